@@ -353,9 +353,9 @@ fn rehearse(scene: &Scene, ends: Vec<Ends>, measured: Duration) -> Measured {
     let simulation = Simulation::for_hosts(scene).unwrap();
     let flag = Arc::clone(&ending);
     let devices = named("devices", move || emulate(simulation, ends, &flag));
-    let supervisor = Supervisor::start(connections, None).unwrap();
     let flag = Arc::clone(&ending);
     let serving = named("loop", move || {
+        let supervisor = Supervisor::start(connections, None).unwrap();
         supervisor.run(&mut dive, &|| flag.load(Ordering::Relaxed), &mut |_| {});
         supervisor.stop(&mut dive, &mut |_| ());
     });

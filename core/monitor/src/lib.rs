@@ -27,6 +27,7 @@ pub mod advice_log;
 pub mod alerts;
 mod app;
 mod arm;
+pub mod byte_ring;
 pub mod digest;
 pub mod entities;
 mod error;

@@ -1,8 +1,9 @@
 //! Bounded lock-free ring of packets from a port's thread to the loop: one writer, one reader.
 
-use ringbuf::traits::{Consumer as _, Observer as _, Producer as _, Split as _};
+use ringbuf::traits::Split as _;
 use ringbuf::{HeapCons, HeapProd, HeapRb};
 
+use crate::byte_ring::{ByteConsumer, ByteProducer};
 use headrace_geometry::time::MonoNs;
 
 /// Size of each packet's header, bytes: receive time, order, length.
@@ -35,13 +36,13 @@ pub enum RingError {
 }
 
 /// The writing end: a port's thread, a player or a simulator.
-pub struct Port {
-    ring: HeapProd<u8>,
+pub struct Port<R: ByteProducer = HeapProd<u8>> {
+    ring: R,
 }
 
 /// The reading end, in the loop.
-pub(super) struct PortReader {
-    ring: HeapCons<u8>,
+pub(super) struct PortReader<R: ByteConsumer = HeapCons<u8>> {
+    ring: R,
 }
 
 /// Header of a packet.
@@ -55,10 +56,15 @@ pub(super) struct PacketHeader {
 /// Makes a ring of `capacity_bytes`, at least large enough for the longest packet.
 pub(super) fn ring(capacity_bytes: usize) -> (Port, PortReader) {
     let (producer, consumer) = HeapRb::new(capacity_bytes.max(HEADER_BYTES + MAX_PACKET_BYTES)).split();
-    (Port { ring: producer }, PortReader { ring: consumer })
+    (Port::on(producer), PortReader::on(consumer))
 }
 
-impl Port {
+impl<R: ByteProducer> Port<R> {
+    /// Writes packets to this ring.
+    pub(super) fn on(ring: R) -> Self {
+        Self { ring }
+    }
+
     /// Hands over a packet received at `received`. Never blocks.
     ///
     /// Errors: the ring is full, or the packet too long; nothing was written.
@@ -73,7 +79,7 @@ impl Port {
         let len = u32::try_from(bytes.len()).ok().filter(|_| bytes.len() <= MAX_PACKET_BYTES);
         let len = len.ok_or(RingError::TooLong { len: bytes.len() })?;
         let needed = HEADER_BYTES + bytes.len();
-        let free = self.ring.vacant_len();
+        let free = self.ring.vacant();
         if free < needed {
             return Err(RingError::Full { free, needed });
         }
@@ -84,22 +90,27 @@ impl Port {
         place.copy_from_slice(&order.to_le_bytes());
         length.copy_from_slice(&len.to_le_bytes());
         // The reader waits for the whole packet, so two writes need no synchronisation.
-        self.ring.push_slice(&header);
-        self.ring.push_slice(bytes);
+        self.ring.push(&header);
+        self.ring.push(bytes);
         Ok(())
     }
 
     /// Whether a packet of `len` bytes would fit now.
     pub fn has_room(&self, len: usize) -> bool {
-        self.ring.vacant_len() >= HEADER_BYTES + len
+        self.ring.vacant() >= HEADER_BYTES + len
     }
 }
 
-impl PortReader {
+impl<R: ByteConsumer> PortReader<R> {
+    /// Reads packets of this ring.
+    pub(super) fn on(ring: R) -> Self {
+        Self { ring }
+    }
+
     /// The next packet's header, when the whole packet is there.
     pub(super) fn peek(&self) -> Option<PacketHeader> {
         let mut header = [0; HEADER_BYTES];
-        if self.ring.occupied_len() < HEADER_BYTES || self.ring.peek_slice(&mut header) < HEADER_BYTES {
+        if self.ring.peek(&mut header) < HEADER_BYTES {
             return None;
         }
         let word = |at: usize| {
@@ -108,19 +119,19 @@ impl PortReader {
             u64::from_le_bytes(bytes)
         };
         let len = (word(12) >> 32) as usize;
-        let whole = self.ring.occupied_len() >= HEADER_BYTES + len;
+        let whole = self.ring.occupied() >= HEADER_BYTES + len;
         whole.then_some(PacketHeader { received: MonoNs(word(0)), order: word(8), len })
     }
 
     /// Discards waiting packets.
     pub(super) fn clear(&mut self) {
-        self.ring.clear();
+        self.ring.skip(usize::MAX);
     }
 
     /// Reads the packet shown by [`PortReader::peek`] into `into`, whose length must be the packet's.
     pub(super) fn take(&mut self, into: &mut [u8]) {
         self.ring.skip(HEADER_BYTES);
-        self.ring.pop_slice(into);
+        self.ring.pop(into);
     }
 }
 
@@ -150,5 +161,37 @@ mod tests {
         assert!(matches!(port.send(MonoNs(2), &[1]), Err(RingError::Full { free: 0, .. })));
         assert!(matches!(port.send(MonoNs(2), &[0; MAX_PACKET_BYTES + 1]), Err(RingError::TooLong { .. })));
         assert_eq!(reader.peek().unwrap().received, MonoNs(1));
+    }
+}
+
+#[cfg(test)]
+mod model_tests {
+    use super::*;
+    use crate::byte_ring::model::{explore, packets};
+
+    /// Packets of different length and content; a ring that holds one of them, and the header of the next.
+    const LENGTHS: [usize; 2] = [3, 5];
+    const CAPACITY: usize = 2 * HEADER_BYTES + 5;
+
+    fn bytes(number: usize) -> Vec<u8> {
+        (0..LENGTHS[number]).map(|at| (16 * number + at + 1) as u8).collect()
+    }
+
+    /// However writer and reader interleave, packets come out whole and in order, and each is either taken or refused.
+    #[test]
+    fn packets_are_taken_whole_or_not_at_all() {
+        let executions = explore("header then body in the loop's ring", Some(4), || {
+            let (mut port, mut reader) = packets(CAPACITY);
+            let writer = loom::thread::spawn(move || {
+                let sent = |number: &usize| port.send(MonoNs(*number as u64), &bytes(*number)).is_ok();
+                (0..LENGTHS.len()).filter(sent).collect::<Vec<_>>()
+            });
+            let mut taken: Vec<_> = (0..2).filter_map(|_| reader.next()).collect();
+            let sent = writer.join().unwrap();
+            taken.extend(std::iter::from_fn(|| reader.next()));
+            let sent: Vec<_> = sent.into_iter().map(|number| (number as u64, bytes(number))).collect();
+            assert_eq!(taken, sent);
+        });
+        assert!(executions > 50, "{executions}");
     }
 }

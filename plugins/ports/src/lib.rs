@@ -16,6 +16,7 @@ mod probe;
 mod status;
 mod supervisor;
 pub mod uhid;
+mod wake;
 
 pub use clock::{clock_anchor, now, of_wall};
 pub use device_end::{EmulatedPort, wait_for_any};
@@ -29,3 +30,4 @@ pub use open_error::{OpenError, OpenErrorKind};
 pub use probe::{Answer, probe};
 pub use status::{Board, LineHistory, Phase, Status};
 pub use supervisor::{Connection, Supervisor};
+pub use wake::{System, Threads, Waker};

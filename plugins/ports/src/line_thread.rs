@@ -8,7 +8,6 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread;
 use std::time::Duration;
 
-use crossbeam::sync::Unparker;
 use headrace_geometry::time::{DurNs, MonoNs};
 use headrace_monitor::ring::{MAX_PACKET_BYTES, Port};
 use headrace_sensor::connect::{Connect, ConnectError};
@@ -20,6 +19,7 @@ use crate::host::Host;
 use crate::lines::{self, Line, READ_BYTES, Senders};
 use crate::open_error::OpenError;
 use crate::status::{Board, LineHistory, Phase, Status};
+use crate::wake::Waker;
 
 /// Reconnect backoff: initial and maximum pause; shorter for local ports, which are cheap to retry.
 const FIRST_PAUSE: DurNs = DurNs::from_millis(250);
@@ -57,7 +57,7 @@ pub struct Common {
     /// Where changes of status are posted.
     pub board: Board,
     /// Wakes the loop when packets have come.
-    pub waker: Unparker,
+    pub waker: Waker,
     /// Gets all messages sent to devices.
     pub sent: Option<SentSink>,
 }
@@ -321,7 +321,7 @@ impl LineService {
         for AttachedState { attached: Attached { driver, port, .. }, history, .. } in &mut self.devices {
             driver.closed(&mut Ends { port, history, requests: &mut VecDeque::new() });
         }
-        self.common.waker.unpark();
+        self.common.waker.wake();
     }
 
     fn count_lost(&mut self) {
@@ -372,7 +372,7 @@ impl LineService {
             }
             self.drive(line, number, |driver, wire| driver.heard(received, bytes, wire))?;
         }
-        self.common.waker.unpark();
+        self.common.waker.wake();
         Ok(())
     }
 
@@ -388,7 +388,7 @@ impl LineService {
             let awaited = others.any(|(other, device)| other != number && awaits(device));
             if device.attached.driver.due().is_some_and(|due| due <= now) && !awaited {
                 self.drive(line, number, |driver, wire| driver.wake(now, wire))?;
-                self.common.waker.unpark();
+                self.common.waker.wake();
             }
         }
         Ok(())

@@ -2,12 +2,12 @@
 
 use std::convert::Infallible;
 use std::io;
+use std::marker::PhantomData;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread::{self, JoinHandle};
 use std::time::Duration;
 
-use crossbeam::sync::Parker;
 use headrace_geometry::time::MonoNs;
 use headrace_monitor::feed::{self, Feed};
 use headrace_monitor::ring::Port;
@@ -19,6 +19,7 @@ use crate::clock;
 use crate::host::RealHost;
 use crate::line_thread::{Attached, Common, LineService, SentSink};
 use crate::status::{Board, LineHistory, Status};
+use crate::wake::{self, Waker};
 
 /// Capacity of the status board.
 const BOARD: usize = 256;
@@ -46,22 +47,23 @@ pub struct Supervisor {
     threads: Vec<JoinHandle<Vec<(usize, LineHistory)>>>,
     stopping: Arc<AtomicBool>,
     board: Board,
-    parker: Parker,
+    /// Not `Send`: the loop runs on the thread that its wakers know.
+    on_this_thread: PhantomData<*const ()>,
 }
 
 impl Supervisor {
-    /// Starts the threads. `sent` receives all messages sent to devices.
+    /// Starts the threads, which wake this one for the loop. `sent` receives all messages sent to devices.
     ///
     /// Errors: a thread can't be started.
     pub fn start(connections: Vec<Connection>, sent: Option<SentSink>) -> io::Result<Self> {
-        let parker = Parker::new();
         let stopping = Arc::new(AtomicBool::new(false));
         let board = Board::new(BOARD);
-        let waker = parker.unparker().clone();
+        let waker = Waker::of_this_thread();
         let host = Arc::new(RealHost);
         let common = Common { host, stopping: Arc::clone(&stopping), board: board.clone(), waker, sent };
         let sensors = connections.iter().map(|hand| hand.source + 1).max().unwrap_or(0);
-        let mut supervisor = Self { sensors, threads: Vec::new(), stopping, board, parker };
+        let mut supervisor =
+            Self { sensors, threads: Vec::new(), stopping, board, on_this_thread: PhantomData };
         let mut before = Vec::new();
         for (name, connect, attached) in lines(connections) {
             let service = LineService::new(connect.clone(), before.clone(), attached, common.clone());
@@ -79,7 +81,7 @@ impl Supervisor {
 
     /// Runs the loop until `ended` returns true: a tick as soon as packets have come, or a period has passed.
     pub fn run(&self, dive: &mut Loop, ended: &dyn Fn() -> bool, after_tick: &mut dyn FnMut(&Loop)) {
-        let Ok(()) = feed::drive(dive, &mut LiveFeed { supervisor: self, ended }, after_tick);
+        let Ok(()) = feed::drive(dive, &mut LiveFeed { ended }, after_tick);
     }
 
     /// Stops all threads and drains the rings; returns each sensor's line history, in the order of the sensors.
@@ -103,7 +105,6 @@ impl Supervisor {
 
 /// The ports as the feed of a loop: their threads fill the rings.
 struct LiveFeed<'a> {
-    supervisor: &'a Supervisor,
     ended: &'a dyn Fn() -> bool,
 }
 
@@ -114,7 +115,7 @@ impl Feed for LiveFeed<'_> {
         if (self.ended)() {
             return Ok(None);
         }
-        self.supervisor.parker.park_timeout(PERIOD);
+        wake::sleep::<wake::System>(PERIOD);
         Ok(Some(clock::now()))
     }
 

@@ -21,7 +21,7 @@ use headrace_monitor::App;
 use headrace_monitor::merge::Inbox;
 use headrace_monitor::outlet::{NoticeOutlet, NoticeReceiver};
 use headrace_monitor::run::Loop;
-use headrace_ports::{Attached, Board, Common, LineHistory, LineService};
+use headrace_ports::{Attached, Board, Common, LineHistory, LineService, Waker};
 use headrace_replay::drive::{Pace, drive};
 use headrace_replay::log::{
     LogHeader, Recorder, RecorderWorker, RecordingEvent, Rotation, SourceInfo, Summary,
@@ -200,12 +200,11 @@ impl World {
         let disk = SimulatedDisk::new(Arc::clone(&clock), &plan.disk, sabotage);
         let (mut dive, recorder, notices) = assemble(&vehicle, &text, &disk);
         let board = Board::new(1 << 16);
-        let waker = crossbeam::sync::Parker::new().unparker().clone();
         let common = Common {
             host: Arc::new(Machine { clock: Arc::clone(&clock), cables: cables.clone() }),
             stopping: Arc::new(AtomicBool::new(false)),
             board: board.clone(),
-            waker,
+            waker: Waker::of_this_thread(),
             sent: None,
         };
         let mut programs = vehicle.programs().unwrap().into_iter();

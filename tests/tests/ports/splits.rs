@@ -113,7 +113,7 @@ fn readings(device: &dyn Device, parts: &[(MonoNs, &[u8])]) -> Vec<String> {
     let mut readings = Vec::new();
     for (received, bytes) in &wire.0 {
         decoder.decode(Packet { received: *received, bytes }, &mut |decoded| {
-            readings.push(format!("{decoded:?}"))
+            readings.push(format!("{decoded:?}"));
         });
     }
     readings
@@ -124,7 +124,7 @@ fn decoded(device: &dyn Device, parts: &[(MonoNs, &[u8])]) -> Vec<String> {
     let (mut decoder, mut readings) = (device.specification().decoder, Vec::new());
     for (received, bytes) in parts {
         decoder.decode(Packet { received: *received, bytes }, &mut |decoded| {
-            readings.push(format!("{decoded:?}"))
+            readings.push(format!("{decoded:?}"));
         });
     }
     readings

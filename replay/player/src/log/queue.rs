@@ -5,12 +5,13 @@ use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 
 use crossbeam::queue::ArrayQueue;
 use headrace_geometry::time::MonoNs;
+use headrace_monitor::byte_ring::{ByteConsumer, ByteProducer};
 use ringbuf::HeapRb;
-use ringbuf::traits::{Consumer as _, Observer as _};
-use ringbuf::wrap::Cons;
+use ringbuf::wrap::{Cons, Prod};
 
 use super::fault::RecordingEvent;
 use super::fields::Fields;
+use super::recorder::Full;
 use super::writer::Lane;
 
 /// Header of each entry in the queue: kind, a spare byte, number, length, log time, publish time.
@@ -92,18 +93,64 @@ pub(super) fn entry_head(
     head
 }
 
+/// The loop's end of the queue.
+pub(super) struct Entries<R: ByteProducer = Prod<Arc<HeapRb<u8>>>> {
+    pub(super) ring: R,
+}
+
+impl<R: ByteProducer> Entries<R> {
+    /// Reserves room for an entry with a message of `len` bytes, which must follow, and writes its header. The thread takes an
+    /// entry only once it is complete.
+    pub(super) fn begin(
+        &mut self,
+        lane: Lane,
+        log_time: MonoNs,
+        publish_time: MonoNs,
+        len: usize,
+    ) -> Result<(), Full> {
+        let (free, needed) = (self.ring.vacant(), ENTRY_HEAD_BYTES.saturating_add(len));
+        let len = u32::try_from(len).ok().filter(|_| needed <= free).ok_or(Full { free, needed })?;
+        self.ring.push(&entry_head(lane, log_time, publish_time, len));
+        Ok(())
+    }
+
+    /// The message, or a part of it.
+    pub(super) fn put(&mut self, bytes: &[u8]) {
+        self.ring.push(bytes);
+    }
+}
+
+/// Works until it is told to stop and nothing is left: `work` says how much it found to do, `idle` waits a little.
+///
+/// The flag is read before the queue is looked at, so that what was pushed before it was set is taken.
+pub(super) fn until_stopped(
+    is_stopping: impl Fn() -> bool,
+    mut work: impl FnMut() -> usize,
+    mut idle: impl FnMut(),
+) {
+    loop {
+        let stopping = is_stopping();
+        match work() {
+            0 if stopping => return,
+            0 => idle(),
+            _ => (),
+        }
+    }
+}
+
 /// The thread's end of the queue.
-pub(super) struct Queue {
-    pub(super) ring: Cons<Arc<HeapRb<u8>>>,
-    pub(super) state: Arc<State>,
+pub(super) struct Queue<R: ByteConsumer = Cons<Arc<HeapRb<u8>>>> {
+    pub(super) ring: R,
     /// The message of the entry taken last.
     pub(super) message: Vec<u8>,
 }
 
 /// However the recorder ends, the loop doesn't wait for it.
-impl Drop for Queue {
+pub(super) struct ClosedWhenDropped(pub(super) Arc<State>);
+
+impl Drop for ClosedWhenDropped {
     fn drop(&mut self) {
-        self.state.closed.store(true, Ordering::Release);
+        self.0.closed.store(true, Ordering::Release);
     }
 }
 
@@ -114,17 +161,17 @@ pub(super) struct Entry {
     pub(super) publish_time: MonoNs,
 }
 
-impl Queue {
+impl<R: ByteConsumer> Queue<R> {
     /// The next entry, if all of it is there; its message is then in `message`.
     pub(super) fn take(&mut self) -> Option<Entry> {
         let mut head = [0; ENTRY_HEAD_BYTES];
-        if self.ring.peek_slice(&mut head) < ENTRY_HEAD_BYTES {
+        if self.ring.peek(&mut head) < ENTRY_HEAD_BYTES {
             return None;
         }
         let mut fields = Fields::new(&head);
         let (kind, _, number) = (fields.u8()?, fields.u8()?, fields.u16()?);
         let len = usize::try_from(fields.u32()?).ok()?;
-        if self.ring.occupied_len() < ENTRY_HEAD_BYTES + len {
+        if self.ring.occupied() < ENTRY_HEAD_BYTES + len {
             return None;
         }
         let lane = match kind {
@@ -135,7 +182,62 @@ impl Queue {
         };
         self.ring.skip(ENTRY_HEAD_BYTES);
         self.message.resize(len, 0);
-        self.ring.pop_slice(&mut self.message);
+        self.ring.pop(&mut self.message);
         Some(Entry { lane, log_time: MonoNs(fields.u64()?), publish_time: MonoNs(fields.u64()?) })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::atomic::Ordering::{Acquire, Release};
+
+    use headrace_monitor::byte_ring::model::{explore, ring};
+    use loom::sync::Arc;
+    use loom::sync::atomic::AtomicBool;
+
+    use super::*;
+
+    const TIMES: MonoNs = MonoNs(7);
+
+    fn message(number: usize) -> Vec<u8> {
+        vec![number as u8 + 1; [5, 0][number]]
+    }
+
+    fn push(entries: &mut Entries<headrace_monitor::byte_ring::model::ModelProducer>, number: usize) {
+        let lane = Lane::Raw(number as u16);
+        entries.begin(lane, TIMES, TIMES, message(number).len()).unwrap();
+        entries.put(&message(number));
+    }
+
+    /// However loop and recorder interleave, entries come out whole and in order, and none that was pushed before the stop is
+    /// left in the queue.
+    #[test]
+    fn entries_are_taken_whole_and_all_of_them_before_the_stop() {
+        let executions = explore("header then body in the recorder's queue, and its stop", Some(2), || {
+            let (producer, consumer) = ring(64);
+            let stopping = Arc::new(AtomicBool::new(false));
+            let flag = Arc::clone(&stopping);
+            let recorder = loom::thread::spawn(move || {
+                let mut queue = Queue { ring: consumer, message: Vec::new() };
+                let mut taken = Vec::new();
+                let work = || {
+                    let entry = queue.take();
+                    taken.extend(
+                        entry.iter().map(|entry| (entry.lane, entry.log_time, queue.message.clone())),
+                    );
+                    usize::from(entry.is_some())
+                };
+                until_stopped(|| flag.load(Acquire), work, loom::thread::yield_now);
+                taken
+            });
+            let mut entries = Entries { ring: producer };
+            push(&mut entries, 0);
+            push(&mut entries, 1);
+            stopping.store(true, Release);
+            let taken = recorder.join().unwrap();
+            let pushed = |number| (Lane::Raw(number as u16), TIMES, message(number));
+            assert_eq!(taken, [pushed(0), pushed(1)]);
+        });
+        assert!(executions > 50, "{executions}");
     }
 }

@@ -12,15 +12,16 @@ use std::time::{Duration, Instant};
 
 use crossbeam::queue::ArrayQueue;
 use headrace_geometry::time::MonoNs;
+use headrace_monitor::byte_ring::ByteProducer as _;
 use ringbuf::HeapRb;
-use ringbuf::traits::{Observer as _, Producer as _};
+use ringbuf::traits::Observer as _;
 use ringbuf::wrap::{Cons, Prod};
 
 use super::LogError;
 use super::derived_channels::DerivedChannels;
 use super::fault::RecordingEvent;
 use super::format::{TICK_HEAD_BYTES, order_bytes, tick_head};
-use super::queue::{ENTRY_HEAD_BYTES, Gap, Queue, SentPort, State, entry_head};
+use super::queue::{ENTRY_HEAD_BYTES, Entries, Gap, Queue, SentPort, State, until_stopped};
 use super::recording::Recording;
 use super::rotate::{Rotation, in_the_way};
 use super::storage::{Disk, OneWriter, Storage};
@@ -54,7 +55,7 @@ pub struct Recorder;
 /// The loop's end. Its methods don't block, allocate or make system calls.
 pub struct RecorderPort {
     /// Without a cached index, so that the port is `Sync` and can be a resource of the loop's world.
-    ring: Prod<Arc<HeapRb<u8>>>,
+    entries: Entries,
     state: Arc<State>,
     result_channels: usize,
     /// Ticks skipped since the last one that was recorded.
@@ -132,12 +133,12 @@ impl Recorder {
             results_missing: AtomicU64::new(0),
         });
         let port = RecorderPort {
-            ring: Prod::new(Arc::clone(&ring)),
+            entries: Entries { ring: Prod::new(Arc::clone(&ring)) },
             state: Arc::clone(&state),
             result_channels: header.results.len(),
             gap: None,
         };
-        let queue = Queue { ring: Cons::new(ring), state: Arc::clone(&state), message: Vec::new() };
+        let queue = Queue { ring: Cons::new(ring), message: Vec::new() };
         Ok((port, RecorderWorker::new(queue, recording, header, derived, state)))
     }
 
@@ -161,17 +162,10 @@ impl Recorder {
 )]
 fn run(mut worker: RecorderWorker) -> Summary {
     let began = Instant::now();
-    loop {
-        // Read before the queue is checked, so that entries pushed before the flag was set are taken.
-        let stopping = worker.is_stopping();
-        let taken = worker.step(began.elapsed());
-        if !taken && stopping {
-            return worker.finish(began.elapsed());
-        }
-        if !taken {
-            thread::park_timeout(NAP);
-        }
-    }
+    let state = Arc::clone(worker.state());
+    let work = || usize::from(worker.step(began.elapsed()));
+    until_stopped(|| state.stopping.load(Ordering::Acquire), work, || thread::park_timeout(NAP));
+    worker.finish(began.elapsed())
 }
 
 impl RecorderPort {
@@ -196,8 +190,8 @@ impl RecorderPort {
         let len = TICK_HEAD_BYTES.saturating_add(order.len().saturating_mul(2));
         self.begin(Lane::Tick, now, now, len)?;
         // `begin` has reserved room for the whole entry, whose length is a u32, so the count fits as well.
-        self.ring.push_slice(&tick_head(index, now, u32::try_from(order.len()).unwrap_or(u32::MAX)));
-        self.ring.push_iter(order_bytes(order));
+        self.entries.put(&tick_head(index, now, u32::try_from(order.len()).unwrap_or(u32::MAX)));
+        self.entries.ring.push_each(order_bytes(order));
         Ok(())
     }
 
@@ -227,12 +221,12 @@ impl RecorderPort {
 
     /// Free bytes of the queue.
     pub fn vacant_bytes(&self) -> usize {
-        self.ring.vacant_len()
+        self.entries.ring.vacant_len()
     }
 
     /// Capacity of the queue, bytes; a larger entry never fits.
     pub fn capacity_bytes(&self) -> usize {
-        self.ring.capacity().get()
+        self.entries.ring.capacity().get()
     }
 
     /// Bytes in the queue of an entry with a message of `len` bytes.
@@ -252,7 +246,7 @@ impl RecorderPort {
 
     fn push(&mut self, lane: Lane, log_time: MonoNs, publish_time: MonoNs, bytes: &[u8]) -> Result<(), Full> {
         self.begin(lane, log_time, publish_time, bytes.len())?;
-        self.ring.push_slice(bytes);
+        self.entries.put(bytes);
         Ok(())
     }
 
@@ -263,13 +257,12 @@ impl RecorderPort {
         }
     }
 
-    /// Reserves room for an entry with a message of `len` bytes, and writes its header. The thread takes an entry only once
-    /// it is complete.
+    /// Begins an entry with a message of `len` bytes. What was skipped before it is told before it.
     fn begin(&mut self, lane: Lane, log_time: MonoNs, publish_time: MonoNs, len: usize) -> Result<(), Full> {
-        let (free, needed) = (self.vacant_bytes(), Self::entry_bytes(len));
-        let len = u32::try_from(len).ok().filter(|_| needed <= free).ok_or(Full { free, needed })?;
-        self.end_gap();
-        self.ring.push_slice(&entry_head(lane, log_time, publish_time, len));
+        if Self::entry_bytes(len) <= self.vacant_bytes() {
+            self.end_gap();
+        }
+        self.entries.begin(lane, log_time, publish_time, len)?;
         Ok(())
     }
 }

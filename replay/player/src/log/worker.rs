@@ -6,7 +6,7 @@ use std::time::Duration;
 
 use super::derived_channels::{DerivedChannels, Made};
 use super::fault::RecordingEvent;
-use super::queue::{Entry, Gap, Queue, SentPort, State};
+use super::queue::{ClosedWhenDropped, Entry, Gap, Queue, SentPort, State};
 use super::recording::Recording;
 use super::space::{LONGEST_KEPT_BYTES, Space};
 use super::writer::{Lane, LogHeader, Summary};
@@ -30,6 +30,7 @@ pub struct RecorderWorker {
     /// Packets of skipped ticks.
     skipped: u64,
     state: Arc<State>,
+    _closed: ClosedWhenDropped,
 }
 
 /// Derived channels, and a buffer for their messages.
@@ -68,6 +69,7 @@ impl RecorderWorker {
         derived: Option<Box<dyn DerivedChannels>>,
         state: Arc<State>,
     ) -> Self {
+        let closed = ClosedWhenDropped(Arc::clone(&state));
         Self {
             queue,
             recording,
@@ -78,6 +80,7 @@ impl RecorderWorker {
             beside: Beside { derived, made: Vec::new() },
             skipped: 0,
             state,
+            _closed: closed,
         }
     }
 
@@ -91,9 +94,9 @@ impl RecorderWorker {
         self.state.events.pop()
     }
 
-    /// Whether the recorder has been told to end.
-    pub(super) fn is_stopping(&self) -> bool {
-        self.state.stopping.load(Ordering::Acquire)
+    /// The state that it shares with its port.
+    pub(super) fn state(&self) -> &Arc<State> {
+        &self.state
     }
 
     /// Writes some of what is in the queue, and syncs and tries again what is due, at `now` since the recording began. `now`

@@ -1,0 +1,68 @@
+//! What the protocols on lock-free rings of bytes need of a ring: one writer, one reader, each push published whole.
+//!
+//! The rings are ringbuf's. The protocols on them are ours, and written against these traits, so that the same code runs on
+//! a ring whose every interleaving can be tried (feature `model`).
+
+use ringbuf::traits::{Consumer, Producer};
+
+#[cfg(any(test, feature = "model"))]
+pub mod model;
+
+/// Writing end of a ring of bytes. Never blocks.
+pub trait ByteProducer {
+    /// Free bytes, at least: the reader may free more meanwhile.
+    fn vacant(&self) -> usize;
+
+    /// Publishes bytes, all at once; what doesn't fit is left out.
+    fn push(&mut self, bytes: &[u8]);
+
+    /// The same of bytes that aren't in one place.
+    fn push_each(&mut self, bytes: impl Iterator<Item = u8>);
+}
+
+/// Reading end of a ring of bytes. Never blocks.
+pub trait ByteConsumer {
+    /// Bytes waiting, at least: the writer may add more meanwhile.
+    fn occupied(&self) -> usize;
+
+    /// Copies waiting bytes, which stay; their number.
+    fn peek(&self, into: &mut [u8]) -> usize;
+
+    /// Discards waiting bytes.
+    fn skip(&mut self, count: usize);
+
+    /// Takes waiting bytes; their number.
+    fn pop(&mut self, into: &mut [u8]) -> usize;
+}
+
+impl<R: Producer<Item = u8>> ByteProducer for R {
+    fn vacant(&self) -> usize {
+        self.vacant_len()
+    }
+
+    fn push(&mut self, bytes: &[u8]) {
+        self.push_slice(bytes);
+    }
+
+    fn push_each(&mut self, bytes: impl Iterator<Item = u8>) {
+        self.push_iter(bytes);
+    }
+}
+
+impl<R: Consumer<Item = u8>> ByteConsumer for R {
+    fn occupied(&self) -> usize {
+        self.occupied_len()
+    }
+
+    fn peek(&self, into: &mut [u8]) -> usize {
+        self.peek_slice(into)
+    }
+
+    fn skip(&mut self, count: usize) {
+        Consumer::skip(self, count);
+    }
+
+    fn pop(&mut self, into: &mut [u8]) -> usize {
+        self.pop_slice(into)
+    }
+}

@@ -1,0 +1,124 @@
+//! A ring whose interleavings are explored by loom: all orders of its accesses, and all that weaker memory lets a reader see.
+//!
+//! The indices are loom's, with the orderings that ringbuf's have. The bytes are visible as soon as they are stored, which
+//! is no weaker: what a reader may see of them follows from the indices alone, and ringbuf sees to that.
+
+use std::sync::atomic::AtomicU8;
+use std::sync::atomic::Ordering::Relaxed;
+
+use loom::sync::Arc;
+use loom::sync::atomic::AtomicUsize;
+use loom::sync::atomic::Ordering::{Acquire, Release};
+
+use super::{ByteConsumer, ByteProducer};
+use crate::ring::{Port, PortReader};
+
+struct Shared {
+    bytes: Vec<AtomicU8>,
+    read: AtomicUsize,
+    write: AtomicUsize,
+}
+
+impl Shared {
+    fn byte(&self, at: usize) -> Option<&AtomicU8> {
+        self.bytes.get(at % self.bytes.len().max(1))
+    }
+}
+
+/// Writing end. Its own index is at hand and isn't loaded: loom would take the load for one that hides the reader's.
+pub struct ModelProducer {
+    shared: Arc<Shared>,
+    write: usize,
+}
+
+/// Reading end, likewise.
+pub struct ModelConsumer {
+    shared: Arc<Shared>,
+    read: usize,
+}
+
+/// A ring of `capacity` bytes, within `loom::model`.
+pub fn ring(capacity: usize) -> (ModelProducer, ModelConsumer) {
+    let bytes = (0..capacity).map(|_| AtomicU8::new(0)).collect();
+    let shared = Arc::new(Shared { bytes, read: AtomicUsize::new(0), write: AtomicUsize::new(0) });
+    (ModelProducer { shared: Arc::clone(&shared), write: 0 }, ModelConsumer { shared, read: 0 })
+}
+
+impl ByteProducer for ModelProducer {
+    fn vacant(&self) -> usize {
+        self.shared.bytes.len() + self.shared.read.load(Acquire) - self.write
+    }
+
+    fn push(&mut self, bytes: &[u8]) {
+        self.push_each(bytes.iter().copied());
+    }
+
+    fn push_each(&mut self, bytes: impl Iterator<Item = u8>) {
+        for byte in bytes.take(self.vacant()) {
+            if let Some(place) = self.shared.byte(self.write) {
+                place.store(byte, Relaxed);
+            }
+            self.write += 1;
+        }
+        self.shared.write.store(self.write, Release);
+    }
+}
+
+impl ByteConsumer for ModelConsumer {
+    fn occupied(&self) -> usize {
+        self.shared.write.load(Acquire) - self.read
+    }
+
+    fn peek(&self, into: &mut [u8]) -> usize {
+        let count = self.occupied().min(into.len());
+        for (at, place) in (self.read..self.read + count).zip(into) {
+            *place = self.shared.byte(at).map_or(0, |byte| byte.load(Relaxed));
+        }
+        count
+    }
+
+    fn skip(&mut self, count: usize) {
+        self.read += count.min(self.occupied());
+        self.shared.read.store(self.read, Release);
+    }
+
+    fn pop(&mut self, into: &mut [u8]) -> usize {
+        let count = self.peek(into);
+        self.skip(count);
+        count
+    }
+}
+
+/// The loop's ring on a model.
+pub fn packets(capacity: usize) -> (Port<ModelProducer>, ModelReader) {
+    let (producer, consumer) = ring(capacity);
+    (Port::on(producer), ModelReader(PortReader::on(consumer)))
+}
+
+/// Reading end of the loop's ring on a model.
+pub struct ModelReader(PortReader<ModelConsumer>);
+
+impl ModelReader {
+    /// The next packet, as the loop takes it: receive time and bytes.
+    pub fn next(&mut self) -> Option<(u64, Vec<u8>)> {
+        let header = self.0.peek()?;
+        let mut bytes = vec![0; header.len];
+        self.0.take(&mut bytes);
+        Some((header.received.0, bytes))
+    }
+}
+
+/// Runs a model, tells how many executions it had, and gives their number.
+pub fn explore(name: &str, preemptions: Option<usize>, model: impl Fn() + Sync + Send + 'static) -> usize {
+    let executions = std::sync::Arc::new(std::sync::atomic::AtomicUsize::new(0));
+    let count = std::sync::Arc::clone(&executions);
+    let mut builder = loom::model::Builder::new();
+    builder.preemption_bound = preemptions;
+    builder.check(move || {
+        count.fetch_add(1, Relaxed);
+        model();
+    });
+    let executions = executions.load(Relaxed);
+    println!("{name}: {executions} executions");
+    executions
+}

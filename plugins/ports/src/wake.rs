@@ -1,0 +1,123 @@
+//! How the threads of the lines wake the loop.
+//!
+//! The loop parks on its thread's token, one atomic word: a waker swaps it and makes one system call only if the loop sleeps
+//! on it. Neither side takes a lock or waits for the other. Packets are in their ring before the token is set, and the loop
+//! looks at the rings after it has taken the token, so that no packet is slept over.
+
+use std::time::Duration;
+
+/// Threads that can be parked: the system's, or a model's.
+pub trait Threads {
+    /// Handle of a thread.
+    type Thread: Clone;
+
+    /// This thread.
+    fn current() -> Self::Thread;
+
+    /// Sets a thread's token.
+    fn unpark(thread: &Self::Thread);
+
+    /// Waits for this thread's token, for some time at most, and takes it.
+    fn park(at_most: Duration);
+}
+
+/// The system's threads.
+pub struct System;
+
+impl Threads for System {
+    type Thread = std::thread::Thread;
+
+    fn current() -> Self::Thread {
+        std::thread::current()
+    }
+
+    fn unpark(thread: &Self::Thread) {
+        thread.unpark();
+    }
+
+    fn park(at_most: Duration) {
+        std::thread::park_timeout(at_most);
+    }
+}
+
+/// Wakes the thread that has made it.
+pub struct Waker<T: Threads = System>(T::Thread);
+
+impl<T: Threads> Clone for Waker<T> {
+    fn clone(&self) -> Self {
+        Self(self.0.clone())
+    }
+}
+
+impl<T: Threads> Waker<T> {
+    /// Wakes this thread.
+    pub fn of_this_thread() -> Self {
+        Self(T::current())
+    }
+
+    /// Ends the current sleep, or the next one. What was written before is seen after it.
+    pub fn wake(&self) {
+        T::unpark(&self.0);
+    }
+}
+
+/// Sleeps until this thread is woken, or for `at_most`; returns at once if it was woken since its last sleep.
+pub(crate) fn sleep<T: Threads>(at_most: Duration) {
+    T::park(at_most);
+}
+
+#[cfg(test)]
+mod tests {
+    use headrace_geometry::time::MonoNs;
+    use headrace_monitor::byte_ring::model::{explore, packets};
+
+    use super::*;
+
+    /// Threads of a model, whose sleeps have no end but being woken: one that is slept over is a deadlock, which loom tells.
+    struct Modelled;
+
+    impl Threads for Modelled {
+        type Thread = loom::thread::Thread;
+
+        fn current() -> Self::Thread {
+            loom::thread::current()
+        }
+
+        fn unpark(thread: &Self::Thread) {
+            thread.unpark();
+        }
+
+        fn park(_: Duration) {
+            loom::thread::park();
+        }
+    }
+
+    /// A line's thread sends and wakes, as `LineThread` does; the loop looks at its rings and sleeps, as `LiveFeed` does.
+    fn line_and_loop(packets_sent: u64) {
+        let (mut port, mut reader) = packets(64);
+        let waker = Waker::<Modelled>::of_this_thread();
+        let line = loom::thread::spawn(move || {
+            for number in 0..packets_sent {
+                port.send(MonoNs(number), &[number as u8 + 1]).unwrap();
+                waker.wake();
+            }
+        });
+        let mut taken = Vec::new();
+        loop {
+            taken.extend(std::iter::from_fn(|| reader.next()));
+            if taken.len() as u64 == packets_sent {
+                break;
+            }
+            sleep::<Modelled>(Duration::MAX);
+        }
+        line.join().unwrap();
+        let sent: Vec<_> = (0..packets_sent).map(|number| (number, vec![number as u8 + 1])).collect();
+        assert_eq!(taken, sent);
+    }
+
+    #[test]
+    fn no_packet_is_slept_over() {
+        let executions = explore("wake-up of the loop", Some(4), || line_and_loop(2));
+        assert!(executions > 50, "{executions}");
+    }
+}
