@@ -244,7 +244,8 @@ impl Sections {
         let section = self.get_mut(request.section)?;
         let before = Self::counted(section);
         let (error_m, had_a_flag) = (confidence_sd * sd_m, section.is_flagged());
-        let is_same = section.hole.is_some_and(|before| before.is_like(&hole)) && section.evidence.is_some();
+        let is_like = section.hole.is_some_and(|before| before.is_like(&hole));
+        let is_same = is_like && section.evidence.is_some() && !section.explained_in_part;
         section.hole = Some(hole);
         section.hole_sd_m = sd_m;
         section.verdict = match verdict(&hole, error_m, target_m, clear_m.min(passed_m)) {
@@ -277,7 +278,8 @@ impl Sections {
         // What is lacking in a hole that hasn't changed may have been forgotten since.
         if section.verdict == Verdict::Fail && !is_same {
             let evidence = self.explain(&hole, request, judging);
-            self.get_mut(request.section)?.evidence = Some(evidence);
+            let section = self.get_mut(request.section)?;
+            (section.evidence, section.explained_in_part) = (Some(evidence), request.only_fails);
         }
         let section = self.get_mut(request.section)?;
         let (judgement, now) = (section.flag(request.at), Self::counted(section));
@@ -365,10 +367,21 @@ impl Sections {
         runs.set(request.section, cause, &mut Telling { at: request.at, hole: &hole, tell: judging.tell });
     }
 
-    /// The causes of a hole, from the passages of the sections within T.
-    fn explain(&self, hole: &Hole, request: &Request, judging: &mut Judging<'_>) -> Evidence {
-        let bounds_m = self.bounds_m(request.section);
+    /// The causes of a hole, from the passages of the sections within T. Of a section that isn't left yet, those of the
+    /// largest hole in the part that is.
+    fn explain(&self, whole: &Hole, request: &Request, judging: &mut Judging<'_>) -> Evidence {
+        let mut bounds_m = self.bounds_m(request.section);
         let near = self.index_of(bounds_m.0 - self.target_m)..=self.index_of(bounds_m.1 + self.target_m);
+        let mut hole = *whole;
+        if let Some(reach) = request.to_come.filter(|_| request.only_fails) {
+            let left =
+                (bounds_m.0.max(reach.to_m + self.left_m()), bounds_m.1.min(reach.from_m - self.left_m()));
+            let left = if reach.from_m.is_finite() { (bounds_m.0, left.1) } else { (left.0, bounds_m.1) };
+            if left.0 < left.1 {
+                let first = self.get(request.section).map_or(0, |section| section.visits.first());
+                (bounds_m, hole) = (left, judging.finder.largest_since(judging.store, left.0, left.1, first));
+            }
+        }
         let beside = |index: i64| {
             let section = self.get(index).filter(|section| section.is_flagged());
             section.and_then(|section| section.evidence).map_or(Causes::default(), |evidence| evidence.causes)
@@ -376,7 +389,7 @@ impl Sections {
         let here = self.get(request.section).copied().unwrap_or_default();
         let (visits, passage) = (here.visits, here.passage);
         let case = Case {
-            hole,
+            hole: &hole,
             bounds_m,
             first_visit: visits.first(),
             swept_by_all: request.swept_by_all,
