@@ -4,5 +4,6 @@
 
 mod circles;
 mod imports;
+mod promises;
 mod tidy;
 mod workspace;
