@@ -7,7 +7,7 @@
 use std::ops::Range;
 
 use headrace_geometry::frames::{Pose, head_direction};
-use headrace_geometry::math::TAU;
+use headrace_geometry::math::{self, TAU};
 use headrace_geometry::time::{DurNs, MonoNs};
 use headrace_monitor::report::SectionReport;
 
@@ -18,8 +18,8 @@ use crate::wall::Wall;
 pub const EVERY: DurNs = DurNs(100_000_000);
 /// Rays round a head.
 const RAYS: u32 = 48;
-/// Lines across a section on which its earliest fail is looked for.
-const LINES: u32 = 20;
+/// Parts of a section in which its earliest fail is looked for.
+pub const PARTS: u32 = 16;
 /// The program looks where all heads have been five times a second, and goes by the farthest wall for a tilted head's
 /// reach: its place is known to this, m.
 pub const NEAR_M: f64 = 0.12;
@@ -74,12 +74,21 @@ fn ends_m(dive: &Dive, pose: &Pose) -> [f64; 2] {
     [rear_m, front_m]
 }
 
-/// The least chainage in a section about which a circle of this radius is empty, as far as lines across it show, and lies
-/// where all heads have been: from `passed_m` on.
+/// The least chainage in a section about which a circle of this radius is empty and lies where all heads have been, from
+/// `passed_m` on; to a part of the section in [`PARTS`], and never too small.
 pub fn first_failing_m(wall: &Wall, [from_m, to_m]: [f64; 2], radius_m: f64, passed_m: f64) -> Option<f64> {
-    let line = |k: u32| from_m + (to_m - from_m) * f64::from(k) / f64::from(LINES);
-    let empty = |x_m: &f64| wall.largest_on(*x_m).is_some_and(|circle| circle.radius_m > radius_m);
-    (0..=LINES).map(line).filter(|x_m| x_m - radius_m >= passed_m).find(empty)
+    let from_m = from_m.max(passed_m + radius_m);
+    if from_m >= to_m { None } else { first_in_m(wall, [from_m, to_m], radius_m, PARTS) }
+}
+
+fn first_in_m(wall: &Wall, [from_m, to_m]: [f64; 2], radius_m: f64, parts: u32) -> Option<f64> {
+    let circle = wall.largest(from_m, to_m).filter(|circle| circle.radius_m > radius_m)?;
+    let middle_m = f64::midpoint(from_m, to_m);
+    let half = |ends_m: [f64; 2]| first_in_m(wall, ends_m, radius_m, parts / 2);
+    if parts < 2 {
+        return Some(circle.centre[0]);
+    }
+    half([from_m, middle_m]).or_else(|| half([middle_m, to_m]))
 }
 
 /// The first moment, among these, at which all that is in reach lies beyond a chainage.
@@ -101,7 +110,7 @@ pub struct Flag {
     pub start_m: f64,
     /// The first moment from which going on forward couldn't undo the fail, seconds.
     pub due_s: Option<f64>,
-    /// The same, were it as early as the lines across the section leave open.
+    /// The same, were it as early as the parts of the section leave open.
     pub may_s: Option<f64>,
     /// When the dive ended.
     pub end_s: f64,
@@ -109,6 +118,8 @@ pub struct Flag {
     pub raised_s: Option<f64>,
     /// When the loop cleared it, seconds.
     pub cleared_s: Option<f64>,
+    /// How far all that is in reach had gone beyond that moment's when it was raised, m.
+    pub late_m: Option<f64>,
     /// Whether the section fails, all samples counted.
     pub fails: bool,
 }
@@ -165,6 +176,25 @@ impl Journey {
         self.reached.get(self.back.end).map_or(f64::INFINITY, |reached| reached.at.as_secs_f64())
     }
 
+    /// Whether a section that was flagged failed for good just then, by what had been sampled: later samples that an empty
+    /// circle gets because the vehicle swings back don't count.
+    pub fn was_due(&self, dive: &Dive, flag: &Flag, sd: f64) -> bool {
+        let report = &dive.report;
+        let section = report.sections.iter().find(|section| section.start_m >= flag.start_m);
+        let Some((section, raised_s)) = section.zip(flag.raised_s) else { return false };
+        let raised = MonoNs(math::round_to_i64(raised_s * 1e9).unsigned_abs());
+        // Of some pings: places and attitudes are as noisy as navigation is.
+        let near = |ping: &&Ping| raised.since(ping.received).0.abs() <= EVERY.0;
+        let poses = dive.pings.iter().filter(near).filter_map(|ping| ping.pose);
+        let rear_m = poses.map(|pose| ends_m(dive, &pose)[0]).fold(f64::MIN, f64::max);
+        let ends = [section.start_m, section.end_m];
+        let radius_m = 0.5 * (report.target_m + sd * section.hole_sd_m);
+        let passed_m = all_passed_from_m(&self.reached) - NEAR_M;
+        let first_m = first_failing_m(&wall_until(dive, raised), ends, radius_m, passed_m);
+        let line_m = (ends[1] - ends[0]) / f64::from(PARTS);
+        first_m.is_some_and(|first_m| first_m + radius_m - line_m <= rear_m)
+    }
+
     /// The flags of a dive. A fail is a hole larger than the target by `sd` of its standard deviation.
     pub fn flags(&self, dive: &Dive, sd: f64) -> Vec<Flag> {
         let target_m = dive.report.target_m;
@@ -174,20 +204,31 @@ impl Journey {
     fn flag(&self, target_m: f64, section: &SectionReport, sd: f64) -> Flag {
         let ends = [section.start_m, section.end_m];
         let radius_m = 0.5 * (target_m + sd * section.hole_sd_m);
-        let due = |wall: &Wall, reached: &[Reached], early_m: f64| {
+        let due_m = |wall: &Wall, early_m: f64| {
             // What is early for a flag is late for its moment.
             let near_m = if early_m > 0.0 { -NEAR_M } else { NEAR_M };
             let passed_m = all_passed_from_m(&self.reached) + near_m;
-            left_behind(reached, first_failing_m(wall, ends, radius_m, passed_m)? + radius_m - early_m)
+            Some(first_failing_m(wall, ends, radius_m, passed_m)? + radius_m - early_m)
         };
+        let due =
+            |wall: &Wall, reached: &[Reached], early_m: f64| left_behind(reached, due_m(wall, early_m)?);
         let on = if self.turned.is_some() { self.back.end } else { 0 };
         let first = |early_m: f64| {
             let out =
                 self.turned.as_ref().and_then(|wall| due(wall, &self.reached[..self.back.start], early_m));
             out.or_else(|| due(&self.whole, &self.reached[on..], early_m)).map(MonoNs::as_secs_f64)
         };
-        let line_m = (section.end_m - section.start_m) / f64::from(LINES);
+        let line_m = (section.end_m - section.start_m) / f64::from(PARTS);
+        let late_m = || {
+            let raised_s = section.flagged_s?;
+            let before = |reached: &&Reached| reached.at.as_secs_f64() <= raised_s;
+            // Where reach or deviation have just jumped, the tick is what counts.
+            let soon_s = 2.0 * EVERY.as_secs_f64();
+            first(0.0).filter(|due_s| raised_s > due_s + soon_s)?;
+            Some(self.reached.iter().take_while(before).last()?.rear_m - due_m(&self.whole, 0.0)?)
+        };
         Flag {
+            late_m: late_m(),
             start_m: section.start_m,
             due_s: first(0.0),
             may_s: first(line_m),

@@ -20,6 +20,7 @@ mod division;
 mod window;
 mod without;
 
+pub use certain::Needed;
 pub use without::Otherwise;
 
 /// Maximum search radius, m: wall farther than this from any sample counts as not passed.

@@ -141,9 +141,58 @@ impl PassError {
         (0..PLACES).map(|k| self.sd_m(place(k))).fold(0.0, f64::max)
     }
 
+    /// The largest change of that with a metre of wall, m/m.
+    pub fn slope(&self) -> f64 {
+        LARGEST_OF_MANY * self.relative.turn_sd_rad()
+    }
+
     /// Standard deviation of the diameter of a hole at a point on the wall, m: its edges are consecutive passes.
     pub fn sd_m(&self, wall_m: [f64; 2]) -> f64 {
         LARGEST_OF_MANY
             * self.relative.sd_m(Vec3::new(0.0, wall_m[0] - self.from_m[0], wall_m[1] - self.from_m[1]))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use headrace_geometry::math;
+    use headrace_geometry::tunnel::shapes;
+
+    fn along(sd_m: f64) -> PassError {
+        PassError { relative: Relative::along(sd_m), from_m: [0.0, 0.0] }
+    }
+
+    #[test]
+    fn of_several_errors_the_worst_is_kept_whichever_comes_last() {
+        for order in [[0.01, 0.05, 0.02], [0.05, 0.02, 0.01], [0.01, 0.02, 0.05]] {
+            let mut worst = PassError::default();
+            for sd_m in order {
+                worst.add(&along(sd_m));
+            }
+            assert_eq!(worst, along(0.05), "{order:?}");
+        }
+    }
+
+    #[test]
+    fn where_a_section_is_passed_at_its_worst_decides_how_sure_its_holes_are() {
+        let drive = |speed_mps: f64| Drive { speed_mps, healthy_gap_s: 2.0, ..Drive::default() };
+        assert_eq!(drive(0.3).or_worse(drive(0.1)), drive(0.3));
+        assert_eq!(drive(0.1).or_worse(drive(0.3)), drive(0.3));
+    }
+
+    #[test]
+    fn a_yaw_moves_what_is_beside_the_vehicle_and_nothing_above_it() {
+        let yaw = Relative::new([[0.0; 3], [0.0; 3], [0.0, 0.0, 1e-4]]);
+        let error = PassError { relative: yaw, from_m: [0.5, 1.0] };
+        let profile = shapes::circle(3.0).unwrap();
+        let sd_m = |wall_m: [f64; 2]| error.sd_m(wall_m) / LARGEST_OF_MANY;
+        assert!((sd_m([2.5, 1.0]) - 0.02).abs() < 1e-12 && sd_m([0.5, 4.0]).abs() < 1e-12);
+        // The farthest wall to either side, 3.5 m away.
+        let [y_m, _] = profile.reference();
+        let worst_m = LARGEST_OF_MANY * 0.01 * (3.0 + (y_m - 0.5).abs());
+        assert!((error.worst_m(&profile) - worst_m).abs() < 1e-4, "{}", error.worst_m(&profile));
+        assert!((error.slope() - LARGEST_OF_MANY * 0.01).abs() < 1e-12);
+        assert!(math::hypot(error.slope(), 0.0) > 0.0);
     }
 }

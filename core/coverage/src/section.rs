@@ -126,6 +126,8 @@ pub struct Section {
     pub cleared: Option<MonoNs>,
     /// Why it failed.
     pub evidence: Option<Evidence>,
+    /// That was found when it was left in part only.
+    pub(super) explained_in_part: bool,
     /// Ping statistics of its passage.
     pub passage: Passage,
     /// T_x of its samples, m.

@@ -1,12 +1,14 @@
 //! Sections of the tunnel: what was measured in each, its hole, its verdict, and its flag.
 
+mod due;
+
 use core::ops::Range;
 
 use super::causes::Causes;
 use super::evidence::Evidence;
 use super::explain::{Case, explain};
-use super::frontier::{Moved, Outlook, Reach, clear_of};
-use super::hole::{FARTHEST_M, Hole, HoleFinder};
+use super::frontier::{Outlook, Reach, clear_of};
+use super::hole::{Hole, HoleFinder};
 use super::lacks::Lacks;
 use super::metres::Metres;
 use super::openings::Opening;
@@ -38,8 +40,9 @@ pub struct Request {
     pub not_passed: Option<Reach>,
     /// The dive has ended: where all heads have been.
     pub ended: Option<Ended>,
-    /// Known to fail already: a large enough empty circle, not necessarily the largest, can get no more samples.
-    pub fails: bool,
+    /// Judged only if it certainly fails: if a large enough empty circle, not necessarily the largest, can get no more
+    /// samples.
+    pub only_fails: bool,
 }
 
 /// Where all heads had been when a dive ended; `None` if nowhere.
@@ -69,7 +72,7 @@ impl Request {
             to_come,
             not_passed,
             ended: None,
-            fails: false,
+            only_fails: false,
         }
     }
 }
@@ -109,9 +112,11 @@ pub struct Sections {
     judged: [u32; Verdict::ALL.len() + 1],
     sections: Vec<Section>,
     runs: Runs,
+    /// Where what the heads leave behind, and ahead, is looked at next: least and greatest chainage of their reach, m.
+    next_look_m: [f64; 2],
 }
 
-stateful!(Sections { state: runs, judged; slots: sections; fixed: section_m, target_m, confidence_sd, first; });
+stateful!(Sections { state: runs, judged, next_look_m; slots: sections; fixed: section_m, target_m, confidence_sd, first; });
 
 impl Sections {
     /// Sections of `section_m` over [`from_m`, `to_m`].
@@ -122,8 +127,16 @@ impl Sections {
         let end = -math::floor_to_i64(-to_m / section_m);
         let count = usize::try_from(end - first).unwrap_or(0);
         let runs = Runs::new(first, count, section_m);
-        let sections = vec![Section::default(); count];
-        Self { section_m, target_m, confidence_sd: CONFIDENCE_SD, first, judged: [0; 5], sections, runs }
+        Self {
+            section_m,
+            target_m,
+            confidence_sd: CONFIDENCE_SD,
+            first,
+            judged: [0; 5],
+            sections: vec![Section::default(); count],
+            runs,
+            next_look_m: due::LOOK_AT_ONCE,
+        }
     }
 
     /// Judges with this many standard deviations of D between hole and target, [`CONFIDENCE_SD`] unless set.
@@ -173,9 +186,9 @@ impl Sections {
         self.confidence_sd
     }
 
-    /// Maximum distance at which a sample may change a pass or fail, m.
-    pub fn margin_m(&self, relative_sd_m: f64) -> f64 {
-        self.target_m / 2.0 + self.confidence_sd / 2.0 * relative_sd_m
+    /// Distance of the heads' reach at which a section is left, m: samples farther away don't change a pass.
+    pub fn left_m(&self) -> f64 {
+        self.target_m / 2.0
     }
 
     /// Index of the section at a chainage.
@@ -209,98 +222,6 @@ impl Sections {
         }
     }
 
-    /// Calls `ask` for every section of the way due for judging after the heads have moved: those that left the zone or
-    /// never were in it, and those whose hole may no longer get samples.
-    ///
-    /// Allocates: never.
-    pub fn due(&mut self, moved: &Moved, outlook: &Outlook, ask: &mut impl FnMut(Request)) {
-        let way = self.sections_of(outlook.way);
-        let ask_for = Request::at(outlook);
-        for range in [&moved.left_behind, &moved.left_ahead] {
-            for index in clamp(range.clone(), &way) {
-                let Some(section) = self.get_mut(index) else { continue };
-                if section.stale || section.hole.is_none() || section.not_inspected {
-                    section.stale = false;
-                    section.settled = false;
-                    ask(ask_for(index));
-                }
-            }
-        }
-        let far = math::floor_to_i64(FARTHEST_M / self.section_m) + 1;
-        let behind = moved.left_behind.end - far..moved.left_behind.end;
-        let ahead = moved.left_ahead.start..moved.left_ahead.start + far;
-        for range in [behind, ahead] {
-            for index in clamp(range, &way) {
-                let (target_m, confidence_sd) = (self.target_m, self.confidence_sd);
-                let bounds_m = self.bounds_m(index);
-                let Some(section) = self.get_mut(index).filter(|section| !section.settled) else { continue };
-                let Some(hole) = section.hole else {
-                    // Of the way, but never in reach of a head: beside the heads, or where the vehicle set out.
-                    let (from_m, to_m) = bounds_m;
-                    let clear = clear_of(moved.to_come, from_m).min(clear_of(moved.to_come, to_m)) > 0.0;
-                    if clear && !moved.has_left(index) {
-                        ask(ask_for(index));
-                    }
-                    continue;
-                };
-                let clear_m = clear_of(moved.to_come, hole.x_m);
-                let left_m = hole.least_m.min(2.0 * clear_m);
-                let fails =
-                    section.verdict == Verdict::Open && left_m - confidence_sd * section.hole_sd_m > target_m;
-                if fails || clear_m >= hole.diameter_m / 2.0 {
-                    ask(ask_for(index));
-                }
-            }
-        }
-    }
-
-    /// Calls `ask` for sections of the still zone: those certain to fail although their hole may still get samples, and
-    /// flagged ones with samples since they were judged. Otherwise they would get no verdict while the vehicle is
-    /// stationary.
-    ///
-    /// Allocates: never.
-    pub fn look_around(
-        &mut self,
-        outlook: &Outlook,
-        store: &SampleStore,
-        finder: &mut HoleFinder,
-        profile: &Profile,
-        ask: &mut impl FnMut(Request),
-    ) {
-        let Some(zone) = outlook.still_zone.clone() else { return };
-        let ask_for = Request::at(outlook);
-        for index in clamp(zone, &self.sections_of(outlook.way)) {
-            let Some(section) = self.get_mut(index) else { continue };
-            if section.is_flagged() {
-                if core::mem::take(&mut section.stale) {
-                    ask(ask_for(index));
-                }
-                continue;
-            }
-            if self.fails_already(index, outlook, store, finder, profile) {
-                ask(Request { fails: true, ..ask_for(index) });
-            }
-        }
-    }
-
-    /// Whether a section has an empty circle, too large for the target, where all heads have been and no more samples will
-    /// land.
-    fn fails_already(
-        &self,
-        index: i64,
-        outlook: &Outlook,
-        store: &SampleStore,
-        finder: &mut HoleFinder,
-        profile: &Profile,
-    ) -> bool {
-        let bounds_m = self.bounds_m(index);
-        let radius_m = self.margin_m(self.pass_error(index).worst_m(profile));
-        let Outlook { to_come, not_passed, .. } = *outlook;
-        let clear_m = |reach| clear_of(reach, bounds_m.0).max(clear_of(reach, bounds_m.1));
-        clear_m(to_come).min(clear_m(not_passed)) > radius_m
-            && finder.has_circle(store, bounds_m, [to_come, not_passed], radius_m)
-    }
-
     /// Measures a section's hole and updates its verdict, flag and run.
     ///
     /// Allocates: never.
@@ -312,18 +233,24 @@ impl Sections {
             // What one visit has shown, a later one doesn't take back.
             return None;
         }
+        let asks = request.only_fails || request.ended.is_some() || section.is_flagged();
+        let fails = asks && self.fails_already(request, judging);
+        if request.only_fails && !fails {
+            return None;
+        }
         let Measured { hole, sd_m, by_newest } = self.measure(request.section, judging)?;
         let clear_m = clear_of(request.to_come, hole.x_m);
         let passed_m = clear_of(request.not_passed, hole.x_m);
         let section = self.get_mut(request.section)?;
         let before = Self::counted(section);
         let (error_m, had_a_flag) = (confidence_sd * sd_m, section.is_flagged());
-        let is_same = section.hole.is_some_and(|before| before.is_like(&hole)) && section.evidence.is_some();
+        let is_like = section.hole.is_some_and(|before| before.is_like(&hole));
+        let is_same = is_like && section.evidence.is_some() && !section.explained_in_part;
         section.hole = Some(hole);
         section.hole_sd_m = sd_m;
         section.verdict = match verdict(&hole, error_m, target_m, clear_m.min(passed_m)) {
             Verdict::Pass if section.doubt().is_some() => Verdict::CannotSay,
-            Verdict::Open | Verdict::CannotSay if request.fails => Verdict::Fail,
+            Verdict::Open | Verdict::CannotSay if fails => Verdict::Fail,
             verdict => verdict,
         };
         if by_newest && section.verdict != Verdict::Pass {
@@ -336,21 +263,23 @@ impl Sections {
         section.not_inspected = section.verdict == Verdict::Open && alone != Verdict::Open;
         if section.not_inspected {
             // The largest hole reaches to where not all heads have been; another one may fail for itself.
-            let reaches = [request.to_come, request.not_passed];
             let radius_m = f64::midpoint(target_m, error_m);
             section.settled &=
                 clear_of(request.to_come, from_m).min(clear_of(request.to_come, to_m)) >= radius_m;
-            if had_a_flag || judging.finder.has_circle(judging.store, (from_m, to_m), reaches, radius_m) {
+            if had_a_flag || self.fails_already(request, judging) {
+                let section = self.get_mut(request.section)?;
                 (section.verdict, section.not_inspected) = (Verdict::Fail, false);
             }
         }
+        let section = self.get_mut(request.section)?;
         // Nothing will come any more.
         section.not_inspected |=
             section.verdict == Verdict::Open && request.ended.is_some_and(|ended| ended.is_beyond(&hole));
         // What is lacking in a hole that hasn't changed may have been forgotten since.
         if section.verdict == Verdict::Fail && !is_same {
             let evidence = self.explain(&hole, request, judging);
-            self.get_mut(request.section)?.evidence = Some(evidence);
+            let section = self.get_mut(request.section)?;
+            (section.evidence, section.explained_in_part) = (Some(evidence), request.only_fails);
         }
         let section = self.get_mut(request.section)?;
         let (judgement, now) = (section.flag(request.at), Self::counted(section));
@@ -438,10 +367,21 @@ impl Sections {
         runs.set(request.section, cause, &mut Telling { at: request.at, hole: &hole, tell: judging.tell });
     }
 
-    /// The causes of a hole, from the passages of the sections within T.
-    fn explain(&self, hole: &Hole, request: &Request, judging: &mut Judging<'_>) -> Evidence {
-        let bounds_m = self.bounds_m(request.section);
+    /// The causes of a hole, from the passages of the sections within T. Of a section that isn't left yet, those of the
+    /// largest hole in the part that is.
+    fn explain(&self, whole: &Hole, request: &Request, judging: &mut Judging<'_>) -> Evidence {
+        let mut bounds_m = self.bounds_m(request.section);
         let near = self.index_of(bounds_m.0 - self.target_m)..=self.index_of(bounds_m.1 + self.target_m);
+        let mut hole = *whole;
+        if let Some(reach) = request.to_come.filter(|_| request.only_fails) {
+            let left =
+                (bounds_m.0.max(reach.to_m + self.left_m()), bounds_m.1.min(reach.from_m - self.left_m()));
+            let left = if reach.from_m.is_finite() { (bounds_m.0, left.1) } else { (left.0, bounds_m.1) };
+            if left.0 < left.1 {
+                let first = self.get(request.section).map_or(0, |section| section.visits.first());
+                (bounds_m, hole) = (left, judging.finder.largest_since(judging.store, left.0, left.1, first));
+            }
+        }
         let beside = |index: i64| {
             let section = self.get(index).filter(|section| section.is_flagged());
             section.and_then(|section| section.evidence).map_or(Causes::default(), |evidence| evidence.causes)
@@ -449,7 +389,7 @@ impl Sections {
         let here = self.get(request.section).copied().unwrap_or_default();
         let (visits, passage) = (here.visits, here.passage);
         let case = Case {
-            hole,
+            hole: &hole,
             bounds_m,
             first_visit: visits.first(),
             swept_by_all: request.swept_by_all,
@@ -463,27 +403,6 @@ impl Sections {
         };
         let passages = near.filter_map(|index| Some(&self.get(index)?.passage));
         explain(&case, passages, judging.store, judging.finder)
-    }
-
-    /// Calls `ask` for every section of the way that isn't settled, at the end of a dive.
-    pub fn unsettled(
-        &mut self,
-        outlook: &Outlook,
-        store: &SampleStore,
-        finder: &mut HoleFinder,
-        profile: &Profile,
-        ask: &mut impl FnMut(Request),
-    ) {
-        let ask_for = Request::at(outlook);
-        for index in self.sections_of(outlook.way) {
-            let Some(section) = self.get_mut(index) else { continue };
-            // Samples farther away than a pass depends on may have narrowed the hole of a fail.
-            if section.stale || !section.settled || section.verdict != Verdict::Pass {
-                section.stale = false;
-                let fails = self.fails_already(index, outlook, store, finder, profile);
-                ask(Request { fails, ended: Some(Ended(outlook.through)), ..ask_for(index) });
-            }
-        }
     }
 
     /// Index range of the sections in the table that a stretch, such as the way, touches.
@@ -538,6 +457,7 @@ fn clamp(range: Range<i64>, within: &Range<i64>) -> Range<i64> {
 
 #[cfg(test)]
 mod tests {
+    use super::super::hole::FARTHEST_M;
     use super::*;
 
     const BEHIND: f64 = f64::INFINITY;

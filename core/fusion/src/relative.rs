@@ -29,7 +29,13 @@ impl Relative {
         math::sqrt(sum.max(0.0))
     }
 
-    /// The same for another reference point of the vehicle, at `arm` from this one.
+    /// Standard deviation of pitch and yaw together, radians: [`Relative::sd_m`] changes by no more with a metre of the arm.
+    pub fn turn_sd_rad(&self) -> f64 {
+        let [_, [_, pitch, _], [.., yaw]] = self.0;
+        math::sqrt((pitch + yaw).max(0.0))
+    }
+
+    /// The covariance for another reference point of the vehicle, at `arm` from this one.
     #[must_use]
     pub fn moved(&self, arm: Vec3<Tunnel>) -> Self {
         let sheared = |[x, pitch, yaw]: [f64; 3]| [x + arm.z() * pitch - arm.y() * yaw, pitch, yaw];
@@ -62,5 +68,14 @@ mod tests {
         let (whole, part) = (Vec3::new(0.3, 2.0, -1.5), Vec3::new(-0.1, 0.4, 0.7));
         let moved = relative.moved(part).sd_m(whole + -part);
         assert!((moved - relative.sd_m(whole)).abs() < 1e-12, "{moved}");
+    }
+
+    #[test]
+    fn no_metre_of_an_arm_adds_more_than_the_turns_do() {
+        let relative = Relative::new([[0.04, 0.003, -0.002], [0.003, 0.01, 0.001], [-0.002, 0.001, 0.02]]);
+        let arm = |k: u32| Vec3::new(0.0, math::sin(f64::from(k)), math::cos(f64::from(k)));
+        let adds_m = |k: u32| relative.sd_m(arm(k).scaled(51.0)) - relative.sd_m(arm(k).scaled(50.0));
+        let most_m = (0..200).map(adds_m).fold(0.0, f64::max);
+        assert!(most_m <= relative.turn_sd_rad() && most_m > 0.7 * relative.turn_sd_rad(), "{most_m}");
     }
 }

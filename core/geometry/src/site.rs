@@ -67,7 +67,7 @@ impl Site {
 
 #[cfg(test)]
 mod tests {
-    use super::fresh_water_sound_speed_mps;
+    use super::{Site, fresh_water_sound_speed_mps};
 
     /// Reference values: Del Grosso and Mader 1972, tables for pure water.
     #[test]
@@ -79,5 +79,29 @@ mod tests {
         }
         let deep = fresh_water_sound_speed_mps(10.0, 101_325.0 + 9_806.65 * 100.0);
         assert!((deep - 1447.27 - 1.63).abs() < 0.05, "{deep}");
+    }
+
+    #[test]
+    fn pressure_is_the_weight_of_the_site_s_water_and_air() {
+        // 10 m of sea water at 9.8 m/s^2 under 900 hPa.
+        let sea = Site {
+            density_kgpm3: 1025.0,
+            gravity_mps2: 9.8,
+            surface_pressure_pa: 90_000.0,
+            ..Site::default()
+        };
+        assert!((sea.pressure_pa(10.0) - 190_450.0).abs() < 1e-9, "{}", sea.pressure_pa(10.0));
+        assert!((sea.depth_m(190_450.0) - 10.0).abs() < 1e-12, "{}", sea.depth_m(190_450.0));
+        // A change of density by 2.5 per cent moves 50 m by 1.2 m.
+        let deep_pa = 101_325.0 + 50.0 * 999.7 * 9.806_65;
+        let salty = Site { density_kgpm3: 1025.0, ..Site::default() };
+        assert!((Site::default().depth_m(deep_pa) - 50.0).abs() < 1e-9);
+        assert!((salty.depth_m(deep_pa) - 48.765_9).abs() < 1e-3, "{}", salty.depth_m(deep_pa));
+    }
+
+    #[test]
+    fn a_range_is_as_long_as_sound_is_fast_here() {
+        let site = Site { sound_speed_mps: 1450.0, ..Site::default() };
+        assert!((site.rescaled_range_m(5.0, 1500.0) - 5.0 * 29.0 / 30.0).abs() < 1e-12);
     }
 }

@@ -210,8 +210,7 @@ impl Loop {
         self.finished = true;
         super::stages::end_returns(&mut self.world);
         let (open, common) = self.open_requests();
-        let request =
-            |(section, fails): &(i64, bool)| Some(Request { section: *section, fails: *fails, ..common? });
+        let request = |section: &i64| Some(Request { section: *section, ..common? });
         for some in open.chunks(FINISHED_AT_ONCE) {
             self.judge_all(some.iter().filter_map(request));
             let notices = core::mem::take(&mut self.world.resource_mut::<Notices>().0);
@@ -222,20 +221,15 @@ impl Loop {
         }
     }
 
-    /// The sections to be judged at the end, each with whether it is known to fail, and the fields their requests share.
-    fn open_requests(&mut self) -> (Vec<(i64, bool)>, Option<Request>) {
+    /// The sections to be judged at the end, and the fields their requests share.
+    fn open_requests(&mut self) -> (Vec<i64>, Option<Request>) {
         let outlook = self.outlook();
-        let profile = &self.mission.profile;
         let (mut open, mut common) = (Vec::new(), None);
-        self.world.resource_scope(|world, mut coverage: Mut<'_, Coverage>| {
-            let mut finder = world.resource_mut::<Finder>();
-            let Coverage { store, sections, .. } = &mut *coverage;
-            let mut ask = |request: Request| {
-                open.push((request.section, request.fails));
-                common = Some(request);
-            };
-            sections.unsettled(&outlook, store, &mut finder.0, profile, &mut ask);
-        });
+        let mut ask = |request: Request| {
+            open.push(request.section);
+            common = Some(request);
+        };
+        self.world.resource_mut::<Coverage>().sections.unsettled(&outlook, &mut ask);
         (open, common)
     }
 

@@ -65,6 +65,15 @@ fn a_declared_opening_is_listed_and_does_not_fail() {
         .map(|section| section["start_m"].as_f64().unwrap())
         .collect();
     assert_eq!(masked, [4.0, 4.25, 4.5, 4.75, 5.0, 5.25]);
+    // Two of twelve hours; from 4.2 m on it is a fifth of the first section, to 5.4 m three fifths of the last.
+    let share = |start_m: f64| {
+        let section =
+            report["sections"].as_array().unwrap().iter().find(|s| s["start_m"] == start_m).unwrap();
+        section["masked_share"].as_f64().unwrap()
+    };
+    for (start_m, whole) in [(4.0, 0.2), (4.25, 1.0), (5.0, 1.0), (5.25, 0.6)] {
+        assert!((share(start_m) - whole / 6.0).abs() < 1e-9, "{start_m}: {}", share(start_m));
+    }
     let all_round = vehicle.replace("clock_from = 8\nclock_to = 10\n", "");
     let (report, _) = dive(&all_round, &scene);
     let sections = report["sections"].as_array().unwrap();

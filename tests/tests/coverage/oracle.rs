@@ -6,7 +6,7 @@ use std::collections::BTreeMap;
 use headrace_geometry::math::{self, TAU};
 use headrace_geometry::time::MonoNs;
 use headrace_monitor::report::{SectionReport, SpreadReport};
-use headrace_tests::flags::{NEAR_M, all_passed_from_m, first_failing_m, reached};
+use headrace_tests::flags::{NEAR_M, PARTS, all_passed_from_m, first_failing_m, reached};
 use headrace_tests::instrumented::{Dive, Ping, Sample};
 use headrace_tests::random_dives::Draw;
 use headrace_tests::spacings::{Spacing, spacings, spread};
@@ -117,9 +117,9 @@ fn val_verdicts_follow_from_hole_sigma_and_target() {
         // Whether a circle lies just where all heads have been.
         let late_m = first_failing_m(wall, ends, radius_m, passed_m + NEAR_M);
         let is_near = late_m != first_failing_m(wall, ends, radius_m, passed_m - NEAR_M);
-        // Where the first such circle is, is known to a twentieth of the section; the program goes by the largest deviation
+        // Where the first such circle is, is known to a part of the section; the program goes by the largest deviation
         // round the wall, and by the farthest wall for the reach of a tilted head.
-        let near_m = (section.end_m - section.start_m) / 20.0 + 2.0 * section.hole_sd_m + 0.03;
+        let near_m = (section.end_m - section.start_m) / f64::from(PARTS) + 2.0 * section.hole_sd_m + 0.03;
         let clear_m = first_m.map_or(f64::NEG_INFINITY, |first_m| rear_m - first_m - radius_m);
         let behind_m = rear_m - largest.centre[0] - largest.radius_m;
         let from_end_m = largest.centre[0] - largest.radius_m - passed_m;

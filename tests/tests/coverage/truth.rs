@@ -109,7 +109,12 @@ fn an_outline_has_the_arc_lengths_of_its_profile() {
 
 /// Whether a section is judged by samples that were placed after the estimate had settled, and not the dive's end.
 fn settled(section: &truth::JudgedSection, start_m: f64) -> bool {
-    section.report.start_m > start_m + 1.5 && section.true_hole_m < 0.7
+    settled_below(section, start_m, 0.7)
+}
+
+/// The same for larger true holes.
+fn settled_below(section: &truth::JudgedSection, start_m: f64, hole_m: f64) -> bool {
+    section.report.start_m > start_m + 1.5 && section.true_hole_m < hole_m
 }
 
 /// Without errors the loop's holes are the true ones, wherever the dive begins.
@@ -153,5 +158,33 @@ fn stretches_follow_the_cable() {
     for section in dive.sections.iter().filter(|section| settled(section, 16.0)) {
         let off_m = section.report.hole_m.unwrap() - section.true_hole_m;
         assert!(off_m.abs() < 0.15, "{} {off_m}", section.report.start_m);
+    }
+}
+
+/// Heads that hear their own vehicle from 10 cm on: it hides a part of the wall, and what they hear of it fills no hole.
+#[test]
+fn what_a_vehicle_answers_itself_passes_nothing() {
+    let load = |name: &str| {
+        let text = String::from_utf8(scenes::vehicle_file(name)?).unwrap();
+        let near = text.replace("min_range_m = 0.5", "min_range_m = 0.1");
+        assert_ne!(text, near);
+        Ok(near.into_bytes())
+    };
+    let scene = scenes::scene_from(
+        "vehicle = \"vita2-4.toml\"\n[vehicle_changes]\ntarget_m = 0.5\n\
+         [trajectory]\nstart_m = 16\n[[trajectory.legs]]\ndistance_m = 4\nspeed_mps = 0.11\n\
+         [effects]\nmotion_within_turn = {}\nocclusion = {}\n",
+        &load,
+    );
+    let dive = truth::dive(&scene);
+    let occluded = dive.report.dive.samples_rejected.occluded;
+    assert!(occluded > 200, "{occluded} echoes of the vehicle");
+    for section in &dive.sections {
+        let (hole_m, start_m) = (section.true_hole_m, section.report.start_m);
+        assert!(section.report.verdict != "pass" || hole_m <= 1.1 * 0.5, "{start_m}: passed with {hole_m} m");
+        if settled_below(section, 16.0, 1.5) {
+            let off_m = section.report.hole_m.unwrap() - hole_m;
+            assert!(off_m.abs() < 0.05, "{start_m}: {off_m}");
+        }
     }
 }

@@ -4,6 +4,7 @@
 
 mod circles;
 mod imports;
+mod promises;
 mod supply;
 mod tidy;
 mod workspace;

@@ -4,12 +4,15 @@ use std::io::Write;
 use std::process::{Output, Stdio};
 use std::time::Duration;
 
+use bevy_ecs::prelude::{Res, ResMut, Resource};
 use crossbeam::channel::unbounded;
 use headrace_geometry::time::{DurNs, MonoNs};
-use headrace_monitor::App;
+use headrace_monitor::merge::Inbox;
 use headrace_monitor::run::Loop;
+use headrace_monitor::stage::Stage;
+use headrace_monitor::{App, Plugin, PluginError};
 use headrace_replay::drive::{Pace, drive};
-use headrace_replay::log::files_of;
+use headrace_replay::log::{LogHeader, LogWriter, SourceInfo, files_of};
 use headrace_replay::playback::{Playback, PlaybackCommand, PlaybackObserver};
 use headrace_replay::player::Player;
 use headrace_replay::snapshot_store::SnapshotStore;
@@ -59,6 +62,58 @@ struct Outcome {
 impl Outcome {
     fn of(dive: &Loop, player: &Player) -> Self {
         Self { digest: dive.digest(), messages: player.played(), losses: player.losses() }
+    }
+}
+
+/// The order in which packets are consumed, by their sources.
+#[derive(Resource, Default)]
+struct Consumed(Vec<u16>);
+
+struct Watch;
+
+impl Plugin for Watch {
+    fn build(&self, app: &mut App) -> Result<(), PluginError> {
+        app.insert_resource(Consumed::default());
+        app.add_systems(Stage::Publish, watch);
+        Ok(())
+    }
+}
+
+#[expect(clippy::needless_pass_by_value, reason = "systems take their parameters by value")]
+fn watch(inbox: Res<'_, Inbox>, mut consumed: ResMut<'_, Consumed>) {
+    consumed.0.extend(inbox.iter().map(|(source, _)| source.0));
+}
+
+/// A dive of ours was consumed in an order that receive times don't tell: it is played in that order, a log without ticks by
+/// time.
+#[test]
+fn a_log_of_ours_is_played_as_it_was_consumed_and_others_by_time() {
+    let folder = Folder::new();
+    // Sources as recorded, each with its receive time.
+    let recorded = [(2, 3_000), (0, 1_000), (1, 2_000), (1, 2_500), (0, 2_200)];
+    for (ticks, wanted) in [(true, [2, 0, 1, 1, 0]), (false, [0, 1, 0, 1, 2])] {
+        let mut app = App::new(vehicle().mission());
+        for sensor in vehicle().sensors.iter().take(3) {
+            app.add_device(sensor.as_ref()).unwrap();
+        }
+        app.add_plugin(&Watch).unwrap();
+        let mut dive = app.arm(vehicle().navigation()).unwrap();
+        let named = |id: &str| SourceInfo { id: id.to_owned(), ..SourceInfo::default() };
+        let sources = dive.sources().iter().map(|source| named(&source.id)).collect();
+        let header = LogHeader { sources, ticks, ..LogHeader::default() };
+        let mut log = LogWriter::new(Vec::new(), &header).unwrap();
+        for (source, at) in recorded {
+            log.raw(source, MonoNs(at), MonoNs(at), &[]).unwrap();
+        }
+        if ticks {
+            log.tick(0, MonoNs(4_000), &recorded.map(|(source, _)| source)).unwrap();
+        }
+        let (bytes, _) = log.finish().unwrap();
+        folder.write("order.mcap", bytes);
+        let mut player = Player::open(&files_of(&[folder.path("order.mcap")]).unwrap()).unwrap();
+        player.connect(dive.sources());
+        drive(&mut dive, &mut player, Pace::default(), &mut |_| {}).unwrap();
+        assert_eq!(dive.resource::<Consumed>().unwrap().0, wanted, "ticks: {ticks}");
     }
 }
 

@@ -7,6 +7,8 @@ mod dead_devices;
 mod devices;
 #[cfg(unix)]
 mod faults;
+#[cfg(unix)]
+mod full_ring;
 #[cfg(target_os = "linux")]
 mod kernel_can_hid;
 #[cfg(target_os = "linux")]

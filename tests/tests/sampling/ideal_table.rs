@@ -1,7 +1,7 @@
 //! metrics.md's table of ideal scenes: SLOW to FASTEST with 1, 2 and 4 heads in phase shift, together at the circle's
 //! centre of the `ceran` profile, at 0.197 m/s, from a scene to bytes to a log to a report.
 //!
-//! The mean distance between passes must be v T / s within 0.5 %, and the largest hole over nine metres within 1 % of
+//! The mean distance between passes must be v T / s within 0.5 %, and the largest hole over nine metres within 0.1 % of
 //! the table, whose values were computed elsewhere from Delaunay circumcircles.
 
 use std::fmt::Write as _;
@@ -88,7 +88,8 @@ fn val_the_table_of_ideal_scenes() {
                 100.0 * hole_off,
                 100.0 * t_x_off
             );
-            if hole_off.abs() > 0.01 || t_x_off.abs() > 0.005 {
+            // The table has three decimals.
+            if (hole_m - expected_m).abs() > 0.001 * expected_m + 0.0005 || t_x_off.abs() > 0.005 {
                 writeln!(misses, "{mode} x {heads}: hole {hole_m} m, T_x {t_x_m} m").unwrap();
             }
         }

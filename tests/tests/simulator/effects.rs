@@ -240,3 +240,31 @@ fn the_water_s_temperature_makes_up_for_a_wrong_speed_of_sound() {
     assert!(right_m.abs() < 0.01, "{right_m}");
     assert!((1447.0..1449.0).contains(&least_mps) && most_mps < 1449.0, "{least_mps} to {most_mps}");
 }
+
+/// Pings of a head that lost their return, or strayed, by an effect alone.
+fn touched(effect: &str) -> Vec<bool> {
+    let ranges = |effects: &str| -> Vec<Option<f64>> {
+        let scene = format!("{SCENE}\n[effects]\n{effects}\n");
+        let scene = headrace_tests::scenes::scene_from(&scene, &|_| Ok(VEHICLE.into()));
+        let mut simulation = headrace_simulator::Simulation::with_truth(&scene).unwrap();
+        let mut ranges = Vec::new();
+        while simulation.advance() {
+            let rows = simulation.take_truth().into_iter().filter(|row| row.source == 0);
+            ranges.extend(rows.filter_map(|row| Some(row.sounding?.measured.range_m)));
+        }
+        ranges
+    };
+    ranges("").iter().zip(ranges(effect)).map(|(was, is)| *was != is).collect()
+}
+
+#[test]
+fn what_one_effect_draws_says_nothing_of_what_another_draws() {
+    let share = |is: &[bool]| is.iter().filter(|is| **is).count() as f64 / is.len() as f64;
+    let lost = touched("missing_returns = { share = 0.3, sensors = [\"sonar_0\"] }");
+    let stray = touched("outliers = { share = 0.3, sensors = [\"sonar_0\"] }");
+    assert!(lost.len() > 500 && (share(&lost) - 0.3).abs() < 0.1 && (share(&stray) - 0.3).abs() < 0.1);
+    let both: Vec<bool> = lost.iter().zip(&stray).map(|(a, b)| *a && *b).collect();
+    // Of one stream it would be all of the smaller; each on its own, 0.09 within five standard deviations.
+    let sd = (0.09_f64 * 0.91 / both.len() as f64).sqrt();
+    assert!((share(&both) - 0.09).abs() < 5.0 * sd + 0.01, "{}", share(&both));
+}

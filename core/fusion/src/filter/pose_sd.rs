@@ -68,3 +68,28 @@ impl PoseSd {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The limits of docs/fusion.md: at 4 m, 0.25 rad move a sample by a metre.
+    #[test]
+    fn what_is_known_too_badly_places_no_sample() {
+        let sure = PoseSd { along_m: 0.1, place_m: 0.05, tilt_rad: 0.01, yaw_rad: 0.02 };
+        let near = Relative::along(0.05);
+        assert_eq!(sure.standing(near), Ok(near));
+        for (unsure, relative, lacking) in [
+            (PoseSd { yaw_rad: 0.24, ..sure }, near, None),
+            (PoseSd { yaw_rad: 0.26, ..sure }, near, Some(NoFix::Heading)),
+            (PoseSd { place_m: 0.49, ..sure }, near, None),
+            (PoseSd { place_m: 0.51, ..sure }, near, Some(NoFix::Section)),
+            (PoseSd { along_m: 0.99, ..sure }, near, None),
+            (PoseSd { along_m: 1.01, ..sure }, near, Some(NoFix::Chainage)),
+            (sure, Relative::along(0.99), None),
+            (sure, Relative::along(1.01), Some(NoFix::Chainage)),
+        ] {
+            assert_eq!(unsure.standing(relative).err(), lacking, "{unsure:?}, {relative:?}");
+        }
+    }
+}

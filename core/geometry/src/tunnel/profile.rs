@@ -246,6 +246,20 @@ impl Profile {
         self.elements.iter().map(reach).fold(0.0, f64::max)
     }
 
+    /// Largest distance, m, of the wall from a line through `origin` across the unit vector `direction`, on either side.
+    pub fn farthest_along_m(&self, origin: Yz, direction: Yz) -> f64 {
+        let farthest_m = |element: &Element| {
+            let start_m = dot(sub(element.start, origin), direction).abs();
+            let Shape::Arc { centre, radius_m, middle, cos_half, .. } = element.shape else { return start_m };
+            let (centre_m, towards) = (dot(sub(centre, origin), direction), dot(middle, direction));
+            // Where the arc's tangent runs across the direction, on this side or the other.
+            let ahead_m = if towards >= cos_half { (centre_m + radius_m).abs() } else { 0.0 };
+            let astern_m = if -towards >= cos_half { (centre_m - radius_m).abs() } else { 0.0 };
+            start_m.max(ahead_m).max(astern_m)
+        };
+        self.elements.iter().map(farthest_m).fold(0.0, f64::max)
+    }
+
     /// Arc lengths of the element boundaries, m.
     #[cfg(test)]
     pub(crate) fn corners_m(&self) -> Vec<f64> {

@@ -15,8 +15,7 @@ use crate::alerts::Alerts;
 use crate::entities::HeadFrontier;
 use crate::messages::{Notices, Outcome, Placed, PlacedList, PlacedPing, Requests, Standings};
 use crate::resources::{Coverage, Digests, Finder, Tally, Target, TunnelDesign, VehicleEntities};
-use headrace_coverage::{Drive, HeadReach, Loss, Outlook, Visit};
-use headrace_geometry::frames::Vec3;
+use headrace_coverage::{Drive, HeadReach, Loss, Visit};
 use headrace_geometry::time::DurNs;
 use headrace_geometry::tunnel::Profile;
 
@@ -66,7 +65,7 @@ pub(super) fn cover(
                 if at.0 % LOOK_AROUND.0.unsigned_abs() == 0 {
                     let reaches = heads.iter().filter_map(|(.., frontier)| frontier.0);
                     let outlook = coverage.frontier.outlook(reaches, *at);
-                    look_around(&mut coverage, &mut finder, &tunnel, &outlook, &mut requests);
+                    coverage.sections.look_around(&outlook, &mut |request| requests.0.push(request));
                 }
             }
             Placed::Ping(ping) => {
@@ -169,19 +168,6 @@ fn note_passage(
     section.note_pass(&Visit::of(&fix, ping.valid_at, turns), profile);
 }
 
-/// Requests judging of sections of a still zone that certainly fail, or are flagged and have new samples.
-fn look_around(
-    coverage: &mut Coverage,
-    finder: &mut Finder,
-    tunnel: &TunnelDesign,
-    outlook: &Outlook,
-    requests: &mut Requests,
-) {
-    let Coverage { store, sections, .. } = coverage;
-    let mut ask = |request| requests.0.push(request);
-    sections.look_around(outlook, store, &mut finder.0, &tunnel.profile, &mut ask);
-}
-
 /// Updates the head's reach.
 fn note_reach(frontier: &mut HeadFrontier, ping: &PlacedPing) {
     match (ping.fix, ping.reach) {
@@ -202,10 +188,10 @@ fn note_frontier(
     requests: &mut Requests,
 ) {
     let Coverage { sections, frontier, .. } = coverage;
-    let (Some(fix), Some(reach)) = (ping.fix, ping.reach) else { return };
-    let margin_m = sections.margin_m(fix.relative.sd_m(Vec3::zero()));
-    let moved = frontier.advance(reach, heads.clone(), ping.received, sections.section_m(), margin_m);
-    if !moved.is_nothing() {
+    let Some(reach) = ping.reach else { return };
+    let moved =
+        frontier.advance(reach, heads.clone(), ping.received, sections.section_m(), sections.left_m());
+    if sections.may_be_due(&moved) {
         let outlook = frontier.outlook(heads, ping.received);
         sections.due(&moved, &outlook, &mut |request| requests.0.push(request));
     }

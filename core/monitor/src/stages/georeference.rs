@@ -124,9 +124,15 @@ fn longest_m(sonar: &SonarReturn, tunnel: &TunnelDesign) -> f64 {
 pub(super) fn reach(pose: &Pose, mount: &Mount, tunnel: &TunnelDesign) -> Reach {
     let origin = pose.place(mount.position);
     let axis = pose.attitude * (mount.rotation * Vec3::new(1.0, 0.0, 0.0));
-    let across = math::hypot(axis.y(), axis.z()).min(0.99);
-    let slope = across / math::sqrt(1.0 - across * across);
-    let spread_m = slope * tunnel.profile.farthest_m([origin.y(), origin.z()]);
+    let across = math::hypot(axis.y(), axis.z());
+    let spread_m = if across > 0.0 {
+        let leaning = [axis.y() / across, axis.z() / across];
+        let across = across.min(0.99);
+        let slope = across / math::sqrt(1.0 - across * across);
+        slope * tunnel.profile.farthest_along_m([origin.y(), origin.z()], leaning)
+    } else {
+        0.0
+    };
     Reach { from_m: origin.x() - spread_m, to_m: origin.x() + spread_m }
 }
 
@@ -158,5 +164,47 @@ fn situation(
         layout: target.layout,
         configured: heads.iter().len(),
         heads: motions,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use headrace_coverage::WallLimits;
+    use headrace_fusion::relative::Relative;
+    use headrace_geometry::frames::{Point3, Rot};
+    use headrace_geometry::site::Site;
+    use headrace_geometry::tunnel::shapes;
+
+    /// In the middle of a pipe of 3 m radius, a ping at 90 degrees, to the left, through water as fast as the head believes.
+    fn heard(range_m: Option<f64>, hidden: bool) -> Outcome {
+        let profile = shapes::circle(3.0).unwrap();
+        let limits = WallLimits::new(profile.perimeter_m(), 1.0);
+        let (site, length_m) = (Site::default(), 30.0);
+        let tunnel = TunnelDesign { profile, site, length_m, contradiction_m: 1.0, limits };
+        let [y_m, z_m] = tunnel.profile.reference();
+        let pose = Pose { position: Point3::new(10.0, y_m, z_m), attitude: Rot::identity() };
+        let relative = Relative::along(0.01);
+        let fix = Fix { pose, speed_mps: 0.1, relative, revisit: relative, tie: 0 };
+        let mount = Mount { position: Vec3::zero(), rotation: Rot::identity() };
+        let sound_speed_mps = tunnel.site.sound_speed_mps;
+        let [angle_rad, max_range_m, resolution_m] = [math::FRAC_PI_2, 5.0, 0.005];
+        let sonar = SonarReturn { angle_rad, range_m, max_range_m, resolution_m, sound_speed_mps };
+        outcome(&sonar, Ok(fix), &mount, hidden, &tunnel)
+    }
+
+    #[test]
+    fn an_echo_of_the_vehicle_is_no_wall() {
+        for range_m in [0.1, 0.75, 1.4] {
+            assert!(
+                matches!(heard(Some(range_m), true), Outcome::Lost(Loss::Occluded, Some(_))),
+                "{range_m}"
+            );
+            assert!(matches!(heard(Some(range_m), false), Outcome::Sample { .. }), "{range_m}");
+        }
+        // Beyond half way it isn't the vehicle that is heard.
+        assert!(matches!(heard(Some(1.6), true), Outcome::Sample { .. }));
+        assert!(matches!(heard(None, true), Outcome::Lost(Loss::Occluded, Some(_))));
+        assert!(matches!(heard(None, false), Outcome::Lost(Loss::Missing, Some(_))));
     }
 }

@@ -340,3 +340,56 @@ impl Placing<'_> {
         coverage.lacks.add(Lack { x_m, arc_m: wall.arc_m, why });
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use headrace_sensor::reading::SourceId;
+
+    /// A ping made without a fix, with a return or without one.
+    fn away(at_ms: u64, outcome: Outcome) -> PlacedPing {
+        let at = MonoNs(at_ms * 1_000_000);
+        PlacedPing {
+            head: 1,
+            received: at,
+            valid_at: at,
+            fix: None,
+            reach: None,
+            single_step: true,
+            new_sweep: false,
+            standing: false,
+            outcome,
+            angle_rad: 0.1,
+            hidden: Hidden::No,
+            longest_m: 5.0,
+            source: SourceId(3),
+            origin: None,
+        }
+    }
+
+    #[test]
+    fn pings_without_a_fix_are_kept_until_there_is_no_room_and_that_is_known() {
+        let (mut lacking, mut lacks) = (Lacking::default(), Lacks::default());
+        let unplaced = Outcome::Unplaced(headrace_fusion::NoFix::Chainage);
+        let missing = Outcome::Lost(Loss::Missing, None);
+        for (k, outcome) in (0..ROOM).zip([unplaced, missing].into_iter().cycle()) {
+            note_ping(&mut lacking, &away(k as u64, outcome), &mut lacks);
+        }
+        assert_eq!((lacking.away.len(), lacking.forgot), (ROOM, false));
+        let [first, second] = [lacking.away[0], lacking.away[1]];
+        assert_eq!(
+            (first.is_lost, second.is_lost),
+            (false, true),
+            "a return that couldn't be placed isn't lost"
+        );
+        assert!(
+            [first, second].iter().all(|ping| ping.why == Causes::of(Cause::PositionLost) && ping.head == 1)
+        );
+        note_ping(&mut lacking, &away(ROOM as u64, unplaced), &mut lacks);
+        assert_eq!(
+            (lacking.away.len(), lacking.forgot),
+            (ROOM, true),
+            "a stretch that isn't remembered is known"
+        );
+    }
+}

@@ -48,9 +48,8 @@ pub(super) fn note_beat(
     }
     let reaches = heads.iter().filter_map(|(.., frontier)| frontier.0);
     let Coverage { sections, frontier, .. } = coverage;
-    let margin_m = sections.margin_m(situation.pass_error_m);
-    let moved = frontier.beat(span, reaches.clone(), at, sections.section_m(), margin_m);
-    if !moved.is_nothing() {
+    let moved = frontier.beat(span, reaches.clone(), at, sections.section_m(), sections.left_m());
+    if sections.may_be_due(&moved) {
         let outlook = frontier.outlook(reaches, at);
         sections.due(&moved, &outlook, &mut |request| requests.0.push(request));
     }

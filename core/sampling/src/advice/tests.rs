@@ -340,3 +340,25 @@ fn a_swing_goes_on_while_heads_apart_follow_each_other() {
     let swept_m = 0.4 * 0.01 * 4.0 * 6.05;
     assert!((t_m(&apart) - t_m(&together) - swept_m).abs() < 0.02, "{} {}", t_m(&apart), t_m(&together));
 }
+
+#[test]
+fn an_unsure_position_lowers_the_speed_to_what_meets_the_target_less_its_margin() {
+    let mut case = Case::new(&[10.0, 100.0, 190.0, 280.0], &[0.0; 4], 0.2, 0.5);
+    let sure = case.advice();
+    // Two standard deviations of 17 mm, of which 2 mm are free: 3 cm of the half metre.
+    case.situation.pass_error_m = 0.017;
+    let unsure = case.advice();
+    let meets_m = |advice: &Advice, v_mps: f64| {
+        let v_mps = v_mps / (1.0 - SPEED_MARGIN);
+        spacing::t_max_m(v_mps * advice.pass_gap_s, v_mps * advice.ping_period_s, advice.t_y_m)
+    };
+    assert!((meets_m(&sure, sure.v_max_mps) - 0.5).abs() < 1e-9);
+    assert!((meets_m(&unsure, unsure.v_max_mps) - 0.47).abs() < 1e-9, "{unsure:?}");
+    let fast = |advice: &Advice| advice.alternatives[1].unwrap().v_max_mps;
+    assert!((meets_m(&unsure, fast(&unsure)) - 0.47).abs() < 1e-3, "{}", fast(&unsure));
+    assert!(fast(&sure) > 1.05 * fast(&unsure));
+    // What it costs is told as position's share, and nothing else has changed.
+    let [margins, before] = [unsure.margins.unwrap(), sure.margins.unwrap()];
+    assert!((margins.swing_mps - before.swing_mps).abs() < 1e-9);
+    assert!((margins.position_mps - unsure.v_max_mps).abs() < 1e-9 && margins.pass_error_m >= 0.017);
+}

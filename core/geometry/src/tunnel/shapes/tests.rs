@@ -191,3 +191,21 @@ proptest! {
         prop_assert!(hit.normal[0] * direction[0] + hit.normal[1] * direction[1] < 1e-9);
     }
 }
+
+#[test]
+fn the_farthest_wall_along_a_direction_is_what_a_dense_search_finds() {
+    for (name, profile) in all() {
+        for k in 0..24 {
+            let (sin, cos) = math::sin_cos(0.26 * f64::from(k));
+            let [y_m, z_m] = profile.reference();
+            let origin = [y_m + 0.3 * cos, z_m - 0.2 * sin];
+            let along_m = |m: u32| {
+                let [y, z] = profile.point_at(profile.perimeter_m() * f64::from(m) / 20_000.0);
+                (cos * (y - origin[0]) + sin * (z - origin[1])).abs()
+            };
+            let dense_m = (0..20_000).map(along_m).fold(0.0, f64::max);
+            let exact_m = profile.farthest_along_m(origin, [cos, sin]);
+            assert!((0.0..2e-3).contains(&(exact_m - dense_m + 1e-12)), "{name} {k}: {exact_m} {dense_m}");
+        }
+    }
+}

@@ -1,0 +1,143 @@
+//! Which sections are due for judging: those that the heads have left, those that may fail for certain by a part of them, and
+//! at the end all that aren't settled.
+
+use super::super::frontier::{Moved, Outlook, Reach, clear_of};
+use super::super::hole::{FARTHEST_M, Needed};
+use super::super::section::Verdict;
+use super::{Ended, Judging, Request, Sections, clamp};
+use headrace_geometry::math;
+
+/// Distance that the heads go between two looks at what they have left behind, m: a flag comes at most so late.
+const LOOK_M: f64 = 0.125;
+
+/// Wherever the heads reach next: any chainage that is finite.
+pub(super) const LOOK_AT_ONCE: [f64; 2] = [f64::MIN, f64::MAX];
+
+impl Sections {
+    /// Whether the heads have moved so far that sections may be due.
+    pub fn may_be_due(&self, moved: &Moved) -> bool {
+        let [behind_m, ahead_m] = self.next_look_m;
+        let is_due = |reach: Reach| reach.from_m >= behind_m || reach.to_m <= ahead_m;
+        !moved.is_nothing() || moved.to_come.is_some_and(is_due)
+    }
+
+    /// Sets where to look next: what lies behind is left in steps of a part of a section, as is what lies ahead of a vehicle
+    /// that goes back.
+    fn look_again(&mut self, to_come: Option<Reach>) {
+        let Some(Reach { from_m, to_m }) = to_come else { return };
+        let parts = (-math::floor_to_i64(-self.section_m / LOOK_M)).max(1);
+        let (step_m, left_m) = (self.section_m / parts as f64, self.left_m());
+        let after_m = |x_m: f64| ((math::floor_to_i64(x_m / step_m) + 1) as f64) * step_m;
+        let [at_once_behind, at_once_ahead] = LOOK_AT_ONCE;
+        self.next_look_m = [
+            if from_m.is_finite() { after_m(from_m - left_m) + left_m } else { at_once_behind },
+            if to_m.is_finite() { -after_m(-to_m - left_m) - left_m } else { at_once_ahead },
+        ];
+    }
+
+    /// Calls `ask` for every section of the way due for judging after the heads have moved: those that left the zone or
+    /// never were in it, those whose hole may no longer get samples, and those of which a part may fail for certain.
+    ///
+    /// Allocates: never.
+    pub fn due(&mut self, moved: &Moved, outlook: &Outlook, ask: &mut impl FnMut(Request)) {
+        self.look_again(moved.to_come);
+        let way = self.sections_of(outlook.way);
+        let ask_for = Request::at(outlook);
+        for range in [&moved.left_behind, &moved.left_ahead] {
+            for index in clamp(range.clone(), &way) {
+                let Some(section) = self.get_mut(index) else { continue };
+                if section.stale || section.hole.is_none() || section.not_inspected {
+                    section.stale = false;
+                    section.settled = false;
+                    ask(ask_for(index));
+                }
+            }
+        }
+        let far = math::floor_to_i64(FARTHEST_M / self.section_m) + 1;
+        // The sections at the zone's ends may be left in part.
+        let behind = moved.left_behind.end - far..moved.left_behind.end + 1;
+        let ahead = moved.left_ahead.start - 1..moved.left_ahead.start + far;
+        for range in [behind, ahead] {
+            for index in clamp(range, &way) {
+                let (target_m, confidence_sd) = (self.target_m, self.confidence_sd);
+                let bounds_m = self.bounds_m(index);
+                let Some(section) = self.get_mut(index).filter(|section| !section.settled) else { continue };
+                let may_fail = !section.is_flagged() && section.verdict == Verdict::Open;
+                let is_out = index < moved.left_behind.end || index >= moved.left_ahead.start;
+                let Some(hole) = section.hole else {
+                    // Of the way, but never in reach of a head: beside the heads, or where the vehicle set out.
+                    let (from_m, to_m) = bounds_m;
+                    let clear = clear_of(moved.to_come, from_m).min(clear_of(moved.to_come, to_m)) > 0.0;
+                    if !is_out {
+                        ask(Request { only_fails: true, ..ask_for(index) });
+                    } else if clear && !moved.has_left(index) {
+                        ask(ask_for(index));
+                    }
+                    continue;
+                };
+                let clear_m = clear_of(moved.to_come, hole.x_m);
+                let left_m = hole.least_m.min(2.0 * clear_m);
+                let fails =
+                    section.verdict == Verdict::Open && left_m - confidence_sd * section.hole_sd_m > target_m;
+                if fails || clear_m >= hole.diameter_m / 2.0 {
+                    ask(ask_for(index));
+                } else if may_fail {
+                    ask(Request { only_fails: true, ..ask_for(index) });
+                }
+            }
+        }
+    }
+
+    /// Calls `ask` for sections of the still zone: those that may fail for certain although their hole may still get samples,
+    /// and flagged ones with samples since they were judged. Otherwise they would get no verdict while the vehicle is
+    /// stationary.
+    ///
+    /// Allocates: never.
+    pub fn look_around(&mut self, outlook: &Outlook, ask: &mut impl FnMut(Request)) {
+        let Some(zone) = outlook.still_zone.clone() else { return };
+        let ask_for = Request::at(outlook);
+        for index in clamp(zone, &self.sections_of(outlook.way)) {
+            let Some(section) = self.get_mut(index) else { continue };
+            let is_flagged = section.is_flagged();
+            if !is_flagged || core::mem::take(&mut section.stale) {
+                ask(Request { only_fails: !is_flagged, ..ask_for(index) });
+            }
+        }
+    }
+
+    /// Whether a section has an empty circle, too large for the target by the errors there, where all heads have been and no
+    /// more samples will land.
+    pub(super) fn fails_already(&self, request: &Request, judging: &mut Judging<'_>) -> bool {
+        let Judging { store, finder, profile, .. } = judging;
+        let Request { section: index, to_come, not_passed, .. } = *request;
+        let (Some(section), Some(_)) = (self.get(index), not_passed) else { return false };
+        let bounds_m = self.bounds_m(index);
+        let clear_m = |reach| clear_of(reach, bounds_m.0).max(clear_of(reach, bounds_m.1));
+        let (most_clear_m, half_k) = (clear_m(to_come).min(clear_m(not_passed)), self.confidence_sd / 2.0);
+        if most_clear_m <= self.target_m / 2.0 {
+            return false;
+        }
+        let pass_error = self.pass_error(index);
+        let radius_m = |pass_sd_m: f64| self.target_m / 2.0 + half_k * section.visits.sd_m(pass_sd_m);
+        let needed = Needed {
+            radius_m: &|arc_m| radius_m(pass_error.sd_m(profile.point_at(arc_m))),
+            most_m: radius_m(pass_error.worst_m(profile)),
+            slope: half_k * pass_error.slope(),
+        };
+        let least_m = needed.most_m - needed.slope * profile.perimeter_m() / 2.0;
+        most_clear_m > least_m && finder.has_circle(store, bounds_m, [to_come, not_passed], &needed)
+    }
+
+    /// Calls `ask` for every section of the way that isn't settled, at the end of a dive.
+    pub fn unsettled(&mut self, outlook: &Outlook, ask: &mut impl FnMut(Request)) {
+        let ask_for = Request::at(outlook);
+        for index in self.sections_of(outlook.way) {
+            let Some(section) = self.get_mut(index) else { continue };
+            // Samples farther away than a pass depends on may have narrowed the hole of a fail.
+            if section.stale || !section.settled || section.verdict != Verdict::Pass {
+                section.stale = false;
+                ask(Request { ended: Some(Ended(outlook.through)), ..ask_for(index) });
+            }
+        }
+    }
+}
