@@ -73,6 +73,35 @@ fn a_sync_that_fails_once_is_told_and_costs_nothing() {
 }
 
 #[test]
+fn a_recording_that_failed_is_told_live_and_stays_told() {
+    let folder = Folder::with_dive();
+    if !has_strace() {
+        return;
+    }
+    let strace = ["strace", "-f", "-qq", "-o", "trace.txt", "-e", "trace=fdatasync"];
+    let strace = [&strace[..], &["-e", "inject=fdatasync:error=EIO:when=2"]].concat();
+    let arguments = ["--record", "log.mcap", "--speed", "10x", "--json-lines"];
+    let output = below(&folder, &strace, &arguments).output().unwrap();
+    assert_eq!(output.status.code(), Some(3));
+    let lines = String::from_utf8(output.stdout).unwrap();
+    let lines: Vec<Value> = lines.lines().map(|line| serde_json::from_str(line).unwrap()).collect();
+    let of = |kind: &str| lines.iter().filter(|line| line["type"] == kind).collect::<Vec<_>>();
+    let told = of("recording");
+    assert_eq!(told.iter().map(|line| line["fails"].as_bool().unwrap()).collect::<Vec<_>>(), [true, false]);
+    assert!(told[0]["text"].as_str().unwrap().contains("Input/output error"), "{}", told[0]);
+    assert!(told[1]["text"].as_str().unwrap().contains("no message is missing"), "{}", told[1]);
+    let states = of("state");
+    let (first, last) = (states[0], states[states.len() - 1]);
+    assert_eq!((&first["recording_fails"], &last["recording_fails"]), (&Value::Null, &Value::Bool(false)));
+    assert!(last["text"].as_str().unwrap().contains("recording had failed"), "{}", last["text"]);
+    let schema: Value = serde_json::from_str(include_str!("../../../docs/live-state.schema.json")).unwrap();
+    for line in &lines {
+        let faults = headrace_tests::json_schema::faults(&schema, line);
+        assert!(faults.is_empty(), "{line:#}: {faults:#?}");
+    }
+}
+
+#[test]
 fn a_medium_that_takes_nothing_more_leaves_a_log_that_is_cut_off() {
     let folder = Folder::with_dive();
     if !has_strace() {
