@@ -164,7 +164,7 @@ mod tests {
     /// left in the queue.
     #[test]
     fn entries_are_taken_whole_and_all_of_them_before_the_stop() {
-        let executions = explore("header then body in the recorder's queue, and its stop", Some(2), || {
+        let executions = explore("header then body in the recorder's queue, and its stop", Some(3), || {
             let (producer, consumer) = ring(64);
             let stopping = Arc::new(AtomicBool::new(false));
             let flag = Arc::clone(&stopping);
