@@ -10,8 +10,17 @@ use ringbuf::HeapRb;
 use ringbuf::wrap::{Cons, Prod};
 
 use super::fields::Fields;
-use super::recorder::Full;
 use super::writer::Lane;
+
+/// An entry didn't fit in the queue; nothing of it was written.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[error("the recorder's queue has room for {free} bytes and an entry needs {needed}")]
+pub struct Full {
+    /// Free bytes.
+    pub free: usize,
+    /// Bytes needed.
+    pub needed: usize,
+}
 
 /// Header of each entry in the queue: kind, a spare byte, number, length, log time, publish time.
 pub(super) const ENTRY_HEAD_BYTES: usize = 24;

@@ -21,7 +21,7 @@ use super::LogError;
 use super::derived_channels::DerivedChannels;
 use super::format::{TICK_HEAD_BYTES, order_bytes, tick_head};
 use super::part::part_path;
-use super::queue::{ENTRY_HEAD_BYTES, Entries, Queue, SentMessage, State};
+use super::queue::{ENTRY_HEAD_BYTES, Entries, Full, Queue, SentMessage, State};
 use super::rotate::{Parts, Rotation, in_the_way};
 use super::space::Space;
 use super::worker::{Beside, Echoes, Worker};
@@ -31,15 +31,6 @@ use super::writer::{Lane, LogHeader, LogWriter, Summary};
 const MIN_QUEUE_BYTES: usize = 64 * 1024;
 /// Capacity for messages to devices: some seconds of eight heads.
 const SENT_MESSAGES: usize = 2048;
-/// An entry didn't fit in the queue; nothing of it was written.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
-#[error("the recorder's queue has room for {free} bytes and an entry needs {needed}")]
-pub struct Full {
-    /// Free bytes.
-    pub free: usize,
-    /// Bytes needed.
-    pub needed: usize,
-}
 
 /// Starts recorders.
 pub struct Recorder;
