@@ -2,7 +2,8 @@
 //! a bare read loop on another port of the same kind in the same run. Prints Markdown.
 //!
 //! `cargo bench -p headrace_benches --bench ports` takes about two minutes; `-- 20` measures for twenty seconds a part,
-//! `-- latency` and `-- cpu` are its parts. The devices are emulated at their own rates by a thread of this process. CAN
+//! `-- latency`, `-- flag` (last byte of a return to the end of its tick, in which its flag is out, idle and with all cores busy)
+//! and `-- cpu` are its parts. The devices are emulated at their own rates by a thread of this process. CAN
 //! (vcan0, up) and HID (`/dev/uhid`) are measured only where available: in `tests/vm`, for one. Absolute times drift on
 //! shared machines, tails most.
 
@@ -79,6 +80,9 @@ fn main() {
     if wanted("latency") {
         latency(Duration::from_secs(seconds));
     }
+    if wanted("flag") {
+        flags(Duration::from_secs(seconds));
+    }
     if wanted("cpu") {
         four_heads(Duration::from_secs(seconds));
     }
@@ -107,6 +111,9 @@ fn answer(program: &str, arguments: &[&str]) -> String {
 struct Course {
     sent: Arc<SegQueue<(MonoNs, Vec<u8>)>>,
     delays: Arc<SegQueue<DurNs>>,
+    /// Times of sending of messages that the loop hasn't consumed yet, and the delays until the ends of their ticks.
+    to_consume: Arc<SegQueue<MonoNs>>,
+    ends: Arc<SegQueue<DurNs>>,
 }
 
 /// The receiving end of a course.
@@ -120,14 +127,12 @@ impl Finish {
         Self { course: course.clone(), waiting: VecDeque::new() }
     }
 
-    /// Records the delay of a received message; those sent before it count as lost.
-    fn note(&mut self, at: MonoNs, bytes: &[u8]) {
+    /// Time of sending of a received message; those sent before it count as lost.
+    fn sent(&mut self, bytes: &[u8]) -> Option<MonoNs> {
         self.look();
-        if let Some(position) = self.waiting.iter().position(|(_, message)| message == bytes) {
-            self.waiting.drain(..position);
-            let (sent, _) = self.waiting.pop_front().unwrap();
-            self.course.delays.push(at.since(sent));
-        }
+        let position = self.waiting.iter().position(|(_, message)| message == bytes)?;
+        self.waiting.drain(..position);
+        self.waiting.pop_front().map(|(sent, _)| sent)
     }
 
     fn look(&mut self) {
@@ -162,8 +167,13 @@ impl Wire for TimedWire<'_> {
     }
 
     fn deliver(&mut self, received: MonoNs, bytes: &[u8]) {
+        let sent = self.finish.sent(bytes);
+        // Before the loop can see it. What isn't of the devices (none on sound lines) has the time of its delivery.
+        self.finish.course.to_consume.push(sent.unwrap_or_else(now));
         self.wire.deliver(received, bytes);
-        self.finish.note(now(), bytes);
+        if let Some(sent) = sent {
+            self.finish.course.delays.push(now().since(sent));
+        }
     }
 }
 
@@ -245,6 +255,7 @@ fn bare(connect: &Connect, finish: Finish) {
 
 fn bare_reads(mut finish: Finish, mut read: impl FnMut(&mut [u8]) -> usize) {
     let (mut buffer, mut held) = ([0; 2048], Vec::new());
+    let empty_loop = empty_loop(&finish.course);
     loop {
         let count = read(&mut buffer);
         let at = now();
@@ -254,10 +265,28 @@ fn bare_reads(mut finish: Finish, mut read: impl FnMut(&mut [u8]) -> usize) {
         }
         held.extend_from_slice(&buffer[..count]);
         while let Some(len) = finish.next_len().filter(|len| held.len() >= *len) {
-            finish.note(at, &held[..len]);
+            if let Some(sent) = finish.sent(&held[..len]) {
+                finish.course.to_consume.push(sent);
+                finish.course.delays.push(at.since(sent));
+            }
             held.drain(..len);
         }
+        empty_loop.unpark();
     }
+}
+
+/// A loop that is woken as ours is, and does nothing.
+fn empty_loop(course: &Course) -> thread::Thread {
+    let course = course.clone();
+    let empty = named("empty", move || {
+        loop {
+            thread::park();
+            while let Some(sent) = course.to_consume.pop() {
+                course.ends.push(now().since(sent));
+            }
+        }
+    });
+    empty.thread().clone()
 }
 
 /// The ends of one sensor's two ports: the driver's and the yardstick's; on a bus both receive from the same one.
@@ -319,6 +348,8 @@ impl Ends {
 struct Measured {
     /// For each sensor the driver's delays and the yardstick's.
     delays: Vec<[Vec<DurNs>; 2]>,
+    /// The same until the end of the tick, and in an empty loop.
+    ends: Vec<[Vec<DurNs>; 2]>,
     /// CPU time, s, of the threads, by name prefix.
     ports_s: f64,
     loop_s: f64,
@@ -354,31 +385,43 @@ fn rehearse(scene: &Scene, ends: Vec<Ends>, measured: Duration) -> Measured {
     let flag = Arc::clone(&ending);
     let devices = named("devices", move || emulate(simulation, ends, &flag));
     let flag = Arc::clone(&ending);
+    let of_loop: Vec<Course> = courses.iter().map(|pair| pair[0].clone()).collect();
     let serving = named("loop", move || {
         let supervisor = Supervisor::start(connections, None).unwrap();
-        supervisor.run(&mut dive, &|| flag.load(Ordering::Relaxed), &mut |_| {});
+        let mut consumed = vec![0; of_loop.len()];
+        supervisor.run(&mut dive, &|| flag.load(Ordering::Relaxed), &mut |dive| {
+            let at = now();
+            for ((course, consumed), counts) in of_loop.iter().zip(&mut consumed).zip(dive.decoder_counts()) {
+                while *consumed < counts.good_frames {
+                    *consumed += 1;
+                    course.to_consume.pop().into_iter().for_each(|sent| course.ends.push(at.since(sent)));
+                }
+            }
+        });
         supervisor.stop(&mut dive, &mut |_| ());
     });
     thread::sleep(Duration::from_secs_f64(WARMING.as_secs_f64()));
     for course in courses.iter().flatten() {
-        while course.delays.pop().is_some() {}
+        while course.delays.pop().is_some() || course.ends.pop().is_some() {}
     }
     let (from, before) = (now(), ["line ", "loop", "bare "].map(run_s));
     thread::sleep(measured);
     let (took_s, after) = (now().since(from).as_secs_f64(), ["line ", "loop", "bare "].map(run_s));
-    let taken = |course: &Course| {
-        let mut delays: Vec<DurNs> = std::iter::from_fn(|| course.delays.pop()).collect();
+    let taken = |queue: &SegQueue<DurNs>| {
+        let mut delays: Vec<DurNs> = std::iter::from_fn(|| queue.pop()).collect();
         delays.sort_unstable();
         delays
     };
-    let delays: Vec<[Vec<DurNs>; 2]> =
-        courses.iter().map(|pair| [taken(&pair[0]), taken(&pair[1])]).collect();
+    let of_pairs = |of: fn(&Course) -> &SegQueue<DurNs>| -> Vec<[Vec<DurNs>; 2]> {
+        courses.iter().map(|pair| [taken(of(&pair[0])), taken(of(&pair[1]))]).collect()
+    };
+    let (delays, ends) = (of_pairs(|course| &course.delays), of_pairs(|course| &course.ends));
     ending.store(true, Ordering::Relaxed);
     serving.join().unwrap();
     devices.join().unwrap();
     let packets = delays.iter().map(|pair| pair[0].len() as u64).sum();
     let [ports_s, loop_s, bare_s] = [0, 1, 2].map(|part| after[part] - before[part]);
-    Measured { delays, ports_s, loop_s, bare_s, packets, took_s }
+    Measured { delays, ends, ports_s, loop_s, bare_s, packets, took_s }
 }
 
 fn named<T: Send + 'static>(name: &str, work: impl FnOnce() -> T + Send + 'static) -> thread::JoinHandle<T> {
@@ -463,6 +506,53 @@ fn latency(measured: Duration) {
             quantiles(bare),
             ratio(500),
             ratio(990)
+        );
+    }
+    println!();
+}
+
+/// Last byte of a return to the end of its tick, in which its flag is out.
+fn flags(measured: Duration) {
+    println!("Last byte of a head's return written to the end of its tick, us: p50, p99, p99.9, max\n");
+    println!("| cores | returns | ours | an empty loop | ours above it |\n|---|---|---|---|---|");
+    let cores = thread::available_parallelism().map_or(1, std::num::NonZero::get);
+    for busy in [0, cores] {
+        let ending = Arc::new(AtomicBool::new(false));
+        let spin = |_| {
+            let ending = Arc::clone(&ending);
+            named("busy", move || while !ending.load(Ordering::Relaxed) {})
+        };
+        let spinning: Vec<_> = (0..busy).map(spin).collect();
+        let scene = scenes::scene(&format!("vehicle = \"vita2-4.toml\"\n{WAY}"));
+        let ends = (0..scene.vehicle.sensors.len()).map(|number| {
+            let config = &scene.vehicle.sensor_configs[number];
+            let carrier = Connect::parse(&config.connect).map_or(Carrier::Udp, |connect| connect.carrier());
+            let network = matches!(carrier, Carrier::Tcp | Carrier::Serial);
+            Ends::new(if network { carrier } else { Carrier::Udp }, number, None).unwrap()
+        });
+        let results = rehearse(&scene, ends.collect(), measured);
+        ending.store(true, Ordering::Relaxed);
+        for thread in spinning {
+            thread.join().unwrap();
+        }
+        let of_heads = |which: usize| {
+            let sensors = scene.vehicle.sensors.iter().zip(&results.ends);
+            let heads = sensors.filter(|(device, _)| device.head().is_some());
+            let mut all: Vec<DurNs> = heads.flat_map(|(_, pair)| pair[which].iter().copied()).collect();
+            all.sort_unstable();
+            all
+        };
+        let (ours, empty) = (of_heads(0), of_heads(1));
+        let above = |thousandths| at(&ours, thousandths) - at(&empty, thousandths);
+        println!(
+            "| {} | {} | {} | {} | {:.0}, {:.0}, {:.0} |",
+            if busy == 0 { "idle".to_owned() } else { format!("{busy} busy loops beside") },
+            ours.len(),
+            quantiles(&ours),
+            quantiles(&empty),
+            above(500),
+            above(990),
+            above(999)
         );
     }
     println!();

@@ -186,9 +186,9 @@ mod model_tests {
                 let sent = |number: &usize| port.send(MonoNs(*number as u64), &bytes(*number)).is_ok();
                 (0..LENGTHS.len()).filter(sent).collect::<Vec<_>>()
             });
-            let mut taken: Vec<_> = (0..2).filter_map(|_| reader.next()).collect();
+            let mut taken: Vec<_> = (0..2).filter_map(|_| reader.take_next()).collect();
             let sent = writer.join().unwrap();
-            taken.extend(std::iter::from_fn(|| reader.next()));
+            taken.extend(std::iter::from_fn(|| reader.take_next()));
             let sent: Vec<_> = sent.into_iter().map(|number| (number as u64, bytes(number))).collect();
             assert_eq!(taken, sent);
         });

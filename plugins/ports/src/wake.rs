@@ -92,26 +92,26 @@ mod tests {
         }
     }
 
-    /// A line's thread sends and wakes, as `LineThread` does; the loop looks at its rings and sleeps, as `LiveFeed` does.
-    fn line_and_loop(packets_sent: u64) {
+    /// A line's thread sends and wakes, as `LineService` does; the loop looks at its rings and sleeps, as `LiveFeed` does.
+    fn line_and_loop(packets_sent: u8) {
         let (mut port, mut reader) = packets(64);
         let waker = Waker::<Modelled>::of_this_thread();
         let line = loom::thread::spawn(move || {
             for number in 0..packets_sent {
-                port.send(MonoNs(number), &[number as u8 + 1]).unwrap();
+                port.send(MonoNs(number.into()), &[number + 1]).unwrap();
                 waker.wake();
             }
         });
         let mut taken = Vec::new();
         loop {
-            taken.extend(std::iter::from_fn(|| reader.next()));
-            if taken.len() as u64 == packets_sent {
+            taken.extend(std::iter::from_fn(|| reader.take_next()));
+            if taken.len() == usize::from(packets_sent) {
                 break;
             }
             sleep::<Modelled>(Duration::MAX);
         }
         line.join().unwrap();
-        let sent: Vec<_> = (0..packets_sent).map(|number| (number, vec![number as u8 + 1])).collect();
+        let sent: Vec<_> = (0..packets_sent).map(|number| (u64::from(number), vec![number + 1])).collect();
         assert_eq!(taken, sent);
     }
 

@@ -1,4 +1,5 @@
-//! Devices on real ports: emulated ones, faulty lines, and the kernel's own CAN and HID.
+//! Devices on real ports: emulated ones, faulty lines, and the kernel's own CAN and HID; and what comes of their bytes on the
+//! way to the loop.
 
 #![allow(clippy::unwrap_used, clippy::panic, reason = "a test stops at what it can't do")]
 
@@ -20,5 +21,7 @@ mod run_ports;
 #[cfg(target_os = "linux")]
 mod soak;
 mod splits;
+#[cfg(target_os = "linux")]
+mod syscalls;
 #[cfg(unix)]
 mod who_speaks;

@@ -171,7 +171,9 @@ fn differences(live: &BTreeMap<String, &Value>, replay: &BTreeMap<String, &Value
     different
 }
 
-fn rehearse(distance_m: f64) {
+/// Rehearses a dive. Its sections are those of the scene's replay as far as the machine keeps time, so that only a test that has
+/// the machine to itself compares them.
+fn rehearse(distance_m: f64, keeps_time: bool) {
     let folder = Folder::new();
     let scene_file = folder.path("scene.toml");
     folder.write("scene.toml", scene(distance_m));
@@ -185,7 +187,8 @@ fn rehearse(distance_m: f64) {
     }
     let (ours, theirs) = (sections(&live), sections(&scene));
     let different = differences(&ours, &theirs);
-    assert!(different.is_empty(), "{different:#?}");
+    assert!(different.is_empty() || !keeps_time, "{different:#?}");
+    assert!(!ours.is_empty(), "no section was judged");
     // What was recorded is what was seen.
     let again = replay(&folder, &folder.path("live.mcap"), "again.json");
     assert_eq!(again["digest"], live["digest"]);
@@ -194,13 +197,13 @@ fn rehearse(distance_m: f64) {
 
 /// Two thirds of a minute under way.
 #[test]
-fn a_rehearsal_gives_the_sections_of_the_scene_s_replay() {
-    rehearse(3.6);
+fn a_rehearsal_is_recorded_as_it_was_seen() {
+    rehearse(3.6, false);
 }
 
 /// Three minutes under way.
 #[test]
 #[ignore = "takes three minutes and more; .ci/run does it"]
 fn a_rehearsal_of_three_minutes_gives_the_sections_of_the_scene_s_replay() {
-    rehearse(16.2);
+    rehearse(16.2, true);
 }

@@ -100,7 +100,7 @@ pub struct ModelReader(PortReader<ModelConsumer>);
 
 impl ModelReader {
     /// The next packet, as the loop takes it: receive time and bytes.
-    pub fn next(&mut self) -> Option<(u64, Vec<u8>)> {
+    pub fn take_next(&mut self) -> Option<(u64, Vec<u8>)> {
         let header = self.0.peek()?;
         let mut bytes = vec![0; header.len];
         self.0.take(&mut bytes);

@@ -11,8 +11,17 @@ use ringbuf::wrap::{Cons, Prod};
 
 use super::fault::RecordingEvent;
 use super::fields::Fields;
-use super::recorder::Full;
 use super::writer::Lane;
+
+/// An entry didn't fit in the queue; nothing of it was written.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[error("the recorder's queue has room for {free} bytes and an entry needs {needed}")]
+pub struct Full {
+    /// Free bytes.
+    pub free: usize,
+    /// Bytes needed.
+    pub needed: usize,
+}
 
 /// Header of each entry in the queue: kind, a spare byte, number, length, log time, publish time.
 pub(super) const ENTRY_HEAD_BYTES: usize = 24;
@@ -199,12 +208,12 @@ mod tests {
 
     const TIMES: MonoNs = MonoNs(7);
 
-    fn message(number: usize) -> Vec<u8> {
-        vec![number as u8 + 1; [5, 0][number]]
+    fn message(number: u8) -> Vec<u8> {
+        vec![number + 1; [5, 0][usize::from(number)]]
     }
 
-    fn push(entries: &mut Entries<headrace_monitor::byte_ring::model::ModelProducer>, number: usize) {
-        let lane = Lane::Raw(number as u16);
+    fn push(entries: &mut Entries<headrace_monitor::byte_ring::model::ModelProducer>, number: u8) {
+        let lane = Lane::Raw(number.into());
         entries.begin(lane, TIMES, TIMES, message(number).len()).unwrap();
         entries.put(&message(number));
     }
@@ -213,7 +222,7 @@ mod tests {
     /// left in the queue.
     #[test]
     fn entries_are_taken_whole_and_all_of_them_before_the_stop() {
-        let executions = explore("header then body in the recorder's queue, and its stop", Some(2), || {
+        let executions = explore("header then body in the recorder's queue, and its stop", Some(3), || {
             let (producer, consumer) = ring(64);
             let stopping = Arc::new(AtomicBool::new(false));
             let flag = Arc::clone(&stopping);
@@ -235,7 +244,7 @@ mod tests {
             push(&mut entries, 1);
             stopping.store(true, Release);
             let taken = recorder.join().unwrap();
-            let pushed = |number| (Lane::Raw(number as u16), TIMES, message(number));
+            let pushed = |number: u8| (Lane::Raw(number.into()), TIMES, message(number));
             assert_eq!(taken, [pushed(0), pushed(1)]);
         });
         assert!(executions > 50, "{executions}");

@@ -21,7 +21,7 @@ use super::LogError;
 use super::derived_channels::DerivedChannels;
 use super::fault::RecordingEvent;
 use super::format::{TICK_HEAD_BYTES, order_bytes, tick_head};
-use super::queue::{ENTRY_HEAD_BYTES, Entries, Gap, Queue, SentPort, State, until_stopped};
+use super::queue::{ENTRY_HEAD_BYTES, Entries, Full, Gap, Queue, SentPort, State, until_stopped};
 use super::recording::Recording;
 use super::rotate::{Rotation, in_the_way};
 use super::storage::{Disk, OneWriter, Storage};
@@ -38,16 +38,6 @@ const SENT_MESSAGES: usize = 2048;
 const PATIENCE: Duration = Duration::from_secs(30);
 /// Capacity for news of the recording.
 const EVENTS: usize = 64;
-
-/// An entry didn't fit in the queue; nothing of it was written.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
-#[error("the recorder's queue has room for {free} bytes and an entry needs {needed}")]
-pub struct Full {
-    /// Free bytes.
-    pub free: usize,
-    /// Bytes needed.
-    pub needed: usize,
-}
 
 /// Starts recorders.
 pub struct Recorder;
