@@ -313,8 +313,8 @@ mod tests {
     fn what_a_log_lacks_is_passed_over_by_its_number() {
         let mut stream = Stream::default();
         let head = RecordKind::Run as u64 | (1 << 8);
-        stream.waiting.push_back(Batch { tick: 4, next: 0, words: vec![head, 7], at: 0 });
-        stream.waiting.push_back(Batch { tick: 9, next: 2, words: vec![head, 8], at: 0 });
+        stream.wait(Batch { tick: 4, next: 0, words: vec![head, 7], at: 0 }, "poses");
+        stream.wait(Batch { tick: 9, next: 2, words: vec![head, 8], at: 0 }, "poses");
         assert_eq!(stream.front().map(|(tick, record)| (tick, record.words.to_vec())), Some((4, vec![7])));
         stream.step();
         assert_eq!(stream.front(), None);

@@ -7,9 +7,9 @@ use std::sync::Arc;
 use crossbeam::queue::SegQueue;
 use headrace_replay::log::{Storage, StoredFile};
 
-use super::Sabotage;
 use super::cable::Clock;
 use super::plan::{DiskFault, Window};
+use super::sabotage::Sabotage;
 use crate::random::Random;
 
 /// Smallest unit that a power cut leaves whole.

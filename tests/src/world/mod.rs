@@ -6,6 +6,7 @@ pub mod device;
 pub mod disk;
 pub mod invariants;
 pub mod plan;
+mod sabotage;
 
 use std::collections::VecDeque;
 use std::fmt::Write as _;
@@ -39,6 +40,7 @@ use cable::{Cable, Clock, Machine};
 use device::Device;
 use disk::{LeftFile, SimulatedDisk};
 use plan::{BEGIN, Ending, MachineFault, Plan};
+pub use sabotage::Sabotage;
 
 /// Longest step of the world.
 const LONGEST_STEP_NS: usize = 12_000_000;
@@ -92,24 +94,6 @@ pub struct Consumed {
     pub received: MonoNs,
     /// Content.
     pub bytes: Vec<u8>,
-}
-
-/// What breaks an invariant on purpose, to see that it is found.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Sabotage {
-    /// Every hundredth frame of a sound device is lost on its way.
-    CableLoses,
-    /// When one connection breaks another does.
-    NeighbourBreaks,
-    /// Every fortieth write is forgotten, and reported as done.
-    DiskForgets,
-    /// Syncs are reported and not done.
-    SyncLies,
-}
-
-impl Sabotage {
-    /// All of them.
-    pub const ALL: [Self; 4] = [Self::CableLoses, Self::NeighbourBreaks, Self::DiskForgets, Self::SyncLies];
 }
 
 /// A dive in a world.

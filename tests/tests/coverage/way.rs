@@ -76,8 +76,9 @@ fn where_all_heads_are_dead_the_way_fails_as_the_vehicle_leaves_it() {
     for section in dark {
         fails_by_silence(section, &[0, 1, 2, 3]);
         let late_s = late_s(&report, section, HEAD_M);
-        // A beat, and what position errors add to half the target.
-        assert!((-0.1..2.5).contains(&late_s), "{}: {late_s} s late", section.start_m);
+        // A beat, and what position errors add to half the target; at the soonest when the section's beginning has been left, since a
+        // circle about that may be large enough.
+        assert!((-0.25 / SPEED_MPS - 0.1..2.5).contains(&late_s), "{}: {late_s} s late", section.start_m);
     }
     let home = report.way_home.iter().map(|back| back.from_m).fold(0.0, f64::max);
     assert!(home > 10.5, "the way home goes to where the vehicle went: {home}");

@@ -208,7 +208,7 @@ fn pointers() -> Vec<Bomb> {
         bomb(
             "an attachment with a name of 3,000 letters",
             some(&[record(9, &nameless)]),
-            "bytes that are no records",
+            "a name too long to be read",
         ),
         bomb(
             "a record of 2^64-1 bytes",
