@@ -112,6 +112,7 @@ impl Navigation for Truth {
             relative: Relative::default(),
             revisit: Relative::default(),
             tie: 0,
+            settled: 0,
         })
     }
 }

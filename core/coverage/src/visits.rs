@@ -32,7 +32,12 @@ impl Visit {
     pub fn of(fix: &Fix, at: MonoNs, turns: u32) -> Self {
         let [pass, long_before] =
             [fix.relative, fix.revisit].map(|relative| PassError { relative, ..PassError::of(fix) });
-        Self { number: turns.saturating_add(fix.tie), tie: fix.tie, at, errors: [pass, long_before] }
+        Self {
+            number: turns.saturating_add(fix.tie).saturating_add(fix.settled),
+            tie: fix.tie,
+            at,
+            errors: [pass, long_before],
+        }
     }
 
     /// The largest standard deviation of a hole's diameter between samples of now and of then, m.

@@ -174,6 +174,7 @@ impl Navigation for DirectNavigation {
             pose: Pose { position: Point3::new(x_m, y_m, z_m), attitude },
             speed_mps,
             tie: 0,
+            settled: 0,
             relative,
             revisit: relative,
         })

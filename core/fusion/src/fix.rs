@@ -19,6 +19,9 @@ pub struct Fix {
     pub revisit: Relative,
     /// Number of the stretch of navigation. Nothing sure relates positions of different stretches.
     pub tie: u32,
+    /// How often the estimate has become much surer while it settled. What was placed before is related to what is placed now by the
+    /// errors of then, which `relative` doesn't have.
+    pub settled: u32,
 }
 
 /// Missing part of a fix.

@@ -1,4 +1,4 @@
-//! I/O shared by all device drivers: clock, lines of every carrier, and the thread that opens, reads, timestamps and
+//! I/O shared by all device drivers: clock, lines of every carrier, and the service that opens, reads, timestamps and
 //! reopens a line. Also device discovery, diagnosis and probing.
 //!
 //! The drivers themselves are in the device crates and do no I/O; see [`headrace_sensor::driver`].
@@ -9,7 +9,7 @@ mod diagnosis;
 mod discover;
 mod fix_hint;
 mod host;
-mod line_thread;
+mod line_service;
 mod lines;
 mod open_error;
 mod probe;
@@ -23,7 +23,7 @@ pub use device_end::{EmulatedPort, wait_for_any};
 pub use discover::can::is_interface_up;
 pub use discover::{Found, Machine, Presence, Rights, User, discover, presence};
 pub use host::Host;
-pub use line_thread::{Attached, Common, LineService, SentSink};
+pub use line_service::{Attached, Common, LineService, SentSink};
 pub use lines::{IsValid, Line, READ_BYTES, Senders};
 pub use open_error::{OpenError, OpenErrorKind};
 #[cfg(target_os = "linux")]

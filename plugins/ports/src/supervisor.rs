@@ -17,7 +17,7 @@ use headrace_sensor::driver::Driver;
 
 use crate::clock;
 use crate::host::RealHost;
-use crate::line_thread::{Attached, Common, LineService, SentSink};
+use crate::line_service::{Attached, Common, LineService, SentSink};
 use crate::status::{Board, LineHistory, Status};
 use crate::wake::{self, Waker};
 

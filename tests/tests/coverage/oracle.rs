@@ -66,16 +66,15 @@ fn is_within(section: &SectionReport, diameter_m: f64) -> bool {
     (least_m - TOLERANCE_M..=most_m + TOLERANCE_M).contains(&diameter_m)
 }
 
-/// Whether a section has passed by the samples of some of its visits, or had until others made that doubtful: samples of the others
-/// could only make its hole smaller.
-fn is_of_a_visit(dive: &Dive, section: &SectionReport, diameter_m: f64) -> bool {
-    let most_m = section.hole_most_m.filter(|_| section.verdict == "pass" || is_of_the_start(dive, section));
+/// Whether a section has passed by the samples of some of its visits: those of the others could only make its hole smaller.
+fn is_of_a_visit(section: &SectionReport, diameter_m: f64) -> bool {
+    let most_m = section.hole_most_m.filter(|_| section.verdict == "pass");
     most_m.is_some_and(|most_m| diameter_m <= most_m + TOLERANCE_M)
 }
 
 #[test]
 fn val_holes_are_the_largest_empty_circles() {
-    every_section(|dive, wall, section| {
+    every_section(|_, wall, section| {
         let Some(hole_m) = section.hole_m else { return Some("not measured".to_owned()) };
         let largest = wall.largest(section.start_m, section.end_m)?;
         let expected_m = 2.0 * largest.radius_m;
@@ -85,25 +84,20 @@ fn val_holes_are_the_largest_empty_circles() {
             return (!said).then(|| format!("{hole_m} m, bounded, not {expected_m} m"));
         }
         // A sample that was packed has moved by micrometres; the bounds say so.
-        let right = section.hole_bounded
-            && (is_within(section, expected_m) || is_of_a_visit(dive, section, expected_m));
-        (!right).then(|| {
-            format!(
-                "{} {hole_m} m, not {expected_m} m about {:?}, {:?}",
-                section.verdict, largest.centre, section.cannot_say
-            )
-        })
+        let right =
+            section.hole_bounded && (is_within(section, expected_m) || is_of_a_visit(section, expected_m));
+        (!right).then(|| format!("{hole_m} m, not {expected_m} m about {:?}", largest.centre))
     });
 }
 
 #[test]
 fn a_hole_is_where_it_is_said_to_be() {
-    every_section(|dive, wall, section| {
+    every_section(|_, wall, section| {
         let centre = section.hole_x_m.zip(section.hole_arc_m).filter(|_| section.hole_bounded);
         let (x_m, arc_m) = centre?;
         let clear_m = 2.0 * wall.clear_m([x_m, arc_m]);
         let within = (section.start_m - TOLERANCE_M..=section.end_m + TOLERANCE_M).contains(&x_m);
-        let right = within && (is_within(section, clear_m) || is_of_a_visit(dive, section, clear_m));
+        let right = within && (is_within(section, clear_m) || is_of_a_visit(section, clear_m));
         (!right).then(|| format!("{clear_m} m about {x_m}, {arc_m}, not {:?}", section.hole_m))
     });
 }
@@ -130,8 +124,6 @@ fn val_verdicts_follow_from_hole_sigma_and_target() {
         let behind_m = rear_m - largest.centre[0] - largest.radius_m;
         let from_end_m = largest.centre[0] - largest.radius_m - passed_m;
         let expected = match section.verdict {
-            // What was seen while the estimate settled is no measure of what was seen after.
-            "cannot_say" if is_of_the_start(dive, section) => "cannot_say",
             _ if hole_m + twice_m <= target_m => "pass",
             either @ ("fail" | "open") if clear_m.abs() <= near_m => either,
             either @ ("fail" | "cannot_say") if (hole_m - twice_m - target_m).abs() < 0.01 => either,
@@ -146,16 +138,6 @@ fn val_verdicts_follow_from_hole_sigma_and_target() {
         (section.verdict != expected)
             .then(|| format!("{}, not {expected}: {hole_m} m, {twice_m} m", section.verdict))
     });
-}
-
-/// Whether nothing sure relates the samples of a section, for the heads looked at its neighbourhood while the estimate settled, in
-/// the first 20 s and the two of alignment.
-fn is_of_the_start(dive: &Dive, section: &SectionReport) -> bool {
-    let first = dive.pings.first().map_or(MonoNs(0), |ping| ping.received);
-    let early = dive.pings.iter().filter(|ping| ping.received.since(first).as_secs_f64() < 22.0);
-    let farthest_m =
-        early.filter_map(|ping| Some(ping.sample.as_ref()?.place[0])).fold(f64::NEG_INFINITY, f64::max);
-    section.cannot_say == Some("several_stretches") && section.start_m < farthest_m + dive.report.target_m
 }
 
 /// Why a spread isn't that of these values; `None` if it is. Variances are compared: where all values are equal, a

@@ -53,7 +53,7 @@ const TIGHTENS_OVER_S: f64 = 100.0;
 /// Share of a wall's ranges' correction of the attitude, and of what is learnt from it, that is made. What matters to coverage is
 /// the attitude of one pass relative to the next, which the gyros know better than walls, whose shape isn't the design's.
 const WALL_SHARE: f64 = 0.3;
-/// Time within which an estimate settles. Later a stretch that ends costs more metres than it makes surer.
+/// Time within which an estimate settles.
 const SETTLES_WITHIN: DurNs = DurNs(20_000_000_000);
 /// Length of an epoch, s.
 const EPOCH_S: f64 = 0.1;
@@ -76,8 +76,10 @@ pub struct Eskf {
     pub way_sought: Option<MonoNs>,
     /// How often what was placed before has lost its relation to what is placed from then on.
     pub ties: u32,
-    /// When the estimate began, and the standard deviation of yaw when its present stretch did, radians.
+    /// When the estimate began, and the standard deviation of yaw then or when it had last halved, radians.
     begun: (MonoNs, f64),
+    /// How often it has halved while the estimate settled.
+    pub settled: u32,
     /// The estimates through the last epoch, before its measurements.
     knots: Vec<(MonoNs, State)>,
     agreement: Agreement,
@@ -95,7 +97,7 @@ pub struct Eskf {
     keeps_steps: bool,
 }
 
-stateful!(Eskf { state: at, state, factors, clones, way_sought, ties, begun, agreement, cable, unrest, loose_m, suspicions, doubts; lists: knots; fixed: steps, keeps_steps; });
+stateful!(Eskf { state: at, state, factors, clones, way_sought, ties, begun, settled, agreement, cable, unrest, loose_m, suspicions, doubts; lists: knots; fixed: steps, keeps_steps; });
 
 impl Default for Eskf {
     /// Allocated buffers without an estimate.
@@ -108,6 +110,7 @@ impl Default for Eskf {
             way_sought: None,
             ties: 0,
             begun: (MonoNs(0), 0.0),
+            settled: 0,
             knots: Vec::with_capacity(KNOTS),
             agreement: Agreement::default(),
             cable: Cable::default(),
@@ -143,13 +146,13 @@ impl Eskf {
     }
 
     /// While the estimate settles, samples are placed ever more surely, and those from before are no measure of passes after:
-    /// whenever yaw has become twice as sure, what is placed from then on is a stretch of its own.
+    /// whenever yaw has become twice as sure, errors between passes are those of passes from then on.
     fn settle(&mut self) {
         let (begun, yaw_rad) = self.begun;
         let now_rad = self.pose_sd().yaw_rad;
         if self.at.since(begun).0 <= SETTLES_WITHIN.0 && now_rad < yaw_rad / 2.0 {
             self.begun = (begun, now_rad);
-            self.ties += 1;
+            self.settled += 1;
             self.clones.clear();
             self.clones.note(self.at, &self.factors);
         }

@@ -435,7 +435,8 @@ impl Navigation for FilterNavigation {
         let arm = state.attitude * -self.context.unit_at;
         let pose = Pose { position: state.position + arm, attitude: state.attitude };
         let (speed_mps, tie) = (state.velocity_mps.x(), self.running.ties);
+        let settled = self.running.settled;
         let [relative, revisit] = [relative, self.revisit].map(|of| of.moved(arm));
-        Ok(Fix { pose, speed_mps, relative, revisit, tie })
+        Ok(Fix { pose, speed_mps, relative, revisit, tie, settled })
     }
 }

@@ -125,7 +125,7 @@ impl Track {
         let pose = Pose { position: pose.position + arm, attitude: pose.attitude };
         let tie = u32::try_from(piece.points.start).unwrap_or(u32::MAX);
         let [relative, revisit] = [relative, before.sd.independent()].map(|of| of.moved(arm));
-        Ok(Fix { pose, speed_mps, relative, revisit, tie })
+        Ok(Fix { pose, speed_mps, relative, revisit, tie, settled: 0 })
     }
 
     fn points_of(&self, piece: &Piece) -> &[Point] {

@@ -185,7 +185,7 @@ mod tests {
         let [y_m, z_m] = tunnel.profile.reference();
         let pose = Pose { position: Point3::new(10.0, y_m, z_m), attitude: Rot::identity() };
         let relative = Relative::along(0.01);
-        let fix = Fix { pose, speed_mps: 0.1, relative, revisit: relative, tie: 0 };
+        let fix = Fix { pose, speed_mps: 0.1, relative, revisit: relative, tie: 0, settled: 0 };
         let mount = Mount { position: Vec3::zero(), rotation: Rot::identity() };
         let sound_speed_mps = tunnel.site.sound_speed_mps;
         let [angle_rad, max_range_m, resolution_m] = [math::FRAC_PI_2, 5.0, 0.005];
