@@ -4,6 +4,7 @@ mod due;
 
 use core::ops::Range;
 
+use super::cause::Cause;
 use super::causes::Causes;
 use super::evidence::Evidence;
 use super::explain::{Case, explain};
@@ -278,6 +279,7 @@ impl Sections {
         // What is lacking in a hole that hasn't changed may have been forgotten since.
         if section.verdict == Verdict::Fail && !is_same {
             let evidence = self.explain(&hole, request, judging);
+            let evidence = self.as_beside(request.section, evidence);
             let section = self.get_mut(request.section)?;
             (section.evidence, section.explained_in_part) = (Some(evidence), request.only_fails);
         }
@@ -286,6 +288,18 @@ impl Sections {
         self.count(before, now);
         self.tell_runs(request, judging);
         Some(judgement)
+    }
+
+    /// Evidence of a section, of which nothing explains it yet: an edge belongs to its stretch.
+    fn as_beside(&self, index: i64, evidence: Evidence) -> Evidence {
+        if evidence.cause != Cause::Unknown {
+            return evidence;
+        }
+        let flagged = |index: i64| self.get(index).filter(|section| section.is_flagged())?.evidence;
+        match flagged(index - 1).or_else(|| flagged(index + 1)) {
+            Some(beside) => Evidence { cause: beside.cause, causes: beside.causes, ..evidence },
+            None => evidence,
+        }
     }
 
     /// Where a section that has been judged is counted.
