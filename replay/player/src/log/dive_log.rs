@@ -78,7 +78,7 @@ struct Resumed {
 }
 
 impl DiveLog<File> {
-    /// Opens a log, or the parts of a recording; see [`files_of`].
+    /// Opens a log, or the parts of a recording; see [`super::files_of`].
     ///
     /// Errors: a file can't be read, isn't MCAP, or has a later format; several files that aren't parts of one recording.
     pub fn open(files: &[PathBuf]) -> Result<Self, LogError> {
