@@ -328,7 +328,8 @@ fn feel(device: &mut Emulated, heard: Option<&[u8]>, now: MonoNs, out: &mut Vec<
     }
 }
 
-fn step<M: Measurement>(
+/// Lets a device hear, and measure what `feel` fills in.
+pub(crate) fn step<M: Measurement>(
     device: &mut dyn Emulator<M>,
     heard: Option<&[u8]>,
     now: MonoNs,

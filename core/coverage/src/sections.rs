@@ -290,7 +290,8 @@ impl Sections {
         Some(judgement)
     }
 
-    /// Evidence of a section, of which nothing explains it yet: an edge belongs to its stretch.
+    /// Evidence of a section. Where nothing that was present explains it, it has the causes of a flagged section beside it: an edge
+    /// belongs to its stretch.
     fn as_beside(&self, index: i64, evidence: Evidence) -> Evidence {
         if evidence.cause != Cause::Unknown {
             return evidence;

@@ -7,11 +7,11 @@ use std::sync::atomic::Ordering;
 use headrace_geometry::frames::Vec3;
 use headrace_geometry::time::{DurNs, MonoNs};
 use headrace_sensor::connect::Connect;
-use headrace_sensor::device::{Direction, Emulated, Emulator};
-use headrace_sensor::measurement::Measurement;
+use headrace_sensor::device::Emulated;
 
 use super::cable::{Cable, FAILURES};
 use super::plan::{CableFault, Window};
+use crate::faulty::step;
 use crate::random::Random;
 
 /// Longest delay of a part of a frame.
@@ -193,28 +193,5 @@ fn feel(device: &mut Emulated, heard: Option<&[u8]>, now: MonoNs, out: &mut Vec<
             inertia.force_mps2 = Vec3::new(0.0, 0.0, 9.81);
         }),
         Emulated::VelocityLog(device) => step(device.as_mut(), heard, now, out, |_| ()),
-    }
-}
-
-fn step<M: Measurement>(
-    device: &mut dyn Emulator<M>,
-    heard: Option<&[u8]>,
-    now: MonoNs,
-    out: &mut Vec<Vec<u8>>,
-    feel: impl Fn(&mut M),
-) {
-    let mut line = |direction, _, bytes: &[u8]| {
-        if direction == Direction::Received {
-            out.push(bytes.to_vec());
-        }
-    };
-    if let Some(bytes) = heard {
-        device.hear(now, bytes, &mut line);
-    }
-    let mut due = Vec::new();
-    device.begin(now + DurNs(1), &mut due);
-    for mut measured in due {
-        feel(&mut measured);
-        device.tell(&measured, &mut line);
     }
 }

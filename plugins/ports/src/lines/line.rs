@@ -75,6 +75,18 @@ pub trait Line: Send {
     }
 }
 
+/// [`Line::exchange`] of an emulated bus: sends a datagram of the bytes to write and the read length; the answer, which comes as a
+/// message, is the transaction.
+pub(super) fn exchange_by_datagram(
+    line: &mut impl Line,
+    write: &[u8],
+    read_bytes: usize,
+) -> io::Result<Option<(MonoNs, Vec<u8>)>> {
+    let count = u8::try_from(read_bytes).unwrap_or(u8::MAX);
+    line.write(&[write, &[count]].concat())?;
+    Ok(None)
+}
+
 /// A socket's read timeout, set only when it changes: most waits are as long as the last.
 #[derive(Default)]
 pub(super) struct ReadTimeout(Duration);

@@ -6,7 +6,7 @@ use std::time::Duration;
 
 use headrace_geometry::time::{DurNs, MonoNs};
 
-use super::line::{Line, READ_BYTES, ReadTimeout, waited};
+use super::line::{Line, READ_BYTES, ReadTimeout, exchange_by_datagram, waited};
 use crate::clock;
 use crate::diagnosis;
 use crate::open_error::OpenError;
@@ -43,16 +43,13 @@ impl Line for Udp {
         self.socket.send(bytes).map(|_| ())
     }
 
-    /// Emulated bus: sends a datagram of the bytes to write and the read length; the answer is the transaction.
     fn exchange(
         &mut self,
         write: &[u8],
         _: DurNs,
         read_bytes: usize,
     ) -> io::Result<Option<(MonoNs, Vec<u8>)>> {
-        let count = u8::try_from(read_bytes).unwrap_or(u8::MAX);
-        self.write(&[write, &[count]].concat())?;
-        Ok(None)
+        exchange_by_datagram(self, write, read_bytes)
     }
 
     fn knock(&mut self) -> io::Result<()> {

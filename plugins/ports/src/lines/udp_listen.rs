@@ -11,7 +11,7 @@ use std::time::Duration;
 
 use headrace_geometry::time::{DurNs, MonoNs};
 
-use super::line::{IsValid, Line, READ_BYTES, ReadTimeout, Senders, waited};
+use super::line::{IsValid, Line, READ_BYTES, ReadTimeout, Senders, exchange_by_datagram, waited};
 use crate::clock;
 use crate::diagnosis;
 use crate::open_error::OpenError;
@@ -185,16 +185,13 @@ impl Line for UdpListen {
         self.peer.map_or(Ok(()), |peer| self.socket.send_to(bytes, peer).map(|_| ()))
     }
 
-    /// Emulated bus: sends a datagram of the bytes to write and the read length; the answer is the transaction.
     fn exchange(
         &mut self,
         write: &[u8],
         _: DurNs,
         read_bytes: usize,
     ) -> io::Result<Option<(MonoNs, Vec<u8>)>> {
-        let count = u8::try_from(read_bytes).unwrap_or(u8::MAX);
-        self.write(&[write, &[count]].concat())?;
-        Ok(None)
+        exchange_by_datagram(self, write, read_bytes)
     }
 }
 
