@@ -14,7 +14,7 @@ use headrace_replay::log::{
     SourceInfo, Summary, dive_name,
 };
 use headrace_replay::player::seconds;
-use headrace_replay::record::{QUEUE_BYTES, RecorderOutlet, result_channels};
+use headrace_replay::record::{QUEUE_BYTES, QUEUE_OF_PORTS_BYTES, RecorderOutlet, result_channels};
 use headrace_replay::view::{Site, View};
 use headrace_sensor::device::Sense;
 use headrace_vehicle::VehicleConfig;
@@ -115,21 +115,22 @@ fn record(
     Recording { paths, clock, rotate, scene }: Recording<'_>,
 ) -> Result<Vec<(PathBuf, RecorderHandle)>, Failure> {
     let mut header = log_header(vehicle, vehicle_text, true);
-    if clock == Clock::Ours {
+    let is_live = clock == Clock::Ours;
+    if is_live {
         anchor(&mut header);
     }
     header.metadata.extend(scene.map(|scene| (SIMULATED.to_owned(), scene.to_owned())));
     let rotation = Rotation { every: rotate, dive: new_dive() };
+    let queue_bytes = if is_live { QUEUE_OF_PORTS_BYTES } else { QUEUE_BYTES };
     let (mut ports, mut recorders) = (Vec::new(), Vec::new());
     for path in paths {
         let view: Option<Box<dyn DerivedChannels>> = Some(Box::new(View::new(view_site(vehicle))));
-        let (port, handle) = Recorder::create(path, &header, &rotation, QUEUE_BYTES, view)?;
+        let (port, handle) = Recorder::create(path, &header, &rotation, queue_bytes, view)?;
         ports.push(port);
         recorders.push((path.clone(), handle));
     }
     let outlet = RecorderOutlet::new(ports);
-    // What is on ports doesn't wait.
-    app.add_plugin(&if clock == Clock::Ours { outlet.waiting_for_one() } else { outlet })?;
+    app.add_plugin(&if is_live { outlet.of_ports() } else { outlet })?;
     Ok(recorders)
 }
 
@@ -380,7 +381,7 @@ fn unrecorded(written: &Summary) -> Vec<String> {
     losses.extend(Some(written.left_out).filter(|left| left.messages > 0).map(left_out));
     let counts = [
         (written.sent_dropped, "messages to devices not recorded: the recorder's queue was full"),
-        (written.skipped, "packets not recorded: the recorder was behind while another went on"),
+        (written.skipped, "packets not recorded: the recorder was behind"),
         (written.results_missing, "ticks recorded without all their results: too many"),
     ];
     losses

@@ -129,13 +129,17 @@ impl Watch {
 
     /// Shows what has happened to a recording.
     pub(crate) fn recording(&mut self, number: usize, event: &RecordingEvent, at: MonoNs) {
-        let fails = matches!(event, RecordingEvent::Failed { .. });
+        let fails = event.fails();
         self.failed.insert(number, fails);
         let words = match event {
             RecordingEvent::Failed { path, error } => {
                 format!("NOT RECORDED to {}: {error}; tried again in another part", path.display())
             }
             RecordingEvent::Resumed(fault) => fault.words(),
+            RecordingEvent::Behind => "NOT RECORDED: the medium takes nothing, and gives no error".to_owned(),
+            RecordingEvent::CaughtUp { packets } => {
+                format!("recorded again; {packets} packets are missing from before")
+            }
         };
         match self.show {
             Show::Nothing => {}

@@ -17,11 +17,21 @@ use crate::view;
 /// Free bytes that the recorder's queue needs for the largest tick: packets, their headers, and their order.
 const LARGEST_TICK_BYTES: usize = MAX_TICK_BYTES + MAX_TICK_PACKETS * 64 + 4096;
 
+/// In a dive on ports a tick takes this part of the room that there is: packets of some ten bytes take a few times as much in the
+/// queue, with their results.
+const SMALLER_TICK: usize = 8;
+/// ... but not less: the longest packet of a port is some KiB.
+const MIN_TICK_BYTES: usize = 8 * 1024;
+
 /// Buffer for a tick's results of one stream, bytes; beyond it they are recorded in part.
 const MAX_RESULT_BYTES: usize = 1 << 19;
 
-/// Size of the recorder's queue, bytes.
+/// Size of a recorder's queue, bytes.
 pub const QUEUE_BYTES: usize = 4 * LARGEST_TICK_BYTES;
+
+/// Size of a recorder's queue in a dive on ports, bytes: some minutes of four heads and all else, for a medium that takes nothing
+/// for so long.
+pub const QUEUE_OF_PORTS_BYTES: usize = 16 * LARGEST_TICK_BYTES;
 
 /// The stream with a record per echo.
 const ECHOES: &str = "pings";
@@ -44,29 +54,32 @@ pub fn result_channels() -> Vec<ResultChannel> {
 /// several.
 ///
 /// When a recorder's queue has no room for another largest tick the loop consumes nothing until it has: recorded input is never
-/// dropped. If the recorders' threads have ended the dive goes on unrecorded; their handles return the errors.
+/// dropped. A dive on ports doesn't wait ([`RecorderOutlet::of_ports`]). If the recorders' threads have ended the dive
+/// goes on unrecorded; their handles return the errors.
 pub struct RecorderOutlet {
     ports: Cell<Vec<RecorderPort>>,
-    waits_for_one: bool,
+    is_of_ports: bool,
 }
 
 impl RecorderOutlet {
     /// With the loop's ends of recorders, whose queues have [`QUEUE_BYTES`]. The outlet can be added to one loop.
     pub fn new(ports: impl IntoIterator<Item = RecorderPort>) -> Self {
-        Self { ports: Cell::new(ports.into_iter().collect()), waits_for_one: false }
+        Self { ports: Cell::new(ports.into_iter().collect()), is_of_ports: false }
     }
 
-    /// Waits for no recorder that is behind while another has room: it skips ticks, and states them in its log.
+    /// For a dive on ports, whose pilot must not be left without advice because a medium takes nothing: waits for no recorder.
+    /// One whose queue is full skips ticks, tells it ([`RecordingEvent::Behind`](crate::log::RecordingEvent)), and states them in
+    /// its log.
     #[must_use]
-    pub fn waiting_for_one(self) -> Self {
-        Self { waits_for_one: true, ..self }
+    pub fn of_ports(self) -> Self {
+        Self { is_of_ports: true, ..self }
     }
 }
 
 #[derive(Resource)]
 struct Recording {
     ports: Vec<RecorderPort>,
-    waits_for_one: bool,
+    is_of_ports: bool,
     order: Vec<u16>,
     /// Buffer for a stream's message.
     message: Vec<u8>,
@@ -81,7 +94,7 @@ impl Plugin for RecorderOutlet {
             app.keep_results();
             app.insert_resource(Recording {
                 ports,
-                waits_for_one: self.waits_for_one,
+                is_of_ports: self.is_of_ports,
                 order: Vec::with_capacity(MAX_TICK_PACKETS),
                 message: Vec::with_capacity(MAX_RESULT_BYTES),
                 records: [0; STREAMS.len()],
@@ -99,13 +112,15 @@ fn record(
     results: Res<'_, Digests>,
     mut recording: ResMut<'_, Recording>,
 ) {
-    let Recording { ports, waits_for_one, order, message, records } = &mut *recording;
+    let Recording { ports, is_of_ports, order, message, records } = &mut *recording;
     let packets = inbox.iter().map(|(_, packet)| RecorderPort::entry_bytes(packet.bytes.len()));
     let (count, bytes) = packets.fold((0, 0), |(count, sum), bytes| (count + 1, sum + bytes));
     let needed = bytes + RecorderPort::tick_entry_bytes(count);
     for port in ports.iter_mut().filter(|port| !port.is_closed()) {
+        // One that is behind begins again with some room, not with each small tick that would fit.
+        let needed = if port.is_behind() { needed.max(port.capacity_bytes() / 4) } else { needed };
         if count > 0 && port.vacant_bytes() < needed {
-            // Only where another recorder had room: the allowance has reserved it.
+            // Only in a dive on ports: else the allowance has reserved it.
             port.skip(time.now, count as u64);
             continue;
         }
@@ -115,11 +130,20 @@ fn record(
     for ((_, trail), before) in results.streams().into_iter().zip(records) {
         *before = trail.records();
     }
-    let has_room = |port: &RecorderPort| port.vacant_bytes() >= LARGEST_TICK_BYTES;
-    let mut open = ports.iter().filter(|port| !port.is_closed()).peekable();
-    let goes_on =
-        open.peek().is_none() || if *waits_for_one { open.any(has_room) } else { open.all(has_room) };
-    inbox.allowance_bytes = if goes_on { MAX_TICK_BYTES } else { 0 };
+    let open = ports.iter().filter(|port| !port.is_closed());
+    inbox.allowance_bytes = allowance_bytes(open, *is_of_ports);
+}
+
+/// How much the next tick may take.
+fn allowance_bytes<'a>(open: impl Iterator<Item = &'a RecorderPort>, is_of_ports: bool) -> usize {
+    let rooms = open.filter(|port| !is_of_ports || !port.is_behind()).map(RecorderPort::vacant_bytes);
+    let room = if is_of_ports { rooms.max() } else { rooms.min() };
+    match room {
+        Some(room) if room < LARGEST_TICK_BYTES && is_of_ports => (room / SMALLER_TICK).max(MIN_TICK_BYTES),
+        Some(room) if room < LARGEST_TICK_BYTES => 0,
+        // Nothing is recorded, or all is skipped.
+        Some(_) | None => MAX_TICK_BYTES,
+    }
 }
 
 /// Records a tick's packets, in the order of consumption.

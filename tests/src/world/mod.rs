@@ -28,7 +28,7 @@ use headrace_replay::log::{
     LogHeader, Recorder, RecorderWorker, RecordingEvent, Rotation, SourceInfo, Summary,
 };
 use headrace_replay::player::Player;
-use headrace_replay::record::{QUEUE_BYTES, RecorderOutlet, result_channels};
+use headrace_replay::record::{RecorderOutlet, result_channels};
 use headrace_sensor::connect::Connect;
 use headrace_sensor::device::EmulatorSetup;
 use headrace_sensor::driver::DriverSetup;
@@ -76,6 +76,9 @@ const SENSORS: [&str; 6] = [
     "plugin = \"tether_hid\"\nconnect = \"udp:10.0.0.2:9002\"\ncounts_per_metre = 2000\n",
 ];
 
+/// Size of the recorder's queue: so small that a stall of seconds fills it.
+const QUEUE_BYTES: usize = 128 * 1024;
+
 /// The vehicle file of all worlds.
 pub fn vehicle_text() -> String {
     let mut text = TUNNEL.to_owned();
@@ -112,6 +115,11 @@ pub struct World {
     /// Packets consumed when the recorder had emptied its queue, with the time, since its last trouble.
     taken: VecDeque<(MonoNs, usize)>,
     is_failing: bool,
+    /// Packets that the recorder was too far behind to take.
+    skipped: usize,
+    /// Since when packets have been waiting and the loop has taken none, and the longest that it did, as long as it ran.
+    waiting_since: Option<MonoNs>,
+    longest_wait: DurNs,
     notices: NoticeReceiver,
     /// Packets that must be in the log, whatever the end.
     certain: usize,
@@ -135,6 +143,8 @@ pub struct Lived {
     pub left: Vec<LeftFile>,
     /// Of the packets consumed, those that must be in the log whatever the end.
     pub certain: usize,
+    /// The longest time for which a running loop took nothing though packets waited.
+    pub longest_wait: DurNs,
 }
 
 /// What a replay of the files that are left comes to.
@@ -224,6 +234,9 @@ impl World {
             recorder,
             taken,
             is_failing,
+            skipped: 0,
+            waiting_since: None,
+            longest_wait: DurNs(0),
             notices,
             certain,
         }
@@ -247,7 +260,7 @@ impl World {
                 self.step(true);
             }
         }
-        let certain = self.certain;
+        let (certain, longest_wait) = (self.certain, self.longest_wait);
         let since_begin = self.since_begin();
         let Self { services, mut dive, devices, plan, mut consumed, disk, recorder, mut random, .. } = self;
         let histories: Vec<LineHistory> =
@@ -282,6 +295,7 @@ impl World {
             disk_failures: disk.failures(),
             left: disk.left(power_cut),
             certain,
+            longest_wait,
             plan,
             consumed,
         }
@@ -297,13 +311,16 @@ impl World {
         let failures = self.disk.failures();
         while self.recorder.step(since_begin) {}
         while let Some(event) = self.recorder.next_event() {
-            self.is_failing = matches!(event, RecordingEvent::Failed { .. });
+            self.is_failing = event.fails();
+            if let RecordingEvent::CaughtUp { packets } = event {
+                self.skipped += usize::try_from(packets).unwrap();
+            }
         }
         if self.is_failing || self.disk.failures() != failures {
             self.taken.clear();
             return;
         }
-        self.taken.push_back((now, self.consumed.len()));
+        self.taken.push_back((now, self.consumed.len() - self.skipped));
         while let Some((at, count)) = self.taken.front().copied()
             && now.since(at) > SYNC_PERIOD
         {
@@ -328,9 +345,17 @@ impl World {
                 serve(service, device.cable(), now);
             }
         }
-        if !self.plan.has(MachineFault::LoopStalls, now) {
-            self.dive.tick(now);
+        if self.plan.has(MachineFault::LoopStalls, now) {
+            self.waiting_since = None;
+        } else {
+            let taken = self.dive.tick(now);
             note(&self.dive, &mut self.consumed);
+            if taken > 0 || !self.dive.has_waiting() {
+                self.waiting_since = None;
+            } else {
+                let since = *self.waiting_since.get_or_insert(now);
+                self.longest_wait = self.longest_wait.max(now.since(since));
+            }
         }
         if !self.plan.has(MachineFault::RecorderStalls, now) {
             self.record(now);
@@ -408,7 +433,7 @@ fn assemble(
     let rotation = Rotation::default();
     let (port, worker) = Recorder::unthreaded(storage, path, &header, &rotation, QUEUE_BYTES, None).unwrap();
     let mut app = app(vehicle);
-    app.add_plugin(&RecorderOutlet::new([port])).unwrap();
+    app.add_plugin(&RecorderOutlet::new([port]).of_ports()).unwrap();
     let (outlet, notices) = NoticeOutlet::new(NOTICES);
     app.add_plugin(&outlet).unwrap();
     (app.arm(vehicle.navigation()).unwrap(), worker, notices)

@@ -13,7 +13,7 @@ const BEGIN_WITHIN_NS: usize = 6_000_000_000;
 const END_WITHIN_NS: usize = 7_000_000_000;
 /// Length of a dive: afterwards there is time to recover.
 const LENGTH: DurNs = DurNs(12_000_000_000);
-/// Longest faults: of a cable that only delays, shorter than any silence timeout; of a loop, long enough for rings to fill.
+/// Longest faults: of a cable that only delays, shorter than any silence timeout; of a loop or recorder, long enough for queues to fill.
 const LONGEST_HOLD_NS: usize = 1_500_000_000;
 const LONGEST_STALL_NS: usize = 7_000_000_000;
 const LONGEST_NS: usize = 3_000_000_000;
@@ -168,8 +168,8 @@ impl Plan {
         }
         let machine = (0..random.below(3)).map(|_| {
             let what = pick(random, &OF_MACHINES);
-            let longest = if what == MachineFault::LoopStalls { LONGEST_STALL_NS } else { LONGEST_NS };
-            window(random, what, longest)
+            let long = matches!(what, MachineFault::LoopStalls | MachineFault::RecorderStalls);
+            window(random, what, if long { LONGEST_STALL_NS } else { LONGEST_NS })
         });
         let machine = machine.collect();
         let disk = (0..random.below(3)).map(|_| {

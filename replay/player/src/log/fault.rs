@@ -55,6 +55,20 @@ pub enum RecordingEvent {
     },
     /// The recording goes on.
     Resumed(RecordingFault),
+    /// The medium takes nothing and gives no error, and the queue is full: what comes now isn't recorded.
+    Behind,
+    /// The medium takes data again.
+    CaughtUp {
+        /// Packets that weren't recorded.
+        packets: u64,
+    },
+}
+
+impl RecordingEvent {
+    /// Whether nothing is recorded from now on.
+    pub fn fails(&self) -> bool {
+        matches!(self, Self::Failed { .. } | Self::Behind)
+    }
 }
 
 /// Adds a fault to a bounded list.

@@ -197,11 +197,20 @@ impl RecorderPort {
         self.state.results_missing.fetch_add(1, Ordering::Relaxed);
     }
 
-    /// Skips a tick of so many packets, for which there is no room. The log states it.
+    /// Skips a tick of so many packets, for which there is no room. The log states it; the first one is told.
     pub fn skip(&mut self, at: MonoNs, packets: u64) {
+        if self.gap.is_none() {
+            // Where nobody takes them there is no room, and nobody to tell.
+            self.state.events.push(RecordingEvent::Behind).ok();
+        }
         let gap = self.gap.get_or_insert(Gap { span: (at, at), packets: 0 });
         gap.span.1 = at;
         gap.packets += packets;
+    }
+
+    /// Whether the last ticks were skipped.
+    pub fn is_behind(&self) -> bool {
+        self.gap.is_some()
     }
 
     /// Number of result channels in the log.
@@ -244,6 +253,9 @@ impl RecorderPort {
     fn end_gap(&mut self) {
         if let Some(gap) = self.gap.take() {
             self.gap = self.state.gaps.push(gap).err();
+            if self.gap.is_none() {
+                self.state.events.push(RecordingEvent::CaughtUp { packets: gap.packets }).ok();
+            }
         }
     }
 

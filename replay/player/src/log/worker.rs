@@ -149,8 +149,7 @@ impl RecorderWorker {
     fn state_gaps(&mut self) {
         while let Some(Gap { span: (from, to), packets }) = self.state.gaps.pop() {
             self.skipped += packets;
-            let words =
-                format!("{packets} packets not recorded: the recorder was behind while another went on");
+            let words = format!("{packets} packets not recorded: the recorder was behind");
             self.recording.state(Some(from), Some(to), &words);
         }
     }
