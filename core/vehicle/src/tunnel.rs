@@ -91,19 +91,24 @@ fn parse(section: &Section<'_>, shape: Shape, load: Loader<'_>) -> Result<Profil
                 Some(_) => return Err(section.invalid("reference_m", "must be two numbers [y, z]")),
             };
             let text = load(&file).map_err(|why| section.invalid("file", &why))?;
-            let points = parse_points(&text).map_err(|why| section.invalid("file", &why))?;
-            Profile::polygon(&points, reference)
+            let (points, lines) = parse_points(&text).map_err(|why| section.invalid("file", &why))?;
+            let profile = Profile::polygon(&points, reference);
+            return profile.map_err(|why| match why.vertex().and_then(|vertex| lines.get(vertex)) {
+                Some(line) => section.invalid("file", &format!("line {line} of it: {why}")),
+                None => section.invalid("file", &why.to_string()),
+            });
         }
     };
     profile.map_err(|why| section.invalid("profile", &why.to_string()))
 }
 
-/// Most points of a profile: one each centimetre of a wall of 100 m.
-const MOST_POINTS: usize = 10_000;
+/// Most points of a profile: one each millimetre of a wall of 100 m.
+const MOST_POINTS: usize = 100_000;
 
-/// Reads a polyline: one line `y_m,z_m` per vertex; a first line of other text and lines starting with # are skipped.
-fn parse_points(text: &str) -> Result<Vec<Yz>, String> {
-    let mut points = Vec::new();
+/// Reads a polyline: one line `y_m,z_m` per vertex; a first line of other text and lines starting with # are skipped. With the
+/// vertices the numbers of their lines.
+fn parse_points(text: &str) -> Result<(Vec<Yz>, Vec<usize>), String> {
+    let (mut points, mut lines) = (Vec::new(), Vec::new());
     for (number, line) in text.lines().enumerate() {
         let line = line.trim();
         if line.is_empty() || line.starts_with('#') {
@@ -114,7 +119,10 @@ fn parse_points(text: &str) -> Result<Vec<Yz>, String> {
             (Some(_), Some(_), None) if points.len() >= MOST_POINTS => {
                 return Err(format!("has more than {MOST_POINTS} points, the most that a profile may have"));
             }
-            (Some(y), Some(z), None) => points.push([y, z]),
+            (Some(y), Some(z), None) => {
+                points.push([y, z]);
+                lines.push(number + 1);
+            }
             _ if number == 0 => {}
             _ => {
                 let start: String = line.chars().take(60).collect();
@@ -122,7 +130,7 @@ fn parse_points(text: &str) -> Result<Vec<Yz>, String> {
             }
         }
     }
-    Ok(points)
+    Ok((points, lines))
 }
 
 #[cfg(test)]
@@ -131,10 +139,11 @@ mod tests {
 
     #[test]
     fn a_polyline_file_says_which_line_is_wrong() {
-        assert_eq!(parse_points("y_m,z_m\n1, 2\n# floor\n-1,2\n").unwrap(), [[1.0, 2.0], [-1.0, 2.0]]);
-        assert_eq!(parse_points(&"1,2\n".repeat(MOST_POINTS)).unwrap().len(), MOST_POINTS);
+        let read = parse_points("y_m,z_m\n1, 2\n# floor\n-1,2\n").unwrap();
+        assert_eq!(read, (vec![[1.0, 2.0], [-1.0, 2.0]], vec![2, 4]));
+        assert_eq!(parse_points(&"1,2\n".repeat(MOST_POINTS)).unwrap().0.len(), MOST_POINTS);
         let words = parse_points(&"1,2\n".repeat(MOST_POINTS + 1)).unwrap_err();
-        assert!(words.starts_with("has more than 10000 points"), "{words}");
+        assert!(words.starts_with("has more than 100000 points"), "{words}");
         assert!(parse_points(&format!("1,2\n{}", "3".repeat(1 << 20))).unwrap_err().len() < 200);
         assert_eq!(parse_points("1,2\n3;4\n").unwrap_err(), "line 2 of it is \"3;4\"; wanted is y_m,z_m");
     }

@@ -107,7 +107,7 @@ fn files() -> Vec<Bomb> {
             check,
             "it is a pipe, a device or a socket; a file is wanted",
         ),
-        ("a profile of 400,000 points", with_profile("points.csv"), check, "has more than 10000 points"),
+        ("a profile of 400,000 points", with_profile("points.csv"), check, "has more than 100000 points"),
         ("a profile of 30 MB", with_profile("long.csv"), check, "it is longer than 16777216 bytes"),
         (
             "a scene at 1e-300 m/s",

@@ -2,39 +2,36 @@
 
 use crate::math::{self, TAU};
 
+mod element;
 mod nearest;
+mod plane;
+mod polygon;
+mod support;
+#[cfg(test)]
+mod tests;
+mod tree;
 
+use element::{Element, Shape, build};
+use plane::{cross, dot, norm, sub};
+use support::Support;
+use tree::{Bounds, Tree};
+
+pub use element::Piece;
 pub use nearest::Nearest;
-
-/// A point in the cross-section: y left, z up, metres.
-pub type Yz = [f64; 2];
+pub use plane::Yz;
 
 /// Points closer together than this are the same, m.
 const SAME_POINT_M: f64 = 1e-9;
-/// Angle by which a hit may lie beyond an arc's end, rad, so that neighbours leave no gap between them.
-const ARC_SLACK_RAD: f64 = 1e-12;
-/// Margin beyond which a hit is clearly within or clearly outside an arc: difference between its cosine about the arc's
-/// middle and that of the ends; far larger than the slack and rounding together.
-const CLEAR: f64 = 1e-9;
-
-/// One piece of a profile, as given; pieces run counter-clockwise with y to the right and z up.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Piece {
-    /// A straight line to this point.
-    LineTo(Yz),
-    /// An arc about `centre` through `sweep_rad` > 0 (polar angle grows, so that it bulges outwards).
-    Arc {
-        /// Centre of its circle.
-        centre: Yz,
-        /// Angle turned about the centre.
-        sweep_rad: f64,
-    },
-}
+/// Polygons of more elements than this have a table of how far they reach.
+const MANY: usize = 256;
 
 /// A design profile. Arc length grows from the floor's centre via the left wall, in [0, perimeter).
 #[derive(Debug, Clone, PartialEq)]
 pub struct Profile {
     elements: Vec<Element>,
+    tree: Tree,
+    /// Only of many elements.
+    support: Option<Support>,
     perimeter_m: f64,
     reference: Yz,
 }
@@ -70,15 +67,20 @@ pub enum ProfileError {
     },
     /// From the reference point, the wall at this vertex is hidden or runs backwards.
     #[error(
-        "the profile isn't star-shaped about ({y}, {z}): it runs backwards or crosses itself at vertex {vertex}",
+        "the profile isn't star-shaped about ({y}, {z}): it runs backwards or crosses itself at vertex {vertex}, counted from 0",
         y = .reference[0], z = .reference[1]
     )]
     NotStarShaped {
-        /// Index of the vertex at which the offending element begins.
+        /// Index, among what was given, of the piece, or of the point of a polygon at which the offending edge begins.
         vertex: usize,
         /// The reference point.
         reference: Yz,
     },
+    /// A polygon all of which lies on one side of y = 0.
+    #[error(
+        "the profile lies beside y = 0, where arc length begins at the floor; it must have points on either side"
+    )]
+    BesideMiddle,
     /// The curve doesn't wind about its reference point exactly once.
     #[error("the profile winds {turns} times about ({y}, {z}); it must do so once", y = .reference[0], z = .reference[1])]
     Winding {
@@ -89,27 +91,14 @@ pub enum ProfileError {
     },
 }
 
-#[derive(Debug, Clone, Copy, PartialEq)]
-struct Element {
-    start: Yz,
-    end: Yz,
-    arc_m: f64,
-    length_m: f64,
-    shape: Shape,
-}
-
-#[derive(Debug, Clone, Copy, PartialEq)]
-enum Shape {
-    Line,
-    /// `middle` is the unit vector to the arc's middle, `cos_half` the cosine of half its sweep.
-    Arc {
-        centre: Yz,
-        radius_m: f64,
-        from_rad: f64,
-        sweep_rad: f64,
-        middle: Yz,
-        cos_half: f64,
-    },
+impl ProfileError {
+    /// The vertex that it is about, by its index among those given.
+    pub fn vertex(&self) -> Option<usize> {
+        match self {
+            Self::NotFinite { vertex } | Self::NotStarShaped { vertex, .. } => Some(*vertex),
+            Self::TooFewPoints { .. } | Self::BesideMiddle | Self::Winding { .. } => None,
+        }
+    }
 }
 
 impl Profile {
@@ -119,7 +108,7 @@ impl Profile {
     /// Errors: see [`ProfileError`].
     /// Allocates: startup only.
     pub fn new(start: Yz, pieces: &[Piece], reference: Yz) -> Result<Self, ProfileError> {
-        let mut elements = Vec::new();
+        let (mut elements, mut pieces_of) = (Vec::new(), Vec::new());
         let mut at = start;
         for (vertex, piece) in pieces.iter().enumerate() {
             let element = build(at, *piece);
@@ -129,11 +118,13 @@ impl Profile {
             if element.length_m > SAME_POINT_M {
                 at = element.end;
                 elements.push(element);
+                pieces_of.push(vertex);
             }
         }
         let closing = build(at, Piece::LineTo(start));
         if closing.length_m > SAME_POINT_M {
             elements.push(closing);
+            pieces_of.push(pieces.len());
         } else if let Some(last) = elements.last_mut() {
             last.end = start;
         }
@@ -146,34 +137,12 @@ impl Profile {
             element.arc_m = perimeter_m;
             perimeter_m += element.length_m;
         }
-        let profile = Self { elements, perimeter_m, reference };
-        profile.check_star_shaped()?;
-        Ok(profile)
-    }
-
-    /// A polygon through `points`, in either sense of rotation; arc length begins at the lowest crossing of y = 0.
-    /// `reference` defaults to the polygon's centroid.
-    ///
-    /// Errors: see [`ProfileError`]; also when the polygon never crosses y = 0.
-    /// Allocates: startup only.
-    pub fn polygon(points: &[Yz], reference: Option<Yz>) -> Result<Self, ProfileError> {
-        if let Some(vertex) = points.iter().position(|p| !p.iter().all(|c| c.abs() <= 1000.0)) {
-            return Err(ProfileError::NotFinite { vertex });
-        }
-        let mut ring = distinct(points);
-        if ring.len() < 3 {
-            return Err(ProfileError::TooFewPoints { count: ring.len() });
-        }
-        let (area, centroid) = area_and_centroid(&ring);
-        if area < 0.0 {
-            ring.reverse();
-        }
-        let reference = reference.unwrap_or(centroid);
-        let (edge, start) = floor_centre(&ring).ok_or(ProfileError::Winding { turns: 0, reference })?;
-        let count = ring.len();
-        let pieces: Vec<Piece> =
-            (1..=count).filter_map(|k| ring.get((edge + k) % count)).map(|p| Piece::LineTo(*p)).collect();
-        Self::new(start, &pieces, reference)
+        check_star_shaped(elements.iter().zip(pieces_of), reference)?;
+        let tree = Tree::over(&elements);
+        let is_polygon = elements.iter().all(|element| element.shape == Shape::Line);
+        let points = || elements.iter().map(|element| element.start).collect::<Vec<_>>();
+        let support = (elements.len() > MANY && is_polygon).then(|| Support::of(&points()));
+        Ok(Self { elements, tree, support, perimeter_m, reference })
     }
 
     /// Length of the closed curve, m.
@@ -243,10 +212,14 @@ impl Profile {
             Shape::Line => norm(sub(element.start, origin)),
             Shape::Arc { centre, radius_m, .. } => norm(sub(centre, origin)) + radius_m,
         };
-        self.elements.iter().map(reach).fold(0.0, f64::max)
+        match &self.support {
+            Some(support) => support.farthest_m(origin),
+            None => self.elements.iter().map(reach).fold(0.0, f64::max),
+        }
     }
 
-    /// Largest distance, m, of the wall from a line through `origin` across the unit vector `direction`, on either side.
+    /// Largest distance, m, of the wall from a line through `origin` across the unit vector `direction`, on either side; of a
+    /// polygon of many points an upper bound, by 0.03 % at most of its size.
     pub fn farthest_along_m(&self, origin: Yz, direction: Yz) -> f64 {
         let farthest_m = |element: &Element| {
             let start_m = dot(sub(element.start, origin), direction).abs();
@@ -257,7 +230,13 @@ impl Profile {
             let astern_m = if -towards >= cos_half { (centre_m - radius_m).abs() } else { 0.0 };
             start_m.max(ahead_m).max(astern_m)
         };
-        self.elements.iter().map(farthest_m).fold(0.0, f64::max)
+        match &self.support {
+            Some(support) => {
+                let ahead_m = support.reach_m(origin, direction);
+                ahead_m.max(support.reach_m(origin, [-direction[0], -direction[1]]))
+            }
+            None => self.elements.iter().map(farthest_m).fold(0.0, f64::max),
+        }
     }
 
     /// Arc lengths of the element boundaries, m.
@@ -271,13 +250,18 @@ impl Profile {
             return None;
         }
         let mut best: Option<(f64, usize)> = None;
-        for (index, element) in self.elements.iter().enumerate() {
-            if let Some(t) = element.crossing(origin, direction)
-                && best.is_none_or(|(shortest, _)| t < shortest)
-            {
-                best = Some((t, index));
+        let entry = |bounds: &Bounds| bounds.entry(origin, direction);
+        self.tree.search(self.elements.len(), entry, |some| {
+            for (index, element) in self.elements.iter().enumerate().take(some.end).skip(some.start) {
+                // Of equally near ones the first along the wall, in whatever order they are looked at.
+                if let Some(t) = element.crossing(origin, direction)
+                    && best.is_none_or(|nearest| (t, index) < nearest)
+                {
+                    best = Some((t, index));
+                }
             }
-        }
+            best.map_or(f64::INFINITY, |(shortest, _)| shortest)
+        });
         let (t, index) = best.or_else(|| self.nearest_vertex(origin, direction))?;
         let element = self.elements.get(index)?;
         let point = [origin[0] + t * direction[0], origin[1] + t * direction[1]];
@@ -302,215 +286,20 @@ impl Profile {
             self.elements.iter().enumerate().filter_map(ahead).min_by(|a, b| a.0.total_cmp(&b.0))?;
         (nearest.0 < 1e-6).then_some((nearest.1, nearest.2))
     }
-
-    fn check_star_shaped(&self) -> Result<(), ProfileError> {
-        let reference = self.reference;
-        let mut turned = 0.0;
-        for (vertex, element) in self.elements.iter().enumerate() {
-            match element.angle_about(reference) {
-                Some(angle) => turned += angle,
-                None => return Err(ProfileError::NotStarShaped { vertex, reference }),
-            }
-        }
-        let turns = math::round_to_i64(turned / TAU);
-        if turns == 1 { Ok(()) } else { Err(ProfileError::Winding { turns, reference }) }
-    }
 }
 
-impl Element {
-    /// Ray parameter where the ray leaves the profile through this element.
-    fn crossing(&self, origin: Yz, direction: Yz) -> Option<f64> {
-        let (start, end) = (sub(self.start, origin), sub(self.end, origin));
-        match self.shape {
-            Shape::Line => {
-                // A ray leaves with the start on its right and the end on its left. The half-open test uses the same
-                // product for the vertex shared by two elements, so that exactly one of them is hit.
-                let (right, left) = (cross(direction, start), cross(direction, end));
-                if !(right <= 0.0 && left > 0.0) {
-                    return None;
-                }
-                let t = cross(start, sub(self.end, self.start)) / (left - right);
-                (t >= 0.0).then_some(t)
-            }
-            Shape::Arc { centre, radius_m, from_rad, sweep_rad, middle, cos_half } => {
-                let offset = sub(origin, centre);
-                let a = dot(direction, direction);
-                let b = dot(direction, offset);
-                let c = dot(offset, offset) - radius_m * radius_m;
-                let discriminant = b * b - a * c;
-                if discriminant < 0.0 {
-                    return None;
-                }
-                let root = math::sqrt(discriminant);
-                let t = if b > 0.0 { -c / (b + root) } else { (root - b) / a };
-                if t < 0.0 {
-                    return None;
-                }
-                let hit = [offset[0] + t * direction[0], offset[1] + t * direction[1]];
-                let lean = dot(hit, middle) / radius_m - cos_half;
-                if lean.abs() > CLEAR {
-                    return (lean > 0.0).then_some(t);
-                }
-                let turned = math::wrap(math::atan2(hit[1], hit[0]) - from_rad, TAU);
-                let within = turned <= sweep_rad + ARC_SLACK_RAD || turned >= TAU - ARC_SLACK_RAD;
-                within.then_some(t)
-            }
+/// Of elements with the indices of their pieces.
+fn check_star_shaped<'a>(
+    elements: impl Iterator<Item = (&'a Element, usize)>,
+    reference: Yz,
+) -> Result<(), ProfileError> {
+    let mut turned = 0.0;
+    for (element, vertex) in elements {
+        match element.angle_about(reference) {
+            Some(angle) => turned += angle,
+            None => return Err(ProfileError::NotStarShaped { vertex, reference }),
         }
     }
-
-    /// Arc length from the element's start to `point` on it.
-    fn along(&self, point: Yz) -> f64 {
-        match self.shape {
-            Shape::Line => norm(sub(point, self.start)),
-            Shape::Arc { centre, radius_m, from_rad, sweep_rad, .. } => {
-                let from_centre = sub(point, centre);
-                let turned = math::wrap(math::atan2(from_centre[1], from_centre[0]) - from_rad, TAU);
-                // Just past the end means slightly before the start.
-                let turned = if turned > sweep_rad + ARC_SLACK_RAD { 0.0 } else { turned };
-                radius_m * turned
-            }
-        }
-    }
-
-    fn point_at(&self, along_m: f64) -> Yz {
-        match self.shape {
-            Shape::Line => {
-                let share = along_m / self.length_m;
-                let along = sub(self.end, self.start);
-                [self.start[0] + share * along[0], self.start[1] + share * along[1]]
-            }
-            Shape::Arc { centre, radius_m, from_rad, .. } => {
-                let (sin, cos) = math::sin_cos(from_rad + along_m / radius_m);
-                [centre[0] + radius_m * cos, centre[1] + radius_m * sin]
-            }
-        }
-    }
-
-    fn normal(&self, point: Yz) -> Yz {
-        let outwards = match self.shape {
-            Shape::Line => {
-                let along = sub(self.end, self.start);
-                [along[1], -along[0]]
-            }
-            Shape::Arc { centre, .. } => sub(point, centre),
-        };
-        let length = norm(outwards);
-        [-outwards[0] / length, -outwards[1] / length]
-    }
-
-    /// Angle that this element spans about `reference`, or `None` where it runs backwards anywhere.
-    fn angle_about(&self, reference: Yz) -> Option<f64> {
-        let (start, end) = (sub(self.start, reference), sub(self.end, reference));
-        match self.shape {
-            Shape::Line => {
-                let angle = math::atan2(cross(start, end), dot(start, end));
-                (angle > 0.0).then_some(angle)
-            }
-            Shape::Arc { centre, radius_m, from_rad, sweep_rad, .. } => {
-                // On the arc, forwards means (centre - reference) . e(theta) + radius > 0; checked at 256 steps.
-                let shift = sub(centre, reference);
-                let steps = 256;
-                let mut angle = 0.0;
-                let mut before = start;
-                for step in 1..=steps {
-                    let theta = from_rad + sweep_rad * f64::from(step) / f64::from(steps);
-                    let (sin, cos) = math::sin_cos(theta);
-                    if shift[0] * cos + shift[1] * sin + radius_m <= 0.0 {
-                        return None;
-                    }
-                    let here = [shift[0] + radius_m * cos, shift[1] + radius_m * sin];
-                    angle += math::atan2(cross(before, here), dot(before, here));
-                    before = here;
-                }
-                Some(angle)
-            }
-        }
-    }
-}
-
-fn build(start: Yz, piece: Piece) -> Element {
-    match piece {
-        Piece::LineTo(end) => {
-            Element { start, end, arc_m: 0.0, length_m: norm(sub(end, start)), shape: Shape::Line }
-        }
-        Piece::Arc { centre, sweep_rad } => {
-            let from_centre = sub(start, centre);
-            let radius_m = norm(from_centre);
-            let from_rad = math::atan2(from_centre[1], from_centre[0]);
-            let (sin, cos) = math::sin_cos(from_rad + sweep_rad);
-            let end = [centre[0] + radius_m * cos, centre[1] + radius_m * sin];
-            let (sin_middle, cos_middle) = math::sin_cos(from_rad + sweep_rad / 2.0);
-            let middle = [cos_middle, sin_middle];
-            let cos_half = math::cos(sweep_rad / 2.0);
-            let shape = Shape::Arc { centre, radius_m, from_rad, sweep_rad, middle, cos_half };
-            Element { start, end, arc_m: 0.0, length_m: radius_m * sweep_rad, shape }
-        }
-    }
-}
-
-/// The points without repeats of their predecessor (the first follows the last).
-fn distinct(points: &[Yz]) -> Vec<Yz> {
-    let mut ring: Vec<Yz> = Vec::with_capacity(points.len());
-    for point in points {
-        if ring.last().is_none_or(|last| norm(sub(*point, *last)) > SAME_POINT_M) {
-            ring.push(*point);
-        }
-    }
-    while let (Some(first), Some(last)) = (ring.first(), ring.last())
-        && ring.len() > 1
-        && norm(sub(*first, *last)) <= SAME_POINT_M
-    {
-        ring.pop();
-    }
-    ring
-}
-
-/// Signed area and centroid of a polygon.
-fn area_and_centroid(ring: &[Yz]) -> (f64, Yz) {
-    let origin = ring.first().copied().unwrap_or_default();
-    let (mut area2, mut sum) = (0.0, [0.0, 0.0]);
-    for (a, b) in ring.iter().zip(ring.iter().cycle().skip(1)) {
-        let (a, b) = (sub(*a, origin), sub(*b, origin));
-        let w = cross(a, b);
-        area2 += w;
-        sum = [sum[0] + w * (a[0] + b[0]), sum[1] + w * (a[1] + b[1])];
-    }
-    let centroid = if area2 == 0.0 {
-        origin
-    } else {
-        [origin[0] + sum[0] / (3.0 * area2), origin[1] + sum[1] / (3.0 * area2)]
-    };
-    (area2 / 2.0, centroid)
-}
-
-/// The lowest crossing of y = 0: index of the edge's first point, and the crossing.
-fn floor_centre(ring: &[Yz]) -> Option<(usize, Yz)> {
-    let crossing = |(index, (a, b)): (usize, (&Yz, &Yz))| {
-        if (a[0] <= 0.0) == (b[0] <= 0.0) {
-            return None;
-        }
-        let share = -a[0] / (b[0] - a[0]);
-        Some((index, [0.0, a[1] + share * (b[1] - a[1])]))
-    };
-    ring.iter()
-        .zip(ring.iter().cycle().skip(1))
-        .enumerate()
-        .filter_map(crossing)
-        .min_by(|a, b| a.1[1].total_cmp(&b.1[1]))
-}
-
-fn sub(a: Yz, b: Yz) -> Yz {
-    [a[0] - b[0], a[1] - b[1]]
-}
-
-fn dot(a: Yz, b: Yz) -> f64 {
-    a[0] * b[0] + a[1] * b[1]
-}
-
-fn cross(a: Yz, b: Yz) -> f64 {
-    a[0] * b[1] - a[1] * b[0]
-}
-
-fn norm(a: Yz) -> f64 {
-    math::sqrt(dot(a, a))
+    let turns = math::round_to_i64(turned / TAU);
+    if turns == 1 { Ok(()) } else { Err(ProfileError::Winding { turns, reference }) }
 }

@@ -1,6 +1,9 @@
 //! Point of a profile nearest to a given point.
 
-use super::{ARC_SLACK_RAD, Element, Profile, Shape, Yz, dot, norm, sub};
+use super::Profile;
+use super::element::{ARC_SLACK_RAD, Element, Shape};
+use super::plane::{Yz, dot, norm, sub};
+use super::tree::Bounds;
 use crate::math::{self, TAU};
 
 /// Point of the wall nearest to a given point.
@@ -20,17 +23,24 @@ impl Profile {
     ///
     /// Allocates: no.
     pub fn nearest(&self, point: Yz) -> Nearest {
-        let mut best = Nearest { distance_m: f64::INFINITY, arc_m: 0.0, point: self.reference };
-        for element in &self.elements {
-            let place = element.nearest(point);
-            let distance_m = norm(sub(point, place));
-            if distance_m < best.distance_m {
-                let along = element.along(place).clamp(0.0, element.length_m);
-                let arc_m = math::wrap(element.arc_m + along, self.perimeter_m);
-                best = Nearest { distance_m, arc_m, point: place };
+        let mut best = (f64::INFINITY, 0, self.reference);
+        let distance = |bounds: &Bounds| bounds.distance_m(point);
+        self.tree.search(self.elements.len(), distance, |some| {
+            for (index, element) in self.elements.iter().enumerate().take(some.end).skip(some.start) {
+                let place = element.nearest(point);
+                let distance_m = norm(sub(point, place));
+                if (distance_m, index) < (best.0, best.1) {
+                    best = (distance_m, index, place);
+                }
             }
-        }
-        best
+            best.0
+        });
+        let (distance_m, index, place) = best;
+        let arc_m = self.elements.get(index).map_or(0.0, |element| {
+            let along = element.along(place).clamp(0.0, element.length_m);
+            math::wrap(element.arc_m + along, self.perimeter_m)
+        });
+        Nearest { distance_m, arc_m, point: place }
     }
 }
 

@@ -132,7 +132,7 @@ fn curves_that_are_no_profile_are_refused_with_their_vertex() {
     let hooked = [[3.0, 0.0], [3.0, 4.0], [2.9, 4.0], [2.9, 0.5], [-3.0, 0.5], [-3.0, 0.0]];
     assert!(matches!(
         Profile::polygon(&hooked, Some([0.0, 0.2])),
-        Err(ProfileError::NotStarShaped { vertex: 3, .. })
+        Err(ProfileError::NotStarShaped { vertex: 2, .. })
     ));
     assert!(matches!(Profile::polygon(&[[0.0, 0.0]; 9], None), Err(ProfileError::TooFewPoints { count: 1 })));
     assert!(matches!(

@@ -1,0 +1,179 @@
+//! One piece of a profile with its place: where a ray crosses it, arc lengths on it.
+
+use super::plane::{Yz, cross, dot, norm, sub};
+use crate::math::{self, TAU};
+
+/// Angle by which a hit may lie beyond an arc's end, rad, so that neighbours leave no gap between them.
+pub(super) const ARC_SLACK_RAD: f64 = 1e-12;
+/// Margin beyond which a hit is clearly within or clearly outside an arc: difference between its cosine about the arc's
+/// middle and that of the ends; far larger than the slack and rounding together.
+const CLEAR: f64 = 1e-9;
+
+/// One piece of a profile, as given; pieces run counter-clockwise with y to the right and z up.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Piece {
+    /// A straight line to this point.
+    LineTo(Yz),
+    /// An arc about `centre` through `sweep_rad` > 0 (polar angle grows, so that it bulges outwards).
+    Arc {
+        /// Centre of its circle.
+        centre: Yz,
+        /// Angle turned about the centre.
+        sweep_rad: f64,
+    },
+}
+
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Element {
+    pub(super) start: Yz,
+    pub(super) end: Yz,
+    pub(super) arc_m: f64,
+    pub(super) length_m: f64,
+    pub(super) shape: Shape,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) enum Shape {
+    Line,
+    /// `middle` is the unit vector to the arc's middle, `cos_half` the cosine of half its sweep.
+    Arc {
+        centre: Yz,
+        radius_m: f64,
+        from_rad: f64,
+        sweep_rad: f64,
+        middle: Yz,
+        cos_half: f64,
+    },
+}
+
+impl Element {
+    /// Ray parameter where the ray leaves the profile through this element.
+    pub(super) fn crossing(&self, origin: Yz, direction: Yz) -> Option<f64> {
+        let (start, end) = (sub(self.start, origin), sub(self.end, origin));
+        match self.shape {
+            Shape::Line => {
+                // A ray leaves with the start on its right and the end on its left. The half-open test uses the same
+                // product for the vertex shared by two elements, so that exactly one of them is hit.
+                let (right, left) = (cross(direction, start), cross(direction, end));
+                if !(right <= 0.0 && left > 0.0) {
+                    return None;
+                }
+                let t = cross(start, sub(self.end, self.start)) / (left - right);
+                (t >= 0.0).then_some(t)
+            }
+            Shape::Arc { centre, radius_m, from_rad, sweep_rad, middle, cos_half } => {
+                let offset = sub(origin, centre);
+                let a = dot(direction, direction);
+                let b = dot(direction, offset);
+                let c = dot(offset, offset) - radius_m * radius_m;
+                let discriminant = b * b - a * c;
+                if discriminant < 0.0 {
+                    return None;
+                }
+                let root = math::sqrt(discriminant);
+                let t = if b > 0.0 { -c / (b + root) } else { (root - b) / a };
+                if t < 0.0 {
+                    return None;
+                }
+                let hit = [offset[0] + t * direction[0], offset[1] + t * direction[1]];
+                let lean = dot(hit, middle) / radius_m - cos_half;
+                if lean.abs() > CLEAR {
+                    return (lean > 0.0).then_some(t);
+                }
+                let turned = math::wrap(math::atan2(hit[1], hit[0]) - from_rad, TAU);
+                let within = turned <= sweep_rad + ARC_SLACK_RAD || turned >= TAU - ARC_SLACK_RAD;
+                within.then_some(t)
+            }
+        }
+    }
+
+    /// Arc length from the element's start to `point` on it.
+    pub(super) fn along(&self, point: Yz) -> f64 {
+        match self.shape {
+            Shape::Line => norm(sub(point, self.start)),
+            Shape::Arc { centre, radius_m, from_rad, sweep_rad, .. } => {
+                let from_centre = sub(point, centre);
+                let turned = math::wrap(math::atan2(from_centre[1], from_centre[0]) - from_rad, TAU);
+                // Just past the end means slightly before the start.
+                let turned = if turned > sweep_rad + ARC_SLACK_RAD { 0.0 } else { turned };
+                radius_m * turned
+            }
+        }
+    }
+
+    pub(super) fn point_at(&self, along_m: f64) -> Yz {
+        match self.shape {
+            Shape::Line => {
+                let share = along_m / self.length_m;
+                let along = sub(self.end, self.start);
+                [self.start[0] + share * along[0], self.start[1] + share * along[1]]
+            }
+            Shape::Arc { centre, radius_m, from_rad, .. } => {
+                let (sin, cos) = math::sin_cos(from_rad + along_m / radius_m);
+                [centre[0] + radius_m * cos, centre[1] + radius_m * sin]
+            }
+        }
+    }
+
+    pub(super) fn normal(&self, point: Yz) -> Yz {
+        let outwards = match self.shape {
+            Shape::Line => {
+                let along = sub(self.end, self.start);
+                [along[1], -along[0]]
+            }
+            Shape::Arc { centre, .. } => sub(point, centre),
+        };
+        let length = norm(outwards);
+        [-outwards[0] / length, -outwards[1] / length]
+    }
+
+    /// Angle that this element spans about `reference`, or `None` where it runs backwards anywhere.
+    pub(super) fn angle_about(&self, reference: Yz) -> Option<f64> {
+        let (start, end) = (sub(self.start, reference), sub(self.end, reference));
+        match self.shape {
+            Shape::Line => {
+                let angle = math::atan2(cross(start, end), dot(start, end));
+                (angle > 0.0).then_some(angle)
+            }
+            Shape::Arc { centre, radius_m, from_rad, sweep_rad, .. } => {
+                // On the arc, forwards means (centre - reference) . e(theta) + radius > 0; checked at 256 steps.
+                let shift = sub(centre, reference);
+                let steps = 256;
+                let mut angle = 0.0;
+                let mut before = start;
+                for step in 1..=steps {
+                    let theta = from_rad + sweep_rad * f64::from(step) / f64::from(steps);
+                    let (sin, cos) = math::sin_cos(theta);
+                    if shift[0] * cos + shift[1] * sin + radius_m <= 0.0 {
+                        return None;
+                    }
+                    let here = [shift[0] + radius_m * cos, shift[1] + radius_m * sin];
+                    angle += math::atan2(cross(before, here), dot(before, here));
+                    before = here;
+                }
+                Some(angle)
+            }
+        }
+    }
+}
+
+/// The element that a piece makes from `start`.
+pub(super) fn build(start: Yz, piece: Piece) -> Element {
+    match piece {
+        Piece::LineTo(end) => {
+            Element { start, end, arc_m: 0.0, length_m: norm(sub(end, start)), shape: Shape::Line }
+        }
+        Piece::Arc { centre, sweep_rad } => {
+            let from_centre = sub(start, centre);
+            let radius_m = norm(from_centre);
+            let from_rad = math::atan2(from_centre[1], from_centre[0]);
+            let (sin, cos) = math::sin_cos(from_rad + sweep_rad);
+            let end = [centre[0] + radius_m * cos, centre[1] + radius_m * sin];
+            let (sin_middle, cos_middle) = math::sin_cos(from_rad + sweep_rad / 2.0);
+            let middle = [cos_middle, sin_middle];
+            let cos_half = math::cos(sweep_rad / 2.0);
+            let shape = Shape::Arc { centre, radius_m, from_rad, sweep_rad, middle, cos_half };
+            Element { start, end, arc_m: 0.0, length_m: radius_m * sweep_rad, shape }
+        }
+    }
+}

@@ -1,0 +1,47 @@
+//! How far a profile of many elements reaches in a direction: bounds from a table.
+
+use super::plane::{Yz, dot, norm};
+use crate::math::{self, TAU};
+
+/// Directions of the table.
+const DIRECTIONS: usize = 128;
+
+/// The farthest that points reach in each direction of the table, m: a direction between two of them is bounded by both, from
+/// above, by less than 1 / cos(pi / [`DIRECTIONS`]), 0.03 %.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Support(Vec<(Yz, f64)>);
+
+impl Support {
+    /// Of points.
+    pub(super) fn of(points: &[Yz]) -> Self {
+        let reach = |k: usize| {
+            let (sin, cos) = math::sin_cos(TAU * k as f64 / DIRECTIONS as f64);
+            let direction = [cos, sin];
+            let reach_m = points.iter().map(|point| dot(*point, direction)).fold(f64::NEG_INFINITY, f64::max);
+            (direction, reach_m)
+        };
+        Self((0..DIRECTIONS).map(reach).collect())
+    }
+
+    /// Upper bound of the distance from `origin` to the farthest point, m.
+    pub(super) fn farthest_m(&self, origin: Yz) -> f64 {
+        let reaches = self.0.iter().map(|(direction, reach_m)| reach_m - dot(origin, *direction));
+        reaches.fold(0.0, f64::max) / math::cos(TAU / 2.0 / DIRECTIONS as f64)
+    }
+
+    /// Upper bound of (point - origin) . direction over all points, m.
+    pub(super) fn reach_m(&self, origin: Yz, direction: Yz) -> f64 {
+        let length = norm(direction);
+        let turned = math::wrap(math::atan2(direction[1], direction[0]), TAU) / TAU * DIRECTIONS as f64;
+        let before = math::floor_to_i64(turned).rem_euclid(DIRECTIONS as i64);
+        let at = |index: i64| {
+            let index = usize::try_from(index.rem_euclid(DIRECTIONS as i64)).unwrap_or_default();
+            self.0.get(index).map_or(0.0, |(_, reach_m)| *reach_m)
+        };
+        // The direction is a sum of its neighbours in the table, with these shares.
+        let step = TAU / DIRECTIONS as f64;
+        let beyond = (turned - before as f64) * step;
+        let (share, other) = (math::sin(step - beyond), math::sin(beyond));
+        length * (share * at(before) + other * at(before + 1)) / math::sin(step) - dot(origin, direction)
+    }
+}

@@ -1,0 +1,142 @@
+//! A tree of boxes over a profile's elements: what is asked of all elements costs with the logarithm of their number. It only
+//! leaves out elements that can't matter; what is found is what a look at all of them finds, bit for bit.
+
+use super::element::{Element, Shape};
+use super::plane::{Yz, norm};
+
+/// Elements in a leaf. Neighbours along the wall lie near each other.
+const LEAF: usize = 8;
+/// Profiles with no more elements than this have no tree: a look at all is as fast.
+const FEW: usize = 24;
+/// Boxes are this much larger than what is in them, m: far more than rounding and an arc's slack.
+const MARGIN_M: f64 = 1e-6;
+/// Depth of a tree over more elements than a profile may have.
+const DEPTH: usize = 40;
+
+/// A box about elements.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Bounds {
+    low: Yz,
+    high: Yz,
+}
+
+/// The boxes, node 1 about all, nodes 2 i and 2 i + 1 about the halves of node i; `leaves` of them are leaves. Empty for few
+/// elements.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub(super) struct Tree {
+    nodes: Vec<Bounds>,
+    leaves: usize,
+}
+
+impl Bounds {
+    const EMPTY: Self = Self { low: [f64::INFINITY; 2], high: [f64::NEG_INFINITY; 2] };
+
+    /// The circle's box for an arc: larger than the arc's, and simple.
+    fn of(element: &Element) -> Self {
+        let Element { start, end, .. } = *element;
+        let of = |place: fn(f64, f64) -> f64, off: f64| {
+            let ends = [place(start[0], end[0]) + off, place(start[1], end[1]) + off];
+            let Shape::Arc { centre, radius_m, .. } = element.shape else { return ends };
+            let reach_m = radius_m * off.signum() + off;
+            [place(ends[0], centre[0] + reach_m), place(ends[1], centre[1] + reach_m)]
+        };
+        Self { low: of(f64::min, -MARGIN_M), high: of(f64::max, MARGIN_M) }
+    }
+
+    fn with(self, other: Self) -> Self {
+        let each = |of: fn(f64, f64) -> f64, a: Yz, b: Yz| [of(a[0], b[0]), of(a[1], b[1])];
+        Self { low: each(f64::min, self.low, other.low), high: each(f64::max, self.high, other.high) }
+    }
+
+    /// Ray parameter where the ray enters, zero from inside; infinite where it misses.
+    pub(super) fn entry(&self, origin: Yz, direction: Yz) -> f64 {
+        let (mut from, mut to) = (0.0, f64::INFINITY);
+        for (((low, high), at), along) in self.low.iter().zip(&self.high).zip(origin).zip(direction) {
+            if along == 0.0 {
+                if at < *low || at > *high {
+                    return f64::INFINITY;
+                }
+                continue;
+            }
+            let (one, other) = ((low - at) / along, (high - at) / along);
+            from = f64::max(from, one.min(other));
+            to = f64::min(to, one.max(other));
+        }
+        if from <= to { from } else { f64::INFINITY }
+    }
+
+    /// Distance of a point, m; zero inside.
+    pub(super) fn distance_m(&self, point: Yz) -> f64 {
+        let off = |axis: usize| {
+            let (low, high, at) = (self.low[axis], self.high[axis], point[axis]);
+            f64::max(low - at, at - high).max(0.0)
+        };
+        norm([off(0), off(1)])
+    }
+}
+
+impl Tree {
+    pub(super) fn over(elements: &[Element]) -> Self {
+        if elements.len() <= FEW {
+            return Self::default();
+        }
+        let leaves = elements.len().div_ceil(LEAF).next_power_of_two();
+        let mut nodes = vec![Bounds::EMPTY; 2 * leaves];
+        for (node, some) in nodes.iter_mut().skip(leaves).zip(elements.chunks(LEAF)) {
+            *node = some.iter().fold(Bounds::EMPTY, |all, element| all.with(Bounds::of(element)));
+        }
+        for node in (1..leaves).rev() {
+            let halves = [nodes.get(2 * node), nodes.get(2 * node + 1)];
+            let both = halves.into_iter().flatten().fold(Bounds::EMPTY, |all, half| all.with(*half));
+            if let Some(node) = nodes.get_mut(node) {
+                *node = both;
+            }
+        }
+        Self { nodes, leaves }
+    }
+
+    /// Looks at the elements of which the best isn't surely worse than what was found so far, by their indices, in ranges.
+    /// `bound` is the least cost that something in a box can have; `look` returns the cost of the best found so far. Of an equal
+    /// cost all are looked at.
+    pub(super) fn search(
+        &self,
+        count: usize,
+        bound: impl Fn(&Bounds) -> f64,
+        mut look: impl FnMut(core::ops::Range<usize>) -> f64,
+    ) {
+        if self.nodes.is_empty() {
+            look(0..count);
+            return;
+        }
+        let mut best = f64::INFINITY;
+        let cost = |node: usize| match self.nodes.get(node) {
+            Some(bounds) if *bounds != Bounds::EMPTY => bound(bounds),
+            _ => f64::INFINITY,
+        };
+        let mut stack = [(0, 0.0); DEPTH];
+        let mut waiting = 0;
+        let wait = |stack: &mut [(usize, f64); DEPTH], waiting: &mut usize, node: usize, cost: f64| {
+            if let Some(slot) = stack.get_mut(*waiting) {
+                *slot = (node, cost);
+                *waiting += 1;
+            }
+        };
+        wait(&mut stack, &mut waiting, 1, cost(1));
+        while waiting > 0 {
+            waiting -= 1;
+            let (node, least) = stack.get(waiting).copied().unwrap_or_default();
+            if least > best || least == f64::INFINITY {
+                continue;
+            }
+            if node >= self.leaves {
+                let from = (node - self.leaves) * LEAF;
+                best = look(from..(from + LEAF).min(count));
+                continue;
+            }
+            let (first, second) = ((2 * node, cost(2 * node)), (2 * node + 1, cost(2 * node + 1)));
+            let (near, far) = if first.1 <= second.1 { (first, second) } else { (second, first) };
+            wait(&mut stack, &mut waiting, far.0, far.1);
+            wait(&mut stack, &mut waiting, near.0, near.1);
+        }
+    }
+}
