@@ -20,3 +20,19 @@ fn every_promise_names_a_test_that_is_there() {
     }
     assert!(named > 20, "{named}");
 }
+
+#[test]
+fn every_listed_mutation_finds_its_line() {
+    let list = std::fs::read_to_string(root().join("tests/mutants/listed")).unwrap();
+    let mut found = 0;
+    for line in list.lines().filter(|line| !line.starts_with('#')) {
+        let line = line.replace("\\|", "\u{1}");
+        let fields: Vec<String> = line.split('|').map(|field| field.replace('\u{1}', "|")).collect();
+        let [name, file, from, to, _] = fields.as_slice() else { panic!("{line}") };
+        let text = std::fs::read_to_string(root().join(file)).unwrap_or_else(|_| panic!("{name}: no {file}"));
+        assert_eq!(text.lines().filter(|line| line.contains(from)).count(), 1, "{name}: {from:?} in {file}");
+        assert_ne!(from, to, "{name}");
+        found += 1;
+    }
+    assert!(found > 15, "{found}");
+}

@@ -116,6 +116,27 @@ fn rays_from_a_millimetre_off_the_wall_and_nearly_along_it_end_on_the_wall() {
     }
 }
 
+/// Up along a wall that runs into a half-circle without a corner: the ray touches the vault's circle where it begins, and a few
+/// ulps beside the wall it crosses it above. The height above the springing is sqrt((2 - y) (2 + y)), without cancellation.
+#[test]
+fn a_ray_tangent_to_the_vault_meets_it_where_it_begins() {
+    let profile = arch(4.0, 4.0, 2.0).unwrap();
+    let mut half: f64 = 2.0;
+    for ulps in 0..2000 {
+        for y in [half, -half] {
+            let Some(hit) = profile.cast_from_inside([y, 1.0], [0.0, 1.0]) else {
+                panic!("no wall {ulps} ulps beside the wall");
+            };
+            let above_m = math::sqrt((2.0 - half) * (2.0 + half));
+            // The circle's equation cancels: an error of an ulp of 4 m^2 under the root.
+            let error_m = (hit.range_m - (1.0 + above_m)).abs();
+            assert!(error_m < 4.3e-8, "{ulps} ulps, y {y}: {error_m}");
+            assert!(profile.contains([hit.point[0] * 0.999, hit.point[1]]));
+        }
+        half = half.next_down();
+    }
+}
+
 #[test]
 fn from_outside_there_is_no_range() {
     for (name, profile) in all() {
