@@ -11,6 +11,7 @@ use std::collections::HashMap;
 use std::hint::black_box;
 use std::time::{Duration, Instant};
 
+use bevy_ecs::prelude::{ResMut, Resource};
 use bevy_ecs::schedule::{IntoScheduleConfigs, Schedule, SingleThreadedExecutor};
 use bevy_ecs::world::World;
 use headrace_coverage::hole::FARTHEST_M;
@@ -22,6 +23,7 @@ use headrace_geometry::time::{DurNs, MonoNs};
 use headrace_geometry::tunnel::shapes;
 use headrace_monitor::resources::Coverage;
 use headrace_monitor::run::Loop;
+use headrace_monitor::stage::Stage;
 use headrace_monitor::{App, SourceSpec};
 use headrace_sensor::codec::CodecCounts;
 use headrace_sensor::device::{Decoder, Direction};
@@ -48,8 +50,13 @@ fn main() {
     println!("| what | figure | yardstick in the same run | ratio |\n|---|---|---|---|");
     // `cargo bench -p headrace_benches -- holes` runs one alone.
     let wanted = std::env::args().nth(1).filter(|word| !word.starts_with('-'));
-    let benches: [(&str, fn()); 4] =
-        [("loop", whole_loop), ("idle", idle_tick), ("covering", covering), ("holes", holes)];
+    let benches: [(&str, fn()); 5] = [
+        ("loop", whole_loop),
+        ("stages", by_stage),
+        ("idle", idle_tick),
+        ("covering", covering),
+        ("holes", holes),
+    ];
     for (name, bench) in benches {
         if wanted.as_deref().is_none_or(|word| word == name) {
             bench();
@@ -90,7 +97,29 @@ impl Decoder for Nothing {
     }
 }
 
+/// When each stage of the present tick ended, and before the first of them.
+#[derive(Resource, Default)]
+struct Ends(Vec<Instant>);
+
+fn note(mut ends: ResMut<'_, Ends>) {
+    ends.0.push(Instant::now());
+}
+
+/// A loop that notes when each stage ends.
+fn noting(scene: &Scene, ticks: usize) -> Loop {
+    let mut app = app(scene, true);
+    app.insert_resource(Ends(Vec::with_capacity(ticks * Stage::ALL.len())));
+    for stage in Stage::ALL {
+        app.add_systems_after(stage, note);
+    }
+    app.arm(scene.vehicle.navigation()).unwrap()
+}
+
 fn armed(scene: &Scene, decoding: bool) -> Loop {
+    app(scene, decoding).arm(scene.vehicle.navigation()).unwrap()
+}
+
+fn app(scene: &Scene, decoding: bool) -> App {
     let vehicle = &scene.vehicle;
     let mut app = App::new(Mission { length_m: 200.0, ..vehicle.mission() });
     for (sensor, config) in vehicle.sensors.iter().zip(&vehicle.sensor_configs) {
@@ -109,7 +138,7 @@ fn armed(scene: &Scene, decoding: bool) -> Loop {
             .unwrap();
         }
     }
-    app.arm(vehicle.navigation()).unwrap()
+    app
 }
 
 /// A message of a simulation, to be fed to the loop.
@@ -121,6 +150,11 @@ struct Kept {
 
 /// Feeds all messages tick by tick; returns the duration of each tick including the filling of its rings.
 fn run(dive: &mut Loop, messages: &[Kept]) -> Vec<Duration> {
+    run_noting(dive, messages, &mut Vec::new())
+}
+
+/// The same; notes when each tick begins.
+fn run_noting(dive: &mut Loop, messages: &[Kept], begins: &mut Vec<Instant>) -> Vec<Duration> {
     let mut ports: Vec<_> = (0..dive.sources().len()).map(|source| dive.take_port(source).unwrap()).collect();
     let mut ticks = Vec::new();
     let mut rest = messages;
@@ -133,6 +167,7 @@ fn run(dive: &mut Loop, messages: &[Kept]) -> Vec<Duration> {
         for message in now {
             ports[usize::from(message.source)].send(message.at, &message.bytes).unwrap();
         }
+        begins.push(Instant::now());
         dive.tick(until);
         ticks.push(started.elapsed());
     }
@@ -141,14 +176,7 @@ fn run(dive: &mut Loop, messages: &[Kept]) -> Vec<Duration> {
 
 fn whole_loop() {
     let scene = scenes::scene(SCENE);
-    let mut simulation = Simulation::new(&scene).unwrap();
-    let data_s = simulation.duration_s();
-    let mut messages: Vec<Kept> = Vec::new();
-    while let Some(message) = simulation.next_message() {
-        if message.direction == Direction::Received {
-            messages.push(Kept { at: message.at, source: message.source, bytes: message.bytes.to_vec() });
-        }
-    }
+    let (data_s, messages) = messages_of(&scene);
     let mut ticks = Vec::new();
     let mut samples = 0;
     let full = best(|| {
@@ -184,6 +212,55 @@ fn whole_loop() {
         "its 20 ms",
         at(500) / 20_000.0,
     );
+}
+
+/// All messages of a scene that the loop gets.
+fn messages_of(scene: &Scene) -> (f64, Vec<Kept>) {
+    let mut simulation = Simulation::new(scene).unwrap();
+    let data_s = simulation.duration_s();
+    let mut messages: Vec<Kept> = Vec::new();
+    while let Some(message) = simulation.next_message() {
+        if message.direction == Direction::Received {
+            messages.push(Kept { at: message.at, source: message.source, bytes: message.bytes.to_vec() });
+        }
+    }
+    (data_s, messages)
+}
+
+/// Percentiles of each stage over the ticks of a dive, and of what precedes the first: rings, merge, the schedule's start.
+fn by_stage() {
+    let scene = scenes::scene(SCENE);
+    let (_, messages) = messages_of(&scene);
+    let last = messages.last().map_or(START, |message| message.at);
+    let mut dive = noting(&scene, usize::try_from(last.since(START).0 / TICK.0).unwrap() + 2);
+    // The tick at arming has noted itself.
+    let armed = dive.resource::<Ends>().unwrap().0.len();
+    let mut begins = Vec::new();
+    run_noting(&mut dive, &messages, &mut begins);
+    let ends = &dive.resource::<Ends>().unwrap().0[armed..];
+    let mut spans = vec![Vec::new(); Stage::ALL.len()];
+    for (begin, ends) in begins.iter().zip(ends.chunks(Stage::ALL.len())) {
+        let mut before = *begin;
+        for (span, end) in spans.iter_mut().zip(ends) {
+            span.push((*end - before).as_secs_f64() * 1e6);
+            before = *end;
+        }
+    }
+    let whole_us: f64 = spans.iter().flatten().sum();
+    for (stage, mut span) in Stage::ALL.into_iter().zip(spans) {
+        let share = span.iter().sum::<f64>() / whole_us;
+        span.sort_unstable_by(f64::total_cmp);
+        let at = |thousandths: usize| span[(span.len() - 1) * thousandths / 1000];
+        let what = format!("stage {stage:?}{}", if stage == Stage::Decode { ", merge included" } else { "" });
+        let figure = format!(
+            "p50 {:.2} us, p99 {:.1} us, p99.9 {:.1} us, max {:.0} us",
+            at(500),
+            at(990),
+            at(999),
+            at(1000)
+        );
+        row(&what, &figure, "all stages", share);
+    }
 }
 
 fn nothing() {}

@@ -162,6 +162,18 @@ impl App {
         self.schedule.add_systems(systems.in_set(stage));
     }
 
+    /// Adds systems between a stage and the next, for what looks at a stage as a whole, such as a measurement.
+    pub fn add_systems_after<M>(
+        &mut self,
+        stage: Stage,
+        systems: impl IntoScheduleConfigs<ScheduleSystem, M>,
+    ) {
+        match stage.next() {
+            Some(next) => self.schedule.add_systems(systems.after(stage).before(next)),
+            None => self.schedule.add_systems(systems.after(stage)),
+        };
+    }
+
     /// The sources so far, in the order of their ids.
     pub fn sources(&self) -> &[SourceInfo] {
         &self.sources

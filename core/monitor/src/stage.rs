@@ -23,6 +23,24 @@ pub enum Stage {
     Publish,
 }
 
+impl Stage {
+    /// All of them, in their order.
+    pub const ALL: [Self; 7] = [
+        Self::Decode,
+        Self::Navigate,
+        Self::Georeference,
+        Self::Cover,
+        Self::Judge,
+        Self::Advise,
+        Self::Publish,
+    ];
+
+    /// The stage after this one.
+    pub fn next(self) -> Option<Self> {
+        Self::ALL.into_iter().skip_while(|stage| *stage != self).nth(1)
+    }
+}
+
 /// An empty schedule of the chained stages: single-threaded; an ambiguous order of systems is an error.
 pub(super) fn schedule() -> Schedule {
     let mut schedule = Schedule::default();
@@ -31,17 +49,10 @@ pub(super) fn schedule() -> Schedule {
         ambiguity_detection: LogLevel::Error,
         ..ScheduleBuildSettings::default()
     });
-    schedule.configure_sets(
-        (
-            Stage::Decode,
-            Stage::Navigate,
-            Stage::Georeference,
-            Stage::Cover,
-            Stage::Judge,
-            Stage::Advise,
-            Stage::Publish,
-        )
-            .chain(),
-    );
+    for stage in Stage::ALL {
+        if let Some(next) = stage.next() {
+            schedule.configure_sets((stage, next).chain());
+        }
+    }
     schedule
 }
