@@ -12,6 +12,7 @@ mod expect;
 mod failure;
 mod feeds;
 mod files;
+mod follower;
 pub mod import;
 mod interrupt;
 mod inventory;

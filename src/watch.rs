@@ -13,6 +13,7 @@ use headrace_ports::{Phase, Status};
 use headrace_replay::log::RecordingEvent;
 use serde_json::{Value, json};
 
+use crate::follower::Follower;
 use crate::printer::Printer;
 use crate::screen::Screen;
 use crate::terminal;
@@ -35,8 +36,9 @@ pub(crate) enum Show {
     JsonLines,
 }
 
-/// Shows a dive on stdout.
+/// Shows a dive on stdout, and to the followers that were added.
 pub(crate) struct Watch {
+    followers: Vec<Box<dyn Follower>>,
     show: Show,
     screen: Screen,
     printer: Option<Printer>,
@@ -52,6 +54,7 @@ impl Watch {
     pub(crate) fn new(show: Show) -> Self {
         let show = if terminal::is_quiet() { Show::Nothing } else { show };
         Self {
+            followers: Vec::new(),
             show,
             screen: Screen::of_stdout(),
             printer: (show != Show::Nothing).then(|| Printer::start(false)),
@@ -66,7 +69,14 @@ impl Watch {
         Self::new(Show::Nothing)
     }
 
-    /// Whether nothing is shown.
+    /// Shows the dive to this one, too.
+    #[must_use]
+    pub(crate) fn followed_by(mut self, follower: Box<dyn Follower>) -> Self {
+        self.followers.push(follower);
+        self
+    }
+
+    /// Whether nothing is shown on stdout.
     pub(crate) fn is_quiet(&self) -> bool {
         self.show == Show::Nothing
     }
@@ -81,6 +91,7 @@ impl Watch {
 
     /// Shows a result of the loop.
     pub(crate) fn notice(&mut self, notice: &Notice, dive: &Loop) {
+        self.followers.iter_mut().for_each(|follower| follower.notice(notice, dive));
         if self.is_quiet() {
             return;
         }
@@ -96,6 +107,7 @@ impl Watch {
 
     /// Shows the state, after every tick: also where nothing has come.
     pub(crate) fn tick(&mut self, dive: &Loop) {
+        self.followers.iter_mut().for_each(|follower| follower.tick(dive));
         if self.is_quiet() {
             return;
         }
@@ -112,6 +124,7 @@ impl Watch {
 
     /// Shows a change of a sensor's state.
     pub(crate) fn sensor(&mut self, id: &str, status: &Status) {
+        self.followers.iter_mut().for_each(|follower| follower.sensor(id, status));
         let phase = status.phase.as_str();
         match self.show {
             Show::Nothing => {}
@@ -131,6 +144,7 @@ impl Watch {
     pub(crate) fn recording(&mut self, number: usize, event: &RecordingEvent, at: MonoNs) {
         let fails = matches!(event, RecordingEvent::Failed { .. });
         self.failed.insert(number, fails);
+        self.followers.iter_mut().for_each(|follower| follower.recording(number, event, at));
         let words = match event {
             RecordingEvent::Failed { path, error } => {
                 format!("NOT RECORDED to {}: {error}; tried again in another part", path.display())
@@ -164,6 +178,7 @@ impl Watch {
     pub(crate) fn stopped(&mut self, dive: &Loop, time: DurNs, ended: bool) {
         self.shown = None;
         self.teller.forget();
+        self.followers.iter_mut().for_each(|follower| follower.stopped(dive, time, ended));
         let (tick, samples, digest) = (dive.ticks(), dive.tally().samples, format!("{:016x}", dive.digest()));
         match self.show {
             Show::Nothing => {}
@@ -186,6 +201,7 @@ impl Watch {
 
     /// Ends the output of a dive.
     pub(crate) fn end(&mut self, dive: &Loop) {
+        self.followers.iter_mut().for_each(|follower| follower.end(dive));
         if !self.is_quiet() {
             let mut told = Vec::new();
             self.teller.end(&dive.coverage().sections, &mut |one| told.push(one));
