@@ -32,6 +32,9 @@ use crate::watch::Watch;
 /// arming.
 const NOTICES: usize = 1 << 10;
 
+/// Keys of a log's metadata: one moment on its clock, and in UTC, nanoseconds.
+pub(crate) const CLOCK_ANCHOR: [&str; 2] = ["clock_anchor_monotonic_ns", "clock_anchor_utc_ns"];
+
 /// An armed loop with the vehicle's sensors, and the consumers of its results.
 pub(crate) struct Dive {
     pub(crate) armed: Loop,
@@ -82,6 +85,29 @@ pub(crate) fn assemble(
     record_to: Option<Recording<'_>>,
 ) -> Result<Dive, Failure> {
     assemble_with(vehicle, vehicle.navigation(), vehicle_text, record_to)
+}
+
+/// The same for a dive that is followed: its results are kept for each tick.
+pub(crate) fn assemble_followed(
+    vehicle: &VehicleConfig,
+    vehicle_text: &str,
+    record_to: Option<Recording<'_>>,
+    is_followed: bool,
+) -> Result<Dive, Failure> {
+    let (mut app, notices) = app(vehicle)?;
+    if is_followed {
+        app.keep_results();
+    }
+    let recorders = match record_to {
+        None => Vec::new(),
+        Some(recording) => record(&mut app, vehicle, vehicle_text, recording)?,
+    };
+    Ok(Dive {
+        armed: arm(app, vehicle, vehicle.navigation())?,
+        notices,
+        recorders,
+        what_if: WhatIf::default(),
+    })
 }
 
 /// The same, keeping all results for a comparison, and without a recording.
@@ -170,8 +196,9 @@ fn view_site(vehicle: &VehicleConfig) -> Site {
 /// Stores the UTC time of the timestamps' clock.
 fn anchor(header: &mut LogHeader) {
     let (monotonic, utc) = headrace_ports::clock_anchor();
-    header.metadata.insert("clock_anchor_monotonic_ns".to_owned(), monotonic.0.to_string());
-    header.metadata.insert("clock_anchor_utc_ns".to_owned(), utc.0.to_string());
+    let [of_clock, of_utc] = CLOCK_ANCHOR.map(str::to_owned);
+    header.metadata.insert(of_clock, monotonic.0.to_string());
+    header.metadata.insert(of_utc, utc.0.to_string());
 }
 
 /// A unique name for a recording.

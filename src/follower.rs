@@ -13,6 +13,10 @@ pub(crate) trait Follower {
     fn notice(&mut self, _notice: &Notice, _dive: &Loop) {}
     /// After every tick, also where nothing has come.
     fn tick(&mut self, dive: &Loop);
+    /// After a tick on the way of a jump, whose notices aren't shown.
+    fn skipped(&mut self, _dive: &Loop) {}
+    /// A replay begins to stand still or to play, or its speed changes.
+    fn mode(&mut self, _paused: bool, _speed: Option<f64>) {}
     /// A sensor's connection has changed.
     fn sensor(&mut self, _id: &str, _status: &Status) {}
     /// Something has happened to the recording of this number.

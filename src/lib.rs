@@ -22,6 +22,7 @@ mod manual;
 mod memory;
 mod output;
 mod outputs;
+mod page;
 mod phase;
 mod plan;
 mod play;

@@ -81,6 +81,11 @@ impl Watch {
         self.show == Show::Nothing
     }
 
+    /// Whether it is shown in lines for people.
+    pub(crate) fn shows_lines(&self) -> bool {
+        self.show == Show::Lines
+    }
+
     /// A dive that can't wait: what the terminal has no room for is dropped.
     pub(crate) fn live(mut self) -> Self {
         if let Some(printer) = &mut self.printer {
@@ -120,6 +125,16 @@ impl Watch {
             self.shown = Some((state.now, condition));
             self.status(state, dive);
         }
+    }
+
+    /// Passes over a tick on the way of a jump.
+    pub(crate) fn skipped(&mut self, dive: &Loop) {
+        self.followers.iter_mut().for_each(|follower| follower.skipped(dive));
+    }
+
+    /// A replay begins to stand still or to play, or its speed changes.
+    pub(crate) fn mode(&mut self, paused: bool, speed: Option<f64>) {
+        self.followers.iter_mut().for_each(|follower| follower.mode(paused, speed));
     }
 
     /// Shows a change of a sensor's state.

@@ -47,7 +47,11 @@ impl Token {
         if !(16..=128).contains(&text.len()) {
             return Err(format!("has {} characters; expected 16 to 128", text.len()));
         }
-        if text.bytes().all(is_fit) { Ok(Self(text.to_owned())) } else { Err("has others than letters, digits, - and _".to_owned()) }
+        if text.bytes().all(is_fit) {
+            Ok(Self(text.to_owned()))
+        } else {
+            Err("has others than letters, digits, - and _".to_owned())
+        }
     }
 
     /// Its text, for who starts the program.
@@ -58,7 +62,8 @@ impl Token {
     /// Whether it is this one. Takes as long wherever they differ.
     fn is(&self, other: &str) -> bool {
         let (own, other) = (self.0.as_bytes(), other.as_bytes());
-        let differs = own.iter().zip(other).fold(own.len() ^ other.len(), |all, (a, b)| all | usize::from(a ^ b));
+        let differs =
+            own.iter().zip(other).fold(own.len() ^ other.len(), |all, (a, b)| all | usize::from(a ^ b));
         core::hint::black_box(differs) == 0
     }
 }
@@ -95,7 +100,8 @@ impl Access {
         let cookies = headers.get_all(header::COOKIE).iter().filter_map(|value| value.to_str().ok());
         let cookies = cookies.flat_map(|line| line.split(';')).filter_map(|pair| pair.trim().split_once('='));
         let of_cookie = cookies.filter(|(name, _)| *name == COOKIE).map(|(_, token)| token.to_owned());
-        let bearer = text(header::AUTHORIZATION).and_then(|value| value.strip_prefix("Bearer ")).map(str::to_owned);
+        let bearer =
+            text(header::AUTHORIZATION).and_then(|value| value.strip_prefix("Bearer ")).map(str::to_owned);
         of_cookie.chain(bearer).chain(query(uri, "token")).filter_map(|token| self.role_of(&token)).max()
     }
 
@@ -104,27 +110,28 @@ impl Access {
         let tokens = self.tokens.as_ref()?;
         // Both are compared, whichever it is.
         let (operates, sees) = (tokens.operator.is(token), tokens.viewer.is(token));
-        if operates {
-            Some(Role::Operator)
-        } else {
-            sees.then_some(Role::Viewer)
-        }
+        if operates { Some(Role::Operator) } else { sees.then_some(Role::Viewer) }
     }
 
     /// Whether the request names this machine: another name that leads here is DNS rebinding.
     pub(crate) fn is_host(&self, headers: &HeaderMap) -> bool {
-        let Some(host) = headers.get(header::HOST).and_then(|value| value.to_str().ok()) else { return false };
+        let Some(host) = headers.get(header::HOST).and_then(|value| value.to_str().ok()) else {
+            return false;
+        };
         let name = name_of(host);
         if let Ok(address) = name.trim_matches(['[', ']']).parse::<IpAddr>() {
             return !self.is_loopback || address.is_loopback();
         }
-        name.eq_ignore_ascii_case("localhost") || self.hosts.iter().any(|known| known.eq_ignore_ascii_case(name))
+        name.eq_ignore_ascii_case("localhost")
+            || self.hosts.iter().any(|known| known.eq_ignore_ascii_case(name))
     }
 
     /// Whether a request comes from our own page, from one that is told of, or from no page at all.
     pub(crate) fn is_origin(&self, headers: &HeaderMap) -> bool {
         let Some(origin) = headers.get(header::ORIGIN) else { return true };
-        let (Ok(origin), Some(Ok(host))) = (origin.to_str(), headers.get(header::HOST).map(|host| host.to_str())) else {
+        let (Ok(origin), Some(Ok(host))) =
+            (origin.to_str(), headers.get(header::HOST).map(|host| host.to_str()))
+        else {
             return false;
         };
         let authority = origin.strip_prefix("http://").or_else(|| origin.strip_prefix("https://"));
@@ -185,7 +192,10 @@ mod tests {
         let access = access(false);
         let role = |pairs: &[_], uri: &'static str| access.role(&headers(pairs), &Uri::from_static(uri));
         assert_eq!(role(&[], "/"), None);
-        assert_eq!(role(&[(header::COOKIE, "a=b; headrace_token=viewer-0123456789")], "/"), Some(Role::Viewer));
+        assert_eq!(
+            role(&[(header::COOKIE, "a=b; headrace_token=viewer-0123456789")], "/"),
+            Some(Role::Viewer)
+        );
         assert_eq!(role(&[(header::AUTHORIZATION, "Bearer operator-01234567")], "/"), Some(Role::Operator));
         assert_eq!(role(&[], "/feed?x=1&token=operator%2d01234567"), Some(Role::Operator));
         for wrong in ["operator-0123456", "operator-012345678", "operator-01234568", ""] {
@@ -208,9 +218,21 @@ mod tests {
 
     #[test]
     fn other_pages_are_refused_but_those_told_of() {
-        let is_origin = |origin| access(false).is_origin(&headers(&[(header::HOST, "127.0.0.1:8881"), (header::ORIGIN, origin)]));
-        assert!(is_origin("http://127.0.0.1:8881") && is_origin("https://127.0.0.1:8881") && is_origin("http://blueos.local"));
-        for origin in ["http://127.0.0.1:3000", "http://evil.example", "null", "127.0.0.1:8881", "http://blueos.local:81"] {
+        let is_origin = |origin| {
+            access(false).is_origin(&headers(&[(header::HOST, "127.0.0.1:8881"), (header::ORIGIN, origin)]))
+        };
+        assert!(
+            is_origin("http://127.0.0.1:8881")
+                && is_origin("https://127.0.0.1:8881")
+                && is_origin("http://blueos.local")
+        );
+        for origin in [
+            "http://127.0.0.1:3000",
+            "http://evil.example",
+            "null",
+            "127.0.0.1:8881",
+            "http://blueos.local:81",
+        ] {
             assert!(!is_origin(origin), "{origin}");
         }
     }

@@ -9,7 +9,8 @@ pub(crate) fn asset(path: &str) -> Option<&'static [u8]> {
 
 /// The page itself.
 pub fn index() -> &'static [u8] {
-    asset("index.html").unwrap_or(b"<!doctype html><title>headrace</title><p>This program was built without its page.")
+    asset("index.html")
+        .unwrap_or(b"<!doctype html><title>headrace</title><p>This program was built without its page.")
 }
 
 /// A file that the page refers to by `/assets/..`.
@@ -44,7 +45,9 @@ mod tests {
     fn the_page_and_all_that_it_refers_to_are_there() {
         let page = core::str::from_utf8(index()).unwrap();
         assert!(page.to_lowercase().contains("<!doctype html>"));
-        let referred = page.split(['"', '\'']).filter_map(|part| part.strip_prefix("/assets/").or_else(|| part.strip_prefix("./assets/")));
+        let referred = page
+            .split(['"', '\''])
+            .filter_map(|part| part.strip_prefix("/assets/").or_else(|| part.strip_prefix("./assets/")));
         for path in referred {
             assert!(asset(&format!("assets/{path}")).is_some(), "{path}");
         }

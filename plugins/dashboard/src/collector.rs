@@ -83,7 +83,13 @@ pub struct Collector {
 
 impl Collector {
     /// For a loop; `waits` for a replay.
-    pub(crate) fn new(to: Sender<Fed>, dive: &Loop, waits: bool, is_playback: bool, recorded_to: Option<String>) -> Self {
+    pub(crate) fn new(
+        to: Sender<Fed>,
+        dive: &Loop,
+        waits: bool,
+        is_playback: bool,
+        recorded_to: Option<String>,
+    ) -> Self {
         let followed = |(source, info): (&headrace_monitor::SourceInfo, SensorInfo)| Followed {
             id: source.id.clone(),
             mount: info.mount,
@@ -138,7 +144,11 @@ impl Collector {
         self.played = Some(now);
         let is_due = self.sent.is_none_or(|sent| now.since(sent).0.abs() >= EVERY.0);
         // Playback needs to know of each tick what came with it, to jump back to there.
-        if is_due || !self.told.is_empty() || !self.changed.is_empty() || self.is_playback && !self.samples.is_empty() {
+        if is_due
+            || !self.told.is_empty()
+            || !self.changed.is_empty()
+            || self.is_playback && !self.samples.is_empty()
+        {
             self.send(dive);
         }
     }
@@ -151,7 +161,9 @@ impl Collector {
 
     /// Takes a change of a sensor's connection.
     pub fn sensor(&mut self, id: &str, phase: &str, text: &str, at: MonoNs) {
-        self.push_told(json!({"type": "sensor", "t_s": at.as_secs_f64(), "id": id, "phase": phase, "text": text}));
+        self.push_told(
+            json!({"type": "sensor", "t_s": at.as_secs_f64(), "id": id, "phase": phase, "text": text}),
+        );
     }
 
     /// Takes what has happened to a recording.
@@ -184,16 +196,17 @@ impl Collector {
         self.send(dive);
     }
 
-    /// Takes the end of the dive: `summary` is its report's.
-    pub fn end(&mut self, dive: &Loop, summary: Value) {
+    /// Takes the end of the dive, when all is judged.
+    pub fn end(&mut self, dive: &Loop) {
         let mut told = Vec::new();
         self.teller.end(&dive.coverage().sections, &mut |one| told.push(one));
         self.tell(&told, dive);
         self.change_all(dive);
         self.back_due = true;
         self.back_told = None;
+        // At its end also a live dive has the time.
+        self.waits = true;
         while !self.changed.is_empty() && self.send(dive) {}
-        self.hand(Fed::End(Box::new(summary)));
     }
 
     /// Marks all sections of the way: what has no notice of its own is sent, too.
@@ -282,7 +295,8 @@ impl Collector {
 
     fn tell(&mut self, told: &[Told], dive: &Loop) {
         for one in told {
-            let mut value = serde_json::to_value(one).unwrap_or_else(|error| json!({"error": error.to_string()}));
+            let mut value =
+                serde_json::to_value(one).unwrap_or_else(|error| json!({"error": error.to_string()}));
             if let Some(object) = value.as_object_mut() {
                 let line = told_line(one, &dive.mission().profile);
                 object.insert("t_s".to_owned(), dive.now().as_secs_f64().into());
@@ -336,8 +350,8 @@ impl Collector {
         if self.waits {
             // Nobody is there to take it once the page has ended.
             let _gone = self.to.blocking_send(message);
-        } else if let Err(TrySendError::Full(Fed::End(_))) = self.to.try_send(message) {
-            tracing::warn!("the page was behind at the end of the dive");
+        } else if let Err(TrySendError::Full(_)) = self.to.try_send(message) {
+            tracing::debug!("the page is behind");
         }
     }
 
@@ -351,7 +365,15 @@ impl Collector {
             if mended.len() < MOST_SAMPLES {
                 let [y_m, z_m] = profile.point_at(arc_m).map(|value| value as f32);
                 let arc = SampleRecord::arc_of(arc_m, profile.perimeter_m());
-                mended.push(SampleRecord { t_ms, x_m: x_m as f32, y_m, z_m, arc, head: NONE, outcome: Outcome::Wall as u8 });
+                mended.push(SampleRecord {
+                    t_ms,
+                    x_m: x_m as f32,
+                    y_m,
+                    z_m,
+                    arc,
+                    head: NONE,
+                    outcome: Outcome::Wall as u8,
+                });
             }
         });
         mended
@@ -367,7 +389,8 @@ impl Collector {
         let over = now.since(from);
         if over.0 >= RATES_OVER.0 {
             for (sensor, readings) in self.sensors.iter_mut().zip(counts) {
-                sensor.hz = rounded(readings.saturating_sub(sensor.readings) as f64 / over.as_secs_f64(), 10.0);
+                sensor.hz =
+                    rounded(readings.saturating_sub(sensor.readings) as f64 / over.as_secs_f64(), 10.0);
                 sensor.readings = readings;
             }
             self.rates_from = Some(now);
@@ -395,7 +418,8 @@ impl Collector {
             echosounders.push(EchoJson { id: sensor.id.clone(), range_m: ping.range_m, age_s, from, to });
         }
         let rates = self.sensors.iter().map(|sensor| RateJson { id: sensor.id.clone(), hz: sensor.hz });
-        let name = |source: usize| dive.sources().get(source).map_or_else(String::new, |info| info.id.clone());
+        let name =
+            |source: usize| dive.sources().get(source).map_or_else(String::new, |info| info.id.clone());
         let text = status_line(dive.live_state(), &dive.mission().profile, &name).text();
         Beside { pose, echosounders, rates: rates.collect(), recording: self.recording.clone(), text }
     }
@@ -403,12 +427,14 @@ impl Collector {
     /// What to go back for, from the far end to the portal, if that has changed and is due.
     fn back(&mut self, dive: &Loop) -> Option<Value> {
         let now = dive.now();
-        let waits = self.back_told.as_ref().is_some_and(|(told, _)| (0..BACK_EVERY.0).contains(&now.since(*told).0));
+        let waits =
+            self.back_told.as_ref().is_some_and(|(told, _)| (0..BACK_EVERY.0).contains(&now.since(*told).0));
         if !self.back_due || waits {
             return None;
         }
         self.back_due = false;
-        let (legs, mut at_m, mut way_m) = (way_home(&dive.coverage().sections), dive.live_state().chainage_m, 0.0);
+        let (legs, mut at_m, mut way_m) =
+            (way_home(&dive.coverage().sections), dive.live_state().chainage_m, 0.0);
         let mut time_s = Some(0.0);
         let mut shown = Vec::new();
         for leg in &legs {

@@ -124,17 +124,24 @@ impl Asked {
     ///
     /// Errors: what is wrong with it.
     pub(crate) fn parse(text: &str) -> Result<Self, String> {
-        let request: Request = serde_json::from_str(text).map_err(|error| format!("no valid command: {error}"))?;
+        let request: Request =
+            serde_json::from_str(text).map_err(|error| format!("no valid command: {error}"))?;
         Self::of(request)
     }
 
     fn of(request: Request) -> Result<Self, String> {
         let within = |what: &str, text: String, most: usize| {
-            if text.len() <= most { Ok(text) } else { Err(format!("{what} has {} bytes; at most {most}", text.len())) }
+            if text.len() <= most {
+                Ok(text)
+            } else {
+                Err(format!("{what} has {} bytes; at most {most}", text.len()))
+            }
         };
         let name = |by: String| within("by", by, LONGEST_NAME);
         Ok(match request {
-            Request::Acknowledge { alert, by } => Self::Command(Command::Acknowledge { alert, by: name(by)? }),
+            Request::Acknowledge { alert, by } => {
+                Self::Command(Command::Acknowledge { alert, by: name(by)? })
+            }
             Request::Silence { by } => Self::Command(Command::Silence { by: name(by)? }),
             Request::Note { text, by } => {
                 let text = within("text", text, LONGEST_NOTE)?;
@@ -157,11 +164,15 @@ fn play(command: &str, speed: Option<f64>, to_s: Option<f64>) -> Result<Play, St
         ("end", ..) => Play::End,
         ("speed", None, _) => Play::Speed(None),
         ("speed", Some(speed), _) if (0.01..=10_000.0).contains(&speed) => Play::Speed(Some(speed)),
-        ("speed", Some(speed), _) => return Err(format!("speed is {speed}; expected 0.01 to 10000, or null")),
+        ("speed", Some(speed), _) => {
+            return Err(format!("speed is {speed}; expected 0.01 to 10000, or null"));
+        }
         ("seek", _, Some(to_s)) if (0.0..=1.8e10).contains(&to_s) => Play::Seek(to_s),
         ("seek", ..) => return Err("seek needs to_s, seconds on the log's clock".to_owned()),
         (other, ..) => {
-            return Err(format!("{other:?} is no command; expected pause, go, step, step_section, end, speed or seek"));
+            return Err(format!(
+                "{other:?} is no command; expected pause, go, step, step_section, end, speed or seek"
+            ));
         }
     })
 }
@@ -177,7 +188,10 @@ mod tests {
             command(r#"{"do":"acknowledge","alert":12,"by":"AB"}"#),
             Ok(Asked::Command(Command::Acknowledge { alert: 12, by: "AB".to_owned() }))
         );
-        assert_eq!(command(r#"{"do":"play","command":"speed","speed":null}"#), Ok(Asked::Play(Play::Speed(None))));
+        assert_eq!(
+            command(r#"{"do":"play","command":"speed","speed":null}"#),
+            Ok(Asked::Play(Play::Speed(None)))
+        );
         assert_eq!(command(r#"{"do":"play","command":"seek","to_s":4.5}"#), Ok(Asked::Play(Play::Seek(4.5))));
         assert_eq!(command(r#"{"do":"rate","hz":1}"#), Ok(Asked::Rate(1.0)));
         for wrong in [

@@ -311,10 +311,12 @@ impl Model {
             let body = Body::Text(numbered(value, low).to_string().into());
             Message { seq: low, sort: Sort::Other, body }
         };
-        let binary = |bytes: Vec<u8>| Message { seq: low, sort: Sort::Other, body: Body::Binary(bytes.into()) };
+        let binary =
+            |bytes: Vec<u8>| Message { seq: low, sort: Sort::Other, body: Body::Binary(bytes.into()) };
         let mut messages = vec![text(&self.hello(may, tokens_needed, None))];
         let missed = |shown: &&Shown| since.is_none_or(|since| shown.seq > since);
-        let sections: Vec<_> = self.sections.values().filter(missed).map(|shown| (shown.record, shown.seen)).collect();
+        let sections: Vec<_> =
+            self.sections.values().filter(missed).map(|shown| (shown.record, shown.seen)).collect();
         if !sections.is_empty() {
             messages.push(binary(section_frame(low, &sections)));
         }
@@ -326,7 +328,11 @@ impl Model {
         }
         if let Some(since) = since {
             let missed = self.told.iter().filter(|(seq, _)| *seq > since);
-            messages.extend(missed.map(|(seq, told)| Message { seq: *seq, sort: Sort::Other, body: Body::Text(told.clone()) }));
+            messages.extend(missed.map(|(seq, told)| Message {
+                seq: *seq,
+                sort: Sort::Other,
+                body: Body::Text(told.clone()),
+            }));
         }
         messages.extend(self.lists().iter().chain(&self.back).map(text));
         messages.push(text(&self.history.message(low)));
@@ -353,7 +359,8 @@ impl Model {
         let begun_s = self.begun.map_or(0.0, MonoNs::as_secs_f64);
         let instance = self.instance();
         let greeting = Greeting { seq: self.seq, instance: &instance, may, begun_s, tokens_needed, thinned };
-        serde_json::to_value(self.site.hello(&greeting)).unwrap_or_else(|error| json!({"error": error.to_string()}))
+        serde_json::to_value(self.site.hello(&greeting))
+            .unwrap_or_else(|error| json!({"error": error.to_string()}))
     }
 
     /// The state.

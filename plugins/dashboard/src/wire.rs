@@ -57,7 +57,14 @@ fn number<T: PartialEq>(all: &[T], one: Option<T>) -> u8 {
 impl SectionRecord {
     /// A section that nothing is known of.
     pub fn blank(index: i32) -> Self {
-        Self { index, verdict: 0, cause: NONE, why: NONE, flags: 0, hole: [f32::NAN, 0.0, f32::NAN, f32::NAN] }
+        Self {
+            index,
+            verdict: 0,
+            cause: NONE,
+            why: NONE,
+            flags: 0,
+            hole: [f32::NAN, 0.0, f32::NAN, f32::NAN],
+        }
     }
 
     /// A section of the loop; `None` where the index is out of range.
@@ -70,7 +77,8 @@ impl SectionRecord {
             Verdict::Fail => 2,
             Verdict::CannotSay => 3,
         };
-        let cause = section.evidence.filter(|_| section.verdict == Verdict::Fail).map(|evidence| evidence.cause);
+        let cause =
+            section.evidence.filter(|_| section.verdict == Verdict::Fail).map(|evidence| evidence.cause);
         let flags = u8::from(section.is_flagged()) | u8::from(section.settled) << 1;
         let hole = section.hole.map_or([f32::NAN, section.hole_sd_m as f32, f32::NAN, f32::NAN], |hole| {
             [hole.diameter_m, section.hole_sd_m, hole.x_m, hole.arc_m].map(|value| value as f32)
@@ -173,7 +181,8 @@ mod tests {
         assert_eq!(bytes[16..24], [253, 255, 255, 255, 2, 255, 255, 3]);
         assert_eq!(bytes[24..28], 0.5_f32.to_le_bytes());
         assert_eq!(bytes[40..48], [1, 0, 0, 0, 0, 0, 0, 0x80]);
-        let sample = SampleRecord { t_ms: 258, x_m: 1.5, y_m: 0.0, z_m: 2.0, arc: 0x8001, head: 3, outcome: 1 };
+        let sample =
+            SampleRecord { t_ms: 258, x_m: 1.5, y_m: 0.0, z_m: 2.0, arc: 0x8001, head: 3, outcome: 1 };
         let bytes = sample_frame(1, &[sample]);
         assert_eq!((bytes.len(), bytes[0]), (36, 2));
         assert_eq!(bytes[16..20], [2, 1, 0, 0]);
@@ -182,7 +191,10 @@ mod tests {
 
     #[test]
     fn arcs_fill_their_range_and_set_a_bit_of_64() {
-        assert_eq!([0.0, 5.0, 9.999_99, 10.0].map(|arc_m| SampleRecord::arc_of(arc_m, 10.0)), [0, 32_768, 65_535, 65_535]);
+        assert_eq!(
+            [0.0, 5.0, 9.999_99, 10.0].map(|arc_m| SampleRecord::arc_of(arc_m, 10.0)),
+            [0, 32_768, 65_535, 65_535]
+        );
         let at = |arc| SampleRecord { t_ms: 0, x_m: 0.0, y_m: 0.0, z_m: 0.0, arc, head: 0, outcome: 0 };
         assert_eq!([at(0).seen(), at(1023).seen(), at(1024).seen(), at(65_535).seen()], [1, 1, 2, 1 << 63]);
         assert_eq!(SampleRecord { outcome: 1, ..at(0) }.seen(), 0, "what isn't taken for wall isn't seen");

@@ -62,7 +62,10 @@ async fn guard(State(shared): Here, request: Request, next: Next) -> Response {
     let changes = request.method() == Method::POST || uri.path() == "/feed";
     let mut answer = if !shared.access.is_host(headers) {
         Shared::count(&shared.counts.foreign, 1);
-        plain(StatusCode::MISDIRECTED_REQUEST, "this machine isn't known by that name; name it with --page-host\n")
+        plain(
+            StatusCode::MISDIRECTED_REQUEST,
+            "this machine isn't known by that name; name it with --page-host\n",
+        )
     } else if changes && !shared.access.is_origin(headers) {
         Shared::count(&shared.counts.foreign, 1);
         plain(StatusCode::FORBIDDEN, "from another page; allow it with --page-origin\n")
@@ -76,7 +79,10 @@ async fn guard(State(shared): Here, request: Request, next: Next) -> Response {
     );
     let set = answer.headers_mut();
     let fixed = |text| HeaderValue::from_static(text);
-    set.insert(header::CONTENT_SECURITY_POLICY, HeaderValue::from_str(&policy).unwrap_or(fixed("default-src 'none'")));
+    set.insert(
+        header::CONTENT_SECURITY_POLICY,
+        HeaderValue::from_str(&policy).unwrap_or(fixed("default-src 'none'")),
+    );
     set.insert(header::X_CONTENT_TYPE_OPTIONS, fixed("nosniff"));
     set.insert(header::REFERRER_POLICY, fixed("no-referrer"));
     set.insert(HeaderName::from_static("cross-origin-resource-policy"), fixed("same-site"));
@@ -129,7 +135,8 @@ async fn page() -> Response {
 async fn asset(Path(path): Path<String>) -> Response {
     match assets::asset(&format!("assets/{path}")) {
         Some(bytes) => {
-            let kind = [(header::CONTENT_TYPE, assets::content_type(&path)), (header::CACHE_CONTROL, "no-cache")];
+            let kind =
+                [(header::CONTENT_TYPE, assets::content_type(&path)), (header::CACHE_CONTROL, "no-cache")];
             (kind, bytes).into_response()
         }
         None => missing().await,
@@ -175,7 +182,8 @@ async fn socket(
     }
     let since = query(&uri, "since").and_then(|since| since.parse().ok());
     let resume = query(&uri, "instance").zip(since).map(|(instance, since)| feed::Resume { instance, since });
-    let upgrade = upgrade.protocols([SUBPROTOCOL]).max_message_size(LONGEST_READ).max_frame_size(LONGEST_READ);
+    let upgrade =
+        upgrade.protocols([SUBPROTOCOL]).max_message_size(LONGEST_READ).max_frame_size(LONGEST_READ);
     upgrade.on_upgrade(move |socket| feed::serve(socket, shared, role, resume))
 }
 
@@ -240,7 +248,9 @@ async fn samples(State(shared): Here, headers: HeaderMap, uri: Uri) -> Response 
 
 async fn state(State(shared): Here, headers: HeaderMap, uri: Uri) -> Response {
     match admit(&shared, &headers, &uri) {
-        Ok(_) => json_answer(&shared.model().state().unwrap_or(json!({"type": "state", "old": true, "condition": "no_data"}))),
+        Ok(_) => json_answer(
+            &shared.model().state().unwrap_or(json!({"type": "state", "old": true, "condition": "no_data"})),
+        ),
         Err(answer) => *answer,
     }
 }
@@ -252,7 +262,9 @@ async fn schema() -> Response {
 
 async fn figures(State(shared): Here, headers: HeaderMap, uri: Uri) -> Response {
     match admit(&shared, &headers, &uri) {
-        Ok(_) => ([(header::CONTENT_TYPE, "text/plain; version=0.0.4")], metrics::metrics(&shared)).into_response(),
+        Ok(_) => {
+            ([(header::CONTENT_TYPE, "text/plain; version=0.0.4")], metrics::metrics(&shared)).into_response()
+        }
         Err(answer) => *answer,
     }
 }
@@ -270,7 +282,10 @@ fn allowed(shared: &Shared, headers: &HeaderMap) -> HeaderMap {
     if shared.access.is_origin(headers) {
         set.insert(header::ACCESS_CONTROL_ALLOW_ORIGIN, origin.clone());
         set.insert(header::ACCESS_CONTROL_ALLOW_METHODS, HeaderValue::from_static("POST"));
-        set.insert(header::ACCESS_CONTROL_ALLOW_HEADERS, HeaderValue::from_static("content-type, authorization"));
+        set.insert(
+            header::ACCESS_CONTROL_ALLOW_HEADERS,
+            HeaderValue::from_static("content-type, authorization"),
+        );
         set.insert(header::VARY, HeaderValue::from_static("origin"));
     }
     set
@@ -281,7 +296,13 @@ async fn preflight(State(shared): Here, headers: HeaderMap) -> Response {
 }
 
 /// Acknowledge, silence, mark and note, as a joystick's buttons send them.
-async fn action(State(shared): Here, Path(name): Path<String>, headers: HeaderMap, uri: Uri, body: HttpBody) -> Response {
+async fn action(
+    State(shared): Here,
+    Path(name): Path<String>,
+    headers: HeaderMap,
+    uri: Uri,
+    body: HttpBody,
+) -> Response {
     let set = allowed(&shared, &headers);
     match act(&shared, &name, &headers, &uri, body).await {
         Ok(done) => (set, json_answer(&done)).into_response(),
@@ -300,12 +321,16 @@ async fn act(
     uri: &Uri,
     body: HttpBody,
 ) -> Result<Value, (StatusCode, String)> {
-    let role = shared.access.role(headers, uri).ok_or((StatusCode::UNAUTHORIZED, "a token is needed".to_owned()))?;
+    let role =
+        shared.access.role(headers, uri).ok_or((StatusCode::UNAUTHORIZED, "a token is needed".to_owned()))?;
     if !feed::may(shared, role).operate {
         return Err((StatusCode::FORBIDDEN, "not in this dive, or the token is a viewer's".to_owned()));
     }
     if !["acknowledge", "silence", "mark", "note"].contains(&name) {
-        return Err((StatusCode::NOT_FOUND, format!("no action {name:?}; acknowledge, silence, mark or note")));
+        return Err((
+            StatusCode::NOT_FOUND,
+            format!("no action {name:?}; acknowledge, silence, mark or note"),
+        ));
     }
     let too_long = |_| (StatusCode::PAYLOAD_TOO_LARGE, format!("at most {LONGEST} bytes"));
     let bytes = to_bytes(body, LONGEST).await.map_err(too_long)?;

@@ -89,7 +89,10 @@ pub(super) async fn serve(socket: WebSocket, shared: Arc<Shared>, role: Role, re
         Over::Gone => return,
         Over::Stalled => {
             Shared::count(&viewer.shared.counts.stalled, 1);
-            tracing::info!("a viewer of the page took nothing for {} s and was dropped", STALLED_AFTER.as_secs());
+            tracing::info!(
+                "a viewer of the page took nothing for {} s and was dropped",
+                STALLED_AFTER.as_secs()
+            );
             return;
         }
         Over::Refused => (close_code::POLICY, "refused"),
@@ -118,7 +121,8 @@ impl Viewer {
             // Subscribed under the model's lock: nothing is missed or comes twice.
             let (messages, mut batches, instance) = {
                 let model = self.shared.model();
-                let Some(batches) = self.shared.fan().as_ref().map(tokio::sync::broadcast::Sender::subscribe) else {
+                let Some(batches) = self.shared.fan().as_ref().map(tokio::sync::broadcast::Sender::subscribe)
+                else {
                     return Over::Ended;
                 };
                 let instance = model.instance();
@@ -210,7 +214,11 @@ impl Viewer {
         let text = match message {
             Frame::Text(text) => text,
             Frame::Ping(_) | Frame::Pong(_) => {
-                return if self.budget.take() { Ok(()) } else { self.refuse("over 20 messages a second").await };
+                return if self.budget.take() {
+                    Ok(())
+                } else {
+                    self.refuse("over 20 messages a second").await
+                };
             }
             Frame::Close(_) => return Err(Over::Gone),
             Frame::Binary(_) => return self.refuse("expected JSON text, not bytes").await,
@@ -241,7 +249,9 @@ impl Viewer {
                 self.state_every = Duration::from_secs_f64((0.9 / hz).max(0.0));
                 Ok("rate")
             }
-            Asked::Play(_) if !self.may.playback => Err("this dive can't be paused, or the token is a viewer's".to_owned()),
+            Asked::Play(_) if !self.may.playback => {
+                Err("this dive can't be paused, or the token is a viewer's".to_owned())
+            }
             Asked::Play(play) => (self.shared.direct)(play).map(|()| "play"),
             Asked::Command(_) if !self.may.operate => {
                 Err("not in this dive, or the token is a viewer's".to_owned())

@@ -41,7 +41,9 @@ impl Tls {
     #[cfg(not(feature = "tls"))]
     pub(super) fn read(files: &TlsFiles) -> Result<Self, String> {
         let path = files.certificate.display();
-        Err(format!("the page can't be served with certificate {path}: this program was built without feature tls"))
+        Err(format!(
+            "the page can't be served with certificate {path}: this program was built without feature tls"
+        ))
     }
 
     /// Reads them.
@@ -56,7 +58,8 @@ impl Tls {
         let of = |what: &str, path: &std::path::Path, error: &dyn std::fmt::Display| {
             format!("the page's {what} {} can't be used: {error}; expected PEM", path.display())
         };
-        let read = CertificateDer::pem_file_iter(certificate).and_then(Iterator::collect::<Result<Vec<_>, _>>);
+        let read =
+            CertificateDer::pem_file_iter(certificate).and_then(Iterator::collect::<Result<Vec<_>, _>>);
         let chain = read.map_err(|error| of("certificate", certificate, &error))?;
         let secret = PrivateKeyDer::from_pem_file(key).map_err(|error| of("key", key, &error))?;
         let config = ServerConfig::builder_with_provider(Arc::new(ring::default_provider()));
@@ -79,7 +82,10 @@ impl Listening {
     /// Listens on.
     ///
     /// Errors: the socket can't be polled.
-    #[cfg_attr(not(feature = "tls"), expect(unused_variables, clippy::needless_pass_by_value, reason = "without TLS there is none"))]
+    #[cfg_attr(
+        not(feature = "tls"),
+        expect(unused_variables, clippy::needless_pass_by_value, reason = "without TLS there is none")
+    )]
     pub(super) fn new(listener: std::net::TcpListener, tls: Option<Tls>) -> io::Result<Self> {
         listener.set_nonblocking(true)?;
         Ok(Self {
@@ -182,7 +188,11 @@ mod secure {
 }
 
 impl AsyncRead for Connection {
-    fn poll_read(mut self: Pin<&mut Self>, cx: &mut Context<'_>, buf: &mut ReadBuf<'_>) -> Poll<io::Result<()>> {
+    fn poll_read(
+        mut self: Pin<&mut Self>,
+        cx: &mut Context<'_>,
+        buf: &mut ReadBuf<'_>,
+    ) -> Poll<io::Result<()>> {
         Pin::new(&mut self.io).poll_read(cx, buf)
     }
 }

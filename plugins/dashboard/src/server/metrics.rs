@@ -40,7 +40,10 @@ pub(super) fn metrics(shared: &Shared) -> String {
     let mut text = String::new();
     let mut put = |name: &str, kind: &str, help: &str, value: f64| {
         // Writing to a string can't fail.
-        let _infallible = write!(text, "# HELP headrace_{name} {help}\n# TYPE headrace_{name} {kind}\nheadrace_{name} {value}\n");
+        let _infallible = write!(
+            text,
+            "# HELP headrace_{name} {help}\n# TYPE headrace_{name} {kind}\nheadrace_{name} {value}\n"
+        );
     };
     let of = |counter: &std::sync::atomic::AtomicU64| counter.load(Ordering::Relaxed) as f64;
     put("page_viewers", "gauge", "Viewers of the page.", counts.viewers.load(Ordering::Relaxed) as f64);
@@ -49,12 +52,32 @@ pub(super) fn metrics(shared: &Shared) -> String {
     put("page_lagged_total", "counter", "Times a slow viewer got all changes at once.", of(&counts.lagged));
     put("page_refused_total", "counter", "Messages of viewers that were refused.", of(&counts.refused));
     put("page_unauthorised_total", "counter", "Requests without a valid token.", of(&counts.unauthorised));
-    put("page_foreign_total", "counter", "Requests with another host or from another origin.", of(&counts.foreign));
+    put(
+        "page_foreign_total",
+        "counter",
+        "Requests with another host or from another origin.",
+        of(&counts.foreign),
+    );
     put("page_sent_bytes_total", "counter", "Bytes of the feed.", of(&counts.bytes));
     put("page_samples", "gauge", "Samples that the page has.", model.samples().len() as f64);
-    put("page_samples_not_kept_total", "counter", "Samples beyond its memory.", model.samples().not_kept() as f64);
-    put("page_dropped_samples_total", "counter", "Samples that found no room on their way.", model.dropped().samples as f64);
-    put("page_dropped_lines_total", "counter", "Lines that found no room on their way.", model.dropped().told as f64);
+    put(
+        "page_samples_not_kept_total",
+        "counter",
+        "Samples beyond its memory.",
+        model.samples().not_kept() as f64,
+    );
+    put(
+        "page_dropped_samples_total",
+        "counter",
+        "Samples that found no room on their way.",
+        model.dropped().samples as f64,
+    );
+    put(
+        "page_dropped_lines_total",
+        "counter",
+        "Lines that found no room on their way.",
+        model.dropped().told as f64,
+    );
     put("page_sections", "gauge", "Sections that the page has.", model.sections() as f64);
     if let Some(state) = model.state() {
         let number = |path: &str| state.pointer(path).and_then(Value::as_f64);

@@ -138,7 +138,13 @@ impl Page {
     /// Serves a dive. `instance` is unique to it.
     ///
     /// Errors: see [`PageError`].
-    pub fn start(settings: Settings, site: Site, instance: String, act: Act, direct: Direct) -> Result<Self, PageError> {
+    pub fn start(
+        settings: Settings,
+        site: Site,
+        instance: String,
+        act: Act,
+        direct: Direct,
+    ) -> Result<Self, PageError> {
         let (listener, taken) = bind(settings.address)?;
         let address = listener.local_addr().map_err(PageError::Thread)?;
         let tls = settings.tls.as_ref().map(listener::Tls::read).transpose().map_err(PageError::Tls)?;
@@ -162,7 +168,8 @@ impl Page {
         let runtime = runtime.map_err(PageError::Thread)?;
         let of_thread = Arc::clone(&shared);
         let serve = move || runtime.block_on(serve(listener, tls, receiver, of_thread));
-        let thread = std::thread::Builder::new().name("page".to_owned()).spawn(serve).map_err(PageError::Thread)?;
+        let thread =
+            std::thread::Builder::new().name("page".to_owned()).spawn(serve).map_err(PageError::Thread)?;
         Ok(Self { shared, thread: Some(thread), sender, address, taken })
     }
 
@@ -195,8 +202,12 @@ impl Page {
         self.shared.counts.viewers.load(Ordering::Relaxed)
     }
 
-    /// Ends it: viewers get the last messages, for a second at most.
-    pub fn end(mut self) {
+    /// Ends it: viewers get the last messages, `end` the very last, for a second at most.
+    pub fn end(mut self, end: Option<serde_json::Value>) {
+        if let Some(end) = end {
+            // Its thread may have ended early, which is told below.
+            let _ended = self.sender.blocking_send(Fed::End(Box::new(end)));
+        }
         self.stop();
     }
 
@@ -235,7 +246,12 @@ fn bind(asked: SocketAddr) -> Result<(TcpListener, Vec<u16>), PageError> {
     Err(PageError::Bind { address: asked, source: failed })
 }
 
-async fn serve(listener: TcpListener, tls: Option<listener::Tls>, fed: mpsc::Receiver<Fed>, shared: Arc<Shared>) {
+async fn serve(
+    listener: TcpListener,
+    tls: Option<listener::Tls>,
+    fed: mpsc::Receiver<Fed>,
+    shared: Arc<Shared>,
+) {
     let listener = match listener::Listening::new(listener, tls) {
         Ok(listener) => listener,
         Err(error) => {
