@@ -43,7 +43,7 @@ pub(crate) fn demo(args: &Demo) -> Result<u8, Failure> {
     outputs::make_way(&log)?;
     let interrupted = interrupt::flag()?;
     let recording = Recording::simulated(&log, &scene.name);
-    let dive = assemble(&scene.vehicle, &scene.vehicle_text, Some(recording))?;
+    let dive = assemble(&scene.vehicle, &scene.vehicle_text, Some(recording))?.operated(Clock::Theirs);
     let mut watch = Watch::new(Show::Lines);
     if !watch.is_quiet() {
         say(&format!("{}, target {} m: a simulated dive", scene.vehicle.name, scene.vehicle.target_m));

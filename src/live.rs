@@ -36,7 +36,7 @@ pub(crate) fn run(args: &Run, text: &str, vehicle: &VehicleConfig) -> Result<u8,
         rotate: args.rotate,
         scene: None,
     });
-    let mut dive = assemble(vehicle, text, recording)?;
+    let mut dive = assemble(vehicle, text, recording)?.operated(Clock::Ours);
     let begun = headrace_ports::now();
     let supervisor = supervisor(&mut dive, vehicle, begun)?;
     let interrupted = interrupt::flag_of_a_dive()?;
