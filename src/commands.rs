@@ -7,6 +7,7 @@ use std::sync::atomic::Ordering;
 use headrace_config::Document;
 use headrace_dashboard::Mode;
 use headrace_geometry::time::DurNs;
+use headrace_monitor::console::ConsolePort;
 use headrace_replay::drive::{Pace, PacketSource as _};
 use headrace_replay::log::files_of;
 use headrace_replay::player::Player;
@@ -48,12 +49,14 @@ pub(crate) fn demo(args: &Demo) -> Result<u8, Failure> {
     let interrupted = interrupt::flag()?;
     let recording = Recording::simulated(&log, &scene.name);
     let is_served = page::is_wanted(&args.page, true);
-    let dive = assemble_followed(&scene.vehicle, &scene.vehicle_text, Some(recording), is_served)?;
+    let dive = assemble_followed(&scene.vehicle, &scene.vehicle_text, Some(recording), is_served)?
+        .operated(Clock::Theirs);
     let mut watch = Watch::new(Show::Lines);
     if !watch.is_quiet() {
         say(&format!("{}, target {} m: a simulated dive", scene.vehicle.name, scene.vehicle.target_m));
     }
-    let served = is_served.then(|| demo_page(args, &scene, &log, !watch.is_quiet())).flatten();
+    let served =
+        is_served.then(|| demo_page(args, &scene, &log, dive.console(), !watch.is_quiet())).flatten();
     if let Some(served) = &served {
         watch = watch.followed_by(served.follower(&dive.armed));
     }
@@ -73,7 +76,13 @@ pub(crate) fn demo(args: &Demo) -> Result<u8, Failure> {
 }
 
 /// The page of a demo, and a browser that shows it.
-fn demo_page(args: &Demo, scene: &Scene, log: &Path, in_lines: bool) -> Option<Served> {
+fn demo_page(
+    args: &Demo,
+    scene: &Scene,
+    log: &Path,
+    console: Option<ConsolePort>,
+    in_lines: bool,
+) -> Option<Served> {
     let of = Of {
         vehicle: &scene.vehicle,
         mode: Mode::Demo,
@@ -82,6 +91,7 @@ fn demo_page(args: &Demo, scene: &Scene, log: &Path, in_lines: bool) -> Option<S
         utc_of_zero_s: None,
         span: None,
         is_playback: false,
+        console,
     };
     let served = page::serve(&args.page, of, in_lines)?;
     if !args.no_open {
@@ -120,6 +130,7 @@ pub(crate) fn run(args: &Run) -> Result<u8, Failure> {
         utc_of_zero_s: None,
         span: player.span(),
         is_playback: false,
+        console: None,
     };
     let served = if is_served { page::serve(&args.page, of, watch.shows_lines()) } else { None };
     if let Some(served) = &served {
@@ -206,6 +217,7 @@ fn replay_page(
         utc_of_zero_s: page::utc_of_zero_s(&player.info().metadata),
         span: player.span(),
         is_playback: true,
+        console: None,
     };
     page::serve(&args.page, of, in_lines)
 }

@@ -7,6 +7,7 @@ use std::sync::atomic::Ordering;
 
 use headrace_dashboard::Mode;
 use headrace_geometry::time::{DurNs, MonoNs};
+use headrace_monitor::console::ConsolePort;
 use headrace_ports::{Connection, Phase, SentSink, Status, Supervisor};
 use headrace_replay::log::part_path;
 use headrace_sensor::connect::{Connect, ConnectError};
@@ -39,13 +40,14 @@ pub(crate) fn run(args: &Run, text: &str, vehicle: &VehicleConfig) -> Result<u8,
         scene: None,
     });
     let is_served = page::is_wanted(&args.page, true);
-    let mut dive = assemble_followed(vehicle, text, recording, is_served)?;
+    let mut dive = assemble_followed(vehicle, text, recording, is_served)?.operated(Clock::Ours);
     let begun = headrace_ports::now();
     let supervisor = supervisor(&mut dive, vehicle, begun)?;
     let interrupted = interrupt::flag_of_a_dive()?;
     let until = args.duration.map(|seconds| begun + DurNs::from_secs_f64(seconds));
     let mut watch = Watch::new(args.output.show()).live();
-    let served = is_served.then(|| live_page(args, vehicle, &logs, watch.shows_lines())).flatten();
+    let served =
+        is_served.then(|| live_page(args, vehicle, &logs, (dive.console(), watch.shows_lines()))).flatten();
     if let Some(served) = &served {
         watch = watch.followed_by(served.follower(&dive.armed));
     }
@@ -92,7 +94,12 @@ pub(crate) fn run(args: &Run, text: &str, vehicle: &VehicleConfig) -> Result<u8,
 }
 
 /// The page of a dive on ports.
-fn live_page(args: &Run, vehicle: &VehicleConfig, logs: &[PathBuf], in_lines: bool) -> Option<Served> {
+fn live_page(
+    args: &Run,
+    vehicle: &VehicleConfig,
+    logs: &[PathBuf],
+    (console, in_lines): (Option<ConsolePort>, bool),
+) -> Option<Served> {
     let (monotonic, utc) = headrace_ports::clock_anchor();
     let log = logs.first().filter(|_| !args.no_record).map(|log| log.display().to_string());
     let of = Of {
@@ -103,6 +110,7 @@ fn live_page(args: &Run, vehicle: &VehicleConfig, logs: &[PathBuf], in_lines: bo
         utc_of_zero_s: Some((utc.0 - monotonic.0.cast_signed()) as f64 / 1e9),
         span: None,
         is_playback: false,
+        console,
     };
     page::serve(&args.page, of, in_lines)
 }

@@ -15,8 +15,11 @@ use headrace_dashboard::collector::Collector;
 use headrace_dashboard::fed::PlaybackState;
 use headrace_dashboard::qr::qr;
 use headrace_dashboard::server::{Act, Direct, PORT};
-use headrace_dashboard::{HeadSite, Mode, Page, Play, SensorSite, Settings, Site, TlsFiles, Token, Tokens};
+use headrace_dashboard::{
+    Command, HeadSite, Mode, Page, Play, SensorSite, Settings, Site, TlsFiles, Token, Tokens,
+};
 use headrace_geometry::time::{DurNs, MonoNs};
+use headrace_monitor::console::{Command as Input, ConsolePort, NoteText, Who};
 use headrace_monitor::messages::Notice;
 use headrace_monitor::report::Report;
 use headrace_monitor::run::Loop;
@@ -55,6 +58,8 @@ pub(crate) struct Of<'a> {
     pub(crate) span: Option<(MonoNs, MonoNs)>,
     /// Whether it can be paused and jump.
     pub(crate) is_playback: bool,
+    /// What takes the operator's commands; none in a replay.
+    pub(crate) console: Option<ConsolePort>,
 }
 
 /// A page that is served.
@@ -98,7 +103,7 @@ fn start(args: &PageArgs, of: Of<'_>, in_lines: bool) -> Result<Served, String> 
     let instance = instance.text().chars().take(12).collect();
     let (span, is_playback, waits) = (of.span, of.is_playback, of.mode != Mode::Live);
     let commands: Arc<Mutex<Option<Sender<PlaybackCommand>>>> = Arc::default();
-    let act: Act = Arc::new(|_| Err("this dive takes no commands".to_owned()));
+    let act = act(of.console.clone());
     let page = Page::start(settings, site(of), instance, act, direct(&commands))
         .map_err(|error| error.to_string())?;
     for port in page.taken() {
@@ -197,11 +202,6 @@ fn site(of: Of<'_>) -> Site {
             kind: kind_text(kind),
         });
     }
-    let sources = vehicle.sensor_configs.iter().map(|config| headrace_monitor::SourceInfo {
-        id: config.id.clone(),
-        plugin: config.plugin.clone(),
-        connect: config.connect.clone(),
-    });
     Site {
         mode: of.mode,
         dive: of.dive,
@@ -213,10 +213,9 @@ fn site(of: Of<'_>) -> Site {
         profile: vehicle.tunnel.profile.clone(),
         heads,
         sensors,
-        sources: sources.collect(),
         utc_of_zero_s: of.utc_of_zero_s,
         span_s: of.span.map(|(from, to)| [from, to].map(MonoNs::as_secs_f64)),
-        takes_commands: false,
+        takes_commands: of.console.is_some(),
         is_playback: of.is_playback,
         recorded_to: of.recorded_to,
     }
@@ -238,6 +237,24 @@ pub(crate) fn utc_of_zero_s(metadata: &BTreeMap<String, String>) -> Option<f64> 
     let number = |key: &str| metadata.get(key)?.parse::<i64>().ok();
     let [monotonic, utc] = CLOCK_ANCHOR.map(number);
     Some(utc?.checked_sub(monotonic?)? as f64 / 1e9)
+}
+
+/// Hands an operator's commands to the loop.
+fn act(console: Option<ConsolePort>) -> Act {
+    Arc::new(move |command| {
+        let Some(console) = &console else { return Err("this dive takes no commands".to_owned()) };
+        let who = |by: &str| Who::new(by).ok_or_else(|| "by has control characters".to_owned());
+        let command = match &command {
+            Command::Acknowledge { alert, by } => Input::Acknowledge { alert: *alert, by: who(by)? },
+            Command::Silence { by } => Input::Silence { by: who(by)? },
+            Command::Note { text, by } => {
+                let text = NoteText::new(text).ok_or_else(|| "text has control characters".to_owned())?;
+                Input::Note { text, by: who(by)? }
+            }
+            Command::Mark { by } => Input::Note { text: NoteText::default(), by: who(by)? },
+        };
+        console.send(&command).map_err(|error| error.to_string())
+    })
 }
 
 /// Hands the page's commands to playback, as long as there is one.

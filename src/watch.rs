@@ -103,6 +103,8 @@ impl Watch {
         let at = match notice {
             Notice::Section { at, .. } | Notice::Run { at, .. } => *at,
             Notice::Advice(entry) => entry.at,
+            Notice::Listed { at, .. } => *at,
+            Notice::Note(note) => note.at,
             Notice::Alert(kind, source) => dive.alerts().get(*kind, *source).map_or(MonoNs(0), |a| a.since),
         };
         let mut told = Vec::new();
@@ -248,8 +250,7 @@ impl Watch {
             line.lamp = if fails { Some(Lamp::Red) } else { line.lamp };
         }
         if self.show == Show::JsonLines {
-            let section_m = dive.coverage().sections.section_m();
-            let mut value = match serde_json::to_value(state.json(dive.sources(), section_m)) {
+            let mut value = match serde_json::to_value(dive.live_state_json()) {
                 Ok(value) => value,
                 Err(error) => json!({"error": error.to_string()}),
             };

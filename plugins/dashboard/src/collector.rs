@@ -7,6 +7,7 @@ use std::collections::BTreeSet;
 
 use headrace_geometry::frames::{Mount, Point3, Vec3};
 use headrace_geometry::time::{DurNs, MonoNs};
+use headrace_monitor::alert_list::NoteJson;
 use headrace_monitor::live_text::{status_line, told_line};
 use headrace_monitor::messages::{Notice, Outcome as Placing, Placed, PlacedList};
 use headrace_monitor::report::way_home;
@@ -76,6 +77,7 @@ pub struct Collector {
     lacking_m: Option<[f64; 2]>,
     dropped: Dropped,
     back_due: bool,
+    notes_due: bool,
     back_told: Option<(MonoNs, Value)>,
     recording: RecordingJson,
     playback: Option<PlaybackState>,
@@ -114,6 +116,7 @@ impl Collector {
             lacking_m: None,
             dropped: Dropped::default(),
             back_due: false,
+            notes_due: false,
             back_told: None,
             recording: RecordingJson { on: recorded_to.is_some(), fails: false, path: recorded_to },
             playback: None,
@@ -127,7 +130,8 @@ impl Collector {
                 self.changed.insert(*section);
             }
             Notice::Run { .. } => self.back_due = true,
-            Notice::Alert(..) | Notice::Advice(_) => {}
+            Notice::Note(_) => self.notes_due = true,
+            Notice::Alert(..) | Notice::Advice(_) | Notice::Listed { .. } => {}
         }
         let mut told = Vec::new();
         self.teller.hear(notice, dive, &mut |one| told.push(one));
@@ -186,7 +190,8 @@ impl Collector {
         }
         self.teller.forget();
         let now = dive.now();
-        (self.sent, self.rates_from, self.back_told, self.back_due) = (None, None, None, true);
+        (self.sent, self.rates_from, self.back_told) = (None, None, None);
+        (self.back_due, self.notes_due) = (true, true);
         self.sensors.iter_mut().for_each(|sensor| sensor.ping = None);
         self.samples.clear();
         self.told.clear();
@@ -300,7 +305,7 @@ impl Collector {
             if let Some(object) = value.as_object_mut() {
                 let line = told_line(one, &dive.mission().profile);
                 object.insert("t_s".to_owned(), dive.now().as_secs_f64().into());
-                object.insert("text".to_owned(), line.text().into());
+                object.entry("text").or_insert_with(|| line.text().into());
             }
             self.push_told(value);
         }
@@ -331,12 +336,14 @@ impl Collector {
         let news = News {
             now,
             begun: self.begun,
-            state: *dive.live_state(),
+            state: Box::new(dive.live_state_json()),
             beside: self.beside(dive),
             samples: core::mem::take(&mut self.samples),
             mended: self.mended(dive),
             sections: changed,
             told: core::mem::take(&mut self.told),
+            notes: core::mem::take(&mut self.notes_due)
+                .then(|| dive.notes().iter().map(NoteJson::from).collect()),
             back: self.back(dive),
             dropped: self.dropped,
         };

@@ -1,7 +1,8 @@
 //! What the loop's thread hands to the page's: values, in a bounded queue.
 
 use headrace_geometry::time::MonoNs;
-use headrace_monitor::live_state::LiveState;
+use headrace_monitor::alert_list::NoteJson;
+use headrace_monitor::live_state::json::LiveStateJson;
 use serde::Serialize;
 use serde_json::Value;
 
@@ -28,7 +29,7 @@ pub struct News {
     /// The first time of the dive, once there is one.
     pub begun: Option<MonoNs>,
     /// The live state, as of the tick.
-    pub state: LiveState,
+    pub state: Box<LiveStateJson>,
     /// What is shown of it besides.
     pub beside: Beside,
     /// New samples.
@@ -39,6 +40,8 @@ pub struct News {
     pub sections: Vec<SectionRecord>,
     /// What was told: JSON objects with a type.
     pub told: Vec<Value>,
+    /// All notes, if there is a new one.
+    pub notes: Option<Vec<NoteJson>>,
     /// What to go back for, if that has changed.
     pub back: Option<Value>,
     /// What has found no room so far.

@@ -2,7 +2,7 @@
 
 use std::collections::VecDeque;
 
-use headrace_monitor::live_state::LiveState;
+use headrace_monitor::live_state::json::LiveStateJson;
 use serde_json::{Value, json};
 
 /// Values kept: half an hour.
@@ -19,14 +19,14 @@ pub struct History {
 
 impl History {
     /// Takes a state, once a second.
-    pub(crate) fn take(&mut self, state: &LiveState) {
-        let Some(at) = state.at else { return };
-        let second = at.as_secs_f64().floor();
+    pub(crate) fn take(&mut self, state: &LiveStateJson) {
+        let Some(at_s) = state.at_s else { return };
+        let second = at_s.floor();
         if self.values.back().is_some_and(|(last, _)| second <= *last) {
             return;
         }
-        let t_m = state.advice.as_ref().and_then(|advice| advice.predicted_t_m);
-        self.values.push_back((second, [state.speed_mps, state.v_max_mps(), t_m]));
+        let t_m = state.turn.as_ref().and_then(|turn| turn.predicted_t_m);
+        self.values.push_back((second, [state.speed_mps, state.v_max_mps, t_m]));
         if self.values.len() > MOST && !self.whole {
             self.values.pop_front();
         }

@@ -8,7 +8,8 @@ use std::collections::{BTreeMap, VecDeque};
 use axum::body::Bytes;
 use axum::extract::ws::Utf8Bytes;
 use headrace_geometry::time::MonoNs;
-use headrace_monitor::live_state::LiveState;
+use headrace_monitor::alert_list::NoteJson;
+use headrace_monitor::live_state::json::LiveStateJson;
 use serde_json::{Value, json};
 
 use crate::fed::{Beside, Dropped, Fed, News, PlaybackState};
@@ -82,11 +83,12 @@ pub struct Model {
     sent_samples: usize,
     /// Messages and how many samples there were with them.
     places: VecDeque<(u64, usize)>,
-    state: Option<Box<(LiveState, Beside)>>,
+    state: Option<Box<(Box<LiveStateJson>, Beside)>>,
     state_is_new: bool,
     playback: Option<PlaybackState>,
     told_new: Vec<Value>,
     told: VecDeque<(u64, Utf8Bytes)>,
+    notes: Vec<NoteJson>,
     back: Option<Value>,
     back_is_new: bool,
     history: History,
@@ -114,6 +116,7 @@ impl Model {
             playback: None,
             told_new: Vec::new(),
             told: VecDeque::new(),
+            notes: Vec::new(),
             back: None,
             back_is_new: false,
             history: History::default(),
@@ -171,6 +174,7 @@ impl Model {
         self.state = Some(Box::new((news.state, news.beside)));
         self.state_is_new = true;
         self.told_new.extend(news.told);
+        self.notes = news.notes.unwrap_or(core::mem::take(&mut self.notes));
         if news.back.is_some() {
             (self.back, self.back_is_new) = (news.back, true);
         }
@@ -351,7 +355,13 @@ impl Model {
 
     /// Alerts and notes, whole.
     fn lists(&self) -> Vec<Value> {
-        vec![json!({"type": "alerts", "alerts": []}), json!({"type": "notes", "notes": []})]
+        let state = self.state.as_ref().map(|shown| &shown.0);
+        let (list, hidden) =
+            state.map_or((json!([]), 0), |state| (json!(state.alert_list), state.alerts_hidden));
+        vec![
+            json!({"type": "alerts", "list": list, "hidden": hidden}),
+            json!({"type": "notes", "list": self.notes}),
+        ]
     }
 
     /// The first message.
@@ -366,11 +376,10 @@ impl Model {
     /// The state.
     pub fn state(&self) -> Option<Value> {
         let (state, beside) = &**self.state.as_ref()?;
-        let json = state.json(&self.site.sources, self.site.section_m);
-        let mut value = serde_json::to_value(json).ok()?;
+        let mut value = serde_json::to_value(state).ok()?;
         let object = value.as_object_mut()?;
         object.insert("type".to_owned(), "state".into());
-        object.insert("t_s".to_owned(), state.now.as_secs_f64().into());
+        object.insert("t_s".to_owned(), state.now_s.into());
         if let Ok(Value::Object(beside)) = serde_json::to_value(beside) {
             object.extend(beside);
         }

@@ -3,7 +3,6 @@
 use headrace_coverage::{Cause, Unsure};
 use headrace_geometry::math::{self, TAU};
 use headrace_geometry::tunnel::Profile;
-use headrace_monitor::SourceInfo;
 use serde::Serialize;
 
 /// Points of the profile as sent, at equal steps of arc length.
@@ -68,8 +67,6 @@ pub struct Site {
     pub heads: Vec<HeadSite>,
     /// All sensors, in the order of sources.
     pub sensors: Vec<SensorSite>,
-    /// The same as the loop has them.
-    pub sources: Vec<SourceInfo>,
     /// UTC of the clock's zero, seconds; `None` where it isn't known.
     pub utc_of_zero_s: Option<f64>,
     /// First and last time of a log, seconds.
