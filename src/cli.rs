@@ -1,6 +1,7 @@
 //! The command line.
 
 mod habits;
+mod page;
 mod value_parsers;
 
 use std::path::PathBuf;
@@ -15,6 +16,7 @@ use tracing::level_filters::LevelFilter;
 
 use crate::watch::Show;
 pub(crate) use habits::{Completions, Man, Overwrite};
+pub(crate) use page::PageArgs;
 
 pub(crate) use value_parsers::{Speed, speed, time};
 use value_parsers::{
@@ -185,6 +187,11 @@ pub(crate) struct Demo {
     pub(crate) speed: Speed,
     #[command(flatten)]
     pub(crate) overwrite: Overwrite,
+    /// Open no browser.
+    #[arg(long, help_heading = "Page")]
+    pub(crate) no_open: bool,
+    #[command(flatten)]
+    pub(crate) page: PageArgs,
 }
 
 #[derive(Debug, Args)]
@@ -219,6 +226,8 @@ pub(crate) struct Run {
     pub(crate) speed: Speed,
     #[command(flatten)]
     pub(crate) output: Output,
+    #[command(flatten)]
+    pub(crate) page: PageArgs,
 }
 
 #[derive(Debug, Args)]
@@ -283,6 +292,8 @@ pub(crate) struct Replay {
     pub(crate) bless: bool,
     #[command(flatten)]
     pub(crate) output: Output,
+    #[command(flatten)]
+    pub(crate) page: PageArgs,
 }
 
 #[derive(Debug, Args)]

@@ -1,11 +1,14 @@
 //! The commands `demo`, `run` and `replay`.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
 use std::sync::atomic::Ordering;
 
 use headrace_config::Document;
+use headrace_dashboard::Mode;
 use headrace_geometry::time::DurNs;
-use headrace_replay::drive::Pace;
+use headrace_monitor::console::ConsolePort;
+use headrace_replay::drive::{Pace, PacketSource as _};
 use headrace_replay::log::files_of;
 use headrace_replay::player::Player;
 use headrace_replay::{SimulationFeed, simulation};
@@ -14,7 +17,7 @@ use headrace_vehicle::VehicleConfig;
 
 use crate::cli::{Demo, Output, Replay, Run, Speed};
 use crate::devices::KINDS;
-use crate::dive::{Clock, Recording, WhatIf, assemble};
+use crate::dive::{Clock, Recording, WhatIf, assemble_followed};
 use crate::expect;
 use crate::failure::{self, Failure};
 use crate::feeds::Interruptible;
@@ -23,11 +26,13 @@ use crate::interrupt;
 use crate::live;
 use crate::output::{say, show};
 use crate::outputs::{self, Kind};
+use crate::page::{self, Of, Served};
 use crate::play::{self, Playing};
 use crate::report_output::{exit_code, finish, note_losses};
 use crate::screen::Screen;
 use crate::smooth;
 use crate::summary::summary;
+use crate::terminal;
 use crate::vehicle_file;
 use crate::watch::{Show, Watch};
 
@@ -43,21 +48,56 @@ pub(crate) fn demo(args: &Demo) -> Result<u8, Failure> {
     outputs::make_way(&log)?;
     let interrupted = interrupt::flag()?;
     let recording = Recording::simulated(&log, &scene.name);
-    let dive = assemble(&scene.vehicle, &scene.vehicle_text, Some(recording))?;
+    let is_served = page::is_wanted(&args.page, true);
+    let dive = assemble_followed(&scene.vehicle, &scene.vehicle_text, Some(recording), is_served)?
+        .operated(Clock::Theirs);
     let mut watch = Watch::new(Show::Lines);
     if !watch.is_quiet() {
         say(&format!("{}, target {} m: a simulated dive", scene.vehicle.name, scene.vehicle.target_m));
+    }
+    let served =
+        is_served.then(|| demo_page(args, &scene, &log, dive.console(), !watch.is_quiet())).flatten();
+    if let Some(served) = &served {
+        watch = watch.followed_by(served.follower(&dive.armed));
     }
     let mut feed = SimulationFeed::new(simulation(&scene, false)?);
     let pace = Pace { speed: args.speed.0, ..Pace::default() };
     let mut feed = Interruptible { feed: &mut feed, interrupted: &interrupted };
     let report = dive.run(&mut feed, pace, &mut watch)?;
+    if let Some(served) = served {
+        served.end(&report);
+    }
     files::write_json(&report_file, &report)?;
     let ended = if interrupted.load(Ordering::Relaxed) { "interrupted: the dive so far\n" } else { "" };
     show(&format!("\n{ended}{}", summary(&report, Screen::columns())));
     say(&format!("report {}", report_file.display()));
     say(&format!("log    {}  (headrace replay)", log.display()));
     Ok(exit_code(&report))
+}
+
+/// The page of a demo, and a browser that shows it.
+fn demo_page(
+    args: &Demo,
+    scene: &Scene,
+    log: &Path,
+    console: Option<ConsolePort>,
+    in_lines: bool,
+) -> Option<Served> {
+    let of = Of {
+        vehicle: &scene.vehicle,
+        mode: Mode::Demo,
+        dive: scene.name.clone(),
+        recorded_to: Some(log.display().to_string()),
+        utc_of_zero_s: None,
+        span: None,
+        is_playback: false,
+        console,
+    };
+    let served = page::serve(&args.page, of, in_lines)?;
+    if !args.no_open {
+        served.open();
+    }
+    Some(served)
 }
 
 /// `headrace run`.
@@ -76,13 +116,32 @@ pub(crate) fn run(args: &Run) -> Result<u8, Failure> {
             "run: --rotate needs a recording; with --source, add --record".to_owned(),
         ));
     }
-    let dive = assemble(&vehicle, &text, recording)?;
+    let is_served = page::is_wanted(&args.page, args.speed.0.is_some());
+    let dive = assemble_followed(&vehicle, &text, recording, is_served)?;
     player.connect(dive.armed.sources());
     let pace = Pace { speed: args.speed.0, ..Pace::default() };
     let interrupted = interrupt::flag()?;
+    let mut watch = Watch::new(args.output.show());
+    let of = Of {
+        vehicle: &vehicle,
+        mode: Mode::Replay,
+        dive: log.display().to_string(),
+        recorded_to: paths.first().map(|path| path.display().to_string()),
+        utc_of_zero_s: None,
+        span: player.span(),
+        is_playback: false,
+        console: None,
+    };
+    let served = if is_served { page::serve(&args.page, of, watch.shows_lines()) } else { None };
+    if let Some(served) = &served {
+        watch = watch.followed_by(served.follower(&dive.armed));
+    }
     let mut feed = Interruptible { feed: &mut player, interrupted: &interrupted };
-    let mut report = dive.run(&mut feed, pace, &mut Watch::new(args.output.show()))?;
+    let mut report = dive.run(&mut feed, pace, &mut watch)?;
     note_losses(&mut report, log, &player);
+    if let Some(served) = served {
+        served.end(&report);
+    }
     finish(&report, &args.output)
 }
 
@@ -103,19 +162,36 @@ pub(crate) fn replay(args: &Replay) -> Result<u8, Failure> {
     let usual = Speed(if args.interactive && play::has_keys() { Some(1.0) } else { None });
     let pace =
         Pace { tick: DurNs::from_millis(i64::from(args.tick_ms)), speed: args.speed.unwrap_or(usual).0 };
+    let mut served = None;
     let mut report = if args.smooth {
         smooth::smoothed(&files, &mut player, (&vehicle, &text), pace, what_if)?
     } else {
-        let dive = assemble(&vehicle, &text, None)?.asking(what_if);
+        let is_watched = pace.speed.is_some() && !terminal::is_quiet();
+        let is_served = page::is_wanted(&args.page, is_watched);
+        let dive = assemble_followed(&vehicle, &text, None, is_served)?.asking(what_if);
         player.connect(dive.armed.sources());
         let mut watch = Watch::new(args.output.show());
-        if args.from.is_some() || args.interactive {
-            let playing = Playing { from: args.from, interactive: args.interactive, pace };
+        served = is_served.then(|| replay_page(args, &vehicle, log, &player, watch.shows_lines())).flatten();
+        if let Some(served) = &served {
+            watch = watch.followed_by(served.follower(&dive.armed));
+        }
+        if args.from.is_some() || args.interactive || served.is_some() {
+            let stays = args.page.page.is_some();
+            let remote = match &served {
+                Some(served) => {
+                    Some(served.remote(stays, if stays { interrupt::flag()? } else { Arc::default() }))
+                }
+                None => None,
+            };
+            let playing = Playing { from: args.from, interactive: args.interactive, pace, remote };
             playing.play(dive, &mut player, &mut watch)?
         } else {
             dive.run(&mut player, pace, &mut watch)?
         }
     };
+    if let Some(served) = served {
+        served.end(&report);
+    }
     note_losses(&mut report, log, &player);
     let code = finish(&report, &args.output)?;
     match &args.expect {
@@ -123,6 +199,27 @@ pub(crate) fn replay(args: &Replay) -> Result<u8, Failure> {
         Some(golden) if expect::differs(&report, golden)? => Ok(failure::FAILED),
         _ => Ok(code),
     }
+}
+
+/// The page of a replay.
+fn replay_page(
+    args: &Replay,
+    vehicle: &VehicleConfig,
+    log: &Path,
+    player: &Player,
+    in_lines: bool,
+) -> Option<Served> {
+    let of = Of {
+        vehicle,
+        mode: Mode::Replay,
+        dive: log.display().to_string(),
+        recorded_to: None,
+        utc_of_zero_s: page::utc_of_zero_s(&player.info().metadata),
+        span: player.span(),
+        is_playback: true,
+        console: None,
+    };
+    page::serve(&args.page, of, in_lines)
 }
 
 /// Checks that the report can be written, and isn't one of the inputs.

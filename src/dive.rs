@@ -1,17 +1,21 @@
 //! A dive from the assembled loop to the report: shared by `demo`, `run` and `replay`.
 
+use std::collections::BTreeMap;
 use std::path::PathBuf;
+use std::sync::Arc;
 
 use headrace_fusion::Navigation;
+use headrace_geometry::time::MonoNs;
 use headrace_monitor::App;
+use headrace_monitor::console::{CONSOLE_ID, Command, ConsoleInput, ConsolePort};
 use headrace_monitor::outlet::{NoticeOutlet, NoticeReceiver};
 use headrace_monitor::report::{LineReport, LogReport, Report};
 use headrace_monitor::run::Loop;
 use headrace_ports::Supervisor;
 use headrace_replay::drive::{Pace, PacketSource, drive};
 use headrace_replay::log::{
-    DerivedChannels, Every, LeftOut, LogHeader, Recorder, RecorderHandle, RecordingFault, Rotation, SentPort,
-    SourceInfo, Summary, dive_name,
+    DerivedChannels, Every, LeftOut, LogHeader, Recorder, RecorderHandle, RecordingEvent, RecordingFault,
+    Rotation, SentPort, SourceInfo, Summary, dive_name,
 };
 use headrace_replay::player::seconds;
 use headrace_replay::record::{QUEUE_BYTES, QUEUE_OF_PORTS_BYTES, RecorderOutlet, result_channels};
@@ -32,12 +36,24 @@ use crate::watch::Watch;
 /// arming.
 const NOTICES: usize = 1 << 10;
 
+/// Keys of a log's metadata: one moment on its clock, and in UTC, nanoseconds.
+pub(crate) const CLOCK_ANCHOR: [&str; 2] = ["clock_anchor_monotonic_ns", "clock_anchor_utc_ns"];
+
 /// An armed loop with the vehicle's sensors, and the consumers of its results.
 pub(crate) struct Dive {
     pub(crate) armed: Loop,
     notices: NoticeReceiver,
     recorders: Vec<(PathBuf, RecorderHandle)>,
     what_if: WhatIf,
+    operator: Option<Operator>,
+}
+
+/// The operator's input of a dive that goes on now.
+struct Operator {
+    input: ConsoleInput,
+    port: ConsolePort,
+    /// Recordings that have failed, by number: whether they still do.
+    failed: BTreeMap<usize, bool>,
 }
 
 /// A log to write.
@@ -84,12 +100,31 @@ pub(crate) fn assemble(
     assemble_with(vehicle, vehicle.navigation(), vehicle_text, record_to)
 }
 
+/// The same for a dive that is followed: its results are kept for each tick.
+pub(crate) fn assemble_followed(
+    vehicle: &VehicleConfig,
+    vehicle_text: &str,
+    record_to: Option<Recording<'_>>,
+    is_followed: bool,
+) -> Result<Dive, Failure> {
+    let (mut app, notices) = app(vehicle)?;
+    if is_followed {
+        app.keep_results();
+    }
+    let recorders = match record_to {
+        None => Vec::new(),
+        Some(recording) => record(&mut app, vehicle, vehicle_text, recording)?,
+    };
+    let armed = arm(app, vehicle, vehicle.navigation())?;
+    Ok(Dive { armed, notices, recorders, what_if: WhatIf::default(), operator: None })
+}
+
 /// The same, keeping all results for a comparison, and without a recording.
 pub(crate) fn assemble_kept(vehicle: &VehicleConfig) -> Result<Dive, Failure> {
     let (mut app, notices) = app(vehicle)?;
     app.keep_results();
     let armed = arm(app, vehicle, vehicle.navigation())?;
-    Ok(Dive { armed, notices, recorders: Vec::new(), what_if: WhatIf::default() })
+    Ok(Dive { armed, notices, recorders: Vec::new(), what_if: WhatIf::default(), operator: None })
 }
 
 /// The same with another navigation than the vehicle file's.
@@ -104,7 +139,8 @@ pub(crate) fn assemble_with(
         None => Vec::new(),
         Some(recording) => record(&mut app, vehicle, vehicle_text, recording)?,
     };
-    Ok(Dive { armed: arm(app, vehicle, navigation)?, notices, recorders, what_if: WhatIf::default() })
+    let armed = arm(app, vehicle, navigation)?;
+    Ok(Dive { armed, notices, recorders, what_if: WhatIf::default(), operator: None })
 }
 
 /// Starts the recorders of a dive.
@@ -171,8 +207,9 @@ fn view_site(vehicle: &VehicleConfig) -> Site {
 /// Stores the UTC time of the timestamps' clock.
 fn anchor(header: &mut LogHeader) {
     let (monotonic, utc) = headrace_ports::clock_anchor();
-    header.metadata.insert("clock_anchor_monotonic_ns".to_owned(), monotonic.0.to_string());
-    header.metadata.insert("clock_anchor_utc_ns".to_owned(), utc.0.to_string());
+    let [of_clock, of_utc] = CLOCK_ANCHOR.map(str::to_owned);
+    header.metadata.insert(of_clock, monotonic.0.to_string());
+    header.metadata.insert(of_utc, utc.0.to_string());
 }
 
 /// A unique name for a recording.
@@ -188,6 +225,9 @@ pub(crate) fn log_header(vehicle: &VehicleConfig, vehicle_text: &str, ticks: boo
         plugin: sensor.plugin.clone(),
         connect: sensor.connect.clone(),
     });
+    let console =
+        SourceInfo { id: CONSOLE_ID.to_owned(), plugin: CONSOLE_ID.to_owned(), connect: String::new() };
+    let sources = sources.chain(ticks.then_some(console));
     LogHeader {
         vehicle_toml: vehicle_text.to_owned(),
         attachments: vehicle
@@ -212,6 +252,22 @@ fn sonars(vehicle: &VehicleConfig) -> Vec<u16> {
 }
 
 impl Dive {
+    /// Takes commands of an operator from now on: a dive that goes on now, and no replay.
+    pub(crate) fn operated(mut self, clock: Clock) -> Self {
+        let clock: Option<Arc<dyn Fn() -> MonoNs + Send + Sync>> = match clock {
+            Clock::Ours => Some(Arc::new(headrace_ports::now)),
+            Clock::Theirs => None,
+        };
+        let input = ConsoleInput::new(&mut self.armed, clock);
+        self.operator = input.map(|(input, port)| Operator { input, port, failed: BTreeMap::new() });
+        self
+    }
+
+    /// Takes commands for the loop, from any thread; `None` for a dive without an operator.
+    pub(crate) fn console(&self) -> Option<ConsolePort> {
+        self.operator.as_ref().map(|operator| operator.port.clone())
+    }
+
     /// Evaluates these alternatives at the end.
     pub(crate) fn asking(self, what_if: WhatIf) -> Self {
         Self { what_if, ..self }
@@ -247,7 +303,10 @@ impl Dive {
             while let Some(notice) = notices.next() {
                 watch.notice(&notice, dive);
             }
-            tell_recordings(&self.recorders, watch, dive);
+            tell_recordings(&self.recorders, watch, dive, self.operator.as_mut());
+            if let Some(operator) = &mut self.operator {
+                operator.input.take_in(dive.now());
+            }
             watch.tick(dive);
             beside(dive);
         });
@@ -287,7 +346,10 @@ impl Dive {
             while let Some(notice) = notices.next() {
                 watch.notice(&notice, dive);
             }
-            tell_recordings(&self.recorders, watch, dive);
+            tell_recordings(&self.recorders, watch, dive, self.operator.as_mut());
+            if let Some(operator) = &mut self.operator {
+                operator.input.take_in_live(dive, headrace_ports::now());
+            }
             watch.tick(dive);
             beside(&supervisor, watch);
         });
@@ -336,11 +398,29 @@ impl Dive {
     }
 }
 
-/// Tells what has happened to the recordings.
-fn tell_recordings(recorders: &[(PathBuf, RecorderHandle)], watch: &mut Watch, dive: &Loop) {
+impl Operator {
+    fn recording(&mut self, number: usize, fails: bool) {
+        self.failed.insert(number, fails);
+        let fails = self.failed.values().any(|fails| *fails);
+        if let Err(error) = self.port.send(&Command::Recording { fails }) {
+            tracing::error!(%error, fails, "a recording's state isn't in the log");
+        }
+    }
+}
+
+/// Tells what has happened to the recordings; the loop, too, so that it is in what is recorded later, or elsewhere.
+fn tell_recordings(
+    recorders: &[(PathBuf, RecorderHandle)],
+    watch: &mut Watch,
+    dive: &Loop,
+    mut operator: Option<&mut Operator>,
+) {
     for (number, (_, handle)) in recorders.iter().enumerate() {
         while let Some(event) = handle.next_event() {
             watch.recording(number, &event, dive.now());
+            if let Some(operator) = &mut operator {
+                operator.recording(number, matches!(event, RecordingEvent::Failed { .. }));
+            }
         }
     }
 }

@@ -5,7 +5,9 @@ use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
 
+use headrace_dashboard::Mode;
 use headrace_geometry::time::{DurNs, MonoNs};
+use headrace_monitor::console::ConsolePort;
 use headrace_ports::{Connection, Phase, SentSink, Status, Supervisor};
 use headrace_replay::log::part_path;
 use headrace_sensor::connect::{Connect, ConnectError};
@@ -13,11 +15,12 @@ use headrace_sensor::driver::DriverSetup;
 use headrace_vehicle::VehicleConfig;
 
 use crate::cli::Run;
-use crate::dive::{Clock, Dive, Recording, assemble};
+use crate::dive::{Clock, Dive, Recording, assemble_followed};
 use crate::failure::Failure;
 use crate::interrupt;
 use crate::output::say;
 use crate::outputs::{self, Kind};
+use crate::page::{self, Of, Served};
 use crate::report_output::finish;
 use crate::screen::Screen;
 use crate::summary::broken;
@@ -36,12 +39,18 @@ pub(crate) fn run(args: &Run, text: &str, vehicle: &VehicleConfig) -> Result<u8,
         rotate: args.rotate,
         scene: None,
     });
-    let mut dive = assemble(vehicle, text, recording)?;
+    let is_served = page::is_wanted(&args.page, true);
+    let mut dive = assemble_followed(vehicle, text, recording, is_served)?.operated(Clock::Ours);
     let begun = headrace_ports::now();
     let supervisor = supervisor(&mut dive, vehicle, begun)?;
     let interrupted = interrupt::flag_of_a_dive()?;
     let until = args.duration.map(|seconds| begun + DurNs::from_secs_f64(seconds));
     let mut watch = Watch::new(args.output.show()).live();
+    let served =
+        is_served.then(|| live_page(args, vehicle, &logs, (dive.console(), watch.shows_lines()))).flatten();
+    if let Some(served) = &served {
+        watch = watch.followed_by(served.follower(&dive.armed));
+    }
     if args.output.show() == Show::Lines {
         let first = |log: &PathBuf| if args.rotate.is_some() { part_path(log, 1) } else { log.clone() };
         let firsts: Vec<String> = logs.iter().map(|log| first(log).display().to_string()).collect();
@@ -74,11 +83,36 @@ pub(crate) fn run(args: &Run, text: &str, vehicle: &VehicleConfig) -> Result<u8,
             states.borrow_mut().show(&status, watch);
         }
     });
+    if let Some(served) = served {
+        served.end(&report);
+    }
     let code = finish(&report, &args.output)?;
     match states.borrow().missing(headrace_ports::now()) {
         Some(why) => Err(Failure::Required(why)),
         None => Ok(code),
     }
+}
+
+/// The page of a dive on ports.
+fn live_page(
+    args: &Run,
+    vehicle: &VehicleConfig,
+    logs: &[PathBuf],
+    (console, in_lines): (Option<ConsolePort>, bool),
+) -> Option<Served> {
+    let (monotonic, utc) = headrace_ports::clock_anchor();
+    let log = logs.first().filter(|_| !args.no_record).map(|log| log.display().to_string());
+    let of = Of {
+        vehicle,
+        mode: Mode::Live,
+        dive: log.clone().unwrap_or_else(|| vehicle.name.clone()),
+        recorded_to: log,
+        utc_of_zero_s: Some((utc.0 - monotonic.0.cast_signed()) as f64 / 1e9),
+        span: None,
+        is_playback: false,
+        console,
+    };
+    page::serve(&args.page, of, in_lines)
 }
 
 /// Checks that a dive can be recorded to these files; with `--force` removes those that are there.

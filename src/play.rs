@@ -5,7 +5,7 @@ mod keys;
 use std::io::{BufRead, IsTerminal as _};
 use std::time::Duration;
 
-use crossbeam::channel::{Sender, unbounded};
+use crossbeam::channel::{Receiver, Sender, unbounded};
 use headrace_geometry::time::{DurNs, MonoNs};
 use headrace_monitor::outlet::NoticeReceiver;
 use headrace_monitor::report::Report;
@@ -30,23 +30,37 @@ const SNAPSHOT_INTERVAL: Duration = Duration::from_millis(300);
 /// Memory for snapshots. When it is full, every other one is dropped and the interval doubled.
 const SNAPSHOT_BYTES: usize = 256 << 20;
 
-/// A replay with `--from` or `--interactive`.
+/// Commands of playback from elsewhere than the terminal.
+pub(crate) struct Remote {
+    pub(crate) commands: (Sender<PlaybackCommand>, Receiver<PlaybackCommand>),
+    /// Whether playback waits for it at the end of the log.
+    pub(crate) stays: bool,
+    /// Drops its sender, so that playback may end.
+    pub(crate) close: Box<dyn Fn()>,
+}
+
+/// A replay with `--from` or `--interactive`, or with a page.
 pub(crate) struct Playing {
     pub(crate) from: Option<DurNs>,
     pub(crate) interactive: bool,
     pub(crate) pace: Pace,
+    /// What else directs it: until the end of the log, or until it says so.
+    pub(crate) remote: Option<Remote>,
 }
 
 impl Playing {
     /// Plays a dive; returns the report.
     pub(crate) fn play(self, dive: Dive, player: &mut Player, watch: &mut Watch) -> Result<Report, Failure> {
-        let Self { from, interactive, pace } = self;
+        let Self { from, interactive, pace, remote } = self;
         // Without commands nothing jumps back.
-        let interval = if interactive { SNAPSHOT_INTERVAL } else { Duration::MAX };
+        let interval = if interactive || remote.is_some() { SNAPSHOT_INTERVAL } else { Duration::MAX };
         dive.play(watch, |armed, notices, watch| {
-            let (sender, commands) = unbounded();
+            let (close, (sender, commands)) = match remote {
+                Some(Remote { commands, stays, close }) => (Some(close).filter(|_| !stays), commands),
+                None => (None, unbounded()),
+            };
             let has_keys = interactive && has_keys();
-            let mut screen = Screen { notices, watch, begun: MonoNs(0), has_keys };
+            let mut screen = Screen { notices, watch, begun: MonoNs(0), has_keys, close };
             let store = SnapshotStore::new(SNAPSHOT_BYTES, interval);
             let mut playback = Playback::new(armed, player, store, pace)?;
             screen.begun = playback.begun();
@@ -54,6 +68,7 @@ impl Playing {
                 let _phase = Phase::start("seek");
                 playback.seek(screen.begun + from, &mut screen)?;
             }
+            screen.watch.mode(false, pace.speed);
             // Keys where they are typed, words from a pipe or a file.
             let keyboard = match interactive {
                 true if has_keys => Some(keyboard(sender, pace)?),
@@ -90,6 +105,8 @@ struct Screen<'a> {
     watch: &'a mut Watch,
     begun: MonoNs,
     has_keys: bool,
+    /// Ends other commands at the end of the log.
+    close: Option<Box<dyn Fn()>>,
 }
 
 impl PlaybackObserver for Screen<'_> {
@@ -100,12 +117,20 @@ impl PlaybackObserver for Screen<'_> {
         self.watch.tick(dive);
     }
 
-    fn after_skipped_tick(&mut self, _: &Loop) {
+    fn after_skipped_tick(&mut self, dive: &Loop) {
         while self.notices.next().is_some() {}
+        self.watch.skipped(dive);
+    }
+
+    fn mode(&mut self, paused: bool, speed: Option<f64>) {
+        self.watch.mode(paused, speed);
     }
 
     fn stopped(&mut self, dive: &Loop, at: MonoNs, ended: bool) {
         self.watch.stopped(dive, at.since(self.begun), ended);
+        if let Some(close) = self.close.as_ref().filter(|_| ended) {
+            close();
+        }
         if ended && self.has_keys {
             aside("END      left and down go back, q leaves");
         }

@@ -13,6 +13,7 @@ use headrace_ports::{Phase, Status};
 use headrace_replay::log::RecordingEvent;
 use serde_json::{Value, json};
 
+use crate::follower::Follower;
 use crate::printer::Printer;
 use crate::screen::Screen;
 use crate::terminal;
@@ -35,8 +36,9 @@ pub(crate) enum Show {
     JsonLines,
 }
 
-/// Shows a dive on stdout.
+/// Shows a dive on stdout, and to the followers that were added.
 pub(crate) struct Watch {
+    followers: Vec<Box<dyn Follower>>,
     show: Show,
     screen: Screen,
     printer: Option<Printer>,
@@ -52,6 +54,7 @@ impl Watch {
     pub(crate) fn new(show: Show) -> Self {
         let show = if terminal::is_quiet() { Show::Nothing } else { show };
         Self {
+            followers: Vec::new(),
             show,
             screen: Screen::of_stdout(),
             printer: (show != Show::Nothing).then(|| Printer::start(false)),
@@ -66,9 +69,21 @@ impl Watch {
         Self::new(Show::Nothing)
     }
 
-    /// Whether nothing is shown.
+    /// Shows the dive to this one, too.
+    #[must_use]
+    pub(crate) fn followed_by(mut self, follower: Box<dyn Follower>) -> Self {
+        self.followers.push(follower);
+        self
+    }
+
+    /// Whether nothing is shown on stdout.
     pub(crate) fn is_quiet(&self) -> bool {
         self.show == Show::Nothing
+    }
+
+    /// Whether it is shown in lines for people.
+    pub(crate) fn shows_lines(&self) -> bool {
+        self.show == Show::Lines
     }
 
     /// A dive that can't wait: what the terminal has no room for is dropped.
@@ -81,12 +96,15 @@ impl Watch {
 
     /// Shows a result of the loop.
     pub(crate) fn notice(&mut self, notice: &Notice, dive: &Loop) {
+        self.followers.iter_mut().for_each(|follower| follower.notice(notice, dive));
         if self.is_quiet() {
             return;
         }
         let at = match notice {
             Notice::Section { at, .. } | Notice::Run { at, .. } => *at,
             Notice::Advice(entry) => entry.at,
+            Notice::Listed { at, .. } => *at,
+            Notice::Note(note) => note.at,
             Notice::Alert(kind, source) => dive.alerts().get(*kind, *source).map_or(MonoNs(0), |a| a.since),
         };
         let mut told = Vec::new();
@@ -96,6 +114,7 @@ impl Watch {
 
     /// Shows the state, after every tick: also where nothing has come.
     pub(crate) fn tick(&mut self, dive: &Loop) {
+        self.followers.iter_mut().for_each(|follower| follower.tick(dive));
         if self.is_quiet() {
             return;
         }
@@ -110,8 +129,19 @@ impl Watch {
         }
     }
 
+    /// Passes over a tick on the way of a jump.
+    pub(crate) fn skipped(&mut self, dive: &Loop) {
+        self.followers.iter_mut().for_each(|follower| follower.skipped(dive));
+    }
+
+    /// A replay begins to stand still or to play, or its speed changes.
+    pub(crate) fn mode(&mut self, paused: bool, speed: Option<f64>) {
+        self.followers.iter_mut().for_each(|follower| follower.mode(paused, speed));
+    }
+
     /// Shows a change of a sensor's state.
     pub(crate) fn sensor(&mut self, id: &str, status: &Status) {
+        self.followers.iter_mut().for_each(|follower| follower.sensor(id, status));
         let phase = status.phase.as_str();
         match self.show {
             Show::Nothing => {}
@@ -131,6 +161,7 @@ impl Watch {
     pub(crate) fn recording(&mut self, number: usize, event: &RecordingEvent, at: MonoNs) {
         let fails = event.fails();
         self.failed.insert(number, fails);
+        self.followers.iter_mut().for_each(|follower| follower.recording(number, event, at));
         let words = match event {
             RecordingEvent::Failed { path, error } => {
                 format!("NOT RECORDED to {}: {error}; tried again in another part", path.display())
@@ -168,6 +199,7 @@ impl Watch {
     pub(crate) fn stopped(&mut self, dive: &Loop, time: DurNs, ended: bool) {
         self.shown = None;
         self.teller.forget();
+        self.followers.iter_mut().for_each(|follower| follower.stopped(dive, time, ended));
         let (tick, samples, digest) = (dive.ticks(), dive.tally().samples, format!("{:016x}", dive.digest()));
         match self.show {
             Show::Nothing => {}
@@ -190,6 +222,7 @@ impl Watch {
 
     /// Ends the output of a dive.
     pub(crate) fn end(&mut self, dive: &Loop) {
+        self.followers.iter_mut().for_each(|follower| follower.end(dive));
         if !self.is_quiet() {
             let mut told = Vec::new();
             self.teller.end(&dive.coverage().sections, &mut |one| told.push(one));
@@ -221,8 +254,7 @@ impl Watch {
             line.lamp = if fails { Some(Lamp::Red) } else { line.lamp };
         }
         if self.show == Show::JsonLines {
-            let section_m = dive.coverage().sections.section_m();
-            let mut value = match serde_json::to_value(state.json(dive.sources(), section_m)) {
+            let mut value = match serde_json::to_value(dive.live_state_json()) {
                 Ok(value) => value,
                 Err(error) => json!({"error": error.to_string()}),
             };

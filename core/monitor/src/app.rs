@@ -7,6 +7,7 @@ use bevy_ecs::schedule::{IntoScheduleConfigs, Schedule};
 use bevy_ecs::system::ScheduleSystem;
 use bevy_ecs::world::World;
 
+use super::console::CONSOLE_ID;
 use super::entities::{HeadSpecification, Mounted, SensorDecoder, SensorHealth};
 use super::error::PluginError;
 use super::loop_snapshot::StateParts;
@@ -92,8 +93,11 @@ impl App {
 
     /// Registers a source; its port fills the ring that the loop reads.
     ///
-    /// Errors: an id that is there already, or more than [`MAX_SOURCES`].
+    /// Errors: an id that is there already or is the console's, or more than [`MAX_SOURCES`].
     pub fn add_source(&mut self, spec: SourceSpec) -> Result<SourceId, PluginError> {
+        if spec.id == CONSOLE_ID {
+            return Err(PluginError::ReservedSource { id: spec.id });
+        }
         if self.sources.iter().any(|other| other.id == spec.id) {
             return Err(PluginError::DuplicateSource { id: spec.id });
         }

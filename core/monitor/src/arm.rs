@@ -4,8 +4,10 @@ use bevy_ecs::entity::Entity;
 use bevy_ecs::world::World;
 
 use super::advice_log::AdviceLog;
+use super::alert_list::{AlertList, MOST_LISTED};
 use super::alerts::Alerts;
 use super::app::{App, SourceInfo};
+use super::console::{Commands, Console};
 use super::entities::{
     Head, HeadFrontier, HeadSpecification, HeadSweep, HiddenAngles, MeasuredMotion, Mounted, Navigator,
     VehicleState,
@@ -13,10 +15,14 @@ use super::entities::{
 use super::error::PluginError;
 use super::live_state::{LiveState, source_bits};
 use super::merge::{Inbox, MAX_TICK_BYTES, MAX_TICK_PACKETS};
-use super::messages::{Events, Notices, PlacedList, PositionedList, Requests, Standings};
+use super::messages::{
+    AdviceList, Events, Notices, PlacedEvents, PlacedList, PositionedList, Requests, Standings,
+};
+use super::notes::Notes;
 use super::resources::{Coverage, Digests, Finder, Tally, Target, TickTime, TunnelDesign, VehicleEntities};
+use super::ring;
 use super::run::Loop;
-use super::stages::{Advisor, Driving, SoundSpeed};
+use super::stages::{Advisor, Driving, RunInputs, SoundSpeed};
 use headrace_coverage::{
     Frontier, GridLayout, HoleFinder, Lacks, Relief, SampleStore, Sections, Soundings, StoreLayout,
     WallLimits,
@@ -38,8 +44,12 @@ const SAMPLES_PER_M: f64 = 4_000.0;
 const MIN_SAMPLES: f64 = 4_000_000.0;
 const MAX_SAMPLES: f64 = 40_000_000.0;
 
-/// Notices per judged section: it may change its run and two others, and raise an alert.
-const NOTICES_EACH: usize = 5;
+/// Runs that a judged section may change: its own and two others.
+const RUNS_EACH: usize = 3;
+/// Notices per judged section: its own, those of its runs and of their alerts, and an alert.
+const NOTICES_EACH: usize = 2 + 3 * RUNS_EACH;
+/// Notices of alerts per tick beside those.
+const NOTICES_OF_ALERTS: usize = 4 * MOST_LISTED;
 
 impl App {
     /// Allocates all memory of the loop and makes it ready to run. From here on no tick allocates or locks.
@@ -56,6 +66,7 @@ impl App {
             sound_speed_mps: mission.site.sound_speed_mps,
         };
         let advisor = advice::Advisor::new(&mission.profile, task, &specs, &mission.hull);
+        self.add_console();
         let entities = self.spawn_entities(navigation, &advisor);
         self.insert_resources(entities, advisor)?;
         self.insert_messages();
@@ -63,6 +74,18 @@ impl App {
             .initialize(&mut self.world)
             .map_err(|error| PluginError::Schedule { why: format!("{error:?}") })?;
         Ok(Loop::new(self))
+    }
+
+    /// The operator's input, after all sensors.
+    fn add_console(&mut self) {
+        let (port, reader) = ring::ring(0);
+        self.ports.push(port);
+        self.readers.push(reader);
+        // At most as many as there are sensors.
+        let number = u16::try_from(self.sources.len()).unwrap_or(u16::MAX);
+        self.world.insert_resource(Console::new(SourceId(number)));
+        self.world.insert_resource(Commands::new());
+        self.world.insert_resource(Notes::default());
     }
 
     /// The vehicle, and the heads' remaining components.
@@ -108,7 +131,9 @@ impl App {
         }
         world.insert_resource(Tally::default());
         world.insert_resource(TickTime::default());
-        world.insert_resource(coverage(mission)?);
+        let coverage = coverage(mission)?;
+        world.insert_resource(AlertList::new(mission.alerts, mission.limits, coverage.sections.len()));
+        world.insert_resource(coverage);
         world.insert_resource(TunnelDesign {
             profile: mission.profile.clone(),
             site: mission.site,
@@ -136,9 +161,14 @@ impl App {
         world.insert_resource(Events(Vec::with_capacity(MAX_TICK_READINGS)));
         world.insert_resource(PositionedList(Vec::with_capacity(2 * MAX_TICK_READINGS)));
         world.insert_resource(PlacedList(Vec::with_capacity(2 * MAX_TICK_READINGS)));
+        world.insert_resource(PlacedEvents(Vec::with_capacity(2 * MAX_TICK_READINGS)));
+        world.insert_resource(AdviceList(Vec::with_capacity(MAX_TICK_PACKETS)));
+        world.insert_resource(RunInputs(Vec::with_capacity(RUNS_EACH * most)));
         world.insert_resource(Standings(Vec::with_capacity(MAX_TICK_PACKETS)));
         world.insert_resource(Requests(Vec::with_capacity(most)));
-        world.insert_resource(Notices(Vec::with_capacity(NOTICES_EACH * most + MAX_TICK_PACKETS)));
+        world.insert_resource(Notices(Vec::with_capacity(
+            NOTICES_EACH * most + MAX_TICK_PACKETS + NOTICES_OF_ALERTS,
+        )));
     }
 }
 

@@ -10,6 +10,12 @@ pub enum PluginError {
         /// The id.
         id: String,
     },
+    /// The id of the operator's input.
+    #[error("adding source {id:?}: that is the id of the operator's input; choose another one")]
+    ReservedSource {
+        /// The id.
+        id: String,
+    },
     /// A required source is missing.
     #[error("arming the loop: water.sound_speed_from = {id:?}: there is no such source")]
     MissingSource {

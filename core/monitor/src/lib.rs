@@ -24,10 +24,12 @@
 #![cfg_attr(test, allow(clippy::cast_possible_truncation))]
 
 pub mod advice_log;
+pub mod alert_list;
 pub mod alerts;
 mod app;
 mod arm;
 pub mod byte_ring;
+pub mod console;
 pub mod digest;
 pub mod entities;
 mod error;
@@ -38,6 +40,7 @@ pub mod live_text;
 mod loop_snapshot;
 pub mod merge;
 pub mod messages;
+pub mod notes;
 pub mod outlet;
 pub mod pilot_text;
 pub mod report;

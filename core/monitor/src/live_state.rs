@@ -101,6 +101,10 @@ pub struct ActiveAlert {
     pub source: Option<SourceId>,
     /// When its present occurrence began.
     pub since: MonoNs,
+    /// Chainage of its first occurrence, m.
+    pub x_m: f64,
+    /// Largest deviation, m.
+    pub worst_m: f64,
 }
 
 /// The alerts that hold now.

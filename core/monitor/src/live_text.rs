@@ -128,7 +128,7 @@ fn age_text(age: DurNs) -> String {
     if seconds < 100.0 { format!("{seconds:.0} s") } else { format!("{:.0} min", seconds / 60.0) }
 }
 
-fn no_position_text(lacking: NoFix) -> &'static str {
+pub(super) fn no_position_text(lacking: NoFix) -> &'static str {
     match lacking {
         NoFix::Heading => "NO POSITION: no heading",
         NoFix::Chainage => "NO POSITION: no chainage",

@@ -8,11 +8,14 @@ use bevy_ecs::prelude::{Mut, Resource};
 use bevy_ecs::world::World;
 
 use super::advice_log::AdviceLog;
+use super::alert_list::AlertList;
 use super::alerts::Alerts;
+use super::console::Console;
 use super::entities::{
     HeadFrontier, HeadSweep, MeasuredMotion, Navigator, SensorDecoder, SensorHealth, VehicleState,
 };
 use super::live_state::LiveState;
+use super::notes::Notes;
 use super::resources::{Coverage, Digests, Finder, Tally, TickTime, VehicleEntities};
 use super::stages::{Advisor, Driving, SoundSpeed};
 use headrace_snapshot::{Restorer, Saver, SnapshotError, Stateful};
@@ -45,6 +48,9 @@ impl StateParts {
         parts.add::<Coverage>("coverage");
         parts.add::<Finder>("search for holes");
         parts.add::<Alerts>("alerts");
+        parts.add::<AlertList>("list of alerts");
+        parts.add::<Notes>("notes");
+        parts.add::<Console>("console");
         parts.add::<Advisor>("advice");
         parts.add::<AdviceLog>("history of advice");
         parts.add::<LiveState>("live state");
@@ -121,10 +127,14 @@ pub(super) fn restore(world: &mut World, from: &mut Restorer<'_>) -> Result<(), 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::console::Commands;
     use crate::entities::{Head, HeadSpecification, HiddenAngles, Mounted};
     use crate::merge::Inbox;
-    use crate::messages::{Events, Notices, PlacedList, PositionedList, Requests, Standings};
+    use crate::messages::{
+        AdviceList, Events, Notices, PlacedEvents, PlacedList, PositionedList, Requests, Standings,
+    };
     use crate::resources::{Target, TunnelDesign};
+    use crate::stages::RunInputs;
     use crate::{App, SourceSpec};
     use headrace_fusion::direct::DirectNavigation;
     use headrace_geometry::site::Site;
@@ -176,6 +186,10 @@ mod tests {
             TypeId::of::<PlacedList>(),
             TypeId::of::<Requests>(),
             TypeId::of::<Standings>(),
+            TypeId::of::<PlacedEvents>(),
+            TypeId::of::<AdviceList>(),
+            TypeId::of::<RunInputs>(),
+            TypeId::of::<Commands>(),
             TypeId::of::<Notices>(),
             TypeId::of::<TunnelDesign>(),
             TypeId::of::<Target>(),

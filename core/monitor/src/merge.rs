@@ -35,7 +35,8 @@ impl Default for Inbox {
         Self {
             packets: Vec::with_capacity(MAX_TICK_PACKETS),
             bytes: Vec::with_capacity(MAX_TICK_BYTES),
-            heads: Vec::with_capacity(MAX_SOURCES),
+            // The sensors, and the console.
+            heads: Vec::with_capacity(MAX_SOURCES + 1),
             allowance_bytes: MAX_TICK_BYTES,
         }
     }

@@ -7,8 +7,10 @@ use bevy_ecs::prelude::Resource;
 use serde::{Deserialize, Serialize};
 
 use super::advice_log::AdviceEntry;
+use super::alert_list::{AlertChange, ListedAlert};
 use super::alerts::AlertKind;
 use super::live_state::{ActiveAlerts, LiveMetres};
+use super::notes::Note;
 use headrace_coverage::{Judgement, Loss, Reach, Request, RunChange, RunId, Stretch};
 use headrace_fusion::filter::cable::CableDoubt;
 use headrace_fusion::filter::pose_sd::PoseSd;
@@ -16,6 +18,7 @@ use headrace_fusion::filter::suspicion::SettingDoubt;
 use headrace_fusion::{Fix, NoFix};
 use headrace_geometry::frames::{Point3, Tunnel};
 use headrace_geometry::time::MonoNs;
+use headrace_sampling::advice::Advice;
 use headrace_sampling::passes::Situation;
 use headrace_sensor::reading::{Reading, SourceId};
 
@@ -157,6 +160,10 @@ pub enum Placed {
 #[derive(Debug, Resource)]
 pub struct PlacedList(pub Vec<Placed>);
 
+/// For each item of [`PlacedList`] the index into [`Events`]: of the ping, or of the event that a situation precedes.
+#[derive(Debug, Resource)]
+pub struct PlacedEvents(pub Vec<usize>);
+
 /// What has been judged, and the alerts that hold, at a beat.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Standing {
@@ -171,6 +178,10 @@ pub struct Standing {
 /// Standing at each beat of this tick, in order.
 #[derive(Debug, Resource)]
 pub struct Standings(pub Vec<Standing>);
+
+/// Advice at each beat of this tick, in order.
+#[derive(Debug, Resource)]
+pub struct AdviceList(pub Vec<Advice>);
 
 /// Sections to be judged after a ping, in order; a reused buffer.
 #[derive(Debug, Resource)]
@@ -202,6 +213,17 @@ pub enum Notice {
     Alert(AlertKind, Option<SourceId>),
     /// Speed advice.
     Advice(AdviceEntry),
+    /// An alert of the list has changed.
+    Listed {
+        /// Kind of change.
+        change: AlertChange,
+        /// Timestamp, in data time.
+        at: MonoNs,
+        /// The alert, as it was then.
+        alert: ListedAlert,
+    },
+    /// Somebody has put down a note.
+    Note(Note),
 }
 
 /// Results of this tick, in order.

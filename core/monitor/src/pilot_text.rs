@@ -3,6 +3,8 @@
 
 use super::advice_log::AdviceEntry;
 use super::alerts::AlertKind;
+use serde::{Deserialize, Serialize};
+
 use headrace_coverage::{Action, Cause, Causes, Evidence};
 use headrace_fusion::filter::suspicion::{Setting, SettingDoubt};
 use headrace_geometry::tunnel::Profile;
@@ -19,7 +21,7 @@ pub fn station(chainage_m: f64) -> String {
 }
 
 /// Figures of a cause's evidence used in its text.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct CauseFigures {
     /// The causes, which only together explain the fail.
     pub causes: Causes,
@@ -150,6 +152,26 @@ fn remedy_text(remedy: Option<Remedy>) -> String {
     }
 }
 
+/// What would gain speed: the remedy where slower doesn't help, else a mode that all heads have and that allows more.
+pub fn gain_text(advice: &Advice) -> Option<String> {
+    if advice.remedy.is_some() {
+        return Some(remedy_text(advice.remedy));
+    }
+    let others = advice.alternatives.iter().flatten();
+    let best = others.max_by(|one, other| one.v_max_mps.total_cmp(&other.v_max_mps))?;
+    let gains = best.v_max_mps > GAIN * advice.v_max_mps && best.v_max_mps > 0.0;
+    gains
+        .then(|| format!("set the heads to {}: {:.2} m/s", best.mode.as_str().to_uppercase(), best.v_max_mps))
+}
+
+/// A speed to keep; empty where there is none.
+pub(super) fn speed_text(what: &str, mps: f64) -> String {
+    if mps > 0.0 { format!("{what} {mps:.2} m/s") } else { String::new() }
+}
+
+/// A mode that allows so many times the speed gains something.
+const GAIN: f64 = 1.1;
+
 /// A stretch that was missed.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Missed {
@@ -229,7 +251,7 @@ pub fn setting_text(doubt: &SettingDoubt, x_m: f64, name: &dyn Fn(u16) -> String
 }
 
 /// Figures of advice used in its text.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct AdviceFigures {
     /// Speed now, m/s.
     pub speed_mps: f64,

@@ -115,19 +115,22 @@ pub struct Digests {
     pub advice: ResultStream,
     /// The live state at the beats.
     pub states: ResultStream,
+    /// Changes of alerts, and notes.
+    pub alerts: ResultStream,
 }
 
-stateful!(Digests { state: poses, pings, judgements, advice, states; });
+stateful!(Digests { state: poses, pings, judgements, advice, states, alerts; });
 
 impl Digests {
     /// The streams by name, in log order.
-    pub fn streams(&self) -> [(&'static str, &ResultStream); 5] {
+    pub fn streams(&self) -> [(&'static str, &ResultStream); 6] {
         [
             ("poses", &self.poses),
             ("pings", &self.pings),
             ("judgements", &self.judgements),
             ("advice", &self.advice),
             ("states", &self.states),
+            ("alerts", &self.alerts),
         ]
     }
 
@@ -138,6 +141,7 @@ impl Digests {
         self.judgements.keep();
         self.advice.keep();
         self.states.keep();
+        self.alerts.keep();
     }
 
     pub(super) fn next_tick(&mut self) {
@@ -146,6 +150,7 @@ impl Digests {
         self.judgements.next_tick();
         self.advice.next_tick();
         self.states.next_tick();
+        self.alerts.next_tick();
     }
 }
 

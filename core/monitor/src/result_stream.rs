@@ -32,6 +32,10 @@ pub enum RecordKind {
     Doubtful = 9,
     /// The live state.
     State = 10,
+    /// A change of an alert of the list.
+    AlertChange = 11,
+    /// A note.
+    Note = 12,
 }
 
 /// Type of a record's word.
@@ -44,7 +48,7 @@ pub enum WordKind {
 }
 
 impl RecordKind {
-    const ALL: [Self; 10] = [
+    const ALL: [Self; 12] = [
         Self::Sample,
         Self::NoSample,
         Self::Section,
@@ -55,6 +59,8 @@ impl RecordKind {
         Self::Alert,
         Self::Doubtful,
         Self::State,
+        Self::AlertChange,
+        Self::Note,
     ];
 
     /// The kind with this number.
@@ -75,6 +81,8 @@ impl RecordKind {
             Self::Alert => "alert",
             Self::Doubtful => "doubtful return",
             Self::State => "live state",
+            Self::AlertChange => "change of an alert",
+            Self::Note => "note",
         }
     }
 
@@ -171,11 +179,38 @@ impl RecordKind {
                 // Only of a head.
                 ("source", Integer),
             ],
+            Self::AlertChange => &[
+                ("at_ns", Integer),
+                ("number", Integer),
+                ("change", Integer),
+                ("kind", Integer),
+                ("priority", Integer),
+                ("state", Integer),
+                ("source", Integer),
+                ("count", Integer),
+                ("acknowledged_ns", Integer),
+                ("by", Integer),
+                ("by_rest", Integer),
+                ("silenced_until_ns", Integer),
+                ("from", Integer),
+                ("to", Integer),
+                ("x_m", Number),
+                ("figure", Number),
+            ],
+            Self::Note => &[
+                ("at_ns", Integer),
+                ("number", Integer),
+                ("chainage_m", Number),
+                ("by", Integer),
+                ("by_rest", Integer),
+            ],
         };
-        // Advice continues with the speeds that other modes would allow, the live state with each source's last reading.
+        // Advice continues with the speeds that other modes would allow, the live state with each source's last reading, a
+        // note with its text.
         let beyond = match self {
             Self::Advice => ("alternative_v_max_mps", Number),
             Self::State => ("heard_ns", Integer),
+            Self::Note => ("text", Integer),
             _ => ("beyond the last field", Number),
         };
         fields.get(place).copied().unwrap_or(beyond)

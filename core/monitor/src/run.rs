@@ -1,22 +1,27 @@
 //! The armed loop.
 
 use bevy_ecs::component::Component;
-use bevy_ecs::prelude::Resource;
+use bevy_ecs::prelude::{ResMut, Resource};
 use bevy_ecs::schedule::Schedule;
-use bevy_ecs::world::{Mut, World};
+use bevy_ecs::system::SystemState;
+use bevy_ecs::world::World;
 
 use super::advice_log::AdviceLog;
+use super::alert_list::{AlertList, Surroundings, Telling};
 use super::alerts::Alerts;
 use super::app::{App, SourceInfo};
+use super::console::{Console, ConsoleCounts};
 use super::digest::Digest;
 use super::entities::{HeadFrontier, Mounted, Navigator, SensorDecoder, SensorHealth, VehicleState};
 use super::live_state::LiveState;
+use super::live_state::json::LiveStateJson;
 use super::loop_snapshot;
 use super::merge::Inbox;
 use super::messages::{Event, Events, Notice, Notices};
+use super::notes::Notes;
 use super::resources::{Coverage, Digests, Finder, Tally, TickTime, VehicleEntities};
 use super::ring::{Port, PortReader};
-use super::stages::{Results, SoundSpeed, judge_one};
+use super::stages::{Results, RunInputs, SoundSpeed, judge_one};
 use headrace_coverage::{Outlook, Request};
 use headrace_fusion::filter::sources::Consistency;
 use headrace_fusion::{Fix, NoFix};
@@ -29,6 +34,17 @@ use headrace_vehicle::Mission;
 
 /// Sections judged per batch at the end of a dive, before their notices are delivered.
 const FINISHED_AT_ONCE: usize = 256;
+
+/// What is judged at the end of a dive, and what comes of it.
+type AtEnd<'w> = (
+    ResMut<'w, Coverage>,
+    ResMut<'w, Finder>,
+    ResMut<'w, Notices>,
+    ResMut<'w, Digests>,
+    ResMut<'w, Alerts>,
+    ResMut<'w, RunInputs>,
+    ResMut<'w, AlertList>,
+);
 
 /// A loop that runs. All memory is allocated; a tick takes no lock, makes no system call and formats nothing.
 pub struct Loop {
@@ -79,7 +95,12 @@ impl Loop {
         self.ports.get_mut(source)?.take()
     }
 
-    /// The sources, in the order of their ids.
+    /// The writing end of the operator's input, once.
+    pub fn take_console(&mut self) -> Option<Port> {
+        self.take_port(self.sources.len())
+    }
+
+    /// The sensors' sources, in the order of their ids. The operator's input comes after them.
     pub fn sources(&self) -> &[SourceInfo] {
         &self.sources
     }
@@ -144,6 +165,31 @@ impl Loop {
     /// Alerts about the dive as a whole.
     pub fn alerts(&self) -> &Alerts {
         self.world.resource()
+    }
+
+    /// The alerts with their lives.
+    pub fn alert_list(&self) -> &AlertList {
+        self.world.resource()
+    }
+
+    /// The notes.
+    pub fn notes(&self) -> &Notes {
+        self.world.resource()
+    }
+
+    /// Traffic of the operator's input.
+    pub fn console_counts(&self) -> ConsoleCounts {
+        self.world.resource::<Console>().counts
+    }
+
+    /// What words of alerts need.
+    pub fn surroundings(&self) -> Surroundings<'_> {
+        Surroundings::of(&self.sources, &self.mission.profile, &self.coverage().sections)
+    }
+
+    /// The live state with the alerts, as JSON.
+    pub fn live_state_json(&self) -> LiveStateJson {
+        self.live_state().json(&self.surroundings(), self.alert_list())
     }
 
     /// The live state, as of the last beat and published with the last tick.
@@ -235,25 +281,27 @@ impl Loop {
 
     fn judge_all(&mut self, requests: impl Iterator<Item = Request>) {
         let Self { world, mission, .. } = self;
-        world.resource_scope(|world, mut coverage: Mut<'_, Coverage>| {
-            world.resource_scope(|world, mut finder: Mut<'_, Finder>| {
-                world.resource_scope(|world, mut notices: Mut<'_, Notices>| {
-                    world.resource_scope(|world, mut alerts: Mut<'_, Alerts>| {
-                        notices.0.clear();
-                        let mut digests = world.resource_mut::<Digests>();
-                        let mut results = Results {
-                            finder: &mut finder,
-                            notices: &mut notices,
-                            digests: &mut digests,
-                            alerts: &mut alerts,
-                        };
-                        for request in requests {
-                            judge_one(&request, &mission.profile, &mut coverage, &mut results);
-                        }
-                    });
-                });
-            });
-        });
+        let mut parts = SystemState::<AtEnd<'_>>::new(world);
+        let Ok((mut coverage, mut finder, mut notices, mut digests, mut alerts, mut runs, mut list)) =
+            parts.get_mut(world)
+        else {
+            return;
+        };
+        notices.0.clear();
+        for request in requests {
+            runs.0.clear();
+            let mut results = Results {
+                finder: &mut finder,
+                notices: &mut notices,
+                digests: &mut digests,
+                alerts: &mut alerts,
+                runs: &mut runs,
+                place: (0, false),
+            };
+            judge_one(&request, &mission.profile, &mut coverage, &mut results);
+            let mut to = Telling { notices: &mut notices, stream: &mut digests.alerts };
+            runs.0.iter().for_each(|run| list.take_run(run, &mut to));
+        }
     }
 
     /// Snapshot of the state after the last tick; a loop of the same vehicle restored from it gives the same results.

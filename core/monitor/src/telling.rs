@@ -98,15 +98,20 @@ pub struct UnsureStretch {
 impl UnsureStretch {
     /// From a stretch of sections.
     pub fn of(stretch: &Stretch, sections: &Sections) -> Self {
+        Self::from_sections(stretch, sections.section_m(), sections.confidence_sd())
+    }
+
+    /// The same with the length of a section, m, and the confidence, standard deviations.
+    pub(super) fn from_sections(stretch: &Stretch, section_m: f64, confidence_sd: f64) -> Self {
         let [hole_m, hole_sd_m] = stretch.hole_m;
         Self {
             why: stretch.why,
-            from_m: sections.bounds_m(stretch.from).0,
-            to_m: sections.bounds_m(stretch.to - 1).1,
-            metres_m: f64::from(stretch.sections) * sections.section_m(),
+            from_m: stretch.from as f64 * section_m,
+            to_m: stretch.to as f64 * section_m,
+            metres_m: f64::from(stretch.sections) * section_m,
             hole_m,
             hole_sd_m,
-            hole_error_m: sections.confidence_sd() * hole_sd_m,
+            hole_error_m: confidence_sd * hole_sd_m,
         }
     }
 }
@@ -134,7 +139,7 @@ impl Teller {
     /// Takes a notice; `tell` gets what it means.
     pub fn hear(&mut self, notice: &Notice, dive: &Loop, tell: &mut dyn FnMut(Told)) {
         match notice {
-            Notice::Advice(_) => {}
+            Notice::Advice(_) | Notice::Listed { .. } | Notice::Note(_) => {}
             Notice::Section { section, .. } => {
                 let sections = &dive.coverage().sections;
                 self.close_run_at(*section, sections, tell);

@@ -19,6 +19,7 @@
 #![cfg_attr(not(test), warn(clippy::cast_possible_truncation))]
 #![cfg_attr(test, allow(clippy::cast_possible_truncation))]
 
+mod alerts;
 mod coverage;
 mod findings;
 mod mission;
@@ -27,6 +28,7 @@ mod sensors;
 mod tunnel;
 mod vehicle;
 
+pub use alerts::{AlertClass, AlertTiming, ClassTiming, LimitsConfig};
 pub use coverage::CoverageConfig;
 pub use findings::{Finding, Grade};
 pub use mission::Mission;

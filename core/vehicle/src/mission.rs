@@ -6,6 +6,7 @@ use headrace_geometry::tunnel::Profile;
 use headrace_sampling::layout::HeadLayout;
 use headrace_sampling::occlusion::Obstacle;
 
+use crate::alerts::{AlertTiming, LimitsConfig};
 use crate::coverage::CoverageConfig;
 
 /// Mission parameters of a loop.
@@ -33,6 +34,10 @@ pub struct Mission {
     pub coverage: CoverageConfig,
     /// Time limit of the dive from its first packet; `None` if not set.
     pub dive_time: Option<DurNs>,
+    /// Hold times and dead bands of alerts.
+    pub alerts: AlertTiming,
+    /// What there is of cable and time.
+    pub limits: LimitsConfig,
 }
 
 impl Mission {
@@ -51,6 +56,8 @@ impl Mission {
             hull: Vec::new(),
             coverage: CoverageConfig { contradiction_m, ..CoverageConfig::default() },
             dive_time: None,
+            alerts: AlertTiming::default(),
+            limits: LimitsConfig::default(),
         }
     }
 }

@@ -4,6 +4,7 @@ use core::cell::RefCell;
 
 use crate::Mission;
 use crate::NavigationConfig;
+use crate::alerts::{AlertTiming, LimitsConfig};
 use crate::coverage::CoverageConfig;
 use crate::sensors::{self, DEGREES, SENSOR_DISTANCE_M, Sensors};
 use crate::tunnel::TunnelConfig;
@@ -46,6 +47,10 @@ pub struct VehicleConfig {
     pub navigation: NavigationConfig,
     /// Time limit of the dive.
     pub dive_time: Option<DurNs>,
+    /// Hold times and dead bands of alerts.
+    pub alerts: AlertTiming,
+    /// What there is of cable and time.
+    pub limits: LimitsConfig,
     /// The sensors, in the order of the file, which is the order of their sources.
     pub sensors: Vec<Box<dyn Device>>,
     /// The common part of each sensor's table, in the same order.
@@ -127,6 +132,14 @@ impl VehicleConfig {
             Some(section) => root.part(|| parse_heads(&section, devices))?,
             None => Some((HeadLayout::PhaseShift, 0.0)),
         };
+        let alerts = match root.section("alerts")? {
+            Some(section) => root.part(|| AlertTiming::parse(&section))?,
+            None => Some(AlertTiming::default()),
+        };
+        let limits = match root.section("limits")? {
+            Some(section) => root.part(|| LimitsConfig::parse(&section))?,
+            None => Some(LimitsConfig::default()),
+        };
         if let Some(sensors) = &sensors {
             root.part(|| check_heads(root, &sensors.devices, &hull))?;
             let sound_speed_from = water.as_ref().and_then(|(_, from)| from.as_deref());
@@ -150,6 +163,8 @@ impl VehicleConfig {
             coverage,
             navigation: root.required("navigation", navigation)?,
             dive_time: dive_time.map(|hours| DurNs::from_secs_f64(hours * 3600.0)),
+            alerts: root.required("alerts", alerts)?,
+            limits: root.required("limits", limits)?,
             sensors: sensors.devices,
             sensor_configs: sensors.configs,
             attachments: Vec::new(),
@@ -172,6 +187,8 @@ impl VehicleConfig {
             hull: self.hull.clone(),
             coverage: self.coverage.clone(),
             dive_time: self.dive_time,
+            alerts: self.alerts,
+            limits: LimitsConfig { dive_time: self.limits.dive_time.or(self.dive_time), ..self.limits },
         }
     }
 

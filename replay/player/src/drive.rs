@@ -181,12 +181,15 @@ impl Driver {
     }
 }
 
+/// The ports of the sensors, and of the operator's input unless an operator has it.
 fn take_ports(dive: &mut Loop) -> Result<Vec<Port>, DriveError> {
     let ids: Vec<String> = dive.sources().iter().map(|source| source.id.clone()).collect();
-    ids.into_iter()
-        .enumerate()
+    let sensors = ids.into_iter().enumerate();
+    let mut ports = sensors
         .map(|(index, source_id)| dive.take_port(index).ok_or(DriveError::PortTaken { source_id }))
-        .collect()
+        .collect::<Result<Vec<_>, _>>()?;
+    ports.extend(dive.take_console());
+    Ok(ports)
 }
 
 /// Sends packets received before `until`.

@@ -4,6 +4,7 @@ use std::time::{Duration, Instant};
 
 use crossbeam::channel::{Receiver, RecvTimeoutError};
 use headrace_geometry::time::{DurNs, MonoNs};
+use headrace_monitor::messages::Notice;
 use headrace_monitor::run::Loop;
 use headrace_snapshot::{Restorer, Saver, SnapshotError};
 
@@ -24,6 +25,8 @@ pub enum PlaybackCommand {
     Go,
     /// Runs this many ticks, then pauses.
     Step(u32),
+    /// Plays on until a section is judged, then pauses.
+    StepSection,
     /// Sets the speed: seconds of the dive per second of wall time, or `None` for as fast as possible.
     Speed(Option<f64>),
     /// Jumps to a time on the log's clock, forwards or back; stays playing or paused.
@@ -59,6 +62,9 @@ pub trait PlaybackObserver {
 
     /// Called when paused, after a jump, or with `ended` at the end of the log; `at` is the end of the last tick.
     fn stopped(&mut self, dive: &Loop, at: MonoNs, ended: bool);
+
+    /// Called when it begins to stand still or to play, and when the speed changes.
+    fn mode(&mut self, _paused: bool, _speed: Option<f64>) {}
 }
 
 /// Playback of a log.
@@ -84,6 +90,8 @@ enum Mode {
     Paused,
     /// Ticks left to run before it pauses.
     Stepping(u32),
+    /// Until a section is judged.
+    SteppingSection,
 }
 
 impl<'a> Playback<'a> {
@@ -134,9 +142,10 @@ impl<'a> Playback<'a> {
             let command = match due {
                 None => {
                     // Steps left over at the end are discarded, also for a jump back.
-                    if let Mode::Stepping(_) = self.mode {
+                    if let Mode::Stepping(_) | Mode::SteppingSection = self.mode {
                         self.mode = Mode::Paused;
                     }
+                    observer.mode(true, self.speed);
                     observer.stopped(self.dive, self.now, true);
                     match commands.recv() {
                         Ok(command) => Some(command),
@@ -165,6 +174,8 @@ impl<'a> Playback<'a> {
                 command
             }
             Mode::Stepping(_) => None,
+            // It may take long.
+            Mode::SteppingSection => commands.try_recv().ok(),
             Mode::Playing => match self.clock.left(until) {
                 None => commands.try_recv().ok(),
                 Some(left) => match commands.recv_timeout(left) {
@@ -180,13 +191,21 @@ impl<'a> Playback<'a> {
     }
 
     fn tick(&mut self, observer: &mut dyn PlaybackObserver) -> Result<(), PlaybackError> {
-        self.advance(&mut |dive| observer.after_tick(dive))?;
-        if let Mode::Stepping(left) = self.mode {
-            self.mode = if left > 1 { Mode::Stepping(left - 1) } else { Mode::Paused };
-            if self.mode == Mode::Paused {
+        let mut is_judged = false;
+        self.advance(&mut |dive| {
+            is_judged |= dive.notices().iter().any(|notice| matches!(notice, Notice::Section { .. }));
+            observer.after_tick(dive);
+        })?;
+        self.mode = match self.mode {
+            Mode::Stepping(left) if left > 1 => Mode::Stepping(left - 1),
+            Mode::SteppingSection if !is_judged => Mode::SteppingSection,
+            Mode::Stepping(_) | Mode::SteppingSection => {
+                observer.mode(true, self.speed);
                 observer.stopped(self.dive, self.now, false);
+                Mode::Paused
             }
-        }
+            mode => mode,
+        };
         Ok(())
     }
 
@@ -241,11 +260,13 @@ impl<'a> Playback<'a> {
             PlaybackCommand::Step(ticks) => {
                 self.mode = if ticks > 0 { Mode::Stepping(ticks) } else { Mode::Paused };
             }
+            PlaybackCommand::StepSection => self.mode = Mode::SteppingSection,
             PlaybackCommand::Speed(speed) => self.speed = speed,
             PlaybackCommand::Seek(to) => self.seek(to, observer)?,
             PlaybackCommand::Skip(by) => self.seek(self.now + by, observer)?,
             PlaybackCommand::End => {}
         }
+        observer.mode(self.mode == Mode::Paused, self.speed);
         if matches!(command, PlaybackCommand::Pause | PlaybackCommand::Seek(_) | PlaybackCommand::Skip(_)) {
             observer.stopped(self.dive, self.now, false);
         }

@@ -5,6 +5,7 @@ use std::path::PathBuf;
 
 use headrace_geometry::time::MonoNs;
 use headrace_monitor::SourceInfo;
+use headrace_monitor::console::CONSOLE_ID;
 use headrace_monitor::ring::{MAX_PACKET_BYTES, NO_ORDER, Port, RingError};
 use headrace_sensor::reading::SourceId;
 use serde::{Deserialize, Serialize};
@@ -75,10 +76,12 @@ impl Player {
         self.reader.header()
     }
 
-    /// Matches the log's sources with the loop's, by name. Until then every message counts as unmatched.
+    /// Matches the log's sources with the loop's, by name; the operator's input comes after the sensors. Until then every message
+    /// counts as unmatched.
     pub fn connect(&mut self, sources: &[SourceInfo]) {
         let find = |id: &String| {
-            let index = sources.iter().position(|source| source.id == *id)?;
+            let sensor = sources.iter().position(|source| source.id == *id);
+            let index = sensor.or_else(|| (id == CONSOLE_ID).then_some(sources.len()))?;
             u16::try_from(index).ok().map(SourceId)
         };
         self.sources = self.ids.iter().map(find).collect();

@@ -4,7 +4,7 @@
 use crate::log::format::RESULT_PREFIX;
 
 /// The streams of results in a log; [`headrace_monitor::resources::Digests::streams`] has them in the same order.
-pub(crate) const STREAMS: [&str; 5] = ["poses", "pings", "judgements", "advice", "states"];
+pub(crate) const STREAMS: [&str; 6] = ["poses", "pings", "judgements", "advice", "states", "alerts"];
 /// Words before a message's records.
 pub(crate) const HEAD_WORDS: usize = 2;
 

@@ -6,18 +6,22 @@ use std::path::PathBuf;
 use headrace_monitor::result_stream::{Record, RecordKind, WordKind, first_record};
 use headrace_monitor::run::Loop;
 
+use crate::log::format::RESULT_PREFIX;
 use crate::log::{DiveLog, LogError, MessageKind};
 use crate::results::{STREAMS, read_results, stream_of};
 
 /// Most memory of a stream's results that wait for the replay, bytes; a true log's are a tick ahead.
 const MOST_WAITING: usize = 16 << 20;
 
+/// Streams that older logs don't have.
+const LATER: [&str; 2] = ["states", "alerts"];
+
 /// The first difference between a replay and the dive.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Difference {
     /// The live dive's tick that published it.
     pub tick: u64,
-    /// The stream: poses, pings, judgements or advice.
+    /// The stream: poses, pings, judgements, advice, states or alerts.
     pub stream: &'static str,
     /// Number of the record in its stream, from zero.
     pub record: u64,
@@ -77,8 +81,6 @@ struct Stream {
     same: u64,
     unrecorded: u64,
     difference: Option<Difference>,
-    /// The log has records of it.
-    has_results: bool,
 }
 
 /// A tick's records as read from the log.
@@ -196,9 +198,12 @@ impl Verifier {
                 stream.part(tick, name, What::Missing);
             }
         }
-        // Logs of before the live state was recorded have none.
-        if let Some(states) = self.streams.last_mut().filter(|states| !states.has_results) {
-            states.difference = None;
+        // Logs of before the live state or the list of alerts was recorded have no channel for them.
+        let topics = self.reader.result_topics();
+        for (stream, name) in self.streams.iter_mut().zip(STREAMS).filter(|(_, name)| LATER.contains(name)) {
+            if !topics.iter().any(|topic| topic.strip_prefix(RESULT_PREFIX) == Some(name)) {
+                stream.difference = None;
+            }
         }
         let same = self.streams.iter().map(|stream| stream.same).sum();
         let unrecorded = self.streams.iter().map(|stream| stream.unrecorded).sum();
@@ -247,7 +252,6 @@ impl Verifier {
                 continue;
             };
             self.has_results = true;
-            stream.has_results = true;
             self.last_tick = tick;
             stream.wait(Batch { tick, next, words, at: 0 }, name);
             return Ok(true);

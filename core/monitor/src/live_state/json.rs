@@ -4,8 +4,8 @@
 use serde::Serialize;
 
 use super::{LIVE_STATE_VERSION, Lamp, LiveMetres, LiveState, PositionState, SensorState};
-use crate::app::SourceInfo;
-use crate::pilot_text::station;
+use crate::alert_list::{AlertCountsJson, AlertList, LeftJson, ListedAlertJson, Surroundings};
+use crate::pilot_text::{gain_text, station};
 use headrace_geometry::time::{DurNs, MonoNs};
 
 /// The live state as JSON. Field names are the contract.
@@ -43,8 +43,18 @@ pub struct LiveStateJson {
     pub metres: MetresJson,
     /// The stretch of which nothing could be said that was judged last.
     pub cannot_say: Option<StretchJson>,
-    /// Alerts that hold now.
+    /// Alerts about the dive as a whole that hold now.
     pub alerts: Vec<AlertJson>,
+    /// Counts of the alerts that aren't over.
+    pub alert_counts: AlertCountsJson,
+    /// What would gain more speed, in words; `None` where nothing would.
+    pub remedy: Option<String>,
+    /// What is left of cable, time and battery, where it is told.
+    pub left: LeftJson,
+    /// The alerts, the most urgent first, at most 64; a few of those that are over come last.
+    pub alert_list: Vec<ListedAlertJson>,
+    /// Alerts that aren't over and have found no room in `alert_list`.
+    pub alerts_hidden: usize,
 }
 
 /// A position.
@@ -143,8 +153,10 @@ pub struct AlertJson {
 }
 
 impl LiveState {
-    /// As JSON. `section_m` is the length of a section.
-    pub fn json(&self, sources: &[SourceInfo], section_m: f64) -> LiveStateJson {
+    /// As JSON, with the alerts of the same dive: see [`Loop::live_state_json`](crate::run::Loop::live_state_json).
+    pub fn json(&self, around: &Surroundings<'_>, alerts: &AlertList) -> LiveStateJson {
+        let Surroundings { sources, section_m, .. } = *around;
+        let (shown, alerts_hidden) = alerts.shown();
         let condition = self.condition();
         let advice = self.advice.as_ref();
         let name = |source: usize| sources.get(source).map(|source| source.id.clone());
@@ -201,6 +213,11 @@ impl LiveState {
                     since_s: alert.since.as_secs_f64(),
                 })
                 .collect(),
+            alert_counts: alerts.counts(),
+            remedy: advice.and_then(gain_text),
+            left: alerts.left(self),
+            alert_list: shown.into_iter().map(|alert| alert.json(around, self.now)).collect(),
+            alerts_hidden,
         }
     }
 

@@ -24,7 +24,7 @@ mod unsure;
 
 pub use advice::{AdviceReport, AlternativeReport};
 pub use inspected::{NotInspectedReport, WayReport};
-pub use runs::{ReturnReport, RunReport};
+pub use runs::{ReturnReport, RunReport, way_home};
 pub use sections::{DeviationReport, SectionReport};
 pub use smoothing::{ChangeReport, JudgedReport, MetresReport, SmoothingReport};
 pub use sources::{DeviceClockReport, LineReport, NavigationReport, SourceReport};

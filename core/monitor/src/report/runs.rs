@@ -105,8 +105,8 @@ fn figures(sections: &Sections, run: &Run) -> Option<CauseFigures> {
     Some((&evidence).into())
 }
 
-/// Open runs, from the far end to the portal.
-pub(super) fn way_home(sections: &Sections) -> Vec<ReturnReport> {
+/// What to pass again, as it is judged now: open runs, from the far end to the portal.
+pub fn way_home(sections: &Sections) -> Vec<ReturnReport> {
     let runs: &Runs = sections.runs();
     let open = (0..).map(RunId).zip(runs.all()).filter(|(_, run)| run.is_open());
     let mut stops: Vec<ReturnReport> = open.map(|(id, run)| stop(sections, id, run)).collect();

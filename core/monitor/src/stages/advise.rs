@@ -3,7 +3,7 @@
 use bevy_ecs::prelude::{Res, ResMut, Resource};
 
 use crate::advice_log::{AdviceEntry, AdviceLog};
-use crate::messages::{Notice, Notices, Placed, PlacedList};
+use crate::messages::{AdviceList, Notice, Notices, Placed, PlacedList};
 use crate::resources::{Digests, Tally};
 use crate::result_stream::{RecordKind, ResultStream};
 use headrace_geometry::frames::Vec3;
@@ -77,8 +77,10 @@ pub(super) fn advise(
     mut advisor: ResMut<'_, Advisor>,
     mut log: ResMut<'_, AdviceLog>,
     mut notices: ResMut<'_, Notices>,
+    mut list: ResMut<'_, AdviceList>,
     mut digests: ResMut<'_, Digests>,
 ) {
+    list.0.clear();
     for item in &placed.0 {
         let Placed::Situation(at, situation, _) = item else { continue };
         let begun = tally.span.map(|(first, _)| first);
@@ -88,5 +90,6 @@ pub(super) fn advise(
         let entry = AdviceEntry { at: *at, chainage_m, speed_mps: situation.speed_mps, advice };
         log.take(&entry);
         notices.0.push(Notice::Advice(entry));
+        list.0.push(advice);
     }
 }

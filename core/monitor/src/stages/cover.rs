@@ -4,6 +4,7 @@
 
 use bevy_ecs::prelude::{Res, ResMut, Single};
 
+use super::alerting::RunInputs;
 use super::doubt;
 use super::driving::{Driving, Plan};
 use super::judge::{Results, judge_one};
@@ -13,7 +14,7 @@ use super::walls::{self, Sorting};
 use super::way::{Heads, note_beat};
 use crate::alerts::Alerts;
 use crate::entities::HeadFrontier;
-use crate::messages::{Notices, Outcome, Placed, PlacedList, PlacedPing, Requests, Standings};
+use crate::messages::{Notices, Outcome, Placed, PlacedEvents, PlacedList, PlacedPing, Requests, Standings};
 use crate::resources::{Coverage, Digests, Finder, Tally, Target, TunnelDesign, VehicleEntities};
 use headrace_coverage::{Drive, HeadReach, Loss, Visit};
 use headrace_geometry::time::DurNs;
@@ -24,7 +25,7 @@ const LOOK_AROUND: DurNs = DurNs(1_000_000_000);
 
 #[expect(clippy::too_many_arguments, reason = "a system's arguments are what it reads and writes")]
 pub(super) fn cover(
-    placed: Res<'_, PlacedList>,
+    (placed, of_events): (Res<'_, PlacedList>, Res<'_, PlacedEvents>),
     tunnel: Res<'_, TunnelDesign>,
     entities: Res<'_, VehicleEntities>,
     mut heads: Heads<'_, '_>,
@@ -38,10 +39,12 @@ pub(super) fn cover(
     mut digests: ResMut<'_, Digests>,
     mut alerts: ResMut<'_, Alerts>,
     mut standings: ResMut<'_, Standings>,
+    mut runs: ResMut<'_, RunInputs>,
 ) {
     notices.0.clear();
     standings.0.clear();
-    for item in &placed.0 {
+    runs.0.clear();
+    for (item, event) in placed.0.iter().zip(&of_events.0) {
         match item {
             Placed::Situation(at, situation, doubts) => {
                 doubt::note(*at, situation, doubts, (&mut alerts, &mut notices, &mut digests));
@@ -113,6 +116,8 @@ pub(super) fn cover(
                 notices: &mut notices,
                 digests: &mut digests,
                 alerts: &mut alerts,
+                runs: &mut runs,
+                place: (*event, matches!(item, Placed::Situation(..))),
             };
             judge_one(&request, &tunnel.profile, &mut coverage, &mut results);
         }

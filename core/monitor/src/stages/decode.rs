@@ -3,6 +3,7 @@
 use bevy_ecs::prelude::{Query, Res, ResMut};
 
 use super::sound_speed::SoundSpeed;
+use crate::console::{Commands, Console};
 use crate::entities::{SensorDecoder, SensorHealth, widened};
 use crate::merge::Inbox;
 use crate::messages::{Event, Events};
@@ -15,9 +16,17 @@ pub(super) fn decode(
     mut events: ResMut<'_, Events>,
     mut tally: ResMut<'_, Tally>,
     mut sound_speed: ResMut<'_, SoundSpeed>,
+    mut console: ResMut<'_, Console>,
+    mut commands: ResMut<'_, Commands>,
 ) {
     events.0.clear();
+    commands.0.clear();
     for (source, packet) in inbox.iter() {
+        // No sensor: the dive's times and counts are theirs.
+        if source == console.source {
+            console.take(packet, events.0.len(), &mut commands);
+            continue;
+        }
         tally.packets += 1;
         tally.span = Some(widened(tally.span, packet.received));
         let before = events.0.len();

@@ -4,7 +4,7 @@ use bevy_ecs::prelude::{Query, Res, ResMut};
 
 use crate::entities::{Head, HiddenAngles, MeasuredMotion, Mounted};
 use crate::messages::{
-    Aim, Events, Hidden, Outcome, Placed, PlacedList, PlacedPing, Positioned, PositionedList,
+    Aim, Events, Hidden, Outcome, Placed, PlacedEvents, PlacedList, PlacedPing, Positioned, PositionedList,
 };
 use crate::resources::{Target, TunnelDesign, VehicleEntities};
 use headrace_coverage::{Loss, PassError, Reach};
@@ -28,16 +28,19 @@ pub(super) fn georeference(
     entities: Res<'_, VehicleEntities>,
     mut heads: Heads<'_, '_>,
     mut placed: ResMut<'_, PlacedList>,
+    mut of_events: ResMut<'_, PlacedEvents>,
 ) {
     placed.0.clear();
+    of_events.0.clear();
     for item in &positioned.0 {
         match *item {
-            Positioned::Beat { at, fix, doubts, .. } => {
+            Positioned::Beat { at, fix, doubts, before, .. } => {
                 let situation = situation(at, fix, &tunnel, &target, &heads);
                 placed.0.push(Placed::Situation(at, situation, doubts));
+                of_events.0.push(before);
             }
-            Positioned::Ping { event, fix } => {
-                let Some(event) = events.0.get(event) else { continue };
+            Positioned::Ping { event: index, fix } => {
+                let Some(event) = events.0.get(index) else { continue };
                 let Reading::Sonar(sonar) = event.reading else { continue };
                 let head = entities.of_source(event.source).and_then(|entity| heads.get_mut(entity).ok());
                 let Some((head, mounted, mut motion, hidden)) = head else { continue };
@@ -68,6 +71,7 @@ pub(super) fn georeference(
                     origin: fix.ok().map(|fix| fix.pose.place(mount.position)),
                 };
                 placed.0.push(Placed::Ping(ping));
+                of_events.0.push(index);
             }
         }
     }

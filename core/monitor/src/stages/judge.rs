@@ -1,10 +1,12 @@
 //! Judges a section: verdict, flag and run.
 
+use super::alerting::RunInputs;
+use crate::alert_list::RunInput;
 use crate::alerts::{AlertKind, Alerts};
 use crate::messages::{Notice, Notices};
 use crate::resources::{Coverage, Digests, Finder};
 use crate::result_stream::RecordKind;
-use headrace_coverage::{Judging, Request, RunChange, RunId};
+use headrace_coverage::{Judging, Request, RunChange, RunId, Sections};
 use headrace_geometry::time::MonoNs;
 use headrace_geometry::tunnel::Profile;
 use headrace_sensor::reading::SourceId;
@@ -15,6 +17,9 @@ pub(crate) struct Results<'a> {
     pub(crate) notices: &'a mut Notices,
     pub(crate) digests: &'a mut Digests,
     pub(crate) alerts: &'a mut Alerts,
+    pub(crate) runs: &'a mut RunInputs,
+    /// Index of the event at which is judged, and whether that is at a beat before it.
+    pub(crate) place: (usize, bool),
 }
 
 /// Judges one section and publishes the changes.
@@ -25,13 +30,16 @@ pub(crate) fn judge_one(
     results: &mut Results<'_>,
 ) {
     let Coverage { store, sections, unsure, lacks, .. } = coverage;
-    let Results { finder, notices, digests, alerts } = results;
+    let Results { finder, notices, digests, alerts, runs, place } = results;
+    let begun = notices.0.len();
     let mut tell = |id: RunId, change: RunChange| {
         notices.0.push(Notice::Run { id, at: request.at, change });
         digests.judgements.record(RecordKind::Run).integer(u64::from(id.0)).integer(change as u64);
     };
     let mut judging = Judging { store, lacks, finder: &mut finder.0, profile, tell: &mut tell };
-    let Some(change) = sections.judge(request, &mut judging) else { return };
+    let change = sections.judge(request, &mut judging);
+    note_runs(notices.0.get(begun..).unwrap_or_default(), *place, sections, runs);
+    let Some(change) = change else { return };
     notices.0.push(Notice::Section { section: request.section, at: request.at, change });
     if let Some(here) = sections.unsure(request.section)
         && !unsure.as_mut().is_some_and(|last| last.join(&here, sections.section_m()))
@@ -68,6 +76,19 @@ pub(crate) fn judge_one(
         if alerts.note(AlertKind::ProfileContradicted, request.at, x_m, off_m) {
             notices.0.push(Notice::Alert(AlertKind::ProfileContradicted, None));
             digest_alert(digests, AlertKind::ProfileContradicted, None, request.at, (x_m, off_m));
+        }
+    }
+}
+
+/// Keeps runs that have changed for the list of alerts. Those that are cleared come last: what they have left belongs to the same
+/// alert.
+fn note_runs(notices: &[Notice], place: (usize, bool), sections: &Sections, runs: &mut RunInputs) {
+    for cleared in [false, true] {
+        for notice in notices {
+            let Notice::Run { id, at, change } = *notice else { continue };
+            if (change == RunChange::Cleared) == cleared && runs.0.len() < runs.0.capacity() {
+                runs.0.extend(RunInput::of(place, at, (id, change), sections));
+            }
         }
     }
 }

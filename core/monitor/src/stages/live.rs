@@ -2,14 +2,18 @@
 
 use bevy_ecs::prelude::{Query, Res, ResMut};
 
+use super::alerting::{Alerting, RunInputs};
+use crate::alert_list::{AlertList, Beat};
 use crate::alerts::{AlertKind, Alerts};
+use crate::console::{Commands, Console};
 use crate::entities::{HeadSweep, Mounted};
 use crate::live_state::{
     ActiveAlert, ActiveAlerts, LiveMetres, LiveState, PositionDoubt, PositionState, source_bits,
 };
 use crate::messages::{
-    Doubts, Events, Notice, Notices, Placed, PlacedList, Positioned, PositionedList, Standing, Standings,
+    AdviceList, Doubts, Events, Notices, Placed, PlacedList, Positioned, PositionedList, Standing, Standings,
 };
+use crate::notes::Notes;
 use crate::resources::{Coverage, Digests, TickTime, VehicleEntities};
 use crate::result_stream::{RecordKind, ResultStream};
 use headrace_geometry::time::{DurNs, MonoNs};
@@ -66,7 +70,13 @@ fn active<'a>(
         }
     });
     for (slot, alert) in active.iter_mut().zip(holds) {
-        *slot = Some(ActiveAlert { kind: alert.kind, source: alert.source, since: alert.latest });
+        *slot = Some(ActiveAlert {
+            kind: alert.kind,
+            source: alert.source,
+            since: alert.latest,
+            x_m: alert.x_m,
+            worst_m: alert.worst_m,
+        });
     }
     active
 }
@@ -93,35 +103,37 @@ pub(super) fn live(
     positioned: Res<'_, PositionedList>,
     placed: Res<'_, PlacedList>,
     standings: Res<'_, Standings>,
-    notices: Res<'_, Notices>,
+    (advice, runs, commands): (Res<'_, AdviceList>, Res<'_, RunInputs>, Res<'_, Commands>),
+    mut alerted: (ResMut<'_, AlertList>, ResMut<'_, Notes>, ResMut<'_, Console>),
+    mut notices: ResMut<'_, Notices>,
     entities: Res<'_, VehicleEntities>,
     sensors: Query<'_, '_, &Mounted>,
     time: Res<'_, TickTime>,
     mut state: ResMut<'_, LiveState>,
     mut digests: ResMut<'_, Digests>,
 ) {
-    let mut heard = 0;
-    let mut hear = |state: &mut LiveState, until: usize| {
-        for event in events.0.get(heard..until).unwrap_or_default() {
-            if let Some(slot) = state.heard.get_mut(event.source.index()) {
-                *slot = Some(event.received);
-            }
-        }
-        heard = until;
-    };
     let situations = placed.0.iter().filter_map(|item| match item {
         Placed::Situation(_, situation, _) => Some(situation),
         Placed::Ping(_) => None,
     });
-    let advice = notices.0.iter().filter_map(|notice| match notice {
-        Notice::Advice(entry) => Some(entry.advice),
-        _ => None,
-    });
-    let mut found = situations.zip(advice).zip(&standings.0);
+    let mut found = situations.zip(&advice.0).zip(&standings.0);
+    let Digests { alerts, states, .. } = &mut *digests;
+    let (list, notes, console) = (&mut alerted.0, &mut alerted.1, &mut alerted.2);
+    let mut alerting = Alerting {
+        list,
+        notes,
+        console,
+        runs: &runs,
+        commands: &commands,
+        notices: &mut notices,
+        stream: alerts,
+        events: &events.0,
+        taken: (0, 0, 0),
+    };
     for item in &positioned.0 {
         let Positioned::Beat { at, doubts, sd, before, fix } = item else { continue };
         let Some(((situation, advice), standing)) = found.next() else { continue };
-        hear(&mut state, *before);
+        alerting.before(*before, &mut state);
         let heads = entities.heads.iter().filter_map(|head| sensors.get(*head).ok());
         let turning = (0..).zip(&situation.heads).filter(|(_, motion)| motion.is_some());
         let turning = turning.fold(HeadSet::default(), |set, (head, _)| set.with(head));
@@ -141,16 +153,18 @@ pub(super) fn live(
             sd: *sd,
             pass_sd_m: situation.pass_error_m,
             speed_mps: situation.pose.map(|_| situation.speed_mps),
-            advice: Some(advice),
+            advice: Some(*advice),
             metres: standing.metres,
             unsure: standing.unsure,
             alerts: standing.alerts,
             turning: source_bits(heads.map(|head| head.source), turning),
             ..*state
         };
-        digest(&mut digests.states, *at, situation, &state);
+        digest(states, *at, situation, &state);
+        let as_of = LiveState { now: *at, ..*state };
+        alerting.beat(&Beat { at: *at, state: &as_of, setting: doubts.setting });
     }
-    hear(&mut state, events.0.len());
+    alerting.rest(&mut state);
     state.now = time.now;
 }
 

@@ -3,6 +3,7 @@
 #![allow(clippy::needless_pass_by_value, reason = "bevy hands systems their arguments by value")]
 
 mod advise;
+mod alerting;
 mod cover;
 mod decode;
 mod doubt;
@@ -22,6 +23,7 @@ use bevy_ecs::schedule::{IntoScheduleConfigs, Schedule};
 use super::stage::Stage;
 
 pub(super) use advise::Advisor;
+pub(super) use alerting::RunInputs;
 pub(super) use driving::Driving;
 pub(super) use judge::{Results, judge_one};
 pub(super) use sound_speed::SoundSpeed;

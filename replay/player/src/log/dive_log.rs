@@ -162,6 +162,11 @@ impl<R: Read + Seek> DiveLog<R> {
         &self.info
     }
 
+    /// Topics of results read so far.
+    pub(crate) fn result_topics(&self) -> Vec<String> {
+        self.channels_found().0
+    }
+
     /// Whether the log contains the ticks of the loop that wrote it.
     pub fn has_ticks(&self) -> bool {
         self.has_ticks

@@ -118,8 +118,12 @@ impl View {
             }
             RecordKind::Alert => self.alert(&mut words, made),
             RecordKind::Advice => self.advice(&mut words, made),
-            // Points are samples; doubtful returns and the live state are in the log's results.
-            RecordKind::NoSample | RecordKind::Doubtful | RecordKind::State => Some(()),
+            // Points are samples; doubtful returns, the live state and the list of alerts are in the log's results.
+            RecordKind::NoSample
+            | RecordKind::Doubtful
+            | RecordKind::State
+            | RecordKind::AlertChange
+            | RecordKind::Note => Some(()),
         }
     }
 

@@ -1,0 +1,206 @@
+//! Alerts and notes as JSON. Field names are the contract; `docs/live-state.schema.json` is its schema. Allocates: for outlets.
+
+use serde::Serialize;
+
+use super::words::Surroundings;
+use super::{AlertList, AlertState, Figures, ListedAlert, Priority};
+use crate::live_state::LiveState;
+use crate::notes::Note;
+use crate::pilot_text::station;
+use headrace_geometry::time::MonoNs;
+
+/// Alerts in a list at most.
+pub const MOST_SHOWN: usize = 64;
+/// Cleared ones follow, as long as there are fewer in it.
+const RECENT: usize = 20;
+
+/// An alert.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct ListedAlertJson {
+    /// Its number, from 1; never given again.
+    pub number: u32,
+    /// `emergency_alarm`, `alarm`, `warning` or `caution`.
+    pub priority: &'static str,
+    /// `coverage`, `speed`, `position`, `sensor`, `recording` or `setting`.
+    pub class: &'static str,
+    /// Its kind.
+    pub kind: &'static str,
+    /// What holds.
+    pub text: String,
+    /// What to do; empty where there is nothing.
+    pub advice: String,
+    /// `active`, `rectified` or `cleared`.
+    pub state: AlertState,
+    /// When it was raised first, seconds on the log's clock.
+    pub since_s: f64,
+    /// Since when it holds no longer.
+    pub rectified_s: Option<f64>,
+    /// Since when it is over.
+    pub cleared_s: Option<f64>,
+    /// Who knows of it.
+    pub acknowledged: Option<AcknowledgedJson>,
+    /// Until when its sound is off.
+    pub silenced_until_s: Option<f64>,
+    /// Whether it sounds now.
+    pub sounds: bool,
+    /// Whether somebody must still acknowledge it.
+    pub needs_acknowledgement: bool,
+    /// Where it begins, or where the vehicle was when it was raised, m.
+    pub from_m: Option<f64>,
+    /// Where it ends, m.
+    pub to_m: Option<f64>,
+    /// Where to go back to, m.
+    pub back_to_m: Option<f64>,
+    /// The speed then, m/s.
+    pub at_most_mps: Option<f64>,
+    /// The sensor that it names, by its id.
+    pub sensor: Option<String>,
+    /// Times that it was raised; of missed stretches, those that it stands for.
+    pub count: u32,
+    /// The alert that stands for it now.
+    pub merged_into: Option<u32>,
+}
+
+/// Who has acknowledged an alert.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct AcknowledgedJson {
+    /// By whom.
+    pub by: String,
+    /// When, seconds on the log's clock.
+    pub at_s: f64,
+}
+
+/// Counts of alerts that aren't over.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize)]
+pub struct AlertCountsJson {
+    /// Those that somebody must still acknowledge.
+    pub unacknowledged: u32,
+    /// Those that hold.
+    pub active: u32,
+    /// Of each priority, all that aren't over.
+    pub emergency_alarm: u32,
+    /// See `emergency_alarm`.
+    pub alarm: u32,
+    /// See `emergency_alarm`.
+    pub warning: u32,
+    /// See `emergency_alarm`.
+    pub caution: u32,
+}
+
+/// What is left, where it is told.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
+pub struct LeftJson {
+    /// Cable beyond the vehicle's place, m.
+    pub cable_m: Option<f64>,
+    /// Time, seconds; below zero is over.
+    pub time_s: Option<f64>,
+    /// Charge of the battery, percent.
+    pub battery_pct: Option<f64>,
+}
+
+/// A note.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct NoteJson {
+    /// Its number, from 1.
+    pub number: u32,
+    /// When, seconds on the log's clock.
+    pub at_s: f64,
+    /// By whom.
+    pub by: String,
+    /// Its text; empty for a mark.
+    pub text: String,
+    /// Where the vehicle was, m; `None` without a position.
+    pub chainage_m: Option<f64>,
+    /// The same as engineers write it.
+    pub station: Option<String>,
+}
+
+impl From<&Note> for NoteJson {
+    fn from(note: &Note) -> Self {
+        Self {
+            number: note.number,
+            at_s: note.at.as_secs_f64(),
+            by: note.by.as_str().to_owned(),
+            text: note.text.as_str().to_owned(),
+            chainage_m: note.chainage_m,
+            station: note.chainage_m.map(station),
+        }
+    }
+}
+
+impl ListedAlert {
+    /// As JSON, at `now`.
+    pub fn json(&self, around: &Surroundings<'_>, now: MonoNs) -> ListedAlertJson {
+        let (from_m, to_m) = self.bounds_m(around.section_m);
+        let seconds = |at: Option<MonoNs>| at.map(MonoNs::as_secs_f64);
+        let at_most_mps = match self.figures {
+            Figures::Missed(_, _, mps) => Some(mps),
+            Figures::Advice(figures) => Some(figures.v_max_mps),
+            _ => None,
+        };
+        let is_missed = matches!(self.figures, Figures::Missed(..));
+        ListedAlertJson {
+            number: self.number,
+            priority: self.priority.as_str(),
+            class: self.kind.class().as_str(),
+            kind: self.kind.as_str(),
+            text: self.text(around),
+            advice: self.advice(around),
+            state: self.state,
+            since_s: self.since.as_secs_f64(),
+            rectified_s: seconds(self.rectified),
+            cleared_s: seconds(self.cleared),
+            acknowledged: self
+                .acknowledged
+                .map(|by| AcknowledgedJson { by: by.by.as_str().to_owned(), at_s: by.at.as_secs_f64() }),
+            silenced_until_s: seconds(self.silenced_until),
+            sounds: self.sounds(now),
+            needs_acknowledgement: self.needs_acknowledgement(),
+            from_m,
+            to_m,
+            back_to_m: from_m.filter(|_| is_missed),
+            at_most_mps: at_most_mps.filter(|mps| *mps > 0.0),
+            sensor: self.source.and_then(|source| Some(around.sources.get(source.index())?.id.clone())),
+            count: self.count,
+            merged_into: self.merged_into,
+        }
+    }
+}
+
+impl AlertList {
+    /// What to show, the most urgent first, and the number of alerts that aren't over and have found no room. A few of those that
+    /// are over come last.
+    pub fn shown(&self) -> (Vec<&ListedAlert>, usize) {
+        let mut all: Vec<&ListedAlert> = self.iter().collect();
+        all.sort_by_key(|alert| alert.rank());
+        let live = all.iter().filter(|alert| alert.is_live()).count();
+        all.truncate(if live > RECENT { live.min(MOST_SHOWN) } else { RECENT });
+        (all, live.saturating_sub(MOST_SHOWN))
+    }
+
+    /// Counts of those that aren't over.
+    pub fn counts(&self) -> AlertCountsJson {
+        let mut counts = AlertCountsJson::default();
+        for alert in self.iter().filter(|alert| alert.is_live()) {
+            counts.unacknowledged += u32::from(alert.needs_acknowledgement());
+            counts.active += u32::from(alert.state == AlertState::Active);
+            let of_priority = match alert.priority {
+                Priority::EmergencyAlarm => &mut counts.emergency_alarm,
+                Priority::Alarm => &mut counts.alarm,
+                Priority::Warning => &mut counts.warning,
+                Priority::Caution => &mut counts.caution,
+            };
+            *of_priority += 1;
+        }
+        counts
+    }
+
+    /// What is left, as of a live state.
+    pub fn left(&self, state: &LiveState) -> LeftJson {
+        LeftJson {
+            cable_m: self.cable_left_m(state.chainage_m),
+            time_s: self.time_left_s(state.at.unwrap_or(state.now)),
+            battery_pct: self.battery_pct(),
+        }
+    }
+}

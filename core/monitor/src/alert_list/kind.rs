@@ -1,0 +1,218 @@
+//! Kinds of alerts, their classes and priorities.
+
+use serde::{Deserialize, Serialize};
+
+use crate::alerts::AlertKind;
+pub use headrace_vehicle::AlertClass;
+
+/// How urgent an alert is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Priority {
+    /// To be known; needs no acknowledgement.
+    Caution,
+    /// To be attended to before it becomes worse.
+    Warning,
+    /// Something must be done.
+    Alarm,
+    /// The vehicle may be lost.
+    EmergencyAlarm,
+}
+
+impl Priority {
+    /// The word used in JSON.
+    pub fn as_str(self) -> &'static str {
+        match self {
+            Self::Caution => "caution",
+            Self::Warning => "warning",
+            Self::Alarm => "alarm",
+            Self::EmergencyAlarm => "emergency_alarm",
+        }
+    }
+}
+
+/// Kind of an alert of the list.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+pub enum ListKind {
+    /// Flagged sections.
+    Missed,
+    /// Nothing can be said of what is judged now.
+    CannotSay,
+    /// Over v_max.
+    TooFast,
+    /// Slower won't help.
+    NoSpeed,
+    /// The present turn misses the target, though the speed is within v_max.
+    TurnFails,
+    /// There is no position.
+    NoPosition,
+    /// The position is too uncertain.
+    PositionDoubtful,
+    /// No profiling head gives readings.
+    NoSonar,
+    /// Nothing comes from any sensor.
+    NoData,
+    /// A sensor gives no readings.
+    SensorSilent,
+    /// A head doesn't turn.
+    SensorStalled,
+    /// See [`AlertKind::HeadScattered`].
+    HeadScattered,
+    /// See [`AlertKind::HeadConstant`].
+    HeadConstant,
+    /// See [`AlertKind::HeadOutvoted`].
+    HeadOutvoted,
+    /// See [`AlertKind::CableDoubted`].
+    CableDoubted,
+    /// See [`AlertKind::SettingDoubted`].
+    SettingDoubted,
+    /// See [`AlertKind::OutsideTunnel`].
+    OutsideTunnel,
+    /// See [`AlertKind::ProfileContradicted`].
+    ProfileContradicted,
+    /// A recording fails.
+    NotRecorded,
+    /// Little cable is left.
+    CableLeft,
+    /// Little time is left.
+    TimeLeft,
+    /// Little charge is left.
+    BatteryLeft,
+}
+
+impl ListKind {
+    /// All of them.
+    pub const ALL: [Self; 22] = [
+        Self::Missed,
+        Self::CannotSay,
+        Self::TooFast,
+        Self::NoSpeed,
+        Self::TurnFails,
+        Self::NoPosition,
+        Self::PositionDoubtful,
+        Self::NoSonar,
+        Self::NoData,
+        Self::SensorSilent,
+        Self::SensorStalled,
+        Self::HeadScattered,
+        Self::HeadConstant,
+        Self::HeadOutvoted,
+        Self::CableDoubted,
+        Self::SettingDoubted,
+        Self::OutsideTunnel,
+        Self::ProfileContradicted,
+        Self::NotRecorded,
+        Self::CableLeft,
+        Self::TimeLeft,
+        Self::BatteryLeft,
+    ];
+
+    /// The word used in JSON.
+    pub fn as_str(self) -> &'static str {
+        match self {
+            Self::Missed => "missed",
+            Self::CannotSay => "cannot_say",
+            Self::TooFast => "too_fast",
+            Self::NoSpeed => "no_speed",
+            Self::TurnFails => "turn_fails",
+            Self::NoPosition => "no_position",
+            Self::PositionDoubtful => "position_doubtful",
+            Self::NoSonar => "no_sonar",
+            Self::NoData => "no_data",
+            Self::SensorSilent => "sensor_silent",
+            Self::SensorStalled => "sensor_stalled",
+            Self::HeadScattered => AlertKind::HeadScattered.as_str(),
+            Self::HeadConstant => AlertKind::HeadConstant.as_str(),
+            Self::HeadOutvoted => AlertKind::HeadOutvoted.as_str(),
+            Self::CableDoubted => AlertKind::CableDoubted.as_str(),
+            Self::SettingDoubted => AlertKind::SettingDoubted.as_str(),
+            Self::OutsideTunnel => AlertKind::OutsideTunnel.as_str(),
+            Self::ProfileContradicted => AlertKind::ProfileContradicted.as_str(),
+            Self::NotRecorded => "not_recorded",
+            Self::CableLeft => "cable_left",
+            Self::TimeLeft => "time_left",
+            Self::BatteryLeft => "battery_left",
+        }
+    }
+
+    /// Its class, by which sounds are muted, and hold times set.
+    pub fn class(self) -> AlertClass {
+        match self {
+            Self::Missed | Self::CannotSay => AlertClass::Coverage,
+            Self::TooFast | Self::NoSpeed | Self::TurnFails => AlertClass::Speed,
+            Self::NoPosition | Self::PositionDoubtful | Self::CableDoubted => AlertClass::Position,
+            Self::NoSonar
+            | Self::NoData
+            | Self::SensorSilent
+            | Self::SensorStalled
+            | Self::HeadScattered
+            | Self::HeadConstant
+            | Self::HeadOutvoted => AlertClass::Sensor,
+            Self::NotRecorded => AlertClass::Recording,
+            Self::SettingDoubted
+            | Self::OutsideTunnel
+            | Self::ProfileContradicted
+            | Self::CableLeft
+            | Self::TimeLeft
+            | Self::BatteryLeft => AlertClass::Setting,
+        }
+    }
+
+    /// Its priority when it is raised; what is left may make it more urgent.
+    pub fn priority(self) -> Priority {
+        match self {
+            Self::CannotSay | Self::TurnFails => Priority::Caution,
+            Self::TooFast
+            | Self::NoSpeed
+            | Self::PositionDoubtful
+            | Self::SensorSilent
+            | Self::SensorStalled
+            | Self::HeadScattered
+            | Self::HeadConstant
+            | Self::HeadOutvoted
+            | Self::SettingDoubted
+            | Self::CableLeft
+            | Self::TimeLeft
+            | Self::BatteryLeft => Priority::Warning,
+            Self::Missed
+            | Self::NoPosition
+            | Self::NoSonar
+            | Self::NoData
+            | Self::CableDoubted
+            | Self::OutsideTunnel
+            | Self::ProfileContradicted
+            | Self::NotRecorded => Priority::Alarm,
+        }
+    }
+
+    /// The alert about the dive as a whole that it tells of.
+    pub(super) fn of_dive(self) -> Option<AlertKind> {
+        AlertKind::ALL.into_iter().find(|kind| Self::from(*kind) == self)
+    }
+
+    /// Whether there may be one for each sensor.
+    pub(super) fn is_of_sensor(self) -> bool {
+        matches!(
+            self,
+            Self::SensorSilent
+                | Self::SensorStalled
+                | Self::HeadScattered
+                | Self::HeadConstant
+                | Self::HeadOutvoted
+        )
+    }
+}
+
+impl From<AlertKind> for ListKind {
+    fn from(kind: AlertKind) -> Self {
+        match kind {
+            AlertKind::OutsideTunnel => Self::OutsideTunnel,
+            AlertKind::ProfileContradicted => Self::ProfileContradicted,
+            AlertKind::HeadScattered => Self::HeadScattered,
+            AlertKind::HeadConstant => Self::HeadConstant,
+            AlertKind::HeadOutvoted => Self::HeadOutvoted,
+            AlertKind::CableDoubted => Self::CableDoubted,
+            AlertKind::SettingDoubted => Self::SettingDoubted,
+        }
+    }
+}

@@ -1,0 +1,186 @@
+//! Missed stretches: an alert per run of flagged sections, merged as they are.
+
+use super::{AlertChange, AlertList, AlertState, Figures, ListKind, ListedAlert, Telling};
+use crate::pilot_text::CauseFigures;
+use headrace_coverage::{RunChange, RunId, Sections};
+use headrace_geometry::time::MonoNs;
+
+/// A run that has changed, as it was then.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct RunInput {
+    /// Index of the event at which it was judged; of a beat, of the event that it precedes.
+    pub(crate) event: usize,
+    /// Judged at a beat, which comes before that event.
+    pub(crate) at_beat: bool,
+    pub(crate) at: MonoNs,
+    pub(crate) id: RunId,
+    pub(crate) change: RunChange,
+    stretch: (i64, i64),
+    /// Causes and arc length of the worst hole, m.
+    causes: Option<(CauseFigures, f64)>,
+    merged_into: Option<RunId>,
+}
+
+impl RunInput {
+    /// Of a run after a judgement; `None` if there is no such run.
+    pub(crate) fn of(
+        (event, at_beat): (usize, bool),
+        at: MonoNs,
+        (id, change): (RunId, RunChange),
+        sections: &Sections,
+    ) -> Option<Self> {
+        let run = sections.runs().get(id)?;
+        let evidence = sections.get(run.worst.0).and_then(|section| section.evidence);
+        let causes = evidence.map(|evidence| (CauseFigures::from(&evidence), run.worst.1.arc_m));
+        let stretch = (run.from, run.to);
+        Some(Self { event, at_beat, at, id, change, stretch, causes, merged_into: run.merged_into })
+    }
+}
+
+impl AlertList {
+    /// Takes a run's change.
+    pub(crate) fn take_run(&mut self, input: &RunInput, to: &mut Telling<'_>) {
+        let at = input.at;
+        match input.change {
+            RunChange::Raised => self.raise_run(input, to),
+            RunChange::Changed => {
+                let number = self.alert_of(input.id);
+                self.widen(number, input, to);
+            }
+            RunChange::Cleared => {
+                let number = self.alert_of(input.id);
+                self.set_alert_of(input.id, 0);
+                self.close_run(number, at, to);
+            }
+            RunChange::Merged => self.merge_runs(input, to),
+        }
+    }
+
+    fn alert_of(&self, id: RunId) -> u32 {
+        self.by_run.get(id.0 as usize).copied().unwrap_or(0)
+    }
+
+    fn set_alert_of(&mut self, id: RunId, number: u32) {
+        // Within its room: there are no more runs than sections.
+        while self.by_run.len() <= id.0 as usize && self.by_run.len() < self.by_run.capacity() {
+            self.by_run.push(0);
+        }
+        if let Some(slot) = self.by_run.get_mut(id.0 as usize) {
+            *slot = number;
+        }
+    }
+
+    fn raise_run(&mut self, input: &RunInput, to: &mut Telling<'_>) {
+        let v_max_mps = self.v_max_mps;
+        let figures =
+            input.causes.map_or(Figures::None, |(causes, arc_m)| Figures::Missed(causes, arc_m, v_max_mps));
+        // Part of a stretch that is told already: another cause, or what a later pass left of it.
+        let (from, until) = input.stretch;
+        let has = |alert: &&ListedAlert| {
+            alert.kind == ListKind::Missed
+                && alert.is_live()
+                && alert.stretch.is_some_and(|(of, to)| of <= from && until <= to)
+        };
+        let number = if let Some(known) = self.alerts.iter_mut().filter(|alert| has(&&**alert)).next_back() {
+            known.figures = figures;
+            known.open_runs += 1;
+            let (number, state) = (known.number, known.state);
+            if state == AlertState::Rectified {
+                self.hold_again(number, input.at, to);
+            }
+            number
+        } else {
+            self.raise(ListKind::Missed, None, (input.at, figures), Some(input.stretch), to)
+        };
+        self.set_alert_of(input.id, number);
+    }
+
+    /// A stretch has grown. It doesn't shrink: what a later pass mends in the middle of it leaves one alert.
+    fn widen(&mut self, number: u32, input: &RunInput, to: &mut Telling<'_>) {
+        let Some(alert) = self.get_mut(number) else { return };
+        let (from, until) = alert.stretch.unwrap_or(input.stretch);
+        let wide = (from.min(input.stretch.0), until.max(input.stretch.1));
+        let is_wider = alert.stretch != Some(wide);
+        if let (Figures::Missed(causes, arc_m, _), Some((now, hole_m))) = (&mut alert.figures, input.causes)
+            && alert.open_runs == 1
+        {
+            (*causes, *arc_m) = (now, hole_m);
+        }
+        alert.stretch = Some(wide);
+        let alert = *alert;
+        if is_wider {
+            to.tell(&alert, AlertChange::Changed, input.at);
+        }
+    }
+
+    fn close_run(&mut self, number: u32, at: MonoNs, to: &mut Telling<'_>) {
+        let Some(alert) = self.get_mut(number) else { return };
+        alert.open_runs = alert.open_runs.saturating_sub(1);
+        if alert.open_runs == 0 {
+            self.rectify(number, at, to);
+        }
+    }
+
+    /// Two runs have become one: of their alerts the one with the lower number stands for both.
+    fn merge_runs(&mut self, input: &RunInput, to: &mut Telling<'_>) {
+        let Some(into) = input.merged_into else { return };
+        let (other, kept) = (self.alert_of(input.id), self.alert_of(into));
+        self.set_alert_of(input.id, 0);
+        if other == kept {
+            // Two runs of one alert are one now.
+            if let Some(alert) = self.get_mut(kept) {
+                alert.open_runs = alert.open_runs.saturating_sub(1);
+            }
+            return;
+        }
+        let (low, high) = (other.min(kept), other.max(kept));
+        if low == 0 {
+            return;
+        }
+        self.merge(low, high, input.at, to);
+        if let Some(alert) = self.get_mut(low) {
+            alert.open_runs = alert.open_runs.saturating_sub(1);
+        }
+    }
+
+    /// Lets the alert `low` stand for `high`, which is over.
+    fn merge(&mut self, low: u32, high: u32, at: MonoNs, to: &mut Telling<'_>) {
+        let Some(gone) = self.get_mut(high) else { return };
+        let before = *gone;
+        (gone.state, gone.cleared) = (AlertState::Cleared, Some(at));
+        (gone.merged_into, gone.open_runs) = (Some(low), 0);
+        let gone = *gone;
+        for of_run in self.by_run.iter_mut().filter(|number| **number == high) {
+            *of_run = low;
+        }
+        let Some(kept) = self.get_mut(low) else { return };
+        let both = kept.stretch.zip(before.stretch);
+        kept.stretch = both.map(|(one, other)| (one.0.min(other.0), one.1.max(other.1))).or(kept.stretch);
+        kept.count += before.count;
+        kept.open_runs += before.open_runs;
+        // What nobody knew of isn't hidden behind what somebody did.
+        if before.needs_acknowledgement() {
+            (kept.acknowledged, kept.silenced_until) = (None, before.silenced_until);
+        }
+        if before.state == AlertState::Active {
+            (kept.state, kept.rectified) = (AlertState::Active, None);
+        }
+        let kept = *kept;
+        to.tell(&gone, AlertChange::Cleared, at);
+        to.tell(&kept, AlertChange::Changed, at);
+    }
+
+    /// Where the list is full of live alerts: the newest missed stretch shares the alert of its nearest neighbour.
+    pub(super) fn share_one(&mut self, at: MonoNs, to: &mut Telling<'_>) {
+        let stretches = || {
+            let missed = self.alerts.iter().filter(|alert| alert.kind == ListKind::Missed && alert.is_live());
+            missed.filter_map(|alert| Some((alert.number, alert.stretch?)))
+        };
+        let Some((number, (from, until))) = stretches().next_back() else { return };
+        let others = stretches().filter(|(other, _)| *other != number);
+        let nearest = others.min_by_key(|(_, (of, to))| (of - until).max(from - to));
+        if let Some((nearest, _)) = nearest {
+            self.merge(nearest, number, at, to);
+        }
+    }
+}

@@ -1,0 +1,138 @@
+//! Words for alerts, made of the table that the pilot's other lines are made of. Allocates: for outlets, not for a tick.
+
+use super::{Figures, ListKind, ListedAlert};
+use crate::app::SourceInfo;
+use crate::live_text::{helps_text, no_position_text, unsure_text};
+use crate::pilot_text::{
+    actions_text, advice_text, alert_text, cause_text, setting_text, speed_text, station,
+};
+use crate::telling::UnsureStretch;
+use headrace_coverage::{Action, Sections};
+use headrace_geometry::tunnel::Profile;
+
+/// What words need of the dive.
+#[derive(Debug, Clone, Copy)]
+pub struct Surroundings<'a> {
+    /// The sources, for their ids.
+    pub sources: &'a [SourceInfo],
+    /// The tunnel, for clock positions.
+    pub profile: &'a Profile,
+    /// Length of a section, m.
+    pub section_m: f64,
+    /// Target T, m.
+    pub target_m: f64,
+    /// Standard deviations of a hole that a verdict keeps clear of the target.
+    pub confidence_sd: f64,
+}
+
+impl<'a> Surroundings<'a> {
+    /// Those of a dive.
+    pub(crate) fn of(sources: &'a [SourceInfo], profile: &'a Profile, sections: &Sections) -> Self {
+        Self {
+            sources,
+            profile,
+            section_m: sections.section_m(),
+            target_m: sections.target_m(),
+            confidence_sd: sections.confidence_sd(),
+        }
+    }
+
+    fn name(&self, source: usize) -> String {
+        self.sources.get(source).map_or_else(String::new, |source| source.id.clone())
+    }
+}
+
+impl ListedAlert {
+    /// Where it begins and ends, m.
+    pub fn bounds_m(&self, section_m: f64) -> (Option<f64>, Option<f64>) {
+        match self.stretch {
+            Some((from, to)) => (Some(from as f64 * section_m), Some(to as f64 * section_m)),
+            None => (self.x_m, None),
+        }
+    }
+
+    /// What holds.
+    pub fn text(&self, around: &Surroundings<'_>) -> String {
+        let name = self.source.map(|source| around.name(source.index())).unwrap_or_default();
+        let place = match self.bounds_m(around.section_m) {
+            (Some(from_m), Some(to_m)) => format!("{} to {}", station(from_m), station(to_m)),
+            _ => String::new(),
+        };
+        match (self.kind, &self.figures) {
+            (_, Figures::Missed(causes, arc_m, _)) => {
+                let clock = around.profile.clock(*arc_m);
+                format!("MISSED {place}, at {clock}: {}", cause_text(causes))
+            }
+            (_, Figures::CannotSay(stretch)) => {
+                let stretch = UnsureStretch::from_sections(stretch, around.section_m, around.confidence_sd);
+                format!("CAN'T SAY {place}: {}", unsure_text(&stretch))
+            }
+            (ListKind::TooFast, Figures::Advice(figures)) => {
+                format!("TOO FAST: {:.2} m/s, at most {:.2} m/s", figures.speed_mps, figures.v_max_mps)
+            }
+            (ListKind::TurnFails, Figures::Advice(figures)) => {
+                format!(
+                    "THIS TURN MISSES: heads {:.0} degrees out of phase",
+                    figures.phase_error_rad.to_degrees().abs()
+                )
+            }
+            (_, Figures::Advice(figures)) => advice_text(figures, around.profile),
+            (_, Figures::Lacking(lacking)) => no_position_text(*lacking).to_owned(),
+            (_, Figures::Error(error_m)) => format!("CAN'T SAY: position ±{error_m:.2} m"),
+            (kind, Figures::Deviation(x_m, off_m)) => match kind.of_dive() {
+                Some(of_dive) => place_first(&alert_text(of_dive, &name, *x_m, *off_m), *x_m),
+                None => String::new(),
+            },
+            (_, Figures::Setting(doubt, x_m)) => {
+                let name = |source: u16| around.name(source.into());
+                place_first(&setting_text(doubt, *x_m, &name), *x_m)
+            }
+            (ListKind::CableLeft, Figures::Left(left_m)) => format!("{left_m:.0} m of cable left"),
+            (ListKind::TimeLeft, Figures::Left(left_s)) => match left_s / 60.0 {
+                min if min < 0.0 => format!("{:.0} min over the dive's time", -min),
+                min => format!("{min:.0} min of the dive left"),
+            },
+            (_, Figures::Left(left_pct)) => format!("battery at {left_pct:.0} %"),
+            (kind, Figures::None) => plain_text(kind, &name, &place),
+        }
+    }
+
+    /// What to do; empty where there is nothing.
+    pub fn advice(&self, around: &Surroundings<'_>) -> String {
+        match (self.kind, &self.figures) {
+            (_, Figures::Missed(causes, _, at_most_mps)) => {
+                let from_m = self.bounds_m(around.section_m).0.unwrap_or(0.0);
+                actions_text(&Action::against(causes.causes), from_m, *at_most_mps)
+            }
+            (_, Figures::CannotSay(stretch)) => helps_text(stretch.why).to_owned(),
+            (ListKind::TooFast, Figures::Advice(figures)) => speed_text("at most", figures.v_max_mps),
+            (ListKind::TurnFails, Figures::Advice(figures)) => speed_text("go", figures.v_max_mps),
+            (ListKind::NoPosition, _) => "hold still".to_owned(),
+            (ListKind::PositionDoubtful, _) => "slower, or again with a surer position".to_owned(),
+            (ListKind::NoSonar | ListKind::NoData, _) => "stop".to_owned(),
+            (ListKind::NotRecorded, _) => "free the disk, or change the medium".to_owned(),
+            (ListKind::CableLeft | ListKind::TimeLeft | ListKind::BatteryLeft, _) => "turn back".to_owned(),
+            _ => String::new(),
+        }
+    }
+}
+
+fn plain_text(kind: ListKind, name: &str, place: &str) -> String {
+    match kind {
+        ListKind::SensorSilent => format!("{name} silent"),
+        ListKind::SensorStalled => format!("{name} doesn't turn"),
+        ListKind::NoSonar => "NO SONAR: nothing is seen".to_owned(),
+        ListKind::NoData => "NO DATA: nothing from any sensor".to_owned(),
+        ListKind::NotRecorded => "NOT RECORDED: the recording fails".to_owned(),
+        ListKind::Missed => format!("MISSED {place}"),
+        ListKind::TooFast => "TOO FAST".to_owned(),
+        kind => kind.as_str().replace('_', " "),
+    }
+}
+
+/// The words of a line that begins with `ch` and its place.
+fn place_first(text: &str, x_m: f64) -> String {
+    let place = station(x_m);
+    let said = text.strip_prefix(&format!("ch {place}")).unwrap_or(text).trim_start();
+    format!("{place}: {said}")
+}

@@ -1,0 +1,332 @@
+//! Commands and their JSON: read strictly, without allocation.
+
+use core::fmt::Write as _;
+
+use super::text::ShortText;
+use serde::{Deserialize, Serialize};
+
+/// Longest packet.
+pub const MAX_COMMAND_BYTES: usize = 512;
+/// Longest note, bytes.
+pub const MAX_NOTE_BYTES: usize = 240;
+
+/// Who commands: initials, a name, or a device.
+pub type Who = ShortText<16>;
+/// Text of a note.
+pub type NoteText = ShortText<MAX_NOTE_BYTES>;
+
+/// A command.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[expect(clippy::large_enum_variant, reason = "copied into room that is there already; a box would allocate")]
+pub enum Command {
+    /// Acknowledges the alert of this number; 0 for all that need it.
+    Acknowledge {
+        /// Its number.
+        alert: u32,
+        /// By whom.
+        by: Who,
+    },
+    /// Silences all that sound, for 30 s.
+    Silence {
+        /// By whom.
+        by: Who,
+    },
+    /// A note at the present place.
+    Note {
+        /// Its text; empty for a mark.
+        text: NoteText,
+        /// By whom.
+        by: Who,
+    },
+    /// From the program: a recording fails, or goes on.
+    Recording {
+        /// Whether it fails.
+        fails: bool,
+    },
+    /// What is told of the vehicle from outside.
+    Limits {
+        /// Charge of its battery, percent.
+        battery_pct: f64,
+    },
+    /// From the program: the time goes on though no sensor speaks.
+    Time,
+}
+
+/// Why bytes are no command.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[error("reading a command, at byte {at}: expected {expected}")]
+pub struct CommandError {
+    /// Place of the first byte that is wrong.
+    pub at: usize,
+    /// What is allowed there.
+    pub expected: &'static str,
+}
+
+/// Keys of a command.
+const KEYS: [&str; 6] = ["do", "alert", "by", "text", "fails", "battery_pct"];
+
+/// Values of the keys so far.
+#[derive(Default)]
+struct Values {
+    what: Option<Who>,
+    alert: Option<u32>,
+    by: Option<Who>,
+    text: Option<NoteText>,
+    fails: Option<bool>,
+    battery_pct: Option<f64>,
+}
+
+impl Command {
+    /// Whether an operator may send it; the others come from the program itself.
+    pub fn is_operators(&self) -> bool {
+        matches!(self, Self::Acknowledge { .. } | Self::Silence { .. } | Self::Note { .. })
+    }
+
+    /// Reads a packet: one JSON object with the keys of its command and no others. Allocates: never.
+    ///
+    /// Errors: what isn't as it must be first.
+    pub fn parse(bytes: &[u8]) -> Result<Self, CommandError> {
+        if bytes.len() > MAX_COMMAND_BYTES {
+            return Err(CommandError { at: MAX_COMMAND_BYTES, expected: "at most 512 bytes" });
+        }
+        let text = core::str::from_utf8(bytes)
+            .map_err(|error| CommandError { at: error.valid_up_to(), expected: "UTF-8" })?;
+        let mut scan = Scan { text, at: 0 };
+        let values = scan.object()?;
+        values.command().map_err(|expected| CommandError { at: 0, expected })
+    }
+
+    /// As a packet.
+    pub fn to_json(&self) -> String {
+        let mut json = String::with_capacity(64);
+        let by = |json: &mut String, by: &Who| quote(json, ",\"by\":", by.as_str());
+        match self {
+            Self::Acknowledge { alert, by: who } => {
+                write!(json, "{{\"do\":\"acknowledge\",\"alert\":{alert}").unwrap_or_default();
+                by(&mut json, who);
+            }
+            Self::Silence { by: who } => {
+                json.push_str("{\"do\":\"silence\"");
+                by(&mut json, who);
+            }
+            Self::Note { text, by: who } if text.as_str().is_empty() => {
+                json.push_str("{\"do\":\"mark\"");
+                by(&mut json, who);
+            }
+            Self::Note { text, by: who } => {
+                json.push_str("{\"do\":\"note\"");
+                quote(&mut json, ",\"text\":", text.as_str());
+                by(&mut json, who);
+            }
+            Self::Recording { fails } => {
+                write!(json, "{{\"do\":\"recording\",\"fails\":{fails}").unwrap_or_default();
+            }
+            Self::Limits { battery_pct } => {
+                write!(json, "{{\"do\":\"limits\",\"battery_pct\":{battery_pct:?}").unwrap_or_default();
+            }
+            Self::Time => json.push_str("{\"do\":\"time\""),
+        }
+        json.push('}');
+        json
+    }
+}
+
+/// Adds a key and a text, which has no control characters.
+fn quote(json: &mut String, key: &str, text: &str) {
+    json.push_str(key);
+    json.push('"');
+    for char in text.chars() {
+        if matches!(char, '"' | '\\') {
+            json.push('\\');
+        }
+        json.push(char);
+    }
+    json.push('"');
+}
+
+impl Values {
+    /// The command, which has all its keys and no other.
+    fn command(self) -> Result<Command, &'static str> {
+        let Self { what, alert, by, text, fails, battery_pct } = self;
+        let what = what.ok_or("the key \"do\"")?;
+        Ok(match (what.as_str(), alert, by, text, fails, battery_pct) {
+            ("acknowledge", Some(alert), Some(by), None, None, None) => Command::Acknowledge { alert, by },
+            ("acknowledge", ..) => return Err("acknowledge with \"alert\" and \"by\""),
+            ("silence", None, Some(by), None, None, None) => Command::Silence { by },
+            ("silence", ..) => return Err("silence with \"by\""),
+            ("note", None, Some(by), Some(text), None, None) if !text.as_str().is_empty() => {
+                Command::Note { text, by }
+            }
+            ("note", ..) => return Err("note with \"text\" and \"by\""),
+            ("mark", None, Some(by), None, None, None) => Command::Note { text: NoteText::default(), by },
+            ("mark", ..) => return Err("mark with \"by\""),
+            ("recording", None, None, None, Some(fails), None) => Command::Recording { fails },
+            ("recording", ..) => return Err("recording with \"fails\""),
+            ("limits", None, None, None, None, Some(battery_pct)) => Command::Limits { battery_pct },
+            ("limits", ..) => return Err("limits with \"battery_pct\""),
+            ("time", None, None, None, None, None) => Command::Time,
+            ("time", ..) => return Err("time without other keys"),
+            _ => return Err("acknowledge, silence, note, mark, recording, limits or time"),
+        })
+    }
+}
+
+/// A place in a text.
+struct Scan<'a> {
+    text: &'a str,
+    at: usize,
+}
+
+impl Scan<'_> {
+    fn rest(&self) -> &str {
+        self.text.get(self.at..).unwrap_or_default()
+    }
+
+    fn wrong<T>(&self, expected: &'static str) -> Result<T, CommandError> {
+        Err(CommandError { at: self.at, expected })
+    }
+
+    fn skip_space(&mut self) {
+        let is_space = |byte: &u8| matches!(byte, b' ' | b'\t' | b'\n' | b'\r');
+        self.at += self.rest().bytes().take_while(is_space).count();
+    }
+
+    /// Whether `word` comes next, after blanks; it is passed then.
+    fn has(&mut self, word: &str) -> bool {
+        self.skip_space();
+        let has = self.rest().starts_with(word);
+        self.at += if has { word.len() } else { 0 };
+        has
+    }
+
+    fn object(&mut self) -> Result<Values, CommandError> {
+        let mut values = Values::default();
+        if !self.has("{") {
+            return self.wrong("{");
+        }
+        loop {
+            self.pair(&mut values)?;
+            if self.has(",") {
+                continue;
+            }
+            if !self.has("}") {
+                return self.wrong(", or }");
+            }
+            self.skip_space();
+            return if self.rest().is_empty() { Ok(values) } else { self.wrong("nothing after the object") };
+        }
+    }
+
+    fn pair(&mut self, values: &mut Values) -> Result<(), CommandError> {
+        self.skip_space();
+        let from = self.at;
+        let key: Who = self.string("a key of a command")?;
+        if !self.has(":") {
+            return self.wrong(":");
+        }
+        self.skip_space();
+        let number = KEYS.iter().position(|known| *known == key.as_str());
+        let is_new = match number {
+            Some(0) => values.what.replace(self.string("a command of at most 16 bytes")?).is_none(),
+            Some(1) => values.alert.replace(self.alert()?).is_none(),
+            Some(2) => values.by.replace(self.string("a text of at most 16 bytes")?).is_none(),
+            Some(3) => values.text.replace(self.string("a text of at most 240 bytes")?).is_none(),
+            Some(4) => values.fails.replace(self.bool()?).is_none(),
+            Some(_) => values.battery_pct.replace(self.percent()?).is_none(),
+            None => {
+                return Err(CommandError { at: from, expected: "do, alert, by, text, fails or battery_pct" });
+            }
+        };
+        if is_new { Ok(()) } else { Err(CommandError { at: from, expected: "each key once" }) }
+    }
+
+    fn bool(&mut self) -> Result<bool, CommandError> {
+        if self.has("true") {
+            return Ok(true);
+        }
+        if self.has("false") { Ok(false) } else { self.wrong("true or false") }
+    }
+
+    /// A number as JSON writes it, without an exponent.
+    fn number(&mut self) -> &str {
+        let bytes = self.rest().as_bytes();
+        let digits = |from: usize| bytes.iter().skip(from).take_while(|byte| byte.is_ascii_digit()).count();
+        let whole = digits(0);
+        let point = usize::from(bytes.get(whole) == Some(&b'.') && digits(whole + 1) > 0);
+        let len = whole + point * (1 + digits(whole + 1));
+        let from = self.at;
+        let has_leading_zero = whole > 1 && bytes.first() == Some(&b'0');
+        self.at += if has_leading_zero { 0 } else { len };
+        self.text.get(from..self.at).unwrap_or_default()
+    }
+
+    fn alert(&mut self) -> Result<u32, CommandError> {
+        let at = self.at;
+        self.number().parse().map_err(|_| CommandError { at, expected: "a number of an alert, or 0 for all" })
+    }
+
+    fn percent(&mut self) -> Result<f64, CommandError> {
+        let at = self.at;
+        let number: Option<f64> = self.number().parse().ok();
+        number.filter(|pct| (0.0..=100.0).contains(pct)).ok_or(CommandError { at, expected: "0 to 100" })
+    }
+
+    fn string<const BYTES: usize>(
+        &mut self,
+        expected: &'static str,
+    ) -> Result<ShortText<BYTES>, CommandError> {
+        let from = self.at;
+        let wrong = CommandError { at: from, expected };
+        if !self.has("\"") {
+            return Err(wrong);
+        }
+        let mut text = ShortText::default();
+        loop {
+            let char = match self.next().ok_or(wrong)? {
+                '"' => return Ok(text),
+                '\\' => self.escaped().ok_or(CommandError { at: self.at, expected: "an escape of JSON" })?,
+                char => char,
+            };
+            if !text.push(char) {
+                return Err(wrong);
+            }
+        }
+    }
+
+    fn next(&mut self) -> Option<char> {
+        let char = self.rest().chars().next()?;
+        self.at += char.len_utf8();
+        Some(char)
+    }
+
+    /// The character that an escape stands for, after its backslash.
+    fn escaped(&mut self) -> Option<char> {
+        match self.next()? {
+            char @ ('"' | '\\' | '/') => Some(char),
+            // Refused as control characters where they are put.
+            'b' | 'f' | 'n' | 'r' | 't' => Some('\n'),
+            'u' => {
+                let first = self.unit()?;
+                if !(0xd800..0xdc00).contains(&first) {
+                    return char::from_u32(first);
+                }
+                let second = if self.rest().starts_with("\\u") {
+                    self.at += 2;
+                    self.unit().filter(|unit| (0xdc00..0xe000).contains(unit))?
+                } else {
+                    return None;
+                };
+                char::from_u32(0x1_0000 + ((first - 0xd800) << 10) + (second - 0xdc00))
+            }
+            _ => None,
+        }
+    }
+
+    fn unit(&mut self) -> Option<u32> {
+        let digits =
+            self.rest().get(..4).filter(|digits| digits.bytes().all(|digit| digit.is_ascii_hexdigit()))?;
+        let unit = u32::from_str_radix(digits, 16).ok()?;
+        self.at += 4;
+        Some(unit)
+    }
+}

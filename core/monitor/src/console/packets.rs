@@ -1,0 +1,69 @@
+//! The console's packets in the loop.
+
+use bevy_ecs::prelude::Resource;
+use serde::{Deserialize, Serialize};
+
+use super::command::Command;
+use headrace_geometry::time::MonoNs;
+use headrace_sensor::reading::{Packet, SourceId};
+use headrace_snapshot::stateful;
+
+/// Most commands of a tick: more than the source's ring holds.
+const MOST_OF_TICK: usize = 256;
+
+/// Traffic of the console.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+pub struct ConsoleCounts {
+    /// Packets.
+    pub packets: u64,
+    /// Of these, such that are no command.
+    pub invalid: u64,
+    /// Commands that changed nothing: an alert that there isn't, or that needs no acknowledgement.
+    pub without_effect: u64,
+}
+
+/// The source.
+#[derive(Debug, Resource)]
+pub(crate) struct Console {
+    pub(crate) source: SourceId,
+    pub(crate) counts: ConsoleCounts,
+}
+
+stateful!(Console { state: counts; fixed: source; });
+
+/// A command, and its place among the readings.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct ReceivedCommand {
+    /// Index into this tick's events of the first one after it.
+    pub(crate) before: usize,
+    pub(crate) at: MonoNs,
+    pub(crate) command: Command,
+}
+
+/// Commands of this tick, in order.
+#[derive(Debug, Resource)]
+pub(crate) struct Commands(pub(crate) Vec<ReceivedCommand>);
+
+impl Commands {
+    /// Allocates: all that it will ever use.
+    pub(crate) fn new() -> Self {
+        Self(Vec::with_capacity(MOST_OF_TICK))
+    }
+}
+
+impl Console {
+    pub(crate) fn new(source: SourceId) -> Self {
+        Self { source, counts: ConsoleCounts::default() }
+    }
+
+    /// Takes a packet that comes before the event of this index.
+    pub(crate) fn take(&mut self, packet: Packet<'_>, before: usize, commands: &mut Commands) {
+        self.counts.packets += 1;
+        match Command::parse(packet.bytes) {
+            Ok(command) if commands.0.len() < commands.0.capacity() => {
+                commands.0.push(ReceivedCommand { before, at: packet.received, command });
+            }
+            _ => self.counts.invalid += 1,
+        }
+    }
+}

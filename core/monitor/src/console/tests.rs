@@ -1,0 +1,99 @@
+use super::*;
+use proptest::prelude::*;
+use serde_json::json;
+
+fn who(text: &str) -> Who {
+    Who::new(text).unwrap()
+}
+
+#[test]
+fn commands_are_read_as_they_are_written_down() {
+    let note = |text: &str| Command::Note { text: NoteText::new(text).unwrap(), by: who("AB") };
+    for (json, command) in [
+        (r#"{"do":"acknowledge","alert":12,"by":"AB"}"#, Command::Acknowledge { alert: 12, by: who("AB") }),
+        (
+            r#" { "by" : "AB" , "alert" : 0 , "do" : "acknowledge" } "#,
+            Command::Acknowledge { alert: 0, by: who("AB") },
+        ),
+        (r#"{"do":"silence","by":""}"#, Command::Silence { by: who("") }),
+        (r#"{"do":"note","text":"rubble left","by":"AB"}"#, note("rubble left")),
+        (r#"{"do":"note","text":"\u00e9\ud83d\ude00 \"\\\/","by":"AB"}"#, note("\u{e9}\u{1f600} \"\\/")),
+        (
+            r#"{"do":"mark","by":"joystick"}"#,
+            Command::Note { text: NoteText::default(), by: who("joystick") },
+        ),
+        (r#"{"do":"recording","fails":true}"#, Command::Recording { fails: true }),
+        (r#"{"do":"limits","battery_pct":63.5}"#, Command::Limits { battery_pct: 63.5 }),
+        (r#"{"do":"time"}"#, Command::Time),
+    ] {
+        assert_eq!(Command::parse(json.as_bytes()), Ok(command), "{json}");
+        assert_eq!(Command::parse(command.to_json().as_bytes()), Ok(command));
+    }
+}
+
+#[test]
+fn what_is_no_command_is_refused_with_its_place() {
+    let long = format!(r#"{{"do":"note","text":"{}","by":"AB"}}"#, "x".repeat(241));
+    let longest = format!(r#"{{"do":"time"{}}}"#, " ".repeat(500));
+    for json in [
+        "",
+        "{}",
+        "[]",
+        "null",
+        r#"{"do":"time"}x"#,
+        r#"{"do":"time",}"#,
+        r#"{"do":"time""#,
+        r#"{'do':'time'}"#,
+        r#"{"do":"dance","by":"AB"}"#,
+        r#"{"do":"silence"}"#,
+        r#"{"do":"silence","by":"AB","by":"AB"}"#,
+        r#"{"do":"silence","by":"AB","at":3}"#,
+        r#"{"do":"silence","by":"seventeen letters"}"#,
+        r#"{"do":"silence","by":7}"#,
+        r#"{"do":"acknowledge","alert":-1,"by":"AB"}"#,
+        r#"{"do":"acknowledge","alert":1.5,"by":"AB"}"#,
+        r#"{"do":"acknowledge","alert":4294967296,"by":"AB"}"#,
+        r#"{"do":"acknowledge","alert":012,"by":"AB"}"#,
+        r#"{"do":"acknowledge","alert":"1","by":"AB"}"#,
+        r#"{"do":"limits","battery_pct":101}"#,
+        r#"{"do":"limits","battery_pct":NaN}"#,
+        r#"{"do":"limits","battery_pct":1e1}"#,
+        r#"{"do":"recording","fails":1}"#,
+        r#"{"do":"note","text":"","by":"AB"}"#,
+        r#"{"do":"note","text":"a\nb","by":"AB"}"#,
+        "{\"do\":\"note\",\"text\":\"\u{1b}[2J\",\"by\":\"AB\"}",
+        r#"{"do":"note","text":"\ud83d","by":"AB"}"#,
+        r#"{"do":"note","text":"\x","by":"AB"}"#,
+        &long,
+        &longest,
+    ] {
+        assert!(Command::parse(json.as_bytes()).is_err(), "{json}");
+    }
+    assert!(Command::parse(b"{\"do\":\"silence\",\"by\":\"\xff\"}").is_err());
+    let error = Command::parse(br#"{"do":"silence","to":"AB"}"#).unwrap_err();
+    insta::assert_snapshot!(error, @"reading a command, at byte 16: expected do, alert, by, text, fails or battery_pct");
+}
+
+proptest! {
+    /// Whatever bytes come, what is taken is JSON with those values, by another reader.
+    #[test]
+    fn what_is_taken_is_json(text in "\\PC{0,60}", by in "[ -~]{0,16}", cut in 0usize..90) {
+        let written = json!({"do": "note", "text": text, "by": by}).to_string();
+        let read = Command::parse(written.as_bytes());
+        let fits = !text.is_empty() && text.len() <= MAX_NOTE_BYTES && written.len() <= MAX_COMMAND_BYTES;
+        let has_control = text.chars().any(char::is_control);
+        prop_assert_eq!(read.is_ok(), fits && !has_control, "{}", written);
+        if let Ok(Command::Note { text: read, by: who }) = read {
+            prop_assert_eq!((read.as_str(), who.as_str()), (text.as_str(), by.as_str()));
+        }
+        let bytes = &written.as_bytes()[..cut.min(written.len() - 1)];
+        prop_assert!(Command::parse(bytes).is_err());
+    }
+
+    #[test]
+    fn any_bytes_are_a_command_or_refused(bytes in proptest::collection::vec(any::<u8>(), 0..600)) {
+        if Command::parse(&bytes).is_ok() {
+            prop_assert!(serde_json::from_slice::<serde_json::Value>(&bytes).is_ok());
+        }
+    }
+}

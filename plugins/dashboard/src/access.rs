@@ -1,0 +1,247 @@
+//! Who may see and do what: tokens, hosts, origins.
+
+use std::fmt;
+use std::net::IpAddr;
+
+use axum::http::{HeaderMap, Uri, header};
+
+/// Name of the cookie.
+pub(crate) const COOKIE: &str = "headrace_token";
+/// Bytes of entropy of a token.
+const TOKEN_BYTES: usize = 16;
+
+/// What a viewer may do.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Role {
+    /// See.
+    Viewer,
+    /// See, acknowledge, note, control a replay.
+    Operator,
+}
+
+/// A secret. It isn't shown by `Debug`.
+#[derive(Clone)]
+pub struct Token(String);
+
+impl fmt::Debug for Token {
+    fn fmt(&self, to: &mut fmt::Formatter<'_>) -> fmt::Result {
+        to.write_str("Token(..)")
+    }
+}
+
+impl Token {
+    /// A new one of the system's entropy.
+    ///
+    /// Errors: the system gives none.
+    pub fn random() -> Result<Self, getrandom::Error> {
+        let mut bytes = [0; TOKEN_BYTES];
+        getrandom::fill(&mut bytes)?;
+        Ok(Self(bytes.iter().map(|byte| format!("{byte:02x}")).collect()))
+    }
+
+    /// One that was chosen: 16 to 128 letters, digits, `-` and `_`.
+    ///
+    /// Errors: what is wrong with it, without its text.
+    pub fn chosen(text: &str) -> Result<Self, String> {
+        let is_fit = |byte: u8| byte.is_ascii_alphanumeric() || b"-_".contains(&byte);
+        if !(16..=128).contains(&text.len()) {
+            return Err(format!("has {} characters; expected 16 to 128", text.len()));
+        }
+        if text.bytes().all(is_fit) {
+            Ok(Self(text.to_owned()))
+        } else {
+            Err("has others than letters, digits, - and _".to_owned())
+        }
+    }
+
+    /// Its text, for who starts the program.
+    pub fn text(&self) -> &str {
+        &self.0
+    }
+
+    /// Whether it is this one. Takes as long wherever they differ.
+    fn is(&self, other: &str) -> bool {
+        let (own, other) = (self.0.as_bytes(), other.as_bytes());
+        let differs =
+            own.iter().zip(other).fold(own.len() ^ other.len(), |all, (a, b)| all | usize::from(a ^ b));
+        core::hint::black_box(differs) == 0
+    }
+}
+
+/// The tokens of those who see, and of those who act.
+#[derive(Debug, Clone)]
+pub struct Tokens {
+    /// The viewers'.
+    pub viewer: Token,
+    /// The operators'.
+    pub operator: Token,
+}
+
+/// Who is let in.
+#[derive(Debug, Clone)]
+pub(crate) struct Access {
+    /// None on loopback: whoever is on this machine may act.
+    pub(crate) tokens: Option<Tokens>,
+    /// Names of this machine besides addresses and `localhost`.
+    pub(crate) hosts: Vec<String>,
+    /// Origins of other pages that may frame this one and send actions, `http://host`.
+    pub(crate) origins: Vec<String>,
+    /// Only `localhost` and loopback addresses are this machine.
+    pub(crate) is_loopback: bool,
+}
+
+impl Access {
+    /// The role of a request by its token: of the cookie, of `Authorization: Bearer`, or of the query.
+    pub(crate) fn role(&self, headers: &HeaderMap, uri: &Uri) -> Option<Role> {
+        if self.tokens.is_none() {
+            return Some(Role::Operator);
+        }
+        let text = |name| headers.get(name).and_then(|value| value.to_str().ok());
+        let cookies = headers.get_all(header::COOKIE).iter().filter_map(|value| value.to_str().ok());
+        let cookies = cookies.flat_map(|line| line.split(';')).filter_map(|pair| pair.trim().split_once('='));
+        let of_cookie = cookies.filter(|(name, _)| *name == COOKIE).map(|(_, token)| token.to_owned());
+        let bearer =
+            text(header::AUTHORIZATION).and_then(|value| value.strip_prefix("Bearer ")).map(str::to_owned);
+        of_cookie.chain(bearer).chain(query(uri, "token")).filter_map(|token| self.role_of(&token)).max()
+    }
+
+    /// The role of a token.
+    pub(crate) fn role_of(&self, token: &str) -> Option<Role> {
+        let tokens = self.tokens.as_ref()?;
+        // Both are compared, whichever it is.
+        let (operates, sees) = (tokens.operator.is(token), tokens.viewer.is(token));
+        if operates { Some(Role::Operator) } else { sees.then_some(Role::Viewer) }
+    }
+
+    /// Whether the request names this machine: another name that leads here is DNS rebinding.
+    pub(crate) fn is_host(&self, headers: &HeaderMap) -> bool {
+        let Some(host) = headers.get(header::HOST).and_then(|value| value.to_str().ok()) else {
+            return false;
+        };
+        let name = name_of(host);
+        if let Ok(address) = name.trim_matches(['[', ']']).parse::<IpAddr>() {
+            return !self.is_loopback || address.is_loopback();
+        }
+        name.eq_ignore_ascii_case("localhost")
+            || self.hosts.iter().any(|known| known.eq_ignore_ascii_case(name))
+    }
+
+    /// Whether a request comes from our own page, from one that is told of, or from no page at all.
+    pub(crate) fn is_origin(&self, headers: &HeaderMap) -> bool {
+        let Some(origin) = headers.get(header::ORIGIN) else { return true };
+        let (Ok(origin), Some(Ok(host))) =
+            (origin.to_str(), headers.get(header::HOST).map(|host| host.to_str()))
+        else {
+            return false;
+        };
+        let authority = origin.strip_prefix("http://").or_else(|| origin.strip_prefix("https://"));
+        authority == Some(host) || self.origins.iter().any(|known| known == origin)
+    }
+}
+
+/// A host without its port.
+pub(crate) fn name_of(host: &str) -> &str {
+    match host.rsplit_once(':') {
+        Some((name, port)) if port.bytes().all(|byte| byte.is_ascii_digit()) && !name.is_empty() => name,
+        _ => host,
+    }
+}
+
+/// A value of the query, its escapes resolved.
+pub(crate) fn query(uri: &Uri, key: &str) -> Option<String> {
+    let pairs = uri.query()?.split('&').filter_map(|pair| pair.split_once('='));
+    pairs.into_iter().find(|(name, _)| *name == key).map(|(_, value)| unescaped(value))
+}
+
+fn unescaped(text: &str) -> String {
+    let mut bytes = Vec::with_capacity(text.len());
+    let mut rest = text.bytes();
+    while let Some(byte) = rest.next() {
+        let hex = |byte: u8| char::from(byte).to_digit(16);
+        let ahead = (rest.clone().next().and_then(hex), rest.clone().nth(1).and_then(hex));
+        match (byte, ahead) {
+            (b'%', (Some(high), Some(low))) => {
+                bytes.push(u8::try_from(high * 16 + low).unwrap_or(b'?'));
+                rest.nth(1);
+            }
+            (b'+', _) => bytes.push(b' '),
+            _ => bytes.push(byte),
+        }
+    }
+    String::from_utf8_lossy(&bytes).into_owned()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use axum::http::HeaderValue;
+
+    fn access(is_loopback: bool) -> Access {
+        let token = |text| Token::chosen(text).unwrap();
+        let tokens = Tokens { viewer: token("viewer-0123456789"), operator: token("operator-01234567") };
+        let origins = vec!["http://blueos.local".to_owned()];
+        Access { tokens: Some(tokens), hosts: vec!["rov.local".to_owned()], origins, is_loopback }
+    }
+
+    fn headers(pairs: &[(header::HeaderName, &str)]) -> HeaderMap {
+        pairs.iter().map(|(name, value)| (name.clone(), HeaderValue::from_str(value).unwrap())).collect()
+    }
+
+    #[test]
+    fn a_role_is_that_of_the_token_wherever_it_is() {
+        let access = access(false);
+        let role = |pairs: &[_], uri: &'static str| access.role(&headers(pairs), &Uri::from_static(uri));
+        assert_eq!(role(&[], "/"), None);
+        assert_eq!(
+            role(&[(header::COOKIE, "a=b; headrace_token=viewer-0123456789")], "/"),
+            Some(Role::Viewer)
+        );
+        assert_eq!(role(&[(header::AUTHORIZATION, "Bearer operator-01234567")], "/"), Some(Role::Operator));
+        assert_eq!(role(&[], "/feed?x=1&token=operator%2d01234567"), Some(Role::Operator));
+        for wrong in ["operator-0123456", "operator-012345678", "operator-01234568", ""] {
+            assert_eq!(access.role_of(wrong), None, "{wrong:?}");
+        }
+    }
+
+    #[test]
+    fn other_names_than_this_machines_are_refused() {
+        let is_host = |is_loopback, host| access(is_loopback).is_host(&headers(&[(header::HOST, host)]));
+        for host in ["localhost:8881", "127.0.0.1:8881", "[::1]:8881", "rov.local"] {
+            assert!(is_host(true, host) && is_host(false, host), "{host}");
+        }
+        assert!(is_host(false, "192.168.2.2:8881") && !is_host(true, "192.168.2.2:8881"));
+        for host in ["evil.example", "localhost.evil.example:8881", "rov.local.evil.example", ""] {
+            assert!(!is_host(true, host) && !is_host(false, host), "{host}");
+        }
+        assert!(!access(false).is_host(&HeaderMap::new()));
+    }
+
+    #[test]
+    fn other_pages_are_refused_but_those_told_of() {
+        let is_origin = |origin| {
+            access(false).is_origin(&headers(&[(header::HOST, "127.0.0.1:8881"), (header::ORIGIN, origin)]))
+        };
+        assert!(
+            is_origin("http://127.0.0.1:8881")
+                && is_origin("https://127.0.0.1:8881")
+                && is_origin("http://blueos.local")
+        );
+        for origin in [
+            "http://127.0.0.1:3000",
+            "http://evil.example",
+            "null",
+            "127.0.0.1:8881",
+            "http://blueos.local:81",
+        ] {
+            assert!(!is_origin(origin), "{origin}");
+        }
+    }
+
+    #[test]
+    fn tokens_are_long_random_and_never_shown() {
+        let (one, other) = (Token::random().unwrap(), Token::random().unwrap());
+        assert!(one.text() != other.text() && one.text().len() == 32);
+        assert_eq!(format!("{one:?}"), "Token(..)");
+        assert!(Token::chosen("short").is_err() && Token::chosen("with a space 0123456").is_err());
+    }
+}

@@ -1,0 +1,55 @@
+//! The built page: `plugins/dashboard/page/dist`, listed by `build.rs` and held in the binary.
+
+include!(concat!(env!("OUT_DIR"), "/assets.rs"));
+
+/// A file of the page by its path below `dist`.
+pub(crate) fn asset(path: &str) -> Option<&'static [u8]> {
+    ASSETS.iter().find(|(name, _)| *name == path).map(|(_, bytes)| *bytes)
+}
+
+/// The page itself.
+pub fn index() -> &'static [u8] {
+    asset("index.html")
+        .unwrap_or(b"<!doctype html><title>headrace</title><p>This program was built without its page.")
+}
+
+/// A file that the page refers to by `/assets/..`.
+pub fn referred(path: &str) -> Option<&'static [u8]> {
+    asset(path.trim_start_matches('/'))
+}
+
+/// Content type of a file by its name.
+pub(crate) fn content_type(path: &str) -> &'static str {
+    match path.rsplit_once('.').map_or("", |(_, extension)| extension) {
+        "html" => "text/html; charset=utf-8",
+        "js" => "text/javascript; charset=utf-8",
+        "css" => "text/css; charset=utf-8",
+        "svg" => "image/svg+xml",
+        "png" => "image/png",
+        "ico" => "image/x-icon",
+        "woff2" => "font/woff2",
+        "wasm" => "application/wasm",
+        "json" | "webmanifest" => "application/json",
+        "mp3" => "audio/mpeg",
+        "wav" => "audio/wav",
+        "txt" => "text/plain; charset=utf-8",
+        _ => "application/octet-stream",
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_page_and_all_that_it_refers_to_are_there() {
+        let page = core::str::from_utf8(index()).unwrap();
+        assert!(page.to_lowercase().contains("<!doctype html>"));
+        let referred = page
+            .split(['"', '\''])
+            .filter_map(|part| part.strip_prefix("/assets/").or_else(|| part.strip_prefix("./assets/")));
+        for path in referred {
+            assert!(asset(&format!("assets/{path}")).is_some(), "{path}");
+        }
+    }
+}

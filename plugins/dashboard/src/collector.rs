@@ -1,0 +1,464 @@
+//! Takes of the loop, on its thread, what the page shows, and hands it over without waiting.
+//!
+//! What finds no room stays here and goes with the next: sections by their numbers, the newest state, and a bounded number of
+//! samples and lines. Samples beyond are counted, and those of wall are taken again from the loop's own store, where it has them.
+
+use std::collections::BTreeSet;
+
+use headrace_geometry::frames::{Mount, Point3, Vec3};
+use headrace_geometry::time::{DurNs, MonoNs};
+use headrace_monitor::alert_list::NoteJson;
+use headrace_monitor::live_text::{status_line, told_line};
+use headrace_monitor::messages::{Notice, Outcome as Placing, Placed, PlacedList};
+use headrace_monitor::report::way_home;
+use headrace_monitor::result_stream::{RecordKind, first_record};
+use headrace_monitor::run::Loop;
+use headrace_monitor::telling::{Teller, Told};
+use headrace_sensor::device::{SensorInfo, SensorKind};
+use headrace_sensor::reading::Reading;
+use serde_json::{Value, json};
+use tokio::sync::mpsc::Sender;
+use tokio::sync::mpsc::error::TrySendError;
+
+use crate::fed::{Beside, Dropped, EchoJson, Fed, News, PlaybackState, PoseJson, RateJson, RecordingJson};
+use crate::wire::{NONE, Outcome, SampleRecord, SectionRecord};
+
+/// Messages that may wait for the page's thread.
+pub(crate) const WAITING: usize = 64;
+/// Samples that wait here while there is no room: ten seconds of four heads.
+const MOST_SAMPLES: usize = 20_000;
+/// Lines that wait here.
+const MOST_TOLD: usize = 256;
+/// Sections sent at once.
+const SECTIONS_AT_ONCE: usize = 4096;
+/// Interval of states where there is no beat, and of rates.
+const EVERY: DurNs = DurNs(200_000_000);
+/// Time over which rates are taken.
+const RATES_OVER: DurNs = DurNs(2_000_000_000);
+/// Interval of the order of going back.
+const BACK_EVERY: DurNs = DurNs(1_000_000_000);
+
+/// The last ping of an echosounder.
+#[derive(Debug, Clone, Copy)]
+struct Ping {
+    at: MonoNs,
+    range_m: Option<f64>,
+}
+
+/// A sensor as it is followed.
+#[derive(Debug)]
+struct Followed {
+    id: String,
+    mount: Mount,
+    is_echosounder: bool,
+    ping: Option<Ping>,
+    hz: f64,
+    /// Readings when the present interval began.
+    readings: u64,
+}
+
+/// Collects what the page shows. It must be fed after every tick, of a loop that keeps its results.
+pub struct Collector {
+    to: Sender<Fed>,
+    /// A replay waits for the page, a live dive doesn't.
+    waits: bool,
+    is_playback: bool,
+    teller: Teller,
+    sensors: Vec<Followed>,
+    rates_from: Option<MonoNs>,
+    begun: Option<MonoNs>,
+    sent: Option<MonoNs>,
+    /// The tick that was played last, other than on the way of a jump.
+    played: Option<MonoNs>,
+    changed: BTreeSet<i64>,
+    samples: Vec<SampleRecord>,
+    told: Vec<Value>,
+    /// Chainages of dropped samples, m.
+    lacking_m: Option<[f64; 2]>,
+    dropped: Dropped,
+    back_due: bool,
+    notes_due: bool,
+    back_told: Option<(MonoNs, Value)>,
+    recording: RecordingJson,
+    playback: Option<PlaybackState>,
+}
+
+impl Collector {
+    /// For a loop; `waits` for a replay.
+    pub(crate) fn new(
+        to: Sender<Fed>,
+        dive: &Loop,
+        waits: bool,
+        is_playback: bool,
+        recorded_to: Option<String>,
+    ) -> Self {
+        let followed = |(source, info): (&headrace_monitor::SourceInfo, SensorInfo)| Followed {
+            id: source.id.clone(),
+            mount: info.mount,
+            is_echosounder: matches!(info.kind, SensorKind::Echosounder { .. }),
+            ping: None,
+            hz: 0.0,
+            readings: 0,
+        };
+        Self {
+            to,
+            waits,
+            is_playback,
+            teller: Teller::default(),
+            sensors: dive.sources().iter().zip(dive.sensors()).map(followed).collect(),
+            rates_from: None,
+            begun: None,
+            sent: None,
+            played: None,
+            changed: BTreeSet::new(),
+            samples: Vec::new(),
+            told: Vec::new(),
+            lacking_m: None,
+            dropped: Dropped::default(),
+            back_due: false,
+            notes_due: false,
+            back_told: None,
+            recording: RecordingJson { on: recorded_to.is_some(), fails: false, path: recorded_to },
+            playback: None,
+        }
+    }
+
+    /// Takes a result of the last tick.
+    pub fn notice(&mut self, notice: &Notice, dive: &Loop) {
+        match notice {
+            Notice::Section { section, .. } => {
+                self.changed.insert(*section);
+            }
+            Notice::Run { .. } => self.back_due = true,
+            Notice::Note(_) => self.notes_due = true,
+            Notice::Alert(..) | Notice::Advice(_) | Notice::Listed { .. } => {}
+        }
+        let mut told = Vec::new();
+        self.teller.hear(notice, dive, &mut |one| told.push(one));
+        self.tell(&told, dive);
+    }
+
+    /// Takes the results of the last tick, and sends what is due.
+    pub fn tick(&mut self, dive: &Loop) {
+        self.gather(dive);
+        let mut told = Vec::new();
+        self.teller.tick(dive.live_state(), dive, &mut |one| told.push(one));
+        self.tell(&told, dive);
+        let now = dive.now();
+        self.played = Some(now);
+        let is_due = self.sent.is_none_or(|sent| now.since(sent).0.abs() >= EVERY.0);
+        // Playback needs to know of each tick what came with it, to jump back to there.
+        if is_due
+            || !self.told.is_empty()
+            || !self.changed.is_empty()
+            || self.is_playback && !self.samples.is_empty()
+        {
+            self.send(dive);
+        }
+    }
+
+    /// Takes the results of a tick on the way of a jump.
+    pub fn skipped(&mut self, dive: &Loop) {
+        self.gather(dive);
+        self.send(dive);
+    }
+
+    /// Takes a change of a sensor's connection.
+    pub fn sensor(&mut self, id: &str, phase: &str, text: &str, at: MonoNs) {
+        self.push_told(
+            json!({"type": "sensor", "t_s": at.as_secs_f64(), "id": id, "phase": phase, "text": text}),
+        );
+    }
+
+    /// Takes what has happened to a recording.
+    pub fn recording(&mut self, fails: bool, text: &str, at: MonoNs) {
+        self.recording.fails = fails;
+        self.push_told(json!({"type": "recording", "t_s": at.as_secs_f64(), "fails": fails, "text": text}));
+    }
+
+    /// Takes how a replay plays.
+    pub fn playback(&mut self, state: PlaybackState) {
+        self.playback = Some(state);
+        self.hand(Fed::Playback(state));
+    }
+
+    /// Playback has jumped, or stands still: the loop's state may be another.
+    pub fn stopped(&mut self, dive: &Loop) {
+        if self.played == Some(dive.now()) {
+            self.send(dive);
+            return;
+        }
+        self.teller.forget();
+        let now = dive.now();
+        (self.sent, self.rates_from, self.back_told) = (None, None, None);
+        (self.back_due, self.notes_due) = (true, true);
+        self.sensors.iter_mut().for_each(|sensor| sensor.ping = None);
+        self.samples.clear();
+        self.told.clear();
+        self.played = Some(now);
+        self.hand(Fed::Jump(now));
+        self.change_all(dive);
+        self.send(dive);
+    }
+
+    /// Takes the end of the dive, when all is judged.
+    pub fn end(&mut self, dive: &Loop) {
+        let mut told = Vec::new();
+        self.teller.end(&dive.coverage().sections, &mut |one| told.push(one));
+        self.tell(&told, dive);
+        self.change_all(dive);
+        self.back_due = true;
+        self.back_told = None;
+        // At its end also a live dive has the time.
+        self.waits = true;
+        while !self.changed.is_empty() && self.send(dive) {}
+    }
+
+    /// Marks all sections of the way: what has no notice of its own is sent, too.
+    fn change_all(&mut self, dive: &Loop) {
+        let (sections, way) = (&dive.coverage().sections, dive.coverage().frontier.way());
+        self.changed.extend(sections.sections_of(way));
+    }
+
+    fn gather(&mut self, dive: &Loop) {
+        self.begun = self.begun.or_else(|| dive.tally().span.map(|(first, _)| first));
+        for event in dive.readings() {
+            if let Reading::Echo(echo) = &event.reading
+                && let Some(sensor) = self.sensors.get_mut(event.source.index())
+            {
+                sensor.ping = Some(Ping { at: event.received, range_m: echo.range_m });
+            }
+        }
+        self.samples_of(dive);
+        self.aims_of(dive);
+    }
+
+    /// Samples and doubtful returns of the last tick.
+    #[expect(clippy::cast_possible_truncation, reason = "shown to a fraction of a millimetre")]
+    fn samples_of(&mut self, dive: &Loop) {
+        let perimeter_m = dive.mission().profile.perimeter_m();
+        let mut words = dive.digests().pings.words();
+        while let Some((record, rest)) = first_record(words) {
+            words = rest;
+            let outcome = match record.kind {
+                Some(RecordKind::Sample) => Outcome::Wall,
+                Some(RecordKind::Doubtful) => Outcome::Doubtful,
+                _ => continue,
+            };
+            let [at, source, _, x, y, z, arc, ..] = *record.words else { continue };
+            let [x_m, y_m, z_m, arc_m] = [x, y, z, arc].map(f64::from_bits);
+            let [x, y, z] = [x_m, y_m, z_m].map(|value| value as f32);
+            let (t_ms, head) = (self.t_ms(MonoNs(at)), self.head(dive, source));
+            let arc = SampleRecord::arc_of(arc_m, perimeter_m);
+            self.push(SampleRecord { t_ms, x_m: x, y_m: y, z_m: z, arc, head, outcome: outcome as u8 });
+        }
+    }
+
+    /// Where pings without a return were aimed.
+    #[expect(clippy::cast_possible_truncation, reason = "shown to a fraction of a millimetre")]
+    fn aims_of(&mut self, dive: &Loop) {
+        let perimeter_m = dive.mission().profile.perimeter_m();
+        let Some(placed) = dive.resource::<PlacedList>() else { return };
+        for one in &placed.0 {
+            let Placed::Ping(ping) = one else { continue };
+            let Placing::Lost(_, Some(aim)) = ping.outcome else { continue };
+            let sample = SampleRecord {
+                t_ms: self.t_ms(ping.received),
+                x_m: aim.x_m as f32,
+                y_m: f32::NAN,
+                z_m: f32::NAN,
+                arc: SampleRecord::arc_of(aim.arc_m, perimeter_m),
+                head: u8::try_from(ping.head).unwrap_or(NONE),
+                outcome: Outcome::NoReturn as u8,
+            };
+            self.push(sample);
+        }
+    }
+
+    fn t_ms(&self, at: MonoNs) -> u32 {
+        let since = self.begun.map_or(0, |begun| at.since(begun).0.max(0) / 1_000_000);
+        u32::try_from(since).unwrap_or(u32::MAX)
+    }
+
+    /// Number of the head with this source.
+    fn head(&self, dive: &Loop, source: u64) -> u8 {
+        let before = dive.sensors().into_iter().take(usize::try_from(source).unwrap_or(usize::MAX));
+        let heads = before.filter(|sensor| sensor.kind == SensorKind::Head).count();
+        u8::try_from(heads).unwrap_or(NONE)
+    }
+
+    fn push(&mut self, sample: SampleRecord) {
+        if self.samples.len() < MOST_SAMPLES {
+            self.samples.push(sample);
+            return;
+        }
+        self.dropped.samples += 1;
+        let x_m = f64::from(sample.x_m);
+        let [from_m, to_m] = self.lacking_m.unwrap_or([x_m; 2]);
+        self.lacking_m = Some([from_m.min(x_m), to_m.max(x_m)]);
+    }
+
+    fn tell(&mut self, told: &[Told], dive: &Loop) {
+        for one in told {
+            let mut value =
+                serde_json::to_value(one).unwrap_or_else(|error| json!({"error": error.to_string()}));
+            if let Some(object) = value.as_object_mut() {
+                let line = told_line(one, &dive.mission().profile);
+                object.insert("t_s".to_owned(), dive.now().as_secs_f64().into());
+                object.entry("text").or_insert_with(|| line.text().into());
+            }
+            self.push_told(value);
+        }
+    }
+
+    fn push_told(&mut self, value: Value) {
+        if self.told.len() < MOST_TOLD {
+            self.told.push(value);
+        } else {
+            self.dropped.told += 1;
+        }
+    }
+
+    /// Sends what there is; `false` where there is no room or nobody to take it.
+    fn send(&mut self, dive: &Loop) -> bool {
+        if self.to.is_closed() || !self.waits && self.to.capacity() == 0 {
+            return false;
+        }
+        let sections = &dive.coverage().sections;
+        let mut changed = Vec::new();
+        while changed.len() < SECTIONS_AT_ONCE
+            && let Some(index) = self.changed.pop_first()
+        {
+            changed.extend(sections.get(index).and_then(|section| SectionRecord::of(index, section)));
+        }
+        let now = dive.now();
+        self.take_rates(now, dive);
+        let news = News {
+            now,
+            begun: self.begun,
+            state: Box::new(dive.live_state_json()),
+            beside: self.beside(dive),
+            samples: core::mem::take(&mut self.samples),
+            mended: self.mended(dive),
+            sections: changed,
+            told: core::mem::take(&mut self.told),
+            notes: core::mem::take(&mut self.notes_due)
+                .then(|| dive.notes().iter().map(NoteJson::from).collect()),
+            back: self.back(dive),
+            dropped: self.dropped,
+        };
+        self.sent = Some(now);
+        self.hand(Fed::News(Box::new(news)));
+        true
+    }
+
+    /// Hands a message over: a replay waits for room, a live dive only where there is some.
+    fn hand(&self, message: Fed) {
+        if self.waits {
+            // Nobody is there to take it once the page has ended.
+            let _gone = self.to.blocking_send(message);
+        } else if let Err(TrySendError::Full(_)) = self.to.try_send(message) {
+            tracing::debug!("the page is behind");
+        }
+    }
+
+    /// Samples of wall where some were dropped, from the loop's store; it has neither times nor heads.
+    #[expect(clippy::cast_possible_truncation, reason = "shown to a fraction of a millimetre")]
+    fn mended(&mut self, dive: &Loop) -> Vec<SampleRecord> {
+        let Some([from_m, to_m]) = self.lacking_m.take() else { return Vec::new() };
+        let (profile, t_ms) = (&dive.mission().profile, self.t_ms(dive.now()));
+        let mut mended = Vec::new();
+        dive.coverage().store.each_between(from_m, to_m, |x_m, arc_m, _| {
+            if mended.len() < MOST_SAMPLES {
+                let [y_m, z_m] = profile.point_at(arc_m).map(|value| value as f32);
+                let arc = SampleRecord::arc_of(arc_m, profile.perimeter_m());
+                mended.push(SampleRecord {
+                    t_ms,
+                    x_m: x_m as f32,
+                    y_m,
+                    z_m,
+                    arc,
+                    head: NONE,
+                    outcome: Outcome::Wall as u8,
+                });
+            }
+        });
+        mended
+    }
+
+    fn take_rates(&mut self, now: MonoNs, dive: &Loop) {
+        let counts = dive.health().map(|health| health.readings);
+        let Some(from) = self.rates_from else {
+            self.rates_from = Some(now);
+            self.sensors.iter_mut().zip(counts).for_each(|(sensor, readings)| sensor.readings = readings);
+            return;
+        };
+        let over = now.since(from);
+        if over.0 >= RATES_OVER.0 {
+            for (sensor, readings) in self.sensors.iter_mut().zip(counts) {
+                sensor.hz =
+                    rounded(readings.saturating_sub(sensor.readings) as f64 / over.as_secs_f64(), 10.0);
+                sensor.readings = readings;
+            }
+            self.rates_from = Some(now);
+        }
+    }
+
+    fn beside(&self, dive: &Loop) -> Beside {
+        let fix = dive.vehicle().fix.ok();
+        let pose = fix.map(|fix| {
+            let (roll, pitch, yaw) = fix.pose.attitude.roll_pitch_yaw();
+            let deg = |rad: f64| rounded(rad.to_degrees(), 100.0);
+            let (y_m, z_m) = (rounded(fix.pose.position.y(), 1e3), rounded(fix.pose.position.z(), 1e3));
+            PoseJson { y_m, z_m, roll_deg: deg(roll), pitch_deg: deg(pitch), yaw_deg: deg(yaw) }
+        });
+        let (now, mut echosounders) = (dive.now(), Vec::new());
+        for sensor in self.sensors.iter().filter(|sensor| sensor.is_echosounder) {
+            let (Some(ping), Some(fix)) = (sensor.ping, fix) else { continue };
+            let across = |point: Point3<_>| [rounded(point.y(), 1e3), rounded(point.z(), 1e3)];
+            let from = across(fix.pose.place(sensor.mount.position));
+            let to = ping.range_m.map(|range_m| {
+                let along = sensor.mount.rotation * Vec3::new(range_m, 0.0, 0.0);
+                across(fix.pose.place(sensor.mount.position + along))
+            });
+            let age_s = rounded(now.since(ping.at).as_secs_f64(), 1e3);
+            echosounders.push(EchoJson { id: sensor.id.clone(), range_m: ping.range_m, age_s, from, to });
+        }
+        let rates = self.sensors.iter().map(|sensor| RateJson { id: sensor.id.clone(), hz: sensor.hz });
+        let name =
+            |source: usize| dive.sources().get(source).map_or_else(String::new, |info| info.id.clone());
+        let text = status_line(dive.live_state(), &dive.mission().profile, &name).text();
+        Beside { pose, echosounders, rates: rates.collect(), recording: self.recording.clone(), text }
+    }
+
+    /// What to go back for, from the far end to the portal, if that has changed and is due.
+    fn back(&mut self, dive: &Loop) -> Option<Value> {
+        let now = dive.now();
+        let waits =
+            self.back_told.as_ref().is_some_and(|(told, _)| (0..BACK_EVERY.0).contains(&now.since(*told).0));
+        if !self.back_due || waits {
+            return None;
+        }
+        self.back_due = false;
+        let (legs, mut at_m, mut way_m) =
+            (way_home(&dive.coverage().sections), dive.live_state().chainage_m, 0.0);
+        let mut time_s = Some(0.0);
+        let mut shown = Vec::new();
+        for leg in &legs {
+            way_m += at_m.map_or(0.0, |at_m| (at_m - leg.from_m).abs()) + leg.from_m - leg.to_m;
+            at_m = Some(leg.to_m);
+            time_s = time_s.zip(leg.takes_s).map(|(sum, takes_s)| sum + takes_s);
+            let why: Vec<_> = leg.actions.iter().map(|action| action.as_str().replace('_', " ")).collect();
+            let at_most_mps = (leg.at_most_mps > 0.0).then_some(leg.at_most_mps);
+            shown.push(json!({"from_m": leg.from_m, "to_m": leg.to_m, "at_most_mps": at_most_mps, "why": why.join(", ")}));
+        }
+        let back = json!({"type": "back", "legs": shown, "way_m": rounded(way_m, 100.0), "time_s": time_s.map(|s| rounded(s, 10.0))});
+        let is_new = self.back_told.as_ref().is_none_or(|(_, told)| told.get("legs") != back.get("legs"));
+        self.back_told = Some((now, back.clone()));
+        is_new.then_some(back)
+    }
+}
+
+fn rounded(value: f64, parts: f64) -> f64 {
+    (value * parts).round() / parts
+}

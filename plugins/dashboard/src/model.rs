@@ -1,0 +1,450 @@
+//! What the page shows, as of the last that was fed: pure, without sockets and clocks.
+//!
+//! Each message has a number, each section the number of the message that had it last; so a viewer that was away gets what has
+//! changed since, and a new one all.
+
+use std::collections::{BTreeMap, VecDeque};
+
+use axum::body::Bytes;
+use axum::extract::ws::Utf8Bytes;
+use headrace_geometry::time::MonoNs;
+use headrace_monitor::alert_list::NoteJson;
+use headrace_monitor::live_state::json::LiveStateJson;
+use serde_json::{Value, json};
+
+use crate::fed::{Beside, Dropped, Fed, News, PlaybackState};
+use crate::history::History;
+use crate::samples::Samples;
+use crate::site::{Greeting, May, Site};
+use crate::wire::{SectionRecord, sample_frame, section_frame};
+
+/// Lines kept for viewers that were away.
+const MOST_TOLD: usize = 256;
+/// Samples sent at once as they come: 100 kB/s at five times a second. Of more one in several is sent; `/samples` has all.
+const MOST_AT_ONCE: usize = 1000;
+/// Samples for a viewer that comes, or was away.
+const MOST_BACK: usize = 10_000;
+/// Places of samples by message that are kept: five minutes of them.
+const MOST_PLACES: usize = 1500;
+/// Samples of the answer to a range of chainage.
+pub const MOST_IN_RANGE: usize = 200_000;
+
+/// What a message is, for viewers that don't want all.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Sort {
+    /// The state: the next replaces it.
+    State,
+    /// Samples as they come.
+    Samples,
+    /// Anything else.
+    Other,
+}
+
+/// A message, encoded once for all viewers.
+#[derive(Debug, Clone)]
+pub struct Message {
+    /// Its number.
+    pub seq: u64,
+    /// What it is.
+    pub sort: Sort,
+    /// Its bytes.
+    pub body: Body,
+}
+
+/// Bytes of a message.
+#[derive(Debug, Clone)]
+pub enum Body {
+    /// JSON.
+    Text(Utf8Bytes),
+    /// A frame.
+    Binary(Bytes),
+}
+
+/// A section with where it has been seen, and the message that had it last.
+#[derive(Debug, Clone, Copy)]
+struct Shown {
+    record: SectionRecord,
+    seen: u64,
+    seq: u64,
+}
+
+/// The model.
+#[derive(Debug)]
+pub struct Model {
+    site: Site,
+    instance: String,
+    jumps: u32,
+    seq: u64,
+    begun: Option<MonoNs>,
+    sections: BTreeMap<i32, Shown>,
+    changed: Vec<i32>,
+    samples: Samples,
+    /// Samples that have been sent.
+    sent_samples: usize,
+    /// Messages and how many samples there were with them.
+    places: VecDeque<(u64, usize)>,
+    state: Option<Box<(Box<LiveStateJson>, Beside)>>,
+    state_is_new: bool,
+    playback: Option<PlaybackState>,
+    told_new: Vec<Value>,
+    told: VecDeque<(u64, Utf8Bytes)>,
+    notes: Vec<NoteJson>,
+    back: Option<Value>,
+    back_is_new: bool,
+    history: History,
+    end: Option<Value>,
+    end_is_new: bool,
+    dropped: Dropped,
+}
+
+impl Model {
+    /// Before anything has been fed. `instance` is unique to it.
+    pub fn new(site: Site, instance: String) -> Self {
+        Self {
+            site,
+            instance,
+            jumps: 0,
+            seq: 0,
+            begun: None,
+            sections: BTreeMap::new(),
+            changed: Vec::new(),
+            samples: Samples::default(),
+            sent_samples: 0,
+            places: VecDeque::new(),
+            state: None,
+            state_is_new: false,
+            playback: None,
+            told_new: Vec::new(),
+            told: VecDeque::new(),
+            notes: Vec::new(),
+            back: None,
+            back_is_new: false,
+            history: History::default(),
+            end: None,
+            end_is_new: false,
+            dropped: Dropped::default(),
+        }
+    }
+
+    /// Keeps the history of the whole dive.
+    pub fn keep_whole(&mut self) {
+        self.history.whole = true;
+    }
+
+    /// Takes what was fed; whether it is to be shown at once.
+    pub fn take(&mut self, fed: Fed) -> bool {
+        match fed {
+            Fed::News(news) => return self.news(*news),
+            Fed::Jump(at) => self.jump(at),
+            Fed::Playback(state) => {
+                self.playback = Some(state);
+                self.state_is_new = true;
+            }
+            Fed::End(end) => {
+                self.end = Some(*end);
+                (self.end_is_new, self.state_is_new) = (true, true);
+            }
+        }
+        true
+    }
+
+    fn news(&mut self, news: News) -> bool {
+        self.begun = self.begun.or(news.begun);
+        let is_urgent = !news.told.is_empty();
+        for record in news.sections {
+            let before = self.sections.get(&record.index);
+            if before.is_none_or(|before| before.record != record) {
+                let seen = before.map_or(0, |before| before.seen);
+                self.sections.insert(record.index, Shown { record, seen, seq: 0 });
+                self.changed.push(record.index);
+            }
+        }
+        for sample in news.samples.iter().chain(&news.mended) {
+            self.see(f64::from(sample.x_m), sample.seen());
+        }
+        let at_ms = self.ms(news.now);
+        self.samples.take(at_ms, &news.samples, self.site.is_playback);
+        if !news.mended.is_empty() {
+            self.samples.take(at_ms, &news.mended, false);
+        }
+        self.history.take(&news.state);
+        if let Some(playback) = &mut self.playback {
+            playback.at_s = news.now.as_secs_f64();
+        }
+        self.state = Some(Box::new((news.state, news.beside)));
+        self.state_is_new = true;
+        self.told_new.extend(news.told);
+        self.notes = news.notes.unwrap_or(core::mem::take(&mut self.notes));
+        if news.back.is_some() {
+            (self.back, self.back_is_new) = (news.back, true);
+        }
+        self.dropped = news.dropped;
+        is_urgent
+    }
+
+    fn see(&mut self, x_m: f64, seen: u64) {
+        #[expect(clippy::cast_possible_truncation, reason = "chainages of a tunnel in sections")]
+        let index = (x_m / self.site.section_m).floor() as i32;
+        let blank = || Shown { record: SectionRecord::blank(index), seen: 0, seq: 0 };
+        if seen == 0 {
+            return;
+        }
+        let shown = self.sections.entry(index).or_insert_with(blank);
+        if shown.seen | seen != shown.seen {
+            shown.seen |= seen;
+            self.changed.push(index);
+        }
+    }
+
+    fn jump(&mut self, at: MonoNs) {
+        self.jumps += 1;
+        self.sections.clear();
+        self.changed.clear();
+        self.told.clear();
+        self.told_new.clear();
+        self.places.clear();
+        self.samples.jump(self.ms(at));
+        self.history.jump(at.as_secs_f64());
+        self.end = None;
+        let seen: Vec<_> = self.samples.since(0).map(|sample| (sample.x_m, sample.seen())).collect();
+        seen.into_iter().for_each(|(x_m, seen)| self.see(f64::from(x_m), seen));
+        self.sent_samples = self.samples.len();
+    }
+
+    fn ms(&self, at: MonoNs) -> u32 {
+        let since = self.begun.map_or(0, |begun| at.since(begun).0.max(0) / 1_000_000);
+        u32::try_from(since).unwrap_or(u32::MAX)
+    }
+
+    /// Unique to this dive and, of a replay, to what follows its last jump.
+    pub fn instance(&self) -> String {
+        if self.jumps == 0 { self.instance.clone() } else { format!("{}.{}", self.instance, self.jumps) }
+    }
+
+    /// What has changed since the last time, for all viewers.
+    pub fn flush(&mut self) -> Vec<Message> {
+        let mut messages = Vec::new();
+        for value in core::mem::take(&mut self.told_new) {
+            let message = self.text(value, Sort::Other);
+            if let Body::Text(text) = &message.body {
+                self.told.push_back((message.seq, text.clone()));
+            }
+            messages.push(message);
+        }
+        while self.told.len() > MOST_TOLD {
+            self.told.pop_front();
+        }
+        messages.extend(self.flush_sections());
+        messages.extend(self.flush_samples());
+        if core::mem::take(&mut self.back_is_new)
+            && let Some(back) = self.back.clone()
+        {
+            messages.push(self.text(back, Sort::Other));
+        }
+        if core::mem::take(&mut self.state_is_new)
+            && let Some(state) = self.state()
+        {
+            messages.push(self.text(state, Sort::State));
+        }
+        if core::mem::take(&mut self.end_is_new)
+            && let Some(end) = self.end.clone()
+        {
+            messages.push(self.text(end, Sort::Other));
+        }
+        messages
+    }
+
+    /// The state again, for viewers of a dive that stands still.
+    pub fn again(&mut self) -> Option<Message> {
+        let state = self.state()?;
+        Some(self.text(state, Sort::State))
+    }
+
+    fn flush_sections(&mut self) -> Option<Message> {
+        let mut changed = core::mem::take(&mut self.changed);
+        changed.sort_unstable();
+        changed.dedup();
+        if changed.is_empty() {
+            return None;
+        }
+        self.seq += 1;
+        let mut records = Vec::with_capacity(changed.len());
+        for index in changed {
+            if let Some(shown) = self.sections.get_mut(&index) {
+                shown.seq = self.seq;
+                records.push((shown.record, shown.seen));
+            }
+        }
+        Some(self.binary(section_frame(self.seq, &records), Sort::Other))
+    }
+
+    fn flush_samples(&mut self) -> Option<Message> {
+        let new = self.samples.len().saturating_sub(self.sent_samples);
+        if new == 0 {
+            return None;
+        }
+        self.seq += 1;
+        let step = new.div_ceil(MOST_AT_ONCE);
+        let some: Vec<_> = self.samples.since(self.sent_samples).step_by(step).copied().collect();
+        self.sent_samples = self.samples.len();
+        self.places.push_back((self.seq, self.sent_samples));
+        if self.places.len() > MOST_PLACES {
+            self.places.pop_front();
+        }
+        Some(self.binary(sample_frame(self.seq, &some), Sort::Samples))
+    }
+
+    fn text(&mut self, mut value: Value, sort: Sort) -> Message {
+        self.seq += 1;
+        if let Some(object) = value.as_object_mut() {
+            object.insert("seq".to_owned(), self.seq.into());
+        }
+        Message { seq: self.seq, sort, body: Body::Text(value.to_string().into()) }
+    }
+
+    fn binary(&self, bytes: Vec<u8>, sort: Sort) -> Message {
+        Message { seq: self.seq, sort, body: Body::Binary(bytes.into()) }
+    }
+
+    /// For a viewer that comes: all, or what has changed since message `since`. What is new must have been flushed.
+    pub fn catch_up(&self, since: Option<u64>, may: May, tokens_needed: bool) -> Vec<Message> {
+        let since = since.filter(|since| *since <= self.seq);
+        // Who is lost half way through asks from where he was.
+        let low = since.unwrap_or(0);
+        let text = |value: &Value| {
+            let body = Body::Text(numbered(value, low).to_string().into());
+            Message { seq: low, sort: Sort::Other, body }
+        };
+        let binary =
+            |bytes: Vec<u8>| Message { seq: low, sort: Sort::Other, body: Body::Binary(bytes.into()) };
+        let mut messages = vec![text(&self.hello(may, tokens_needed, None))];
+        let missed = |shown: &&Shown| since.is_none_or(|since| shown.seq > since);
+        let sections: Vec<_> =
+            self.sections.values().filter(missed).map(|shown| (shown.record, shown.seen)).collect();
+        if !sections.is_empty() {
+            messages.push(binary(section_frame(low, &sections)));
+        }
+        let known = since.and_then(|since| self.samples_until(since));
+        let first = known.unwrap_or(0).max(self.samples.len().saturating_sub(MOST_BACK));
+        let samples: Vec<_> = self.samples.since(first).copied().collect();
+        if !samples.is_empty() {
+            messages.push(binary(sample_frame(low, &samples)));
+        }
+        if let Some(since) = since {
+            let missed = self.told.iter().filter(|(seq, _)| *seq > since);
+            messages.extend(missed.map(|(seq, told)| Message {
+                seq: *seq,
+                sort: Sort::Other,
+                body: Body::Text(told.clone()),
+            }));
+        }
+        messages.extend(self.lists().iter().chain(&self.back).map(text));
+        messages.push(text(&self.history.message(low)));
+        messages.extend(self.state().as_ref().map(text));
+        messages.extend(self.end.as_ref().map(text));
+        let ready = numbered(&json!({"type": "ready"}), self.seq).to_string();
+        messages.push(Message { seq: self.seq, sort: Sort::Other, body: Body::Text(ready.into()) });
+        messages
+    }
+
+    /// How many samples a viewer has that has had this message; `None` where that isn't known any more.
+    fn samples_until(&self, since: u64) -> Option<usize> {
+        let place = self.places.partition_point(|(seq, _)| *seq <= since).checked_sub(1)?;
+        self.places.get(place).map(|(_, count)| *count)
+    }
+
+    /// Alerts and notes, whole.
+    fn lists(&self) -> Vec<Value> {
+        let state = self.state.as_ref().map(|shown| &shown.0);
+        let (list, hidden) =
+            state.map_or((json!([]), 0), |state| (json!(state.alert_list), state.alerts_hidden));
+        vec![
+            json!({"type": "alerts", "list": list, "hidden": hidden}),
+            json!({"type": "notes", "list": self.notes}),
+        ]
+    }
+
+    /// The first message.
+    pub fn hello(&self, may: May, tokens_needed: bool, thinned: Option<usize>) -> Value {
+        let begun_s = self.begun.map_or(0.0, MonoNs::as_secs_f64);
+        let instance = self.instance();
+        let greeting = Greeting { seq: self.seq, instance: &instance, may, begun_s, tokens_needed, thinned };
+        serde_json::to_value(self.site.hello(&greeting))
+            .unwrap_or_else(|error| json!({"error": error.to_string()}))
+    }
+
+    /// The state.
+    pub fn state(&self) -> Option<Value> {
+        let (state, beside) = &**self.state.as_ref()?;
+        let mut value = serde_json::to_value(state).ok()?;
+        let object = value.as_object_mut()?;
+        object.insert("type".to_owned(), "state".into());
+        object.insert("t_s".to_owned(), state.now_s.into());
+        if let Ok(Value::Object(beside)) = serde_json::to_value(beside) {
+            object.extend(beside);
+        }
+        object.insert("playback".to_owned(), json!(self.playback));
+        object.insert("ended".to_owned(), self.end.is_some().into());
+        object.insert("page_dropped".to_owned(), json!(self.dropped));
+        Some(value)
+    }
+
+    /// Samples between two chainages, m, in a frame: at most [`MOST_IN_RANGE`], and of how many one.
+    pub fn samples_frame(&self, from_m: f32, to_m: f32) -> (Vec<u8>, usize) {
+        let (samples, step) = self.samples.between(from_m, to_m, MOST_IN_RANGE);
+        (sample_frame(self.seq, &samples), step)
+    }
+
+    /// The samples.
+    pub fn samples(&self) -> &Samples {
+        &self.samples
+    }
+
+    /// What found no room on its way here.
+    pub fn dropped(&self) -> Dropped {
+        self.dropped
+    }
+
+    /// The number of the last message.
+    pub fn seq(&self) -> u64 {
+        self.seq
+    }
+
+    /// How many sections there are.
+    pub fn sections(&self) -> usize {
+        self.sections.len()
+    }
+
+    /// The site.
+    pub fn site(&self) -> &Site {
+        &self.site
+    }
+
+    /// All sections in a frame.
+    pub fn sections_frame(&self) -> Vec<u8> {
+        let all: Vec<_> = self.sections.values().map(|shown| (shown.record, shown.seen)).collect();
+        section_frame(self.seq, &all)
+    }
+
+    /// Alerts, notes and the history, as messages.
+    pub fn closing(&self) -> Vec<Value> {
+        let mut all = self.lists();
+        all.push(self.history.message(self.seq));
+        all.extend(self.back.clone());
+        all
+    }
+
+    /// The end of the dive, once it has ended.
+    pub fn end(&self) -> Option<&Value> {
+        self.end.as_ref()
+    }
+}
+
+/// A message with its number.
+fn numbered(value: &Value, seq: u64) -> Value {
+    let mut value = value.clone();
+    if let Some(object) = value.as_object_mut() {
+        object.insert("seq".to_owned(), seq.into());
+    }
+    value
+}

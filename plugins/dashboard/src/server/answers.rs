@@ -1,0 +1,353 @@
+//! Answers to requests. None waits for the loop.
+
+use std::convert::Infallible;
+use std::sync::Arc;
+use std::sync::atomic::Ordering;
+use std::time::Duration;
+
+use axum::Router;
+use axum::body::{Body as HttpBody, Bytes, to_bytes};
+use axum::extract::ws::WebSocketUpgrade;
+use axum::extract::ws::rejection::WebSocketUpgradeRejection;
+use axum::extract::{Path, Request, State};
+use axum::http::{HeaderMap, HeaderName, HeaderValue, Method, StatusCode, Uri, header};
+use axum::middleware::{self, Next};
+use axum::response::{IntoResponse, Response};
+use axum::routing::{get, post};
+use serde_json::{Value, json};
+use tokio::time::Instant;
+
+use super::{Shared, feed, metrics, neighbours};
+use crate::access::{COOKIE, Role, name_of, query};
+use crate::assets;
+use crate::command::{Asked, LONGEST};
+use crate::model::{Body, MOST_IN_RANGE, Message, Sort};
+
+/// The feed's WebSocket subprotocol.
+const SUBPROTOCOL: &str = "headrace.feed.1";
+/// Longest message that is read at all, bytes.
+const LONGEST_READ: usize = 16 << 10;
+/// How long a browser keeps the token, seconds: a day.
+const COOKIE_S: u32 = 86_400;
+
+type Here = State<Arc<Shared>>;
+
+/// All addresses.
+pub(super) fn router(shared: Arc<Shared>) -> Router {
+    Router::new()
+        .route("/", get(page))
+        .route("/widget/speed", get(page))
+        .route("/widget/wall", get(page))
+        .route("/widget/alerts", get(page))
+        .route("/assets/{*path}", get(asset))
+        .route("/feed", get(socket))
+        .route("/feed.jsonl", get(lines))
+        .route("/samples", get(samples))
+        .route("/state.json", get(state))
+        .route("/schema.json", get(schema))
+        .route("/metrics", get(figures))
+        .route("/register_service", get(|| async { json_answer(&neighbours::service()) }))
+        .route(neighbours::EXTRAS, get(extras))
+        .route("/login", get(login))
+        .route("/actions/{name}", post(action).options(preflight))
+        .fallback(missing)
+        .layer(middleware::from_fn_with_state(Arc::clone(&shared), guard))
+        .with_state(shared)
+}
+
+/// Refuses other hosts and origins, and says what browsers may do with an answer.
+async fn guard(State(shared): Here, request: Request, next: Next) -> Response {
+    let (headers, uri) = (request.headers(), request.uri());
+    let frame_ancestors = ancestors(&shared, headers);
+    let changes = request.method() == Method::POST || uri.path() == "/feed";
+    let mut answer = if !shared.access.is_host(headers) {
+        Shared::count(&shared.counts.foreign, 1);
+        plain(
+            StatusCode::MISDIRECTED_REQUEST,
+            "this machine isn't known by that name; name it with --page-host\n",
+        )
+    } else if changes && !shared.access.is_origin(headers) {
+        Shared::count(&shared.counts.foreign, 1);
+        plain(StatusCode::FORBIDDEN, "from another page; allow it with --page-origin\n")
+    } else {
+        next.run(request).await
+    };
+    let policy = format!(
+        "default-src 'none'; script-src 'self'; style-src 'self' 'unsafe-inline'; img-src 'self' data: blob:; \
+         font-src 'self'; media-src 'self' data: blob:; connect-src 'self'; worker-src 'self' blob:; manifest-src 'self'; \
+         base-uri 'none'; form-action 'self'; frame-ancestors {frame_ancestors}"
+    );
+    let set = answer.headers_mut();
+    let fixed = |text| HeaderValue::from_static(text);
+    set.insert(
+        header::CONTENT_SECURITY_POLICY,
+        HeaderValue::from_str(&policy).unwrap_or(fixed("default-src 'none'")),
+    );
+    set.insert(header::X_CONTENT_TYPE_OPTIONS, fixed("nosniff"));
+    set.insert(header::REFERRER_POLICY, fixed("no-referrer"));
+    set.insert(HeaderName::from_static("cross-origin-resource-policy"), fixed("same-site"));
+    set.entry(header::CACHE_CONTROL).or_insert(fixed("no-store"));
+    answer
+}
+
+/// Who may frame the page: this machine's other services, as Cockpit is, and those told of.
+fn ancestors(shared: &Shared, headers: &HeaderMap) -> String {
+    let mut all = "'self'".to_owned();
+    let name = headers.get(header::HOST).and_then(|host| host.to_str().ok()).map(name_of);
+    let is_fit = |byte: u8| byte.is_ascii_alphanumeric() || b".-[]:".contains(&byte);
+    if let Some(name) = name.filter(|name| !name.is_empty() && name.bytes().all(is_fit)) {
+        all.push_str(&format!(" http://{name}:* https://{name}:*"));
+    }
+    for origin in &shared.access.origins {
+        all.push(' ');
+        all.push_str(origin);
+    }
+    all
+}
+
+fn plain(status: StatusCode, text: &'static str) -> Response {
+    (status, [(header::CONTENT_TYPE, "text/plain; charset=utf-8")], text).into_response()
+}
+
+fn json_answer(value: &Value) -> Response {
+    ([(header::CONTENT_TYPE, "application/json")], value.to_string()).into_response()
+}
+
+/// The role of a request.
+///
+/// Errors: the answer where it has none.
+fn admit(shared: &Shared, headers: &HeaderMap, uri: &Uri) -> Result<Role, Box<Response>> {
+    shared.access.role(headers, uri).ok_or_else(|| {
+        Shared::count(&shared.counts.unauthorised, 1);
+        Box::new(plain(StatusCode::UNAUTHORIZED, "a token is needed: open this server's page\n"))
+    })
+}
+
+async fn missing() -> Response {
+    plain(StatusCode::NOT_FOUND, "no such page\n")
+}
+
+/// The page, for anyone: it asks for the token itself, as frames that answer otherwise are retried for ever.
+async fn page() -> Response {
+    ([(header::CONTENT_TYPE, "text/html; charset=utf-8")], assets::index()).into_response()
+}
+
+async fn asset(Path(path): Path<String>) -> Response {
+    match assets::asset(&format!("assets/{path}")) {
+        Some(bytes) => {
+            let kind =
+                [(header::CONTENT_TYPE, assets::content_type(&path)), (header::CACHE_CONTROL, "no-cache")];
+            (kind, bytes).into_response()
+        }
+        None => missing().await,
+    }
+}
+
+/// Takes a token, and keeps it in the browser.
+async fn login(State(shared): Here, uri: Uri) -> Response {
+    let role = query(&uri, "token").and_then(|token| Some((shared.access.role_of(&token)?, token)));
+    let home = [(header::LOCATION, "/")];
+    let Some((_, token)) = role else {
+        if shared.access.tokens.is_none() {
+            return (StatusCode::SEE_OTHER, home).into_response();
+        }
+        Shared::count(&shared.counts.unauthorised, 1);
+        return if shared.may_fail.take() {
+            plain(StatusCode::UNAUTHORIZED, "that isn't the token\n")
+        } else {
+            plain(StatusCode::TOO_MANY_REQUESTS, "too many wrong tokens; try again in a while\n")
+        };
+    };
+    let secure = if shared.is_tls { "; Secure" } else { "" };
+    let cookie = format!("{COOKIE}={token}; Path=/; Max-Age={COOKIE_S}; HttpOnly; SameSite=Strict{secure}");
+    (StatusCode::SEE_OTHER, home, [(header::SET_COOKIE, cookie)]).into_response()
+}
+
+async fn socket(
+    State(shared): Here,
+    headers: HeaderMap,
+    uri: Uri,
+    upgrade: Result<WebSocketUpgrade, WebSocketUpgradeRejection>,
+) -> Response {
+    let role = match admit(&shared, &headers, &uri) {
+        Ok(role) => role,
+        Err(answer) => return *answer,
+    };
+    let upgrade = match upgrade {
+        Ok(upgrade) => upgrade,
+        Err(rejection) => return rejection.into_response(),
+    };
+    if shared.counts.viewers.load(Ordering::Relaxed) >= feed::MOST_VIEWERS {
+        return plain(StatusCode::SERVICE_UNAVAILABLE, "too many viewers\n");
+    }
+    let since = query(&uri, "since").and_then(|since| since.parse().ok());
+    let resume = query(&uri, "instance").zip(since).map(|(instance, since)| feed::Resume { instance, since });
+    let upgrade =
+        upgrade.protocols([SUBPROTOCOL]).max_message_size(LONGEST_READ).max_frame_size(LONGEST_READ);
+    upgrade.on_upgrade(move |socket| feed::serve(socket, shared, role, resume))
+}
+
+/// The texts of the feed, a line each, with a state a second.
+async fn lines(State(shared): Here, headers: HeaderMap, uri: Uri) -> Response {
+    if let Err(answer) = admit(&shared, &headers, &uri) {
+        return *answer;
+    }
+    let Some(batches) = shared.fan().as_ref().map(tokio::sync::broadcast::Sender::subscribe) else {
+        return plain(StatusCode::SERVICE_UNAVAILABLE, "the dive has ended\n");
+    };
+    let stream = futures_util::stream::unfold((batches, None), |(mut batches, mut stated)| async move {
+        loop {
+            use tokio::sync::broadcast::error::RecvError;
+            match batches.recv().await {
+                Ok(batch) => {
+                    let text = lines_of(&batch, &mut stated);
+                    if !text.is_empty() {
+                        return Some((Ok::<_, Infallible>(Bytes::from(text)), (batches, stated)));
+                    }
+                }
+                Err(RecvError::Lagged(_)) => {}
+                Err(RecvError::Closed) => return None,
+            }
+        }
+    });
+    ([(header::CONTENT_TYPE, "application/x-ndjson")], HttpBody::from_stream(stream)).into_response()
+}
+
+fn lines_of(batch: &[Message], stated: &mut Option<Instant>) -> String {
+    let mut text = String::new();
+    for message in batch {
+        let Body::Text(line) = &message.body else { continue };
+        if message.sort == Sort::State {
+            if stated.is_some_and(|stated: Instant| stated.elapsed() < Duration::from_millis(900)) {
+                continue;
+            }
+            *stated = Some(Instant::now());
+        }
+        text.push_str(line);
+        text.push('\n');
+    }
+    text
+}
+
+async fn samples(State(shared): Here, headers: HeaderMap, uri: Uri) -> Response {
+    if let Err(answer) = admit(&shared, &headers, &uri) {
+        return *answer;
+    }
+    let number = |key| query(&uri, key)?.parse::<f32>().ok().filter(|value| value.is_finite());
+    let (Some(from_m), Some(to_m)) = (number("from_m"), number("to_m")) else {
+        return plain(StatusCode::BAD_REQUEST, "needs from_m and to_m, metres of chainage\n");
+    };
+    let (frame, step) = shared.model().samples_frame(from_m, to_m);
+    let head = [
+        (header::CONTENT_TYPE, "application/octet-stream".to_owned()),
+        (HeaderName::from_static("headrace-one-of"), step.to_string()),
+        (HeaderName::from_static("headrace-most"), MOST_IN_RANGE.to_string()),
+    ];
+    (axum::response::AppendHeaders(head), frame).into_response()
+}
+
+async fn state(State(shared): Here, headers: HeaderMap, uri: Uri) -> Response {
+    match admit(&shared, &headers, &uri) {
+        Ok(_) => json_answer(
+            &shared.model().state().unwrap_or(json!({"type": "state", "old": true, "condition": "no_data"})),
+        ),
+        Err(answer) => *answer,
+    }
+}
+
+async fn schema() -> Response {
+    let kind = [(header::CONTENT_TYPE, "application/schema+json")];
+    (kind, include_str!("../../../../docs/live-state.schema.json")).into_response()
+}
+
+async fn figures(State(shared): Here, headers: HeaderMap, uri: Uri) -> Response {
+    match admit(&shared, &headers, &uri) {
+        Ok(_) => {
+            ([(header::CONTENT_TYPE, "text/plain; version=0.0.4")], metrics::metrics(&shared)).into_response()
+        }
+        Err(answer) => *answer,
+    }
+}
+
+async fn extras(State(shared): Here, headers: HeaderMap) -> Response {
+    let host = headers.get(header::HOST).and_then(|host| host.to_str().ok()).unwrap_or("localhost");
+    let scheme = if shared.is_tls { "https" } else { "http" };
+    json_answer(&neighbours::extras(&format!("{scheme}://{host}")))
+}
+
+/// Headers that let a page told of read the answer.
+fn allowed(shared: &Shared, headers: &HeaderMap) -> HeaderMap {
+    let mut set = HeaderMap::new();
+    let Some(origin) = headers.get(header::ORIGIN) else { return set };
+    if shared.access.is_origin(headers) {
+        set.insert(header::ACCESS_CONTROL_ALLOW_ORIGIN, origin.clone());
+        set.insert(header::ACCESS_CONTROL_ALLOW_METHODS, HeaderValue::from_static("POST"));
+        set.insert(
+            header::ACCESS_CONTROL_ALLOW_HEADERS,
+            HeaderValue::from_static("content-type, authorization"),
+        );
+        set.insert(header::VARY, HeaderValue::from_static("origin"));
+    }
+    set
+}
+
+async fn preflight(State(shared): Here, headers: HeaderMap) -> Response {
+    (StatusCode::NO_CONTENT, allowed(&shared, &headers)).into_response()
+}
+
+/// Acknowledge, silence, mark and note, as a joystick's buttons send them.
+async fn action(
+    State(shared): Here,
+    Path(name): Path<String>,
+    headers: HeaderMap,
+    uri: Uri,
+    body: HttpBody,
+) -> Response {
+    let set = allowed(&shared, &headers);
+    match act(&shared, &name, &headers, &uri, body).await {
+        Ok(done) => (set, json_answer(&done)).into_response(),
+        Err((status, why)) => {
+            Shared::count(&shared.counts.refused, 1);
+            let refused = json!({"type": "refused", "why": why}).to_string();
+            (status, set, [(header::CONTENT_TYPE, "application/json")], refused).into_response()
+        }
+    }
+}
+
+async fn act(
+    shared: &Shared,
+    name: &str,
+    headers: &HeaderMap,
+    uri: &Uri,
+    body: HttpBody,
+) -> Result<Value, (StatusCode, String)> {
+    let role =
+        shared.access.role(headers, uri).ok_or((StatusCode::UNAUTHORIZED, "a token is needed".to_owned()))?;
+    if !feed::may(shared, role).operate {
+        return Err((StatusCode::FORBIDDEN, "not in this dive, or the token is a viewer's".to_owned()));
+    }
+    if !["acknowledge", "silence", "mark", "note"].contains(&name) {
+        return Err((
+            StatusCode::NOT_FOUND,
+            format!("no action {name:?}; acknowledge, silence, mark or note"),
+        ));
+    }
+    let too_long = |_| (StatusCode::PAYLOAD_TOO_LARGE, format!("at most {LONGEST} bytes"));
+    let bytes = to_bytes(body, LONGEST).await.map_err(too_long)?;
+    let wrong = |why: String| (StatusCode::BAD_REQUEST, why);
+    let mut value: Value = if bytes.is_empty() {
+        json!({})
+    } else {
+        serde_json::from_slice(&bytes).map_err(|error| wrong(format!("no JSON: {error}")))?
+    };
+    let object = value.as_object_mut().ok_or_else(|| wrong("expected a JSON object".to_owned()))?;
+    object.insert("do".to_owned(), name.into());
+    if name == "acknowledge" {
+        object.entry("alert").or_insert(0.into());
+    }
+    match Asked::parse(&value.to_string()).map_err(wrong)? {
+        Asked::Command(command) => (shared.act)(command).map_err(|why| (StatusCode::CONFLICT, why))?,
+        Asked::Play(_) | Asked::Rate(_) => {}
+    }
+    Ok(json!({"type": "done", "do": name}))
+}

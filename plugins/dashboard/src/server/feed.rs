@@ -1,0 +1,272 @@
+//! A viewer on the WebSocket.
+
+use std::sync::Arc;
+use std::sync::atomic::Ordering;
+use std::time::Duration;
+
+use axum::extract::ws::{CloseFrame, Message as Frame, WebSocket, close_code};
+use serde_json::{Value, json};
+use tokio::sync::broadcast::error::RecvError;
+use tokio::time::{Instant, timeout};
+
+use super::Shared;
+use super::metrics::Budget;
+use crate::access::Role;
+use crate::command::{Asked, LONGEST};
+use crate::model::{Body, Message, Sort};
+use crate::site::May;
+
+/// Viewers at a time.
+pub(super) const MOST_VIEWERS: usize = 32;
+/// A viewer that takes nothing for so long is dropped.
+const STALLED_AFTER: Duration = Duration::from_secs(10);
+/// Messages a second from a viewer.
+const MOST_PER_S: f64 = 20.0;
+
+/// Where a viewer was when it was lost.
+pub(super) struct Resume {
+    pub(super) instance: String,
+    pub(super) since: u64,
+}
+
+/// Counts a viewer as long as it is there.
+struct Counted(Arc<Shared>);
+
+impl Counted {
+    fn new(shared: Arc<Shared>) -> Self {
+        shared.counts.viewers.fetch_add(1, Ordering::Relaxed);
+        Shared::count(&shared.counts.served, 1);
+        Self(shared)
+    }
+}
+
+impl Drop for Counted {
+    fn drop(&mut self) {
+        self.0.counts.viewers.fetch_sub(1, Ordering::Relaxed);
+    }
+}
+
+/// Why a viewer isn't served any more.
+enum Over {
+    /// It is gone, or said so.
+    Gone,
+    /// It takes nothing.
+    Stalled,
+    /// What it sends isn't allowed.
+    Refused,
+    /// The page ends.
+    Ended,
+}
+
+struct Viewer {
+    socket: WebSocket,
+    shared: Arc<Shared>,
+    may: May,
+    instance: String,
+    /// The last message that it got.
+    seq: u64,
+    state_every: Duration,
+    state_sent: Option<Instant>,
+    budget: Budget,
+}
+
+/// Serves a viewer until it goes.
+pub(super) async fn serve(socket: WebSocket, shared: Arc<Shared>, role: Role, resume: Option<Resume>) {
+    let _counted = Counted::new(Arc::clone(&shared));
+    let may = may(&shared, role);
+    let (instance, seq) = resume.map_or((String::new(), 0), |resume| (resume.instance, resume.since));
+    let mut viewer = Viewer {
+        socket,
+        shared,
+        may,
+        instance,
+        seq,
+        state_every: Duration::ZERO,
+        state_sent: None,
+        budget: Budget::new(MOST_PER_S, MOST_PER_S),
+    };
+    let (code, reason) = match viewer.watch().await {
+        Over::Gone => return,
+        Over::Stalled => {
+            Shared::count(&viewer.shared.counts.stalled, 1);
+            tracing::info!(
+                "a viewer of the page took nothing for {} s and was dropped",
+                STALLED_AFTER.as_secs()
+            );
+            return;
+        }
+        Over::Refused => (close_code::POLICY, "refused"),
+        Over::Ended => (close_code::AWAY, "ended"),
+    };
+    let close = Frame::Close(Some(CloseFrame { code, reason: reason.into() }));
+    // It may be gone already; otherwise its answer is waited for, so that it reads what was sent before.
+    let _closed = timeout(Duration::from_millis(500), async {
+        if viewer.socket.send(close).await.is_ok() {
+            while let Some(Ok(_)) = viewer.socket.recv().await {}
+        }
+    })
+    .await;
+}
+
+/// What a role may do in this dive.
+pub(super) fn may(shared: &Shared, role: Role) -> May {
+    let model = shared.model();
+    let operates = role == Role::Operator;
+    May { operate: operates && model.site().takes_commands, playback: operates && model.site().is_playback }
+}
+
+impl Viewer {
+    async fn watch(&mut self) -> Over {
+        loop {
+            // Subscribed under the model's lock: nothing is missed or comes twice.
+            let (messages, mut batches, instance) = {
+                let model = self.shared.model();
+                let Some(batches) = self.shared.fan().as_ref().map(tokio::sync::broadcast::Sender::subscribe)
+                else {
+                    return Over::Ended;
+                };
+                let instance = model.instance();
+                let since = (self.instance == instance).then_some(self.seq);
+                (model.catch_up(since, self.may, self.shared.access.tokens.is_some()), batches, instance)
+            };
+            self.instance = instance;
+            for message in &messages {
+                if let Err(over) = self.send(message).await {
+                    return over;
+                }
+            }
+            loop {
+                tokio::select! {
+                    batch = batches.recv() => match batch {
+                        Ok(batch) => {
+                            if self.has_jumped() {
+                                break;
+                            }
+                            if let Err(over) = self.send_batch(&batch).await {
+                                return over;
+                            }
+                        }
+                        Err(RecvError::Lagged(_)) => {
+                            Shared::count(&self.shared.counts.lagged, 1);
+                            break;
+                        }
+                        Err(RecvError::Closed) => return Over::Ended,
+                    },
+                    message = self.socket.recv() => {
+                        let Some(Ok(message)) = message else { return Over::Gone };
+                        if let Err(over) = self.hear(message).await {
+                            return over;
+                        }
+                    }
+                }
+            }
+        }
+    }
+
+    fn has_jumped(&self) -> bool {
+        self.shared.model().instance() != self.instance
+    }
+
+    async fn send_batch(&mut self, batch: &[Message]) -> Result<(), Over> {
+        for message in batch {
+            if message.sort == Sort::State && !self.wants_state() {
+                continue;
+            }
+            self.send(message).await?;
+        }
+        Ok(())
+    }
+
+    /// Whether a state is due for it.
+    fn wants_state(&mut self) -> bool {
+        let now = Instant::now();
+        let is_due = self.state_sent.is_none_or(|sent| now.duration_since(sent) >= self.state_every);
+        if is_due {
+            self.state_sent = Some(now);
+        }
+        is_due
+    }
+
+    async fn send(&mut self, message: &Message) -> Result<(), Over> {
+        let (frame, bytes) = match &message.body {
+            Body::Text(text) => (Frame::Text(text.clone()), text.len()),
+            Body::Binary(bytes) => (Frame::Binary(bytes.clone()), bytes.len()),
+        };
+        self.put(frame).await?;
+        self.seq = self.seq.max(message.seq);
+        Shared::count(&self.shared.counts.bytes, bytes as u64);
+        Ok(())
+    }
+
+    async fn put(&mut self, frame: Frame) -> Result<(), Over> {
+        match timeout(STALLED_AFTER, self.socket.send(frame)).await {
+            Ok(Ok(())) => Ok(()),
+            Ok(Err(_)) => Err(Over::Gone),
+            Err(_) => Err(Over::Stalled),
+        }
+    }
+
+    async fn answer(&mut self, value: &Value) -> Result<(), Over> {
+        self.put(Frame::Text(value.to_string().into())).await
+    }
+
+    async fn hear(&mut self, message: Frame) -> Result<(), Over> {
+        let text = match message {
+            Frame::Text(text) => text,
+            Frame::Ping(_) | Frame::Pong(_) => {
+                return if self.budget.take() {
+                    Ok(())
+                } else {
+                    self.refuse("over 20 messages a second").await
+                };
+            }
+            Frame::Close(_) => return Err(Over::Gone),
+            Frame::Binary(_) => return self.refuse("expected JSON text, not bytes").await,
+        };
+        if text.len() > LONGEST {
+            return self.refuse(&format!("a message of {} bytes; at most {LONGEST}", text.len())).await;
+        }
+        if !self.budget.take() {
+            return self.refuse("over 20 messages a second").await;
+        }
+        match serde_json::from_str::<Value>(&text) {
+            Ok(Value::Object(_)) => {}
+            _ => return self.refuse("expected a JSON object").await,
+        }
+        match self.obey(&text) {
+            Ok(done) => self.answer(&json!({"type": "done", "seq": self.seq, "do": done})).await,
+            Err(why) => {
+                Shared::count(&self.shared.counts.refused, 1);
+                self.answer(&json!({"type": "refused", "seq": self.seq, "why": why})).await
+            }
+        }
+    }
+
+    fn obey(&mut self, text: &str) -> Result<&'static str, String> {
+        match Asked::parse(text)? {
+            Asked::Rate(hz) => {
+                // A little less, so that beats of a steady rhythm aren't missed by a hair.
+                self.state_every = Duration::from_secs_f64((0.9 / hz).max(0.0));
+                Ok("rate")
+            }
+            Asked::Play(_) if !self.may.playback => {
+                Err("this dive can't be paused, or the token is a viewer's".to_owned())
+            }
+            Asked::Play(play) => (self.shared.direct)(play).map(|()| "play"),
+            Asked::Command(_) if !self.may.operate => {
+                Err("not in this dive, or the token is a viewer's".to_owned())
+            }
+            Asked::Command(command) => {
+                let done = command.word();
+                (self.shared.act)(command).map(|()| done)
+            }
+        }
+    }
+
+    /// Refuses what no page of ours sends, and ends.
+    async fn refuse(&mut self, why: &str) -> Result<(), Over> {
+        Shared::count(&self.shared.counts.refused, 1);
+        self.answer(&json!({"type": "refused", "seq": self.seq, "why": why})).await?;
+        Err(Over::Refused)
+    }
+}

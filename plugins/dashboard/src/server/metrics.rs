@@ -1,0 +1,104 @@
+//! Figures of the page and the dive for Prometheus, and budgets of requests.
+
+use std::fmt::Write as _;
+use std::sync::atomic::Ordering;
+use std::sync::{Mutex, PoisonError};
+
+use serde_json::Value;
+use tokio::time::Instant;
+
+use super::Shared;
+
+/// So many at once, and so many a second after that.
+pub(crate) struct Budget {
+    most: f64,
+    per_s: f64,
+    left: Mutex<(f64, Option<Instant>)>,
+}
+
+impl Budget {
+    pub(crate) fn new(most: f64, per_s: f64) -> Self {
+        Self { most, per_s, left: Mutex::new((most, None)) }
+    }
+
+    /// Takes one, if there is one left.
+    pub(crate) fn take(&self) -> bool {
+        let mut left = self.left.lock().unwrap_or_else(PoisonError::into_inner);
+        let now = Instant::now();
+        let since_s = left.1.map_or(0.0, |last| now.duration_since(last).as_secs_f64());
+        let budget = (left.0 + since_s * self.per_s).min(self.most);
+        let has_one = budget >= 1.0;
+        *left = (if has_one { budget - 1.0 } else { budget }, Some(now));
+        has_one
+    }
+}
+
+/// In Prometheus' text format.
+pub(super) fn metrics(shared: &Shared) -> String {
+    let model = shared.model();
+    let counts = &shared.counts;
+    let mut text = String::new();
+    let mut put = |name: &str, kind: &str, help: &str, value: f64| {
+        // Writing to a string can't fail.
+        let _infallible = write!(
+            text,
+            "# HELP headrace_{name} {help}\n# TYPE headrace_{name} {kind}\nheadrace_{name} {value}\n"
+        );
+    };
+    let of = |counter: &std::sync::atomic::AtomicU64| counter.load(Ordering::Relaxed) as f64;
+    put("page_viewers", "gauge", "Viewers of the page.", counts.viewers.load(Ordering::Relaxed) as f64);
+    put("page_viewers_total", "counter", "Viewers so far.", of(&counts.served));
+    put("page_stalled_total", "counter", "Viewers dropped as they took nothing.", of(&counts.stalled));
+    put("page_lagged_total", "counter", "Times a slow viewer got all changes at once.", of(&counts.lagged));
+    put("page_refused_total", "counter", "Messages of viewers that were refused.", of(&counts.refused));
+    put("page_unauthorised_total", "counter", "Requests without a valid token.", of(&counts.unauthorised));
+    put(
+        "page_foreign_total",
+        "counter",
+        "Requests with another host or from another origin.",
+        of(&counts.foreign),
+    );
+    put("page_sent_bytes_total", "counter", "Bytes of the feed.", of(&counts.bytes));
+    put("page_samples", "gauge", "Samples that the page has.", model.samples().len() as f64);
+    put(
+        "page_samples_not_kept_total",
+        "counter",
+        "Samples beyond its memory.",
+        model.samples().not_kept() as f64,
+    );
+    put(
+        "page_dropped_samples_total",
+        "counter",
+        "Samples that found no room on their way.",
+        model.dropped().samples as f64,
+    );
+    put(
+        "page_dropped_lines_total",
+        "counter",
+        "Lines that found no room on their way.",
+        model.dropped().told as f64,
+    );
+    put("page_sections", "gauge", "Sections that the page has.", model.sections() as f64);
+    if let Some(state) = model.state() {
+        let number = |path: &str| state.pointer(path).and_then(Value::as_f64);
+        for (name, path, help) in [
+            ("chainage_metres", "/position/chainage_m", "Chainage."),
+            ("speed_mps", "/speed_mps", "Speed along the tunnel."),
+            ("v_max_mps", "/v_max_mps", "Largest speed advised."),
+            ("state_age_seconds", "/age_s", "Age of the live state."),
+            ("way_metres", "/metres/way_m", "Metres of the way."),
+            ("pass_metres", "/metres/pass_m", "Metres that pass."),
+            ("fail_metres", "/metres/fail_m", "Metres that fail."),
+            ("cannot_say_metres", "/metres/cannot_say_m", "Metres of which neither can be said."),
+            ("open_metres", "/metres/open_m", "Metres that going on may fill."),
+            ("not_inspected_metres", "/metres/not_inspected_m", "Metres not seen from both sides."),
+            ("alerts_unacknowledged", "/alert_counts/unacknowledged", "Alerts that nobody has acknowledged."),
+            ("alerts_active", "/alert_counts/active", "Alerts that hold."),
+        ] {
+            if let Some(value) = number(path) {
+                put(name, "gauge", help, value);
+            }
+        }
+    }
+    text
+}

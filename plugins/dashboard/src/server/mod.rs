@@ -1,0 +1,282 @@
+//! The server: one thread with sockets and timers, which the loop's thread never waits for in a live dive.
+
+mod answers;
+mod feed;
+mod listener;
+mod metrics;
+mod neighbours;
+mod pump;
+
+use std::io;
+use std::net::{SocketAddr, TcpListener};
+use std::sync::atomic::{AtomicBool, AtomicU64, AtomicUsize, Ordering};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::thread::JoinHandle;
+use std::time::Duration;
+
+use headrace_monitor::run::Loop;
+use tokio::sync::{Notify, broadcast, mpsc};
+
+use crate::access::{Access, Tokens};
+use crate::collector::{Collector, WAITING};
+use crate::command::{Command, Play};
+use crate::fed::Fed;
+use crate::model::{Message, Model};
+use crate::site::Site;
+
+/// The usual port.
+pub const PORT: u16 = 8881;
+/// Ports that are tried, from the one asked for.
+const PORTS: u16 = 10;
+/// Batches that a viewer may be behind before it gets all that has changed at once.
+const BATCHES: usize = 64;
+/// How long viewers get for the last messages.
+const ENDS_WITHIN: Duration = Duration::from_secs(1);
+
+/// Certificate and key, as files in PEM.
+#[derive(Debug, Clone)]
+pub struct TlsFiles {
+    /// The certificate, and those that lead to its issuer.
+    pub certificate: std::path::PathBuf,
+    /// Its private key.
+    pub key: std::path::PathBuf,
+}
+
+/// Where the page is served, and for whom.
+#[derive(Debug, Clone)]
+pub struct Settings {
+    /// Address and port; port 0 is any.
+    pub address: SocketAddr,
+    /// Tokens; none on loopback.
+    pub tokens: Option<Tokens>,
+    /// Names of this machine.
+    pub hosts: Vec<String>,
+    /// Origins of pages that may frame this one and send actions.
+    pub origins: Vec<String>,
+    /// Certificate and key.
+    pub tls: Option<TlsFiles>,
+}
+
+/// Why the page can't be served.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum PageError {
+    /// No port can be listened on.
+    #[error("the page can't be served on {address} or the {PORTS} ports from there: {source}")]
+    Bind {
+        /// The address asked for.
+        address: SocketAddr,
+        /// Why.
+        source: io::Error,
+    },
+    /// No thread or runtime.
+    #[error("the page's thread can't be started: {0}")]
+    Thread(io::Error),
+    /// No TLS.
+    #[error("{0}")]
+    Tls(String),
+}
+
+/// What takes the operators' commands: `Err` with why not.
+pub type Act = Arc<dyn Fn(Command) -> Result<(), String> + Send + Sync>;
+/// What takes commands of playback.
+pub type Direct = Arc<dyn Fn(Play) -> Result<(), String> + Send + Sync>;
+
+/// Counts for `/metrics`.
+#[derive(Debug, Default)]
+pub(crate) struct Counts {
+    pub(crate) viewers: AtomicUsize,
+    pub(crate) served: AtomicU64,
+    pub(crate) stalled: AtomicU64,
+    pub(crate) lagged: AtomicU64,
+    pub(crate) refused: AtomicU64,
+    pub(crate) unauthorised: AtomicU64,
+    pub(crate) foreign: AtomicU64,
+    pub(crate) bytes: AtomicU64,
+}
+
+/// What the handlers share.
+pub(crate) struct Shared {
+    model: Mutex<Model>,
+    pub(crate) access: Access,
+    /// None once the page ends.
+    fan: Mutex<Option<broadcast::Sender<Arc<[Message]>>>>,
+    pub(crate) counts: Counts,
+    pub(crate) act: Act,
+    pub(crate) direct: Direct,
+    pub(crate) is_tls: bool,
+    pub(crate) may_fail: metrics::Budget,
+    stop: Notify,
+    has_ended: AtomicBool,
+}
+
+impl Shared {
+    pub(crate) fn model(&self) -> MutexGuard<'_, Model> {
+        self.model.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    fn fan(&self) -> MutexGuard<'_, Option<broadcast::Sender<Arc<[Message]>>>> {
+        self.fan.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    pub(crate) fn count(counter: &AtomicU64, by: u64) {
+        counter.fetch_add(by, Ordering::Relaxed);
+    }
+}
+
+/// A page that is served.
+pub struct Page {
+    shared: Arc<Shared>,
+    thread: Option<JoinHandle<()>>,
+    sender: mpsc::Sender<Fed>,
+    address: SocketAddr,
+    /// Ports that were taken.
+    taken: Vec<u16>,
+}
+
+impl Page {
+    /// Serves a dive. `instance` is unique to it.
+    ///
+    /// Errors: see [`PageError`].
+    pub fn start(
+        settings: Settings,
+        site: Site,
+        instance: String,
+        act: Act,
+        direct: Direct,
+    ) -> Result<Self, PageError> {
+        let (listener, taken) = bind(settings.address)?;
+        let address = listener.local_addr().map_err(PageError::Thread)?;
+        let tls = settings.tls.as_ref().map(listener::Tls::read).transpose().map_err(PageError::Tls)?;
+        let (sender, receiver) = mpsc::channel(WAITING);
+        let (fan, _) = broadcast::channel(BATCHES);
+        let is_loopback = address.ip().is_loopback();
+        let Settings { tokens, hosts, origins, .. } = settings;
+        let shared = Arc::new(Shared {
+            model: Mutex::new(Model::new(site, instance)),
+            access: Access { tokens, hosts, origins, is_loopback },
+            fan: Mutex::new(Some(fan)),
+            counts: Counts::default(),
+            act,
+            direct,
+            is_tls: tls.is_some(),
+            may_fail: metrics::Budget::new(20.0, 1.0),
+            stop: Notify::new(),
+            has_ended: AtomicBool::new(false),
+        });
+        let runtime = tokio::runtime::Builder::new_current_thread().enable_io().enable_time().build();
+        let runtime = runtime.map_err(PageError::Thread)?;
+        let of_thread = Arc::clone(&shared);
+        let serve = move || runtime.block_on(serve(listener, tls, receiver, of_thread));
+        let thread =
+            std::thread::Builder::new().name("page".to_owned()).spawn(serve).map_err(PageError::Thread)?;
+        Ok(Self { shared, thread: Some(thread), sender, address, taken })
+    }
+
+    /// Where it is served.
+    pub fn address(&self) -> SocketAddr {
+        self.address
+    }
+
+    /// Ports before that one, which others have.
+    pub fn taken(&self) -> &[u16] {
+        &self.taken
+    }
+
+    /// Its scheme, `http` or `https`.
+    pub fn scheme(&self) -> &'static str {
+        if self.shared.is_tls { "https" } else { "http" }
+    }
+
+    /// What takes results of a loop for it: `waits` for a replay.
+    pub fn collector(&self, dive: &Loop, waits: bool) -> Collector {
+        let (is_playback, recorded_to) = {
+            let model = self.shared.model();
+            (model.site().is_playback, model.site().recorded_to.clone())
+        };
+        Collector::new(self.sender.clone(), dive, waits, is_playback, recorded_to)
+    }
+
+    /// How many watch.
+    pub fn viewers(&self) -> usize {
+        self.shared.counts.viewers.load(Ordering::Relaxed)
+    }
+
+    /// Ends it: viewers get the last messages, `end` the very last, for a second at most.
+    pub fn end(mut self, end: Option<serde_json::Value>) {
+        if let Some(end) = end {
+            // Its thread may have ended early, which is told below.
+            let _ended = self.sender.blocking_send(Fed::End(Box::new(end)));
+        }
+        self.stop();
+    }
+
+    fn stop(&mut self) {
+        self.shared.has_ended.store(true, Ordering::Relaxed);
+        self.shared.stop.notify_one();
+        if let Some(thread) = self.thread.take()
+            && thread.join().is_err()
+        {
+            tracing::error!("the page's thread has ended early");
+        }
+    }
+}
+
+impl Drop for Page {
+    fn drop(&mut self) {
+        self.stop();
+    }
+}
+
+/// The first free port from the one asked for, and those that were taken.
+fn bind(asked: SocketAddr) -> Result<(TcpListener, Vec<u16>), PageError> {
+    let mut taken = Vec::new();
+    let mut failed = io::Error::other("no port");
+    for step in 0..PORTS {
+        let Some(port) = asked.port().checked_add(step) else { break };
+        match TcpListener::bind(SocketAddr::new(asked.ip(), port)) {
+            Ok(listener) => return Ok((listener, taken)),
+            Err(error) if error.kind() == io::ErrorKind::AddrInUse => {
+                taken.push(port);
+                failed = error;
+            }
+            Err(source) => return Err(PageError::Bind { address: asked, source }),
+        }
+    }
+    Err(PageError::Bind { address: asked, source: failed })
+}
+
+async fn serve(
+    listener: TcpListener,
+    tls: Option<listener::Tls>,
+    fed: mpsc::Receiver<Fed>,
+    shared: Arc<Shared>,
+) {
+    let listener = match listener::Listening::new(listener, tls) {
+        Ok(listener) => listener,
+        Err(error) => {
+            tracing::error!(%error, "the page can't be served");
+            return;
+        }
+    };
+    let app = answers::router(Arc::clone(&shared));
+    let pump = pump::pump(fed, Arc::clone(&shared));
+    let serving = async move {
+        if let Err(error) = axum::serve(listener, app).await {
+            tracing::error!(%error, "the page isn't served any more");
+        }
+    };
+    let serving = tokio::spawn(serving);
+    // Ends when the page is to.
+    pump.await;
+    drop(shared.fan().take());
+    let gone = async {
+        while shared.counts.viewers.load(Ordering::Relaxed) > 0 {
+            tokio::time::sleep(Duration::from_millis(5)).await;
+        }
+    };
+    if tokio::time::timeout(ENDS_WITHIN, gone).await.is_err() {
+        tracing::warn!("viewers of the page didn't take its last messages");
+    }
+    serving.abort();
+}

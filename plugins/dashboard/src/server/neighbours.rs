@@ -1,0 +1,66 @@
+//! What BlueOS and Cockpit ask for. It is answered without a token, and says nothing of the dive.
+
+use serde_json::{Value, json};
+
+/// Where Cockpit finds its widgets and actions.
+pub(super) const EXTRAS: &str = "/cockpit_extras.json";
+/// The icon of the widgets: the page's own.
+const ICON: &str = "mdi-tunnel";
+
+/// The service as BlueOS lists it.
+pub(super) fn service() -> Value {
+    json!({
+        "name": "headrace",
+        "description": "Coverage of a tunnel's wall while it is inspected: what was missed, why, and how fast to go.",
+        "icon": ICON,
+        "company": "headrace",
+        "version": env!("CARGO_PKG_VERSION"),
+        "webpage": "",
+        "api": "",
+        "new_page": true,
+        "works_in_relative_paths": false,
+        "extras": {"cockpit": EXTRAS},
+    })
+}
+
+/// Widgets, actions and buttons of a joystick for Cockpit. `base` is this server as the browser knows it.
+pub(super) fn extras(base: &str) -> Value {
+    let widget = |name: &str, path: &str| {
+        json!({"name": name, "iframeUrl": format!("{base}/widget/{path}"), "iframeIcon": ICON,
+            "version": env!("CARGO_PKG_VERSION"), "useExtensionPathAsBaseUrl": false})
+    };
+    let action = |id: &str, name: &str, path: &str, body: Value| {
+        json!({"id": id, "name": name, "type": "http-request", "version": env!("CARGO_PKG_VERSION"),
+            "config": {"name": name, "url": format!("{base}/actions/{path}"), "method": "POST",
+                "headers": {"Content-Type": "application/json"}, "urlParams": {}, "body": body.to_string()}})
+    };
+    let button = |id: &str, name: &str, action: &str, button: u8, why: &str| {
+        json!({"id": id, "actionProtocol": "cockpit-action", "actionName": name, "actionId": action, "button": button,
+            "modifierKey": "shift", "description": why})
+    };
+    let (acknowledge, mark, silence) = ("headrace-acknowledge", "headrace-mark", "headrace-silence");
+    json!({
+        "targetSystem": "Cockpit",
+        "targetCockpitApiVersion": "1.0.0",
+        "widgets": [
+            widget("headrace speed", "speed"),
+            widget("headrace wall", "wall"),
+            widget("headrace alerts", "alerts"),
+        ],
+        "actions": [
+            action(acknowledge, "headrace: acknowledge alerts", "acknowledge", json!({"alert": 0, "by": "joystick"})),
+            action(silence, "headrace: silence alerts", "silence", json!({"by": "joystick"})),
+            action(mark, "headrace: mark this place", "mark", json!({"by": "joystick"})),
+        ],
+        "joystickSuggestions": [{
+            "id": "headrace-alerts",
+            "name": "headrace alerts",
+            "description": "Acknowledge alerts and mark a place without leaving the joystick.",
+            "version": env!("CARGO_PKG_VERSION"),
+            "buttonMappingSuggestions": [
+                button("headrace-acknowledge-button", "headrace: acknowledge alerts", acknowledge, 0, "All alerts that need it."),
+                button("headrace-mark-button", "headrace: mark this place", mark, 1, "A note without text at the present place."),
+            ],
+        }],
+    })
+}

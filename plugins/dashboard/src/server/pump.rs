@@ -1,0 +1,95 @@
+//! Takes what the loop hands over, and gives each message to all viewers, encoded once.
+
+use std::sync::Arc;
+use std::sync::atomic::Ordering;
+use std::time::Duration;
+
+use tokio::sync::mpsc;
+use tokio::time::{Instant, sleep_until};
+
+use super::Shared;
+use crate::fed::Fed;
+use crate::model::Message;
+
+/// Least time between two batches that hold nothing urgent: five a second, with some grace for beats that come early.
+const BATCH_EVERY: Duration = Duration::from_millis(190);
+/// The state is sent again after so long without any: of a replay that stands still.
+const AGAIN_AFTER: Duration = Duration::from_secs(2);
+
+/// Goes on until the page is to end.
+pub(super) async fn pump(mut fed: mpsc::Receiver<Fed>, shared: Arc<Shared>) {
+    let (mut flushed, mut is_due) = (Instant::now(), false);
+    let mut is_open = true;
+    loop {
+        let wake = if is_due { flushed + BATCH_EVERY } else { flushed + AGAIN_AFTER };
+        tokio::select! {
+            one = fed.recv(), if is_open => match one {
+                Some(one) => {
+                    let is_urgent = take(one, &mut fed, &shared);
+                    is_due = true;
+                    if is_urgent || flushed.elapsed() >= BATCH_EVERY {
+                        flush(&shared);
+                        (flushed, is_due) = (Instant::now(), false);
+                    }
+                }
+                None => is_open = false,
+            },
+            () = sleep_until(wake) => {
+                if is_due {
+                    flush(&shared);
+                } else {
+                    again(&shared);
+                }
+                (flushed, is_due) = (Instant::now(), false);
+            }
+            () = shared.stop.notified() => {
+                while let Ok(one) = fed.try_recv() {
+                    shared.model().take(one);
+                }
+                flush(&shared);
+                return;
+            }
+        }
+        if shared.has_ended.load(Ordering::Relaxed) && !is_open {
+            flush(&shared);
+            return;
+        }
+        // Viewers have their turn also while a replay feeds as fast as it can.
+        tokio::task::yield_now().await;
+    }
+}
+
+/// Takes a message and those that wait behind it; whether one is urgent.
+fn take(one: Fed, fed: &mut mpsc::Receiver<Fed>, shared: &Shared) -> bool {
+    let mut model = shared.model();
+    let mut is_urgent = model.take(one);
+    for _ in 0..crate::collector::WAITING {
+        match fed.try_recv() {
+            Ok(one) => is_urgent |= model.take(one),
+            Err(_) => break,
+        }
+    }
+    is_urgent
+}
+
+fn flush(shared: &Shared) {
+    // The lock is held until it is sent: who comes in between has either all or nothing of it.
+    let mut model = shared.model();
+    let messages = model.flush();
+    send(shared, messages);
+}
+
+fn again(shared: &Shared) {
+    let mut model = shared.model();
+    let messages = model.again().into_iter().collect();
+    send(shared, messages);
+}
+
+fn send(shared: &Shared, messages: Vec<Message>) {
+    if !messages.is_empty()
+        && let Some(fan) = &*shared.fan()
+    {
+        // Nobody may be watching.
+        let _nobody = fan.send(messages.into());
+    }
+}

@@ -1,0 +1,179 @@
+//! What doesn't change during a dive: tunnel, heads, sensors. The page gets it first.
+
+use headrace_coverage::{Cause, Unsure};
+use headrace_geometry::math::{self, TAU};
+use headrace_geometry::tunnel::Profile;
+use serde::Serialize;
+
+/// Points of the profile as sent, at equal steps of arc length.
+const POINTS: u32 = 128;
+
+/// How a dive is fed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Mode {
+    /// By ports.
+    Live,
+    /// By a simulation.
+    Demo,
+    /// By a log.
+    Replay,
+    /// Not at all: a page in a file.
+    File,
+}
+
+/// A profiling head.
+#[derive(Debug, Clone, Serialize)]
+pub struct HeadSite {
+    /// Its id.
+    pub id: String,
+    /// Number of its source.
+    pub source: u16,
+    /// Angles that the vehicle hides: from and to, degrees in the sensor frame; `to` may be over 360.
+    pub hidden_deg: Vec<[f64; 2]>,
+}
+
+/// A sensor.
+#[derive(Debug, Clone, Serialize)]
+pub struct SensorSite {
+    /// Its id.
+    pub id: String,
+    /// Its device.
+    pub plugin: String,
+    /// `head`, `echosounder`, `depth`, `imu`, `velocity_log`, `tether` or `other`.
+    pub kind: &'static str,
+}
+
+/// Tunnel, vehicle and dive.
+#[derive(Debug, Clone)]
+pub struct Site {
+    /// How the dive is fed.
+    pub mode: Mode,
+    /// Name of the dive: its log or scene.
+    pub dive: String,
+    /// Name of the vehicle.
+    pub vehicle: String,
+    /// Target T, m.
+    pub target_m: f64,
+    /// Length of a section, m.
+    pub section_m: f64,
+    /// Standard deviations of a hole that a pass keeps clear of the target.
+    pub confidence_sd: f64,
+    /// Length of the tunnel, m.
+    pub length_m: f64,
+    /// Design profile.
+    pub profile: Profile,
+    /// The heads, in the order of their sources.
+    pub heads: Vec<HeadSite>,
+    /// All sensors, in the order of sources.
+    pub sensors: Vec<SensorSite>,
+    /// UTC of the clock's zero, seconds; `None` where it isn't known.
+    pub utc_of_zero_s: Option<f64>,
+    /// First and last time of a log, seconds.
+    pub span_s: Option<[f64; 2]>,
+    /// Whether the dive takes what an operator sends.
+    pub takes_commands: bool,
+    /// Whether it can be paused and jump.
+    pub is_playback: bool,
+    /// Where the dive is recorded.
+    pub recorded_to: Option<String>,
+}
+
+/// The first message to a viewer. Field names are the contract.
+#[derive(Debug, Serialize)]
+pub(crate) struct Hello<'a> {
+    #[serde(rename = "type")]
+    kind: &'static str,
+    pub(crate) seq: u64,
+    version: u32,
+    program: &'static str,
+    instance: &'a str,
+    mode: Mode,
+    dive: &'a str,
+    vehicle: &'a str,
+    target_m: f64,
+    section_m: f64,
+    confidence_sd: f64,
+    length_m: f64,
+    perimeter_m: f64,
+    profile: Vec<[f64; 2]>,
+    clock_arc_m: Vec<f64>,
+    heads: &'a [HeadSite],
+    sensors: &'a [SensorSite],
+    may: May,
+    begun_s: f64,
+    utc_of_zero_s: Option<f64>,
+    causes: Vec<&'static str>,
+    whys: Vec<&'static str>,
+    span_s: Option<[f64; 2]>,
+    tokens_needed: bool,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    thinned: Option<usize>,
+}
+
+/// What a viewer may do.
+#[derive(Debug, Clone, Copy, Serialize)]
+pub struct May {
+    /// Acknowledge, silence, note.
+    pub operate: bool,
+    /// Pause, seek and the like.
+    pub playback: bool,
+}
+
+/// What of the first message depends on the viewer and the moment.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Greeting<'a> {
+    pub(crate) seq: u64,
+    pub(crate) instance: &'a str,
+    pub(crate) may: May,
+    pub(crate) begun_s: f64,
+    pub(crate) tokens_needed: bool,
+    /// Of so many samples one is in the file; `None` where all are.
+    pub(crate) thinned: Option<usize>,
+}
+
+impl Site {
+    pub(crate) fn hello<'a>(&'a self, to: &Greeting<'a>) -> Hello<'a> {
+        let perimeter_m = self.profile.perimeter_m();
+        let points = (0..POINTS).map(|k| perimeter_m * f64::from(k) / f64::from(POINTS));
+        Hello {
+            kind: "hello",
+            seq: to.seq,
+            version: 1,
+            program: concat!("headrace ", env!("CARGO_PKG_VERSION")),
+            instance: to.instance,
+            mode: self.mode,
+            dive: &self.dive,
+            vehicle: &self.vehicle,
+            target_m: self.target_m,
+            section_m: self.section_m,
+            confidence_sd: self.confidence_sd,
+            length_m: self.length_m,
+            perimeter_m,
+            profile: points.map(|arc_m| self.profile.point_at(arc_m).map(millimetres)).collect(),
+            clock_arc_m: (0..12).map(|hour| millimetres(self.arc_at_hour_m(hour))).collect(),
+            heads: &self.heads,
+            sensors: &self.sensors,
+            may: to.may,
+            begun_s: to.begun_s,
+            utc_of_zero_s: self.utc_of_zero_s,
+            causes: Cause::ALL.iter().map(|cause| cause.as_str()).collect(),
+            whys: Unsure::ALL.iter().map(|why| why.as_str()).collect(),
+            span_s: self.span_s,
+            tokens_needed: to.tokens_needed,
+            thinned: to.thinned,
+        }
+    }
+
+    /// Arc length at an hour of the clock seen inwards: 0 stands for 12, the crown.
+    fn arc_at_hour_m(&self, hour: u32) -> f64 {
+        // 9 is the left wall: y grows to the left.
+        let (sin, cos) = math::sin_cos(f64::from(hour) / 12.0 * TAU);
+        let [y, z] = self.profile.reference();
+        self.profile.arc_of([y - sin, z + cos])
+    }
+}
+
+fn millimetres(value: f64) -> f64 {
+    (value * 1000.0).round() / 1000.0
+}

@@ -1,0 +1,202 @@
+//! Binary frames of the feed, little-endian: a head of 16 bytes, then records of one size. `docs/page-feed.md` is their contract.
+
+use headrace_coverage::{Cause, Section, Unsure, Verdict};
+
+/// Kind of a frame of sections.
+pub const SECTIONS: u8 = 1;
+/// Kind of a frame of samples.
+pub const SAMPLES: u8 = 2;
+/// Version of both.
+const VERSION: u8 = 1;
+/// Bytes of a frame's head.
+const HEAD_BYTES: usize = 16;
+/// Bytes of a section.
+const SECTION_BYTES: usize = 32;
+/// Bytes of a sample.
+const SAMPLE_BYTES: usize = 20;
+/// What stands for none in a byte.
+pub(crate) const NONE: u8 = 255;
+/// Parts of the perimeter that an arc length is rounded down to.
+const ARC_PARTS: f64 = 65_536.0;
+/// Verdict of an open section that going on won't change.
+const NOT_INSPECTED: u8 = 4;
+
+/// A section as it is shown, but for where samples have been seen on it.
+#[derive(Debug, Clone, Copy)]
+pub struct SectionRecord {
+    /// Its chainage in lengths of a section.
+    pub index: i32,
+    /// 0 open, 1 pass, 2 fail, 3 cannot say, 4 not inspected.
+    pub verdict: u8,
+    /// Number of the main cause; 255 for none.
+    pub cause: u8,
+    /// Number of why it can't be said; 255 for none.
+    pub why: u8,
+    /// Bit 0 flagged, bit 1 settled.
+    pub flags: u8,
+    /// Diameter of the hole, its standard deviation, chainage and arc length of its centre, m; NaN for none.
+    pub hole: [f32; 4],
+}
+
+impl PartialEq for SectionRecord {
+    /// Bit for bit.
+    fn eq(&self, other: &Self) -> bool {
+        let bytes = |of: &Self| [of.verdict, of.cause, of.why, of.flags];
+        self.index == other.index
+            && bytes(self) == bytes(other)
+            && self.hole.map(f32::to_bits) == other.hole.map(f32::to_bits)
+    }
+}
+
+/// The number of one of several, as a byte.
+fn number<T: PartialEq>(all: &[T], one: Option<T>) -> u8 {
+    let place = one.and_then(|one| all.iter().position(|other| *other == one));
+    place.and_then(|place| u8::try_from(place).ok()).unwrap_or(NONE)
+}
+
+impl SectionRecord {
+    /// A section that nothing is known of.
+    pub fn blank(index: i32) -> Self {
+        Self {
+            index,
+            verdict: 0,
+            cause: NONE,
+            why: NONE,
+            flags: 0,
+            hole: [f32::NAN, 0.0, f32::NAN, f32::NAN],
+        }
+    }
+
+    /// A section of the loop; `None` where the index is out of range.
+    #[expect(clippy::cast_possible_truncation, reason = "shown to a fraction of a millimetre")]
+    pub fn of(index: i64, section: &Section) -> Option<Self> {
+        let verdict = match section.verdict {
+            Verdict::Open if section.not_inspected => NOT_INSPECTED,
+            Verdict::Open => 0,
+            Verdict::Pass => 1,
+            Verdict::Fail => 2,
+            Verdict::CannotSay => 3,
+        };
+        let cause =
+            section.evidence.filter(|_| section.verdict == Verdict::Fail).map(|evidence| evidence.cause);
+        let flags = u8::from(section.is_flagged()) | u8::from(section.settled) << 1;
+        let hole = section.hole.map_or([f32::NAN, section.hole_sd_m as f32, f32::NAN, f32::NAN], |hole| {
+            [hole.diameter_m, section.hole_sd_m, hole.x_m, hole.arc_m].map(|value| value as f32)
+        });
+        let (cause, why) = (number(&Cause::ALL, cause), number(&Unsure::ALL, section.unsure()));
+        Some(Self { index: i32::try_from(index).ok()?, verdict, cause, why, flags, hole })
+    }
+
+    fn put(&self, seen: u64, to: &mut Vec<u8>) {
+        to.extend_from_slice(&self.index.to_le_bytes());
+        to.extend_from_slice(&[self.verdict, self.cause, self.why, self.flags]);
+        self.hole.iter().for_each(|value| to.extend_from_slice(&value.to_le_bytes()));
+        to.extend_from_slice(&seen.to_le_bytes());
+    }
+}
+
+/// What has become of a ping.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Outcome {
+    /// Taken for wall.
+    Wall = 0,
+    /// A return that isn't taken for wall.
+    Doubtful = 1,
+    /// None: where it was aimed.
+    NoReturn = 2,
+}
+
+/// A sample, as it is kept and sent: 20 bytes.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SampleRecord {
+    /// Milliseconds since the dive began.
+    pub t_ms: u32,
+    /// Chainage, m.
+    pub x_m: f32,
+    /// Left of the axis, m; NaN without a return.
+    pub y_m: f32,
+    /// Above the floor, m; NaN without a return.
+    pub z_m: f32,
+    /// Arc length, in 65,536th of the perimeter.
+    pub arc: u16,
+    /// Number of the head.
+    pub head: u8,
+    /// See [`Outcome`].
+    pub outcome: u8,
+}
+
+impl SampleRecord {
+    /// Arc length as it is sent, of one in metres.
+    #[expect(clippy::cast_possible_truncation, reason = "held to the range before")]
+    pub fn arc_of(arc_m: f64, perimeter_m: f64) -> u16 {
+        (arc_m / perimeter_m * ARC_PARTS).clamp(0.0, ARC_PARTS - 1.0) as u16
+    }
+
+    /// The bit that it sets of its section's `seen`; none where it is no wall.
+    pub(crate) fn seen(&self) -> u64 {
+        if self.outcome == Outcome::Wall as u8 { 1 << (self.arc >> 10) } else { 0 }
+    }
+
+    fn put(&self, to: &mut Vec<u8>) {
+        to.extend_from_slice(&self.t_ms.to_le_bytes());
+        [self.x_m, self.y_m, self.z_m].iter().for_each(|value| to.extend_from_slice(&value.to_le_bytes()));
+        to.extend_from_slice(&self.arc.to_le_bytes());
+        to.extend_from_slice(&[self.head, self.outcome]);
+    }
+}
+
+fn frame(kind: u8, count: usize, seq: u64, record_bytes: usize) -> Vec<u8> {
+    let mut bytes = Vec::with_capacity(HEAD_BYTES + count * record_bytes);
+    bytes.extend_from_slice(&[kind, VERSION, 0, 0]);
+    bytes.extend_from_slice(&u32::try_from(count).unwrap_or(u32::MAX).to_le_bytes());
+    bytes.extend_from_slice(&seq.to_le_bytes());
+    bytes
+}
+
+/// A frame of sections, each with where it has been seen.
+pub fn section_frame(seq: u64, sections: &[(SectionRecord, u64)]) -> Vec<u8> {
+    let mut bytes = frame(SECTIONS, sections.len(), seq, SECTION_BYTES);
+    sections.iter().for_each(|(section, seen)| section.put(*seen, &mut bytes));
+    bytes
+}
+
+/// A frame of samples.
+pub fn sample_frame(seq: u64, samples: &[SampleRecord]) -> Vec<u8> {
+    let mut bytes = frame(SAMPLES, samples.len(), seq, SAMPLE_BYTES);
+    samples.iter().for_each(|sample| sample.put(&mut bytes));
+    bytes
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn frames_are_as_documented() {
+        let mut section = SectionRecord::blank(-3);
+        (section.verdict, section.flags, section.hole) = (2, 3, [0.5, 0.01, 1.25, 7.0]);
+        let bytes = section_frame(9, &[(section, 1 << 63 | 1)]);
+        assert_eq!(bytes.len(), 16 + 32);
+        assert_eq!(bytes[..16], [1, 1, 0, 0, 1, 0, 0, 0, 9, 0, 0, 0, 0, 0, 0, 0]);
+        assert_eq!(bytes[16..24], [253, 255, 255, 255, 2, 255, 255, 3]);
+        assert_eq!(bytes[24..28], 0.5_f32.to_le_bytes());
+        assert_eq!(bytes[40..48], [1, 0, 0, 0, 0, 0, 0, 0x80]);
+        let sample =
+            SampleRecord { t_ms: 258, x_m: 1.5, y_m: 0.0, z_m: 2.0, arc: 0x8001, head: 3, outcome: 1 };
+        let bytes = sample_frame(1, &[sample]);
+        assert_eq!((bytes.len(), bytes[0]), (36, 2));
+        assert_eq!(bytes[16..20], [2, 1, 0, 0]);
+        assert_eq!(bytes[32..], [1, 0x80, 3, 1]);
+    }
+
+    #[test]
+    fn arcs_fill_their_range_and_set_a_bit_of_64() {
+        assert_eq!(
+            [0.0, 5.0, 9.999_99, 10.0].map(|arc_m| SampleRecord::arc_of(arc_m, 10.0)),
+            [0, 32_768, 65_535, 65_535]
+        );
+        let at = |arc| SampleRecord { t_ms: 0, x_m: 0.0, y_m: 0.0, z_m: 0.0, arc, head: 0, outcome: 0 };
+        assert_eq!([at(0).seen(), at(1023).seen(), at(1024).seen(), at(65_535).seen()], [1, 1, 2, 1 << 63]);
+        assert_eq!(SampleRecord { outcome: 1, ..at(0) }.seen(), 0, "what isn't taken for wall isn't seen");
+    }
+}

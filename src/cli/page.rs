@@ -1,0 +1,74 @@
+//! Options of the operator's page.
+
+use std::net::{IpAddr, Ipv4Addr, SocketAddr};
+use std::path::PathBuf;
+
+use clap::Args;
+use headrace_dashboard::server::PORT;
+
+/// Where the page is served, and for whom (docs/page.md).
+#[derive(Debug, Args)]
+#[command(next_help_heading = "Page")]
+pub(crate) struct PageArgs {
+    /// Serve the operator's page, by default on 127.0.0.1:8881 or one of the nine ports after it. Without this option it is
+    /// served where stdout is a terminal, of a replay if that is also paced or has keys. A replay that is asked for it goes on
+    /// until it is ended on the page, by a key or Ctrl-C.
+    #[arg(long, value_name = "ADDRESS:PORT", num_args = 0..=1, require_equals = true, value_parser = address, default_missing_value = "127.0.0.1")]
+    pub(crate) page: Option<SocketAddr>,
+    /// Serve no page.
+    #[arg(long, conflicts_with = "page")]
+    pub(crate) no_page: bool,
+    /// File with the lines `operator = TOKEN` and `viewer = TOKEN`, needed beyond loopback; without it tokens are made up and
+    /// shown in the terminal.
+    #[arg(long, value_name = "FILE")]
+    pub(crate) page_token_file: Option<PathBuf>,
+    /// Certificate of the page's server, PEM.
+    #[arg(long, value_name = "CERT.pem", requires = "page_key")]
+    pub(crate) page_cert: Option<PathBuf>,
+    /// Its private key, PEM.
+    #[arg(long, value_name = "KEY.pem", requires = "page_cert")]
+    pub(crate) page_key: Option<PathBuf>,
+    /// A further name of this machine in browsers.
+    #[arg(long, value_name = "NAME")]
+    pub(crate) page_host: Vec<String>,
+    /// Origin of another page that may frame this one and send its actions, as http://blueos.local.
+    #[arg(long, value_name = "ORIGIN", value_parser = origin)]
+    pub(crate) page_origin: Vec<String>,
+}
+
+fn address(text: &str) -> Result<SocketAddr, String> {
+    let with_port = |ip: IpAddr| SocketAddr::new(ip, PORT);
+    let port = |text: &str| text.parse().ok().map(|port| SocketAddr::new(Ipv4Addr::LOCALHOST.into(), port));
+    let parsed = text.parse().ok().or_else(|| text.parse().ok().map(with_port)).or_else(|| port(text));
+    parsed.ok_or_else(|| {
+        "expected an address of this machine and a port, as 127.0.0.1:8881 or 0.0.0.0:8881".to_owned()
+    })
+}
+
+fn origin(text: &str) -> Result<String, String> {
+    let host = text.strip_prefix("http://").or_else(|| text.strip_prefix("https://"));
+    let is_fit = |byte: u8| byte.is_ascii_alphanumeric() || b".-[]:".contains(&byte);
+    match host {
+        Some(host) if !host.is_empty() && host.bytes().all(is_fit) => Ok(text.to_owned()),
+        _ => Err("expected http:// or https:// and a host, without a path".to_owned()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn addresses_ports_and_origins_are_taken() {
+        let address = |text| super::address(text).map(|address| address.to_string());
+        assert_eq!(address("0.0.0.0").as_deref(), Ok("0.0.0.0:8881"));
+        assert_eq!(address("9000").as_deref(), Ok("127.0.0.1:9000"));
+        assert_eq!(address("[::1]:0").as_deref(), Ok("[::1]:0"));
+        assert!(address("rov.local:8881").is_err());
+        assert!(
+            origin("http://blueos.local").is_ok()
+                && origin("http://a/b").is_err()
+                && origin("blueos.local").is_err()
+        );
+    }
+}

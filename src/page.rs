@@ -1,0 +1,384 @@
+//! The operator's page of a dive: started, fed and ended.
+
+use std::collections::BTreeMap;
+use std::io::IsTerminal as _;
+use std::net::{IpAddr, SocketAddr, UdpSocket};
+use std::path::Path;
+use std::process::{Command as Process, Stdio};
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex, PoisonError};
+use std::time::Duration;
+
+use crossbeam::channel::{Sender, unbounded};
+use headrace_config::plain::one_line;
+use headrace_dashboard::collector::Collector;
+use headrace_dashboard::fed::PlaybackState;
+use headrace_dashboard::qr::qr;
+use headrace_dashboard::server::{Act, Direct, PORT};
+use headrace_dashboard::{
+    Command, HeadSite, Mode, Page, Play, SensorSite, Settings, Site, TlsFiles, Token, Tokens,
+};
+use headrace_geometry::time::{DurNs, MonoNs};
+use headrace_monitor::console::{Command as Input, ConsolePort, NoteText, Who};
+use headrace_monitor::messages::Notice;
+use headrace_monitor::report::Report;
+use headrace_monitor::run::Loop;
+use headrace_ports::Status;
+use headrace_replay::log::RecordingEvent;
+use headrace_replay::playback::PlaybackCommand;
+use headrace_sampling::occlusion::hidden_by_vehicle;
+use headrace_sensor::device::Sense;
+use headrace_vehicle::VehicleConfig;
+use serde_json::json;
+
+use crate::cli::PageArgs;
+use crate::dive::CLOCK_ANCHOR;
+use crate::files;
+use crate::follower::Follower;
+use crate::logging::complain;
+use crate::output::put;
+use crate::play::Remote;
+use crate::report_output::exit_code;
+
+/// Interval at which an interruption is looked for while a replay stands still.
+const LOOK_EVERY: Duration = Duration::from_millis(100);
+/// Names by which BlueOS' machine is reached.
+const BLUEOS: &str = "blueos.local";
+
+/// What a page is of.
+pub(crate) struct Of<'a> {
+    pub(crate) vehicle: &'a VehicleConfig,
+    pub(crate) mode: Mode,
+    /// The log's or scene's name.
+    pub(crate) dive: String,
+    pub(crate) recorded_to: Option<String>,
+    /// UTC of the clock's zero, where the clock is this machine's.
+    pub(crate) utc_of_zero_s: Option<f64>,
+    /// First and last time of a log.
+    pub(crate) span: Option<(MonoNs, MonoNs)>,
+    /// Whether it can be paused and jump.
+    pub(crate) is_playback: bool,
+    /// What takes the operator's commands; none in a replay.
+    pub(crate) console: Option<ConsolePort>,
+}
+
+/// A page that is served.
+pub(crate) struct Served {
+    page: Page,
+    span: Option<(MonoNs, MonoNs)>,
+    is_playback: bool,
+    waits: bool,
+    commands: Arc<Mutex<Option<Sender<PlaybackCommand>>>>,
+}
+
+/// Whether a page is to be served: asked for, or a person watches.
+pub(crate) fn is_wanted(args: &PageArgs, is_watched: bool) -> bool {
+    !args.no_page && (args.page.is_some() || is_watched && std::io::stdout().is_terminal())
+}
+
+/// Serves the page of a dive. What is in its way is told on stderr, and the dive goes on without it. `in_lines` tells the address
+/// among the dive's lines.
+pub(crate) fn serve(args: &PageArgs, of: Of<'_>, in_lines: bool) -> Option<Served> {
+    match start(args, of, in_lines) {
+        Ok(served) => Some(served),
+        Err(why) => {
+            complain(&format!("headrace: {}; the dive goes on without the page", one_line(&why)));
+            None
+        }
+    }
+}
+
+fn start(args: &PageArgs, of: Of<'_>, in_lines: bool) -> Result<Served, String> {
+    let address = args.page.unwrap_or(SocketAddr::new([127, 0, 0, 1].into(), PORT));
+    let tokens = tokens(args, address)?;
+    let tls = args.page_cert.clone().zip(args.page_key.clone());
+    let settings = Settings {
+        address,
+        tokens: tokens.clone(),
+        hosts: hosts(args),
+        origins: args.page_origin.clone(),
+        tls: tls.map(|(certificate, key)| TlsFiles { certificate, key }),
+    };
+    let instance = Token::random().map_err(|error| format!("the page has no random number: {error}"))?;
+    let instance = instance.text().chars().take(12).collect();
+    let (span, is_playback, waits) = (of.span, of.is_playback, of.mode != Mode::Live);
+    let commands: Arc<Mutex<Option<Sender<PlaybackCommand>>>> = Arc::default();
+    let act = act(of.console.clone());
+    let page = Page::start(settings, site(of), instance, act, direct(&commands))
+        .map_err(|error| error.to_string())?;
+    for port in page.taken() {
+        complain(&format!("headrace: port {port} is taken; the page is on {}", page.address().port()));
+    }
+    tell(&page, tokens.as_ref(), in_lines);
+    Ok(Served { page, span, is_playback, waits, commands })
+}
+
+/// Tokens where the page is for others than this machine.
+fn tokens(args: &PageArgs, address: SocketAddr) -> Result<Option<Tokens>, String> {
+    if let Some(path) = &args.page_token_file {
+        return read_tokens(path).map(Some);
+    }
+    if address.ip().is_loopback() {
+        return Ok(None);
+    }
+    if !std::io::stdout().is_terminal() {
+        return Err(format!(
+            "a page on {address} is for others, too, and needs --page-token-file without a terminal"
+        ));
+    }
+    let random = || Token::random().map_err(|error| format!("the page has no tokens: {error}"));
+    Ok(Some(Tokens { viewer: random()?, operator: random()? }))
+}
+
+fn read_tokens(path: &Path) -> Result<Tokens, String> {
+    let failed = |why: String| format!("the page's tokens can't be read from {}: {why}", path.display());
+    let text = files::read(path).map_err(|error| failed(error.to_string()))?;
+    let token = |name: &str| {
+        let lines = text.lines().filter_map(|line| line.split_once('='));
+        let value = lines
+            .into_iter()
+            .find(|(key, _)| key.trim() == name)
+            .map(|(_, value)| value.trim().trim_matches('"'));
+        let value = value.ok_or_else(|| failed(format!("no line `{name} = TOKEN`")))?;
+        Token::chosen(value).map_err(|why| failed(format!("the {name}'s token {why}")))
+    };
+    Ok(Tokens { viewer: token("viewer")?, operator: token("operator")? })
+}
+
+/// Names of this machine in browsers.
+fn hosts(args: &PageArgs) -> Vec<String> {
+    let own = std::fs::read_to_string("/proc/sys/kernel/hostname").unwrap_or_default();
+    let own = own.trim();
+    let own = [own.to_owned(), format!("{own}.local")].into_iter().filter(|_| !own.is_empty());
+    own.chain([BLUEOS.to_owned()]).chain(args.page_host.iter().cloned()).collect()
+}
+
+/// Tells where the page is; its tokens only on a terminal, and never to the log.
+fn tell(page: &Page, tokens: Option<&Tokens>, in_lines: bool) {
+    let (scheme, at) = (page.scheme(), page.address());
+    let host = if at.ip().is_unspecified() { own_address(at.ip()) } else { at.ip() };
+    let base = format!("{scheme}://{}", SocketAddr::new(host, at.port()));
+    let is_terminal = std::io::stdout().is_terminal();
+    let mut lines = format!("page   {base}\n");
+    if let Some(tokens) = tokens.filter(|_| is_terminal) {
+        let login = |token: &Token| format!("{base}/login?token={}", token.text());
+        let operator = login(&tokens.operator);
+        lines = format!("page   {operator}  (operator)\n       {}  (viewer)\n", login(&tokens.viewer));
+        lines.push_str(&qr(&operator).map(|code| format!("{code}\n")).unwrap_or_default());
+    }
+    if in_lines { put(&lines) } else { complain(lines.trim_end()) }
+}
+
+/// The address by which others reach this machine. Nothing is sent.
+fn own_address(unspecified: IpAddr) -> IpAddr {
+    let (any, beyond) =
+        if unspecified.is_ipv4() { ("0.0.0.0:0", "192.0.2.1:9") } else { ("[::]:0", "[2001:db8::1]:9") };
+    let found = UdpSocket::bind(any).and_then(|socket| {
+        socket.connect(beyond)?;
+        socket.local_addr()
+    });
+    found.map_or(unspecified, |address| address.ip())
+}
+
+/// Tunnel, heads and sensors.
+fn site(of: Of<'_>) -> Site {
+    let vehicle = of.vehicle;
+    let hidden = hidden_by_vehicle(&vehicle.heads(), &vehicle.hull);
+    let mut hidden = hidden.into_iter();
+    let (mut heads, mut sensors) = (Vec::new(), Vec::new());
+    for ((number, sensor), config) in (0..).zip(&vehicle.sensors).zip(&vehicle.sensor_configs) {
+        let kind = sensor.sense();
+        if kind == Sense::Head {
+            let ranges = hidden.next().unwrap_or_default();
+            let degrees = |range: headrace_sampling::occlusion::AngleRange| {
+                [range.from_rad, range.from_rad + range.size_rad].map(f64::to_degrees)
+            };
+            let hidden_deg = ranges.into_iter().map(degrees).collect();
+            heads.push(HeadSite { id: config.id.clone(), source: number, hidden_deg });
+        }
+        sensors.push(SensorSite {
+            id: config.id.clone(),
+            plugin: config.plugin.clone(),
+            kind: kind_text(kind),
+        });
+    }
+    Site {
+        mode: of.mode,
+        dive: of.dive,
+        vehicle: vehicle.name.clone(),
+        target_m: vehicle.target_m,
+        section_m: vehicle.section_m,
+        confidence_sd: vehicle.coverage.confidence_sd,
+        length_m: vehicle.tunnel.length_m,
+        profile: vehicle.tunnel.profile.clone(),
+        heads,
+        sensors,
+        utc_of_zero_s: of.utc_of_zero_s,
+        span_s: of.span.map(|(from, to)| [from, to].map(MonoNs::as_secs_f64)),
+        takes_commands: of.console.is_some(),
+        is_playback: of.is_playback,
+        recorded_to: of.recorded_to,
+    }
+}
+
+fn kind_text(kind: Sense) -> &'static str {
+    match kind {
+        Sense::Head => "head",
+        Sense::Echosounder => "echosounder",
+        Sense::Depth => "depth",
+        Sense::Inertial => "imu",
+        Sense::Velocity => "velocity_log",
+        Sense::Tether => "tether",
+    }
+}
+
+/// UTC of the zero of a log's clock, seconds, where the log says so.
+pub(crate) fn utc_of_zero_s(metadata: &BTreeMap<String, String>) -> Option<f64> {
+    let number = |key: &str| metadata.get(key)?.parse::<i64>().ok();
+    let [monotonic, utc] = CLOCK_ANCHOR.map(number);
+    Some(utc?.checked_sub(monotonic?)? as f64 / 1e9)
+}
+
+/// Hands an operator's commands to the loop.
+fn act(console: Option<ConsolePort>) -> Act {
+    Arc::new(move |command| {
+        let Some(console) = &console else { return Err("this dive takes no commands".to_owned()) };
+        let who = |by: &str| Who::new(by).ok_or_else(|| "by has control characters".to_owned());
+        let command = match &command {
+            Command::Acknowledge { alert, by } => Input::Acknowledge { alert: *alert, by: who(by)? },
+            Command::Silence { by } => Input::Silence { by: who(by)? },
+            Command::Note { text, by } => {
+                let text = NoteText::new(text).ok_or_else(|| "text has control characters".to_owned())?;
+                Input::Note { text, by: who(by)? }
+            }
+            Command::Mark { by } => Input::Note { text: NoteText::default(), by: who(by)? },
+        };
+        console.send(&command).map_err(|error| error.to_string())
+    })
+}
+
+/// Hands the page's commands to playback, as long as there is one.
+fn direct(commands: &Arc<Mutex<Option<Sender<PlaybackCommand>>>>) -> Direct {
+    let commands = Arc::clone(commands);
+    Arc::new(move |play| {
+        let command = match play {
+            Play::Pause => PlaybackCommand::Pause,
+            Play::Go => PlaybackCommand::Go,
+            Play::Step => PlaybackCommand::Step(1),
+            Play::StepSection => PlaybackCommand::StepSection,
+            Play::End => PlaybackCommand::End,
+            Play::Speed(speed) => PlaybackCommand::Speed(speed),
+            Play::Seek(to_s) => PlaybackCommand::Seek(MonoNs(0) + DurNs::from_secs_f64(to_s)),
+        };
+        let commands = commands.lock().unwrap_or_else(PoisonError::into_inner);
+        let sent = commands.as_ref().map(|commands| commands.send(command));
+        if matches!(sent, Some(Ok(()))) {
+            Ok(())
+        } else {
+            Err("nothing is played that could be directed".to_owned())
+        }
+    })
+}
+
+impl Served {
+    /// What feeds it.
+    pub(crate) fn follower(&self, dive: &Loop) -> Box<dyn Follower> {
+        let span = self.span.filter(|_| self.is_playback);
+        Box::new(PageFollower { collector: self.page.collector(dive, self.waits), span, now: MonoNs(0) })
+    }
+
+    /// What directs a replay from the page. It `stays` at the end of the log; `interrupted` ends it.
+    pub(crate) fn remote(&self, stays: bool, interrupted: Arc<AtomicBool>) -> Remote {
+        let (sender, receiver) = unbounded();
+        let commands = Arc::clone(&self.commands);
+        *commands.lock().unwrap_or_else(PoisonError::into_inner) = Some(sender.clone());
+        let close = move || drop(commands.lock().unwrap_or_else(PoisonError::into_inner).take());
+        if stays {
+            let sender = sender.clone();
+            std::thread::spawn(move || {
+                while !interrupted.load(Ordering::Relaxed) {
+                    std::thread::sleep(LOOK_EVERY);
+                }
+                // It may have ended by itself.
+                let _ended = sender.send(PlaybackCommand::End);
+            });
+        }
+        Remote { commands: (sender, receiver), stays, close: Box::new(close) }
+    }
+
+    /// Opens a browser, where there is one and a person to see it.
+    pub(crate) fn open(&self) {
+        let has_screen = ["DISPLAY", "WAYLAND_DISPLAY"]
+            .iter()
+            .any(|name| std::env::var_os(name).is_some_and(|of| !of.is_empty()));
+        if !has_screen || !std::io::stdout().is_terminal() {
+            return;
+        }
+        let address = format!("{}://{}", self.page.scheme(), self.page.address());
+        let null = Stdio::null;
+        let opened =
+            Process::new("xdg-open").arg(address).stdin(null()).stdout(null()).stderr(null()).spawn();
+        if let Err(error) = opened {
+            tracing::debug!(%error, "no browser was opened");
+        }
+    }
+
+    /// Ends it with the dive's report.
+    pub(crate) fn end(self, report: &Report) {
+        let end = json!({"type": "end", "digest": report.digest, "summary": report.summary, "way": report.way,
+            "exit": exit_code(report)});
+        self.page.end(Some(end));
+    }
+}
+
+struct PageFollower {
+    collector: Collector,
+    /// First and last time of a replay's log.
+    span: Option<(MonoNs, MonoNs)>,
+    now: MonoNs,
+}
+
+impl Follower for PageFollower {
+    fn notice(&mut self, notice: &Notice, dive: &Loop) {
+        self.collector.notice(notice, dive);
+    }
+
+    fn tick(&mut self, dive: &Loop) {
+        self.now = dive.now();
+        self.collector.tick(dive);
+    }
+
+    fn skipped(&mut self, dive: &Loop) {
+        self.now = dive.now();
+        self.collector.skipped(dive);
+    }
+
+    fn mode(&mut self, paused: bool, speed: Option<f64>) {
+        let Some((from, to)) = self.span else { return };
+        let [at_s, from_s, to_s] = [self.now.max(from), from, to].map(MonoNs::as_secs_f64);
+        self.collector.playback(PlaybackState { paused, speed, at_s, from_s, to_s });
+    }
+
+    fn sensor(&mut self, id: &str, status: &Status) {
+        self.collector.sensor(id, status.phase.as_str(), &status.words, status.since);
+    }
+
+    fn recording(&mut self, _number: usize, event: &RecordingEvent, at: MonoNs) {
+        let (fails, words) = match event {
+            RecordingEvent::Failed { path, error } => {
+                (true, format!("NOT RECORDED to {}: {error}; tried again in another part", path.display()))
+            }
+            RecordingEvent::Resumed(fault) => (false, fault.words()),
+        };
+        self.collector.recording(fails, &words, at);
+    }
+
+    fn stopped(&mut self, dive: &Loop, _time: DurNs, _ended: bool) {
+        self.now = dive.now();
+        self.collector.stopped(dive);
+    }
+
+    fn end(&mut self, dive: &Loop) {
+        self.collector.end(dive);
+    }
+}
