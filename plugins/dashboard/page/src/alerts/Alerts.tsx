@@ -1,4 +1,5 @@
 // The alerts that hold or wait to be acknowledged, in the order of what has to be looked at first.
+import { useEffect, useRef, useState } from "preact/hooks";
 import { acknowledge, silence } from "../feed/client";
 import type { Alert } from "../feed/types";
 import { isUnacknowledged, PRIORITY_WORDS, sorted } from "../store/alerts";
@@ -8,8 +9,8 @@ import { span } from "../text/format";
 import { actions } from "../wall/control";
 import { SoundButtons } from "./SoundButtons";
 
-/** So many are in the list; at least 20 can be seen by scrolling, and the rest are counted. */
-const SHOWN = 40;
+/** So many are in the list; what of them has to be scrolled to is counted, and so is what isn't in it. */
+const SHOWN = 64;
 
 export function Alerts() {
   useTopics(store.topics.alerts, store.topics.hello);
@@ -17,6 +18,12 @@ export function Alerts() {
   const waiting = list.filter(isUnacknowledged).length;
   const hidden = Math.max(0, list.length - SHOWN) + store.alertsHidden;
   const may = store.hello?.may.operate ?? false;
+  const ol = useRef<HTMLOListElement>(null), [below, setBelow] = useState(0);
+  const count = () => {
+    const bottom = ol.current?.getBoundingClientRect().bottom ?? 0;
+    setBelow([...(ol.current?.querySelectorAll(".alert") ?? [])].filter((item) => item.getBoundingClientRect().top > bottom - 24).length);
+  };
+  useEffect(count);
   return (
     <section class="panel alerts" aria-label="Alerts">
       <div class="panel-head">
@@ -25,14 +32,14 @@ export function Alerts() {
       </div>
       <div class="buttons">
         <button type="button" class="all" disabled={!may || waiting === 0} onClick={() => acknowledge(0)} title="Shift+A">Acknowledge all</button>
-        <button type="button" disabled={!may} onClick={silence} title="Silence for 30 s (S)">Silence 30 s</button>
+        <button type="button" disabled={!may} onClick={silence} title="Silence for 30 s (S)">Silence</button>
         <SoundButtons />
       </div>
-      <ol class="alert-list" tabIndex={0} aria-label="Alerts, first what has to be looked at first">
+      <ol class="alert-list" ref={ol} onScroll={count} tabIndex={0} aria-label="Alerts, first what has to be looked at first">
         {list.slice(0, SHOWN).map((alert) => <Item key={alert.number} alert={alert} may={may} />)}
         {list.length === 0 ? <li class="none">nothing to report</li> : null}
       </ol>
-      {hidden > 0 ? <p class="more">{hidden} more hidden</p> : null}
+      {hidden + below > 0 ? <p class="more">{hidden + below} more hidden{below > 0 ? " below" : ""}</p> : null}
     </section>
   );
 }
@@ -44,11 +51,9 @@ function Item({ alert, may }: { alert: Alert; may: boolean }) {
     <li class={`alert ${alert.priority}${open ? " open" : ""}${rectified ? " rectified" : ""}`} data-number={alert.number} data-state={alert.state} data-kind={alert.kind}>
       <Mark alert={alert} />
       <div class="what">
-        <div class="line"><b class="priority">{PRIORITY_WORDS[alert.priority]}</b> <span class="number">#{alert.number}</span> <Since alert={alert} /></div>
+        <div class="line"><b class="priority">{PRIORITY_WORDS[alert.priority]}</b> <span class="number">#{alert.number}</span> <Since alert={alert} />{rectified ? " · over, not acknowledged" : ""}{alert.acknowledged ? ` · seen by ${alert.acknowledged.by || "somebody"}` : ""}</div>
         <div class="text">{alert.text}{alert.count > 1 ? ` (${alert.count} times)` : ""}</div>
         {alert.advice ? <div class="do">→ {alert.advice}</div> : null}
-        {rectified ? <div class="state">over, not acknowledged</div> : null}
-        {alert.acknowledged ? <div class="state">acknowledged by {alert.acknowledged.by || "somebody"}</div> : null}
       </div>
       <div class="do-buttons">
         {open ? <button type="button" class="ack" disabled={!may} onClick={() => acknowledge(alert.number)} aria-label={`Acknowledge alert ${alert.number}`}>Ack</button> : null}

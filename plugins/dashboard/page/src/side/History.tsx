@@ -9,12 +9,12 @@ import { useSize } from "../ui/canvas";
 import { colour } from "../ui/colours";
 
 function options(width: number, height: number): uPlot.Options {
-  const axis = { stroke: colour("faint"), grid: { stroke: colour("line"), width: 1 }, ticks: { stroke: colour("line"), width: 1 }, font: "11px system-ui" };
+  const axis = { stroke: colour("faint"), grid: { stroke: colour("line"), width: 1 }, ticks: { stroke: colour("line"), width: 1, size: 4 }, gap: 3, font: "11px system-ui" };
   return {
     width, height, legend: { show: false }, cursor: { show: false }, padding: [6, 8, 0, 0],
     scales: { x: { time: false }, y: { range: (_, __, most) => [0, Math.max(0.1, (Number.isFinite(most) ? most : 0) * 1.15)] } },
     axes: [
-      { ...axis, size: 22, values: (_, ticks) => ticks.map((t) => clock(t)) },
+      { ...axis, size: 22, values: (_, ticks) => ticks.map((t) => clock(t - (store.hello?.begun_s ?? 0))) },
       { ...axis, size: 40, values: (_, ticks) => ticks.map((v) => figure(v, 2)) },
     ],
     series: [
@@ -50,7 +50,7 @@ export function History() {
   }, []);
   return (
     <section class="panel history" aria-label="Speed history">
-      <div class="panel-head"><h2>Speed</h2><span class="count"><i class="stroke now" /> speed <i class="stroke most" /> v max, m/s</span></div>
+      <div class="panel-head"><h2>Speed</h2><span class="count"><i class="stroke now" /> now <i class="stroke most" /> max m/s</span></div>
       <div class="history-box" ref={box} role="img" aria-label="Speed and the largest speed allowed over the last half hour" />
     </section>
   );

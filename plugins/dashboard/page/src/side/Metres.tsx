@@ -54,7 +54,7 @@ export function Back() {
   const { legs, way_m, time_s } = store.back;
   return (
     <section class="panel back" aria-label="The way back">
-      <div class="panel-head"><h2>Back for what is missed</h2><span class="count">{legs.length === 0 ? "" : `${metres(way_m)}, ${span(time_s)}`}</span></div>
+      <div class="panel-head"><h2>Back for missed</h2><span class="count">{legs.length === 0 ? "" : `${metres(way_m)}, ${span(time_s)}`}</span></div>
       {legs.length === 0 ? <p class="none">nothing to go back for</p> : (
         <ol tabIndex={0} aria-label="Legs, cheapest order">
           {legs.map((leg) => (

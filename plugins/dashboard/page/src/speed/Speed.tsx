@@ -38,7 +38,7 @@ export function Speed() {
     <div class="speed">
       <div class="figures">
         <div class="now"><span class="value">{figure(speed === null ? null : Math.abs(speed), 2)}</span><span class="unit">m/s{speed !== null && speed < -0.02 ? " back" : ""}</span></div>
-        <div class="most"><span class="name">v max</span><span class="value">{figure(most, 2)}</span><span class="unit">m/s</span></div>
+        <div class="most"><span class="name">max</span><span class="value">{figure(most, 2)}</span><span class="unit">m/s</span></div>
         <div class="margin">{margin === null ? "" : margin >= 0 ? `${figure(margin, 2)} to spare` : `${figure(-margin, 2)} too fast`}</div>
       </div>
       <Gauge speed={speed} most={most} />
@@ -56,7 +56,7 @@ function Gauge({ speed, most }: { speed: number | null; most: number | null }) {
   const at = speed === null ? null : x(speed);
   const told = speed === null ? "no speed" : `${figure(Math.abs(speed), 2)} of at most ${figure(most, 2)} metres a second`;
   return (
-    <svg class="gauge" viewBox="-14 0 1028 92" role="img" aria-label={`Speed: ${told}`} preserveAspectRatio="none">
+    <svg class="gauge" viewBox="-34 0 1068 92" role="img" aria-label={`Speed: ${told}`} preserveAspectRatio="none">
       <defs>
         <pattern id="over" width="14" height="14" patternUnits="userSpaceOnUse" patternTransform="rotate(45)"><rect width="14" height="14" class="zone-red" /><rect width="5" height="14" class="zone-stripe" /></pattern>
       </defs>

@@ -14,6 +14,7 @@ describe("figures", () => {
     expect(span(0.44)).toBe("0.4 s");
     expect(span(32.2)).toBe("32 s");
     expect(span(245)).toBe("4 min 05 s");
+    expect(span(3125)).toBe("52 min");
     expect(span(7980)).toBe("2 h 13 min");
   });
   it("writes clocks and figures", () => {

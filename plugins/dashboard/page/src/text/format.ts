@@ -17,13 +17,14 @@ export function figure(value: number | null | undefined, decimals: number): stri
   return Number(text) === 0 ? text.replace("-", "") : text.replace("-", "−");
 }
 
-/** A length of time: 0.4 s, 32 s, 4 min 05 s, 2 h 13 min. */
+/** A length of time: 0.4 s, 32 s, 4 min 05 s, 52 min, 2 h 13 min. */
 export function span(seconds: number): string {
   if (seconds < 9.95) return `${Math.max(0, seconds).toFixed(1)} s`;
   if (seconds < 99.5) return `${Math.round(seconds)} s`;
   const whole = Math.round(seconds);
-  if (whole < 6000) return `${Math.floor(whole / 60)} min ${String(whole % 60).padStart(2, "0")} s`;
+  if (whole < 600) return `${Math.floor(whole / 60)} min ${String(whole % 60).padStart(2, "0")} s`;
   const minutes = Math.round(seconds / 60);
+  if (minutes < 100) return `${minutes} min`;
   return `${Math.floor(minutes / 60)} h ${String(minutes % 60).padStart(2, "0")} min`;
 }
 

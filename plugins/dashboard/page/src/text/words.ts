@@ -40,7 +40,7 @@ export function atMost(state: State): string {
 /** Word and advice of a state's condition. */
 export function conditionWords(state: State): { word: string; advice: string } {
   const most = atMost(state);
-  const slower = most === "" ? "slower" : `slow down: ${most}`;
+  const slower = most === "" ? "slower" : `slow to ${figure(state.v_max_mps, 2)} m/s`;
   const words: Record<Condition, [string, string]> = {
     no_data: ["WAITING", "for the first data"],
     old: [`OLD ${span(state.age_s ?? 0)}`, "nothing from any sensor: stop"],

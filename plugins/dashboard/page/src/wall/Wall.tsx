@@ -15,14 +15,14 @@ import { drawOverlay, type Layout } from "./overlay";
 import { SampleWindow } from "./samples";
 import { left_m, right_m, roundOf, wholeView, type Round, type View } from "./view";
 
-const LEFT = 30, BOTTOM = 24, STRIP = 34, STRIP_BOTTOM = 18;
+const LEFT = 30, TOP = 8, BOTTOM = 24, STRIP = 34, STRIP_BOTTOM = 18;
 /** Discs are drawn where their radius has so many pixels, and up to so wide a view. */
 const LEAST_RADIUS = 2.2, DISCS_UPTO_M = 160;
 
 function layoutOf({ width, height }: Size): Layout {
   const strip = height > 170 ? STRIP : 0;
   const stripTop = height - strip - STRIP_BOTTOM;
-  return { left: LEFT, top: 0, width: Math.max(10, width - LEFT), height: Math.max(10, (strip ? stripTop : height) - BOTTOM), stripTop, stripHeight: strip };
+  return { left: LEFT, top: TOP, width: Math.max(10, width - LEFT), height: Math.max(10, (strip ? stripTop : height) - BOTTOM - TOP), stripTop, stripHeight: strip };
 }
 
 function wallColours(): WallColours {

@@ -40,8 +40,9 @@ export function vehicle(): { at_m: number; sd_m: number; direction: number; sure
 /** The view as it is drawn: with the vehicle, if it follows. */
 export function current(): View {
   const its = vehicle();
+  if (view.whole) return wholeView(view, ...whole());
   if (!view.follow) return view;
-  if (its) return followed(view, its.at_m, its.direction);
+  if (its) return followed(view, its.at_m, its.direction, whole()[0]);
   const way = wayOf();
   return { ...view, centre_m: way[1] };
 }
@@ -74,6 +75,6 @@ export const actions = {
   },
   goTo(x_m: number, span_m?: number): void {
     const now = current();
-    set({ ...now, centre_m: x_m, span_m: span_m ?? now.span_m, follow: false });
+    set({ ...now, centre_m: x_m, span_m: span_m ?? now.span_m, follow: false, whole: false });
   },
 };

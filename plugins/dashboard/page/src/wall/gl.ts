@@ -133,7 +133,9 @@ export class WallGl {
     this.use(this.dots, drawing, colours);
     this.place(this.dots, drawing);
     const radius = (discs.radius_m / drawing.view.span_m) * drawing.part.width;
-    gl.uniform1f(this.dots.at("u_point"), Math.min(Math.max(radius / 4, 1), 3.5 * drawing.scale));
+    // From afar the dots would hide what the discs show.
+    gl.uniform1i(this.dots.at("u_all"), radius > 7 * drawing.scale ? 1 : 0);
+    gl.uniform1f(this.dots.at("u_point"), Math.min(Math.max(radius / 6, 1), 3.5 * drawing.scale));
     gl.uniform1fv(this.dots.at("u_turn_t_s"), discs.turn_t_s);
     gl.uniform3fv(this.dots.at("u_dot"), rgb(colours.dot));
     gl.uniform3fv(this.dots.at("u_new"), rgb(colours.fresh));

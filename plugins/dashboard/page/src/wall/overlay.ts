@@ -53,7 +53,7 @@ function clocks(context: CanvasRenderingContext2D, store: Store, view: View, lay
       context.lineTo(layout.left + layout.width, y);
       context.stroke();
       context.globalAlpha = 1;
-      const middle = Math.min(Math.max(y, layout.top + 8), layout.top + layout.height - 8);
+      const middle = Math.min(Math.max(y, 8), layout.top + layout.height);
       if (drawn.some((other) => Math.abs(other - middle) < 14)) continue;
       drawn.push(middle);
       context.fillStyle = colour(big ? "ink" : "faint");

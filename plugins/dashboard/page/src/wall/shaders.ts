@@ -117,6 +117,7 @@ void main() {
 export const DOT_VERTEX = `${COMMON}${SAMPLE_COMMON}
 layout(location = 0) in vec4 a_sample;
 uniform float u_point;      // pixels
+uniform bool u_all;         // dots of all turns, or of the present one
 uniform float u_turn_t_s[16]; // where each head's present turn begins
 out float v_kind;
 void main() {
@@ -126,7 +127,7 @@ void main() {
   float outcome = floor(a_sample.w / 16.0);
   v_kind = outcome > 0.0 ? 2.0 : present ? 1.0 : 0.0;
   gl_PointSize = present ? u_point + 2.5 * u_scale : u_point;
-  gl_Position = vec4(at / u_size * 2.0 - 1.0, 0.3, 1.0);
+  gl_Position = present || u_all ? vec4(at / u_size * 2.0 - 1.0, 0.3, 1.0) : vec4(3.0, 3.0, 0.0, 1.0);
 }`;
 
 export const DOT_FRAGMENT = `${COMMON}

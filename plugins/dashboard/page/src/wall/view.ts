@@ -7,6 +7,8 @@ export interface View {
   span_m: number;
   /** Follows the vehicle. */
   follow: boolean;
+  /** Shows the whole tunnel, however long it becomes. */
+  whole: boolean;
   /** How many times the height of one round; 1 shows all clock positions. */
   zoomDown: number;
   /** Fraction of the round, from the crown, in the middle of the height. */
@@ -19,26 +21,28 @@ export const FOLLOW_SPAN_M = 60;
 const BEHIND = 0.78;
 
 export function startView(): View {
-  return { centre_m: 0, span_m: FOLLOW_SPAN_M, follow: true, zoomDown: 1, centreDown: 0.5 };
+  return { centre_m: 0, span_m: FOLLOW_SPAN_M, follow: true, whole: false, zoomDown: 1, centreDown: 0.5 };
 }
 
 export const left_m = (view: View): number => view.centre_m - view.span_m / 2;
 export const right_m = (view: View): number => view.centre_m + view.span_m / 2;
 
-/** Follows a vehicle at a chainage that goes inwards (1) or back (-1). */
-export function followed(view: View, at_m: number, direction: number): View {
-  return { ...view, centre_m: at_m - direction * (BEHIND - 0.5) * view.span_m };
+/** Follows a vehicle at a chainage that goes inwards (1) or back (-1); shows little of what lies before the portal. */
+export function followed(view: View, at_m: number, direction: number, portal_m: number): View {
+  const centre_m = at_m - direction * (BEHIND - 0.5) * view.span_m;
+  const least_m = Math.min(portal_m, at_m) + 0.46 * view.span_m;
+  return { ...view, centre_m: Math.max(centre_m, least_m) };
 }
 
 /** Zooms about a place of the width, 0 to 1; factor below 1 zooms in. */
 export function zoomed(view: View, factor: number, at: number, whole_m: number): View {
   const span_m = Math.min(Math.max(view.span_m * factor, LEAST_SPAN_M), Math.max(whole_m * 1.1, FOLLOW_SPAN_M));
   const fixed_m = left_m(view) + at * view.span_m;
-  return { ...view, span_m, centre_m: fixed_m + (0.5 - at) * span_m };
+  return { ...view, whole: false, span_m, centre_m: fixed_m + (0.5 - at) * span_m };
 }
 
 export function moved(view: View, by_m: number): View {
-  return { ...view, centre_m: view.centre_m + by_m, follow: false };
+  return { ...view, centre_m: view.centre_m + by_m, follow: false, whole: false };
 }
 
 export function zoomedDown(view: View, factor: number): View {
@@ -53,7 +57,7 @@ export function movedDown(view: View, by: number): View {
 /** All of the way, from the portal. */
 export function wholeView(view: View, from_m: number, to_m: number): View {
   const span_m = Math.max(to_m - from_m, LEAST_SPAN_M) * 1.04;
-  return { ...view, span_m, centre_m: (from_m + to_m) / 2, follow: false, zoomDown: 1, centreDown: 0.5 };
+  return { ...view, span_m, centre_m: (from_m + to_m) / 2, follow: false, whole: true, zoomDown: 1, centreDown: 0.5 };
 }
 
 /** Fractions of the round at the top edge, and how clock positions grow: down from 12 by 3, as seen inwards. */
