@@ -51,13 +51,13 @@ function Item({ alert, may }: { alert: Alert; may: boolean }) {
     <li class={`alert ${alert.priority}${open ? " open" : ""}${rectified ? " rectified" : ""}`} data-number={alert.number} data-state={alert.state} data-kind={alert.kind}>
       <Mark alert={alert} />
       <div class="what">
-        <div class="line"><b class="priority">{PRIORITY_WORDS[alert.priority]}</b> <span class="number">#{alert.number}</span> <Since alert={alert} />{rectified ? " · over, not acknowledged" : ""}{alert.acknowledged ? ` · seen by ${alert.acknowledged.by || "somebody"}` : ""}</div>
+        <div class="line"><b class="priority">{PRIORITY_WORDS[alert.priority]}</b> <span class="number">#{alert.number}</span> <Since alert={alert} />{rectified ? " · over, not acknowledged" : ""}{alert.acknowledged ? ` · ack ${alert.acknowledged.by}` : ""}</div>
         <div class="text">{alert.text}{alert.count > 1 ? ` (${alert.count} times)` : ""}</div>
         {alert.advice ? <div class="do">→ {alert.advice}</div> : null}
       </div>
       <div class="do-buttons">
-        {open ? <button type="button" class="ack" disabled={!may} onClick={() => acknowledge(alert.number)} aria-label={`Acknowledge alert ${alert.number}`}>Ack</button> : null}
         {go === null ? null : <button type="button" class="show" onClick={() => actions.goTo(go, 30)} aria-label={`Show alert ${alert.number} on the wall`}>Show</button>}
+        {open ? <button type="button" class="ack" disabled={!may} onClick={() => acknowledge(alert.number)} aria-label={`Ack alert ${alert.number}`} title="Acknowledge (A)">Ack</button> : null}
       </div>
     </li>
   );
@@ -67,7 +67,7 @@ function Item({ alert, may }: { alert: Alert; may: boolean }) {
 function Mark({ alert }: { alert: Alert }) {
   const alarm = alert.priority === "alarm" || alert.priority === "emergency_alarm";
   return (
-    <svg class="mark-shape" width="30" height="30" viewBox="0 0 24 24" aria-hidden="true">
+    <svg class="mark-shape" width="26" height="26" viewBox="0 0 24 24" aria-hidden="true">
       {alarm ? <path d="M12 1.5L23 22H1z" /> : alert.priority === "warning" ? <path d="M12 1L23 12 12 23 1 12z" /> : <circle cx="12" cy="12" r="10" />}
       <path class="in" d={alarm ? "M12 8v7M12 17.5v2" : "M12 6v8M12 16v2"} />
     </svg>

@@ -51,6 +51,7 @@ export async function readDive(base64: string, store: Store): Promise<Dive> {
       store.take(message);
     }
   }
+  store.ready = true;
   return dive;
 }
 

@@ -28,7 +28,7 @@ export function drawSection(context: CanvasRenderingContext2D, store: Store, wid
     returns(frame, turns.present, true);
   });
   if (!pose) {
-    text(frame, "no position across", width / 2, height / 2, "bold 16px", colour("ink"));
+    text(frame, "no position", width / 2, height / 2, "bold 16px", colour("ink"));
     return;
   }
   store.turns.heads.forEach((turns, head) => {

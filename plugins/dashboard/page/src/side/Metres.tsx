@@ -54,13 +54,13 @@ export function Back() {
   const { legs, way_m, time_s } = store.back;
   return (
     <section class="panel back" aria-label="The way back">
-      <div class="panel-head"><h2>Back for missed</h2><span class="count">{legs.length === 0 ? "" : `${metres(way_m)}, ${span(time_s)}`}</span></div>
+      <div class="panel-head"><h2>Way back</h2><span class="count">{legs.length === 0 ? "" : `${metres(way_m)}, ${span(time_s)}`}</span></div>
       {legs.length === 0 ? <p class="none">nothing to go back for</p> : (
         <ol tabIndex={0} aria-label="Legs, cheapest order">
           {legs.map((leg) => (
             <li key={`${leg.from_m}-${leg.to_m}`}>
               <button type="button" class="leg" onClick={() => actions.goTo((leg.from_m + leg.to_m) / 2, 30)}>
-                <b>{station(leg.from_m)} to {station(leg.to_m)}</b>{leg.at_most_mps === null ? "" : ` at most ${figure(leg.at_most_mps, 2)} m/s`}<span class="leg-why"> {leg.why.replaceAll("_", " ")}</span>
+                <b>{station(leg.from_m)} to {station(leg.to_m)}</b>{leg.at_most_mps === null ? "" : ` at most ${figure(leg.at_most_mps, 2)}`}<span class="leg-why"> {leg.why.replaceAll("_", " ")}</span>
               </button>
             </li>
           ))}

@@ -16,16 +16,17 @@ export function Sensors() {
       <ul>
         {(state?.sensors ?? []).map((sensor) => {
           const age = sensor.age_s === null ? null : sensor.age_s + since;
-          const silent = sensor.state === "ok" && age !== null && age > OLD_AFTER_S;
-          const is = silent ? "silent" : sensor.state;
+          // Where the program itself isn't heard, nothing is known of its sensors.
+          const is = since > OLD_AFTER_S ? "unknown" : sensor.state;
+          const lamp = is === "ok" ? "green" : is === "unknown" ? "none" : is === "stalled" || is === "distrusted" ? "amber" : "red";
           const hz = state?.rates?.find((rate) => rate.id === sensor.id)?.hz;
           const kind = hello?.sensors.find((each) => each.id === sensor.id)?.kind ?? "";
           const word = SENSOR_STATES[is] ?? is;
           return (
-            <li key={sensor.id} class={`sensor ${is === "ok" ? "green" : is === "stalled" || is === "distrusted" ? "amber" : "red"}`} data-sensor={sensor.id} data-state={is} title={kind}>
-              <Shape lamp={is === "ok" ? "green" : is === "stalled" || is === "distrusted" ? "amber" : "red"} size={18} />
+            <li key={sensor.id} class={`sensor ${lamp}`} data-sensor={sensor.id} data-state={is} title={kind}>
+              <Shape lamp={lamp} size={18} />
               <span class="id">{sensor.id}</span>
-              {is === "ok" ? <span class="rate">{hz === undefined ? "" : `${figure(hz, hz < 10 ? 1 : 0)} Hz`}</span> : <span class="bad">{word} {age === null ? "" : span(age)}</span>}
+              {is === "ok" ? <span class="rate">{hz === undefined ? "" : `${figure(hz, hz < 10 ? 1 : 0)} Hz`}</span> : <span class="bad">{word} {age === null || is === "unknown" ? "" : span(age)}</span>}
             </li>
           );
         })}

@@ -11,7 +11,7 @@ export function Condition() {
   useTopics(store.topics.state, store.topics.link, store.topics.clock);
   const { word, advice, lamp, old } = shown(store);
   return (
-    <div class={`condition ${lamp}${old ? " old" : ""}`} data-condition={store.state?.condition ?? ""}>
+    <div class={`condition ${lamp}${old ? " old" : ""}${word.length > 14 ? " longest" : word.length > 9 ? " long" : ""}`} data-condition={store.state?.condition ?? ""}>
       <Shape lamp={lamp} size={64} />
       <div>
         <div class="word">{word}</div>
@@ -25,7 +25,7 @@ export function Condition() {
 export function Announcer() {
   useTopics(store.topics.state, store.topics.link, store.topics.clock);
   const { word, advice } = shown(store);
-  const said = `${word.replace(/[\d.,]+ (s|min|h).*$/, "")} ${store.link.phase === "open" ? advice : ""}`;
+  const said = `${word.replace(/\d.*$/, "")} ${store.link.phase === "open" ? advice : ""}`;
   return <div class="sr" role="status" aria-live="polite">{said}</div>;
 }
 
@@ -56,7 +56,8 @@ function Gauge({ speed, most }: { speed: number | null; most: number | null }) {
   const at = speed === null ? null : x(speed);
   const told = speed === null ? "no speed" : `${figure(Math.abs(speed), 2)} of at most ${figure(most, 2)} metres a second`;
   return (
-    <svg class="gauge" viewBox="-34 0 1068 92" role="img" aria-label={`Speed: ${told}`} preserveAspectRatio="none">
+    <div class="gauge-box">
+    <svg class="gauge" viewBox="-14 0 1028 66" role="img" aria-label={`Speed: ${told}`} preserveAspectRatio="none">
       <defs>
         <pattern id="over" width="14" height="14" patternUnits="userSpaceOnUse" patternTransform="rotate(45)"><rect width="14" height="14" class="zone-red" /><rect width="5" height="14" class="zone-stripe" /></pattern>
       </defs>
@@ -68,9 +69,10 @@ function Gauge({ speed, most }: { speed: number | null; most: number | null }) {
         <path class="limit" d={`M${x(most)} 14V64`} />
       </>}
       {marks(end).map((v) => <path class="tick" key={v} d={`M${x(v)} 56v9`} />)}
-      {marks(end).map((v) => <text class="tick-text" key={v} x={x(v)} y="86" text-anchor="middle">{figure(v, end < 1 ? 2 : 1)}</text>)}
       {at === null ? null : <path class="needle" d={`M${at} 58L${at - 13} 4H${at + 13}Z`} />}
     </svg>
+    <div class="ticks" aria-hidden="true">{marks(end).map((v) => <span key={v} style={{ left: `${((x(v) + 14) / 1028) * 100}%` }}>{figure(v, end < 1 ? 2 : 1)}</span>)}</div>
+    </div>
   );
 }
 

@@ -47,7 +47,7 @@ export function shown(store: Store): Shown {
   }
   const gone = sinceState_s(store);
   if (lost !== null && (lost > OLD_AFTER_S || gone > OLD_AFTER_S)) {
-    return { word: `NO CONNECTION ${span(Math.max(lost, gone))}`, advice: "to the program: nothing here is current", lamp: "red", old: true };
+    return { word: "NO CONNECTION", advice: `for ${span(Math.max(lost, gone))}: nothing here is current`, lamp: "red", old: true };
   }
   if (store.end) return { ...conditionWords(state), word: "DIVE ENDED", advice: "", lamp: "amber", old: false };
   if (isOld(store)) {

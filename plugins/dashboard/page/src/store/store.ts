@@ -28,7 +28,12 @@ export class Store {
   /** When the state came, performance.now(): what it says grows old from there. */
   state_ms = 0;
   seq = 0;
+  /** All has come since the last hello. */
   ready = false;
+  /** How often a connection has begun. */
+  session = 0;
+  /** All has come once: what is missing since can be asked for. */
+  private known = false;
   end: { digest?: string; exit?: number } | null = null;
   alerts = new Map<number, Alert>();
   alertsHidden = 0;
@@ -78,7 +83,7 @@ export class Store {
         this.back = message as Back & { type: "back" };
         return this.topics.back.changed();
       case "ready":
-        this.ready = true;
+        this.ready = this.known = true;
         return this.topics.hello.changed();
       case "refused":
         return this.answered((message as { why: string }).why, true);
@@ -111,18 +116,20 @@ export class Store {
 
   /** The instance to resume with; empty if there is nothing to resume. */
   get instance(): string {
-    return this.ready ? (this.hello?.instance ?? "") : "";
+    return this.known ? (this.hello?.instance ?? "") : "";
   }
 
   private takeHello(hello: Hello): void {
     if (this.hello?.instance !== hello.instance) this.forget();
     this.hello = hello;
+    this.ready = false;
+    this.session += 1;
     this.topics.hello.changed();
   }
 
   private forget(): void {
     this.state = null;
-    this.ready = false;
+    this.ready = this.known = false;
     this.end = null;
     this.alerts.clear();
     this.notes = [];

@@ -37,11 +37,13 @@ class Painter {
   private size: Size = { width: 0, height: 0, scale: 1 };
   private readonly gl: WallGl;
   private readonly words = new Uint32Array(8192 * WORDS);
+  private readonly stripWords = new Uint32Array(8192 * WORDS);
+  private stripKey = "";
   private readonly window: SampleWindow;
   private readonly turns = new Float32Array(16);
   private colours = wallColours();
   private round: Round = { crown: 0.5, sign: 1 };
-  private instance = "";
+  private session = 0;
   private asked = 0;
   layout = layoutOf(this.size);
 
@@ -97,10 +99,9 @@ class Painter {
     context.setTransform(scale, 0, 0, scale, 0, 0);
     context.clearRect(0, 0, width, height);
     if (!hello) return;
-    if (this.instance !== hello.instance) {
-      this.instance = hello.instance;
-      this.window.clear();
-    }
+    // What came while there was no connection isn't in the window.
+    if (this.session !== store.session) this.window.clear();
+    this.session = store.session;
     this.round = roundOf(hello.clock_arc_m, hello.perimeter_m);
     const view = current(), strip = this.stripView(), layout = this.layout;
     this.paintPart("wall", view, layout.top, layout.height, true);
@@ -115,8 +116,14 @@ class Painter {
       x: Math.round(this.layout.left * scale), y: this.wall.height - Math.round((top + height) * scale),
       width: Math.min(Math.round(this.layout.width * scale), this.wall.width - Math.round(this.layout.left * scale)), height: Math.round(height * scale),
     };
-    columns(store.sections, hello.section_m, hello.target_m, left_m(view), view.span_m / part.width, part.width, this.words);
-    this.gl.draw(name, { part, columns: this.words, view, round: this.round, scale, discs: large ? this.discs(view) : null }, this.colours);
+    const words = large ? this.words : this.stripWords;
+    // The strip of the whole tunnel changes only with the wall itself.
+    const key = large ? "" : `${store.topics.sections.version} ${left_m(view)} ${view.span_m} ${part.width}`;
+    if (large || key !== this.stripKey) {
+      columns(store.sections, hello.section_m, hello.target_m, left_m(view), view.span_m / part.width, part.width, words);
+    }
+    if (!large) this.stripKey = key;
+    this.gl.draw(name, { part, columns: words, view, round: this.round, scale, discs: large ? this.discs(view) : null }, this.colours);
   }
 
   private discs(view: View) {
@@ -125,6 +132,9 @@ class Painter {
     const radius = ((hello.target_m / 2) * this.layout.width) / view.span_m;
     if (radius < LEAST_RADIUS || view.span_m > DISCS_UPTO_M) return null;
     const from = left_m(view) - hello.target_m, to = right_m(view) + hello.target_m, way = wayOf();
+    if (!store.ready) return null;
+    this.window.round = this.round;
+    this.window.seam = hello.target_m / 2 / hello.perimeter_m;
     this.window.want(from, to, way, 0);
     if (!this.window.covers(Math.max(from, way[0]), Math.min(to, way[1]))) return null;
     this.turns.fill(Infinity);

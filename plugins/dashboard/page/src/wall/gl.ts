@@ -2,7 +2,7 @@
 import { rgb } from "./cividis";
 import { WORDS } from "./columns";
 import { FLOATS, type SampleWindow } from "./samples";
-import { DISC_FRAGMENT, DISC_VERTEX, DOT_FRAGMENT, DOT_VERTEX, FULL_VERTEX, MARKS_FRAGMENT, WALL_FRAGMENT } from "./shaders";
+import { DISC_FRAGMENT, DISC_VERTEX, DOT_FRAGMENT, DOT_VERTEX, FULL_VERTEX, MARKS_FRAGMENT, POINT_DISC_FRAGMENT, POINT_DISC_VERTEX, WALL_FRAGMENT } from "./shaders";
 import type { Round, View } from "./view";
 
 export interface WallColours { blank: string; open: string; missed: string; flag: string; hatch: string; dot: string; fresh: string; gain: number }
@@ -13,6 +13,15 @@ export interface Part { x: number; y: number; width: number; height: number }
 export interface Drawing {
   part: Part; columns: Uint32Array; view: View; round: Round; scale: number;
   discs: { samples: SampleWindow; radius_m: number; perimeter_m: number; turn_t_s: Float32Array } | null;
+}
+
+/** Discs of a smaller radius, CSS pixels, are drawn as points. */
+const SMALL_DISC = 9;
+
+/** Rounds that a view shows parts of. */
+function rounds({ centreDown, zoomDown }: View): number[] {
+  const half = 0.5 / zoomDown;
+  return [-1, 0, 1].filter((shift) => centreDown + half > shift + 1e-6 && centreDown - half < shift + 1 - 1e-6);
 }
 
 class Program {
@@ -50,6 +59,7 @@ export class WallGl {
   private wall!: Program;
   private marks!: Program;
   private discs!: Program;
+  private pointDiscs!: Program;
   private dots!: Program;
   private buffer!: WebGLBuffer;
   private instanced!: WebGLVertexArrayObject;
@@ -72,6 +82,7 @@ export class WallGl {
     this.wall = new Program(gl, FULL_VERTEX, WALL_FRAGMENT);
     this.marks = new Program(gl, FULL_VERTEX, MARKS_FRAGMENT);
     this.discs = new Program(gl, DISC_VERTEX, DISC_FRAGMENT);
+    this.pointDiscs = new Program(gl, POINT_DISC_VERTEX, POINT_DISC_FRAGMENT);
     this.dots = new Program(gl, DOT_VERTEX, DOT_FRAGMENT);
     this.buffer = gl.createBuffer();
     this.textures.clear();
@@ -112,17 +123,22 @@ export class WallGl {
     const gl = this.gl, discs = drawing.discs, { part, view } = drawing;
     if (!discs) return;
     this.upload(discs.samples);
-    this.use(this.discs, drawing, colours);
-    this.place(this.discs, drawing);
-    const perRound = part.height * view.zoomDown;
-    gl.uniform2f(this.discs.at("u_radius"), (discs.radius_m / view.span_m) * part.width, (discs.radius_m / discs.perimeter_m) * perRound);
+    const across = (discs.radius_m / view.span_m) * part.width;
+    const down = (discs.radius_m / discs.perimeter_m) * part.height * view.zoomDown;
+    const small = Math.max(across, down) < SMALL_DISC * drawing.scale;
+    const program = small ? this.pointDiscs : this.discs;
+    this.use(program, drawing, colours);
+    this.place(program, drawing);
+    gl.uniform2f(program.at("u_radius"), across, down);
     // A pixel that one disc covers isn't shaded again for the next.
     gl.enable(gl.DEPTH_TEST);
     gl.depthFunc(gl.LESS);
-    gl.bindVertexArray(this.instanced);
-    for (const shift of [-1, 0, 1]) {
-      gl.uniform1f(this.discs.at("u_shift"), shift);
-      gl.drawArraysInstanced(gl.TRIANGLE_STRIP, 0, 4, discs.samples.count);
+    gl.bindVertexArray(small ? this.points : this.instanced);
+    // The window has samples beside the seam twice: other rounds are drawn only where the view reaches beyond one.
+    for (const shift of rounds(view)) {
+      gl.uniform1f(program.at("u_shift"), shift);
+      if (small) gl.drawArrays(gl.POINTS, 0, discs.samples.count);
+      else gl.drawArraysInstanced(gl.TRIANGLE_STRIP, 0, 4, discs.samples.count);
     }
     gl.disable(gl.DEPTH_TEST);
   }
@@ -140,7 +156,7 @@ export class WallGl {
     gl.uniform3fv(this.dots.at("u_dot"), rgb(colours.dot));
     gl.uniform3fv(this.dots.at("u_new"), rgb(colours.fresh));
     gl.bindVertexArray(this.points);
-    for (const shift of drawing.view.zoomDown > 1 ? [-1, 0, 1] : [0]) {
+    for (const shift of rounds(drawing.view)) {
       gl.uniform1f(this.dots.at("u_shift"), shift);
       gl.drawArrays(gl.POINTS, 0, discs.samples.count);
     }

@@ -1,12 +1,13 @@
 // The samples near what is seen: fetched for a window of chainage, and grown by the live ones.
 import { SAMPLE_BYTES, type Frame } from "../feed/binary";
+import { downOf, type Round } from "./view";
 
-/** Floats a sample: x from the origin, arc fraction, time, head + 16 outcome. */
+/** Floats a sample: x from the origin, fraction of the round from the crown (beyond 0 to 1 for the copy beside the seam), time, head + 16 outcome. */
 export const FLOATS = 4;
 /** The server gives at most so many and thins beyond: a thinned window can't show what is missed. */
 const THINNED_FROM = 199_000;
 const CAPACITY = 260_000;
-const MARGIN = 0.6;
+const MARGIN = 0.3;
 
 export class SampleWindow {
   from_m = NaN;
@@ -14,6 +15,9 @@ export class SampleWindow {
   origin_m = 0;
   count = 0;
   thinned = false;
+  round: Round = { crown: 0, sign: 1 };
+  /** So near the seam, as a share of the round, a disc reaches over it. */
+  seam = 0;
   readonly data = new Float32Array(CAPACITY * FLOATS);
   /** Samples that have been handed to the graphics processor already. */
   uploaded = 0;
@@ -80,6 +84,12 @@ export class SampleWindow {
     if (!Number.isNaN(this.from_m)) this.add(frame, begun_s);
   }
 
+  private put(x: number, down: number, t_s: number, kind: number): void {
+    if (this.count >= CAPACITY) return;
+    this.data.set([x, down, t_s, kind], this.count * FLOATS);
+    this.count += 1;
+  }
+
   private add(frame: Frame, begun_s: number): void {
     const { view, count } = frame;
     if (this.count + count > CAPACITY) {
@@ -89,12 +99,12 @@ export class SampleWindow {
     for (let at = 0; at < count * SAMPLE_BYTES; at += SAMPLE_BYTES) {
       const x = view.getFloat32(at + 4, true);
       if (!(x >= this.from_m && x <= this.to_m)) continue;
-      const to = this.count * FLOATS;
-      this.data[to] = x - this.origin_m;
-      this.data[to + 1] = view.getUint16(at + 16, true) / 65536;
-      this.data[to + 2] = begun_s + view.getUint32(at, true) / 1000;
-      this.data[to + 3] = Math.min(view.getUint8(at + 18), 15) + 16 * view.getUint8(at + 19);
-      this.count += 1;
+      const down = downOf(this.round, view.getUint16(at + 16, true) / 65536);
+      const t_s = begun_s + view.getUint32(at, true) / 1000;
+      const kind = Math.min(view.getUint8(at + 18), 15) + 16 * view.getUint8(at + 19);
+      this.put(x - this.origin_m, down, t_s, kind);
+      if (down < this.seam) this.put(x - this.origin_m, down + 1, t_s, kind);
+      else if (down > 1 - this.seam) this.put(x - this.origin_m, down - 1, t_s, kind);
     }
   }
 }

@@ -85,14 +85,13 @@ const SAMPLE_COMMON = `
 uniform float u_left_m;   // left edge, metres from the window's origin
 uniform float u_per_m;    // pixels a metre
 uniform float u_shift;    // rounds that this drawing is shifted by
-vec2 placed(float x, float arc) {
-  float down = fract(u_sign * (arc - u_crown)) + u_shift;
-  return vec2((x - u_left_m) * u_per_m, (0.5 - (down - u_middle) * u_zoom) * u_size.y);
+vec2 placed(float x, float down) {
+  return vec2((x - u_left_m) * u_per_m, (0.5 - (down + u_shift - u_middle) * u_zoom) * u_size.y);
 }
 `;
 
 export const DISC_VERTEX = `${COMMON}${SAMPLE_COMMON}
-layout(location = 0) in vec4 a_sample; // x, arc fraction, time, head + 16 outcome
+layout(location = 0) in vec4 a_sample; // x, fraction of the round from the crown, time, head + 16 outcome
 uniform vec2 u_radius;                 // pixels
 out vec2 v_corner;
 void main() {
@@ -102,17 +101,31 @@ void main() {
   gl_Position = wall ? vec4(at / u_size * 2.0 - 1.0, 0.5, 1.0) : vec4(3.0, 3.0, 0.0, 1.0);
 }`;
 
-export const DISC_FRAGMENT = `${COMMON}
-in vec2 v_corner;
+/** Small discs are points: a vertex each instead of four. */
+export const POINT_DISC_VERTEX = `${COMMON}${SAMPLE_COMMON}
+layout(location = 0) in vec4 a_sample;
+uniform vec2 u_radius;
+void main() {
+  bool wall = a_sample.w < 16.0;
+  vec2 at = placed(a_sample.x, a_sample.y);
+  gl_PointSize = 2.0 * max(u_radius.x, u_radius.y);
+  gl_Position = wall ? vec4(at / u_size * 2.0 - 1.0, 0.5, 1.0) : vec4(3.0, 3.0, 0.0, 1.0);
+}`;
+
+const discFragment = (corner: string, input: string): string => `${COMMON}
+${input}
 out vec4 colour;
 void main() {
-  if (dot(v_corner, v_corner) > 1.0) discard;
+  vec2 corner = ${corner};
+  if (dot(corner, corner) > 1.0) discard;
   uint state = texelFetch(u_columns, ivec2(int(gl_FragCoord.x - u_origin.x), 0), 0).x;
   uint verdict = state & 7u;
   vec3 its = byRatio(state);
   bool judged = verdict == 1u || verdict == 2u || verdict == 3u;
   colour = vec4(judged ? its : mix(u_open, cividis(0.35), 0.7), 1.0);
 }`;
+export const DISC_FRAGMENT = discFragment("v_corner", "in vec2 v_corner;");
+export const POINT_DISC_FRAGMENT = discFragment("(gl_PointCoord * 2.0 - 1.0) * max(u_radius.x, u_radius.y) / u_radius", "uniform vec2 u_radius;");
 
 export const DOT_VERTEX = `${COMMON}${SAMPLE_COMMON}
 layout(location = 0) in vec4 a_sample;
