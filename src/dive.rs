@@ -14,8 +14,8 @@ use headrace_monitor::run::Loop;
 use headrace_ports::Supervisor;
 use headrace_replay::drive::{Pace, PacketSource, drive};
 use headrace_replay::log::{
-    DerivedChannels, Every, LeftOut, LogHeader, Recorder, RecorderHandle, RecordingEvent, RecordingFault,
-    Rotation, SentPort, SourceInfo, Summary, dive_name,
+    DerivedChannels, Every, LeftOut, LogHeader, Recorder, RecorderHandle, RecordingFault, Rotation, SentPort,
+    SourceInfo, Summary, dive_name,
 };
 use headrace_replay::player::seconds;
 use headrace_replay::record::{QUEUE_BYTES, QUEUE_OF_PORTS_BYTES, RecorderOutlet, result_channels};
@@ -419,7 +419,7 @@ fn tell_recordings(
         while let Some(event) = handle.next_event() {
             watch.recording(number, &event, dive.now());
             if let Some(operator) = &mut operator {
-                operator.recording(number, matches!(event, RecordingEvent::Failed { .. }));
+                operator.recording(number, event.fails());
             }
         }
     }

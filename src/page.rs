@@ -364,12 +364,7 @@ impl Follower for PageFollower {
     }
 
     fn recording(&mut self, _number: usize, event: &RecordingEvent, at: MonoNs) {
-        let (fails, words) = match event {
-            RecordingEvent::Failed { path, error } => {
-                (true, format!("NOT RECORDED to {}: {error}; tried again in another part", path.display()))
-            }
-            RecordingEvent::Resumed(fault) => (false, fault.words()),
-        };
+        let (fails, words) = (event.fails(), event.words());
         self.collector.recording(fails, &words, at);
     }
 

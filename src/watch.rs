@@ -162,16 +162,7 @@ impl Watch {
         let fails = event.fails();
         self.failed.insert(number, fails);
         self.followers.iter_mut().for_each(|follower| follower.recording(number, event, at));
-        let words = match event {
-            RecordingEvent::Failed { path, error } => {
-                format!("NOT RECORDED to {}: {error}; tried again in another part", path.display())
-            }
-            RecordingEvent::Resumed(fault) => fault.words(),
-            RecordingEvent::Behind => "NOT RECORDED: the medium takes nothing, and gives no error".to_owned(),
-            RecordingEvent::CaughtUp { packets } => {
-                format!("recorded again; {packets} packets are missing from before")
-            }
-        };
+        let words = event.words();
         match self.show {
             Show::Nothing => {}
             Show::JsonLines => self.json(at, json!({"type": "recording", "fails": fails, "text": words})),

@@ -69,6 +69,20 @@ impl RecordingEvent {
     pub fn fails(&self) -> bool {
         matches!(self, Self::Failed { .. } | Self::Behind)
     }
+
+    /// As text.
+    pub fn words(&self) -> String {
+        match self {
+            Self::Failed { path, error } => {
+                format!("NOT RECORDED to {}: {error}; tried again in another part", path.display())
+            }
+            Self::Resumed(fault) => fault.words(),
+            Self::Behind => "NOT RECORDED: the medium takes nothing, and gives no error".to_owned(),
+            Self::CaughtUp { packets } => {
+                format!("recorded again; {packets} packets are missing from before")
+            }
+        }
+    }
 }
 
 /// Adds a fault to a bounded list.
