@@ -59,15 +59,15 @@ export function stepFile(by: number): void {
   if (dive) seekFile(dive.t_s[Math.min(Math.max(entry + by, 0), dive.t_s.length - 1)] ?? 0);
 }
 
-/** Samples between two chainages, from the program or the file. */
-export async function samples(from_m: number, to_m: number, signal: AbortSignal): Promise<Frame> {
-  if (dive) return fromFile(dive, from_m, to_m);
+/** Samples between two chainages, from the program or the file; of so many there is one. */
+export async function samples(from_m: number, to_m: number, signal: AbortSignal): Promise<{ frame: Frame; oneOf: number }> {
+  if (dive) return { frame: fromFile(dive, from_m, to_m), oneOf: store.hello?.thinned ? 2 : 1 };
   const url = new URL("/samples", location.href);
   url.searchParams.set("from_m", from_m.toFixed(2));
   url.searchParams.set("to_m", to_m.toFixed(2));
   const response = await fetch(url, { signal, credentials: "same-origin" });
   if (!response.ok) throw new Error(`samples from ${from_m.toFixed(0)} to ${to_m.toFixed(0)} m: ${response.status}`);
-  return frameOf(await response.arrayBuffer());
+  return { frame: frameOf(await response.arrayBuffer()), oneOf: Number(response.headers.get("headrace-one-of") ?? 1) };
 }
 
 function fromFile({ samples }: Dive, from_m: number, to_m: number): Frame {
