@@ -60,7 +60,7 @@ export function Back() {
           {legs.map((leg) => (
             <li key={`${leg.from_m}-${leg.to_m}`}>
               <button type="button" class="leg" onClick={() => actions.goTo((leg.from_m + leg.to_m) / 2, 30)}>
-                <b>{station(leg.from_m)} to {station(leg.to_m)}</b>{leg.at_most_mps === null ? "" : ` ≤ ${figure(leg.at_most_mps, 2)} m/s`}<span class="leg-why"> {leg.why.replaceAll("_", " ")}</span>
+                <b>{station(leg.from_m)}–{station(leg.to_m)}</b>{leg.at_most_mps === null ? "" : ` ≤ ${figure(leg.at_most_mps, 2)} m/s`}<span class="leg-why"> {leg.why.replaceAll("_", " ")}</span>
               </button>
             </li>
           ))}
