@@ -163,17 +163,17 @@ describe("connection", () => {
       // The clock of the page runs on while nothing answers.
       await page.clock.runFor(20_000);
       await word(page, "NO CONNECTION");
-      assert.match(await page.locator(".condition .advice").innerText(), /for (19|2\d) s/);
-      assert.equal(await page.evaluate(() => document.documentElement.dataset.old), "true");
-      assert.match(await page.locator(".age").innerText(), /(19|2\d) s old/);
-      assert.match(await page.title(), /NO CONNECTION/);
+      await page.locator(".condition .advice", { hasText: /for (19|2\d) s/ }).waitFor();
+      await page.locator(':root[data-old="true"]').waitFor();
+      await page.locator(".age", { hasText: /(19|2\d) s old/ }).waitFor();
+      await page.waitForFunction(() => document.title.includes("NO CONNECTION"));
       mock.control({ closed: false });
       await page.clock.runFor(5000);
       await page.clock.resume();
       await condition(page, "good");
       await page.locator(".alert.open", { hasText: "MISSED 0+080" }).waitFor();
       await page.locator('.status .link:text("connected")').waitFor();
-      assert.equal(await page.evaluate(() => document.documentElement.dataset.old), "false");
+      await page.locator(':root[data-old="false"]').waitFor();
     });
   });
 

@@ -9,7 +9,7 @@ const WHOLE_LIVE = 500;
 /** After live frames that may have been thinned, all is asked for again, but not more often than this. */
 const AGAIN_MS = 2000;
 const CAPACITY = 260_000;
-const MARGIN = 0.3;
+const MARGIN = 0.2;
 
 export class SampleWindow {
   from_m = NaN;
