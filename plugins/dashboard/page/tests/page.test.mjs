@@ -133,7 +133,7 @@ describe("alerts", () => {
     await page.locator(".alert.caution", { hasText: "setting doubted" }).waitFor();
     mock.control({ settle: "missed" });
     mock.control({ settle: "setting_doubted" });
-    await page.locator('.alert.rectified[data-kind="missed"]', { hasText: "over, not acknowledged" }).waitFor();
+    await page.locator('.alert.rectified[data-kind="missed"]', { hasText: "· over" }).waitFor();
     await page.locator(".alert.caution").waitFor({ state: "detached" });
     await page.keyboard.press("a");
     await page.locator('.alert[data-kind="missed"]').waitFor({ state: "detached" });
