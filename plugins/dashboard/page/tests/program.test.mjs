@@ -46,7 +46,6 @@ async function stop(child, signal = "SIGKILL") {
   await once(child, "exit");
 }
 
-const step = (text) => process.env.STEPS && console.error(text);
 describe("with the program", { skip: BIN ? false : "HEADRACE_BIN isn't set", concurrency: false }, () => {
   let chromium, folder;
   before(async () => { chromium = await browser(); folder = mkdtempSync(join(tmpdir(), "headrace-page-")); });
@@ -110,14 +109,10 @@ describe("with the program", { skip: BIN ? false : "HEADRACE_BIN isn't set", con
     const vehicle = join(out, "vehicle.toml");
     // Its last line names the devices' ports: all are open then, and the vehicle file is written.
     await once(emulator.stdout, "data");
-    step("emulated");
     const { child, url } = await start(folder, await freePort(), "run", vehicle);
-    step("run");
     const { page, context, problems } = await open(chromium, url);
     await page.waitForFunction(() => document.querySelectorAll('.sensor[data-state="ok"]').length >= 8, null, LONG);
-    step("ok");
     await stop(emulator);
-    step("stopped");
     const killed = Date.now();
     await page.locator('.sensor[data-state="silent"]').first().waitFor();
     console.log(`# silent sensor on the page ${((Date.now() - killed) / 1000).toFixed(1)} s after it was killed (2 s of silence make it so)`);

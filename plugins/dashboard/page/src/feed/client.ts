@@ -6,6 +6,9 @@ import { Feed } from "./feed";
 import { embedded, entryAt, readDive, stateAt, type Dive } from "./file";
 import type { Command } from "./types";
 
+/** Samples before a time of a file that the cross-section shows: two turns of slow heads. */
+const TURNS_MS = 20_000;
+
 let feed: Feed | null = null;
 let dive: Dive | null = null;
 let entry = 0;
@@ -52,6 +55,14 @@ export function seekFile(at_s: number): void {
   const state = stateAt(dive, entry);
   if (!state) return;
   const from_s = dive.t_s[0] ?? 0;
+  const begun_s = store.hello?.begun_s ?? 0;
+  const upTo_ms = ((dive.t_s[entry] ?? 0) - begun_s) * 1000;
+  store.turns.clear();
+  store.turns.take(chosen(dive, (view, at) => {
+    const t_ms = view.getUint32(at, true);
+    return t_ms <= upTo_ms && t_ms > upTo_ms - TURNS_MS;
+  }), begun_s);
+  store.topics.samples.changed();
   store.take({ ...state, playback: { paused: true, speed: null, at_s: dive.t_s[entry] ?? 0, from_s, to_s: dive.t_s.at(-1) ?? 0 } });
 }
 
@@ -70,12 +81,19 @@ export async function samples(from_m: number, to_m: number, signal: AbortSignal)
   return { frame: frameOf(await response.arrayBuffer()), oneOf: Number(response.headers.get("headrace-one-of") ?? 1) };
 }
 
-function fromFile({ samples }: Dive, from_m: number, to_m: number): Frame {
+function fromFile(dive: Dive, from_m: number, to_m: number): Frame {
+  return chosen(dive, (view, at) => {
+    const x_m = view.getFloat32(at + 4, true);
+    return x_m >= from_m && x_m < to_m;
+  });
+}
+
+/** Some of a file's samples as a frame. */
+function chosen({ samples }: Dive, choose: (view: DataView, at: number) => boolean): Frame {
   const records: Uint8Array[] = [];
   for (const { view, count } of samples) {
     for (let at = 0; at < count * SAMPLE_BYTES; at += SAMPLE_BYTES) {
-      const x = view.getFloat32(at + 4, true);
-      if (x >= from_m && x < to_m) records.push(new Uint8Array(view.buffer, view.byteOffset + at, SAMPLE_BYTES));
+      if (choose(view, at)) records.push(new Uint8Array(view.buffer, view.byteOffset + at, SAMPLE_BYTES));
     }
   }
   const bytes = new Uint8Array(HEADER_BYTES + records.length * SAMPLE_BYTES);
