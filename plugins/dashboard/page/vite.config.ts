@@ -1,8 +1,15 @@
 import { defineConfig } from "vite";
 
+// `npm run dev` and `npx vite preview` show the dive of a running program: HEADRACE=http://127.0.0.1:8881.
+const program = process.env["HEADRACE"] ?? "http://127.0.0.1:8881";
+const to = { target: program, changeOrigin: true, ws: true, headers: { origin: program } };
+const proxy = { "/feed": to, "/samples": to, "/state.json": to, "/login": to };
+
 // Two files of fixed names beside index.html, so that the program embeds the same list whatever changes in them.
 export default defineConfig({
   base: "/",
+  server: { proxy },
+  preview: { proxy },
   build: {
     target: "es2022",
     outDir: "dist",

@@ -13,7 +13,7 @@ import { Back, Metres } from "./side/Metres";
 import { NoteDialog, Notes } from "./side/Notes";
 import { Sensors } from "./side/Sensors";
 import { Announcer, Condition, Place, Speed } from "./speed/Speed";
-import { isOld, lost_s, shown } from "./store/age";
+import { hasEnded, isOld, lost_s, shown } from "./store/age";
 import { prefs, setPrefs } from "./store/prefs";
 import { store } from "./store/store";
 import "./style/palettes.css";
@@ -58,7 +58,7 @@ const WIDGETS: Record<string, () => preact.JSX.Element> = {
 function watch(): void {
   const { dataset } = document.documentElement;
   const lost = lost_s(store);
-  dataset["old"] = String(store.link.phase !== "refused" && (isOld(store) || (lost !== null && lost > 2)));
+  dataset["old"] = String(store.link.phase !== "refused" && !hasEnded(store) && (isOld(store) || (lost !== null && lost > 2)));
   const { word } = shown(store);
   const title = `${word} - headrace`;
   if (document.title !== title) document.title = title;

@@ -27,6 +27,17 @@ async function on(options, run, { path = "/", ...more } = {}) {
   }
 }
 const word = (page, text) => page.locator(".condition .word", { hasText: text }).waitFor();
+
+/** Pixels of a picture within 24 of a colour in each part. */
+const countNear = (page, picture, colour) => page.evaluate(async ({ base64, colour }) => {
+  const bitmap = await createImageBitmap(new Blob([Uint8Array.from(atob(base64), (each) => each.charCodeAt(0))]));
+  const context = new OffscreenCanvas(bitmap.width, bitmap.height).getContext("2d");
+  context.drawImage(bitmap, 0, 0);
+  const { data } = context.getImageData(0, 0, bitmap.width, bitmap.height);
+  let count = 0;
+  for (let at = 0; at < data.length; at += 4) if (colour.every((part, n) => Math.abs(data[at + n] - part) < 24)) count += 1;
+  return count;
+}, { base64: picture.toString("base64"), colour });
 const condition = (page, name) => page.locator(`.condition[data-condition="${name}"]`).waitFor();
 
 
@@ -36,11 +47,14 @@ describe("what it shows", () => {
     assert.match(await page.locator(".most .value").innerText(), /0\.24/);
     assert.match(await page.locator(".why").innerText(), /slower helps/);
     assert.match(await page.locator(".chainage").innerText(), /^0\+06\d\.\d$/);
-    // The canvas keeps nothing between frames: it is looked at in the frame that draws it.
-    await page.screenshot();
-    const box = await page.locator(".wall-box").boundingBox();
-    const picture = await page.screenshot({ clip: box });
-    assert.ok(picture.length > 15_000, `a picture of the wall has ${picture.length} bytes: it is empty`);
+    // The stretch from 0+012 to 0+018 was missed: holes over T are yellow, its outline is red, the rest of the way is blue to grey.
+    await page.waitForFunction(() => !document.querySelector(".condition.old"));
+    const near = async (colour) => countNear(page, await page.screenshot({ clip: await page.locator(".wall-box").boundingBox() }), colour);
+    let yellow = 0;
+    for (let tries = 0; tries < 20 && yellow < 300; tries += 1) yellow = await near([0xfe, 0xe8, 0x38]);
+    assert.ok(yellow >= 300, `${yellow} yellow pixels on the wall`);
+    assert.ok(await near([0xff, 0x4d, 0x3d]) >= 100, "no outline of what is flagged");
+    assert.ok(await near([0x57, 0x5d, 0x6d]) >= 2000, "no wall that passes");
   }));
 
   it("what would gain more, where slower won't help", () => on({}, async ({ mock, page }) => {
@@ -119,7 +133,7 @@ describe("alerts", () => {
     await page.locator(".alert.caution", { hasText: "setting doubted" }).waitFor();
     mock.control({ settle: "missed" });
     mock.control({ settle: "setting_doubted" });
-    await page.locator('.alert.rectified[data-kind="missed"]', { hasText: "over, not acknowledged" }).waitFor();
+    await page.locator('.alert.rectified[data-kind="missed"]', { hasText: "· over" }).waitFor();
     await page.locator(".alert.caution").waitFor({ state: "detached" });
     await page.keyboard.press("a");
     await page.locator('.alert[data-kind="missed"]').waitFor({ state: "detached" });
@@ -134,7 +148,7 @@ describe("alerts", () => {
       const bottom = document.querySelector(".alert-list").getBoundingClientRect().bottom;
       return [...document.querySelectorAll(".alert")].filter((item) => item.getBoundingClientRect().top <= bottom - 24).length;
     });
-    assert.equal(below + inside, 30);
+    assert.equal(below + inside, mock.control({}).alerts.length);
   }));
 });
 
@@ -149,17 +163,17 @@ describe("connection", () => {
       // The clock of the page runs on while nothing answers.
       await page.clock.runFor(20_000);
       await word(page, "NO CONNECTION");
-      assert.match(await page.locator(".condition .advice").innerText(), /for (19|2\d) s/);
-      assert.equal(await page.evaluate(() => document.documentElement.dataset.old), "true");
-      assert.match(await page.locator(".age").innerText(), /(19|2\d) s old/);
-      assert.match(await page.title(), /NO CONNECTION/);
+      await page.locator(".condition .advice", { hasText: /for (19|2\d) s/ }).waitFor();
+      await page.locator(':root[data-old="true"]').waitFor();
+      await page.locator(".age", { hasText: /(19|2\d) s old/ }).waitFor();
+      await page.waitForFunction(() => document.title.includes("NO CONNECTION"));
       mock.control({ closed: false });
       await page.clock.runFor(5000);
       await page.clock.resume();
       await condition(page, "good");
       await page.locator(".alert.open", { hasText: "MISSED 0+080" }).waitFor();
       await page.locator('.status .link:text("connected")').waitFor();
-      assert.equal(await page.evaluate(() => document.documentElement.dataset.old), "false");
+      await page.locator(':root[data-old="false"]').waitFor();
     });
   });
 
@@ -234,18 +248,18 @@ describe("keyboard", () => {
     await page.keyboard.press(" ");
     await page.locator(".paused").waitFor();
     // A paused dive doesn't grow old.
-    const before = await page.locator(".replay .at").innerText();
-    await page.keyboard.press(".");
-    await page.waitForFunction((text) => document.querySelector(".replay .at").textContent !== text || true, before);
-    await page.keyboard.press(",");
-    await page.keyboard.press("l");
-    await page.waitForFunction((text) => document.querySelector(".replay .at").textContent !== text, before);
+    for (const key of [".", ",", "l", "j"]) {
+      const before = await page.locator(".replay input").inputValue();
+      await page.keyboard.press(key);
+      await page.waitForFunction((value) => document.querySelector(".replay input").value !== value, before);
+    }
     await page.keyboard.press(">");
     await page.waitForFunction(() => document.querySelector(".replay select").value === "2");
+    assert.equal(mock.control({}).playback.paused, true);
     await page.keyboard.press(" ");
     await page.locator(".paused").waitFor({ state: "detached" });
-    await page.keyboard.press("a");
     assert.equal(mock.control({}).playback.paused, false);
+    assert.ok(await page.getByRole("button", { name: "Acknowledge all" }).isDisabled());
   }));
 });
 

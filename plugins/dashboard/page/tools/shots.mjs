@@ -37,7 +37,7 @@ await shot("no-position", { dive: far, asks: [{ position: "none" }] });
 await shot("no-connection", { dive: far, asks: [{ closed: true }], wait: 3500 });
 await shot("old", { dive: far, asks: [{ mute: true }], wait: 3500 });
 await shot("killed-head", { dive: far, asks: [{ kill: "aft_port" }], wait: 3500 });
-await shot("no-speed", { dive: near, asks: [{ condition: "no_speed", lamp: "red", remedy: "set the heads to SLOW" }] });
+await shot("no-speed", { dive: near, asks: [{ condition: "no_speed", lamp: "red", remedy: "set the heads to SLOW" }, { world: { v_max_mps: null } }] });
 await shot("replay", { dive: { ...far, mode: "replay" }, asks: [{ world: { playback: { paused: true, speed: 4 } } }] });
 await shot("tablet", { size: [1024, 768], dive: far });
 await shot("help", { dive: near, keys: ["?"] });

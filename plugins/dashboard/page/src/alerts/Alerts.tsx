@@ -51,7 +51,7 @@ function Item({ alert, may }: { alert: Alert; may: boolean }) {
     <li class={`alert ${alert.priority}${open ? " open" : ""}${rectified ? " rectified" : ""}`} data-number={alert.number} data-state={alert.state} data-kind={alert.kind}>
       <Mark alert={alert} />
       <div class="what">
-        <div class="line"><b class="priority">{PRIORITY_WORDS[alert.priority]}</b> <span class="number">#{alert.number}</span> <Since alert={alert} />{rectified ? " · over, not acknowledged" : ""}{alert.acknowledged ? ` · ack ${alert.acknowledged.by}` : ""}</div>
+        <div class="line"><b class="priority">{PRIORITY_WORDS[alert.priority]}</b> <span class="number">#{alert.number}</span> <Since alert={alert} />{rectified ? " · over" : ""}{alert.acknowledged ? ` · ack ${alert.acknowledged.by}` : ""}</div>
         <div class="text">{alert.text}{alert.count > 1 ? ` (${alert.count} times)` : ""}</div>
         {alert.advice ? <div class="do">→ {alert.advice}</div> : null}
       </div>

@@ -46,7 +46,7 @@ export function sounding(alerts: Iterable<Alert>, muted: readonly string[]): Exc
 
 function beat(): void {
   // What is old may no longer be true: it shows, and doesn't sound on.
-  const now = prefs.sound && !isOld(store) ? sounding(store.alerts.values(), prefs.muted) : null;
+  const now = prefs.sound && store.link.phase !== "file" && !isOld(store) ? sounding(store.alerts.values(), prefs.muted) : null;
   if (now !== playing) {
     playing = now;
     next_s = 0;

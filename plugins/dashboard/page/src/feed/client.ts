@@ -6,6 +6,9 @@ import { Feed } from "./feed";
 import { embedded, entryAt, readDive, stateAt, type Dive } from "./file";
 import type { Command } from "./types";
 
+/** Samples before a time of a file that the cross-section shows: two turns of slow heads. */
+const TURNS_MS = 20_000;
+
 let feed: Feed | null = null;
 let dive: Dive | null = null;
 let entry = 0;
@@ -52,6 +55,14 @@ export function seekFile(at_s: number): void {
   const state = stateAt(dive, entry);
   if (!state) return;
   const from_s = dive.t_s[0] ?? 0;
+  const begun_s = store.hello?.begun_s ?? 0;
+  const upTo_ms = ((dive.t_s[entry] ?? 0) - begun_s) * 1000;
+  store.turns.clear();
+  store.turns.take(chosen(dive, (view, at) => {
+    const t_ms = view.getUint32(at, true);
+    return t_ms <= upTo_ms && t_ms > upTo_ms - TURNS_MS;
+  }), begun_s);
+  store.topics.samples.changed();
   store.take({ ...state, playback: { paused: true, speed: null, at_s: dive.t_s[entry] ?? 0, from_s, to_s: dive.t_s.at(-1) ?? 0 } });
 }
 
@@ -59,23 +70,30 @@ export function stepFile(by: number): void {
   if (dive) seekFile(dive.t_s[Math.min(Math.max(entry + by, 0), dive.t_s.length - 1)] ?? 0);
 }
 
-/** Samples between two chainages, from the program or the file. */
-export async function samples(from_m: number, to_m: number, signal: AbortSignal): Promise<Frame> {
-  if (dive) return fromFile(dive, from_m, to_m);
+/** Samples between two chainages, from the program or the file; of so many there is one. */
+export async function samples(from_m: number, to_m: number, signal: AbortSignal): Promise<{ frame: Frame; oneOf: number }> {
+  if (dive) return { frame: fromFile(dive, from_m, to_m), oneOf: store.hello?.thinned ? 2 : 1 };
   const url = new URL("/samples", location.href);
   url.searchParams.set("from_m", from_m.toFixed(2));
   url.searchParams.set("to_m", to_m.toFixed(2));
   const response = await fetch(url, { signal, credentials: "same-origin" });
   if (!response.ok) throw new Error(`samples from ${from_m.toFixed(0)} to ${to_m.toFixed(0)} m: ${response.status}`);
-  return frameOf(await response.arrayBuffer());
+  return { frame: frameOf(await response.arrayBuffer()), oneOf: Number(response.headers.get("headrace-one-of") ?? 1) };
 }
 
-function fromFile({ samples }: Dive, from_m: number, to_m: number): Frame {
+function fromFile(dive: Dive, from_m: number, to_m: number): Frame {
+  return chosen(dive, (view, at) => {
+    const x_m = view.getFloat32(at + 4, true);
+    return x_m >= from_m && x_m < to_m;
+  });
+}
+
+/** Some of a file's samples as a frame. */
+function chosen({ samples }: Dive, choose: (view: DataView, at: number) => boolean): Frame {
   const records: Uint8Array[] = [];
   for (const { view, count } of samples) {
     for (let at = 0; at < count * SAMPLE_BYTES; at += SAMPLE_BYTES) {
-      const x = view.getFloat32(at + 4, true);
-      if (x >= from_m && x < to_m) records.push(new Uint8Array(view.buffer, view.byteOffset + at, SAMPLE_BYTES));
+      if (choose(view, at)) records.push(new Uint8Array(view.buffer, view.byteOffset + at, SAMPLE_BYTES));
     }
   }
   const bytes = new Uint8Array(HEADER_BYTES + records.length * SAMPLE_BYTES);

@@ -41,6 +41,8 @@ export interface State {
   sensors: Sensor[];
   metres: { pass_m: number; fail_m: number; cannot_say_m: number; open_m: number; not_inspected_m: number; way_m: number };
   cannot_say: { why: string; from_m: number; to_m: number } | null;
+  /** The replay has reached its end, or the dive has ended. */
+  ended?: boolean;
   alert_list?: Alert[]; alerts_hidden?: number;
   left?: { cable_m: number | null; time_s: number | null; battery_pct: number | null } | null;
   pose?: { y_m: number; z_m: number; roll_deg: number; pitch_deg: number; yaw_deg: number } | null;

@@ -44,7 +44,7 @@ function Left() {
     <dl class="left" aria-label="What is left">
       {left.cable_m === null ? null : <div class={left.cable_m < 50 ? "bad" : ""}><dt>cable left</dt><dd>{metres(left.cable_m)}</dd></div>}
       {left.time_s === null ? null : <div class={left.time_s < 600 ? "bad" : ""}><dt>time left</dt><dd>{span(left.time_s)}</dd></div>}
-      {left.battery_pct === null ? null : <div class={left.battery_pct < 25 ? "bad" : ""}><dt>battery left</dt><dd>{figure(left.battery_pct, 0)} %</dd></div>}
+      {left.battery_pct === null ? null : <div class={left.battery_pct < 25 ? "bad" : ""}><dt>battery</dt><dd>{figure(left.battery_pct, 0)} %</dd></div>}
     </dl>
   );
 }
@@ -60,7 +60,7 @@ export function Back() {
           {legs.map((leg) => (
             <li key={`${leg.from_m}-${leg.to_m}`}>
               <button type="button" class="leg" onClick={() => actions.goTo((leg.from_m + leg.to_m) / 2, 30)}>
-                <b>{station(leg.from_m)} to {station(leg.to_m)}</b>{leg.at_most_mps === null ? "" : ` at most ${figure(leg.at_most_mps, 2)}`}<span class="leg-why"> {leg.why.replaceAll("_", " ")}</span>
+                <b>{station(leg.from_m)}–{station(leg.to_m)}</b>{leg.at_most_mps === null ? "" : ` ≤ ${figure(leg.at_most_mps, 2)} m/s`}<span class="leg-why"> {leg.why.replaceAll("_", " ")}</span>
               </button>
             </li>
           ))}

@@ -2,17 +2,16 @@
 import { useEffect, useRef } from "preact/hooks";
 import { note } from "../feed/client";
 import { store } from "../store/store";
-import { Topic, useTopics } from "../store/topic";
+import { useTopics } from "../store/topic";
 import { clock, station } from "../text/format";
 import { actions } from "../wall/control";
 
 const MOST_BYTES = 240;
-const noteTopic = new Topic();
-let isOpen = false;
+let show: (() => void) | null = null;
 
+/** Opens the field at once: what is typed next belongs into it. */
 export function openNote(): void {
-  isOpen = true;
-  noteTopic.changed();
+  show?.();
 }
 
 export function Notes() {
@@ -36,18 +35,16 @@ export function Notes() {
 }
 
 export function NoteDialog() {
-  useTopics(noteTopic);
+  useTopics(store.topics.state);
   const dialog = useRef<HTMLDialogElement>(null), field = useRef<HTMLInputElement>(null);
   useEffect(() => {
-    if (isOpen && dialog.current && !dialog.current.open) {
-      dialog.current.showModal();
+    show = () => {
+      if (!dialog.current?.open) dialog.current?.showModal();
       field.current?.focus();
-    }
-  });
-  const close = () => {
-    isOpen = false;
-    dialog.current?.close();
-  };
+    };
+    return () => { show = null; };
+  }, []);
+  const close = () => dialog.current?.close();
   const submit = (event: Event) => {
     event.preventDefault();
     let text = field.current?.value.trim() ?? "";
@@ -58,7 +55,7 @@ export function NoteDialog() {
   };
   const at = store.state?.position.chainage_m;
   return (
-    <dialog ref={dialog} class="note" aria-label="Note" onClose={() => (isOpen = false)}>
+    <dialog ref={dialog} class="note" aria-label="Note">
       <form onSubmit={submit}>
         <label>Note at {at === null || at === undefined ? "this time" : station(at, 1)}
           <input ref={field} type="text" maxLength={MOST_BYTES} autocomplete="off" />

@@ -1,5 +1,6 @@
 // A lamp for every sensor: state in words, rate, age. Ages go on while nothing comes.
 import { OLD_AFTER_S, sinceState_s } from "../store/age";
+import type { Sensor } from "../feed/types";
 import { store } from "../store/store";
 import { useTopics } from "../store/topic";
 import { figure, span } from "../text/format";
@@ -14,7 +15,7 @@ export function Sensors() {
     <section class="panel sensors" aria-label="Sensors">
       <div class="panel-head"><h2>Sensors</h2></div>
       <ul>
-        {(state?.sensors ?? []).map((sensor) => {
+        {inOrder(state?.sensors ?? []).map((sensor) => {
           const age = sensor.age_s === null ? null : sensor.age_s + since;
           // Where the program itself isn't heard, nothing is known of its sensors.
           const is = since > OLD_AFTER_S ? "unknown" : sensor.state;
@@ -34,6 +35,11 @@ export function Sensors() {
       <Recording />
     </section>
   );
+}
+
+/** What isn't well comes first: it must not be below the edge. */
+function inOrder(sensors: Sensor[]): Sensor[] {
+  return [...sensors.filter(({ state }) => state !== "ok"), ...sensors.filter(({ state }) => state === "ok")];
 }
 
 function Recording() {

@@ -85,7 +85,7 @@ function Forecast() {
   const over = predicted_t_m === null || predicted_t_m > target_m;
   return (
     <div class={`forecast${over ? " over" : ""}`}>
-      <span>this turn: largest hole {predicted_t_m === null ? "unbounded" : `${figure(predicted_t_m, 2)} m`} of {figure(target_m, 2)} m {will_exceed ? "▲ misses" : over ? "▲" : "✓"}</span>
+      <span>this turn: largest hole {predicted_t_m === null ? "unbounded" : `${figure(predicted_t_m, 2)} m`} of {figure(target_m, 2)} m {over ? (will_exceed ? "▲ misses" : "▲") : "✓"}</span>
       <svg viewBox="0 0 200 8" preserveAspectRatio="none" aria-hidden="true"><rect width="200" height="8" class="zone-none" /><rect width={share * 200} height="8" class={over ? "zone-red" : "zone-green"} /><path class="limit" d="M100 0V8" /></svg>
     </div>
   );

@@ -8,7 +8,12 @@ export const OLD_AFTER_S = 2;
 
 /** Whether time stands still on purpose: what is shown doesn't grow old. */
 export function stands(store: Store): boolean {
-  return store.link.phase === "file" || store.end !== null || store.state?.playback?.paused === true;
+  return store.link.phase === "file" || hasEnded(store) || store.state?.playback?.paused === true;
+}
+
+/** Whether the dive has ended: nothing more is to come. */
+export function hasEnded(store: Store): boolean {
+  return store.end !== null || store.state?.ended === true;
 }
 
 /** Seconds since the state came. */
@@ -46,10 +51,13 @@ export function shown(store: Store): Shown {
     return { word: "WAITING", advice, lamp: "amber", old: true };
   }
   const gone = sinceState_s(store);
+  if (hasEnded(store)) {
+    const advice = link.phase === "lost" ? "the program has closed" : "all is judged";
+    return { word: "DIVE ENDED", advice, lamp: "amber", old: false };
+  }
   if (lost !== null && (lost > OLD_AFTER_S || gone > OLD_AFTER_S)) {
     return { word: "NO CONNECTION", advice: `for ${span(Math.max(lost, gone))}: nothing here is current`, lamp: "red", old: true };
   }
-  if (store.end) return { ...conditionWords(state), word: "DIVE ENDED", advice: "", lamp: "amber", old: false };
   if (isOld(store)) {
     const age = age_s(store) ?? gone;
     return { word: `OLD ${span(age)}`, advice: "nothing from any sensor: stop", lamp: "red", old: true };

@@ -148,10 +148,10 @@ export class Store {
     if (state.alerts_hidden !== undefined) this.alertsHidden = state.alerts_hidden;
     // A jump back: what has been placed since is no longer so.
     if (before && state.now_s < before.now_s - 1) {
-      this.turns.clear();
+      if (this.link.phase !== "file") this.turns.clear();
       this.end = null;
       if (state.alert_list) this.takeAlerts({ list: state.alert_list });
-    }
+    } else if (this.link.phase === "file" && state.alert_list) this.takeAlerts({ list: state.alert_list });
     this.topics.state.changed();
     this.grow(state);
   }

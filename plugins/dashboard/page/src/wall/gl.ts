@@ -149,8 +149,9 @@ export class WallGl {
     this.use(this.dots, drawing, colours);
     this.place(this.dots, drawing);
     const radius = (discs.radius_m / drawing.view.span_m) * drawing.part.width;
+    const down = (discs.radius_m / discs.perimeter_m) * drawing.part.height * drawing.view.zoomDown;
     // From afar the dots would hide what the discs show.
-    gl.uniform1i(this.dots.at("u_all"), radius > 7 * drawing.scale ? 1 : 0);
+    gl.uniform1i(this.dots.at("u_all"), Math.min(radius, down) > 4 * drawing.scale ? 1 : 0);
     gl.uniform1f(this.dots.at("u_point"), Math.min(Math.max(radius / 6, 1), 3.5 * drawing.scale));
     gl.uniform1fv(this.dots.at("u_turn_t_s"), discs.turn_t_s);
     gl.uniform3fv(this.dots.at("u_dot"), rgb(colours.dot));

@@ -4,17 +4,22 @@ import { downOf, type Round } from "./view";
 
 /** Floats a sample: x from the origin, fraction of the round from the crown (beyond 0 to 1 for the copy beside the seam), time, head + 16 outcome. */
 export const FLOATS = 4;
-/** The server gives at most so many and thins beyond: a thinned window can't show what is missed. */
-const THINNED_FROM = 199_000;
+/** A live frame of more records may have been thinned: the server sends at most 1,000 at once, one of several. */
+const WHOLE_LIVE = 500;
+/** After live frames that may have been thinned, all is asked for again, but not more often than this. */
+const AGAIN_MS = 2000;
 const CAPACITY = 260_000;
-const MARGIN = 0.3;
+const MARGIN = 0.2;
 
 export class SampleWindow {
   from_m = NaN;
   to_m = NaN;
   origin_m = 0;
   count = 0;
+  /** Not all samples are here: what is missed can't be shown by them. */
   thinned = false;
+  private stale = false;
+  private asked_ms = -Infinity;
   round: Round = { crown: 0, sign: 1 };
   /** So near the seam, as a share of the round, a disc reaches over it. */
   seam = 0;
@@ -26,7 +31,7 @@ export class SampleWindow {
   private askedTo_m = NaN;
 
   constructor(
-    private readonly fetch: (from_m: number, to_m: number, signal: AbortSignal) => Promise<Frame>,
+    private readonly fetch: (from_m: number, to_m: number, signal: AbortSignal) => Promise<{ frame: Frame; oneOf: number }>,
     private readonly changed: () => void,
   ) {}
 
@@ -35,11 +40,11 @@ export class SampleWindow {
     this.asked = null;
     this.from_m = this.to_m = this.askedFrom_m = this.askedTo_m = NaN;
     this.count = this.uploaded = 0;
-    this.thinned = false;
+    this.thinned = this.stale = false;
   }
 
   covers(from_m: number, to_m: number): boolean {
-    return !this.thinned && from_m >= this.from_m && to_m <= this.to_m;
+    return !this.thinned && !this.stale && from_m >= this.from_m && to_m <= this.to_m;
   }
 
   /** Sees to it that the samples between these are there; way: where there are any at all. */
@@ -48,6 +53,8 @@ export class SampleWindow {
     if (!(to > from) || this.covers(from, to)) return;
     if (this.thinned && from_m >= this.from_m && to_m <= this.to_m && to_m - from_m > (this.to_m - this.from_m) * 0.4) return;
     if (this.asked && from >= this.askedFrom_m && to <= this.askedTo_m) return;
+    if (this.stale && performance.now() - this.asked_ms < AGAIN_MS) return;
+    this.asked_ms = performance.now();
     const margin = (to_m - from_m) * MARGIN;
     const wantFrom = from_m - margin, wantTo = to_m + margin;
     this.asked?.abort();
@@ -56,9 +63,11 @@ export class SampleWindow {
     this.askedFrom_m = wantFrom;
     this.askedTo_m = wantTo;
     this.fetch(wantFrom, wantTo, asked.signal).then(
-      (frame) => {
+      ({ frame, oneOf }) => {
         if (this.asked !== asked) return;
         this.asked = null;
+        this.stale = false;
+        this.thinned = oneOf > 1;
         this.fill(frame, wantFrom, wantTo, way, begun_s);
         this.changed();
       },
@@ -74,14 +83,15 @@ export class SampleWindow {
     // Beyond the ends of the way there is nothing but what comes live.
     this.from_m = from_m <= way[0] ? -Infinity : from_m;
     this.to_m = to_m >= way[1] ? Infinity : to_m;
-    this.thinned = frame.count >= THINNED_FROM;
     this.count = this.uploaded = 0;
     this.add(frame, begun_s);
   }
 
   /** Adds live samples that lie in the window. */
   take(frame: Frame, begun_s: number): void {
-    if (!Number.isNaN(this.from_m)) this.add(frame, begun_s);
+    if (Number.isNaN(this.from_m)) return;
+    if (frame.count > WHOLE_LIVE) this.stale = true;
+    this.add(frame, begun_s);
   }
 
   private put(x: number, down: number, t_s: number, kind: number): void {

@@ -1,0 +1,31 @@
+import { describe, expect, it } from "vitest";
+import { HeadTurns } from "./turns";
+
+const at = (t_s: number, arc: number) => ({ t_s, x_m: 0, y_m: 0, z_m: 0, arc: arc - Math.floor(arc), outcome: 0 });
+
+describe("turns of a head", () => {
+  it("end after a whole round, over the seam too", () => {
+    const turns = new HeadTurns();
+    for (let n = 0; n <= 150; n += 1) turns.take(at(n * 0.05, 0.7 + n / 100));
+    // 0 to 99 in the first, 100 on in the second.
+    expect(turns.last.length).toBe(100);
+    expect(turns.present.length).toBe(51);
+    expect(turns.present[0]?.t_s).toBeCloseTo(5);
+  });
+  it("end where the head reverses, not at a jitter", () => {
+    const turns = new HeadTurns();
+    for (let n = 0; n < 30; n += 1) turns.take(at(n, 0.1 + n / 100));
+    turns.take(at(30, 0.38));
+    turns.take(at(31, 0.39));
+    expect(turns.last).toEqual([]);
+    for (let n = 0; n < 10; n += 1) turns.take(at(32 + n, 0.38 - n / 100));
+    expect(turns.last.length).toBeGreaterThan(30);
+    expect(turns.present.length).toBeLessThan(10);
+  });
+  it("begin anew after a jump in time", () => {
+    const turns = new HeadTurns();
+    for (let n = 0; n < 10; n += 1) turns.take(at(100 + n, n / 100));
+    turns.take(at(20, 0.5));
+    expect([turns.present.length, turns.last.length]).toEqual([1, 0]);
+  });
+});

@@ -1,0 +1,125 @@
+// The page with the program itself: HEADRACE_BIN names the binary. A simulated dive, its replay, and a rehearsal on real ports.
+import assert from "node:assert/strict";
+import { spawn } from "node:child_process";
+import { once } from "node:events";
+import { mkdtempSync, rmSync } from "node:fs";
+import { createServer } from "node:net";
+import { tmpdir } from "node:os";
+import { join } from "node:path";
+import { after, before, describe, it } from "node:test";
+import { fileURLToPath } from "node:url";
+import { browser, open } from "./browser.mjs";
+
+const BIN = process.env.HEADRACE_BIN;
+const SCENE = fileURLToPath(new URL("../../../../deploy/scenes/demo.toml", import.meta.url));
+const LONG = { timeout: 120_000 };
+
+async function freePort() {
+  const server = createServer();
+  server.listen(0, "127.0.0.1");
+  await once(server, "listening");
+  const { port } = server.address();
+  server.close();
+  await once(server, "close");
+  return port;
+}
+
+const running = new Set();
+/** Starts the program; with the address of its page once it has said so. */
+async function start(cwd, port, ...args) {
+  const child = spawn(BIN, [...args, `--page=127.0.0.1:${port}`], { cwd, stdio: ["ignore", "pipe", "pipe"] });
+  running.add(child);
+  child.once("exit", () => running.delete(child));
+  let said = "";
+  const told = new Promise((resolve, reject) => {
+    const take = (bytes) => { said += bytes; if (/page\s+http:\/\/127\.0\.0\.1:\d+/.test(said)) resolve(); };
+    child.stdout.on("data", take);
+    child.stderr.on("data", take);
+    child.once("exit", (code) => reject(new Error(`${args[0]} ended with ${code}: ${said}`)));
+  });
+  await told;
+  return { child, url: /http:\/\/127\.0\.0\.1:\d+/.exec(said)[0] };
+}
+async function stop(child, signal = "SIGKILL") {
+  if (child.exitCode !== null || child.signalCode !== null) return;
+  child.kill(signal);
+  await once(child, "exit");
+}
+
+describe("with the program", { skip: BIN ? false : "HEADRACE_BIN isn't set", concurrency: false }, () => {
+  let chromium, folder;
+  before(async () => { chromium = await browser(); folder = mkdtempSync(join(tmpdir(), "headrace-page-")); });
+  after(async () => {
+    for (const child of running) await stop(child);
+    await chromium?.close();
+    rmSync(folder, { recursive: true, force: true });
+  });
+
+  it("a dive too fast for a stretch raises one alert, acknowledged for all, in the log and its replay", async () => {
+    const out = join(folder, "demo");
+    const { child, url } = await start(folder, await freePort(), "demo", "--no-open", "--out", out, "--force", "--speed", "6x");
+    const one = await open(chromium, url), other = await open(chromium, url);
+    await one.page.locator('.condition[data-condition="good"]').waitFor(LONG);
+    assert.match(await one.page.locator(".most .value").innerText(), /0\.\d\d/);
+    assert.match(await one.page.locator(".why").innerText(), /slower helps/);
+    const missed = one.page.locator('.alert.open[data-kind="missed"]');
+    await missed.waitFor(LONG);
+    const number = await missed.first().getAttribute("data-number");
+    await other.page.locator(`.alert.open[data-number="${number}"]`).waitFor();
+    await one.page.keyboard.press("n");
+    await one.page.keyboard.type("by the page");
+    await one.page.keyboard.press("Enter");
+    await other.page.locator(".notes", { hasText: "by the page" }).waitFor();
+    await one.page.locator(`.alert[data-number="${number}"]`).getByRole("button", { name: /Ack alert/ }).click();
+    await other.page.locator(`.alert[data-number="${number}"]:not(.open)`, { hasText: "ack page" }).waitFor();
+    // One situation, one alert.
+    assert.equal(await other.page.locator('.alert[data-kind="missed"]').count(), 1);
+    await one.page.reload();
+    await one.page.locator(`.alert[data-number="${number}"]:not(.open)`, { hasText: "ack page" }).waitFor();
+    // Each only as far as the dive is not over.
+    if (child.exitCode === null) await Promise.race([once(child, "exit"), one.page.locator(".word", { hasText: "DIVE ENDED" }).waitFor(LONG)]);
+    assert.deepEqual([one.problems, other.problems], [[], []]);
+    await stop(child, "SIGINT");
+    await one.context.close();
+    await other.context.close();
+
+    const port = await freePort();
+    const replay = await start(folder, port, "replay", join(out, "dive.mcap"), "--speed", "8x");
+    const { page, context, problems } = await open(chromium, replay.url);
+    await page.locator(".replay").waitFor();
+    await page.getByLabel("Time of the dive").focus();
+    await page.keyboard.press("End");
+    await page.locator(`.alert[data-number="${number}"]:not(.open)`, { hasText: "ack page" }).waitFor(LONG);
+    await page.locator(".notes", { hasText: "by the page" }).waitFor();
+    assert.ok(await page.getByRole("button", { name: "Acknowledge all" }).isDisabled());
+    // The program dies and comes back: the page says so, and goes on by itself.
+    await stop(replay.child);
+    await page.locator(".word", { hasText: "NO CONNECTION" }).waitFor();
+    await start(folder, port, "replay", join(out, "dive.mcap"), "--speed", "8x");
+    await page.locator('.status .link:text("connected")').waitFor(LONG);
+    await page.locator(':root[data-old="false"]').waitFor(LONG);
+    assert.deepEqual(problems, []);
+    await context.close();
+  });
+
+  it("sensors that fall silent in a rehearsal show within 2 s of their silence", async () => {
+    const out = join(folder, "rehearsal");
+    const emulator = spawn(BIN, ["emulate", SCENE, "--out", out], { stdio: ["ignore", "pipe", "ignore"] });
+    running.add(emulator);
+    const vehicle = join(out, "vehicle.toml");
+    // Its last line names the devices' ports: all are open then, and the vehicle file is written.
+    await once(emulator.stdout, "data");
+    const { child, url } = await start(folder, await freePort(), "run", vehicle);
+    const { page, context, problems } = await open(chromium, url);
+    await page.waitForFunction(() => document.querySelectorAll('.sensor[data-state="ok"]').length >= 8, null, LONG);
+    await stop(emulator);
+    const killed = Date.now();
+    await page.locator('.sensor[data-state="silent"]').first().waitFor();
+    console.log(`# silent sensor on the page ${((Date.now() - killed) / 1000).toFixed(1)} s after it was killed (2 s of silence make it so)`);
+    await page.locator(".word", { hasText: /OLD|NO SONAR|NO POSITION/ }).waitFor();
+    assert.match(await page.locator('.sensor[data-state="silent"]').first().innerText(), /silent \d+\.\d s/);
+    assert.deepEqual(problems, []);
+    await stop(child, "SIGINT");
+    await context.close();
+  });
+});
