@@ -4,7 +4,7 @@ use serde::{Deserialize, Serialize};
 
 use super::timer::{self, Due};
 use super::{AlertList, AlertState, Figures, ListKind, Priority, Telling};
-use crate::live_state::{Condition, LiveState, PositionDoubt, PositionState, SensorState};
+use crate::live_state::{Condition, LiveState, OLD_AFTER, PositionDoubt, PositionState, SensorState};
 use crate::pilot_text::AdviceFigures;
 use headrace_coverage::{Stretch, Unsure};
 use headrace_fusion::filter::suspicion::SettingDoubt;
@@ -178,14 +178,21 @@ impl AlertList {
     fn take_sensors(&mut self, at: MonoNs, state: &LiveState, to: &mut Telling<'_>) {
         let is_late = self.is_late(at);
         let sources = || (0_u16..).take(usize::from(state.sources));
-        let heard = |source: u16| state.age_of(source.into());
-        let is_silent = |source: u16| state.silent().any(|silent| silent == usize::from(source));
+        let heard = |source: u16| state.heard.get(usize::from(source)).copied().flatten();
+        let is_silent = |source: u16| {
+            matches!(state.sensor(source.into()), SensorState::Never | SensorState::Silent)
+        };
         // Nothing from anybody is one situation, not one for each.
         let all_silent = state.sources > 0 && sources().all(is_silent);
         self.observe(at, &Seen::of(ListKind::NoData, all_silent, Figures::None), to);
+        // Silent is who says nothing while another one speaks.
+        let newest = sources().filter_map(heard).max();
         for source in sources() {
-            let is_due = heard(source).is_some() || is_late;
-            let holds = is_silent(source) && is_due && !all_silent;
+            let holds = match (heard(source), newest) {
+                (Some(heard), Some(newest)) => newest.since(heard).0 > OLD_AFTER.0,
+                (None, _) => is_late && !all_silent,
+                (Some(_), None) => false,
+            };
             let (kind, source) = (ListKind::SensorSilent, Some(SourceId(source)));
             self.observe(at, &Seen { kind, source, holds, figures: Figures::None }, to);
         }
