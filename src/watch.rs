@@ -96,9 +96,8 @@ impl Watch {
             return;
         }
         let at = match notice {
-            Notice::Section { at, .. } | Notice::Run { at, .. } => *at,
+            Notice::Section { at, .. } | Notice::Run { at, .. } | Notice::Listed { at, .. } => *at,
             Notice::Advice(entry) => entry.at,
-            Notice::Listed { at, .. } => *at,
             Notice::Note(note) => note.at,
             Notice::Alert(kind, source) => dive.alerts().get(*kind, *source).map_or(MonoNs(0), |a| a.since),
         };

@@ -2,10 +2,10 @@
 
 use super::alert_list::{AlertChange, ListedAlertJson};
 use super::live_state::{Condition, Lamp, LiveMetres, LiveState, PositionDoubt};
-use super::pilot_text::{AdviceFigures, actions_text, advice_text, cause_text, station};
-use super::telling::{Told, UnsureStretch};
-use headrace_coverage::{Action, Unsure};
-use headrace_fusion::NoFix;
+use super::pilot_text::{AdviceFigures, actions_text, advice_text, cause_text, no_position_text, station};
+use super::telling::Told;
+pub use super::unsure_stretch::{helps_text, unsure_text};
+use headrace_coverage::Action;
 use headrace_geometry::time::DurNs;
 use headrace_geometry::tunnel::Profile;
 
@@ -127,14 +127,6 @@ fn waiting_text(state: &LiveState) -> &'static str {
 fn age_text(age: DurNs) -> String {
     let seconds = age.as_secs_f64();
     if seconds < 100.0 { format!("{seconds:.0} s") } else { format!("{:.0} min", seconds / 60.0) }
-}
-
-pub(super) fn no_position_text(lacking: NoFix) -> &'static str {
-    match lacking {
-        NoFix::Heading => "NO POSITION: no heading",
-        NoFix::Chainage => "NO POSITION: no chainage",
-        NoFix::Section => "NO POSITION: no place across",
-    }
 }
 
 fn figures(state: &LiveState) -> Option<AdviceFigures> {
@@ -283,36 +275,6 @@ impl Told {
             AlertChange::Cleared => is_told_once && alert.rectified_s == alert.cleared_s,
             AlertChange::Silenced => false,
         }
-    }
-}
-
-/// Why nothing can be said of a stretch, with its figures.
-pub fn unsure_text(stretch: &UnsureStretch) -> String {
-    match stretch.why {
-        Unsure::NotInspected => format!("{:.2} m not seen from both sides", stretch.metres_m),
-        Unsure::Position => {
-            format!("hole {:.2} m, give or take {:.2} m", stretch.hole_m, stretch.hole_error_m)
-        }
-        Unsure::SeveralStretches => "position lost or doubted between passes".to_owned(),
-        Unsure::DoubtfulReturns => "more doubtful returns than wall".to_owned(),
-        Unsure::DistrustedHead => "seen by a head that isn't believed".to_owned(),
-        Unsure::ContradictedProfile => "the wall isn't where the design says".to_owned(),
-        Unsure::OtherSize => "the cross-section isn't the design's".to_owned(),
-        Unsure::NoWall => "a declared opening, no wall".to_owned(),
-    }
-}
-
-/// What would help; empty where nothing does.
-pub fn helps_text(why: Unsure) -> &'static str {
-    match why {
-        Unsure::NotInspected => "pass it whole to inspect it",
-        Unsure::Position => "slower, or again with a surer position",
-        Unsure::SeveralStretches => "pass it again in one go",
-        Unsure::DoubtfulReturns => "pass it again in clear water",
-        Unsure::DistrustedHead => "pass it again without that head",
-        Unsure::ContradictedProfile => "check profile, sound speed and tether zero",
-        Unsure::OtherSize => "check profile and sound speed",
-        Unsure::NoWall => "",
     }
 }
 

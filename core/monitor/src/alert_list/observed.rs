@@ -179,9 +179,8 @@ impl AlertList {
         let is_late = self.is_late(at);
         let sources = || (0_u16..).take(usize::from(state.sources));
         let heard = |source: u16| state.heard.get(usize::from(source)).copied().flatten();
-        let is_silent = |source: u16| {
-            matches!(state.sensor(source.into()), SensorState::Never | SensorState::Silent)
-        };
+        let is_silent =
+            |source: u16| matches!(state.sensor(source.into()), SensorState::Never | SensorState::Silent);
         // Nothing from anybody is one situation, not one for each.
         let all_silent = state.sources > 0 && sources().all(is_silent);
         self.observe(at, &Seen::of(ListKind::NoData, all_silent, Figures::None), to);

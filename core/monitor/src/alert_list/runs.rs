@@ -81,7 +81,7 @@ impl AlertList {
                 && alert.is_live()
                 && alert.stretch.is_some_and(|(of, to)| of <= from && until <= to)
         };
-        let number = if let Some(known) = self.alerts.iter_mut().filter(|alert| has(&&**alert)).next_back() {
+        let number = if let Some(known) = self.alerts.iter_mut().rfind(|alert| has(&&**alert)) {
             known.figures = figures;
             known.open_runs += 1;
             let (number, state) = (known.number, known.state);

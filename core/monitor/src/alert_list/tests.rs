@@ -107,14 +107,15 @@ impl Oracle {
         let state = self.all.last().map_or("none", |last| last.1);
         let (on, off) = self.spells_ms(hold_ms);
         match state {
-            "active unacknowledged" | "active acknowledged" | "active caution" => {
-                if off.is_some_and(|off| off >= off_ms) {
-                    // What ends begins anew.
-                    self.history.clear();
-                    self.all.last_mut().unwrap().1 =
-                        if state == "active unacknowledged" { "rectified unacknowledged" } else { "cleared" };
-                }
+            "active unacknowledged" | "active acknowledged" | "active caution"
+                if off.is_some_and(|off| off >= off_ms) =>
+            {
+                // What ends begins anew.
+                self.history.clear();
+                self.all.last_mut().unwrap().1 =
+                    if state == "active unacknowledged" { "rectified unacknowledged" } else { "cleared" };
             }
+            "active unacknowledged" | "active acknowledged" | "active caution" => {}
             _ if holds && on.is_some_and(|on| on >= hold_ms) => {
                 let active = if self.is_caution { "active caution" } else { "active unacknowledged" };
                 if state == "rectified unacknowledged" {
@@ -196,7 +197,9 @@ proptest! {
                 }
                 Happens::Silence => {
                     bench.with(|list, to| list.silence(at, to));
-                    oracles.iter_mut().for_each(|oracle| oracle.silence(now));
+                    for oracle in &mut oracles {
+                        oracle.silence(now);
+                    }
                 }
                 Happens::Snapshot => bench = bench.restored(),
             }
