@@ -7,9 +7,11 @@ use std::io::{BufWriter, Write};
 use std::path::PathBuf;
 
 use headrace_geometry::time::{DurNs, MonoNs};
+use headrace_monitor::console::{CONSOLE_ID, Command};
 use headrace_replay::drive::Pace;
 use headrace_replay::log::{
-    DiveLog, LogHeader, LogInfo, Trim as Work, Trimmed, files_digest, files_of, trim as rewrite,
+    DiveLog, LogHeader, LogInfo, ResultChannel, Trim as Work, Trimmed, files_digest, files_of,
+    trim as rewrite,
 };
 use headrace_replay::player::{Player, seconds};
 use headrace_replay::record::result_channels;
@@ -145,6 +147,12 @@ fn what_is_done(args: &Trim, files: &[PathBuf], spans: &[(MonoNs, MonoNs)]) -> R
     Ok(said)
 }
 
+/// Channels of results that the new log may have: those of alerts and notes name people.
+fn kept_results(args: &Trim) -> Vec<ResultChannel> {
+    let is_kept = |channel: &ResultChannel| !args.anonymise || !channel.topic.ends_with("/alerts");
+    result_channels().into_iter().filter(is_kept).collect()
+}
+
 /// Writes the new log; deletes it again if that fails.
 fn write(
     args: &Trim,
@@ -164,6 +172,11 @@ fn write(
     let wanted = [(args.drop_echoes, Needless::Echoes), (args.anonymise, Needless::Identity)];
     let mut between = Vec::new();
     let mut change = |source: u16, bytes: &[u8], shorter: &mut Vec<u8>| {
+        if args.anonymise && sources.get(usize::from(source)).is_some_and(|source| source.id == CONSOLE_ID) {
+            *shorter = Command::parse(bytes)
+                .map_or(Vec::new(), |command| command.anonymous().to_json().into_bytes());
+            return true;
+        }
         let Some(device) = device(source) else { return false };
         let mut changed = false;
         for (_, what) in wanted.iter().filter(|(wanted, _)| *wanted) {
@@ -185,7 +198,7 @@ fn write(
     outputs::make_way(&args.output)?;
     let file = OpenOptions::new().write(true).create_new(true).open(&args.output).map_err(failed)?;
     let mut writer = BufWriter::new(Writing::new(&file, files::bytes(files)));
-    let written = rewrite(&mut || DiveLog::open(files), &mut writer, &mut work, &result_channels())
+    let written = rewrite(&mut || DiveLog::open(files), &mut writer, &mut work, &kept_results(args))
         .map_err(Failure::from)
         .and_then(|trimmed| writer.flush().and_then(|()| file.sync_all()).map(|()| trimmed).map_err(failed));
     if written.is_err() {

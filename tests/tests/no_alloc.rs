@@ -82,6 +82,17 @@ const SCENE: &str = "vehicle = \"vita2-4.toml\"\n[trajectory]\n
 [[trajectory.legs]]\ndistance_m = 200\nspeed_mps = 0.35\n
 [[effects.device_faults]]\nkind = \"die\"\nsensors = [\"sonar_0\", \"sonar_1\", \"sonar_2\", \"sonar_3\"]\nfrom_s = 820\nfor_s = 40\n";
 
+/// What an operator does, one thing a second; the last is no command.
+const COMMANDS: [&str; 7] = [
+    r#"{"do":"silence","by":"AB"}"#,
+    r#"{"do":"note","text":"rubble \u006ceft","by":"AB"}"#,
+    r#"{"do":"limits","battery_pct":19.5}"#,
+    r#"{"do":"recording","fails":true}"#,
+    r#"{"do":"acknowledge","alert":0,"by":"AB"}"#,
+    r#"{"do":"recording","fails":false}"#,
+    r#"{"do":"time","by":"AB"}"#,
+];
+
 #[test]
 fn a_million_packets_without_one_allocation() {
     assert!(allocations(|| drop(vec![1])) > 0, "the counter counts");
@@ -115,6 +126,7 @@ fn a_million_packets_without_one_allocation() {
     let mut dive = app.arm(Box::new(filter.with_journal(journal))).unwrap();
     let mut ports: Vec<_> =
         (0..vehicle.sensors.len()).map(|source| dive.take_port(source).unwrap()).collect();
+    let mut console = dive.take_console().unwrap();
 
     let mut simulation = Simulation::new(&scene).unwrap();
     let mut until = START;
@@ -126,6 +138,10 @@ fn a_million_packets_without_one_allocation() {
             if message.direction == Direction::Received {
                 ports[usize::from(message.source)].send(message.at, message.bytes).unwrap();
             }
+        }
+        if until.0 % 1_000_000_000 == 0 {
+            let command = COMMANDS[usize::try_from(until.0 / 1_000_000_000).unwrap() % COMMANDS.len()];
+            console.send(until, command.as_bytes()).unwrap();
         }
         while dive.has_waiting() {
             let mut consumed = 0;
@@ -140,6 +156,9 @@ fn a_million_packets_without_one_allocation() {
         assert!(simulation.peek_message().is_some(), "the scene is too short: {packets} packets");
     }
     assert_eq!(allocated, 0, "allocator calls in {packets} packets");
+    let (list, counts) = (dive.alert_list(), dive.console_counts());
+    assert!(list.raised() > 5 && dive.notes().iter().count() > 5, "{} alerts", list.raised());
+    assert!(list.iter().any(|alert| alert.acknowledged.is_some()) && counts.invalid > 5, "{counts:?}");
     assert!(notices.dropped() > 0, "the notice queue has overflowed");
     assert!(steps.dropped() > 0, "the journal has overflowed");
     drop(dive);

@@ -94,7 +94,6 @@ pub struct Acknowledgement {
 
 /// What the words of an alert need.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-#[expect(clippy::large_enum_variant, reason = "copied into room that is there already; a box would allocate")]
 pub enum Figures {
     /// Nothing.
     None,

@@ -7,7 +7,6 @@ use bevy_ecs::schedule::{IntoScheduleConfigs, Schedule};
 use bevy_ecs::system::ScheduleSystem;
 use bevy_ecs::world::World;
 
-use super::console::CONSOLE_ID;
 use super::entities::{HeadSpecification, Mounted, SensorDecoder, SensorHealth};
 use super::error::PluginError;
 use super::loop_snapshot::StateParts;
@@ -18,7 +17,7 @@ use super::stages;
 use headrace_sensor::device::{Decoder, Device, SensorInfo, SensorSpec};
 use headrace_sensor::reading::{MAX_SOURCES, SourceId};
 use headrace_snapshot::Stateful;
-use headrace_vehicle::Mission;
+use headrace_vehicle::{CONSOLE_ID, Mission};
 
 /// A source of bytes, as a plugin registers it.
 pub struct SourceSpec {

@@ -20,8 +20,7 @@ pub use packets::ConsoleCounts;
 pub(super) use packets::{Commands, Console, ReceivedCommand};
 pub use text::ShortText;
 
-/// Id of the source, also of its channel in the log; no sensor may have it.
-pub const CONSOLE_ID: &str = "console";
+pub use headrace_vehicle::CONSOLE_ID;
 /// Commands that wait for the loop at most.
 const MOST_WAITING: usize = 256;
 /// While no sensor speaks, the time is told this often, so that what grows old is found.

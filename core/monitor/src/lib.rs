@@ -51,6 +51,7 @@ pub mod run;
 pub mod stage;
 mod stages;
 pub mod telling;
+pub mod unsure_stretch;
 pub mod what_if;
 
 pub use app::{App, Plugin, SourceInfo, SourceSpec};

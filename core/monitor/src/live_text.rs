@@ -1,10 +1,11 @@
 //! Words for what is told live: the place first, then what, then what to do. Terminals break them to their width.
 
+use super::alert_list::{AlertChange, ListedAlertJson};
 use super::live_state::{Condition, Lamp, LiveMetres, LiveState, PositionDoubt};
-use super::pilot_text::{AdviceFigures, actions_text, advice_text, cause_text, station};
-use super::telling::{Told, UnsureStretch};
-use headrace_coverage::{Action, Unsure};
-use headrace_fusion::NoFix;
+use super::pilot_text::{AdviceFigures, actions_text, advice_text, cause_text, no_position_text, station};
+use super::telling::Told;
+pub use super::unsure_stretch::{helps_text, unsure_text};
+use headrace_coverage::Action;
 use headrace_geometry::time::DurNs;
 use headrace_geometry::tunnel::Profile;
 
@@ -128,14 +129,6 @@ fn age_text(age: DurNs) -> String {
     if seconds < 100.0 { format!("{seconds:.0} s") } else { format!("{:.0} min", seconds / 60.0) }
 }
 
-pub(super) fn no_position_text(lacking: NoFix) -> &'static str {
-    match lacking {
-        NoFix::Heading => "NO POSITION: no heading",
-        NoFix::Chainage => "NO POSITION: no chainage",
-        NoFix::Section => "NO POSITION: no place across",
-    }
-}
-
 fn figures(state: &LiveState) -> Option<AdviceFigures> {
     state.advice.as_ref().map(|advice| AdviceFigures::of(advice, state.speed_mps.unwrap_or(0.0)))
 }
@@ -235,39 +228,53 @@ pub fn told_line(told: &Told, profile: &Profile) -> PilotLine {
             let said = text.strip_prefix(&format!("ch {place}")).unwrap_or(text).trim_start();
             line(place, format!("ALERT: {said}"), String::new(), Some(Lamp::Red))
         }
+        Told::AlertChange { change, alert } => alert_line(*change, alert),
+        Told::Note(note) => {
+            let what = if note.text.is_empty() { "mark".to_owned() } else { format!("note: {}", note.text) };
+            let by = if note.by.is_empty() { String::new() } else { format!(" ({})", note.by) };
+            let place = note.station.clone().unwrap_or_else(|| "-+---.--".to_owned());
+            line(place, format!("{what}{by}"), String::new(), None)
+        }
         Told::Way { from_m, to_m, metres } => {
             line(to(*from_m, *to_m), format!("WAY: {}", metres_text(metres)), String::new(), None)
         }
     }
 }
 
-/// Why nothing can be said of a stretch, with its figures.
-pub fn unsure_text(stretch: &UnsureStretch) -> String {
-    match stretch.why {
-        Unsure::NotInspected => format!("{:.2} m not seen from both sides", stretch.metres_m),
-        Unsure::Position => {
-            format!("hole {:.2} m, give or take {:.2} m", stretch.hole_m, stretch.hole_error_m)
-        }
-        Unsure::SeveralStretches => "position lost or doubted between passes".to_owned(),
-        Unsure::DoubtfulReturns => "more doubtful returns than wall".to_owned(),
-        Unsure::DistrustedHead => "seen by a head that isn't believed".to_owned(),
-        Unsure::ContradictedProfile => "the wall isn't where the design says".to_owned(),
-        Unsure::OtherSize => "the cross-section isn't the design's".to_owned(),
-        Unsure::NoWall => "a declared opening, no wall".to_owned(),
+/// Line of a change of an alert.
+fn alert_line(change: AlertChange, alert: &ListedAlertJson) -> PilotLine {
+    let by = match (&alert.acknowledged, change) {
+        (Some(by), AlertChange::Acknowledged) if !by.by.is_empty() => format!(" by {}", by.by),
+        _ => String::new(),
+    };
+    let has_advice = matches!(change, AlertChange::Raised | AlertChange::Changed);
+    PilotLine {
+        place: format!("ALERT {}", alert.number),
+        what: vec![format!("{}{by}: {}", change.as_str(), alert.text)],
+        action: if has_advice { alert.advice.clone() } else { String::new() },
+        lamp: (change == AlertChange::Raised).then_some(Lamp::Amber),
+        ..PilotLine::default()
     }
 }
 
-/// What would help; empty where nothing does.
-pub fn helps_text(why: Unsure) -> &'static str {
-    match why {
-        Unsure::NotInspected => "pass it whole to inspect it",
-        Unsure::Position => "slower, or again with a surer position",
-        Unsure::SeveralStretches => "pass it again in one go",
-        Unsure::DoubtfulReturns => "pass it again in clear water",
-        Unsure::DistrustedHead => "pass it again without that head",
-        Unsure::ContradictedProfile => "check profile, sound speed and tether zero",
-        Unsure::OtherSize => "check profile and sound speed",
-        Unsure::NoWall => "",
+impl Told {
+    /// Whether a line of it adds something to the status and the other lines: of an alert that somebody has acknowledged it, that
+    /// it is over where nothing else tells that, and what is left.
+    pub fn adds_line(&self) -> bool {
+        let Self::AlertChange { change, alert } = self else { return true };
+        let is_left = matches!(alert.kind, "cable_left" | "time_left" | "battery_left");
+        let is_told_once = matches!(
+            alert.kind,
+            "head_scattered" | "head_constant" | "head_outvoted" | "cable_doubted" | "setting_doubted"
+        );
+        match change {
+            AlertChange::Acknowledged => true,
+            AlertChange::Raised | AlertChange::Changed => is_left,
+            // Of what nobody has acknowledged the end is told when it comes, not when it is acknowledged.
+            AlertChange::Rectified => is_told_once,
+            AlertChange::Cleared => is_told_once && alert.rectified_s == alert.cleared_s,
+            AlertChange::Silenced => false,
+        }
     }
 }
 

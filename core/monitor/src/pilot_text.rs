@@ -6,6 +6,7 @@ use super::alerts::AlertKind;
 use serde::{Deserialize, Serialize};
 
 use headrace_coverage::{Action, Cause, Causes, Evidence};
+use headrace_fusion::NoFix;
 use headrace_fusion::filter::suspicion::{Setting, SettingDoubt};
 use headrace_geometry::tunnel::Profile;
 use headrace_sampling::advice::{Advice, Reason, Remedy};
@@ -149,6 +150,15 @@ fn remedy_text(remedy: Option<Remedy>) -> String {
         Some(Remedy::Centre) => "go to the middle of the tunnel".to_owned(),
         Some(Remedy::Mode(mode)) => format!("set the heads to {}", mode.as_str().to_uppercase()),
         None => "no mode meets the target here".to_owned(),
+    }
+}
+
+/// What is lacking for a position.
+pub(super) fn no_position_text(lacking: NoFix) -> &'static str {
+    match lacking {
+        NoFix::Heading => "NO POSITION: no heading",
+        NoFix::Chainage => "NO POSITION: no chainage",
+        NoFix::Section => "NO POSITION: no place across",
     }
 }
 

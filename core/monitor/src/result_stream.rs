@@ -47,6 +47,34 @@ pub enum WordKind {
     Number,
 }
 
+/// Words of a change of an alert.
+const ALERT_CHANGE: [(&str, WordKind); 16] = [
+    ("at_ns", WordKind::Integer),
+    ("number", WordKind::Integer),
+    ("change", WordKind::Integer),
+    ("kind", WordKind::Integer),
+    ("priority", WordKind::Integer),
+    ("state", WordKind::Integer),
+    ("source", WordKind::Integer),
+    ("count", WordKind::Integer),
+    ("acknowledged_ns", WordKind::Integer),
+    ("by", WordKind::Integer),
+    ("by_rest", WordKind::Integer),
+    ("silenced_until_ns", WordKind::Integer),
+    ("from", WordKind::Integer),
+    ("to", WordKind::Integer),
+    ("x_m", WordKind::Number),
+    ("figure", WordKind::Number),
+];
+/// Words of a note; its text follows.
+const NOTE: [(&str, WordKind); 5] = [
+    ("at_ns", WordKind::Integer),
+    ("number", WordKind::Integer),
+    ("chainage_m", WordKind::Number),
+    ("by", WordKind::Integer),
+    ("by_rest", WordKind::Integer),
+];
+
 impl RecordKind {
     const ALL: [Self; 12] = [
         Self::Sample,
@@ -179,31 +207,8 @@ impl RecordKind {
                 // Only of a head.
                 ("source", Integer),
             ],
-            Self::AlertChange => &[
-                ("at_ns", Integer),
-                ("number", Integer),
-                ("change", Integer),
-                ("kind", Integer),
-                ("priority", Integer),
-                ("state", Integer),
-                ("source", Integer),
-                ("count", Integer),
-                ("acknowledged_ns", Integer),
-                ("by", Integer),
-                ("by_rest", Integer),
-                ("silenced_until_ns", Integer),
-                ("from", Integer),
-                ("to", Integer),
-                ("x_m", Number),
-                ("figure", Number),
-            ],
-            Self::Note => &[
-                ("at_ns", Integer),
-                ("number", Integer),
-                ("chainage_m", Number),
-                ("by", Integer),
-                ("by_rest", Integer),
-            ],
+            Self::AlertChange => &ALERT_CHANGE,
+            Self::Note => &NOTE,
         };
         // Advice continues with the speeds that other modes would allow, the live state with each source's last reading, a
         // note with its text.

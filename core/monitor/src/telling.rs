@@ -3,10 +3,12 @@
 
 use serde::Serialize;
 
+use super::alert_list::{AlertChange, ListedAlertJson, NoteJson};
 use super::live_state::{LiveMetres, LiveState};
 use super::messages::Notice;
 use super::pilot_text::{Missed, alert_text, setting_text};
 use super::run::Loop;
+pub use super::unsure_stretch::UnsureStretch;
 use headrace_coverage::{Cause, Run, RunChange, RunId, Section, Sections, Stretch, Unsure, Verdict};
 use headrace_geometry::math::TAU;
 use headrace_geometry::time::{DurNs, MonoNs};
@@ -65,6 +67,15 @@ pub enum Told {
         /// Its text.
         text: String,
     },
+    /// An alert of the list has changed.
+    AlertChange {
+        /// Kind of change.
+        change: AlertChange,
+        /// The alert, as it was then.
+        alert: Box<ListedAlertJson>,
+    },
+    /// Somebody has put down a note.
+    Note(NoteJson),
     /// The way so far.
     Way {
         /// Where it begins.
@@ -74,46 +85,6 @@ pub enum Told {
         /// Metres by state.
         metres: LiveMetres,
     },
-}
-
-/// A stretch of which neither a pass nor a fail can be told.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct UnsureStretch {
-    /// Why.
-    pub why: Unsure,
-    /// Where it begins, m.
-    pub from_m: f64,
-    /// Where it ends, m.
-    pub to_m: f64,
-    /// Its metres that are unsure.
-    pub metres_m: f64,
-    /// Its largest hole, m.
-    pub hole_m: f64,
-    /// Standard deviation of that hole, m.
-    pub hole_sd_m: f64,
-    /// By how much the hole may be larger or smaller: the confidence times its standard deviation, m.
-    pub hole_error_m: f64,
-}
-
-impl UnsureStretch {
-    /// From a stretch of sections.
-    pub fn of(stretch: &Stretch, sections: &Sections) -> Self {
-        Self::from_sections(stretch, sections.section_m(), sections.confidence_sd())
-    }
-
-    /// The same with the length of a section, m, and the confidence, standard deviations.
-    pub(super) fn from_sections(stretch: &Stretch, section_m: f64, confidence_sd: f64) -> Self {
-        let [hole_m, hole_sd_m] = stretch.hole_m;
-        Self {
-            why: stretch.why,
-            from_m: stretch.from as f64 * section_m,
-            to_m: stretch.to as f64 * section_m,
-            metres_m: f64::from(stretch.sections) * section_m,
-            hole_m,
-            hole_sd_m,
-            hole_error_m: confidence_sd * hole_sd_m,
-        }
-    }
 }
 
 /// Makes what is told of the loop's notices.
@@ -139,7 +110,12 @@ impl Teller {
     /// Takes a notice; `tell` gets what it means.
     pub fn hear(&mut self, notice: &Notice, dive: &Loop, tell: &mut dyn FnMut(Told)) {
         match notice {
-            Notice::Advice(_) | Notice::Listed { .. } | Notice::Note(_) => {}
+            Notice::Advice(_) => {}
+            Notice::Listed { change, at, alert } => {
+                let alert = Box::new(alert.json(&dive.surroundings(), *at));
+                tell(Told::AlertChange { change: *change, alert });
+            }
+            Notice::Note(note) => tell(Told::Note(note.into())),
             Notice::Section { section, .. } => {
                 let sections = &dive.coverage().sections;
                 self.close_run_at(*section, sections, tell);

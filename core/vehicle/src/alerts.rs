@@ -133,3 +133,47 @@ impl LimitsConfig {
         Ok(Self { cable_m, dive_time: dive_min.map(|min| DurNs::from_secs_f64(min * 60.0)) })
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use headrace_config::Document;
+
+    fn timing(text: &str) -> Result<AlertTiming, String> {
+        let section = Document::new("vehicle.toml", text).root().map_err(|error| error.to_string())?;
+        AlertTiming::parse(&section).map_err(|error| error.to_string())
+    }
+
+    #[test]
+    fn a_class_is_set_by_its_name_and_the_others_stay() {
+        let all = timing("speed.hold_s = 2.5\n[position]\noff_s = 0\n").unwrap();
+        let usual = AlertTiming::default();
+        let speed = ClassTiming { hold: DurNs(2_500_000_000), ..usual.of(AlertClass::Speed) };
+        let position = ClassTiming { off: DurNs(0), ..usual.of(AlertClass::Position) };
+        assert_eq!((all.of(AlertClass::Speed), all.of(AlertClass::Position)), (speed, position));
+        for class in AlertClass::ALL {
+            let (now, before) = (all.of(class), usual.of(class));
+            assert_eq!(now == before, !matches!(class, AlertClass::Speed | AlertClass::Position));
+        }
+        for wrong in
+            ["sonar.hold_s = 1", "speed.hold_s = -1", "speed.off_s = 601", "speed.off = 1", "hold_s = 1"]
+        {
+            assert!(timing(wrong).is_err(), "{wrong}");
+        }
+    }
+
+    #[test]
+    fn limits_are_metres_and_minutes() {
+        let limits = |text: &str| {
+            let section = Document::new("vehicle.toml", text).root().unwrap();
+            LimitsConfig::parse(&section).map_err(|error| error.to_string())
+        };
+        let dive_time = Some(DurNs(5_400_000_000_000));
+        assert_eq!(
+            limits("cable_m = 300\ndive_min = 90"),
+            Ok(LimitsConfig { cable_m: Some(300.0), dive_time })
+        );
+        assert_eq!(limits(""), Ok(LimitsConfig::default()));
+        assert!(limits("cable_m = 0").is_err() && limits("dive_min = \"90\"").is_err());
+    }
+}

@@ -33,5 +33,6 @@ pub use coverage::CoverageConfig;
 pub use findings::{Finding, Grade};
 pub use mission::Mission;
 pub use navigation::NavigationConfig;
+pub use sensors::CONSOLE_ID;
 pub use tunnel::TunnelConfig;
 pub use vehicle::{VehicleConfig, WaterConfig};

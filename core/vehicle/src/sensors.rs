@@ -81,11 +81,17 @@ fn parse_sensor(
     id.map(|_| (config, device))
 }
 
+/// Id of the operator's input, which is recorded like a sensor.
+pub const CONSOLE_ID: &str = "console";
+
 /// What is wrong with an id.
 fn id_problem(id: &str, ids: &[String]) -> Option<&'static str> {
     let simple = |c: char| c.is_ascii_alphanumeric() || c == '_' || c == '-';
     if id.is_empty() || id.len() > 32 || !id.chars().all(simple) {
         return Some("must be 1 to 32 letters, digits, _ or -");
+    }
+    if id == CONSOLE_ID {
+        return Some("is kept for the operator's input; choose another id");
     }
     ids.iter().any(|other| other == id).then_some("is the id of an earlier sensor; ids must differ")
 }

@@ -72,7 +72,7 @@ fn a_wrong_vehicle_file_is_refused_with_file_line_key_value_and_what_is_allowed(
     table missing
         headrace: vehicle.toml:1: tunnel: is missing
     unknown key
-        headrace: vehicle.toml:3: colour: is not a key here; known are name, target_m, section_m, dive_hours, tunnel, water, coverage, openings, hull, sensors, navigation, heads
+        headrace: vehicle.toml:3: colour: is not a key here; known are name, target_m, section_m, dive_hours, tunnel, water, coverage, openings, hull, sensors, navigation, heads, alerts, limits
     unknown key in a table
         headrace: vehicle.toml:11: water.salt: is not a key here; known are sound_speed_mps, density_kgpm3, gravity_mps2, surface_pressure_pa, surface_above_floor_m, sound_speed_from
     unknown key of a sensor

@@ -2,6 +2,7 @@
 
 #![allow(clippy::unwrap_used, clippy::panic, reason = "a test stops at what it can't do")]
 
+mod alerts;
 mod determinism;
 #[cfg(target_os = "linux")]
 mod faults;

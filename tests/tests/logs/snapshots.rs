@@ -15,6 +15,16 @@ struct Packet {
     bytes: Vec<u8>,
 }
 
+const COMMANDS: [&str; 7] = [
+    r#"{"do":"acknowledge","alert":0,"by":"AB"}"#,
+    r#"{"do":"silence","by":"AB"}"#,
+    r#"{"do":"note","text":"rubble left","by":"AB"}"#,
+    r#"{"do":"recording","fails":true}"#,
+    r#"{"do":"limits","battery_pct":9.5}"#,
+    r#"{"do":"recording","fails":false}"#,
+    r#"{"do":"nothing"}"#,
+];
+
 /// All that a scene's devices send, every third packet of a stream of bytes cut in two: frames are open at any moment.
 fn packets(scene: &Scene) -> Vec<Packet> {
     let mut simulation = Simulation::new(scene).unwrap();
@@ -30,6 +40,11 @@ fn packets(scene: &Scene) -> Vec<Packet> {
         for bytes in [&bytes[..cut], &bytes[cut..]].into_iter().filter(|bytes| !bytes.is_empty()) {
             all.push(Packet { source, at, bytes: bytes.to_vec() });
         }
+        // An operator at work.
+        if all.len() % 97 == 0 {
+            let command = COMMANDS[all.len() / 97 % COMMANDS.len()].as_bytes().to_vec();
+            all.push(Packet { source: scene.vehicle.sensors.len(), at, bytes: command });
+        }
     }
     all
 }
@@ -40,7 +55,9 @@ fn armed(vehicle: &VehicleConfig) -> (Loop, Vec<Port>) {
         app.add_device(sensor.as_ref()).unwrap();
     }
     let mut dive = app.arm(vehicle.navigation()).unwrap();
-    let ports = (0..vehicle.sensors.len()).map(|source| dive.take_port(source).unwrap()).collect();
+    let mut ports: Vec<Port> =
+        (0..vehicle.sensors.len()).map(|source| dive.take_port(source).unwrap()).collect();
+    ports.push(dive.take_console().unwrap());
     (dive, ports)
 }
 

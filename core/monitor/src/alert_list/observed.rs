@@ -4,7 +4,7 @@ use serde::{Deserialize, Serialize};
 
 use super::timer::{self, Due};
 use super::{AlertList, AlertState, Figures, ListKind, Priority, Telling};
-use crate::live_state::{Condition, LiveState, PositionDoubt, PositionState, SensorState};
+use crate::live_state::{Condition, LiveState, OLD_AFTER, PositionDoubt, PositionState, SensorState};
 use crate::pilot_text::AdviceFigures;
 use headrace_coverage::{Stretch, Unsure};
 use headrace_fusion::filter::suspicion::SettingDoubt;
@@ -26,6 +26,7 @@ const MORE_PCT: f64 = 2.0;
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub(super) struct Had {
     position: bool,
+    sure_position: bool,
     sonar: bool,
     turning: u64,
     /// The stretch of which nothing could be said, and when it last grew.
@@ -41,15 +42,15 @@ pub(crate) struct Beat<'a> {
 }
 
 /// Something that may hold.
-struct Seen {
-    kind: ListKind,
-    source: Option<SourceId>,
-    holds: bool,
-    figures: Figures,
+pub(super) struct Seen {
+    pub(super) kind: ListKind,
+    pub(super) source: Option<SourceId>,
+    pub(super) holds: bool,
+    pub(super) figures: Figures,
 }
 
 impl Seen {
-    fn of(kind: ListKind, holds: bool, figures: Figures) -> Self {
+    pub(super) fn of(kind: ListKind, holds: bool, figures: Figures) -> Self {
         Self { kind, source: None, holds, figures }
     }
 }
@@ -62,6 +63,7 @@ impl AlertList {
         self.v_max_mps = state.v_max_mps().unwrap_or(0.0);
         self.x_m = state.chainage_m;
         self.had.position |= !matches!(state.position, PositionState::None(_));
+        self.had.sure_position |= state.position == PositionState::Ok;
         self.had.turning |= state.turning;
         self.had.sonar |= state.has_sonar() && state.turning != 0;
         self.take_speed(beat, to);
@@ -125,9 +127,11 @@ impl AlertList {
             _ => (false, Figures::None),
         };
         // An alignment takes its time.
-        let is_due = self.had.position || at.since(begun).0 >= GRACE.0;
-        self.observe(at, &Seen::of(ListKind::NoPosition, lacks && is_due, figures), to);
-        let is_spread = state.position == PositionState::Doubtful(PositionDoubt::Spread);
+        let is_late = at.since(begun).0 >= GRACE.0;
+        let lacks = lacks && (self.had.position || is_late);
+        self.observe(at, &Seen::of(ListKind::NoPosition, lacks, figures), to);
+        let is_spread = state.position == PositionState::Doubtful(PositionDoubt::Spread)
+            && (self.had.sure_position || is_late);
         let error = Figures::Error(state.confidence_sd * state.pass_sd_m);
         self.observe(at, &Seen::of(ListKind::PositionDoubtful, is_spread, error), to);
     }
@@ -174,14 +178,20 @@ impl AlertList {
     fn take_sensors(&mut self, at: MonoNs, state: &LiveState, to: &mut Telling<'_>) {
         let is_late = self.is_late(at);
         let sources = || (0_u16..).take(usize::from(state.sources));
-        let heard = |source: u16| state.age_of(source.into());
-        let is_silent = |source: u16| state.silent().any(|silent| silent == usize::from(source));
+        let heard = |source: u16| state.heard.get(usize::from(source)).copied().flatten();
+        let is_silent =
+            |source: u16| matches!(state.sensor(source.into()), SensorState::Never | SensorState::Silent);
         // Nothing from anybody is one situation, not one for each.
         let all_silent = state.sources > 0 && sources().all(is_silent);
         self.observe(at, &Seen::of(ListKind::NoData, all_silent, Figures::None), to);
+        // Silent is who says nothing while another one speaks.
+        let newest = sources().filter_map(heard).max();
         for source in sources() {
-            let is_due = heard(source).is_some() || is_late;
-            let holds = is_silent(source) && is_due && !all_silent;
+            let holds = match (heard(source), newest) {
+                (Some(heard), Some(newest)) => newest.since(heard).0 > OLD_AFTER.0,
+                (None, _) => is_late && !all_silent,
+                (Some(_), None) => false,
+            };
             let (kind, source) = (ListKind::SensorSilent, Some(SourceId(source)));
             self.observe(at, &Seen { kind, source, holds, figures: Figures::None }, to);
         }
@@ -248,7 +258,7 @@ impl AlertList {
     }
 
     /// Takes what holds of a situation, and does what is due.
-    fn observe(&mut self, at: MonoNs, seen: &Seen, to: &mut Telling<'_>) {
+    pub(super) fn observe(&mut self, at: MonoNs, seen: &Seen, to: &mut Telling<'_>) {
         let Seen { kind, source, holds, figures } = *seen;
         let place = timer::place(kind, source);
         let timing = self.timing.of(kind.class());

@@ -15,10 +15,10 @@ pub(crate) struct RunInput {
     pub(crate) at: MonoNs,
     pub(crate) id: RunId,
     pub(crate) change: RunChange,
-    stretch: (i64, i64),
+    pub(super) stretch: (i64, i64),
     /// Causes and arc length of the worst hole, m.
-    causes: Option<(CauseFigures, f64)>,
-    merged_into: Option<RunId>,
+    pub(super) causes: Option<(CauseFigures, f64)>,
+    pub(super) merged_into: Option<RunId>,
 }
 
 impl RunInput {
@@ -81,7 +81,7 @@ impl AlertList {
                 && alert.is_live()
                 && alert.stretch.is_some_and(|(of, to)| of <= from && until <= to)
         };
-        let number = if let Some(known) = self.alerts.iter_mut().filter(|alert| has(&&**alert)).next_back() {
+        let number = if let Some(known) = self.alerts.iter_mut().rfind(|alert| has(&&**alert)) {
             known.figures = figures;
             known.open_runs += 1;
             let (number, state) = (known.number, known.state);

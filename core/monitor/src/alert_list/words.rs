@@ -2,11 +2,10 @@
 
 use super::{Figures, ListKind, ListedAlert};
 use crate::app::SourceInfo;
-use crate::live_text::{helps_text, no_position_text, unsure_text};
 use crate::pilot_text::{
-    actions_text, advice_text, alert_text, cause_text, setting_text, speed_text, station,
+    actions_text, advice_text, alert_text, cause_text, no_position_text, setting_text, speed_text, station,
 };
-use crate::telling::UnsureStretch;
+use crate::unsure_stretch::{UnsureStretch, helps_text, unsure_text};
 use headrace_coverage::{Action, Sections};
 use headrace_geometry::tunnel::Profile;
 

@@ -82,6 +82,18 @@ impl Command {
         matches!(self, Self::Acknowledge { .. } | Self::Silence { .. } | Self::Note { .. })
     }
 
+    /// The same of nobody, and without what somebody wrote.
+    #[must_use]
+    pub fn anonymous(self) -> Self {
+        let by = Who::default();
+        match self {
+            Self::Acknowledge { alert, .. } => Self::Acknowledge { alert, by },
+            Self::Silence { .. } => Self::Silence { by },
+            Self::Note { .. } => Self::Note { text: NoteText::default(), by },
+            Self::Recording { .. } | Self::Limits { .. } | Self::Time => self,
+        }
+    }
+
     /// Reads a packet: one JSON object with the keys of its command and no others. Allocates: never.
     ///
     /// Errors: what isn't as it must be first.

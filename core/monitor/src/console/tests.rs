@@ -43,7 +43,7 @@ fn what_is_no_command_is_refused_with_its_place() {
         r#"{"do":"time"}x"#,
         r#"{"do":"time",}"#,
         r#"{"do":"time""#,
-        r#"{'do':'time'}"#,
+        "{'do':'time'}",
         r#"{"do":"dance","by":"AB"}"#,
         r#"{"do":"silence"}"#,
         r#"{"do":"silence","by":"AB","by":"AB"}"#,

@@ -1,5 +1,8 @@
 use super::*;
 use crate::live_state::{PositionState, test_state};
+use crate::unsure_stretch::UnsureStretch;
+use headrace_coverage::Unsure;
+use headrace_fusion::NoFix;
 use headrace_geometry::time::MonoNs;
 use headrace_geometry::tunnel::shapes;
 

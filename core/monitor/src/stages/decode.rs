@@ -9,6 +9,7 @@ use crate::merge::Inbox;
 use crate::messages::{Event, Events};
 use crate::resources::{Tally, VehicleEntities};
 
+#[expect(clippy::too_many_arguments, reason = "a system's arguments are what it reads and writes")]
 pub(super) fn decode(
     inbox: Res<'_, Inbox>,
     entities: Res<'_, VehicleEntities>,

@@ -20,6 +20,7 @@ use headrace_sensor::reading::{Reading, SonarReturn};
 type Heads<'w, 's> =
     Query<'w, 's, (&'static Head, &'static Mounted, &'static mut MeasuredMotion, &'static HiddenAngles)>;
 
+#[expect(clippy::too_many_arguments, reason = "a system's arguments are what it reads and writes")]
 pub(super) fn georeference(
     events: Res<'_, Events>,
     positioned: Res<'_, PositionedList>,

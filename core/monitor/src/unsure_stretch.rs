@@ -1,0 +1,75 @@
+//! A stretch of which neither a pass nor a fail can be told, and its words. Allocates: for outlets, not for a tick.
+
+use serde::Serialize;
+
+use headrace_coverage::{Sections, Stretch, Unsure};
+
+/// A stretch of which neither a pass nor a fail can be told.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct UnsureStretch {
+    /// Why.
+    pub why: Unsure,
+    /// Where it begins, m.
+    pub from_m: f64,
+    /// Where it ends, m.
+    pub to_m: f64,
+    /// Its metres that are unsure.
+    pub metres_m: f64,
+    /// Its largest hole, m.
+    pub hole_m: f64,
+    /// Standard deviation of that hole, m.
+    pub hole_sd_m: f64,
+    /// By how much the hole may be larger or smaller: the confidence times its standard deviation, m.
+    pub hole_error_m: f64,
+}
+
+impl UnsureStretch {
+    /// From a stretch of sections.
+    pub fn of(stretch: &Stretch, sections: &Sections) -> Self {
+        Self::from_sections(stretch, sections.section_m(), sections.confidence_sd())
+    }
+
+    /// The same with the length of a section, m, and the confidence, standard deviations.
+    pub(super) fn from_sections(stretch: &Stretch, section_m: f64, confidence_sd: f64) -> Self {
+        let [hole_m, hole_sd_m] = stretch.hole_m;
+        Self {
+            why: stretch.why,
+            from_m: stretch.from as f64 * section_m,
+            to_m: stretch.to as f64 * section_m,
+            metres_m: f64::from(stretch.sections) * section_m,
+            hole_m,
+            hole_sd_m,
+            hole_error_m: confidence_sd * hole_sd_m,
+        }
+    }
+}
+
+/// Why nothing can be said of a stretch, with its figures.
+pub fn unsure_text(stretch: &UnsureStretch) -> String {
+    match stretch.why {
+        Unsure::NotInspected => format!("{:.2} m not seen from both sides", stretch.metres_m),
+        Unsure::Position => {
+            format!("hole {:.2} m, give or take {:.2} m", stretch.hole_m, stretch.hole_error_m)
+        }
+        Unsure::SeveralStretches => "position lost or doubted between passes".to_owned(),
+        Unsure::DoubtfulReturns => "more doubtful returns than wall".to_owned(),
+        Unsure::DistrustedHead => "seen by a head that isn't believed".to_owned(),
+        Unsure::ContradictedProfile => "the wall isn't where the design says".to_owned(),
+        Unsure::OtherSize => "the cross-section isn't the design's".to_owned(),
+        Unsure::NoWall => "a declared opening, no wall".to_owned(),
+    }
+}
+
+/// What would help; empty where nothing does.
+pub fn helps_text(why: Unsure) -> &'static str {
+    match why {
+        Unsure::NotInspected => "pass it whole to inspect it",
+        Unsure::Position => "slower, or again with a surer position",
+        Unsure::SeveralStretches => "pass it again in one go",
+        Unsure::DoubtfulReturns => "pass it again in clear water",
+        Unsure::DistrustedHead => "pass it again without that head",
+        Unsure::ContradictedProfile => "check profile, sound speed and tether zero",
+        Unsure::OtherSize => "check profile and sound speed",
+        Unsure::NoWall => "",
+    }
+}

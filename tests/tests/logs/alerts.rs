@@ -1,0 +1,324 @@
+//! Alerts and an operator's commands: the same however the stream is cut into ticks, in a replay, and in verify; and no result
+//! but the alerts knows of a command.
+
+use headrace_geometry::time::{DurNs, MonoNs};
+use headrace_monitor::App;
+use headrace_monitor::alert_list::{AlertChange, AlertState, ListKind, ListedAlert};
+use headrace_monitor::console::{CONSOLE_ID, Command, ConsoleCounts, ConsoleInput, Who};
+use headrace_monitor::messages::Notice;
+use headrace_monitor::report::Report;
+use headrace_monitor::ring::Port;
+use headrace_monitor::run::Loop;
+use headrace_replay::log::{LogHeader, LogWriter, SourceInfo};
+use headrace_sensor::device::Direction;
+use headrace_simulator::{START, Scene, Simulation};
+use headrace_tests::{Folder, scenes};
+use serde_json::Value;
+
+/// Fast for a stretch, then back over a part of it; a head dies, and comes back.
+const SCENE: &str = "vehicle = \"vita2-4.toml\"\n[trajectory]\n
+[[trajectory.legs]]\ndistance_m = 10\nspeed_mps = 0.18\n
+[[trajectory.legs]]\ndistance_m = 8\nspeed_mps = 0.4\n
+[[trajectory.legs]]\ndistance_m = 6\nspeed_mps = -0.18\n
+[[trajectory.legs]]\ndistance_m = 12\nspeed_mps = 0.18\n
+[[effects.device_faults]]\nkind = \"die\"\nsensors = [\"sonar_1\"]\nfrom_s = 35\nfor_s = 12\n";
+/// When the head dies, seconds after the beginning.
+const DIES_S: f64 = 35.0;
+
+struct Packet {
+    source: usize,
+    at: MonoNs,
+    bytes: Vec<u8>,
+}
+
+fn sent(scene: &Scene) -> Vec<Packet> {
+    let mut simulation = Simulation::new(scene).unwrap();
+    let mut all = Vec::new();
+    while let Some(message) = simulation.next_message() {
+        if message.direction == Direction::Received {
+            let (source, at) = (usize::from(message.source), message.at);
+            all.push(Packet { source, at, bytes: message.bytes.to_vec() });
+        }
+    }
+    all
+}
+
+fn after(seconds: f64) -> MonoNs {
+    START + DurNs::from_secs_f64(seconds)
+}
+
+/// What an operator does, some of it no command.
+const COMMANDS: [(f64, &str); 11] = [
+    (12.0, r#"{"do":"note","text":"start of the lining","by":"AB"}"#),
+    (40.0, r#"{"do":"acknowledge","alert":0,"by":"AB"}"#),
+    (61.0, r#"{"do":"limits","battery_pct":19.5}"#),
+    (63.0, r#"{"do":"silence","by":"AB"}"#),
+    (63.1, r#"{"do":"dance"}"#),
+    (66.0, r#"{"do":"acknowledge","alert":0,"by":"CD"}"#),
+    (70.0, r#"{"do":"recording","fails":true}"#),
+    (71.0, r#"{"do":"mark","by":"joystick"}"#),
+    (80.0, r#"{"do":"recording","fails":false}"#),
+    (100.0, r#"{"do":"acknowledge","alert":4711,"by":"AB"}"#),
+    (110.0, r#"{"do":"acknowledge","alert":0,"by":"CD"}"#),
+];
+
+fn with_commands(scene: &Scene) -> Vec<Packet> {
+    let mut all = sent(scene);
+    let source = scene.vehicle.sensors.len();
+    let commands = COMMANDS.map(|(at_s, json)| Packet { source, at: after(at_s), bytes: json.into() });
+    all.extend(commands);
+    all.sort_by_key(|packet| (packet.at, packet.source));
+    all
+}
+
+fn armed(scene: &Scene) -> (Loop, Vec<Port>) {
+    let mut app = App::new(scene.vehicle.mission());
+    for sensor in &scene.vehicle.sensors {
+        app.add_device(sensor.as_ref()).unwrap();
+    }
+    let mut dive = app.arm(scene.vehicle.navigation()).unwrap();
+    let count = scene.vehicle.sensors.len();
+    let mut ports: Vec<Port> = (0..count).map(|source| dive.take_port(source).unwrap()).collect();
+    ports.push(dive.take_console().unwrap());
+    (dive, ports)
+}
+
+type Change = (MonoNs, AlertChange, ListedAlert);
+
+/// A dive in ticks of so many milliseconds, with the changes of alerts.
+fn dive(scene: &Scene, packets: &[Packet], tick_ms: i64) -> (Loop, Vec<Change>) {
+    let (mut dive, mut ports) = armed(scene);
+    let mut changes = Vec::new();
+    let mut until = START + DurNs::from_millis(tick_ms);
+    let take = |notice: &Notice, changes: &mut Vec<Change>| {
+        if let Notice::Listed { change, at, alert } = notice {
+            changes.push((*at, *change, *alert));
+        }
+    };
+    for packet in packets {
+        let port = &mut ports[packet.source];
+        if packet.at >= until || !port.has_room(packet.bytes.len()) {
+            while dive.has_waiting() {
+                dive.tick(packet.at);
+                dive.notices().iter().for_each(|notice| take(notice, &mut changes));
+            }
+            while packet.at >= until {
+                until = until + DurNs::from_millis(tick_ms);
+            }
+        }
+        port.send(packet.at, &packet.bytes).unwrap();
+    }
+    while dive.has_waiting() {
+        dive.tick(until);
+        dive.notices().iter().for_each(|notice| take(notice, &mut changes));
+    }
+    dive.finish(&mut |notice, _| take(notice, &mut changes));
+    (dive, changes)
+}
+
+fn streams(dive: &Loop) -> Vec<(&'static str, u64)> {
+    dive.digests().streams().into_iter().map(|(name, stream)| (name, stream.value())).collect()
+}
+
+fn json(dive: &Loop) -> Value {
+    serde_json::to_value(Report::of(dive)).unwrap()
+}
+
+#[test]
+fn alerts_and_commands_do_not_depend_on_where_ticks_end() {
+    let scene = scenes::scene(SCENE);
+    let packets = with_commands(&scene);
+    let (expected, told) = dive(&scene, &packets, 20);
+    let report = json(&expected);
+    let kinds: Vec<&str> = told.iter().map(|(_, _, alert)| alert.kind.as_str()).collect();
+    for kind in ["missed", "too_fast", "sensor_silent", "not_recorded", "battery_left"] {
+        assert!(kinds.contains(&kind), "{kinds:?}");
+    }
+    let done: Vec<AlertChange> = told.iter().map(|(_, change, _)| *change).collect();
+    for change in ["raised", "acknowledged", "silenced", "rectified", "cleared", "changed"] {
+        assert!(done.iter().any(|done| done.as_str() == change), "{change}");
+    }
+    assert_eq!(report["notes"].as_array().unwrap().len(), 2);
+    assert_eq!(report["notes"][0]["text"], "start of the lining");
+    let x_m = report["notes"][0]["chainage_m"].as_f64().unwrap();
+    assert!((1.0..4.0).contains(&x_m), "{x_m}");
+    let counts = ConsoleCounts { packets: 11, invalid: 1, without_effect: 1 };
+    assert_eq!(expected.console_counts(), counts);
+    assert_eq!(report["sources"].as_array().unwrap().len(), scene.vehicle.sensors.len());
+    for tick_ms in [1, 333, 5000] {
+        let (other, also_told) = dive(&scene, &packets, tick_ms);
+        assert_eq!(streams(&other), streams(&expected), "ticks of {tick_ms} ms");
+        assert_eq!(json(&other), report, "ticks of {tick_ms} ms");
+        assert_eq!(also_told, told, "ticks of {tick_ms} ms");
+    }
+}
+
+#[test]
+fn no_result_but_the_alerts_knows_of_a_command() {
+    let scene = scenes::scene(SCENE);
+    let (plain, _) = dive(&scene, &sent(&scene), 20);
+    let (operated, _) = dive(&scene, &with_commands(&scene), 20);
+    for ((name, one), (_, other)) in streams(&plain).into_iter().zip(streams(&operated)) {
+        assert_eq!(one == other, name != "alerts", "{name}");
+    }
+    let (mut one, mut other) = (json(&plain), json(&operated));
+    for report in [&mut one, &mut other] {
+        for key in ["digest", "alert_list", "notes", "console"] {
+            report.as_object_mut().unwrap().remove(key).unwrap();
+        }
+    }
+    assert_eq!(one, other);
+    // What is no command changes nothing at all.
+    let mut packets = sent(&scene);
+    let source = scene.vehicle.sensors.len();
+    for (number, bytes) in
+        [&b"\0\xff"[..], b"{", b"{\"do\":\"silence\"}", &[b' '; 4000]].into_iter().enumerate()
+    {
+        packets
+            .insert(1000 * number, Packet { source, at: packets[1000 * number].at, bytes: bytes.to_vec() });
+    }
+    let (odd, _) = dive(&scene, &packets, 20);
+    assert_eq!(streams(&odd), streams(&plain));
+    assert_eq!(odd.console_counts(), ConsoleCounts { packets: 4, invalid: 4, without_effect: 0 });
+}
+
+#[test]
+fn a_speeding_stretch_and_a_dead_head_are_told_once_and_in_time() {
+    let scene = scenes::scene(SCENE);
+    let (dive, told) = dive(&scene, &sent(&scene), 20);
+    let raised = |kind: ListKind| -> Vec<f64> {
+        let raised =
+            told.iter().filter(|(_, change, alert)| *change == AlertChange::Raised && alert.kind == kind);
+        raised.map(|(at, ..)| at.since(START).as_secs_f64()).collect()
+    };
+    assert_eq!(raised(ListKind::TooFast).len(), 1, "{:?}", raised(ListKind::TooFast));
+    let [silent_s] = raised(ListKind::SensorSilent)[..] else {
+        panic!("{:?}", raised(ListKind::SensorSilent))
+    };
+    // The head's last reading, 2 s, and a beat; no hold time is set.
+    assert!((DIES_S + 1.5..DIES_S + 2.3).contains(&silent_s), "{silent_s}");
+    let head = dive.alert_list().iter().find(|alert| alert.kind == ListKind::SensorSilent).unwrap();
+    assert_eq!(dive.sources()[head.source.unwrap().index()].id, "sonar_1");
+    assert_eq!(head.state, AlertState::Rectified, "it came back, and nobody has acknowledged it");
+    // One alert for the stretch that was missed, part of which a later pass has mended.
+    let missed = raised(ListKind::Missed);
+    let runs = dive.coverage().sections.runs().all();
+    assert!(missed.len() <= runs.len() && !missed.is_empty(), "{missed:?}, {} runs", runs.len());
+    for run in runs.iter().filter(|run| run.is_open()) {
+        let holds = |alert: &&ListedAlert| {
+            let within = alert.stretch.is_some_and(|(from, to)| from <= run.from && run.to <= to);
+            alert.kind == ListKind::Missed && alert.state == AlertState::Active && within
+        };
+        assert_eq!(dive.alert_list().iter().filter(holds).count(), 1, "{run:?}");
+    }
+}
+
+#[test]
+fn a_dive_whose_sensors_are_all_silent_says_so_by_the_time_it_is_told() {
+    let scene = scenes::scene(SCENE);
+    let mut packets = sent(&scene);
+    packets.retain(|packet| packet.at < after(20.0));
+    let source = scene.vehicle.sensors.len();
+    let last = packets.last().unwrap().at;
+    for half in 1..12 {
+        let at = last + DurNs::from_millis(500 * half);
+        packets.push(Packet { source, at, bytes: Command::Time.to_json().into_bytes() });
+    }
+    let (dive, told) = dive(&scene, &packets, 20);
+    let silent: Vec<_> = told.iter().filter(|(.., alert)| alert.kind == ListKind::NoData).collect();
+    let [(at, AlertChange::Raised, _)] = silent[..] else { panic!("{silent:?}") };
+    assert!((2.0..=2.6).contains(&at.since(last).as_secs_f64()), "{:?}", at.since(last));
+    let of_one = told.iter().filter(|(.., alert)| alert.kind == ListKind::SensorSilent).count();
+    assert_eq!(of_one, 0, "one situation, not one for each sensor");
+    assert_eq!(dive.tally().span.unwrap().1, last, "the console is no sensor");
+}
+
+/// Commands from any thread, in a dive that goes on; they come stamped with the dive's clock.
+#[test]
+fn commands_of_any_thread_reach_the_loop() {
+    let scene = scenes::scene(SCENE);
+    let mut app = App::new(scene.vehicle.mission());
+    for sensor in &scene.vehicle.sensors {
+        app.add_device(sensor.as_ref()).unwrap();
+    }
+    let mut dive = app.arm(scene.vehicle.navigation()).unwrap();
+    let (mut input, port) = ConsoleInput::new(&mut dive, None).unwrap();
+    assert!(ConsoleInput::new(&mut dive, None).is_none(), "there is one");
+    let by = Who::new("AB").unwrap();
+    let threads = [(); 4].map(|()| {
+        let port = port.clone();
+        std::thread::spawn(move || {
+            (0..100).filter(|_| port.send(&Command::Note { text: Default::default(), by }).is_ok()).count()
+        })
+    });
+    let taken: usize = threads.into_iter().map(|thread| thread.join().unwrap()).sum();
+    assert_eq!(taken, 256, "what waits is bounded");
+    while dive.notes().iter().count() < taken {
+        input.take_in(MonoNs(7));
+        dive.tick(MonoNs(8));
+    }
+    assert!(dive.notes().iter().all(|note| note.at == MonoNs(7) && note.by == by));
+    let recording = Command::Recording { fails: true };
+    port.send(&recording).unwrap();
+    input.take_in(MonoNs(9));
+    dive.tick(MonoNs(9));
+    assert_eq!(dive.alert_list().counts().unacknowledged, 1);
+}
+
+#[test]
+fn acknowledgements_of_a_recorded_dive_are_in_its_replay_and_verify_says_equal() {
+    let scene = scenes::scene(SCENE);
+    let folder = Folder::new();
+    let console = SourceInfo { id: CONSOLE_ID.to_owned(), plugin: String::new(), connect: String::new() };
+    let sources = scene.vehicle.sensor_configs.iter().map(|sensor| SourceInfo {
+        id: sensor.id.clone(),
+        plugin: sensor.plugin.clone(),
+        connect: sensor.connect.clone(),
+    });
+    let header = LogHeader {
+        vehicle_toml: scene.vehicle_text.clone(),
+        sources: sources.chain([console]).collect(),
+        ..LogHeader::default()
+    };
+    let mut writer = LogWriter::create(&folder.path("dive.mcap"), &header).unwrap();
+    for packet in with_commands(&scene) {
+        let source = u16::try_from(packet.source).unwrap();
+        writer.raw(source, packet.at, packet.at, &packet.bytes).unwrap();
+    }
+    writer.finish().unwrap();
+    folder.write("vehicle.toml", &scene.vehicle_text);
+    let live = folder.headrace(&[
+        "run",
+        "vehicle.toml",
+        "--source",
+        "dive.mcap",
+        "--record",
+        "live.mcap",
+        "--speed",
+        "max",
+        "--json",
+    ]);
+    let live: Value =
+        serde_json::from_str(&live.stdout).unwrap_or_else(|error| panic!("{error}: {}", live.stderr));
+    let by = |report: &Value| -> Vec<String> {
+        let all = report["alert_list"].as_array().unwrap().iter();
+        all.filter_map(|alert| Some(alert["acknowledged"]["by"].as_str()?.to_owned())).collect()
+    };
+    assert!(by(&live).contains(&"AB".to_owned()) && by(&live).contains(&"CD".to_owned()), "{:?}", by(&live));
+    for tick in ["1", "20", "5000"] {
+        let (_, replayed) = folder.replay("live.mcap", &["--tick-ms", tick]);
+        assert_eq!(replayed["digest"], live["digest"]);
+        assert_eq!(replayed["alert_list"], live["alert_list"]);
+        assert_eq!(replayed["notes"], live["notes"]);
+        let verified = folder.headrace(&["verify", "live.mcap", "--tick-ms", tick]);
+        assert_eq!(verified.code, Some(0), "{}{}", verified.stdout, verified.stderr);
+    }
+    let lines = folder.headrace(&["replay", "live.mcap", "--json-lines"]).stdout;
+    let lines: Vec<Value> = lines.lines().map(|line| serde_json::from_str(line).unwrap()).collect();
+    let of = |kind: &str| lines.iter().filter(|line| line["type"] == kind).cloned().collect::<Vec<_>>();
+    assert_eq!(of("note").len(), 2);
+    assert!(of("alert_change").iter().any(|line| line["change"] == "acknowledged"));
+    let states = of("state");
+    let last = states.last().unwrap();
+    assert_eq!((&last["left"]["battery_pct"], &last["alerts_hidden"]), (&19.5.into(), &0.into()));
+}
