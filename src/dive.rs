@@ -447,7 +447,8 @@ fn recorded(recorders: Vec<(PathBuf, RecorderHandle)>, report: &Report) -> Optio
         let parts = written.map(|written| written.parts).unwrap_or_default();
         let parts: Vec<_> = parts.iter().map(|part| (part.path.as_path(), part.raw_messages)).collect();
         let mut files = files_report(&path, &parts);
-        files.messages = report.sources.iter().map(|source| source.packets).sum();
+        let of_console = report.console.map_or(0, |console| console.packets);
+        files.messages = of_console + report.sources.iter().map(|source| source.packets).sum::<u64>();
         files.losses.splice(0..0, losses);
         log = Some(files);
     }

@@ -276,14 +276,16 @@ impl Watch {
         for one in told {
             let line = told_line(one, &dive.mission().profile);
             if self.show == Show::Lines {
-                self.line(&line);
+                if one.adds_line() {
+                    self.line(&line);
+                }
                 continue;
             }
             let mut value = match serde_json::to_value(one) {
                 Ok(value) => value,
                 Err(error) => json!({"error": error.to_string()}),
             };
-            if let Some(object) = value.as_object_mut() {
+            if let Some(object) = value.as_object_mut().filter(|_| !matches!(one, Told::Note(_))) {
                 object.insert("text".to_owned(), line.text().into());
             }
             self.json(at, value);

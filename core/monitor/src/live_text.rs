@@ -1,5 +1,6 @@
 //! Words for what is told live: the place first, then what, then what to do. Terminals break them to their width.
 
+use super::alert_list::{AlertChange, ListedAlertJson};
 use super::live_state::{Condition, Lamp, LiveMetres, LiveState, PositionDoubt};
 use super::pilot_text::{AdviceFigures, actions_text, advice_text, cause_text, station};
 use super::telling::{Told, UnsureStretch};
@@ -235,8 +236,52 @@ pub fn told_line(told: &Told, profile: &Profile) -> PilotLine {
             let said = text.strip_prefix(&format!("ch {place}")).unwrap_or(text).trim_start();
             line(place, format!("ALERT: {said}"), String::new(), Some(Lamp::Red))
         }
+        Told::AlertChange { change, alert } => alert_line(*change, alert),
+        Told::Note(note) => {
+            let what = if note.text.is_empty() { "mark".to_owned() } else { format!("note: {}", note.text) };
+            let by = if note.by.is_empty() { String::new() } else { format!(" ({})", note.by) };
+            let place = note.station.clone().unwrap_or_else(|| "-+---.--".to_owned());
+            line(place, format!("{what}{by}"), String::new(), None)
+        }
         Told::Way { from_m, to_m, metres } => {
             line(to(*from_m, *to_m), format!("WAY: {}", metres_text(metres)), String::new(), None)
+        }
+    }
+}
+
+/// Line of a change of an alert.
+fn alert_line(change: AlertChange, alert: &ListedAlertJson) -> PilotLine {
+    let by = match (&alert.acknowledged, change) {
+        (Some(by), AlertChange::Acknowledged) if !by.by.is_empty() => format!(" by {}", by.by),
+        _ => String::new(),
+    };
+    let has_advice = matches!(change, AlertChange::Raised | AlertChange::Changed);
+    PilotLine {
+        place: format!("ALERT {}", alert.number),
+        what: vec![format!("{}{by}: {}", change.as_str(), alert.text)],
+        action: if has_advice { alert.advice.clone() } else { String::new() },
+        lamp: (change == AlertChange::Raised).then_some(Lamp::Amber),
+        ..PilotLine::default()
+    }
+}
+
+impl Told {
+    /// Whether a line of it adds something to the status and the other lines: of an alert that somebody has acknowledged it, that
+    /// it is over where nothing else tells that, and what is left.
+    pub fn adds_line(&self) -> bool {
+        let Self::AlertChange { change, alert } = self else { return true };
+        let is_left = matches!(alert.kind, "cable_left" | "time_left" | "battery_left");
+        let is_told_once = matches!(
+            alert.kind,
+            "head_scattered" | "head_constant" | "head_outvoted" | "cable_doubted" | "setting_doubted"
+        );
+        match change {
+            AlertChange::Acknowledged => true,
+            AlertChange::Raised | AlertChange::Changed => is_left,
+            // Of what nobody has acknowledged the end is told when it comes, not when it is acknowledged.
+            AlertChange::Rectified => is_told_once,
+            AlertChange::Cleared => is_told_once && alert.rectified_s == alert.cleared_s,
+            AlertChange::Silenced => false,
         }
     }
 }

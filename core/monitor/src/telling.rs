@@ -3,6 +3,7 @@
 
 use serde::Serialize;
 
+use super::alert_list::{AlertChange, ListedAlertJson, NoteJson};
 use super::live_state::{LiveMetres, LiveState};
 use super::messages::Notice;
 use super::pilot_text::{Missed, alert_text, setting_text};
@@ -65,6 +66,15 @@ pub enum Told {
         /// Its text.
         text: String,
     },
+    /// An alert of the list has changed.
+    AlertChange {
+        /// Kind of change.
+        change: AlertChange,
+        /// The alert, as it was then.
+        alert: Box<ListedAlertJson>,
+    },
+    /// Somebody has put down a note.
+    Note(NoteJson),
     /// The way so far.
     Way {
         /// Where it begins.
@@ -139,7 +149,12 @@ impl Teller {
     /// Takes a notice; `tell` gets what it means.
     pub fn hear(&mut self, notice: &Notice, dive: &Loop, tell: &mut dyn FnMut(Told)) {
         match notice {
-            Notice::Advice(_) | Notice::Listed { .. } | Notice::Note(_) => {}
+            Notice::Advice(_) => {}
+            Notice::Listed { change, at, alert } => {
+                let alert = Box::new(alert.json(&dive.surroundings(), *at));
+                tell(Told::AlertChange { change: *change, alert });
+            }
+            Notice::Note(note) => tell(Told::Note(note.into())),
             Notice::Section { section, .. } => {
                 let sections = &dive.coverage().sections;
                 self.close_run_at(*section, sections, tell);

@@ -26,6 +26,7 @@ const MORE_PCT: f64 = 2.0;
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub(super) struct Had {
     position: bool,
+    sure_position: bool,
     sonar: bool,
     turning: u64,
     /// The stretch of which nothing could be said, and when it last grew.
@@ -41,15 +42,15 @@ pub(crate) struct Beat<'a> {
 }
 
 /// Something that may hold.
-struct Seen {
-    kind: ListKind,
-    source: Option<SourceId>,
-    holds: bool,
-    figures: Figures,
+pub(super) struct Seen {
+    pub(super) kind: ListKind,
+    pub(super) source: Option<SourceId>,
+    pub(super) holds: bool,
+    pub(super) figures: Figures,
 }
 
 impl Seen {
-    fn of(kind: ListKind, holds: bool, figures: Figures) -> Self {
+    pub(super) fn of(kind: ListKind, holds: bool, figures: Figures) -> Self {
         Self { kind, source: None, holds, figures }
     }
 }
@@ -62,6 +63,7 @@ impl AlertList {
         self.v_max_mps = state.v_max_mps().unwrap_or(0.0);
         self.x_m = state.chainage_m;
         self.had.position |= !matches!(state.position, PositionState::None(_));
+        self.had.sure_position |= state.position == PositionState::Ok;
         self.had.turning |= state.turning;
         self.had.sonar |= state.has_sonar() && state.turning != 0;
         self.take_speed(beat, to);
@@ -125,9 +127,11 @@ impl AlertList {
             _ => (false, Figures::None),
         };
         // An alignment takes its time.
-        let is_due = self.had.position || at.since(begun).0 >= GRACE.0;
-        self.observe(at, &Seen::of(ListKind::NoPosition, lacks && is_due, figures), to);
-        let is_spread = state.position == PositionState::Doubtful(PositionDoubt::Spread);
+        let is_late = at.since(begun).0 >= GRACE.0;
+        let lacks = lacks && (self.had.position || is_late);
+        self.observe(at, &Seen::of(ListKind::NoPosition, lacks, figures), to);
+        let is_spread = state.position == PositionState::Doubtful(PositionDoubt::Spread)
+            && (self.had.sure_position || is_late);
         let error = Figures::Error(state.confidence_sd * state.pass_sd_m);
         self.observe(at, &Seen::of(ListKind::PositionDoubtful, is_spread, error), to);
     }
@@ -248,7 +252,7 @@ impl AlertList {
     }
 
     /// Takes what holds of a situation, and does what is due.
-    fn observe(&mut self, at: MonoNs, seen: &Seen, to: &mut Telling<'_>) {
+    pub(super) fn observe(&mut self, at: MonoNs, seen: &Seen, to: &mut Telling<'_>) {
         let Seen { kind, source, holds, figures } = *seen;
         let place = timer::place(kind, source);
         let timing = self.timing.of(kind.class());

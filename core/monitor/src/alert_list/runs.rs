@@ -15,10 +15,10 @@ pub(crate) struct RunInput {
     pub(crate) at: MonoNs,
     pub(crate) id: RunId,
     pub(crate) change: RunChange,
-    stretch: (i64, i64),
+    pub(super) stretch: (i64, i64),
     /// Causes and arc length of the worst hole, m.
-    causes: Option<(CauseFigures, f64)>,
-    merged_into: Option<RunId>,
+    pub(super) causes: Option<(CauseFigures, f64)>,
+    pub(super) merged_into: Option<RunId>,
 }
 
 impl RunInput {

@@ -1,1 +1,362 @@
+use super::observed::Seen;
+use super::*;
+use crate::messages::Notices;
+use crate::result_stream::ResultStream;
+use headrace_coverage::{RunChange, RunId};
+use headrace_snapshot::{Restorer, Saver, Stateful as _};
+use headrace_vehicle::ClassTiming;
+use proptest::prelude::*;
 
+/// A list, and where it tells.
+struct Bench {
+    list: AlertList,
+    notices: Notices,
+    stream: ResultStream,
+}
+
+impl Bench {
+    fn new(hold_s: f64, off_s: f64) -> Self {
+        let timing = ClassTiming { hold: DurNs::from_secs_f64(hold_s), off: DurNs::from_secs_f64(off_s) };
+        let all = AlertClass::ALL.into_iter();
+        let timing = all.fold(AlertTiming::default(), |all, class| all.with(class, timing));
+        Self {
+            list: AlertList::new(timing, LimitsConfig::default(), 30_000),
+            notices: Notices(Vec::with_capacity(100_000)),
+            stream: ResultStream::default(),
+        }
+    }
+
+    /// The same with another memory: all state goes by a snapshot.
+    fn restored(self) -> Self {
+        let mut saver = Saver::default();
+        self.list.save(&mut saver);
+        self.stream.save(&mut saver);
+        let bytes = saver.finish().unwrap();
+        let mut list = AlertList::new(self.list.timing, self.list.limits, 30_000);
+        let (mut stream, mut from) = (ResultStream::default(), Restorer::new(&bytes));
+        list.restore(&mut from).unwrap();
+        stream.restore(&mut from).unwrap();
+        Self { list, notices: self.notices, stream }
+    }
+
+    fn with<T>(&mut self, act: impl FnOnce(&mut AlertList, &mut Telling<'_>) -> T) -> T {
+        let Self { list, notices, stream } = self;
+        act(list, &mut Telling { notices, stream })
+    }
+
+    fn run(&mut self, id: u32, change: RunChange, stretch: (i64, i64), merged_into: Option<u32>) {
+        let merged_into = merged_into.map(RunId);
+        let causes = None;
+        let (at, id) = (MonoNs(u64::from(id) + 1), RunId(id));
+        let input = RunInput { event: 0, at_beat: false, at, id, change, stretch, causes, merged_into };
+        self.with(|list, to| list.take_run(&input, to));
+    }
+}
+
+/// What may happen.
+#[derive(Debug, Clone, Copy)]
+enum Happens {
+    /// A beat at which each situation holds or not.
+    Beat([bool; 3]),
+    AcknowledgeNewest,
+    AcknowledgeAll,
+    Silence,
+    Snapshot,
+}
+
+/// Of each priority that a situation of its own may have.
+const KINDS: [ListKind; 3] = [ListKind::TooFast, ListKind::NotRecorded, ListKind::TurnFails];
+const BEAT_MS: u64 = 200;
+
+/// The life of one situation's alerts, as in the table of MSC.302(87), written from the history of what held.
+#[derive(Debug, Clone, Default)]
+struct Oracle {
+    history: Vec<(u64, bool)>,
+    is_caution: bool,
+    /// Number, state, acknowledged, silenced until, count.
+    all: Vec<(u32, &'static str, bool, u64, u32)>,
+}
+
+impl Oracle {
+    /// How long it has held, breaks shorter than `least_ms` included, and how long it hasn't, by the last history alone.
+    fn spells_ms(&self, least_ms: u64) -> (Option<u64>, Option<u64>) {
+        let now = self.history.last().map_or(0, |(at, _)| *at);
+        let off_from = |until: usize| {
+            let back = self.history[..until].iter().rev().take_while(|(_, held)| !held);
+            back.last().map(|(at, _)| *at)
+        };
+        let off = off_from(self.history.len()).map(|from| now - from);
+        // The first time of holding after the last break that was long enough.
+        let (mut on, mut break_from) = (None, None);
+        for (at, held) in &self.history {
+            if *held {
+                on = on.or(Some(*at));
+                break_from = None;
+            } else {
+                let from = *break_from.get_or_insert(*at);
+                if at - from >= least_ms {
+                    on = None;
+                }
+            }
+        }
+        (on.map(|from| now - from), off)
+    }
+
+    fn beat(&mut self, at: u64, holds: bool, (hold_ms, off_ms): (u64, u64), next: &mut u32) {
+        self.history.push((at, holds));
+        let state = self.all.last().map_or("none", |last| last.1);
+        let (on, off) = self.spells_ms(hold_ms);
+        match state {
+            "active unacknowledged" | "active acknowledged" | "active caution" => {
+                if off.is_some_and(|off| off >= off_ms) {
+                    // What ends begins anew.
+                    self.history.clear();
+                    self.all.last_mut().unwrap().1 =
+                        if state == "active unacknowledged" { "rectified unacknowledged" } else { "cleared" };
+                }
+            }
+            _ if holds && on.is_some_and(|on| on >= hold_ms) => {
+                let active = if self.is_caution { "active caution" } else { "active unacknowledged" };
+                if state == "rectified unacknowledged" {
+                    let last = self.all.last_mut().unwrap();
+                    (last.1, last.4) = (active, last.4 + 1);
+                } else {
+                    *next += 1;
+                    self.all.push((*next, active, false, 0, 1));
+                }
+            }
+            _ => {}
+        }
+    }
+
+    fn acknowledge(&mut self) {
+        let Some(last) = self.all.last_mut() else { return };
+        (last.1, last.2, last.3) = match last.1 {
+            "active unacknowledged" => ("active acknowledged", true, 0),
+            "rectified unacknowledged" => ("cleared", true, 0),
+            other => (other, last.2, last.3),
+        };
+    }
+
+    fn silence(&mut self, at: u64) {
+        if let Some(last) =
+            self.all.last_mut().filter(|last| last.1 == "active unacknowledged" && last.3 <= at)
+        {
+            last.3 = at + 30_000;
+        }
+    }
+}
+
+fn happens() -> impl Strategy<Value = Happens> {
+    prop_oneof![
+        12 => any::<[bool; 3]>().prop_map(Happens::Beat),
+        6 => Just(Happens::Beat([true; 3])),
+        6 => Just(Happens::Beat([false; 3])),
+        1 => Just(Happens::AcknowledgeNewest),
+        1 => Just(Happens::AcknowledgeAll),
+        1 => Just(Happens::Silence),
+        1 => Just(Happens::Snapshot),
+    ]
+}
+
+proptest! {
+    /// Whatever holds and whatever an operator does, each alert is where the table says.
+    #[test]
+    fn alerts_live_as_the_table_says(
+        steps in proptest::collection::vec((happens(), 1usize..8), 1..120),
+        hold_ms in prop_oneof![Just(0u64), 200..1500u64],
+        off_ms in prop_oneof![Just(0u64), 200..3000u64],
+    ) {
+        let mut bench = Bench::new(hold_ms as f64 / 1e3, off_ms as f64 / 1e3);
+        let mut oracles: [Oracle; 3] = Default::default();
+        oracles[2].is_caution = true;
+        let (mut now, mut next) = (1000, 0);
+        for (step, times) in steps {
+            let at = MonoNs(now * 1_000_000);
+            match step {
+                Happens::Beat(holds) => {
+                    for _ in 0..times {
+                        now += BEAT_MS;
+                        let at = MonoNs(now * 1_000_000);
+                        for ((kind, holds), oracle) in KINDS.into_iter().zip(holds).zip(&mut oracles) {
+                            let seen = Seen::of(kind, holds, Figures::None);
+                            bench.with(|list, to| list.observe(at, &seen, to));
+                            oracle.beat(now, holds, (hold_ms, off_ms), &mut next);
+                        }
+                    }
+                }
+                Happens::AcknowledgeNewest => {
+                    bench.with(|list, to| list.acknowledge(next.max(1), Who::cut("AB"), at, to));
+                    let newest = oracles.iter_mut().find(|oracle| oracle.all.last().is_some_and(|last| last.0 == next));
+                    newest.into_iter().for_each(Oracle::acknowledge);
+                }
+                Happens::AcknowledgeAll => {
+                    bench.with(|list, to| list.acknowledge(0, Who::cut("AB"), at, to));
+                    oracles.iter_mut().for_each(Oracle::acknowledge);
+                }
+                Happens::Silence => {
+                    bench.with(|list, to| list.silence(at, to));
+                    oracles.iter_mut().for_each(|oracle| oracle.silence(now));
+                }
+                Happens::Snapshot => bench = bench.restored(),
+            }
+            let now_ns = MonoNs(now * 1_000_000);
+            let expected: Vec<_> = oracles.iter().flat_map(|oracle| oracle.all.clone()).collect();
+            prop_assert_eq!(bench.list.iter().count(), expected.len());
+            for (number, state, acknowledged, silenced, count) in expected {
+                let alert = bench.list.get(number).unwrap();
+                let found = match (alert.state, alert.priority, alert.acknowledged.is_some()) {
+                    (AlertState::Cleared, ..) => "cleared",
+                    (AlertState::Rectified, _, false) => "rectified unacknowledged",
+                    (AlertState::Active, Priority::Caution, false) => "active caution",
+                    (AlertState::Active, _, false) => "active unacknowledged",
+                    (AlertState::Active, _, true) => "active acknowledged",
+                    (AlertState::Rectified, _, true) => "no such state",
+                };
+                prop_assert_eq!(found, state, "{:?}", alert);
+                prop_assert_eq!(alert.acknowledged.is_some(), acknowledged);
+                prop_assert_eq!(alert.count, count);
+                prop_assert_eq!(alert.sounds(now_ns), state == "active unacknowledged" && now >= silenced);
+                prop_assert_eq!(alert.needs_acknowledgement(), state.ends_with("unacknowledged"));
+            }
+        }
+    }
+}
+
+#[test]
+fn a_speed_that_flickers_about_its_limit_raises_one_alert() {
+    let mut bench = Bench::new(1.0, 5.0);
+    for beat in 0..3000_u64 {
+        let seen = Seen::of(ListKind::TooFast, beat % 3 != 0, Figures::None);
+        bench.with(|list, to| list.observe(MonoNs(beat * 200_000_000), &seen, to));
+    }
+    assert_eq!((bench.list.raised(), bench.notices.0.len()), (1, 1));
+    // Without hold time and dead band it is ten a minute.
+    let mut bench = Bench::new(0.0, 0.0);
+    for beat in 0..300_u64 {
+        let seen = Seen::of(ListKind::TurnFails, beat % 3 != 0, Figures::None);
+        bench.with(|list, to| list.observe(MonoNs(beat * 200_000_000), &seen, to));
+    }
+    assert_eq!(bench.list.raised(), 100);
+}
+
+#[test]
+fn an_acknowledgement_is_made_once_and_of_what_there_is() {
+    let mut bench = Bench::new(0.0, 0.0);
+    let at = MonoNs(7);
+    let acknowledge =
+        |bench: &mut Bench, number| bench.with(|list, to| list.acknowledge(number, Who::cut("AB"), at, to));
+    assert!(!acknowledge(&mut bench, 0) && !acknowledge(&mut bench, 1));
+    bench.with(|list, to| list.observe(at, &Seen::of(ListKind::NotRecorded, true, Figures::None), to));
+    bench.with(|list, to| list.observe(at, &Seen::of(ListKind::TurnFails, true, Figures::None), to));
+    assert!(!acknowledge(&mut bench, 2), "a caution needs none");
+    assert!(acknowledge(&mut bench, 1) && !acknowledge(&mut bench, 1) && !acknowledge(&mut bench, 0));
+    assert_eq!(bench.list.get(1).unwrap().acknowledged, Some(Acknowledgement { by: Who::cut("AB"), at }));
+}
+
+#[test]
+fn what_becomes_more_urgent_is_acknowledged_anew() {
+    let mut bench = Bench::new(0.0, 5.0);
+    let mut state = crate::live_state::test_state();
+    let mut beat = |bench: &mut Bench, at_s: u64, pct: f64| {
+        let at = MonoNs(at_s * 1_000_000_000);
+        (state.at, state.now) = (Some(at), at);
+        bench.list.set_battery(pct);
+        bench.with(|list, to| list.beat(&Beat { at, state: &state, setting: None }, to));
+    };
+    let battery = |bench: &Bench| {
+        let found = bench.list.iter().find(|alert| alert.kind == ListKind::BatteryLeft);
+        found.map(|alert| (alert.priority, alert.needs_acknowledgement()))
+    };
+    beat(&mut bench, 1, 21.0);
+    assert_eq!(battery(&bench), None);
+    beat(&mut bench, 2, 20.0);
+    assert_eq!(battery(&bench), Some((Priority::Warning, true)));
+    bench.with(|list, to| list.acknowledge(0, Who::cut("AB"), MonoNs(3), to));
+    beat(&mut bench, 4, 10.0);
+    assert_eq!(battery(&bench), Some((Priority::Alarm, true)));
+    bench.with(|list, to| list.acknowledge(0, Who::cut("AB"), MonoNs(5), to));
+    // It flickers.
+    beat(&mut bench, 6, 11.0);
+    beat(&mut bench, 7, 10.0);
+    assert_eq!(battery(&bench), Some((Priority::Alarm, false)));
+    beat(&mut bench, 8, 4.0);
+    assert_eq!(battery(&bench), Some((Priority::EmergencyAlarm, true)));
+}
+
+#[test]
+fn runs_that_merge_keep_the_lower_number_and_what_nobody_knew_of() {
+    let mut bench = Bench::new(0.0, 0.0);
+    bench.run(0, RunChange::Raised, (10, 11), None);
+    bench.run(1, RunChange::Raised, (14, 15), None);
+    bench.with(|list, to| list.acknowledge(1, Who::cut("AB"), MonoNs(9), to));
+    bench.run(1, RunChange::Merged, (14, 15), Some(0));
+    bench.run(0, RunChange::Changed, (10, 15), None);
+    let [kept, gone] = [1, 2].map(|number| *bench.list.get(number).unwrap());
+    assert_eq!((kept.stretch, kept.count, kept.needs_acknowledgement()), (Some((10, 15)), 2, true));
+    assert_eq!((gone.state, gone.merged_into), (AlertState::Cleared, Some(1)));
+    // A later pass mends the middle, which leaves another run: still one alert. Then all of it.
+    bench.run(2, RunChange::Raised, (13, 15), None);
+    bench.run(0, RunChange::Changed, (10, 12), None);
+    assert_eq!(bench.list.raised(), 2);
+    bench.run(0, RunChange::Cleared, (10, 12), None);
+    assert_eq!(bench.list.get(1).unwrap().state, AlertState::Active);
+    bench.run(2, RunChange::Cleared, (13, 15), None);
+    assert_eq!(bench.list.get(1).unwrap().state, AlertState::Rectified);
+    bench.with(|list, to| list.acknowledge(0, Who::cut("AB"), MonoNs(9), to));
+    assert_eq!(bench.list.get(1).unwrap().state, AlertState::Cleared);
+    bench.run(3, RunChange::Raised, (10, 11), None);
+    assert_eq!(bench.list.raised(), 3, "what is over is over");
+}
+
+proptest! {
+    /// 7 km of runs, raised and cleared at random: whatever is missed and wasn't acknowledged is in an alert that says so, in a
+    /// list that never grows; and once all is mended, nothing holds.
+    #[test]
+    fn no_missed_stretch_is_lost_from_a_full_list(
+        events in proptest::collection::vec((0u8..10, 0u32..2000), 800..2500),
+    ) {
+        let mut bench = Bench::new(0.0, 0.0);
+        let room = bench.list.alerts.capacity();
+        let mut open: Vec<u32> = Vec::new();
+        let (mut raised, mut unknown) = (0_u32, Vec::new());
+        let stretch = |id: u32| (i64::from(id) * 10, i64::from(id) * 10 + 4);
+        for (what, pick) in events {
+            match what {
+                0..=6 => {
+                    bench.run(raised, RunChange::Raised, stretch(raised), None);
+                    open.push(raised);
+                    unknown.push(raised);
+                    raised += 1;
+                }
+                7 | 8 if !open.is_empty() => {
+                    let id = open.swap_remove(pick as usize % open.len());
+                    bench.run(id, RunChange::Cleared, stretch(id), None);
+                }
+                9 if pick % 50 == 0 => {
+                    bench.with(|list, to| list.acknowledge(0, Who::cut("AB"), MonoNs(1), to));
+                    unknown.clear();
+                }
+                _ => {}
+            }
+        }
+        prop_assert_eq!(bench.list.alerts.capacity(), room);
+        prop_assert!(bench.list.iter().count() <= MOST_LISTED);
+        for id in &open {
+            let (from, to) = stretch(*id);
+            let mut holding = bench.list.iter().filter(|alert| {
+                alert.state == AlertState::Active && alert.stretch.is_some_and(|(of, until)| of <= from && to <= until)
+            });
+            let needs = unknown.contains(id);
+            prop_assert!(holding.any(|alert| !needs || alert.needs_acknowledgement()), "run {}", id);
+        }
+        let (shown, hidden) = bench.list.shown();
+        let live = bench.list.iter().filter(|alert| alert.is_live()).count();
+        prop_assert_eq!(shown.iter().filter(|alert| alert.is_live()).count() + hidden, live);
+        prop_assert!(shown.is_sorted_by_key(|alert| alert.rank()) && shown.len() <= json::MOST_SHOWN);
+        for id in open {
+            bench.run(id, RunChange::Cleared, stretch(id), None);
+        }
+        prop_assert_eq!(bench.list.counts().active, 0);
+    }
+}

@@ -2,7 +2,9 @@
 
 use serde::Serialize;
 
+use super::alert_list::{ListedAlertJson, NoteJson};
 use super::alerts::Alert;
+use super::console::ConsoleCounts;
 use super::resources::{Coverage, Tally};
 use super::run::Loop;
 use super::what_if::WhatIfReport;
@@ -75,6 +77,16 @@ pub struct Report {
     pub openings: Vec<OpeningReport>,
     /// Alerts about the dive as a whole.
     pub alerts: Vec<AlertReport>,
+    /// Alerts with their lives, by number.
+    pub alert_list: Vec<ListedAlertJson>,
+    /// Cleared alerts that are left out for lack of room.
+    pub alerts_dropped: u64,
+    /// What was put down during the dive.
+    pub notes: Vec<NoteJson>,
+    /// Notes that are left out for lack of room.
+    pub notes_dropped: u32,
+    /// Traffic of the operator's input; `None` where there was none.
+    pub console: Option<ConsoleReport>,
     /// Advice history.
     pub advice: Vec<AdviceReport>,
     /// Advice entries dropped for lack of room.
@@ -223,6 +235,17 @@ pub struct AlertReport {
     pub setting: Option<SettingReport>,
 }
 
+/// Traffic of the operator's input.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+pub struct ConsoleReport {
+    /// Packets.
+    pub packets: u64,
+    /// Of these, such that are no command.
+    pub invalid: u64,
+    /// Commands that changed nothing.
+    pub without_effect: u64,
+}
+
 /// A setting that ranges contradict.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct SettingReport {
@@ -268,6 +291,11 @@ impl Report {
             what_if: Vec::new(),
             openings: dive.mission().coverage.openings.iter().map(opening_report).collect(),
             alerts: dive.alerts().iter().map(|alert| alert_report(alert, dive)).collect(),
+            alert_list: listed(dive),
+            alerts_dropped: dive.alert_list().dropped(),
+            notes: dive.notes().iter().map(NoteJson::from).collect(),
+            notes_dropped: dive.notes().dropped(),
+            console: console_report(dive.console_counts()),
             advice: log.entries.iter().map(advice::advice_report).collect(),
             advice_dropped: log.dropped,
             sources: sources::source_reports(dive),
@@ -282,6 +310,18 @@ impl Report {
             self.sources.iter().flat_map(|source| &source.line).any(|line| line.dropped_packets > 0);
         rejected.not_stored > 0 || dropped || self.log.as_ref().is_some_and(|log| !log.losses.is_empty())
     }
+}
+
+/// The alerts that are kept, as of the end.
+fn listed(dive: &Loop) -> Vec<ListedAlertJson> {
+    let around = dive.surroundings();
+    let now = dive.tally().span.map_or(MonoNs(0), |(_, last)| last);
+    dive.alert_list().iter().map(|alert| alert.json(&around, now)).collect()
+}
+
+fn console_report(counts: ConsoleCounts) -> Option<ConsoleReport> {
+    let ConsoleCounts { packets, invalid, without_effect } = counts;
+    (packets > 0).then_some(ConsoleReport { packets, invalid, without_effect })
 }
 
 /// The confidence as the whole number that it is configured as.
