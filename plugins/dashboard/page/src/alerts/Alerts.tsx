@@ -1,0 +1,95 @@
+// The alerts that hold or wait to be acknowledged, in the order of what has to be looked at first.
+import { useEffect, useRef, useState } from "preact/hooks";
+import { acknowledge, silence } from "../feed/client";
+import type { Alert } from "../feed/types";
+import { isUnacknowledged, PRIORITY_WORDS, sorted } from "../store/alerts";
+import { store } from "../store/store";
+import { useTopics } from "../store/topic";
+import { span } from "../text/format";
+import { actions } from "../wall/control";
+import { SoundButtons } from "./SoundButtons";
+
+/** So many are in the list; what of them has to be scrolled to is counted, and so is what isn't in it. */
+const SHOWN = 64;
+
+export function Alerts() {
+  useTopics(store.topics.alerts, store.topics.hello);
+  const list = sorted(store.alerts.values());
+  const waiting = list.filter(isUnacknowledged).length;
+  const hidden = Math.max(0, list.length - SHOWN) + store.alertsHidden;
+  const may = store.hello?.may.operate ?? false;
+  const ol = useRef<HTMLOListElement>(null), [below, setBelow] = useState(0);
+  const count = () => {
+    const bottom = ol.current?.getBoundingClientRect().bottom ?? 0;
+    setBelow([...(ol.current?.querySelectorAll(".alert") ?? [])].filter((item) => item.getBoundingClientRect().top > bottom - 24).length);
+  };
+  useEffect(count);
+  return (
+    <section class="panel alerts" aria-label="Alerts">
+      <div class="panel-head">
+        <h2>Alerts</h2>
+        <span class={`count${waiting > 0 ? " waiting" : ""}`}>{waiting > 0 ? `${waiting} not acknowledged` : list.length > 0 ? `${list.length} acknowledged` : "none"}</span>
+      </div>
+      <div class="buttons">
+        <button type="button" class="all" disabled={!may || waiting === 0} onClick={() => acknowledge(0)} title="Shift+A">Acknowledge all</button>
+        <button type="button" disabled={!may} onClick={silence} title="Silence for 30 s (S)">Silence</button>
+        <SoundButtons />
+      </div>
+      <ol class="alert-list" ref={ol} onScroll={count} tabIndex={0} aria-label="Alerts, first what has to be looked at first">
+        {list.slice(0, SHOWN).map((alert) => <Item key={alert.number} alert={alert} may={may} />)}
+        {list.length === 0 ? <li class="none">nothing to report</li> : null}
+      </ol>
+      {hidden + below > 0 ? <p class="more">{hidden + below} more hidden{below > 0 ? " below" : ""}</p> : null}
+    </section>
+  );
+}
+
+function Item({ alert, may }: { alert: Alert; may: boolean }) {
+  const open = isUnacknowledged(alert), rectified = alert.state === "rectified";
+  const go = alert.from_m === null ? null : (alert.from_m + (alert.to_m ?? alert.from_m)) / 2;
+  return (
+    <li class={`alert ${alert.priority}${open ? " open" : ""}${rectified ? " rectified" : ""}`} data-number={alert.number} data-state={alert.state} data-kind={alert.kind}>
+      <Mark alert={alert} />
+      <div class="what">
+        <div class="line"><b class="priority">{PRIORITY_WORDS[alert.priority]}</b> <span class="number">#{alert.number}</span> <Since alert={alert} />{rectified ? " · over, not acknowledged" : ""}{alert.acknowledged ? ` · ack ${alert.acknowledged.by}` : ""}</div>
+        <div class="text">{alert.text}{alert.count > 1 ? ` (${alert.count} times)` : ""}</div>
+        {alert.advice ? <div class="do">→ {alert.advice}</div> : null}
+      </div>
+      <div class="do-buttons">
+        {go === null ? null : <button type="button" class="show" onClick={() => actions.goTo(go, 30)} aria-label={`Show alert ${alert.number} on the wall`}>Show</button>}
+        {open ? <button type="button" class="ack" disabled={!may} onClick={() => acknowledge(alert.number)} aria-label={`Ack alert ${alert.number}`} title="Acknowledge (A)">Ack</button> : null}
+      </div>
+    </li>
+  );
+}
+
+/** The shape of a priority: triangle for alarms, diamond for warnings, circle for cautions. */
+function Mark({ alert }: { alert: Alert }) {
+  const alarm = alert.priority === "alarm" || alert.priority === "emergency_alarm";
+  return (
+    <svg class="mark-shape" width="26" height="26" viewBox="0 0 24 24" aria-hidden="true">
+      {alarm ? <path d="M12 1.5L23 22H1z" /> : alert.priority === "warning" ? <path d="M12 1L23 12 12 23 1 12z" /> : <circle cx="12" cy="12" r="10" />}
+      <path class="in" d={alarm ? "M12 8v7M12 17.5v2" : "M12 6v8M12 16v2"} />
+    </svg>
+  );
+}
+
+function Since({ alert }: { alert: Alert }) {
+  useTopics(store.topics.state);
+  const now = store.state?.now_s;
+  return <span class="since">{now === undefined ? "" : `${span(now - alert.since_s)} ago`}</span>;
+}
+
+/** Says new alerts to a screen reader: alarms at once. */
+export function AlertAnnouncer() {
+  useTopics(store.topics.alerts);
+  const newest = sorted(store.alerts.values()).find((alert) => isUnacknowledged(alert) && alert.state === "active");
+  const alarm = newest && newest.priority !== "warning";
+  const text = newest ? `${PRIORITY_WORDS[newest.priority]}: ${newest.text}. ${newest.advice ?? ""}` : "";
+  return (
+    <>
+      <div class="sr" role="alert">{alarm ? text : ""}</div>
+      <div class="sr" aria-live="polite">{alarm ? "" : text}</div>
+    </>
+  );
+}

@@ -1,0 +1,33 @@
+// Sound and speech: on, off, muted by class.
+import { CLASSES } from "../store/alerts";
+import { prefs, prefsTopic, setPrefs } from "../store/prefs";
+import { useTopics } from "../store/topic";
+import { isAudible, soundTopic, unlock } from "./sound";
+
+export function toggleSound(): void {
+  unlock();
+  setPrefs({ sound: !(prefs.sound && isAudible()) });
+}
+
+export function SoundButtons() {
+  useTopics(prefsTopic, soundTopic);
+  const word = !prefs.sound ? "Sound off" : isAudible() ? "Sound on" : "Sound: tap";
+  const title = prefs.sound && !isAudible() ? "The browser gives no sound before the page is touched" : "Sound (M)";
+  return (
+    <>
+      <button type="button" class={prefs.sound && !isAudible() ? "wants" : ""} aria-pressed={prefs.sound} onClick={toggleSound} title={title}>{word}</button>
+      <details class="mutes">
+        <summary title="Which alerts sound, and speech">Mute</summary>
+        <div class="mutes-box">
+          {CLASSES.map((each) => (
+            <label key={each}>
+              <input type="checkbox" checked={prefs.muted.includes(each)}
+                onChange={(event) => setPrefs({ muted: event.currentTarget.checked ? [...prefs.muted, each] : prefs.muted.filter((other) => other !== each) })} /> mute {each}
+            </label>
+          ))}
+          <label><input type="checkbox" checked={prefs.speech} onChange={(event) => setPrefs({ speech: event.currentTarget.checked })} /> speak alerts (V)</label>
+        </div>
+      </details>
+    </>
+  );
+}

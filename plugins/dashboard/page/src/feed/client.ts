@@ -1,0 +1,88 @@
+// Where what is shown comes from: the program's feed, or the dive in this file.
+import { prefs } from "../store/prefs";
+import { store } from "../store/store";
+import { HEADER_BYTES, SAMPLE_BYTES, frameOf, type Frame } from "./binary";
+import { Feed } from "./feed";
+import { embedded, entryAt, readDive, stateAt, type Dive } from "./file";
+import type { Command } from "./types";
+
+let feed: Feed | null = null;
+let dive: Dive | null = null;
+let entry = 0;
+
+export function start(): void {
+  setInterval(() => store.topics.clock.changed(), 200);
+  store.link.since_ms = performance.now();
+  const file = embedded();
+  if (file !== null) {
+    void readDive(file, store).then(
+      (read) => {
+        dive = read;
+        store.end = null;
+        seekFile(read.t_s.at(-1) ?? 0);
+      },
+      (error: unknown) => {
+        store.link.phase = "lost";
+        store.answered(`the dive in this file can't be read: ${String(error)}`, true);
+        store.topics.link.changed();
+      },
+    );
+    return;
+  }
+  feed = new Feed(store, new URL(location.href));
+  feed.start();
+  document.addEventListener("visibilitychange", () => feed?.send({ do: "rate", hz: document.hidden || prefs.slow ? 1 : 5 }));
+}
+
+export function send(command: Command): void {
+  if (dive) store.answered("this is a file: nothing can be changed in it", true);
+  else feed?.send(command);
+}
+
+export const login = (token: string): Promise<boolean> => feed?.login(token) ?? Promise.resolve(false);
+export const reconnect = (): void => feed?.again();
+export const acknowledge = (alert: number): void => send({ do: "acknowledge", alert, by: prefs.by });
+export const silence = (): void => send({ do: "silence", by: prefs.by });
+export const note = (text: string): void => send({ do: "note", text, by: prefs.by });
+
+/** The file's dive as it was at a time. */
+export function seekFile(at_s: number): void {
+  if (!dive) return;
+  entry = entryAt(dive.t_s, at_s);
+  const state = stateAt(dive, entry);
+  if (!state) return;
+  const from_s = dive.t_s[0] ?? 0;
+  store.take({ ...state, playback: { paused: true, speed: null, at_s: dive.t_s[entry] ?? 0, from_s, to_s: dive.t_s.at(-1) ?? 0 } });
+}
+
+export function stepFile(by: number): void {
+  if (dive) seekFile(dive.t_s[Math.min(Math.max(entry + by, 0), dive.t_s.length - 1)] ?? 0);
+}
+
+/** Samples between two chainages, from the program or the file; of so many there is one. */
+export async function samples(from_m: number, to_m: number, signal: AbortSignal): Promise<{ frame: Frame; oneOf: number }> {
+  if (dive) return { frame: fromFile(dive, from_m, to_m), oneOf: store.hello?.thinned ? 2 : 1 };
+  const url = new URL("/samples", location.href);
+  url.searchParams.set("from_m", from_m.toFixed(2));
+  url.searchParams.set("to_m", to_m.toFixed(2));
+  const response = await fetch(url, { signal, credentials: "same-origin" });
+  if (!response.ok) throw new Error(`samples from ${from_m.toFixed(0)} to ${to_m.toFixed(0)} m: ${response.status}`);
+  return { frame: frameOf(await response.arrayBuffer()), oneOf: Number(response.headers.get("headrace-one-of") ?? 1) };
+}
+
+function fromFile({ samples }: Dive, from_m: number, to_m: number): Frame {
+  const records: Uint8Array[] = [];
+  for (const { view, count } of samples) {
+    for (let at = 0; at < count * SAMPLE_BYTES; at += SAMPLE_BYTES) {
+      const x = view.getFloat32(at + 4, true);
+      if (x >= from_m && x < to_m) records.push(new Uint8Array(view.buffer, view.byteOffset + at, SAMPLE_BYTES));
+    }
+  }
+  const bytes = new Uint8Array(HEADER_BYTES + records.length * SAMPLE_BYTES);
+  const head = new DataView(bytes.buffer);
+  head.setUint8(0, 2);
+  head.setUint8(1, 1);
+  head.setUint32(4, records.length, true);
+  records.forEach((record, at) => bytes.set(record, HEADER_BYTES + at * SAMPLE_BYTES));
+  return frameOf(bytes.buffer);
+}

@@ -1,0 +1,101 @@
+// What comes over the feed, as the server names it. Lengths in metres, times in seconds on the log's clock.
+
+export type Mode = "live" | "demo" | "replay" | "file";
+export type Lamp = "green" | "amber" | "red";
+export type Condition =
+  | "no_data" | "old" | "no_position" | "no_sonar" | "no_speed" | "too_fast" | "turn_fails" | "cannot_say" | "over" | "good";
+export type Priority = "emergency_alarm" | "alarm" | "warning" | "caution";
+export type AlertClass = "coverage" | "speed" | "position" | "sensor" | "recording" | "setting";
+
+export interface Head { id: string; source: number; hidden_deg: [number, number][] }
+
+export interface Hello {
+  type: "hello"; seq: number; version: number; program: string; instance: string; mode: Mode;
+  dive: string; vehicle: string; target_m: number; section_m: number; confidence_sd: number;
+  length_m: number | null; perimeter_m: number; profile: [number, number][]; clock_arc_m: number[];
+  heads: Head[]; sensors: { id: string; plugin: string; kind: string }[];
+  may: { operate: boolean; playback: boolean };
+  begun_s: number; utc_of_zero_s: number | null; causes: string[]; whys: string[];
+  span_s: [number, number] | null; tokens_needed: boolean; thinned?: number | null;
+}
+
+export interface Sensor {
+  id: string; state: "ok" | "silent" | "never" | "stalled" | "distrusted"; age_s: number | null; is_head: boolean;
+}
+
+export interface Turn {
+  target_m: number; predicted_t_m: number | null; will_exceed: boolean; t_y_m: number; pass_gap_s: number;
+  phase_error_deg: number | null;
+}
+
+export interface State {
+  type: "state"; seq?: number; t_s: number; text: string; now_s: number; at_s: number | null; age_s: number | null; old: boolean;
+  condition: Condition; lamp: Lamp; recording_fails?: boolean;
+  position: {
+    state: "ok" | "doubtful" | "none"; why: string | null; chainage_m: number | null; station: string | null;
+    chainage_sd_m: number | null; place_sd_m: number | null; yaw_sd_deg: number | null; pass_sd_m: number | null;
+  };
+  speed_mps: number | null; v_max_mps: number | null; reason: string | null; remedy?: string | null;
+  margins: { speed_mps: number | null; turn_m: number | null; position_m: number | null };
+  turn: Turn | null;
+  sensors: Sensor[];
+  metres: { pass_m: number; fail_m: number; cannot_say_m: number; open_m: number; not_inspected_m: number; way_m: number };
+  cannot_say: { why: string; from_m: number; to_m: number } | null;
+  /** The replay has reached its end, or the dive has ended. */
+  ended?: boolean;
+  alert_list?: Alert[]; alerts_hidden?: number;
+  left?: { cable_m: number | null; time_s: number | null; battery_pct: number | null } | null;
+  pose?: { y_m: number; z_m: number; roll_deg: number; pitch_deg: number; yaw_deg: number } | null;
+  echosounders?: Echosounder[];
+  rates?: { id: string; hz: number }[];
+  recording?: { on: boolean; fails: boolean; path: string | null } | null;
+  playback?: Playback | null;
+}
+
+export interface Echosounder {
+  id: string; range_m: number | null; age_s: number | null; from: [number, number]; to: [number, number] | null;
+}
+export interface Playback { paused: boolean; speed: number | null; at_s: number; from_s: number; to_s: number }
+
+export interface Alert {
+  number: number; priority: Priority; class: AlertClass; kind: string; text: string; advice: string | null;
+  state: "active" | "rectified" | "cleared"; since_s: number; rectified_s: number | null; cleared_s: number | null;
+  acknowledged: { by: string; at_s: number } | null; silenced_until_s: number | null; sounds: boolean;
+  needs_acknowledgement: boolean; from_m: number | null; to_m: number | null; back_to_m: number | null;
+  at_most_mps: number | null; sensor: string | null; count: number;
+}
+
+export interface Note {
+  number: number; at_s: number; by: string; text: string; chainage_m: number | null; station: string | null;
+}
+export interface Leg { from_m: number; to_m: number; at_most_mps: number | null; why: string }
+export interface Back { legs: Leg[]; way_m: number; time_s: number }
+export interface History { t_s: number[]; v_mps: (number | null)[]; v_max_mps: (number | null)[]; t_m: (number | null)[] }
+
+/** A line of `--json-lines` that is told once. */
+export interface Told { type: string; t_s: number; text: string }
+
+export type Message =
+  | Hello | State | Told
+  | { type: "alerts"; list: Alert[]; hidden?: number }
+  | { type: "alert_change"; change: string; alert: Alert }
+  | { type: "notes"; list: Note[] }
+  | (Note & { type: "note" })
+  | ({ type: "history" } & History)
+  | ({ type: "back" } & Back)
+  | { type: "ready" }
+  | { type: "refused"; why: string }
+  | { type: "done"; do: string }
+  | { type: "timeline"; t_s: number[]; states: Partial<State>[] }
+  | { type: "end"; summary?: unknown; digest?: string; exit?: number };
+
+/** What the page sends. */
+export type Command =
+  | { do: "acknowledge"; alert: number; by: string }
+  | { do: "silence"; by: string }
+  | { do: "note"; text: string; by: string }
+  | { do: "mark"; by: string }
+  | { do: "play"; command: "pause" | "go" | "step" | "step_section" | "end" }
+  | { do: "play"; command: "speed"; speed: number | null }
+  | { do: "play"; command: "seek"; to_s: number }
+  | { do: "rate"; hz: number };

@@ -1,0 +1,77 @@
+// The operator's page: everything, or by its path one part of it.
+import { render } from "preact";
+import { AlertAnnouncer, Alerts } from "./alerts/Alerts";
+import { startSound } from "./alerts/sound";
+import { startSpeech } from "./alerts/speech";
+import { start } from "./feed/client";
+import { Help } from "./keys/Help";
+import { startKeys } from "./keys/keys";
+import { Replay } from "./replay/Replay";
+import { Section } from "./section/Section";
+import { History } from "./side/History";
+import { Back, Metres } from "./side/Metres";
+import { NoteDialog, Notes } from "./side/Notes";
+import { Sensors } from "./side/Sensors";
+import { Announcer, Condition, Place, Speed } from "./speed/Speed";
+import { hasEnded, isOld, lost_s, shown } from "./store/age";
+import { prefs, setPrefs } from "./store/prefs";
+import { store } from "./store/store";
+import "./style/palettes.css";
+import "./style/page.css";
+import "./style/panels.css";
+import { Status } from "./ui/Status";
+import { Token } from "./ui/Token";
+import { Wall } from "./wall/Wall";
+
+function Top() {
+  return <header class="top"><Condition /><Speed /><Place /></header>;
+}
+
+function Whole() {
+  return (
+    <>
+      <h1 class="sr">headrace</h1>
+      <Top />
+      <Token />
+      <main>
+        <Wall />
+        <Alerts />
+        <div class="lower"><Section /><Sensors /><div class="stack"><Metres /><Back /></div><div class="stack"><History /><Notes /></div></div>
+      </main>
+      <Replay />
+      <Status />
+      <Announcer />
+      <AlertAnnouncer />
+      <NoteDialog />
+      <Help />
+    </>
+  );
+}
+
+const WIDGETS: Record<string, () => preact.JSX.Element> = {
+  speed: () => <><h1 class="sr">headrace: speed</h1><Token /><main><Top /></main><Announcer /></>,
+  wall: () => <><h1 class="sr">headrace: wall</h1><Token /><main><Wall /></main></>,
+  alerts: () => <><h1 class="sr">headrace: alerts</h1><Token /><main><Alerts /></main><AlertAnnouncer /></>,
+};
+
+/** The whole page is visibly old where what it shows is, whatever part is looked at. */
+function watch(): void {
+  const { dataset } = document.documentElement;
+  const lost = lost_s(store);
+  dataset["old"] = String(store.link.phase !== "refused" && !hasEnded(store) && (isOld(store) || (lost !== null && lost > 2)));
+  const { word } = shown(store);
+  const title = `${word} - headrace`;
+  if (document.title !== title) document.title = title;
+}
+
+const widget = /\/widget\/(\w+)\/?$/.exec(location.pathname)?.[1] ?? "";
+const View = WIDGETS[widget] ?? Whole;
+document.documentElement.dataset["widget"] = widget in WIDGETS ? widget : "";
+setPrefs({ palette: prefs.palette });
+render(<View />, document.getElementById("page") as HTMLElement);
+startKeys();
+startSound();
+startSpeech();
+start();
+store.topics.clock.on(watch);
+store.topics.state.on(watch);

@@ -1,0 +1,71 @@
+// Metres of the way by verdict, what is left, and the way back for what is missed.
+import { store } from "../store/store";
+import { useTopics } from "../store/topic";
+import { figure, metres, span, station } from "../text/format";
+import { VERDICTS } from "../text/words";
+import { actions } from "../wall/control";
+
+const ORDER = ["pass_m", "fail_m", "cannot_say_m", "not_inspected_m", "open_m"] as const;
+
+export function Metres() {
+  useTopics(store.topics.state);
+  const all = store.state?.metres;
+  const whole = Math.max(all?.way_m ?? 0, 1e-9);
+  let at = 0;
+  return (
+    <section class="panel metres" aria-label="Metres by verdict">
+      <div class="panel-head"><h2>Metres</h2><span class="count">{all ? `${metres(all.way_m)} of way` : ""}</span></div>
+      <svg class="bar" viewBox="0 0 1000 20" preserveAspectRatio="none" aria-hidden="true">
+        <defs>
+          <pattern id="unsure" width="10" height="10" patternUnits="userSpaceOnUse" patternTransform="rotate(45)"><rect width="10" height="10" class="v-cannot-say" /><rect width="4" height="10" class="v-stripe" /></pattern>
+        </defs>
+        {ORDER.map((key) => {
+          const share = ((all?.[key] ?? 0) / whole) * 1000, x = at;
+          at += share;
+          return <rect key={key} x={x} y="0" width={Math.max(share > 0 ? 4 : 0, share)} height="20" class={`v-${key.replace(/_m$/, "").replaceAll("_", "-")}`} fill={key === "cannot_say_m" ? "url(#unsure)" : undefined} />;
+        })}
+      </svg>
+      <dl>
+        {ORDER.map((key) => (
+          <div key={key} class={key === "fail_m" && (all?.fail_m ?? 0) > 0 ? "bad" : ""}>
+            <dt><i class={`key v-${key.replace(/_m$/, "").replaceAll("_", "-")}`} />{VERDICTS[key]}</dt><dd>{all ? metres(all[key]) : "–"}</dd>
+          </div>
+        ))}
+      </dl>
+      <Left />
+    </section>
+  );
+}
+
+function Left() {
+  const left = store.state?.left;
+  if (!left || (left.cable_m === null && left.time_s === null && left.battery_pct === null)) return null;
+  return (
+    <dl class="left" aria-label="What is left">
+      {left.cable_m === null ? null : <div class={left.cable_m < 50 ? "bad" : ""}><dt>cable left</dt><dd>{metres(left.cable_m)}</dd></div>}
+      {left.time_s === null ? null : <div class={left.time_s < 600 ? "bad" : ""}><dt>time left</dt><dd>{span(left.time_s)}</dd></div>}
+      {left.battery_pct === null ? null : <div class={left.battery_pct < 25 ? "bad" : ""}><dt>battery left</dt><dd>{figure(left.battery_pct, 0)} %</dd></div>}
+    </dl>
+  );
+}
+
+export function Back() {
+  useTopics(store.topics.back);
+  const { legs, way_m, time_s } = store.back;
+  return (
+    <section class="panel back" aria-label="The way back">
+      <div class="panel-head"><h2>Way back</h2><span class="count">{legs.length === 0 ? "" : `${metres(way_m)}, ${span(time_s)}`}</span></div>
+      {legs.length === 0 ? <p class="none">nothing to go back for</p> : (
+        <ol tabIndex={0} aria-label="Legs, cheapest order">
+          {legs.map((leg) => (
+            <li key={`${leg.from_m}-${leg.to_m}`}>
+              <button type="button" class="leg" onClick={() => actions.goTo((leg.from_m + leg.to_m) / 2, 30)}>
+                <b>{station(leg.from_m)} to {station(leg.to_m)}</b>{leg.at_most_mps === null ? "" : ` at most ${figure(leg.at_most_mps, 2)}`}<span class="leg-why"> {leg.why.replaceAll("_", " ")}</span>
+              </button>
+            </li>
+          ))}
+        </ol>
+      )}
+    </section>
+  );
+}

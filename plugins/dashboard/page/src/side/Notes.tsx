@@ -1,0 +1,67 @@
+// Notes: what was written at a place. N writes one at the present place.
+import { useEffect, useRef } from "preact/hooks";
+import { note } from "../feed/client";
+import { store } from "../store/store";
+import { useTopics } from "../store/topic";
+import { clock, station } from "../text/format";
+import { actions } from "../wall/control";
+
+const MOST_BYTES = 240;
+let show: (() => void) | null = null;
+
+/** Opens the field at once: what is typed next belongs into it. */
+export function openNote(): void {
+  show?.();
+}
+
+export function Notes() {
+  useTopics(store.topics.notes, store.topics.hello);
+  const begun = store.hello?.begun_s ?? 0;
+  return (
+    <section class="panel notes" aria-label="Notes">
+      <div class="panel-head"><h2>Notes</h2><button type="button" disabled={!(store.hello?.may.operate ?? false)} onClick={openNote} title="Note at this place (N)">Note…</button></div>
+      <ol tabIndex={0} aria-label="Notes, newest first">
+        {[...store.notes].reverse().map((each) => (
+          <li key={each.number}>
+            <button type="button" class="leg" disabled={each.chainage_m === null} onClick={() => each.chainage_m !== null && actions.goTo(each.chainage_m, 30)}>
+              <b>{each.chainage_m === null ? clock(each.at_s - begun) : station(each.chainage_m)}</b> {each.text || "mark"} <span class="leg-why">{each.by}</span>
+            </button>
+          </li>
+        ))}
+        {store.notes.length === 0 ? <li class="none">none yet</li> : null}
+      </ol>
+    </section>
+  );
+}
+
+export function NoteDialog() {
+  useTopics(store.topics.state);
+  const dialog = useRef<HTMLDialogElement>(null), field = useRef<HTMLInputElement>(null);
+  useEffect(() => {
+    show = () => {
+      if (!dialog.current?.open) dialog.current?.showModal();
+      field.current?.focus();
+    };
+    return () => { show = null; };
+  }, []);
+  const close = () => dialog.current?.close();
+  const submit = (event: Event) => {
+    event.preventDefault();
+    let text = field.current?.value.trim() ?? "";
+    while (new TextEncoder().encode(text).length > MOST_BYTES) text = text.slice(0, -1);
+    note(text);
+    if (field.current) field.current.value = "";
+    close();
+  };
+  const at = store.state?.position.chainage_m;
+  return (
+    <dialog ref={dialog} class="note" aria-label="Note">
+      <form onSubmit={submit}>
+        <label>Note at {at === null || at === undefined ? "this time" : station(at, 1)}
+          <input ref={field} type="text" maxLength={MOST_BYTES} autocomplete="off" />
+        </label>
+        <span class="buttons"><button type="submit">Keep (Enter)</button><button type="button" onClick={close}>Cancel (Esc)</button></span>
+      </form>
+    </dialog>
+  );
+}

@@ -1,0 +1,52 @@
+// A lamp for every sensor: state in words, rate, age. Ages go on while nothing comes.
+import { OLD_AFTER_S, sinceState_s } from "../store/age";
+import type { Sensor } from "../feed/types";
+import { store } from "../store/store";
+import { useTopics } from "../store/topic";
+import { figure, span } from "../text/format";
+import { SENSOR_STATES } from "../text/words";
+import { Shape } from "../ui/Shape";
+
+export function Sensors() {
+  useTopics(store.topics.state, store.topics.hello, store.topics.clock);
+  const { state, hello } = store;
+  const since = sinceState_s(store);
+  return (
+    <section class="panel sensors" aria-label="Sensors">
+      <div class="panel-head"><h2>Sensors</h2></div>
+      <ul>
+        {inOrder(state?.sensors ?? []).map((sensor) => {
+          const age = sensor.age_s === null ? null : sensor.age_s + since;
+          // Where the program itself isn't heard, nothing is known of its sensors.
+          const is = since > OLD_AFTER_S ? "unknown" : sensor.state;
+          const lamp = is === "ok" ? "green" : is === "unknown" ? "none" : is === "stalled" || is === "distrusted" ? "amber" : "red";
+          const hz = state?.rates?.find((rate) => rate.id === sensor.id)?.hz;
+          const kind = hello?.sensors.find((each) => each.id === sensor.id)?.kind ?? "";
+          const word = SENSOR_STATES[is] ?? is;
+          return (
+            <li key={sensor.id} class={`sensor ${lamp}`} data-sensor={sensor.id} data-state={is} title={kind}>
+              <Shape lamp={lamp} size={18} />
+              <span class="id">{sensor.id}</span>
+              {is === "ok" ? <span class="rate">{hz === undefined ? "" : `${figure(hz, hz < 10 ? 1 : 0)} Hz`}</span> : <span class="bad">{word} {age === null || is === "unknown" ? "" : span(age)}</span>}
+            </li>
+          );
+        })}
+      </ul>
+      <Recording />
+    </section>
+  );
+}
+
+/** What isn't well comes first: it must not be below the edge. */
+function inOrder(sensors: Sensor[]): Sensor[] {
+  return [...sensors.filter(({ state }) => state !== "ok"), ...sensors.filter(({ state }) => state === "ok")];
+}
+
+function Recording() {
+  const recording = store.state?.recording;
+  if (!recording) return null;
+  const failed = store.state?.recording_fails !== undefined;
+  const lamp = recording.fails ? "red" : !recording.on ? "none" : failed ? "amber" : "green";
+  const words = recording.fails ? "NOT RECORDED" : !recording.on ? "not recorded" : failed ? "recording had failed" : "recording";
+  return <div class={`recording sensor ${lamp}`} title={recording.path ?? ""}><Shape lamp={lamp} size={18} /><span class="id">{words}</span></div>;
+}

@@ -1,0 +1,107 @@
+// The condition, the speed, what is allowed and why: what a pilot reads at two metres.
+import { shown, age_s, isOld } from "../store/age";
+import { store } from "../store/store";
+import { useTopics } from "../store/topic";
+import { figure, span, station } from "../text/format";
+import { POSITION_WHY, REASONS } from "../text/words";
+import { Shape } from "../ui/Shape";
+import { marks, scaleEnd, TOO_FAST } from "./gauge";
+
+export function Condition() {
+  useTopics(store.topics.state, store.topics.link, store.topics.clock);
+  const { word, advice, lamp, old } = shown(store);
+  return (
+    <div class={`condition ${lamp}${old ? " old" : ""}${word.length > 14 ? " longest" : word.length > 9 ? " long" : ""}`} data-condition={store.state?.condition ?? ""}>
+      <Shape lamp={lamp} size={64} />
+      <div>
+        <div class="word">{word}</div>
+        <div class="advice">{advice}</div>
+      </div>
+    </div>
+  );
+}
+
+/** Says the condition once when it changes; not the seconds that count. */
+export function Announcer() {
+  useTopics(store.topics.state, store.topics.link, store.topics.clock);
+  const { word, advice } = shown(store);
+  const said = `${word.replace(/\d.*$/, "")} ${store.link.phase === "open" ? advice : ""}`;
+  return <div class="sr" role="status" aria-live="polite">{said}</div>;
+}
+
+export function Speed() {
+  useTopics(store.topics.state);
+  const { state } = store;
+  const speed = state?.speed_mps ?? null, most = state?.v_max_mps ?? null;
+  const margin = state?.margins.speed_mps ?? null;
+  return (
+    <div class="speed">
+      <div class="figures">
+        <div class="now"><span class="value">{figure(speed === null ? null : Math.abs(speed), 2)}</span><span class="unit">m/s{speed !== null && speed < -0.02 ? " back" : ""}</span></div>
+        <div class="most"><span class="name">max</span><span class="value">{figure(most, 2)}</span><span class="unit">m/s</span></div>
+        <div class="margin">{margin === null ? "" : margin >= 0 ? `${figure(margin, 2)} to spare` : `${figure(-margin, 2)} too fast`}</div>
+      </div>
+      <Gauge speed={speed} most={most} />
+      <div class="why">
+        {state?.reason ? <span><b>limit</b> {REASONS[state.reason] ?? state.reason}</span> : null}
+        {state?.remedy ? <span class="remedy"><b>to gain more</b> {state.remedy}</span> : null}
+      </div>
+      <Forecast />
+    </div>
+  );
+}
+
+function Gauge({ speed, most }: { speed: number | null; most: number | null }) {
+  const end = scaleEnd(speed, most), x = (v: number): number => Math.min(1000, (Math.abs(v) / end) * 1000);
+  const at = speed === null ? null : x(speed);
+  const told = speed === null ? "no speed" : `${figure(Math.abs(speed), 2)} of at most ${figure(most, 2)} metres a second`;
+  return (
+    <div class="gauge-box">
+    <svg class="gauge" viewBox="-14 0 1028 66" role="img" aria-label={`Speed: ${told}`} preserveAspectRatio="none">
+      <defs>
+        <pattern id="over" width="14" height="14" patternUnits="userSpaceOnUse" patternTransform="rotate(45)"><rect width="14" height="14" class="zone-red" /><rect width="5" height="14" class="zone-stripe" /></pattern>
+      </defs>
+      <rect x="0" y="22" width="1000" height="34" class="zone-none" />
+      {most === null ? null : <>
+        <rect x="0" y="22" width={x(most)} height="34" class="zone-green" />
+        <rect x={x(most)} y="22" width={x(most * TOO_FAST) - x(most)} height="34" class="zone-amber" />
+        <rect x={x(most * TOO_FAST)} y="22" width={1000 - x(most * TOO_FAST)} height="34" fill="url(#over)" />
+        <path class="limit" d={`M${x(most)} 14V64`} />
+      </>}
+      {marks(end).map((v) => <path class="tick" key={v} d={`M${x(v)} 56v9`} />)}
+      {at === null ? null : <path class="needle" d={`M${at} 58L${at - 13} 4H${at + 13}Z`} />}
+    </svg>
+    <div class="ticks" aria-hidden="true">{marks(end).map((v) => <span key={v} style={{ left: `${((x(v) + 14) / 1028) * 100}%` }}>{figure(v, end < 1 ? 2 : 1)}</span>)}</div>
+    </div>
+  );
+}
+
+/** What the present turn will come to, against the target. */
+function Forecast() {
+  const turn = store.state?.turn ?? null;
+  if (!turn) return <div class="forecast">no forecast for this turn</div>;
+  const { predicted_t_m, target_m, will_exceed } = turn;
+  const share = predicted_t_m === null ? 1 : Math.min(1, predicted_t_m / (2 * target_m));
+  const over = predicted_t_m === null || predicted_t_m > target_m;
+  return (
+    <div class={`forecast${over ? " over" : ""}`}>
+      <span>this turn: largest hole {predicted_t_m === null ? "unbounded" : `${figure(predicted_t_m, 2)} m`} of {figure(target_m, 2)} m {will_exceed ? "▲ misses" : over ? "▲" : "✓"}</span>
+      <svg viewBox="0 0 200 8" preserveAspectRatio="none" aria-hidden="true"><rect width="200" height="8" class="zone-none" /><rect width={share * 200} height="8" class={over ? "zone-red" : "zone-green"} /><path class="limit" d="M100 0V8" /></svg>
+    </div>
+  );
+}
+
+export function Place() {
+  useTopics(store.topics.state, store.topics.clock, store.topics.link);
+  const { state } = store, position = state?.position;
+  const age = age_s(store), dead = !position || position.state === "none";
+  return (
+    <div class="place">
+      <div class={`chainage${dead ? " dead" : ""}`}>{dead ? "no position" : station(position.chainage_m ?? 0, 1)}</div>
+      <div class="sure">
+        {dead ? (POSITION_WHY[position?.why ?? ""] ?? "") : <>± {figure(position.chainage_sd_m === null ? null : 2 * position.chainage_sd_m, 2)} m (95 %){position.state === "doubtful" ? <b class="doubt"> doubtful: {POSITION_WHY[position.why ?? ""] ?? ""}</b> : null}</>}
+      </div>
+      <div class={`age${isOld(store) ? " old" : ""}`}>{store.link.phase === "file" ? "from a file" : `data ${age === null ? "–" : span(age)} old`}</div>
+    </div>
+  );
+}

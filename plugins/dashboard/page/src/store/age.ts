@@ -1,0 +1,66 @@
+// How old what is shown is, and what the page says of it.
+import { conditionWords, type Shown } from "../text/words";
+import { span } from "../text/format";
+import type { Store } from "./store";
+
+/** What is older is shown as old, as in the loop. */
+export const OLD_AFTER_S = 2;
+
+/** Whether time stands still on purpose: what is shown doesn't grow old. */
+export function stands(store: Store): boolean {
+  return store.link.phase === "file" || hasEnded(store) || store.state?.playback?.paused === true;
+}
+
+/** Whether the dive has ended: nothing more is to come. */
+export function hasEnded(store: Store): boolean {
+  return store.end !== null || store.state?.ended === true;
+}
+
+/** Seconds since the state came. */
+export function sinceState_s(store: Store): number {
+  return stands(store) ? 0 : Math.max(0, (performance.now() - store.state_ms) / 1000);
+}
+
+/** Age of the data, seconds; null before the first. */
+export function age_s(store: Store): number | null {
+  const { state } = store;
+  if (!state || state.age_s === null) return null;
+  // The loop's own age counts only where it says that it is old: a replay's beats stand apart in time.
+  return state.age_s + sinceState_s(store);
+}
+
+export function isOld(store: Store): boolean {
+  const age = age_s(store);
+  return store.state !== null && (store.state.old || (age !== null && age > OLD_AFTER_S) || sinceState_s(store) > OLD_AFTER_S);
+}
+
+/** Seconds for which nothing has come; null while the connection stands. */
+export function lost_s(store: Store): number | null {
+  const { phase, heard_ms, since_ms } = store.link;
+  if (phase === "open" || phase === "file") return null;
+  return (performance.now() - (heard_ms || since_ms)) / 1000;
+}
+
+/** What the page shows as condition. */
+export function shown(store: Store): Shown {
+  const { state, link } = store;
+  const lost = lost_s(store);
+  if (link.phase === "refused") return { word: "NO ACCESS", advice: "a token is needed", lamp: "amber", old: true };
+  if (!state) {
+    const advice = link.phase === "open" ? "for the dive's state" : `for the program, ${span(lost ?? 0)}`;
+    return { word: "WAITING", advice, lamp: "amber", old: true };
+  }
+  const gone = sinceState_s(store);
+  if (hasEnded(store)) {
+    const advice = link.phase === "lost" ? "the program has closed" : "all is judged";
+    return { word: "DIVE ENDED", advice, lamp: "amber", old: false };
+  }
+  if (lost !== null && (lost > OLD_AFTER_S || gone > OLD_AFTER_S)) {
+    return { word: "NO CONNECTION", advice: `for ${span(Math.max(lost, gone))}: nothing here is current`, lamp: "red", old: true };
+  }
+  if (isOld(store)) {
+    const age = age_s(store) ?? gone;
+    return { word: `OLD ${span(age)}`, advice: "nothing from any sensor: stop", lamp: "red", old: true };
+  }
+  return { ...conditionWords(state), lamp: state.lamp, old: false };
+}

@@ -1,0 +1,58 @@
+// The words of conditions, verdicts, reasons. The one table of the page.
+import type { Condition, Lamp, State } from "../feed/types";
+import { figure, span } from "./format";
+
+/** What the page shows as condition: the loop's, or that it hears nothing of the loop. */
+export interface Shown { word: string; advice: string; lamp: Lamp; old: boolean }
+
+export const REASONS: Record<string, string> = {
+  helix_pitch: "passes would lie too far apart: slower helps",
+  angular_step: "steps round the wall are too wide: slower doesn't help",
+  no_heading_or_fix: "no heading or position to judge by",
+  no_returns: "no returns from the wall",
+};
+
+export const POSITION_WHY: Record<string, string> = {
+  cable: "the cable's counter isn't believed",
+  spread: "passes aren't known well enough against each other",
+  no_heading: "no heading",
+  no_chainage: "no chainage",
+  no_place_in_section: "no place across the tunnel",
+};
+
+export const VERDICTS = {
+  pass_m: "pass", fail_m: "missed", cannot_say_m: "can't say", open_m: "open", not_inspected_m: "not inspected",
+} as const;
+
+export const SENSOR_STATES: Record<string, string> = {
+  ok: "ok", silent: "silent", never: "never heard", stalled: "doesn't turn", distrusted: "not believed",
+};
+
+/** Words for a cause or why of the wire: too_fast is "too fast". */
+export function plain(name: string): string {
+  return name.replaceAll("_", " ");
+}
+
+export function atMost(state: State): string {
+  return state.v_max_mps === null ? "" : `at most ${figure(state.v_max_mps, 2)} m/s`;
+}
+
+/** Word and advice of a state's condition. */
+export function conditionWords(state: State): { word: string; advice: string } {
+  const most = atMost(state);
+  const slower = most === "" ? "slower" : `slow to ${figure(state.v_max_mps, 2)} m/s`;
+  const words: Record<Condition, [string, string]> = {
+    no_data: ["WAITING", "for the first data"],
+    old: [`OLD ${span(state.age_s ?? 0)}`, "nothing from any sensor: stop"],
+    no_position: ["NO POSITION", `${POSITION_WHY[state.position.why ?? ""] ?? "no position"}: hold still`],
+    no_sonar: ["NO SONAR", "nothing is seen: stop"],
+    no_speed: ["SLOWER WON'T HELP", state.remedy ?? "no speed meets the target here"],
+    too_fast: ["TOO FAST", slower],
+    turn_fails: ["THIS TURN MISSES", slower],
+    cannot_say: ["CAN'T SAY", `${POSITION_WHY[state.position.why ?? ""] ?? "position too unsure"}${most === "" ? "" : `: ${most}`}`],
+    over: ["A LITTLE FAST", slower],
+    good: ["GOOD", most === "" ? "" : `may go up to ${figure(state.v_max_mps, 2)} m/s`],
+  };
+  const [word, advice] = words[state.condition] ?? [state.text, ""];
+  return { word, advice };
+}

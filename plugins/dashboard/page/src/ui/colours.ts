@@ -1,0 +1,15 @@
+// Colours of the palette, for what is drawn on canvases. The style sheet has them; one table for both.
+import { prefsTopic } from "../store/prefs";
+
+let cache = new Map<string, string>();
+prefsTopic.on(() => (cache = new Map()));
+
+/** A colour of the style sheet, such as `ink` for --ink: #rrggbb. */
+export function colour(name: string): string {
+  let value = cache.get(name);
+  if (value === undefined) {
+    value = getComputedStyle(document.documentElement).getPropertyValue(`--${name}`).trim() || "#808080";
+    cache.set(name, value);
+  }
+  return value;
+}

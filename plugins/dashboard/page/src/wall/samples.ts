@@ -1,0 +1,120 @@
+// The samples near what is seen: fetched for a window of chainage, and grown by the live ones.
+import { SAMPLE_BYTES, type Frame } from "../feed/binary";
+import { downOf, type Round } from "./view";
+
+/** Floats a sample: x from the origin, fraction of the round from the crown (beyond 0 to 1 for the copy beside the seam), time, head + 16 outcome. */
+export const FLOATS = 4;
+/** A live frame of more records may have been thinned: the server sends at most 1,000 at once, one of several. */
+const WHOLE_LIVE = 500;
+/** After live frames that may have been thinned, all is asked for again, but not more often than this. */
+const AGAIN_MS = 2000;
+const CAPACITY = 260_000;
+const MARGIN = 0.3;
+
+export class SampleWindow {
+  from_m = NaN;
+  to_m = NaN;
+  origin_m = 0;
+  count = 0;
+  /** Not all samples are here: what is missed can't be shown by them. */
+  thinned = false;
+  private stale = false;
+  private asked_ms = -Infinity;
+  round: Round = { crown: 0, sign: 1 };
+  /** So near the seam, as a share of the round, a disc reaches over it. */
+  seam = 0;
+  readonly data = new Float32Array(CAPACITY * FLOATS);
+  /** Samples that have been handed to the graphics processor already. */
+  uploaded = 0;
+  private asked: AbortController | null = null;
+  private askedFrom_m = NaN;
+  private askedTo_m = NaN;
+
+  constructor(
+    private readonly fetch: (from_m: number, to_m: number, signal: AbortSignal) => Promise<{ frame: Frame; oneOf: number }>,
+    private readonly changed: () => void,
+  ) {}
+
+  clear(): void {
+    this.asked?.abort();
+    this.asked = null;
+    this.from_m = this.to_m = this.askedFrom_m = this.askedTo_m = NaN;
+    this.count = this.uploaded = 0;
+    this.thinned = this.stale = false;
+  }
+
+  covers(from_m: number, to_m: number): boolean {
+    return !this.thinned && !this.stale && from_m >= this.from_m && to_m <= this.to_m;
+  }
+
+  /** Sees to it that the samples between these are there; way: where there are any at all. */
+  want(from_m: number, to_m: number, way: [number, number], begun_s: number): void {
+    const from = Math.max(from_m, way[0]), to = Math.min(to_m, way[1]);
+    if (!(to > from) || this.covers(from, to)) return;
+    if (this.thinned && from_m >= this.from_m && to_m <= this.to_m && to_m - from_m > (this.to_m - this.from_m) * 0.4) return;
+    if (this.asked && from >= this.askedFrom_m && to <= this.askedTo_m) return;
+    if (this.stale && performance.now() - this.asked_ms < AGAIN_MS) return;
+    this.asked_ms = performance.now();
+    const margin = (to_m - from_m) * MARGIN;
+    const wantFrom = from_m - margin, wantTo = to_m + margin;
+    this.asked?.abort();
+    const asked = new AbortController();
+    this.asked = asked;
+    this.askedFrom_m = wantFrom;
+    this.askedTo_m = wantTo;
+    this.fetch(wantFrom, wantTo, asked.signal).then(
+      ({ frame, oneOf }) => {
+        if (this.asked !== asked) return;
+        this.asked = null;
+        this.stale = false;
+        this.thinned = oneOf > 1;
+        this.fill(frame, wantFrom, wantTo, way, begun_s);
+        this.changed();
+      },
+      () => {
+        // Without an answer the columns are shown; it is asked again when the view or the wall changes.
+        if (this.asked === asked) this.asked = null;
+      },
+    );
+  }
+
+  private fill(frame: Frame, from_m: number, to_m: number, way: [number, number], begun_s: number): void {
+    this.origin_m = Math.round((from_m + to_m) / 2);
+    // Beyond the ends of the way there is nothing but what comes live.
+    this.from_m = from_m <= way[0] ? -Infinity : from_m;
+    this.to_m = to_m >= way[1] ? Infinity : to_m;
+    this.count = this.uploaded = 0;
+    this.add(frame, begun_s);
+  }
+
+  /** Adds live samples that lie in the window. */
+  take(frame: Frame, begun_s: number): void {
+    if (Number.isNaN(this.from_m)) return;
+    if (frame.count > WHOLE_LIVE) this.stale = true;
+    this.add(frame, begun_s);
+  }
+
+  private put(x: number, down: number, t_s: number, kind: number): void {
+    if (this.count >= CAPACITY) return;
+    this.data.set([x, down, t_s, kind], this.count * FLOATS);
+    this.count += 1;
+  }
+
+  private add(frame: Frame, begun_s: number): void {
+    const { view, count } = frame;
+    if (this.count + count > CAPACITY) {
+      this.clear();
+      return;
+    }
+    for (let at = 0; at < count * SAMPLE_BYTES; at += SAMPLE_BYTES) {
+      const x = view.getFloat32(at + 4, true);
+      if (!(x >= this.from_m && x <= this.to_m)) continue;
+      const down = downOf(this.round, view.getUint16(at + 16, true) / 65536);
+      const t_s = begun_s + view.getUint32(at, true) / 1000;
+      const kind = Math.min(view.getUint8(at + 18), 15) + 16 * view.getUint8(at + 19);
+      this.put(x - this.origin_m, down, t_s, kind);
+      if (down < this.seam) this.put(x - this.origin_m, down + 1, t_s, kind);
+      else if (down > 1 - this.seam) this.put(x - this.origin_m, down - 1, t_s, kind);
+    }
+  }
+}

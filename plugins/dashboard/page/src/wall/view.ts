@@ -1,0 +1,81 @@
+// What of the unrolled wall is seen. Across: chainage. Down: fractions of the perimeter, from the crown by 3 o'clock.
+
+export interface View {
+  /** Chainage in the middle, m. */
+  centre_m: number;
+  /** Metres across the whole width. */
+  span_m: number;
+  /** Follows the vehicle. */
+  follow: boolean;
+  /** Shows the whole tunnel, however long it becomes. */
+  whole: boolean;
+  /** How many times the height of one round; 1 shows all clock positions. */
+  zoomDown: number;
+  /** Fraction of the round, from the crown, in the middle of the height. */
+  centreDown: number;
+}
+
+export const LEAST_SPAN_M = 1.5;
+export const FOLLOW_SPAN_M = 60;
+/** Where the vehicle stands in a view that follows it: share of the width behind it. */
+const BEHIND = 0.78;
+
+export function startView(): View {
+  return { centre_m: 0, span_m: FOLLOW_SPAN_M, follow: true, whole: false, zoomDown: 1, centreDown: 0.5 };
+}
+
+export const left_m = (view: View): number => view.centre_m - view.span_m / 2;
+export const right_m = (view: View): number => view.centre_m + view.span_m / 2;
+
+/** Follows a vehicle at a chainage that goes inwards (1) or back (-1); shows little of what lies before the portal. */
+export function followed(view: View, at_m: number, direction: number, portal_m: number): View {
+  const centre_m = at_m - direction * (BEHIND - 0.5) * view.span_m;
+  const least_m = Math.min(portal_m, at_m) + 0.46 * view.span_m;
+  return { ...view, centre_m: Math.max(centre_m, least_m) };
+}
+
+/** Zooms about a place of the width, 0 to 1; factor below 1 zooms in. */
+export function zoomed(view: View, factor: number, at: number, whole_m: number): View {
+  const span_m = Math.min(Math.max(view.span_m * factor, LEAST_SPAN_M), Math.max(whole_m * 1.1, FOLLOW_SPAN_M));
+  const fixed_m = left_m(view) + at * view.span_m;
+  return { ...view, whole: false, span_m, centre_m: fixed_m + (0.5 - at) * span_m };
+}
+
+export function moved(view: View, by_m: number): View {
+  return { ...view, centre_m: view.centre_m + by_m, follow: false, whole: false };
+}
+
+export function zoomedDown(view: View, factor: number): View {
+  return { ...view, zoomDown: Math.min(Math.max(view.zoomDown * factor, 1), 16) };
+}
+
+export function movedDown(view: View, by: number): View {
+  const down = view.centreDown + by / view.zoomDown;
+  return { ...view, centreDown: down - Math.floor(down) };
+}
+
+/** All of the way, from the portal. */
+export function wholeView(view: View, from_m: number, to_m: number): View {
+  const span_m = Math.max(to_m - from_m, LEAST_SPAN_M) * 1.04;
+  return { ...view, span_m, centre_m: (from_m + to_m) / 2, follow: false, whole: true, zoomDown: 1, centreDown: 0.5 };
+}
+
+/** Fractions of the round at the top edge, and how clock positions grow: down from 12 by 3, as seen inwards. */
+export interface Round { crown: number; sign: number }
+
+export function roundOf(clock_arc_m: number[], perimeter_m: number): Round {
+  const crown = (clock_arc_m[0] ?? 0) / perimeter_m;
+  const step = ((clock_arc_m[1] ?? 0) / perimeter_m - crown + 1) % 1;
+  return { crown, sign: step < 0.5 ? 1 : -1 };
+}
+
+/** Fraction of the round from the crown (0 to 1) of an arc length's fraction. */
+export function downOf(round: Round, arc: number): number {
+  const down = round.sign * (arc - round.crown);
+  return down - Math.floor(down);
+}
+
+/** Place in the height, 0 (top) to 1, of a fraction of the round; it repeats every `zoomDown`. */
+export function heightOf(view: View, down: number): number {
+  return (down - view.centreDown) * view.zoomDown + 0.5;
+}

@@ -1,0 +1,27 @@
+// Debian's Chromium by its path, with WebGL2 in software.
+import { chromium } from "playwright-core";
+
+export const EXECUTABLE = process.env.CHROMIUM ?? "/usr/bin/chromium";
+
+export function browser() {
+  return chromium.launch({
+    executablePath: EXECUTABLE,
+    args: ["--headless", "--no-sandbox", "--disable-gpu", "--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--disable-quic",
+      "--no-first-run", "--disable-background-networking", "--disable-component-update", "--disable-sync"],
+  });
+}
+
+/** A page of its own context, with what it prints and fails on gathered in `problems`. */
+export async function open(chromium, url, { width = 1280, height = 800, palette = "dusk", init, ...more } = {}) {
+  const context = await chromium.newContext({ viewport: { width, height }, ...more });
+  await context.addInitScript((palette) => {
+    if (localStorage.getItem("headrace.page") === null) localStorage.setItem("headrace.page", JSON.stringify({ palette }));
+  }, palette);
+  const page = await context.newPage();
+  if (init) await init(page);
+  const problems = [];
+  page.on("pageerror", (error) => problems.push(String(error)));
+  page.on("console", (message) => { if (message.type() === "error" && !/Failed to load resource|WebSocket connection/.test(message.text())) problems.push(message.text()); });
+  await page.goto(url);
+  return { page, context, problems };
+}

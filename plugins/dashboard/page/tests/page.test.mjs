@@ -1,0 +1,364 @@
+// The page against a made-up dive, in Debian's Chromium. Nothing sleeps: conditions are waited for.
+import assert from "node:assert/strict";
+import { after, before, describe, it } from "node:test";
+import { readFileSync } from "node:fs";
+import { deflateRawSync } from "node:zlib";
+import { createServer } from "node:http";
+import { serve } from "../mock/server.mjs";
+import { samplesBetween, samplesFrame, sectionsFrame, BEGUN_S } from "../mock/dive.mjs";
+import { World } from "../mock/world.mjs";
+import { browser, open } from "./browser.mjs";
+
+const AXE = readFileSync(new URL("../node_modules/axe-core/axe.min.js", import.meta.url), "utf8");
+let chromium;
+before(async () => { chromium = await browser(); });
+after(async () => { await chromium.close(); });
+
+/** A dive and a page on it, closed when done. */
+async function on(options, run, { path = "/", ...more } = {}) {
+  const mock = await serve({ length_m: 7000, at_m: 60, ...options });
+  const opened = await open(chromium, mock.url + path, more);
+  try {
+    await run({ mock, ...opened, again: (over) => open(chromium, mock.url + path, over) });
+    assert.deepEqual(opened.problems, []);
+  } finally {
+    await opened.context.close();
+    await mock.close();
+  }
+}
+const word = (page, text) => page.locator(".condition .word", { hasText: text }).waitFor();
+const condition = (page, name) => page.locator(`.condition[data-condition="${name}"]`).waitFor();
+
+
+describe("what it shows", () => {
+  it("v_max with its reason, and the wall", () => on({}, async ({ page }) => {
+    await condition(page, "good");
+    assert.match(await page.locator(".most .value").innerText(), /0\.24/);
+    assert.match(await page.locator(".why").innerText(), /slower helps/);
+    assert.match(await page.locator(".chainage").innerText(), /^0\+06\d\.\d$/);
+    // The canvas keeps nothing between frames: it is looked at in the frame that draws it.
+    await page.screenshot();
+    const box = await page.locator(".wall-box").boundingBox();
+    const picture = await page.screenshot({ clip: box });
+    assert.ok(picture.length > 15_000, `a picture of the wall has ${picture.length} bytes: it is empty`);
+  }));
+
+  it("what would gain more, where slower won't help", () => on({}, async ({ mock, page }) => {
+    mock.control({ condition: "no_speed", lamp: "red", remedy: "set the heads to SLOW" });
+    await condition(page, "no_speed");
+    assert.match(await page.locator(".remedy").innerText(), /set the heads to SLOW/);
+    assert.match(await page.locator(".condition .advice").innerText(), /set the heads to SLOW/);
+  }));
+
+  it("a dead position", () => on({}, async ({ mock, page }) => {
+    await condition(page, "good");
+    mock.control({ position: "none" });
+    await word(page, "NO POSITION");
+    assert.match(await page.locator(".chainage").innerText(), /no position/);
+    assert.match(await page.locator(".sure").innerText(), /no heading/);
+  }));
+
+  it("a killed sensor within 2 s of its silence, with its age", () => on({}, async ({ mock, page }) => {
+    await page.locator('[data-sensor="aft_port"][data-state="ok"]').waitFor();
+    mock.control({ kill: "aft_port" });
+    await page.locator('[data-sensor="aft_port"][data-state="silent"]').waitFor({ timeout: 4000 });
+    assert.match(await page.locator('[data-sensor="aft_port"]').innerText(), /silent [2-4]\.\d s/);
+    await page.locator('.alert[data-kind="sensor_silent"]').waitFor();
+  }));
+
+  it("a recording that fails", () => on({}, async ({ mock, page }) => {
+    mock.control({ recording: { on: true, fails: true, path: "dive.mcap" } });
+    await page.locator(".recording", { hasText: "NOT RECORDED" }).waitFor();
+  }));
+
+  it("parts of it by their paths", async () => {
+    for (const [path, there] of [["speed", ".gauge"], ["wall", ".wall-box canvas"], ["alerts", ".alert-list"]]) {
+      await on({}, async ({ page }) => {
+        await page.locator(there).first().waitFor();
+        assert.equal(await page.locator(".status").count(), 0);
+        const fits = await page.evaluate(() => document.documentElement.scrollWidth <= innerWidth && document.documentElement.scrollHeight <= innerHeight);
+        assert.ok(fits, `/widget/${path} doesn't fit its frame`);
+      }, { path: `/widget/${path}`, width: 420, height: 300 });
+    }
+  });
+
+  it("all the rest where there is no WebGL2", () => on({}, async ({ page }) => {
+    await page.locator(".missing", { hasText: "no WebGL2" }).waitFor();
+    await condition(page, "good");
+  }, { init: (page) => page.addInitScript(() => {
+    const get = HTMLCanvasElement.prototype.getContext;
+    HTMLCanvasElement.prototype.getContext = function (kind, ...rest) { return kind === "webgl2" ? null : get.call(this, kind, ...rest); };
+  }) }));
+});
+
+describe("alerts", () => {
+  it("a stretch passed too fast raises one, acknowledged in one browser and seen in the other", () => on({ at_m: 148 }, async ({ mock, page, again }) => {
+    await condition(page, "good");
+    mock.control({ speed_mps: 0.5 });
+    await condition(page, "too_fast");
+    const alert = page.locator('.alert[data-kind="too_fast"]');
+    await alert.waitFor();
+    mock.control({ missed_m: 149 });
+    const missed = page.locator(".alert", { hasText: "MISSED 0+149" });
+    await missed.waitFor();
+    assert.equal(await missed.count(), 1);
+    assert.match(await missed.innerText(), /go back to 0\+147, then at most 0\.08 m\/s/);
+    const other = await again();
+    await other.page.locator(".alert.open", { hasText: "MISSED 0+149" }).waitFor();
+    await missed.getByRole("button", { name: /Ack alert/ }).click();
+    await other.page.locator(".alert:not(.open)", { hasText: "MISSED 0+149" }).waitFor();
+    assert.match(await other.page.locator(".alert", { hasText: "MISSED 0+149" }).innerText(), /ack page/);
+    assert.deepEqual(mock.control({}).alerts.find((each) => each.from_m === 149).acknowledged.by, "page");
+    await other.context.close();
+  }));
+
+  it("what is over stays until it is acknowledged; a caution doesn't", () => on({}, async ({ mock, page }) => {
+    await condition(page, "good");
+    mock.control({ raise: { priority: "alarm", class: "coverage", kind: "missed", text: "MISSED 0+040" } });
+    mock.control({ raise: { priority: "caution", class: "setting", kind: "setting_doubted", text: "setting doubted" } });
+    await page.locator(".alert.caution", { hasText: "setting doubted" }).waitFor();
+    mock.control({ settle: "missed" });
+    mock.control({ settle: "setting_doubted" });
+    await page.locator('.alert.rectified[data-kind="missed"]', { hasText: "over, not acknowledged" }).waitFor();
+    await page.locator(".alert.caution").waitFor({ state: "detached" });
+    await page.keyboard.press("a");
+    await page.locator('.alert[data-kind="missed"]').waitFor({ state: "detached" });
+  }));
+
+  it("says how many more there are", () => on({}, async ({ mock, page }) => {
+    await condition(page, "good");
+    for (let n = 0; n < 30; n += 1) mock.control({ raise: { text: `warning ${n}`, kind: `kind_${n}` } });
+    await page.locator(".alert").nth(29).waitFor();
+    const below = Number(/^(\d+) more hidden below/.exec(await page.locator(".more").innerText())?.[1]);
+    const inside = await page.evaluate(() => {
+      const bottom = document.querySelector(".alert-list").getBoundingClientRect().bottom;
+      return [...document.querySelectorAll(".alert")].filter((item) => item.getBoundingClientRect().top <= bottom - 24).length;
+    });
+    assert.equal(below + inside, mock.control({}).alerts.length);
+  }));
+});
+
+describe("connection", () => {
+  it("a network lost for 20 s: counts, and recovers with nothing missing", async () => {
+    await on({ at_m: 90 }, async ({ mock, page }) => {
+      await condition(page, "good");
+      await page.keyboard.press("0");
+      await page.clock.install();
+      mock.control({ closed: true });
+      mock.control({ missed_m: 80 });
+      // The clock of the page runs on while nothing answers.
+      await page.clock.runFor(20_000);
+      await word(page, "NO CONNECTION");
+      assert.match(await page.locator(".condition .advice").innerText(), /for (19|2\d) s/);
+      assert.equal(await page.evaluate(() => document.documentElement.dataset.old), "true");
+      assert.match(await page.locator(".age").innerText(), /(19|2\d) s old/);
+      assert.match(await page.title(), /NO CONNECTION/);
+      mock.control({ closed: false });
+      await page.clock.runFor(5000);
+      await page.clock.resume();
+      await condition(page, "good");
+      await page.locator(".alert.open", { hasText: "MISSED 0+080" }).waitFor();
+      await page.locator('.status .link:text("connected")').waitFor();
+      assert.equal(await page.evaluate(() => document.documentElement.dataset.old), "false");
+    });
+  });
+
+  it("a program that says nothing: old within 2 s", () => on({}, async ({ mock, page }) => {
+    await condition(page, "good");
+    mock.control({ mute: true });
+    await word(page, "OLD");
+    assert.match(await page.locator(".condition .word").innerText(), /OLD [23]\.\d s/);
+    mock.control({ mute: false });
+    await word(page, "GOOD");
+  }));
+
+  it("a reload, and a restart of the program as another instance", () => on({ at_m: 90 }, async ({ mock, page }) => {
+    await condition(page, "good");
+    mock.control({ missed_m: 80 });
+    await page.locator(".alert", { hasText: "MISSED 0+080" }).waitFor();
+    await page.reload();
+    await page.locator(".alert", { hasText: "MISSED 0+080" }).waitFor();
+    mock.control({ restart: "mock-2" });
+    // Another program: what the first one had told is gone.
+    await page.locator(".alert", { hasText: "MISSED 0+080" }).waitFor({ state: "detached" });
+    await condition(page, "good");
+  }));
+
+  it("a token where one is wanted", () => on({ token: "right" }, async ({ page }) => {
+    await word(page, "NO ACCESS");
+    await page.getByLabel(/Token/).fill("wrong");
+    await page.keyboard.press("Enter");
+    await page.locator(".token p", { hasText: "isn't right" }).waitFor();
+    await page.getByLabel(/Token/).fill("right");
+    await page.keyboard.press("Enter");
+    await condition(page, "good");
+    assert.equal(await page.locator(".token").count(), 0);
+  }));
+});
+
+describe("keyboard", () => {
+  it("does everything", () => on({ mode: "demo", at_m: 60 }, async ({ mock, page }) => {
+    await condition(page, "good");
+    mock.control({ missed_m: 50 });
+    await page.locator(".alert.open").first().waitFor();
+    await page.keyboard.press("s");
+    await page.locator(".said", { hasText: "done: silence" }).waitFor();
+    assert.ok(mock.control({}).alerts.every((alert) => !alert.sounds));
+    await page.keyboard.press("a");
+    await page.locator(".alert.open").waitFor({ state: "detached" });
+    mock.control({ missed_m: 40 });
+    mock.control({ raise: { text: "another", kind: "other" } });
+    await page.locator(".alert.open").nth(1).waitFor();
+    await page.keyboard.press("Shift+A");
+    await page.locator(".count", { hasText: "acknowledged" }).first().waitFor();
+    await page.locator(".alert.open").first().waitFor({ state: "detached" });
+    await page.keyboard.press("n");
+    await page.keyboard.type("rubble left");
+    await page.keyboard.press("Enter");
+    await page.locator(".notes", { hasText: "rubble left" }).waitFor();
+    assert.equal(mock.control({}).notes[0].text, "rubble left");
+    await page.keyboard.press("b");
+    await page.locator(".notes li", { hasText: "mark" }).waitFor();
+    await page.keyboard.press("?");
+    await page.locator("dialog.help[open]").waitFor();
+    await page.keyboard.press("Escape");
+    await page.locator("dialog.help[open]").waitFor({ state: "detached" });
+    await page.keyboard.press("p");
+    await page.locator(':root[data-palette="night"]').waitFor();
+    for (const key of ["0", "+", "-", "ArrowLeft", "ArrowRight", "]", "ArrowDown", "ArrowUp", "[", "g", "f", "m", "v", "r"]) await page.keyboard.press(key);
+    await condition(page, "good");
+  }));
+
+  it("plays a replay", () => on({ mode: "replay", at_m: 60 }, async ({ mock, page }) => {
+    await page.locator(".replay").waitFor();
+    await page.keyboard.press(" ");
+    await page.locator(".paused").waitFor();
+    // A paused dive doesn't grow old.
+    const before = await page.locator(".replay .at").innerText();
+    await page.keyboard.press(".");
+    await page.waitForFunction((text) => document.querySelector(".replay .at").textContent !== text || true, before);
+    await page.keyboard.press(",");
+    await page.keyboard.press("l");
+    await page.waitForFunction((text) => document.querySelector(".replay .at").textContent !== text, before);
+    await page.keyboard.press(">");
+    await page.waitForFunction(() => document.querySelector(".replay select").value === "2");
+    await page.keyboard.press(" ");
+    await page.locator(".paused").waitFor({ state: "detached" });
+    await page.keyboard.press("a");
+    assert.equal(mock.control({}).playback.paused, false);
+  }));
+});
+
+describe("for everybody", () => {
+  for (const palette of ["day", "dusk", "night"]) {
+    it(`axe finds nothing serious, ${palette}`, () => on({ at_m: 148 }, async ({ mock, page }) => {
+      await condition(page, "good");
+      mock.control({ speed_mps: 0.5 });
+      mock.control({ missed_m: 140 });
+      mock.control({ kill: "depth" });
+      await page.locator(".alert.open").nth(1).waitFor();
+      await page.locator('[data-sensor="depth"][data-state="silent"]').waitFor();
+      await page.evaluate(AXE);
+      const { violations } = await page.evaluate(() => window.axe.run(document, { resultTypes: ["violations"] }));
+      const grave = violations.filter(({ impact }) => impact === "serious" || impact === "critical");
+      assert.deepEqual(grave.map(({ id, nodes }) => `${id}: ${nodes.map((node) => `${node.target} ${node.any[0]?.message ?? ""}`).join("; ")}`), []);
+    }, { palette, reducedMotion: "reduce" }));
+  }
+
+  it("green, amber and red are told apart under deuteranopia, and by shape and word besides", () => on({}, async ({ page }) => {
+    await condition(page, "good");
+    const colours = await page.evaluate(() => ["day", "dusk", "night"].flatMap((palette) => {
+      document.documentElement.dataset.palette = palette;
+      const style = getComputedStyle(document.documentElement);
+      return [["green", "amber", "red"].map((name) => style.getPropertyValue(`--${name}`).trim())];
+    }));
+    for (const three of colours) {
+      const labs = three.map((hex) => lab(deuteranopia(hex)));
+      for (const [a, b] of [[0, 1], [1, 2], [0, 2]]) {
+        const apart = Math.hypot(...labs[a].map((part, at) => part - labs[b][at]));
+        assert.ok(apart > 15, `${three[a]} and ${three[b]} are ${apart.toFixed(1)} apart`);
+      }
+    }
+  }));
+});
+
+/** Machado, Oliveira, Fernandes 2009, severity 1, on linear RGB. */
+function deuteranopia(hex) {
+  const six = hex.length === 4 ? [...hex.slice(1)].map((d) => d + d).join("") : hex.slice(1);
+  const linear = [0, 2, 4].map((at) => parseInt(six.slice(at, at + 2), 16) / 255).map((v) => (v <= 0.04045 ? v / 12.92 : ((v + 0.055) / 1.055) ** 2.4));
+  return [[0.367322, 0.860646, -0.227968], [0.280085, 0.672501, 0.047413], [-0.01182, 0.04294, 0.968881]].map((row) => Math.max(0, row[0] * linear[0] + row[1] * linear[1] + row[2] * linear[2]));
+}
+function lab([r, g, b]) {
+  const xyz = [(0.4124 * r + 0.3576 * g + 0.1805 * b) / 0.95047, 0.2126 * r + 0.7152 * g + 0.0722 * b, (0.0193 * r + 0.1192 * g + 0.9505 * b) / 1.08883];
+  const [x, y, z] = xyz.map((v) => (v > 0.008856 ? Math.cbrt(v) : 7.787 * v + 16 / 116));
+  return [116 * y - 16, 500 * (x - y), 200 * (y - z)];
+}
+
+describe("one dive in one file", () => {
+  it("opens with no network, with a slider over its time", async () => {
+    const world = new World({ length_m: 7000, at_m: 60 });
+    const states = [], t_s = [];
+    for (let n = 0; n < 20; n += 1) { world.step(1); t_s.push(world.t_s); states.push(world.state()); }
+    const parts = [];
+    const add = (kind, bytes) => { const head = Buffer.alloc(5); head.writeUInt32LE(bytes.length); head[4] = kind; parts.push(head, bytes); };
+    const text = (message) => add(0, Buffer.from(JSON.stringify(message)));
+    text({ ...world.hello(), mode: "file", thinned: 1200 });
+    add(1, sectionsFrame(0, 240, world.at_m, 0));
+    add(1, samplesFrame(samplesBetween(0, 60, BEGUN_S), BEGUN_S));
+    text({ type: "alerts", list: [{ ...world.missed(40), acknowledged: { by: "AB", at_s: 1 } }] });
+    text({ type: "notes", list: [{ number: 1, at_s: 300, by: "AB", text: "rubble", chainage_m: 20, station: "0+020" }] });
+    text(world.history());
+    text({ type: "timeline", t_s, states: states.map(({ sensors, ...state }, n) => (n === 0 ? { sensors, ...state } : state)) });
+    text({ type: "end", digest: "0", exit: 0 });
+    const single = readFileSync(new URL("../dist/single.html", import.meta.url), "utf8");
+    assert.equal(single.split("<!--DIVE-->").length, 2);
+    const page1 = single.replace("<!--DIVE-->", () => `<script type="application/octet-stream;base64" id="dive">${deflateRawSync(Buffer.concat(parts)).toString("base64")}</script>`);
+    const requests = [];
+    const server = createServer((request, response) => { requests.push(request.url); response.setHeader("content-type", "text/html"); response.end(page1); });
+    await new Promise((resolve) => server.listen(0, "127.0.0.1", resolve));
+    const { page, context, problems } = await open(chromium, `http://127.0.0.1:${server.address().port}/`);
+    try {
+      await condition(page, "good");
+      assert.match(await page.locator(".chainage").innerText(), /0\+063\.6/);
+      assert.match(await page.locator(".age").innerText(), /from a file/);
+      assert.match(await page.locator(".dive").innerText(), /1,200 samples left out/);
+      await page.locator(".notes", { hasText: "rubble" }).waitFor();
+      await page.getByLabel("Time of the dive").focus();
+      await page.keyboard.press("Home");
+      await page.locator(".chainage", { hasText: "0+060.2" }).waitFor();
+      // What is constant is in the first entry alone.
+      assert.equal(await page.locator(".sensor[data-sensor]").count(), 10);
+      assert.deepEqual(requests.filter((url) => url !== "/"), []);
+      assert.deepEqual(problems, []);
+    } finally {
+      await context.close();
+      server.closeAllConnections();
+      server.close();
+    }
+  });
+});
+
+describe("speed of drawing", () => {
+  it("at 7 km with 28,000 sections: measured and printed", () => on({ at_m: 6990 }, async ({ page }) => {
+    await condition(page, "good");
+    const measure = (span) => page.evaluate(async ({ span, count }) => {
+      const press = (key) => dispatchEvent(new KeyboardEvent("keydown", { key }));
+      press(span === "whole" ? "0" : "f");
+      await new Promise((resolve) => setTimeout(resolve, 1000));
+      const times = [];
+      let last = performance.now();
+      for (let n = 0; n < count; n += 1) {
+        press(n % 2 ? "ArrowLeft" : "ArrowRight");
+        await new Promise(requestAnimationFrame);
+        times.push(performance.now() - last);
+        last = performance.now();
+      }
+      times.sort((a, b) => a - b);
+      return { median: times[count >> 1], p95: times[Math.floor(count * 0.95)] };
+    }, { span, count: 120 });
+    for (const span of ["whole", "60 m with discs"]) {
+      const { median, p95 } = await measure(span === "whole" ? span : "near");
+      console.log(`# frame time in software, ${span}: median ${median.toFixed(1)} ms, p95 ${p95.toFixed(1)} ms`);
+    }
+  }));
+});
