@@ -83,7 +83,9 @@ impl Serving {
         };
         let further: String = headers.iter().map(|header| format!("{header}\r\n")).collect();
         let length = body.len();
-        let head = format!("{method} {path} HTTP/1.1\r\n{host}{further}Connection: close\r\nContent-Length: {length}\r\n\r\n");
+        let head = format!(
+            "{method} {path} HTTP/1.1\r\n{host}{further}Connection: close\r\nContent-Length: {length}\r\n\r\n"
+        );
         stream.write_all((head + body).as_bytes()).unwrap();
         let mut bytes = Vec::new();
         stream.read_to_end(&mut bytes).unwrap();
@@ -138,7 +140,11 @@ pub struct Viewer {
 
 impl Viewer {
     /// Connects; `query` begins with `?` or is empty.
-    pub fn connect(serving: &Serving, query: &str, headers: &[(&'static str, &str)]) -> Result<Self, tungstenite::Error> {
+    pub fn connect(
+        serving: &Serving,
+        query: &str,
+        headers: &[(&'static str, &str)],
+    ) -> Result<Self, tungstenite::Error> {
         let stream = TcpStream::connect(&serving.address).unwrap();
         stream.set_read_timeout(Some(WITHIN)).unwrap();
         let mut request = format!("ws://{}/feed{query}", serving.address).into_client_request()?;
@@ -185,7 +191,9 @@ impl Viewer {
     pub fn until_closed(&mut self) -> Option<(u16, String)> {
         loop {
             match self.socket.read() {
-                Ok(Message::Close(frame)) => return frame.map(|frame| (frame.code.into(), frame.reason.to_string())),
+                Ok(Message::Close(frame)) => {
+                    return frame.map(|frame| (frame.code.into(), frame.reason.to_string()));
+                }
                 Ok(message) => self.take(&message),
                 Err(_) => return None,
             }
@@ -234,7 +242,8 @@ impl Viewer {
             "state" => self.state = value,
             "alerts" => {
                 let list = value["list"].as_array().unwrap();
-                self.alerts = list.iter().map(|alert| (alert["number"].as_u64().unwrap(), alert.clone())).collect();
+                self.alerts =
+                    list.iter().map(|alert| (alert["number"].as_u64().unwrap(), alert.clone())).collect();
             }
             "notes" => self.notes = value["list"].as_array().unwrap().clone(),
             "alert_change" => {
@@ -258,8 +267,12 @@ impl Viewer {
                 self.section_frames = (self.section_frames.0 + 1, self.section_frames.1 + count as u64);
                 for at in (0..count).map(|number| 16 + 32 * number) {
                     let (verdict, cause) = (bytes[at + 4], bytes[at + 5]);
-                    let section =
-                        SeenSection { verdict, cause, hole_m: f32::from_bits(word(at + 8)), seen: long(at + 24) };
+                    let section = SeenSection {
+                        verdict,
+                        cause,
+                        hole_m: f32::from_bits(word(at + 8)),
+                        seen: long(at + 24),
+                    };
                     self.sections.insert(word(at).cast_signed(), section);
                 }
             }

@@ -389,6 +389,11 @@ impl Model {
         Some(value)
     }
 
+    /// Time of the state, seconds.
+    pub fn now_s(&self) -> Option<f64> {
+        self.state.as_ref().map(|shown| shown.0.now_s)
+    }
+
     /// Samples between two chainages, m, in a frame: at most [`MOST_IN_RANGE`], and of how many one.
     pub fn samples_frame(&self, from_m: f32, to_m: f32) -> (Vec<u8>, usize) {
         let (samples, step) = self.samples.between(from_m, to_m, MOST_IN_RANGE);

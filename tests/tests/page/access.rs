@@ -35,7 +35,8 @@ fn without_a_token_nothing_is_said_and_a_viewer_only_sees() {
     folder.write("tokens", TOKENS);
     let serving = Serving::start(&folder, &["replay", "dive.mcap", ANY, "--page-token-file", "tokens"]);
     for path in ["/feed", "/feed.jsonl", "/state.json", "/samples?from_m=0&to_m=1", "/metrics"] {
-        let (status, answer) = serving.ask("GET", path, &["Authorization: Bearer operator-0123456789abcdee"], "");
+        let (status, answer) =
+            serving.ask("GET", path, &["Authorization: Bearer operator-0123456789abcdee"], "");
         assert_eq!(status, 401, "{path}");
         assert!(!answer.contains("dive"), "{answer}");
     }
@@ -94,7 +95,12 @@ fn rubbish_is_refused_and_the_page_goes_on() {
         let mut viewer = Viewer::connect(&serving, "", &[]).unwrap();
         let length = random.below(300);
         let bytes: Vec<u8> = (0..length).map(|_| random.byte()).collect();
-        let commands = [r#"{"do":"play","command":"seek","to_s":-1e400}"#, r#"{"do":"acknowledge","alert":99999999999}"#, "{}", ""];
+        let commands = [
+            r#"{"do":"play","command":"seek","to_s":-1e400}"#,
+            r#"{"do":"acknowledge","alert":99999999999}"#,
+            "{}",
+            "",
+        ];
         let message = match random.below(4) {
             0 => Message::Binary(bytes.into()),
             1 => Message::Text(String::from_utf8_lossy(&bytes).into_owned().into()),

@@ -16,6 +16,11 @@ fn replayed(folder: &Folder) -> (Serving, Viewer) {
     (serving, viewer)
 }
 
+/// First and last time of the log.
+fn span_s(viewer: &Viewer) -> [f64; 2] {
+    ["from_s", "to_s"].map(|key| viewer.state["playback"][key].as_f64().unwrap())
+}
+
 fn end(serving: Serving, viewer: &mut Viewer) -> Value {
     viewer.send(&json!({"do": "play", "command": "end"}));
     let end = viewer.until_type("end");
@@ -55,7 +60,9 @@ fn all_that_a_viewer_has_at_the_end_equals_the_report() {
             None => assert!(shown.hole_m.is_nan(), "at {start_m}"),
         }
         match section["cause"]["cause"].as_str() {
-            Some(cause) => assert_eq!(viewer.hello["causes"][usize::from(shown.cause)], cause, "at {start_m}"),
+            Some(cause) => {
+                assert_eq!(viewer.hello["causes"][usize::from(shown.cause)], cause, "at {start_m}")
+            }
             None => assert_eq!(shown.cause, 255, "at {start_m}"),
         }
         if section["samples"].as_u64() > Some(200) {
@@ -80,19 +87,21 @@ fn who_was_lost_gets_what_has_changed_and_has_the_same_as_who_is_new() {
     let folder = Folder::with_dive();
     let (serving, mut lost) = replayed(&folder);
     // A jump shows less, and is another instance: from there it is lost, and the dive goes on without it.
-    let from_s = lost.state["playback"]["from_s"].as_f64().unwrap();
-    lost.send(&json!({"do": "play", "command": "seek", "to_s": from_s + 12.0}));
+    let [from_s, to_s] = span_s(&lost);
+    let middle_s = f64::midpoint(from_s, to_s);
+    lost.send(&json!({"do": "play", "command": "seek", "to_s": middle_s}));
     lost.until("the jump", |viewer| {
-        viewer.hello["instance"].as_str().unwrap().contains('.') && viewer.others.last().unwrap()["type"] == "ready"
+        viewer.hello["instance"].as_str().unwrap().contains('.')
+            && viewer.others.last().unwrap()["type"] == "ready"
     });
-    lost.until("a state", |viewer| viewer.state["now_s"].as_f64() < Some(from_s + 12.5));
+    lost.until("a state", |viewer| viewer.state["now_s"].as_f64() < Some(middle_s + 0.1));
     let (resume, before) = (lost.resume(), lost.sections.clone());
     drop(lost.send_raw(tungstenite::Message::Close(None)));
     let mut other = Viewer::connect(&serving, "", &[]).unwrap();
     other.until_type("ready");
     other.send(&json!({"do": "play", "command": "go"}));
     other.until("the end again", |viewer| {
-        viewer.state["playback"]["paused"] == true && viewer.state["now_s"].as_f64() > Some(from_s + 13.0)
+        viewer.state["playback"]["paused"] == true && viewer.state["now_s"].as_f64() > Some(to_s - 0.5)
     });
     let mut resumed = Viewer::connect(&serving, &resume, &[]).unwrap();
     resumed.until_type("ready");
@@ -126,10 +135,10 @@ fn samples_come_by_chainage_and_none_is_lost_by_jumps() {
     };
     let whole = count();
     assert!(whole > 1000, "{whole}");
-    let from_s = viewer.state["playback"]["from_s"].as_f64().unwrap();
-    let to_s = viewer.state["playback"]["to_s"].as_f64().unwrap();
-    viewer.send(&json!({"do": "play", "command": "seek", "to_s": from_s + 12.0}));
-    viewer.until("the jump back", |viewer| viewer.state["now_s"].as_f64() < Some(from_s + 12.5));
+    let [from_s, to_s] = span_s(&viewer);
+    let middle_s = f64::midpoint(from_s, to_s);
+    viewer.send(&json!({"do": "play", "command": "seek", "to_s": middle_s}));
+    viewer.until("the jump back", |viewer| viewer.state["now_s"].as_f64() < Some(middle_s + 0.1));
     let part = count();
     assert!(part > 0 && part < whole, "{part} of {whole}");
     viewer.send(&json!({"do": "play", "command": "seek", "to_s": to_s + 1.0}));
@@ -148,6 +157,20 @@ fn samples_come_by_chainage_and_none_is_lost_by_jumps() {
 fn other_programs_read_lines_states_and_figures() {
     let folder = Folder::with_dive();
     let (serving, mut viewer) = replayed(&folder);
+    let (_, extras) = serving.ask("GET", "/cockpit_extras.json", &[], "");
+    let extras: Value = serde_json::from_str(extras.split("\r\n\r\n").nth(1).unwrap()).unwrap();
+    // As Cockpit's schema wants it: keys in camelCase, texts and no null where a text is, an icon for each widget.
+    for widget in extras["widgets"].as_array().unwrap() {
+        assert!(
+            ["name", "iframeUrl", "iframeIcon", "version"].iter().all(|key| widget[key].is_string()),
+            "{widget}"
+        );
+    }
+    for action in extras["actions"].as_array().unwrap() {
+        let config = &action["config"];
+        assert!(["name", "url", "method", "body"].iter().all(|key| config[key].is_string()), "{action}");
+        assert!(config["headers"].is_object() && action["type"] == "http-request", "{action}");
+    }
     let (status, answer) = serving.ask("GET", "/state.json", &[], "");
     let body = answer.split("\r\n\r\n").nth(1).unwrap();
     let state: Value = serde_json::from_str(body).unwrap();
@@ -158,4 +181,61 @@ fn other_programs_read_lines_states_and_figures() {
     let (_, page) = serving.ask("GET", "/widget/speed", &[], "");
     assert!(page.to_lowercase().contains("<!doctype html>") && page.contains("nosniff"), "{page}");
     end(serving, &mut viewer);
+}
+
+#[test]
+fn a_dive_in_a_file_holds_what_a_viewer_gets() {
+    use std::io::Read as _;
+    let folder = Folder::with_dive();
+    let answer = folder.headrace(&["export", "dive.mcap", "--html", "dive.html"]);
+    assert!(matches!(answer.code, Some(0 | 1)), "{}", answer.stderr);
+    let page = String::from_utf8(folder.read("dive.html")).unwrap();
+    assert!(!page.contains("src=\"/") && !page.contains("href=\"/"), "nothing is fetched");
+    let begin = page.find("id=\"dive\">").unwrap() + 10;
+    let text = &page[begin..begin + page[begin..].find("</script>").unwrap()];
+    let mut bytes = Vec::new();
+    flate2::read::DeflateDecoder::new(&*base64(text)).read_to_end(&mut bytes).unwrap();
+    let (mut kinds, mut rest, mut frames) = (Vec::new(), bytes.as_slice(), Vec::new());
+    while let [a, b, c, d, kind, after @ ..] = rest {
+        let (body, after) = after.split_at(u32::from_le_bytes([*a, *b, *c, *d]) as usize);
+        rest = after;
+        if *kind == 0 {
+            let value: Value = serde_json::from_slice(body).unwrap();
+            kinds.push(value["type"].as_str().unwrap().to_owned());
+            frames.push(value);
+        } else {
+            kinds.push(format!("binary {}", body[0]));
+        }
+    }
+    assert_eq!(kinds[..3], ["hello", "binary 1", "binary 2"]);
+    assert_eq!(kinds.last().unwrap(), "end");
+    let (_, replayed) = folder.replay("dive.mcap", &[]);
+    assert_eq!(frames.last().unwrap()["digest"], replayed["digest"]);
+    let timeline = frames.iter().find(|frame| frame["type"] == "timeline").unwrap();
+    let (times, states) = (timeline["t_s"].as_array().unwrap(), timeline["states"].as_array().unwrap());
+    assert!(times.len() > 5 && times.len() == states.len(), "{} {}", times.len(), states.len());
+    assert!(
+        states.iter().skip(1).all(|state| state.get("version").is_none()),
+        "what is constant is there once"
+    );
+    let again = folder.headrace(&["export", "dive.mcap", "--html", "dive.html"]);
+    assert!(matches!(again.code, Some(0 | 1)), "its own kind is overwritten: {}", again.stderr);
+    assert_eq!(folder.read("dive.html"), page.as_bytes(), "byte for byte");
+    folder.write("other.html", "<html>");
+    assert_eq!(folder.headrace(&["export", "dive.mcap", "--html", "other.html"]).code, Some(2));
+}
+
+/// Source: RFC 4648, section 4.
+fn base64(text: &str) -> Vec<u8> {
+    const DIGITS: &[u8] = b"ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
+    let (mut bytes, mut bits, mut count) = (Vec::new(), 0_u32, 0);
+    for digit in text.bytes().filter(|digit| *digit != b'=') {
+        let value = DIGITS.iter().position(|other| *other == digit).unwrap();
+        (bits, count) = (bits << 6 | u32::try_from(value).unwrap(), count + 6);
+        if count >= 8 {
+            count -= 8;
+            bytes.push((bits >> count & 255) as u8);
+        }
+    }
+    bytes
 }

@@ -49,7 +49,11 @@ fn a_taken_port_is_named_and_the_next_is_used() {
     let wrong = ["--page", "--page-cert", "none.pem", "--page-key", "none.pem"];
     let answer = folder.headrace(&[&["replay", "dive.mcap"], wrong.as_slice()].concat());
     assert!(matches!(answer.code, Some(0 | 1)), "{}", answer.stderr);
-    assert!(answer.stderr.contains("none.pem") && answer.stderr.contains("goes on without the page"), "{}", answer.stderr);
+    assert!(
+        answer.stderr.contains("none.pem") && answer.stderr.contains("goes on without the page"),
+        "{}",
+        answer.stderr
+    );
 }
 
 #[test]
