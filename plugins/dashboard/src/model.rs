@@ -207,7 +207,9 @@ impl Model {
         self.history.jump(at.as_secs_f64());
         self.end = None;
         let seen: Vec<_> = self.samples.since(0).map(|sample| (sample.x_m, sample.seen())).collect();
-        seen.into_iter().for_each(|(x_m, seen)| self.see(f64::from(x_m), seen));
+        for (x_m, seen) in seen {
+            self.see(f64::from(x_m), seen);
+        }
         self.sent_samples = self.samples.len();
     }
 
