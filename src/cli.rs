@@ -100,6 +100,12 @@ pub(crate) enum Command {
         after_help = "Example:\n  headrace replay dive.mcap --target 0.6 --report report.json\n  headrace replay dive.mcap --target 0.3,0.6,1.0 --section 0.25,1\n  headrace replay dive.mcap --smooth --report certificate.json\n  headrace replay dive.part*.mcap\n  headrace replay dive.mcap --expect golden.json --bless"
     )]
     Replay(Replay),
+    /// Write a recorded dive as one HTML page that opens from disk, without a network.
+    ///
+    /// The log is replayed through the same processing; the page is the one that shows a live dive, with the dive inside
+    /// (docs/page.md). Exit codes are those of replay.
+    #[command(after_help = "Example:\n  headrace export dive.mcap --html dive.html")]
+    Export(Export),
     /// Compare a replay with the results that the dive published live.
     ///
     /// Reports the first difference of each result stream: tick, sensor, field and both values with their bits. Exit code 4
@@ -294,6 +300,21 @@ pub(crate) struct Replay {
     pub(crate) output: Output,
     #[command(flatten)]
     pub(crate) page: PageArgs,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct Export {
+    /// Log to export, or the parts of a recording.
+    #[arg(required = true, value_name = "LOG")]
+    pub(crate) logs: Vec<PathBuf>,
+    /// Page to write.
+    #[arg(long, value_name = "OUT.html")]
+    pub(crate) html: PathBuf,
+    /// Vehicle file, overriding the one attached to the log.
+    #[arg(long, value_name = "FILE")]
+    pub(crate) vehicle: Option<PathBuf>,
+    #[command(flatten)]
+    pub(crate) overwrite: Overwrite,
 }
 
 #[derive(Debug, Args)]

@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use headrace_calibration::collect::CollectError;
 use headrace_config::{ConfigError, ConfigErrors};
+use headrace_dashboard::export::ExportError;
 use headrace_import::ImportError;
 use headrace_import::routing::RoutingError;
 use headrace_monitor::PluginError;
@@ -57,6 +58,8 @@ pub(crate) enum Failure {
     Drive(#[from] DriveError),
     #[error(transparent)]
     Playback(#[from] PlaybackError),
+    #[error(transparent)]
+    Export(#[from] ExportError),
     #[error("writing the report as JSON: {0}")]
     Json(#[from] serde_json::Error),
     #[error("planning: {0}")]

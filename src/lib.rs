@@ -9,6 +9,7 @@ pub mod devices;
 mod dive;
 mod emulate;
 mod expect;
+mod export;
 mod failure;
 mod feeds;
 mod files;
@@ -62,6 +63,7 @@ pub fn main() -> ExitCode {
         Command::Demo(demo) => commands::demo(&demo),
         Command::Run(run) => commands::run(&run),
         Command::Replay(replay) => commands::replay(&replay),
+        Command::Export(args) => export::export(&args),
         Command::Verify(args) => verify::verify(&args),
         Command::Recover(args) => recover::recover(&args),
         Command::Trim(args) => trim::trim(&args),

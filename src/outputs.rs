@@ -1,7 +1,7 @@
 //! Files that commands write: what they may write over, and whether they can be written, found out before the work.
 
 use std::fs::OpenOptions;
-use std::io::{ErrorKind, Read};
+use std::io::{ErrorKind, Read, Seek as _, SeekFrom};
 use std::path::{Path, PathBuf};
 
 use headrace_replay::log::{DiveLog, RECOVERED_FROM, TRIMMED};
@@ -20,6 +20,8 @@ pub(crate) const REHEARSAL: &str = "# Rehearsal by headrace emulate: ";
 pub(crate) const PICTURE: &str = "<!-- headrace plan -->\n";
 /// Begins a manual page.
 pub(crate) const MANUAL: &str = ".\\\" Written by headrace man.\n";
+/// Ends a page with a dive.
+pub(crate) const EXPORTED: &str = "<!-- headrace export -->\n";
 /// Begins a table of true values.
 pub(crate) const TRUTH: &str = "# true values: ";
 /// A key of each report.
@@ -39,6 +41,7 @@ pub(crate) enum Kind {
     Rehearsal,
     Picture,
     Manual,
+    Page,
 }
 
 impl Kind {
@@ -55,6 +58,7 @@ impl Kind {
             Self::Rehearsal => "isn't a rehearsal's vehicle file",
             Self::Picture => "isn't a plan's picture",
             Self::Manual => "isn't a page of headrace's manual",
+            Self::Page => "isn't an exported dive",
         }
     }
 
@@ -75,6 +79,7 @@ impl Kind {
             Self::Truth => begins(path, TRUTH),
             Self::Rehearsal => begins(path, REHEARSAL),
             Self::Manual => begins(path, MANUAL),
+            Self::Page => ends(path, EXPORTED),
             Self::Picture => files::read_report(path).is_ok_and(|text| text.ends_with(PICTURE)),
         }
     }
@@ -89,6 +94,19 @@ fn begin(path: &Path) -> Option<String> {
 
 fn begins(path: &Path, mark: &str) -> bool {
     begin(path).is_some_and(|text| text.starts_with(mark))
+}
+
+/// Whether a file, of any size, ends with this.
+fn ends(path: &Path, mark: &str) -> bool {
+    let end = || {
+        let mut file = std::fs::File::open(path)?;
+        let mut bytes = Vec::new();
+        let back = i64::try_from(mark.len()).unwrap_or(i64::MAX);
+        file.seek(SeekFrom::End(-back))?;
+        file.read_to_end(&mut bytes)?;
+        std::io::Result::Ok(bytes == mark.as_bytes())
+    };
+    end().unwrap_or(false)
 }
 
 /// Checks, before the work, that a file may and can be written. Nothing is changed.

@@ -1,5 +1,7 @@
 //! The operator's page of a dive: started, fed and ended.
 
+#![expect(clippy::disallowed_types, reason = "locks between the page's threads; the loop's takes none")]
+
 use std::collections::BTreeMap;
 use std::io::IsTerminal as _;
 use std::net::{IpAddr, SocketAddr, UdpSocket};
@@ -29,7 +31,7 @@ use headrace_replay::playback::PlaybackCommand;
 use headrace_sampling::occlusion::hidden_by_vehicle;
 use headrace_sensor::device::Sense;
 use headrace_vehicle::VehicleConfig;
-use serde_json::json;
+use serde_json::{Value, json};
 
 use crate::cli::PageArgs;
 use crate::dive::CLOCK_ANCHOR;
@@ -181,7 +183,7 @@ fn own_address(unspecified: IpAddr) -> IpAddr {
 }
 
 /// Tunnel, heads and sensors.
-fn site(of: Of<'_>) -> Site {
+pub(crate) fn site(of: Of<'_>) -> Site {
     let vehicle = of.vehicle;
     let hidden = hidden_by_vehicle(&vehicle.heads(), &vehicle.hull);
     let mut hidden = hidden.into_iter();
@@ -325,10 +327,19 @@ impl Served {
 
     /// Ends it with the dive's report.
     pub(crate) fn end(self, report: &Report) {
-        let end = json!({"type": "end", "digest": report.digest, "summary": report.summary, "way": report.way,
-            "exit": exit_code(report)});
-        self.page.end(Some(end));
+        self.page.end(Some(end_message(report)));
     }
+}
+
+/// The last message of a dive.
+pub(crate) fn end_message(report: &Report) -> Value {
+    json!({"type": "end", "digest": report.digest, "summary": report.summary, "way": report.way,
+        "exit": exit_code(report)})
+}
+
+/// A follower that hands all to a collector.
+pub(crate) fn following(collector: Collector) -> Box<dyn Follower> {
+    Box::new(PageFollower { collector, span: None, now: MonoNs(0) })
 }
 
 struct PageFollower {

@@ -17,6 +17,8 @@ pub mod interventions;
 pub mod json_schema;
 mod log_files;
 pub mod outline;
+#[cfg(unix)]
+pub mod page_client;
 pub mod passable;
 pub mod planned;
 #[cfg(unix)]

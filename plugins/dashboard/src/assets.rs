@@ -13,9 +13,9 @@ pub fn index() -> &'static [u8] {
         .unwrap_or(b"<!doctype html><title>headrace</title><p>This program was built without its page.")
 }
 
-/// A file that the page refers to by `/assets/..`.
-pub fn referred(path: &str) -> Option<&'static [u8]> {
-    asset(path.trim_start_matches('/'))
+/// The page as one file, its scripts and styles in it; `None` where the program was built without.
+pub fn single() -> Option<&'static str> {
+    core::str::from_utf8(asset("single.html")?).ok()
 }
 
 /// Content type of a file by its name.

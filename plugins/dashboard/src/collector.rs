@@ -51,6 +51,8 @@ struct Followed {
     id: String,
     mount: Mount,
     is_echosounder: bool,
+    /// Its number among the heads.
+    head: u8,
     ping: Option<Ping>,
     hz: f64,
     /// Readings when the present interval began.
@@ -58,6 +60,7 @@ struct Followed {
 }
 
 /// Collects what the page shows. It must be fed after every tick, of a loop that keeps its results.
+#[expect(clippy::struct_excessive_bools, reason = "each says what is due, apart from the others")]
 pub struct Collector {
     to: Sender<Fed>,
     /// A replay waits for the page, a live dive doesn't.
@@ -92,10 +95,12 @@ impl Collector {
         is_playback: bool,
         recorded_to: Option<String>,
     ) -> Self {
+        let mut heads = 0..NONE;
         let followed = |(source, info): (&headrace_monitor::SourceInfo, SensorInfo)| Followed {
             id: source.id.clone(),
             mount: info.mount,
             is_echosounder: matches!(info.kind, SensorKind::Echosounder { .. }),
+            head: if info.kind == SensorKind::Head { heads.next().unwrap_or(NONE) } else { NONE },
             ping: None,
             hz: 0.0,
             readings: 0,
@@ -248,7 +253,7 @@ impl Collector {
             let [at, source, _, x, y, z, arc, ..] = *record.words else { continue };
             let [x_m, y_m, z_m, arc_m] = [x, y, z, arc].map(f64::from_bits);
             let [x, y, z] = [x_m, y_m, z_m].map(|value| value as f32);
-            let (t_ms, head) = (self.t_ms(MonoNs(at)), self.head(dive, source));
+            let (t_ms, head) = (self.t_ms(MonoNs(at)), self.head(source));
             let arc = SampleRecord::arc_of(arc_m, perimeter_m);
             self.push(SampleRecord { t_ms, x_m: x, y_m: y, z_m: z, arc, head, outcome: outcome as u8 });
         }
@@ -281,10 +286,9 @@ impl Collector {
     }
 
     /// Number of the head with this source.
-    fn head(&self, dive: &Loop, source: u64) -> u8 {
-        let before = dive.sensors().into_iter().take(usize::try_from(source).unwrap_or(usize::MAX));
-        let heads = before.filter(|sensor| sensor.kind == SensorKind::Head).count();
-        u8::try_from(heads).unwrap_or(NONE)
+    fn head(&self, source: u64) -> u8 {
+        let sensor = usize::try_from(source).ok().and_then(|source| self.sensors.get(source));
+        sensor.map_or(NONE, |sensor| sensor.head)
     }
 
     fn push(&mut self, sample: SampleRecord) {

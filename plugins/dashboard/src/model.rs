@@ -207,7 +207,9 @@ impl Model {
         self.history.jump(at.as_secs_f64());
         self.end = None;
         let seen: Vec<_> = self.samples.since(0).map(|sample| (sample.x_m, sample.seen())).collect();
-        seen.into_iter().for_each(|(x_m, seen)| self.see(f64::from(x_m), seen));
+        for (x_m, seen) in seen {
+            self.see(f64::from(x_m), seen);
+        }
         self.sent_samples = self.samples.len();
     }
 
@@ -387,6 +389,11 @@ impl Model {
         object.insert("ended".to_owned(), self.end.is_some().into());
         object.insert("page_dropped".to_owned(), json!(self.dropped));
         Some(value)
+    }
+
+    /// Time of the state, seconds.
+    pub fn now_s(&self) -> Option<f64> {
+        self.state.as_ref().map(|shown| shown.0.now_s)
     }
 
     /// Samples between two chainages, m, in a frame: at most [`MOST_IN_RANGE`], and of how many one.

@@ -90,7 +90,9 @@ impl SectionRecord {
     fn put(&self, seen: u64, to: &mut Vec<u8>) {
         to.extend_from_slice(&self.index.to_le_bytes());
         to.extend_from_slice(&[self.verdict, self.cause, self.why, self.flags]);
-        self.hole.iter().for_each(|value| to.extend_from_slice(&value.to_le_bytes()));
+        for value in self.hole {
+            to.extend_from_slice(&value.to_le_bytes());
+        }
         to.extend_from_slice(&seen.to_le_bytes());
     }
 }
@@ -139,7 +141,9 @@ impl SampleRecord {
 
     fn put(&self, to: &mut Vec<u8>) {
         to.extend_from_slice(&self.t_ms.to_le_bytes());
-        [self.x_m, self.y_m, self.z_m].iter().for_each(|value| to.extend_from_slice(&value.to_le_bytes()));
+        for value in [self.x_m, self.y_m, self.z_m] {
+            to.extend_from_slice(&value.to_le_bytes());
+        }
         to.extend_from_slice(&self.arc.to_le_bytes());
         to.extend_from_slice(&[self.head, self.outcome]);
     }
@@ -156,14 +160,18 @@ fn frame(kind: u8, count: usize, seq: u64, record_bytes: usize) -> Vec<u8> {
 /// A frame of sections, each with where it has been seen.
 pub fn section_frame(seq: u64, sections: &[(SectionRecord, u64)]) -> Vec<u8> {
     let mut bytes = frame(SECTIONS, sections.len(), seq, SECTION_BYTES);
-    sections.iter().for_each(|(section, seen)| section.put(*seen, &mut bytes));
+    for (section, seen) in sections {
+        section.put(*seen, &mut bytes);
+    }
     bytes
 }
 
 /// A frame of samples.
 pub fn sample_frame(seq: u64, samples: &[SampleRecord]) -> Vec<u8> {
     let mut bytes = frame(SAMPLES, samples.len(), seq, SAMPLE_BYTES);
-    samples.iter().for_each(|sample| sample.put(&mut bytes));
+    for sample in samples {
+        sample.put(&mut bytes);
+    }
     bytes
 }
 

@@ -8,7 +8,7 @@ use serde_json::Value;
 use super::workspace::root;
 
 /// Crates that link libraries in other languages: by the name of the library.
-const FOREIGN_LIBRARIES: [&str; 3] = ["hidapi", "lz4", "zstd"];
+const FOREIGN_LIBRARIES: [&str; 4] = ["hidapi", "lz4", "ring_core_0_17_14_", "zstd"];
 /// Not built for any system that we run on: only pages in a browser need it.
 const NEVER_BUILT: [&str; 1] = ["wasm_bindgen"];
 

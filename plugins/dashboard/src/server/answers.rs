@@ -96,7 +96,7 @@ fn ancestors(shared: &Shared, headers: &HeaderMap) -> String {
     let name = headers.get(header::HOST).and_then(|host| host.to_str().ok()).map(name_of);
     let is_fit = |byte: u8| byte.is_ascii_alphanumeric() || b".-[]:".contains(&byte);
     if let Some(name) = name.filter(|name| !name.is_empty() && name.bytes().all(is_fit)) {
-        all.push_str(&format!(" http://{name}:* https://{name}:*"));
+        all = format!("{all} http://{name}:* https://{name}:*");
     }
     for origin in &shared.access.origins {
         all.push(' ');

@@ -1,5 +1,7 @@
 //! Figures of the page and the dive for Prometheus, and budgets of requests.
 
+#![expect(clippy::disallowed_types, reason = "locks between the page's threads; the loop's takes none")]
+
 use std::fmt::Write as _;
 use std::sync::atomic::Ordering;
 use std::sync::{Mutex, PoisonError};

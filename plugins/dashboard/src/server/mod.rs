@@ -1,5 +1,7 @@
 //! The server: one thread with sockets and timers, which the loop's thread never waits for in a live dive.
 
+#![expect(clippy::disallowed_types, reason = "locks between the page's threads; the loop's takes none")]
+
 mod answers;
 mod feed;
 mod listener;

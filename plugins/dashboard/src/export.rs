@@ -1,0 +1,189 @@
+//! A dive in one file: the page, and in it all that it would get of a server.
+
+use std::io::{self, Write as _};
+use std::thread::JoinHandle;
+
+use base64::Engine as _;
+use base64::engine::general_purpose::STANDARD;
+use flate2::Compression;
+use flate2::write::DeflateEncoder;
+use headrace_monitor::run::Loop;
+use serde_json::{Map, Value, json};
+use tokio::sync::mpsc;
+
+use crate::assets;
+use crate::collector::{Collector, WAITING};
+use crate::fed::Fed;
+use crate::model::Model;
+use crate::site::{May, Site};
+use crate::wire::sample_frame;
+
+/// Samples in a file; of more, one in several.
+const MOST_SAMPLES: usize = 500_000;
+/// States in a file: one a second of two hours. Of a longer dive every other one, and so on.
+const MOST_STATES: usize = 7200;
+/// Begins a page with a dive, after its first line.
+pub const MARK: &str = "id=\"dive\"";
+/// What of a state isn't in a file: it is there once, or means nothing there.
+const LEFT_OUT: [&str; 9] =
+    ["type", "seq", "alert_list", "alerts", "playback", "ended", "page_dropped", "rates", "recording"];
+
+/// Why there is no file.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum ExportError {
+    /// No thread.
+    #[error("exporting a dive: its thread can't be started: {0}")]
+    Thread(io::Error),
+    /// The thread has ended early.
+    #[error("exporting a dive: its thread has ended early")]
+    Ended,
+    /// The program has no page.
+    #[error("exporting a dive: this program was built without its page")]
+    NoPage,
+    /// Packing fails.
+    #[error("exporting a dive: {0}")]
+    Pack(#[from] io::Error),
+}
+
+/// Takes a dive for a file.
+pub struct Export {
+    sender: mpsc::Sender<Fed>,
+    thread: JoinHandle<Taken>,
+}
+
+/// What was taken.
+struct Taken {
+    model: Model,
+    states: States,
+}
+
+/// States, one a second or less often.
+struct States {
+    every_s: f64,
+    all: Vec<(f64, Map<String, Value>)>,
+}
+
+impl Export {
+    /// Starts to take a dive.
+    ///
+    /// Errors: no thread.
+    pub fn start(site: Site) -> Result<Self, ExportError> {
+        let (sender, mut fed) = mpsc::channel(WAITING);
+        let take = move || {
+            let mut taken = Taken {
+                model: Model::new(site, "file".to_owned()),
+                states: States { every_s: 1.0, all: Vec::new() },
+            };
+            taken.model.keep_whole();
+            while let Some(one) = fed.blocking_recv() {
+                taken.model.take(one);
+                taken.states.take(&taken.model);
+            }
+            taken
+        };
+        let thread = std::thread::Builder::new().name("export".to_owned()).spawn(take);
+        Ok(Self { sender, thread: thread.map_err(ExportError::Thread)? })
+    }
+
+    /// What takes results of a loop for it, and waits where it must.
+    pub fn collector(&self, dive: &Loop) -> Collector {
+        Collector::new(self.sender.clone(), dive, true, false, None)
+    }
+
+    /// The page with the dive; `alerts` are all of the dive, `end` its last message. All collectors must be gone.
+    ///
+    /// Errors: see [`ExportError`].
+    pub fn page(self, alerts: &Value, end: &Value) -> Result<Vec<u8>, ExportError> {
+        drop(self.sender);
+        let taken = self.thread.join().map_err(|_| ExportError::Ended)?;
+        let frames = taken.frames(alerts, end)?;
+        let page = assets::single().ok_or(ExportError::NoPage)?;
+        let place = page.rfind("</body>").ok_or(ExportError::NoPage)?;
+        let (before, after) = page.split_at(place);
+        let dive = STANDARD.encode(frames);
+        let text = format!(
+            "{before}<script type=\"application/octet-stream;base64\" {MARK}>{dive}</script>\n{after}"
+        );
+        Ok(text.into_bytes())
+    }
+}
+
+impl Taken {
+    /// All frames, packed.
+    fn frames(&self, alerts: &Value, end: &Value) -> io::Result<Vec<u8>> {
+        let model = &self.model;
+        let mut packed = DeflateEncoder::new(Vec::new(), Compression::default());
+        let mut put = |kind: u8, bytes: &[u8]| {
+            let length = u32::try_from(bytes.len()).map_err(io::Error::other)?;
+            packed.write_all(&length.to_le_bytes())?;
+            packed.write_all(&[kind])?;
+            packed.write_all(bytes)
+        };
+        let (samples, step) = model.samples().between(f32::NEG_INFINITY, f32::INFINITY, MOST_SAMPLES);
+        let may = May { operate: false, playback: false };
+        put(0, model.hello(may, false, (step > 1).then_some(step)).to_string().as_bytes())?;
+        put(1, &model.sections_frame())?;
+        put(1, &sample_frame(model.seq(), &samples))?;
+        let mut texts = vec![json!({"type": "alerts", "list": alerts, "hidden": 0})];
+        texts.extend(model.closing().into_iter().filter(|message| message["type"] != "alerts"));
+        texts.extend([self.states.timeline()]);
+        texts.extend(model.state());
+        texts.push(end.clone());
+        for mut text in texts {
+            if let Some(object) = text.as_object_mut() {
+                object.insert("seq".to_owned(), model.seq().into());
+            }
+            put(0, text.to_string().as_bytes())?;
+        }
+        packed.finish()
+    }
+}
+
+impl States {
+    fn take(&mut self, model: &Model) {
+        let Some(now_s) = model.now_s() else { return };
+        if self.all.last().is_some_and(|(last_s, _)| now_s < last_s + self.every_s) {
+            return;
+        }
+        let Some(Value::Object(mut state)) = model.state() else { return };
+        state.retain(|key, _| !LEFT_OUT.contains(&key.as_str()));
+        state.values_mut().for_each(short);
+        self.all.push((now_s, state));
+        if self.all.len() > MOST_STATES {
+            self.every_s *= 2.0;
+            let mut number = 0_usize;
+            self.all.retain(|_| {
+                number += 1;
+                number % 2 == 1
+            });
+        }
+    }
+
+    /// The first state whole, of the others what differs from it.
+    fn timeline(&self) -> Value {
+        let first = self.all.first().map(|(_, first)| first);
+        let differs = |state: &Map<String, Value>| -> Map<String, Value> {
+            let is_new =
+                |(key, value): &(&String, &Value)| first.is_none_or(|first| first.get(*key) != Some(value));
+            state.iter().filter(is_new).map(|(key, value)| (key.clone(), value.clone())).collect()
+        };
+        let others = self.all.iter().skip(1).map(|(_, state)| differs(state));
+        let states: Vec<_> = first.cloned().into_iter().chain(others).collect();
+        let t_s: Vec<_> = self.all.iter().map(|(at_s, _)| *at_s).collect();
+        json!({"type": "timeline", "t_s": t_s, "states": states})
+    }
+}
+
+/// Numbers to four places.
+fn short(value: &mut Value) {
+    match value {
+        Value::Number(number) if number.is_f64() => {
+            let rounded = number.as_f64().map(|number| (number * 1e4).round() / 1e4);
+            *value = json!(rounded);
+        }
+        Value::Array(all) => all.iter_mut().for_each(short),
+        Value::Object(all) => all.values_mut().for_each(short),
+        _ => {}
+    }
+}

@@ -1,0 +1,291 @@
+//! A viewer of the page over real sockets, and what it has understood; its decoding shares no code with the server's.
+
+use std::collections::BTreeMap;
+use std::io::{BufRead, BufReader, Read, Write};
+use std::net::TcpStream;
+use std::process::{Child, ChildStdin, Stdio};
+use std::sync::mpsc;
+use std::time::Duration;
+
+use serde_json::{Value, json};
+use tungstenite::client::IntoClientRequest as _;
+use tungstenite::{Message, WebSocket};
+
+use crate::{Folder, program};
+
+/// Longest wait for anything that must come.
+const WITHIN: Duration = Duration::from_secs(120);
+
+/// A running program with a page, killed when it goes out of scope.
+pub struct Serving {
+    child: Child,
+    /// Host and port of its page.
+    pub address: String,
+    /// Its standard input.
+    pub stdin: Option<ChildStdin>,
+    rest: mpsc::Receiver<String>,
+}
+
+impl Serving {
+    /// Starts the program in this folder; it must tell where its page is.
+    pub fn start(folder: &Folder, arguments: &[&str]) -> Self {
+        let mut command = program();
+        command.args(arguments).current_dir(folder.path(""));
+        command.stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped());
+        let mut child = command.spawn().unwrap();
+        #[expect(clippy::disallowed_types, reason = "read to its end by a test, without a loop")]
+        let (sender, lines): (mpsc::Sender<String>, _) = mpsc::channel();
+        let streams: [Box<dyn Read + Send>; 2] =
+            [Box::new(child.stdout.take().unwrap()), Box::new(child.stderr.take().unwrap())];
+        for stream in streams {
+            let sender = sender.clone();
+            std::thread::spawn(move || {
+                for line in BufReader::new(stream).lines().map_while(Result::ok) {
+                    if sender.send(line).is_err() {
+                        return;
+                    }
+                }
+            });
+        }
+        drop(sender);
+        let mut told = Vec::new();
+        let address = loop {
+            let Ok(line) = lines.recv_timeout(WITHIN) else { panic!("no page: {told:#?}") };
+            if let Some(at) = line.find("http://").filter(|_| line.contains("page ")) {
+                break line[at + 7..].trim().to_owned();
+            }
+            told.push(line);
+        };
+        let stdin = child.stdin.take();
+        Self { child, address, stdin, rest: lines }
+    }
+
+    /// Sends a signal.
+    pub fn signal(&self, signal: rustix::process::Signal) {
+        let pid = rustix::process::Pid::from_child(&self.child);
+        rustix::process::kill_process(pid, signal).unwrap();
+    }
+
+    /// Waits for its end: exit code and what it told.
+    pub fn end(mut self) -> (Option<i32>, String) {
+        let code = self.child.wait().unwrap().code();
+        (code, self.rest.iter().collect::<Vec<_>>().join("\n"))
+    }
+
+    /// Answer to a request: status, and all of it.
+    pub fn ask(&self, method: &str, path: &str, headers: &[&str], body: &str) -> (u16, String) {
+        let mut stream = TcpStream::connect(&self.address).unwrap();
+        stream.set_read_timeout(Some(WITHIN)).unwrap();
+        let host = if headers.iter().any(|header| header.starts_with("Host:")) {
+            String::new()
+        } else {
+            format!("Host: {}\r\n", self.address)
+        };
+        let further: String = headers.iter().map(|header| format!("{header}\r\n")).collect();
+        let length = body.len();
+        let head = format!(
+            "{method} {path} HTTP/1.1\r\n{host}{further}Connection: close\r\nContent-Length: {length}\r\n\r\n"
+        );
+        stream.write_all((head + body).as_bytes()).unwrap();
+        let mut bytes = Vec::new();
+        stream.read_to_end(&mut bytes).unwrap();
+        let text = String::from_utf8_lossy(&bytes).into_owned();
+        let status = text.split(' ').nth(1).and_then(|code| code.parse().ok()).unwrap_or(0);
+        (status, text)
+    }
+}
+
+impl Drop for Serving {
+    fn drop(&mut self) {
+        let _gone = self.child.kill();
+        let _gone = self.child.wait();
+    }
+}
+
+/// A section as it was sent.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SeenSection {
+    /// 0 open, 1 pass, 2 fail, 3 cannot say, 4 not inspected.
+    pub verdict: u8,
+    /// Number of the cause.
+    pub cause: u8,
+    /// Diameter of the hole, m.
+    pub hole_m: f32,
+    /// Where samples are.
+    pub seen: u64,
+}
+
+/// A viewer.
+pub struct Viewer {
+    socket: WebSocket<TcpStream>,
+    /// The first message.
+    pub hello: Value,
+    /// Sections by number.
+    pub sections: BTreeMap<i32, SeenSection>,
+    /// Samples that were sent.
+    pub samples: u64,
+    /// Frames of sections that were sent, and the sections in them.
+    pub section_frames: (u64, u64),
+    /// The last state.
+    pub state: Value,
+    /// The last list of alerts, with the changes since.
+    pub alerts: BTreeMap<u64, Value>,
+    /// Notes.
+    pub notes: Vec<Value>,
+    /// The other messages, newest last.
+    pub others: Vec<Value>,
+    /// The last number.
+    pub seq: u64,
+}
+
+impl Viewer {
+    /// Connects; `query` begins with `?` or is empty.
+    pub fn connect(
+        serving: &Serving,
+        query: &str,
+        headers: &[(&'static str, &str)],
+    ) -> Result<Self, tungstenite::Error> {
+        let stream = TcpStream::connect(&serving.address).unwrap();
+        stream.set_read_timeout(Some(WITHIN)).unwrap();
+        let mut request = format!("ws://{}/feed{query}", serving.address).into_client_request()?;
+        for (name, value) in headers {
+            request.headers_mut().insert(*name, value.parse().unwrap());
+        }
+        let protocol = "headrace.feed.1".parse().unwrap();
+        request.headers_mut().insert("Sec-WebSocket-Protocol", protocol);
+        let (socket, _) = tungstenite::client::client(request, stream).map_err(|error| match error {
+            tungstenite::HandshakeError::Failure(error) => error,
+            tungstenite::HandshakeError::Interrupted(_) => panic!("no answer"),
+        })?;
+        Ok(Self {
+            socket,
+            hello: Value::Null,
+            sections: BTreeMap::new(),
+            samples: 0,
+            section_frames: (0, 0),
+            state: Value::Null,
+            alerts: BTreeMap::new(),
+            notes: Vec::new(),
+            others: Vec::new(),
+            seq: 0,
+        })
+    }
+
+    /// Reads on until this holds; it must before the connection ends.
+    pub fn until(&mut self, what: &str, mut holds: impl FnMut(&Self) -> bool) {
+        while !holds(self) {
+            if let Err(why) = self.read() {
+                panic!("{what}: {why}; last {:?}", self.others.last());
+            }
+        }
+    }
+
+    /// Reads on until a message of this type.
+    pub fn until_type(&mut self, kind: &str) -> Value {
+        let before = self.others.len();
+        self.until(kind, |viewer| viewer.others[before..].iter().any(|other| other["type"] == kind));
+        self.others[before..].iter().find(|other| other["type"] == kind).unwrap().clone()
+    }
+
+    /// Reads to the end of the connection: the code and reason of its close.
+    pub fn until_closed(&mut self) -> Option<(u16, String)> {
+        loop {
+            match self.socket.read() {
+                Ok(Message::Close(frame)) => {
+                    return frame.map(|frame| (frame.code.into(), frame.reason.to_string()));
+                }
+                Ok(message) => self.take(&message),
+                Err(_) => return None,
+            }
+        }
+    }
+
+    /// Reads a message.
+    pub fn read(&mut self) -> Result<(), tungstenite::Error> {
+        let message = self.socket.read()?;
+        self.take(&message);
+        if message.is_close() { Err(tungstenite::Error::ConnectionClosed) } else { Ok(()) }
+    }
+
+    /// Sends a command.
+    pub fn send(&mut self, command: &Value) {
+        self.send_raw(Message::Text(command.to_string().into())).unwrap();
+    }
+
+    /// Sends anything.
+    pub fn send_raw(&mut self, message: Message) -> Result<(), tungstenite::Error> {
+        self.socket.send(message)
+    }
+
+    /// Where it may go on after it was lost.
+    pub fn resume(&self) -> String {
+        format!("?instance={}&since={}", self.hello["instance"].as_str().unwrap(), self.seq)
+    }
+
+    fn take(&mut self, message: &Message) {
+        match message {
+            Message::Text(text) => self.take_text(serde_json::from_str(text).unwrap()),
+            Message::Binary(bytes) => self.take_frame(bytes),
+            _ => {}
+        }
+    }
+
+    fn take_text(&mut self, value: Value) {
+        self.seq = self.seq.max(value["seq"].as_u64().unwrap());
+        match value["type"].as_str().unwrap() {
+            "hello" => {
+                if value["instance"] != self.hello["instance"] {
+                    self.sections.clear();
+                }
+                self.hello = value;
+            }
+            "state" => self.state = value,
+            "alerts" => {
+                let list = value["list"].as_array().unwrap();
+                self.alerts =
+                    list.iter().map(|alert| (alert["number"].as_u64().unwrap(), alert.clone())).collect();
+            }
+            "notes" => self.notes = value["list"].as_array().unwrap().clone(),
+            "alert_change" => {
+                let alert = value["alert"].clone();
+                self.alerts.insert(alert["number"].as_u64().unwrap(), alert);
+                self.others.push(value);
+            }
+            _ => self.others.push(value),
+        }
+    }
+
+    fn take_frame(&mut self, bytes: &[u8]) {
+        let word = |at: usize| u32::from_le_bytes(bytes[at..at + 4].try_into().unwrap());
+        let long = |at: usize| u64::from_le_bytes(bytes[at..at + 8].try_into().unwrap());
+        assert_eq!(bytes[1], 1, "version");
+        let count = word(4) as usize;
+        self.seq = self.seq.max(long(8));
+        match bytes[0] {
+            1 => {
+                assert_eq!(bytes.len(), 16 + 32 * count);
+                self.section_frames = (self.section_frames.0 + 1, self.section_frames.1 + count as u64);
+                for at in (0..count).map(|number| 16 + 32 * number) {
+                    let (verdict, cause) = (bytes[at + 4], bytes[at + 5]);
+                    let section = SeenSection {
+                        verdict,
+                        cause,
+                        hole_m: f32::from_bits(word(at + 8)),
+                        seen: long(at + 24),
+                    };
+                    self.sections.insert(word(at).cast_signed(), section);
+                }
+            }
+            2 => {
+                assert_eq!(bytes.len(), 16 + 20 * count);
+                self.samples += count as u64;
+            }
+            other => panic!("a frame of kind {other}"),
+        }
+    }
+}
+
+/// An acknowledgement of all alerts that need it.
+pub fn acknowledge_all(by: &str) -> Value {
+    json!({"do": "acknowledge", "alert": 0, "by": by})
+}

@@ -1,0 +1,242 @@
+//! What viewers get: the loop's own results, whole or since they were lost.
+
+use headrace_tests::Folder;
+use headrace_tests::page_client::{Serving, Viewer};
+use serde_json::{Value, json};
+
+use crate::ANY;
+
+/// Replays the short dive with a page, paused at its end.
+fn replayed(folder: &Folder) -> (Serving, Viewer) {
+    let serving = Serving::start(folder, &["replay", "dive.mcap", ANY, "--report", "report.json"]);
+    let mut viewer = Viewer::connect(&serving, "", &[]).unwrap();
+    viewer.until_type("ready");
+    // At the end of the log playback stands still.
+    viewer.until("the end of the log", |viewer| viewer.state["playback"]["paused"] == true);
+    (serving, viewer)
+}
+
+/// First and last time of the log.
+fn span_s(viewer: &Viewer) -> [f64; 2] {
+    ["from_s", "to_s"].map(|key| viewer.state["playback"][key].as_f64().unwrap())
+}
+
+fn end(serving: Serving, viewer: &mut Viewer) -> Value {
+    viewer.send(&json!({"do": "play", "command": "end"}));
+    let end = viewer.until_type("end");
+    let (code, told) = serving.end();
+    assert_eq!(json!(code), end["exit"], "{told}");
+    end
+}
+
+#[test]
+fn all_that_a_viewer_has_at_the_end_equals_the_report() {
+    let folder = Folder::with_dive();
+    let (serving, mut viewer) = replayed(&folder);
+    let last = end(serving, &mut viewer);
+    let report: Value = serde_json::from_slice(&folder.read("report.json")).unwrap();
+    assert_eq!(last["digest"], report["digest"]);
+    let section_m = viewer.hello["section_m"].as_f64().unwrap();
+    let sections = report["sections"].as_array().unwrap();
+    assert!(sections.len() > 10, "{}", sections.len());
+    let mut metres = [0.0; 5];
+    for section in sections {
+        let start_m = section["start_m"].as_f64().unwrap();
+        #[expect(clippy::cast_possible_truncation, reason = "a whole number")]
+        let index = (start_m / section_m).round() as i32;
+        let shown = viewer.sections[&index];
+        let verdict = match section["verdict"].as_str().unwrap() {
+            "open" if section["not_inspected"] == true => 4,
+            "open" => 0,
+            "pass" => 1,
+            "fail" => 2,
+            "cannot_say" => 3,
+            other => panic!("{other}"),
+        };
+        assert_eq!(shown.verdict, verdict, "at {start_m}");
+        metres[usize::from(shown.verdict)] += section_m;
+        match section["hole_m"].as_f64() {
+            Some(hole_m) => assert!((f64::from(shown.hole_m) - hole_m).abs() < 1e-6, "at {start_m}"),
+            None => assert!(shown.hole_m.is_nan(), "at {start_m}"),
+        }
+        match section["cause"]["cause"].as_str() {
+            Some(cause) => {
+                assert_eq!(viewer.hello["causes"][usize::from(shown.cause)], cause, "at {start_m}")
+            }
+            None => assert_eq!(shown.cause, 255, "at {start_m}"),
+        }
+        if section["samples"].as_u64() > Some(200) {
+            assert!(shown.seen.count_ones() > 32, "at {start_m}: {:b}", shown.seen);
+        }
+    }
+    let summary = &report["summary"];
+    let of = |key: &str| summary[key].as_f64().unwrap();
+    for (shown_m, reported_m) in [
+        (metres[1], of("pass_m")),
+        (metres[2], of("fail_m")),
+        (metres[3], of("cannot_say_m")),
+        (metres[4], of("not_inspected_m")),
+        (metres[0] + metres[4], of("open_m")),
+    ] {
+        assert!((shown_m - reported_m).abs() < 1e-6, "{metres:?}, {summary}");
+    }
+}
+
+#[test]
+fn who_was_lost_gets_what_has_changed_and_has_the_same_as_who_is_new() {
+    let folder = Folder::with_dive();
+    let (serving, mut lost) = replayed(&folder);
+    // A jump shows less, and is another instance: from there it is lost, and the dive goes on without it.
+    let [from_s, to_s] = span_s(&lost);
+    // Late, so that some of the tunnel is judged for good.
+    let middle_s = to_s - 0.1 * (to_s - from_s);
+    lost.send(&json!({"do": "play", "command": "seek", "to_s": middle_s}));
+    lost.until("the jump", |viewer| {
+        viewer.hello["instance"].as_str().unwrap().contains('.')
+            && viewer.others.last().unwrap()["type"] == "ready"
+    });
+    lost.until("a state", |viewer| viewer.state["now_s"].as_f64() < Some(middle_s + 0.1));
+    let (resume, before) = (lost.resume(), lost.sections.clone());
+    drop(lost.send_raw(tungstenite::Message::Close(None)));
+    let mut other = Viewer::connect(&serving, "", &[]).unwrap();
+    other.until_type("ready");
+    other.send(&json!({"do": "play", "command": "go"}));
+    other.until("the end again", |viewer| {
+        viewer.state["playback"]["paused"] == true && viewer.state["now_s"].as_f64() > Some(to_s - 0.5)
+    });
+    let mut resumed = Viewer::connect(&serving, &resume, &[]).unwrap();
+    resumed.until_type("ready");
+    let sent = resumed.section_frames.1;
+    let mut fresh = Viewer::connect(&serving, "", &[]).unwrap();
+    fresh.until_type("ready");
+    assert!(sent > 0 && sent < fresh.section_frames.1, "{sent} of {}", fresh.section_frames.1);
+    let mut merged = before;
+    merged.extend(&resumed.sections);
+    let bits = |sections: &std::collections::BTreeMap<i32, headrace_tests::page_client::SeenSection>| {
+        let of = |(index, section): (&i32, &headrace_tests::page_client::SeenSection)| {
+            (*index, section.verdict, section.cause, section.hole_m.to_bits(), section.seen)
+        };
+        sections.iter().map(of).collect::<Vec<_>>()
+    };
+    assert_eq!(bits(&merged), bits(&fresh.sections));
+    assert_eq!(bits(&other.sections), bits(&fresh.sections));
+    end(serving, &mut fresh);
+}
+
+#[test]
+fn samples_come_by_chainage_and_none_is_lost_by_jumps() {
+    let folder = Folder::with_dive();
+    let (serving, mut viewer) = replayed(&folder);
+    let count = || {
+        let (status, answer) = serving.ask("GET", "/samples?from_m=-100&to_m=1000", &[], "");
+        assert_eq!(status, 200);
+        assert!(answer.to_lowercase().contains("headrace-one-of: 1\r\n"), "{answer}");
+        let length = answer.to_lowercase().split("content-length: ").nth(1).unwrap().to_owned();
+        (length.split('\r').next().unwrap().parse::<u64>().unwrap() - 16) / 20
+    };
+    let whole = count();
+    assert!(whole > 1000, "{whole}");
+    let [from_s, to_s] = span_s(&viewer);
+    let middle_s = f64::midpoint(from_s, to_s);
+    viewer.send(&json!({"do": "play", "command": "seek", "to_s": middle_s}));
+    viewer.until("the jump back", |viewer| viewer.state["now_s"].as_f64() < Some(middle_s + 0.1));
+    let part = count();
+    assert!(part > 0 && part < whole, "{part} of {whole}");
+    viewer.send(&json!({"do": "play", "command": "seek", "to_s": to_s + 1.0}));
+    viewer.until("the jump to the end", |viewer| viewer.state["now_s"].as_f64() > Some(to_s - 1.0));
+    assert_eq!(count(), whole);
+    viewer.send(&json!({"do": "play", "command": "seek", "to_s": from_s}));
+    viewer.until("the beginning", |viewer| viewer.state["now_s"].as_f64() < Some(from_s + 0.5));
+    viewer.send(&json!({"do": "play", "command": "step_section"}));
+    viewer.until("a section", |viewer| viewer.sections.values().any(|section| section.verdict != 0));
+    viewer.until("it stands still", |viewer| viewer.state["playback"]["paused"] == true);
+    assert!(viewer.state["now_s"].as_f64() < Some(to_s - 1.0), "{}", viewer.state["now_s"]);
+    end(serving, &mut viewer);
+}
+
+#[test]
+fn other_programs_read_lines_states_and_figures() {
+    let folder = Folder::with_dive();
+    let (serving, mut viewer) = replayed(&folder);
+    let (_, extras) = serving.ask("GET", "/cockpit_extras.json", &[], "");
+    let extras: Value = serde_json::from_str(extras.split("\r\n\r\n").nth(1).unwrap()).unwrap();
+    // As Cockpit's schema wants it: keys in camelCase, texts and no null where a text is, an icon for each widget.
+    for widget in extras["widgets"].as_array().unwrap() {
+        assert!(
+            ["name", "iframeUrl", "iframeIcon", "version"].iter().all(|key| widget[key].is_string()),
+            "{widget}"
+        );
+    }
+    for action in extras["actions"].as_array().unwrap() {
+        let config = &action["config"];
+        assert!(["name", "url", "method", "body"].iter().all(|key| config[key].is_string()), "{action}");
+        assert!(config["headers"].is_object() && action["type"] == "http-request", "{action}");
+    }
+    let (status, answer) = serving.ask("GET", "/state.json", &[], "");
+    let body = answer.split("\r\n\r\n").nth(1).unwrap();
+    let state: Value = serde_json::from_str(body).unwrap();
+    assert_eq!((status, &state["position"]), (200, &viewer.state["position"]));
+    let (_, figures) = serving.ask("GET", "/metrics", &[], "");
+    assert!(figures.contains("\nheadrace_page_viewers 1\n"), "{figures}");
+    assert!(figures.contains("\nheadrace_page_dropped_samples_total 0\n"), "{figures}");
+    let (_, page) = serving.ask("GET", "/widget/speed", &[], "");
+    assert!(page.to_lowercase().contains("<!doctype html>") && page.contains("nosniff"), "{page}");
+    end(serving, &mut viewer);
+}
+
+#[test]
+fn a_dive_in_a_file_holds_what_a_viewer_gets() {
+    use std::io::Read as _;
+    let folder = Folder::with_dive();
+    let answer = folder.headrace(&["export", "dive.mcap", "--html", "dive.html"]);
+    assert!(matches!(answer.code, Some(0 | 1)), "{}", answer.stderr);
+    let page = String::from_utf8(folder.read("dive.html")).unwrap();
+    assert!(!page.contains("src=\"/") && !page.contains("href=\"/"), "nothing is fetched");
+    let begin = page.find("id=\"dive\">").unwrap() + 10;
+    let text = &page[begin..begin + page[begin..].find("</script>").unwrap()];
+    let mut bytes = Vec::new();
+    flate2::read::DeflateDecoder::new(&*base64(text)).read_to_end(&mut bytes).unwrap();
+    let (mut kinds, mut rest, mut frames) = (Vec::new(), bytes.as_slice(), Vec::new());
+    while let [a, b, c, d, kind, after @ ..] = rest {
+        let (body, after) = after.split_at(u32::from_le_bytes([*a, *b, *c, *d]) as usize);
+        rest = after;
+        if *kind == 0 {
+            let value: Value = serde_json::from_slice(body).unwrap();
+            kinds.push(value["type"].as_str().unwrap().to_owned());
+            frames.push(value);
+        } else {
+            kinds.push(format!("binary {}", body[0]));
+        }
+    }
+    assert_eq!(kinds[..3], ["hello", "binary 1", "binary 2"]);
+    assert_eq!(kinds.last().unwrap(), "end");
+    let (_, replayed) = folder.replay("dive.mcap", &[]);
+    assert_eq!(frames.last().unwrap()["digest"], replayed["digest"]);
+    let timeline = frames.iter().find(|frame| frame["type"] == "timeline").unwrap();
+    let (times, states) = (timeline["t_s"].as_array().unwrap(), timeline["states"].as_array().unwrap());
+    assert!(times.len() > 5 && times.len() == states.len(), "{} {}", times.len(), states.len());
+    assert!(
+        states.iter().skip(1).all(|state| state.get("version").is_none()),
+        "what is constant is there once"
+    );
+    let again = folder.headrace(&["export", "dive.mcap", "--html", "dive.html"]);
+    assert!(matches!(again.code, Some(0 | 1)), "its own kind is overwritten: {}", again.stderr);
+    assert_eq!(folder.read("dive.html"), page.as_bytes(), "byte for byte");
+    folder.write("other.html", "<html>");
+    assert_eq!(folder.headrace(&["export", "dive.mcap", "--html", "other.html"]).code, Some(2));
+}
+
+/// Source: RFC 4648, section 4.
+fn base64(text: &str) -> Vec<u8> {
+    const DIGITS: &[u8] = b"ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
+    let (mut bytes, mut bits, mut count) = (Vec::new(), 0_u32, 0);
+    for digit in text.bytes().filter(|digit| *digit != b'=') {
+        let value = DIGITS.iter().position(|other| *other == digit).unwrap();
+        (bits, count) = (bits << 6 | u32::try_from(value).unwrap(), count + 6);
+        if count >= 8 {
+            count -= 8;
+            bytes.push((bits >> count & 255) as u8);
+        }
+    }
+    bytes
+}

@@ -1,0 +1,64 @@
+//! Viewers cost the dive nothing: its results are the same with a stalled one, one that floods, and none.
+
+use std::net::TcpListener;
+
+use headrace_tests::Folder;
+use headrace_tests::page_client::{Serving, Viewer};
+use serde_json::Value;
+use tungstenite::Message;
+
+use crate::ANY;
+
+#[test]
+fn a_stalled_and_a_flooding_viewer_change_nothing() {
+    let folder = Folder::new();
+    let bare = folder.headrace(&["demo", "--speed", "max", "--out", "bare"]);
+    assert_eq!(bare.code, Some(0), "{}", bare.stderr);
+    let serving = Serving::start(&folder, &["demo", ANY, "--no-open", "--speed", "400x", "--out", "watched"]);
+    // Connected, and never read from again.
+    let _stalled: Vec<Viewer> = (0..8).map(|_| Viewer::connect(&serving, "", &[]).unwrap()).collect();
+    let mut flooding = Viewer::connect(&serving, "", &[]).unwrap();
+    while flooding.send_raw(Message::Text("x".repeat(4000).into())).is_ok() {}
+    let mut viewer = Viewer::connect(&serving, "", &[]).unwrap();
+    let end = viewer.until_type("end");
+    let (code, told) = serving.end();
+    assert_eq!(code, bare.code, "{told}");
+    let digest = |name: &str| serde_json::from_slice::<Value>(&folder.read(name)).unwrap()["digest"].clone();
+    assert_eq!(digest("bare/report.json"), digest("watched/report.json"));
+    assert_eq!(end["digest"], digest("bare/report.json"));
+}
+
+#[test]
+fn a_taken_port_is_named_and_the_next_is_used() {
+    let folder = Folder::with_dive();
+    let (taken, port) = loop {
+        let listener = TcpListener::bind("127.0.0.1:0").unwrap();
+        let port = listener.local_addr().unwrap().port();
+        if port < 65_000 {
+            break (listener, port);
+        }
+    };
+    let page = format!("--page=127.0.0.1:{port}");
+    let serving = Serving::start(&folder, &["replay", "dive.mcap", &page]);
+    assert_ne!(serving.address, format!("127.0.0.1:{port}"));
+    let mut viewer = Viewer::connect(&serving, "", &[]).unwrap();
+    viewer.send(&serde_json::json!({"do": "play", "command": "end"}));
+    viewer.until_type("end");
+    serving.end();
+    drop(taken);
+    let wrong = ["--page", "--page-cert", "none.pem", "--page-key", "none.pem"];
+    let answer = folder.headrace(&[&["replay", "dive.mcap"], wrong.as_slice()].concat());
+    assert!(matches!(answer.code, Some(0 | 1)), "{}", answer.stderr);
+    assert!(
+        answer.stderr.contains("none.pem") && answer.stderr.contains("goes on without the page"),
+        "{}",
+        answer.stderr
+    );
+}
+
+#[test]
+fn no_page_unless_asked_where_nobody_watches() {
+    let folder = Folder::with_dive();
+    let answer = folder.headrace(&["replay", "dive.mcap", "--speed", "50x"]);
+    assert!(!answer.stdout.contains("http://") && !answer.stderr.contains("http://"));
+}
