@@ -4,7 +4,7 @@
 use headrace_geometry::time::{DurNs, MonoNs};
 use headrace_monitor::App;
 use headrace_monitor::alert_list::{AlertChange, AlertState, ListKind, ListedAlert};
-use headrace_monitor::console::{CONSOLE_ID, Command, ConsoleCounts, ConsoleInput, Who};
+use headrace_monitor::console::{CONSOLE_ID, Command, ConsoleCounts, ConsoleInput, NoteText, Who};
 use headrace_monitor::messages::Notice;
 use headrace_monitor::report::Report;
 use headrace_monitor::ring::Port;
@@ -248,7 +248,7 @@ fn commands_of_any_thread_reach_the_loop() {
     let threads = [(); 4].map(|()| {
         let port = port.clone();
         std::thread::spawn(move || {
-            (0..100).filter(|_| port.send(&Command::Note { text: Default::default(), by }).is_ok()).count()
+            (0..100).filter(|_| port.send(&Command::Note { text: NoteText::default(), by }).is_ok()).count()
         })
     });
     let taken: usize = threads.into_iter().map(|thread| thread.join().unwrap()).sum();
