@@ -79,6 +79,7 @@ pub struct Collector {
     /// Chainages of dropped samples, m.
     lacking_m: Option<[f64; 2]>,
     dropped: Dropped,
+    skips: bool,
     back_due: bool,
     notes_due: bool,
     back_told: Option<(MonoNs, Value)>,
@@ -120,6 +121,7 @@ impl Collector {
             told: Vec::new(),
             lacking_m: None,
             dropped: Dropped::default(),
+            skips: false,
             back_due: false,
             notes_due: false,
             back_told: None,
@@ -165,7 +167,9 @@ impl Collector {
     /// Takes the results of a tick on the way of a jump.
     pub fn skipped(&mut self, dive: &Loop) {
         self.gather(dive);
+        self.skips = true;
         self.send(dive);
+        self.skips = false;
     }
 
     /// Takes a change of a sensor's connection.
@@ -339,6 +343,7 @@ impl Collector {
         self.take_rates(now, dive);
         let news = News {
             now,
+            is_skipped: self.skips,
             begun: self.begun,
             state: Box::new(dive.live_state_json()),
             beside: self.beside(dive),

@@ -26,6 +26,8 @@ pub enum Fed {
 pub struct News {
     /// The end of the tick.
     pub now: MonoNs,
+    /// Of a tick on the way of a jump: only its samples count, the rest comes with the jump.
+    pub is_skipped: bool,
     /// The first time of the dive, once there is one.
     pub begun: Option<MonoNs>,
     /// The live state, as of the tick.

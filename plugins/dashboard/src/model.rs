@@ -150,6 +150,11 @@ impl Model {
 
     fn news(&mut self, news: News) -> bool {
         self.begun = self.begun.or(news.begun);
+        if news.is_skipped {
+            let at_ms = self.ms(news.now);
+            self.samples.take(at_ms, &news.samples, self.site.is_playback);
+            return false;
+        }
         let is_urgent = !news.told.is_empty();
         for record in news.sections {
             let before = self.sections.get(&record.index);

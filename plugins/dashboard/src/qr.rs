@@ -6,8 +6,8 @@ use qrcode::{EcLevel, QrCode};
 /// Lines of a code for `text`, dark modules as gaps; `None` where it is too long.
 pub fn qr(text: &str) -> Option<String> {
     let code = QrCode::with_error_correction_level(text, EcLevel::L).ok()?;
-    // Terminals are mostly dark: light is what they draw.
-    Some(code.render::<Dense1x2>().dark_color(Dense1x2::Dark).light_color(Dense1x2::Light).build())
+    // Terminals are mostly dark: what they draw is light. The renderer's `Dark` is what is drawn.
+    Some(code.render::<Dense1x2>().dark_color(Dense1x2::Light).light_color(Dense1x2::Dark).build())
 }
 
 #[cfg(test)]
@@ -19,7 +19,7 @@ mod tests {
         let code = qr("http://192.168.2.2:8881/login?token=0123456789abcdef0123456789abcdef").unwrap();
         let lines: Vec<&str> = code.lines().collect();
         assert!(lines.iter().all(|line| line.chars().count() == lines[0].chars().count()));
-        // The rim is light, an eye's first row dark: half blocks.
-        assert!(lines[2].starts_with("    ▀▀") || lines[2].starts_with("████ "), "{code}");
+        assert!(lines[0].chars().all(|char| char == '█'), "the rim is drawn: {code}");
+        assert!(lines[2].starts_with("████ ▄▄▄▄▄ █"), "an eye: {code}");
     }
 }
