@@ -19,7 +19,7 @@ pub(crate) use habits::{Completions, Man, Overwrite};
 pub(crate) use value_parsers::{Speed, speed, time};
 use value_parsers::{
     address, chainage, chainage_range, drift, file_kind, hours, layout, length, place, rotation, seconds,
-    seconds_range, section, sound_speed, source_line, speed_mps, target, yaw,
+    seconds_range, section, sound_speed, source_line, speed_mps, target, udp_address, yaw,
 };
 
 /// Commands of `replay --interactive`.
@@ -184,6 +184,8 @@ pub(crate) struct Demo {
     #[arg(long, value_name = "max|Nx", default_value = "20x", value_parser = speed, help = SPEED_HELP)]
     pub(crate) speed: Speed,
     #[command(flatten)]
+    pub(crate) following: Following,
+    #[command(flatten)]
     pub(crate) overwrite: Overwrite,
 }
 
@@ -217,6 +219,8 @@ pub(crate) struct Run {
     pub(crate) duration: Option<f64>,
     #[arg(long, value_name = "max|Nx", default_value = "1x", value_parser = speed, help = SPEED_HELP)]
     pub(crate) speed: Speed,
+    #[command(flatten)]
+    pub(crate) following: Following,
     #[command(flatten)]
     pub(crate) output: Output,
 }
@@ -273,7 +277,7 @@ pub(crate) struct Replay {
     #[arg(short, long, conflicts_with = "smooth", help = interactive_help())]
     pub(crate) interactive: bool,
     /// Use the smoothed trajectory, and report what it changes.
-    #[arg(long, conflicts_with = "speed")]
+    #[arg(long, conflicts_with_all = ["speed", "tui", "foxglove"])]
     pub(crate) smooth: bool,
     /// Report to compare with; exit code 1 if verdicts, holes or the digest differ.
     #[arg(long, value_name = "GOLDEN.json")]
@@ -281,6 +285,8 @@ pub(crate) struct Replay {
     /// Show the differences to the golden report, and replace it.
     #[arg(long, requires = "expect")]
     pub(crate) bless: bool,
+    #[command(flatten)]
+    pub(crate) following: Following,
     #[command(flatten)]
     pub(crate) output: Output,
 }
@@ -531,6 +537,33 @@ pub(crate) struct Check {
     pub(crate) json: bool,
 }
 
+/// Screens and programs that follow a dive.
+#[derive(Debug, Args)]
+#[command(next_help_heading = "Who follows the dive")]
+pub(crate) struct Following {
+    /// Show the dive on the whole terminal, for a session over ssh; ? lists the keys.
+    #[arg(long)]
+    pub(crate) tui: bool,
+    /// Send heartbeats, figures and alerts over MAVLink to this UDP address, as an onboard computer (component 191): to
+    /// QGroundControl, or under BlueOS to its MAVLink server, 127.0.0.1:14550.
+    #[arg(long, value_name = "HOST:PORT", value_parser = udp_address)]
+    pub(crate) mavlink_out: Option<String>,
+    /// MAVLink system id of the vehicle.
+    #[arg(long, value_name = "ID", default_value = "1", value_parser = clap::value_parser!(u8).range(1..), requires = "mavlink_out")]
+    pub(crate) mavlink_system: u8,
+    /// Serve the dive to Foxglove or Lichtblick on this machine, by default at 127.0.0.1:8765; a replay takes its playback
+    /// controls. In a program built with --features foxglove.
+    #[arg(long, value_name = "ADDRESS:PORT", num_args = 0..=1, default_missing_value = "127.0.0.1:8765")]
+    pub(crate) foxglove: Option<std::net::SocketAddr>,
+}
+
+impl Following {
+    /// Whether somebody may want to command a replay.
+    pub(crate) fn may_command(&self) -> bool {
+        self.tui || self.foxglove.is_some()
+    }
+}
+
 #[derive(Debug, Args)]
 pub(crate) struct Output {
     /// Report file to write.
@@ -542,7 +575,7 @@ pub(crate) struct Output {
     #[command(flatten)]
     pub(crate) overwrite: Overwrite,
     /// Print a JSON object a line while the dive goes on: the state once a second, and what is told of it (docs/live-state.md).
-    #[arg(long, conflicts_with = "json")]
+    #[arg(long, conflicts_with_all = ["json", "tui"])]
     pub(crate) json_lines: bool,
 }
 

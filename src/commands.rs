@@ -1,12 +1,15 @@
 //! The commands `demo`, `run` and `replay`.
 
 use std::path::PathBuf;
+use std::sync::Arc;
 use std::sync::atomic::Ordering;
 
+use crossbeam::channel::{Receiver, unbounded};
 use headrace_config::Document;
-use headrace_geometry::time::DurNs;
-use headrace_replay::drive::Pace;
+use headrace_geometry::time::{DurNs, MonoNs};
+use headrace_replay::drive::{Pace, PacketSource as _};
 use headrace_replay::log::files_of;
+use headrace_replay::playback::PlaybackCommand;
 use headrace_replay::player::Player;
 use headrace_replay::{SimulationFeed, simulation};
 use headrace_simulator::Scene;
@@ -19,6 +22,7 @@ use crate::expect;
 use crate::failure::{self, Failure};
 use crate::feeds::Interruptible;
 use crate::files;
+use crate::followers::{Followers, Joining};
 use crate::interrupt;
 use crate::live;
 use crate::output::{say, show};
@@ -28,6 +32,8 @@ use crate::report_output::{exit_code, finish, note_losses};
 use crate::screen::Screen;
 use crate::smooth;
 use crate::summary::summary;
+use crate::terminal;
+use crate::tui::Mode;
 use crate::vehicle_file;
 use crate::watch::{Show, Watch};
 
@@ -41,13 +47,18 @@ pub(crate) fn demo(args: &Demo) -> Result<u8, Failure> {
     outputs::claim(&report_file, Kind::Report, &args.overwrite)?;
     // The recorder writes new logs only.
     outputs::make_way(&log)?;
+    let followers = Followers::of(&args.following)?;
     let interrupted = interrupt::flag()?;
     let recording = Recording::simulated(&log, &scene.name);
     let dive = assemble(&scene.vehicle, &scene.vehicle_text, Some(recording))?.operated(Clock::Theirs);
-    let mut watch = Watch::new(Show::Lines);
-    if !watch.is_quiet() {
+    let shown = followers.show(Show::Lines);
+    if shown == Show::Lines && !terminal::is_quiet() {
         say(&format!("{}, target {} m: a simulated dive", scene.vehicle.name, scene.vehicle.target_m));
     }
+    let mut watch = followers.join(
+        Watch::new(shown),
+        Joining::new(&scene.vehicle, Mode::Demo, &interrupted).operated(dive.console()),
+    )?;
     let mut feed = SimulationFeed::new(simulation(&scene, false)?);
     let pace = Pace { speed: args.speed.0, ..Pace::default() };
     let mut feed = Interruptible { feed: &mut feed, interrupted: &interrupted };
@@ -79,9 +90,12 @@ pub(crate) fn run(args: &Run) -> Result<u8, Failure> {
     let dive = assemble(&vehicle, &text, recording)?;
     player.connect(dive.armed.sources());
     let pace = Pace { speed: args.speed.0, ..Pace::default() };
+    let followers = Followers::of(&args.following)?;
     let interrupted = interrupt::flag()?;
     let mut feed = Interruptible { feed: &mut player, interrupted: &interrupted };
-    let mut report = dive.run(&mut feed, pace, &mut Watch::new(args.output.show()))?;
+    let watch = Watch::new(followers.show(args.output.show()));
+    let mut watch = followers.join(watch, Joining::new(&vehicle, Mode::Source, &interrupted))?;
+    let mut report = dive.run(&mut feed, pace, &mut watch)?;
     note_losses(&mut report, log, &player);
     finish(&report, &args.output)
 }
@@ -100,7 +114,8 @@ pub(crate) fn replay(args: &Replay) -> Result<u8, Failure> {
         None => vehicle_file::attached(player.info(), &player.losses(), log),
     }?;
     let what_if = what_if(args, &mut vehicle);
-    let usual = Speed(if args.interactive && play::has_keys() { Some(1.0) } else { None });
+    let has_keys = args.following.may_command() || args.interactive && play::has_keys();
+    let usual = Speed(if has_keys { Some(1.0) } else { None });
     let pace =
         Pace { tick: DurNs::from_millis(i64::from(args.tick_ms)), speed: args.speed.unwrap_or(usual).0 };
     let mut report = if args.smooth {
@@ -108,9 +123,9 @@ pub(crate) fn replay(args: &Replay) -> Result<u8, Failure> {
     } else {
         let dive = assemble(&vehicle, &text, None)?.asking(what_if);
         player.connect(dive.armed.sources());
-        let mut watch = Watch::new(args.output.show());
-        if args.from.is_some() || args.interactive {
-            let playing = Playing { from: args.from, interactive: args.interactive, pace };
+        let (mut watch, commands) = watch_of_replay(args, &vehicle, pace, player.span())?;
+        if args.from.is_some() || args.interactive || commands.is_some() {
+            let playing = Playing { from: args.from, interactive: args.interactive, pace, commands };
             playing.play(dive, &mut player, &mut watch)?
         } else {
             dive.run(&mut player, pace, &mut watch)?
@@ -123,6 +138,25 @@ pub(crate) fn replay(args: &Replay) -> Result<u8, Failure> {
         Some(golden) if expect::differs(&report, golden)? => Ok(failure::FAILED),
         _ => Ok(code),
     }
+}
+
+/// Who watches a replay, and the commands that come from a screen with keys.
+fn watch_of_replay(
+    args: &Replay,
+    vehicle: &VehicleConfig,
+    pace: Pace,
+    span: Option<(MonoNs, MonoNs)>,
+) -> Result<(Watch, Option<Receiver<PlaybackCommand>>), Failure> {
+    let followers = Followers::of(&args.following)?;
+    let watch = Watch::new(followers.show(args.output.show()));
+    if !args.following.may_command() {
+        return Ok((followers.join(watch, Joining::new(vehicle, Mode::Source, &Arc::default()))?, None));
+    }
+    let (sender, commands) = unbounded();
+    let interrupted = interrupt::flag()?;
+    let mode = Mode::Replay(sender, pace.speed);
+    let joining = Joining::new(vehicle, mode, &interrupted).over(span);
+    Ok((followers.join(watch, joining)?, Some(commands)))
 }
 
 /// Checks that the report can be written, and isn't one of the inputs.

@@ -5,7 +5,7 @@ mod keys;
 use std::io::{BufRead, IsTerminal as _};
 use std::time::Duration;
 
-use crossbeam::channel::{Sender, unbounded};
+use crossbeam::channel::{Receiver, Sender, unbounded};
 use headrace_geometry::time::{DurNs, MonoNs};
 use headrace_monitor::outlet::NoticeReceiver;
 use headrace_monitor::report::Report;
@@ -24,6 +24,7 @@ use crate::output::aside;
 use crate::phase::Phase;
 use crate::watch::Watch;
 use keys::Keyboard;
+pub(crate) use keys::{Hand, Key};
 
 /// Work between two snapshots: with the time to restore one, a jump takes well under a second.
 const SNAPSHOT_INTERVAL: Duration = Duration::from_millis(300);
@@ -35,16 +36,20 @@ pub(crate) struct Playing {
     pub(crate) from: Option<DurNs>,
     pub(crate) interactive: bool,
     pub(crate) pace: Pace,
+    /// Where commands come from, if not from stdin.
+    pub(crate) commands: Option<Receiver<PlaybackCommand>>,
 }
 
 impl Playing {
     /// Plays a dive; returns the report.
     pub(crate) fn play(self, dive: Dive, player: &mut Player, watch: &mut Watch) -> Result<Report, Failure> {
-        let Self { from, interactive, pace } = self;
+        let Self { from, interactive, pace, commands: others } = self;
         // Without commands nothing jumps back.
-        let interval = if interactive { SNAPSHOT_INTERVAL } else { Duration::MAX };
+        let interval = if interactive || others.is_some() { SNAPSHOT_INTERVAL } else { Duration::MAX };
         dive.play(watch, |armed, notices, watch| {
-            let (sender, commands) = unbounded();
+            let (sender, own) = unbounded();
+            let interactive = interactive && others.is_none();
+            let commands = others.unwrap_or(own);
             let has_keys = interactive && has_keys();
             let mut screen = Screen { notices, watch, begun: MonoNs(0), has_keys };
             let store = SnapshotStore::new(SNAPSHOT_BYTES, interval);
