@@ -1,6 +1,7 @@
 //! The command line.
 
 mod habits;
+mod logs;
 mod page;
 mod value_parsers;
 
@@ -8,7 +9,6 @@ use std::path::PathBuf;
 
 use clap::{ArgAction, Args, Parser, Subcommand};
 use headrace_geometry::time::DurNs;
-use headrace_import::FileKind;
 use headrace_replay::log::Every;
 use headrace_sampling::layout::HeadLayout;
 use headrace_sensor::connect::Connect;
@@ -16,12 +16,13 @@ use tracing::level_filters::LevelFilter;
 
 use crate::watch::Show;
 pub(crate) use habits::{Completions, Man, Overwrite};
+pub(crate) use logs::{Export, Import, Recover, Trim, Verify};
 pub(crate) use page::PageArgs;
-
 pub(crate) use value_parsers::{Speed, speed, time};
+
 use value_parsers::{
-    address, chainage, chainage_range, drift, file_kind, hours, layout, length, place, rotation, seconds,
-    seconds_range, section, sound_speed, source_line, speed_mps, target, yaw,
+    address, chainage, drift, hours, layout, length, place, rotation, seconds, seconds_range, section,
+    sound_speed, speed_mps, target, udp_address, yaw,
 };
 
 /// Commands of `replay --interactive`.
@@ -192,6 +193,8 @@ pub(crate) struct Demo {
     #[arg(long, value_name = "max|Nx", default_value = "20x", value_parser = speed, help = SPEED_HELP)]
     pub(crate) speed: Speed,
     #[command(flatten)]
+    pub(crate) following: Following,
+    #[command(flatten)]
     pub(crate) overwrite: Overwrite,
     /// Open no browser.
     #[arg(long, help_heading = "Page")]
@@ -230,6 +233,8 @@ pub(crate) struct Run {
     pub(crate) duration: Option<f64>,
     #[arg(long, value_name = "max|Nx", default_value = "1x", value_parser = speed, help = SPEED_HELP)]
     pub(crate) speed: Speed,
+    #[command(flatten)]
+    pub(crate) following: Following,
     #[command(flatten)]
     pub(crate) output: Output,
     #[command(flatten)]
@@ -288,7 +293,7 @@ pub(crate) struct Replay {
     #[arg(short, long, conflicts_with = "smooth", help = interactive_help())]
     pub(crate) interactive: bool,
     /// Use the smoothed trajectory, and report what it changes.
-    #[arg(long, conflicts_with = "speed")]
+    #[arg(long, conflicts_with_all = ["speed", "tui", "foxglove"])]
     pub(crate) smooth: bool,
     /// Report to compare with; exit code 1 if verdicts, holes or the digest differ.
     #[arg(long, value_name = "GOLDEN.json")]
@@ -297,88 +302,11 @@ pub(crate) struct Replay {
     #[arg(long, requires = "expect")]
     pub(crate) bless: bool,
     #[command(flatten)]
+    pub(crate) following: Following,
+    #[command(flatten)]
     pub(crate) output: Output,
     #[command(flatten)]
     pub(crate) page: PageArgs,
-}
-
-#[derive(Debug, Args)]
-pub(crate) struct Export {
-    /// Log to export, or the parts of a recording.
-    #[arg(required = true, value_name = "LOG")]
-    pub(crate) logs: Vec<PathBuf>,
-    /// Page to write.
-    #[arg(long, value_name = "OUT.html")]
-    pub(crate) html: PathBuf,
-    /// Vehicle file, overriding the one attached to the log.
-    #[arg(long, value_name = "FILE")]
-    pub(crate) vehicle: Option<PathBuf>,
-    #[command(flatten)]
-    pub(crate) overwrite: Overwrite,
-}
-
-#[derive(Debug, Args)]
-pub(crate) struct Verify {
-    /// Log to verify, or the parts of a recording.
-    #[arg(required = true, value_name = "LOG")]
-    pub(crate) logs: Vec<PathBuf>,
-    /// Vehicle file, overriding the one attached to the log.
-    #[arg(long, value_name = "FILE")]
-    pub(crate) vehicle: Option<PathBuf>,
-    /// Tick length, milliseconds; results don't depend on it.
-    #[arg(long, value_name = "MS", default_value = "20", value_parser = clap::value_parser!(u32).range(1..=60_000))]
-    pub(crate) tick_ms: u32,
-    /// Print JSON.
-    #[arg(long)]
-    pub(crate) json: bool,
-}
-
-#[derive(Debug, Args)]
-pub(crate) struct Recover {
-    /// Log to recover, or the parts of a recording, which become one log; not modified.
-    #[arg(required = true, value_name = "LOG")]
-    pub(crate) logs: Vec<PathBuf>,
-    /// Log to write.
-    #[arg(short, long, value_name = "FIXED.mcap")]
-    pub(crate) output: PathBuf,
-    /// Print the summary as JSON.
-    #[arg(long)]
-    pub(crate) json: bool,
-    #[command(flatten)]
-    pub(crate) overwrite: Overwrite,
-}
-
-#[derive(Debug, Args)]
-pub(crate) struct Trim {
-    /// Log to trim, or the parts of a recording; not modified.
-    #[arg(required = true, value_name = "LOG")]
-    pub(crate) logs: Vec<PathBuf>,
-    /// Log to write.
-    #[arg(short, long, value_name = "TRIMMED.mcap")]
-    pub(crate) output: PathBuf,
-    /// Start time, from the log's first message: 90s, 10min, 1.5h.
-    #[arg(long, value_name = "TIME", value_parser = time, conflicts_with = "chainage")]
-    pub(crate) from: Option<DurNs>,
-    /// End time, from the log's first message.
-    #[arg(long, value_name = "TIME", value_parser = time, conflicts_with = "chainage")]
-    pub(crate) to: Option<DurNs>,
-    /// Keep the times at which the vehicle was in this range of chainage, metres; the log is replayed to find them.
-    #[arg(long, value_name = "FROM..TO", value_parser = chainage_range, allow_hyphen_values = true)]
-    pub(crate) chainage: Option<[f64; 2]>,
-    /// Drop echo data where a device's messages also contain the range; replays give the same results.
-    #[arg(long)]
-    pub(crate) drop_echoes: bool,
-    /// Remove names, comments, addresses, serial numbers, time of day and geographic positions; lists what can't be removed.
-    #[arg(long)]
-    pub(crate) anonymise: bool,
-    /// Vehicle file for --chainage and --drop-echoes, overriding the one attached to the log.
-    #[arg(long, value_name = "FILE", conflicts_with = "anonymise")]
-    pub(crate) vehicle: Option<PathBuf>,
-    /// Print the summary as JSON.
-    #[arg(long)]
-    pub(crate) json: bool,
-    #[command(flatten)]
-    pub(crate) overwrite: Overwrite,
 }
 
 #[derive(Debug, Args)]
@@ -398,33 +326,6 @@ pub(crate) struct Simulate {
     /// List what would be simulated and why, without simulating.
     #[arg(long)]
     pub(crate) explain: bool,
-    /// Print a summary as JSON.
-    #[arg(long)]
-    pub(crate) json: bool,
-    #[command(flatten)]
-    pub(crate) overwrite: Overwrite,
-}
-
-#[derive(Debug, Args)]
-pub(crate) struct Import {
-    /// Log to import.
-    pub(crate) file: PathBuf,
-    /// Log to write.
-    #[arg(short, long, value_name = "LOG.mcap")]
-    pub(crate) output: PathBuf,
-    /// Vehicle file with the sensors that the messages are from.
-    #[arg(long, value_name = "VEHICLE.toml")]
-    pub(crate) vehicle: Option<PathBuf>,
-    /// Sensor and the stream of the log that it receives (mavlink, imagenex, ping, or a CAN interface), once per sensor;
-    /// replaces the assignment by the vehicle file.
-    #[arg(long, value_name = "ID=STREAM", value_parser = source_line)]
-    pub(crate) source: Vec<(String, String)>,
-    /// Mapping file: for CSV, columns to quantities of sensors; for ROS, topics to sensors, where it is ambiguous.
-    #[arg(long, value_name = "MAPPING.toml")]
-    pub(crate) map: Option<PathBuf>,
-    /// Format of the file, if its extension doesn't tell.
-    #[arg(long, value_parser = file_kind())]
-    pub(crate) format: Option<FileKind>,
     /// Print a summary as JSON.
     #[arg(long)]
     pub(crate) json: bool,
@@ -563,6 +464,33 @@ pub(crate) struct Check {
     pub(crate) json: bool,
 }
 
+/// Screens and programs that follow a dive.
+#[derive(Debug, Args)]
+#[command(next_help_heading = "Who follows the dive")]
+pub(crate) struct Following {
+    /// Show the dive on the whole terminal, for a session over ssh; ? lists the keys.
+    #[arg(long)]
+    pub(crate) tui: bool,
+    /// Send heartbeats, figures and alerts over MAVLink to this UDP address, as an onboard computer (component 191): to
+    /// QGroundControl, or under BlueOS to its MAVLink server, 127.0.0.1:14550.
+    #[arg(long, value_name = "HOST:PORT", value_parser = udp_address)]
+    pub(crate) mavlink_out: Option<String>,
+    /// MAVLink system id of the vehicle.
+    #[arg(long, value_name = "ID", default_value = "1", value_parser = clap::value_parser!(u8).range(1..), requires = "mavlink_out")]
+    pub(crate) mavlink_system: u8,
+    /// Serve the dive to Foxglove or Lichtblick on this machine, by default at 127.0.0.1:8765; a replay takes its playback
+    /// controls. In a program built with --features foxglove.
+    #[arg(long, value_name = "ADDRESS:PORT", num_args = 0..=1, default_missing_value = "127.0.0.1:8765")]
+    pub(crate) foxglove: Option<std::net::SocketAddr>,
+}
+
+impl Following {
+    /// Whether somebody may want to command a replay.
+    pub(crate) fn may_command(&self) -> bool {
+        self.tui || self.foxglove.is_some()
+    }
+}
+
 #[derive(Debug, Args)]
 pub(crate) struct Output {
     /// Report file to write.
@@ -574,7 +502,7 @@ pub(crate) struct Output {
     #[command(flatten)]
     pub(crate) overwrite: Overwrite,
     /// Print a JSON object a line while the dive goes on: the state once a second, and what is told of it (docs/live-state.md).
-    #[arg(long, conflicts_with = "json")]
+    #[arg(long, conflicts_with_all = ["json", "tui"])]
     pub(crate) json_lines: bool,
 }
 

@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
 
+use crossbeam::channel::unbounded;
 use headrace_config::Document;
 use headrace_dashboard::Mode;
 use headrace_geometry::time::DurNs;
@@ -22,17 +23,19 @@ use crate::expect;
 use crate::failure::{self, Failure};
 use crate::feeds::Interruptible;
 use crate::files;
+use crate::followers::{Followers, Joining};
 use crate::interrupt;
 use crate::live;
 use crate::output::{say, show};
 use crate::outputs::{self, Kind};
 use crate::page::{self, Of, Served};
-use crate::play::{self, Playing};
+use crate::play::{self, Directors, Playing};
 use crate::report_output::{exit_code, finish, note_losses};
 use crate::screen::Screen;
 use crate::smooth;
 use crate::summary::summary;
 use crate::terminal;
+use crate::tui;
 use crate::vehicle_file;
 use crate::watch::{Show, Watch};
 
@@ -46,20 +49,24 @@ pub(crate) fn demo(args: &Demo) -> Result<u8, Failure> {
     outputs::claim(&report_file, Kind::Report, &args.overwrite)?;
     // The recorder writes new logs only.
     outputs::make_way(&log)?;
+    let followers = Followers::of(&args.following)?;
     let interrupted = interrupt::flag()?;
     let recording = Recording::simulated(&log, &scene.name);
     let is_served = page::is_wanted(&args.page, true);
     let dive = assemble_followed(&scene.vehicle, &scene.vehicle_text, Some(recording), is_served)?
         .operated(Clock::Theirs);
-    let mut watch = Watch::new(Show::Lines);
-    if !watch.is_quiet() {
+    let shown = followers.show(Show::Lines);
+    let mut watch = Watch::new(shown);
+    if watch.shows_lines() {
         say(&format!("{}, target {} m: a simulated dive", scene.vehicle.name, scene.vehicle.target_m));
     }
     let served =
-        is_served.then(|| demo_page(args, &scene, &log, dive.console(), !watch.is_quiet())).flatten();
+        is_served.then(|| demo_page(args, &scene, &log, dive.console(), watch.shows_lines())).flatten();
     if let Some(served) = &served {
         watch = watch.followed_by(served.follower(&dive.armed));
     }
+    let joining = Joining::new(&scene.vehicle, tui::Mode::Demo, &interrupted).operated(dive.console());
+    let mut watch = followers.join(watch, joining)?;
     let mut feed = SimulationFeed::new(simulation(&scene, false)?);
     let pace = Pace { speed: args.speed.0, ..Pace::default() };
     let mut feed = Interruptible { feed: &mut feed, interrupted: &interrupted };
@@ -120,8 +127,9 @@ pub(crate) fn run(args: &Run) -> Result<u8, Failure> {
     let dive = assemble_followed(&vehicle, &text, recording, is_served)?;
     player.connect(dive.armed.sources());
     let pace = Pace { speed: args.speed.0, ..Pace::default() };
+    let followers = Followers::of(&args.following)?;
     let interrupted = interrupt::flag()?;
-    let mut watch = Watch::new(args.output.show());
+    let mut watch = Watch::new(followers.show(args.output.show()));
     let of = Of {
         vehicle: &vehicle,
         mode: Mode::Replay,
@@ -137,6 +145,7 @@ pub(crate) fn run(args: &Run) -> Result<u8, Failure> {
         watch = watch.followed_by(served.follower(&dive.armed));
     }
     let mut feed = Interruptible { feed: &mut player, interrupted: &interrupted };
+    let mut watch = followers.join(watch, Joining::new(&vehicle, tui::Mode::Source, &interrupted))?;
     let mut report = dive.run(&mut feed, pace, &mut watch)?;
     note_losses(&mut report, log, &player);
     if let Some(served) = served {
@@ -159,7 +168,8 @@ pub(crate) fn replay(args: &Replay) -> Result<u8, Failure> {
         None => vehicle_file::attached(player.info(), &player.losses(), log),
     }?;
     let what_if = what_if(args, &mut vehicle);
-    let usual = Speed(if args.interactive && play::has_keys() { Some(1.0) } else { None });
+    let has_keys = args.following.may_command() || args.interactive && play::has_keys();
+    let usual = Speed(if has_keys { Some(1.0) } else { None });
     let pace =
         Pace { tick: DurNs::from_millis(i64::from(args.tick_ms)), speed: args.speed.unwrap_or(usual).0 };
     let mut served = None;
@@ -170,20 +180,33 @@ pub(crate) fn replay(args: &Replay) -> Result<u8, Failure> {
         let is_served = page::is_wanted(&args.page, is_watched);
         let dive = assemble_followed(&vehicle, &text, None, is_served)?.asking(what_if);
         player.connect(dive.armed.sources());
-        let mut watch = Watch::new(args.output.show());
+        let (sender, commands) = unbounded();
+        let followers = Followers::of(&args.following)?;
+        let mut watch = Watch::new(followers.show(args.output.show()));
         served = is_served.then(|| replay_page(args, &vehicle, log, &player, watch.shows_lines())).flatten();
+        let mut close = None;
         if let Some(served) = &served {
             watch = watch.followed_by(served.follower(&dive.armed));
-        }
-        if args.from.is_some() || args.interactive || served.is_some() {
             let stays = args.page.page.is_some();
-            let remote = match &served {
-                Some(served) => {
-                    Some(served.remote(stays, if stays { interrupt::flag()? } else { Arc::default() }))
-                }
-                None => None,
+            let interrupted = if stays { interrupt::flag()? } else { Arc::default() };
+            close = served.direct(&sender, stays, interrupted);
+        }
+        let takes_keys = args.following.may_command();
+        let mut joining = Joining::new(&vehicle, tui::Mode::Source, &Arc::default());
+        if takes_keys {
+            let mode = tui::Mode::Replay(sender.clone(), pace.speed);
+            joining = Joining::new(&vehicle, mode, &interrupt::flag()?).over(player.span());
+        }
+        let mut watch = followers.join(watch, joining)?;
+        if args.from.is_some() || args.interactive || served.is_some() || takes_keys {
+            let others = (served.is_some() || takes_keys).then_some(Directors { takes_keys, close });
+            let playing = Playing {
+                from: args.from,
+                interactive: args.interactive,
+                pace,
+                commands: (sender, commands),
+                others,
             };
-            let playing = Playing { from: args.from, interactive: args.interactive, pace, remote };
             playing.play(dive, &mut player, &mut watch)?
         } else {
             dive.run(&mut player, pace, &mut watch)?

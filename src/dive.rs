@@ -187,13 +187,16 @@ fn app(vehicle: &VehicleConfig) -> Result<(App, NoticeReceiver), Failure> {
     for sensor in &vehicle.sensors {
         app.add_device(sensor.as_ref())?;
     }
+    if cfg!(feature = "foxglove") {
+        app.keep_results();
+    }
     let (outlet, notices) = NoticeOutlet::new(NOTICES);
     app.add_plugin(&outlet)?;
     Ok((app, notices))
 }
 
 /// Tunnel and heads for viewers.
-fn view_site(vehicle: &VehicleConfig) -> Site {
+pub(crate) fn view_site(vehicle: &VehicleConfig) -> Site {
     let heads = (0..).zip(&vehicle.sensors).filter(|(_, sensor)| sensor.head().is_some());
     Site {
         profile: vehicle.tunnel.profile.clone(),

@@ -1,7 +1,8 @@
 //! Signals: a dive ends in good order, and nothing else ends it.
 
+use std::os::unix::net::UnixStream;
 use std::sync::Arc;
-use std::sync::atomic::AtomicBool;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 use signal_hook::consts::{
     SIGALRM, SIGHUP, SIGINT, SIGTERM, SIGTSTP, SIGUSR1, SIGUSR2, SIGVTALRM, SIGXCPU, SIGXFSZ,
@@ -32,10 +33,28 @@ pub(crate) fn flag_of_a_dive() -> Result<Arc<AtomicBool>, Failure> {
     Ok(flag)
 }
 
+/// Who puts the terminal in order before a second signal ends the program.
+static LEFT_TO_KEYS: AtomicBool = AtomicBool::new(false);
+
+/// From now on a second SIGINT or SIGTERM doesn't end the program: whoever reads [`seconds`] does.
+pub(crate) fn leave_second_to_keys() {
+    LEFT_TO_KEYS.store(true, Ordering::Relaxed);
+}
+
+/// A byte for every SIGINT and SIGTERM.
+pub(crate) fn seconds() -> std::io::Result<UnixStream> {
+    let (read, write) = UnixStream::pair()?;
+    signal_hook::low_level::pipe::register(SIGINT, write.try_clone()?)?;
+    signal_hook::low_level::pipe::register(SIGTERM, write)?;
+    Ok(read)
+}
+
 fn ending() -> Result<Arc<AtomicBool>, Failure> {
     let flag = Arc::new(AtomicBool::new(false));
     for signal in [SIGINT, SIGTERM] {
-        signal_hook::flag::register_conditional_shutdown(signal, 1, Arc::clone(&flag)).map_err(failed)?;
+        if !LEFT_TO_KEYS.load(Ordering::Relaxed) {
+            signal_hook::flag::register_conditional_shutdown(signal, 1, Arc::clone(&flag)).map_err(failed)?;
+        }
         on(signal, &flag)?;
     }
     Ok(flag)

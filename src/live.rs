@@ -17,6 +17,7 @@ use headrace_vehicle::VehicleConfig;
 use crate::cli::Run;
 use crate::dive::{Clock, Dive, Recording, assemble_followed};
 use crate::failure::Failure;
+use crate::followers::{Followers, Joining};
 use crate::interrupt;
 use crate::output::say;
 use crate::outputs::{self, Kind};
@@ -24,6 +25,7 @@ use crate::page::{self, Of, Served};
 use crate::report_output::finish;
 use crate::screen::Screen;
 use crate::summary::broken;
+use crate::tui;
 use crate::watch::{Show, Watch};
 
 /// Runs a dive on the vehicle's ports.
@@ -43,29 +45,25 @@ pub(crate) fn run(args: &Run, text: &str, vehicle: &VehicleConfig) -> Result<u8,
     let mut dive = assemble_followed(vehicle, text, recording, is_served)?.operated(Clock::Ours);
     let begun = headrace_ports::now();
     let supervisor = supervisor(&mut dive, vehicle, begun)?;
+    let followers = Followers::of(&args.following)?;
     let interrupted = interrupt::flag_of_a_dive()?;
     let until = args.duration.map(|seconds| begun + DurNs::from_secs_f64(seconds));
-    let mut watch = Watch::new(args.output.show()).live();
+    let show = followers.show(args.output.show());
+    let mut watch = Watch::new(show).live();
     let served =
         is_served.then(|| live_page(args, vehicle, &logs, (dive.console(), watch.shows_lines()))).flatten();
     if let Some(served) = &served {
         watch = watch.followed_by(served.follower(&dive.armed));
     }
-    if args.output.show() == Show::Lines {
-        let first = |log: &PathBuf| if args.rotate.is_some() { part_path(log, 1) } else { log.clone() };
-        let firsts: Vec<String> = logs.iter().map(|log| first(log).display().to_string()).collect();
-        let firsts = firsts.join(" and ");
-        let where_to = match (args.no_record, args.rotate) {
-            (true, _) => "not recorded".to_owned(),
-            (false, None) => format!("recorded to {firsts}"),
-            (false, Some(_)) => format!("recorded in parts, starting with {firsts}"),
-        };
-        let begun =
-            format!("{}, target {} m: {where_to}; Ctrl-C ends the dive", vehicle.name, vehicle.target_m);
-        for line in broken(&begun, Screen::columns()) {
+    let begun_text = begun_text(args, &logs, vehicle);
+    if show == Show::Lines {
+        for line in broken(&begun_text, Screen::columns()) {
             say(&line);
         }
     }
+    let joining =
+        Joining::new(vehicle, tui::Mode::Live, &interrupted).operated(dive.console()).saying(begun_text);
+    let mut watch = followers.join(watch, joining)?;
     let states = RefCell::new(SensorStates::new(
         vehicle,
         required,
@@ -113,6 +111,19 @@ fn live_page(
         console,
     };
     page::serve(&args.page, of, in_lines)
+}
+
+/// What is said of a dive that begins.
+fn begun_text(args: &Run, logs: &[PathBuf], vehicle: &VehicleConfig) -> String {
+    let first = |log: &PathBuf| if args.rotate.is_some() { part_path(log, 1) } else { log.clone() };
+    let firsts: Vec<String> = logs.iter().map(|log| first(log).display().to_string()).collect();
+    let firsts = firsts.join(" and ");
+    let where_to = match (args.no_record, args.rotate) {
+        (true, _) => "not recorded".to_owned(),
+        (false, None) => format!("recorded to {firsts}"),
+        (false, Some(_)) => format!("recorded in parts, starting with {firsts}"),
+    };
+    format!("{}, target {} m: {where_to}; Ctrl-C ends the dive", vehicle.name, vehicle.target_m)
 }
 
 /// Checks that a dive can be recorded to these files; with `--force` removes those that are there.

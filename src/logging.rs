@@ -1,12 +1,13 @@
 //! Log messages: tracing's events on stderr, filtered by `-v`, `-q` and `RUST_LOG`.
 
-use std::io::{self, Write};
+use std::io::{self, IsTerminal as _, Write};
 use std::sync::OnceLock;
-use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::thread;
 use std::time::Duration;
 
 use crossbeam::channel::{Sender, bounded};
+use crossbeam::queue::ArrayQueue;
 use headrace_config::plain::one_line;
 use tracing::level_filters::LevelFilter;
 use tracing_subscriber::filter::Targets;
@@ -96,6 +97,52 @@ pub(crate) fn never_wait() {
     }
 }
 
+/// Lines that are kept while the terminal is taken; the oldest are dropped, and counted.
+struct Held {
+    is_on: AtomicBool,
+    /// For stderr, once the terminal is back.
+    kept: ArrayQueue<Vec<u8>>,
+    dropped: AtomicU64,
+    /// For the screen.
+    shown: ArrayQueue<String>,
+}
+
+const MOST_HELD: usize = 1 << 8;
+const MOST_SHOWN: usize = 16;
+
+static HELD: OnceLock<Held> = OnceLock::new();
+
+fn held() -> &'static Held {
+    HELD.get_or_init(|| Held {
+        is_on: AtomicBool::new(false),
+        kept: ArrayQueue::new(MOST_HELD),
+        dropped: AtomicU64::new(0),
+        shown: ArrayQueue::new(MOST_SHOWN),
+    })
+}
+
+/// From now on nothing is written to stderr if that is a terminal: the screen is another's. Lines are kept, and shown there.
+pub(crate) fn hold() {
+    held().is_on.store(true, Ordering::Relaxed);
+}
+
+/// The next line for the screen.
+pub(crate) fn next_held() -> Option<String> {
+    HELD.get().and_then(|held| held.shown.pop())
+}
+
+/// Writes what was kept: the terminal is back.
+pub(crate) fn release() {
+    let Some(held) = HELD.get().filter(|held| held.is_on.swap(false, Ordering::Relaxed)) else { return };
+    let dropped = held.dropped.swap(0, Ordering::Relaxed);
+    if dropped > 0 {
+        complain(&format!("headrace: {dropped} earlier lines not kept"));
+    }
+    while let Some(bytes) = held.kept.pop() {
+        pass(&bytes);
+    }
+}
+
 /// Writes a line that may hold text from outside to stderr, after those that wait.
 pub(crate) fn complain(text: &str) {
     pass(format!("{}\n", one_line(text)).as_bytes());
@@ -123,6 +170,14 @@ fn pass(bytes: &[u8]) {
 
 /// Stderr is shared with self-overwriting lines. Failed writes are dropped: a closed stderr must not end a dive.
 fn write_now(bytes: &[u8]) {
+    if let Some(held) = HELD.get().filter(|held| held.is_on.load(Ordering::Relaxed)) {
+        held.shown.force_push(plain(bytes));
+        if io::stderr().is_terminal() {
+            held.dropped
+                .fetch_add(u64::from(held.kept.force_push(bytes.to_vec()).is_some()), Ordering::Relaxed);
+            return;
+        }
+    }
     let mut stderr = io::stderr().lock();
     let cleared = if terminal::of(&stderr).overwrites && transient::take() {
         stderr.write_all(terminal::CLEAR.as_bytes())
@@ -130,6 +185,14 @@ fn write_now(bytes: &[u8]) {
         Ok(())
     };
     cleared.and_then(|()| stderr.write_all(bytes)).ok();
+}
+
+/// A line without colours and its end.
+fn plain(bytes: &[u8]) -> String {
+    let text = String::from_utf8_lossy(bytes);
+    let mut parts = text.trim_end().split("\x1b[");
+    let first = parts.next().unwrap_or_default().to_owned();
+    parts.fold(first, |line, part| line + part.split_once('m').map_or(part, |(_, rest)| rest))
 }
 
 /// An event as one line, whatever names are in it. The colours are the formatter's, which escapes those of others.

@@ -11,7 +11,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 
-use crossbeam::channel::{Sender, unbounded};
+use crossbeam::channel::Sender;
 use headrace_config::plain::one_line;
 use headrace_dashboard::collector::Collector;
 use headrace_dashboard::fed::PlaybackState;
@@ -39,7 +39,6 @@ use crate::files;
 use crate::follower::Follower;
 use crate::logging::complain;
 use crate::output::put;
-use crate::play::Remote;
 use crate::report_output::exit_code;
 
 /// Interval at which an interruption is looked for while a replay stands still.
@@ -289,23 +288,30 @@ impl Served {
         Box::new(PageFollower { collector: self.page.collector(dive, self.waits), span, now: MonoNs(0) })
     }
 
-    /// What directs a replay from the page. It `stays` at the end of the log; `interrupted` ends it.
-    pub(crate) fn remote(&self, stays: bool, interrupted: Arc<AtomicBool>) -> Remote {
-        let (sender, receiver) = unbounded();
+    /// Directs a replay by commands from the page. It `stays` at the end of the log, until `interrupted`; else what is returned takes
+    /// its hands off.
+    pub(crate) fn direct(
+        &self,
+        to: &Sender<PlaybackCommand>,
+        stays: bool,
+        interrupted: Arc<AtomicBool>,
+    ) -> Option<Box<dyn Fn()>> {
         let commands = Arc::clone(&self.commands);
-        *commands.lock().unwrap_or_else(PoisonError::into_inner) = Some(sender.clone());
-        let close = move || drop(commands.lock().unwrap_or_else(PoisonError::into_inner).take());
-        if stays {
-            let sender = sender.clone();
-            std::thread::spawn(move || {
-                while !interrupted.load(Ordering::Relaxed) {
-                    std::thread::sleep(LOOK_EVERY);
-                }
-                // It may have ended by itself.
-                let _ended = sender.send(PlaybackCommand::End);
-            });
+        *commands.lock().unwrap_or_else(PoisonError::into_inner) = Some(to.clone());
+        if !stays {
+            return Some(Box::new(move || {
+                drop(commands.lock().unwrap_or_else(PoisonError::into_inner).take());
+            }));
         }
-        Remote { commands: (sender, receiver), stays, close: Box::new(close) }
+        let sender = to.clone();
+        std::thread::spawn(move || {
+            while !interrupted.load(Ordering::Relaxed) {
+                std::thread::sleep(LOOK_EVERY);
+            }
+            // It may have ended by itself.
+            let _ended = sender.send(PlaybackCommand::End);
+        });
+        None
     }
 
     /// Opens a browser, where there is one and a person to see it.

@@ -5,7 +5,7 @@ mod keys;
 use std::io::{BufRead, IsTerminal as _};
 use std::time::Duration;
 
-use crossbeam::channel::{Receiver, Sender, unbounded};
+use crossbeam::channel::{Receiver, Sender};
 use headrace_geometry::time::{DurNs, MonoNs};
 use headrace_monitor::outlet::NoticeReceiver;
 use headrace_monitor::report::Report;
@@ -24,19 +24,19 @@ use crate::output::aside;
 use crate::phase::Phase;
 use crate::watch::Watch;
 use keys::Keyboard;
+pub(crate) use keys::{Hand, Key};
 
 /// Work between two snapshots: with the time to restore one, a jump takes well under a second.
 const SNAPSHOT_INTERVAL: Duration = Duration::from_millis(300);
 /// Memory for snapshots. When it is full, every other one is dropped and the interval doubled.
 const SNAPSHOT_BYTES: usize = 256 << 20;
 
-/// Commands of playback from elsewhere than the terminal.
-pub(crate) struct Remote {
-    pub(crate) commands: (Sender<PlaybackCommand>, Receiver<PlaybackCommand>),
-    /// Whether playback waits for it at the end of the log.
-    pub(crate) stays: bool,
-    /// Drops its sender, so that playback may end.
-    pub(crate) close: Box<dyn Fn()>,
+/// Those besides standard input who direct playback; each has a sender of commands, and playback goes on as long as there is one.
+pub(crate) struct Directors {
+    /// Whether one of them takes the terminal's keys.
+    pub(crate) takes_keys: bool,
+    /// Drops the sender of one that doesn't stay at the end of the log.
+    pub(crate) close: Option<Box<dyn Fn()>>,
 }
 
 /// A replay with `--from` or `--interactive`, or with a page.
@@ -44,21 +44,20 @@ pub(crate) struct Playing {
     pub(crate) from: Option<DurNs>,
     pub(crate) interactive: bool,
     pub(crate) pace: Pace,
-    /// What else directs it: until the end of the log, or until it says so.
-    pub(crate) remote: Option<Remote>,
+    pub(crate) commands: (Sender<PlaybackCommand>, Receiver<PlaybackCommand>),
+    /// Who else directs it.
+    pub(crate) others: Option<Directors>,
 }
 
 impl Playing {
     /// Plays a dive; returns the report.
     pub(crate) fn play(self, dive: Dive, player: &mut Player, watch: &mut Watch) -> Result<Report, Failure> {
-        let Self { from, interactive, pace, remote } = self;
+        let Self { from, interactive, pace, commands: (sender, commands), others } = self;
         // Without commands nothing jumps back.
-        let interval = if interactive || remote.is_some() { SNAPSHOT_INTERVAL } else { Duration::MAX };
+        let interval = if interactive || others.is_some() { SNAPSHOT_INTERVAL } else { Duration::MAX };
         dive.play(watch, |armed, notices, watch| {
-            let (close, (sender, commands)) = match remote {
-                Some(Remote { commands, stays, close }) => (Some(close).filter(|_| !stays), commands),
-                None => (None, unbounded()),
-            };
+            let interactive = interactive && !others.as_ref().is_some_and(|others| others.takes_keys);
+            let close = others.and_then(|others| others.close);
             let has_keys = interactive && has_keys();
             let mut screen = Screen { notices, watch, begun: MonoNs(0), has_keys, close };
             let store = SnapshotStore::new(SNAPSHOT_BYTES, interval);

@@ -1,4 +1,4 @@
-//! What the terminal behind an output can do. Nothing else reads `NO_COLOR` and `TERM`.
+//! What the terminal behind an output can do. Nothing else reads `NO_COLOR`, `TERM` and the locale.
 
 use std::io::IsTerminal;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -27,6 +27,13 @@ pub(crate) fn of(stream: &impl IsTerminal) -> Terminal {
 pub(crate) fn allows_colour() -> bool {
     let variable = |name: &str| std::env::var(name).ok();
     able(true, variable("NO_COLOR").as_deref(), variable("TERM").as_deref()).colour
+}
+
+/// Whether the locale says that the terminal shows more than ASCII. Source: POSIX, the order of `LC_ALL`, `LC_CTYPE`, `LANG`.
+pub(crate) fn has_unicode() -> bool {
+    let set = |name: &str| std::env::var(name).ok().filter(|value| !value.is_empty());
+    let locale = ["LC_ALL", "LC_CTYPE", "LANG"].into_iter().find_map(set).unwrap_or_default().to_lowercase();
+    locale.contains("utf-8") || locale.contains("utf8")
 }
 
 /// An empty `NO_COLOR` doesn't count. Source: no-color.org.

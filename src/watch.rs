@@ -30,6 +30,8 @@ const CHANGE_EVERY: DurNs = DurNs(2_000_000_000);
 pub(crate) enum Show {
     /// Not at all.
     Nothing,
+    /// To its followers alone, which have the terminal.
+    Followers,
     /// As lines for people.
     Lines,
     /// As a JSON object a line.
@@ -52,12 +54,13 @@ pub(crate) struct Watch {
 impl Watch {
     /// Shows the dive in this way; not at all with `-q`.
     pub(crate) fn new(show: Show) -> Self {
-        let show = if terminal::is_quiet() { Show::Nothing } else { show };
+        let quiet = terminal::is_quiet() && show != Show::Followers;
+        let show = if quiet { Show::Nothing } else { show };
         Self {
             followers: Vec::new(),
             show,
             screen: Screen::of_stdout(),
-            printer: (show != Show::Nothing).then(|| Printer::start(false)),
+            printer: matches!(show, Show::Lines | Show::JsonLines).then(|| Printer::start(false)),
             teller: Teller::default(),
             shown: None,
             failed: BTreeMap::new(),
@@ -97,7 +100,7 @@ impl Watch {
     /// Shows a result of the loop.
     pub(crate) fn notice(&mut self, notice: &Notice, dive: &Loop) {
         self.followers.iter_mut().for_each(|follower| follower.notice(notice, dive));
-        if self.is_quiet() {
+        if self.printer.is_none() {
             return;
         }
         let at = match notice {
@@ -114,7 +117,7 @@ impl Watch {
     /// Shows the state, after every tick: also where nothing has come.
     pub(crate) fn tick(&mut self, dive: &Loop) {
         self.followers.iter_mut().for_each(|follower| follower.tick(dive));
-        if self.is_quiet() {
+        if self.printer.is_none() {
             return;
         }
         let state = dive.live_state();
@@ -143,7 +146,7 @@ impl Watch {
         self.followers.iter_mut().for_each(|follower| follower.sensor(id, status));
         let phase = status.phase.as_str();
         match self.show {
-            Show::Nothing => {}
+            Show::Nothing | Show::Followers => {}
             Show::JsonLines => self.json(
                 status.since,
                 json!({"type": "sensor", "id": id, "phase": phase, "text": status.words}),
@@ -163,7 +166,7 @@ impl Watch {
         self.followers.iter_mut().for_each(|follower| follower.recording(number, event, at));
         let words = event.words();
         match self.show {
-            Show::Nothing => {}
+            Show::Nothing | Show::Followers => {}
             Show::JsonLines => self.json(at, json!({"type": "recording", "fails": fails, "text": words})),
             Show::Lines => {
                 let lamp = Some(if fails { Lamp::Red } else { Lamp::Amber });
@@ -192,7 +195,7 @@ impl Watch {
         self.followers.iter_mut().for_each(|follower| follower.stopped(dive, time, ended));
         let (tick, samples, digest) = (dive.ticks(), dive.tally().samples, format!("{:016x}", dive.digest()));
         match self.show {
-            Show::Nothing => {}
+            Show::Nothing | Show::Followers => {}
             Show::JsonLines => {
                 let stopped = json!({"type": "stopped", "time_s": time.as_secs_f64(), "ended": ended, "tick": tick,
                     "samples": samples, "digest": digest});
@@ -213,7 +216,7 @@ impl Watch {
     /// Ends the output of a dive.
     pub(crate) fn end(&mut self, dive: &Loop) {
         self.followers.iter_mut().for_each(|follower| follower.end(dive));
-        if !self.is_quiet() {
+        if self.printer.is_some() {
             let mut told = Vec::new();
             self.teller.end(&dive.coverage().sections, &mut |one| told.push(one));
             self.tell(dive.now(), &told, dive);

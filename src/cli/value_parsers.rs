@@ -102,6 +102,17 @@ pub(super) fn address(text: &str) -> Result<Connect, String> {
     }
 }
 
+/// Where MAVLink is sent: `udpout:` as other programs write it may stand before it.
+pub(super) fn udp_address(text: &str) -> Result<String, String> {
+    let text = text.strip_prefix("udpout:").unwrap_or(text);
+    let host = text.rsplit_once(':').map_or("", |(host, _)| host);
+    let is_host = !host.contains(':') || host.starts_with('[');
+    match Connect::parse(&format!("udp:{text}")) {
+        Ok(Connect::Udp { .. }) if is_host => Ok(text.to_owned()),
+        _ => Err("expected HOST:PORT, for instance 127.0.0.1:14550".to_owned()),
+    }
+}
+
 pub(super) fn source_line(text: &str) -> Result<(String, String), String> {
     let both = text.split_once('=').filter(|(id, line)| !id.is_empty() && !line.is_empty());
     let both = both.map(|(id, line)| (id.to_owned(), line.to_owned()));

@@ -24,7 +24,7 @@ const WAIT: Timespec = Timespec { tv_sec: 0, tv_nsec: 200_000_000 };
 
 /// A key of playback.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Key {
+pub(crate) enum Key {
     Space,
     Left,
     Right,
@@ -62,7 +62,7 @@ impl Keyboard {
         aside(&format!("KEYS     {KEYS}"));
         let ended = Arc::new(AtomicBool::new(false));
         let keyboard = Self { before, ended: Arc::clone(&ended) };
-        let mut hand = Hand { speed, paused: false };
+        let mut hand = Hand::new(speed, aside);
         std::thread::spawn(move || {
             let mut bytes = [0; 64];
             while !ended.load(Ordering::Relaxed) {
@@ -108,13 +108,30 @@ fn read(bytes: &mut [u8]) -> io::Result<usize> {
 }
 
 /// Speed and state as the keys have left them.
-struct Hand {
+pub(crate) struct Hand {
     speed: Option<f64>,
     paused: bool,
+    /// Shows an answer to a key.
+    say: fn(&str),
 }
 
 impl Hand {
-    fn command(&mut self, key: Key) -> Option<PlaybackCommand> {
+    pub(crate) fn new(speed: Option<f64>, say: fn(&str)) -> Self {
+        Self { speed, paused: false, say }
+    }
+
+    /// Speed of playback; `None` is as fast as possible.
+    pub(crate) fn speed(&self) -> Option<f64> {
+        self.speed
+    }
+
+    /// Whether the keys have paused it.
+    pub(crate) fn is_paused(&self) -> bool {
+        self.paused
+    }
+
+    /// The command of a key; some have none.
+    pub(crate) fn command(&mut self, key: Key) -> Option<PlaybackCommand> {
         Some(match key {
             Key::Space => {
                 self.paused = !self.paused;
@@ -132,7 +149,7 @@ impl Hand {
             }
             Key::Leave => PlaybackCommand::End,
             Key::Help => {
-                aside(&format!("KEYS     {KEYS}"));
+                (self.say)(&format!("KEYS     {KEYS}"));
                 return None;
             }
         })
@@ -140,7 +157,7 @@ impl Hand {
 
     fn go_at(&mut self, speed: Option<f64>) -> PlaybackCommand {
         self.speed = speed;
-        aside(&speed.map_or_else(|| "SPEED    max".to_owned(), |speed| format!("SPEED    {speed}x")));
+        (self.say)(&speed.map_or_else(|| "SPEED    max".to_owned(), |speed| format!("SPEED    {speed}x")));
         PlaybackCommand::Speed(speed)
     }
 }
@@ -195,7 +212,7 @@ mod tests {
 
     #[test]
     fn keys_are_commands() {
-        let mut hand = Hand { speed: None, paused: false };
+        let mut hand = Hand::new(None, |_| {});
         let mut press = |key| hand.command(key).unwrap();
         assert_eq!(press(Key::Space), PlaybackCommand::Pause);
         assert_eq!(press(Key::Space), PlaybackCommand::Go);

@@ -14,7 +14,7 @@ use tungstenite::{Message, WebSocket};
 use crate::{Folder, program};
 
 /// Longest wait for anything that must come.
-const WITHIN: Duration = Duration::from_secs(120);
+const WITHIN: Duration = Duration::from_mins(2);
 
 /// A running program with a page, killed when it goes out of scope.
 pub struct Serving {
@@ -81,7 +81,7 @@ impl Serving {
         } else {
             format!("Host: {}\r\n", self.address)
         };
-        let further: String = headers.iter().map(|header| format!("{header}\r\n")).collect();
+        let further = headers.iter().fold(String::new(), |all, header| all + header + "\r\n");
         let length = body.len();
         let head = format!(
             "{method} {path} HTTP/1.1\r\n{host}{further}Connection: close\r\nContent-Length: {length}\r\n\r\n"

@@ -3,6 +3,7 @@
 use std::cell::RefCell;
 use std::fs::File;
 use std::io::{Read as _, Write as _};
+use std::num::NonZero;
 use std::os::fd::OwnedFd;
 use std::process::Child;
 use std::sync::mpsc::{Receiver, channel};
@@ -20,23 +21,36 @@ use crate::{Folder, program};
 const STEPS: u32 = 1200;
 const STEP: Duration = Duration::from_millis(100);
 
-/// A running program and its terminal of 24 lines.
+/// A running program and its terminal.
 pub struct Screen {
     child: Child,
     keys: File,
     coming: Receiver<Vec<u8>>,
     seen: RefCell<Vec<u8>>,
+    /// Lines and columns.
+    size: (u16, u16),
 }
 
 impl Screen {
     /// Runs the program in a folder on a terminal that is so wide, with these variables beside `TERM=xterm`.
     pub fn run(folder: &Folder, arguments: &[&str], columns: u16, variables: &[(&str, &str)]) -> Self {
+        Self::sized(folder, arguments, (columns, 24), variables)
+    }
+
+    /// The same on a terminal of so many columns and lines.
+    pub fn sized(
+        folder: &Folder,
+        arguments: &[&str],
+        (columns, lines): (u16, u16),
+        variables: &[(&str, &str)],
+    ) -> Self {
         let master = openpt(OpenptFlags::RDWR | OpenptFlags::NOCTTY).unwrap();
         grantpt(&master).unwrap();
         unlockpt(&master).unwrap();
         let path = ptsname(&master, Vec::new()).unwrap();
         let end = || rustix::fs::open(&*path, OFlags::RDWR | OFlags::NOCTTY, Mode::empty()).unwrap();
-        tcsetwinsize(&master, Winsize { ws_row: 24, ws_col: columns, ws_xpixel: 0, ws_ypixel: 0 }).unwrap();
+        tcsetwinsize(&master, Winsize { ws_row: lines, ws_col: columns, ws_xpixel: 0, ws_ypixel: 0 })
+            .unwrap();
         let mut command = program();
         command.args(arguments).current_dir(folder.path("")).env_remove("NO_COLOR").env("TERM", "xterm");
         command.envs(variables.iter().copied());
@@ -55,7 +69,7 @@ impl Screen {
                 }
             }
         });
-        Self { child, keys: File::from(master), coming, seen: RefCell::default() }
+        Self { child, keys: File::from(master), coming, seen: RefCell::default(), size: (lines, columns) }
     }
 
     /// All that was shown so far, with its escape sequences.
@@ -76,6 +90,43 @@ impl Screen {
             thread::sleep(STEP);
         }
         panic!("{text:?} doesn't come: {:?}", self.shown());
+    }
+
+    /// The terminal as it looks now, in another program's eyes.
+    pub fn terminal(&self) -> vt100::Parser {
+        self.shown();
+        let [lines, columns] = [self.size.0, self.size.1].map(|size| NonZero::new(size).unwrap());
+        let mut terminal = vt100::Parser::new(lines, columns, 0);
+        terminal.process(&self.seen.borrow());
+        terminal
+    }
+
+    /// The page as text, without spaces at the ends of lines: whether they were written depends on what was there before.
+    pub fn page(&self) -> String {
+        let page = self.terminal().screen().contents();
+        page.lines().map(str::trim_end).collect::<Vec<_>>().join("\n")
+    }
+
+    /// Waits until the page has a text, and stands still; the page.
+    #[track_caller]
+    pub fn until_page(&self, text: &str) -> String {
+        let mut before = String::new();
+        for _ in 0..STEPS {
+            let page = self.page();
+            if page.contains(text) && page == before {
+                return page;
+            }
+            before = page;
+            thread::sleep(STEP);
+        }
+        panic!("{text:?} doesn't come: {before}");
+    }
+
+    /// Changes the terminal's size, to columns and lines.
+    pub fn resize(&mut self, (columns, lines): (u16, u16)) {
+        self.size = (lines, columns);
+        tcsetwinsize(&self.keys, Winsize { ws_row: lines, ws_col: columns, ws_xpixel: 0, ws_ypixel: 0 })
+            .unwrap();
     }
 
     /// Presses keys.

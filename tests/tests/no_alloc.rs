@@ -139,7 +139,7 @@ fn a_million_packets_without_one_allocation() {
                 ports[usize::from(message.source)].send(message.at, message.bytes).unwrap();
             }
         }
-        if until.0 % 1_000_000_000 == 0 {
+        if until.0.is_multiple_of(1_000_000_000) {
             let command = COMMANDS[usize::try_from(until.0 / 1_000_000_000).unwrap() % COMMANDS.len()];
             console.send(until, command.as_bytes()).unwrap();
         }

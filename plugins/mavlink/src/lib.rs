@@ -2,7 +2,7 @@
 //! distances.
 //!
 //! [`frame`] separates frames from noise, [`message`] reads the supported messages, [`decoder`] makes readings for the loop,
-//! [`emulator`] is the autopilot side for simulations, [`plugin`] reads the vehicle file and [`tlog`] the log files of ground
+//! [`emulator`] is the autopilot side for simulations, [`out`] is what the program itself says, [`plugin`] reads the vehicle file and [`tlog`] the log files of ground
 //! stations. Message definitions come from the mavlink crate.
 
 #![cfg_attr(not(test), warn(clippy::indexing_slicing))]
@@ -12,6 +12,7 @@ pub mod driver;
 pub mod emulator;
 pub mod frame;
 pub mod message;
+pub mod out;
 pub mod plugin;
 pub mod tlog;
 

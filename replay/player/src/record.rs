@@ -3,6 +3,8 @@
 use headrace_monitor::App;
 use headrace_monitor::merge::{Inbox, MAX_TICK_BYTES, MAX_TICK_PACKETS};
 use headrace_monitor::resources::{Digests, TickTime};
+use headrace_monitor::result_stream::ResultStream;
+use headrace_monitor::run::Loop;
 use headrace_monitor::stage::Stage;
 use headrace_monitor::{Plugin, PluginError};
 
@@ -48,6 +50,19 @@ pub fn result_channels() -> Vec<ResultChannel> {
         follows_echoes: *name == ECHOES,
     };
     STREAMS.iter().map(channel).chain(view::channels()).collect()
+}
+
+/// The results of a loop's last tick as messages of the channels, by number, for a [`crate::log::DerivedChannels`]; of a loop
+/// that keeps its results. Allocates: for outlets, between ticks.
+pub fn result_messages(dive: &Loop) -> Vec<(u16, Vec<u8>)> {
+    let streams = (0..).zip(dive.digests().streams());
+    let filled = streams.filter(|(_, (_, trail))| !trail.words().is_empty());
+    let message = |(channel, (_, trail)): (u16, (&str, &ResultStream))| {
+        let mut message = Vec::with_capacity((trail.words().len() + HEAD_WORDS) * 8);
+        fill(&mut message, dive.ticks(), 0, trail.words());
+        (channel, message)
+    };
+    filled.map(message).collect()
 }
 
 /// Records every packet that the loop consumes, in the order of consumption, every tick, and every result, with one recorder or

@@ -7,6 +7,7 @@ mod check;
 #[cfg(unix)]
 mod habits;
 mod logging;
+mod mavlink_out;
 mod overwriting;
 mod plan;
 #[cfg(unix)]
@@ -15,4 +16,6 @@ mod readme;
 mod registration;
 mod report_schema;
 mod screens;
+#[cfg(unix)]
+mod tui;
 mod viewers;

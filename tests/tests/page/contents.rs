@@ -61,7 +61,7 @@ fn all_that_a_viewer_has_at_the_end_equals_the_report() {
         }
         match section["cause"]["cause"].as_str() {
             Some(cause) => {
-                assert_eq!(viewer.hello["causes"][usize::from(shown.cause)], cause, "at {start_m}")
+                assert_eq!(viewer.hello["causes"][usize::from(shown.cause)], cause, "at {start_m}");
             }
             None => assert_eq!(shown.cause, 255, "at {start_m}"),
         }

@@ -1,0 +1,210 @@
+//! What the program itself says over MAVLink, as an onboard computer beside the autopilot: heartbeats, figures and texts.
+//!
+//! Neither DISTANCE_SENSOR nor OBSTACLE_DISTANCE is ever sent: ground stations would take them for the autopilot's, and an
+//! autopilot for what it is to avoid.
+
+use mavlink::MavHeader;
+use mavlink::types::CharArray;
+
+use crate::dialect::{
+    HEARTBEAT_DATA, MavAutopilot, MavModeFlag, MavSeverity, MavState, MavType, NAMED_VALUE_FLOAT_DATA,
+    STATUSTEXT_DATA,
+};
+use crate::frame::encode;
+
+/// MAV_COMP_ID_ONBOARD_COMPUTER. Source: MAVLink, MAV_COMPONENT.
+pub const COMPONENT_ID: u8 = 191;
+/// Longest text of a STATUSTEXT; longer ones are sent in parts. Source: MAVLink, STATUSTEXT.
+pub const TEXT_BYTES: usize = 50;
+/// Longest name of a figure. Source: MAVLink, NAMED_VALUE_FLOAT.
+pub const NAME_BYTES: usize = 10;
+/// Names that QGroundControl takes for the autopilot's, whoever sends them. Source: its ArduSub plugin, August 2026.
+pub const RESERVED: [&str; 8] =
+    ["TetherTrn", "RFTarget", "CamTilt", "Lights1", "Lights2", "PilotGain", "InputHold", "RollPitch"];
+
+/// How grave a text is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Gravity {
+    /// Act at once.
+    Emergency,
+    /// Act.
+    Alarm,
+    /// Take care.
+    Warning,
+    /// Know of it.
+    Caution,
+}
+
+impl From<Gravity> for MavSeverity {
+    fn from(gravity: Gravity) -> Self {
+        match gravity {
+            Gravity::Emergency => Self::MAV_SEVERITY_ALERT,
+            Gravity::Alarm => Self::MAV_SEVERITY_CRITICAL,
+            Gravity::Warning => Self::MAV_SEVERITY_WARNING,
+            Gravity::Caution => Self::MAV_SEVERITY_NOTICE,
+        }
+    }
+}
+
+/// Encodes what is said, in order.
+#[derive(Debug)]
+pub struct Speaker {
+    system_id: u8,
+    sequence: u8,
+    /// Number of the last text in parts.
+    text: u16,
+}
+
+impl Speaker {
+    /// A part of the vehicle with this system id.
+    pub fn new(system_id: u8) -> Self {
+        Self { system_id, sequence: 0, text: 0 }
+    }
+
+    /// A heartbeat.
+    pub fn heartbeat(&mut self, is_active: bool) -> Vec<u8> {
+        let header = self.header();
+        let system_status = if is_active { MavState::MAV_STATE_ACTIVE } else { MavState::MAV_STATE_STANDBY };
+        let heartbeat = HEARTBEAT_DATA {
+            mavtype: MavType::MAV_TYPE_ONBOARD_CONTROLLER,
+            autopilot: MavAutopilot::MAV_AUTOPILOT_INVALID,
+            base_mode: MavModeFlag::empty(),
+            system_status,
+            ..HEARTBEAT_DATA::DEFAULT
+        };
+        encode(header, &heartbeat).raw_bytes().to_vec()
+    }
+
+    /// A figure; NaN where it isn't known. `None` for a name that is too long or [`RESERVED`].
+    pub fn figure(&mut self, name: &str, time_ms: u32, value: f32) -> Option<Vec<u8>> {
+        if name.len() > NAME_BYTES || !name.is_ascii() || RESERVED.contains(&name) {
+            return None;
+        }
+        let header = self.header();
+        let figure = NAMED_VALUE_FLOAT_DATA { time_boot_ms: time_ms, value, name: CharArray::from(name) };
+        Some(encode(header, &figure).raw_bytes().to_vec())
+    }
+
+    /// A text, in as many parts as it takes. Ground stations decode each part by itself: what isn't ASCII is written with it.
+    pub fn text(&mut self, gravity: Gravity, text: &str) -> Vec<Vec<u8>> {
+        let text = ascii(text);
+        let is_whole = text.len() <= TEXT_BYTES;
+        let id = if is_whole { 0 } else { self.next_text() };
+        // A part that is full doesn't say that it is the last: an empty one follows it.
+        let parts = if is_whole { 1 } else { text.len() / TEXT_BYTES + 1 };
+        let part = |part: usize| {
+            let from = part * TEXT_BYTES;
+            text.get(from..(from + TEXT_BYTES).min(text.len())).unwrap_or_default()
+        };
+        let mut frames = Vec::new();
+        for (number, part) in (0..parts).map(part).enumerate() {
+            let header = self.header();
+            let said = STATUSTEXT_DATA {
+                severity: gravity.into(),
+                text: CharArray::from(part),
+                id,
+                // 50 bytes each: no text of ours has 255 parts.
+                chunk_seq: u8::try_from(number).unwrap_or(u8::MAX),
+            };
+            frames.push(encode(header, &said).raw_bytes().to_vec());
+        }
+        frames
+    }
+
+    fn header(&mut self) -> MavHeader {
+        let sequence = self.sequence;
+        self.sequence = sequence.wrapping_add(1);
+        MavHeader { system_id: u32::from(self.system_id), component_id: COMPONENT_ID, sequence }
+    }
+
+    /// Zero is for texts of one part.
+    fn next_text(&mut self) -> u16 {
+        self.text = self.text.checked_add(1).unwrap_or(1);
+        self.text
+    }
+}
+
+/// A text in ASCII.
+fn ascii(text: &str) -> String {
+    let mut plain = String::with_capacity(text.len());
+    for letter in text.chars() {
+        match letter {
+            ' '..='~' => plain.push(letter),
+            '±' => plain.push_str("+-"),
+            '→' => plain.push_str("->"),
+            _ => plain.push('?'),
+        }
+    }
+    plain
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Header and payload by the guide's "Packet Serialization", with zeros for what the sender cut off.
+    fn parts(frame: &[u8]) -> ([u8; 3], u32, Vec<u8>) {
+        assert_eq!((frame[0], frame[2]), (0xfd, 0));
+        let length = usize::from(frame[1]);
+        assert_eq!(frame.len(), 10 + length + 2);
+        let mut payload = frame[10..10 + length].to_vec();
+        payload.resize(60, 0);
+        ([frame[4], frame[5], frame[6]], u32::from_le_bytes([frame[7], frame[8], frame[9], 0]), payload)
+    }
+
+    fn joined(frames: &[Vec<u8>]) -> (Vec<u16>, Vec<u8>, String) {
+        let (mut ids, mut chunks, mut text) = (Vec::new(), Vec::new(), String::new());
+        for frame in frames {
+            let (_, id, payload) = parts(frame);
+            assert_eq!(id, 253);
+            let bytes = &payload[1..51];
+            let end = bytes.iter().position(|byte| *byte == 0).unwrap_or(50);
+            text.push_str(core::str::from_utf8(&bytes[..end]).unwrap());
+            ids.push(u16::from_le_bytes([payload[51], payload[52]]));
+            chunks.push(payload[53]);
+        }
+        (ids, chunks, text)
+    }
+
+    #[test]
+    fn a_heartbeat_is_an_onboard_computers() {
+        let mut speaker = Speaker::new(7);
+        let (header, id, payload) = parts(&speaker.heartbeat(true));
+        assert_eq!((header, id), ([0, 7, 191], 0));
+        // Custom mode, type, autopilot, base mode, state, version.
+        assert_eq!(&payload[..9], [0, 0, 0, 0, 18, 8, 0, 4, 3]);
+        assert_eq!(parts(&speaker.heartbeat(false)).0, [1, 7, 191]);
+    }
+
+    #[test]
+    fn a_figure_has_its_name_and_never_a_reserved_one() {
+        let mut speaker = Speaker::new(1);
+        let (_, id, payload) = parts(&speaker.figure("HR_VMAX", 1234, 0.25).unwrap());
+        assert_eq!(id, 251);
+        assert_eq!(payload[..4], 1234_u32.to_le_bytes());
+        assert_eq!(payload[4..8], 0.25_f32.to_le_bytes());
+        assert_eq!(&payload[8..18], b"HR_VMAX\0\0\0");
+        for name in RESERVED.into_iter().chain(["ELEVEN_LONG", "\u{b1}"]) {
+            assert_eq!(speaker.figure(name, 0, 0.0), None, "{name}");
+        }
+    }
+
+    #[test]
+    fn texts_of_any_length_are_joined_to_what_they_were() {
+        let mut speaker = Speaker::new(1);
+        for length in 0..=260 {
+            let text: String = ('a'..='z').cycle().take(length).collect();
+            let frames = speaker.text(Gravity::Alarm, &text);
+            let (ids, chunks, said) = joined(&frames);
+            assert_eq!(said, text);
+            assert!(chunks.iter().enumerate().all(|(number, chunk)| usize::from(*chunk) == number));
+            assert!(ids.iter().all(|id| *id == ids[0] && (*id == 0) == (length <= 50)), "{ids:?}");
+            // The last part has a zero.
+            let (_, _, last) = parts(frames.last().unwrap());
+            assert!(length <= 50 || last[1..51].contains(&0));
+        }
+        assert_eq!(joined(&speaker.text(Gravity::Caution, "±0.2 m → go\n")).2, "+-0.2 m -> go?");
+        let (_, _, payload) = parts(&speaker.text(Gravity::Warning, "x")[0]);
+        assert_eq!(payload[0], 4);
+    }
+}

@@ -1,0 +1,116 @@
+//! Options of commands that take logs to pieces, and make them of others'.
+
+use std::path::PathBuf;
+
+use clap::Args;
+use headrace_geometry::time::DurNs;
+use headrace_import::FileKind;
+
+use super::habits::Overwrite;
+use super::value_parsers::{chainage_range, file_kind, source_line, time};
+
+#[derive(Debug, Args)]
+pub(crate) struct Export {
+    /// Log to export, or the parts of a recording.
+    #[arg(required = true, value_name = "LOG")]
+    pub(crate) logs: Vec<PathBuf>,
+    /// Page to write.
+    #[arg(long, value_name = "OUT.html")]
+    pub(crate) html: PathBuf,
+    /// Vehicle file, overriding the one attached to the log.
+    #[arg(long, value_name = "FILE")]
+    pub(crate) vehicle: Option<PathBuf>,
+    #[command(flatten)]
+    pub(crate) overwrite: Overwrite,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct Verify {
+    /// Log to verify, or the parts of a recording.
+    #[arg(required = true, value_name = "LOG")]
+    pub(crate) logs: Vec<PathBuf>,
+    /// Vehicle file, overriding the one attached to the log.
+    #[arg(long, value_name = "FILE")]
+    pub(crate) vehicle: Option<PathBuf>,
+    /// Tick length, milliseconds; results don't depend on it.
+    #[arg(long, value_name = "MS", default_value = "20", value_parser = clap::value_parser!(u32).range(1..=60_000))]
+    pub(crate) tick_ms: u32,
+    /// Print JSON.
+    #[arg(long)]
+    pub(crate) json: bool,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct Recover {
+    /// Log to recover, or the parts of a recording, which become one log; not modified.
+    #[arg(required = true, value_name = "LOG")]
+    pub(crate) logs: Vec<PathBuf>,
+    /// Log to write.
+    #[arg(short, long, value_name = "FIXED.mcap")]
+    pub(crate) output: PathBuf,
+    /// Print the summary as JSON.
+    #[arg(long)]
+    pub(crate) json: bool,
+    #[command(flatten)]
+    pub(crate) overwrite: Overwrite,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct Trim {
+    /// Log to trim, or the parts of a recording; not modified.
+    #[arg(required = true, value_name = "LOG")]
+    pub(crate) logs: Vec<PathBuf>,
+    /// Log to write.
+    #[arg(short, long, value_name = "TRIMMED.mcap")]
+    pub(crate) output: PathBuf,
+    /// Start time, from the log's first message: 90s, 10min, 1.5h.
+    #[arg(long, value_name = "TIME", value_parser = time, conflicts_with = "chainage")]
+    pub(crate) from: Option<DurNs>,
+    /// End time, from the log's first message.
+    #[arg(long, value_name = "TIME", value_parser = time, conflicts_with = "chainage")]
+    pub(crate) to: Option<DurNs>,
+    /// Keep the times at which the vehicle was in this range of chainage, metres; the log is replayed to find them.
+    #[arg(long, value_name = "FROM..TO", value_parser = chainage_range, allow_hyphen_values = true)]
+    pub(crate) chainage: Option<[f64; 2]>,
+    /// Drop echo data where a device's messages also contain the range; replays give the same results.
+    #[arg(long)]
+    pub(crate) drop_echoes: bool,
+    /// Remove names, comments, addresses, serial numbers, time of day and geographic positions; lists what can't be removed.
+    #[arg(long)]
+    pub(crate) anonymise: bool,
+    /// Vehicle file for --chainage and --drop-echoes, overriding the one attached to the log.
+    #[arg(long, value_name = "FILE", conflicts_with = "anonymise")]
+    pub(crate) vehicle: Option<PathBuf>,
+    /// Print the summary as JSON.
+    #[arg(long)]
+    pub(crate) json: bool,
+    #[command(flatten)]
+    pub(crate) overwrite: Overwrite,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct Import {
+    /// Log to import.
+    pub(crate) file: PathBuf,
+    /// Log to write.
+    #[arg(short, long, value_name = "LOG.mcap")]
+    pub(crate) output: PathBuf,
+    /// Vehicle file with the sensors that the messages are from.
+    #[arg(long, value_name = "VEHICLE.toml")]
+    pub(crate) vehicle: Option<PathBuf>,
+    /// Sensor and the stream of the log that it receives (mavlink, imagenex, ping, or a CAN interface), once per sensor;
+    /// replaces the assignment by the vehicle file.
+    #[arg(long, value_name = "ID=STREAM", value_parser = source_line)]
+    pub(crate) source: Vec<(String, String)>,
+    /// Mapping file: for CSV, columns to quantities of sensors; for ROS, topics to sensors, where it is ambiguous.
+    #[arg(long, value_name = "MAPPING.toml")]
+    pub(crate) map: Option<PathBuf>,
+    /// Format of the file, if its extension doesn't tell.
+    #[arg(long, value_parser = file_kind())]
+    pub(crate) format: Option<FileKind>,
+    /// Print a summary as JSON.
+    #[arg(long)]
+    pub(crate) json: bool,
+    #[command(flatten)]
+    pub(crate) overwrite: Overwrite,
+}

@@ -1,0 +1,121 @@
+//! Who follows a dive, as the command line asks.
+
+use std::net::SocketAddr;
+use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
+
+use headrace_geometry::time::MonoNs;
+use headrace_monitor::console::ConsolePort;
+use headrace_vehicle::VehicleConfig;
+
+use crate::cli::Following;
+use crate::failure::Failure;
+use crate::mavlink_out::MavlinkOut;
+use crate::tui::{Mode, Start, Tui};
+use crate::watch::{Show, Watch};
+
+/// Those that were asked for.
+pub(crate) struct Followers {
+    tui: bool,
+    /// Address and system id.
+    mavlink_out: Option<(String, u8)>,
+    foxglove: Option<SocketAddr>,
+}
+
+/// What they follow.
+pub(crate) struct Joining<'a> {
+    vehicle: &'a VehicleConfig,
+    mode: Mode,
+    interrupted: Arc<AtomicBool>,
+    first: Option<String>,
+    console: Option<ConsolePort>,
+    #[cfg_attr(not(feature = "foxglove"), expect(dead_code, reason = "only Foxglove shows a log's span"))]
+    span: Option<(MonoNs, MonoNs)>,
+}
+
+impl<'a> Joining<'a> {
+    /// A dive of a vehicle, which the flag ends.
+    pub(crate) fn new(vehicle: &'a VehicleConfig, mode: Mode, interrupted: &Arc<AtomicBool>) -> Self {
+        let interrupted = Arc::clone(interrupted);
+        Self { vehicle, mode, interrupted, first: None, console: None, span: None }
+    }
+
+    /// Takes an operator's commands; `None` for a dive that is over.
+    pub(crate) fn operated(self, console: Option<ConsolePort>) -> Self {
+        Self { console, ..self }
+    }
+
+    /// The first and the last time of a log.
+    pub(crate) fn over(self, span: Option<(MonoNs, MonoNs)>) -> Self {
+        Self { span, ..self }
+    }
+
+    /// What is said of it before anything else.
+    pub(crate) fn saying(self, first: String) -> Self {
+        Self { first: Some(first), ..self }
+    }
+}
+
+impl Followers {
+    /// To be called before signals are handled.
+    ///
+    /// Errors: a follower that can't be had here.
+    pub(crate) fn of(asked: &Following) -> Result<Self, Failure> {
+        if asked.foxglove.is_some() && !cfg!(feature = "foxglove") {
+            let why = "--foxglove: this program was built without it; cargo build --features foxglove";
+            return Err(Failure::Usage(why.to_owned()));
+        }
+        if asked.tui {
+            Tui::prepare()?;
+        }
+        let mavlink_out = asked.mavlink_out.clone().map(|to| (to, asked.mavlink_system));
+        Ok(Self { tui: asked.tui, mavlink_out, foxglove: asked.foxglove })
+    }
+
+    /// How the dive is shown on stdout, where otherwise it would be so.
+    pub(crate) fn show(&self, otherwise: Show) -> Show {
+        if self.tui { Show::Followers } else { otherwise }
+    }
+
+    /// Adds them.
+    ///
+    /// Errors: one can't be started.
+    pub(crate) fn join(self, mut watch: Watch, joining: Joining<'_>) -> Result<Watch, Failure> {
+        if let Some((to, system_id)) = &self.mavlink_out {
+            watch = watch.followed_by(Box::new(MavlinkOut::start(to, *system_id)?));
+        }
+        if let Some(at) = self.foxglove {
+            watch = foxglove(watch, at, &joining)?;
+        }
+        if self.tui {
+            let Joining { vehicle, mode, interrupted, first, console, .. } = joining;
+            let start = Start { vehicle: &vehicle.name, first, mode, interrupted, console };
+            watch = watch.followed_by(Box::new(Tui::start(start)?));
+        }
+        Ok(watch)
+    }
+}
+
+#[cfg(feature = "foxglove")]
+fn foxglove(watch: Watch, at: SocketAddr, joining: &Joining<'_>) -> Result<Watch, Failure> {
+    use crate::foxglove_live::{Controlled, Foxglove};
+    let controlled = match (&joining.mode, joining.span) {
+        (Mode::Replay(commands, speed), Some(span)) => Some(Controlled {
+            commands: commands.clone(),
+            span,
+            speed: *speed,
+            interrupted: Arc::clone(&joining.interrupted),
+        }),
+        _ => None,
+    };
+    let site = crate::dive::view_site(joining.vehicle);
+    let is_live = matches!(joining.mode, Mode::Live);
+    Ok(watch.followed_by(Box::new(Foxglove::start(at, &joining.vehicle.name, site, is_live, controlled)?)))
+}
+
+#[cfg(not(feature = "foxglove"))]
+#[expect(clippy::unnecessary_wraps, reason = "with the feature it may fail")]
+fn foxglove(watch: Watch, _: SocketAddr, _: &Joining<'_>) -> Result<Watch, Failure> {
+    // Refused before.
+    Ok(watch)
+}

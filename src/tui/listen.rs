@@ -1,0 +1,73 @@
+//! Hears keys of the terminal, and signals, on a thread of its own.
+
+use std::io;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::thread;
+
+use crossbeam::channel::Sender;
+use rustix::event::{PollFd, PollFlags, Timespec, poll};
+
+use super::hold;
+use super::keys::{INTERRUPT, Key, keys};
+use super::message::Message;
+use crate::interrupt;
+
+/// Longest wait for a key before the end is noticed.
+const WAIT: Timespec = Timespec { tv_sec: 0, tv_nsec: 100_000_000 };
+
+/// Sends keys until what it returns is set. Ctrl-C sets the flag as SIGINT does; a second one ends the program at once, the
+/// terminal in order.
+///
+/// Errors: signals can't be counted, or the thread not started.
+pub(super) fn listen(to: Sender<Message>, interrupted: Arc<AtomicBool>) -> io::Result<Arc<AtomicBool>> {
+    let ended = Arc::new(AtomicBool::new(false));
+    let until = Arc::clone(&ended);
+    let signals = interrupt::seconds()?;
+    let read = move || {
+        let mut bytes = [0; 256];
+        let (mut signalled, mut is_told) = (0_u32, false);
+        while !until.load(Ordering::Relaxed) {
+            if !is_told && interrupted.load(Ordering::Relaxed) {
+                is_told = to.try_send(Message::Interrupted).is_ok();
+            }
+            let stdin = io::stdin();
+            let mut waiting = [PollFd::new(&signals, PollFlags::IN), PollFd::new(&stdin, PollFlags::IN)];
+            if !matches!(poll(&mut waiting, Some(&WAIT)), Ok(1..)) {
+                continue;
+            }
+            let [by_signal, by_key] = waiting.map(|one| !one.revents().is_empty());
+            if by_signal && let Ok(count) = rustix::io::read(&signals, &mut bytes) {
+                signalled += u32::try_from(count).unwrap_or(u32::MAX);
+                if signalled > 1 {
+                    end_at_once();
+                }
+            }
+            if !by_key {
+                continue;
+            }
+            match rustix::io::read(&stdin, &mut bytes) {
+                // The terminal is gone; the dive goes on.
+                Ok(0) | Err(rustix::io::Errno::IO) => return,
+                Ok(count) => {
+                    for key in keys(bytes.get(..count).unwrap_or_default()) {
+                        if key != Key::Character(INTERRUPT) {
+                            to.try_send(Message::Key(key)).ok();
+                        } else if interrupted.swap(true, Ordering::Relaxed) {
+                            end_at_once();
+                        }
+                    }
+                }
+                Err(_) => {}
+            }
+        }
+    };
+    thread::Builder::new().name("keys".to_owned()).spawn(read)?;
+    Ok(ended)
+}
+
+fn end_at_once() {
+    hold::restore_from_elsewhere();
+    crate::logging::release();
+    std::process::exit(1);
+}

@@ -1,0 +1,189 @@
+//! `--tui`: the dive on a terminal's whole screen, for a session over ssh. The loop's thread hands over a picture of the dive by
+//! value when the artist's thread wants one; it never waits for the terminal in a live dive.
+
+mod alerts;
+mod artist;
+mod draw;
+mod hold;
+mod keys;
+mod listen;
+mod message;
+mod mode;
+mod panels;
+mod paper;
+mod shot;
+mod wall;
+
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::thread::{self, JoinHandle};
+use std::time::Duration;
+
+use crossbeam::channel::{Receiver, RecvTimeoutError, Sender, bounded};
+use headrace_geometry::time::{DurNs, MonoNs};
+use headrace_monitor::console::ConsolePort;
+use headrace_monitor::live_state::Lamp;
+use headrace_monitor::live_text::PilotLine;
+use headrace_monitor::messages::Notice;
+use headrace_monitor::run::Loop;
+use headrace_ports::{Phase, Status};
+use headrace_replay::log::RecordingEvent;
+
+use crate::failure::Failure;
+use crate::follower::Follower;
+use crate::interrupt;
+use alerts::Desk;
+use artist::Artist;
+use hold::Hold;
+use message::Message;
+pub(crate) use mode::Mode;
+use mode::Stop;
+use shot::Eye;
+
+/// How long a live dive waits for its terminal at the end.
+const ENDS_WITHIN: Duration = Duration::from_secs(2);
+
+/// What to show, and who ends it.
+pub(crate) struct Start<'a> {
+    /// The vehicle's name.
+    pub(crate) vehicle: &'a str,
+    /// What is said before anything else.
+    pub(crate) first: Option<String>,
+    pub(crate) mode: Mode,
+    /// Set by Ctrl-C.
+    pub(crate) interrupted: Arc<AtomicBool>,
+    /// Takes an operator's commands; `None` for a dive that is over.
+    pub(crate) console: Option<ConsolePort>,
+}
+
+/// The follower that shows a dive on the whole terminal.
+pub(crate) struct Tui {
+    eye: Eye,
+    wanted: Arc<AtomicBool>,
+    sender: Option<Sender<Message>>,
+    thread: Option<JoinHandle<()>>,
+    /// Disconnected once the terminal is as it was.
+    done: Receiver<()>,
+    is_live: bool,
+}
+
+impl Tui {
+    /// To be called before the handlers of signals are installed: a second Ctrl-C ends the program at once, and the terminal is put
+    /// in order before.
+    ///
+    /// Errors: stdin or stdout is no terminal.
+    pub(crate) fn prepare() -> Result<(), Failure> {
+        hold::check()?;
+        interrupt::leave_second_to_keys();
+        Ok(())
+    }
+
+    /// Takes the terminal, and starts the threads that draw and read keys.
+    ///
+    /// Errors: the terminal's settings can't be changed, or a thread not started.
+    pub(crate) fn start(start: Start<'_>) -> Result<Self, Failure> {
+        let failed = |source| Failure::System { what: "taking the terminal", source };
+        let hold = Hold::take().map_err(failed)?;
+        let (sender, messages) = bounded(64);
+        let wanted = Arc::new(AtomicBool::new(true));
+        let is_live = matches!(start.mode, Mode::Live);
+        let ended = listen::listen(sender.clone(), Arc::clone(&start.interrupted)).map_err(failed)?;
+        let artist = Artist::new(hold, start.mode, Desk::new(start.console), Arc::clone(&wanted), ended);
+        let (drawing, done) = bounded(0);
+        let draw = move || {
+            artist.draw_until_the_end(&messages);
+            drop::<Sender<()>>(drawing);
+        };
+        let thread = thread::Builder::new().name(hold::ARTIST.to_owned()).spawn(draw).map_err(failed)?;
+        let mut eye = Eye::new(start.vehicle);
+        if let Some(first) = start.first {
+            eye.tell(PilotLine { place: "BEGUN".to_owned(), what: vec![first], ..PilotLine::default() });
+        }
+        Ok(Self { eye, wanted, sender: Some(sender), thread: Some(thread), done, is_live })
+    }
+
+    /// Hands a picture over. What finds no room in a live dive is in the next one.
+    fn show(&mut self, dive: &Loop, stopped: Option<Stop>) {
+        let Some(sender) = &self.sender else { return };
+        if self.is_live && sender.is_full() {
+            return;
+        }
+        let shot = Message::Shot(Box::new(self.eye.shot(dive, stopped)));
+        // A thread that has ended shows nothing more, and said why.
+        let is_taken = if self.is_live { sender.try_send(shot).is_ok() } else { sender.send(shot).is_ok() };
+        if !is_taken {
+            self.eye.show_all_again();
+        }
+    }
+}
+
+impl Follower for Tui {
+    fn notice(&mut self, notice: &Notice, dive: &Loop) {
+        self.eye.hear(notice, dive);
+    }
+
+    fn tick(&mut self, dive: &Loop) {
+        self.eye.tick(dive);
+        if self.wanted.swap(false, Ordering::Relaxed) {
+            self.show(dive, None);
+        }
+    }
+
+    fn sensor(&mut self, id: &str, status: &Status) {
+        self.eye.sensor(status);
+        let lamp = (status.phase != Phase::Running).then_some(Lamp::Amber);
+        let what = vec![format!("{id} {status}")];
+        self.eye.tell(PilotLine { place: "SENSOR".to_owned(), what, lamp, ..PilotLine::default() });
+    }
+
+    fn recording(&mut self, number: usize, event: &RecordingEvent, _: MonoNs) {
+        let (words, fails) = (event.words(), event.fails());
+        self.eye.recording(number, fails);
+        let lamp = Some(if fails { Lamp::Red } else { Lamp::Amber });
+        self.eye.tell(PilotLine {
+            place: "RECORDING".to_owned(),
+            what: vec![words],
+            lamp,
+            ..PilotLine::default()
+        });
+    }
+
+    fn stopped(&mut self, dive: &Loop, _: DurNs, ended: bool) {
+        self.eye.forget();
+        self.show(dive, Some(if ended { Stop::Ended } else { Stop::Paused }));
+    }
+
+    fn end(&mut self, _: &Loop) {
+        self.close();
+    }
+}
+
+impl Tui {
+    /// Gives the terminal back; of a live dive within [`ENDS_WITHIN`].
+    fn close(&mut self) {
+        let Some(sender) = self.sender.take() else { return };
+        hold::leave();
+        sender.try_send(Message::End).ok();
+        drop(sender);
+        let stuck = self.done.recv_timeout(ENDS_WITHIN) == Err(RecvTimeoutError::Timeout);
+        if stuck {
+            self.thread = None;
+            hold::restore_settings();
+        }
+        if let Some(thread) = self.thread.take()
+            && thread.join().is_err()
+        {
+            tracing::error!("the screen's thread has ended early");
+        }
+        crate::logging::release();
+        if stuck {
+            tracing::warn!("the terminal doesn't read: it may be left without its first page");
+        }
+    }
+}
+
+impl Drop for Tui {
+    fn drop(&mut self) {
+        self.close();
+    }
+}

@@ -1,0 +1,409 @@
+//! The panels of the screen.
+
+use headrace_config::plain::one_line;
+use headrace_geometry::math;
+use headrace_geometry::time::DurNs;
+use headrace_monitor::live_state::{Condition, Lamp, LiveMetres, PositionState, SensorState};
+use headrace_monitor::pilot_text::station;
+use ratatui::buffer::Buffer;
+use ratatui::style::{Color, Modifier, Style};
+use ratatui::text::{Line, Span};
+
+use super::alerts::AlertRow;
+use super::paper::{Ink, Rows};
+use super::shot::{SensorRow, Shot};
+use super::wall::{Cell, Extent, HOURS, Known, Strip, Wall};
+use crate::output::append;
+
+/// Rows of the clock strips.
+pub(super) const CLOCK_ROWS: usize = HOURS;
+/// Width of a sensor's lamp with its age, and without.
+const LAMP_COLUMNS: [usize; 2] = [24, 19];
+/// Width of the strips' labels.
+const LABEL: usize = 6;
+
+/// Speed against v_max as a band, with the reason below.
+pub(super) fn speed(shot: &Shot, ink: Ink, rows: &mut Rows<'_>) {
+    let state = &shot.state;
+    let is_known = is_now(shot);
+    let (speed_mps, v_max_mps) =
+        (state.speed_mps.filter(|_| is_known), state.v_max_mps().filter(|_| is_known));
+    let figure = |mps: Option<f64>| mps.map_or_else(|| "-.--".to_owned(), |mps| format!("{mps:.2}"));
+    let words = format!("SPEED  {} of at most {} m/s  ", figure(speed_mps), figure(v_max_mps));
+    let mut spans = vec![Span::styled(words.clone(), Style::default().add_modifier(Modifier::BOLD))];
+    let columns = usize::from(rows.width()).saturating_sub(words.chars().count() + 2).min(60);
+    if let (Some(speed_mps), Some(v_max_mps)) = (speed_mps, v_max_mps)
+        && columns >= 10
+    {
+        // The band ends at one and a half times v_max.
+        let share = |mps: f64| (mps.abs() / (1.5 * v_max_mps)).min(1.0);
+        let at = |mps: f64| usize::try_from(math::round_to_i64(share(mps) * columns as f64)).unwrap_or(0);
+        let (filled, mark) = (at(speed_mps), at(v_max_mps));
+        let (full, empty, limit) = if ink.unicode { ('█', '░', '┃') } else { ('=', '.', '|') };
+        let style = ink.style(state.condition().lamp());
+        spans.push(Span::raw("["));
+        for column in 0..columns {
+            let (letter, style) = match column {
+                column if column == mark => (limit, Style::default().add_modifier(Modifier::BOLD)),
+                column if column < filled => (full, style),
+                _ => (empty, Ink::dim()),
+            };
+            spans.push(Span::styled(letter.to_string(), style));
+        }
+        spans.push(Span::raw("]"));
+    }
+    rows.line(Line::from(spans));
+    let mut parts: Vec<&str> = Vec::new();
+    if is_known && !shot.reason.is_empty() {
+        parts.push(&shot.reason);
+    }
+    // The first parts are in the banner.
+    let shown = if shot.status.action.is_empty() { 2 } else { 1 };
+    parts.extend(shot.status.what.iter().skip(shown).map(String::as_str));
+    rows.text(&one_line(&format!("WHY    {}", parts.join("  "))), Style::default());
+}
+
+/// Whether the state is of now.
+pub(super) fn is_now(shot: &Shot) -> bool {
+    !matches!(shot.state.condition(), Condition::Old(_) | Condition::NoData)
+}
+
+/// Where, how sure, and the metres by verdict.
+pub(super) fn place(shot: &Shot, ink: Ink, rows: &mut Rows<'_>) {
+    let state = &shot.state;
+    let has_position = !matches!(state.position, PositionState::None(_));
+    let place = state.chainage_m.map_or_else(|| "-+---.--".to_owned(), station);
+    let mut spans =
+        vec![Span::styled(format!("AT     {place}"), Style::default().add_modifier(Modifier::BOLD))];
+    let pm = if ink.unicode { "±" } else { "+-" };
+    let (words, lamp) = match state.position {
+        _ if !is_now(shot) => {
+            let age =
+                state.age().map_or_else(|| "not known".to_owned(), |age| format!("{} ago", age_text(age)));
+            (age, Lamp::Red)
+        }
+        PositionState::None(_) => ("no position".to_owned(), Lamp::Red),
+        PositionState::Doubtful(_) => (format!("doubtful: passes {pm}{:.2} m", state.pass_sd_m), Lamp::Amber),
+        PositionState::Ok => (format!("sure: passes {pm}{:.2} m", state.pass_sd_m), Lamp::Green),
+    };
+    spans.push(Span::styled(format!("  {} {words}", ink.shape(lamp)), ink.style(lamp)));
+    if let Some(sd) = state.sd.filter(|_| has_position) {
+        let errors = format!("  {pm}{:.2} m along, {pm}{:.2} across", sd.along_m, sd.place_m);
+        let used: usize = spans.iter().map(Span::width).sum();
+        // Whole, or not at all.
+        spans.extend(
+            Some(errors)
+                .filter(|text| used + text.chars().count() <= usize::from(rows.width()))
+                .map(Span::raw),
+        );
+    }
+    rows.line(Line::from(spans));
+    let style = if state.metres.fail_m > 0.0 { ink.style(Lamp::Red) } else { Style::default() };
+    rows.text(
+        &format!("WAY    {}", metres_text(&state.metres, usize::from(rows.width()).saturating_sub(7))),
+        style,
+    );
+}
+
+/// Metres by verdict, as exact as there is room for.
+fn metres_text(metres: &LiveMetres, columns: usize) -> String {
+    let LiveMetres { pass_m, fail_m, cannot_say_m, open_m, not_inspected_m } = *metres;
+    let all = [
+        (fail_m, "MISSED"),
+        (cannot_say_m, "can't say"),
+        (pass_m, "passed"),
+        (open_m, "open"),
+        (not_inspected_m, "not inspected"),
+    ];
+    let digits = if columns < 70 { 1 } else { 2 };
+    let mut text = format!("{:.digits$} m:", metres.way_m());
+    for (part_m, what) in all.iter().filter(|(part_m, _)| *part_m > 0.0) {
+        let part = format!(" {part_m:.digits$} {what},");
+        if text.len() + part.len() <= columns {
+            text += &part;
+        }
+    }
+    text.trim_end_matches([',', ':']).to_owned()
+}
+
+/// An alert's lines: what to do goes below what holds where there is no room beside it.
+fn alert_lines(alert: &AlertRow, ink: Ink, columns: usize) -> Vec<String> {
+    let AlertRow { number, priority, state, lamp, text, advice, .. } = alert;
+    let first = format!("{} {number} {priority} {state}: {text}", ink.shape(*lamp));
+    if advice.is_empty() {
+        return vec![first];
+    }
+    let arrow = if ink.unicode { "→" } else { "->" };
+    let whole = format!("{first} {arrow} {advice}");
+    if whole.chars().count() <= columns { vec![whole] } else { vec![first, format!("    {arrow} {advice}")] }
+}
+
+/// Rows that the alerts would take.
+pub(super) fn alert_rows(shot: &Shot, ink: Ink, columns: usize) -> usize {
+    shot.alerts.iter().map(|alert| alert_lines(alert, ink, columns).len()).sum()
+}
+
+/// Alerts: `room` rows below a title with their numbers.
+pub(super) fn alerts(shot: &Shot, ink: Ink, room: usize, rows: &mut Rows<'_>) {
+    let columns = usize::from(rows.width());
+    let (mut lines, mut shown) = (Vec::new(), 0);
+    for alert in &shot.alerts {
+        let of_it = alert_lines(alert, ink, columns);
+        // What holds is more than what to do about it.
+        if lines.len() == room {
+            break;
+        }
+        shown += 1;
+        lines.extend(of_it.into_iter().take(room - lines.len()).map(|line| (line, alert)));
+    }
+    let new = shot.alerts.iter().filter(|alert| alert.needs_acknowledgement).count();
+    let hidden = shot.alerts.len().saturating_sub(shown) + shot.alerts_hidden;
+    let more = if hidden > 0 { format!(", {hidden} not shown") } else { String::new() };
+    let title = match (shot.alerts.len(), new) {
+        (0, _) => "ALERTS none".to_owned(),
+        (all, 0) => format!("ALERTS {all}{more}"),
+        (all, new) => format!("ALERTS {all}, {new} to acknowledge{more}"),
+    };
+    rows.title(&title, ink);
+    let mut lines = lines.into_iter();
+    for _ in 0..room {
+        let Some((line, alert)) = lines.next() else {
+            rows.text("", Style::default());
+            continue;
+        };
+        let text: String = one_line(&line).chars().take(columns).collect();
+        let style = ink.style(alert.lamp);
+        let flashing = style.add_modifier(Modifier::REVERSED | Modifier::SLOW_BLINK);
+        rows.text(&text, if alert.needs_acknowledgement { flashing } else { style });
+    }
+}
+
+/// Rows that so many sensors take.
+pub(super) fn sensor_rows(sensors: usize, columns: usize) -> usize {
+    sensors.div_ceil((columns / LAMP_COLUMNS[0]).max(1))
+}
+
+/// Sensor lamps with rate and age; with a reason, those that aren't well come first and take a row each while there is room.
+pub(super) fn sensors(shot: &Shot, ink: Ink, room: usize, rows: &mut Rows<'_>) {
+    let unwell = shot.sensors.iter().filter(|sensor| sensor.state != SensorState::Ok).count();
+    let columns = usize::from(rows.width());
+    let has_room = sensor_rows(shot.sensors.len() - unwell, columns) + unwell <= room;
+    let across = (columns / LAMP_COLUMNS[usize::from(!has_room)]).max(1);
+    // One row is for those that are well.
+    let rows_of_ill = unwell.min(room.saturating_sub(usize::from(unwell < shot.sensors.len())));
+    let hidden = shot.sensors.len().saturating_sub(rows_of_ill + (room - rows_of_ill) * across);
+    let more = if hidden > 0 { format!(", {hidden} not shown") } else { String::new() };
+    let title = match unwell {
+        0 => format!("SENSORS {} ok{more}", shot.sensors.len()),
+        some => format!("SENSORS {some} of {} not ok{more}", shot.sensors.len()),
+    };
+    rows.title(&title, ink);
+    let (ill, well): (Vec<_>, Vec<_>) =
+        shot.sensors.iter().partition(|sensor| sensor.state != SensorState::Ok);
+    let mut ill = ill.into_iter();
+    for sensor in ill.by_ref().take(rows_of_ill) {
+        let (words, lamp) = sensor_words(sensor, true);
+        let text: String = format!("{} {words}", ink.shape(lamp)).chars().take(columns).collect();
+        rows.text(&one_line(&text), ink.style(lamp));
+    }
+    let others: Vec<&SensorRow> = ill.chain(well).collect();
+    let width = columns / across;
+    let mut lines = others.chunks(across);
+    for _ in rows_of_ill..room {
+        let spans = lines.next().unwrap_or_default().iter().map(|sensor| {
+            let (words, lamp) = sensor_words(sensor, has_room);
+            let text: String = format!("{} {words}", ink.shape(lamp)).chars().take(width - 1).collect();
+            Span::styled(format!("{:<width$}", one_line(&text)), ink.style(lamp))
+        });
+        rows.line(Line::from(spans.collect::<Vec<_>>()));
+    }
+}
+
+fn sensor_words(sensor: &SensorRow, long: bool) -> (String, Lamp) {
+    let SensorRow { id, state, age, rate_hz, why } = sensor;
+    let age = age.map_or_else(String::new, age_text);
+    let rate = rate_hz.map_or_else(String::new, |hz| format!(" {hz:.0}/s"));
+    let (words, lamp) = match state {
+        SensorState::Ok if long => (format!("{id}{rate} {age}"), Lamp::Green),
+        SensorState::Ok => (format!("{id}{rate}"), Lamp::Green),
+        SensorState::Silent => (format!("{id} SILENT {age}"), Lamp::Red),
+        SensorState::Never => (format!("{id} never heard"), Lamp::Red),
+        SensorState::Stalled => (format!("{id} STALLED"), Lamp::Red),
+        SensorState::Distrusted => (format!("{id} not believed"), Lamp::Amber),
+    };
+    let why = if long && !why.is_empty() { format!(": {why}") } else { String::new() };
+    (words + &why, lamp)
+}
+
+fn age_text(age: DurNs) -> String {
+    let seconds = age.as_secs_f64();
+    match seconds {
+        _ if seconds < 9.95 => format!("{seconds:.1} s"),
+        _ if seconds < 100.0 => format!("{seconds:.0} s"),
+        _ => format!("{:.0} min", seconds / 60.0),
+    }
+}
+
+/// The wall by section: holes against the target, verdicts, perhaps a ruler, and perhaps what is seen by clock position.
+pub(super) fn wall(wall: &Wall, extent: Extent, ink: Ink, (clock, ruler): (bool, bool), rows: &mut Rows<'_>) {
+    let columns = usize::from(rows.width()).saturating_sub(LABEL);
+    let strip = wall.strip(extent, columns);
+    let each = strip.column_m;
+    rows.title(&format!("WALL {}, a column {each} m", extent.words()), ink);
+    if clock {
+        for hour in 0..HOURS {
+            let label = format!("{:>4}h ", if hour == 0 { 12 } else { hour });
+            strip_row(&label, &strip, rows, |cell| clock_mark(cell, hour, ink));
+        }
+    }
+    strip_row("hole  ", &strip, rows, |cell| hole_mark(cell, ink));
+    strip_row("judged", &strip, rows, |cell| verdict_mark(cell, ink));
+    if let Some((column, inwards)) = strip.vehicle {
+        let mark = match (ink.unicode, inwards) {
+            (true, true) => "▶",
+            (true, false) => "◀",
+            (false, true) => ">",
+            (false, false) => "<",
+        };
+        let x = u16::try_from(LABEL + column).unwrap_or(u16::MAX);
+        let style = Style::default().add_modifier(Modifier::BOLD | Modifier::REVERSED);
+        let y = rows.top.saturating_sub(1);
+        rows.to.set_stringn(x, y, mark, 1, style);
+    }
+    if ruler {
+        rows.text(&ruler_text(&strip), Ink::dim());
+    }
+}
+
+fn strip_row(label: &str, strip: &Strip, rows: &mut Rows<'_>, mark: impl Fn(Cell) -> (char, Style)) {
+    let mut spans = vec![Span::styled(label.to_owned(), Ink::dim())];
+    for column in &strip.columns {
+        let (letter, style) = column.map_or((' ', Style::default()), &mark);
+        spans.push(Span::styled(letter.to_string(), style));
+    }
+    rows.line(Line::from(spans));
+}
+
+fn known_style(known: Known, ink: Ink) -> Style {
+    match known {
+        Known::Unseen => Ink::dim(),
+        Known::Pass => ink.style(Lamp::Green),
+        Known::Open if ink.colour => Style::default().fg(Color::Cyan),
+        Known::Open | Known::NotInspected => Style::default(),
+        Known::CannotSay => ink.style(Lamp::Amber),
+        Known::Missed => ink.style(Lamp::Red).add_modifier(Modifier::REVERSED),
+    }
+}
+
+/// The hole in eighths of twice the target: half a column high is the target.
+fn hole_mark(cell: Cell, ink: Ink) -> (char, Style) {
+    let Some(share) = cell.share else {
+        return (if cell.known == Known::Unseen { '·' } else { ' ' }, Ink::dim()).ascii(ink);
+    };
+    let style = ink.style(if share > 1.0 { Lamp::Red } else { Lamp::Green });
+    let step = usize::try_from(math::floor_to_i64((share * 4.0).clamp(0.0, 7.0))).unwrap_or(0);
+    let bars: [char; 8] = if ink.unicode {
+        ['▁', '▂', '▃', '▄', '▅', '▆', '▇', '█']
+    } else {
+        ['1', '2', '3', '4', '5', '6', '7', '8']
+    };
+    (bars.get(step).copied().unwrap_or(' '), style)
+}
+
+fn verdict_mark(cell: Cell, ink: Ink) -> (char, Style) {
+    let mark = match cell.known {
+        Known::Unseen => '·',
+        Known::Pass => '=',
+        Known::Open => '~',
+        Known::NotInspected => 'o',
+        Known::CannotSay => '?',
+        Known::Missed => '✖',
+    };
+    (mark, known_style(cell.known, ink)).ascii(ink)
+}
+
+fn clock_mark(cell: Cell, hour: usize, ink: Ink) -> (char, Style) {
+    let seen = cell.seen >> hour & 1 == 1;
+    match (cell.known, seen) {
+        (Known::Unseen, false) => (' ', Style::default()),
+        (known, true) => ('█', known_style(known, ink).remove_modifier(Modifier::REVERSED)).ascii(ink),
+        (_, false) => ('·', ink.style(Lamp::Red)).ascii(ink),
+    }
+}
+
+trait Ascii {
+    /// In letters that any terminal has.
+    fn ascii(self, ink: Ink) -> Self;
+}
+
+impl Ascii for (char, Style) {
+    fn ascii(self, ink: Ink) -> Self {
+        let letter = match self.0 {
+            letter if ink.unicode => letter,
+            '·' => '.',
+            '█' => '#',
+            '✖' => 'X',
+            letter => letter,
+        };
+        (letter, self.1)
+    }
+}
+
+/// Stations below a strip, each at its column.
+fn ruler_text(strip: &Strip) -> String {
+    let mut text = " ".repeat(LABEL);
+    let mut column = 0;
+    while column + 10 <= strip.columns.len() {
+        let place = station(strip.from_m + column as f64 * strip.column_m);
+        append(&mut text, format_args!("{:<20}", format!("|{place}")));
+        column += 20;
+    }
+    text
+}
+
+/// Digits of five rows: three columns each, from the most significant bit.
+const DIGITS: [[u8; 5]; 10] = [
+    [7, 5, 5, 5, 7],
+    [2, 6, 2, 2, 7],
+    [7, 1, 7, 4, 7],
+    [7, 1, 7, 1, 7],
+    [5, 5, 7, 1, 1],
+    [7, 4, 7, 1, 7],
+    [7, 4, 7, 5, 7],
+    [7, 1, 2, 2, 2],
+    [7, 5, 7, 5, 7],
+    [7, 5, 7, 1, 7],
+];
+
+/// A figure in large digits at the right of a banner of seven rows, with its unit below.
+pub(super) fn large_digits(
+    figure: &str,
+    unit: &str,
+    (width, top): (u16, u16),
+    style: Style,
+    ink: Ink,
+    to: &mut Buffer,
+) {
+    let letter_columns = |letter: char| if letter == '.' { 4 } else { 8 };
+    let columns: u16 = figure.chars().map(letter_columns).sum();
+    let mut left = width.saturating_sub(columns + 15);
+    let block = if ink.unicode { "██" } else { "##" };
+    for letter in figure.chars() {
+        for row in 0..5_u16 {
+            let bits = match letter.to_digit(10) {
+                Some(digit) => DIGITS
+                    .get(digit as usize)
+                    .and_then(|rows| rows.get(usize::from(row)))
+                    .copied()
+                    .unwrap_or(0),
+                None if row == 4 => 4,
+                None => 0,
+            };
+            for bit in (0..3_u16).filter(|bit| bits >> (2 - bit) & 1 == 1) {
+                to.set_stringn(left + 2 * bit, top + 1 + row, block, 2, style);
+            }
+        }
+        left += letter_columns(letter);
+    }
+    to.set_stringn(left + 1, top + 5, unit, 12, style);
+}

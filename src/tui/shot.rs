@@ -1,0 +1,222 @@
+//! A picture of the dive by value, made on the loop's thread between ticks.
+
+use std::collections::{BTreeMap, BTreeSet, VecDeque};
+
+use headrace_geometry::time::{DurNs, MonoNs};
+use headrace_geometry::tunnel::Profile;
+use headrace_monitor::live_state::{Condition, LiveState, SensorState};
+use headrace_monitor::live_text::{PilotLine, status_line, told_line};
+use headrace_monitor::messages::Notice;
+use headrace_monitor::pilot_text::{AdviceFigures, advice_text};
+use headrace_monitor::run::Loop;
+use headrace_monitor::telling::Teller;
+use headrace_ports::{Phase, Status};
+use headrace_sampling::advice::{Advice, Reason};
+
+use super::alerts::{self, AlertRow};
+use super::mode::Stop;
+use super::wall::{Cell, Clock, WallNews};
+
+/// Time over which a sensor's rate is taken, in data time.
+const RATE_OVER: DurNs = DurNs(2_000_000_000);
+/// Lines told between two pictures that are kept.
+const MOST_TOLD: usize = 64;
+/// Sections on either side of the vehicle that are looked at for every picture.
+const NEAR: i64 = 8;
+
+/// A picture.
+pub(super) struct Shot {
+    pub(super) vehicle: String,
+    pub(super) state: LiveState,
+    /// Since the dive's first packet.
+    pub(super) time: DurNs,
+    pub(super) stopped: Option<Stop>,
+    /// Place, speed, what holds and what to do about it.
+    pub(super) status: PilotLine,
+    /// What limits the speed.
+    pub(super) reason: String,
+    pub(super) sensors: Vec<SensorRow>,
+    pub(super) alerts: Vec<AlertRow>,
+    /// Alerts beyond these.
+    pub(super) alerts_hidden: usize,
+    /// Words, and whether it fails now.
+    pub(super) recording: Option<(&'static str, bool)>,
+    pub(super) wall: WallNews,
+    /// What was told since the last one, the oldest first.
+    pub(super) told: Vec<PilotLine>,
+}
+
+/// A sensor.
+pub(super) struct SensorRow {
+    pub(super) id: String,
+    pub(super) state: SensorState,
+    pub(super) age: Option<DurNs>,
+    pub(super) rate_hz: Option<f64>,
+    /// What its port says, unless it runs.
+    pub(super) why: String,
+}
+
+/// What is remembered between pictures.
+pub(super) struct Eye {
+    vehicle: String,
+    teller: Teller,
+    told: VecDeque<PilotLine>,
+    /// Sections that have changed since the last picture; all of them if `None`.
+    changed: Option<BTreeSet<i64>>,
+    clock: Option<Clock>,
+    /// Readings of each sensor at two times.
+    counted: [Option<(MonoNs, Vec<u64>)>; 2],
+    failed: BTreeMap<usize, bool>,
+    ports: BTreeMap<usize, String>,
+}
+
+impl Eye {
+    pub(super) fn new(vehicle: &str) -> Self {
+        Self {
+            vehicle: vehicle.to_owned(),
+            teller: Teller::default(),
+            told: VecDeque::new(),
+            changed: None,
+            clock: None,
+            counted: [None, None],
+            failed: BTreeMap::new(),
+            ports: BTreeMap::new(),
+        }
+    }
+
+    /// Puts a line among those that are told.
+    pub(super) fn tell(&mut self, line: PilotLine) {
+        if self.told.len() == MOST_TOLD {
+            self.told.pop_front();
+        }
+        self.told.push_back(line);
+    }
+
+    pub(super) fn hear(&mut self, notice: &Notice, dive: &Loop) {
+        if let (Notice::Section { section, .. }, Some(changed)) = (notice, &mut self.changed) {
+            changed.insert(*section);
+        }
+        let mut told = Vec::new();
+        self.teller.hear(notice, dive, &mut |one| told.push(told_line(&one, &dive.mission().profile)));
+        for line in told {
+            self.tell(line);
+        }
+    }
+
+    pub(super) fn tick(&mut self, dive: &Loop) {
+        let mut told = Vec::new();
+        let state = dive.live_state();
+        self.teller.tick(state, dive, &mut |one| told.push(told_line(&one, &dive.mission().profile)));
+        for line in told {
+            self.tell(line);
+        }
+    }
+
+    /// The state of a sensor's port.
+    pub(super) fn sensor(&mut self, status: &Status) {
+        let words = if status.phase == Phase::Running { String::new() } else { status.to_string() };
+        self.ports.insert(status.source, words);
+    }
+
+    /// Whether a recording fails.
+    pub(super) fn recording(&mut self, number: usize, fails: bool) {
+        self.failed.insert(number, fails);
+    }
+
+    /// A picture got lost: the next one has all sections.
+    pub(super) fn show_all_again(&mut self) {
+        self.changed = None;
+    }
+
+    /// Playback has jumped: all may be otherwise.
+    pub(super) fn forget(&mut self) {
+        self.teller.forget();
+        self.changed = None;
+        self.counted = [None, None];
+    }
+
+    pub(super) fn shot(&mut self, dive: &Loop, stopped: Option<Stop>) -> Shot {
+        let state = *dive.live_state();
+        let profile = &dive.mission().profile;
+        let name =
+            |source: usize| dive.sources().get(source).map_or_else(String::new, |info| info.id.clone());
+        let reason =
+            state.advice.as_ref().map_or_else(String::new, |advice| reason_text(advice, &state, profile));
+        let (alerts, alerts_hidden) = alerts::rows(dive);
+        let fails = self.failed.values().any(|fails| *fails);
+        let words = if fails { "NOT RECORDED" } else { "recording had failed" };
+        Shot {
+            vehicle: self.vehicle.clone(),
+            time: dive.tally().span.map_or(DurNs(0), |(begun, _)| DurNs(state.now.since(begun).0.max(0))),
+            stopped,
+            status: status_line(&state, profile, &name),
+            reason,
+            sensors: self.sensors(&state, dive),
+            alerts,
+            alerts_hidden,
+            recording: (!self.failed.is_empty()).then_some((words, fails)),
+            wall: self.wall(&state, dive),
+            told: self.told.drain(..).collect(),
+            state,
+        }
+    }
+
+    fn sensors(&mut self, state: &LiveState, dive: &Loop) -> Vec<SensorRow> {
+        let counts: Vec<u64> = dive.health().map(|health| health.readings).collect();
+        let [before, last] = &mut self.counted;
+        let is_due = last.as_ref().is_none_or(|(at, _)| state.now.since(*at).0 >= RATE_OVER.0);
+        let from = before.as_ref().or(last.as_ref());
+        let rate = |source: usize| {
+            let (at, readings) = from?;
+            let seconds = state.now.since(*at).as_secs_f64();
+            let more = counts.get(source)?.checked_sub(*readings.get(source)?)?;
+            (seconds > 0.5).then(|| more as f64 / seconds)
+        };
+        let row = |(source, info): (usize, &headrace_monitor::SourceInfo)| SensorRow {
+            id: info.id.clone(),
+            state: state.sensor(source),
+            age: state.age_of(source),
+            rate_hz: rate(source),
+            why: self.ports.get(&source).cloned().unwrap_or_default(),
+        };
+        let rows = dive.sources().iter().enumerate().map(row).collect();
+        if is_due {
+            *before = last.take();
+            *last = Some((state.now, counts));
+        }
+        rows
+    }
+
+    fn wall(&mut self, state: &LiveState, dive: &Loop) -> WallNews {
+        let sections = &dive.coverage().sections;
+        let clock = self.clock.get_or_insert_with(|| Clock::of(&dive.mission().profile));
+        let indexes: Vec<i64> = match self.changed.take() {
+            None => (0..).take(sections.len()).collect(),
+            Some(mut changed) => {
+                if let Some(x_m) = state.chainage_m {
+                    let here = sections.index_of(x_m);
+                    changed.extend(here - NEAR..=here + NEAR);
+                }
+                changed.into_iter().collect()
+            }
+        };
+        self.changed = Some(BTreeSet::new());
+        let cell = |index: i64| Some((index, Cell::of(index, dive, clock)?));
+        WallNews {
+            section_m: sections.section_m(),
+            count: sections.len(),
+            at_m: state.chainage_m,
+            inwards: state.speed_mps.is_none_or(|speed_mps| speed_mps >= 0.0),
+            cells: indexes.into_iter().filter_map(cell).collect(),
+        }
+    }
+}
+
+/// What limits the speed. What the condition says isn't said again.
+fn reason_text(advice: &Advice, state: &LiveState, profile: &Profile) -> String {
+    let is_told = matches!(state.condition(), Condition::TurnFails | Condition::NoSpeed);
+    if advice.reason == Reason::HelixPitch && !is_told {
+        return "the distance between turns limits the speed".to_owned();
+    }
+    advice_text(&AdviceFigures::of(advice, state.speed_mps.unwrap_or(0.0)), profile)
+}

@@ -1,0 +1,169 @@
+//! `--tui` on terminals of several sizes, as another program reads them: pages of kept dives at fixed times, keys, and the
+//! terminal in order on every way out.
+
+use headrace_tests::screen::Screen;
+use headrace_tests::{Folder, root};
+use rustix::process::Signal;
+
+const UNICODE: (&str, &str) = ("LANG", "C.UTF-8");
+
+/// A kept dive on a terminal, played to its end and paused there.
+fn ended(log: &str, size: (u16, u16), variables: &[(&str, &str)]) -> (Folder, Screen) {
+    let folder = Folder::new();
+    let log = root().join(format!("tests/golden/{log}.mcap"));
+    let arguments = ["replay", log.to_str().unwrap(), "--tui", "--speed", "max"];
+    let mut screen = Screen::sized(&folder, &arguments, size, variables);
+    screen.until_page(" END ");
+    screen.press(b" ");
+    (folder, screen)
+}
+
+/// The page at a time, so many times ten seconds and the rest before the end.
+fn at(screen: &mut Screen, back: usize, time: &str) -> String {
+    screen.until_page(" END ");
+    for _ in 0..back {
+        screen.press(b"\x1b[D");
+    }
+    screen.until_page(&format!(" PAUSED  {time}"))
+}
+
+#[test]
+fn a_kept_dive_at_a_time_on_three_terminals() {
+    for size in [(60, 20), (80, 24), (120, 40)] {
+        let (_folder, mut screen) = ended("too-fast", size, &[UNICODE]);
+        let page = at(&mut screen, 5, "0:00:31");
+        insta::assert_snapshot!(format!("too_fast_{}x{}", size.0, size.1), page);
+    }
+}
+
+#[test]
+fn what_is_wrong_is_first() {
+    for log in ["stalls", "adrift", "slipping-cable", "murk"] {
+        let (_folder, screen) = ended(log, (80, 24), &[UNICODE]);
+        let page = screen.until_page(" END ");
+        insta::assert_snapshot!(log, page);
+    }
+}
+
+#[test]
+fn without_colours_and_unicode_words_and_shapes_are_left() {
+    let (_folder, mut screen) = ended("too-fast", (80, 24), &[("NO_COLOR", "1"), ("LC_ALL", "C")]);
+    let page = at(&mut screen, 5, "0:00:31");
+    assert!(page.is_ascii(), "{page}");
+    insta::assert_snapshot!("plain", page);
+    let terminal = screen.terminal();
+    for row in 0..24 {
+        for column in 0..80 {
+            let cell = terminal.screen().cell(row, column).unwrap();
+            let colours = [cell.fgcolor(), cell.bgcolor()];
+            assert_eq!(colours, [vt100::Color::Default; 2], "row {row}, column {column}");
+        }
+    }
+}
+
+#[test]
+fn keys_move_through_a_replay_and_leave_it() {
+    let (_folder, mut screen) = ended("too-fast", (100, 30), &[UNICODE]);
+    assert!(!screen.is_in_order(), "keys come without a line end");
+    at(&mut screen, 1, "0:01:11");
+    screen.press(b"\x1b[B");
+    screen.until_page(" PAUSED  0:00:11");
+    screen.press(b"-");
+    screen.until_page(" 1024x PAUSED");
+    screen.press(b"w");
+    screen.until_page("WALL all that was seen");
+    screen.press(b"w");
+    screen.until_page("WALL whole tunnel");
+    screen.press(b"?");
+    screen.until_page("acknowledge the alert on top");
+    screen.press(b"?");
+    screen.resize((60, 20));
+    let small = screen.until_page("REPLAY 1024x PAUSED  0:00:11");
+    assert!(small.lines().all(|line| line.chars().count() <= 60) && !small.contains("on top"), "{small}");
+    screen.press(b"\x1b[A\x1b[A");
+    screen.until_page(" END ");
+    screen.press(b"q");
+    let (code, shown) = screen.end();
+    assert!(matches!(code, Some(0 | 1)), "{code:?}: {shown}");
+    assert!(screen.is_in_order());
+    let last = screen.page();
+    assert!(last.contains("digest ") && !last.contains("ALERTS"), "the first page, with the summary: {last}");
+    assert!(!screen.terminal().screen().hide_cursor() && !screen.terminal().screen().alternate_screen());
+}
+
+/// Its name, what is done, and whether the end is an orderly one.
+type Way<'a> = (&'a str, &'a dyn Fn(&mut Screen), bool);
+
+#[test]
+fn every_way_out_leaves_the_terminal_in_order() {
+    let folder = Folder::with_dive();
+    let play = ["replay", "dive.mcap", "--tui", "--speed", "0.5x"];
+    let demo = ["demo", "--tui", "--speed", "1x", "--out", "demo", "--force"];
+    let ways: [Way<'_>; 4] = [
+        ("ctrl-c", &|screen| screen.press(b"\x03"), true),
+        ("SIGTERM", &|screen| screen.signal(Signal::TERM), true),
+        ("SIGHUP", &|screen| screen.signal(Signal::HUP), true),
+        ("ctrl-c twice", &|screen| screen.press(b"\x03\x03"), false),
+    ];
+    for arguments in [&play[..], &demo] {
+        for (way, leave, in_good_order) in ways {
+            let mut screen = Screen::run(&folder, arguments, 80, &[]);
+            screen.until("ALERTS");
+            leave(&mut screen);
+            let (code, shown) = screen.end();
+            let page = screen.page();
+            assert!(screen.is_in_order(), "{way}: {shown}");
+            let terminal = screen.terminal();
+            assert!(!terminal.screen().alternate_screen() && !terminal.screen().hide_cursor(), "{way}");
+            assert!(page.contains("digest ") || !in_good_order, "{way}: {code:?}: {page}");
+        }
+    }
+}
+
+#[test]
+fn a_program_without_a_terminal_says_what_it_needs() {
+    let folder = Folder::with_dive();
+    let answer = folder.headrace(&["replay", "dive.mcap", "--tui"]);
+    assert_eq!(answer.code, Some(2), "{}", answer.stderr);
+    assert!(answer.stderr.contains("--tui needs a terminal"), "{}", answer.stderr);
+}
+
+#[test]
+fn log_messages_wait_until_the_terminal_is_back() {
+    let folder = Folder::with_dive();
+    let mut screen =
+        Screen::run(&folder, &["replay", "dive.mcap", "--tui", "--speed", "max", "-v"], 100, &[UNICODE]);
+    let page = screen.until_page(" END ");
+    for line in page.lines() {
+        let torn = line.contains("INFO") && !line.starts_with("LOG");
+        assert!(!torn, "{page}");
+    }
+    screen.press(b"q");
+    let (_, shown) = screen.end();
+    let (_, after) = shown.rsplit_once("\x1b[?1049l").unwrap();
+    assert!(after.contains("loop armed") || after.contains("memory at the most"), "{after}");
+}
+
+#[test]
+fn an_alert_is_acknowledged_and_a_note_taken_by_keys_and_both_are_in_the_log() {
+    let folder = Folder::new();
+    let mut screen =
+        Screen::sized(&folder, &["demo", "--tui", "--speed", "20x", "--out", "demo"], (100, 30), &[UNICODE]);
+    screen.until("MISSED");
+    screen.press(b"A");
+    screen.until("all acknowledged");
+    screen.press(b"nrubble, left\r");
+    screen.until("noted: rubble, left");
+    screen.press(b"\x03");
+    let (code, shown) = screen.end();
+    assert!(matches!(code, Some(0 | 1)), "{code:?}: {shown}");
+    let messages = mcap::MessageStream::new(&folder.read("demo/dive.mcap"))
+        .unwrap()
+        .map(Result::unwrap)
+        .filter(|message| message.channel.topic == "/raw/console")
+        .map(|message| String::from_utf8(message.data.to_vec()).unwrap())
+        .collect::<Vec<_>>();
+    let has = |text: &str| messages.iter().any(|message| message.contains(text));
+    assert!(has(r#""do":"acknowledge","alert":0,"by":"terminal""#), "{messages:?}");
+    assert!(has(r#""do":"note","text":"rubble, left","by":"terminal""#), "{messages:?}");
+}
