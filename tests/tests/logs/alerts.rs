@@ -3,7 +3,7 @@
 
 use headrace_geometry::time::{DurNs, MonoNs};
 use headrace_monitor::App;
-use headrace_monitor::alert_list::{AlertChange, AlertState, ListKind, ListedAlert};
+use headrace_monitor::alert_list::{AlertChange, AlertState, Figures, ListKind, ListedAlert};
 use headrace_monitor::console::{CONSOLE_ID, Command, ConsoleCounts, ConsoleInput, NoteText, Who};
 use headrace_monitor::messages::Notice;
 use headrace_monitor::report::Report;
@@ -192,6 +192,10 @@ fn a_speeding_stretch_and_a_dead_head_are_told_once_and_in_time() {
         raised.map(|(at, ..)| at.since(START).as_secs_f64()).collect()
     };
     assert_eq!(raised(ListKind::TooFast).len(), 1, "{:?}", raised(ListKind::TooFast));
+    // Once it is over it still tells of the speed that was too fast, not of the one that the pilot slowed down to.
+    let fast = dive.alert_list().iter().find(|alert| alert.kind == ListKind::TooFast).unwrap();
+    let Figures::Advice(figures) = fast.figures else { panic!("{:?}", fast.figures) };
+    assert!(figures.speed_mps > 1.2 * figures.v_max_mps, "{figures:?}");
     let [silent_s] = raised(ListKind::SensorSilent)[..] else {
         panic!("{:?}", raised(ListKind::SensorSilent))
     };

@@ -299,7 +299,8 @@ impl AlertList {
             return self.raise(kind, source, (at, figures), stretch, to);
         };
         if let Some(alert) = self.get_mut(number) {
-            (alert.figures, alert.stretch) = (figures, stretch);
+            alert.figures = alert.figures.and_then(figures, kind);
+            alert.stretch = stretch;
         }
         self.hold_again(number, at, to);
         number
@@ -308,7 +309,7 @@ impl AlertList {
     /// The figures of what goes on; a change of place is told.
     fn update(&mut self, number: u32, figures: Figures, to: &mut Telling<'_>, at: MonoNs) {
         let Some(alert) = self.get_mut(number) else { return };
-        alert.figures = figures;
+        alert.figures = alert.figures.and_then(figures, alert.kind);
         let stretch = figures.stretch();
         if alert.stretch != stretch {
             alert.stretch = stretch;
@@ -319,6 +320,19 @@ impl AlertList {
 }
 
 impl Figures {
+    /// What is told of a situation that goes on: what is now, but of speeds the highest. Once the pilot has slowed down, the last
+    /// one is a speed that is allowed.
+    fn and_then(self, now: Self, kind: ListKind) -> Self {
+        match (self, now) {
+            (Self::Advice(before), Self::Advice(figures))
+                if kind == ListKind::TooFast && before.speed_mps.abs() > figures.speed_mps.abs() =>
+            {
+                Self::Advice(AdviceFigures { speed_mps: before.speed_mps, ..figures })
+            }
+            _ => now,
+        }
+    }
+
     fn stretch(&self) -> Option<(i64, i64)> {
         match self {
             Self::CannotSay(stretch) => Some((stretch.from, stretch.to)),

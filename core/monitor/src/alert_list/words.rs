@@ -67,7 +67,8 @@ impl ListedAlert {
                 format!("CAN'T SAY {place}: {}", unsure_text(&stretch))
             }
             (ListKind::TooFast, Figures::Advice(figures)) => {
-                format!("TOO FAST: {:.2} m/s, at most {:.2} m/s", figures.speed_mps, figures.v_max_mps)
+                // The present speed is on every screen.
+                format!("TOO FAST: up to {:.2} m/s", figures.speed_mps.abs())
             }
             (ListKind::TurnFails, Figures::Advice(figures)) => {
                 format!(
