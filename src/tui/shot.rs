@@ -9,7 +9,7 @@ use headrace_monitor::live_text::{PilotLine, status_line, told_line};
 use headrace_monitor::messages::Notice;
 use headrace_monitor::pilot_text::{AdviceFigures, advice_text};
 use headrace_monitor::run::Loop;
-use headrace_monitor::telling::Teller;
+use headrace_monitor::telling::{Teller, Told};
 use headrace_ports::{Phase, Status};
 use headrace_sampling::advice::{Advice, Reason};
 
@@ -97,7 +97,7 @@ impl Eye {
             changed.insert(*section);
         }
         let mut told = Vec::new();
-        self.teller.hear(notice, dive, &mut |one| told.push(told_line(&one, &dive.mission().profile)));
+        self.teller.hear(notice, dive, &mut |one| tell(&one, dive, &mut told));
         for line in told {
             self.tell(line);
         }
@@ -106,7 +106,7 @@ impl Eye {
     pub(super) fn tick(&mut self, dive: &Loop) {
         let mut told = Vec::new();
         let state = dive.live_state();
-        self.teller.tick(state, dive, &mut |one| told.push(told_line(&one, &dive.mission().profile)));
+        self.teller.tick(state, dive, &mut |one| tell(&one, dive, &mut told));
         for line in told {
             self.tell(line);
         }
@@ -219,4 +219,11 @@ fn reason_text(advice: &Advice, state: &LiveState, profile: &Profile) -> String 
         return "the distance between turns limits the speed".to_owned();
     }
     advice_text(&AdviceFigures::of(advice, state.speed_mps.unwrap_or(0.0)), profile)
+}
+
+/// The line of what is told, where it adds something to the list of alerts.
+fn tell(one: &Told, dive: &Loop, to: &mut Vec<PilotLine>) {
+    if one.adds_line() {
+        to.push(told_line(one, &dive.mission().profile));
+    }
 }
