@@ -74,24 +74,7 @@ impl Serving {
 
     /// Answer to a request: status, and all of it.
     pub fn ask(&self, method: &str, path: &str, headers: &[&str], body: &str) -> (u16, String) {
-        let mut stream = TcpStream::connect(&self.address).unwrap();
-        stream.set_read_timeout(Some(WITHIN)).unwrap();
-        let host = if headers.iter().any(|header| header.starts_with("Host:")) {
-            String::new()
-        } else {
-            format!("Host: {}\r\n", self.address)
-        };
-        let further = headers.iter().fold(String::new(), |all, header| all + header + "\r\n");
-        let length = body.len();
-        let head = format!(
-            "{method} {path} HTTP/1.1\r\n{host}{further}Connection: close\r\nContent-Length: {length}\r\n\r\n"
-        );
-        stream.write_all((head + body).as_bytes()).unwrap();
-        let mut bytes = Vec::new();
-        stream.read_to_end(&mut bytes).unwrap();
-        let text = String::from_utf8_lossy(&bytes).into_owned();
-        let status = text.split(' ').nth(1).and_then(|code| code.parse().ok()).unwrap_or(0);
-        (status, text)
+        ask(&self.address, method, path, headers, body)
     }
 }
 
@@ -100,6 +83,28 @@ impl Drop for Serving {
         let _gone = self.child.kill();
         let _gone = self.child.wait();
     }
+}
+
+/// Answer of a server at this host and port: status, and all of it.
+pub fn ask(address: &str, method: &str, path: &str, headers: &[&str], body: &str) -> (u16, String) {
+    let mut stream = TcpStream::connect(address).unwrap();
+    stream.set_read_timeout(Some(WITHIN)).unwrap();
+    let host = if headers.iter().any(|header| header.starts_with("Host:")) {
+        String::new()
+    } else {
+        format!("Host: {address}\r\n")
+    };
+    let further = headers.iter().fold(String::new(), |all, header| all + header + "\r\n");
+    let length = body.len();
+    let head = format!(
+        "{method} {path} HTTP/1.1\r\n{host}{further}Connection: close\r\nContent-Length: {length}\r\n\r\n"
+    );
+    stream.write_all((head + body).as_bytes()).unwrap();
+    let mut bytes = Vec::new();
+    stream.read_to_end(&mut bytes).unwrap();
+    let text = String::from_utf8_lossy(&bytes).into_owned();
+    let status = text.split(' ').nth(1).and_then(|code| code.parse().ok()).unwrap_or(0);
+    (status, text)
 }
 
 /// A section as it was sent.
@@ -145,9 +150,18 @@ impl Viewer {
         query: &str,
         headers: &[(&'static str, &str)],
     ) -> Result<Self, tungstenite::Error> {
-        let stream = TcpStream::connect(&serving.address).unwrap();
-        stream.set_read_timeout(Some(WITHIN)).unwrap();
-        let mut request = format!("ws://{}/feed{query}", serving.address).into_client_request()?;
+        Self::connect_to(&serving.address, query, headers)
+    }
+
+    /// The same by host and port.
+    pub fn connect_to(
+        address: &str,
+        query: &str,
+        headers: &[(&'static str, &str)],
+    ) -> Result<Self, tungstenite::Error> {
+        let stream = TcpStream::connect(address)?;
+        stream.set_read_timeout(Some(WITHIN))?;
+        let mut request = format!("ws://{address}/feed{query}").into_client_request()?;
         for (name, value) in headers {
             request.headers_mut().insert(*name, value.parse().unwrap());
         }
