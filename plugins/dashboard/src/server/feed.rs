@@ -20,6 +20,8 @@ use crate::site::May;
 pub(super) const MOST_VIEWERS: usize = 32;
 /// A viewer that takes nothing for so long is dropped.
 const STALLED_AFTER: Duration = Duration::from_secs(10);
+/// Messages read of a viewer after it was told that its connection is closed.
+const MOST_AFTER_CLOSE: usize = 64;
 /// Messages a second from a viewer.
 const MOST_PER_S: f64 = 20.0;
 
@@ -99,10 +101,14 @@ pub(super) async fn serve(socket: WebSocket, shared: Arc<Shared>, role: Role, re
         Over::Ended => (close_code::AWAY, "ended"),
     };
     let close = Frame::Close(Some(CloseFrame { code, reason: reason.into() }));
-    // It may be gone already; otherwise its answer is waited for, so that it reads what was sent before.
+    // It may be gone already; otherwise its answer is waited for, so that it reads what was sent before. Who floods is not read on.
     let _closed = timeout(Duration::from_millis(500), async {
         if viewer.socket.send(close).await.is_ok() {
-            while let Some(Ok(_)) = viewer.socket.recv().await {}
+            for _ in 0..MOST_AFTER_CLOSE {
+                if !matches!(viewer.socket.recv().await, Some(Ok(_))) {
+                    return;
+                }
+            }
         }
     })
     .await;
