@@ -187,7 +187,9 @@ impl Viewer {
 
     /// Reads on until this holds; it must before the connection ends.
     pub fn until(&mut self, what: &str, mut holds: impl FnMut(&Self) -> bool) {
+        let began = std::time::Instant::now();
         while !holds(self) {
+            assert!(began.elapsed() < WITHIN, "{what}: not within {WITHIN:?}; state {}", self.state);
             if let Err(why) = self.read() {
                 panic!("{what}: {why}; last {:?}", self.others.last());
             }
@@ -212,6 +214,11 @@ impl Viewer {
                 Err(_) => return None,
             }
         }
+    }
+
+    /// Reads on until the dive has begun: from then on a replay is directed.
+    pub fn until_begun(&mut self) {
+        self.until("a state", |viewer| !viewer.state.is_null());
     }
 
     /// Reads a message.

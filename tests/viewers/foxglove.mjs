@@ -76,7 +76,9 @@ socket.addEventListener("message", ({ data }) => {
   const view = typeof data === "string" ? undefined : new DataView(data);
   if (view?.getUint8(0) === 5) state = { status: view.getUint8(1), at: view.getBigUint64(2, true) };
 });
-await pause(12_000);
+// The first stretch is missed after some twenty seconds of it.
+const complete = () => Object.keys(TOPICS).every((name) => counts.has(`/result/view/${name}`));
+for (const until = Date.now() + 60_000; Date.now() < until && !complete();) await pause(100);
 for (const [name, schema] of Object.entries(TOPICS)) {
   const topic = `/result/view/${name}`;
   const channel = schemas.get(topic);

@@ -59,7 +59,7 @@ fn without_a_token_nothing_is_said_and_a_viewer_only_sees() {
     viewer.send(&json!({"do": "play", "command": "end"}));
     viewer.until_type("refused");
     let mut operator = Viewer::connect(&serving, "?token=operator-0123456789abcdef", &[]).unwrap();
-    operator.until_type("ready");
+    operator.until_begun();
     assert_eq!(operator.hello["may"]["playback"], true);
     operator.send(&json!({"do": "play", "command": "end"}));
     operator.until_type("end");
@@ -110,7 +110,7 @@ fn rubbish_is_refused_and_the_page_goes_on() {
         drop(viewer.send_raw(message));
     }
     let mut viewer = Viewer::connect(&serving, "", &[]).unwrap();
-    viewer.until_type("ready");
+    viewer.until_begun();
     viewer.send(&json!({"do": "play", "command": "end"}));
     viewer.until_type("end");
     let (code, told) = serving.end();

@@ -90,6 +90,7 @@ fn who_was_lost_gets_what_has_changed_and_has_the_same_as_who_is_new() {
     let [from_s, to_s] = span_s(&lost);
     // Late, so that some of the tunnel is judged for good.
     let middle_s = to_s - 0.1 * (to_s - from_s);
+    lost.send(&json!({"do": "play", "command": "pause"}));
     lost.send(&json!({"do": "play", "command": "seek", "to_s": middle_s}));
     lost.until("the jump", |viewer| {
         viewer.hello["instance"].as_str().unwrap().contains('.')
@@ -138,6 +139,8 @@ fn samples_come_by_chainage_and_none_is_lost_by_jumps() {
     assert!(whole > 1000, "{whole}");
     let [from_s, to_s] = span_s(&viewer);
     let middle_s = f64::midpoint(from_s, to_s);
+    // Otherwise it plays on from there, faster than states are sent.
+    viewer.send(&json!({"do": "play", "command": "pause"}));
     viewer.send(&json!({"do": "play", "command": "seek", "to_s": middle_s}));
     viewer.until("the jump back", |viewer| viewer.state["now_s"].as_f64() < Some(middle_s + 0.1));
     let part = count();
@@ -172,10 +175,18 @@ fn other_programs_read_lines_states_and_figures() {
         assert!(["name", "url", "method", "body"].iter().all(|key| config[key].is_string()), "{action}");
         assert!(config["headers"].is_object() && action["type"] == "http-request", "{action}");
     }
-    let (status, answer) = serving.ask("GET", "/state.json", &[], "");
-    let body = answer.split("\r\n\r\n").nth(1).unwrap();
-    let state: Value = serde_json::from_str(body).unwrap();
-    assert_eq!((status, &state["position"]), (200, &viewer.state["position"]));
+    // The dive goes on meanwhile, until the end of the log: then both have its last state.
+    loop {
+        let (status, answer) = serving.ask("GET", "/state.json", &[], "");
+        let body = answer.split("\r\n\r\n").nth(1).unwrap();
+        let state: Value = serde_json::from_str(body).unwrap();
+        assert_eq!(status, 200);
+        viewer.until("as new a state", |viewer| viewer.state["at_s"].as_f64() >= state["at_s"].as_f64());
+        if viewer.state["at_s"] == state["at_s"] {
+            assert_eq!(viewer.state["position"], state["position"]);
+            break;
+        }
+    }
     let (_, figures) = serving.ask("GET", "/metrics", &[], "");
     assert!(figures.contains("\nheadrace_page_viewers 1\n"), "{figures}");
     assert!(figures.contains("\nheadrace_page_dropped_samples_total 0\n"), "{figures}");

@@ -42,6 +42,7 @@ fn a_taken_port_is_named_and_the_next_is_used() {
     let serving = Serving::start(&folder, &["replay", "dive.mcap", &page]);
     assert_ne!(serving.address, format!("127.0.0.1:{port}"));
     let mut viewer = Viewer::connect(&serving, "", &[]).unwrap();
+    viewer.until_begun();
     viewer.send(&serde_json::json!({"do": "play", "command": "end"}));
     viewer.until_type("end");
     serving.end();
