@@ -28,7 +28,7 @@ use headrace_monitor::run::Loop;
 use headrace_ports::Status;
 use headrace_replay::log::RecordingEvent;
 use headrace_replay::playback::PlaybackCommand;
-use headrace_sampling::occlusion::hidden_by_vehicle;
+use headrace_sampling::occlusion::{AngleRange, hidden_by_vehicle};
 use headrace_sensor::device::Sense;
 use headrace_vehicle::VehicleConfig;
 use serde_json::{Value, json};
@@ -185,16 +185,16 @@ fn own_address(unspecified: IpAddr) -> IpAddr {
 pub(crate) fn site(of: Of<'_>) -> Site {
     let vehicle = of.vehicle;
     let hidden = hidden_by_vehicle(&vehicle.heads(), &vehicle.hull);
-    let mut hidden = hidden.into_iter();
+    let mut hidden = vehicle.heads().into_iter().zip(hidden);
     let (mut heads, mut sensors) = (Vec::new(), Vec::new());
     for ((number, sensor), config) in (0..).zip(&vehicle.sensors).zip(&vehicle.sensor_configs) {
         let kind = sensor.sense();
         if kind == Sense::Head {
-            let ranges = hidden.next().unwrap_or_default();
-            let degrees = |range: headrace_sampling::occlusion::AngleRange| {
-                [range.from_rad, range.from_rad + range.size_rad].map(f64::to_degrees)
-            };
-            let hidden_deg = ranges.into_iter().map(degrees).collect();
+            let degrees =
+                |range: AngleRange| [range.from_rad, range.from_rad + range.size_rad].map(f64::to_degrees);
+            let hidden_deg = hidden.next().map_or_else(Vec::new, |(head, ranges)| {
+                ranges.iter().map(|range| degrees(range.across_body(&head.mount))).collect()
+            });
             heads.push(HeadSite { id: config.id.clone(), source: number, hidden_deg });
         }
         sensors.push(SensorSite {

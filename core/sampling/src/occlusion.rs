@@ -47,6 +47,24 @@ impl AngleRange {
     pub fn middle_rad(&self) -> f64 {
         self.from_rad + self.size_rad / 2.0
     }
+
+    /// The same directions in the vehicle's cross-section, as angles of a head that is mounted straight: 0 is down, growing to the
+    /// vehicle's left. A head that faces aft turns the other way round. For pictures.
+    pub fn across_body(&self, mount: &Mount) -> Self {
+        let across = |angle_rad: f64| {
+            let direction = mount.rotation * head_direction(angle_rad);
+            math::atan2(direction.y(), -direction.z())
+        };
+        let [from, middle] = [0.0, 0.5].map(|share| across(self.from_rad + share * self.size_rad));
+        let half = math::wrap_signed(middle - from, TAU);
+        let turns = if half < 0.0 { -1.0 } else { 1.0 };
+        let first = if half < 0.0 { across(self.from_rad + self.size_rad) } else { from };
+        let size_rad = match self.size_rad {
+            whole if whole >= TAU => TAU,
+            _ => math::wrap(turns * (across(self.from_rad + self.size_rad) - from), TAU),
+        };
+        Self { from_rad: math::wrap(first, TAU), size_rad }
+    }
 }
 
 impl Obstacle {
@@ -233,6 +251,26 @@ mod tests {
             assert!((ranges[0].middle_rad().to_degrees() - middle_deg).abs() < 1e-9);
             assert!((ranges[0].size_rad.to_degrees() - 15.1).abs() < 0.3);
         }
+    }
+
+    #[test]
+    fn what_two_heads_hide_lies_towards_each_other_however_they_face() {
+        for aft in [false, true] {
+            let pair = [head([0.5, 0.15, 0.0], aft), head([0.5, -0.15, 0.0], aft)];
+            // The left one's lies to the right, 270 degrees; the right one's to the left.
+            for ((ranges, spec), middle_deg) in
+                hidden_by_vehicle(&pair, &[]).iter().zip(&pair).zip([270.0, 90.0])
+            {
+                let across = ranges[0].across_body(&spec.mount);
+                assert!((across.middle_rad().to_degrees() - middle_deg).abs() < 1e-9, "{across:?}");
+                assert!((across.size_rad - ranges[0].size_rad).abs() < 1e-9);
+            }
+        }
+        let mount = head([0.0; 3], true).mount;
+        // A quarter from 10 degrees on is for a head that faces aft the quarter up to -10 degrees.
+        let quarter = AngleRange { from_rad: 10_f64.to_radians(), size_rad: TAU / 4.0 }.across_body(&mount);
+        assert!((quarter.from_rad.to_degrees() - 260.0).abs() < 1e-9, "{quarter:?}");
+        assert!(quarter.has(300_f64.to_radians()) && !quarter.has(355_f64.to_radians()));
     }
 
     #[test]

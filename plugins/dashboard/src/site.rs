@@ -29,7 +29,8 @@ pub struct HeadSite {
     pub id: String,
     /// Number of its source.
     pub source: u16,
-    /// Angles that the vehicle hides: from and to, degrees in the sensor frame; `to` may be over 360.
+    /// Angles in the vehicle's cross-section that it hides from the head: from and to, degrees, 0 down, growing to the left; `to` may be
+    /// over 360.
     pub hidden_deg: Vec<[f64; 2]>,
 }
 
