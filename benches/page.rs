@@ -298,6 +298,7 @@ fn site(scene: &Scene) -> Site {
         takes_commands: true,
         is_playback: false,
         recorded_to: None,
+        compared_m: None,
     }
 }
 

@@ -37,6 +37,7 @@ pub(crate) fn export(args: &Export) -> Result<u8, Failure> {
         mode: Mode::File,
         dive: log.display().to_string(),
         recorded_to: None,
+        compared_m: None,
         utc_of_zero_s: page::utc_of_zero_s(&player.info().metadata),
         span: player.span(),
         is_playback: false,

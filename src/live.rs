@@ -105,6 +105,7 @@ fn live_page(
         mode: Mode::Live,
         dive: log.clone().unwrap_or_else(|| vehicle.name.clone()),
         recorded_to: log,
+        compared_m: None,
         utc_of_zero_s: Some((utc.0 - monotonic.0.cast_signed()) as f64 / 1e9),
         span: None,
         is_playback: false,

@@ -53,6 +53,8 @@ pub(crate) struct Of<'a> {
     /// The log's or scene's name.
     pub(crate) dive: String,
     pub(crate) recorded_to: Option<String>,
+    /// Another target that the dive is held to as well, m.
+    pub(crate) compared_m: Option<f64>,
     /// UTC of the clock's zero, where the clock is this machine's.
     pub(crate) utc_of_zero_s: Option<f64>,
     /// First and last time of a log.
@@ -208,6 +210,7 @@ pub(crate) fn site(of: Of<'_>) -> Site {
         dive: of.dive,
         vehicle: vehicle.name.clone(),
         target_m: vehicle.target_m,
+        compared_m: of.compared_m,
         section_m: vehicle.section_m,
         confidence_sd: vehicle.coverage.confidence_sd,
         length_m: vehicle.tunnel.length_m,

@@ -112,6 +112,8 @@ pub fn ask(address: &str, method: &str, path: &str, headers: &[&str], body: &str
 pub struct SeenSection {
     /// 0 open, 1 pass, 2 fail, 3 cannot say, 4 not inspected.
     pub verdict: u8,
+    /// The same for another target; none where there is none.
+    pub compared: Option<u8>,
     /// Number of the cause.
     pub cause: u8,
     /// Diameter of the hole, m.
@@ -290,6 +292,7 @@ impl Viewer {
                     let (verdict, cause) = (bytes[at + 4], bytes[at + 5]);
                     let section = SeenSection {
                         verdict,
+                        compared: ((bytes[at + 7] >> 2) & 7).checked_sub(1),
                         cause,
                         hole_m: f32::from_bits(word(at + 8)),
                         seen: long(at + 24),

@@ -18,6 +18,13 @@ struct Measured {
     doubtful: bool,
 }
 
+impl Measured {
+    /// Of a section whose hole has been measured.
+    fn of(section: &Section) -> Option<Self> {
+        Some(Self { hole: section.hole?, sd_m: section.hole_sd_m, doubtful: section.doubt().is_some() })
+    }
+}
+
 impl Sections {
     /// Metres by verdict for each target, for a given section length. The present length reuses the holes as last
     /// measured, which don't depend on the target once a dive has ended.
@@ -37,16 +44,15 @@ impl Sections {
         targets_m.iter().map(|target_m| self.metres_of(&measured, section_m, *target_m, outlook)).collect()
     }
 
+    /// Verdicts for another target, by section, of all whose hole has been measured: as [`Sections::what_if`] counts them.
+    pub fn verdicts_at(&self, target_m: f64, outlook: &Outlook) -> impl Iterator<Item = (i64, Verdict)> {
+        self.sections_of(outlook.way).filter_map(move |index| {
+            Some((index, self.verdict_of(&Measured::of(self.get(index)?)?, target_m, outlook)))
+        })
+    }
+
     fn measured(&self, way: Option<Reach>) -> Vec<Measured> {
-        let section = |index: i64| {
-            let section = self.get(index)?;
-            Some(Measured {
-                hole: section.hole?,
-                sd_m: section.hole_sd_m,
-                doubtful: section.doubt().is_some(),
-            })
-        };
-        self.sections_of(way).filter_map(section).collect()
+        self.sections_of(way).filter_map(|index| Measured::of(self.get(index)?)).collect()
     }
 
     fn measured_anew(
@@ -80,13 +86,23 @@ impl Sections {
 
     fn metres_of(&self, measured: &[Measured], section_m: f64, target_m: f64, outlook: &Outlook) -> Metres {
         let mut metres = Metres::default();
-        for Measured { hole, sd_m, doubtful } in measured {
-            let error_m = self.confidence_sd() * sd_m;
-            let clear_m = clear_of(outlook.to_come, hole.x_m).min(clear_of(outlook.not_passed, hole.x_m));
-            let said = verdict(hole, error_m, target_m, clear_m);
-            let said = if said == Verdict::Pass && *doubtful { Verdict::CannotSay } else { said };
-            metres.add(said, section_m);
+        for one in measured {
+            metres.add(self.verdict_of(one, target_m, outlook), section_m);
         }
         metres
+    }
+
+    fn verdict_of(
+        &self,
+        Measured { hole, sd_m, doubtful }: &Measured,
+        target_m: f64,
+        outlook: &Outlook,
+    ) -> Verdict {
+        let error_m = self.confidence_sd() * sd_m;
+        let clear_m = clear_of(outlook.to_come, hole.x_m).min(clear_of(outlook.not_passed, hole.x_m));
+        match verdict(hole, error_m, target_m, clear_m) {
+            Verdict::Pass if *doubtful => Verdict::CannotSay,
+            said => said,
+        }
     }
 }

@@ -1,6 +1,7 @@
 //! Verdicts of a dive's samples for other targets and section lengths.
 
 use bevy_ecs::world::Mut;
+use headrace_coverage::Verdict;
 use serde::Serialize;
 
 use super::resources::{Coverage, Finder};
@@ -24,6 +25,11 @@ pub struct WhatIfReport {
 }
 
 impl Loop {
+    /// Verdicts for another target as of now, by section, of those whose hole has been measured.
+    pub fn verdicts_at(&self, target_m: f64) -> Vec<(i64, Verdict)> {
+        self.coverage().sections.verdicts_at(target_m, &self.outlook()).collect()
+    }
+
     /// Verdicts of its samples for every target and section length, once the dive has ended.
     pub fn what_if(&mut self, targets_m: &[f64], sections_m: &[f64]) -> Vec<WhatIfReport> {
         let outlook = self.outlook();

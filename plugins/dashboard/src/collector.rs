@@ -20,6 +20,7 @@ use serde_json::{Value, json};
 use tokio::sync::mpsc::Sender;
 use tokio::sync::mpsc::error::TrySendError;
 
+use crate::compared::Compared;
 use crate::fed::{Beside, Dropped, EchoJson, Fed, News, PlaybackState, PoseJson, RateJson, RecordingJson};
 use crate::wire::{NONE, Outcome, SampleRecord, SectionRecord};
 
@@ -85,6 +86,7 @@ pub struct Collector {
     back_told: Option<(MonoNs, Value)>,
     recording: RecordingJson,
     playback: Option<PlaybackState>,
+    compared: Option<Compared>,
 }
 
 impl Collector {
@@ -127,7 +129,13 @@ impl Collector {
             back_told: None,
             recording: RecordingJson { on: recorded_to.is_some(), fails: false, path: recorded_to },
             playback: None,
+            compared: None,
         }
+    }
+
+    /// Holds all sections to another target, m, as well.
+    pub(crate) fn compared_with(self, target_m: Option<f64>) -> Self {
+        Self { compared: target_m.map(Compared::with), ..self }
     }
 
     /// Takes a result of the last tick.
@@ -201,6 +209,9 @@ impl Collector {
         let now = dive.now();
         (self.sent, self.rates_from, self.back_told) = (None, None, None);
         (self.back_due, self.notes_due) = (true, true);
+        if let Some(compared) = &mut self.compared {
+            compared.forget();
+        }
         self.sensors.iter_mut().for_each(|sensor| sensor.ping = None);
         self.samples.clear();
         self.told.clear();
@@ -216,6 +227,9 @@ impl Collector {
         self.teller.end(&dive.coverage().sections, &mut |one| told.push(one));
         self.tell(&told, dive);
         self.change_all(dive);
+        if let Some(compared) = &mut self.compared {
+            compared.forget();
+        }
         self.back_due = true;
         self.back_told = None;
         // At its end also a live dive has the time.
@@ -333,11 +347,16 @@ impl Collector {
             return false;
         }
         let sections = &dive.coverage().sections;
+        if let Some(compared) = &mut self.compared {
+            compared.refresh(dive, |index| _ = self.changed.insert(index));
+        }
         let mut changed = Vec::new();
         while changed.len() < SECTIONS_AT_ONCE
             && let Some(index) = self.changed.pop_first()
         {
-            changed.extend(sections.get(index).and_then(|section| SectionRecord::of(index, section)));
+            let other = self.compared.as_ref().and_then(|compared| compared.verdict(index));
+            let record = sections.get(index).and_then(|section| SectionRecord::of(index, section));
+            changed.extend(record.map(|record| record.compared(other)));
         }
         let now = dive.now();
         self.take_rates(now, dive);
@@ -437,7 +456,15 @@ impl Collector {
         let name =
             |source: usize| dive.sources().get(source).map_or_else(String::new, |info| info.id.clone());
         let text = status_line(dive.live_state(), &dive.mission().profile, &name).text();
-        Beside { pose, echosounders, rates: rates.collect(), recording: self.recording.clone(), text }
+        let compared = self.compared.as_ref().map(Compared::json);
+        Beside {
+            pose,
+            echosounders,
+            rates: rates.collect(),
+            recording: self.recording.clone(),
+            compared,
+            text,
+        }
     }
 
     /// What to go back for, from the far end to the portal, if that has changed and is due.

@@ -6,6 +6,7 @@ use headrace_monitor::live_state::json::LiveStateJson;
 use serde::Serialize;
 use serde_json::Value;
 
+use crate::compared::ComparedJson;
 use crate::wire::{SampleRecord, SectionRecord};
 
 /// A message to the page's thread.
@@ -61,6 +62,9 @@ pub struct Beside {
     pub rates: Vec<RateJson>,
     /// The recording.
     pub recording: RecordingJson,
+    /// The same dive held to another target.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub compared: Option<ComparedJson>,
     /// The status in a line.
     pub text: String,
 }

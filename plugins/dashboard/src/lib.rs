@@ -8,6 +8,7 @@ pub mod access;
 pub mod assets;
 pub mod collector;
 pub mod command;
+mod compared;
 pub mod export;
 pub mod fed;
 pub mod history;

@@ -56,6 +56,8 @@ pub struct Site {
     pub vehicle: String,
     /// Target T, m.
     pub target_m: f64,
+    /// Another target that all sections are held to as well, m.
+    pub compared_m: Option<f64>,
     /// Length of a section, m.
     pub section_m: f64,
     /// Standard deviations of a hole that a pass keeps clear of the target.
@@ -93,6 +95,8 @@ pub(crate) struct Hello<'a> {
     dive: &'a str,
     vehicle: &'a str,
     target_m: f64,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    compared_m: Option<f64>,
     section_m: f64,
     confidence_sd: f64,
     length_m: f64,
@@ -147,6 +151,7 @@ impl Site {
             dive: &self.dive,
             vehicle: &self.vehicle,
             target_m: self.target_m,
+            compared_m: self.compared_m,
             section_m: self.section_m,
             confidence_sd: self.confidence_sd,
             length_m: self.length_m,

@@ -32,7 +32,7 @@ pub struct SectionRecord {
     pub cause: u8,
     /// Number of why it can't be said; 255 for none.
     pub why: u8,
-    /// Bit 0 flagged, bit 1 settled.
+    /// Bit 0 flagged, bit 1 settled, bits 2 to 4 the verdict for another target and 1, or 0 where there is none.
     pub flags: u8,
     /// Diameter of the hole, its standard deviation, chainage and arc length of its centre, m; NaN for none.
     pub hole: [f32; 4],
@@ -54,6 +54,15 @@ fn number<T: PartialEq>(all: &[T], one: Option<T>) -> u8 {
     place.and_then(|place| u8::try_from(place).ok()).unwrap_or(NONE)
 }
 
+fn byte(verdict: Verdict) -> u8 {
+    match verdict {
+        Verdict::Open => 0,
+        Verdict::Pass => 1,
+        Verdict::Fail => 2,
+        Verdict::CannotSay => 3,
+    }
+}
+
 impl SectionRecord {
     /// A section that nothing is known of.
     pub fn blank(index: i32) -> Self {
@@ -72,10 +81,7 @@ impl SectionRecord {
     pub fn of(index: i64, section: &Section) -> Option<Self> {
         let verdict = match section.verdict {
             Verdict::Open if section.not_inspected => NOT_INSPECTED,
-            Verdict::Open => 0,
-            Verdict::Pass => 1,
-            Verdict::Fail => 2,
-            Verdict::CannotSay => 3,
+            verdict => byte(verdict),
         };
         let cause =
             section.evidence.filter(|_| section.verdict == Verdict::Fail).map(|evidence| evidence.cause);
@@ -85,6 +91,12 @@ impl SectionRecord {
         });
         let (cause, why) = (number(&Cause::ALL, cause), number(&Unsure::ALL, section.unsure()));
         Some(Self { index: i32::try_from(index).ok()?, verdict, cause, why, flags, hole })
+    }
+
+    /// With the verdict for another target.
+    pub fn compared(self, other: Option<Verdict>) -> Self {
+        let bits = other.map_or(0, |verdict| byte(verdict) + 1);
+        Self { flags: self.flags | bits << 2, ..self }
     }
 
     fn put(&self, seen: u64, to: &mut Vec<u8>) {

@@ -8,7 +8,12 @@ use crate::ANY;
 
 /// Replays the short dive with a page, paused at its end.
 fn replayed(folder: &Folder) -> (Serving, Viewer) {
-    let serving = Serving::start(folder, &["replay", "dive.mcap", ANY, "--report", "report.json"]);
+    replayed_with(folder, &[])
+}
+
+fn replayed_with(folder: &Folder, further: &[&str]) -> (Serving, Viewer) {
+    let arguments = [&["replay", "dive.mcap", ANY, "--report", "report.json"], further].concat();
+    let serving = Serving::start(folder, &arguments);
     let mut viewer = Viewer::connect(&serving, "", &[]).unwrap();
     viewer.until_type("ready");
     // At the end of the log playback stands still.
@@ -80,6 +85,32 @@ fn all_that_a_viewer_has_at_the_end_equals_the_report() {
     ] {
         assert!((shown_m - reported_m).abs() < 1e-6, "{metres:?}, {summary}");
     }
+}
+
+#[test]
+fn the_same_dive_held_to_another_target_beside_its_own_equals_the_report() {
+    let folder = Folder::with_dive();
+    let (serving, mut viewer) = replayed_with(&folder, &["--target", "0.5,0.2"]);
+    assert_eq!(viewer.hello["compared_m"], 0.2);
+    // What is behind a vehicle that goes on is judged, not only at the end.
+    let judged =
+        |viewer: &Viewer| viewer.sections.values().filter(|section| section.compared == Some(2)).count();
+    assert!(judged(&viewer) > 3, "{:?}", viewer.sections);
+    end(serving, &mut viewer);
+    let report: Value = serde_json::from_slice(&folder.read("report.json")).unwrap();
+    let section_m = viewer.hello["section_m"].as_f64().unwrap();
+    for (other, key) in [(0, "open_m"), (1, "pass_m"), (2, "fail_m"), (3, "cannot_say_m")] {
+        let reported_m = report["what_if"][1][key].as_f64().unwrap();
+        let sections = viewer.sections.values().filter(|section| section.compared == Some(other)).count();
+        let shown_m = sections as f64 * section_m;
+        assert!((shown_m - reported_m).abs() < 1e-9, "{key}: {shown_m}, {reported_m}");
+        assert_eq!(
+            viewer.state["compared"][key].as_f64().map(|m| (m * 1e6).round()),
+            Some((reported_m * 1e6).round()),
+            "{key}"
+        );
+    }
+    assert!(report["what_if"][1]["fail_m"].as_f64() > report["what_if"][0]["fail_m"].as_f64());
 }
 
 #[test]

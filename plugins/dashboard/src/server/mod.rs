@@ -192,11 +192,12 @@ impl Page {
 
     /// What takes results of a loop for it: `waits` for a replay.
     pub fn collector(&self, dive: &Loop, waits: bool) -> Collector {
-        let (is_playback, recorded_to) = {
+        let (is_playback, recorded_to, compared_m) = {
             let model = self.shared.model();
-            (model.site().is_playback, model.site().recorded_to.clone())
+            let site = model.site();
+            (site.is_playback, site.recorded_to.clone(), site.compared_m)
         };
-        Collector::new(self.sender.clone(), dive, waits, is_playback, recorded_to)
+        Collector::new(self.sender.clone(), dive, waits, is_playback, recorded_to).compared_with(compared_m)
     }
 
     /// How many watch.

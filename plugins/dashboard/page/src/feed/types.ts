@@ -11,7 +11,7 @@ export interface Head { id: string; source: number; hidden_deg: [number, number]
 
 export interface Hello {
   type: "hello"; seq: number; version: number; program: string; instance: string; mode: Mode;
-  dive: string; vehicle: string; target_m: number; section_m: number; confidence_sd: number;
+  dive: string; vehicle: string; target_m: number; compared_m?: number; section_m: number; confidence_sd: number;
   length_m: number | null; perimeter_m: number; profile: [number, number][]; clock_arc_m: number[];
   heads: Head[]; sensors: { id: string; plugin: string; kind: string }[];
   may: { operate: boolean; playback: boolean };
@@ -40,6 +40,8 @@ export interface State {
   turn: Turn | null;
   sensors: Sensor[];
   metres: { pass_m: number; fail_m: number; cannot_say_m: number; open_m: number; not_inspected_m: number; way_m: number };
+  /** The same dive held to the hello's other target. */
+  compared?: { target_m: number; pass_m: number; fail_m: number; cannot_say_m: number; open_m: number };
   cannot_say: { why: string; from_m: number; to_m: number } | null;
   /** The replay has reached its end, or the dive has ended. */
   ended?: boolean;

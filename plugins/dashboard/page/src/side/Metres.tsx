@@ -32,8 +32,21 @@ export function Metres() {
           </div>
         ))}
       </dl>
+      <Compared />
       <Left />
     </section>
+  );
+}
+
+/** The same for the other target of a replay. */
+function Compared() {
+  const other = store.state?.compared;
+  if (!other) return null;
+  return (
+    <p class="compared">
+      <b>T {figure(other.target_m, 2)} m:</b>{" "}
+      {(["pass_m", "fail_m", "cannot_say_m", "open_m"] as const).map((key) => `${VERDICTS[key]} ${metres(other[key])}`).join(" · ")}
+    </p>
   );
 }
 

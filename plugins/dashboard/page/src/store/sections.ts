@@ -4,6 +4,8 @@ import { SECTION_BYTES, type Frame } from "../feed/binary";
 export const OPEN = 0, PASS = 1, FAIL = 2, CANNOT_SAY = 3, NOT_INSPECTED = 4;
 export const NONE = 255;
 export const FLAGGED = 1;
+/** For which target a section's verdict is taken: the dive's own, or the other one that it is compared with. */
+export type Held = "own" | "compared";
 
 export class Sections {
   /** Index of the first slot. */
@@ -35,6 +37,16 @@ export class Sections {
   slot(index: number): number {
     const slot = index - this.base;
     return slot >= 0 && slot < this.slots && this.verdict[slot] !== NONE ? slot : -1;
+  }
+
+  /** Verdict of a slot. */
+  verdictOf(slot: number, held: Held): number {
+    return held === "own" ? (this.verdict[slot] ?? OPEN) : Math.max(((this.flags[slot] ?? 0) >> 2) - 1, OPEN);
+  }
+
+  /** Whether a slot is outlined as missed. */
+  isFlagged(slot: number, held: Held): boolean {
+    return held === "own" ? ((this.flags[slot] ?? 0) & FLAGGED) !== 0 : this.verdictOf(slot, held) === FAIL;
   }
 
   take(frame: Frame): void {

@@ -11,11 +11,13 @@ import { columns, WORDS } from "./columns";
 import { usePointer } from "./pointer";
 import { WallGl, type Part, type WallColours } from "./gl";
 import { Legend } from "./Legend";
-import { drawOverlay, type Layout } from "./overlay";
+import { drawOverlay, type Layout, type Row } from "./overlay";
 import { SampleWindow } from "./samples";
 import { left_m, right_m, roundOf, wholeView, type Round, type View } from "./view";
 
 const LEFT = 30, TOP = 8, BOTTOM = 24, STRIP = 34, STRIP_BOTTOM = 18;
+/** Between two walls, pixels. */
+const BETWEEN = 16;
 /** Discs are drawn where their radius has so many pixels, and up to so wide a view. */
 const LEAST_RADIUS = 2.2, DISCS_UPTO_M = 160;
 
@@ -104,12 +106,23 @@ class Painter {
     this.session = store.session;
     this.round = roundOf(hello.clock_arc_m, hello.perimeter_m);
     const view = current(), strip = this.stripView(), layout = this.layout;
-    this.paintPart("wall", view, layout.top, layout.height, true);
-    if (layout.stripHeight > 0) this.paintPart("strip", strip, layout.stripTop, layout.stripHeight, false);
-    drawOverlay(context, store, view, strip, layout, vehicle(), this.round);
+    const rows = this.rows(hello.target_m, hello.compared_m);
+    for (const row of rows) this.paintPart(row.held, view, row, true);
+    if (layout.stripHeight > 0) {
+      this.paintPart("strip", strip, { held: "own", target_m: hello.target_m, top: layout.stripTop, height: layout.stripHeight }, false);
+    }
+    drawOverlay(context, store, view, strip, layout, vehicle(), this.round, rows);
   }
 
-  private paintPart(name: string, view: View, top: number, height: number, large: boolean): void {
+  /** The wall, and below it the same for the other target where there is one. */
+  private rows(target_m: number, compared_m: number | undefined): Row[] {
+    const { top, height } = this.layout;
+    if (compared_m === undefined) return [{ held: "own", target_m, top, height }];
+    const each = (height - BETWEEN) / 2;
+    return [{ held: "own", target_m, top, height: each }, { held: "compared", target_m: compared_m, top: top + each + BETWEEN, height: each }];
+  }
+
+  private paintPart(name: string, view: View, { held, target_m, top, height }: Row, large: boolean): void {
     const { hello } = store, { scale } = this.size;
     if (!hello) return;
     const part: Part = {
@@ -120,21 +133,22 @@ class Painter {
     // The strip of the whole tunnel changes only with the wall itself.
     const key = large ? "" : `${store.topics.sections.version} ${left_m(view)} ${view.span_m} ${part.width}`;
     if (large || key !== this.stripKey) {
-      columns(store.sections, hello.section_m, hello.target_m, left_m(view), view.span_m / part.width, part.width, words);
+      columns(store.sections, hello.section_m, target_m, left_m(view), view.span_m / part.width, part.width, words, held);
     }
     if (!large) this.stripKey = key;
-    this.gl.draw(name, { part, columns: words, view, round: this.round, scale, discs: large ? this.discs(view) : null }, this.colours);
+    this.gl.draw(name, { part, columns: words, view, round: this.round, scale, discs: large ? this.discs(view, target_m) : null }, this.colours);
   }
 
-  private discs(view: View) {
+  private discs(view: View, target_m: number) {
     const { hello } = store;
     if (!hello) return null;
-    const radius = ((hello.target_m / 2) * this.layout.width) / view.span_m;
+    const radius = ((target_m / 2) * this.layout.width) / view.span_m;
     if (radius < LEAST_RADIUS || view.span_m > DISCS_UPTO_M) return null;
-    const from = left_m(view) - hello.target_m, to = right_m(view) + hello.target_m, way = wayOf();
+    const widest_m = Math.max(hello.target_m, hello.compared_m ?? 0);
+    const from = left_m(view) - widest_m, to = right_m(view) + widest_m, way = wayOf();
     if (!store.ready) return null;
     this.window.round = this.round;
-    this.window.seam = hello.target_m / 2 / hello.perimeter_m;
+    this.window.seam = widest_m / 2 / hello.perimeter_m;
     this.window.want(from, to, way, 0);
     if (!this.window.covers(Math.max(from, way[0]), Math.min(to, way[1]))) return null;
     this.turns.fill(Infinity);
@@ -142,7 +156,7 @@ class Painter {
       const first = head.present[0];
       if (first && at < 16) this.turns[at] = first.t_s - hello.begun_s - 0.0005;
     });
-    return { samples: this.window, radius_m: hello.target_m / 2, perimeter_m: hello.perimeter_m, turn_t_s: this.turns };
+    return { samples: this.window, radius_m: target_m / 2, perimeter_m: hello.perimeter_m, turn_t_s: this.turns };
   }
 
   /** What lies under a place, in words. */
@@ -152,11 +166,14 @@ class Painter {
     const view = current(), x_m = left_m(view) + ((x - left) / width) * view.span_m;
     const slot = sections.slot(Math.floor(x_m / hello.section_m));
     if (slot < 0) return station(x_m, 1);
-    const verdict = ["open", "pass", "missed", "can't say", "not inspected"][sections.verdict[slot] ?? 0] ?? "";
-    const cause = hello.causes[sections.cause[slot] ?? 255], why = hello.whys[sections.why[slot] ?? 255];
+    const row = this.rows(hello.target_m, hello.compared_m).find((each) => y <= each.top + each.height);
+    const held = row?.held ?? "own", target_m = row?.target_m ?? hello.target_m;
+    const verdict = ["open", "pass", "missed", "can't say", "not inspected"][sections.verdictOf(slot, held)] ?? "";
+    // Cause and why are those of the dive's own target.
+    const own = held === "own" ? slot : -1, cause = hello.causes[sections.cause[own] ?? 255], why = hello.whys[sections.why[own] ?? 255];
     const words = [cause, why].filter((word) => word !== undefined).map((word) => word.replaceAll("_", " ")).join(", ");
     const d = sections.hole[slot] ?? NaN;
-    return `${station(x_m, 1)}: ${verdict}${words ? ` (${words})` : ""}${Number.isFinite(d) ? `, hole ${figure(d, 2)} of ${figure(hello.target_m, 2)} m` : ""}`;
+    return `${station(x_m, 1)}: ${verdict}${words ? ` (${words})` : ""}${Number.isFinite(d) ? `, hole ${figure(d, 2)} of ${figure(target_m, 2)} m` : ""}`;
   }
 }
 

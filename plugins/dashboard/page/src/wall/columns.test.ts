@@ -1,6 +1,6 @@
 import { describe, expect, it } from "vitest";
 import { frameOf } from "../feed/binary";
-import { FAIL, PASS, Sections } from "../store/sections";
+import { FAIL, OPEN, PASS, Sections } from "../store/sections";
 import { ABSENT, columns, FLAGGED_BIT, RATIO_STEPS } from "./columns";
 
 function frame(records: { index: number; verdict: number; flags?: number; hole: number; low?: number }[]) {
@@ -34,6 +34,17 @@ describe("columns of the wall", () => {
     expect(out[1]).toBe(3);
     expect(out[4]! & 7).toBe(PASS);
     expect(out[8]! & 7).toBe(ABSENT);
+  });
+  it("hold the same samples to another target", () => {
+    const sections = new Sections();
+    // Passes for its own target, is missed for the other; and one that nothing was compared of.
+    sections.take(frame([{ index: 0, verdict: PASS, flags: 2 | ((FAIL + 1) << 2), hole: 0.4 }, { index: 1, verdict: PASS, flags: 2, hole: 0.4 }]));
+    const own = new Uint32Array(2 * 4), other = new Uint32Array(2 * 4);
+    columns(sections, 1, 0.5, 0, 1, 2, own);
+    columns(sections, 1, 0.25, 0, 1, 2, other, "compared");
+    expect([own[0]! & 15, other[0]! & 15]).toEqual([PASS, FAIL | FLAGGED_BIT]);
+    expect(other[0]! >>> 16).toBe(Math.round((Math.fround(0.4) / 0.25) * RATIO_STEPS));
+    expect(other[4]! & 7).toBe(OPEN);
   });
   it("widen a flag that would be a single pixel, within the way", () => {
     const sections = new Sections();

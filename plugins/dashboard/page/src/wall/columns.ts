@@ -1,6 +1,6 @@
 // One column of the wall for each pixel across, made of the sections that lie in it: 28,000 sections cost less than
 // a millisecond, and only what the screen has columns for goes to the graphics processor.
-import { CANNOT_SAY, FAIL, FLAGGED, NOT_INSPECTED, OPEN, PASS, type Sections } from "../store/sections";
+import { CANNOT_SAY, FAIL, NOT_INSPECTED, OPEN, PASS, type Held, type Sections } from "../store/sections";
 
 export const ABSENT = 7;
 export const FLAGGED_BIT = 8;
@@ -19,9 +19,9 @@ RANK[FAIL] = 5;
 
 /** Fills `out` with columns from `from_m` on, each `step_m` wide. */
 export function columns(
-  sections: Sections, section_m: number, target_m: number, from_m: number, step_m: number, count: number, out: Uint32Array,
+  sections: Sections, section_m: number, target_m: number, from_m: number, step_m: number, count: number, out: Uint32Array, held: Held = "own",
 ): void {
-  const { verdict, flags, hole, seenLow, seenHigh } = sections;
+  const { hole, seenLow, seenHigh } = sections;
   for (let column = 0; column < count; column += 1) {
     const start = from_m + column * step_m;
     const first = Math.floor(start / section_m);
@@ -32,11 +32,11 @@ export function columns(
       for (let index = Math.max(first, sections.least); index <= end; index += 1) {
         const slot = sections.slot(index);
         if (slot < 0) continue;
-        const is = verdict[slot] ?? 0, its = RANK[is] ?? 0;
+        const is = sections.verdictOf(slot, held), its = RANK[is] ?? 0;
         if (its > rank) { rank = its; shown = is; }
         const d = hole[slot] ?? NaN;
         if (d > largest) largest = d;
-        flagged |= (flags[slot] ?? 0) & FLAGGED;
+        if (sections.isFlagged(slot, held)) flagged = 1;
         low |= seenLow[slot] ?? 0;
         high |= seenHigh[slot] ?? 0;
       }

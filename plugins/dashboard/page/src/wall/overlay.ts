@@ -1,5 +1,5 @@
 // What is written over the wall: stations, clock positions, holes, alerts, the vehicle.
-import { CANNOT_SAY, FAIL } from "../store/sections";
+import { CANNOT_SAY, FAIL, type Held } from "../store/sections";
 import { isUnacknowledged } from "../store/alerts";
 import type { Store } from "../store/store";
 import { figure, station } from "../text/format";
@@ -8,26 +8,38 @@ import { downOf, heightOf, left_m, right_m, type Round, type View } from "./view
 
 /** Places in CSS pixels. */
 export interface Layout { left: number; top: number; width: number; height: number; stripTop: number; stripHeight: number }
+/** One of the walls: the same samples, held to one target. */
+export interface Row { held: Held; target_m: number; top: number; height: number }
 export interface Vehicle { at_m: number; sd_m: number; direction: number; sure: boolean }
 
 const FONT = "system-ui, 'DejaVu Sans', sans-serif";
 
 export function drawOverlay(
-  context: CanvasRenderingContext2D, store: Store, view: View, strip: View, layout: Layout, vehicle: Vehicle | null, round: Round,
+  context: CanvasRenderingContext2D, store: Store, view: View, strip: View, layout: Layout, vehicle: Vehicle | null, round: Round, rows: Row[],
 ): void {
-  const { left, top, width, height } = layout;
   context.textBaseline = "middle";
-  clocks(context, store, view, layout, round);
+  for (const row of rows) {
+    const { left, top, width, height } = { ...layout, ...row }, its = { ...layout, ...row };
+    clocks(context, store, view, its, round);
+    context.save();
+    context.beginPath();
+    context.rect(left, top, width, height);
+    context.clip();
+    holes(context, store, view, its, round, row);
+    if (row.held === "own") missed(context, store, view, its);
+    if (vehicle) drawVehicle(context, view, its, vehicle);
+    if (rows.length > 1) named(context, its, row);
+    context.restore();
+  }
   stations(context, view, layout);
-  context.save();
-  context.beginPath();
-  context.rect(left, top, width, height);
-  context.clip();
-  holes(context, store, view, layout, round);
-  missed(context, store, view, layout);
-  if (vehicle) drawVehicle(context, view, layout, vehicle);
-  context.restore();
   drawStrip(context, store, view, strip, layout, vehicle);
+}
+
+/** Which target a wall is held to, in its upper corner. */
+function named(context: CanvasRenderingContext2D, { left, top }: Layout, { target_m }: Row): void {
+  context.font = `bold 15px ${FONT}`;
+  context.textAlign = "left";
+  label(context, `T ${figure(target_m, 2)} m`, left + 8, top + 14, colour("wall-fresh"), colour("wall-dot"));
 }
 
 function across(view: View, layout: Layout, x_m: number): number {
@@ -86,7 +98,7 @@ function stations(context: CanvasRenderingContext2D, view: View, layout: Layout)
   }
 }
 
-function holes(context: CanvasRenderingContext2D, store: Store, view: View, layout: Layout, round: Round): void {
+function holes(context: CanvasRenderingContext2D, store: Store, view: View, layout: Layout, round: Round, { held }: Row): void {
   const { sections, hello } = store;
   const perMetre = layout.width / view.span_m;
   if (!hello || perMetre * hello.target_m < 9) return;
@@ -99,7 +111,7 @@ function holes(context: CanvasRenderingContext2D, store: Store, view: View, layo
   for (let index = first; index <= last; index += 1) {
     const slot = sections.slot(index);
     if (slot < 0) continue;
-    const verdict = sections.verdict[slot], d = sections.hole[slot] ?? NaN;
+    const verdict = sections.verdictOf(slot, held), d = sections.hole[slot] ?? NaN;
     if ((verdict !== FAIL && verdict !== CANNOT_SAY) || !(d > 0)) continue;
     // Neighbours share a hole: only the largest of a circle's width is drawn.
     let largest = true;
