@@ -29,6 +29,37 @@ fn a_stalled_and_a_flooding_viewer_change_nothing() {
 }
 
 #[test]
+fn a_viewer_that_takes_nothing_is_dropped_and_counted_and_the_others_are_served_on() {
+    let folder = Folder::with_dive();
+    let serving = Serving::start(&folder, &["replay", "dive.mcap", ANY]);
+    // Connected, and never read from again.
+    let _stalled = Viewer::connect(&serving, "", &[]).unwrap();
+    let mut viewer = Viewer::connect(&serving, "", &[]).unwrap();
+    viewer.until("the end of the log", |viewer| viewer.state["playback"]["paused"] == true);
+    viewer.send(&serde_json::json!({"do": "play", "command": "pause"}));
+    let figure = |name: &str| {
+        let (_, figures) = serving.ask("GET", "/metrics", &[], "");
+        let line = figures.lines().find_map(|line| line.strip_prefix(name)?.strip_prefix(' '));
+        line.unwrap().parse::<u64>().unwrap()
+    };
+    // Each jump is all of the dive anew, so that what the machine keeps for a viewer fills; then ten seconds pass.
+    let to_s = viewer.state["playback"]["to_s"].as_f64().unwrap();
+    for jump in 0..600 {
+        let to_s = to_s - f64::from(jump % 2) * 2.0;
+        viewer.send(&serde_json::json!({"do": "play", "command": "seek", "to_s": to_s}));
+        viewer.until_type("ready");
+        std::thread::sleep(std::time::Duration::from_millis(60));
+        if jump % 20 == 19 && figure("headrace_page_stalled_total") > 0 {
+            break;
+        }
+    }
+    assert_eq!((figure("headrace_page_stalled_total"), figure("headrace_page_viewers")), (1, 1));
+    viewer.send(&serde_json::json!({"do": "play", "command": "end"}));
+    viewer.until_type("end");
+    serving.end();
+}
+
+#[test]
 fn a_taken_port_is_named_and_the_next_is_used() {
     let folder = Folder::with_dive();
     let (taken, port) = loop {
