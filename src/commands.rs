@@ -26,7 +26,7 @@ use crate::files;
 use crate::followers::{Followers, Joining};
 use crate::interrupt;
 use crate::live;
-use crate::output::{say, show};
+use crate::output::{put_line, say, show};
 use crate::outputs::{self, Kind};
 use crate::page::{self, Of, Served};
 use crate::play::{self, Directors, Playing};
@@ -101,7 +101,7 @@ fn demo_page(
         is_playback: false,
         console,
     };
-    let served = page::serve(&args.page, of, in_lines)?;
+    let served = page::serve(&args.page, of, in_lines.then_some(&mut put_line))?;
     if !args.no_open {
         served.open();
     }
@@ -142,7 +142,11 @@ pub(crate) fn run(args: &Run) -> Result<u8, Failure> {
         is_playback: false,
         console: None,
     };
-    let served = if is_served { page::serve(&args.page, of, watch.shows_lines()) } else { None };
+    let served = if is_served {
+        page::serve(&args.page, of, watch.shows_lines().then_some(&mut put_line))
+    } else {
+        None
+    };
     if let Some(served) = &served {
         watch = watch.followed_by(served.follower(&dive.armed));
     }
@@ -245,7 +249,7 @@ fn replay_page(
         is_playback: true,
         console: None,
     };
-    page::serve(&args.page, of, in_lines)
+    page::serve(&args.page, of, in_lines.then_some(&mut put_line))
 }
 
 /// Checks that the report can be written, and isn't one of the inputs.

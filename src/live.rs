@@ -19,7 +19,6 @@ use crate::dive::{Clock, Dive, Recording, assemble_followed};
 use crate::failure::Failure;
 use crate::followers::{Followers, Joining};
 use crate::interrupt;
-use crate::output::say;
 use crate::outputs::{self, Kind};
 use crate::page::{self, Of, Served};
 use crate::report_output::finish;
@@ -50,15 +49,14 @@ pub(crate) fn run(args: &Run, text: &str, vehicle: &VehicleConfig) -> Result<u8,
     let until = args.duration.map(|seconds| begun + DurNs::from_secs_f64(seconds));
     let show = followers.show(args.output.show());
     let mut watch = Watch::new(show).live();
-    let served =
-        is_served.then(|| live_page(args, vehicle, &logs, (dive.console(), watch.shows_lines()))).flatten();
+    let served = is_served.then(|| live_page(args, vehicle, &logs, dive.console(), &mut watch)).flatten();
     if let Some(served) = &served {
         watch = watch.followed_by(served.follower(&dive.armed));
     }
     let begun_text = begun_text(args, &logs, vehicle);
     if show == Show::Lines {
         for line in broken(&begun_text, Screen::columns()) {
-            say(&line);
+            watch.say(&line);
         }
     }
     let joining =
@@ -96,7 +94,8 @@ fn live_page(
     args: &Run,
     vehicle: &VehicleConfig,
     logs: &[PathBuf],
-    (console, in_lines): (Option<ConsolePort>, bool),
+    console: Option<ConsolePort>,
+    watch: &mut Watch,
 ) -> Option<Served> {
     let (monotonic, utc) = headrace_ports::clock_anchor();
     let log = logs.first().filter(|_| !args.no_record).map(|log| log.display().to_string());
@@ -111,7 +110,9 @@ fn live_page(
         is_playback: false,
         console,
     };
-    page::serve(&args.page, of, in_lines)
+    let shows_lines = watch.shows_lines();
+    let mut say = |lines: &str| lines.lines().for_each(|line| watch.say(line));
+    page::serve(&args.page, of, if shows_lines { Some(&mut say) } else { None })
 }
 
 /// What is said of a dive that begins.

@@ -2,6 +2,7 @@
 
 use std::fmt::{self, Write as _};
 use std::io::{BufWriter, Write};
+use std::sync::atomic::{AtomicBool, Ordering};
 
 use headrace_config::plain::{lines, one_line};
 use headrace_monitor::report::Report;
@@ -10,13 +11,29 @@ use crate::failure::Failure;
 use crate::terminal;
 use crate::transient;
 
+/// Whether the terminal has been given up: nothing is written to it any more.
+static GIVEN_UP: AtomicBool = AtomicBool::new(false);
+
+/// From now on stdout is left alone: a terminal that doesn't read must not keep a program from its end.
+pub(crate) fn give_up() {
+    GIVEN_UP.store(true, Ordering::Relaxed);
+}
+
 /// Writes `text` as it is: lines made fit already, and codes for the terminal. Errors are only logged: a closed pipe or a lost
-/// session doesn't end a dive.
+/// session doesn't end a dive. Nothing is written once the terminal has been given up.
 pub(crate) fn put(text: &str) {
+    if GIVEN_UP.load(Ordering::Relaxed) {
+        return;
+    }
     let mut stdout = std::io::stdout().lock();
     if let Err(error) = stdout.write_all(text.as_bytes()).and_then(|()| stdout.flush()) {
         tracing::debug!(%error, "stdout is closed");
     }
+}
+
+/// The same with a line end.
+pub(crate) fn put_line(text: &str) {
+    put(&format!("{text}\n"));
 }
 
 /// Writes lines that may hold text from outside.

@@ -38,7 +38,6 @@ use crate::dive::CLOCK_ANCHOR;
 use crate::files;
 use crate::follower::Follower;
 use crate::logging::complain;
-use crate::output::put;
 use crate::report_output::exit_code;
 
 /// Interval at which an interruption is looked for while a replay stands still.
@@ -79,10 +78,10 @@ pub(crate) fn is_wanted(args: &PageArgs, is_watched: bool) -> bool {
     !args.no_page && (args.page.is_some() || is_watched && std::io::stdout().is_terminal())
 }
 
-/// Serves the page of a dive. What is in its way is told on stderr, and the dive goes on without it. `in_lines` tells the address
+/// Serves the page of a dive. What is in its way is told on stderr, and the dive goes on without it. `lines` takes the address
 /// among the dive's lines.
-pub(crate) fn serve(args: &PageArgs, of: Of<'_>, in_lines: bool) -> Option<Served> {
-    match start(args, of, in_lines) {
+pub(crate) fn serve(args: &PageArgs, of: Of<'_>, lines: Option<&mut dyn FnMut(&str)>) -> Option<Served> {
+    match start(args, of, lines) {
         Ok(served) => Some(served),
         Err(why) => {
             complain(&format!("headrace: {}; the dive goes on without the page", one_line(&why)));
@@ -91,7 +90,7 @@ pub(crate) fn serve(args: &PageArgs, of: Of<'_>, in_lines: bool) -> Option<Serve
     }
 }
 
-fn start(args: &PageArgs, of: Of<'_>, in_lines: bool) -> Result<Served, String> {
+fn start(args: &PageArgs, of: Of<'_>, lines: Option<&mut dyn FnMut(&str)>) -> Result<Served, String> {
     let address = args.page.unwrap_or(SocketAddr::new([127, 0, 0, 1].into(), PORT));
     let tokens = tokens(args, address)?;
     let tls = args.page_cert.clone().zip(args.page_key.clone());
@@ -112,7 +111,8 @@ fn start(args: &PageArgs, of: Of<'_>, in_lines: bool) -> Result<Served, String> 
     for port in page.taken() {
         complain(&format!("headrace: port {port} is taken; the page is on {}", page.address().port()));
     }
-    tell(&page, tokens.as_ref(), in_lines);
+    let told = told(&page, tokens.as_ref());
+    lines.unwrap_or(&mut complain)(told.trim_end());
     Ok(Served { page, span, is_playback, waits, commands })
 }
 
@@ -156,8 +156,8 @@ fn hosts(args: &PageArgs) -> Vec<String> {
     own.chain([BLUEOS.to_owned()]).chain(args.page_host.iter().cloned()).collect()
 }
 
-/// Tells where the page is; its tokens only on a terminal, and never to the log.
-fn tell(page: &Page, tokens: Option<&Tokens>, in_lines: bool) {
+/// Where the page is; its tokens only for a terminal, and never for the log.
+fn told(page: &Page, tokens: Option<&Tokens>) -> String {
     let (scheme, at) = (page.scheme(), page.address());
     let host = if at.ip().is_unspecified() { own_address(at.ip()) } else { at.ip() };
     let base = format!("{scheme}://{}", SocketAddr::new(host, at.port()));
@@ -169,7 +169,7 @@ fn tell(page: &Page, tokens: Option<&Tokens>, in_lines: bool) {
         lines = format!("page   {operator}  (operator)\n       {}  (viewer)\n", login(&tokens.viewer));
         lines.push_str(&qr(&operator).map(|code| format!("{code}\n")).unwrap_or_default());
     }
-    if in_lines { put(&lines) } else { complain(lines.trim_end()) }
+    lines
 }
 
 /// The address by which others reach this machine. Nothing is sent.

@@ -5,7 +5,7 @@ use std::time::Duration;
 
 use crossbeam::channel::{Receiver, RecvTimeoutError, Sender, TrySendError, bounded};
 
-use crate::output::put;
+use crate::output::{give_up, put};
 use crate::{terminal, transient};
 
 /// Lines that may wait. A dive has a line a second, and some for each stretch.
@@ -76,6 +76,7 @@ impl Printer {
         let stuck = self.lossy && self.done.recv_timeout(ENDS_WITHIN) == Err(RecvTimeoutError::Timeout);
         if stuck {
             self.thread = None;
+            give_up();
             tracing::warn!("the terminal doesn't read: its last lines aren't shown");
         }
         if let Some(thread) = self.thread.take()

@@ -89,6 +89,11 @@ impl Watch {
         self.show == Show::Lines
     }
 
+    /// Says a line in its turn.
+    pub(crate) fn say(&mut self, line: &str) {
+        self.print(one_line(line).into_owned());
+    }
+
     /// A dive that can't wait: what the terminal has no room for is dropped.
     pub(crate) fn live(mut self) -> Self {
         if let Some(printer) = &mut self.printer {

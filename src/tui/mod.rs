@@ -32,6 +32,7 @@ use headrace_replay::log::RecordingEvent;
 use crate::failure::Failure;
 use crate::follower::Follower;
 use crate::interrupt;
+use crate::output::give_up;
 use alerts::Desk;
 use artist::Artist;
 use hold::Hold;
@@ -168,6 +169,7 @@ impl Tui {
         let stuck = self.done.recv_timeout(ENDS_WITHIN) == Err(RecvTimeoutError::Timeout);
         if stuck {
             self.thread = None;
+            give_up();
             hold::restore_settings();
         }
         if let Some(thread) = self.thread.take()

@@ -1,13 +1,61 @@
 //! A program on a pseudoterminal of some width, and what it wrote there.
 
 use std::fs::{File, OpenOptions};
-use std::io::Read;
+use std::io::{Read, Write as _};
+use std::os::fd::AsRawFd as _;
 use std::process::{Child, Command};
 use std::sync::mpsc::{Receiver, sync_channel};
 use std::time::Duration;
 
+use rustix::event::{PollFd, PollFlags, Timespec, poll};
+use rustix::fs::{Mode, OFlags};
 use rustix::pty::{OpenptFlags, grantpt, openpt, ptsname, unlockpt};
 use rustix::termios::{Winsize, tcgetwinsize, tcsetwinsize};
+
+/// A terminal of which only a test reads.
+pub struct Terminal {
+    reader: File,
+    end: File,
+}
+
+impl Terminal {
+    /// Opens one of 40 lines and so many columns.
+    pub fn open(columns: u16) -> Self {
+        let master = openpt(OpenptFlags::RDWR | OpenptFlags::NOCTTY).unwrap();
+        grantpt(&master).unwrap();
+        unlockpt(&master).unwrap();
+        let name = ptsname(&master, Vec::new()).unwrap().into_string().unwrap();
+        let end = OpenOptions::new().read(true).write(true).open(name).unwrap();
+        tcsetwinsize(&end, Winsize { ws_row: 40, ws_col: columns, ws_xpixel: 0, ws_ypixel: 0 }).unwrap();
+        Self { reader: File::from(master), end }
+    }
+
+    /// The program's end.
+    pub fn end(&self) -> File {
+        self.end.try_clone().unwrap()
+    }
+
+    /// Reads until a text comes. Panics after a minute in which nothing comes.
+    pub fn read_until(&mut self, text: &str) {
+        let (mut read, mut bytes) = (Vec::new(), [0; 4096]);
+        while !String::from_utf8_lossy(&read).contains(text) {
+            let mut waits = [PollFd::new(&self.reader, PollFlags::IN)];
+            let within = Timespec { tv_sec: 60, tv_nsec: 0 };
+            assert_eq!(poll(&mut waits, Some(&within)), Ok(1), "{}", String::from_utf8_lossy(&read));
+            let count = self.reader.read(&mut bytes).unwrap();
+            read.extend_from_slice(&bytes[..count]);
+        }
+    }
+
+    /// Writes to its end until it takes nothing more: from then on who writes there waits.
+    pub fn fill(&self) {
+        // A file of its own: whether it waits is the open file's, not the terminal's.
+        let name = format!("/proc/self/fd/{}", self.end.as_raw_fd());
+        let flags = OFlags::RDWR | OFlags::NOCTTY | OFlags::NONBLOCK;
+        let mut end = File::from(rustix::fs::open(name, flags, Mode::empty()).unwrap());
+        while end.write(b"x").is_ok() {}
+    }
+}
 
 /// A program that runs on a pseudoterminal; ended with it.
 pub struct OnTerminal {

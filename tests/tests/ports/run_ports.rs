@@ -2,10 +2,14 @@
 //! would be right, the dive goes on with what there is, and exit codes are the right ones.
 
 use headrace_tests::faulty::{End, Fault, Faulty, Healthy, Wire};
+use headrace_tests::pty::Terminal;
 use headrace_tests::rig::{COUNTER, HEAD, HEADING, emulated};
 use headrace_tests::{Folder, raw_messages};
 use mcap::MessageStream;
 use serde_json::Value;
+use std::time::Duration;
+
+use crate::rehearsal::Running;
 
 /// Sensors whose lines are none, each wrong in another way.
 const WRONG: [(&str, &str, &str); 7] = [
@@ -126,6 +130,41 @@ fn a_dive_without_any_sensor_fails_and_says_what_each_lacks() {
     for (id, ..) in ABSENT {
         assert!(answer.stdout.contains(&format!("SENSOR     {id} closed: ")), "{}", answer.stdout);
     }
+}
+
+/// Waits for the end of a dive whose terminal takes nothing: ten times as long as the program waits for it.
+fn ends_and_reports(mut run: Running, folder: &Folder) {
+    let code = (0..300).find_map(|_| {
+        std::thread::sleep(Duration::from_millis(100));
+        run.0.try_wait().unwrap()
+    });
+    assert_eq!(code.expect("it doesn't end").code(), Some(1));
+    assert_eq!(report(folder)["sources"].as_array().unwrap().len(), ABSENT.len());
+}
+
+#[test]
+fn a_terminal_that_takes_nothing_from_the_start_keeps_no_dive_from_its_end() {
+    let folder = Folder::new();
+    folder.write("vehicle.toml", vehicle(&ABSENT));
+    let full = Terminal::open(100);
+    full.fill();
+    let mut run = headrace_tests::program();
+    run.args(RUN).arg("--page=127.0.0.1:0").current_dir(folder.path("")).env("TERM", "xterm");
+    let run = run.stdin(full.end()).stdout(full.end()).stderr(full.end()).spawn().unwrap();
+    ends_and_reports(Running(run), &folder);
+}
+
+#[test]
+fn nor_does_one_that_stops_while_it_shows_the_whole_page() {
+    let folder = Folder::new();
+    folder.write("vehicle.toml", vehicle(&ABSENT));
+    let mut terminal = Terminal::open(100);
+    let mut run = headrace_tests::program();
+    run.args(RUN).arg("--tui").current_dir(folder.path("")).env("TERM", "xterm");
+    let run = run.stdin(terminal.end()).stdout(terminal.end()).stderr(terminal.end()).spawn().unwrap();
+    terminal.read_until("ALERTS");
+    terminal.fill();
+    ends_and_reports(Running(run), &folder);
 }
 
 #[test]
