@@ -22,6 +22,8 @@ pub enum LossKind {
     Checksum,
     /// A chunk that doesn't unpack, or contains anything but records. None of it is delivered.
     Contents,
+    /// A chunk, or messages outside chunks, that the medium doesn't give: its error.
+    Unreadable(String),
     /// A chunk with an unsupported compression.
     Compression(String),
     /// A chunk or attachment larger than the limit for reading into memory.
@@ -161,6 +163,7 @@ impl fmt::Display for LossKind {
             Self::Framing => out.write_str("bytes that are no records"),
             Self::Checksum => out.write_str("a chunk that fails its checksum"),
             Self::Contents => out.write_str("a chunk that does not unpack"),
+            Self::Unreadable(error) => write!(out, "the medium doesn't give them: {error}"),
             Self::Compression(name) => write!(out, "a chunk compressed as {name:?}; zstd and lz4 are known"),
             Self::TooLarge { limit } => {
                 write!(out, "larger than the {limit} bytes that are read into memory")

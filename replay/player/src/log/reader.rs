@@ -272,7 +272,7 @@ impl<R: Read + Seek> LogReader<R> {
 
     /// The next message, or `None` at the end.
     ///
-    /// Errors: an I/O error; damage is not an error.
+    /// Errors: an I/O error at the end; damage is not an error, nor what the medium doesn't give.
     #[expect(
         clippy::should_implement_trait,
         reason = "messages borrow from the reader, which no Iterator allows"
@@ -377,12 +377,13 @@ impl<R: Read + Seek> LogReader<R> {
         let mut batch = self.merge.empty_batch();
         let mut found = Vec::new();
         let Some(span) = self.spans.get(number).copied() else { return Ok(()) };
-        let chunk = span.chunk(&mut self.file)?;
-        match &chunk {
-            Some(place) => read_chunk(&mut self.file, place, &mut batch, &mut self.channels, &mut found)?,
-            None if span.piece == Piece::Run => read_run(&mut self.file, &span, &mut batch)?,
-            // The file has changed since the scan.
-            None => found.push(LossKind::Contents),
+        match self.fill(&span, &mut batch, &mut found) {
+            // What lies elsewhere on the medium may be sound.
+            Err(LogError::Read { source, .. }) => {
+                batch.clear();
+                found = vec![LossKind::Unreadable(source.to_string())];
+            }
+            filled => filled?,
         }
         place_entries(&mut batch, &self.channels, &self.repeated, &mut found);
         for kind in found {
@@ -393,6 +394,17 @@ impl<R: Read + Seek> LogReader<R> {
         let times = (times.clone().min().unwrap_or(0), times.max().unwrap_or(0));
         self.correct(number, times);
         self.merge.add(number, batch, next);
+        Ok(())
+    }
+
+    /// Reads the messages of a piece.
+    fn fill(&mut self, span: &Span, batch: &mut Batch, found: &mut Vec<LossKind>) -> Result<(), LogError> {
+        match &span.chunk(&mut self.file)? {
+            Some(place) => read_chunk(&mut self.file, place, batch, &mut self.channels, found)?,
+            None if span.piece == Piece::Run => read_run(&mut self.file, span, batch)?,
+            // The file has changed since the scan.
+            None => found.push(LossKind::Contents),
+        }
         Ok(())
     }
 

@@ -63,6 +63,70 @@ fn a_log_cut_anywhere_gives_what_was_before_the_cut() {
     }
 }
 
+/// A medium of which some bytes can't be read once it is worn.
+struct Worn<'a> {
+    bytes: std::io::Cursor<&'a [u8]>,
+    bad: core::ops::Range<usize>,
+    is_worn: std::rc::Rc<core::cell::Cell<bool>>,
+}
+
+impl std::io::Read for Worn<'_> {
+    fn read(&mut self, into: &mut [u8]) -> std::io::Result<usize> {
+        let at = usize::try_from(self.bytes.position()).unwrap();
+        // Up to the bad bytes it reads.
+        let len = if at < self.bad.start { into.len().min(self.bad.start - at) } else { into.len() };
+        if self.is_worn.get() && self.bad.contains(&at) {
+            return Err(std::io::Error::from_raw_os_error(5));
+        }
+        self.bytes.read(&mut into[..len])
+    }
+}
+
+impl std::io::Seek for Worn<'_> {
+    fn seek(&mut self, to: std::io::SeekFrom) -> std::io::Result<u64> {
+        self.bytes.seek(to)
+    }
+}
+
+#[test]
+fn what_the_medium_does_not_give_is_a_loss_and_the_rest_is_read() {
+    let (bytes, seen, places) = log();
+    for (chunk, place) in places.iter().enumerate() {
+        let end = record_after(&bytes, *place);
+        for at in [*place, (*place + end) / 2, end - 1] {
+            let is_worn = std::rc::Rc::default();
+            let medium = Worn {
+                bytes: std::io::Cursor::new(&bytes),
+                bad: at..at + 1,
+                is_worn: std::rc::Rc::clone(&is_worn),
+            };
+            let mut reader = LogReader::new(medium, "worn".to_owned()).unwrap();
+            let before = reader.place();
+            is_worn.set(true);
+            // A chunk is known by its first kilobyte, whatever length it claims.
+            let is_lost =
+                |other: usize| other == chunk || (places[other]..places[other] + 9 + 1024).contains(&at);
+            let lost: Vec<_> = (0..CHUNKS).filter(|other| is_lost(*other)).collect();
+            let left: Vec<_> = seen
+                .iter()
+                .filter(|(_, at, ..)| !lost.iter().any(|lost| at / 100 == *lost as u64))
+                .cloned()
+                .collect();
+            for again in 0..2 {
+                let got = read_all(&mut reader);
+                assert_eq!(got, left, "chunk {chunk}, byte {at}");
+                let losses = reader.losses().to_vec();
+                let is_told = |loss: &Loss| matches!(&loss.kind, LossKind::Unreadable(why) if why.contains("os error 5"));
+                assert!(!losses.is_empty() && losses.iter().all(is_told), "{losses:?}");
+                missing_are_covered(&got, &seen, &losses);
+                if again == 0 {
+                    reader.go_to(&before).unwrap();
+                }
+            }
+        }
+    }
+}
+
 /// A log like that of a long dive: long packets, results, chunks of some kilobytes.
 fn long_log() -> (Vec<u8>, Vec<Seen>) {
     let mut log = LogWriter::new(Vec::new(), &header(true)).unwrap();

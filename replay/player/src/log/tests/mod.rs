@@ -51,7 +51,7 @@ fn open(bytes: &[u8]) -> LogReader<Cursor<Vec<u8>>> {
 }
 
 /// All messages of a reader.
-fn read_all(reader: &mut LogReader<Cursor<Vec<u8>>>) -> Vec<Seen> {
+fn read_all<R: std::io::Read + std::io::Seek>(reader: &mut LogReader<R>) -> Vec<Seen> {
     let mut seen = Vec::new();
     while let Some(message) = reader.next().unwrap() {
         let kind = match message.kind {
