@@ -16,6 +16,7 @@ use super::LogError;
 use super::fields::{Fields, MessageHead};
 use super::format::LIBRARY;
 use super::limits::map_cost;
+use super::medium::Medium;
 
 /// A greater length of a record is taken as damage, except for chunks and attachments.
 const MAX_RECORD_BYTES: u64 = 256 << 20;
@@ -28,28 +29,32 @@ const CHUNK_HEAD_BYTES: u64 = 40;
 
 /// Random access to a log's bytes.
 pub(super) struct LogFile<R> {
-    input: BufReader<R>,
+    input: BufReader<Medium<R>>,
     at: u64,
-    len: u64,
     name: String,
 }
 
 impl<R: Read + Seek> LogFile<R> {
-    pub(super) fn new(mut input: R, name: String) -> Result<Self, LogError> {
-        let len = input.seek(std::io::SeekFrom::End(0)).and_then(|len| input.rewind().map(|()| len));
-        let len = len.map_err(|source| LogError::Read { name: name.clone(), offset: 0, source })?;
-        Ok(Self { input: BufReader::new(input), at: 0, len, name })
+    pub(super) fn new(input: R, name: String) -> Result<Self, LogError> {
+        let medium = Medium::new(input);
+        let medium = medium.map_err(|source| LogError::Read { name: name.clone(), offset: 0, source })?;
+        Ok(Self { input: BufReader::new(medium), at: 0, name })
     }
 
     pub(super) fn len(&self) -> u64 {
-        self.len
+        self.medium().len()
+    }
+
+    /// What the file lies on.
+    pub(super) fn medium(&self) -> &Medium<R> {
+        self.input.get_ref()
     }
 
     pub(super) fn name(&self) -> &str {
         &self.name
     }
 
-    /// Reads from `at` until `into` is full or the file ends; returns the number of bytes.
+    /// Reads from `at` until `into` is full or the file ends; returns the number of bytes. What the medium fails to give is zeros.
     pub(super) fn read_at(&mut self, at: u64, into: &mut [u8]) -> Result<usize, LogError> {
         let mut done = 0;
         let mut read = || {
@@ -72,7 +77,7 @@ impl<R: Read + Seek> LogFile<R> {
 
     /// Up to `len` bytes at `at`, fewer at the end of the file. The caller bounds `len`.
     pub(super) fn bytes_at(&mut self, at: u64, len: u64) -> Result<Vec<u8>, LogError> {
-        let len = len.min(self.len.saturating_sub(at));
+        let len = len.min(self.len().saturating_sub(at));
         let mut bytes = vec![0; usize::try_from(len).unwrap_or(0)];
         let done = self.read_at(at, &mut bytes)?;
         bytes.truncate(done);

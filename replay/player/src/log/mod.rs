@@ -39,6 +39,7 @@ pub mod format;
 mod framing;
 mod limits;
 mod loss;
+mod medium;
 mod merge;
 mod part;
 mod queue;

@@ -272,7 +272,7 @@ impl<R: Read + Seek> LogReader<R> {
 
     /// The next message, or `None` at the end.
     ///
-    /// Errors: an I/O error at the end; damage is not an error, nor what the medium doesn't give.
+    /// Errors: an I/O error that isn't of some of the log's bytes; damage is not an error, nor what the medium fails to give.
     #[expect(
         clippy::should_implement_trait,
         reason = "messages borrow from the reader, which no Iterator allows"
@@ -377,13 +377,11 @@ impl<R: Read + Seek> LogReader<R> {
         let mut batch = self.merge.empty_batch();
         let mut found = Vec::new();
         let Some(span) = self.spans.get(number).copied() else { return Ok(()) };
-        match self.fill(&span, &mut batch, &mut found) {
-            // What lies elsewhere on the medium may be sound.
-            Err(LogError::Read { source, .. }) => {
-                batch.clear();
-                found = vec![LossKind::Unreadable(source.to_string())];
-            }
-            filled => filled?,
+        self.fill(&span, &mut batch, &mut found)?;
+        if self.file.medium().has_failed_within(&(span.at..span.end)) {
+            // Not all is covered by checksums.
+            batch.clear();
+            found = vec![LossKind::Unreadable(self.file.medium().error().to_owned())];
         }
         place_entries(&mut batch, &self.channels, &self.repeated, &mut found);
         for kind in found {

@@ -86,7 +86,8 @@ pub(super) fn scan<R: Read + Seek>(file: &mut LogFile<R>) -> Result<(Scan, Chann
     if first != mcap::MAGIC {
         // A log whose first bytes are damaged still has its header record after them.
         if !matches!(look(file, magic_len)?, Found::Record(Frame { item: Item::Header { .. }, .. })) {
-            return Err(not_mcap(file, &first));
+            let unread = file.medium().has_failed_within(&(0..magic_len)).then(|| unread(file));
+            return Err(unread.unwrap_or_else(|| not_mcap(file, &first)));
         }
         scan.lose(LossKind::Framing, 0..magic_len);
     }
@@ -97,6 +98,10 @@ pub(super) fn scan<R: Read + Seek>(file: &mut LogFile<R>) -> Result<(Scan, Chann
         scan.look_into_chunks(file)?;
     }
     scan.miss_parts();
+    for failed in file.medium().failed() {
+        let kind = LossKind::Unreadable(file.medium().error().to_owned());
+        scan.losses.extend(kind, failed.start, failed.end - failed.start);
+    }
     date_losses(&mut scan.losses, &scan.spans, false);
     for loss in core::mem::take(&mut scan.stated) {
         scan.losses.push(loss);
@@ -118,6 +123,12 @@ pub(super) fn beyond(what: Many) -> LossKind {
         Many::AttachmentBytes => MAX_ATTACHMENT_BYTES,
     };
     LossKind::Beyond { what, limit }
+}
+
+/// The beginning of the log can't be read.
+fn unread<R: Read + Seek>(file: &LogFile<R>) -> LogError {
+    let source = std::io::Error::other(file.medium().error().to_owned());
+    LogError::Read { name: file.name().to_owned(), offset: 0, source }
 }
 
 fn not_mcap<R: Read + Seek>(file: &LogFile<R>, first: &[u8]) -> LogError {

@@ -1,0 +1,89 @@
+//! A log's medium, some of which may fail to be read.
+
+use std::io::{Error, ErrorKind, Read, Result, Seek, SeekFrom};
+use std::ops::Range;
+
+/// What is taken for unreadable together: a sector of a disk.
+const SECTOR_BYTES: u64 = 512;
+/// Ranges that are told apart; more are taken together with what lies between them.
+const MOST_RANGES: usize = 1024;
+
+/// Reads zeros in place of what the medium fails to give, and keeps where that was: what lies elsewhere may be sound.
+pub(super) struct Medium<R> {
+    input: R,
+    at: u64,
+    len: u64,
+    failed: Vec<Range<u64>>,
+    /// The first error.
+    error: String,
+}
+
+impl<R: Read + Seek> Medium<R> {
+    /// Errors: the length can't be had.
+    pub(super) fn new(mut input: R) -> Result<Self> {
+        let len = input.seek(SeekFrom::End(0))?;
+        input.rewind()?;
+        Ok(Self { input, at: 0, len, failed: Vec::new(), error: String::new() })
+    }
+
+    pub(super) fn len(&self) -> u64 {
+        self.len
+    }
+
+    /// Whether any of these bytes couldn't be read.
+    pub(super) fn has_failed_within(&self, part: &Range<u64>) -> bool {
+        self.failed.iter().any(|failed| failed.start < part.end && part.start < failed.end)
+    }
+
+    /// What couldn't be read so far, as far as it was tried.
+    pub(super) fn failed(&self) -> &[Range<u64>] {
+        &self.failed
+    }
+
+    /// The first error.
+    pub(super) fn error(&self) -> &str {
+        &self.error
+    }
+
+    fn fail(&mut self, error: &Error, part: Range<u64>) {
+        if self.error.is_empty() {
+            self.error = error.to_string();
+        }
+        let is_full = self.failed.len() >= MOST_RANGES;
+        match self.failed.last_mut() {
+            Some(last) if last.end == part.start || is_full => {
+                (last.start, last.end) = (last.start.min(part.start), last.end.max(part.end));
+            }
+            _ => self.failed.push(part),
+        }
+    }
+}
+
+impl<R: Read + Seek> Read for Medium<R> {
+    fn read(&mut self, into: &mut [u8]) -> Result<usize> {
+        let error = match self.input.read(into) {
+            Err(error) if error.kind() != ErrorKind::Interrupted => error,
+            other => {
+                self.at += other.as_ref().map_or(0, |read| *read as u64);
+                return other;
+            }
+        };
+        let end = ((self.at / SECTOR_BYTES + 1) * SECTOR_BYTES).min(self.len);
+        let zeros = into.len().min(usize::try_from(end.saturating_sub(self.at)).unwrap_or(0));
+        if zeros == 0 {
+            return Err(error);
+        }
+        into.iter_mut().take(zeros).for_each(|byte| *byte = 0);
+        let part = self.at..self.at + zeros as u64;
+        self.at = self.input.seek(SeekFrom::Start(part.end))?;
+        self.fail(&error, part);
+        Ok(zeros)
+    }
+}
+
+impl<R: Seek> Seek for Medium<R> {
+    fn seek(&mut self, to: SeekFrom) -> Result<u64> {
+        self.at = self.input.seek(to)?;
+        Ok(self.at)
+    }
+}
