@@ -8,6 +8,7 @@ mod causes;
 mod confidence;
 mod dives;
 mod faults;
+mod far_and_long;
 mod field;
 mod flags;
 mod interventions;
