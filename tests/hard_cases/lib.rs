@@ -39,20 +39,24 @@ fn tell(name: &str, error: f64, bound: f64, condition: Option<f64>) {
     }
     let row = row(name);
     let told: Vec<&str> = row.split('|').map(str::trim).skip(3).take(3).collect();
-    assert_eq!(told, figures, "docs/hard-cases.md tells other figures of {name}; tests/hard_cases/run makes it anew");
+    assert_eq!(
+        told, figures,
+        "docs/hard-cases.md tells other figures of {name}; tests/hard_cases/run makes it anew"
+    );
 }
 
 /// The page's row of a case.
 #[track_caller]
 fn row(name: &str) -> String {
     let list = read("tests/hard_cases/list");
-    let fields = list.lines().map(|line| line.split('|').map(str::trim));
-    let case = fields.filter_map(|mut fields| (fields.next() == Some(name)).then(|| fields.next()).flatten()).next();
+    let mut fields = list.lines().map(|line| line.split('|').map(str::trim));
+    let case = fields.find_map(|mut fields| (fields.next() == Some(name)).then(|| fields.next()).flatten());
     let case = case.unwrap_or_else(|| panic!("tests/hard_cases/list has no case {name}"));
     let start = format!("| {case} |");
     let page = read("docs/hard-cases.md");
     let row = page.lines().find(|line| line.starts_with(&start));
-    row.unwrap_or_else(|| panic!("docs/hard-cases.md has no row {case:?}; tests/hard_cases/run makes it")).to_owned()
+    row.unwrap_or_else(|| panic!("docs/hard-cases.md has no row {case:?}; tests/hard_cases/run makes it"))
+        .to_owned()
 }
 
 #[track_caller]

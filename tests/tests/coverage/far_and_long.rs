@@ -13,6 +13,8 @@ const ROUNDS: usize = 100;
 /// Between these places, m.
 const FROM_M: f64 = 5.0;
 const TO_M: f64 = 9.0;
+/// In the end the vehicle goes on to here, m.
+const END_M: f64 = 16.0;
 /// Bounds of a hole are no farther apart than full cells thin, m.
 const THINNED_M: f64 = 0.04;
 
@@ -27,7 +29,7 @@ fn scene(parked_s: u32, rounds: usize) -> String {
             writeln!(text, "[[trajectory.waypoints]]\nchainage_m = {chainage_m}\nspeed_mps = 0.3").unwrap();
         }
     }
-    text + "[[trajectory.waypoints]]\nchainage_m = 16\nspeed_mps = 0.1\n"
+    text + &format!("[[trajectory.waypoints]]\nchainage_m = {END_M}\nspeed_mps = 0.1\n")
 }
 
 /// A dive, and bytes of samples every minute.
@@ -49,7 +51,9 @@ fn an_hour_parked_and_a_hundred_rounds_change_nothing() {
     let (long, used) = dive(PARKED_S, ROUNDS);
     assert_eq!(once.sections.len(), long.sections.len());
     let (mut passed, mut off_m) = (0, [0.0_f64; 2]);
-    for (a, b) in once.sections.iter().zip(&long.sections) {
+    // Not where the dive begins and ends: there heads have been in part.
+    let pairs = once.sections.iter().zip(&long.sections);
+    for (a, b) in pairs.filter(|(a, _)| (FROM_M..END_M - 1.0).contains(&a.report.start_m)) {
         assert_eq!(a.report.verdict, b.report.verdict, "section {}", a.report.start_m);
         passed += u32::from(a.report.verdict == "pass");
         let (Some(least_m), Some(most_m)) = (b.report.hole_least_m, b.report.hole_most_m) else {
@@ -64,13 +68,13 @@ fn an_hour_parked_and_a_hundred_rounds_change_nothing() {
         }
     }
     assert!(passed > 30, "{passed} sections pass");
-    println!("D off by {off_m:?} m; {used:?} bytes");
+    println!("{passed} sections pass; D off by {off_m:?} m; {used:?} bytes");
     assert!(off_m[1] <= off_m[0] + 0.01, "{off_m:?}");
     found("loop.rounds", off_m[1], 0.02);
-    // By minutes: after a third of the hour, at its end; after a third of the rounds, at their end.
+    // By minutes: after a third of the hour, and at its end; after three quarters of the rounds, and at their end.
     let parked = PARKED_S as usize / 60;
     let rounds = used.len() - 3 - parked;
     let grown = |from: usize, to: usize| used[to] as f64 / used[from] as f64 - 1.0;
     found("loop.parked_memory", grown(parked / 3, parked - 2), 0.05);
-    found("loop.rounds_memory", grown(parked + rounds / 2, parked + rounds), 0.1);
+    found("loop.rounds_memory", grown(parked + rounds * 3 / 4, parked + rounds), 0.05);
 }

@@ -2,7 +2,7 @@
 
 use std::fmt::Write as _;
 
-use headrace_fusion::direct::DirectNavigation;
+use headrace_geometry::frames::{Tunnel, Vec3};
 use headrace_geometry::math;
 use headrace_hard_cases::found;
 use headrace_tests::scenes;
@@ -13,7 +13,8 @@ const SCENE: &str = "vehicle = \"vita2-2.toml\"\n[effects]\nmotion_within_turn =
 
 /// Out of the horizontal and back, at 0.05 m/s: nose down and over to 135 degrees, up and over, beyond 180 to the left, and to the right.
 fn way() -> String {
-    let turns = [(40.0, 0.0, 0.0), (100.0, 135.0, 0.0), (160.0, 0.0, 0.0), (220.0, -135.0, 0.0), (280.0, 0.0, 0.0)];
+    let turns =
+        [(40.0, 0.0, 0.0), (100.0, 135.0, 0.0), (160.0, 0.0, 0.0), (220.0, -135.0, 0.0), (280.0, 0.0, 0.0)];
     let rounds = [(400.0, 0.0, 200.0), (640.0, 0.0, -190.0), (660.0, 0.0, -190.0)];
     let (mut text, mut from) = (String::new(), (0.0, 0.0, 0.0));
     let smooth = |share: f64| share * share * (3.0 - 2.0 * share);
@@ -31,27 +32,42 @@ fn way() -> String {
     text
 }
 
-/// Largest errors of fixes, m and radians, and how many there were with the nose over, turned round, and lacking.
-fn errors(track: &Track) -> ([f64; 2], [u32; 3]) {
-    let (mut worst, mut counts) = ([0.0_f64; 2], [0; 3]);
+/// Largest errors of fixes, and how many there were.
+#[derive(Debug, Default)]
+struct Errors {
+    turn_rad: f64,
+    /// With the hull within 30 degrees of the tunnel's axis, either way, and anywhere.
+    along_axis_m: f64,
+    anywhere_m: f64,
+    upside_down: u32,
+    turned_round: u32,
+    lacking: usize,
+}
+
+fn errors(track: &Track) -> Errors {
+    let mut found = Errors::default();
     for tracked in &track.fixes {
         let Ok(fix) = tracked.fix else {
-            counts[2] += 1;
+            found.lacking += 1;
             continue;
         };
         let truth = tracked.truth;
-        let off = truth.attitude * fix.pose.attitude.inverse();
-        let turned_rad = 2.0 * math::asin(math::sqrt(off.wxyz()[1..].iter().map(|c| c * c).sum::<f64>()).min(1.0));
-        worst[0] = worst[0].max((truth.position - fix.pose.position).norm());
-        worst[1] = worst[1].max(turned_rad);
-        let up = truth.attitude * headrace_geometry::frames::Vec3::new(0.0, 0.0, 1.0);
-        let ahead = truth.attitude * headrace_geometry::frames::Vec3::new(1.0, 0.0, 0.0);
-        counts[0] += u32::from(up.z() < -0.1);
-        counts[1] += u32::from(up.z() > 0.9 && ahead.x() < -0.9);
+        let [_, x, y, z] = (truth.attitude * fix.pose.attitude.inverse()).wxyz();
+        found.turn_rad = found.turn_rad.max(2.0 * math::asin(Vec3::<Tunnel>::new(x, y, z).norm().min(1.0)));
+        let off_m = (truth.position - fix.pose.position).norm();
+        let (ahead, up) =
+            (truth.attitude * Vec3::new(1.0, 0.0, 0.0), truth.attitude * Vec3::new(0.0, 0.0, 1.0));
+        found.anywhere_m = found.anywhere_m.max(off_m);
+        if ahead.x().abs() > math::cos(f64::to_radians(30.0)) {
+            found.along_axis_m = found.along_axis_m.max(off_m);
+        }
+        found.upside_down += u32::from(up.z() < -0.1);
+        found.turned_round += u32::from(up.z() > 0.9 && ahead.x() < -0.9);
     }
-    (worst, counts)
+    found
 }
 
+/// Where beams look along the tunnel and graze the wall, few measure the place: it is off by more there than the filter says.
 #[test]
 fn over_the_top_and_round_about_the_fix_stays_right() {
     let way = way();
@@ -59,12 +75,11 @@ fn over_the_top_and_round_about_the_fix_stays_right() {
         if name == "way.csv" { Ok(way.clone().into_bytes()) } else { scenes::vehicle_file(name) }
     });
     let track = dive(&scene, filter(&scene), Silence::default());
-    let ([place_m, turn_rad], counts) = errors(&track);
-    println!("{place_m} {turn_rad} {counts:?} {}", track.fixes.len());
-    let vehicle = &scene.vehicle;
-    let direct = DirectNavigation::new(vehicle.tunnel.profile.clone(), vehicle.site);
-    let track = dive(&scene, direct, Silence::default());
-    println!("{:?} {}", errors(&track), track.fixes.len());
-    found("loop.attitude_place", place_m, 0.1);
-    found("loop.attitude_turn", turn_rad, 0.02);
+    let errors = errors(&track);
+    println!("{errors:?} of {}", track.fixes.len());
+    assert!(errors.upside_down > 5000 && errors.turned_round > 5000, "{errors:?}");
+    assert!(errors.lacking * 100 < track.fixes.len(), "{errors:?}");
+    found("loop.attitude_turn", errors.turn_rad, 0.02);
+    found("loop.attitude_place", errors.along_axis_m, 0.1);
+    found("loop.attitude_grazing", errors.anywhere_m, 0.3);
 }

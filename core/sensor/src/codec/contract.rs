@@ -84,7 +84,10 @@ fn made_to_match<C: Codec>(new: &impl Fn() -> C, bytes: &mut [u8], at: usize) ->
 /// A place in a frame for each of a few attempts, and what a byte there is turned by: the same each time. By one, a digit mostly stays
 /// a digit.
 fn attempts(len: usize) -> impl Iterator<Item = (usize, u8)> {
-    (0..12_usize).map(move |k| ((k * 7 + 3) % len, if k % 2 == 0 { 1 } else { 0x5B_u8.rotate_left(k as u32 % 8) }))
+    const TURNS: [u8; 6] = [0x5B, 0x80, 0x24, 0xFF, 0x11, 0xC2];
+    (0..12_usize).map(move |k| {
+        ((k * 7 + 3) % len, if k % 2 == 0 { 1 } else { TURNS.get(k / 2).copied().unwrap_or(1) })
+    })
 }
 
 /// Longer frames have no checksum, and trying all values of two bytes in them takes long.
@@ -96,7 +99,10 @@ pub fn matching_by_chance<C: Codec>(new: &impl Fn() -> C, frame: &[u8]) -> Vec<V
         let mut wrong = frame.to_vec();
         wrong[at] ^= turn;
         // A checksum stands near the end, and perhaps in digits.
-        let places = (0..frame.len().saturating_sub(1)).rev().take(6).filter(|place| !(*place..place + 2).contains(&at));
+        let places = (0..frame.len().saturating_sub(1))
+            .rev()
+            .take(6)
+            .filter(|place| !(*place..place + 2).contains(&at));
         let is_one = is_one_frame(&mut new(), &wrong);
         (is_one || places.into_iter().any(|place| made_to_match(new, &mut wrong, place))).then_some(wrong)
     });

@@ -247,6 +247,7 @@ fn a_quaternion_may_have_either_sign_and_any_length() {
     let rig = Rig::new(|t| still(t, 0.02, math::PI + 0.2 * math::sin(t / 4.0)), 1);
     let events = rig.events(0.0, 30.0);
     let (right, _) = outcome(&rig, &events);
+    let mut worst = 0.0_f64;
     for factor in [-1.0, 1e-5, -1e5] {
         let mut other = events.clone();
         for (k, event) in other.iter_mut().enumerate() {
@@ -257,8 +258,9 @@ fn a_quaternion_may_have_either_sign_and_any_length() {
         }
         let (state, _) = outcome(&rig, &other);
         let off = state.errors_to(&right).iter().fold(0.0, |most: f64, e| most.max(e.abs()));
-        assert!(off < 1e-9, "off by {off:e} with quaternions times {factor}");
+        worst = worst.max(off);
     }
+    found("filter.quaternions", worst, 1e-9);
 }
 
 #[test]
@@ -335,12 +337,14 @@ fn far_from_the_portal_passes_are_as_sure_as_near_it() {
             let tally = rig.run(&mut nav, &rig.events(0.0, 60.0));
             assert!(tally.fixes > 500 && tally.lacking == 0, "{off_m} m: {tally:?}");
             let [here, there] = [&near_nav, &nav].map(|nav| nav.fix(at(60.0)).unwrap());
-            let [here_sd_m, there_sd_m] = [here, there].map(|fix| fix.relative.sd_m(Vec3::new(0.0, 3.0, 3.0)));
+            let [here_sd_m, there_sd_m] =
+                [here, there].map(|fix| fix.relative.sd_m(Vec3::new(0.0, 3.0, 3.0)));
             sd_off = sd_off.max((there_sd_m / here_sd_m - 1.0).abs());
             let expected = here.pose.position + Vec3::new(off_m, 0.0, 0.0);
             moved_m = moved_m.max((there.pose.position - expected).norm());
             let variance = |i: usize| nav.running().unwrap().factors.variance(i);
-            let least = (0..ERRORS).map(variance).filter(|variance| *variance > 0.0).fold(f64::INFINITY, f64::min);
+            let least =
+                (0..ERRORS).map(variance).filter(|variance| *variance > 0.0).fold(f64::INFINITY, f64::min);
             condition = condition.max((0..ERRORS).map(variance).fold(0.0, f64::max) / least);
         }
     }
@@ -352,8 +356,16 @@ fn far_from_the_portal_passes_are_as_sure_as_near_it() {
 fn rounds(t: f64) -> Pose {
     let phase = math::TAU * t / 60.0;
     Pose {
-        position: Point3::new(9.0 - 6.0 * math::cos(phase), 0.4 * math::sin(phase), 4.0 + 0.3 * math::sin(2.0 * phase)),
-        attitude: Rot::from_roll_pitch_yaw(0.05 * math::sin(phase), 0.06 * math::sin(2.0 * phase), 0.2 * math::sin(phase)),
+        position: Point3::new(
+            9.0 - 6.0 * math::cos(phase),
+            0.4 * math::sin(phase),
+            4.0 + 0.3 * math::sin(2.0 * phase),
+        ),
+        attitude: Rot::from_roll_pitch_yaw(
+            0.05 * math::sin(phase),
+            0.06 * math::sin(2.0 * phase),
+            0.2 * math::sin(phase),
+        ),
     }
 }
 

@@ -68,7 +68,7 @@ fn rays_along_walls_into_arcs_end_where_the_wall_does() {
     let (half, radius) = (2.0, 0.5);
     let (mut worst_m, mut negative, mut positive) = (0.0_f64, 0, 0);
     for turn in 0..400 {
-        let (sin, cos) = math::sin_cos(0.7853 + f64::from(turn) * 1e-3);
+        let (sin, cos) = math::sin_cos(0.5 + f64::from(turn) * 1e-3);
         let turned = |[y, z]: Yz| [y * cos - z * sin, 3.0 + y * sin + z * cos];
         let inner = half - radius;
         // Counter-clockwise from the middle of the lower wall.
@@ -85,13 +85,23 @@ fn rays_along_walls_into_arcs_end_where_the_wall_does() {
             let (origin, direction) = (turned([y, z]), [v * cos - w * sin, v * sin + w * cos]);
             // Where the wall ends and the arc begins, and the arc's centre.
             let end = turned([y + inner * v, z + inner * w]);
-            let centre = turned([y + inner * v - radius * w.abs() * y.signum(), z + inner * w - radius * v.abs() * z.signum()]);
+            let centre = turned([
+                y + inner * v - radius * w.abs() * y.signum(),
+                z + inner * w - radius * v.abs() * z.signum(),
+            ]);
             let offset = [origin[0] - centre[0], origin[1] - centre[1]];
             let along = offset[0] * direction[0] + offset[1] * direction[1];
             let beyond = offset[0] * offset[0] + offset[1] * offset[1] - radius * radius;
-            let under_root = along * along - (direction[0] * direction[0] + direction[1] * direction[1]) * beyond;
-            if under_root < 0.0 { negative += 1 } else { positive += 1 }
-            let hit = profile.cast_from_inside(origin, direction).unwrap_or_else(|| panic!("no wall at turn {turn}"));
+            let under_root =
+                along * along - (direction[0] * direction[0] + direction[1] * direction[1]) * beyond;
+            if under_root < 0.0 {
+                negative += 1;
+            } else {
+                positive += 1;
+            }
+            let hit = profile
+                .cast_from_inside(origin, direction)
+                .unwrap_or_else(|| panic!("no wall at turn {turn}"));
             // By rounding the wall itself may be met on the way, where the ray runs along it; beyond its end there is only the arc.
             let off = [hit.point[0] - end[0], hit.point[1] - end[1]];
             let beyond_m = off[0] * direction[0] + off[1] * direction[1];
