@@ -3,7 +3,7 @@
 use headrace_geometry::math::{self, TAU};
 use headrace_geometry::tunnel::{Profile, Yz, shapes};
 
-use crate::{Case, few, many};
+use crate::{Case, few, many, within};
 
 /// Edges of a micrometre are met to some nanometres, m: what tells on which side of a ray their ends lie cancels to their length.
 const OFF_M: f64 = 1e-8;
@@ -124,7 +124,7 @@ fn inverses(case: &mut Case, polygon: &Profile) -> Result<(), String> {
         let [to, from] =
             [place, back].map(|at| [at[0] - profile.reference()[0], at[1] - profile.reference()[1]]);
         let turned_rad = math::atan2(to[0] * from[1] - to[1] * from[0], to[0] * from[0] + to[1] * from[1]);
-        if !(turned_rad.abs() < 1e-9) {
+        if !within(turned_rad.abs(), 1e-9) {
             return Err(format!("arc length {arc_m} comes back {turned_rad} rad off: {place:?} {back:?}"));
         }
     }

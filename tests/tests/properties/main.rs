@@ -50,9 +50,19 @@ impl Case {
         self.0.below(limit)
     }
 
+    /// Below `limit`.
+    pub(crate) fn count_below(&mut self, limit: u32) -> u32 {
+        u32::try_from(self.0.bits() % u64::from(limit)).unwrap()
+    }
+
     pub(crate) fn byte(&mut self) -> u8 {
         self.0.byte()
     }
+}
+
+/// Whether an error is a number within its bound.
+pub(crate) fn within(error: f64, bound: f64) -> bool {
+    error <= bound
 }
 
 type Property<'a> = &'a dyn Fn(&mut Case) -> Result<(), String>;

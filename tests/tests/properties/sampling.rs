@@ -6,7 +6,7 @@ use headrace_sampling::layout::{start_rad, start_reversed_rad};
 use headrace_sampling::section;
 use headrace_sampling::spacing::{self, Spiral};
 
-use crate::{Case, few, many};
+use crate::{Case, few, many, within};
 
 /// A number, seldom a sensible one.
 fn any(case: &mut Case) -> f64 {
@@ -27,7 +27,7 @@ fn off(got: f64, expected: f64) -> f64 {
 
 fn equations(case: &mut Case) -> Result<(), String> {
     let (a, b, c) = (any(case), any(case), any(case));
-    let m = case.below(2000) as u32;
+    let m = case.count_below(2000);
     let told = [
         section::t_y1_m(a, b),
         section::t_y2_m(a, b, m),
@@ -54,19 +54,19 @@ fn equations(case: &mut Case) -> Result<(), String> {
     }
 
     // Steps add up to the way along the wall, however near to 90 degrees the last one ends.
-    let last = 1 + case.below(400) as u32;
+    let last = 1 + case.count_below(400);
     let end_rad = FRAC_PI_2 * (1.0 - 10_f64.powf(case.between(-9.0, -0.1)));
     let theta = end_rad / f64::from(last);
     let h = case.between(0.1, 20.0);
     let sum: f64 = (1..=last).map(|m| section::t_y2_m(h, theta, m).unwrap_or(f64::NAN)).sum();
     let mean = section::t_y2_mean_m(h, theta, last).map_err(|why| why.to_string())?;
-    if !(off(mean * f64::from(last), sum) < 1e-12) {
+    if !within(off(mean * f64::from(last), sum), 1e-12) {
         return Err(format!("{last} steps of {theta:e} at {h}: {sum} is not {}", mean * f64::from(last)));
     }
     let tangent = section::t_y2_m(h, theta, last).map_err(|why| why.to_string())?;
     let footprint = section::footprint_m(h, end_rad - theta / 2.0, theta).map_err(|why| why.to_string())?;
     let condition = 1.0 + end_rad / (FRAC_PI_2 - end_rad);
-    if !(off(tangent, footprint) < 1e-14 * condition) {
+    if !within(off(tangent, footprint), 1e-14 * condition) {
         return Err(format!("step {last} of {theta:e} at {h}: {tangent} is not the footprint {footprint}"));
     }
 
@@ -78,7 +78,7 @@ fn equations(case: &mut Case) -> Result<(), String> {
     let Some(speed) = speed else {
         return if t_y >= target { Ok(()) } else { Err(format!("no speed for {target} and {t_y}")) };
     };
-    if !(off(spacing::t_max_m(speed * gap_s, speed * ping_s, t_y), target) < 4e-15) {
+    if !within(off(spacing::t_max_m(speed * gap_s, speed * ping_s, t_y), target), 4e-15) {
         return Err(format!("{speed} m/s for {target} and {t_y}"));
     }
     if spacing::speed_for_target_mps(target, target, gap_s, ping_s).is_some()
@@ -89,7 +89,7 @@ fn equations(case: &mut Case) -> Result<(), String> {
     }
 
     // One step a turn or thousands: what a turn advances is the sum of its pings.
-    let steps = 1 + case.below(3000) as u32;
+    let steps = 1 + case.count_below(3000);
     let turn = Turn::new(TAU / f64::from(steps), ping_s).map_err(|why| why.to_string())?;
     let spiral = Spiral::new(speed, turn, 1.0).map_err(|why| why.to_string())?;
     if off(spiral.pitch_m(), spiral.advance_m() * f64::from(steps)) > 1e-12 || speed.is_nan() {

@@ -54,7 +54,7 @@ impl Row {
 
     /// How far off `got` is, as a share of the value.
     fn share(&self, got: f64) -> f64 {
-        if got == self.value { 0.0 } else { ((got - self.value) / self.value).abs() }
+        (got - self.value).abs() / self.value.abs().max(f64::MIN_POSITIVE)
     }
 
     /// On a circle of this circumference.
