@@ -98,6 +98,9 @@ impl MeasuredMotion {
             return Turned { single_step: false, new_sweep: true, standing: false };
         }
         self.last = Some((at, angle_rad));
+        if at.since(last).0.abs() > STANDING.0 {
+            self.anchors = [Some((at, self.turned_rad + size)), None];
+        }
         let reversed = step * self.last_step_rad < 0.0;
         if reversed {
             self.sector_rad = self.from_turning_point.then_some(self.since_turning_rad);
@@ -120,13 +123,14 @@ impl MeasuredMotion {
         Turned { single_step, new_sweep: reversed, standing: false }
     }
 
-    /// Whether the head may have started anew at an angle so far from the one before.
+    /// Whether the head may have started anew at an angle so far from the one before: a stalled head goes on by a step.
     fn is_elsewhere(&self, silence: DurNs, size_rad: f64) -> bool {
         let by_far = self.step_rad.zip(self.rate_radps()).is_some_and(|(step_rad, rate_radps)| {
             let turned_rad = (rate_radps * silence.as_secs_f64()).abs();
             size_rad > ELSEWHERE_STEPS * step_rad && size_rad > ELSEWHERE_RATES * turned_rad
         });
-        by_far || silence.0.abs() > STANDING.0
+        let long = self.step_rad.is_some_and(|step_rad| size_rad > LONG_STEP * step_rad);
+        by_far || long && silence.0.abs() > STANDING.0
     }
 
     /// Time at the same angle after which a head counts as stalled, seconds: four ping periods.
