@@ -6,7 +6,7 @@ use spade::{DelaunayTriangulation, HasPosition, Point2, Triangulation};
 
 /// Smaller coordinates are zero: the triangulation's exact predicates take none below 1e-142.
 const TINY_M: f64 = 1e-100;
-/// By how much rounding may make a circumradius too small, m.
+/// By how much rounding may make a circumradius too small, and move a centre, m.
 const ROUNDING_M: f64 = 1e-6;
 
 /// A place: chainage and arc length, m.
@@ -108,9 +108,9 @@ impl Wall {
                 let sigma = crossing(&pair[0], &pair[1]);
                 (sigma, (sigma - pair[0].0) * (sigma - pair[0].0) + pair[0].1)
             })
-            .filter(|(sigma, _)| (0.0..self.perimeter_m).contains(sigma))
+            .filter(|(sigma, _)| (-ROUNDING_M..self.perimeter_m + ROUNDING_M).contains(sigma))
             .max_by(|a, b| a.1.total_cmp(&b.1));
-        let (sigma, _) = highest?;
+        let sigma = math::wrap(highest?.0, self.perimeter_m);
         Some(Circle { centre: [x_m, sigma], radius_m: self.clear_m([x_m, sigma]) })
     }
 }
@@ -123,7 +123,12 @@ fn circles(images: &[Place], perimeter_m: f64) -> Vec<Circle> {
     let mut circles: Vec<Circle> = triangles
         .inner_faces()
         .filter_map(|face| circle(face.positions().map(|at| [at.x, at.y])))
-        .filter(|circle| (0.0..perimeter_m).contains(&circle.centre[1]))
+        // A centre on the seam may be rounded to either side of it, and its image to the other.
+        .filter(|circle| (-ROUNDING_M..perimeter_m + ROUNDING_M).contains(&circle.centre[1]))
+        .map(|Circle { centre: [x, sigma], radius_m }| Circle {
+            centre: [x, math::wrap(sigma, perimeter_m)],
+            radius_m,
+        })
         .collect();
     circles.sort_unstable_by(|a, b| b.radius_m.total_cmp(&a.radius_m));
     circles

@@ -13,6 +13,11 @@ const RATE_SPAN_RAD: f64 = TAU / 2.0;
 /// Ratio to the usual step from which a step isn't a single one: pings were skipped.
 const LONG_STEP: f64 = 1.5;
 
+/// A head that has gone farther than this many usual steps, and than this many times what its rate gives, hasn't turned there: it has
+/// started anew. A head that catches up with its program takes steps eight times its own at most.
+const ELSEWHERE_STEPS: f64 = 10.0;
+const ELSEWHERE_RATES: f64 = 4.0;
+
 /// Standstill or silence after which the measurement of the turn rate restarts.
 const STANDING: DurNs = DurNs(1_000_000_000);
 
@@ -85,6 +90,13 @@ impl MeasuredMotion {
             let standing = at.since(last).as_secs_f64() > self.stands_after_s();
             return Turned { single_step: false, new_sweep: false, standing };
         }
+        if self.is_elsewhere(at.since(last), size) {
+            // What lies between wasn't turned through, and whether it goes on the same way isn't known.
+            self.last = Some((at, angle_rad));
+            self.anchors = [Some((at, self.turned_rad)), None];
+            (self.last_step_rad, self.since_turning_rad, self.from_turning_point) = (0.0, 0.0, false);
+            return Turned { single_step: false, new_sweep: true, standing: false };
+        }
         self.last = Some((at, angle_rad));
         if at.since(last).0.abs() > STANDING.0 {
             self.anchors = [Some((at, self.turned_rad + size)), None];
@@ -109,6 +121,16 @@ impl MeasuredMotion {
         let usual = self.step_rad.unwrap_or(size);
         let single_step = !reversed && size < LONG_STEP * usual;
         Turned { single_step, new_sweep: reversed, standing: false }
+    }
+
+    /// Whether the head may have started anew at an angle so far from the one before: a stalled head goes on by a step.
+    fn is_elsewhere(&self, silence: DurNs, size_rad: f64) -> bool {
+        let by_far = self.step_rad.zip(self.rate_radps()).is_some_and(|(step_rad, rate_radps)| {
+            let turned_rad = (rate_radps * silence.as_secs_f64()).abs();
+            size_rad > ELSEWHERE_STEPS * step_rad && size_rad > ELSEWHERE_RATES * turned_rad
+        });
+        let long = self.step_rad.is_some_and(|step_rad| size_rad > LONG_STEP * step_rad);
+        by_far || long && silence.0.abs() > STANDING.0
     }
 
     /// Time at the same angle after which a head counts as stalled, seconds: four ping periods.
@@ -186,5 +208,36 @@ mod tests {
         let (track, turned) = run([0.0, 0.9, 1.8, 2.7, 4.5, 5.4].into_iter());
         assert!(!turned[4].single_step && turned[5].single_step);
         assert!((track.step_rad().unwrap() - f64::to_radians(0.9)).abs() < 1e-9);
+    }
+
+    /// Switched off and on, or turned by hand: what came before says nothing of how it moves, and the angle between isn't turned.
+    #[test]
+    fn a_head_that_restarts_elsewhere_has_turned_nowhere() {
+        for gap_ms in [20, 60, 1500, 60_000] {
+            for jump_deg in [-170, -60, -20, 20, 60, 170] {
+                for way in [0.9, -0.9] {
+                    let mut track = MeasuredMotion::default();
+                    let mut at = MonoNs(0);
+                    for k in 0..1000 {
+                        at = MonoNs(k * 20_000_000);
+                        track.ping(at, f64::to_radians(way * k as f64));
+                    }
+                    let from = way * 999.0 + f64::from(jump_deg);
+                    for k in 0..1000 {
+                        let when = at + DurNs::from_millis(gap_ms + 20 * k);
+                        let turned = track.ping(when, f64::to_radians(from + way * k as f64));
+                        let what = format!("{gap_ms} ms, {jump_deg} deg, step {way}: ping {k}: {turned:?}");
+                        assert_eq!(turned.single_step, k > 0, "{what}");
+                        assert!(k == 0 || !turned.new_sweep, "{what}");
+                        assert_eq!(track.sector_rad(), None, "{what}");
+                        if let Some(rate) = track.rate_radps() {
+                            let off = rate.to_degrees() / (50.0 * way) - 1.0;
+                            assert!(off.abs() < 0.02, "{what}: {} deg/s", rate.to_degrees());
+                        }
+                    }
+                    assert!(track.rate_radps().is_some());
+                }
+            }
+        }
     }
 }

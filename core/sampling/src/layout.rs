@@ -56,15 +56,16 @@ pub fn turned_over_rad(rate_radps: f64, x_m: f64, speed_mps: f64) -> Result<f64,
 /// gamma: start angle of a head `x_m` behind the foremost, such that its phase is `phase_rad` where it passes the same
 /// place; in [0, 2 pi). Accurate to about 1e-16 of the angle turned meanwhile.
 ///
-/// Errors: as for [`turned_over_rad`].
+/// Errors: as for [`turned_over_rad`]; a phase that isn't finite.
 /// Source: Jorge et al. 2021, Eq. 20 (gamma = phi(k) - omega x / v).
 pub fn start_rad(phase_rad: f64, rate_radps: f64, x_m: f64, speed_mps: f64) -> Result<f64, SamplingError> {
+    not_negative("the phase in radians, without its sign", phase_rad.abs())?;
     Ok(math::wrap(phase_rad - turned_over_rad(rate_radps, x_m, speed_mps)?, TAU))
 }
 
 /// gamma of a head that faces the other way, whose angles grow opposite to the first's; in [0, 2 pi).
 ///
-/// Errors: as for [`turned_over_rad`].
+/// Errors: as for [`start_rad`].
 /// Source: Jorge et al. 2021, Eq. 21 (gamma = 2 pi - (phi(k) - omega x / v)).
 pub fn start_reversed_rad(
     phase_rad: f64,

@@ -45,16 +45,23 @@ const BEAMS: u32 = 720;
 const LEAST_SHARE: f64 = 0.5;
 /// Turns whose durations differ by less than this share stay in step for hours.
 const SAME_TURN: f64 = 1e-6;
+/// Finest step in which a sonar counts ranges, m: that of an 881L set to 5 m or less (Imagenex 881L data sheet). What a wall does
+/// within it, no return tells.
+const FINEST_M: f64 = 0.002;
+/// Edges of this length, m, leave less of a wall's curve out than [`FINEST_M`], whatever its radius: the sagitta e^2 / (8 r) is
+/// 0.1 mm in the narrowest pipe, of 0.1 m.
+const ENOUGH_M: f64 = 0.01;
 /// Distance along the hull below which heads are side by side, m.
 const APART_M: f64 = 0.01;
 
 impl VehicleConfig {
-    /// All findings, sensor by sensor, then those of the heads together.
+    /// All findings, sensor by sensor, then those of the heads together and of the tunnel.
     pub fn findings(&self) -> Vec<Finding> {
         let mut found = self.connections();
         found.extend(self.remarks());
         found.extend(self.reaches());
         found.extend(self.interleaving());
+        found.extend(self.too_fine());
         found
     }
 
@@ -179,6 +186,31 @@ impl VehicleConfig {
         );
         let grade = if share < LEAST_SHARE { Grade::Error } else { Grade::Warning };
         Some(Finding { grade, key: format!("sensors[{number}].range_m"), problem })
+    }
+
+    /// Points of a profile that lie closer together than any sonar tells.
+    fn too_fine(&self) -> Option<Finding> {
+        let tunnel = &self.tunnel;
+        if tunnel.name != "polyline" {
+            return None;
+        }
+        // The first and the last piece are what the floor's centre makes of one edge.
+        let pieces = tunnel.profile.pieces_m();
+        let edges = pieces.len().saturating_sub(1);
+        let whole = pieces.take(edges).skip(1);
+        let short: Vec<(f64, f64)> = whole.filter(|(_, length_m)| *length_m < FINEST_M).collect();
+        let (first_m, length_m) = *short.first()?;
+        let problem = format!(
+            "is finer than a sonar tells: {} of {edges} edges are shorter than {} mm, the finest step of a range here, the first of \
+             {:.3} mm at {first_m:.3} m round the wall ({}); which way so short an edge faces is the survey's error, points every \
+             {} mm say as much",
+            short.len(),
+            FINEST_M * 1e3,
+            length_m * 1e3,
+            tunnel.profile.clock(first_m),
+            ENOUGH_M * 1e3,
+        );
+        Some(warning("tunnel.file".to_owned(), problem))
     }
 
     /// Heads whose passes can't interleave.

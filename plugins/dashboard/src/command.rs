@@ -177,6 +177,16 @@ fn play(command: &str, speed: Option<f64>, to_s: Option<f64>) -> Result<Play, St
     })
 }
 
+/// The operator's command in a message as viewers send it; `None` of requests that concern a replay or the page alone.
+///
+/// Errors: what is wrong with it, as the page's refusal says.
+pub fn command_of(message: &str) -> Result<Option<Command>, String> {
+    Ok(match Asked::parse(message)? {
+        Asked::Command(command) => Some(command),
+        Asked::Play(_) | Asked::Rate(_) => None,
+    })
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

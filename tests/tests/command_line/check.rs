@@ -2,6 +2,7 @@
 
 use std::fmt::Write as _;
 
+use headrace_geometry::math;
 use headrace_tests::{Folder, SCENE, VEHICLE, root};
 use serde_json::Value;
 
@@ -263,4 +264,36 @@ fn json_has_every_error_with_its_line() {
     assert_eq!(errors.len(), 2, "{errors:?}");
     assert_eq!((&errors[0]["line"], &errors[0]["key"]), (&line("target_m").into(), &"target_cm".into()));
     assert_eq!(errors[1]["line"], line("id = \"imu\""));
+}
+
+/// A circle of 3 m radius in points so many to a turn.
+fn surveyed(points: u32) -> String {
+    let mut text = "y_m,z_m\n".to_owned();
+    for k in 0..points {
+        let (sin, cos) = math::sin_cos(math::TAU * (f64::from(k) + 0.5) / f64::from(points));
+        writeln!(text, "{:.6},{:.6}", 3.0 * sin, 3.0 - 3.0 * cos).unwrap();
+    }
+    text
+}
+
+#[test]
+fn a_profile_finer_than_a_sonar_tells_is_named() {
+    let folder = Folder::new();
+    let tunnel = changed(
+        VEHICLE,
+        &[("profile = \"circle\"\nradius_m = 3\n", "profile = \"polyline\"\nfile = \"wall.csv\"\n")],
+    );
+    folder.write("vehicle.toml", tunnel);
+    let mut said = String::new();
+    for points in [600, 20_000] {
+        folder.write("wall.csv", surveyed(points));
+        let answer = folder.headrace(&["check", "vehicle.toml"]);
+        assert_eq!(answer.code, Some(0));
+        let mut lines = answer.stderr.lines().filter(|line| line.contains("tunnel.file"));
+        writeln!(said, "{points} points: {}", lines.next_back().unwrap_or("nothing")).unwrap();
+    }
+    insta::assert_snapshot!(said, @"
+    600 points: nothing
+    20000 points: headrace: warning: vehicle.toml:6: tunnel.file: is finer than a sonar tells: 19999 of 20000 edges are shorter than 2 mm, the finest step of a range here, the first of 0.943 mm at 0.000 m round the wall (6:00); which way so short an edge faces is the survey's error, points every 10 mm say as much
+    ");
 }

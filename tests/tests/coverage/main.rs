@@ -7,6 +7,7 @@ mod cable;
 mod causes;
 mod confidence;
 mod dives;
+mod far_and_long;
 mod faults;
 mod field;
 mod flags;

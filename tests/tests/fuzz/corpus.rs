@@ -8,6 +8,8 @@ use headrace_mavlink::MavHeader;
 use headrace_mavlink::dialect::ATTITUDE_DATA;
 use headrace_mavlink::message::Message;
 use headrace_replay::log::{LogHeader, LogWriter, SourceInfo};
+use headrace_sensor::device::Direction;
+use headrace_simulator::Simulation;
 use headrace_tests::random::Random;
 use mcap::{Compression, WriteOptions};
 
@@ -16,6 +18,9 @@ use crate::mutate::broken;
 
 /// Begin of the logs that are broken.
 const BEGIN: MonoNs = MonoNs(1_000_000_000);
+
+/// Number of the first sensor of the second vehicle.
+pub(crate) const OTHERS: u8 = 128;
 
 /// What reads a file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
@@ -30,9 +35,15 @@ pub(crate) enum Kind {
     Mcap,
     Vehicle,
     Scene,
+    /// What a device sends: the number of the sensor, a seed of how the bytes come in pieces, and the bytes.
+    Line,
+    /// A packet of the operator's input.
+    Console,
+    /// A message of the page's viewer.
+    Viewer,
 }
 
-const KINDS: [(Kind, &str); 10] = [
+const KINDS: [(Kind, &str); 13] = [
     (Kind::Log, "log"),
     (Kind::Tlog, "tlog"),
     (Kind::Candump, "candump"),
@@ -43,6 +54,9 @@ const KINDS: [(Kind, &str); 10] = [
     (Kind::Mcap, "mcap"),
     (Kind::Vehicle, "vehicle"),
     (Kind::Scene, "scene"),
+    (Kind::Line, "line"),
+    (Kind::Console, "console"),
+    (Kind::Viewer, "viewer"),
 ];
 
 impl Kind {
@@ -104,6 +118,16 @@ impl Corpus {
         let demo = include_str!("../../../deploy/scenes/demo.toml");
         add(Kind::Scene, demo.replace("../vehicles/vita2-4.toml", "vehicle.toml").into_bytes());
         add(Kind::Scene, headrace_tests::SCENE.into());
+        for line in lines() {
+            add(Kind::Line, line);
+        }
+        for command in COMMANDS {
+            add(Kind::Console, command.into());
+            add(Kind::Viewer, command.into());
+        }
+        for request in REQUESTS {
+            add(Kind::Viewer, request.into());
+        }
         let said = files
             .iter()
             .filter(|file| file.kind == Kind::Log)
@@ -120,6 +144,41 @@ impl Corpus {
         let other = others[random.below(others.len())];
         (file.kind, broken(random, &file.bytes, &other.bytes))
     }
+}
+
+const COMMANDS: [&str; 4] = [
+    r#"{"do":"acknowledge","alert":12,"by":"AB"}"#,
+    r#"{"do":"silence","by":"AB"}"#,
+    r#"{"do":"note","text":"a leak \u00fc at 9:30 \\ \"there\"","by":"AB"}"#,
+    r#"{"do":"mark","by":"AB"}"#,
+];
+
+const REQUESTS: [&str; 3] = [
+    r#"{"do":"play","command":"seek","speed":null,"to_s":4.5}"#,
+    r#"{"do":"play","command":"speed","speed":12.5}"#,
+    r#"{"do":"rate","hz":1}"#,
+];
+
+/// What each device of the two vehicles sends in the first seconds of a short dive.
+fn lines() -> Vec<Vec<u8>> {
+    let mut found = Vec::new();
+    for (text, first) in [(headrace_tests::VEHICLE.to_owned(), 0), (headrace_tests::other_vehicle(), OTHERS)]
+    {
+        let scene =
+            headrace_tests::scenes::scene_from(headrace_tests::SCENE, &|_| Ok(text.clone().into_bytes()));
+        let mut simulation = Simulation::new(&scene).unwrap();
+        let mut lines: Vec<Vec<u8>> = (0..scene.vehicle.sensors.len())
+            .map(|number| vec![first + u8::try_from(number).unwrap(), 0])
+            .collect();
+        while let Some(message) = simulation.next_message() {
+            let line = &mut lines[usize::from(message.source)];
+            if message.direction == Direction::Received && line.len() < 2000 {
+                line.extend(message.bytes);
+            }
+        }
+        found.extend(lines);
+    }
+    found
 }
 
 fn fixture(name: &str) -> Vec<u8> {

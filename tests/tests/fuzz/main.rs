@@ -1,5 +1,5 @@
-//! Broken files, by chance: what reads dive logs, foreign ones, and files that people write must neither panic nor hang, take no more memory than a bound, and
-//! lose nothing of a dive log in silence.
+//! Broken files, by chance: what reads dive logs, foreign ones, files that people write, devices' lines, commands and viewers' messages
+//! must neither panic nor hang, take no more memory than a bound, and lose nothing of a dive log in silence.
 //!
 //! `cargo test -p headrace_tests --test fuzz` tries a few files, the same each time; `.ci/run` goes on for a minute from a seed of its own:
 //!

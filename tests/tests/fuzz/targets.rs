@@ -5,7 +5,7 @@ use std::io::Cursor;
 use headrace::devices::KINDS;
 use headrace_config::Document;
 use headrace_config::plain::is_plain;
-use headrace_geometry::time::MonoNs;
+use headrace_geometry::time::{DurNs, MonoNs};
 use headrace_import::candump::Candump;
 use headrace_import::csv::Csv;
 use headrace_import::detect::looks_like;
@@ -16,17 +16,23 @@ use headrace_import::ros::mcap::Mcap;
 use headrace_import::ros::{Feeds, Topic};
 use headrace_import::tlog::{self, TlogFormat};
 use headrace_import::{Format, Import, Input, Source, Taker};
+use headrace_monitor::console;
 use headrace_replay::log::{LogHeader, LogWriter, SourceInfo};
 use headrace_sensor::driver::DriverSetup;
+use headrace_sensor::reading::Packet;
 use headrace_simulator::Scene;
 use headrace_vehicle::VehicleConfig;
 
-use crate::corpus::{Corpus, Kind};
+use headrace_tests::random::Random;
+
+use crate::corpus::{Corpus, Kind, OTHERS};
 use crate::messages::{Said, said};
 
 /// What files need about them: a vehicle, and mappings.
 pub(crate) struct Surroundings {
     vehicle: VehicleConfig,
+    /// Those whose devices send lines, the second from sensor `OTHERS` on.
+    vehicles: [VehicleConfig; 2],
 }
 
 const VEHICLE: &str = r#"target_m = 1.2
@@ -75,13 +81,12 @@ const TOPICS: [(&str, &str); 6] = [
 
 impl Surroundings {
     pub(crate) fn new() -> Self {
-        let vehicle =
-            VehicleConfig::parse(
-                Document::new("vehicle.toml", VEHICLE),
-                &KINDS,
-                &|name| Err(name.to_owned()),
-            );
-        Self { vehicle: vehicle.unwrap() }
+        let read = |text: &str| {
+            VehicleConfig::parse(Document::new("vehicle.toml", text), &KINDS, &|name| Err(name.to_owned()))
+                .unwrap()
+        };
+        let vehicles = [read(headrace_tests::VEHICLE), read(&headrace_tests::other_vehicle())];
+        Self { vehicle: read(VEHICLE), vehicles }
     }
 
     /// Every sensor listens to the line of this name, and to one named as itself.
@@ -130,6 +135,12 @@ pub(crate) fn try_one(
     if let Kind::Vehicle | Kind::Scene = kind {
         return written_by_people(kind, bytes).map(drop);
     }
+    match kind {
+        Kind::Line => return sent(bytes, around).map(drop),
+        Kind::Console => return command(bytes).map(drop),
+        Kind::Viewer => return from_viewer(bytes).map(drop),
+        _ => {}
+    }
     if kind != Kind::Log {
         imported(kind, bytes, around);
         return Ok(());
@@ -175,7 +186,69 @@ pub(crate) fn gives(kind: Kind, bytes: &[u8], around: &Surroundings) -> u64 {
     match kind {
         Kind::Log => said(bytes).unwrap().0.len() as u64,
         Kind::Vehicle | Kind::Scene => written_by_people(kind, bytes).unwrap(),
+        Kind::Line => sent(bytes, around).unwrap(),
+        Kind::Console => command(bytes).unwrap(),
+        Kind::Viewer => from_viewer(bytes).unwrap(),
         kind => imported(kind, bytes, around),
+    }
+}
+
+/// Decodes what a device sent, whole and in pieces; how many readings it has. Errors: a reading that is no number, counts that are
+/// no account of the bytes, or readings that depend on the pieces.
+fn sent(bytes: &[u8], around: &Surroundings) -> Result<u64, String> {
+    let &[number, seed, ref line @ ..] = bytes else { return Ok(0) };
+    let [first, second] = &around.vehicles;
+    let (vehicle, number) = if number >= OTHERS { (second, number - OTHERS) } else { (first, number) };
+    let Some(device) = vehicle.sensors.get(usize::from(number) % vehicle.sensors.len()) else { return Ok(0) };
+    let mut random = Random(u64::from(seed));
+    let mut decoder = device.specification().decoder;
+    let (mut rest, mut at, mut count) = (line, MonoNs(1_000_000_000), 0);
+    let mut said = Ok(());
+    while !rest.is_empty() {
+        let (now, later) = rest.split_at((1 + random.below(24)).min(rest.len()));
+        // Mostly at once, and now and then after a silence, or stamped before what came before.
+        at = match random.below(40) {
+            0 => at + DurNs::from_millis(3_600_000),
+            1 => MonoNs(at.0.saturating_sub(1_000_000_000)),
+            _ => at + DurNs::from_millis(1),
+        };
+        decoder.decode(Packet { received: at, bytes: now }, &mut |decoded| {
+            count += 1;
+            if !decoded.reading.is_finite() {
+                said = Err(format!("no number: {:?}", decoded.reading));
+            }
+        });
+        rest = later;
+    }
+    let counts = decoder.counts();
+    if counts.skipped_bytes > line.len() as u64 {
+        said = Err(format!("{counts:?} of {} bytes", line.len()));
+    }
+    said.map(|()| count)
+}
+
+/// Reads a packet of the operator's input. Errors: one that isn't the same again as written.
+fn command(bytes: &[u8]) -> Result<u64, String> {
+    let Ok(command) = console::Command::parse(bytes) else { return Ok(0) };
+    let json = command.to_json();
+    match console::Command::parse(json.as_bytes()) {
+        Ok(again) if again == command => Ok(1),
+        other => Err(format!("{command:?} is written {json}, which is {other:?}")),
+    }
+}
+
+/// Reads a viewer's message. Errors: one that is taken and that the loop's input has no command for.
+fn from_viewer(bytes: &[u8]) -> Result<u64, String> {
+    let Ok(text) = str::from_utf8(bytes) else { return Ok(0) };
+    match headrace_dashboard::command::command_of(text) {
+        Ok(None) => Ok(1),
+        Ok(Some(taken)) => {
+            let json = serde_json::to_string(&taken).map_err(|error| error.to_string())?;
+            let read: serde_json::Value = serde_json::from_str(&json).map_err(|error| error.to_string())?;
+            if read["do"] == taken.word() { Ok(1) } else { Err(format!("{taken:?} is written {json}")) }
+        }
+        Err(words) if words.is_empty() => Err("refused without words".to_owned()),
+        Err(_) => Ok(0),
     }
 }
 
@@ -210,7 +283,7 @@ fn written_by_people(kind: Kind, bytes: &[u8]) -> Result<u64, String> {
 fn imported(kind: Kind, bytes: &[u8], around: &Surroundings) -> u64 {
     let format: Box<dyn Format> = match kind {
         // The others aren't imported.
-        Kind::Log | Kind::Mcap | Kind::Vehicle | Kind::Scene => {
+        Kind::Log | Kind::Mcap | Kind::Vehicle | Kind::Scene | Kind::Line | Kind::Console | Kind::Viewer => {
             let Ok(recording) = Mcap::open("file", Cursor::new(bytes)) else { return 0 };
             let feeds = around.feeds(&recording.topics());
             return written(kind, recording.feeding(feeds), around);

@@ -3,6 +3,7 @@
 #![allow(clippy::unwrap_used, clippy::panic, reason = "a test stops at what it can't do")]
 
 mod circles;
+mod hard_cases;
 mod imports;
 mod promises;
 mod supply;

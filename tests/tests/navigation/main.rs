@@ -4,6 +4,7 @@
 
 mod calibration;
 mod fusion;
+mod hard_cases;
 mod imu_truth;
 mod other_vehicles;
 mod outage;

@@ -6,6 +6,7 @@
 use headrace_geometry::frames::{Body, Mount, Point3, Pose, Rot, Tunnel, Vec3};
 use headrace_geometry::math::{self, FRAC_PI_2, TAU};
 use headrace_geometry::tunnel::{Profile, shapes};
+use headrace_hard_cases::found_at;
 use headrace_sampling::head::Turn;
 use headrace_sampling::layout::{InSector, Sector, in_step, start_rad, start_reversed_rad};
 use headrace_sampling::ring::{Sounding, Standing};
@@ -51,6 +52,11 @@ impl Row {
         self.near(got, ulps * ULP * self.value.abs());
     }
 
+    /// How far off `got` is, as a share of the value.
+    fn share(&self, got: f64) -> f64 {
+        (got - self.value).abs() / self.value.abs().max(f64::MIN_POSITIVE)
+    }
+
     /// On a circle of this circumference.
     fn around(&self, got: f64, modulus: f64, tolerance: f64) {
         let off = math::wrap_signed(got - self.value, modulus);
@@ -84,6 +90,46 @@ fn rows(cases: &[&str]) -> Vec<Row> {
 /// How much the rounding of an angle near 90 degrees is magnified.
 fn condition(angle_rad: f64) -> f64 {
     1.0 + angle_rad / (FRAC_PI_2 - angle_rad).abs()
+}
+
+/// Near 90 degrees the tangent has no bound, and the difference of two would have no digits left.
+#[test]
+fn val_steps_that_end_near_90_degrees() {
+    let (mut worst, mut magnified) = (0.0_f64, 0.0_f64);
+    for row in rows(&["eq6"]) {
+        worst = worst.max(row.share(section::t_y2_m(row.i(1), row.i(2), row.count(3)).unwrap()));
+        magnified = magnified.max(condition(row.i(2) * row.i(3)));
+    }
+    found_at("sampling.corner", magnified, worst, 8.0 * ULP);
+}
+
+/// As T_y comes near to the target the difference of their squares would cancel.
+#[test]
+fn val_speeds_where_little_is_left_of_the_target() {
+    let (mut worst, mut magnified) = (0.0_f64, 0.0_f64);
+    for row in rows(&["eq16_speed"]) {
+        let [target, t_y, gap_s, ping_s] = [1, 2, 3, 4].map(|i| row.i(i));
+        if let Some(got) = spacing::speed_for_target_mps(target, t_y, gap_s, ping_s) {
+            worst = worst.max(row.share(got));
+            magnified = magnified.max(target * target / ((target - t_y) * (target + t_y)));
+        }
+    }
+    found_at("sampling.speed", magnified, worst, 8.0 * ULP);
+}
+
+/// At a crawl a head turns any number of times while the vehicle comes to where another head has been.
+#[test]
+fn val_phases_at_a_crawl() {
+    let (mut worst_rad, mut turned_most) = (0.0_f64, 0.0_f64);
+    for row in rows(&["eq20", "eq21"]) {
+        let [phase, rate, x, v] = [1, 2, 3, 4].map(|i| row.i(i));
+        let start = if row.case == "eq20" { start_rad } else { start_reversed_rad };
+        let turned = (rate * x / v).abs() + phase.abs() + TAU;
+        let off = math::wrap_signed(start(phase, rate, x, v).unwrap() - row.value, TAU).abs();
+        worst_rad = worst_rad.max(off / turned);
+        turned_most = turned_most.max(turned);
+    }
+    found_at("sampling.phase", turned_most, worst_rad, 4.0 * ULP);
 }
 
 #[test]

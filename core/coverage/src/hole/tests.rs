@@ -1,5 +1,6 @@
 use super::super::store::{Kept, StoreLayout, WallSample};
 use super::*;
+use headrace_hard_cases::found;
 use proptest::prelude::*;
 
 const PERIMETER_M: f64 = 9.0;
@@ -223,13 +224,13 @@ fn samples_on_a_line_and_repeated_and_all_in_one_place() {
     let line: Vec<_> = (0..90).map(|i| (0.1, f64::from(i) * 0.1)).collect();
     let expected = brute_force(PERIMETER_M, &line[..20], 0.0, 0.25);
     let hole = largest(PERIMETER_M, &line[..20], 0.0, 0.25);
-    assert!((hole.diameter_m - expected).abs() < 1e-9, "{hole:?} and {expected}");
+    found("holes.line", (hole.diameter_m - expected).abs(), 1e-9);
     let repeated: Vec<_> = (0..50).flat_map(|_| line.clone()).collect();
     let once = largest(PERIMETER_M, &line, 0.0, 0.25);
     let many = largest(PERIMETER_M, &repeated, 0.0, 0.25);
     assert!((once.diameter_m - many.diameter_m).abs() < 1e-9);
     let one_place = largest(PERIMETER_M, &[(0.0, 1.0); 33], 0.0, 0.25);
-    assert!((one_place.diameter_m - 2.0 * math::hypot(0.25, PERIMETER_M / 2.0)).abs() < 1e-9);
+    found("holes.one_place", (one_place.diameter_m - 2.0 * math::hypot(0.25, PERIMETER_M / 2.0)).abs(), 1e-9);
 }
 
 #[test]
@@ -239,7 +240,8 @@ fn spacings_of_a_nanometre_and_of_metres_in_one_set() {
     let few = [(0.0, 3.0), (0.3, 6.0), (-0.4, 0.5), (0.2, 8.0)];
     let hole = largest(PERIMETER_M, &samples, 0.0, 0.25);
     let expected = brute_force(PERIMETER_M, &few, 0.0, 0.25);
-    assert!((hole.diameter_m - expected).abs() < 1e-7, "{hole:?} and {expected}");
+    // The samples of a nanometre apart are one in what is expected.
+    found("holes.spacings", (hole.diameter_m - expected).abs(), 1e-7);
 }
 
 /// Far along the tunnel D is the same, to double precision there.
@@ -248,7 +250,7 @@ fn chainage_of_seven_and_of_a_thousand_kilometres() {
     let samples: Vec<_> =
         (0..60).map(|i| (f64::from(i) * 0.05 - 1.0, (f64::from(i) * 2.3) % PERIMETER_M)).collect();
     let near = largest(PERIMETER_M, &samples, 0.0, 0.25).diameter_m;
-    for (chainage, error) in [(7_000.0, 1e-9), (1e6, 1e-8)] {
+    for (name, chainage, error) in [("holes.7_km", 7_000.0, 1e-9), ("holes.1000_km", 1e6, 1e-8)] {
         let layout = StoreLayout {
             perimeter_m: PERIMETER_M,
             from_m: chainage - 5.0,
@@ -263,7 +265,7 @@ fn chainage_of_seven_and_of_a_thousand_kilometres() {
                 .unwrap();
         }
         let hole = HoleFinder::default().largest(&store, chainage, chainage + 0.25);
-        assert!((hole.diameter_m - near).abs() < error, "{chainage}: {hole:?} and {near}");
+        found(name, (hole.diameter_m - near).abs(), error);
     }
 }
 

@@ -239,6 +239,12 @@ impl Profile {
         }
     }
 
+    /// Where each piece begins and how long it is, m: arc lengths. Of a polygon the first and the last are parts of one edge, unless
+    /// a point lies at the floor's centre.
+    pub fn pieces_m(&self) -> impl ExactSizeIterator<Item = (f64, f64)> + '_ {
+        self.elements.iter().map(|element| (element.arc_m, element.length_m))
+    }
+
     /// Arc lengths of the element boundaries, m.
     #[cfg(test)]
     pub(crate) fn corners_m(&self) -> Vec<f64> {

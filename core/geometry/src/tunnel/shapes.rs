@@ -75,3 +75,6 @@ pub fn ceran_blueprint() -> Result<Profile, ProfileError> {
 
 #[cfg(test)]
 mod tests;
+
+#[cfg(test)]
+mod oracle;

@@ -58,6 +58,67 @@ pub fn decode_after_garbage<C: Codec>(codec: &mut C, garbage: &[u8], frame: &[u8
     values
 }
 
+/// Whether all of the bytes are one good frame.
+fn is_one_frame<C: Codec>(codec: &mut C, bytes: &[u8]) -> bool {
+    let values = decode_all(codec, bytes);
+    let counts = codec.counts();
+    values.len() == 1 && counts.bad_frames == 0 && counts.skipped_bytes == 0
+}
+
+/// Sets two neighbouring bytes so that all of `bytes` passes as one frame, if any values do.
+fn made_to_match<C: Codec>(new: &impl Fn() -> C, bytes: &mut [u8], at: usize) -> bool {
+    let Some(before) = bytes.get(at..at + 2).map(<[u8]>::to_vec) else { return false };
+    if bytes.len() > MOST_MATCHED {
+        return false;
+    }
+    for pair in 0..=u16::MAX {
+        bytes[at..at + 2].copy_from_slice(&pair.to_le_bytes());
+        if is_one_frame(&mut new(), bytes) {
+            return true;
+        }
+    }
+    bytes[at..at + 2].copy_from_slice(&before);
+    false
+}
+
+/// A place in a frame for each of a few attempts, and what a byte there is turned by: the same each time. By one, a digit mostly stays
+/// a digit.
+fn attempts(len: usize) -> impl Iterator<Item = (usize, u8)> {
+    const TURNS: [u8; 6] = [0x5B, 0x80, 0x24, 0xFF, 0x11, 0xC2];
+    (0..12_usize).map(move |k| {
+        ((k * 7 + 3) % len, if k % 2 == 0 { 1 } else { TURNS.get(k / 2).copied().unwrap_or(1) })
+    })
+}
+
+/// Longer frames have no checksum, and trying all values of two bytes in them takes long.
+const MOST_MATCHED: usize = 100;
+
+/// Wrong frames that pass all the same: a byte of a good one is changed, and its checksum, if it has any, happens to match.
+pub fn matching_by_chance<C: Codec>(new: &impl Fn() -> C, frame: &[u8]) -> Vec<Vec<u8>> {
+    let wrong = attempts(frame.len()).filter_map(|(at, turn)| {
+        let mut wrong = frame.to_vec();
+        wrong[at] ^= turn;
+        // A checksum stands near the end, and perhaps in digits.
+        let places = (0..frame.len().saturating_sub(1))
+            .rev()
+            .take(6)
+            .filter(|place| !(*place..place + 2).contains(&at));
+        let is_one = is_one_frame(&mut new(), &wrong);
+        (is_one || places.into_iter().any(|place| made_to_match(new, &mut wrong, place))).then_some(wrong)
+    });
+    wrong.collect()
+}
+
+/// Beginnings of frames that were cut short and pass together with the first bytes of the good frame behind them.
+pub fn matching_into_the_next<C: Codec>(new: &impl Fn() -> C, frame: &[u8]) -> Vec<Vec<u8>> {
+    let len = frame.len();
+    let cut = (2..len).rev().step_by(len.div_ceil(6)).filter_map(|keep| {
+        let mut both = [&frame[..keep], &frame[..len - keep]].concat();
+        made_to_match(new, &mut both, keep - 2).then(|| both[..keep].to_vec())
+    });
+    cut.collect()
+}
+
 /// Generates a module of tests that check a codec against its contract.
 ///
 /// `codec` is an expression that creates a new codec, `values` a proptest strategy of all values that can be encoded,
@@ -76,7 +137,9 @@ macro_rules! codec_contract {
             use proptest::prelude::*;
             #[allow(unused_imports)]
             use $crate::codec::Codec as _;
-            use $crate::codec::contract::{decode_after_garbage, decode_all, decode_pieces};
+            use $crate::codec::contract::{
+                decode_after_garbage, decode_all, decode_pieces, matching_by_chance, matching_into_the_next,
+            };
 
             proptest! {
                 #![proptest_config($crate::codec::contract::config())]
@@ -150,6 +213,38 @@ macro_rules! codec_contract {
                     assert_eq!(expected.len(), 1, "{frame:02X?}");
                     for at in 0..=frame.len() {
                         assert_eq!(decode_pieces(&mut $codec, frame, &[at]), expected, "split at {at}");
+                    }
+                }
+            }
+
+            /// A wrong frame whose checksum happens to match is a value like any other, and costs no frame behind it.
+            #[test]
+            fn a_checksum_that_happens_to_match_costs_no_other_frame() {
+                let mut tried = 0;
+                for frame in $frames {
+                    let frame: &[u8] = frame.as_ref();
+                    for wrong in matching_by_chance(&|| $codec, frame) {
+                        let mut codec = $codec;
+                        let got = decode_after_garbage(&mut codec, &wrong, frame);
+                        assert_eq!(got.len(), 2, "after {wrong:02X?}");
+                        assert_eq!(got.get(1), decode_all(&mut $codec, frame).first(), "after {wrong:02X?}");
+                        assert_eq!((codec.counts().good_frames, codec.counts().skipped_bytes), (2, 0));
+                        tried += 1;
+                    }
+                }
+                assert!(tried > 0);
+            }
+
+            /// A frame cut short whose checksum matches with what comes next costs the frame that it takes bytes of, and no more.
+            #[test]
+            fn a_checksum_that_matches_into_the_next_frame_costs_that_frame_alone() {
+                for frame in $frames {
+                    let frame: &[u8] = frame.as_ref();
+                    for cut in matching_into_the_next(&|| $codec, frame) {
+                        let mut codec = $codec;
+                        let got = decode_after_garbage(&mut codec, &cut, &[frame, frame].concat());
+                        assert_eq!(got.last(), decode_all(&mut $codec, frame).first(), "after {cut:02X?}");
+                        assert!(got.len() >= 2 && codec.held_bytes() == 0, "after {cut:02X?}: {got:?}");
                     }
                 }
             }

@@ -5,6 +5,7 @@
 
 use super::super::factors::{Factors, Gain};
 use headrace_geometry::math;
+use headrace_hard_cases::found_at;
 
 const LINES: &str = include_str!("../../../../../tests/oracles/fusion.csv");
 
@@ -128,6 +129,8 @@ struct Worst {
     covariance: f64,
     gain: f64,
     distance: f64,
+    /// The largest variance over the smallest, of those that must come of the steps.
+    spread: f64,
     is_sign_lost: bool,
 }
 
@@ -189,6 +192,9 @@ fn follow<const N: usize, C: Covariance<N>>(case: &str) -> Worst {
                         *slot = *elements.next().unwrap();
                     }
                 }
+                let variances = || (0..N).map(|i| right[i][i]);
+                let spread = variances().fold(0.0, f64::max) / variances().fold(f64::INFINITY, f64::min);
+                worst.spread = worst.spread.max(spread);
                 for i in 0..N {
                     worst.is_sign_lost |= p.element(i, i) <= 0.0;
                     for j in i..N {
@@ -239,6 +245,9 @@ fn verif_factors_agree_with_the_textbook_at_100_digits() {
         assert!(!factors.is_sign_lost, "{case} {n}: {factors:?}");
         let worst = factors.covariance.max(factors.gain).max(factors.distance);
         assert!(worst <= tolerance, "{case} {n}: {factors:?}, allowed {tolerance:e}");
+        if n == 4 {
+            found_at(&format!("filter.{case}"), factors.spread, worst, tolerance);
+        }
     }
 }
 

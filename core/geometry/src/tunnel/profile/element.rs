@@ -9,6 +9,9 @@ pub(super) const ARC_SLACK_RAD: f64 = 1e-12;
 /// middle and that of the ends; far larger than the slack and rounding together.
 const CLEAR: f64 = 1e-9;
 
+/// Sine of the angle to a ray below which an edge counts as parallel to it.
+const PARALLEL: f64 = 1e-6;
+
 /// One piece of a profile, as given; pieces run counter-clockwise with y to the right and z up.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Piece {
@@ -58,7 +61,16 @@ impl Element {
                 if !(right <= 0.0 && left > 0.0) {
                     return None;
                 }
-                let t = cross(start, sub(self.end, self.start)) / (left - right);
+                let (along, apart) = (sub(self.end, self.start), left - right);
+                let t = cross(start, along) / apart;
+                let length2 = dot(direction, direction);
+                // Of a ray along the edge both products are rounding: it leaves somewhere on the edge, and nowhere else.
+                let t = if apart * apart < PARALLEL * PARALLEL * length2 * dot(along, along) {
+                    let ends = [dot(start, direction) / length2, dot(end, direction) / length2];
+                    t.clamp(ends[0].min(ends[1]), ends[0].max(ends[1]))
+                } else {
+                    t
+                };
                 (t >= 0.0).then_some(t)
             }
             Shape::Arc { centre, radius_m, from_rad, sweep_rad, middle, cos_half } => {

@@ -1,6 +1,7 @@
 use super::*;
 use crate::frames::{Vec3, head_direction};
 use crate::tunnel::Yz;
+use headrace_hard_cases::found;
 use proptest::prelude::*;
 
 fn all() -> Vec<(&'static str, Profile)> {
@@ -178,13 +179,14 @@ fn repeated_and_collinear_points_and_slivers_change_nothing() {
         [2.0, 0.0],
     ];
     let messy = Profile::polygon(&messy, Some(plain.reference())).unwrap();
-    assert!((plain.perimeter_m() - messy.perimeter_m()).abs() < 1e-11);
+    let mut worst_m = (plain.perimeter_m() - messy.perimeter_m()).abs();
     for step in 0..60 {
         let angle = TAU * f64::from(step) / 60.0;
         let direction = [math::cos(angle), math::sin(angle)];
         let (a, b) = (plain.cast([0.5, 1.0], direction).unwrap(), messy.cast([0.5, 1.0], direction).unwrap());
-        assert!((a.range_m - b.range_m).abs() < 1e-11 && (a.arc_m - b.arc_m).abs() < 1e-10);
+        worst_m = worst_m.max((a.range_m - b.range_m).abs()).max((a.arc_m - b.arc_m).abs());
     }
+    found("geometry.slivers", worst_m, 1e-10);
 }
 
 proptest! {

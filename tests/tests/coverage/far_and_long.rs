@@ -1,0 +1,80 @@
+//! The whole loop for hours in one place: a vehicle that parks, and one that goes to and fro a hundred times.
+
+use std::fmt::Write as _;
+
+use headrace_hard_cases::found;
+use headrace_monitor::run::Loop;
+use headrace_tests::scenes;
+use headrace_tests::truth::{self, JudgedDive};
+
+const PARKED_S: u32 = 3600;
+/// There and back so often.
+const ROUNDS: usize = 100;
+/// Between these places, m.
+const FROM_M: f64 = 5.0;
+const TO_M: f64 = 9.0;
+/// In the end the vehicle goes on to here, m.
+const END_M: f64 = 16.0;
+/// Bounds of a hole are no farther apart than full cells thin, m.
+const THINNED_M: f64 = 0.04;
+
+fn scene(parked_s: u32, rounds: usize) -> String {
+    let mut text = format!(
+        "vehicle = \"vita2-2.toml\"\n[effects]\nmotion_within_turn = {{}}\nrange_noise = {{ sd_m = 0.02 }}\n\
+         [trajectory]\nkind = \"waypoints\"\n[[trajectory.waypoints]]\nchainage_m = 5\nstay_s = 10\n\
+         [[trajectory.waypoints]]\nchainage_m = 7\nspeed_mps = 0.1\nstay_s = {parked_s}\n"
+    );
+    for _ in 0..rounds {
+        for chainage_m in [TO_M, FROM_M] {
+            writeln!(text, "[[trajectory.waypoints]]\nchainage_m = {chainage_m}\nspeed_mps = 0.3").unwrap();
+        }
+    }
+    text + &format!("[[trajectory.waypoints]]\nchainage_m = {END_M}\nspeed_mps = 0.1\n")
+}
+
+/// A dive, and bytes of samples every minute.
+fn dive(parked_s: u32, rounds: usize) -> (JudgedDive, Vec<usize>) {
+    let scene = scenes::scene(&scene(parked_s, rounds));
+    let (mut used, mut ticks) = (Vec::new(), 0_u64);
+    let mut note = |dive: &Loop| {
+        ticks += 1;
+        if ticks.is_multiple_of(3000) {
+            used.push(dive.coverage().store.usage().bytes);
+        }
+    };
+    (truth::dive_noting(&scene, &scene.vehicle, &mut note), used)
+}
+
+#[test]
+fn an_hour_parked_and_a_hundred_rounds_change_nothing() {
+    let (once, _) = dive(0, 1);
+    let (long, used) = dive(PARKED_S, ROUNDS);
+    assert_eq!(once.sections.len(), long.sections.len());
+    let (mut passed, mut off_m) = (0, [0.0_f64; 2]);
+    // Not where the dive begins and ends: there heads have been in part.
+    let pairs = once.sections.iter().zip(&long.sections);
+    for (a, b) in pairs.filter(|(a, _)| (FROM_M..END_M - 1.0).contains(&a.report.start_m)) {
+        assert_eq!(a.report.verdict, b.report.verdict, "section {}", a.report.start_m);
+        passed += u32::from(a.report.verdict == "pass");
+        let (Some(least_m), Some(most_m)) = (b.report.hole_least_m, b.report.hole_most_m) else {
+            panic!("section {}: no bounds", b.report.start_m)
+        };
+        assert!(most_m - least_m <= THINNED_M, "section {}: {least_m} to {most_m}", b.report.start_m);
+        // Where the vehicle has come once, after all of it: D is as near to the truth as without.
+        if a.report.start_m >= TO_M + 1.0 {
+            for (off_m, section) in off_m.iter_mut().zip([a, b]) {
+                *off_m = off_m.max((section.report.hole_m.unwrap() - section.true_hole_m).abs());
+            }
+        }
+    }
+    assert!(passed > 30, "{passed} sections pass");
+    println!("{passed} sections pass; D off by {off_m:?} m; {used:?} bytes");
+    assert!(off_m[1] <= off_m[0] + 0.01, "{off_m:?}");
+    found("loop.rounds", off_m[1], 0.02);
+    // By minutes: after a third of the hour, and at its end; after three quarters of the rounds, and at their end.
+    let parked = PARKED_S as usize / 60;
+    let rounds = used.len() - 3 - parked;
+    let grown = |from: usize, to: usize| used[to] as f64 / used[from] as f64 - 1.0;
+    found("loop.parked_memory", grown(parked / 3, parked - 2), 0.05);
+    found("loop.rounds_memory", grown(parked + rounds * 3 / 4, parked + rounds), 0.05);
+}

@@ -1,0 +1,143 @@
+//! Rays in cross-sections of any kind, against a look at each edge by the plain formula.
+
+use headrace_geometry::math::{self, TAU};
+use headrace_geometry::tunnel::{Profile, Yz, shapes};
+
+use crate::{Case, few, many, within};
+
+/// Edges of a micrometre are met to some nanometres, m: what tells on which side of a ray their ends lie cancels to their length.
+const OFF_M: f64 = 1e-8;
+
+/// Points of a polygon that is star-shaped about (0, 3), with repeats, slivers, corners and straight runs.
+fn points(case: &mut Case) -> Vec<Yz> {
+    let count = 3 + case.below(60);
+    let mut turns: Vec<f64> = (0..count).map(|k| (k as f64 + 0.9 * case.unit()) / count as f64).collect();
+    for k in 1..count {
+        match case.below(12) {
+            0 => turns[k] = turns[k - 1],
+            1 => turns[k] = turns[k - 1] + 1e-12,
+            2 => turns[k] = turns[k - 1] + 1e-7,
+            _ => {}
+        }
+    }
+    let round = case.below(3) == 0;
+    turns
+        .iter()
+        .map(|turn| {
+            let radius_m = if round { 2.0 } else { case.between(1.2, 2.8) };
+            let (sin, cos) = math::sin_cos(turn * TAU);
+            [radius_m * cos, 3.0 + radius_m * sin]
+        })
+        .collect()
+}
+
+/// Where a ray first meets an edge ahead, in its own lengths, and the sine between them; edges count a little beyond their ends.
+fn meets(points: &[Yz], origin: Yz, ray: Yz) -> Option<(f64, f64)> {
+    let cross = |a: Yz, b: Yz| a[0] * b[1] - a[1] * b[0];
+    let edges = points.iter().zip(points.iter().cycle().skip(1));
+    let meetings = edges.filter_map(|(a, b)| {
+        let (along, to) = ([b[0] - a[0], b[1] - a[1]], [a[0] - origin[0], a[1] - origin[1]]);
+        let det = cross(ray, along);
+        let (share, t) = (cross(to, ray) / det, cross(to, along) / det);
+        let length_m = math::hypot(along[0], along[1]);
+        ((-1e-12..=1.0 + 1e-12).contains(&share) && t > 0.0).then(|| (t, (det / length_m).abs()))
+    });
+    meetings.min_by(|a, b| a.0.total_cmp(&b.0))
+}
+
+fn rays(case: &mut Case) -> Result<(), String> {
+    let given = points(case);
+    let profile = match Profile::polygon(&given, Some([0.0, 3.0])) {
+        Ok(profile) => profile,
+        // Too few distinct points, half a turn without one: refused with a reason.
+        Err(why) => return if why.to_string().is_empty() { Err("no reason".to_owned()) } else { Ok(()) },
+    };
+    for _ in 0..8 {
+        let (sin, cos) = math::sin_cos(case.between(0.0, TAU));
+        let off_m = case.between(0.0, 1.1);
+        let origin = [off_m * cos, 3.0 + off_m * sin];
+        if !profile.contains(origin) {
+            continue;
+        }
+        let corner = given[case.below(given.len())];
+        let to_corner = [corner[0] - origin[0], corner[1] - origin[1]];
+        let (sin, cos) = math::sin_cos(case.between(0.0, TAU));
+        let ray = match case.below(5) {
+            0 => to_corner,
+            1 => [to_corner[0].next_up(), to_corner[1]],
+            2 => [to_corner[0], to_corner[1].next_down()],
+            3 => [1e-6 * cos, 1e-6 * sin],
+            _ => [cos, sin],
+        };
+        let hit =
+            profile.cast(origin, ray).ok_or_else(|| format!("no wall from {origin:?} along {ray:?}"))?;
+        let nearest = profile.nearest(hit.point);
+        let wall = profile.point_at(hit.arc_m);
+        let by_arc_m = math::hypot(wall[0] - hit.point[0], wall[1] - hit.point[1]);
+        let along_m = hit.range_m * math::hypot(ray[0], ray[1]);
+        let told = [hit.range_m, hit.arc_m, hit.normal[0], hit.normal[1]];
+        let inwards = hit.normal[0] * ray[0] + hit.normal[1] * ray[1] < 1e-9;
+        if !(told.iter().all(|number| number.is_finite())
+            && inwards
+            && (0.0..profile.perimeter_m()).contains(&hit.arc_m))
+        {
+            return Err(format!("{hit:?} from {origin:?} along {ray:?}"));
+        }
+        if nearest.distance_m > OFF_M || by_arc_m > 2.0 * OFF_M {
+            return Err(format!(
+                "{hit:?} is {} m off the wall, {by_arc_m} from its arc length: {origin:?} {ray:?}",
+                nearest.distance_m
+            ));
+        }
+        // Through a corner or along an edge rounding says which of two walls is met.
+        if let Some((t, sine)) = meets(&given, origin, ray)
+            && sine > 1e-3 * math::hypot(ray[0], ray[1])
+        {
+            let off_m = (t - hit.range_m).abs() * math::hypot(ray[0], ray[1]);
+            let is_steady = [1e-9, -1e-9].into_iter().all(|turn| {
+                let beside = meets(&given, origin, [ray[0] - turn * ray[1], ray[1] + turn * ray[0]]);
+                beside.is_some_and(|(other, _)| {
+                    (other / t - 1.0).abs() < 4e-9 * math::hypot(ray[0], ray[1]) / sine
+                })
+            });
+            if is_steady && off_m > OFF_M * (1.0 + along_m) * (1.0 + math::hypot(ray[0], ray[1]) / sine) {
+                return Err(format!("{hit:?} isn't at {t}: {origin:?} {ray:?} {given:?}"));
+            }
+        }
+    }
+    inverses(case, &profile)
+}
+
+/// Arc length to place and back, in a polygon and in a shape of arcs.
+fn inverses(case: &mut Case, polygon: &Profile) -> Result<(), String> {
+    let width_m = case.between(0.5, 12.0);
+    let shape = match case.below(3) {
+        0 => shapes::circle(width_m),
+        1 => shapes::arch(width_m, width_m * case.between(0.8, 2.0), width_m * case.between(0.5, 3.0)),
+        _ => shapes::trimmed_circle(width_m, width_m * case.between(0.1, 1.99)),
+    };
+    for profile in [Some(polygon), shape.as_ref().ok()].into_iter().flatten() {
+        let arc_m = case.unit() * profile.perimeter_m();
+        let place = profile.point_at(arc_m);
+        let back = profile.point_at(profile.arc_of(place));
+        // It is the direction that counts: an edge that points at the reference point has one for all of it.
+        let [to, from] =
+            [place, back].map(|at| [at[0] - profile.reference()[0], at[1] - profile.reference()[1]]);
+        let turned_rad = math::atan2(to[0] * from[1] - to[1] * from[0], to[0] * from[0] + to[1] * from[1]);
+        if !within(turned_rad.abs(), 1e-9) {
+            return Err(format!("arc length {arc_m} comes back {turned_rad} rad off: {place:?} {back:?}"));
+        }
+    }
+    Ok(())
+}
+
+#[test]
+fn rays_end_on_the_wall_where_the_plain_formula_says() {
+    few("geometry", &rays);
+}
+
+#[test]
+#[ignore = "long; see the module's description"]
+fn geometry_at_length() {
+    many("geometry", &rays);
+}

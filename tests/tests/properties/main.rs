@@ -1,0 +1,124 @@
+//! Properties that hold of any case, over as many random ones as there is time for:
+//!
+//!     HEADRACE_PROPERTY_CASES=10000000 cargo test -p headrace_tests --test properties -- --ignored --nocapture
+//!     HEADRACE_PROPERTY_SEED=42 HEADRACE_PROPERTY_CASES=1000000 cargo test -p headrace_tests --test properties holes -- --ignored --nocapture
+//!
+//! So many cases are shared by the five subjects; a seed of its own is printed with the count. Case n of a seed is case 0 of seed + n.
+//! Ordinary tests take a few thousand of each subject, the same each time.
+
+#![allow(clippy::unwrap_used, clippy::panic, reason = "a test stops at what it can't do")]
+
+mod codecs;
+mod filter;
+mod geometry;
+mod holes;
+mod sampling;
+
+use std::panic::{AssertUnwindSafe, catch_unwind};
+
+use headrace_tests::random::Random;
+
+/// Cases of a subject in ordinary tests, and the seed of the first.
+const FEW: u64 = 3000;
+const SEED_OF_FEW: u64 = 20_260_901;
+/// Cases of all subjects in a long run, unless it is told another number.
+const MANY: u64 = 10_000_000;
+const SUBJECTS: u64 = 5;
+
+/// Random values of a case.
+pub(crate) struct Case(Random);
+
+impl Case {
+    /// From 0 to below 1.
+    pub(crate) fn unit(&mut self) -> f64 {
+        (self.0.bits() >> 11) as f64 / (1_u64 << 53) as f64
+    }
+
+    /// From `from` to below `to`.
+    pub(crate) fn between(&mut self, from: f64, to: f64) -> f64 {
+        from + (to - from) * self.unit()
+    }
+
+    /// Between two powers of ten, either sign.
+    pub(crate) fn of_any_size(&mut self, from: i32, to: i32) -> f64 {
+        let size = 10_f64.powf(self.between(f64::from(from), f64::from(to)));
+        if self.below(2) == 0 { size } else { -size }
+    }
+
+    /// Below `limit`.
+    pub(crate) fn below(&mut self, limit: usize) -> usize {
+        self.0.below(limit)
+    }
+
+    /// Below `limit`.
+    pub(crate) fn count_below(&mut self, limit: u32) -> u32 {
+        u32::try_from(self.0.bits() % u64::from(limit)).unwrap()
+    }
+
+    pub(crate) fn byte(&mut self) -> u8 {
+        self.0.byte()
+    }
+}
+
+/// Whether an error is a number within its bound.
+pub(crate) fn within(error: f64, bound: f64) -> bool {
+    error <= bound
+}
+
+type Property<'a> = &'a dyn Fn(&mut Case) -> Result<(), String>;
+
+/// Tries so many cases; those that fail or panic, ten at most.
+fn failing(subject: &str, seed: u64, count: u64, property: Property<'_>) -> Vec<String> {
+    let mut found = Vec::new();
+    for number in 0..count {
+        let of_this = seed.wrapping_add(number);
+        let tried = catch_unwind(AssertUnwindSafe(|| {
+            property(&mut Case(Random(of_this.wrapping_mul(0x2545_F491_4F6C_DD1D))))
+        }));
+        let problem = match tried {
+            Ok(Ok(())) => continue,
+            Ok(Err(problem)) => problem,
+            Err(_) => "a panic".to_owned(),
+        };
+        found.push(format!("{subject}: HEADRACE_PROPERTY_SEED={of_this}: {problem}"));
+        if found.len() >= 10 {
+            break;
+        }
+    }
+    found
+}
+
+/// Holds a few cases to a property.
+#[track_caller]
+pub(crate) fn few(subject: &str, property: Property<'_>) {
+    let found = failing(subject, SEED_OF_FEW, FEW, property);
+    assert!(found.is_empty(), "{}", found.join("\n"));
+}
+
+/// Holds a subject's share of many.
+#[track_caller]
+pub(crate) fn many(subject: &str, property: Property<'_>) {
+    let number = |name: &str| {
+        let text = std::env::var(name).ok()?;
+        Some(text.parse::<u64>().unwrap_or_else(|_| panic!("{name}={text} is no number")))
+    };
+    let seed = number("HEADRACE_PROPERTY_SEED")
+        .unwrap_or_else(|| headrace_ports::now().0 ^ u64::from(std::process::id()) << 40);
+    let count = number("HEADRACE_PROPERTY_CASES").unwrap_or(MANY) / SUBJECTS;
+    println!("{subject}: {count} cases, HEADRACE_PROPERTY_SEED={seed}");
+    let found = failing(subject, seed, count, property);
+    assert!(found.is_empty(), "{}", found.join("\n"));
+    println!("{subject}: {count} cases hold");
+}
+
+/// A planted fault is found, and told with its seed.
+#[test]
+fn a_case_that_fails_is_told_and_comes_again() {
+    let rare = |case: &mut Case| if case.below(500) == 7 { Err("seven".to_owned()) } else { Ok(()) };
+    let found = failing("planted", 1, 5000, &rare);
+    assert!(found.len() > 3, "{found:?}");
+    let seed = found[0].split(['=', ':']).nth(2).unwrap().parse().unwrap();
+    assert_eq!(failing("planted", seed, 1, &rare), found[..1]);
+    let broken = |case: &mut Case| if case.below(500) == 7 { panic!("planted") } else { Ok(()) };
+    assert_eq!(failing("planted", seed, 1, &broken).len(), 1);
+}
