@@ -19,6 +19,7 @@
 #![cfg_attr(not(test), warn(clippy::cast_possible_truncation))]
 #![cfg_attr(test, allow(clippy::cast_possible_truncation))]
 
+mod advice;
 mod alerts;
 mod coverage;
 mod findings;

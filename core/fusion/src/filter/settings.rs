@@ -87,6 +87,8 @@ pub struct Settings {
     pub gate: f64,
     /// Readings older than this on arrival are too late.
     pub window: DurNs,
+    /// Length of an epoch, positive: readings are fused, and errors carried on, once in each. Epochs begin at its multiples.
+    pub epoch: DurNs,
     /// Whether the level of the sources' noise is learnt. Likelihoods can only be compared without.
     pub learns: bool,
 }
@@ -121,6 +123,7 @@ impl Default for Settings {
             velocity_sd_mps: 0.02,
             gate: GATE_999,
             window: DurNs::from_millis(200),
+            epoch: DurNs::from_millis(100),
             learns: true,
         }
     }
