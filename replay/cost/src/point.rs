@@ -1,0 +1,217 @@
+//! What is measured: a setting's error beside its cost, and which settings nothing else beats.
+
+use headrace_geometry::math;
+use serde::Serialize;
+
+/// A figure with the bounds of its spread.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Interval {
+    /// Lower bound.
+    pub low: f64,
+    /// The figure itself.
+    pub middle: f64,
+    /// Upper bound.
+    pub high: f64,
+}
+
+impl Interval {
+    /// A figure without spread.
+    pub fn exact(value: f64) -> Self {
+        Self { low: value, middle: value, high: value }
+    }
+
+    /// Median and quartiles; `None` of nothing. Values between two ranks are interpolated.
+    pub fn quartiles(values: &[f64]) -> Option<Self> {
+        Some(Self {
+            low: quantile(values, 0.25)?,
+            middle: quantile(values, 0.5)?,
+            high: quantile(values, 0.75)?,
+        })
+    }
+
+    /// Mean with its 95 % confidence interval by Student's t; `None` of fewer than two values.
+    pub fn mean(values: &[f64]) -> Option<Self> {
+        if values.len() < 2 {
+            return None;
+        }
+        let n = values.len() as f64;
+        let middle = values.iter().sum::<f64>() / n;
+        let variance =
+            values.iter().map(|value| (value - middle) * (value - middle)).sum::<f64>() / (n - 1.0);
+        let half = student(values.len() - 1) * math::sqrt(variance / n);
+        Some(Self { low: middle - half, middle, high: middle + half })
+    }
+
+    /// The same in another unit: `factor` new units to an old one.
+    #[must_use]
+    pub fn scaled(self, factor: f64) -> Self {
+        Self { low: self.low * factor, middle: self.middle * factor, high: self.high * factor }
+    }
+}
+
+/// A quantile, `share` from 0 to 1, interpolated between two ranks; `None` of nothing.
+pub fn quantile(values: &[f64], share: f64) -> Option<f64> {
+    let mut sorted = values.to_vec();
+    sorted.sort_unstable_by(f64::total_cmp);
+    let rank = share.clamp(0.0, 1.0) * (sorted.len().checked_sub(1)? as f64);
+    let below = usize::try_from(math::floor_to_i64(rank)).ok()?;
+    let (from, part) = (*sorted.get(below)?, rank - below as f64);
+    // Of equal or infinite neighbours no difference is formed.
+    match sorted.get(below + 1) {
+        Some(to) if part > 0.0 && *to > from => Some(from + part * (to - from)),
+        _ => Some(from),
+    }
+}
+
+/// 97.5 % quantile of Student's distribution. Source: its tables, three decimals.
+fn student(freedom: usize) -> f64 {
+    const UP_TO_30: [f64; 30] = [
+        12.706, 4.303, 3.182, 2.776, 2.571, 2.447, 2.365, 2.306, 2.262, 2.228, 2.201, 2.179, 2.160, 2.145,
+        2.131, 2.120, 2.110, 2.101, 2.093, 2.086, 2.080, 2.074, 2.069, 2.064, 2.060, 2.056, 2.052, 2.048,
+        2.045, 2.042,
+    ];
+    UP_TO_30.get(freedom.max(1) - 1).copied().unwrap_or(1.96)
+}
+
+/// One of a point's errors.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Error {
+    /// What is wrong by it, as a heading of a table.
+    pub name: &'static str,
+    /// Its unit.
+    pub unit: &'static str,
+    /// How large it is.
+    pub interval: Interval,
+}
+
+/// A setting, measured.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Point {
+    /// The line that it is a marker of.
+    pub method: String,
+    /// The setting's name.
+    pub knob: String,
+    /// Its value, with its unit.
+    pub value: String,
+    /// The same as a number, where it is one.
+    pub number: Option<f64>,
+    /// Whether headrace is shipped so.
+    pub is_default: bool,
+    /// What was dived; points of different scenes aren't compared, and each scene has its own chart.
+    pub scene: String,
+    /// Number of seeds, each a dive of its own.
+    pub seeds: u32,
+    /// Its errors; the first is the axis's.
+    pub errors: Vec<Error>,
+    /// Its cost, in the unit of the trade's axis: median and quartiles.
+    pub cost: Interval,
+    /// Instructions, counted, per unit of what `cost` is for; `None` where nothing counts them.
+    pub instructions: Option<f64>,
+    /// Whether nothing beats it ([`front`]).
+    pub on_front: bool,
+}
+
+impl Point {
+    /// The error on the axis: the middle of the first one, infinite without any.
+    pub fn error(&self) -> f64 {
+        self.errors.first().map_or(f64::INFINITY, |error| error.interval.middle)
+    }
+}
+
+/// A setting that isn't among the points.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct LeftOut {
+    /// The setting.
+    pub what: String,
+    /// Why.
+    pub why: String,
+}
+
+/// How far the reference itself may be off.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct OracleError {
+    /// How it was found: which two references were held against each other, where.
+    pub how: String,
+    /// Largest difference, in the unit of the trade's first error.
+    pub size: f64,
+}
+
+/// A question of the kind "what does more of this cost", answered.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Trade {
+    /// Its name in `--only` and in names of files.
+    pub name: &'static str,
+    /// Its heading.
+    pub title: String,
+    /// What is asked.
+    pub question: String,
+    /// Name and unit of the axis to the right.
+    pub error_axis: String,
+    /// Name and unit of the axis upwards.
+    pub cost_axis: String,
+    /// Whether cost is computed rather than measured, so that it doesn't differ from run to run.
+    pub cost_is_computed: bool,
+    /// The error below which accuracy decides nothing, a tenth of the target.
+    pub decides: Option<f64>,
+    /// What was measured.
+    pub points: Vec<Point>,
+    /// What wasn't, or failed.
+    pub left_out: Vec<LeftOut>,
+    /// The reference's own error.
+    pub oracle: OracleError,
+    /// Of defaults that something beats, in a sentence each, why they stay.
+    pub reasons: Vec<String>,
+    /// What follows, with a number.
+    pub advice: String,
+}
+
+impl Trade {
+    /// Scenes in the order of their first points.
+    pub fn scenes(&self) -> Vec<&str> {
+        let mut scenes: Vec<&str> = Vec::new();
+        for point in &self.points {
+            if !scenes.contains(&point.scene.as_str()) {
+                scenes.push(&point.scene);
+            }
+        }
+        scenes
+    }
+}
+
+/// Marks the points that no other one of their scene beats.
+///
+/// One beats another if it is no worse in either, and clearly better in one: its error is smaller by more than `resolution`, or its
+/// cost's upper bound is below the other's lower bound. So noise in the costs of equal settings beats neither.
+pub fn front(points: &mut [Point], resolution: f64) {
+    let beats = |one: &Point, other: &Point| {
+        let (error, others) = (one.error(), other.error());
+        let is_cheaper = one.cost.high < other.cost.low;
+        one.scene == other.scene
+            && error <= others + resolution
+            && one.cost.middle <= other.cost.middle
+            && (error < others - resolution || is_cheaper)
+    };
+    let on_front: Vec<bool> =
+        points.iter().map(|point| !points.iter().any(|other| beats(other, point))).collect();
+    for (point, on_front) in points.iter_mut().zip(on_front) {
+        point.on_front = on_front;
+    }
+}
+
+/// The knee of a scene's front: the point farthest below the straight line between the front's ends, both axes logarithmic. `None`
+/// with fewer than three points on the front, or where none lies below the line.
+pub fn knee<'a>(points: &'a [Point], scene: &str) -> Option<&'a Point> {
+    let mut on_front: Vec<(&Point, [f64; 2])> = points
+        .iter()
+        .filter(|point| point.on_front && point.scene == scene)
+        .filter(|point| point.error() > 0.0 && point.error().is_finite() && point.cost.middle > 0.0)
+        .map(|point| (point, [math::ln(point.error()), math::ln(point.cost.middle)]))
+        .collect();
+    on_front.sort_by(|a, b| a.1[0].total_cmp(&b.1[0]));
+    let (from, to) = (on_front.first()?.1, on_front.last()?.1);
+    let [along, up] = [to[0] - from[0], to[1] - from[1]];
+    let below = |at: [f64; 2]| up * (at[0] - from[0]) - along * (at[1] - from[1]);
+    let inner = on_front.get(1..on_front.len().checked_sub(1)?)?;
+    let (point, at) = inner.iter().max_by(|a, b| below(a.1).total_cmp(&below(b.1)))?;
+    (below(*at) > 0.0).then_some(*point)
+}
