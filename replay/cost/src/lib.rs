@@ -5,10 +5,13 @@
 //! `oracle/` the independent values; `dive.rs` the simulated dives that both are found on.
 
 pub mod dive;
+pub mod draw;
 pub mod effort;
 pub mod error;
 pub mod measure;
 pub mod oracle;
+pub mod page;
 pub mod point;
 pub mod scene;
 pub mod trades;
+mod words;

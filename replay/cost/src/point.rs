@@ -1,10 +1,10 @@
 //! What is measured: a setting's error beside its cost, and which settings nothing else beats.
 
 use headrace_geometry::math;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 /// A figure with the bounds of its spread.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Interval {
     /// Lower bound.
     pub low: f64,
@@ -73,19 +73,19 @@ fn student(freedom: usize) -> f64 {
     UP_TO_30.get(freedom.max(1) - 1).copied().unwrap_or(1.96)
 }
 
-/// One of a point's errors.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+/// One of a point's errors; finite.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Error {
     /// What is wrong by it, as a heading of a table.
-    pub name: &'static str,
+    pub name: String,
     /// Its unit.
-    pub unit: &'static str,
+    pub unit: String,
     /// How large it is.
     pub interval: Interval,
 }
 
 /// A setting, measured.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Point {
     /// The line that it is a marker of.
     pub method: String,
@@ -111,6 +111,13 @@ pub struct Point {
     pub on_front: bool,
 }
 
+impl Error {
+    /// An error by its name and unit.
+    pub fn new(name: &str, unit: &str, interval: Interval) -> Self {
+        Self { name: name.to_owned(), unit: unit.to_owned(), interval }
+    }
+}
+
 impl Point {
     /// The error on the axis: the middle of the first one, infinite without any.
     pub fn error(&self) -> f64 {
@@ -119,7 +126,7 @@ impl Point {
 }
 
 /// A setting that isn't among the points.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct LeftOut {
     /// The setting.
     pub what: String,
@@ -128,7 +135,7 @@ pub struct LeftOut {
 }
 
 /// How far the reference itself may be off.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct OracleError {
     /// How it was found: which two references were held against each other, where.
     pub how: String,
@@ -137,10 +144,10 @@ pub struct OracleError {
 }
 
 /// A question of the kind "what does more of this cost", answered.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Trade {
     /// Its name in `--only` and in names of files.
-    pub name: &'static str,
+    pub name: String,
     /// Its heading.
     pub title: String,
     /// What is asked.
@@ -149,6 +156,8 @@ pub struct Trade {
     pub error_axis: String,
     /// Name and unit of the axis upwards.
     pub cost_axis: String,
+    /// Unit of the cost, as in a sentence: "ns a return".
+    pub cost_unit: String,
     /// Whether cost is computed rather than measured, so that it doesn't differ from run to run.
     pub cost_is_computed: bool,
     /// The error below which accuracy decides nothing, a tenth of the target.
