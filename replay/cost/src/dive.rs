@@ -165,6 +165,12 @@ impl Recorded {
         })
     }
 
+    /// From the first to the last packet, s.
+    pub fn duration_s(&self) -> f64 {
+        let ends = self.packets.list.first().zip(self.packets.list.last());
+        ends.map_or(0.0, |((first, ..), (last, ..))| last.since(*first).as_secs_f64())
+    }
+
     /// D_true of a stretch of true chainage, m; infinite without a single sample.
     pub fn true_hole_m(&self, from_m: f64, to_m: f64) -> f64 {
         let key = [from_m.to_bits(), to_m.to_bits()];

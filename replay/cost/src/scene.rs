@@ -9,7 +9,7 @@ use crate::effort::Effort;
 use crate::error::CostError;
 
 /// Files that come with the program, by name.
-pub const FILES: [(&str, &str); 10] = [
+pub const FILES: [(&str, &str); 11] = [
     ("vita1.toml", include_str!("../../../deploy/vehicles/vita1.toml")),
     ("vita2-2.toml", include_str!("../../../deploy/vehicles/vita2-2.toml")),
     ("vita2-3.toml", include_str!("../../../deploy/vehicles/vita2-3.toml")),
@@ -19,6 +19,7 @@ pub const FILES: [(&str, &str); 10] = [
     ("collapse.toml", include_str!("../../../deploy/scenes/collapse.toml")),
     ("demo.toml", include_str!("../../../deploy/scenes/demo.toml")),
     ("drop-outs.toml", include_str!("../../../deploy/scenes/drop-outs.toml")),
+    ("small-pipe.toml", include_str!("../../../deploy/scenes/small-pipe.toml")),
     ("vita1-field.toml", include_str!("../../../deploy/scenes/vita1-field.toml")),
 ];
 
