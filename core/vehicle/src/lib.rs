@@ -22,6 +22,7 @@
 mod alerts;
 mod coverage;
 mod findings;
+mod inspection;
 mod mission;
 mod navigation;
 mod sensors;

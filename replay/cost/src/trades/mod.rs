@@ -1,11 +1,19 @@
 //! The trades: each a file with a function `measure`, listed here.
 
+pub mod survey;
+
 use crate::error::CostError;
-use crate::point::Trade;
+use crate::point::{Given, Trade};
 use crate::scene::Inputs;
 
 /// Measures a trade; what is being done is told to the second argument.
 pub type Measure = fn(&Inputs<'_>, &mut dyn FnMut(&str)) -> Result<Trade, CostError>;
 
+/// Makes a table of what isn't a choice.
+pub type Tabulate = fn(&Inputs<'_>, &mut dyn FnMut(&str)) -> Result<Given, CostError>;
+
 /// All trades by name, in the order of the page.
-pub const TRADES: [(&str, Measure); 0] = [];
+pub const TRADES: [(&str, Measure); 1] = [("survey", survey::measure)];
+
+/// Tables of what isn't a choice, below the trades.
+pub const GIVEN: [Tabulate; 0] = [];
