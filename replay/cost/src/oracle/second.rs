@@ -26,10 +26,11 @@ pub fn hole_m(wall: &Wall, from_m: f64, to_m: f64) -> f64 {
     2.0 * best_m
 }
 
-/// The largest difference between both references over stretches of a section's length between two chainages, m.
+/// By how much D_true of a dive may be off, m: the largest difference between both references over stretches of a section's length
+/// between two chainages, and what the arc lengths of two samples may add.
 ///
 /// Errors: as for [`Wall::new`].
-pub fn largest_difference_m(
+pub fn may_be_off_m(
     truth: &Truth,
     [from_m, to_m]: [f64; 2],
     stretch_m: f64,
@@ -51,5 +52,5 @@ pub fn largest_difference_m(
         let other_m = hole_m(&Wall::new(places, truth.perimeter_m)?, begin_m, end_m);
         largest_m = largest_m.max((one_m - other_m).abs());
     }
-    Ok(largest_m)
+    Ok(largest_m + 2.0 * truth.arc_off_m)
 }

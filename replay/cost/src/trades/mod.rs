@@ -1,5 +1,7 @@
 //! The trades: each a file with a function `measure`, listed here.
 
+mod cells;
+pub mod holes;
 pub mod survey;
 
 use crate::error::CostError;
@@ -13,7 +15,7 @@ pub type Measure = fn(&Inputs<'_>, &mut dyn FnMut(&str)) -> Result<Trade, CostEr
 pub type Tabulate = fn(&Inputs<'_>, &mut dyn FnMut(&str)) -> Result<Given, CostError>;
 
 /// All trades by name, in the order of the page.
-pub const TRADES: [(&str, Measure); 1] = [("survey", survey::measure)];
+pub const TRADES: [(&str, Measure); 2] = [("survey", survey::measure), ("holes", holes::measure)];
 
 /// Tables of what isn't a choice, below the trades.
 pub const GIVEN: [Tabulate; 0] = [];
