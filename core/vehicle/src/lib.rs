@@ -23,6 +23,7 @@ mod advice;
 mod alerts;
 mod coverage;
 mod findings;
+mod inspection;
 mod mission;
 mod navigation;
 mod sensors;

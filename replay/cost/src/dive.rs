@@ -193,10 +193,27 @@ impl Recorded {
         navigation: Box<dyn Navigation>,
         note: &mut dyn FnMut(&Loop),
     ) -> Result<JudgedDive, CostError> {
+        Ok(self.judge(&self.replayed(vehicle, navigation, note)?))
+    }
+
+    /// A loop at the end of a replay, for [`Recorded::judge`].
+    ///
+    /// Errors: the loop can't be armed or driven.
+    pub fn replayed(
+        &self,
+        vehicle: &VehicleConfig,
+        navigation: Box<dyn Navigation>,
+        note: &mut dyn FnMut(&Loop),
+    ) -> Result<Loop, CostError> {
         let mut dive = armed(vehicle, navigation, &[&Watch])?;
         drive(&mut dive, &mut self.packets.feed(), Pace::default(), &mut |dive: &Loop| note(dive))?;
         dive.finish(&mut |_, _| {});
-        let report = Report::of(&dive);
+        Ok(dive)
+    }
+
+    /// What a replayed loop reports, beside the truth.
+    pub fn judge(&self, dive: &Loop) -> JudgedDive {
+        let report = Report::of(dive);
         let shifts = dive.resource::<Seen>().map_or_else(Shifts::default, |seen| seen.shifts(&self.scenery));
         let judge = |section: &SectionReport| {
             let shift_m = shifts.about(section.start_m, section.end_m);
@@ -204,7 +221,7 @@ impl Recorded {
             JudgedSection { report: section.clone(), true_hole_m, shift_m }
         };
         let sections = report.sections.iter().map(judge).collect();
-        Ok(JudgedDive { report, truth: Rc::clone(&self.truth), sections })
+        JudgedDive { report, truth: Rc::clone(&self.truth), sections }
     }
 
     /// CPU time of a replay with the settings of a vehicle file, s; without arming and without the report.
@@ -223,6 +240,22 @@ impl Recorded {
         navigation: Box<dyn Navigation>,
         pace: Pace,
     ) -> Result<f64, CostError> {
+        Ok(self.timed_with(vehicle, navigation, pace)?.1)
+    }
+
+    /// A loop at the end of a replay, and the CPU time of it, s.
+    ///
+    /// Errors: the loop can't be armed or driven.
+    pub fn timed(&self, vehicle: &VehicleConfig) -> Result<(Loop, f64), CostError> {
+        self.timed_with(vehicle, vehicle.navigation(), Pace::default())
+    }
+
+    fn timed_with(
+        &self,
+        vehicle: &VehicleConfig,
+        navigation: Box<dyn Navigation>,
+        pace: Pace,
+    ) -> Result<(Loop, f64), CostError> {
         let mut dive = armed(vehicle, navigation, &[])?;
         let (driven, cpu_s) = timed(|| {
             let driven = drive(&mut dive, &mut self.packets.feed(), pace, &mut |_| {});
@@ -230,7 +263,7 @@ impl Recorded {
             driven
         });
         driven?;
-        Ok(cpu_s)
+        Ok((dive, cpu_s))
     }
 }
 

@@ -14,4 +14,5 @@ pub mod page;
 pub mod point;
 pub mod scene;
 pub mod trades;
+pub mod verdicts;
 mod words;

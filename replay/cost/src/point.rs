@@ -187,6 +187,19 @@ impl Trade {
     }
 }
 
+/// A table beside the trades: what isn't a choice, and what it costs.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Given {
+    /// Its heading.
+    pub title: String,
+    /// What it says, in a paragraph.
+    pub text: String,
+    /// Headings of its columns.
+    pub columns: Vec<String>,
+    /// Its rows.
+    pub rows: Vec<Vec<String>>,
+}
+
 /// Marks the points that no other one of their scene beats.
 ///
 /// One beats another if it is no worse in either, and clearly better in one: its error is smaller by more than `resolution`, or its

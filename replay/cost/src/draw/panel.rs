@@ -19,6 +19,8 @@ pub(super) const PLATEAU: Colour = Colour(255, 240, 200);
 const WHISKER: Look = Look { colour: Colour(170, 170, 170), width_px: 0.9, ..look::T };
 /// Errors within this ratio of the least are the plateau's.
 const SAME: f64 = 1.05;
+/// The least error that is told, as a multiple of the oracle's own.
+const CLEAR: f64 = 10.0;
 /// Room about the outermost points, as a ratio.
 const ROOM: f64 = 1.25;
 
@@ -59,13 +61,13 @@ impl<'a> Panel<'a> {
         }
     }
 
-    /// Where a point is drawn: errors that the oracle can't tell from none are drawn at the oracle's own.
+    /// Where a point is drawn: errors that the oracle can't tell are drawn at the least that it can.
     fn place(&self, point: &Point) -> [f64; 2] {
         [self.shown(point.error()), point.cost.middle]
     }
 
     fn shown(&self, error: f64) -> f64 {
-        error.max(self.trade.oracle.size)
+        error.max(CLEAR * self.trade.oracle.size)
     }
 
     fn ranges(&self) -> Option<[[f64; 2]; 2]> {

@@ -2,5 +2,6 @@
 //! search for holes doesn't use, on arc lengths that share no ray casting with it.
 
 pub mod outline;
+pub mod second;
 pub mod truth;
 pub mod wall;

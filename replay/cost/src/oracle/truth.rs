@@ -3,6 +3,7 @@
 //! A return is of the wall where its beam's axis met something that stays (wall, boulder, opening's side), within the head's range,
 //! and no effect put another sound or nothing in its place ([`REPLACING`]).
 
+use headrace_geometry::math;
 use headrace_geometry::time::MonoNs;
 use headrace_geometry::tunnel::Profile;
 use headrace_sensor::device::Sense;
@@ -49,6 +50,8 @@ pub struct Truth {
     pub perimeter_m: f64,
     /// Returns of profiling heads, of the wall or not.
     pub returns: u64,
+    /// Largest difference of a sample's arc length from the one that the simulator's rays give, m.
+    pub arc_off_m: f64,
 }
 
 impl Truth {
@@ -80,6 +83,7 @@ impl TruthTaker {
             way_m: [f64::INFINITY, f64::NEG_INFINITY],
             perimeter_m: outline.perimeter_m(),
             returns: 0,
+            arc_off_m: 0.0,
         };
         Self {
             outline,
@@ -96,7 +100,11 @@ impl TruthTaker {
             self.truth.way_m = [least_m.min(row.chainage_m), most_m.max(row.chainage_m)];
             let is_return = row.sounding.is_some_and(|sounding| sounding.measured.range_m.is_some());
             self.truth.returns += u64::from(row.sense == Sense::Head && is_return);
-            self.truth.samples.extend(self.sample(&row, simulation));
+            if let (Some(sample), Some((_, arc_m))) = (self.sample(&row, simulation), row.wall()) {
+                let off_m = math::wrap_signed(sample.place[1] - arc_m, self.truth.perimeter_m);
+                self.truth.arc_off_m = self.truth.arc_off_m.max(off_m.abs());
+                self.truth.samples.push(sample);
+            }
         }
     }
 

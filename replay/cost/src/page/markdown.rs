@@ -1,7 +1,7 @@
 //! The page.
 
-use super::{Given, Results};
-use crate::point::{Interval, Point, Trade};
+use super::Results;
+use crate::point::{Given, Interval, Point, Trade};
 use crate::words::{self, append, number};
 
 /// The whole page.

@@ -8,25 +8,12 @@ mod table;
 use serde::{Deserialize, Serialize};
 
 use crate::draw;
-use crate::point::Trade;
+use crate::point::{Given, Trade};
 
 pub use table::table;
 
 /// Version of `cost.json`.
 pub const COST_VERSION: u32 = 1;
-
-/// A table beside the trades: what isn't a choice, and what it costs.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct Given {
-    /// Its heading.
-    pub title: String,
-    /// What it says, in a paragraph.
-    pub text: String,
-    /// Headings of its columns.
-    pub columns: Vec<String>,
-    /// Its rows.
-    pub rows: Vec<Vec<String>>,
-}
 
 /// All that was measured.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]

@@ -13,7 +13,7 @@ use headrace_replay::drive::{Driver, Pace};
 use headrace_sampling::advice::{Looks, SPEED_MARGIN};
 use headrace_vehicle::VehicleConfig;
 
-use super::judging::{error, rms};
+use super::figures::{error, rms};
 use crate::dive::{Recorded, armed};
 use crate::error::CostError;
 use crate::measure::{in_turns, timed};
@@ -91,14 +91,15 @@ pub fn measure(inputs: &Inputs<'_>, progress: &mut dyn FnMut(&str)) -> Result<Tr
 
 fn scenes(inputs: &Inputs<'_>) -> Result<Vec<(&'static str, String)>, CostError> {
     let demo = file("demo.toml")?;
-    let ends_m = inputs.effort.pick(["4.0", "5.0", "6.0"], ["5.0", "8.0", "12.0"]);
+    let ends_m = inputs.effort.pick(["3.0", "3.5", "4.0"], ["5.0", "7.0", "9.0"]);
     let mut shorter = demo.to_owned();
     for (from, to) in ["14.0", "20.0", "32.0"].iter().zip(ends_m) {
         shorter = shorter.replace(&format!("chainage_m = {from}"), &format!("chainage_m = {to}"));
     }
-    let to_m = inputs.effort.pick(7, 10);
-    let pilot = format!("{PILOT}to_m = {to_m}\n{PILOT_EFFECTS}");
-    Ok(vec![("demo", shorter), ("pilot", pilot)])
+    let pilot = format!("{PILOT}to_m = 8\n{PILOT_EFFECTS}");
+    let mut scenes = vec![("demo", shorter)];
+    scenes.extend(inputs.effort.pick(None, Some(("pilot", pilot))));
+    Ok(scenes)
 }
 
 /// A lively pilot of VITA 2 with four heads.

@@ -7,7 +7,7 @@ use headrace_simulator::environment::What;
 use headrace_simulator::{Scene, Simulation};
 
 use self::effects::{ALL, without};
-use super::judging::{error, spread};
+use super::figures::{error, spread};
 use crate::dive::{JudgedDive, Recorded};
 use crate::error::CostError;
 use crate::measure::{in_turns, timed};
