@@ -237,3 +237,78 @@ pub fn knee<'a>(points: &'a [Point], scene: &str) -> Option<&'a Point> {
     let (point, at) = inner.iter().max_by(|a, b| below(a.1).total_cmp(&below(b.1)))?;
     (below(*at) > 0.0).then_some(*point)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn point(value: &str, error: f64, cost: [f64; 3]) -> Point {
+        let [low, middle, high] = cost;
+        Point {
+            method: "m".to_owned(),
+            knob: "k".to_owned(),
+            value: value.to_owned(),
+            number: None,
+            is_default: false,
+            scene: "s".to_owned(),
+            seeds: 1,
+            errors: vec![Error::new("e", "m", Interval::exact(error))],
+            cost: Interval { low, middle, high },
+            instructions: None,
+            on_front: false,
+        }
+    }
+
+    fn on_front(points: &mut [Point]) -> Vec<&str> {
+        front(points, 1e-9);
+        points.iter().filter(|point| point.on_front).map(|point| point.value.as_str()).collect()
+    }
+
+    #[test]
+    fn a_planted_slow_method_is_off_the_front() {
+        let mut points = [
+            point("fine", 0.01, [9.0, 10.0, 11.0]),
+            point("fine but slow", 0.01, [90.0, 100.0, 110.0]),
+            point("coarse", 0.1, [4.0, 5.0, 6.0]),
+            point("coarse and slow", 0.2, [19.0, 20.0, 21.0]),
+        ];
+        assert_eq!(on_front(&mut points), ["fine", "coarse"]);
+    }
+
+    #[test]
+    fn noise_of_equal_settings_beats_neither() {
+        let mut points = [point("a", 0.01, [9.0, 10.0, 11.0]), point("b", 0.01, [9.5, 10.4, 11.5])];
+        assert_eq!(on_front(&mut points), ["a", "b"]);
+    }
+
+    #[test]
+    fn points_of_other_scenes_beat_nothing() {
+        let mut elsewhere = point("there", 0.001, [1.0; 3]);
+        elsewhere.scene = "elsewhere".to_owned();
+        assert_eq!(on_front(&mut [point("here", 0.01, [9.0; 3]), elsewhere]), ["here", "there"]);
+    }
+
+    #[test]
+    fn the_knee_lies_farthest_below_the_line_between_the_ends() {
+        let mut points = [
+            point("finest", 0.001, [1000.0; 3]),
+            point("knee", 0.01, [20.0; 3]),
+            point("near the line", 0.1, [15.0; 3]),
+            point("coarsest", 1.0, [10.0; 3]),
+        ];
+        front(&mut points, 0.0);
+        assert_eq!(knee(&points, "s").map(|point| point.value.as_str()), Some("knee"));
+        assert!(knee(&points[..2], "s").is_none() && knee(&points, "another").is_none());
+    }
+
+    #[test]
+    fn spreads_are_those_of_tables() {
+        let values = [4.0, 1.0, 3.0, 2.0, 5.0];
+        assert_eq!(Interval::quartiles(&values), Some(Interval { low: 2.0, middle: 3.0, high: 4.0 }));
+        // Mean 3, variance 2.5; t of four degrees of freedom is 2.776.
+        let mean = Interval::mean(&values).unwrap();
+        assert!((mean.middle - 3.0).abs() < 1e-12 && (mean.high - 4.963).abs() < 1e-3, "{mean:?}");
+        assert_eq!(Interval::mean(&[1.0]), None);
+        assert_eq!(quantile(&[], 0.5), None);
+    }
+}

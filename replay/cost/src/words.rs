@@ -24,7 +24,7 @@ pub(crate) fn number(value: f64) -> String {
 
 /// A setting: method, knob and value.
 pub(crate) fn setting(point: &Point) -> String {
-    if point.value.is_empty() { point.method.clone() } else { format!("{} {}", point.knob, point.value) }
+    if point.value.is_empty() { point.knob.clone() } else { format!("{} {}", point.knob, point.value) }
 }
 
 /// A setting with its error and cost.

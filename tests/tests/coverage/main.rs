@@ -6,6 +6,7 @@ mod bad;
 mod cable;
 mod causes;
 mod confidence;
+mod cost;
 mod dives;
 mod faults;
 mod field;

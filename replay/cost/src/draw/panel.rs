@@ -34,7 +34,7 @@ pub(super) struct Panel<'a> {
 impl<'a> Panel<'a> {
     pub(super) fn of(trade: &'a Trade, scene: &'a str, top_px: f64, height_px: f64) -> Self {
         let frame =
-            Frame { left: 84.0, top: top_px + 34.0, right: 780.0, bottom: top_px + height_px - 112.0 };
+            Frame { left: 96.0, top: top_px + 34.0, right: 780.0, bottom: top_px + height_px - 112.0 };
         let points = trade.points.iter().filter(|point| point.scene == scene);
         Self { trade, scene, points: points.filter(|point| point.cost.middle > 0.0).collect(), frame }
     }
@@ -46,7 +46,7 @@ impl<'a> Panel<'a> {
             return;
         };
         let x_axis = Axis::logarithmic(&self.trade.error_axis, x[0], x[1], 10).with_name_at(34.0);
-        let y_axis = Axis::logarithmic(&self.trade.cost_axis, y[0], y[1], 8).with_name_at(50.0);
+        let y_axis = Axis::logarithmic(&self.trade.cost_axis, y[0], y[1], 8).with_name_at(62.0);
         self.plateau(canvas, x, y);
         let chart = Chart::new(canvas, self.frame, &x_axis, &y_axis);
         if let Some(decides) = self.trade.decides.filter(|decides| (x[0]..x[1]).contains(decides)) {
@@ -170,6 +170,7 @@ impl<'a> Panel<'a> {
                 (false, true) => format!("{}: knee", point.value),
                 (false, false) => point.value.clone(),
             };
+            let text = if point.value.is_empty() { point.knob.clone() + &text } else { text };
             let letters = if point.is_default || is_knee(point) { BOLD } else { SMALL };
             let at = chart.px(self.place(point));
             if let Some(placed) = taken.label(at, &text, letters, &self.frame) {

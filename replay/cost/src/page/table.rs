@@ -3,54 +3,67 @@
 use crate::point::{Point, Trade};
 use crate::words::{self, append, number};
 
-/// A trade as a table, with its advice.
+/// A trade as a table, with its advice. Figures are numbered; what they are stands below.
 pub fn table(trade: &Trade) -> String {
     let mut text = format!("{}\n{}\n", trade.title, trade.question);
-    let [wide, methods] = [
-        trade.points.iter().map(|point| words::setting(point).chars().count()).max().unwrap_or(0),
-        trade.points.iter().map(|point| point.method.chars().count()).max().unwrap_or(0),
-    ];
-    for scene in trade.scenes() {
-        append(&mut text, format_args!("\n  {scene}\n"));
-        for point in trade.points.iter().filter(|point| point.scene == scene) {
-            text.push_str(&row(trade, point, methods, wide));
+    let mut names: Vec<String> = Vec::new();
+    for error in trade.points.iter().flat_map(|point| &point.errors) {
+        let name = format!("{}, {}", error.name, error.unit);
+        if !names.contains(&name) {
+            names.push(name);
         }
     }
+    let wide = |of: &dyn Fn(&Point) -> usize| trade.points.iter().map(of).max().unwrap_or(0);
+    let widths =
+        [wide(&|point| point.method.chars().count()), wide(&|point| words::setting(point).chars().count())];
+    for scene in trade.scenes() {
+        let heads = (1..=names.len()).map(|number| format!("{:>9}", format!("[{number}]")));
+        let heads = heads.collect::<Vec<_>>().concat();
+        append(
+            &mut text,
+            format_args!("\n  {scene:<0$}{1:>24}{heads}\n", widths[0] + widths[1] + 4, trade.cost_unit),
+        );
+        for point in trade.points.iter().filter(|point| point.scene == scene) {
+            text.push_str(&row(point, &names, widths));
+        }
+    }
+    text.push('\n');
+    for (k, name) in names.iter().enumerate() {
+        append(&mut text, format_args!("  [{}] {name}\n", k + 1));
+    }
+    let (size, how) = (number(trade.oracle.size), &trade.oracle.how);
     append(
         &mut text,
         format_args!(
-            "\n  * on the front; (shipped) the default; error: {}\n  oracle's own error {}: {}\n",
-            trade.error_axis,
-            number(trade.oracle.size),
-            trade.oracle.how
+            "  * nothing beats it   # as shipped   cost with its quartiles\n  oracle's own error {size}: {how}\n"
         ),
     );
     for left in &trade.left_out {
         append(&mut text, format_args!("  left out: {}: {}\n", left.what, left.why));
     }
-    for line in words::defaults(trade).iter().chain(&trade.reasons) {
+    for line in words::defaults(trade).iter().chain(&trade.reasons).chain([&trade.advice]) {
         append(&mut text, format_args!("  {line}\n"));
     }
-    append(&mut text, format_args!("  {}\n", trade.advice));
     text
 }
 
-fn row(trade: &Trade, point: &Point, methods: usize, wide: usize) -> String {
-    let errors: Vec<String> = point
-        .errors
-        .iter()
-        .map(|error| format!("{} {} {}", error.name, number(error.interval.middle), error.unit))
-        .collect();
+fn row(point: &Point, names: &[String], [methods, settings]: [usize; 2]) -> String {
+    let figure = |name: &String| {
+        let error = point.errors.iter().find(|error| format!("{}, {}", error.name, error.unit) == *name);
+        format!("{:>9}", error.map(|error| number(error.interval.middle)).unwrap_or_default())
+    };
+    let cost = point.cost;
+    let spread = if cost.high > cost.low {
+        format!("{} ({} to {})", number(cost.middle), number(cost.low), number(cost.high))
+    } else {
+        number(cost.middle)
+    };
     format!(
-        "  {} {:<methods$}  {:<wide$}  {:>9} {} ({} to {})  {}{}\n",
+        "  {}{} {:<methods$} {:<settings$}{spread:>24}{}\n",
         if point.on_front { '*' } else { ' ' },
+        if point.is_default { '#' } else { ' ' },
         point.method,
         words::setting(point),
-        number(point.cost.middle),
-        trade.cost_unit,
-        number(point.cost.low),
-        number(point.cost.high),
-        errors.join(", "),
-        if point.is_default { "  (shipped)" } else { "" }
+        names.iter().map(figure).collect::<Vec<_>>().concat(),
     )
 }
