@@ -7,6 +7,7 @@ mod cable;
 mod causes;
 mod confidence;
 mod cost;
+mod cost_trades;
 mod dives;
 mod faults;
 mod field;

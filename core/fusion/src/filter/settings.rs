@@ -87,7 +87,8 @@ pub struct Settings {
     pub gate: f64,
     /// Readings older than this on arrival are too late.
     pub window: DurNs,
-    /// Length of an epoch, positive: readings are fused, and errors carried on, once in each. Epochs begin at its multiples.
+    /// Length of an epoch, positive, 0.2 s at most for estimates that hold: readings are fused, and errors carried on, once in each.
+    /// Epochs begin at its multiples.
     pub epoch: DurNs,
     /// Whether the level of the sources' noise is learnt. Likelihoods can only be compared without.
     pub learns: bool,

@@ -91,7 +91,7 @@ pub fn measure(inputs: &Inputs<'_>, progress: &mut dyn FnMut(&str)) -> Result<Tr
 
 fn scenes(inputs: &Inputs<'_>) -> Result<Vec<(&'static str, String)>, CostError> {
     let demo = file("demo.toml")?;
-    let ends_m = inputs.effort.pick(["3.0", "3.5", "4.0"], ["5.0", "7.0", "9.0"]);
+    let ends_m = inputs.effort.pick(["2.6", "2.9", "3.2"], ["5.0", "7.0", "9.0"]);
     let mut shorter = demo.to_owned();
     for (from, to) in ["14.0", "20.0", "32.0"].iter().zip(ends_m) {
         shorter = shorter.replace(&format!("chainage_m = {from}"), &format!("chainage_m = {to}"));
@@ -244,7 +244,7 @@ impl Ran {
     fn other_verdicts(&self, other: &Self) -> f64 {
         let differing = self.verdicts.iter().zip(&other.verdicts).filter(|(a, b)| a != b).count();
         let differing = differing + self.verdicts.len().abs_diff(other.verdicts.len());
-        100.0 * differing as f64 / other.verdicts.len().max(1) as f64
+        100.0 * differing as f64 / self.verdicts.len().max(other.verdicts.len()).max(1) as f64
     }
 }
 
@@ -365,8 +365,8 @@ fn advice(points: &[Point]) -> String {
     let most = points.iter().rfind(|point| point.method == "vertices");
     let ring = ring.map(|(usual, finest)| {
         format!(
-            "A ring of 0.1 degrees in place of 0.3 moves the advised speed by {:.4} m/s and takes {:.2} times the loop's time.",
-            (usual.error() - finest.error()).abs(),
+            "A ring of 0.1 degrees in place of 0.3 moves the advised speed by {:.2} mm/s and takes {:.2} times the loop's time.",
+            1e3 * (usual.error() - finest.error()).abs(),
             finest.cost.middle / usual.cost.middle,
         )
     });

@@ -134,9 +134,11 @@ fn single_precision(inputs: &Inputs<'_>) -> Result<Vec<String>, CostError> {
 
 /// Samples packed to some four bytes, against as many that stay open.
 fn packing(inputs: &Inputs<'_>) -> Result<Vec<String>, CostError> {
-    let packed = filled(PACKED_M)?;
+    let (half, packed) = (filled(PACKED_M / 2)?, filled(PACKED_M)?);
     let moved_m = packed.fidelity(0.0, 10.0).moved_m;
-    let bytes = packed.usage().bytes as f64 / packed.usage().kept.max(1) as f64;
+    // What is open is as much in both.
+    let [fewer, more] = [half.usage(), packed.usage()];
+    let bytes = (more.bytes - fewer.bytes) as f64 / (more.kept - fewer.kept).max(1) as f64;
     let costs = in_turns(inputs.effort.rounds(), &[PACKED_M, OPEN_M], |metres| {
         let mut store = empty();
         let (filled, cpu_s) = timed(|| fill(&mut store, *metres));

@@ -35,7 +35,7 @@ const DECIDES_M: f64 = 0.05;
 /// The time at which a section is passed is found to this, s.
 const MOMENT_S: f64 = 0.1;
 /// So much of a dive is timed, s.
-const TIMED_S: f64 = 30.0;
+const TIMED_S: f64 = 15.0;
 /// What is worse by less than this is the same.
 const RESOLUTION_M: f64 = 5e-4;
 /// A beam of more than a turn: no return of a head is ever far enough from the one before to be used.

@@ -30,7 +30,7 @@ const LEAST_SEEDS: u32 = 2;
 /// So many seconds of a dive are timed, at most: a slice of the simulation is a second.
 const TIMED_S: u32 = 8;
 /// As [`MANY_RAYS`] take their time.
-const RAYS_SEEDS: u32 = 3;
+const RAYS_SEEDS: u32 = 2;
 
 /// A scene with what may be left out of it.
 struct Stage {
@@ -79,7 +79,7 @@ pub fn measure(inputs: &Inputs<'_>, progress: &mut dyn FnMut(&str)) -> Result<Tr
         cost_is_computed: false,
         decides: Some(DECIDES_M),
         points,
-        left_out: left_out(),
+        left_out: left_out(inputs),
         oracle: OracleError {
             how: format!("{MANY_RAYS} rays against {OTHER_RAYS}, which lie elsewhere within the beam"),
             size,
@@ -118,16 +118,15 @@ fn stages(inputs: &Inputs<'_>) -> Result<Vec<Stage>, CostError> {
         let collapse = file("collapse.toml")?;
         let collapse = shorter(collapse, "start_m = 5\n", "start_m = 16\n")?;
         stages.push(stage("collapse", shorter(&collapse, "distance_m = 45", "distance_m = 12")?));
-        let field = file("vita1-field.toml")?;
-        stages.push(stage("field", shorter(field, "distance_m = 130", "distance_m = 40")?));
+        stages.push(field(30)?);
         stages.push(stage("all effects", format!("{BARE}{ALL}")));
     }
     Ok(stages)
 }
 
 /// Boulders round the wall, from the smallest to the largest, m.
-const BOULDERS: u32 = 80;
-const SMALLEST_M: f64 = 0.05;
+const BOULDERS: u32 = 60;
+const SMALLEST_M: f64 = 0.02;
 const LARGEST_M: f64 = 0.8;
 
 /// Size of a boulder, m: neighbours in number are neighbours in size.
@@ -152,19 +151,29 @@ const BOULDERS_EFFECTS: &str =
 /// VITA 2 with four heads along a plain stretch.
 const BARE: &str = "vehicle = \"vita2-4.toml\"\n[trajectory]\nstart_m = 5\n[[trajectory.legs]]\ndistance_m = 10\nspeed_mps = 0.09\n";
 
-/// The scenes whose beams' rays are varied: short ones.
+/// The scenes whose beams' rays are varied: short ones, since a thousand rays take their time. The first is the one on which both
+/// references are held against each other.
 fn beams(inputs: &Inputs<'_>) -> Result<Vec<Stage>, CostError> {
-    let [metres, count] = inputs.effort.pick([1.2, 1.0], [2.0, 3.0]);
-    let mut beams = stages(inputs)?;
-    beams.truncate(math::round_to_i64(count).try_into().unwrap_or(1));
-    for stage in &mut beams {
+    let lengths = inputs.effort.pick(&[("field", 14.0)][..], &[("field", 30.0), ("boulders", 1.0)]);
+    let mut of_field = vec![field(20)?];
+    of_field.extend(stages(inputs)?.into_iter().filter(|stage| stage.name == "boulders"));
+    let mut beams = Vec::new();
+    for (mut stage, (_, metres)) in of_field.into_iter().zip(lengths) {
         let legs = stage.text.lines().map(|line| match line.starts_with("distance_m") {
             true => format!("distance_m = {metres}\n"),
             false => format!("{line}\n"),
         });
         stage.text = legs.collect();
+        beams.push(stage);
     }
     Ok(beams)
+}
+
+/// The shipped field scene over so many metres.
+fn field(length_m: u32) -> Result<Stage, CostError> {
+    let text = file("vita1-field.toml")?.replace("distance_m = 130", &format!("distance_m = {length_m}"));
+    let effects = effects::named(&text);
+    Ok(Stage { name: "field", text, effects, boulders_m: Vec::new() })
 }
 
 fn effects_of(inputs: &Inputs<'_>, stage: &Stage, seeds: u32) -> Result<Vec<Point>, CostError> {
@@ -220,6 +229,9 @@ fn rays_of(inputs: &Inputs<'_>, stage: &Stage, seeds: u32) -> Result<(Vec<Point>
             on_front: false,
         },
     );
+    if stage.name != "field" {
+        return Ok((points.collect(), 0.0));
+    }
     // One dive says how far two references are apart.
     let others = [MANY_RAYS, OTHER_RAYS].map(text).into_iter().collect::<Result<Vec<_>, CostError>>()?;
     let (references, _) = self::differences(inputs, &others, 1)?;
@@ -269,11 +281,13 @@ fn differences(
         for (((_, text), differences), hits) in texts.iter().zip(&mut differences).zip(&mut hits) {
             let figures = Figures::of(
                 &inputs.scene(text, seed)?,
-                text.contains("\"boulder\"") && !text.contains("rays = "),
+                seed == 1 && text.contains("\"boulder\"") && !text.contains("rays = "),
             )?;
             let against = whole.as_ref().unwrap_or(&figures);
             compare(against, &figures, differences);
-            hits.push(figures.features_hit.clone());
+            if seed == 1 {
+                hits.push(figures.features_hit.clone());
+            }
             whole.get_or_insert(figures);
         }
     }
@@ -368,15 +382,26 @@ fn costs_ns(inputs: &Inputs<'_>, texts: &[(String, String)]) -> Result<Vec<Inter
     })
 }
 
-fn left_out() -> Vec<LeftOut> {
-    vec![
+fn left_out(inputs: &Inputs<'_>) -> Vec<LeftOut> {
+    let mut left_out = vec![
         LeftOut {
             what: "steps of rays by distance".to_owned(),
             why: "a ray in a bent or narrowing tunnel advances by what the wall's slope bounds, and ends at a root to 1e-11 m \
                   (`LEAST_STEP_M` and `ROOT_M` of the tube): shorter steps would change no result, and longer ones would miss walls"
                 .to_owned(),
         },
-    ]
+        LeftOut {
+            what: "rays in the small pipe and the collapse".to_owned(),
+            why: "a thousand rays take minutes where walls bend or blocks lie about".to_owned(),
+        },
+    ];
+    if inputs.effort.pick(true, false) {
+        left_out.push(LeftOut {
+            what: "collapse, field, all effects, and rays among boulders".to_owned(),
+            why: "`--quick`; the whole measurement has them".to_owned(),
+        });
+    }
+    left_out
 }
 
 /// The dearest effect that changed nothing, and the one that changed most.

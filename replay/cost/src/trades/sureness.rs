@@ -120,7 +120,7 @@ fn point(
 
 /// What verdicts of so many sigma are worth in field dives, half at a speed and half faster.
 fn dived(inputs: &Inputs<'_>, confidence: u32, speed_mps: f64) -> Result<Vec<Error>, CostError> {
-    let half_m = inputs.effort.pick(4.0, 6.0);
+    let half_m = inputs.effort.pick(8.0, 15.0);
     let legs = [(half_m, speed_mps), (half_m, HURRY * speed_mps)];
     // Phases hold for a speed to a millimetre a second.
     let changes = format!("[vehicle_changes]\nheads.planned_speed_mps = {speed_mps:.3}\n");
