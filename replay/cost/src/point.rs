@@ -116,12 +116,22 @@ impl Error {
     pub fn new(name: &str, unit: &str, interval: Interval) -> Self {
         Self { name: name.to_owned(), unit: unit.to_owned(), interval }
     }
+
+    /// Name and unit.
+    fn heading(&self) -> String {
+        format!("{}, {}", self.name, self.unit)
+    }
 }
 
 impl Point {
     /// The error on the axis: the middle of the first one, infinite without any.
     pub fn error(&self) -> f64 {
         self.errors.first().map_or(f64::INFINITY, |error| error.interval.middle)
+    }
+
+    /// A figure by its name and unit, as [`Trade::figures`] lists them.
+    pub(crate) fn figure(&self, named: &str) -> Option<Interval> {
+        self.errors.iter().find(|error| error.heading() == named).map(|error| error.interval)
     }
 }
 
@@ -175,6 +185,17 @@ pub struct Trade {
 }
 
 impl Trade {
+    /// Names of all figures of its points with their units, in the order of the first ones.
+    pub(crate) fn figures(&self) -> Vec<String> {
+        let mut figures: Vec<String> = Vec::new();
+        for heading in self.points.iter().flat_map(|point| &point.errors).map(Error::heading) {
+            if !figures.contains(&heading) {
+                figures.push(heading);
+            }
+        }
+        figures
+    }
+
     /// Scenes in the order of their first points.
     pub fn scenes(&self) -> Vec<&str> {
         let mut scenes: Vec<&str> = Vec::new();

@@ -99,12 +99,19 @@ impl<'a> Panel<'a> {
         front
     }
 
-    /// The ground of points that cost clearly more than others for no less error.
+    /// The ground of a method's points that cost clearly more than others for no less error.
     fn plateau(&self, canvas: &Canvas, x: [f64; 2], y: [f64; 2]) {
-        let errors = self.points.iter().map(|point| self.shown(point.error()));
+        for method in self.methods() {
+            self.plateau_of(method, canvas, x, y);
+        }
+    }
+
+    fn plateau_of(&self, method: &str, canvas: &Canvas, x: [f64; 2], y: [f64; 2]) {
+        let points: Vec<&&Point> = self.points.iter().filter(|point| point.method == method).collect();
+        let errors = points.iter().map(|point| self.shown(point.error()));
         let least = errors.fold(f64::INFINITY, f64::min);
-        let same: Vec<&&Point> =
-            self.points.iter().filter(|point| self.shown(point.error()) <= least * SAME).collect();
+        let same = points.into_iter().filter(|point| self.shown(point.error()) <= least * SAME);
+        let same: Vec<&&Point> = same.collect();
         let cheapest = same.iter().map(|point| point.cost.high).fold(f64::INFINITY, f64::min);
         let dearest = same.iter().map(|point| point.cost.low).fold(0.0, f64::max);
         if same.len() < 2 || dearest <= cheapest {

@@ -48,48 +48,35 @@ fn section(trade: &Trade) -> String {
 }
 
 fn points(trade: &Trade) -> String {
-    let mut names: Vec<String> = Vec::new();
-    for error in trade.points.iter().flat_map(|point| &point.errors) {
-        let name = format!("{}, {}", error.name, error.unit);
-        if !names.contains(&name) {
-            names.push(name);
-        }
-    }
-    let mut text = format!(
-        "\n| scene | method | setting | seeds | {} | {} | instructions | front |\n|---|---|---|---|{}---|---|---|\n",
-        names.join(" | "),
-        trade.cost_axis,
-        "---|".repeat(names.len())
-    );
-    for point in &trade.points {
-        text.push_str(&row(point, &names));
-    }
-    text
-}
-
-fn row(point: &Point, names: &[String]) -> String {
-    let shipped = if point.is_default { " **(shipped)**" } else { "" };
-    let figure = |name: &String| {
-        let error = point.errors.iter().find(|error| format!("{}, {}", error.name, error.unit) == *name);
-        error.map(|error| figure(error.interval)).unwrap_or_default()
+    let names = trade.figures();
+    let is_counted = trade.points.iter().any(|point| point.instructions.is_some());
+    let mut columns = ["scene", "method", "setting", "seeds"].map(str::to_owned).to_vec();
+    columns.extend(names.iter().cloned());
+    columns.push(trade.cost_axis.clone());
+    columns.extend(is_counted.then(|| "instructions".to_owned()));
+    columns.push("front".to_owned());
+    let rows: Vec<Vec<String>> = trade.points.iter().map(|point| row(point, &names, is_counted)).collect();
+    let counted = if is_counted {
+        ""
+    } else {
+        "\nInstructions weren't counted: nothing on that machine counts them.\n"
     };
-    let errors: Vec<String> = names.iter().map(figure).collect();
-    format!(
-        "| {} | {} | {} {}{shipped} | {} | {} | {} | {} | {} |\n",
-        point.scene,
-        point.method,
-        point.knob,
-        point.value,
-        point.seeds,
-        errors.join(" | "),
-        figure_of_cost(point),
-        point.instructions.map(number).unwrap_or_default(),
-        if point.on_front { "yes" } else { "" }
-    )
+    format!("\n{}{counted}", lines(&columns, &rows))
 }
 
-fn figure_of_cost(point: &Point) -> String {
-    figure(point.cost)
+fn row(point: &Point, names: &[String], is_counted: bool) -> Vec<String> {
+    let shipped = if point.is_default { " **(shipped)**" } else { "" };
+    let mut row = vec![
+        point.scene.clone(),
+        point.method.clone(),
+        words::setting(point) + shipped,
+        point.seeds.to_string(),
+    ];
+    row.extend(names.iter().map(|name| point.figure(name).map(figure).unwrap_or_default()));
+    row.push(figure(point.cost));
+    row.extend(is_counted.then(|| point.instructions.map(number).unwrap_or_default()));
+    row.push(if point.on_front { "yes" } else { "" }.to_owned());
+    row
 }
 
 /// A figure with its bounds, where it has any.
@@ -102,13 +89,12 @@ fn figure(Interval { low, middle, high }: Interval) -> String {
 }
 
 fn table(given: &Given) -> String {
+    format!("\n## {}\n{}\n\n{}", given.title, given.text, lines(&given.columns, &given.rows))
+}
+
+/// A table's lines.
+fn lines(columns: &[String], rows: &[Vec<String>]) -> String {
     let line = |cells: &[String]| format!("| {} |\n", cells.join(" | "));
-    let rows: String = given.rows.iter().map(|row| line(row)).collect();
-    format!(
-        "\n## {}\n{}\n\n{}|{}\n{rows}",
-        given.title,
-        given.text,
-        line(&given.columns),
-        "---|".repeat(given.columns.len())
-    )
+    let rows: Vec<String> = rows.iter().map(|row| line(row)).collect();
+    format!("{}|{}\n{}", line(columns), "---|".repeat(columns.len()), rows.concat())
 }

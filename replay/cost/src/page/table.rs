@@ -6,13 +6,7 @@ use crate::words::{self, append, number};
 /// A trade as a table, with its advice. Figures are numbered; what they are stands below.
 pub fn table(trade: &Trade) -> String {
     let mut text = format!("{}\n{}\n", trade.title, trade.question);
-    let mut names: Vec<String> = Vec::new();
-    for error in trade.points.iter().flat_map(|point| &point.errors) {
-        let name = format!("{}, {}", error.name, error.unit);
-        if !names.contains(&name) {
-            names.push(name);
-        }
-    }
+    let names = trade.figures();
     let wide = |of: &dyn Fn(&Point) -> usize| trade.points.iter().map(of).max().unwrap_or(0);
     let widths =
         [wide(&|point| point.method.chars().count()), wide(&|point| words::setting(point).chars().count())];
@@ -49,8 +43,7 @@ pub fn table(trade: &Trade) -> String {
 
 fn row(point: &Point, names: &[String], [methods, settings]: [usize; 2]) -> String {
     let figure = |name: &String| {
-        let error = point.errors.iter().find(|error| format!("{}, {}", error.name, error.unit) == *name);
-        format!("{:>9}", error.map(|error| number(error.interval.middle)).unwrap_or_default())
+        format!("{:>9}", point.figure(name).map(|figure| number(figure.middle)).unwrap_or_default())
     };
     let cost = point.cost;
     let spread = if cost.high > cost.low {
