@@ -116,9 +116,9 @@ fn stages(inputs: &Inputs<'_>) -> Result<Vec<Stage>, CostError> {
     ];
     if inputs.effort.pick(false, true) {
         let collapse = file("collapse.toml")?;
-        let collapse = shorter(collapse, "start_m = 5\n", "start_m = 16\n")?;
-        stages.push(stage("collapse", shorter(&collapse, "distance_m = 45", "distance_m = 12")?));
-        stages.push(field(30)?);
+        let collapse = shorter(collapse, "start_m = 5\n", "start_m = 18\n")?;
+        stages.push(stage("collapse", shorter(&collapse, "distance_m = 45", "distance_m = 4\n")?));
+        stages.push(field(18)?);
         stages.push(stage("all effects", format!("{BARE}{ALL}")));
     }
     Ok(stages)
@@ -149,12 +149,12 @@ const AMONG_BOULDERS: &str = "vehicle = \"vita2-4.toml\"\n[trajectory]\nstart_m 
 const BOULDERS_EFFECTS: &str =
     "[effects]\nmotion_within_turn = {}\nocclusion = {}\nbeam_cone = {}\nrange_noise = { sd_m = 0.01 }\n";
 /// VITA 2 with four heads along a plain stretch.
-const BARE: &str = "vehicle = \"vita2-4.toml\"\n[trajectory]\nstart_m = 5\n[[trajectory.legs]]\ndistance_m = 10\nspeed_mps = 0.09\n";
+const BARE: &str = "vehicle = \"vita2-4.toml\"\n[trajectory]\nstart_m = 5\n[[trajectory.legs]]\ndistance_m = 4\nspeed_mps = 0.09\n";
 
 /// The scenes whose beams' rays are varied: short ones, since a thousand rays take their time. The first is the one on which both
 /// references are held against each other.
 fn beams(inputs: &Inputs<'_>) -> Result<Vec<Stage>, CostError> {
-    let lengths = inputs.effort.pick(&[("field", 14.0)][..], &[("field", 30.0), ("boulders", 1.0)]);
+    let lengths = inputs.effort.pick(&[("field", 14.0)][..], &[("field", 20.0), ("boulders", 0.6)]);
     let mut of_field = vec![field(20)?];
     of_field.extend(stages(inputs)?.into_iter().filter(|stage| stage.name == "boulders"));
     let mut beams = Vec::new();
