@@ -106,6 +106,7 @@ impl Default for Settings {
             tether_sd_m: 0.005,
             slack: Wander { reach: 0.06, time_s: 10.0 },
             scale_sd: 0.002,
+            // Nobody sets it: a wheel's scale doesn't change within a dive. It keeps the variance from becoming zero.
             scale_noise: 1e-9,
             depth_sd_m: 0.02,
             depth_offset_sd_m: 0.5,

@@ -117,7 +117,7 @@ fn stages(inputs: &Inputs<'_>) -> Result<Vec<Stage>, CostError> {
     if inputs.effort.pick(false, true) {
         let collapse = file("collapse.toml")?;
         let collapse = shorter(collapse, "start_m = 5\n", "start_m = 18\n")?;
-        stages.push(stage("collapse", shorter(&collapse, "distance_m = 45", "distance_m = 4\n")?));
+        stages.push(stage("collapse", shorter(&collapse, "distance_m = 45", "distance_m = 2\n")?));
         stages.push(field(18)?);
         stages.push(stage("all effects", format!("{BARE}{ALL}")));
     }
