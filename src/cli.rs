@@ -1,5 +1,6 @@
 //! The command line.
 
+mod cost;
 mod habits;
 mod logs;
 mod page;
@@ -15,6 +16,7 @@ use headrace_sensor::connect::Connect;
 use tracing::level_filters::LevelFilter;
 
 use crate::watch::Show;
+pub(crate) use cost::Cost;
 pub(crate) use habits::{Completions, Man, Overwrite};
 pub(crate) use logs::{Export, Import, Recover, Trim, Verify};
 pub(crate) use page::PageArgs;
@@ -144,6 +146,14 @@ pub(crate) enum Command {
     /// mode meets the request.
     #[command(after_help = PLAN_EXAMPLES)]
     Plan(Plan),
+    /// Measure what accuracy costs in time: errors against independent values, setting by setting, beside CPU time or hours.
+    ///
+    /// Simulates dives, replays them with other settings, and prints a table and a sentence of advice for each trade; --out writes
+    /// the page, JSON, CSV and pictures that docs/cost has. Times are CPU time of one thread.
+    #[command(
+        after_help = "Example:\n  headrace cost --quick\n  headrace cost --only survey --vehicle deploy/vehicles/vita2-4.toml\n  headrace cost --out docs/cost"
+    )]
+    Cost(Cost),
     /// Estimate mounts, zeros and latencies of the sensors from a log, as values for the vehicle file.
     ///
     /// Mounts of heads need a full turn while the vehicle stands still off the tunnel's axis; the surface pressure needs

@@ -5,6 +5,7 @@ mod calibrate;
 mod check;
 mod cli;
 mod commands;
+mod cost;
 pub mod devices;
 mod dive;
 mod emulate;
@@ -74,6 +75,7 @@ pub fn main() -> ExitCode {
         Command::Trim(args) => trim::trim(&args),
         Command::Simulate(simulate) => simulate::simulate(&simulate),
         Command::Import(args) => import::import(&args),
+        Command::Cost(args) => cost::cost(&args),
         Command::Plan(args) => plan::plan(&args),
         Command::Calibrate(args) => calibrate::calibrate(&args),
         Command::Emulate(args) => emulate::emulate(&args),

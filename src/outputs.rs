@@ -22,6 +22,10 @@ pub(crate) const PICTURE: &str = "<!-- headrace plan -->\n";
 pub(crate) const MANUAL: &str = ".\\\" Written by headrace man.\n";
 /// Ends a page with a dive.
 pub(crate) const EXPORTED: &str = "<!-- headrace export -->\n";
+/// Ends a picture of what accuracy costs; also in its page and its JSON, without the brackets.
+pub(crate) const COST: &str = "<!-- headrace cost -->\n";
+/// Begins its tables.
+const COST_TABLE: &str = "scene,method,knob,";
 /// Begins a table of true values.
 pub(crate) const TRUTH: &str = "# true values: ";
 /// A key of each report.
@@ -42,6 +46,7 @@ pub(crate) enum Kind {
     Picture,
     Manual,
     Page,
+    Cost,
 }
 
 impl Kind {
@@ -59,6 +64,7 @@ impl Kind {
             Self::Picture => "isn't a plan's picture",
             Self::Manual => "isn't a page of headrace's manual",
             Self::Page => "isn't an exported dive",
+            Self::Cost => "isn't one that headrace cost has written",
         }
     }
 
@@ -80,6 +86,11 @@ impl Kind {
             Self::Rehearsal => begins(path, REHEARSAL),
             Self::Manual => begins(path, MANUAL),
             Self::Page => ends(path, EXPORTED),
+            Self::Cost => {
+                begins(path, COST_TABLE)
+                    || ends(path, COST)
+                    || begin(path).is_some_and(|text| text.contains("headrace cost"))
+            }
             Self::Picture => files::read_report(path).is_ok_and(|text| text.ends_with(PICTURE)),
         }
     }

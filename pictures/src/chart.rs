@@ -8,18 +8,38 @@ use super::look::{AXIS, GRID, Look};
 use super::polyline::Frame;
 use super::polyline::Px;
 
+/// Ratio of its ends below which a logarithmic axis has plain steps.
+const SHORT: f64 = 4.0;
 /// Length of a tick mark, pixels.
 const TICK_PX: f64 = 4.0;
 const NUMBER: Letters = Letters { colour: BLACK, ..SMALL };
+
+/// The range of an axis, and whether equal ratios or equal differences are equally long.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Scale {
+    from: f64,
+    to: f64,
+    logarithmic: bool,
+}
+
+impl Scale {
+    /// Place of a value: 0 at the beginning, 1 at the end.
+    fn share(&self, value: f64) -> f64 {
+        if self.logarithmic {
+            math::ln(value / self.from) / math::ln(self.to / self.from)
+        } else {
+            (value - self.from) / (self.to - self.from)
+        }
+    }
+}
 
 /// An axis: name, range and ticks.
 #[derive(Debug, Clone)]
 #[must_use]
 pub struct Axis {
-    from: f64,
-    to: f64,
-    ticks: Vec<f64>,
-    digits: usize,
+    scale: Scale,
+    /// Places with their numbers.
+    ticks: Vec<(f64, String)>,
     name: String,
     /// Distance of its name from it, pixels.
     name_px: f64,
@@ -30,7 +50,20 @@ impl Axis {
     /// An axis with at most `most_ticks` ticks.
     pub fn new(name: &str, from: f64, to: f64, most_ticks: u32) -> Self {
         let (ticks, digits) = ticks(from, to, most_ticks);
-        Self { from, to, ticks, digits, name: name.to_owned(), name_px: 36.0, numbered: true }
+        let ticks = ticks.into_iter().map(|tick| (tick, format!("{tick:.digits$}"))).collect();
+        let scale = Scale { from, to, logarithmic: false };
+        Self { scale, ticks, name: name.to_owned(), name_px: 36.0, numbered: true }
+    }
+
+    /// A logarithmic axis, from above zero, with at most `most_ticks` ticks: powers of ten, with 2 and 5 between them if they fit, or
+    /// plain steps where it is too short for these.
+    pub fn logarithmic(name: &str, from: f64, to: f64, most_ticks: u32) -> Self {
+        let scale = Scale { from, to, logarithmic: true };
+        if to / from < SHORT {
+            return Self { scale, ..Self::new(name, from, to, most_ticks) };
+        }
+        let ticks = log_ticks(from, to, most_ticks).into_iter().map(|tick| (tick, tidy(tick))).collect();
+        Self { scale, ticks, name: name.to_owned(), name_px: 36.0, numbered: true }
     }
 
     /// With its name at a given distance, pixels.
@@ -68,6 +101,37 @@ fn ticks(from: f64, to: f64, most: u32) -> (Vec<f64>, usize) {
     ((0..=most).map(tick).filter(|tick| *tick <= to + 1e-9 * step).collect(), digits)
 }
 
+/// Powers of ten within a range, with 2 and 5 between them if no more than `most` are found.
+fn log_ticks(from: f64, to: f64, most: u32) -> Vec<f64> {
+    let within = |factors: &[f64]| -> Vec<f64> {
+        let decades =
+            (-15..=15_i32).map(|power| if power < 0 { 1.0 / ten_to(-power) } else { ten_to(power) });
+        let ticks = decades.flat_map(|decade| factors.iter().map(move |factor| factor * decade));
+        ticks.filter(|tick| (from * (1.0 - 1e-9)..=to * (1.0 + 1e-9)).contains(tick)).collect()
+    };
+    let fitting = [&[1.0, 2.0, 5.0][..], &[1.0, 3.0]].into_iter().map(within);
+    let fitting = fitting.into_iter().find(|ticks| ticks.len() <= usize::try_from(most).unwrap_or(0));
+    fitting.unwrap_or_else(|| {
+        let powers = within(&[1.0]);
+        let every = powers.len().div_ceil(usize::try_from(most).unwrap_or(1).max(1));
+        powers.into_iter().step_by(every.max(1)).collect()
+    })
+}
+
+fn ten_to(power: i32) -> f64 {
+    (0..power).map(|_| 10.0).product()
+}
+
+/// The number of a tick of a logarithmic axis: as short as may be.
+fn tidy(tick: f64) -> String {
+    if (1e-4..1e6).contains(&tick) {
+        let text = format!("{tick:.4}");
+        text.trim_end_matches('0').trim_end_matches('.').to_owned()
+    } else {
+        format!("{tick:.0e}")
+    }
+}
+
 /// A number with about three significant digits.
 pub fn short(value: f64) -> String {
     match value.abs() {
@@ -84,31 +148,29 @@ pub struct Chart<'c> {
     pub canvas: &'c Canvas,
     /// Position of the axes on the sheet.
     pub frame: Frame,
-    x: [f64; 2],
-    y: [f64; 2],
+    x: Scale,
+    y: Scale,
 }
 
 impl<'c> Chart<'c> {
     /// Draws the grid and both axes.
     pub fn new(canvas: &'c Canvas, frame: Frame, x: &Axis, y: &Axis) -> Self {
-        let chart = Self { canvas, frame, x: [x.from, x.to], y: [y.from, y.to] };
+        let chart = Self { canvas, frame, x: x.scale, y: y.scale };
         let Frame { left, top, right, bottom } = frame;
-        for tick in &x.ticks {
-            let [at, _] = chart.px([*tick, y.from]);
+        for (tick, words) in &x.ticks {
+            let [at, _] = chart.px([*tick, y.scale.from]);
             canvas.line(&[[at, top], [at, bottom]], &GRID);
             canvas.line(&[[at, bottom], [at, bottom + TICK_PX]], &AXIS);
             if x.numbered {
-                let words = format!("{tick:.*}", x.digits);
-                canvas.text([at, bottom + 14.0], &words, Side::Middle, NUMBER);
+                canvas.text([at, bottom + 14.0], words, Side::Middle, NUMBER);
             }
         }
-        for tick in &y.ticks {
-            let [_, at] = chart.px([x.from, *tick]);
+        for (tick, words) in &y.ticks {
+            let [_, at] = chart.px([x.scale.from, *tick]);
             canvas.line(&[[left, at], [right, at]], &GRID);
             canvas.line(&[[left - TICK_PX, at], [left, at]], &AXIS);
             if y.numbered {
-                let words = format!("{tick:.*}", y.digits);
-                canvas.text([left - 8.0, at], &words, Side::Left, NUMBER);
+                canvas.text([left - 8.0, at], words, Side::Left, NUMBER);
             }
         }
         canvas.line(&[[left, top], [left, bottom], [right, bottom]], &AXIS);
@@ -129,9 +191,8 @@ impl<'c> Chart<'c> {
 
     /// Position of a point on the sheet.
     pub fn px(&self, [x, y]: [f64; 2]) -> Px {
-        let share = |value: f64, [from, to]: [f64; 2]| (value - from) / (to - from);
         let Frame { left, top, right, bottom } = self.frame;
-        [left + share(x, self.x) * (right - left), bottom - share(y, self.y) * (bottom - top)]
+        [left + self.x.share(x) * (right - left), bottom - self.y.share(y) * (bottom - top)]
     }
 
     /// The line through these points, clipped to the frame; returns its pieces on the sheet.
@@ -146,12 +207,12 @@ impl<'c> Chart<'c> {
 
     /// A horizontal line.
     pub fn across(&self, y: f64, look: &Look) {
-        self.line(&[[self.x[0], y], [self.x[1], y]], look);
+        self.line(&[[self.x.from, y], [self.x.to, y]], look);
     }
 
     /// A vertical line.
     pub fn upright(&self, x: f64, look: &Look) {
-        self.line(&[[x, self.y[0]], [x, self.y[1]]], look);
+        self.line(&[[x, self.y.from], [x, self.y.to]], look);
     }
 
     /// An ellipse about a position on the sheet, clipped to the frame.
@@ -196,6 +257,22 @@ mod tests {
         for (from, to) in [(0.0, 1e-3), (3.0, 4.0), (0.0, 9e4)] {
             let (ticks, _) = ticks(from, to, 8);
             assert!(ticks.len() >= 3 && ticks.iter().all(|tick| (from..=to).contains(tick)), "{ticks:?}");
+        }
+    }
+
+    #[test]
+    fn logarithmic_ticks_are_round_and_few() {
+        assert_eq!(log_ticks(0.01, 1.0, 8), [0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1.0]);
+        assert_eq!(log_ticks(1e-9, 1.0, 8), [1e-9, 1e-7, 1e-5, 1e-3, 0.1]);
+        let words: Vec<String> = [1e-9, 1e-4, 0.05, 1.0, 2e6].map(tidy).into();
+        assert_eq!(words, ["1e-9", "0.0001", "0.05", "1", "2e6"]);
+    }
+
+    #[test]
+    fn equal_ratios_are_equally_long_on_a_logarithmic_axis() {
+        let scale = Scale { from: 1e-3, to: 1.0, logarithmic: true };
+        for (value, share) in [(1e-3, 0.0), (1e-2, 1.0 / 3.0), (0.1, 2.0 / 3.0), (1.0, 1.0)] {
+            assert!((scale.share(value) - share).abs() < 1e-12, "{value}");
         }
     }
 

@@ -12,7 +12,7 @@ use headrace_geometry::time::{DurNs, MonoNs};
 use headrace_monitor::report::SectionReport;
 
 use crate::instrumented::{Dive, Ping};
-use crate::wall::Wall;
+use headrace_cost::oracle::wall::Wall;
 
 /// Poses are looked at so often.
 pub const EVERY: DurNs = DurNs(100_000_000);
@@ -100,7 +100,7 @@ pub fn left_behind(reached: &[Reached], chainage_m: f64) -> Option<MonoNs> {
 pub fn wall_until(dive: &Dive, until: MonoNs) -> Wall {
     let before = |ping: &&Ping| ping.received <= until;
     let samples = dive.pings.iter().filter(before).filter_map(|ping| ping.sample);
-    Wall::new(samples.map(|sample| sample.place), dive.profile.perimeter_m())
+    Wall::new(samples.map(|sample| sample.place), dive.profile.perimeter_m()).unwrap()
 }
 
 /// What a section's flag should have been, and what it was.

@@ -16,7 +16,6 @@ pub mod instrumented;
 pub mod interventions;
 pub mod json_schema;
 mod log_files;
-pub mod outline;
 #[cfg(unix)]
 pub mod page_client;
 pub mod passable;
@@ -34,7 +33,6 @@ mod short_dive;
 pub mod spacings;
 pub mod tracking;
 pub mod truth;
-pub mod wall;
 #[cfg(unix)]
 pub mod world;
 

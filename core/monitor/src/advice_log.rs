@@ -88,7 +88,7 @@ impl AdviceLog {
 mod tests {
     use super::*;
     use headrace_geometry::tunnel::shapes;
-    use headrace_sampling::advice::{Advisor, Task};
+    use headrace_sampling::advice::{Advisor, Looks, Task};
     use headrace_sampling::layout::HeadLayout;
     use headrace_sampling::passes::Situation;
     use headrace_sampling::swing::Swing;
@@ -103,6 +103,7 @@ mod tests {
             length_m: 100.0,
             layout: HeadLayout::PhaseShift,
             sound_speed_mps: 1447.0,
+            looks: Looks::default(),
         };
         let nowhere = Situation {
             pose: None,

@@ -64,6 +64,7 @@ impl App {
             length_m: mission.length_m,
             layout: mission.layout,
             sound_speed_mps: mission.site.sound_speed_mps,
+            looks: mission.looks,
         };
         let advisor = advice::Advisor::new(&mission.profile, task, &specs, &mission.hull);
         self.add_console();

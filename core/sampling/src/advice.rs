@@ -20,10 +20,11 @@ use headrace_geometry::math;
 use headrace_geometry::tunnel::Profile;
 use headrace_snapshot::stateful;
 use intervals::Driving;
-use ring_cache::{AdvisedHead, RING};
+use ring_cache::AdvisedHead;
 
 pub use answer::{Advice, Alternative, Anew, Left, ModeName, Reason, Remedy};
 pub use hysteresis::Hysteresis;
+pub use ring_cache::Looks;
 
 /// Share of the speed held back for the error of its measurement.
 pub const SPEED_MARGIN: f64 = 0.01;
@@ -60,6 +61,8 @@ pub struct Task {
     pub layout: HeadLayout,
     /// Speed of sound in the tunnel's water, m/s.
     pub sound_speed_mps: f64,
+    /// How finely the advice looks at the wall, and how often anew.
+    pub looks: Looks,
 }
 
 /// Computes speed advice; caches the rings of the heads until the vehicle has moved.
@@ -74,8 +77,6 @@ pub struct Advisor {
     modes: Strips,
     /// Largest step in each mode at the centre of the tunnel, m.
     centred_m: Vec<f64>,
-    /// Ring of each head there.
-    middle: Vec<Ring>,
     parallax_rad: f64,
     /// Ring stride of one step of each head that turns.
     strides: [Option<usize>; MAX_HEADS],
@@ -93,7 +94,7 @@ pub struct Advisor {
     still_m: f64,
 }
 
-stateful!(Advisor { state: now, parallax_rad, next, until_alternatives, alternatives, anew, margins, astern, last_mps, still_m; slots: strides; each: heads, views; fixed: profile, task, modes, centred_m, middle; });
+stateful!(Advisor { state: now, parallax_rad, next, until_alternatives, alternatives, anew, margins, astern, last_mps, still_m; slots: strides; each: heads, views; fixed: profile, task, modes, centred_m; });
 
 impl Advisor {
     /// For heads with their modes, and the parts of the hull that may occlude them.
@@ -130,10 +131,9 @@ impl Advisor {
             task,
             views: heads.iter().map(view).collect(),
             heads,
-            now: Strips::with_room(arcs, 1, RING),
-            modes: Strips::with_room(arcs, MAX_MODES, RING),
+            now: Strips::with_room(arcs, 1, task.looks.ring),
+            modes: Strips::with_room(arcs, MAX_MODES, task.looks.ring),
             centred_m: Vec::new(),
-            middle: Vec::new(),
             parallax_rad: 0.0,
             strides: [None; MAX_HEADS],
             next: 0,
@@ -154,14 +154,13 @@ impl Advisor {
         let [y, z] = self.profile.reference();
         let centre = Pose { position: Point3::new(0.0, y, z), attitude: Rot::identity() };
         for (head, view) in self.heads.iter_mut().zip(&mut self.views) {
-            if head.cast(&self.profile, &centre).is_ok() {
+            if head.cast(&self.profile, &centre, self.task.looks.ring).is_ok() {
                 head.look(&self.profile, &centre, self.task.sound_speed_mps, view);
             }
         }
         self.now.rebuild(self.profile.perimeter_m(), &self.views);
         self.measure_modes();
         self.centred_m = (0..MAX_MODES).map(|mode| self.modes.largest_step_m(mode)).collect();
-        self.middle = self.heads.iter().map(|head| head.ring.clone()).collect();
         for head in &mut self.heads {
             head.cast_at = None;
         }
@@ -172,21 +171,9 @@ impl Advisor {
         self.heads.iter().map(|head| head.hidden.as_slice())
     }
 
-    /// Ring stride of a step: steps of equal stride have the same [`Advisor::middle_step_m`].
-    pub fn stride(step_rad: f64) -> usize {
-        Ring::stride(step_rad, RING)
-    }
-
-    /// The largest distance along the wall between two pings `step_rad` apart, from the tunnel's centre, level, m.
-    ///
-    /// Allocates: never.
-    pub fn middle_step_m(&self, step_rad: f64) -> f64 {
-        let largest_m = |ring: &Ring| {
-            let pairs = ring.pairs(Ring::stride(step_rad, RING));
-            let steps = pairs.map(|(a, b)| math::wrap_signed(b.arc_m - a.arc_m, ring.perimeter_m()).abs());
-            steps.fold(0.0, f64::max)
-        };
-        self.middle.iter().map(largest_m).fold(0.0, f64::max)
+    /// Soundings of a ring per step of a head.
+    fn stride(&self, step_rad: f64) -> usize {
+        Ring::stride(step_rad, self.task.looks.ring)
     }
 
     /// The largest speed at which the predicted T_max stays within the target, by inverting Eq. 16 with measured
@@ -284,14 +271,14 @@ impl Advisor {
             };
             if head.cast_at.is_none() || may_cast && !head.is_near(pose, self.still_m) {
                 may_cast &= head.cast_at.is_none();
-                if head.cast(&self.profile, pose).is_ok() {
+                if head.cast(&self.profile, pose, self.task.looks.ring).is_ok() {
                     head.look(&self.profile, pose, self.task.sound_speed_mps, view);
                 }
                 self.next = (number + 1) % count;
                 cast = true;
             }
         }
-        let stride = |motion: Option<HeadMotion>| Some(Ring::stride(motion?.step_rad, RING));
+        let stride = |motion: Option<HeadMotion>| Some(self.stride(motion?.step_rad));
         let strides = situation.heads.map(stride);
         if cast || strides != self.strides {
             self.strides = strides;
@@ -368,6 +355,9 @@ impl Advisor {
 
     /// How far the vehicle may move before rings are recast, m.
     fn still_m_for(&self, fastest: &Result<Fastest, SamplingError>, going: &Going) -> f64 {
+        if let Some(anew_m) = self.task.looks.anew_m {
+            return anew_m;
+        }
         let (t_y_m, swing_share) = match fastest {
             Ok(fastest) => (fastest.t_y_m, going.swing_mps / fastest.speed_mps.max(UNDER_WAY_MPS)),
             // A swing too wide for any speed is also too wide from slightly aside.
@@ -410,7 +400,7 @@ impl Advisor {
         const SAME: f64 = 0.02;
         let stride = self.strides.iter().flatten().next().copied();
         let period_s = mode.turn.period_s();
-        Some(Ring::stride(mode.turn.step_rad(), RING)) == stride
+        Some(self.stride(mode.turn.step_rad())) == stride
             && (passes.turn_s() - period_s).abs() < SAME * period_s
     }
 
@@ -436,13 +426,14 @@ impl Advisor {
     }
 
     fn measure_modes(&mut self) {
-        let Self { heads, modes, views, profile, .. } = self;
+        let Self { heads, modes, views, profile, task, .. } = self;
+        let ring = &task.looks.ring;
         modes.rebuild(profile.perimeter_m(), views);
         let name = |mode: usize| heads.first()?.modes.get(mode).map(|mode| mode.name);
         let rings = heads.iter().map(|head| &head.ring);
         modes.measure(MAX_MODES, rings, |mode, head| {
             let turn = heads.get(head)?.mode(name(mode)?)?.turn;
-            Some(Ring::stride(turn.step_rad(), RING))
+            Some(Ring::stride(turn.step_rad(), *ring))
         });
     }
 
@@ -483,8 +474,8 @@ impl Advisor {
         {
             return Some(Remedy::HoldHeading);
         }
-        let stride = situation.heads.iter().flatten().map(|motion| Ring::stride(motion.step_rad, RING)).max();
-        let same = |mode: &HeadMode| Some(Ring::stride(mode.turn.step_rad(), RING)) == stride;
+        let stride = situation.heads.iter().flatten().map(|motion| self.stride(motion.step_rad)).max();
+        let same = |mode: &HeadMode| Some(self.stride(mode.turn.step_rad())) == stride;
         let modes = self.heads.first().map(|head| head.modes.as_slice()).unwrap_or_default();
         let centred_m = modes.iter().position(same).and_then(|mode| self.centred_m.get(mode));
         if !unseen

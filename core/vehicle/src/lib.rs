@@ -19,9 +19,11 @@
 #![cfg_attr(not(test), warn(clippy::cast_possible_truncation))]
 #![cfg_attr(test, allow(clippy::cast_possible_truncation))]
 
+mod advice;
 mod alerts;
 mod coverage;
 mod findings;
+mod inspection;
 mod mission;
 mod navigation;
 mod sensors;

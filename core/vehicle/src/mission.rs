@@ -3,6 +3,7 @@
 use headrace_geometry::site::Site;
 use headrace_geometry::time::DurNs;
 use headrace_geometry::tunnel::Profile;
+use headrace_sampling::advice::Looks;
 use headrace_sampling::layout::HeadLayout;
 use headrace_sampling::occlusion::Obstacle;
 
@@ -32,6 +33,8 @@ pub struct Mission {
     pub hull: Vec<Obstacle>,
     /// Judging parameters and openings of the wall.
     pub coverage: CoverageConfig,
+    /// How finely the advice of speed looks at the wall, and how often anew.
+    pub looks: Looks,
     /// Time limit of the dive from its first packet; `None` if not set.
     pub dive_time: Option<DurNs>,
     /// Hold times and dead bands of alerts.
@@ -55,6 +58,7 @@ impl Mission {
             planned_speed_mps: 0.0,
             hull: Vec::new(),
             coverage: CoverageConfig { contradiction_m, ..CoverageConfig::default() },
+            looks: Looks::default(),
             dive_time: None,
             alerts: AlertTiming::default(),
             limits: LimitsConfig::default(),

@@ -8,6 +8,7 @@ use headrace_fusion::direct::DirectNavigation;
 use headrace_fusion::filter::FilterNavigation;
 use headrace_fusion::filter::settings::Settings;
 use headrace_geometry::site::Site;
+use headrace_geometry::time::DurNs;
 use headrace_geometry::tunnel::Profile;
 use headrace_sensor::device::InertialNoise;
 
@@ -18,6 +19,10 @@ const DEGREES: RangeInclusive<f64> = 1e-4..=90.0;
 const METRES: RangeInclusive<f64> = 1e-4..=100.0;
 const SMALL: RangeInclusive<f64> = 1e-9..=10.0;
 const SECONDS: RangeInclusive<f64> = 0.1..=1e9;
+/// Lengths of an epoch: at 0.5 s the estimate of a field dive was off by metres, and at 0.2 s by no more than at 0.1 (the trade
+/// Navigation of `headrace cost`); and of a window for which the filter's buffers have room, s.
+const EPOCH_S: RangeInclusive<f64> = 0.02..=0.2;
+const WINDOW_S: RangeInclusive<f64> = 0.1..=1.0;
 
 /// Navigation method of a vehicle: the `[navigation]` table of its file.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -86,6 +91,12 @@ fn settings(section: &Section<'_>, usual: Settings) -> Result<Settings, ConfigEr
         ("velocity_sd_mps", SMALL, 1.0, &mut settings.velocity_sd_mps),
     ];
     read(section, keys)?;
+    let keys = [("epoch_s", EPOCH_S, &mut settings.epoch), ("window_s", WINDOW_S, &mut settings.window)];
+    for (key, range, slot) in keys {
+        if let Some(seconds) = section.number(key, range)? {
+            *slot = DurNs::from_secs_f64(seconds);
+        }
+    }
     Ok(settings)
 }
 
@@ -99,4 +110,36 @@ fn read<const N: usize>(
         }
     }
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use headrace_config::Document;
+
+    fn parsed(text: &str) -> Result<Settings, String> {
+        let root = Document::new("vehicle.toml", text).root().unwrap();
+        let section = root.section("navigation").unwrap();
+        match NavigationConfig::parse(section, None).map_err(|why| why.to_string())? {
+            NavigationConfig::Filter(settings) => Ok(settings),
+            NavigationConfig::Direct => Err("direct".to_owned()),
+        }
+    }
+
+    #[test]
+    fn the_filter_s_epoch_and_window_are_those_of_the_file() {
+        assert_eq!(parsed("[navigation]\n").unwrap(), Settings::default());
+        assert_eq!(
+            parsed("[navigation]\nepoch_s = 0.1\nwindow_s = 0.2\n").unwrap(),
+            Settings::default(),
+            "the defaults are those of docs/vehicle-file.md"
+        );
+        let settings = parsed("[navigation]\nepoch_s = 0.02\nwindow_s = 1\n").unwrap();
+        assert_eq!((settings.epoch, settings.window), (DurNs::from_millis(20), DurNs::from_millis(1000)));
+        for (wrong, range) in [("epoch_s = 0.5", "0.02 to 0.2"), ("window_s = 0.05", "0.1 to 1")] {
+            let why = parsed(&format!("[navigation]\n{wrong}\n")).unwrap_err();
+            let said = format!("vehicle.toml:2: navigation.{wrong}: must be a number from {range}");
+            assert!(why.contains(&said), "{why}");
+        }
+    }
 }

@@ -4,6 +4,7 @@ use core::cell::RefCell;
 
 use crate::Mission;
 use crate::NavigationConfig;
+use crate::advice::parse_looks;
 use crate::alerts::{AlertTiming, LimitsConfig};
 use crate::coverage::CoverageConfig;
 use crate::sensors::{self, DEGREES, SENSOR_DISTANCE_M, Sensors};
@@ -15,6 +16,7 @@ use headrace_geometry::frames::Vec3;
 use headrace_geometry::site::Site;
 use headrace_geometry::time::DurNs;
 use headrace_sampling::SamplingError;
+use headrace_sampling::advice::Looks;
 use headrace_sampling::head::{HeadProgram, HeadSpec};
 use headrace_sampling::layout::{self, HeadLayout};
 use headrace_sampling::occlusion::Obstacle;
@@ -45,6 +47,8 @@ pub struct VehicleConfig {
     pub coverage: CoverageConfig,
     /// Navigation method and settings.
     pub navigation: NavigationConfig,
+    /// How finely the advice of speed looks at the wall, and how often anew.
+    pub looks: Looks,
     /// Time limit of the dive.
     pub dive_time: Option<DurNs>,
     /// Hold times and dead bands of alerts.
@@ -132,6 +136,10 @@ impl VehicleConfig {
             Some(section) => root.part(|| parse_heads(&section, devices))?,
             None => Some((HeadLayout::PhaseShift, 0.0)),
         };
+        let looks = match root.section("advice")? {
+            Some(section) => root.part(|| parse_looks(&section))?,
+            None => Some(Looks::default()),
+        };
         let alerts = match root.section("alerts")? {
             Some(section) => root.part(|| AlertTiming::parse(&section))?,
             None => Some(AlertTiming::default()),
@@ -162,6 +170,7 @@ impl VehicleConfig {
             hull,
             coverage,
             navigation: root.required("navigation", navigation)?,
+            looks: root.required("advice", looks)?,
             dive_time: dive_time.map(|hours| DurNs::from_secs_f64(hours * 3600.0)),
             alerts: root.required("alerts", alerts)?,
             limits: root.required("limits", limits)?,
@@ -186,6 +195,7 @@ impl VehicleConfig {
             planned_speed_mps: self.planned_speed_mps,
             hull: self.hull.clone(),
             coverage: self.coverage.clone(),
+            looks: self.looks,
             dive_time: self.dive_time,
             alerts: self.alerts,
             limits: LimitsConfig { dive_time: self.limits.dive_time.or(self.dive_time), ..self.limits },

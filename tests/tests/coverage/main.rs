@@ -6,6 +6,8 @@ mod bad;
 mod cable;
 mod causes;
 mod confidence;
+mod cost;
+mod cost_trades;
 mod dives;
 mod far_and_long;
 mod faults;

@@ -4,13 +4,13 @@
 use std::fmt::Write as _;
 use std::sync::Arc;
 
+use headrace_cost::oracle::wall::Wall;
 use headrace_geometry::math::{self, TAU};
 use headrace_geometry::time::DurNs;
 use headrace_geometry::tunnel::{Piece, Profile};
 use headrace_monitor::report::{SectionReport, SpreadReport};
 use headrace_tests::instrumented::{self, Dive};
 use headrace_tests::random_dives::{self, seeded};
-use headrace_tests::wall::Wall;
 use headrace_tests::{Folder, raw_messages, write_log};
 use mcap::{Channel, Message, WriteOptions};
 use serde_json::Value;
@@ -32,7 +32,8 @@ impl Beside<'_> {
     fn agree(&self) {
         let [here, there] = [self.here, self.there].map(|dive| &dive.report.sections);
         assert_eq!(here.len(), there.len(), "sections");
-        let wall = Wall::new(self.here.samples().map(|sample| sample.place), self.here.profile.perimeter_m());
+        let wall = Wall::new(self.here.samples().map(|sample| sample.place), self.here.profile.perimeter_m())
+            .unwrap();
         let verdicts: std::collections::BTreeSet<_> = here.iter().map(|section| section.verdict).collect();
         assert!(
             verdicts.contains("fail") && verdicts.contains("pass"),

@@ -3,6 +3,7 @@
 
 use std::collections::BTreeMap;
 
+use headrace_cost::oracle::wall::{Place, Wall};
 use headrace_geometry::math::{self, TAU};
 use headrace_geometry::time::MonoNs;
 use headrace_monitor::report::{SectionReport, SpreadReport};
@@ -10,7 +11,6 @@ use headrace_tests::flags::{NEAR_M, PARTS, all_passed_from_m, first_failing_m, r
 use headrace_tests::instrumented::{Dive, Ping, Sample};
 use headrace_tests::random_dives::Draw;
 use headrace_tests::spacings::{Spacing, spacings, spread};
-use headrace_tests::wall::{Place, Wall};
 
 use crate::dives::DIVES;
 
@@ -23,7 +23,7 @@ const SEARCH_M: f64 = 12.0;
 fn every_section(mut misses: impl FnMut(&Dive, &Wall, &SectionReport) -> Option<String>) {
     let mut said = Vec::new();
     for (seeded, dive) in DIVES.iter() {
-        let wall = Wall::new(dive.samples().map(|sample| sample.place), dive.profile.perimeter_m());
+        let wall = Wall::new(dive.samples().map(|sample| sample.place), dive.profile.perimeter_m()).unwrap();
         for section in &dive.report.sections {
             let miss = misses(dive, &wall, section);
             said.extend(miss.map(|miss| {
@@ -207,20 +207,21 @@ fn holds(wall: &Wall, from_m: f64, to_m: f64, expected_m: f64) {
 fn lattices_have_holes_that_are_known() {
     let diagonal_m = math::sqrt(2.0);
     // Squares of 0.25 m, all corners on common circles; then as far as a section that holds no centre sees of them.
-    let squares = Wall::new(lattice(20, 24, |i, j| [0.25 * i, 0.25 * j]), 6.0);
+    let squares = Wall::new(lattice(20, 24, |i, j| [0.25 * i, 0.25 * j]), 6.0).unwrap();
     holds(&squares, 1.0, 1.25, 0.25 * diagonal_m);
     holds(&squares, 1.0, 1.05, 2.0 * math::hypot(0.05, 0.125));
     // Rows set off by half a step: triangles with sides of 0.4 m.
     let height_m = 0.2 * math::sqrt(3.0);
-    let triangles = Wall::new(lattice(20, 10, |i, j| [height_m * i, 0.4 * j + 0.2 * (i % 2.0)]), 4.0);
+    let triangles =
+        Wall::new(lattice(20, 10, |i, j| [height_m * i, 0.4 * j + 0.2 * (i % 2.0)]), 4.0).unwrap();
     holds(&triangles, 1.0, 2.0, 0.8 / math::sqrt(3.0));
     // One ring: the farther away, the larger.
-    let ring = Wall::new(lattice(1, 10, |_, j| [0.0, 0.3 * j]), 3.0);
+    let ring = Wall::new(lattice(1, 10, |_, j| [0.0, 0.3 * j]), 3.0).unwrap();
     holds(&ring, 1.0, 2.0, 2.0 * math::hypot(2.0, 0.15));
     // One sample, again and again: the far side of the perimeter.
-    let one = Wall::new(vec![[5.0, 0.0]; 7], 8.0);
+    let one = Wall::new(vec![[5.0, 0.0]; 7], 8.0).unwrap();
     holds(&one, 5.0, 8.0, 10.0);
-    assert!(Wall::new(Vec::new(), 8.0).largest(0.0, 1.0).is_none());
+    assert!(Wall::new(Vec::new(), 8.0).unwrap().largest(0.0, 1.0).is_none());
 }
 
 fn scattered(seed: u64, count: usize, perimeter_m: f64) -> Vec<Place> {
@@ -233,7 +234,8 @@ fn holes_of_small_sets_are_what_a_dense_search_finds() {
     let (perimeter_m, step_m) = (2.0, 0.004);
     for seed in 0..30 {
         let wall =
-            Wall::new(scattered(seed, 1 + usize::try_from(seed).unwrap() % 9, perimeter_m), perimeter_m);
+            Wall::new(scattered(seed, 1 + usize::try_from(seed).unwrap() % 9, perimeter_m), perimeter_m)
+                .unwrap();
         let along = (0..=125).map(|i| f64::from(i) * step_m);
         let around = || (0..500).map(|j| f64::from(j) * step_m);
         let dense_m = along
@@ -254,7 +256,8 @@ fn the_seam_may_lie_anywhere() {
         let samples = scattered(seed, 60, perimeter_m);
         let shift_m = 0.13 * seed as f64;
         let shifted = samples.iter().map(|[x, sigma]| [*x, math::wrap(sigma + shift_m, perimeter_m)]);
-        let [here, there] = [Wall::new(samples.clone(), perimeter_m), Wall::new(shifted, perimeter_m)];
+        let [here, there] =
+            [Wall::new(samples.clone(), perimeter_m).unwrap(), Wall::new(shifted, perimeter_m).unwrap()];
         let holes = [here, there].map(|wall| wall.largest(0.0, 0.5).unwrap().radius_m);
         assert!((holes[0] - holes[1]).abs() < 1e-12, "{seed}: {holes:?}");
     }

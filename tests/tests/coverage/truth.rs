@@ -1,11 +1,11 @@
 //! The oracle of D_true against other ways to the same figures.
 
+use headrace_cost::oracle::outline::Outline;
+use headrace_cost::oracle::wall::Place;
 use headrace_geometry::math;
 use headrace_geometry::tunnel::{Profile, shapes};
-use headrace_tests::outline::Outline;
 use headrace_tests::scenes;
 use headrace_tests::truth::{self, JudgedDive, Truth};
-use headrace_tests::wall::Place;
 
 const EFFECTS: &str = "motion_within_turn = {}\nocclusion = {}\nrange_noise = { sd_m = 0.01 }\n";
 

@@ -4,12 +4,12 @@
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 
+use headrace_cost::oracle::wall::Wall;
 use headrace_monitor::report::AlertReport;
 use headrace_sensor::device::Sense;
 use headrace_simulator::Simulation;
 use headrace_tests::instrumented::{self, Dive, Sample};
 use headrace_tests::scenes;
-use headrace_tests::wall::Wall;
 
 const VITA: &str = include_str!("../../../deploy/vehicles/vita2-4.toml");
 /// In a pipe of 1 m radius at a creep.
@@ -92,7 +92,7 @@ fn compared(vehicle: &str, scene: &str, near_m: f64) -> Compared {
             (is.strays, is.strays_wall) = (is.strays + wall + doubtful, is.strays_wall + wall);
         }
     }
-    let wall = Wall::new(true_wall.iter().map(|sample| sample.place), dive.profile.perimeter_m());
+    let wall = Wall::new(true_wall.iter().map(|sample| sample.place), dive.profile.perimeter_m()).unwrap();
     for section in dive.report.sections.iter().filter(|section| section.verdict == "pass") {
         let true_m = 2.0 * wall.largest(section.start_m, section.end_m).unwrap().radius_m;
         is.passed += 1;
@@ -127,7 +127,7 @@ fn one_such_head_of_several_is_named_and_the_others_count() {
         assert!(dive.report.summary.pass_m >= least_m, "{at}");
         // No section passes by its returns.
         let others = dive.samples_of(|head| head != stuck);
-        let wall = Wall::new(others, dive.profile.perimeter_m());
+        let wall = Wall::new(others, dive.profile.perimeter_m()).unwrap();
         for section in dive.report.sections.iter().filter(|section| section.verdict == "pass") {
             let true_m = 2.0 * wall.largest(section.start_m, section.end_m).unwrap().radius_m;
             assert!(true_m <= 1.1 * dive.report.target_m, "{at}: section {}: {true_m} m", section.start_m);
@@ -232,7 +232,7 @@ fn caves_heaps_boulders_traps_and_side_tunnels_stay_wall() {
         // No section fails for want of them.
         let all =
             dive.pings.iter().filter_map(|ping| ping.sample.or(ping.doubtful)).map(|sample| sample.place);
-        let wall = Wall::new(all, dive.profile.perimeter_m());
+        let wall = Wall::new(all, dive.profile.perimeter_m()).unwrap();
         for section in &dive.report.sections {
             if section.doubtful_returns > 0 && section.verdict == "fail" {
                 let hole_m = 2.0 * wall.largest(section.start_m, section.end_m).unwrap().radius_m;

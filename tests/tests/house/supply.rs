@@ -111,7 +111,7 @@ fn the_bill_of_materials_lists_what_is_linked() {
     let components = bill["components"].as_array().unwrap();
     let lists = |name: &str| components.iter().any(|part| part["name"] == name);
     let is_linked = ["bevy_ecs", "headrace_coverage", "nalgebra", "serialport", "zstd-sys"];
-    let is_not = ["headrace", "headrace_tests", "insta", "proptest", "spade"];
+    let is_not = ["headrace", "headrace_tests", "insta", "proptest", "kiddo"];
     assert_eq!(is_linked.map(lists), [true; 5], "{is_linked:?}");
     assert_eq!(is_not.map(lists), [false; 5], "{is_not:?}");
     for part in components {

@@ -17,10 +17,11 @@ const FOR_DEVICES: [&str; 1] = ["sensor"];
 const FOR_PORTS: [&str; 3] = ["sensor", "geometry", "monitor"];
 
 /// What crates of `replay/` need of one another and of the plugins, besides the core.
-const FOR_REPLAY: [(&str, &[&str]); 4] = [
+const FOR_REPLAY: [(&str, &[&str]); 5] = [
     ("replay/simulator", &[]),
     ("replay/player", &["replay/simulator"]),
     ("replay/calibration", &["replay/player"]),
+    ("replay/cost", &["replay/simulator", "replay/player", "pictures"]),
     (
         "replay/import",
         &["replay/player", "plugins/imagenex881", "plugins/imu_can", "plugins/mavlink", "plugins/ping1d"],
@@ -105,6 +106,8 @@ fn layers_let_nothing_point_back() {
         ("replay/import", "plugins/mavlink", true),
         ("replay/import", "plugins/ports", false),
         ("pictures", "replay/player", false),
+        ("replay/cost", "pictures", true),
+        ("replay/player", "replay/cost", false),
         ("", "plugins/mavlink", true),
         ("", "experiments", false),
         ("experiments", "", false),

@@ -9,3 +9,4 @@ mod interleave;
 mod oracle;
 mod phase;
 mod plan_holes;
+mod survey;

@@ -55,8 +55,6 @@ const TIGHTENS_OVER_S: f64 = 100.0;
 const WALL_SHARE: f64 = 0.3;
 /// Time within which an estimate settles.
 const SETTLES_WITHIN: DurNs = DurNs(20_000_000_000);
-/// Length of an epoch, s.
-const EPOCH_S: f64 = 0.1;
 
 /// Maximum steps of an epoch: its leg, two widenings of the covariance, and an end.
 const STEPS: usize = 4;
@@ -204,7 +202,7 @@ impl Eskf {
         self.clones.note(to, &self.factors);
         self.settle();
         self.unrest.pass(leg.dt_s(), &context.settings);
-        self.note_jolt(window.jolted(to));
+        self.note_jolt(window.jolted(to), context.settings.epoch.as_secs_f64());
         self.agreement.seek(&mut self.doubts);
         let doubts = core::mem::replace(&mut self.doubts, [0.0; ERRORS]);
         if doubts.iter().any(|variance| *variance > 0.0) {
@@ -213,9 +211,9 @@ impl Eskf {
     }
 
     /// A force beyond what is plausible may have been true: the speed that it carried is then missing.
-    fn note_jolt(&mut self, speed_mps: f64) {
+    fn note_jolt(&mut self, speed_mps: f64, epoch_s: f64) {
         let variance = speed_mps * speed_mps;
-        let way = variance * EPOCH_S * EPOCH_S;
+        let way = variance * epoch_s * epoch_s;
         for k in 0..3 {
             add_to(&mut self.doubts, VELOCITY + k, variance);
             add_to(&mut self.doubts, POSITION + k, way);

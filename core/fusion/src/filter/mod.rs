@@ -53,8 +53,6 @@ use headrace_sensor::reading::MAX_SOURCES;
 use headrace_sensor::reading::Reading;
 use headrace_snapshot::stateful;
 
-/// Length of an epoch; epochs begin at its multiples.
-pub(super) const EPOCH: DurNs = DurNs(100_000_000);
 /// Longest extrapolation of a fix beyond the last inertial sample.
 pub(super) const CARRIES: DurNs = DurNs(2_000_000_000);
 /// A clock that goes back by more than this has been set; readings stamped further in the future are rejected.
@@ -71,8 +69,8 @@ const SILENCE: DurNs = DurNs(5_000_000_000);
 /// Plausible limits of inertial samples; beyond them the unit is saturated or faulty.
 const MOST_RATE_RADPS: f64 = 10.0;
 const MOST_FORCE_MPS2: f64 = 50.0;
-/// Room for the estimates after the last epoch.
-const AHEAD: usize = 512;
+/// Room for the estimates after the last epoch: the longest window and epoch, 1.5 s, of a unit at 600 Hz.
+const AHEAD: usize = 1024;
 /// Time between two head passes when no head is known to turn.
 const USUAL_GAP: DurNs = DurNs(20_000_000_000);
 
@@ -160,7 +158,7 @@ impl FilterNavigation {
             return;
         }
         while self.running.at < last {
-            let due = self.epoch_before(self.running.at + EPOCH);
+            let due = self.epoch_before(self.running.at + self.context.settings.epoch);
             // An interval without readings is a single leg.
             let heard =
                 self.window.next_heard(self.running.at).map_or(last, |heard| self.epoch_before(heard));
@@ -205,7 +203,8 @@ impl FilterNavigation {
 
     /// The last beginning of an epoch at or before a time.
     fn epoch_before(&self, at: MonoNs) -> MonoNs {
-        MonoNs(at.0 - at.0.saturating_sub(self.epoch_zero.0) % EPOCH.0.unsigned_abs())
+        let epoch_ns = self.context.settings.epoch.0.unsigned_abs().max(1);
+        MonoNs(at.0 - at.0.saturating_sub(self.epoch_zero.0) % epoch_ns)
     }
 
     fn after_epochs(&mut self) {

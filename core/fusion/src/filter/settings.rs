@@ -87,6 +87,9 @@ pub struct Settings {
     pub gate: f64,
     /// Readings older than this on arrival are too late.
     pub window: DurNs,
+    /// Length of an epoch, positive, 0.2 s at most for estimates that hold: readings are fused, and errors carried on, once in each.
+    /// Epochs begin at its multiples.
+    pub epoch: DurNs,
     /// Whether the level of the sources' noise is learnt. Likelihoods can only be compared without.
     pub learns: bool,
 }
@@ -103,6 +106,7 @@ impl Default for Settings {
             tether_sd_m: 0.005,
             slack: Wander { reach: 0.06, time_s: 10.0 },
             scale_sd: 0.002,
+            // Nobody sets it: a wheel's scale doesn't change within a dive. It keeps the variance from becoming zero.
             scale_noise: 1e-9,
             depth_sd_m: 0.02,
             depth_offset_sd_m: 0.5,
@@ -121,6 +125,7 @@ impl Default for Settings {
             velocity_sd_mps: 0.02,
             gate: GATE_999,
             window: DurNs::from_millis(200),
+            epoch: DurNs::from_millis(100),
             learns: true,
         }
     }

@@ -78,7 +78,7 @@ impl Backward {
     /// The track of all steps.
     pub fn finish(mut self) -> Track {
         self.end_piece();
-        Track::of_reversed(self.pieces, self.points, self.relatives)
+        Track::of_reversed(self.pieces, self.points, self.relatives, self.settings.epoch)
     }
 
     /// Smoothed estimate at the step's beginning, from that at its end; `None` if it isn't finite.

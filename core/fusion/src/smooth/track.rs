@@ -6,11 +6,11 @@ use super::step::Placed;
 use crate::filter::pose_sd::PoseSd;
 use crate::filter::sources::Consistency;
 use crate::filter::state::{State, rotation, rotation_vector};
-use crate::filter::{CARRIES, CLOCK_JUMP, EPOCH};
+use crate::filter::{CARRIES, CLOCK_JUMP};
 use crate::relative::Relative;
 use crate::{Fix, Navigation, NoFix, Times};
 use headrace_geometry::frames::{Body, Pose, Vec3};
-use headrace_geometry::time::MonoNs;
+use headrace_geometry::time::{DurNs, MonoNs};
 use headrace_sensor::device::SensorInfo;
 use headrace_sensor::reading::MAX_SOURCES;
 use headrace_sensor::reading::Reading;
@@ -40,6 +40,8 @@ pub struct Track {
     pieces: Vec<Piece>,
     points: Vec<Point>,
     relatives: Vec<(MonoNs, Relative)>,
+    /// Length of the filter's epochs: so far beyond its last point it goes.
+    epoch: DurNs,
 }
 
 impl Point {
@@ -71,6 +73,7 @@ impl Track {
         mut pieces: Vec<Piece>,
         mut points: Vec<Point>,
         mut relatives: Vec<(MonoNs, Relative)>,
+        epoch: DurNs,
     ) -> Self {
         points.reverse();
         relatives.reverse();
@@ -80,7 +83,7 @@ impl Track {
             piece.points = turned(&piece.points, points.len());
             piece.relatives = turned(&piece.relatives, relatives.len());
         }
-        Self { pieces, points, relatives }
+        Self { pieces, points, relatives, epoch }
     }
 
     /// Number of pieces: one more than of breaks.
@@ -112,7 +115,7 @@ impl Track {
         let (before, after) = (points.get(next.saturating_sub(1)), points.get(next));
         let (before, after) = before.zip(after).ok_or(NoFix::Heading)?;
         let span = after.at.since(before.at);
-        if span.0 > CARRIES.0 || at.since(after.at).0 > EPOCH.0 {
+        if span.0 > CARRIES.0 || at.since(after.at).0 > self.epoch.0 {
             return Err(NoFix::Heading);
         }
         let share = if span.0 > 0 { at.since(before.at).as_secs_f64() / span.as_secs_f64() } else { 1.0 };

@@ -9,8 +9,6 @@ use headrace_geometry::frames::Pose;
 use headrace_geometry::tunnel::Profile;
 use headrace_snapshot::stateful;
 
-/// Soundings per ring: the finest step of the supported heads (0.3 degrees).
-pub(super) const RING: u32 = 1200;
 /// Relative change of the speed that is tolerated before the rings are recast.
 const SHARE: f64 = 0.002;
 /// Limits of the movement across the tunnel before a recast, m: the lower, since the target may leave next to nothing;
@@ -18,6 +16,24 @@ const SHARE: f64 = 0.002;
 const STILL_M: [f64; 2] = [0.004, 0.1];
 /// Tolerated rotation per metre of that, as a quaternion's component (half an angle, rad).
 const TURN_PER_M: f64 = 0.2;
+
+/// How finely the advice looks at the wall, and how often anew.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Looks {
+    /// Rays of a head's ring, evenly over a turn; at least one. Steps of heads are taken to be whole multiples of the angle
+    /// between them, rounded up.
+    pub ring: u32,
+    /// How far the vehicle may move across the tunnel before a ring is cast anew, m; `None` as far as the speed changes by
+    /// 0.2 %, 4 mm at least and 0.1 m at most.
+    pub anew_m: Option<f64>,
+}
+
+impl Default for Looks {
+    /// The finest step of the supported heads, 0.3 degrees.
+    fn default() -> Self {
+        Self { ring: 1200, anew_m: None }
+    }
+}
 
 /// How far the vehicle may move across the tunnel, m, before rings are recast, where steps of `t_y_m` on a wall
 /// `range_m` away bound the speed v for a target T, with the beams' swing w at `swing_share` = w / v.
@@ -54,11 +70,11 @@ impl AdvisedHead {
             && near(&cast_at.attitude.wxyz(), &pose.attitude.wxyz(), still_m * TURN_PER_M)
     }
 
-    /// Recasts the head's ring. On an error `cast_at` is `None`, and the caller keeps the last view.
-    pub(super) fn cast(&mut self, profile: &Profile, pose: &Pose) -> Result<(), SamplingError> {
+    /// Recasts the head's ring of so many rays. On an error `cast_at` is `None`, and the caller keeps the last view.
+    pub(super) fn cast(&mut self, profile: &Profile, pose: &Pose, ring: u32) -> Result<(), SamplingError> {
         self.cast_at = None;
         let standing = Standing::new(profile, pose, &self.spec.mount)?;
-        self.ring.recast(&standing, 0.0, RING)?;
+        self.ring.recast(&standing, 0.0, ring)?;
         self.cast_at = Some(*pose);
         Ok(())
     }

@@ -65,6 +65,7 @@ impl Case {
             length_m: LENGTH_M,
             layout: self.situation.layout,
             sound_speed_mps: 1500.0,
+            looks: Looks::default(),
         };
         Advisor::new(&self.profile, task, &heads, &[])
     }

@@ -22,7 +22,7 @@ use bins::Bins;
 /// A beam is a cone; its range is formed from all the wall within it: the nearest point, the mean, or the surface by the
 /// paper's interpolation.
 ///
-/// Keys: `rays` per beam, from 1 to 64 (16; 64 where `form` is bilinear); the cone's full width `width_deg`, from 0.1
+/// Keys: `rays` per beam, from 1 to 1024 (16; 64 where `form` is bilinear); the cone's full width `width_deg`, from 0.1
 /// to 60, or the head's frequency `frequency_khz` from which it follows, from 600 to 1000 (a head's own width; 30 for an
 /// echosounder); `form` first, mean or bilinear (first); `bin_m`, range bin width for bilinear, from 0.001 to 1 m (a
 /// 500th of a head's range setting, in this water; 0.15 for an echosounder).
@@ -139,7 +139,7 @@ impl EffectKind for BeamConeKind {
         Ok(Box::new(PerSensor::read(tables, facts, &senses, |table| {
             let form = table.choice("form", &FORMS)?.unwrap_or(Form::First);
             let usual = if form == Form::Bilinear { 64 } else { 16 };
-            let rays = table.integer("rays", 1..=64)?.and_then(|rays| usize::try_from(rays).ok());
+            let rays = table.integer("rays", 1..=1024)?.and_then(|rays| usize::try_from(rays).ok());
             let width_deg = table.number("width_deg", 0.1..=60.0)?;
             let frequency_khz = table.number("frequency_khz", 600.0..=1000.0)?;
             if frequency_khz.is_some() && width_deg.is_some() {

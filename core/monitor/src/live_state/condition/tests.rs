@@ -2,7 +2,7 @@ use super::*;
 use crate::live_state::{LiveMetres, SensorState};
 use headrace_geometry::time::MonoNs;
 use headrace_geometry::tunnel::shapes;
-use headrace_sampling::advice::{Advice, Advisor, Task};
+use headrace_sampling::advice::{Advice, Advisor, Looks, Task};
 use headrace_sampling::layout::HeadLayout;
 use headrace_sampling::passes::Situation;
 use headrace_sampling::swing::Swing;
@@ -19,6 +19,7 @@ fn advice(reason: Reason, v_max_mps: f64, t_m: f64) -> Advice {
         length_m: 100.0,
         layout: HeadLayout::PhaseShift,
         sound_speed_mps: 1447.0,
+        looks: Looks::default(),
     };
     let nowhere = Situation {
         pose: None,

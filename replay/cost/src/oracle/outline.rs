@@ -4,8 +4,8 @@
 use headrace_geometry::math::{self, TAU};
 use headrace_geometry::tunnel::{Profile, Yz};
 
-/// Points of the outline: chords are then within a tenth of a millimetre of the arcs of any tunnel.
-const POINTS: u32 = 20_000;
+/// Points of the outline: chords, and those that cut a corner, are then within a hundredth of a millimetre of the curve of any tunnel.
+const POINTS: u32 = 200_000;
 
 /// A profile's outline about its reference point, by angle.
 pub struct Outline {

@@ -4,6 +4,8 @@
 use headrace_geometry::math;
 use spade::{DelaunayTriangulation, HasPosition, Point2, Triangulation};
 
+use crate::error::CostError;
+
 /// Smaller coordinates are zero: the triangulation's exact predicates take none below 1e-142.
 const TINY_M: f64 = 1e-100;
 /// By how much rounding may make a circumradius too small, and move a centre, m.
@@ -44,15 +46,17 @@ pub struct Wall {
 
 impl Wall {
     /// Takes samples as chainage and arc length, m, on a wall of this perimeter, m.
-    pub fn new(samples: impl IntoIterator<Item = Place>, perimeter_m: f64) -> Self {
+    ///
+    /// Errors: a place that is no number, or farther away than any wall.
+    pub fn new(samples: impl IntoIterator<Item = Place>, perimeter_m: f64) -> Result<Self, CostError> {
         let samples: Vec<Place> =
             samples.into_iter().map(|[x, sigma]| [x, math::wrap(sigma, perimeter_m)]).collect();
         let shifted = |by_m: f64| samples.iter().map(move |[x, sigma]| [*x, sigma + by_m]);
         let mut images: Vec<Place> = [-perimeter_m, 0.0, perimeter_m].into_iter().flat_map(shifted).collect();
         images.sort_unstable_by(|a, b| a[1].total_cmp(&b[1]).then(a[0].total_cmp(&b[0])));
         images.dedup();
-        let circles = circles(&images, perimeter_m);
-        Self { perimeter_m, samples, images, circles }
+        let circles = circles(&images, perimeter_m)?;
+        Ok(Self { perimeter_m, samples, images, circles })
     }
 
     /// Distance from a place to the nearest sample, m; infinite without any.
@@ -77,6 +81,11 @@ impl Wall {
             }
         }
         Some(best)
+    }
+
+    /// D of a stretch between two chainages, m: the diameter of that circle, infinite without samples.
+    pub fn hole_m(&self, from_m: f64, to_m: f64) -> f64 {
+        self.largest(from_m, to_m).map_or(f64::INFINITY, |circle| 2.0 * circle.radius_m)
     }
 
     /// The same with centres at one chainage: the highest point of the lower envelope of distances, which lies where two
@@ -116,10 +125,15 @@ impl Wall {
 }
 
 /// Circumcircles of a Delaunay triangulation with their centres on the wall, the largest first.
-fn circles(images: &[Place], perimeter_m: f64) -> Vec<Circle> {
+fn circles(images: &[Place], perimeter_m: f64) -> Result<Vec<Circle>, CostError> {
     let tidy = |value: f64| if value.abs() < TINY_M { 0.0 } else { value };
     let vertices = images.iter().map(|[x, sigma]| Vertex(Point2::new(tidy(*x), tidy(*sigma)))).collect();
-    let triangles: DelaunayTriangulation<Vertex> = DelaunayTriangulation::bulk_load(vertices).unwrap();
+    let refused = |why: spade::InsertionError| {
+        let what = format!("{} places on a wall", images.len());
+        CostError::Oracle { what, why: why.to_string() }
+    };
+    let triangles: DelaunayTriangulation<Vertex> =
+        DelaunayTriangulation::bulk_load(vertices).map_err(refused)?;
     let mut circles: Vec<Circle> = triangles
         .inner_faces()
         .filter_map(|face| circle(face.positions().map(|at| [at.x, at.y])))
@@ -131,7 +145,7 @@ fn circles(images: &[Place], perimeter_m: f64) -> Vec<Circle> {
         })
         .collect();
     circles.sort_unstable_by(|a, b| b.radius_m.total_cmp(&a.radius_m));
-    circles
+    Ok(circles)
 }
 
 /// The circle through three places, unless rounding leaves none.

@@ -1,0 +1,97 @@
+//! Labels beside markers, where they cover neither markers nor one another.
+
+use headrace_pictures::canvas::{Letters, Side, width_px};
+use headrace_pictures::polyline::{Frame, Px};
+
+/// Space between a marker and its label, pixels.
+const APART_PX: f64 = 9.0;
+
+/// A label with its place.
+pub(super) struct Placed {
+    pub(super) place: Px,
+    pub(super) side: Side,
+}
+
+/// What is taken up on a sheet so far.
+#[derive(Default)]
+pub(super) struct Taken(Vec<Frame>);
+
+impl Taken {
+    /// Takes up the place of a marker.
+    pub(super) fn marker(&mut self, [x, y]: Px) {
+        const HALF_PX: f64 = 6.0;
+        self.0.push(Frame { left: x - HALF_PX, top: y - HALF_PX, right: x + HALF_PX, bottom: y + HALF_PX });
+    }
+
+    /// A free place for a label beside a marker, within a frame, which is then taken; `None` where there is none.
+    pub(super) fn label(
+        &mut self,
+        [x, y]: Px,
+        text: &str,
+        letters: Letters,
+        within: &Frame,
+    ) -> Option<Placed> {
+        let up_px = letters.size_px + 2.0;
+        for step in [0.0, 1.0, -1.0, 2.0, -2.0, 3.0, -3.0, 4.0, -4.0] {
+            for side in [Side::Right, Side::Left, Side::Middle] {
+                let by_px = match side {
+                    Side::Right => APART_PX,
+                    Side::Left => -APART_PX,
+                    // Right above or below its marker.
+                    Side::Middle if step == 0.0 => continue,
+                    Side::Middle => 0.0,
+                };
+                let place = [x + by_px, y + step * up_px];
+                let frame = frame(place, side, width_px(text, letters), up_px);
+                let fits = frame.left >= within.left
+                    && frame.right <= within.right
+                    && frame.top >= within.top
+                    && frame.bottom <= within.bottom;
+                if fits && !self.0.iter().any(|taken| overlap(taken, &frame)) {
+                    self.0.push(frame);
+                    return Some(Placed { place, side });
+                }
+            }
+        }
+        None
+    }
+}
+
+fn frame([x, y]: Px, side: Side, width: f64, height: f64) -> Frame {
+    let left = match side {
+        Side::Right => x,
+        Side::Left => x - width,
+        Side::Middle => x - width / 2.0,
+    };
+    Frame { left, top: y - height / 2.0, right: left + width, bottom: y + height / 2.0 }
+}
+
+fn overlap(a: &Frame, b: &Frame) -> bool {
+    a.left < b.right && b.left < a.right && a.top < b.bottom && b.top < a.bottom
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use headrace_pictures::canvas::SMALL;
+
+    const SHEET: Frame = Frame { left: 0.0, top: 0.0, right: 400.0, bottom: 200.0 };
+
+    #[test]
+    fn labels_of_crowded_markers_dont_cover_one_another() {
+        let mut taken = Taken::default();
+        let markers: Vec<Px> = (0..6).map(|k| [100.0 + 4.0 * f64::from(k), 100.0]).collect();
+        markers.iter().for_each(|at| taken.marker(*at));
+        let placed = markers.iter().filter(|at| taken.label(**at, "0.05 m", SMALL, &SHEET).is_some()).count();
+        assert_eq!(placed, 6);
+        for (k, a) in taken.0.iter().enumerate().skip(6) {
+            assert!(!taken.0.iter().take(k).any(|b| overlap(a, b)), "{a:?}");
+        }
+    }
+
+    #[test]
+    fn a_label_without_room_isnt_drawn() {
+        let narrow = Frame { left: 0.0, top: 0.0, right: 30.0, bottom: 30.0 };
+        assert!(Taken::default().label([15.0, 15.0], "much too long", SMALL, &narrow).is_none());
+    }
+}

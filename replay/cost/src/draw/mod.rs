@@ -1,0 +1,89 @@
+//! A trade as a picture: a chart for each scene, error to the right, cost upwards, both logarithmic.
+
+mod labels;
+mod panel;
+
+use headrace_pictures::canvas::{Canvas, NORMAL, SMALL, Side, width_px};
+use headrace_pictures::colour::DIM;
+use headrace_pictures::look::{self, Look};
+use headrace_pictures::polyline::Px;
+
+use crate::point::Trade;
+use panel::{BAND, PLATEAU, Panel};
+
+const WIDTH_PX: u32 = 1000;
+/// Of a chart with its heading and what stands below it.
+const PANEL_PX: f64 = 470.0;
+/// Title and legend.
+const TOP_PX: f64 = 96.0;
+const LINE_PX: f64 = 17.0;
+/// Lines for settings that are left out.
+const MOST_LEFT_OUT: usize = 6;
+
+/// A trade as SVG.
+pub fn svg(trade: &Trade) -> String {
+    let scenes = trade.scenes();
+    let left_out = left_out(trade);
+    let height_px = TOP_PX + PANEL_PX * scenes.len() as f64 + LINE_PX * left_out.len() as f64 + 10.0;
+    let canvas = Canvas::of_size([WIDTH_PX, whole(height_px)], &trade.title, &trade.question);
+    legend(&canvas, trade);
+    for (number, scene) in scenes.iter().enumerate() {
+        Panel::of(trade, scene, TOP_PX + PANEL_PX * number as f64, PANEL_PX).draw(&canvas);
+    }
+    let first_px = TOP_PX + PANEL_PX * scenes.len() as f64;
+    for (k, line) in left_out.iter().enumerate() {
+        canvas.text([14.0, first_px + LINE_PX * k as f64], line, Side::Right, SMALL);
+    }
+    canvas.into_svg()
+}
+
+fn whole(px: f64) -> u32 {
+    u32::try_from(headrace_geometry::math::floor_to_i64(px) + 1).unwrap_or(0)
+}
+
+/// What the marks mean, in a line below the title.
+fn legend(canvas: &Canvas, trade: &Trade) {
+    let y = 70.0;
+    let mut x = 14.0;
+    let mut entry = |width: f64, words: &str, sample: &dyn Fn(Px)| {
+        sample([x, y]);
+        canvas.text([x + width + 6.0, y], words, Side::Right, NORMAL);
+        x += width + 6.0 + width_px(words, NORMAL) + 14.0;
+    };
+    let marker =
+        |filled: bool| move |[x, y]: Px| canvas.marker([x + 6.0, y], &look::of_several(4), 5.0, filled);
+    let line = |look: Look| move |[x, y]: Px| canvas.line(&[[x, y], [x + 30.0, y]], &look);
+    entry(12.0, "as shipped", &marker(true));
+    entry(12.0, "other settings", &marker(false));
+    entry(30.0, "front: nothing beats these", &line(BAND));
+    entry(30.0, "plateau: more cost, same error", &|[x, y]: Px| {
+        canvas.area([x, y - 7.0], [x + 30.0, y + 7.0], PLATEAU);
+    });
+    if let Some(decides) = trade.decides {
+        entry(30.0, &format!("a tenth of the target, {decides} m"), &line(look::TARGET));
+    }
+}
+
+/// Lines that say what isn't shown.
+fn left_out(trade: &Trade) -> Vec<String> {
+    let fits = |line: String| {
+        let room_px = f64::from(WIDTH_PX) - 28.0;
+        let letters = headrace_pictures::canvas::Letters { colour: DIM, ..SMALL };
+        if width_px(&line, letters) <= room_px {
+            return line;
+        }
+        let mut short: String = line;
+        while width_px(&short, letters) > room_px - 8.0 {
+            short.pop();
+        }
+        short + "…"
+    };
+    let mut lines: Vec<String> =
+        trade.left_out.iter().map(|left| fits(format!("left out: {}: {}", left.what, left.why))).collect();
+    if lines.len() > MOST_LEFT_OUT {
+        let more = lines.len() - (MOST_LEFT_OUT - 1);
+        lines.truncate(MOST_LEFT_OUT - 1);
+        lines.push(format!("left out: {more} more, listed on the page"));
+    }
+    lines
+}

@@ -1,0 +1,18 @@
+//! What accuracy costs: headrace's errors against its time, setting by setting.
+//!
+//! A trade is a question ("what does a finer target cost?"), answered by points: a setting, its error against independent values, and
+//! its cost. Errors are told in what is decided by: the hole D of a section, and metres falsely passed. `trades/` has a file for each;
+//! `oracle/` the independent values; `dive.rs` the simulated dives that both are found on.
+
+pub mod dive;
+pub mod draw;
+pub mod effort;
+pub mod error;
+pub mod measure;
+pub mod oracle;
+pub mod page;
+pub mod point;
+pub mod scene;
+pub mod trades;
+pub mod verdicts;
+mod words;

@@ -1,0 +1,50 @@
+//! What was measured as files: a page in Markdown, JSON, and a CSV and a picture a trade. All are made from [`Results`] alone, so that a
+//! page that isn't its data's can be told.
+
+mod csv;
+mod markdown;
+mod table;
+
+use serde::{Deserialize, Serialize};
+
+use crate::draw;
+use crate::point::{Given, Trade};
+
+pub use table::table;
+
+/// Version of `cost.json`.
+pub const COST_VERSION: u32 = 1;
+
+/// All that was measured.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Results {
+    /// Version of this format.
+    pub cost_version: u32,
+    /// The program that measured.
+    pub program: String,
+    /// The machine: processor, cores, debug or release.
+    pub machine: String,
+    /// The command that gives this again.
+    pub command: String,
+    /// The trades.
+    pub trades: Vec<Trade>,
+    /// What isn't a choice.
+    pub given: Vec<Given>,
+}
+
+impl Results {
+    /// All files by name.
+    ///
+    /// Errors: figures that JSON can't hold.
+    pub fn files(&self) -> Result<Vec<(String, String)>, serde_json::Error> {
+        let mut files = vec![
+            ("README.md".to_owned(), markdown::page(self)),
+            ("cost.json".to_owned(), serde_json::to_string_pretty(self)? + "\n"),
+        ];
+        for trade in &self.trades {
+            files.push((format!("{}.csv", trade.name), csv::csv(trade)));
+            files.push((format!("{}.svg", trade.name), draw::svg(trade)));
+        }
+        Ok(files)
+    }
+}

@@ -1,0 +1,335 @@
+//! What is measured: a setting's error beside its cost, and which settings nothing else beats.
+
+use headrace_geometry::math;
+use serde::{Deserialize, Serialize};
+
+/// A figure with the bounds of its spread.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Interval {
+    /// Lower bound.
+    pub low: f64,
+    /// The figure itself.
+    pub middle: f64,
+    /// Upper bound.
+    pub high: f64,
+}
+
+impl Interval {
+    /// A figure without spread.
+    pub fn exact(value: f64) -> Self {
+        Self { low: value, middle: value, high: value }
+    }
+
+    /// Median and quartiles; `None` of nothing. Values between two ranks are interpolated.
+    pub fn quartiles(values: &[f64]) -> Option<Self> {
+        Some(Self {
+            low: quantile(values, 0.25)?,
+            middle: quantile(values, 0.5)?,
+            high: quantile(values, 0.75)?,
+        })
+    }
+
+    /// Mean with its 95 % confidence interval by Student's t; `None` of fewer than two values.
+    pub fn mean(values: &[f64]) -> Option<Self> {
+        if values.len() < 2 {
+            return None;
+        }
+        let n = values.len() as f64;
+        let middle = values.iter().sum::<f64>() / n;
+        let variance =
+            values.iter().map(|value| (value - middle) * (value - middle)).sum::<f64>() / (n - 1.0);
+        let half = student(values.len() - 1) * math::sqrt(variance / n);
+        Some(Self { low: middle - half, middle, high: middle + half })
+    }
+
+    /// The same in another unit: `factor` new units to an old one.
+    #[must_use]
+    pub fn scaled(self, factor: f64) -> Self {
+        Self { low: self.low * factor, middle: self.middle * factor, high: self.high * factor }
+    }
+}
+
+/// A quantile, `share` from 0 to 1, interpolated between two ranks; `None` of nothing.
+pub fn quantile(values: &[f64], share: f64) -> Option<f64> {
+    let mut sorted = values.to_vec();
+    sorted.sort_unstable_by(f64::total_cmp);
+    let rank = share.clamp(0.0, 1.0) * (sorted.len().checked_sub(1)? as f64);
+    let below = usize::try_from(math::floor_to_i64(rank)).ok()?;
+    let (from, part) = (*sorted.get(below)?, rank - below as f64);
+    // Of equal or infinite neighbours no difference is formed.
+    match sorted.get(below + 1) {
+        Some(to) if part > 0.0 && *to > from => Some(from + part * (to - from)),
+        _ => Some(from),
+    }
+}
+
+/// 97.5 % quantile of Student's distribution. Source: its tables, three decimals.
+fn student(freedom: usize) -> f64 {
+    const UP_TO_30: [f64; 30] = [
+        12.706, 4.303, 3.182, 2.776, 2.571, 2.447, 2.365, 2.306, 2.262, 2.228, 2.201, 2.179, 2.160, 2.145,
+        2.131, 2.120, 2.110, 2.101, 2.093, 2.086, 2.080, 2.074, 2.069, 2.064, 2.060, 2.056, 2.052, 2.048,
+        2.045, 2.042,
+    ];
+    UP_TO_30.get(freedom.max(1) - 1).copied().unwrap_or(1.96)
+}
+
+/// One of a point's errors; finite.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Error {
+    /// What is wrong by it, as a heading of a table.
+    pub name: String,
+    /// Its unit.
+    pub unit: String,
+    /// How large it is.
+    pub interval: Interval,
+}
+
+/// A setting, measured.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Point {
+    /// The line that it is a marker of.
+    pub method: String,
+    /// The setting's name.
+    pub knob: String,
+    /// Its value, with its unit.
+    pub value: String,
+    /// The same as a number, where it is one.
+    pub number: Option<f64>,
+    /// Whether headrace is shipped so.
+    pub is_default: bool,
+    /// What was dived; points of different scenes aren't compared, and each scene has its own chart.
+    pub scene: String,
+    /// Number of seeds, each a dive of its own.
+    pub seeds: u32,
+    /// Its errors; the first is the axis's.
+    pub errors: Vec<Error>,
+    /// Its cost, in the unit of the trade's axis: median and quartiles.
+    pub cost: Interval,
+    /// Instructions, counted, per unit of what `cost` is for; `None` where nothing counts them.
+    pub instructions: Option<f64>,
+    /// Whether nothing beats it ([`front`]).
+    pub on_front: bool,
+}
+
+impl Error {
+    /// An error by its name and unit.
+    pub fn new(name: &str, unit: &str, interval: Interval) -> Self {
+        Self { name: name.to_owned(), unit: unit.to_owned(), interval }
+    }
+
+    /// Name and unit.
+    fn heading(&self) -> String {
+        format!("{}, {}", self.name, self.unit)
+    }
+}
+
+impl Point {
+    /// The error on the axis: the middle of the first one, infinite without any.
+    pub fn error(&self) -> f64 {
+        self.errors.first().map_or(f64::INFINITY, |error| error.interval.middle)
+    }
+
+    /// A figure by its name and unit, as [`Trade::figures`] lists them.
+    pub(crate) fn figure(&self, named: &str) -> Option<Interval> {
+        self.errors.iter().find(|error| error.heading() == named).map(|error| error.interval)
+    }
+}
+
+/// A setting that isn't among the points.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct LeftOut {
+    /// The setting.
+    pub what: String,
+    /// Why.
+    pub why: String,
+}
+
+/// How far the reference itself may be off.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct OracleError {
+    /// How it was found: which two references were held against each other, where.
+    pub how: String,
+    /// Largest difference, in the unit of the trade's first error.
+    pub size: f64,
+}
+
+/// A question of the kind "what does more of this cost", answered.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Trade {
+    /// Its name in `--only` and in names of files.
+    pub name: String,
+    /// Its heading.
+    pub title: String,
+    /// What is asked.
+    pub question: String,
+    /// Name and unit of the axis to the right.
+    pub error_axis: String,
+    /// Name and unit of the axis upwards.
+    pub cost_axis: String,
+    /// Unit of the cost, as in a sentence: "ns a return".
+    pub cost_unit: String,
+    /// Whether cost is computed rather than measured, so that it doesn't differ from run to run.
+    pub cost_is_computed: bool,
+    /// The error below which accuracy decides nothing, a tenth of the target.
+    pub decides: Option<f64>,
+    /// What was measured.
+    pub points: Vec<Point>,
+    /// What wasn't, or failed.
+    pub left_out: Vec<LeftOut>,
+    /// The reference's own error.
+    pub oracle: OracleError,
+    /// Of defaults that something beats, in a sentence each, why they stay.
+    pub reasons: Vec<String>,
+    /// What follows, with a number.
+    pub advice: String,
+}
+
+impl Trade {
+    /// Names of all figures of its points with their units, in the order of the first ones.
+    pub(crate) fn figures(&self) -> Vec<String> {
+        let mut figures: Vec<String> = Vec::new();
+        for heading in self.points.iter().flat_map(|point| &point.errors).map(Error::heading) {
+            if !figures.contains(&heading) {
+                figures.push(heading);
+            }
+        }
+        figures
+    }
+
+    /// Scenes in the order of their first points.
+    pub fn scenes(&self) -> Vec<&str> {
+        let mut scenes: Vec<&str> = Vec::new();
+        for point in &self.points {
+            if !scenes.contains(&point.scene.as_str()) {
+                scenes.push(&point.scene);
+            }
+        }
+        scenes
+    }
+}
+
+/// A table beside the trades: what isn't a choice, and what it costs.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Given {
+    /// Its heading.
+    pub title: String,
+    /// What it says, in a paragraph.
+    pub text: String,
+    /// Headings of its columns.
+    pub columns: Vec<String>,
+    /// Its rows.
+    pub rows: Vec<Vec<String>>,
+}
+
+/// Marks the points that no other one of their scene beats.
+///
+/// One beats another if it is no worse in either, and clearly better in one: its error is smaller by more than `resolution`, or its
+/// cost's upper bound is below the other's lower bound. So noise in the costs of equal settings beats neither.
+pub fn front(points: &mut [Point], resolution: f64) {
+    let beats = |one: &Point, other: &Point| {
+        let (error, others) = (one.error(), other.error());
+        let is_cheaper = one.cost.high < other.cost.low;
+        one.scene == other.scene
+            && error <= others + resolution
+            && one.cost.middle <= other.cost.middle
+            && (error < others - resolution || is_cheaper)
+    };
+    let on_front: Vec<bool> =
+        points.iter().map(|point| !points.iter().any(|other| beats(other, point))).collect();
+    for (point, on_front) in points.iter_mut().zip(on_front) {
+        point.on_front = on_front;
+    }
+}
+
+/// The knee of a scene's front: the point farthest below the straight line between the front's ends, both axes logarithmic. `None`
+/// with fewer than three points on the front, or where none lies below the line.
+pub fn knee<'a>(points: &'a [Point], scene: &str) -> Option<&'a Point> {
+    let mut on_front: Vec<(&Point, [f64; 2])> = points
+        .iter()
+        .filter(|point| point.on_front && point.scene == scene)
+        .filter(|point| point.error() > 0.0 && point.error().is_finite() && point.cost.middle > 0.0)
+        .map(|point| (point, [math::ln(point.error()), math::ln(point.cost.middle)]))
+        .collect();
+    on_front.sort_by(|a, b| a.1[0].total_cmp(&b.1[0]));
+    let (from, to) = (on_front.first()?.1, on_front.last()?.1);
+    let [along, up] = [to[0] - from[0], to[1] - from[1]];
+    let below = |at: [f64; 2]| up * (at[0] - from[0]) - along * (at[1] - from[1]);
+    let inner = on_front.get(1..on_front.len().checked_sub(1)?)?;
+    let (point, at) = inner.iter().max_by(|a, b| below(a.1).total_cmp(&below(b.1)))?;
+    (below(*at) > 0.0).then_some(*point)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn point(value: &str, error: f64, cost: [f64; 3]) -> Point {
+        let [low, middle, high] = cost;
+        Point {
+            method: "m".to_owned(),
+            knob: "k".to_owned(),
+            value: value.to_owned(),
+            number: None,
+            is_default: false,
+            scene: "s".to_owned(),
+            seeds: 1,
+            errors: vec![Error::new("e", "m", Interval::exact(error))],
+            cost: Interval { low, middle, high },
+            instructions: None,
+            on_front: false,
+        }
+    }
+
+    fn on_front(points: &mut [Point]) -> Vec<&str> {
+        front(points, 1e-9);
+        points.iter().filter(|point| point.on_front).map(|point| point.value.as_str()).collect()
+    }
+
+    #[test]
+    fn a_planted_slow_method_is_off_the_front() {
+        let mut points = [
+            point("fine", 0.01, [9.0, 10.0, 11.0]),
+            point("fine but slow", 0.01, [90.0, 100.0, 110.0]),
+            point("coarse", 0.1, [4.0, 5.0, 6.0]),
+            point("coarse and slow", 0.2, [19.0, 20.0, 21.0]),
+        ];
+        assert_eq!(on_front(&mut points), ["fine", "coarse"]);
+    }
+
+    #[test]
+    fn noise_of_equal_settings_beats_neither() {
+        let mut points = [point("a", 0.01, [9.0, 10.0, 11.0]), point("b", 0.01, [9.5, 10.4, 11.5])];
+        assert_eq!(on_front(&mut points), ["a", "b"]);
+    }
+
+    #[test]
+    fn points_of_other_scenes_beat_nothing() {
+        let mut elsewhere = point("there", 0.001, [1.0; 3]);
+        elsewhere.scene = "elsewhere".to_owned();
+        assert_eq!(on_front(&mut [point("here", 0.01, [9.0; 3]), elsewhere]), ["here", "there"]);
+    }
+
+    #[test]
+    fn the_knee_lies_farthest_below_the_line_between_the_ends() {
+        let mut points = [
+            point("finest", 0.001, [1000.0; 3]),
+            point("knee", 0.01, [20.0; 3]),
+            point("near the line", 0.1, [15.0; 3]),
+            point("coarsest", 1.0, [10.0; 3]),
+        ];
+        front(&mut points, 0.0);
+        assert_eq!(knee(&points, "s").map(|point| point.value.as_str()), Some("knee"));
+        assert!(knee(&points[..2], "s").is_none() && knee(&points, "another").is_none());
+    }
+
+    #[test]
+    fn spreads_are_those_of_tables() {
+        let values = [4.0, 1.0, 3.0, 2.0, 5.0];
+        assert_eq!(Interval::quartiles(&values), Some(Interval { low: 2.0, middle: 3.0, high: 4.0 }));
+        // Mean 3, variance 2.5; t of four degrees of freedom is 2.776.
+        let mean = Interval::mean(&values).unwrap();
+        assert!((mean.middle - 3.0).abs() < 1e-12 && (mean.high - 4.963).abs() < 1e-3, "{mean:?}");
+        assert_eq!(Interval::mean(&[1.0]), None);
+        assert_eq!(quantile(&[], 0.5), None);
+    }
+}

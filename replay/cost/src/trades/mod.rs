@@ -1,0 +1,34 @@
+//! The trades: each a file with a function `measure`, listed here.
+
+mod cells;
+mod figures;
+pub mod holes;
+pub mod live;
+pub mod memory;
+pub mod navigation;
+pub mod simulation;
+pub mod sureness;
+pub mod survey;
+
+use crate::error::CostError;
+use crate::point::{Given, Trade};
+use crate::scene::Inputs;
+
+/// Measures a trade; what is being done is told to the second argument.
+pub type Measure = fn(&Inputs<'_>, &mut dyn FnMut(&str)) -> Result<Trade, CostError>;
+
+/// Makes a table of what isn't a choice.
+pub type Tabulate = fn(&Inputs<'_>, &mut dyn FnMut(&str)) -> Result<Given, CostError>;
+
+/// All trades by name, in the order of the page.
+pub const TRADES: [(&str, Measure); 6] = [
+    ("survey", survey::measure),
+    ("holes", holes::measure),
+    ("navigation", navigation::measure),
+    ("sureness", sureness::measure),
+    ("simulation", simulation::measure),
+    ("live", live::measure),
+];
+
+/// Tables of what isn't a choice, below the trades.
+pub const GIVEN: [Tabulate; 1] = [memory::tabulate];

@@ -1,0 +1,138 @@
+//! What `headrace cost` shows of errors: planted ones are found, and the page is its data's.
+
+use std::path::Path;
+use std::process::Command;
+
+use headrace_cost::dive::JudgedDive;
+use headrace_cost::oracle::second;
+use headrace_cost::oracle::wall::{Place, Wall};
+use headrace_cost::page::Results;
+use headrace_cost::verdicts::{Judged, errors, inner};
+use headrace_tests::{root, scenes, skipped, truth};
+
+const TARGET_M: f64 = 0.5;
+
+fn ideal() -> JudgedDive {
+    truth::dive(&scenes::scene(
+        "vehicle = \"vita2-4.toml\"\n[trajectory]\nstart_m = 5\n[[trajectory.legs]]\ndistance_m = 8\nspeed_mps = 0.1\n\
+         [effects]\nmotion_within_turn = {}\nocclusion = {}\n",
+    ))
+}
+
+/// Median of |D - D_true|, metres in 100 falsely failed.
+fn wrong(dive: &JudgedDive, judged: impl Fn(Judged) -> Judged) -> [f64; 2] {
+    let sections: Vec<Judged> = inner(dive).map(|section| judged(Judged::of(section))).collect();
+    assert!(sections.len() > 8, "{} sections", sections.len());
+    let errors = errors(&[sections], TARGET_M);
+    let figure = |name: &str| errors.iter().find(|error| error.name.contains(name)).unwrap().interval.middle;
+    [figure("median"), figure("falsely failed")]
+}
+
+#[test]
+fn a_planted_wrong_method_has_the_error_planted() {
+    const PLANTED_M: f64 = 0.1;
+    let dive = ideal();
+    let [right_m, _] = wrong(&dive, |judged| judged);
+    let [wrong_m, failed_m] = wrong(&dive, |judged| {
+        let hole_m = judged.hole_m.map(|hole_m| hole_m + PLANTED_M);
+        Judged { hole_m, passes: hole_m.map(|hole_m| hole_m <= TARGET_M), ..judged }
+    });
+    assert!(right_m < 0.005, "{right_m}");
+    assert!((wrong_m - PLANTED_M).abs() <= right_m + 0.005, "{wrong_m}");
+    assert!(failed_m > 50.0, "{failed_m} m in 100");
+}
+
+/// The places of `tests/oracles/holes_truth.csv` and the wall's perimeter.
+fn committed() -> Wall {
+    let text = std::fs::read_to_string(root().join("tests/oracles/holes_truth.csv")).unwrap();
+    let (first, rest) = text.split_once('\n').unwrap();
+    let perimeter_m = first.split_once('=').unwrap().1.trim().parse().unwrap();
+    let place = |line: &str| -> Place {
+        let (x, arc) = line.split_once(',').unwrap();
+        [x.parse().unwrap(), arc.parse().unwrap()]
+    };
+    Wall::new(rest.lines().skip(1).map(place), perimeter_m).unwrap()
+}
+
+/// Bounds and D of sections.
+fn holes(table: &str) -> Vec<[f64; 3]> {
+    let row = |line: &str| -> [f64; 3] {
+        let cells: Vec<f64> = line.split(',').map(|cell| cell.parse().unwrap()).collect();
+        cells.try_into().unwrap()
+    };
+    table.lines().skip(1).map(row).collect()
+}
+
+#[test]
+fn val_true_holes_are_those_of_another_program() {
+    let wall = committed();
+    let expected = holes(&std::fs::read_to_string(root().join("tests/oracles/holes.csv")).unwrap());
+    assert_eq!(expected.len(), 12);
+    for [from_m, to_m, hole_m] in expected {
+        let found_m = wall.hole_m(from_m, to_m);
+        assert!((found_m - hole_m).abs() < 1e-9, "{from_m} to {to_m} m: {found_m} m, not {hole_m} m");
+        let second_m = second::hole_m(&wall, from_m, to_m);
+        assert!((second_m - hole_m).abs() < 1e-9, "{from_m} to {to_m} m: {second_m} m, not {hole_m} m");
+    }
+}
+
+#[test]
+fn val_the_other_program_still_gives_the_table() {
+    let script = root().join("tests/oracles/holes.py");
+    let has_scipy = Command::new("python3").args(["-c", "import scipy"]).output();
+    if !has_scipy.is_ok_and(|output| output.status.success()) {
+        return skipped("python3 with scipy is not there; the table of holes wasn't made again");
+    }
+    let output = Command::new("python3").arg::<&Path>(&script).output().unwrap();
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    let expected = holes(&std::fs::read_to_string(root().join("tests/oracles/holes.csv")).unwrap());
+    let found = holes(&String::from_utf8(output.stdout).unwrap());
+    assert_eq!(found.len(), expected.len());
+    for (found, expected) in found.iter().flatten().zip(expected.iter().flatten()) {
+        assert!((found - expected).abs() < 1e-9, "{found}, not {expected}");
+    }
+}
+
+/// `docs/cost` is what `headrace cost` makes of `cost.json`: nothing in it is by hand, or of an older form.
+#[test]
+fn the_page_in_docs_is_that_of_its_data() {
+    let folder = root().join("docs/cost");
+    let read =
+        |name: &str| std::fs::read_to_string(folder.join(name)).unwrap_or_else(|why| panic!("{name}: {why}"));
+    let results: Results = serde_json::from_str(&read("cost.json")).unwrap();
+    let files = results.files().unwrap();
+    for (name, content) in &files {
+        let there = read(name);
+        assert!(
+            there.trim_end() == content.trim_end() || there == format!("{content}<!-- headrace cost -->\n"),
+            "docs/cost/{name} isn't what headrace cost makes of docs/cost/cost.json: run `headrace cost --out docs/cost`"
+        );
+    }
+    let mut known: Vec<&str> = files.iter().map(|(name, _)| name.as_str()).collect();
+    known.sort_unstable();
+    let there =
+        std::fs::read_dir(&folder).unwrap().map(|entry| entry.unwrap().file_name().into_string().unwrap());
+    let mut there: Vec<String> = there.collect();
+    there.sort_unstable();
+    assert_eq!(there, known);
+    for trade in &results.trades {
+        let says_a_number = trade.advice.chars().any(|letter| letter.is_ascii_digit());
+        assert!(says_a_number, "{}: {}", trade.name, trade.advice);
+        assert!(trade.points.iter().any(|point| point.is_default), "{}: no default", trade.name);
+    }
+}
+
+/// Of sections whose D_true is over the target, what shipped defaults pass.
+#[test]
+fn shipped_defaults_pass_few_of_those_over_the_target() {
+    let text = std::fs::read_to_string(root().join("docs/cost/cost.json")).unwrap();
+    let results: Results = serde_json::from_str(&text).unwrap();
+    let mut told = 0;
+    for point in results.trades.iter().flat_map(|trade| &trade.points).filter(|point| point.is_default) {
+        for error in point.errors.iter().filter(|error| error.name.starts_with("passed of those over")) {
+            told += 1;
+            assert!(error.interval.middle < 2.5, "{}: {} %", point.scene, error.interval.middle);
+        }
+    }
+    assert!(told > 0, "no trade tells of false passes");
+}
