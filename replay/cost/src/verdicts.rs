@@ -57,7 +57,10 @@ pub fn errors(dives: &[Vec<Judged>], target_m: f64) -> Vec<Error> {
     let is_over = |judged: &Judged| judged.true_hole_m > target_m;
     let in_100 = |dive: &Vec<Judged>, is: &dyn Fn(&Judged) -> bool| {
         let sum = |is: &dyn Fn(&Judged) -> bool| -> f64 {
-            dive.iter().filter(|judged| is(judged)).map(|judged| judged.length_m).sum()
+            dive.iter()
+                .filter(|judged| is(judged))
+                .map(|judged| judged.length_m)
+                .fold(0.0, |all, one| all + one)
         };
         let all_m = sum(&|_| true);
         (all_m > 0.0).then(|| 100.0 * sum(is) / all_m)

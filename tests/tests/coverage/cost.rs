@@ -102,10 +102,15 @@ fn the_page_in_docs_is_that_of_its_data() {
     let results: Results = serde_json::from_str(&read("cost.json")).unwrap();
     let files = results.files().unwrap();
     for (name, content) in &files {
-        let there = read(name);
+        let end = if name.ends_with(".svg") { "<!-- headrace cost -->\n" } else { "" };
+        let content = format!("{content}{end}");
+        // Form alone: times stay as old as they are.
+        if std::env::var_os("HEADRACE_RENEW_COST").is_some() {
+            std::fs::write(folder.join(name), &content).unwrap();
+        }
         assert!(
-            there.trim_end() == content.trim_end() || there == format!("{content}<!-- headrace cost -->\n"),
-            "docs/cost/{name} isn't what headrace cost makes of docs/cost/cost.json: run `headrace cost --out docs/cost`"
+            read(name) == content,
+            "docs/cost/{name} isn't what headrace cost makes of docs/cost/cost.json; HEADRACE_RENEW_COST=1 renews it"
         );
     }
     let mut known: Vec<&str> = files.iter().map(|(name, _)| name.as_str()).collect();
