@@ -188,6 +188,7 @@ impl Viewer {
     }
 
     /// Reads on until this holds; it must before the connection ends.
+    #[expect(clippy::disallowed_methods, reason = "a wait that would never end")]
     pub fn until(&mut self, what: &str, mut holds: impl FnMut(&Self) -> bool) {
         let began = std::time::Instant::now();
         while !holds(self) {

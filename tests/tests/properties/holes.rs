@@ -1,7 +1,7 @@
 //! The largest hole of samples in any arrangement, against Voronoi vertices of all of them.
 
+use headrace_cost::oracle::wall::Wall;
 use headrace_coverage::{HoleFinder, SampleStore, StoreLayout, WallSample};
-use headrace_tests::wall::Wall;
 
 use crate::{Case, few, many};
 
@@ -59,7 +59,8 @@ fn hole(case: &mut Case) -> Result<(), String> {
         return Err(format!("{hole:?}"));
     }
     // Places are rounded at a far chainage, and so are the samples that the oracle gets.
-    let wall = Wall::new(samples.iter().map(|[x_m, arc_m]| [(x_m + along_m) - along_m, *arc_m]), perimeter_m);
+    let wall = Wall::new(samples.iter().map(|[x_m, arc_m]| [(x_m + along_m) - along_m, *arc_m]), perimeter_m)
+        .map_err(|why| why.to_string())?;
     let ends = [(from_m + along_m) - along_m, (to_m + along_m) - along_m];
     let largest = wall.largest(ends[0], ends[1]).ok_or("the oracle has no circle")?;
     let expected_m = 2.0 * largest.radius_m;
