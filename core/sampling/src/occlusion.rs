@@ -50,6 +50,7 @@ impl AngleRange {
 
     /// The same directions in the vehicle's cross-section, as angles of a head that is mounted straight: 0 is down, growing to the
     /// vehicle's left. A head that faces aft turns the other way round. For pictures.
+    #[must_use]
     pub fn across_body(&self, mount: &Mount) -> Self {
         let across = |angle_rad: f64| {
             let direction = mount.rotation * head_direction(angle_rad);

@@ -44,7 +44,7 @@ impl NavigationConfig {
         let usual = noise.map_or(usual, |noise| usual.with_inertial(&noise));
         let Some(section) = section else { return Ok(Self::Filter(usual)) };
         let by_filter = section.choice("way", &[("filter", true), ("direct", false)])?.unwrap_or(true);
-        let settings = settings(&section, usual)?;
+        let settings = settings(&section, &usual)?;
         section.finish()?;
         Ok(if by_filter { Self::Filter(settings) } else { Self::Direct })
     }
@@ -61,8 +61,8 @@ impl NavigationConfig {
 /// Reads a vehicle file's `[navigation]` table; missing keys keep what is `usual`.
 ///
 /// Errors: the first key whose value is out of range.
-fn settings(section: &Section<'_>, usual: Settings) -> Result<Settings, ConfigError> {
-    let mut settings = usual;
+fn settings(section: &Section<'_>, usual: &Settings) -> Result<Settings, ConfigError> {
+    let mut settings = *usual;
     let keys: [(&'static str, RangeInclusive<f64>, f64, &mut f64); 10] = [
         ("gyro_bias_degps", DEGREES, DEGREE, &mut settings.rate_bias.reach),
         ("gyro_bias_time_s", SECONDS, 1.0, &mut settings.rate_bias.time_s),

@@ -48,7 +48,7 @@ pub fn expected_errors(
         distance_m / CALM_S
     );
     let scene = Scene::parse(Document::new("a calm dive", &text), kinds, load, None)?;
-    let navigation = navigated(&scene, Settings { learns: false, ..settings })?;
+    let navigation = navigated(&scene, &Settings { learns: false, ..settings })?;
     Ok(Some(ExpectedErrors {
         confidence_sd: vehicle.coverage.confidence_sd,
         by_time: by_time(&navigation, vehicle),
@@ -56,9 +56,9 @@ pub fn expected_errors(
 }
 
 /// The filter at the end of a scene.
-fn navigated(scene: &Scene, settings: Settings) -> Result<FilterNavigation, SceneError> {
+fn navigated(scene: &Scene, settings: &Settings) -> Result<FilterNavigation, SceneError> {
     let vehicle = &scene.vehicle;
-    let mut navigation = FilterNavigation::new(vehicle.tunnel.profile.clone(), vehicle.site, settings);
+    let mut navigation = FilterNavigation::new(vehicle.tunnel.profile.clone(), vehicle.site, *settings);
     let sensors = vehicle.sensors.iter().map(|sensor| sensor.specification());
     let mut sensors: Vec<_> = sensors
         .map(|spec| (SensorInfo { mount: spec.sensor.mount, kind: spec.kind }, spec.decoder))
