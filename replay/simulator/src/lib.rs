@@ -4,6 +4,7 @@
 
 mod adviser;
 mod builder;
+mod calls;
 pub mod calm;
 mod clock;
 pub mod effects;
@@ -31,6 +32,7 @@ mod truth;
 
 pub use adviser::Adviser;
 pub use builder::Added;
+pub use calls::{Called, Fate, Take};
 pub use clock::START;
 pub use error::SceneError;
 pub use facts::{Facts, SensorFacts};

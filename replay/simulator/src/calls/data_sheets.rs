@@ -18,31 +18,28 @@
 use headrace_sensor::device::{InertialNoise, Sense};
 use headrace_vehicle::VehicleConfig;
 
-use super::described::Described;
 use super::{Call, number};
 use crate::facts::{Facts, SensorFacts};
 
 /// Heads whose beams differ by less share a frequency, radians: 5 kHz.
 const SAME_BEAM_RAD: f64 = 2e-4;
 
-/// The models of which a data sheet is known here.
-pub(super) const MODELS: [&str; 4] = ["imagenex881", "ping1d", "bar100", "imu_can"];
-
-/// What the vehicle's sensors call for: each by its model, which is its plugin's unless the scene says another.
-pub(super) fn calls(described: &Described, vehicle: &VehicleConfig, facts: &Facts) -> Vec<Call> {
+/// What the vehicle's sensors call for, each by its model.
+pub(super) fn calls(vehicle: &VehicleConfig, facts: &Facts) -> Vec<Call> {
     let mut calls = of_vehicle(vehicle, facts);
-    let models = vehicle.sensor_configs.iter().map(|config| described.model(&config.id, &config.plugin));
+    let models = vehicle.sensor_configs.iter().map(|config| config.plugin.as_str());
     for (model, (sensor, of)) in models.zip(vehicle.sensors.iter().zip(&facts.sensors)) {
-        let by = format!("the model of {}, {model}", of.id);
+        let by = format!("the model {model}");
         let own = match model {
             "imagenex881" => head(),
             "ping1d" => echosounder(),
             "bar100" => depth(),
             _ => sensor.inertial_noise().as_ref().map(inertial).unwrap_or_default(),
         };
-        calls.extend(own.into_iter().map(|(effect, keys)| {
-            Call::new(effect, by.clone(), &keys).on(core::slice::from_ref(&of.id))
-        }));
+        calls
+            .extend(own.into_iter().map(|(effect, keys)| {
+                Call::new(effect, by.clone(), &keys).on(core::slice::from_ref(&of.id))
+            }));
     }
     calls
 }

@@ -2,9 +2,9 @@
 
 use headrace_config::{ConfigError, Section};
 use headrace_geometry::math;
+use headrace_geometry::site::{Site, fresh_water_sound_speed_mps};
 use headrace_sensor::device::Sense;
 
-use super::data_sheets::MODELS;
 use super::{Call, number};
 use crate::effects::Stretch;
 use crate::environment::Environment;
@@ -42,7 +42,6 @@ pub(crate) struct Described {
     linings: Vec<(Stretch, Lining)>,
     cable: Option<CableKeys>,
     thrusters: Option<Thrusters>,
-    models: Vec<(String, &'static str)>,
 }
 
 /// Silt in the water.
@@ -84,39 +83,55 @@ struct Thrusters {
     accel_mps2: f64,
 }
 
-impl Described {
-    /// Reads `[water]`, `[cable]`, `[thrusters]`, `[models]` and the stretches of `[tunnel]`.
+/// The tables that say what is there.
+pub(crate) struct Tables<'a> {
+    water: Option<Section<'a>>,
+    stretches: Vec<Section<'a>>,
+    cable: Option<Section<'a>>,
+    thrusters: Option<Section<'a>>,
+}
+
+impl<'a> Tables<'a> {
+    /// `[water]`, `[cable]`, `[thrusters]` and the stretches of `[tunnel]`.
     ///
-    /// Errors: a key that is missing, unknown or out of range; a sensor or model that isn't known.
-    pub(crate) fn read(
-        root: &Section<'_>,
-        tunnel: Option<&Section<'_>>,
-        length_m: f64,
-        sensors: &[String],
-    ) -> Result<Self, ConfigError> {
+    /// Errors: one is no table.
+    pub(crate) fn of(root: &Section<'a>, tunnel: Option<&Section<'a>>) -> Result<Self, ConfigError> {
+        let stretches = tunnel.map(|tunnel| tunnel.sections("stretches")).transpose()?;
+        Ok(Self {
+            water: root.section("water")?,
+            stretches: stretches.unwrap_or_default(),
+            cable: root.section("cable")?,
+            thrusters: root.section("thrusters")?,
+        })
+    }
+}
+
+impl Described {
+    /// Reads the tables of a scene whose tunnel is `length_m` long.
+    ///
+    /// Errors: a key that is missing, unknown or out of range; linings that overlap.
+    pub(crate) fn read(tables: Tables<'_>, length_m: f64) -> Result<Self, ConfigError> {
         let mut described = Self::default();
-        if let Some(water) = root.section("water")? {
+        if let Some(water) = tables.water {
             described.water(&water, length_m)?;
         }
-        if let Some(tunnel) = tunnel {
-            for table in tunnel.sections("stretches")? {
-                let words =
-                    [("rock", Lining::Rock), ("concrete", Lining::Concrete), ("steel", Lining::Steel)];
-                let lining = table.required("lining", table.choice("lining", &words)?)?;
-                let stretch = within(&table, length_m)?;
-                if described.linings.iter().any(|(other, _)| other.meets(&stretch)) {
-                    return Err(table.invalid("from_m", "begins a stretch that overlaps an earlier one"));
-                }
-                table.finish()?;
-                described.linings.push((stretch, lining));
-            }
+        for table in tables.stretches {
+            described.lining(&table, length_m)?;
         }
-        described.cable = root.section("cable")?.map(|table| CableKeys::read(&table)).transpose()?;
-        described.thrusters = root.section("thrusters")?.map(|table| Thrusters::read(&table)).transpose()?;
-        if let Some(table) = root.section("models")? {
-            described.models = models(&table, sensors)?;
-        }
+        described.cable = tables.cable.map(|table| CableKeys::read(&table)).transpose()?;
+        described.thrusters = tables.thrusters.map(|table| Thrusters::read(&table)).transpose()?;
         Ok(described)
+    }
+
+    fn lining(&mut self, table: &Section<'_>, length_m: f64) -> Result<(), ConfigError> {
+        let words = [("rock", Lining::Rock), ("concrete", Lining::Concrete), ("steel", Lining::Steel)];
+        let lining = table.required("lining", table.choice("lining", &words)?)?;
+        let stretch = within(table, length_m)?;
+        if self.linings.iter().any(|(other, _)| other.meets(&stretch)) {
+            return Err(table.invalid("from_m", "begins a stretch that overlaps an earlier one"));
+        }
+        self.linings.push((stretch, lining));
+        table.finish()
     }
 
     fn water(&mut self, water: &Section<'_>, length_m: f64) -> Result<(), ConfigError> {
@@ -144,14 +159,8 @@ impl Described {
         water.finish()
     }
 
-    /// The model of a sensor: what the scene says, or its plugin.
-    pub(super) fn model<'a>(&self, id: &str, plugin: &'a str) -> &'a str {
-        let said = self.models.iter().find(|(sensor, _)| sensor == id);
-        said.map_or(plugin, |(_, model)| *model)
-    }
-
     /// What all this calls for.
-    pub(super) fn calls(&self, facts: &Facts, environment: &Environment) -> Vec<Call> {
+    pub(super) fn calls(&self, site: &Site, facts: &Facts, environment: &Environment) -> Vec<Call> {
         let of = |sense: Sense| {
             let sensors = facts.sensors.iter().filter(|sensor| sensor.sense == sense);
             sensors.map(|sensor| sensor.id.clone()).collect::<Vec<_>>()
@@ -160,8 +169,9 @@ impl Described {
         let sonars = [heads.clone(), of(Sense::Echosounder)].concat();
         let mut calls = Vec::new();
         if !sonars.is_empty() {
-            calls.extend(self.of_water(&heads, &sonars));
-            calls.extend(openings(environment, &sonars));
+            calls.extend(self.of_water(site, &heads, &sonars));
+            calls.extend(openings(environment, &sonars, facts.length_m));
+            calls.extend(rubble(environment, &sonars));
         }
         calls.extend(self.of_leaks(facts, environment));
         self.linings.iter().for_each(|(stretch, lining)| {
@@ -176,7 +186,7 @@ impl Described {
         calls
     }
 
-    fn of_water(&self, heads: &[String], sonars: &[String]) -> Vec<Call> {
+    fn of_water(&self, site: &Site, heads: &[String], sonars: &[String]) -> Vec<Call> {
         let mut calls = Vec::new();
         if let Some(degc) = self.temperature_degc {
             let by = format!("water of {degc} degrees");
@@ -184,14 +194,11 @@ impl Described {
                 let keys = [("temperature_degc", number(degc))];
                 calls.push(Call::new("echo_strength", by.clone(), &keys).on(heads));
             }
-            let speed_mps = |degc| {
-                headrace_geometry::site::fresh_water_sound_speed_mps(degc, 101_325.0)
-            };
-            // The change with pressure is the vehicle file's matter: what it assumes holds for its depth.
+            let pressure_pa = site.pressure_pa(site.surface_above_floor_m);
+            let speed_mps = |degc| fresh_water_sound_speed_mps(degc, pressure_pa);
             let per_metre = self.per_metre_degc.unwrap_or(0.0);
             let per_metre_mps = speed_mps(degc + per_metre) - speed_mps(degc);
-            let keys =
-                [("floor_mps", number(speed_mps(degc))), ("per_metre_mps", number(per_metre_mps))];
+            let keys = [("floor_mps", number(speed_mps(degc))), ("per_metre_mps", number(per_metre_mps))];
             calls.push(Call::new("sound_speed_profile", by, &keys).on(sonars));
         }
         for murk in &self.murk {
@@ -214,7 +221,7 @@ impl Described {
 
     fn of_leaks(&self, facts: &Facts, environment: &Environment) -> Vec<Call> {
         // A trajectory that is given over ground isn't carried.
-        if facts.ground == Ground::Tunnel {
+        if self.leaks.is_empty() || facts.ground == Ground::Tunnel {
             return Vec::new();
         }
         let area_m2 = environment.area_m2();
@@ -239,30 +246,21 @@ fn within(table: &Section<'_>, length_m: f64) -> Result<Stretch, ConfigError> {
     Ok(stretch)
 }
 
-fn models(table: &Section<'_>, sensors: &[String]) -> Result<Vec<(String, &'static str)>, ConfigError> {
-    let mut models = Vec::new();
-    for key in table.keys() {
-        let Some(id) = sensors.iter().find(|id| *id == key) else {
-            return Err(table.invalid(key, &format!("is no sensor; the vehicle has {}", sensors.join(", "))));
-        };
-        let said = table.string(key)?;
-        let Some(model) = MODELS.into_iter().find(|model| said.as_deref() == Some(*model)) else {
-            let problem = format!("is a model without a data sheet here; there are {}", MODELS.join(", "));
-            return Err(table.invalid(key, &problem));
-        };
-        models.push((id.clone(), model));
-    }
-    Ok(models)
-}
-
 /// Corners at openings return sound by way of two walls.
-fn openings(environment: &Environment, sonars: &[String]) -> Vec<Call> {
+fn openings(environment: &Environment, sonars: &[String], length_m: f64) -> Vec<Call> {
     let by_opening = |(name, [from_m, to_m]): (&str, [f64; 2])| {
-        let place_m = [(from_m - BESIDE_M).max(0.0), to_m + BESIDE_M];
+        let place_m = [(from_m - BESIDE_M).max(0.0), (to_m + BESIDE_M).min(length_m)];
         let by = format!("{name} from {from_m:.1} to {to_m:.1} m");
         Call::new("multipath", by, &[("share", number(0.1))]).on(sonars).within(place_m)
     };
     environment.openings().map(by_opening).collect()
+}
+
+/// Beside rubble a beam meets stones and the wall behind them.
+fn rubble(environment: &Environment, sonars: &[String]) -> Option<Call> {
+    let [from_m, to_m] = environment.rubble_m()?;
+    let by = format!("rubble from {from_m:.1} to {to_m:.1} m");
+    Some(Call::new("beam_cone", by, &[]).on(sonars))
 }
 
 impl Lining {

@@ -1,14 +1,18 @@
 //! Many calls for effects as one set of tables: where two calls for an effect meet, the later one's keys hold.
 
-use core::fmt::Write as _;
-
 use super::{Call, Called, Fate, Value};
 use crate::effects::KINDS;
 
 /// Key whose values are put in a row instead of the later one holding.
 const PLACES: &str = "places";
 
+/// Effect whose tables are groups of sensors.
+const GROUPED: &str = "interference";
+
 type Keys = Vec<(&'static str, Value)>;
+
+/// Sensors with the same pieces, and, if that matters, the group that they are.
+type Shared<'a> = (Vec<&'a String>, Vec<Piece>, Option<Option<&'a Vec<String>>>);
 
 /// A table to be: where, and what.
 #[derive(Debug, Clone, PartialEq)]
@@ -31,7 +35,12 @@ pub(super) fn merge(calls: &[Call]) -> Vec<Called> {
                 by.push(call.by.clone());
             }
         }
-        all.push(Called { effect: kind.name(), by, tables: tables(kind.name(), &calls), fate: Fate::NotTaken });
+        all.push(Called {
+            effect: kind.name(),
+            by,
+            tables: tables(kind.name(), &calls),
+            fate: Fate::NotTaken,
+        });
     }
     all
 }
@@ -47,21 +56,24 @@ fn tables(effect: &str, calls: &[&Call]) -> String {
             }
         }
     }
-    let mut shared: Vec<(Vec<&String>, Vec<Piece>)> = Vec::new();
+    let mut shared: Vec<Shared<'_>> = Vec::new();
     for sensor in sensors {
         let acts = |call: &&&Call| match (&call.sensors, sensor) {
             (Some(ids), Some(id)) => ids.contains(id),
             (None, None) => true,
             _ => false,
         };
-        let pieces = pieces(calls.iter().filter(acts).copied());
-        match shared.iter_mut().find(|(_, other)| *other == pieces) {
-            Some((ids, _)) => ids.extend(sensor),
-            None => shared.push((sensor.into_iter().collect(), pieces)),
+        let acting: Vec<&Call> = calls.iter().filter(acts).copied().collect();
+        let pieces = pieces(&acting);
+        // Of heads that hear each other a table is a frequency: those of two calls aren't one.
+        let group = acting.first().filter(|_| effect == GROUPED).map(|call| call.sensors.as_ref());
+        match shared.iter_mut().find(|(_, other, of)| *other == pieces && *of == group) {
+            Some((ids, ..)) => ids.extend(sensor),
+            None => shared.push((sensor.into_iter().collect(), pieces, group)),
         }
     }
     let mut text = String::new();
-    for (ids, pieces) in &shared {
+    for (ids, pieces, _) in &shared {
         for piece in pieces {
             piece.write(effect, ids, &mut text);
         }
@@ -70,15 +82,15 @@ fn tables(effect: &str, calls: &[&Call]) -> String {
 }
 
 /// The places where different sets of calls hold, in order, without those where none does.
-fn pieces<'a>(calls: impl Iterator<Item = &'a Call> + Clone) -> Vec<Piece> {
+fn pieces(calls: &[&Call]) -> Vec<Piece> {
     const ALL: [f64; 2] = [f64::NEG_INFINITY, f64::INFINITY];
     let place = |call: &Call| call.place_m.unwrap_or(ALL);
-    let mut borders: Vec<f64> = calls.clone().flat_map(place).collect();
+    let mut borders: Vec<f64> = calls.iter().flat_map(|call| place(call)).collect();
     borders.sort_by(f64::total_cmp);
     borders.dedup();
     let mut pieces: Vec<Piece> = Vec::new();
     for (from_m, to_m) in borders.iter().zip(borders.iter().skip(1)) {
-        let here = calls.clone().filter(|call| {
+        let here = calls.iter().filter(|call| {
             let [first_m, last_m] = place(call);
             first_m <= *from_m && last_m >= *to_m
         });
@@ -123,11 +135,8 @@ impl Piece {
             lines.push(format!("to_m = {to_m:?}"));
         }
         lines.extend(self.keys.iter().map(|(key, value)| format!("{key} = {value}")));
-        // Writing to a text can't fail.
-        drop(write!(text, "[[effects.{effect}]]\n"));
-        for line in lines {
-            text.push_str(&line);
-            text.push('\n');
-        }
+        lines.push(String::new());
+        lines.insert(0, format!("[[effects.{effect}]]"));
+        text.push_str(&lines.join("\n"));
     }
 }

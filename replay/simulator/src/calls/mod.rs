@@ -11,7 +11,7 @@ use headrace_vehicle::VehicleConfig;
 use crate::environment::Environment;
 use crate::facts::Facts;
 
-pub(crate) use described::Described;
+pub(crate) use described::{Described, Tables};
 
 /// Which of the effects that a scene calls for are simulated.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -102,8 +102,8 @@ pub(crate) fn called(
     facts: &Facts,
     environment: &Environment,
 ) -> Vec<Called> {
-    let mut calls = data_sheets::calls(described, vehicle, facts);
-    calls.extend(described.calls(facts, environment));
+    let mut calls = data_sheets::calls(vehicle, facts);
+    calls.extend(described.calls(&vehicle.site, facts, environment));
     merge::merge(&calls)
 }
 
@@ -115,11 +115,13 @@ pub(crate) struct Choice {
 }
 
 impl Choice {
-    /// Reads `take` and `leave`.
+    /// Reads `take` and `leave`; `instead` overrides what `take` says.
     ///
     /// Errors: another word; `leave` without `take = "called"`, or a name that is no effect.
-    pub(crate) fn read(effects: Option<&Section<'_>>) -> Result<Self, ConfigError> {
-        let Some(section) = effects else { return Ok(Self::default()) };
+    pub(crate) fn read(effects: Option<&Section<'_>>, instead: Option<Take>) -> Result<Self, ConfigError> {
+        let Some(section) = effects else {
+            return Ok(Self { take: instead.unwrap_or_default(), leave: Vec::new() });
+        };
         let words = [("only", Take::Only), ("called", Take::Called)];
         let take = section.choice("take", &words)?.unwrap_or_default();
         let leave = section.texts("leave")?;
@@ -130,7 +132,7 @@ impl Choice {
         if let Some(unknown) = leave.iter().find(|name| crate::effects::named(name).is_none()) {
             return Err(section.invalid("leave", &format!("names {unknown:?}, which is no effect")));
         }
-        Ok(Self { take, leave })
+        Ok(Self { take: instead.unwrap_or(take), leave })
     }
 
     /// Says of each call what becomes of it, the effects of these names being the scene's own.

@@ -50,7 +50,7 @@ mod tether_scale;
 mod tether_slack;
 mod tether_slip;
 
-use headrace_config::{ConfigError, Section};
+use headrace_config::{ConfigError, Document, Section};
 
 use crate::facts::Facts;
 
@@ -114,6 +114,11 @@ pub const KINDS: [&dyn EffectKind; 38] = [
 /// The effects that a scene names, in the order of [`KINDS`].
 pub struct Named(pub(crate) Vec<(&'static dyn EffectKind, Box<dyn Effect>)>);
 
+/// The effect of a name.
+pub(crate) fn named(name: &str) -> Option<&'static dyn EffectKind> {
+    KINDS.into_iter().find(|kind| kind.name() == name)
+}
+
 /// Reads the `[effects]` table.
 ///
 /// Errors: a name that is no effect; see [`EffectKind::read`].
@@ -129,6 +134,23 @@ pub(crate) fn parse(section: Option<Section<'_>>, facts: &Facts) -> Result<Named
     }
     section.finish()?;
     Ok(Named(named))
+}
+
+impl Named {
+    /// Whether an effect is among them.
+    pub(crate) fn has(&self, name: &str) -> bool {
+        self.0.iter().any(|(kind, _)| kind.name() == name)
+    }
+
+    /// These and those of a text of tables, none of which is among these.
+    ///
+    /// Errors: see [`EffectKind::read`].
+    pub(crate) fn and(mut self, tables: &str, facts: &Facts) -> Result<Self, ConfigError> {
+        let root = Document::new("what the scene calls for", tables).root()?;
+        self.0.extend(parse(root.section("effects")?, facts)?.0);
+        self.0.sort_by_key(|(kind, _)| KINDS.iter().position(|other| other.name() == kind.name()));
+        Ok(self)
+    }
 }
 
 #[cfg(test)]

@@ -71,13 +71,10 @@ impl<P: Clone> PerSensor<Places<P>> {
             })?;
             let Some((sensors, stretch, parameters)) = read else { continue };
             for source in sensors {
-                let of_sensor = match found.iter().position(|(other, _)| *other == source) {
-                    Some(known) => found.get_mut(known),
-                    None => {
-                        found.push((source, Places(Vec::new())));
-                        found.last_mut()
-                    }
-                };
+                if !found.iter().any(|(other, _)| *other == source) {
+                    found.push((source, Places(Vec::new())));
+                }
+                let of_sensor = found.iter_mut().find(|(other, _)| *other == source);
                 let Some((_, places)) = of_sensor else { continue };
                 if places.0.iter().any(|(other, _)| other.meets(&stretch)) {
                     let id = facts.sensors.get(source).map_or("", |sensor| sensor.id.as_str());
