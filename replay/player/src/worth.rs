@@ -4,14 +4,14 @@
 //! two dives of a seed differ by what the effect does and by nothing else; the mean difference over seeds has a confidence
 //! interval of 95 %, by Student's t.
 
+mod error;
 mod figures;
 mod mean;
 mod price;
 
 use headrace_simulator::Scene;
 
-use crate::adviser::SimulationError;
-use crate::drive::DriveError;
+pub use error::WorthError;
 use figures::Figures;
 pub use mean::Mean;
 
@@ -19,23 +19,6 @@ pub use mean::Mean;
 pub const HOLE_LIMIT_M: f64 = 0.01;
 /// The same for the metres passed, as a share of the way.
 pub const PASSED_LIMIT: f64 = 0.01;
-
-/// Why worth can't be measured.
-#[derive(Debug, thiserror::Error)]
-pub enum WorthError {
-    /// A scene can't be simulated, perhaps without one of its effects.
-    #[error(transparent)]
-    Simulation(#[from] SimulationError),
-    /// A loop can't be armed for the scene's vehicle.
-    #[error("arming the loop that judges the scene: {0}")]
-    Loop(#[from] headrace_monitor::PluginError),
-    /// A simulated dive doesn't go through the loop.
-    #[error(transparent)]
-    Drive(#[from] DriveError),
-    /// Too few seeds for an interval.
-    #[error("measuring worth: {0} seeds; an interval needs at least 2")]
-    Seeds(usize),
-}
 
 /// What leaving effects out does to a scene.
 #[derive(Debug, Clone, PartialEq)]

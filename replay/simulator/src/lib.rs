@@ -22,6 +22,7 @@ mod scene;
 mod sensing;
 mod simulation;
 mod stages;
+mod stretch;
 #[cfg(test)]
 mod testing;
 #[cfg(test)]

@@ -7,7 +7,7 @@ use headrace_monitor::App;
 use headrace_monitor::report::Report;
 use headrace_simulator::Scene;
 
-use super::WorthError;
+use super::error::WorthError;
 use crate::adviser::simulation;
 use crate::drive::{Pace, drive};
 use crate::simulation_feed::SimulationFeed;

@@ -4,7 +4,8 @@ use headrace_sensor::device::{Direction, Sense};
 use headrace_simulator::Scene;
 use rustix::time::{ClockId, clock_gettime};
 
-use super::{Mean, WorthError};
+use super::error::WorthError;
+use super::mean::Mean;
 use crate::adviser::{SimulationError, simulation};
 
 /// Rounds, in turns, whose mean and interval are told.

@@ -6,9 +6,9 @@ use headrace_geometry::site::{Site, fresh_water_sound_speed_mps};
 use headrace_sensor::device::Sense;
 
 use super::{Call, number};
-use crate::effects::Stretch;
 use crate::environment::Environment;
 use crate::facts::Facts;
+use crate::stretch::Stretch;
 use crate::trajectory::Ground;
 
 /// A cable that can be named.

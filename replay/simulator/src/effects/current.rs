@@ -5,11 +5,11 @@ use headrace_geometry::math;
 
 use super::effect::{Effect, EffectKind};
 use super::keys;
-use super::places::Stretch;
 use crate::builder::Builder;
 use crate::error::SceneError;
 use crate::facts::Facts;
 use crate::random::Stream;
+use crate::stretch::Stretch;
 use crate::trajectory::{Flow, Ground, Knots, Trajectory};
 
 const NAME: &str = "current";

@@ -56,7 +56,6 @@ use crate::facts::Facts;
 
 pub use beam_cone::Cone;
 pub use effect::{Effect, EffectKind};
-pub(crate) use places::Stretch;
 pub use targets::PerSensor;
 
 /// All effects. Within a stage, systems run in this order, whatever the order of the scene.

@@ -1,6 +1,6 @@
 //! The water's flow along the tunnel.
 
-use crate::effects::Stretch;
+use crate::stretch::Stretch;
 
 /// Speeds of the water by stretches of the tunnel; it stands elsewhere.
 #[derive(Debug, Clone, Default, PartialEq)]

@@ -3,8 +3,8 @@ use headrace_geometry::math;
 use headrace_vehicle::TunnelConfig;
 
 use super::*;
-use crate::effects::Stretch;
 use crate::random::Stream;
+use crate::stretch::Stretch;
 
 /// A trajectory in a tunnel of 200 m.
 fn parsed(trajectory: &str, seed: u64) -> Result<(Trajectory, Ground), String> {
