@@ -8,7 +8,7 @@ mod value_parsers;
 
 use std::path::PathBuf;
 
-use clap::{ArgAction, Args, Parser, Subcommand};
+use clap::{ArgAction, Args, Parser, Subcommand, ValueEnum};
 use headrace_geometry::time::DurNs;
 use headrace_replay::log::Every;
 use headrace_sampling::layout::HeadLayout;
@@ -131,7 +131,7 @@ pub(crate) enum Command {
     Trim(Trim),
     /// Simulate a scene and write the bytes that its devices would send as a log.
     ///
-    /// Only the effects named in the scene are simulated; --explain lists them.
+    /// Only the effects named in the scene are simulated, or, as the scene wishes, those that it calls for; --explain lists them.
     #[command(after_help = SIMULATE_EXAMPLES)]
     Simulate(Simulate),
     /// Convert a log of another program: MAVLink telemetry, candump, Imagenex, Ping Viewer, CSV, ROS bags and MCAP.
@@ -319,6 +319,24 @@ pub(crate) struct Replay {
     pub(crate) page: PageArgs,
 }
 
+/// What --take takes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(crate) enum TakeWhat {
+    /// What the scene names.
+    Only,
+    /// What the scene calls for, and what it names.
+    Called,
+}
+
+/// What --explain tells.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(crate) enum Explain {
+    /// What would be simulated, and what calls for it.
+    List,
+    /// That, and what each effect is worth.
+    Worth,
+}
+
 #[derive(Debug, Args)]
 pub(crate) struct Simulate {
     /// Scene file.
@@ -333,9 +351,16 @@ pub(crate) struct Simulate {
     /// effect contributed.
     #[arg(long, value_name = "TRUTH.csv")]
     pub(crate) truth: Option<PathBuf>,
-    /// List what would be simulated and why, without simulating.
-    #[arg(long)]
-    pub(crate) explain: bool,
+    /// Effects to simulate, overriding the scene's: those alone that it names, or those that it calls for, too.
+    #[arg(long, value_enum, value_name = "WHAT")]
+    pub(crate) take: Option<TakeWhat>,
+    /// List what would be simulated and why, without simulating; with =worth, also measure what each effect costs and what
+    /// leaving it out changes in this scene's results, over several seeds.
+    #[arg(long, value_enum, num_args = 0..=1, require_equals = true, default_missing_value = "list", value_name = "WHAT")]
+    pub(crate) explain: Option<Explain>,
+    /// Seeds that --explain=worth dives, from the scene's on.
+    #[arg(long, value_name = "N", default_value_t = 5, value_parser = clap::value_parser!(u16).range(2..=1000))]
+    pub(crate) seeds: u16,
     /// Print a summary as JSON.
     #[arg(long)]
     pub(crate) json: bool,
@@ -353,6 +378,7 @@ const IMPORT_EXAMPLES: &str = "Example:
 const SIMULATE_EXAMPLES: &str = "Example:
   headrace simulate deploy/scenes/demo.toml -o dive.mcap
   headrace simulate deploy/scenes/vita1-field.toml --explain
+  headrace simulate deploy/scenes/vita1-field.toml --take called --explain=worth --seeds 8
   headrace simulate deploy/scenes/vita1-field.toml --seed 7 --truth truth.csv -o dive.mcap";
 
 const CALIBRATE_EXAMPLES: &str = "Example:

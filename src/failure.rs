@@ -14,6 +14,7 @@ use headrace_replay::drive::DriveError;
 use headrace_replay::log::LogError;
 use headrace_replay::playback::PlaybackError;
 use headrace_replay::smooth::SmoothError;
+use headrace_replay::worth::WorthError;
 use headrace_sampling::SamplingError;
 use headrace_simulator::SceneError;
 
@@ -57,6 +58,8 @@ pub(crate) enum Failure {
     Smooth(#[from] SmoothError),
     #[error(transparent)]
     Drive(#[from] DriveError),
+    #[error(transparent)]
+    Worth(#[from] WorthError),
     #[error(transparent)]
     Playback(#[from] PlaybackError),
     #[error(transparent)]

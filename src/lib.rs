@@ -10,6 +10,7 @@ pub mod devices;
 mod dive;
 mod emulate;
 mod expect;
+mod explain;
 mod export;
 mod failure;
 mod feeds;

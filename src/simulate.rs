@@ -1,4 +1,4 @@
-//! `headrace simulate`: a scene as a log, with its ground truth; or a list of what would be simulated.
+//! `headrace simulate`: a scene as a log, with its ground truth.
 
 use std::fs::File;
 use std::io::{BufWriter, Write};
@@ -9,17 +9,17 @@ use headrace_geometry::time::MonoNs;
 use headrace_replay::log::LogWriter;
 use headrace_replay::simulation;
 use headrace_sensor::device::Direction;
-use headrace_simulator::effects::KINDS as EFFECTS;
 use headrace_simulator::environment::What;
-use headrace_simulator::{Added, START, Scene, Simulation, SoundingTruth, Stage, TruthRow};
+use headrace_simulator::{START, Scene, Simulation, SoundingTruth, Take, TruthRow};
 use serde_json::json;
 
-use crate::cli::Simulate;
+use crate::cli::{Explain, Simulate, TakeWhat};
 use crate::devices::KINDS;
 use crate::dive::log_header;
+use crate::explain::{explain, worth_of};
 use crate::failure::{self, Failure};
 use crate::files;
-use crate::output::{append, deliver, say, show};
+use crate::output::{append, deliver, say};
 use crate::outputs::{self, Kind, SIMULATED, TRUTH};
 use crate::phase::Phase;
 use crate::progress::Progress;
@@ -29,9 +29,21 @@ pub(crate) fn simulate(args: &Simulate) -> Result<u8, Failure> {
     let text = files::read(&args.scene)?;
     let name = args.scene.display().to_string();
     let load = files::bytes_beside(&args.scene);
-    let scene = Scene::parse(Document::new(&name, &text), &KINDS, &load, args.seed)?;
-    if args.explain {
-        return explain(&scene, args.json);
+    let take = args.take.map(|take| match take {
+        TakeWhat::Only => Take::Only,
+        TakeWhat::Called => Take::Called,
+    });
+    let read = |seed| Scene::parse_taking(Document::new(&name, &text), &KINDS, &load, seed, take);
+    let scene = read(args.seed)?;
+    match args.explain {
+        Some(Explain::List) => return explain(&scene, None, args.json),
+        Some(Explain::Worth) => {
+            let seeds = (scene.seed..).take(usize::from(args.seeds));
+            let mut scenes = seeds.map(|seed| read(Some(seed))).collect::<Result<Vec<_>, _>>()?;
+            let worth = worth_of(&mut scenes)?;
+            return explain(&scene, Some(&worth), args.json);
+        }
+        None => {}
     }
     let Some(output) = &args.output else {
         let what = "simulate: needs -o LOG.mcap for the log, or --explain to list what would be simulated";
@@ -88,76 +100,6 @@ pub(crate) fn simulate(args: &Simulate) -> Result<u8, Failure> {
         }
     }
     Ok(failure::OK)
-}
-
-/// Lists a scene's systems, components and random streams, and the effects it doesn't use.
-fn explain(scene: &Scene, as_json: bool) -> Result<u8, Failure> {
-    let simulation = Simulation::new(scene)?;
-    let added = simulation.added();
-    let left_out: Vec<_> =
-        EFFECTS.iter().filter(|kind| added.iter().all(|effect| effect.effect != kind.name())).collect();
-    if as_json {
-        let system = |(stage, name): &(Stage, String)| json!({"stage": stage.as_str(), "system": name});
-        let effect = |effect: &Added| {
-            json!({
-                "effect": effect.effect,
-                "systems": effect.systems.iter().map(system).collect::<Vec<_>>(),
-                "replaces": effect.replaces,
-                "components": effect.components.iter().map(|(name, on)| json!({"component": name, "sensors": on})).collect::<Vec<_>>(),
-                "streams": effect.streams, "trajectory": effect.trajectory,
-            })
-        };
-        let shown = json!({
-            "scene": scene.name, "seed": scene.seed, "duration_s": simulation.duration_s(),
-            "base": simulation.base_systems().iter().map(system).collect::<Vec<_>>(),
-            "effects": added.iter().map(effect).collect::<Vec<_>>(),
-            "left_out": left_out.iter().map(|kind| kind.name()).collect::<Vec<_>>(),
-        });
-        deliver(&serde_json::to_string_pretty(&shown)?)?;
-        return Ok(failure::OK);
-    }
-    let mut text = format!(
-        "{}: {:.0} s of {}, seed {}\n\nalways simulated for this vehicle:\n",
-        scene.name,
-        simulation.duration_s(),
-        scene.vehicle.name,
-        scene.seed
-    );
-    for (stage, name) in simulation.base_systems() {
-        append(&mut text, format_args!("  {:<6} {name}\n", stage.as_str()));
-    }
-    text.push_str(if added.is_empty() { "\nno effects\n" } else { "\neffects of the scene:\n" });
-    for effect in added {
-        text.push_str(&in_words(effect));
-    }
-    text.push_str("\nnot simulated:\n");
-    for kind in left_out {
-        append(&mut text, format_args!("  {:<22} {}\n", kind.name(), kind.summary()));
-    }
-    show(&text);
-    Ok(failure::OK)
-}
-
-fn in_words(added: &Added) -> String {
-    let summary = EFFECTS.iter().find(|kind| kind.name() == added.effect).map_or("", |kind| kind.summary());
-    let mut text = format!("  {}: {summary}\n", added.effect);
-    let mut line = |what: &str, words: String| append(&mut text, format_args!("    {what:<10} {words}\n"));
-    for (stage, name) in &added.systems {
-        line("system", format!("{name} in {}", stage.as_str()));
-    }
-    for base in &added.replaces {
-        line("instead of", (*base).to_owned());
-    }
-    for (component, sensors) in &added.components {
-        line("component", format!("{component} on {}", sensors.join(", ")));
-    }
-    if !added.streams.is_empty() {
-        line("random", format!("a stream each for {}", added.streams.join(", ")));
-    }
-    if let Some(what) = &added.trajectory {
-        line("trajectory", what.clone());
-    }
-    text
 }
 
 /// The ground truth: CSV, a row per measurement.

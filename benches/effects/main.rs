@@ -1,6 +1,6 @@
-//! Cost of each effect of the simulator, and the change in the results from leaving it out. Prints Markdown.
+//! Cost of each effect of the simulator, and what is saved by what a scene calls for. Prints Markdown.
 //!
-//! `cargo bench -p headrace_benches --bench effects` runs all; `-- bare`, `-- cost`, `-- fidelity`, `-- seven` one part
+//! `cargo bench -p headrace_benches --bench effects` runs all; `-- bare`, `-- cost`, `-- called`, `-- seven` one part
 //! alone, and in a build with `--features mesh` `-- mesh`.
 //! Times are the least of several rounds, taken in turns, on an otherwise idle machine.
 
@@ -8,6 +8,7 @@
 #![expect(clippy::unwrap_used, clippy::panic, reason = "a benchmark stops at what it can't do")]
 
 mod bare;
+mod called;
 #[cfg(feature = "mesh")]
 mod mesh;
 
@@ -21,7 +22,8 @@ const ROUNDS: usize = 15;
 const SPEED_MPS: f64 = 0.11;
 
 /// Every effect with some parameters; heads turn in sectors, so that `sector_end_slowing` applies.
-const EFFECTS: [(&str, &str); 30] = [
+const EFFECTS: [(&str, &str); 38] = [
+    ("mount_error", "angles_sd_deg = 0.2"),
     ("start_phase_error", "max_deg = 20"),
     ("sector_end_slowing", "lag_ms = 60"),
     ("skipped_steps", "per_thousand = 0.2"),
@@ -29,22 +31,29 @@ const EFFECTS: [(&str, &str); 30] = [
     ("motion_within_turn", ""),
     ("beam_cone", "sensors = [\"sonar_0\", \"sonar_1\", \"sonar_2\", \"sonar_3\"]"),
     ("occlusion", ""),
+    ("echo_strength", ""),
     ("multipath", "share = 0.1\nsensors = [\"sonar_0\", \"sonar_1\", \"sonar_2\", \"sonar_3\"]"),
     ("side_lobes", "share = 0.02\nsensors = [\"sonar_0\", \"sonar_1\", \"sonar_2\", \"sonar_3\"]"),
     ("interference", "share = 0.01"),
+    ("near_returns", "share = 0.02\nmean_run = 3"),
     ("missing_returns", "share = 0.05\nmean_run = 3"),
     ("outliers", "share = 0.02"),
     ("stuck_range", "range_m = 0.55\nto_s = 20\nsensors = [\"sonar_0\"]"),
     ("sound_speed_error", "share = 0.005"),
+    ("sound_speed_profile", "per_metre_mps = 0.5"),
     ("range_noise", "sd_m = 0.01"),
     ("range_quantisation", "points = 500\nsensors = [\"sonar_0\", \"sonar_1\", \"sonar_2\", \"sonar_3\"]"),
     ("current", "speed_mps = -0.02\ngust_sd_mps = 0.01"),
     ("pilot_drift", "across_m = 0.5\nup_m = 0.3\nyaw_deg = 5"),
+    ("depth_noise", "noise_pa = 150"),
     ("depth_steps", ""),
     ("imu_noise", "gyro_degps_rthz = 0.007\naccel_mps2_rthz = 0.001\nattitude_deg = 0.2"),
     ("imu_bias", "gyro_degps = 0.05"),
+    ("imu_vibration", "frequency_hz = 75\naccel_mps2 = 0.3"),
+    ("imu_bumps", "per_hour = 20"),
     ("magnetic_disturbance", "per_100m = 4"),
     ("tether_slack", ""),
+    ("tether_scale", "share = 0.002\nstiffness_n = 40000"),
     ("tether_slip", "per_100m = 1"),
     ("late_winding", "hold_m = 0.2"),
     ("tether_quantum", ""),
@@ -59,7 +68,7 @@ fn main() {
     let parts: &[(&str, fn())] = &[
         ("bare", bare::bare),
         ("cost", cost),
-        ("fidelity", fidelity),
+        ("called", called::called),
         ("seven", seven_kilometres),
         #[cfg(feature = "mesh")]
         ("mesh", mesh::mesh),
@@ -142,59 +151,6 @@ fn cost() {
             ns(alone_s) * scale(&alone) - ns(none_s),
             ns(all_s) * scale(&all) - ns(without_s) * scale(&without)
         );
-    }
-}
-
-struct Figures {
-    t_x_m: f64,
-    t_y_m: f64,
-    hole_m: f64,
-    worst_m: f64,
-    pass_m: f64,
-    fail_m: f64,
-}
-
-/// The loop's figures for a scene.
-fn dive(scene: &Scene) -> Figures {
-    let report = serde_json::to_value(scenes::report(scene)).unwrap();
-    let summary =
-        |pointer: &str| report.pointer(pointer).and_then(serde_json::Value::as_f64).unwrap_or(f64::NAN);
-    Figures {
-        t_x_m: summary("/summary/t_x/mean_m"),
-        t_y_m: summary("/summary/t_y/mean_m"),
-        hole_m: summary("/summary/hole/mean_m"),
-        worst_m: summary("/summary/hole/max_m"),
-        pass_m: summary("/summary/pass_m"),
-        fail_m: summary("/summary/fail_m"),
-    }
-}
-
-/// Effect on the loop's figures of leaving out each effect, with heads in sectors and turning continuously.
-fn fidelity() {
-    const LENGTH_M: f64 = 40.0;
-    for (layout, title) in [("phase_shift", "phase shift"), ("sector_offset", "sector offset")] {
-        let usable: Vec<_> = EFFECTS
-            .iter()
-            .copied()
-            .filter(|(name, _)| layout != "phase_shift" || *name != "sector_end_slowing")
-            .collect();
-        let row = |name: &str, figures: &Figures| {
-            println!(
-                "| {name} | {:.4} | {:.4} | {:.3} | {:.2} | {:.1} | {:.1} |",
-                figures.t_x_m, figures.t_y_m, figures.hole_m, figures.worst_m, figures.pass_m, figures.fail_m
-            );
-        };
-        println!(
-            "\n| {title}: left out | T_x mean, m | T_y mean, m | D mean, m | D largest, m | passed, m | failed, m |"
-        );
-        println!("|---|---|---|---|---|---|---|");
-        row("all effects left out", &dive(&scene(LENGTH_M, layout, "")));
-        row("none", &dive(&scene(LENGTH_M, layout, &named(&usable))));
-        for (index, effect) in usable.iter().enumerate() {
-            let others: Vec<_> =
-                usable.iter().enumerate().filter(|(k, _)| *k != index).map(|(_, e)| *e).collect();
-            row(effect.0, &dive(&scene(LENGTH_M, layout, &named(&others))));
-        }
     }
 }
 

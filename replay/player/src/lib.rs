@@ -15,6 +15,7 @@ pub mod smooth;
 pub mod snapshot_store;
 pub mod verify;
 pub mod view;
+pub mod worth;
 
 pub use adviser::{SimulationError, simulation, simulation_believing};
 pub use simulation_feed::SimulationFeed;

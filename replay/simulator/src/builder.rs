@@ -5,12 +5,13 @@ use bevy_ecs::prelude::{Component, IntoScheduleConfigs, SystemSet, World};
 use bevy_ecs::schedule::{Schedule, ScheduleConfigs};
 use bevy_ecs::system::{IntoSystem, ScheduleSystem};
 
+use headrace_geometry::frames::Mount;
 use headrace_sampling::head::HeadProgram;
 
 use crate::facts::Facts;
 use crate::notes;
 use crate::random::Stream;
-use crate::sensing::Scenery;
+use crate::sensing::{Mounted, Scenery};
 use crate::stages::Stage;
 
 /// Additions by an effect, for display.
@@ -115,6 +116,11 @@ impl<'a> Builder<'a> {
         if let Some(now) = self.now() {
             now.streams.extend(sources);
         }
+    }
+
+    /// A sensor's mount, as the effects so far have left it.
+    pub fn mount(&self, source: usize) -> Option<Mount> {
+        self.world.get::<Mounted>(*self.entities.get(source)?).map(|mounted| mounted.0)
     }
 
     /// Gives a sensor a component.

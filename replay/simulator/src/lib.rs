@@ -4,6 +4,7 @@
 
 mod adviser;
 mod builder;
+mod calls;
 pub mod calm;
 mod clock;
 pub mod effects;
@@ -21,6 +22,7 @@ mod scene;
 mod sensing;
 mod simulation;
 mod stages;
+mod stretch;
 #[cfg(test)]
 mod testing;
 #[cfg(test)]
@@ -31,6 +33,7 @@ mod truth;
 
 pub use adviser::Adviser;
 pub use builder::Added;
+pub use calls::{Called, Fate, Take};
 pub use clock::START;
 pub use error::SceneError;
 pub use facts::{Facts, SensorFacts};

@@ -6,7 +6,8 @@ use headrace_sampling::head::HeadProgram;
 use headrace_sensor::device::DeviceKind;
 use headrace_vehicle::VehicleConfig;
 
-use crate::effects::{self, Named};
+use crate::calls::{self, Called, Choice, Described, Tables, Take};
+use crate::effects::{self, Effect, EffectKind, Named};
 use crate::environment::Environment;
 use crate::error::SceneError;
 use crate::facts::Facts;
@@ -32,6 +33,9 @@ pub struct Scene {
     pub(crate) trajectory: Trajectory,
     pub(crate) facts: Facts,
     pub(crate) effects: Named,
+    called: Vec<Called>,
+    /// Effects that are left out for the time being.
+    without: Vec<String>,
 }
 
 impl Scene {
@@ -45,8 +49,21 @@ impl Scene {
         load: FileLoader<'_>,
         seed: Option<u64>,
     ) -> Result<Self, SceneError> {
+        Self::parse_taking(document, kinds, load, seed, None)
+    }
+
+    /// The same; `take` overrides the scene's.
+    ///
+    /// Errors: see [`Scene::parse`].
+    pub fn parse_taking(
+        document: Document<'_>,
+        kinds: &[&dyn DeviceKind],
+        load: FileLoader<'_>,
+        seed: Option<u64>,
+        take: Option<Take>,
+    ) -> Result<Self, SceneError> {
         let mut of_vehicle = None;
-        let scene = document.read(|root| Self::from_root(root, kinds, load, seed, &mut of_vehicle));
+        let scene = document.read(|root| Self::from_root(root, kinds, load, (seed, take), &mut of_vehicle));
         match (scene, of_vehicle) {
             (Err(errors), Some(others)) => Err(errors.and(others).into()),
             (scene, _) => Ok(scene?),
@@ -58,7 +75,7 @@ impl Scene {
         root: &Section<'_>,
         kinds: &[&dyn DeviceKind],
         load: FileLoader<'_>,
-        seed: Option<u64>,
+        (seed, take): (Option<u64>, Option<Take>),
         of_vehicle: &mut Option<ConfigErrors>,
     ) -> Result<Self, ConfigError> {
         let text = |name: &str| String::from_utf8(load(name)?).map_err(|_| "is no text".to_owned());
@@ -70,6 +87,7 @@ impl Scene {
         let changes = root.section("vehicle_changes")?;
         let (tunnel, trajectory) = (root.section("tunnel")?, root.section("trajectory")?);
         let effects = root.section("effects")?;
+        let described = Tables::of(root, tunnel.as_ref())?;
         root.finish()?;
         let (file, trajectory) = (root.required("vehicle", file), root.required("trajectory", trajectory));
         let file = file?;
@@ -96,16 +114,60 @@ impl Scene {
         let known = trajectory.as_ref().map(|(trajectory, ground)| (*ground, trajectory.duration_s()));
         let (ground, duration_s) = known.unwrap_or((Ground::Water, LONGEST_S));
         let facts = Facts::new(&vehicle, &programs, ground, duration_s);
+        let described = root.part(|| Described::read(described, length_m))?;
+        let choice = root.part(|| Choice::read(effects.as_ref(), take))?;
         let effects = root.part(|| effects::parse(effects, &facts))?;
         let (trajectory, _) = root.required("trajectory", trajectory)?;
         let environment = root.required("tunnel", environment)?;
         let effects = root.required("effects", effects)?;
-        Ok(Self { name, vehicle_text, vehicle, programs, seed, environment, trajectory, facts, effects })
+        let (described, choice) = (root.required("water", described)?, root.required("effects", choice)?);
+        let mut called = calls::called(&described, &vehicle, &facts, &environment);
+        choice.decide(&mut called, |name| effects.has(name));
+        let effects = effects.and(&calls::taken(&called), &facts)?;
+        let without = Vec::new();
+        Ok(Self {
+            name,
+            vehicle_text,
+            vehicle,
+            programs,
+            seed,
+            environment,
+            trajectory,
+            facts,
+            effects,
+            called,
+            without,
+        })
     }
 
     /// Whether the pilot hears a monitor's advice ([`crate::Simulation::advised_by`]).
     pub fn is_advised(&self) -> bool {
         self.trajectory.is_advised()
+    }
+
+    /// Effects that the scene calls for, with what becomes of each.
+    pub fn called(&self) -> &[Called] {
+        &self.called
+    }
+
+    /// Names of the effects that are simulated, in the order of [`effects::KINDS`].
+    pub fn simulated(&self) -> Vec<&'static str> {
+        self.active().map(|(kind, _)| kind.name()).collect()
+    }
+
+    /// Leaves these of its effects out from now on, and takes back those left out before.
+    pub fn leave_out(&mut self, names: &[&str]) {
+        self.without = names.iter().map(|name| (*name).to_owned()).collect();
+    }
+
+    /// The effects that are simulated.
+    pub(crate) fn active(&self) -> impl Iterator<Item = (&'static dyn EffectKind, &dyn Effect)> {
+        let is_in = |kind: &dyn EffectKind| self.without.iter().all(|name| name != kind.name());
+        self.effects
+            .0
+            .iter()
+            .filter(move |(kind, _)| is_in(*kind))
+            .map(|(kind, effect)| (*kind, effect.as_ref()))
     }
 
     /// Facts that its effects are checked against.

@@ -100,7 +100,7 @@ impl Simulation {
             world.insert_resource(Notes::default());
         }
         let mut sim = Builder::new(&mut world, &facts, scene.seed, &entities);
-        for (kind, effect) in &scene.effects.0 {
+        for (kind, effect) in scene.active() {
             sim.effect(kind.name());
             sim.has_drawn(drawn.iter().filter(|(name, _)| *name == kind.name()).map(|(_, id)| id.clone()));
             effect.build(&mut sim)?;
@@ -317,7 +317,7 @@ fn hear<M: Measurement>(world: &mut World, entity: Entity, at: MonoNs, bytes: &[
 /// The scene's facts with the heads' programs as changed by effects, and the effects' draws for that.
 fn programmed(scene: &Scene) -> (Facts, Vec<(&'static str, String)>) {
     let (mut facts, mut drawn) = (scene.facts.clone(), Vec::new());
-    for (kind, effect) in &scene.effects.0 {
+    for (kind, effect) in scene.active() {
         let (effect_name, seed) = (kind.name(), scene.seed);
         effect.begin(&mut Programs { facts: &mut facts, seed, effect: effect_name, drawn: &mut drawn });
     }

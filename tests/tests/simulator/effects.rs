@@ -131,6 +131,67 @@ fn only_what_is_named_has_systems_components_and_streams() {
     assert_eq!(moving["effects"][0]["replaces"], serde_json::json!(["aim_held"]));
 }
 
+/// What the scene calls for is listed with what calls for it, and is simulated only where the scene says so.
+#[test]
+fn a_scene_says_what_it_calls_for_and_takes_what_it_wants() {
+    let folder = folder();
+    let names = |list: &Value| -> Vec<String> {
+        let of = |entry: &Value| entry["effect"].as_str().unwrap().to_owned();
+        list.as_array().unwrap().iter().map(of).collect()
+    };
+    let only = explained(&folder, "");
+    let called = names(&only["called"]);
+    assert!(
+        called.contains(&"occlusion".to_owned()) && called.contains(&"imu_bias".to_owned()),
+        "{called:?}"
+    );
+    assert!(only["called"].as_array().unwrap().iter().all(|call| call["fate"] == "not taken"));
+    let taken =
+        explained(&folder, "take = \"called\"\nleave = [\"beam_cone\"]\nimu_bias = { gyro_degps = 0.1 }");
+    let simulated = names(&taken["effects"]);
+    let expected: Vec<String> = called.into_iter().filter(|name| name != "beam_cone").collect();
+    assert_eq!(simulated, expected);
+    let fate = |name: &str| {
+        let list = taken["called"].as_array().unwrap();
+        list.iter().find(|call| call["effect"] == name).unwrap()["fate"].clone()
+    };
+    assert_eq!(
+        (fate("beam_cone"), fate("imu_bias"), fate("occlusion")),
+        ("left".into(), "as named".into(), "taken".into())
+    );
+    // No byte differs from those of the scene without the descriptions that aren't taken.
+    let plain = lines(&folder, "", &[]);
+    let described = format!(
+        "\n[water]\ntemperature_degc = 4\n[[water.murk]]\nfrom_m = 1\nto_m = 9\nsilt_gpl = 3\n[cable]\nslack_m = 1\n"
+    );
+    assert_eq!(lines(&folder, &described, &[]), plain);
+}
+
+/// An effect that does nothing is free, one that puts ranges off isn't; the price is what the processor is busy for it.
+#[test]
+fn worth_tells_what_matters_from_what_does_not() {
+    let folder = folder();
+    let effects = "motion_within_turn = {}\nimu_noise = { gyro_degps_rthz = 1e-7 }\nmissing_returns = { share = 0.5, mean_run = 9 }";
+    folder.write("scene.toml", format!("{SCENE}\n[effects]\n{effects}\n"));
+    let answer = folder.headrace(&["simulate", "scene.toml", "--explain=worth", "--seeds", "3", "--json"]);
+    assert_eq!(answer.code, Some(0), "{}", answer.stderr);
+    let explained: Value = serde_json::from_str(&answer.stdout).unwrap();
+    let worth = &explained["worth"];
+    assert_eq!(worth["seeds"], 3);
+    let of = |name: &str| {
+        let each = worth["each"].as_array().unwrap();
+        each.iter().find(|out| out["effects"] == serde_json::json!([name])).unwrap().clone()
+    };
+    assert_eq!(of("imu_noise")["is_free"], true, "{worth}");
+    let lost = of("missing_returns");
+    assert!(lost["is_free"] == false && lost["hole_m"]["mean"].as_f64().unwrap() < -0.02, "{lost}");
+    let spared = worth["spared"]["effects"].as_array().unwrap();
+    assert!(spared.contains(&"imu_noise".into()) && !spared.contains(&"missing_returns".into()), "{worth}");
+    // One seed gives no interval.
+    let one = folder.headrace(&["simulate", "scene.toml", "--explain=worth", "--seeds", "1"]);
+    assert!(one.code == Some(2) && one.stderr.contains("seeds"), "{}", one.stderr);
+}
+
 /// Exit code 2 and these words.
 #[track_caller]
 fn refused(scene: &str, words: &[&str]) {

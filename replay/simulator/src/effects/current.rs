@@ -9,7 +9,8 @@ use crate::builder::Builder;
 use crate::error::SceneError;
 use crate::facts::Facts;
 use crate::random::Stream;
-use crate::trajectory::{Ground, Knots, Trajectory};
+use crate::stretch::Stretch;
+use crate::trajectory::{Flow, Ground, Knots, Trajectory};
 
 const NAME: &str = "current";
 /// Steps per correlation time of a gust's speed.
@@ -22,15 +23,16 @@ const LOOK_S: f64 = 5.0;
 /// The water flows along the tunnel and carries a vehicle that holds its speed through water: legs and a pilot's course
 /// end at the same place, after another duration.
 ///
-/// `speed_mps` is positive towards growing chainage. `gust_sd_mps` adds a Gauss-Markov variation whose correlation falls
+/// `speed_mps` is positive towards growing chainage, from `from_m` to `to_m`; several tables are several stretches, as on both
+/// sides of a leak. `gust_sd_mps`, in a table for all of the tunnel, adds a Gauss-Markov variation whose correlation falls
 /// to 1/e within `gust_s` (60 by default); the displacement by gusts isn't corrected.
 /// A trajectory given over ground is independent of currents, so combining the two is refused.
 /// Source: Jorge et al. 2021, §9.1 (0.10 m/s through a leak, against the vehicle or with it).
 pub(super) struct CurrentKind;
 
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone)]
 struct Current {
-    speed_mps: f64,
+    flow: Flow,
     gust_sd_mps: f64,
     gust_s: f64,
     length_m: f64,
@@ -47,17 +49,30 @@ impl EffectKind for CurrentKind {
 
     fn read(&self, tables: Vec<Section<'_>>, facts: &Facts) -> Result<Box<dyn Effect>, ConfigError> {
         let mut current =
-            Current { speed_mps: 0.0, gust_sd_mps: 0.0, gust_s: 60.0, length_m: facts.length_m };
-        for table in keys::only_one(tables)? {
+            Current { flow: Flow::default(), gust_sd_mps: 0.0, gust_s: 60.0, length_m: facts.length_m };
+        for table in tables {
             if facts.ground == Ground::Tunnel {
                 return Err(table.invalid_itself("changes nothing: the trajectory is given over ground"));
             }
-            current.speed_mps = keys::or_zero(&table, "speed_mps", -2.0..=2.0)?;
-            current.gust_sd_mps = keys::or_zero(&table, "gust_sd_mps", 0.0..=1.0)?;
-            current.gust_s = table.number("gust_s", 1.0..=3600.0)?.unwrap_or(current.gust_s);
-            let speeds = [("speed_mps", current.speed_mps), ("gust_sd_mps", current.gust_sd_mps)];
-            keys::some_not_zero(&table, &speeds)?;
+            let stretch = Stretch::read(&table, facts.length_m)?;
+            let speed_mps = keys::or_zero(&table, "speed_mps", -2.0..=2.0)?;
+            let gust_sd_mps = keys::or_zero(&table, "gust_sd_mps", 0.0..=1.0)?;
+            let gust_s = table.number("gust_s", 1.0..=3600.0)?;
+            keys::some_not_zero(&table, &[("speed_mps", speed_mps), ("gust_sd_mps", gust_sd_mps)])?;
+            if gust_sd_mps > 0.0 {
+                if stretch != Stretch::ALL || current.gust_sd_mps > 0.0 {
+                    let problem =
+                        "can be said once, in a table without from_m and to_m: gusts are of all the water";
+                    return Err(table.invalid("gust_sd_mps", problem));
+                }
+                (current.gust_sd_mps, current.gust_s) = (gust_sd_mps, gust_s.unwrap_or(current.gust_s));
+            }
             table.finish()?;
+            if speed_mps != 0.0 && !current.flow.add(stretch, speed_mps) {
+                return Err(
+                    table.invalid("from_m", "begins a stretch that an earlier table has a current for, too")
+                );
+            }
         }
         Ok(Box::new(current))
     }
@@ -66,10 +81,10 @@ impl EffectKind for CurrentKind {
 impl Effect for Current {
     fn build(&self, sim: &mut Builder<'_>) -> Result<(), SceneError> {
         let gusts = (self.gust_sd_mps > 0.0).then(|| sim.stream_for("water"));
-        let what = format!("a current of {} m/s, gusts of {} m/s", self.speed_mps, self.gust_sd_mps);
+        let what = format!("a current of {}, gusts of {} m/s", self.flow, self.gust_sd_mps);
         let Some(mut scenery) = sim.scenery(what) else { return Ok(()) };
         let refuse = |problem| SceneError::Effect { effect: NAME, problem };
-        scenery.trajectory.carry(self.speed_mps).map_err(refuse)?;
+        scenery.trajectory.carry(&self.flow).map_err(refuse)?;
         if let Some(stream) = gusts {
             let duration_s = scenery.trajectory.duration_s();
             scenery.trajectory.sway(self.carried(stream, duration_s));
@@ -152,7 +167,7 @@ mod tests {
     /// 2 sd^2 T t.
     #[test]
     fn gusts_are_as_strong_and_as_long_as_wanted() {
-        let current = Current { speed_mps: 0.0, gust_sd_mps: 0.05, gust_s: 20.0, length_m: 1e6 };
+        let current = Current { flow: Flow::default(), gust_sd_mps: 0.05, gust_s: 20.0, length_m: 1e6 };
         let (mut speeds, mut lagged, mut ways) = (0.0, 0.0, 0.0);
         let (runs, seconds) = (200_u32, 4000.0);
         let mut count = 0.0;

@@ -1,6 +1,6 @@
 //! Some pings get no return.
 
-use bevy_ecs::prelude::{Component, Query};
+use bevy_ecs::prelude::{Component, Query, Res};
 use headrace_config::{ConfigError, Section};
 use headrace_geometry::math;
 use headrace_sensor::device::Sense;
@@ -9,18 +9,20 @@ use headrace_sensor::measurement::Sounding;
 use super::effect::{Effect, EffectKind};
 use super::geometry::squareness;
 use super::occlusion::Stopped;
+use super::places::Places;
+use super::runs::Runs;
 use super::targets::PerSensor;
 use crate::builder::Builder;
 use crate::error::SceneError;
 use crate::facts::Facts;
 use crate::random::Stream;
-use crate::sensing::{Ray, Rays, Samples};
+use crate::sensing::{Ray, Rays, Samples, Scenery};
 use crate::stages::Stage;
 
 /// Some pings get no return: a share of them anywhere, singly or in runs; those at grazing incidence, which return little
 /// sound; those whose echo comes from far away. The three are independent of each other.
 ///
-/// Keys: `share` of all pings, from 0 to 0.95 (0), and the mean length of their runs, `mean_run` pings, from
+/// Keys: `from_m` and `to_m` of the stretch where they are lost; `share` of all pings, from 0 to 0.95 (0), and the mean length of their runs, `mean_run` pings, from
 /// share / (1 - share), or 1 if that is more, to 10,000 (1 / (1 - share): independent pings); `grazing_from_deg` and
 /// `grazing_to_deg`, incidence beyond which some, and from which all, are lost, from 0, perpendicular to the wall, to 90;
 /// `far_from_m` and `far_to_m`, the same for the range, from 0 to 200 m. Between the two of a pair the share grows
@@ -28,24 +30,11 @@ use crate::stages::Stage;
 /// Source: runs after Gilbert, "Capacity of a burst-noise channel", Bell System Technical Journal 39, 1960.
 pub(super) struct MissingReturnsKind;
 
-/// Largest mean run, pings.
-const LONGEST_RUN: f64 = 10_000.0;
-
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Parameters {
     runs: Option<Runs>,
     grazing: Option<Ramp>,
     far: Option<Ramp>,
-}
-
-/// Pings lost in runs: a Markov chain of two states.
-#[derive(Debug, Clone, Copy, PartialEq)]
-struct Runs {
-    share: f64,
-    /// Probability that a ping is lost after one that isn't.
-    begin: f64,
-    /// Probability that a ping is lost after one that is.
-    go_on: f64,
 }
 
 /// Share lost: 0 up to `from`, 1 from `to`, linear between.
@@ -57,27 +46,10 @@ struct Ramp {
 
 #[derive(Component)]
 struct MissingReturns {
-    parameters: Parameters,
+    places: Places<Parameters>,
     stream: Stream,
     /// Whether the last ping was lost in a run; `None` before the first.
     in_run: Option<bool>,
-}
-
-impl Runs {
-    /// The chain whose lost pings are this share, in runs of `mean` pings.
-    fn new(share: f64, mean: f64) -> Self {
-        Self { share, begin: share / (mean * (1.0 - share)), go_on: 1.0 - 1.0 / mean }
-    }
-
-    /// State of the next ping, given the last one's; the first is lost with the probability of the share.
-    fn next(&self, before: Option<bool>, chance: f64) -> bool {
-        let lost = match before {
-            None => self.share,
-            Some(false) => self.begin,
-            Some(true) => self.go_on,
-        };
-        chance < lost
-    }
 }
 
 impl Ramp {
@@ -100,9 +72,9 @@ impl EffectKind for MissingReturnsKind {
 
     fn read(&self, tables: Vec<Section<'_>>, facts: &Facts) -> Result<Box<dyn Effect>, ConfigError> {
         let senses = [Sense::Head, Sense::Echosounder];
-        Ok(Box::new(PerSensor::read(tables, facts, &senses, |table| {
+        Ok(Box::new(PerSensor::read_by_place(tables, facts, &senses, |table| {
             let parameters = Parameters {
-                runs: runs(table)?,
+                runs: Runs::read(table)?,
                 grazing: ramp(table, ["grazing_from_deg", "grazing_to_deg"], 90.0)?,
                 far: ramp(table, ["far_from_m", "far_to_m"], 200.0)?,
             };
@@ -113,23 +85,6 @@ impl EffectKind for MissingReturnsKind {
             Ok(parameters)
         })?))
     }
-}
-
-fn runs(table: &Section<'_>) -> Result<Option<Runs>, ConfigError> {
-    let share = table.number("share", 0.0..=0.95)?.unwrap_or(0.0);
-    let mean = table.number("mean_run", 1.0..=LONGEST_RUN)?;
-    if share == 0.0 {
-        return match mean {
-            Some(_) => Err(table.invalid("mean_run", "is of use only with a share above zero")),
-            None => Ok(None),
-        };
-    }
-    let least = share / (1.0 - share);
-    if mean.is_some_and(|mean| mean < least) {
-        let problem = format!("must be at least {least:.2}: shorter runs don't make up a share of {share}");
-        return Err(table.invalid("mean_run", &problem));
-    }
-    Ok(Some(Runs::new(share, mean.unwrap_or(1.0 / (1.0 - share)))))
 }
 
 fn ramp(table: &Section<'_>, keys: [&'static str; 2], most: f64) -> Result<Option<Ramp>, ConfigError> {
@@ -145,40 +100,53 @@ fn ramp(table: &Section<'_>, keys: [&'static str; 2], most: f64) -> Result<Optio
     }
 }
 
-impl Effect for PerSensor<Parameters> {
+impl Effect for PerSensor<Places<Parameters>> {
     fn build(&self, sim: &mut Builder<'_>) -> Result<(), SceneError> {
-        for (source, parameters) in &self.0 {
+        for (source, places) in &self.0 {
             let stream = sim.stream(*source);
-            sim.insert(*source, MissingReturns { parameters: *parameters, stream, in_run: None });
+            sim.insert(*source, MissingReturns { places: places.clone(), stream, in_run: None });
         }
         sim.system(Stage::Hear, lose);
         Ok(())
     }
 }
 
-impl MissingReturns {
-    /// Whether the ping of a step gets no return. Call for each step, in order.
-    fn loses(&mut self, step: u64, ray: &Ray, range_m: Option<f64>, stopped: bool) -> bool {
-        let [first, second] = self.stream.at(step).uniform();
-        let in_run = self.parameters.runs.is_some_and(|runs| runs.next(self.in_run, first));
-        self.in_run = Some(in_run);
+impl Parameters {
+    /// Whether the ping of a step gets no return. Call for each step, in order; `in_run` is its state.
+    fn loses(&self, in_run: &mut Option<bool>, drawn: [f64; 2], ray: &Ray, echo: Echo) -> bool {
+        let [first, second] = drawn;
+        let runs = self.runs.is_some_and(|runs| runs.next(*in_run, first));
+        *in_run = Some(runs);
         let share =
             |ramp: Option<Ramp>, at: Option<f64>| ramp.zip(at).map_or(0.0, |(ramp, at)| ramp.share(at));
         // The incidence on an obstacle of the vehicle isn't known.
-        let hit = ray.hit.filter(|_| self.parameters.grazing.is_some() && !stopped);
+        let hit = ray.hit.filter(|_| self.grazing.is_some() && !echo.stopped);
         let incidence_deg = hit.map(|hit| math::acos(squareness(ray.direction, hit.normal)).to_degrees());
-        let stays = (1.0 - share(self.parameters.grazing, incidence_deg))
-            * (1.0 - share(self.parameters.far, range_m));
-        in_run || second >= stays
+        let stays = (1.0 - share(self.grazing, incidence_deg)) * (1.0 - share(self.far, echo.range_m));
+        runs || second >= stays
     }
+}
+
+/// What a ping has come back with so far.
+#[derive(Debug, Clone, Copy)]
+struct Echo {
+    range_m: Option<f64>,
+    /// Whether it comes from a part of the vehicle.
+    stopped: bool,
 }
 
 type Losing<'a> = (&'a mut Samples<Sounding>, &'a Rays, &'a mut MissingReturns, Option<&'a Stopped>);
 
-fn lose(mut sonars: Query<'_, '_, Losing<'_>>) {
+fn lose(scenery: Res<'_, Scenery>, mut sonars: Query<'_, '_, Losing<'_>>) {
     for (mut samples, rays, mut missing, stopped) in &mut sonars {
+        let MissingReturns { places, stream, in_run } = &mut *missing;
         for (number, ((step, sounding), ray)) in samples.steps().zip(&rays.0).enumerate() {
-            if missing.loses(step, ray, sounding.range_m, Stopped::has(stopped, number)) {
+            let Some(parameters) = places.here(&scenery, ray) else {
+                *in_run = None;
+                continue;
+            };
+            let echo = Echo { range_m: sounding.range_m, stopped: Stopped::has(stopped, number) };
+            if parameters.loses(in_run, stream.at(step).uniform(), ray, echo) {
                 sounding.range_m = None;
             }
         }
@@ -220,8 +188,7 @@ mod tests {
         assert!((found - mean).abs() < 5.0 * math::sqrt(mean * (mean - 1.0) / count), "{found}");
         assert_share(runs.iter().filter(|run| **run == 1).count(), runs.len(), 1.0 / mean);
         // The share's variance is that of independent pings, by (1 + r) / (1 - r), r the chain's correlation.
-        let chain = Runs::new(share, mean);
-        let correlation = chain.go_on - chain.begin;
+        let correlation = Runs::new(share, mean).correlation();
         let variance = share * (1.0 - share) / whole * (1.0 + correlation) / (1.0 - correlation);
         let found = runs.iter().sum::<usize>() as f64 / whole;
         assert!((found - share).abs() < 5.0 * math::sqrt(variance), "{found}");

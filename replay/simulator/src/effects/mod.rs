@@ -7,23 +7,31 @@ mod behind;
 mod effect;
 mod geometry;
 mod keys;
+mod places;
+mod runs;
 mod targets;
 
 mod beam_cone;
 mod byte_errors;
 mod clock_drift;
 mod current;
+mod depth_noise;
 mod depth_steps;
 mod device_faults;
+mod echo_strength;
 mod head_stalls;
 mod imu_bias;
+mod imu_bumps;
 mod imu_noise;
+mod imu_vibration;
 mod interference;
 mod line_delay;
 mod magnetic_disturbance;
 mod missing_returns;
 mod motion_within_turn;
+mod mount_error;
 mod multipath;
+mod near_returns;
 mod occlusion;
 mod outliers;
 mod pilot_drift;
@@ -33,14 +41,16 @@ mod sector_end_slowing;
 mod side_lobes;
 mod skipped_steps;
 mod sound_speed_error;
+mod sound_speed_profile;
 mod start_phase_error;
 mod stuck_range;
 mod tether_lag;
 mod tether_quantum;
+mod tether_scale;
 mod tether_slack;
 mod tether_slip;
 
-use headrace_config::{ConfigError, Section};
+use headrace_config::{ConfigError, Document, Section};
 
 use crate::facts::Facts;
 
@@ -49,7 +59,9 @@ pub use effect::{Effect, EffectKind};
 pub use targets::PerSensor;
 
 /// All effects. Within a stage, systems run in this order, whatever the order of the scene.
-pub const KINDS: [&dyn EffectKind; 30] = [
+pub const KINDS: [&dyn EffectKind; 38] = [
+    // The vehicle, where it isn't what its file says.
+    &mount_error::MountErrorKind,
     // Turning of heads, and the pose from which they look.
     &start_phase_error::StartPhaseErrorKind,
     &sector_end_slowing::SectorEndSlowingKind,
@@ -60,26 +72,33 @@ pub const KINDS: [&dyn EffectKind; 30] = [
     &beam_cone::BeamConeKind,
     &occlusion::OcclusionKind,
     // Sound paths.
+    &echo_strength::EchoStrengthKind,
     &multipath::MultipathKind,
     &side_lobes::SideLobesKind,
     &interference::InterferenceKind,
+    &near_returns::NearReturnsKind,
     // Processing in the sonar.
     &missing_returns::MissingReturnsKind,
     &outliers::OutliersKind,
     &stuck_range::StuckRangeKind,
     &sound_speed_error::SoundSpeedErrorKind,
+    &sound_speed_profile::SoundSpeedProfileKind,
     &range_noise::RangeNoiseKind,
     &range_quantisation::RangeQuantisationKind,
     // The vehicle's trajectory.
     &current::CurrentKind,
     &pilot_drift::PilotDriftKind,
     // Depth and motion.
+    &depth_noise::DepthNoiseKind,
     &depth_steps::DepthStepsKind,
     &imu_noise::ImuNoiseKind,
     &imu_bias::ImuBiasKind,
+    &imu_vibration::ImuVibrationKind,
+    &imu_bumps::ImuBumpsKind,
     &magnetic_disturbance::MagneticDisturbanceKind,
     // The cable.
     &tether_slack::TetherSlackKind,
+    &tether_scale::TetherScaleKind,
     &tether_slip::TetherSlipKind,
     &tether_lag::TetherLagKind,
     &tether_quantum::TetherQuantumKind,
@@ -93,6 +112,11 @@ pub const KINDS: [&dyn EffectKind; 30] = [
 
 /// The effects that a scene names, in the order of [`KINDS`].
 pub struct Named(pub(crate) Vec<(&'static dyn EffectKind, Box<dyn Effect>)>);
+
+/// The effect of a name.
+pub(crate) fn named(name: &str) -> Option<&'static dyn EffectKind> {
+    KINDS.into_iter().find(|kind| kind.name() == name)
+}
 
 /// Reads the `[effects]` table.
 ///
@@ -109,6 +133,23 @@ pub(crate) fn parse(section: Option<Section<'_>>, facts: &Facts) -> Result<Named
     }
     section.finish()?;
     Ok(Named(named))
+}
+
+impl Named {
+    /// Whether an effect is among them.
+    pub(crate) fn has(&self, name: &str) -> bool {
+        self.0.iter().any(|(kind, _)| kind.name() == name)
+    }
+
+    /// These and those of a text of tables, none of which is among these.
+    ///
+    /// Errors: see [`EffectKind::read`].
+    pub(crate) fn and(mut self, tables: &str, facts: &Facts) -> Result<Self, ConfigError> {
+        let root = Document::new("what the scene calls for", tables).root()?;
+        self.0.extend(parse(root.section("effects")?, facts)?.0);
+        self.0.sort_by_key(|(kind, _)| KINDS.iter().position(|other| other.name() == kind.name()));
+        Ok(self)
+    }
 }
 
 #[cfg(test)]

@@ -8,6 +8,7 @@ use headrace_sensor::measurement::Sounding;
 use super::effect::{Effect, EffectKind};
 use super::geometry::{mirrored, squareness};
 use super::occlusion::Stopped;
+use super::places::Places;
 use super::targets::PerSensor;
 use crate::builder::Builder;
 use crate::environment::Environment;
@@ -21,7 +22,7 @@ use crate::stages::Stage;
 /// sonar. The range is half of that path, (r1 + r12 + r2) / 2. It replaces the direct echo more often towards grazing
 /// incidence: the direct echo's strength goes with the cosine of incidence.
 ///
-/// Keys: the share of the returns where the beam is perpendicular to the wall, `square_share` (0), and where it is along
+/// Keys: `from_m` and `to_m` of the stretch where this is so; the share of the returns where the beam is perpendicular to the wall, `square_share` (0), and where it is along
 /// the wall, `share` (0.1), both from 0 to 1; between, it goes with 1 less the cosine of incidence. The echo stays the
 /// direct one where the path meets no second wall within reach, or the sonar doesn't see that wall.
 /// Source: geometry of mirrors; the law of the direct echo is Lambert's.
@@ -38,7 +39,7 @@ struct Parameters {
 
 #[derive(Component)]
 struct Multipath {
-    parameters: Parameters,
+    places: Places<Parameters>,
     stream: Stream,
 }
 
@@ -53,7 +54,7 @@ impl EffectKind for MultipathKind {
 
     fn read(&self, tables: Vec<Section<'_>>, facts: &Facts) -> Result<Box<dyn Effect>, ConfigError> {
         let senses = [Sense::Head, Sense::Echosounder];
-        Ok(Box::new(PerSensor::read(tables, facts, &senses, |table| {
+        Ok(Box::new(PerSensor::read_by_place(tables, facts, &senses, |table| {
             let share = table.number("share", 0.0..=1.0)?.unwrap_or(0.1);
             let square_share = table.number("square_share", 0.0..=1.0)?.unwrap_or(0.0);
             if share == 0.0 && square_share == 0.0 {
@@ -64,11 +65,11 @@ impl EffectKind for MultipathKind {
     }
 }
 
-impl Effect for PerSensor<Parameters> {
+impl Effect for PerSensor<Places<Parameters>> {
     fn build(&self, sim: &mut Builder<'_>) -> Result<(), SceneError> {
-        for (source, parameters) in &self.0 {
+        for (source, places) in &self.0 {
             let stream = sim.stream(*source);
-            sim.insert(*source, Multipath { parameters: *parameters, stream });
+            sim.insert(*source, Multipath { places: places.clone(), stream });
         }
         sim.system(Stage::Hear, bounce);
         Ok(())
@@ -93,9 +94,11 @@ type Bouncing<'a> = (&'a mut Samples<Sounding>, &'a Rays, &'a Reach, &'a Multipa
 
 fn bounce(scenery: Res<'_, Scenery>, mut sonars: Query<'_, '_, Bouncing<'_>>) {
     for (mut samples, rays, Reach(far_m), multipath, stopped) in &mut sonars {
-        let Parameters { share, square_share } = multipath.parameters;
         for (number, ((step, sounding), ray)) in samples.steps().zip(&rays.0).enumerate() {
             let Some(hit) = ray.hit.filter(|_| !Stopped::has(stopped, number)) else { continue };
+            let Some(Parameters { share, square_share }) = multipath.places.here(&scenery, ray) else {
+                continue;
+            };
             let [chance, _] = multipath.stream.at(step).uniform();
             let square = squareness(ray.direction, hit.normal);
             if chance < share + (square_share - share) * square {

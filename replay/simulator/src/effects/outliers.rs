@@ -1,23 +1,24 @@
 //! Some returns are unrelated to the wall.
 
-use bevy_ecs::prelude::{Component, Query};
+use bevy_ecs::prelude::{Component, Query, Res};
 use headrace_config::{ConfigError, Section};
 use headrace_sensor::device::Sense;
 use headrace_sensor::measurement::Sounding;
 
 use super::effect::{Effect, EffectKind};
+use super::places::Places;
 use super::targets::PerSensor;
 use crate::builder::Builder;
 use crate::error::SceneError;
 use crate::facts::Facts;
 use crate::random::Stream;
-use crate::sensing::Samples;
+use crate::sensing::{Rays, Samples, Scenery};
 use crate::stages::Stage;
 
 /// Some returns are unrelated to the wall: their range is uniformly distributed. Echosounders in a tunnel give such
 /// outliers between echoes of all kinds.
 ///
-/// Keys: their `share` of the returns, from 0 (excluded) to 1 (0.08); the nearest range `near_m` (0.3) and the farthest
+/// Keys: `from_m` and `to_m` of the stretch in which they fall; their `share` of the returns, from 0 (excluded) to 1 (0.08); the nearest range `near_m` (0.3) and the farthest
 /// `far_m` (a head's range setting in this water; 30 for an echosounder), from 0 to 200 m.
 /// Source: the share is that of the logs of VITA 1, as in the project's scene vita1-field; 30 m is a Ping1D's usual scan.
 pub(super) struct OutliersKind;
@@ -34,9 +35,15 @@ struct Parameters {
 
 #[derive(Component)]
 struct Outliers {
+    places: Places<Strays>,
+    stream: Stream,
+}
+
+/// Strays of a stretch: their share, and the ranges between which they fall, m.
+#[derive(Debug, Clone, Copy)]
+struct Strays {
     share: f64,
     between_m: [f64; 2],
-    stream: Stream,
 }
 
 impl EffectKind for OutliersKind {
@@ -50,7 +57,7 @@ impl EffectKind for OutliersKind {
 
     fn read(&self, tables: Vec<Section<'_>>, facts: &Facts) -> Result<Box<dyn Effect>, ConfigError> {
         let senses = [Sense::Head, Sense::Echosounder];
-        Ok(Box::new(PerSensor::read(tables, facts, &senses, |table| {
+        Ok(Box::new(PerSensor::read_by_place(tables, facts, &senses, |table| {
             let share = table.number("share", 0.0..=1.0)?.unwrap_or(0.08);
             if share == 0.0 {
                 return Err(table.invalid("share", "must be above zero"));
@@ -65,28 +72,33 @@ impl EffectKind for OutliersKind {
     }
 }
 
-impl Effect for PerSensor<Parameters> {
+impl Effect for PerSensor<Places<Parameters>> {
     fn build(&self, sim: &mut Builder<'_>) -> Result<(), SceneError> {
-        for (source, Parameters { share, near_m, far_m }) in &self.0 {
+        for (source, places) in &self.0 {
             let facts = sim.facts();
             let head = facts.sensors.get(*source).and_then(|sensor| sensor.head);
             let usual_m = head.map_or(ECHOSOUNDER_FAR_M, |spec| spec.reach_m(facts.sound_speed_mps)[1]);
-            let far_m = far_m.unwrap_or(usual_m);
-            if far_m <= *near_m {
+            let far_m = |parameters: &Parameters| parameters.far_m.unwrap_or(usual_m);
+            if let Some(none) = places.all().find(|parameters| far_m(parameters) <= parameters.near_m) {
+                let (near_m, far_m) = (none.near_m, far_m(none));
                 let problem = format!("has near_m = {near_m}, beyond the farthest range of {far_m} m");
                 return Err(SceneError::Effect { effect: OutliersKind.name(), problem });
             }
+            let places = places.map(|it| Strays { share: it.share, between_m: [it.near_m, far_m(it)] });
             let stream = sim.stream(*source);
-            sim.insert(*source, Outliers { share: *share, between_m: [*near_m, far_m], stream });
+            sim.insert(*source, Outliers { places, stream });
         }
         sim.system(Stage::Hear, stray);
         Ok(())
     }
 }
 
-fn stray(mut sonars: Query<'_, '_, (&mut Samples<Sounding>, &Outliers)>) {
-    for (mut samples, Outliers { share, between_m: [near_m, far_m], stream }) in &mut sonars {
-        for (step, sounding) in samples.steps() {
+fn stray(scenery: Res<'_, Scenery>, mut sonars: Query<'_, '_, (&mut Samples<Sounding>, &Rays, &Outliers)>) {
+    for (mut samples, rays, Outliers { places, stream }) in &mut sonars {
+        for ((step, sounding), ray) in samples.steps().zip(&rays.0) {
+            let Some(Strays { share, between_m: [near_m, far_m] }) = places.here(&scenery, ray) else {
+                continue;
+            };
             let [chance, place] = stream.at(step).uniform();
             if chance < *share && sounding.range_m.is_some() {
                 sounding.range_m = Some(near_m + place * (far_m - near_m));

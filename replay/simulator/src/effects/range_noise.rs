@@ -1,20 +1,22 @@
 //! Noise of ranges.
 
-use bevy_ecs::prelude::{Component, Query};
+use bevy_ecs::prelude::{Component, Query, Res};
 use headrace_config::{ConfigError, Section};
 use headrace_sensor::device::Sense;
 use headrace_sensor::measurement::Sounding;
 
 use super::effect::{Effect, EffectKind};
+use super::places::Places;
 use super::targets::PerSensor;
 use crate::builder::Builder;
 use crate::error::SceneError;
 use crate::facts::Facts;
 use crate::random::Stream;
-use crate::sensing::Samples;
+use crate::sensing::{Rays, Samples, Scenery};
 use crate::stages::Stage;
 
-/// Ranges have normally distributed noise with a constant part and a part proportional to the range.
+/// Ranges have normally distributed noise with a constant part and a part proportional to the range, in all of the tunnel or
+/// from `from_m` to `to_m`.
 pub(super) struct RangeNoiseKind;
 
 #[derive(Debug, Clone, Copy)]
@@ -25,7 +27,7 @@ struct Parameters {
 
 #[derive(Component)]
 struct RangeNoise {
-    parameters: Parameters,
+    places: Places<Parameters>,
     stream: Stream,
 }
 
@@ -40,7 +42,7 @@ impl EffectKind for RangeNoiseKind {
 
     fn read(&self, tables: Vec<Section<'_>>, facts: &Facts) -> Result<Box<dyn Effect>, ConfigError> {
         let senses = [Sense::Head, Sense::Echosounder];
-        Ok(Box::new(PerSensor::read(tables, facts, &senses, |table| {
+        Ok(Box::new(PerSensor::read_by_place(tables, facts, &senses, |table| {
             let sd_m = table.number("sd_m", 0.0..=1.0)?.unwrap_or(0.0);
             let sd_share = table.number("sd_share", 0.0..=0.5)?.unwrap_or(0.0);
             if sd_m == 0.0 && sd_share == 0.0 {
@@ -51,21 +53,24 @@ impl EffectKind for RangeNoiseKind {
     }
 }
 
-impl Effect for PerSensor<Parameters> {
+impl Effect for PerSensor<Places<Parameters>> {
     fn build(&self, sim: &mut Builder<'_>) -> Result<(), SceneError> {
-        for (source, parameters) in &self.0 {
+        for (source, places) in &self.0 {
             let stream = sim.stream(*source);
-            sim.insert(*source, RangeNoise { parameters: *parameters, stream });
+            sim.insert(*source, RangeNoise { places: places.clone(), stream });
         }
         sim.system(Stage::Hear, scatter);
         Ok(())
     }
 }
 
-fn scatter(mut sonars: Query<'_, '_, (&mut Samples<Sounding>, &RangeNoise)>) {
-    for (mut samples, noise) in &mut sonars {
-        let Parameters { sd_m, sd_share } = noise.parameters;
-        for (step, sounding) in samples.steps() {
+fn scatter(
+    scenery: Res<'_, Scenery>,
+    mut sonars: Query<'_, '_, (&mut Samples<Sounding>, &Rays, &RangeNoise)>,
+) {
+    for (mut samples, rays, noise) in &mut sonars {
+        for ((step, sounding), ray) in samples.steps().zip(&rays.0) {
+            let Some(Parameters { sd_m, sd_share }) = noise.places.here(&scenery, ray) else { continue };
             if let Some(range_m) = &mut sounding.range_m {
                 let [by, _] = noise.stream.at(step).normal();
                 // A range is never negative.

@@ -10,6 +10,7 @@ use headrace_sensor::measurement::Sounding;
 use super::effect::{Effect, EffectKind};
 use super::geometry::{square_to, squareness};
 use super::occlusion::Stopped;
+use super::places::Places;
 use super::targets::PerSensor;
 use crate::builder::Builder;
 use crate::environment::Environment;
@@ -22,7 +23,7 @@ use crate::stages::Stage;
 /// Echoes through side lobes: where one of four side lobes, two in the plane of turning and two across it, meets the wall
 /// nearer and more perpendicularly than the beam, the nearest such lobe's range is reported with some probability.
 ///
-/// Keys: their `angle_deg` from the beam's axis, from 0.1 to 80 (1.59 times the beam's width); the probability `share`,
+/// Keys: `from_m` and `to_m` of the stretch where this is so; their `angle_deg` from the beam's axis, from 0.1 to 80 (1.59 times the beam's width); the probability `share`,
 /// from 0 (excluded) to 1 (0.05).
 /// Source: the first side lobe of a circular piston, ka sin x = 5.136 against 1.616 at half power (Urick, "Principles of
 /// underwater sound", ch. 3); it is 17.6 dB below the beam, so it matters where the wall reflects the beam itself away.
@@ -41,9 +42,15 @@ struct Parameters {
 
 #[derive(Component)]
 struct SideLobes {
+    places: Places<Lobes>,
+    stream: Stream,
+}
+
+/// Side lobes in a stretch: their angle from the beam's axis, and the share of the pings that hear them.
+#[derive(Debug, Clone, Copy)]
+struct Lobes {
     angle_rad: f64,
     share: f64,
-    stream: Stream,
 }
 
 impl EffectKind for SideLobesKind {
@@ -57,7 +64,7 @@ impl EffectKind for SideLobesKind {
 
     fn read(&self, tables: Vec<Section<'_>>, facts: &Facts) -> Result<Box<dyn Effect>, ConfigError> {
         let senses = [Sense::Head, Sense::Echosounder];
-        Ok(Box::new(PerSensor::read(tables, facts, &senses, |table| {
+        Ok(Box::new(PerSensor::read_by_place(tables, facts, &senses, |table| {
             let share = table.number("share", 0.0..=1.0)?.unwrap_or(0.05);
             if share == 0.0 {
                 return Err(table.invalid("share", "must be above zero"));
@@ -67,14 +74,17 @@ impl EffectKind for SideLobesKind {
     }
 }
 
-impl Effect for PerSensor<Parameters> {
+impl Effect for PerSensor<Places<Parameters>> {
     fn build(&self, sim: &mut Builder<'_>) -> Result<(), SceneError> {
-        for (source, Parameters { angle_deg, share }) in &self.0 {
+        for (source, places) in &self.0 {
             let head = sim.facts().sensors.get(*source).and_then(|sensor| sensor.head);
             let beam_rad = head.map_or(ECHOSOUNDER_DEG.to_radians(), |spec| spec.beam_rad);
-            let angle_rad = angle_deg.map_or(LOBE_WIDTHS * beam_rad, f64::to_radians);
+            let places = places.map(|Parameters { angle_deg, share }| Lobes {
+                angle_rad: angle_deg.map_or(LOBE_WIDTHS * beam_rad, f64::to_radians),
+                share: *share,
+            });
             let stream = sim.stream(*source);
-            sim.insert(*source, SideLobes { angle_rad, share: *share, stream });
+            sim.insert(*source, SideLobes { places, stream });
         }
         sim.system(Stage::Hear, hear_lobes);
         Ok(())
@@ -100,12 +110,13 @@ type Lobed<'a> = (&'a mut Samples<Sounding>, &'a Rays, &'a Reach, &'a SideLobes,
 fn hear_lobes(scenery: Res<'_, Scenery>, mut sonars: Query<'_, '_, Lobed<'_>>) {
     for (mut samples, rays, reach, lobes, stopped) in &mut sonars {
         for (number, ((step, sounding), ray)) in samples.steps().zip(&rays.0).enumerate() {
+            let Some(Lobes { angle_rad, share }) = lobes.places.here(&scenery, ray) else { continue };
             let [chance, _] = lobes.stream.at(step).uniform();
-            if chance >= lobes.share || Stopped::has(stopped, number) {
+            if chance >= *share || Stopped::has(stopped, number) {
                 continue;
             }
             let near_m = sounding.range_m.unwrap_or(reach.0);
-            let heard_m = lobe_m(&scenery.environment, ray, lobes.angle_rad, near_m);
+            let heard_m = lobe_m(&scenery.environment, ray, *angle_rad, near_m);
             sounding.range_m = heard_m.or(sounding.range_m);
         }
     }

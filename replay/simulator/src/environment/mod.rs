@@ -169,6 +169,35 @@ impl Environment {
         Self { design, tube, plain, solids, hollows, solids_by_chainage, hollows_by_chainage, names }
     }
 
+    /// Cross-section of the water where the profile isn't scaled, m^2.
+    pub(crate) fn area_m2(&self) -> f64 {
+        const CORNERS: u32 = 1000;
+        let profile = self.tube.profile();
+        let corner = |k: u32| profile.point_at(profile.perimeter_m() * f64::from(k) / f64::from(CORNERS));
+        let twice_m2 = (0..CORNERS).map(|k| {
+            let ([a, b], [c, d]) = (corner(k), corner((k + 1) % CORNERS));
+            a * d - c * b
+        });
+        twice_m2.sum::<f64>().abs() / 2.0
+    }
+
+    /// Openings of the wall, by name, with the chainages between which they lie, m.
+    pub(crate) fn openings(&self) -> impl Iterator<Item = (&str, [f64; 2])> {
+        self.hollows.iter().map(|hollow| {
+            let (from_m, to_m) = hollow.span_m;
+            (self.feature_name(hollow.feature), [from_m, to_m])
+        })
+    }
+
+    /// Chainages between which boulders, pieces of heaps and other bodies lie, m.
+    pub(crate) fn rubble_m(&self) -> Option<[f64; 2]> {
+        let spans = self.solids.iter().map(|solid| solid.span_m);
+        spans.fold(None, |all: Option<[f64; 2]>, (from_m, to_m)| {
+            let [first_m, last_m] = all.unwrap_or([from_m, to_m]);
+            Some([first_m.min(from_m), last_m.max(to_m)])
+        })
+    }
+
     /// Hit of the ray from `origin` along the unit vector `direction` within `far_m`; `None` if it meets nothing, or the
     /// origin isn't in the water.
     ///

@@ -3,6 +3,7 @@
 use headrace_geometry::math;
 use headrace_geometry::time::{DurNs, MonoNs};
 
+use super::flow::Flow;
 use super::knots::{Knots, Offsets, wandering};
 use super::place::Place;
 use crate::clock::START;
@@ -72,7 +73,7 @@ pub(super) struct Advised {
     along: Knots,
     beside: Knots,
     hold: Knots,
-    current_mps: f64,
+    flow: Flow,
     heard: Vec<Told>,
     doing: Doing,
     x_m: f64,
@@ -99,7 +100,7 @@ impl Advised {
             along,
             beside,
             hold,
-            current_mps: 0.0,
+            flow: Flow::default(),
             heard: Vec::new(),
             doing: Doing::Going,
             x_m: from_m,
@@ -124,8 +125,8 @@ impl Advised {
     }
 
     /// Lets a current carry the vehicle.
-    pub(super) fn carry(&mut self, current_mps: f64) {
-        self.current_mps = current_mps;
+    pub(super) fn carry(&mut self, flow: &Flow) {
+        self.flow = flow.clone();
     }
 
     /// Hears what is told, and decides the motion up to a time after the start, s.
@@ -152,7 +153,7 @@ impl Advised {
             Doing::Waiting { .. } | Doing::Done => 0.0,
         };
         self.speed_mps += (wanted_mps - self.speed_mps) * (STEP_S / RESPONSE_S);
-        self.x_m += (self.speed_mps + self.current_mps) * STEP_S;
+        self.x_m += (self.speed_mps + self.flow.at_mps(self.x_m)) * STEP_S;
         self.farthest_m = self.farthest_m.max(self.x_m);
     }
 

@@ -1,9 +1,12 @@
 //! Legs at constant speed.
 
+use super::flow::Flow;
 use super::place::Place;
 
 /// Lowest speed of a leg, m/s.
 const SLOWEST_MPS: f64 = 1e-3;
+/// Shortest piece of a leg that is cut off where the water's flow changes, m.
+const SHORTEST_M: f64 = 1e-6;
 
 /// A leg at constant speed.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -54,18 +57,31 @@ impl Legs {
         Place { chainage_m, across_m: self.across_m, turned_rad: [0.0; 3] }
     }
 
-    pub(super) fn carry(&mut self, current_mps: f64) -> Result<(), String> {
+    /// The same speeds through water that flows: a leg is cut where the flow changes.
+    ///
+    /// Errors, as text: a leg that makes no way against the flow.
+    pub(super) fn carry(&mut self, flow: &Flow) -> Result<(), String> {
         let mut legs = Vec::with_capacity(self.legs.len());
-        for (number, leg) in self.legs.iter().enumerate() {
-            let speed_mps = leg.speed_mps + current_mps;
-            if speed_mps * leg.speed_mps.signum() < SLOWEST_MPS {
-                return Err(format!(
-                    "carries the vehicle off: leg {number} (from 0) goes {} m/s through the water, so {speed_mps} \
-                     m/s over ground",
-                    leg.speed_mps
-                ));
+        for (number, (leg, (_, begins_m))) in self.legs.iter().zip(&self.begins).enumerate() {
+            let (mut at_m, mut left_m, towards) = (*begins_m, leg.distance_m, leg.speed_mps.signum());
+            while left_m > 0.0 {
+                let change_m = flow.next_change_m(at_m, at_m + towards * left_m);
+                // A leg that isn't cut keeps its length to the last bit.
+                let distance_m = left_m.min((change_m - at_m).abs());
+                let is_last = distance_m >= left_m - SHORTEST_M;
+                let distance_m = if is_last { left_m } else { distance_m };
+                let speed_mps = leg.speed_mps + flow.at_mps(at_m + towards * distance_m / 2.0);
+                if speed_mps * towards < SLOWEST_MPS {
+                    return Err(format!(
+                        "carries the vehicle off: leg {number} (from 0) goes {} m/s through the water, so {speed_mps} \
+                         m/s over ground",
+                        leg.speed_mps
+                    ));
+                }
+                legs.push(Leg { distance_m, speed_mps });
+                left_m = if is_last { 0.0 } else { left_m - distance_m };
+                at_m = change_m;
             }
-            legs.push(Leg { speed_mps, ..*leg });
         }
         *self = Self::new(self.start_m, self.across_m, legs);
         Ok(())

@@ -1,6 +1,7 @@
 //! The vehicle's trajectory through the tunnel: its position at any time, relative to the axis.
 
 mod advised;
+mod flow;
 mod knots;
 mod legs;
 mod parse;
@@ -15,6 +16,7 @@ use pilot::Piloted;
 
 use crate::told::Told;
 
+pub use flow::Flow;
 pub use knots::{Knots, Offsets, wandering};
 pub use legs::Leg;
 pub(crate) use parse::parse;
@@ -96,21 +98,21 @@ impl Trajectory {
         self.sways.push(knots);
     }
 
-    /// Lets a current of `speed_mps`, positive towards growing chainage, carry a vehicle that moves through the water. It
+    /// Lets the water's flow carry a vehicle that moves through the water. It
     /// reaches the same end, after another duration.
     ///
     /// Errors, as text: a leg that makes no way against the current; a trajectory given over ground.
-    pub fn carry(&mut self, speed_mps: f64) -> Result<(), String> {
+    pub fn carry(&mut self, flow: &Flow) -> Result<(), String> {
         match &mut self.base {
             Base::Legs(legs) => {
-                legs.carry(speed_mps)?;
+                legs.carry(flow)?;
                 self.duration_s = legs.duration_s();
             }
             Base::Piloted(piloted) => {
-                piloted.carry(speed_mps)?;
+                piloted.carry(flow)?;
                 self.duration_s = piloted.duration_s();
             }
-            Base::Advised(advised) => advised.carry(speed_mps),
+            Base::Advised(advised) => advised.carry(flow),
             Base::Knots(_) => return Err("is of no effect: the trajectory is given over ground".to_owned()),
         }
         Ok(())

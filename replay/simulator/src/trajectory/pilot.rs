@@ -2,6 +2,7 @@
 
 use headrace_geometry::math;
 
+use super::flow::Flow;
 use super::knots::{Knots, Offsets, wandering};
 use super::place::Place;
 use crate::random::Stream;
@@ -56,7 +57,7 @@ impl Pilot {
     /// The chainage at each step, and once before the first.
     ///
     /// Errors, as text: a trajectory that never ends.
-    fn chainages_m(&self, stick: Stream, current_mps: f64) -> Result<Vec<f64>, String> {
+    fn chainages_m(&self, stick: Stream, flow: &Flow) -> Result<Vec<f64>, String> {
         let towards = (self.to_m - self.from_m).signum();
         let plain_s = (self.to_m - self.from_m).abs() / self.speed_mps;
         let most = math::floor_to_i64((plain_s + 60.0) * MOST_TIMES_AS_LONG / STEP_S);
@@ -79,7 +80,7 @@ impl Pilot {
                 Doing::Back { .. } => -self.speed_mps * towards,
             };
             speed_mps += (wanted - speed_mps) * (STEP_S / RESPONSE_S);
-            x_m += (speed_mps + current_mps) * STEP_S;
+            x_m += (speed_mps + flow.at_mps(x_m)) * STEP_S;
             xs.push(x_m);
         }
         Ok(xs)
@@ -116,7 +117,7 @@ impl Piloted {
         let nowhere = Knots::new(0.0, STEP_S, |_| [0.0; 6]);
         let (along, beside) = (nowhere.clone(), nowhere);
         let mut piloted = Self { pilot, stick, wander, along, beside, duration_s: 0.0 };
-        piloted.go(0.0)?;
+        piloted.go(&Flow::default())?;
         Ok(piloted)
     }
 
@@ -131,13 +132,13 @@ impl Piloted {
     }
 
     /// Recomputes the trajectory for a current.
-    pub(super) fn carry(&mut self, current_mps: f64) -> Result<(), String> {
-        self.go(current_mps).map_err(|why| format!("carries the vehicle off: it {why}"))
+    pub(super) fn carry(&mut self, flow: &Flow) -> Result<(), String> {
+        self.go(flow).map_err(|why| format!("carries the vehicle off: it {why}"))
     }
 
-    fn go(&mut self, current_mps: f64) -> Result<(), String> {
+    fn go(&mut self, flow: &Flow) -> Result<(), String> {
         let pilot = self.pilot;
-        let xs = pilot.chainages_m(self.stick, current_mps)?;
+        let xs = pilot.chainages_m(self.stick, flow)?;
         let [y, z] = pilot.across_m;
         self.duration_s = xs.len().saturating_sub(2) as f64 * STEP_S;
         self.along = Knots::new(self.duration_s, STEP_S, |k| {

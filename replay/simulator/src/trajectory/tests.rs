@@ -4,6 +4,7 @@ use headrace_vehicle::TunnelConfig;
 
 use super::*;
 use crate::random::Stream;
+use crate::stretch::Stretch;
 
 /// A trajectory in a tunnel of 200 m.
 fn parsed(trajectory: &str, seed: u64) -> Result<(Trajectory, Ground), String> {
@@ -244,22 +245,68 @@ fn wandering_has_its_reach_and_spread() {
     assert!(products.abs() < 0.05, "{products}");
 }
 
+fn everywhere(speed_mps: f64) -> Flow {
+    let mut flow = Flow::default();
+    assert!(flow.add(Stretch::ALL, speed_mps));
+    flow
+}
+
+/// Where the flow changes within a leg, each piece takes its length over its own speed; the places between are where those
+/// times put them.
+#[test]
+fn a_current_carries_along_its_own_stretch_alone() {
+    let mut flow = Flow::default();
+    assert!(flow.add(Stretch { from_m: 4.0, to_m: 7.0 }, 0.1));
+    assert!(flow.add(Stretch { from_m: 10.0, to_m: f64::INFINITY }, -0.05));
+    assert!(!flow.add(Stretch { from_m: 6.0, to_m: 8.0 }, 0.1));
+    let mut legs = trajectory(
+        "[[trajectory.legs]]\ndistance_m = 12\nspeed_mps = 0.2\n[[trajectory.legs]]\ndistance_m = 11\nspeed_mps = -0.25\n",
+    );
+    let start_m = legs.place(0.0).chainage_m;
+    assert!(start_m.abs() < 1e-12, "{start_m}");
+    legs.carry(&flow).unwrap();
+    let there = [4.0 / 0.2, 3.0 / 0.3, 3.0 / 0.2, 2.0 / 0.15];
+    let back = [2.0 / 0.3, 3.0 / 0.25, 3.0 / 0.15, 3.0 / 0.25];
+    let sum = |times: &[f64]| times.iter().sum::<f64>();
+    assert!((legs.duration_s() - sum(&there) - sum(&back)).abs() < 1e-9, "{}", legs.duration_s());
+    for (after_s, at_m) in [
+        (20.0, 4.0),
+        (25.0, 5.5),
+        (30.0, 7.0),
+        (sum(&there[..3]), 10.0),
+        (sum(&there), 12.0),
+        (sum(&there) + sum(&back[..2]), 7.0),
+        (sum(&there) + sum(&back[..3]), 4.0),
+        (sum(&there) + sum(&back), 1.0),
+    ] {
+        assert!(
+            (legs.place(after_s).chainage_m - at_m).abs() < 1e-9,
+            "{after_s}: {}",
+            legs.place(after_s).chainage_m
+        );
+    }
+    // Only the leg that the flow is too strong for is refused, and only where it flows.
+    let mut strong = Flow::default();
+    assert!(strong.add(Stretch { from_m: 100.0, to_m: 200.0 }, -1.0));
+    legs.carry(&strong).unwrap();
+}
+
 #[test]
 fn a_current_carries_what_goes_through_water() {
     let mut legs = trajectory("[[trajectory.legs]]\ndistance_m = 12\nspeed_mps = 0.2\n");
-    legs.carry(0.1).unwrap();
+    legs.carry(&everywhere(0.1)).unwrap();
     assert!((legs.duration_s() - 40.0).abs() < 1e-9 && (legs.place(20.0).chainage_m - 6.0).abs() < 1e-9);
-    assert!(legs.carry(-0.3).unwrap_err().contains("carries the vehicle off: leg 0"));
+    assert!(legs.carry(&everywhere(-0.3)).unwrap_err().contains("carries the vehicle off: leg 0"));
 
     let mut pilot = trajectory(&format!("{PILOT}to_m = 60\n"));
     let still_s = pilot.duration_s();
-    pilot.carry(0.2).unwrap();
+    pilot.carry(&everywhere(0.2)).unwrap();
     assert!(pilot.duration_s() < still_s && (pilot.place(pilot.duration_s()).chainage_m - 60.0).abs() < 0.4);
-    assert!(pilot.carry(-0.6).unwrap_err().contains("has not come to 60 m"));
+    assert!(pilot.carry(&everywhere(-0.6)).unwrap_err().contains("has not come to 60 m"));
 
     let mut ground =
         Trajectory::of_knots(Knots::new(10.0, 1.0, |k| [k as f64, 0.0, 4.0, 0.0, 0.0, 0.0]), 10.0);
-    assert!(ground.carry(0.1).unwrap_err().contains("given over ground"));
+    assert!(ground.carry(&everywhere(0.1)).unwrap_err().contains("given over ground"));
 }
 
 #[test]

@@ -1,0 +1,54 @@
+//! What simulating costs.
+
+use headrace_sensor::device::{Direction, Sense};
+use headrace_simulator::Scene;
+use rustix::time::{ClockId, clock_gettime};
+
+use super::error::WorthError;
+use super::mean::Mean;
+use crate::adviser::{SimulationError, simulation};
+
+/// Rounds, in turns, whose mean and interval are told.
+const ROUNDS: usize = 5;
+
+/// What simulating costs with all effects, ns of the processor for each return of a head.
+///
+/// Errors: see [`WorthError`].
+pub(super) fn all_ns(scene: &Scene) -> Result<Mean, WorthError> {
+    let rounds: Result<Vec<f64>, SimulationError> = (0..ROUNDS).map(|_| ns_a_return(scene)).collect();
+    Ok(Mean::of(&rounds?))
+}
+
+/// What these effects cost of it.
+///
+/// Errors: see [`WorthError`].
+pub(super) fn of_ns(scene: &mut Scene, effects: &[&str]) -> Result<Mean, WorthError> {
+    let mut differences = Vec::new();
+    for _ in 0..ROUNDS {
+        let with = ns_a_return(scene)?;
+        scene.leave_out(effects);
+        let without = ns_a_return(scene);
+        scene.leave_out(&[]);
+        differences.push(with - without?);
+    }
+    Ok(Mean::of(&differences))
+}
+
+/// Time of this thread on the processor to simulate a scene, over the returns of its heads, ns.
+fn ns_a_return(scene: &Scene) -> Result<f64, SimulationError> {
+    let mut simulation = simulation(scene, false)?;
+    let sensors = &scene.facts().sensors;
+    let is_head = |source: u16| sensors.get(usize::from(source)).is_some_and(|of| of.sense == Sense::Head);
+    let began_ns = thread_ns();
+    let mut returns = 0_u64;
+    while let Some(message) = simulation.next_message() {
+        returns += u64::from(message.direction == Direction::Received && is_head(message.source));
+    }
+    Ok((thread_ns() - began_ns) / returns.max(1) as f64)
+}
+
+/// Time that this thread has been on a processor, ns.
+fn thread_ns() -> f64 {
+    let time = clock_gettime(ClockId::ThreadCPUTime);
+    time.tv_sec as f64 * 1e9 + time.tv_nsec as f64
+}

@@ -1,0 +1,151 @@
+//! Noise, offset and drift of depth sensors.
+
+use bevy_ecs::prelude::{Component, Query};
+use headrace_config::{ConfigError, Section};
+use headrace_geometry::math;
+use headrace_geometry::time::MonoNs;
+use headrace_sensor::device::Sense;
+use headrace_sensor::measurement::Pressure;
+
+use super::effect::{Effect, EffectKind};
+use super::keys;
+use super::targets::PerSensor;
+use crate::builder::Builder;
+use crate::error::SceneError;
+use crate::facts::Facts;
+use crate::random::Stream;
+use crate::sensing::Samples;
+use crate::stages::Stage;
+
+/// Step of the draw of the offset; no sample has this number.
+const OFFSET: u64 = u64::MAX;
+
+/// A depth sensor's pressure has white noise, an offset, and a drift.
+///
+/// `noise_pa` is the standard deviation of each sample's noise; `offset_sd_pa` that of an offset drawn for the dive; `drift_pa`
+/// that of a Gauss-Markov process whose correlation falls to 1/e within `tau_s` (3,600). All are zero by default.
+/// Source: Brown and Hwang, Introduction to Random Signals and Applied Kalman Filtering, 4th ed., §4.4 (exact steps).
+pub(super) struct DepthNoiseKind;
+
+#[derive(Debug, Clone, Copy)]
+struct Parameters {
+    noise_pa: f64,
+    offset_sd_pa: f64,
+    drift_pa: f64,
+    tau_s: f64,
+}
+
+#[derive(Component)]
+struct DepthNoise {
+    parameters: Parameters,
+    stream: Stream,
+    offset_pa: f64,
+    /// The drift, in standard deviations, and when it was so.
+    drift: f64,
+    before: Option<MonoNs>,
+}
+
+impl EffectKind for DepthNoiseKind {
+    fn name(&self) -> &'static str {
+        "depth_noise"
+    }
+
+    fn summary(&self) -> &'static str {
+        "depth scatters, is off, and drifts"
+    }
+
+    fn read(&self, tables: Vec<Section<'_>>, facts: &Facts) -> Result<Box<dyn Effect>, ConfigError> {
+        Ok(Box::new(PerSensor::read(tables, facts, &[Sense::Depth], |table| {
+            let noise_pa = keys::or_zero(table, "noise_pa", 0.0..=1e5)?;
+            let offset_sd_pa = keys::or_zero(table, "offset_sd_pa", 0.0..=1e6)?;
+            let drift_pa = keys::or_zero(table, "drift_pa", 0.0..=1e6)?;
+            let values = [("noise_pa", noise_pa), ("offset_sd_pa", offset_sd_pa), ("drift_pa", drift_pa)];
+            keys::some_not_zero(table, &values)?;
+            let tau_s = table.number("tau_s", 1.0..=1e6)?.unwrap_or(3600.0);
+            Ok(Parameters { noise_pa, offset_sd_pa, drift_pa, tau_s })
+        })?))
+    }
+}
+
+impl Effect for PerSensor<Parameters> {
+    fn build(&self, sim: &mut Builder<'_>) -> Result<(), SceneError> {
+        for (source, parameters) in &self.0 {
+            let stream = sim.stream(*source);
+            let [drawn, _] = stream.at(OFFSET).normal();
+            let offset_pa = parameters.offset_sd_pa * drawn;
+            let parameters = *parameters;
+            sim.insert(*source, DepthNoise { parameters, stream, offset_pa, drift: 0.0, before: None });
+        }
+        sim.system(Stage::Feel, disturb);
+        Ok(())
+    }
+}
+
+fn disturb(mut sensors: Query<'_, '_, (&mut Samples<Pressure>, &mut DepthNoise)>) {
+    for (mut samples, mut noise) in &mut sensors {
+        for (step, pressure) in samples.steps() {
+            pressure.pressure_pa += noise.error_pa(step, pressure.at);
+        }
+    }
+}
+
+impl DepthNoise {
+    /// Error of a step's sample. Call for each step, in order.
+    fn error_pa(&mut self, step: u64, at: MonoNs) -> f64 {
+        let Parameters { noise_pa, drift_pa, tau_s, .. } = self.parameters;
+        let [white, wander] = self.stream.at(step).normal();
+        if drift_pa > 0.0 {
+            let kept = self.before.map_or(0.0, |before| math::exp(-at.since(before).as_secs_f64() / tau_s));
+            self.drift = self.drift * kept + wander * math::sqrt((1.0 - kept * kept).max(0.0));
+            self.before = Some(at);
+        }
+        self.offset_pa + noise_pa * white + drift_pa * self.drift
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::testing_motion::{Bench, refusal, same_in_any_slices};
+
+    fn errors_pa(effects: &str) -> Vec<f64> {
+        let run = |effects: &str| Bench::long(effects).run::<Pressure>("depth");
+        run("").iter().zip(run(effects)).map(|(plain, with)| with.pressure_pa - plain.pressure_pa).collect()
+    }
+
+    #[test]
+    fn noise_is_white_and_as_strong_as_said() {
+        let errors = errors_pa("[effects.depth_noise]\nnoise_pa = 300\n");
+        let n = errors.len() as f64;
+        assert!(n > 3000.0);
+        let variance = errors.iter().map(|e| e * e).sum::<f64>() / n;
+        assert!((variance / 9e4 - 1.0).abs() < 5.0 * math::sqrt(2.0 / n), "{variance}");
+        let lagged = errors.windows(2).map(|w| w[0] * w[1]).sum::<f64>() / n;
+        assert!(lagged.abs() < 5.0 * 9e4 / math::sqrt(n), "{lagged}");
+    }
+
+    /// Over a lag t, the mean square of a Gauss-Markov process's change is 2 sd^2 (1 - exp(-t / tau)).
+    #[test]
+    fn drift_wanders_as_fast_as_said() {
+        let parameters = Parameters { noise_pa: 0.0, offset_sd_pa: 0.0, drift_pa: 100.0, tau_s: 20.0 };
+        let stream = Stream::new(3, "depth_noise", "depth");
+        let mut noise = DepthNoise { parameters, stream, offset_pa: 0.0, drift: 0.0, before: None };
+        let times = (0..400_000_u64).map(|step| (step, MonoNs(1_000_000_000 + step * 100_000_000)));
+        let drift: Vec<f64> = times.map(|(step, at)| noise.error_pa(step, at)).collect();
+        for lag in [1_usize, 50, 200, 1000] {
+            let pairs = drift.iter().zip(drift.iter().skip(lag));
+            let found = pairs.map(|(a, b)| (b - a) * (b - a)).sum::<f64>() / (drift.len() - lag) as f64;
+            let wanted = 2e4 * (1.0 - math::exp(-(lag as f64) * 0.1 / 20.0));
+            // Independent stretches are some two tau long: 1,000 of them.
+            assert!((found / wanted - 1.0).abs() < 5.0 * math::sqrt(2.0 / 1000.0), "{lag}: {found} {wanted}");
+        }
+    }
+
+    #[test]
+    fn the_offset_is_one_for_the_dive_and_slices_dont_matter() {
+        let errors = errors_pa("[effects.depth_noise]\noffset_sd_pa = 1000\n");
+        assert!(errors[0] != 0.0 && errors.iter().all(|error| (error - errors[0]).abs() < 1e-6));
+        same_in_any_slices(&Bench::turning("[effects.depth_noise]\nnoise_pa = 300\ndrift_pa = 100\n"));
+        assert!(refusal("[effects.depth_noise]\n").contains("or offset_sd_pa or drift_pa must not be zero"));
+    }
+}

@@ -1,0 +1,173 @@
+//! The vehicle bumps into things.
+
+use bevy_ecs::prelude::{Component, Query};
+use headrace_config::{ConfigError, Section};
+use headrace_geometry::frames::{Sensor, Vec3};
+use headrace_geometry::math;
+use headrace_sensor::device::Sense;
+use headrace_sensor::measurement::Inertia;
+
+use super::effect::{Effect, EffectKind};
+use super::keys;
+use super::targets::PerSensor;
+use crate::builder::Builder;
+use crate::clock::START;
+use crate::error::SceneError;
+use crate::facts::Facts;
+use crate::random::Stream;
+use crate::sensing::Samples;
+use crate::stages::Stage;
+
+/// Length of the spans of time in each of which there may be one bump, s.
+const SPAN_S: f64 = 1.0;
+
+/// Now and then the vehicle bumps into the wall, a rock, its own cable: it is thrust one way and swings back.
+///
+/// Keys: `per_hour`, to 1,800 (needed); the speed `speed_mps = [least, most]` that a bump gives ([0.02, 0.1]), evenly drawn, in a
+/// direction evenly drawn; `seconds`, from the first touch until the vehicle is at rest again, 0.01 to 1 (0.2). The force is one
+/// turn of a sine, so that speed is gained and lost again and the vehicle's place changes by millimetres, which the true
+/// trajectory leaves out. Sensors on one vehicle feel the same bumps.
+/// Source: momentum; the speeds are those at which such vehicles go.
+pub(super) struct ImuBumpsKind;
+
+#[derive(Debug, Clone, Copy)]
+struct Parameters {
+    chance: f64,
+    speed_mps: [f64; 2],
+    seconds: f64,
+}
+
+#[derive(Component)]
+struct ImuBumps {
+    parameters: Parameters,
+    stream: Stream,
+}
+
+impl EffectKind for ImuBumpsKind {
+    fn name(&self) -> &'static str {
+        "imu_bumps"
+    }
+
+    fn summary(&self) -> &'static str {
+        "the vehicle bumps into things, which inertial units feel"
+    }
+
+    fn read(&self, tables: Vec<Section<'_>>, facts: &Facts) -> Result<Box<dyn Effect>, ConfigError> {
+        Ok(Box::new(PerSensor::read(tables, facts, &[Sense::Inertial], |table| {
+            let per_hour = keys::or_zero(table, "per_hour", 0.0..=1800.0)?;
+            keys::some_not_zero(table, &[("per_hour", per_hour)])?;
+            let speed_mps = keys::span(table, "speed_mps", 0.0..=2.0, [0.02, 0.1])?;
+            let seconds = table.number("seconds", 0.01..=SPAN_S)?.unwrap_or(0.2);
+            Ok(Parameters { chance: per_hour * SPAN_S / 3600.0, speed_mps, seconds })
+        })?))
+    }
+}
+
+impl Effect for PerSensor<Parameters> {
+    fn build(&self, sim: &mut Builder<'_>) -> Result<(), SceneError> {
+        for (source, parameters) in &self.0 {
+            let stream = sim.stream_for("vehicle");
+            sim.insert(*source, ImuBumps { parameters: *parameters, stream });
+        }
+        sim.system(Stage::Feel, bump);
+        Ok(())
+    }
+}
+
+fn bump(mut units: Query<'_, '_, (&mut Samples<Inertia>, &ImuBumps)>) {
+    for (mut samples, bumps) in &mut units {
+        for inertia in &mut samples.list {
+            let period_s = inertia.period.as_secs_f64();
+            let until_s = inertia.at.since(START).as_secs_f64() + period_s / 2.0;
+            let gained = bumps.gained_mps([until_s - period_s, until_s]);
+            if let Some(gained) = gained.filter(|_| period_s > 0.0) {
+                inertia.force_mps2 = inertia.force_mps2 + gained.scaled(1.0 / period_s);
+            }
+        }
+    }
+}
+
+impl ImuBumps {
+    /// Speed gained between two times by bumps, m/s.
+    fn gained_mps(&self, [from_s, until_s]: [f64; 2]) -> Option<Vec3<Sensor>> {
+        let last = math::floor_to_i64(until_s / SPAN_S);
+        let first = math::floor_to_i64((from_s - self.parameters.seconds) / SPAN_S).max(0);
+        let each = (first..=last).filter_map(|span| {
+            let (began_s, speed) = self.drawn(span.unsigned_abs())?;
+            let share = self.share(until_s - began_s) - self.share(from_s - began_s);
+            (share != 0.0).then(|| speed.scaled(share))
+        });
+        each.reduce(|a, b| a + b)
+    }
+
+    /// Share of a bump's speed that the vehicle has so long after its begin.
+    fn share(&self, after_s: f64) -> f64 {
+        let turn = (after_s / self.parameters.seconds).clamp(0.0, 1.0);
+        (1.0 - math::cos(math::TAU * turn)) / 2.0
+    }
+
+    /// Begin and speed of the bump in a span, if there is one.
+    fn drawn(&self, span: u64) -> Option<(f64, Vec3<Sensor>)> {
+        let [chance, along] = self.stream.at(span).uniform();
+        if chance >= self.parameters.chance {
+            return None;
+        }
+        let [size, up] = self.stream.block(span, 1).uniform();
+        let [round, _] = self.stream.block(span, 2).uniform();
+        let [least, most] = self.parameters.speed_mps;
+        let z = 2.0 * up - 1.0;
+        let level = math::sqrt((1.0 - z * z).max(0.0));
+        let (sine, cosine) = math::sin_cos(math::TAU * round);
+        let direction = Vec3::new(level * cosine, level * sine, z);
+        Some(((span as f64 + along) * SPAN_S, direction.scaled(least + (most - least) * size)))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::testing_motion::{Bench, refusal, same_in_any_slices};
+
+    const KEYS: &str = "[effects.imu_bumps]\nper_hour = 400\nspeed_mps = [0.05, 0.2]\nseconds = 0.3\n";
+
+    /// Bumps found in the difference of two dives: as many as wanted, each as long and as strong as wanted, and each leaves the
+    /// vehicle at the speed it had.
+    #[test]
+    fn bumps_are_as_many_as_long_and_as_strong_as_wanted() {
+        let (plain, with) = (Bench::long("").run::<Inertia>("imu"), Bench::long(KEYS).run::<Inertia>("imu"));
+        let period_s = plain[0].period.as_secs_f64();
+        let force: Vec<Vec3<Sensor>> =
+            plain.iter().zip(&with).map(|(a, b)| b.force_mps2 + a.force_mps2.scaled(-1.0)).collect();
+        let felt = |v: &Vec3<Sensor>| v.norm() > 1e-9;
+        let bumps: Vec<&[Vec3<Sensor>]> =
+            force.chunk_by(|a, b| felt(a) == felt(b)).filter(|run| felt(&run[0])).collect();
+        let (spans, chance) = (640.0, 400.0 / 3600.0);
+        let n = bumps.len() as f64;
+        // Two that meet are found as one.
+        assert!((n - spans * chance).abs() < 5.0 * math::sqrt(spans * chance), "{n}");
+        let mut single = 0;
+        for bump in &bumps {
+            let lasted_s = bump.len() as f64 * period_s;
+            if lasted_s > 0.33 {
+                continue;
+            }
+            single += 1;
+            assert!(lasted_s > 0.28, "{lasted_s}");
+            let (mut speed, mut largest_mps) = (Vec3::<Sensor>::zero(), 0.0_f64);
+            for force in *bump {
+                speed = speed + force.scaled(period_s);
+                largest_mps = largest_mps.max(speed.norm());
+            }
+            assert!(speed.norm() < 1e-9, "{speed:?}");
+            assert!((0.049..0.2001).contains(&largest_mps), "{largest_mps}");
+        }
+        assert!(single * 4 > bumps.len() * 3);
+    }
+
+    #[test]
+    fn slices_make_no_difference_and_nonsense_is_refused() {
+        same_in_any_slices(&Bench::turning(KEYS));
+        assert!(refusal("[effects.imu_bumps]\n").contains("per_hour: must not be zero"));
+        assert!(refusal("[effects.imu_bumps]\nper_hour = 9\nspeed_mps = 1\n").contains("must be"));
+    }
+}

@@ -1,0 +1,144 @@
+//! Thrusters shake inertial units.
+
+use bevy_ecs::prelude::{Component, Query};
+use headrace_config::{ConfigError, Section};
+use headrace_geometry::frames::Vec3;
+use headrace_geometry::math;
+use headrace_sensor::device::Sense;
+use headrace_sensor::measurement::Inertia;
+
+use super::effect::{Effect, EffectKind};
+use super::keys;
+use super::targets::PerSensor;
+use crate::builder::Builder;
+use crate::clock::START;
+use crate::error::SceneError;
+use crate::facts::Facts;
+use crate::random::Stream;
+use crate::sensing::Samples;
+use crate::stages::Stage;
+
+/// Thrusters shake an inertial unit at one frequency.
+///
+/// Keys: `frequency_hz`, 1 to 2,000 (needed): the turns of a shaft a second, or times its blades; the amplitudes along and about
+/// each axis of the unit, `accel_mps2` and `gyro_degps`, zero by default. Each axis has a phase of its own. A unit that integrates
+/// between samples sees the mean over its period T: the amplitude goes with sin(pi f T) / (pi f T), and what is above half
+/// the rate of samples appears below it.
+/// Source: sampling theorem; strapdown units integrate between their outputs.
+pub(super) struct ImuVibrationKind;
+
+#[derive(Debug, Clone, Copy)]
+struct Parameters {
+    frequency_hz: f64,
+    accel_mps2: f64,
+    gyro_radps: f64,
+}
+
+#[derive(Component)]
+struct ImuVibration {
+    parameters: Parameters,
+    /// Phases of forces, then of turn rates, by axis, radians.
+    phases_rad: [f64; 6],
+}
+
+impl EffectKind for ImuVibrationKind {
+    fn name(&self) -> &'static str {
+        "imu_vibration"
+    }
+
+    fn summary(&self) -> &'static str {
+        "thrusters shake inertial units"
+    }
+
+    fn read(&self, tables: Vec<Section<'_>>, facts: &Facts) -> Result<Box<dyn Effect>, ConfigError> {
+        Ok(Box::new(PerSensor::read(tables, facts, &[Sense::Inertial], |table| {
+            let frequency_hz = table.number("frequency_hz", 1.0..=2000.0)?;
+            let accel_mps2 = keys::or_zero(table, "accel_mps2", 0.0..=100.0)?;
+            let gyro_degps = keys::or_zero(table, "gyro_degps", 0.0..=100.0)?;
+            keys::some_not_zero(table, &[("accel_mps2", accel_mps2), ("gyro_degps", gyro_degps)])?;
+            let frequency_hz = table.required("frequency_hz", frequency_hz)?;
+            Ok(Parameters { frequency_hz, accel_mps2, gyro_radps: gyro_degps.to_radians() })
+        })?))
+    }
+}
+
+impl Effect for PerSensor<Parameters> {
+    fn build(&self, sim: &mut Builder<'_>) -> Result<(), SceneError> {
+        for (source, parameters) in &self.0 {
+            let vibration = ImuVibration::new(*parameters, sim.stream(*source));
+            sim.insert(*source, vibration);
+        }
+        sim.system(Stage::Feel, shake);
+        Ok(())
+    }
+}
+
+fn shake(mut units: Query<'_, '_, (&mut Samples<Inertia>, &ImuVibration)>) {
+    for (mut samples, vibration) in &mut units {
+        for inertia in &mut samples.list {
+            vibration.shake(inertia);
+        }
+    }
+}
+
+impl ImuVibration {
+    fn new(parameters: Parameters, stream: Stream) -> Self {
+        let [[a, b], [c, d], [e, f]] = [0, 1, 2].map(|step| stream.at(step).uniform());
+        Self { parameters, phases_rad: [a, b, c, d, e, f].map(|turn| math::TAU * turn) }
+    }
+
+    fn shake(&self, inertia: &mut Inertia) {
+        let Parameters { frequency_hz, accel_mps2, gyro_radps } = self.parameters;
+        let half_rad = math::TAU / 2.0 * frequency_hz * inertia.period.as_secs_f64();
+        let kept = if half_rad > 0.0 { math::sin(half_rad) / half_rad } else { 1.0 };
+        // Whole turns are left out first, so that hours into a dive no digits are lost.
+        let turns = frequency_hz * inertia.at.since(START).as_secs_f64();
+        let now_rad = math::TAU * math::wrap(turns, 1.0);
+        let [a, b, c, d, e, f] = self.phases_rad.map(|phase_rad| math::sin(now_rad + phase_rad));
+        inertia.force_mps2 = inertia.force_mps2 + Vec3::new(a, b, c).scaled(accel_mps2 * kept);
+        inertia.rate_radps = inertia.rate_radps + Vec3::new(d, e, f).scaled(gyro_radps * kept);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::testing_motion::{Bench, refusal, same_in_any_slices};
+
+    /// A swing of 83 Hz, integrated over each sample's period in many small steps, gives these means: one phase an axis, found from
+    /// the first samples, holds for all.
+    #[test]
+    fn samples_are_means_of_the_swing() {
+        let keys = "[effects.imu_vibration]\nfrequency_hz = 83\naccel_mps2 = 4\n";
+        let (plain, shaken) =
+            (Bench::turning("").run::<Inertia>("imu"), Bench::turning(keys).run::<Inertia>("imu"));
+        let period_s = plain[0].period.as_secs_f64();
+        let error = |k: usize| shaken[k].force_mps2.x() - plain[k].force_mps2.x();
+        let mean = |k: usize, phase_rad: f64| {
+            let at_s = plain[k].at.since(START).as_secs_f64() - period_s / 2.0;
+            let parts = 400;
+            let part = |i: i32| {
+                4.0 * math::sin(
+                    math::TAU * 83.0 * (at_s + (f64::from(i) + 0.5) * period_s / 400.0) + phase_rad,
+                )
+            };
+            (0..parts).map(part).sum::<f64>() / f64::from(parts)
+        };
+        let square = |x: f64| x * x;
+        let off = |phase_rad: f64| (0..50).map(|k| square(error(k) - mean(k, phase_rad))).sum::<f64>();
+        let phases = (0..2000).map(|i| math::TAU * f64::from(i) / 2000.0);
+        let phase_rad = phases.min_by(|a, b| off(*a).total_cmp(&off(*b))).unwrap();
+        let worst = (0..plain.len()).map(|k| (error(k) - mean(k, phase_rad)).abs()).fold(0.0, f64::max);
+        let largest = (0..plain.len()).map(|k| error(k).abs()).fold(0.0, f64::max);
+        assert!(plain.len() > 3000 && largest > 0.5 && worst < 0.02, "{largest} {worst}");
+    }
+
+    #[test]
+    fn slices_make_no_difference_and_nonsense_is_refused() {
+        same_in_any_slices(&Bench::turning("[effects.imu_vibration]\nfrequency_hz = 25\ngyro_degps = 1\n"));
+        assert!(refusal("[effects.imu_vibration]\naccel_mps2 = 1\n").contains("frequency_hz: is missing"));
+        assert!(
+            refusal("[effects.imu_vibration]\nfrequency_hz = 9\n").contains("or gyro_degps must not be zero")
+        );
+    }
+}

@@ -1,0 +1,140 @@
+//! The speed of sound changes with height.
+
+use bevy_ecs::prelude::{Component, Query, Res};
+use headrace_config::{ConfigError, Section};
+use headrace_geometry::math;
+use headrace_sensor::device::Sense;
+use headrace_sensor::measurement::Sounding;
+
+use super::effect::{Effect, EffectKind};
+use super::places::Places;
+use super::targets::PerSensor;
+use crate::builder::Builder;
+use crate::error::SceneError;
+use crate::facts::Facts;
+use crate::sensing::{Rays, Samples, Scenery};
+use crate::stages::Stage;
+
+/// Water lies in layers, warm above cold: the speed of sound changes evenly with the height above the tunnel's floor, and
+/// ranges, which are computed with the vehicle file's speed, are off by the mean slowness on the way.
+///
+/// Keys, besides `from_m` and `to_m` of the stretch: the speed at the floor, `floor_mps`, from 1300 to 1700 (the file's), and its
+/// change per metre of height, `per_metre_mps`, from -50 to 50 (0). One degree is some 4 m/s. That the ray bends is left out: its
+/// radius is the speed over the gradient, 300 m at 5 m/s a metre, which over 10 m of range bends it by 2 degrees.
+/// Source: Urick, "Principles of underwater sound", ch. 5 (travel time in a constant gradient).
+pub(super) struct SoundSpeedProfileKind;
+
+/// Differences of speed below this share are taken for none.
+const SAME: f64 = 1e-9;
+
+#[derive(Debug, Clone, Copy)]
+struct Parameters {
+    floor_mps: f64,
+    per_metre_mps: f64,
+    /// The vehicle file's.
+    assumed_mps: f64,
+}
+
+#[derive(Component)]
+struct SoundSpeedProfile(Places<Parameters>);
+
+impl EffectKind for SoundSpeedProfileKind {
+    fn name(&self) -> &'static str {
+        "sound_speed_profile"
+    }
+
+    fn summary(&self) -> &'static str {
+        "sound is faster in warm water above than in cold below"
+    }
+
+    fn read(&self, tables: Vec<Section<'_>>, facts: &Facts) -> Result<Box<dyn Effect>, ConfigError> {
+        let senses = [Sense::Head, Sense::Echosounder];
+        Ok(Box::new(PerSensor::read_by_place(tables, facts, &senses, |table| {
+            let floor_mps = table.number("floor_mps", 1300.0..=1700.0)?;
+            let per_metre_mps = table.number("per_metre_mps", -50.0..=50.0)?;
+            if floor_mps.is_none() && per_metre_mps.is_none() {
+                return Err(table.invalid("floor_mps", "or per_metre_mps is needed"));
+            }
+            Ok(Parameters {
+                floor_mps: floor_mps.unwrap_or(facts.sound_speed_mps),
+                per_metre_mps: per_metre_mps.unwrap_or(0.0),
+                assumed_mps: facts.sound_speed_mps,
+            })
+        })?))
+    }
+}
+
+impl Effect for PerSensor<Places<Parameters>> {
+    fn build(&self, sim: &mut Builder<'_>) -> Result<(), SceneError> {
+        for (source, places) in &self.0 {
+            sim.insert(*source, SoundSpeedProfile(places.clone()));
+        }
+        sim.system(Stage::Hear, rescale);
+        Ok(())
+    }
+}
+
+impl Parameters {
+    /// Reported over true range of an echo from one height to another.
+    fn scale(&self, from_z_m: f64, to_z_m: f64) -> f64 {
+        // Never below a third of the floor's speed, however deep a hollow is.
+        let at_mps = |z_m: f64| (self.floor_mps + self.per_metre_mps * z_m).max(self.floor_mps / 3.0);
+        let [from_mps, to_mps] = [from_z_m, to_z_m].map(at_mps);
+        let faster = to_mps / from_mps - 1.0;
+        let slowness = if faster.abs() < SAME { 1.0 } else { math::ln(1.0 + faster) / faster };
+        self.assumed_mps / from_mps * slowness
+    }
+}
+
+fn rescale(
+    scenery: Res<'_, Scenery>,
+    mut sonars: Query<'_, '_, (&mut Samples<Sounding>, &Rays, &SoundSpeedProfile)>,
+) {
+    for (mut samples, rays, SoundSpeedProfile(places)) in &mut sonars {
+        for (sounding, ray) in samples.list.iter_mut().zip(&rays.0) {
+            let (Some(range_m), Some(profile)) = (&mut sounding.range_m, places.here(&scenery, ray)) else {
+                continue;
+            };
+            let from_m = ray.origin.z();
+            *range_m *= profile.scale(from_m, from_m + ray.direction.z() * *range_m);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::testing::Dive;
+
+    /// Against the time over the way in ten thousand pieces.
+    #[test]
+    fn ranges_are_the_time_of_the_way_at_the_file_s_speed() {
+        let mut dive = Dive::with_head();
+        dive.vehicle = "[water]\nsound_speed_mps = 1447";
+        for (keys, floor_mps, per_metre) in [
+            ("floor_mps = 1430\nper_metre_mps = 4", 1430.0, 4.0),
+            ("per_metre_mps = -12", 1447.0, -12.0),
+            ("floor_mps = 1480", 1480.0, 0.0),
+        ] {
+            let (plain, with) = (dive.dive(""), dive.dive(&format!("[effects.sound_speed_profile]\n{keys}")));
+            for (row, seen) in plain.rows.iter().zip(with.ranges_m(0)).step_by(7) {
+                let sounding = row.sounding.unwrap();
+                let range_m = sounding.measured.range_m.unwrap();
+                let parts = 10_000;
+                let slowness = |part: i32| {
+                    let way_m = range_m * (f64::from(part) + 0.5) / f64::from(parts);
+                    1.0 / (floor_mps + per_metre * (sounding.origin.z() + sounding.direction.z() * way_m))
+                };
+                let mean = (0..parts).map(slowness).sum::<f64>() / f64::from(parts);
+                let expected_m = range_m * mean * 1447.0;
+                assert!((seen.unwrap() - expected_m).abs() < 1e-8, "{keys}: {seen:?} {expected_m}");
+            }
+        }
+    }
+
+    #[test]
+    fn slices_dont_matter_and_nonsense_is_refused() {
+        Dive::with_head().assert_slices_dont_matter("[effects.sound_speed_profile]\nper_metre_mps = 3");
+        let refusal = Dive::with_head().refusal("[effects.sound_speed_profile]");
+        assert!(refusal.contains("or per_metre_mps is needed"), "{refusal}");
+    }
+}

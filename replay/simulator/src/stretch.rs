@@ -1,0 +1,41 @@
+//! Stretches of the tunnel.
+
+use headrace_config::{ConfigError, Section};
+
+/// A stretch of the tunnel: chainages from `from_m` up to `to_m`, which is excluded.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Stretch {
+    /// Its begin, m; minus infinity for all before it.
+    pub from_m: f64,
+    /// Its end, m; infinity for all behind it.
+    pub to_m: f64,
+}
+
+impl Stretch {
+    /// The whole tunnel.
+    pub(crate) const ALL: Self = Self { from_m: f64::NEG_INFINITY, to_m: f64::INFINITY };
+
+    /// Reads `from_m` and `to_m`, each of which may be absent: then the stretch has no end there.
+    ///
+    /// Errors: outside the tunnel, or the end isn't behind the begin.
+    pub(crate) fn read(table: &Section<'_>, length_m: f64) -> Result<Self, ConfigError> {
+        let from_m = table.number("from_m", 0.0..=length_m)?;
+        let to_m = table.number("to_m", 0.0..=length_m)?;
+        let stretch =
+            Self { from_m: from_m.unwrap_or(Self::ALL.from_m), to_m: to_m.unwrap_or(Self::ALL.to_m) };
+        if stretch.to_m <= stretch.from_m {
+            return Err(table.invalid("to_m", &format!("must be above from_m, which is {}", stretch.from_m)));
+        }
+        Ok(stretch)
+    }
+
+    /// Whether a chainage lies in it.
+    pub(crate) fn has(&self, chainage_m: f64) -> bool {
+        (self.from_m..self.to_m).contains(&chainage_m)
+    }
+
+    /// Whether two stretches share a chainage.
+    pub(crate) fn meets(&self, other: &Self) -> bool {
+        self.from_m < other.to_m && other.from_m < self.to_m
+    }
+}
