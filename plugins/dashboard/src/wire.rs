@@ -94,6 +94,7 @@ impl SectionRecord {
     }
 
     /// With the verdict for another target.
+    #[must_use]
     pub fn compared(self, other: Option<Verdict>) -> Self {
         let bits = other.map_or(0, |verdict| byte(verdict) + 1);
         Self { flags: self.flags | bits << 2, ..self }

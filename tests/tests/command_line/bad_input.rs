@@ -72,7 +72,7 @@ fn a_wrong_vehicle_file_is_refused_with_file_line_key_value_and_what_is_allowed(
     table missing
         headrace: vehicle.toml:1: tunnel: is missing
     unknown key
-        headrace: vehicle.toml:3: colour: is not a key here; known are name, target_m, section_m, dive_hours, tunnel, water, coverage, openings, hull, sensors, navigation, heads, alerts, limits
+        headrace: vehicle.toml:3: colour: is not a key here; known are name, target_m, section_m, dive_hours, tunnel, water, coverage, openings, hull, sensors, navigation, heads, advice, alerts, limits
     unknown key in a table
         headrace: vehicle.toml:11: water.salt: is not a key here; known are sound_speed_mps, density_kgpm3, gravity_mps2, surface_pressure_pa, surface_above_floor_m, sound_speed_from
     unknown key of a sensor
@@ -148,9 +148,9 @@ fn a_wrong_scene_is_refused_with_file_line_key_value_and_what_is_allowed() {
     unknown key
         headrace: scene.toml:6: trajectory.end_m: is not a key here; known are kind, start_m, place_m, legs
     unknown table
-        headrace: scene.toml:4: weather: is not a key here; known are name, seed, vehicle, vehicle_changes, tunnel, trajectory, effects
+        headrace: scene.toml:4: weather: is not a key here; known are name, seed, vehicle, vehicle_changes, tunnel, trajectory, effects, water, cable, thrusters
     unknown effect
-        headrace: scene.toml:5: effects.fish: is not a key here; known are start_phase_error, sector_end_slowing, skipped_steps, head_stalls, motion_within_turn, beam_cone, occlusion, multipath, side_lobes, interference, missing_returns, outliers, stuck_range, sound_speed_error, range_noise, range_quantisation, current, pilot_drift, depth_steps, imu_noise, imu_bias, magnetic_disturbance, tether_slack, tether_slip, late_winding, tether_quantum, device_faults, clock_drift, line_delay, byte_errors
+        headrace: scene.toml:5: effects.fish: is not a key here; known are take, leave, mount_error, start_phase_error, sector_end_slowing, skipped_steps, head_stalls, motion_within_turn, beam_cone, occlusion, echo_strength, multipath, side_lobes, interference, near_returns, missing_returns, outliers, stuck_range, sound_speed_error, sound_speed_profile, range_noise, range_quantisation, current, pilot_drift, depth_noise, depth_steps, imu_noise, imu_bias, imu_vibration, imu_bumps, magnetic_disturbance, tether_slack, tether_scale, tether_slip, late_winding, tether_quantum, device_faults, clock_drift, line_delay, byte_errors
     text in place of a number
         headrace: scene.toml:5: trajectory.start_m = "portal": must be a number from -20 to 1000000
     no distance

@@ -76,7 +76,7 @@ fn all_errors_of_a_scene_and_its_vehicle_file_are_told_at_once() {
         assert_eq!((answer.code, answer.stdout.as_str()), (Some(2), ""));
         insta::allow_duplicates! { insta::assert_snapshot!(answer.stderr, @r#"
         headrace: scene.toml:2: vehicle = "vehicle.toml": has 2 errors
-        headrace: scene.toml:4: weather: is not a key here; known are name, seed, vehicle, vehicle_changes, tunnel, trajectory, effects
+        headrace: scene.toml:4: weather: is not a key here; known are name, seed, vehicle, vehicle_changes, tunnel, trajectory, effects, water, cable, thrusters
         headrace: vehicle.toml:1: target_m: is missing
         headrace: vehicle.toml:5: tunnel.radius_m = 0: must be a number from 0.1 to 200
         "#); }

@@ -102,7 +102,11 @@ fn the_page_in_docs_is_that_of_its_data() {
     let results: Results = serde_json::from_str(&read("cost.json")).unwrap();
     let files = results.files().unwrap();
     for (name, content) in &files {
-        let end = if name.ends_with(".svg") { "<!-- headrace cost -->\n" } else { "" };
+        let end = if Path::new(name).extension().is_some_and(|of| of == "svg") {
+            "<!-- headrace cost -->\n"
+        } else {
+            ""
+        };
         let content = format!("{content}{end}");
         // Form alone: times stay as old as they are.
         if std::env::var_os("HEADRACE_RENEW_COST").is_some() {

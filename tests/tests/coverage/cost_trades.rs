@@ -108,7 +108,10 @@ fn nothing_left_out_changes_nothing_and_rays_converge() {
     };
     let (hit_m, missed_m) =
         (boulder("none", "smallest boulder hit"), boulder("none", "largest boulder missed"));
-    assert!((0.02..=0.8).contains(&hit_m) && missed_m < 0.8 && hit_m != missed_m, "{hit_m}, {missed_m}");
+    assert!(
+        (0.02..=0.8).contains(&hit_m) && missed_m < 0.8 && (hit_m - missed_m).abs() > 0.0,
+        "{hit_m}, {missed_m}"
+    );
 }
 
 /// Sureness is bought as metrics.md has it: with k standard deviations a hole of T - k (sigma - 2 mm) is planned for.

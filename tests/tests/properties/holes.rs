@@ -22,7 +22,7 @@ fn samples(case: &mut Case, perimeter_m: f64) -> Vec<[f64; 2]> {
             3 => fixed,
             4 if !found.is_empty() => {
                 let near = found[case.below(found.len())];
-                let off = 10_f64.powf(case.between(-12.0, -3.0));
+                let off = case.power_of_ten(-12.0, -3.0);
                 [near[0] + off, (near[1] + off * case.unit()).min(perimeter_m.next_down())]
             }
             5 => [(free[0] * 8.0).round() / 8.0, (free[1] / perimeter_m * 16.0).floor() / 16.0 * perimeter_m],

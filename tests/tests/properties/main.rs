@@ -16,6 +16,7 @@ mod sampling;
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
+use headrace_geometry::math;
 use headrace_tests::random::Random;
 
 /// Cases of a subject in ordinary tests, and the seed of the first.
@@ -39,9 +40,14 @@ impl Case {
         from + (to - from) * self.unit()
     }
 
+    /// A power of ten whose exponent is between these.
+    pub(crate) fn power_of_ten(&mut self, from: f64, to: f64) -> f64 {
+        math::exp(self.between(from, to) * core::f64::consts::LN_10)
+    }
+
     /// Between two powers of ten, either sign.
     pub(crate) fn of_any_size(&mut self, from: i32, to: i32) -> f64 {
-        let size = 10_f64.powf(self.between(f64::from(from), f64::from(to)));
+        let size = self.power_of_ten(f64::from(from), f64::from(to));
         if self.below(2) == 0 { size } else { -size }
     }
 

@@ -55,7 +55,7 @@ fn equations(case: &mut Case) -> Result<(), String> {
 
     // Steps add up to the way along the wall, however near to 90 degrees the last one ends.
     let last = 1 + case.count_below(400);
-    let end_rad = FRAC_PI_2 * (1.0 - 10_f64.powf(case.between(-9.0, -0.1)));
+    let end_rad = FRAC_PI_2 * (1.0 - case.power_of_ten(-9.0, -0.1));
     let theta = end_rad / f64::from(last);
     let h = case.between(0.1, 20.0);
     let sum: f64 = (1..=last).map(|m| section::t_y2_m(h, theta, m).unwrap_or(f64::NAN)).sum();
@@ -72,7 +72,7 @@ fn equations(case: &mut Case) -> Result<(), String> {
 
     // The speed for a target put back gives the target, as T_y comes near to it, too.
     let target = case.between(0.1, 3.0);
-    let t_y = target * (1.0 - 10_f64.powf(case.between(-15.0, 0.0)));
+    let t_y = target * (1.0 - case.power_of_ten(-15.0, 0.0));
     let (gap_s, ping_s) = (case.between(0.1, 30.0), case.between(0.001, 0.1));
     let speed = spacing::speed_for_target_mps(target, t_y, gap_s, ping_s);
     let Some(speed) = speed else {
@@ -98,7 +98,7 @@ fn equations(case: &mut Case) -> Result<(), String> {
 
     // A start angle is one of the turn, and at the other end of the hull the phase is back.
     let (phase, rate) = (case.between(0.0, TAU), case.between(0.1, 3.0));
-    let (x, v) = (case.between(-2.0, 2.0), 10_f64.powf(case.between(-9.0, 1.0)));
+    let (x, v) = (case.between(-2.0, 2.0), case.power_of_ten(-9.0, 1.0));
     if let Ok(start) = start_rad(phase, rate, x, v) {
         let turned = (rate * x / v).abs();
         let back = start_rad(start, -rate, x, v).map_err(|why| why.to_string())?;

@@ -161,10 +161,8 @@ fn a_scene_says_what_it_calls_for_and_takes_what_it_wants() {
     );
     // No byte differs from those of the scene without the descriptions that aren't taken.
     let plain = lines(&folder, "", &[]);
-    let described = format!(
-        "\n[water]\ntemperature_degc = 4\n[[water.murk]]\nfrom_m = 1\nto_m = 9\nsilt_gpl = 3\n[cable]\nslack_m = 1\n"
-    );
-    assert_eq!(lines(&folder, &described, &[]), plain);
+    let described = "\n[water]\ntemperature_degc = 4\n[[water.murk]]\nfrom_m = 1\nto_m = 9\nsilt_gpl = 3\n[cable]\nslack_m = 1\n";
+    assert_eq!(lines(&folder, described, &[]), plain);
 }
 
 /// An effect that does nothing is free, one that puts ranges off isn't; the price is what the processor is busy for it.

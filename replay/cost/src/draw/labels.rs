@@ -81,7 +81,9 @@ mod tests {
     fn labels_of_crowded_markers_dont_cover_one_another() {
         let mut taken = Taken::default();
         let markers: Vec<Px> = (0..6).map(|k| [100.0 + 4.0 * f64::from(k), 100.0]).collect();
-        markers.iter().for_each(|at| taken.marker(*at));
+        for at in &markers {
+            taken.marker(*at);
+        }
         let placed = markers.iter().filter(|at| taken.label(**at, "0.05 m", SMALL, &SHEET).is_some()).count();
         assert_eq!(placed, 6);
         for (k, a) in taken.0.iter().enumerate().skip(6) {

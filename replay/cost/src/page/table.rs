@@ -9,13 +9,13 @@ pub fn table(trade: &Trade) -> String {
     let names = trade.figures();
     let wide = |of: &dyn Fn(&Point) -> usize| trade.points.iter().map(of).max().unwrap_or(0);
     let widths =
-        [wide(&|point| point.method.chars().count()), wide(&|point| words::setting(point).chars().count())];
+        [wide(&|point| point.method.chars().count()), wide(&|point| shown(point).chars().count())];
     for scene in trade.scenes() {
         let heads = (1..=names.len()).map(|number| format!("{:>9}", format!("[{number}]")));
         let heads = heads.collect::<Vec<_>>().concat();
         append(
             &mut text,
-            format_args!("\n  {scene:<0$}{1:>24}{heads}\n", widths[0] + widths[1] + 4, trade.cost_unit),
+            format_args!("\n  {scene:<0$}{1:>30}{heads}\n", widths[0] + widths[1] + 4, trade.cost_unit),
         );
         for point in trade.points.iter().filter(|point| point.scene == scene) {
             text.push_str(&row(point, &names, widths));
@@ -41,6 +41,11 @@ pub fn table(trade: &Trade) -> String {
     text
 }
 
+/// The setting, without the knob's name where the method is called by that.
+fn shown(point: &Point) -> String {
+    if point.knob == point.method { point.value.clone() } else { words::setting(point) }
+}
+
 fn row(point: &Point, names: &[String], [methods, settings]: [usize; 2]) -> String {
     let figure = |name: &String| {
         format!("{:>9}", point.figure(name).map(|figure| number(figure.middle)).unwrap_or_default())
@@ -52,11 +57,11 @@ fn row(point: &Point, names: &[String], [methods, settings]: [usize; 2]) -> Stri
         number(cost.middle)
     };
     format!(
-        "  {}{} {:<methods$} {:<settings$}{spread:>24}{}\n",
+        "  {}{} {:<methods$} {:<settings$}{spread:>30}{}\n",
         if point.on_front { '*' } else { ' ' },
         if point.is_default { '#' } else { ' ' },
         point.method,
-        words::setting(point),
+        shown(point),
         names.iter().map(figure).collect::<Vec<_>>().concat(),
     )
 }

@@ -327,7 +327,7 @@ fn outline(profile: &Profile, count: u32) -> String {
     for k in 0..count {
         let [y_m, z_m] = profile.point_at(profile.perimeter_m() * f64::from(k) / f64::from(count));
         // Writing to a string can't fail.
-        let _: Result<(), _> = writeln!(lines, "{y_m},{z_m}");
+        let _written = writeln!(lines, "{y_m},{z_m}");
     }
     lines
 }

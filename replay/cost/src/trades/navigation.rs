@@ -10,6 +10,7 @@ use headrace_fusion::direct::DirectNavigation;
 use headrace_fusion::filter::FilterNavigation;
 use headrace_fusion::filter::settings::Settings;
 use headrace_geometry::frames::Vec3;
+use headrace_geometry::math;
 use headrace_geometry::time::{DurNs, MonoNs};
 use headrace_sampling::margin::{APART_SHARE, error_time_s};
 use headrace_simulator::{START, Scenery};
@@ -178,8 +179,8 @@ fn moved(text: &str, from_m: u32, legs: &[(f64, f64)]) -> Result<String, CostErr
 }
 
 /// The markers of a place: methods, and where all knobs are tried, these.
-fn settings(usual: Settings, all_knobs: bool) -> Vec<Setting> {
-    let deaf = Settings { return_step_rad: NO_RETURNS_RAD, ..usual };
+fn settings(usual: &Settings, all_knobs: bool) -> Vec<Setting> {
+    let deaf = Settings { return_step_rad: NO_RETURNS_RAD, ..*usual };
     let method = |value: &str, way, is_default| Setting {
         method: "method",
         knob: "method",
@@ -193,8 +194,8 @@ fn settings(usual: Settings, all_knobs: bool) -> Vec<Setting> {
         method("cable only", Way::Cable, false),
         method("direct", Way::Direct, false),
         method("filter", Way::Filter(deaf), false),
-        method("filter, sonar returns", Way::Filter(usual), true),
-        method("smoothed", Way::Smoothed(usual), false),
+        method("filter, sonar returns", Way::Filter(*usual), true),
+        method("smoothed", Way::Smoothed(*usual), false),
     ];
     if !all_knobs {
         return settings;
@@ -210,17 +211,17 @@ fn settings(usual: Settings, all_knobs: bool) -> Vec<Setting> {
     };
     for rate_hz in [400, 100, 25] {
         let is_usual = rate_hz == USUAL_HZ;
-        settings.push(knob("inertial unit", "Hz", f64::from(rate_hz), is_usual, rate_hz, usual));
+        settings.push(knob("inertial unit", "Hz", f64::from(rate_hz), is_usual, rate_hz, *usual));
     }
     for epoch_s in [0.02, 0.05, 0.1, 0.2, 0.5] {
         let epoch = DurNs::from_secs_f64(epoch_s);
         let is_usual = epoch == usual.epoch;
-        settings.push(knob("epoch", "s", epoch_s, is_usual, USUAL_HZ, Settings { epoch, ..usual }));
+        settings.push(knob("epoch", "s", epoch_s, is_usual, USUAL_HZ, Settings { epoch, ..*usual }));
     }
     for window_s in [0.1, 0.2, 0.5, 1.0] {
         let window = DurNs::from_secs_f64(window_s);
         let is_usual = window == usual.window;
-        settings.push(knob("window", "s", window_s, is_usual, USUAL_HZ, Settings { window, ..usual }));
+        settings.push(knob("window", "s", window_s, is_usual, USUAL_HZ, Settings { window, ..*usual }));
     }
     settings
 }
@@ -230,7 +231,7 @@ fn points_of(inputs: &Inputs<'_>, place: &Place) -> Result<Vec<Point>, CostError
         NavigationConfig::Filter(settings) => settings,
         NavigationConfig::Direct => Settings::default(),
     };
-    let settings = settings(usual, place.all_knobs);
+    let settings = settings(&usual, place.all_knobs);
     let mut rates: Vec<u32> = settings.iter().map(|setting| setting.rate_hz).collect();
     rates.sort_unstable();
     rates.dedup();
@@ -250,7 +251,7 @@ fn points_of(inputs: &Inputs<'_>, place: &Place) -> Result<Vec<Point>, CostError
         }
         for ((rate_hz, way), of_way) in unique.iter().zip(&mut of_unique) {
             if let Some((_, dived)) = dives.iter().find(|(of_dive_hz, _)| of_dive_hz == rate_hz) {
-                of_way.push(dived.figures(*way, place)?);
+                of_way.push(dived.figures(way, place)?);
             }
         }
         if seed == 1 {
@@ -260,7 +261,7 @@ fn points_of(inputs: &Inputs<'_>, place: &Place) -> Result<Vec<Point>, CostError
     let rounds = inputs.effort.rounds();
     let costs = in_turns(rounds, &unique, |(rate_hz, way)| {
         let found = first.iter().find(|(of_dive_hz, _)| of_dive_hz == rate_hz);
-        Ok(found.map_or(f64::NAN, |(_, dived)| dived.cost_ns_per_s(*way)))
+        Ok(found.map_or(f64::NAN, |(_, dived)| dived.cost_ns_per_s(way)))
     })?;
     let of_unique: Vec<(u32, Vec<Error>)> = of_unique
         .into_iter()
@@ -332,18 +333,18 @@ impl Dived {
         Ok(Self { recorded, vehicle, hearing, timed, by_cable })
     }
 
-    fn navigation(&self, way: Way, hearing: &Hearing) -> Box<dyn Navigation> {
+    fn navigation(&self, way: &Way, hearing: &Hearing) -> Box<dyn Navigation> {
         let (profile, site) = (&self.vehicle.tunnel.profile, self.vehicle.site);
         match way {
             Way::Cable => Box::new(CableNavigation::new(profile)),
             Way::Direct => Box::new(DirectNavigation::new(profile.clone(), site)),
-            Way::Filter(settings) => Box::new(FilterNavigation::new(profile.clone(), site, settings)),
+            Way::Filter(settings) => Box::new(FilterNavigation::new(profile.clone(), site, *settings)),
             Way::Smoothed(settings) => Box::new(hearing.smoothed(&self.vehicle, settings)),
         }
     }
 
     /// CPU time of the navigation alone, ns a second of dive.
-    fn cost_ns_per_s(&self, way: Way) -> f64 {
+    fn cost_ns_per_s(&self, way: &Way) -> f64 {
         let ((), cpu_s) = timed(|| {
             let mut navigation = self.navigation(way, &self.timed);
             self.timed.run(navigation.as_mut(), &mut |at, fix| {
@@ -353,7 +354,7 @@ impl Dived {
         cpu_s * 1e9 / self.timed.duration_s
     }
 
-    fn figures(&self, way: Way, place: &Place) -> Result<(Figures, JudgedDive), CostError> {
+    fn figures(&self, way: &Way, place: &Place) -> Result<(Figures, JudgedDive), CostError> {
         let mut known = Vec::new();
         self.hearing.run(self.navigation(way, &self.hearing).as_mut(), &mut |at, fix| {
             known.extend(fix.ok().map(|fix| (at, fix, self.recorded.scenery.pose(at).position)));
@@ -409,11 +410,8 @@ fn flag_delay_s(dive: &JudgedDive, scenery: &Scenery) -> Option<f64> {
     let end_s = dive.report.dive.duration_s;
     let passed_s = |chainage_m: f64| {
         let moment = |k: u32| START + DurNs::from_secs_f64(f64::from(k) * MOMENT_S);
-        (0_u32..)
-            .map(moment)
-            .take_while(|at: &MonoNs| at.since(START).as_secs_f64() <= end_s)
-            .find(|at| scenery.chainage_m(*at) >= chainage_m)
-            .map(MonoNs::as_secs_f64)
+        let last = math::floor_to_i64(end_s / MOMENT_S).try_into().unwrap_or(0);
+        (0..=last).map(moment).find(|at| scenery.chainage_m(*at) >= chainage_m).map(MonoNs::as_secs_f64)
     };
     let delays: Vec<f64> = dive
         .sections

@@ -159,9 +159,12 @@ fn beams(inputs: &Inputs<'_>) -> Result<Vec<Stage>, CostError> {
     of_field.extend(stages(inputs)?.into_iter().filter(|stage| stage.name == "boulders"));
     let mut beams = Vec::new();
     for (mut stage, (_, metres)) in of_field.into_iter().zip(lengths) {
-        let legs = stage.text.lines().map(|line| match line.starts_with("distance_m") {
-            true => format!("distance_m = {metres}\n"),
-            false => format!("{line}\n"),
+        let legs = stage.text.lines().map(|line| {
+            if line.starts_with("distance_m") {
+                format!("distance_m = {metres}\n")
+            } else {
+                format!("{line}\n")
+            }
         });
         stage.text = legs.collect();
         beams.push(stage);
@@ -184,27 +187,26 @@ fn effects_of(inputs: &Inputs<'_>, stage: &Stage, seeds: u32) -> Result<Vec<Poin
     let (differences, hits) = differences(inputs, &texts, seeds)?;
     let costs = costs_ns(inputs, &texts)?;
     let whole = costs.first().copied().unwrap_or(Interval::exact(f64::NAN));
-    let points = texts.iter().zip(differences).zip(costs).zip(hits);
-    let point =
-        |((((effect, _), differences), cost), hits): (((&(String, String), Differences), Interval), Hits)| {
-            let mut errors = differences.errors();
-            errors.push(Error::new("saved", "ns a return", Interval::exact(whole.middle - cost.middle)));
-            errors.extend(boulders_hit(&stage.boulders_m, &hits));
-            Point {
-                method: "left out".to_owned(),
-                knob: "effect left out".to_owned(),
-                value: effect.clone(),
-                number: None,
-                is_default: effect == "none",
-                scene: stage.name.to_owned(),
-                seeds,
-                errors,
-                cost,
-                instructions: None,
-                on_front: false,
-            }
-        };
-    Ok(points.map(point).collect())
+    let mut points = Vec::new();
+    for ((((effect, _), differences), cost), hits) in texts.iter().zip(differences).zip(costs).zip(hits) {
+        let mut errors = differences.errors();
+        errors.push(Error::new("saved", "ns a return", Interval::exact(whole.middle - cost.middle)));
+        errors.extend(boulders_hit(&stage.boulders_m, &hits));
+        points.push(Point {
+            method: "left out".to_owned(),
+            knob: "effect left out".to_owned(),
+            value: effect.clone(),
+            number: None,
+            is_default: effect == "none",
+            scene: stage.name.to_owned(),
+            seeds,
+            errors,
+            cost,
+            instructions: None,
+            on_front: false,
+        });
+    }
+    Ok(points)
 }
 
 /// Points of rays, and how far two references are from one another, m.

@@ -9,7 +9,7 @@ use headrace_fusion::smooth::track::TrackNavigation;
 use headrace_fusion::{Fix, Navigation, NoFix, Times};
 use headrace_geometry::time::MonoNs;
 use headrace_monitor::messages::Events;
-use headrace_sensor::device::SensorInfo;
+use headrace_sensor::device::{SensorInfo, SensorSpec};
 use headrace_sensor::reading::{MAX_SOURCES, Reading};
 use headrace_vehicle::VehicleConfig;
 
@@ -51,14 +51,21 @@ impl Hearing {
                 reading: event.reading,
             }));
         })?;
-        let info = |sensor: &Box<dyn headrace_sensor::device::Device>| {
-            let specification = sensor.specification();
-            SensorInfo { mount: specification.sensor.mount, kind: specification.kind }
+        let info = |specification: SensorSpec| SensorInfo {
+            mount: specification.sensor.mount,
+            kind: specification.kind,
         };
         let ends = readings.first().zip(readings.last());
         let duration_s =
             ends.map_or(0.0, |(first, last)| last.times.received.since(first.times.received).as_secs_f64());
-        Ok((Self { sensors: vehicle.sensors.iter().map(info).collect(), readings, duration_s }, dive))
+        Ok((
+            Self {
+                sensors: vehicle.sensors.iter().map(|sensor| info(sensor.specification())).collect(),
+                readings,
+                duration_s,
+            },
+            dive,
+        ))
     }
 
     /// Cable readings, as chainages: when they were valid, and the chainage that they say, m.
@@ -106,15 +113,15 @@ impl Hearing {
     }
 
     /// Navigation along the track that a smoother makes of a filter's run.
-    pub(super) fn smoothed(&self, vehicle: &VehicleConfig, settings: Settings) -> TrackNavigation {
+    pub(super) fn smoothed(&self, vehicle: &VehicleConfig, settings: &Settings) -> TrackNavigation {
         let (journal, steps) = Journal::new(JOURNAL);
-        let filter = FilterNavigation::new(vehicle.tunnel.profile.clone(), vehicle.site, settings);
+        let filter = FilterNavigation::new(vehicle.tunnel.profile.clone(), vehicle.site, *settings);
         let mut filter = filter.with_journal(journal);
         let mut kept: Vec<Words> = Vec::new();
         self.run_noting(&mut filter, &mut |_, _| {}, &mut || {
-            kept.extend(std::iter::from_fn(|| steps.next()))
+            kept.extend(std::iter::from_fn(|| steps.next()));
         });
-        let mut backward = Backward::new(settings);
+        let mut backward = Backward::new(*settings);
         for placed in kept.iter().rev().filter_map(Placed::of_words) {
             backward.take(&placed);
         }

@@ -37,7 +37,7 @@ byte_errors = { flipped_per_million = 20 }
 ";
 
 /// The effect that a line of a scene is of: of a line in `[effects]`, or of the header of an effect's own table.
-fn effect_of<'a>(line: &'a str, in_effects: bool) -> Option<&'a str> {
+fn effect_of(line: &str, in_effects: bool) -> Option<&str> {
     if line.starts_with('[') {
         return line.trim_matches(['[', ']']).strip_prefix("effects.");
     }

@@ -118,7 +118,7 @@ fn slices_dont_matter() {
 #[test]
 fn what_makes_no_beam_is_refused() {
     let refusal = |keys: &str| Dive::with_head().refusal(&format!("[effects.beam_cone]\n{keys}"));
-    assert!(refusal("rays = 65").contains("must be a whole number from 1 to 64"));
+    assert!(refusal("rays = 1025").contains("must be a whole number from 1 to 1024"));
     assert!(refusal("width_deg = 2\nfrequency_khz = 700").contains("both say how wide"));
     assert!(refusal("bin_m = 0.02").contains("bilinear"));
     assert!(refusal("form = \"last\"").contains("must be one of first, mean, bilinear"));
