@@ -8,8 +8,7 @@ pub fn table(trade: &Trade) -> String {
     let mut text = format!("{}\n{}\n", trade.title, trade.question);
     let names = trade.figures();
     let wide = |of: &dyn Fn(&Point) -> usize| trade.points.iter().map(of).max().unwrap_or(0);
-    let widths =
-        [wide(&|point| point.method.chars().count()), wide(&|point| shown(point).chars().count())];
+    let widths = [wide(&|point| point.method.chars().count()), wide(&|point| shown(point).chars().count())];
     for scene in trade.scenes() {
         let heads = (1..=names.len()).map(|number| format!("{:>9}", format!("[{number}]")));
         let heads = heads.collect::<Vec<_>>().concat();
