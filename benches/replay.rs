@@ -1,4 +1,4 @@
-//! A long dive replayed by the binary, compared with reading its log with `mcap` alone. Prints Markdown.
+//! A long dive replayed by the binary, on one thread and on several, compared with reading its log with `mcap` alone. Prints Markdown.
 //!
 //! `cargo bench -p headrace_benches --bench replay` takes the first kilometre of `deploy/scenes/seven-kilometres.toml`,
 //! about a minute; `cargo bench -p headrace_benches --bench replay -- 7` all of it. The log goes to the system's folder for
@@ -12,6 +12,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
 
+use headrace_replay::threads::MOST_THREADS;
 use mcap::sans_io::{LinearReadEvent, LinearReader};
 
 const HEADRACE: &str = env!("CARGO_BIN_EXE_headrace_measured");
@@ -23,29 +24,31 @@ fn main() {
     let log = simulated(&folder, km);
     let (messages, _, first) = bare_read(&log);
     let report = folder.join("report.json");
-    let replay = replayed(&log, &report);
+    let replays = [1, MOST_THREADS].map(|threads| (threads, replayed(&log, &report, threads)));
     let (_, bytes, second) = bare_read(&log);
     let bare = first.min(second);
     let report: serde_json::Value = serde_json::from_slice(&std::fs::read(report).unwrap()).unwrap();
     let (data_s, packets) =
         (report["dive"]["duration_s"].as_f64().unwrap(), report["log"]["messages"].as_f64().unwrap());
-    let took_s = replay.took.as_secs_f64();
     println!("| what | figure | yardstick in the same run | ratio |\n|---|---|---|---|");
-    println!(
-        "| replay of {km} km in {:.1} hours, four heads, {packets} packets, {} samples | {:.0} x real time, {:.2} M packets/s | \
-         the bare mcap read of {messages} messages, {:.0} MB: {:.0} x real time | {:.1} |",
-        data_s / 3600.0,
-        report["dive"]["samples_valid"],
-        data_s / took_s,
-        packets / took_s / 1e6,
-        bytes as f64 / 1e6,
-        data_s / bare.as_secs_f64(),
-        took_s / bare.as_secs_f64()
-    );
-    println!(
-        "| memory of that replay, at most | {:.1} MiB, and {:.1} MiB of the program's own file | | |",
-        replay.own_mib, replay.file_mib
-    );
+    for (threads, replay) in replays {
+        let took_s = replay.took.as_secs_f64();
+        println!(
+            "| replay of {km} km in {:.1} hours, four heads, {packets} packets, {} samples, --threads {threads} | {:.0} x real time, \
+             {:.2} M packets/s | the bare mcap read of {messages} messages, {:.0} MB: {:.0} x real time | {:.1} |",
+            data_s / 3600.0,
+            report["dive"]["samples_valid"],
+            data_s / took_s,
+            packets / took_s / 1e6,
+            bytes as f64 / 1e6,
+            data_s / bare.as_secs_f64(),
+            took_s / bare.as_secs_f64()
+        );
+        println!(
+            "| memory of that replay, at most | {:.1} MiB, and {:.1} MiB of the program's own file | | |",
+            replay.own_mib, replay.file_mib
+        );
+    }
     std::fs::remove_dir_all(&folder).unwrap();
 }
 
@@ -70,10 +73,11 @@ struct Replayed {
     file_mib: f64,
 }
 
-fn replayed(log: &Path, report: &Path) -> Replayed {
+fn replayed(log: &Path, report: &Path, threads: usize) -> Replayed {
     let started = Instant::now();
     let mut command = Command::new(HEADRACE);
     let command = command.arg("replay").arg(log).arg("--report").arg(report);
+    let command = command.arg("--threads").arg(threads.to_string());
     let mut child = command.stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap();
     let (mut own_mib, mut file_mib) = (0.0_f64, 0.0_f64);
     while child.try_wait().unwrap().is_none() {

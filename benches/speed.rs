@@ -21,6 +21,7 @@ use headrace_coverage::{
 use headrace_geometry::math;
 use headrace_geometry::time::{DurNs, MonoNs};
 use headrace_geometry::tunnel::shapes;
+use headrace_monitor::alert_list::AlertList;
 use headrace_monitor::resources::Coverage;
 use headrace_monitor::run::Loop;
 use headrace_monitor::stage::Stage;
@@ -50,9 +51,10 @@ fn main() {
     println!("| what | figure | yardstick in the same run | ratio |\n|---|---|---|---|");
     // `cargo bench -p headrace_benches -- holes` runs one alone.
     let wanted = std::env::args().nth(1).filter(|word| !word.starts_with('-'));
-    let benches: [(&str, fn()); 5] = [
+    let benches: [(&str, fn()); 6] = [
         ("loop", whole_loop),
         ("stages", by_stage),
+        ("alerts", alerts),
         ("idle", idle_tick),
         ("covering", covering),
         ("holes", holes),
@@ -227,12 +229,12 @@ fn messages_of(scene: &Scene) -> (f64, Vec<Kept>) {
     (data_s, messages)
 }
 
-/// Percentiles of each stage over the ticks of a dive, and of what precedes the first: rings, merge, the schedule's start.
-fn by_stage() {
-    let scene = scenes::scene(SCENE);
-    let (_, messages) = messages_of(&scene);
+/// How long each stage takes in each tick of a dive, us, with what precedes the first: rings, merge, the schedule's start; and the loop
+/// at the end.
+fn spans(scene: &Scene) -> (Loop, Vec<Vec<f64>>) {
+    let (_, messages) = messages_of(scene);
     let last = messages.last().map_or(START, |message| message.at);
-    let mut dive = noting(&scene, usize::try_from(last.since(START).0 / TICK.0).unwrap() + 2);
+    let mut dive = noting(scene, usize::try_from(last.since(START).0 / TICK.0).unwrap() + 2);
     // The tick at arming has noted itself.
     let armed = dive.resource::<Ends>().unwrap().0.len();
     let mut begins = Vec::new();
@@ -246,21 +248,50 @@ fn by_stage() {
             before = *end;
         }
     }
+    (dive, spans)
+}
+
+fn percentiles(mut span: Vec<f64>) -> String {
+    span.sort_unstable_by(f64::total_cmp);
+    let at = |thousandths: usize| span[(span.len() - 1) * thousandths / 1000];
+    let [p50, p99, p999, most] = [500, 990, 999, 1000].map(at);
+    format!("p50 {p50:.2} us, p99 {p99:.1} us, p99.9 {p999:.1} us, max {most:.0} us")
+}
+
+/// Percentiles of each stage over the ticks of a dive.
+fn by_stage() {
+    let (_, spans) = spans(&scenes::scene(SCENE));
     let whole_us: f64 = spans.iter().flatten().sum();
-    for (stage, mut span) in Stage::ALL.into_iter().zip(spans) {
+    for (stage, span) in Stage::ALL.into_iter().zip(spans) {
         let share = span.iter().sum::<f64>() / whole_us;
-        span.sort_unstable_by(f64::total_cmp);
-        let at = |thousandths: usize| span[(span.len() - 1) * thousandths / 1000];
         let what = format!("stage {stage:?}{}", if stage == Stage::Decode { ", merge included" } else { "" });
-        let figure = format!(
-            "p50 {:.2} us, p99 {:.1} us, p99.9 {:.1} us, max {:.0} us",
-            at(500),
-            at(990),
-            at(999),
-            at(1000)
-        );
-        row(&what, &figure, "all stages", share);
+        row(&what, &percentiles(span), "all stages", share);
     }
+}
+
+/// The stage that keeps the list of alerts, in a dive with a missed stretch every four metres, beside one without any.
+fn alerts() {
+    const PAIRS: usize = 40;
+    const WAY: &str =
+        "vehicle = \"vita2-4.toml\"\n[vehicle_changes]\nheads.planned_speed_mps = 0.08\n[trajectory]\n";
+    let leg = |(distance_m, speed_mps): (u32, f64)| {
+        format!("[[trajectory.legs]]\ndistance_m = {distance_m}\nspeed_mps = {speed_mps}\n")
+    };
+    let of_advise = |fast_mps: f64| {
+        let legs = [(1, fast_mps), (3, 0.08)].map(leg).concat().repeat(PAIRS);
+        let (dive, spans) = spans(&scenes::scene(&format!("{WAY}{legs}")));
+        let list = dive.resource::<AlertList>().unwrap();
+        let span = Stage::ALL.into_iter().zip(spans).find(|(stage, _)| *stage == Stage::Advise).unwrap().1;
+        (list.raised(), list.iter().count(), span)
+    };
+    let [many, few] = [0.4, 0.08].map(of_advise);
+    let mean = |span: &[f64]| span.iter().sum::<f64>() / span.len() as f64;
+    row(
+        &format!("stage Advise, {} alerts raised, {} in the list at the end", many.0, many.1),
+        &format!("mean {:.2} us, {}", mean(&many.2), percentiles(many.2.clone())),
+        &format!("{} raised: mean {:.2} us, {}", few.0, mean(&few.2), percentiles(few.2.clone())),
+        mean(&many.2) / mean(&few.2),
+    );
 }
 
 fn nothing() {}

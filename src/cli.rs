@@ -1,5 +1,6 @@
 //! The command line.
 
+mod campaigns;
 mod cost;
 mod habits;
 mod logs;
@@ -16,12 +17,14 @@ use headrace_sensor::connect::Connect;
 use tracing::level_filters::LevelFilter;
 
 use crate::watch::Show;
+pub(crate) use campaigns::Campaign;
 pub(crate) use cost::Cost;
-pub(crate) use habits::{Completions, Man, Overwrite};
+pub(crate) use habits::{Completions, Man, Overwrite, Threads};
 pub(crate) use logs::{Export, Import, Recover, Trim, Verify};
 pub(crate) use page::PageArgs;
 pub(crate) use value_parsers::{Speed, speed, time};
 
+use campaigns::ELSEWHERE;
 use value_parsers::{
     address, chainage, drift, hours, layout, length, place, rotation, seconds, seconds_range, section,
     sound_speed, speed_mps, target, udp_address, yaw,
@@ -185,6 +188,12 @@ pub(crate) enum Command {
         after_help = "Example:\n  headrace check deploy/vehicles/vita2-4.toml\n  headrace check deploy/scenes/demo.toml"
     )]
     Check(Check),
+    /// Ask hundreds of dives in SQL, each replayed once.
+    #[command(disable_help_flag = true, after_help = ELSEWHERE)]
+    Campaign(Campaign),
+    /// Replay a share of a folder's dives, and keep their tables as Parquet: for Slurm, Nextflow, CI matrices.
+    #[command(disable_help_flag = true, after_help = ELSEWHERE)]
+    Batch(Campaign),
     /// Write a shell's completions of this command line to stdout.
     #[command(
         after_help = "Example:\n  headrace completions bash > ~/.local/share/bash-completion/completions/headrace\n  headrace completions zsh > \"${fpath[1]}/_headrace\""
@@ -297,6 +306,8 @@ pub(crate) struct Replay {
     /// Tick length, milliseconds; results don't depend on it.
     #[arg(long, value_name = "MS", default_value = "20", value_parser = clap::value_parser!(u32).range(1..=60_000))]
     pub(crate) tick_ms: u32,
+    #[command(flatten)]
+    pub(crate) threads: Threads,
     /// Start at this time of the dive (90s, 1h20min, 1:23:45); the part before is processed, too.
     #[arg(long, value_name = "TIME", value_parser = time, conflicts_with = "smooth")]
     pub(crate) from: Option<DurNs>,

@@ -180,7 +180,7 @@ pub(crate) fn replay(args: &Replay) -> Result<u8, Failure> {
         Pace { tick: DurNs::from_millis(i64::from(args.tick_ms)), speed: args.speed.unwrap_or(usual).0 };
     let mut served = None;
     let mut report = if args.smooth {
-        smooth::smoothed(&files, &mut player, (&vehicle, &text), pace, what_if)?
+        smooth::smoothed(&files, &mut player, (&vehicle, &text), (pace, args.threads.of_replay()), what_if)?
     } else {
         let is_watched = pace.speed.is_some() && !terminal::is_quiet();
         let is_served = page::is_wanted(&args.page, is_watched);
@@ -215,7 +215,7 @@ pub(crate) fn replay(args: &Replay) -> Result<u8, Failure> {
             };
             playing.play(dive, &mut player, &mut watch)?
         } else {
-            dive.run(&mut player, pace, &mut watch)?
+            dive.run_on(args.threads.of_replay(), (&mut player, pace), &mut watch, &mut |_| ())?
         }
     };
     if let Some(served) = served {

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use headrace_cost::effort::Effort;
-use headrace_cost::page::{COST_VERSION, Results, table};
+use headrace_cost::page::{Bars, COST_VERSION, Results, table};
 use headrace_cost::scene::Inputs;
 use headrace_cost::trades::{GIVEN, TRADES};
 
@@ -45,6 +45,7 @@ pub(crate) fn cost(args: &Cost) -> Result<u8, Failure> {
         program: format!("headrace {}", env!("CARGO_PKG_VERSION")),
         machine: machine(),
         command: command(args),
+        bars: Bars::Median,
         trades,
         given,
     };

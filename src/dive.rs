@@ -12,13 +12,14 @@ use headrace_monitor::outlet::{NoticeOutlet, NoticeReceiver};
 use headrace_monitor::report::{LineReport, LogReport, Report};
 use headrace_monitor::run::Loop;
 use headrace_ports::Supervisor;
-use headrace_replay::drive::{Pace, PacketSource, drive};
+use headrace_replay::drive::{DriveError, Pace, PacketSource, drive};
 use headrace_replay::log::{
     DerivedChannels, Every, LeftOut, LogHeader, Recorder, RecorderHandle, RecordingFault, Rotation, SentPort,
     SourceInfo, Summary, dive_name,
 };
 use headrace_replay::player::seconds;
 use headrace_replay::record::{QUEUE_BYTES, QUEUE_OF_PORTS_BYTES, RecorderOutlet, result_channels};
+use headrace_replay::threads::drive_on;
 use headrace_replay::view::{Site, View};
 use headrace_sensor::device::Sense;
 use headrace_vehicle::VehicleConfig;
@@ -38,6 +39,9 @@ const NOTICES: usize = 1 << 10;
 
 /// Keys of a log's metadata: one moment on its clock, and in UTC, nanoseconds.
 pub(crate) const CLOCK_ANCHOR: [&str; 2] = ["clock_anchor_monotonic_ns", "clock_anchor_utc_ns"];
+
+/// What is called after every tick.
+type AfterTick<'a> = &'a mut dyn FnMut(&Loop);
 
 /// An armed loop with the vehicle's sensors, and the consumers of its results.
 pub(crate) struct Dive {
@@ -288,17 +292,42 @@ impl Dive {
 
     /// The same; `beside` is called after every tick and at the end.
     pub(crate) fn run_beside(
-        mut self,
+        self,
         feed: &mut dyn PacketSource,
         pace: Pace,
         watch: &mut Watch,
         beside: &mut dyn FnMut(&Loop),
     ) -> Result<Report, Failure> {
+        let span = feed.span();
+        self.run_driven(span, watch, beside, &mut |dive, after_tick| drive(dive, feed, pace, after_tick))
+    }
+
+    /// The same on up to `threads` threads; on one at a speed.
+    pub(crate) fn run_on(
+        self,
+        threads: usize,
+        (feed, pace): (&mut (dyn PacketSource + Send), Pace),
+        watch: &mut Watch,
+        beside: &mut dyn FnMut(&Loop),
+    ) -> Result<Report, Failure> {
+        let span = feed.span();
+        self.run_driven(span, watch, beside, &mut |dive, after_tick| match pace.speed {
+            Some(_) => drive(dive, feed, pace, after_tick),
+            None => drive_on(threads, dive, feed, pace.tick, after_tick),
+        })
+    }
+
+    fn run_driven(
+        mut self,
+        span: Option<(MonoNs, MonoNs)>,
+        watch: &mut Watch,
+        beside: &mut dyn FnMut(&Loop),
+        drive: &mut dyn FnMut(&mut Loop, AfterTick<'_>) -> Result<(), DriveError>,
+    ) -> Result<Report, Failure> {
         let notices = self.notices.clone();
         let phase = Phase::start("replay");
         let mut progress = Progress::start();
-        let span = feed.span();
-        let driven = drive(&mut self.armed, feed, pace, &mut |dive| {
+        let driven = drive(&mut self.armed, &mut |dive| {
             if watch.is_quiet() {
                 let (tally, share) = (dive.tally(), feeds::share(span, dive.now()));
                 progress.at(|| (format!("{} packets, {} samples", tally.packets, tally.samples), share));
@@ -315,6 +344,10 @@ impl Dive {
         });
         drop(progress);
         drop(phase);
+        if let Err(error @ DriveError::Panicked { .. }) = driven {
+            // The loop isn't whole any more.
+            return Err(error.into());
+        }
         let report = self.end(watch, beside);
         driven?;
         Ok(report)

@@ -13,6 +13,7 @@ use headrace_replay::SimulationError;
 use headrace_replay::drive::DriveError;
 use headrace_replay::log::LogError;
 use headrace_replay::playback::PlaybackError;
+use headrace_replay::segments::SegmentError;
 use headrace_replay::smooth::SmoothError;
 use headrace_replay::worth::WorthError;
 use headrace_sampling::SamplingError;
@@ -63,6 +64,8 @@ pub(crate) enum Failure {
     #[error(transparent)]
     Playback(#[from] PlaybackError),
     #[error(transparent)]
+    Segment(#[from] SegmentError),
+    #[error(transparent)]
     Export(#[from] ExportError),
     #[error("writing the report as JSON: {0}")]
     Json(#[from] serde_json::Error),
@@ -107,7 +110,9 @@ impl Failure {
             | Self::Read { .. }
             | Self::Unwritable { .. }
             | Self::Routing(_)
+            | Self::Segment(SegmentError::Unfit { .. })
             | Self::Collect(CollectError::Backwards { .. } | CollectError::TooLong { .. }) => USAGE,
+            Self::Segment(SegmentError::Parted { .. }) => DIVERGED,
             _ => FAILED,
         }
     }

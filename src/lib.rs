@@ -2,6 +2,7 @@
 //! crates; a binary of its own only calls [`main`].
 
 mod calibrate;
+mod campaign;
 mod check;
 mod cli;
 mod commands;
@@ -82,6 +83,8 @@ pub fn main() -> ExitCode {
         Command::Emulate(args) => emulate::emulate(&args),
         Command::Devices(args) => inventory::devices(&args),
         Command::Check(args) => check::check(&args),
+        Command::Campaign(args) => campaign::campaign(&args, None),
+        Command::Batch(args) => campaign::campaign(&args, Some("--batch")),
         Command::Completions(args) => manual::completions(&args),
         Command::Man(args) => manual::man(&args),
     };

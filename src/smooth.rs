@@ -2,8 +2,8 @@
 
 use std::path::{Path, PathBuf};
 
-use headrace_fusion::filter::FilterNavigation;
 use headrace_fusion::filter::sources::Consistency;
+use headrace_fusion::smooth::beside::BesideNavigation;
 use headrace_fusion::smooth::journal::Journal;
 use headrace_fusion::smooth::track::TrackNavigation;
 use headrace_monitor::report::Report;
@@ -29,7 +29,7 @@ pub(crate) fn smoothed(
     files: &[PathBuf],
     player: &mut Player,
     (vehicle, text): (&VehicleConfig, &str),
-    pace: Pace,
+    (pace, threads): (Pace, usize),
     what_if: WhatIf,
 ) -> Result<Report, Failure> {
     let NavigationConfig::Filter(settings) = vehicle.navigation else {
@@ -41,9 +41,9 @@ pub(crate) fn smoothed(
     };
     let (journal, reader) = Journal::new(RECORDS);
     let mut steps = Steps::new(reader.clone())?;
-    let filter = FilterNavigation::new(vehicle.tunnel.profile.clone(), vehicle.site, settings);
-    let filter = Box::new(filter.with_journal(journal));
-    let dive = assemble_with(vehicle, filter, text, None)?;
+    let profile = vehicle.tunnel.profile.clone();
+    let filters = BesideNavigation::new(profile, vehicle.site, settings, journal);
+    let dive = assemble_with(vehicle, Box::new(filters), text, None)?;
     let mut first = Player::open(files)?;
     first.connect(dive.armed.sources());
     let mut consistency = [None; MAX_SOURCES];
@@ -63,7 +63,7 @@ pub(crate) fn smoothed(
     let dive = assemble_with(vehicle, Box::new(TrackNavigation::new(track, consistency)), text, None)?
         .asking(what_if);
     player.connect(dive.armed.sources());
-    let mut report = dive.run(player, pace, &mut Watch::quiet())?;
+    let mut report = dive.run_on(threads, (player, pace), &mut Watch::quiet(), &mut |_| ())?;
     report.smoothing = Some(smoothing_changes::compare(&before, &report, estimates, pieces));
     Ok(report)
 }

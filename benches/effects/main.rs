@@ -2,9 +2,8 @@
 //!
 //! `cargo bench -p headrace_benches --bench effects` runs all; `-- bare`, `-- cost`, `-- called`, `-- seven` one part
 //! alone, and in a build with `--features mesh` `-- mesh`.
-//! Times are the least of several rounds, taken in turns, on an otherwise idle machine.
+//! Times are this thread's CPU time, the least of several rounds in turns: what else the machine does tells in them hardly at all.
 
-#![expect(clippy::disallowed_methods, reason = "a benchmark reads the clock")]
 #![expect(clippy::unwrap_used, clippy::panic, reason = "a benchmark stops at what it can't do")]
 
 mod bare;
@@ -12,12 +11,11 @@ mod called;
 #[cfg(feature = "mesh")]
 mod mesh;
 
-use std::time::Instant;
-
+use headrace_cost::measure::timed;
 use headrace_simulator::{Scene, Simulation};
 use headrace_tests::scenes;
 
-const ROUNDS: usize = 15;
+const ROUNDS: usize = 9;
 
 const SPEED_MPS: f64 = 0.11;
 
@@ -96,13 +94,6 @@ fn named(effects: &[(&str, &str)]) -> String {
     let tables: Vec<String> =
         effects.iter().map(|(name, keys)| format!("[effects.{name}]\n{keys}\n")).collect();
     tables.concat()
-}
-
-/// Result of some work, and its duration, s.
-fn timed<T>(work: impl FnOnce() -> T) -> (T, f64) {
-    let began = Instant::now();
-    let given = work();
-    (given, began.elapsed().as_secs_f64())
 }
 
 /// Time to simulate a scene, s.

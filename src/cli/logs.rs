@@ -6,7 +6,7 @@ use clap::Args;
 use headrace_geometry::time::DurNs;
 use headrace_import::FileKind;
 
-use super::habits::Overwrite;
+use super::habits::{Overwrite, Threads};
 use super::value_parsers::{chainage_range, file_kind, source_line, time};
 
 #[derive(Debug, Args)]
@@ -35,6 +35,12 @@ pub(crate) struct Verify {
     /// Tick length, milliseconds; results don't depend on it.
     #[arg(long, value_name = "MS", default_value = "20", value_parser = clap::value_parser!(u32).range(1..=60_000))]
     pub(crate) tick_ms: u32,
+    #[command(flatten)]
+    pub(crate) threads: Threads,
+    /// File of snapshots of the dive. It is made if there is none; with it, segments between them are verified side by side, by
+    /// default on all cores, each from its snapshot to the next's.
+    #[arg(long, value_name = "FILE")]
+    pub(crate) snapshots: Option<PathBuf>,
     /// Print JSON.
     #[arg(long)]
     pub(crate) json: bool,

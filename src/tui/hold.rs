@@ -145,3 +145,88 @@ fn mind_panics() {
         usual(panic);
     }));
 }
+
+#[cfg(test)]
+mod tests {
+    use std::fs::OpenOptions;
+    use std::io::Read as _;
+    use std::process::Command;
+
+    use rustix::pty::{OpenptFlags, grantpt, openpt, ptsname, unlockpt};
+    use rustix::termios::{Winsize, tcsetwinsize};
+
+    use super::*;
+
+    /// Name of the thread that panics in [`panics_with_the_terminal_taken`].
+    const THREAD: &str = "HEADRACE_TEST_THREAD";
+    const WORDS: &str = "a panic on purpose";
+
+    /// Run by [`a_panic_leaves_the_terminal_as_it_was`] in a process with a terminal of its own.
+    #[test]
+    #[ignore = "takes the terminal, and panics"]
+    fn panics_with_the_terminal_taken() {
+        let Ok(name) = std::env::var(THREAD) else { return };
+        let hold = Hold::take().unwrap();
+        let panicking = thread::Builder::new().name(name).spawn(|| panic!("{WORDS}")).unwrap();
+        assert!(panicking.join().is_err());
+        assert!(tcgetwinsize(&hold.0).is_ok());
+    }
+
+    /// All that a process writes which panics on a thread of that name with the terminal taken, the terminal's settings while it is
+    /// taken, and whether they are afterwards as they were.
+    fn written(thread: &str) -> (String, bool) {
+        let master = openpt(OpenptFlags::RDWR | OpenptFlags::NOCTTY).unwrap();
+        grantpt(&master).unwrap();
+        unlockpt(&master).unwrap();
+        let name = ptsname(&master, Vec::new()).unwrap().into_string().unwrap();
+        let end = OpenOptions::new().read(true).write(true).open(name).unwrap();
+        tcsetwinsize(&end, Winsize { ws_row: 24, ws_col: 80, ws_xpixel: 0, ws_ypixel: 0 }).unwrap();
+        let before = tcgetattr(&end).unwrap();
+        let mut command = Command::new(std::env::current_exe().unwrap());
+        command.args([
+            "tui::hold::tests::panics_with_the_terminal_taken",
+            "--exact",
+            "--ignored",
+            "--nocapture",
+        ]);
+        command.env(THREAD, thread).env("RUST_BACKTRACE", "0");
+        let [stdin, stdout, stderr] = [(); 3].map(|()| end.try_clone().unwrap());
+        let mut child = command.stdin(stdin).stdout(stdout).stderr(stderr).spawn().unwrap();
+        drop(command);
+        let mut master = File::from(master);
+        let reading = thread::spawn(move || {
+            let (mut all, mut bytes) = (Vec::new(), [0; 4096]);
+            // The end of a terminal that nobody holds open is an error.
+            while let Ok(count @ 1..) = master.read(&mut bytes) {
+                all.extend_from_slice(&bytes[..count]);
+            }
+            String::from_utf8(all).unwrap()
+        });
+        assert!(child.wait().unwrap().success());
+        let after = tcgetattr(&end).unwrap();
+        drop(end);
+        let same = (before.local_modes, before.input_modes, before.output_modes)
+            == (after.local_modes, after.input_modes, after.output_modes);
+        (reading.join().unwrap(), same)
+    }
+
+    #[test]
+    fn a_panic_leaves_the_terminal_as_it_was() {
+        let at = |written: &str, text: &str| {
+            written.find(text).unwrap_or_else(|| panic!("{text:?} in {written:?}"))
+        };
+        let [enter, leave] = [ENTER, LEAVE].map(|bytes| std::str::from_utf8(bytes).unwrap());
+        // What draws, and the loop: the words stand on the first page, after the way back to it.
+        for thread in [ARTIST, "main"] {
+            let (written, same) = written(thread);
+            assert!(same, "{thread}: the settings are others");
+            assert!(at(&written, enter) < at(&written, leave), "{thread}: {written:?}");
+            assert!(at(&written, leave) < at(&written, WORDS), "{thread}: {written:?}");
+            assert_eq!(written.matches(leave).count(), 1, "{thread}: {written:?}");
+        }
+        // Another thread's panic is a line of the log, and the terminal stays taken until its owner gives it back.
+        let (written, same) = written("line 0");
+        assert!(same && at(&written, enter) < at(&written, leave), "{written:?}");
+        assert!(!written.contains(WORDS), "{written:?}");
+    }
+}

@@ -16,6 +16,8 @@ use crate::{Folder, program};
 /// Longest wait for anything that must come.
 const WITHIN: Duration = Duration::from_mins(2);
 
+const SCHEMA: &str = include_str!("../../docs/page-feed.schema.json");
+
 /// A running program with a page, killed when it goes out of scope.
 pub struct Serving {
     child: Child,
@@ -143,6 +145,20 @@ pub struct Viewer {
     pub others: Vec<Value>,
     /// The last number.
     pub seq: u64,
+    /// What texts must be as: `docs/page-feed.schema.json`.
+    schema: Value,
+}
+
+/// Where a text isn't as the definition of its type says.
+fn faults(schema: &Value, text: &Value) -> Vec<String> {
+    let of_type = schema["anyOf"].as_array().unwrap().iter().find(|one| {
+        let definition = one["$ref"].as_str().unwrap().strip_prefix('#').unwrap();
+        schema.pointer(definition).unwrap()["properties"]["type"]["const"] == text["type"]
+    });
+    let Some(of_type) = of_type else { return vec!["a type that the schema doesn't have".to_owned()] };
+    let mut alone = of_type.clone();
+    alone["$defs"] = schema["$defs"].clone();
+    crate::json_schema::faults(&alone, text)
 }
 
 impl Viewer {
@@ -184,6 +200,7 @@ impl Viewer {
             notes: Vec::new(),
             others: Vec::new(),
             seq: 0,
+            schema: serde_json::from_str(SCHEMA).unwrap(),
         })
     }
 
@@ -255,6 +272,8 @@ impl Viewer {
     }
 
     fn take_text(&mut self, value: Value) {
+        let faults = faults(&self.schema, &value);
+        assert!(faults.is_empty(), "{value:#}: {faults:#?}");
         self.seq = self.seq.max(value["seq"].as_u64().unwrap());
         match value["type"].as_str().unwrap() {
             "hello" => {

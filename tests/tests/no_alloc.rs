@@ -14,7 +14,7 @@ use std::cell::Cell;
 
 use headrace_a50::decoder::{self as a50, A50Decoder};
 use headrace_a50::report::{Against, Velocity};
-use headrace_fusion::filter::FilterNavigation;
+use headrace_fusion::smooth::beside::BesideNavigation;
 use headrace_fusion::smooth::journal::Journal;
 use headrace_geometry::time::DurNs;
 use headrace_mavlink::MavHeader;
@@ -122,8 +122,9 @@ fn a_million_packets_without_one_allocation() {
     // Nor does anybody empty the journal of the filter's steps.
     let (journal, steps) = Journal::new(1000);
     let NavigationConfig::Filter(settings) = vehicle.navigation else { panic!("no filter") };
-    let filter = FilterNavigation::new(vehicle.tunnel.profile.clone(), vehicle.site, settings);
-    let mut dive = app.arm(Box::new(filter.with_journal(journal))).unwrap();
+    let profile = vehicle.tunnel.profile.clone();
+    let filters = BesideNavigation::new(profile, vehicle.site, settings, journal);
+    let mut dive = app.arm(Box::new(filters)).unwrap();
     let mut ports: Vec<_> =
         (0..vehicle.sensors.len()).map(|source| dive.take_port(source).unwrap()).collect();
     let mut console = dive.take_console().unwrap();

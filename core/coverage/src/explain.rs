@@ -81,7 +81,7 @@ pub fn explain<'a>(
     let seen = Seen::over(passages);
     let drive = seen.worst;
     let present = present(case, &seen, store.perimeter_m());
-    let mut trial = Trial { case, drive: &drive, seen: &seen, store, finder, left: MOST_TRIED };
+    let mut trial = Trial { case, drive: &drive, seen: &seen, store, finder, left: MOST_TRIED, laid: None };
     let causes = trial.smallest(present);
     let in_hole = |lack: &&Lack| is_in(case.hole, case.target_m, store.perimeter_m(), lack);
     let radius_m = case.target_m;
@@ -208,6 +208,8 @@ struct Trial<'a> {
     store: &'a SampleStore,
     finder: &'a mut HoleFinder,
     left: u32,
+    /// Without which factors the wall was laid out last, and for circles of which radius, m.
+    laid: Option<(Causes, f64)>,
 }
 
 impl Trial<'_> {
@@ -269,14 +271,18 @@ impl Trial<'_> {
         self.left -= 1;
         let Case { bounds_m, first_visit, target_m, lacks, .. } = *self.case;
         let otherwise = self.otherwise(removed);
-        let reach_m = (target_m + bounds_m.1 - bounds_m.0) / otherwise.along;
-        let put_back = lacks
-            // Those about to be mirrored, too.
-            .between(bounds_m.0 - 2.0 * reach_m, bounds_m.1 + 2.0 * reach_m)
-            .filter(|lack| lack.why.is_within(removed))
-            .map(|lack| [lack.x_m, lack.arc_m]);
         let radius_m = times * target_m / 2.0;
-        !self.finder.has_circle_otherwise((self.store, first_visit), bounds_m, radius_m, &otherwise, put_back)
+        if !self.laid.is_some_and(|(laid, most_m)| laid == removed && radius_m <= most_m) {
+            let reach_m = (target_m + bounds_m.1 - bounds_m.0) / otherwise.along;
+            let put_back = lacks
+                // Those about to be mirrored, too.
+                .between(bounds_m.0 - 2.0 * reach_m, bounds_m.1 + 2.0 * reach_m)
+                .filter(|lack| lack.why.is_within(removed))
+                .map(|lack| [lack.x_m, lack.arc_m]);
+            self.finder.lay_otherwise((self.store, first_visit), bounds_m, radius_m, &otherwise, put_back);
+            self.laid = Some((removed, radius_m));
+        }
+        !self.finder.has_circle_otherwise(bounds_m, radius_m, &otherwise)
     }
 
     /// How the wall would have been sampled without some factors.

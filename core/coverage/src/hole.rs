@@ -27,6 +27,10 @@ pub use without::Otherwise;
 pub const FARTHEST_M: f64 = 12.0;
 /// Half diagonal below which a tile isn't halved, m: its bound is within 2e-10 m of the exact value.
 const NO_FINER_M: f64 = 1e-10;
+/// More than any rounding error of a distance, m.
+const ROUNDING_M: f64 = 1e-9;
+/// The owner of a tile of which no sample is known.
+const NO_OWNER: (f64, f64) = (f64::INFINITY, f64::INFINITY);
 /// Rounding tolerance for accepting a corner's bound as proven, m.
 const PROVEN_M: f64 = 1e-11;
 
@@ -64,7 +68,7 @@ struct Tile {
     arc_m: f64,
     half_x_m: f64,
     half_arc_m: f64,
-    /// Sample nearest to the centre, relative to it, m.
+    /// Sample nearest to the centre, relative to it, m; in searches for any circle a sample near by, from the start of the section.
     owner: (f64, f64),
     /// Upper bound of f in the tile, m.
     bound_m: f64,
@@ -86,6 +90,27 @@ struct Beyond {
     arc_m: f64,
 }
 
+/// What is near the centre of a tile.
+enum Near {
+    /// A sample so near that every point of the tile has it within the radius.
+    Settled,
+    /// The nearest, or one as near as that.
+    Sample(Nearest),
+    /// None within reach.
+    Nothing,
+}
+
+impl Near {
+    /// The sample, and its distance, m; `None` where the tile is settled.
+    fn unsettled(self) -> Option<(Option<Nearest>, f64)> {
+        match self {
+            Self::Settled => None,
+            Self::Sample(found) => Some((Some(found), math::sqrt(found.distance2))),
+            Self::Nothing => Some((None, f64::INFINITY)),
+        }
+    }
+}
+
 impl Tile {
     /// Half diagonal, m.
     fn half_m(&self) -> f64 {
@@ -103,6 +128,28 @@ impl Tile {
                 Self { arc_m, half_arc_m: self.half_arc_m / 2.0, ..*self }
             }
         })
+    }
+
+    /// What is near its centre. Where the owner, a sample's chainage and arc length, is near enough to settle the tile, nothing
+    /// is looked for; and any sample that is near enough will do.
+    fn near(&self, window: &Window, radius_m: f64, within_m: f64) -> Near {
+        // Less and more by over the rounding of the distances.
+        let enough_m = radius_m - self.half_m() - ROUNDING_M;
+        let (dx, darc) = (self.owner.0 - self.x_m, self.owner.1 - self.arc_m);
+        let owner_m = math::sqrt(dx * dx + darc * darc);
+        if owner_m <= enough_m {
+            return Near::Settled;
+        }
+        let within_m = within_m.min(owner_m + ROUNDING_M);
+        window.near_enough(self.x_m, self.arc_m, within_m, enough_m).map_or(Near::Nothing, Near::Sample)
+    }
+
+    /// The halves of a tile whose nearest sample, if there is one within reach, is their owner.
+    fn halves_of(mut self, nearest: Option<&Nearest>, perimeter_m: f64) -> [Self; 2] {
+        if let Some(found) = nearest {
+            self.owner = (found.x_m, found.arc_m + found.turns * perimeter_m);
+        }
+        self.halves()
     }
 
     /// Sample position relative to the centre: bit-identical whichever point it was found from.

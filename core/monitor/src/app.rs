@@ -62,6 +62,8 @@ pub struct App {
     pub(super) entities: Vec<Entity>,
     pub(super) ports: Vec<Port>,
     pub(super) readers: Vec<PortReader>,
+    /// Whether a plugin has systems among those that place pings.
+    pub(super) has_own_placing: bool,
 }
 
 impl App {
@@ -79,6 +81,7 @@ impl App {
             entities: Vec::new(),
             ports: Vec::new(),
             readers: Vec::new(),
+            has_own_placing: false,
         }
     }
 
@@ -162,6 +165,7 @@ impl App {
 
     /// Adds systems to a stage. Systems of one stage that share data must be ordered by the caller.
     pub fn add_systems<M>(&mut self, stage: Stage, systems: impl IntoScheduleConfigs<ScheduleSystem, M>) {
+        self.has_own_placing |= stage.is_placing();
         self.schedule.add_systems(systems.in_set(stage));
     }
 
@@ -171,6 +175,7 @@ impl App {
         stage: Stage,
         systems: impl IntoScheduleConfigs<ScheduleSystem, M>,
     ) {
+        self.has_own_placing |= stage.is_placing();
         match stage.next() {
             Some(next) => self.schedule.add_systems(systems.after(stage).before(next)),
             None => self.schedule.add_systems(systems.after(stage)),

@@ -48,6 +48,7 @@ pub mod resources;
 pub mod result_stream;
 pub mod ring;
 pub mod run;
+pub mod split;
 pub mod stage;
 mod stages;
 pub mod telling;

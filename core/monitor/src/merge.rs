@@ -43,6 +43,29 @@ impl Default for Inbox {
 }
 
 impl Inbox {
+    /// One whose lists grow as needed, for a replay's threads.
+    pub(super) fn growing() -> Self {
+        Self { packets: Vec::new(), bytes: Vec::new(), heads: Vec::new(), allowance_bytes: MAX_TICK_BYTES }
+    }
+
+    /// Exchanges the packets with another's.
+    pub(super) fn swap_packets(&mut self, other: &mut Self) {
+        core::mem::swap(&mut self.packets, &mut other.packets);
+        core::mem::swap(&mut self.bytes, &mut other.bytes);
+    }
+
+    /// Takes another's packets in place of its own; none, and false, if they are more than is allowed.
+    pub(super) fn take_packets(&mut self, other: &Self) -> bool {
+        self.packets.clear();
+        self.bytes.clear();
+        let is_allowed = other.bytes.len() <= self.allowance_bytes;
+        if is_allowed {
+            self.packets.extend_from_slice(&other.packets);
+            self.bytes.extend_from_slice(&other.bytes);
+        }
+        is_allowed
+    }
+
     /// The packets, in order.
     pub fn iter(&self) -> impl Iterator<Item = (SourceId, Packet<'_>)> {
         self.packets.iter().map(|packet| {

@@ -296,6 +296,13 @@ impl ResultStream {
         self
     }
 
+    /// Becomes as another is, with the words that its last tick has kept.
+    pub(super) fn follow(&mut self, other: &Self) {
+        (self.digest, self.records, self.lost) = (other.digest, other.records, other.lost);
+        self.words.clear();
+        self.words.extend_from_slice(&other.words);
+    }
+
     /// Clears the words of the last tick.
     pub(super) fn next_tick(&mut self) {
         self.words.clear();

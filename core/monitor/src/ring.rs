@@ -167,7 +167,7 @@ mod tests {
 #[cfg(test)]
 mod model_tests {
     use super::*;
-    use crate::byte_ring::model::{explore, packets};
+    use crate::byte_ring::model::{Hasty, ModelConsumer, explore, packets_by};
 
     /// Packets of different length and content; a ring that holds one of them, and the header of the next.
     const LENGTHS: [usize; 2] = [3, 5];
@@ -177,11 +177,10 @@ mod model_tests {
         (0..LENGTHS[number]).map(|at| (16 * number + at + 1) as u8).collect()
     }
 
-    /// However writer and reader interleave, packets come out whole and in order, and each is either taken or refused.
-    #[test]
-    fn packets_are_taken_whole_or_not_at_all() {
-        let executions = explore("header then body in the loop's ring", Some(4), || {
-            let (mut port, mut reader) = packets(CAPACITY);
+    /// A writer and a reader of two packets, however they interleave.
+    fn explored<R: ByteConsumer + 'static>(name: &str, reading: fn(ModelConsumer) -> R) -> usize {
+        explore(name, Some(4), move || {
+            let (mut port, mut reader) = packets_by(CAPACITY, reading);
             let writer = loom::thread::spawn(move || {
                 let sent = |number: &usize| port.send(MonoNs(*number as u64), &bytes(*number)).is_ok();
                 (0..LENGTHS.len()).filter(sent).collect::<Vec<_>>()
@@ -191,7 +190,19 @@ mod model_tests {
             taken.extend(std::iter::from_fn(|| reader.take_next()));
             let sent: Vec<_> = sent.into_iter().map(|number| (number as u64, bytes(number))).collect();
             assert_eq!(taken, sent);
-        });
+        })
+    }
+
+    /// However writer and reader interleave, packets come out whole and in order, and each is either taken or refused.
+    #[test]
+    fn packets_are_taken_whole_or_not_at_all() {
+        let executions = explored("header then body in the loop's ring", |consumer| consumer);
         assert!(executions > 50, "{executions}");
+    }
+
+    #[test]
+    #[should_panic = "assertion `left == right` failed"]
+    fn a_reader_that_takes_the_header_for_the_packet_is_found() {
+        explored("the loop's ring, a body not waited for", Hasty);
     }
 }

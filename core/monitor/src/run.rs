@@ -56,14 +56,18 @@ pub struct Loop {
     mission: Mission,
     ticks: u64,
     finished: bool,
+    /// Whether a plugin has systems among those that place pings.
+    pub(super) has_own_placing: bool,
 }
 
 impl Loop {
     /// From an app whose world has everything that the stages need.
     pub(super) fn new(app: App) -> Self {
-        let App { mission, world, schedule, sources, ports, readers, .. } = app;
+        let App { mission, world, schedule, sources, ports, readers, has_own_placing, .. } = app;
         let ports = ports.into_iter().map(Some).collect();
-        let mut armed = Self { world, schedule, readers, ports, sources, mission, ticks: 0, finished: false };
+        let (ticks, finished) = (0, false);
+        let mut armed =
+            Self { world, schedule, readers, ports, sources, mission, ticks, finished, has_own_placing };
         // The first run of a schedule allocates; with nothing to do it has no other effect.
         armed.tick(MonoNs(0));
         armed.ticks = 0;
@@ -85,9 +89,19 @@ impl Loop {
         if let Some(mut inbox) = self.world.get_resource_mut::<Inbox>() {
             inbox.fill(&mut self.readers);
         }
+        self.run_stages();
+        self.world.get_resource::<Inbox>().map_or(0, Inbox::len)
+    }
+
+    /// Runs the stages of a tick.
+    pub(super) fn run_stages(&mut self) {
         self.schedule.run(&mut self.world);
         self.ticks += 1;
-        self.world.get_resource::<Inbox>().map_or(0, Inbox::len)
+    }
+
+    /// The world, and the readers of the rings, to be split or joined.
+    pub(super) fn split_world(&mut self) -> (&mut World, &mut Vec<PortReader>) {
+        (&mut self.world, &mut self.readers)
     }
 
     /// The writing end of a source's ring, once: for a port's thread, a player or a simulator.
@@ -309,6 +323,10 @@ impl Loop {
     ///
     /// Errors: a part can't be serialised.
     pub fn save(&self) -> Result<Vec<u8>, SnapshotError> {
+        if self.is_split() {
+            let (part, why) = ("the loop".to_owned(), "parts of it are on other threads".to_owned());
+            return Err(SnapshotError::Unsaved { part, why });
+        }
         let mut to = Saver::default();
         to.part("ticks");
         to.value(&self.ticks);
@@ -321,6 +339,9 @@ impl Loop {
     /// Errors: the snapshot doesn't fit this loop, which must not be used afterwards.
     pub fn restore(&mut self, snapshot: &[u8]) -> Result<(), SnapshotError> {
         let mut from = Restorer::new(snapshot);
+        if self.is_split() {
+            return Err(from.unfit("parts of the loop are on other threads".to_owned()));
+        }
         from.part("ticks")?;
         self.ticks = from.value()?;
         loop_snapshot::restore(&mut self.world, &mut from)?;

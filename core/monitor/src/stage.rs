@@ -1,5 +1,6 @@
 //! The stages of a tick, in order, and the schedule that chains them.
 
+use bevy_ecs::prelude::{Res, Resource};
 use bevy_ecs::schedule::{
     IntoScheduleConfigs, LogLevel, Schedule, ScheduleBuildSettings, SingleThreadedExecutor, SystemSet,
 };
@@ -35,11 +36,24 @@ impl Stage {
         Self::Publish,
     ];
 
+    /// Whether it belongs to those that place pings, which a replay may run on a thread of their own.
+    pub(super) fn is_placing(self) -> bool {
+        matches!(self, Self::Decode | Self::Navigate | Self::Georeference)
+    }
+
     /// The stage after this one.
     pub fn next(self) -> Option<Self> {
         Self::ALL.into_iter().skip_while(|stage| *stage != self).nth(1)
     }
 }
+
+/// The stages that place pings run elsewhere: their lists come with the tick.
+#[derive(Debug, Resource)]
+pub(super) struct PlacedElsewhere;
+
+/// The stages that place pings.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, SystemSet)]
+struct Placing;
 
 /// An empty schedule of the chained stages: single-threaded; an ambiguous order of systems is an error.
 pub(super) fn schedule() -> Schedule {
@@ -49,7 +63,12 @@ pub(super) fn schedule() -> Schedule {
         ambiguity_detection: LogLevel::Error,
         ..ScheduleBuildSettings::default()
     });
+    schedule
+        .configure_sets(Placing.run_if(|elsewhere: Option<Res<'_, PlacedElsewhere>>| elsewhere.is_none()));
     for stage in Stage::ALL {
+        if stage.is_placing() {
+            schedule.configure_sets(stage.in_set(Placing));
+        }
         if let Some(next) = stage.next() {
             schedule.configure_sets((stage, next).chain());
         }

@@ -11,6 +11,10 @@ use super::spacing;
 use headrace_geometry::math;
 use headrace_snapshot::stateful;
 
+mod thin;
+
+use thin::Thin;
+
 /// Strips narrower than this are rounding errors, m.
 const NO_WIDTH_M: f64 = 1e-9;
 
@@ -304,7 +308,13 @@ impl Strips {
         target_m: f64,
         going: &Going,
     ) -> bool {
-        self.ts_m(setting, passes, speed_mps, going).all(|t_m| t_m <= target_m)
+        let thin = Thin::of(passes, self.strips.iter().map(|strip| strip.seen_by));
+        let is_met = |limit: Limit| limit.t_m(speed_mps, going) <= target_m;
+        // What is across a strip is only looked at where the strip itself doesn't meet it.
+        self.strips.iter().enumerate().all(|(k, strip)| {
+            self.within(setting, (k, strip), &thin).is_some_and(is_met)
+                || self.across(setting, (k, strip), &thin).is_some_and(is_met)
+        })
     }
 
     /// The largest speed for a target if every head saw all of the wall, m/s; `None` where none meets it.
@@ -378,26 +388,31 @@ impl Strips {
         setting: usize,
         passes: &Passes,
     ) -> impl Iterator<Item = (&Strip, Option<Limit>, Option<Limit>)> {
-        let count = self.strips.len();
-        let gaps = Gaps::of(passes, &self.strips);
-        let best_s =
-            self.strips.iter().filter_map(|strip| gaps.gap_s(strip.seen_by)).fold(f64::INFINITY, f64::min);
-        let full = move |strip: &Strip| gaps.gap_s(strip.seen_by).is_some_and(|gap_s| gap_s <= best_s);
+        let thin = Thin::of(passes, self.strips.iter().map(|strip| strip.seen_by));
         self.strips.iter().enumerate().map(move |(k, strip)| {
-            let seen_m = self.steps_m.get(setting * count + k).map_or(0.0, |steps| steps[0]);
-            let within = gaps.gap_s(strip.seen_by).map(|gap_s| Limit { gap_s, t_y_m: seen_m });
-            let across = (!full(strip) && best_s.is_finite())
-                .then(|| Limit { gap_s: best_s, t_y_m: self.across_m(setting, k, &full) })
-                .filter(|limit| limit.t_y_m < self.perimeter_m);
+            let (within, across) =
+                (self.within(setting, (k, strip), &thin), self.across(setting, (k, strip), &thin));
             (strip, within, across)
         })
     }
 
-    /// Distance between the samples on either side of the strips around strip `k` that aren't `full`, m.
-    fn across_m(&self, setting: usize, k: usize, full: &impl Fn(&Strip) -> bool) -> f64 {
+    fn within(&self, setting: usize, (k, strip): (usize, &Strip), thin: &Thin<'_>) -> Option<Limit> {
+        let t_y_m = self.steps_m.get(setting * self.strips.len() + k).map_or(0.0, |steps| steps[0]);
+        thin.gap_s(k, strip.seen_by).map(|gap_s| Limit { gap_s, t_y_m })
+    }
+
+    fn across(&self, setting: usize, (k, strip): (usize, &Strip), thin: &Thin<'_>) -> Option<Limit> {
+        (!thin.is_full(k, strip.seen_by) && thin.best_s().is_finite())
+            .then(|| Limit { gap_s: thin.best_s(), t_y_m: self.across_m(setting, k, thin) })
+            .filter(|limit| limit.t_y_m < self.perimeter_m)
+    }
+
+    /// Distance between the samples on either side of the strips around strip `k` that are thin, m.
+    fn across_m(&self, setting: usize, k: usize, gaps: &Thin<'_>) -> f64 {
         let count = self.strips.len();
         let thin = |number: usize| {
-            self.strips.get(number % count).filter(|strip| !full(strip)).map(|_| number % count)
+            let number = number % count;
+            self.strips.get(number).filter(|strip| !gaps.is_full(number, strip.seen_by)).map(|_| number)
         };
         let forward = (k..k + count).map_while(&thin);
         let back = (1..count).map(|step| k + count - step).map_while(&thin);
@@ -410,41 +425,6 @@ impl Strips {
         }
         // Pings end at a sector's edge, but up to a step before a hidden arc.
         width_m.min(self.perimeter_m) + if hidden { 2.0 * step_m } else { 0.0 }
-    }
-}
-
-/// Number of head sets with cached gaps; strips hidden from one or two heads rarely make more.
-const SETS: usize = 8;
-
-/// Cached pass gaps by set of heads: many strips are seen by the same heads.
-#[derive(Clone, Copy)]
-struct Gaps<'a> {
-    passes: &'a Passes,
-    known: [Option<(HeadSet, Option<f64>)>; SETS],
-}
-
-impl<'a> Gaps<'a> {
-    fn of(passes: &'a Passes, strips: &[Strip]) -> Self {
-        let mut gaps = Self { passes, known: [None; SETS] };
-        let mut count = 0;
-        for strip in strips {
-            if gaps.find(strip.seen_by).is_none()
-                && let Some(slot) = gaps.known.get_mut(count)
-            {
-                *slot = Some((strip.seen_by, passes.gap_s(strip.seen_by)));
-                count += 1;
-            }
-        }
-        gaps
-    }
-
-    fn find(&self, seen_by: HeadSet) -> Option<(HeadSet, Option<f64>)> {
-        self.known.iter().map_while(|known| *known).find(|(set, _)| *set == seen_by)
-    }
-
-    /// See [`Passes::gap_s`].
-    fn gap_s(&self, seen_by: HeadSet) -> Option<f64> {
-        self.find(seen_by).map_or_else(|| self.passes.gap_s(seen_by), |(_, gap_s)| gap_s)
     }
 }
 

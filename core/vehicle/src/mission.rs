@@ -64,4 +64,13 @@ impl Mission {
             limits: LimitsConfig::default(),
         }
     }
+
+    /// Whether pings land on the wall as in another mission: the same tunnel, water, layout and hull, whatever is asked of them.
+    pub fn places_as(&self, other: &Self) -> bool {
+        self.profile == other.profile
+            && self.site == other.site
+            && self.sound_speed_from == other.sound_speed_from
+            && self.layout == other.layout
+            && self.hull == other.hull
+    }
 }

@@ -86,21 +86,34 @@ impl Supervisor {
 
     /// Stops all threads and drains the rings; returns each sensor's line history, in the order of the sensors.
     pub fn stop(mut self, dive: &mut Loop, after_tick: &mut dyn FnMut(&Loop)) -> Vec<LineHistory> {
-        self.stopping.store(true, Ordering::Relaxed);
         // A panicked thread has already reported itself; the other histories are kept.
         let ended_early =
             LineHistory { last: "its thread has ended early".to_owned(), ..LineHistory::default() };
         let mut all = vec![ended_early; self.sensors];
-        for (source, history) in self.threads.drain(..).flat_map(|thread| thread.join().unwrap_or_default()) {
+        let (stopping, threads) = (Arc::clone(&self.stopping), std::mem::take(&mut self.threads));
+        let mut drain = || {
+            if dive.has_waiting() {
+                feed::work_off(dive, clock::now(), after_tick, &mut pause);
+            }
+        };
+        let wait =
+            || threads.into_iter().flat_map(|thread| thread.join().unwrap_or_default()).collect::<Vec<_>>();
+        for (source, history) in wind_up(|| stopping.store(true, Ordering::Relaxed), wait, &mut drain) {
             if let Some(place) = all.get_mut(source) {
                 *place = history;
             }
         }
-        if dive.has_waiting() {
-            feed::work_off(dive, clock::now(), after_tick, &mut pause);
-        }
         all
     }
+}
+
+/// Ends threads that fill rings: they are told, then waited for, and only then is taken what they have left, which a thread still adds
+/// to after it was told. The flag orders nothing; that a thread has ended does.
+fn wind_up<H>(tell: impl FnOnce(), wait: impl FnOnce() -> H, drain: impl FnOnce()) -> H {
+    tell();
+    let handed_back = wait();
+    drain();
+    handed_back
 }
 
 /// The ports as the feed of a loop: their threads fill the rings.
@@ -148,4 +161,53 @@ fn lines(connections: Vec<Connection>) -> Vec<LineOf> {
         }
     }
     lines
+}
+
+#[cfg(test)]
+mod tests {
+    use headrace_geometry::time::MonoNs;
+    use headrace_monitor::byte_ring::model::{explore, packets};
+
+    use super::wind_up;
+
+    /// How the loop ends a line, by what tells it, what waits for it, and what drains its ring.
+    type Ends = fn(&dyn Fn(), &mut dyn FnMut(), &mut dyn FnMut());
+
+    /// A line's thread as `LineService::run`: looks at the flag before each step, and hands over what its driver still holds at the end.
+    fn line_and_stop(name: &str, ends: Ends) -> usize {
+        explore(name, Some(4), move || {
+            let (mut port, mut reader) = packets(96);
+            let stopping = loom::sync::Arc::new(loom::sync::atomic::AtomicBool::new(false));
+            let flag = loom::sync::Arc::clone(&stopping);
+            let line = loom::thread::spawn(move || {
+                let mut sent = Vec::new();
+                while sent.len() < 2 && !flag.load(loom::sync::atomic::Ordering::Relaxed) {
+                    port.send(MonoNs(sent.len() as u64), &[7]).unwrap();
+                    sent.push(sent.len() as u64);
+                }
+                port.send(MonoNs(9), &[7]).unwrap();
+                sent.push(9);
+                sent
+            });
+            let (mut line, mut sent, mut taken) = (Some(line), Vec::new(), Vec::new());
+            ends(
+                &|| stopping.store(true, loom::sync::atomic::Ordering::Relaxed),
+                &mut || sent = line.take().unwrap().join().unwrap(),
+                &mut || taken.extend(std::iter::from_fn(|| reader.take_next()).map(|(at, _)| at)),
+            );
+            assert_eq!(taken, sent);
+        })
+    }
+
+    #[test]
+    fn nothing_that_a_line_has_handed_over_is_left_at_the_stop() {
+        let executions = line_and_stop("the lines' stop", |tell, wait, drain| wind_up(tell, wait, drain));
+        assert!(executions > 5, "{executions}");
+    }
+
+    #[test]
+    #[should_panic = "assertion `left == right` failed"]
+    fn a_stop_that_drains_before_it_waits_is_found() {
+        line_and_stop("the lines' stop, drained first", |tell, wait, drain| wind_up(tell, drain, wait));
+    }
 }

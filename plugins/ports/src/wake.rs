@@ -68,6 +68,8 @@ pub(crate) fn sleep<T: Threads>(at_most: Duration) {
 
 #[cfg(test)]
 mod tests {
+    use std::mem::ManuallyDrop;
+
     use headrace_geometry::time::MonoNs;
     use headrace_monitor::byte_ring::model::{explore, packets};
 
@@ -92,16 +94,23 @@ mod tests {
         }
     }
 
-    /// A line's thread sends and wakes, as `LineService` does; the loop looks at its rings and sleeps, as `LiveFeed` does.
-    fn line_and_loop(packets_sent: u8) {
-        let (mut port, mut reader) = packets(64);
+    /// A line's thread sends and wakes, as `LineService` does; the loop looks at its rings and sleeps, as `LiveFeed` does. What loom would
+    /// look into when it is dropped isn't dropped where it has found a deadlock: that would be a second panic.
+    fn line_and_loop(packets_sent: u8, wakes_first: bool) {
+        let (mut port, reader) = packets(64);
+        let mut reader = ManuallyDrop::new(reader);
         let waker = Waker::<Modelled>::of_this_thread();
-        let line = loom::thread::spawn(move || {
+        let line = ManuallyDrop::new(loom::thread::spawn(move || {
             for number in 0..packets_sent {
+                if wakes_first {
+                    waker.wake();
+                }
                 port.send(MonoNs(number.into()), &[number + 1]).unwrap();
-                waker.wake();
+                if !wakes_first {
+                    waker.wake();
+                }
             }
-        });
+        }));
         let mut taken = Vec::new();
         loop {
             taken.extend(std::iter::from_fn(|| reader.take_next()));
@@ -110,14 +119,21 @@ mod tests {
             }
             sleep::<Modelled>(Duration::MAX);
         }
-        line.join().unwrap();
+        ManuallyDrop::into_inner(line).join().unwrap();
+        drop(ManuallyDrop::into_inner(reader));
         let sent: Vec<_> = (0..packets_sent).map(|number| (u64::from(number), vec![number + 1])).collect();
         assert_eq!(taken, sent);
     }
 
     #[test]
     fn no_packet_is_slept_over() {
-        let executions = explore("wake-up of the loop", Some(4), || line_and_loop(2));
+        let executions = explore("wake-up of the loop", Some(4), || line_and_loop(2, false));
         assert!(executions > 50, "{executions}");
+    }
+
+    #[test]
+    #[should_panic = "deadlock"]
+    fn a_line_that_wakes_before_it_sends_is_found() {
+        explore("wake-up before the packet", Some(4), || line_and_loop(2, true));
     }
 }

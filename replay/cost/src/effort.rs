@@ -23,13 +23,13 @@ impl Effort {
         self.pick(1, 5)
     }
 
-    /// Times that every setting is measured, in turns: fewer say little of quartiles.
+    /// Times that every setting is measured, in turns: six are the fewest of which a median has an interval of 95 %.
     pub fn rounds(self) -> u32 {
-        9
+        self.pick(6, 9)
     }
 
     /// Length of a dive, m.
     pub fn length_m(self) -> f64 {
-        self.pick(12.0, 40.0)
+        self.pick(8.0, 40.0)
     }
 }

@@ -23,7 +23,7 @@ pub fn timed<R>(work: impl FnOnce() -> R) -> (R, f64) {
     (result, cpu_s() - begun_s)
 }
 
-/// Median and quartiles of each setting's costs, measured so many rounds in turns, so that what the machine does besides falls upon
+/// Median of each setting's costs with its interval of 95 %, measured so many rounds in turns, so that what the machine does besides falls upon
 /// all of them alike. `run` measures a setting once and returns its cost.
 ///
 /// Errors: those of `run`; no rounds.
@@ -40,7 +40,7 @@ pub fn in_turns<T>(
     }
     let interval = |costs: &Vec<f64>| {
         let why = || CostError::Figure { what: "costs".to_owned(), why: "no round was measured".to_owned() };
-        Interval::quartiles(costs).ok_or_else(why)
+        Interval::median(costs).ok_or_else(why)
     };
     costs.iter().map(interval).collect()
 }

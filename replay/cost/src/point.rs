@@ -20,6 +20,32 @@ impl Interval {
         Self { low: value, middle: value, high: value }
     }
 
+    /// Median with its interval of 95 %, by signs: the innermost two values, as far from the least as from the largest, between which
+    /// the median of all values that there might have been lies with that probability. Of fewer than six values their least and largest,
+    /// which hold it less surely; `None` of nothing.
+    pub fn median(values: &[f64]) -> Option<Self> {
+        let mut sorted = values.to_vec();
+        sorted.sort_unstable_by(f64::total_cmp);
+        let count = i32::try_from(sorted.len()).ok()?;
+        // Probability that no more than so many of all values lie below the median: of a fair coin.
+        let (mut ways, mut below, mut cut) = (1.0, 1.0, 0_usize);
+        let all = (0..count).fold(1.0, |all, _| all * 2.0);
+        for k in 1..=count / 2 {
+            if below / all > 0.025 {
+                break;
+            }
+            cut = usize::try_from(k).ok()?;
+            ways *= f64::from(count - k + 1) / f64::from(k);
+            below += ways;
+        }
+        let cut = cut.max(1) - 1;
+        Some(Self {
+            low: *sorted.get(cut)?,
+            middle: quantile(values, 0.5)?,
+            high: *sorted.get(sorted.len().checked_sub(cut + 1)?)?,
+        })
+    }
+
     /// Median and quartiles; `None` of nothing. Values between two ranks are interpolated.
     pub fn quartiles(values: &[f64]) -> Option<Self> {
         Some(Self {
@@ -103,7 +129,7 @@ pub struct Point {
     pub seeds: u32,
     /// Its errors; the first is the axis's.
     pub errors: Vec<Error>,
-    /// Its cost, in the unit of the trade's axis: median and quartiles.
+    /// Its cost, in the unit of the trade's axis: median, and bounds as `Results::bars` says.
     pub cost: Interval,
     /// Instructions, counted, per unit of what `cost` is for; `None` where nothing counts them.
     pub instructions: Option<f64>,
@@ -185,6 +211,12 @@ pub struct Trade {
 }
 
 impl Trade {
+    /// Differences of the error below this decide nothing, in its unit: a tenth of what decides anything, and no less than the reference
+    /// may be off itself.
+    pub fn resolution(&self) -> f64 {
+        self.oracle.size.max(self.decides.map_or(0.0, |decides| decides / 10.0))
+    }
+
     /// Names of all figures of its points with their units, in the order of the first ones.
     pub(crate) fn figures(&self) -> Vec<String> {
         let mut figures: Vec<String> = Vec::new();
@@ -241,16 +273,19 @@ pub fn front(points: &mut [Point], resolution: f64) {
     }
 }
 
-/// The knee of a scene's front: the point farthest below the straight line between the front's ends, both axes logarithmic. `None`
-/// with fewer than three points on the front, or where none lies below the line.
-pub fn knee<'a>(points: &'a [Point], scene: &str) -> Option<&'a Point> {
+/// The knee of a scene's front: the point farthest below the straight line between the front's ends, both axes logarithmic. Errors up
+/// to `resolution` count as that, and of those only the cheapest is on the front. `None` with fewer than three points left on it, or
+/// where none lies below the line.
+pub fn knee<'a>(points: &'a [Point], scene: &str, resolution: f64) -> Option<&'a Point> {
+    let told = |point: &Point| point.error().max(resolution);
     let mut on_front: Vec<(&Point, [f64; 2])> = points
         .iter()
         .filter(|point| point.on_front && point.scene == scene)
-        .filter(|point| point.error() > 0.0 && point.error().is_finite() && point.cost.middle > 0.0)
-        .map(|point| (point, [math::ln(point.error()), math::ln(point.cost.middle)]))
+        .filter(|point| told(point) > 0.0 && told(point).is_finite() && point.cost.middle > 0.0)
+        .map(|point| (point, [math::ln(told(point)), math::ln(point.cost.middle)]))
         .collect();
-    on_front.sort_by(|a, b| a.1[0].total_cmp(&b.1[0]));
+    on_front.sort_by(|a, b| a.1[0].total_cmp(&b.1[0]).then(a.1[1].total_cmp(&b.1[1])));
+    on_front.dedup_by(|dearer, cheaper| dearer.1[0].to_bits() == cheaper.1[0].to_bits());
     let (from, to) = (on_front.first()?.1, on_front.last()?.1);
     let [along, up] = [to[0] - from[0], to[1] - from[1]];
     let below = |at: [f64; 2]| up * (at[0] - from[0]) - along * (at[1] - from[1]);
@@ -318,8 +353,11 @@ mod tests {
             point("coarsest", 1.0, [10.0; 3]),
         ];
         front(&mut points, 0.0);
-        assert_eq!(knee(&points, "s").map(|point| point.value.as_str()), Some("knee"));
-        assert!(knee(&points[..2], "s").is_none() && knee(&points, "another").is_none());
+        assert_eq!(knee(&points, "s", 0.0).map(|point| point.value.as_str()), Some("knee"));
+        assert!(knee(&points[..2], "s", 0.0).is_none() && knee(&points, "another", 0.0).is_none());
+        // Finest and knee are the same then, and the cheaper one is an end of the front.
+        assert_eq!(knee(&points, "s", 0.02).map(|point| point.value.as_str()), Some("near the line"));
+        assert!(knee(&points, "s", 0.2).is_none());
     }
 
     #[test]
@@ -331,5 +369,20 @@ mod tests {
         assert!((mean.middle - 3.0).abs() < 1e-12 && (mean.high - 4.963).abs() < 1e-3, "{mean:?}");
         assert_eq!(Interval::mean(&[1.0]), None);
         assert_eq!(quantile(&[], 0.5), None);
+    }
+
+    /// Ranks of the sign test at 5 %, from tables (Conover, "Practical nonparametric statistics", A3): the first and the last of 6 to 8
+    /// values, the second of 9 to 11, the third of 12 to 14, the sixth of 20.
+    #[test]
+    fn intervals_of_medians_are_those_of_tables() {
+        for (count, rank) in [(1, 1), (5, 1), (6, 1), (8, 1), (9, 2), (11, 2), (12, 3), (14, 3), (20, 6)] {
+            let values: Vec<f64> = (1..=count).map(f64::from).rev().collect();
+            let found = Interval::median(&values).unwrap();
+            let [low, high] = [rank, count + 1 - rank].map(f64::from);
+            let off = (found.low - low).abs().max((found.high - high).abs());
+            assert!(off < 1e-12, "of {count}: {found:?}");
+            assert!((found.middle - f64::from(count + 1) / 2.0).abs() < 1e-12);
+        }
+        assert_eq!(Interval::median(&[]), None);
     }
 }

@@ -46,10 +46,10 @@ pub(crate) fn steps(trade: &Trade, scene: &str) -> Vec<String> {
         return vec!["The shipped default isn't among these settings.".to_owned()];
     };
     let mut lines = vec![format!("As shipped: {}.", whole(trade, default))];
-    if let Some(knee) = knee(&trade.points, scene) {
+    let resolution = trade.resolution();
+    if let Some(knee) = knee(&trade.points, scene, resolution) {
         lines.push(format!("Knee of the front: {}.", whole(trade, knee)));
     }
-    let resolution = trade.oracle.size;
     let finer = points().filter(|point| point.on_front && point.error() < default.error() - resolution);
     match finer.max_by(|a, b| a.error().total_cmp(&b.error())) {
         Some(next) => lines.push(format!(
@@ -58,9 +58,17 @@ pub(crate) fn steps(trade: &Trade, scene: &str) -> Vec<String> {
             signed(next.cost.middle - default.cost.middle),
             trade.cost_unit
         )),
-        None => lines.push("Next step: no setting has less error at any cost.".to_owned()),
+        None => lines.push(no_step(default, resolution)),
     }
     lines
+}
+
+/// That no setting has less error than the default, or none by what decides anything.
+fn no_step(default: &Point, resolution: f64) -> String {
+    let by = default.errors.first().filter(|_| resolution > 0.0);
+    let by =
+        by.map_or_else(String::new, |error| format!(" by more than {} {}", number(resolution), error.unit));
+    format!("Next step: no setting has less error{by} at any cost.")
 }
 
 fn signed(value: f64) -> String {
@@ -76,7 +84,7 @@ pub(crate) fn defaults(trade: &Trade) -> Vec<String> {
         let better = trade
             .points
             .iter()
-            .filter(|point| point.scene == scene && point.error() <= default.error() + trade.oracle.size)
+            .filter(|point| point.scene == scene && point.error() <= default.error() + trade.resolution())
             .min_by(|a, b| a.cost.middle.total_cmp(&b.cost.middle));
         if let Some(better) = better {
             lines.push(format!(

@@ -68,6 +68,23 @@ pub enum DriveError {
         /// The source.
         source_id: String,
     },
+    /// Of loops that are to share one navigation.
+    #[error(
+        "driving several loops with one navigation: loop {number}, counted from 0, has other sensors, another tunnel or layout than \
+         loop 0, or systems of its own that place pings"
+    )]
+    Unlike {
+        /// Number of the loop.
+        number: usize,
+    },
+    /// A thread of the replay has panicked: a bug. The loop must not be used afterwards.
+    #[error("driving the loop: the thread that {what} has panicked: {message}; please report it")]
+    Panicked {
+        /// What the thread was for.
+        what: &'static str,
+        /// What it said.
+        message: String,
+    },
 }
 
 /// Runs the loop until the source ends; `after_tick` is called after every tick.
@@ -105,7 +122,7 @@ impl Feed for PacedFeed<'_> {
         if let Some(left) = clock.left(until) {
             std::thread::sleep(left);
         }
-        self.driver.fill(dive, self.source, until, after_tick)?;
+        self.driver.fill(self.source, until, &mut |now| work_off(dive, now, after_tick, &mut pause))?;
         Ok(Some(until))
     }
 
@@ -115,7 +132,7 @@ impl Feed for PacedFeed<'_> {
 }
 
 /// Gives an outlet that is behind some time.
-fn pause() {
+pub(crate) fn pause() {
     std::thread::sleep(Duration::from_millis(1));
 }
 
@@ -154,30 +171,40 @@ impl Driver {
         after_tick: &mut dyn FnMut(&Loop),
     ) -> Result<(), DriveError> {
         let Some(until) = self.due(feed)? else { return Ok(()) };
-        self.fill(dive, feed, until, after_tick)?;
-        work_off(dive, until, after_tick, &mut pause);
+        let work_off = &mut |now| work_off(dive, now, after_tick, &mut pause);
+        self.fill(feed, until, work_off)?;
+        work_off(until);
         Ok(())
     }
 
-    /// Feeds packets received before `until`. On an error what has been fed is processed.
-    fn fill(
+    /// Feeds packets received before `until`; `work_off` runs a tick. On an error what has been fed is processed.
+    pub(crate) fn fill(
         &mut self,
-        dive: &mut Loop,
         feed: &mut dyn PacketSource,
         until: MonoNs,
-        after_tick: &mut dyn FnMut(&Loop),
+        work_off: &mut dyn FnMut(MonoNs),
     ) -> Result<(), DriveError> {
         self.until = Some(until);
-        let sent = send_until(dive, feed, &mut self.ports, until, after_tick);
+        let sent = send_until(feed, &mut self.ports, until, work_off);
         if sent.is_err() {
-            work_off(dive, until, after_tick, &mut pause);
+            work_off(until);
         }
         sent
     }
 
     /// Continues after a tick that ended at `until`, when feed and loop have jumped there.
     pub fn jump_to(&mut self, until: MonoNs) {
-        self.until = Some(until);
+        self.go_to(Some(until));
+    }
+
+    /// The same; `None` is before the first tick.
+    pub(crate) fn go_to(&mut self, until: Option<MonoNs>) {
+        self.until = until;
+    }
+
+    /// The end of the last tick; `None` before the first.
+    pub(crate) fn ended_at(&self) -> Option<MonoNs> {
+        self.until
     }
 }
 
@@ -194,11 +221,10 @@ fn take_ports(dive: &mut Loop) -> Result<Vec<Port>, DriveError> {
 
 /// Sends packets received before `until`.
 fn send_until(
-    dive: &mut Loop,
     feed: &mut dyn PacketSource,
     ports: &mut [Port],
     until: MonoNs,
-    after_tick: &mut dyn FnMut(&Loop),
+    work_off: &mut dyn FnMut(MonoNs),
 ) -> Result<(), DriveError> {
     // Nothing is after the last moment of the clock: what comes at it belongs to the last tick.
     let is_due = |coming: &Coming| coming.at < until || until == MonoNs(u64::MAX);
@@ -206,7 +232,7 @@ fn send_until(
         let Some(port) = ports.get_mut(coming.source.index()) else { continue };
         if !port.has_room(coming.len) {
             // Results don't depend on where ticks end, so a full ring may end one.
-            work_off(dive, coming.at, after_tick, &mut pause);
+            work_off(coming.at);
         }
         if let Err(error) = feed.send(port) {
             tracing::error!(%error, "a packet of the feed could not be handed over");

@@ -38,7 +38,7 @@ pub struct Player {
 /// A player's position in its log, to resume from.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct PlayerPlace {
-    log: DivePlace,
+    pub(crate) log: DivePlace,
     /// The message read but not sent yet: receive time, source, bytes.
     next: Option<(MonoNs, u16, Vec<u8>)>,
     order: u64,

@@ -78,6 +78,8 @@ pub(crate) type OnLine = (MonoNs, Direction, Vec<u8>);
 pub(crate) struct Bench {
     layout: &'static str,
     scene: String,
+    /// What the inertial unit is called.
+    unit: &'static str,
 }
 
 impl Bench {
@@ -99,11 +101,23 @@ impl Bench {
     /// Heads that turn continuously, on this trajectory.
     pub(crate) fn on(trajectory: &str, effects: &str) -> Self {
         let scene = format!("vehicle = \"vehicle.toml\"\nseed = 11\n[trajectory]\n{trajectory}\n{effects}\n");
-        Self { layout: "phase_shift", scene }
+        Self { layout: "phase_shift", scene, unit: "imu" }
+    }
+
+    /// The same with another seed.
+    pub(crate) fn seeded(self, seed: u64) -> Self {
+        Self { scene: self.scene.replace("seed = 11", &format!("seed = {seed}")), ..self }
+    }
+
+    /// The same with the inertial unit called by another name, so that it draws other random numbers of its own.
+    pub(crate) fn with_unit(self, unit: &'static str) -> Self {
+        Self { unit, ..self }
     }
 
     fn parse(&self) -> Result<Scene, SceneError> {
-        let vehicle = VEHICLE.replace("LAYOUT", self.layout);
+        let vehicle = VEHICLE
+            .replace("LAYOUT", self.layout)
+            .replace("id = \"imu\"", &format!("id = \"{}\"", self.unit));
         Scene::parse(Document::new("scene", &self.scene), &KINDS, &|_| Ok(vehicle.clone().into_bytes()), None)
     }
 

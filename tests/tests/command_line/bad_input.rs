@@ -464,6 +464,11 @@ fn every_command_has_help_with_an_example() {
     assert!(commands.contains(&"replay") && commands.contains(&"demo"), "{commands:?}");
     for command in commands.into_iter().filter(|command| *command != "help") {
         let answer = folder.headrace(&[command, "--help"]);
+        // Done by a program that needn't be there: then it is said how to build it.
+        if ["campaign", "batch"].contains(&command) && answer.code == Some(2) {
+            assert!(answer.stderr.contains("cd campaign && cargo build --release"), "{}", answer.stderr);
+            continue;
+        }
         assert_eq!((answer.code, answer.stderr.as_str()), (Some(0), ""), "{command}");
         assert!(answer.stdout.contains(&format!("Example:\n  headrace {command}")), "{}", answer.stdout);
     }

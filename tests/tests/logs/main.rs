@@ -13,5 +13,6 @@ mod playback;
 mod recover;
 mod rotation;
 mod snapshots;
+mod threads;
 mod trim;
 mod verify;

@@ -9,10 +9,11 @@ use headrace_simulator::{Scene, Simulation};
 use headrace_tests::scenes;
 use headrace_vehicle::VehicleConfig;
 
-struct Packet {
-    source: usize,
-    at: MonoNs,
-    bytes: Vec<u8>,
+#[derive(Clone)]
+pub(crate) struct Packet {
+    pub(crate) source: usize,
+    pub(crate) at: MonoNs,
+    pub(crate) bytes: Vec<u8>,
 }
 
 const COMMANDS: [&str; 7] = [
@@ -26,7 +27,7 @@ const COMMANDS: [&str; 7] = [
 ];
 
 /// All that a scene's devices send, every third packet of a stream of bytes cut in two: frames are open at any moment.
-fn packets(scene: &Scene) -> Vec<Packet> {
+pub(crate) fn packets(scene: &Scene) -> Vec<Packet> {
     let mut simulation = Simulation::new(scene).unwrap();
     let mut all = Vec::new();
     while let Some(message) = simulation.next_message() {
@@ -99,10 +100,10 @@ fn goes_on_from_anywhere(scene: &Scene) {
 }
 
 /// To and fro, so that sections fail, settle, and are cleared.
-const LEGS: &str = "[trajectory]\nstart_m = 3\n[[trajectory.legs]]\ndistance_m = 5\nspeed_mps = 0.197\n\
+pub(crate) const LEGS: &str = "[trajectory]\nstart_m = 3\n[[trajectory.legs]]\ndistance_m = 5\nspeed_mps = 0.197\n\
     [[trajectory.legs]]\ndistance_m = 5\nspeed_mps = 0.4\n[[trajectory.legs]]\ndistance_m = 7\nspeed_mps = -0.3\n";
 
-const EFFECTS: &str = "[effects]\nrange_noise = { sd_m = 0.02 }\nmissing_returns = { share = 0.1, mean_run = 5 }\n\
+pub(crate) const EFFECTS: &str = "[effects]\nrange_noise = { sd_m = 0.02 }\nmissing_returns = { share = 0.1, mean_run = 5 }\n\
     pilot_drift = { across_m = 0.4, yaw_deg = 4 }\n";
 
 /// An inertial unit by a file of its frames, as its crate's README has it.

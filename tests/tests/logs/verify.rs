@@ -66,3 +66,74 @@ fn a_log_without_results_has_nothing_to_be_verified_by() {
     assert_eq!(answer.code, Some(1));
     assert!(answer.stdout.contains("nothing to compare"), "{}", answer.stdout);
 }
+
+/// From the second time on: the same answer, whatever the number of threads, also where the dive differs or the log was cut off.
+#[test]
+fn segments_between_snapshots_give_the_answer_of_the_whole() {
+    let folder = recorded();
+    let whole = folder.read("live.mcap");
+    folder.write("cut.mcap", &whole[..whole.len() / 2]);
+    folder.write(
+        "other.toml",
+        VEHICLE.replacen("mode = \"fastest\"", "mode = \"fastest\"\nangles_deg = [0, 0, 1e-13]", 1),
+    );
+    let other = ["live.mcap", "--vehicle", "other.toml"];
+    for (number, of) in [&["live.mcap"][..], &["cut.mcap"], &other].into_iter().enumerate() {
+        let expected = verified(&folder, of);
+        let snapshots = format!("{number}.snapshots");
+        for threads in ["1", "1", "2", "5"] {
+            let got = verified(&folder, &[of, &["--snapshots", &snapshots, "--threads", threads]].concat());
+            assert_eq!(got, expected, "{of:?}, {threads} threads");
+        }
+    }
+    // The last one is of a longer dive.
+    assert!(folder.read("0.snapshots").len() > folder.read("1.snapshots").len());
+}
+
+#[test]
+fn snapshots_that_were_changed_or_are_others_are_told() {
+    let folder = recorded();
+    let verify = |further: &[&str]| {
+        let answer =
+            folder.headrace(&[&["verify", "live.mcap", "--snapshots", "dive.snapshots"], further].concat());
+        (answer.code, answer.stderr)
+    };
+    assert_eq!(verify(&[]).0, Some(0));
+    let (whole, places) = (folder.read("dive.snapshots"), snapshots(&folder.read("dive.snapshots")));
+    assert!(places.len() > 8, "{places:?}");
+    // The last byte of a snapshot is of its time: in place of the dive's another one.
+    let mut changed = whole.clone();
+    changed[places[4].1 - 1] ^= 1;
+    folder.write("dive.snapshots", &changed);
+    let (code, words) = verify(&[]);
+    assert_eq!(code, Some(4), "{words}");
+    assert!(words.contains(&format!("segment 4 of {}, ", places.len())), "{words}");
+    // A snapshot left out is another segment, and no error.
+    folder.write("dive.snapshots", [&whole[..places[5].0], &whole[places[5].1..]].concat());
+    assert_eq!(verify(&[]).0, Some(0));
+    for (bytes, further) in
+        [(&whole[..whole.len() - 1], &[][..]), (b"", &[]), (&whole[..], &["--tick-ms", "50"])]
+    {
+        folder.write("dive.snapshots", bytes);
+        let (code, words) = verify(further);
+        assert_eq!(code, Some(2), "{words}");
+        assert!(words.contains("dive.snapshots") && words.contains("remove the file"), "{words}");
+    }
+    folder.write("dive.snapshots", [&whole[..places[0].0], &whole[places[0].1..]].concat());
+    let (code, words) = verify(&[]);
+    assert_eq!(code, Some(2), "{words}");
+    assert!(words.contains("the first snapshot isn't that of a dive that begins"), "{words}");
+}
+
+/// Begin, its length included, and end of each snapshot in a file.
+fn snapshots(file: &[u8]) -> Vec<(usize, usize)> {
+    let length =
+        |at: usize| usize::try_from(u64::from_le_bytes(file[at..at + 8].try_into().unwrap())).unwrap();
+    let (mut at, mut all) = (8 + length(0), Vec::new());
+    while at < file.len() {
+        let end = at + 8 + length(at);
+        all.push((at, end));
+        at = end;
+    }
+    all
+}

@@ -1,10 +1,12 @@
 //! What a plan promises against the wall itself: heads stepped by their schedule, their beams cast, and the largest
 //! circle looked for that holds no sample.
 //!
+//! What the vehicle itself hides from its heads is found here, too, by following beams step by step.
+//!
 //! A circle that is found is no larger than the largest, so that none may exceed the promise; and the promise is no
 //! more than twice what is found, or it would cost the crew their time.
 
-use headrace_geometry::frames::{Mount, Point3, Pose, Rot, Vec3};
+use headrace_geometry::frames::{Body, Mount, Point3, Pose, Rot, Vec3};
 use headrace_geometry::math::{self, PI, TAU};
 use headrace_geometry::time::DurNs;
 use headrace_geometry::tunnel::{Profile, shapes};
@@ -79,6 +81,42 @@ fn straight(_: f64) -> (f64, f64) {
     (0.0, 0.0)
 }
 
+/// Length of the steps in which a beam is followed away from its head, m: the sliver of 5 mm is met by two at least.
+const STEP_M: f64 = 0.002;
+/// Farther from a head there is nothing of the vehicle, m.
+const VEHICLE_M: f64 = 1.6;
+
+/// Whether a beam ends at the vehicle: followed step by step, is a place on it within another head or the hull? A head's own body and
+/// a box about the head hide nothing.
+fn is_hidden(inspection: &Inspection, number: usize, angle_rad: f64) -> bool {
+    let (spec, _) = &inspection.heads[number];
+    let from = spec.mount.position;
+    // 0 is down, growing clockwise seen from behind the head; one that faces aft is turned about the upright.
+    let (sine, cosine) = math::sin_cos(angle_rad);
+    let towards = spec.mount.rotation * Vec3::new(0.0, sine, -cosine);
+    let others = || inspection.heads.iter().enumerate().filter(|(other, _)| *other != number);
+    let solid = |at: Vec3<Body>| {
+        let in_head = others().any(|(_, (other, _))| {
+            let HeadBody { radius_m, ahead_m, behind_m } = other.body;
+            let off = at + other.mount.position.scaled(-1.0);
+            // Heads look forward or aft here, so that their axes are the vehicle's.
+            let along_m = (other.mount.rotation * Vec3::new(1.0, 0.0, 0.0)).x() * off.x();
+            radius_m > 0.0
+                && (-behind_m..=ahead_m).contains(&along_m)
+                && math::hypot(off.y(), off.z()) <= radius_m
+        });
+        in_head || inspection.hull.iter().any(|part| in_box(part, at) && !in_box(part, from))
+    };
+    let steps = math::floor_to_i64(VEHICLE_M / STEP_M);
+    (1..=steps).any(|step| solid(from + towards.scaled(step as f64 * STEP_M)))
+}
+
+fn in_box(part: &Obstacle, at: Vec3<Body>) -> bool {
+    let Obstacle::Box { least, most } = part else { panic!("hulls are of boxes here") };
+    let within = |axis: fn(&Vec3<Body>) -> f64| (axis(least)..=axis(most)).contains(&axis(&at));
+    within(Vec3::x) && within(Vec3::y) && within(Vec3::z)
+}
+
 /// Samples (chainage, arc length) of a dive as long as `length_m`.
 fn samples(planner: &Planner, mode: usize, speed_mps: f64, length_m: f64, way: Way) -> Vec<[f64; 2]> {
     let schedule = planner.schedule(mode, speed_mps).unwrap();
@@ -89,7 +127,7 @@ fn samples(planner: &Planner, mode: usize, speed_mps: f64, length_m: f64, way: W
         for ping in 0..pings {
             let t = ping as f64 * spec.ping_period_s;
             let angle = schedule.angle_rad(number, DurNs::from_secs_f64(t)).unwrap();
-            if planner.hidden()[number].iter().any(|range| range.has(angle)) {
+            if is_hidden(inspection, number, angle) {
                 continue;
             }
             let (aside_m, yaw_rad) = way(t);

@@ -1,9 +1,8 @@
 //! Early fail, before the hole is final: an empty circle that lies wholly where no more samples can land.
 
-use super::{HoleFinder, Tile, cell_m, first_tiles};
+use super::{HoleFinder, NO_OWNER, Tile, cell_m, first_tiles};
 use crate::frontier::{Reach, clear_of};
 use crate::store::SampleStore;
-use headrace_geometry::math;
 
 /// Search resolution, m: a circle larger than the radius by less than this may be missed.
 const FINE_M: f64 = 1e-3;
@@ -37,7 +36,8 @@ impl HoleFinder {
         let around_m = needed.most_m + length_m;
         window.fill((store, 0), from_m, (-around_m, length_m + around_m), cell_m(needed.most_m));
         tiles.clear();
-        tiles.extend(first_tiles(store.perimeter_m(), length_m));
+        let perimeter_m = store.perimeter_m();
+        tiles.extend(first_tiles(perimeter_m, length_m).map(|tile| Tile { owner: NO_OWNER, ..tile }));
         while let Some(tile) = tiles.pop() {
             let half_m = tile.half_m();
             let clear_m = reaches.map(|reach| clear_of(reach, from_m + tile.x_m));
@@ -47,13 +47,13 @@ impl HoleFinder {
             if clear_m + tile.half_x_m < least_m {
                 continue;
             }
-            let nearest = window.nearest(tile.x_m, tile.arc_m, radius_m + half_m);
-            let nearest_m = nearest.map_or(f64::INFINITY, |found| math::sqrt(found.distance2));
+            let near = tile.near(window, least_m, radius_m + half_m);
+            let Some((nearest, nearest_m)) = near.unsettled() else { continue };
             if nearest_m.min(clear_m) > radius_m {
                 return true;
             }
             if nearest_m + half_m > least_m && half_m > FINE_M {
-                tiles.extend::<[Tile; 2]>(tile.halves());
+                tiles.extend::<[Tile; 2]>(tile.halves_of(nearest.as_ref(), perimeter_m));
             }
         }
         false
@@ -64,6 +64,7 @@ impl HoleFinder {
 mod tests {
     use super::*;
     use crate::store::{StoreLayout, WallSample};
+    use headrace_geometry::math;
     use proptest::prelude::*;
 
     const PERIMETER_M: f64 = 6.0;

@@ -158,6 +158,16 @@ impl Window {
 
     /// Nearest sample to a point within `within_m`; of equally near ones the first found.
     pub(super) fn nearest(&self, x_m: f64, arc_m: f64, within_m: f64) -> Option<Nearest> {
+        self.near(x_m, arc_m, within_m, -1.0)
+    }
+
+    /// The nearest sample to a point within `within_m`, or one that is within `enough_m`.
+    pub(super) fn near_enough(&self, x_m: f64, arc_m: f64, within_m: f64, enough_m: f64) -> Option<Nearest> {
+        let enough2 = if enough_m > 0.0 { enough_m * enough_m } else { -1.0 };
+        self.near(x_m, arc_m, within_m, enough2)
+    }
+
+    fn near(&self, x_m: f64, arc_m: f64, within_m: f64, enough2: f64) -> Option<Nearest> {
         let [per_turn, per_row, _] = self.per_m;
         let turn = libm::floor(arc_m * per_turn);
         let arc_m = arc_m - turn * self.perimeter_m;
@@ -166,6 +176,9 @@ impl Window {
         // Outwards from the point's row, one row to either side at a time.
         self.look_in_row(centre, &mut best);
         for ring in 1..self.rows {
+            if best.limit2 <= enough2 && best.found.is_some() {
+                break;
+            }
             let below = (centre >= ring).then(|| centre - ring);
             let above = Some(centre + ring).filter(|row| *row < self.rows);
             let mut in_reach = false;

@@ -1,9 +1,8 @@
 //! Holes as they would have been: with samples that are lacking put back, the wall drawn together, or stretches covered.
 
-use super::{HoleFinder, Tile, cell_m, first_tiles};
+use super::{HoleFinder, NO_OWNER, Tile, cell_m, first_tiles};
 use crate::frontier::Reach;
 use crate::store::SampleStore;
-use headrace_geometry::math;
 
 /// Search resolution, as a share of the radius: a circle larger by less than this may be missed.
 const FINE: f64 = 0.01;
@@ -39,19 +38,19 @@ impl Otherwise {
 }
 
 impl HoleFinder {
-    /// True if a circle of `radius_m` centred between two chainages would hold no sample, had things been `otherwise` and
-    /// had there been the samples `more` (chainage and arc length, m) as well; samples count from `first_visit` on.
+    /// Lays out the wall as it would have been `otherwise`, with the samples `more` (chainage and arc length, m) as well, for
+    /// circles of up to `radius_m` centred between two chainages; samples count from `first_visit` on.
     ///
-    /// Allocates: never, unless a section is over 4,000 cells large.
-    pub fn has_circle_otherwise(
+    /// Allocates: never.
+    pub fn lay_otherwise(
         &mut self,
         (store, first_visit): (&SampleStore, u32),
         (from_m, to_m): (f64, f64),
         radius_m: f64,
         otherwise: &Otherwise,
         more: impl Iterator<Item = [f64; 2]>,
-    ) -> bool {
-        let Self { window, tiles, .. } = self;
+    ) {
+        let window = &mut self.window;
         let Otherwise { along, around, .. } = *otherwise;
         let length_m = (to_m - from_m) * along;
         let perimeter_m = store.perimeter_m() * around;
@@ -76,18 +75,32 @@ impl HoleFinder {
             take(x_m, arc_m);
         }
         window.sort();
+    }
+
+    /// True if a circle of `radius_m` centred between two chainages would hold no sample on the wall that was laid out
+    /// [`otherwise`](Self::lay_otherwise), for circles as large at least.
+    ///
+    /// Allocates: never, unless a section is over 4,000 cells large.
+    pub fn has_circle_otherwise(
+        &mut self,
+        (from_m, to_m): (f64, f64),
+        radius_m: f64,
+        otherwise: &Otherwise,
+    ) -> bool {
+        let Self { window, tiles, .. } = self;
+        let (length_m, perimeter_m) = ((to_m - from_m) * otherwise.along, window.perimeter_m());
         tiles.clear();
-        tiles.extend(first_tiles(perimeter_m, length_m));
+        tiles.extend(first_tiles(perimeter_m, length_m).map(|tile| Tile { owner: NO_OWNER, ..tile }));
         while let Some(tile) = tiles.pop() {
             let half_m = tile.half_m();
-            let clear_m = otherwise.clear_m(from_m + tile.x_m / along);
-            let nearest = window.nearest(tile.x_m, tile.arc_m, radius_m + half_m);
-            let nearest_m = nearest.map_or(f64::INFINITY, |found| math::sqrt(found.distance2)).min(clear_m);
+            let near = tile.near(window, radius_m, radius_m + half_m);
+            let Some((nearest, near_m)) = near.unsettled() else { continue };
+            let nearest_m = near_m.min(otherwise.clear_m(from_m + tile.x_m / otherwise.along));
             if nearest_m > radius_m {
                 return true;
             }
             if nearest_m + half_m > radius_m && half_m > FINE * radius_m {
-                tiles.extend::<[Tile; 2]>(tile.halves());
+                tiles.extend::<[Tile; 2]>(tile.halves_of(nearest.as_ref(), perimeter_m));
             }
         }
         false
@@ -113,7 +126,9 @@ mod tests {
             store.insert(WallSample { x_m, arc_m, head: 0, step_m: None, visit: 0 }).unwrap();
         }
         let more = more.iter().copied();
-        HoleFinder::default().has_circle_otherwise((&store, 0), (5.0, 5.5), radius_m, otherwise, more)
+        let (mut finder, between_m) = (HoleFinder::default(), (5.0, 5.5));
+        finder.lay_otherwise((&store, 0), between_m, 1.2 * radius_m, otherwise, more);
+        finder.has_circle_otherwise(between_m, radius_m, otherwise)
     }
 
     #[test]

@@ -50,9 +50,6 @@ const MISLED_SHARE: f64 = 0.3;
 const LOOSEST_M: f64 = 0.5;
 /// Time over which a loose cable is taken to tighten, s.
 const TIGHTENS_OVER_S: f64 = 100.0;
-/// Share of a wall's ranges' correction of the attitude, and of what is learnt from it, that is made. What matters to coverage is
-/// the attitude of one pass relative to the next, which the gyros know better than walls, whose shape isn't the design's.
-const WALL_SHARE: f64 = 0.3;
 /// Time within which an estimate settles.
 const SETTLES_WITHIN: DurNs = DurNs(20_000_000_000);
 
@@ -367,7 +364,7 @@ impl Eskf {
         if agrees {
             source.noise_level.note(kind, number, innovation, variance);
             if matches!(kind, SensorKind::Head | SensorKind::Echosounder { .. }) {
-                self.correct_by_wall(&row, known, errors);
+                self.correct_by_wall(&row, settings.wall_share, known, errors);
             } else {
                 self.correct(&row, known, errors);
             }
@@ -455,17 +452,17 @@ impl Eskf {
         self.apply(row, &gain, known, errors);
     }
 
-    /// Corrects by a range of the wall, which takes part only in what it tells of the attitude.
+    /// Corrects by a range of the wall: the attitude, and what is learnt from it, by a share of what it tells.
     ///
     /// Source: Brink, Partial-Update Schmidt-Kalman Filter, 2017; the covariance is Joseph's for the smaller gain, which is
     /// the best one's plus a dyad of the gain left out.
-    fn correct_by_wall(&mut self, row: &ScalarUpdate, known: &Errors, errors: &mut Errors) {
+    fn correct_by_wall(&mut self, row: &ScalarUpdate, share: f64, known: &Errors, errors: &mut Errors) {
         let mut gain = self.factors.measure(&row.h, row.noise);
         let mut left_out = [0.0; ERRORS];
         for i in (ATTITUDE..ATTITUDE + 3).chain(RATE_BIAS..RATE_BIAS + 3).chain([HEADING]) {
             if let (Some(k), Some(left)) = (gain.k.get_mut(i), left_out.get_mut(i)) {
-                *left = (1.0 - WALL_SHARE) * *k;
-                *k *= WALL_SHARE;
+                *left = (1.0 - share) * *k;
+                *k *= share;
             }
         }
         self.factors.add(gain.variance, left_out, HEADING + 1);

@@ -92,6 +92,10 @@ pub struct Settings {
     pub epoch: DurNs,
     /// Whether the level of the sources' noise is learnt. Likelihoods can only be compared without.
     pub learns: bool,
+    /// Share of a wall's ranges' correction of the attitude, and of what is learnt from it, that is made: 0 to 1, the best estimate.
+    /// What matters to coverage is the attitude of one pass relative to the next, which the gyros know better than walls, whose
+    /// shape isn't the design's. A smoother needs 1: [`crate::smooth::beside`].
+    pub wall_share: f64,
 }
 
 impl Default for Settings {
@@ -127,6 +131,7 @@ impl Default for Settings {
             window: DurNs::from_millis(200),
             epoch: DurNs::from_millis(100),
             learns: true,
+            wall_share: 0.3,
         }
     }
 }

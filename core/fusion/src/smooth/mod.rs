@@ -5,6 +5,7 @@
 //! "Smoothing".
 
 pub mod backward;
+pub mod beside;
 pub mod journal;
 pub mod relative_backward;
 pub mod rts_step;

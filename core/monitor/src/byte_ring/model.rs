@@ -89,16 +89,46 @@ impl ByteConsumer for ModelConsumer {
     }
 }
 
+/// A reading end that takes all for there: a protocol on it that waits for its message doesn't. Models of broken protocols are
+/// of this, and must be found to be so.
+pub struct Hasty(pub ModelConsumer);
+
+impl ByteConsumer for Hasty {
+    fn occupied(&self) -> usize {
+        usize::MAX
+    }
+
+    fn peek(&self, into: &mut [u8]) -> usize {
+        self.0.peek(into)
+    }
+
+    fn skip(&mut self, count: usize) {
+        self.0.skip(count);
+    }
+
+    fn pop(&mut self, into: &mut [u8]) -> usize {
+        self.0.pop(into)
+    }
+}
+
 /// The loop's ring on a model.
 pub fn packets(capacity: usize) -> (Port<ModelProducer>, ModelReader) {
+    packets_by(capacity, |consumer| consumer)
+}
+
+/// The same with another reading end.
+pub fn packets_by<R: ByteConsumer>(
+    capacity: usize,
+    reading: impl FnOnce(ModelConsumer) -> R,
+) -> (Port<ModelProducer>, ModelReader<R>) {
     let (producer, consumer) = ring(capacity);
-    (Port::on(producer), ModelReader(PortReader::on(consumer)))
+    (Port::on(producer), ModelReader(PortReader::on(reading(consumer))))
 }
 
 /// Reading end of the loop's ring on a model.
-pub struct ModelReader(PortReader<ModelConsumer>);
+pub struct ModelReader<R: ByteConsumer = ModelConsumer>(PortReader<R>);
 
-impl ModelReader {
+impl<R: ByteConsumer> ModelReader<R> {
     /// The next packet, as the loop takes it: receive time and bytes.
     pub fn take_next(&mut self) -> Option<(u64, Vec<u8>)> {
         let header = self.0.peek()?;

@@ -33,6 +33,15 @@ impl Advisor {
         Self { advisor, dive_time, looks: Looks::default(), hysteresis: Hysteresis::new(target_m) }
     }
 
+    /// The advice at each beat of a tick, in order; `begun` is the receive time of the first packet.
+    pub(crate) fn fill(&mut self, placed: &[Placed], begun: Option<MonoNs>, list: &mut Vec<Advice>) {
+        list.clear();
+        for item in placed {
+            let Placed::Situation(at, situation, _) = item else { continue };
+            list.push(self.advise(*at, situation, begun));
+        }
+    }
+
     /// Advice to show at a beat; `begun` is the receive time of the first packet.
     fn advise(&mut self, at: MonoNs, situation: &Situation, begun: Option<MonoNs>) -> Advice {
         let left = self.dive_time.zip(begun).map(|(time, begun)| (time - at.since(begun)).as_secs_f64());
@@ -71,25 +80,35 @@ fn digest(stream: &mut ResultStream, at: MonoNs, advice: &Advice) {
     }
 }
 
-pub(super) fn advise(
+/// Finds the advice at each beat. Without an advisor it has come with the tick: see [`crate::split`].
+pub(super) fn find(
     placed: Res<'_, PlacedList>,
     tally: Res<'_, Tally>,
-    mut advisor: ResMut<'_, Advisor>,
+    advisor: Option<ResMut<'_, Advisor>>,
+    mut list: ResMut<'_, AdviceList>,
+) {
+    let Some(mut advisor) = advisor else { return };
+    advisor.fill(&placed.0, tally.span.map(|(first, _)| first), &mut list.0);
+}
+
+/// Publishes the advice.
+pub(super) fn tell(
+    placed: Res<'_, PlacedList>,
+    list: Res<'_, AdviceList>,
     mut log: ResMut<'_, AdviceLog>,
     mut notices: ResMut<'_, Notices>,
-    mut list: ResMut<'_, AdviceList>,
     mut digests: ResMut<'_, Digests>,
 ) {
-    list.0.clear();
-    for item in &placed.0 {
-        let Placed::Situation(at, situation, _) = item else { continue };
-        let begun = tally.span.map(|(first, _)| first);
-        let advice = advisor.advise(*at, situation, begun);
+    let situations = placed.0.iter().filter_map(|item| match item {
+        Placed::Situation(at, situation, _) => Some((at, situation)),
+        Placed::Ping(_) => None,
+    });
+    for ((at, situation), advice) in situations.zip(&list.0) {
+        let advice = *advice;
         digest(&mut digests.advice, *at, &advice);
         let chainage_m = situation.pose.map(|pose| pose.position.x());
         let entry = AdviceEntry { at: *at, chainage_m, speed_mps: situation.speed_mps, advice };
         log.take(&entry);
         notices.0.push(Notice::Advice(entry));
-        list.0.push(advice);
     }
 }

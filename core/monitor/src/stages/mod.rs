@@ -31,11 +31,18 @@ pub(super) use walls::end_returns;
 
 /// Adds the core's systems to their stages.
 pub(super) fn add(schedule: &mut Schedule) {
+    add_placing(schedule);
+    schedule.add_systems((
+        cover::cover.in_set(Stage::Cover),
+        (advise::find, advise::tell, live::live).chain().in_set(Stage::Advise),
+    ));
+}
+
+/// Adds those that place pings.
+pub(super) fn add_placing(schedule: &mut Schedule) {
     schedule.add_systems((
         decode::decode.in_set(Stage::Decode),
         navigate::navigate.in_set(Stage::Navigate),
         georeference::georeference.in_set(Stage::Georeference),
-        cover::cover.in_set(Stage::Cover),
-        (advise::advise, live::live).chain().in_set(Stage::Advise),
     ));
 }

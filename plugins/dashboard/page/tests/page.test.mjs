@@ -126,6 +126,61 @@ describe("alerts", () => {
     await other.context.close();
   }));
 
+  /** Items of the list that can be read whole, all its items, and how many are said to be hidden. */
+  const listed = (page) => page.evaluate(() => {
+    const frame = document.querySelector(".alert-list").getBoundingClientRect();
+    const items = [...document.querySelectorAll(".alert")];
+    const whole = items.filter((item) => item.getBoundingClientRect().top >= frame.top - 1 && item.getBoundingClientRect().bottom <= frame.bottom + 1);
+    const more = document.querySelector(".alerts .more")?.textContent ?? "0";
+    const root = document.documentElement;
+    return { whole: whole.map((item) => Number(item.dataset.number)), all: items.length, hidden: Number.parseInt(more, 10),
+      fits: root.scrollHeight <= innerHeight && root.scrollWidth <= innerWidth };
+  });
+  const raised = (mock, count) => {
+    for (let k = 0; k < count; k += 1) mock.control({ raise: { priority: k === 3 ? "alarm" : "warning", kind: `kind_${k}`, text: `sensor ${k} has been silent for a while`, advice: "look at its plug" } });
+  };
+
+  it("of twenty at 1280x800 the first are shown, the rest are counted and reached by keys", () => on({ at_m: 1 }, async ({ mock, page }) => {
+    await page.locator(".alert-list .none").waitFor();
+    raised(mock, 20);
+    await page.waitForFunction(() => document.querySelectorAll(".alert").length === 20 && document.querySelector(".alerts .more"));
+    const before = await listed(page);
+    assert.ok(before.fits, "the page has grown over its window");
+    assert.ok(before.whole.length >= 10, `${before.whole.length} of 20 can be read`);
+    // The one alarm comes first, and what is cut by the edge counts as shown or as hidden, not as both.
+    assert.equal(before.whole[0], 4);
+    assert.ok([0, 1].includes(20 - before.whole.length - before.hidden), JSON.stringify(before));
+    await page.locator(".alert-list").focus();
+    await page.keyboard.press("End");
+    await page.waitForFunction(() => !document.querySelector(".alerts .more"));
+    const after = await listed(page);
+    assert.ok(after.whole.length >= 10 && after.all === 20, JSON.stringify(after));
+    assert.ok(!after.whole.includes(4) && after.fits, JSON.stringify(after));
+    // A line opens while it has the focus, with what is to be done.
+    const last = page.locator(".alert").last(), advice = last.locator(".do");
+    assert.ok(!(await advice.isVisible()));
+    await last.getByRole("button", { name: /Ack alert/ }).focus();
+    await advice.waitFor();
+    await page.locator(".alert-list").focus();
+    await page.keyboard.press("Home");
+    await page.waitForFunction((hidden) => Number.parseInt(document.querySelector(".alerts .more")?.textContent ?? "0", 10) === hidden, before.hidden);
+  }));
+
+  it("of more than the list holds the rest are counted, and move up as others are acknowledged", () => on({ at_m: 1 }, async ({ mock, page }) => {
+    await page.locator(".alert-list .none").waitFor();
+    raised(mock, 70);
+    await page.waitForFunction(() => document.querySelectorAll(".alert").length === 64);
+    await page.locator(".alerts .count", { hasText: "70 not acknowledged" }).waitFor();
+    await page.locator(".alert-list").focus();
+    await page.keyboard.press("End");
+    await page.locator(".alerts .more", { hasText: /^6 more hidden$/ }).waitFor();
+    for (let k = 0; k < 10; k += 1) mock.control({ settle: `kind_${k}` });
+    await page.keyboard.press("Shift+A");
+    await page.locator(".alerts .count", { hasText: "60 acknowledged" }).waitFor();
+    await page.waitForFunction(() => document.querySelectorAll(".alert").length === 60 && !document.querySelector(".alerts .more")?.textContent.match(/hidden$/));
+    assert.ok((await listed(page)).fits);
+  }));
+
   it("what is over stays until it is acknowledged; a caution doesn't", () => on({}, async ({ mock, page }) => {
     await condition(page, "good");
     mock.control({ raise: { priority: "alarm", class: "coverage", kind: "missed", text: "MISSED 0+040" } });

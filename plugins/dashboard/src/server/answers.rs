@@ -257,7 +257,7 @@ async fn state(State(shared): Here, headers: HeaderMap, uri: Uri) -> Response {
 
 async fn schema() -> Response {
     let kind = [(header::CONTENT_TYPE, "application/schema+json")];
-    (kind, include_str!("../../../../docs/live-state.schema.json")).into_response()
+    (kind, include_str!("../../../../docs/page-feed.schema.json")).into_response()
 }
 
 async fn figures(State(shared): Here, headers: HeaderMap, uri: Uri) -> Response {

@@ -166,7 +166,7 @@ impl<'a> Panel<'a> {
             taken.marker(at);
         }
         // Those that must be read first; where there is no room left, the table on the page has the others.
-        let knee = crate::point::knee(&self.trade.points, self.scene);
+        let knee = crate::point::knee(&self.trade.points, self.scene, self.trade.resolution());
         let is_knee = |point: &Point| knee.is_some_and(|knee| std::ptr::eq(knee, point));
         let mut points = self.points.clone();
         points.sort_by_key(|point| (!point.is_default, !is_knee(point), !point.on_front));

@@ -9,10 +9,15 @@ pub(super) fn page(results: &Results) -> String {
     let mut text = format!(
         "# What accuracy costs\n\nMade by `{}`, nothing by hand. Times are of {}, {}; they are as old as that, and differ from machine to \
          machine: compare them with one another only. All else is the same wherever it is measured.\n\n\
-         Each point is a setting: its error against independent values, with 95 % or quartile bounds, beside its cost, median and \
-         quartiles of at least nine rounds in turns. \"Front\" says that no other setting of the same scene has less error for no \
-         more cost. CPU time is that of the thread, the kernel's part for it included; wall time says little on a shared machine.\n",
-        results.command, results.program, results.machine
+         Each point is a setting: its error against independent values, with 95 % or outermost bounds, beside its cost, {}. \
+         The bars say how far the rounds of one run are apart: from run to run a machine is faster or slower as a whole, by which all \
+         costs of a trade differ alike (`.ci/cost-page --runs ONE OTHER` tells by how much). \"Front\" says that no other setting of \
+         the same scene has less error for no more cost. CPU time is that of the thread, the kernel's part for it included; wall time says \
+         little on a shared machine.\n",
+        results.command,
+        results.program,
+        results.machine,
+        results.bars.as_str()
     );
     for trade in &results.trades {
         text.push_str(&section(trade));

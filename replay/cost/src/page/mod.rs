@@ -15,6 +15,29 @@ pub use table::table;
 /// Version of `cost.json`.
 pub const COST_VERSION: u32 = 1;
 
+/// What the bounds of costs are.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Bars {
+    /// Quartiles of nine rounds: what files have that don't say.
+    #[default]
+    Quartiles,
+    /// The median's interval of 95 %.
+    Median,
+}
+
+impl Bars {
+    /// What they are, in words.
+    pub fn as_str(self) -> &'static str {
+        match self {
+            Self::Quartiles => "median and quartiles of nine rounds in turns",
+            Self::Median => {
+                "median of rounds in turns (nine; with `--quick` six) with its 95 % interval, by signs"
+            }
+        }
+    }
+}
+
 /// All that was measured.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Results {
@@ -26,6 +49,9 @@ pub struct Results {
     pub machine: String,
     /// The command that gives this again.
     pub command: String,
+    /// What the bounds of costs are.
+    #[serde(default)]
+    pub bars: Bars,
     /// The trades.
     pub trades: Vec<Trade>,
     /// What isn't a choice.

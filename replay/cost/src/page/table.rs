@@ -28,7 +28,7 @@ pub fn table(trade: &Trade) -> String {
     append(
         &mut text,
         format_args!(
-            "  * nothing beats it   # as shipped   cost with its quartiles\n  oracle's own error {size}: {how}\n"
+            "  * nothing beats it   # as shipped   cost with its 95 % interval\n  oracle's own error {size}: {how}\n"
         ),
     );
     for left in &trade.left_out {

@@ -2,6 +2,7 @@
 
 mod cable;
 mod heard;
+mod words;
 
 use std::rc::Rc;
 
@@ -98,7 +99,8 @@ pub fn measure(inputs: &Inputs<'_>, progress: &mut dyn FnMut(&str)) -> Result<Tr
     progress("navigation: the oracle");
     let oracle = oracle(inputs, &places)?;
     front(&mut points, RESOLUTION_M);
-    let advice = advice(&points, places.last().map_or("", |place| place.name.as_str()));
+    let reasons = words::reasons(&points);
+    let advice = words::advice(&points, places.last().map_or("", |place| place.name.as_str()));
     Ok(Trade {
         name: "navigation".to_owned(),
         title: "Navigation".to_owned(),
@@ -111,12 +113,7 @@ pub fn measure(inputs: &Inputs<'_>, progress: &mut dyn FnMut(&str)) -> Result<Tr
         points,
         left_out: left_out(inputs),
         oracle,
-        reasons: vec![
-            "The filter with sonar returns stays the default where something cheaper has the same displacement: it alone has the place \
-             across and a standard deviation with it, without which no section may pass."
-                .to_owned(),
-            "The smoother isn't the default: it needs the whole dive, and verdicts are said during it.".to_owned(),
-        ],
+        reasons,
         advice,
     })
 }
@@ -461,30 +458,9 @@ fn left_out(inputs: &Inputs<'_>) -> Vec<LeftOut> {
     }];
     if inputs.effort.pick(true, false) {
         left_out.push(LeftOut {
-            what: "chainages 3000 and 6900 m".to_owned(),
+            what: "chainages 3000 and 6900 m, four of five seeds, and the last metres of dives".to_owned(),
             why: "`--quick`; the whole measurement has them".to_owned(),
         });
     }
     left_out
-}
-
-/// What the data says of the default in the last scene.
-fn advice(points: &[Point], scene: &str) -> String {
-    let of = |value: &str| points.iter().find(|point| point.scene == scene && point.value == value);
-    let (Some(cable), Some(usual)) = (of("cable only"), of("filter, sonar returns")) else {
-        return "Without points there is nothing to advise.".to_owned();
-    };
-    let figure = |point: &Point, name: &str| {
-        let found = point.errors.iter().find(|error| error.name == name);
-        found.map_or(f64::NAN, |error| error.interval.middle)
-    };
-    format!(
-        "{scene}: the filter with sonar returns knows the place across to {:.3} m instead of {:.2} m by the cable alone, and D to \
-         {:.3} m instead of {:.3} m, for {:.1} ms of CPU more a second of dive.",
-        figure(usual, "position across"),
-        figure(cable, "position across"),
-        figure(usual, "abs(D - D_true), 95th percentile"),
-        figure(cable, "abs(D - D_true), 95th percentile"),
-        (usual.cost.middle - cable.cost.middle) * 1e-6,
-    )
 }

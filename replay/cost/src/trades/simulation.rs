@@ -13,6 +13,7 @@ use crate::error::CostError;
 use crate::measure::{in_turns, timed};
 use crate::point::{Error, Interval, LeftOut, OracleError, Point, Trade, front};
 use crate::scene::{Inputs, file};
+use crate::words::number;
 
 /// Rays of a beam that are held against [`MANY_RAYS`].
 const RAYS: [u32; 7] = [1, 2, 4, 8, 16, 32, 64];
@@ -68,7 +69,7 @@ pub fn measure(inputs: &Inputs<'_>, progress: &mut dyn FnMut(&str)) -> Result<Tr
         size = size.max(off_m);
     }
     front(&mut points, RESOLUTION_M);
-    let advice = advice(&points);
+    let (reasons, advice) = (reasons(&points), advice(&points));
     Ok(Trade {
         name: "simulation".to_owned(),
         title: "Simulation".to_owned(),
@@ -84,13 +85,7 @@ pub fn measure(inputs: &Inputs<'_>, progress: &mut dyn FnMut(&str)) -> Result<Tr
             how: format!("{MANY_RAYS} rays against {OTHER_RAYS}, which lie elsewhere within the beam"),
             size,
         },
-        reasons: vec![
-            format!(
-                "{USUAL_RAYS} rays stay the default where fewer change D no more: a boulder's edge within a beam is found by its rays \
-                 alone, and D doesn't show it."
-            ),
-            "All effects of a scene stay on where leaving one out changes no D: what an effect does depends on the scene.".to_owned(),
-        ],
+        reasons,
         advice,
     })
 }
@@ -399,11 +394,48 @@ fn left_out(inputs: &Inputs<'_>) -> Vec<LeftOut> {
     ];
     if inputs.effort.pick(true, false) {
         left_out.push(LeftOut {
-            what: "collapse, field, all effects, and rays among boulders".to_owned(),
+            what: "collapse, field, all effects, rays among boulders, and three of five seeds".to_owned(),
             why: "`--quick`; the whole measurement has them".to_owned(),
         });
     }
     left_out
+}
+
+/// A change of D below this counts as none, m.
+const UNCHANGED_M: f64 = 0.01;
+
+/// Why a beam has as many rays, and a scene all its effects.
+fn reasons(points: &[Point]) -> Vec<String> {
+    let of_rays = |rays: u32| {
+        let is = move |point: &&Point| point.knob == "rays" && point.value == rays.to_string();
+        points.iter().filter(is).find(|point| !point.errors.is_empty())
+    };
+    let rays = of_rays(1).zip(of_rays(USUAL_RAYS)).map(|(one, usual)| {
+        format!(
+            "{USUAL_RAYS} rays stay the default where fewer change D no more: in the {} scene one ray is {} m off the D of {MANY_RAYS} and \
+             {USUAL_RAYS} are {} m, for {} ns a return in place of {}. Where a boulder's edge cuts a beam its rays alone find it, and D \
+             doesn't show it.",
+            usual.scene.trim_end_matches(", rays"),
+            number(one.error()),
+            number(usual.error()),
+            number(usual.cost.middle),
+            number(one.cost.middle)
+        )
+    });
+    let left_out: Vec<&Point> =
+        points.iter().filter(|point| point.method == "left out" && !point.is_default).collect();
+    let surely = |point: &&&Point| {
+        point.errors.first().is_some_and(|error| error.unit == "m" && error.interval.low > UNCHANGED_M)
+    };
+    let effects = (!left_out.is_empty()).then(|| {
+        format!(
+            "All effects of a scene stay on where leaving one out changes no D: what an effect does depends on the scene. Of {} that were \
+             left out of one scene each time, {} surely change D by more than {UNCHANGED_M} m.",
+            left_out.len(),
+            left_out.iter().filter(surely).count()
+        )
+    });
+    rays.into_iter().chain(effects).collect()
 }
 
 /// The dearest effect that changed nothing, and the one that changed most.
@@ -414,7 +446,7 @@ fn advice(points: &[Point]) -> String {
         found.map_or(f64::NAN, |error| error.interval.middle)
     };
     let most = left_out().max_by(|a, b| a.error().total_cmp(&b.error()));
-    let within = |point: &&Point| point.errors.first().is_some_and(|error| error.interval.high < 0.01);
+    let within = |point: &&Point| point.errors.first().is_some_and(|error| error.interval.high < UNCHANGED_M);
     let idle = left_out().filter(within).max_by(|a, b| figure(a, "saved").total_cmp(&figure(b, "saved")));
     let most = most.map(|point| {
         let by_m = figure(point, "change of D");

@@ -11,6 +11,7 @@ use crate::error::CostError;
 use crate::point::{Error, Interval, LeftOut, OracleError, Point, Trade, front};
 use crate::scene::{Inputs, file};
 use crate::verdicts::{self, Judged, inner};
+use crate::words::number;
 
 const VEHICLE: &str = "vita2-4.toml";
 /// The mode of its heads, and its target, m.
@@ -56,7 +57,7 @@ pub fn measure(inputs: &Inputs<'_>, progress: &mut dyn FnMut(&str)) -> Result<Tr
         });
     }
     front(&mut points, 0.0);
-    let advice = advice(&points, calm_m);
+    let (reasons, advice) = (reasons(&points), advice(&points, calm_m));
     Ok(Trade {
         name: "sureness".to_owned(),
         title: "The price of sureness".to_owned(),
@@ -67,21 +68,31 @@ pub fn measure(inputs: &Inputs<'_>, progress: &mut dyn FnMut(&str)) -> Result<Tr
         cost_is_computed: true,
         decides: Some(0.1 * TARGET_M),
         points,
-        left_out: vec![LeftOut {
-            what: "other modes and targets".to_owned(),
-            why: format!("VITA 2 with four heads in {MODE} for {TARGET_M} m is what is shipped; the trade Survey has the others"),
-        }],
+        left_out: left_out(inputs),
         oracle: OracleError {
             how: "sigma is given and not measured, and hours are the plan's; verdicts of the dives are judged by D_true".to_owned(),
             size: 0.0,
         },
-        reasons: vec![
-            "Two sigma stay the default although one is cheaper: what is falsely passed is told beside, and no more than 2.5 % of what is \
-             over the target may be."
-                .to_owned(),
-        ],
+        reasons,
         advice,
     })
+}
+
+fn left_out(inputs: &Inputs<'_>) -> Vec<LeftOut> {
+    let mut left_out = vec![LeftOut {
+        what: "other modes and targets".to_owned(),
+        why: format!(
+            "VITA 2 with four heads in {MODE} for {TARGET_M} m is what is shipped; the trade Survey has the others"
+        ),
+    }];
+    left_out.extend(inputs.effort.pick(
+        Some(LeftOut {
+            what: "four of five seeds, and half of the dives' length".to_owned(),
+            why: "`--quick`; the whole measurement has them".to_owned(),
+        }),
+        None,
+    ));
+    left_out
 }
 
 /// The largest speed at which sections pass, m/s.
@@ -133,6 +144,24 @@ fn dived(inputs: &Inputs<'_>, confidence: u32, speed_mps: f64) -> Result<Vec<Err
         dives.push(inner(&dive).map(Judged::of).collect::<Vec<_>>());
     }
     Ok(verdicts::errors(&dives, TARGET_M))
+}
+
+/// Why verdicts are of two sigma although one is cheaper.
+fn reasons(points: &[Point]) -> Vec<String> {
+    let passed = |confidence: u32| {
+        let is = |point: &&Point| point.method == format!("{confidence} sigma");
+        let mut errors = points.iter().filter(is).flat_map(|point| &point.errors);
+        errors.find(|error| error.name.starts_with("passed of those over")).map(|error| error.interval)
+    };
+    let (Some(one), Some(usual)) = (passed(1), passed(USUAL)) else { return Vec::new() };
+    vec![format!(
+        "Two sigma stay the default although one is cheaper: of sections over the target one sigma passes {} % (worst dive {} %), two pass {} % \
+         ({} %), and no more than 2.5 % may.",
+        number(one.middle),
+        number(one.high),
+        number(usual.middle),
+        number(usual.high)
+    )]
 }
 
 fn advice(points: &[Point], calm_m: f64) -> String {

@@ -18,8 +18,9 @@ use crate::words::number;
 /// Targets, m.
 const TARGETS_M: [f64; 8] = [0.2, 0.3, 0.4, 0.5, 0.7, 1.0, 1.4, 2.0];
 const QUICK_TARGETS_M: [f64; 3] = [0.4, 0.5, 1.0];
-/// Drifts and layouts are compared at these.
+/// Modes, drifts and layouts are compared at these.
 const FEW_TARGETS_M: [f64; 4] = [0.4, 0.5, 1.0, 2.0];
+const QUICK_FEW_TARGETS_M: [f64; 1] = [SHIPPED_M];
 /// The shipped target, m.
 const SHIPPED_M: f64 = 0.5;
 /// The shipped mode of the vehicle whose modes are compared.
@@ -68,7 +69,8 @@ pub fn measure(inputs: &Inputs<'_>, progress: &mut dyn FnMut(&str)) -> Result<Tr
         let texts = VEHICLES.map(|(name, file)| scene::file(file).map(|text| (name, text)));
         survey.vehicles(&texts.into_iter().collect::<Result<Vec<_>, _>>()?)?;
     }
-    let Survey { mut points, left_out, oracle_m, compared, .. } = survey;
+    let Survey { mut points, mut left_out, oracle_m, compared, .. } = survey;
+    left_out.extend(inputs.effort.pick(Some(quick_left_out()), None));
     front(&mut points, oracle_m);
     let (reasons, advice) = (reasons(&points), advice(&points));
     Ok(Trade {
@@ -92,6 +94,15 @@ pub fn measure(inputs: &Inputs<'_>, progress: &mut dyn FnMut(&str)) -> Result<Tr
         reasons,
         advice,
     })
+}
+
+fn quick_left_out() -> LeftOut {
+    LeftOut {
+        what: format!(
+            "targets but {QUICK_TARGETS_M:?} m, of modes, layouts and drifts but {QUICK_FEW_TARGETS_M:?} m; of places off the middle all but two"
+        ),
+        why: "`--quick`; the whole measurement has them".to_owned(),
+    }
 }
 
 fn reasons(points: &[Point]) -> Vec<String> {
@@ -154,7 +165,7 @@ struct Survey<'a> {
 impl Survey<'_> {
     fn vehicles(&mut self, vehicles: &[(&str, &str)]) -> Result<(), CostError> {
         let targets_m = self.inputs.effort.pick(QUICK_TARGETS_M.as_slice(), &TARGETS_M);
-        let few_m = self.inputs.effort.pick(QUICK_TARGETS_M.as_slice(), &FEW_TARGETS_M);
+        let few_m = self.inputs.effort.pick(QUICK_FEW_TARGETS_M.as_slice(), &FEW_TARGETS_M);
         for (name, file) in vehicles {
             let way = Way {
                 method: (*name).to_owned(),

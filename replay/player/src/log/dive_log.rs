@@ -27,7 +27,7 @@ pub struct PartFile {
 }
 
 /// Opens the log with that index in the list.
-type Open<R> = Box<dyn FnMut(usize) -> Result<LogReader<R>, LogError>>;
+type Open<R> = Box<dyn FnMut(usize) -> Result<LogReader<R>, LogError> + Send>;
 
 /// A position in a dive's log, to continue reading from.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]

@@ -200,7 +200,7 @@ impl<R: ByteConsumer> Queue<R> {
 mod tests {
     use std::sync::atomic::Ordering::{Acquire, Release};
 
-    use headrace_monitor::byte_ring::model::{explore, ring};
+    use headrace_monitor::byte_ring::model::{Hasty, ModelConsumer, explore, ring};
     use loom::sync::Arc;
     use loom::sync::atomic::AtomicBool;
 
@@ -218,25 +218,27 @@ mod tests {
         entries.put(&message(number));
     }
 
-    /// However loop and recorder interleave, entries come out whole and in order, and none that was pushed before the stop is
-    /// left in the queue.
-    #[test]
-    fn entries_are_taken_whole_and_all_of_them_before_the_stop() {
-        let executions = explore("header then body in the recorder's queue, and its stop", Some(3), || {
+    /// A loop that pushes two entries and then sets the flag, and a recorder that takes until `until` ends it.
+    fn explored<R: ByteConsumer + 'static>(
+        name: &str,
+        reading: fn(ModelConsumer) -> R,
+        until: fn(&dyn Fn() -> bool, &mut dyn FnMut() -> usize),
+    ) -> usize {
+        explore(name, Some(3), move || {
             let (producer, consumer) = ring(64);
             let stopping = Arc::new(AtomicBool::new(false));
             let flag = Arc::clone(&stopping);
             let recorder = loom::thread::spawn(move || {
-                let mut queue = Queue { ring: consumer, message: Vec::new() };
+                let mut queue = Queue { ring: reading(consumer), message: Vec::new() };
                 let mut taken = Vec::new();
-                let work = || {
+                let mut work = || {
                     let entry = queue.take();
                     taken.extend(
                         entry.iter().map(|entry| (entry.lane, entry.log_time, queue.message.clone())),
                     );
                     usize::from(entry.is_some())
                 };
-                until_stopped(|| flag.load(Acquire), work, loom::thread::yield_now);
+                until(&|| flag.load(Acquire), &mut work);
                 taken
             });
             let mut entries = Entries { ring: producer };
@@ -246,7 +248,39 @@ mod tests {
             let taken = recorder.join().unwrap();
             let pushed = |number: u8| (Lane::Raw(number.into()), TIMES, message(number));
             assert_eq!(taken, [pushed(0), pushed(1)]);
-        });
+        })
+    }
+
+    fn as_it_is(is_stopping: &dyn Fn() -> bool, work: &mut dyn FnMut() -> usize) {
+        until_stopped(is_stopping, work, loom::thread::yield_now);
+    }
+
+    /// However loop and recorder interleave, entries come out whole and in order, and none that was pushed before the stop is
+    /// left in the queue.
+    #[test]
+    fn entries_are_taken_whole_and_all_of_them_before_the_stop() {
+        let name = "header then body in the recorder's queue, and its stop";
+        let executions = explored(name, |consumer| consumer, as_it_is);
         assert!(executions > 50, "{executions}");
+    }
+
+    #[test]
+    #[should_panic = "assertion `left == right` failed"]
+    fn a_recorder_that_takes_the_header_for_the_entry_is_found() {
+        explored("the recorder's queue, a message not waited for", Hasty, as_it_is);
+    }
+
+    #[test]
+    #[should_panic = "assertion `left == right` failed"]
+    fn a_recorder_that_looks_at_the_flag_last_is_found() {
+        explored(
+            "the recorder's stop, the flag read last",
+            |consumer| consumer,
+            |is_stopping, work| {
+                while work() > 0 || !is_stopping() {
+                    loom::thread::yield_now();
+                }
+            },
+        );
     }
 }

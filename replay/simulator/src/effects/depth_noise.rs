@@ -141,6 +141,40 @@ mod tests {
         }
     }
 
+    /// What the drift takes up anew with each sample has nothing to do with that sample's noise.
+    #[test]
+    fn noise_and_drift_are_drawn_apart() {
+        let stream = Stream::new(3, "depth_noise", "depth");
+        let series = |noise_pa: f64, drift_pa: f64| -> Vec<f64> {
+            let parameters = Parameters { noise_pa, offset_sd_pa: 0.0, drift_pa, tau_s: 1.0 };
+            let mut noise = DepthNoise { parameters, stream, offset_pa: 0.0, drift: 0.0, before: None };
+            (1..20_000).map(|step| noise.error_pa(step, MonoNs(step * 1_000_000_000))).collect()
+        };
+        let (white, drift) = (series(1.0, 0.0), series(0.0, 1.0));
+        let kept = math::exp(-1.0);
+        let taken_up = drift.windows(2).map(|w| (w[1] - kept * w[0]) / math::sqrt(1.0 - kept * kept));
+        let n = drift.len() as f64 - 1.0;
+        let correlation = white.iter().skip(1).zip(taken_up).map(|(a, b)| a * b).sum::<f64>() / n;
+        assert!(correlation.abs() < 5.0 / math::sqrt(n), "{correlation}");
+    }
+
+    #[test]
+    fn offsets_of_many_dives_have_their_spread() {
+        let offset_pa = |seed: u64| {
+            let keys = "[effects.depth_noise]\noffset_sd_pa = 1000\n";
+            let [plain, with] =
+                ["", keys].map(|keys| Bench::turning(keys).seeded(seed).run::<Pressure>("depth")[0]);
+            with.pressure_pa - plain.pressure_pa
+        };
+        let offsets: Vec<f64> = (0..200).map(offset_pa).collect();
+        let n = offsets.len() as f64;
+        let squares = offsets.iter().map(|pa| pa * pa / 1e6);
+        let (second, fourth) = (squares.clone().sum::<f64>() / n, squares.map(|of| of * of).sum::<f64>() / n);
+        assert!((second - 1.0).abs() < 5.0 * math::sqrt(2.0 / n), "{second}");
+        // Of a normal distribution it is 3, and its variance 96 / n.
+        assert!((fourth - 3.0).abs() < 5.0 * math::sqrt(96.0 / n) && fourth > 1.5, "{fourth}");
+    }
+
     #[test]
     fn the_offset_is_one_for_the_dive_and_slices_dont_matter() {
         let errors = errors_pa("[effects.depth_noise]\noffset_sd_pa = 1000\n");

@@ -164,6 +164,48 @@ mod tests {
         assert!(single * 4 > bumps.len() * 3);
     }
 
+    /// Sizes and directions of the bumps of a seed, as drawn in so many spans.
+    fn bumps(spans: u64) -> Vec<Vec3<Sensor>> {
+        let parameters = Parameters { chance: 0.5, speed_mps: [0.05, 0.2], seconds: 0.3 };
+        let bumps = ImuBumps { parameters, stream: Stream::new(5, "imu_bumps", "vehicle") };
+        (0..spans).filter_map(|span| bumps.drawn(span)).map(|(_, speed)| speed).collect()
+    }
+
+    /// Even on a sphere: the mean of each component is 0, that of its square a third. Even from least to most: mean and variance.
+    #[test]
+    fn bumps_come_from_everywhere_and_are_of_every_size() {
+        let bumps = bumps(20_000);
+        let n = bumps.len() as f64;
+        let mean = |of: &dyn Fn(&Vec3<Sensor>) -> f64| bumps.iter().map(of).sum::<f64>() / n;
+        let size = |speed: &Vec3<Sensor>| speed.norm();
+        let axes: [fn(&Vec3<Sensor>) -> f64; 3] = [|v| v.x(), |v| v.y(), |v| v.z()];
+        for axis in axes {
+            let along = |speed: &Vec3<Sensor>| axis(speed) / size(speed);
+            let (first, second) = (mean(&along), mean(&|speed| along(speed) * along(speed)));
+            assert!(first.abs() < 5.0 * math::sqrt(1.0 / 3.0 / n), "{first}");
+            assert!((second - 1.0 / 3.0).abs() < 5.0 * math::sqrt(4.0 / 45.0 / n), "{second}");
+        }
+        let off = |speed: &Vec3<Sensor>| (size(speed) - 0.125) / 0.15;
+        let (first, second) = (mean(&off), mean(&|speed| off(speed) * off(speed)));
+        assert!(first.abs() < 5.0 * math::sqrt(1.0 / 12.0 / n), "{first}");
+        assert!((second - 1.0 / 12.0).abs() < 5.0 * math::sqrt(1.0 / 180.0 / n), "{second}");
+    }
+
+    #[test]
+    fn units_on_one_vehicle_feel_the_same_bumps() {
+        let felt = |unit: &'static str| {
+            let force = |keys: &str| {
+                let samples = Bench::turning(keys).with_unit(unit).run::<Inertia>(unit);
+                samples.iter().map(|sample| sample.force_mps2).collect::<Vec<_>>()
+            };
+            let pairs = force("").into_iter().zip(force(KEYS));
+            pairs.map(|(plain, with)| with + plain.scaled(-1.0)).collect::<Vec<_>>()
+        };
+        let (one, other) = (felt("imu"), felt("imu_of_another_name"));
+        assert!(one.iter().any(|force| force.norm() > 0.1));
+        assert_eq!(one, other);
+    }
+
     #[test]
     fn slices_make_no_difference_and_nonsense_is_refused() {
         same_in_any_slices(&Bench::turning(KEYS));

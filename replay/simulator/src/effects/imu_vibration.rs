@@ -105,32 +105,49 @@ mod tests {
     use super::*;
     use crate::testing_motion::{Bench, refusal, same_in_any_slices};
 
-    /// A swing of 83 Hz, integrated over each sample's period in many small steps, gives these means: one phase an axis, found from
-    /// the first samples, holds for all.
+    /// What a unit measures along or about one of its axes.
+    type Axis = fn(&Inertia) -> f64;
+
+    /// A swing of 83 Hz, integrated over each sample's period in many small steps, gives these means along and about each axis: one
+    /// phase an axis, found from the first samples, holds for all, and no two axes have the same.
     #[test]
-    fn samples_are_means_of_the_swing() {
-        let keys = "[effects.imu_vibration]\nfrequency_hz = 83\naccel_mps2 = 4\n";
+    fn samples_are_means_of_each_axis_s_own_swing() {
+        let keys = "[effects.imu_vibration]\nfrequency_hz = 83\naccel_mps2 = 4\ngyro_degps = 6\n";
         let (plain, shaken) =
             (Bench::turning("").run::<Inertia>("imu"), Bench::turning(keys).run::<Inertia>("imu"));
         let period_s = plain[0].period.as_secs_f64();
-        let error = |k: usize| shaken[k].force_mps2.x() - plain[k].force_mps2.x();
-        let mean = |k: usize, phase_rad: f64| {
-            let at_s = plain[k].at.since(START).as_secs_f64() - period_s / 2.0;
-            let parts = 400;
-            let part = |i: i32| {
-                4.0 * math::sin(
-                    math::TAU * 83.0 * (at_s + (f64::from(i) + 0.5) * period_s / 400.0) + phase_rad,
-                )
+        let rate_radps = f64::to_radians(6.0);
+        let axes: [(f64, Axis); 6] = [
+            (4.0, |inertia| inertia.force_mps2.x()),
+            (4.0, |inertia| inertia.force_mps2.y()),
+            (4.0, |inertia| inertia.force_mps2.z()),
+            (rate_radps, |inertia| inertia.rate_radps.x()),
+            (rate_radps, |inertia| inertia.rate_radps.y()),
+            (rate_radps, |inertia| inertia.rate_radps.z()),
+        ];
+        let mut firsts: Vec<f64> = Vec::new();
+        for (amplitude, axis) in axes {
+            let error = |k: usize| (axis(&shaken[k]) - axis(&plain[k])) / amplitude;
+            let mean = |k: usize, phase_rad: f64| {
+                let at_s = plain[k].at.since(START).as_secs_f64() - period_s / 2.0;
+                let parts = 100;
+                let part = |i: i32| {
+                    let then_s = at_s + (f64::from(i) + 0.5) * period_s / f64::from(parts);
+                    math::sin(math::TAU * 83.0 * then_s + phase_rad)
+                };
+                (0..parts).map(part).sum::<f64>() / f64::from(parts)
             };
-            (0..parts).map(part).sum::<f64>() / f64::from(parts)
-        };
-        let square = |x: f64| x * x;
-        let off = |phase_rad: f64| (0..50).map(|k| square(error(k) - mean(k, phase_rad))).sum::<f64>();
-        let phases = (0..2000).map(|i| math::TAU * f64::from(i) / 2000.0);
-        let phase_rad = phases.min_by(|a, b| off(*a).total_cmp(&off(*b))).unwrap();
-        let worst = (0..plain.len()).map(|k| (error(k) - mean(k, phase_rad)).abs()).fold(0.0, f64::max);
-        let largest = (0..plain.len()).map(|k| error(k).abs()).fold(0.0, f64::max);
-        assert!(plain.len() > 3000 && largest > 0.5 && worst < 0.02, "{largest} {worst}");
+            let square = |x: f64| x * x;
+            let off = |phase_rad: f64| (0..25).map(|k| square(error(k) - mean(k, phase_rad))).sum::<f64>();
+            let tried = (0..1000).map(|i| math::TAU * f64::from(i) / 1000.0);
+            let phase_rad = tried.min_by(|a, b| off(*a).total_cmp(&off(*b))).unwrap();
+            let worst = (0..plain.len()).map(|k| (error(k) - mean(k, phase_rad)).abs()).fold(0.0, f64::max);
+            let largest = (0..plain.len()).map(|k| error(k).abs()).fold(0.0, f64::max);
+            assert!(plain.len() > 3000 && largest > 0.125 && worst < 0.005, "{largest} {worst}");
+            let apart = |other: &f64| (error(0) - other).abs() > 1e-6;
+            assert!(firsts.iter().all(apart), "{phase_rad} {firsts:?}");
+            firsts.push(error(0));
+        }
     }
 
     #[test]

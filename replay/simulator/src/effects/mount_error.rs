@@ -93,6 +93,7 @@ impl Parameters {
 mod tests {
     use headrace_geometry::math;
 
+    use super::*;
     use crate::testing::Dive;
 
     /// In a rectangle on whose axis the head is, a beam that is turned by a roll of the mount meets the wall where an unturned
@@ -133,6 +134,52 @@ mod tests {
         assert!((variance / 1e-4 - 1.0).abs() < 5.0 * math::sqrt(2.0 / n), "{variance}");
         let pairs = places.chunks(2).map(|pair| pair[0] * pair[1]).sum::<f64>() / (n / 2.0);
         assert!(pairs.abs() < 5e-4 / math::sqrt(n / 2.0), "{pairs}");
+    }
+
+    /// A beam at right angles to a head's axis, turned by small angles: roll moves it within its plane, pitch and yaw out of it.
+    #[test]
+    fn angles_have_their_spread_about_each_axis() {
+        let sd_rad = f64::to_radians(0.5);
+        let (mut within, mut out) = (Vec::new(), Vec::new());
+        for seed in 0..400 {
+            let dive = Dive { seed, seconds: 0.2, ..Dive::with_head() };
+            let [plain, turned] = ["", "[effects.mount_error]\nangles_sd_deg = 0.5"]
+                .map(|effects| dive.dive(effects).rows.first().unwrap().sounding.unwrap().direction);
+            let angle_rad = |y: f64, z: f64| math::atan2(z, y);
+            let by_rad = angle_rad(turned.y(), turned.z()) - angle_rad(plain.y(), plain.z());
+            within.push(math::wrap_signed(by_rad, math::TAU));
+            out.push(turned.x() - plain.x());
+        }
+        for errors in [within, out] {
+            let n = errors.len() as f64;
+            let variance = errors.iter().map(|rad| rad * rad).sum::<f64>() / n / (sd_rad * sd_rad);
+            assert!((variance - 1.0).abs() < 5.0 * math::sqrt(2.0 / n), "{variance}");
+        }
+    }
+
+    /// On a sensor that looks to the left, its own x is the vehicle's y: a roll moves z backwards, a pitch moves x down.
+    #[test]
+    fn errors_are_about_the_sensor_s_own_axes() {
+        let left = Mount {
+            position: Vec3::new(0.3, 0.0, 0.0),
+            rotation: Rot::from_roll_pitch_yaw(0.0, 0.0, math::TAU / 4.0),
+        };
+        let angle_rad = f64::to_radians(5.0);
+        let (sine, cosine) = math::sin_cos(angle_rad);
+        let none =
+            Parameters { position_m: [0.0; 3], angles_rad: [0.0; 3], position_sd_m: 0.0, angles_sd_rad: 0.0 };
+        for (angles_rad, axis, expected) in [
+            ([angle_rad, 0.0, 0.0], [0.0, 0.0, 1.0], [sine, 0.0, cosine]),
+            ([0.0, angle_rad, 0.0], [1.0, 0.0, 0.0], [0.0, cosine, -sine]),
+            ([0.0, 0.0, angle_rad], [1.0, 0.0, 0.0], [-sine, cosine, 0.0]),
+        ] {
+            let [x, y, z] = axis;
+            let moved = Parameters { angles_rad, ..none }.moved(&left, [[0.0; 2]; 3]);
+            let found = moved.rotation * Vec3::<Sensor>::new(x, y, z);
+            let [x, y, z] = expected;
+            assert!((found + Vec3::<Body>::new(-x, -y, -z)).norm() < 1e-12, "{angles_rad:?}: {found:?}");
+            assert!((moved.position + left.position.scaled(-1.0)).norm() < 1e-12);
+        }
     }
 
     #[test]

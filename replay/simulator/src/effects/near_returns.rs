@@ -186,6 +186,35 @@ mod tests {
         assert_eq!(heard, 0, "what is lost in the sonar is lost wherever it came from");
     }
 
+    /// Two stretches with a gap between them, in each of which nearly every ping meets a cluster: that of the first stays there.
+    #[test]
+    fn a_cluster_doesn_t_go_on_behind_its_stretch() {
+        let dive = Dive { seconds: 60.0, ..Dive::with_head() };
+        let table = |from_m: f64, near_m: f64| {
+            format!(
+                "[[effects.near_returns]]\nshare = 0.95\nmean_run = 1000\nnear_m = {near_m}\nfar_m = {}\nspread_m = 0\n\
+                 from_m = {from_m}\nto_m = {}\n",
+                near_m + 0.01,
+                from_m + 3.0
+            )
+        };
+        let effects = format!("[effects.motion_within_turn]\n{}{}", table(2.0, 0.8), table(6.0, 1.5));
+        let (mut first, mut second) = (0, 0);
+        for row in &dive.dive(&effects).rows {
+            let range_m = row.sounding.unwrap().measured.range_m.unwrap();
+            let is_first = (0.8..0.8101).contains(&range_m);
+            let is_second = (1.5..1.5101).contains(&range_m);
+            assert!(!is_first || (2.0..5.0).contains(&row.chainage_m), "{range_m} m at {} m", row.chainage_m);
+            assert!(
+                !is_second || (6.0..9.0).contains(&row.chainage_m),
+                "{range_m} m at {} m",
+                row.chainage_m
+            );
+            (first, second) = (first + usize::from(is_first), second + usize::from(is_second));
+        }
+        assert!(first > 50 && second > 50, "{first} {second}");
+    }
+
     #[test]
     fn slices_dont_matter_and_nonsense_is_refused() {
         Dive::with_head().assert_slices_dont_matter("[effects.near_returns]\nshare = 0.3\nmean_run = 9");

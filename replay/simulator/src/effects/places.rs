@@ -106,6 +106,9 @@ mod tests {
             "range_noise]]\nsd_m = 0.1\n",
             "multipath]]\nsquare_share = 0.4\nshare = 0.4\n",
             "side_lobes]]\nshare = 0.4\nangle_deg = 20\n",
+            "echo_strength]]\nwall_db = -20\ngain_db = 0\n",
+            "near_returns]]\nshare = 0.4\n",
+            "sound_speed_profile]]\nper_metre_mps = 3\n",
         ] {
             let two = format!(
                 "[[effects.{effect}from_m = 5\nto_m = 8\n[[effects.{effect}from_m = 12\nto_m = 13.5\n"

@@ -103,6 +103,7 @@ fn rescale(
 
 #[cfg(test)]
 mod tests {
+    use super::*;
     use crate::testing::Dive;
 
     /// Against the time over the way in ten thousand pieces.
@@ -128,6 +129,17 @@ mod tests {
                 let expected_m = range_m * mean * 1447.0;
                 assert!((seen.unwrap() - expected_m).abs() < 1e-8, "{keys}: {seen:?} {expected_m}");
             }
+        }
+    }
+
+    /// Forty metres up a gradient of -50 m/s a metre leaves no sound: the mean slowness down to a third of the floor's speed is told.
+    #[test]
+    fn sound_never_slows_below_a_third() {
+        let profile = Parameters { floor_mps: 1440.0, per_metre_mps: -50.0, assumed_mps: 1440.0 };
+        let expected = 1.5 * math::ln(3.0);
+        for height_m in [20.0, 40.0, 400.0] {
+            let scale = profile.scale(0.0, height_m);
+            assert!((scale / expected - 1.0).abs() < 0.01, "{height_m} m: {scale}, not {expected}");
         }
     }
 

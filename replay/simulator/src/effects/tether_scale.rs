@@ -123,6 +123,20 @@ mod tests {
         }
     }
 
+    /// Of a drag of 0.05 N on a metre where the scene says none: half of it is borne on the mean, over the stiffness.
+    #[test]
+    fn keys_are_stiffness_and_drag() {
+        let plain = counts("");
+        for (keys, strain_pm) in
+            [("stiffness_n = 2000\n", 1.25e-5), ("stiffness_n = 2000\ndrag_npm = 0.4\n", 1e-4)]
+        {
+            let counted = counts(&format!("[effects.tether_scale]\n{keys}"));
+            for (is, counted) in plain.iter().zip(&counted) {
+                assert!((counted - is / (1.0 + strain_pm * is)).abs() < 1e-12, "{keys}: {is} {counted}");
+            }
+        }
+    }
+
     #[test]
     fn slices_make_no_difference_and_nonsense_is_refused() {
         same_in_any_slices(&Bench::turning("[effects.tether_scale]\nshare = -0.01\nstiffness_n = 5e4\n"));

@@ -11,12 +11,16 @@ import { SoundButtons } from "./SoundButtons";
 
 /** So many are in the list; what of them has to be scrolled to is counted, and so is what isn't in it. */
 const SHOWN = 64;
+/** Of more than these all but the first two are a line each, until they have the focus. */
+const ROOMY = 6;
 
 export function Alerts() {
   useTopics(store.topics.alerts, store.topics.hello);
   const list = sorted(store.alerts.values());
   const waiting = list.filter(isUnacknowledged).length;
-  const hidden = Math.max(0, list.length - SHOWN) + store.alertsHidden;
+  // What the program counts beyond those that it lists is partly here, too, where it was raised since the page is open.
+  const all = Math.max(list.length, store.alertsHidden > 0 ? SHOWN + store.alertsHidden : 0);
+  const hidden = all - Math.min(list.length, SHOWN);
   const may = store.hello?.may.operate ?? false;
   const ol = useRef<HTMLOListElement>(null), [below, setBelow] = useState(0);
   const count = () => {
@@ -35,7 +39,7 @@ export function Alerts() {
         <button type="button" disabled={!may} onClick={silence} title="Silence for 30 s (S)">Silence</button>
         <SoundButtons />
       </div>
-      <ol class="alert-list" ref={ol} onScroll={count} tabIndex={0} aria-label="Alerts, first what has to be looked at first">
+      <ol class={`alert-list${list.length > ROOMY ? " dense" : ""}`} ref={ol} onScroll={count} tabIndex={0} aria-label="Alerts, first what has to be looked at first">
         {list.slice(0, SHOWN).map((alert) => <Item key={alert.number} alert={alert} may={may} />)}
         {list.length === 0 ? <li class="none">nothing to report</li> : null}
       </ol>
@@ -52,7 +56,7 @@ function Item({ alert, may }: { alert: Alert; may: boolean }) {
       <Mark alert={alert} />
       <div class="what">
         <div class="line"><b class="priority">{PRIORITY_WORDS[alert.priority]}</b> <span class="number">#{alert.number}</span> <Since alert={alert} />{rectified ? " · over" : ""}{alert.acknowledged ? ` · ack ${alert.acknowledged.by}` : ""}</div>
-        <div class="text">{alert.text}{alert.count > 1 ? ` (${alert.count} times)` : ""}</div>
+        <div class="text" title={alert.text}>{alert.text}{alert.count > 1 ? ` (${alert.count} times)` : ""}</div>
         {alert.advice ? <div class="do">→ {alert.advice}</div> : null}
       </div>
       <div class="do-buttons">

@@ -145,7 +145,10 @@ export class Store {
     const before = this.state;
     this.state = state;
     this.state_ms = performance.now();
-    if (state.alerts_hidden !== undefined) this.alertsHidden = state.alerts_hidden;
+    if (state.alerts_hidden !== undefined && state.alerts_hidden !== this.alertsHidden) {
+      this.alertsHidden = state.alerts_hidden;
+      this.topics.alerts.changed();
+    }
     // A jump back: what has been placed since is no longer so.
     if (before && state.now_s < before.now_s - 1) {
       if (this.link.phase !== "file") this.turns.clear();

@@ -1,8 +1,8 @@
 //! What navigation hears of a dive, so that it can be run, and its CPU time taken, without the rest of the loop.
 
-use headrace_fusion::filter::FilterNavigation;
 use headrace_fusion::filter::settings::Settings;
 use headrace_fusion::smooth::backward::Backward;
+use headrace_fusion::smooth::beside::smoothable;
 use headrace_fusion::smooth::journal::Journal;
 use headrace_fusion::smooth::step::{Placed, Words};
 use headrace_fusion::smooth::track::TrackNavigation;
@@ -115,8 +115,7 @@ impl Hearing {
     /// Navigation along the track that a smoother makes of a filter's run.
     pub(super) fn smoothed(&self, vehicle: &VehicleConfig, settings: &Settings) -> TrackNavigation {
         let (journal, steps) = Journal::new(JOURNAL);
-        let filter = FilterNavigation::new(vehicle.tunnel.profile.clone(), vehicle.site, *settings);
-        let mut filter = filter.with_journal(journal);
+        let mut filter = smoothable(vehicle.tunnel.profile.clone(), vehicle.site, *settings, journal);
         let mut kept: Vec<Words> = Vec::new();
         self.run_noting(&mut filter, &mut |_, _| {}, &mut || {
             kept.extend(std::iter::from_fn(|| steps.next()));

@@ -105,6 +105,42 @@ fn echoes_are_detected_as_often_as_the_sonar_equation_says() {
     }
 }
 
+/// Where no wall is heard at all, parts of the vehicle are.
+#[test]
+fn parts_of_the_vehicle_are_always_heard() {
+    let hull = "[[hull]]\nleast_m = [-1, -0.3, -1]\nmost_m = [1, 0.3, -0.5]";
+    let dive = Dive { vehicle: hull, ..Dive::with_head() };
+    let plain = dive.dive("[effects.occlusion]").ranges_m(0);
+    let deaf =
+        dive.dive("[effects.occlusion]\n[effects.echo_strength]\nwall_db = -60\ngain_db = 0").ranges_m(0);
+    let near = |range_m: &Option<f64>| range_m.is_some_and(|range_m| range_m < 2.0);
+    let hidden = plain.iter().filter(|range_m| near(range_m)).count();
+    assert!(hidden > 10 && hidden < plain.len() / 2, "{hidden} of {}", plain.len());
+    for (was, is) in plain.iter().zip(&deaf) {
+        assert_eq!(*is, was.filter(|_| near(was)));
+    }
+}
+
+#[test]
+fn water_of_its_temperature_absorbs() {
+    let head = Dive::with_head().scene("").unwrap().facts.sensors[0].head.unwrap();
+    for temperature_degc in [4.0, 25.0] {
+        let parameters = Parameters {
+            temperature_degc,
+            silt: Silt { gpl: 0.0, grain_m: 1e-5 },
+            wall_db: 0.0,
+            frequency_khz: Some(1000.0),
+            pulse_us: None,
+            gain_db: 20.0,
+            log_gain_db: 20.0,
+            absorption_dbpm: None,
+        };
+        let off =
+            parameters.sonar(&head, 1447.0).absorbed_dbpm / water_absorption_dbpm(1000.0, temperature_degc);
+        assert!((off - 1.0).abs() < 1e-12, "{temperature_degc}: {off}");
+    }
+}
+
 #[test]
 fn with_its_usual_settings_a_head_hears_rock_about_it() {
     let dive = Dive { seconds: 200.0, ..Dive::with_head() };

@@ -1,0 +1,222 @@
+//! Tables of dives as Parquet files, by program version, parameters and the log's digest.
+//!
+//! `CACHE/VERSION/PARAMETERS/DIVE/sections.parquet`, ... A dive's folder is made beside and renamed, so that it is there as a whole
+//! or not at all, whoever is killed when. Its `whole.json` has the length and digest of each file: what differs is made anew.
+//! `CACHE/known` remembers the digests of logs by path, length and time of writing.
+
+use std::collections::BTreeMap;
+use std::fs::{self, File};
+use std::io::Read as _;
+use std::path::{Path, PathBuf};
+
+use datafusion::arrow::array::RecordBatch;
+use datafusion::parquet::arrow::ArrowWriter;
+use datafusion::parquet::basic::{Compression, ZstdLevel};
+use datafusion::parquet::file::properties::WriterProperties;
+use headrace_tables::{TABLES, Tables, dive_key, program_version};
+use serde::{Deserialize, Serialize};
+use sha2::{Digest, Sha256};
+
+use crate::error::{Error, of_file};
+use crate::place::DiveLog;
+
+/// The list of a dive's files.
+const WHOLE: &str = "whole.json";
+/// Folder for what isn't finished.
+const SCRATCH: &str = "unfinished";
+/// Folder of logs' digests.
+const KNOWN: &str = "known";
+
+/// A folder of finished dives. Several processes may use it at a time.
+#[derive(Debug, Clone)]
+pub struct Cache {
+    folder: PathBuf,
+}
+
+/// A file as it was written.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+struct Written {
+    bytes: u64,
+    sha256: String,
+}
+
+/// What is there of a dive.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Found {
+    /// All of it, unchanged.
+    Whole,
+    /// Nothing.
+    Nothing,
+    /// Something else than was written: what is wrong.
+    Broken(String),
+}
+
+impl Cache {
+    /// A cache in a folder, which is made if it isn't there.
+    ///
+    /// Errors: it can't be made.
+    pub fn open(folder: &Path) -> Result<Self, Error> {
+        for name in [SCRATCH, KNOWN] {
+            let path = folder.join(name);
+            fs::create_dir_all(&path).map_err(of_file("making the folder", &path))?;
+        }
+        let folder = folder.canonicalize().map_err(of_file("opening", folder))?;
+        Ok(Self { folder })
+    }
+
+    /// Its folder.
+    pub fn folder(&self) -> &Path {
+        &self.folder
+    }
+
+    /// Where unfinished things go.
+    pub fn scratch(&self) -> PathBuf {
+        self.folder.join(SCRATCH)
+    }
+
+    /// The folder of a dive as replayed by this program.
+    pub fn dive(&self, parameters: &str, sha256: &str) -> PathBuf {
+        self.folder.join(program_version()).join(parameters).join(dive_key(sha256))
+    }
+
+    /// A table's file in a dive's folder.
+    pub fn table(dive: &Path, table: &str) -> PathBuf {
+        dive.join(format!("{table}.parquet"))
+    }
+
+    /// Looks at a dive's folder, and reads all of it.
+    pub fn look(dive: &Path) -> Found {
+        let whole = match fs::read_to_string(dive.join(WHOLE)) {
+            Ok(text) => text,
+            Err(_) if !dive.exists() => return Found::Nothing,
+            Err(error) => return Found::Broken(format!("{WHOLE}: {error}")),
+        };
+        let Ok(written) = serde_json::from_str::<BTreeMap<String, Written>>(&whole) else {
+            return Found::Broken(format!("{WHOLE} isn't what was written"));
+        };
+        for table in TABLES {
+            let path = Self::table(dive, table);
+            match digest(&path) {
+                Err(error) => return Found::Broken(format!("{table}.parquet: {error}")),
+                Ok(there) if written.get(table) != Some(&there) => {
+                    return Found::Broken(format!("{table}.parquet isn't what was written"));
+                }
+                Ok(_) => {}
+            }
+        }
+        Found::Whole
+    }
+
+    /// Keeps a dive's tables; one that is there already stays, whoever has made it.
+    ///
+    /// Errors: they can't be written.
+    pub fn keep(&self, dive: &Path, tables: &Tables) -> Result<(), Error> {
+        let scratch = self.scratch();
+        let beside = tempfile::tempdir_in(&scratch).map_err(of_file("making a folder in", &scratch))?;
+        let mut written = BTreeMap::new();
+        for table in TABLES {
+            let path = Self::table(beside.path(), table);
+            if let Some(batch) = tables.get(table) {
+                write(&path, batch)?;
+            }
+            written.insert(table, digest(&path).map_err(of_file("reading back", &path))?);
+        }
+        let path = beside.path().join(WHOLE);
+        let text =
+            serde_json::to_string(&written).map_err(|error| of_file("writing", &path)(error.into()))?;
+        fs::write(&path, text).map_err(of_file("writing", &path))?;
+        if let Some(parent) = dive.parent() {
+            fs::create_dir_all(parent).map_err(of_file("making the folder", parent))?;
+        }
+        match fs::rename(beside.path(), dive) {
+            Ok(()) => {
+                // It is no longer where it would be removed from.
+                let _gone = beside.keep();
+                Ok(())
+            }
+            Err(_) if Self::look(dive) == Found::Whole => Ok(()),
+            Err(error) => Err(of_file("renaming to", dive)(error)),
+        }
+    }
+
+    /// Moves a broken dive's folder out of the way and removes it.
+    ///
+    /// Errors: it can't be moved.
+    pub fn discard(&self, dive: &Path) -> Result<(), Error> {
+        let scratch = self.scratch();
+        let beside = tempfile::tempdir_in(&scratch).map_err(of_file("making a folder in", &scratch))?;
+        match fs::rename(dive, beside.path().join("broken")) {
+            Err(error) if error.kind() != std::io::ErrorKind::NotFound => {
+                Err(of_file("moving away", dive)(error))
+            }
+            _ => Ok(()),
+        }
+    }
+
+    /// The digest of a log that was read before and hasn't changed since.
+    pub fn known(&self, place: &str, dive: &DiveLog) -> Option<String> {
+        let text = fs::read_to_string(self.known_path(place, dive)).ok()?;
+        Some(text).filter(|text| text.len() == 64 && text.bytes().all(|byte| byte.is_ascii_hexdigit()))
+    }
+
+    /// Remembers the digest of a log.
+    ///
+    /// Errors: it can't be written.
+    pub fn remember(&self, place: &str, dive: &DiveLog, sha256: &str) -> Result<(), Error> {
+        let (path, scratch) = (self.known_path(place, dive), self.scratch());
+        let file =
+            tempfile::NamedTempFile::new_in(&scratch).map_err(of_file("making a file in", &scratch))?;
+        fs::write(file.path(), sha256).map_err(of_file("writing", file.path()))?;
+        file.persist(&path).map_err(|error| of_file("renaming to", &path)(error.error))?;
+        Ok(())
+    }
+
+    fn known_path(&self, place: &str, dive: &DiveLog) -> PathBuf {
+        let mut hasher = Sha256::new();
+        let mut put = |text: &str| {
+            hasher.update((text.len() as u64).to_le_bytes());
+            hasher.update(text.as_bytes());
+        };
+        put(place);
+        for part in &dive.parts {
+            put(&part.path);
+            put(&part.bytes.to_string());
+            put(&part.modified_us.to_string());
+            put(part.e_tag.as_deref().unwrap_or_default());
+        }
+        self.folder.join(KNOWN).join(hex(&hasher.finalize()))
+    }
+}
+
+fn write(path: &Path, batch: &RecordBatch) -> Result<(), Error> {
+    let file = File::create(path).map_err(of_file("writing", path))?;
+    let level = ZstdLevel::default();
+    let properties = WriterProperties::builder().set_compression(Compression::ZSTD(level)).build();
+    let failed = |source| Error::Parquet { doing: "writing", path: path.to_owned(), source };
+    let mut writer = ArrowWriter::try_new(file, batch.schema(), Some(properties)).map_err(failed)?;
+    writer.write(batch).map_err(failed)?;
+    writer.close().map_err(failed)?;
+    Ok(())
+}
+
+fn digest(path: &Path) -> std::io::Result<Written> {
+    let (mut file, mut hasher, mut block) = (File::open(path)?, Sha256::new(), vec![0; 1 << 16]);
+    let mut bytes = 0;
+    loop {
+        match file.read(&mut block) {
+            Ok(0) => break,
+            Ok(len) => {
+                hasher.update(block.get(..len).unwrap_or_default());
+                bytes += len as u64;
+            }
+            Err(error) if error.kind() == std::io::ErrorKind::Interrupted => {}
+            Err(error) => return Err(error),
+        }
+    }
+    Ok(Written { bytes, sha256: hex(&hasher.finalize()) })
+}
+
+#[expect(clippy::format_collect, reason = "a few bytes")]
+fn hex(bytes: &[u8]) -> String {
+    bytes.iter().map(|byte| format!("{byte:02x}")).collect()
+}

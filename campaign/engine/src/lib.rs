@@ -1,0 +1,15 @@
+//! Campaigns: the dives of a folder or bucket, replayed once each and asked in SQL. `docs/campaign.md` is its manual.
+
+pub mod about;
+pub mod cache;
+pub mod campaign;
+pub mod dives;
+pub mod error;
+pub mod maker;
+pub mod output;
+pub mod picture;
+pub mod place;
+pub mod provider;
+pub mod questions;
+
+pub use error::Error;

@@ -1,0 +1,182 @@
+//! Makes a dive's tables: takes them from the cache, or replays the log and keeps them.
+
+use std::path::PathBuf;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
+
+use datafusion::arrow::array::RecordBatch;
+use datafusion::parquet::arrow::arrow_reader::ParquetRecordBatchReaderBuilder;
+use headrace_tables::{Parameters, Tables, log_digest, replay_digested, unread};
+use tokio::sync::Semaphore;
+
+use crate::cache::{Cache, Found};
+use crate::error::{Error, of_file};
+use crate::place::{DiveLog, Place};
+
+/// Makes tables, at most so many dives at a time.
+#[derive(Debug)]
+pub struct Maker {
+    cache: Cache,
+    threads: Arc<Semaphore>,
+    counts: Arc<Counts>,
+}
+
+/// What a maker has done so far.
+#[derive(Debug, Default)]
+pub struct Counts {
+    replayed: AtomicU64,
+    cached: AtomicU64,
+    broken: AtomicU64,
+}
+
+impl Counts {
+    /// Dives that were replayed.
+    pub fn replayed(&self) -> u64 {
+        self.replayed.load(Ordering::Relaxed)
+    }
+
+    /// Dives that were taken from the cache.
+    pub fn cached(&self) -> u64 {
+        self.cached.load(Ordering::Relaxed)
+    }
+
+    /// Dives that the cache had broken, and that were made anew.
+    pub fn broken(&self) -> u64 {
+        self.broken.load(Ordering::Relaxed)
+    }
+}
+
+/// A dive's tables.
+#[derive(Debug, Clone)]
+pub enum Made {
+    /// In the cache: the log's SHA-256, and the folder.
+    Kept {
+        /// SHA-256 of the log.
+        sha256: String,
+        /// Folder of its Parquet files.
+        folder: PathBuf,
+    },
+    /// None: the log can't be read or replayed. A row of `dives` says why.
+    Unread(Arc<Tables>),
+}
+
+impl Maker {
+    /// With a cache, for `threads` replays at a time.
+    pub fn new(cache: Cache, threads: usize) -> Self {
+        Self { cache, threads: Arc::new(Semaphore::new(threads.max(1))), counts: Arc::default() }
+    }
+
+    /// Its cache.
+    pub fn cache(&self) -> &Cache {
+        &self.cache
+    }
+
+    /// What it has done so far.
+    pub fn counts(&self) -> &Counts {
+        &self.counts
+    }
+
+    /// Makes a dive's tables, or finds them in the cache. Waits for one of the threads.
+    ///
+    /// Errors: the cache can't be written, or the store not be read. A log that can't be replayed is [`Made::Unread`].
+    pub async fn make(&self, place: &Place, dive: &DiveLog, parameters: &Parameters) -> Result<Made, Error> {
+        let _turn = self.threads.acquire().await.map_err(|error| Error::Usage(error.to_string()))?;
+        let url = place.url().to_string();
+        let known = self.cache.known(&url, dive);
+        if let Some(sha256) = &known
+            && let Some(made) = self.find(sha256.clone(), parameters).await?
+        {
+            return Ok(made);
+        }
+        let fetched = match place.fetch(dive, &self.cache.scratch()).await {
+            Err(error @ Error::Store { .. }) => {
+                return unread_dive(
+                    dive,
+                    known.as_deref().unwrap_or_default(),
+                    parameters,
+                    &error.to_string(),
+                );
+            }
+            fetched => fetched?,
+        };
+        let files = fetched.files.clone();
+        let sha256 = match blocking(move || log_digest(&files)).await? {
+            Ok(sha256) => sha256,
+            Err(error) => return unread_dive(dive, "", parameters, &error.to_string()),
+        };
+        if known.as_ref() != Some(&sha256) {
+            self.cache.remember(&url, dive, &sha256)?;
+            if let Some(made) = self.find(sha256.clone(), parameters).await? {
+                return Ok(made);
+            }
+        }
+        let (files, asked) = (fetched.files.clone(), parameters.clone());
+        let (named, digest) = (dive.log.clone(), sha256.clone());
+        let replayed = match blocking(move || replay_digested(&files, &named, &digest, &asked)).await {
+            Ok(replayed) => replayed.map_err(|error| error.to_string()),
+            Err(error) => Err(error.to_string()),
+        };
+        drop(fetched);
+        self.counts.replayed.fetch_add(1, Ordering::Relaxed);
+        let tables = match replayed {
+            Ok(tables) => tables,
+            Err(error) => return unread_dive(dive, &sha256, parameters, &error),
+        };
+        let (cache, folder) = (self.cache.clone(), self.cache.dive(&parameters.digest(), &sha256));
+        let kept = folder.clone();
+        blocking(move || cache.keep(&kept, &tables)).await??;
+        Ok(Made::Kept { sha256, folder })
+    }
+
+    /// A dive that the cache has; one that it has broken is removed.
+    async fn find(&self, sha256: String, parameters: &Parameters) -> Result<Option<Made>, Error> {
+        let folder = self.cache.dive(&parameters.digest(), &sha256);
+        let looked = folder.clone();
+        match blocking(move || Cache::look(&looked)).await? {
+            Found::Whole => {
+                self.counts.cached.fetch_add(1, Ordering::Relaxed);
+                Ok(Some(Made::Kept { sha256, folder }))
+            }
+            Found::Nothing => Ok(None),
+            Found::Broken(why) => {
+                eprintln!("headrace-campaign: {}: {why}; made anew", folder.display());
+                self.counts.broken.fetch_add(1, Ordering::Relaxed);
+                self.cache.discard(&folder)?;
+                Ok(None)
+            }
+        }
+    }
+}
+
+impl Made {
+    /// A table, read from the cache.
+    ///
+    /// Errors: it can't be read.
+    pub async fn table(&self, table: &'static str) -> Result<Vec<RecordBatch>, Error> {
+        match self {
+            Self::Unread(tables) => Ok(tables.get(table).cloned().into_iter().collect()),
+            Self::Kept { folder, .. } => {
+                let path = Cache::table(folder, table);
+                blocking(move || {
+                    let file = std::fs::File::open(&path).map_err(of_file("reading", &path))?;
+                    let failed = |source| Error::Parquet { doing: "reading", path: path.clone(), source };
+                    let reader = ParquetRecordBatchReaderBuilder::try_new(file).map_err(failed)?;
+                    let reader = reader.build().map_err(failed)?;
+                    reader.collect::<Result<Vec<_>, _>>().map_err(|error| failed(error.into()))
+                })
+                .await?
+            }
+        }
+    }
+}
+
+fn unread_dive(dive: &DiveLog, sha256: &str, parameters: &Parameters, error: &str) -> Result<Made, Error> {
+    Ok(Made::Unread(Arc::new(unread(&dive.log, sha256, parameters, error)?)))
+}
+
+/// Runs what takes long on a thread of its own; a panic there is an error here.
+async fn blocking<T: Send + 'static>(work: impl FnOnce() -> T + Send + 'static) -> Result<T, Error> {
+    tokio::task::spawn_blocking(work)
+        .await
+        .map_err(|error| Error::Usage(format!("a thread ended early: {error}")))
+}

@@ -1,0 +1,234 @@
+//! Where the logs are: a folder, or a bucket of an object store.
+
+use std::collections::BTreeMap;
+use std::io::Write as _;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use futures::{StreamExt as _, TryStreamExt as _};
+use headrace_replay::log::part_path;
+use object_store::path::Path as StorePath;
+use object_store::{ObjectStore, ObjectStoreExt as _};
+use percent_encoding::percent_decode_str;
+use serde::{Deserialize, Serialize};
+use url::Url;
+
+use crate::error::{Error, of_file};
+
+/// Highest number that a part of a recording is looked for by.
+const MOST_PARTS: u32 = 999;
+
+/// A folder of logs, here or in an object store.
+#[derive(Debug, Clone)]
+pub struct Place {
+    /// As a URL, ending in `/`.
+    url: Url,
+    store: Arc<dyn ObjectStore>,
+    prefix: StorePath,
+    /// The folder, where it is one of this machine.
+    folder: Option<PathBuf>,
+}
+
+/// A dive of a campaign: a log, or the parts of a recording in order.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct DiveLog {
+    /// Path of the log below the place; of a recording in parts, of the recording.
+    pub log: String,
+    /// Its files.
+    pub parts: Vec<Part>,
+}
+
+/// A file of a dive, and what changes when its content does.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Part {
+    /// Path below the place, as its store has it.
+    pub path: String,
+    /// Its length.
+    pub bytes: u64,
+    /// When it was last written, microseconds of UTC.
+    pub modified_us: i64,
+    /// The store's own mark of its content.
+    pub e_tag: Option<String>,
+}
+
+/// The files of a dive on this machine, and their copy's folder, which goes with this.
+pub struct Fetched {
+    /// The files in order.
+    pub files: Vec<PathBuf>,
+    _copy: Option<tempfile::TempDir>,
+}
+
+impl Place {
+    /// A folder, or `s3://BUCKET/PREFIX`, whose keys and endpoint are those of the environment (`AWS_ACCESS_KEY_ID`, ...).
+    ///
+    /// Errors: the folder isn't there; the URL isn't one, or of no store that is known.
+    pub fn open(text: &str) -> Result<Self, Error> {
+        let failed = |why: String| Error::Place { place: text.to_owned(), why };
+        let mut folder = None;
+        let url = match Url::parse(text).ok().filter(|_| text.contains("://")) {
+            Some(url) if url.scheme() == "file" => {
+                folder = Some(url.to_file_path().map_err(|()| failed("isn't a path".to_owned()))?);
+                url
+            }
+            Some(url) => url,
+            None => {
+                let path = Path::new(text).canonicalize().map_err(|error| failed(error.to_string()))?;
+                if !path.is_dir() {
+                    return Err(failed("isn't a folder".to_owned()));
+                }
+                let url = Url::from_directory_path(&path).map_err(|()| failed("isn't a path".to_owned()))?;
+                folder = Some(path);
+                url
+            }
+        };
+        let mut url = url;
+        if !url.path().ends_with('/') {
+            url.set_path(&format!("{}/", url.path()));
+        }
+        let settings = std::env::vars().filter(|(key, _)| key.starts_with("AWS_"));
+        let settings = settings.map(|(key, value)| (key.to_ascii_lowercase(), value));
+        let (store, prefix) =
+            object_store::parse_url_opts(&url, settings).map_err(|error| failed(error.to_string()))?;
+        Ok(Self { url, store: Arc::from(store), prefix, folder })
+    }
+
+    /// Its URL.
+    pub fn url(&self) -> &Url {
+        &self.url
+    }
+
+    /// Its dives, in the order of their paths.
+    ///
+    /// Errors: it can't be listed.
+    pub async fn dives(&self) -> Result<Vec<DiveLog>, Error> {
+        let failed = |source| Error::Store { what: self.url.to_string(), source };
+        let mut parts: BTreeMap<String, Part> = BTreeMap::new();
+        let mut listed = self.store.list(Some(&self.prefix));
+        while let Some(meta) = listed.next().await {
+            let meta = meta.map_err(failed)?;
+            if meta.location.extension() != Some("mcap") {
+                continue;
+            }
+            let Some(below) = meta.location.prefix_match(&self.prefix) else { continue };
+            let path = below.map(|part| part.as_ref().to_owned()).collect::<Vec<_>>().join("/");
+            let (bytes, modified_us) = (meta.size, meta.last_modified.timestamp_micros());
+            parts.insert(path.clone(), Part { path, bytes, modified_us, e_tag: meta.e_tag });
+        }
+        Ok(grouped(parts))
+    }
+
+    /// A small text file below it; `None` if it isn't there.
+    ///
+    /// Errors: it can't be read.
+    pub async fn text(&self, name: &str) -> Result<Option<String>, Error> {
+        let what = format!("{}{name}", self.url);
+        let failed = |source| Error::Store { what: what.clone(), source };
+        let location = self.location(name).map_err(failed)?;
+        let got = match self.store.get(&location).await {
+            Ok(got) => got.bytes().await,
+            Err(object_store::Error::NotFound { .. }) => return Ok(None),
+            Err(source) => Err(source),
+        };
+        let bytes = got.map_err(failed)?;
+        let text = String::from_utf8(bytes.to_vec());
+        text.map(Some).map_err(|_| Error::Place { place: what, why: "isn't UTF-8 text".to_owned() })
+    }
+
+    /// The files of a dive on this machine: themselves, or copies in a folder of `scratch` that lives as long as the answer.
+    ///
+    /// Errors: they can't be read, or the copy not be written.
+    pub async fn fetch(&self, dive: &DiveLog, scratch: &Path) -> Result<Fetched, Error> {
+        if let Some(folder) = &self.folder {
+            let files = dive.parts.iter().map(|part| folder.join(plain(&part.path)));
+            return Ok(Fetched { files: files.collect(), _copy: None });
+        }
+        let copy = tempfile::tempdir_in(scratch).map_err(of_file("making a folder in", scratch))?;
+        let mut files = Vec::new();
+        for (number, part) in dive.parts.iter().enumerate() {
+            let failed = |source| Error::Store { what: format!("{}{}", self.url, part.path), source };
+            // Names of parts matter to nobody here, and paths of a store may be none of this machine's.
+            let path = copy.path().join(format!("{number:03}.mcap"));
+            let mut file = std::fs::File::create(&path).map_err(of_file("writing", &path))?;
+            let location = self.location(&part.path).map_err(failed)?;
+            let mut stream = self.store.get(&location).await.map_err(failed)?.into_stream();
+            while let Some(bytes) = stream.try_next().await.map_err(failed)? {
+                file.write_all(&bytes).map_err(of_file("writing", &path))?;
+            }
+            files.push(path);
+        }
+        Ok(Fetched { files, _copy: Some(copy) })
+    }
+
+    /// Errors: none for a path that was listed.
+    fn location(&self, below: &str) -> Result<StorePath, object_store::Error> {
+        let slash = if self.prefix.as_ref().is_empty() { "" } else { "/" };
+        Ok(StorePath::parse(format!("{}{slash}{below}", self.prefix))?)
+    }
+}
+
+/// A path as people write it: stores encode some characters.
+fn plain(path: &str) -> String {
+    percent_decode_str(path).decode_utf8_lossy().into_owned()
+}
+
+/// Files as dives: the parts of a recording are one.
+fn grouped(parts: BTreeMap<String, Part>) -> Vec<DiveLog> {
+    let mut dives: BTreeMap<String, Vec<(u32, Part)>> = BTreeMap::new();
+    for (path, part) in parts {
+        let (log, number) = recording(&path).unwrap_or((path, 0));
+        dives.entry(log).or_default().push((number, part));
+    }
+    let dive = |(log, mut parts): (String, Vec<(u32, Part)>)| {
+        parts.sort_by_key(|(number, _)| *number);
+        DiveLog { log: plain(&log), parts: parts.into_iter().map(|(_, part)| part).collect() }
+    };
+    dives.into_iter().map(dive).collect()
+}
+
+/// The recording that a file is a part of, and the part's number.
+fn recording(path: &str) -> Option<(String, u32)> {
+    let stem = path.strip_suffix(".mcap")?;
+    let (_, digits) = stem.rsplit_once(|c: char| !c.is_ascii_digit())?;
+    let number = digits.parse().ok().filter(|number| (1..=MOST_PARTS).contains(number))?;
+    let mark = part_path(Path::new("x.mcap"), number).to_string_lossy().into_owned();
+    let log = format!("{}.mcap", path.strip_suffix(mark.strip_prefix('x')?)?);
+    Some((log, number))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn parts_of_a_recording_are_one_dive() {
+        let part = |path: &str| Part { path: path.to_owned(), bytes: 1, modified_us: 2, e_tag: None };
+        let names = [
+            "a/x.part010.mcap",
+            "a/x.part002.mcap",
+            "a/x.mcap",
+            "b/y7.mcap",
+            "b/z.part003.mcap",
+            "part.mcap",
+        ];
+        let found = grouped(names.iter().map(|name| ((*name).to_owned(), part(name))).collect());
+        let found: Vec<String> = found
+            .iter()
+            .map(|dive| {
+                format!(
+                    "{}: {}",
+                    dive.log,
+                    dive.parts.iter().map(|part| part.path.as_str()).collect::<Vec<_>>().join(" ")
+                )
+            })
+            .collect();
+        assert_eq!(
+            found,
+            [
+                "a/x.mcap: a/x.mcap a/x.part002.mcap a/x.part010.mcap",
+                "b/y7.mcap: b/y7.mcap",
+                "b/z.mcap: b/z.part003.mcap",
+                "part.mcap: part.mcap",
+            ]
+        );
+    }
+}

@@ -1,0 +1,49 @@
+//! What is missing from a log.
+
+use headrace_replay::log;
+use pyo3::{pyclass, pymethods};
+
+/// Something that is missing from a log: damage, a gap, or what the recorder had to leave out.
+#[pyclass(frozen, get_all, module = "headrace")]
+#[derive(Clone)]
+pub(crate) struct Loss {
+    /// What is missing, and where, in words.
+    what: String,
+    /// Where it begins in its file, bytes; 0 where it has no place.
+    offset: u64,
+    /// How long it is in the file, bytes; 0 where it has no place.
+    bytes: u64,
+    /// The last time before it that is in the log, ns of the log's clock; None where there is none.
+    from_ns: Option<u64>,
+    /// The first time after it, ns of the log's clock; None where there is none.
+    to_ns: Option<u64>,
+}
+
+impl Loss {
+    pub(crate) fn of(loss: &log::Loss) -> Self {
+        Self {
+            what: loss.to_string(),
+            offset: loss.offset,
+            bytes: loss.bytes,
+            from_ns: loss.from.map(|at| at.0),
+            to_ns: loss.to.map(|at| at.0),
+        }
+    }
+
+    /// Messages out of order by more than a reader holds.
+    pub(crate) fn of_order(late: u64) -> Self {
+        let what = format!("{late} messages out of order by more than can be held, taken where they stand");
+        Self { what, offset: 0, bytes: 0, from_ns: None, to_ns: None }
+    }
+}
+
+#[pymethods]
+impl Loss {
+    fn __str__(&self) -> &str {
+        &self.what
+    }
+
+    fn __repr__(&self) -> String {
+        format!("Loss({:?})", self.what)
+    }
+}

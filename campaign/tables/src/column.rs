@@ -1,0 +1,102 @@
+//! A table as a list of columns: what each holds, and how its values are taken from a row of the report. Schemas, record batches
+//! and the page of `docs/campaign.md` are made from the same list.
+
+use std::fmt::Write as _;
+use std::sync::Arc;
+
+use arrow_array::{
+    ArrayRef, BooleanArray, Float64Array, Int64Array, RecordBatch, StringArray, TimestampMicrosecondArray,
+};
+use arrow_schema::{DataType, Field, Schema, SchemaRef, TimeUnit};
+
+use crate::Error;
+
+/// The first column of every table.
+pub(crate) const DIVE: &str = "dive";
+const DIVE_ABOUT: &str = "The dive: the first 16 digits of its log's SHA-256; the key between tables";
+
+/// How a column's value is taken from a row; `None` is null.
+pub(crate) enum Get<R> {
+    Text(fn(&R) -> Option<String>),
+    Number(fn(&R) -> Option<f64>),
+    Count(fn(&R) -> Option<i64>),
+    Truth(fn(&R) -> Option<bool>),
+    /// Microseconds of UTC.
+    Moment(fn(&R) -> Option<i64>),
+}
+
+impl<R> Get<R> {
+    fn data_type(&self) -> DataType {
+        match self {
+            Self::Text(_) => DataType::Utf8,
+            Self::Number(_) => DataType::Float64,
+            Self::Count(_) => DataType::Int64,
+            Self::Truth(_) => DataType::Boolean,
+            Self::Moment(_) => DataType::Timestamp(TimeUnit::Microsecond, Some("UTC".into())),
+        }
+    }
+
+    fn array(&self, rows: &[R]) -> ArrayRef {
+        match self {
+            Self::Text(get) => Arc::new(rows.iter().map(get).collect::<StringArray>()),
+            Self::Number(get) => Arc::new(rows.iter().map(get).collect::<Float64Array>()),
+            Self::Count(get) => Arc::new(rows.iter().map(get).collect::<Int64Array>()),
+            Self::Truth(get) => Arc::new(rows.iter().map(get).collect::<BooleanArray>()),
+            Self::Moment(get) => {
+                Arc::new(rows.iter().map(get).collect::<TimestampMicrosecondArray>().with_timezone("UTC"))
+            }
+        }
+    }
+}
+
+/// A column: name, with its unit; what it holds; how to take it.
+pub(crate) struct Column<R>(pub(crate) &'static str, pub(crate) &'static str, pub(crate) Get<R>);
+
+/// A table of rows `R`.
+pub(crate) struct Table<R> {
+    pub(crate) name: &'static str,
+    /// What a row is.
+    pub(crate) about: &'static str,
+    pub(crate) columns: Vec<Column<R>>,
+}
+
+impl<R> Table<R> {
+    pub(crate) fn schema(&self) -> SchemaRef {
+        let dive = Field::new(DIVE, DataType::Utf8, false);
+        let columns =
+            self.columns.iter().map(|Column(name, _, get)| Field::new(*name, get.data_type(), true));
+        Arc::new(Schema::new([dive].into_iter().chain(columns).collect::<Vec<_>>()))
+    }
+
+    pub(crate) fn batch(&self, dive: &str, rows: &[R]) -> Result<RecordBatch, Error> {
+        let dives: ArrayRef = Arc::new(StringArray::from_iter_values(rows.iter().map(|_| dive)));
+        let columns = self.columns.iter().map(|Column(_, _, get)| get.array(rows));
+        RecordBatch::try_new(self.schema(), [dives].into_iter().chain(columns).collect())
+            .map_err(|source| Error::Table { table: self.name, source })
+    }
+
+    /// The table as a section of Markdown.
+    pub(crate) fn describe(&self, page: &mut String) {
+        let mut row = |name: &str, kind: &str, about: &str| {
+            // Writing to a string can't fail.
+            writeln!(page, "| `{name}` | {kind} | {about} |").unwrap_or_default();
+        };
+        row(DIVE, "text", DIVE_ABOUT);
+        for Column(name, about, get) in &self.columns {
+            let kind = match get {
+                Get::Text(_) => "text",
+                Get::Number(_) => "number",
+                Get::Count(_) => "integer",
+                Get::Truth(_) => "boolean",
+                Get::Moment(_) => "time",
+            };
+            row(name, kind, about);
+        }
+    }
+}
+
+/// A count as Arrow's widest signed integer, which SQL adds up without surprises.
+#[expect(clippy::unnecessary_wraps, reason = "as columns want it")]
+pub(crate) fn count(value: impl TryInto<i64>) -> Option<i64> {
+    Some(value.try_into().unwrap_or(i64::MAX))
+}

@@ -1,0 +1,85 @@
+//! Why a dive has no tables.
+
+use std::path::PathBuf;
+
+use arrow_schema::ArrowError;
+use headrace_config::ConfigErrors;
+use headrace_monitor::PluginError;
+use headrace_replay::drive::DriveError;
+use headrace_replay::log::LogError;
+use headrace_replay::smooth::SmoothError;
+
+/// Why a dive has no tables.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum Error {
+    /// A parameter is out of its range.
+    #[error("{name} = {value}: must be from {from} to {to}")]
+    Parameter {
+        /// The parameter.
+        name: &'static str,
+        /// Its value.
+        value: f64,
+        /// Least value allowed.
+        from: f64,
+        /// Greatest value allowed.
+        to: f64,
+    },
+    /// No file was named.
+    #[error("replaying a dive: no log was named")]
+    NoLog,
+    /// A vehicle file can't be read.
+    #[error("reading {}: {source}", path.display())]
+    Read {
+        /// The file.
+        path: PathBuf,
+        /// Cause.
+        source: std::io::Error,
+    },
+    /// The log can't be opened or read.
+    #[error(transparent)]
+    Log(#[from] LogError),
+    /// The log has no vehicle file, and none was given.
+    #[error("reading {}: no vehicle file {}; give one as the parameter vehicle", log.display(), match loss {
+        Some(loss) => format!("can be read from this damaged log ({loss})"),
+        None => "is attached to this log".to_owned(),
+    })]
+    NoVehicle {
+        /// The log.
+        log: PathBuf,
+        /// The first of its losses.
+        loss: Option<String>,
+    },
+    /// The vehicle file is wrong.
+    #[error(transparent)]
+    Vehicle(#[from] ConfigErrors),
+    /// The loop can't be armed.
+    #[error(transparent)]
+    Arming(#[from] PluginError),
+    /// The replay stopped early.
+    #[error(transparent)]
+    Drive(#[from] DriveError),
+    /// It was told to stop before the log's end.
+    #[error("replaying {}: stopped before its end", log.display())]
+    Stopped {
+        /// The log.
+        log: PathBuf,
+    },
+    /// Smoothing was asked for of a vehicle without a filter.
+    #[error("replaying {}: smooth needs [navigation] way = \"filter\"; the vehicle file has way = \"direct\"", log.display())]
+    NoFilter {
+        /// The log.
+        log: PathBuf,
+    },
+    /// Smoothing fails.
+    #[error("smoothing: {0}")]
+    Smooth(#[from] SmoothError),
+    /// Columns don't make a table: a defect of this library.
+    #[error("making table {table}: {source}")]
+    Table {
+        /// The table.
+        table: &'static str,
+        /// What Arrow says.
+        source: ArrowError,
+    },
+}

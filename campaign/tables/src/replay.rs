@@ -1,0 +1,196 @@
+//! One dive, from its log to its report, in-process and on the calling thread.
+
+use std::path::{Path, PathBuf};
+use std::sync::atomic::AtomicBool;
+
+use headrace_config::Document;
+use headrace_fusion::Navigation;
+use headrace_fusion::filter::FilterNavigation;
+use headrace_fusion::filter::sources::Consistency;
+use headrace_fusion::smooth::journal::Journal;
+use headrace_fusion::smooth::track::TrackNavigation;
+use headrace_monitor::App;
+use headrace_monitor::report::{LogReport, Report, smoothing_changes};
+use headrace_monitor::run::Loop;
+use headrace_replay::drive::{Pace, drive};
+use headrace_replay::log::files_digest;
+use headrace_replay::log::format::VEHICLE_FILE;
+use headrace_replay::player::Player;
+use headrace_replay::regular_file;
+use headrace_replay::smooth::Steps;
+use headrace_sensor::reading::MAX_SOURCES;
+use headrace_vehicle::{NavigationConfig, VehicleConfig};
+
+use crate::kinds::KINDS;
+use crate::stoppable::Stoppable;
+use crate::{Error, Parameters};
+
+/// Capacity of the queue of filter steps: a tick has a minute at most, with ten epochs a second and up to three steps each.
+const RECORDS: usize = 4096;
+
+/// Longest vehicle file, or file that it names, bytes.
+const TEXT_BYTES: u64 = 16 << 20;
+
+/// A dive as replayed.
+pub(crate) struct Dive {
+    pub(crate) report: Report,
+    pub(crate) vehicle: String,
+    pub(crate) about: About,
+}
+
+/// What a log says of itself.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct About {
+    /// The program that wrote it.
+    pub(crate) recorded_version: Option<String>,
+    /// The scene that it is a simulation of.
+    pub(crate) scene: Option<String>,
+    /// UTC of the zero of its clock, nanoseconds.
+    pub(crate) utc_of_zero_ns: Option<i64>,
+}
+
+/// Keys of a log's metadata, as `headrace run` and `headrace simulate` write them.
+const VERSION: &str = "version";
+const SCENE: &str = "simulated";
+const ANCHOR: [&str; 2] = ["clock_anchor_monotonic_ns", "clock_anchor_utc_ns"];
+
+/// SHA-256 of a dive's log, of its parts' concatenated bytes, hexadecimal.
+///
+/// Errors: a file can't be read.
+pub fn log_digest(log: &[PathBuf]) -> Result<String, Error> {
+    if log.is_empty() {
+        return Err(Error::NoLog);
+    }
+    Ok(files_digest(log)?)
+}
+
+pub(crate) fn run(
+    log: &[PathBuf],
+    sha256: &str,
+    parameters: &Parameters,
+    stop: &AtomicBool,
+) -> Result<Dive, Error> {
+    let first = log.first().ok_or(Error::NoLog)?;
+    parameters.check()?;
+    let mut player = Player::open(log)?;
+    let mut vehicle = vehicle(first, &player, parameters)?;
+    parameters.apply(&mut vehicle)?;
+    let mut report = if parameters.smooth {
+        smoothed(log, &mut player, &vehicle, stop)?
+    } else {
+        straight(Stoppable::new(&mut player, stop), &vehicle, vehicle.navigation(), &mut |_| ())?
+    };
+    report.log = Some(LogReport {
+        path: first.display().to_string(),
+        sha256: sha256.to_owned(),
+        messages: player.played(),
+        losses: player.losses(),
+        notes: player.notes(),
+        parts: Vec::new(),
+    });
+    Ok(Dive { report, vehicle: vehicle.name, about: about(&player) })
+}
+
+/// The vehicle file: the one given, or that of the log.
+fn vehicle(log: &Path, player: &Player, parameters: &Parameters) -> Result<VehicleConfig, Error> {
+    let info = player.info();
+    let load = |name: &str| {
+        if let Some(text) = parameters.vehicle_files.get(name) {
+            return Ok(text.clone());
+        }
+        let found = info.attachments.iter().find(|(attached, _)| attached == name);
+        let (_, content) = found.ok_or_else(|| "is neither given nor attached to the log".to_owned())?;
+        String::from_utf8(content.clone())
+            .map_err(|_| "is attached to the log, but isn't UTF-8 text".to_owned())
+    };
+    let (name, text) = match (&parameters.vehicle, &info.vehicle_toml) {
+        (Some(text), _) => ("vehicle".to_owned(), text),
+        (None, Some(text)) => (format!("{}/{VEHICLE_FILE}", log.display()), text),
+        (None, None) => {
+            let loss = player.losses().into_iter().next();
+            return Err(Error::NoVehicle { log: log.to_owned(), loss });
+        }
+    };
+    Ok(VehicleConfig::parse(Document::new(&name, text), &KINDS, &load)?)
+}
+
+/// A replay from the beginning to the end.
+fn straight(
+    mut player: Stoppable<'_>,
+    vehicle: &VehicleConfig,
+    navigation: Box<dyn Navigation>,
+    after_tick: &mut dyn FnMut(&Loop),
+) -> Result<Report, Error> {
+    let mut app = App::new(vehicle.mission());
+    for sensor in &vehicle.sensors {
+        app.add_device(sensor.as_ref())?;
+    }
+    let mut armed = app.arm(navigation)?;
+    player.connect(armed.sources());
+    drive(&mut armed, &mut player, Pace::default(), after_tick)?;
+    player.check()?;
+    armed.finish(&mut |_, _| ());
+    after_tick(&armed);
+    let now = armed.now();
+    armed.tick(now);
+    armed.release_samples();
+    Ok(Report::of(&armed))
+}
+
+/// A replay with the filter, smoothing, and a replay along the smoothed trajectory, as of `headrace replay --smooth`.
+fn smoothed(
+    log: &[PathBuf],
+    player: &mut Player,
+    vehicle: &VehicleConfig,
+    stop: &AtomicBool,
+) -> Result<Report, Error> {
+    let NavigationConfig::Filter(settings) = vehicle.navigation else {
+        return Err(Error::NoFilter { log: log.first().cloned().unwrap_or_default() });
+    };
+    let (journal, reader) = Journal::new(RECORDS);
+    let mut steps = Steps::new(reader)?;
+    let filter = FilterNavigation::new(vehicle.tunnel.profile.clone(), vehicle.site, settings);
+    let mut consistency: [Option<Consistency>; MAX_SOURCES] = [None; MAX_SOURCES];
+    let mut first = Player::open(log)?;
+    let first = Stoppable::new(&mut first, stop);
+    let before = straight(first, vehicle, Box::new(filter.with_journal(journal)), &mut |dive| {
+        steps.take();
+        consistency = core::array::from_fn(|source| dive.consistency(source));
+    })?;
+    let track = steps.smooth(settings)?;
+    let (estimates, pieces) = (track.len() as u64, track.pieces() as u64);
+    let navigation = Box::new(TrackNavigation::new(track, consistency));
+    let mut report = straight(Stoppable::new(player, stop), vehicle, navigation, &mut |_| ())?;
+    report.smoothing = Some(smoothing_changes::compare(&before, &report, estimates, pieces));
+    Ok(report)
+}
+
+fn about(player: &Player) -> About {
+    let metadata = &player.info().metadata;
+    let [monotonic, utc] = ANCHOR.map(|key| metadata.get(key).and_then(|text| text.parse::<i64>().ok()));
+    About {
+        recorded_version: metadata.get(VERSION).cloned(),
+        scene: metadata.get(SCENE).cloned(),
+        utc_of_zero_ns: utc.zip(monotonic).and_then(|(utc, monotonic)| utc.checked_sub(monotonic)),
+    }
+}
+
+impl Parameters {
+    /// Takes a vehicle file, and the files that it names, into the parameters.
+    ///
+    /// Errors: it can't be read, or is wrong.
+    pub fn read_vehicle(&mut self, path: &Path) -> Result<(), Error> {
+        let failed = |source| Error::Read { path: path.to_owned(), source };
+        let text = regular_file::read_text(path, TEXT_BYTES).map_err(failed)?;
+        let folder = path.parent().unwrap_or(Path::new(""));
+        let load = |name: &str| {
+            let path = folder.join(name);
+            regular_file::read_text(&path, TEXT_BYTES)
+                .map_err(|error| format!("can't be read at {}: {error}", path.display()))
+        };
+        let vehicle = VehicleConfig::parse(Document::new(&path.display().to_string(), &text), &KINDS, &load)?;
+        self.vehicle_files = vehicle.attachments.into_iter().collect();
+        self.vehicle = Some(text);
+        Ok(())
+    }
+}

@@ -1,0 +1,82 @@
+//! `runs`: neighbouring flagged sections of one cause, and what passing them again takes.
+
+use headrace_monitor::report::{Report, ReturnReport, RunReport};
+
+use super::sections::words;
+use crate::column::{Column, Get, Table, count};
+
+/// A run, and the way back to it where it is open.
+pub(crate) struct Run<'a> {
+    run: &'a RunReport,
+    back: Option<&'a ReturnReport>,
+}
+
+pub(crate) fn runs(report: &Report) -> Vec<Run<'_>> {
+    let back = |run: &RunReport| report.way_home.iter().find(|back| back.run == run.id);
+    report.runs.iter().map(|run| Run { run, back: back(run) }).collect()
+}
+
+pub(crate) fn runs_table<'a>() -> Table<Run<'a>> {
+    Table {
+        name: "runs",
+        about: "Neighbouring flagged sections of one cause.",
+        columns: vec![
+            Column("run", "Its number within the dive, which stays", Get::Count(|row| count(row.run.id))),
+            Column("cause", "Main cause", Get::Text(|row| Some(row.run.cause.as_str().to_owned()))),
+            Column(
+                "causes",
+                "All causes, the main one first, with commas",
+                Get::Text(|row| Some(words(row.run.causes))),
+            ),
+            Column(
+                "silent_sources",
+                "Heads that were silent in its worst section, with commas",
+                Get::Text(|row| Some(row.run.silent_sources.join(",")).filter(|text| !text.is_empty())),
+            ),
+            Column("chainage_m", "Where it begins, m", Get::Number(|row| Some(row.run.start_m))),
+            Column("end_m", "Where it ends, m", Get::Number(|row| Some(row.run.end_m))),
+            Column("failed_m", "Metres of it that fail", Get::Number(|row| Some(row.run.failed_m))),
+            Column(
+                "d_m",
+                "Diameter D of its largest hole, m; the last one before it was cleared",
+                Get::Number(|row| Some(row.run.hole_m)),
+            ),
+            Column("d_x_m", "Chainage of that hole's centre, m", Get::Number(|row| Some(row.run.hole_x_m))),
+            Column(
+                "d_clock",
+                "The same on a clock seen along the tunnel",
+                Get::Text(|row| Some(row.run.hole_clock.clone())),
+            ),
+            Column(
+                "raised_s",
+                "When its first flag was raised, s on the log's clock",
+                Get::Number(|row| Some(row.run.raised_s)),
+            ),
+            Column(
+                "cleared_s",
+                "Since when none of its sections fails, s on the log's clock",
+                Get::Number(|row| row.run.cleared_s),
+            ),
+            Column(
+                "merged_into",
+                "The run that it was merged into",
+                Get::Count(|row| row.run.merged_into.map(i64::from)),
+            ),
+            Column(
+                "action",
+                "Change to make when it is passed again; null unless it is open",
+                Get::Text(|row| row.back.map(|back| back.action.as_str().to_owned())),
+            ),
+            Column(
+                "at_most_mps",
+                "Greatest speed then, m/s; zero if none meets the target in this mode",
+                Get::Number(|row| row.back.map(|back| back.at_most_mps)),
+            ),
+            Column(
+                "takes_s",
+                "Seconds that passing it again takes at that speed",
+                Get::Number(|row| row.back.and_then(|back| back.takes_s)),
+            ),
+        ],
+    }
+}

@@ -1,0 +1,134 @@
+//! `sources` and `alerts`.
+
+use headrace_monitor::alert_list::{AlertState, ListedAlertJson};
+use headrace_monitor::report::SourceReport;
+
+use crate::column::{Column, Get, Table, count};
+
+pub(crate) fn sources() -> Table<SourceReport> {
+    Table {
+        name: "sources",
+        about: "A sensor of the vehicle file.",
+        columns: vec![
+            Column("source", "Its id", Get::Text(|row| Some(row.id.clone()))),
+            Column("plugin", "Kind of device", Get::Text(|row| Some(row.plugin.clone()))),
+            Column("packets", "Packets", Get::Count(|row| count(row.packets))),
+            Column("frames", "Frames that were whole and valid", Get::Count(|row| count(row.frames))),
+            Column("bad_frames", "Candidate frames that failed", Get::Count(|row| count(row.bad_frames))),
+            Column(
+                "skipped_bytes",
+                "Bytes that belong to no good frame",
+                Get::Count(|row| count(row.skipped_bytes)),
+            ),
+            Column("readings", "Readings decoded from them", Get::Count(|row| count(row.readings))),
+            Column("withheld", "Readings understood but not used", Get::Count(|row| count(row.withheld))),
+            Column(
+                "longest_gap_s",
+                "Longest silence between two packets, s",
+                Get::Number(|row| Some(row.longest_gap_s)),
+            ),
+            Column("rate_hz", "Packets per second", Get::Number(|row| Some(row.rate_hz))),
+            Column(
+                "drift_ppm",
+                "Drift of the device's clock, parts per million, gaining positive",
+                Get::Number(|row| row.device_clock.as_ref()?.drift_ppm),
+            ),
+            Column(
+                "drift_sd_ppm",
+                "Standard deviation of the drift, parts per million",
+                Get::Number(|row| row.device_clock.as_ref()?.drift_sd_ppm),
+            ),
+            Column(
+                "clock_restarts",
+                "Times that the device's clock restarted",
+                Get::Count(|row| count(row.device_clock.as_ref()?.restarts)),
+            ),
+            Column(
+                "nav_used",
+                "Measurements used in navigation",
+                Get::Count(|row| count(row.navigation.as_ref()?.used)),
+            ),
+            Column(
+                "nav_gated",
+                "Measurements rejected by the gate",
+                Get::Count(|row| count(row.navigation.as_ref()?.gated)),
+            ),
+            Column(
+                "nis",
+                "Mean normalised innovation squared: about 1 if the noise settings are right",
+                Get::Number(|row| row.navigation.as_ref()?.nis),
+            ),
+        ],
+    }
+}
+
+#[expect(clippy::unnecessary_wraps, reason = "as columns want it")]
+fn state(row: &ListedAlertJson) -> Option<String> {
+    let word = match row.state {
+        AlertState::Active => "active",
+        AlertState::Rectified => "rectified",
+        AlertState::Cleared => "cleared",
+    };
+    Some(word.to_owned())
+}
+
+pub(crate) fn alerts() -> Table<ListedAlertJson> {
+    Table {
+        name: "alerts",
+        about: "An alert with its life, as of the end of the dive ([alerts.md](alerts.md)).",
+        columns: vec![
+            Column("number", "Its number, from 1", Get::Count(|row| count(row.number))),
+            Column(
+                "priority",
+                "`emergency_alarm`, `alarm`, `warning` or `caution`",
+                Get::Text(|row| Some(row.priority.to_owned())),
+            ),
+            Column(
+                "class",
+                "`coverage`, `speed`, `position`, `sensor`, `recording` or `setting`",
+                Get::Text(|row| Some(row.class.to_owned())),
+            ),
+            Column("kind", "Its kind", Get::Text(|row| Some(row.kind.to_owned()))),
+            Column("text", "What holds", Get::Text(|row| Some(row.text.clone()))),
+            Column("state", "`active`, `rectified` or `cleared`", Get::Text(state)),
+            Column(
+                "since_s",
+                "When it was raised first, s on the log's clock",
+                Get::Number(|row| Some(row.since_s)),
+            ),
+            Column(
+                "rectified_s",
+                "Since when it holds no longer, s on the log's clock",
+                Get::Number(|row| row.rectified_s),
+            ),
+            Column(
+                "cleared_s",
+                "Since when it is over, s on the log's clock",
+                Get::Number(|row| row.cleared_s),
+            ),
+            Column(
+                "acknowledged_s",
+                "When somebody acknowledged it, s on the log's clock",
+                Get::Number(|row| Some(row.acknowledged.as_ref()?.at_s)),
+            ),
+            Column(
+                "acknowledged_by",
+                "By whom",
+                Get::Text(|row| Some(row.acknowledged.as_ref()?.by.clone())),
+            ),
+            Column("from_m", "Where it begins, or where the vehicle was, m", Get::Number(|row| row.from_m)),
+            Column("to_m", "Where it ends, m", Get::Number(|row| row.to_m)),
+            Column("source", "The sensor that it names", Get::Text(|row| row.sensor.clone())),
+            Column(
+                "count",
+                "Times that it was raised; of missed stretches, those that it stands for",
+                Get::Count(|row| count(row.count)),
+            ),
+            Column(
+                "merged_into",
+                "The alert that stands for it now",
+                Get::Count(|row| row.merged_into.map(i64::from)),
+            ),
+        ],
+    }
+}

@@ -1,0 +1,76 @@
+//! The filter whose steps are smoothed, beside the filter that navigates.
+//!
+//! A Rauch-Tung-Striebel smoother holds for best gains alone. The navigating filter takes walls in part, which forgets on purpose what
+//! its covariance relates: going backwards, errors then grow without bound. So steps are recorded by a filter of its own, which hears the
+//! same and takes walls whole.
+
+use super::journal::Journal;
+use crate::filter::FilterNavigation;
+use crate::filter::cable::CableDoubt;
+use crate::filter::pose_sd::PoseSd;
+use crate::filter::settings::Settings;
+use crate::filter::sources::Consistency;
+use crate::filter::suspicion::SettingDoubt;
+use crate::{Fix, Navigation, NoFix, Times};
+use headrace_geometry::site::Site;
+use headrace_geometry::time::MonoNs;
+use headrace_geometry::tunnel::Profile;
+use headrace_sensor::device::SensorInfo;
+use headrace_sensor::reading::Reading;
+use headrace_snapshot::stateful;
+
+/// The filter with a smoother's beside it. Fixes and all else that it tells are bit for bit those of the filter alone.
+pub struct BesideNavigation {
+    navigating: FilterNavigation,
+    recorded: FilterNavigation,
+}
+
+stateful!(BesideNavigation { state: navigating, recorded; });
+
+/// The filter to smooth: with best gains, its steps written to a journal.
+pub fn smoothable(profile: Profile, site: Site, settings: Settings, journal: Journal) -> FilterNavigation {
+    let settings = Settings { wall_share: 1.0, ..settings };
+    FilterNavigation::new(profile, site, settings).with_journal(journal)
+}
+
+impl BesideNavigation {
+    /// Without readings yet.
+    pub fn new(profile: Profile, site: Site, settings: Settings, journal: Journal) -> Self {
+        Self {
+            navigating: FilterNavigation::new(profile.clone(), site, settings),
+            recorded: smoothable(profile, site, settings, journal),
+        }
+    }
+}
+
+impl Navigation for BesideNavigation {
+    fn update(&mut self, source: usize, sensor: &SensorInfo, times: Times, reading: &Reading) {
+        self.navigating.update(source, sensor, times, reading);
+        self.recorded.update(source, sensor, times, reading);
+    }
+
+    fn end(&mut self) {
+        self.navigating.end();
+        self.recorded.end();
+    }
+
+    fn consistency(&self, source: usize) -> Option<Consistency> {
+        self.navigating.consistency(source)
+    }
+
+    fn pose_sd(&self) -> Option<PoseSd> {
+        self.navigating.pose_sd()
+    }
+
+    fn cable_doubt(&self) -> Option<CableDoubt> {
+        self.navigating.cable_doubt()
+    }
+
+    fn setting_doubt(&self) -> Option<SettingDoubt> {
+        self.navigating.setting_doubt()
+    }
+
+    fn fix(&self, at: MonoNs) -> Result<Fix, NoFix> {
+        self.navigating.fix(at)
+    }
+}

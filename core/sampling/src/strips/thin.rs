@@ -1,0 +1,71 @@
+//! Which strips are passed less often than others.
+
+use crate::head::HeadSet;
+use crate::passes::Passes;
+
+/// Number of head sets whose gaps are kept; strips hidden from one or two heads rarely make more.
+const SETS: usize = 8;
+/// Strips of which it is known which set sees them; those beyond are looked at anew.
+const STRIPS: usize = 64;
+/// Number of a set that isn't kept.
+const NOT_KEPT: u8 = u8::MAX;
+
+/// The time between passes over each strip, and which strips are thin: passed less often than the one passed most often.
+pub(super) struct Thin<'a> {
+    passes: &'a Passes,
+    /// Sets of heads with their gaps, seconds: many strips are seen by the same heads.
+    sets: [(HeadSet, Option<f64>); SETS],
+    set_of: [u8; STRIPS],
+    best_s: f64,
+}
+
+impl<'a> Thin<'a> {
+    /// Of strips by the heads that see them.
+    pub(super) fn of(passes: &'a Passes, strips: impl Iterator<Item = HeadSet>) -> Self {
+        let mut thin = Self {
+            passes,
+            sets: [(HeadSet::default(), None); SETS],
+            set_of: [NOT_KEPT; STRIPS],
+            best_s: f64::INFINITY,
+        };
+        let mut count = 0;
+        for (k, seen_by) in strips.enumerate() {
+            let known = thin.sets.iter().take(count).position(|(set, _)| *set == seen_by);
+            let number = match (known, thin.sets.get_mut(count)) {
+                (Some(number), _) => Some(number),
+                (None, Some(slot)) => {
+                    *slot = (seen_by, passes.gap_s(seen_by));
+                    count += 1;
+                    Some(count - 1)
+                }
+                (None, None) => None,
+            };
+            let number = number.and_then(|number| u8::try_from(number).ok()).unwrap_or(NOT_KEPT);
+            if let Some(set_of) = thin.set_of.get_mut(k) {
+                *set_of = number;
+            }
+            if number == NOT_KEPT {
+                thin.best_s = passes.gap_s(seen_by).map_or(thin.best_s, |gap_s| thin.best_s.min(gap_s));
+            }
+        }
+        let gaps_s = thin.sets.iter().take(count).filter_map(|(_, gap_s)| *gap_s);
+        thin.best_s = gaps_s.fold(thin.best_s, f64::min);
+        thin
+    }
+
+    /// Time between passes over the strip that is passed most often, seconds; infinite where none is.
+    pub(super) fn best_s(&self) -> f64 {
+        self.best_s
+    }
+
+    /// Time between passes over a strip, by its number, seconds; `None` where no head sees it.
+    pub(super) fn gap_s(&self, k: usize, seen_by: HeadSet) -> Option<f64> {
+        let kept = self.set_of.get(k).and_then(|number| self.sets.get(usize::from(*number)));
+        kept.map_or_else(|| self.passes.gap_s(seen_by), |(_, gap_s)| *gap_s)
+    }
+
+    /// Whether a strip is passed as often as any.
+    pub(super) fn is_full(&self, k: usize, seen_by: HeadSet) -> bool {
+        self.gap_s(k, seen_by).is_some_and(|gap_s| gap_s <= self.best_s)
+    }
+}

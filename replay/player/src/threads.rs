@@ -1,0 +1,273 @@
+//! Drives a loop from a log on several threads, or several loops with one navigation.
+//!
+//! A thread reads, decodes, navigates and places pings, one advises, and the caller's does the rest; what one has done of some
+//! ticks goes to the next through a bounded queue. Each part works through the ticks in order and alone, so results are the same
+//! bit for bit on any number of threads: see [`headrace_monitor::split`].
+
+use std::any::Any;
+use std::sync::Arc;
+use std::thread::ScopedJoinHandle;
+
+use crossbeam::channel::{Receiver, bounded};
+use headrace_geometry::time::{DurNs, MonoNs};
+use headrace_monitor::run::Loop;
+use headrace_monitor::split::{Advising, PlacedTick, Placer};
+use headrace_sampling::advice::Advice;
+
+use crate::drive::{DriveError, Driver, Pace, PacketSource, drive, pause};
+
+/// Threads on which a loop can be driven: one places, one advises, one does the rest.
+pub const MOST_THREADS: usize = 3;
+
+/// Ticks handed over at once: what a queue costs is paid once for some milliseconds of work.
+const BATCH_TICKS: usize = 32;
+/// Batches that wait between two threads at most.
+const MOST_WAITING: usize = 4;
+/// Room for all batches that come back: those in two queues and in work.
+const MOST_UNUSED: usize = 2 * MOST_WAITING + MOST_THREADS;
+
+/// Ticks with their pings placed, and the advice at their beats.
+#[derive(Default)]
+struct Batch {
+    ticks: Vec<PlacedTick>,
+    advice: Vec<Vec<Advice>>,
+    /// How many ticks there are; the rest is room that is used again.
+    len: usize,
+}
+
+impl Batch {
+    /// Room for the next tick.
+    fn next(&mut self) -> &mut PlacedTick {
+        if self.len == self.ticks.len() {
+            self.ticks.push(PlacedTick::default());
+            self.advice.push(Vec::new());
+        }
+        self.len += 1;
+        let last = self.len - 1;
+        &mut self.ticks[last]
+    }
+
+    fn advise(&mut self, advising: &mut Advising) {
+        for (tick, advice) in self.ticks.iter().zip(&mut self.advice).take(self.len) {
+            advising.advise(tick, advice);
+        }
+    }
+}
+
+/// Runs the loop until the source ends, as fast as possible and on up to `threads` threads, of which one is the caller's;
+/// `after_tick` is called on that one after every tick. The results are those of [`drive`].
+///
+/// On one thread, or with a plugin that has systems among those that place pings, it is [`drive`].
+///
+/// Errors: see [`DriveError`]. Packets fed before the error have been processed, unless a thread has panicked.
+pub fn drive_on(
+    threads: usize,
+    dive: &mut Loop,
+    source: &mut (dyn PacketSource + Send),
+    tick: DurNs,
+    after_tick: &mut dyn FnMut(&Loop),
+) -> Result<(), DriveError> {
+    let parts = if threads > 1 { dive.split() } else { None };
+    let Some((mut placer, mut advising)) = parts else {
+        return drive(dive, source, Pace { tick, speed: None }, after_tick);
+    };
+    let driven = Driver::new(dive, tick).and_then(|driver| {
+        drive_parts(threads, dive, (&mut placer, driver), source, &mut advising, after_tick)
+    });
+    if !matches!(driven, Err(DriveError::Panicked { .. })) {
+        dive.join(placer, advising);
+    }
+    driven
+}
+
+fn drive_parts(
+    threads: usize,
+    dive: &mut Loop,
+    (placer, driver): (&mut Placer, Driver),
+    source: &mut (dyn PacketSource + Send),
+    advising: &mut Advising,
+    after_tick: &mut dyn FnMut(&Loop),
+) -> Result<(), DriveError> {
+    std::thread::scope(|scope| {
+        let (used, unused) = bounded(MOST_UNUSED);
+        let (to, placed) = bounded::<Batch>(MOST_WAITING);
+        let placing =
+            scope.spawn(move || place(placer, driver, source, &unused, &mut |batch| to.send(batch).is_ok()));
+        let (mut advising, mut beside, mut batches) = (Some(advising), None, placed);
+        if threads >= MOST_THREADS
+            && let Some(advising) = advising.take()
+        {
+            let (to, advised) = bounded(MOST_WAITING);
+            let placed = core::mem::replace(&mut batches, advised);
+            beside = Some(scope.spawn(move || {
+                for mut batch in placed {
+                    batch.advise(advising);
+                    if to.send(batch).is_err() {
+                        return;
+                    }
+                }
+            }));
+        }
+        for mut batch in batches {
+            if let Some(advising) = &mut advising {
+                batch.advise(advising);
+            }
+            for (tick, advice) in batch.ticks.iter_mut().zip(&mut batch.advice).take(batch.len) {
+                run_tick(dive, &mut |dive| dive.tick_taken(tick, advice), after_tick);
+            }
+            // The placer may have ended.
+            used.try_send(batch).ok();
+        }
+        beside.map_or(Ok(()), |beside| joined(beside, "advises"))?;
+        joined(placing, "reads and places pings")?
+    })
+}
+
+/// Runs the later stages of a tick; an outlet that is behind is given time.
+fn run_tick(dive: &mut Loop, tick: &mut dyn FnMut(&mut Loop) -> bool, after_tick: &mut dyn FnMut(&Loop)) {
+    while !tick(dive) {
+        after_tick(dive);
+        pause();
+    }
+    after_tick(dive);
+}
+
+/// Places the pings of a source until it ends, or until nobody takes a batch any more; `unused` has batches to be filled anew.
+fn place(
+    placer: &mut Placer,
+    mut driver: Driver,
+    source: &mut dyn PacketSource,
+    unused: &Receiver<Batch>,
+    hand_over: &mut dyn FnMut(Batch) -> bool,
+) -> Result<(), DriveError> {
+    let (mut batch, mut is_wanted) = (Batch::default(), true);
+    let mut work_off = |now: MonoNs| {
+        loop {
+            placer.tick(now, batch.next());
+            if batch.len == BATCH_TICKS {
+                let next = Batch { len: 0, ..unused.try_recv().unwrap_or_default() };
+                is_wanted &= hand_over(core::mem::replace(&mut batch, next));
+            }
+            if !placer.has_waiting() {
+                return is_wanted;
+            }
+        }
+    };
+    let mut fill = || -> Result<bool, DriveError> {
+        let Some(until) = driver.due(source)? else { return Ok(false) };
+        driver.fill(source, until, &mut |now| {
+            work_off(now);
+        })?;
+        Ok(work_off(until))
+    };
+    let placed = loop {
+        match fill() {
+            Ok(true) => {}
+            Ok(false) => break Ok(()),
+            Err(error) => break Err(error),
+        }
+    };
+    hand_over(batch);
+    placed
+}
+
+/// Runs several loops until the source ends, as [`drive_on`] runs one, with the navigation of the first: packets are decoded and
+/// pings placed once. Each ends as it would have alone.
+///
+/// Errors: see [`DriveError`]; also loops that differ in anything but the target, the sections and what is asked of them. The
+/// navigation they were armed with, which can't be compared, must be the same.
+pub fn drive_together(
+    threads: usize,
+    dives: &mut [Loop],
+    source: &mut dyn PacketSource,
+    tick: DurNs,
+) -> Result<(), DriveError> {
+    let Some(first) = dives.first_mut() else { return Ok(()) };
+    let driver = Driver::new(first, tick)?;
+    let (sources, sensors, mission) = (first.sources().to_vec(), first.sensors(), first.mission().clone());
+    let mut parts = Vec::new();
+    for (number, dive) in dives.iter_mut().enumerate() {
+        let is_alike =
+            dive.sources() == sources && dive.sensors() == sensors && mission.places_as(dive.mission());
+        let split = if is_alike { dive.split() } else { None };
+        parts.push(split.ok_or(DriveError::Unlike { number })?);
+    }
+    let (mut placers, mut advising): (Vec<Placer>, Vec<Advising>) = parts.into_iter().unzip();
+    let Some((placer, others)) = placers.split_first_mut() else { return Ok(()) };
+    let parted: Vec<(&mut Loop, &mut Advising)> = dives.iter_mut().zip(&mut advising).collect();
+    let driven = drive_all(threads, parted, (placer, driver), source);
+    if let Err(DriveError::Panicked { .. }) = driven {
+        return driven;
+    }
+    for (number, other) in (1..).zip(others) {
+        other.take_over(placer).map_err(|_| DriveError::Unlike { number })?;
+    }
+    for ((dive, placer), advising) in dives.iter_mut().zip(placers).zip(advising) {
+        dive.join(placer, advising);
+    }
+    driven
+}
+
+fn drive_all(
+    threads: usize,
+    mut dives: Vec<(&mut Loop, &mut Advising)>,
+    (placer, driver): (&mut Placer, Driver),
+    source: &mut dyn PacketSource,
+) -> Result<(), DriveError> {
+    let (used, unused) = bounded(MOST_UNUSED);
+    if threads < 2 {
+        return place(placer, driver, source, &unused, &mut |batch| {
+            cover_all(&mut dives, &batch);
+            used.try_send(batch).is_ok()
+        });
+    }
+    std::thread::scope(|scope| {
+        let (mut queues, mut covering) = (Vec::new(), Vec::new());
+        let each = dives.len().div_ceil((threads - 1).min(dives.len()).max(1));
+        while !dives.is_empty() {
+            let mut some: Vec<_> = dives.drain(..each.min(dives.len())).collect();
+            let (to, placed) = bounded::<Arc<Batch>>(MOST_WAITING);
+            let used = used.clone();
+            queues.push(to);
+            covering.push(scope.spawn(move || {
+                for batch in placed {
+                    cover_all(&mut some, &batch);
+                    // The last one gives it back; the placer may have ended.
+                    if let Some(batch) = Arc::into_inner(batch) {
+                        used.try_send(batch).ok();
+                    }
+                }
+            }));
+        }
+        let placed = place(placer, driver, source, &unused, &mut |batch| {
+            let batch = Arc::new(batch);
+            queues.iter().all(|queue| queue.send(Arc::clone(&batch)).is_ok())
+        });
+        drop(queues);
+        for covering in covering {
+            joined(covering, "covers the wall")?;
+        }
+        placed
+    })
+}
+
+/// Runs the later stages of a batch in each loop.
+fn cover_all(dives: &mut [(&mut Loop, &mut Advising)], batch: &Batch) {
+    let mut advice = Vec::new();
+    for (dive, advising) in dives {
+        for tick in batch.ticks.iter().take(batch.len) {
+            advising.advise(tick, &mut advice);
+            run_tick(dive, &mut |dive| dive.tick_placed(tick, &advice), &mut |_| ());
+        }
+    }
+}
+
+/// What a thread has returned; its panic is an error.
+pub(crate) fn joined<T>(thread: ScopedJoinHandle<'_, T>, what: &'static str) -> Result<T, DriveError> {
+    thread.join().map_err(|panic| DriveError::Panicked { what, message: words_of(panic.as_ref()) })
+}
+
+fn words_of(panic: &(dyn Any + Send)) -> String {
+    let text = panic.downcast_ref::<&str>().map(|text| (*text).to_owned());
+    text.or_else(|| panic.downcast_ref::<String>().cloned()).unwrap_or_default()
+}
