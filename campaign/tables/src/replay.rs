@@ -5,28 +5,20 @@ use std::sync::atomic::AtomicBool;
 
 use headrace_config::Document;
 use headrace_fusion::Navigation;
-use headrace_fusion::filter::FilterNavigation;
-use headrace_fusion::filter::sources::Consistency;
-use headrace_fusion::smooth::journal::Journal;
-use headrace_fusion::smooth::track::TrackNavigation;
 use headrace_monitor::App;
-use headrace_monitor::report::{LogReport, Report, smoothing_changes};
+use headrace_monitor::report::{LogReport, Report};
 use headrace_monitor::run::Loop;
 use headrace_replay::drive::{Pace, drive};
 use headrace_replay::log::files_digest;
 use headrace_replay::log::format::VEHICLE_FILE;
 use headrace_replay::player::Player;
 use headrace_replay::regular_file;
-use headrace_replay::smooth::Steps;
-use headrace_sensor::reading::MAX_SOURCES;
+use headrace_replay::smooth::FirstPass;
 use headrace_vehicle::{NavigationConfig, VehicleConfig};
 
 use crate::kinds::KINDS;
 use crate::stoppable::Stoppable;
 use crate::{Error, Parameters};
-
-/// Capacity of the queue of filter steps: a tick has a minute at most, with ten epochs a second and up to three steps each.
-const RECORDS: usize = 4096;
 
 /// Longest vehicle file, or file that it names, bytes.
 const TEXT_BYTES: u64 = 16 << 20;
@@ -147,21 +139,13 @@ fn smoothed(
     let NavigationConfig::Filter(settings) = vehicle.navigation else {
         return Err(Error::NoFilter { log: log.first().cloned().unwrap_or_default() });
     };
-    let (journal, reader) = Journal::new(RECORDS);
-    let mut steps = Steps::new(reader)?;
-    let filter = FilterNavigation::new(vehicle.tunnel.profile.clone(), vehicle.site, settings);
-    let mut consistency: [Option<Consistency>; MAX_SOURCES] = [None; MAX_SOURCES];
+    let (mut pass, filters) = FirstPass::new(vehicle, settings)?;
     let mut first = Player::open(log)?;
     let first = Stoppable::new(&mut first, stop);
-    let before = straight(first, vehicle, Box::new(filter.with_journal(journal)), &mut |dive| {
-        steps.take();
-        consistency = core::array::from_fn(|source| dive.consistency(source));
-    })?;
-    let track = steps.smooth(settings)?;
-    let (estimates, pieces) = (track.len() as u64, track.pieces() as u64);
-    let navigation = Box::new(TrackNavigation::new(track, consistency));
+    let before = straight(first, vehicle, filters, &mut |dive| pass.after_tick(dive))?;
+    let (navigation, changes) = pass.smooth()?;
     let mut report = straight(Stoppable::new(player, stop), vehicle, navigation, &mut |_| ())?;
-    report.smoothing = Some(smoothing_changes::compare(&before, &report, estimates, pieces));
+    changes.complete(&before, &mut report);
     Ok(report)
 }
 

@@ -1,4 +1,4 @@
-//! Stores the filter's steps on disk during a replay, and smooths them from last to first.
+//! Keeps the filter's steps on disk during a first replay, and smooths them from last to first for a second one.
 //!
 //! They are too many for memory: an unlinked file holds them and disappears with the process.
 
@@ -6,12 +6,21 @@ use std::fs::{File, OpenOptions};
 use std::io::{BufWriter, Read, Seek, SeekFrom, Write};
 use std::path::PathBuf;
 
+use headrace_fusion::Navigation;
 use headrace_fusion::filter::settings::Settings;
+use headrace_fusion::filter::sources::Consistency;
 use headrace_fusion::smooth::backward::Backward;
-use headrace_fusion::smooth::journal::JournalReader;
+use headrace_fusion::smooth::beside::BesideNavigation;
+use headrace_fusion::smooth::journal::{Journal, JournalReader};
 use headrace_fusion::smooth::step::{Placed, WORDS, Words};
-use headrace_fusion::smooth::track::Track;
+use headrace_fusion::smooth::track::{Track, TrackNavigation};
+use headrace_monitor::report::{Report, smoothing_changes};
+use headrace_monitor::run::Loop;
+use headrace_sensor::reading::MAX_SOURCES;
+use headrace_vehicle::VehicleConfig;
 
+/// Capacity of the queue of filter steps: a tick has a minute at most, with ten epochs a second and up to three steps each.
+const QUEUED: usize = 4096;
 /// Bytes per record.
 const RECORD: usize = 8 * WORDS;
 /// Records per read.
@@ -33,6 +42,14 @@ pub enum SmoothError {
         /// Cause.
         source: std::io::Error,
     },
+    /// The filter made steps faster than they were taken.
+    #[error("keeping the filter's steps: {lost} of a tick were lost; there is room for {queued}")]
+    Lost {
+        /// Steps lost.
+        lost: u64,
+        /// Steps that a tick may have.
+        queued: usize,
+    },
     /// A record read back isn't the one written.
     #[error("reading the filter's steps back: record {record} is damaged")]
     Damaged {
@@ -41,8 +58,63 @@ pub enum SmoothError {
     },
 }
 
+/// The first of two replays: it navigates with the filter, and keeps the steps of the one that is smoothed.
+pub struct FirstPass {
+    settings: Settings,
+    steps: Steps,
+    consistency: [Option<Consistency>; MAX_SOURCES],
+}
+
+impl FirstPass {
+    /// With the navigation that the replay is armed with. The file of steps is in the system's temporary folder.
+    ///
+    /// Errors: it can't be created.
+    pub fn new(vehicle: &VehicleConfig, settings: Settings) -> Result<(Self, Box<dyn Navigation>), SmoothError> {
+        let (journal, reader) = Journal::new(QUEUED);
+        let steps = Steps::new(reader)?;
+        let profile = vehicle.tunnel.profile.clone();
+        let navigation = BesideNavigation::new(profile, vehicle.site, settings, journal);
+        Ok((Self { settings, steps, consistency: [None; MAX_SOURCES] }, Box::new(navigation)))
+    }
+
+    /// Takes what a tick brought; to be called after every tick.
+    pub fn after_tick(&mut self, dive: &Loop) {
+        self.steps.take();
+        self.consistency = core::array::from_fn(|source| dive.consistency(source));
+    }
+
+    /// Smooths from the last step to the first; the second replay navigates along the result.
+    ///
+    /// Errors: a step was lost, or the file of steps couldn't be written or read.
+    pub fn smooth(self) -> Result<(Box<dyn Navigation>, Changes), SmoothError> {
+        let (records, lost) = (self.steps.records, self.steps.journal.dropped());
+        if lost > 0 {
+            return Err(SmoothError::Lost { lost, queued: QUEUED });
+        }
+        let track = self.steps.smooth(self.settings)?;
+        let changes = Changes { estimates: track.len() as u64, pieces: track.pieces() as u64 };
+        tracing::debug!(records, pieces = changes.pieces, "smoothed");
+        Ok((Box::new(TrackNavigation::new(track, self.consistency)), changes))
+    }
+}
+
+/// How much was smoothed.
+#[derive(Debug, Clone, Copy)]
+pub struct Changes {
+    estimates: u64,
+    pieces: u64,
+}
+
+impl Changes {
+    /// Writes into the second replay's report what has changed since the first.
+    pub fn complete(self, first: &Report, second: &mut Report) {
+        let changes = smoothing_changes::compare(first, second, self.estimates, self.pieces);
+        second.smoothing = Some(changes);
+    }
+}
+
 /// Filter steps of a replay in progress.
-pub struct Steps {
+struct Steps {
     journal: JournalReader,
     folder: PathBuf,
     file: BufWriter<File>,
@@ -51,10 +123,7 @@ pub struct Steps {
 }
 
 impl Steps {
-    /// For a filter's journal. The file is in the system's temporary folder.
-    ///
-    /// Errors: it can't be created.
-    pub fn new(journal: JournalReader) -> Result<Self, SmoothError> {
+    fn new(journal: JournalReader) -> Result<Self, SmoothError> {
         let folder = std::env::temp_dir();
         match nameless(&folder) {
             Ok(file) => {
@@ -65,8 +134,7 @@ impl Steps {
         }
     }
 
-    /// Takes the steps since the last call; to be called after every tick.
-    pub fn take(&mut self) {
+    fn take(&mut self) {
         while let Some(words) = self.journal.next() {
             if self.failed.is_some() {
                 continue;
@@ -78,22 +146,9 @@ impl Steps {
         }
     }
 
-    /// Number of records.
-    pub fn records(&self) -> u64 {
-        self.records
-    }
-
-    /// Size of the records, bytes.
-    pub fn bytes(&self) -> u64 {
-        self.records * RECORD as u64
-    }
-
-    /// Smooths from the last step to the first, with the filter's settings.
-    ///
-    /// Errors: the file couldn't be written, or can't be read.
-    pub fn smooth(mut self, settings: Settings) -> Result<Track, SmoothError> {
+    fn smooth(mut self, settings: Settings) -> Result<Track, SmoothError> {
         self.take();
-        let (folder, bytes) = (self.folder.clone(), self.bytes());
+        let (folder, bytes) = (self.folder.clone(), self.records * RECORD as u64);
         let failed = |source| SmoothError::File { folder: folder.clone(), bytes, source };
         if let Some(error) = self.failed {
             return Err(failed(error));

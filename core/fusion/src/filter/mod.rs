@@ -145,7 +145,7 @@ impl FilterNavigation {
 
     /// From now on records the steps of each epoch, for smoothing.
     #[must_use]
-    pub fn with_journal(mut self, journal: Journal) -> Self {
+    pub(crate) fn with_journal(mut self, journal: Journal) -> Self {
         self.running.keep_steps();
         self.journal = Some(journal);
         self
