@@ -69,7 +69,10 @@ impl FirstPass {
     /// With the navigation that the replay is armed with. The file of steps is in the system's temporary folder.
     ///
     /// Errors: it can't be created.
-    pub fn new(vehicle: &VehicleConfig, settings: Settings) -> Result<(Self, Box<dyn Navigation>), SmoothError> {
+    pub fn new(
+        vehicle: &VehicleConfig,
+        settings: Settings,
+    ) -> Result<(Self, Box<dyn Navigation>), SmoothError> {
         let (journal, reader) = Journal::new(QUEUED);
         let steps = Steps::new(reader)?;
         let profile = vehicle.tunnel.profile.clone();

@@ -4,6 +4,7 @@
 
 mod circles;
 mod hard_cases;
+mod image;
 mod imports;
 mod promises;
 mod supply;

@@ -15,7 +15,7 @@ const NEVER_BUILT: [&str; 1] = ["wasm_bindgen"];
 /// All packages that the lock file names and any feature needs.
 fn packages() -> Vec<Value> {
     let output = Command::new(env!("CARGO"))
-        .args(["metadata", "--format-version", "1", "--offline", "--locked", "--all-features"])
+        .args(["metadata", "--format-version", "1", "--locked", "--all-features"])
         .current_dir(root())
         .output()
         .unwrap();

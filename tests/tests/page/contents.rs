@@ -188,24 +188,52 @@ fn samples_come_by_chainage_and_none_is_lost_by_jumps() {
     end(serving, &mut viewer);
 }
 
+/// The fields of Cockpit's page "External Integrations" (May 2026): one that is missing, null or of another type discards the whole file.
+fn is_what_cockpit_accepts(extras: &Value) {
+    let texts = |of: &Value, keys: &[&str]| {
+        for key in keys {
+            assert!(of[key].is_string(), "{key} of {of}");
+        }
+    };
+    let each = |of: &Value, key: &str| of[key].as_array().unwrap_or_else(|| panic!("{key} of {of}")).clone();
+    texts(extras, &["targetCockpitApiVersion", "targetSystem"]);
+    for widget in each(extras, "widgets") {
+        texts(&widget, &["name", "iframeUrl", "iconUrl", "iframeIcon", "version"]);
+        assert!(widget["useExtensionPathAsBaseUrl"].is_boolean(), "{widget}");
+    }
+    let actions = each(extras, "actions");
+    for action in &actions {
+        texts(action, &["id", "name", "version"]);
+        assert_eq!(action["type"], "http-request");
+        let config = &action["config"];
+        texts(config, &["name", "url", "body"]);
+        assert!(["GET", "POST", "PUT", "DELETE", "PATCH"].contains(&config["method"].as_str().unwrap()));
+        for record in ["headers", "urlParams"] {
+            assert!(config[record].as_object().unwrap().values().all(Value::is_string), "{action}");
+        }
+    }
+    for group in each(extras, "joystickSuggestions") {
+        texts(&group, &["id", "name", "description", "version"]);
+        for button in each(&group, "buttonMappingSuggestions") {
+            texts(&button, &["id", "actionName", "actionId", "description"]);
+            assert_eq!(button["actionProtocol"], "cockpit-action");
+            assert!(["regular", "shift"].contains(&button["modifierKey"].as_str().unwrap()), "{button}");
+            assert!(button["button"].is_number(), "{button}");
+            assert!(actions.iter().any(|action| action["id"] == button["actionId"]), "{button}");
+        }
+    }
+}
+
 #[test]
 fn other_programs_read_lines_states_and_figures() {
     let folder = Folder::with_dive();
     let (serving, mut viewer) = replayed(&folder);
     let (_, extras) = serving.ask("GET", "/cockpit_extras.json", &[], "");
     let extras: Value = serde_json::from_str(extras.split("\r\n\r\n").nth(1).unwrap()).unwrap();
-    // As Cockpit's schema wants it: keys in camelCase, texts and no null where a text is, an icon for each widget.
-    for widget in extras["widgets"].as_array().unwrap() {
-        assert!(
-            ["name", "iframeUrl", "iframeIcon", "version"].iter().all(|key| widget[key].is_string()),
-            "{widget}"
-        );
-    }
-    for action in extras["actions"].as_array().unwrap() {
-        let config = &action["config"];
-        assert!(["name", "url", "method", "body"].iter().all(|key| config[key].is_string()), "{action}");
-        assert!(config["headers"].is_object() && action["type"] == "http-request", "{action}");
-    }
+    is_what_cockpit_accepts(&extras);
+    let icon = extras["widgets"][0]["iconUrl"].as_str().unwrap();
+    let (status, picture) = serving.ask("GET", &icon[icon.find("/assets").unwrap()..], &[], "");
+    assert!(status == 200 && picture.contains("<svg"), "{icon}: {status}");
     // The dive goes on meanwhile, until the end of the log: then both have its last state.
     loop {
         let (status, answer) = serving.ask("GET", "/state.json", &[], "");

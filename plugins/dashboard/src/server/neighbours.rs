@@ -4,7 +4,7 @@ use serde_json::{Value, json};
 
 /// Where Cockpit finds its widgets and actions.
 pub(super) const EXTRAS: &str = "/cockpit_extras.json";
-/// The icon of the widgets: the page's own.
+/// The service's icon in BlueOS, by its name in Material Design Icons.
 const ICON: &str = "mdi-tunnel";
 
 /// The service as BlueOS lists it.
@@ -25,8 +25,10 @@ pub(super) fn service() -> Value {
 
 /// Widgets, actions and buttons of a joystick for Cockpit. `base` is this server as the browser knows it.
 pub(super) fn extras(base: &str) -> Value {
+    // Cockpit shows a picture, not an icon by name; it calls it `iconUrl` now, `iframeIcon` before.
+    let icon = format!("{base}/assets/icon.svg");
     let widget = |name: &str, path: &str| {
-        json!({"name": name, "iframeUrl": format!("{base}/widget/{path}"), "iframeIcon": ICON,
+        json!({"name": name, "iframeUrl": format!("{base}/widget/{path}"), "iconUrl": icon, "iframeIcon": icon,
             "version": env!("CARGO_PKG_VERSION"), "useExtensionPathAsBaseUrl": false})
     };
     let action = |id: &str, name: &str, path: &str, body: Value| {
