@@ -10,6 +10,8 @@ use headrace_snapshot::stateful;
 
 /// Capacity: five minutes of four heads that all get nothing.
 const ROOM: usize = 1 << 16;
+/// Lacks whose extent is known as a whole: a look for a few metres' passes over the others. Divides the capacity.
+const BLOCK: usize = 1 << 8;
 
 /// A sample that is lacking.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -26,16 +28,18 @@ pub struct Lack {
 #[derive(Debug)]
 pub struct Lacks {
     ring: Vec<Lack>,
+    /// Of each block of the ring, chainages between which all its lacks are, m.
+    extents_m: Vec<[f64; 2]>,
     /// Where the next one goes once the ring is full.
     next: u32,
 }
 
-stateful!(Lacks { state: next; lists: ring; });
+stateful!(Lacks { state: next; lists: ring, extents_m; });
 
 impl Default for Lacks {
     /// Allocates: startup only; all that it will ever use.
     fn default() -> Self {
-        Self { ring: Vec::with_capacity(ROOM), next: 0 }
+        Self { ring: Vec::with_capacity(ROOM), extents_m: Vec::with_capacity(ROOM / BLOCK), next: 0 }
     }
 }
 
@@ -44,19 +48,38 @@ impl Lacks {
     ///
     /// Allocates: never.
     pub fn add(&mut self, lack: Lack) {
-        if self.ring.len() < ROOM {
-            self.ring.push(lack);
-            return;
-        }
-        if let Some(oldest) = self.ring.get_mut(self.next as usize) {
+        let at = if self.ring.len() < ROOM { self.ring.len() } else { self.next as usize };
+        if let Some(oldest) = self.ring.get_mut(at) {
             *oldest = lack;
+            self.next = if at + 1 >= ROOM { 0 } else { self.next + 1 };
+        } else {
+            self.ring.push(lack);
         }
-        self.next = if self.next as usize + 1 >= ROOM { 0 } else { self.next + 1 };
+        self.extend(at, lack.x_m);
+    }
+
+    /// Takes a lack at a place of the ring into its block's extent, which is that of the latest alone once they fill the block.
+    fn extend(&mut self, at: usize, x_m: f64) {
+        let block = at / BLOCK;
+        let wider_m = |[from_m, to_m]: [f64; 2], x_m: f64| [from_m.min(x_m), to_m.max(x_m)];
+        let Some(extent_m) = self.extents_m.get_mut(block) else {
+            self.extents_m.push([x_m; 2]);
+            return;
+        };
+        *extent_m = wider_m(*extent_m, x_m);
+        if (at + 1).is_multiple_of(BLOCK) {
+            let latest = self.ring.get(block * BLOCK..=at).unwrap_or_default();
+            *extent_m = latest.iter().fold([x_m; 2], |extent_m, lack| wider_m(extent_m, lack.x_m));
+        }
     }
 
     /// Those between two chainages, in no particular order.
     pub fn between(&self, from_m: f64, to_m: f64) -> impl Iterator<Item = &Lack> {
-        self.ring.iter().filter(move |lack| (from_m..=to_m).contains(&lack.x_m))
+        let meets = move |extent_m: &[f64; 2]| extent_m[0] <= to_m && extent_m[1] >= from_m;
+        let blocks =
+            self.ring.chunks(BLOCK).zip(&self.extents_m).filter(move |(_, extent_m)| meets(extent_m));
+        let lacks = blocks.flat_map(|(block, _)| block);
+        lacks.filter(move |lack| (from_m..=to_m).contains(&lack.x_m))
     }
 }
 
@@ -76,5 +99,22 @@ mod tests {
         let first = (ROOM + 10) as f64;
         assert_eq!(lacks.between(0.0, first - 1.0).count(), 0);
         assert_eq!(lacks.between(first, first + 4.0).count(), 5);
+    }
+
+    /// Whatever was looked for in blocks is what is there without them, while the ring fills and is written over, on a way there and back.
+    #[test]
+    fn none_is_passed_over() {
+        let mut lacks = Lacks::default();
+        for k in 0..ROOM + 5 * BLOCK + 77 {
+            let along_m = (k % 9000) as f64 * 0.01;
+            let x_m = if (k / 9000).is_multiple_of(2) { along_m } else { 90.0 - along_m };
+            lacks.add(Lack { x_m, arc_m: k as f64, why: Causes::of(Cause::HeadSilent) });
+            if k % 977 == 0 || k >= ROOM && k % 101 == 0 {
+                let [from_m, to_m] = [x_m - 0.3, x_m + 0.1 * (k % 7) as f64];
+                let all = lacks.ring.iter().filter(|lack| (from_m..=to_m).contains(&lack.x_m));
+                assert!(lacks.between(from_m, to_m).eq(all), "after {k}");
+            }
+        }
+        assert!(lacks.between(90.1, 100.0).next().is_none());
     }
 }
