@@ -10,6 +10,9 @@ use std::time::Duration;
 use serde_json::Value;
 use tempfile::TempDir;
 
+#[cfg(feature = "cluster")]
+mod cluster;
+
 /// Logs of 16 to 20 s, all different.
 const LOGS: [&str; 5] = ["adrift", "murk", "sectors", "stalls", "steel"];
 
