@@ -192,6 +192,10 @@ fn a_log_that_cannot_be_read_is_a_row() {
     assert_eq!(of("rosone/cut.mcap")["exit_code"], 3);
     assert!(of("rosone/cut.mcap")["losses"].as_i64().unwrap() > 0);
     assert_eq!(of("rosone/stalls.mcap")["exit_code"], 0);
+    // Of a copy, too, the table function has the path.
+    let (logs, _) =
+        ask(folder.path(), cache.path(), "SELECT DISTINCT log FROM replay('*', '', 'dives')", &[]);
+    assert_eq!(logs.len(), 8);
 }
 
 #[test]
