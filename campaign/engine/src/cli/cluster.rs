@@ -30,7 +30,7 @@ pub(crate) struct Arguments {
     executor: Option<String>,
     /// Where the scheduler or executor listens; by default on this machine alone, 127.0.0.1:50050 and 127.0.0.1:50051. Anybody who
     /// reaches it can read the logs: there is neither a password nor encryption.
-    #[arg(long, value_name = "ADDRESS:PORT")]
+    #[arg(long, value_name = "ADDRESS:PORT", conflicts_with = "folder")]
     listen: Option<SocketAddr>,
 }
 
