@@ -37,6 +37,8 @@ impl Cluster {
     fn process(&mut self, cache: &Path, arguments: &[&str], address: SocketAddr) {
         let mut command = Command::new(env!("CARGO_BIN_EXE_headrace-campaign"));
         command.args(arguments).arg("--listen").arg(address.to_string()).arg("--cache").arg(cache);
+        // What a killed one leaves goes with the cache's folder.
+        command.env("TMPDIR", cache.parent().unwrap());
         let mut child = command.stderr(Stdio::null()).spawn().unwrap();
         while TcpStream::connect(address).is_err() {
             assert!(child.try_wait().unwrap().is_none(), "{command:?} ended");
