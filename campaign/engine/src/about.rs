@@ -3,8 +3,6 @@
 
 use std::collections::BTreeMap;
 
-use serde::{Deserialize, Serialize};
-
 use crate::error::Error;
 use crate::place::Place;
 
@@ -14,7 +12,7 @@ pub const FILE: &str = "dives.csv";
 const COLUMNS: [&str; 4] = ["log", "plant", "pilot", "day"];
 
 /// What is known of a dive beside its log.
-#[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct About {
     /// The plant.
     pub plant: Option<String>,
@@ -25,7 +23,7 @@ pub struct About {
 }
 
 /// What is known of all dives, by log.
-#[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct Abouts(BTreeMap<String, About>);
 
 impl Abouts {

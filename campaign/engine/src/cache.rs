@@ -188,7 +188,10 @@ impl Cache {
     }
 }
 
-fn write(path: &Path, batch: &RecordBatch) -> Result<(), Error> {
+/// Writes a Parquet file.
+///
+/// Errors: it can't be written.
+pub(crate) fn write(path: &Path, batch: &RecordBatch) -> Result<(), Error> {
     let file = File::create(path).map_err(of_file("writing", path))?;
     let level = ZstdLevel::default();
     let properties = WriterProperties::builder().set_compression(Compression::ZSTD(level)).build();

@@ -7,21 +7,24 @@ use std::sync::Arc;
 use datafusion::arrow::array::RecordBatch;
 use datafusion::arrow::array::cast::AsArray as _;
 use datafusion::arrow::array::types::Int64Type;
+use datafusion::arrow::datatypes::SchemaRef;
 use datafusion::datasource::MemTable;
 use datafusion::datasource::file_format::parquet::ParquetFormat;
 use datafusion::datasource::listing::{ListingOptions, ListingTable, ListingTableConfig, ListingTableUrl};
+use datafusion::error::DataFusionError;
 use datafusion::prelude::{SessionConfig, SessionContext};
 use futures::{StreamExt as _, TryStreamExt as _};
 use headrace_tables::{Parameters, TABLES, dive_key, program_version, schema};
+use tempfile::TempDir;
 use url::Url;
 
 use crate::about::Abouts;
-use crate::cache::{Cache, Found};
+use crate::cache::{Cache, Found, write};
 use crate::dives::dives_table;
 use crate::error::{Error, of_file};
-use crate::maker::{Made, Maker};
+use crate::maker::{Made, Maker, unread_dive};
 use crate::place::{DiveLog, Place};
-use crate::provider::{ReplayFunction, Replayed};
+use crate::provider::{ReplayFunction, ReplayTable, Replayed};
 
 /// Prefix of the tables of another program version.
 pub const BEFORE: &str = "before_";
@@ -38,6 +41,19 @@ pub struct Campaign {
     /// Makes their tables.
     pub maker: Arc<Maker>,
     threads: usize,
+    elsewhere: Option<Elsewhere>,
+}
+
+/// A session that other processes replay and answer for, and a folder that they see, too.
+struct Elsewhere {
+    session: SessionContext,
+    folder: TempDir,
+}
+
+impl std::fmt::Debug for Elsewhere {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("Elsewhere").field("folder", &self.folder).finish_non_exhaustive()
+    }
 }
 
 /// A campaign's dives as made.
@@ -68,7 +84,17 @@ impl Campaign {
         if dives.is_empty() {
             return Err(Error::NoLogs(place.url().to_string()));
         }
-        Ok(Self { place, dives, parameters, maker, threads: threads.max(1) })
+        Ok(Self { place, dives, parameters, maker, threads: threads.max(1), elsewhere: None })
+    }
+
+    /// Replays and answers in a session of other processes, which have the same cache.
+    ///
+    /// Errors: the cache can't be written.
+    pub fn send_to(&mut self, session: SessionContext) -> Result<(), Error> {
+        let scratch = self.maker.cache().scratch();
+        let folder = tempfile::tempdir_in(&scratch).map_err(of_file("making a folder in", &scratch))?;
+        self.elsewhere = Some(Elsewhere { session, folder });
+        Ok(())
     }
 
     /// Every `of`-th dive, beginning with number `shard`, from 1.
@@ -87,14 +113,8 @@ impl Campaign {
         let about = Abouts::read(&self.place).await?;
         let logs: Vec<String> = self.dives.iter().map(|dive| dive.log.clone()).collect();
         let unknown = about.beyond(&logs).into_iter().map(str::to_owned).collect();
-        let making = self.dives.iter().map(|dive| async move {
-            let made = self.maker.make(&self.place, dive, &self.parameters).await?;
-            Ok::<_, Error>((dive.clone(), made))
-        });
-        let mut making = futures::stream::iter(making).buffered(self.threads);
         let (mut first, mut dives, mut copies) = (BTreeMap::new(), Vec::new(), Vec::new());
-        while let Some((dive, made)) = making.try_next().await? {
-            note(&dive, &made);
+        for (dive, made) in self.made(note).await? {
             if let Made::Kept { sha256, .. } = &made
                 && let Some(of) = first.insert(sha256.clone(), dive.log.clone())
             {
@@ -106,6 +126,118 @@ impl Campaign {
         }
         let table = dives_table(&dives, &about).await?;
         Ok(Finished { dives, copies, unknown, table })
+    }
+
+    /// Each dive with its tables, in order.
+    async fn made(&self, note: &mut dyn FnMut(&DiveLog, &Made)) -> Result<Vec<(DiveLog, Made)>, Error> {
+        let mut sent = match &self.elsewhere {
+            Some(elsewhere) => self.made_by(&elsewhere.session).await?,
+            None => BTreeMap::new(),
+        };
+        let making = self.dives.iter().map(|dive| {
+            let sent = sent.remove(&dive.log);
+            async move {
+                let made = match sent {
+                    Some(made) => made,
+                    None => self.maker.make(&self.place, dive, &self.parameters).await?,
+                };
+                Ok::<_, Error>((dive.clone(), made))
+            }
+        });
+        let mut making = futures::stream::iter(making).buffered(self.threads);
+        let mut all = Vec::new();
+        while let Some((dive, made)) = making.try_next().await? {
+            note(&dive, &made);
+            all.push((dive, made));
+        }
+        Ok(all)
+    }
+
+    /// The dives that a session's processes have made, by log: those that the cache hasn't yet. Where a process ends and takes its answers
+    /// with it, what it finished is in the cache; the others are sent again, as long as they become fewer.
+    async fn made_by(&self, session: &SessionContext) -> Result<BTreeMap<String, Made>, Error> {
+        let (mut made, mut wanted) = self.looked_for(self.dives.clone()).await?;
+        self.maker.counts().add(wanted.len(), made.len());
+        while !wanted.is_empty() {
+            match self.replayed_by(session, &wanted).await {
+                Ok(replayed) => {
+                    made.extend(replayed);
+                    wanted.clear();
+                }
+                Err(error) => {
+                    let sent = wanted.len();
+                    let (kept, missing) = self.looked_for(wanted).await?;
+                    if missing.len() == sent {
+                        return Err(error);
+                    }
+                    eprintln!("headrace-campaign: {error}; {} of {sent} dives are sent again", missing.len());
+                    made.extend(kept);
+                    wanted = missing;
+                }
+            }
+        }
+        Ok(made)
+    }
+
+    /// What the cache has of these dives, by log, and the others.
+    async fn looked_for(&self, dives: Vec<DiveLog>) -> Result<(BTreeMap<String, Made>, Vec<DiveLog>), Error> {
+        let looking = dives.into_iter().map(|dive| async move {
+            let kept = self.maker.kept(&self.place, &dive, &self.parameters).await?;
+            Ok::<_, Error>((dive, kept))
+        });
+        let mut looking = futures::stream::iter(looking).buffered(self.threads);
+        let (mut found, mut missing) = (BTreeMap::new(), Vec::new());
+        while let Some((dive, kept)) = looking.try_next().await? {
+            match kept {
+                Some(made) => _ = found.insert(dive.log, made),
+                None => missing.push(dive),
+            }
+        }
+        Ok((found, missing))
+    }
+
+    /// Has dives replayed by a session's processes.
+    async fn replayed_by(
+        &self,
+        session: &SessionContext,
+        dives: &[DiveLog],
+    ) -> Result<BTreeMap<String, Made>, Error> {
+        let replayed = Replayed { dives: dives.to_vec(), ..self.replayed("dives") };
+        let table = Arc::new(ReplayTable::new(self.maker.clone(), replayed)?);
+        let rows = session.read_table(table)?.select_columns(&["log", "log_sha256", "error"])?;
+        let by_log: BTreeMap<&str, &DiveLog> = dives.iter().map(|dive| (dive.log.as_str(), dive)).collect();
+        let mut made = BTreeMap::new();
+        for rows in rows.collect().await? {
+            let texts = |name: &str| rows.column_by_name(name).and_then(|of| of.as_string_opt::<i32>());
+            let (Some(logs), Some(digests), Some(errors)) =
+                (texts("log"), texts("log_sha256"), texts("error"))
+            else {
+                return Err(DataFusionError::Internal(format!("{} is no dives", rows.schema())).into());
+            };
+            for ((log, sha256), error) in logs.iter().zip(digests).zip(errors) {
+                let Some(dive) = log.and_then(|log| by_log.get(log)) else { continue };
+                let sha256 = sha256.unwrap_or_default();
+                let of = match error {
+                    Some(error) => unread_dive(dive, sha256, &self.parameters, error)?,
+                    None => self.seen(sha256)?,
+                };
+                made.insert(dive.log.clone(), of);
+            }
+        }
+        Ok(made)
+    }
+
+    /// A dive that others say they have made.
+    ///
+    /// Errors: it isn't in this cache.
+    fn seen(&self, sha256: &str) -> Result<Made, Error> {
+        let folder = self.maker.cache().dive(&self.parameters.digest(), sha256);
+        if !folder.exists() {
+            let (folder, cache) = (folder.display(), self.maker.cache().folder().display());
+            let why = "is missing though an executor has made it; --cache must be one folder that all see";
+            return Err(Error::Usage(format!("{folder} {why}, here it is {cache}")));
+        }
+        Ok(Made::Kept { sha256: sha256.to_owned(), folder })
     }
 
     /// Replays at a time.
@@ -120,7 +252,6 @@ impl Campaign {
             dives: self.dives.clone(),
             parameters: self.parameters.clone(),
             table: table.to_owned(),
-            about: None,
         }
     }
 
@@ -128,8 +259,12 @@ impl Campaign {
     ///
     /// Errors: a table can't be registered.
     pub fn session(&self, finished: &Finished, before: Option<&str>) -> Result<SessionContext, Error> {
-        let config = SessionConfig::new().with_target_partitions(self.threads).with_information_schema(true);
-        let session = SessionContext::new_with_config(config);
+        let session = if let Some(elsewhere) = &self.elsewhere {
+            elsewhere.session.clone()
+        } else {
+            let config = SessionConfig::new().with_target_partitions(self.threads);
+            SessionContext::new_with_config(config.with_information_schema(true))
+        };
         self.register(&session, finished, before)?;
         Ok(session)
     }
@@ -144,21 +279,47 @@ impl Campaign {
         before: Option<&str>,
     ) -> Result<(), Error> {
         let folders: Vec<PathBuf> = finished.dives.iter().filter_map(|(_, made)| folder(made)).collect();
-        let dives = MemTable::try_new(finished.table.schema(), vec![vec![finished.table.clone()]])?;
-        session.register_table("dives", Arc::new(dives))?;
+        self.register_batch(session, "dives", finished.table.clone())?;
         for table in TABLES.into_iter().filter(|table| *table != "dives") {
-            register_files(session, table, table, &folders)?;
+            self.register_files(session, table, table, &folders)?;
         }
         let earlier = match before.map(ToOwned::to_owned).or_else(|| self.other_version()) {
             Some(version) => self.earlier(&version, finished),
             None => Vec::new(),
         };
         for table in TABLES {
-            register_files(session, &format!("{BEFORE}{table}"), table, &earlier)?;
+            self.register_files(session, &format!("{BEFORE}{table}"), table, &earlier)?;
         }
         let function = ReplayFunction { maker: self.maker.clone(), all: self.replayed("sections") };
         session.register_udtf("replay", Arc::new(function));
         Ok(())
+    }
+
+    /// Registers a table of Parquet files, one of each dive's folder.
+    fn register_files(
+        &self,
+        session: &SessionContext,
+        name: &str,
+        table: &'static str,
+        folders: &[PathBuf],
+    ) -> Result<(), Error> {
+        let Some(schema) = schema(table) else { return Ok(()) };
+        if folders.is_empty() {
+            return self.register_batch(session, name, RecordBatch::new_empty(schema));
+        }
+        register_listed(session, name, schema, folders.iter().map(|folder| Cache::table(folder, table)))
+    }
+
+    /// Registers rows as a table: those in memory have no meaning to other processes, which take them from a file.
+    fn register_batch(&self, session: &SessionContext, name: &str, rows: RecordBatch) -> Result<(), Error> {
+        let Some(elsewhere) = &self.elsewhere else {
+            let table = MemTable::try_new(rows.schema(), vec![vec![rows]])?;
+            session.register_table(name, Arc::new(table))?;
+            return Ok(());
+        };
+        let path = Cache::table(elsewhere.folder.path(), name);
+        write(&path, &rows)?;
+        register_listed(session, name, rows.schema(), std::iter::once(path))
     }
 
     /// The program version, other than this, by which most dives of these parameters are in the cache.
@@ -201,23 +362,17 @@ fn folder(made: &Made) -> Option<PathBuf> {
     }
 }
 
-/// Registers a table of Parquet files, one of each dive's folder.
-fn register_files(
+/// Registers a table of Parquet files.
+fn register_listed(
     session: &SessionContext,
     name: &str,
-    table: &'static str,
-    folders: &[PathBuf],
+    schema: SchemaRef,
+    files: impl Iterator<Item = PathBuf>,
 ) -> Result<(), Error> {
-    let Some(schema) = schema(table) else { return Ok(()) };
-    if folders.is_empty() {
-        session.register_table(name, Arc::new(MemTable::try_new(schema, vec![Vec::new()])?))?;
-        return Ok(());
-    }
-    let urls = folders.iter().map(|folder| file_url(&Cache::table(folder, table)));
+    let urls = files.map(|path| file_url(&path)).collect::<Result<_, _>>()?;
     let options = ListingOptions::new(Arc::new(ParquetFormat::default())).with_file_extension(".parquet");
-    let config = ListingTableConfig::new_with_multi_paths(urls.collect::<Result<_, _>>()?)
-        .with_listing_options(options)
-        .with_schema(schema);
+    let config =
+        ListingTableConfig::new_with_multi_paths(urls).with_listing_options(options).with_schema(schema);
     session.register_table(name, Arc::new(ListingTable::try_new(config)?))?;
     Ok(())
 }

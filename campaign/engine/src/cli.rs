@@ -13,6 +13,14 @@ use headrace_campaign::questions::{QUESTIONS, Question};
 use headrace_campaign::{Error, output, picture};
 use headrace_tables::{Parameters, program_version};
 
+#[cfg(feature = "cluster")]
+mod cluster;
+
+/// What does without a folder.
+#[cfg(feature = "cluster")]
+const NO_FOLDER: [&str; 3] = ["questions", "schedule", "executor"];
+#[cfg(not(feature = "cluster"))]
+const NO_FOLDER: [&str; 1] = ["questions"];
 /// Exit code: success, on all the data.
 const OK: u8 = 0;
 /// Exit code: a question can't be answered.
@@ -37,7 +45,7 @@ Examples:
 Exit code: 0 success, 1 a question can't be answered, 2 wrong file or argument, 3 finished, but logs couldn't be replayed or lost data.")]
 pub(crate) struct Arguments {
     /// Folder of logs, searched with its folders, or s3://BUCKET/PREFIX.
-    #[arg(value_name = "FOLDER", required_unless_present = "questions")]
+    #[arg(value_name = "FOLDER", required_unless_present_any = NO_FOLDER)]
     folder: Option<String>,
     /// SQL to answer.
     #[arg(long, conflicts_with = "question")]
@@ -81,6 +89,9 @@ pub(crate) struct Arguments {
     /// Only replay, every N-th dive beginning with number I, and keep the tables in the folder --out.
     #[arg(long, value_name = "I/N", value_parser = shard, requires = "out", conflicts_with_all = ["sql", "question", "picture", "cache"])]
     shard: Option<(usize, usize)>,
+    #[cfg(feature = "cluster")]
+    #[command(flatten)]
+    cluster: cluster::Arguments,
     /// `headrace batch`: as --shard 1/1 unless that is given.
     #[arg(long, hide = true, requires = "out")]
     batch: bool,
@@ -113,13 +124,22 @@ pub(crate) fn run(arguments: &Arguments) -> Result<u8, Error> {
     }
     let cores = std::thread::available_parallelism().map_or(1, std::num::NonZero::get);
     let threads = arguments.threads.map_or(cores, usize::from);
-    let runtime = tokio::runtime::Builder::new_multi_thread().worker_threads(threads).enable_all().build();
+    let mut runtime = tokio::runtime::Builder::new_multi_thread();
+    runtime.worker_threads(threads).enable_all();
+    // A scheduler goes through plans by recursion.
+    #[cfg(feature = "cluster")]
+    let runtime = runtime.thread_stack_size(32 << 20);
+    let runtime = runtime.build();
     let runtime = runtime.map_err(|error| Error::Usage(format!("starting {threads} threads: {error}")))?;
     runtime.block_on(work(arguments, threads))
 }
 
 async fn work(arguments: &Arguments, threads: usize) -> Result<u8, Error> {
     let maker = Arc::new(Maker::new(Cache::open(&cache_folder(arguments)?)?, threads));
+    #[cfg(feature = "cluster")]
+    if arguments.cluster.serve(&maker, threads).await? {
+        return Ok(OK);
+    }
     if let Some(out) = arguments.out.as_deref().filter(|_| !is_batch(arguments)) {
         output::check(out)?;
     }
@@ -130,6 +150,10 @@ async fn work(arguments: &Arguments, threads: usize) -> Result<u8, Error> {
     };
     let place = Place::open(arguments.folder.as_deref().unwrap_or_default())?;
     let mut campaign = Campaign::open(place, parameters(arguments)?, maker, threads).await?;
+    #[cfg(feature = "cluster")]
+    if let Some(session) = arguments.cluster.session(&campaign)? {
+        campaign.send_to(session)?;
+    }
     if is_batch(arguments) {
         let (number, of) = arguments.shard.unwrap_or((1, 1));
         campaign.keep_shard(number, of);

@@ -3,6 +3,8 @@
 pub mod about;
 pub mod cache;
 pub mod campaign;
+#[cfg(feature = "cluster")]
+pub mod cluster;
 pub mod dives;
 pub mod error;
 pub mod maker;

@@ -7,7 +7,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use datafusion::arrow::array::RecordBatch;
 use datafusion::parquet::arrow::arrow_reader::ParquetRecordBatchReaderBuilder;
 use headrace_tables::{Parameters, Tables, log_digest, replay_digested, unread};
-use tokio::sync::Semaphore;
+use tokio::sync::{Semaphore, SemaphorePermit};
 
 use crate::cache::{Cache, Found};
 use crate::error::{Error, of_file};
@@ -33,6 +33,12 @@ impl Counts {
     /// Dives that were replayed.
     pub fn replayed(&self) -> u64 {
         self.replayed.load(Ordering::Relaxed)
+    }
+
+    /// Counts dives that others have replayed into the same cache, and that were found there.
+    pub fn add(&self, replayed: usize, cached: usize) {
+        self.replayed.fetch_add(replayed as u64, Ordering::Relaxed);
+        self.cached.fetch_add(cached as u64, Ordering::Relaxed);
     }
 
     /// Dives that were taken from the cache.
@@ -80,12 +86,13 @@ impl Maker {
     ///
     /// Errors: the cache can't be written, or the store not be read. A log that can't be replayed is [`Made::Unread`].
     pub async fn make(&self, place: &Place, dive: &DiveLog, parameters: &Parameters) -> Result<Made, Error> {
-        let _turn = self.threads.acquire().await.map_err(|error| Error::Usage(error.to_string()))?;
+        let _turn = self.turn().await?;
         let url = place.url().to_string();
         let known = self.cache.known(&url, dive);
         if let Some(sha256) = &known
             && let Some(made) = self.find(sha256.clone(), parameters).await?
         {
+            self.counts.add(0, 1);
             return Ok(made);
         }
         let fetched = match place.fetch(dive, &self.cache.scratch()).await {
@@ -107,6 +114,7 @@ impl Maker {
         if known.as_ref() != Some(&sha256) {
             self.cache.remember(&url, dive, &sha256)?;
             if let Some(made) = self.find(sha256.clone(), parameters).await? {
+                self.counts.add(0, 1);
                 return Ok(made);
             }
         }
@@ -117,7 +125,7 @@ impl Maker {
             Err(error) => Err(error.to_string()),
         };
         drop(fetched);
-        self.counts.replayed.fetch_add(1, Ordering::Relaxed);
+        self.counts.add(1, 0);
         let tables = match replayed {
             Ok(tables) => tables,
             Err(error) => return unread_dive(dive, &sha256, parameters, &error),
@@ -128,15 +136,32 @@ impl Maker {
         Ok(Made::Kept { sha256, folder })
     }
 
+    /// A dive's tables, if its log was read before and the cache has them; not counted. Waits for one of the threads.
+    ///
+    /// Errors: what is broken there can't be removed.
+    pub async fn kept(
+        &self,
+        place: &Place,
+        dive: &DiveLog,
+        parameters: &Parameters,
+    ) -> Result<Option<Made>, Error> {
+        let _turn = self.turn().await?;
+        match self.cache.known(place.url().as_str(), dive) {
+            Some(sha256) => self.find(sha256, parameters).await,
+            None => Ok(None),
+        }
+    }
+
+    async fn turn(&self) -> Result<SemaphorePermit<'_>, Error> {
+        self.threads.acquire().await.map_err(|error| Error::Usage(error.to_string()))
+    }
+
     /// A dive that the cache has; one that it has broken is removed.
     async fn find(&self, sha256: String, parameters: &Parameters) -> Result<Option<Made>, Error> {
         let folder = self.cache.dive(&parameters.digest(), &sha256);
         let looked = folder.clone();
         match blocking(move || Cache::look(&looked)).await? {
-            Found::Whole => {
-                self.counts.cached.fetch_add(1, Ordering::Relaxed);
-                Ok(Some(Made::Kept { sha256, folder }))
-            }
+            Found::Whole => Ok(Some(Made::Kept { sha256, folder })),
             Found::Nothing => Ok(None),
             Found::Broken(why) => {
                 eprintln!("headrace-campaign: {}: {why}; made anew", folder.display());
@@ -170,7 +195,15 @@ impl Made {
     }
 }
 
-fn unread_dive(dive: &DiveLog, sha256: &str, parameters: &Parameters, error: &str) -> Result<Made, Error> {
+/// A dive that can't be read or replayed.
+///
+/// Errors: its row can't be made.
+pub(crate) fn unread_dive(
+    dive: &DiveLog,
+    sha256: &str,
+    parameters: &Parameters,
+    error: &str,
+) -> Result<Made, Error> {
     Ok(Made::Unread(Arc::new(unread(&dive.log, sha256, parameters, error)?)))
 }
 

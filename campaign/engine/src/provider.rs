@@ -4,7 +4,10 @@ use std::fmt;
 use std::sync::Arc;
 
 use async_trait::async_trait;
-use datafusion::arrow::datatypes::{Schema, SchemaRef};
+use datafusion::arrow::array::cast::AsArray as _;
+use datafusion::arrow::array::{ArrayRef, RecordBatch, StringArray};
+use datafusion::arrow::datatypes::{DataType, Field, Schema, SchemaRef};
+use datafusion::catalog::memory::MemorySourceConfig;
 use datafusion::catalog::{Session, TableFunctionArgs, TableFunctionImpl, TableProvider};
 use datafusion::common::tree_node::TreeNodeRecursion;
 use datafusion::common::{ScalarValue, plan_err};
@@ -19,8 +22,6 @@ use futures::{StreamExt as _, TryStreamExt as _};
 use headrace_tables::{Parameters, TABLES, schema};
 use serde::{Deserialize, Serialize};
 
-use crate::about::Abouts;
-use crate::dives::{dives_schema, dives_table};
 use crate::maker::Maker;
 use crate::place::{DiveLog, Place};
 
@@ -35,8 +36,6 @@ pub struct Replayed {
     pub parameters: Parameters,
     /// The table of [`TABLES`].
     pub table: String,
-    /// What else is known of the dives: then `dives` has plant, pilot and day.
-    pub about: Option<Abouts>,
 }
 
 impl Replayed {
@@ -45,11 +44,22 @@ impl Replayed {
     /// Errors: there is no such table.
     fn table(&self) -> Result<(&'static str, SchemaRef)> {
         let name = TABLES.into_iter().find(|table| *table == self.table);
-        match name.and_then(|name| Some((name, schema(name)?))) {
-            Some(("dives", _)) if self.about.is_some() => Ok(("dives", dives_schema())),
-            Some(found) => Ok(found),
-            None => plan_err!("{:?} isn't a table of a dive; there are {}", self.table, TABLES.join(", ")),
-        }
+        let Some(found) = name.and_then(|name| Some((name, schema(name)?))) else {
+            return plan_err!("{:?} isn't a table of a dive; there are {}", self.table, TABLES.join(", "));
+        };
+        Ok(found)
+    }
+
+    /// A plan that lists the dives, one in each partition.
+    fn listed(&self) -> Result<Arc<dyn ExecutionPlan>> {
+        let schema = Arc::new(Schema::new(vec![Field::new("dive", DataType::Utf8, false)]));
+        let partition = |dive: &DiveLog| {
+            let text = serde_json::to_string(dive).map_err(|error| external(error.into()))?;
+            let column = Arc::new(StringArray::from(vec![text]));
+            Ok(vec![RecordBatch::try_new(schema.clone(), vec![column])?])
+        };
+        let partitions = self.dives.iter().map(partition).collect::<Result<Vec<_>>>()?;
+        Ok(MemorySourceConfig::try_new_exec(&partitions, schema.clone(), None)?)
     }
 }
 
@@ -57,7 +67,7 @@ impl Replayed {
 #[derive(Debug)]
 pub struct ReplayTable {
     maker: Arc<Maker>,
-    replayed: Arc<Replayed>,
+    replayed: Replayed,
     schema: SchemaRef,
 }
 
@@ -67,7 +77,7 @@ impl ReplayTable {
     /// Errors: there is no such table.
     pub fn new(maker: Arc<Maker>, replayed: Replayed) -> Result<Self> {
         let (_, schema) = replayed.table()?;
-        Ok(Self { maker, replayed: Arc::new(replayed), schema })
+        Ok(Self { maker, replayed, schema })
     }
 
     /// What it is of.
@@ -93,60 +103,67 @@ impl TableProvider for ReplayTable {
         _: &[Expr],
         _: Option<usize>,
     ) -> Result<Arc<dyn ExecutionPlan>> {
-        let plan = ReplayExec::new(self.maker.clone(), self.replayed.clone(), projection.cloned())?;
-        Ok(Arc::new(plan))
+        let asked = Asked {
+            replayed: Replayed { dives: Vec::new(), ..self.replayed.clone() },
+            projection: projection.cloned(),
+        };
+        Ok(Arc::new(ReplayExec::new(self.maker.clone(), asked, self.replayed.listed()?)?))
     }
 }
 
-/// Replays dives, one for each partition.
+/// What is asked of each dive that a plan lists; can be sent to another process.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Asked {
+    /// Table and parameters; its list of dives is empty, they come from below.
+    pub replayed: Replayed,
+    /// The columns that are wanted, all without them.
+    pub projection: Option<Vec<usize>>,
+}
+
+/// Replays the dives that the plan below lists, in the partition that lists them. A node with one below rather than a leaf: an engine
+/// that shares the partitions of a plan out among machines knows how to divide a list, and nothing of replays.
 #[derive(Debug)]
 pub struct ReplayExec {
     maker: Arc<Maker>,
-    replayed: Arc<Replayed>,
+    asked: Arc<Asked>,
     table: &'static str,
-    projection: Option<Vec<usize>>,
+    listed: Arc<dyn ExecutionPlan>,
     properties: Arc<PlanProperties>,
 }
 
 impl ReplayExec {
-    /// Of these dives; `projection` are the columns that are wanted, all without one.
+    /// Of the dives that `listed` has as JSON texts.
     ///
     /// Errors: there is no such table or column.
-    pub fn new(maker: Arc<Maker>, replayed: Arc<Replayed>, projection: Option<Vec<usize>>) -> Result<Self> {
-        let (table, schema) = replayed.table()?;
-        let schema: SchemaRef = match &projection {
+    pub fn new(
+        maker: Arc<Maker>,
+        asked: impl Into<Arc<Asked>>,
+        listed: Arc<dyn ExecutionPlan>,
+    ) -> Result<Self> {
+        let asked = asked.into();
+        let (table, schema) = asked.replayed.table()?;
+        let schema: SchemaRef = match &asked.projection {
             None => schema,
             Some(columns) => Arc::new(Schema::clone(&schema).project(columns)?),
         };
         let properties = PlanProperties::new(
             EquivalenceProperties::new(schema),
-            Partitioning::UnknownPartitioning(replayed.dives.len()),
+            Partitioning::UnknownPartitioning(listed.properties().output_partitioning().partition_count()),
             EmissionType::Incremental,
             Boundedness::Bounded,
         );
-        Ok(Self { maker, replayed, table, projection, properties: Arc::new(properties) })
+        Ok(Self { maker, asked, table, listed, properties: Arc::new(properties) })
     }
 
-    /// What it is of.
-    pub fn replayed(&self) -> &Replayed {
-        &self.replayed
-    }
-
-    /// The columns that are wanted.
-    pub fn projection(&self) -> Option<&[usize]> {
-        self.projection.as_deref()
+    /// What is asked of each dive.
+    pub fn asked(&self) -> &Asked {
+        &self.asked
     }
 }
 
 impl DisplayAs for ReplayExec {
     fn fmt_as(&self, _: DisplayFormatType, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(
-            f,
-            "ReplayExec: {} of {} dives of {}",
-            self.table,
-            self.replayed.dives.len(),
-            self.replayed.place
-        )
+        write!(f, "ReplayExec: {} of dives of {}", self.table, self.asked.replayed.place)
     }
 }
 
@@ -160,7 +177,12 @@ impl ExecutionPlan for ReplayExec {
     }
 
     fn children(&self) -> Vec<&Arc<dyn ExecutionPlan>> {
-        Vec::new()
+        vec![&self.listed]
+    }
+
+    /// The list is divided as it is to be.
+    fn benefits_from_input_partitioning(&self) -> Vec<bool> {
+        vec![false]
     }
 
     fn apply_expressions(
@@ -170,35 +192,64 @@ impl ExecutionPlan for ReplayExec {
         Ok(TreeNodeRecursion::Continue)
     }
 
-    fn with_new_children(self: Arc<Self>, _: Vec<Arc<dyn ExecutionPlan>>) -> Result<Arc<dyn ExecutionPlan>> {
-        Ok(self)
+    fn with_new_children(
+        self: Arc<Self>,
+        children: Vec<Arc<dyn ExecutionPlan>>,
+    ) -> Result<Arc<dyn ExecutionPlan>> {
+        let [listed] = children.as_slice() else {
+            return plan_err!("ReplayExec over {} plans: expected one", children.len());
+        };
+        Ok(Arc::new(Self::new(self.maker.clone(), self.asked.clone(), listed.clone())?))
     }
 
-    fn execute(&self, partition: usize, _: Arc<TaskContext>) -> Result<SendableRecordBatchStream> {
-        let Some(dive) = self.replayed.dives.get(partition).cloned() else {
-            return plan_err!("partition {partition} of {} dives", self.replayed.dives.len());
-        };
-        let (maker, replayed, table) = (self.maker.clone(), self.replayed.clone(), self.table);
-        let projection = self.projection.clone();
-        let batches = async move {
-            let external = |error: crate::error::Error| DataFusionError::External(Box::new(error));
-            let place = Place::open(&replayed.place).map_err(external)?;
-            let made = maker.make(&place, &dive, &replayed.parameters).await.map_err(external)?;
-            let batches = match &replayed.about {
-                Some(about) if table == "dives" => {
-                    vec![dives_table(&[(dive, made)], about).await.map_err(external)?]
-                }
-                _ => made.table(table).await.map_err(external)?,
-            };
-            let wanted = batches.into_iter().map(move |batch| match &projection {
-                None => Ok(batch),
-                Some(columns) => Ok(batch.project(columns)?),
-            });
-            Ok::<_, DataFusionError>(futures::stream::iter(wanted.collect::<Vec<_>>()))
-        };
-        let stream = futures::stream::once(batches).try_flatten().boxed();
-        Ok(Box::pin(RecordBatchStreamAdapter::new(self.schema(), stream)))
+    fn execute(&self, partition: usize, context: Arc<TaskContext>) -> Result<SendableRecordBatchStream> {
+        let place = Place::open(&self.asked.replayed.place).map_err(|error| external(error.into()))?;
+        let (maker, asked, table) = (self.maker.clone(), self.asked.clone(), self.table);
+        let dives = self.listed.execute(partition, context)?;
+        let dives = dives.map_ok(|batch| futures::stream::iter(listed_dives(&batch)));
+        let batches = dives.try_flatten().and_then(move |dive| {
+            let (maker, asked, place) = (maker.clone(), asked.clone(), place.clone());
+            async move {
+                let made = maker.make(&place, &dive, &asked.replayed.parameters).await;
+                let batches = made.map_err(|error| external(error.into()))?.table(table).await;
+                let batches = batches.map_err(|error| external(error.into()))?.into_iter();
+                let wanted = batches.map(|batch| {
+                    // A copy's tables have the path of the log that was replayed.
+                    let batch = if table == "dives" { under_path(&batch, &dive.log)? } else { batch };
+                    match &asked.projection {
+                        None => Ok(batch),
+                        Some(columns) => Ok(batch.project(columns)?),
+                    }
+                });
+                Ok(futures::stream::iter(wanted.collect::<Vec<_>>()))
+            }
+        });
+        Ok(Box::pin(RecordBatchStreamAdapter::new(self.schema(), batches.try_flatten().boxed())))
     }
+}
+
+/// The dives that a batch of [`Replayed::listed`] has.
+fn listed_dives(batch: &RecordBatch) -> Vec<Result<DiveLog>> {
+    let texts = batch.columns().first().and_then(|column| column.as_string_opt::<i32>());
+    let parsed = texts.into_iter().flatten().flatten().map(serde_json::from_str);
+    parsed.map(|dive| dive.map_err(|error| external(error.into()))).collect()
+}
+
+/// Rows of `dives` with this path as their log.
+fn under_path(batch: &RecordBatch, log: &str) -> Result<RecordBatch> {
+    let columns =
+        batch.schema_ref().fields().iter().zip(batch.columns()).map(|(field, column)| -> ArrayRef {
+            if field.name() == "log" {
+                Arc::new(StringArray::from_iter_values(std::iter::repeat_n(log, batch.num_rows())))
+            } else {
+                column.clone()
+            }
+        });
+    Ok(RecordBatch::try_new(batch.schema(), columns.collect())?)
+}
+
+fn external(error: Box<dyn std::error::Error + Send + Sync>) -> DataFusionError {
+    DataFusionError::External(error)
 }
 
 /// The table function `replay(log, parameters [, table])`: `log` as the column `log` of `dives` has it, or `*` for all of them;
@@ -232,7 +283,6 @@ impl TableFunctionImpl for ReplayFunction {
         };
         let mut replayed = self.all.clone();
         table.clone_into(&mut replayed.table);
-        replayed.about = None;
         if log != "*" {
             replayed.dives.retain(|dive| dive.log == log);
             if replayed.dives.is_empty() {

@@ -10,6 +10,9 @@ use std::time::Duration;
 use serde_json::Value;
 use tempfile::TempDir;
 
+#[cfg(feature = "cluster")]
+mod cluster;
+
 /// Logs of 16 to 20 s, all different.
 const LOGS: [&str; 5] = ["adrift", "murk", "sectors", "stalls", "steel"];
 
@@ -189,6 +192,10 @@ fn a_log_that_cannot_be_read_is_a_row() {
     assert_eq!(of("rosone/cut.mcap")["exit_code"], 3);
     assert!(of("rosone/cut.mcap")["losses"].as_i64().unwrap() > 0);
     assert_eq!(of("rosone/stalls.mcap")["exit_code"], 0);
+    // Of a copy, too, the table function has the path.
+    let (logs, _) =
+        ask(folder.path(), cache.path(), "SELECT DISTINCT log FROM replay('*', '', 'dives')", &[]);
+    assert_eq!(logs.len(), 8);
 }
 
 #[test]

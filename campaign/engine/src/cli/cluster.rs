@@ -1,0 +1,68 @@
+//! The command line of campaigns on many machines.
+
+use std::net::SocketAddr;
+use std::sync::Arc;
+
+use datafusion::prelude::SessionContext;
+use headrace_campaign::campaign::Campaign;
+use headrace_campaign::maker::Maker;
+use headrace_campaign::{Error, cluster};
+
+/// Where a program of the cluster listens unless told otherwise; the second is an executor's.
+const LISTENS: [SocketAddr; 2] = [
+    SocketAddr::new(std::net::IpAddr::V4(std::net::Ipv4Addr::LOCALHOST), 50050),
+    SocketAddr::new(std::net::IpAddr::V4(std::net::Ipv4Addr::LOCALHOST), 50051),
+];
+
+/// Options of campaigns on many machines.
+#[derive(Debug, clap::Args)]
+#[group(skip)]
+#[command(next_help_heading = "Many machines (all with one --cache, and logs and cache at the same paths)")]
+pub(crate) struct Arguments {
+    /// Replay and answer on the executors of this scheduler.
+    #[arg(long, value_name = "HOST:PORT", conflicts_with_all = ["schedule", "executor"])]
+    scheduler: Option<String>,
+    /// Be the scheduler, Ballista's own.
+    #[arg(long, conflicts_with_all = ["folder", "executor"])]
+    schedule: bool,
+    /// Be an executor for this scheduler, with --threads tasks at a time; waits until it is there.
+    #[arg(long, value_name = "HOST:PORT", conflicts_with = "folder")]
+    executor: Option<String>,
+    /// Where the scheduler or executor listens; by default on this machine alone, 127.0.0.1:50050 and 127.0.0.1:50051. Anybody who
+    /// reaches it can read the logs: there is neither a password nor encryption.
+    #[arg(long, value_name = "ADDRESS:PORT", conflicts_with = "folder")]
+    listen: Option<SocketAddr>,
+}
+
+impl Arguments {
+    /// Is the scheduler or an executor, if that is asked.
+    pub(crate) async fn serve(&self, maker: &Arc<Maker>, threads: usize) -> Result<bool, Error> {
+        if self.schedule {
+            let address = self.listen.unwrap_or(LISTENS[0]);
+            eprintln!("headrace-campaign: scheduling on {address}");
+            cluster::schedule(address, maker.clone()).await?;
+        } else if let Some(scheduler) = &self.executor {
+            let address = self.listen.unwrap_or(LISTENS[1]);
+            let (host, port) = host_and_port("--executor", scheduler)?;
+            eprintln!("headrace-campaign: executing {threads} tasks at a time on {address} for {scheduler}");
+            cluster::execute((host, port), address, threads, maker.clone()).await?;
+        } else {
+            return Ok(false);
+        }
+        Ok(true)
+    }
+
+    /// The session of the scheduler that is given.
+    pub(crate) fn session(&self, campaign: &Campaign) -> Result<Option<SessionContext>, Error> {
+        let Some(scheduler) = &self.scheduler else { return Ok(None) };
+        host_and_port("--scheduler", scheduler)?;
+        Ok(Some(cluster::session(scheduler, campaign.maker.clone())?))
+    }
+}
+
+/// A host, and the number of a port.
+fn host_and_port<'a>(option: &str, text: &'a str) -> Result<(&'a str, u16), Error> {
+    let both = text.rsplit_once(':').and_then(|(host, port)| Some((host, port.parse().ok()?)));
+    let found = both.filter(|(host, port)| !host.is_empty() && *port > 0);
+    found.ok_or_else(|| Error::Usage(format!("{option} {text}: expected HOST:PORT, like localhost:50050")))
+}
