@@ -94,7 +94,7 @@ impl FirstPass {
         if lost > 0 {
             return Err(SmoothError::Lost { lost, queued: QUEUED });
         }
-        let track = self.steps.smooth(self.settings)?;
+        let track = self.steps.smooth(&self.settings)?;
         let changes = Changes { estimates: track.len() as u64, pieces: track.pieces() as u64 };
         tracing::debug!(records, pieces = changes.pieces, "smoothed");
         Ok((Box::new(TrackNavigation::new(track, self.consistency)), changes))
@@ -149,7 +149,7 @@ impl Steps {
         }
     }
 
-    fn smooth(mut self, settings: Settings) -> Result<Track, SmoothError> {
+    fn smooth(mut self, settings: &Settings) -> Result<Track, SmoothError> {
         self.take();
         let (folder, bytes) = (self.folder.clone(), self.records * RECORD as u64);
         let failed = |source| SmoothError::File { folder: folder.clone(), bytes, source };
@@ -157,7 +157,7 @@ impl Steps {
             return Err(failed(error));
         }
         let mut file = self.file.into_inner().map_err(|error| failed(error.into_error()))?;
-        let mut backward = Backward::new(settings);
+        let mut backward = Backward::new(*settings);
         let mut left = self.records;
         let mut block = Vec::new();
         while left > 0 {
