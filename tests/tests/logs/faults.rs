@@ -194,8 +194,9 @@ fn a_stderr_that_nobody_reads_holds_up_no_recording_that_fails() {
     assert!(losses(&report).contains("File too large"), "{}", losses(&report));
 }
 
+/// Waits until a dive writes to a file: an empty one is only tried before the dive begins.
 fn wait_for(path: &Path, dive: &mut Child) {
-    while !path.exists() {
+    while std::fs::metadata(path).map_or(0, |file| file.len()) == 0 {
         assert!(dive.try_wait().unwrap().is_none(), "the dive has ended without {}", path.display());
         std::thread::sleep(Duration::from_millis(1));
     }

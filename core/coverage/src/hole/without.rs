@@ -37,6 +37,18 @@ impl Otherwise {
     }
 }
 
+/// A stretch and its mirror image, in ascending order, and as one where they meet: all between two that are far apart is neither.
+fn with_mirrored([from_m, to_m]: [f64; 2], mirror_m: f64) -> [Option<[f64; 2]>; 2] {
+    let image_m = [2.0 * mirror_m - to_m, 2.0 * mirror_m - from_m];
+    if image_m[0] > to_m {
+        return [Some([from_m, to_m]), Some(image_m)];
+    }
+    if image_m[1] < from_m {
+        return [Some(image_m), Some([from_m, to_m])];
+    }
+    [Some([from_m.min(image_m[0]), to_m.max(image_m[1])]), None]
+}
+
 impl HoleFinder {
     /// Lays out the wall as it would have been `otherwise`, with the samples `more` (chainage and arc length, m) as well, for
     /// circles of up to `radius_m` centred between two chainages; samples count from `first_visit` on.
@@ -64,13 +76,14 @@ impl HoleFinder {
             }
         };
         let ends_m = [from_m - reach_m / along, to_m + reach_m / along];
-        let mirrored_m = mirror_m.map_or(ends_m, |mirror_m| ends_m.map(|x_m| 2.0 * mirror_m - x_m));
-        let [least_m, most_m] = [ends_m[0].min(mirrored_m[1]), ends_m[1].max(mirrored_m[0])];
-        store.each_between(least_m, most_m, |x_m, arc_m, visit| {
-            if visit >= first_visit {
-                take(x_m, arc_m);
-            }
-        });
+        let stretches_m = mirror_m.map_or([Some(ends_m), None], |mirror_m| with_mirrored(ends_m, mirror_m));
+        for [least_m, most_m] in stretches_m.into_iter().flatten() {
+            store.each_between(least_m, most_m, |x_m, arc_m, visit| {
+                if visit >= first_visit {
+                    take(x_m, arc_m);
+                }
+            });
+        }
         for [x_m, arc_m] in more {
             take(x_m, arc_m);
         }
@@ -166,6 +179,17 @@ mod tests {
         let strip = |i: u32, k: u32| i <= 11 && k != 4;
         let to_come = Some(Reach { from_m: 6.0, to_m: f64::INFINITY });
         assert!(has(strip, 0.4, &Otherwise { to_come, ..otherwise }, &[]));
+    }
+
+    #[test]
+    fn a_mirror_far_away_brings_nothing_of_what_lies_between() {
+        let same = |found: [Option<[f64; 2]>; 2], expected: &[[f64; 2]]| {
+            assert_eq!(found.into_iter().flatten().collect::<Vec<_>>(), expected);
+        };
+        same(with_mirrored([10.0, 12.0], 100.0), &[[10.0, 12.0], [188.0, 190.0]]);
+        same(with_mirrored([10.0, 12.0], 5.0), &[[-2.0, 0.0], [10.0, 12.0]]);
+        same(with_mirrored([10.0, 12.0], 11.5), &[[10.0, 13.0]]);
+        same(with_mirrored([10.0, 12.0], 12.0), &[[10.0, 14.0]]);
     }
 
     #[test]
