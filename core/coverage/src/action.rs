@@ -3,7 +3,6 @@
 use serde::{Serialize, Serializer};
 
 use super::cause::Cause;
-use super::causes::Causes;
 
 /// Change to make when a failed stretch is passed again.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -45,10 +44,10 @@ impl Action {
         Self::Again,
     ];
 
-    /// The actions against several causes, that against the main one first.
-    pub fn against(causes: Causes) -> Vec<Self> {
+    /// The actions against several causes, in their order.
+    pub fn against(causes: impl IntoIterator<Item = Cause>) -> Vec<Self> {
         let mut actions: Vec<Self> = Vec::new();
-        for cause in causes.iter() {
+        for cause in causes {
             let action = Self::of(cause);
             if !actions.contains(&action) {
                 actions.push(action);

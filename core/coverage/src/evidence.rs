@@ -4,6 +4,7 @@ use serde::{Deserialize, Serialize};
 
 use super::cause::Cause;
 use super::causes::Causes;
+use headrace_geometry::math;
 use headrace_sampling::head::HeadSet;
 
 /// Causes of a fail and the figures behind them: those of driving are of the moment with the largest T as driven, in the
@@ -42,6 +43,17 @@ pub struct Evidence {
     /// Heads that went by without a ping, by number.
     #[serde(with = "head_numbers")]
     pub silent_heads: HeadSet,
+}
+
+/// Share of places at which all turns may be lost when a stretch is passed again.
+const ALL_LOST: f64 = 0.001;
+/// Most turns that are asked for, those of a share of a half: beyond it nobody waits, and the returns have to come back.
+const MOST_TURNS: f64 = 10.0;
+
+/// How many turns have to go by a place for one where returns are lost in runs, so that hardly any place has none.
+pub fn turns_against_losses(missing_share: f64) -> f64 {
+    let share = missing_share.clamp(f64::MIN_POSITIVE, 0.99);
+    (math::ln(ALL_LOST) / math::ln(share)).clamp(1.0, MOST_TURNS)
 }
 
 mod head_numbers;

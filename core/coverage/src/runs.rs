@@ -1,8 +1,9 @@
-//! Runs: neighbouring failed sections with one cause, reported as one event with a stable number.
+//! Runs: neighbouring failed sections, reported as one event with a stable number.
 
 use serde::{Deserialize, Serialize};
 
 use super::cause::Cause;
+use super::causes::Causes;
 use super::hole::Hole;
 use headrace_geometry::time::MonoNs;
 use headrace_snapshot::stateful;
@@ -10,15 +11,20 @@ use headrace_snapshot::stateful;
 /// Maximum gap between neighbouring failed sections of one run, m.
 const JOIN_M: f64 = 0.5;
 
+/// Of a run's failing sections, one of so many has a cause that is named beside the main one.
+const NAMED_OF: u32 = 10;
+
 /// Number of a run; never reused.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 pub struct RunId(pub u32);
 
-/// Neighbouring failed sections with one cause.
+/// Neighbouring failed sections.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Run {
-    /// Why they failed.
+    /// Why most of them failed; of two that are as frequent, the one that was so first.
     pub cause: Cause,
+    /// How many of them have each cause, in the order of [`Cause::ALL`].
+    counts: [u32; Cause::ALL.len()],
     /// Index of the first section.
     pub from: i64,
     /// Index after the last.
@@ -42,6 +48,51 @@ impl Run {
     pub fn is_open(&self) -> bool {
         self.failed > 0
     }
+
+    /// How many of its sections have a cause.
+    pub fn count(&self, cause: Cause) -> u32 {
+        self.counts.get(cause as usize).copied().unwrap_or(0)
+    }
+
+    /// What its words name: the main cause, and the next where a tenth of its sections have it.
+    pub fn named(&self) -> Causes {
+        let others = Cause::ALL.into_iter().filter(|cause| *cause != self.cause);
+        let next = others.rev().max_by_key(|cause| self.count(*cause));
+        let next = next.filter(|cause| NAMED_OF * self.count(*cause) >= self.failed.max(1));
+        next.map_or(Causes::of(self.cause), |next| Causes::of(self.cause).with(next))
+    }
+
+    /// All causes that its sections have: the main one, then the others as they are frequent. Allocates: for outlets.
+    pub fn causes(&self) -> Vec<Cause> {
+        let mut causes: Vec<Cause> =
+            Cause::ALL.into_iter().filter(|cause| *cause == self.cause || self.count(*cause) > 0).collect();
+        causes.sort_by_key(|cause| (*cause != self.cause, core::cmp::Reverse(self.count(*cause))));
+        causes
+    }
+
+    /// Counts a section's causes.
+    fn count_in(&mut self, causes: Causes) {
+        for cause in causes.iter() {
+            if let Some(count) = self.counts.get_mut(cause as usize) {
+                *count += 1;
+            }
+        }
+    }
+
+    /// Takes a section's causes from what was counted.
+    fn count_out(&mut self, causes: Causes) {
+        for cause in causes.iter() {
+            if let Some(count) = self.counts.get_mut(cause as usize) {
+                *count = count.saturating_sub(1);
+            }
+        }
+    }
+
+    /// Makes the most frequent cause the main one.
+    fn choose(&mut self) {
+        let most = Cause::ALL.into_iter().rev().max_by_key(|cause| self.count(*cause));
+        self.cause = most.filter(|most| self.count(*most) > self.count(self.cause)).unwrap_or(self.cause);
+    }
 }
 
 /// Kind of change of a run.
@@ -51,7 +102,7 @@ pub enum RunChange {
     Raised,
     /// Its ends, worst hole or extent have changed.
     Changed,
-    /// None of its sections fails any more: filled by a later pass, or reassigned to another cause.
+    /// None of its sections fails any more: filled by a later pass.
     Cleared,
     /// Merged into another run.
     Merged,
@@ -65,9 +116,11 @@ pub struct Runs {
     runs: Vec<Run>,
     /// Per section: the number of its run plus one, or zero.
     member: Vec<u32>,
+    /// Per section of a run: what it was put down to.
+    causes: Vec<Causes>,
 }
 
-stateful!(Runs { lists: runs; slots: member; fixed: first, join; });
+stateful!(Runs { lists: runs; slots: member, causes; fixed: first, join; });
 
 /// Context for updating runs.
 pub struct Telling<'a> {
@@ -85,7 +138,8 @@ impl Runs {
     /// Allocates: startup only; all that it will ever use.
     pub fn new(first: i64, count: usize, section_m: f64) -> Self {
         let join = headrace_geometry::math::floor_to_i64(JOIN_M / section_m + 1e-9).max(0) + 1;
-        Self { first, join, runs: Vec::with_capacity(count), member: vec![0; count] }
+        let (member, causes) = (vec![0; count], vec![Causes::default(); count]);
+        Self { first, join, runs: Vec::with_capacity(count), member, causes }
     }
 
     /// All runs so far, by number.
@@ -103,42 +157,54 @@ impl Runs {
         self.member.get(self.slot(section)?).copied()?.checked_sub(1).map(RunId)
     }
 
-    /// Updates the state of a section: it fails for a cause, or doesn't fail (`None`).
+    /// Updates the state of a section: it fails for these causes, or doesn't fail (`None`).
     ///
     /// Allocates: never.
-    pub fn set(&mut self, section: i64, cause: Option<Cause>, telling: &mut Telling<'_>) {
-        let before = self.of(section);
-        let same = before.filter(|id| self.get(*id).map(|run| run.cause) == cause);
-        if let Some(id) = same {
-            self.measure_again(id, section, telling);
-            (telling.tell)(id, RunChange::Changed);
-            return;
-        }
-        if let Some(id) = before {
-            self.leave(section, id, telling);
-        }
-        if let Some(cause) = cause {
-            self.join(section, cause, telling);
+    pub fn set(&mut self, section: i64, causes: Option<Causes>, telling: &mut Telling<'_>) {
+        match (self.of(section), causes) {
+            (Some(id), Some(causes)) => {
+                let before = self.causes_of(section);
+                self.put_down_to(section, causes);
+                if let Some(run) = self.runs.get_mut(id.0 as usize) {
+                    run.count_out(before);
+                    run.count_in(causes);
+                    run.choose();
+                }
+                self.measure_again(id, section, telling);
+                (telling.tell)(id, RunChange::Changed);
+            }
+            (Some(id), None) => self.leave(section, id, telling),
+            (None, Some(causes)) => self.join(section, causes, telling),
+            (None, None) => {}
         }
     }
 
-    /// Adds a failed section to the nearby runs of its cause, merging them, or starts a run.
-    fn join(&mut self, section: i64, cause: Cause, telling: &mut Telling<'_>) {
-        let near = |side: i64| {
-            let run = |step: i64| self.of(section + side * step);
-            (1..=self.join).filter_map(run).find(|id| self.get(*id).is_some_and(|run| run.cause == cause))
-        };
+    /// What a section was put down to.
+    fn causes_of(&self, section: i64) -> Causes {
+        self.slot(section).and_then(|slot| self.causes.get(slot)).copied().unwrap_or_default()
+    }
+
+    fn put_down_to(&mut self, section: i64, causes: Causes) {
+        if let Some(slot) = self.slot(section).and_then(|slot| self.causes.get_mut(slot)) {
+            *slot = causes;
+        }
+    }
+
+    /// Adds a failed section to the runs beside it, merging them, or starts a run.
+    fn join(&mut self, section: i64, causes: Causes, telling: &mut Telling<'_>) {
+        let near = |side: i64| (1..=self.join).find_map(|step| self.of(section + side * step));
         let (kept, other) = match (near(-1), near(1)) {
             (Some(a), Some(b)) if a != b => (a.min(b), Some(a.max(b))),
             (Some(id), _) | (None, Some(id)) => (id, None),
             (None, None) => {
-                if let Some(id) = self.begin(section, cause, telling) {
+                if let Some(id) = self.begin(section, causes, telling) {
                     (telling.tell)(id, RunChange::Raised);
                 }
                 return;
             }
         };
         self.put(section, kept);
+        self.put_down_to(section, causes);
         self.add(kept, section, telling);
         if let Some(other) = other {
             self.merge(other, kept, telling.at);
@@ -156,7 +222,7 @@ impl Runs {
         let earlier = (run.from..section).rev().find(|index| self.of(*index) == Some(id));
         if let (Some(earlier), Some(later)) = (earlier, later)
             && later - earlier > self.join
-            && let Some(new) = self.begin(later, run.cause, telling)
+            && let Some(new) = self.begin(later, self.causes_of(later), telling)
         {
             for index in later..run.to {
                 if self.of(index) == Some(id) {
@@ -171,7 +237,7 @@ impl Runs {
         (telling.tell)(id, if open { RunChange::Changed } else { RunChange::Cleared });
     }
 
-    fn begin(&mut self, section: i64, cause: Cause, telling: &Telling<'_>) -> Option<RunId> {
+    fn begin(&mut self, section: i64, causes: Causes, telling: &Telling<'_>) -> Option<RunId> {
         if self.runs.len() == self.runs.capacity() {
             // More runs than sections so far: this section is still flagged, but in no run.
             return None;
@@ -179,8 +245,9 @@ impl Runs {
         let id = RunId(u32::try_from(self.runs.len()).ok()?);
         let worst = (section, (telling.hole)(section)?);
         let (from, to, at) = (section, section + 1, telling.at);
-        self.runs.push(Run {
-            cause,
+        let mut run = Run {
+            cause: causes.iter().next().unwrap_or(Cause::Unknown),
+            counts: [0; Cause::ALL.len()],
             from,
             to,
             failed: 1,
@@ -189,8 +256,11 @@ impl Runs {
             changed: at,
             cleared: None,
             merged_into: None,
-        });
+        };
+        run.count_in(causes);
+        self.runs.push(run);
         self.put(section, id);
+        self.put_down_to(section, causes);
         Some(id)
     }
 
@@ -204,17 +274,22 @@ impl Runs {
         if let Some(kept) = self.runs.get_mut(kept.0 as usize) {
             kept.failed += run.failed;
             kept.worst = larger(kept.worst, run.worst);
+            kept.counts.iter_mut().zip(run.counts).for_each(|(count, more)| *count += more);
+            kept.choose();
         }
         if let Some(run) = self.runs.get_mut(other.0 as usize) {
             (run.failed, run.changed, run.cleared, run.merged_into) = (0, at, Some(at), Some(kept));
+            run.counts.fill(0);
         }
     }
 
     /// Updates a run for a section just added.
     fn add(&mut self, id: RunId, section: i64, telling: &Telling<'_>) {
-        let hole = (telling.hole)(section);
+        let (hole, causes) = ((telling.hole)(section), self.causes_of(section));
         if let Some(run) = self.runs.get_mut(id.0 as usize) {
             run.failed += 1;
+            run.count_in(causes);
+            run.choose();
             run.changed = telling.at;
             run.worst = hole.map_or(run.worst, |hole| larger(run.worst, (section, hole)));
         }
@@ -233,7 +308,7 @@ impl Runs {
         }
     }
 
-    /// Recomputes a run's section count, ends and worst hole.
+    /// Recomputes a run's section count, causes, ends and worst hole.
     fn measure(&mut self, id: RunId, telling: &Telling<'_>) {
         let Some(run) = self.get(id).copied() else { return };
         let members = || (run.from..run.to).filter(|index| self.of(*index) == Some(id));
@@ -243,8 +318,12 @@ impl Runs {
         let ends = members().next().zip(members().next_back());
         let (from, to) = ends.map_or((run.from, run.to), |(first, last)| (first, last + 1));
         let cleared = (failed == 0).then_some(telling.at);
+        let mut now = Run { failed, worst, from, to, cleared, changed: telling.at, ..run };
+        now.counts.fill(0);
+        members().for_each(|index| now.count_in(self.causes_of(index)));
+        now.choose();
         if let Some(run) = self.runs.get_mut(id.0 as usize) {
-            *run = Run { failed, worst, from, to, cleared, changed: telling.at, ..*run };
+            *run = now;
         }
     }
 

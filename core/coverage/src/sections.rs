@@ -14,7 +14,7 @@ use super::lacks::Lacks;
 use super::metres::Metres;
 use super::openings::Opening;
 use super::passage::PassError;
-use super::runs::{RunChange, RunId, Runs, Telling};
+use super::runs::{Run, RunChange, RunId, Runs, Telling};
 use super::section::{Judgement, Section, Verdict};
 use super::store::SampleStore;
 use super::unsure::Stretch;
@@ -374,12 +374,9 @@ impl Sections {
         let Self { sections, runs, first, .. } = self;
         let get = |index: i64| sections.get(usize::try_from(index - *first).ok()?);
         let flagged = get(request.section).filter(|section| section.is_flagged());
-        let cause = flagged.and_then(|section| section.evidence).map(|evidence| evidence.cause);
-        if cause.is_none() && runs.of(request.section).is_none() {
-            return;
-        }
+        let causes = flagged.and_then(|section| section.evidence).map(|evidence| evidence.causes);
         let hole = |index: i64| get(index)?.hole;
-        runs.set(request.section, cause, &mut Telling { at: request.at, hole: &hole, tell: judging.tell });
+        runs.set(request.section, causes, &mut Telling { at: request.at, hole: &hole, tell: judging.tell });
     }
 
     /// The causes of a hole, from the passages of the sections within T. Of a section that isn't left yet, those of the
@@ -418,6 +415,13 @@ impl Sections {
         };
         let passages = near.filter_map(|index| Some(&self.get(index)?.passage));
         explain(&case, passages, judging.store, judging.finder)
+    }
+
+    /// The evidence that speaks for a cause of a run: that of the section with the largest hole, or of the first with this cause where
+    /// that one fails for something else.
+    pub fn evidence_of(&self, run: &Run, cause: Cause) -> Option<Evidence> {
+        let evidence = |index: i64| self.get(index)?.evidence.filter(|evidence| evidence.causes.has(cause));
+        evidence(run.worst.0).or_else(|| (run.from..run.to).find_map(evidence))
     }
 
     /// Index range of the sections in the table that a stretch, such as the way, touches.

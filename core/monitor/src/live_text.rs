@@ -191,7 +191,8 @@ pub fn told_line(told: &Told, profile: &Profile) -> PilotLine {
     let to = |from_m: f64, to_m: f64| format!("{} to {}", station(from_m), station(to_m));
     match told {
         Told::Flag { from_m, missed, .. } => {
-            let action = actions_text(&Action::against(missed.figures.causes), *from_m, missed.v_max_mps);
+            let at_most_mps = missed.figures.again_mps(missed.v_max_mps);
+            let action = actions_text(&Action::against(missed.figures.causes.iter()), *from_m, at_most_mps);
             let clock = profile.clock(missed.hole_arc_m);
             let what = format!(
                 "MISSED: {}, holes over {} m at {clock}",

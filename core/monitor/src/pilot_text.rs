@@ -5,7 +5,7 @@ use super::advice_log::AdviceEntry;
 use super::alerts::AlertKind;
 use serde::{Deserialize, Serialize};
 
-use headrace_coverage::{Action, Cause, Causes, Evidence};
+use headrace_coverage::{Action, Cause, Causes, Evidence, Run, Sections, turns_against_losses};
 use headrace_fusion::NoFix;
 use headrace_fusion::filter::suspicion::{Setting, SettingDoubt};
 use headrace_geometry::tunnel::Profile;
@@ -49,6 +49,42 @@ impl From<&Evidence> for CauseFigures {
 }
 
 impl CauseFigures {
+    /// Those of a run: of each cause that is named, the figures of the section that speaks for it.
+    pub fn of_run(sections: &Sections, run: &Run) -> Option<Self> {
+        let causes = run.named();
+        let mut figures = Self { causes, ..Self::from(&sections.evidence_of(run, run.cause)?) };
+        for other in causes.iter().filter(|cause| *cause != run.cause) {
+            if let Some(evidence) = sections.evidence_of(run, other) {
+                figures.take(other, &evidence);
+            }
+        }
+        Some(figures)
+    }
+
+    /// Takes the figures of a cause's text from the evidence for it.
+    fn take(&mut self, cause: Cause, from: &Evidence) {
+        match cause {
+            Cause::TooFast | Cause::Phase => self.speed_mps = from.speed_mps,
+            Cause::AngularStep | Cause::OffAxis => {
+                (self.t_y_m, self.middle_t_y_m, self.swing_m) = (from.t_y_m, from.middle_t_y_m, from.swing_m);
+            }
+            Cause::MissingReturns => self.missing_share = from.missing_share,
+            Cause::HeadSilent => self.silent_heads = from.silent_heads,
+            Cause::OutOfRange
+            | Cause::NotPassed
+            | Cause::HeadStalled
+            | Cause::PositionLost
+            | Cause::Occluded
+            | Cause::Unknown => {}
+        }
+    }
+
+    /// What is left of a speed where turns have to replace lost returns, m/s.
+    pub fn again_mps(&self, mps: f64) -> f64 {
+        let is_lossy = self.causes.has(Cause::MissingReturns);
+        if is_lossy { mps / turns_against_losses(self.missing_share) } else { mps }
+    }
+
     /// The main cause.
     pub fn cause(&self) -> Cause {
         self.causes.iter().next().unwrap_or(Cause::Unknown)
@@ -205,7 +241,7 @@ pub fn flag_text(missed: &Missed, profile: &Profile) -> String {
         station(*start_m),
         cause_text(figures),
         profile.clock(*hole_arc_m),
-        actions_text(&Action::against(figures.causes), *start_m, *v_max_mps),
+        actions_text(&Action::against(figures.causes.iter()), *start_m, figures.again_mps(*v_max_mps)),
     )
 }
 

@@ -9,25 +9,32 @@ use super::messages::Notice;
 use super::pilot_text::{Missed, alert_text, setting_text};
 use super::run::Loop;
 pub use super::unsure_stretch::UnsureStretch;
-use headrace_coverage::{Cause, Run, RunChange, RunId, Section, Sections, Stretch, Unsure, Verdict};
+use headrace_coverage::{
+    Cause, Causes, Evidence, Run, RunChange, RunId, Section, Sections, Stretch, Unsure, Verdict,
+};
 use headrace_geometry::math::TAU;
 use headrace_geometry::time::{DurNs, MonoNs};
 
 /// Interval of the way and its metres by verdict, in data time.
 const WAY_EVERY: DurNs = DurNs(60_000_000_000);
 
+/// Length of a run that fails for what wasn't told of it from which that is told, m.
+const LASTS_M: f64 = 1.0;
+
 /// Something to tell. Field names are the contract of `--json-lines`; lengths in m.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 #[serde(tag = "type", rename_all = "snake_case")]
 pub enum Told {
-    /// Sections were missed: where they begin.
+    /// Sections were missed: where they begin. Of a run that goes on for another cause, again: where that one begins.
     Flag {
         /// Number of the run.
         run: u32,
         /// Where it begins.
         from_m: f64,
-        /// Why.
+        /// Why, the main cause.
         cause: Cause,
+        /// All causes.
+        causes: Causes,
         /// What its text needs.
         #[serde(skip)]
         missed: Missed,
@@ -90,8 +97,8 @@ pub enum Told {
 /// Makes what is told of the loop's notices.
 #[derive(Debug, Default)]
 pub struct Teller {
-    /// The run that was flagged last, until its end is told.
-    run: Option<RunId>,
+    /// The run that was flagged last, with the causes that were told of it, until its end is told.
+    run: Option<(RunId, Causes)>,
     /// The stretch that was told last, until its end is.
     unsure: Option<Stretch>,
     /// The stretches whose ends have been told.
@@ -223,14 +230,14 @@ impl Teller {
         // An open section may still join the run.
         let other = |section: &Section| !section.is_flagged() && section.verdict != Verdict::Open;
         let ends = sections.get(section).is_some_and(other);
-        let run = self.run.and_then(|id| sections.runs().get(id));
+        let run = self.run.and_then(|(id, _)| sections.runs().get(id));
         if ends && run.is_some_and(|run| section == run.to || section == run.from - 1) {
             self.close_run(sections, tell);
         }
     }
 
     fn close_run(&mut self, sections: &Sections, tell: &mut dyn FnMut(Told)) {
-        let Some(id) = self.run.take() else { return };
+        let Some((id, _)) = self.run.take() else { return };
         let Some(run) = sections.runs().get(id) else { return };
         let (from_m, to_m) = bounds_m(run, sections);
         tell(Told::FlagEnds { run: id.0, from_m, to_m });
@@ -239,31 +246,53 @@ impl Teller {
     fn run(&mut self, id: RunId, change: RunChange, dive: &Loop, tell: &mut dyn FnMut(Told)) {
         let sections = &dive.coverage().sections;
         let Some(run) = sections.runs().get(id) else { return };
-        let (from_m, to_m) = bounds_m(run, sections);
         match change {
             RunChange::Raised => {
                 self.close_run(sections, tell);
-                self.run = Some(id);
-                let evidence = sections.get(run.worst.0).and_then(|section| section.evidence);
-                let Some(evidence) = evidence else { return };
-                let missed = Missed {
-                    start_m: from_m,
-                    figures: (&evidence).into(),
-                    hole_arc_m: run.worst.1.arc_m,
-                    target_m: sections.target_m(),
-                    v_max_mps: dive.live_state().v_max_mps().unwrap_or(0.0),
-                };
-                tell(Told::Flag { run: id.0, from_m, cause: evidence.cause, missed });
+                let Some(evidence) = sections.evidence_of(run, run.cause) else { return };
+                self.run = Some((id, evidence.causes));
+                tell(flag(id, run, run.from, &evidence, dive));
             }
+            RunChange::Changed => self.tell_other_cause(id, run, dive, tell),
             RunChange::Cleared => {
-                // Sections whose cause has changed belong to another run, which is told.
-                if !(run.from..run.to).filter_map(|index| sections.get(index)).any(Section::is_flagged) {
-                    tell(Told::Cleared { run: id.0, from_m, to_m });
-                }
+                let (from_m, to_m) = bounds_m(run, sections);
+                tell(Told::Cleared { run: id.0, from_m, to_m });
             }
-            RunChange::Changed | RunChange::Merged => {}
+            RunChange::Merged => {}
         }
     }
+
+    /// Tells a run anew once a metre of it fails for what wasn't told: who has done what was told may still miss the wall.
+    fn tell_other_cause(&mut self, id: RunId, run: &Run, dive: &Loop, tell: &mut dyn FnMut(Told)) {
+        let sections = &dive.coverage().sections;
+        let Some((_, told)) = self.run.as_mut().filter(|(last, _)| *last == id) else { return };
+        let lasts = |cause: &Cause| f64::from(run.count(*cause)) * sections.section_m() >= LASTS_M;
+        let Some(cause) = Cause::ALL.into_iter().find(|cause| !told.has(*cause) && lasts(cause)) else {
+            return;
+        };
+        let has = |index: i64| {
+            let evidence = sections.get(index).filter(|section| section.is_flagged())?.evidence?;
+            evidence.causes.has(cause).then_some((index, evidence))
+        };
+        let Some((index, evidence)) = (run.from..run.to).find_map(has) else { return };
+        *told = told.union(evidence.causes);
+        tell(flag(id, run, index, &evidence, dive));
+    }
+}
+
+/// What is told of a run from one of its sections on.
+fn flag(id: RunId, run: &Run, section: i64, evidence: &Evidence, dive: &Loop) -> Told {
+    let sections = &dive.coverage().sections;
+    let from_m = sections.bounds_m(section).0;
+    let hole = sections.get(section).and_then(|section| section.hole).unwrap_or(run.worst.1);
+    let missed = Missed {
+        start_m: from_m,
+        figures: evidence.into(),
+        hole_arc_m: hole.arc_m,
+        target_m: sections.target_m(),
+        v_max_mps: dive.live_state().v_max_mps().unwrap_or(0.0),
+    };
+    Told::Flag { run: id.0, from_m, cause: evidence.cause, causes: evidence.causes, missed }
 }
 
 fn bounds_m(run: &Run, sections: &Sections) -> (f64, f64) {

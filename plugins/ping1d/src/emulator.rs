@@ -142,8 +142,7 @@ impl PingEmulator {
     }
 
     fn say(&self, at: MonoNs, message: &Message, line: LineSink<'_>) {
-        let answer = Addressed { source: self.settings.device_id, destination: 0, message: *message };
-        if let Ok(answer) = answer.encode() {
+        if let Ok(answer) = message.encode(self.settings.device_id, 0) {
             line(Direction::Received, at + self.latency, answer.as_slice());
         }
     }
@@ -190,10 +189,8 @@ impl Emulator<Sounding> for PingEmulator {
     fn tell(&mut self, sounding: &Sounding, line: LineSink<'_>) {
         let about = self.asked.pop_front().unwrap_or(id::DISTANCE);
         if self.polled {
-            let message = Message::GeneralRequest(about);
-            let question = Addressed { source: 0, destination: self.settings.device_id, message };
             // Requests are far shorter than the longest frame.
-            if let Ok(bytes) = question.encode() {
+            if let Ok(bytes) = Message::GeneralRequest(about).encode(0, self.settings.device_id) {
                 line(Direction::Sent, sounding.at, bytes.as_slice());
             }
         }

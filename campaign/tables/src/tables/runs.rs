@@ -19,7 +19,7 @@ pub(crate) fn runs(report: &Report) -> Vec<Run<'_>> {
 pub(crate) fn runs_table<'a>() -> Table<Run<'a>> {
     Table {
         name: "runs",
-        about: "Neighbouring flagged sections of one cause.",
+        about: "Neighbouring flagged sections.",
         columns: vec![
             Column("run", "Its number within the dive, which stays", Get::Count(|row| count(row.run.id))),
             Column("cause", "Main cause", Get::Text(|row| Some(row.run.cause.as_str().to_owned()))),

@@ -7,7 +7,7 @@ const COUNT: i64 = 60;
 /// Runs, and the section states that they are checked against.
 struct Rig {
     runs: Runs,
-    causes: Vec<Option<Cause>>,
+    causes: Vec<Option<Causes>>,
     holes: Vec<f64>,
     told: Vec<(RunId, RunChange)>,
 }
@@ -24,8 +24,12 @@ impl Rig {
     }
 
     fn say(&mut self, section: i64, cause: Option<Cause>, diameter_m: f64) {
+        self.say_all(section, cause.map(Causes::of), diameter_m);
+    }
+
+    fn say_all(&mut self, section: i64, causes: Option<Causes>, diameter_m: f64) {
         let slot = usize::try_from(section + 5).unwrap();
-        (self.causes[slot], self.holes[slot]) = (cause, diameter_m);
+        (self.causes[slot], self.holes[slot]) = (causes, diameter_m);
         let Self { runs, holes, told, .. } = self;
         let hole = |index: i64| {
             let diameter_m = *holes.get(usize::try_from(index + 5).ok()?)?;
@@ -39,16 +43,16 @@ impl Rig {
             })
         };
         let mut tell = |id, change| told.push((id, change));
-        runs.set(section, cause, &mut Telling { at: MonoNs(1), hole: &hole, tell: &mut tell });
+        runs.set(section, causes, &mut Telling { at: MonoNs(1), hole: &hole, tell: &mut tell });
     }
 
     /// Checks every open run against the sections.
     fn check(&self) {
-        let cause = |index: i64| self.causes[usize::try_from(index + 5).unwrap()];
+        let causes = |index: i64| self.causes[usize::try_from(index + 5).unwrap()];
         let indexes = || -5..COUNT - 5;
         for index in indexes() {
             let run = self.runs.of(index).map(|id| self.runs.get(id).unwrap());
-            assert_eq!(run.map(|run| run.cause), cause(index), "section {index}");
+            assert_eq!(run.is_some(), causes(index).is_some(), "section {index}");
             assert!(run.is_none_or(|run| (run.from..run.to).contains(&index)));
         }
         for (number, run) in (0..).zip(self.runs.all()) {
@@ -64,10 +68,14 @@ impl Rig {
                 .map(|index| self.holes[usize::try_from(index + 5).unwrap()])
                 .fold(0.0, f64::max);
             assert!((run.worst.1.diameter_m - largest).abs() < 1e-12);
-            // No other run of the cause is within joining distance.
             for other in last + 1..=(last + 3).min(COUNT - 6) {
-                let near = self.runs.of(other).map(|id| self.runs.get(id).unwrap());
-                assert!(near.is_none_or(|near| near.cause != run.cause), "run {number} and its neighbour");
+                assert!(self.runs.of(other).is_none(), "run {number} and its neighbour");
+            }
+            let having =
+                |cause: Cause| members.iter().filter(|index| causes(**index).unwrap().has(cause)).count();
+            for cause in Cause::ALL {
+                assert_eq!(run.count(cause) as usize, having(cause));
+                assert!(having(run.cause) >= having(cause), "{cause:?} is more frequent in run {number}");
             }
         }
     }
@@ -79,9 +87,8 @@ fn neighbours_are_one_run_that_grows_merges_and_is_cleared() {
     rig.say(10, Some(Cause::TooFast), 1.0);
     rig.say(11, Some(Cause::TooFast), 1.5);
     rig.say(16, Some(Cause::TooFast), 1.2);
-    rig.say(13, Some(Cause::Phase), 1.2);
     // Within half a metre of both.
-    rig.say(14, Some(Cause::TooFast), 1.1);
+    rig.say(14, Some(Cause::Phase), 1.1);
     let first = *rig.runs.get(RunId(0)).unwrap();
     assert_eq!((first.from, first.to, first.failed, first.worst.0), (10, 17, 4, 11));
     assert_eq!(rig.runs.get(RunId(1)).unwrap().merged_into, Some(RunId(0)));
@@ -89,7 +96,29 @@ fn neighbours_are_one_run_that_grows_merges_and_is_cleared() {
         rig.say(section, None, 0.2);
     }
     assert!(rig.told.contains(&(RunId(0), RunChange::Cleared)));
-    assert!(rig.runs.get(RunId(2)).unwrap().is_open(), "the other cause is another run");
+    rig.check();
+}
+
+#[test]
+fn a_run_has_the_cause_of_most_of_its_sections_and_names_the_next() {
+    let mut rig = Rig::new();
+    let run = |rig: &Rig| *rig.runs.get(RunId(0)).unwrap();
+    rig.say(0, Some(Cause::Occluded), 1.0);
+    rig.say(1, Some(Cause::TooFast), 1.0);
+    assert_eq!(run(&rig).cause, Cause::Occluded, "the first of two that are as frequent");
+    rig.say_all(2, Some(Causes::of(Cause::TooFast).with(Cause::Phase)), 1.0);
+    assert_eq!(run(&rig).cause, Cause::TooFast);
+    assert_eq!(run(&rig).causes(), [Cause::TooFast, Cause::Phase, Cause::Occluded]);
+    assert_eq!(run(&rig).named(), Causes::of(Cause::TooFast).with(Cause::Phase));
+    for section in 3..22 {
+        rig.say(section, Some(Cause::TooFast), 1.0);
+    }
+    assert_eq!(run(&rig).named(), Causes::of(Cause::TooFast), "one of 22 isn't named");
+    // Judged anew.
+    for section in 1..22 {
+        rig.say(section, Some(Cause::HeadSilent), 1.0);
+    }
+    assert_eq!(run(&rig).causes(), [Cause::HeadSilent, Cause::Occluded]);
     rig.check();
 }
 
@@ -116,8 +145,9 @@ proptest! {
     ) {
         let mut rig = Rig::new();
         for (section, cause, diameter_m) in said {
-            let causes = [None, Some(Cause::TooFast), Some(Cause::TooFast), Some(Cause::Phase)];
-            rig.say(section, causes[usize::from(cause)], diameter_m);
+            let both = Causes::of(Cause::TooFast).with(Cause::Phase);
+            let causes = [None, Some(Causes::of(Cause::TooFast)), Some(both), Some(Causes::of(Cause::Phase))];
+            rig.say_all(section, causes[usize::from(cause)], diameter_m);
         }
         // So many changes may exhaust the run numbers; then sections are in no run.
         if rig.runs.all().len() < usize::try_from(COUNT).unwrap() {

@@ -134,7 +134,7 @@ impl ListedAlert {
         let (from_m, to_m) = self.bounds_m(around.section_m);
         let seconds = |at: Option<MonoNs>| at.map(MonoNs::as_secs_f64);
         let at_most_mps = match self.figures {
-            Figures::Missed(_, _, mps) => Some(mps),
+            Figures::Missed(causes, _, mps) => Some(causes.again_mps(mps)),
             Figures::Advice(figures) => Some(figures.v_max_mps),
             _ => None,
         };

@@ -30,8 +30,7 @@ impl RunInput {
         sections: &Sections,
     ) -> Option<Self> {
         let run = sections.runs().get(id)?;
-        let evidence = sections.get(run.worst.0).and_then(|section| section.evidence);
-        let causes = evidence.map(|evidence| (CauseFigures::from(&evidence), run.worst.1.arc_m));
+        let causes = CauseFigures::of_run(sections, run).map(|figures| (figures, run.worst.1.arc_m));
         let stretch = (run.from, run.to);
         Some(Self { event, at_beat, at, id, change, stretch, causes, merged_into: run.merged_into })
     }
@@ -74,7 +73,7 @@ impl AlertList {
         let v_max_mps = self.v_max_mps;
         let figures =
             input.causes.map_or(Figures::None, |(causes, arc_m)| Figures::Missed(causes, arc_m, v_max_mps));
-        // Part of a stretch that is told already: another cause, or what a later pass left of it.
+        // Part of a stretch that is told already: what a later pass left of it.
         let (from, until) = input.stretch;
         let has = |alert: &&ListedAlert| {
             alert.kind == ListKind::Missed

@@ -100,9 +100,9 @@ impl ListedAlert {
     /// What to do; empty where there is nothing.
     pub fn advice(&self, around: &Surroundings<'_>) -> String {
         match (self.kind, &self.figures) {
-            (_, Figures::Missed(causes, _, at_most_mps)) => {
+            (_, Figures::Missed(causes, _, v_max_mps)) => {
                 let from_m = self.bounds_m(around.section_m).0.unwrap_or(0.0);
-                actions_text(&Action::against(causes.causes), from_m, *at_most_mps)
+                actions_text(&Action::against(causes.causes.iter()), from_m, causes.again_mps(*v_max_mps))
             }
             (_, Figures::CannotSay(stretch)) => helps_text(stretch.why).to_owned(),
             (ListKind::TooFast, Figures::Advice(figures)) => speed_text("at most", figures.v_max_mps),

@@ -36,7 +36,7 @@ pub use survey::{HolidayReport, NodeRowReport, SurveyReport};
 pub use unsure::UnsureReport;
 
 /// Version of the report schema.
-pub const REPORT_VERSION: u32 = 5;
+pub const REPORT_VERSION: u32 = 6;
 
 /// A whole report. Field names are the contract.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -63,7 +63,7 @@ pub struct Report {
     pub summary: SummaryReport,
     /// Every section of the way, in the order of chainage.
     pub sections: Vec<SectionReport>,
-    /// Neighbouring flagged sections of one cause, by their stable number.
+    /// Neighbouring flagged sections, by their stable number.
     pub runs: Vec<RunReport>,
     /// Stretches of which neither a pass nor a fail can be told, though nothing more will come, in the order of chainage.
     pub unsure: Vec<UnsureReport>,

@@ -5,23 +5,23 @@ use serde::Serialize;
 use crate::app::SourceInfo;
 use crate::pilot_text::CauseFigures;
 use crate::run::Loop;
-use headrace_coverage::{Action, Cause, Causes, Evidence, Run, RunId, Runs, Sections};
+use headrace_coverage::{Action, Cause, Evidence, Run, RunId, Runs, Sections};
 use headrace_geometry::time::MonoNs;
 use headrace_sensor::device::{SensorInfo, SensorKind};
 
-/// Neighbouring flagged sections with one cause.
+/// Neighbouring flagged sections.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct RunReport {
     /// Its stable number.
     pub id: u32,
-    /// Its main cause.
+    /// Its main cause: that of most of its sections.
     pub cause: Cause,
-    /// All causes named of its sections, the main one first.
-    pub causes: Causes,
-    /// The cause's figures, for its text; those of the section with the largest hole.
+    /// All causes of its sections, the main one first, then the others as they are frequent.
+    pub causes: Vec<Cause>,
+    /// The named causes' figures, for their text; those of the section with the largest hole.
     #[serde(skip)]
     pub figures: Option<CauseFigures>,
-    /// Heads that were silent in its section with the largest hole, by the ids of their sources.
+    /// Heads that were silent where it was put down to that, by the ids of their sources.
     pub silent_sources: Vec<String>,
     /// Where it begins, m.
     pub start_m: f64,
@@ -54,7 +54,7 @@ pub struct ReturnReport {
     pub to_m: f64,
     /// Change to make against the main cause.
     pub action: Action,
-    /// Changes to make, all of them, one for each cause; that against the main cause first.
+    /// Changes to make, all of them, in the order of the run's causes.
     pub actions: Vec<Action>,
     /// Maximum speed then, m/s: the planned one where that meets the target; zero if none does in this mode.
     pub at_most_mps: f64,
@@ -70,12 +70,12 @@ pub(super) fn run_reports(dive: &Loop) -> Vec<RunReport> {
         .zip(sections.runs().all())
         .map(|(id, run)| {
             let ((start_m, end_m), (_, hole)) = (bounds(run), run.worst);
-            let figures = figures(sections, run);
+            let figures = CauseFigures::of_run(sections, run);
             let silent = figures.iter().flat_map(|figures| figures.silent_heads.iter());
             RunReport {
                 id,
                 cause: run.cause,
-                causes: causes(sections, run),
+                causes: run.causes(),
                 figures,
                 silent_sources: silent.filter_map(|head| heads.get(head).cloned()).collect(),
                 start_m,
@@ -98,13 +98,6 @@ fn head_ids(dive: &Loop) -> Vec<String> {
     dive.sources().iter().zip(dive.sensors()).filter(is_head).map(|(source, _)| source.id.clone()).collect()
 }
 
-/// Figures of the run's cause: those of its worst section, or of another if the cause of that one has changed.
-fn figures(sections: &Sections, run: &Run) -> Option<CauseFigures> {
-    let evidence = |index: i64| sections.get(index)?.evidence.filter(|evidence| evidence.cause == run.cause);
-    let evidence = evidence(run.worst.0).or_else(|| (run.from..run.to).find_map(evidence))?;
-    Some((&evidence).into())
-}
-
 /// What to pass again, as it is judged now: open runs, from the far end to the portal.
 pub fn way_home(sections: &Sections) -> Vec<ReturnReport> {
     let runs: &Runs = sections.runs();
@@ -116,21 +109,12 @@ pub fn way_home(sections: &Sections) -> Vec<ReturnReport> {
 
 fn stop(sections: &Sections, id: RunId, run: &Run) -> ReturnReport {
     let (to_m, from_m) = (sections.bounds_m(run.from).0, sections.bounds_m(run.to - 1).1);
-    let fits = flagged(sections, run).map(|evidence| evidence.fits_mps).filter(|mps| *mps > 0.0);
-    let at_most_mps = fits.reduce(f64::min).unwrap_or(0.0);
+    let flagged = |index: i64| sections.get(index).filter(|section| section.is_flagged())?.evidence;
+    let evidence = (run.from..run.to).filter_map(flagged);
+    let again_mps = |evidence: Evidence| CauseFigures::from(&evidence).again_mps(evidence.fits_mps);
+    let speeds = evidence.map(again_mps).filter(|mps| *mps > 0.0);
+    let at_most_mps = speeds.reduce(f64::min).unwrap_or(0.0);
     let takes_s = (at_most_mps > 0.0).then(|| (from_m - to_m) / at_most_mps);
-    let actions = Action::against(causes(sections, run));
+    let actions = Action::against(run.causes());
     ReturnReport { run: id.0, from_m, to_m, action: Action::of(run.cause), actions, at_most_mps, takes_s }
-}
-
-/// What the flagged sections of a run were put down to.
-fn flagged<'a>(sections: &'a Sections, run: &Run) -> impl Iterator<Item = Evidence> + use<'a> {
-    let evidence = |index: i64| sections.get(index).filter(|section| section.is_flagged())?.evidence;
-    let cause = run.cause;
-    (run.from..run.to).filter_map(evidence).filter(move |evidence| evidence.cause == cause)
-}
-
-/// All causes named of a run's sections.
-fn causes(sections: &Sections, run: &Run) -> Causes {
-    flagged(sections, run).fold(Causes::of(run.cause), |all, evidence| all.union(evidence.causes))
 }

@@ -5,7 +5,7 @@
 use headrace_sensor::codec::{Bytes, TooLong};
 
 use super::fields::{Field, Payload, record};
-use super::{Frame, MAX_PAYLOAD_BYTES};
+use super::{Frame, MAX_FRAME_BYTES, MAX_PAYLOAD_BYTES};
 
 record! {
     /// Identity of a device.
@@ -328,6 +328,14 @@ impl Message {
                 Some(_) => Err(length),
             },
         }
+    }
+
+    /// Encodes the message as a frame, from one device id to another. Messages are as large as the longest: they are better lent.
+    ///
+    /// Errors: a payload beyond [`MAX_PAYLOAD_BYTES`], or an id that may not be sent as [`Message::Other`].
+    pub fn encode(&self, source: u8, destination: u8) -> Result<Bytes<MAX_FRAME_BYTES>, MessageError> {
+        let payload = self.payload()?;
+        Ok(Frame { id: self.id(), source, destination, payload: payload.as_slice() }.encode()?)
     }
 
     /// Encoded payload.

@@ -28,14 +28,7 @@ impl Addressed {
     ///
     /// Errors: a payload beyond [`MAX_PAYLOAD_BYTES`], or an id that may not be sent as [`Message::Other`].
     pub fn encode(&self) -> Result<Bytes<MAX_FRAME_BYTES>, MessageError> {
-        let payload = self.message.payload()?;
-        let frame = Frame {
-            id: self.message.id(),
-            source: self.source,
-            destination: self.destination,
-            payload: payload.as_slice(),
-        };
-        Ok(frame.encode()?)
+        self.message.encode(self.source, self.destination)
     }
 }
 

@@ -74,7 +74,7 @@ impl Sections {
         let span = self.runs.entry(id).or_insert((index, index));
         if change == RunChange::Cleared as u64 {
             let (from, to) = self.runs.remove(&id)?;
-            // If only the cause has changed, the alert gives the new cause.
+            // Part of it may be another run now.
             let open = self.flagged.range(from..=to).next().is_some();
             let words = cleared_text(from as f64 * site.section_m, (to + 1) as f64 * site.section_m);
             return (!open).then(|| Log::new(judged.at, Level::Info, words));
