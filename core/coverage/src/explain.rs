@@ -341,7 +341,9 @@ impl Drive {
             let squared = (margin_m - t_y_m) * (margin_m + t_y_m);
             let along_m = math::sqrt(squared.max(0.0)).max(0.3 * margin_m);
             let fits = along_m / (then.speed_mps * self.all_gap_s + self.advance_m()).max(1e-9);
-            then.speed_mps *= fits.min(1.0);
+            // What is advised allows for wall that the vehicle hides.
+            let advised = if self.fits_mps > 0.0 { self.fits_mps / then.speed_mps.max(1e-9) } else { 1.0 };
+            then.speed_mps *= fits.min(advised).min(1.0);
         }
         then
     }
