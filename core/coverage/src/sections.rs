@@ -417,11 +417,11 @@ impl Sections {
         explain(&case, passages, judging.store, judging.finder)
     }
 
-    /// The evidence that speaks for a cause of a run: that of the section with the largest hole, or of the first with this cause where
+    /// The evidence that speaks for a cause of a run: that of the section with the largest hole, or of the last with this cause where
     /// that one fails for something else.
     pub fn evidence_of(&self, run: &Run, cause: Cause) -> Option<Evidence> {
         let evidence = |index: i64| self.get(index)?.evidence.filter(|evidence| evidence.causes.has(cause));
-        evidence(run.worst.0).or_else(|| (run.from..run.to).find_map(evidence))
+        evidence(run.worst.0).or_else(|| (run.from..run.to).rev().find_map(evidence))
     }
 
     /// Index range of the sections in the table that a stretch, such as the way, touches.

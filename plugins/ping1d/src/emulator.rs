@@ -9,8 +9,8 @@ use headrace_sensor::geometry::time::{DurNs, MonoNs};
 use headrace_sensor::measurement::Sounding;
 
 use crate::codec::{
-    Addressed, DeviceInformation, Distance, DistanceSimple, MAX_STRENGTHS, Message, PingCodec, Profile,
-    ProtocolVersion, ScanRange, Text, id,
+    Addressed, DeviceInformation, Distance, DistanceSimple, MAX_FRAME_BYTES, MAX_STRENGTHS, Message,
+    PingCodec, Profile, ProtocolVersion, ScanRange, Text, id,
 };
 use crate::settings::Settings;
 
@@ -61,6 +61,8 @@ pub struct PingEmulator {
     /// Message ids of their answers.
     asked: VecDeque<u16>,
     polled: bool,
+    /// What is said last.
+    frame: Bytes<MAX_FRAME_BYTES>,
 }
 
 impl PingEmulator {
@@ -79,6 +81,7 @@ impl PingEmulator {
             waiting: Vec::new(),
             asked: VecDeque::new(),
             polled: setup.polled,
+            frame: Bytes::default(),
         }
     }
 
@@ -141,9 +144,9 @@ impl PingEmulator {
         (1..=SCAN.length_mm).contains(&mm).then_some(mm)
     }
 
-    fn say(&self, at: MonoNs, message: &Message, line: LineSink<'_>) {
-        if let Ok(answer) = message.encode(self.settings.device_id, 0) {
-            line(Direction::Received, at + self.latency, answer.as_slice());
+    fn say(&mut self, at: MonoNs, message: &Message, line: LineSink<'_>) {
+        if message.encode_to(&mut self.frame, self.settings.device_id, 0).is_ok() {
+            line(Direction::Received, at + self.latency, self.frame.as_slice());
         }
     }
 }
@@ -190,8 +193,9 @@ impl Emulator<Sounding> for PingEmulator {
         let about = self.asked.pop_front().unwrap_or(id::DISTANCE);
         if self.polled {
             // Requests are far shorter than the longest frame.
-            if let Ok(bytes) = Message::GeneralRequest(about).encode(0, self.settings.device_id) {
-                line(Direction::Sent, sounding.at, bytes.as_slice());
+            let question = Message::GeneralRequest(about);
+            if question.encode_to(&mut self.frame, 0, self.settings.device_id).is_ok() {
+                line(Direction::Sent, sounding.at, self.frame.as_slice());
             }
         }
         let distance_mm = self.distance_mm(sounding.range_m);

@@ -22,15 +22,15 @@ pub(crate) fn runs_table<'a>() -> Table<Run<'a>> {
         about: "Neighbouring flagged sections.",
         columns: vec![
             Column("run", "Its number within the dive, which stays", Get::Count(|row| count(row.run.id))),
-            Column("cause", "Main cause", Get::Text(|row| Some(row.run.cause.as_str().to_owned()))),
+            Column("cause", "Main cause: that of most of its sections", Get::Text(|row| Some(row.run.cause.as_str().to_owned()))),
             Column(
                 "causes",
-                "All causes, the main one first, with commas",
-                Get::Text(|row| Some(words(row.run.causes))),
+                "All causes, the main one first, then the others as they are frequent, with commas",
+                Get::Text(|row| Some(words(row.run.causes.iter().copied()))),
             ),
             Column(
                 "silent_sources",
-                "Heads that were silent in its worst section, with commas",
+                "Heads that were silent where it was put down to that, with commas",
                 Get::Text(|row| Some(row.run.silent_sources.join(",")).filter(|text| !text.is_empty())),
             ),
             Column("chainage_m", "Where it begins, m", Get::Number(|row| Some(row.run.start_m))),

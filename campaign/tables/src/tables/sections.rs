@@ -14,12 +14,12 @@ fn cause(row: &SectionReport) -> Option<String> {
 }
 
 fn causes(row: &SectionReport) -> Option<String> {
-    evidence(row).map(|evidence| words(evidence.causes))
+    evidence(row).map(|evidence| words(evidence.causes.iter()))
 }
 
 /// Causes by name, the main one first.
-pub(super) fn words(causes: headrace_coverage::Causes) -> String {
-    causes.iter().map(headrace_coverage::Cause::as_str).collect::<Vec<_>>().join(",")
+pub(super) fn words(causes: impl IntoIterator<Item = headrace_coverage::Cause>) -> String {
+    causes.into_iter().map(headrace_coverage::Cause::as_str).collect::<Vec<_>>().join(",")
 }
 
 #[expect(clippy::too_many_lines, reason = "a line for each column")]

@@ -44,6 +44,17 @@ impl<const N: usize> Bytes<N> {
         Ok(())
     }
 
+    /// Holds none.
+    pub fn clear(&mut self) {
+        self.as_mut_slice().fill(0);
+        self.len = 0;
+    }
+
+    /// The bytes held, to be changed.
+    pub fn as_mut_slice(&mut self) -> &mut [u8] {
+        self.bytes.get_mut(..self.len).unwrap_or_default()
+    }
+
     /// The bytes held.
     pub fn as_slice(&self) -> &[u8] {
         self.bytes.get(..self.len).unwrap_or_default()
@@ -69,5 +80,7 @@ mod tests {
         assert_eq!(bytes.as_slice(), [1, 2, 3, 0]);
         assert_ne!(bytes, Bytes::new(&[1, 2, 3]).unwrap());
         assert_eq!(format!("{bytes:?}"), "[01, 02, 03, 00]");
+        bytes.clear();
+        assert_eq!(bytes, Bytes::default());
     }
 }

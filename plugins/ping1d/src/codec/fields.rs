@@ -2,10 +2,10 @@
 
 use headrace_sensor::codec::{Bytes, TooLong};
 
-use super::MAX_PAYLOAD_BYTES;
+use super::MAX_FRAME_BYTES;
 
-/// A payload under construction.
-pub(super) type Payload = Bytes<MAX_PAYLOAD_BYTES>;
+/// A frame whose payload is being written.
+pub(super) type Payload = Bytes<MAX_FRAME_BYTES>;
 
 /// One or several consecutive fields of fixed length.
 pub(super) trait Field: Sized {

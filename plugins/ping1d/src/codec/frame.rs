@@ -42,17 +42,37 @@ impl<'a> Frame<'a> {
     ///
     /// Errors: a payload longer than [`MAX_PAYLOAD_BYTES`].
     pub fn encode(&self) -> Result<Bytes<MAX_FRAME_BYTES>, TooLong> {
-        let len = self.payload.len();
-        let length = u16::try_from(len).map_err(|_| TooLong { len, max: MAX_PAYLOAD_BYTES })?;
-        let mut bytes = Bytes::new(&START)?;
-        bytes.extend(&length.to_le_bytes())?;
-        bytes.extend(&self.id.to_le_bytes())?;
-        bytes.extend(&[self.source, self.destination])?;
-        bytes.extend(self.payload)?;
-        let sum = sum(bytes.as_slice());
-        bytes.extend(&sum.to_le_bytes())?;
-        Ok(bytes)
+        let mut frame = Bytes::default();
+        begin(&mut frame, self.id, self.source, self.destination)?;
+        frame.extend(self.payload)?;
+        end(&mut frame)?;
+        Ok(frame)
     }
+}
+
+/// Begins a frame; its payload is to be appended.
+pub(super) fn begin(
+    frame: &mut Bytes<MAX_FRAME_BYTES>,
+    id: u16,
+    source: u8,
+    destination: u8,
+) -> Result<(), TooLong> {
+    let [i0, i1] = id.to_le_bytes();
+    let [b, r] = START;
+    frame.clear();
+    // The length is known at the end.
+    frame.extend(&[b, r, 0, 0, i0, i1, source, destination])
+}
+
+/// Ends a frame, whose payload is there.
+pub(super) fn end(frame: &mut Bytes<MAX_FRAME_BYTES>) -> Result<(), TooLong> {
+    let len = frame.as_slice().len().saturating_sub(HEADER_BYTES);
+    let length = u16::try_from(len).map_err(|_| TooLong { len, max: MAX_PAYLOAD_BYTES })?;
+    if let Some(place) = frame.as_mut_slice().get_mut(START.len()..START.len() + size_of::<u16>()) {
+        place.copy_from_slice(&length.to_le_bytes());
+    }
+    let sum = sum(frame.as_slice());
+    frame.extend(&sum.to_le_bytes())
 }
 
 /// Judges whether `front` is, or may become, a frame; checks the checksum but not the payload.

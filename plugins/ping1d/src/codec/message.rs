@@ -5,7 +5,7 @@
 use headrace_sensor::codec::{Bytes, TooLong};
 
 use super::fields::{Field, Payload, record};
-use super::{Frame, MAX_FRAME_BYTES, MAX_PAYLOAD_BYTES};
+use super::{Frame, MAX_FRAME_BYTES, MAX_PAYLOAD_BYTES, frame};
 
 record! {
     /// Identity of a device.
@@ -330,21 +330,19 @@ impl Message {
         }
     }
 
-    /// Encodes the message as a frame, from one device id to another. Messages are as large as the longest: they are better lent.
+    /// Encodes the message as a frame from one device id to another, in place of what `frame` held: messages and frames are as large as
+    /// the longest, and better lent than moved.
     ///
     /// Errors: a payload beyond [`MAX_PAYLOAD_BYTES`], or an id that may not be sent as [`Message::Other`].
-    pub fn encode(&self, source: u8, destination: u8) -> Result<Bytes<MAX_FRAME_BYTES>, MessageError> {
-        let payload = self.payload()?;
-        Ok(Frame { id: self.id(), source, destination, payload: payload.as_slice() }.encode()?)
-    }
-
-    /// Encoded payload.
-    ///
-    /// Errors: too long, or an [`Message::Other`] whose id may not be sent as unknown.
-    pub fn payload(&self) -> Result<Bytes<MAX_PAYLOAD_BYTES>, MessageError> {
-        let mut payload = Payload::default();
-        self.write(&mut payload)?;
-        Ok(payload)
+    pub fn encode_to(
+        &self,
+        frame: &mut Bytes<MAX_FRAME_BYTES>,
+        source: u8,
+        destination: u8,
+    ) -> Result<(), MessageError> {
+        frame::begin(frame, self.id(), source, destination)?;
+        self.write(frame)?;
+        Ok(frame::end(frame)?)
     }
 }
 

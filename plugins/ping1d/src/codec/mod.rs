@@ -28,7 +28,9 @@ impl Addressed {
     ///
     /// Errors: a payload beyond [`MAX_PAYLOAD_BYTES`], or an id that may not be sent as [`Message::Other`].
     pub fn encode(&self) -> Result<Bytes<MAX_FRAME_BYTES>, MessageError> {
-        self.message.encode(self.source, self.destination)
+        let mut frame = Bytes::default();
+        self.message.encode_to(&mut frame, self.source, self.destination)?;
+        Ok(frame)
     }
 }
 

@@ -120,7 +120,9 @@ fn every_length_and_id_of_the_table_is_right() {
 #[test]
 fn a_profile_whose_count_lies_is_refused() {
     let (_, _, Message::Profile(profile)) = examples().swap_remove(6) else { panic!() };
-    let mut payload = Message::Profile(profile).payload().unwrap().as_slice().to_vec();
+    let message = Message::Profile(profile);
+    let told = Addressed { source: 1, destination: 0, message }.encode().unwrap();
+    let mut payload = Frame::parse(told.as_slice()).unwrap().payload.to_vec();
     payload[24] = 200;
     let bytes = frame(id::PROFILE, &payload);
     let parsed = Frame::parse(&bytes).unwrap();
