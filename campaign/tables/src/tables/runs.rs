@@ -22,7 +22,11 @@ pub(crate) fn runs_table<'a>() -> Table<Run<'a>> {
         about: "Neighbouring flagged sections.",
         columns: vec![
             Column("run", "Its number within the dive, which stays", Get::Count(|row| count(row.run.id))),
-            Column("cause", "Main cause: that of most of its sections", Get::Text(|row| Some(row.run.cause.as_str().to_owned()))),
+            Column(
+                "cause",
+                "Main cause: that of most of its sections",
+                Get::Text(|row| Some(row.run.cause.as_str().to_owned())),
+            ),
             Column(
                 "causes",
                 "All causes, the main one first, then the others as they are frequent, with commas",
