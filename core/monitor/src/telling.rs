@@ -258,7 +258,13 @@ impl Teller {
                 let (from_m, to_m) = bounds_m(run, sections);
                 tell(Told::Cleared { run: id.0, from_m, to_m });
             }
-            RunChange::Merged => {}
+            RunChange::Merged => {
+                if let (Some((last, _)), Some(kept)) = (self.run.as_mut(), run.merged_into)
+                    && *last == id
+                {
+                    *last = kept;
+                }
+            }
         }
     }
 

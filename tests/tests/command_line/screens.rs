@@ -62,6 +62,35 @@ fn in_a_pipe_there_are_neither_colours_nor_broken_lines() {
     insta::assert_snapshot!(answer.stdout.split("digest").next().unwrap());
 }
 
+/// Who has slowed down as he was told goes on missing the wall, for another cause: the stretch is one run, and that is told, too.
+#[test]
+fn a_missed_stretch_that_goes_on_for_another_cause_is_told_again() {
+    let folder = dive();
+    let dying = "sensors = [\"sonar_0\", \"sonar_1\", \"sonar_2\"]\nfrom_s = 42\nfor_s = 70\n";
+    let [kept, _] = SCENE.split("sensors =").collect::<Vec<_>>()[..] else { panic!("{SCENE}") };
+    folder.write("scene.toml", format!("{kept}{dying}"));
+    folder.simulate("scene.toml", "silent.mcap");
+    let answer = folder.headrace(&["replay", "silent.mcap", "--json-lines"]);
+    let lines = answer.stdout.lines().map(|line| serde_json::from_str::<Value>(line).unwrap());
+    let flags: Vec<Value> = lines.filter(|line| line["type"] == "flag").collect();
+    let (_, report) = folder.replay("silent.mcap", &[]);
+    let runs = report["runs"].as_array().unwrap();
+    let kept: Vec<_> = runs.iter().filter(|run| run["merged_into"].is_null()).collect();
+    let [run] = kept[..] else { panic!("{runs:#?}") };
+    let told: Vec<_> = flags.iter().map(|flag| flag["cause"].as_str().unwrap()).collect();
+    assert_eq!(told, ["too_fast", "head_silent"], "{flags:#?}");
+    let from_m = |flag: &Value| flag["from_m"].as_f64().unwrap();
+    assert!(from_m(&flags[1]) > from_m(&flags[0]) + 1.0, "{flags:#?}");
+    for flag in &flags {
+        assert_eq!(flag["run"], run["id"]);
+        assert!(run["causes"].as_array().unwrap().contains(&flag["cause"]), "{run}");
+    }
+    let actions = &report["way_home"][0]["actions"];
+    assert!(
+        ["slower", "head_back"].iter().all(|action| actions.as_array().unwrap().contains(&(*action).into()))
+    );
+}
+
 #[test]
 fn json_lines_have_the_state_once_a_second_and_what_is_told_once() {
     let folder = dive();

@@ -34,7 +34,7 @@ pub(crate) fn runs_table<'a>() -> Table<Run<'a>> {
             ),
             Column(
                 "silent_sources",
-                "Heads that were silent where it was put down to that, with commas",
+                "Heads that were silent in the section with its largest hole, or where it was put down to them, with commas",
                 Get::Text(|row| Some(row.run.silent_sources.join(",")).filter(|text| !text.is_empty())),
             ),
             Column("chainage_m", "Where it begins, m", Get::Number(|row| Some(row.run.start_m))),

@@ -18,10 +18,11 @@ pub struct RunReport {
     pub cause: Cause,
     /// All causes of its sections, the main one first, then the others as they are frequent.
     pub causes: Vec<Cause>,
-    /// The named causes' figures, for their text; those of the section with the largest hole.
+    /// Figures of the causes that its text names, each of a section that has it.
     #[serde(skip)]
     pub figures: Option<CauseFigures>,
-    /// Heads that were silent where it was put down to that, by the ids of their sources.
+    /// Heads that were silent in the section with its largest hole, or where it was put down to them, by the ids of their
+    /// sources.
     pub silent_sources: Vec<String>,
     /// Where it begins, m.
     pub start_m: f64,
