@@ -169,11 +169,11 @@ mod secure {
         pub(super) fn begin(&self, connection: Connection, from: SocketAddr) {
             let (acceptor, done) = (self.acceptor.clone(), self.done.clone());
             tokio::spawn(async move {
-                let Connection { io, _place } = connection;
+                let Connection { io, _place: place } = connection;
                 match tokio::time::timeout(WITHIN, acceptor.accept(io)).await {
                     Ok(Ok(stream)) => {
                         // Nobody takes it once the page has ended.
-                        let _ended = done.send((Connection { io: Box::new(stream), _place }, from)).await;
+                        let _ended = done.send((Connection { io: Box::new(stream), _place: place }, from)).await;
                     }
                     Ok(Err(error)) => tracing::debug!(%error, "a handshake of the page failed"),
                     Err(_) => tracing::debug!("a handshake of the page took too long"),
