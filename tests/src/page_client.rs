@@ -53,8 +53,9 @@ impl Serving {
         let mut told = Vec::new();
         let address = loop {
             let Ok(line) = lines.recv_timeout(WITHIN) else { panic!("no page: {told:#?}") };
-            if let Some(at) = line.find("http://").filter(|_| line.contains("page ")) {
-                break line[at + 7..].trim().to_owned();
+            let scheme = line.find("://").filter(|_| line.contains("page ") && line.contains("http"));
+            if let Some(at) = scheme {
+                break line[at + 3..].trim().to_owned();
             }
             told.push(line);
         };

@@ -6,6 +6,8 @@
 mod access;
 mod commands;
 mod contents;
+#[cfg(feature = "tls")]
+mod tls;
 mod undisturbed;
 
 /// A page on any port.
