@@ -17,7 +17,7 @@ use std::thread::{self, JoinHandle};
 use std::time::{Duration, Instant};
 
 use headrace_dashboard::collector::Collector;
-use headrace_dashboard::{HeadSite, Mode, Page, SensorSite, Settings, Site};
+use headrace_dashboard::{HeadSite, Mode, Page, SensorSite, Settings, Site, Voices};
 use headrace_geometry::time::{DurNs, MonoNs};
 use headrace_monitor::App;
 use headrace_monitor::outlet::{NoticeOutlet, NoticeReceiver};
@@ -268,7 +268,7 @@ fn serve(scene: &Scene) -> Page {
     };
     let act = Arc::new(|_| Err("a bench takes no commands".to_owned()));
     let direct = Arc::new(|_| Err("a bench isn't directed".to_owned()));
-    Page::start(settings, site(scene), "bench".to_owned(), act, direct).unwrap()
+    Page::start(settings, site(scene), "bench".to_owned(), act, direct, Voices::None).unwrap()
 }
 
 fn site(scene: &Scene) -> Site {

@@ -20,7 +20,7 @@ use crate::watch::Show;
 pub(crate) use campaigns::Campaign;
 pub(crate) use cost::Cost;
 pub(crate) use habits::{Completions, Man, Overwrite, Threads};
-pub(crate) use logs::{Export, Import, Recover, Trim, Verify};
+pub(crate) use logs::{Export, Import, Notes, Recover, Trim, Verify};
 pub(crate) use page::PageArgs;
 pub(crate) use value_parsers::{Speed, speed, time};
 
@@ -112,6 +112,11 @@ pub(crate) enum Command {
     /// (docs/page.md). Exit codes are those of replay.
     #[command(after_help = "Example:\n  headrace export dive.mcap --html dive.html")]
     Export(Export),
+    /// List the notes of a recorded dive, and write the recordings of its voice notes as files.
+    ///
+    /// The log isn't replayed: places are those that the dive published. Exit code 3 if the log, or a recording, has been lost in part.
+    #[command(after_help = "Example:\n  headrace notes dive.mcap\n  headrace notes dive.mcap --out voices")]
+    Notes(Notes),
     /// Compare a replay with the results that the dive published live.
     ///
     /// Reports the first difference of each result stream: tick, sensor, field and both values with their bits. Exit code 4

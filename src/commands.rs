@@ -8,7 +8,6 @@ use crossbeam::channel::unbounded;
 use headrace_config::Document;
 use headrace_dashboard::Mode;
 use headrace_geometry::time::DurNs;
-use headrace_monitor::console::ConsolePort;
 use headrace_replay::drive::{Pace, PacketSource as _};
 use headrace_replay::log::files_of;
 use headrace_replay::player::Player;
@@ -18,7 +17,7 @@ use headrace_vehicle::VehicleConfig;
 
 use crate::cli::{Demo, Output, Replay, Run, Speed};
 use crate::devices::KINDS;
-use crate::dive::{Clock, Recording, WhatIf, assemble_followed};
+use crate::dive::{Clock, Dive, Recording, WhatIf, assemble_followed};
 use crate::expect;
 use crate::failure::{self, Failure};
 use crate::feeds::Interruptible;
@@ -28,7 +27,7 @@ use crate::interrupt;
 use crate::live;
 use crate::output::{put_line, say, show};
 use crate::outputs::{self, Kind};
-use crate::page::{self, Of, Served};
+use crate::page::{self, Of, Served, VoicesOf};
 use crate::play::{self, Directors, Playing};
 use crate::report_output::{exit_code, finish, note_losses};
 use crate::screen::Screen;
@@ -60,8 +59,7 @@ pub(crate) fn demo(args: &Demo) -> Result<u8, Failure> {
     if watch.shows_lines() {
         say(&format!("{}, target {} m: a simulated dive", scene.vehicle.name, scene.vehicle.target_m));
     }
-    let served =
-        is_served.then(|| demo_page(args, &scene, &log, dive.console(), watch.shows_lines())).flatten();
+    let served = is_served.then(|| demo_page(args, &scene, &log, &dive, watch.shows_lines())).flatten();
     if let Some(served) = &served {
         watch = watch.followed_by(served.follower(&dive.armed));
     }
@@ -83,13 +81,7 @@ pub(crate) fn demo(args: &Demo) -> Result<u8, Failure> {
 }
 
 /// The page of a demo, and a browser that shows it.
-fn demo_page(
-    args: &Demo,
-    scene: &Scene,
-    log: &Path,
-    console: Option<ConsolePort>,
-    in_lines: bool,
-) -> Option<Served> {
+fn demo_page(args: &Demo, scene: &Scene, log: &Path, dive: &Dive, in_lines: bool) -> Option<Served> {
     let of = Of {
         vehicle: &scene.vehicle,
         mode: Mode::Demo,
@@ -99,7 +91,8 @@ fn demo_page(
         utc_of_zero_s: None,
         span: None,
         is_playback: false,
-        console,
+        console: dive.console(),
+        voices: VoicesOf::Dive(dive.voice_ports()),
     };
     let served = page::serve(&args.page, of, in_lines.then_some(&mut put_line))?;
     if !args.no_open {
@@ -141,6 +134,7 @@ pub(crate) fn run(args: &Run) -> Result<u8, Failure> {
         span: player.span(),
         is_playback: false,
         console: None,
+        voices: VoicesOf::Log(files_of_player(&player)),
     };
     let served = if is_served {
         page::serve(&args.page, of, watch.shows_lines().then_some(&mut put_line))
@@ -230,6 +224,11 @@ pub(crate) fn replay(args: &Replay) -> Result<u8, Failure> {
     }
 }
 
+/// The files that a player plays.
+fn files_of_player(player: &Player) -> Vec<PathBuf> {
+    player.files().iter().map(|file| file.path.clone()).collect()
+}
+
 /// The page of a replay.
 fn replay_page(
     args: &Replay,
@@ -248,6 +247,7 @@ fn replay_page(
         span: player.span(),
         is_playback: true,
         console: None,
+        voices: VoicesOf::Log(files_of_player(player)),
     };
     page::serve(&args.page, of, in_lines.then_some(&mut put_line))
 }

@@ -15,7 +15,7 @@ use headrace_ports::Supervisor;
 use headrace_replay::drive::{DriveError, Pace, PacketSource, drive};
 use headrace_replay::log::{
     DerivedChannels, Every, LeftOut, LogHeader, Recorder, RecorderHandle, RecordingFault, Rotation, SentPort,
-    SourceInfo, Summary, dive_name,
+    SourceInfo, Summary, VoicePort, dive_name,
 };
 use headrace_replay::player::seconds;
 use headrace_replay::record::{QUEUE_BYTES, QUEUE_OF_PORTS_BYTES, RecorderOutlet, result_channels};
@@ -245,6 +245,7 @@ pub(crate) fn log_header(vehicle: &VehicleConfig, vehicle_text: &str, ticks: boo
         metadata: [("version".to_owned(), env!("CARGO_PKG_VERSION").to_owned())].into(),
         sources: sources.collect(),
         ticks,
+        voices: ticks,
         results: if ticks { result_channels() } else { Vec::new() },
         sonars: sonars(vehicle),
         part: None,
@@ -410,6 +411,11 @@ impl Dive {
     /// The recorders' inputs for bytes sent to devices.
     pub(crate) fn sent_ports(&self) -> Vec<SentPort> {
         self.recorders.iter().map(|(_, handle)| handle.sent_port()).collect()
+    }
+
+    /// The recorders' inputs for recordings of voice notes.
+    pub(crate) fn voice_ports(&self) -> Vec<VoicePort> {
+        self.recorders.iter().map(|(_, handle)| handle.voice_port()).collect()
     }
 
     /// Ends the dive; returns the report.

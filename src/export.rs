@@ -1,9 +1,14 @@
 //! `headrace export`: a recorded dive as one page that opens from disk.
 
+use std::path::PathBuf;
+
 use headrace_dashboard::Mode;
 use headrace_dashboard::export::Export as PageExport;
+use headrace_monitor::report::Report;
+use headrace_monitor::voice::Voice;
 use headrace_replay::drive::{Pace, PacketSource as _};
 use headrace_replay::log::files_of;
+use headrace_replay::notes::each_voice;
 use headrace_replay::player::Player;
 use serde_json::json;
 
@@ -15,10 +20,13 @@ use crate::files;
 use crate::interrupt;
 use crate::output::say;
 use crate::outputs::{self, EXPORTED, Kind};
-use crate::page::{self, Of};
+use crate::page::{self, Of, VoicesOf};
 use crate::report_output::{exit_code, note_losses};
 use crate::vehicle_file;
 use crate::watch::Watch;
+
+/// Bytes of voices in a page: two hours.
+const MOST_VOICE_BYTES: usize = 24 << 20;
 
 /// `headrace export`.
 pub(crate) fn export(args: &Export) -> Result<u8, Failure> {
@@ -42,6 +50,7 @@ pub(crate) fn export(args: &Export) -> Result<u8, Failure> {
         span: player.span(),
         is_playback: false,
         console: None,
+        voices: VoicesOf::Log(files.clone()),
     };
     let export = PageExport::start(page::site(of))?;
     let mut watch = Watch::quiet().followed_by(page::following(export.collector(&dive.armed)));
@@ -50,9 +59,35 @@ pub(crate) fn export(args: &Export) -> Result<u8, Failure> {
     let mut report = dive.run(&mut feed, Pace::default(), &mut watch)?;
     drop(watch);
     note_losses(&mut report, log, &player);
-    let mut page = export.page(&json!(report.alert_list), &page::end_message(&report))?;
+    let (voices, left_out) = voices(&files, &report)?;
+    let mut page = export.page(&json!(report.alert_list), &voices, &page::end_message(&report))?;
     page.extend_from_slice(EXPORTED.as_bytes());
     files::write(&args.html, &page)?;
     say(&format!("page   {} ({} kB)", args.html.display(), page.len() / 1000));
+    if left_out > 0 {
+        say(&format!("{left_out} recordings of voice notes left out: headrace notes --out writes them"));
+    }
     Ok(exit_code(&report))
+}
+
+/// The recordings of a dive's voice notes, as many as a page takes, and how many it doesn't.
+fn voices(files: &[PathBuf], report: &Report) -> Result<(Vec<Voice>, u64), Failure> {
+    let (mut voices, mut bytes, mut left_out): (Vec<Voice>, _, _) = (Vec::new(), 0, 0);
+    // Most dives have none, and needn't be read once more.
+    if report.notes.iter().any(|note| note.voice.is_some()) {
+        each_voice(files, |voice| {
+            // Sent twice, where the first answer was lost.
+            if voices.iter().any(|other| other.id == voice.id) {
+                return Ok::<_, Failure>(());
+            }
+            if bytes + voice.audio.len() > MOST_VOICE_BYTES {
+                left_out += 1;
+            } else {
+                bytes += voice.audio.len();
+                voices.push(voice);
+            }
+            Ok(())
+        })?;
+    }
+    Ok((voices, left_out))
 }

@@ -28,6 +28,7 @@ mod logging;
 mod manual;
 mod mavlink_out;
 mod memory;
+mod notes;
 mod output;
 mod outputs;
 mod page;
@@ -72,6 +73,7 @@ pub fn main() -> ExitCode {
         Command::Run(run) => commands::run(&run),
         Command::Replay(replay) => commands::replay(&replay),
         Command::Export(args) => export::export(&args),
+        Command::Notes(args) => notes::notes(&args),
         Command::Verify(args) => verify::verify(&args),
         Command::Recover(args) => recover::recover(&args),
         Command::Trim(args) => trim::trim(&args),

@@ -7,7 +7,6 @@ use std::sync::atomic::Ordering;
 
 use headrace_dashboard::Mode;
 use headrace_geometry::time::{DurNs, MonoNs};
-use headrace_monitor::console::ConsolePort;
 use headrace_ports::{Connection, Phase, SentSink, Status, Supervisor};
 use headrace_replay::log::part_path;
 use headrace_sensor::connect::{Connect, ConnectError};
@@ -20,7 +19,7 @@ use crate::failure::Failure;
 use crate::followers::{Followers, Joining};
 use crate::interrupt;
 use crate::outputs::{self, Kind};
-use crate::page::{self, Of, Served};
+use crate::page::{self, Of, Served, VoicesOf};
 use crate::report_output::finish;
 use crate::screen::Screen;
 use crate::summary::broken;
@@ -49,7 +48,7 @@ pub(crate) fn run(args: &Run, text: &str, vehicle: &VehicleConfig) -> Result<u8,
     let until = args.duration.map(|seconds| begun + DurNs::from_secs_f64(seconds));
     let show = followers.show(args.output.show());
     let mut watch = Watch::new(show).live();
-    let served = is_served.then(|| live_page(args, vehicle, &logs, dive.console(), &mut watch)).flatten();
+    let served = is_served.then(|| live_page(args, vehicle, &logs, &dive, &mut watch)).flatten();
     if let Some(served) = &served {
         watch = watch.followed_by(served.follower(&dive.armed));
     }
@@ -94,7 +93,7 @@ fn live_page(
     args: &Run,
     vehicle: &VehicleConfig,
     logs: &[PathBuf],
-    console: Option<ConsolePort>,
+    dive: &Dive,
     watch: &mut Watch,
 ) -> Option<Served> {
     let (monotonic, utc) = headrace_ports::clock_anchor();
@@ -108,7 +107,8 @@ fn live_page(
         utc_of_zero_s: Some((utc.0 - monotonic.0.cast_signed()) as f64 / 1e9),
         span: None,
         is_playback: false,
-        console,
+        console: dive.console(),
+        voices: VoicesOf::Dive(dive.voice_ports()),
     };
     let shows_lines = watch.shows_lines();
     let mut say = |lines: &str| lines.lines().for_each(|line| watch.say(line));

@@ -47,6 +47,8 @@ pub(crate) enum Kind {
     Manual,
     Page,
     Cost,
+    /// The recording of a voice note can't be told from any other.
+    Voice,
 }
 
 impl Kind {
@@ -64,6 +66,7 @@ impl Kind {
             Self::Picture => "isn't a plan's picture",
             Self::Manual => "isn't a page of headrace's manual",
             Self::Page => "isn't an exported dive",
+            Self::Voice => "may be another recording",
             Self::Cost => "isn't one that headrace cost has written",
         }
     }
@@ -75,7 +78,7 @@ impl Kind {
             log.is_ok_and(|log| log.header().metadata.contains_key(key))
         };
         match self {
-            Self::Dive => false,
+            Self::Dive | Self::Voice => false,
             Self::Simulation => logged(SIMULATED),
             Self::Import => logged(IMPORTED),
             Self::Trimmed => logged(TRIMMED),

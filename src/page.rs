@@ -5,7 +5,7 @@
 use std::collections::BTreeMap;
 use std::io::IsTerminal as _;
 use std::net::{IpAddr, SocketAddr, UdpSocket};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::process::{Command as Process, Stdio};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
@@ -18,7 +18,7 @@ use headrace_dashboard::fed::PlaybackState;
 use headrace_dashboard::qr::qr;
 use headrace_dashboard::server::{Act, Direct, PORT};
 use headrace_dashboard::{
-    Command, HeadSite, Mode, Page, Play, SensorSite, Settings, Site, TlsFiles, Token, Tokens,
+    Command, HeadSite, Mode, Page, Play, SensorSite, Settings, Site, TlsFiles, Token, Tokens, Voices,
 };
 use headrace_geometry::time::{DurNs, MonoNs};
 use headrace_monitor::console::{Command as Input, ConsolePort, NoteText, Who};
@@ -26,7 +26,8 @@ use headrace_monitor::messages::Notice;
 use headrace_monitor::report::Report;
 use headrace_monitor::run::Loop;
 use headrace_ports::Status;
-use headrace_replay::log::RecordingEvent;
+use headrace_replay::log::voice::find_voice;
+use headrace_replay::log::{RecordingEvent, VoicePort};
 use headrace_replay::playback::PlaybackCommand;
 use headrace_sampling::occlusion::{AngleRange, hidden_by_vehicle};
 use headrace_sensor::device::Sense;
@@ -62,6 +63,16 @@ pub(crate) struct Of<'a> {
     pub(crate) is_playback: bool,
     /// What takes the operator's commands; none in a replay.
     pub(crate) console: Option<ConsolePort>,
+    /// Where recordings of voice notes go to or come from.
+    pub(crate) voices: VoicesOf,
+}
+
+/// Where recordings of voice notes go to or come from.
+pub(crate) enum VoicesOf {
+    /// The logs of a dive that goes on now; without any it isn't recorded.
+    Dive(Vec<VoicePort>),
+    /// The files of a log.
+    Log(Vec<PathBuf>),
 }
 
 /// A page that is served.
@@ -106,7 +117,8 @@ fn start(args: &PageArgs, of: Of<'_>, lines: Option<&mut dyn FnMut(&str)>) -> Re
     let (span, is_playback, waits) = (of.span, of.is_playback, of.mode != Mode::Live);
     let commands: Arc<Mutex<Option<Sender<PlaybackCommand>>>> = Arc::default();
     let act = act(of.console.clone());
-    let page = Page::start(settings, site(of), instance, act, direct(&commands))
+    let voices = voices(&of);
+    let page = Page::start(settings, site(of), instance, act, direct(&commands), voices)
         .map_err(|error| error.to_string())?;
     for port in page.taken() {
         complain(&format!("headrace: port {port} is taken; the page is on {}", page.address().port()));
@@ -256,9 +268,35 @@ fn act(console: Option<ConsolePort>) -> Act {
                 Input::Note { text, by: who(by)? }
             }
             Command::Mark { by } => Input::Note { text: NoteText::default(), by: who(by)? },
+            Command::Voice { id, by } => Input::Voice { id: *id, by: who(by)? },
         };
         console.send(&command).map_err(|error| error.to_string())
     })
+}
+
+/// Hands recordings of voice notes to all logs, of which one must take it, and then tells the loop; or finds them in a log.
+fn voices(of: &Of<'_>) -> Voices {
+    match (&of.voices, &of.console) {
+        (VoicesOf::Log(files), _) => {
+            let files = files.clone();
+            Voices::Recalled(Arc::new(move |id, at_s| {
+                let from = MonoNs(0) + DurNs::from_secs_f64(at_s);
+                find_voice(&files, id, from).map_err(|error| error.to_string())
+            }))
+        }
+        (VoicesOf::Dive(ports), Some(console)) if !ports.is_empty() => {
+            let (ports, console) = (ports.clone(), console.clone());
+            Voices::Kept(Arc::new(move |voice| {
+                let kept: Vec<_> = ports.iter().map(|port| port.keep(voice)).collect();
+                if kept.iter().all(Result::is_err) {
+                    return kept.into_iter().collect::<Result<_, _>>().map_err(|why| why.to_string());
+                }
+                let spoken = Input::Voiced { id: voice.id, seconds: voice.seconds };
+                console.send(&spoken).map_err(|error| error.to_string())
+            }))
+        }
+        _ => Voices::None,
+    }
 }
 
 /// Hands the page's commands to playback, as long as there is one.

@@ -11,6 +11,9 @@ use headrace_monitor::telling::UnsureStretch;
 
 use crate::output::append;
 
+/// Notes that are listed.
+const MOST_NOTES: usize = 20;
+
 /// The summary text, in lines of at most so many columns, if that is said.
 pub(crate) fn summary(report: &Report, columns: Option<usize>) -> String {
     let mut text = String::new();
@@ -84,6 +87,14 @@ pub(crate) fn summary(report: &Report, columns: Option<usize>) -> String {
                 source.id
             ));
         }
+    }
+    for note in report.notes.iter().take(MOST_NOTES) {
+        let place = note.station.clone().unwrap_or_else(|| "-+---.--".to_owned());
+        let by = if note.by.is_empty() { String::new() } else { format!(" ({})", note.by) };
+        line(format!("  {} at {place}: {}{by}", note.number, note.words()));
+    }
+    if report.notes.len() > MOST_NOTES {
+        line(format!("  and {} further notes, all in the report", report.notes.len() - MOST_NOTES));
     }
     for loss in report.log.iter().flat_map(|log| &log.losses) {
         line(format!("  LOST: {loss}"));

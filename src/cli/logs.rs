@@ -25,6 +25,21 @@ pub(crate) struct Export {
 }
 
 #[derive(Debug, Args)]
+pub(crate) struct Notes {
+    /// Log to read, or the parts of a recording.
+    #[arg(required = true, value_name = "LOG")]
+    pub(crate) logs: Vec<PathBuf>,
+    /// Folder for the recordings of voice notes: note-3.webm, as the browser made it (.webm, .ogg or .m4a).
+    #[arg(long, value_name = "DIR")]
+    pub(crate) out: Option<PathBuf>,
+    /// Print JSON.
+    #[arg(long)]
+    pub(crate) json: bool,
+    #[command(flatten)]
+    pub(crate) overwrite: Overwrite,
+}
+
+#[derive(Debug, Args)]
 pub(crate) struct Verify {
     /// Log to verify, or the parts of a recording.
     #[arg(required = true, value_name = "LOG")]

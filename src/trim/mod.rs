@@ -193,8 +193,13 @@ fn write(
         Some(anonymous) => anonymous.header(header),
         None => header,
     };
-    let mut work =
-        Work { spans: spans.to_vec(), words: said.join("; "), header: &header, change: &mut change };
+    let mut work = Work {
+        spans: spans.to_vec(),
+        words: said.join("; "),
+        header: &header,
+        change: &mut change,
+        voices: !args.anonymise,
+    };
     outputs::make_way(&args.output)?;
     let file = OpenOptions::new().write(true).create_new(true).open(&args.output).map_err(failed)?;
     let mut writer = BufWriter::new(Writing::new(&file, files::bytes(files)));

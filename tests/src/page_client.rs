@@ -53,8 +53,9 @@ impl Serving {
         let mut told = Vec::new();
         let address = loop {
             let Ok(line) = lines.recv_timeout(WITHIN) else { panic!("no page: {told:#?}") };
-            if let Some(at) = line.find("http://").filter(|_| line.contains("page ")) {
-                break line[at + 7..].trim().to_owned();
+            let scheme = line.find("://").filter(|_| line.contains("page ") && line.contains("http"));
+            if let Some(at) = scheme {
+                break line[at + 3..].trim().to_owned();
             }
             told.push(line);
         };
@@ -75,8 +76,16 @@ impl Serving {
     }
 
     /// Answer to a request: status, and all of it.
-    pub fn ask(&self, method: &str, path: &str, headers: &[&str], body: &str) -> (u16, String) {
+    pub fn ask(&self, method: &str, path: &str, headers: &[&str], body: impl AsRef<[u8]>) -> (u16, String) {
         ask(&self.address, method, path, headers, body)
+    }
+
+    /// Body of the answer to a request, which must be 200.
+    pub fn get(&self, path: &str) -> Vec<u8> {
+        let bytes = answer_of(&self.address, "GET", path, &[], &[]);
+        assert!(bytes.starts_with(b"HTTP/1.1 200"), "{path}: {}", String::from_utf8_lossy(&bytes));
+        let end = bytes.windows(4).position(|window| window == b"\r\n\r\n").unwrap();
+        bytes[end + 4..].to_vec()
     }
 }
 
@@ -88,7 +97,20 @@ impl Drop for Serving {
 }
 
 /// Answer of a server at this host and port: status, and all of it.
-pub fn ask(address: &str, method: &str, path: &str, headers: &[&str], body: &str) -> (u16, String) {
+pub fn ask(
+    address: &str,
+    method: &str,
+    path: &str,
+    headers: &[&str],
+    body: impl AsRef<[u8]>,
+) -> (u16, String) {
+    let bytes = answer_of(address, method, path, headers, body.as_ref());
+    let text = String::from_utf8_lossy(&bytes).into_owned();
+    let status = text.split(' ').nth(1).and_then(|code| code.parse().ok()).unwrap_or(0);
+    (status, text)
+}
+
+fn answer_of(address: &str, method: &str, path: &str, headers: &[&str], body: &[u8]) -> Vec<u8> {
     let mut stream = TcpStream::connect(address).unwrap();
     stream.set_read_timeout(Some(WITHIN)).unwrap();
     let host = if headers.iter().any(|header| header.starts_with("Host:")) {
@@ -97,16 +119,15 @@ pub fn ask(address: &str, method: &str, path: &str, headers: &[&str], body: &str
         format!("Host: {address}\r\n")
     };
     let further = headers.iter().fold(String::new(), |all, header| all + header + "\r\n");
-    let length = body.len();
-    let head = format!(
-        "{method} {path} HTTP/1.1\r\n{host}{further}Connection: close\r\nContent-Length: {length}\r\n\r\n"
-    );
-    stream.write_all((head + body).as_bytes()).unwrap();
+    // What is stated in the headers may be less, or more, than what is sent.
+    let states =
+        headers.iter().any(|header| header.starts_with("Content-Length:") || header.contains("chunked"));
+    let length = if states { String::new() } else { format!("Content-Length: {}\r\n", body.len()) };
+    let head = format!("{method} {path} HTTP/1.1\r\n{host}{further}{length}Connection: close\r\n\r\n");
+    stream.write_all(&[head.as_bytes(), body].concat()).unwrap();
     let mut bytes = Vec::new();
     stream.read_to_end(&mut bytes).unwrap();
-    let text = String::from_utf8_lossy(&bytes).into_owned();
-    let status = text.split(' ').nth(1).and_then(|code| code.parse().ok()).unwrap_or(0);
-    (status, text)
+    bytes
 }
 
 /// A section as it was sent.

@@ -83,9 +83,11 @@ const SCENE: &str = "vehicle = \"vita2-4.toml\"\n[trajectory]\n
 [[effects.device_faults]]\nkind = \"die\"\nsensors = [\"sonar_0\", \"sonar_1\", \"sonar_2\", \"sonar_3\"]\nfrom_s = 820\nfor_s = 40\n";
 
 /// What an operator does, one thing a second; the last is no command.
-const COMMANDS: [&str; 7] = [
+const COMMANDS: [&str; 9] = [
     r#"{"do":"silence","by":"AB"}"#,
     r#"{"do":"note","text":"rubble \u006ceft","by":"AB"}"#,
+    r#"{"do":"voice","id":7,"by":"AB"}"#,
+    r#"{"do":"voiced","id":7,"seconds":60}"#,
     r#"{"do":"limits","battery_pct":19.5}"#,
     r#"{"do":"recording","fails":true}"#,
     r#"{"do":"acknowledge","alert":0,"by":"AB"}"#,

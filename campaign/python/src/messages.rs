@@ -149,6 +149,7 @@ fn held(message: &LogMessage<'_>) -> Held {
         MessageKind::Raw { .. } => ("raw", None),
         MessageKind::Sent { .. } => ("sent", None),
         MessageKind::Tick => ("tick", None),
+        MessageKind::Voice => ("voice", None),
         MessageKind::Result { topic } => ("result", Some(topic.to_owned())),
         MessageKind::Other => ("other", None),
     };

@@ -26,7 +26,7 @@ mod runs;
 mod timer;
 pub mod words;
 
-pub use json::{AlertCountsJson, LeftJson, ListedAlertJson, NoteJson};
+pub use json::{AlertCountsJson, LeftJson, ListedAlertJson, NoteJson, SpokenJson};
 pub use kind::{AlertClass, ListKind, Priority};
 pub(super) use life::Telling;
 pub(super) use observed::Beat;

@@ -53,6 +53,7 @@ pub mod stage;
 mod stages;
 pub mod telling;
 pub mod unsure_stretch;
+pub mod voice;
 pub mod what_if;
 
 pub use app::{App, Plugin, SourceInfo, SourceSpec};

@@ -231,10 +231,9 @@ pub fn told_line(told: &Told, profile: &Profile) -> PilotLine {
         }
         Told::AlertChange { change, alert } => alert_line(*change, alert),
         Told::Note(note) => {
-            let what = if note.text.is_empty() { "mark".to_owned() } else { format!("note: {}", note.text) };
             let by = if note.by.is_empty() { String::new() } else { format!(" ({})", note.by) };
             let place = note.station.clone().unwrap_or_else(|| "-+---.--".to_owned());
-            line(place, format!("{what}{by}"), String::new(), None)
+            line(place, format!("{}{by}", note.words()), String::new(), None)
         }
         Told::Way { from_m, to_m, metres } => {
             line(to(*from_m, *to_m), format!("WAY: {}", metres_text(metres)), String::new(), None)

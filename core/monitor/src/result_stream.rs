@@ -36,6 +36,8 @@ pub enum RecordKind {
     AlertChange = 11,
     /// A note.
     Note = 12,
+    /// A voice note, and the same once its recording is in the log.
+    Voice = 13,
 }
 
 /// Type of a record's word.
@@ -66,6 +68,16 @@ const ALERT_CHANGE: [(&str, WordKind); 16] = [
     ("x_m", WordKind::Number),
     ("figure", WordKind::Number),
 ];
+/// Words of a voice note.
+const VOICE: [(&str, WordKind); 7] = [
+    ("at_ns", WordKind::Integer),
+    ("number", WordKind::Integer),
+    ("chainage_m", WordKind::Number),
+    ("by", WordKind::Integer),
+    ("by_rest", WordKind::Integer),
+    ("id", WordKind::Integer),
+    ("seconds", WordKind::Integer),
+];
 /// Words of a note; its text follows.
 const NOTE: [(&str, WordKind); 5] = [
     ("at_ns", WordKind::Integer),
@@ -76,7 +88,7 @@ const NOTE: [(&str, WordKind); 5] = [
 ];
 
 impl RecordKind {
-    const ALL: [Self; 12] = [
+    const ALL: [Self; 13] = [
         Self::Sample,
         Self::NoSample,
         Self::Section,
@@ -89,6 +101,7 @@ impl RecordKind {
         Self::State,
         Self::AlertChange,
         Self::Note,
+        Self::Voice,
     ];
 
     /// The kind with this number.
@@ -111,6 +124,7 @@ impl RecordKind {
             Self::State => "live state",
             Self::AlertChange => "change of an alert",
             Self::Note => "note",
+            Self::Voice => "voice note",
         }
     }
 
@@ -209,6 +223,7 @@ impl RecordKind {
             ],
             Self::AlertChange => &ALERT_CHANGE,
             Self::Note => &NOTE,
+            Self::Voice => &VOICE,
         };
         // Advice continues with the speeds that other modes would allow, the live state with each source's last reading, a
         // note with its text.

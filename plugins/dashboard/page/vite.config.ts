@@ -3,7 +3,7 @@ import { defineConfig } from "vite";
 // `npm run dev` and `npx vite preview` show the dive of a running program: HEADRACE=http://127.0.0.1:8881.
 const program = process.env["HEADRACE"] ?? "http://127.0.0.1:8881";
 const to = { target: program, changeOrigin: true, ws: true, headers: { origin: program } };
-const proxy = { "/feed": to, "/samples": to, "/state.json": to, "/login": to };
+const proxy = { "/feed": to, "/samples": to, "/state.json": to, "/login": to, "/voice": to };
 
 // Two files of fixed names beside index.html, so that the program embeds the same list whatever changes in them.
 export default defineConfig({

@@ -37,6 +37,12 @@ pub(crate) enum Request {
         #[serde(default)]
         by: String,
     },
+    /// Begins a voice note at the present place.
+    Voice {
+        id: u32,
+        #[serde(default)]
+        by: String,
+    },
     /// Controls a replay.
     Play {
         command: String,
@@ -77,6 +83,13 @@ pub enum Command {
         /// Who.
         by: String,
     },
+    /// Begins a voice note at the present place; its recording follows by `/voice/ID`.
+    Voice {
+        /// Ties it to its recording; made on the page, not 0.
+        id: u32,
+        /// Who.
+        by: String,
+    },
 }
 
 impl Command {
@@ -87,6 +100,7 @@ impl Command {
             Self::Silence { .. } => "silence",
             Self::Note { .. } => "note",
             Self::Mark { .. } => "mark",
+            Self::Voice { .. } => "voice",
         }
     }
 }
@@ -148,6 +162,8 @@ impl Asked {
                 Self::Command(Command::Note { text, by: name(by)? })
             }
             Request::Mark { by } => Self::Command(Command::Mark { by: name(by)? }),
+            Request::Voice { id: 0, .. } => return Err("id is 0; expected 1 to 4294967295".to_owned()),
+            Request::Voice { id, by } => Self::Command(Command::Voice { id, by: name(by)? }),
             Request::Play { command, speed, to_s } => Self::Play(play(&command, speed, to_s)?),
             Request::Rate { hz } if RATES_HZ.contains(&hz) => Self::Rate(hz),
             Request::Rate { hz } => return Err(format!("hz is {hz}; expected 0.1 to 5")),

@@ -8,6 +8,7 @@ use base64::engine::general_purpose::STANDARD;
 use flate2::Compression;
 use flate2::write::DeflateEncoder;
 use headrace_monitor::run::Loop;
+use headrace_monitor::voice::Voice;
 use serde_json::{Map, Value, json};
 use tokio::sync::mpsc;
 
@@ -91,13 +92,14 @@ impl Export {
         Collector::new(self.sender.clone(), dive, true, false, None)
     }
 
-    /// The page with the dive; `alerts` are all of the dive, `end` its last message. All collectors must be gone.
+    /// The page with the dive; `alerts` are all of the dive, `voices` the recordings of its notes, `end` its last message. All
+    /// collectors must be gone.
     ///
     /// Errors: see [`ExportError`].
-    pub fn page(self, alerts: &Value, end: &Value) -> Result<Vec<u8>, ExportError> {
+    pub fn page(self, alerts: &Value, voices: &[Voice], end: &Value) -> Result<Vec<u8>, ExportError> {
         drop(self.sender);
         let taken = self.thread.join().map_err(|_| ExportError::Ended)?;
-        let frames = taken.frames(alerts, end)?;
+        let frames = taken.frames(alerts, voices, end)?;
         let page = assets::single().ok_or(ExportError::NoPage)?;
         let place = page.rfind("</body>").ok_or(ExportError::NoPage)?;
         let (before, after) = page.split_at(place);
@@ -111,7 +113,7 @@ impl Export {
 
 impl Taken {
     /// All frames, packed.
-    fn frames(&self, alerts: &Value, end: &Value) -> io::Result<Vec<u8>> {
+    fn frames(&self, alerts: &Value, voices: &[Voice], end: &Value) -> io::Result<Vec<u8>> {
         let model = &self.model;
         let mut packed = DeflateEncoder::new(Vec::new(), Compression::default());
         let mut put = |kind: u8, bytes: &[u8]| {
@@ -127,6 +129,10 @@ impl Taken {
         put(1, &sample_frame(model.seq(), &samples))?;
         let mut texts = vec![json!({"type": "alerts", "list": alerts, "hidden": 0})];
         texts.extend(model.closing().into_iter().filter(|message| message["type"] != "alerts"));
+        texts.extend(voices.iter().map(|voice| {
+            json!({"type": "voice", "id": voice.id, "media_type": voice.container.media_type(),
+                "audio": STANDARD.encode(&voice.audio)})
+        }));
         texts.extend([self.states.timeline()]);
         texts.extend(model.state());
         texts.push(end.clone());

@@ -21,5 +21,5 @@ pub mod wire;
 
 pub use access::{Role, Token, Tokens};
 pub use command::{Command, Play};
-pub use server::{Page, PageError, Settings, TlsFiles};
+pub use server::{Page, PageError, Settings, TlsFiles, Voices};
 pub use site::{HeadSite, Mode, SensorSite, Site};

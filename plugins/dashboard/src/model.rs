@@ -360,6 +360,14 @@ impl Model {
         self.places.get(place).map(|(_, count)| *count)
     }
 
+    /// When the voice note of an id was begun, seconds on the log's clock; `None` where there is none, or none with a recording.
+    pub(crate) fn spoken_s(&self, id: u32) -> Option<f64> {
+        let is_it = |note: &&NoteJson| {
+            note.voice.as_ref().is_some_and(|voice| voice.id == id && voice.seconds.is_some())
+        };
+        self.notes.iter().find(is_it).map(|note| note.at_s)
+    }
+
     /// Alerts and notes, whole.
     fn lists(&self) -> Vec<Value> {
         let state = self.state.as_ref().map(|shown| &shown.0);

@@ -5,6 +5,7 @@ mod adviser;
 mod clocks;
 pub mod drive;
 pub mod log;
+pub mod notes;
 pub mod playback;
 pub mod player;
 pub mod record;

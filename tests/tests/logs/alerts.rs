@@ -48,8 +48,11 @@ fn after(seconds: f64) -> MonoNs {
 }
 
 /// What an operator does, some of it no command.
-const COMMANDS: [(f64, &str); 11] = [
+const COMMANDS: [(f64, &str); 14] = [
     (12.0, r#"{"do":"note","text":"start of the lining","by":"AB"}"#),
+    (20.0, r#"{"do":"voice","id":7,"by":"AB"}"#),
+    (25.0, r#"{"do":"voiced","id":7,"seconds":5}"#),
+    (26.0, r#"{"do":"voiced","id":8,"seconds":5}"#),
     (40.0, r#"{"do":"acknowledge","alert":0,"by":"AB"}"#),
     (61.0, r#"{"do":"limits","battery_pct":19.5}"#),
     (63.0, r#"{"do":"silence","by":"AB"}"#),
@@ -138,11 +141,14 @@ fn alerts_and_commands_do_not_depend_on_where_ticks_end() {
     for change in ["raised", "acknowledged", "silenced", "rectified", "cleared", "changed"] {
         assert!(done.iter().any(|done| done.as_str() == change), "{change}");
     }
-    assert_eq!(report["notes"].as_array().unwrap().len(), 2);
+    assert_eq!(report["notes"].as_array().unwrap().len(), 3);
     assert_eq!(report["notes"][0]["text"], "start of the lining");
     let x_m = report["notes"][0]["chainage_m"].as_f64().unwrap();
     assert!((1.0..4.0).contains(&x_m), "{x_m}");
-    let counts = ConsoleCounts { packets: 11, invalid: 1, without_effect: 1 };
+    let voice = &report["notes"][1];
+    assert_eq!(voice["voice"], serde_json::json!({"id": 7, "seconds": 5}));
+    assert_eq!(voice["at_s"], after(20.0).as_secs_f64(), "of the moment when it began");
+    let counts = ConsoleCounts { packets: 14, invalid: 1, without_effect: 2 };
     assert_eq!(expected.console_counts(), counts);
     assert_eq!(report["sources"].as_array().unwrap().len(), scene.vehicle.sensors.len());
     for tick_ms in [1, 333, 5000] {
@@ -320,7 +326,8 @@ fn acknowledgements_of_a_recorded_dive_are_in_its_replay_and_verify_says_equal()
     let lines = folder.headrace(&["replay", "live.mcap", "--json-lines"]).stdout;
     let lines: Vec<Value> = lines.lines().map(|line| serde_json::from_str(line).unwrap()).collect();
     let of = |kind: &str| lines.iter().filter(|line| line["type"] == kind).cloned().collect::<Vec<_>>();
-    assert_eq!(of("note").len(), 2);
+    // A voice once more, with its seconds.
+    assert_eq!(of("note").len(), 4);
     assert!(of("alert_change").iter().any(|line| line["change"] == "acknowledged"));
     let states = of("state");
     let last = states.last().unwrap();

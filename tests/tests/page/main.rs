@@ -6,7 +6,10 @@
 mod access;
 mod commands;
 mod contents;
+#[cfg(feature = "tls")]
+mod tls;
 mod undisturbed;
+mod voice;
 
 /// A page on any port.
 const ANY: &str = "--page=127.0.0.1:0";

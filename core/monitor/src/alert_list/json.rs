@@ -5,7 +5,7 @@ use serde::Serialize;
 use super::words::Surroundings;
 use super::{AlertList, AlertState, Figures, ListedAlert, Priority};
 use crate::live_state::LiveState;
-use crate::notes::Note;
+use crate::notes::{Note, Spoken};
 use crate::pilot_text::station;
 use headrace_geometry::time::MonoNs;
 
@@ -107,12 +107,35 @@ pub struct NoteJson {
     pub at_s: f64,
     /// By whom.
     pub by: String,
-    /// Its text; empty for a mark.
+    /// Its text; empty for a mark and a voice note.
     pub text: String,
+    /// Of a voice note.
+    pub voice: Option<SpokenJson>,
     /// Where the vehicle was, m; `None` without a position.
     pub chainage_m: Option<f64>,
     /// The same as engineers write it.
     pub station: Option<String>,
+}
+
+/// What was spoken, of a voice note.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct SpokenJson {
+    /// Ties the note to its recording in the log.
+    pub id: u32,
+    /// How long its recording is, seconds; `None` while, or if, none is in the log.
+    pub seconds: Option<u32>,
+}
+
+impl NoteJson {
+    /// What it says, in words.
+    pub fn words(&self) -> String {
+        match &self.voice {
+            Some(SpokenJson { seconds: Some(seconds), .. }) => format!("voice, {seconds} s"),
+            Some(SpokenJson { seconds: None, .. }) => "voice".to_owned(),
+            None if self.text.is_empty() => "mark".to_owned(),
+            None => format!("note: {}", self.text),
+        }
+    }
 }
 
 impl From<&Note> for NoteJson {
@@ -122,6 +145,10 @@ impl From<&Note> for NoteJson {
             at_s: note.at.as_secs_f64(),
             by: note.by.as_str().to_owned(),
             text: note.text.as_str().to_owned(),
+            voice: note.voice.map(|Spoken { id, seconds }| SpokenJson {
+                id,
+                seconds: Some(seconds).filter(|seconds| *seconds > 0),
+            }),
             chainage_m: note.chainage_m,
             station: note.chainage_m.map(station),
         }

@@ -3,6 +3,7 @@
 use core::fmt::Write as _;
 
 use super::text::ShortText;
+use crate::voice::MAX_VOICE_S;
 use serde::{Deserialize, Serialize};
 
 /// Longest packet.
@@ -38,6 +39,20 @@ pub enum Command {
         /// By whom.
         by: Who,
     },
+    /// A voice note at the present place: its recording begins.
+    Voice {
+        /// Ties the note to its recording; not 0.
+        id: u32,
+        /// By whom.
+        by: Who,
+    },
+    /// From the program: the recording of a voice note is in the log.
+    Voiced {
+        /// The note's.
+        id: u32,
+        /// How long it is, seconds, 1 to 60.
+        seconds: u32,
+    },
     /// From the program: a recording fails, or goes on.
     Recording {
         /// Whether it fails.
@@ -63,7 +78,7 @@ pub struct CommandError {
 }
 
 /// Keys of a command.
-const KEYS: [&str; 6] = ["do", "alert", "by", "text", "fails", "battery_pct"];
+const KEYS: [&str; 8] = ["do", "alert", "by", "text", "fails", "battery_pct", "id", "seconds"];
 
 /// Values of the keys so far.
 #[derive(Default)]
@@ -74,12 +89,19 @@ struct Values {
     text: Option<NoteText>,
     fails: Option<bool>,
     battery_pct: Option<f64>,
+    /// Of a voice note.
+    id: Option<u32>,
+    /// Of a voice note.
+    seconds: Option<u32>,
 }
 
 impl Command {
     /// Whether an operator may send it; the others come from the program itself.
     pub fn is_operators(&self) -> bool {
-        matches!(self, Self::Acknowledge { .. } | Self::Silence { .. } | Self::Note { .. })
+        matches!(
+            self,
+            Self::Acknowledge { .. } | Self::Silence { .. } | Self::Note { .. } | Self::Voice { .. }
+        )
     }
 
     /// The same of nobody, and without what somebody wrote.
@@ -90,7 +112,8 @@ impl Command {
             Self::Acknowledge { alert, .. } => Self::Acknowledge { alert, by },
             Self::Silence { .. } => Self::Silence { by },
             Self::Note { .. } => Self::Note { text: NoteText::default(), by },
-            Self::Recording { .. } | Self::Limits { .. } | Self::Time => self,
+            Self::Voice { id, .. } => Self::Voice { id, by },
+            Self::Voiced { .. } | Self::Recording { .. } | Self::Limits { .. } | Self::Time => self,
         }
     }
 
@@ -130,6 +153,13 @@ impl Command {
                 quote(&mut json, ",\"text\":", text.as_str());
                 by(&mut json, who);
             }
+            Self::Voice { id, by: who } => {
+                write!(json, "{{\"do\":\"voice\",\"id\":{id}").unwrap_or_default();
+                by(&mut json, who);
+            }
+            Self::Voiced { id, seconds } => {
+                write!(json, "{{\"do\":\"voiced\",\"id\":{id},\"seconds\":{seconds}").unwrap_or_default();
+            }
             Self::Recording { fails } => {
                 write!(json, "{{\"do\":\"recording\",\"fails\":{fails}").unwrap_or_default();
             }
@@ -159,8 +189,20 @@ fn quote(json: &mut String, key: &str, text: &str) {
 impl Values {
     /// The command, which has all its keys and no other.
     fn command(self) -> Result<Command, &'static str> {
-        let Self { what, alert, by, text, fails, battery_pct } = self;
+        let Self { what, alert, by, text, fails, battery_pct, id, seconds } = self;
         let what = what.ok_or("the key \"do\"")?;
+        if what.as_str().starts_with("voice") {
+            let others = (alert, text.is_some(), fails, battery_pct) != (None, false, None, None);
+            return match (what.as_str(), id, by, seconds) {
+                ("voice", Some(id), Some(by), None) if !others => Ok(Command::Voice { id, by }),
+                ("voiced", Some(id), None, Some(seconds)) if !others => Ok(Command::Voiced { id, seconds }),
+                ("voice", ..) => Err("voice with \"id\" and \"by\""),
+                _ => Err("voiced with \"id\" and \"seconds\""),
+            };
+        }
+        if id.is_some() || seconds.is_some() {
+            return Err("\"id\" and \"seconds\" with voice and voiced alone");
+        }
         Ok(match (what.as_str(), alert, by, text, fails, battery_pct) {
             ("acknowledge", Some(alert), Some(by), None, None, None) => Command::Acknowledge { alert, by },
             ("acknowledge", ..) => return Err("acknowledge with \"alert\" and \"by\""),
@@ -178,7 +220,7 @@ impl Values {
             ("limits", ..) => return Err("limits with \"battery_pct\""),
             ("time", None, None, None, None, None) => Command::Time,
             ("time", ..) => return Err("time without other keys"),
-            _ => return Err("acknowledge, silence, note, mark, recording, limits or time"),
+            _ => return Err("acknowledge, silence, note, mark, voice, voiced, recording, limits or time"),
         })
     }
 }
@@ -244,9 +286,12 @@ impl Scan<'_> {
             Some(2) => values.by.replace(self.string("a text of at most 16 bytes")?).is_none(),
             Some(3) => values.text.replace(self.string("a text of at most 240 bytes")?).is_none(),
             Some(4) => values.fails.replace(self.bool()?).is_none(),
-            Some(_) => values.battery_pct.replace(self.percent()?).is_none(),
+            Some(5) => values.battery_pct.replace(self.percent()?).is_none(),
+            Some(6) => values.id.replace(self.of_voice(u32::MAX, "an id from 1 to 4294967295")?).is_none(),
+            Some(_) => values.seconds.replace(self.of_voice(MAX_VOICE_S, "1 to 60 seconds")?).is_none(),
             None => {
-                return Err(CommandError { at: from, expected: "do, alert, by, text, fails or battery_pct" });
+                let expected = "do, alert, by, text, fails, battery_pct, id or seconds";
+                return Err(CommandError { at: from, expected });
             }
         };
         if is_new { Ok(()) } else { Err(CommandError { at: from, expected: "each key once" }) }
@@ -275,6 +320,13 @@ impl Scan<'_> {
     fn alert(&mut self) -> Result<u32, CommandError> {
         let at = self.at;
         self.number().parse().map_err(|_| CommandError { at, expected: "a number of an alert, or 0 for all" })
+    }
+
+    /// A whole number from 1 to `most`.
+    fn of_voice(&mut self, most: u32, expected: &'static str) -> Result<u32, CommandError> {
+        let at = self.at;
+        let number: Option<u32> = self.number().parse().ok();
+        number.filter(|number| (1..=most).contains(number)).ok_or(CommandError { at, expected })
     }
 
     fn percent(&mut self) -> Result<f64, CommandError> {

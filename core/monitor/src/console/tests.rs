@@ -22,6 +22,8 @@ fn commands_are_read_as_they_are_written_down() {
             r#"{"do":"mark","by":"joystick"}"#,
             Command::Note { text: NoteText::default(), by: who("joystick") },
         ),
+        (r#"{"do":"voice","id":4294967295,"by":"AB"}"#, Command::Voice { id: u32::MAX, by: who("AB") }),
+        (r#"{"do":"voiced","id":7,"seconds":60}"#, Command::Voiced { id: 7, seconds: 60 }),
         (r#"{"do":"recording","fails":true}"#, Command::Recording { fails: true }),
         (r#"{"do":"limits","battery_pct":63.5}"#, Command::Limits { battery_pct: 63.5 }),
         (r#"{"do":"time"}"#, Command::Time),
@@ -60,6 +62,16 @@ fn what_is_no_command_is_refused_with_its_place() {
         r#"{"do":"limits","battery_pct":1e1}"#,
         r#"{"do":"recording","fails":1}"#,
         r#"{"do":"note","text":"","by":"AB"}"#,
+        r#"{"do":"note","text":"a","by":"AB","id":7}"#,
+        r#"{"do":"voice","id":0,"by":"AB"}"#,
+        r#"{"do":"voice","id":4294967296,"by":"AB"}"#,
+        r#"{"do":"voice","id":7}"#,
+        r#"{"do":"voice","id":7,"by":"AB","seconds":1}"#,
+        r#"{"do":"voice","id":7,"by":"AB","text":"a"}"#,
+        r#"{"do":"voiced","id":7,"seconds":0}"#,
+        r#"{"do":"voiced","id":7,"seconds":61}"#,
+        r#"{"do":"voiced","id":7,"seconds":1,"by":"AB"}"#,
+        r#"{"do":"voiceless","id":7,"seconds":1}"#,
         r#"{"do":"note","text":"a\nb","by":"AB"}"#,
         "{\"do\":\"note\",\"text\":\"\u{1b}[2J\",\"by\":\"AB\"}",
         r#"{"do":"note","text":"\ud83d","by":"AB"}"#,
@@ -71,7 +83,7 @@ fn what_is_no_command_is_refused_with_its_place() {
     }
     assert!(Command::parse(b"{\"do\":\"silence\",\"by\":\"\xff\"}").is_err());
     let error = Command::parse(br#"{"do":"silence","to":"AB"}"#).unwrap_err();
-    insta::assert_snapshot!(error, @"reading a command, at byte 16: expected do, alert, by, text, fails or battery_pct");
+    insta::assert_snapshot!(error, @"reading a command, at byte 16: expected do, alert, by, text, fails, battery_pct, id or seconds");
 }
 
 proptest! {

@@ -6,7 +6,7 @@ use crate::alert_list::{AlertList, Beat, RunInput, Telling};
 use crate::console::{Command, Commands, Console, ReceivedCommand};
 use crate::live_state::LiveState;
 use crate::messages::{Event, Notice, Notices};
-use crate::notes::Notes;
+use crate::notes::{Note, Notes, Spoken};
 use crate::result_stream::{RecordKind, ResultStream};
 
 /// Runs that have changed in this tick, in order.
@@ -91,10 +91,22 @@ impl Alerting<'_> {
             Command::Note { text, by } => {
                 let note = self.notes.take(at, by, text, self.list.x_m());
                 digest_note(self.stream, &note);
-                if self.notices.0.len() < self.notices.0.capacity() {
-                    self.notices.0.push(Notice::Note(note));
-                }
+                self.tell(&note);
                 true
+            }
+            Command::Voice { id, by } => {
+                let note = self.notes.speak(at, by, id, self.list.x_m());
+                digest_voice(self.stream, &note);
+                self.tell(&note);
+                true
+            }
+            Command::Voiced { id, seconds } => {
+                let note = self.notes.spoken(id, seconds);
+                if let Some(note) = note {
+                    digest_voice(self.stream, &note);
+                    self.tell(&note);
+                }
+                note.is_some()
             }
             Command::Recording { fails } => {
                 self.list.set_recording(fails, at, &mut to);
@@ -111,9 +123,27 @@ impl Alerting<'_> {
         };
         self.console.counts.without_effect += u64::from(!has_effect);
     }
+
+    fn tell(&mut self, note: &Note) {
+        if self.notices.0.len() < self.notices.0.capacity() {
+            self.notices.0.push(Notice::Note(*note));
+        }
+    }
 }
 
-fn digest_note(stream: &mut ResultStream, note: &crate::notes::Note) {
+fn digest_voice(stream: &mut ResultStream, note: &Note) {
+    let Spoken { id, seconds } = note.voice.unwrap_or(Spoken { id: 0, seconds: 0 });
+    stream
+        .record(RecordKind::Voice)
+        .integer(note.at.0)
+        .integer(note.number.into())
+        .number(note.chainage_m.unwrap_or(0.0))
+        .text(note.by.as_str())
+        .integer(id.into())
+        .integer(seconds.into());
+}
+
+fn digest_note(stream: &mut ResultStream, note: &Note) {
     stream
         .record(RecordKind::Note)
         .integer(note.at.0)

@@ -9,7 +9,7 @@ import { World } from "./world.mjs";
 
 const DIST = fileURLToPath(new URL("../dist/", import.meta.url));
 const TYPES = { ".html": "text/html; charset=utf-8", ".js": "text/javascript", ".css": "text/css", ".svg": "image/svg+xml" };
-const CSP = "default-src 'self'; style-src 'self'; script-src 'self'; img-src 'self' data:; connect-src 'self' ws: wss:; object-src 'none'; base-uri 'none'";
+const CSP = "default-src 'self'; style-src 'self'; script-src 'self'; img-src 'self' data:; media-src 'self' blob:; connect-src 'self' ws: wss:; object-src 'none'; base-uri 'none'";
 const KEPT = 2000;
 const TICK_MS = 200;
 
@@ -17,7 +17,7 @@ const TICK_MS = 200;
 export async function serve(options = {}) {
   let world = new World(options);
   const clients = new Set();
-  let seq = 0, kept = [], sectionsTo = 0, mute = false, closed = false, token = options.token ?? null;
+  let seq = 0, kept = [], sectionsTo = 0, mute = false, closed = false, token = options.token ?? null, refuses = null;
 
   const send = (message) => {
     seq += 1;
@@ -74,6 +74,7 @@ export async function serve(options = {}) {
     else if (command.do === "silence") world.silence();
     else if (command.do === "note") world.note(command.text, command.by);
     else if (command.do === "mark") world.note("", command.by);
+    else if (command.do === "voice") world.note("", command.by, { id: command.id, seconds: null });
     for (const change of world.changes.splice(0)) send(change);
     return answer({ type: "done", do: command.do });
   };
@@ -88,6 +89,7 @@ export async function serve(options = {}) {
     if (ask.settle) world.settle((alert) => alert.kind === ask.settle);
     if (ask.condition) Object.assign(world, { condition: ask.condition, lamp: ask.lamp, remedy: ask.remedy ?? null });
     if (ask.recording) world.recording = ask.recording;
+    if (ask.refuses !== undefined) refuses = ask.refuses;
     if (ask.mute !== undefined) mute = ask.mute;
     if (ask.closed !== undefined) { closed = ask.closed; if (closed) clients.forEach((client) => client.terminate()); }
     if (ask.token !== undefined) token = ask.token;
@@ -119,6 +121,22 @@ export async function serve(options = {}) {
       if (url.pathname === "/state.json") return answer(200, "application/json", JSON.stringify(world.state()));
       const from = Math.max(0, Number(url.searchParams.get("from_m"))), to = Math.min(world.at_m, Number(url.searchParams.get("to_m")));
       return answer(200, "application/octet-stream", samplesFrame(samplesBetween(from, to, BEGUN_S), BEGUN_S, seq));
+    }
+    if (url.pathname.startsWith("/voice/")) {
+      const id = Number(url.pathname.slice("/voice/".length));
+      if (request.method === "GET") {
+        const sound = world.voices.get(id);
+        return sound ? answer(200, "audio/webm", sound) : answer(404, "text/plain", "no voice note of this id has a recording");
+      }
+      const parts = [];
+      request.on("data", (part) => parts.push(part));
+      request.on("end", () => {
+        if (refuses) return answer(503, "application/json", JSON.stringify({ type: "refused", why: refuses }));
+        world.spoken(id, Number(url.searchParams.get("seconds")), Buffer.concat(parts));
+        for (const change of world.changes.splice(0)) send(change);
+        return answer(200, "application/json", "{}");
+      });
+      return undefined;
     }
     const name = url.pathname === "/" || url.pathname.startsWith("/widget/") ? "index.html" : normalize(url.pathname).replace(/^[/\\]+/, "");
     const file = join(DIST, name);

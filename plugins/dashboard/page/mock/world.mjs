@@ -24,6 +24,7 @@ export class World {
     this.frozen_s = null;
     this.alerts = [];
     this.notes = [];
+    this.voices = new Map();
     this.playback = mode === "replay" ? { paused: false, speed: 1 } : null;
     this.numbers = 0;
     this.remedy = null;
@@ -103,8 +104,15 @@ export class World {
     }
   }
 
-  note(text, by) {
-    this.notes.push({ number: this.notes.length + 1, at_s: round(this.t_s), by, text, chainage_m: round(this.at_m, 2), station: station(this.at_m) });
+  spoken(id, seconds, sound) {
+    const at = this.notes.findIndex((note) => note.voice?.id === id);
+    this.notes[at] = { ...this.notes[at], voice: { id, seconds } };
+    this.voices.set(id, sound);
+    this.changes.push({ type: "note", t_s: round(this.t_s), ...this.notes[at] });
+  }
+
+  note(text, by, voice = null) {
+    this.notes.push({ number: this.notes.length + 1, at_s: round(this.t_s), by, text, voice, chainage_m: round(this.at_m, 2), station: station(this.at_m) });
     this.changes.push({ type: "note", t_s: round(this.t_s), ...this.notes.at(-1) });
   }
 

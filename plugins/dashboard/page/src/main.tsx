@@ -21,6 +21,7 @@ import "./style/page.css";
 import "./style/panels.css";
 import { Status } from "./ui/Status";
 import { Token } from "./ui/Token";
+import { startVoice } from "./voice/record";
 import { Wall } from "./wall/Wall";
 
 function Top() {
@@ -72,6 +73,7 @@ render(<View />, document.getElementById("page") as HTMLElement);
 startKeys();
 startSound();
 startSpeech();
+startVoice();
 start();
 store.topics.clock.on(watch);
 store.topics.state.on(watch);

@@ -7,7 +7,7 @@ import { createServer } from "node:http";
 import { serve } from "../mock/server.mjs";
 import { samplesBetween, samplesFrame, sectionsFrame, BEGUN_S } from "../mock/dive.mjs";
 import { World } from "../mock/world.mjs";
-import { browser, open } from "./browser.mjs";
+import { MICROPHONE, browser, open } from "./browser.mjs";
 
 const AXE = readFileSync(new URL("../node_modules/axe-core/axe.min.js", import.meta.url), "utf8");
 let chromium;
@@ -103,6 +103,94 @@ describe("what it shows", () => {
     const get = HTMLCanvasElement.prototype.getContext;
     HTMLCanvasElement.prototype.getContext = function (kind, ...rest) { return kind === "webgl2" ? null : get.call(this, kind, ...rest); };
   }) }));
+});
+
+describe("voice notes", () => {
+  let hears;
+  before(async () => { hears = await browser(MICROPHONE); });
+  after(async () => { await hears.close(); });
+  const voice = (page) => page.locator(".notes .voice");
+
+  /** A dive and a page on it with a microphone. */
+  async function spoken(run) {
+    const mock = await serve({ length_m: 7000, at_m: 60, mode: "demo" });
+    const opened = await open(hears, mock.url);
+    try {
+      await condition(opened.page, "good");
+      await run({ mock, ...opened });
+      assert.deepEqual(opened.problems, []);
+    } finally {
+      await opened.context.close();
+      await mock.close();
+    }
+  }
+
+  it("is put down when it begins, shows its seconds, and plays", () => spoken(async ({ mock, page }) => {
+    await voice(page).click();
+    await page.locator(".notes .voice.recording", { hasText: "End 0:01" }).waitFor();
+    const [begun] = mock.control({}).notes;
+    assert.equal(begun.voice.seconds, null);
+    await page.locator(".notes li", { hasText: /voice\s+page/ }).waitFor();
+    await page.keyboard.press("t");
+    const line = page.locator(".notes li", { hasText: /voice, [12] s/ });
+    await line.waitFor();
+    assert.equal(await page.locator(".notes li").count(), 1);
+    const [ended] = mock.control({}).notes;
+    assert.deepEqual([ended.number, ended.at_s, ended.chainage_m], [begun.number, begun.at_s, begun.chainage_m]);
+    const play = line.getByRole("button", { name: /Play note 1/ });
+    await play.click();
+    await line.locator('.play[aria-pressed="true"]').waitFor();
+    await line.locator('.play[aria-pressed="false"]').waitFor();
+    assert.equal(await page.locator(".said.refused").count(), 0);
+  }));
+
+  it("held, it ends when it is let go", () => spoken(async ({ page }) => {
+    await voice(page).hover();
+    await page.mouse.down();
+    await page.locator(".notes .voice.recording", { hasText: "End 0:01" }).waitFor();
+    await page.mouse.up();
+    await page.locator(".notes li", { hasText: /voice, [12] s/ }).waitFor();
+  }));
+
+  it("that can't be kept is told, and is sent again", () => spoken(async ({ mock, page }) => {
+    mock.control({ refuses: "the voice isn't kept: nothing is being recorded at present" });
+    await voice(page).click();
+    await page.locator(".notes .voice.recording").waitFor();
+    await voice(page).click();
+    await page.locator(".notes .voice-words", { hasText: "the voice isn't kept: nothing is being recorded" }).waitFor();
+    mock.control({ refuses: null });
+    await page.locator(".notes .voice.unsent", { hasText: "Send again" }).click();
+    await page.locator(".notes li", { hasText: "voice, 1 s" }).waitFor();
+    await page.locator(".notes .voice.idle").waitFor();
+    // And goes by itself once there is a connection again.
+    await voice(page).click();
+    await page.locator(".notes .voice.recording").waitFor();
+    mock.control({ closed: true });
+    await voice(page).click();
+    await page.locator(".notes .voice.unsent").waitFor();
+    mock.control({ closed: false });
+    await page.locator(".notes li", { hasText: "voice, 1 s" }).nth(1).waitFor();
+  }));
+
+  it("says why there is none, without a microphone, a secure page or a recording", async () => {
+    const told = (page, words) => page.locator(".notes .voice-words", { hasText: words }).waitFor();
+    await on({ mode: "demo" }, async ({ mock, page }) => {
+      await condition(page, "good");
+      await page.keyboard.press("t");
+      await told(page, /microphone/);
+      assert.equal(mock.control({}).notes.length, 0, "nothing was recorded, and nothing is noted");
+      mock.control({ recording: { on: false, fails: false, path: null } });
+      await page.locator(".recording", { hasText: "not recorded" }).waitFor();
+      await page.keyboard.press("t");
+      await told(page, /this dive isn't recorded/);
+    });
+    const insecure = (page) => page.addInitScript(() => Object.defineProperty(window, "isSecureContext", { value: false }));
+    await on({ mode: "demo" }, async ({ page }) => {
+      await page.locator(".notes .voice.lacks", { hasText: "No voice" }).waitFor();
+      await voice(page).click();
+      await told(page, /by https, or of this machine/);
+    }, { init: insecure });
+  });
 });
 
 describe("alerts", () => {

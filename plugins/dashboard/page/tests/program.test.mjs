@@ -1,14 +1,14 @@
 // The page with the program itself: HEADRACE_BIN names the binary. A simulated dive, its replay, and a rehearsal on real ports.
 import assert from "node:assert/strict";
-import { spawn } from "node:child_process";
+import { execFileSync, spawn } from "node:child_process";
 import { once } from "node:events";
-import { mkdtempSync, rmSync } from "node:fs";
+import { mkdtempSync, readFileSync, rmSync } from "node:fs";
 import { createServer } from "node:net";
 import { tmpdir } from "node:os";
 import { join } from "node:path";
 import { after, before, describe, it } from "node:test";
 import { fileURLToPath } from "node:url";
-import { browser, open } from "./browser.mjs";
+import { MICROPHONE, browser, open } from "./browser.mjs";
 
 const BIN = process.env.HEADRACE_BIN;
 const SCENE = fileURLToPath(new URL("../../../../deploy/scenes/demo.toml", import.meta.url));
@@ -99,6 +99,53 @@ describe("with the program", { skip: BIN ? false : "HEADRACE_BIN isn't set", con
     await page.locator('.status .link:text("connected")').waitFor(LONG);
     await page.locator(':root[data-old="false"]').waitFor(LONG);
     assert.deepEqual(problems, []);
+    await context.close();
+  });
+
+  it("what is spoken into one browser is in the other, in the log, and in the replay", async () => {
+    const out = join(folder, "spoken");
+    const { child, url } = await start(folder, await freePort(), "demo", "--no-open", "--out", out, "--force", "--speed", "4x");
+    const hears = await browser(MICROPHONE);
+    const one = await open(hears, url), other = await open(chromium, url);
+    await one.page.locator('.condition[data-condition="good"]').waitFor(LONG);
+    await one.page.locator(".notes .voice").click();
+    await one.page.locator(".notes .voice.recording", { hasText: "End 0:02" }).waitFor();
+    await one.page.locator(".notes .voice").click();
+    const line = other.page.locator(".notes li", { hasText: /voice, [23] s/ });
+    await line.waitFor();
+    const played = async (page, line) => {
+      await line.getByRole("button", { name: /Play note 1/ }).click();
+      await line.locator('.play[aria-pressed="true"]').waitFor();
+      await line.locator('.play[aria-pressed="false"]').waitFor();
+      assert.equal(await page.locator(".said.refused").count(), 0);
+    };
+    await played(other.page, line);
+    assert.deepEqual([one.problems, other.problems], [[], []]);
+    await stop(child, "SIGINT");
+    await one.context.close();
+    await other.context.close();
+    await hears.close();
+
+    const log = join(out, "dive.mcap"), voices = join(folder, "voices");
+    const told = JSON.parse(execFileSync(BIN, ["notes", log, "--out", voices, "--json"], { encoding: "utf8" }));
+    const [note] = told.notes;
+    assert.equal(note.recording.media_type, "audio/webm");
+    assert.ok(note.voice.seconds === 2 || note.voice.seconds === 3, JSON.stringify(note));
+    const sound = readFileSync(join(voices, "note-1.webm"));
+    assert.equal(sound.length, note.recording.bytes);
+    // Opus in WebM, of a few kB a second.
+    assert.ok(sound.subarray(0, 4).equals(Buffer.from([0x1a, 0x45, 0xdf, 0xa3])) && sound.includes("A_OPUS"));
+    assert.ok(sound.length > 1000 && sound.length < 30_000, `${sound.length} bytes`);
+
+    const replay = await start(folder, await freePort(), "replay", log, "--speed", "8x");
+    const { page, context, problems } = await open(chromium, replay.url);
+    const again = page.locator(".notes li", { hasText: `voice, ${note.voice.seconds} s` });
+    await again.waitFor(LONG);
+    await played(page, again);
+    const fetched = await page.evaluate(async (id) => [...new Uint8Array(await (await fetch(`/voice/${id}`)).arrayBuffer())], note.voice.id);
+    assert.ok(sound.equals(Buffer.from(fetched)), "the replay plays what the log has");
+    assert.deepEqual(problems, []);
+    await stop(replay.child);
     await context.close();
   });
 

@@ -17,8 +17,9 @@ use axum::routing::{get, post};
 use serde_json::{Value, json};
 use tokio::time::Instant;
 
-use super::{Shared, feed, metrics, neighbours};
-use crate::access::{COOKIE, Role, name_of, query};
+use super::reply::{Here, admit, json_answer, plain};
+use super::{Shared, feed, metrics, neighbours, voices};
+use crate::access::{COOKIE, name_of, query};
 use crate::assets;
 use crate::command::{Asked, LONGEST};
 use crate::model::{Body, MOST_IN_RANGE, Message, Sort};
@@ -29,8 +30,6 @@ const SUBPROTOCOL: &str = "headrace.feed.1";
 const LONGEST_READ: usize = 16 << 10;
 /// How long a browser keeps the token, seconds: a day.
 const COOKIE_S: u32 = 86_400;
-
-type Here = State<Arc<Shared>>;
 
 /// All addresses.
 pub(super) fn router(shared: Arc<Shared>) -> Router {
@@ -49,6 +48,7 @@ pub(super) fn router(shared: Arc<Shared>) -> Router {
         .route("/register_service", get(|| async { json_answer(&neighbours::service()) }))
         .route(neighbours::EXTRAS, get(extras))
         .route("/login", get(login))
+        .route("/voice/{id}", get(voices::play).post(voices::take))
         .route("/actions/{name}", post(action).options(preflight))
         .fallback(missing)
         .layer(middleware::from_fn_with_state(Arc::clone(&shared), guard))
@@ -83,6 +83,8 @@ async fn guard(State(shared): Here, request: Request, next: Next) -> Response {
         header::CONTENT_SECURITY_POLICY,
         HeaderValue::from_str(&policy).unwrap_or(fixed("default-src 'none'")),
     );
+    // Voice notes, by this page and not by one that frames it or that it frames.
+    set.insert(HeaderName::from_static("permissions-policy"), fixed("microphone=(self)"));
     set.insert(header::X_CONTENT_TYPE_OPTIONS, fixed("nosniff"));
     set.insert(header::REFERRER_POLICY, fixed("no-referrer"));
     set.insert(HeaderName::from_static("cross-origin-resource-policy"), fixed("same-site"));
@@ -103,24 +105,6 @@ fn ancestors(shared: &Shared, headers: &HeaderMap) -> String {
         all.push_str(origin);
     }
     all
-}
-
-fn plain(status: StatusCode, text: &'static str) -> Response {
-    (status, [(header::CONTENT_TYPE, "text/plain; charset=utf-8")], text).into_response()
-}
-
-fn json_answer(value: &Value) -> Response {
-    ([(header::CONTENT_TYPE, "application/json")], value.to_string()).into_response()
-}
-
-/// The role of a request.
-///
-/// Errors: the answer where it has none.
-fn admit(shared: &Shared, headers: &HeaderMap, uri: &Uri) -> Result<Role, Box<Response>> {
-    shared.access.role(headers, uri).ok_or_else(|| {
-        Shared::count(&shared.counts.unauthorised, 1);
-        Box::new(plain(StatusCode::UNAUTHORIZED, "a token is needed: open this server's page\n"))
-    })
 }
 
 async fn missing() -> Response {

@@ -12,7 +12,7 @@ use tokio::time::{Instant, timeout};
 use super::Shared;
 use super::metrics::Budget;
 use crate::access::Role;
-use crate::command::{Asked, LONGEST};
+use crate::command::{Asked, Command, LONGEST};
 use crate::model::{Body, Message, Sort};
 use crate::site::May;
 
@@ -264,7 +264,12 @@ impl Viewer {
             }
             Asked::Command(command) => {
                 let done = command.word();
-                (self.shared.act)(command).map(|()| done)
+                let voice = if let Command::Voice { id, .. } = command { Some(id) } else { None };
+                (self.shared.act)(command)?;
+                if let Some(id) = voice {
+                    self.shared.voices.begin(id);
+                }
+                Ok(done)
             }
         }
     }

@@ -25,7 +25,8 @@ impl<T: AsyncRead + AsyncWrite + Send + Unpin> Duplex for T {}
 /// A connection, and its place among those allowed.
 pub(super) struct Connection {
     io: Box<dyn Duplex>,
-    _place: OwnedSemaphorePermit,
+    #[cfg_attr(not(feature = "tls"), expect(dead_code, reason = "held, and moved by a handshake alone"))]
+    place: OwnedSemaphorePermit,
 }
 
 /// Certificate and key.
@@ -61,11 +62,17 @@ impl Tls {
         let read =
             CertificateDer::pem_file_iter(certificate).and_then(Iterator::collect::<Result<Vec<_>, _>>);
         let chain = read.map_err(|error| of("certificate", certificate, &error))?;
+        if chain.is_empty() {
+            return Err(of("certificate", certificate, &"it holds no certificate"));
+        }
         let secret = PrivateKeyDer::from_pem_file(key).map_err(|error| of("key", key, &error))?;
         let config = ServerConfig::builder_with_provider(Arc::new(ring::default_provider()));
         let config = config.with_safe_default_protocol_versions().map_err(|error| error.to_string())?;
         let config = config.with_no_client_auth().with_single_cert(chain, secret);
-        let config = config.map_err(|error| of("certificate", certificate, &error))?;
+        let config = config.map_err(|error| {
+            let [certificate, key] = [certificate, key].map(|path| path.display());
+            format!("the page's certificate {certificate} and key {key} can't be used together: {error}")
+        })?;
         Ok(Self { acceptor: Arc::new(config).into() })
     }
 }
@@ -105,7 +112,7 @@ impl Listening {
                     if let Err(error) = stream.set_nodelay(true) {
                         tracing::debug!(%error, "a connection of the page delays small messages");
                     }
-                    return (Connection { io: Box::new(stream), _place: place }, from);
+                    return (Connection { io: Box::new(stream), place }, from);
                 }
                 (Err(error), _) => {
                     tracing::debug!(%error, "a connection of the page couldn't be taken");
@@ -169,11 +176,11 @@ mod secure {
         pub(super) fn begin(&self, connection: Connection, from: SocketAddr) {
             let (acceptor, done) = (self.acceptor.clone(), self.done.clone());
             tokio::spawn(async move {
-                let Connection { io, _place: place } = connection;
+                let Connection { io, place } = connection;
                 match tokio::time::timeout(WITHIN, acceptor.accept(io)).await {
                     Ok(Ok(stream)) => {
                         // Nobody takes it once the page has ended.
-                        let _ended = done.send((Connection { io: Box::new(stream), _place: place }, from)).await;
+                        let _ended = done.send((Connection { io: Box::new(stream), place }, from)).await;
                     }
                     Ok(Err(error)) => tracing::debug!(%error, "a handshake of the page failed"),
                     Err(_) => tracing::debug!("a handshake of the page took too long"),

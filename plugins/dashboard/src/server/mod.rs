@@ -8,6 +8,8 @@ mod listener;
 mod metrics;
 mod neighbours;
 mod pump;
+mod reply;
+mod voices;
 
 use std::io;
 use std::net::{SocketAddr, TcpListener};
@@ -17,6 +19,7 @@ use std::thread::JoinHandle;
 use std::time::Duration;
 
 use headrace_monitor::run::Loop;
+use headrace_monitor::voice::Voice;
 use tokio::sync::{Notify, broadcast, mpsc};
 
 use crate::access::{Access, Tokens};
@@ -81,6 +84,23 @@ pub enum PageError {
 
 /// What takes the operators' commands: `Err` with why not.
 pub type Act = Arc<dyn Fn(Command) -> Result<(), String> + Send + Sync>;
+/// What takes the recording of a voice note, for the log, and then tells the loop of it: `Err` with why not.
+pub type Keep = Arc<dyn Fn(&Voice) -> Result<(), String> + Send + Sync>;
+/// What finds the recording of a note of this id and time, seconds, in a log: `None` where there is none that reads. It may take
+/// seconds.
+pub type Recall = Arc<dyn Fn(u32, f64) -> Result<Option<Voice>, String> + Send + Sync>;
+
+/// Where voice notes' recordings go to, or come from.
+#[derive(Clone)]
+pub enum Voices {
+    /// Nowhere.
+    None,
+    /// Into the log of a dive that goes on now.
+    Kept(Keep),
+    /// From a log.
+    Recalled(Recall),
+}
+
 /// What takes commands of playback.
 pub type Direct = Arc<dyn Fn(Play) -> Result<(), String> + Send + Sync>;
 
@@ -106,6 +126,7 @@ pub(crate) struct Shared {
     pub(crate) counts: Counts,
     pub(crate) act: Act,
     pub(crate) direct: Direct,
+    pub(crate) voices: voices::Desk,
     pub(crate) is_tls: bool,
     pub(crate) may_fail: metrics::Budget,
     stop: Notify,
@@ -146,6 +167,7 @@ impl Page {
         instance: String,
         act: Act,
         direct: Direct,
+        voices: Voices,
     ) -> Result<Self, PageError> {
         let (listener, taken) = bind(settings.address)?;
         let address = listener.local_addr().map_err(PageError::Thread)?;
@@ -161,6 +183,7 @@ impl Page {
             counts: Counts::default(),
             act,
             direct,
+            voices: voices::Desk::new(voices),
             is_tls: tls.is_some(),
             may_fail: metrics::Budget::new(20.0, 1.0),
             stop: Notify::new(),

@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, VecDeque};
 
 use headrace_geometry::time::MonoNs;
 
-use super::format::{RAW_PREFIX, SENT_PREFIX, TICK_TOPIC, Tick};
+use super::format::{RAW_PREFIX, SENT_PREFIX, TICK_TOPIC, Tick, VOICE_TOPIC};
 use super::part::Progress;
 use super::writer::{Lane, LogHeader};
 
@@ -39,6 +39,23 @@ impl Backlog {
     /// The oldest message, if there are more than may be kept.
     pub(super) fn overflow(&mut self) -> Option<Head> {
         if self.bytes() > MAX_BYTES { self.pop() } else { None }
+    }
+
+    /// Drops the recordings of voice notes; returns them without their bytes.
+    pub(super) fn drop_voices(&mut self) -> Vec<Head> {
+        let (mut dropped, mut at) = (Vec::new(), 0);
+        let Self { heads, data } = self;
+        heads.retain(|head| {
+            let is_voice = head.lane == Lane::Voice;
+            if is_voice {
+                data.drain(at..at + head.len);
+                dropped.push(*head);
+            } else {
+                at += head.len;
+            }
+            !is_voice
+        });
+        dropped
     }
 
     pub(super) fn pop(&mut self) -> Option<Head> {
@@ -106,6 +123,7 @@ impl Tally {
             Lane::Raw(number) => source(RAW_PREFIX, number),
             Lane::Sent(number) => source(SENT_PREFIX, number),
             Lane::Tick => Some(TICK_TOPIC.to_owned()),
+            Lane::Voice => Some(VOICE_TOPIC.to_owned()),
             Lane::Result(number) => {
                 header.results.get(usize::from(number)).map(|result| result.topic.clone())
             }

@@ -3,7 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use super::format::{
-    CONNECT_KEY, PLUGIN_KEY, RAW_PREFIX, RESULT_PREFIX, SENT_PREFIX, SOURCE_KEY, TICK_TOPIC,
+    CONNECT_KEY, PLUGIN_KEY, RAW_PREFIX, RESULT_PREFIX, SENT_PREFIX, SOURCE_KEY, TICK_TOPIC, VOICE_TOPIC,
 };
 use super::framing::Definition;
 use super::limits::{HeaderBudget, MAX_CHANNELS, MAX_SOURCES};
@@ -18,6 +18,7 @@ pub(super) enum ChannelKind {
     Raw(u16),
     Sent(u16),
     Tick,
+    Voice,
     Result,
     Other,
 }
@@ -132,6 +133,7 @@ impl Channels {
         }
         let kind = match definition.topic.as_str() {
             TICK_TOPIC => ChannelKind::Tick,
+            VOICE_TOPIC => ChannelKind::Voice,
             topic if topic.starts_with(RESULT_PREFIX) => ChannelKind::Result,
             topic => match source_id(topic).map(str::to_owned) {
                 Some(id) if topic.starts_with(RAW_PREFIX) => {
@@ -167,8 +169,8 @@ impl Channels {
         &self.sources
     }
 
-    pub(super) fn has_ticks(&self) -> bool {
-        self.by_id.values().any(|channel| channel.kind == ChannelKind::Tick)
+    pub(super) fn has(&self, kind: ChannelKind) -> bool {
+        self.by_id.values().any(|channel| channel.kind == kind)
     }
 
     pub(super) fn result_topics(&self) -> Vec<String> {

@@ -172,6 +172,22 @@ impl<R: Read + Seek> DiveLog<R> {
         self.has_ticks
     }
 
+    /// Whether the file being read has a channel of voice notes' recordings.
+    pub(super) fn has_voices(&self) -> bool {
+        self.reader.has_voices()
+    }
+
+    /// Passes over what is earlier than this, by the chunks' headers. Before the first message is read.
+    ///
+    /// Errors: a further file can't be opened.
+    pub(super) fn pass_before(&mut self, at: MonoNs) -> Result<(), LogError> {
+        while self.at + 1 < self.files.len() && self.reader.times().is_none_or(|(_, last)| last < at) {
+            self.go_on()?;
+        }
+        self.reader.pass_before(at);
+        Ok(())
+    }
+
     /// The files, in reading order.
     pub fn files(&self) -> &[PartFile] {
         &self.files

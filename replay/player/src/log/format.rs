@@ -5,6 +5,7 @@
 //! | `/raw/<source id>` | bytes as received: one device frame, datagram, CAN frame, HID report or I2C transaction | receive time | time of validity, if the device gives one, else the receive time |
 //! | `/sent/<source id>` | bytes sent to the device | time of sending | the same |
 //! | `/loop/tick` | one tick of the loop, see [`Tick`] | the tick's time | the same |
+//! | `/notes/voice` | the recording of a voice note, see [`super::voice`]; read by people and never by a replay | that of the message before it | the same |
 //! | `/result/poses`, `/result/pings`, `/result/judgements`, `/result/advice`, `/result/states` | the loop's results of a tick as words ([`headrace_monitor::result_stream`]): u64 tick, u64 number of the first record, records; for `verify`, never read by a replay | the tick's time | the same |
 //! | `/result/view/...` | the same for viewers, in JSON: [`crate::view`] | the tick's time | the same |
 //!
@@ -29,9 +30,11 @@ pub const SENT_PREFIX: &str = "/sent/";
 pub const RESULT_PREFIX: &str = "/result/";
 /// Topic prefix of results for viewers.
 pub const VIEW_PREFIX: &str = "/result/view/";
+/// The channel of voice notes' recordings.
+pub const VOICE_TOPIC: &str = "/notes/voice";
 /// The channel of ticks.
 pub const TICK_TOPIC: &str = "/loop/tick";
-/// Message encoding of raw, sent and tick channels.
+/// Message encoding of raw, sent, tick and voice channels.
 pub const BYTES_ENCODING: &str = "application/octet-stream";
 /// Name of the metadata record written by the recorder: versions, digests, clock anchors.
 pub const METADATA: &str = "headrace";

@@ -20,6 +20,8 @@
 //!
 //! [`DiveLog`] reads one log, or the parts of a recording as one.
 //!
+//! Recordings of voice notes ([`voice`]) have chunks of their own.
+//!
 //! The file is append-only: written bytes are never modified, so a power cut can't damage them. After an error of the medium a
 //! file is left as it is, without an end, and the recording goes on in another part, which repeats what wasn't synced: its
 //! [`PartHead`] says from which message of each channel on. Readers leave these out of the part before.
@@ -54,6 +56,7 @@ mod space;
 mod storage;
 mod trim;
 mod unzstd;
+pub mod voice;
 mod worker;
 mod writer;
 
@@ -72,6 +75,7 @@ pub use rotate::{Every, Rotation, files_of};
 pub use space::LeftOut;
 pub use storage::{Disk, Storage, StoredFile};
 pub use trim::{Change, TRIMMED, Trim, Trimmed, trim};
+pub use voice::VoicePort;
 pub use worker::RecorderWorker;
 pub use writer::{LogHeader, LogWriter, PartSummary, ResultChannel, SourceInfo, Summary};
 

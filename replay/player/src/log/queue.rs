@@ -42,6 +42,10 @@ pub(super) struct State {
     /// Bytes that the port threads sent to the devices, which don't pass through the loop.
     pub(super) sent: ArrayQueue<SentMessage>,
     pub(super) sent_dropped: AtomicU64,
+    /// Recordings of voice notes, which don't pass through the loop either.
+    pub(super) voices: ArrayQueue<Vec<u8>>,
+    /// Whether the recorder takes no further one: set before it takes the last.
+    pub(super) voices_end: AtomicBool,
     pub(super) results_missing: AtomicU64,
 }
 
@@ -94,6 +98,7 @@ pub(super) fn entry_head(
         Lane::Sent(source) => (1, source),
         Lane::Tick => (2, 0),
         Lane::Result(channel) => (3, channel),
+        Lane::Voice => (4, 0),
     };
     let mut head = [0; ENTRY_HEAD_BYTES];
     let values = [kind, 0].into_iter().chain(number.to_le_bytes()).chain(len.to_le_bytes());
@@ -187,6 +192,7 @@ impl<R: ByteConsumer> Queue<R> {
             0 => Lane::Raw(number),
             1 => Lane::Sent(number),
             2 => Lane::Tick,
+            4 => Lane::Voice,
             _ => Lane::Result(number),
         };
         self.ring.skip(ENTRY_HEAD_BYTES);

@@ -53,6 +53,8 @@ pub enum MessageKind<'a> {
     },
     /// A tick of the loop, see [`super::format::Tick`].
     Tick,
+    /// The recording of a voice note, see [`super::voice`].
+    Voice,
     /// A result of the loop.
     Result {
         /// Its topic.
@@ -169,7 +171,7 @@ impl<R: Read + Seek> LogReader<R> {
             sources: channels.sources().to_vec(),
         };
         take_vehicle_file(&mut info);
-        let by_time = !channels.has_ticks();
+        let by_time = !channels.has(ChannelKind::Tick);
         tracing::debug!(log = %file.name(), chunks = scan.spans.len(), sources = info.sources.len(), by_time, "log scanned");
         let mut plan: Vec<u32> = (0..).take(scan.spans.len()).collect();
         if by_time {
@@ -206,7 +208,20 @@ impl<R: Read + Seek> LogReader<R> {
 
     /// Whether the log contains the ticks of the loop that wrote it.
     pub fn has_ticks(&self) -> bool {
-        self.channels.has_ticks()
+        self.channels.has(ChannelKind::Tick)
+    }
+
+    /// Whether the log has a channel of voice notes' recordings.
+    pub(super) fn has_voices(&self) -> bool {
+        self.channels.has(ChannelKind::Voice)
+    }
+
+    /// Passes over what its chunks' headers say is earlier than this. Before the first message is read.
+    pub(super) fn pass_before(&mut self, at: MonoNs) {
+        let is_due = |number: &u32| {
+            self.spans.get(*number as usize).is_none_or(|span| !span.is_dated() || span.to >= at.0)
+        };
+        self.read = self.plan.iter().position(is_due).unwrap_or(self.plan.len());
     }
 
     /// The channels known before messages are read.
@@ -292,6 +307,7 @@ impl<R: Read + Seek> LogReader<R> {
                 ChannelKind::Raw(source) => MessageKind::Raw { source },
                 ChannelKind::Sent(source) => MessageKind::Sent { source },
                 ChannelKind::Tick => MessageKind::Tick,
+                ChannelKind::Voice => MessageKind::Voice,
                 ChannelKind::Result => MessageKind::Result { topic: &channel.definition.topic },
                 ChannelKind::Other => MessageKind::Other,
             },

@@ -25,6 +25,7 @@ use super::queue::{ENTRY_HEAD_BYTES, Entries, Full, Gap, Queue, SentPort, State,
 use super::recording::Recording;
 use super::rotate::{Rotation, in_the_way};
 use super::storage::{Disk, OneWriter, Storage};
+use super::voice::VoicePort;
 use super::worker::RecorderWorker;
 use super::writer::{Lane, LogHeader, Summary};
 
@@ -34,6 +35,8 @@ const NAP: Duration = Duration::from_millis(2);
 const MIN_QUEUE_BYTES: usize = 64 * 1024;
 /// Capacity for messages to devices: some seconds of eight heads.
 const SENT_MESSAGES: usize = 2048;
+/// Capacity for recordings of voice notes: a minute each, and at most 4 MiB.
+const VOICES: usize = 8;
 /// How long a medium that neither takes anything nor fails is waited for at the end.
 const PATIENCE: Duration = Duration::from_secs(30);
 /// Capacity for news of the recording.
@@ -120,6 +123,8 @@ impl Recorder {
             events: ArrayQueue::new(EVENTS),
             sent: ArrayQueue::new(SENT_MESSAGES),
             sent_dropped: AtomicU64::new(0),
+            voices: ArrayQueue::new(VOICES),
+            voices_end: AtomicBool::new(false),
             results_missing: AtomicU64::new(0),
         });
         let port = RecorderPort {
@@ -289,6 +294,11 @@ impl RecorderHandle {
     /// A port for bytes sent to the devices.
     pub fn sent_port(&self) -> SentPort {
         SentPort { state: Arc::clone(&self.state) }
+    }
+
+    /// A port for the recordings of voice notes.
+    pub fn voice_port(&self) -> VoicePort {
+        VoicePort { state: Arc::clone(&self.state) }
     }
 
     /// Writes the rest of the queue and the summary, and ends the thread. Errors of writing are in [`Summary::faults`].

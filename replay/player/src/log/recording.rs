@@ -11,7 +11,7 @@ use std::time::Duration;
 use headrace_geometry::time::MonoNs;
 
 use super::LogError;
-use super::backlog::{Backlog, Tally};
+use super::backlog::{Backlog, Head, Tally};
 use super::fault::{RecordingEvent, RecordingFault, add};
 use super::part::{PartHead, part_path};
 use super::rotate::{Every, Rotation};
@@ -155,10 +155,15 @@ impl Recording {
             }
         }
         while let Some(lost) = self.backlog.overflow() {
-            self.settled.add(&lost);
-            if let Some(outage) = &mut self.outage {
-                outage.fault.lost += 1;
-            }
+            self.lose(&lost);
+        }
+    }
+
+    /// Counts a message that is given up.
+    fn lose(&mut self, lost: &Head) {
+        self.settled.add(lost);
+        if let Some(outage) = &mut self.outage {
+            outage.fault.lost += 1;
         }
     }
 
@@ -245,6 +250,10 @@ impl Recording {
         self.open = Some(part);
         if let Err(error) = self.write_again(&path) {
             self.fail(&error);
+            // A voice is as long as seconds of a dive, which may find room without it.
+            for lost in self.backlog.drop_voices() {
+                self.lose(&lost);
+            }
             return;
         }
         self.settle();
@@ -281,7 +290,7 @@ impl Recording {
                 self.within_tick = false;
                 false
             }
-            Lane::Sent(_) | Lane::Result(_) => false,
+            Lane::Sent(_) | Lane::Result(_) | Lane::Voice => false,
         };
         let Some(part) = &mut self.open else { return false };
         let began = *part.began.get_or_insert(at);

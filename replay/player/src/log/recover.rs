@@ -111,6 +111,7 @@ pub(super) fn header<R: Read + Seek>(
         metadata: info.metadata.clone(),
         sources,
         ticks: reader.has_ticks(),
+        voices: reader.has_voices(),
         results: topics.iter().map(result).collect(),
         sonars: Vec::new(),
         part: info.part.as_ref().map(|part| part.head.clone()),
@@ -123,6 +124,7 @@ pub(super) fn lane(message: &LogMessage<'_>, results: &BTreeMap<&str, u16>) -> O
         MessageKind::Raw { source } => Some(Lane::Raw(source)),
         MessageKind::Sent { source } => Some(Lane::Sent(source)),
         MessageKind::Tick => Some(Lane::Tick),
+        MessageKind::Voice => Some(Lane::Voice),
         MessageKind::Result { topic } => results.get(topic).copied().map(Lane::Result),
         MessageKind::Other => None,
     }

@@ -25,6 +25,8 @@ pub struct Trim<'a> {
     pub header: &'a dyn Fn(&LogInfo, LogHeader) -> LogHeader,
     /// Changes source messages.
     pub change: Change<'a>,
+    /// Whether recordings of voice notes are kept, as long as they are within the spans.
+    pub voices: bool,
 }
 
 /// Outcome of trimming.
@@ -66,6 +68,7 @@ pub fn trim<R: Read + Seek, W: Write>(
     let mut begin = header(&reader, &topics, found.sources, known);
     begin.metadata.insert(TRIMMED.to_owned(), trim.words.clone());
     begin.part = None;
+    begin.voices &= trim.voices;
     let mut log = LogWriter::new(output, &(trim.header)(reader.header(), begin))?;
     let losses = found.losses.len() as u64;
     for loss in found.losses {
@@ -130,6 +133,10 @@ impl<W: Write> Cutter<'_, W> {
         let within = |(from, to): &(MonoNs, MonoNs)| (*from..*to).contains(&message.log_time);
         if lane == Lane::Tick {
             return self.tick(message);
+        }
+        if lane == Lane::Voice && !trim.voices {
+            self.done.cut += 1;
+            return Ok(());
         }
         if !trim.spans.is_empty() && !trim.spans.iter().any(within) {
             self.done.cut += 1;

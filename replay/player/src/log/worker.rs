@@ -4,11 +4,14 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Duration;
 
+use headrace_geometry::time::MonoNs;
+
 use super::derived_channels::{DerivedChannels, Made};
 use super::fault::RecordingEvent;
 use super::queue::{ClosedWhenDropped, Entry, Gap, Queue, SentPort, State};
 use super::recording::Recording;
 use super::space::{LONGEST_KEPT_BYTES, Space};
+use super::voice::VoicePort;
 use super::writer::{Lane, LogHeader, Summary};
 
 /// Interval at which a chunk is closed and synced. Half of the second that a power cut may cost, since closing
@@ -29,6 +32,8 @@ pub struct RecorderWorker {
     beside: Beside,
     /// Packets of skipped ticks.
     skipped: u64,
+    /// Log time of the last entry: voice notes' recordings have no other clock of the dive.
+    last: Option<MonoNs>,
     state: Arc<State>,
     _closed: ClosedWhenDropped,
 }
@@ -56,7 +61,7 @@ impl Echoes {
         match lane {
             Lane::Raw(source) => len > LONGEST_KEPT_BYTES && self.sonars.contains(&source),
             Lane::Result(number) => self.results.get(usize::from(number)).copied().unwrap_or_default(),
-            Lane::Sent(_) | Lane::Tick => false,
+            Lane::Sent(_) | Lane::Tick | Lane::Voice => false,
         }
     }
 }
@@ -79,6 +84,7 @@ impl RecorderWorker {
             echoes: Echoes::of(header),
             beside: Beside { derived, made: Vec::new() },
             skipped: 0,
+            last: None,
             state,
             _closed: closed,
         }
@@ -87,6 +93,11 @@ impl RecorderWorker {
     /// A port for bytes sent to the devices.
     pub fn sent_port(&self) -> SentPort {
         SentPort { state: Arc::clone(&self.state) }
+    }
+
+    /// A port for the recordings of voice notes.
+    pub fn voice_port(&self) -> VoicePort {
+        VoicePort { state: Arc::clone(&self.state) }
     }
 
     /// What has happened to the recording, once each, oldest first.
@@ -110,9 +121,11 @@ impl RecorderWorker {
             && let Some(entry) = self.queue.take()
         {
             self.write_all(&entry);
+            self.last = Some(entry.log_time);
             taken += 1;
         }
         taken += self.write_sent();
+        taken += self.write_voices();
         self.state_gaps();
         self.flush_in_time(now);
         self.tell();
@@ -121,6 +134,7 @@ impl RecorderWorker {
 
     /// Writes the rest of the queue, and ends the log.
     pub fn finish(mut self, now: Duration) -> Summary {
+        self.state.voices_end.store(true, Ordering::SeqCst);
         while self.step(now) {}
         self.write_made(|derived, made| derived.end(made));
         let left_out = self.space.left_out();
@@ -202,6 +216,18 @@ impl RecorderWorker {
             let entry =
                 Entry { lane: Lane::Sent(message.source), log_time: message.at, publish_time: message.at };
             self.write(&entry, &message.bytes);
+            written += 1;
+        }
+        written
+    }
+
+    /// Writes recordings of voice notes, once the dive has begun; returns their number.
+    fn write_voices(&mut self) -> usize {
+        let mut written = 0;
+        while let Some(at) = self.last
+            && let Some(message) = self.state.voices.pop()
+        {
+            self.write(&Entry { lane: Lane::Voice, log_time: at, publish_time: at }, &message);
             written += 1;
         }
         written

@@ -14,7 +14,7 @@ use mcap::write::NoSeek;
 use super::format::{
     ATTACHMENT_PREFIX, BYTES_ENCODING, CHANNEL_LIST, CONNECT_KEY, FORMAT_KEY, FORMAT_VERSION, LIBRARY,
     LOSSES, METADATA, PLUGIN_KEY, RAW_PREFIX, RESULT_PREFIX, SENT_PREFIX, SOURCE_KEY, TICK_TOPIC, Tick,
-    VEHICLE_FILE, order_bytes, seal, stated_loss, tick_head,
+    VEHICLE_FILE, VOICE_TOPIC, order_bytes, seal, stated_loss, tick_head,
 };
 use super::part::{PART, PART_END, PartEnd, PartHead, Progress};
 use super::{LeftOut, LogError, RecordingFault};
@@ -40,6 +40,8 @@ pub struct LogHeader {
     pub sources: Vec<SourceInfo>,
     /// Whether ticks will be written. A simulation has none, and its log no channel of ticks.
     pub ticks: bool,
+    /// Whether recordings of voice notes may be written.
+    pub voices: bool,
     /// The results; a result's index is its number in the messages.
     pub results: Vec<ResultChannel>,
     /// Numbers of the sources that are sonars: their long packets are echoes, dropped first when a disk fills.
@@ -54,6 +56,7 @@ impl LogHeader {
         match lane {
             Lane::Raw(source) | Lane::Sent(source) => usize::from(source) < self.sources.len(),
             Lane::Tick => self.ticks,
+            Lane::Voice => self.voices,
             Lane::Result(channel) => usize::from(channel) < self.results.len(),
         }
     }
@@ -130,6 +133,7 @@ pub(super) enum Lane {
     Sent(u16),
     Tick,
     Result(u16),
+    Voice,
 }
 
 /// A channel of the file and its next message number.
@@ -152,6 +156,7 @@ pub struct LogWriter<W: Write> {
     raw: Vec<Channel>,
     sent: Vec<Channel>,
     tick: Option<Channel>,
+    voice: Option<Channel>,
     results: Vec<Channel>,
     tick_message: Vec<u8>,
     messages: u64,
@@ -165,6 +170,8 @@ pub struct LogWriter<W: Write> {
     losses: u64,
     /// Time of the first message of the open chunk.
     chunk_began: Option<MonoNs>,
+    /// Whether the last message was a voice.
+    is_alone: bool,
 }
 
 impl LogWriter<BufWriter<File>> {
@@ -215,6 +222,8 @@ impl<W: Write> LogWriter<W> {
         let tick = header.ticks.then(|| channels.add(0, TICK_TOPIC, BYTES_ENCODING, BTreeMap::new()));
         let tick = tick.transpose()?;
         let results = channels.add_results(&header.results)?;
+        let voice = header.voices.then(|| channels.add(0, VOICE_TOPIC, BYTES_ENCODING, BTreeMap::new()));
+        let voice = voice.transpose()?;
         channels.write()?;
         let before = header.part.as_ref().map(|part| part.before.clone()).unwrap_or_default();
         let mut log = Self {
@@ -223,6 +232,7 @@ impl<W: Write> LogWriter<W> {
             raw,
             sent,
             tick,
+            voice,
             results,
             tick_message: Vec::new(),
             messages: 0,
@@ -233,6 +243,7 @@ impl<W: Write> LogWriter<W> {
             before,
             losses: 0,
             chunk_began: None,
+            is_alone: false,
         };
         log.count_on(header);
         Ok(log)
@@ -254,6 +265,7 @@ impl<W: Write> LogWriter<W> {
         let mut all: Vec<(String, &mut Channel)> = topics(RAW_PREFIX).zip(&mut self.raw).collect();
         all.extend(topics(SENT_PREFIX).zip(&mut self.sent));
         all.extend(self.tick.as_mut().map(|channel| (TICK_TOPIC.to_owned(), channel)));
+        all.extend(self.voice.as_mut().map(|channel| (VOICE_TOPIC.to_owned(), channel)));
         all.extend(header.results.iter().map(|result| result.topic.clone()).zip(&mut self.results));
         all
     }
@@ -331,6 +343,7 @@ impl<W: Write> LogWriter<W> {
             Lane::Raw(source) => self.raw.get_mut(usize::from(source)),
             Lane::Sent(source) => self.sent.get_mut(usize::from(source)),
             Lane::Tick => self.tick.as_mut(),
+            Lane::Voice => self.voice.as_mut(),
             Lane::Result(channel) => self.results.get_mut(usize::from(channel)),
         };
         let channel = channel.ok_or_else(|| LogError::NoChannel { channel: format!("{lane:?}") })?;
@@ -341,20 +354,22 @@ impl<W: Write> LogWriter<W> {
             publish_time: publish_time.0,
         };
         channel.sequence = channel.sequence.wrapping_add(1);
-        // Limits the loss from damage to one chunk, however fast the dive is written.
-        let began = *self.chunk_began.get_or_insert(log_time);
-        if log_time.since(began).0 >= CHUNK_SPAN.0 {
+        // Limits the loss from damage to one chunk, however fast the dive is written. A voice is as long as seconds of a dive, and has
+        // a chunk of its own, so that damage to it is damage to nothing else.
+        let is_alone = core::mem::replace(&mut self.is_alone, lane == Lane::Voice) || self.is_alone;
+        if self.chunk_began.is_some_and(|began| is_alone || log_time.since(began).0 >= CHUNK_SPAN.0) {
             self.writer.flush().map_err(LogError::writing("a chunk"))?;
             self.chunks += 1;
-            self.chunk_began = Some(log_time);
+            self.chunk_began = None;
         }
+        self.chunk_began.get_or_insert(log_time);
         self.writer.write_to_known_channel(&header, bytes).map_err(LogError::writing("a message"))?;
         self.messages += 1;
         self.message_bytes += bytes.len() as u64;
         match lane {
             Lane::Raw(_) => self.raw_messages += 1,
             Lane::Tick => self.last_tick = Tick::decode(bytes).ok().map(|tick| tick.index),
-            Lane::Sent(_) | Lane::Result(_) => {}
+            Lane::Sent(_) | Lane::Result(_) | Lane::Voice => {}
         }
         Ok(())
     }

@@ -123,7 +123,8 @@ impl View {
             | RecordKind::Doubtful
             | RecordKind::State
             | RecordKind::AlertChange
-            | RecordKind::Note => Some(()),
+            | RecordKind::Note
+            | RecordKind::Voice => Some(()),
         }
     }
 

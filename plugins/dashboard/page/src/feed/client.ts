@@ -37,16 +37,42 @@ export function start(): void {
   document.addEventListener("visibilitychange", () => feed?.send({ do: "rate", hz: document.hidden || prefs.slow ? 1 : 5 }));
 }
 
-export function send(command: Command): void {
-  if (dive) store.answered("this is a file: nothing can be changed in it", true);
-  else feed?.send(command);
+/** Sends a command; whether it was sent. */
+export function send(command: Command): boolean {
+  if (!dive) return feed?.send(command) ?? false;
+  store.answered("this is a file: nothing can be changed in it", true);
+  return false;
 }
 
 export const login = (token: string): Promise<boolean> => feed?.login(token) ?? Promise.resolve(false);
 export const reconnect = (): void => feed?.again();
-export const acknowledge = (alert: number): void => send({ do: "acknowledge", alert, by: prefs.by });
-export const silence = (): void => send({ do: "silence", by: prefs.by });
-export const note = (text: string): void => send({ do: "note", text, by: prefs.by });
+export const acknowledge = (alert: number): boolean => send({ do: "acknowledge", alert, by: prefs.by });
+export const silence = (): boolean => send({ do: "silence", by: prefs.by });
+export const note = (text: string): boolean => send({ do: "note", text, by: prefs.by });
+export const beginVoice = (id: number, by: string): boolean => send({ do: "voice", id, by });
+
+/** Sends the recording of a voice note. Throws what the program says against it. */
+export async function sendVoice(id: number, seconds: number, sound: Blob): Promise<void> {
+  const url = new URL(`/voice/${id}`, location.href);
+  url.searchParams.set("seconds", String(seconds));
+  const sent = fetch(url, { method: "POST", body: sound, headers: { "content-type": sound.type }, credentials: "same-origin" });
+  const response = await sent.catch(() => { throw new Error("the voice isn't sent: no connection to the program"); });
+  if (response.ok) return;
+  const answer = (await response.json().catch(() => null)) as { why?: string } | null;
+  throw new Error(answer?.why ?? `the program answered ${response.status}`);
+}
+
+/** The recording of a voice note, from the program or the file. Throws why there is none. */
+export async function voiceOf(id: number): Promise<Blob> {
+  if (dive) {
+    const sound = dive.voices.get(id);
+    if (!sound) throw new Error("its recording isn't in this file");
+    return sound;
+  }
+  const response = await fetch(new URL(`/voice/${id}`, location.href), { credentials: "same-origin" });
+  if (!response.ok) throw new Error((await response.text()).trim());
+  return response.blob();
+}
 
 /** The file's dive as it was at a time. */
 export function seekFile(at_s: number): void {

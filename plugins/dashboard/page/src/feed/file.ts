@@ -3,17 +3,21 @@ import type { Store } from "../store/store";
 import { frameOf, KIND_SAMPLES, type Frame } from "./binary";
 import type { Message, State } from "./types";
 
-export interface Dive { samples: Frame[]; t_s: number[]; states: Partial<State>[] }
+export interface Dive { samples: Frame[]; t_s: number[]; states: Partial<State>[]; voices: Map<number, Blob> }
 
 export function embedded(): string | null {
   return document.getElementById("dive")?.textContent?.trim() ?? null;
 }
 
-async function inflate(base64: string): Promise<ArrayBuffer> {
+function bytesOf(base64: string): Uint8Array<ArrayBuffer> {
   const text = atob(base64);
   const bytes = new Uint8Array(text.length);
   for (let at = 0; at < text.length; at += 1) bytes[at] = text.charCodeAt(at);
-  const stream = new Blob([bytes]).stream().pipeThrough(new DecompressionStream("deflate-raw"));
+  return bytes;
+}
+
+async function inflate(base64: string): Promise<ArrayBuffer> {
+  const stream = new Blob([bytesOf(base64)]).stream().pipeThrough(new DecompressionStream("deflate-raw"));
   return new Response(stream).arrayBuffer();
 }
 
@@ -34,7 +38,7 @@ export function* frames(bytes: ArrayBuffer): Generator<string | Frame> {
 
 /** Reads the embedded dive into the store. */
 export async function readDive(base64: string, store: Store): Promise<Dive> {
-  const dive: Dive = { samples: [], t_s: [], states: [] };
+  const dive: Dive = { samples: [], t_s: [], states: [], voices: new Map() };
   store.link.phase = "file";
   for (const frame of frames(await inflate(base64))) {
     if (typeof frame !== "string") {
@@ -47,6 +51,9 @@ export async function readDive(base64: string, store: Store): Promise<Dive> {
       const { t_s, states } = message as { t_s: number[]; states: Partial<State>[] };
       dive.t_s = t_s;
       dive.states = states;
+    } else if (message.type === "voice") {
+      const { id, media_type, audio } = message as { id: number; media_type: string; audio: string };
+      dive.voices.set(id, new Blob([bytesOf(audio)], { type: media_type }));
     } else {
       store.take(message);
     }

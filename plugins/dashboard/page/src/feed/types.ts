@@ -69,6 +69,8 @@ export interface Alert {
 
 export interface Note {
   number: number; at_s: number; by: string; text: string; chainage_m: number | null; station: string | null;
+  /** Of a voice note; without seconds its recording isn't in the log. */
+  voice?: { id: number; seconds: number | null } | null;
 }
 export interface Leg { from_m: number; to_m: number; at_most_mps: number | null; why: string }
 export interface Back { legs: Leg[]; way_m: number; time_s: number }
@@ -88,6 +90,7 @@ export type Message =
   | { type: "ready" }
   | { type: "refused"; why: string }
   | { type: "done"; do: string }
+  | { type: "voice"; id: number; media_type: string; audio: string }
   | { type: "timeline"; t_s: number[]; states: Partial<State>[] }
   | { type: "end"; summary?: unknown; digest?: string; exit?: number };
 
@@ -97,6 +100,7 @@ export type Command =
   | { do: "silence"; by: string }
   | { do: "note"; text: string; by: string }
   | { do: "mark"; by: string }
+  | { do: "voice"; id: number; by: string }
   | { do: "play"; command: "pause" | "go" | "step" | "step_section" | "end" }
   | { do: "play"; command: "speed"; speed: number | null }
   | { do: "play"; command: "seek"; to_s: number }

@@ -7,6 +7,7 @@ import { PALETTES, prefs, setPrefs } from "../store/prefs";
 import { store } from "../store/store";
 import { Topic } from "../store/topic";
 import { openNote } from "../side/Notes";
+import { next as voiceNext } from "../voice/record";
 import { actions } from "../wall/control";
 
 export interface Key { keys: string[]; shown: string; what: string; group: string; run: () => void }
@@ -47,6 +48,7 @@ export const KEYS: Key[] = [
   { group: "Alerts", keys: ["g"], shown: "G", what: "show the next missed place on the wall", run: nextMissed },
   { group: "Notes", keys: ["n"], shown: "N", what: "write a note at this place", run: openNote },
   { group: "Notes", keys: ["b"], shown: "B", what: "mark this place without words", run: () => note("") },
+  { group: "Notes", keys: ["t"], shown: "T", what: "record a voice note at this place; again, end it", run: voiceNext },
   { group: "Wall", keys: ["+", "="], shown: "+", what: "zoom in", run: () => actions.zoom(0.7) },
   { group: "Wall", keys: ["-", "_"], shown: "−", what: "zoom out", run: () => actions.zoom(1 / 0.7) },
   { group: "Wall", keys: ["ArrowLeft"], shown: "←", what: "towards the portal", run: () => actions.pan(-0.1) },

@@ -1,9 +1,12 @@
-// Notes: what was written at a place. N writes one at the present place.
+// Notes: what was written or spoken at a place. N writes one at the present place, T records one.
 import { useEffect, useRef } from "preact/hooks";
 import { note } from "../feed/client";
 import { store } from "../store/store";
+import type { Note } from "../feed/types";
 import { useTopics } from "../store/topic";
 import { clock, station } from "../text/format";
+import { playTopic, playing, togglePlay } from "../voice/play";
+import { VoiceButton, VoiceWords } from "../voice/Voice";
 import { actions } from "../wall/control";
 
 const MOST_BYTES = 240;
@@ -14,23 +17,40 @@ export function openNote(): void {
   show?.();
 }
 
+/** What a note says, as the terminal has it, too. */
+export function words({ text, voice }: Note): string {
+  if (voice) return voice.seconds === null ? "voice" : `voice, ${voice.seconds} s`;
+  return text || "mark";
+}
+
 export function Notes() {
-  useTopics(store.topics.notes, store.topics.hello);
+  useTopics(store.topics.notes, store.topics.hello, playTopic);
   const begun = store.hello?.begun_s ?? 0;
   return (
     <section class="panel notes" aria-label="Notes">
-      <div class="panel-head"><h2>Notes</h2><button type="button" disabled={!(store.hello?.may.operate ?? false)} onClick={openNote} title="Note at this place (N)">Note…</button></div>
+      <div class="panel-head"><h2>Notes</h2><span class="buttons"><VoiceButton /><button type="button" disabled={!(store.hello?.may.operate ?? false)} onClick={openNote} title="Note at this place (N)">Note…</button></span></div>
+      <VoiceWords />
       <ol tabIndex={0} aria-label="Notes, newest first">
         {[...store.notes].reverse().map((each) => (
           <li key={each.number}>
             <button type="button" class="leg" disabled={each.chainage_m === null} onClick={() => each.chainage_m !== null && actions.goTo(each.chainage_m, 30)}>
-              <b>{each.chainage_m === null ? clock(each.at_s - begun) : station(each.chainage_m)}</b> {each.text || "mark"} <span class="leg-why">{each.by}</span>
+              <b>{each.chainage_m === null ? clock(each.at_s - begun) : station(each.chainage_m)}</b> {words(each)} <span class="leg-why">{each.by}</span>
             </button>
+            {each.voice && each.voice.seconds !== null ? <Play number={each.number} id={each.voice.id} seconds={each.voice.seconds} /> : null}
           </li>
         ))}
         {store.notes.length === 0 ? <li class="none">none yet</li> : null}
       </ol>
     </section>
+  );
+}
+
+function Play({ number, id, seconds }: { number: number; id: number; seconds: number }) {
+  const now = playing === id;
+  return (
+    <button type="button" class="play" aria-pressed={now} aria-label={`${now ? "Stop" : "Play"} note ${number}, ${seconds} s`} onClick={() => void togglePlay(id, number)}>
+      {now ? "■" : "▶"}
+    </button>
   );
 }
 
@@ -60,7 +80,8 @@ export function NoteDialog() {
         <label>Note at {at === null || at === undefined ? "this time" : station(at, 1)}
           <input ref={field} type="text" maxLength={MOST_BYTES} autocomplete="off" />
         </label>
-        <span class="buttons"><button type="submit">Keep (Enter)</button><button type="button" onClick={close}>Cancel (Esc)</button></span>
+        <span class="buttons"><button type="submit">Keep (Enter)</button><VoiceButton /><button type="button" onClick={close}>Cancel (Esc)</button></span>
+        <VoiceWords />
       </form>
     </dialog>
   );

@@ -193,7 +193,9 @@ export class Store {
   }
 
   private takeNote(note: Note): void {
-    if (!this.notes.some((each) => each.number === note.number)) this.notes.push(note);
+    const at = this.notes.findIndex((each) => each.number === note.number);
+    if (at < 0) this.notes.push(note);
+    else this.notes[at] = note;
     this.topics.notes.changed();
   }
 

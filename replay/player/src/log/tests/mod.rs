@@ -8,6 +8,7 @@ mod recorder;
 mod recover;
 mod round_trip;
 mod storage;
+mod voice;
 
 use std::io::Cursor;
 
@@ -59,6 +60,7 @@ fn read_all<R: std::io::Read + std::io::Seek>(reader: &mut LogReader<R>) -> Vec<
             MessageKind::Sent { source } => format!("sent {source}"),
             MessageKind::Tick => "tick".to_owned(),
             MessageKind::Result { topic } => topic.to_owned(),
+            MessageKind::Voice => "voice".to_owned(),
             MessageKind::Other => "other".to_owned(),
         };
         let MonoNs(log_time) = message.log_time;

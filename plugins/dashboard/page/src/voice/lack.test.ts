@@ -1,0 +1,27 @@
+import { describe, expect, it } from "vitest";
+import { lack, recordable, refusal, seconds, type Here } from "./lack";
+
+const here: Here = { connected: true, operates: true, recorded: true, secure: true, asks: true, type: "audio/webm" };
+
+describe("a voice note", () => {
+  it("can be recorded where nothing lacks", () => expect(lack(here)).toBeNull());
+  it("says why it can't be", () => {
+    expect(lack({ ...here, connected: false })).toMatch(/no connection/);
+    expect(lack({ ...here, operates: false })).toMatch(/viewer's/);
+    expect(lack({ ...here, recorded: false })).toMatch(/isn't recorded/);
+    // By plain HTTP from another machine a browser has no way to ask either.
+    expect(lack({ ...here, secure: false, asks: false, type: null })).toMatch(/https/);
+    expect(lack({ ...here, type: null })).toMatch(/records no sound/);
+  });
+  it("is of a type that the log takes", () => {
+    expect(recordable((type) => type.startsWith("audio/mp4"))).toBe("audio/mp4");
+    expect(recordable((type) => type.includes("opus"))).toBe("audio/webm;codecs=opus");
+    expect(recordable(() => false)).toBeNull();
+  });
+  it("tells a refusal in words", () => {
+    expect(refusal("NotAllowedError")).toMatch(/refused/);
+    expect(refusal("NotFoundError")).toMatch(/no microphone/);
+    expect(refusal("AbortError")).toMatch(/AbortError/);
+  });
+  it("has 1 to 60 whole seconds", () => expect([0, 1499, 1500, 60_900].map(seconds)).toEqual([1, 1, 2, 60]));
+});

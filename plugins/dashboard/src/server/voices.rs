@@ -1,0 +1,216 @@
+//! Recordings of voice notes: taken of operators for the log, and played to viewers.
+
+use std::collections::VecDeque;
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::time::Duration;
+
+use axum::body::{Body as HttpBody, to_bytes};
+use axum::extract::{Path, State};
+use axum::http::{HeaderMap, StatusCode, Uri, header};
+use axum::response::{IntoResponse, Response};
+use headrace_monitor::voice::{Container, MAX_VOICE_BYTES, MAX_VOICE_S, Voice, VoiceError};
+use serde_json::json;
+use tokio::sync::Semaphore;
+use tokio::time::timeout;
+
+use super::metrics::Budget;
+use super::reply::{Here, admit, json_answer, plain};
+use super::{Shared, Voices, feed};
+use crate::access::query;
+
+/// Voice notes that were begun and whose recordings haven't come; the oldest is forgotten.
+const MOST_BEGUN: usize = 32;
+/// Recordings that are held to be played, bytes; the oldest are let go, and are in the log.
+const MOST_HELD_BYTES: usize = 16 << 20;
+/// Recordings that are being sent at a time.
+const MOST_COMING: usize = 2;
+/// Recordings at once, and a second.
+const RATE: (f64, f64) = (8.0, 0.2);
+/// How long one may be on its way: 512 KiB at 10 kB/s.
+const COMES_WITHIN: Duration = Duration::from_mins(1);
+
+/// Voice notes' recordings on their way.
+pub(crate) struct Desk {
+    to: Voices,
+    begun: Mutex<VecDeque<u32>>,
+    held: Mutex<VecDeque<Arc<Voice>>>,
+    budget: Budget,
+    coming: Semaphore,
+    recalling: Semaphore,
+}
+
+/// A status, and why.
+type Refusal = (StatusCode, String);
+
+impl Desk {
+    pub(super) fn new(to: Voices) -> Self {
+        Self {
+            to,
+            begun: Mutex::default(),
+            held: Mutex::default(),
+            budget: Budget::new(RATE.0, RATE.1),
+            coming: Semaphore::new(MOST_COMING),
+            recalling: Semaphore::new(1),
+        }
+    }
+
+    /// The loop has been told that a voice note begins.
+    pub(super) fn begin(&self, id: u32) {
+        let mut begun = self.begun();
+        if !begun.contains(&id) {
+            begun.push_back(id);
+        }
+        if begun.len() > MOST_BEGUN {
+            begun.pop_front();
+        }
+    }
+
+    fn begun(&self) -> MutexGuard<'_, VecDeque<u32>> {
+        self.begun.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    fn held(&self) -> MutexGuard<'_, VecDeque<Arc<Voice>>> {
+        self.held.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    fn get(&self, id: u32) -> Option<Arc<Voice>> {
+        self.held().iter().find(|voice| voice.id == id).cloned()
+    }
+
+    fn hold(&self, voice: Arc<Voice>) {
+        let mut held = self.held();
+        held.push_back(voice);
+        while held.iter().map(|voice| voice.audio.len()).sum::<usize>() > MOST_HELD_BYTES {
+            held.pop_front();
+        }
+    }
+
+    /// Keeps the recording of a note that was begun; again, once it is there.
+    fn keep(&self, voice: Voice) -> Result<(), Refusal> {
+        let Voices::Kept(keep) = &self.to else {
+            return Err((StatusCode::CONFLICT, "this dive isn't recorded: no voice can be kept".to_owned()));
+        };
+        if self.get(voice.id).is_some_and(|held| *held == voice) {
+            return Ok(());
+        }
+        if !self.begun().contains(&voice.id) {
+            let why = format!("no voice note {} waits for its recording", voice.id);
+            return Err((StatusCode::CONFLICT, why));
+        }
+        // Before anybody hears that it is there.
+        let voice = Arc::new(voice);
+        self.hold(Arc::clone(&voice));
+        if let Err(why) = keep(&voice) {
+            self.held().retain(|held| held.id != voice.id);
+            return Err((StatusCode::SERVICE_UNAVAILABLE, why));
+        }
+        self.begun().retain(|id| *id != voice.id);
+        Ok(())
+    }
+
+    /// The recording of a note, from memory or from the log.
+    async fn recall(&self, id: u32, at_s: f64) -> Result<Option<Arc<Voice>>, Refusal> {
+        let Voices::Recalled(recall) = &self.to else { return Ok(self.get(id)) };
+        // One after another: each may read much of a log.
+        let _turn = self.recalling.acquire().await;
+        if let Some(voice) = self.get(id) {
+            return Ok(Some(voice));
+        }
+        let recall = Arc::clone(recall);
+        let failed = |why: String| (StatusCode::INTERNAL_SERVER_ERROR, why);
+        let found = tokio::task::spawn_blocking(move || recall(id, at_s)).await;
+        let found = found.map_err(|error| failed(error.to_string()))?.map_err(failed)?.map(Arc::new);
+        if let Some(voice) = &found {
+            self.hold(Arc::clone(voice));
+        }
+        Ok(found)
+    }
+}
+
+/// Takes the recording of a voice note that was begun on the feed.
+pub(super) async fn take(
+    State(shared): Here,
+    Path(id): Path<String>,
+    headers: HeaderMap,
+    uri: Uri,
+    body: HttpBody,
+) -> Response {
+    match receive(&shared, &id, &headers, &uri, body).await {
+        Ok(()) => json_answer(&json!({"type": "done", "do": "voice"})),
+        Err((status, why)) => {
+            Shared::count(&shared.counts.refused, 1);
+            let refused = json!({"type": "refused", "why": why}).to_string();
+            (status, [(header::CONTENT_TYPE, "application/json")], refused).into_response()
+        }
+    }
+}
+
+async fn receive(
+    shared: &Shared,
+    id: &str,
+    headers: &HeaderMap,
+    uri: &Uri,
+    body: HttpBody,
+) -> Result<(), Refusal> {
+    let role =
+        shared.access.role(headers, uri).ok_or((StatusCode::UNAUTHORIZED, "a token is needed".to_owned()))?;
+    if !feed::may(shared, role).operate {
+        return Err((StatusCode::FORBIDDEN, "not in this dive, or the token is a viewer's".to_owned()));
+    }
+    let desk = &shared.voices;
+    let too_many = || (StatusCode::TOO_MANY_REQUESTS, "too many voices at a time; send it again".to_owned());
+    let _place = desk.coming.try_acquire().map_err(|_| too_many())?;
+    let wrong = |why: String| (StatusCode::BAD_REQUEST, why);
+    let id = id.parse().map_err(|_| wrong(format!("no id of a voice note: {id:?}")))?;
+    let seconds = query(uri, "seconds").and_then(|seconds| seconds.parse().ok());
+    let seconds = seconds.ok_or_else(|| wrong(format!("needs seconds, 1 to {MAX_VOICE_S}")))?;
+    let media_type = headers.get(header::CONTENT_TYPE).and_then(|value| value.to_str().ok()).unwrap_or("");
+    let container = Container::of_media_type(media_type)
+        .ok_or_else(|| refusal(&VoiceError::Type(media_type.chars().take(40).collect())))?;
+    let stated = headers.get(header::CONTENT_LENGTH).and_then(|value| value.to_str().ok()?.parse().ok());
+    if let Some(bytes) = stated.filter(|bytes: &usize| *bytes > MAX_VOICE_BYTES) {
+        return Err(refusal(&VoiceError::Bytes(bytes)));
+    }
+    if !desk.budget.take() {
+        return Err(too_many());
+    }
+    let late = |_| (StatusCode::REQUEST_TIMEOUT, "the voice took over a minute to come".to_owned());
+    let audio = timeout(COMES_WITHIN, to_bytes(body, MAX_VOICE_BYTES)).await.map_err(late)?;
+    let audio = audio.map_err(|_| refusal(&VoiceError::Bytes(MAX_VOICE_BYTES + 1)))?.to_vec();
+    desk.keep(Voice { id, seconds, container, audio }.checked().map_err(|error| refusal(&error))?)
+}
+
+fn refusal(error: &VoiceError) -> Refusal {
+    let status = match error {
+        VoiceError::Bytes(_) => StatusCode::PAYLOAD_TOO_LARGE,
+        VoiceError::Type(_) | VoiceError::Contents(_) => StatusCode::UNSUPPORTED_MEDIA_TYPE,
+        _ => StatusCode::BAD_REQUEST,
+    };
+    (status, error.to_string())
+}
+
+/// Plays the recording of a voice note to whoever sees the dive.
+pub(super) async fn play(
+    State(shared): Here,
+    Path(id): Path<String>,
+    headers: HeaderMap,
+    uri: Uri,
+) -> Response {
+    if let Err(answer) = admit(&shared, &headers, &uri) {
+        return *answer;
+    }
+    let spoken = id.parse().ok().and_then(|id| Some((id, shared.model().spoken_s(id)?)));
+    let Some((id, at_s)) = spoken else {
+        return plain(StatusCode::NOT_FOUND, "no voice note of this id has a recording\n");
+    };
+    match shared.voices.recall(id, at_s).await {
+        Ok(Some(voice)) => {
+            ([(header::CONTENT_TYPE, voice.container.media_type())], voice.audio.clone()).into_response()
+        }
+        Ok(None) => plain(StatusCode::NOT_FOUND, "its recording can't be had here: it may be in the log\n"),
+        Err((status, why)) => {
+            let kind = [(header::CONTENT_TYPE, "text/plain; charset=utf-8")];
+            (status, kind, format!("its recording can't be read: {why}\n")).into_response()
+        }
+    }
+}

@@ -1,0 +1,148 @@
+//! Recordings of voice notes in a log: from the operator's page to the recorder, and back.
+//!
+//! A message of `/notes/voice`, little-endian: u32 id of the note, u32 seconds, u16 length of the media type, the media type, and
+//! from there on the bytes of the recording, a file as the browser made it. It has a chunk of its own: damage to it is damage to
+//! nothing else. No replay reads it; what the loop knows of it is in the operator's commands.
+
+use std::path::PathBuf;
+use std::sync::Arc;
+use std::sync::atomic::Ordering;
+
+use headrace_geometry::time::MonoNs;
+use headrace_monitor::voice::{Container, Voice, VoiceError};
+
+use super::fields::Fields;
+use super::queue::State;
+use super::{DiveLog, LogError, MessageKind};
+
+/// Why a recording isn't taken.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
+pub enum NotKept {
+    /// The medium fails, or the recorder has ended.
+    #[error("the voice isn't kept: nothing is being recorded at present")]
+    Failing,
+    /// Others wait.
+    #[error("the voice isn't kept: others are still being written; send it again")]
+    Full,
+}
+
+/// A message that is no recording of a voice note.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
+pub enum VoiceMessageError {
+    /// It ends before what it says it has.
+    #[error("a voice message of {0} bytes is cut off in its head")]
+    Short(usize),
+    /// It has what no recording may have.
+    #[error(transparent)]
+    Voice(#[from] VoiceError),
+}
+
+/// Takes recordings of voice notes, from any thread.
+#[derive(Clone)]
+pub struct VoicePort {
+    pub(super) state: Arc<State>,
+}
+
+impl VoicePort {
+    /// Hands a recording to the log. Never blocks. It is as certain as what a sensor sends: written within a second, and again in
+    /// another part if the medium fails then.
+    ///
+    /// Errors: see [`NotKept`]; nothing was taken.
+    pub fn keep(&self, voice: &Voice) -> Result<(), NotKept> {
+        if self.state.failing.load(Ordering::Acquire) || self.state.voices_end.load(Ordering::SeqCst) {
+            return Err(NotKept::Failing);
+        }
+        self.state.voices.push(encode(voice)).map_err(|_| NotKept::Full)?;
+        // The recorder sets it before it looks for the last time: while it isn't set, this one is taken.
+        if self.state.voices_end.load(Ordering::SeqCst) { Err(NotKept::Failing) } else { Ok(()) }
+    }
+}
+
+/// A recording as a message.
+pub fn encode(voice: &Voice) -> Vec<u8> {
+    let media_type = voice.container.media_type().as_bytes();
+    let mut message = Vec::with_capacity(10 + media_type.len() + voice.audio.len());
+    message.extend(voice.id.to_le_bytes());
+    message.extend(voice.seconds.to_le_bytes());
+    message.extend(u16::try_from(media_type.len()).unwrap_or(0).to_le_bytes());
+    message.extend(media_type);
+    message.extend(&voice.audio);
+    message
+}
+
+/// A message as a recording. Logs come from anywhere: it is held to what the page would have taken.
+///
+/// Errors: see [`VoiceMessageError`].
+pub fn decode(message: &[u8]) -> Result<Voice, VoiceMessageError> {
+    let parts = || {
+        let mut fields = Fields::new(message);
+        let (id, seconds, len) = (fields.u32()?, fields.u32()?, fields.u16()?);
+        Some((id, seconds, fields.take(len.into())?, fields.rest()))
+    };
+    let (id, seconds, media_type, audio) = parts().ok_or(VoiceMessageError::Short(message.len()))?;
+    let media_type = String::from_utf8_lossy(media_type);
+    let container = Container::of_media_type(&media_type)
+        .ok_or_else(|| VoiceError::Type(media_type.chars().take(40).collect()))?;
+    Ok(Voice { id, seconds, container, audio: audio.to_vec() }.checked()?)
+}
+
+/// Finds the recording of a note in a log, from a time on: that of the note, as it is later. `None` where the log has none that
+/// reads.
+///
+/// Errors: the log can't be read.
+pub fn find_voice(files: &[PathBuf], id: u32, from: MonoNs) -> Result<Option<Voice>, LogError> {
+    let mut log = DiveLog::open(files)?;
+    if !log.has_voices() {
+        return Ok(None);
+    }
+    log.pass_before(from)?;
+    while let Some(message) = log.next()? {
+        if message.kind == MessageKind::Voice
+            && let Ok(voice) = decode(message.data)
+            && voice.id == id
+        {
+            return Ok(Some(voice));
+        }
+    }
+    Ok(None)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    fn voice(audio: &[u8]) -> Voice {
+        Voice { id: 258, seconds: 12, container: Container::Ogg, audio: audio.to_vec() }
+    }
+
+    #[test]
+    fn a_voice_has_the_documented_layout() {
+        let message = encode(&voice(b"OggS.."));
+        assert_eq!(message[..10], [2, 1, 0, 0, 12, 0, 0, 0, 9, 0]);
+        assert_eq!(&message[10..], b"audio/oggOggS..");
+        assert_eq!(decode(&message), Ok(voice(b"OggS..")));
+    }
+
+    #[test]
+    fn a_message_that_is_no_voice_says_why() {
+        let message = encode(&voice(b"OggS"));
+        assert_eq!(decode(&message[..9]), Err(VoiceMessageError::Short(9)));
+        assert_eq!(decode(&message[..18]), Err(VoiceMessageError::Short(18)));
+        let html = [&message[..8], &[9, 0], b"text/html", b"<script>"].concat();
+        assert_eq!(decode(&html), Err(VoiceError::Type("text/html".to_owned()).into()));
+        let disguised = [&message[..19], b"<script>"].concat();
+        assert_eq!(decode(&disguised), Err(VoiceError::Contents("audio/ogg").into()));
+    }
+
+    proptest! {
+        #[test]
+        fn any_bytes_are_a_voice_or_refused(bytes: Vec<u8>) {
+            if let Ok(voice) = decode(&bytes) {
+                prop_assert_eq!(voice.checked().map(|voice| encode(&voice).len()), Ok(bytes.len()));
+            }
+        }
+    }
+}

@@ -1,0 +1,131 @@
+//! Notes and voices in a log, read without a replay.
+
+use std::collections::BTreeMap;
+use std::path::PathBuf;
+
+use headrace_geometry::time::MonoNs;
+use headrace_monitor::alert_list::{NoteJson, SpokenJson};
+use headrace_monitor::console::{CONSOLE_ID, Command};
+use headrace_monitor::pilot_text::station;
+use headrace_monitor::result_stream::{RecordKind, first_record};
+use headrace_monitor::voice::{Container, Voice};
+
+use crate::log::voice::decode;
+use crate::log::{DiveLog, LogError, LogMessage, MessageKind};
+use crate::results::{read_results, stream_of};
+
+/// What a log has of notes.
+#[derive(Debug, Default)]
+pub struct LoggedNotes {
+    /// The notes, as a replay would number them. Their places are those that the dive published: none in a log without results.
+    pub notes: Vec<NoteJson>,
+    /// Seconds, container and bytes of the recordings, by id.
+    pub voices: BTreeMap<u32, (u32, Container, usize)>,
+    /// Messages that should be recordings and aren't: what is wrong with each.
+    pub wrong: Vec<String>,
+    /// What of the log is lost, as text.
+    pub losses: Vec<String>,
+}
+
+/// Reads the notes of a log.
+///
+/// Errors: the log can't be read.
+pub fn notes_of(files: &[PathBuf]) -> Result<LoggedNotes, LogError> {
+    let mut log = DiveLog::open(files)?;
+    let (mut found, mut places) = (LoggedNotes::default(), BTreeMap::new());
+    let console = |log: &DiveLog| {
+        let number = log.header().sources.iter().position(|source| source.id == CONSOLE_ID);
+        number.and_then(|number| u16::try_from(number).ok())
+    };
+    let mut of_console = console(&log);
+    while let Some(message) = log.next()? {
+        match message.kind {
+            MessageKind::Raw { source } if Some(source) == of_console => found.hear(&message),
+            MessageKind::Voice => found.take_voice(&message),
+            MessageKind::Result { topic } if stream_of(topic).is_some() => place(message.data, &mut places),
+            _ => {}
+        }
+        of_console = of_console.or_else(|| console(&log));
+    }
+    for note in &mut found.notes {
+        note.chainage_m = places.get(&note.number).copied();
+        note.station = note.chainage_m.map(station);
+    }
+    found.losses = log.losses().iter().map(ToString::to_string).collect();
+    Ok(found)
+}
+
+/// Hands over all recordings in a log, in order.
+///
+/// Errors: the log can't be read; those of `take`.
+pub fn each_voice<E: From<LogError>>(
+    files: &[PathBuf],
+    mut take: impl FnMut(Voice) -> Result<(), E>,
+) -> Result<(), E> {
+    let mut log = DiveLog::open(files)?;
+    while let Some(message) = log.next()? {
+        if message.kind == MessageKind::Voice
+            && let Ok(voice) = decode(message.data)
+        {
+            take(voice)?;
+        }
+    }
+    Ok(())
+}
+
+impl LoggedNotes {
+    /// Takes a command of the operator.
+    fn hear(&mut self, message: &LogMessage<'_>) {
+        let (by, text, voice) = match Command::parse(message.data) {
+            Ok(Command::Note { text, by }) => (by, text.as_str().to_owned(), None),
+            Ok(Command::Voice { id, by }) => (by, String::new(), Some(SpokenJson { id, seconds: None })),
+            Ok(Command::Voiced { id, seconds }) => {
+                let waits = Some(SpokenJson { id, seconds: None });
+                if let Some(note) = self.notes.iter_mut().rev().find(|note| note.voice == waits) {
+                    note.voice = Some(SpokenJson { id, seconds: Some(seconds) });
+                }
+                return;
+            }
+            _ => return,
+        };
+        self.notes.push(NoteJson {
+            number: u32::try_from(self.notes.len() + 1).unwrap_or(u32::MAX),
+            at_s: message.log_time.as_secs_f64(),
+            by: by.as_str().to_owned(),
+            text,
+            voice,
+            chainage_m: None,
+            station: None,
+        });
+    }
+
+    fn take_voice(&mut self, message: &LogMessage<'_>) {
+        match decode(message.data) {
+            Ok(Voice { id, seconds, container, audio }) => {
+                self.voices.insert(id, (seconds, container, audio.len()));
+            }
+            Err(error) => {
+                let MonoNs(at) = message.log_time;
+                self.wrong.push(format!("the voice message at {:.3} s: {error}", at as f64 / 1e9));
+            }
+        }
+    }
+}
+
+/// Takes the places of notes from a message of results.
+fn place(message: &[u8], places: &mut BTreeMap<u32, f64>) {
+    let Some((_, _, words)) = read_results(message) else { return };
+    let mut rest = words.as_slice();
+    while let Some((record, after)) = first_record(rest) {
+        rest = after;
+        if let (Some(RecordKind::Note | RecordKind::Voice), [_, number, chainage, ..]) =
+            (record.kind, record.words)
+        {
+            // 0 stands for none.
+            let chainage_m = Some(f64::from_bits(*chainage)).filter(|chainage_m| *chainage_m != 0.0);
+            if let (Ok(number), Some(chainage_m)) = (u32::try_from(*number), chainage_m) {
+                places.insert(number, chainage_m);
+            }
+        }
+    }
+}
