@@ -7,7 +7,7 @@
 
 use std::cell::RefCell;
 use std::collections::BTreeMap;
-use std::rc::Rc;
+use std::sync::Arc;
 
 use bevy_ecs::prelude::{Res, ResMut, Resource};
 use headrace_fusion::Navigation;
@@ -96,7 +96,7 @@ pub struct Recorded {
     /// What its devices sent.
     pub packets: Packets,
     /// Where beams met the wall.
-    pub truth: Rc<Truth>,
+    pub truth: Arc<Truth>,
     /// Where the vehicle truly was.
     pub scenery: Scenery,
     wall: Wall,
@@ -120,7 +120,7 @@ pub struct JudgedDive {
     /// Report of the loop.
     pub report: Report,
     /// The truth.
-    pub truth: Rc<Truth>,
+    pub truth: Arc<Truth>,
     /// All sections, in order.
     pub sections: Vec<JudgedSection>,
 }
@@ -159,7 +159,7 @@ impl Recorded {
         Ok(Self {
             packets,
             wall: truth.wall()?,
-            truth: Rc::new(truth),
+            truth: Arc::new(truth),
             scenery,
             holes_m: RefCell::new(BTreeMap::new()),
         })
@@ -221,7 +221,7 @@ impl Recorded {
             JudgedSection { report: section.clone(), true_hole_m, shift_m }
         };
         let sections = report.sections.iter().map(judge).collect();
-        JudgedDive { report, truth: Rc::clone(&self.truth), sections }
+        JudgedDive { report, truth: Arc::clone(&self.truth), sections }
     }
 
     /// CPU time of a replay with the settings of a vehicle file, s; without arming and without the report.

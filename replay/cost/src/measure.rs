@@ -4,6 +4,8 @@
 //! the kernel does for it, too (page faults); `getrusage` tells both apart by sampling once in 4 ms, too coarse for what is measured.
 
 use std::hint::black_box;
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::thread;
 
 use rustix::time::{ClockId, clock_gettime};
 
@@ -21,6 +23,35 @@ pub fn timed<R>(work: impl FnOnce() -> R) -> (R, f64) {
     let begun_s = cpu_s();
     let result = black_box(work());
     (result, cpu_s() - begun_s)
+}
+
+/// What some work gives for each item, in the items' order, for as many at once as there are processors: for what isn't timed.
+///
+/// Errors: that of the first item that has one.
+pub fn side_by_side<T: Sync, R: Send>(
+    items: &[T],
+    work: impl Fn(&T) -> Result<R, CostError> + Sync,
+) -> Result<Vec<R>, CostError> {
+    let next = AtomicUsize::new(0);
+    let some = || {
+        let mut done = Vec::new();
+        loop {
+            let at = next.fetch_add(1, Ordering::Relaxed);
+            let Some(item) = items.get(at) else { return done };
+            done.push((at, work(item)));
+        }
+    };
+    let workers = thread::available_parallelism().map_or(1, usize::from).min(items.len());
+    let mut done: Vec<(usize, Result<R, CostError>)> = thread::scope(|scope| {
+        let workers: Vec<_> = (0..workers).map(|_| scope.spawn(some)).collect();
+        let joined = |worker: thread::ScopedJoinHandle<'_, _>| match worker.join() {
+            Ok(done) => done,
+            Err(panic) => std::panic::resume_unwind(panic),
+        };
+        workers.into_iter().flat_map(joined).collect()
+    });
+    done.sort_by_key(|(at, _)| *at);
+    done.into_iter().map(|(_, result)| result).collect()
 }
 
 /// Median of each setting's costs with its interval of 95 %, measured so many rounds in turns, so that what the machine does besides falls upon
@@ -43,4 +74,24 @@ pub fn in_turns<T>(
         Interval::median(costs).ok_or_else(why)
     };
     costs.iter().map(interval).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn work_side_by_side_comes_in_the_items_order_with_the_first_ones_error() {
+        let items: Vec<u32> = (0..100).collect();
+        let halves = side_by_side(&items, |item| Ok(item / 2));
+        assert_eq!(halves.unwrap(), items.iter().map(|item| item / 2).collect::<Vec<_>>());
+        let nothing: Vec<u32> = side_by_side(&[], |item: &u32| Ok(*item)).unwrap();
+        assert!(nothing.is_empty());
+
+        let odd = side_by_side(&items, |item| match item % 10 {
+            7 => Err(CostError::Figure { what: format!("item {item}"), why: "it ends in 7".to_owned() }),
+            _ => Ok(()),
+        });
+        assert_eq!(odd.unwrap_err().to_string(), "measuring item 7: it ends in 7");
+    }
 }

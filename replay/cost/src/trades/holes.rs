@@ -10,7 +10,7 @@ use super::cells;
 use crate::dive::{JudgedDive, JudgedSection, Recorded};
 use crate::effort::Effort;
 use crate::error::CostError;
-use crate::measure::{in_turns, timed};
+use crate::measure::{in_turns, side_by_side, timed};
 use crate::oracle::second;
 use crate::point::{Error, Interval, LeftOut, OracleError, Point, Trade, front};
 use crate::scene::{self, Inputs};
@@ -136,13 +136,13 @@ impl Dives {
         let judged_m = inputs.effort.pick(JUDGED_M[0], JUDGED_M[1]);
         let length_m = 2.0 * (END_M + TARGET_M) + judged_m;
         let text = case.text.replace("LENGTH", &format!("{length_m:?}"));
-        let mut dives = Vec::new();
-        for seed in 1..=inputs.effort.seeds() {
-            let mut scene = inputs.scene(&text, seed)?;
+        let seeds: Vec<u32> = (1..=inputs.effort.seeds()).collect();
+        let dives = side_by_side(&seeds, |seed| {
+            let mut scene = inputs.scene(&text, *seed)?;
             scene.vehicle.tunnel.length_m = 5.0 + length_m + BEYOND_M;
             let recorded = Recorded::of(&scene, &scene.vehicle)?;
-            dives.push((scene, recorded));
-        }
+            Ok((scene, recorded))
+        })?;
         Ok(Self(dives))
     }
 

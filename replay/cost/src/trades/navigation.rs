@@ -4,7 +4,7 @@ mod cable;
 mod heard;
 mod words;
 
-use std::rc::Rc;
+use std::sync::Arc;
 
 use headrace_fusion::Navigation;
 use headrace_fusion::direct::DirectNavigation;
@@ -22,7 +22,7 @@ use self::heard::Hearing;
 use super::figures::{error, rms};
 use crate::dive::{JudgedDive, Recorded};
 use crate::error::CostError;
-use crate::measure::{in_turns, timed};
+use crate::measure::{in_turns, side_by_side, timed};
 use crate::oracle::second;
 use crate::point::{Error, LeftOut, OracleError, Point, Trade, front, quantile};
 use crate::scene::{Inputs, file};
@@ -239,21 +239,26 @@ fn points_of(inputs: &Inputs<'_>, place: &Place) -> Result<Vec<Point>, CostError
             unique.push((setting.rate_hz, setting.way));
         }
     }
+    let dives_of = |seed: u32| -> Result<Vec<(u32, Dived)>, CostError> {
+        rates.iter().map(|rate_hz| Ok((*rate_hz, Dived::of(inputs, place, *rate_hz, seed)?))).collect()
+    };
+    let seeds: Vec<u32> = (1..=inputs.effort.seeds()).collect();
+    let of_seeds = side_by_side(&seeds, |seed| {
+        let dives = dives_of(*seed)?;
+        let of = |(rate_hz, way): &(u32, Way)| {
+            let dived = dives.iter().find(|(of_dive_hz, _)| of_dive_hz == rate_hz);
+            dived.map(|(_, dived)| dived.figures(way, place)).transpose()
+        };
+        let figures = unique.iter().map(of).collect::<Result<Vec<_>, _>>()?;
+        Ok((figures, (*seed == 1).then_some(dives)))
+    })?;
     let mut of_unique: Vec<Vec<(Figures, JudgedDive)>> = unique.iter().map(|_| Vec::new()).collect();
     let mut first = Vec::new();
-    for seed in 1..=inputs.effort.seeds() {
-        let mut dives = Vec::new();
-        for rate_hz in &rates {
-            dives.push((*rate_hz, Dived::of(inputs, place, *rate_hz, seed)?));
+    for (figures, dives) in of_seeds {
+        for (of_way, dived) in of_unique.iter_mut().zip(figures) {
+            of_way.extend(dived);
         }
-        for ((rate_hz, way), of_way) in unique.iter().zip(&mut of_unique) {
-            if let Some((_, dived)) = dives.iter().find(|(of_dive_hz, _)| of_dive_hz == rate_hz) {
-                of_way.push(dived.figures(way, place)?);
-            }
-        }
-        if seed == 1 {
-            first = dives;
-        }
+        first.extend(dives.into_iter().flatten());
     }
     let rounds = inputs.effort.rounds();
     let costs = in_turns(rounds, &unique, |(rate_hz, way)| {
@@ -389,7 +394,7 @@ impl Dived {
 
     fn dive_by_cable(&self) -> JudgedDive {
         let JudgedDive { report, truth, sections } = &self.by_cable;
-        JudgedDive { report: report.clone(), truth: Rc::clone(truth), sections: sections.clone() }
+        JudgedDive { report: report.clone(), truth: Arc::clone(truth), sections: sections.clone() }
     }
 
     /// Time over which errors accumulate between neighbouring passes of a place, as the filter has it, s.

@@ -10,7 +10,7 @@ use self::effects::{ALL, without};
 use super::figures::{error, spread};
 use crate::dive::{JudgedDive, Recorded};
 use crate::error::CostError;
-use crate::measure::{in_turns, timed};
+use crate::measure::{in_turns, side_by_side, timed};
 use crate::point::{Error, Interval, LeftOut, OracleError, Point, Trade, front};
 use crate::scene::{Inputs, file};
 use crate::words::number;
@@ -273,19 +273,18 @@ fn differences(
 ) -> Result<(Vec<Differences>, Vec<Hits>), CostError> {
     let mut differences: Vec<Differences> = texts.iter().map(|_| Differences::default()).collect();
     let mut hits: Vec<Hits> = texts.iter().map(|_| Hits::new()).collect();
-    for seed in 1..=seeds {
-        let mut whole: Option<Figures> = None;
-        for (((_, text), differences), hits) in texts.iter().zip(&mut differences).zip(&mut hits) {
-            let figures = Figures::of(
-                &inputs.scene(text, seed)?,
-                seed == 1 && text.contains("\"boulder\"") && !text.contains("rays = "),
-            )?;
-            let against = whole.as_ref().unwrap_or(&figures);
-            compare(against, &figures, differences);
-            if seed == 1 {
+    let seeds: Vec<u32> = (1..=seeds).collect();
+    let dives = seeds.iter().flat_map(|seed| texts.iter().map(move |(_, text)| (*seed, text)));
+    let figures = side_by_side(&dives.collect::<Vec<_>>(), |(seed, text)| {
+        let with_features = *seed == 1 && text.contains("\"boulder\"") && !text.contains("rays = ");
+        Figures::of(&inputs.scene(text, *seed)?, with_features)
+    })?;
+    for (seed, of_seed) in seeds.iter().zip(figures.chunks(texts.len().max(1))) {
+        for ((figures, differences), hits) in of_seed.iter().zip(&mut differences).zip(&mut hits) {
+            compare(of_seed.first().unwrap_or(figures), figures, differences);
+            if *seed == 1 {
                 hits.push(figures.features_hit.clone());
             }
-            whole.get_or_insert(figures);
         }
     }
     Ok((differences, hits))

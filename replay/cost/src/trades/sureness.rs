@@ -8,6 +8,7 @@ use super::navigation::field_of_four;
 use super::survey::planner;
 use crate::dive::Recorded;
 use crate::error::CostError;
+use crate::measure::side_by_side;
 use crate::point::{Error, Interval, LeftOut, OracleError, Point, Trade, front};
 use crate::scene::{Inputs, file};
 use crate::verdicts::{self, Judged, inner};
@@ -136,13 +137,13 @@ fn dived(inputs: &Inputs<'_>, confidence: u32, speed_mps: f64) -> Result<Vec<Err
     // Phases hold for a speed to a millimetre a second.
     let changes = format!("[vehicle_changes]\nheads.planned_speed_mps = {speed_mps:.3}\n");
     let text = field_of_four(16, &legs)?.replace("[trajectory]", &format!("{changes}[trajectory]"));
-    let mut dives = Vec::new();
-    for seed in 1..=inputs.effort.seeds() {
-        let mut scene = inputs.scene(&text, seed)?;
+    let seeds: Vec<u32> = (1..=inputs.effort.seeds()).collect();
+    let dives = side_by_side(&seeds, |seed| {
+        let mut scene = inputs.scene(&text, *seed)?;
         scene.vehicle.coverage.confidence_sd = f64::from(confidence);
         let dive = Recorded::of(&scene, &scene.vehicle)?.judged(&scene.vehicle)?;
-        dives.push(inner(&dive).map(Judged::of).collect::<Vec<_>>());
-    }
+        Ok(inner(&dive).map(Judged::of).collect::<Vec<_>>())
+    })?;
     Ok(verdicts::errors(&dives, TARGET_M))
 }
 

@@ -4,10 +4,11 @@
 //! planned for it, its heads phased for that speed: a promise that is kept shows less than T.
 
 use headrace_sampling::layout::HeadLayout;
-use headrace_sampling::plan::{Answer, Planner, Question};
+use headrace_sampling::plan::{Planner, Question};
 use headrace_simulator::{Simulation, calm};
 
 use crate::error::CostError;
+use crate::measure::side_by_side;
 use crate::oracle::second;
 use crate::oracle::truth::{Truth, TruthTaker};
 use crate::point::{Error, Interval, LeftOut, OracleError, Point, Trade, front};
@@ -220,6 +221,7 @@ impl Survey<'_> {
                 return Ok(());
             }
         };
+        let mut planned = Vec::new();
         for target_m in targets_m {
             let question = Question { target_m: Some(*target_m), speed_mps: None, time_s: None };
             let answers = planner.answers(&question, way.mode)?;
@@ -227,7 +229,8 @@ impl Survey<'_> {
             let Some(answer) = answer else { continue };
             match (answer.v_max_mps, answer.needed_h) {
                 (Some(speed_mps), Some(there_h)) => {
-                    self.point(scene, way, *target_m, answer, [speed_mps, there_h], &planner)?;
+                    let (mode, target_m) = (answer.mode, *target_m);
+                    planned.push(Planned { scene, way, mode, target_m, speed_mps, there_h });
                 }
                 _ => self.left_out.push(LeftOut {
                     what: format!("{scene}, {}, {target_m} m", way.method),
@@ -235,32 +238,27 @@ impl Survey<'_> {
                 }),
             }
         }
+        let inspection = planner.inspection();
+        let holes = true_holes(self.inputs, &planned, inspection.place)?;
+        for (planned, holes) in planned.iter().zip(&holes) {
+            self.point(planned, holes, inspection.length_m);
+        }
         Ok(())
     }
 
-    fn point(
-        &mut self,
-        scene: &str,
-        way: &Way<'_>,
-        target_m: f64,
-        answer: &Answer,
-        [speed_mps, there_h]: [f64; 2],
-        planner: &Planner,
-    ) -> Result<(), CostError> {
-        let back_h = planner.inspection().length_m / WAY_BACK_MPS / 3600.0;
+    /// Takes a point, of the true holes of its dives; the tunnel is so long, m.
+    fn point(&mut self, planned: &Planned<'_>, holes: &[TrueHole], length_m: f64) {
+        let Planned { scene, way, mode, target_m, speed_mps, there_h } = *planned;
+        let back_h = length_m / WAY_BACK_MPS / 3600.0;
         let again_h = AGAIN_SHARE * there_h;
-        let middle = planner.inspection().place;
-        let dives = Dives { way, mode: answer.mode, target_m, speed_mps, middle };
-        // Without effects that draw random numbers there is nothing to a seed but the place off the middle.
-        let seeds = if way.drift_m > 0.0 { self.inputs.effort.pick(2, 5) } else { 1 };
-        let mut holes_m = Vec::new();
-        for seed in 1..=seeds {
-            holes_m.push(self.true_hole_m(&dives, seed)?);
+        for off_m in holes.iter().filter_map(|hole| hole.may_be_off_m) {
+            self.oracle_m = self.oracle_m.max(off_m);
+            self.compared += STRETCHES;
         }
-        let most_m = holes_m.iter().copied().fold(0.0, f64::max);
+        let most_m = holes.iter().map(|hole| hole.hole_m).fold(0.0, f64::max);
         let mut errors = vec![Error::new("T promised", "m", Interval::exact(target_m))];
         if most_m.is_finite() {
-            let least_m = holes_m.iter().copied().fold(f64::INFINITY, f64::min);
+            let least_m = holes.iter().map(|hole| hole.hole_m).fold(f64::INFINITY, f64::min);
             let interval = Interval { low: least_m, middle: most_m, high: most_m };
             errors.push(Error::new("largest D_true at that speed", "m", interval));
         } else {
@@ -271,10 +269,9 @@ impl Survey<'_> {
         for (name, hours) in [("there", there_h), ("back", back_h), ("again", again_h)] {
             errors.push(Error::new(name, "h", Interval::exact(hours)));
         }
-        let is_default = self.inputs.vehicle.is_none()
-            && way.mode == Some(SHIPPED_MODE)
-            && (target_m - SHIPPED_M).abs() < 1e-9;
-        let value = if way.mode.is_some() { String::new() } else { format!(", {}", answer.mode) };
+        let is_default =
+            self.inputs.vehicle.is_none() && way.mode == Some(SHIPPED_MODE) && is_shipped(target_m);
+        let value = if way.mode.is_some() { String::new() } else { format!(", {mode}") };
         self.points.push(Point {
             method: way.method.clone(),
             knob: "target".to_owned(),
@@ -282,28 +279,71 @@ impl Survey<'_> {
             number: Some(target_m),
             is_default,
             scene: scene.to_owned(),
-            seeds,
+            seeds: u32::try_from(holes.len()).unwrap_or(u32::MAX),
             errors,
             cost: Interval::exact(there_h + back_h + again_h),
             instructions: None,
             on_front: false,
         });
-        Ok(())
     }
+}
 
-    /// D_true of a dive, away from its ends, m.
-    fn true_hole_m(&mut self, dives: &Dives<'_>, seed: u32) -> Result<f64, CostError> {
-        let end_m = END_M + dives.target_m;
-        let length_m = self.inputs.effort.length_m() + 2.0 * end_m;
-        let truth = dives.truth(self.inputs, seed, length_m)?;
-        let [from_m, to_m] = [truth.way_m[0] + end_m, truth.way_m[1] - end_m];
-        if dives.way.mode.is_some() && (dives.target_m - SHIPPED_M).abs() < 1e-9 {
-            let off_m = second::may_be_off_m(&truth, [from_m, to_m], STRETCH_M, STRETCHES)?;
-            self.oracle_m = self.oracle_m.max(off_m);
-            self.compared += STRETCHES;
+fn is_shipped(target_m: f64) -> bool {
+    (target_m - SHIPPED_M).abs() < 1e-9
+}
+
+/// What is planned for a target.
+struct Planned<'a> {
+    scene: &'a str,
+    way: &'a Way<'a>,
+    mode: &'static str,
+    target_m: f64,
+    speed_mps: f64,
+    there_h: f64,
+}
+
+/// The largest hole of a dive, m, and by how much both references may be off, where that was looked at.
+struct TrueHole {
+    hole_m: f64,
+    may_be_off_m: Option<f64>,
+}
+
+/// The true holes of what is planned: one of each seed.
+fn true_holes(
+    inputs: &Inputs<'_>,
+    planned: &[Planned<'_>],
+    middle: [f64; 2],
+) -> Result<Vec<Vec<TrueHole>>, CostError> {
+    // Without effects that draw random numbers there is nothing to a seed but the place off the middle.
+    let seeds_of = |planned: &Planned<'_>| {
+        if planned.way.drift_m > 0.0 { inputs.effort.pick(2, 5) } else { 1 }
+    };
+    let of_seeds = |(at, planned)| (1..=seeds_of(planned)).map(move |seed| (at, planned, seed));
+    let dives: Vec<(usize, &Planned<'_>, u32)> = planned.iter().enumerate().flat_map(of_seeds).collect();
+    let found = side_by_side(&dives, |(_, planned, seed)| {
+        let Planned { way, mode, target_m, speed_mps, .. } = **planned;
+        true_hole(inputs, &Dives { way, mode, target_m, speed_mps, middle }, *seed)
+    })?;
+    let mut holes: Vec<Vec<TrueHole>> = planned.iter().map(|_| Vec::new()).collect();
+    for ((at, ..), hole) in dives.iter().zip(found) {
+        if let Some(holes) = holes.get_mut(*at) {
+            holes.push(hole);
         }
-        Ok(truth.wall()?.hole_m(from_m, to_m))
     }
+    Ok(holes)
+}
+
+/// D_true of a dive, away from its ends.
+fn true_hole(inputs: &Inputs<'_>, dives: &Dives<'_>, seed: u32) -> Result<TrueHole, CostError> {
+    let end_m = END_M + dives.target_m;
+    let length_m = inputs.effort.length_m() + 2.0 * end_m;
+    let truth = dives.truth(inputs, seed, length_m)?;
+    let [from_m, to_m] = [truth.way_m[0] + end_m, truth.way_m[1] - end_m];
+    let is_compared = dives.way.mode.is_some() && is_shipped(dives.target_m);
+    let may_be_off_m = is_compared
+        .then(|| second::may_be_off_m(&truth, [from_m, to_m], STRETCH_M, STRETCHES))
+        .transpose()?;
+    Ok(TrueHole { hole_m: truth.wall()?.hole_m(from_m, to_m), may_be_off_m })
 }
 
 /// The plan of a vehicle file with another layout and a tolerated drift: what `headrace plan` says of it.
