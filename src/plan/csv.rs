@@ -5,7 +5,7 @@ use headrace_sampling::plan::{Answer, Spacing};
 const HEADINGS: &str = "mode,step_deg,steps_per_turn,turn_s,turn_basis,overlap,t_y_min_rest_m,t_y_mean_rest_m,\
 t_y_max_rest_m,t_yp_m,t_y2_m,v_max_mps,needed_h,reason,speed_mps,advance_m,pitch_m,t_x_m,t_x_hidden_m,t_y_min_m,\
 t_y_mean_m,t_y_max_m,t_min_m,t_mean_m,t_max_m,hit_once_m,hit_twice_m,meets_target,suffices,best,geometry_mps,\
-hidden_mps,phase_mps,swing_mps,position_mps,pass_error_m";
+hidden_mps,phase_mps,swing_mps,position_mps,losses_mps,pass_error_m";
 
 /// The table, without a final line end.
 pub(super) fn csv(answers: &[Answer]) -> String {
@@ -31,7 +31,7 @@ fn row(answer: &Answer) -> Vec<String> {
     row.push(known(answer.speed_mps));
     row.extend(answer.spacing.as_ref().map_or([None; 12], columns).map(known));
     row.extend([yes(answer.meets_target), yes(answer.suffices), yes(Some(answer.best))]);
-    row.extend(answer.margins.map_or([None; 5], |margins| margins.speeds_mps().map(Some)).map(known));
+    row.extend(answer.margins.map_or([None; 6], |margins| margins.speeds_mps().map(Some)).map(known));
     row.push(known(answer.margins.map(|margins| margins.pass_error_m)));
     row
 }

@@ -188,7 +188,8 @@ fn margin_words(mode: &str, margins: &Margins) -> String {
             Margin::Position => {
                 format!("with the distance between passes known to {:.1} cm", 100.0 * margins.pass_error_m)
             }
-            Margin::Geometry => continue,
+            // A plan knows of none.
+            Margin::Geometry | Margin::Losses => continue,
         };
         if price_mps >= NOTHING_MPS {
             words.push(format!("{speed_mps:.3} {why}"));

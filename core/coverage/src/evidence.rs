@@ -4,7 +4,6 @@ use serde::{Deserialize, Serialize};
 
 use super::cause::Cause;
 use super::causes::Causes;
-use headrace_geometry::math;
 use headrace_sampling::head::HeadSet;
 
 /// Causes of a fail and the figures behind them: those of driving are of the moment with the largest T as driven, in the
@@ -20,6 +19,8 @@ pub struct Evidence {
     /// Largest speed that would have met the target in the middle, all heads turning as scheduled, m/s; the planned one
     /// where that does; zero where none.
     pub fits_mps: f64,
+    /// The same with as many passes over each place as it takes for one, since returns are lost; never above `fits_mps`, m/s.
+    pub with_losses_mps: f64,
     /// Time between passes, seconds.
     pub pass_gap_s: f64,
     /// Time between passes had they been spread evenly, seconds.
@@ -45,15 +46,11 @@ pub struct Evidence {
     pub silent_heads: HeadSet,
 }
 
-/// Share of places at which all turns may be lost when a stretch is passed again.
-const ALL_LOST: f64 = 0.001;
-/// Most turns that are asked for, those of a share of a half: beyond it nobody waits, and the returns have to come back.
-const MOST_TURNS: f64 = 10.0;
-
-/// How many turns have to go by a place for one where returns are lost in runs, so that hardly any place has none.
-pub fn turns_against_losses(missing_share: f64) -> f64 {
-    let share = missing_share.clamp(f64::MIN_POSITIVE, 0.99);
-    (math::ln(ALL_LOST) / math::ln(share)).clamp(1.0, MOST_TURNS)
+impl Evidence {
+    /// Whether returns were lost such that it takes a lower speed to make up for them.
+    pub fn is_lossy(&self) -> bool {
+        self.with_losses_mps < self.fits_mps
+    }
 }
 
 mod head_numbers;

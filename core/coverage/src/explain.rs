@@ -4,6 +4,8 @@
 //! are lacking for it are put back, or the wall is drawn together by as much as passes or steps would have been closer.
 //! `docs/coverage.md` has the order and its reasons.
 
+use core::iter;
+
 use super::cause::Cause;
 use super::causes::Causes;
 use super::evidence::Evidence;
@@ -14,6 +16,7 @@ use super::passage::{Drive, Passage};
 use super::store::SampleStore;
 use headrace_geometry::math;
 use headrace_sampling::head::HeadSet;
+use headrace_sampling::losses::{LossRate, Sampled};
 use headrace_sampling::spacing;
 
 /// A failed section and its surroundings.
@@ -85,6 +88,13 @@ pub fn explain<'a>(
     let causes = trial.smallest(present);
     let in_hole = |lack: &&Lack| is_in(case.hole, case.target_m, store.perimeter_m(), lack);
     let radius_m = case.target_m;
+    let sampled =
+        Sampled { target_m: case.target_m, t_y_m: drive.middle_t_y_m, perimeter_m: store.perimeter_m() };
+    let missing_share = seen.share(seen.missing);
+    let is_lossy = causes.has(Cause::MissingReturns);
+    let here =
+        if is_lossy { sampled.passes_needed(iter::once(LossRate::independent(missing_share))) } else { 1.0 };
+    let passes_needed = here.max(drive.passes_needed);
     let lost = case.lacks.between(case.hole.x_m - radius_m, case.hole.x_m + radius_m).filter(in_hole).count();
     Evidence {
         cause: causes.iter().next().unwrap_or(Cause::Unknown),
@@ -94,7 +104,8 @@ pub fn explain<'a>(
         pass_gap_s: drive.gap_s,
         even_pass_gap_s: drive.even_gap_s,
         all_pass_gap_s: drive.all_gap_s,
-        missing_share: seen.share(seen.missing),
+        missing_share,
+        with_losses_mps: drive.with_losses_mps(passes_needed),
         occluded_share: seen.share(seen.occluded),
         standing_share: seen.share(seen.standing),
         lost_in_hole: u32::try_from(lost).unwrap_or(u32::MAX),
@@ -323,6 +334,16 @@ impl Trial<'_> {
 }
 
 impl Drive {
+    /// The largest speed that fits where it takes so many passes for one, m/s.
+    fn with_losses_mps(&self, passes_needed: f64) -> f64 {
+        let turn_s = passes_needed * self.all_gap_s + self.ping_period_s;
+        if passes_needed > 1.0 {
+            self.fits_mps.min(self.fits_along_m / turn_s.max(1e-9))
+        } else {
+            self.fits_mps
+        }
+    }
+
     /// The same without some factors. `margin_m` is the target less a margin, for the speed that would have been right, m.
     fn without(&self, removed: Causes, margin_m: f64) -> Self {
         let mut then = *self;

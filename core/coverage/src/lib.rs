@@ -50,7 +50,7 @@ pub mod what_if;
 pub use action::Action;
 pub use cause::Cause;
 pub use causes::Causes;
-pub use evidence::{Evidence, turns_against_losses};
+pub use evidence::Evidence;
 pub use frontier::{Frontier, HeadReach, Outlook, Reach};
 pub use hole::{Hole, HoleFinder};
 pub use lacks::{Lack, Lacks};

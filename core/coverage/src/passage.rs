@@ -63,6 +63,10 @@ pub struct Drive {
     /// Largest speed that meets the target from the middle, all heads turning as scheduled; the planned one where that does;
     /// zero where none does, m/s.
     pub fits_mps: f64,
+    /// The distance along the tunnel between passes that it leaves room for, m.
+    pub fits_along_m: f64,
+    /// Passes over each place that it takes for one, as the heads lose returns: see [`headrace_sampling::losses`].
+    pub passes_needed: f64,
     /// Heads go back and forth in sectors.
     pub is_in_sectors: bool,
     /// A head hasn't been heard since the dive began.

@@ -9,8 +9,8 @@ use super::alerts::Alerts;
 use super::app::{App, SourceInfo};
 use super::console::{Commands, Console};
 use super::entities::{
-    Head, HeadFrontier, HeadSpecification, HeadSweep, HiddenAngles, MeasuredMotion, Mounted, Navigator,
-    VehicleState,
+    Head, HeadFrontier, HeadSpecification, HeadSweep, HiddenAngles, LossCount, MeasuredMotion, Mounted,
+    Navigator, VehicleState,
 };
 use super::error::PluginError;
 use super::live_state::{LiveState, source_bits};
@@ -105,7 +105,12 @@ impl App {
                 continue;
             }
             let hidden = HiddenAngles(hidden.next().map(<[_]>::to_vec).unwrap_or_default());
-            let state = (MeasuredMotion::default(), HeadSweep::default(), HeadFrontier::default());
+            let state = (
+                MeasuredMotion::default(),
+                LossCount::default(),
+                HeadSweep::default(),
+                HeadFrontier::default(),
+            );
             world.entity_mut(*entity).insert((hidden, state));
             heads.push(*entity);
         }

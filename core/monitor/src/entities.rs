@@ -2,12 +2,13 @@
 //!
 //! The vehicle has [`Navigator`], [`VehicleState`] and its motion statistics. Every sensor has [`Mounted`],
 //! [`SensorDecoder`] and [`SensorHealth`]; a head also has [`Head`], [`HeadSpecification`], [`MeasuredMotion`],
-//! [`HeadSweep`], [`HeadFrontier`] and [`HiddenAngles`].
+//! [`LossCount`], [`HeadSweep`], [`HeadFrontier`] and [`HiddenAngles`].
 
 use bevy_ecs::prelude::Component;
 use serde::{Deserialize, Serialize};
 
 pub use super::head_motion::MeasuredMotion;
+pub use super::loss_count::LossCount;
 use super::messages::PlacedPing;
 use headrace_coverage::{HeadReach, HeadWall};
 use headrace_fusion::filter::cable::CableDoubt;

@@ -38,6 +38,7 @@ mod head_motion;
 pub mod live_state;
 pub mod live_text;
 mod loop_snapshot;
+mod loss_count;
 pub mod merge;
 pub mod messages;
 pub mod notes;

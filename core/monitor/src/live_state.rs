@@ -244,6 +244,15 @@ impl LiveState {
         Some(advice.v_max_mps).filter(|v_max_mps| *v_max_mps > 0.0)
     }
 
+    /// Share of returns that are lost, where making up for them takes a fifth of the speed or more; else `None`.
+    pub fn lost_share(&self) -> Option<f64> {
+        /// Share of the speed that is left.
+        const LEFT: f64 = 0.8;
+        let advice = self.advice.as_ref().filter(|_| self.v_max_mps().is_some())?;
+        let margins = advice.margins?;
+        (margins.losses_mps < LEFT * margins.position_mps).then_some(advice.lost_share)
+    }
+
     /// Bits of the kinds of alerts that hold.
     pub(super) fn alert_bits(&self) -> u64 {
         self.alerts.iter().flatten().fold(0, |bits, alert| bits | 1 << alert.kind as u64)

@@ -111,7 +111,8 @@ pub fn status_line(state: &LiveState, profile: &Profile, name: &dyn Fn(usize) ->
             [one] => parts.push(format!("{} silent", name(*one))),
             some => parts.push(format!("{} of {} sensors silent", some.len(), state.sources)),
         }
-        parts.extend(forecast_text(state).filter(|_| state.has_sonar() && state.speed_mps.is_some()));
+        let forecast = losses_text(state).or_else(|| forecast_text(state));
+        parts.extend(forecast.filter(|_| state.has_sonar() && state.speed_mps.is_some()));
     }
     if state.metres.fail_m > 0.0 {
         parts.push(format!("missed {:.2} m", state.metres.fail_m));
@@ -153,6 +154,11 @@ fn doubt_text(doubt: PositionDoubt, state: &LiveState) -> String {
             format!("CAN'T SAY: position ±{:.2} m", state.confidence_sd * state.pass_sd_m)
         }
     }
+}
+
+/// How much is lost, where that bounds the speed: the forecast of a turn that lost nothing says little then.
+fn losses_text(state: &LiveState) -> Option<String> {
+    state.lost_share().map(|share| format!("{:.0} % of returns lost", 100.0 * share))
 }
 
 /// The T forecast for the present turn, against the target.

@@ -12,7 +12,7 @@ use super::alert_list::AlertList;
 use super::alerts::Alerts;
 use super::console::Console;
 use super::entities::{
-    HeadFrontier, HeadSweep, MeasuredMotion, Navigator, SensorDecoder, SensorHealth, VehicleState,
+    HeadFrontier, HeadSweep, LossCount, MeasuredMotion, Navigator, SensorDecoder, SensorHealth, VehicleState,
 };
 use super::live_state::LiveState;
 use super::notes::Notes;
@@ -42,6 +42,7 @@ impl StateParts {
         parts.add_component::<SensorDecoder>("decoders");
         parts.add_component::<SensorHealth>("health of sensors");
         parts.add_component::<MeasuredMotion>("motion of heads");
+        parts.add_component::<LossCount>("losses of heads");
         parts.add_component::<HeadSweep>("sweeps");
         parts.add_component::<HeadFrontier>("reach of heads");
         parts.add::<SoundSpeed>("speed of sound");

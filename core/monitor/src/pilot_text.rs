@@ -5,7 +5,7 @@ use super::advice_log::AdviceEntry;
 use super::alerts::AlertKind;
 use serde::{Deserialize, Serialize};
 
-use headrace_coverage::{Action, Cause, Causes, Evidence, Run, Sections, turns_against_losses};
+use headrace_coverage::{Action, Cause, Causes, Evidence, Run, Sections};
 use headrace_fusion::NoFix;
 use headrace_fusion::filter::suspicion::{Setting, SettingDoubt};
 use headrace_geometry::tunnel::Profile;
@@ -34,6 +34,9 @@ pub struct CauseFigures {
     pub middle_t_y_m: f64,
     /// Share of pings without a return.
     pub missing_share: f64,
+    /// Where it takes several passes over each place for one, since returns are lost: the largest speed that allows for them,
+    /// m/s; else zero.
+    pub with_losses_mps: f64,
     /// How far the beams swung along the tunnel between two passes, m.
     pub swing_m: f64,
     /// Heads that went by without a ping.
@@ -44,7 +47,8 @@ impl From<&Evidence> for CauseFigures {
     fn from(evidence: &Evidence) -> Self {
         let Evidence { causes, speed_mps, t_y_m, middle_t_y_m, missing_share, swing_m, silent_heads, .. } =
             *evidence;
-        Self { causes, speed_mps, t_y_m, middle_t_y_m, missing_share, swing_m, silent_heads }
+        let with_losses_mps = if evidence.is_lossy() { evidence.with_losses_mps } else { 0.0 };
+        Self { causes, speed_mps, t_y_m, middle_t_y_m, missing_share, with_losses_mps, swing_m, silent_heads }
     }
 }
 
@@ -68,7 +72,9 @@ impl CauseFigures {
             Cause::AngularStep | Cause::OffAxis => {
                 (self.t_y_m, self.middle_t_y_m, self.swing_m) = (from.t_y_m, from.middle_t_y_m, from.swing_m);
             }
-            Cause::MissingReturns => self.missing_share = from.missing_share,
+            Cause::MissingReturns => {
+                (self.missing_share, self.with_losses_mps) = (from.missing_share, from.with_losses_mps);
+            }
             Cause::HeadSilent => self.silent_heads = from.silent_heads,
             Cause::OutOfRange
             | Cause::NotPassed
@@ -79,10 +85,9 @@ impl CauseFigures {
         }
     }
 
-    /// What is left of a speed where turns have to replace lost returns, m/s.
-    pub fn again_mps(&self, mps: f64) -> f64 {
-        let is_lossy = self.causes.has(Cause::MissingReturns);
-        if is_lossy { mps / turns_against_losses(self.missing_share) } else { mps }
+    /// The speed at which to pass again, m/s: what is advised, or less where more was lost than that allows for.
+    pub fn again_mps(&self, v_max_mps: f64) -> f64 {
+        if self.with_losses_mps > 0.0 { v_max_mps.min(self.with_losses_mps) } else { v_max_mps }
     }
 
     /// The main cause.

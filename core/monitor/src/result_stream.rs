@@ -161,6 +161,9 @@ impl RecordKind {
                 ("missing_share", Number),
                 ("swing_m", Number),
                 ("silent_heads", Integer),
+                ("causes", Integer),
+                // Only where lost returns take a lower speed.
+                ("with_losses_mps", Number),
             ],
             Self::Run => &[("id", Integer), ("change", Integer)],
             Self::Advice => &[

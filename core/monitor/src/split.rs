@@ -13,7 +13,8 @@ use bevy_ecs::world::World;
 
 use super::console::{Commands, Console, ReceivedCommand};
 use super::entities::{
-    Head, HiddenAngles, MeasuredMotion, Mounted, Navigator, SensorDecoder, SensorHealth, VehicleState,
+    Head, HiddenAngles, LossCount, MeasuredMotion, Mounted, Navigator, SensorDecoder, SensorHealth,
+    VehicleState,
 };
 use super::merge::Inbox;
 use super::messages::{
@@ -175,11 +176,12 @@ struct PlacerState {
 }
 
 /// The state that [`Loop::join`] takes back, but for the readings' speed of sound.
-const STATE: [PlacerState; 5] = [
+const STATE: [PlacerState; 6] = [
     PlacerState { save: Placer::state_of::<Navigator>, restore: Placer::restore_of::<Navigator> },
     PlacerState { save: Placer::state_of::<SensorDecoder>, restore: Placer::restore_of::<SensorDecoder> },
     PlacerState { save: Placer::state_of::<SensorHealth>, restore: Placer::restore_of::<SensorHealth> },
     PlacerState { save: Placer::state_of::<MeasuredMotion>, restore: Placer::restore_of::<MeasuredMotion> },
+    PlacerState { save: Placer::state_of::<LossCount>, restore: Placer::restore_of::<LossCount> },
     PlacerState {
         save: |world, to| world.resource::<SoundSpeed>().save(to),
         restore: |world, from| world.resource_mut::<SoundSpeed>().restore(from),
@@ -275,6 +277,7 @@ impl Loop {
             move_component::<SensorDecoder>(&mut placing, from, world, to);
             move_component::<SensorHealth>(&mut placing, from, world, to);
             move_component::<MeasuredMotion>(&mut placing, from, world, to);
+            move_component::<LossCount>(&mut placing, from, world, to);
         }
         world.insert_resource(placing.resource::<SoundSpeed>().clone());
     }
@@ -293,6 +296,7 @@ fn placing_world(world: &mut World) -> World {
         copy_component::<SensorHealth>(world, entity, &mut placing, copy);
         copy_component::<Head>(world, entity, &mut placing, copy);
         copy_component::<MeasuredMotion>(world, entity, &mut placing, copy);
+        copy_component::<LossCount>(world, entity, &mut placing, copy);
         copy_component::<HiddenAngles>(world, entity, &mut placing, copy);
         copy
     });

@@ -9,6 +9,7 @@ mod search;
 use super::error::SamplingError;
 use super::head::{HeadMode, HeadMotion, HeadSet, HeadSpec, MAX_HEADS};
 use super::layout::{self, HeadLayout};
+use super::losses::LossRate;
 use super::margin::{self, APART_SHARE, Margins};
 use super::occlusion::{self, AngleRange, Obstacle};
 use super::passes::{self, Passes, Phasing, Situation};
@@ -210,11 +211,13 @@ impl Advisor {
             swing_most_m: Some(swing.most_rad * farthest_m),
         };
         let sure_m = self.task.target_m - self.margin_m(situation.pass_error_m);
-        let fastest = self.fastest(&phasing, &passes, &going, sure_m, self.last_mps);
+        let lossy = passes.lossy(true);
+        self.now.count_losses(0, sure_m, &rates_of(situation));
+        let fastest = self.fastest(&phasing, &lossy, &going, sure_m, self.last_mps);
         let possible = fastest.as_ref().ok().filter(|fastest| fastest.speed_mps > 0.0);
         let advised_mps = possible.map(|fastest| fastest.advised_mps);
         let [from_mps, nearest_mps] = possible.map_or([None; 2], |fastest| {
-            let driving = self.driving(&phasing, &passes, &going, sure_m);
+            let driving = self.driving(&phasing, &lossy, &going, sure_m);
             let now_mps = Some(situation.speed_mps.abs()).filter(|now_mps| *now_mps > UNDER_WAY_MPS);
             let nearest = now_mps.and_then(|now_mps| driving.nearest_mps(now_mps));
             [Some(driving.lower_end_mps(fastest.advised_mps)), nearest]
@@ -224,8 +227,7 @@ impl Advisor {
         let predicted_t_m = self.now.t_max_m(0, &passes, situation.speed_mps.abs(), &going);
         let x_m = pose.position.x();
         let left_m = if self.astern { x_m } else { self.task.length_m - x_m };
-        let pass_error_m = situation.pass_error_m;
-        self.think_over(&phasing, &passes, &going, pass_error_m);
+        self.think_over(&phasing, &lossy, &going, situation);
         let unseen_m = match fastest {
             Err(SamplingError::UnseenStrip { width_m, arc_m, .. }) => Some([width_m, arc_m]),
             _ => None,
@@ -252,6 +254,7 @@ impl Advisor {
             alternatives: self.alternatives,
             anew: self.anew,
             margins: self.margins,
+            lost_share: mean(situation.losses_of_turning().map(|rate| rate.share)),
         }
     }
 
@@ -320,6 +323,7 @@ impl Advisor {
             phasing,
             going,
             parallax_rad: self.parallax_rad,
+            lossy: passes.is_lossy(),
             astern: self.astern,
             target_m,
             bound_mps: target_m / (passes.even_gap_s() + going.ping_period_s),
@@ -370,18 +374,22 @@ impl Advisor {
 
     /// Computes the speed that each mode common to all heads would allow, with the heads that turn now started in
     /// phase, and what each margin costs.
-    fn think_over(&mut self, phasing: &Phasing, passes: &Passes, going: &Going, pass_error_m: f64) {
+    fn think_over(&mut self, phasing: &Phasing, passes: &Passes, going: &Going, situation: &Situation) {
         if let Some(left) = self.until_alternatives.checked_sub(1) {
             self.until_alternatives = left;
             return;
         }
         self.until_alternatives = ALTERNATIVES_EVERY - 1;
         self.measure_modes();
+        let rates = rates_of(situation);
+        for mode in 0..MAX_MODES {
+            self.modes.count_losses(mode, self.sure_in_m(mode, situation), &rates);
+        }
         let names = self.heads.first().map(|head| head.modes.as_slice()).unwrap_or_default();
         let mut alternatives = [None; MAX_MODES];
         let mut anew = None;
         for (number, (slot, mode)) in alternatives.iter_mut().zip(names).enumerate() {
-            let Some(v_mps) = self.mode_speed_mps(number, passes.heads(), going, pass_error_m) else {
+            let Some(v_mps) = self.mode_speed_mps(number, passes.heads(), going, situation) else {
                 continue;
             };
             let v_max_mps = v_mps * (1.0 - SPEED_MARGIN);
@@ -392,7 +400,7 @@ impl Advisor {
             }
         }
         (self.alternatives, self.anew) = (alternatives, anew);
-        self.margins = Some(self.margins(phasing, passes, going, pass_error_m));
+        self.margins = Some(self.margins(phasing, passes, going, situation.pass_error_m));
     }
 
     /// Whether the heads turn in a mode.
@@ -408,9 +416,10 @@ impl Advisor {
     fn margins(&self, phasing: &Phasing, passes: &Passes, going: &Going, pass_error_m: f64) -> Margins {
         let target_m = self.task.target_m;
         let steady = Going { ping_period_s: going.ping_period_s, ..Going::default() };
+        let (lossy, passes) = (passes, &passes.lossy(false));
         let even = passes.evened();
         let hidden = self.now.bound_for_target(0, &even, target_m, &steady);
-        let fastest = |going: &Going, target_m: f64| {
+        let fastest = |passes: &Passes, going: &Going, target_m: f64| {
             self.fastest(phasing, passes, going, target_m, self.last_mps)
                 .map_or(0.0, |fastest| fastest.speed_mps)
         };
@@ -418,9 +427,10 @@ impl Advisor {
         let speeds = [
             self.now.bound_if_all_seen_mps(0, &even, target_m, &steady).unwrap_or(0.0),
             hidden.map_or(0.0, |bound| bound.speed_mps),
-            fastest(&steady, target_m),
-            fastest(going, target_m),
-            fastest(going, sure_m),
+            fastest(passes, &steady, target_m),
+            fastest(passes, going, target_m),
+            fastest(passes, going, sure_m),
+            fastest(lossy, going, sure_m),
         ];
         Margins::of(speeds.map(|speed_mps| speed_mps * (1.0 - SPEED_MARGIN)), pass_error_m)
     }
@@ -438,7 +448,13 @@ impl Advisor {
     }
 
     /// The largest speed in a mode, zero where none meets the target; `None` when a head lacks the mode.
-    fn mode_speed_mps(&self, number: usize, heads: HeadSet, going: &Going, pass_error_m: f64) -> Option<f64> {
+    fn mode_speed_mps(
+        &self,
+        number: usize,
+        heads: HeadSet,
+        going: &Going,
+        situation: &Situation,
+    ) -> Option<f64> {
         let name = self.heads.first()?.modes.get(number)?.name;
         let turn = |head: usize| self.heads.get(head)?.mode(name).map(|mode| mode.turn);
         let (mut longest_s, mut ping_period_s) = (0.0_f64, 0.0_f64);
@@ -457,11 +473,17 @@ impl Advisor {
         };
         let passes = passes.ok()?.beside(self.parallax_rad);
         let going = Going { ping_period_s, ..*going };
-        let Task { target_m, confidence_sd, .. } = self.task;
-        let t_y_m = self.modes.largest_step_m(number);
-        let sure_m = target_m - margin::position_margin_m(target_m, confidence_sd, pass_error_m, t_y_m);
+        let passes = passes.lossy(true);
+        let sure_m = self.sure_in_m(number, situation);
         let bound = self.modes.bound_for_target(number, &passes, sure_m, &going);
         Some(bound.map_or(0.0, |bound| bound.speed_mps))
+    }
+
+    /// The target less what is left to errors of position, in a mode, m.
+    fn sure_in_m(&self, mode: usize, situation: &Situation) -> f64 {
+        let Task { target_m, confidence_sd, .. } = self.task;
+        let t_y_m = self.modes.largest_step_m(mode);
+        target_m - margin::position_margin_m(target_m, confidence_sd, situation.pass_error_m, t_y_m)
     }
 
     /// The remedy: a steady heading, where that alone is enough; the centre, where the same steps are short enough
@@ -493,6 +515,20 @@ impl Advisor {
         let Task { target_m, confidence_sd, .. } = self.task;
         margin::position_margin_m(target_m, confidence_sd, pass_error_m, self.now.largest_step_m(0))
     }
+}
+
+/// What each head that turns loses, by number.
+fn rates_of(situation: &Situation) -> [Option<LossRate>; MAX_HEADS] {
+    let mut rates = [None; MAX_HEADS];
+    for ((slot, motion), rate) in rates.iter_mut().zip(&situation.heads).zip(situation.losses) {
+        *slot = motion.map(|_| rate);
+    }
+    rates
+}
+
+fn mean(shares: impl Iterator<Item = f64>) -> f64 {
+    let (sum, count) = shares.fold((0.0, 0.0), |(sum, count), share| (sum + share, count + 1.0));
+    if count > 0.0 { sum / count } else { 0.0 }
 }
 
 #[cfg(test)]

@@ -2,7 +2,7 @@
 //!
 //! [`section`] and [`spacing`] have the paper's closed forms, [`ring`] the general case by ray casting. [`layout`] and
 //! [`schedule`] say how several heads turn, [`passes`] how often they pass a place, [`swing`] what the vehicle's own
-//! turning adds. [`advice`] combines them for the pilot during the dive, [`plan`] for the engineer before it.
+//! turning adds, [`losses`] what lost returns ask for. [`advice`] combines them for the pilot during the dive, [`plan`] for the engineer before it.
 //!
 //! ```
 //! use headrace_sampling::head::Turn;
@@ -29,6 +29,7 @@ pub mod head;
 pub mod head_set;
 pub mod interference;
 pub mod layout;
+pub mod losses;
 pub mod margin;
 pub mod occlusion;
 pub mod passes;

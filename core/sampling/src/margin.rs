@@ -81,11 +81,14 @@ pub enum Margin {
     Swing,
     /// Position that is uncertain.
     Position,
+    /// Returns that are lost.
+    Losses,
 }
 
 impl Margin {
     /// All of them, in the order in which they are added.
-    pub const ALL: [Self; 5] = [Self::Geometry, Self::Hidden, Self::Phase, Self::Swing, Self::Position];
+    pub const ALL: [Self; 6] =
+        [Self::Geometry, Self::Hidden, Self::Phase, Self::Swing, Self::Position, Self::Losses];
 
     /// Name used in reports and logs.
     pub fn as_str(self) -> &'static str {
@@ -95,6 +98,7 @@ impl Margin {
             Self::Phase => "phase",
             Self::Swing => "swing",
             Self::Position => "position",
+            Self::Losses => "losses",
         }
     }
 }
@@ -110,15 +114,17 @@ pub struct Margins {
     pub phase_mps: f64,
     /// With the beams' swing.
     pub swing_mps: f64,
-    /// With errors of position: the largest speed.
+    /// With errors of position.
     pub position_mps: f64,
-    /// Standard deviation of a hole's size between two passes that the last is for, m.
+    /// With passes for returns that are lost: the largest speed.
+    pub losses_mps: f64,
+    /// Standard deviation of a hole's size between two passes that `position_mps` is for, m.
     pub pass_error_m: f64,
 }
 
 impl Margins {
     /// From speeds in the order of [`Margin::ALL`], m/s: each counts at most as the one before.
-    pub fn of(speeds_mps: [f64; 5], pass_error_m: f64) -> Self {
+    pub fn of(speeds_mps: [f64; 6], pass_error_m: f64) -> Self {
         // From the last: a margin that seems to cost less than nothing costs nothing.
         let mut most = 0.0_f64;
         let mut speeds = speeds_mps;
@@ -126,23 +132,25 @@ impl Margins {
             most = most.max(*speed);
             *speed = most;
         }
-        let [geometry_mps, hidden_mps, phase_mps, swing_mps, position_mps] = speeds;
-        Self { geometry_mps, hidden_mps, phase_mps, swing_mps, position_mps, pass_error_m }
+        let [geometry_mps, hidden_mps, phase_mps, swing_mps, position_mps, losses_mps] = speeds;
+        Self { geometry_mps, hidden_mps, phase_mps, swing_mps, position_mps, losses_mps, pass_error_m }
     }
 
     /// The speeds in the order of [`Margin::ALL`], m/s.
-    pub fn speeds_mps(&self) -> [f64; 5] {
-        [self.geometry_mps, self.hidden_mps, self.phase_mps, self.swing_mps, self.position_mps]
+    pub fn speeds_mps(&self) -> [f64; 6] {
+        let Self { geometry_mps, hidden_mps, phase_mps, swing_mps, position_mps, losses_mps, .. } = *self;
+        [geometry_mps, hidden_mps, phase_mps, swing_mps, position_mps, losses_mps]
     }
 
     /// What each margin takes from the one before, m/s, in the order of [`Margin::ALL`] from the second on.
-    pub fn prices_mps(&self) -> [(Margin, f64); 4] {
-        let [geometry, hidden, phase, swing, position] = self.speeds_mps();
+    pub fn prices_mps(&self) -> [(Margin, f64); 5] {
+        let [geometry, hidden, phase, swing, position, losses] = self.speeds_mps();
         [
             (Margin::Hidden, geometry - hidden),
             (Margin::Phase, hidden - phase),
             (Margin::Swing, phase - swing),
             (Margin::Position, swing - position),
+            (Margin::Losses, position - losses),
         ]
     }
 
@@ -195,13 +203,13 @@ mod tests {
 
     #[test]
     fn prices_add_up_and_the_costliest_is_named() {
-        let margins = Margins::of([0.23, 0.118, 0.117, 0.118, 0.108], 0.02);
+        let margins = Margins::of([0.23, 0.118, 0.117, 0.118, 0.108, 0.1], 0.02);
         // Swing can't give back what phase took.
-        let expected = [0.23, 0.118, 0.118, 0.118, 0.108];
+        let expected = [0.23, 0.118, 0.118, 0.118, 0.108, 0.1];
         assert!(margins.speeds_mps().iter().zip(expected).all(|(a, b)| (a - b).abs() < 1e-12));
         let sum: f64 = margins.prices_mps().iter().map(|(_, price)| price).sum();
-        assert!((sum - (0.23 - 0.108)).abs() < 1e-12);
+        assert!((sum - (0.23 - 0.1)).abs() < 1e-12);
         assert_eq!(margins.costliest(), Margin::Hidden);
-        assert_eq!(Margins::of([0.1; 5], 0.0).costliest(), Margin::Geometry);
+        assert_eq!(Margins::of([0.1; 6], 0.0).costliest(), Margin::Geometry);
     }
 }

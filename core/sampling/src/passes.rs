@@ -3,6 +3,7 @@
 use super::error::SamplingError;
 use super::head::{HeadMotion, HeadSet, MAX_HEADS, faces_aft};
 use super::layout::HeadLayout;
+use super::losses::LossRate;
 use headrace_geometry::frames::{Mount, Pose, Rot, Tunnel, Vec3};
 use headrace_geometry::math::{self, TAU};
 use headrace_geometry::tunnel::{Profile, Yz};
@@ -30,6 +31,15 @@ pub struct Situation {
     pub configured: usize,
     /// The heads that turn and ping, by number.
     pub heads: [Option<HeadMotion>; MAX_HEADS],
+    /// What each head loses by chance, by number.
+    pub losses: [LossRate; MAX_HEADS],
+}
+
+impl Situation {
+    /// What the heads that turn lose by chance.
+    pub fn losses_of_turning(&self) -> impl Iterator<Item = LossRate> {
+        self.heads.iter().zip(self.losses).filter_map(|(motion, rate)| motion.is_some().then_some(rate))
+    }
 }
 
 /// The passes of a vehicle's heads at one speed.
@@ -43,6 +53,8 @@ pub struct Passes {
     parallax_s: f64,
     /// Too slow for phases along the tunnel to have a meaning.
     at_rest: bool,
+    /// Whether more passes are counted on where returns are lost.
+    lossy: bool,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -134,7 +146,7 @@ impl Phasing {
                 *phase = math::wrap(*phase + ahead, 1.0);
             }
         }
-        Passes { heads, turns_s, pattern, parallax_s: 0.0, at_rest }
+        Passes { heads, turns_s, pattern, parallax_s: 0.0, at_rest, lossy: false }
     }
 }
 
@@ -197,6 +209,39 @@ impl Passes {
         Self { parallax_s: parallax_rad / TAU * turn_s, ..self }
     }
 
+    /// These passes, to be counted as returns are lost or as if none were: see [`super::losses`].
+    #[must_use]
+    pub fn lossy(self, lossy: bool) -> Self {
+        Self { lossy, ..self }
+    }
+
+    /// Whether lost returns count.
+    pub fn is_lossy(&self) -> bool {
+        self.lossy
+    }
+
+    /// The longest time that `needed` neighbouring passes of these heads over a place take, seconds, where `gap_s` is the longest
+    /// between two: the other passes of a turn share what that leaves of it. Continuous; `gap_s` up to one pass.
+    pub fn time_for_s(&self, seen_by: HeadSet, gap_s: f64, needed: f64) -> f64 {
+        let (passing, turn_s) = match self.pattern {
+            Pattern::Turning(_) => {
+                (seen_by.iter().filter(|head| self.heads.has(*head)).count(), self.turn_s())
+            }
+            // There and back: at a sector's end one right after the other.
+            Pattern::Sectors(sweep_s) => (2, sweep_s),
+            Pattern::Loose => (1, gap_s),
+        };
+        let (count, needed) = (passing.max(1) as f64, needed.max(1.0));
+        if passing <= 1 {
+            return needed * gap_s;
+        }
+        let others_s = (turn_s - gap_s).max(0.0) / (count - 1.0);
+        let turns = (needed / count).floor();
+        let rest = needed - turns * count;
+        let rest_s = if rest > 1.0 { gap_s + (rest - 1.0) * others_s } else { rest * gap_s };
+        turns * (gap_s + (count - 1.0) * others_s) + rest_s
+    }
+
     /// Continuously rotating heads, evenly phased in order of their numbers: the result of a schedule for this speed if
     /// their turn periods are equal. If not, heads run out of step, and no phase can be relied on.
     ///
@@ -213,7 +258,7 @@ impl Passes {
         }
         let in_step = heads.iter().all(|head| (turn_s(head) / turn_s(first) - 1.0).abs() < IN_STEP);
         let pattern = if in_step { Pattern::Turning(phases) } else { Pattern::Loose };
-        Ok(Self { heads, turns_s, pattern, parallax_s: 0.0, at_rest: false })
+        Ok(Self { heads, turns_s, pattern, parallax_s: 0.0, at_rest: false, lossy: false })
     }
 
     /// Heads in sectors with a sweep period (there and back) of `sweep_s`, seconds.
@@ -224,7 +269,7 @@ impl Passes {
             return Err(SamplingError::HeadCount { heads: 0 });
         }
         let pattern = Pattern::Sectors(sweep_s);
-        Ok(Self { heads, turns_s: [0.0; MAX_HEADS], pattern, parallax_s: 0.0, at_rest: false })
+        Ok(Self { heads, turns_s: [0.0; MAX_HEADS], pattern, parallax_s: 0.0, at_rest: false, lossy: false })
     }
 
     /// The heads that pass.
@@ -266,7 +311,7 @@ impl Passes {
             Pattern::Turning(_) => Self::evenly_phased(self.heads, |_| self.turn_s()).ok(),
             Pattern::Sectors(_) | Pattern::Loose => None,
         };
-        even.unwrap_or(Self { parallax_s: 0.0, ..*self })
+        even.map_or(Self { parallax_s: 0.0, ..*self }, |even| even.lossy(self.lossy))
     }
 
     /// [`Passes::gap_s`] of all heads if they were evenly phased, seconds; zero without a head.
@@ -346,6 +391,7 @@ mod tests {
             layout: HeadLayout::PhaseShift,
             configured,
             heads,
+            losses: [LossRate::default(); MAX_HEADS],
         }
     }
 
@@ -379,6 +425,25 @@ mod tests {
         assert!((gap_s([0, 2]) - 4.0).abs() < 1e-12 && (gap_s([0, 1]) - 6.0).abs() < 1e-12);
         assert_eq!(passes.gap_s(HeadSet::default()), None);
         assert_eq!(passes.gap_s(HeadSet::default().with(6)), None);
+    }
+
+    #[test]
+    fn several_passes_take_as_long_as_the_turn_leaves_them() {
+        let even = Passes::evenly_phased(HeadSet::first(4), |_| 8.0).unwrap();
+        let time_s = |heads: HeadSet, needed: f64| even.time_for_s(heads, even.gap_s(heads).unwrap(), needed);
+        let all = even.heads();
+        assert!((time_s(all, 1.0) - 2.0).abs() < 1e-12 && (time_s(all, 2.5) - 5.0).abs() < 1e-12);
+        assert!((time_s(all, 9.0) - 18.0).abs() < 1e-12);
+        // Two heads a quarter of a turn apart: 6 s, then 2 s.
+        let two = all.without(0).without(1);
+        for (needed, seconds) in [(1.0, 6.0), (1.5, 7.0), (2.0, 8.0), (3.0, 14.0), (4.0, 16.0)] {
+            assert!((time_s(two, needed) - seconds).abs() < 1e-9, "{needed}");
+        }
+        assert!((time_s(HeadSet::first(1), 3.0) - 24.0).abs() < 1e-12);
+        let sectors = Passes::in_sectors(HeadSet::first(2), 8.0).unwrap();
+        for (needed, seconds) in [(1.0, 8.0), (2.0, 8.0), (2.5, 12.0), (3.0, 16.0), (4.0, 16.0)] {
+            assert!((sectors.time_for_s(sectors.heads(), 8.0, needed) - seconds).abs() < 1e-9, "{needed}");
+        }
     }
 
     #[test]

@@ -207,7 +207,10 @@ impl Planner {
         }
         let [geometry, hidden, phase] = slowest;
         let (swing, position) = (self.known_v_max_mps(mode, target_m)?, self.v_max_mps(mode, target_m)?);
-        Ok(Margins::of([geometry, hidden, phase, swing, position], self.pass_error_m(planned, position)))
+        Ok(Margins::of(
+            [geometry, hidden, phase, swing, position, position],
+            self.pass_error_m(planned, position),
+        ))
     }
 
     /// The largest speed at which T_max is the target, with the heads phased for it, m/s: the inverse of

@@ -11,6 +11,7 @@ use super::spacing;
 use headrace_geometry::math;
 use headrace_snapshot::stateful;
 
+mod lossy;
 mod thin;
 
 use thin::Thin;
@@ -158,11 +159,13 @@ pub struct Strips {
     perimeter_m: f64,
     /// By setting and strip: the largest step of the heads that see it, and of all heads, m.
     steps_m: Vec<[f64; 2]>,
+    /// By setting and strip: passes needed for one within it, and across it, as returns are lost; empty before the first count.
+    needed: Vec<[f64; 2]>,
     /// Strip of each sounding of the current ring, and the approximate distance to the strip's end, m.
     strip_of: Vec<(usize, f64)>,
 }
 
-stateful!(Strips { state: perimeter_m; lists: strips, edges_m, steps_m, strip_of; });
+stateful!(Strips { state: perimeter_m; lists: strips, edges_m, steps_m, needed, strip_of; });
 
 impl Strips {
     /// Without strips, with capacity for those of `arcs` arcs in `settings` settings.
@@ -173,6 +176,7 @@ impl Strips {
             edges_m: Vec::with_capacity(2 * arcs),
             perimeter_m: 0.0,
             steps_m: Vec::with_capacity(strips * settings),
+            needed: Vec::with_capacity(strips * settings),
             strip_of: Vec::with_capacity(soundings as usize),
         }
     }
@@ -398,12 +402,17 @@ impl Strips {
 
     fn within(&self, setting: usize, (k, strip): (usize, &Strip), thin: &Thin<'_>) -> Option<Limit> {
         let t_y_m = self.steps_m.get(setting * self.strips.len() + k).map_or(0.0, |steps| steps[0]);
-        thin.gap_s(k, strip.seen_by).map(|gap_s| Limit { gap_s, t_y_m })
+        let gap_s = thin.gap_s(k, strip.seen_by)?;
+        let [needed, _] = self.needed(setting, k, thin);
+        Some(Limit { gap_s: thin.time_for_s(strip.seen_by, gap_s, needed), t_y_m })
     }
 
     fn across(&self, setting: usize, (k, strip): (usize, &Strip), thin: &Thin<'_>) -> Option<Limit> {
         (!thin.is_full(k, strip.seen_by) && thin.best_s().is_finite())
-            .then(|| Limit { gap_s: thin.best_s(), t_y_m: self.across_m(setting, k, thin) })
+            .then(|| {
+                let [_, needed] = self.needed(setting, k, thin);
+                Limit { gap_s: needed * thin.best_s(), t_y_m: self.across_m(setting, k, thin) }
+            })
             .filter(|limit| limit.t_y_m < self.perimeter_m)
     }
 

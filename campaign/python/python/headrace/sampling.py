@@ -72,10 +72,10 @@ class Spacing(TypedDict):
 
 
 class Margins(TypedDict):
-    """The largest speeds with the margins added one after the other, m/s: v_max is ``position_mps``.
+    """The largest speeds with the margins added one after the other, m/s: v_max is ``losses_mps``.
 
     ``geometry_mps`` is that of heads evenly phased on a wall that all of them see; then what the vehicle hides, the heads' phases and
-    places, swing, and errors of position, whose standard deviation between two passes is ``pass_error_m``.
+    places, swing, errors of position, whose standard deviation between two passes is ``pass_error_m``, and lost returns, of which a plan knows none.
     """
 
     geometry_mps: float
@@ -83,6 +83,7 @@ class Margins(TypedDict):
     phase_mps: float
     swing_mps: float
     position_mps: float
+    losses_mps: float
     pass_error_m: float
 
 

@@ -252,6 +252,11 @@ pub(crate) fn flags_table<'a>() -> Table<Flag<'a>> {
                 Get::Number(|row| evidence(row.0).map(|of| of.fits_mps)),
             ),
             Column(
+                "with_losses_mps",
+                "The same as returns were lost, m/s",
+                Get::Number(|row| evidence(row.0).map(|of| of.with_losses_mps)),
+            ),
+            Column(
                 "missing_share",
                 "Share of pings without a return",
                 Get::Number(|row| evidence(row.0).map(|of| of.missing_share)),

@@ -87,6 +87,8 @@ pub struct MarginsJson {
     pub turn_m: Option<f64>,
     /// What position errors take of the target, m: the confidence times the standard deviation of one pass against the next.
     pub position_m: Option<f64>,
+    /// Share of returns that are lost, where that is what bounds the speed; else `None`.
+    pub lost_share: Option<f64>,
 }
 
 /// Forecast of the present turn at the present speed.
@@ -180,6 +182,7 @@ impl LiveState {
                 speed_mps: less(self.v_max_mps(), self.speed_mps.map(f64::abs)),
                 turn_m: less(Some(self.target_m), predicted_m),
                 position_m: pass_sd_m.map(|sd_m| self.confidence_sd * sd_m),
+                lost_share: self.lost_share(),
             },
             turn: advice.map(|advice| TurnJson {
                 target_m: self.target_m,

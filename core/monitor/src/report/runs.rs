@@ -112,8 +112,7 @@ fn stop(sections: &Sections, id: RunId, run: &Run) -> ReturnReport {
     let (to_m, from_m) = (sections.bounds_m(run.from).0, sections.bounds_m(run.to - 1).1);
     let flagged = |index: i64| sections.get(index).filter(|section| section.is_flagged())?.evidence;
     let evidence = (run.from..run.to).filter_map(flagged);
-    let again_mps = |evidence: Evidence| CauseFigures::from(&evidence).again_mps(evidence.fits_mps);
-    let speeds = evidence.map(again_mps).filter(|mps| *mps > 0.0);
+    let speeds = evidence.map(|evidence: Evidence| evidence.with_losses_mps).filter(|mps| *mps > 0.0);
     let at_most_mps = speeds.reduce(f64::min).unwrap_or(0.0);
     let takes_s = (at_most_mps > 0.0).then(|| (from_m - to_m) / at_most_mps);
     let actions = Action::against(run.causes());

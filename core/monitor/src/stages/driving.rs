@@ -10,6 +10,7 @@ use headrace_geometry::time::{DurNs, MonoNs};
 use headrace_geometry::tunnel::{Profile, Yz};
 use headrace_sampling::head::{HeadMotion, HeadSet};
 use headrace_sampling::layout::HeadLayout;
+use headrace_sampling::losses::Sampled;
 use headrace_sampling::margin::position_margin_m;
 use headrace_sampling::passes::{Passes, Phasing, Situation};
 use headrace_sampling::swing::Looks;
@@ -76,6 +77,9 @@ impl Driving {
         };
         self.note_gaps(at, [situation, healthy], plan.planned_mps);
         self.note_fit(healthy, plan);
+        let t_y_m = self.now.middle_t_y_m;
+        let sampled = Sampled { target_m: plan.target_m, t_y_m, perimeter_m: profile.perimeter_m() };
+        self.now.passes_needed = sampled.passes_needed(situation.losses_of_turning());
         let place_m = [pose.position.y(), pose.position.z()];
         self.note_steps(situation, place_m, profile);
         let look = pose.attitude * Vec3::new(1.0, 0.0, 0.0);
@@ -100,6 +104,7 @@ impl Driving {
         self.fitted = passes;
         let squared = (sure_m - now.middle_t_y_m) * (sure_m + now.middle_t_y_m);
         let along_m = math::sqrt(squared.max(0.0));
+        now.fits_along_m = along_m;
         let scheduled = Phasing::of(healthy).as_scheduled(healthy.configured, now.planned_mps);
         let fits = |mps: f64| {
             let passes = scheduled.at(mps);

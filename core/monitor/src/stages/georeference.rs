@@ -2,7 +2,7 @@
 
 use bevy_ecs::prelude::{Query, Res, ResMut};
 
-use crate::entities::{Head, HiddenAngles, MeasuredMotion, Mounted};
+use crate::entities::{Head, HiddenAngles, LossCount, MeasuredMotion, Mounted};
 use crate::messages::{
     Aim, Events, Hidden, Outcome, Placed, PlacedEvents, PlacedList, PlacedPing, Positioned, PositionedList,
 };
@@ -13,12 +13,19 @@ use headrace_geometry::frames::{Mount, Pose, Vec3, head_direction};
 use headrace_geometry::math;
 use headrace_geometry::time::MonoNs;
 use headrace_sampling::head::{HeadMotion, MAX_HEADS, SILENT_AFTER};
+use headrace_sampling::losses::LossRate;
 use headrace_sampling::passes::Situation;
 use headrace_sensor::reading::{Reading, SonarReturn};
 
-/// A head: number, mount, measured motion and occluded angles.
-type Heads<'w, 's> =
-    Query<'w, 's, (&'static Head, &'static Mounted, &'static mut MeasuredMotion, &'static HiddenAngles)>;
+/// A head: number, mount, measured motion, losses and occluded angles.
+type Heads<'w, 's> = Query<'w, 's, HeadParts>;
+type HeadParts = (
+    &'static Head,
+    &'static Mounted,
+    &'static mut MeasuredMotion,
+    &'static mut LossCount,
+    &'static HiddenAngles,
+);
 
 #[expect(clippy::too_many_arguments, reason = "a system's arguments are what it reads and writes")]
 pub(super) fn georeference(
@@ -44,7 +51,7 @@ pub(super) fn georeference(
                 let Some(event) = events.0.get(index) else { continue };
                 let Reading::Sonar(sonar) = event.reading else { continue };
                 let head = entities.of_source(event.source).and_then(|entity| heads.get_mut(entity).ok());
-                let Some((head, mounted, mut motion, hidden)) = head else { continue };
+                let Some((head, mounted, mut motion, mut losses, hidden)) = head else { continue };
                 let turned = motion.ping(event.valid_at, sonar.angle_rad);
                 let mount = &mounted.info.mount;
                 let hides = hidden.hides(sonar.angle_rad);
@@ -71,10 +78,22 @@ pub(super) fn georeference(
                     source: event.source,
                     origin: fix.ok().map(|fix| fix.pose.place(mount.position)),
                 };
+                if !ping.standing {
+                    count(&mut losses, &ping);
+                }
                 placed.0.push(Placed::Ping(ping));
                 of_events.0.push(index);
             }
         }
+    }
+}
+
+/// Counts a ping at wall that the head could hear.
+fn count(losses: &mut LossCount, ping: &PlacedPing) {
+    match ping.outcome {
+        Outcome::Sample { .. } => losses.ping(ping.angle_rad, false),
+        Outcome::Lost(Loss::Missing, Some(_)) => losses.ping(ping.angle_rad, true),
+        Outcome::Lost(..) | Outcome::Unplaced(_) => {}
     }
 }
 
@@ -149,7 +168,11 @@ fn situation(
     heads: &Heads<'_, '_>,
 ) -> Situation {
     let mut motions = [None; MAX_HEADS];
-    for (head, mounted, track, _) in heads {
+    let mut losses = [LossRate::default(); MAX_HEADS];
+    for (head, mounted, track, lost, _) in heads {
+        if let Some(slot) = losses.get_mut(head.0) {
+            *slot = lost.rate();
+        }
         let (Some((last, angle_rad)), Some(rate_radps), Some(step_rad), Some(slot)) =
             (track.last(), track.rate_radps(), track.step_rad(), motions.get_mut(head.0))
         else {
@@ -169,6 +192,7 @@ fn situation(
         layout: target.layout,
         configured: heads.iter().len(),
         heads: motions,
+        losses,
     }
 }
 

@@ -191,6 +191,8 @@ pub struct Advice {
     pub anew: Option<Anew>,
     /// What each margin costs, every five seconds.
     pub margins: Option<Margins>,
+    /// Share of returns that are lost by chance, of the heads that turn.
+    pub lost_share: f64,
 }
 
 impl Advice {
@@ -213,6 +215,7 @@ impl Advice {
             alternatives: [None; MAX_MODES],
             anew: None,
             margins: None,
+            lost_share: 0.0,
         }
     }
 }

@@ -5,7 +5,7 @@
 //! continuity, since the next one may be far below; there, and back again, [`EASE`] is between.
 
 use super::search;
-use crate::passes::Phasing;
+use crate::passes::{Passes, Phasing};
 use crate::strips::{Going, Strips};
 use headrace_geometry::math;
 
@@ -24,6 +24,8 @@ pub(super) struct Driving<'a> {
     pub(super) phasing: &'a Phasing,
     pub(super) going: &'a Going,
     pub(super) parallax_rad: f64,
+    /// Lost returns count.
+    pub(super) lossy: bool,
     pub(super) astern: bool,
     pub(super) target_m: f64,
     /// No speed above it meets the target, however the heads are phased, m/s.
@@ -34,17 +36,19 @@ impl Driving<'_> {
     /// Whether a speed meets the target, more or less a share of it.
     pub(super) fn meets(&self, speed_mps: f64, more: f64) -> bool {
         let target_m = self.target_m * (1.0 + more);
-        let signed_mps = if self.astern { -speed_mps } else { speed_mps };
-        let then = self.phasing.at(signed_mps).beside(self.parallax_rad);
+        let then = self.passes(speed_mps);
         // No strip has more passes than all heads make: this test alone rules out most speeds.
         let gap_s = then.gap_s(then.heads()).unwrap_or(f64::INFINITY);
         speed_mps * gap_s <= target_m && self.strips.meets(0, &then, speed_mps, target_m, self.going)
     }
 
     fn t_m(&self, speed_mps: f64) -> f64 {
+        self.strips.t_max_m(0, &self.passes(speed_mps), speed_mps, self.going)
+    }
+
+    fn passes(&self, speed_mps: f64) -> Passes {
         let signed_mps = if self.astern { -speed_mps } else { speed_mps };
-        let then = self.phasing.at(signed_mps).beside(self.parallax_rad);
-        self.strips.t_max_m(0, &then, speed_mps, self.going)
+        self.phasing.at(signed_mps).beside(self.parallax_rad).lossy(self.lossy)
     }
 
     /// The largest speed, m/s; zero where there is none. `last_mps` is the one found before.

@@ -1,6 +1,7 @@
 use super::*;
 use crate::fixtures;
 use crate::head::{Basis, Turn};
+use crate::losses::LossRate;
 use crate::spacing;
 use headrace_geometry::frames::Vec3;
 use headrace_geometry::math::TAU;
@@ -53,6 +54,7 @@ impl Case {
             layout: HeadLayout::PhaseShift,
             configured: specs.len(),
             heads,
+            losses: [LossRate::default(); MAX_HEADS],
         };
         Self { profile, specs, situation, target_m, left_s: None }
     }

@@ -64,6 +64,16 @@ impl<'a> Thin<'a> {
         kept.map_or_else(|| self.passes.gap_s(seen_by), |(_, gap_s)| *gap_s)
     }
 
+    /// The longest time that so many passes over a strip take, seconds: see [`Passes::time_for_s`].
+    pub(super) fn time_for_s(&self, seen_by: HeadSet, gap_s: f64, needed: f64) -> f64 {
+        if needed > 1.0 { self.passes.time_for_s(seen_by, gap_s, needed) } else { gap_s }
+    }
+
+    /// Whether lost returns count.
+    pub(super) fn is_lossy(&self) -> bool {
+        self.passes.is_lossy()
+    }
+
     /// Whether a strip is passed as often as any.
     pub(super) fn is_full(&self, k: usize, seen_by: HeadSet) -> bool {
         self.gap_s(k, seen_by).is_some_and(|gap_s| gap_s <= self.best_s)

@@ -212,10 +212,20 @@ impl View {
         let figures = words.numbers().zip(cause);
         let silent = words.integer().and_then(|bits| u8::try_from(bits).ok()).map(HeadSet::from_bits);
         let causes = words.integer().and_then(|bits| u16::try_from(bits).ok()).map(Causes::from_bits);
+        let with_losses_mps = words.number().unwrap_or(0.0);
         let cause = figures.map(|([speed_mps, t_y_m, middle_t_y_m, missing_share, swing_m], cause)| {
             let silent_heads = silent.unwrap_or_default();
             let causes = causes.unwrap_or(Causes::of(cause));
-            CauseFigures { causes, speed_mps, t_y_m, middle_t_y_m, missing_share, swing_m, silent_heads }
+            CauseFigures {
+                causes,
+                speed_mps,
+                t_y_m,
+                middle_t_y_m,
+                missing_share,
+                with_losses_mps,
+                swing_m,
+                silent_heads,
+            }
         });
         let judged = Judged { at, section, change, verdict, hole_m, hole_sd_m, hole_x_m, hole_arc_m, cause };
         self.wall.judge(section, verdict);

@@ -36,7 +36,7 @@ export interface State {
     chainage_sd_m: number | null; place_sd_m: number | null; yaw_sd_deg: number | null; pass_sd_m: number | null;
   };
   speed_mps: number | null; v_max_mps: number | null; reason: string | null; remedy?: string | null;
-  margins: { speed_mps: number | null; turn_m: number | null; position_m: number | null };
+  margins: { speed_mps: number | null; turn_m: number | null; position_m: number | null; lost_share: number | null };
   turn: Turn | null;
   sensors: Sensor[];
   metres: { pass_m: number; fail_m: number; cannot_say_m: number; open_m: number; not_inspected_m: number; way_m: number };

@@ -33,7 +33,7 @@ export function Speed() {
   useTopics(store.topics.state);
   const { state } = store;
   const speed = state?.speed_mps ?? null, most = state?.v_max_mps ?? null;
-  const margin = state?.margins.speed_mps ?? null;
+  const margin = state?.margins.speed_mps ?? null, lost = state?.margins.lost_share ?? null;
   return (
     <div class="speed">
       <div class="figures">
@@ -43,7 +43,7 @@ export function Speed() {
       </div>
       <Gauge speed={speed} most={most} />
       <div class="why">
-        {state?.reason ? <span><b>limit</b> {REASONS[state.reason] ?? state.reason}</span> : null}
+        {state?.reason ? <span><b>limit</b> {lost === null ? (REASONS[state.reason] ?? state.reason) : `${figure(100 * lost, 0)} % of returns lost`}</span> : null}
         {state?.remedy ? <span class="remedy"><b>to gain more</b> {state.remedy}</span> : null}
       </div>
       <Forecast />
@@ -80,12 +80,12 @@ function Gauge({ speed, most }: { speed: number | null; most: number | null }) {
 function Forecast() {
   const turn = store.state?.turn ?? null;
   if (!turn) return <div class="forecast">no forecast for this turn</div>;
-  const { predicted_t_m, target_m, will_exceed } = turn;
+  const { predicted_t_m, target_m, will_exceed } = turn, lost = store.state?.margins.lost_share ?? null;
   const share = predicted_t_m === null ? 1 : Math.min(1, predicted_t_m / (2 * target_m));
   const over = predicted_t_m === null || predicted_t_m > target_m;
   return (
     <div class={`forecast${over ? " over" : ""}`}>
-      <span>this turn: largest hole {predicted_t_m === null ? "unbounded" : `${figure(predicted_t_m, 2)} m`} of {figure(target_m, 2)} m {over ? (will_exceed ? "▲ misses" : "▲") : "✓"}</span>
+      <span>this turn: largest hole {predicted_t_m === null ? "unbounded" : `${figure(predicted_t_m, 2)} m`} of {figure(target_m, 2)} m{lost === null ? "" : ", had none been lost"} {over ? (will_exceed ? "▲ misses" : "▲") : "✓"}</span>
       <svg viewBox="0 0 200 8" preserveAspectRatio="none" aria-hidden="true"><rect width="200" height="8" class="zone-none" /><rect width={share * 200} height="8" class={over ? "zone-red" : "zone-green"} /><path class="limit" d="M100 0V8" /></svg>
     </div>
   );

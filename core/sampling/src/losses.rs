@@ -1,0 +1,150 @@
+//! Returns that are lost by chance, and how many passes over a place make up for them.
+//!
+//! The model: along a turn, a head's pings are lost in runs (Gilbert 1960: a share, and a share after a lost one), passes lose
+//! independently of each other. A run that is lost widens the circle that fits between two passes; a run as wide as the target
+//! takes the pass away there. Counted are places where the wall was heard a turn before: what is lost at the same angle turn after
+//! turn isn't lost by chance, and going slower doesn't bring it back.
+
+use serde::{Deserialize, Serialize};
+
+use super::head::MAX_HEADS;
+use headrace_geometry::math;
+
+/// Length of wall, m, of which the share [`MAY_FAIL`] may fail for lost returns.
+const STRETCH_M: f64 = 0.25;
+/// Share of stretches that may fail, so that the others, 95 in 100, pass.
+const MAY_FAIL: f64 = 0.05;
+/// Most passes that are asked for: beyond, nobody waits, and the returns have to come back.
+pub const MOST_PASSES: f64 = 10.0;
+/// Shares of lost returns count at most as this: a head that hears one ping in a thousand hears nothing.
+const MOST_SHARE: f64 = 0.999;
+
+/// How often a head's pings get no return by chance.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+pub struct LossRate {
+    /// Share of its pings, from 0 to 1.
+    pub share: f64,
+    /// Share of those that follow a lost one, from 0 to 1.
+    pub after_lost: f64,
+}
+
+impl LossRate {
+    /// Of pings lost independently of each other.
+    pub fn independent(share: f64) -> Self {
+        Self { share, after_lost: share }
+    }
+
+    fn clamped(self) -> Self {
+        Self { share: self.share.clamp(0.0, MOST_SHARE), after_lost: self.after_lost.clamp(0.0, MOST_SHARE) }
+    }
+
+    /// Chance that so many pings in a row are lost, one at least.
+    fn chance_of_run(self, pings: f64) -> f64 {
+        self.share * power(self.after_lost, (pings - 1.0).max(0.0))
+    }
+
+    /// Pings of the longest run lost at as many as `chances` places of the wall, with the chance [`MAY_FAIL`]; zero where even one is rarer.
+    fn longest_run(self, chances: f64) -> f64 {
+        let expected = chances * self.share / MAY_FAIL;
+        if expected <= 0.0 {
+            return 0.0;
+        }
+        let rarer = -math::ln(self.after_lost.max(f64::MIN_POSITIVE));
+        (1.0 + math::ln(expected) / rarer).max(0.0)
+    }
+}
+
+/// Wall as it is sampled, and what is asked of it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Sampled {
+    /// Target T, m.
+    pub target_m: f64,
+    /// Largest distance between neighbours of one turn, m.
+    pub t_y_m: f64,
+    /// Perimeter of the wall, m.
+    pub perimeter_m: f64,
+}
+
+impl Sampled {
+    /// How many passes over each place it takes, in place of one, that 95 of 100 stretches of a quarter metre meet the target although
+    /// returns are lost: the distance between passes that the target allows, over that which losses leave of it. From 1, where none
+    /// are lost, to [`MOST_PASSES`]; continuous in all that is measured. The heads go by in turn, those that lose most come first.
+    ///
+    /// Source: `docs/coverage.md`, "Lost returns".
+    pub fn passes_needed(&self, rates: impl Iterator<Item = LossRate>) -> f64 {
+        let mut heads = [LossRate::default(); MAX_HEADS];
+        let mut count = 0;
+        for (slot, rate) in heads.iter_mut().zip(rates) {
+            *slot = rate.clamped();
+            count += 1;
+        }
+        let heads = heads.get_mut(..count).unwrap_or_default();
+        let lattice_m2 = (self.target_m - self.t_y_m) * (self.target_m + self.t_y_m);
+        if lattice_m2 <= 0.0 || self.t_y_m <= 0.0 || heads.iter().all(|rate| rate.share <= 0.0) {
+            return 1.0;
+        }
+        let pings = self.pings_across();
+        heads.sort_unstable_by(|a, b| b.chance_of_run(pings).total_cmp(&a.chance_of_run(pings)));
+        let along_m = math::sqrt(lattice_m2);
+        let places = self.perimeter_m / self.t_y_m * STRETCH_M / along_m;
+        // The more passes, the more places at which they may fail together.
+        let once = self.passes_for(places, along_m, heads);
+        self.passes_for(places * once, along_m, heads)
+    }
+
+    /// Pings that must be lost for a pass to be lost as wide as the target, one at least.
+    fn pings_across(&self) -> f64 {
+        (self.target_m / self.t_y_m - 1.0).max(1.0)
+    }
+
+    /// The same for a number of places at which passes may be lost together.
+    fn passes_for(&self, places: f64, along_m: f64, heads: &[LossRate]) -> f64 {
+        let pings = self.pings_across();
+        let mut left = places;
+        let mut whole = 0.0;
+        let mut going_by = heads.iter().cycle();
+        while let Some(head) = going_by.next().filter(|_| whole < MOST_PASSES) {
+            let chance = head.chance_of_run(pings);
+            if left * chance <= MAY_FAIL {
+                return (whole + along_m / self.along_with_run_m(head.longest_run(left)))
+                    .clamp(1.0, MOST_PASSES);
+            }
+            left *= chance;
+            whole += 1.0;
+        }
+        MOST_PASSES
+    }
+
+    /// Distance between passes at which the largest circle is the target where one pass lacks a run of pings, m.
+    ///
+    /// With half a step h and half the gap g, the circle touches the two ends of the gap and two neighbours of the pass before; its
+    /// centre lies (a^2 + h^2 - g^2) / (2 a) off the pass with the gap, a the distance between passes.
+    fn along_with_run_m(&self, lost: f64) -> f64 {
+        let half_m = self.t_y_m / 2.0;
+        let gap_m = (half_m * (1.0 + lost)).min(self.target_m / 2.0).max(half_m);
+        let [h2, g2] = [half_m * half_m, gap_m * gap_m];
+        let b = self.target_m * self.target_m - 2.0 * (h2 + g2);
+        let root = math::sqrt((b * b - 4.0 * (g2 - h2) * (g2 - h2)).max(0.0));
+        math::sqrt(f64::midpoint(b, root).max(0.0)).max(f64::MIN_POSITIVE)
+    }
+
+    /// The target that a lattice without losses must meet so that this one is met with so many passes, m.
+    pub fn target_for_m(&self, passes: f64) -> f64 {
+        let t_y2_m2 = self.t_y_m * self.t_y_m;
+        let along_m2 = (self.target_m * self.target_m - t_y2_m2).max(0.0);
+        if passes <= 1.0 || along_m2 <= 0.0 {
+            return self.target_m;
+        }
+        math::sqrt(along_m2 / (passes * passes) + t_y2_m2)
+    }
+}
+
+fn power(base: f64, exponent: f64) -> f64 {
+    if base <= 0.0 {
+        return if exponent > 0.0 { 0.0 } else { 1.0 };
+    }
+    math::exp(exponent * math::ln(base))
+}
+
+#[cfg(test)]
+mod tests;

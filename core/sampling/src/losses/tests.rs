@@ -1,0 +1,153 @@
+//! The passes that are asked for against walls that are sampled with losses drawn at random, whose holes are found by brute force.
+
+use super::*;
+
+const TARGET_M: f64 = 0.5;
+const PERIMETER_M: f64 = 12.0;
+
+fn sampled(t_y_m: f64) -> Sampled {
+    Sampled { target_m: TARGET_M, t_y_m, perimeter_m: PERIMETER_M }
+}
+
+fn passes(t_y_m: f64, rates: &[LossRate]) -> f64 {
+    sampled(t_y_m).passes_needed(rates.iter().copied())
+}
+
+/// Numbers from 0 to 1 (splitmix64).
+struct Draw(u64);
+
+impl Draw {
+    fn next(&mut self) -> f64 {
+        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
+        let mut z = self.0;
+        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+        ((z ^ (z >> 31)) >> 11) as f64 / (1_u64 << 53) as f64
+    }
+}
+
+/// Share of quarter metres without a circle of the target's diameter that holds no sample, where passes are so far apart.
+fn share_passed(along_m: f64, t_y_m: f64, rates: &[LossRate], seed: u64) -> f64 {
+    const STRETCHES: usize = 80;
+    const FINE_M: f64 = 0.02;
+    let mut draw = Draw(seed);
+    let length_m = STRETCHES as f64 * STRETCH_M + 2.0 * TARGET_M;
+    let turns = (length_m / along_m).ceil() as usize + 1;
+    let pings = (PERIMETER_M / t_y_m).round();
+    let mut lost = vec![false; rates.len()];
+    // Samples by rows of half a metre along the wall.
+    let mut rows = vec![Vec::new(); (length_m / TARGET_M) as usize + 3];
+    for turn in 0..turns {
+        let head = turn % rates.len();
+        let LossRate { share, after_lost } = rates[head];
+        let heard_to_lost = share * (1.0 - after_lost) / (1.0 - share);
+        let offset = draw.next();
+        for ping in 0..pings as usize {
+            lost[head] = draw.next() < if lost[head] { after_lost } else { heard_to_lost };
+            if !lost[head] {
+                let x_m = (turn as f64 + ping as f64 / pings) * along_m;
+                let y_m = ((ping as f64 + offset) % pings) * PERIMETER_M / pings;
+                if let Some(row) = rows.get_mut((x_m / TARGET_M) as usize) {
+                    row.push([x_m, y_m]);
+                }
+            }
+        }
+    }
+    let is_empty = |x_m: f64, y_m: f64| {
+        let row = (x_m / TARGET_M) as usize;
+        rows[row.saturating_sub(1)..(row + 2).min(rows.len())].iter().flatten().all(|[sx, sy]| {
+            let across = (sy - y_m).abs();
+            let across = across.min(PERIMETER_M - across);
+            (sx - x_m) * (sx - x_m) + across * across > TARGET_M * TARGET_M / 4.0
+        })
+    };
+    let fails = |stretch: usize| {
+        let from_m = TARGET_M + stretch as f64 * STRETCH_M;
+        (0..(STRETCH_M / FINE_M) as u32).any(|i| {
+            (0..(PERIMETER_M / FINE_M) as u32)
+                .any(|j| is_empty(from_m + f64::from(i) * FINE_M, f64::from(j) * FINE_M))
+        })
+    };
+    (0..STRETCHES).filter(|stretch| !fails(*stretch)).count() as f64 / STRETCHES as f64
+}
+
+fn along_m(t_y_m: f64, passes: f64) -> f64 {
+    (TARGET_M * TARGET_M - t_y_m * t_y_m).sqrt() / passes
+}
+
+#[test]
+fn nineteen_of_twenty_stretches_pass_with_the_passes_that_are_asked_for() {
+    let rates = [
+        LossRate::independent(0.02),
+        LossRate::independent(0.1),
+        LossRate::independent(0.3),
+        LossRate::independent(0.5),
+        LossRate { share: 0.1, after_lost: 0.5 },
+        LossRate { share: 0.2, after_lost: 0.8 },
+    ];
+    for t_y_m in [0.07, 0.1, 0.2] {
+        for (seed, rate) in (1..).zip(rates) {
+            let passes = passes(t_y_m, &[rate]);
+            let share = share_passed(along_m(t_y_m, passes), t_y_m, &[rate], seed);
+            // Of 80 stretches; neighbours share their holes.
+            assert!(share >= 0.87, "steps of {t_y_m} m, {rate:?}: {passes:.2} passes, {share:.2} pass");
+        }
+    }
+}
+
+#[test]
+fn with_notably_fewer_passes_they_do_not() {
+    let rates =
+        [LossRate::independent(0.2), LossRate::independent(0.5), LossRate { share: 0.2, after_lost: 0.8 }];
+    for t_y_m in [0.07, 0.1] {
+        for (seed, rate) in (1..).zip(rates) {
+            let passes = passes(t_y_m, &[rate]) / 1.4;
+            let share = share_passed(along_m(t_y_m, passes), t_y_m, &[rate], seed);
+            assert!(share < 0.9, "steps of {t_y_m} m, {rate:?}: {passes:.2} passes, {share:.2} pass");
+        }
+    }
+}
+
+#[test]
+fn a_head_that_hears_nothing_leaves_its_passes_to_the_others() {
+    let sound = LossRate::default();
+    let deaf = LossRate::independent(1.0);
+    assert!((passes(0.1, &[sound, deaf, sound, sound]) - 2.0).abs() < 1e-12);
+    assert!((passes(0.1, &[deaf, deaf, sound, sound]) - 3.0).abs() < 1e-12);
+    assert!((passes(0.1, &[deaf]) - MOST_PASSES).abs() < 1e-12);
+    // That it loses some, too, costs more than either alone.
+    let lossy = LossRate::independent(0.1);
+    let all = passes(0.1, &[deaf, lossy, lossy, lossy]);
+    assert!(all > 2.05 && all > passes(0.1, &[lossy; 4]), "{all}");
+    // Alike, it doesn't matter how many they are.
+    assert!((passes(0.1, &[lossy; 4]) - passes(0.1, &[lossy])).abs() < 1e-12);
+}
+
+#[test]
+fn it_grows_with_what_is_lost_and_has_no_steps() {
+    for t_y_m in [0.03, 0.1, 0.2, 0.35] {
+        let at = |share: f64| passes(t_y_m, &[LossRate::independent(share)]);
+        assert!(at(0.002) >= 1.0 && at(0.998) >= 6.0);
+        for k in 0..4980 {
+            let [mut low, mut high] = [k, k + 1].map(|k| 0.002 + 2e-4 * f64::from(k));
+            assert!(at(high) >= at(low) - 1e-9, "steps of {t_y_m} m, {high}: {} to {}", at(low), at(high));
+            // It is steep where a run comes to be as wide as the target.
+            for _ in 0..40 {
+                let middle = f64::midpoint(low, high);
+                if at(middle) - at(low) > at(high) - at(middle) { high = middle } else { low = middle }
+            }
+            assert!(at(high) <= 1.001 * at(low), "steps of {t_y_m} m, {high}: {} to {}", at(low), at(high));
+        }
+    }
+}
+
+#[test]
+fn without_losses_or_without_a_speed_it_asks_for_nothing() {
+    assert!((passes(0.1, &[LossRate::default(); 4]) - 1.0).abs() <= 0.0);
+    assert!((passes(0.1, &[]) - 1.0).abs() <= 0.0);
+    // Steps longer than the target: no speed is to be divided.
+    assert!((passes(0.6, &[LossRate::independent(0.5)]) - 1.0).abs() <= 0.0);
+    assert!((sampled(0.1).target_for_m(1.0) - TARGET_M).abs() <= 0.0);
+    let half_m = sampled(0.3).target_for_m(2.0);
+    assert!((half_m * half_m - (0.04 + 0.09)).abs() < 1e-12, "half of 0.4 m along, 0.3 m across");
+}

@@ -1,0 +1,34 @@
+//! Passes over each strip that it takes for one, where returns are lost.
+
+use super::Strips;
+use super::thin::Thin;
+use crate::head::{HeadSet, MAX_HEADS};
+use crate::losses::{LossRate, Sampled};
+
+impl Strips {
+    /// Finds how many passes over each strip it takes for one in a setting, with what each head loses, `None` for a head that is
+    /// absent; for [`Passes::lossy`].
+    ///
+    /// Allocates: not with capacity for the settings.
+    pub fn count_losses(&mut self, setting: usize, target_m: f64, rates: &[Option<LossRate>; MAX_HEADS]) {
+        let Self { strips, steps_m, needed, .. } = self;
+        let first = setting * strips.len();
+        needed.resize(steps_m.len(), [1.0; 2]);
+        let lost = |heads: HeadSet| heads.iter().filter_map(|head| *rates.get(head)?);
+        let all = HeadSet::first(MAX_HEADS);
+        let slots = needed.iter_mut().skip(first).zip(steps_m.iter().skip(first));
+        for (strip, (slot, [own_m, most_m])) in strips.iter().zip(slots) {
+            let sampled = |t_y_m: f64| Sampled { target_m, t_y_m, perimeter_m: strip.arc.length_m };
+            *slot = [
+                sampled(*own_m).passes_needed(lost(strip.seen_by)),
+                sampled(*most_m).passes_needed(lost(all)),
+            ];
+        }
+    }
+
+    /// Passes needed for one within a strip, and across it.
+    pub(super) fn needed(&self, setting: usize, k: usize, thin: &Thin<'_>) -> [f64; 2] {
+        let needed = || self.needed.get(setting * self.strips.len() + k).copied();
+        if thin.is_lossy() { needed().unwrap_or([1.0; 2]) } else { [1.0; 2] }
+    }
+}
