@@ -49,6 +49,29 @@ pub enum WordKind {
     Number,
 }
 
+/// Of a section.
+const SECTION: [(&str, WordKind); 17] = [
+    ("at_ns", WordKind::Integer),
+    ("section", WordKind::Integer),
+    ("change", WordKind::Integer),
+    ("verdict", WordKind::Integer),
+    ("hole_m", WordKind::Number),
+    ("hole_sd_m", WordKind::Number),
+    ("cause", WordKind::Integer),
+    ("hole_x_m", WordKind::Number),
+    ("hole_arc_m", WordKind::Number),
+    // Only with a cause.
+    ("speed_mps", WordKind::Number),
+    ("t_y_m", WordKind::Number),
+    ("middle_t_y_m", WordKind::Number),
+    ("missing_share", WordKind::Number),
+    ("swing_m", WordKind::Number),
+    ("silent_heads", WordKind::Integer),
+    ("causes", WordKind::Integer),
+    // Only where lost returns take a lower speed.
+    ("with_losses_mps", WordKind::Number),
+];
+
 /// Words of a change of an alert.
 const ALERT_CHANGE: [(&str, WordKind); 16] = [
     ("at_ns", WordKind::Integer),
@@ -144,27 +167,7 @@ impl RecordKind {
             Self::NoSample => {
                 &[("received_ns", Integer), ("source", Integer), ("outcome", Integer), ("reason", Integer)]
             }
-            Self::Section => &[
-                ("at_ns", Integer),
-                ("section", Integer),
-                ("change", Integer),
-                ("verdict", Integer),
-                ("hole_m", Number),
-                ("hole_sd_m", Number),
-                ("cause", Integer),
-                ("hole_x_m", Number),
-                ("hole_arc_m", Number),
-                // Only with a cause.
-                ("speed_mps", Number),
-                ("t_y_m", Number),
-                ("middle_t_y_m", Number),
-                ("missing_share", Number),
-                ("swing_m", Number),
-                ("silent_heads", Integer),
-                ("causes", Integer),
-                // Only where lost returns take a lower speed.
-                ("with_losses_mps", Number),
-            ],
+            Self::Section => &SECTION,
             Self::Run => &[("id", Integer), ("change", Integer)],
             Self::Advice => &[
                 ("at_ns", Integer),
