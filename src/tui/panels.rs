@@ -54,7 +54,8 @@ pub(super) fn speed(shot: &Shot, ink: Ink, rows: &mut Rows<'_>) {
     }
     rows.line(Line::from(spans));
     let mut parts: Vec<&str> = Vec::new();
-    if is_known && !shot.reason.is_empty() {
+    // What is lost is among the status' own parts.
+    if is_known && !shot.reason.is_empty() && state.lost_share().is_none() {
         parts.push(&shot.reason);
     }
     // The first parts are in the banner.

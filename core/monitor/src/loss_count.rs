@@ -6,17 +6,17 @@ use serde::{Deserialize, Serialize};
 use headrace_geometry::math::{self, TAU};
 use headrace_sampling::losses::LossRate;
 
-/// Angles told apart: finer than the steps of heads, but for the finest.
-const BINS: usize = 1024;
+/// Angles told apart: finer than the steps of heads.
+const BINS: usize = 2048;
 const WORDS: usize = BINS / 64;
 /// Pings over which shares are counted: once there are so many, they count half.
 const WINDOW: u32 = 4096;
 /// Fewer pings count as so many: one lost at the beginning isn't a share.
-const LEAST: u32 = 256;
+const LEAST: u32 = 100;
 /// Pings as which the share of all is taken for those after a lost one, as long as these are few.
 const USUAL: f64 = 50.0;
-/// Share of a head's pings from which on it is deaf: what it loses then is lost whatever was heard before.
-const NEARLY_ALL: f64 = 0.9;
+/// Share of a head's pings from which on it is nearly deaf: hardly an angle is heard in one turn and the next but one.
+const NEARLY_ALL: f64 = 0.75;
 
 /// Pings, and how many of them were lost.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
@@ -39,19 +39,39 @@ impl Count {
     }
 }
 
+/// A bit for each angle.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+struct Angles([u64; WORDS]);
+
+impl Angles {
+    fn has(&self, bin: usize) -> bool {
+        self.0.get(bin / 64).is_some_and(|word| word >> (bin % 64) & 1 == 1)
+    }
+
+    fn set(&mut self, bin: usize, to: bool) {
+        if let Some(word) = self.0.get_mut(bin / 64) {
+            let bit = 1 << (bin % 64);
+            *word = if to { *word | bit } else { *word & !bit };
+        }
+    }
+}
+
 /// Losses of one head; part of the loop's state.
 ///
-/// Counted are pings at angles at which the head heard the wall when it last pinged there: where a wall sends nothing back turn
-/// after turn, nothing is lost by chance.
+/// Counted are pings at angles at which the head heard the wall a turn before and a turn after: what is silent turn after turn, such as a
+/// side tunnel or wall that is met too flatly, isn't lost by chance, neither where it begins nor where it ends.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Component, Serialize, Deserialize)]
 pub struct LossCount {
-    /// By angle, a bit each: the wall was heard there last.
-    heard: [u64; WORDS],
-    /// Of all pings at wall within range, and those by chance: all, and after a lost one.
+    /// By angle: whether the wall was heard there a turn ago, and the turn before.
+    heard: Angles,
+    heard_before: Angles,
+    /// The ping before the one a turn ago was lost.
+    followed_lost: Angles,
+    /// Of all pings at wall within range, and of those counted: all, and after a lost one.
     any: Count,
     by_chance: Count,
     after_lost: Count,
-    /// The ping before was lost.
+    /// The last ping was lost.
     was_lost: bool,
 }
 
@@ -62,17 +82,18 @@ impl LossCount {
     pub fn ping(&mut self, angle_rad: f64, is_lost: bool) {
         let bin = math::floor_to_i64(math::wrap(angle_rad, TAU) / TAU * BINS as f64);
         let bin = usize::try_from(bin).unwrap_or(0) % BINS;
-        let Some(word) = self.heard.get_mut(bin / 64) else { return };
-        let bit = 1_u64 << (bin % 64);
-        let was_heard = *word & bit != 0;
-        *word = if is_lost { *word & !bit } else { *word | bit };
         self.any.add(is_lost);
-        if was_heard {
-            self.by_chance.add(is_lost);
-            if self.was_lost {
-                self.after_lost.add(is_lost);
+        if !is_lost && self.heard_before.has(bin) {
+            // The ping between is the one that is told of.
+            let was_lost = !self.heard.has(bin);
+            self.by_chance.add(was_lost);
+            if self.followed_lost.has(bin) {
+                self.after_lost.add(was_lost);
             }
         }
+        self.heard_before.set(bin, self.heard.has(bin));
+        self.heard.set(bin, !is_lost);
+        self.followed_lost.set(bin, self.was_lost);
         self.was_lost = is_lost;
     }
 
@@ -112,13 +133,13 @@ mod tests {
     #[test]
     fn losses_by_chance_are_counted_as_they_are() {
         for in_hundred in [2_u32, 10, 40, 70] {
-            let LossRate { share, after_lost } = turned(8000, |ping| chance(ping, in_hundred.into()));
+            let LossRate { share, after_lost } = turned(24_000, |ping| chance(ping, in_hundred.into()));
             let expected = f64::from(in_hundred) / 100.0;
             assert!((share - expected).abs() < 0.03, "{in_hundred}: {share}");
             assert!((after_lost - expected).abs() < 0.08, "{in_hundred}: {after_lost}");
         }
         // In pairs: after the first of two the second is lost, after the second it is as it was.
-        let pairs = turned(8000, |ping| chance(ping / 2, 10));
+        let pairs = turned(24_000, |ping| chance(ping / 2, 10));
         assert!((pairs.share - 0.1).abs() < 0.03 && (pairs.after_lost - 0.55).abs() < 0.1, "{pairs:?}");
     }
 
@@ -128,6 +149,9 @@ mod tests {
         assert!(grazing.share <= 0.0, "{grazing:?}");
         let both = turned(8000, |ping| ping % 400 < 120 || chance(ping, 5));
         assert!((both.share - 0.05).abs() < 0.02, "{both:?}");
+        // Side tunnels, passed by for three turns each.
+        let tunnels = turned(24_000, |ping| ping / 400 % 6 > 2 && ping % 400 < 60);
+        assert!(tunnels.share <= 0.0, "{tunnels:?}");
     }
 
     #[test]

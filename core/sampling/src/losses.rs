@@ -2,8 +2,8 @@
 //!
 //! The model: along a turn, a head's pings are lost in runs (Gilbert 1960: a share, and a share after a lost one), passes lose
 //! independently of each other. A run that is lost widens the circle that fits between two passes; a run as wide as the target
-//! takes the pass away there. Counted are places where the wall was heard a turn before: what is lost at the same angle turn after
-//! turn isn't lost by chance, and going slower doesn't bring it back.
+//! takes the pass away there. What is lost at the same angle turn after turn isn't lost by chance, and
+//! going slower doesn't bring it back: who counts losses leaves it out.
 
 use serde::{Deserialize, Serialize};
 
