@@ -7,7 +7,7 @@ use crate::losses::{LossRate, Sampled};
 
 impl Strips {
     /// Finds how many passes over each strip it takes for one in a setting, with what each head loses, `None` for a head that is
-    /// absent; for [`Passes::lossy`].
+    /// absent; for [`crate::passes::Passes::lossy`].
     ///
     /// Allocates: not with capacity for the settings.
     pub fn count_losses(&mut self, setting: usize, target_m: f64, rates: &[Option<LossRate>; MAX_HEADS]) {
