@@ -2,7 +2,8 @@
 //!
 //! [`section`] and [`spacing`] have the paper's closed forms, [`ring`] the general case by ray casting. [`layout`] and
 //! [`schedule`] say how several heads turn, [`passes`] how often they pass a place, [`swing`] what the vehicle's own
-//! turning adds, [`losses`] what lost returns ask for. [`advice`] combines them for the pilot during the dive, [`plan`] for the engineer before it.
+//! turning adds, [`losses`] what lost returns ask for. [`advice`] combines them for the pilot during the dive, [`plan`] for the
+//! engineer before it.
 //!
 //! ```
 //! use headrace_sampling::head::Turn;

@@ -2,8 +2,8 @@
 //!
 //! The model: along a turn, a head's pings are lost in runs (Gilbert 1960: a share, and a share after a lost one), passes lose
 //! independently of each other. A run that is lost widens the circle that fits between two passes; a run as wide as the target
-//! takes the pass away there. What is lost at the same angle turn after turn isn't lost by chance, and
-//! going slower doesn't bring it back: who counts losses leaves it out.
+//! takes the pass away there. What is lost at the same angle turn after turn isn't lost by chance, and going slower doesn't bring
+//! it back: who counts losses leaves it out.
 
 use serde::{Deserialize, Serialize};
 
@@ -43,9 +43,10 @@ impl LossRate {
         self.share * power(self.after_lost, (pings - 1.0).max(0.0))
     }
 
-    /// Pings of the longest run lost at as many as `chances` places of the wall, with the chance [`MAY_FAIL`]; zero where even one is rarer.
-    fn longest_run(self, chances: f64) -> f64 {
-        let expected = chances * self.share / MAY_FAIL;
+    /// Pings of the longest run to be reckoned with at so many places of the wall: it is lost at one of them with the chance
+    /// [`MAY_FAIL`]; zero where even a single ping is rarer.
+    fn longest_run(self, places: f64) -> f64 {
+        let expected = places * self.share / MAY_FAIL;
         if expected <= 0.0 {
             return 0.0;
         }
@@ -97,7 +98,8 @@ impl Sampled {
         (self.target_m / self.t_y_m - 1.0).max(1.0)
     }
 
-    /// The same for a number of places at which passes may be lost together.
+    /// [`Sampled::passes_needed`] for a number of places at which passes may be lost together, where those without losses may be
+    /// `along_m` apart.
     fn passes_for(&self, places: f64, along_m: f64, heads: &[LossRate]) -> f64 {
         let pings = self.pings_across();
         let mut left = places;
@@ -126,16 +128,6 @@ impl Sampled {
         let b = self.target_m * self.target_m - 2.0 * (h2 + g2);
         let root = math::sqrt((b * b - 4.0 * (g2 - h2) * (g2 - h2)).max(0.0));
         math::sqrt(f64::midpoint(b, root).max(0.0)).max(f64::MIN_POSITIVE)
-    }
-
-    /// The target that a lattice without losses must meet so that this one is met with so many passes, m.
-    pub fn target_for_m(&self, passes: f64) -> f64 {
-        let t_y2_m2 = self.t_y_m * self.t_y_m;
-        let along_m2 = (self.target_m * self.target_m - t_y2_m2).max(0.0);
-        if passes <= 1.0 || along_m2 <= 0.0 {
-            return self.target_m;
-        }
-        math::sqrt(along_m2 / (passes * passes) + t_y2_m2)
     }
 }
 

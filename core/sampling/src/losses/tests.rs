@@ -147,7 +147,4 @@ fn without_losses_or_without_a_speed_it_asks_for_nothing() {
     assert!((passes(0.1, &[]) - 1.0).abs() <= 0.0);
     // Steps longer than the target: no speed is to be divided.
     assert!((passes(0.6, &[LossRate::independent(0.5)]) - 1.0).abs() <= 0.0);
-    assert!((sampled(0.1).target_for_m(1.0) - TARGET_M).abs() <= 0.0);
-    let half_m = sampled(0.3).target_for_m(2.0);
-    assert!((half_m * half_m - (0.04 + 0.09)).abs() < 1e-12, "half of 0.4 m along, 0.3 m across");
 }
