@@ -93,6 +93,11 @@ impl End {
         self.beside
     }
 
+    /// True of a serial port.
+    pub fn is_pseudoterminal(&self) -> bool {
+        self.link.is_some()
+    }
+
     /// The same, not plugged in yet.
     #[must_use]
     pub fn absent(mut self) -> Self {

@@ -8,6 +8,9 @@ use serde_json::Value;
 
 use crate::short_dive::{SCENE, VEHICLE};
 
+/// Time after which a dive is given up that doesn't show what is waited for, s.
+const LONG_S: u32 = 100;
+
 /// The program under test, to be given arguments.
 pub fn program() -> Command {
     // Cargo tells the tests that it runs. A test that is run by itself, as in `tests/vm`, looks where cargo puts programs.
@@ -72,6 +75,23 @@ impl Folder {
         let output = program().args(arguments).current_dir(&self.0).output().unwrap();
         let text = |bytes| String::from_utf8(bytes).unwrap();
         Answer { code: output.status.code(), stdout: text(output.stdout), stderr: text(output.stderr) }
+    }
+
+    /// Dives with these arguments of `run` until the report holds what is waited for: for 3 s, and longer where the machine is too busy
+    /// for that. A log is `dive.mcap`. Gives the last dive's answer and report.
+    pub fn dive_until(&self, arguments: &[&str], is_enough: impl Fn(&Value) -> bool) -> (Answer, Value) {
+        let mut seconds = 3;
+        loop {
+            let time = seconds.to_string();
+            drop(std::fs::remove_file(self.path("dive.mcap")));
+            let answer =
+                self.headrace(&[&["run"], arguments, &["--report", "report.json", "--for", &time]].concat());
+            let report: Value = serde_json::from_slice(&self.read("report.json")).unwrap();
+            if is_enough(&report) || seconds > LONG_S {
+                return (answer, report);
+            }
+            seconds *= 4;
+        }
     }
 
     /// Simulates a scene; the command must succeed.

@@ -19,6 +19,8 @@ mod log_files;
 #[cfg(unix)]
 pub mod page_client;
 pub mod passable;
+#[cfg(unix)]
+mod patient;
 pub mod planned;
 #[cfg(unix)]
 pub mod pty;

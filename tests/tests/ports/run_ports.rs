@@ -50,6 +50,15 @@ fn statuses(report: &Value) -> String {
 }
 
 const RUN: [&str; 7] = ["run", "vehicle.toml", "--no-record", "--report", "report.json", "--for", "3"];
+/// The same, for as long as it takes.
+const RUN_UNTIL: [&str; 2] = ["vehicle.toml", "--no-record"];
+
+/// Whether the first sensor has given readings and been said to run.
+fn first_runs(report: &Value) -> bool {
+    let first = &report["sources"][0];
+    let status = first["line"]["status"].as_str().unwrap_or_default();
+    first["readings"].as_u64() > Some(10) && status.starts_with("running")
+}
 
 #[test]
 fn check_names_every_connect_that_is_wrong_with_what_is_right() {
@@ -77,14 +86,13 @@ fn ports_that_are_wrong_or_not_there_are_named_while_the_dive_goes_on() {
     let device = Faulty::start(vec![emulated(HEAD)], end, Box::new(Healthy));
     let sensors: Vec<_> = [("head", HEAD, place.as_str())].into_iter().chain(WRONG).chain(ABSENT).collect();
     folder.write("vehicle.toml", vehicle(&sensors[..=WRONG.len()]));
-    let answer = folder.headrace(&RUN);
-    let wrong = report(&folder);
+    let (answer, wrong) = folder.dive_until(&RUN_UNTIL, first_runs);
     // A head alone gives no position.
     assert_eq!(answer.code, Some(1), "{}{}", answer.stdout, answer.stderr);
     let few: Vec<_> = sensors[..1].iter().chain(&ABSENT).copied().collect();
     folder.write("vehicle.toml", vehicle(&few));
-    assert_eq!(folder.headrace(&RUN).code, Some(1));
-    let absent = report(&folder);
+    let (second, absent) = folder.dive_until(&RUN_UNTIL, first_runs);
+    assert_eq!(second.code, Some(1), "{}{}", second.stdout, second.stderr);
     drop(device);
     for report in [&wrong, &absent] {
         let head = &report["sources"][0];
@@ -205,10 +213,10 @@ fn reports_that_are_shorter_than_configured_are_named() {
     let end = End::udp();
     folder.write("vehicle.toml", vehicle(&[("counter", COUNTER, &end.connect().to_string())]));
     let device = Faulty::start(vec![emulated(COUNTER)], end, Box::new(Short));
-    let answer = folder.headrace(&RUN);
+    let says_wrong = |report: &Value| statuses(report).contains(": wrong");
+    let (answer, report) = folder.dive_until(&RUN_UNTIL, says_wrong);
     drop(device);
     assert_eq!(answer.code, Some(1), "{}", answer.stderr);
-    let report = report(&folder);
     assert_eq!(report["sources"][0]["readings"], 0);
     insta::assert_snapshot!(statuses(&report), @r#"
     counter: wrong: sends reports of 5 bytes; report_bytes says 11
@@ -225,22 +233,11 @@ fn a_live_dive_s_log_has_what_was_sent_and_replays_to_the_same_digest() {
         Faulty::start(vec![emulated(HEAD)], head, Box::new(Healthy)),
         Faulty::start(vec![emulated(COUNTER)], counter, Box::new(Healthy)),
     ];
-    let answer = folder.headrace(&[
-        "run",
-        "vehicle.toml",
-        "--record",
-        "dive.mcap",
-        "--report",
-        "report.json",
-        "--for",
-        "4",
-        "--require",
-        "all",
-    ]);
+    let recorded = ["vehicle.toml", "--record", "dive.mcap", "--require", "all"];
+    let (answer, live) = folder.dive_until(&recorded, first_runs);
     drop(devices);
     // Without an inertial unit there is no position.
     assert_eq!(answer.code, Some(1), "{}{}", answer.stdout, answer.stderr);
-    let live = report(&folder);
     let (code, replayed) = folder.replay("dive.mcap", &[]);
     assert_eq!((code, &replayed["digest"]), (Some(1), &live["digest"]));
     let log = folder.read("dive.mcap");

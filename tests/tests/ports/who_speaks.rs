@@ -61,7 +61,7 @@ fn dive_among_strangers(option: &str, keys: &str) -> (Value, usize, usize) {
     };
     device.set_nonblocking(true).unwrap();
     stranger.set_nonblocking(true).unwrap();
-    let answer = thread::scope(|scope| {
+    let (answer, report) = thread::scope(|scope| {
         scope.spawn(|| {
             until_end(&|| {
                 // Errors are those of a port that nobody has opened yet.
@@ -82,11 +82,13 @@ fn dive_among_strangers(option: &str, keys: &str) -> (Value, usize, usize) {
                 assert!(stranger.recv(&mut [0; 300]).is_err(), "the host has spoken to a stranger");
             });
         });
-        let arguments =
-            ["run", "vehicle.toml", "--record", "dive.mcap", "--report", "report.json", "--for", "4"];
-        let answer = folder.headrace(&[&arguments[..], &["--require", "all"]].concat());
+        let arguments = ["vehicle.toml", "--record", "dive.mcap", "--require", "all"];
+        let dived = folder.dive_until(&arguments, |report| {
+            let source = &report["sources"][0];
+            source["readings"].as_u64() > Some(20) && source["line"]["strangers"].as_u64() > Some(20)
+        });
         ended.store(true, Ordering::Relaxed);
-        answer
+        dived
     });
     // A depth sensor alone gives no position.
     assert_eq!(answer.code, Some(1), "{}{}", answer.stdout, answer.stderr);
@@ -97,7 +99,7 @@ fn dive_among_strangers(option: &str, keys: &str) -> (Value, usize, usize) {
         let holds = |data: &[u8]| data.windows(4).any(|four| four == wanted);
         raw_messages(&log).iter().filter(|message| holds(&message.data)).count()
     };
-    (report(&folder), has(TRUE_HPA), has(FALSE_HPA))
+    (report, has(TRUE_HPA), has(FALSE_HPA))
 }
 
 #[test]
@@ -122,11 +124,11 @@ fn two(folder: &Folder, connects: [&str; 2]) -> Vec<Value> {
     };
     let sensors: String = ["first", "second"].into_iter().zip(connects).map(sensor).collect();
     folder.write("vehicle.toml", format!("{HEADING}{sensors}"));
-    let run =
-        ["run", "vehicle.toml", "--no-record", "--report", "report.json", "--for", "3", "--require", "first"];
-    let answer = folder.headrace(&run);
+    let run = ["vehicle.toml", "--no-record", "--require", "first"];
+    let is_read = |report: &Value| report["sources"][0]["readings"].as_u64() > Some(0);
+    let (answer, report) = folder.dive_until(&run, is_read);
     assert_eq!(answer.code, Some(1), "{}{}", answer.stdout, answer.stderr);
-    report(folder)["sources"].as_array().unwrap().clone()
+    report["sources"].as_array().unwrap().clone()
 }
 
 #[test]
