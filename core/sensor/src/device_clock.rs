@@ -12,6 +12,10 @@ use headrace_geometry::math;
 use headrace_geometry::time::{DurNs, MonoNs};
 use headrace_snapshot::array;
 
+mod sample_times;
+
+pub use sample_times::SampleTimes;
+
 /// Maximum number of stretches kept.
 const PLACES: usize = 128;
 

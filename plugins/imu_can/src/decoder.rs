@@ -2,7 +2,7 @@
 
 use headrace_sensor::codec::{Codec as _, CodecCounts, Framing as _};
 use headrace_sensor::device::Decoder;
-use headrace_sensor::device_clock::{ClockReport, DeviceClock};
+use headrace_sensor::device_clock::{ClockReport, SampleTimes};
 use headrace_sensor::geometry::frames::{Rot, Sensor, Vec3};
 use headrace_sensor::geometry::time::{DurNs, MonoNs};
 use headrace_sensor::reading::{Decoded, Level, Packet, Reading};
@@ -54,7 +54,7 @@ struct State {
     /// True once a quaternion has come; Euler angles are then ignored, lest the attitude be used twice.
     sends_quaternions: bool,
     sample_time_ticks: Option<u32>,
-    clock: Option<DeviceClock>,
+    clock: Option<SampleTimes>,
     stamped_by_filter: Option<bool>,
     received: MonoNs,
     group: Option<u16>,
@@ -131,7 +131,9 @@ impl Decoder for ImuDecoder {
             };
             state.received = packet.received;
             if let Some((reading, delay)) = state.take(&message) {
-                let valid_at = packet.received - (state.meaning.latency + delay);
+                let received = packet.received;
+                let came = state.clock.as_mut().map_or(received, |clock| clock.arrival(&reading, received));
+                let valid_at = came - (state.meaning.latency + delay);
                 sink(Decoded { valid_at, reading });
             }
         });
@@ -148,7 +150,7 @@ impl Decoder for ImuDecoder {
     }
 
     fn clock(&self) -> Option<ClockReport> {
-        self.state.clock.as_ref().map(DeviceClock::report)
+        self.state.clock.as_ref().map(SampleTimes::report)
     }
 }
 
@@ -256,8 +258,8 @@ impl State {
 
     /// Processes a timestamp of the unit's 32-bit clock.
     fn stamp(&mut self, ticks: u32, tick: DurNs) {
-        let clock = self.clock.get_or_insert_with(|| DeviceClock::new(u32::BITS, tick));
-        clock.take(u64::from(ticks), self.received);
+        let clock = self.clock.get_or_insert_with(|| SampleTimes::new(u32::BITS, tick));
+        clock.stamp(u64::from(ticks), self.received);
     }
 
     fn rate(&mut self, radps: [f64; 3]) -> Told {

@@ -207,10 +207,21 @@ fn holes_within_their_bounds(holes: &[(f64, f64)], least: f64) {
     assert!((least..=0.99).contains(&within), "{within}");
 }
 
+/// What a dive with a silence came to: whether each error of its epochs is within three standard deviations, the worst, and the share
+/// of pings without a fix.
+fn silenced(seed: u64, silence: Silence) -> (Vec<bool>, f64, f64) {
+    let scene = field(seed, 40.0);
+    let track = dive(&scene, filter(&scene), silence);
+    let off =
+        |epoch: &tracking::Epoch| POSE.map(|i| epoch.errors[i].abs() / math::sqrt(epoch.factors.variance(i)));
+    let off: Vec<f64> = track.epochs[SETTLED..].iter().flat_map(off).collect();
+    let lost = share(track.fixes.iter().map(|tracked| tracked.fix.is_err()));
+    (off.iter().map(|off| *off <= 3.0).collect(), off.iter().copied().fold(0.0, f64::max), lost)
+}
+
 /// Each sensor lost for a while, and for good: the error stays within what is told of it, and grows no faster.
 #[test]
 fn whatever_falls_silent_the_error_stays_within_its_bounds() {
-    let scene = field(3, 40.0);
     for (name, sources) in [
         ("the head", vec![0]),
         ("the left echosounder", vec![1]),
@@ -222,15 +233,14 @@ fn whatever_falls_silent_the_error_stays_within_its_bounds() {
         ("everything", vec![0, 1, 2, 3, 4, 5, 6, 7]),
     ] {
         for to_s in [70.0, 120.0, f64::INFINITY] {
-            let silence = Silence { sources: sources.clone(), from_s: 60.0, to_s };
-            let track = dive(&scene, filter(&scene), silence);
-            let off = |epoch: &tracking::Epoch| {
-                POSE.map(|i| epoch.errors[i].abs() / math::sqrt(epoch.factors.variance(i)))
-            };
-            let settled = &track.epochs[SETTLED..];
-            let within = share(settled.iter().flat_map(off).map(|off| off <= 3.0));
-            let worst = settled.iter().flat_map(off).fold(0.0, f64::max);
-            let lost = share(track.fixes.iter().map(|tracked| tracked.fix.is_err()));
+            // A unit that is back after a minute leaves some dives too sure for a while: 1 % of epochs, told of several.
+            let seeds = if name == "the inertial unit" && to_s.is_finite() { 1..=6 } else { 3..=3 };
+            let dives: Vec<_> = seeds
+                .map(|seed| silenced(seed, Silence { sources: sources.clone(), from_s: 60.0, to_s }))
+                .collect();
+            let within = share(dives.iter().flat_map(|(within, ..)| within.iter().copied()));
+            let worst = dives.iter().map(|(_, worst, _)| *worst).fold(0.0, f64::max);
+            let lost = dives.iter().map(|(.., lost)| *lost).fold(0.0, f64::max);
             println!(
                 "{name} from 60 to {to_s} s: within 3 sigma {within:.4}, worst {worst:.1}, no fix {lost:.2}"
             );

@@ -14,7 +14,8 @@ const MOST: usize = 1024;
 const MOST_FELT: usize = 1024;
 /// Longest interval for which an inertial sample is valid.
 const SPEAKS_FOR: DurNs = DurNs(100_000_000);
-/// Samples nearer than this are merged.
+/// Samples nearer than this are merged: rate and force of one, or several that came in one burst, of which the mean counts for all the
+/// time since the one before.
 const SAME: DurNs = DurNs(500_000);
 
 /// A waiting reading.
@@ -28,11 +29,19 @@ pub struct Waiting {
     pub reading: Reading,
 }
 
+/// Samples of one time: their means, and how many rates and forces these are of.
+#[derive(Debug, Clone, Copy, Serialize, Deserialize)]
+struct FeltAt {
+    at: MonoNs,
+    felt: Felt,
+    counts: [u32; 2],
+}
+
 /// Readings in order of validity; those of the same time in order of arrival.
 #[derive(Debug, Clone)]
 pub struct Window {
     waiting: Vec<Waiting>,
-    felt: Vec<(MonoNs, Felt)>,
+    felt: Vec<FeltAt>,
     /// The last implausible force that may have been true, and the speed that it would have carried, m/s.
     jolt: Option<(MonoNs, f64)>,
 }
@@ -58,17 +67,21 @@ impl Window {
 
     /// Notes a turn rate; false when there is no room.
     pub fn take_rate(&mut self, at: MonoNs, rate_radps: Vec3<Body>) -> bool {
-        self.felt_at(at).map(|felt| felt.rate_radps = Some(rate_radps)).is_some()
+        self.felt_at(at)
+            .map(|FeltAt { felt, counts: [of, _], .. }| take_mean(&mut felt.rate_radps, of, rate_radps))
+            .is_some()
     }
 
     /// Notes a specific force; false when there is no room.
     pub fn take_force(&mut self, at: MonoNs, force_mps2: Vec3<Body>) -> bool {
-        self.felt_at(at).map(|felt| felt.force_mps2 = Some(force_mps2)).is_some()
+        self.felt_at(at)
+            .map(|FeltAt { felt, counts: [_, of], .. }| take_mean(&mut felt.force_mps2, of, force_mps2))
+            .is_some()
     }
 
     /// Notes a force that isn't used, m/s^2: the speed that it may have carried over the time since the sample before.
     pub fn take_jolt(&mut self, at: MonoNs, force_mps2: f64) {
-        let before = self.felt.iter().rev().map(|(felt, _)| *felt).find(|felt| *felt < at);
+        let before = self.felt.iter().rev().map(|felt| felt.at).find(|felt| *felt < at);
         let lasted = before.map_or(SPEAKS_FOR, |before| at.since(before).min(SPEAKS_FOR));
         let carried_mps = self.jolt.map_or(0.0, |(_, speed_mps)| speed_mps);
         self.jolt = Some((at, carried_mps + force_mps2 * lasted.as_secs_f64()));
@@ -84,31 +97,32 @@ impl Window {
         self.jolt
     }
 
-    fn felt_at(&mut self, at: MonoNs) -> Option<&mut Felt> {
-        let place = self.felt.partition_point(|(other, _)| *other + SAME < at);
-        let same = self.felt.get(place).is_some_and(|(other, _)| other.since(at).0.abs() <= SAME.0);
+    fn felt_at(&mut self, at: MonoNs) -> Option<&mut FeltAt> {
+        let place = self.felt.partition_point(|other| other.at + SAME < at);
+        let same = self.felt.get(place).is_some_and(|other| other.at.since(at).0.abs() <= SAME.0);
         if !same {
             if self.felt.len() == MOST_FELT {
                 return None;
             }
-            self.felt.insert(place, (at, Felt { rate_radps: None, force_mps2: None }));
+            let felt = Felt { rate_radps: None, force_mps2: None };
+            self.felt.insert(place, FeltAt { at, felt, counts: [0; 2] });
         }
-        self.felt.get_mut(place).map(|(_, felt)| felt)
+        self.felt.get_mut(place)
     }
 
     /// Inertial data from `from` on, and the end of its validity, `until` at the latest: a sample is the mean over the time
     /// before it.
     pub fn felt(&self, from: MonoNs, until: MonoNs) -> (Felt, MonoNs) {
-        let next = self.felt.partition_point(|(at, _)| *at <= from);
+        let next = self.felt.partition_point(|felt| felt.at <= from);
         let speaking = |number: Option<usize>| {
             let sample = number.and_then(|number| self.felt.get(number));
-            sample.filter(|(at, _)| at.since(from).0.abs() <= SPEAKS_FOR.0)
+            sample.filter(|sample| sample.at.since(from).0.abs() <= SPEAKS_FOR.0)
         };
         let (at, sample) = match (speaking(Some(next)), speaking(next.checked_sub(1))) {
-            (Some((at, felt)), _) => ((*at).min(until), *felt),
-            (None, Some((at, felt))) => ((*at + SPEAKS_FOR).min(until), *felt),
+            (Some(next), _) => (next.at.min(until), next.felt),
+            (None, Some(last)) => ((last.at + SPEAKS_FOR).min(until), last.felt),
             (None, None) => {
-                let later = self.felt.get(next).map_or(until, |(at, _)| *at - SPEAKS_FOR);
+                let later = self.felt.get(next).map_or(until, |next| next.at - SPEAKS_FOR);
                 return (Felt { rate_radps: None, force_mps2: None }, later.clamp(from + DurNs(1), until));
             }
         };
@@ -116,7 +130,7 @@ impl Window {
         let near = |pick: fn(&Felt) -> Option<Vec3<Body>>| {
             pick(&sample).or_else(|| {
                 let around = [Some(next + 1), next.checked_sub(1), next.checked_sub(2)];
-                around.into_iter().find_map(|number| speaking(number).and_then(|(_, felt)| pick(felt)))
+                around.into_iter().find_map(|number| speaking(number).and_then(|sample| pick(&sample.felt)))
             })
         };
         let felt =
@@ -138,7 +152,7 @@ impl Window {
 
     /// Time of the next inertial sample after `at`.
     pub fn next_felt(&self, at: MonoNs) -> Option<MonoNs> {
-        self.felt.get(self.felt.partition_point(|(felt, _)| *felt <= at)).map(|(at, _)| *at)
+        self.felt.get(self.felt.partition_point(|felt| felt.at <= at)).map(|felt| felt.at)
     }
 
     /// Removes everything.
@@ -156,7 +170,13 @@ impl Window {
 
     /// Removes inertial samples not needed for any time after `at`.
     pub fn forget(&mut self, at: MonoNs) {
-        let old = self.felt.partition_point(|(other, _)| *other + SPEAKS_FOR < at);
+        let old = self.felt.partition_point(|other| other.at + SPEAKS_FOR < at);
         self.felt.drain(..old.saturating_sub(2));
     }
+}
+
+/// Takes one more into a mean of so many.
+fn take_mean(mean: &mut Option<Vec3<Body>>, of: &mut u32, value: Vec3<Body>) {
+    *of = of.saturating_add(1);
+    *mean = Some(mean.map_or(value, |mean| mean + (value + -mean).scaled(1.0 / f64::from(*of))));
 }

@@ -21,6 +21,7 @@ pub struct Stillness {
     force: Means,
     cable_m: Option<f64>,
     cable_still: bool,
+    cable_at: MonoNs,
 }
 
 /// Means of successive windows, compared with the first of a steady run.
@@ -59,6 +60,10 @@ impl Stillness {
     pub fn take(&mut self, at: MonoNs, kind: SensorKind, reading: &Reading) {
         match (kind, reading) {
             (SensorKind::Imu, Reading::AngularRate(rate)) => {
+                if at.since(self.cable_at).0 > MEAN_OVER.0 {
+                    // A counter that says nothing doesn't say that the cable is still.
+                    self.moved();
+                }
                 self.rate.take(at, [rate.x(), rate.y(), rate.z()], SAME_RATE);
             }
             (SensorKind::Imu, Reading::SpecificForce(force)) => {
@@ -66,14 +71,20 @@ impl Stillness {
             }
             (SensorKind::Tether { .. }, Reading::TetherLength(length)) => {
                 let before_m = *self.cable_m.get_or_insert(length.length_m);
-                self.cable_still = (length.length_m - before_m).abs() <= length.resolution_m;
-                if !self.cable_still {
+                self.cable_at = at;
+                self.cable_still = true;
+                if (length.length_m - before_m).abs() > length.resolution_m {
                     self.cable_m = Some(length.length_m);
-                    (self.rate.alike, self.force.alike) = (0, 0);
+                    self.moved();
                 }
             }
             _ => {}
         }
+    }
+
+    fn moved(&mut self) {
+        self.cable_still = false;
+        (self.rate.alike, self.force.alike) = (0, 0);
     }
 
     /// Whether gyros and accelerometers have been steady for long, and the cable hasn't moved.
@@ -94,24 +105,36 @@ mod tests {
     use headrace_sensor::reading::TetherLength;
 
     /// Whether it is at rest after twenty seconds with this turn rate and cable length.
-    fn still(rate: impl Fn(f64) -> f64, way_m: impl Fn(f64) -> f64) -> bool {
+    fn still(rate: impl Fn(f64) -> f64, way_m: impl Fn(f64) -> Option<f64>) -> bool {
         let mut stillness = Stillness::default();
         for k in 0..2000_u32 {
             let (at, t) = (MonoNs(u64::from(k) * 10_000_000), f64::from(k) / 100.0);
             let noise = 0.001 * f64::from(k % 7) - 0.003;
             stillness.take(at, SensorKind::Imu, &Reading::AngularRate(Vec3::new(0.01 + noise, 0.0, rate(t))));
             stillness.take(at, SensorKind::Imu, &Reading::SpecificForce(Vec3::new(0.1, noise, 9.8)));
-            let length = TetherLength { length_m: way_m(t), resolution_m: 0.001 };
+            let Some(length_m) = way_m(t) else { continue };
             let tether = SensorKind::Tether { zero_at_m: 0.0, scale: 1.0 };
-            stillness.take(at, tether, &Reading::TetherLength(length));
+            stillness.take(
+                at,
+                tether,
+                &Reading::TetherLength(TetherLength { length_m, resolution_m: 0.001 }),
+            );
         }
         stillness.is_still()
     }
 
     #[test]
     fn a_vehicle_on_deck_rests_and_one_that_floats_does_not() {
-        assert!(still(|_| 0.003, |_| 0.0), "biases and noise aren't motion");
-        assert!(!still(|t| 0.01 * math::sin(t / 2.0), |_| 0.0), "it turns to and fro");
-        assert!(!still(|_| 0.0, |t| 0.05 * t), "the cable runs");
+        assert!(still(|_| 0.003, |_| Some(0.0)), "biases and noise aren't motion");
+        assert!(!still(|t| 0.01 * math::sin(t / 2.0), |_| Some(0.0)), "it turns to and fro");
+        assert!(!still(|_| 0.0, |t| Some(0.05 * t)), "the cable runs");
+        assert!(
+            !still(|_| 0.0, |t| (t < 5.0).then_some(0.0)),
+            "nothing is known of the cable since it fell silent"
+        );
+        assert!(
+            still(|_| 0.0, |t| (!(2.0..5.0).contains(&t)).then_some(0.0)),
+            "it speaks again, and is still"
+        );
     }
 }

@@ -2,7 +2,7 @@
 
 use headrace_sensor::codec::{Codec as _, CodecCounts, Framed, Framing, Verdict};
 use headrace_sensor::device::Decoder;
-use headrace_sensor::device_clock::{ClockReport, DeviceClock};
+use headrace_sensor::device_clock::{ClockReport, SampleTimes};
 use headrace_sensor::geometry::frames::{Rot, Vec3};
 use headrace_sensor::geometry::time::{DurNs, MonoNs};
 use headrace_sensor::reading::{Decoded, Packet, Reading};
@@ -53,7 +53,7 @@ struct State {
     rate_well: Well,
     force_well: Well,
     stamp: Option<Stamp>,
-    clock: Option<DeviceClock>,
+    clock: Option<SampleTimes>,
     withheld: u64,
 }
 
@@ -144,7 +144,7 @@ impl DbcDecoder {
             rate_well: Well::new(conditions.rate),
             force_well: Well::new(conditions.force),
             stamp: mapping.sample_time,
-            clock: mapping.sample_time.map(|stamp| DeviceClock::new(stamp.place.layout.bits(), stamp.tick)),
+            clock: mapping.sample_time.map(|stamp| SampleTimes::new(stamp.place.layout.bits(), stamp.tick)),
             withheld: 0,
         };
         let listened = Listened::new(mapping);
@@ -177,7 +177,7 @@ impl Decoder for DbcDecoder {
     }
 
     fn clock(&self) -> Option<ClockReport> {
-        self.state.clock.as_ref().map(DeviceClock::report)
+        self.state.clock.as_ref().map(SampleTimes::report)
     }
 }
 
@@ -188,19 +188,22 @@ impl State {
         for (place, byte) in data.iter_mut().zip(frame.data()) {
             *place = *byte;
         }
-        let Self { all_well, attitude_well, rate_well, force_well, withheld, axes, .. } = self;
+        let Self { all_well, attitude_well, rate_well, force_well, withheld, axes, clock, .. } = self;
         for well in [&mut *all_well, attitude_well, rate_well, force_well] {
             well.note(id, data);
         }
-        if let (Some(stamp), Some(clock)) = (self.stamp, &mut self.clock)
+        if let (Some(stamp), Some(clock)) = (self.stamp, clock.as_mut())
             && let Some(ticks) = stamp.place.raw(id, data)
         {
-            clock.take(ticks, received);
+            clock.stamp(ticks, received);
         }
         let mut tell = |well: &Well, reading: Option<Reading>| match reading
             .filter(|reading| all_well.now && well.now && reading.is_finite())
         {
-            Some(reading) => sink(Decoded { valid_at: received - self.latency, reading }),
+            Some(reading) => {
+                let came = clock.as_mut().map_or(received, |clock| clock.arrival(&reading, received));
+                sink(Decoded { valid_at: came - self.latency, reading });
+            }
             None => *withheld += 1,
         };
         if let Some(complete) = self.quaternion.as_mut().and_then(|vector| vector.take(id, data, received)) {

@@ -167,6 +167,19 @@ proptest! {
 }
 
 #[test]
+fn of_samples_in_one_burst_the_mean_counts() {
+    let mut window = Window::default();
+    for (at_ns, x) in [(0, 1.0), (10 * MS, 2.0), (10 * MS, 40.0), (10 * MS + 1000, 3.0)] {
+        assert!(window.take_force(MonoNs(at_ns), Vec3::new(x, 0.0, 0.0)));
+    }
+    assert!(window.take_rate(MonoNs(10 * MS), Vec3::new(0.5, 0.0, 0.0)));
+    let (felt, until) = window.felt(MonoNs(1), MonoNs(20 * MS));
+    assert_eq!(until, MonoNs(10 * MS));
+    assert_eq!(felt.force_mps2.map(|force| force.x()), Some(15.0));
+    assert_eq!(felt.rate_radps.map(|rate| rate.x()), Some(0.5));
+}
+
+#[test]
 fn a_full_window_refuses_and_goes_on() {
     let mut window = Window::default();
     let taken =
