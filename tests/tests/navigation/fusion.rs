@@ -233,7 +233,7 @@ fn whatever_falls_silent_the_error_stays_within_its_bounds() {
         ("everything", vec![0, 1, 2, 3, 4, 5, 6, 7]),
     ] {
         for to_s in [70.0, 120.0, f64::INFINITY] {
-            // A unit that is back after a minute leaves some dives too sure for a while: 1 % of epochs, told of several.
+            // What a guessed motion would teach of the ranges shows when the unit is back, in some dives.
             let seeds = if name == "the inertial unit" && to_s.is_finite() { 1..=6 } else { 3..=3 };
             let dives: Vec<_> = seeds
                 .map(|seed| silenced(seed, Silence { sources: sources.clone(), from_s: 60.0, to_s }))
@@ -244,8 +244,8 @@ fn whatever_falls_silent_the_error_stays_within_its_bounds() {
             println!(
                 "{name} from 60 to {to_s} s: within 3 sigma {within:.4}, worst {worst:.1}, no fix {lost:.2}"
             );
-            // Of normal errors 0.3 % are beyond.
-            assert!(within > 0.99, "{name} to {to_s}: {within}");
+            // Of normal errors 0.3 % are beyond, and of so many none by much.
+            assert!(within > 0.997 && worst < 5.0, "{name} to {to_s}: {within}, {worst}");
             let is_needed = sources.contains(&7) && !sources.contains(&6) && to_s > 100.0;
             assert_eq!(
                 lost > 0.1,

@@ -81,6 +81,8 @@ pub struct Eskf {
     /// Whether the cable counter is believed.
     pub cable: Cable,
     unrest: Unrest,
+    /// Whether inertial data were lacking in the last epoch: what the vehicle did is then a guess, of which no noise is learnt.
+    is_blind: bool,
     /// How loose the cable hangs beyond what is declared, a standard deviation, m.
     loose_m: f64,
     /// Settings that the ranges contradict.
@@ -92,7 +94,7 @@ pub struct Eskf {
     keeps_steps: bool,
 }
 
-stateful!(Eskf { state: at, state, factors, clones, way_sought, ties, begun, settled, agreement, cable, unrest, loose_m, suspicions, doubts; lists: knots; fixed: steps, keeps_steps; });
+stateful!(Eskf { state: at, state, factors, clones, way_sought, ties, begun, settled, agreement, cable, unrest, is_blind, loose_m, suspicions, doubts; lists: knots; fixed: steps, keeps_steps; });
 
 impl Default for Eskf {
     /// Allocated buffers without an estimate.
@@ -110,6 +112,7 @@ impl Default for Eskf {
             agreement: Agreement::default(),
             cable: Cable::default(),
             unrest: Unrest::default(),
+            is_blind: false,
             loose_m: 0.0,
             suspicions: Suspicions::default(),
             doubts: [0.0; ERRORS],
@@ -166,6 +169,7 @@ impl Eskf {
         let looseness = 1.0 + self.loose_m * self.loose_m / (declared_m * declared_m);
         let [rate, force] = self.unrest.factors();
         let leg = leg.with_unrest([rate, force, looseness]);
+        self.is_blind = leg.is_blind();
         self.loose_m *= math::exp(-leg.dt_s() / TIGHTENS_OVER_S);
         let transition = leg.transition(&context.settings);
         transition.fade(&mut nominal);
@@ -362,7 +366,11 @@ impl Eskf {
             self.agreement.note(kind, &row, agrees);
         }
         if agrees {
-            source.noise_level.note(kind, number, innovation, variance);
+            if self.is_blind {
+                source.noise_level.skip(number);
+            } else {
+                source.noise_level.note(kind, number, innovation, variance);
+            }
             if matches!(kind, SensorKind::Head | SensorKind::Echosounder { .. }) {
                 self.correct_by_wall(&row, settings.wall_share, known, errors);
             } else {

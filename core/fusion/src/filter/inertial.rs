@@ -179,6 +179,11 @@ impl Leg {
         self.dt_s
     }
 
+    /// Whether inertial data were lacking, if only for a part of it.
+    pub fn is_blind(&self) -> bool {
+        self.blind_s.iter().any(|blind_s| *blind_s > 0.0)
+    }
+
     /// Transition of errors from its beginning to its end.
     pub fn transition(&self, settings: &Settings) -> Transition {
         let fading = |time_s: f64| math::exp(-self.dt_s / time_s).max(LEAST_FADING);

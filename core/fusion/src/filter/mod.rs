@@ -165,7 +165,7 @@ impl FilterNavigation {
             let to = due.max(heard).min(last);
             let is_silent = to.since(self.running.at).0 > SILENCE.0;
             self.running.advance(to, &self.context, &mut self.window, &mut self.sources);
-            if self.stillness.is_still() {
+            if self.stillness.is_still() && self.cable_doubt().is_none() {
                 let unit = self.unit.and_then(|unit| self.sources.get(unit).copied().flatten());
                 let mean = self.stillness.take_mean_rate().zip(unit);
                 self.running.rest(mean.map(|(rate, unit)| unit.sensor.mount.rotation * rate));
