@@ -324,8 +324,7 @@ fn length_m(reading: &Reading) -> f64 {
 /// steadily that gyros and accelerometers would feel the same at rest isn't at rest, either.
 #[test]
 fn a_counter_that_stays_stuck_leaves_no_fix_rather_than_a_wrong_one() {
-    let steady: Way =
-        |t| Pose { position: Point3::new(3.0 + 0.2 * t, 0.4, 4.0), attitude: Rot::identity() };
+    let steady: Way = |t| Pose { position: Point3::new(3.0 + 0.2 * t, 0.4, 4.0), attitude: Rot::identity() };
     for way in [cruise, steady] {
         let rig = Rig::new(way, 1);
         let mut events = rig.events(0.0, 200.0);
