@@ -6,10 +6,15 @@ use headrace_pictures::polyline::{Frame, Px};
 /// Space between a marker and its label, pixels.
 const APART_PX: f64 = 9.0;
 
+/// From so far away on a line leads from the marker to its label, pixels.
+const FAR_PX: f64 = 14.0;
+
 /// A label with its place.
 pub(super) struct Placed {
     pub(super) place: Px,
     pub(super) side: Side,
+    /// Where a line to its marker ends; `None` of a label right beside it.
+    pub(super) led_from: Option<Px>,
 }
 
 /// What is taken up on a sheet so far.
@@ -49,7 +54,9 @@ impl Taken {
                     && frame.bottom <= within.bottom;
                 if fits && !self.0.iter().any(|taken| overlap(taken, &frame)) {
                     self.0.push(frame);
-                    return Some(Placed { place, side });
+                    let nearest = [x.clamp(frame.left, frame.right), y.clamp(frame.top, frame.bottom)];
+                    let is_far = (nearest[0] - x).abs().max((nearest[1] - y).abs()) > FAR_PX;
+                    return Some(Placed { place, side, led_from: is_far.then_some(nearest) });
                 }
             }
         }
@@ -84,8 +91,11 @@ mod tests {
         for at in &markers {
             taken.marker(*at);
         }
-        let placed = markers.iter().filter(|at| taken.label(**at, "0.05 m", SMALL, &SHEET).is_some()).count();
-        assert_eq!(placed, 6);
+        let placed: Vec<Placed> =
+            markers.iter().filter_map(|at| taken.label(*at, "0.05 m", SMALL, &SHEET)).collect();
+        assert_eq!(placed.len(), 6);
+        let led = placed.iter().filter(|placed| placed.led_from.is_some()).count();
+        assert!((1..6).contains(&led), "the first stand beside their markers, the last don't: {led}");
         for (k, a) in taken.0.iter().enumerate().skip(6) {
             assert!(!taken.0.iter().take(k).any(|b| overlap(a, b)), "{a:?}");
         }

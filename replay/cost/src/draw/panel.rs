@@ -17,6 +17,8 @@ pub(super) const BAND: Look = Look { colour: Colour(214, 214, 214), width_px: 9.
 /// Ground of the plateau.
 pub(super) const PLATEAU: Colour = Colour(255, 240, 200);
 const WHISKER: Look = Look { colour: Colour(170, 170, 170), width_px: 0.9, ..look::T };
+/// From a marker to a label that stands away from it.
+const LEADER: Look = Look { colour: Colour(110, 110, 110), width_px: 0.7, ..look::T };
 /// Errors within this ratio of the least are the plateau's.
 const SAME: f64 = 1.05;
 /// The least error that is told, as a multiple of the oracle's own.
@@ -181,6 +183,9 @@ impl<'a> Panel<'a> {
             let letters = if point.is_default || is_knee(point) { BOLD } else { SMALL };
             let at = chart.px(self.place(point));
             if let Some(placed) = taken.label(at, &text, letters, &self.frame) {
+                if let Some(label) = placed.led_from {
+                    chart.canvas.line(&[at, label], &LEADER);
+                }
                 chart.canvas.text_on_white(placed.place, &text, placed.side, letters);
             }
         }

@@ -64,12 +64,13 @@ proptest! {
         let exact = plain(&table);
         let origin = [at.0, at.1];
         let (sin, cos) = math::sin_cos(turns * TAU);
-        let half_step = TAU / 2.0 / 128.0;
-        let edge_m = 2.0 * (2.2_f64.powi(2) - (1.8 * (TAU / 2.0 / 257.0).cos()).powi(2)).sqrt();
+        let (half_step_sin, half_step_cos) = math::sin_cos(TAU / 2.0 / 128.0);
+        let nearest_m = 1.8 * math::cos(TAU / 2.0 / 257.0);
+        let edge_m = 2.0 * math::sqrt(2.2 * 2.2 - nearest_m * nearest_m);
         let (farthest_m, along_m) = (exact.farthest_m(origin), exact.farthest_along_m(origin, [cos, sin]));
         for (bound_m, exact_m, above_m) in [
-            (table.farthest_m(origin), farthest_m, farthest_m * (1.0 / half_step.cos() - 1.0)),
-            (table.farthest_along_m(origin, [cos, sin]), along_m, edge_m / 2.0 * half_step.tan()),
+            (table.farthest_m(origin), farthest_m, farthest_m * (1.0 / half_step_cos - 1.0)),
+            (table.farthest_along_m(origin, [cos, sin]), along_m, edge_m / 2.0 * half_step_sin / half_step_cos),
         ] {
             let bounds = exact_m - 1e-9..=exact_m + above_m + 1e-9;
             prop_assert!(bounds.contains(&bound_m), "{} {} {}", bound_m, exact_m, above_m);
