@@ -87,16 +87,16 @@ mod tests {
     #[test]
     fn labels_of_crowded_markers_dont_cover_one_another() {
         let mut taken = Taken::default();
-        let markers: Vec<Px> = (0..6).map(|k| [100.0 + 4.0 * f64::from(k), 100.0]).collect();
+        let markers: Vec<Px> = (0..10).map(|k| [100.0 + 4.0 * f64::from(k), 100.0]).collect();
         for at in &markers {
             taken.marker(*at);
         }
         let placed: Vec<Placed> =
             markers.iter().filter_map(|at| taken.label(*at, "0.05 m", SMALL, &SHEET)).collect();
-        assert_eq!(placed.len(), 6);
+        assert_eq!(placed.len(), 10);
         let led = placed.iter().filter(|placed| placed.led_from.is_some()).count();
-        assert!((1..6).contains(&led), "the first stand beside their markers, the last don't: {led}");
-        for (k, a) in taken.0.iter().enumerate().skip(6) {
+        assert!((1..10).contains(&led), "the first stand beside their markers, the last don't: {led}");
+        for (k, a) in taken.0.iter().enumerate().skip(10) {
             assert!(!taken.0.iter().take(k).any(|b| overlap(a, b)), "{a:?}");
         }
     }
