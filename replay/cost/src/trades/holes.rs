@@ -89,13 +89,16 @@ fn cases() -> Result<[Case; 3], CostError> {
 ///
 /// Errors: see [`CostError`].
 pub fn measure(inputs: &Inputs<'_>, progress: &mut dyn FnMut(&str)) -> Result<Trade, CostError> {
-    let (mut points, mut oracle_m) = (Vec::new(), 0.0_f64);
+    let settings = settings(inputs.effort);
+    let (mut prepared, mut oracle_m) = (Vec::new(), 0.0_f64);
     for case in cases()? {
         progress(&format!("holes: {}", case.name));
         let dives = Dives::of(inputs, &case)?;
         oracle_m = oracle_m.max(dives.oracle_m()?);
-        points.extend(dives.points(inputs, &case)?);
+        prepared.push(dives.prepared(case.name, &settings)?);
     }
+    progress("holes: costs");
+    let mut points = points(inputs, &settings, prepared)?;
     front(&mut points, oracle_m.max(NOTHING_M));
     let (reasons, advice) = (reasons(&points), advice(&points));
     Ok(Trade {
@@ -158,31 +161,57 @@ impl Dives {
         )
     }
 
-    fn points(mut self, inputs: &Inputs<'_>, case: &Case) -> Result<Vec<Point>, CostError> {
-        let settings = settings(inputs.effort);
-        let mut errors: Vec<Vec<Vec<Judged>>> = settings.iter().map(|_| Vec::new()).collect();
+    /// The sections as each setting has them, and the first dive, which is timed.
+    fn prepared(mut self, name: &'static str, settings: &[Setting]) -> Result<Prepared, CostError> {
+        let mut judged: Vec<Vec<Vec<Judged>>> = settings.iter().map(|_| Vec::new()).collect();
         for (scene, recorded) in &mut self.0 {
-            for (setting, errors) in settings.iter().zip(&mut errors) {
-                errors.push(setting.judged(&mut scene.vehicle, recorded)?);
+            for (setting, judged) in settings.iter().zip(&mut judged) {
+                judged.push(setting.judged(&mut scene.vehicle, recorded)?);
             }
         }
-        let Some((scene, recorded)) = self.0.first_mut() else { return Ok(Vec::new()) };
-        let returns = recorded.truth.returns.max(1) as f64;
-        let mut searches: Vec<Vec<f64>> = settings.iter().map(|_| Vec::new()).collect();
-        let numbered: Vec<(usize, Setting)> = settings.iter().copied().enumerate().collect();
-        let costs = in_turns(inputs.effort.rounds(), &numbered, |(number, setting)| {
-            let [whole_s, search_s] = setting.cost_s(&mut scene.vehicle, recorded)?;
-            if let Some(searches) = searches.get_mut(*number) {
-                searches.push(search_s / returns * NS);
-            }
-            Ok(whole_s / returns * NS)
-        })?;
-        let seeds = inputs.effort.seeds();
-        let points = settings.iter().zip(errors).zip(costs.into_iter().zip(searches));
-        Ok(points
-            .map(|((setting, judged), (cost, search))| setting.point(case, seeds, &judged, cost, &search))
-            .collect())
+        let why =
+            || CostError::Figure { what: format!("holes of {name}"), why: "no seed was dived".to_owned() };
+        let (scene, recorded) = self.0.into_iter().next().ok_or_else(why)?;
+        Ok(Prepared { name, vehicle: scene.vehicle, recorded, judged })
     }
+}
+
+/// A case with its settings judged, ready to be timed.
+struct Prepared {
+    name: &'static str,
+    vehicle: VehicleConfig,
+    recorded: Recorded,
+    /// Of each setting, of each seed, the sections.
+    judged: Vec<Vec<Vec<Judged>>>,
+}
+
+/// Times all settings of all cases in turns.
+fn points(
+    inputs: &Inputs<'_>,
+    settings: &[Setting],
+    mut prepared: Vec<Prepared>,
+) -> Result<Vec<Point>, CostError> {
+    let all: Vec<(usize, Setting)> =
+        (0..prepared.len()).flat_map(|case| settings.iter().map(move |setting| (case, *setting))).collect();
+    let mut searches: Vec<Vec<f64>> = all.iter().map(|_| Vec::new()).collect();
+    let numbered: Vec<(usize, &(usize, Setting))> = all.iter().enumerate().collect();
+    let costs = in_turns(inputs.effort.rounds(), &numbered, |(number, (case, setting))| {
+        let Some(Prepared { vehicle, recorded, .. }) = prepared.get_mut(*case) else { return Ok(f64::NAN) };
+        let [whole_s, search_s] = setting.cost_s(vehicle, recorded)?;
+        let ns_a_return = NS / recorded.truth.returns.max(1) as f64;
+        if let Some(searches) = searches.get_mut(*number) {
+            searches.push(search_s * ns_a_return);
+        }
+        Ok(whole_s * ns_a_return)
+    })?;
+    let seeds = inputs.effort.seeds();
+    let judged = prepared.iter().flat_map(|case| case.judged.iter().map(|judged| (case.name, judged)));
+    let points = all.iter().zip(judged).zip(costs.into_iter().zip(searches));
+    Ok(points
+        .map(|(((_, setting), (name, judged)), (cost, search))| {
+            setting.point(name, seeds, judged, cost, &search)
+        })
+        .collect())
 }
 
 fn settings(effort: Effort) -> Vec<Setting> {
@@ -249,7 +278,7 @@ impl Setting {
         })
     }
 
-    fn point(self, case: &Case, seeds: u32, judged: &[Vec<Judged>], cost: Interval, search: &[f64]) -> Point {
+    fn point(self, scene: &str, seeds: u32, judged: &[Vec<Judged>], cost: Interval, search: &[f64]) -> Point {
         let (method, knob, value) = match self {
             Self::Exact => ("exact, and to a tolerance", "tolerance", Some(0.0)),
             Self::Tolerance(tolerance_m) => ("exact, and to a tolerance", "tolerance", Some(tolerance_m)),
@@ -272,7 +301,7 @@ impl Setting {
             },
             number: value,
             is_default: self == Self::Exact,
-            scene: case.name.to_owned(),
+            scene: scene.to_owned(),
             seeds,
             errors,
             cost,

@@ -31,6 +31,7 @@ const USUAL_TICK_MS: u32 = 20;
 /// A marker.
 struct Setting {
     method: &'static str,
+    knob: &'static str,
     value: String,
     number: Option<f64>,
     is_default: bool,
@@ -52,16 +53,18 @@ struct Ran {
 ///
 /// Errors: see [`CostError`].
 pub fn measure(inputs: &Inputs<'_>, progress: &mut dyn FnMut(&str)) -> Result<Trade, CostError> {
-    let mut points = Vec::new();
+    let mut prepared = Vec::new();
     let (mut size, mut slowest_mps) = (0.0_f64, f64::INFINITY);
     for (name, text) in scenes(inputs)? {
         progress(&format!("live loop: {name}"));
-        let (of_scene, off_mps, v_mps) = points_of(inputs, name, &text)?;
-        points.extend(of_scene);
+        let (of_scene, off_mps, v_mps) = Prepared::of(inputs, name, &text)?;
+        prepared.push(of_scene);
         (size, slowest_mps) = (size.max(off_mps), slowest_mps.min(v_mps));
     }
     progress("live loop: surveyed profiles");
-    points.extend(surveyed(inputs)?);
+    prepared.push(Prepared::surveyed(inputs)?);
+    progress("live loop: costs");
+    let mut points = points(inputs, prepared)?;
     front(&mut points, RESOLUTION_MPS);
     let (reasons, advice) = (reasons(&points), advice(&points));
     Ok(Trade {
@@ -111,6 +114,7 @@ const SHORT: &str = "vehicle = \"vita2-4.toml\"\n[trajectory]\nstart_m = 5\n[[tr
 fn settings() -> Vec<Setting> {
     let setting = |method, value: String, number, is_default, looks, tick_ms| Setting {
         method,
+        knob: method,
         value,
         number,
         is_default,
@@ -144,64 +148,124 @@ fn settings() -> Vec<Setting> {
     settings
 }
 
-/// Points of a scene, how far two references are apart, and the median of the speeds advised, m/s.
-fn points_of(inputs: &Inputs<'_>, name: &str, text: &str) -> Result<(Vec<Point>, f64, f64), CostError> {
-    let settings = settings();
-    let seeds = inputs.effort.pick(1, 3);
-    let mut figures: Vec<Against> = settings.iter().map(|_| Against::default()).collect();
-    let (mut size, mut v_mps) = (0.0_f64, 0.0);
-    let mut first = None;
-    for seed in 1..=seeds {
-        let scene = inputs.scene(text, seed)?;
-        let recorded = Recorded::of(&scene, &scene.vehicle)?;
-        let vehicle = |looks: Looks| -> Result<VehicleConfig, CostError> {
-            Ok(VehicleConfig { looks, ..inputs.vehicle(&scene.vehicle_text)? })
-        };
-        let finest = Ran::of(&recorded, &vehicle(FINEST)?, USUAL_TICK_MS)?;
-        let as_fine = Ran::of(&recorded, &vehicle(AS_FINE)?, USUAL_TICK_MS)?;
-        size = size.max(as_fine.off_mps(&finest));
-        let advised_mps: Vec<f64> = finest.v_max_mps.iter().copied().filter(|v_mps| *v_mps > 0.0).collect();
-        v_mps = quantile(&advised_mps, 0.5).unwrap_or(0.0);
-        let usual = Ran::of(&recorded, &vehicle(Looks::default())?, USUAL_TICK_MS)?;
-        for (setting, against) in settings.iter().zip(&mut figures) {
-            let ran = Ran::of(&recorded, &vehicle(setting.looks)?, setting.tick_ms)?;
-            against.take(&ran, &finest, &usual);
-        }
-        first.get_or_insert((recorded, scene.vehicle_text.clone()));
-    }
-    let Some((recorded, vehicle_text)) = first else { return Ok((Vec::new(), size, v_mps)) };
-    let costs = costs(inputs, &recorded, &settings, |setting| {
-        Ok((VehicleConfig { looks: setting.looks, ..inputs.vehicle(&vehicle_text)? }, setting.tick_ms))
-    })?;
-    let point = |((setting, against), cost): ((Setting, Against), Interval)| Point {
-        method: setting.method.to_owned(),
-        knob: setting.method.to_owned(),
-        value: setting.value,
-        number: setting.number,
-        is_default: setting.is_default,
-        scene: name.to_owned(),
-        seeds,
-        errors: against.errors(),
-        cost,
-        instructions: None,
-        on_front: false,
-    };
-    Ok((settings.into_iter().zip(figures).zip(costs).map(point).collect(), size, v_mps))
+/// A recorded dive whose settings are judged, ready to be timed.
+struct Prepared {
+    scene: &'static str,
+    seeds: u32,
+    recorded: Recorded,
+    markers: Vec<Marker>,
 }
 
-/// Share of a core, of each setting.
-fn costs<T>(
-    inputs: &Inputs<'_>,
-    recorded: &Recorded,
-    settings: &[T],
-    of: impl Fn(&T) -> Result<(VehicleConfig, u32), CostError>,
-) -> Result<Vec<Interval>, CostError> {
-    let known = settings.iter().map(of).collect::<Result<Vec<_>, _>>()?;
-    let duration_s = recorded.duration_s();
-    in_turns(inputs.effort.rounds(), &known, |(vehicle, tick_ms)| {
-        let pace = Pace { tick: tick(*tick_ms), speed: None };
-        Ok(recorded.cpu_with_s(vehicle, vehicle.navigation(), pace)? / duration_s)
-    })
+/// A setting as it is run, and what came of it.
+struct Marker {
+    setting: Setting,
+    vehicle: VehicleConfig,
+    against: Against,
+}
+
+impl Prepared {
+    /// A scene, how far two references are apart, and the median of the speeds advised, m/s.
+    fn of(inputs: &Inputs<'_>, name: &'static str, text: &str) -> Result<(Self, f64, f64), CostError> {
+        let settings = settings();
+        let seeds = inputs.effort.pick(1, 3);
+        let mut figures: Vec<Against> = settings.iter().map(|_| Against::default()).collect();
+        let (mut size, mut v_mps) = (0.0_f64, 0.0);
+        let mut first = None;
+        for seed in 1..=seeds {
+            let scene = inputs.scene(text, seed)?;
+            let recorded = Recorded::of(&scene, &scene.vehicle)?;
+            let vehicle = |looks: Looks| -> Result<VehicleConfig, CostError> {
+                Ok(VehicleConfig { looks, ..inputs.vehicle(&scene.vehicle_text)? })
+            };
+            let finest = Ran::of(&recorded, &vehicle(FINEST)?, USUAL_TICK_MS)?;
+            let as_fine = Ran::of(&recorded, &vehicle(AS_FINE)?, USUAL_TICK_MS)?;
+            size = size.max(as_fine.off_mps(&finest));
+            let advised_mps: Vec<f64> =
+                finest.v_max_mps.iter().copied().filter(|v_mps| *v_mps > 0.0).collect();
+            v_mps = quantile(&advised_mps, 0.5).unwrap_or(0.0);
+            let usual = Ran::of(&recorded, &vehicle(Looks::default())?, USUAL_TICK_MS)?;
+            for (setting, against) in settings.iter().zip(&mut figures) {
+                let ran = Ran::of(&recorded, &vehicle(setting.looks)?, setting.tick_ms)?;
+                against.take(&ran, &finest, &usual);
+            }
+            first.get_or_insert((recorded, scene.vehicle_text.clone()));
+        }
+        let why = || CostError::Figure { what: name.to_owned(), why: "no seed was dived".to_owned() };
+        let (recorded, vehicle_text) = first.ok_or_else(why)?;
+        let marker = |(setting, against): (Setting, Against)| {
+            let vehicle = VehicleConfig { looks: setting.looks, ..inputs.vehicle(&vehicle_text)? };
+            Ok(Marker { setting, vehicle, against })
+        };
+        let markers = settings.into_iter().zip(figures).map(marker).collect::<Result<_, CostError>>()?;
+        Ok((Self { scene: name, seeds, recorded, markers }, size, v_mps))
+    }
+
+    /// The design profile as so many vertices on it, in place of its arcs.
+    fn surveyed(inputs: &Inputs<'_>) -> Result<Self, CostError> {
+        let scene = inputs.scene(SHORT, 1)?;
+        let recorded = Recorded::of(&scene, &scene.vehicle)?;
+        let arcs = Ran::of(&recorded, &scene.vehicle, USUAL_TICK_MS)?;
+        let counts = inputs.effort.pick(&VERTICES[..3], &VERTICES[..]);
+        let marker = |count: Option<u32>, vehicle: VehicleConfig| -> Result<Marker, CostError> {
+            let mut against = Against::default();
+            against.take(&Ran::of(&recorded, &vehicle, USUAL_TICK_MS)?, &arcs, &arcs);
+            let setting = Setting {
+                method: "vertices",
+                knob: "vertices of the profile",
+                value: count.map_or_else(|| "arcs".to_owned(), |count| count.to_string()),
+                number: count.map(f64::from),
+                is_default: count.is_none(),
+                looks: vehicle.looks,
+                tick_ms: USUAL_TICK_MS,
+            };
+            Ok(Marker { setting, vehicle, against })
+        };
+        let mut markers = vec![marker(None, inputs.vehicle(&scene.vehicle_text)?)?];
+        for count in counts {
+            let outline = outline(&scene.vehicle.tunnel.profile, *count);
+            markers.push(marker(Some(*count), vehicle_of(inputs, &scene.vehicle_text, &outline)?)?);
+        }
+        Ok(Self { scene: "surveyed profile", seeds: 1, recorded, markers })
+    }
+}
+
+impl Marker {
+    /// Share of a core.
+    fn cost(&self, recorded: &Recorded) -> Result<f64, CostError> {
+        let pace = Pace { tick: tick(self.setting.tick_ms), speed: None };
+        Ok(recorded.cpu_with_s(&self.vehicle, self.vehicle.navigation(), pace)? / recorded.duration_s())
+    }
+
+    fn point(self, scene: &str, seeds: u32, cost: Interval) -> Point {
+        let Self { setting, against, .. } = self;
+        Point {
+            method: setting.method.to_owned(),
+            knob: setting.knob.to_owned(),
+            value: setting.value,
+            number: setting.number,
+            is_default: setting.is_default,
+            scene: scene.to_owned(),
+            seeds,
+            errors: against.errors(),
+            cost,
+            instructions: None,
+            on_front: false,
+        }
+    }
+}
+
+/// Times all markers of all scenes in turns.
+fn points(inputs: &Inputs<'_>, prepared: Vec<Prepared>) -> Result<Vec<Point>, CostError> {
+    let mut all: Vec<(&Recorded, &Marker)> = Vec::new();
+    for Prepared { recorded, markers, .. } in &prepared {
+        all.extend(markers.iter().map(|marker| (recorded, marker)));
+    }
+    let costs = in_turns(inputs.effort.rounds(), &all, |(recorded, marker)| marker.cost(recorded))?;
+    let markers = prepared.into_iter().flat_map(|dive| {
+        let Prepared { scene, seeds, markers, .. } = dive;
+        markers.into_iter().map(move |marker| (scene, seeds, marker))
+    });
+    Ok(markers.zip(costs).map(|((scene, seeds, marker), cost)| marker.point(scene, seeds, cost)).collect())
 }
 
 fn tick(tick_ms: u32) -> DurNs {
@@ -274,46 +338,6 @@ impl Against {
         ];
         errors.into_iter().flatten().collect()
     }
-}
-
-/// The design profile as so many vertices on it, in place of its arcs.
-fn surveyed(inputs: &Inputs<'_>) -> Result<Vec<Point>, CostError> {
-    let scene = inputs.scene(SHORT, 1)?;
-    let recorded = Recorded::of(&scene, &scene.vehicle)?;
-    let arcs = Ran::of(&recorded, &scene.vehicle, USUAL_TICK_MS)?;
-    let counts = inputs.effort.pick(&VERTICES[..3], &VERTICES[..]);
-    let vehicles = counts
-        .iter()
-        .map(|count| vehicle_of(inputs, &scene.vehicle_text, &outline(&scene.vehicle.tunnel.profile, *count)))
-        .collect::<Result<Vec<_>, _>>()?;
-    let mut figures = vec![Against::default()];
-    if let Some(of_arcs) = figures.first_mut() {
-        of_arcs.take(&arcs, &arcs, &arcs);
-    }
-    for vehicle in &vehicles {
-        let mut against = Against::default();
-        against.take(&Ran::of(&recorded, vehicle, USUAL_TICK_MS)?, &arcs, &arcs);
-        figures.push(against);
-    }
-    let known: Vec<&VehicleConfig> = std::iter::once(&scene.vehicle).chain(&vehicles).collect();
-    let duration_s = recorded.duration_s();
-    let costs =
-        in_turns(inputs.effort.rounds(), &known, |vehicle| Ok(recorded.cpu_s(vehicle)? / duration_s))?;
-    let values = std::iter::once(None).chain(counts.iter().map(|count| Some(*count)));
-    let point = |((count, against), cost): ((Option<u32>, Against), Interval)| Point {
-        method: "vertices".to_owned(),
-        knob: "vertices of the profile".to_owned(),
-        value: count.map_or_else(|| "arcs".to_owned(), |count| count.to_string()),
-        number: count.map(f64::from),
-        is_default: count.is_none(),
-        scene: "surveyed profile".to_owned(),
-        seeds: 1,
-        errors: against.errors(),
-        cost,
-        instructions: None,
-        on_front: false,
-    };
-    Ok(values.zip(figures).zip(costs).map(point).collect())
 }
 
 const VERTICES: [u32; 5] = [10, 100, 1_000, 10_000, 100_000];

@@ -24,7 +24,7 @@ use crate::dive::{JudgedDive, Recorded};
 use crate::error::CostError;
 use crate::measure::{in_turns, side_by_side, timed};
 use crate::oracle::second;
-use crate::point::{Error, LeftOut, OracleError, Point, Trade, front, quantile};
+use crate::point::{Error, Interval, LeftOut, OracleError, Point, Trade, front, quantile};
 use crate::scene::{Inputs, file};
 use crate::verdicts::{self, Judged, inner};
 
@@ -90,12 +90,14 @@ struct Dived {
 ///
 /// Errors: see [`CostError`].
 pub fn measure(inputs: &Inputs<'_>, progress: &mut dyn FnMut(&str)) -> Result<Trade, CostError> {
-    let mut points = Vec::new();
     let places = places(inputs)?;
+    let mut prepared = Vec::new();
     for place in &places {
         progress(&format!("navigation: {}", place.name));
-        points.extend(points_of(inputs, place)?);
+        prepared.push(Prepared::of(inputs, place)?);
     }
+    progress("navigation: costs");
+    let mut points = points(inputs, &prepared)?;
     progress("navigation: the oracle");
     let oracle = oracle(inputs, &places)?;
     front(&mut points, RESOLUTION_M);
@@ -223,73 +225,102 @@ fn settings(usual: &Settings, all_knobs: bool) -> Vec<Setting> {
     settings
 }
 
-fn points_of(inputs: &Inputs<'_>, place: &Place) -> Result<Vec<Point>, CostError> {
-    let usual = match inputs.vehicle(&place.vehicle)?.navigation {
-        NavigationConfig::Filter(settings) => settings,
-        NavigationConfig::Direct => Settings::default(),
-    };
-    let settings = settings(&usual, place.all_knobs);
-    let mut rates: Vec<u32> = settings.iter().map(|setting| setting.rate_hz).collect();
-    rates.sort_unstable();
-    rates.dedup();
-    // A default is a marker of several lines, and measured once.
-    let mut unique: Vec<(u32, Way)> = Vec::new();
-    for setting in &settings {
-        if !unique.contains(&(setting.rate_hz, setting.way)) {
-            unique.push((setting.rate_hz, setting.way));
-        }
-    }
-    let dives_of = |seed: u32| -> Result<Vec<(u32, Dived)>, CostError> {
-        rates.iter().map(|rate_hz| Ok((*rate_hz, Dived::of(inputs, place, *rate_hz, seed)?))).collect()
-    };
-    let seeds: Vec<u32> = (1..=inputs.effort.seeds()).collect();
-    let of_seeds = side_by_side(&seeds, |seed| {
-        let dives = dives_of(*seed)?;
-        let of = |(rate_hz, way): &(u32, Way)| {
-            let dived = dives.iter().find(|(of_dive_hz, _)| of_dive_hz == rate_hz);
-            dived.map(|(_, dived)| dived.figures(way, place)).transpose()
+/// A place whose dives are judged, ready to be timed.
+struct Prepared {
+    scene: String,
+    settings: Vec<Setting>,
+    /// What is measured: a default is a marker of several lines, and measured once.
+    unique: Vec<(u32, Way)>,
+    /// Number of seeds and errors of each of them.
+    errors: Vec<(u32, Vec<Error>)>,
+    /// The first seed's dives, by rate of the inertial unit, Hz.
+    first: Vec<(u32, Dived)>,
+}
+
+impl Prepared {
+    fn of(inputs: &Inputs<'_>, place: &Place) -> Result<Self, CostError> {
+        let usual = match inputs.vehicle(&place.vehicle)?.navigation {
+            NavigationConfig::Filter(settings) => settings,
+            NavigationConfig::Direct => Settings::default(),
         };
-        let figures = unique.iter().map(of).collect::<Result<Vec<_>, _>>()?;
-        Ok((figures, (*seed == 1).then_some(dives)))
-    })?;
-    let mut of_unique: Vec<Vec<(Figures, JudgedDive)>> = unique.iter().map(|_| Vec::new()).collect();
-    let mut first = Vec::new();
-    for (figures, dives) in of_seeds {
-        for (of_way, dived) in of_unique.iter_mut().zip(figures) {
-            of_way.extend(dived);
+        let settings = settings(&usual, place.all_knobs);
+        let mut rates: Vec<u32> = settings.iter().map(|setting| setting.rate_hz).collect();
+        rates.sort_unstable();
+        rates.dedup();
+        let mut unique: Vec<(u32, Way)> = Vec::new();
+        for setting in &settings {
+            if !unique.contains(&(setting.rate_hz, setting.way)) {
+                unique.push((setting.rate_hz, setting.way));
+            }
         }
-        first.extend(dives.into_iter().flatten());
-    }
-    let rounds = inputs.effort.rounds();
-    let costs = in_turns(rounds, &unique, |(rate_hz, way)| {
-        let found = first.iter().find(|(of_dive_hz, _)| of_dive_hz == rate_hz);
-        Ok(found.map_or(f64::NAN, |(_, dived)| dived.cost_ns_per_s(way)))
-    })?;
-    let of_unique: Vec<(u32, Vec<Error>)> = of_unique
-        .into_iter()
-        .map(|dives| {
+        let dives_of = |seed: u32| -> Result<Vec<(u32, Dived)>, CostError> {
+            rates.iter().map(|rate_hz| Ok((*rate_hz, Dived::of(inputs, place, *rate_hz, seed)?))).collect()
+        };
+        let seeds: Vec<u32> = (1..=inputs.effort.seeds()).collect();
+        let of_seeds = side_by_side(&seeds, |seed| {
+            let dives = dives_of(*seed)?;
+            let of = |(rate_hz, way): &(u32, Way)| {
+                let dived = dives.iter().find(|(of_dive_hz, _)| of_dive_hz == rate_hz);
+                dived.map(|(_, dived)| dived.figures(way, place)).transpose()
+            };
+            let figures = unique.iter().map(of).collect::<Result<Vec<_>, _>>()?;
+            Ok((figures, (*seed == 1).then_some(dives)))
+        })?;
+        let mut of_unique: Vec<Vec<(Figures, JudgedDive)>> = unique.iter().map(|_| Vec::new()).collect();
+        let mut first = Vec::new();
+        for (figures, dives) in of_seeds {
+            for (of_way, dived) in of_unique.iter_mut().zip(figures) {
+                of_way.extend(dived);
+            }
+            first.extend(dives.into_iter().flatten());
+        }
+        let errors = |dives: Vec<(Figures, JudgedDive)>| {
             let (figures, dives): (Vec<Figures>, Vec<JudgedDive>) = dives.into_iter().unzip();
             (u32::try_from(dives.len()).unwrap_or(u32::MAX), errors(&figures, &dives))
-        })
-        .collect();
-    let point = |setting: Setting| {
-        let which = unique.iter().position(|unique| *unique == (setting.rate_hz, setting.way))?;
-        let ((seeds, errors), cost) = of_unique.get(which).zip(costs.get(which))?;
+        };
+        let errors = of_unique.into_iter().map(errors).collect();
+        Ok(Self { scene: place.name.clone(), settings, unique, errors, first })
+    }
+
+    fn cost_ns_per_s(&self, rate_hz: u32, way: &Way) -> f64 {
+        let found = self.first.iter().find(|(of_dive_hz, _)| *of_dive_hz == rate_hz);
+        found.map_or(f64::NAN, |(_, dived)| dived.cost_ns_per_s(way))
+    }
+
+    /// A marker; `cost` is of what it shares with others.
+    fn point(&self, setting: &Setting, cost: impl Fn(usize) -> Option<Interval>) -> Option<Point> {
+        let which = self.unique.iter().position(|unique| *unique == (setting.rate_hz, setting.way))?;
+        let ((seeds, errors), cost) = self.errors.get(which).zip(cost(which))?;
         Some(Point {
             method: setting.method.to_owned(),
             knob: setting.knob.to_owned(),
-            value: setting.value,
+            value: setting.value.clone(),
             number: setting.number,
             is_default: setting.is_default,
-            scene: place.name.clone(),
+            scene: self.scene.clone(),
             seeds: *seeds,
             errors: errors.clone(),
-            cost: *cost,
+            cost,
             instructions: None,
             on_front: false,
         })
-    };
-    Ok(settings.into_iter().filter_map(point).collect())
+    }
+}
+
+/// Times what is measured of all places in turns.
+fn points(inputs: &Inputs<'_>, prepared: &[Prepared]) -> Result<Vec<Point>, CostError> {
+    let all: Vec<(&Prepared, (u32, Way))> =
+        prepared.iter().flat_map(|place| place.unique.iter().map(move |unique| (place, *unique))).collect();
+    let costs = in_turns(inputs.effort.rounds(), &all, |(place, (rate_hz, way))| {
+        Ok(place.cost_ns_per_s(*rate_hz, way))
+    })?;
+    let (mut points, mut from) = (Vec::new(), 0);
+    for place in prepared {
+        let cost = |which: usize| costs.get(from + which).copied();
+        points.extend(place.settings.iter().filter_map(|setting| place.point(setting, cost)));
+        from += place.unique.len();
+    }
+    Ok(points)
 }
 
 /// What navigation itself gave in one dive.

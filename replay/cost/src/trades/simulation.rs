@@ -55,19 +55,21 @@ struct Figures {
 /// Errors: see [`CostError`].
 pub fn measure(inputs: &Inputs<'_>, progress: &mut dyn FnMut(&str)) -> Result<Trade, CostError> {
     let seeds = inputs.effort.seeds().max(LEAST_SEEDS);
-    let mut points = Vec::new();
+    let mut prepared = Vec::new();
     let stages = stages(inputs)?;
     for stage in &stages {
         progress(&format!("simulation: effects of {}", stage.name));
-        points.extend(effects_of(inputs, stage, seeds)?);
+        prepared.extend(effects_of(inputs, stage, seeds)?);
     }
     let mut size = 0.0_f64;
     for stage in &beams(inputs)? {
         progress(&format!("simulation: rays of {}", stage.name));
         let (of_rays, off_m) = rays_of(inputs, stage, seeds.min(RAYS_SEEDS))?;
-        points.extend(of_rays);
+        prepared.extend(of_rays);
         size = size.max(off_m);
     }
+    progress("simulation: costs");
+    let mut points = points(inputs, prepared)?;
     front(&mut points, RESOLUTION_M);
     let (reasons, advice) = (reasons(&points), advice(&points));
     Ok(Trade {
@@ -174,21 +176,63 @@ fn field(length_m: u32) -> Result<Stage, CostError> {
     Ok(Stage { name: "field", text, effects, boulders_m: Vec::new() })
 }
 
-fn effects_of(inputs: &Inputs<'_>, stage: &Stage, seeds: u32) -> Result<Vec<Point>, CostError> {
+/// A marker whose errors are known, with what is timed of it: a point without its cost.
+struct Prepared {
+    point: Point,
+    scene: Scene,
+    /// Returns of a head in the time that is simulated.
+    returns: f64,
+}
+
+impl Prepared {
+    /// The first seed's scene is timed.
+    fn of(inputs: &Inputs<'_>, text: &str, point: Point) -> Result<Self, CostError> {
+        let scene = inputs.scene(text, 1)?;
+        let recorded = Recorded::of(&scene, &scene.vehicle)?;
+        let recorded_s = recorded.duration_s().max(f64::from(TIMED_S));
+        let returns = recorded.truth.returns.max(1) as f64 * f64::from(TIMED_S) / recorded_s;
+        Ok(Self { point, scene, returns })
+    }
+
+    /// CPU time of a simulation, ns a return of a head.
+    fn cost_ns(&self) -> Result<f64, CostError> {
+        let mut simulation = Simulation::new(&self.scene)?;
+        let ((), cpu_s) = timed(|| (0..TIMED_S).take_while(|_| simulation.advance()).for_each(drop));
+        Ok(cpu_s * 1e9 / self.returns)
+    }
+}
+
+/// Times all markers of all scenes in turns; what leaving an effect out saves is against its scene's whole.
+fn points(inputs: &Inputs<'_>, prepared: Vec<Prepared>) -> Result<Vec<Point>, CostError> {
+    let costs = in_turns(inputs.effort.rounds(), &prepared, Prepared::cost_ns)?;
+    let mut whole = f64::NAN;
+    let mut points = Vec::new();
+    for (Prepared { mut point, .. }, cost) in prepared.into_iter().zip(costs) {
+        point.cost = cost;
+        if point.method == LEFT_OUT {
+            whole = if point.is_default { cost.middle } else { whole };
+            point.errors.push(Error::new("saved", "ns a return", Interval::exact(whole - cost.middle)));
+        }
+        points.push(point);
+    }
+    Ok(points)
+}
+
+/// The line of effects that are left out, one by one; the default leaves none out and comes first.
+const LEFT_OUT: &str = "left out";
+
+fn effects_of(inputs: &Inputs<'_>, stage: &Stage, seeds: u32) -> Result<Vec<Prepared>, CostError> {
     let mut texts = vec![("none".to_owned(), stage.text.clone())];
     for effect in &stage.effects {
         texts.push((effect.clone(), without(&stage.text, effect)?));
     }
     let (differences, hits) = differences(inputs, &texts, seeds)?;
-    let costs = costs_ns(inputs, &texts)?;
-    let whole = costs.first().copied().unwrap_or(Interval::exact(f64::NAN));
-    let mut points = Vec::new();
-    for ((((effect, _), differences), cost), hits) in texts.iter().zip(differences).zip(costs).zip(hits) {
+    let mut prepared = Vec::new();
+    for (((effect, text), differences), hits) in texts.iter().zip(differences).zip(hits) {
         let mut errors = differences.errors();
-        errors.push(Error::new("saved", "ns a return", Interval::exact(whole.middle - cost.middle)));
         errors.extend(boulders_hit(&stage.boulders_m, &hits));
-        points.push(Point {
-            method: "left out".to_owned(),
+        let point = Point {
+            method: LEFT_OUT.to_owned(),
             knob: "effect left out".to_owned(),
             value: effect.clone(),
             number: None,
@@ -196,23 +240,24 @@ fn effects_of(inputs: &Inputs<'_>, stage: &Stage, seeds: u32) -> Result<Vec<Poin
             scene: stage.name.to_owned(),
             seeds,
             errors,
-            cost,
+            cost: Interval::exact(f64::NAN),
             instructions: None,
             on_front: false,
-        });
+        };
+        prepared.push(Prepared::of(inputs, text, point)?);
     }
-    Ok(points)
+    Ok(prepared)
 }
 
-/// Points of rays, and how far two references are from one another, m.
-fn rays_of(inputs: &Inputs<'_>, stage: &Stage, seeds: u32) -> Result<(Vec<Point>, f64), CostError> {
+/// Markers of rays, and how far two references are from one another, m.
+fn rays_of(inputs: &Inputs<'_>, stage: &Stage, seeds: u32) -> Result<(Vec<Prepared>, f64), CostError> {
     let rays = || [MANY_RAYS].into_iter().chain(RAYS);
     let text = |rays: u32| Ok((rays.to_string(), effects::with_rays(&stage.text, rays)?));
     let texts = rays().map(text).collect::<Result<Vec<_>, CostError>>()?;
     let (differences, _) = differences(inputs, &texts, seeds)?;
-    let costs = costs_ns(inputs, texts.get(1..).unwrap_or_default())?;
-    let points = RAYS.into_iter().zip(differences.into_iter().skip(1)).zip(costs).map(
-        |((rays, differences), cost)| Point {
+    let mut prepared = Vec::new();
+    for ((rays, differences), (_, text)) in rays().zip(differences).zip(&texts).skip(1) {
+        let point = Point {
             method: "rays of a beam".to_owned(),
             knob: "rays".to_owned(),
             value: rays.to_string(),
@@ -221,18 +266,19 @@ fn rays_of(inputs: &Inputs<'_>, stage: &Stage, seeds: u32) -> Result<(Vec<Point>
             scene: format!("{}, rays", stage.name),
             seeds,
             errors: differences.errors(),
-            cost,
+            cost: Interval::exact(f64::NAN),
             instructions: None,
             on_front: false,
-        },
-    );
+        };
+        prepared.push(Prepared::of(inputs, text, point)?);
+    }
     if stage.name != "field" {
-        return Ok((points.collect(), 0.0));
+        return Ok((prepared, 0.0));
     }
     // One dive says how far two references are apart.
     let others = [MANY_RAYS, OTHER_RAYS].map(text).into_iter().collect::<Result<Vec<_>, CostError>>()?;
     let (references, _) = self::differences(inputs, &others, 1)?;
-    Ok((points.collect(), references.get(1).map_or(f64::NAN, Differences::change_m)))
+    Ok((prepared, references.get(1).map_or(f64::NAN, Differences::change_m)))
 }
 
 /// Of each seed: how a change of the scene changed its figures.
@@ -361,23 +407,6 @@ fn features_hit(scene: &Scene) -> Result<Vec<u16>, CostError> {
     Ok(hit)
 }
 
-/// CPU time of each text's simulation, ns a return of a head, the first seed's.
-fn costs_ns(inputs: &Inputs<'_>, texts: &[(String, String)]) -> Result<Vec<Interval>, CostError> {
-    let mut scenes = Vec::new();
-    for (_, text) in texts {
-        let scene = inputs.scene(text, 1)?;
-        let recorded = Recorded::of(&scene, &scene.vehicle)?;
-        let returns = recorded.truth.returns;
-        let recorded_s = recorded.duration_s().max(f64::from(TIMED_S));
-        scenes.push((scene, returns.max(1) as f64 * f64::from(TIMED_S) / recorded_s));
-    }
-    in_turns(inputs.effort.rounds(), &scenes, |(scene, returns)| {
-        let mut simulation = Simulation::new(scene)?;
-        let ((), cpu_s) = timed(|| (0..TIMED_S).take_while(|_| simulation.advance()).for_each(drop));
-        Ok(cpu_s * 1e9 / returns)
-    })
-}
-
 fn left_out(inputs: &Inputs<'_>) -> Vec<LeftOut> {
     let mut left_out = vec![
         LeftOut {
@@ -422,7 +451,7 @@ fn reasons(points: &[Point]) -> Vec<String> {
         )
     });
     let left_out: Vec<&Point> =
-        points.iter().filter(|point| point.method == "left out" && !point.is_default).collect();
+        points.iter().filter(|point| point.method == LEFT_OUT && !point.is_default).collect();
     let surely = |point: &&&Point| {
         point.errors.first().is_some_and(|error| error.unit == "m" && error.interval.low > UNCHANGED_M)
     };
@@ -439,7 +468,7 @@ fn reasons(points: &[Point]) -> Vec<String> {
 
 /// The dearest effect that changed nothing, and the one that changed most.
 fn advice(points: &[Point]) -> String {
-    let left_out = || points.iter().filter(|point| point.method == "left out" && !point.is_default);
+    let left_out = || points.iter().filter(|point| point.method == LEFT_OUT && !point.is_default);
     let figure = |point: &Point, name: &str| {
         let found = point.errors.iter().find(|error| error.name == name);
         found.map_or(f64::NAN, |error| error.interval.middle)
