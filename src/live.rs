@@ -18,6 +18,7 @@ use crate::dive::{Clock, Dive, Recording, assemble_followed};
 use crate::failure::Failure;
 use crate::followers::{Followers, Joining};
 use crate::interrupt;
+use crate::output;
 use crate::outputs::{self, Kind};
 use crate::page::{self, Of, Served, VoicesOf};
 use crate::report_output::finish;
@@ -29,6 +30,7 @@ use crate::watch::{Show, Watch};
 /// Runs a dive on the vehicle's ports.
 pub(crate) fn run(args: &Run, text: &str, vehicle: &VehicleConfig) -> Result<u8, Failure> {
     let required = required(args, vehicle)?;
+    output::never_wait();
     let logs = if args.record.is_empty() { vec![new_log()] } else { args.record.clone() };
     if !args.no_record {
         make_room(&logs, args)?;

@@ -1,9 +1,12 @@
 //! Output on stdout. A closed terminal ends neither a dive nor its recording.
 
 use std::fmt::{self, Write as _};
-use std::io::{BufWriter, Write};
+use std::io::{self, BufWriter, Write};
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::thread;
+use std::time::Duration;
 
+use crossbeam::channel::{Receiver, RecvTimeoutError, SendTimeoutError, Sender, bounded};
 use headrace_config::plain::{lines, one_line};
 use headrace_monitor::report::Report;
 
@@ -11,12 +14,106 @@ use crate::failure::Failure;
 use crate::terminal;
 use crate::transient;
 
-/// Whether the terminal has been given up: nothing is written to it any more.
+/// How long a live dive waits for a stdout of which nothing is read.
+pub(crate) const UNREAD_FOR: Duration = Duration::from_secs(2);
+/// Bytes that are taken within that time from whoever reads at all.
+const PIECE: usize = 1 << 10;
+
+/// Whether stdout has been given up: nothing is written to it any more.
 static GIVEN_UP: AtomicBool = AtomicBool::new(false);
+/// Whether stdout is given up where nobody reads it.
+static NEVER_WAITS: AtomicBool = AtomicBool::new(false);
 
 /// From now on stdout is left alone: a terminal that doesn't read must not keep a program from its end.
 pub(crate) fn give_up() {
     GIVEN_UP.store(true, Ordering::Relaxed);
+}
+
+/// From now on stdout is given up once nothing of it has been read for [`UNREAD_FOR`]: a live dive ends whoever reads.
+pub(crate) fn never_wait() {
+    NEVER_WAITS.store(true, Ordering::Relaxed);
+}
+
+/// Stdout for what a thread of its own doesn't write: flushed once, at its end.
+///
+/// Errors: it has been given up.
+fn stdout() -> io::Result<Box<dyn Write>> {
+    match (GIVEN_UP.load(Ordering::Relaxed), NEVER_WAITS.load(Ordering::Relaxed)) {
+        (true, _) => Err(unread()),
+        (false, true) => Ok(Box::new(Unheld::start()?)),
+        (false, false) => Ok(Box::new(io::stdout().lock())),
+    }
+}
+
+fn unread() -> io::Error {
+    io::Error::new(io::ErrorKind::TimedOut, "nobody reads it")
+}
+
+/// Stdout on a thread of its own, which holds up nobody longer than [`UNREAD_FOR`].
+struct Unheld {
+    pieces: Option<Sender<Vec<u8>>>,
+    done: Receiver<io::Result<()>>,
+}
+
+impl Unheld {
+    fn start() -> io::Result<Self> {
+        // A piece is handed over when the one before has been taken.
+        let (pieces, queue) = bounded::<Vec<u8>>(0);
+        let (ended, done) = bounded(1);
+        let write = move || {
+            let mut stdout = io::stdout().lock();
+            let result = queue.iter().try_for_each(|piece| stdout.write_all(&piece));
+            drop(queue);
+            // Nobody may wait for it any more.
+            ended.send(result.and_then(|()| stdout.flush())).ok();
+        };
+        thread::Builder::new().name("stdout".to_owned()).spawn(write)?;
+        Ok(Self { pieces: Some(pieces), done })
+    }
+
+    /// How the writing has ended.
+    fn end(&mut self) -> io::Result<()> {
+        self.pieces = None;
+        match self.done.recv_timeout(UNREAD_FOR) {
+            Ok(result) => result,
+            Err(RecvTimeoutError::Timeout) => {
+                give_up();
+                Err(unread())
+            }
+            Err(RecvTimeoutError::Disconnected) => Err(io::Error::other("its thread has ended early")),
+        }
+    }
+}
+
+impl Write for Unheld {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        let piece = bytes.get(..PIECE).unwrap_or(bytes);
+        let Some(pieces) = &self.pieces else { return Err(unread()) };
+        match pieces.send_timeout(piece.to_vec(), UNREAD_FOR) {
+            Ok(()) => Ok(piece.len()),
+            Err(SendTimeoutError::Timeout(_)) => {
+                self.pieces = None;
+                give_up();
+                Err(unread())
+            }
+            Err(SendTimeoutError::Disconnected(_)) => self.end().and(Err(io::ErrorKind::BrokenPipe.into())),
+        }
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        self.end()
+    }
+}
+
+/// Writes `text` as it is at once, however long that takes: for a thread that holds up nobody. As [`put`] otherwise.
+pub(crate) fn put_waiting(text: &str) {
+    if GIVEN_UP.load(Ordering::Relaxed) {
+        return;
+    }
+    let mut stdout = io::stdout().lock();
+    if let Err(error) = stdout.write_all(text.as_bytes()).and_then(|()| stdout.flush()) {
+        tracing::debug!(%error, "stdout is closed");
+    }
 }
 
 /// Writes `text` as it is: lines made fit already, and codes for the terminal. Errors are only logged: a closed pipe or a lost
@@ -25,9 +122,16 @@ pub(crate) fn put(text: &str) {
     if GIVEN_UP.load(Ordering::Relaxed) {
         return;
     }
-    let mut stdout = std::io::stdout().lock();
-    if let Err(error) = stdout.write_all(text.as_bytes()).and_then(|()| stdout.flush()) {
-        tracing::debug!(%error, "stdout is closed");
+    let written = stdout().and_then(|mut stdout| {
+        stdout.write_all(text.as_bytes())?;
+        stdout.flush()
+    });
+    match written {
+        Err(error) if error.kind() == io::ErrorKind::TimedOut => {
+            tracing::warn!("the terminal doesn't read: not all is shown");
+        }
+        Err(error) => tracing::debug!(%error, "stdout is closed"),
+        Ok(()) => {}
     }
 }
 
@@ -54,42 +158,40 @@ pub(crate) fn aside(text: &str) {
 
 /// Writes output for another program, and a line end.
 ///
-/// Errors: stdout is closed or the write is short.
+/// Errors: stdout is closed, the write is short, or a live dive's is read by nobody.
 pub(crate) fn deliver(text: &str) -> Result<(), Failure> {
-    let mut stdout = std::io::stdout().lock();
-    stdout
-        .write_all(lines(text).as_bytes())
-        .and_then(|()| stdout.write_all(b"\n"))
-        .and_then(|()| stdout.flush())
-        .map_err(|source| Failure::Write { path: "standard output".into(), source })
+    deliver_bytes(format!("{}\n", lines(text)).as_bytes())
 }
 
 /// Writes output for another program as it is.
 ///
-/// Errors: stdout is closed or the write is short.
+/// Errors: as of [`deliver`].
 pub(crate) fn deliver_bytes(bytes: &[u8]) -> Result<(), Failure> {
-    let mut stdout = std::io::stdout().lock();
-    stdout
-        .write_all(bytes)
-        .and_then(|()| stdout.flush())
-        .map_err(|source| Failure::Write { path: "standard output".into(), source })
+    let write = |mut stdout: Box<dyn Write>| {
+        stdout.write_all(bytes)?;
+        stdout.flush()
+    };
+    stdout().and_then(write).map_err(failed)
 }
 
 /// Writes a report as JSON, without holding all of it in memory.
 ///
-/// Errors: stdout is closed or the write is short.
+/// Errors: as of [`deliver`].
 pub(crate) fn deliver_json(report: &Report) -> Result<(), Failure> {
-    let failed = |source| Failure::Write { path: "standard output".into(), source };
-    let mut stdout = BufWriter::new(Plain(std::io::stdout().lock()));
+    let mut stdout = BufWriter::new(Plain(stdout().map_err(failed)?));
     serde_json::to_writer_pretty(&mut stdout, report).map_err(|error| failed(error.into()))?;
     stdout.write_all(b"\n").and_then(|()| stdout.flush()).map_err(failed)
+}
+
+fn failed(source: io::Error) -> Failure {
+    Failure::Write { path: "standard output".into(), source }
 }
 
 /// Writes text made fit, whatever pieces it comes in.
 struct Plain<W>(W);
 
 impl<W: Write> Write for Plain<W> {
-    fn write(&mut self, bytes: &[u8]) -> std::io::Result<usize> {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
         // A character that isn't whole yet comes again with the next bytes.
         let whole = match str::from_utf8(bytes) {
             Ok(text) => text,
@@ -97,13 +199,13 @@ impl<W: Write> Write for Plain<W> {
                 .get(..error.valid_up_to())
                 .and_then(|text| str::from_utf8(text).ok())
                 .unwrap_or_default(),
-            Err(error) => return Err(std::io::Error::new(std::io::ErrorKind::InvalidData, error)),
+            Err(error) => return Err(io::Error::new(io::ErrorKind::InvalidData, error)),
         };
         self.0.write_all(lines(whole).as_bytes())?;
         Ok(whole.len())
     }
 
-    fn flush(&mut self) -> std::io::Result<()> {
+    fn flush(&mut self) -> io::Result<()> {
         self.0.flush()
     }
 }

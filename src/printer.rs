@@ -1,17 +1,14 @@
 //! Writes a dive's lines to stdout on a thread of its own: a terminal that doesn't read holds up no live dive.
 
 use std::thread::{self, JoinHandle};
-use std::time::Duration;
 
 use crossbeam::channel::{Receiver, RecvTimeoutError, Sender, TrySendError, bounded};
 
-use crate::output::{give_up, put};
+use crate::output::{UNREAD_FOR, give_up, put_waiting};
 use crate::{terminal, transient};
 
 /// Lines that may wait. A dive has a line a second, and some for each stretch.
 const WAITING: usize = 1 << 10;
-/// How long a live dive waits for its terminal at the end.
-const ENDS_WITHIN: Duration = Duration::from_secs(2);
 
 enum Message {
     Line(String),
@@ -69,11 +66,13 @@ impl Printer {
         self.dropped += u64::from(full);
     }
 
-    /// Waits until all has been written; a lossy one for [`ENDS_WITHIN`] at most, since a terminal that doesn't read must not keep a
+    /// Waits until all has been written; a lossy one for [`UNREAD_FOR`] at most, since a terminal that doesn't read must not keep a
     /// dive from its log's end.
     pub(crate) fn end(&mut self) {
         drop(self.sender.take());
-        let stuck = self.lossy && self.done.recv_timeout(ENDS_WITHIN) == Err(RecvTimeoutError::Timeout);
+        let stuck = self.thread.is_some()
+            && self.lossy
+            && self.done.recv_timeout(UNREAD_FOR) == Err(RecvTimeoutError::Timeout);
         if stuck {
             self.thread = None;
             give_up();
@@ -102,17 +101,17 @@ fn print(messages: &Receiver<Message>) {
     let close = |has_status: &mut bool| {
         // A log message has already cleared it. What it said is no longer so.
         if core::mem::take(has_status) && transient::take() {
-            put(terminal::CLEAR);
+            put_waiting(terminal::CLEAR);
         }
     };
     for message in messages {
         match message {
             Message::Line(text) => {
                 close(&mut has_status);
-                put(&format!("{text}\n"));
+                put_waiting(&format!("{text}\n"));
             }
             Message::Status(text) => {
-                put(&format!("{}{text}", terminal::CLEAR));
+                put_waiting(&format!("{}{text}", terminal::CLEAR));
                 transient::shown();
                 has_status = true;
             }
