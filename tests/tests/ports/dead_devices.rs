@@ -22,7 +22,7 @@ fn when_all_devices_die_the_state_grows_old_on_the_screen() {
     let mut said = BufReader::new(emulate.0.stdout.take().unwrap()).lines().map(Result::unwrap);
     let vehicle = said.find_map(|line| line.strip_prefix("vehicle ").map(str::to_owned)).unwrap();
     let mut run = headrace_tests::program();
-    run.args(["run", &vehicle, "--no-record"]);
+    run.args(["run", &vehicle, "--no-record", "--no-page"]);
     let mut run = OnTerminal::start(run, 60);
     let before = run.wait_for(" m/s", 0);
     emulate.0.kill().unwrap();

@@ -7,6 +7,8 @@ use headrace_tests::rig::{COUNTER, HEAD, HEADING, emulated};
 use headrace_tests::{Folder, raw_messages};
 use mcap::MessageStream;
 use serde_json::Value;
+use std::io::Write as _;
+use std::process::Stdio;
 use std::time::Duration;
 
 use crate::rehearsal::Running;
@@ -173,6 +175,33 @@ fn nor_does_one_that_stops_while_it_shows_the_whole_page() {
     terminal.read_until("ALERTS");
     terminal.fill();
     ends_and_reports(Running(run), &folder);
+}
+
+/// The size of a pipe. Source: pipe(7), "Pipe capacity".
+const PIPE: usize = 1 << 16;
+
+#[test]
+fn nor_does_a_pipe_that_nobody_reads_to_the_last_byte() {
+    let folder = Folder::new();
+    folder.write("vehicle.toml", vehicle(&ABSENT));
+    let whole = folder.headrace(&RUN).stdout.len();
+    assert!((200..PIPE).contains(&whole), "{whole} bytes");
+    // Full from the start, and at last within the summary.
+    let lines = [0, whole - 150, whole - 100, whole - 50, whole - 10].map(|room| ("", room));
+    let json = ["--json", "--json-lines"].map(|how| (how, 0));
+    let runs = lines.into_iter().chain(json).map(|(how, room)| {
+        let folder = Folder::new();
+        folder.write("vehicle.toml", vehicle(&ABSENT));
+        let (unread, mut pipe) = std::io::pipe().unwrap();
+        pipe.write_all(&vec![b'x'; PIPE - room]).unwrap();
+        let mut run = headrace_tests::program();
+        run.args(RUN).args([how].iter().filter(|how| !how.is_empty())).current_dir(folder.path(""));
+        let run = Running(run.stdin(Stdio::null()).stdout(pipe).stderr(Stdio::null()).spawn().unwrap());
+        (run, unread, folder)
+    });
+    for (run, _unread, folder) in runs.collect::<Vec<_>>() {
+        ends_and_reports(run, &folder);
+    }
 }
 
 #[test]
