@@ -174,7 +174,7 @@ pub(crate) enum Command {
     /// Writes a vehicle file for `headrace run`. The vehicle waits until all its sensors are connected, and --stand seconds
     /// more; the command ends at the end of the trajectory.
     #[command(
-        after_help = "Example:\n  headrace emulate deploy/scenes/demo.toml --out /tmp/rehearsal\n  headrace run /tmp/rehearsal/vehicle.toml"
+        after_help = "Example:\n  headrace emulate deploy/scenes/rehearsal.toml --out /tmp/rehearsal\n  headrace run /tmp/rehearsal/vehicle.toml"
     )]
     Emulate(Emulate),
     /// List attached devices, permissions and missing ports, with the command that fixes each.

@@ -7,7 +7,7 @@ use headrace_tests::scenes;
 use crate::{EFFECTS, best, simulate};
 
 /// The scenes, each of some minutes.
-const SCENES: [&str; 6] = ["demo", "steel", "collapse", "drop-outs", "leak-current", "small-pipe"];
+const SCENES: [&str; 6] = ["rehearsal", "steel", "collapse", "drop-outs", "leak-current", "small-pipe"];
 /// Effects that stand for devices that break: no scene has them all.
 const FAULTS: [&str; 2] = ["stuck_range", "device_faults"];
 

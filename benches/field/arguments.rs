@@ -23,6 +23,8 @@ pub(crate) struct Arguments {
     pub(crate) metres: Option<f64>,
     /// File of the figures.
     pub(crate) json: PathBuf,
+    /// Page whose table is replaced.
+    pub(crate) page: Option<PathBuf>,
 }
 
 impl Arguments {
@@ -31,7 +33,8 @@ impl Arguments {
         let mut words = words.filter(|word| word != "--bench");
         let mut seeds = None;
         let json = headrace_tests::root().join("target/field.json");
-        let mut all = Self { quick: false, cell: Vec::new(), seeds: 0, from_seed: 1, metres: None, json };
+        let mut all =
+            Self { quick: false, cell: Vec::new(), seeds: 0, from_seed: 1, metres: None, json, page: None };
         while let Some(word) = words.next() {
             if word == "--quick" {
                 all.quick = true;
@@ -50,7 +53,12 @@ impl Arguments {
                     all.metres = Some(metres);
                 }
                 "--json" => all.json = PathBuf::from(value),
-                _ => panic!("{word}: known are --quick, --cell, --seeds, --from-seed, --metres, --json"),
+                "--page" => all.page = Some(headrace_tests::root().join(value)),
+                _ => {
+                    panic!(
+                        "{word}: known are --quick, --cell, --seeds, --from-seed, --metres, --json, --page"
+                    )
+                }
             }
         }
         all.seeds = seeds.unwrap_or(SEEDS[usize::from(all.quick)]);

@@ -4,7 +4,8 @@
 //! `cargo bench -p headrace_benches --bench field` runs all cells in some ten minutes on two cores; `-- --quick` with a
 //! tenth of the dives. `--cell VEHICLE/CONDITION/PLACE/SPEED` runs those cells alone (any part may be `*`, parts at the end may be left
 //! out, a place may be any chainage), `--seeds N` so many dives each, `--from-seed N` begins with another,
-//! `--metres N` makes each so long, `--json FILE` says where to write (target/field.json).
+//! `--metres N` makes each so long, `--json FILE` says where to write (target/field.json), `--page docs/field.md` renews the table of
+//! that page.
 //! D_true is from `headrace_tests::truth`, which has nothing of the program's coverage. The figures are the report's.
 
 #![expect(clippy::unwrap_used, clippy::panic, reason = "a benchmark stops at what it can't do")]
@@ -25,7 +26,11 @@ fn main() {
     let cells = table::cells(&arguments);
     assert!(!cells.is_empty(), "--cell names none: vehicles, conditions, places and speeds are in the table");
     let figures = run(&cells, &arguments);
-    table::print(&cells, &figures, &arguments);
+    let text = table::markdown(&cells, &figures, &arguments);
+    println!("{text}");
+    if let Some(page) = &arguments.page {
+        table::replace(page, &text);
+    }
     table::write_json(&cells, &figures, &arguments);
 }
 
@@ -38,7 +43,9 @@ fn run(cells: &[NamedCell], arguments: &Arguments) -> Vec<Figures> {
         loop {
             let number = next.fetch_add(1, Ordering::Relaxed);
             let Some(NamedCell { cell, .. }) = cells.get(number) else { return done };
-            let seeds = arguments.from_seed..arguments.from_seed + arguments.seeds;
+            // Hours of way are driven once.
+            let count = if cell.let_in_m.is_some() { 1 } else { arguments.seeds };
+            let seeds = arguments.from_seed..arguments.from_seed + count;
             let length_m = arguments.metres.unwrap_or(cell.vehicle.length_m);
             done.push((number, field_table::figures(cell, seeds, length_m)));
             eprint!("\r{} of {} cells", number + 1, cells.len());

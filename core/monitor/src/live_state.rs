@@ -153,6 +153,8 @@ pub struct LiveState {
     pub metres: LiveMetres,
     /// The stretch of which nothing could be said that was judged last.
     pub unsure: Option<Stretch>,
+    /// All wall that heads see here has passed: it follows from chainage and verdicts.
+    pub passed: bool,
     /// Alerts that hold.
     pub alerts: ActiveAlerts,
     /// Sources that are profiling heads, by number.
@@ -166,7 +168,7 @@ pub struct LiveState {
 }
 
 stateful!(LiveState {
-    state: now, at, position, chainage_m, sd, pass_sd_m, speed_mps, advice, metres, unsure, alerts, turning;
+    state: now, at, position, chainage_m, sd, pass_sd_m, speed_mps, advice, metres, unsure, passed, alerts, turning;
     slots: heard;
     fixed: target_m, confidence_sd, heads, sources;
 });
@@ -187,6 +189,7 @@ impl LiveState {
             confidence_sd,
             metres: LiveMetres::default(),
             unsure: None,
+            passed: false,
             alerts: [None; MOST_ALERTS],
             heads,
             turning: 0,

@@ -91,6 +91,7 @@ pub fn status_line(state: &LiveState, profile: &Profile, name: &dyn Fn(usize) ->
         Condition::Old(age) => (format!("OLD {}: nothing from any sensor", age_text(age)), "stop".to_owned()),
         Condition::NoPosition(lacking) => (no_position_text(lacking).to_owned(), "hold still".to_owned()),
         Condition::NoSonar => ("NO SONAR: nothing is seen".to_owned(), "stop".to_owned()),
+        Condition::Passed => ("passed here".to_owned(), String::new()),
         Condition::NoSpeed => (no_speed_text(state, profile), String::new()),
         Condition::TooFast => ("TOO FAST".to_owned(), format!("at most {v_max}")),
         Condition::TurnFails => (turn_fails_text(state), format!("go {v_max}")),
@@ -112,7 +113,8 @@ pub fn status_line(state: &LiveState, profile: &Profile, name: &dyn Fn(usize) ->
             some => parts.push(format!("{} of {} sensors silent", some.len(), state.sources)),
         }
         let forecast = losses_text(state).or_else(|| forecast_text(state));
-        parts.extend(forecast.filter(|_| state.has_sonar() && state.speed_mps.is_some()));
+        let counts = state.has_sonar() && state.speed_mps.is_some() && condition != Condition::Passed;
+        parts.extend(forecast.filter(|_| counts));
     }
     if state.metres.fail_m > 0.0 {
         parts.push(format!("missed {:.2} m", state.metres.fail_m));

@@ -171,6 +171,8 @@ pub struct Standing {
     pub metres: LiveMetres,
     /// The unsure stretch that was judged last.
     pub unsure: Option<Stretch>,
+    /// All wall that heads see here has passed.
+    pub passed: bool,
     /// Alerts that hold.
     pub alerts: ActiveAlerts,
 }

@@ -48,13 +48,13 @@ pub enum Told {
         /// Where it ends.
         to_m: f64,
     },
-    /// A run was passed again and fails no more.
+    /// A stretch that was missed was passed again, and none of it fails any more.
     Cleared {
-        /// Number of the run.
+        /// Number of the run that was flagged.
         run: u32,
-        /// Where it begins.
+        /// Where it began.
         from_m: f64,
-        /// Where it ends.
+        /// Where it ended.
         to_m: f64,
     },
     /// Nothing can be said of a stretch, which goes on.
@@ -99,6 +99,8 @@ pub enum Told {
 pub struct Teller {
     /// The run that was flagged last, with the causes that were told of it, until its end is told.
     run: Option<(RunId, Causes)>,
+    /// The stretches that were told as missed, until none of them fails any more.
+    missed: Vec<ToldMissed>,
     /// The stretch that was told last, until its end is.
     unsure: Option<Stretch>,
     /// The stretches whose ends have been told.
@@ -106,6 +108,20 @@ pub struct Teller {
     /// Sections at an end of the way, until the vehicle is well beyond.
     at_ends: Option<Stretch>,
     way_told: Option<MonoNs>,
+}
+
+/// Sections that were told as missed, from the first to before the last that ever failed.
+#[derive(Debug, Clone, Copy)]
+struct ToldMissed {
+    run: RunId,
+    from: i64,
+    to: i64,
+}
+
+impl ToldMissed {
+    fn meets(&self, run: &Run) -> bool {
+        run.from < self.to && run.to > self.from
+    }
 }
 
 impl Teller {
@@ -203,7 +219,10 @@ impl Teller {
             return;
         };
         let is_told = |told: &Stretch| told.why == here.why && (told.from..told.to).contains(&section);
-        if self.told.iter().any(is_told) {
+        // Who was told that it is missed is on his way back: what half of a pass makes of it is no news.
+        let is_missed =
+            |told: &ToldMissed| here.why != Unsure::NotInspected && (told.from..told.to).contains(&section);
+        if self.told.iter().any(is_told) || self.missed.iter().any(is_missed) {
             return;
         }
         if here.why == Unsure::NotInspected {
@@ -247,17 +266,20 @@ impl Teller {
         let sections = &dive.coverage().sections;
         let Some(run) = sections.runs().get(id) else { return };
         match change {
+            // A part of what was told is no other stretch.
+            RunChange::Raised if self.missed.iter().any(|told| told.meets(run)) => {}
             RunChange::Raised => {
                 self.close_run(sections, tell);
                 let Some(evidence) = sections.evidence_of(run, run.cause) else { return };
                 self.run = Some((id, evidence.causes));
+                self.missed.push(ToldMissed { run: id, from: run.from, to: run.to });
                 tell(flag(id, run, run.from, &evidence, dive));
             }
-            RunChange::Changed => self.tell_other_cause(id, run, dive, tell),
-            RunChange::Cleared => {
-                let (from_m, to_m) = bounds_m(run, sections);
-                tell(Told::Cleared { run: id.0, from_m, to_m });
+            RunChange::Changed => {
+                self.widen(run);
+                self.tell_other_cause(id, run, dive, tell);
             }
+            RunChange::Cleared => self.clear(run, sections, tell),
             RunChange::Merged => {
                 if let (Some((last, _)), Some(kept)) = (self.run.as_mut(), run.merged_into)
                     && *last == id
@@ -266,6 +288,34 @@ impl Teller {
                 }
             }
         }
+    }
+
+    /// Takes a run that has grown into what was told of it; stretches that have met are one.
+    fn widen(&mut self, run: &Run) {
+        let mut met = self.missed.iter().filter(|told| told.meets(run));
+        let Some(mut whole) = met.next().copied() else { return };
+        (whole.from, whole.to) = (whole.from.min(run.from), whole.to.max(run.to));
+        for other in met {
+            (whole.from, whole.to) = (whole.from.min(other.from), whole.to.max(other.to));
+        }
+        self.missed.retain(|told| !told.meets(run));
+        self.missed.push(whole);
+    }
+
+    /// Tells the end of a stretch that was missed, as it was told, and then what can't be said of it.
+    fn clear(&mut self, run: &Run, sections: &Sections, tell: &mut dyn FnMut(Told)) {
+        let Some(at) = self.missed.iter().position(|told| told.meets(run)) else { return };
+        let Some(told) = self.missed.get(at).copied() else { return };
+        if sections.runs().all().iter().any(|other| other.is_open() && told.meets(other)) {
+            return;
+        }
+        self.missed.swap_remove(at);
+        let (from_m, to_m) = (sections.bounds_m(told.from).0, sections.bounds_m(told.to).0);
+        tell(Told::Cleared { run: told.run.0, from_m, to_m });
+        for section in told.from..told.to {
+            self.note_unsure(section, sections, tell);
+        }
+        self.close_unsure(sections, tell);
     }
 
     /// Tells a run anew once a metre of it fails for what wasn't told: who has done what was told may still miss the wall.

@@ -17,7 +17,7 @@ pub const FILES: [(&str, &str); 11] = [
     ("pipe.toml", include_str!("../../../deploy/vehicles/pipe.toml")),
     ("boulders.toml", include_str!("../../../deploy/scenes/boulders.toml")),
     ("collapse.toml", include_str!("../../../deploy/scenes/collapse.toml")),
-    ("demo.toml", include_str!("../../../deploy/scenes/demo.toml")),
+    ("rehearsal.toml", include_str!("../../../deploy/scenes/rehearsal.toml")),
     ("drop-outs.toml", include_str!("../../../deploy/scenes/drop-outs.toml")),
     ("small-pipe.toml", include_str!("../../../deploy/scenes/small-pipe.toml")),
     ("vita1-field.toml", include_str!("../../../deploy/scenes/vita1-field.toml")),

@@ -1,5 +1,7 @@
 //! What dives in each cell of the table: scenes, and the vehicle files that headrace is told.
 
+use std::fmt::Write as _;
+
 use headrace_sensor::device::Sense;
 use headrace_simulator::Scene;
 use headrace_vehicle::VehicleConfig;
@@ -24,19 +26,41 @@ pub struct Vehicle {
     pub layout: &'static str,
     /// Metres of a dive, unless told otherwise: more where passes are far apart.
     pub length_m: f64,
+    /// Places beyond the portal are at this share of their chainage, where its tunnel is shorter than 7 km.
+    pub far_share: f64,
+    /// Noise of its inertial unit, where nothing else is said.
+    unit: Unit,
     /// The largest speed at which Eq. 16 keeps the target with what the vehicle hides, and no other margin, m/s. A number, so
     /// that speeds beyond it stay the same when plans change.
     pub edge_mps: f64,
 }
 
+/// Inertial units, by what is simulated of them: what the vehicle file says, or leaves to the data sheet.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Unit {
+    /// The one of the preset `xsens_mti600`: `plugins/imu_can/src/noise.rs`.
+    Xsens,
+    /// An autopilot's, of which nothing is known but the defaults of `[navigation]`.
+    Autopilot,
+}
+
 /// The vehicles.
-pub const VEHICLES: [Vehicle; 6] = [
-    vehicle("vita1", "vita1.toml", "slow", 5.0, "phase_shift", 45.0, 0.231),
-    vehicle("vita2-2", "vita2-2.toml", "fast", 0.5, "phase_shift", 15.0, 0.115),
-    vehicle("vita2-3", "vita2-3.toml", "fast", 0.5, "phase_shift", 15.0, 0.089),
-    vehicle("vita2-4", "vita2-4.toml", "fast", 0.5, "phase_shift", 15.0, 0.118),
-    vehicle("vita2-4-sectors", "vita2-4.toml", "fast", 0.5, "sector_offset", 15.0, 0.099),
-    vehicle("pipe", "pipe.toml", "fast", 0.5, "phase_shift", 10.0, 0.116),
+pub const VEHICLES: [Vehicle; 8] = [
+    vehicle("vita1", "vita1.toml", "slow", 5.0, 45.0, 0.231),
+    vehicle("vita2-2", "vita2-2.toml", "fast", 0.5, 15.0, 0.115),
+    vehicle("vita2-3", "vita2-3.toml", "fast", 0.5, 15.0, 0.089),
+    vehicle("vita2-4", "vita2-4.toml", "fast", 0.5, 15.0, 0.118),
+    Vehicle {
+        layout: "sector_offset",
+        ..vehicle("vita2-4-sectors", "vita2-4.toml", "fast", 0.5, 15.0, 0.099)
+    },
+    Vehicle { far_share: 0.05, ..vehicle("pipe", "pipe.toml", "fast", 0.5, 10.0, 0.116) },
+    Vehicle { unit: Unit::Autopilot, ..vehicle("autopilot", "autopilot.toml", "fast", 0.5, 15.0, 0.118) },
+    Vehicle {
+        unit: Unit::Autopilot,
+        far_share: 0.16,
+        ..vehicle("bluerov2", "bluerov2.toml", "fast", 1.0, 20.0, 0.124)
+    },
 ];
 
 const fn vehicle(
@@ -44,11 +68,11 @@ const fn vehicle(
     file: &'static str,
     mode: &'static str,
     target_m: f64,
-    layout: &'static str,
     length_m: f64,
     edge_mps: f64,
 ) -> Vehicle {
-    Vehicle { name, file, mode, target_m, layout, length_m, edge_mps }
+    let (layout, far_share, unit) = ("phase_shift", 1.0, Unit::Xsens);
+    Vehicle { name, file, mode, target_m, layout, length_m, far_share, unit, edge_mps }
 }
 
 /// What is the matter with a dive.
@@ -58,7 +82,7 @@ pub enum Condition {
     Clean,
     /// Every sensor as its maker says.
     DataSheet,
-    /// A MEMS unit, slack, a wheel 0.5 % off, steel.
+    /// A MEMS unit, slack, both as the vehicle file says; a wheel 0.5 % off, steel.
     Poor,
     /// Returns lost in runs, near returns, second echoes.
     Murk,
@@ -74,12 +98,16 @@ pub enum Condition {
     WrongLatency,
     /// The cable's counter counts 2 % too much.
     WrongCable,
+    /// The inertial unit is a MEMS one, and the vehicle file names a better one.
+    WrongUnit,
+    /// The cable hangs, and the vehicle file says that it is kept taut.
+    WrongSlack,
     /// One device sticks, jumps, dies, returns or babbles.
     Broken,
 }
 
 /// All conditions with their names.
-pub const CONDITIONS: [(&str, Condition); 11] = [
+pub const CONDITIONS: [(&str, Condition); 13] = [
     ("clean", Condition::Clean),
     ("data-sheet", Condition::DataSheet),
     ("poor", Condition::Poor),
@@ -90,13 +118,15 @@ pub const CONDITIONS: [(&str, Condition); 11] = [
     ("wrong-wall", Condition::WrongWall),
     ("wrong-latency", Condition::WrongLatency),
     ("wrong-cable", Condition::WrongCable),
+    ("wrong-unit", Condition::WrongUnit),
+    ("wrong-slack", Condition::WrongSlack),
     ("broken", Condition::Broken),
 ];
 
 /// Where dives begin: a name and a chainage, m.
 pub type Place = (&'static str, f64);
 
-/// The places. Of the pipe, which has 400 m, the last are 180 and 360 m.
+/// The places; in shorter tunnels at a share of that ([`Vehicle::far_share`]).
 pub const PLACES: [Place; 3] = [("portal", 3.0), ("3000", 3000.0), ("6900", 6900.0)];
 
 /// How fast a vehicle goes.
@@ -129,6 +159,8 @@ pub struct Cell {
     pub condition: Condition,
     /// Where it begins, m.
     pub start_m: f64,
+    /// Where it was let in, if it is driven to `start_m` from there, m.
+    pub let_in_m: Option<f64>,
     /// How fast it goes.
     pub driven: Driven,
 }
@@ -141,14 +173,29 @@ pub struct CellDive {
     pub believed: Scene,
 }
 
-/// Pings of an uncertain maker, and the depth and inertial units; heads have tables of their own.
-const DATA_SHEET_SENSORS: &str = "imu_noise = { gyro_degps_rthz = 0.007, accel_mps2_rthz = 0.001, attitude_deg = 0.3 }\n\
-     depth_steps = {}\n";
-/// An MTi-class unit's biases.
-const GOOD_BIAS: &str = "imu_bias = { gyro_degps = 0.003, accel_mps2 = 0.002, tau_s = 300 }\n";
-const POOR_BIAS: &str = "imu_bias = { gyro_degps = 0.2, accel_mps2 = 0.02, tau_s = 300 }\n\
-     magnetic_disturbance = { per_100m = 4, up_to_deg = 10, length_m = 6 }\n\
-     tether_slack = { reach_m = 0.15, period_s = 30 }\n";
+/// The depth sensor's noise and counts, and what a compass scatters; heads and echosounders have tables of their own.
+/// Sources: `replay/simulator/src/calls/data_sheets.rs`.
+const DEPTH: &str = "depth_steps = {}\ndepth_noise = { noise_pa = 152 }\n";
+/// Noise and biases of the units, as the vehicle files say or leave to data sheets: `plugins/imu_can/src/noise.rs`, and the
+/// defaults of `[navigation]` in docs/vehicle-file.md.
+const XSENS: &str = "imu_noise = { gyro_degps_rthz = 0.0077, accel_mps2_rthz = 0.0006, attitude_deg = 0.3 }\n\
+     imu_bias = { gyro_degps = 0.0022, accel_mps2 = 0.002, tau_s = 300, gyro_constant_degps = 0.05, accel_constant_mps2 = 0.02 }\n";
+const AUTOPILOT: &str = "imu_noise = { gyro_degps_rthz = 0.01, accel_mps2_rthz = 0.003, attitude_deg = 0.3 }\n\
+     imu_bias = { gyro_degps = 0.2, accel_mps2 = 0.03, tau_s = 1000 }\n";
+/// Source: field.md, "poor".
+const MEMS: &str = "imu_noise = { gyro_degps_rthz = 0.007, accel_mps2_rthz = 0.001, attitude_deg = 0.3 }\n\
+     imu_bias = { gyro_degps = 0.2, accel_mps2 = 0.02, tau_s = 300 }\n";
+/// What is said of it, and of a cable that hangs, in the vehicle file.
+const MEMS_TOLD: &str = "gyro_noise_degps_rthz = 0.007\naccel_noise_mps2_rthz = 0.001\ngyro_bias_degps = 0.2\n\
+     gyro_bias_time_s = 300\naccel_bias_mps2 = 0.02\naccel_bias_time_s = 300\n";
+const STEEL: &str = "magnetic_disturbance = { per_100m = 4, up_to_deg = 10, length_m = 6 }\n";
+const SLACK: &str = "tether_slack = { reach_m = 0.15, period_s = 30 }\n";
+/// Standard deviations of slack that are told: of a cable that doesn't hang, and of that one, m.
+const TAUT_M: f64 = 0.003;
+const HANGS_M: f64 = 0.06;
+
+/// Speed of a vehicle that is driven to where it is to begin, m/s.
+const WAY_MPS: f64 = 0.3;
 
 impl Cell {
     /// The dive of a seed over so many metres.
@@ -156,7 +203,7 @@ impl Cell {
         let plain = self.plain(seed, length_m);
         let [planned_mps, speed_mps] = self.speeds_mps(&plain.vehicle);
         let told = self.told().replace("PLANNED", &format!("{planned_mps:.4}"));
-        let effects = self.effects(&plain, seed, length_m / speed_mps);
+        let effects = self.effects(&plain, seed, length_m, length_m / speed_mps);
         let truly = self.truly(&told, &plain, seed);
         let text = self.text(seed, length_m, speed_mps, &effects);
         CellDive { scene: parse(&text, &truly, seed), believed: parse(&text, &told, seed) }
@@ -188,11 +235,18 @@ impl Cell {
             Some("mode") => format!("mode = {mode:?}"),
             Some("layout") => format!("layout = {layout:?}"),
             Some("planned_speed_mps") => "planned_speed_mps = PLANNED".to_owned(),
-            // Who knows that a cable hangs says so in the vehicle file.
-            Some("slack_sd_m") if self.condition == Condition::Poor => "slack_sd_m = 0.06".to_owned(),
+            Some("[navigation]" | "slack_sd_m") => String::new(),
             _ => line.to_owned(),
         });
-        lines.collect::<Vec<_>>().join("\n")
+        let told = lines.collect::<Vec<_>>().join("\n");
+        told.replace("[heads]", &format!("[navigation]\n{}\n[heads]", self.told_navigation()))
+    }
+
+    /// Who knows that a cable hangs, or doesn't, and what a unit is worth, says so in the vehicle file.
+    fn told_navigation(&self) -> String {
+        let poor = self.condition == Condition::Poor;
+        let slack_sd_m = if poor { HANGS_M } else { TAUT_M };
+        format!("slack_sd_m = {slack_sd_m}\n{}", if poor { MEMS_TOLD } else { "" })
     }
 
     /// The vehicle as it truly is.
@@ -261,9 +315,11 @@ impl Cell {
                 self.aside_m(0.5)
             )
         } else {
-            format!(
-                "start_m = {start_m}\n[[trajectory.legs]]\ndistance_m = {length_m}\nspeed_mps = {speed_mps}\n"
-            )
+            let leg = |distance_m: f64, speed_mps: f64| {
+                format!("[[trajectory.legs]]\ndistance_m = {distance_m}\nspeed_mps = {speed_mps}\n")
+            };
+            let way = self.let_in_m.map(|from_m| leg(start_m - from_m, WAY_MPS)).unwrap_or_default();
+            format!("start_m = {}\n{way}{}", self.let_in_m.unwrap_or(start_m), leg(length_m, speed_mps))
         };
         let wider = "[[tunnel.stations]]\nchainage_m = 0\nscale = 1.06\n";
         let tunnel = if self.condition == Condition::WrongWall { wider } else { "" };
@@ -277,14 +333,13 @@ impl Cell {
         if self.vehicle.name == "pipe" { 0.3 * most_m } else { most_m }
     }
 
-    fn effects(&self, plain: &Scene, seed: u64, duration_s: f64) -> String {
+    fn effects(&self, plain: &Scene, seed: u64, length_m: f64, duration_s: f64) -> String {
         let heads = of_sense(plain, Sense::Head);
         let occlusion = "occlusion = {}\n";
         if self.condition == Condition::Clean {
             return occlusion.to_owned();
         }
         let (heads, pings) = (quoted(&heads), quoted(&of_sense(plain, Sense::Echosounder)));
-        let bias = if self.condition == Condition::Poor { POOR_BIAS } else { GOOD_BIAS };
         let tables = format!(
             "[effects.beam_cone]\nsensors = {heads}\n\
              [effects.range_quantisation]\npoints = 500\nsensors = {heads}\n\
@@ -294,23 +349,50 @@ impl Cell {
              [[effects.missing_returns]]\nshare = 0.05\nmean_run = 8\nsensors = {pings}\n"
         );
         format!(
-            "{occlusion}{DATA_SHEET_SENSORS}{bias}{tables}{}{}",
-            self.murk(&heads),
+            "{occlusion}{DEPTH}{}{tables}{}{}",
+            self.units_and_cables(),
+            self.murk(&heads, seed, length_m),
             self.wrong(plain, seed, duration_s)
         )
     }
 
-    /// All along the way: effects can't be limited to stretches.
-    fn murk(&self, heads: &str) -> String {
+    fn units_and_cables(&self) -> String {
+        let own = match self.vehicle.unit {
+            Unit::Xsens => XSENS,
+            Unit::Autopilot => AUTOPILOT,
+        };
+        match self.condition {
+            Condition::Poor => format!("{MEMS}{STEEL}{SLACK}"),
+            Condition::WrongUnit => MEMS.to_owned(),
+            Condition::WrongSlack => format!("{own}{SLACK}"),
+            _ => own.to_owned(),
+        }
+    }
+
+    /// Stretches of 5 to 20 m, 2 to 6 m apart, in which 10 to 30 % of the heads' returns are lost in runs; 5 % come from before the
+    /// wall in clusters, and some by way of a second wall. Source: field.md, "murk".
+    fn murk(&self, heads: &str, seed: u64, length_m: f64) -> String {
         if self.condition != Condition::Murk {
             return String::new();
         }
         let far_m = self.aside_m(3.0);
-        format!(
-            "[[effects.missing_returns]]\nshare = 0.2\nmean_run = 6\nsensors = {heads}\n\
-             [[effects.outliers]]\nshare = 0.05\nnear_m = 0.6\nfar_m = {far_m}\nsensors = {heads}\n\
-             [effects.multipath]\nshare = 0.1\nsensors = {heads}\n"
-        )
+        let mut draw = Draw::new(seed ^ 0x5117);
+        let (mut from_m, end_m) = (self.start_m + draw.between(2.0, 6.0), self.start_m + length_m);
+        let mut murk = String::new();
+        while from_m < end_m {
+            let to_m = from_m + draw.between(5.0, 20.0);
+            let place = format!("from_m = {from_m:.2}\nto_m = {to_m:.2}\nsensors = {heads}\n");
+            let share = draw.between(0.1, 0.3);
+            write!(
+                murk,
+                "[[effects.missing_returns]]\nshare = {share:.3}\nmean_run = 6\n{place}\
+                 [[effects.near_returns]]\nshare = 0.05\nmean_run = 4\nnear_m = 0.6\nfar_m = {far_m}\n{place}\
+                 [[effects.multipath]]\nshare = 0.1\n{place}"
+            )
+            .unwrap();
+            from_m = to_m + draw.between(2.0, 6.0);
+        }
+        murk
     }
 
     /// The one thing that is wrong or breaks.

@@ -1,6 +1,7 @@
 //! Figures of a cell: verdicts and sigmas against the truth.
 
 use headrace_geometry::math;
+use headrace_monitor::report::AdviceReport;
 use headrace_sensor::device::Sense;
 use headrace_simulator::Scene;
 
@@ -47,27 +48,33 @@ pub struct Figures {
     pub errors: Vec<[f64; 2]>,
     /// For each kind of source, measurements used and the sum of their normalised innovations squared.
     pub innovations: [(f64, f64); KINDS_OF_SOURCES.len()],
+    /// Speeds advised away from the ends, m/s.
+    pub advised_mps: Vec<f64>,
     /// Metres of the vehicle's way, and those of them that have a section in the report.
     pub way_m: [f64; 2],
 }
 
 impl Figures {
-    /// Adds a dive.
-    pub fn add(&mut self, dive: &JudgedDive, scene: &Scene) {
+    /// Adds a dive from a chainage on, m.
+    pub fn add(&mut self, dive: &JudgedDive, scene: &Scene, from_m: f64) {
         self.dives += 1;
         let target_m = dive.report.target_m;
-        for section in &dive.sections {
-            self.judge(section, target_m);
-        }
         let end_m = END_M + target_m;
-        let inner = |section: &&JudgedSection| {
-            let [from_m, to_m] =
+        let [from_m, to_m] = [from_m.max(dive.truth.way_m[0]), dive.truth.way_m[1]];
+        let [first_m, last_m] = [from_m + end_m, to_m - end_m];
+        for section in &dive.sections {
+            let [start_m, end_m] =
                 [section.report.start_m, section.report.end_m].map(|x_m| x_m + section.shift_m);
-            from_m >= dive.truth.way_m[0] + end_m && to_m <= dive.truth.way_m[1] - end_m
-        };
-        for section in dive.sections.iter().filter(inner) {
-            self.weigh(section, target_m);
+            if end_m > from_m {
+                self.judge(section, target_m);
+            }
+            if start_m >= first_m && end_m <= last_m {
+                self.weigh(section, target_m);
+            }
         }
+        let heard =
+            |entry: &&AdviceReport| entry.chainage_m.is_some_and(|x_m| (first_m..last_m).contains(&x_m));
+        self.advised_mps.extend(dive.report.advice.iter().filter(heard).map(|entry| entry.v_max_mps));
         self.innovate(dive, scene);
         self.tell(dive);
     }
@@ -166,9 +173,12 @@ impl Figures {
 
     /// Median of the sigmas, m.
     pub fn sd_m(&self) -> f64 {
-        let mut all: Vec<f64> = self.errors.iter().map(|[_, sd_m]| *sd_m).collect();
-        all.sort_by(f64::total_cmp);
-        all.get(all.len() / 2).copied().unwrap_or(f64::NAN)
+        median(self.errors.iter().map(|[_, sd_m]| *sd_m))
+    }
+
+    /// Median of the speeds advised, m/s.
+    pub fn advised_mps(&self) -> f64 {
+        median(self.advised_mps.iter().copied())
     }
 
     /// Mean normalised innovation squared of a kind of sources, by its number.
@@ -186,4 +196,11 @@ impl Figures {
     pub fn false_fails(&self) -> f64 {
         f64::from(self.failed_under) / f64::from(self.under.max(1))
     }
+}
+
+/// The median; not a number of none.
+fn median(of: impl Iterator<Item = f64>) -> f64 {
+    let mut all: Vec<f64> = of.collect();
+    all.sort_by(f64::total_cmp);
+    all.get(all.len() / 2).copied().unwrap_or(f64::NAN)
 }

@@ -15,7 +15,7 @@ pub fn figures(cell: &Cell, seeds: impl IntoIterator<Item = u64>, length_m: f64)
     for seed in seeds {
         let dive = cell.dive(seed, length_m);
         let judged = truth::dive_believing(&dive.scene, &dive.believed.vehicle);
-        figures.add(&judged, &dive.scene);
+        figures.add(&judged, &dive.scene, cell.start_m);
     }
     figures
 }

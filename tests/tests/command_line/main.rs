@@ -19,3 +19,4 @@ mod screens;
 #[cfg(unix)]
 mod tui;
 mod viewers;
+mod way_back;

@@ -9,17 +9,20 @@ const LEFT_OUT: &str = "    [...]";
 /// Tells this test to write the README anew.
 const RENEW: &str = "HEADRACE_RENEW_README";
 
-/// Of the demonstration's output in a pipe: from the state before the first flag to that after the last run, and the summary of
-/// the way. Nothing within is left out.
+/// Of the demonstration's output in a pipe: from the state before the flag to where what was missed ends, from the state before it
+/// is cleared to that, and the summary of the way. Nothing within these is left out.
 fn excerpt(stdout: &str) -> String {
     let lines: Vec<&str> = stdout.lines().collect();
     let first = lines.iter().position(|line| line.contains("MISSED: ")).unwrap() - 1;
-    let last = lines.iter().rposition(|line| line.contains("missed until ")).unwrap() + 1;
+    let last = lines.iter().position(|line| line.contains("missed until ")).unwrap();
+    let cleared = lines.iter().rposition(|line| line.contains("CLEARED until ")).unwrap();
     let summary = lines.iter().position(|line| line.contains(" samples, target ")).unwrap();
     let end = lines.iter().position(|line| line.starts_with("  largest hole")).unwrap();
-    assert!(first < last && last < summary && summary < end, "{stdout}");
+    assert!(first < last && last < cleared && cleared < summary && summary < end, "{stdout}");
     let shown = |lines: &[&str]| -> String { format!("    {}\n", lines.join("\n    ")) };
-    format!("{}{LEFT_OUT}\n{}", shown(&lines[first..=last]), shown(&lines[summary..=end]))
+    let parts = [(first, last), (cleared - 1, cleared), (summary, end)];
+    let parts = parts.map(|(from, to)| shown(&lines[from..=to]));
+    parts.join(&format!("{LEFT_OUT}\n"))
 }
 
 /// `HEADRACE_RENEW_README=1 cargo test -p headrace_tests --test command_line readme` renews it.

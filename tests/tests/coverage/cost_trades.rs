@@ -69,13 +69,13 @@ fn ticks_change_no_verdict_and_a_coarse_profile_does_change_the_advice() {
     let trade = measured(live::measure);
     is_whole(&trade);
     for value in ["1 ms", "5 ms", "20 ms", "50 ms", "100 ms"] {
-        let of = |name: &str| figure(&trade, ["demo", "tick", value], name);
+        let of = |name: &str| figure(&trade, ["rehearsal", "tick", value], name);
         assert_eq!(of("dives with another digest than by default").to_bits(), 0.0_f64.to_bits(), "{value}");
         assert_eq!(of("other verdicts than by default").to_bits(), 0.0_f64.to_bits(), "{value}");
     }
     let off =
         |scene: &str, method: &str, value: &str| figure(&trade, [scene, method, value], "advised speed off");
-    assert!(off("demo", "ring", "1 degrees") > 2.0 * off("demo", "ring", "0.1 degrees"));
+    assert!(off("rehearsal", "ring", "1 degrees") > 2.0 * off("rehearsal", "ring", "0.1 degrees"));
     let vertices = |value: &str| off("surveyed", "vertices", value);
     assert!(
         vertices("10") > 10.0 * vertices("1000") && vertices("arcs") == 0.0,

@@ -21,7 +21,13 @@ fn cell(seed: u64) -> Cell {
     let vehicle = VEHICLES.into_iter().find(|vehicle| vehicle.name == "vita2-4").unwrap();
     let mut draw = Draw::new(seed);
     let start_m = draw.one_of(&[16.0, 6900.0]);
-    Cell { vehicle, condition: Condition::Broken, start_m, driven: Driven::Times(draw.between(0.7, 1.3)) }
+    Cell {
+        vehicle,
+        condition: Condition::Broken,
+        start_m,
+        let_in_m: None,
+        driven: Driven::Times(draw.between(0.7, 1.3)),
+    }
 }
 
 fn dives(seeds: impl Iterator<Item = u64>) -> Vec<(u64, Figures)> {

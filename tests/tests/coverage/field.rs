@@ -35,7 +35,7 @@ fn val_what_passes_is_within_the_target() {
     for condition in [Condition::Clean, Condition::DataSheet, Condition::Lively] {
         for start_m in [16.0, 6900.0] {
             for driven in [Driven::Planned, Driven::Times(1.2)] {
-                let cell = Cell { vehicle, condition, start_m, driven };
+                let cell = Cell { vehicle, condition, start_m, let_in_m: None, driven };
                 let figures = field_table::figures(&cell, [1], 15.0);
                 let name = format!("{condition:?} {start_m} {driven:?}");
                 print(&name, &figures);
@@ -56,7 +56,13 @@ fn val_what_passes_is_within_the_target() {
 #[test]
 fn figures_see_false_verdicts() {
     let vehicle = VEHICLES.into_iter().find(|vehicle| vehicle.name == "vita2-4").unwrap();
-    let cell = Cell { vehicle, condition: Condition::Clean, start_m: 16.0, driven: Driven::Times(1.0) };
+    let cell = Cell {
+        vehicle,
+        condition: Condition::Clean,
+        start_m: 16.0,
+        let_in_m: None,
+        driven: Driven::Times(1.0),
+    };
     let dive = cell.dive(1, 8.0);
     let mut judged = truth::dive_believing(&dive.scene, &dive.believed.vehicle);
     let mut all = |verdict| {
@@ -64,7 +70,7 @@ fn figures_see_false_verdicts() {
             section.report.verdict = verdict;
         }
         let mut figures = Figures::default();
-        figures.add(&judged, &dive.scene);
+        figures.add(&judged, &dive.scene, cell.start_m);
         figures
     };
     let passed = all("pass");
@@ -77,6 +83,6 @@ fn figures_see_false_verdicts() {
     let told_m = failed.way_m[1];
     judged.sections.remove(judged.sections.len() / 2);
     let mut less = Figures::default();
-    less.add(&judged, &dive.scene);
+    less.add(&judged, &dive.scene, cell.start_m);
     assert!((told_m - less.way_m[1] - judged.report.section_m).abs() < 1e-9, "{told_m} {less:?}");
 }

@@ -95,7 +95,7 @@ fn heads_that_are_swapped_are_named() {
 
 fn cell(vehicle: &str, condition: Condition) -> Cell {
     let vehicle = VEHICLES.into_iter().find(|known| known.name == vehicle).unwrap();
-    Cell { vehicle, condition, start_m: 100.0, driven: Driven::Planned }
+    Cell { vehicle, condition, start_m: 100.0, let_in_m: None, driven: Driven::Planned }
 }
 
 /// Ranges by sound that is faster than told are too short; a wall that is wider is too far.

@@ -115,7 +115,7 @@ impl Corpus {
         }
         add(Kind::Vehicle, headrace_tests::VEHICLE.into());
         add(Kind::Vehicle, headrace_tests::other_vehicle().into_bytes());
-        let demo = include_str!("../../../deploy/scenes/demo.toml");
+        let demo = include_str!("../../../deploy/scenes/rehearsal.toml");
         add(Kind::Scene, demo.replace("../vehicles/vita2-4.toml", "vehicle.toml").into_bytes());
         add(Kind::Scene, headrace_tests::SCENE.into());
         for line in lines() {

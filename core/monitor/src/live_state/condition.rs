@@ -23,6 +23,8 @@ pub enum Condition {
     NoPosition(NoFix),
     /// No profiling head gives readings.
     NoSonar,
+    /// All wall here has passed, and the position is sure: any speed will do.
+    Passed,
     /// Slower won't help.
     NoSpeed,
     /// The speed is well over v_max.
@@ -57,6 +59,7 @@ impl Condition {
             Self::Old(_) => "old",
             Self::NoPosition(_) => "no_position",
             Self::NoSonar => "no_sonar",
+            Self::Passed => "passed",
             Self::NoSpeed => "no_speed",
             Self::TooFast => "too_fast",
             Self::TurnFails => "turn_fails",
@@ -69,7 +72,7 @@ impl Condition {
     /// Its colour.
     pub fn lamp(self) -> Lamp {
         match self {
-            Self::Good => Lamp::Green,
+            Self::Good | Self::Passed => Lamp::Green,
             Self::Over | Self::TurnFails | Self::CannotSay(_) | Self::NoData => Lamp::Amber,
             Self::Old(_) | Self::NoPosition(_) | Self::NoSonar | Self::NoSpeed | Self::TooFast => Lamp::Red,
         }
@@ -94,6 +97,9 @@ impl LiveState {
         let Some(advice) = self.advice.as_ref().filter(|_| self.has_sonar()) else {
             return Condition::NoSonar;
         };
+        if self.passed && self.position == PositionState::Ok && advice.reason != Reason::NoReturns {
+            return Condition::Passed;
+        }
         let Some(v_max_mps) = self.v_max_mps() else {
             return match advice.reason {
                 // Of a head that doesn't turn, or not long enough yet, nothing is known.

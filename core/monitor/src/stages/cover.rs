@@ -14,14 +14,19 @@ use super::walls::{self, Sorting};
 use super::way::{Heads, note_beat};
 use crate::alerts::Alerts;
 use crate::entities::HeadFrontier;
-use crate::messages::{Notices, Outcome, Placed, PlacedEvents, PlacedList, PlacedPing, Requests, Standings};
+use crate::messages::{
+    Notices, Outcome, Placed, PlacedEvents, PlacedList, PlacedPing, Requests, Standing, Standings,
+};
 use crate::resources::{Coverage, Digests, Finder, Tally, Target, TunnelDesign, VehicleEntities};
-use headrace_coverage::{Drive, HeadReach, Loss, Visit};
+use headrace_coverage::{Drive, HeadReach, Loss, Verdict, Visit};
 use headrace_geometry::time::DurNs;
 use headrace_geometry::tunnel::Profile;
+use headrace_sampling::passes::Situation;
 
 /// Interval between checks of the sections of a still zone.
 const LOOK_AROUND: DurNs = DurNs(1_000_000_000);
+/// Time in which a pilot slows down before wall that hasn't passed, seconds.
+const SOON_S: f64 = 5.0;
 
 #[expect(clippy::too_many_arguments, reason = "a system's arguments are what it reads and writes")]
 pub(super) fn cover(
@@ -121,11 +126,25 @@ pub(super) fn cover(
             };
             judge_one(&request, &tunnel.profile, &mut coverage, &mut results);
         }
-        if let Placed::Situation(at, _, doubts) = item {
+        if let Placed::Situation(at, situation, doubts) = item {
             let sweeps = heads.iter().map(|(_, mounted, _, sweep, _)| (mounted.source, sweep));
-            standings.0.push(standing(*at, &coverage, &alerts, doubts, sweeps));
+            let passed = is_passed(&coverage, &heads, situation);
+            standings.0.push(Standing { passed, ..standing(*at, &coverage, &alerts, doubts, sweeps) });
         }
     }
+}
+
+/// Whether all wall that heads see here, and in the next seconds, has passed: nothing is to be gained or missed.
+fn is_passed(coverage: &Coverage, heads: &Heads<'_, '_>, situation: &Situation) -> bool {
+    let Coverage { sections, .. } = coverage;
+    let reaches = heads.iter().map(|(.., frontier)| frontier.0.map(|reach| reach.latest()));
+    let all = reaches.reduce(|all, reach| Some(all?.with(reach?))).flatten();
+    let Some(all) = all.filter(|_| situation.pose.is_some()) else { return false };
+    let (ahead_m, around_m) = (SOON_S * situation.speed_mps, sections.target_m() / 2.0);
+    let from_m = all.from_m.min(all.from_m + ahead_m) - around_m;
+    let to_m = all.to_m.max(all.to_m + ahead_m) + around_m;
+    let mut indices = sections.index_of(from_m)..=sections.index_of(to_m);
+    indices.all(|index| sections.get(index).is_some_and(|section| section.verdict == Verdict::Pass))
 }
 
 fn count(tally: &mut Tally, ping: &PlacedPing) {

@@ -44,6 +44,7 @@ pub(super) fn standing<'a>(
             not_inspected_m: metres.not_inspected_m,
         },
         unsure: coverage.unsure,
+        passed: false,
         alerts: active(at, alerts, doubts, heads),
     }
 }
@@ -156,6 +157,7 @@ pub(super) fn live(
             advice: Some(*advice),
             metres: standing.metres,
             unsure: standing.unsure,
+            passed: standing.passed,
             alerts: standing.alerts,
             turning: source_bits(heads.map(|head| head.source), turning),
             ..*state

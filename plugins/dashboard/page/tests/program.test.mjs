@@ -11,7 +11,7 @@ import { fileURLToPath } from "node:url";
 import { MICROPHONE, browser, open } from "./browser.mjs";
 
 const BIN = process.env.HEADRACE_BIN;
-const SCENE = fileURLToPath(new URL("../../../../deploy/scenes/demo.toml", import.meta.url));
+const SCENE = fileURLToPath(new URL("../../../../deploy/scenes/rehearsal.toml", import.meta.url));
 const LONG = { timeout: 120_000 };
 
 async function freePort() {

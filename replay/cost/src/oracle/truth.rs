@@ -14,8 +14,9 @@ use super::wall::{Place, Wall};
 use crate::error::CostError;
 
 /// Effects that put another sound, or none, in place of the wall's return, or spoil its bytes.
-pub const REPLACING: [&str; 9] = [
+pub const REPLACING: [&str; 10] = [
     "occlusion",
+    "near_returns",
     "multipath",
     "side_lobes",
     "interference",

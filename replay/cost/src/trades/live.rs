@@ -89,14 +89,14 @@ pub fn measure(inputs: &Inputs<'_>, progress: &mut dyn FnMut(&str)) -> Result<Tr
 }
 
 fn scenes(inputs: &Inputs<'_>) -> Result<Vec<(&'static str, String)>, CostError> {
-    let demo = file("demo.toml")?;
+    let rehearsal = file("rehearsal.toml")?;
     let ends_m = inputs.effort.pick(["2.6", "2.9", "3.2"], ["5.0", "7.0", "9.0"]);
-    let mut shorter = demo.to_owned();
+    let mut shorter = rehearsal.to_owned();
     for (from, to) in ["14.0", "20.0", "32.0"].iter().zip(ends_m) {
         shorter = shorter.replace(&format!("chainage_m = {from}"), &format!("chainage_m = {to}"));
     }
     let pilot = format!("{PILOT}to_m = 8\n{PILOT_EFFECTS}");
-    let mut scenes = vec![("demo", shorter)];
+    let mut scenes = vec![("rehearsal", shorter)];
     scenes.extend(inputs.effort.pick(None, Some(("pilot", pilot))));
     Ok(scenes)
 }

@@ -50,6 +50,8 @@ pub(super) struct Heeding {
     pub(super) within: f64,
     /// Whether missed stretches are passed again.
     pub(super) goes_back: bool,
+    /// How long the pilot waits before he sets out, s.
+    pub(super) waits_s: f64,
     pub(super) hurries: Vec<Hurry>,
     /// The longest dive, s.
     pub(super) at_most_s: f64,
@@ -148,6 +150,7 @@ impl Advised {
         let missed_m = told.as_ref().and_then(|told| self.to_go_back_for(told));
         self.doing = self.decide(at_s, missed_m);
         let wanted_mps = match self.doing {
+            Doing::Going if at_s < self.pilot.waits_s => 0.0,
             Doing::Going => self.wanted_mps(at_s, told.as_ref()),
             Doing::Back { .. } => -BACK_MPS,
             Doing::Waiting { .. } | Doing::Done => 0.0,

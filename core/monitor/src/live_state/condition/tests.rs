@@ -73,6 +73,20 @@ fn the_colour_follows_speed_against_what_is_allowed() {
     );
 }
 
+/// Where nothing is to be gained or missed; but not on the word of a doubtful position, nor without sonar.
+#[test]
+fn over_wall_that_has_passed_any_speed_will_do() {
+    let back = LiveState { passed: true, speed_mps: Some(-0.3), ..state() };
+    assert_eq!((back.condition(), back.condition().lamp()), (Condition::Passed, Lamp::Green));
+    let coarse = LiveState { advice: Some(advice(Reason::AngularStep, 0.0, 0.9)), ..back };
+    assert_eq!(coarse.condition(), Condition::Passed);
+    let doubtful = LiveState { position: PositionState::Doubtful(PositionDoubt::Cable), ..back };
+    assert_eq!(doubtful.condition(), Condition::TooFast);
+    let mut mute = back;
+    mute.heard[..2].fill(Some(at(7)));
+    assert_eq!(mute.condition(), Condition::NoSonar);
+}
+
 #[test]
 fn a_turn_that_misses_within_the_speed_allowed_is_told_only_while_it_does() {
     let forecast = |t_m| Advice { will_exceed: true, ..advice(Reason::HelixPitch, 0.07, t_m) };

@@ -32,21 +32,23 @@ export function Announcer() {
 export function Speed() {
   useTopics(store.topics.state);
   const { state } = store;
-  const speed = state?.speed_mps ?? null, most = state?.v_max_mps ?? null;
+  // Over wall that has passed nothing bounds the speed.
+  const bounded = state?.condition !== "passed";
+  const speed = state?.speed_mps ?? null, most = bounded ? (state?.v_max_mps ?? null) : null;
   const margin = state?.margins.speed_mps ?? null, lost = state?.margins.lost_share ?? null;
   return (
     <div class="speed">
       <div class="figures">
         <div class="now"><span class="value">{figure(speed === null ? null : Math.abs(speed), 2)}</span><span class="unit">m/s{speed !== null && speed < -0.02 ? " back" : ""}</span></div>
         <div class="most"><span class="name">max</span><span class="value">{figure(most, 2)}</span><span class="unit">m/s</span></div>
-        <div class="margin">{margin === null ? "" : margin >= 0 ? `${figure(margin, 2)} to spare` : `${figure(-margin, 2)} too fast`}</div>
+        <div class="margin">{margin === null || !bounded ? "" : margin >= 0 ? `${figure(margin, 2)} to spare` : `${figure(-margin, 2)} too fast`}</div>
       </div>
       <Gauge speed={speed} most={most} />
       <div class="why">
-        {state?.reason ? <span><b>limit</b> {lost === null ? (REASONS[state.reason] ?? state.reason) : `${figure(100 * lost, 0)} % of returns lost`}</span> : null}
-        {state?.remedy ? <span class="remedy"><b>to gain more</b> {state.remedy}</span> : null}
+        {state?.reason && bounded ? <span><b>limit</b> {lost === null ? (REASONS[state.reason] ?? state.reason) : `${figure(100 * lost, 0)} % of returns lost`}</span> : null}
+        {state?.remedy && bounded ? <span class="remedy"><b>to gain more</b> {state.remedy}</span> : null}
       </div>
-      <Forecast />
+      {bounded ? <Forecast /> : <div class="forecast">all wall here has passed</div>}
     </div>
   );
 }

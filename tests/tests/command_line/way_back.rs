@@ -1,0 +1,99 @@
+//! What a pilot is told who goes back for a stretch that was missed: nothing that he knows, no limit where there is none, and one end.
+
+use headrace_tests::{Folder, root};
+use serde_json::Value;
+
+/// Lines of a dive of the shipped vehicle in a scene.
+fn told(scene: &str) -> Vec<Value> {
+    let folder = Folder::new();
+    let file = root().join("deploy/vehicles/vita2-4.toml");
+    folder.write("vehicle.toml", std::fs::read(file).unwrap());
+    folder.write("scene.toml", scene.replace("../vehicles/vita2-4.toml", "vehicle.toml"));
+    folder.simulate("scene.toml", "dive.mcap");
+    let answer = folder.headrace(&["replay", "dive.mcap", "--json-lines"]);
+    assert_eq!(answer.code, Some(0), "{}", answer.stderr);
+    answer.stdout.lines().map(|line| serde_json::from_str(line).unwrap()).collect()
+}
+
+fn of<'a>(lines: &'a [Value], kind: &str) -> Vec<&'a Value> {
+    lines.iter().filter(|line| line["type"] == kind).collect()
+}
+
+#[track_caller]
+fn figure(line: &Value, key: &str) -> f64 {
+    line[key].as_f64().unwrap_or_else(|| panic!("{key} of {line}"))
+}
+
+/// Conditions, but for the seconds after each turn.
+fn conditions<'a>(lines: &'a [Value], back: bool, between_m: [f64; 2]) -> Vec<&'a str> {
+    let states = of(lines, "state");
+    let within = |state: &&&Value| {
+        let [x_m, mps] = [&state["position"]["chainage_m"], &state["speed_mps"]]
+            .map(|value| value.as_f64().unwrap_or(f64::NAN));
+        (between_m[0]..between_m[1]).contains(&x_m) && if back { mps < -0.15 } else { mps > 0.05 }
+    };
+    states.iter().filter(within).map(|state| state["condition"].as_str().unwrap()).collect()
+}
+
+#[test]
+fn the_demonstration_s_stretch_is_told_once_and_cleared_once_as_it_was_told() {
+    let lines = told(&std::fs::read_to_string(root().join("deploy/scenes/demo.toml")).unwrap());
+    let (flags, ends, cleared) = (of(&lines, "flag"), of(&lines, "flag_ends"), of(&lines, "cleared"));
+    assert_eq!([flags.len(), ends.len(), cleared.len()], [1, 1, 1], "{flags:?} {ends:?} {cleared:?}");
+    for key in ["run", "from_m", "to_m"] {
+        assert_eq!(cleared[0][key], ends[0][key], "{key}");
+    }
+    assert_eq!(cleared[0]["from_m"], flags[0]["from_m"]);
+    let [from_m, to_m] = ["from_m", "to_m"].map(|key| figure(cleared[0], key));
+    assert!(to_m - from_m > 4.0, "{from_m} to {to_m}");
+    // The way back leaves more samples, and sections of which nothing can be said until they are passed again.
+    let unsure = of(&lines, "cannot_say");
+    let within = unsure.iter().filter(|line| (from_m..to_m).contains(&figure(line, "from_m")));
+    assert_eq!(within.count(), 0, "{unsure:?}");
+    let states = of(&lines, "state");
+    let unsure_m = |state: &&&Value| figure(&state["metres"], "cannot_say_m");
+    assert!(states.iter().map(|state| unsure_m(&state)).fold(0.0, f64::max) > 1.0, "the test sees nothing");
+    let end = &of(&lines, "end")[0];
+    assert_eq!(end["summary"]["fail_m"], 0.0, "{end}");
+}
+
+/// The way there at a speed that passes, or not, and back fast.
+fn there_and_back(there_mps: f64) -> Vec<Value> {
+    told(&format!(
+        "vehicle = \"vehicle.toml\"\n[vehicle_changes]\nheads.planned_speed_mps = 0.09\n[trajectory]\nkind = \"waypoints\"\n\
+         [[trajectory.waypoints]]\nchainage_m = 5\nstay_s = 10\n[[trajectory.waypoints]]\nchainage_m = 15\nspeed_mps = {there_mps}\n\
+         [[trajectory.waypoints]]\nchainage_m = 6\nspeed_mps = 0.3\n[effects]\nmotion_within_turn = {{}}\nocclusion = {{}}\n"
+    ))
+}
+
+#[test]
+fn over_wall_that_has_passed_no_speed_is_too_fast_and_over_other_wall_it_is() {
+    let lines = there_and_back(0.09);
+    let conditions_there = conditions(&lines, false, [7.0, 13.0]);
+    assert!(conditions_there.iter().all(|condition| *condition != "passed"), "{conditions_there:?}");
+    let back = conditions(&lines, true, [8.5, 12.0]);
+    assert!(back.len() > 5 && back.iter().all(|condition| *condition == "passed"), "{back:?}");
+    let lines = there_and_back(0.3);
+    let back = conditions(&lines, true, [8.5, 12.0]);
+    assert!(back.len() > 5 && back.iter().all(|condition| *condition == "too_fast"), "{back:?}");
+}
+
+/// A pilot slows down before new wall: the limit is back before he is there.
+#[test]
+fn the_limit_is_back_before_new_wall_is() {
+    let lines = told(
+        "vehicle = \"vehicle.toml\"\n[vehicle_changes]\nheads.planned_speed_mps = 0.09\n[trajectory]\nkind = \"waypoints\"\n\
+         [[trajectory.waypoints]]\nchainage_m = 5\nstay_s = 10\n[[trajectory.waypoints]]\nchainage_m = 12\nspeed_mps = 0.09\n\
+         [[trajectory.waypoints]]\nchainage_m = 8\nspeed_mps = 0.3\n[[trajectory.waypoints]]\nchainage_m = 16\nspeed_mps = 0.3\n\
+         [effects]\nmotion_within_turn = {}\nocclusion = {}\n",
+    );
+    let again: Vec<&Value> = of(&lines, "state")
+        .into_iter()
+        .filter(|state| state["speed_mps"].as_f64().is_some_and(|mps| mps > 0.25))
+        .collect();
+    let first = again.iter().find(|state| state["condition"] == "too_fast").unwrap();
+    // The heads are 0.55 m before the middle, and saw wall up to there.
+    let x_m = figure(&first["position"], "chainage_m");
+    assert!((9.0..11.5).contains(&x_m), "{x_m}");
+    assert!(again.iter().any(|state| state["condition"] == "passed"));
+}
