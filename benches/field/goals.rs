@@ -1,6 +1,5 @@
 //! What the figures of a cell must be.
 
-use crate::table::advice_share;
 use headrace_tests::field_table::{Cell, Condition, Driven, Figures, KINDS_OF_SOURCES};
 
 /// Few false fails, as a share of the sections with D_true below 0.9 T, few that can't be said, and as many passed as could,
@@ -42,8 +41,13 @@ impl Missed {
         };
         let first_go = matches!(cell.driven, Driven::Planned | Driven::Advised);
         let ratios = if bounds.is_some() { 0.7..=1.3 } else { 0.0..=1.5 };
-        // D of several visits is the best of them, D_true that of all together.
-        let judged = !figures.errors.is_empty() && cell.driven != Driven::Back;
+        // D of several visits is the best of them, D_true that of all together: a lively pilot goes back, too.
+        let once = match cell.driven {
+            Driven::Back => false,
+            Driven::Planned | Driven::Times(_) => cell.condition != Condition::Lively,
+            Driven::Advised => true,
+        };
+        let judged = !figures.errors.is_empty() && once;
         let nis = |kind| bounds.is_some() && figures.nis(kind).is_some_and(|nis| !(0.7..=1.4).contains(&nis));
         Self {
             passed_over: figures.false_passes() > 0.025,
@@ -80,4 +84,9 @@ impl Missed {
         ];
         single.iter().chain(&self.nis).filter(|missed| **missed).count()
     }
+}
+
+/// The speed advised over that of Eq. 16.
+pub(crate) fn advice_share(cell: &Cell, figures: &Figures) -> f64 {
+    figures.advised_mps() / cell.vehicle.edge_mps
 }

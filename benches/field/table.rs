@@ -8,7 +8,7 @@ use headrace_tests::field_table::{
 use serde_json::json;
 
 use crate::arguments::Arguments;
-use crate::goals::Missed;
+use crate::goals::{Missed, advice_share};
 
 /// Where one vehicle goes that is let in near the portal, m.
 const DRIVEN_THERE: Place = ("driven", 6900.0);
@@ -150,11 +150,6 @@ fn judged<'a>(
     figures: &'a [Figures],
 ) -> impl Iterator<Item = (&'a NamedCell, &'a Figures, Missed)> {
     cells.iter().zip(figures).map(|(cell, figures)| (cell, figures, Missed::of(&cell.cell, figures)))
-}
-
-/// The speed advised over that of Eq. 16.
-pub(crate) fn advice_share(cell: &Cell, figures: &Figures) -> f64 {
-    figures.advised_mps() / cell.vehicle.edge_mps
 }
 
 fn marked(text: String, missed: bool) -> String {

@@ -65,5 +65,5 @@ pub use store::{Fidelity, Kept, SampleStore, StoreError, StoreLayout, StoreUse, 
 pub use trust::{Beam, Distrust};
 pub use unsure::{Stretch, Unsure};
 pub use visits::{Visit, Visits};
-pub use wall::{HeadWall, Sorted, Taken};
+pub use wall::{HeadWall, MOST_WAITING, Sorted, Taken};
 pub use wall_limits::{PlacedReturn, WallLimits};

@@ -49,6 +49,13 @@ impl WallLimits {
         apart_m <= NEAR_SHARE * self.radius_m && (a.off_m - b.off_m).abs() <= self.tolerance_m + slope_m
     }
 
+    /// Distance between two returns across their rays, at the nearer one's range from the middle, m.
+    pub(super) fn width_m(&self, a: &PlacedReturn, b: &PlacedReturn) -> f64 {
+        let inward = (1.0 + a.off_m.min(b.off_m) / self.radius_m).clamp(0.0, 1.0);
+        let around_m = math::wrap_signed(a.arc_m - b.arc_m, self.perimeter_m) * inward;
+        math::hypot(a.x_m - b.x_m, around_m)
+    }
+
     /// Distance between the rays of two returns along the wall, at the farther one, m.
     fn apart_m(&self, a: &PlacedReturn, b: &PlacedReturn) -> f64 {
         let outward = 1.0 + a.off_m.max(b.off_m).max(0.0) / self.radius_m;
@@ -65,7 +72,7 @@ const MOST_SLOPE: f64 = 1.0;
 const NEAR_SHARE: f64 = 0.4;
 
 /// A return placed on the unrolled wall.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct PlacedReturn {
     /// Chainage, m.
     pub x_m: f64,

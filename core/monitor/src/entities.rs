@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 pub use super::head_motion::MeasuredMotion;
 pub use super::loss_count::LossCount;
 use super::messages::PlacedPing;
-use headrace_coverage::{HeadReach, HeadWall};
+use headrace_coverage::{HeadReach, HeadWall, MOST_WAITING};
 use headrace_fusion::filter::cable::CableDoubt;
 use headrace_fusion::filter::pose_sd::PoseSd;
 use headrace_fusion::{Fix, Navigation, NoFix};
@@ -155,18 +155,40 @@ pub struct HeadSweep {
     pub(super) last: Option<LastSample>,
     /// What its returns are taken for.
     pub(super) wall: HeadWall,
-    /// Its last return, while its next one is to say what it is, and what has come since.
-    pub(super) waiting: Option<Waiting>,
+    /// Its last returns, while its next ones are to say what they are.
+    pub(super) waiting: WaitingReturns,
 }
 
-/// A return that waits for the head's next one.
+/// A return that waits for the head's next ones.
 #[derive(Debug, Clone, Copy, Serialize, Deserialize)]
 pub(super) struct Waiting {
     pub(super) ping: PlacedPing,
-    /// A ping since gave no return.
+    /// The ping after it gave no return.
     pub(super) broken: bool,
     /// A new sweep has begun since.
     pub(super) new_sweep: bool,
+}
+
+/// Returns that wait, in order.
+#[derive(Debug, Clone, Copy, Default, Serialize, Deserialize)]
+pub(super) struct WaitingReturns([Option<Waiting>; MOST_WAITING]);
+
+impl WaitingReturns {
+    /// Adds a return; false if there is no room.
+    pub(super) fn add(&mut self, ping: &PlacedPing) -> bool {
+        let slot = self.0.iter_mut().find(|slot| slot.is_none());
+        slot.map(|slot| *slot = Some(Waiting { ping: *ping, broken: false, new_sweep: false })).is_some()
+    }
+
+    /// The last one.
+    pub(super) fn last_mut(&mut self) -> Option<&mut Waiting> {
+        self.0.iter_mut().flatten().next_back()
+    }
+
+    /// All of them; none waits any more.
+    pub(super) fn take(&mut self) -> impl Iterator<Item = Waiting> + use<> {
+        core::mem::take(&mut self.0).into_iter().flatten()
+    }
 }
 
 /// The last valid sample of a head in its present sweep.

@@ -132,7 +132,7 @@ pub const PLACES: [Place; 3] = [("portal", 3.0), ("3000", 3000.0), ("6900", 6900
 /// How fast a vehicle goes.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Driven {
-    /// As planned: the vehicle file's speed, but no more than what `plan` says for mode and target.
+    /// As `plan` says for mode and target.
     Planned,
     /// So many times the largest speed of Eq. 16, phases as planned.
     Times(f64),
@@ -269,12 +269,7 @@ impl Cell {
 
     /// Planned speed and speed driven, m/s.
     fn speeds_mps(&self, vehicle: &VehicleConfig) -> [f64; 2] {
-        let most_mps = self.plan_mps(vehicle);
-        let file = scenes::vehicle_file(self.vehicle.file).unwrap();
-        let file = String::from_utf8(file).unwrap();
-        let file_mps = file.lines().find_map(|line| line.strip_prefix("planned_speed_mps = "));
-        let file_mps = file_mps.and_then(|rest| rest.split(' ').next()?.parse::<f64>().ok());
-        let planned_mps = file_mps.unwrap_or(most_mps).min(most_mps);
+        let planned_mps = self.plan_mps(vehicle);
         match self.driven {
             Driven::Planned => [planned_mps, planned_mps],
             Driven::Times(times) => [planned_mps, times * self.vehicle.edge_mps],

@@ -20,6 +20,8 @@ pub const KINDS_OF_SOURCES: [(&str, Sense); 6] = [
 /// Beyond the target, sections at the ends of a dive have no neighbours on one side over so many metres: the length of the
 /// hull, and the way to the next pass.
 const END_M: f64 = 2.0;
+/// A hole's centre is within its section where it is farther than this from the section's bounds, m.
+const FLANK_M: f64 = 0.005;
 
 /// What came of the dives of a cell.
 #[derive(Debug, Clone, Default)]
@@ -44,7 +46,7 @@ pub struct Figures {
     pub verdicts_m: [f64; 4],
     /// Of them, D_true is within the target.
     pub passable_m: f64,
-    /// Of each inner section with a bounded hole: D less D_true and sigma, m.
+    /// Of each inner section with a bounded hole of its own: D less D_true and sigma, m.
     pub errors: Vec<[f64; 2]>,
     /// For each kind of source, measurements used and the sum of their normalised innovations squared.
     pub innovations: [(f64, f64); KINDS_OF_SOURCES.len()],
@@ -101,7 +103,12 @@ impl Figures {
         if let Some(metres) = place.and_then(|place| self.verdicts_m.get_mut(place)) {
             *metres += length_m;
         }
-        if let Some(hole_m) = section.report.hole_m.filter(|_| section.report.hole_bounded)
+        // A circle centred on a bound is the flank of a neighbour's hole: twice as far off as the place is.
+        let is_own = section
+            .report
+            .hole_x_m
+            .is_some_and(|x_m| (x_m - section.report.start_m).min(section.report.end_m - x_m) > FLANK_M);
+        if let Some(hole_m) = section.report.hole_m.filter(|_| section.report.hole_bounded && is_own)
             && section.true_hole_m.is_finite()
         {
             self.errors.push([hole_m - section.true_hole_m, section.report.hole_sd_m]);

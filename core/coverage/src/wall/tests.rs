@@ -38,6 +38,7 @@ impl Turning {
     fn turn(&mut self, turns: u32, heard: impl Fn(usize, f64, f64, [u32; 2]) -> Option<f64>) -> Vec<Count> {
         let radius_m = self.limits.radius_m;
         let mut counts = vec![Count::default(); self.heads.len()];
+        let mut waiting = vec![0; self.heads.len()];
         for (turn, step) in (0..turns).flat_map(|turn| (0..STEPS).map(move |step| (turn, step))) {
             for (head, count) in counts.iter_mut().enumerate() {
                 let angle =
@@ -50,9 +51,13 @@ impl Turning {
                 let beam =
                     Beam { range_m, angle_rad: angle, standing: false, design_range_m: &|| Some(radius_m) };
                 let sorted = self.heads[head].sort(head, placed, &beam, &self.limits, &mut self.relief);
-                for taken in sorted.waiting.into_iter().chain([sorted.this]) {
-                    count.wall += usize::from(taken == Taken::Wall);
-                    count.doubtful += usize::from(taken == Taken::Doubtful);
+                let waits = usize::from(sorted.this == Taken::Waits);
+                let settled =
+                    if sorted.waiting.is_some() { std::mem::replace(&mut waiting[head], 0) } else { 0 };
+                waiting[head] += waits;
+                for (taken, returns) in [(sorted.waiting, settled), (Some(sorted.this), 1)] {
+                    count.wall += if taken == Some(Taken::Wall) { returns } else { 0 };
+                    count.doubtful += if taken == Some(Taken::Doubtful) { returns } else { 0 };
                 }
                 count.named.extend(sorted.distrusted.map(|(why, _)| why));
             }
@@ -99,6 +104,44 @@ fn boulders_and_niches_are_wall_to_their_edges() {
             if within { 6.0 - inward_m } else { 6.0 }
         });
     }
+}
+
+/// Five returns in a row that agree, far from the wall, once: a cloud of bubbles. A pole that stands there is met again.
+#[test]
+fn what_hangs_before_the_wall_is_doubtful_and_a_pole_is_wall_when_it_is_met_again() {
+    let near = |angle: f64| (angle - 3.0).abs() < 2.6 * TAU / f64::from(STEPS);
+    for radius_m in [1.0, 6.0] {
+        let cloud = |_: usize, _: f64, angle: f64, [turn, _]: [u32; 2]| {
+            Some(if turn == 2 && near(angle) { 0.4 * radius_m } else { radius_m })
+        };
+        let count = &Turning::new(radius_m, 1).turn(5, cloud)[0];
+        assert_eq!((count.wall, count.doubtful), (5 * STEPS as usize - 5, 5), "{radius_m}");
+        let pole = |_: usize, _: f64, angle: f64, [turn, _]: [u32; 2]| {
+            Some(if turn >= 2 && near(angle) { 0.4 * radius_m } else { radius_m })
+        };
+        let count = &Turning::new(radius_m, 1).turn(6, pole)[0];
+        assert_eq!((count.wall, count.doubtful), (6 * STEPS as usize - 5, 5), "{radius_m}");
+        // An echo by way of two walls, three times in a row.
+        let echo = |_: usize, _: f64, angle: f64, [turn, _]: [u32; 2]| {
+            Some(if turn == 2 && (angle - 3.0).abs() < 1.6 * TAU / f64::from(STEPS) {
+                1.9 * radius_m
+            } else {
+                radius_m
+            })
+        };
+        let count = &Turning::new(radius_m, 1).turn(5, echo)[0];
+        assert_eq!((count.wall, count.doubtful), (5 * STEPS as usize - 3, 3), "{radius_m}");
+    }
+}
+
+/// A heap whose foot slopes to the wall, higher than it is wide.
+#[test]
+fn what_ends_in_a_slope_to_the_wall_is_wall() {
+    let steep = |_: f64, angle: f64| {
+        let off = (angle - 3.0).abs();
+        6.0 - (1.4 - 12.0 * off).max(0.0)
+    };
+    Turning::new(6.0, 1).all_wall(6, steep);
 }
 
 #[test]

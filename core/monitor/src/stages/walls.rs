@@ -26,7 +26,7 @@ pub(super) struct Sorting<'a> {
     pub(super) alerts: &'a mut Alerts,
 }
 
-/// Takes a ping: its return is sorted with the one that waited for it; one without a return breaks the sweep. Returns the
+/// Takes a ping: its return is sorted with those that waited for it; one without a return breaks the sweep. Returns the
 /// chainages at which samples of a head that has just been distrusted lie, m.
 pub(super) fn note_ping(
     sorting: &mut Sorting<'_>,
@@ -35,7 +35,7 @@ pub(super) fn note_ping(
 ) -> Option<[f64; 2]> {
     let (Outcome::Sample { point, arc_m }, Some(origin)) = (ping.outcome, ping.origin) else {
         digest(sorting.digests, ping, RecordKind::NoSample);
-        if let Some(waiting) = &mut sweep.waiting {
+        if let Some(waiting) = sweep.waiting.last_mut() {
             waiting.broken = true;
             waiting.new_sweep |= ping.new_sweep;
         } else {
@@ -59,13 +59,15 @@ pub(super) fn note_ping(
     };
     let relief = &mut sorting.coverage.relief;
     let sorted = sweep.wall.sort(ping.head, placed, &had, &sorting.tunnel.limits, relief);
-    if let Some(waiting) = sweep.waiting.take() {
-        settle(sorting, sweep, &waiting, sorted.waiting == Some(Taken::Wall));
+    if let Some(taken) = sorted.waiting {
+        for waiting in sweep.waiting.take() {
+            settle(sorting, sweep, &waiting, taken == Taken::Wall);
+        }
     }
     match sorted.this {
         Taken::Wall => wall(sorting, sweep, ping),
-        Taken::Doubtful => doubtful(sorting, sweep, ping),
-        Taken::Waits => sweep.waiting = Some(Waiting { ping: *ping, broken: false, new_sweep: false }),
+        Taken::Waits if sweep.waiting.add(ping) => {}
+        Taken::Waits | Taken::Doubtful => doubtful(sorting, sweep, ping),
     }
     let (why, between_m) = sorted.distrusted?;
     let (kind, figure_m) = AlertKind::of_distrust(why);
@@ -107,7 +109,7 @@ pub(crate) fn end_returns(world: &mut World) {
     };
     for head in heads {
         let Ok(mut sweep) = sweeps.get_mut(head) else { continue };
-        if let Some(waiting) = sweep.waiting.take() {
+        for waiting in sweep.waiting.take() {
             settle(&mut sorting, &mut sweep, &waiting, false);
         }
     }
