@@ -1,11 +1,11 @@
 //! The table of field dives: verdicts and sigmas of simulated dives against their truth, by vehicle, condition, place and
 //! speed. Prints Markdown, and writes the same figures as JSON.
 //!
-//! `cargo bench -p headrace_benches --bench field` runs all cells in some ten minutes on two cores; `-- --quick` with a
+//! `cargo bench -p headrace_benches --bench field` runs all cells in a quarter of an hour on two cores; `-- --quick` with a
 //! tenth of the dives. `--cell VEHICLE/CONDITION/PLACE/SPEED` runs those cells alone (any part may be `*`, parts at the end may be left
 //! out, a place may be any chainage), `--seeds N` so many dives each, `--from-seed N` begins with another,
 //! `--metres N` makes each so long, `--json FILE` says where to write (target/field.json), `--page docs/field.md` renews the table of
-//! that page.
+//! that page, which has the dives of all places together.
 //! D_true is from `headrace_tests::truth`, which has nothing of the program's coverage. The figures are the report's.
 
 #![expect(clippy::unwrap_used, clippy::panic, reason = "a benchmark stops at what it can't do")]
@@ -29,7 +29,8 @@ fn main() {
     let text = table::markdown(&cells, &figures, &arguments);
     println!("{text}");
     if let Some(page) = &arguments.page {
-        table::replace(page, &text);
+        let (cells, figures) = table::pooled(&cells, &figures);
+        table::replace(page, &table::markdown(&cells, &figures, &arguments));
     }
     table::write_json(&cells, &figures, &arguments);
 }

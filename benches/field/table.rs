@@ -52,6 +52,12 @@ fn has(vehicle: &Vehicle, condition: Condition, arguments: &Arguments, [place, s
     if place == DRIVEN_THERE.0 {
         return vehicle.name == "vita2-4" && condition == Condition::DataSheet && speed == "planned";
     }
+    // Between the ends nothing is told apart from them but that it is the same.
+    let told_apart = place != "3000"
+        || ["vita1", "vita2-4"].contains(&vehicle.name) && ["planned", "advised"].contains(&speed);
+    if !told_apart && arguments.cell.is_empty() {
+        return false;
+    }
     let graded =
         [Condition::Clean, Condition::DataSheet, Condition::Poor, Condition::Murk, Condition::Lively];
     let (common, asked) = (graded.contains(&condition), !arguments.cell.is_empty());
@@ -89,6 +95,20 @@ pub(crate) fn markdown(cells: &[NamedCell], figures: &[Figures], arguments: &Arg
     }
     text += &plans(cells);
     text + &format!("\n{with_misses} of {} cells miss a goal.\n", cells.len())
+}
+
+/// The same with the dives of all places together, for a page: one vehicle's places beside each other are printed.
+pub(crate) fn pooled(cells: &[NamedCell], figures: &[Figures]) -> (Vec<NamedCell>, Vec<Figures>) {
+    let mut pools: Vec<(NamedCell, Figures)> = Vec::new();
+    for (NamedCell { name: [vehicle, condition, _, speed], cell }, figures) in cells.iter().zip(figures) {
+        let name = [vehicle.clone(), condition.clone(), "all".to_owned(), speed.clone()];
+        if let Some((_, pool)) = pools.iter_mut().find(|(pooled, _)| pooled.name == name) {
+            pool.join(figures);
+        } else {
+            pools.push((NamedCell { name, cell: *cell }, figures.clone()));
+        }
+    }
+    pools.into_iter().unzip()
 }
 
 fn row(NamedCell { name, cell }: &NamedCell, figures: &Figures, missed: &Missed) -> String {

@@ -27,8 +27,8 @@ use headrace_vehicle::VehicleConfig;
 
 use crate::error::CostError;
 use crate::measure::timed;
+use crate::oracle::blocks::Blocks;
 use crate::oracle::truth::{Truth, TruthTaker};
-use crate::oracle::wall::Wall;
 
 /// How far from a section samples still say how far off its chainage is, m.
 const NEAR_M: f64 = 1.0;
@@ -99,7 +99,7 @@ pub struct Recorded {
     pub truth: Arc<Truth>,
     /// Where the vehicle truly was.
     pub scenery: Scenery,
-    wall: Wall,
+    wall: Blocks,
     /// D_true of stretches that were asked for, by the bits of their bounds.
     holes_m: RefCell<BTreeMap<[u64; 2], f64>>,
 }
@@ -158,7 +158,7 @@ impl Recorded {
         let truth = taker.truth();
         Ok(Self {
             packets,
-            wall: truth.wall()?,
+            wall: Blocks::of(&truth)?,
             truth: Arc::new(truth),
             scenery,
             holes_m: RefCell::new(BTreeMap::new()),
@@ -174,7 +174,7 @@ impl Recorded {
     /// D_true of a stretch of true chainage, m; infinite without a single sample.
     pub fn true_hole_m(&self, from_m: f64, to_m: f64) -> f64 {
         let key = [from_m.to_bits(), to_m.to_bits()];
-        *self.holes_m.borrow_mut().entry(key).or_insert_with(|| self.wall.hole_m(from_m, to_m))
+        *self.holes_m.borrow_mut().entry(key).or_insert_with(|| self.wall.hole_m(&self.truth, from_m, to_m))
     }
 
     /// Replays it with the settings of a vehicle file and judges what is reported by the truth.

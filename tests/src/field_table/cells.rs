@@ -59,7 +59,7 @@ pub const VEHICLES: [Vehicle; 8] = [
     Vehicle {
         unit: Unit::Autopilot,
         far_share: 0.16,
-        ..vehicle("bluerov2", "bluerov2.toml", "fast", 1.0, 20.0, 0.124)
+        ..vehicle("bluerov2", "bluerov2.toml", "fast", 1.0, 20.0, 0.186)
     },
 ];
 

@@ -81,6 +81,29 @@ impl Figures {
         self.tell(dive);
     }
 
+    /// Adds the figures of other dives.
+    pub fn join(&mut self, other: &Self) {
+        self.dives += other.dives;
+        self.sections += other.sections;
+        self.over += other.over;
+        self.passed_over += other.passed_over;
+        self.passed_far += other.passed_far;
+        self.under += other.under;
+        self.failed_under += other.failed_under;
+        self.inner_m += other.inner_m;
+        self.passable_m += other.passable_m;
+        let add =
+            |sums: &mut [f64], more: &[f64]| sums.iter_mut().zip(more).for_each(|(sum, more)| *sum += more);
+        add(&mut self.verdicts_m, &other.verdicts_m);
+        add(&mut self.way_m, &other.way_m);
+        for ((used, sum), (more_used, more)) in self.innovations.iter_mut().zip(other.innovations) {
+            *used += more_used;
+            *sum += more;
+        }
+        self.errors.extend(&other.errors);
+        self.advised_mps.extend(&other.advised_mps);
+    }
+
     fn judge(&mut self, section: &JudgedSection, target_m: f64) {
         let (passed, failed) = (section.report.verdict == "pass", section.report.verdict == "fail");
         let is = |condition: bool| u32::from(condition);

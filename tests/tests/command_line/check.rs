@@ -201,7 +201,7 @@ fn walls_out_of_reach_and_heads_out_of_step_are_told() {
 #[test]
 fn what_a_plan_makes_of_a_file_is_what_plan_says() {
     let folder = Folder::new();
-    for name in ["vita1", "vita2-2", "vita2-3", "vita2-4", "pipe"] {
+    for name in ["vita1", "vita2-2", "vita2-3", "vita2-4", "pipe", "autopilot", "bluerov2"] {
         let file = root().join(format!("deploy/vehicles/{name}.toml"));
         let file = file.to_str().unwrap();
         let json = |arguments: &[&str]| -> Value {

@@ -43,7 +43,10 @@ fn a_live_dive_and_the_replay_of_its_log_agree() {
     assert_eq!(live["log"]["sha256"], replayed["log"]["sha256"]);
     assert_eq!(live["log"]["messages"], replayed["log"]["messages"]);
     let missed = live["runs"].as_array().unwrap();
-    assert!(missed.iter().any(|run| run["cleared_s"].is_number()), "the demonstration misses a stretch and clears it");
+    assert!(
+        missed.iter().any(|run| run["cleared_s"].is_number()),
+        "the demonstration misses a stretch and clears it"
+    );
 }
 
 /// Dives in which failed sections settle, flags are cleared on a later pass, and judging depends on judging.

@@ -34,7 +34,8 @@ pub struct Circle {
     pub radius_m: f64,
 }
 
-/// All samples of a dive on a wall whose arc length is cyclic.
+/// All samples of a dive on a wall whose arc length is cyclic; none by default.
+#[derive(Default)]
 pub struct Wall {
     perimeter_m: f64,
     samples: Vec<Place>,
