@@ -2,6 +2,8 @@
 
 use crate::cli::Plan;
 use crate::failure::Failure;
+use headrace_geometry::math;
+use headrace_sampling::plan::HELD_SHARE;
 
 use super::findings::Findings;
 
@@ -17,12 +19,15 @@ pub(super) fn lines(findings: &Findings, args: &Plan) -> Result<String, Failure>
         return Err(Failure::Usage("--write: no mode meets the target at any speed".to_owned()));
     };
     let inspection = findings.planner.inspection();
+    let held_mps = math::floor_to_i64(1e3 * HELD_SHARE * speed_mps) as f64 / 1e3;
     let mode = findings.planner.modes().get(number).map_or("", |planned| planned.mode.name);
     let met =
         findings.question.target_m.map(|target_m| format!(": {target_m} m at {speed_mps:.3} m/s in {mode}"));
     let target = args.target.map(|target_m| format!("target_m = {target_m}\n")).unwrap_or_default();
     let mut text = format!(
-        "# In place of the same keys of {}{}\n{target}\n[heads]\nlayout = {:?}\nplanned_speed_mps = {speed_mps:.3}\n",
+        "# In place of the same keys of {}{}\n{target}\n[heads]\nlayout = {:?}\n\
+         # Less than that by what a pilot's speed varies: heads apart along the hull are in phase about the planned speed only.\n\
+         planned_speed_mps = {held_mps:.3}\n",
         vehicle.display(),
         met.unwrap_or_default(),
         inspection.layout.as_str()

@@ -23,6 +23,9 @@ pub use briefing::{Briefing, Heard, Hidden, HullAdvice, Start, ThinStrip};
 pub use mounts::InLine;
 pub use wall::{PatternSample, WallPlace};
 
+/// Share of the largest speed that meets the target for which heads are to be started: a pilot holds a speed within 5 %, and heads apart
+/// along the hull are in phase about the planned one only. Source: field.md, "Driven".
+pub const HELD_SHARE: f64 = 0.95;
 /// Soundings per ring: 0.1 degrees apart, so that a step is evaluated from many start angles.
 const RING: u32 = 3600;
 

@@ -2,6 +2,7 @@
 
 use std::fmt::Write as _;
 
+use headrace_sampling::plan::HELD_SHARE;
 use headrace_sensor::device::Sense;
 use headrace_simulator::Scene;
 use headrace_vehicle::VehicleConfig;
@@ -132,7 +133,7 @@ pub const PLACES: [Place; 3] = [("portal", 3.0), ("3000", 3000.0), ("6900", 6900
 /// How fast a vehicle goes.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Driven {
-    /// As `plan` says for mode and target.
+    /// At the speed that `plan --write` gives for mode and target.
     Planned,
     /// So many times the largest speed of Eq. 16, phases as planned.
     Times(f64),
@@ -269,7 +270,7 @@ impl Cell {
 
     /// Planned speed and speed driven, m/s.
     fn speeds_mps(&self, vehicle: &VehicleConfig) -> [f64; 2] {
-        let planned_mps = self.plan_mps(vehicle);
+        let planned_mps = HELD_SHARE * self.plan_mps(vehicle);
         match self.driven {
             Driven::Planned => [planned_mps, planned_mps],
             Driven::Times(times) => [planned_mps, times * self.vehicle.edge_mps],

@@ -22,6 +22,8 @@ pub const KINDS_OF_SOURCES: [(&str, Sense); 6] = [
 const END_M: f64 = 2.0;
 /// A hole's centre is within its section where it is farther than this from the section's bounds, m.
 const FLANK_M: f64 = 0.005;
+/// A way that reaches into a section by no more than this isn't in it, m.
+const TOUCH_M: f64 = 0.02;
 
 /// What came of the dives of a cell.
 #[derive(Debug, Clone, Default)]
@@ -159,7 +161,8 @@ impl Figures {
             return;
         };
         let from = math::floor_to_i64((dive.truth.way_m[0] - first.shift_m) / section_m);
-        let to = math::floor_to_i64((dive.truth.way_m[1] - last.shift_m) / section_m);
+        // A way that ends where a section begins isn't in it.
+        let to = math::floor_to_i64((dive.truth.way_m[1] - last.shift_m - TOUCH_M) / section_m);
         let mut told: Vec<i64> = dive
             .sections
             .iter()

@@ -281,7 +281,7 @@ fn the_lines_that_a_plan_writes_make_its_best_answer_the_vehicle_s() {
     };
     let speed_mps: f64 = line("planned_speed_mps").split_once(" = ").unwrap().1.parse().unwrap();
     let v_max_mps = best["v_max_mps"].as_f64().unwrap();
-    assert!((0.0..0.001).contains(&(v_max_mps - speed_mps)), "{speed_mps} of {v_max_mps}");
+    assert!((0.0..0.001).contains(&(0.95 * v_max_mps - speed_mps)), "{speed_mps} of {v_max_mps}");
     assert_eq!(line("mode"), format!("mode = {}", best["mode"]));
     assert_eq!(written.stdout.matches("[[sensors]]").count(), 4);
     // Pasted in place of the same keys: a vehicle that passes at its planned speed.
@@ -300,6 +300,22 @@ fn the_lines_that_a_plan_writes_make_its_best_answer_the_vehicle_s() {
     let now =
         &again["modes"].as_array().unwrap().iter().find(|mode| mode["best"] == true).unwrap()["v_max_mps"];
     assert!((now.as_f64().unwrap() - v_max_mps).abs() < 0.003, "{now} of {v_max_mps}");
+    // Who drives as planned is not told that it is too fast, once the heading is known, and all of it passes.
+    folder.write(
+        "scene.toml",
+        format!(
+            "vehicle = \"pasted.toml\"\n[trajectory]\nkind = \"waypoints\"\n[[trajectory.waypoints]]\nchainage_m = 5\nstay_s = 20\n\
+             [[trajectory.waypoints]]\nchainage_m = 21\nspeed_mps = {speed_mps}\n[effects]\nmotion_within_turn = {{}}\nocclusion = {{}}\n"
+        ),
+    );
+    folder.simulate("scene.toml", "dive.mcap");
+    let lines = folder.headrace(&["replay", "dive.mcap", "--json-lines"]).stdout;
+    let lines: Vec<Value> = lines.lines().map(|line| serde_json::from_str(line).unwrap()).collect();
+    let within = |x_m: &Value| x_m.as_f64().is_some_and(|x_m| (12.0..19.5).contains(&x_m));
+    let states =
+        lines.iter().filter(|line| line["type"] == "state" && within(&line["position"]["chainage_m"]));
+    let told: Vec<&str> = states.map(|state| state["condition"].as_str().unwrap()).collect();
+    assert!(told.len() > 20 && told.iter().all(|told| *told == "good"), "{told:?}");
     let no_vehicle =
         plan(&folder, &["--tunnel", "circle,radius_m=3", "--length", "10", "--target", "0.5", "--write"]);
     assert_eq!(no_vehicle.code, Some(2), "{}", no_vehicle.stdout);
