@@ -83,11 +83,12 @@ noise where it is one (poor); wrong-unit and wrong-slack are the same where the 
 pub(crate) fn markdown(cells: &[NamedCell], figures: &[Figures], arguments: &Arguments) -> String {
     let mut text = format!("{} dives a cell.\n\n{LEGEND}\n", arguments.seeds);
     let nis = KINDS_OF_SOURCES.map(|(name, _)| name).join(" / ");
-    text += &format!(
+    let head = format!(
         "| vehicle | condition | place | speed | over | passed | far | failed under | passable | pass | fail | can't say | open | \
          advice | D | sd | ratio | within | NIS {nis} | told |\n|{}\n",
         "---|".repeat(20)
     );
+    text += &head;
     let mut with_misses = 0;
     for (cell, figures, missed) in judged(cells, figures) {
         with_misses += usize::from(missed.count() > 0);
@@ -148,7 +149,8 @@ fn plans(cells: &[NamedCell]) -> String {
         };
         if let Some(cell) = cells.iter().find(graded) {
             let share = cell.cell.plan_share();
-            text += &format!("| {} | {} |\n", vehicle.name, marked(format!("{share:.2}"), share < 0.95));
+            let row = format!("| {} | {} |\n", vehicle.name, marked(format!("{share:.2}"), share < 0.95));
+            text += &row;
         }
     }
     text

@@ -25,7 +25,7 @@ fn figure(line: &Value, key: &str) -> f64 {
 }
 
 /// Conditions, but for the seconds after each turn.
-fn conditions<'a>(lines: &'a [Value], back: bool, between_m: [f64; 2]) -> Vec<&'a str> {
+fn conditions(lines: &[Value], back: bool, between_m: [f64; 2]) -> Vec<&str> {
     let states = of(lines, "state");
     let within = |state: &&&Value| {
         let [x_m, mps] = [&state["position"]["chainage_m"], &state["speed_mps"]]
