@@ -89,8 +89,12 @@ describe("with the program", { skip: BIN ? false : "HEADRACE_BIN isn't set", con
     await page.locator(".replay").waitFor();
     await page.getByLabel("Time of the dive").focus();
     await page.keyboard.press("End");
-    await page.locator(`.alert[data-number="${number}"]:not(.open)`, { hasText: "ack page" }).waitFor(LONG);
-    await page.locator(".notes", { hasText: "by the page" }).waitFor();
+    await page.locator(".notes", { hasText: "by the page" }).waitFor(LONG);
+    // The pilot has gone back: acknowledged, and passed again, it is over.
+    assert.equal(await page.locator(`.alert[data-number="${number}"]`).count(), 0);
+    const report = JSON.parse(execFileSync(BIN, ["replay", join(out, "dive.mcap"), "--json"], { maxBuffer: 1 << 28 }));
+    const alert = report.alert_list.find((alert) => alert.number === Number(number));
+    assert.deepEqual([alert.kind, alert.state, alert.acknowledged?.by], ["missed", "cleared", "page"]);
     assert.ok(await page.getByRole("button", { name: "Acknowledge all" }).isDisabled());
     // The program dies and comes back: the page says so, and goes on by itself.
     await stop(replay.child);
