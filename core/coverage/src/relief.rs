@@ -77,21 +77,32 @@ pub struct Relief {
     ballots: [Ballot; MAX_HEADS],
     /// Heads that aren't believed, a bit each.
     distrusted: u8,
+    /// Heads whose ranges change as the design's do, a bit each.
+    changing: u8,
 }
 
-stateful!(Relief { state: ballots, distrusted; slots: cells; });
+stateful!(Relief { state: ballots, distrusted, changing; slots: cells; });
 
 impl Default for Relief {
     /// Nothing is known. Allocates: all that it will ever use.
     fn default() -> Self {
         let nowhere = Cell { slab: i64::MIN, ..Cell::default() };
         let count = usize::try_from(BINS * SLABS).unwrap_or(0);
-        Self { cells: vec![nowhere; count], ballots: [Ballot::default(); MAX_HEADS], distrusted: 0 }
+        Self {
+            cells: vec![nowhere; count],
+            ballots: [Ballot::default(); MAX_HEADS],
+            distrusted: 0,
+            changing: 0,
+        }
     }
 }
 
 fn bit(head: usize) -> u8 {
     1_u8.checked_shl(u32::try_from(head).unwrap_or(u32::MAX)).unwrap_or(0)
+}
+
+fn set(bits: &mut u8, head: usize, on: bool) {
+    *bits = if on { *bits | bit(head) } else { *bits & !bit(head) };
 }
 
 impl Relief {
@@ -178,7 +189,17 @@ impl Relief {
 
     /// Whether a head's votes count.
     pub(super) fn believe(&mut self, head: usize, believed: bool) {
-        self.distrusted = if believed { self.distrusted & !bit(head) } else { self.distrusted | bit(head) };
+        set(&mut self.distrusted, head, !believed);
+    }
+
+    /// Whether a head's range changes as the design's does.
+    pub(super) fn note_changing(&mut self, head: usize, changes: bool) {
+        set(&mut self.changing, head, changes);
+    }
+
+    /// Whether another head's range changes as the design's does: no error of the estimate makes this one's stay.
+    pub(super) fn others_change(&self, head: usize) -> bool {
+        self.changing & !bit(head) != 0
     }
 
     fn cell(&self, slab: i64, bin: i64) -> Option<&Cell> {

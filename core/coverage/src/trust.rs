@@ -4,6 +4,7 @@ use serde::{Deserialize, Serialize};
 
 use super::relief::Ballot;
 use super::wall_limits::{PlacedReturn, WallLimits};
+use headrace_fusion::one_range::OneRange;
 use headrace_geometry::math;
 
 /// Why a head isn't believed, with the figure that says so, m.
@@ -11,7 +12,7 @@ use headrace_geometry::math;
 pub enum Distrust {
     /// Most of its successive returns disagree: by how far in the mean.
     Scattered(f64),
-    /// Its range doesn't change through a turn, though that to the design does by much: the range.
+    /// Its range doesn't change, though that to the design does: the range.
     Constant(f64),
     /// It contradicts the design where other heads agree with it: its mean deviation there.
     Outvoted(f64),
@@ -27,6 +28,14 @@ pub struct Beam<'a> {
     pub standing: bool,
     /// Range to the design profile, m; `None` where the beam meets none.
     pub design_range_m: &'a dyn Fn() -> Option<f64>,
+}
+
+/// What the vehicle's other heads say of one.
+pub(super) struct Others {
+    /// Votes on it.
+    pub(super) ballot: Ballot,
+    /// The range of one of them changes as the design's does.
+    pub(super) change: bool,
 }
 
 /// Counts over half a turn.
@@ -89,6 +98,9 @@ const CONSTANT: f64 = 0.6;
 const VARIES: f64 = 2.0;
 /// Returns in a row that make a run of unchanged range: neighbours on a wall differ less.
 const RUN: u32 = 8;
+/// A run of exactly one range contradicts a design that varies by this many tolerances there, if another head's range changes: in a round
+/// tunnel the design varies where the vehicle is beside its estimate.
+const STUCK_VARIES: f64 = 1.0;
 
 fn joined(a: Option<[f64; 2]>, b: Option<[f64; 2]>) -> Option<[f64; 2]> {
     match (a, b) {
@@ -126,6 +138,10 @@ pub(super) struct HeadTrust {
     halves: [HalfTurn; 3],
     angle_rad: Option<f64>,
     unchanged: Unchanged,
+    one_range: OneRange,
+    /// Chainages of the returns of that one range, m, and how far the head turned since.
+    one_range_at_m: [f64; 2],
+    one_range_rad: f64,
     distrusted: Option<Distrust>,
 }
 
@@ -143,7 +159,7 @@ impl HeadTrust {
         jump_m: Option<f64>,
         doubtful: u32,
         limits: &WallLimits,
-        ballot: Ballot,
+        others: &Others,
     ) -> Option<(Distrust, [f64; 2])> {
         // A head that stands still looks at one place only, which may well be off the design.
         if beam.standing {
@@ -165,6 +181,8 @@ impl HeadTrust {
             design_m: if unchanged { (beam.design_range_m)().and_then(is_run) } else { None },
         };
         self.halves[0] = self.halves[0].with(&one);
+        self.note_range(placed, beam, turned_rad, limits);
+        let is_stuck = others.change && self.is_stuck(limits);
         let is_full = self.halves[0].is_full();
         let turn = self.halves[0].with(&self.halves[1]);
         let late_m = turn.with(&self.halves[2]).between_m.unwrap_or([placed.x_m; 2]);
@@ -173,20 +191,47 @@ impl HeadTrust {
         }
         let whole = is_full && turn.turned_rad >= 0.9 * math::TAU;
         if self.distrusted.is_some() {
-            if whole && !turn.has_one_in(4) && !ballot.is_lost() && !turn.is_constant(4, limits) {
+            if whole
+                && !is_stuck
+                && !turn.has_one_in(4)
+                && !others.ballot.is_lost()
+                && !turn.is_constant(4, limits)
+            {
                 self.distrusted = None;
             }
             return None;
         }
-        let (why, between_m) = if whole && turn.is_constant(2, limits) {
+        let (why, between_m) = if is_stuck {
+            (Distrust::Constant(beam.range_m), self.one_range_at_m)
+        } else if whole && turn.is_constant(2, limits) {
             (Distrust::Constant(beam.range_m), late_m)
         } else if whole && turn.has_one_in(2) {
             (Distrust::Scattered(turn.jump_sum_m / f64::from(turn.jumps.max(1))), late_m)
         } else {
-            let (off_m, between_m) = ballot.verdict()?;
+            let (off_m, between_m) = others.ballot.verdict()?;
             (Distrust::Outvoted(off_m), joined(Some(late_m), Some(between_m))?)
         };
         self.distrusted = Some(why);
         Some((why, between_m))
+    }
+
+    /// Notes a return for its range. Of what doesn't contradict the design half a turn is kept.
+    fn note_range(&mut self, placed: &PlacedReturn, beam: &Beam<'_>, turned_rad: f64, limits: &WallLimits) {
+        if self.one_range_rad > math::TAU / 2.0 && !self.is_stuck(limits) {
+            self.one_range = OneRange::default();
+        }
+        let off_m = (beam.design_range_m)().map_or(0.0, |design_m| beam.range_m - design_m);
+        self.one_range.note(beam.range_m, off_m);
+        if self.one_range.is_new() {
+            (self.one_range_at_m, self.one_range_rad) = ([placed.x_m; 2], 0.0);
+        }
+        let [least_m, most_m] = self.one_range_at_m;
+        self.one_range_at_m = [least_m.min(placed.x_m), most_m.max(placed.x_m)];
+        self.one_range_rad += turned_rad;
+    }
+
+    /// Whether the last returns are of one range where the design's vary.
+    pub(super) fn is_stuck(&self, limits: &WallLimits) -> bool {
+        self.one_range.is_stuck(RUN, STUCK_VARIES * limits.tolerance_m)
     }
 }

@@ -27,6 +27,7 @@
 pub mod direct;
 pub mod filter;
 pub mod fix;
+pub mod one_range;
 pub mod relative;
 pub mod section;
 pub mod smooth;

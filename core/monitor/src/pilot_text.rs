@@ -270,7 +270,7 @@ pub fn alert_text(kind: AlertKind, head: &str, x_m: f64, off_m: f64) -> String {
             off_m.abs()
         ),
         AlertKind::HeadConstant => format!(
-            "ch {x}  {head} says {off_m:.2} m all round: its own frame or a bubble; its returns don't count"
+            "ch {x}  {head} says {off_m:.2} m wherever it looks: its own frame or a bubble; its returns don't count"
         ),
         AlertKind::HeadOutvoted => format!(
             "ch {x}  {head} sees a wall {off_m:+.2} m off the one that other heads see; its returns don't count"

@@ -12,9 +12,6 @@ const LENGTH_M: f64 = 7.0;
 
 /// Most that may pass, of those with D_true over T.
 const MOST_OVER: f64 = 0.025;
-/// Dives with a section far over the target that passes, today: a head that stuck has turned the yaw by more than a degree, and a
-/// hole's centre lies 0.1 m off at the wall, in the neighbouring section, which fails. There must be none; until then no more.
-const KNOWN_FAR: usize = 2;
 
 /// From well within the target to well beyond it, near the portal and far from it.
 fn cell(seed: u64) -> Cell {
@@ -84,6 +81,6 @@ fn val_whatever_breaks_nothing_far_over_the_target_passes() {
     let (over, passed_over) = (total(|figures| figures.over), total(|figures| figures.passed_over));
     println!("{passed_over} of {over} over the target passed; far over it in {} dives: {far:?}", far.len());
     assert!(over > 1000.0, "{over}");
-    assert!(far.len() <= KNOWN_FAR, "{far:?}");
+    assert!(far.is_empty(), "{far:?}");
     assert!(passed_over <= MOST_OVER * over, "{passed_over} of {over}");
 }

@@ -252,6 +252,47 @@ fn an_unchanging_range_is_the_wall_in_the_middle_of_a_pipe_and_a_fault_out_of_it
     }
 }
 
+/// From a place out of the middle, where a range that stays agrees with the wall for a while each turn.
+#[test]
+fn a_head_that_sticks_for_a_while_is_not_believed_from_then_on_until_it_moves() {
+    for (radius_m, out_m) in [(1.0, 0.3), (6.0, 1.0)] {
+        let mut turning = Turning::new(radius_m, 1);
+        let limits = turning.limits;
+        let (mut named, mut stuck_wall, mut stuck_m) = (Vec::new(), 0, None);
+        turning.relief.note_changing(1, true);
+        for step in 0..5 * STEPS {
+            let angle = TAU * f64::from(step % STEPS) / f64::from(STEPS);
+            let (sine, cosine) = math::sin_cos(angle);
+            let design_m = -out_m * sine + math::sqrt(radius_m * radius_m - out_m * out_m * cosine * cosine);
+            let sticks = (2 * STEPS..2 * STEPS + STEPS / 2).contains(&step);
+            // Where it begins, it is right.
+            let range_m = if sticks { *stuck_m.get_or_insert(design_m) } else { design_m };
+            let (y, z) = (out_m + range_m * sine, -range_m * cosine);
+            let placed = PlacedReturn {
+                x_m: 0.001 * f64::from(step),
+                arc_m: math::wrap(math::atan2(y, -z), TAU) * radius_m,
+                off_m: math::hypot(y, z) - radius_m,
+            };
+            let beam =
+                Beam { range_m, angle_rad: angle, standing: false, design_range_m: &|| Some(design_m) };
+            let sorted = turning.heads[0].sort(0, placed, &beam, &limits, &mut turning.relief);
+            stuck_wall += usize::from(sticks && sorted.this == Taken::Wall);
+            named.extend(sorted.distrusted);
+            if step == 4 * STEPS {
+                assert_eq!(turning.heads[0].distrusted(), None, "it moves again");
+            }
+        }
+        let [(Distrust::Constant(_), [from_m, to_m])] = named[..] else { panic!("{named:?}") };
+        // All that it said of the wall while it stuck is taken back, and nothing from before.
+        let begun_m = 0.001 * f64::from(2 * STEPS);
+        assert!((from_m - begun_m).abs() <= 0.001 + 1e-9, "{from_m}");
+        assert!(
+            ((to_m - from_m) / 0.001 - stuck_wall as f64).abs() <= 1.5,
+            "{stuck_wall}, {from_m} to {to_m}"
+        );
+    }
+}
+
 #[test]
 fn tolerances_scale_with_the_section() {
     let of = |radius_m: f64| WallLimits::new(TAU * radius_m, (0.2 * radius_m).min(0.5));

@@ -11,7 +11,7 @@ use super::inertial::Leg;
 use super::measure::{self, ScalarUpdate};
 use super::pose_sd::PoseSd;
 use super::settings::Settings;
-use super::sources::Source;
+use super::sources::{self, Source};
 use super::state::{
     ATTITUDE, CREEP, ERRORS, Errors, FORCE_BIAS, HEADING, POSITION, RATE_BIAS, SLACK, State, VELOCITY,
     add_to, put, vec,
@@ -185,12 +185,18 @@ impl Eskf {
             let mut then = self.state_at(waiting.at);
             then.correct(&earlier(&known, later_s));
             self.suspicions.hear(&then, &context.design(), sources, &waiting);
+            let others_change = sources::others_change(sources, waiting.source);
             let Some(Some(source)) = sources.get_mut(waiting.source) else { continue };
             for (number, row) in rows(&then, context, source, &waiting, window).into_iter().enumerate() {
                 let again = |state: &State| {
                     rows(state, context, source, &waiting, window).get(number).copied().flatten()
                 };
                 if let Some(row) = row.and_then(|row| self.straight(row, &then, again)) {
+                    let sd_m = math::sqrt(self.factors.variance_along(&row.h));
+                    if source.says_one_range(&waiting.reading, row.residual, sd_m) && others_change {
+                        source.leave_out(number);
+                        continue;
+                    }
                     let row = row.seen_later(later_s);
                     self.fuse(&row, (&waiting, number), &context.settings, source, (&known, &mut errors));
                 }

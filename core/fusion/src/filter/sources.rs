@@ -3,12 +3,18 @@
 use serde::{Deserialize, Serialize};
 
 use super::noise_level::NoiseLevel;
+use crate::one_range::OneRange;
 use headrace_geometry::math;
 use headrace_geometry::time::{DurNs, MonoNs};
-use headrace_sensor::device::SensorInfo;
-use headrace_sensor::reading::SonarReturn;
+use headrace_sensor::device::{SensorInfo, SensorKind};
+use headrace_sensor::reading::{Reading, SonarReturn};
 use headrace_sensor::sampling::head::SILENT_AFTER;
 
+/// A head is stuck where so many of its returns are of one range, though those that are expected vary by more than a length, m: a
+/// reading that is left out by mistake costs nothing. They are expected for sure within a standard deviation, m.
+const FEW_OF_ONE_RANGE: u32 = 3;
+const VARIES_M: f64 = 0.05;
+const SURE_M: f64 = 0.02;
 /// Weight of a new turn rate in the running mean.
 const RATE_SHARE: f64 = 0.05;
 
@@ -62,6 +68,8 @@ pub struct Source {
     pub turning: Turning,
     /// Level of its noise.
     pub noise_level: NoiseLevel,
+    /// For a head, whether its range follows the wall.
+    pub one_range: OneRange,
 }
 
 /// Rotation of a head.
@@ -81,7 +89,31 @@ impl Source {
             taken: None,
             turning: Turning::default(),
             noise_level: NoiseLevel::default(),
+            one_range: OneRange::default(),
         }
+    }
+
+    /// Notes a head's range, by how much it is longer than the estimate's, m, and how sure that is; whether the head says that one
+    /// range wherever it looks. Nothing is known of it while the estimate is unsure.
+    pub fn says_one_range(&mut self, reading: &Reading, residual_m: f64, estimate_sd_m: f64) -> bool {
+        let Reading::Sonar(SonarReturn { range_m: Some(range_m), .. }) = reading else { return false };
+        if estimate_sd_m > SURE_M {
+            self.one_range = OneRange::default();
+        } else {
+            self.one_range.note(*range_m, residual_m);
+        }
+        self.is_stuck()
+    }
+
+    /// Whether a head's last returns are of one range where those of the estimate vary.
+    fn is_stuck(&self) -> bool {
+        self.one_range.is_stuck(FEW_OF_ONE_RANGE, VARIES_M)
+    }
+
+    /// Counts a reading's scalar of this number as one that isn't used.
+    pub fn leave_out(&mut self, number: usize) {
+        self.consistency.gated += 1;
+        self.noise_level.skip(number);
     }
 
     /// Whether `period` has passed since its last reading in the window; if so, this one becomes the last.
@@ -92,6 +124,17 @@ impl Source {
         }
         due
     }
+}
+
+/// Whether the range of another head than this source changes with the wall: what makes this one's stay is then no error of the estimate,
+/// as it may be in a round tunnel.
+pub fn others_change(sources: &[Option<Source>], source: usize) -> bool {
+    let mut others = sources.iter().enumerate().filter(|(number, _)| *number != source);
+    others.any(|(_, other)| {
+        other.is_some_and(|other| {
+            other.sensor.kind == SensorKind::Head && other.one_range.is_heard() && !other.is_stuck()
+        })
+    })
 }
 
 impl Turning {

@@ -279,6 +279,27 @@ fn a_frozen_sensor_is_got_over() {
 
 /// A counter that stands while the vehicle goes on, and one that has lost what it stood for: the estimate stays right by its own
 /// standard deviations all the while, and the counter is doubted within two seconds.
+/// Its echo is that of its own frame, or the last one heard, while it goes on turning: each turn it agrees with the wall for a while.
+#[test]
+fn a_head_that_says_one_range_turns_nothing() {
+    let (for_s, mut gated) = (40.0, 0);
+    for seed in 1..=5 {
+        let rig = Rig::new(cruise, seed);
+        let mut events = rig.events(0.0, FAULT_S + for_s);
+        let from = |event: &Event| event.source == HEADS && seconds(event.valid) >= FAULT_S;
+        let last_m = events.iter().find(|event| from(event)).map(|event| event.reading);
+        let Some(Reading::Sonar(SonarReturn { range_m, .. })) = last_m else { panic!("{last_m:?}") };
+        say_otherwise(&mut events, &[HEADS], for_s, |reading, _| match reading {
+            Reading::Sonar(sonar) => Reading::Sonar(SonarReturn { range_m, ..*sonar }),
+            other => *other,
+        });
+        let mut nav = rig.navigation();
+        rig.run(&mut nav, &events);
+        gated += nav.consistency(HEADS).unwrap().gated;
+    }
+    assert!(gated > 500, "{gated}");
+}
+
 #[test]
 fn a_counter_that_stands_or_slips_is_noticed_and_not_followed() {
     for seed in 1..4 {
