@@ -295,6 +295,12 @@ pub fn setting_text(doubt: &SettingDoubt, x_m: f64, name: &dyn Fn(u16) -> String
         Setting::HeadTurned(by_rad) => {
             format!("{source} seems to be turned by {:+.1} degrees about its axis", by_rad.to_degrees())
         }
+        Setting::HeadPitched(by_rad) => {
+            format!("{source} seems to be pitched by {:+.1} degrees on its mount", by_rad.to_degrees())
+        }
+        Setting::HeadYawed(by_rad) => {
+            format!("{source} seems to be yawed by {:+.1} degrees on its mount", by_rad.to_degrees())
+        }
         Setting::WrongWayRound => format!("{source} seems to be the wrong way round"),
         Setting::Swapped(other) => format!("{source} and {} seem to be swapped", name(other)),
     };

@@ -36,10 +36,19 @@ const EFFECTS: &str = "motion_within_turn = {}\nocclusion = {}\ndepth_steps = {}
 
 /// A dive of 100 m by a pilot who wanders a little, of a vehicle as it is, headrace being told another file.
 fn told(truly: &str, told: &str, aside_m: f64, seed: u64) -> Option<SettingReport> {
+    told_swinging(truly, told, [aside_m, 3.0], seed)
+}
+
+/// The same by one who yaws by so much, degrees.
+fn told_swinging(truly: &str, told: &str, [aside_m, yaw_deg]: [f64; 2], seed: u64) -> Option<SettingReport> {
+    let heads: Vec<&str> = ["sonar_0", "sonar_1", "sonar_2", "sonar_3"]
+        .into_iter()
+        .filter(|head| truly.contains(&format!("id = {head:?}")))
+        .collect();
     let text = format!(
         "seed = {seed}\nvehicle = \"vehicle.toml\"\n[trajectory]\nkind = \"pilot\"\nstart_m = 100\nto_m = 190\n\
-         speed_mps = 0.15\nwander_across_m = {aside_m}\nwander_up_m = {}\nwander_yaw_deg = 3\nwander_pitch_deg = 1\n\
-         wander_roll_deg = 1\n[effects]\n{EFFECTS}",
+         speed_mps = 0.15\nwander_across_m = {aside_m}\nwander_up_m = {}\nwander_yaw_deg = {yaw_deg}\nwander_pitch_deg = 1\n\
+         wander_roll_deg = 1\n[effects]\n{EFFECTS}beam_cone = {{ sensors = {heads:?} }}\n",
         aside_m / 2.0
     );
     let parse =
@@ -63,6 +72,24 @@ fn a_head_turned_about_its_axis_is_named_with_its_angle() {
             let share = doubt.angle_deg.unwrap() / f64::from(by_deg);
             assert!((share - 1.0).abs() < 0.3, "{name}: {doubt:?}");
         }
+    }
+}
+
+/// It shows in how ranges change as the vehicle turns to and fro. Of one head alone it can't be told from a heading that is off.
+#[test]
+fn a_head_yawed_or_pitched_on_its_mount_is_named_with_its_angle() {
+    let right = file("vita2-4.toml");
+    // The first looks ahead, the other back.
+    for (head, what, angles, by_deg) in [
+        ("sonar_1", "head_yawed", "[0, 0, 3]", 3.0),
+        ("sonar_3", "head_yawed", "[0, 0, 177]", -3.0),
+        ("sonar_3", "head_pitched", "[0, 3, 180]", 3.0),
+    ] {
+        let turned = changed(&right, head, "angles_deg", angles);
+        let doubt = told_swinging(&turned, &right, [ASIDE_M, 5.0], 1).unwrap();
+        println!("{head} {what} by {by_deg}: {doubt:?}");
+        assert_eq!((doubt.what, doubt.source.as_deref()), (what, Some(head)), "{doubt:?}");
+        assert!((doubt.angle_deg.unwrap() / by_deg - 1.0).abs() < 0.3, "{doubt:?}");
     }
 }
 

@@ -3,48 +3,34 @@
 use serde::{Deserialize, Serialize};
 
 use headrace_geometry::math;
-use headrace_geometry::time::MonoNs;
 
 /// Sources with ranges that are followed.
 pub(super) const FOLLOWED: usize = 12;
 /// One reading in so many is compared with its alternatives: each costs a ray.
 pub(super) const COMPARED: u32 = 4;
 /// Fewest blocks that say how sure a figure is.
-const FEWEST_BLOCKS: u32 = 8;
+pub(super) const FEWEST_BLOCKS: u32 = 8;
 /// Standard deviations from which a figure is certain, and from which an alternative is: how much it gains varies with the
 /// vehicle's place.
 pub(super) const SURE: f64 = 6.0;
 pub(super) const SURE_GAIN: f64 = 3.0;
-/// Standard deviations of place and roll within a spell, m and radians.
-const PLACE_SD_M: f64 = 0.3;
-const ROLL_SD_RAD: f64 = 0.005;
+/// What of the vehicle's pose is unknown within a spell: place across and up, roll, pitch and yaw.
+pub(super) const POSE: usize = 5;
 /// What a comparison counts of a miss at most, m: a share of echoes is of something else.
 const MOST_MISSED_M: f64 = 0.5;
 /// Mean square by which a source must miss, m^2, and the share of it that an alternative may leave.
 const MISSES_M2: f64 = 0.01;
 const LEAVES: f64 = 0.4;
 
-/// Sums of one parameter within a spell, beside those of place and roll.
+/// Sums of one parameter within a spell, beside those of the vehicle's pose.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub(super) struct Line {
-    /// By place across and up, and by roll.
-    pub(super) by_pose: [f64; 3],
+    pub(super) by_pose: [f64; POSE],
     pub(super) squares: f64,
     pub(super) residuals: f64,
 }
 
-/// Sums of a spell.
-#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
-pub(super) struct Spell {
-    pub(super) begun: Option<MonoNs>,
-    /// Information on place and roll, lower triangle by rows, and its right side.
-    pub(super) pose: [[f64; 3]; 3],
-    pub(super) residuals: [f64; 3],
-    pub(super) scale: Line,
-    pub(super) turned: [Line; FOLLOWED],
-}
-
-/// Sums of one parameter over blocks, freed of place and roll.
+/// Sums of one parameter over blocks, freed of the vehicle's pose.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub(super) struct Fit {
     pub(super) blocks: u32,
@@ -70,7 +56,7 @@ pub(super) struct Alternative {
 }
 
 impl Line {
-    pub(super) fn add(&mut self, by_pose: [f64; 3], by: f64, residual_m: f64, weight: f64) {
+    pub(super) fn add(&mut self, by_pose: [f64; POSE], by: f64, residual_m: f64, weight: f64) {
         for (sum, part) in self.by_pose.iter_mut().zip(by_pose) {
             *sum += weight * by * part;
         }
@@ -79,34 +65,20 @@ impl Line {
     }
 }
 
-impl Spell {
-    /// The lower Cholesky factor of the information on place and roll, priors included.
-    pub(super) fn factor(&self) -> Option<[[f64; 3]; 3]> {
-        let priors = [PLACE_SD_M, PLACE_SD_M, ROLL_SD_RAD].map(|sd| 1.0 / (sd * sd));
-        let [[a, ..], [b, c, _], [d, e, f]] = self.pose;
-        let [p, q, r] = priors;
-        let aa = math::sqrt(a + p);
-        let (ba, da) = (b / aa, d / aa);
-        let bb = math::sqrt((c + q - ba * ba).max(0.0));
-        let dc = (e - da * ba) / bb;
-        let dd = math::sqrt((f + r - da * da - dc * dc).max(0.0));
-        let factor = [[aa, 0.0, 0.0], [ba, bb, 0.0], [da, dc, dd]];
-        (aa > 0.0 && bb > 0.0 && dd > 0.0 && factor.iter().flatten().all(|x| x.is_finite())).then_some(factor)
-    }
-
-    /// Weight and weighted value of a parameter, freed of place and roll.
-    pub(super) fn freed(&self, line: &Line, factor: &[[f64; 3]; 3]) -> [f64; 2] {
-        let (by, residuals) = (solved(factor, line.by_pose), solved(factor, self.residuals));
-        let dot = |a: &[f64; 3], b: &[f64; 3]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
-        [line.squares - dot(&by, &by), line.residuals - dot(&by, &residuals)]
-    }
+pub(super) fn dot<const N: usize>(a: &[f64; N], b: &[f64; N]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| a * b).sum()
 }
 
 /// Forward substitution.
-fn solved([[a, ..], [b, c, _], [d, e, f]]: &[[f64; 3]; 3], [x, y, z]: [f64; 3]) -> [f64; 3] {
-    let x = x / a;
-    let y = (y - b * x) / c;
-    [x, y, (z - d * x - e * y) / f]
+pub(super) fn solved(factor: &[[f64; POSE]; POSE], right: [f64; POSE]) -> [f64; POSE] {
+    let mut solution = [0.0; POSE];
+    for (i, (row, right)) in factor.iter().zip(right).enumerate() {
+        let known = dot(row, &solution);
+        if let (Some(slot), Some(diagonal)) = (solution.get_mut(i), row.get(i)) {
+            *slot = (right - known) / diagonal;
+        }
+    }
+    solution
 }
 
 impl Fit {

@@ -6,11 +6,13 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::evidence::{Alternative, COMPARED, FOLLOWED, Fit, Line, SURE, Spell};
+use super::evidence::{Alternative, COMPARED, FOLLOWED, Fit, Line, SURE};
 use super::measure::{self, Beam, ScalarUpdate, with_quantum};
 use super::settings::Settings;
 use super::sources::Source;
+use super::spell::Spell;
 use super::state::{ATTITUDE, POSITION, State, vec};
+use super::tilted::TiltFit;
 use super::window::Waiting;
 use headrace_geometry::frames::{Body, Rot, Sensor, Tunnel, Vec3, head_direction};
 use headrace_geometry::math;
@@ -31,7 +33,7 @@ const LONGEST: DurNs = DurNs(120_000_000_000);
 const FEWEST_READINGS: u32 = 100;
 /// Least figures that are told: a share of the range, and an angle.
 const LEAST_SCALE: f64 = 0.015;
-const LEAST_ROLL_RAD: f64 = 0.03;
+const LEAST_ANGLE_RAD: f64 = 0.03;
 /// Residual from which a range weighs less, and beyond which it doesn't count, m.
 const FAR_M: f64 = 0.5;
 const BEYOND_M: f64 = 2.0;
@@ -49,6 +51,10 @@ pub enum Setting {
     RangeScale(f64),
     /// A head is turned about its axis from how it is said to sit, radians: to be added to its roll.
     HeadTurned(f64),
+    /// A head is pitched on its mount, radians: to be added to its pitch.
+    HeadPitched(f64),
+    /// A head is yawed on its mount, radians: to be added to its yaw.
+    HeadYawed(f64),
     /// A source looks the other way.
     WrongWayRound,
     /// Two sources are swapped: the other's number.
@@ -72,6 +78,8 @@ impl Setting {
         match self {
             Self::RangeScale(_) => "range_scale",
             Self::HeadTurned(_) => "head_turned",
+            Self::HeadPitched(_) => "head_pitched",
+            Self::HeadYawed(_) => "head_yawed",
             Self::WrongWayRound => "wrong_way_round",
             Self::Swapped(_) => "swapped",
         }
@@ -80,8 +88,19 @@ impl Setting {
     /// The share or the angle, radians; 0 where there is none.
     pub fn figure(self) -> f64 {
         match self {
-            Self::RangeScale(figure) | Self::HeadTurned(figure) => figure,
+            Self::RangeScale(figure)
+            | Self::HeadTurned(figure)
+            | Self::HeadPitched(figure)
+            | Self::HeadYawed(figure) => figure,
             Self::WrongWayRound | Self::Swapped(_) => 0.0,
+        }
+    }
+
+    /// The angle, radians, of a head that isn't as it is said to sit.
+    pub fn angle_rad(self) -> Option<f64> {
+        match self {
+            Self::HeadTurned(by_rad) | Self::HeadPitched(by_rad) | Self::HeadYawed(by_rad) => Some(by_rad),
+            Self::RangeScale(_) | Self::WrongWayRound | Self::Swapped(_) => None,
         }
     }
 
@@ -123,13 +142,14 @@ struct Look {
     sd_m: f64,
 }
 
-/// Where and when a block began, its readings, and the sums of its spells, freed of place and roll.
+/// Where and when a block began, its readings, and the sums of its spells, freed of the vehicle's pose.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 struct Block {
     begun: Option<(MonoNs, f64)>,
     readings: u32,
     scale: [f64; 2],
     turned: [[f64; 2]; FOLLOWED],
+    tilted: [[[f64; 5]; 2]; FOLLOWED],
 }
 
 /// See the module's description.
@@ -140,13 +160,14 @@ pub struct Suspicions {
     followed: [Option<u16>; FOLLOWED],
     scale: Fit,
     turned: [Fit; FOLLOWED],
+    tilted: [[TiltFit; 2]; FOLLOWED],
     alternatives: Vec<Alternative>,
     /// Readings of each source that is followed.
     heard: [u32; FOLLOWED],
     doubt: Option<SettingDoubt>,
 }
 
-stateful!(Suspicions { state: block, spell, followed, scale, turned, heard, doubt; lists: alternatives; });
+stateful!(Suspicions { state: block, spell, followed, scale, turned, tilted, heard, doubt; lists: alternatives; });
 
 impl Default for Suspicions {
     /// Allocated without readings.
@@ -157,6 +178,7 @@ impl Default for Suspicions {
             followed: [None; FOLLOWED],
             scale: Fit::default(),
             turned: [Fit::default(); FOLLOWED],
+            tilted: [[TiltFit::default(); 2]; FOLLOWED],
             alternatives: Vec::with_capacity(ALTERNATIVES),
             heard: [0; FOLLOWED],
             doubt: None,
@@ -209,29 +231,33 @@ impl Suspicions {
         if row.residual.abs() > BEYOND_M {
             return;
         }
-        let axis = state.attitude * (info.mount.rotation * Vec3::<Sensor>::new(1.0, 0.0, 0.0));
         let place = vec::<Tunnel>(&row.h, POSITION);
         let arm = state.attitude * look.beam.offset;
-        let turned = (vec::<Tunnel>(&row.h, ATTITUDE) + -arm.cross(&place)).dot(&axis);
+        let turn = vec::<Tunnel>(&row.h, ATTITUDE);
+        let own_turn = turn + -arm.cross(&place);
         let expected_m = look.range_m - row.residual;
-        let roll = row.h.get(ATTITUDE).copied().unwrap_or(0.0);
-        let by_pose = [place.y(), place.z(), roll];
+        let by_pose = [place.y(), place.z(), turn.x(), turn.y(), turn.z()];
         // What is known to be wrong makes nothing an outlier.
         let scale = self.scale.estimate().map_or(0.0, |[scale, _]| scale);
         let off_m = row.residual.abs().min((row.residual - scale * expected_m).abs());
         let weight = (FAR_M / off_m.max(FAR_M)) / row.noise;
         self.block.readings += 1;
-        for (k, (by, line)) in by_pose.iter().zip(&mut self.spell.pose).enumerate() {
-            for (sum, other) in line.iter_mut().zip(&by_pose) {
-                *sum += weight * by * other;
-            }
-            if let Some(sum) = self.spell.residuals.get_mut(k) {
-                *sum += weight * by * row.residual;
-            }
-        }
+        self.spell.add(by_pose, row.residual, weight);
         self.spell.scale.add(by_pose, expected_m, row.residual, weight);
-        if let Some(line) = self.spell.turned.get_mut(slot).filter(|_| info.kind == SensorKind::Head) {
-            line.add(by_pose, turned, row.residual, weight);
+        if info.kind != SensorKind::Head {
+            return;
+        }
+        let axis = state.attitude * (info.mount.rotation * Vec3::<Sensor>::new(1.0, 0.0, 0.0));
+        if let Some(line) = self.spell.turned.get_mut(slot) {
+            line.add(by_pose, own_turn.dot(&axis), row.residual, weight);
+        }
+        let along = state.attitude * look.beam.along;
+        for (line, axis) in
+            self.spell.tilted.get_mut(slot).into_iter().flatten().zip(tilt_axes(&info.mount.rotation))
+        {
+            let axis = state.attitude * axis;
+            let leans = axis.cross(&along).x();
+            line.add(by_pose, own_turn.dot(&axis), expected_m * leans * leans, row.residual, weight);
         }
     }
 
@@ -286,6 +312,11 @@ impl Suspicions {
         for (sums, line) in self.block.turned.iter_mut().zip(&spell.turned) {
             add(sums, line);
         }
+        for (sums, line) in self.block.tilted.iter_mut().flatten().zip(spell.tilted.iter().flatten()) {
+            for (sum, part) in sums.iter_mut().zip(line.freed(spell.residuals, &factor)) {
+                *sum += part;
+            }
+        }
     }
 
     fn give_up(&mut self) {
@@ -303,6 +334,9 @@ impl Suspicions {
             self.scale.add(self.block.scale);
             for (fit, sums) in self.turned.iter_mut().zip(self.block.turned) {
                 fit.add(sums);
+            }
+            for (fit, sums) in self.tilted.iter_mut().flatten().zip(self.block.tilted.iter().flatten()) {
+                fit.add(*sums);
             }
             for alternative in &mut self.alternatives {
                 alternative.close();
@@ -325,9 +359,19 @@ impl Suspicions {
         }
         let is_astray = self.alternatives.iter().any(|of| of.is_echo && of.all[0] > ASTRAY_M2 * of.all[2]);
         for (source, fit) in self.followed.iter().zip(&self.turned) {
-            if let Some((by_rad, sure_sd)) = fit.certain(LEAST_ROLL_RAD).filter(|_| !is_astray) {
+            if let Some((by_rad, sure_sd)) = fit.certain(LEAST_ANGLE_RAD).filter(|_| !is_astray) {
                 let setting = Setting::HeadTurned(by_rad);
                 propose(fit.explains(), SettingDoubt { setting, source: *source, sure_sd });
+            }
+        }
+        for (source, fits) in self.followed.iter().zip(&self.tilted) {
+            for (fit, setting) in fits.iter().zip([Setting::HeadPitched, Setting::HeadYawed]) {
+                if let Some((by_rad, sure_sd)) = fit.certain(LEAST_ANGLE_RAD).filter(|_| !is_astray) {
+                    propose(
+                        fit.explains(),
+                        SettingDoubt { setting: setting(by_rad), source: *source, sure_sd },
+                    );
+                }
             }
         }
         for own in &self.alternatives {
@@ -354,6 +398,13 @@ impl Suspicions {
 
 fn info(sources: &[Option<Source>], number: usize) -> Option<&SensorInfo> {
     sources.get(number)?.as_ref().map(|source| &source.sensor)
+}
+
+/// The axes about which a mount is pitched and yawed, in the body's frame.
+fn tilt_axes(mount: &Rot<Body, Sensor>) -> [Vec3<Body>; 2] {
+    let ahead = *mount * Vec3::<Sensor>::new(1.0, 0.0, 0.0);
+    let level = math::hypot(ahead.x(), ahead.y()).max(f64::MIN_POSITIVE);
+    [Vec3::new(-ahead.y() / level, ahead.x() / level, 0.0), Vec3::new(0.0, 0.0, 1.0)]
 }
 
 /// Half a turn about a sensor's own vertical.

@@ -249,7 +249,7 @@ pub struct ConsoleReport {
 /// A setting that ranges contradict.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct SettingReport {
-    /// `range_scale`, `head_turned`, `wrong_way_round` or `swapped`.
+    /// `range_scale`, `head_turned`, `head_pitched`, `head_yawed`, `wrong_way_round` or `swapped`.
     pub what: &'static str,
     /// Name of the source; `None` where it is no single one's.
     pub source: Option<String>,
@@ -257,7 +257,7 @@ pub struct SettingReport {
     pub other: Option<String>,
     /// Ranges over those that the design has; `None` for other settings.
     pub range_ratio: Option<f64>,
-    /// Angle by which the head is turned about its axis, degrees; `None` for other settings.
+    /// Angle by which the head is turned about its axis, pitched or yawed, to be added to that of the vehicle file, degrees; `None` for other settings.
     pub angle_deg: Option<f64>,
     /// Standard deviations from right.
     pub sure_ratio: f64,
@@ -417,7 +417,7 @@ fn setting_report(doubt: &SettingDoubt, dive: &Loop) -> SettingReport {
         source: source.map(name),
         other: setting.other().map(name),
         range_ratio: matches!(setting, Setting::RangeScale(_)).then_some(1.0 + setting.figure()),
-        angle_deg: matches!(setting, Setting::HeadTurned(_)).then_some(setting.figure().to_degrees()),
+        angle_deg: setting.angle_rad().map(f64::to_degrees),
         sure_ratio: sure_sd,
     }
 }

@@ -1,0 +1,60 @@
+//! Sums of a spell: of all that is fitted, beside those of the vehicle's pose, which explains what it can.
+
+use serde::{Deserialize, Serialize};
+
+use super::evidence::{FOLLOWED, Line, POSE, dot, solved};
+use super::tilted::TiltLine;
+use headrace_geometry::math;
+use headrace_geometry::time::MonoNs;
+
+/// Standard deviations of the pose within a spell, m and radians.
+const POSE_SD: [f64; POSE] = [0.3, 0.3, 0.005, 0.01, 0.02];
+
+/// Sums of a spell.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+pub(super) struct Spell {
+    pub(super) begun: Option<MonoNs>,
+    /// Information on the pose, and its right side.
+    pub(super) pose: [[f64; POSE]; POSE],
+    pub(super) residuals: [f64; POSE],
+    pub(super) scale: Line,
+    pub(super) turned: [Line; FOLLOWED],
+    /// By pitch and by yaw of a head on its mount.
+    pub(super) tilted: [[TiltLine; 2]; FOLLOWED],
+}
+
+impl Spell {
+    /// Adds what a reading says of the vehicle's pose.
+    pub(super) fn add(&mut self, by_pose: [f64; POSE], residual_m: f64, weight: f64) {
+        for ((by, line), sum) in by_pose.iter().zip(&mut self.pose).zip(&mut self.residuals) {
+            for (part, other) in line.iter_mut().zip(&by_pose) {
+                *part += weight * by * other;
+            }
+            *sum += weight * by * residual_m;
+        }
+    }
+
+    /// The lower Cholesky factor of the information on the pose, priors included.
+    pub(super) fn factor(&self) -> Option<[[f64; POSE]; POSE]> {
+        let mut factor = [[0.0; POSE]; POSE];
+        for (i, (line, sd)) in self.pose.iter().zip(POSE_SD).enumerate() {
+            let mut row = [0.0; POSE];
+            for (j, sum) in line.iter().enumerate().take(i + 1) {
+                let before = factor.get(j).map_or(0.0, |above| dot(&row, above));
+                let left = sum - if i == j { dot(&row, &row) - 1.0 / (sd * sd) } else { before };
+                let slot = row.get_mut(j)?;
+                *slot = if i == j { math::sqrt(left.max(0.0)) } else { left / *factor.get(j)?.get(j)? };
+            }
+            *factor.get_mut(i)? = row;
+        }
+        let is_sound = factor.iter().flatten().all(|x| x.is_finite());
+        (is_sound && factor.iter().enumerate().all(|(i, row)| row.get(i).is_some_and(|x| *x > 0.0)))
+            .then_some(factor)
+    }
+
+    /// Weight and weighted value of a parameter, freed of the vehicle's pose.
+    pub(super) fn freed(&self, line: &Line, factor: &[[f64; POSE]; POSE]) -> [f64; 2] {
+        let (by, residuals) = (solved(factor, line.by_pose), solved(factor, self.residuals));
+        [line.squares - dot(&by, &by), line.residuals - dot(&by, &residuals)]
+    }
+}
