@@ -202,10 +202,12 @@ fn app(vehicle: &VehicleConfig) -> Result<(App, NoticeReceiver), Failure> {
 /// Tunnel and heads for viewers.
 pub(crate) fn view_site(vehicle: &VehicleConfig) -> Site {
     let heads = (0..).zip(&vehicle.sensors).filter(|(_, sensor)| sensor.head().is_some());
+    let reaches = heads.clone().map(|(_, sensor)| sensor.specification().sensor.mount.position.x().abs());
     Site {
         profile: vehicle.tunnel.profile.clone(),
         target_m: vehicle.target_m,
         section_m: vehicle.section_m,
+        run_up_m: reaches.fold(0.0, f64::max) + vehicle.target_m,
         length_m: vehicle.tunnel.length_m,
         heads: heads.map(|(source, _)| source).collect(),
     }

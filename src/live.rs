@@ -11,6 +11,7 @@ use headrace_ports::{Connection, Phase, SentSink, Status, Supervisor};
 use headrace_replay::log::part_path;
 use headrace_sensor::connect::{Connect, ConnectError};
 use headrace_sensor::driver::DriverSetup;
+use headrace_vehicle::Grade;
 use headrace_vehicle::VehicleConfig;
 
 use crate::cli::Run;
@@ -26,6 +27,12 @@ use crate::screen::Screen;
 use crate::summary::broken;
 use crate::tui;
 use crate::watch::{Show, Watch};
+
+/// What `headrace check` refuses in the vehicle file: a dive goes on with it, but not without a word.
+fn wrong_texts(vehicle: &VehicleConfig) -> Vec<String> {
+    let errors = vehicle.findings().into_iter().filter(|finding| finding.grade == Grade::Error);
+    errors.map(|finding| format!("WRONG in the vehicle file: {finding}")).collect()
+}
 
 /// Runs a dive on the vehicle's ports.
 pub(crate) fn run(args: &Run, text: &str, vehicle: &VehicleConfig) -> Result<u8, Failure> {
@@ -54,11 +61,17 @@ pub(crate) fn run(args: &Run, text: &str, vehicle: &VehicleConfig) -> Result<u8,
     if let Some(served) = &served {
         watch = watch.followed_by(served.follower(&dive.armed));
     }
-    let begun_text = begun_text(args, &logs, vehicle);
+    let wrong: Vec<String> = wrong_texts(vehicle);
+    let mut begun_text = begun_text(args, &logs, vehicle);
     if show == Show::Lines {
-        for line in broken(&begun_text, Screen::columns()) {
+        for line in
+            core::iter::once(&begun_text).chain(&wrong).flat_map(|text| broken(text, Screen::columns()))
+        {
             watch.say(&line);
         }
+    }
+    if let [first, ..] = wrong.as_slice() {
+        output::append(&mut begun_text, format_args!("; {first}"));
     }
     let joining =
         Joining::new(vehicle, tui::Mode::Live, &interrupted).operated(dive.console()).saying(begun_text);

@@ -6,11 +6,13 @@ use headrace_monitor::live_state::LiveMetres;
 use headrace_monitor::live_text::{helps_text, metres_text, unsure_text};
 use headrace_monitor::pilot_text::{actions_text, cause_text, station};
 use headrace_monitor::report::{ChangeReport, JudgedReport, SmoothingReport};
-use headrace_monitor::report::{NotInspectedReport, Report, RunReport};
+use headrace_monitor::report::{NotInspectedReport, Report, RunReport, SourceReport};
 use headrace_monitor::telling::UnsureStretch;
 
 use crate::output::append;
 
+/// Silence of a sensor that is told, s.
+const SILENT_S: f64 = 5.0;
 /// Notes that are listed.
 const MOST_NOTES: usize = 20;
 
@@ -79,6 +81,9 @@ pub(crate) fn summary(report: &Report, columns: Option<usize>) -> String {
     for (count, what) in lost.iter().filter(|(count, _)| *count > 0) {
         line(format!("  {count} {what}"));
     }
+    for silent in report.sources.iter().filter_map(silence) {
+        line(silent);
+    }
     for source in &report.sources {
         let strangers = source.line.as_ref().map_or(0, |line| line.strangers);
         if strangers > 0 {
@@ -106,6 +111,19 @@ pub(crate) fn summary(report: &Report, columns: Option<usize>) -> String {
     text
 }
 
+/// How long a sensor was silent, if that is worth a line; a dive without a position or sonar says by itself what it never heard.
+fn silence(source: &SourceReport) -> Option<String> {
+    let id = &source.id;
+    match source.silent_at_end_s {
+        None => Some(format!("  {id} said nothing")),
+        Some(end_s) if end_s > SILENT_S => Some(format!("  {id} silent for the last {end_s:.0} s")),
+        Some(_) if source.longest_gap_s > SILENT_S => {
+            Some(format!("  {id} silent for up to {:.0} s", source.longest_gap_s))
+        }
+        Some(_) => None,
+    }
+}
+
 /// Why a dive is no inspection.
 fn not_inspected_text(why: &NotInspectedReport) -> String {
     let lacking = why
@@ -131,7 +149,13 @@ fn not_inspected_text(why: &NotInspectedReport) -> String {
 
 /// The stretches that are missed or of which nothing can be said, along the tunnel, a line each: where, what, what to do.
 fn stretches(report: &Report) -> Vec<String> {
-    let open = report.runs.iter().filter(|run| run.cleared_s.is_none());
+    let fails = |run: &&RunReport| {
+        let mut within =
+            report.sections.iter().filter(|section| (run.start_m..run.end_m).contains(&section.start_m));
+        within.any(|section| section.verdict == "fail")
+    };
+    // What was passed again and can't be said is among the unsure.
+    let open = report.runs.iter().filter(|run| run.cleared_s.is_none()).filter(fails);
     let mut all: Vec<(f64, String)> = open.map(|run| (run.start_m, missed(run, report))).collect();
     all.extend(report.unsure.iter().map(|stretch| (stretch.start_m, unsure(&stretch.stretch))));
     all.sort_by(|a, b| a.0.total_cmp(&b.0));
@@ -145,7 +169,7 @@ fn missed(run: &RunReport, report: &Report) -> String {
     }
     let back = report.way_home.iter().find(|back| back.run == run.id);
     let action =
-        back.map(|back| format!("  -> {}", actions_text(&back.actions, run.start_m, back.at_most_mps)));
+        back.map(|back| format!("  -> {}", actions_text(&back.actions, back.back_to_m, back.at_most_mps)));
     format!(
         "  {} to {}  MISSED: {cause}, holes up to {:.2} m{}",
         station(run.start_m),

@@ -13,7 +13,7 @@ const BY: &str = "terminal";
 pub(super) struct AlertRow {
     pub(super) number: u32,
     pub(super) priority: &'static str,
-    /// `active` or `rectified`, and whether somebody knows.
+    /// Whether it holds, and whether somebody knows.
     pub(super) state: &'static str,
     pub(super) lamp: Lamp,
     /// Flashes until somebody acknowledges it.
@@ -37,7 +37,7 @@ pub(super) fn rows(dive: &Loop) -> (Vec<AlertRow>, usize) {
         state: match (alert.state, alert.needs_acknowledgement()) {
             (AlertState::Active, true) => "NEW",
             (AlertState::Active, false) => "active",
-            (AlertState::Rectified, _) => "rectified, NEW",
+            (AlertState::Rectified, _) => "is OVER, not acknowledged",
             (AlertState::Cleared, _) => "cleared",
         },
         lamp: match alert.priority {
@@ -46,7 +46,7 @@ pub(super) fn rows(dive: &Loop) -> (Vec<AlertRow>, usize) {
         },
         needs_acknowledgement: alert.needs_acknowledgement(),
         text: alert.text(&around),
-        advice: alert.advice(&around),
+        advice: if alert.state == AlertState::Rectified { String::new() } else { alert.advice(&around) },
     };
     (shown.iter().filter(|alert| alert.is_live()).map(row).collect(), hidden)
 }

@@ -61,7 +61,24 @@ pub(super) fn speed(shot: &Shot, ink: Ink, rows: &mut Rows<'_>) {
     // The first parts are in the banner.
     let shown = if shot.status.action.is_empty() { 2 } else { 1 };
     parts.extend(shot.status.what.iter().skip(shown).map(String::as_str));
-    rows.text(&one_line(&format!("WHY    {}", parts.join("  "))), Style::default());
+    rows.text(&one_line(&format!("WHY    {}", fitted(&parts, columns_after_label(rows)))), Style::default());
+}
+
+fn columns_after_label(rows: &Rows<'_>) -> usize {
+    usize::from(rows.width()).saturating_sub(LABEL + 1)
+}
+
+/// As many of the parts as fit whole, the first ones.
+fn fitted(parts: &[&str], columns: usize) -> String {
+    let mut text = String::new();
+    for part in parts {
+        let gap = if text.is_empty() { "" } else { "  " };
+        if text.chars().count() + gap.len() + part.chars().count() > columns {
+            break;
+        }
+        text = format!("{text}{gap}{part}");
+    }
+    text
 }
 
 /// Whether the state is of now.
@@ -100,29 +117,28 @@ pub(super) fn place(shot: &Shot, ink: Ink, rows: &mut Rows<'_>) {
     }
     rows.line(Line::from(spans));
     let style = if state.metres.fail_m > 0.0 { ink.style(Lamp::Red) } else { Style::default() };
-    rows.text(
-        &format!("WAY    {}", metres_text(&state.metres, usize::from(rows.width()).saturating_sub(7))),
-        style,
-    );
+    rows.text(&format!("WAY    {}", metres_text(&state.metres, columns_after_label(rows))), style);
 }
 
-/// Metres by verdict, as exact as there is room for.
+/// Metres by verdict, what isn't passed first; dots stand for what there is no room for.
 fn metres_text(metres: &LiveMetres, columns: usize) -> String {
     let LiveMetres { pass_m, fail_m, cannot_say_m, open_m, not_inspected_m } = *metres;
     let all = [
         (fail_m, "MISSED"),
         (cannot_say_m, "can't say"),
+        (not_inspected_m, "not inspected"),
         (pass_m, "passed"),
         (open_m, "open"),
-        (not_inspected_m, "not inspected"),
     ];
-    let digits = if columns < 70 { 1 } else { 2 };
-    let mut text = format!("{:.digits$} m:", metres.way_m());
+    let mut text = format!("{:.2} m:", metres.way_m());
     for (part_m, what) in all.iter().filter(|(part_m, _)| *part_m > 0.0) {
-        let part = format!(" {part_m:.digits$} {what},");
-        if text.len() + part.len() <= columns {
-            text += &part;
+        let part = format!(" {part_m:.2} {what},");
+        // Room for the dots is kept.
+        if text.len() + part.len() + 3 > columns {
+            text += " ..";
+            break;
         }
+        text += &part;
     }
     text.trim_end_matches([',', ':']).to_owned()
 }
@@ -132,11 +148,34 @@ fn alert_lines(alert: &AlertRow, ink: Ink, columns: usize) -> Vec<String> {
     let AlertRow { number, priority, state, lamp, text, advice, .. } = alert;
     let first = format!("{} {number} {priority} {state}: {text}", ink.shape(*lamp));
     if advice.is_empty() {
-        return vec![first];
+        return wrapped(&first, columns);
     }
     let arrow = if ink.unicode { "→" } else { "->" };
     let whole = format!("{first} {arrow} {advice}");
-    if whole.chars().count() <= columns { vec![whole] } else { vec![first, format!("    {arrow} {advice}")] }
+    if whole.chars().count() <= columns {
+        return vec![whole];
+    }
+    let mut lines = wrapped(&first, columns);
+    lines.extend(wrapped(&format!("    {arrow} {advice}"), columns));
+    lines
+}
+
+/// A text in lines of at most so many columns, broken at blanks, the later ones indented.
+fn wrapped(text: &str, columns: usize) -> Vec<String> {
+    let mut lines = vec![String::new()];
+    for word in text.split(' ') {
+        let Some(line) = lines.last_mut() else { break };
+        let is_begun = !line.trim().is_empty();
+        if is_begun && line.chars().count() + 1 + word.chars().count() > columns {
+            lines.push(format!("      {word}"));
+        } else {
+            if !line.is_empty() || word.is_empty() {
+                line.push(' ');
+            }
+            line.push_str(word);
+        }
+    }
+    lines
 }
 
 /// Rows that the alerts would take.

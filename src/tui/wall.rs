@@ -84,6 +84,10 @@ impl Cell {
                 }
             });
         }
+        // Around a hole that is too large, samples or not, the hour isn't covered.
+        if let Some(hole) = section.hole.filter(|_| matches!(known, Known::Missed | Known::CannotSay)) {
+            seen &= !clock.bit(hole.arc_m);
+        }
         let share = section.hole.map(|hole| hole.diameter_m / sections.target_m());
         Some(Self { known, share: share.filter(|_| section.verdict != Verdict::Open), seen })
     }

@@ -108,6 +108,8 @@ pub struct Sections {
     target_m: f64,
     /// Standard deviations of D that a verdict of pass or fail keeps clear of the target.
     confidence_sd: f64,
+    /// How far before a missed stretch the vehicle's origin is to turn round, m.
+    run_up_m: f64,
     first: i64,
     /// Judged sections by verdict, in the order of [`Verdict::ALL`]; last, open ones that weren't inspected.
     judged: [u32; Verdict::ALL.len() + 1],
@@ -117,7 +119,7 @@ pub struct Sections {
     next_look_m: [f64; 2],
 }
 
-stateful!(Sections { state: runs, judged, next_look_m; slots: sections; fixed: section_m, target_m, confidence_sd, first; });
+stateful!(Sections { state: runs, judged, next_look_m; slots: sections; fixed: section_m, target_m, confidence_sd, run_up_m, first; });
 
 impl Sections {
     /// Sections of `section_m` over [`from_m`, `to_m`].
@@ -132,6 +134,7 @@ impl Sections {
             section_m,
             target_m,
             confidence_sd: CONFIDENCE_SD,
+            run_up_m: target_m,
             first,
             judged: [0; 5],
             sections: vec![Section::default(); count],
@@ -144,6 +147,18 @@ impl Sections {
     #[must_use]
     pub fn with_confidence_sd(self, confidence_sd: f64) -> Self {
         Self { confidence_sd, ..self }
+    }
+
+    /// Of a vehicle whose heads reach so far before or behind its origin, m.
+    #[must_use]
+    pub fn with_heads_reach_m(self, reach_m: f64) -> Self {
+        Self { run_up_m: reach_m + self.target_m, ..self }
+    }
+
+    /// Chainage that the vehicle's origin is to go back to, so that all its heads pass a stretch from its beginning on, m: to a
+    /// decimetre.
+    pub fn back_to_m(&self, start_m: f64) -> f64 {
+        back_to_m(start_m, self.run_up_m)
     }
 
     /// The runs of flagged sections.
@@ -276,6 +291,10 @@ impl Sections {
         // Nothing will come any more.
         section.not_inspected |=
             section.verdict == Verdict::Open && request.ended.is_some_and(|ended| ended.is_beyond(&hole));
+        if request.ended.is_some() && section.verdict == Verdict::Open && section.is_flagged() {
+            // Missed, and the dive ended on the way back over it.
+            (section.verdict, section.not_inspected) = (Verdict::Fail, false);
+        }
         // What is lacking in a hole that hasn't changed may have been forgotten since.
         if section.verdict == Verdict::Fail && !is_same {
             let evidence = self.explain(&hole, request, judging);
@@ -468,6 +487,11 @@ pub(super) fn verdict(hole: &Hole, error_m: f64, target_m: f64, clear_m: f64) ->
     } else {
         Verdict::Open
     }
+}
+
+/// Chainage to go back to, so many metres before a stretch begins, m: to a decimetre.
+pub fn back_to_m(start_m: f64, run_up_m: f64) -> f64 {
+    math::floor_to_i64((start_m - run_up_m) * 10.0 + 1e-6) as f64 / 10.0
 }
 
 fn clamp(range: Range<i64>, within: &Range<i64>) -> Range<i64> {

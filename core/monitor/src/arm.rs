@@ -1,6 +1,7 @@
 //! Arming: allocates all memory of a loop.
 
 use bevy_ecs::entity::Entity;
+use bevy_ecs::query::With;
 use bevy_ecs::world::World;
 
 use super::advice_log::AdviceLog;
@@ -137,7 +138,8 @@ impl App {
         }
         world.insert_resource(Tally::default());
         world.insert_resource(TickTime::default());
-        let coverage = coverage(mission)?;
+        let reach_m = heads_reach_m(world);
+        let coverage = coverage(mission, reach_m)?;
         world.insert_resource(AlertList::new(mission.alerts, mission.limits, coverage.sections.len()));
         world.insert_resource(coverage);
         world.insert_resource(TunnelDesign {
@@ -207,7 +209,13 @@ fn sound_source(mission: &Mission, sources: &[SourceInfo]) -> Result<Option<Sour
     place.map(|place| Some(SourceId(place))).ok_or_else(|| PluginError::MissingSource { id: id.clone() })
 }
 
-fn coverage(mission: &Mission) -> Result<Coverage, PluginError> {
+/// How far heads sit before or behind the vehicle's origin at most, m.
+fn heads_reach_m(world: &mut World) -> f64 {
+    let mut heads = world.query_filtered::<&Mounted, With<Head>>();
+    heads.iter(world).map(|mounted| mounted.info.mount.position.x().abs()).fold(0.0, f64::max)
+}
+
+fn coverage(mission: &Mission, heads_reach_m: f64) -> Result<Coverage, PluginError> {
     let (from_m, to_m) = (-ROOM_BEYOND_M, mission.length_m + ROOM_BEYOND_M);
     let samples = headrace_geometry::math::round_to_i64(
         ((to_m - from_m) * SAMPLES_PER_M).clamp(MIN_SAMPLES, MAX_SAMPLES),
@@ -220,7 +228,8 @@ fn coverage(mission: &Mission) -> Result<Coverage, PluginError> {
         capacity: u32::try_from(samples).unwrap_or(u32::MAX),
     });
     let mut sections = Sections::new(mission.section_m, mission.target_m, 0.0, mission.length_m)
-        .with_confidence_sd(mission.coverage.confidence_sd);
+        .with_confidence_sd(mission.coverage.confidence_sd)
+        .with_heads_reach_m(heads_reach_m);
     for opening in &mission.coverage.openings {
         let name = || opening.name.clone();
         opening

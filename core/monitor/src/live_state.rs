@@ -155,6 +155,8 @@ pub struct LiveState {
     pub unsure: Option<Stretch>,
     /// All wall that heads see here has passed: it follows from chainage and verdicts.
     pub passed: bool,
+    /// On the way back for a missed stretch: how far, m.
+    pub back_to_m: Option<f64>,
     /// Alerts that hold.
     pub alerts: ActiveAlerts,
     /// Sources that are profiling heads, by number.
@@ -168,7 +170,7 @@ pub struct LiveState {
 }
 
 stateful!(LiveState {
-    state: now, at, position, chainage_m, sd, pass_sd_m, speed_mps, advice, metres, unsure, passed, alerts, turning;
+    state: now, at, position, chainage_m, sd, pass_sd_m, speed_mps, advice, metres, unsure, passed, back_to_m, alerts, turning;
     slots: heard;
     fixed: target_m, confidence_sd, heads, sources;
 });
@@ -190,6 +192,7 @@ impl LiveState {
             metres: LiveMetres::default(),
             unsure: None,
             passed: false,
+            back_to_m: None,
             alerts: [None; MOST_ALERTS],
             heads,
             turning: 0,

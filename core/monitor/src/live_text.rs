@@ -92,6 +92,7 @@ pub fn status_line(state: &LiveState, profile: &Profile, name: &dyn Fn(usize) ->
         Condition::NoPosition(lacking) => (no_position_text(lacking).to_owned(), "hold still".to_owned()),
         Condition::NoSonar => ("NO SONAR: nothing is seen".to_owned(), "stop".to_owned()),
         Condition::Passed => ("passed here".to_owned(), String::new()),
+        Condition::GoingBack(to_m) => (format!("going back to {}", station(to_m)), String::new()),
         Condition::NoSpeed => (no_speed_text(state, profile), String::new()),
         Condition::TooFast => ("TOO FAST".to_owned(), format!("at most {v_max}")),
         Condition::TurnFails => (turn_fails_text(state), format!("go {v_max}")),
@@ -101,10 +102,17 @@ pub fn status_line(state: &LiveState, profile: &Profile, name: &dyn Fn(usize) ->
     };
     let is_old = matches!(condition, Condition::Old(_) | Condition::NoData);
     let speed = match state.speed_mps {
-        Some(speed_mps) if !is_old => format!("{speed_mps:.2} m/s"),
+        // No minus before a zero.
+        Some(speed_mps) if !is_old => {
+            format!("{:.2} m/s", if speed_mps.abs() < 0.005 { 0.0 } else { speed_mps })
+        }
         _ => String::new(),
     };
     let mut parts = vec![what];
+    // What is lost goes before what may be: a narrow screen leaves the last parts out.
+    if state.metres.fail_m > 0.0 {
+        parts.push(format!("missed {:.2} m", state.metres.fail_m));
+    }
     if !is_old {
         let silent: Vec<usize> = state.silent().collect();
         match silent.as_slice() {
@@ -113,11 +121,9 @@ pub fn status_line(state: &LiveState, profile: &Profile, name: &dyn Fn(usize) ->
             some => parts.push(format!("{} of {} sensors silent", some.len(), state.sources)),
         }
         let forecast = losses_text(state).or_else(|| forecast_text(state));
-        let counts = state.has_sonar() && state.speed_mps.is_some() && condition != Condition::Passed;
+        let any_speed = matches!(condition, Condition::Passed | Condition::GoingBack(_));
+        let counts = state.has_sonar() && state.speed_mps.is_some() && !any_speed;
         parts.extend(forecast.filter(|_| counts));
-    }
-    if state.metres.fail_m > 0.0 {
-        parts.push(format!("missed {:.2} m", state.metres.fail_m));
     }
     PilotLine { place, speed, what: parts, action, lamp: Some(condition.lamp()) }
 }
@@ -200,7 +206,8 @@ pub fn told_line(told: &Told, profile: &Profile) -> PilotLine {
     match told {
         Told::Flag { from_m, missed, .. } => {
             let at_most_mps = missed.figures.again_mps(missed.v_max_mps);
-            let action = actions_text(&Action::against(missed.figures.causes.iter()), *from_m, at_most_mps);
+            let action =
+                actions_text(&Action::against(missed.figures.causes.iter()), missed.back_to_m, at_most_mps);
             let clock = profile.clock(missed.hole_arc_m);
             let what = format!(
                 "MISSED: {}, holes over {} m at {clock}",

@@ -173,6 +173,8 @@ pub struct Standing {
     pub unsure: Option<Stretch>,
     /// All wall that heads see here has passed.
     pub passed: bool,
+    /// On the way back for a missed stretch: how far, m.
+    pub back_to_m: Option<f64>,
     /// Alerts that hold.
     pub alerts: ActiveAlerts,
 }

@@ -126,20 +126,32 @@ fn one_cause_text(cause: Cause, figures: &CauseFigures) -> String {
     }
 }
 
-/// Text of the heads that were silent, counted from 1 in the order of the vehicle file.
+/// Text of the heads that were silent, as people count them in the order of the vehicle file: sources' own names often have numbers
+/// that begin with 0.
 fn silent_text(heads: HeadSet) -> String {
-    let numbers: Vec<String> = heads.iter().map(|head| (head + 1).to_string()).collect();
+    let numbers: Vec<String> = heads.iter().map(ordinal).collect();
     match numbers.as_slice() {
         [] => "heads silent".to_owned(),
-        [only] => format!("head {only} silent"),
-        [others @ .., last] => format!("heads {} and {last} silent", others.join(", ")),
+        [only] => format!("the {only} head silent"),
+        [others @ .., last] => format!("the {} and {last} head silent", others.join(", ")),
     }
 }
 
+/// "1st" of 0.
+fn ordinal(head: usize) -> String {
+    let suffix = match head {
+        0 => "st",
+        1 => "nd",
+        2 => "rd",
+        _ => "th",
+    };
+    format!("{}{suffix}", head + 1)
+}
+
 /// Text of the actions for a missed stretch, as of [`action_text`]; of several, the first two.
-pub fn actions_text(actions: &[Action], start_m: f64, at_most_mps: f64) -> String {
+pub fn actions_text(actions: &[Action], back_to_m: f64, at_most_mps: f64) -> String {
     let Some((first, others)) = actions.split_first() else { return String::new() };
-    let text = action_text(*first, start_m, at_most_mps);
+    let text = action_text(*first, back_to_m, at_most_mps);
     others.first().map_or(text.clone(), |second| format!("{text}; and {}", short_text(*second)))
 }
 
@@ -159,23 +171,23 @@ fn short_text(action: Action) -> &'static str {
     }
 }
 
-/// Text of the action for a missed stretch that begins at `start_m`, m, with the maximum speed, m/s; zero if no speed is
-/// known to meet the target.
-pub fn action_text(action: Action, start_m: f64, at_most_mps: f64) -> String {
-    let start = station(start_m);
+/// Text of the action for a missed stretch that the vehicle is to go back for to a chainage, m, with the maximum speed, m/s; zero if
+/// no speed is known to meet the target.
+pub fn action_text(action: Action, back_to_m: f64, at_most_mps: f64) -> String {
+    let back = format!("go back to {}", station(back_to_m));
     let text = match action {
         // The speed is for the present mode and range setting.
         Action::FinerMode => return "slower won't help, a finer mode will".to_owned(),
         Action::LongerRange => return "set a longer range".to_owned(),
-        Action::Slower if at_most_mps > 0.0 => format!("go back to {start}, then"),
-        Action::Slower => format!("go back to {start}"),
-        Action::OtherSide => format!("pass {start} again rolled to either side,"),
-        Action::Middle => format!("go back to {start}, then in the middle and steady,"),
-        Action::InPhase => format!("go back to {start}, then with the heads in phase,"),
-        Action::Head => format!("go back to {start}, then with that head repaired or without it,"),
-        Action::HeadBack => format!("get what is silent back, then go back to {start},"),
-        Action::Position => format!("pass {start} again once the position is back,"),
-        Action::Again => "pass it again from end to end,".to_owned(),
+        Action::Slower if at_most_mps > 0.0 => format!("{back}, then"),
+        Action::Slower => back,
+        Action::OtherSide => format!("{back}, then rolled to either side,"),
+        Action::Middle => format!("{back}, then in the middle and steady,"),
+        Action::InPhase => format!("{back}, then with the heads in phase,"),
+        Action::Head => format!("{back}, then with that head repaired or without it,"),
+        Action::HeadBack => format!("get what is silent back, then {back},"),
+        Action::Position => format!("once the position is back, {back},"),
+        Action::Again => format!("{back}, then from end to end,"),
     };
     if at_most_mps > 0.0 {
         format!("{text} at most {at_most_mps:.2} m/s")
@@ -228,6 +240,8 @@ const GAIN: f64 = 1.1;
 pub struct Missed {
     /// Where it begins, m.
     pub start_m: f64,
+    /// Where the vehicle is to go back to for it, m.
+    pub back_to_m: f64,
     /// Cause with its figures.
     pub figures: CauseFigures,
     /// Arc length of its largest hole, m.
@@ -240,13 +254,13 @@ pub struct Missed {
 
 /// Text of a flag: location, cause and action.
 pub fn flag_text(missed: &Missed, profile: &Profile) -> String {
-    let Missed { start_m, figures, hole_arc_m, target_m, v_max_mps } = missed;
+    let Missed { start_m, back_to_m, figures, hole_arc_m, target_m, v_max_mps } = missed;
     format!(
         "ch {}  {}: holes over {target_m} m at {} o'clock; {}",
         station(*start_m),
         cause_text(figures),
         profile.clock(*hole_arc_m),
-        actions_text(&Action::against(figures.causes.iter()), *start_m, figures.again_mps(*v_max_mps)),
+        actions_text(&Action::against(figures.causes.iter()), *back_to_m, figures.again_mps(*v_max_mps)),
     )
 }
 
@@ -400,8 +414,8 @@ mod tests {
     fn silent_heads_are_named_as_people_count() {
         let text =
             |heads: &[usize]| silent_text(heads.iter().fold(HeadSet::default(), |set, head| set.with(*head)));
-        assert_eq!(text(&[1]), "head 2 silent");
-        assert_eq!(text(&[0, 1, 3]), "heads 1, 2 and 4 silent");
+        assert_eq!(text(&[1]), "the 2nd head silent");
+        assert_eq!(text(&[0, 1, 3]), "the 1st, 2nd and 4th head silent");
         assert_eq!(text(&[]), "heads silent");
     }
 
@@ -420,7 +434,7 @@ mod tests {
             at(Action::Middle, 0.25),
             "go back to 1+240.50, then in the middle and steady, at most 0.25 m/s"
         );
-        assert_eq!(at(Action::Again, 0.0), "pass it again from end to end");
+        assert_eq!(at(Action::Again, 0.0), "go back to 1+240.50, then from end to end");
         assert_eq!(
             actions_text(&[Action::Slower, Action::OtherSide, Action::Again], 1240.5, 0.25),
             "go back to 1+240.50, then at most 0.25 m/s; and rolled to either side"

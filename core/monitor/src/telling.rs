@@ -343,6 +343,7 @@ fn flag(id: RunId, run: &Run, section: i64, evidence: &Evidence, dive: &Loop) ->
     let hole = sections.get(section).and_then(|section| section.hole).unwrap_or(run.worst.1);
     let missed = Missed {
         start_m: from_m,
+        back_to_m: sections.back_to_m(from_m),
         figures: evidence.into(),
         hole_arc_m: hole.arc_m,
         target_m: sections.target_m(),

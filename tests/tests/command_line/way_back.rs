@@ -67,7 +67,7 @@ fn there_and_back(there_mps: f64) -> Vec<Value> {
 }
 
 #[test]
-fn over_wall_that_has_passed_no_speed_is_too_fast_and_over_other_wall_it_is() {
+fn over_wall_that_has_passed_and_on_the_way_back_to_what_was_missed_no_speed_is_too_fast() {
     let lines = there_and_back(0.09);
     let conditions_there = conditions(&lines, false, [7.0, 13.0]);
     assert!(conditions_there.iter().all(|condition| *condition != "passed"), "{conditions_there:?}");
@@ -75,7 +75,7 @@ fn over_wall_that_has_passed_no_speed_is_too_fast_and_over_other_wall_it_is() {
     assert!(back.len() > 5 && back.iter().all(|condition| *condition == "passed"), "{back:?}");
     let lines = there_and_back(0.3);
     let back = conditions(&lines, true, [8.5, 12.0]);
-    assert!(back.len() > 5 && back.iter().all(|condition| *condition == "too_fast"), "{back:?}");
+    assert!(back.len() > 5 && back.iter().all(|condition| *condition == "going_back"), "{back:?}");
 }
 
 /// A pilot slows down before new wall: the limit is back before he is there.
@@ -96,4 +96,43 @@ fn the_limit_is_back_before_new_wall_is() {
     let x_m = figure(&first["position"], "chainage_m");
     assert!((9.0..11.5).contains(&x_m), "{x_m}");
     assert!(again.iter().any(|state| state["condition"] == "passed"));
+}
+
+/// Too fast over 6 m, and back to a place; on from there at a speed, or no farther.
+fn missed_and_back(to_m: f64, on_mps: Option<f64>) -> String {
+    let on = on_mps.map_or_else(String::new, |mps| {
+        format!("[[trajectory.waypoints]]\nchainage_m = 20\nspeed_mps = {mps}\n")
+    });
+    format!(
+        "vehicle = \"vehicle.toml\"\n[vehicle_changes]\nheads.planned_speed_mps = 0.09\n[trajectory]\nkind = \"waypoints\"\n\
+         [[trajectory.waypoints]]\nchainage_m = 2\nstay_s = 10\n[[trajectory.waypoints]]\nchainage_m = 10\nspeed_mps = 0.09\n\
+         [[trajectory.waypoints]]\nchainage_m = 16\nspeed_mps = 0.32\n[[trajectory.waypoints]]\nchainage_m = 18\nspeed_mps = 0.09\n\
+         [[trajectory.waypoints]]\nchainage_m = {to_m}\nspeed_mps = 0.09\n{on}[effects]\nmotion_within_turn = {{}}\nocclusion = {{}}\n"
+    )
+}
+
+/// What is told is the place of the vehicle's middle, and its heads sit before and behind it.
+#[test]
+fn who_goes_back_as_far_as_told_and_on_as_fast_as_told_clears_it_all() {
+    let end = |lines: &[Value]| of(lines, "end")[0]["summary"]["fail_m"].as_f64().unwrap();
+    let lines = told(&missed_and_back(17.9, None));
+    assert!(end(&lines) > 5.0);
+    let flag = of(&lines, "flag")[0];
+    let text = flag["text"].as_str().unwrap();
+    let words = text.split("go back to 0+").nth(1).unwrap();
+    let back_m: f64 = words.split(',').next().unwrap().parse().unwrap();
+    let at_most_mps: f64 =
+        words.split("at most ").nth(1).unwrap().split(' ').next().unwrap().parse().unwrap();
+    let from_m = figure(flag, "from_m");
+    assert!((0.5..2.0).contains(&(from_m - back_m)), "{text}");
+    assert_eq!(end(&told(&missed_and_back(back_m, Some(at_most_mps)))), 0.0, "{text}");
+}
+
+/// A dive that ends on the way back has what was missed in its sums.
+#[test]
+fn what_was_missed_is_missed_where_the_dive_ends_on_the_way_back() {
+    let lines = told(&missed_and_back(10.5, None));
+    let end = of(&lines, "end")[0];
+    let missed_m = end["summary"]["fail_m"].as_f64().unwrap();
+    assert!((1.0..3.0).contains(&missed_m), "{end}");
 }

@@ -197,7 +197,9 @@ fn a_speeding_stretch_and_a_dead_head_are_told_once_and_in_time() {
             told.iter().filter(|(_, change, alert)| *change == AlertChange::Raised && alert.kind == kind);
         raised.map(|(at, ..)| at.since(START).as_secs_f64()).collect()
     };
-    assert_eq!(raised(ListKind::TooFast).len(), 1, "{:?}", raised(ListKind::TooFast));
+    // And once more after the way back, on which any speed will do.
+    let too_fast = raised(ListKind::TooFast);
+    assert!(matches!(too_fast[..], [first, again] if first < 10.0 && again > 100.0), "{too_fast:?}");
     // Once it is over it still tells of the speed that was too fast, not of the one that the pilot slowed down to.
     let fast = dive.alert_list().iter().find(|alert| alert.kind == ListKind::TooFast).unwrap();
     let Figures::Advice(figures) = fast.figures else { panic!("{:?}", fast.figures) };

@@ -94,12 +94,16 @@ impl AlertList {
         self.set_alert_of(input.id, number);
     }
 
-    /// A stretch has grown. It doesn't shrink: what a later pass mends in the middle of it leaves one alert.
+    /// A stretch has grown, or shrunk if it is one run; what a later pass mends in the middle of it leaves one alert.
     fn widen(&mut self, number: u32, input: &RunInput, to: &mut Telling<'_>) {
         let Some(alert) = self.get_mut(number) else { return };
         let (from, until) = alert.stretch.unwrap_or(input.stretch);
-        let wide = (from.min(input.stretch.0), until.max(input.stretch.1));
-        let is_wider = alert.stretch != Some(wide);
+        let wide = if alert.open_runs == 1 {
+            input.stretch
+        } else {
+            (from.min(input.stretch.0), until.max(input.stretch.1))
+        };
+        let is_wider = from > wide.0 || until < wide.1 || alert.stretch.is_none();
         if let (Figures::Missed(causes, arc_m, _), Some((now, hole_m))) = (&mut alert.figures, input.causes)
             && alert.open_runs == 1
         {

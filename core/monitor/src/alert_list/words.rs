@@ -22,17 +22,20 @@ pub struct Surroundings<'a> {
     pub target_m: f64,
     /// Standard deviations of a hole that a verdict keeps clear of the target.
     pub confidence_sd: f64,
+    /// The sections, for where to go back to.
+    pub sections: &'a Sections,
 }
 
 impl<'a> Surroundings<'a> {
     /// Those of a dive.
-    pub(crate) fn of(sources: &'a [SourceInfo], profile: &'a Profile, sections: &Sections) -> Self {
+    pub(crate) fn of(sources: &'a [SourceInfo], profile: &'a Profile, sections: &'a Sections) -> Self {
         Self {
             sources,
             profile,
             section_m: sections.section_m(),
             target_m: sections.target_m(),
             confidence_sd: sections.confidence_sd(),
+            sections,
         }
     }
 
@@ -102,7 +105,8 @@ impl ListedAlert {
         match (self.kind, &self.figures) {
             (_, Figures::Missed(causes, _, v_max_mps)) => {
                 let from_m = self.bounds_m(around.section_m).0.unwrap_or(0.0);
-                actions_text(&Action::against(causes.causes.iter()), from_m, causes.again_mps(*v_max_mps))
+                let back_to_m = around.sections.back_to_m(from_m);
+                actions_text(&Action::against(causes.causes.iter()), back_to_m, causes.again_mps(*v_max_mps))
             }
             (_, Figures::CannotSay(stretch)) => helps_text(stretch.why).to_owned(),
             (ListKind::TooFast, Figures::Advice(figures)) => speed_text("at most", figures.v_max_mps),

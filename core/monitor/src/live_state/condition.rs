@@ -25,6 +25,8 @@ pub enum Condition {
     NoSonar,
     /// All wall here has passed, and the position is sure: any speed will do.
     Passed,
+    /// On the way back for a missed stretch, to this chainage (m), faster than what counts: it is passed again from there.
+    GoingBack(f64),
     /// Slower won't help.
     NoSpeed,
     /// The speed is well over v_max.
@@ -60,6 +62,7 @@ impl Condition {
             Self::NoPosition(_) => "no_position",
             Self::NoSonar => "no_sonar",
             Self::Passed => "passed",
+            Self::GoingBack(_) => "going_back",
             Self::NoSpeed => "no_speed",
             Self::TooFast => "too_fast",
             Self::TurnFails => "turn_fails",
@@ -72,7 +75,7 @@ impl Condition {
     /// Its colour.
     pub fn lamp(self) -> Lamp {
         match self {
-            Self::Good | Self::Passed => Lamp::Green,
+            Self::Good | Self::Passed | Self::GoingBack(_) => Lamp::Green,
             Self::Over | Self::TurnFails | Self::CannotSay(_) | Self::NoData => Lamp::Amber,
             Self::Old(_) | Self::NoPosition(_) | Self::NoSonar | Self::NoSpeed | Self::TooFast => Lamp::Red,
         }
@@ -100,15 +103,21 @@ impl LiveState {
         if self.passed && self.position == PositionState::Ok && advice.reason != Reason::NoReturns {
             return Condition::Passed;
         }
+        let going_back = self.back_to_m.filter(|_| self.position == PositionState::Ok);
         let Some(v_max_mps) = self.v_max_mps() else {
             return match advice.reason {
                 // Of a head that doesn't turn, or not long enough yet, nothing is known.
                 Reason::NoReturns => Condition::NoSonar,
                 Reason::NoHeadingOrFix => Condition::NoPosition(NoFix::Heading),
-                Reason::AngularStep | Reason::HelixPitch => Condition::NoSpeed,
+                Reason::AngularStep | Reason::HelixPitch => {
+                    going_back.map_or(Condition::NoSpeed, Condition::GoingBack)
+                }
             };
         };
         let share = self.speed_mps.unwrap_or(0.0).abs() / v_max_mps;
+        if let Some(to_m) = going_back.filter(|_| share > OVER) {
+            return Condition::GoingBack(to_m);
+        }
         match self.position {
             _ if share > TOO_FAST => Condition::TooFast,
             // The forecast is held for a second; the turn itself may have been mended.

@@ -53,6 +53,8 @@ pub struct ReturnReport {
     pub from_m: f64,
     /// Chainage of its near end, m.
     pub to_m: f64,
+    /// Chainage that the vehicle's origin is to go back to, so that all heads pass it from its far end on or back, m.
+    pub back_to_m: f64,
     /// Change to make against the main cause.
     pub action: Action,
     /// Changes to make, all of them, in the order of the run's causes.
@@ -116,5 +118,15 @@ fn stop(sections: &Sections, id: RunId, run: &Run) -> ReturnReport {
     let at_most_mps = speeds.reduce(f64::min).unwrap_or(0.0);
     let takes_s = (at_most_mps > 0.0).then(|| (from_m - to_m) / at_most_mps);
     let actions = Action::against(run.causes());
-    ReturnReport { run: id.0, from_m, to_m, action: Action::of(run.cause), actions, at_most_mps, takes_s }
+    let back_to_m = sections.back_to_m(to_m);
+    ReturnReport {
+        run: id.0,
+        from_m,
+        to_m,
+        back_to_m,
+        action: Action::of(run.cause),
+        actions,
+        at_most_mps,
+        takes_s,
+    }
 }

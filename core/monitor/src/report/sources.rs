@@ -1,5 +1,6 @@
 //! Sources in the report.
 
+use headrace_geometry::time::MonoNs;
 use serde::Serialize;
 
 use crate::run::Loop;
@@ -26,6 +27,8 @@ pub struct SourceReport {
     pub withheld: u64,
     /// Longest silence between two packets, seconds.
     pub longest_gap_s: f64,
+    /// Time from its last packet to the dive's last reading, seconds; `None` if it never sent any.
+    pub silent_at_end_s: Option<f64>,
     /// Packets per second.
     pub rate_hz: f64,
     /// Device clock statistics; `None` if it sends no timestamps.
@@ -97,6 +100,7 @@ pub struct NavigationReport {
 }
 
 pub(super) fn source_reports(dive: &Loop) -> Vec<SourceReport> {
+    let end = dive.tally().span.map_or(MonoNs(0), |(_, last)| last);
     let decoders = dive.decoder_counts().into_iter().zip(dive.decoder_withheld()).zip(dive.decoder_clocks());
     dive.sources()
         .iter()
@@ -116,6 +120,7 @@ pub(super) fn source_reports(dive: &Loop) -> Vec<SourceReport> {
                 readings: tally.readings,
                 withheld,
                 longest_gap_s: tally.longest_gap.as_secs_f64(),
+                silent_at_end_s: tally.span.map(|(_, last)| end.since(last).as_secs_f64().max(0.0)),
                 rate_hz: if span_s > 0.0 { intervals / span_s } else { 0.0 },
                 device_clock: clock.map(DeviceClockReport::from),
                 navigation: dive.consistency(number).map(|consistency| NavigationReport {

@@ -18,7 +18,7 @@ use crate::messages::{
     Notices, Outcome, Placed, PlacedEvents, PlacedList, PlacedPing, Requests, Standing, Standings,
 };
 use crate::resources::{Coverage, Digests, Finder, Tally, Target, TunnelDesign, VehicleEntities};
-use headrace_coverage::{Drive, HeadReach, Loss, Verdict, Visit};
+use headrace_coverage::{Drive, HeadReach, Loss, Sections, Verdict, Visit};
 use headrace_geometry::time::DurNs;
 use headrace_geometry::tunnel::Profile;
 use headrace_sampling::passes::Situation;
@@ -27,6 +27,8 @@ use headrace_sampling::passes::Situation;
 const LOOK_AROUND: DurNs = DurNs(1_000_000_000);
 /// Time in which a pilot slows down before wall that hasn't passed, seconds.
 const SOON_S: f64 = 5.0;
+/// A vehicle goes back at this speed or faster, m/s.
+const ASTERN_MPS: f64 = -0.02;
 
 #[expect(clippy::too_many_arguments, reason = "a system's arguments are what it reads and writes")]
 pub(super) fn cover(
@@ -129,7 +131,12 @@ pub(super) fn cover(
         if let Placed::Situation(at, situation, doubts) = item {
             let sweeps = heads.iter().map(|(_, mounted, _, sweep, _)| (mounted.source, sweep));
             let passed = is_passed(&coverage, &heads, situation);
-            standings.0.push(Standing { passed, ..standing(*at, &coverage, &alerts, doubts, sweeps) });
+            let back_to_m = back_to_m(&coverage.sections, situation);
+            standings.0.push(Standing {
+                passed,
+                back_to_m,
+                ..standing(*at, &coverage, &alerts, doubts, sweeps)
+            });
         }
     }
 }
@@ -145,6 +152,14 @@ fn is_passed(coverage: &Coverage, heads: &Heads<'_, '_>, situation: &Situation) 
     let to_m = all.to_m.max(all.to_m + ahead_m) + around_m;
     let mut indices = sections.index_of(from_m)..=sections.index_of(to_m);
     indices.all(|index| sections.get(index).is_some_and(|section| section.verdict == Verdict::Pass))
+}
+
+/// Where a vehicle that goes back is to turn round for the nearest missed stretch that isn't ahead of it, m.
+fn back_to_m(sections: &Sections, situation: &Situation) -> Option<f64> {
+    let x_m = situation.pose.filter(|_| situation.speed_mps < ASTERN_MPS)?.position.x();
+    let missed = sections.runs().all().iter().filter(|run| run.is_open());
+    let backs = missed.map(|run| sections.back_to_m(sections.bounds_m(run.from).0));
+    backs.filter(|back_m| *back_m < x_m).reduce(f64::max)
 }
 
 fn count(tally: &mut Tally, ping: &PlacedPing) {

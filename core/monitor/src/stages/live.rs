@@ -45,6 +45,7 @@ pub(super) fn standing<'a>(
         },
         unsure: coverage.unsure,
         passed: false,
+        back_to_m: None,
         alerts: active(at, alerts, doubts, heads),
     }
 }
@@ -158,6 +159,7 @@ pub(super) fn live(
             metres: standing.metres,
             unsure: standing.unsure,
             passed: standing.passed,
+            back_to_m: standing.back_to_m,
             alerts: standing.alerts,
             turning: source_bits(heads.map(|head| head.source), turning),
             ..*state

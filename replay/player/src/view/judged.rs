@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use headrace_coverage::{Cause, Judgement, RunChange, Verdict};
+use headrace_coverage::{Cause, Judgement, RunChange, Verdict, back_to_m};
 use headrace_geometry::time::{DurNs, MonoNs};
 use headrace_monitor::pilot_text::{CauseFigures, Missed as MissedText, cause_text, cleared_text, flag_text};
 
@@ -84,6 +84,7 @@ impl Sections {
         (change == RunChange::Raised as u64).then(|| {
             let missed = MissedText {
                 start_m: index as f64 * site.section_m,
+                back_to_m: back_to_m(index as f64 * site.section_m, site.run_up_m),
                 figures,
                 hole_arc_m: judged.hole_arc_m,
                 target_m: site.target_m,

@@ -16,6 +16,8 @@ pub struct Site {
     pub target_m: f64,
     /// Length of a section, m.
     pub section_m: f64,
+    /// How far before a missed stretch the vehicle is to turn round, m.
+    pub run_up_m: f64,
     /// Length of the tunnel, m.
     pub length_m: f64,
     /// Numbers of the sources that are heads.

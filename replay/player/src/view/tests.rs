@@ -11,6 +11,7 @@ fn view() -> View {
         profile: shapes::circle(3.0).unwrap(),
         target_m: 0.5,
         section_m: 0.25,
+        run_up_m: 0.5,
         length_m: 100.0,
         heads: vec![2, 5],
     })
@@ -127,7 +128,7 @@ fn flags_are_said_once_and_cleared_in_the_pilot_s_words() {
     let made = taken(&mut view, "judgements", 1, &raised);
     assert_eq!(
         made["alerts"][0]["message"],
-        "ch 0+010.00  too fast (0.30 m/s): holes over 0.5 m at 12:00 o'clock; go back to 0+010.00"
+        "ch 0+010.00  too fast (0.30 m/s): holes over 0.5 m at 12:00 o'clock; go back to 0+009.50"
     );
     assert_eq!((&made["alerts"][0]["level"], &made["sections"][0]["flagged"]), (&3.into(), &true.into()));
     let grown = [run(RunChange::Changed), section(2, 41, Judgement::Raised, Verdict::Fail)];

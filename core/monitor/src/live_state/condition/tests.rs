@@ -87,6 +87,18 @@ fn over_wall_that_has_passed_any_speed_will_do() {
     assert_eq!(mute.condition(), Condition::NoSonar);
 }
 
+/// What was missed is passed again from where the vehicle turns round; slowly enough, the way back counts, too.
+#[test]
+fn on_the_way_back_for_what_was_missed_any_speed_will_do() {
+    let back = LiveState { back_to_m: Some(8.2), speed_mps: Some(-0.3), ..state() };
+    assert_eq!((back.condition(), back.condition().lamp()), (Condition::GoingBack(8.2), Lamp::Green));
+    assert_eq!(LiveState { speed_mps: Some(-0.05), ..back }.condition(), Condition::Good);
+    let doubtful = LiveState { position: PositionState::Doubtful(PositionDoubt::Cable), ..back };
+    assert_eq!(doubtful.condition(), Condition::TooFast);
+    let coarse = LiveState { advice: Some(advice(Reason::AngularStep, 0.0, 0.9)), ..back };
+    assert_eq!(coarse.condition(), Condition::GoingBack(8.2));
+}
+
 #[test]
 fn a_turn_that_misses_within_the_speed_allowed_is_told_only_while_it_does() {
     let forecast = |t_m| Advice { will_exceed: true, ..advice(Reason::HelixPitch, 0.07, t_m) };

@@ -32,8 +32,8 @@ export function Announcer() {
 export function Speed() {
   useTopics(store.topics.state);
   const { state } = store;
-  // Over wall that has passed nothing bounds the speed.
-  const bounded = state?.condition !== "passed";
+  // Over wall that has passed, and on the way back, nothing bounds the speed.
+  const bounded = state?.condition !== "passed" && state?.condition !== "going_back";
   const speed = state?.speed_mps ?? null, most = bounded ? (state?.v_max_mps ?? null) : null;
   const margin = state?.margins.speed_mps ?? null, lost = state?.margins.lost_share ?? null;
   return (
@@ -48,7 +48,7 @@ export function Speed() {
         {state?.reason && bounded ? <span><b>limit</b> {lost === null ? (REASONS[state.reason] ?? state.reason) : `${figure(100 * lost, 0)} % of returns lost`}</span> : null}
         {state?.remedy && bounded ? <span class="remedy"><b>to gain more</b> {state.remedy}</span> : null}
       </div>
-      {bounded ? <Forecast /> : <div class="forecast">all wall here has passed</div>}
+      {bounded ? <Forecast /> : <div class="forecast">{state?.condition === "passed" ? "all wall here has passed" : "at most max, the way back counts, too"}</div>}
     </div>
   );
 }

@@ -47,6 +47,7 @@ export function conditionWords(state: State): { word: string; advice: string } {
     no_position: ["NO POSITION", `${POSITION_WHY[state.position.why ?? ""] ?? "no position"}: hold still`],
     no_sonar: ["NO SONAR", "nothing is seen: stop"],
     passed: ["PASSED HERE", "any speed will do"],
+    going_back: ["GOING BACK", "for what was missed: any speed will do"],
     no_speed: ["SLOWER WON'T HELP", state.remedy ?? "no speed meets the target here"],
     too_fast: ["TOO FAST", slower],
     turn_fails: ["THIS TURN MISSES", slower],
