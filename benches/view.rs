@@ -109,6 +109,7 @@ fn view() -> View {
         profile: shapes::ceran().unwrap(),
         target_m: 0.5,
         section_m: 0.25,
+        run_up_m: 0.5,
         length_m: 1000.0,
         heads: (0..4).collect(),
     })

@@ -125,7 +125,8 @@ fn who_goes_back_as_far_as_told_and_on_as_fast_as_told_clears_it_all() {
         words.split("at most ").nth(1).unwrap().split(' ').next().unwrap().parse().unwrap();
     let from_m = figure(flag, "from_m");
     assert!((0.5..2.0).contains(&(from_m - back_m)), "{text}");
-    assert_eq!(end(&told(&missed_and_back(back_m, Some(at_most_mps)))), 0.0, "{text}");
+    let left_m = end(&told(&missed_and_back(back_m, Some(at_most_mps))));
+    assert!(left_m < 0.1, "{left_m} m, {text}");
 }
 
 /// A dive that ends on the way back has what was missed in its sums.
