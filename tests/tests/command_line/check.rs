@@ -155,6 +155,20 @@ fn lines_that_two_sensors_cannot_share_are_errors() {
     "#);
 }
 
+/// A dive goes on with it: it may be the only file there is.
+#[test]
+fn a_dive_says_what_check_refuses() {
+    let folder = Folder::new();
+    folder.write("vehicle.toml", VEHICLE.replace("range_m = 5", "range_m = 3"));
+    let answer = folder.headrace(&["run", "vehicle.toml", "--no-page", "--no-record", "--for", "0.5"]);
+    let said = "WRONG in the vehicle file: sensors[1].range_m: reaches 0 % of the wall";
+    let all = format!("{}{}", answer.stdout, answer.stderr);
+    assert!(all.contains(said), "{all}");
+    folder.write("vehicle.toml", VEHICLE);
+    let answer = folder.headrace(&["run", "vehicle.toml", "--no-page", "--no-record", "--for", "0.5"]);
+    assert!(!format!("{}{}", answer.stdout, answer.stderr).contains("WRONG"), "{answer:?}");
+}
+
 #[test]
 fn walls_out_of_reach_and_heads_out_of_step_are_told() {
     let first = "0.4:4040\"\nmode = \"fastest\"\nrange_m = 5";

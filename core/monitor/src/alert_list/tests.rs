@@ -288,6 +288,23 @@ fn what_becomes_more_urgent_is_acknowledged_anew() {
 }
 
 #[test]
+fn an_alert_is_as_long_as_what_is_still_missed_of_its_stretch() {
+    let mut bench = Bench::new(0.0, 0.0);
+    let stretch = |bench: &Bench| bench.list.iter().next().and_then(|alert| alert.stretch);
+    bench.run(0, RunChange::Raised, (40, 41), None);
+    bench.run(0, RunChange::Changed, (40, 64), None);
+    bench.run(0, RunChange::Changed, (40, 52), None);
+    assert_eq!(stretch(&bench), Some((40, 52)), "passed again from its far end");
+    // Passed in the middle: two runs of one alert.
+    bench.run(1, RunChange::Raised, (48, 52), None);
+    bench.run(0, RunChange::Changed, (40, 44), None);
+    assert_eq!((stretch(&bench), bench.list.iter().count()), (Some((40, 52)), 1));
+    bench.run(1, RunChange::Cleared, (48, 52), None);
+    bench.run(0, RunChange::Changed, (41, 44), None);
+    assert_eq!(stretch(&bench), Some((41, 44)));
+}
+
+#[test]
 fn runs_that_merge_keep_the_lower_number_and_what_nobody_knew_of() {
     let mut bench = Bench::new(0.0, 0.0);
     bench.run(0, RunChange::Raised, (10, 11), None);
