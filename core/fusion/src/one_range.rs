@@ -27,7 +27,7 @@ impl OneRange {
     }
 
     /// Whether so many returns or more have the same range although the design's varies by more than a length, m: no wall is
-    /// round about a head to within [`SAME_M`] where the design isn't.
+    /// round about a head to within 2 mm where the design isn't.
     pub fn is_stuck(&self, fewest: u32, varies_m: f64) -> bool {
         self.returns >= fewest && self.off_m[1] - self.off_m[0] > varies_m
     }
