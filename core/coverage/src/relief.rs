@@ -225,3 +225,23 @@ fn place(placed: &PlacedReturn, limits: &WallLimits) -> (i64, i64) {
 fn index(slab: i64, bin: i64) -> Option<usize> {
     usize::try_from(slab.rem_euclid(SLABS) * BINS + bin.rem_euclid(BINS)).ok()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Of what was long ago half is forgotten at a time, so that a head that goes wrong late is outvoted within about a turn or two, and
+    /// not by a few bins.
+    #[test]
+    fn a_ballot_forgets_by_halves() {
+        let wrong = PlacedReturn { x_m: 7.0, arc_m: 0.0, off_m: -0.5 };
+        let mut ballot = Ballot::default();
+        (0..1027).for_each(|_| ballot.add(None));
+        (0..125).for_each(|_| ballot.add(Some(&wrong)));
+        assert_eq!(ballot.verdict(), None, "{ballot:?}");
+        (0..125).for_each(|_| ballot.add(Some(&wrong)));
+        let (off_m, between_m) = ballot.verdict().unwrap();
+        assert!((off_m + 0.5).abs() < 0.05, "{off_m}");
+        assert_eq!(between_m, [7.0, 7.0]);
+    }
+}

@@ -106,6 +106,20 @@ fn programs_read_the_same_figures_as_json_and_csv() {
     }
 }
 
+/// Its T fits the target, and leaves no room for what the position errs by.
+#[test]
+fn a_speed_between_the_plan_s_and_that_of_geometry_doesn_t_meet_the_target() {
+    let folder = Folder::new();
+    let at = |speed: &str| {
+        let plan = json(&folder, &["--vehicle", VITA_2, "--mode", "fast", "--speed", speed]);
+        let mode = &plan["modes"][0];
+        (mode["spacing"]["t_max_m"].as_f64().unwrap(), mode["meets_target"].clone())
+    };
+    let [(slow_m, slow), (fast_m, fast)] = ["0.112", "0.116"].map(at);
+    assert!(slow_m < fast_m && fast_m < 0.5, "{slow_m} {fast_m}");
+    assert_eq!([slow, fast], [true, false]);
+}
+
 #[test]
 fn v_max_asked_back_as_a_speed_gives_the_target() {
     let folder = Folder::new();
