@@ -155,7 +155,8 @@ fn alert_lines(alert: &AlertRow, ink: Ink, columns: usize) -> Vec<String> {
     if whole.chars().count() <= columns {
         return vec![whole];
     }
-    let mut lines = wrapped(&first, columns);
+    // What to do has its place before the last words of what holds.
+    let mut lines = vec![wrapped(&first, columns).swap_remove(0)];
     lines.extend(wrapped(&format!("    {arrow} {advice}"), columns));
     lines
 }
