@@ -240,6 +240,9 @@ mod tests {
         let off = fix.pose.position - truth.position;
         assert!(off.norm() < 2e-3, "{:?}", fix.pose);
         assert!((fix.speed_mps - 0.2).abs() < 1e-12);
+        // Between the cable's readings it goes on.
+        let later = nav.fix(now + headrace_geometry::time::DurNs::from_millis(100)).unwrap();
+        assert!((later.pose.position.x() - fix.pose.position.x() - 0.02).abs() < 1e-9, "{:?}", later.pose);
         assert_eq!(nav.fix(MonoNs(3_000_000_000)), Err(NoFix::Heading));
     }
 
