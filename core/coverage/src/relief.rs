@@ -242,6 +242,6 @@ mod tests {
         (0..125).for_each(|_| ballot.add(Some(&wrong)));
         let (off_m, between_m) = ballot.verdict().unwrap();
         assert!((off_m + 0.5).abs() < 0.05, "{off_m}");
-        assert_eq!(between_m, [7.0, 7.0]);
+        assert!(between_m.iter().all(|x_m| (x_m - 7.0).abs() < 1e-12), "{between_m:?}");
     }
 }
