@@ -195,6 +195,9 @@ const SLACK: &str = "tether_slack = { reach_m = 0.15, period_s = 30 }\n";
 const TAUT_M: f64 = 0.003;
 const HANGS_M: f64 = 0.06;
 
+/// Standard deviation of the wall's bumps, but in clean dives: with the heads' own noise what vehicle files allow for, 3 cm, m.
+const ROUGH_M: f64 = 0.028;
+
 /// Speed of a vehicle that is driven to where it is to begin, m/s.
 const WAY_MPS: f64 = 0.3;
 
@@ -319,8 +322,13 @@ impl Cell {
         };
         let wider = "[[tunnel.stations]]\nchainage_m = 0\nscale = 1.06\n";
         let tunnel = if self.condition == Condition::WrongWall { wider } else { "" };
+        let rough = if self.condition == Condition::Clean {
+            String::new()
+        } else {
+            format!("[[tunnel.rough]]\nsd_m = {ROUGH_M}\nseed = {seed}\n")
+        };
         format!(
-            "seed = {seed}\nvehicle = \"vehicle.toml\"\n{tunnel}[trajectory]\n{way}[effects]\nmotion_within_turn = {{}}\n{effects}"
+            "seed = {seed}\nvehicle = \"vehicle.toml\"\n{tunnel}{rough}[trajectory]\n{way}[effects]\nmotion_within_turn = {{}}\n{effects}"
         )
     }
 

@@ -4,7 +4,7 @@
 //! Where the axis bends, chainage and x differ; see [`Axis`].
 //!
 //! Water is (tube or hollows) without solids. A ray from the water extends to the tube's wall, on through hollows that open
-//! there, and stops at the first solid. Only boulders draw random numbers, from a seed.
+//! there, and stops at the first solid. Only boulders and roughness draw random numbers, from seeds of their own.
 
 mod axis;
 mod boulders;
@@ -28,6 +28,7 @@ mod meshes;
 mod meshes;
 mod openings;
 mod placing;
+mod rough;
 mod shapes;
 mod stations;
 mod steepness;
@@ -48,6 +49,7 @@ use face::Face;
 use features::Features;
 use index::Index;
 use placing::{Placed, Site};
+use rough::Roughness;
 use shapes::{Hollow, SKIN_M, Solid};
 use stations::Scales;
 use tube::Tube;
@@ -66,6 +68,7 @@ pub struct Environment {
     /// The vehicle file's profile, to whose chart points of the wall are referred.
     design: Profile,
     tube: Tube,
+    rough: Roughness,
     /// Straight, as designed, and empty: the profile alone suffices.
     plain: bool,
     solids: Vec<Placed<Solid>>,
@@ -78,9 +81,9 @@ pub struct Environment {
 /// End of a ray.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Hit {
-    /// Range, m.
+    /// Range, m; of a rough wall to its bumps and hollows.
     pub range_m: f64,
-    /// Position.
+    /// Position on the smooth wall.
     pub point: Point3<Tunnel>,
     /// Unit normal there, towards the water.
     pub normal: Vec3<Tunnel>,
@@ -127,7 +130,7 @@ impl Environment {
     /// A straight, empty tunnel of the design profile.
     pub fn straight(profile: Profile) -> Self {
         let tube = Tube::new(Axis::straight(), profile.clone(), Scales::default(), Vec::new(), Vec::new());
-        Self::new(profile, tube, true, Features::default())
+        Self::new(profile, tube, Roughness::default(), true, Features::default())
     }
 
     /// Reads a scene's `[tunnel]` table, all of whose keys are optional. `design` is the vehicle file's profile, and `length_m`
@@ -151,6 +154,7 @@ impl Environment {
         let scales = Scales::parse(section.sections("stations")?, farthest_m, length_m)?;
         let half_width_m = widths::half_width_m(&profile) * scales.largest();
         let axis = Axis::parse(section.sections("axis")?, half_width_m)?;
+        let rough = Roughness::parse(section.sections("rough")?, length_m)?;
         let tables = section.sections("features")?;
         let plain = axis.is_straight() && tables.is_empty() && scales.is_one();
         let site = Site { profile: &profile, scales: &scales, axis: &axis, length_m, half_width_m };
@@ -159,14 +163,20 @@ impl Environment {
         let tube = Tube::new(axis, profile, scales, bulges, walls);
         let features = features::parse(tables, &heaps, bodies, &tube, length_m)?;
         section.finish()?;
-        Ok(Self::new(design.clone(), tube, plain, features))
+        Ok(Self::new(design.clone(), tube, rough, plain, features))
     }
 
-    fn new(design: Profile, tube: Tube, plain: bool, features: Features) -> Self {
+    fn new(
+        design: Profile,
+        tube: Tube,
+        rough: Roughness,
+        plain: bool,
+        features: Features,
+    ) -> Self {
         let Features { names, solids, hollows } = features;
         let solids_by_chainage = Index::new(&solids.iter().map(|s| s.span_m).collect::<Vec<_>>());
         let hollows_by_chainage = Index::new(&hollows.iter().map(|h| h.span_m).collect::<Vec<_>>());
-        Self { design, tube, plain, solids, hollows, solids_by_chainage, hollows_by_chainage, names }
+        Self { design, tube, rough, plain, solids, hollows, solids_by_chainage, hollows_by_chainage, names }
     }
 
     /// Cross-section of the water where the profile isn't scaled, m^2.
@@ -210,12 +220,9 @@ impl Environment {
         }
         let hit = self.tube.profile().cast([origin.y(), origin.z()], [direction.y(), direction.z()])?;
         let (range_m, [y, z]) = (hit.range_m, hit.normal);
-        (range_m <= far_m).then(|| Hit {
-            range_m,
-            point: origin + direction.scaled(range_m),
-            normal: Vec3::new(0.0, y, z),
-            what: What::Wall,
-        })
+        let point = origin + direction.scaled(range_m);
+        let hit = Hit { range_m, point, normal: Vec3::new(0.0, y, z), what: What::Wall };
+        (range_m <= far_m).then(|| self.rough.met(hit, direction, || point.x()))
     }
 
     fn cast_among_features(
@@ -236,10 +243,19 @@ impl Environment {
                 (normal, What::Feature(feature))
             }
         };
-        Some(Hit { range_m: reach.t_m, point: to_point(point), normal: to_vec(normal), what })
+        let hit = Hit { range_m: reach.t_m, point: to_point(point), normal: to_vec(normal), what };
+        Some(if what == What::Wall {
+            let chainage_m = || {
+                let [chainage_m, ..] = self.axis().chart(hit.point);
+                chainage_m
+            };
+            self.rough.met(hit, direction, chainage_m)
+        } else {
+            hit
+        })
     }
 
-    /// Range of [`Environment::cast`] alone, m, at lower cost.
+    /// Range of [`Environment::cast`] alone to the smooth wall, m, at lower cost.
     ///
     /// Allocates: no.
     pub fn range_m(&self, origin: Point3<Tunnel>, direction: Vec3<Tunnel>, far_m: f64) -> Option<f64> {

@@ -1,0 +1,154 @@
+//! Roughness of the wall: heights that scatter about it, and follow one another over some length.
+//!
+//! The same place has the same height for every beam that meets it, from whichever sensor and in whichever pass: roughness isn't
+//! noise that looking again would average away.
+
+use headrace_config::{ConfigError, Section};
+use headrace_geometry::frames::Vec3;
+use headrace_geometry::math;
+use headrace_geometry::{frames::Point3, frames::Tunnel};
+
+use super::Hit;
+use crate::stretch::Stretch;
+
+/// Below this cosine of incidence a beam doesn't reach deeper between the bumps: they hide one another.
+const LEAST_COSINE: f64 = 0.25;
+/// Standard deviation of the sum of four 16-bit numbers, as a share of their range: 4 / 12, square root.
+const SUM_SD: f64 = 0.577_350_269_189_625_8;
+
+/// Rough stretches of the tunnel.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Roughness(Vec<(Stretch, Heights)>);
+
+/// Heights of a stretch: numbers at the nodes of a cubic lattice, and between nodes their mean, weighted by nearness.
+#[derive(Debug, Clone, Copy)]
+struct Heights {
+    sd_m: f64,
+    length_m: f64,
+    seed: u64,
+}
+
+impl Roughness {
+    /// Reads `[[tunnel.rough]]`: `from_m`, `to_m`; the standard deviation `sd_m` of the heights, from 0.001 to 0.3; `length_m`, from
+    /// 0.02 to 5 (0.3), beyond which heights have nothing to do with each other; `seed` (1).
+    ///
+    /// Errors: a key that is missing or out of range, or stretches that overlap.
+    pub(super) fn parse(tables: Vec<Section<'_>>, tunnel_m: f64) -> Result<Self, ConfigError> {
+        let mut all: Vec<(Stretch, Heights)> = Vec::new();
+        for table in tables {
+            let stretch = Stretch::read(&table, tunnel_m)?;
+            if all.iter().any(|(other, _)| other.meets(&stretch)) {
+                return Err(table.invalid("from_m", "and to_m reach into an earlier rough stretch"));
+            }
+            let sd_m = table.required("sd_m", table.number("sd_m", 0.001..=0.3)?)?;
+            let length_m = table.number("length_m", 0.02..=5.0)?.unwrap_or(0.3);
+            let seed = table.integer("seed", 0..=i64::MAX)?.unwrap_or(1).unsigned_abs();
+            table.finish()?;
+            all.push((stretch, Heights { sd_m, length_m, seed }));
+        }
+        Ok(Self(all))
+    }
+
+    /// The hit with the range to the rough wall in place of the smooth one's. The point stays on the smooth wall, so that the side of it on
+    /// which the water is stays certain.
+    pub(super) fn met(&self, hit: Hit, direction: Vec3<Tunnel>, chainage_m: impl FnOnce() -> f64) -> Hit {
+        if self.0.is_empty() {
+            return hit;
+        }
+        let chainage_m = chainage_m();
+        let Some((_, heights)) = self.0.iter().find(|(stretch, _)| stretch.has(chainage_m)) else { return hit };
+        let cosine = (-direction.dot(&hit.normal)).max(LEAST_COSINE);
+        let deeper_m = heights.at_m(hit.point) / cosine;
+        // No bump reaches more than half way to the sonar.
+        Hit { range_m: hit.range_m + deeper_m.max(-hit.range_m / 2.0), ..hit }
+    }
+}
+
+impl Heights {
+    /// How far the wall lies outside the smooth one, m.
+    fn at_m(&self, point: Point3<Tunnel>) -> f64 {
+        let places = [point.x(), point.y(), point.z()].map(|x_m| {
+            let share = x_m / self.length_m;
+            let node = math::floor_to_i64(share);
+            (node, share - node as f64)
+        });
+        let (mut sum, mut squares) = (0.0, 0.0);
+        for corner in 0..8_u32 {
+            let (mut nodes, mut weight) = ([0_i64; 3], 1.0);
+            for (axis, (node, within)) in places.iter().enumerate() {
+                let upper = (corner >> axis) & 1 == 1;
+                nodes[axis] = node + i64::from(upper);
+                weight *= if upper { *within } else { 1.0 - within };
+            }
+            sum += weight * self.number(nodes);
+            squares += weight * weight;
+        }
+        // A mean of several scatters less than each: here it doesn't.
+        self.sd_m * sum / math::sqrt(squares)
+    }
+
+    /// A node's number: mean zero, standard deviation one.
+    fn number(&self, nodes: [i64; 3]) -> f64 {
+        let mut hash = self.seed;
+        for node in nodes {
+            hash = mixed(hash ^ node.cast_unsigned());
+        }
+        let sum: u64 = (0..4).map(|word| (hash >> (16 * word)) & 0xFFFF).sum();
+        (sum as f64 / 65_535.0 - 2.0) / SUM_SD
+    }
+}
+
+/// Source: Steele, Lea and Flood, "Fast splittable pseudorandom number generators", OOPSLA 2014 (SplitMix64).
+const fn mixed(from: u64) -> u64 {
+    let from = from.wrapping_add(0x9E37_79B9_7F4A_7C15);
+    let from = (from ^ (from >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
+    let from = (from ^ (from >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
+    from ^ (from >> 31)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const HEIGHTS: Heights = Heights { sd_m: 0.03, length_m: 0.3, seed: 7 };
+
+    fn at_m(x_m: f64, y_m: f64) -> f64 {
+        HEIGHTS.at_m(Point3::new(x_m, y_m, 1.23))
+    }
+
+    fn mean(of: impl Iterator<Item = f64>) -> f64 {
+        let (n, sum) = of.fold((0.0, 0.0), |(n, sum), x| (n + 1.0, sum + x));
+        sum / n
+    }
+
+    #[test]
+    fn heights_have_the_spread_that_is_asked_for() {
+        let many = || (0..100_000).map(|k| at_m(f64::from(k) * 0.137, f64::from(k % 97) * 0.211));
+        assert!(mean(many()).abs() < 0.0005, "{}", mean(many()));
+        let sd_m = mean(many().map(|h_m| h_m * h_m)).sqrt();
+        assert!((sd_m - 0.03).abs() < 0.0005, "{sd_m}");
+    }
+
+    #[test]
+    fn heights_follow_one_another_within_the_length_and_not_beyond() {
+        let alike = |apart_m: f64| {
+            mean((0..50_000).map(|k| {
+                let x_m = f64::from(k) * 0.371;
+                at_m(x_m, 0.5) * at_m(x_m + apart_m, 0.5)
+            })) / (0.03 * 0.03)
+        };
+        assert!(alike(0.03) > 0.9, "{}", alike(0.03));
+        assert!((0.2..0.7).contains(&alike(0.2)), "{}", alike(0.2));
+        assert!(alike(0.7).abs() < 0.03, "{}", alike(0.7));
+    }
+
+    #[test]
+    fn seeds_have_nothing_in_common() {
+        let other = Heights { seed: 8, ..HEIGHTS };
+        let product = mean((0..50_000).map(|k| {
+            let at = Point3::new(f64::from(k) * 0.371, 0.2, 0.9);
+            HEIGHTS.at_m(at) * other.at_m(at)
+        }));
+        assert!((product / (0.03 * 0.03)).abs() < 0.03, "{product}");
+    }
+}
