@@ -34,7 +34,7 @@ impl Missed {
             Condition::Clean | Condition::DataSheet => {
                 Some(Bounds { false_fails: 0.0, cannot_say: 0.02, passed: 0.97, advice: 0.95 })
             }
-            Condition::Poor | Condition::Murk | Condition::Lively => {
+            Condition::Poor | Condition::Murk | Condition::Rough | Condition::Lively => {
                 Some(Bounds { false_fails: 0.005, cannot_say: 0.08, passed: 0.88, advice: 0.8 })
             }
             _ => None,

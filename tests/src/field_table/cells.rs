@@ -87,6 +87,8 @@ pub enum Condition {
     Poor,
     /// Returns lost in runs, near returns, second echoes.
     Murk,
+    /// The wall has the bumps that vehicle files allow for.
+    Rough,
     /// A pilot who wanders, stops and goes back.
     Lively,
     /// The water's speed of sound is 4 % more than the vehicle file says.
@@ -108,11 +110,12 @@ pub enum Condition {
 }
 
 /// All conditions with their names.
-pub const CONDITIONS: [(&str, Condition); 13] = [
+pub const CONDITIONS: [(&str, Condition); 14] = [
     ("clean", Condition::Clean),
     ("data-sheet", Condition::DataSheet),
     ("poor", Condition::Poor),
     ("murk", Condition::Murk),
+    ("rough", Condition::Rough),
     ("lively", Condition::Lively),
     ("wrong-sound", Condition::WrongSound),
     ("wrong-mount", Condition::WrongMount),
@@ -195,7 +198,7 @@ const SLACK: &str = "tether_slack = { reach_m = 0.15, period_s = 30 }\n";
 const TAUT_M: f64 = 0.003;
 const HANGS_M: f64 = 0.06;
 
-/// Standard deviation of the wall's bumps, but in clean dives: with the heads' own noise what vehicle files allow for, 3 cm, m.
+/// Standard deviation of a rough wall's bumps: with the heads' own noise what vehicle files allow for, 3 cm, m.
 const ROUGH_M: f64 = 0.028;
 
 /// Speed of a vehicle that is driven to where it is to begin, m/s.
@@ -322,10 +325,10 @@ impl Cell {
         };
         let wider = "[[tunnel.stations]]\nchainage_m = 0\nscale = 1.06\n";
         let tunnel = if self.condition == Condition::WrongWall { wider } else { "" };
-        let rough = if self.condition == Condition::Clean {
-            String::new()
-        } else {
+        let rough = if self.condition == Condition::Rough {
             format!("[[tunnel.rough]]\nsd_m = {ROUGH_M}\nseed = {seed}\n")
+        } else {
+            String::new()
         };
         format!(
             "seed = {seed}\nvehicle = \"vehicle.toml\"\n{tunnel}{rough}[trajectory]\n{way}[effects]\nmotion_within_turn = {{}}\n{effects}"

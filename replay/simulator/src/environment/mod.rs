@@ -166,13 +166,7 @@ impl Environment {
         Ok(Self::new(design.clone(), tube, rough, plain, features))
     }
 
-    fn new(
-        design: Profile,
-        tube: Tube,
-        rough: Roughness,
-        plain: bool,
-        features: Features,
-    ) -> Self {
+    fn new(design: Profile, tube: Tube, rough: Roughness, plain: bool, features: Features) -> Self {
         let Features { names, solids, hollows } = features;
         let solids_by_chainage = Index::new(&solids.iter().map(|s| s.span_m).collect::<Vec<_>>());
         let hollows_by_chainage = Index::new(&hollows.iter().map(|h| h.span_m).collect::<Vec<_>>());

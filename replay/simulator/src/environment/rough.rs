@@ -56,7 +56,9 @@ impl Roughness {
             return hit;
         }
         let chainage_m = chainage_m();
-        let Some((_, heights)) = self.0.iter().find(|(stretch, _)| stretch.has(chainage_m)) else { return hit };
+        let Some((_, heights)) = self.0.iter().find(|(stretch, _)| stretch.has(chainage_m)) else {
+            return hit;
+        };
         let cosine = (-direction.dot(&hit.normal)).max(LEAST_COSINE);
         let deeper_m = heights.at_m(hit.point) / cosine;
         // No bump reaches more than half way to the sonar.
