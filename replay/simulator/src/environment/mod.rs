@@ -216,7 +216,7 @@ impl Environment {
         let (range_m, [y, z]) = (hit.range_m, hit.normal);
         let point = origin + direction.scaled(range_m);
         let hit = Hit { range_m, point, normal: Vec3::new(0.0, y, z), what: What::Wall };
-        (range_m <= far_m).then(|| self.rough.met(hit, direction, || point.x()))
+        (range_m <= far_m).then(|| self.roughened(hit, direction, || point.x()))
     }
 
     fn cast_among_features(
@@ -243,10 +243,18 @@ impl Environment {
                 let [chainage_m, ..] = self.axis().chart(hit.point);
                 chainage_m
             };
-            self.rough.met(hit, direction, chainage_m)
+            self.roughened(hit, direction, chainage_m)
         } else {
             hit
         })
+    }
+
+    /// The hit with the range to the rough wall in place of the smooth one's. The point stays on the smooth wall, so that the side of it on
+    /// which the water is stays certain.
+    fn roughened(&self, hit: Hit, direction: Vec3<Tunnel>, chainage_m: impl FnOnce() -> f64) -> Hit {
+        let cosine = -direction.dot(&hit.normal);
+        let deeper_m = self.rough.deeper_m(hit.point, (hit.range_m, cosine), chainage_m);
+        Hit { range_m: hit.range_m + deeper_m, ..hit }
     }
 
     /// Range of [`Environment::cast`] alone to the smooth wall, m, at lower cost.

@@ -4,11 +4,9 @@
 //! noise that looking again would average away.
 
 use headrace_config::{ConfigError, Section};
-use headrace_geometry::frames::Vec3;
+use headrace_geometry::frames::{Point3, Tunnel};
 use headrace_geometry::math;
-use headrace_geometry::{frames::Point3, frames::Tunnel};
 
-use super::Hit;
 use crate::stretch::Stretch;
 
 /// Below this cosine of incidence a beam doesn't reach deeper between the bumps: they hide one another.
@@ -49,20 +47,22 @@ impl Roughness {
         Ok(Self(all))
     }
 
-    /// The hit with the range to the rough wall in place of the smooth one's. The point stays on the smooth wall, so that the side of it on
-    /// which the water is stays certain.
-    pub(super) fn met(&self, hit: Hit, direction: Vec3<Tunnel>, chainage_m: impl FnOnce() -> f64) -> Hit {
+    /// How much farther than the smooth wall the rough one is on a beam that meets that at `point` after `range_m`, at this cosine of incidence, m.
+    pub(super) fn deeper_m(
+        &self,
+        point: Point3<Tunnel>,
+        (range_m, cosine): (f64, f64),
+        chainage_m: impl FnOnce() -> f64,
+    ) -> f64 {
         if self.0.is_empty() {
-            return hit;
+            return 0.0;
         }
         let chainage_m = chainage_m();
         let Some((_, heights)) = self.0.iter().find(|(stretch, _)| stretch.has(chainage_m)) else {
-            return hit;
+            return 0.0;
         };
-        let cosine = (-direction.dot(&hit.normal)).max(LEAST_COSINE);
-        let deeper_m = heights.at_m(hit.point) / cosine;
         // No bump reaches more than half way to the sonar.
-        Hit { range_m: hit.range_m + deeper_m.max(-hit.range_m / 2.0), ..hit }
+        (heights.at_m(point) / cosine.max(LEAST_COSINE)).max(-range_m / 2.0)
     }
 }
 
