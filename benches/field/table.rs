@@ -80,8 +80,8 @@ who follows the live advice within 5 % and 3 s; back: by one who is in a hurry, 
 median speed advised over the largest one of Eq. 16 with what the vehicle hides and no other margin. Wrong and broken cells have no
 goals but those for false passes, the ratio and told metres; nor has the advice where the vehicle goes too fast or back.
 
-Rough is the data sheet's on a wall with bumps of 2.8 cm (sd) that follow one another over 0.3 m. Conditions wrong-* each have one wrong setting; broken has one device that breaks, by the seed. Driven: let in at 60 m and driven to
-6,900 at 0.3 m/s, once. Vehicle files say what acts: slack of 3 mm for a cable that is taut, 6 cm for one that hangs (poor), a MEMS unit's
+Rough is the data sheet's on a wall with bumps of 2.8 cm (sd) that follow one another over 0.3 m. Conditions wrong-* each have one
+wrong setting; broken has one device that breaks, by the seed. Driven: let in at 60 m and driven to 6,900 at 0.3 m/s, once. Vehicle files say what acts: slack of 3 mm for a cable that is taut, 6 cm for one that hangs (poor), a MEMS unit's
 noise where it is one (poor); wrong-unit and wrong-slack are the same where the file says better.
 ";
 

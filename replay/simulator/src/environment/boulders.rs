@@ -8,6 +8,7 @@ use super::ground::Ground;
 use super::heaps::Heap;
 use super::keys;
 use super::placing::Placed;
+use super::scatter::Scatter;
 use super::shapes::Solid;
 use super::widths::floor_m;
 
@@ -28,11 +29,6 @@ struct Boulder {
     yaw_rad: f64,
     sunk: f64,
 }
-
-/// Pseudo-random numbers from a seed: SplitMix64.
-///
-/// Source: Steele, Lea, Flood, "Fast splittable pseudorandom number generators", OOPSLA 2014.
-struct Scatter(u64);
 
 /// Common parameters of many boulders.
 struct Field {
@@ -86,7 +82,7 @@ pub(super) fn many(
         count: table.required("count", table.integer("count", 1..=100_000)?)?,
         size_m: table.required("size_m", parse_sizes(table)?)?,
         sunk: parse_sunk(table)?,
-        seed: parse_seed(table)?,
+        seed: keys::seed(table)?,
     };
     Ok(field.scatter(ground, feature))
 }
@@ -101,7 +97,7 @@ pub(super) fn pieces(
 ) -> Result<Vec<Placed<Solid>>, ConfigError> {
     let count = table.integer("pieces", 0..=10_000)?.unwrap_or(0);
     let size_m = parse_sizes(table)?.unwrap_or([0.1, 0.3]);
-    let (sunk, seed) = (parse_sunk(table)?, parse_seed(table)?);
+    let (sunk, seed) = (parse_sunk(table)?, keys::seed(table)?);
     let Some(heap) = heap else { return Ok(Vec::new()) };
     let field = Field {
         from_m: heap.chainage_m - heap.length_m / 4.0,
@@ -157,24 +153,6 @@ impl Field {
     }
 }
 
-impl Scatter {
-    fn next(&mut self) -> u64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let z = (self.0 ^ (self.0 >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        let z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        z ^ (z >> 31)
-    }
-
-    /// A number in [0, 1).
-    fn share(&mut self) -> f64 {
-        (self.next() >> 11) as f64 / (1_u64 << 53) as f64
-    }
-
-    fn between(&mut self, least: f64, most: f64) -> f64 {
-        least + (most - least) * self.share()
-    }
-}
-
 /// `base` to the power of `exponent` in [0, 1), by square roots, whose exact rounding makes it equal on all machines.
 fn power(base: f64, exponent: f64) -> f64 {
     let (mut result, mut root, mut rest) = (1.0, base, exponent);
@@ -215,9 +193,4 @@ fn parse_sizes(table: &Section<'_>) -> Result<Option<[f64; 2]>, ConfigError> {
 
 fn parse_sunk(table: &Section<'_>) -> Result<f64, ConfigError> {
     Ok(table.number("sunk", 0.0..=0.9)?.unwrap_or(SUNK))
-}
-
-fn parse_seed(table: &Section<'_>) -> Result<u64, ConfigError> {
-    let seed = table.integer("seed", 0..=i64::MAX)?.unwrap_or(1);
-    Ok(seed.unsigned_abs())
 }

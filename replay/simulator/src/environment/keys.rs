@@ -81,3 +81,10 @@ pub(super) fn extent_m(
     }
     Ok((middle_m, extent_m))
 }
+
+/// The `seed` of what is scattered (1).
+///
+/// Errors: below zero.
+pub(super) fn seed(table: &Section<'_>) -> Result<u64, ConfigError> {
+    Ok(table.integer("seed", 0..=i64::MAX)?.unwrap_or(1).unsigned_abs())
+}

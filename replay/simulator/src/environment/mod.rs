@@ -29,6 +29,7 @@ mod meshes;
 mod openings;
 mod placing;
 mod rough;
+mod scatter;
 mod shapes;
 mod stations;
 mod steepness;
@@ -83,7 +84,7 @@ pub struct Environment {
 pub struct Hit {
     /// Range, m; of a rough wall to its bumps and hollows.
     pub range_m: f64,
-    /// Position on the smooth wall.
+    /// Position; of a rough wall on the smooth one that it scatters about.
     pub point: Point3<Tunnel>,
     /// Unit normal there, towards the water.
     pub normal: Vec3<Tunnel>,

@@ -7,6 +7,8 @@ use headrace_config::{ConfigError, Section};
 use headrace_geometry::frames::{Point3, Tunnel};
 use headrace_geometry::math;
 
+use super::keys;
+use super::scatter::Scatter;
 use crate::stretch::Stretch;
 
 /// Below this cosine of incidence a beam doesn't reach deeper between the bumps: they hide one another.
@@ -40,14 +42,15 @@ impl Roughness {
             }
             let sd_m = table.required("sd_m", table.number("sd_m", 0.001..=0.3)?)?;
             let length_m = table.number("length_m", 0.02..=5.0)?.unwrap_or(0.3);
-            let seed = table.integer("seed", 0..=i64::MAX)?.unwrap_or(1).unsigned_abs();
+            let seed = keys::seed(&table)?;
             table.finish()?;
             all.push((stretch, Heights { sd_m, length_m, seed }));
         }
         Ok(Self(all))
     }
 
-    /// How much farther than the smooth wall the rough one is on a beam that meets that at `point` after `range_m`, at this cosine of incidence, m.
+    /// How much farther than the smooth wall the rough one is on a beam that meets that at `point` after `range_m`,
+    /// at this cosine of incidence, m.
     pub(super) fn deeper_m(
         &self,
         point: Point3<Tunnel>,
@@ -93,19 +96,11 @@ impl Heights {
     fn number(&self, nodes: [i64; 3]) -> f64 {
         let mut hash = self.seed;
         for node in nodes {
-            hash = mixed(hash ^ node.cast_unsigned());
+            hash = Scatter(hash ^ node.cast_unsigned()).next();
         }
         let sum: u64 = (0..4).map(|word| (hash >> (16 * word)) & 0xFFFF).sum();
         (sum as f64 / 65_535.0 - 2.0) / SUM_SD
     }
-}
-
-/// Source: Steele, Lea and Flood, "Fast splittable pseudorandom number generators", OOPSLA 2014 (SplitMix64).
-const fn mixed(from: u64) -> u64 {
-    let from = from.wrapping_add(0x9E37_79B9_7F4A_7C15);
-    let from = (from ^ (from >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
-    let from = (from ^ (from >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
-    from ^ (from >> 31)
 }
 
 #[cfg(test)]

@@ -139,3 +139,36 @@ fn arc_length_is_the_designs_in_the_axis_chart() {
         assert!((environment.arc_m(place) - design.arc_of([y, z])).abs() < 1e-9);
     }
 }
+
+#[test]
+fn a_bump_is_the_same_from_wherever_it_is_seen_and_ends_with_its_stretch() {
+    let profile = shapes::ceran().unwrap();
+    let smooth = Environment::straight(profile.clone());
+    let rough = parse("[tunnel]\n[[tunnel.rough]]\nfrom_m = 10\nto_m = 20\nsd_m = 0.03", &profile);
+    let height_m = |from: V3, direction: V3| {
+        let [bare, bumpy] = [&smooth, &rough].map(|tunnel| cast(tunnel, from, direction).unwrap());
+        assert_eq!(bare.point, bumpy.point);
+        (bumpy.range_m - bare.range_m) * -to_vec(direction).dot(&bare.normal)
+    };
+    let mut most_m = 0.0_f64;
+    for k in 0..200 {
+        let x_m = 10.0 + 0.05 * f64::from(k);
+        let [near, far] = [0.0, 3.0].map(|y_m| height_m([x_m, y_m, 3.0], [0.0, 1.0, 0.0]));
+        assert!((near - far).abs() < 1e-9, "{x_m} m: {near} and {far}");
+        most_m = most_m.max(near.abs());
+        assert_eq!(height_m([x_m - 10.0, 0.0, 3.0], [0.0, 1.0, 0.0]).to_bits(), 0.0_f64.to_bits());
+    }
+    assert!((0.04..0.15).contains(&most_m), "{most_m}");
+}
+
+#[test]
+fn rough_stretches_that_overlap_or_have_no_height_are_refused() {
+    let profile = shapes::ceran().unwrap();
+    let twice =
+        "[tunnel]\n[[tunnel.rough]]\nsd_m = 0.03\nto_m = 9\n[[tunnel.rough]]\nsd_m = 0.01\nfrom_m = 8";
+    for (text, words) in [(twice, "earlier rough stretch"), ("[tunnel]\n[[tunnel.rough]]\nto_m = 9", "sd_m")]
+    {
+        let error = try_parse(text, &profile).err().map(|error| error.to_string()).unwrap_or_default();
+        assert!(error.contains(words), "{error}");
+    }
+}
