@@ -18,6 +18,7 @@ const LOST_MPS: f64 = 1.0;
 const LOST_WAY_M: f64 = 100.0;
 const LOST_WAY_MPS: f64 = 10.0;
 const LOST_TILT_RAD: f64 = 0.1;
+const LOST_YAW_RAD: f64 = 0.1;
 const LOST_RAD: f64 = 1.0;
 const LOST_SCALE: f64 = 0.03;
 /// The same where inertial data have led the speed astray, m/s, radians, m/s^2.
@@ -80,8 +81,11 @@ impl Agreement {
         if wall {
             add(variances, POSITION + 1..POSITION + 3, LOST_M);
             add(variances, VELOCITY + 1..VELOCITY + 3, LOST_MPS);
-            // A tilt error moves the estimate too, through gravity.
+            // A tilt error moves the estimate too, through gravity; what turned it astray has turned the yaw as well, which the compass's
+            // deviation may have taken up.
             add(variances, ATTITUDE..ATTITUDE + 2, LOST_TILT_RAD);
+            add(variances, ATTITUDE + 2..ATTITUDE + 3, LOST_YAW_RAD);
+            add(variances, HEADING..HEADING + 1, LOST_YAW_RAD);
             // The tunnel may be wider from here on.
             add(variances, RANGES..RANGES + 1, LOST_SCALE);
         }
