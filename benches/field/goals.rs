@@ -39,12 +39,12 @@ impl Missed {
             }
             _ => None,
         };
-        let first_go = matches!(cell.driven, Driven::Planned | Driven::Advised);
+        let first_go = matches!(cell.driven, Driven::Planned | Driven::Stood | Driven::Advised);
         let ratios = if bounds.is_some() { 0.7..=1.3 } else { 0.0..=1.5 };
         // D of several visits is the best of them, D_true that of all together: a lively pilot goes back, too.
         let once = match cell.driven {
             Driven::Back => false,
-            Driven::Planned | Driven::Times(_) => cell.condition != Condition::Lively,
+            Driven::Planned | Driven::Stood | Driven::Times(_) => cell.condition != Condition::Lively,
             Driven::Advised => true,
         };
         let judged = !figures.errors.is_empty() && once;

@@ -91,14 +91,14 @@ impl Outcome {
         all.get(all.len() / 2).copied().unwrap_or(f64::NAN)
     }
 
-    /// Changes of the speed shown, a minute.
+    /// Changes of the speed shown, a minute; what is shorter than half a minute counts as that, so that one change isn't many.
     pub fn changes_a_minute(&self) -> f64 {
         let changed = |pair: &[AdviceEntry]| {
             (pair[0].advice.v_max_mps - pair[1].advice.v_max_mps).abs() > 1e-6
                 || pair[0].advice.reason != pair[1].advice.reason
         };
         let changes = self.beats.windows(2).filter(|pair| changed(pair)).count();
-        changes as f64 * 300.0 / self.beats.len().max(1) as f64
+        changes as f64 * 300.0 / self.beats.len().max(150) as f64
     }
 }
 

@@ -138,6 +138,8 @@ pub const PLACES: [Place; 3] = [("portal", 3.0), ("3000", 3000.0), ("6900", 6900
 pub enum Driven {
     /// At the speed that `plan --write` gives for mode and target.
     Planned,
+    /// The same, after the vehicle has stood where it begins.
+    Stood,
     /// So many times the largest speed of Eq. 16, phases as planned.
     Times(f64),
     /// By a pilot who hears the live advice, follows it within 5 % and 3 s later, and never goes back.
@@ -147,8 +149,9 @@ pub enum Driven {
 }
 
 /// All with their names.
-pub const DRIVEN: [(&str, Driven); 4] = [
+pub const DRIVEN: [(&str, Driven); 5] = [
     ("planned", Driven::Planned),
+    ("stood", Driven::Stood),
     ("faster", Driven::Times(1.2)),
     ("advised", Driven::Advised),
     ("back", Driven::Back),
@@ -200,6 +203,9 @@ const HANGS_M: f64 = 0.06;
 
 /// Standard deviation of a rough wall's bumps: with the heads' own noise what vehicle files allow for, 3 cm, m.
 const ROUGH_M: f64 = 0.028;
+
+/// How long a vehicle stands that does so first, s.
+const STANDS_S: f64 = 30.0;
 
 /// Speed of a vehicle that is driven to where it is to begin, m/s.
 const WAY_MPS: f64 = 0.3;
@@ -278,7 +284,7 @@ impl Cell {
     fn speeds_mps(&self, vehicle: &VehicleConfig) -> [f64; 2] {
         let planned_mps = HELD_SHARE * self.plan_mps(vehicle);
         match self.driven {
-            Driven::Planned => [planned_mps, planned_mps],
+            Driven::Planned | Driven::Stood => [planned_mps, planned_mps],
             Driven::Times(times) => [planned_mps, times * self.vehicle.edge_mps],
             // The most that the pilot would drive.
             Driven::Advised | Driven::Back => [planned_mps, 1.2 * self.vehicle.edge_mps],
@@ -316,6 +322,12 @@ impl Cell {
                 self.aside_m(1.0),
                 self.aside_m(0.5)
             )
+        } else if self.driven == Driven::Stood {
+            let place = |chainage_m: f64, more: &str| {
+                format!("[[trajectory.waypoints]]\nchainage_m = {chainage_m}\n{more}\n")
+            };
+            let [from, to] = [format!("stay_s = {STANDS_S}"), format!("speed_mps = {speed_mps}")];
+            format!("kind = \"waypoints\"\n{}{}", place(start_m, &from), place(to_m, &to))
         } else {
             let leg = |distance_m: f64, speed_mps: f64| {
                 format!("[[trajectory.legs]]\ndistance_m = {distance_m}\nspeed_mps = {speed_mps}\n")

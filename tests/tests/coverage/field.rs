@@ -52,6 +52,38 @@ fn val_what_passes_is_within_the_target() {
     }
 }
 
+/// On a wall whose bumps are as large as the vehicle file allows for, errors of D are as large as said, in both directions: echosounders
+/// see one bump for seconds, which mustn't be taken for the place.
+#[test]
+fn val_bumps_are_not_taken_for_the_place() {
+    for name in ["vita2-4", "pipe", "bluerov2"] {
+        let vehicle = VEHICLES.into_iter().find(|vehicle| vehicle.name == name).unwrap();
+        let condition = Condition::Rough;
+        let cell = Cell { vehicle, condition, start_m: 16.0, let_in_m: None, driven: Driven::Planned };
+        let figures = field_table::figures(&cell, [1, 2, 3], 15.0);
+        print(name, &figures);
+        assert!(figures.inner_m > 15.0, "{name}: {figures:?}");
+        assert_eq!(figures.passed_far, 0, "{name}");
+        let ratio = figures.ratio_rms();
+        assert!((0.5..=1.3).contains(&ratio), "{name}: errors are {ratio} of their standard deviations");
+    }
+}
+
+/// A vehicle that stands for half a minute, the program running, knows its gyros' bias before it sets out, and so its heading soon.
+#[test]
+fn val_who_stands_first_can_say_sooner() {
+    let vehicle = VEHICLES.into_iter().find(|vehicle| vehicle.name == "vita2-4").unwrap();
+    let [at_once, stood] = [Driven::Planned, Driven::Stood].map(|driven| {
+        let cell = Cell { vehicle, condition: Condition::DataSheet, start_m: 16.0, let_in_m: None, driven };
+        let figures = field_table::figures(&cell, [1, 2], 15.0);
+        print(&format!("{driven:?}"), &figures);
+        assert!(figures.passed_far == 0 && figures.false_passes() <= 0.025, "{driven:?}: {figures:?}");
+        figures.share(2)
+    });
+    assert!(at_once > 0.05, "{at_once}: there is nothing to gain");
+    assert!(stood <= 0.02, "{stood} of metres can't be said, {at_once} without standing");
+}
+
 /// What would pass all sees each section that mustn't, and what would fail all each that mustn't.
 #[test]
 fn figures_see_false_verdicts() {

@@ -10,11 +10,12 @@ use super::factors::{Factors, Gain};
 use super::inertial::Leg;
 use super::measure::{self, ScalarUpdate};
 use super::pose_sd::PoseSd;
+use super::roughness::{Look, Roughness};
 use super::settings::Settings;
 use super::sources::{self, Source};
 use super::state::{
-    ATTITUDE, CREEP, ERRORS, Errors, FORCE_BIAS, HEADING, POSITION, RATE_BIAS, SLACK, State, VELOCITY,
-    add_to, put, vec,
+    self, ATTITUDE, CREEP, ERRORS, Errors, FORCE_BIAS, HEADING, POSITION, RANGES, RATE_BIAS, SLACK, State,
+    VELOCITY, add_to, put,
 };
 use super::suspicion::Suspicions;
 use super::unrest::Unrest;
@@ -81,6 +82,8 @@ pub struct Eskf {
     /// Whether the cable counter is believed.
     pub cable: Cable,
     unrest: Unrest,
+    /// How rough the wall is.
+    roughness: Roughness,
     /// Whether inertial data were lacking in the last epoch: what the vehicle did is then a guess, of which no noise is learnt.
     is_blind: bool,
     /// How loose the cable hangs beyond what is declared, a standard deviation, m.
@@ -94,7 +97,7 @@ pub struct Eskf {
     keeps_steps: bool,
 }
 
-stateful!(Eskf { state: at, state, factors, clones, way_sought, ties, begun, settled, agreement, cable, unrest, is_blind, loose_m, suspicions, doubts; lists: knots; fixed: steps, keeps_steps; });
+stateful!(Eskf { state: at, state, factors, clones, way_sought, ties, begun, settled, agreement, cable, unrest, roughness, is_blind, loose_m, suspicions, doubts; lists: knots; fixed: steps, keeps_steps; });
 
 impl Default for Eskf {
     /// Allocated buffers without an estimate.
@@ -112,6 +115,7 @@ impl Default for Eskf {
             agreement: Agreement::default(),
             cable: Cable::default(),
             unrest: Unrest::default(),
+            roughness: Roughness::default(),
             is_blind: false,
             loose_m: 0.0,
             suspicions: Suspicions::default(),
@@ -183,7 +187,7 @@ impl Eskf {
             let known = errors;
             let later_s = to.since(waiting.at).as_secs_f64();
             let mut then = self.state_at(waiting.at);
-            then.correct(&earlier(&known, later_s));
+            then.correct(&state::earlier(&known, later_s));
             self.suspicions.hear(&then, &context.design(), sources, &waiting);
             let others_change = sources::others_change(sources, waiting.source);
             let Some(Some(source)) = sources.get_mut(waiting.source) else { continue };
@@ -349,7 +353,10 @@ impl Eskf {
         if settings.learns {
             row.noise *= source.noise_level.factor(kind, number);
         }
-        let innovation = row.residual - since(&row, known, errors);
+        let white = row.noise;
+        let bumps = self.bumps(kind, settings);
+        row.noise = white + bumps;
+        let innovation = row.residual - row.found(known, errors);
         let along = self.factors.along(&row.h);
         let of_estimate = row.h.iter().zip(&along).map(|(h, along)| h * along).sum::<f64>();
         let variance = of_estimate + row.noise;
@@ -375,7 +382,11 @@ impl Eskf {
             if self.is_blind {
                 source.noise_level.skip(number);
             } else {
-                source.noise_level.note(kind, number, innovation, variance);
+                source.noise_level.note(kind, number, innovation, of_estimate + white);
+            }
+            if matches!(kind, SensorKind::Echosounder { .. }) {
+                row.noise =
+                    self.spread_over_looks(&row, waiting, [white, bumps, innovation, of_estimate], settings);
             }
             if matches!(kind, SensorKind::Head | SensorKind::Echosounder { .. }) {
                 self.correct_by_wall(&row, settings.wall_share, known, errors);
@@ -385,6 +396,38 @@ impl Eskf {
         } else {
             source.noise_level.skip(number);
         }
+    }
+
+    /// Variance that the wall's bumps give a range of which many see the same one, m^2; 0 of other measurements.
+    fn bumps(&self, kind: SensorKind, settings: &Settings) -> f64 {
+        let sees_one = settings.learns && matches!(kind, SensorKind::Echosounder { .. });
+        if sees_one { self.roughness.variance_m2(settings) } else { 0.0 }
+    }
+
+    /// The noise with which a ping is fused, that of many which see the same bump; notes it for the wall's roughness.
+    fn spread_over_looks(
+        &mut self,
+        row: &ScalarUpdate,
+        waiting: &Waiting,
+        [white_m2, bumps_m2, innovation_m, of_estimate_m2]: [f64; 4],
+        settings: &Settings,
+    ) -> f64 {
+        let speed_mps = self.state.velocity_mps.norm();
+        let looks = self.roughness.looks_at_a_bump(waiting.source, waiting.at, speed_mps, settings.bump_m);
+        let noise_m2 = white_m2 + bumps_m2 * looks;
+        let mut of_scale = [0.0; ERRORS];
+        if let (Some(slot), Some(by)) = (of_scale.get_mut(RANGES), row.h.get(RANGES)) {
+            *slot = 2.0 * by;
+        }
+        let look = Look {
+            source: waiting.source,
+            at: waiting.at,
+            by_place: state::vec(&row.h, POSITION),
+            left_m: innovation_m * noise_m2 / (of_estimate_m2 + noise_m2),
+            white_m2,
+        };
+        self.roughness.note(look, 1.0 / looks, self.factors.variance_along(&of_scale), settings);
+        noise_m2
     }
 
     /// Variance of the second-order terms neglected by an update. It matters only while position or attitude is hardly
@@ -484,22 +527,10 @@ impl Eskf {
     }
 
     fn apply(&mut self, row: &ScalarUpdate, gain: &Gain<ERRORS>, known: &Errors, errors: &mut Errors) {
-        let innovation = row.residual - since(row, known, errors);
+        let innovation = row.residual - row.found(known, errors);
         self.clones.measure(&row.h, gain);
         for (error, k) in errors.iter_mut().zip(&gain.k) {
             *error += k * innovation;
         }
     }
-}
-
-/// Part of an update's innovation due to the errors found since `known`.
-fn since(row: &ScalarUpdate, known: &Errors, errors: &Errors) -> f64 {
-    row.h.iter().zip(errors.iter().zip(known)).map(|(h, (error, known))| h * (error - known)).sum()
-}
-
-/// Errors as they were `by_s` before.
-fn earlier(errors: &Errors, by_s: f64) -> Errors {
-    let mut then = *errors;
-    put(&mut then, POSITION, vec::<Tunnel>(errors, POSITION) + vec::<Tunnel>(errors, VELOCITY).scaled(-by_s));
-    then
 }

@@ -75,6 +75,11 @@ impl ScalarUpdate {
         self
     }
 
+    /// Part of the residual due to the errors found since `known`.
+    pub fn found(&self, known: &Errors, errors: &Errors) -> f64 {
+        self.h.iter().zip(errors.iter().zip(known)).map(|(h, (error, known))| h * (error - known)).sum()
+    }
+
     /// The same update for the errors `later_s` after the measurement.
     #[must_use]
     pub fn seen_later(mut self, later_s: f64) -> Self {

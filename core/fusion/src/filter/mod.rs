@@ -15,6 +15,7 @@ pub mod inertial;
 pub mod measure;
 pub mod noise_level;
 pub mod pose_sd;
+mod roughness;
 pub mod settings;
 pub mod sources;
 mod spell;

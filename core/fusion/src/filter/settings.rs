@@ -69,6 +69,8 @@ pub struct Settings {
     pub attitude_sd_rad: f64,
     /// Noise of an echosounder, m, wall roughness included.
     pub echo_sd_m: f64,
+    /// Length of wall along which its bumps are one and the same to an echosounder, m.
+    pub bump_m: f64,
     /// Full width of its beam, radians: which part of the wall within it echoes is uncertain.
     pub echo_beam_rad: f64,
     /// Initial scale error of all ranges against the design, a ratio, and its random walk, per root of a second.
@@ -120,6 +122,8 @@ impl Default for Settings {
             tilt_sd_rad: 2.0 * DEGREE,
             attitude_sd_rad: 1.0 * DEGREE,
             echo_sd_m: 0.03,
+            // Nobody sets it. Of bumps that follow one another over 0.3 m, by what field dives show (docs/field.md).
+            bump_m: 0.2,
             echo_beam_rad: 25.0 * DEGREE,
             range_scale_sd: 0.03,
             range_scale_noise: 1e-5,

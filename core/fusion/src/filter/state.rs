@@ -229,6 +229,13 @@ pub fn put<F: Copy>(errors: &mut Errors, from: usize, value: Vec3<F>) {
     }
 }
 
+/// Errors as they were `by_s` before.
+pub fn earlier(errors: &Errors, by_s: f64) -> Errors {
+    let mut then = *errors;
+    put(&mut then, POSITION, vec::<Tunnel>(errors, POSITION) + vec::<Tunnel>(errors, VELOCITY).scaled(-by_s));
+    then
+}
+
 /// Adds to one of the errors, or of their variances.
 pub fn add_to(errors: &mut Errors, i: usize, amount: f64) {
     if let Some(slot) = errors.get_mut(i) {

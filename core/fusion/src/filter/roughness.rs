@@ -1,0 +1,170 @@
+//! How rough the wall is, learnt from echosounders that face each other: the sum of their ranges doesn't depend on where the vehicle is
+//! between them, so that what it has beyond their noise is the wall's. An echosounder sees one bump for seconds. Derivation:
+//! `docs/fusion.md`, "Bumps of the wall".
+
+use serde::{Deserialize, Serialize};
+
+use super::settings::Settings;
+use headrace_geometry::frames::{Tunnel, Vec3};
+use headrace_geometry::time::{DurNs, MonoNs};
+
+/// Bumps of which the mean is taken, and as how many the declared noise counts.
+const MEMORY: f64 = 30.0;
+const DECLARED: f64 = 1.0;
+/// Largest square of a sum that counts, a factor of its variance: one outlier is no bump.
+const MOST: f64 = 9.0;
+/// Largest variance, a factor of the declared one: 6 cm.
+const ROUGHEST: f64 = 4.0;
+/// A vehicle that is slower moves sideways at such a speed, and so past bumps, m/s.
+const STILL_MPS: f64 = 0.05;
+/// Echosounders whose last looks are kept.
+const ECHOSOUNDERS: usize = 8;
+/// Largest cosine between the directions in which two that face each other lengthen with the place.
+const FACING: f64 = -0.95;
+/// Longest time between their looks, s.
+const AT_ONCE_S: f64 = 0.25;
+
+/// A ping that was fused.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub(super) struct Look {
+    /// Which echosounder's.
+    pub(super) source: usize,
+    /// When.
+    pub(super) at: MonoNs,
+    /// Change of the expected range per metre of the place.
+    pub(super) by_place: Vec3<Tunnel>,
+    /// What the range has beyond the estimate that it has corrected, m.
+    pub(super) left_m: f64,
+    /// Variance of its white noise, m^2.
+    pub(super) white_m2: f64,
+}
+
+/// Variance of the wall's bumps as echosounders see them, as a factor of their declared one.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub(super) struct Roughness {
+    factor: f64,
+    /// Bumps seen, as far as they count.
+    seen: f64,
+    looks: [Option<Look>; ECHOSOUNDERS],
+}
+
+impl Default for Roughness {
+    /// As declared.
+    fn default() -> Self {
+        Self { factor: 1.0, seen: DECLARED, looks: [None; ECHOSOUNDERS] }
+    }
+}
+
+impl Roughness {
+    /// Notes a ping that has corrected the estimate: `bump` is the share of a bump that it adds to those seen, `scale_m2` the variance
+    /// that the scale of ranges, still unknown, gives a sum of two.
+    pub(super) fn note(&mut self, look: Look, bump: f64, scale_m2: f64, settings: &Settings) {
+        let faces = |other: &&Look| {
+            other.by_place.dot(&look.by_place) < FACING
+                && look.at.since(other.at).as_secs_f64().abs() < AT_ONCE_S
+        };
+        let declared_m2 = settings.echo_sd_m * settings.echo_sd_m;
+        if let Some(other) = self.looks.iter().flatten().find(faces).filter(|_| scale_m2 < declared_m2) {
+            let noise_m2 = look.white_m2 + other.white_m2 + scale_m2;
+            let sum_m = look.left_m + other.left_m;
+            let most_m2 = MOST * (noise_m2 + 2.0 * self.variance_m2(settings).max(declared_m2));
+            // Each sees a bump of its own, and each of the two has the other for its partner.
+            let found_m2 = ((sum_m * sum_m).min(most_m2) - noise_m2) / 2.0;
+            let share = bump / 2.0;
+            self.seen = (self.seen + share).min(MEMORY);
+            self.factor += (found_m2 / declared_m2 - self.factor) * share / self.seen;
+        }
+        let same = self.looks.iter().position(|old| old.is_some_and(|old| old.source == look.source));
+        let slot = same.or_else(|| self.looks.iter().position(Option::is_none)).unwrap_or(0);
+        if let Some(slot) = self.looks.get_mut(slot) {
+            *slot = Some(look);
+        }
+    }
+
+    /// Variance of the wall's bumps, m^2.
+    pub(super) fn variance_m2(&self, settings: &Settings) -> f64 {
+        self.factor.clamp(0.0, ROUGHEST) * settings.echo_sd_m * settings.echo_sd_m
+    }
+
+    /// How many pings of this echosounder see the same bump, at least 1, at such a speed: together they say no more of the place than one
+    /// that sees it alone. 1 of the first.
+    pub(super) fn looks_at_a_bump(&self, source: usize, at: MonoNs, speed_mps: f64, bump_m: f64) -> f64 {
+        let before = self.looks.iter().flatten().find(|look| look.source == source);
+        before.map_or(1.0, |before| looks(at.since(before.at), speed_mps, bump_m))
+    }
+}
+
+/// How many pings that come `apart` see the same bump, at such a speed.
+fn looks(apart: DurNs, speed_mps: f64, bump_m: f64) -> f64 {
+    let way_m = apart.as_secs_f64().abs() * speed_mps.abs().max(STILL_MPS);
+    if way_m > 0.0 { (bump_m / way_m).max(1.0) } else { 1.0 }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use headrace_geometry::math;
+
+    /// Heights of bumps a third of a metre long, of this standard deviation.
+    fn height_m(side: f64, along_m: f64, sd_m: f64) -> f64 {
+        sd_m * (math::sin((19.0 + 2.0 * side) * along_m) + math::sin((31.7 + 4.0 * side) * along_m))
+    }
+
+    /// What is found after so long with two echosounders abreast, 0.1 m/s, when the vehicle sways between the walls as it likes.
+    fn found_m(rough_m: f64, white_m: f64, scale_m2: f64, end_s: f64) -> f64 {
+        let settings = Settings::default();
+        let mut roughness = Roughness::default();
+        let count = math::round_to_i64(end_s * 15.0);
+        for k in 0..count {
+            let at_s = k as f64 / 15.0;
+            let aside_m = 0.3 * math::sin(0.2 * at_s);
+            for (source, side) in [(3, 1.0), (5, -1.0)] {
+                let at = MonoNs(1_000_000_000) + DurNs::from_secs_f64(at_s + 0.02 * side);
+                let white = white_m * math::sqrt(2.0) * math::sin((2.0 + 0.3 * side) * (k * k) as f64);
+                let left_m = side * aside_m + height_m(side, 0.1 * at_s, rough_m) + white;
+                let looks = roughness.looks_at_a_bump(source, at, 0.1, 0.3);
+                let by_place = Vec3::new(0.0, side, 0.0);
+                let look = Look { source, at, by_place, left_m, white_m2: white_m * white_m };
+                roughness.note(look, 1.0 / looks, scale_m2, &settings);
+            }
+        }
+        math::sqrt(roughness.variance_m2(&settings))
+    }
+
+    /// The wall's bumps are found whatever the vehicle does between the walls, and a smooth wall is found smooth though declared rough.
+    #[test]
+    fn roughness_is_what_the_sum_of_two_ranges_has_beyond_their_noise() {
+        for rough_m in [0.0, 0.01, 0.03, 0.05] {
+            for white_m in [0.0, 0.02] {
+                let found_m = found_m(rough_m, white_m, 0.0, 400.0);
+                assert!((found_m - rough_m).abs() < 0.006, "{found_m} of {rough_m}, noise {white_m}");
+            }
+        }
+    }
+
+    /// Nothing is learnt while the scale of ranges is unknown, of one echosounder, or of two that look the same way; and no wall is
+    /// rougher than twice what is declared.
+    #[test]
+    fn roughness_is_as_declared_until_it_is_seen() {
+        let settings = Settings::default();
+        assert!((found_m(0.05, 0.0, 0.1, 100.0) - settings.echo_sd_m).abs() < 1e-12);
+        assert!((found_m(1.0, 0.0, 0.0, 400.0) - 2.0 * settings.echo_sd_m).abs() < 1e-12);
+        let mut roughness = Roughness::default();
+        for source in [0, 1, 0, 1, 0, 1] {
+            let by_place = Vec3::new(0.0, 1.0, 0.0);
+            let look = Look { source, at: MonoNs::default(), by_place, left_m: 1.0, white_m2: 0.0 };
+            roughness.note(look, 1.0, 0.0, &settings);
+        }
+        assert_eq!(roughness.variance_m2(&settings), settings.echo_sd_m * settings.echo_sd_m);
+    }
+
+    #[test]
+    fn looks_at_a_bump_are_those_on_its_way() {
+        let looks = |apart_s: f64, speed_mps: f64| looks(DurNs::from_secs_f64(apart_s), speed_mps, 0.1);
+        assert!((looks(0.1, 0.2) - 5.0).abs() < 1e-9);
+        assert!((looks(0.1, -0.2) - 5.0).abs() < 1e-9 && (looks(-0.1, 0.2) - 5.0).abs() < 1e-9);
+        // Hardly moving, it still sways; farther apart than a bump, each ping is news; at one time, they count as one.
+        assert!((looks(0.1, 0.0) - 20.0).abs() < 1e-9);
+        assert_eq!((looks(1.0, 0.2), looks(0.0, 0.2)), (1.0, 1.0));
+    }
+}
