@@ -70,6 +70,12 @@ pub trait Navigation: Stateful + Send + Sync {
         None
     }
 
+    /// How much longer the vehicle should stand still for its gyros' bias to be known, s; 0 once it is known, and where standing
+    /// shows nothing.
+    fn stand_s(&self) -> u32 {
+        0
+    }
+
     /// The setting that ranges contradict, if one certainly is wrong; `None`, too, where settings aren't judged.
     fn setting_doubt(&self) -> Option<SettingDoubt> {
         None

@@ -106,8 +106,8 @@ pub enum Figures {
     Advice(AdviceFigures),
     /// What is lacking for a position.
     Lacking(NoFix),
-    /// By how much the position may be off, m.
-    Error(f64),
+    /// By how much the position may be off, m, and whether standing still would help.
+    Error(f64, bool),
     /// Of an alert about the dive as a whole: place and largest deviation, m.
     Deviation(f64, f64),
     /// A setting in doubt, and the place where it was found, m.

@@ -141,6 +141,8 @@ pub struct LiveState {
     pub sd: Option<PoseSd>,
     /// Standard deviation of one pass against the next.
     pub pass_sd_m: f64,
+    /// How much longer the vehicle should stand still for its gyros' bias, and so soon its heading, to be known, s; 0 if it needn't.
+    pub stand_s: u32,
     /// Speed along the tunnel, positive inwards; `None` without a position.
     pub speed_mps: Option<f64>,
     /// The advice; `None` before the first.
@@ -170,7 +172,7 @@ pub struct LiveState {
 }
 
 stateful!(LiveState {
-    state: now, at, position, chainage_m, sd, pass_sd_m, speed_mps, advice, metres, unsure, passed, back_to_m, alerts, turning;
+    state: now, at, position, chainage_m, sd, pass_sd_m, stand_s, speed_mps, advice, metres, unsure, passed, back_to_m, alerts, turning;
     slots: heard;
     fixed: target_m, confidence_sd, heads, sources;
 });
@@ -185,6 +187,7 @@ impl LiveState {
             chainage_m: None,
             sd: None,
             pass_sd_m: 0.0,
+            stand_s: 0,
             speed_mps: None,
             advice: None,
             target_m,
@@ -199,6 +202,11 @@ impl LiveState {
             sources,
             heard: [None; MAX_SOURCES],
         }
+    }
+
+    /// Whether the pilot is told to stand still rather than a speed, for the gyros' bias.
+    pub fn asks_to_stand(&self) -> bool {
+        self.condition() == Condition::CannotSay(PositionDoubt::Spread) && self.stand_s > 0
     }
 
     /// How old it is; `None` before the first beat.

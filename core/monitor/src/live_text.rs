@@ -96,6 +96,9 @@ pub fn status_line(state: &LiveState, profile: &Profile, name: &dyn Fn(usize) ->
         Condition::NoSpeed => (no_speed_text(state, profile), String::new()),
         Condition::TooFast => ("TOO FAST".to_owned(), format!("at most {v_max}")),
         Condition::TurnFails => (turn_fails_text(state), format!("go {v_max}")),
+        Condition::CannotSay(PositionDoubt::Spread) if state.asks_to_stand() => {
+            (doubt_text(PositionDoubt::Spread, state), format!("stand still {} s", state.stand_s))
+        }
         Condition::CannotSay(doubt) => (doubt_text(doubt, state), format!("at most {v_max}")),
         Condition::Over => ("a little fast".to_owned(), format!("at most {v_max}")),
         Condition::Good => (format!("ok up to {v_max}"), String::new()),

@@ -46,6 +46,8 @@ pub struct Doubts {
     pub cable: Option<CableDoubt>,
     /// The setting that is likely wrong.
     pub setting: Option<SettingDoubt>,
+    /// How much longer the vehicle should stand still for its gyros' bias to be known, s.
+    pub stand_s: u32,
 }
 
 /// An epoch with its fix: a multiple of [`ADVICE_PERIOD`](super::advice_log::ADVICE_PERIOD), or a sonar ping.

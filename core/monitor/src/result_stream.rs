@@ -203,6 +203,7 @@ impl RecordKind {
                 ("position", Integer),
                 ("chainage_m", Number),
                 ("pass_sd_m", Number),
+                ("stand_s", Integer),
                 ("speed_mps", Number),
                 ("v_max_mps", Number),
                 ("reason", Integer),

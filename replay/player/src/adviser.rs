@@ -2,6 +2,7 @@
 
 use headrace_geometry::time::{DurNs, MonoNs};
 use headrace_monitor::feed::work_off;
+use headrace_monitor::live_state::Condition;
 use headrace_monitor::messages::Notice;
 use headrace_monitor::ring::Port;
 use headrace_monitor::run::Loop;
@@ -84,7 +85,9 @@ fn told_by(dive: &Loop) -> Option<Told> {
     let open = sections.runs().all().iter().filter(|run| run.is_open());
     let missed_m = open.map(|run| [sections.bounds_m(run.from).0, sections.bounds_m(run.to).0]).collect();
     let known = matches!(last.advice.reason, Reason::HelixPitch | Reason::AngularStep);
-    Some(Told { at: last.at, v_max_mps: known.then_some(last.advice.v_max_mps), missed_m })
+    let state = dive.live_state();
+    let stand = state.asks_to_stand() || matches!(state.condition(), Condition::NoPosition(_));
+    Some(Told { at: last.at, v_max_mps: known.then_some(last.advice.v_max_mps), stand, missed_m })
 }
 
 impl Adviser for LoopAdviser {

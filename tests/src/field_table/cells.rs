@@ -308,7 +308,7 @@ impl Cell {
             let [yaw_deg, tilt_deg] = if lively { [10, 2] } else { [0, 0] };
             format!(
                 "kind = \"advised\"\nstart_m = {start_m}\nto_m = {to_m}\nspeed_mps = {speed_mps}\n\
-                 goes_back = {}\nwander_across_m = {aside_m}\nwander_up_m = {up_m}\nwander_yaw_deg = {yaw_deg}\n\
+                 goes_back = {}\nstands = true\nwander_across_m = {aside_m}\nwander_up_m = {up_m}\nwander_yaw_deg = {yaw_deg}\n\
                  wander_pitch_deg = {tilt_deg}\nwander_roll_deg = {tilt_deg}\n{}",
                 self.driven == Driven::Back,
                 if self.driven == Driven::Back { &hurries } else { "" },

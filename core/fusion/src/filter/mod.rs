@@ -37,7 +37,7 @@ use self::eskf::Eskf;
 use self::pose_sd::PoseSd;
 use self::settings::Settings;
 use self::sources::{Consistency, Source};
-use self::state::{RANGES, State, rotation};
+use self::state::{RANGES, RATE_BIAS, State, rotation};
 use self::suspicion::SettingDoubt;
 use self::window::{Waiting, Window};
 use self::zupt::Stillness;
@@ -76,6 +76,8 @@ const MOST_FORCE_MPS2: f64 = 50.0;
 const AHEAD: usize = 1024;
 /// Time between two head passes when no head is known to turn.
 const USUAL_GAP: DurNs = DurNs(20_000_000_000);
+/// Standard deviation from which a gyro's bias is known: a pass of 3 s is off by a milliradian, and standing would show little more, rad/s.
+const BIAS_KNOWN_RADPS: f64 = 3e-4;
 
 /// See the module's description.
 pub struct FilterNavigation {
@@ -397,6 +399,13 @@ impl Navigation for FilterNavigation {
 
     fn pose_sd(&self) -> Option<PoseSd> {
         self.running().map(Eskf::pose_sd)
+    }
+
+    fn stand_s(&self) -> u32 {
+        let Some(running) = self.running() else { return 0 };
+        let variances = [0, 1, 2].map(|axis| running.factors.variance(RATE_BIAS + axis));
+        let is_known = variances.iter().all(|variance| *variance < BIAS_KNOWN_RADPS * BIAS_KNOWN_RADPS);
+        if is_known || self.unit.is_none() { 0 } else { self.stillness.lacking_s() }
     }
 
     fn setting_doubt(&self) -> Option<SettingDoubt> {

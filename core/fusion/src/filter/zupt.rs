@@ -10,6 +10,10 @@ use headrace_sensor::reading::Reading;
 /// Averaging window; a floating vehicle never stays steady for `MEANS` windows.
 const MEAN_OVER: DurNs = DurNs(1_000_000_000);
 const MEANS: u32 = 5;
+/// How many means at rest make the bias known.
+const ENOUGH: u32 = 25;
+/// Seconds after which one that stands and isn't at rest floats.
+const FLOATS: u32 = 15;
 /// Largest difference between means of turn rate and specific force at rest, rad/s and m/s^2.
 const SAME_RATE: f64 = 1e-3;
 const SAME_FORCE: f64 = 0.02;
@@ -22,6 +26,12 @@ pub struct Stillness {
     cable_m: Option<f64>,
     cable_still: bool,
     cable_at: MonoNs,
+    /// Means taken at rest.
+    rested: u32,
+    /// Seconds for which the cable has stood without the vehicle being at rest.
+    floated: u32,
+    /// It has stood for long without being at rest, and not been at rest since.
+    floats: bool,
 }
 
 /// Means of successive windows, compared with the first of a steady run.
@@ -37,9 +47,11 @@ struct Means {
 }
 
 impl Means {
-    fn take(&mut self, at: MonoNs, value: [f64; 3], same: f64) {
+    /// Takes a value; whether a window ended with it.
+    fn take(&mut self, at: MonoNs, value: [f64; 3], same: f64) -> bool {
         let since = *self.since.get_or_insert(at);
-        if at.since(since).0 >= MEAN_OVER.0 {
+        let ends = at.since(since).0 >= MEAN_OVER.0;
+        if ends {
             let mean = self.sum.map(|sum| sum / self.count.max(1.0));
             let is_alike =
                 self.first.is_some_and(|first| first.iter().zip(mean).all(|(a, b)| (a - b).abs() <= same));
@@ -52,6 +64,7 @@ impl Means {
             *sum += value;
         }
         self.count += 1.0;
+        ends
     }
 }
 
@@ -64,7 +77,11 @@ impl Stillness {
                     // A counter that says nothing doesn't say that the cable is still.
                     self.moved();
                 }
-                self.rate.take(at, [rate.x(), rate.y(), rate.z()], SAME_RATE);
+                let ended = self.rate.take(at, [rate.x(), rate.y(), rate.z()], SAME_RATE);
+                if ended && self.cable_still {
+                    self.floated = if self.is_still() { 0 } else { self.floated.saturating_add(1) };
+                    self.floats = !self.is_still() && (self.floats || self.floated > FLOATS);
+                }
             }
             (SensorKind::Imu, Reading::SpecificForce(force)) => {
                 self.force.take(at, [force.x(), force.y(), force.z()], SAME_FORCE);
@@ -84,7 +101,7 @@ impl Stillness {
 
     fn moved(&mut self) {
         self.cable_still = false;
-        (self.rate.alike, self.force.alike) = (0, 0);
+        (self.rate.alike, self.force.alike, self.floated) = (0, 0, 0);
     }
 
     /// Whether gyros and accelerometers have been steady for long, and the cable hasn't moved.
@@ -92,9 +109,21 @@ impl Stillness {
         self.rate.alike >= MEANS && self.force.alike >= MEANS && self.cable_still
     }
 
-    /// Mean turn rate of the last window, rad/s; returned once.
+    /// Mean turn rate of the last window at rest, rad/s; returned once.
     pub fn take_mean_rate(&mut self) -> Option<Vec3<Sensor>> {
-        self.rate.latest.take().map(|[x, y, z]| Vec3::new(x, y, z))
+        let [x, y, z] = self.rate.latest.take()?;
+        self.rested = self.rested.saturating_add(1);
+        Some(Vec3::new(x, y, z))
+    }
+
+    /// How much longer the vehicle should stand until its gyros' bias is as well known as that makes it, s; 0 of one that floats, or
+    /// whose unit is too noisy: standing as still as it can, it isn't at rest.
+    pub fn lacking_s(&self) -> u32 {
+        let lacking = ENOUGH.saturating_sub(self.rested);
+        if lacking == 0 || self.floats {
+            return 0;
+        }
+        lacking + MEANS - self.rate.alike.min(self.force.alike).min(MEANS)
     }
 }
 
@@ -136,5 +165,37 @@ mod tests {
             still(|_| 0.0, |t| (!(2.0..5.0).contains(&t)).then_some(0.0)),
             "it speaks again, and is still"
         );
+    }
+
+    /// Seconds asked for after so long: while turned like this, with a cable of this length.
+    fn lacking_s(rate: impl Fn(f64) -> f64, way_m: impl Fn(f64) -> f64, end_s: u32) -> u32 {
+        let mut stillness = Stillness::default();
+        for k in 0..100 * end_s {
+            let (at, t) = (MonoNs(u64::from(k) * 10_000_000), f64::from(k) / 100.0);
+            stillness.take(at, SensorKind::Imu, &Reading::AngularRate(Vec3::new(0.0, 0.0, rate(t))));
+            stillness.take(at, SensorKind::Imu, &Reading::SpecificForce(Vec3::new(0.0, 0.0, 9.8)));
+            let tether = SensorKind::Tether { zero_at_m: 0.0, scale: 1.0 };
+            let length = TetherLength { length_m: way_m(t), resolution_m: 0.001 };
+            stillness.take(at, tether, &Reading::TetherLength(length));
+            if stillness.is_still() {
+                stillness.take_mean_rate();
+            }
+        }
+        stillness.lacking_s()
+    }
+
+    #[test]
+    fn who_floats_is_not_asked_to_stand_again_and_again() {
+        let sways = |t: f64| 0.01 * math::sin(t / 2.0);
+        let set_off = |t: f64| (t - 40.0).max(0.0) * 0.1;
+        assert_eq!(lacking_s(|_| 0.0, |_| 0.0, 35), 0, "it has stood");
+        assert_eq!(lacking_s(|_| 0.0, |t| 0.1 * t, 35), 30, "it has only gone on");
+        assert_eq!(lacking_s(sways, |_| 0.0, 10), 30, "it may yet come to rest");
+        assert_eq!(lacking_s(sways, |_| 0.0, 35), 0, "it floats");
+        assert_eq!(lacking_s(sways, set_off, 60), 0, "it has floated");
+        let lands = |t: f64| if t < 30.0 { sways(t) } else { 0.0 };
+        assert!((15..30).contains(&lacking_s(lands, |_| 0.0, 45)), "it stands now");
+        // Slow, on a coarse counter that stands between its steps, it goes on.
+        assert_eq!(lacking_s(sways, |t| math::floor_to_i64(2.0 * t) as f64 * 0.01, 60), 30);
     }
 }

@@ -56,7 +56,7 @@ impl Figures {
             Self::CannotSay(stretch) => stretch.hole_m[0],
             Self::Advice(figures) => figures.speed_mps,
             Self::Lacking(lacking) => f64::from(lacking as u8),
-            Self::Error(figure) | Self::Left(figure) | Self::Deviation(_, figure) => figure,
+            Self::Error(figure, _) | Self::Left(figure) | Self::Deviation(_, figure) => figure,
             Self::Setting(doubt, _) => doubt.setting.figure(),
         }
     }

@@ -81,7 +81,7 @@ impl ListedAlert {
             }
             (_, Figures::Advice(figures)) => advice_text(figures, around.profile),
             (_, Figures::Lacking(lacking)) => no_position_text(*lacking).to_owned(),
-            (_, Figures::Error(error_m)) => format!("CAN'T SAY: position ±{error_m:.2} m"),
+            (_, Figures::Error(error_m, _)) => format!("CAN'T SAY: position ±{error_m:.2} m"),
             (kind, Figures::Deviation(x_m, off_m)) => match kind.of_dive() {
                 Some(of_dive) => place_first(&alert_text(of_dive, &name, *x_m, *off_m), *x_m),
                 None => String::new(),
@@ -112,6 +112,7 @@ impl ListedAlert {
             (ListKind::TooFast, Figures::Advice(figures)) => speed_text("at most", figures.v_max_mps),
             (ListKind::TurnFails, Figures::Advice(figures)) => speed_text("go", figures.v_max_mps),
             (ListKind::NoPosition, _) => "hold still".to_owned(),
+            (ListKind::PositionDoubtful, Figures::Error(_, true)) => "stand still for 30 s".to_owned(),
             (ListKind::PositionDoubtful, _) => "slower, or again with a surer position".to_owned(),
             (ListKind::NoSonar | ListKind::NoData, _) => "stop".to_owned(),
             (ListKind::NotRecorded, _) => "free the disk, or change the medium".to_owned(),

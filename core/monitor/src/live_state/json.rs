@@ -76,6 +76,8 @@ pub struct PositionJson {
     pub yaw_sd_deg: Option<f64>,
     /// Standard deviation of one pass against the next, m; `None` without a position.
     pub pass_sd_m: Option<f64>,
+    /// How much longer the vehicle should stand still for its gyros' bias to be known, s; 0 if it needn't.
+    pub stand_s: u32,
 }
 
 /// What is left to limits, and what is kept back.
@@ -239,6 +241,7 @@ impl LiveState {
             place_sd_m: self.sd.map(|sd| sd.place_m),
             yaw_sd_deg: self.sd.map(|sd| sd.yaw_rad.to_degrees()),
             pass_sd_m,
+            stand_s: self.stand_s,
         }
     }
 }

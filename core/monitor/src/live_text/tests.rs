@@ -32,6 +32,12 @@ fn states() -> Vec<LiveState> {
         LiveState { position: PositionState::Doubtful(PositionDoubt::Cable), ..good },
         LiveState { position: PositionState::Doubtful(PositionDoubt::Spread), pass_sd_m: 0.15, ..good },
         LiveState {
+            position: PositionState::Doubtful(PositionDoubt::Spread),
+            pass_sd_m: 0.15,
+            stand_s: 24,
+            ..good
+        },
+        LiveState {
             position: PositionState::None(NoFix::Section),
             chainage_m: None,
             speed_mps: None,

@@ -154,6 +154,7 @@ pub(super) fn live(
             chainage_m: situation.pose.map(|pose| pose.position.x()),
             sd: *sd,
             pass_sd_m: situation.pass_error_m,
+            stand_s: doubts.stand_s,
             speed_mps: situation.pose.map(|_| situation.speed_mps),
             advice: Some(*advice),
             metres: standing.metres,
@@ -182,6 +183,7 @@ fn digest(stream: &mut ResultStream, at: MonoNs, situation: &Situation, state: &
         .integer(state.position.number())
         .number(state.chainage_m.unwrap_or(0.0))
         .number(situation.pass_error_m)
+        .integer(state.stand_s.into())
         .number(situation.speed_mps)
         .number(advice.map_or(0.0, |advice| advice.v_max_mps))
         .integer(advice.map_or(u64::MAX, |advice| advice.reason as u64))

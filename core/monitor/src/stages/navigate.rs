@@ -27,7 +27,8 @@ pub(super) fn navigate(
         if let Some(at) = beat_before(&mut navigator.next_beat, event.received) {
             let fix = navigator.navigation.fix(at);
             let navigation = &navigator.navigation;
-            let doubts = Doubts { cable: navigation.cable_doubt(), setting: navigation.setting_doubt() };
+            let (cable, setting) = (navigation.cable_doubt(), navigation.setting_doubt());
+            let doubts = Doubts { cable, setting, stand_s: navigation.stand_s() };
             let sd = navigation.pose_sd();
             *state = VehicleState { at: Some(at), fix, sd, cable_doubt: doubts.cable };
             digest(&mut digests.poses, at, &state);

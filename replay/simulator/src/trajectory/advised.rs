@@ -23,6 +23,8 @@ const BEHIND_M: f64 = 3.0;
 const RUN_UP_M: f64 = 2.5;
 /// A speed is held to a share that wanders over this time, s.
 const HOLD_S: f64 = 20.0;
+/// How long the pilot stands still in all because he is told so, s.
+const MOST_STOOD_S: f64 = 120.0;
 /// How long the pilot waits at the end for what may still be told, s.
 const WAITS_S: f64 = 10.0;
 
@@ -50,6 +52,8 @@ pub(super) struct Heeding {
     pub(super) within: f64,
     /// Whether missed stretches are passed again.
     pub(super) goes_back: bool,
+    /// Whether he stands still when told so, at once or for want of a position, and until he is told anything.
+    pub(super) stands: bool,
     /// How long the pilot waits before he sets out, s.
     pub(super) waits_s: f64,
     pub(super) hurries: Vec<Hurry>,
@@ -86,6 +90,8 @@ pub(super) struct Advised {
     /// Number of the next knot to decide.
     next: i64,
     ended_s: Option<f64>,
+    /// How long the pilot has stood because he was told so, s.
+    stood_s: f64,
 }
 
 impl Advised {
@@ -111,6 +117,7 @@ impl Advised {
             tried_m: Vec::new(),
             next: -1,
             ended_s: None,
+            stood_s: 0.0,
             pilot,
         }
     }
@@ -198,7 +205,14 @@ impl Advised {
         missed.filter(|_| self.pilot.goes_back)
     }
 
-    fn wanted_mps(&self, at_s: f64, told: Option<&Told>) -> f64 {
+    /// Whether the pilot stands still, as he does until he is told anything; not for ever.
+    fn stands(&mut self, told: Option<&Told>) -> bool {
+        let stands = self.pilot.stands && self.stood_s < MOST_STOOD_S && told.is_none_or(|told| told.stand);
+        self.stood_s += if stands { STEP_S } else { 0.0 };
+        stands
+    }
+
+    fn wanted_mps(&mut self, at_s: f64, told: Option<&Told>) -> f64 {
         let pilot = &self.pilot;
         let anew = self.x_m > self.farthest_m - 0.5;
         let hurry = pilot.hurries.iter().find(|hurry| (hurry.from_m..hurry.to_m).contains(&self.x_m));
@@ -207,6 +221,10 @@ impl Advised {
         if let Some(hurry) = hurry.filter(|_| anew) {
             return hurry.speed_mps * (1.0 + hold);
         }
+        if self.stands(told) {
+            return 0.0;
+        }
+        let pilot = &self.pilot;
         // Where slower doesn't help, or nothing is known, the pilot goes on.
         let v_max_mps = told.and_then(|told| told.v_max_mps).filter(|v_max_mps| *v_max_mps > 0.0);
         v_max_mps.map_or(pilot.speed_mps, |v_max_mps| (v_max_mps * (1.0 + hold)).min(pilot.speed_mps))

@@ -369,6 +369,27 @@ fn rounds(t: f64) -> Pose {
     }
 }
 
+/// It is asked to stand until its bias is known, no longer than said at first, and isn't asked again when it goes on.
+#[test]
+fn who_is_asked_to_stand_is_asked_no_longer_than_it_takes() {
+    let rig = Rig { noise: 0.0, ..Rig::new(rest, 1) };
+    let mut nav = rig.navigation();
+    let mut asked = Vec::new();
+    for second in 0..60 {
+        let from_s = f64::from(second);
+        for event in &rig.events(from_s, from_s + 1.0) {
+            Rig::hear(&mut nav, event);
+        }
+        asked.push(nav.stand_s());
+    }
+    println!("{asked:?}");
+    let begun = asked.iter().position(|asked_s| *asked_s > 0).unwrap();
+    let first_s = asked[begun];
+    assert!((20..=30).contains(&first_s), "{asked:?}");
+    assert!(asked[begun..].windows(2).all(|pair| pair[1] <= pair[0]), "{asked:?}");
+    assert!(asked[begun + 31..].iter().all(|asked_s| *asked_s == 0), "{asked:?}");
+}
+
 /// Largest change of the relative sd, a share, from the tenth minute on, at the same place of the round.
 fn change_over_hours(hours: u32) -> f64 {
     let rig = Rig { imu_s: 0.1, ..Rig::new(rounds, 1) };

@@ -74,7 +74,7 @@ export function stateAt(dive: Dive, entry: number): State | null {
 const EMPTY: Omit<State, "type"> = {
   t_s: 0, text: "", now_s: 0, at_s: null, age_s: 0, old: false, condition: "no_data", lamp: "amber",
   position: {
-    state: "none", why: null, chainage_m: null, station: null, chainage_sd_m: null, place_sd_m: null, yaw_sd_deg: null, pass_sd_m: null,
+    state: "none", why: null, chainage_m: null, station: null, chainage_sd_m: null, place_sd_m: null, yaw_sd_deg: null, pass_sd_m: null, stand_s: 0,
   },
   speed_mps: null, v_max_mps: null, reason: null, margins: { speed_mps: null, turn_m: null, position_m: null, lost_share: null }, turn: null,
   sensors: [], metres: { pass_m: 0, fail_m: 0, cannot_say_m: 0, open_m: 0, not_inspected_m: 0, way_m: 0 }, cannot_say: null,

@@ -33,7 +33,7 @@ export interface State {
   condition: Condition; lamp: Lamp; recording_fails?: boolean;
   position: {
     state: "ok" | "doubtful" | "none"; why: string | null; chainage_m: number | null; station: string | null;
-    chainage_sd_m: number | null; place_sd_m: number | null; yaw_sd_deg: number | null; pass_sd_m: number | null;
+    chainage_sd_m: number | null; place_sd_m: number | null; yaw_sd_deg: number | null; pass_sd_m: number | null; stand_s: number;
   };
   speed_mps: number | null; v_max_mps: number | null; reason: string | null; remedy?: string | null;
   margins: { speed_mps: number | null; turn_m: number | null; position_m: number | null; lost_share: number | null };
