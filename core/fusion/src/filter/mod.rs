@@ -373,6 +373,7 @@ impl Navigation for FilterNavigation {
             if let Some((state, factors)) = self.listening.settle(at, &self.context) {
                 self.running.begin(at, state, factors);
                 self.is_running = true;
+                self.stillness.ask_from(at);
                 if let Some(journal) = &mut self.journal {
                     journal.begin();
                 }
@@ -405,7 +406,7 @@ impl Navigation for FilterNavigation {
         let Some(running) = self.running() else { return 0 };
         let variances = [0, 1, 2].map(|axis| running.factors.variance(RATE_BIAS + axis));
         let is_known = variances.iter().all(|variance| *variance < BIAS_KNOWN_RADPS * BIAS_KNOWN_RADPS);
-        if is_known || self.unit.is_none() { 0 } else { self.stillness.lacking_s() }
+        if is_known || self.unit.is_none() { 0 } else { self.stillness.lacking_s(running.at) }
     }
 
     fn setting_doubt(&self) -> Option<SettingDoubt> {

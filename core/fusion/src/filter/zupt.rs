@@ -14,6 +14,8 @@ const MEANS: u32 = 5;
 const ENOUGH: u32 = 25;
 /// Seconds after which one that stands and isn't at rest floats.
 const FLOATS: u32 = 15;
+/// How long a vehicle is asked to stand from the first estimate on.
+const ASKS_FOR: DurNs = DurNs(60_000_000_000);
 /// Largest difference between means of turn rate and specific force at rest, rad/s and m/s^2.
 const SAME_RATE: f64 = 1e-3;
 const SAME_FORCE: f64 = 0.02;
@@ -32,6 +34,8 @@ pub struct Stillness {
     floated: u32,
     /// It has stood for long without being at rest, and not been at rest since.
     floats: bool,
+    /// When the first estimate began.
+    asks_from: Option<MonoNs>,
 }
 
 /// Means of successive windows, compared with the first of a steady run.
@@ -116,11 +120,18 @@ impl Stillness {
         Some(Vec3::new(x, y, z))
     }
 
+    /// Notes that an estimate begins.
+    pub fn ask_from(&mut self, at: MonoNs) {
+        self.asks_from.get_or_insert(at);
+    }
+
     /// How much longer the vehicle should stand until its gyros' bias is as well known as that makes it, s; 0 of one that floats, or
-    /// whose unit is too noisy: standing as still as it can, it isn't at rest.
-    pub fn lacking_s(&self) -> u32 {
+    /// whose unit is too noisy: standing as still as it can, it isn't at rest. It is asked at the dive's beginning only: later, what
+    /// makes passes unsure is seldom the gyros.
+    pub fn lacking_s(&self, now: MonoNs) -> u32 {
         let lacking = ENOUGH.saturating_sub(self.rested);
-        if lacking == 0 || self.floats {
+        let begins = self.asks_from.is_some_and(|from| now.since(from).0 < ASKS_FOR.0);
+        if lacking == 0 || self.floats || !begins {
             return 0;
         }
         lacking + MEANS - self.rate.alike.min(self.force.alike).min(MEANS)
@@ -170,6 +181,7 @@ mod tests {
     /// Seconds asked for after so long: while turned like this, with a cable of this length.
     fn lacking_s(rate: impl Fn(f64) -> f64, way_m: impl Fn(f64) -> f64, end_s: u32) -> u32 {
         let mut stillness = Stillness::default();
+        stillness.ask_from(MonoNs(0));
         for k in 0..100 * end_s {
             let (at, t) = (MonoNs(u64::from(k) * 10_000_000), f64::from(k) / 100.0);
             stillness.take(at, SensorKind::Imu, &Reading::AngularRate(Vec3::new(0.0, 0.0, rate(t))));
@@ -181,7 +193,7 @@ mod tests {
                 stillness.take_mean_rate();
             }
         }
-        stillness.lacking_s()
+        stillness.lacking_s(MonoNs(u64::from(end_s) * 1_000_000_000))
     }
 
     #[test]
@@ -192,10 +204,11 @@ mod tests {
         assert_eq!(lacking_s(|_| 0.0, |t| 0.1 * t, 35), 30, "it has only gone on");
         assert_eq!(lacking_s(sways, |_| 0.0, 10), 30, "it may yet come to rest");
         assert_eq!(lacking_s(sways, |_| 0.0, 35), 0, "it floats");
-        assert_eq!(lacking_s(sways, set_off, 60), 0, "it has floated");
+        assert_eq!(lacking_s(sways, set_off, 55), 0, "it has floated");
         let lands = |t: f64| if t < 30.0 { sways(t) } else { 0.0 };
         assert!((15..30).contains(&lacking_s(lands, |_| 0.0, 45)), "it stands now");
         // Slow, on a coarse counter that stands between its steps, it goes on.
-        assert_eq!(lacking_s(sways, |t| math::floor_to_i64(2.0 * t) as f64 * 0.01, 60), 30);
+        assert_eq!(lacking_s(sways, |t| math::floor_to_i64(2.0 * t) as f64 * 0.01, 55), 30);
+        assert_eq!(lacking_s(|_| 0.0, |t| 0.1 * t, 61), 0, "it has set out");
     }
 }
