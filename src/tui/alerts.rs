@@ -46,7 +46,7 @@ pub(super) fn rows(dive: &Loop) -> (Vec<AlertRow>, usize) {
         },
         needs_acknowledgement: alert.needs_acknowledgement(),
         text: alert.text(&around),
-        advice: if alert.state == AlertState::Rectified { String::new() } else { alert.advice(&around) },
+        advice: alert.advice(&around),
     };
     (shown.iter().filter(|alert| alert.is_live()).map(row).collect(), hidden)
 }

@@ -141,6 +141,12 @@ fn alerts_and_commands_do_not_depend_on_where_ticks_end() {
     for change in ["raised", "acknowledged", "silenced", "rectified", "cleared", "changed"] {
         assert!(done.iter().any(|done| done.as_str() == change), "{change}");
     }
+    // What is over asks for nothing.
+    let around = expected.surroundings();
+    let asks = |alert: &&ListedAlert| !alert.advice(&around).is_empty();
+    let (holding, over): (Vec<_>, Vec<_>) =
+        told.iter().map(|(.., alert)| alert).partition(|alert| alert.state == AlertState::Active);
+    assert!(holding.iter().any(asks) && over.iter().all(|alert| !asks(alert)));
     assert_eq!(report["notes"].as_array().unwrap().len(), 3);
     assert_eq!(report["notes"][0]["text"], "start of the lining");
     let x_m = report["notes"][0]["chainage_m"].as_f64().unwrap();

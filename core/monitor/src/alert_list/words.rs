@@ -1,6 +1,6 @@
 //! Words for alerts, made of the table that the pilot's other lines are made of. Allocates: for outlets, not for a tick.
 
-use super::{Figures, ListKind, ListedAlert};
+use super::{AlertState, Figures, ListKind, ListedAlert};
 use crate::app::SourceInfo;
 use crate::pilot_text::{
     actions_text, advice_text, alert_text, cause_text, no_position_text, setting_text, speed_text, station,
@@ -100,8 +100,11 @@ impl ListedAlert {
         }
     }
 
-    /// What to do; empty where there is nothing.
+    /// What to do; empty where there is nothing, and once it is over.
     pub fn advice(&self, around: &Surroundings<'_>) -> String {
+        if self.state != AlertState::Active {
+            return String::new();
+        }
         match (self.kind, &self.figures) {
             (_, Figures::Missed(causes, _, v_max_mps)) => {
                 let from_m = self.bounds_m(around.section_m).0.unwrap_or(0.0);
