@@ -131,6 +131,7 @@ struct Seen {
     standing: u32,
     silent: HeadSet,
     unseen: bool,
+    adrift: bool,
     worst: Drive,
 }
 
@@ -145,6 +146,7 @@ impl Seen {
                 standing: sum.standing.saturating_add(passage.standing),
                 silent: sum.silent.union(passage.silent),
                 unseen: sum.unseen || passage.unseen,
+                adrift: sum.adrift || passage.adrift,
                 worst: Drive {
                     t_y_m: sum.worst.t_y_m.max(drive.t_y_m),
                     middle_t_y_m: sum.worst.middle_t_y_m.max(drive.middle_t_y_m),
@@ -180,7 +182,7 @@ fn present(case: &Case<'_>, seen: &Seen, perimeter_m: f64) -> Causes {
         }
     };
     add(!is_passed && !case.none_alive || !hole.bounded && seen.silent.is_empty(), Cause::NotPassed);
-    add(case.is_torn || seen.unseen, Cause::PositionLost);
+    add(case.is_torn || seen.unseen || seen.adrift, Cause::PositionLost);
     add(is_dark(case, seen), Cause::HeadSilent);
     let coarse = drive.middle_t_y_m > 0.9 * target_m;
     add(drive.middle_t_y_m > COARSE * target_m, Cause::AngularStep);
@@ -312,7 +314,7 @@ impl Trial<'_> {
             covered[0] = Some(Reach { from_m: f64::NEG_INFINITY, to_m: before });
             covered[1] = Some(Reach { from_m: beyond, to_m: f64::INFINITY });
         }
-        if removed.has(Cause::PositionLost) && (self.case.is_torn || self.seen.unseen)
+        if removed.has(Cause::PositionLost) && (self.case.is_torn || self.seen.unseen || self.seen.adrift)
             || removed.has(Cause::HeadSilent) && is_dark(self.case, self.seen)
         {
             covered[2] = all;

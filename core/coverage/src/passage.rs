@@ -31,6 +31,8 @@ pub struct Passage {
     pub drive: Drive,
     /// More pings went by without a fix than are remembered.
     pub unseen: bool,
+    /// A ping's place was so unsure against the pass before that its speed says nothing.
+    pub adrift: bool,
     /// Relative error between passes, of the newest visit with a ping here.
     pub pass_error: PassError,
 }

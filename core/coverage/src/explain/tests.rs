@@ -34,6 +34,7 @@ struct Wall {
     end_m: f64,
     beside: [Causes; 2],
     is_torn: bool,
+    adrift: bool,
 }
 
 impl Default for Wall {
@@ -47,6 +48,7 @@ impl Default for Wall {
             end_m: 14.0,
             beside: [Causes::default(); 2],
             is_torn: false,
+            adrift: false,
         }
     }
 }
@@ -91,7 +93,8 @@ fn named(wall: &Wall) -> Vec<Cause> {
         beside: wall.beside,
         lacks: &lacks,
     };
-    let passage = Passage { pings: 1000, placed: 1000, drive: wall.drive, ..Passage::default() };
+    let Wall { drive, adrift, .. } = *wall;
+    let passage = Passage { pings: 1000, placed: 1000, drive, adrift, ..Passage::default() };
     let evidence = explain(&case, core::iter::once(&passage), &store, &mut finder);
     assert_eq!(evidence.causes.iter().next(), Some(evidence.cause));
     evidence.causes.iter().collect()
@@ -121,6 +124,7 @@ fn each_cause_alone_is_named() {
         ),
         (Cause::NotPassed, Wall { end_m: 10.1, ..Wall::default() }),
         (Cause::PositionLost, Wall { bare: BARE, is_torn: true, ..Wall::default() }),
+        (Cause::PositionLost, Wall { bare: BARE, adrift: true, ..Wall::default() }),
         (Cause::Unknown, Wall { bare: BARE, ..Wall::default() }),
     ] {
         assert_eq!(named(&wall), [cause], "{:?}", wall.drive);

@@ -18,7 +18,7 @@ use crate::messages::{
     Notices, Outcome, Placed, PlacedEvents, PlacedList, PlacedPing, Requests, Standing, Standings,
 };
 use crate::resources::{Coverage, Digests, Finder, Tally, Target, TunnelDesign, VehicleEntities};
-use headrace_coverage::{Drive, HeadReach, Loss, Sections, Verdict, Visit};
+use headrace_coverage::{Drive, HeadReach, Loss, PassError, Sections, Verdict, Visit};
 use headrace_geometry::time::DurNs;
 use headrace_geometry::tunnel::Profile;
 use headrace_sampling::passes::Situation;
@@ -29,6 +29,8 @@ const LOOK_AROUND: DurNs = DurNs(1_000_000_000);
 const SOON_S: f64 = 5.0;
 /// A vehicle goes back at this speed or faster, m/s.
 const ASTERN_MPS: f64 = -0.02;
+/// So many standard deviations of a pass against the one before make up the target where a speed says nothing.
+const ADRIFT_SD: f64 = 2.0;
 
 #[expect(clippy::too_many_arguments, reason = "a system's arguments are what it reads and writes")]
 pub(super) fn cover(
@@ -190,6 +192,7 @@ fn note_passage(
     let Some(reach) = ping.reach.or_else(|| Some(frontier.0?.latest())) else { return };
     let index = coverage.sections.index_of(reach.middle_m());
     let turns = coverage.frontier.turns();
+    let target_m = coverage.sections.target_m();
     let Some(section) = coverage.sections.get_mut(index) else { return };
     let passage = &mut section.passage;
     passage.pings += 1;
@@ -203,7 +206,11 @@ fn note_passage(
     }
     let Some(fix) = ping.fix else { return };
     passage.placed += 1;
-    passage.drive = passage.drive.or_worse(Drive { speed_mps: fix.speed_mps.abs(), ..*drive });
+    if ADRIFT_SD * PassError::of(&fix).worst_m(profile) > target_m {
+        passage.adrift = true;
+    } else {
+        passage.drive = passage.drive.or_worse(Drive { speed_mps: fix.speed_mps.abs(), ..*drive });
+    }
     section.note_pass(&Visit::of(&fix, ping.valid_at, turns), profile);
 }
 
