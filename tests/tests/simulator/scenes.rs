@@ -1,9 +1,10 @@
 //! The scenes that are shipped: each can be simulated, and names only what its vehicle has.
 
+use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
 use headrace_simulator::Simulation;
-use headrace_tests::scenes;
+use headrace_tests::{scenes, truth};
 
 fn files() -> Vec<PathBuf> {
     let folder = headrace_tests::root().join("deploy/scenes");
@@ -38,4 +39,37 @@ fn every_shipped_scene_can_be_simulated() {
         let added = simulation.added().len();
         assert!(added > 0 && text.contains("motion_within_turn"), "{name}: {added} effects");
     }
+}
+
+/// The page about the scenes tells the metres that their dives have.
+#[test]
+fn every_shipped_scene_shows_what_its_page_says() {
+    let folder = headrace_tests::root().join("deploy/scenes");
+    let page = std::fs::read_to_string(folder.join("README.md")).unwrap();
+    let rows: Vec<Vec<&str>> = page
+        .lines()
+        .filter(|line| line.starts_with("| `"))
+        .map(|line| line.split('|').map(|cell| cell.trim().trim_matches('`')).collect())
+        .collect();
+    let names: BTreeSet<&str> = rows.iter().map(|row| row[1]).collect();
+    let shipped = files().into_iter().filter(|path| path.parent() == Some(&folder));
+    let shipped: BTreeSet<String> =
+        shipped.map(|path| path.file_stem().unwrap().to_string_lossy().into_owned()).collect();
+    assert!(shipped.iter().map(String::as_str).eq(names.iter().copied()), "{shipped:?} and {names:?}");
+    std::thread::scope(|scope| {
+        for half in [0, 1] {
+            let (rows, folder) = (&rows, &folder);
+            scope.spawn(move || {
+                for row in rows.iter().filter(|row| !row[2].is_empty()).skip(half).step_by(2) {
+                    let text = std::fs::read_to_string(folder.join(format!("{}.toml", row[1]))).unwrap();
+                    let load =
+                        |name: &str| std::fs::read(folder.join(name)).map_err(|error| error.to_string());
+                    let summary = truth::dive(&scenes::scene_from(&text, &load)).report.summary;
+                    let told = [summary.pass_m, summary.fail_m, summary.cannot_say_m];
+                    let told = told.map(|metres_m| format!("{}", (100.0 * metres_m).round() / 100.0));
+                    assert_eq!(row[2..5], told, "{}", row[1]);
+                }
+            });
+        }
+    });
 }
