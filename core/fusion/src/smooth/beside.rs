@@ -66,6 +66,10 @@ impl Navigation for BesideNavigation {
         self.navigating.cable_doubt()
     }
 
+    fn stand_s(&self) -> u32 {
+        self.navigating.stand_s()
+    }
+
     fn setting_doubt(&self) -> Option<SettingDoubt> {
         self.navigating.setting_doubt()
     }
