@@ -122,7 +122,7 @@ impl Default for Settings {
             tilt_sd_rad: 2.0 * DEGREE,
             attitude_sd_rad: 1.0 * DEGREE,
             echo_sd_m: 0.03,
-            // Nobody sets it. Of bumps that follow one another over 0.3 m, by what field dives show (docs/field.md).
+            // Nobody sets it: two thirds of the 0.3 m over which the bumps of field dives follow one another (docs/field.md).
             bump_m: 0.2,
             echo_beam_rad: 25.0 * DEGREE,
             range_scale_sd: 0.03,

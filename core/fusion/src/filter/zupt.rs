@@ -130,7 +130,7 @@ impl Stillness {
     /// makes passes unsure is seldom the gyros.
     pub fn lacking_s(&self, now: MonoNs) -> u32 {
         let lacking = ENOUGH.saturating_sub(self.rested);
-        let begins = self.asks_from.is_some_and(|from| now.since(from).0 < ASKS_FOR.0);
+        let begins = self.asks_from.is_some_and(|from| (0..ASKS_FOR.0).contains(&now.since(from).0));
         if lacking == 0 || self.floats || !begins {
             return 0;
         }
@@ -210,5 +210,8 @@ mod tests {
         // Slow, on a coarse counter that stands between its steps, it goes on.
         assert_eq!(lacking_s(sways, |t| math::floor_to_i64(2.0 * t) as f64 * 0.01, 55), 30);
         assert_eq!(lacking_s(|_| 0.0, |t| 0.1 * t, 61), 0, "it has set out");
+        let mut set_back = Stillness::default();
+        set_back.ask_from(MonoNs(3_600_000_000_000));
+        assert_eq!(set_back.lacking_s(MonoNs(0)), 0, "the clock was set back by an hour");
     }
 }

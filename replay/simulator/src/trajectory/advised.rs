@@ -52,7 +52,7 @@ pub(super) struct Heeding {
     pub(super) within: f64,
     /// Whether missed stretches are passed again.
     pub(super) goes_back: bool,
-    /// Whether he stands still when told so, at once or for want of a position, and until he is told anything.
+    /// Whether he stands still when told so, for the gyros' bias or for want of a position, and until he hears the first word.
     pub(super) stands: bool,
     /// How long the pilot waits before he sets out, s.
     pub(super) waits_s: f64,
