@@ -142,9 +142,15 @@ impl PassError {
 
     /// The largest standard deviation of a hole's diameter round the profile, m.
     pub fn worst_m(&self, profile: &Profile) -> f64 {
-        const PLACES: u32 = 64;
-        let place = |k: u32| profile.point_at(profile.perimeter_m() * f64::from(k) / f64::from(PLACES));
-        (0..PLACES).map(|k| self.sd_m(place(k))).fold(0.0, f64::max)
+        profile.places().iter().map(|place| self.sd_m(*place)).fold(0.0, f64::max)
+    }
+
+    /// Whether that is over a limit, m: most passes aren't by far, which is known without looking round the profile.
+    pub fn exceeds(&self, limit_m: f64, profile: &Profile) -> bool {
+        // No wall is farther from a place within the profile than half of the way round it.
+        let here_m = LARGEST_OF_MANY * self.relative.sd_m(Vec3::zero());
+        let at_most_m = here_m + self.slope() * profile.perimeter_m() / 2.0;
+        at_most_m > limit_m && self.worst_m(profile) > limit_m
     }
 
     /// The largest change of that with a metre of wall, m/m.
@@ -198,5 +204,9 @@ mod tests {
         let worst_m = LARGEST_OF_MANY * 0.01 * (3.0 + (y_m - 0.5).abs());
         assert!((error.worst_m(&profile) - worst_m).abs() < 1e-4, "{}", error.worst_m(&profile));
         assert!((error.slope() - LARGEST_OF_MANY * 0.01).abs() < 1e-12);
+        let worst_m = error.worst_m(&profile);
+        for share in [0.3, 0.9, 0.999, 1.001, 1.5, 4.0] {
+            assert_eq!(error.exceeds(share * worst_m, &profile), share < 1.0, "{share}");
+        }
     }
 }

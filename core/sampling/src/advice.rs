@@ -10,11 +10,11 @@ use super::error::SamplingError;
 use super::head::{HeadMode, HeadMotion, HeadSet, HeadSpec, MAX_HEADS};
 use super::layout::{self, HeadLayout};
 use super::losses::LossRate;
-use super::margin::{self, APART_SHARE, Margins};
+use super::margin::{self, Margins};
 use super::occlusion::{self, AngleRange, Obstacle};
 use super::passes::{self, Passes, Phasing, Situation};
 use super::ring::Ring;
-use super::strips::{Going, Strips, View};
+use super::strips::{Going, PARTS, Strips, View};
 use super::swing::Swing;
 use headrace_geometry::frames::{Point3, Pose, Rot};
 use headrace_geometry::math;
@@ -126,7 +126,7 @@ impl Advisor {
         let heads: Vec<AdvisedHead> = advised.collect();
         let room = |head: &AdvisedHead| head.hidden.len() + OUT_OF_REACH;
         let view = |head: &AdvisedHead| View { sector: None, hidden: Vec::with_capacity(room(head)) };
-        let arcs = heads.iter().map(|head| room(head) + 1).sum();
+        let arcs = heads.iter().map(|head| room(head) + PARTS).sum();
         let mut advisor = Self {
             profile: profile.clone(),
             task,
@@ -196,7 +196,8 @@ impl Advisor {
         if situation.speed_mps.abs() > UNDER_WAY_MPS {
             self.astern = situation.speed_mps < 0.0;
         }
-        let phasing = Phasing::of(situation);
+        let sector = |head: usize| self.heads.get(head)?.sector.as_ref();
+        let phasing = Phasing::of(situation).in_sectors_of(situation, sector);
         let passes = phasing.at(situation.speed_mps).beside(self.parallax_rad);
         let ping_period_s =
             situation.heads.iter().flatten().map(HeadMotion::ping_period_s).fold(0.0, f64::max);
@@ -206,8 +207,7 @@ impl Advisor {
             swing_mps: swing.rate_radps * farthest_m,
             shift_m: 0.0,
             apart_m: phasing.apart_m(),
-            // As of errors of position, a hole takes a share of what moves the passes of heads apart.
-            apart_swing_mps: APART_SHARE * swing.apart_rate_radps * farthest_m,
+            apart_swing_mps: phasing.neighbours_apart() * swing.apart_rate_radps * farthest_m,
             swing_most_m: Some(swing.most_rad * farthest_m),
         };
         let sure_m = self.task.target_m - self.margin_m(situation.pass_error_m);
@@ -395,7 +395,7 @@ impl Advisor {
             let v_max_mps = v_mps * (1.0 - SPEED_MARGIN);
             *slot = Some(Alternative { mode: ModeName::new(mode.name), v_max_mps });
             // The mode in which the heads are: all that would change is where they start.
-            if v_max_mps > 0.0 && phasing.apart_m() > 0.0 && self.is_now(mode, passes) {
+            if v_max_mps > 0.0 && phasing.fits_some_speeds() && self.is_now(mode, passes) {
                 anew = Some(Anew { planned_speed_mps: v_max_mps });
             }
         }

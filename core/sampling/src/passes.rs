@@ -1,12 +1,16 @@
 //! Times at which a vehicle's heads pass a place of the wall, and the longest time between two passes.
 
+mod sectors;
+
 use super::error::SamplingError;
 use super::head::{HeadMotion, HeadSet, MAX_HEADS, faces_aft};
 use super::layout::HeadLayout;
 use super::losses::LossRate;
+use super::occlusion::AngleRange;
 use headrace_geometry::frames::{Mount, Pose, Rot, Tunnel, Vec3};
 use headrace_geometry::math::{self, TAU};
 use headrace_geometry::tunnel::{Profile, Yz};
+use sectors::{AT_ONCE, Leg};
 
 /// Below this speed a vehicle is at rest, m/s: its heads' offsets along the hull have no phase.
 const AT_REST_MPS: f64 = 1e-3;
@@ -62,8 +66,9 @@ enum Pattern {
     /// All rotate continuously, in one sense and at one rate: by head, phase of its passes in a turn's advance,
     /// in [0, 1).
     Turning([f64; MAX_HEADS]),
-    /// Each sweeps back and forth; the longest period of a sweep there and back, seconds.
-    Sectors(f64),
+    /// Each sweeps back and forth; the longest period of a sweep there and back, seconds, and how far from evenly after one another
+    /// neighbours come to the end that they share, as a share of the advance in it, 0 to 0.5.
+    Sectors(f64, f64),
     /// Opposite senses, or out of step: passes come at uneven times, and only one head can be relied on.
     Loose,
 }
@@ -75,6 +80,8 @@ pub struct Phasing {
     turns_s: [f64; MAX_HEADS],
     pattern: Pattern,
     ahead_m: [f64; MAX_HEADS],
+    /// Of heads in sectors, where each is on its sweep.
+    legs: [Option<Leg>; MAX_HEADS],
 }
 
 impl Phasing {
@@ -92,7 +99,7 @@ impl Phasing {
                 let sweep_s = |motion: &HeadMotion| {
                     2.0 * motion.sector_rad.unwrap_or(share_rad) / motion.rate_radps.abs()
                 };
-                Pattern::Sectors(motions.iter().flatten().map(sweep_s).fold(0.0, f64::max))
+                Pattern::Sectors(motions.iter().flatten().map(sweep_s).fold(0.0, f64::max), AT_ONCE)
             }
             HeadLayout::PhaseShift if ahead.iter().any(Option::is_none) => Pattern::Loose,
             HeadLayout::PhaseShift => phases(motions).map_or(Pattern::Loose, Pattern::Turning),
@@ -102,15 +109,62 @@ impl Phasing {
             turns_s: motions.map(|motion| motion.map_or(0.0, |motion| motion.turn_period_s())),
             pattern,
             ahead_m: ahead.map(Option::unwrap_or_default),
+            legs: [None; MAX_HEADS],
         }
+    }
+
+    /// The same, where the heads' sectors are known: angles in each one's sensor frame, by number.
+    #[must_use]
+    pub fn in_sectors_of<'a>(
+        self,
+        situation: &Situation,
+        sector: impl Fn(usize) -> Option<&'a AngleRange>,
+    ) -> Self {
+        let mut legs = [None; MAX_HEADS];
+        for (head, (leg, motion)) in legs.iter_mut().zip(&situation.heads).enumerate() {
+            *leg = motion.as_ref().zip(sector(head)).and_then(|(motion, sector)| Leg::of(motion, sector));
+        }
+        Self { legs, ..self }
+    }
+
+    /// Whether heads come to a place evenly after one another in some intervals of speed only: they are apart along the hull, and
+    /// phased with each other.
+    pub fn fits_some_speeds(&self) -> bool {
+        let is_phased = match self.pattern {
+            Pattern::Turning(_) => true,
+            Pattern::Sectors(..) => self.legs.iter().any(Option::is_some),
+            Pattern::Loose => false,
+        };
+        is_phased && self.spread_m() > 0.0
     }
 
     /// Largest distance along the tunnel between the planes in which the heads meet the wall, m; zero for heads that
     /// aren't phased with each other.
     pub fn apart_m(&self) -> f64 {
         let Pattern::Turning(_) = self.pattern else { return 0.0 };
+        self.spread_m()
+    }
+
+    fn spread_m(&self) -> f64 {
         let ahead_m = || self.heads.iter().filter_map(|head| self.ahead_m.get(head)).copied();
         (ahead_m().fold(f64::MIN, f64::max) - ahead_m().fold(f64::MAX, f64::min)).max(0.0)
+    }
+
+    /// How far apart along the hull heads are that follow one another in a schedule, on average, as a share of [`Phasing::apart_m`]: 1 of two
+    /// heads, a half of four of which neighbours are two and two together; zero where none are apart.
+    pub fn neighbours_apart(&self) -> f64 {
+        let apart_m = self.apart_m();
+        if apart_m <= 0.0 {
+            return 0.0;
+        }
+        let ahead_m = |head: usize| self.ahead_m.get(head).copied().unwrap_or_default();
+        let mut before = self.heads.iter().last();
+        let mut sum_m = 0.0;
+        for head in self.heads.iter() {
+            sum_m += before.map_or(0.0, |before| (ahead_m(head) - ahead_m(before)).abs());
+            before = Some(head);
+        }
+        sum_m / (apart_m * self.heads.len() as f64)
     }
 
     /// The same heads with the phases of a schedule of `scheduled` heads for `planned_mps`; zero for a schedule that
@@ -137,7 +191,7 @@ impl Phasing {
     /// Sectors: a place near a sector's end waits for a whole sweep there and back.
     /// Source: Jorge et al. 2021, §5.1 and §5.2.
     pub fn at(&self, speed_mps: f64) -> Passes {
-        let Self { heads, turns_s, mut pattern, ahead_m } = *self;
+        let Self { heads, turns_s, mut pattern, ahead_m, legs } = *self;
         let at_rest = speed_mps.abs() <= AT_REST_MPS;
         if let Pattern::Turning(phases) = &mut pattern {
             for ((phase, ahead_m), turn_s) in phases.iter_mut().zip(ahead_m).zip(turns_s) {
@@ -145,6 +199,12 @@ impl Phasing {
                 let ahead = if apart { ahead_m / speed_mps / turn_s } else { 0.0 };
                 *phase = math::wrap(*phase + ahead, 1.0);
             }
+        }
+        if let Pattern::Sectors(sweep_s, uneven) = &mut pattern
+            && !at_rest
+            && *sweep_s > 0.0
+        {
+            *uneven = sectors::uneven(&legs, &ahead_m.map(|ahead_m| ahead_m / (speed_mps * *sweep_s)));
         }
         Passes { heads, turns_s, pattern, parallax_s: 0.0, at_rest, lossy: false }
     }
@@ -228,7 +288,7 @@ impl Passes {
                 (seen_by.iter().filter(|head| self.heads.has(*head)).count(), self.turn_s())
             }
             // There and back: at a sector's end one right after the other.
-            Pattern::Sectors(sweep_s) => (2, sweep_s),
+            Pattern::Sectors(sweep_s, _) => (2, sweep_s),
             Pattern::Loose => (1, gap_s),
         };
         let (count, needed) = (passing.max(1) as f64, needed.max(1.0));
@@ -261,14 +321,14 @@ impl Passes {
         Ok(Self { heads, turns_s, pattern, parallax_s: 0.0, at_rest: false, lossy: false })
     }
 
-    /// Heads in sectors with a sweep period (there and back) of `sweep_s`, seconds.
+    /// Heads in sectors with a sweep period (there and back) of `sweep_s`, seconds, as a schedule for this speed starts them.
     ///
     /// Errors: no head.
     pub fn in_sectors(heads: HeadSet, sweep_s: f64) -> Result<Self, SamplingError> {
         if heads.is_empty() {
             return Err(SamplingError::HeadCount { heads: 0 });
         }
-        let pattern = Pattern::Sectors(sweep_s);
+        let pattern = Pattern::Sectors(sweep_s, 0.0);
         Ok(Self { heads, turns_s: [0.0; MAX_HEADS], pattern, parallax_s: 0.0, at_rest: false, lossy: false })
     }
 
@@ -283,7 +343,7 @@ impl Passes {
         passing().next()?;
         let turns_s = || passing().filter_map(|head| self.turns_s.get(head)).copied();
         Some(match &self.pattern {
-            Pattern::Sectors(sweep_s) => *sweep_s,
+            Pattern::Sectors(sweep_s, _) => *sweep_s,
             Pattern::Loose => turns_s().fold(f64::INFINITY, f64::min),
             Pattern::Turning(phases) => {
                 let mut known = [0.0; MAX_HEADS];
@@ -299,17 +359,27 @@ impl Passes {
         })
     }
 
+    /// Of heads in sectors, how far from evenly after one another neighbours come to the end that they share: the largest, as a share of
+    /// the advance in a sweep there and back, 0 to 0.5.
+    pub fn uneven_ends(&self) -> Option<f64> {
+        match self.pattern {
+            Pattern::Sectors(_, uneven) => Some(uneven),
+            Pattern::Turning(_) | Pattern::Loose => None,
+        }
+    }
+
     /// The longest turn period of a head, seconds.
     pub fn turn_s(&self) -> f64 {
         self.turns_s.into_iter().fold(0.0, f64::max)
     }
 
-    /// The same heads evenly phased, and without parallax; heads in sectors, or out of step, as they are.
+    /// The same heads evenly phased, and without parallax; heads out of step as they are.
     #[must_use]
     pub fn evened(&self) -> Self {
         let even = match self.pattern {
             Pattern::Turning(_) => Self::evenly_phased(self.heads, |_| self.turn_s()).ok(),
-            Pattern::Sectors(_) | Pattern::Loose => None,
+            Pattern::Sectors(sweep_s, _) => Self::in_sectors(self.heads, sweep_s).ok(),
+            Pattern::Loose => None,
         };
         even.map_or(Self { parallax_s: 0.0, ..*self }, |even| even.lossy(self.lossy))
     }
@@ -319,7 +389,7 @@ impl Passes {
         let turn_s = self.turns_s.into_iter().fold(0.0, f64::max);
         match self.pattern {
             Pattern::Turning(_) => turn_s / self.heads.len().max(1) as f64,
-            Pattern::Sectors(_) | Pattern::Loose => self.gap_s(self.heads).unwrap_or(0.0),
+            Pattern::Sectors(..) | Pattern::Loose => self.gap_s(self.heads).unwrap_or(0.0),
         }
     }
 
@@ -369,177 +439,4 @@ fn body_rate(motion: &HeadMotion) -> f64 {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-
-    fn situation(angles_deg: &[f64], x_m: &[f64]) -> Situation {
-        let mut heads = [None; MAX_HEADS];
-        for ((slot, angle), x) in heads.iter_mut().zip(angles_deg).zip(x_m) {
-            *slot = Some(HeadMotion {
-                mount: Mount { position: Vec3::new(*x, 0.0, 0.0), rotation: Rot::identity() },
-                angle_rad: angle.to_radians(),
-                rate_radps: TAU / 8.0,
-                step_rad: f64::to_radians(0.9),
-                sector_rad: None,
-            });
-        }
-        let configured = angles_deg.len();
-        Situation {
-            pose: None,
-            speed_mps: 0.2,
-            pass_error_m: 0.0,
-            layout: HeadLayout::PhaseShift,
-            configured,
-            heads,
-            losses: [LossRate::default(); MAX_HEADS],
-        }
-    }
-
-    fn passes(angles_deg: &[f64], x_m: &[f64]) -> Passes {
-        Phasing::of(&situation(angles_deg, x_m)).at(0.2)
-    }
-
-    fn all(passes: &Passes) -> f64 {
-        passes.gap_s(passes.heads()).unwrap()
-    }
-
-    #[test]
-    fn evenly_phased_heads_share_the_turn() {
-        let passes = passes(&[10.0, 100.0, 190.0, 280.0], &[0.0; 4]);
-        assert!((all(&passes) - 2.0).abs() < 1e-9 && (passes.even_gap_s() - 2.0).abs() < 1e-12);
-        let errors = passes.phase_errors_rad(4);
-        assert!(errors[..4].iter().all(|error| error.unwrap().abs() < 1e-9) && errors[4].is_none());
-        let planned = Passes::evenly_phased(HeadSet::first(4), |_| 8.0).unwrap();
-        assert!((all(&planned) - 2.0).abs() < 1e-12);
-        // Side by side, they see a place at angles that differ by up to 9 degrees: a fortieth of a turn.
-        assert!((all(&planned.beside(TAU / 40.0)) - 2.2).abs() < 1e-12);
-        assert!((planned.beside(TAU / 40.0).gap_s(HeadSet::first(1)).unwrap() - 8.0).abs() < 1e-12);
-    }
-
-    #[test]
-    fn where_heads_do_not_see_a_place_the_others_leave_longer_gaps() {
-        let passes = Passes::evenly_phased(HeadSet::first(4), |_| 8.0).unwrap();
-        let gap_s =
-            |hidden: [usize; 2]| passes.gap_s(passes.heads().without(hidden[0]).without(hidden[1])).unwrap();
-        // Half a turn apart: doubled. A quarter apart: two passes in a row are missing.
-        assert!((gap_s([0, 2]) - 4.0).abs() < 1e-12 && (gap_s([0, 1]) - 6.0).abs() < 1e-12);
-        assert_eq!(passes.gap_s(HeadSet::default()), None);
-        assert_eq!(passes.gap_s(HeadSet::default().with(6)), None);
-    }
-
-    #[test]
-    fn several_passes_take_as_long_as_the_turn_leaves_them() {
-        let even = Passes::evenly_phased(HeadSet::first(4), |_| 8.0).unwrap();
-        let time_s = |heads: HeadSet, needed: f64| even.time_for_s(heads, even.gap_s(heads).unwrap(), needed);
-        let all = even.heads();
-        assert!((time_s(all, 1.0) - 2.0).abs() < 1e-12 && (time_s(all, 2.5) - 5.0).abs() < 1e-12);
-        assert!((time_s(all, 9.0) - 18.0).abs() < 1e-12);
-        // Two heads a quarter of a turn apart: 6 s, then 2 s.
-        let two = all.without(0).without(1);
-        for (needed, seconds) in [(1.0, 6.0), (1.5, 7.0), (2.0, 8.0), (3.0, 14.0), (4.0, 16.0)] {
-            assert!((time_s(two, needed) - seconds).abs() < 1e-9, "{needed}");
-        }
-        assert!((time_s(HeadSet::first(1), 3.0) - 24.0).abs() < 1e-12);
-        let sectors = Passes::in_sectors(HeadSet::first(2), 8.0).unwrap();
-        for (needed, seconds) in [(1.0, 8.0), (2.0, 8.0), (2.5, 12.0), (3.0, 16.0), (4.0, 16.0)] {
-            assert!((sectors.time_for_s(sectors.heads(), 8.0, needed) - seconds).abs() < 1e-9, "{needed}");
-        }
-    }
-
-    #[test]
-    fn heads_together_pass_together() {
-        let together = passes(&[0.0, 0.0], &[0.0, 0.0]);
-        assert!((all(&together) - 8.0).abs() < 1e-9 && (together.even_gap_s() - 4.0).abs() < 1e-12);
-        assert!((together.phase_errors_rad(2)[1].unwrap().abs() - math::PI).abs() < 1e-9);
-        // Half a pitch apart along the hull, the same angles interleave: 0.2 m/s, 8 s a turn, 0.8 m.
-        let apart = passes(&[0.0, 0.0], &[0.8, 0.0]);
-        assert!((all(&apart) - 4.0).abs() < 1e-9);
-    }
-
-    #[test]
-    fn turned_round_the_vehicle_s_heads_are_apart_the_other_way() {
-        let mut back = situation(&[0.0, 90.0], &[0.9, -0.3]);
-        let out = Phasing::of(&back).at(0.2);
-        let turned = Rot::from_roll_pitch_yaw(0.0, 0.0, math::PI);
-        back.pose = Some(Pose { position: headrace_geometry::frames::Point3::zero(), attitude: turned });
-        // Returning nose first mirrors going out nose first; tail first doesn't.
-        assert!((all(&Phasing::of(&back).at(-0.2)) - all(&out)).abs() < 1e-9);
-        assert!((all(&Phasing::of(&back).at(0.2)) - all(&out)).abs() > 0.1);
-        // Askew, heads are farther apart along the tunnel; with their planes along it, there is no phase.
-        let askew = |yaw: f64| Rot::from_roll_pitch_yaw(0.0, 0.0, yaw);
-        let mount = Mount { position: Vec3::new(1.0, 0.0, 0.0), rotation: Rot::identity() };
-        assert!((ahead_m(&askew(0.5), &mount).unwrap() - 1.0 / math::cos(0.5)).abs() < 1e-12);
-        assert_eq!(ahead_m(&askew(math::FRAC_PI_2), &mount), None);
-    }
-
-    #[test]
-    fn a_head_that_is_late_has_a_positive_error() {
-        // The second of two belongs half a turn ahead; it is 30 degrees short of that.
-        let passes = passes(&[0.0, 150.0], &[0.0, 0.0]);
-        assert!((passes.phase_errors_rad(2)[1].unwrap() - f64::to_radians(30.0)).abs() < 1e-9);
-        // Ten per cent faster than scheduled, a head 1.6 m (a turn's advance) astern is early by a tenth / 1.1 of a turn.
-        let at = |speed| Phasing::of(&situation(&[0.0, 180.0], &[1.6, 0.0])).at(speed).phase_errors_rad(2)[1];
-        assert!(at(0.2).unwrap().abs() < 1e-9);
-        assert!((at(0.22).unwrap() - TAU * (1.0 - 1.0 / 1.1)).abs() < 1e-9, "{:?}", at(0.22));
-        assert_eq!(at(0.0), None);
-    }
-
-    #[test]
-    fn heads_that_all_turn_the_other_way_are_phased_alike_and_opposed_ones_are_not() {
-        let mut mirrored = situation(&[0.0, 180.0], &[0.0, 0.0]);
-        for head in mirrored.heads.iter_mut().flatten() {
-            head.rate_radps = -head.rate_radps;
-        }
-        assert!((all(&Phasing::of(&mirrored).at(0.2)) - 4.0).abs() < 1e-9);
-        if let Some(first) = mirrored.heads.iter_mut().flatten().next() {
-            first.rate_radps = -first.rate_radps;
-        }
-        let opposed = Phasing::of(&mirrored).at(0.2);
-        assert!((all(&opposed) - 8.0).abs() < 1e-9 && opposed.phase_errors_rad(2) == [None; MAX_HEADS]);
-    }
-
-    #[test]
-    fn heads_out_of_step_leave_the_faster_one_to_count_on() {
-        let mut mixed = situation(&[0.0, 180.0], &[0.0, 0.0]);
-        if let Some(second) = mixed.heads.iter_mut().flatten().nth(1) {
-            second.rate_radps = TAU / 21.6;
-        }
-        assert!((all(&Phasing::of(&mixed).at(0.2)) - 8.0).abs() < 1e-9);
-        let planned = Passes::evenly_phased(HeadSet::first(2), |head| 8.0 + 0.01 * head as f64).unwrap();
-        assert!((all(&planned) - 8.0).abs() < 1e-12);
-    }
-
-    #[test]
-    fn a_turning_point_makes_no_sector_of_a_layout_that_turns_on() {
-        let mut jerked = situation(&[0.0, 180.0], &[0.0, 0.0]);
-        for head in jerked.heads.iter_mut().flatten() {
-            head.sector_rad = Some(f64::to_radians(0.9));
-        }
-        assert!((all(&Phasing::of(&jerked).at(0.2)) - 4.0).abs() < 1e-9);
-        // In sectors, a sector that isn't measured yet is half a turn for two heads, there and back.
-        let mut sectors = situation(&[0.0, 180.0], &[0.0, 0.0]);
-        sectors.layout = HeadLayout::SectorOffset;
-        assert!((all(&Phasing::of(&sectors).at(0.2)) - 8.0).abs() < 1e-9);
-        assert_eq!(Phasing::of(&sectors).at(0.2).phase_errors_rad(2), [None; MAX_HEADS]);
-    }
-
-    #[test]
-    fn heads_that_are_left_share_the_turn_evenly() {
-        let three = Passes::evenly_phased(HeadSet::first(4).without(1), |_| 9.0).unwrap();
-        assert!((all(&three) - 3.0).abs() < 1e-12);
-        let none = HeadSet::default();
-        assert_eq!(Passes::evenly_phased(none, |_| 8.0), Err(SamplingError::HeadCount { heads: 0 }));
-        assert_eq!(Passes::in_sectors(none, 16.0), Err(SamplingError::HeadCount { heads: 0 }));
-        assert!((all(&Passes::in_sectors(HeadSet::first(2), 8.0).unwrap()) - 8.0).abs() < 1e-12);
-    }
-
-    #[test]
-    fn parallax_grows_as_the_wall_comes_near() {
-        let wide = headrace_geometry::tunnel::shapes::circle(6.0).unwrap();
-        let narrow = headrace_geometry::tunnel::shapes::circle(1.0).unwrap();
-        let of = |profile: &Profile, z: f64| parallax_rad(profile, &[[0.15, z], [-0.15, z]]);
-        // Seen from 6 m, the heads are 0.3 m apart.
-        assert!((of(&wide, 6.0) - 0.05).abs() < 1e-3 && of(&narrow, 1.0) > 0.29);
-        assert!(parallax_rad(&wide, &[[0.1, 6.0]]) <= 0.0 && parallax_rad(&wide, &[]) <= 0.0);
-    }
-}
+mod tests;

@@ -13,7 +13,7 @@ use super::occlusion::{self, AngleRange, Obstacle};
 use super::passes::{self, Passes};
 use super::ring::{Ring, Standing};
 use super::schedule::Schedule;
-use super::strips::{Arc, Going, Strips, View};
+use super::strips::{Arc, Going, Sector, Strips, View};
 use headrace_geometry::frames::{Point3, Pose, Rot};
 use headrace_geometry::math::TAU;
 use headrace_geometry::tunnel::{Profile, Yz};
@@ -458,7 +458,8 @@ fn views(
         let standing = Standing::new(&inspection.profile, pose, &spec.mount)?;
         let arc = |angles: &AngleRange| Arc::of(&standing, angles);
         let sector = program.sector.map(|(from_rad, size_rad)| AngleRange { from_rad, size_rad });
-        let mut view = View { sector: sector.as_ref().map(arc).transpose()?, hidden: Vec::new() };
+        let sector = sector.map(|angles| Sector::of(&standing, &angles)).transpose()?;
+        let mut view = View { sector, hidden: Vec::new() };
         view.hidden = hidden.iter().map(arc).collect::<Result<_, _>>()?;
         view.hidden.reserve(OUT_OF_REACH);
         view.hide_out_of_reach(ring, spec.reach_m(inspection.sound_speed_mps));

@@ -4,113 +4,28 @@ use serde::{Deserialize, Serialize};
 
 use super::error::SamplingError;
 use super::head::{HeadSet, MAX_HEADS};
-use super::occlusion::AngleRange;
 use super::passes::Passes;
-use super::ring::{Ring, Sounding, Standing};
-use super::spacing;
+use super::ring::{Ring, Sounding};
 use headrace_geometry::math;
 use headrace_snapshot::stateful;
 
+mod arc;
+mod limit;
 mod lossy;
+mod sector;
 mod thin;
+mod view;
 
+use limit::Limit;
 use thin::Thin;
+
+pub use arc::Arc;
+pub use limit::Going;
+pub use sector::{PARTS, Sector};
+pub use view::View;
 
 /// Strips narrower than this are rounding errors, m.
 const NO_WIDTH_M: f64 = 1e-9;
-
-/// An interval of the perimeter.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub struct Arc {
-    /// Arc length of its start, m.
-    pub from_m: f64,
-    /// Its length in the direction of growing arc length, m.
-    pub length_m: f64,
-}
-
-impl Arc {
-    /// The part of the wall covered by a range of head angles.
-    ///
-    /// Errors: as for [`Standing::sounding`].
-    pub fn of(standing: &Standing<'_>, angles: &AngleRange) -> Result<Self, SamplingError> {
-        let arc_m = |angle_rad| standing.sounding(angle_rad).map(|sounding| sounding.arc_m);
-        let perimeter_m = standing.perimeter_m();
-        if angles.size_rad >= math::TAU {
-            return Ok(Self { from_m: 0.0, length_m: perimeter_m });
-        }
-        let (first, last) = (arc_m(angles.from_rad)?, arc_m(angles.from_rad + angles.size_rad)?);
-        let (middle, whole) = (
-            math::wrap(arc_m(angles.middle_rad())? - first, perimeter_m),
-            math::wrap(last - first, perimeter_m),
-        );
-        // A head that faces aft sweeps the wall in the other direction.
-        Ok(if middle <= whole {
-            Self { from_m: first, length_m: whole }
-        } else {
-            Self { from_m: last, length_m: perimeter_m - whole }
-        })
-    }
-
-    /// From the start of this arc to the end of the next, in the head's direction of rotation.
-    fn on_to(&self, next: &Self, forward: bool, perimeter_m: f64) -> Self {
-        let (first, last) = if forward { (self, next) } else { (next, self) };
-        let length_m = math::wrap(last.from_m + last.length_m - first.from_m, perimeter_m);
-        Self { from_m: first.from_m, length_m }
-    }
-
-    fn has(&self, arc_m: f64, perimeter_m: f64) -> bool {
-        math::wrap(arc_m - self.from_m, perimeter_m) <= self.length_m
-    }
-}
-
-/// The parts of the wall that one head sees.
-#[derive(Debug, Clone, PartialEq, Default)]
-pub struct View {
-    /// Its sector; `None` for the whole perimeter.
-    pub sector: Option<Arc>,
-    /// Arcs hidden from it, by the vehicle or out of its reach.
-    pub hidden: Vec<Arc>,
-}
-
-stateful!(View { state: sector; lists: hidden; });
-
-impl View {
-    /// Hides the parts of a ring nearer or farther than the head's reach. Without capacity for another arc, the last is
-    /// extended over the visible part between: hiding too much is the safe side.
-    ///
-    /// Allocates: not with capacity for one arc.
-    pub fn hide_out_of_reach(&mut self, ring: &Ring, reach_m: [f64; 2]) {
-        let [least_m, most_m] = reach_m;
-        let heard = |range_m: f64| (least_m..=most_m).contains(&range_m);
-        let soundings = ring.soundings();
-        let Some(first) = soundings.iter().position(|sounding| heard(sounding.range_m())) else {
-            self.hidden.clear();
-            self.hidden.push(Arc { from_m: 0.0, length_m: ring.perimeter_m() });
-            return;
-        };
-        let mut began: Option<f64> = None;
-        let mut before_m = 0.0;
-        for sounding in soundings.iter().cycle().skip(first).take(soundings.len() + 1) {
-            match (heard(sounding.range_m()), began) {
-                (false, None) => began = Some(before_m),
-                (true, Some(from_m)) => {
-                    let way_m = math::wrap_signed(sounding.arc_m - from_m, ring.perimeter_m());
-                    let forward = ring.way_round_m() >= 0.0;
-                    let (from_m, way_m) = if forward { (from_m, way_m) } else { (sounding.arc_m, -way_m) };
-                    let arc = Arc { from_m, length_m: math::wrap(way_m, ring.perimeter_m()) };
-                    let full = self.hidden.len() == self.hidden.capacity();
-                    match self.hidden.last_mut().filter(|_| full) {
-                        Some(last) => *last = last.on_to(&arc, forward, ring.perimeter_m()),
-                        None => self.hidden.push(arc),
-                    }
-                    began = None;
-                }
-                _ => {}
-            }
-            before_m = sounding.arc_m;
-        }
-    }
-}
 
 /// A strip of the wall along the tunnel.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -122,23 +37,16 @@ pub struct Strip {
     /// All or part of it is hidden from a head: pings stop up to a step before its edge. Where it is only outside a
     /// sector, they stop at its edge.
     pub hidden: bool,
+    /// The longest wait between two passes, as a share of the longest anywhere, which is at the ends of a sector: 0.5 to 1.
+    pub wait: f64,
 }
 
-/// Vehicle motion for the prediction of spacing.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct Going {
-    /// Time between two pings, the longest of any head, seconds.
-    pub ping_period_s: f64,
-    /// Largest speed of the beams along the wall due to swing, in addition to the vehicle's speed, m/s.
-    pub swing_mps: f64,
-    /// Displacement of passes from their places at any speed, m.
-    pub shift_m: f64,
-    /// Distance between heads along the hull, m: the swing acts while the vehicle covers it.
-    pub apart_m: f64,
-    /// Largest speed of the beams along the wall due to swing, averaged over that time, m/s.
-    pub apart_swing_mps: f64,
-    /// Limit of the swing's displacement over any time, m; `None` if unknown.
-    pub swing_most_m: Option<f64>,
+impl Strip {
+    /// Whether another one differs in its place alone.
+    fn is_like(&self, other: &Self) -> bool {
+        let same_wait = (self.wait - other.wait).abs() <= 0.0;
+        self.seen_by == other.seen_by && self.hidden == other.hidden && same_wait
+    }
 }
 
 /// The largest speed for a target, and T_y where it limits that speed.
@@ -150,7 +58,8 @@ pub struct Bound {
     pub t_y_m: f64,
 }
 
-/// Strips of the wall, in order of arc length, neighbours seen by different heads; one strip where all heads see all.
+/// Strips of the wall, in order of arc length, neighbours seen by different heads or after different waits; one strip where all heads
+/// see all.
 /// Holds the largest steps on each strip for each of several settings of the heads.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Strips {
@@ -184,11 +93,12 @@ impl Strips {
     /// Builds the strips of these views, without steps.
     ///
     /// Allocates: not with capacity for their sectors and hidden arcs.
-    pub fn rebuild(&mut self, perimeter_m: f64, views: &[View]) {
+    pub fn rebuild<'a>(&mut self, perimeter_m: f64, views: &'a [View]) {
         self.perimeter_m = perimeter_m;
         self.steps_m.clear();
         self.edges_m.clear();
-        for arc in views.iter().flat_map(|view| view.sector.iter().chain(&view.hidden)) {
+        let arcs = |view: &'a View| view.sector.iter().flat_map(Sector::parts).chain(&view.hidden);
+        for arc in views.iter().flat_map(arcs) {
             self.edges_m.push(math::wrap(arc.from_m, perimeter_m));
             self.edges_m.push(math::wrap(arc.from_m + arc.length_m, perimeter_m));
         }
@@ -206,7 +116,7 @@ impl Strips {
             self.strips.push(strip(views, Arc { from_m: 0.0, length_m: perimeter_m }, perimeter_m));
         }
         self.strips.dedup_by(|b, a| {
-            let alike = a.seen_by == b.seen_by && a.hidden == b.hidden;
+            let alike = a.is_like(b);
             if alike {
                 a.arc.length_m += b.arc.length_m;
             }
@@ -217,11 +127,10 @@ impl Strips {
 
     /// Joins the last strip and the first across the seam where they are alike.
     fn join_at_the_seam(&mut self) {
-        let alike = |a: &Strip, b: &Strip| a.seen_by == b.seen_by && a.hidden == b.hidden;
         let first = self.strips.first().copied();
         if self.strips.len() > 1
             && let (Some(first), Some(last)) = (first, self.strips.last_mut())
-            && alike(&first, last)
+            && first.is_like(last)
         {
             last.arc.length_m += first.arc.length_m;
             self.strips.remove(0);
@@ -287,6 +196,17 @@ impl Strips {
         self.strips.get(number_at(&self.strips, arc_m, self.perimeter_m))
     }
 
+    /// A strip with those beside it that the same heads see after other waits.
+    fn seen_alike(&self, k: usize) -> Arc {
+        let count = self.strips.len();
+        let Some(strip) = self.strips.get(k) else { return Arc { from_m: 0.0, length_m: 0.0 } };
+        let is_alike = |beside: &&Strip| beside.seen_by == strip.seen_by && beside.hidden == strip.hidden;
+        let alike = |number: usize| Some(self.strips.get(number % count).filter(is_alike)?.arc.length_m);
+        let forward_m: f64 = (k..k + count).map_while(alike).sum();
+        let back_m: f64 = (1..count).map_while(|step| alike(k + count - step)).sum();
+        Arc { from_m: strip.arc.from_m - back_m, length_m: (forward_m + back_m).min(self.perimeter_m) }
+    }
+
     /// The largest step of any head on the strips that it sees, in a setting, m.
     pub fn largest_step_m(&self, setting: usize) -> f64 {
         let count = self.strips.len();
@@ -329,10 +249,18 @@ impl Strips {
         target_m: f64,
         going: &Going,
     ) -> Option<f64> {
-        let count = self.strips.len();
-        let of_setting = self.steps_m.iter().skip(setting * count).take(count);
-        let t_y_m = of_setting.map(|steps| steps[1]).fold(0.0, f64::max);
-        Limit { gap_s: passes.gap_s(passes.heads())?, t_y_m }.speed_mps(target_m, going)
+        let of_setting = self.steps_m.iter().skip(setting * self.strips.len());
+        let gap_s = passes.gap_s(passes.heads())?;
+        let limit = |(strip, steps): (&Strip, &[f64; 2])| Limit {
+            gap_s: strip.wait * gap_s,
+            t_y_m: steps[1],
+            uneven: None,
+        };
+        let mut slowest_mps = f64::INFINITY;
+        for limit in self.strips.iter().zip(of_setting).map(limit) {
+            slowest_mps = slowest_mps.min(limit.speed_mps(target_m, going)?);
+        }
+        Some(slowest_mps)
     }
 
     /// T predicted on each strip at a speed, m.
@@ -361,7 +289,7 @@ impl Strips {
         going: &Going,
     ) -> Result<Bound, SamplingError> {
         let mut slowest = Bound { speed_mps: f64::INFINITY, t_y_m: 0.0 };
-        for (strip, within, across) in self.limits(setting, passes) {
+        for (k, within, across) in self.limits(setting, passes) {
             let limits = || [within, across].into_iter().flatten();
             let bounds = limits().filter_map(|limit| {
                 let speed_mps = limit.speed_mps(target_m, going)?;
@@ -369,12 +297,12 @@ impl Strips {
             });
             let fastest = bounds.max_by(|a, b| a.speed_mps.total_cmp(&b.speed_mps));
             let t_y_m = limits().map(|limit| limit.t_y_m).fold(f64::INFINITY, f64::min);
-            let arc = strip.arc;
             let refused = if within.is_some() && t_y_m >= target_m {
                 SamplingError::AngularStep { target_m, t_y_m }
             } else if within.is_some() {
                 SamplingError::OffAxis { target_m }
             } else {
+                let arc = self.seen_alike(k);
                 let arc_m = math::wrap(arc.from_m + arc.length_m / 2.0, self.perimeter_m);
                 SamplingError::UnseenStrip { target_m, width_m: arc.length_m, arc_m }
             };
@@ -391,33 +319,36 @@ impl Strips {
         &self,
         setting: usize,
         passes: &Passes,
-    ) -> impl Iterator<Item = (&Strip, Option<Limit>, Option<Limit>)> {
+    ) -> impl Iterator<Item = (usize, Option<Limit>, Option<Limit>)> {
         let thin = Thin::of(passes, self.strips.iter().map(|strip| strip.seen_by));
         self.strips.iter().enumerate().map(move |(k, strip)| {
             let (within, across) =
                 (self.within(setting, (k, strip), &thin), self.across(setting, (k, strip), &thin));
-            (strip, within, across)
+            (k, within, across)
         })
     }
 
     fn within(&self, setting: usize, (k, strip): (usize, &Strip), thin: &Thin<'_>) -> Option<Limit> {
         let t_y_m = self.steps_m.get(setting * self.strips.len() + k).map_or(0.0, |steps| steps[0]);
-        let gap_s = thin.gap_s(k, strip.seen_by)?;
+        let gap_s = strip.wait * thin.gap_s(k, strip.seen_by)?;
         let [needed, _] = self.needed(setting, k, thin);
-        Some(Limit { gap_s: thin.time_for_s(strip.seen_by, gap_s, needed), t_y_m })
+        Some(Limit { gap_s: thin.time_for_s(strip.seen_by, gap_s, needed), t_y_m, uneven: None })
     }
 
     fn across(&self, setting: usize, (k, strip): (usize, &Strip), thin: &Thin<'_>) -> Option<Limit> {
         (!thin.is_full(k, strip.seen_by) && thin.best_s().is_finite())
             .then(|| {
                 let [_, needed] = self.needed(setting, k, thin);
-                Limit { gap_s: needed * thin.best_s(), t_y_m: self.across_m(setting, k, thin) }
+                let (t_y_m, is_left_out) = self.across_m(setting, k, thin);
+                let uneven = thin.uneven_ends().filter(|_| is_left_out);
+                Limit { gap_s: needed * thin.best_s(), t_y_m, uneven }
             })
             .filter(|limit| limit.t_y_m < self.perimeter_m)
     }
 
-    /// Distance between the samples on either side of the strips around strip `k` that are thin, m.
-    fn across_m(&self, setting: usize, k: usize, gaps: &Thin<'_>) -> f64 {
+    /// Distance between the samples on either side of the strips around strip `k` that are thin, m, and whether they are no more than
+    /// what sectors leave out.
+    fn across_m(&self, setting: usize, k: usize, gaps: &Thin<'_>) -> (f64, bool) {
         let count = self.strips.len();
         let thin = |number: usize| {
             let number = number % count;
@@ -425,15 +356,16 @@ impl Strips {
         };
         let forward = (k..k + count).map_while(&thin);
         let back = (1..count).map(|step| k + count - step).map_while(&thin);
-        let (mut width_m, mut step_m, mut hidden) = (0.0, 0.0_f64, false);
+        let (mut width_m, mut step_m, mut hidden, mut is_left_out) = (0.0, 0.0_f64, false, true);
         for number in forward.chain(back) {
             let Some(strip) = self.strips.get(number) else { continue };
             width_m += strip.arc.length_m;
             hidden |= strip.hidden;
+            is_left_out &= strip.seen_by.is_empty() && !strip.hidden;
             step_m = step_m.max(self.steps_m.get(setting * count + number).map_or(0.0, |steps| steps[1]));
         }
         // Pings end at a sector's edge, but up to a step before a hidden arc.
-        width_m.min(self.perimeter_m) + if hidden { 2.0 * step_m } else { 0.0 }
+        (width_m.min(self.perimeter_m) + if hidden { 2.0 * step_m } else { 0.0 }, is_left_out)
     }
 }
 
@@ -492,58 +424,18 @@ fn note_on(strip: &Strip, steps_m: &mut [f64; 2], head: usize, step_m: f64) {
     steps_m[1] = steps_m[1].max(step_m);
 }
 
-/// Limit of T: time between passes, and distance between neighbours around the wall.
-#[derive(Debug, Clone, Copy)]
-struct Limit {
-    gap_s: f64,
-    t_y_m: f64,
-}
-
-impl Limit {
-    fn t_m(&self, speed_mps: f64, going: &Going) -> f64 {
-        let over_ground_mps = speed_mps + going.swing_mps;
-        let lag_m2ps = going.apart_swing_mps * going.apart_m;
-        let lag_m = if lag_m2ps > 0.0 { lag_m2ps / speed_mps } else { 0.0 };
-        let swung_m = over_ground_mps * self.gap_s + going.shift_m + lag_m;
-        let at_most_m = going.swing_most_m.map(|most_m| speed_mps * self.gap_s + going.shift_m + most_m);
-        let t_x_m = at_most_m.map_or(swung_m, |at_most_m| swung_m.min(at_most_m));
-        spacing::t_max_m(t_x_m, over_ground_mps * going.ping_period_s, self.t_y_m)
-    }
-
-    /// The largest speed that solves T = hypot((v + w) t + shift + u a / v, T_y), with t the sum of gap and ping
-    /// period, w the swing speed, u that between heads, and a their distance; or, if faster, the same with the swing's limit
-    /// between passes.
-    fn speed_mps(&self, target_m: f64, going: &Going) -> Option<f64> {
-        let along_m = spacing::along_m(target_m, self.t_y_m)?;
-        let bounded = going.swing_most_m.and_then(|most_m| self.bounded_mps(along_m, most_m, going));
-        self.swung_mps(along_m, going).into_iter().chain(bounded).max_by(f64::total_cmp)
-    }
-
-    fn bounded_mps(&self, along_m: f64, most_m: f64, going: &Going) -> Option<f64> {
-        let time_s = self.gap_s + going.ping_period_s;
-        let for_speed_m = along_m - going.shift_m - most_m - going.swing_mps * going.ping_period_s;
-        (time_s > 0.0 && for_speed_m > 0.0).then(|| for_speed_m / time_s)
-    }
-
-    fn swung_mps(&self, along_m: f64, going: &Going) -> Option<f64> {
-        let time_s = self.gap_s + going.ping_period_s;
-        let for_speed_m = along_m - going.shift_m - going.swing_mps * time_s;
-        let rest = for_speed_m * for_speed_m - 4.0 * time_s * going.apart_swing_mps * going.apart_m;
-        let possible = time_s > 0.0 && for_speed_m > 0.0 && rest >= 0.0;
-        possible.then(|| (for_speed_m + math::sqrt(rest)) / (2.0 * time_s))
-    }
-}
-
 fn strip(views: &[View], arc: Arc, perimeter_m: f64) -> Strip {
     let middle_m = arc.from_m + arc.length_m / 2.0;
     let hides = |view: &View| view.hidden.iter().any(|hidden| hidden.has(middle_m, perimeter_m));
-    let sees =
-        |view: &View| view.sector.is_none_or(|sector| sector.has(middle_m, perimeter_m)) && !hides(view);
-    let heads = views.iter().take(MAX_HEADS).enumerate().filter(|(_, view)| sees(view));
+    let wait = |view: &View| view.sector.map_or(Some(1.0), |sector| sector.wait(middle_m, perimeter_m));
+    let heads = || views.iter().take(MAX_HEADS).enumerate();
+    let sees = |(_, view): &(usize, &View)| wait(view).is_some() && !hides(view);
+    let seen = || heads().filter(sees);
     Strip {
         arc,
-        seen_by: heads.fold(HeadSet::default(), |set, (head, _)| set.with(head)),
+        seen_by: seen().fold(HeadSet::default(), |set, (head, _)| set.with(head)),
         hidden: views.iter().any(hides),
+        wait: seen().filter_map(|(_, view)| wait(view)).reduce(f64::max).unwrap_or(1.0),
     }
 }
 

@@ -60,15 +60,15 @@ fn a_plan_with_drift_yaw_and_a_deadline_in_words() {
 
                                        T_y at rest, m         at  T_x, m, seen by   T_max  sure to hit, m   v_max   hours
       mode     step   turn  overlap    min   mean  worst     m/s    all    fewest       m   once    twice     m/s  needed
-      slow      0.3 ~ 37.60     4.67  0.016  0.030  0.108   0.065  2.437     2.437   2.441   2.44     4.88   0.015   124.0
-      medium    0.6 ~ 18.80     2.33  0.032  0.060  0.213   0.065  1.219     1.219   1.239   1.24     2.48   0.029    65.3
-      fast      0.9 ~ 13.33     1.56  0.049  0.090  0.315   0.065  0.864     0.864   0.922   0.92     1.84   0.038    50.9
-    * faster    1.2 ~ 10.60     1.17  0.065  0.120  0.414   0.065  0.687     0.687   0.804   0.80     1.61   0.040    47.6
-      fastest   2.4 ~  6.80     0.58  0.130  0.239  0.782   0.065  0.441     0.441   0.899   0.90     1.80    none
+      slow      0.3 ~ 37.60     4.67  0.016  0.030  0.108   0.065  2.437     2.437   2.439   2.44     4.88   0.015   122.2
+      medium    0.6 ~ 18.80     2.33  0.032  0.060  0.213   0.065  1.219     1.219   1.223   1.22     2.45   0.031    61.5
+      fast      0.9 ~ 13.33     1.56  0.049  0.090  0.315   0.065  0.864     0.864   0.874   0.87     1.75   0.044    44.2
+    * faster    1.2 ~ 10.60     1.17  0.065  0.120  0.414   0.065  0.687     0.687   0.706   0.71     1.41   0.054    35.7
+      fastest   2.4 ~  6.80     0.58  0.130  0.239  0.782   0.065  0.441     0.441   0.830   0.83     1.66    none
 
     fastest: a target of 0.6 m is met at no speed: neighbours of one turn are 0.782 m apart, whatever the speed
     * finest at this speed: faster; it misses the target
-    faster: 0.041 m/s by geometry
+    faster: 0.055 m/s by geometry
     ~ extrapolated from another range setting; measure the turn period and add it to the vehicle file
     start angles in faster at 0.065 m/s, degrees, + growing: head_0 0.0+ within 0 to 180; head_1 180.0+ within 180 to 360
     ");

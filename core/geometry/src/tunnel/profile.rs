@@ -24,6 +24,8 @@ pub use plane::Yz;
 const SAME_POINT_M: f64 = 1e-9;
 /// Polygons of more elements than this have a table of how far they reach.
 const MANY: usize = 256;
+/// Number of [`Profile::places`].
+const PLACES: u32 = 64;
 
 /// A design profile. Arc length grows from the floor's centre via the left wall, in [0, perimeter).
 #[derive(Debug, Clone, PartialEq)]
@@ -34,6 +36,8 @@ pub struct Profile {
     support: Option<Support>,
     perimeter_m: f64,
     reference: Yz,
+    /// Places as far apart as one another, from the floor's centre on.
+    places: Vec<Yz>,
 }
 
 /// Intersection of a ray with the wall.
@@ -142,7 +146,10 @@ impl Profile {
         let is_polygon = elements.iter().all(|element| element.shape == Shape::Line);
         let points = || elements.iter().map(|element| element.start).collect::<Vec<_>>();
         let support = (elements.len() > MANY && is_polygon).then(|| Support::of(&points()));
-        Ok(Self { elements, tree, support, perimeter_m, reference })
+        let mut profile = Self { elements, tree, support, perimeter_m, reference, places: Vec::new() };
+        let place = |k: u32| profile.point_at(perimeter_m * f64::from(k) / f64::from(PLACES));
+        profile.places = (0..PLACES).map(place).collect();
+        Ok(profile)
     }
 
     /// Length of the closed curve, m.
@@ -192,6 +199,11 @@ impl Profile {
         let arc = math::wrap(arc_m, self.perimeter_m);
         let index = self.elements.partition_point(|element| element.arc_m <= arc).saturating_sub(1);
         self.elements.get(index).map_or(self.reference, |element| element.point_at(arc - element.arc_m))
+    }
+
+    /// Sixty-four places round the wall, evenly from the floor's centre on: what is asked for often and needn't be exact is asked there.
+    pub fn places(&self) -> &[Yz] {
+        &self.places
     }
 
     /// Clock position of an arc length, seen from the reference point looking along the tunnel, to the nearest half

@@ -206,7 +206,7 @@ fn note_passage(
     }
     let Some(fix) = ping.fix else { return };
     passage.placed += 1;
-    if ADRIFT_SD * PassError::of(&fix).worst_m(profile) > target_m {
+    if PassError::of(&fix).exceeds(target_m / ADRIFT_SD, profile) {
         passage.adrift = true;
     } else {
         passage.drive = passage.drive.or_worse(Drive { speed_mps: fix.speed_mps.abs(), ..*drive });

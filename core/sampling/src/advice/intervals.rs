@@ -55,14 +55,14 @@ impl Driving<'_> {
     pub(super) fn fastest_mps(&self, last_mps: Option<f64>) -> f64 {
         let highest = |more: f64| {
             let meets = |speed_mps: f64| self.meets(speed_mps, more);
-            if self.phasing.apart_m() > 0.0 {
+            if self.phasing.fits_some_speeds() {
                 search::downwards_mps(self.bound_mps, meets)
             } else {
                 search::highest_mps(self.bound_mps, meets)
             }
         };
         let top_mps = highest(0.0);
-        let Some(last_mps) = last_mps.filter(|_| self.phasing.apart_m() > 0.0) else { return top_mps };
+        let Some(last_mps) = last_mps.filter(|_| self.phasing.fits_some_speeds()) else { return top_mps };
         if top_mps < last_mps * (1.0 - NEAR) {
             return self.kept_mps(last_mps).unwrap_or(top_mps);
         }
@@ -87,7 +87,7 @@ impl Driving<'_> {
         const STEP: f64 = 0.99;
         /// Slower than this share of it, nobody wants to go.
         const SLOWEST: f64 = 0.2;
-        if self.phasing.apart_m() <= 0.0 {
+        if !self.phasing.fits_some_speeds() {
             return 0.0;
         }
         let mut good = speed_mps;

@@ -4,7 +4,7 @@ use crate::error::SamplingError;
 use crate::head::{HeadMode, HeadSpec};
 use crate::occlusion::AngleRange;
 use crate::ring::{Ring, Standing};
-use crate::strips::{Arc, View};
+use crate::strips::{Arc, Sector, View};
 use headrace_geometry::frames::Pose;
 use headrace_geometry::tunnel::Profile;
 use headrace_snapshot::stateful;
@@ -83,7 +83,7 @@ impl AdvisedHead {
     pub(super) fn look(&self, profile: &Profile, pose: &Pose, sound_speed_mps: f64, view: &mut View) {
         view.hidden.clear();
         let Ok(standing) = Standing::new(profile, pose, &self.spec.mount) else { return };
-        view.sector = self.sector.and_then(|angles| Arc::of(&standing, &angles).ok());
+        view.sector = self.sector.and_then(|angles| Sector::of(&standing, &angles).ok());
         view.hidden.extend(self.hidden.iter().filter_map(|angles| Arc::of(&standing, angles).ok()));
         view.hide_out_of_reach(&self.ring, self.spec.reach_m(sound_speed_mps));
     }

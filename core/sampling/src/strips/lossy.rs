@@ -11,18 +11,23 @@ impl Strips {
     ///
     /// Allocates: not with capacity for the settings.
     pub fn count_losses(&mut self, setting: usize, target_m: f64, rates: &[Option<LossRate>; MAX_HEADS]) {
-        let Self { strips, steps_m, needed, .. } = self;
-        let first = setting * strips.len();
-        needed.resize(steps_m.len(), [1.0; 2]);
+        let first = setting * self.strips.len();
+        self.needed.resize(self.steps_m.len(), [1.0; 2]);
         let lost = |heads: HeadSet| heads.iter().filter_map(|head| *rates.get(head)?);
         let all = HeadSet::first(MAX_HEADS);
-        let slots = needed.iter_mut().skip(first).zip(steps_m.iter().skip(first));
-        for (strip, (slot, [own_m, most_m])) in strips.iter().zip(slots) {
-            let sampled = |t_y_m: f64| Sampled { target_m, t_y_m, perimeter_m: strip.arc.length_m };
-            *slot = [
-                sampled(*own_m).passes_needed(lost(strip.seen_by)),
-                sampled(*most_m).passes_needed(lost(all)),
+        for k in 0..self.strips.len() {
+            let (Some(strip), Some(steps_m)) = (self.strips.get(k), self.steps_m.get(first + k)) else {
+                return;
+            };
+            let perimeter_m = self.seen_alike(k).length_m;
+            let sampled = |t_y_m: f64| Sampled { target_m, t_y_m, perimeter_m };
+            let passes = [
+                sampled(steps_m[0]).passes_needed(lost(strip.seen_by)),
+                sampled(steps_m[1]).passes_needed(lost(all)),
             ];
+            if let Some(slot) = self.needed.get_mut(first + k) {
+                *slot = passes;
+            }
         }
     }
 

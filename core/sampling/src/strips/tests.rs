@@ -1,4 +1,7 @@
 use super::*;
+use crate::occlusion::AngleRange;
+use crate::ring::Standing;
+use crate::spacing;
 use headrace_geometry::frames::{Mount, Point3, Pose, Rot, Vec3};
 use headrace_geometry::tunnel::{Profile, shapes};
 
@@ -58,7 +61,7 @@ fn closed(target_m: f64, t_y_m: f64, gap_s: f64) -> f64 {
 #[test]
 fn where_all_see_all_there_is_one_strip() {
     let one = strips(&[all_around(&[]), all_around(&[])]);
-    let whole = Strip { arc: arc(0.0, 30.0), seen_by: HeadSet::first(2), hidden: false };
+    let whole = Strip { arc: arc(0.0, 30.0), seen_by: HeadSet::first(2), hidden: false, wait: 1.0 };
     assert_eq!(one.as_slice(), [whole]);
     assert!((one.largest_step_m(0) - 0.2).abs() < 1e-9);
     let v = speed(&one, &turning(2), 0.5).unwrap();
@@ -118,15 +121,74 @@ fn a_strip_that_no_head_sees_can_make_every_speed_too_high() {
 #[test]
 fn sectors_that_leave_a_place_out_are_noticed_and_pinged_up_to_their_ends() {
     let views = [
-        View { sector: Some(arc(0.2, 14.8)), hidden: Vec::new() },
-        View { sector: Some(arc(15.0, 14.9)), hidden: Vec::new() },
+        View { sector: Some(Sector::evenly(arc(0.2, 14.8))), hidden: Vec::new() },
+        View { sector: Some(Sector::evenly(arc(15.0, 14.9))), hidden: Vec::new() },
     ];
     let passes = Passes::in_sectors(HeadSet::first(2), 8.0).unwrap();
     let some = strips(&views);
     let unseen: Vec<&Strip> = some.as_slice().iter().filter(|strip| strip.seen_by.is_empty()).collect();
     assert!(unseen.len() == 1 && (unseen[0].arc.length_m - 0.3).abs() < 1e-9);
+    // Wide enough for the target, it is the end of a sector that counts; else the circle through three samples, two of them on one
+    // side and 8 s apart, the third between them on the other.
     let v = speed(&some, &passes, 1.0).unwrap();
-    assert!((v - closed(1.0, 0.3, 8.0)).abs() < 1e-9);
+    assert!((v - closed(1.0, 0.2, 8.0)).abs() < 1e-9);
+    let v = speed(&some, &passes, 0.35).unwrap();
+    let apart_m = v * (8.0 + PING_S);
+    assert!((0.3 + apart_m * apart_m / 1.2 - 0.35).abs() < 1e-9, "{v}");
+    assert!((some.t_max_m(0, &passes, v, &GOING) - 0.35).abs() < 1e-9);
+}
+
+/// Against the samples themselves: of two heads in the middle of a rectangle, whose corners lie within their sectors.
+#[test]
+fn in_sectors_a_long_step_counts_with_the_wait_where_it_is() {
+    let (target_m, sweep_s, count) = (0.5, 8.0, 75);
+    let profile = shapes::rectangle(6.0, 4.0).unwrap();
+    let ring = ring(&profile);
+    let perimeter_m = profile.perimeter_m();
+    // The first from the floor's centre up the left side to the roof's, the other down again.
+    let half = perimeter_m / 2.0;
+    let views = [0.0, half].map(|from_m| {
+        let [y, z] = profile.reference();
+        let pose = Pose { position: Point3::new(0.0, y, z), attitude: Rot::identity() };
+        let mount = Mount { position: Vec3::zero(), rotation: Rot::identity() };
+        let standing = Standing::new(&profile, &pose, &mount).unwrap();
+        let from_rad = if from_m > 0.0 { math::TAU / 2.0 } else { 0.0 };
+        let angles = AngleRange { from_rad, size_rad: math::TAU / 2.0 };
+        View { sector: Some(Sector::of(&standing, &angles).unwrap()), hidden: Vec::new() }
+    });
+    let mut strips = Strips::default();
+    strips.rebuild(perimeter_m, &views);
+    let stride = SOUNDINGS as usize / (2 * count);
+    strips.measure(1, [&ring, &ring].into_iter(), |_, _| Some(stride));
+    let going = Going { ping_period_s: sweep_s / (2 * count) as f64, ..GOING };
+    let passes = Passes::in_sectors(HeadSet::first(2), sweep_s).unwrap();
+    let v = strips.bound_for_target(0, &passes, target_m, &going).unwrap().speed_mps;
+    let without = closed(target_m, strips.largest_step_m(0), sweep_s);
+    assert!(v > 1.1 * without, "{v} {without}");
+    let at = |angle: usize| ring.soundings()[angle * stride % SOUNDINGS as usize].arc_m;
+    let hole_m = |speed_mps: f64| {
+        let place = |ping: usize, head: usize| {
+            let along = ping % (2 * count);
+            let along = if along <= count { along } else { 2 * count - along };
+            [speed_mps * ping as f64 * going.ping_period_s, at(along + head * count)]
+        };
+        let samples: Vec<[f64; 2]> =
+            (0..count * 8).flat_map(|ping| [0, 1].map(|head| place(ping, head))).collect();
+        let clear = |x_m: f64, arc_m: f64| {
+            let away = |place: &[f64; 2]| {
+                let around_m = math::wrap_signed(place[1] - arc_m, perimeter_m);
+                math::hypot(place[0] - x_m, around_m)
+            };
+            samples.iter().map(away).fold(f64::INFINITY, f64::min)
+        };
+        let turn_m = speed_mps * sweep_s;
+        let grid = (0..40).flat_map(|i| (0..1000).map(move |k| (f64::from(i) / 40.0, f64::from(k) / 1000.0)));
+        let widest = grid.map(|(x, s)| clear((1.5 + x) * turn_m, s * perimeter_m)).fold(0.0, f64::max);
+        2.0 * widest
+    };
+    let (at_it_m, faster_m) = (hole_m(v), hole_m(1.1 * v));
+    assert!(at_it_m < target_m && at_it_m > 0.9 * target_m, "{at_it_m}");
+    assert!(faster_m > target_m, "{faster_m}");
 }
 
 #[test]

@@ -1,0 +1,114 @@
+//! Heads in sectors: when neighbours come to the end that their sectors share.
+
+use serde::{Deserialize, Serialize};
+
+use crate::head::{HeadMotion, MAX_HEADS, faces_aft};
+use crate::occlusion::AngleRange;
+use headrace_geometry::math::{self, TAU};
+
+/// What is assumed of neighbours whose sweeps aren't known: that they come to their ends at once.
+pub(super) const AT_ONCE: f64 = 0.5;
+
+/// Where a head is on its way through its sector, there and back.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub(super) struct Leg {
+    /// Number of its sector, and how many there are, in the body's sense of rotation.
+    sector: i64,
+    of: i64,
+    /// Share of a sweep there and back since it was at the beginning of the sector, 0 to 1.
+    share: f64,
+}
+
+impl Leg {
+    /// Of a head that turns within `sector`, angles in its sensor frame; `None` for a sector without a size.
+    pub(super) fn of(motion: &HeadMotion, sector: &AngleRange) -> Option<Self> {
+        let size_rad = Some(sector.size_rad).filter(|size_rad| *size_rad > 0.0)?;
+        let along = math::wrap_signed(motion.angle_rad - sector.middle_rad(), TAU) / size_rad + 0.5;
+        let along = along.clamp(0.0, 1.0);
+        let grows = motion.rate_radps > 0.0;
+        // A head that faces aft turns the other way round.
+        let (along, grows, from_rad) = if faces_aft(motion.mount.rotation) {
+            (1.0 - along, !grows, TAU - sector.from_rad - size_rad)
+        } else {
+            (along, grows, sector.from_rad)
+        };
+        let of = math::round_to_i64(TAU / size_rad).max(1);
+        Some(Self {
+            sector: math::round_to_i64(from_rad / size_rad).rem_euclid(of),
+            of,
+            share: if grows { along / 2.0 } else { 1.0 - along / 2.0 },
+        })
+    }
+}
+
+/// How far from evenly after one another neighbours come to the end that their sectors share, the largest, as a share of the advance in
+/// a sweep there and back: 0 where one comes half a sweep after the other, [`AT_ONCE`] where both come at one place, or nothing is
+/// known. `ahead` is how far ahead each head sits, as a share of that advance.
+pub(super) fn uneven(legs: &[Option<Leg>; MAX_HEADS], ahead: &[f64; MAX_HEADS]) -> f64 {
+    let known = || legs.iter().zip(ahead).filter_map(|(leg, ahead)| Some(((*leg)?, *ahead)));
+    let mut most: Option<f64> = None;
+    for (leg, ahead) in known() {
+        let next = (leg.sector + 1).rem_euclid(leg.of);
+        for (beside, beside_ahead) in known().filter(|(beside, _)| beside.sector == next) {
+            let (at_end, at_begin) = (ahead + 0.5 - leg.share, beside_ahead - beside.share);
+            let off = AT_ONCE - math::wrap_signed(at_end - at_begin, 1.0).abs();
+            most = Some(most.map_or(off, |most| most.max(off)));
+        }
+    }
+    most.unwrap_or(AT_ONCE)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::fixtures;
+    use crate::head::HeadSpec;
+    use crate::layout::{self, HeadLayout};
+    use headrace_geometry::frames::{Mount, Rot, Vec3};
+
+    /// Two heads ahead, two behind that face aft, started for a speed: by their programs, and by the speed at which they go.
+    #[test]
+    fn heads_that_are_started_for_a_speed_come_evenly_at_it_and_at_no_other() {
+        const SWEEP_S: f64 = 4.0;
+        let mount = |x_m: f64, y_m: f64| Mount {
+            position: Vec3::new(x_m, y_m, 0.0),
+            rotation: Rot::from_roll_pitch_yaw(0.0, 0.0, if x_m < 0.0 { TAU / 2.0 } else { 0.0 }),
+        };
+        let (x_m, step_rad) = (0.55, f64::to_radians(0.9));
+        let specs = [(x_m, 0.15), (x_m, -0.15), (-x_m, 0.15), (-x_m, -0.15)].map(|(x_m, y_m)| HeadSpec {
+            mount: mount(x_m, y_m),
+            step_rad,
+            ping_period_s: SWEEP_S / 200.0,
+            ..fixtures::head([0.0; 3], false, 0.0)
+        });
+        for speed_mps in [0.05, 0.11, 0.2] {
+            let programs = layout::programs(&specs, HeadLayout::SectorOffset, speed_mps).unwrap();
+            let mut legs = [None; MAX_HEADS];
+            for ((slot, spec), program) in legs.iter_mut().zip(&specs).zip(&programs) {
+                let (from_rad, size_rad) = program.sector.unwrap();
+                let rate_radps = step_rad / spec.ping_period_s * if program.growing { 1.0 } else { -1.0 };
+                let motion = HeadMotion {
+                    mount: spec.mount,
+                    angle_rad: program.start_rad,
+                    rate_radps,
+                    step_rad,
+                    sector_rad: None,
+                };
+                *slot = Leg::of(&motion, &AngleRange { from_rad, size_rad });
+            }
+            let at = |mps: f64| {
+                let mut ahead = [0.0; MAX_HEADS];
+                for (slot, spec) in ahead.iter_mut().zip(&specs) {
+                    *slot = spec.mount.position.x() / (mps * SWEEP_S);
+                }
+                uneven(&legs, &ahead)
+            };
+            assert!(at(speed_mps) < 1e-6, "{speed_mps}: {}", at(speed_mps));
+            // The rear heads come to a place 1.1 m / v after those in front.
+            let later_s = 2.0 * x_m / speed_mps - 2.0 * x_m / (1.1 * speed_mps);
+            let off = math::wrap_signed(later_s / SWEEP_S, 1.0).abs();
+            assert!((at(1.1 * speed_mps) - off).abs() < 1e-6, "{speed_mps}: {} {off}", at(1.1 * speed_mps));
+        }
+        assert!((uneven(&[None; MAX_HEADS], &[0.0; MAX_HEADS]) - AT_ONCE).abs() <= 0.0);
+    }
+}

@@ -1,0 +1,172 @@
+use super::*;
+
+fn situation(angles_deg: &[f64], x_m: &[f64]) -> Situation {
+    let mut heads = [None; MAX_HEADS];
+    for ((slot, angle), x) in heads.iter_mut().zip(angles_deg).zip(x_m) {
+        *slot = Some(HeadMotion {
+            mount: Mount { position: Vec3::new(*x, 0.0, 0.0), rotation: Rot::identity() },
+            angle_rad: angle.to_radians(),
+            rate_radps: TAU / 8.0,
+            step_rad: f64::to_radians(0.9),
+            sector_rad: None,
+        });
+    }
+    let configured = angles_deg.len();
+    Situation {
+        pose: None,
+        speed_mps: 0.2,
+        pass_error_m: 0.0,
+        layout: HeadLayout::PhaseShift,
+        configured,
+        heads,
+        losses: [LossRate::default(); MAX_HEADS],
+    }
+}
+
+fn passes(angles_deg: &[f64], x_m: &[f64]) -> Passes {
+    Phasing::of(&situation(angles_deg, x_m)).at(0.2)
+}
+
+fn all(passes: &Passes) -> f64 {
+    passes.gap_s(passes.heads()).unwrap()
+}
+
+#[test]
+fn evenly_phased_heads_share_the_turn() {
+    let passes = passes(&[10.0, 100.0, 190.0, 280.0], &[0.0; 4]);
+    assert!((all(&passes) - 2.0).abs() < 1e-9 && (passes.even_gap_s() - 2.0).abs() < 1e-12);
+    let errors = passes.phase_errors_rad(4);
+    assert!(errors[..4].iter().all(|error| error.unwrap().abs() < 1e-9) && errors[4].is_none());
+    let planned = Passes::evenly_phased(HeadSet::first(4), |_| 8.0).unwrap();
+    assert!((all(&planned) - 2.0).abs() < 1e-12);
+    // Side by side, they see a place at angles that differ by up to 9 degrees: a fortieth of a turn.
+    assert!((all(&planned.beside(TAU / 40.0)) - 2.2).abs() < 1e-12);
+    assert!((planned.beside(TAU / 40.0).gap_s(HeadSet::first(1)).unwrap() - 8.0).abs() < 1e-12);
+}
+
+#[test]
+fn where_heads_do_not_see_a_place_the_others_leave_longer_gaps() {
+    let passes = Passes::evenly_phased(HeadSet::first(4), |_| 8.0).unwrap();
+    let gap_s =
+        |hidden: [usize; 2]| passes.gap_s(passes.heads().without(hidden[0]).without(hidden[1])).unwrap();
+    // Half a turn apart: doubled. A quarter apart: two passes in a row are missing.
+    assert!((gap_s([0, 2]) - 4.0).abs() < 1e-12 && (gap_s([0, 1]) - 6.0).abs() < 1e-12);
+    assert_eq!(passes.gap_s(HeadSet::default()), None);
+    assert_eq!(passes.gap_s(HeadSet::default().with(6)), None);
+}
+
+#[test]
+fn several_passes_take_as_long_as_the_turn_leaves_them() {
+    let even = Passes::evenly_phased(HeadSet::first(4), |_| 8.0).unwrap();
+    let time_s = |heads: HeadSet, needed: f64| even.time_for_s(heads, even.gap_s(heads).unwrap(), needed);
+    let all = even.heads();
+    assert!((time_s(all, 1.0) - 2.0).abs() < 1e-12 && (time_s(all, 2.5) - 5.0).abs() < 1e-12);
+    assert!((time_s(all, 9.0) - 18.0).abs() < 1e-12);
+    // Two heads a quarter of a turn apart: 6 s, then 2 s.
+    let two = all.without(0).without(1);
+    for (needed, seconds) in [(1.0, 6.0), (1.5, 7.0), (2.0, 8.0), (3.0, 14.0), (4.0, 16.0)] {
+        assert!((time_s(two, needed) - seconds).abs() < 1e-9, "{needed}");
+    }
+    assert!((time_s(HeadSet::first(1), 3.0) - 24.0).abs() < 1e-12);
+    let sectors = Passes::in_sectors(HeadSet::first(2), 8.0).unwrap();
+    for (needed, seconds) in [(1.0, 8.0), (2.0, 8.0), (2.5, 12.0), (3.0, 16.0), (4.0, 16.0)] {
+        assert!((sectors.time_for_s(sectors.heads(), 8.0, needed) - seconds).abs() < 1e-9, "{needed}");
+    }
+}
+
+#[test]
+fn heads_together_pass_together() {
+    let together = passes(&[0.0, 0.0], &[0.0, 0.0]);
+    assert!((all(&together) - 8.0).abs() < 1e-9 && (together.even_gap_s() - 4.0).abs() < 1e-12);
+    assert!((together.phase_errors_rad(2)[1].unwrap().abs() - math::PI).abs() < 1e-9);
+    // Half a pitch apart along the hull, the same angles interleave: 0.2 m/s, 8 s a turn, 0.8 m.
+    let apart = passes(&[0.0, 0.0], &[0.8, 0.0]);
+    assert!((all(&apart) - 4.0).abs() < 1e-9);
+}
+
+#[test]
+fn turned_round_the_vehicle_s_heads_are_apart_the_other_way() {
+    let mut back = situation(&[0.0, 90.0], &[0.9, -0.3]);
+    let out = Phasing::of(&back).at(0.2);
+    let turned = Rot::from_roll_pitch_yaw(0.0, 0.0, math::PI);
+    back.pose = Some(Pose { position: headrace_geometry::frames::Point3::zero(), attitude: turned });
+    // Returning nose first mirrors going out nose first; tail first doesn't.
+    assert!((all(&Phasing::of(&back).at(-0.2)) - all(&out)).abs() < 1e-9);
+    assert!((all(&Phasing::of(&back).at(0.2)) - all(&out)).abs() > 0.1);
+    // Askew, heads are farther apart along the tunnel; with their planes along it, there is no phase.
+    let askew = |yaw: f64| Rot::from_roll_pitch_yaw(0.0, 0.0, yaw);
+    let mount = Mount { position: Vec3::new(1.0, 0.0, 0.0), rotation: Rot::identity() };
+    assert!((ahead_m(&askew(0.5), &mount).unwrap() - 1.0 / math::cos(0.5)).abs() < 1e-12);
+    assert_eq!(ahead_m(&askew(math::FRAC_PI_2), &mount), None);
+}
+
+#[test]
+fn a_head_that_is_late_has_a_positive_error() {
+    // The second of two belongs half a turn ahead; it is 30 degrees short of that.
+    let passes = passes(&[0.0, 150.0], &[0.0, 0.0]);
+    assert!((passes.phase_errors_rad(2)[1].unwrap() - f64::to_radians(30.0)).abs() < 1e-9);
+    // Ten per cent faster than scheduled, a head 1.6 m (a turn's advance) astern is early by a tenth / 1.1 of a turn.
+    let at = |speed| Phasing::of(&situation(&[0.0, 180.0], &[1.6, 0.0])).at(speed).phase_errors_rad(2)[1];
+    assert!(at(0.2).unwrap().abs() < 1e-9);
+    assert!((at(0.22).unwrap() - TAU * (1.0 - 1.0 / 1.1)).abs() < 1e-9, "{:?}", at(0.22));
+    assert_eq!(at(0.0), None);
+}
+
+#[test]
+fn heads_that_all_turn_the_other_way_are_phased_alike_and_opposed_ones_are_not() {
+    let mut mirrored = situation(&[0.0, 180.0], &[0.0, 0.0]);
+    for head in mirrored.heads.iter_mut().flatten() {
+        head.rate_radps = -head.rate_radps;
+    }
+    assert!((all(&Phasing::of(&mirrored).at(0.2)) - 4.0).abs() < 1e-9);
+    if let Some(first) = mirrored.heads.iter_mut().flatten().next() {
+        first.rate_radps = -first.rate_radps;
+    }
+    let opposed = Phasing::of(&mirrored).at(0.2);
+    assert!((all(&opposed) - 8.0).abs() < 1e-9 && opposed.phase_errors_rad(2) == [None; MAX_HEADS]);
+}
+
+#[test]
+fn heads_out_of_step_leave_the_faster_one_to_count_on() {
+    let mut mixed = situation(&[0.0, 180.0], &[0.0, 0.0]);
+    if let Some(second) = mixed.heads.iter_mut().flatten().nth(1) {
+        second.rate_radps = TAU / 21.6;
+    }
+    assert!((all(&Phasing::of(&mixed).at(0.2)) - 8.0).abs() < 1e-9);
+    let planned = Passes::evenly_phased(HeadSet::first(2), |head| 8.0 + 0.01 * head as f64).unwrap();
+    assert!((all(&planned) - 8.0).abs() < 1e-12);
+}
+
+#[test]
+fn a_turning_point_makes_no_sector_of_a_layout_that_turns_on() {
+    let mut jerked = situation(&[0.0, 180.0], &[0.0, 0.0]);
+    for head in jerked.heads.iter_mut().flatten() {
+        head.sector_rad = Some(f64::to_radians(0.9));
+    }
+    assert!((all(&Phasing::of(&jerked).at(0.2)) - 4.0).abs() < 1e-9);
+    // In sectors, a sector that isn't measured yet is half a turn for two heads, there and back.
+    let mut sectors = situation(&[0.0, 180.0], &[0.0, 0.0]);
+    sectors.layout = HeadLayout::SectorOffset;
+    assert!((all(&Phasing::of(&sectors).at(0.2)) - 8.0).abs() < 1e-9);
+    assert_eq!(Phasing::of(&sectors).at(0.2).phase_errors_rad(2), [None; MAX_HEADS]);
+}
+
+#[test]
+fn heads_that_are_left_share_the_turn_evenly() {
+    let three = Passes::evenly_phased(HeadSet::first(4).without(1), |_| 9.0).unwrap();
+    assert!((all(&three) - 3.0).abs() < 1e-12);
+    let none = HeadSet::default();
+    assert_eq!(Passes::evenly_phased(none, |_| 8.0), Err(SamplingError::HeadCount { heads: 0 }));
+    assert_eq!(Passes::in_sectors(none, 16.0), Err(SamplingError::HeadCount { heads: 0 }));
+    assert!((all(&Passes::in_sectors(HeadSet::first(2), 8.0).unwrap()) - 8.0).abs() < 1e-12);
+}
+
+#[test]
+fn parallax_grows_as_the_wall_comes_near() {
+    let wide = headrace_geometry::tunnel::shapes::circle(6.0).unwrap();
+    let narrow = headrace_geometry::tunnel::shapes::circle(1.0).unwrap();
+    let of = |profile: &Profile, z: f64| parallax_rad(profile, &[[0.15, z], [-0.15, z]]);
+    // Seen from 6 m, the heads are 0.3 m apart.
+    assert!((of(&wide, 6.0) - 0.05).abs() < 1e-3 && of(&narrow, 1.0) > 0.29);
+    assert!(parallax_rad(&wide, &[[0.1, 6.0]]) <= 0.0 && parallax_rad(&wide, &[]) <= 0.0);
+}

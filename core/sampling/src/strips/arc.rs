@@ -1,0 +1,52 @@
+//! Intervals of the perimeter.
+
+use serde::{Deserialize, Serialize};
+
+use crate::error::SamplingError;
+use crate::occlusion::AngleRange;
+use crate::ring::Standing;
+use headrace_geometry::math;
+
+/// An interval of the perimeter.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Arc {
+    /// Arc length of its start, m.
+    pub from_m: f64,
+    /// Its length in the direction of growing arc length, m.
+    pub length_m: f64,
+}
+
+impl Arc {
+    /// The part of the wall covered by a range of head angles.
+    ///
+    /// Errors: as for [`Standing::sounding`].
+    pub fn of(standing: &Standing<'_>, angles: &AngleRange) -> Result<Self, SamplingError> {
+        let arc_m = |angle_rad| standing.sounding(angle_rad).map(|sounding| sounding.arc_m);
+        let perimeter_m = standing.perimeter_m();
+        if angles.size_rad >= math::TAU {
+            return Ok(Self { from_m: 0.0, length_m: perimeter_m });
+        }
+        let (first, last) = (arc_m(angles.from_rad)?, arc_m(angles.from_rad + angles.size_rad)?);
+        let (middle, whole) = (
+            math::wrap(arc_m(angles.middle_rad())? - first, perimeter_m),
+            math::wrap(last - first, perimeter_m),
+        );
+        // A head that faces aft sweeps the wall in the other direction.
+        Ok(if middle <= whole {
+            Self { from_m: first, length_m: whole }
+        } else {
+            Self { from_m: last, length_m: perimeter_m - whole }
+        })
+    }
+
+    /// From the start of this arc to the end of the next, in the head's direction of rotation.
+    pub(super) fn on_to(&self, next: &Self, forward: bool, perimeter_m: f64) -> Self {
+        let (first, last) = if forward { (self, next) } else { (next, self) };
+        let length_m = math::wrap(last.from_m + last.length_m - first.from_m, perimeter_m);
+        Self { from_m: first.from_m, length_m }
+    }
+
+    pub(super) fn has(&self, arc_m: f64, perimeter_m: f64) -> bool {
+        math::wrap(arc_m - self.from_m, perimeter_m) <= self.length_m
+    }
+}

@@ -1,0 +1,153 @@
+//! Where two figures of a strip limit the speed: the time between its passes, and its longest step.
+
+use crate::spacing;
+use headrace_geometry::math;
+
+/// Vehicle motion for the prediction of spacing.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Going {
+    /// Time between two pings, the longest of any head, seconds.
+    pub ping_period_s: f64,
+    /// Largest speed of the beams along the wall due to swing, in addition to the vehicle's speed, m/s.
+    pub swing_mps: f64,
+    /// Displacement of passes from their places at any speed, m.
+    pub shift_m: f64,
+    /// Distance between heads along the hull, m: the swing acts while the vehicle covers it.
+    pub apart_m: f64,
+    /// Largest speed of the beams along the wall due to swing, averaged over that time, m/s.
+    pub apart_swing_mps: f64,
+    /// Limit of the swing's displacement over any time, m; `None` if unknown.
+    pub swing_most_m: Option<f64>,
+}
+
+/// Limit of T: time between passes, and distance between neighbours around the wall.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Limit {
+    pub(super) gap_s: f64,
+    pub(super) t_y_m: f64,
+    /// Across a place that sectors leave out, of which T_y is the width: how far from evenly after one another passes come to it from
+    /// either side, as a share of T_x, 0 to 0.5.
+    pub(super) uneven: Option<f64>,
+}
+
+impl Limit {
+    pub(super) fn t_m(&self, speed_mps: f64, going: &Going) -> f64 {
+        let over_ground_mps = speed_mps + going.swing_mps;
+        let lag_m2ps = going.apart_swing_mps * going.apart_m;
+        let lag_m = if lag_m2ps > 0.0 { lag_m2ps / speed_mps } else { 0.0 };
+        let swung_m = over_ground_mps * self.gap_s + going.shift_m + lag_m;
+        let at_most_m = going.swing_most_m.map(|most_m| speed_mps * self.gap_s + going.shift_m + most_m);
+        let t_x_m = at_most_m.map_or(swung_m, |at_most_m| swung_m.min(at_most_m));
+        let advance_m = over_ground_mps * going.ping_period_s;
+        let t_m = spacing::t_max_m(t_x_m, advance_m, self.t_y_m);
+        let Some(uneven) = self.uneven else { return t_m };
+        // What one row is moved by against the other changes the circle by twice that at most.
+        let unmoved_m = staggered_m(t_x_m - going.shift_m + advance_m, self.t_y_m, uneven);
+        t_m.min(unmoved_m + 2.0 * going.shift_m)
+    }
+
+    /// The largest speed that solves T = hypot((v + w) t + shift + u a / v, T_y), with t the sum of gap and ping
+    /// period, w the swing speed, u that between heads, and a their distance; or, if faster, the same with the swing's limit
+    /// between passes.
+    pub(super) fn speed_mps(&self, target_m: f64, going: &Going) -> Option<f64> {
+        let along_m = spacing::along_m(target_m, self.t_y_m)?;
+        let staggered = self
+            .uneven
+            .and_then(|uneven| along_staggered_m(target_m - 2.0 * going.shift_m, self.t_y_m, uneven));
+        let along_m = staggered.map_or(along_m, |unmoved_m| along_m.max(unmoved_m + going.shift_m));
+        let bounded = going.swing_most_m.and_then(|most_m| self.bounded_mps(along_m, most_m, going));
+        self.swung_mps(along_m, going).into_iter().chain(bounded).max_by(f64::total_cmp)
+    }
+
+    fn bounded_mps(&self, along_m: f64, most_m: f64, going: &Going) -> Option<f64> {
+        let time_s = self.gap_s + going.ping_period_s;
+        let for_speed_m = along_m - going.shift_m - most_m - going.swing_mps * going.ping_period_s;
+        (time_s > 0.0 && for_speed_m > 0.0).then(|| for_speed_m / time_s)
+    }
+
+    fn swung_mps(&self, along_m: f64, going: &Going) -> Option<f64> {
+        let time_s = self.gap_s + going.ping_period_s;
+        let for_speed_m = along_m - going.shift_m - going.swing_mps * time_s;
+        let rest = for_speed_m * for_speed_m - 4.0 * time_s * going.apart_swing_mps * going.apart_m;
+        let possible = time_s > 0.0 && for_speed_m > 0.0 && rest >= 0.0;
+        possible.then(|| (for_speed_m + math::sqrt(rest)) / (2.0 * time_s))
+    }
+}
+
+/// The largest circle between two rows of samples `along_m` apart in each and `across_m` from one another, of which one row is half of
+/// that further along, or by the share `uneven` less or more: its diameter, m. Beside it are the rows' legs: where the rows are nearer
+/// to one another than half of what is between samples of one, a circle lies between those.
+///
+/// Circles through two samples of a row and one of the other have 2 R = across + along^2 / (4 across); a sample that moves by so much
+/// changes 2 R by twice that at most.
+fn staggered_m(along_m: f64, across_m: f64, uneven: f64) -> f64 {
+    let even_m = if 2.0 * across_m >= along_m {
+        across_m + along_m * along_m / (4.0 * across_m).max(f64::MIN_POSITIVE)
+    } else {
+        along_m
+    };
+    even_m + 2.0 * uneven * along_m
+}
+
+/// The inverse of [`staggered_m`] by `along_m`, m; `None` for a circle that is no wider than the rows are apart.
+fn along_staggered_m(target_m: f64, across_m: f64, uneven: f64) -> Option<f64> {
+    if target_m <= across_m || across_m <= 0.0 {
+        return None;
+    }
+    let wide_m =
+        2.0 * across_m * (math::sqrt(4.0 * uneven * uneven + target_m / across_m - 1.0) - 2.0 * uneven);
+    Some(if wide_m <= 2.0 * across_m { wide_m } else { target_m / (1.0 + 2.0 * uneven) })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn circles_between_staggered_rows_are_as_told() {
+        for (along_m, across_m) in [(0.5, 0.3), (0.4, 0.4), (0.3, 0.35)] {
+            for uneven in [0.0, 0.05, 0.2, 0.5] {
+                let samples: Vec<[f64; 2]> = (-4..=4)
+                    .flat_map(|k| [[f64::from(k), 0.0], [f64::from(k) + 0.5 + uneven, across_m]])
+                    .map(|[x, y]| [x * along_m, y])
+                    .collect();
+                let clear = |x: f64, y: f64| {
+                    let away = |sample: &[f64; 2]| math::hypot(sample[0] - x, sample[1] - y);
+                    samples.iter().map(away).fold(f64::INFINITY, f64::min)
+                };
+                let grid = (0..200).flat_map(|i| (0..=200).map(move |k| (f64::from(i), f64::from(k))));
+                let places = grid.map(|(i, k)| clear(i / 200.0 * along_m, k / 200.0 * across_m));
+                let widest_m = 2.0 * places.fold(0.0, f64::max);
+                let told_m = staggered_m(along_m, across_m, uneven);
+                assert!(widest_m <= told_m + 1e-9, "{along_m} {across_m} {uneven}: {widest_m} {told_m}");
+                if uneven <= 0.0 {
+                    assert!(widest_m > told_m - 0.005, "{along_m} {across_m}: {widest_m} {told_m}");
+                }
+                let back_m = along_staggered_m(told_m, across_m, uneven).unwrap();
+                assert!((back_m - along_m).abs() < 1e-9, "{along_m} {across_m} {uneven}: {back_m}");
+            }
+        }
+        // Where rows are near to one another, the circle is as wide as their samples are apart.
+        assert!((staggered_m(0.5, 0.1, 0.0) - 0.5).abs() <= 0.0);
+        assert!((along_staggered_m(0.5, 0.1, 0.0).unwrap() - 0.5).abs() <= 0.0);
+        assert_eq!(along_staggered_m(0.3, 0.3, 0.1), None);
+    }
+
+    #[test]
+    fn a_speed_is_the_inverse_of_its_limit_however_it_swings_or_is_shifted() {
+        let bounded = Some(0.3);
+        for (swing_mps, shift_m, swing_most_m) in
+            [(0.0, 0.0, None), (0.01, 0.0, None), (0.0, 0.03, None), (0.01, 0.03, bounded)]
+        {
+            let going = Going { ping_period_s: 0.02, swing_mps, shift_m, swing_most_m, ..Going::default() };
+            for uneven in [None, Some(0.0), Some(0.1), Some(0.4)] {
+                for target_m in [0.4, 0.5, 0.9] {
+                    let limit = Limit { gap_s: 4.0, t_y_m: 0.3, uneven };
+                    let Some(speed_mps) = limit.speed_mps(target_m, &going) else { continue };
+                    let t_m = limit.t_m(speed_mps, &going);
+                    assert!((t_m - target_m).abs() < 1e-9, "{limit:?} {going:?}: {t_m} for {target_m}");
+                }
+            }
+        }
+    }
+}
