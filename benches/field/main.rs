@@ -5,7 +5,7 @@
 //! tenth of the dives. `--cell VEHICLE/CONDITION/PLACE/SPEED` runs those cells alone (any part may be `*`, parts at the end may be left
 //! out, a place may be any chainage), `--seeds N` so many dives each, `--from-seed N` begins with another,
 //! `--metres N` makes each so long, `--json FILE` says where to write (target/field.json), `--page docs/field.md` renews the table of
-//! that page, which has the dives of all places together.
+//! that page, which has the dives of all places together. Below the table are the sections that passed over the target, by dive.
 //! D_true is from `headrace_tests::truth`, which has nothing of the program's coverage. The figures are the report's.
 
 #![expect(clippy::unwrap_used, clippy::panic, reason = "a benchmark stops at what it can't do")]
@@ -28,6 +28,7 @@ fn main() {
     let figures = run(&cells, &arguments);
     let text = table::markdown(&cells, &figures, &arguments);
     println!("{text}");
+    print!("{}", table::falsely(&cells, &figures));
     if let Some(page) = &arguments.page {
         let (cells, figures) = table::pooled(&cells, &figures);
         table::replace(page, &table::markdown(&cells, &figures, &arguments));

@@ -109,6 +109,25 @@ pub(crate) fn markdown(cells: &[NamedCell], figures: &[Figures], arguments: &Arg
     text + &format!("\n{with_misses} of {} cells miss a goal.\n", cells.len())
 }
 
+/// A line for each section that passed although its true hole is over the target.
+pub(crate) fn falsely(cells: &[NamedCell], figures: &[Figures]) -> String {
+    let mut text = String::new();
+    for (NamedCell { name, .. }, figures) in cells.iter().zip(figures) {
+        for section in &figures.falsely {
+            let [told_m, sd_m, true_m] = section.hole_m;
+            let (x_m, clock) = &section.at;
+            text += &format!(
+                "{} seed {}: {:.2} passed, D {told_m:.3} +- {sd_m:.3} m at {x_m:.2}, {clock}; true {true_m:.3}; {} doubtful\n",
+                name.join("/"),
+                section.seed,
+                section.start_m,
+                section.doubtful
+            );
+        }
+    }
+    text
+}
+
 /// The same with the dives of all places together, for a page: one vehicle's places beside each other are printed.
 pub(crate) fn pooled(cells: &[NamedCell], figures: &[Figures]) -> (Vec<NamedCell>, Vec<Figures>) {
     let mut pools: Vec<(NamedCell, Figures)> = Vec::new();

@@ -434,7 +434,7 @@ fn strip(views: &[View], arc: Arc, perimeter_m: f64) -> Strip {
     Strip {
         arc,
         seen_by: seen().fold(HeadSet::default(), |set, (head, _)| set.with(head)),
-        hidden: views.iter().any(hides),
+        hidden: views.iter().any(|view| wait(view).is_some() && hides(view)),
         wait: seen().filter_map(|(_, view)| wait(view)).reduce(f64::max).unwrap_or(1.0),
     }
 }

@@ -25,6 +25,21 @@ const FLANK_M: f64 = 0.005;
 /// A way that reaches into a section by no more than this isn't in it, m.
 const TOUCH_M: f64 = 0.02;
 
+/// A section that passed although its true hole is over the target.
+#[derive(Debug, Clone)]
+pub struct Falsely {
+    /// Seed of the dive.
+    pub seed: u64,
+    /// Where the section begins, m.
+    pub start_m: f64,
+    /// Diameter of its hole as told, its standard deviation, and in truth, m.
+    pub hole_m: [f64; 3],
+    /// Where the hole is as told, chainage and clock.
+    pub at: (f64, String),
+    /// Returns that weren't taken for wall.
+    pub doubtful: u32,
+}
+
 /// What came of the dives of a cell.
 #[derive(Debug, Clone, Default)]
 pub struct Figures {
@@ -38,6 +53,8 @@ pub struct Figures {
     pub passed_over: u32,
     /// Passed although D_true is over 1.1 times the target.
     pub passed_far: u32,
+    /// Each of those that passed over the target.
+    pub falsely: Vec<Falsely>,
     /// D_true is below 0.9 times the target.
     pub under: u32,
     /// Of those, failed.
@@ -70,7 +87,7 @@ impl Figures {
             let [start_m, end_m] =
                 [section.report.start_m, section.report.end_m].map(|x_m| x_m + section.shift_m);
             if end_m > from_m {
-                self.judge(section, target_m);
+                self.judge(section, target_m, scene.seed);
             }
             if start_m >= first_m && end_m <= last_m {
                 self.weigh(section, target_m);
@@ -90,6 +107,7 @@ impl Figures {
         self.over += other.over;
         self.passed_over += other.passed_over;
         self.passed_far += other.passed_far;
+        self.falsely.extend(other.falsely.iter().cloned());
         self.under += other.under;
         self.failed_under += other.failed_under;
         self.inner_m += other.inner_m;
@@ -106,7 +124,7 @@ impl Figures {
         self.advised_mps.extend(&other.advised_mps);
     }
 
-    fn judge(&mut self, section: &JudgedSection, target_m: f64) {
+    fn judge(&mut self, section: &JudgedSection, target_m: f64, seed: u64) {
         let (passed, failed) = (section.report.verdict == "pass", section.report.verdict == "fail");
         let is = |condition: bool| u32::from(condition);
         let share = section.true_hole_m / target_m;
@@ -114,6 +132,16 @@ impl Figures {
         self.over += is(share > 1.0);
         self.passed_over += is(passed && share > 1.0);
         self.passed_far += is(passed && share > 1.1);
+        if passed && share > 1.0 {
+            let report = &section.report;
+            self.falsely.push(Falsely {
+                seed,
+                start_m: report.start_m,
+                hole_m: [report.hole_m.unwrap_or(f64::NAN), report.hole_sd_m, section.true_hole_m],
+                at: (report.hole_x_m.unwrap_or(f64::NAN), report.hole_clock.clone().unwrap_or_default()),
+                doubtful: report.doubtful_returns,
+            });
+        }
         self.under += is(share < 0.9);
         self.failed_under += is(failed && share < 0.9);
     }

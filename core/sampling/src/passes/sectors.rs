@@ -62,9 +62,11 @@ pub(super) fn uneven(legs: &[Option<Leg>; MAX_HEADS], ahead: &[f64; MAX_HEADS]) 
 mod tests {
     use super::*;
     use crate::fixtures;
-    use crate::head::HeadSpec;
+    use crate::head::{HeadProgram, HeadSpec};
     use crate::layout::{self, HeadLayout};
+    use crate::schedule::Schedule;
     use headrace_geometry::frames::{Mount, Rot, Vec3};
+    use headrace_geometry::time::DurNs;
 
     /// Two heads ahead, two behind that face aft, started for a speed: by their programs, and by the speed at which they go.
     #[test]
@@ -82,33 +84,52 @@ mod tests {
             ..fixtures::head([0.0; 3], false, 0.0)
         });
         for speed_mps in [0.05, 0.11, 0.2] {
+            let schedule = Schedule::new(&specs, HeadLayout::SectorOffset, speed_mps).unwrap();
             let programs = layout::programs(&specs, HeadLayout::SectorOffset, speed_mps).unwrap();
-            let mut legs = [None; MAX_HEADS];
-            for ((slot, spec), program) in legs.iter_mut().zip(&specs).zip(&programs) {
-                let (from_rad, size_rad) = program.sector.unwrap();
-                let rate_radps = step_rad / spec.ping_period_s * if program.growing { 1.0 } else { -1.0 };
-                let motion = HeadMotion {
-                    mount: spec.mount,
-                    angle_rad: program.start_rad,
-                    rate_radps,
-                    step_rad,
-                    sector_rad: None,
+            // At some moments of a sweep there and back, the turning points' neighbourhood included.
+            for moment in 0..50 {
+                let at_s = 7.0 + 0.083 * f64::from(moment);
+                let legs = legs_at(&schedule, &specs, &programs, at_s);
+                let at = |mps: f64| {
+                    let mut ahead = [0.0; MAX_HEADS];
+                    for (slot, spec) in ahead.iter_mut().zip(&specs) {
+                        *slot = spec.mount.position.x() / (mps * SWEEP_S);
+                    }
+                    uneven(&legs, &ahead)
                 };
-                *slot = Leg::of(&motion, &AngleRange { from_rad, size_rad });
+                // A step of a head is a two hundredth of the sweep.
+                assert!(at(speed_mps) < 0.011, "{speed_mps} m/s, {at_s} s: {}", at(speed_mps));
+                // The rear heads come to a place 1.1 m / v after those in front.
+                let later_s = 2.0 * x_m / speed_mps - 2.0 * x_m / (1.1 * speed_mps);
+                let off = math::wrap_signed(later_s / SWEEP_S, 1.0).abs();
+                assert!((at(1.1 * speed_mps) - off).abs() < 0.011, "{speed_mps} m/s, {at_s} s: {off}");
             }
-            let at = |mps: f64| {
-                let mut ahead = [0.0; MAX_HEADS];
-                for (slot, spec) in ahead.iter_mut().zip(&specs) {
-                    *slot = spec.mount.position.x() / (mps * SWEEP_S);
-                }
-                uneven(&legs, &ahead)
-            };
-            assert!(at(speed_mps) < 1e-6, "{speed_mps}: {}", at(speed_mps));
-            // The rear heads come to a place 1.1 m / v after those in front.
-            let later_s = 2.0 * x_m / speed_mps - 2.0 * x_m / (1.1 * speed_mps);
-            let off = math::wrap_signed(later_s / SWEEP_S, 1.0).abs();
-            assert!((at(1.1 * speed_mps) - off).abs() < 1e-6, "{speed_mps}: {} {off}", at(1.1 * speed_mps));
         }
         assert!((uneven(&[None; MAX_HEADS], &[0.0; MAX_HEADS]) - AT_ONCE).abs() <= 0.0);
+    }
+
+    fn legs_at(
+        schedule: &Schedule,
+        specs: &[HeadSpec],
+        programs: &[HeadProgram],
+        at_s: f64,
+    ) -> [Option<Leg>; MAX_HEADS] {
+        let mut legs = [None; MAX_HEADS];
+        for (head, ((slot, spec), program)) in legs.iter_mut().zip(specs).zip(programs).enumerate() {
+            let (from_rad, size_rad) = program.sector.unwrap();
+            let angle_rad = |at_s: f64| schedule.angle_rad(head, DurNs::from_secs_f64(at_s)).unwrap();
+            // As heads are heard: at the last ping, and by the step to it.
+            let pings = (at_s / spec.ping_period_s).floor() * spec.ping_period_s + 1e-6;
+            let step_rad = math::wrap_signed(angle_rad(pings) - angle_rad(pings - spec.ping_period_s), TAU);
+            let motion = HeadMotion {
+                mount: spec.mount,
+                angle_rad: angle_rad(pings),
+                rate_radps: step_rad / spec.ping_period_s,
+                step_rad: step_rad.abs(),
+                sector_rad: None,
+            };
+            *slot = Leg::of(&motion, &AngleRange { from_rad, size_rad });
+        }
+        legs
     }
 }

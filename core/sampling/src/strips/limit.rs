@@ -41,9 +41,8 @@ impl Limit {
         let advance_m = over_ground_mps * going.ping_period_s;
         let t_m = spacing::t_max_m(t_x_m, advance_m, self.t_y_m);
         let Some(uneven) = self.uneven else { return t_m };
-        // What one row is moved by against the other changes the circle by twice that at most.
-        let unmoved_m = staggered_m(t_x_m - going.shift_m + advance_m, self.t_y_m, uneven);
-        t_m.min(unmoved_m + 2.0 * going.shift_m)
+        // One row may be moved against the other.
+        t_m.min(staggered_m(t_x_m - going.shift_m + advance_m, self.t_y_m, uneven, going.shift_m))
     }
 
     /// The largest speed that solves T = hypot((v + w) t + shift + u a / v, T_y), with t the sum of gap and ping
@@ -51,10 +50,9 @@ impl Limit {
     /// between passes.
     pub(super) fn speed_mps(&self, target_m: f64, going: &Going) -> Option<f64> {
         let along_m = spacing::along_m(target_m, self.t_y_m)?;
-        let staggered = self
-            .uneven
-            .and_then(|uneven| along_staggered_m(target_m - 2.0 * going.shift_m, self.t_y_m, uneven));
-        let along_m = staggered.map_or(along_m, |unmoved_m| along_m.max(unmoved_m + going.shift_m));
+        let staggered_m =
+            |uneven| along_staggered_m(target_m, self.t_y_m, uneven, going.shift_m) + going.shift_m;
+        let along_m = self.uneven.map_or(along_m, |uneven| along_m.max(staggered_m(uneven)));
         let bounded = going.swing_most_m.and_then(|most_m| self.bounded_mps(along_m, most_m, going));
         self.swung_mps(along_m, going).into_iter().chain(bounded).max_by(f64::total_cmp)
     }
@@ -74,29 +72,38 @@ impl Limit {
     }
 }
 
-/// The largest circle between two rows of samples `along_m` apart in each and `across_m` from one another, of which one row is half of
-/// that further along, or by the share `uneven` less or more: its diameter, m. Beside it are the rows' legs: where the rows are nearer
-/// to one another than half of what is between samples of one, a circle lies between those.
+/// The largest circle between two rows of samples `along_m` apart in each and `across_m` from one another: its diameter, m. One row is
+/// half of that further along than the other, by the share `uneven` of it and by `moved_m` more or less, and at most as far as to be level
+/// with it.
 ///
-/// Circles through two samples of a row and one of the other have 2 R = across + along^2 / (4 across); a sample that moves by so much
-/// changes 2 R by twice that at most.
-fn staggered_m(along_m: f64, across_m: f64, uneven: f64) -> f64 {
-    let even_m = if 2.0 * across_m >= along_m {
-        across_m + along_m * along_m / (4.0 * across_m).max(f64::MIN_POSITIVE)
-    } else {
-        along_m
-    };
-    even_m + 2.0 * uneven * along_m
+/// The circle goes through two samples of a row and the one of the other row between them, which is a and b from them along the tunnel:
+/// 2 R = sqrt((a^2 + c^2) (b^2 + c^2)) / c, c being `across_m`. Where c^2 < a b its centre isn't between the rows: on one of them
+/// there is no more room than its own samples leave, and beyond are the rows' legs.
+fn staggered_m(along_m: f64, across_m: f64, uneven: f64, moved_m: f64) -> f64 {
+    let off_m = (uneven * along_m + moved_m).min(along_m / 2.0);
+    let (a2, b2) = ((along_m / 2.0 - off_m).powi(2), (along_m / 2.0 + off_m).powi(2));
+    let across2 = across_m * across_m;
+    if across2 * across2 < a2 * b2 || across_m <= 0.0 {
+        return along_m;
+    }
+    math::sqrt((a2 + across2) * (b2 + across2)) / across_m
 }
 
-/// The inverse of [`staggered_m`] by `along_m`, m; `None` for a circle that is no wider than the rows are apart.
-fn along_staggered_m(target_m: f64, across_m: f64, uneven: f64) -> Option<f64> {
-    if target_m <= across_m || across_m <= 0.0 {
-        return None;
+/// The inverse of [`staggered_m`] by `along_m`, which is at most the target, m.
+fn along_staggered_m(target_m: f64, across_m: f64, uneven: f64, moved_m: f64) -> f64 {
+    let (mut meets_m, mut misses_m) = (0.0, target_m);
+    if staggered_m(misses_m, across_m, uneven, moved_m) <= target_m {
+        return target_m;
     }
-    let wide_m =
-        2.0 * across_m * (math::sqrt(4.0 * uneven * uneven + target_m / across_m - 1.0) - 2.0 * uneven);
-    Some(if wide_m <= 2.0 * across_m { wide_m } else { target_m / (1.0 + 2.0 * uneven) })
+    for _ in 0..60 {
+        let middle_m = f64::midpoint(meets_m, misses_m);
+        if staggered_m(middle_m, across_m, uneven, moved_m) <= target_m {
+            meets_m = middle_m;
+        } else {
+            misses_m = middle_m;
+        }
+    }
+    meets_m
 }
 
 #[cfg(test)]
@@ -105,8 +112,8 @@ mod tests {
 
     #[test]
     fn circles_between_staggered_rows_are_as_told() {
-        for (along_m, across_m) in [(0.5, 0.3), (0.4, 0.4), (0.3, 0.35)] {
-            for uneven in [0.0, 0.05, 0.2, 0.5] {
+        for (along_m, across_m) in [(0.5, 0.3), (0.4, 0.4), (0.3, 0.35), (0.5, 0.22), (0.6, 0.1)] {
+            for uneven in [0.0, 0.02, 0.05, 0.1, 0.2, 0.35, 0.5] {
                 let samples: Vec<[f64; 2]> = (-4..=4)
                     .flat_map(|k| [[f64::from(k), 0.0], [f64::from(k) + 0.5 + uneven, across_m]])
                     .map(|[x, y]| [x * along_m, y])
@@ -115,22 +122,23 @@ mod tests {
                     let away = |sample: &[f64; 2]| math::hypot(sample[0] - x, sample[1] - y);
                     samples.iter().map(away).fold(f64::INFINITY, f64::min)
                 };
-                let grid = (0..200).flat_map(|i| (0..=200).map(move |k| (f64::from(i), f64::from(k))));
-                let places = grid.map(|(i, k)| clear(i / 200.0 * along_m, k / 200.0 * across_m));
+                let grid = (0..400).flat_map(|i| (0..=200).map(move |k| (f64::from(i), f64::from(k))));
+                let places = grid.map(|(i, k)| clear(i / 400.0 * along_m, k / 200.0 * across_m));
                 let widest_m = 2.0 * places.fold(0.0, f64::max);
-                let told_m = staggered_m(along_m, across_m, uneven);
-                assert!(widest_m <= told_m + 1e-9, "{along_m} {across_m} {uneven}: {widest_m} {told_m}");
-                if uneven <= 0.0 {
-                    assert!(widest_m > told_m - 0.005, "{along_m} {across_m}: {widest_m} {told_m}");
-                }
-                let back_m = along_staggered_m(told_m, across_m, uneven).unwrap();
-                assert!((back_m - along_m).abs() < 1e-9, "{along_m} {across_m} {uneven}: {back_m}");
+                let told_m = staggered_m(along_m, across_m, uneven, 0.0);
+                let what = format!("{along_m} {across_m} {uneven}: {widest_m} {told_m}");
+                assert!(widest_m <= told_m + 1e-9, "{what}");
+                // Where no circle is centred between the rows, less room is left on them by the other row's samples.
+                let is_between = across_m * across_m >= along_m * along_m * (0.25 - uneven * uneven);
+                assert!(!is_between || widest_m > told_m - 0.005, "{what}");
+                assert!((staggered_m(along_m, across_m, 0.0, uneven * along_m) - told_m).abs() < 1e-12);
+                let back_m = along_staggered_m(told_m, across_m, uneven, 0.0);
+                assert!((back_m - along_m).abs() < 1e-9, "{what}: {back_m}");
             }
         }
-        // Where rows are near to one another, the circle is as wide as their samples are apart.
-        assert!((staggered_m(0.5, 0.1, 0.0) - 0.5).abs() <= 0.0);
-        assert!((along_staggered_m(0.5, 0.1, 0.0).unwrap() - 0.5).abs() <= 0.0);
-        assert_eq!(along_staggered_m(0.3, 0.3, 0.1), None);
+        // Level with one another, they are the corners of a rectangle.
+        assert!((staggered_m(0.4, 0.3, 0.5, 0.0) - 0.5).abs() < 1e-12);
+        assert!((staggered_m(0.4, 0.3, 0.3, 1.0) - 0.5).abs() < 1e-12);
     }
 
     #[test]

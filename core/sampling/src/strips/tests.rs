@@ -138,6 +138,25 @@ fn sectors_that_leave_a_place_out_are_noticed_and_pinged_up_to_their_ends() {
     assert!((some.t_max_m(0, &passes, v, &GOING) - 0.35).abs() < 1e-9);
 }
 
+#[test]
+fn what_is_hidden_from_a_head_beyond_its_sector_hides_nothing() {
+    let plain = |from_m: f64, length_m: f64| View {
+        sector: Some(Sector::evenly(arc(from_m, length_m))),
+        hidden: Vec::new(),
+    };
+    let open = [plain(0.0, 14.99), plain(15.0, 15.0)];
+    // The narrow strip that both leave out, and wall of the other's.
+    let mut beside = open.clone();
+    beside[0].hidden = vec![arc(14.992, 5.0)];
+    let passes = Passes::in_sectors(HeadSet::first(2), 8.0).unwrap();
+    let speeds = [&open, &beside].map(|views| speed(&strips(views), &passes, 0.5).unwrap());
+    assert!((speeds[0] - speeds[1]).abs() < 1e-12, "{speeds:?}");
+    // Within its own it does.
+    let mut own = open.clone();
+    own[0].hidden = vec![arc(7.0, 0.4)];
+    assert!(speed(&strips(&own), &passes, 0.5).is_err());
+}
+
 /// Against the samples themselves: of two heads in the middle of a rectangle, whose corners lie within their sectors.
 #[test]
 fn in_sectors_a_long_step_counts_with_the_wait_where_it_is() {
