@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use headrace_tests::field_table::{
-    CONDITIONS, Cell, Condition, DRIVEN, Figures, KINDS_OF_SOURCES, PLACES, Place, VEHICLES, Vehicle,
+    CONDITIONS, Cell, Condition, DRIVEN, Falsely, Figures, KINDS_OF_SOURCES, PLACES, Place, VEHICLES, Vehicle,
 };
 use serde_json::json;
 
@@ -111,21 +111,21 @@ pub(crate) fn markdown(cells: &[NamedCell], figures: &[Figures], arguments: &Arg
 
 /// A line for each section that passed although its true hole is over the target.
 pub(crate) fn falsely(cells: &[NamedCell], figures: &[Figures]) -> String {
-    let mut text = String::new();
-    for (NamedCell { name, .. }, figures) in cells.iter().zip(figures) {
-        for section in &figures.falsely {
-            let [told_m, sd_m, true_m] = section.hole_m;
-            let (x_m, clock) = &section.at;
-            text += &format!(
-                "{} seed {}: {:.2} passed, D {told_m:.3} +- {sd_m:.3} m at {x_m:.2}, {clock}; true {true_m:.3}; {} doubtful\n",
-                name.join("/"),
-                section.seed,
-                section.start_m,
-                section.doubtful
-            );
-        }
-    }
-    text
+    let line = |name: &[String; 4], section: &Falsely| {
+        let [told_m, sd_m, true_m] = section.hole_m;
+        let (x_m, clock) = &section.at;
+        format!(
+            "{} seed {}: {:.2} passed, D {told_m:.3} +- {sd_m:.3} m at {x_m:.2}, {clock}; true {true_m:.3}; {} doubtful\n",
+            name.join("/"),
+            section.seed,
+            section.start_m,
+            section.doubtful
+        )
+    };
+    let of_cell = |(NamedCell { name, .. }, figures): (&NamedCell, &Figures)| -> String {
+        figures.falsely.iter().map(|section| line(name, section)).collect()
+    };
+    cells.iter().zip(figures).map(of_cell).collect()
 }
 
 /// The same with the dives of all places together, for a page: one vehicle's places beside each other are printed.

@@ -81,7 +81,8 @@ impl Limit {
 /// there is no more room than its own samples leave, and beyond are the rows' legs.
 fn staggered_m(along_m: f64, across_m: f64, uneven: f64, moved_m: f64) -> f64 {
     let off_m = (uneven * along_m + moved_m).min(along_m / 2.0);
-    let (a2, b2) = ((along_m / 2.0 - off_m).powi(2), (along_m / 2.0 + off_m).powi(2));
+    let square = |x_m: f64| x_m * x_m;
+    let (a2, b2) = (square(along_m / 2.0 - off_m), square(along_m / 2.0 + off_m));
     let across2 = across_m * across_m;
     if across2 * across2 < a2 * b2 || across_m <= 0.0 {
         return along_m;
