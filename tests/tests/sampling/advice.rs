@@ -238,6 +238,27 @@ fn val_followed_it_meets_the_target_and_a_tenth_faster_it_does_not() {
     assert!(near >= 8, "holes are near T in {near} cases only");
 }
 
+/// What is missed at a third above the advice is told to be passed again at about that advice: two numbers of one screen.
+#[test]
+fn the_way_home_says_about_what_the_advice_does() {
+    let sectors = |of: Case, target_m: f64| Case { layout: "sector_offset", target_m, ..of };
+    let coarse = Case { mode: "faster", ..FOUR };
+    for case in [VITA1, FOUR, sectors(TWO, 0.9), sectors(FOUR, 0.5), sectors(FOUR, 0.7), sectors(coarse, 0.5)]
+    {
+        let planned_mps = case.planned_mps();
+        let dive = case.dive(planned_mps, 1.35 * planned_mps);
+        let again = dive.report.way_home.iter().map(|stop| stop.at_most_mps).fold(f64::INFINITY, f64::min);
+        let advised = dive.median(v_max_mps);
+        println!("{} {} {}: {again:.4} again, {advised:.4} advised", case.what, case.layout, case.target_m);
+        assert!(
+            (0.95..1.02).contains(&(again / advised)),
+            "{} {}: {again} {advised}",
+            case.what,
+            case.layout
+        );
+    }
+}
+
 #[test]
 fn val_under_a_swinging_vehicle_it_is_lower_and_holds() {
     let mut broken = Vec::new();

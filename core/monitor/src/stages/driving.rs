@@ -29,6 +29,8 @@ const RAYS: u32 = 72;
 const MOVED_M: f64 = 0.05;
 /// Time between passes over the scheduled one up to which heads are in step.
 const IN_STEP: f64 = 1.05;
+/// Waits of a place in a sector that are told apart: from a whole sweep there and back at its ends to half of one in its middle.
+const WAITS: usize = 4;
 /// Speed below which the vehicle counts as stationary, m/s.
 const SLOW_MPS: f64 = 0.01;
 
@@ -50,6 +52,8 @@ pub(crate) struct Driving {
     /// The step of the heads, radians, and the place for which steps along the wall were last found, m.
     step_rad: f64,
     place_m: [f64; 2],
+    /// The largest steps along the wall, m, by wait: the n-th where it is at most 1 - n / 8 of the longest. Heads that turn on wait alike everywhere.
+    steps_m: [f64; WAITS],
     /// The time between passes, seconds, the steps along the wall and the target less its margin, m, for which the speed
     /// that fits was last found.
     fitted: [f64; 3],
@@ -57,7 +61,7 @@ pub(crate) struct Driving {
     pub(super) lacking: Lacking,
 }
 
-stateful!(Driving { state: now, step_rad, place_m, fitted, looks, lacking; });
+stateful!(Driving { state: now, step_rad, place_m, steps_m, fitted, looks, lacking; });
 
 impl Driving {
     /// Updates the statistics for a beat, from the situation as it is and as it would be had no head been silent or stood
@@ -102,8 +106,11 @@ impl Driving {
             return;
         }
         self.fitted = passes;
-        let squared = (sure_m - now.middle_t_y_m) * (sure_m + now.middle_t_y_m);
-        let along_m = math::sqrt(squared.max(0.0));
+        let along = |(number, step_m): (usize, &f64)| {
+            let wait = 1.0 - number as f64 / (2 * WAITS) as f64;
+            math::sqrt(((sure_m - step_m) * (sure_m + step_m)).max(0.0)) / wait
+        };
+        let along_m = self.steps_m.iter().enumerate().map(along).fold(f64::INFINITY, f64::min);
         now.fits_along_m = along_m;
         let scheduled = Phasing::of(healthy).as_scheduled(healthy.configured, now.planned_mps);
         let fits = |mps: f64| {
@@ -131,11 +138,14 @@ impl Driving {
         }
         let anew = (step_rad - self.step_rad).abs() > 1e-9;
         if anew {
-            self.now.middle_t_y_m = largest_step_m(profile, profile.reference(), step_rad);
+            let sectors = if situation.layout == HeadLayout::SectorOffset { situation.configured } else { 0 };
+            self.steps_m = steps_by_wait_m(profile, profile.reference(), step_rad, sectors);
+            self.now.middle_t_y_m = self.steps_m.into_iter().fold(0.0, f64::max);
         }
         let off_m = math::hypot(place_m[0] - self.place_m[0], place_m[1] - self.place_m[1]);
         if anew || off_m > MOVED_M {
-            self.now.t_y_m = largest_step_m(profile, place_m, step_rad).max(self.now.middle_t_y_m);
+            let steps_m = steps_by_wait_m(profile, place_m, step_rad, 0);
+            self.now.t_y_m = steps_m.into_iter().fold(self.now.middle_t_y_m, f64::max);
             self.place_m = place_m;
         }
         self.step_rad = step_rad;
@@ -175,18 +185,26 @@ impl Driving {
     }
 }
 
-/// Largest distance along the perimeter between the places that two beams meet, a step apart, seen from a place, m.
-fn largest_step_m(profile: &Profile, place_m: Yz, step_rad: f64) -> f64 {
+/// Largest distances along the perimeter between the places that two beams meet, a step apart, seen from a place, m: by the wait of a place
+/// in one of so many sectors, or all as the first where there are none.
+fn steps_by_wait_m(profile: &Profile, place_m: Yz, step_rad: f64, sectors: usize) -> [f64; WAITS] {
     let arc_m = |angle_rad: f64| {
         let wall = profile.cast(place_m, [math::sin(angle_rad), -math::cos(angle_rad)]);
         wall.map(|wall| wall.arc_m)
     };
-    let step_m = |k: u32| {
+    let mut steps_m = [0.0_f64; WAITS];
+    for k in 0..RAYS {
         let angle_rad = math::TAU * f64::from(k) / f64::from(RAYS);
-        let (from_m, to_m) = (arc_m(angle_rad)?, arc_m(angle_rad + step_rad)?);
-        Some(math::wrap_signed(to_m - from_m, profile.perimeter_m()).abs())
-    };
-    (0..RAYS).filter_map(step_m).fold(0.0, f64::max)
+        let Some((from_m, to_m)) = arc_m(angle_rad).zip(arc_m(angle_rad + step_rad)) else { continue };
+        let step_m = math::wrap_signed(to_m - from_m, profile.perimeter_m()).abs();
+        let share = math::wrap(f64::from(k) * sectors as f64 / f64::from(RAYS), 1.0);
+        let number = math::floor_to_i64(share.min(1.0 - share) * (2 * WAITS) as f64);
+        let place = usize::try_from(number).unwrap_or(0).min(WAITS - 1);
+        if let Some(slot) = steps_m.get_mut(place) {
+            *slot = slot.max(step_m);
+        }
+    }
+    steps_m
 }
 
 /// How far apart along the hull the heads that turn are, m.
