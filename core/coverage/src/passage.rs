@@ -5,6 +5,7 @@ use serde::{Deserialize, Serialize};
 use headrace_fusion::Fix;
 use headrace_fusion::relative::Relative;
 use headrace_geometry::frames::Vec3;
+use headrace_geometry::math;
 use headrace_geometry::tunnel::Profile;
 use headrace_sampling::head::HeadSet;
 
@@ -147,9 +148,11 @@ impl PassError {
 
     /// Whether that is over a limit, m: most passes aren't by far, which is known without looking round the profile.
     pub fn exceeds(&self, limit_m: f64, profile: &Profile) -> bool {
-        // No wall is farther from a place within the profile than half of the way round it.
+        // No wall is farther from the reference point, which is within the profile, than half of the way round.
+        let [y_m, z_m] = profile.reference();
+        let off_m = math::hypot(self.from_m[0] - y_m, self.from_m[1] - z_m);
         let here_m = LARGEST_OF_MANY * self.relative.sd_m(Vec3::zero());
-        let at_most_m = here_m + self.slope() * profile.perimeter_m() / 2.0;
+        let at_most_m = here_m + self.slope() * (off_m + profile.perimeter_m() / 2.0);
         at_most_m > limit_m && self.worst_m(profile) > limit_m
     }
 
@@ -204,9 +207,13 @@ mod tests {
         let worst_m = LARGEST_OF_MANY * 0.01 * (3.0 + (y_m - 0.5).abs());
         assert!((error.worst_m(&profile) - worst_m).abs() < 1e-4, "{}", error.worst_m(&profile));
         assert!((error.slope() - LARGEST_OF_MANY * 0.01).abs() < 1e-12);
-        let worst_m = error.worst_m(&profile);
-        for share in [0.3, 0.9, 0.999, 1.001, 1.5, 4.0] {
-            assert_eq!(error.exceeds(share * worst_m, &profile), share < 1.0, "{share}");
+        // From within, and from where an estimate that is lost may be.
+        for from_m in [error.from_m, [40.0, -30.0]] {
+            let error = PassError { from_m, ..error };
+            let worst_m = error.worst_m(&profile);
+            for share in [0.3, 0.9, 0.999, 1.001, 1.5, 4.0] {
+                assert_eq!(error.exceeds(share * worst_m, &profile), share < 1.0, "{from_m:?} {share}");
+            }
         }
     }
 }

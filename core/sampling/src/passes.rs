@@ -66,9 +66,13 @@ enum Pattern {
     /// All rotate continuously, in one sense and at one rate: by head, phase of its passes in a turn's advance,
     /// in [0, 1).
     Turning([f64; MAX_HEADS]),
-    /// Each sweeps back and forth; the longest period of a sweep there and back, seconds, and how far from evenly after one another
-    /// neighbours come to the end that they share, as a share of the advance in it, 0 to 0.5.
-    Sectors(f64, f64),
+    /// Each sweeps back and forth.
+    Sectors {
+        /// The longest period of a sweep there and back, seconds.
+        sweep_s: f64,
+        /// See [`Passes::uneven_ends`].
+        uneven: f64,
+    },
     /// Opposite senses, or out of step: passes come at uneven times, and only one head can be relied on.
     Loose,
 }
@@ -99,7 +103,8 @@ impl Phasing {
                 let sweep_s = |motion: &HeadMotion| {
                     2.0 * motion.sector_rad.unwrap_or(share_rad) / motion.rate_radps.abs()
                 };
-                Pattern::Sectors(motions.iter().flatten().map(sweep_s).fold(0.0, f64::max), AT_ONCE)
+                let sweep_s = motions.iter().flatten().map(sweep_s).fold(0.0, f64::max);
+                Pattern::Sectors { sweep_s, uneven: AT_ONCE }
             }
             HeadLayout::PhaseShift if ahead.iter().any(Option::is_none) => Pattern::Loose,
             HeadLayout::PhaseShift => phases(motions).map_or(Pattern::Loose, Pattern::Turning),
@@ -132,7 +137,7 @@ impl Phasing {
     pub fn fits_some_speeds(&self) -> bool {
         let is_phased = match self.pattern {
             Pattern::Turning(_) => true,
-            Pattern::Sectors(..) => self.legs.iter().any(Option::is_some),
+            Pattern::Sectors { .. } => self.legs.iter().any(Option::is_some),
             Pattern::Loose => false,
         };
         is_phased && self.spread_m() > 0.0
@@ -145,6 +150,7 @@ impl Phasing {
         self.spread_m()
     }
 
+    /// The same of any heads.
     fn spread_m(&self) -> f64 {
         let ahead_m = || self.heads.iter().filter_map(|head| self.ahead_m.get(head)).copied();
         (ahead_m().fold(f64::MIN, f64::max) - ahead_m().fold(f64::MAX, f64::min)).max(0.0)
@@ -188,7 +194,7 @@ impl Phasing {
     ///
     /// Continuous rotation: head k passes the vertical at the times t_k + i T; as it sits x_k ahead of the vehicle's
     /// origin, it meets the wall at chainages x_k + v (t_k + i T). Divided by v T, these are phases on a circle.
-    /// Sectors: a place near a sector's end waits for a whole sweep there and back.
+    /// Sectors: a place near a sector's end waits for a whole sweep there and back; when neighbours come to it depends on the speed.
     /// Source: Jorge et al. 2021, §5.1 and §5.2.
     pub fn at(&self, speed_mps: f64) -> Passes {
         let Self { heads, turns_s, mut pattern, ahead_m, legs } = *self;
@@ -200,7 +206,7 @@ impl Phasing {
                 *phase = math::wrap(*phase + ahead, 1.0);
             }
         }
-        if let Pattern::Sectors(sweep_s, uneven) = &mut pattern
+        if let Pattern::Sectors { sweep_s, uneven } = &mut pattern
             && !at_rest
             && *sweep_s > 0.0
         {
@@ -288,7 +294,7 @@ impl Passes {
                 (seen_by.iter().filter(|head| self.heads.has(*head)).count(), self.turn_s())
             }
             // There and back: at a sector's end one right after the other.
-            Pattern::Sectors(sweep_s, _) => (2, sweep_s),
+            Pattern::Sectors { sweep_s, .. } => (2, sweep_s),
             Pattern::Loose => (1, gap_s),
         };
         let (count, needed) = (passing.max(1) as f64, needed.max(1.0));
@@ -328,7 +334,7 @@ impl Passes {
         if heads.is_empty() {
             return Err(SamplingError::HeadCount { heads: 0 });
         }
-        let pattern = Pattern::Sectors(sweep_s, 0.0);
+        let pattern = Pattern::Sectors { sweep_s, uneven: 0.0 };
         Ok(Self { heads, turns_s: [0.0; MAX_HEADS], pattern, parallax_s: 0.0, at_rest: false, lossy: false })
     }
 
@@ -343,7 +349,7 @@ impl Passes {
         passing().next()?;
         let turns_s = || passing().filter_map(|head| self.turns_s.get(head)).copied();
         Some(match &self.pattern {
-            Pattern::Sectors(sweep_s, _) => *sweep_s,
+            Pattern::Sectors { sweep_s, .. } => *sweep_s,
             Pattern::Loose => turns_s().fold(f64::INFINITY, f64::min),
             Pattern::Turning(phases) => {
                 let mut known = [0.0; MAX_HEADS];
@@ -359,11 +365,11 @@ impl Passes {
         })
     }
 
-    /// Of heads in sectors, how far from evenly after one another neighbours come to the end that they share: the largest, as a share of
-    /// the advance in a sweep there and back, 0 to 0.5.
+    /// How far from evenly after one another neighbours come to the end that their sectors share: the largest, as a share of the advance in a
+    /// sweep there and back, from 0 (one half a sweep after the other) to 0.5 (both at one place, or not known). `None` for heads that turn on.
     pub fn uneven_ends(&self) -> Option<f64> {
         match self.pattern {
-            Pattern::Sectors(_, uneven) => Some(uneven),
+            Pattern::Sectors { uneven, .. } => Some(uneven),
             Pattern::Turning(_) | Pattern::Loose => None,
         }
     }
@@ -378,7 +384,7 @@ impl Passes {
     pub fn evened(&self) -> Self {
         let even = match self.pattern {
             Pattern::Turning(_) => Self::evenly_phased(self.heads, |_| self.turn_s()).ok(),
-            Pattern::Sectors(sweep_s, _) => Self::in_sectors(self.heads, sweep_s).ok(),
+            Pattern::Sectors { sweep_s, .. } => Self::in_sectors(self.heads, sweep_s).ok(),
             Pattern::Loose => None,
         };
         even.map_or(Self { parallax_s: 0.0, ..*self }, |even| even.lossy(self.lossy))
@@ -389,7 +395,7 @@ impl Passes {
         let turn_s = self.turns_s.into_iter().fold(0.0, f64::max);
         match self.pattern {
             Pattern::Turning(_) => turn_s / self.heads.len().max(1) as f64,
-            Pattern::Sectors(..) | Pattern::Loose => self.gap_s(self.heads).unwrap_or(0.0),
+            Pattern::Sectors { .. } | Pattern::Loose => self.gap_s(self.heads).unwrap_or(0.0),
         }
     }
 

@@ -34,8 +34,8 @@ pub struct Strip {
     pub arc: Arc,
     /// The heads that see it.
     pub seen_by: HeadSet,
-    /// All or part of it is hidden from a head: pings stop up to a step before its edge. Where it is only outside a
-    /// sector, they stop at its edge.
+    /// All or part of it is hidden from a head that would ping it: pings stop up to a step before its edge. Where it is only
+    /// outside a sector, they stop at its edge.
     pub hidden: bool,
     /// The longest wait between two passes, as a share of the longest anywhere, which is at the ends of a sector: 0.5 to 1.
     pub wait: f64,

@@ -25,8 +25,7 @@ pub struct Going {
 pub(super) struct Limit {
     pub(super) gap_s: f64,
     pub(super) t_y_m: f64,
-    /// Across a place that sectors leave out, of which T_y is the width: how far from evenly after one another passes come to it from
-    /// either side, as a share of T_x, 0 to 0.5.
+    /// Across a place that sectors leave out, of which `t_y_m` is the width: [`crate::passes::Passes::uneven_ends`]. `None` anywhere else.
     pub(super) uneven: Option<f64>,
 }
 
@@ -47,7 +46,7 @@ impl Limit {
 
     /// The largest speed that solves T = hypot((v + w) t + shift + u a / v, T_y), with t the sum of gap and ping
     /// period, w the swing speed, u that between heads, and a their distance; or, if faster, the same with the swing's limit
-    /// between passes.
+    /// between passes, or that of the circle between two rows of turning points.
     pub(super) fn speed_mps(&self, target_m: f64, going: &Going) -> Option<f64> {
         let along_m = spacing::along_m(target_m, self.t_y_m)?;
         let staggered_m =
