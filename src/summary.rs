@@ -182,10 +182,10 @@ fn missed(run: &RunReport, report: &Report) -> String {
 fn unsure(stretch: &UnsureStretch) -> String {
     let what = if stretch.why == Unsure::NotInspected { "NOT INSPECTED" } else { "CAN'T SAY" };
     let (from, to) = (station(stretch.from_m), station(stretch.to_m));
-    let helps = match helps_text(stretch.why) {
-        "" => String::new(),
-        helps => format!("  -> {helps}"),
-    };
+    let mut helps = helps_text(stretch);
+    if !helps.is_empty() {
+        helps.insert_str(0, "  -> ");
+    }
     format!("  {from} to {to}  {what}: {}{helps}", unsure_text(stretch))
 }
 

@@ -17,7 +17,7 @@ use super::passage::PassError;
 use super::runs::{Run, RunChange, RunId, Runs, Telling};
 use super::section::{Judgement, Section, Verdict};
 use super::store::SampleStore;
-use super::unsure::Stretch;
+use super::unsure::{Driven, Stretch};
 use super::visits::Visit;
 use headrace_geometry::math;
 use headrace_geometry::time::MonoNs;
@@ -457,7 +457,8 @@ impl Sections {
         let section = self.get(index)?;
         let hole_m = section.hole.map_or(0.0, |hole| hole.diameter_m);
         let (from, to) = (index, index + 1);
-        Some(Stretch { why: section.unsure()?, from, to, sections: 1, hole_m: [hole_m, section.hole_sd_m] })
+        let (why, driven) = (section.unsure()?, Driven::of(&section.passage.drive));
+        Some(Stretch { why, from, to, sections: 1, hole_m: [hole_m, section.hole_sd_m], driven })
     }
 
     /// The unsure stretches of the way, in order. Allocates: for the end of a dive.

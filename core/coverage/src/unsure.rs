@@ -2,6 +2,8 @@
 
 use serde::{Deserialize, Serialize};
 
+use super::passage::Drive;
+
 /// Why a section has neither passed nor failed, though no more samples will come without turning back.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
@@ -65,6 +67,30 @@ pub struct Stretch {
     pub sections: u32,
     /// Largest hole, and the standard deviation of that hole, m.
     pub hole_m: [f64; 2],
+    /// How the section with the largest hole was driven.
+    pub driven: Driven,
+}
+
+/// How a section was driven, and how it should be.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+pub struct Driven {
+    /// Speed along the tunnel, m/s; zero where nothing passed.
+    pub speed_mps: f64,
+    /// The largest speed that meets the target, all heads turning as scheduled, m/s; zero where none does.
+    pub fits_mps: f64,
+    /// Passes are farther apart than evenly spread ones.
+    pub is_uneven: bool,
+}
+
+/// Time between passes over that of evenly spread ones from which they are uneven.
+const UNEVEN: f64 = 1.05;
+
+impl Driven {
+    /// From how vehicle and heads moved.
+    pub fn of(drive: &Drive) -> Self {
+        let Drive { speed_mps, fits_mps, healthy_gap_s, all_gap_s, .. } = *drive;
+        Self { speed_mps, fits_mps, is_uneven: healthy_gap_s > UNEVEN * all_gap_s }
+    }
 }
 
 /// Sections farther apart than this are of different stretches, m.
@@ -81,7 +107,7 @@ impl Stretch {
         (self.from, self.to) = (self.from.min(other.from), self.to.max(other.to));
         self.sections += other.sections;
         if other.hole_m[0] > self.hole_m[0] {
-            self.hole_m = other.hole_m;
+            (self.hole_m, self.driven) = (other.hole_m, other.driven);
         }
         true
     }
@@ -92,7 +118,8 @@ mod tests {
     use super::*;
 
     fn one(why: Unsure, section: i64, hole_m: f64) -> Stretch {
-        Stretch { why, from: section, to: section + 1, sections: 1, hole_m: [hole_m, 0.1] }
+        let driven = Driven { speed_mps: hole_m, ..Driven::default() };
+        Stretch { why, from: section, to: section + 1, sections: 1, hole_m: [hole_m, 0.1], driven }
     }
 
     #[test]
@@ -102,7 +129,7 @@ mod tests {
         assert!(stretch.join(&one(Unsure::Position, 7, 0.5), 0.25), "two sections lie between");
         assert!(!stretch.join(&one(Unsure::Position, 15, 0.5), 0.25), "three");
         assert!(!stretch.join(&one(Unsure::DoubtfulReturns, 12, 0.5), 0.25), "another reason");
-        let all = Stretch { why: Unsure::Position, from: 7, to: 12, sections: 3, hole_m: [0.6, 0.1] };
+        let all = Stretch { from: 7, sections: 3, ..one(Unsure::Position, 11, 0.6) };
         assert_eq!(stretch, all);
     }
 }

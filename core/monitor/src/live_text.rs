@@ -95,12 +95,13 @@ pub fn status_line(state: &LiveState, profile: &Profile, name: &dyn Fn(usize) ->
         Condition::GoingBack(to_m) => (format!("going back to {}", station(to_m)), String::new()),
         Condition::NoSpeed => (no_speed_text(state, profile), String::new()),
         Condition::TooFast => ("TOO FAST".to_owned(), format!("at most {v_max}")),
-        Condition::TurnFails => (turn_fails_text(state), format!("go {v_max}")),
+        Condition::TurnFails => (turn_text("THIS TURN MISSES", state), format!("go {v_max}")),
         Condition::CannotSay(PositionDoubt::Spread) if state.asks_to_stand() => {
             (doubt_text(PositionDoubt::Spread, state), format!("stand still {} s", state.stand_s))
         }
         Condition::CannotSay(doubt) => (doubt_text(doubt, state), format!("at most {v_max}")),
         Condition::Over => ("a little fast".to_owned(), format!("at most {v_max}")),
+        Condition::TurnUnsure => (turn_text("THIS TURN MAY MISS", state), format!("go {v_max}")),
         Condition::Good => (format!("ok up to {v_max}"), String::new()),
     };
     let is_old = matches!(condition, Condition::Old(_) | Condition::NoData);
@@ -149,12 +150,12 @@ fn no_speed_text(state: &LiveState, profile: &Profile) -> String {
     figures(state).map_or_else(String::new, |figures| advice_text(&figures, profile))
 }
 
-fn turn_fails_text(state: &LiveState) -> String {
+fn turn_text(what: &str, state: &LiveState) -> String {
     let error_deg = state.advice.and_then(|advice| advice.phase_error_rad).unwrap_or(0.0).to_degrees().abs();
     if error_deg >= 1.0 {
-        format!("THIS TURN MISSES: heads {error_deg:.0} degrees out of phase")
+        format!("{what}: heads {error_deg:.0} degrees out of phase")
     } else {
-        "THIS TURN MISSES".to_owned()
+        what.to_owned()
     }
 }
 
@@ -230,7 +231,7 @@ pub fn told_line(told: &Told, profile: &Profile) -> PilotLine {
         ),
         Told::CannotSay(stretch) => {
             let what = format!("CAN'T SAY: {}", unsure_text(stretch));
-            line(station(stretch.from_m), what, helps_text(stretch.why).to_owned(), Some(Lamp::Amber))
+            line(station(stretch.from_m), what, helps_text(stretch), Some(Lamp::Amber))
         }
         Told::CannotSayEnds(stretch) => {
             let what = format!("can't say until {}", station(stretch.to_m));
@@ -239,7 +240,7 @@ pub fn told_line(told: &Told, profile: &Profile) -> PilotLine {
         Told::NotInspected(stretch) => {
             let what = format!("NOT INSPECTED: {}", unsure_text(stretch));
             let place = to(stretch.from_m, stretch.to_m);
-            line(place, what, helps_text(stretch.why).to_owned(), Some(Lamp::Amber))
+            line(place, what, helps_text(stretch), Some(Lamp::Amber))
         }
         // Its text begins with the place.
         Told::Alert { x_m, text, .. } => {

@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-use headrace_coverage::{Sections, Stretch, Unsure};
+use headrace_coverage::{Driven, Sections, Stretch, Unsure};
 
 /// A stretch of which neither a pass nor a fail can be told.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
@@ -21,6 +21,9 @@ pub struct UnsureStretch {
     pub hole_sd_m: f64,
     /// By how much the hole may be larger or smaller: the confidence times its standard deviation, m.
     pub hole_error_m: f64,
+    /// How the section with that hole was driven.
+    #[serde(skip)]
+    pub driven: Driven,
 }
 
 impl UnsureStretch {
@@ -40,6 +43,7 @@ impl UnsureStretch {
             hole_m,
             hole_sd_m,
             hole_error_m: confidence_sd * hole_sd_m,
+            driven: stretch.driven,
         }
     }
 }
@@ -60,16 +64,37 @@ pub fn unsure_text(stretch: &UnsureStretch) -> String {
     }
 }
 
+/// Shares of the speed that fits within which a speed is that one.
+const AS_FITS: [f64; 2] = [0.98, 1.02];
+
+/// Share of the hole from which its error is what matters.
+const MOSTLY_ERROR: f64 = 0.2;
+
 /// What would help; empty where nothing does.
-pub fn helps_text(why: Unsure) -> &'static str {
-    match why {
+pub fn helps_text(stretch: &UnsureStretch) -> String {
+    let surer = "again with a surer position";
+    let helps = match stretch.why {
         Unsure::NotInspected => "pass it whole to inspect it",
-        Unsure::Position => "slower, or again with a surer position",
+        Unsure::Position => {
+            let Driven { speed_mps, fits_mps, is_uneven } = stretch.driven;
+            let [least_mps, most_mps] = AS_FITS.map(|share| share * fits_mps);
+            return if stretch.hole_error_m > MOSTLY_ERROR * stretch.hole_m {
+                surer.to_owned()
+            } else if fits_mps > 0.0 && speed_mps > most_mps {
+                format!("at most {fits_mps:.2} m/s, or {surer}")
+            } else if speed_mps > 0.0 && speed_mps < least_mps && is_uneven {
+                // Slower than that, heads apart along the hull are out of phase.
+                format!("at {fits_mps:.2} m/s, or {surer}")
+            } else {
+                surer.to_owned()
+            };
+        }
         Unsure::SeveralStretches => "pass it again in one go",
         Unsure::DoubtfulReturns => "pass it again in clear water",
         Unsure::DistrustedHead => "pass it again without that head",
         Unsure::ContradictedProfile => "check profile, sound speed and tether zero",
         Unsure::OtherSize => "check profile and sound speed",
         Unsure::NoWall => "",
-    }
+    };
+    helps.to_owned()
 }

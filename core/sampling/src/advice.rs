@@ -241,6 +241,8 @@ impl Advisor {
             reason: if helps { Reason::HelixPitch } else { Reason::AngularStep },
             predicted_t_m: predicted_t_m.is_finite().then_some(predicted_t_m),
             will_exceed: predicted_t_m > self.task.target_m,
+            may_exceed: predicted_t_m > sure_m,
+            sure_m,
             pass_gap_s: passes.gap_s(passes.heads()).unwrap_or(0.0),
             even_pass_gap_s: passes.even_gap_s(),
             t_y_m: self.now.largest_step_m(0),

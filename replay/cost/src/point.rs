@@ -196,7 +196,7 @@ pub struct Trade {
     pub cost_unit: String,
     /// Whether cost is computed rather than measured, so that it doesn't differ from run to run.
     pub cost_is_computed: bool,
-    /// The error below which accuracy decides nothing, a tenth of the target.
+    /// The error below which accuracy decides nothing: a tenth of the target, or what the advice keeps back of a speed.
     pub decides: Option<f64>,
     /// What was measured.
     pub points: Vec<Point>,
@@ -211,6 +211,11 @@ pub struct Trade {
 }
 
 impl Trade {
+    /// Unit of the axis to the right.
+    pub(crate) fn error_unit(&self) -> &str {
+        self.error_axis.rsplit(", ").next().unwrap_or_default()
+    }
+
     /// Differences of the error below this decide nothing, in its unit: a tenth of what decides anything, and no less than the reference
     /// may be off itself.
     pub fn resolution(&self) -> f64 {

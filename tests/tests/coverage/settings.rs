@@ -158,6 +158,18 @@ fn right_settings_are_not_doubted() {
     }
 }
 
+/// A head that sees a vault round itself has nothing to show how it is turned by; without noise its millimetres are alike all the way.
+#[test]
+fn a_head_whose_sector_is_round_is_not_doubted_for_millimetres() {
+    for layout in ["sector_offset", "phase_shift"] {
+        let scene = scenes::scene(&format!(
+            "vehicle = \"vita2-4.toml\"\n[vehicle_changes]\nheads.layout = {layout:?}\n[trajectory]\nstart_m = 5\n\
+             [[trajectory.legs]]\ndistance_m = 45\nspeed_mps = 0.1\n[effects]\nmotion_within_turn = {{}}\n"
+        ));
+        assert_eq!(doubted(&scene, &scene), None, "{layout}");
+    }
+}
+
 #[test]
 fn walls_that_are_not_as_drawn_here_and_there_are_no_settings() {
     for name in ["collapse", "boulders", "steel", "vita1-field"] {

@@ -14,6 +14,8 @@ pub(super) const FEWEST_BLOCKS: u32 = 8;
 /// vehicle's place.
 pub(super) const SURE: f64 = 6.0;
 pub(super) const SURE_GAIN: f64 = 3.0;
+/// Normalised squares that a parameter explains, of each reading of all sources, from which it shows: a seventh of their noise.
+const EXPLAINS: f64 = 0.02;
 /// What of the vehicle's pose is unknown within a spell: place across and up, roll, pitch and yaw.
 pub(super) const POSE: usize = 5;
 /// What a comparison counts of a miss at most, m: a share of echoes is of something else.
@@ -34,6 +36,7 @@ pub(super) struct Line {
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub(super) struct Fit {
     pub(super) blocks: u32,
+    readings: u32,
     weight: f64,
     value: f64,
     weights_2: f64,
@@ -82,11 +85,13 @@ pub(super) fn solved(factor: &[[f64; POSE]; POSE], right: [f64; POSE]) -> [f64; 
 }
 
 impl Fit {
-    pub(super) fn add(&mut self, [weight, value]: [f64; 2]) {
+    /// Adds the sums of a block of so many readings, of all sources.
+    pub(super) fn add(&mut self, [weight, value]: [f64; 2], readings: u32) {
         if weight <= 0.0 {
             return;
         }
         self.blocks += 1;
+        self.readings = self.readings.saturating_add(readings);
         self.weight += weight;
         self.value += value;
         self.weights_2 += weight * weight;
@@ -110,11 +115,14 @@ impl Fit {
         Some([estimate, math::sqrt((scatter * n / (n - 1.0)).max(0.0)) / self.weight])
     }
 
-    /// The estimate where it is certainly beyond this, and its standard deviations from zero.
+    /// The estimate where it is certainly beyond this, and its standard deviations from zero: by the scatter of blocks, and by the noise
+    /// of ranges, without which blocks hardly scatter. `None` where it hardly changes any range: what is made of millimetres then is
+    /// what walls and beams are otherwise than assumed.
     pub(super) fn certain(&self, least: f64) -> Option<(f64, f64)> {
-        let [estimate, sd] = self.estimate()?;
-        let sure_sd = estimate.abs() / sd.max(f64::MIN_POSITIVE);
-        (estimate.abs() >= least && sure_sd >= SURE).then_some((estimate, sure_sd))
+        let [estimate, scatter] = self.estimate()?;
+        let sure_sd = estimate.abs() / scatter.max(1.0 / math::sqrt(self.weight));
+        let shows = self.explains() >= EXPLAINS * f64::from(self.readings);
+        (estimate.abs() >= least && sure_sd >= SURE && shows).then_some((estimate, sure_sd))
     }
 
     /// Sum of normalised squares that it explains.
@@ -170,5 +178,27 @@ impl Alternative {
     pub(super) fn explains(&self) -> f64 {
         let [own, theirs, _] = self.all;
         (own - theirs) * f64::from(COMPARED) / (0.03 * 0.03)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Blocks alike, as without noise, of a parameter that changes ranges by so many of their standard deviations.
+    fn alike(changes_sd: f64, by: f64) -> Fit {
+        let mut fit = Fit::default();
+        let weight = 100.0 * (changes_sd / by) * (changes_sd / by);
+        (0..20).for_each(|_| fit.add([weight, by * weight], 100));
+        fit
+    }
+
+    #[test]
+    fn what_hardly_changes_a_range_is_not_certain_though_blocks_do_not_scatter() {
+        assert!(alike(1.0, 0.05).certain(0.03).is_some());
+        assert!(alike(0.2, 0.2).certain(0.03).is_some(), "6 mm of 3 cm");
+        assert_eq!(alike(0.1, 0.2).certain(0.03), None, "3 mm");
+        assert_eq!(alike(0.001, 1e9).certain(0.03), None, "a turn in a round pipe");
+        assert_eq!(alike(1.0, 0.02).certain(0.03), None, "less than what is told");
     }
 }

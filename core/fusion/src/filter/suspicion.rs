@@ -331,9 +331,10 @@ impl Suspicions {
     fn close(&mut self) {
         self.end_spell();
         if self.block.readings >= FEWEST_READINGS {
-            self.scale.add(self.block.scale);
+            let readings = self.block.readings;
+            self.scale.add(self.block.scale, readings);
             for (fit, sums) in self.turned.iter_mut().zip(self.block.turned) {
-                fit.add(sums);
+                fit.add(sums, readings);
             }
             for (fit, sums) in self.tilted.iter_mut().flatten().zip(self.block.tilted.iter().flatten()) {
                 fit.add(*sums);

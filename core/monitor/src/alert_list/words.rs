@@ -6,7 +6,7 @@ use crate::pilot_text::{
     actions_text, advice_text, alert_text, cause_text, no_position_text, setting_text, speed_text, station,
 };
 use crate::unsure_stretch::{UnsureStretch, helps_text, unsure_text};
-use headrace_coverage::{Action, Sections};
+use headrace_coverage::{Action, Sections, Stretch};
 use headrace_geometry::tunnel::Profile;
 
 /// What words need of the dive.
@@ -39,6 +39,10 @@ impl<'a> Surroundings<'a> {
         }
     }
 
+    fn unsure(&self, stretch: &Stretch) -> UnsureStretch {
+        UnsureStretch::from_sections(stretch, self.section_m, self.confidence_sd)
+    }
+
     fn name(&self, source: usize) -> String {
         self.sources.get(source).map_or_else(String::new, |source| source.id.clone())
     }
@@ -66,8 +70,7 @@ impl ListedAlert {
                 format!("MISSED {place}, at {clock}: {}", cause_text(causes))
             }
             (_, Figures::CannotSay(stretch)) => {
-                let stretch = UnsureStretch::from_sections(stretch, around.section_m, around.confidence_sd);
-                format!("CAN'T SAY {place}: {}", unsure_text(&stretch))
+                format!("CAN'T SAY {place}: {}", unsure_text(&around.unsure(stretch)))
             }
             (ListKind::TooFast, Figures::Advice(figures)) => {
                 // The present speed is on every screen.
@@ -111,7 +114,7 @@ impl ListedAlert {
                 let back_to_m = around.sections.back_to_m(from_m);
                 actions_text(&Action::against(causes.causes.iter()), back_to_m, causes.again_mps(*v_max_mps))
             }
-            (_, Figures::CannotSay(stretch)) => helps_text(stretch.why).to_owned(),
+            (_, Figures::CannotSay(stretch)) => helps_text(&around.unsure(stretch)),
             (ListKind::TooFast, Figures::Advice(figures)) => speed_text("at most", figures.v_max_mps),
             (ListKind::TurnFails, Figures::Advice(figures)) => speed_text("go", figures.v_max_mps),
             (ListKind::NoPosition, _) => "hold still".to_owned(),

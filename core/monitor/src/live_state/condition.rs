@@ -9,6 +9,8 @@ use headrace_sampling::advice::Reason;
 
 /// Share of v_max beyond which a speed is over it: that of the advice's margin and of the error of its measurement.
 const OVER: f64 = 1.02;
+/// Share below which a speed is another one than v_max.
+const UNDER: f64 = 0.97;
 /// Share beyond which it is too fast: what a pilot who follows the advice keeps.
 const TOO_FAST: f64 = 1.05;
 
@@ -37,6 +39,8 @@ pub enum Condition {
     CannotSay(PositionDoubt),
     /// The speed is a little over v_max.
     Over,
+    /// At this speed the present turn may miss the target for what errors of position take of it, though v_max is faster.
+    TurnUnsure,
     /// The speed is within v_max.
     Good,
 }
@@ -68,6 +72,7 @@ impl Condition {
             Self::TurnFails => "turn_fails",
             Self::CannotSay(_) => "cannot_say",
             Self::Over => "over",
+            Self::TurnUnsure => "turn_unsure",
             Self::Good => "good",
         }
     }
@@ -76,16 +81,16 @@ impl Condition {
     pub fn lamp(self) -> Lamp {
         match self {
             Self::Good | Self::Passed | Self::GoingBack(_) => Lamp::Green,
-            Self::Over | Self::TurnFails | Self::CannotSay(_) | Self::NoData => Lamp::Amber,
+            Self::Over | Self::TurnFails | Self::TurnUnsure | Self::CannotSay(_) | Self::NoData => Lamp::Amber,
             Self::Old(_) | Self::NoPosition(_) | Self::NoSonar | Self::NoSpeed | Self::TooFast => Lamp::Red,
         }
     }
 }
 
 impl LiveState {
-    /// Whether the T forecast at the present speed is over the target, or unbounded.
-    fn turn_exceeds(&self) -> bool {
-        self.advice.and_then(|advice| advice.predicted_t_m).is_none_or(|t_m| t_m > self.target_m)
+    /// Whether the T forecast at the present speed is over this, m, or unbounded.
+    fn turn_exceeds(&self, limit_m: f64) -> bool {
+        self.advice.and_then(|advice| advice.predicted_t_m).is_none_or(|t_m| t_m > limit_m)
     }
 
     /// What holds now.
@@ -121,9 +126,12 @@ impl LiveState {
         match self.position {
             _ if share > TOO_FAST => Condition::TooFast,
             // The forecast is held for a second; the turn itself may have been mended.
-            _ if advice.will_exceed && self.turn_exceeds() && share <= OVER => Condition::TurnFails,
+            _ if advice.will_exceed && self.turn_exceeds(self.target_m) && share <= OVER => Condition::TurnFails,
             PositionState::Doubtful(doubt) => Condition::CannotSay(doubt),
             _ if share > OVER => Condition::Over,
+            _ if advice.may_exceed && self.turn_exceeds(advice.sure_m) && share < UNDER => {
+                Condition::TurnUnsure
+            }
             _ => Condition::Good,
         }
     }

@@ -1,7 +1,7 @@
 use super::*;
 use crate::live_state::{PositionState, test_state};
 use crate::unsure_stretch::UnsureStretch;
-use headrace_coverage::Unsure;
+use headrace_coverage::{Driven, Unsure};
 use headrace_fusion::NoFix;
 use headrace_geometry::time::MonoNs;
 use headrace_geometry::tunnel::shapes;
@@ -71,7 +71,28 @@ fn stretch(why: Unsure) -> UnsureStretch {
         hole_m: 0.486,
         hole_sd_m: 0.04,
         hole_error_m: 0.08,
+        driven: Driven::default(),
     }
+}
+
+/// Slower isn't always better: below the speed that the heads are in phase for, they are out of it.
+#[test]
+fn what_helps_an_unsure_stretch_is_the_speed_that_fits() {
+    let helps = |speed_mps: f64, fits_mps: f64, is_uneven: bool| {
+        let driven = Driven { speed_mps, fits_mps, is_uneven };
+        helps_text(&UnsureStretch { driven, ..stretch(Unsure::Position) })
+    };
+    let surer = "again with a surer position";
+    assert_eq!(helps(0.2, 0.1, false), format!("at most 0.10 m/s, or {surer}"));
+    assert_eq!(helps(0.2, 0.1, true), format!("at most 0.10 m/s, or {surer}"));
+    assert_eq!(helps(0.09, 0.1, true), format!("at 0.10 m/s, or {surer}"));
+    assert_eq!(helps(0.09, 0.1, false), surer, "faster won't help");
+    assert_eq!(helps(0.1, 0.1, true), surer, "driven as told");
+    assert_eq!(helps(0.1, 0.0, true), surer, "no speed is known");
+    assert_eq!(helps(0.0, 0.1, true), surer, "never driven");
+    let driven = Driven { speed_mps: 0.2, fits_mps: 0.1, is_uneven: false };
+    let lost = UnsureStretch { hole_error_m: 0.3, driven, ..stretch(Unsure::Position) };
+    assert_eq!(helps_text(&lost), surer, "the error is what matters");
 }
 
 #[test]

@@ -168,6 +168,11 @@ pub struct Advice {
     pub predicted_t_m: Option<f64>,
     /// At the present speed the present turn will exceed the target; false where nothing can be predicted.
     pub will_exceed: bool,
+    /// At the present speed the present turn may exceed it: T comes within what errors of position take of the target; false where
+    /// nothing can be predicted.
+    pub may_exceed: bool,
+    /// The target less what errors of position take, m.
+    pub sure_m: f64,
     /// The longest time between two passes over a place that all heads see, seconds.
     pub pass_gap_s: f64,
     /// That time with the heads' passes evenly spread, seconds.
@@ -204,6 +209,8 @@ impl Advice {
             reason,
             predicted_t_m: None,
             will_exceed: false,
+            may_exceed: false,
+            sure_m: 0.0,
             pass_gap_s: 0.0,
             even_pass_gap_s: 0.0,
             t_y_m: 0.0,

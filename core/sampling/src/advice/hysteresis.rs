@@ -17,6 +17,8 @@ const HELD: usize = 6;
 /// A turn is forecast to exceed the target when the predicted T is above it by this share: half of the speed margin, so
 /// that the forecast doesn't chatter at the advised speed.
 const BEYOND: f64 = SPEED_MARGIN / 2.0;
+/// The same of what errors of position leave of the target: a pilot may be over the advised speed by a hundredth or two.
+const MAYBE_BEYOND: f64 = 0.03;
 
 /// Shows the most restrictive advice of the last second: the gravest reason and, within it, the lowest speed.
 ///
@@ -30,13 +32,14 @@ pub struct Hysteresis {
     next: usize,
     begun: bool,
     will_exceed: bool,
+    may_exceed: bool,
     /// The speed shown, m/s, with the time of the advice last taken.
     shown: Option<(MonoNs, f64)>,
     /// Since when all speeds have been higher than that one, and the least of them, m/s.
     rising: Option<(MonoNs, f64)>,
 }
 
-stateful!(Hysteresis { state: held, next, begun, will_exceed, shown, rising; fixed: target_m; });
+stateful!(Hysteresis { state: held, next, begun, will_exceed, may_exceed, shown, rising; fixed: target_m; });
 
 impl Hysteresis {
     /// For a target T, m.
@@ -47,6 +50,7 @@ impl Hysteresis {
             next: 0,
             begun: false,
             will_exceed: false,
+            may_exceed: false,
             shown: None,
             rising: None,
         }
@@ -70,13 +74,15 @@ impl Hysteresis {
         };
         let limit_m = self.target_m * if self.will_exceed { 1.0 } else { 1.0 + BEYOND };
         let will_exceed = held().any(|held| exceeds(held, limit_m));
+        let sure_share = if self.may_exceed { 1.0 + MAYBE_BEYOND / 3.0 } else { 1.0 + MAYBE_BEYOND };
+        let may_exceed = held().any(|held| held.may_exceed && exceeds(held, held.sure_m * sure_share));
         let worst =
             held().fold(&advice, |worst, held| if restricts_more(held, worst) { held } else { worst });
         let (unseen_m, remedy, reason, worst_mps) =
             (worst.unseen_m, worst.remedy, worst.reason, worst.v_max_mps);
         let v_max_mps = self.steadied_mps(at, worst_mps, reason == Reason::HelixPitch);
-        let shown = Advice { v_max_mps, reason, will_exceed, unseen_m, remedy, ..advice };
-        self.will_exceed = will_exceed;
+        let shown = Advice { v_max_mps, reason, will_exceed, may_exceed, unseen_m, remedy, ..advice };
+        (self.will_exceed, self.may_exceed) = (will_exceed, may_exceed);
         shown
     }
 
@@ -215,6 +221,16 @@ mod tests {
         assert!(exceed[22], "a strip that nobody sees");
         let nothing = shown(vec![Advice::nothing(Reason::NoHeadingOrFix)]);
         assert!(!nothing[0].will_exceed);
+    }
+
+    #[test]
+    fn what_may_be_exceeded_is_said_beyond_what_a_pilot_keeps_and_held_until_it_is_well_within() {
+        let at = |t_m: f64| Advice { may_exceed: t_m > 0.4, sure_m: 0.4, ..advice(Reason::HelixPitch, 0.2, t_m) };
+        let given = [vec![at(0.411); 3], vec![at(0.413)], vec![at(0.406); 10], vec![at(0.403); 8]].concat();
+        let may: Vec<_> = shown(given).iter().map(|advice| advice.may_exceed).collect();
+        assert_eq!(may[..3], [false; 3]);
+        assert_eq!(may[3..19], [true; 16]);
+        assert_eq!(may[19..], [false; 3]);
     }
 
     #[test]

@@ -9,7 +9,8 @@ use headrace_pictures::look::{self, Look};
 use headrace_pictures::polyline::Px;
 
 use crate::point::Trade;
-use panel::{BAND, PLATEAU, Panel};
+use crate::words::number;
+use panel::{BAND, CLEAR, PLATEAU, Panel};
 
 const WIDTH_PX: u32 = 1000;
 /// Of a chart with its heading and what stands below it.
@@ -60,11 +61,12 @@ fn legend(canvas: &Canvas, trade: &Trade) {
         canvas.area([x, y - 7.0], [x + 30.0, y + 7.0], PLATEAU);
     });
     if let Some(decides) = trade.decides {
-        entry(30.0, &format!("a tenth of the target, {decides} m"), &line(look::TARGET));
+        let words = format!("decides from {} {} on", number(decides), trade.error_unit());
+        entry(30.0, &words, &line(look::TARGET));
     }
 }
 
-/// Lines that say what isn't shown.
+/// Lines that say what isn't shown, or not where it is.
 fn left_out(trade: &Trade) -> Vec<String> {
     let fits = |line: String| {
         let room_px = f64::from(WIDTH_PX) - 28.0;
@@ -84,6 +86,14 @@ fn left_out(trade: &Trade) -> Vec<String> {
         let more = lines.len() - (MOST_LEFT_OUT - 1);
         lines.truncate(MOST_LEFT_OUT - 1);
         lines.push(format!("left out: {more} more, listed on the page"));
+    }
+    let (least, unit) = (CLEAR * trade.oracle.size, trade.error_unit());
+    if trade.points.iter().any(|point| point.error() < least) {
+        lines.push(format!(
+            "errors below {} {unit} are drawn there: the reference may be {} {unit} off itself",
+            number(least),
+            number(trade.oracle.size)
+        ));
     }
     lines
 }

@@ -22,7 +22,7 @@ const LEADER: Look = Look { colour: Colour(110, 110, 110), width_px: 0.7, ..look
 /// Errors within this ratio of the least are the plateau's.
 const SAME: f64 = 1.05;
 /// The least error that is told, as a multiple of the oracle's own.
-const CLEAR: f64 = 10.0;
+pub(super) const CLEAR: f64 = 10.0;
 /// Room about the outermost points, as a ratio.
 const ROOM: f64 = 1.25;
 

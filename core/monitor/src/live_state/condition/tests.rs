@@ -107,6 +107,24 @@ fn a_turn_that_misses_within_the_speed_allowed_is_told_only_while_it_does() {
 }
 
 #[test]
+fn a_turn_within_what_errors_of_position_take_is_not_good() {
+    let forecast = |may_exceed, will_exceed| Advice {
+        may_exceed,
+        will_exceed,
+        ..advice(Reason::HelixPitch, 0.07, if will_exceed { 0.6 } else { 0.48 })
+    };
+    let driven = |advice, speed_mps| {
+        LiveState { advice: Some(advice), speed_mps: Some(speed_mps), ..state() }.condition()
+    };
+    assert_eq!(driven(forecast(true, false), 0.06), Condition::TurnUnsure);
+    assert_eq!(driven(forecast(false, false), 0.06), Condition::Good);
+    assert_eq!(driven(forecast(true, true), 0.06), Condition::TurnFails, "the graver of the two");
+    assert_eq!(driven(forecast(true, false), 0.07), Condition::Good, "nothing better is known than what is driven");
+    assert_eq!(driven(forecast(true, false), 0.072), Condition::Over, "that it is over what is allowed says why");
+    assert_eq!(Condition::TurnUnsure.lamp(), Lamp::Amber);
+}
+
+#[test]
 fn what_is_lacking_is_a_state_and_comes_before_what_is_doubtful() {
     let doubtful = LiveState { position: PositionState::Doubtful(PositionDoubt::Cable), ..state() };
     assert_eq!(doubtful.condition(), Condition::CannotSay(PositionDoubt::Cable));

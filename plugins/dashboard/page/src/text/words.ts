@@ -41,6 +41,8 @@ export function atMost(state: State): string {
 export function conditionWords(state: State): { word: string; advice: string } {
   const most = atMost(state);
   const slower = most === "" ? "slower" : `slow to ${figure(state.v_max_mps, 2)} m/s`;
+  // Within v_max a turn misses where heads apart along the hull are out of phase: slower is worse.
+  const go = most === "" ? "" : `go ${figure(state.v_max_mps, 2)} m/s`;
   const stand = state.position.why === "spread" && state.position.stand_s > 0 ? `stand still ${state.position.stand_s} s` : most;
   const words: Record<Condition, [string, string]> = {
     no_data: ["WAITING", "for the first data"],
@@ -51,7 +53,8 @@ export function conditionWords(state: State): { word: string; advice: string } {
     going_back: ["GOING BACK", "for what was missed: any speed will do"],
     no_speed: ["SLOWER WON'T HELP", state.remedy ?? "no speed meets the target here"],
     too_fast: ["TOO FAST", slower],
-    turn_fails: ["THIS TURN MISSES", slower],
+    turn_fails: ["THIS TURN MISSES", go],
+    turn_unsure: ["THIS TURN MAY MISS", go],
     cannot_say: ["CAN'T SAY", `${POSITION_WHY[state.position.why ?? ""] ?? "position too unsure"}${stand === "" ? "" : `: ${stand}`}`],
     over: ["A LITTLE FAST", slower],
     good: ["GOOD", most === "" ? "" : `may go up to ${figure(state.v_max_mps, 2)} m/s`],
