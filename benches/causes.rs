@@ -6,7 +6,18 @@
 
 use std::sync::atomic::{AtomicU64, Ordering};
 
-use headrace_tests::interventions::{Matrix, intervene, kinds, remedies};
+use headrace_tests::interventions::{Judged, Matrix, intervene, kinds, remedies};
+
+/// Holes without each of the causes alone, over the target: the median and the largest of a stretch.
+fn over_target(sections: &[Judged], target_m: f64) -> String {
+    let of_cause = |k: usize| {
+        let mut over: Vec<f64> =
+            sections.iter().filter_map(|section| Some(section.without_m.get(k)? / target_m)).collect();
+        over.sort_by(f64::total_cmp);
+        Some(format!("{:.2} ({:.2})", over.get(over.len() / 2)?, over.last()?))
+    };
+    (0..).map_while(of_cause).collect::<Vec<_>>().join(", ")
+}
 
 fn main() {
     let arguments: Vec<String> = std::env::args().skip(1).filter(|word| word != "--bench").collect();
@@ -65,13 +76,14 @@ fn main() {
             if wrong && (!is_right || stretch.runs() > 1) {
                 let [first, last] = [stretch.sections.first().unwrap(), stretch.sections.last().unwrap()];
                 println!(
-                    "dive {seed}: {:.2} to {:.2}, T {:.3}, right {:?}, told {:?}, {} runs; {:?}",
+                    "dive {seed}: {:.2} to {:.2}, T {:.3}, right {:?}, told {:?}, {} runs, over T without each {}; {:?}",
                     first.ends_m[0],
                     last.ends_m[1],
                     dive.drawn.target_m,
                     stretch.right,
                     stretch.told(),
                     stretch.runs(),
+                    over_target(stretch.sections, dive.drawn.target_m),
                     dive.drawn.injected
                 );
             }

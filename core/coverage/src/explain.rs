@@ -189,7 +189,8 @@ fn present(case: &Case<'_>, seen: &Seen, perimeter_m: f64) -> Causes {
     let as_planned = spacing::t_max_m(drive.planned_along_m(), drive.advance_m(), drive.middle_t_y_m);
     let over = if coarse { drive.planned_along_m() } else { as_planned } / target_m;
     add(over > WELL_OVER || over > 1.0 && drive.speed_mps > OVER_PLAN * drive.planned_mps, Cause::TooFast);
-    add(drive.planned_gap_s < HELPS * drive.healthy_gap_s, Cause::Phase);
+    let is_slow = drive.is_slow_out_of_phase(1.0 / HELPS);
+    add(is_slow || drive.planned_gap_s < HELPS * drive.healthy_gap_s, Cause::Phase);
     let steady = Drive { swing_m: 0.0, ..*drive };
     let aside = drive.middle_t_y_m < HELPS * drive.t_y_m;
     add(steady.along_m() < SWINGS * drive.along_m() || aside, Cause::OffAxis);
@@ -240,6 +241,11 @@ impl Trial<'_> {
         let silent = Causes::of(Cause::HeadSilent);
         if is_unheard(self.case, self.seen) && self.passes_without(silent, ROUGHLY[1]) {
             return silent;
+        }
+        // A speed is changed most easily: what the planned one would have mended is put down to that.
+        let phase = Causes::of(Cause::Phase);
+        if self.drive.is_slow_out_of_phase(1.0 / HELPS) && self.passes_without(phase, ROUGHLY[1]) {
+            return phase;
         }
         let mut needed = Causes::default();
         for size in 1..=present.len().min(MOST_NAMED) {
@@ -352,7 +358,9 @@ impl Drive {
         if removed.has(Cause::OffAxis) {
             (then.swing_m, then.t_y_m) = (0.0, self.middle_t_y_m.min(self.t_y_m));
         }
-        if removed.has(Cause::Phase) {
+        if removed.has(Cause::Phase) && self.is_slow_out_of_phase(1.0 / HELPS) {
+            (then.speed_mps, then.healthy_gap_s) = (self.planned_mps, self.all_gap_s);
+        } else if removed.has(Cause::Phase) {
             then.healthy_gap_s = self.planned_gap_s.min(self.healthy_gap_s);
         }
         if removed.has(Cause::TooFast) {

@@ -76,6 +76,9 @@ pub struct Drive {
     pub is_unheard: bool,
 }
 
+/// Share of the planned speed below which another one is driven.
+const SLOWER: f64 = 0.97;
+
 impl Drive {
     /// The distance between passes with the swing added, had no head been silent or stood still, m.
     pub fn along_m(&self) -> f64 {
@@ -90,6 +93,14 @@ impl Drive {
     /// The distance travelled between two pings, m.
     pub fn advance_m(&self) -> f64 {
         self.speed_mps * self.ping_period_s
+    }
+
+    /// Whether it went slower than planned, and passes were farther apart for it by over so much: heads apart along the hull are in phase
+    /// about the planned speed only. Said where that speed meets the target.
+    pub fn is_slow_out_of_phase(&self, over: f64) -> bool {
+        let is_slower = self.planned_mps > 0.0 && self.speed_mps < SLOWER * self.planned_mps;
+        let fits = self.fits_mps >= self.planned_mps;
+        is_slower && fits && self.speed_mps * self.healthy_gap_s > over * self.planned_mps * self.all_gap_s
     }
 
     /// The one with the larger distance between passes.

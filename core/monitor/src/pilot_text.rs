@@ -183,6 +183,10 @@ pub fn action_text(action: Action, back_to_m: f64, at_most_mps: f64) -> String {
         Action::Slower => back,
         Action::OtherSide => format!("{back}, then rolled to either side,"),
         Action::Middle => format!("{back}, then in the middle and steady,"),
+        // Slower, heads apart along the hull are out of phase again.
+        Action::InPhase if at_most_mps > 0.0 => {
+            return format!("{back}, then with the heads in phase, at {at_most_mps:.2} m/s");
+        }
         Action::InPhase => format!("{back}, then with the heads in phase,"),
         Action::Head => format!("{back}, then with that head repaired or without it,"),
         Action::HeadBack => format!("get what is silent back, then {back},"),

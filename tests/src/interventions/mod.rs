@@ -38,6 +38,8 @@ pub struct Judged {
     pub run: Option<u32>,
     /// Diameter of its hole, m.
     pub hole_m: f64,
+    /// The same without each of the injected causes alone; infinite where there is no hole to be measured.
+    pub without_m: Vec<f64>,
     /// The figures behind what was told.
     pub evidence: Evidence,
 }
@@ -117,10 +119,12 @@ pub fn intervene(seed: u64, kinds: &[usize]) -> Intervened {
     let mut sections = Vec::new();
     for section in all.sections.iter().filter(is_inner) {
         let Some(evidence) = section.cause.as_ref().filter(|_| section.verdict == "fail") else { continue };
-        let passes = |report: &Report| {
+        let hole_m = |report: &Report| {
             let same = report.sections.iter().find(|other| (other.start_m - section.start_m).abs() < 1e-6);
-            same.and_then(|same| same.hole_m).is_some_and(|hole_m| hole_m <= drawn.target_m)
+            same.and_then(|same| same.hole_m).unwrap_or(f64::INFINITY)
         };
+        let without_m: Vec<f64> = without.iter().map(hole_m).collect();
+        let passes = |report: &Report| hole_m(report) <= drawn.target_m;
         let Some(right) =
             right(&drawn, &without.iter().map(passes).collect::<Vec<_>>(), passes(&without_all))
         else {
@@ -136,6 +140,7 @@ pub fn intervene(seed: u64, kinds: &[usize]) -> Intervened {
             told,
             run,
             hole_m: section.hole_m.unwrap_or(0.0),
+            without_m,
             evidence: *evidence,
         });
     }

@@ -156,3 +156,34 @@ fn the_cause_that_is_named_is_the_one_that_was_injected() {
     println!("{table}{right} of {all} failed sections have the injected cause");
     assert!(100 * right >= 95 * all, "{right} of {all}\n{table}");
 }
+
+/// Heads apart along the hull are in phase about the planned speed: what fails below it passes at it, and is put down to the phase.
+#[test]
+fn what_only_a_faster_speed_mends_is_put_down_to_the_phase() {
+    let driven = |speed_mps: f64| {
+        let vehicle = include_str!("../../../deploy/vehicles/vita2-4.toml");
+        let scene = format!(
+            "vehicle = \"vehicle.toml\"\n[vehicle_changes]\ntarget_m = 0.46\n[trajectory]\nstart_m = 3\n\
+             [[trajectory.legs]]\ndistance_m = 22\nspeed_mps = {speed_mps}\n{ALWAYS}[effects.occlusion]\n"
+        );
+        instrumented::dive(vehicle, &scene).report
+    };
+    let failed = |report: &headrace_monitor::report::Report| {
+        let inner = |start_m: f64| (8.0..22.0).contains(&start_m);
+        let sections = report.sections.iter().filter(|section| inner(section.start_m));
+        sections.filter_map(|section| Some(section.cause?.cause.as_str())).collect::<Vec<_>>()
+    };
+    let as_planned = driven(0.1);
+    assert_eq!(failed(&as_planned), [""; 0], "at the planned speed nothing fails");
+    for speed_mps in [0.08, 0.085] {
+        let report = driven(speed_mps);
+        let causes = failed(&report);
+        let of_phase = causes.iter().filter(|cause| **cause == "phase").count();
+        println!("{speed_mps} m/s: {of_phase} of {} failed sections are put down to the phase", causes.len());
+        assert!(causes.len() >= 20 && 20 * of_phase >= 19 * causes.len(), "{speed_mps} m/s: {causes:?}");
+        let back =
+            report.way_home.iter().find(|back| back.actions.contains(&headrace_coverage::Action::InPhase));
+        let at_mps = back.map_or(0.0, |back| back.at_most_mps);
+        assert!((at_mps - 0.1).abs() < 1e-9, "{:?}", report.way_home);
+    }
+}

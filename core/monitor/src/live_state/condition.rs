@@ -81,7 +81,9 @@ impl Condition {
     pub fn lamp(self) -> Lamp {
         match self {
             Self::Good | Self::Passed | Self::GoingBack(_) => Lamp::Green,
-            Self::Over | Self::TurnFails | Self::TurnUnsure | Self::CannotSay(_) | Self::NoData => Lamp::Amber,
+            Self::Over | Self::TurnFails | Self::TurnUnsure | Self::CannotSay(_) | Self::NoData => {
+                Lamp::Amber
+            }
             Self::Old(_) | Self::NoPosition(_) | Self::NoSonar | Self::NoSpeed | Self::TooFast => Lamp::Red,
         }
     }
@@ -126,7 +128,9 @@ impl LiveState {
         match self.position {
             _ if share > TOO_FAST => Condition::TooFast,
             // The forecast is held for a second; the turn itself may have been mended.
-            _ if advice.will_exceed && self.turn_exceeds(self.target_m) && share <= OVER => Condition::TurnFails,
+            _ if advice.will_exceed && self.turn_exceeds(self.target_m) && share <= OVER => {
+                Condition::TurnFails
+            }
             PositionState::Doubtful(doubt) => Condition::CannotSay(doubt),
             _ if share > OVER => Condition::Over,
             _ if advice.may_exceed && self.turn_exceeds(advice.sure_m) && share < UNDER => {

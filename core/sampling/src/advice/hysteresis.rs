@@ -225,7 +225,8 @@ mod tests {
 
     #[test]
     fn what_may_be_exceeded_is_said_beyond_what_a_pilot_keeps_and_held_until_it_is_well_within() {
-        let at = |t_m: f64| Advice { may_exceed: t_m > 0.4, sure_m: 0.4, ..advice(Reason::HelixPitch, 0.2, t_m) };
+        let at =
+            |t_m: f64| Advice { may_exceed: t_m > 0.4, sure_m: 0.4, ..advice(Reason::HelixPitch, 0.2, t_m) };
         let given = [vec![at(0.411); 3], vec![at(0.413)], vec![at(0.406); 10], vec![at(0.403); 8]].concat();
         let may: Vec<_> = shown(given).iter().map(|advice| advice.may_exceed).collect();
         assert_eq!(may[..3], [false; 3]);

@@ -119,8 +119,16 @@ fn a_turn_within_what_errors_of_position_take_is_not_good() {
     assert_eq!(driven(forecast(true, false), 0.06), Condition::TurnUnsure);
     assert_eq!(driven(forecast(false, false), 0.06), Condition::Good);
     assert_eq!(driven(forecast(true, true), 0.06), Condition::TurnFails, "the graver of the two");
-    assert_eq!(driven(forecast(true, false), 0.07), Condition::Good, "nothing better is known than what is driven");
-    assert_eq!(driven(forecast(true, false), 0.072), Condition::Over, "that it is over what is allowed says why");
+    assert_eq!(
+        driven(forecast(true, false), 0.07),
+        Condition::Good,
+        "nothing better is known than what is driven"
+    );
+    assert_eq!(
+        driven(forecast(true, false), 0.072),
+        Condition::Over,
+        "that it is over what is allowed says why"
+    );
     assert_eq!(Condition::TurnUnsure.lamp(), Lamp::Amber);
 }
 
