@@ -247,6 +247,7 @@ impl Trial<'_> {
         if self.drive.is_slow_out_of_phase(1.0 / HELPS) && self.passes_without(phase, ROUGHLY[1]) {
             return phase;
         }
+        let (lost, is_only_adrift) = (Causes::of(Cause::PositionLost), self.is_only_adrift());
         let mut needed = Causes::default();
         for size in 1..=present.len().min(MOST_NAMED) {
             if size == 2 {
@@ -256,7 +257,10 @@ impl Trial<'_> {
                 .filter(|bits| bits & !present.bits() == 0 && bits.count_ones() == size)
                 .map(Causes::from_bits);
             let mut roughly = None;
-            let fit = |set: &Causes| set.len() == size && set.is_within(present) && needed.is_within(*set);
+            let fit = |set: &Causes| {
+                let is_last = is_only_adrift && size == 1 && *set == lost;
+                set.len() == size && set.is_within(present) && needed.is_within(*set) && !is_last
+            };
             for set in self.case.beside.into_iter().chain(sets).filter(fit) {
                 if !self.passes_without(set, ROUGHLY[1]) {
                     continue;
@@ -269,8 +273,17 @@ impl Trial<'_> {
             if let Some(set) = roughly {
                 return set;
             }
+            if size == 1 && is_only_adrift && self.passes_without(lost, ROUGHLY[1]) {
+                return lost;
+            }
         }
         present
+    }
+
+    /// Whether nothing but the error of one pass against the next speaks of the position: a fail is one in spite of that error, which explains
+    /// any hole, so that whatever else does comes first.
+    fn is_only_adrift(&self) -> bool {
+        self.seen.adrift && !self.seen.unseen && !self.case.is_torn
     }
 
     /// The factors without which no set will do: all the others together don't.

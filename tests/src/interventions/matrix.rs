@@ -37,6 +37,8 @@ pub struct Matrix {
     pub stretches: [Count; 2],
     /// Stretches of which a set of two is true.
     pub pairs: Count,
+    /// Stretches whose true set is two, that are told right or nearly: see [`super::Judged::is_close`].
+    pub close_pairs: Count,
     /// Stretches told as at most one run.
     pub one_run: Count,
     /// Dives of which nothing failed.
@@ -70,6 +72,11 @@ impl Matrix {
             self.one_run.add(stretch.runs() <= 1);
             if stretch.right.iter().all(|set| set.len() > 1) {
                 self.pairs.add(is_right);
+                let close = stretch.sections.iter().filter(|section| section.told == stretch.told());
+                let mut close = close.peekable();
+                let is_close = close.peek().is_some()
+                    && close.all(|section| section.is_close(&dive.drawn.injected, dive.drawn.target_m));
+                self.close_pairs.add(is_right || is_close);
             }
             self.note(several, &stretch.right, stretch.told(), 1);
         }
@@ -105,6 +112,7 @@ impl Matrix {
             ("sections, two causes", self.sections[1]),
             ("stretches, two causes", self.stretches[1]),
             ("of these stretches whose true set is two", self.pairs),
+            ("the same, or what is told alone brings holes within 1.05 of the target", self.close_pairs),
             ("stretches of at most one run", self.one_run),
         ] {
             writeln!(text, "{what}: {} of {} ({:.1} %)", count.right, count.all, 100.0 * count.share())

@@ -22,6 +22,9 @@ const END_M: f64 = 2.0;
 /// Failed sections this near to each other are one stretch, m.
 const JOIN_M: f64 = 0.5;
 
+/// A hole up to so many times the target is about the target's.
+const CLOSE: f64 = 1.05;
+
 /// Sets of causes, any of which is right; each sorted.
 pub type Right = Vec<Vec<Cause>>;
 
@@ -48,6 +51,12 @@ impl Judged {
     /// Whether what was told is right.
     pub fn is_right(&self) -> bool {
         self.right.contains(&self.told)
+    }
+
+    /// Whether it is one of the injected causes, and the right answer hangs by less than a twentieth of the target.
+    pub fn is_close(&self, injected: &[Injected], target_m: f64) -> bool {
+        let alone = injected.iter().zip(&self.without_m).find(|(cause, _)| self.told == [cause.cause()]);
+        alone.is_some_and(|(_, hole_m)| *hole_m <= CLOSE * target_m)
     }
 }
 
