@@ -95,12 +95,13 @@ impl Drive {
         self.speed_mps * self.ping_period_s
     }
 
-    /// Whether it went slower than planned, and passes were farther apart for it by over so much: heads apart along the hull are in phase
-    /// about the planned speed only. Said where that speed meets the target.
+    /// Whether it went slower than planned, and passes of heads at their scheduled angles were farther apart for it than at the planned speed,
+    /// by a factor over `over`: heads apart along the hull are in phase about that speed only. Only where that speed meets the target;
+    /// heads that were started wrongly aren't mended by any speed.
     pub fn is_slow_out_of_phase(&self, over: f64) -> bool {
         let is_slower = self.planned_mps > 0.0 && self.speed_mps < SLOWER * self.planned_mps;
         let fits = self.fits_mps >= self.planned_mps;
-        is_slower && fits && self.speed_mps * self.healthy_gap_s > over * self.planned_mps * self.all_gap_s
+        is_slower && fits && self.planned_along_m() > over * self.planned_mps * self.all_gap_s
     }
 
     /// The one with the larger distance between passes.
@@ -186,6 +187,26 @@ mod tests {
 
     fn along(sd_m: f64) -> PassError {
         PassError { relative: Relative::along(sd_m), from_m: [0.0, 0.0] }
+    }
+
+    #[test]
+    fn only_what_the_planned_speed_would_mend_is_slow_out_of_phase() {
+        let slow = Drive {
+            speed_mps: 0.08,
+            planned_mps: 0.1,
+            fits_mps: 0.1,
+            healthy_gap_s: 4.0,
+            planned_gap_s: 4.0,
+            all_gap_s: 2.5,
+            ..Drive::default()
+        };
+        let is_slow = |drive: Drive| drive.is_slow_out_of_phase(1.07);
+        assert!(is_slow(slow));
+        assert!(!is_slow(Drive { planned_gap_s: 2.5, ..slow }), "heads were started wrongly");
+        assert!(!is_slow(Drive { planned_gap_s: 3.2, ..slow }), "slower, passes are no farther apart");
+        assert!(!is_slow(Drive { speed_mps: 0.1, ..slow }), "as planned");
+        assert!(!is_slow(Drive { fits_mps: 0.06, ..slow }), "the planned speed doesn't meet the target");
+        assert!(!is_slow(Drive { planned_mps: 0.0, ..slow }), "nothing is planned");
     }
 
     #[test]

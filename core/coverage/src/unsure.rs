@@ -78,7 +78,7 @@ pub struct Driven {
     pub speed_mps: f64,
     /// The largest speed that meets the target, all heads turning as scheduled, m/s; zero where none does.
     pub fits_mps: f64,
-    /// Passes are farther apart than evenly spread ones.
+    /// At this speed heads at their scheduled angles pass unevenly: those apart along the hull are out of phase.
     pub is_uneven: bool,
 }
 
@@ -88,8 +88,8 @@ const UNEVEN: f64 = 1.05;
 impl Driven {
     /// From how vehicle and heads moved.
     pub fn of(drive: &Drive) -> Self {
-        let Drive { speed_mps, fits_mps, healthy_gap_s, all_gap_s, .. } = *drive;
-        Self { speed_mps, fits_mps, is_uneven: healthy_gap_s > UNEVEN * all_gap_s }
+        let Drive { speed_mps, fits_mps, planned_gap_s, all_gap_s, .. } = *drive;
+        Self { speed_mps, fits_mps, is_uneven: planned_gap_s > UNEVEN * all_gap_s }
     }
 }
 
