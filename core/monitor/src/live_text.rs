@@ -64,8 +64,8 @@ impl PilotLine {
         lines
     }
 
-    /// As much of a status as fits into `columns`: the last parts are left out, then the speed, and what still doesn't fit is
-    /// cut off.
+    /// As much of a status as fits into `columns`: the last parts are left out, then the speed, then why where it says what to do, and what
+    /// still doesn't fit is cut off.
     pub fn cut(&self, columns: usize) -> String {
         let mut line = self.clone();
         let is_wide = |line: &Self| line.text().chars().count() > columns;
@@ -75,6 +75,14 @@ impl PilotLine {
         // What holds is more than how fast it goes.
         if is_wide(&line) {
             line.speed.clear();
+        }
+        // And what to do is more than why.
+        if is_wide(&line)
+            && !line.action.is_empty()
+            && let Some(what) = line.what.first_mut()
+            && let Some(end) = what.find(": ")
+        {
+            what.truncate(end);
         }
         line.text().chars().take(columns).collect()
     }

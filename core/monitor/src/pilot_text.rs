@@ -430,8 +430,12 @@ mod tests {
             let without = at(action, 0.0);
             assert!(!without.contains("m/s") && !without.ends_with([',', ' ']), "{without:?}");
             let with = at(action, 0.25);
-            let has_speed = !matches!(action, Action::FinerMode | Action::LongerRange);
-            assert_eq!(with.ends_with("at most 0.25 m/s"), has_speed, "{with:?}");
+            let speed = match action {
+                Action::FinerMode | Action::LongerRange => "",
+                Action::InPhase => "in phase, at 0.25 m/s",
+                _ => "at most 0.25 m/s",
+            };
+            assert!(with.ends_with(speed) && with.contains("m/s") != speed.is_empty(), "{with:?}");
         }
         assert_eq!(at(Action::Slower, 0.25), "go back to 1+240.50, then at most 0.25 m/s");
         assert_eq!(

@@ -133,3 +133,21 @@ fn a_line_is_broken_between_words_and_what_to_do_begins_anew() {
     let words = |text: &str| text.split_whitespace().map(str::to_owned).collect::<Vec<_>>();
     assert_eq!(words(&line.broken(40).join(" ")), words(&line.text()), "nothing is lost");
 }
+
+#[test]
+fn on_a_narrow_screen_what_to_do_stays_and_why_goes() {
+    let line = PilotLine {
+        place: "0+039.06".to_owned(),
+        speed: "0.09 m/s".to_owned(),
+        what: vec![
+            "THIS TURN MAY MISS: heads 55 degrees out of phase".to_owned(),
+            "missed 1.00 m".to_owned(),
+        ],
+        action: "go 0.10 m/s".to_owned(),
+        lamp: None,
+    };
+    assert!(line.cut(200).contains("missed 1.00 m  -> go 0.10 m/s"));
+    assert_eq!(line.cut(60), "0+039.06   THIS TURN MAY MISS  -> go 0.10 m/s");
+    let remedy = PilotLine { action: String::new(), ..line };
+    assert!(remedy.cut(40).contains("THIS TURN MAY MISS: heads"), "what it says itself stays");
+}
