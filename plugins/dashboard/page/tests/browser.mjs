@@ -6,12 +6,22 @@ export const EXECUTABLE = process.env.CHROMIUM ?? "/usr/bin/chromium";
 /** A microphone that hums, and is given to whoever asks. */
 export const MICROPHONE = ["--use-fake-device-for-media-stream", "--use-fake-ui-for-media-stream"];
 
-export function browser(more = []) {
-  return chromium.launch({
+const opened = new Set();
+
+export async function browser(more = []) {
+  const started = await chromium.launch({
     executablePath: EXECUTABLE,
     args: ["--headless", "--no-sandbox", "--disable-gpu", "--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--disable-quic",
       "--no-first-run", "--disable-background-networking", "--disable-component-update", "--disable-sync", ...more],
   });
+  opened.add(started);
+  started.once("disconnected", () => opened.delete(started));
+  return started;
+}
+
+/** Ends all that are open: also those of a test that failed, for which the tests would wait for ever. */
+export async function closeAll() {
+  for (const started of opened) await started.close();
 }
 
 /** A page of its own context, with what it prints and fails on gathered in `problems`. */

@@ -8,7 +8,7 @@ import { tmpdir } from "node:os";
 import { join } from "node:path";
 import { after, before, describe, it } from "node:test";
 import { fileURLToPath } from "node:url";
-import { MICROPHONE, browser, open } from "./browser.mjs";
+import { MICROPHONE, browser, closeAll, open } from "./browser.mjs";
 
 const BIN = process.env.HEADRACE_BIN;
 const SCENE = fileURLToPath(new URL("../../../../deploy/scenes/rehearsal.toml", import.meta.url));
@@ -51,7 +51,7 @@ describe("with the program", { skip: BIN ? false : "HEADRACE_BIN isn't set", con
   before(async () => { chromium = await browser(); folder = mkdtempSync(join(tmpdir(), "headrace-page-")); });
   after(async () => {
     for (const child of running) await stop(child);
-    await chromium?.close();
+    await closeAll();
     rmSync(folder, { recursive: true, force: true });
   });
 
@@ -115,8 +115,11 @@ describe("with the program", { skip: BIN ? false : "HEADRACE_BIN isn't set", con
     await one.page.locator(".notes .voice").click();
     await one.page.locator(".notes .voice.recording", { hasText: "End 0:02" }).waitFor();
     await one.page.locator(".notes .voice").click();
-    const line = other.page.locator(".notes li", { hasText: /voice, [23] s/ });
+    // How long it was open is up to this machine; two seconds were waited for.
+    const line = other.page.locator(".notes li", { hasText: /voice, \d+ s/ });
     await line.waitFor();
+    const seconds = Number(/voice, (\d+) s/.exec(await line.innerText())[1]);
+    assert.ok(seconds >= 2 && seconds < 30, `${seconds} s`);
     const played = async (page, line) => {
       await line.getByRole("button", { name: /Play note 1/ }).click();
       await line.locator('.play[aria-pressed="true"]').waitFor();
@@ -134,12 +137,12 @@ describe("with the program", { skip: BIN ? false : "HEADRACE_BIN isn't set", con
     const told = JSON.parse(execFileSync(BIN, ["notes", log, "--out", voices, "--json"], { encoding: "utf8" }));
     const [note] = told.notes;
     assert.equal(note.recording.media_type, "audio/webm");
-    assert.ok(note.voice.seconds === 2 || note.voice.seconds === 3, JSON.stringify(note));
+    assert.equal(note.voice.seconds, seconds);
     const sound = readFileSync(join(voices, "note-1.webm"));
     assert.equal(sound.length, note.recording.bytes);
     // Opus in WebM, of a few kB a second.
     assert.ok(sound.subarray(0, 4).equals(Buffer.from([0x1a, 0x45, 0xdf, 0xa3])) && sound.includes("A_OPUS"));
-    assert.ok(sound.length > 1000 && sound.length < 30_000, `${sound.length} bytes`);
+    assert.ok(sound.length > 500 * seconds && sound.length < 10_000 * (seconds + 1), `${sound.length} bytes in ${seconds} s`);
 
     const replay = await start(folder, await freePort(), "replay", log, "--speed", "8x");
     const { page, context, problems } = await open(chromium, replay.url);
