@@ -72,6 +72,11 @@ impl NoiseLevel {
         nis / usual
     }
 
+    /// Share of the declared variance that innovations have lately, 1 at most and until some have been seen.
+    pub fn share(&self) -> f64 {
+        if self.seen >= FEW { self.nis.min(1.0) } else { 1.0 }
+    }
+
     /// Whether innovations are about as large as they should be. Of ranges they are larger where the wall isn't as designed.
     pub fn is_usual(&self) -> bool {
         self.nis < UNUSUAL
