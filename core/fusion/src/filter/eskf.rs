@@ -394,6 +394,7 @@ impl Eskf {
             } else if let Reading::Sonar(SonarReturn { range_m: Some(range_m), .. }) = waiting.reading
                 && settings.learns
             {
+                source.noise_level.note_share((innovation * innovation - of_estimate) / white);
                 row.noise = self.seen_again.noise_m2(range_m, white, source.noise_level.share(), settings);
             }
             if matches!(kind, SensorKind::Head | SensorKind::Echosounder { .. }) {
