@@ -28,9 +28,9 @@ impl SeenAgain {
         }
     }
 
-    /// Passes of these bumps, the present one with them: from 1 on, not only whole ones.
+    /// How often a bump has been seen, this time with it, at least 1: of a turn that has begun, half the bumps have been seen once more.
     fn passes(&self, settings: &Settings) -> f64 {
-        (1.0 + f64::from(self.returns) * settings.return_step_rad / math::TAU).min(MOST_PASSES)
+        (0.5 + f64::from(self.returns) * settings.return_step_rad / math::TAU).clamp(1.0, MOST_PASSES)
     }
 
     /// Takes a return of this range; variance with which it is fused, m^2: by itself it has the `declared_m2`, of which bumps are a share.
@@ -63,7 +63,7 @@ mod tests {
     /// The noise of a return after so many passes, at a range at which `around` returns of a turn see one bump.
     fn noise_m2(passes: f64, around: f64, bumps: f64) -> f64 {
         let settings = Settings::default();
-        let returns = math::round_to_i64((passes - 1.0) * math::TAU / settings.return_step_rad);
+        let returns = math::round_to_i64((passes - 0.5) * math::TAU / settings.return_step_rad);
         let mut seen = SeenAgain { from_m: Some(7.0), returns: u32::try_from(returns).unwrap() };
         seen.noise_m2(settings.bump_m / settings.return_step_rad / around, DECLARED_M2, bumps, &settings)
     }
@@ -104,7 +104,7 @@ mod tests {
         // 120 returns are a turn.
         let passes = [(0, 7.0), (120, 7.01), (240, 7.0), (60, 7.06), (0, 7.03), (0, 7.0)]
             .map(|(n, x_m)| after(n, x_m));
-        for (found, right) in passes.iter().zip([1.0, 2.0, 4.0, 1.5, 1.5, 1.0]) {
+        for (found, right) in passes.iter().zip([1.0, 1.5, 3.5, 1.0, 1.0, 1.0]) {
             assert!((found - right).abs() < 1e-9, "{passes:?}");
         }
     }

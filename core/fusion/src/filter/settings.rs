@@ -126,7 +126,7 @@ impl Default for Settings {
             echo_sd_m: 0.03,
             // Nobody sets it: two thirds of the 0.3 m over which the bumps of field dives follow one another (docs/field.md).
             bump_m: 0.2,
-            // Nobody sets it: tuned on the field table's rough walls, with 0.1 and 0.2 m D is too unsure (docs/fusion.md).
+            // Nobody sets it: about what a vehicle drives while its heads turn half round.
             seen_again_m: 0.05,
             echo_beam_rad: 25.0 * DEGREE,
             range_scale_sd: 0.03,
