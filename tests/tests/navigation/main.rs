@@ -8,5 +8,4 @@ mod hard_cases;
 mod imu_truth;
 mod other_vehicles;
 mod outage;
-mod rough_walls;
 mod smoothing;

@@ -16,7 +16,6 @@ pub mod measure;
 pub mod noise_level;
 pub mod pose_sd;
 mod roughness;
-mod seen_again;
 pub mod settings;
 pub mod sources;
 mod spell;
