@@ -257,6 +257,13 @@ mod tests {
     use super::*;
 
     #[test]
+    fn a_section_is_flagged_from_its_flag_until_it_is_cleared() {
+        let at = |seconds: u64| Some(MonoNs(seconds * 1_000_000_000));
+        let flagged = |flagged, cleared| Section { flagged, cleared, ..Section::default() }.is_flagged();
+        assert_eq!([flagged(None, None), flagged(at(3), None), flagged(at(3), at(9))], [false, true, false]);
+    }
+
+    #[test]
     fn a_spread_keeps_its_digits_far_from_zero_and_whatever_is_merged() {
         let values = [1e8 + 1.0, 1e8 + 2.0, 1e8 + 4.0, 1e8 + 9.0];
         let (mut whole, mut first, mut second) = (Spread::default(), Spread::default(), Spread::default());

@@ -325,3 +325,19 @@ fn samples_of_earlier_visits_fill_no_hole_of_a_later_one() {
     assert!((later.diameter_m - math::hypot(0.1, PERIMETER_M / 20.0)).abs() < 1e-9, "{later:?}");
     assert!(!none.bounded);
 }
+
+/// A hole that has grown, moved along or around, or lost what bounded it is another one.
+#[test]
+fn a_hole_is_like_another_within_a_centimetre_in_every_respect() {
+    let hole = Hole { diameter_m: 0.6, least_m: 0.6, most_m: 0.6, x_m: 7.0, arc_m: 3.0, bounded: true };
+    let little = Hole { diameter_m: 0.609, x_m: 6.991, arc_m: 3.009, ..hole };
+    assert!(hole.is_like(&little) && little.is_like(&hole));
+    for other in [
+        Hole { diameter_m: 0.62, ..hole },
+        Hole { x_m: 7.02, ..hole },
+        Hole { arc_m: 2.98, ..hole },
+        Hole { bounded: false, ..hole },
+    ] {
+        assert!(!hole.is_like(&other) && !other.is_like(&hole), "{other:?}");
+    }
+}

@@ -192,11 +192,6 @@ impl SampleStore {
         self.layout.perimeter_m
     }
 
-    /// Chainages between which samples are kept, m.
-    pub fn extent_m(&self) -> (f64, f64) {
-        (self.layout.from_m, self.layout.to_m)
-    }
-
     /// Whether a point is within the store's extent and finite.
     pub fn covers(&self, x_m: f64, arc_m: f64) -> bool {
         self.row(x_m).is_some() && arc_m.is_finite()

@@ -165,3 +165,21 @@ impl Turning {
             .then(|| self.rate_radps / math::TAU)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_used_and_what_is_gated_is_counted_and_the_mean_is_of_what_is_used() {
+        let mut consistency = Consistency::default();
+        assert_eq!(consistency.nis(), None);
+        for nis in [0.5, 9.0, 2.5, 16.0, 100.0] {
+            consistency.count(nis, 9.0, 4.0, 4.0);
+        }
+        assert_eq!((consistency.used, consistency.gated), (3, 2));
+        assert_eq!(consistency.nis(), Some(4.0));
+        // Beyond the gate an innovation says no more than at it.
+        assert!((consistency.surprise - (0.5 + 9.0 + 2.5 + 9.0 + 9.0 - 5.0)).abs() < 1e-12);
+    }
+}
