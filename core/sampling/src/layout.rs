@@ -305,3 +305,25 @@ pub(super) fn divided_m(both_m: f64, share: f64) -> [f64; 2] {
     let nearer = share.min(1.0 - share);
     [both_m * nearer, both_m * (1.0 - nearer)]
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Each of the three figures meets the rule x = q v T / s with the other two as they are, and the nearest whole q is taken.
+    #[test]
+    fn each_figure_of_the_hull_rule_meets_it_with_the_others() {
+        for (apart_m, heads, speed_mps, turn_s, q) in
+            [(0.6, 4, 0.1, 8.0, 3), (1.1, 2, 0.14, 7.3, 2), (0.05, 3, 0.2, 28.0, 1), (2.0, 3, 0.09, 5.5, 12)]
+        {
+            let rule = hull_rule(apart_m, heads, speed_mps, turn_s).unwrap();
+            assert_eq!(rule.q, q);
+            let is_met = |x_m: f64, v_mps: f64, t_s: f64| {
+                (x_m * heads as f64 / (v_mps * t_s) - f64::from(rule.q)).abs() < 1e-9
+            };
+            assert!(is_met(rule.apart_m, speed_mps, turn_s), "{rule:?}");
+            assert!(is_met(apart_m, rule.speed_mps, turn_s), "{rule:?}");
+            assert!(is_met(apart_m, speed_mps, rule.turn_s), "{rule:?}");
+        }
+    }
+}

@@ -240,6 +240,22 @@ mod tests {
         fixtures::head(position, aft, 0.04)
     }
 
+    /// A point on a side isn't in it, nor one that is inside by two of three coordinates; heads hold nothing.
+    #[test]
+    fn a_box_holds_what_is_inside_all_its_sides() {
+        let hull = Obstacle::Box { least: Vec3::new(-1.0, -0.3, -0.2), most: Vec3::new(0.5, 0.3, 0.2) };
+        let holds = |at: [f64; 3]| hull.holds(Vec3::new(at[0], at[1], at[2]));
+        assert!(holds([0.0, 0.0, 0.0]) && holds([0.49, -0.29, 0.19]));
+        for (axis, [low, high]) in [[-1.0, 0.5], [-0.3, 0.3], [-0.2, 0.2]].into_iter().enumerate() {
+            for beyond in [low, high, 2.0 * low, 2.0 * high] {
+                let mut at = [0.0; 3];
+                at[axis] = beyond;
+                assert!(!holds(at), "{at:?}");
+            }
+        }
+        assert!(!Obstacle::of_head(&head([0.0; 3], false)).holds(Vec3::zero()));
+    }
+
     #[test]
     fn heads_side_by_side_hide_an_angle_from_each_other() {
         let pair = [head([0.5, 0.15, 0.0], false), head([0.5, -0.15, 0.0], false)];

@@ -8,4 +8,5 @@ mod hard_cases;
 mod imu_truth;
 mod other_vehicles;
 mod outage;
+mod rough_walls;
 mod smoothing;

@@ -11,6 +11,7 @@ use super::inertial::Leg;
 use super::measure::{self, ScalarUpdate};
 use super::pose_sd::PoseSd;
 use super::roughness::{Look, Roughness};
+use super::seen_again::SeenAgain;
 use super::settings::Settings;
 use super::sources::{self, Source};
 use super::state::{
@@ -27,7 +28,7 @@ use headrace_geometry::math;
 use headrace_geometry::time::{DurNs, MonoNs};
 use headrace_geometry::tunnel::Profile;
 use headrace_sensor::device::SensorKind;
-use headrace_sensor::reading::Reading;
+use headrace_sensor::reading::{Reading, SonarReturn};
 use headrace_snapshot::stateful;
 
 /// Room for the inertial sample times of an epoch.
@@ -84,6 +85,9 @@ pub struct Eskf {
     unrest: Unrest,
     /// How rough the wall is.
     roughness: Roughness,
+    seen_again: SeenAgain,
+    /// Whether the vehicle is known to be at rest: its heads then see the same bumps turn after turn.
+    pub is_at_rest: bool,
     /// Whether inertial data were lacking in the last epoch: what the vehicle did is then a guess, of which no noise is learnt.
     is_blind: bool,
     /// How loose the cable hangs beyond what is declared, a standard deviation, m.
@@ -97,7 +101,7 @@ pub struct Eskf {
     keeps_steps: bool,
 }
 
-stateful!(Eskf { state: at, state, factors, clones, way_sought, ties, begun, settled, agreement, cable, unrest, roughness, is_blind, loose_m, suspicions, doubts; lists: knots; fixed: steps, keeps_steps; });
+stateful!(Eskf { state: at, state, factors, clones, way_sought, ties, begun, settled, agreement, cable, unrest, roughness, seen_again, is_at_rest, is_blind, loose_m, suspicions, doubts; lists: knots; fixed: steps, keeps_steps; });
 
 impl Default for Eskf {
     /// Allocated buffers without an estimate.
@@ -116,6 +120,8 @@ impl Default for Eskf {
             cable: Cable::default(),
             unrest: Unrest::default(),
             roughness: Roughness::default(),
+            seen_again: SeenAgain::default(),
+            is_at_rest: false,
             is_blind: false,
             loose_m: 0.0,
             suspicions: Suspicions::default(),
@@ -181,6 +187,7 @@ impl Eskf {
         transition.carry(&mut self.factors);
         leg.disturb(&context.settings, &transition, &mut self.factors);
         self.clones.carry(&transition);
+        self.seen_again.pass(nominal.position.x(), &context.settings);
         let mut errors = [0.0; ERRORS];
         while let Some(waiting) = window.pop(to) {
             // Each reading is compared with the best estimate so far: after a silence the first ones move it far.
@@ -387,6 +394,12 @@ impl Eskf {
             if matches!(kind, SensorKind::Echosounder { .. }) {
                 row.noise =
                     self.spread_over_looks(&row, waiting, [white, bumps, innovation, of_estimate], settings);
+            } else if let Reading::Sonar(SonarReturn { range_m: Some(range_m), .. }) = waiting.reading
+                && settings.learns
+            {
+                source.noise_level.note_share((innovation * innovation - of_estimate) / white);
+                let again_m2 = self.seen_again.noise_m2(range_m, white, source.noise_level.share(), settings);
+                row.noise = if self.is_at_rest { again_m2 } else { white };
             }
             if matches!(kind, SensorKind::Head | SensorKind::Echosounder { .. }) {
                 self.correct_by_wall(&row, settings.wall_share, known, errors);

@@ -193,6 +193,26 @@ mod tests {
         fit
     }
 
+    /// Standard deviations of a mean by its values, of an alternative that gains by turns so many square metres of a quarter.
+    #[test]
+    fn an_alternative_is_as_sure_as_its_blocks_agree() {
+        let sure_sd = |scatter_m2: f64| {
+            let mut alternative = Alternative::default();
+            for k in 0..8 {
+                let theirs_m2 = 0.05 + if k % 2 == 0 { scatter_m2 } else { -scatter_m2 };
+                alternative.note([0.5, math::sqrt(theirs_m2)]);
+                alternative.close();
+            }
+            alternative.certain(alternative.share_left())
+        };
+        // The mean gain is 0.2 m^2; that of eight which lie so far off it, alternately, is sure to so much over the root of seven.
+        for scatter_m2 in [0.05, 0.04, 0.02] {
+            let expected = 0.2 / scatter_m2 * math::sqrt(7.0);
+            let found = sure_sd(scatter_m2).unwrap();
+            assert!((found / expected - 1.0).abs() < 1e-6, "{found}, not {expected}");
+        }
+    }
+
     #[test]
     fn what_hardly_changes_a_range_is_not_certain_though_blocks_do_not_scatter() {
         assert!(alike(1.0, 0.05).certain(0.03).is_some());

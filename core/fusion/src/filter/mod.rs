@@ -16,6 +16,7 @@ pub mod measure;
 pub mod noise_level;
 pub mod pose_sd;
 mod roughness;
+mod seen_again;
 pub mod settings;
 pub mod sources;
 mod spell;
@@ -169,8 +170,9 @@ impl FilterNavigation {
                 self.window.next_heard(self.running.at).map_or(last, |heard| self.epoch_before(heard));
             let to = due.max(heard).min(last);
             let is_silent = to.since(self.running.at).0 > SILENCE.0;
+            self.running.is_at_rest = self.stillness.is_still() && self.cable_doubt().is_none();
             self.running.advance(to, &self.context, &mut self.window, &mut self.sources);
-            if self.stillness.is_still() && self.cable_doubt().is_none() {
+            if self.running.is_at_rest && self.cable_doubt().is_none() {
                 let unit = self.unit.and_then(|unit| self.sources.get(unit).copied().flatten());
                 let mean = self.stillness.take_mean_rate().zip(unit);
                 self.running.rest(mean.map(|(rate, unit)| unit.sensor.mount.rotation * rate));

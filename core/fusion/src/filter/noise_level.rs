@@ -28,11 +28,13 @@ pub struct NoiseLevel {
     /// Running mean of the normalised squares of all innovations, and how many it has seen.
     nis: f64,
     seen: u32,
+    /// Running mean of the squares of those used beyond what the estimate explains, as a share of the noise.
+    share: f64,
 }
 
 impl Default for NoiseLevel {
     fn default() -> Self {
-        Self { last: [None; 3], factor: 1.0, nis: 0.0, seen: 0 }
+        Self { last: [None; 3], factor: 1.0, nis: 0.0, seen: 0, share: 1.0 }
     }
 }
 
@@ -70,6 +72,16 @@ impl NoiseLevel {
         self.seen = (self.seen + 1).min(MEMORY);
         self.nis += (nis - self.nis) / f64::from(self.seen);
         nis / usual
+    }
+
+    /// Notes the square of an innovation that is used beyond what the estimate explains, as a share of the noise.
+    pub fn note_share(&mut self, share: f64) {
+        self.share += (share.clamp(-MOST, MOST) - self.share) / f64::from(self.seen.clamp(1, MEMORY));
+    }
+
+    /// Share of its noise that a source has had lately: 0 to 1, the most until some measurements have been seen.
+    pub fn share(&self) -> f64 {
+        if self.seen >= FEW { self.share.clamp(0.0, 1.0) } else { 1.0 }
     }
 
     /// Whether innovations are about as large as they should be. Of ranges they are larger where the wall isn't as designed.

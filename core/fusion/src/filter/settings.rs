@@ -71,6 +71,8 @@ pub struct Settings {
     pub echo_sd_m: f64,
     /// Length of wall along which its bumps are one and the same to an echosounder, m.
     pub bump_m: f64,
+    /// Way along the tunnel within which heads see the same bumps again, m.
+    pub seen_again_m: f64,
     /// Full width of its beam, radians: which part of the wall within it echoes is uncertain.
     pub echo_beam_rad: f64,
     /// Initial scale error of all ranges against the design, a ratio, and its random walk, per root of a second.
@@ -124,6 +126,8 @@ impl Default for Settings {
             echo_sd_m: 0.03,
             // Nobody sets it: two thirds of the 0.3 m over which the bumps of field dives follow one another (docs/field.md).
             bump_m: 0.2,
+            // Nobody sets it: about what a vehicle drives while its heads turn half round.
+            seen_again_m: 0.05,
             echo_beam_rad: 25.0 * DEGREE,
             range_scale_sd: 0.03,
             range_scale_noise: 1e-5,

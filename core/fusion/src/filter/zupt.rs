@@ -16,6 +16,10 @@ const ENOUGH: u32 = 25;
 const FLOATS: u32 = 15;
 /// How long a vehicle is asked to stand from the first estimate on.
 const ASKS_FOR: DurNs = DurNs(60_000_000_000);
+/// Pauses of the cable that are remembered, and how many times the longest of them it must have stood: who winds it in by half metres
+/// lets it stand between them while the vehicle goes on.
+const PAUSES: usize = 4;
+const PAUSES_TO_REST: u64 = 2;
 /// Largest difference between means of turn rate and specific force at rest, rad/s and m/s^2.
 const SAME_RATE: f64 = 1e-3;
 const SAME_FORCE: f64 = 0.02;
@@ -28,6 +32,9 @@ pub struct Stillness {
     cable_m: Option<f64>,
     cable_still: bool,
     cable_at: MonoNs,
+    /// When it last moved, and how long it had stood the last times before, the latest last.
+    cable_moved_at: Option<MonoNs>,
+    pauses: [DurNs; PAUSES],
     /// Means taken at rest.
     rested: u32,
     /// Seconds for which the cable has stood without the vehicle being at rest.
@@ -96,6 +103,7 @@ impl Stillness {
                 self.cable_still = true;
                 if (length.length_m - before_m).abs() > length.resolution_m {
                     self.cable_m = Some(length.length_m);
+                    self.note_pause(at);
                     self.moved();
                 }
             }
@@ -108,9 +116,27 @@ impl Stillness {
         (self.rate.alike, self.force.alike, self.floated) = (0, 0, 0);
     }
 
-    /// Whether gyros and accelerometers have been steady for long, and the cable hasn't moved.
+    /// Notes that the cable has moved again.
+    fn note_pause(&mut self, at: MonoNs) {
+        if let Some(before) = self.cable_moved_at.replace(at) {
+            self.pauses.rotate_left(1);
+            if let Some(latest) = self.pauses.last_mut() {
+                *latest = at.since(before);
+            }
+        }
+    }
+
+    /// Whether the cable has stood for much longer than it did the last times before it moved on.
+    fn cable_rests(&self) -> bool {
+        let longest = self.pauses.iter().map(|pause| pause.0.unsigned_abs()).max().unwrap_or(0);
+        self.cable_moved_at.is_none_or(|moved_at| {
+            self.cable_at.since(moved_at).0.unsigned_abs() >= PAUSES_TO_REST.saturating_mul(longest)
+        })
+    }
+
+    /// Whether gyros and accelerometers have been steady for long, and the cable hasn't moved for as long, nor only paused.
     pub fn is_still(&self) -> bool {
-        self.rate.alike >= MEANS && self.force.alike >= MEANS && self.cable_still
+        self.rate.alike >= MEANS && self.force.alike >= MEANS && self.cable_still && self.cable_rests()
     }
 
     /// Mean turn rate of the last window at rest, rad/s; returned once.
@@ -176,6 +202,32 @@ mod tests {
             still(|_| 0.0, |t| (!(2.0..5.0).contains(&t)).then_some(0.0)),
             "it speaks again, and is still"
         );
+    }
+
+    /// A cable wound in by half metres stands for longer than the means take, and the vehicle goes on meanwhile; it is at rest once the
+    /// cable has stood for twice as long as it did between the last pulls.
+    #[test]
+    fn a_cable_wound_in_by_pulls_is_no_vehicle_at_rest() {
+        let pulled = |speed_mps: f64, t: f64| 0.5 * math::floor_to_i64(2.0 * speed_mps * t) as f64;
+        let mut stillness = Stillness::default();
+        let mut rested_s = 0_u32;
+        for k in 0..9000_u32 {
+            let (at, t) = (MonoNs(u64::from(k) * 10_000_000), f64::from(k) / 100.0);
+            stillness.take(at, SensorKind::Imu, &Reading::AngularRate(Vec3::zero()));
+            stillness.take(at, SensorKind::Imu, &Reading::SpecificForce(Vec3::new(0.0, 0.0, 9.8)));
+            // A pull every 7 s until 63 s have gone.
+            let length_m = pulled(0.5 / 7.0, t.min(63.5));
+            let length = TetherLength { length_m, resolution_m: 0.001 };
+            stillness.take(
+                at,
+                SensorKind::Tether { zero_at_m: 0.0, scale: 1.0 },
+                &Reading::TetherLength(length),
+            );
+            rested_s =
+                rested_s.max(if stillness.is_still() && (14.0..76.0).contains(&t) { k / 100 } else { 0 });
+        }
+        assert_eq!(rested_s, 0, "it went on");
+        assert!(stillness.is_still(), "the cable has stood for 27 s");
     }
 
     /// Seconds asked for after so long: while turned like this, with a cable of this length.

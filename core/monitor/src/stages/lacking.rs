@@ -367,6 +367,23 @@ mod tests {
         }
     }
 
+    /// What is taken to hide a head does so once seven in ten of the pings there get nothing; the latest hundreds count.
+    #[test]
+    fn the_vehicle_hides_where_most_pings_get_nothing() {
+        let hides = |pings: [u32; 2]| {
+            let mut turning = Turning::default();
+            for (count, is_lost) in pings.into_iter().zip([true, false]) {
+                (0..count).for_each(|_| turning.note_hidden(true, is_lost));
+            }
+            turning.note_hidden(false, false);
+            turning.is_hidden()
+        };
+        assert!(hides([0, 0]), "until something is seen there");
+        assert!(hides([70, 30]) && !hides([69, 31]));
+        assert!(!hides([0, 3]) && hides([1, 0]));
+        assert!(!hides([10_000, 400]), "seen through for the last hundreds");
+    }
+
     #[test]
     fn pings_without_a_fix_are_kept_until_there_is_no_room_and_that_is_known() {
         let (mut lacking, mut lacks) = (Lacking::default(), Lacks::default());

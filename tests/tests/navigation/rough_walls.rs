@@ -1,0 +1,47 @@
+//! A vehicle that stands before a rough wall sees the same bumps turn after turn, and is to know its heading no better for that.
+
+use headrace_fusion::filter::state::ATTITUDE;
+use headrace_geometry::math;
+use headrace_simulator::START;
+use headrace_tests::scenes;
+use headrace_tests::tracking::{self, Silence};
+
+/// Yaw's errors over their standard deviations, rms, and the largest of these, radians, from 15 to 30 s after it has been let in, by seeds.
+fn yaw(rough: &str) -> (f64, f64) {
+    let (mut squares, mut count, mut largest_sd_rad) = (0.0, 0.0, 0.0_f64);
+    for seed in 1..=8 {
+        let text = format!(
+            "seed = {seed}\nvehicle = \"vita2-3.toml\"\n{rough}[trajectory]\nkind = \"waypoints\"\n\
+             [[trajectory.waypoints]]\nchainage_m = {chainage_m}\nstay_s = 30\n\
+             [[trajectory.waypoints]]\nchainage_m = {end_m}\nspeed_mps = 0.1\n[effects]\nmotion_within_turn = {{}}\n\
+             imu_noise = {{ gyro_degps_rthz = 0.0077, accel_mps2_rthz = 0.0006, attitude_deg = 0.3 }}\n\
+             [effects.beam_cone]\nsensors = [\"sonar_0\", \"sonar_1\", \"sonar_2\"]\n\
+             [[effects.range_noise]]\nsd_m = 0.01\nsensors = [\"sonar_0\", \"sonar_1\", \"sonar_2\"]\n",
+            chainage_m = 3 + 5 * seed,
+            end_m = 4 + 5 * seed,
+        );
+        let scene = scenes::scene(&text);
+        let track = tracking::dive(&scene, tracking::filter(&scene), Silence::default());
+        for epoch in &track.epochs {
+            let since_s = epoch.at.since(START).as_secs_f64();
+            if (15.0..30.0).contains(&since_s) {
+                let sd_rad = math::sqrt(epoch.factors.variance(ATTITUDE + 2));
+                let ratio = epoch.errors[ATTITUDE + 2] / sd_rad;
+                squares += ratio * ratio;
+                count += 1.0;
+                largest_sd_rad = largest_sd_rad.max(sd_rad);
+            }
+        }
+    }
+    (math::sqrt(squares / count), largest_sd_rad)
+}
+
+#[test]
+fn who_stands_before_a_rough_wall_is_no_surer_of_its_heading_than_right() {
+    let (ratio, _) = yaw("[[tunnel.rough]]\nsd_m = 0.028\nseed = 3\n");
+    println!("rough: {ratio:.2} standard deviations");
+    assert!((0.3..1.0).contains(&ratio), "{ratio}");
+    let (ratio, largest_sd_rad) = yaw("");
+    println!("smooth: {ratio:.2} standard deviations, {:.2} degrees at most", largest_sd_rad.to_degrees());
+    assert!(ratio < 1.0 && largest_sd_rad.to_degrees() < 0.8, "{ratio}, {largest_sd_rad}");
+}
