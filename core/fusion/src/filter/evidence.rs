@@ -202,6 +202,7 @@ mod tests {
                 let theirs_m2 = 0.05 + if k % 2 == 0 { scatter_m2 } else { -scatter_m2 };
                 alternative.note([0.5, math::sqrt(theirs_m2)]);
                 alternative.close();
+                alternative.block = [0.0; 3];
             }
             alternative.certain(alternative.share_left())
         };
