@@ -84,7 +84,8 @@ pub fn explain<'a>(
     let seen = Seen::over(passages);
     let drive = seen.worst;
     let present = present(case, &seen, store.perimeter_m());
-    let mut trial = Trial { case, drive: &drive, seen: &seen, store, finder, left: MOST_TRIED, laid: None };
+    let mut trial =
+        Trial { case, drive: &drive, seen: &seen, store, finder, left: MOST_TRIED, laid: None, passed: None };
     let causes = trial.smallest(present);
     let in_hole = |lack: &&Lack| is_in(case.hole, case.target_m, store.perimeter_m(), lack);
     let radius_m = case.target_m;
@@ -224,6 +225,8 @@ struct Trial<'a> {
     left: u32,
     /// Without which factors the wall was laid out last, and for circles of which radius, m.
     laid: Option<(Causes, f64)>,
+    /// Without which factors the section was found last to have met the target itself.
+    passed: Option<Causes>,
 }
 
 impl Trial<'_> {
@@ -301,6 +304,9 @@ impl Trial<'_> {
             return false;
         }
         self.left -= 1;
+        if self.passed == Some(removed) {
+            return true;
+        }
         let Case { bounds_m, first_visit, target_m, lacks, .. } = *self.case;
         let otherwise = self.otherwise(removed);
         let radius_m = times * target_m / 2.0;
@@ -314,7 +320,13 @@ impl Trial<'_> {
             self.finder.lay_otherwise((self.store, first_visit), bounds_m, radius_m, &otherwise, put_back);
             self.laid = Some((removed, radius_m));
         }
-        !self.finder.has_circle_otherwise(bounds_m, radius_m, &otherwise)
+        let mut passes = |radius_m| !self.finder.has_circle_otherwise(bounds_m, radius_m, &otherwise);
+        // Most sets that do, do with nothing to spare, and needn't be searched for larger circles.
+        if passes(target_m / 2.0) {
+            self.passed = Some(removed);
+            return true;
+        }
+        times > 1.0 && passes(radius_m)
     }
 
     /// How the wall would have been sampled without some factors.

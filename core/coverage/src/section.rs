@@ -184,10 +184,9 @@ impl Section {
         self.passage.pass_error.add(&pass);
     }
 
-    /// Whether its newest visit is free of what makes those before doubtful.
+    /// Whether there were visits before its newest one, which is free of what makes those doubtful.
     pub(super) fn is_visited_anew(&self) -> bool {
-        let newest = self.visits.newest();
-        newest > self.visits.first() && !(self.suspect && newest <= self.suspected_in)
+        self.visits.are_several() && !(self.suspect && self.visits.newest() <= self.suspected_in)
     }
 
     /// Dismisses the samples of all visits but the newest.
