@@ -34,6 +34,7 @@ struct Wall {
     end_m: f64,
     beside: [Causes; 2],
     is_torn: bool,
+    is_dark: bool,
     adrift: bool,
 }
 
@@ -48,6 +49,7 @@ impl Default for Wall {
             end_m: 14.0,
             beside: [Causes::default(); 2],
             is_torn: false,
+            is_dark: false,
             adrift: false,
         }
     }
@@ -87,7 +89,7 @@ fn named(wall: &Wall) -> Vec<Cause> {
         swept_by_all: Some(Reach { from_m: 6.0, to_m: wall.end_m }),
         to_come: None,
         none_alive: false,
-        is_dark: false,
+        is_dark: wall.is_dark,
         is_torn: wall.is_torn,
         target_m: TARGET_M,
         beside: wall.beside,
@@ -159,6 +161,14 @@ fn of_two_that_are_needed_both_are_named_and_of_two_that_suffice_the_one_the_pil
     );
 }
 
+/// Of heads that were never there nothing else is known: however fast it went, that is no cause.
+#[test]
+fn where_no_head_was_heard_their_silence_is_named() {
+    let fast = || Wall { along_m: 0.7, drive: Drive { speed_mps: 0.35, ..sound() }, ..Wall::default() };
+    assert_eq!(named(&Wall { is_dark: true, ..fast() }), [Cause::HeadSilent]);
+    assert_eq!(named(&fast()), [Cause::TooFast]);
+}
+
 #[test]
 fn what_is_named_beside_is_preferred_if_it_suffices() {
     let wall = |beside: Cause| Wall {
@@ -177,4 +187,14 @@ fn a_report_has_the_same_word_for_a_cause_wherever_it_stands() {
     for cause in Cause::ALL {
         assert_eq!(serde_json::to_value(cause).unwrap(), cause.as_str());
     }
+}
+
+/// Where so many passes are made for one, they and the pings between them take the way that fits.
+#[test]
+fn with_losses_the_speed_is_that_at_which_all_passes_needed_fit() {
+    let drive = Drive { fits_mps: 0.19, fits_along_m: 0.4, ..sound() };
+    assert!((drive.with_losses_mps(1.0) - 0.19).abs() < 1e-12);
+    // 0.4 m over 1.5 passes of 2 s and a ping.
+    assert!((drive.with_losses_mps(1.5) - 0.4 / 3.02).abs() < 1e-12);
+    assert!((drive.with_losses_mps(1.01) - 0.19).abs() < 1e-12, "no faster than without losses");
 }

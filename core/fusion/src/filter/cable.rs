@@ -285,3 +285,25 @@ impl Doubt {
         reading.off_m.abs() <= MISSING_SHARE * way_m + MISSING_M
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Whether a counter that had lost 0.4 m leaves again, so many seconds after, with a reading that is off by this.
+    fn leaves_again(after_s: u64, off_m: f64) -> bool {
+        let over = Over { at: MonoNs(1_000_000_000_000), most_m: 0.5, lost_m: 0.4 };
+        let at = over.at + DurNs(i64::try_from(after_s).unwrap() * 1_000_000_000);
+        over.is_followed_by(&CableReading { at, shown_m: 10.0, off_m, sd_m: 0.01, agrees: false })
+    }
+
+    /// One that leaves soon again hangs loose; one that takes back what it had lost doesn't, nor one that leaves minutes later.
+    #[test]
+    fn a_counter_leaves_again_soon_and_for_something_else() {
+        assert!(leaves_again(10, 0.4) && leaves_again(119, 0.4) && leaves_again(10, -0.2));
+        assert!(!leaves_again(121, 0.4) && !leaves_again(3600, 0.4));
+        // It takes back 0.4 m, to a tenth of it and 2 cm.
+        assert!(!leaves_again(10, -0.4) && !leaves_again(10, -0.45) && !leaves_again(10, -0.35));
+        assert!(leaves_again(10, -0.47) && leaves_again(10, -0.33));
+    }
+}

@@ -1,0 +1,111 @@
+use super::super::hole::FARTHEST_M;
+use super::*;
+use headrace_fusion::relative::Relative;
+
+const SECTION_M: f64 = 0.25;
+
+/// Sections of a stretch from a metre before the portal to 10 m, for a target of 0.5 m.
+fn sections() -> Sections {
+    Sections::new(SECTION_M, 0.5, -1.0, 10.0)
+}
+
+#[test]
+fn a_stretch_has_the_sections_that_it_touches_and_that_there_are() {
+    let of = |from_m: f64, to_m: f64| sections().sections_of(Some(Reach { from_m, to_m }));
+    assert_eq!(of(1.1, 1.9), 4..8);
+    assert_eq!(of(1.0, 2.0), 4..9, "both at their beginning");
+    assert_eq!(of(3.3, 3.3), 13..14);
+    assert_eq!((of(-20.0, -0.6), of(9.9, 40.0)), (-4..-2, 39..40));
+    assert!(of(11.0, 12.0).is_empty() && sections().sections_of(None).is_empty());
+}
+
+/// A judged section is counted once, however often its verdict changes; what isn't judged is open.
+#[test]
+fn metres_are_those_of_the_latest_verdicts() {
+    let mut sections = sections();
+    let [pass, fail] = [Verdict::Pass, Verdict::Fail].map(|verdict| Some(verdict as usize));
+    for (before, now) in [(None, fail), (None, fail), (None, fail), (None, pass), (fail, pass), (fail, None)]
+    {
+        sections.count(before, now);
+    }
+    let metres = sections.metres(Some(Reach { from_m: 0.1, to_m: 1.9 }));
+    let found = [metres.pass_m, metres.fail_m, metres.cannot_say_m, metres.open_m, metres.not_inspected_m];
+    assert_eq!(found, [2.0, 1.0, 0.0, 5.0, 0.0].map(|count| count * SECTION_M));
+}
+
+/// A section with pings has its own error; one without has the largest of those within T / 2 of it, and no other.
+#[test]
+fn a_section_without_pings_has_the_error_of_those_beside_it() {
+    let error_of = |placed_in: i64, asked: i64| {
+        let mut sections = sections();
+        for (index, sd_m) in [(placed_in, 0.03), (30, 0.01)] {
+            let passage = &mut sections.get_mut(index).unwrap().passage;
+            passage.placed = 5;
+            passage.pass_error.relative = Relative::along(sd_m);
+        }
+        let found = sections.pass_error(asked);
+        if found == PassError::default() {
+            0.0
+        } else {
+            found.sd_m([0.0; 2]) / PassError { relative: Relative::along(1.0), ..found }.sd_m([0.0; 2])
+        }
+    };
+    let near = |found: f64, expected: f64| (found - expected).abs() < 1e-12;
+    // Section 20 is 5 to 5.25 m, and what lies within 0.25 m of it 4.75 to 5.5 m.
+    for (beside, expected) in [(18, 0.0), (19, 0.03), (21, 0.03), (22, 0.03), (23, 0.0)] {
+        assert!(near(error_of(beside, 20), expected), "{beside}: {}", error_of(beside, 20));
+    }
+    assert!(near(error_of(31, 30), 0.01), "its own, though there is a larger one beside it");
+    assert!(near(error_of(29, 28), 0.03) && near(error_of(27, 28), 0.03));
+}
+
+const BEHIND: f64 = f64::INFINITY;
+
+fn hole(diameter_m: f64) -> Hole {
+    Hole { diameter_m, least_m: diameter_m, most_m: diameter_m, x_m: 0.0, arc_m: 0.0, bounded: true }
+}
+
+#[test]
+fn a_wall_without_samples_never_passes() {
+    let hole = Hole { bounded: false, ..hole(2.0 * FARTHEST_M) };
+    assert_eq!(verdict(&hole, 0.0, 100.0, BEHIND), Verdict::Fail);
+    assert_eq!(verdict(&hole, 0.0, 100.0, 1.0), Verdict::Open);
+}
+
+#[test]
+fn the_verdict_needs_as_many_standard_deviations_as_asked() {
+    for (confidence_sd, diameter_m, expected) in [
+        (1.0, 0.89, Verdict::Pass),
+        (1.0, 0.91, Verdict::CannotSay),
+        (1.0, 1.11, Verdict::Fail),
+        (2.0, 0.79, Verdict::Pass),
+        (2.0, 0.81, Verdict::CannotSay),
+        (2.0, 1.19, Verdict::CannotSay),
+        (2.0, 1.21, Verdict::Fail),
+        (3.0, 0.69, Verdict::Pass),
+        (3.0, 1.29, Verdict::CannotSay),
+        (3.0, 1.31, Verdict::Fail),
+    ] {
+        assert_eq!(verdict(&hole(diameter_m), confidence_sd * 0.1, 1.0, BEHIND), expected, "{diameter_m}");
+    }
+    assert_eq!(verdict(&hole(1.0), 0.0, 1.0, BEHIND), Verdict::Pass, "as large as the target passes");
+}
+
+#[test]
+fn what_samples_may_still_fill_is_open_until_enough_of_it_is_out_of_their_reach() {
+    let at = |clear_m: f64| verdict(&hole(2.0), 0.2, 1.0, clear_m);
+    assert_eq!([0.0, 0.59, 0.61, 1.0].map(at), [Verdict::Open, Verdict::Open, Verdict::Fail, Verdict::Fail]);
+    let unsure = |clear_m: f64| verdict(&hole(1.1), 0.2, 1.0, clear_m);
+    assert_eq!([0.5, 0.56].map(unsure), [Verdict::Open, Verdict::CannotSay]);
+}
+
+#[test]
+fn bounds_on_either_side_of_the_target_say_nothing() {
+    let within = |diameter_m: f64, least_m: f64, most_m: f64| {
+        verdict(&Hole { least_m, most_m, ..hole(diameter_m) }, 0.0, 0.5, BEHIND)
+    };
+    assert_eq!(within(0.51, 0.49, 0.51), Verdict::CannotSay);
+    assert_eq!(within(0.51, 0.501, 0.51), Verdict::Fail);
+    assert_eq!(within(0.49, 0.49, 0.505), Verdict::CannotSay);
+    assert_eq!(within(0.49, 0.45, 0.5), Verdict::Pass);
+}
