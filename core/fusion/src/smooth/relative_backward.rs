@@ -114,3 +114,19 @@ fn against(own: &[Errors; 3], before: &[Errors; 3], with: &[Errors; 3]) -> Relat
     };
     Relative::new(core::array::from_fn(|r| core::array::from_fn(|c| element(r, c))))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Epochs come latest first; one is noted where it is a step before the last.
+    #[test]
+    fn epochs_are_noted_a_step_apart() {
+        let at = |s: u64| MonoNs(1_000_000_000 * s);
+        let mut later = Later::default();
+        assert!(later.is_due(at(100)));
+        assert_eq!(later.note(7, at(100), DurNs(0), &Factors::independent([1.0; ERRORS])), None);
+        let step = at(100) - STEP;
+        assert!(!later.is_due(at(100)) && !later.is_due(step + DurNs(1)) && later.is_due(step));
+    }
+}
