@@ -141,3 +141,24 @@ impl Sections {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// What is left in part is looked at every few centimetres of the way, behind and ahead.
+    #[test]
+    fn the_next_look_is_a_few_centimetres_on() {
+        let mut sections = Sections::new(0.25, 0.5, -1.0, 10.0);
+        for k in 0..100 {
+            let x_m = 4.0 + 0.013 * f64::from(k);
+            sections.look_again(Some(Reach { from_m: x_m, to_m: x_m }));
+            let [behind_m, ahead_m] = sections.next_look_m;
+            for on_m in [behind_m - x_m, x_m - ahead_m] {
+                assert!(on_m > 0.0 && on_m <= LOOK_M + 1e-9, "{on_m} on from {x_m}");
+            }
+        }
+        sections.look_again(Some(Reach { from_m: f64::NEG_INFINITY, to_m: f64::INFINITY }));
+        assert_eq!(sections.next_look_m, LOOK_AT_ONCE);
+    }
+}

@@ -297,6 +297,30 @@ mod tests {
         over.is_followed_by(&CableReading { at, shown_m: 10.0, off_m, sd_m: 0.01, agrees: false })
     }
 
+    /// A counter that sticks is doubted within a second, with the speed at which it had run as what may have misled the filter.
+    #[test]
+    fn a_counter_that_sticks_has_left_by_its_rate() {
+        let (mut cable, mut left) = (Cable::default(), None);
+        for k in 0..120_u32 {
+            let t = f64::from(k) / 10.0;
+            let at = MonoNs(1_000_000_000) + DurNs::from_secs_f64(t);
+            let off_m = -0.1 * (t - 10.0).max(0.0);
+            let reading = CableReading {
+                at,
+                shown_m: 7.0 + 0.1 * t + off_m,
+                off_m,
+                sd_m: 0.005,
+                agrees: off_m > -0.01,
+            };
+            match cable.take(&reading) {
+                Use::Left(by_mps) => left = left.or(Some((t, by_mps))),
+                used => assert_eq!(used, if off_m > -0.01 { Use::Fuse } else { Use::Withhold }, "at {t}"),
+            }
+        }
+        let (at_s, by_mps) = left.unwrap();
+        assert!((10.5..11.0).contains(&at_s) && (by_mps - 0.1).abs() < 0.01, "{by_mps} at {at_s}");
+    }
+
     /// One that leaves soon again hangs loose; one that takes back what it had lost doesn't, nor one that leaves minutes later.
     #[test]
     fn a_counter_leaves_again_soon_and_for_something_else() {
