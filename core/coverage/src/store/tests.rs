@@ -251,6 +251,23 @@ fn a_parked_vehicle_fills_cells_and_no_more() {
     assert!(store.fidelity(100.0, 100.0).thinned_m <= 0.02);
 }
 
+/// A step is dropped from a full cell where one close by goes in its direction: passes are told apart by it.
+#[test]
+fn a_step_is_dropped_for_one_in_its_direction_alone() {
+    let mut store = SampleStore::new(LAYOUT);
+    let mut goes = |around_m: f64, k: u32| {
+        // Over a decimetre of one cell, a millimetre apart.
+        let off_m = 0.001 * f64::from(k % 100);
+        let before = store.usage().thinned;
+        store.insert(WallSample { step_m: Some([0.002, around_m]), ..sample(100.1, 3.05 + off_m) }).unwrap();
+        store.usage().thinned > before
+    };
+    let ways: Vec<bool> = (0..400).map(|k| goes(0.05, k)).collect();
+    assert!(ways[..100].iter().all(|dropped| !dropped) && ways[300..].iter().all(|dropped| *dropped));
+    assert!(!goes(-0.05, 17), "the first to go back is kept");
+    assert!(goes(0.05, 17));
+}
+
 /// Back and forth over one section: neither memory nor error grows.
 #[test]
 fn back_and_forth_a_hundred_times() {
