@@ -297,28 +297,32 @@ mod tests {
         over.is_followed_by(&CableReading { at, shown_m: 10.0, off_m, sd_m: 0.01, agrees: false })
     }
 
-    /// A counter that sticks is doubted within a second, with the speed at which it had run as what may have misled the filter.
-    #[test]
-    fn a_counter_that_sticks_has_left_by_its_rate() {
-        let (mut cable, mut left) = (Cable::default(), None);
-        for k in 0..120_u32 {
+    /// When a counter is doubted that had run at 0.1 m/s for 10 s and then counts only a share of that, s, and by how much it has left.
+    fn left(share: f64) -> (f64, f64) {
+        let mut cable = Cable::default();
+        for k in 0..140_u32 {
             let t = f64::from(k) / 10.0;
             let at = MonoNs(1_000_000_000) + DurNs::from_secs_f64(t);
-            let off_m = -0.1 * (t - 10.0).max(0.0);
-            let reading = CableReading {
-                at,
-                shown_m: 7.0 + 0.1 * t + off_m,
-                off_m,
-                sd_m: 0.005,
-                agrees: off_m > -0.01,
-            };
-            match cable.take(&reading) {
-                Use::Left(by_mps) => left = left.or(Some((t, by_mps))),
-                used => assert_eq!(used, if off_m > -0.01 { Use::Fuse } else { Use::Withhold }, "at {t}"),
+            let off_m = (share - 1.0) * 0.1 * (t - 10.0).max(0.0);
+            let agrees = off_m > -0.01;
+            let used =
+                cable.take(&CableReading { at, shown_m: 7.0 + 0.1 * t + off_m, off_m, sd_m: 0.005, agrees });
+            match used {
+                Use::Left(by_mps) => return (t, by_mps),
+                used => assert_eq!(used, if agrees { Use::Fuse } else { Use::Withhold }, "at {t}"),
             }
         }
-        let (at_s, by_mps) = left.unwrap();
-        assert!((10.5..11.0).contains(&at_s) && (by_mps - 0.1).abs() < 0.01, "{by_mps} at {at_s}");
+        panic!("believed for ever");
+    }
+
+    /// A counter that sticks or slips is doubted within a second, with what its rate has changed by: that may have misled the filter.
+    #[test]
+    fn a_counter_has_left_by_what_its_rate_has_changed() {
+        for (share, changed_mps, within_s) in [(0.0, 0.1, 1.0), (0.4, 0.06, 1.5), (-1.0, 0.2, 0.8)] {
+            let (at_s, by_mps) = left(share);
+            assert!((by_mps - changed_mps).abs() < 0.012, "{share}: {by_mps}");
+            assert!((10.5..10.0 + within_s).contains(&at_s), "{share}: {at_s}");
+        }
     }
 
     /// One that leaves soon again hangs loose; one that takes back what it had lost doesn't, nor one that leaves minutes later.
