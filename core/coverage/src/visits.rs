@@ -112,3 +112,55 @@ impl Visits {
         if self.several { pass_sd_m.max(self.apart_sd_m) } else { pass_sd_m }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use headrace_fusion::relative::Relative;
+    use headrace_geometry::tunnel::shapes;
+
+    /// A visit of this number and stretch of navigation, whose passes are off one another by a centimetre, and off those of long before by ten.
+    fn visit(number: u32, tie: u32, at_s: u64) -> Visit {
+        let error = |sd_m: f64| PassError { relative: Relative::along(sd_m), from_m: [0.0; 2] };
+        Visit { number, tie, at: MonoNs(at_s * 1_000_000_000), errors: [error(0.01), error(0.1)] }
+    }
+
+    fn after(noted: &[(u32, u32, u64)]) -> Visits {
+        let profile = shapes::ceran().unwrap();
+        let mut visits = Visits::default();
+        noted.iter().for_each(|(number, tie, at_s)| visits.note(&visit(*number, *tie, *at_s), &profile));
+        visits
+    }
+
+    #[test]
+    fn samples_of_several_visits_are_related_where_navigation_went_on() {
+        let flags = |noted: &[(u32, u32, u64)]| {
+            let visits = after(noted);
+            (visits.newest(), visits.are_several(), visits.are_unrelated())
+        };
+        assert_eq!(flags(&[]), (0, false, false));
+        assert_eq!(flags(&[(3, 1, 0), (3, 1, 9)]), (3, false, false), "one visit");
+        assert_eq!(flags(&[(3, 1, 0), (4, 1, 60)]), (4, true, false), "it turned back");
+        assert_eq!(flags(&[(3, 1, 0), (4, 2, 60)]), (4, true, true), "navigation broke off");
+        let mut visits = after(&[(3, 1, 0), (4, 2, 60)]);
+        visits.keep_newest();
+        assert_eq!((visits.first(), visits.are_several(), visits.are_unrelated()), (4, false, false));
+    }
+
+    /// The longer ago the last sample, the more passes of different visits are off one another: from 20 to 40 s on as those of long before.
+    #[test]
+    fn passes_of_different_visits_are_off_one_another_by_the_time_between() {
+        let sd_m = |gap_s: u64| after(&[(3, 1, 0), (4, 1, gap_s)]).sd_m(0.0);
+        assert!(sd_m(20) > 0.0 && (sd_m(10) - sd_m(20)).abs() < 1e-12, "as of one pass");
+        assert!(
+            sd_m(30) > 1.5 * sd_m(20) && sd_m(40) > 1.2 * sd_m(30),
+            "{} {} {}",
+            sd_m(20),
+            sd_m(30),
+            sd_m(40)
+        );
+        assert!((sd_m(40) / sd_m(20) - 10.0).abs() < 1e-9 && (sd_m(900) - sd_m(40)).abs() < 1e-12);
+        assert!((after(&[(3, 1, 0), (3, 1, 900)]).sd_m(0.02) - 0.02).abs() < 1e-12, "one visit");
+        assert!((after(&[(3, 1, 0), (4, 1, 10)]).sd_m(0.5) - 0.5).abs() < 1e-12, "the newest is worse");
+    }
+}
