@@ -128,7 +128,9 @@ mod tests {
     fn after(noted: &[(u32, u32, u64)]) -> Visits {
         let profile = shapes::ceran().unwrap();
         let mut visits = Visits::default();
-        noted.iter().for_each(|(number, tie, at_s)| visits.note(&visit(*number, *tie, *at_s), &profile));
+        for (number, tie, at_s) in noted {
+            visits.note(&visit(*number, *tie, *at_s), &profile);
+        }
         visits
     }
 
