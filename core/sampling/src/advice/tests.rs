@@ -75,6 +75,13 @@ impl Case {
     fn advice(&self) -> Advice {
         self.advisor().advise(&self.situation, Swing::default(), self.left_s)
     }
+
+    /// T at a speed, m, by the paper's equation, with the phases that heads have at it.
+    fn t_at_m(&self, advice: &Advice, speed_mps: f64) -> f64 {
+        let passes = Phasing::of(&self.situation).at(speed_mps);
+        let gap_s = passes.gap_s(passes.heads()).unwrap();
+        spacing::t_max_m(speed_mps * gap_s, speed_mps * advice.ping_period_s, advice.t_y_m)
+    }
 }
 
 #[test]
@@ -92,11 +99,7 @@ fn at_the_largest_speed_the_target_is_just_met() {
 fn the_largest_speed_is_one_at_which_the_phases_of_heads_apart_hold() {
     let case = Case::new(&[0.0, 0.0], &[0.8, 0.0], 0.2, 1.0);
     let advice = case.advice();
-    let t_at = |speed_mps: f64| {
-        let passes = Phasing::of(&case.situation).at(speed_mps);
-        let gap_s = passes.gap_s(passes.heads()).unwrap();
-        spacing::t_max_m(speed_mps * gap_s, speed_mps * advice.ping_period_s, advice.t_y_m)
-    };
+    let t_at = |speed_mps: f64| case.t_at_m(&advice, speed_mps);
     let v_max = advice.v_max_mps / (1.0 - SPEED_MARGIN);
     assert!((t_at(v_max) - 1.0).abs() < 1e-6, "{v_max}: {}", t_at(v_max));
     assert!(t_at(1.02 * v_max) > 1.0);
@@ -375,12 +378,7 @@ fn a_speed_that_is_kept_meets_the_target() {
         let case = Case::new(&[0.0, f64::from(k * 7 % 360)], &[0.8, 0.0], 0.2, 1.0);
         let advice = advisor.advise(&case.situation, Swing::default(), None);
         let v = advice.v_max_mps;
-        let passes = Phasing::of(&case.situation).at(v);
-        let t_m = spacing::t_max_m(
-            v * passes.gap_s(passes.heads()).unwrap(),
-            v * advice.ping_period_s,
-            advice.t_y_m,
-        );
+        let t_m = case.t_at_m(&advice, v);
         assert!(t_m <= 1.0 + intervals::EASE, "{k}: {t_m} at {v}");
         kept += u32::from((v / case.advice().v_max_mps - 1.0).abs() > 1e-6);
     }
@@ -405,11 +403,7 @@ fn lost_returns_slow_the_vehicle_down() {
 fn the_interval_of_speeds_begins_where_the_target_is_met() {
     let case = Case::new(&[0.0, 0.0], &[2.4, 0.0], 0.2, 1.0);
     let advice = case.advice();
-    let t_at = |speed_mps: f64| {
-        let passes = Phasing::of(&case.situation).at(speed_mps);
-        let gap_s = passes.gap_s(passes.heads()).unwrap();
-        spacing::t_max_m(speed_mps * gap_s, speed_mps * advice.ping_period_s, advice.t_y_m)
-    };
+    let t_at = |speed_mps: f64| case.t_at_m(&advice, speed_mps);
     let (from, to) = (advice.from_mps, advice.v_max_mps);
     // At 0.15 m/s the rear head comes to a place just when the front one does again.
     assert!(from > 0.15 && to > 1.1 * from, "{from} to {to}");
