@@ -10,7 +10,7 @@ use super::error::SamplingError;
 use super::head::{HeadMode, HeadMotion, HeadSet, HeadSpec, MAX_HEADS};
 use super::layout::{self, HeadLayout};
 use super::losses::LossRate;
-use super::margin::{self, Margins};
+use super::margin::{self, APART_SHARE, Margins, SureTarget};
 use super::occlusion::{self, AngleRange, Obstacle};
 use super::passes::{self, Passes, Phasing, Situation};
 use super::ring::Ring;
@@ -34,6 +34,8 @@ pub const MAX_MODES: usize = 8;
 
 /// Advice updates per recomputation of the alternatives.
 const ALTERNATIVES_EVERY: u32 = 25;
+/// Times that a speed and what it leaves to errors of position are computed from each other.
+const FALLS: u32 = 3;
 /// Below this speed, m/s, the last direction of travel is kept.
 const UNDER_WAY_MPS: f64 = 0.02;
 /// Capacity for stretches of wall out of a head's reach.
@@ -210,14 +212,15 @@ impl Advisor {
             apart_swing_mps: phasing.neighbours_apart() * swing.apart_rate_radps * farthest_m,
             swing_most_m: Some(swing.most_rad * farthest_m),
         };
-        let sure_m = self.task.target_m - self.margin_m(situation.pass_error_m);
+        let sure = self.sure(&phasing, &passes, situation);
+        let sure_m = sure.at_m(situation.speed_mps);
         let lossy = passes.lossy(true);
         self.now.count_losses(0, sure_m, &rates_of(situation));
-        let fastest = self.fastest(&phasing, &lossy, &going, sure_m, self.last_mps);
+        let fastest = self.fastest(&phasing, &lossy, &going, sure, self.last_mps);
         let possible = fastest.as_ref().ok().filter(|fastest| fastest.speed_mps > 0.0);
         let advised_mps = possible.map(|fastest| fastest.advised_mps);
         let [from_mps, nearest_mps] = possible.map_or([None; 2], |fastest| {
-            let driving = self.driving(&phasing, &lossy, &going, sure_m);
+            let driving = self.driving(&phasing, &lossy, &going, sure);
             let now_mps = Some(situation.speed_mps.abs()).filter(|now_mps| *now_mps > UNDER_WAY_MPS);
             let nearest = now_mps.and_then(|now_mps| driving.nearest_mps(now_mps));
             [Some(driving.lower_end_mps(fastest.advised_mps)), nearest]
@@ -227,7 +230,7 @@ impl Advisor {
         let predicted_t_m = self.now.t_max_m(0, &passes, situation.speed_mps.abs(), &going);
         let x_m = pose.position.x();
         let left_m = if self.astern { x_m } else { self.task.length_m - x_m };
-        self.think_over(&phasing, &lossy, &going, situation);
+        self.think_over(&phasing, &lossy, &going, situation, sure);
         let unseen_m = match fastest {
             Err(SamplingError::UnseenStrip { width_m, arc_m, .. }) => Some([width_m, arc_m]),
             _ => None,
@@ -318,7 +321,7 @@ impl Advisor {
         phasing: &'a Phasing,
         passes: &Passes,
         going: &'a Going,
-        target_m: f64,
+        sure: SureTarget,
     ) -> Driving<'a> {
         Driving {
             strips: &self.now,
@@ -327,8 +330,8 @@ impl Advisor {
             parallax_rad: self.parallax_rad,
             lossy: passes.is_lossy(),
             astern: self.astern,
-            target_m,
-            bound_mps: target_m / (passes.even_gap_s() + going.ping_period_s),
+            sure,
+            bound_mps: sure.most_m() / (passes.even_gap_s() + going.ping_period_s),
         }
     }
 
@@ -340,11 +343,11 @@ impl Advisor {
         phasing: &Phasing,
         passes: &Passes,
         going: &Going,
-        target_m: f64,
+        sure: SureTarget,
         last_mps: Option<f64>,
     ) -> Result<Fastest, SamplingError> {
-        let bound = self.now.bound_for_target(0, passes, target_m, going);
-        let driving = self.driving(phasing, passes, going, target_m);
+        let bound = self.now.bound_for_target(0, passes, sure.most_m(), going);
+        let driving = self.driving(phasing, passes, going, sure);
         let t_y_m = match &bound {
             Ok(bound) => bound.t_y_m,
             // At another speed heads are phased otherwise, and the swing between them is less.
@@ -376,7 +379,14 @@ impl Advisor {
 
     /// Computes the speed that each mode common to all heads would allow, with the heads that turn now started in
     /// phase, and what each margin costs.
-    fn think_over(&mut self, phasing: &Phasing, passes: &Passes, going: &Going, situation: &Situation) {
+    fn think_over(
+        &mut self,
+        phasing: &Phasing,
+        passes: &Passes,
+        going: &Going,
+        situation: &Situation,
+        sure: SureTarget,
+    ) {
         if let Some(left) = self.until_alternatives.checked_sub(1) {
             self.until_alternatives = left;
             return;
@@ -385,13 +395,13 @@ impl Advisor {
         self.measure_modes();
         let rates = rates_of(situation);
         for mode in 0..MAX_MODES {
-            self.modes.count_losses(mode, self.sure_in_m(mode, situation), &rates);
+            self.modes.count_losses(mode, self.sure_in(mode, sure).at_m(situation.speed_mps), &rates);
         }
         let names = self.heads.first().map(|head| head.modes.as_slice()).unwrap_or_default();
         let mut alternatives = [None; MAX_MODES];
         let mut anew = None;
         for (number, (slot, mode)) in alternatives.iter_mut().zip(names).enumerate() {
-            let Some(v_mps) = self.mode_speed_mps(number, passes.heads(), going, situation) else {
+            let Some(v_mps) = self.mode_speed_mps(number, passes.heads(), going, sure) else {
                 continue;
             };
             let v_max_mps = v_mps * (1.0 - SPEED_MARGIN);
@@ -402,7 +412,7 @@ impl Advisor {
             }
         }
         (self.alternatives, self.anew) = (alternatives, anew);
-        self.margins = Some(self.margins(phasing, passes, going, situation.pass_error_m));
+        self.margins = Some(self.margins(phasing, passes, going, sure));
     }
 
     /// Whether the heads turn in a mode.
@@ -415,26 +425,25 @@ impl Advisor {
     }
 
     /// The largest speeds with margins added one after the other.
-    fn margins(&self, phasing: &Phasing, passes: &Passes, going: &Going, pass_error_m: f64) -> Margins {
+    fn margins(&self, phasing: &Phasing, passes: &Passes, going: &Going, sure: SureTarget) -> Margins {
         let target_m = self.task.target_m;
+        let known = SureTarget { pass_error_m: 0.0, ..sure };
         let steady = Going { ping_period_s: going.ping_period_s, ..Going::default() };
         let (lossy, passes) = (passes, &passes.lossy(false));
         let even = passes.evened();
         let hidden = self.now.bound_for_target(0, &even, target_m, &steady);
-        let fastest = |passes: &Passes, going: &Going, target_m: f64| {
-            self.fastest(phasing, passes, going, target_m, self.last_mps)
-                .map_or(0.0, |fastest| fastest.speed_mps)
+        let fastest = |passes: &Passes, going: &Going, sure: SureTarget| {
+            self.fastest(phasing, passes, going, sure, self.last_mps).map_or(0.0, |fastest| fastest.speed_mps)
         };
-        let sure_m = target_m - self.margin_m(pass_error_m);
         let speeds = [
             self.now.bound_if_all_seen_mps(0, &even, target_m, &steady).unwrap_or(0.0),
             hidden.map_or(0.0, |bound| bound.speed_mps),
-            fastest(passes, &steady, target_m),
-            fastest(passes, going, target_m),
-            fastest(passes, going, sure_m),
-            fastest(lossy, going, sure_m),
+            fastest(passes, &steady, known),
+            fastest(passes, going, known),
+            fastest(passes, going, sure),
+            fastest(lossy, going, sure),
         ];
-        Margins::of(speeds.map(|speed_mps| speed_mps * (1.0 - SPEED_MARGIN)), pass_error_m)
+        Margins::of(speeds.map(|speed_mps| speed_mps * (1.0 - SPEED_MARGIN)), sure.pass_error_m)
     }
 
     fn measure_modes(&mut self) {
@@ -450,13 +459,7 @@ impl Advisor {
     }
 
     /// The largest speed in a mode, zero where none meets the target; `None` when a head lacks the mode.
-    fn mode_speed_mps(
-        &self,
-        number: usize,
-        heads: HeadSet,
-        going: &Going,
-        situation: &Situation,
-    ) -> Option<f64> {
+    fn mode_speed_mps(&self, number: usize, heads: HeadSet, going: &Going, sure: SureTarget) -> Option<f64> {
         let name = self.heads.first()?.modes.get(number)?.name;
         let turn = |head: usize| self.heads.get(head)?.mode(name).map(|mode| mode.turn);
         let (mut longest_s, mut ping_period_s) = (0.0_f64, 0.0_f64);
@@ -476,16 +479,33 @@ impl Advisor {
         let passes = passes.ok()?.beside(self.parallax_rad);
         let going = Going { ping_period_s, ..*going };
         let passes = passes.lossy(true);
-        let sure_m = self.sure_in_m(number, situation);
-        let bound = self.modes.bound_for_target(number, &passes, sure_m, &going);
-        Some(bound.map_or(0.0, |bound| bound.speed_mps))
+        let sure = SureTarget { even_gap_s: passes.even_gap_s(), ..self.sure_in(number, sure) };
+        let bound_mps = |target_m: f64| {
+            self.modes
+                .bound_for_target(number, &passes, target_m, &going)
+                .map_or(0.0, |bound| bound.speed_mps)
+        };
+        // Each speed leaves more to errors than the faster one before, until it leads to itself.
+        Some((0..FALLS).fold(bound_mps(sure.most_m()), |speed_mps, _| bound_mps(sure.at_m(speed_mps))))
     }
 
-    /// The target less what is left to errors of position, in a mode, m.
-    fn sure_in_m(&self, mode: usize, situation: &Situation) -> f64 {
-        let Task { target_m, confidence_sd, .. } = self.task;
-        let t_y_m = self.modes.largest_step_m(mode);
-        target_m - margin::position_margin_m(target_m, confidence_sd, situation.pass_error_m, t_y_m)
+    /// What errors of position leave of the target, with the heads as they turn now.
+    fn sure(&self, phasing: &Phasing, passes: &Passes, situation: &Situation) -> SureTarget {
+        let (even_gap_s, apart_m) = (passes.even_gap_s(), phasing.apart_m());
+        SureTarget {
+            target_m: self.task.target_m,
+            confidence_sd: self.task.confidence_sd,
+            pass_error_m: situation.pass_error_m,
+            measured_s: margin::error_time_s(1.0 / even_gap_s, apart_m, situation.speed_mps, APART_SHARE),
+            even_gap_s,
+            apart_m,
+            t_y_m: self.now.largest_step_m(0),
+        }
+    }
+
+    /// The same with the steps of a mode.
+    fn sure_in(&self, mode: usize, sure: SureTarget) -> SureTarget {
+        SureTarget { t_y_m: self.modes.largest_step_m(mode), ..sure }
     }
 
     /// The remedy: a steady heading, where that alone is enough; the centre, where the same steps are short enough
@@ -510,12 +530,6 @@ impl Advisor {
         }
         let best = self.alternatives.iter().flatten().max_by(|a, b| a.v_max_mps.total_cmp(&b.v_max_mps));
         best.filter(|best| best.v_max_mps > 0.0).map(|best| Remedy::Mode(best.mode))
-    }
-
-    /// Part of the target left to errors of position, m.
-    fn margin_m(&self, pass_error_m: f64) -> f64 {
-        let Task { target_m, confidence_sd, .. } = self.task;
-        margin::position_margin_m(target_m, confidence_sd, pass_error_m, self.now.largest_step_m(0))
     }
 }
 

@@ -44,6 +44,49 @@ pub fn position_margin_m(target_m: f64, confidence_sd: f64, pass_error_m: f64, t
     (confidence_sd * (pass_error_m - NOTHING_M).max(0.0)).min(most_m)
 }
 
+/// How errors of position grow with the time between two passes: between that of noise that is independent from second to
+/// second, 0.5, and of speeds that drift, 1. VITA 2 with two heads, swaying, has 21 mm after 8.5 s and 23 to 26 after 11.2.
+const GROWTH: f64 = 0.7;
+
+/// What errors of position leave of a target, at each speed.
+///
+/// They are known at the speed that the vehicle has. At half of it, heads apart along the hull pass a place twice as far
+/// apart in time, and more has to be left to them.
+#[derive(Debug, Clone, Copy)]
+pub struct SureTarget {
+    /// Target T, m.
+    pub target_m: f64,
+    /// Standard deviations of a hole that a verdict of pass keeps below the target.
+    pub confidence_sd: f64,
+    /// Standard deviation of a hole's size as measured, m.
+    pub pass_error_m: f64,
+    /// [`error_time_s`] while that was measured, seconds.
+    pub measured_s: f64,
+    /// Time between two passes of evenly spread heads, seconds.
+    pub even_gap_s: f64,
+    /// Length of hull between the heads, m.
+    pub apart_m: f64,
+    /// The largest distance between neighbours of one turn, m.
+    pub t_y_m: f64,
+}
+
+impl SureTarget {
+    /// At a speed, m: the faster, the more, by steps nowhere.
+    pub fn at_m(&self, speed_mps: f64) -> f64 {
+        let time_s = error_time_s(1.0 / self.even_gap_s, self.apart_m, speed_mps, APART_SHARE);
+        // Without heads that turn, nothing is known of the time.
+        let same = self.measured_s <= 0.0 || (time_s - self.measured_s).abs() <= f64::EPSILON * time_s;
+        let growth = if same { 1.0 } else { math::exp(GROWTH * math::ln(time_s / self.measured_s)) };
+        let error_m = self.pass_error_m * growth;
+        self.target_m - position_margin_m(self.target_m, self.confidence_sd, error_m, self.t_y_m)
+    }
+
+    /// What is left of it however fast the vehicle goes, m.
+    pub fn most_m(&self) -> f64 {
+        self.at_m(f64::INFINITY)
+    }
+}
+
 /// Errors of position between two passes as expected before a dive.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ExpectedErrors {
@@ -199,6 +242,38 @@ mod tests {
         assert!(unknown.pass_error_m(3.0).abs() <= 0.0);
         assert!((error_time_s(0.5, 1.0, 0.1, 0.4) - 6.0).abs() < 1e-12);
         assert!((error_time_s(0.5, 1.0, 0.0, 0.4) - 10.0).abs() < 1e-12, "at rest");
+    }
+
+    /// What is measured at one speed tells the same of all others as what is measured there.
+    #[test]
+    fn a_margin_is_that_of_the_speed_it_is_for() {
+        let sure = SureTarget {
+            target_m: 0.5,
+            confidence_sd: 2.0,
+            pass_error_m: 0.012,
+            measured_s: error_time_s(0.25, 0.8, 0.1, APART_SHARE),
+            even_gap_s: 4.0,
+            apart_m: 0.8,
+            t_y_m: 0.1,
+        };
+        assert!((sure.at_m(0.1) - (0.5 - 2.0 * 0.01)).abs() < 1e-9);
+        // 4 s and 0.4 of 16 s, of 8 s and of no time at all.
+        let times_s = [10.4, 7.2, 4.0];
+        let error_m = |time_s: f64| 0.012 * (time_s / times_s[1]).powf(GROWTH);
+        let at = [0.05, 0.1, f64::INFINITY].map(|speed_mps| sure.at_m(speed_mps));
+        let expected = times_s.map(|time_s| 0.5 - 2.0 * (error_m(time_s) - NOTHING_M));
+        assert!(at.iter().zip(expected).all(|(a, b)| (a - b).abs() < 1e-9), "{at:?} {expected:?}");
+        let elsewhere = SureTarget {
+            pass_error_m: error_m(times_s[0]),
+            measured_s: error_time_s(0.25, 0.8, -0.05, APART_SHARE),
+            ..sure
+        };
+        let speeds_mps = (1..100).map(|k| 0.003 * f64::from(k));
+        assert!({ speeds_mps }.all(|v_mps| (elsewhere.at_m(v_mps) - sure.at_m(v_mps)).abs() < 1e-12));
+        let side_by_side = SureTarget { apart_m: 0.0, measured_s: 4.0, ..sure };
+        assert!((side_by_side.at_m(0.02) - side_by_side.most_m()).abs() <= 0.0);
+        let without_heads = SureTarget { even_gap_s: 0.0, measured_s: 0.0, apart_m: 0.0, ..sure };
+        assert!((without_heads.at_m(0.1) - (0.5 - 2.0 * 0.01)).abs() < 1e-12);
     }
 
     #[test]

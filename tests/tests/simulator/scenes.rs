@@ -18,7 +18,7 @@ fn files() -> Vec<PathBuf> {
 #[test]
 fn every_shipped_scene_can_be_simulated() {
     let scenes = files();
-    assert_eq!(scenes.len(), 28, "{scenes:?}");
+    assert_eq!(scenes.len(), 29, "{scenes:?}");
     for path in scenes {
         let folder = path.parent().unwrap();
         let text = std::fs::read_to_string(&path).unwrap();

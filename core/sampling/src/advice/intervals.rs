@@ -5,6 +5,7 @@
 //! continuity, since the next one may be far below; there, and back again, [`EASE`] is between.
 
 use super::search;
+use crate::margin::SureTarget;
 use crate::passes::{Passes, Phasing};
 use crate::strips::{Going, Strips};
 use headrace_geometry::math;
@@ -27,7 +28,7 @@ pub(super) struct Driving<'a> {
     /// Lost returns count.
     pub(super) lossy: bool,
     pub(super) astern: bool,
-    pub(super) target_m: f64,
+    pub(super) sure: SureTarget,
     /// No speed above it meets the target, however the heads are phased, m/s.
     pub(super) bound_mps: f64,
 }
@@ -35,7 +36,7 @@ pub(super) struct Driving<'a> {
 impl Driving<'_> {
     /// Whether a speed meets the target, more or less a share of it.
     pub(super) fn meets(&self, speed_mps: f64, more: f64) -> bool {
-        let target_m = self.target_m * (1.0 + more);
+        let target_m = self.sure.at_m(speed_mps) * (1.0 + more);
         let then = self.passes(speed_mps);
         // No strip has more passes than all heads make: this test alone rules out most speeds.
         let gap_s = then.gap_s(then.heads()).unwrap_or(f64::INFINITY);
@@ -79,7 +80,7 @@ impl Driving<'_> {
         let near = (-TRIED..=TRIED).map(|k| last_mps * (1.0 + TRIED_SHARE * f64::from(k)));
         let best =
             near.map(|speed_mps| (speed_mps, self.t_m(speed_mps))).min_by(|a, b| a.1.total_cmp(&b.1))?;
-        (best.1 <= self.target_m * (1.0 + EASE)).then_some(best.0)
+        (best.1 <= self.sure.at_m(best.0) * (1.0 + EASE)).then_some(best.0)
     }
 
     /// The lower end of the interval up to a speed that meets the target, m/s; zero where all slower speeds do.

@@ -172,6 +172,8 @@ fn beams(inputs: &Inputs<'_>) -> Result<Vec<Stage>, CostError> {
 /// The shipped field scene over so many metres.
 fn field(length_m: u32) -> Result<Stage, CostError> {
     let text = file("vita1-field.toml")?.replace("distance_m = 130", &format!("distance_m = {length_m}"));
+    // At the speed that its vehicle file plans.
+    let text = text.replace("speed_mps = 0.16", "speed_mps = 0.197");
     let effects = effects::named(&text);
     Ok(Stage { name: "field", text, effects, boulders_m: Vec::new() })
 }
