@@ -331,6 +331,8 @@ impl Advisor {
             lossy: passes.is_lossy(),
             astern: self.astern,
             sure,
+            most_m: sure.most_m(),
+            apart_m: phasing.apart_m(),
             bound_mps: sure.most_m() / (passes.even_gap_s() + going.ping_period_s),
         }
     }

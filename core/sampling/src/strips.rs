@@ -58,6 +58,17 @@ pub struct Bound {
     pub t_y_m: f64,
 }
 
+/// A strip that doesn't meet a target at a speed.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Unmet {
+    /// The longest time between two passes over it, seconds, without any for returns that are lost; infinite where no head sees it.
+    pub gap_s: f64,
+    /// The largest step on it, m.
+    pub t_y_m: f64,
+    /// Its length round the wall, m: at least so far apart are the samples on either side of it.
+    pub width_m: f64,
+}
+
 /// Strips of the wall, in order of arc length, neighbours seen by different heads or after different waits; one strip where all heads
 /// see all.
 /// Holds the largest steps on each strip for each of several settings of the heads.
@@ -232,12 +243,30 @@ impl Strips {
         target_m: f64,
         going: &Going,
     ) -> bool {
+        self.unmet(setting, passes, speed_mps, target_m, going).is_none()
+    }
+
+    /// The first strip that doesn't meet a target at a speed; `None` where [`Strips::t_max_m`] is within it.
+    pub fn unmet(
+        &self,
+        setting: usize,
+        passes: &Passes,
+        speed_mps: f64,
+        target_m: f64,
+        going: &Going,
+    ) -> Option<Unmet> {
         let thin = Thin::of(passes, self.strips.iter().map(|strip| strip.seen_by));
         let is_met = |limit: Limit| limit.t_m(speed_mps, going) <= target_m;
         // What is across a strip is only looked at where the strip itself doesn't meet it.
-        self.strips.iter().enumerate().all(|(k, strip)| {
-            self.within(setting, (k, strip), &thin).is_some_and(is_met)
-                || self.across(setting, (k, strip), &thin).is_some_and(is_met)
+        let is_unmet = |(k, strip): &(usize, &Strip)| {
+            !(self.within(setting, (*k, strip), &thin).is_some_and(is_met)
+                || self.across(setting, (*k, strip), &thin).is_some_and(is_met))
+        };
+        let (k, strip) = self.strips.iter().enumerate().find(is_unmet)?;
+        Some(Unmet {
+            gap_s: thin.gap_s(k, strip.seen_by).map_or(f64::INFINITY, |gap_s| strip.wait * gap_s),
+            t_y_m: self.steps_m.get(setting * self.strips.len() + k).map_or(0.0, |steps| steps[0]),
+            width_m: strip.arc.length_m,
         })
     }
 

@@ -7,6 +7,7 @@
 use super::search;
 use crate::margin::SureTarget;
 use crate::passes::{Passes, Phasing};
+use crate::spacing;
 use crate::strips::{Going, Strips};
 use headrace_geometry::math;
 
@@ -29,6 +30,9 @@ pub(super) struct Driving<'a> {
     pub(super) lossy: bool,
     pub(super) astern: bool,
     pub(super) sure: SureTarget,
+    /// What is left of the target at most, and the heads' distance along the hull, m.
+    pub(super) most_m: f64,
+    pub(super) apart_m: f64,
     /// No speed above it meets the target, however the heads are phased, m/s.
     pub(super) bound_mps: f64,
 }
@@ -36,11 +40,38 @@ pub(super) struct Driving<'a> {
 impl Driving<'_> {
     /// Whether a speed meets the target, more or less a share of it.
     pub(super) fn meets(&self, speed_mps: f64, more: f64) -> bool {
-        let target_m = self.sure.at_m(speed_mps) * (1.0 + more);
+        self.tries(speed_mps, more).is_ok()
+    }
+
+    /// The same. Where it doesn't meet the target: no speed down to the one that is given does.
+    pub(super) fn tries(&self, speed_mps: f64, more: f64) -> Result<(), f64> {
+        let most_m = self.most_m * (1.0 + more);
         let then = self.passes(speed_mps);
         // No strip has more passes than all heads make: this test alone rules out most speeds.
         let gap_s = then.gap_s(then.heads()).unwrap_or(f64::INFINITY);
-        speed_mps * gap_s <= target_m && self.strips.meets(0, &then, speed_mps, target_m, self.going)
+        if speed_mps * gap_s > most_m {
+            return Err(self.below_mps(speed_mps, gap_s, most_m));
+        }
+        let target_m = self.sure.at_m(speed_mps) * (1.0 + more);
+        if speed_mps * gap_s > target_m {
+            return Err(speed_mps);
+        }
+        let Some(unmet) = self.strips.unmet(0, &then, speed_mps, target_m, self.going) else { return Ok(()) };
+        // A narrower strip may be met by what is on either side of it.
+        let stays = unmet.width_m > most_m;
+        let below_mps = |along_m| self.below_mps(speed_mps, unmet.gap_s, along_m).min(speed_mps);
+        Err(if stays { spacing::along_m(most_m, unmet.t_y_m).map_or(0.0, below_mps) } else { speed_mps })
+    }
+
+    /// At a speed v, passes are g apart in time and more than `most_m` along the wall: down to this speed, m/s, they stay so.
+    ///
+    /// At u < v the heads, at most a apart along the hull, come to a place by up to a (1 / u - 1 / v) earlier or later against each other. Their longest gap is
+    /// at least g less that, and u times it at least u g - a (1 - u / v).
+    fn below_mps(&self, speed_mps: f64, gap_s: f64, most_m: f64) -> f64 {
+        /// For rounding.
+        const A_LITTLE: f64 = 1e-9;
+        let apart_m = self.apart_m;
+        (most_m + apart_m) / (gap_s + apart_m / speed_mps) * (1.0 + A_LITTLE)
     }
 
     fn t_m(&self, speed_mps: f64) -> f64 {
@@ -55,11 +86,10 @@ impl Driving<'_> {
     /// The largest speed, m/s; zero where there is none. `last_mps` is the one found before.
     pub(super) fn fastest_mps(&self, last_mps: Option<f64>) -> f64 {
         let highest = |more: f64| {
-            let meets = |speed_mps: f64| self.meets(speed_mps, more);
             if self.phasing.fits_some_speeds() {
-                search::downwards_mps(self.bound_mps, meets)
+                search::downwards_mps(self.bound_mps, |speed_mps: f64| self.tries(speed_mps, more))
             } else {
-                search::highest_mps(self.bound_mps, meets)
+                search::highest_mps(self.bound_mps, |speed_mps: f64| self.meets(speed_mps, more))
             }
         };
         let top_mps = highest(0.0);
@@ -69,7 +99,7 @@ impl Driving<'_> {
         }
         if top_mps > last_mps * (1.0 + NEAR) && highest(-EASE) <= last_mps * (1.0 + NEAR) {
             let within =
-                search::downwards_mps(last_mps * (1.0 + NEAR), |speed_mps| self.meets(speed_mps, 0.0));
+                search::downwards_mps(last_mps * (1.0 + NEAR), |speed_mps| self.tries(speed_mps, 0.0));
             return if within < last_mps * (1.0 - NEAR) { top_mps } else { within };
         }
         top_mps

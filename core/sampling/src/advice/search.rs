@@ -11,15 +11,25 @@ pub(super) fn highest_mps(bound_mps: f64, meets: impl Fn(f64) -> bool) -> f64 {
 }
 
 /// The largest speed up to `bound_mps` that meets the target, found by stepping down from the bound; zero if none is
-/// found.
-pub(super) fn downwards_mps(bound_mps: f64, meets: impl Fn(f64) -> bool) -> f64 {
+/// found. `tries` a speed: where it doesn't meet the target, it says below which it may be met again.
+pub(super) fn downwards_mps(bound_mps: f64, tries: impl Fn(f64) -> Result<(), f64>) -> f64 {
     const TRIED: u32 = 256;
     let at = |k: u32| bound_mps * (1.0 - f64::from(k) / f64::from(TRIED));
-    match (0..TRIED).find(|k| meets(at(*k))) {
-        None => 0.0,
-        Some(0) => bound_mps,
-        Some(first) => edge_mps(at(first), at(first - 1), meets),
+    let meets = |speed_mps: f64| tries(speed_mps).is_ok();
+    let mut k = 0;
+    while k < TRIED {
+        match tries(at(k)) {
+            Ok(()) if k == 0 => return bound_mps,
+            Ok(()) => return edge_mps(at(k), at(k - 1), meets),
+            Err(below_mps) => {
+                k += 1;
+                while k < TRIED && at(k) > below_mps {
+                    k += 1;
+                }
+            }
+        }
     }
+    0.0
 }
 
 /// `fastest_mps`, which meets the target, reduced by `share`; where that leaves the interval of speeds that meet the
@@ -63,7 +73,11 @@ mod tests {
         let islands = |mps: f64| (0.05..=0.1).contains(&mps) || (0.13..=0.15).contains(&mps);
         assert!((highest_mps(0.3, |mps| mps < 0.1) - 0.1).abs() < 1e-9);
         assert!((highest_mps(0.3, |_| true) - 0.3).abs() <= 0.0 && highest_mps(0.3, |_| false) <= 0.0);
-        assert!((downwards_mps(0.3, islands) - 0.15).abs() < 1e-9);
-        assert!(downwards_mps(0.3, |_| false).abs() <= 0.0);
+        let tries = |mps: f64| if islands(mps) { Ok(()) } else { Err(mps) };
+        let knows = |mps: f64| if islands(mps) { Ok(()) } else { Err(if mps > 0.15 { 0.15 } else { 0.1 }) };
+        assert!((downwards_mps(0.3, tries) - 0.15).abs() < 1e-9);
+        assert!((downwards_mps(0.3, knows) - downwards_mps(0.3, tries)).abs() <= 0.0);
+        assert!(downwards_mps(0.3, Err).abs() <= 0.0 && downwards_mps(0.3, |_| Err(0.0)).abs() <= 0.0);
+        assert!((downwards_mps(0.3, |_| Ok(())) - 0.3).abs() <= 0.0);
     }
 }

@@ -410,3 +410,52 @@ fn the_interval_of_speeds_begins_where_the_target_is_met() {
     assert!((0..=50).map(|k| from + (to - from) * f64::from(k) / 50.0).all(|v| t_at(v) <= 1.0 + 1e-6));
     assert!(t_at(0.985 * from) > 1.0, "{}", t_at(0.985 * from));
 }
+
+/// What a speed that fails rules out below it holds no speed that meets the target: with heads anywhere along the hull and beside one
+/// another, some wall hidden, swinging and unsure of the position.
+#[test]
+fn no_speed_that_meets_the_target_is_passed_over() {
+    let mut seed = 7_u64;
+    let mut draw = |from: f64, to: f64| {
+        seed = seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        from + (to - from) * (seed >> 11) as f64 / (1_u64 << 53) as f64
+    };
+    let (mut found, mut hidden, mut skipped) = (0, 0, 0);
+    for number in 0..120 {
+        let heads = 2 + number % 3;
+        let angles: Vec<f64> = (0..heads).map(|_| draw(0.0, 360.0)).collect();
+        let mut case = Case::new(&angles, &vec![0.0; heads], draw(0.05, 0.4), draw(0.3, 1.2));
+        let radius_m = if number % 2 == 0 { 0.0 } else { 0.12 };
+        case.specs = (0..heads).map(|_| spec([draw(-0.9, 0.9), draw(-0.3, 0.3), 0.0], radius_m)).collect();
+        for (motion, spec) in case.situation.heads.iter_mut().flatten().zip(&case.specs) {
+            motion.mount = spec.mount;
+        }
+        case.situation.pass_error_m = draw(0.0, 0.03);
+        let mut advisor = case.advisor();
+        advisor.advise(&case.situation, Swing::default(), None);
+        hidden += usize::from(advisor.hidden_angles().any(|hidden| !hidden.is_empty()));
+        let phasing = Phasing::of(&case.situation);
+        let passes = phasing.at(case.situation.speed_mps).beside(advisor.parallax_rad).lossy(true);
+        let swing_mps = draw(0.0, 0.02);
+        let going = Going {
+            ping_period_s: 0.02,
+            swing_mps,
+            apart_m: phasing.apart_m(),
+            apart_swing_mps: swing_mps / 2.0,
+            swing_most_m: Some(draw(0.0, 0.2)),
+            shift_m: 0.0,
+        };
+        let sure = advisor.sure(&phasing, &passes, &case.situation);
+        let driving = advisor.driving(&phasing, &passes, &going, sure);
+        for step in 1..=400 {
+            let speed_mps = driving.bound_mps * f64::from(step) / 400.0;
+            let Err(below_mps) = driving.tries(speed_mps, 0.0) else { continue };
+            skipped += usize::from(below_mps < 0.99 * speed_mps);
+            let between = (1..40).map(|k| below_mps + (speed_mps - below_mps) * f64::from(k) / 40.0);
+            let met = { between }.find(|mps| *mps > 0.0 && driving.meets(*mps, 0.0));
+            assert_eq!(met, None, "{number}: {speed_mps} fails down to {below_mps}");
+        }
+        found += usize::from(driving.fastest_mps(None) > 0.0);
+    }
+    assert!(found > 100 && hidden > 20 && skipped > 10_000, "{found} {hidden} {skipped}");
+}
