@@ -1,8 +1,8 @@
 //! A long dive replayed by the binary, on one thread and on several, compared with reading its log with `mcap` alone. Prints Markdown.
 //!
 //! `cargo bench -p headrace_benches --bench replay` takes the first kilometre of `deploy/scenes/seven-kilometres.toml`,
-//! about a minute; `cargo bench -p headrace_benches --bench replay -- 7` all of it. The log goes to the system's folder for
-//! temporary files, 145 MB per kilometre, and is removed at the end.
+//! about a minute; `cargo bench -p headrace_benches --bench replay -- 7` all of it; `-- DIVE.mcap ...` logs that are there. A log that it
+//! makes goes to the system's folder for temporary files, 145 MB per kilometre, and is removed at the end.
 
 #![expect(clippy::disallowed_methods, reason = "a benchmark reads the clock")]
 #![expect(clippy::unwrap_used, reason = "a benchmark stops at what it can't do")]
@@ -18,23 +18,37 @@ use mcap::sans_io::{LinearReadEvent, LinearReader};
 const HEADRACE: &str = env!("CARGO_BIN_EXE_headrace_measured");
 
 fn main() {
-    let km: u32 = std::env::args().skip(1).find_map(|word| word.parse().ok()).unwrap_or(1).clamp(1, 7);
+    let words: Vec<String> = std::env::args().skip(1).filter(|word| !word.starts_with("--")).collect();
     let folder = std::env::temp_dir().join(format!("headrace-replay-{}", std::process::id()));
     std::fs::create_dir_all(&folder).unwrap();
-    let log = simulated(&folder, km);
-    let (messages, _, first) = bare_read(&log);
+    println!("| what | figure | yardstick in the same run | ratio |\n|---|---|---|---|");
+    let km = words.iter().find_map(|word| word.parse::<u32>().ok());
+    let logs: Vec<&String> = words.iter().filter(|word| word.parse::<u32>().is_err()).collect();
+    if let Some(km) = km.or(logs.is_empty().then_some(1)) {
+        let km = km.clamp(1, 7);
+        compare(&simulated(&folder, km), &format!("{km} km of four heads"), &folder);
+    }
+    for log in logs {
+        compare(Path::new(log), log, &folder);
+    }
+    std::fs::remove_dir_all(&folder).unwrap();
+}
+
+/// Prints a log's replays beside its bare read.
+fn compare(log: &Path, name: &str, folder: &Path) {
     let report = folder.join("report.json");
-    let replays = [1, MOST_THREADS].map(|threads| (threads, replayed(&log, &report, threads)));
-    let (_, bytes, second) = bare_read(&log);
+    let (messages, _, first) = bare_read(log);
+    let replays = [1, MOST_THREADS].map(|threads| (threads, replayed(log, &report, threads)));
+    let (_, bytes, second) = bare_read(log);
     let bare = first.min(second);
-    let report: serde_json::Value = serde_json::from_slice(&std::fs::read(report).unwrap()).unwrap();
+    let report: serde_json::Value = serde_json::from_slice(&std::fs::read(&report).unwrap()).unwrap();
+    std::fs::remove_file(folder.join("report.json")).unwrap();
     let (data_s, packets) =
         (report["dive"]["duration_s"].as_f64().unwrap(), report["log"]["messages"].as_f64().unwrap());
-    println!("| what | figure | yardstick in the same run | ratio |\n|---|---|---|---|");
     for (threads, replay) in replays {
         let took_s = replay.took.as_secs_f64();
         println!(
-            "| replay of {km} km in {:.1} hours, four heads, {packets} packets, {} samples, --threads {threads} | {:.0} x real time, \
+            "| replay of {name}, {:.1} hours, {packets} packets, {} samples, --threads {threads} | {:.0} x real time, \
              {:.2} M packets/s | the bare mcap read of {messages} messages, {:.0} MB: {:.0} x real time | {:.1} |",
             data_s / 3600.0,
             report["dive"]["samples_valid"],
@@ -49,7 +63,6 @@ fn main() {
             replay.own_mib, replay.file_mib
         );
     }
-    std::fs::remove_dir_all(&folder).unwrap();
 }
 
 /// The log of the scene's first kilometres.
