@@ -189,6 +189,7 @@ mod tests {
             let turn = Turn::new(f64::to_radians(step_deg), 8.0).unwrap();
             assert_eq!(turn.steps(), steps);
             assert!((turn.ping_period_s() * f64::from(steps) - 8.0).abs() < 1e-12);
+            assert!((turn.rate_radps() * turn.ping_period_s() - f64::to_radians(step_deg)).abs() < 1e-12);
         }
     }
 

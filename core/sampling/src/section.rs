@@ -152,6 +152,23 @@ mod tests {
     use super::*;
     use headrace_geometry::math::{FRAC_PI_2, tan};
 
+    /// Near a right angle a cosine is as exact as the sum itself, which a double isn't: against the sine of what is left of a right angle,
+    /// in two parts, taken exactly.
+    #[test]
+    fn the_cosine_of_a_sum_is_exact_up_to_a_grazing_beam() {
+        const REST: f64 = 6.123_233_995_736_766e-17;
+        for k in 35..60 {
+            // The difference from a right angle is exact from half of one on.
+            let a_rad = 0.023 * f64::from(k);
+            for left in [1e-3, 1e-6, 1e-9, 1e-12] {
+                let b_rad = FRAC_PI_2 - a_rad - left;
+                let exact = math::sin((FRAC_PI_2 - a_rad) - b_rad + REST);
+                let told = cos_of_sum(a_rad, b_rad).unwrap();
+                assert!((told / exact - 1.0).abs() < 1e-13, "{a_rad} + {b_rad}: {told} {exact}");
+            }
+        }
+    }
+
     #[test]
     fn verif_hand_computed_values() {
         let step = f64::to_radians(0.9);

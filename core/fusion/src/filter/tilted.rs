@@ -136,3 +136,76 @@ impl TiltFit {
         self.estimate().map_or(0.0, |(tilt_rad, weight)| tilt_rad * tilt_rad * weight)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const NOISE_M: f64 = 0.01;
+
+    /// Readings of a head that leans by `tilt_rad` on a wall that is off by `steady` of the pattern: pattern, derivative, residual, by block.
+    fn blocks(tilt_rad: f64, steady: f64) -> Vec<Vec<[f64; 3]>> {
+        let mut seed = 5_u64;
+        let mut draw = || {
+            seed = seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            (seed >> 11) as f64 / (1_u64 << 52) as f64 - 1.0
+        };
+        let block = |number: u32| {
+            let reading = |k: u32| {
+                let turned = math::sin(0.7 * f64::from(number) + 0.1 * f64::from(k));
+                let (pattern, by_tilt) = (2.0 + 0.5 * draw(), 1.5 * turned + 0.3 * draw());
+                [pattern, by_tilt, tilt_rad * by_tilt + steady * pattern + 0.02 * draw()]
+            };
+            (0..30).map(reading).collect()
+        };
+        { 0..FEWEST_BLOCKS + 12 }.map(block).collect()
+    }
+
+    fn fit(blocks: &[Vec<[f64; 3]>]) -> TiltFit {
+        let mut fit = TiltFit::default();
+        let unit = core::array::from_fn(|row| core::array::from_fn(|k| f64::from(u8::from(k == row))));
+        for block in blocks {
+            let mut line = TiltLine::default();
+            for [pattern, by_tilt, residual_m] in block {
+                line.add([0.0; POSE], *by_tilt, *pattern, *residual_m, 1.0 / (NOISE_M * NOISE_M));
+            }
+            fit.add(line.freed([0.0; POSE], &unit));
+        }
+        fit
+    }
+
+    /// Against least squares by the readings themselves, for two unknowns by Cramer's rule.
+    #[test]
+    fn a_tilt_is_that_of_least_squares_and_as_sure_as_its_blocks_scatter() {
+        let weight = 1.0 / (NOISE_M * NOISE_M);
+        for (tilt_rad, steady) in [(0.05, 0.02), (-0.08, -0.1), (0.2, 0.3)] {
+            let blocks = blocks(tilt_rad, steady);
+            let sum = |of: &dyn Fn(&[f64; 3]) -> f64| blocks.iter().flatten().map(of).sum::<f64>() * weight;
+            let [pp, pt, tt] = [sum(&|r| r[0] * r[0]), sum(&|r| r[0] * r[1]), sum(&|r| r[1] * r[1])];
+            let [po, to] = [sum(&|r| r[0] * r[2]), sum(&|r| r[1] * r[2])];
+            let whole = pp * tt - pt * pt;
+            let (found_rad, found_steady) = ((pp * to - pt * po) / whole, (tt * po - pt * to) / whole);
+            let fit = fit(&blocks);
+            // What a tilt explains is what squares are left without it, less those with it.
+            let left = |tilt: f64, steady: f64| sum(&|r| (r[2] - tilt * r[1] - steady * r[0]).powi(2));
+            let explained = left(0.0, po / pp) - left(found_rad, found_steady);
+            assert!((fit.explains() / explained - 1.0).abs() < 1e-6, "{} {explained}", fit.explains());
+            let pull = |block: &Vec<[f64; 3]>| {
+                let pulls = |r: &[f64; 3]| {
+                    weight * (r[1] - pt / pp * r[0]) * (r[2] - found_rad * r[1] - found_steady * r[0])
+                };
+                block.iter().map(pulls).sum::<f64>().powi(2)
+            };
+            let n = blocks.len() as f64;
+            let scatter = blocks.iter().map(pull).sum::<f64>() * n / (n - 2.0);
+            let sd_rad = (math::sqrt(scatter) / (whole / pp)).max(math::sqrt(pp / whole));
+            let (told_rad, sure_sd) = fit.certain(0.01).unwrap();
+            assert!((told_rad - found_rad).abs() < 1e-9 && (told_rad - tilt_rad).abs() < 0.01);
+            assert!(
+                (sure_sd / (found_rad.abs() / sd_rad) - 1.0).abs() < 1e-6,
+                "{sure_sd} {found_rad} {sd_rad}"
+            );
+        }
+        assert_eq!(fit(&blocks(0.005, 0.02)).certain(0.01), None, "less than is asked for");
+    }
+}

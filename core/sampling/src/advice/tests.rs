@@ -465,3 +465,31 @@ fn no_speed_that_meets_the_target_is_passed_over() {
     }
     assert!(found > 100 && hidden > 20 && skipped > 10_000, "{found} {hidden} {skipped}");
 }
+
+/// A higher interval of speeds is told once its best speed meets the target with 2 % to spare, and not as soon as it meets it: while
+/// heads run out of phase it comes and goes.
+#[test]
+fn a_higher_interval_is_told_once_it_meets_the_target_with_something_to_spare() {
+    let mut advisor = Case::new(&[0.0, 0.0], &[1.1, 0.0], 0.1, 0.5).advisor();
+    let (mut last_mps, mut jumps, mut waited) = (None::<f64>, 0, 0);
+    for k in 0..1440 {
+        let case = Case::new(&[0.0, -0.25 * f64::from(k)], &[1.1, 0.0], 0.1, 0.5);
+        let advice = advisor.advise(&case.situation, Swing::default(), None);
+        let now_mps = advice.v_max_mps / (1.0 - SPEED_MARGIN);
+        let fresh_mps = case.advice().v_max_mps / (1.0 - SPEED_MARGIN);
+        if let Some(last_mps) = last_mps.filter(|last_mps| fresh_mps > 1.06 * last_mps) {
+            let above = (0..400).map(|k| last_mps * (1.05 + 0.005 * f64::from(k)));
+            let least_m = above.map(|mps| case.t_at_m(&advice, mps)).fold(f64::INFINITY, f64::min);
+            let is_told = now_mps > 1.05 * last_mps;
+            jumps += u32::from(is_told);
+            waited += u32::from(!is_told);
+            assert!(
+                !is_told || least_m < 0.985 * 0.5,
+                "{k}: {last_mps} to {now_mps}, T {least_m} m at best above"
+            );
+            assert!(is_told || least_m > 0.975 * 0.5, "{k}: {last_mps} stays {now_mps}, T {least_m} m above");
+        }
+        last_mps = Some(now_mps).filter(|now_mps| *now_mps > 0.0);
+    }
+    assert!(jumps > 0 && waited > 0, "{jumps} told at once, {waited} waited");
+}

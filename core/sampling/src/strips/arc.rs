@@ -50,3 +50,20 @@ impl Arc {
         math::wrap(arc_m - self.from_m, perimeter_m) <= self.length_m
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_arc_goes_on_to_the_end_of_the_next_also_over_the_seam() {
+        let arc = |from_m: f64, length_m: f64| Arc { from_m, length_m };
+        let onward = |a: Arc, b: Arc, forward: bool| {
+            let joined = a.on_to(&b, forward, 20.0);
+            (joined.from_m, joined.length_m)
+        };
+        assert_eq!(onward(arc(10.0, 2.0), arc(15.0, 3.0), true), (10.0, 8.0));
+        assert_eq!(onward(arc(15.0, 3.0), arc(10.0, 2.0), false), (10.0, 8.0));
+        assert_eq!(onward(arc(18.0, 1.0), arc(1.0, 2.0), true), (18.0, 5.0));
+    }
+}
