@@ -178,6 +178,7 @@ mod tests {
     #[test]
     fn a_tilt_is_that_of_least_squares_and_as_sure_as_its_blocks_scatter() {
         let weight = 1.0 / (NOISE_M * NOISE_M);
+        let square = |x: f64| x * x;
         for (tilt_rad, steady) in [(0.05, 0.02), (-0.08, -0.1), (0.2, 0.3)] {
             let blocks = blocks(tilt_rad, steady);
             let sum = |of: &dyn Fn(&[f64; 3]) -> f64| blocks.iter().flatten().map(of).sum::<f64>() * weight;
@@ -187,14 +188,14 @@ mod tests {
             let (found_rad, found_steady) = ((pp * to - pt * po) / whole, (tt * po - pt * to) / whole);
             let fit = fit(&blocks);
             // What a tilt explains is what squares are left without it, less those with it.
-            let left = |tilt: f64, steady: f64| sum(&|r| (r[2] - tilt * r[1] - steady * r[0]).powi(2));
+            let left = |tilt: f64, steady: f64| sum(&|r| square(r[2] - tilt * r[1] - steady * r[0]));
             let explained = left(0.0, po / pp) - left(found_rad, found_steady);
             assert!((fit.explains() / explained - 1.0).abs() < 1e-6, "{} {explained}", fit.explains());
             let pull = |block: &Vec<[f64; 3]>| {
                 let pulls = |r: &[f64; 3]| {
                     weight * (r[1] - pt / pp * r[0]) * (r[2] - found_rad * r[1] - found_steady * r[0])
                 };
-                block.iter().map(pulls).sum::<f64>().powi(2)
+                square(block.iter().map(pulls).sum::<f64>())
             };
             let n = blocks.len() as f64;
             let scatter = blocks.iter().map(pull).sum::<f64>() * n / (n - 2.0);
