@@ -151,7 +151,7 @@ fn sweep() {
 }
 
 fn advised(outcome: &Outcome) -> f64 {
-    outcome.median(|beat| beat.advice.v_max_mps)
+    outcome.told_mps()
 }
 
 fn planned() {

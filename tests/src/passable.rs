@@ -81,7 +81,7 @@ impl Compared {
 
     /// The same of what is heard by one who has followed it.
     pub fn followed_ratio(&self) -> f64 {
-        self.over_true(self.followed.median(|beat| beat.advice.v_max_mps))
+        self.over_true(self.followed.told_mps())
     }
 
     fn over_true(&self, speed_mps: f64) -> f64 {
@@ -100,6 +100,15 @@ impl Outcome {
         let mut all: Vec<f64> = self.beats.iter().map(of).collect();
         all.sort_by(f64::total_cmp);
         all.get(all.len() / 2).copied().unwrap_or(f64::NAN)
+    }
+
+    /// The speed that is within what is told at as many of the beats as sections have to pass at a speed that passes, m/s: who sways is told less at
+    /// times, and who keeps one speed all the way can't keep more.
+    pub fn told_mps(&self) -> f64 {
+        let mut all: Vec<f64> = self.beats.iter().map(|beat| beat.advice.v_max_mps).collect();
+        all.sort_by(f64::total_cmp);
+        let below = ((1.0 - PASSING) * all.len() as f64).floor() as usize;
+        all.get(below).copied().unwrap_or(f64::NAN)
     }
 
     /// Changes of the speed shown, a minute; what is shorter than half a minute counts as that, so that one change isn't many.
@@ -207,7 +216,7 @@ impl Outing {
         let plan_mps = self.plan_mps();
         let planned_mps = self.planned_share * plan_mps;
         let planned = self.dive(planned_mps, planned_mps);
-        let advised_mps = planned.median(|beat| beat.advice.v_max_mps);
+        let advised_mps = planned.told_mps();
         let at = |share: f64| self.dive(planned_mps, share * advised_mps);
         let passes = |share: f64| at(share).passes();
         let followed = at(1.0);
