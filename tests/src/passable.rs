@@ -20,6 +20,8 @@ const SETTLES_S: f64 = 100.0;
 const JUDGED_M: f64 = 8.0;
 /// Share of sections that pass in a dive that passes, as of one that is driven as planned. None of them may pass falsely.
 const PASSING: f64 = 0.95;
+/// One section in so many doesn't.
+const FAILING: usize = 20;
 /// Shares of a speed that are tried above it and below it.
 const ABOVE: [f64; 9] = [1.02, 1.04, 1.06, 1.08, 1.1, 1.125, 1.15, 1.2, 1.25];
 const BELOW: [f64; 8] = [0.98, 0.96, 0.94, 0.92, 0.9, 0.87, 0.83, 0.75];
@@ -107,8 +109,7 @@ impl Outcome {
     pub fn told_mps(&self) -> f64 {
         let mut all: Vec<f64> = self.beats.iter().map(|beat| beat.advice.v_max_mps).collect();
         all.sort_by(f64::total_cmp);
-        let below = ((1.0 - PASSING) * all.len() as f64).floor() as usize;
-        all.get(below).copied().unwrap_or(f64::NAN)
+        all.get(all.len() / FAILING).copied().unwrap_or(f64::NAN)
     }
 
     /// Changes of the speed shown, a minute; what is shorter than half a minute counts as that, so that one change isn't many.
