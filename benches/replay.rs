@@ -36,13 +36,13 @@ fn main() {
 
 /// Prints a log's replays beside its bare read.
 fn compare(log: &Path, name: &str, folder: &Path) {
-    let report = folder.join("report.json");
+    let report_file = folder.join("report.json");
     let (messages, _, first) = bare_read(log);
-    let replays = [1, MOST_THREADS].map(|threads| (threads, replayed(log, &report, threads)));
+    let replays = [1, MOST_THREADS].map(|threads| (threads, replayed(log, &report_file, threads)));
     let (_, bytes, second) = bare_read(log);
     let bare = first.min(second);
-    let report: serde_json::Value = serde_json::from_slice(&std::fs::read(&report).unwrap()).unwrap();
-    std::fs::remove_file(folder.join("report.json")).unwrap();
+    let report: serde_json::Value = serde_json::from_slice(&std::fs::read(&report_file).unwrap()).unwrap();
+    std::fs::remove_file(&report_file).unwrap();
     let (data_s, packets) =
         (report["dive"]["duration_s"].as_f64().unwrap(), report["log"]["messages"].as_f64().unwrap());
     for (threads, replay) in replays {

@@ -234,18 +234,6 @@ impl Strips {
         self.ts_m(setting, passes, speed_mps, going).fold(0.0, f64::max)
     }
 
-    /// Whether [`Strips::t_max_m`] is within a target; stops at the first strip that isn't.
-    pub fn meets(
-        &self,
-        setting: usize,
-        passes: &Passes,
-        speed_mps: f64,
-        target_m: f64,
-        going: &Going,
-    ) -> bool {
-        self.unmet(setting, passes, speed_mps, target_m, going).is_none()
-    }
-
     /// The first strip that doesn't meet a target at a speed; `None` where [`Strips::t_max_m`] is within it.
     pub fn unmet(
         &self,

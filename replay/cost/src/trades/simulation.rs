@@ -173,7 +173,12 @@ fn beams(inputs: &Inputs<'_>) -> Result<Vec<Stage>, CostError> {
 fn field(length_m: u32) -> Result<Stage, CostError> {
     let text = file("vita1-field.toml")?.replace("distance_m = 130", &format!("distance_m = {length_m}"));
     // At the speed that its vehicle file plans.
-    let text = text.replace("speed_mps = 0.16", "speed_mps = 0.197");
+    let planned = text.replace("speed_mps = 0.16", "speed_mps = 0.197");
+    if planned == text {
+        let why = "the shipped scene has another speed than this trade changes".to_owned();
+        return Err(CostError::Figure { what: "vita1-field.toml as planned".to_owned(), why });
+    }
+    let text = planned;
     let effects = effects::named(&text);
     Ok(Stage { name: "field", text, effects, boulders_m: Vec::new() })
 }
