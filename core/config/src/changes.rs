@@ -14,23 +14,28 @@ const ALL: &str = "all";
 const ID: &str = "id";
 
 /// `text` with the values of the keys in `changes` replaced. `heads.layout = "x"` changes a key of a table,
-/// `sensors.ID.key` that of the array's table with this id, `sensors.all.key` that of every table that has the key.
+/// `sensors.ID.key` that of the array's table with this id, `sensors.all.key` that of every table that has the key. An array that isn't
+/// there, `openings = [{ .. }]`, is added before all else.
 ///
-/// Errors: a changed key that isn't in the text; a text that isn't TOML.
+/// Errors: another key that isn't in the text; a text that isn't TOML.
 pub fn changed(text: &str, changes: &Section<'_>) -> Result<String, ConfigError> {
     let table = Document::new(changes.file(), text).table()?;
+    let mut changed = String::new();
     let mut edits: Vec<(Range<usize>, &str)> = Vec::new();
     for (path, value, invalid) in changes.leaves() {
         let path: Vec<&str> = path.iter().map(String::as_str).collect();
         let mut found = Vec::new();
         find(&table, &path, &mut found);
+        if let ([key], true, true) = (path.as_slice(), found.is_empty(), value.starts_with('[')) {
+            changed.extend([*key, " = ", value, "\n"]);
+            continue;
+        }
         if found.is_empty() {
             return Err(invalid("is not in the vehicle file, so that it can't be changed"));
         }
         edits.extend(found.into_iter().map(|span| (span, value)));
     }
     edits.sort_by_key(|(span, _)| span.start);
-    let mut changed = String::new();
     let mut at = 0;
     for (span, value) in edits {
         changed.push_str(text.get(at..span.start).unwrap_or_default());
@@ -91,6 +96,13 @@ mod tests {
             )
         );
         assert_eq!(change("").unwrap(), TEXT);
+    }
+
+    #[test]
+    fn an_array_that_is_not_there_is_added() {
+        let opening = "openings = [{ name = \"gate\", from_m = 1, to_m = 2 }]\n";
+        let added = change(&format!("{opening}heads.layout = \"x\"\n")).unwrap();
+        assert_eq!(added, format!("{opening}{}", TEXT.replace("phase_shift", "x")));
     }
 
     #[test]

@@ -83,6 +83,8 @@ pub enum Condition {
     Clean,
     /// Every sensor as its maker says.
     DataSheet,
+    /// The same, and the vehicle file says of every noise what it truly is: no allowance for rough walls, tilt or slack.
+    Told,
     /// A MEMS unit, slack, both as the vehicle file says; a wheel 0.5 % off, steel.
     Poor,
     /// Returns lost in runs, near returns, second echoes.
@@ -110,9 +112,10 @@ pub enum Condition {
 }
 
 /// All conditions with their names.
-pub const CONDITIONS: [(&str, Condition); 14] = [
+pub const CONDITIONS: [(&str, Condition); 15] = [
     ("clean", Condition::Clean),
     ("data-sheet", Condition::DataSheet),
+    ("told", Condition::Told),
     ("poor", Condition::Poor),
     ("murk", Condition::Murk),
     ("rough", Condition::Rough),
@@ -201,6 +204,11 @@ const SLACK: &str = "tether_slack = { reach_m = 0.15, period_s = 30 }\n";
 const TAUT_M: f64 = 0.003;
 const HANGS_M: f64 = 0.06;
 
+/// What the data sheet's effects are, said in the vehicle file: counts of 2 cm and noise of 1 cm of heads with ranges of 10 m, noise
+/// of echosounders and depth (152 Pa), of attitudes; nothing of cable and its scale. Units say theirs by their preset.
+const TRUE_NOISES: &str = "return_sd_m = 0.0116\necho_sd_m = 0.02\ndepth_sd_m = 0.0155\ntilt_sd_deg = 0.3\nattitude_sd_deg = 0.3\n\
+     heading_sd_deg = 0.3\ndeviation_deg = 0.01\ntether_sd_m = 0.0001\nslack_sd_m = 0.0001\ntether_scale_sd = 0.00001\n";
+
 /// Standard deviation of a rough wall's bumps: with the heads' own noise what vehicle files allow for, 3 cm, m.
 const ROUGH_M: f64 = 0.028;
 
@@ -257,9 +265,11 @@ impl Cell {
 
     /// Who knows that a cable hangs, or doesn't, and what a unit is worth, says so in the vehicle file.
     fn told_navigation(&self) -> String {
-        let poor = self.condition == Condition::Poor;
-        let slack_sd_m = if poor { HANGS_M } else { TAUT_M };
-        format!("slack_sd_m = {slack_sd_m}\n{}", if poor { MEMS_TOLD } else { "" })
+        match self.condition {
+            Condition::Poor => format!("slack_sd_m = {HANGS_M}\n{MEMS_TOLD}"),
+            Condition::Told => TRUE_NOISES.to_owned(),
+            _ => format!("slack_sd_m = {TAUT_M}\n"),
+        }
     }
 
     /// The vehicle as it truly is.
