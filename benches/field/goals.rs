@@ -31,10 +31,10 @@ pub(crate) struct Missed {
 impl Missed {
     pub(crate) fn of(cell: &Cell, figures: &Figures) -> Self {
         let bounds = match cell.condition {
-            Condition::Clean | Condition::DataSheet => {
+            Condition::Clean | Condition::DataSheet | Condition::Told => {
                 Some(Bounds { false_fails: 0.0, cannot_say: 0.02, passed: 0.97, advice: 0.95 })
             }
-            Condition::Poor | Condition::Murk | Condition::Rough | Condition::Lively => {
+            Condition::Poor | Condition::Murk | Condition::Rough | Condition::AsBuilt | Condition::Lively => {
                 Some(Bounds { false_fails: 0.005, cannot_say: 0.08, passed: 0.88, advice: 0.8 })
             }
             _ => None,

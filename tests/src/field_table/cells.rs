@@ -2,6 +2,7 @@
 
 use std::fmt::Write as _;
 
+use headrace_geometry::math;
 use headrace_sampling::plan::HELD_SHARE;
 use headrace_sensor::device::Sense;
 use headrace_simulator::Scene;
@@ -91,6 +92,8 @@ pub enum Condition {
     Murk,
     /// The wall has the bumps that vehicle files allow for.
     Rough,
+    /// The wall is built some centimetres off the design, here in and there out.
+    AsBuilt,
     /// A pilot who wanders, stops and goes back.
     Lively,
     /// The water's speed of sound is 4 % more than the vehicle file says.
@@ -112,13 +115,14 @@ pub enum Condition {
 }
 
 /// All conditions with their names.
-pub const CONDITIONS: [(&str, Condition); 15] = [
+pub const CONDITIONS: [(&str, Condition); 16] = [
     ("clean", Condition::Clean),
     ("data-sheet", Condition::DataSheet),
     ("told", Condition::Told),
     ("poor", Condition::Poor),
     ("murk", Condition::Murk),
     ("rough", Condition::Rough),
+    ("as-built", Condition::AsBuilt),
     ("lively", Condition::Lively),
     ("wrong-sound", Condition::WrongSound),
     ("wrong-mount", Condition::WrongMount),
@@ -211,6 +215,9 @@ const TRUE_NOISES: &str = "return_sd_m = 0.0116\necho_sd_m = 0.02\ndepth_sd_m = 
 
 /// Standard deviation of a rough wall's bumps: with the heads' own noise what vehicle files allow for, 3 cm, m.
 const ROUGH_M: f64 = 0.028;
+
+/// How far the wall is built off the design at most, m: some tolerances of linings add up to this.
+const OFF_DESIGN_M: f64 = 0.06;
 
 /// How long a vehicle stands that does so first, s.
 const STANDS_S: f64 = 30.0;
@@ -347,14 +354,35 @@ impl Cell {
         };
         let wider = "[[tunnel.stations]]\nchainage_m = 0\nscale = 1.06\n";
         let tunnel = if self.condition == Condition::WrongWall { wider } else { "" };
-        let rough = if self.condition == Condition::Rough {
-            format!("[[tunnel.rough]]\nsd_m = {ROUGH_M}\nseed = {seed}\n")
-        } else {
-            String::new()
+        let rough = match self.condition {
+            Condition::Rough => format!("[[tunnel.rough]]\nsd_m = {ROUGH_M}\nseed = {seed}\n"),
+            Condition::AsBuilt => self.as_built(seed, length_m),
+            _ => String::new(),
         };
         format!(
             "seed = {seed}\nvehicle = \"vehicle.toml\"\n{tunnel}{rough}[trajectory]\n{way}[effects]\nmotion_within_turn = {{}}\n{effects}"
         )
+    }
+
+    /// Bulges and hollows all round the wall, two to a metre of the way.
+    fn as_built(&self, seed: u64, length_m: f64) -> String {
+        let most_m = self.aside_m(OFF_DESIGN_M);
+        let mut draw = Draw::new(seed ^ 0xb17);
+        let (from_m, to_m) = (self.start_m - 5.0, self.start_m + length_m + 5.0);
+        let mut text = String::new();
+        for _ in 0..math::round_to_i64(2.0 * (to_m - from_m)) {
+            let [long_m, wide_m] = [draw.between(2.0, 6.0), self.aside_m(draw.between(1.0, 4.0))];
+            // None begins before the tunnel does.
+            let at_m = draw.between(from_m, to_m).max(0.1 + long_m / 2.0);
+            let [depth_m, arc_m] = [draw.between(-most_m, most_m), self.aside_m(draw.between(0.0, 36.0))];
+            writeln!(
+                text,
+                "[[tunnel.features]]\nkind = \"bulge\"\nchainage_m = {at_m:.2}\nlength_m = {long_m:.2}\n\
+                 width_m = {wide_m:.2}\ndepth_m = {depth_m:.6}\narc_m = {arc_m:.2}"
+            )
+            .unwrap();
+        }
+        text
     }
 
     /// No wandering into a pipe's wall.

@@ -54,6 +54,8 @@ const LOOSEST_M: f64 = 0.5;
 const TIGHTENS_OVER_S: f64 = 100.0;
 /// Time within which an estimate settles.
 const SETTLES_WITHIN: DurNs = DurNs(20_000_000_000);
+/// Yaw known to this hardly moves what was placed, 5 cm at 6 m: what its getting surer would gain, relating nothing to it any more costs.
+const SETTLED_RAD: f64 = 0.5 * core::f64::consts::PI / 180.0;
 
 /// Maximum steps of an epoch: its leg, two widenings of the covariance, and an end.
 const STEPS: usize = 4;
@@ -158,7 +160,8 @@ impl Eskf {
     fn settle(&mut self) {
         let (begun, yaw_rad) = self.begun;
         let now_rad = self.pose_sd().yaw_rad;
-        if self.at.since(begun).0 <= SETTLES_WITHIN.0 && now_rad < yaw_rad / 2.0 {
+        let is_settling = self.at.since(begun).0 <= SETTLES_WITHIN.0 && yaw_rad > SETTLED_RAD;
+        if is_settling && now_rad < yaw_rad / 2.0 {
             self.begun = (begun, now_rad);
             self.settled += 1;
             self.clones.clear();
@@ -356,7 +359,7 @@ impl Eskf {
         let mut row =
             row.unless_sure(source.noise_level.is_usual(), |by| math::sqrt(self.factors.variance_along(by)));
         row.noise += self.left_out(row.bends);
-        let kind = source.sensor.kind;
+        let (kind, declared) = (source.sensor.kind, row.noise);
         if settings.learns {
             row.noise *= source.noise_level.factor(kind, number);
         }
@@ -371,6 +374,9 @@ impl Eskf {
         let mut agrees = nis <= settings.gate;
         source.consistency.count(nis, settings.gate, variance, settings.usual_variance(kind));
         let part = |from: usize| [0, 1, 2].map(|k| along.get(from + k).copied().unwrap_or(0.0));
+        if kind == SensorKind::Head && !self.is_blind {
+            source.noise_level.note_share((innovation * innovation - of_estimate) / declared, agrees);
+        }
         let relative = source.noise_level.relative(nis.min(settings.gate));
         // Rocks move the heads' ranges as restless gyros would.
         if kind != SensorKind::Head {
@@ -397,7 +403,6 @@ impl Eskf {
             } else if let Reading::Sonar(SonarReturn { range_m: Some(range_m), .. }) = waiting.reading
                 && settings.learns
             {
-                source.noise_level.note_share((innovation * innovation - of_estimate) / white);
                 let again_m2 = self.seen_again.noise_m2(range_m, white, source.noise_level.share(), settings);
                 row.noise = if self.is_at_rest { again_m2 } else { white };
             }

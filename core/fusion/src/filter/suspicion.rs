@@ -162,12 +162,13 @@ pub struct Suspicions {
     turned: [Fit; FOLLOWED],
     tilted: [[TiltFit; 2]; FOLLOWED],
     alternatives: Vec<Alternative>,
-    /// Readings of each source that is followed.
+    /// Readings of each source that is followed, and the share of its declared variance that it shows, 1 at most.
     heard: [u32; FOLLOWED],
+    levels: [f64; FOLLOWED],
     doubt: Option<SettingDoubt>,
 }
 
-stateful!(Suspicions { state: block, spell, followed, scale, turned, tilted, heard, doubt; lists: alternatives; });
+stateful!(Suspicions { state: block, spell, followed, scale, turned, tilted, heard, levels, doubt; lists: alternatives; });
 
 impl Default for Suspicions {
     /// Allocated without readings.
@@ -181,6 +182,7 @@ impl Default for Suspicions {
             tilted: [[TiltFit::default(); 2]; FOLLOWED],
             alternatives: Vec::with_capacity(ALTERNATIVES),
             heard: [0; FOLLOWED],
+            levels: [1.0; FOLLOWED],
             doubt: None,
         }
     }
@@ -222,6 +224,9 @@ impl Suspicions {
             self.give_up();
         }
         let Some(row) = expect(state, design, &look) else { return };
+        if let (Some(level), Some(Some(source))) = (self.levels.get_mut(slot), sources.get(waiting.source)) {
+            *level = source.noise_level.factor(info.kind, 0).min(1.0);
+        }
         if let Some(heard) = self.heard.get_mut(slot) {
             *heard = heard.wrapping_add(1);
             if heard.is_multiple_of(COMPARED) {
@@ -365,9 +370,9 @@ impl Suspicions {
                 propose(fit.explains(), SettingDoubt { setting, source: *source, sure_sd });
             }
         }
-        for (source, fits) in self.followed.iter().zip(&self.tilted) {
+        for ((source, fits), level) in self.followed.iter().zip(&self.tilted).zip(self.levels) {
             for (fit, setting) in fits.iter().zip([Setting::HeadPitched, Setting::HeadYawed]) {
-                if let Some((by_rad, sure_sd)) = fit.certain(LEAST_ANGLE_RAD).filter(|_| !is_astray) {
+                if let Some((by_rad, sure_sd)) = fit.certain(LEAST_ANGLE_RAD, level).filter(|_| !is_astray) {
                     propose(
                         fit.explains(),
                         SettingDoubt { setting: setting(by_rad), source: *source, sure_sd },

@@ -112,9 +112,10 @@ impl TiltFit {
         (weight > LEAST_LEFT * tilt_2).then(|| ((tilt_off - share * pattern_off) / weight, weight))
     }
 
-    /// The tilt where it is certainly beyond this, radians, and its standard deviations from zero by the scatter of the blocks; `None`
-    /// where ranges would be too noisy to show so little, and where there is more than a tilt.
-    pub(super) fn certain(&self, least_rad: f64) -> Option<(f64, f64)> {
+    /// The tilt where it is certainly beyond this, radians, and its standard deviations from zero: by the scatter of the blocks, and no
+    /// fewer than the noise of ranges leaves, of whose declared variance the head shows `level`. `None` where declared noise
+    /// would show no such tilt, and where there is more than a tilt.
+    pub(super) fn certain(&self, least_rad: f64, level: f64) -> Option<(f64, f64)> {
         let (tilt_rad, weight) = self.estimate()?;
         if weight * least_rad * least_rad < SHOWS * SHOWS {
             return None;
@@ -127,7 +128,7 @@ impl TiltFit {
         let scatter = self.squares.iter().zip(left).map(|(line, a)| a * dot(line, &left)).sum::<f64>();
         let n = f64::from(self.blocks);
         let sd_rad = math::sqrt((scatter * n / (n - 2.0)).max(0.0)) / weight;
-        let sure_sd = tilt_rad.abs() / sd_rad.max(1.0 / math::sqrt(weight));
+        let sure_sd = tilt_rad.abs() / sd_rad.max(math::sqrt(level / weight));
         ((least_rad..MOST_RAD).contains(&tilt_rad.abs()) && sure_sd >= SURE).then_some((tilt_rad, sure_sd))
     }
 
@@ -200,13 +201,22 @@ mod tests {
             let n = blocks.len() as f64;
             let scatter = blocks.iter().map(pull).sum::<f64>() * n / (n - 2.0);
             let sd_rad = (math::sqrt(scatter) / (whole / pp)).max(math::sqrt(pp / whole));
-            let (told_rad, sure_sd) = fit.certain(0.01).unwrap();
+            let (told_rad, sure_sd) = fit.certain(0.01, 1.0).unwrap();
             assert!((told_rad - found_rad).abs() < 1e-9 && (told_rad - tilt_rad).abs() < 0.01);
             assert!(
                 (sure_sd / (found_rad.abs() / sd_rad) - 1.0).abs() < 1e-6,
                 "{sure_sd} {found_rad} {sd_rad}"
             );
         }
-        assert_eq!(fit(&blocks(0.005, 0.02)).certain(0.01), None, "less than is asked for");
+        assert_eq!(fit(&blocks(0.005, 0.02)).certain(0.01, 1.0), None, "less than is asked for");
+        // Ranges that scatter less than declared are as sure as they scatter, and by their noise at most.
+        let sure_sd = |level: f64| fit(&blocks(0.05, 0.0)).certain(0.01, level).unwrap().1;
+        assert!(
+            (sure_sd(100.0) / sure_sd(400.0) - 2.0).abs() < 1e-9,
+            "{} {}",
+            sure_sd(100.0),
+            sure_sd(400.0)
+        );
+        assert!((sure_sd(0.01) / sure_sd(0.02) - 1.0).abs() < 1e-9);
     }
 }
