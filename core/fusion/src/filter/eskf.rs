@@ -2,6 +2,7 @@
 
 use core::ops::Range;
 
+use super::BIAS_KNOWN_RADPS;
 use super::agreement::{self, Agreement};
 use super::cable::{Cable, CableReading, Slip, Use};
 use super::clones::ErrorClones;
@@ -52,6 +53,11 @@ const MISLED_SHARE: f64 = 0.3;
 const LOOSEST_M: f64 = 0.5;
 /// Time over which a loose cable is taken to tighten, s.
 const TIGHTENS_OVER_S: f64 = 100.0;
+/// Least cosine of the incidence at which a head's range is believed more than declared. Where a hull is pitched over the top, beams look along the
+/// tunnel, and few of them hold the attitude.
+const SQUARE: f64 = 0.8;
+/// Square of an innovation over its variance up to which the wall may be as smooth as it has shown itself.
+const SMOOTH: f64 = 4.0;
 /// Time within which an estimate settles.
 const SETTLES_WITHIN: DurNs = DurNs(20_000_000_000);
 /// Yaw known to this hardly moves what was placed, 5 cm at 6 m: what its getting surer would gain, relating nothing to it any more costs.
@@ -88,6 +94,8 @@ pub struct Eskf {
     /// How rough the wall is.
     roughness: Roughness,
     seen_again: SeenAgain,
+    /// Share of the declared variance with which heads' ranges count: that of the head that shows most, until the gyros' bias is known.
+    smoothness: f64,
     /// Whether the vehicle is known to be at rest: its heads then see the same bumps turn after turn.
     pub is_at_rest: bool,
     /// Whether inertial data were lacking in the last epoch: what the vehicle did is then a guess, of which no noise is learnt.
@@ -103,7 +111,7 @@ pub struct Eskf {
     keeps_steps: bool,
 }
 
-stateful!(Eskf { state: at, state, factors, clones, way_sought, ties, begun, settled, agreement, cable, unrest, roughness, seen_again, is_at_rest, is_blind, loose_m, suspicions, doubts; lists: knots; fixed: steps, keeps_steps; });
+stateful!(Eskf { state: at, state, factors, clones, way_sought, ties, begun, settled, agreement, cable, unrest, roughness, seen_again, smoothness, is_at_rest, is_blind, loose_m, suspicions, doubts; lists: knots; fixed: steps, keeps_steps; });
 
 impl Default for Eskf {
     /// Allocated buffers without an estimate.
@@ -123,6 +131,7 @@ impl Default for Eskf {
             unrest: Unrest::default(),
             roughness: Roughness::default(),
             seen_again: SeenAgain::default(),
+            smoothness: 1.0,
             is_at_rest: false,
             is_blind: false,
             loose_m: 0.0,
@@ -190,6 +199,8 @@ impl Eskf {
         transition.carry(&mut self.factors);
         leg.disturb(&context.settings, &transition, &mut self.factors);
         self.clones.carry(&transition);
+        let is_bias_known = self.factors.variance(RATE_BIAS + 2) < BIAS_KNOWN_RADPS * BIAS_KNOWN_RADPS;
+        self.smoothness = if is_bias_known { 1.0 } else { smoothness(sources) };
         self.seen_again.pass(nominal.position.x(), &context.settings);
         let mut errors = [0.0; ERRORS];
         while let Some(waiting) = window.pop(to) {
@@ -360,21 +371,28 @@ impl Eskf {
             row.unless_sure(source.noise_level.is_usual(), |by| math::sqrt(self.factors.variance_along(by)));
         row.noise += self.left_out(row.bends);
         let (kind, declared) = (source.sensor.kind, row.noise);
+        let is_head_square = kind == SensorKind::Head && is_square(&row);
         if settings.learns {
             row.noise *= source.noise_level.factor(kind, number);
+        }
+        let innovation = row.residual - row.found(known, errors);
+        let along = self.factors.along(&row.h);
+        let of_estimate = row.h.iter().zip(&along).map(|(h, along)| h * along).sum::<f64>();
+        if settings.learns && is_head_square {
+            // What is too far off for a smooth wall is weighed as of a rough one.
+            let smooth = row.noise * self.smoothness;
+            let fits = innovation * innovation <= SMOOTH * (of_estimate + smooth);
+            row.noise = if fits { smooth } else { row.noise };
         }
         let white = row.noise;
         let bumps = self.bumps(kind, settings);
         row.noise = white + bumps;
-        let innovation = row.residual - row.found(known, errors);
-        let along = self.factors.along(&row.h);
-        let of_estimate = row.h.iter().zip(&along).map(|(h, along)| h * along).sum::<f64>();
         let variance = of_estimate + row.noise;
         let nis = innovation * innovation / variance;
         let mut agrees = nis <= settings.gate;
         source.consistency.count(nis, settings.gate, variance, settings.usual_variance(kind));
         let part = |from: usize| [0, 1, 2].map(|k| along.get(from + k).copied().unwrap_or(0.0));
-        if kind == SensorKind::Head && !self.is_blind {
+        if is_head_square && !self.is_blind {
             source.noise_level.note_share((innovation * innovation - of_estimate) / declared, agrees);
         }
         let relative = source.noise_level.relative(nis.min(settings.gate));
@@ -551,4 +569,16 @@ impl Eskf {
             *error += k * innovation;
         }
     }
+}
+
+/// Share of the declared variance of heads' ranges that the wall leaves them: that of the head that shows most. Where one begins to see rocks, the
+/// others will.
+fn smoothness(sources: &[Option<Source>]) -> f64 {
+    let heads = sources.iter().flatten().filter(|source| source.sensor.kind == SensorKind::Head);
+    heads.filter_map(|head| head.noise_level.smoothness()).reduce(f64::max).unwrap_or(1.0)
+}
+
+/// Whether a beam meets the wall squarely: a range changes by the place as one over the cosine of the incidence.
+fn is_square(row: &ScalarUpdate) -> bool {
+    state::vec::<Tunnel>(&row.h, POSITION).norm() < 1.0 / SQUARE
 }

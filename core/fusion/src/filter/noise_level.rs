@@ -50,7 +50,7 @@ impl Default for NoiseLevel {
 /// Limits of the level, as factors of the declared variance; `None` where it isn't learnt.
 ///
 /// An inertial unit's tilt is declared for its slow errors, which no difference shows; a head's range for the wall's bumps and shape as well, which a
-/// beam that leans would take for a yaw: differences only raise it, and what lowers it is the square of all that it is off ([`NoiseLevel::factor`]).
+/// beam that leans would take for a yaw: differences only raise it, and what lowers it is the square of all that it is off ([`NoiseLevel::smoothness`]).
 fn limits(kind: SensorKind, scalar: usize) -> Option<[f64; 2]> {
     match kind {
         SensorKind::Head => Some([1.0, 9.0]),
@@ -108,12 +108,18 @@ impl NoiseLevel {
         }
     }
 
-    /// Factor of the declared variance, 1 where it isn't learnt. A head's is lowered to the share that its innovations show once a turn of
-    /// them is known, of the last few if that is more: where the wall isn't as designed, those are large whether it is rough or bent.
+    /// Factor of the declared variance, 1 where it isn't learnt.
     pub fn factor(&self, kind: SensorKind, scalar: usize) -> f64 {
-        let is_known = kind == SensorKind::Head && self.seen >= TURN;
-        let smooth = if is_known { self.share.max(self.latest).clamp(LEAST_OF_HEAD, 1.0) } else { 1.0 };
-        limits(kind, scalar).map_or(1.0, |_| smooth * self.factor)
+        limits(kind, scalar).map_or(1.0, |_| self.factor)
+    }
+
+    /// Factor, 1 at most, of the variance of a head's range that meets the wall squarely: the share that such innovations show, once a turn of
+    /// them is known, of the last few if that is more. Where the wall isn't as designed, they are large whether it is rough or bent. `None` of
+    /// a head that hasn't measured anything.
+    pub fn smoothness(&self) -> Option<f64> {
+        let is_known = self.seen >= TURN;
+        (self.seen > 0)
+            .then(|| if is_known { self.share.max(self.latest).clamp(LEAST_OF_HEAD, 1.0) } else { 1.0 })
     }
 }
 
@@ -127,7 +133,7 @@ mod tests {
     fn level(count: u32, off: impl Fn(u32) -> f64, is_used: bool) -> NoiseLevel {
         let mut level = NoiseLevel::default();
         for k in 0..count {
-            let (innovation, factor) = (off(k), level.factor(HEAD, 0));
+            let (innovation, factor) = (off(k), level.factor(HEAD, 0) * level.smoothness().unwrap_or(1.0));
             level.note_share(innovation * innovation, is_used);
             _ = level.relative(innovation * innovation / factor);
             if is_used {
@@ -147,19 +153,22 @@ mod tests {
 
     #[test]
     fn a_head_before_a_smooth_wall_is_believed_as_it_shows_itself_after_a_turn() {
-        near(level(119, |k| 0.5 * math::sin(f64::from(k)), true).factor(HEAD, 0), 1.0);
+        near(level(119, |k| 0.5 * math::sin(f64::from(k)), true).smoothness().unwrap(), 1.0);
         near(level(2000, alternating(0.5), true).share(), 0.25);
-        near(level(2000, |k| 0.5 * math::sqrt(2.0) * math::sin(f64::from(k)), true).factor(HEAD, 0), 0.25);
+        near(
+            level(2000, |k| 0.5 * math::sqrt(2.0) * math::sin(f64::from(k)), true).smoothness().unwrap(),
+            0.25,
+        );
         // Never below what its counts and its noise leave.
-        near(level(2000, alternating(0.01), true).factor(HEAD, 0), 0.15);
+        near(level(2000, alternating(0.01), true).smoothness().unwrap(), 0.15);
     }
 
     /// Of a wall that is built otherwise neighbouring ranges are off alike, so that differences show nothing.
     #[test]
     fn a_wall_of_another_shape_is_no_smooth_one() {
-        near(level(2000, |_| 1.0, true).factor(HEAD, 0), 1.0);
-        near(level(2000, |_| 3.0, true).factor(HEAD, 0), 1.0);
-        near(level(2000, |k| math::sin(f64::from(k) / 40.0), true).factor(HEAD, 0), 0.5);
+        near(level(2000, |_| 1.0, true).smoothness().unwrap(), 1.0);
+        near(level(2000, |_| 3.0, true).smoothness().unwrap(), 1.0);
+        near(level(2000, |k| math::sin(f64::from(k) / 40.0), true).smoothness().unwrap(), 0.5);
     }
 
     /// What isn't used says that the wall is otherwise, and one stray in twenty hardly does.

@@ -225,7 +225,7 @@ impl Suspicions {
         }
         let Some(row) = expect(state, design, &look) else { return };
         if let (Some(level), Some(Some(source))) = (self.levels.get_mut(slot), sources.get(waiting.source)) {
-            *level = source.noise_level.factor(info.kind, 0).min(1.0);
+            *level = source.noise_level.smoothness().unwrap_or(1.0);
         }
         if let Some(heard) = self.heard.get_mut(slot) {
             *heard = heard.wrapping_add(1);
