@@ -2,7 +2,6 @@
 
 use core::ops::Range;
 
-use super::BIAS_KNOWN_RADPS;
 use super::agreement::{self, Agreement};
 use super::cable::{Cable, CableReading, Slip, Use};
 use super::clones::ErrorClones;
@@ -51,6 +50,8 @@ const BEYOND_M: f64 = 1.5;
 const MISLED_SHARE: f64 = 0.3;
 /// The loosest cable allowed for, m.
 const LOOSEST_M: f64 = 0.5;
+/// Standard deviation from which a gyro's bias is known: a pass of 3 s is off by a milliradian, and standing would show little more, rad/s.
+pub(super) const BIAS_KNOWN_RADPS: f64 = 3e-4;
 /// Time over which a loose cable is taken to tighten, s.
 const TIGHTENS_OVER_S: f64 = 100.0;
 /// Least cosine of the incidence at which a head's range is believed more than declared. Where a hull is pitched over the top, beams look along the

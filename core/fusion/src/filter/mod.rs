@@ -34,7 +34,7 @@ mod tests;
 use self::align::{LISTENS, Listening};
 use self::cable::CableDoubt;
 use self::context::Context;
-use self::eskf::Eskf;
+use self::eskf::{BIAS_KNOWN_RADPS, Eskf};
 use self::pose_sd::PoseSd;
 use self::settings::Settings;
 use self::sources::{Consistency, Source};
@@ -77,8 +77,6 @@ const MOST_FORCE_MPS2: f64 = 50.0;
 const AHEAD: usize = 1024;
 /// Time between two head passes when no head is known to turn.
 const USUAL_GAP: DurNs = DurNs(20_000_000_000);
-/// Standard deviation from which a gyro's bias is known: a pass of 3 s is off by a milliradian, and standing would show little more, rad/s.
-const BIAS_KNOWN_RADPS: f64 = 3e-4;
 
 /// See the module's description.
 pub struct FilterNavigation {
