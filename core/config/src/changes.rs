@@ -26,7 +26,7 @@ pub fn changed(text: &str, changes: &Section<'_>) -> Result<String, ConfigError>
         let path: Vec<&str> = path.iter().map(String::as_str).collect();
         let mut found = Vec::new();
         find(&table, &path, &mut found);
-        if let ([key], true, true) = (path.as_slice(), found.is_empty(), value.starts_with('[')) {
+        if let ([key], true, true) = (path.as_slice(), found.is_empty(), is_array(value)) {
             changed.extend([*key, " = ", value, "\n"]);
             continue;
         }
@@ -44,6 +44,11 @@ pub fn changed(text: &str, changes: &Section<'_>) -> Result<String, ConfigError>
     }
     changed.push_str(text.get(at..).unwrap_or_default());
     Ok(changed)
+}
+
+/// Whether a value is an array on its own: tables under `[[headers]]` are none that could be moved.
+fn is_array(value: &str) -> bool {
+    value.starts_with('[') && !value.starts_with("[[")
 }
 
 /// Finds the byte ranges of the values at `path`.
@@ -108,6 +113,8 @@ mod tests {
     #[test]
     fn what_is_not_there_is_refused() {
         let missing = "is not in the vehicle file, so that it can't be changed";
+        let tables = "\n[[openings]]\nname = \"gate\"";
+        assert_eq!(change(tables).unwrap_err(), format!("s.toml:2: openings = [[openings]]: {missing}"));
         for (changes, key) in
             [("\nheads.speed = 1", "heads.speed"), ("\nsensors.y.mode = 1", "sensors.y.mode")]
         {

@@ -299,7 +299,7 @@ fn a_vehicle_that_waits_until_its_heading_is_known_loses_no_metre_to_doubt() {
     assert_ne!(vehicle, VEHICLE);
     let scene = format!(
         "seed = 3\nvehicle = \"vehicle.toml\"\n[trajectory]\nkind = \"waypoints\"\n\
-         [[trajectory.waypoints]]\nchainage_m = {START_M}\nstay_s = 14\n\
+         [[trajectory.waypoints]]\nchainage_m = {START_M}\nstay_s = 10\n\
          [[trajectory.waypoints]]\nchainage_m = {}\nspeed_mps = 0.09\n[effects]\nmotion_within_turn = {{}}\n",
         START_M + 6.0
     );

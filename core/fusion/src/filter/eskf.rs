@@ -382,8 +382,9 @@ impl Eskf {
         if settings.learns && is_head_square {
             // What is too far off for a smooth wall is weighed as of a rough one.
             let smooth = row.noise * self.smoothness;
-            let fits = innovation * innovation <= SMOOTH * (of_estimate + smooth);
-            row.noise = if fits { smooth } else { row.noise };
+            if innovation * innovation <= SMOOTH * (of_estimate + smooth) {
+                row.noise = smooth;
+            }
         }
         let white = row.noise;
         let bumps = self.bumps(kind, settings);
