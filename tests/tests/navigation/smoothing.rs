@@ -242,12 +242,12 @@ fn replay_says_what_smoothing_changed() {
     let said: Vec<&str> = answer.stdout.lines().filter(about).collect();
     insta::assert_snapshot!(said.join("\n"), @r"
       smoothed 593 estimates; by the filter alone: passed 4.25 m   missed 2.50 m   can't say 4.25 m   open 1.50 m
-      0+003.50 to 0+003.75  changed: can't say to pass, holes 0.557±0.176 to 0.531±0.012 m
-      0+007.75 to 0+010.75  changed: can't say to pass, holes 0.596±0.233 to 0.550±0.012 m
-      0+011.00 to 0+011.50  changed: can't say to pass, holes 0.464±0.233 to 0.560±0.068 m
-      0+011.50 to 0+011.75  changed: can't say to fail, holes 0.655±0.058 to 1.055±0.078 m
-      0+014.25 to 0+014.50  changed: pass to fail, holes 0.444±0.014 to 6.552±0.000 m
-      0+015.00 to 0+015.50  changed: open to not passed, holes 2.247±0.013 to - m
+      0+003.50 to 0+003.75  changed: can't say to pass, holes 0.557±0.176 to 0.530±0.012 m
+      0+007.75 to 0+010.75  changed: can't say to pass, holes 0.596±0.223 to 0.550±0.012 m
+      0+011.00 to 0+011.50  changed: can't say to pass, holes 0.454±0.223 to 0.561±0.068 m
+      0+011.50 to 0+011.75  changed: can't say to fail, holes 0.595±0.051 to 1.057±0.078 m
+      0+014.25 to 0+014.50  changed: pass to fail, holes 0.444±0.014 to 6.553±0.000 m
+      0+015.00 to 0+015.50  changed: open to not passed, holes 2.243±0.013 to - m
     ");
     let report: serde_json::Value = serde_json::from_slice(&folder.read("r.json")).unwrap();
     let smoothing = &report["smoothing"];
