@@ -20,6 +20,18 @@ impl Causes {
         self.union(Self::of(cause))
     }
 
+    /// This set less a cause.
+    #[must_use]
+    pub fn without(self, cause: Cause) -> Self {
+        self.less(Self::of(cause))
+    }
+
+    /// This set less the causes of another.
+    #[must_use]
+    pub fn less(self, other: Self) -> Self {
+        Self(self.0 & !other.0)
+    }
+
     /// The causes of either set.
     #[must_use]
     pub fn union(self, other: Self) -> Self {

@@ -48,8 +48,9 @@ pub struct Case<'a> {
 
 /// The share of the target that is left for the hole when speed is put right: a plan keeps a margin.
 const MARGIN: f64 = 0.85;
-/// Least factor by which the wall is drawn together.
+/// Least and largest factor by which the wall is drawn together, or apart: a finer step or a longer range takes longer to go round.
 const LEAST: f64 = 0.1;
+const MOST: f64 = 3.0;
 /// Without a factor that was present, distances are at most this share of what they were.
 const HELPS: f64 = 0.93;
 /// T as driven over the target from which speed counts although it was the planned one: T is an upper bound of D.
@@ -58,15 +59,19 @@ const WELL_OVER: f64 = 1.2;
 const OVER_PLAN: f64 = 1.15;
 /// Multiples of the target that what is left of the hole may reach, tried in turn before a larger set is: figures are those
 /// of one moment, holes have many.
-const ROUGHLY: [f64; 2] = [1.0, 1.05];
+const ROUGHLY: [f64; 2] = [1.0, 1.0];
 /// The same of the swing between passes: even a steady vehicle sways.
 const SWINGS: f64 = 0.85;
 /// Multiple of the target beyond which what is left of the hole says that something else is the matter.
 const AT_MOST: f64 = 1.3;
 /// Share of the target from which steps from the middle count.
 const COARSE: f64 = 0.75;
-/// Ratio of a finer mode's step to the present one.
-const FINER: f64 = 0.375;
+/// Multiple of the target up to which a hole's size counts where it is asked what is lacking about it.
+const WIDEST: f64 = 8.0;
+/// Least and largest factor on a hole's size between which it is searched for with all that is lacking put back, and the steps of the search.
+const SEARCHED: u32 = 5;
+/// Share of what is lacking near a hole, for reasons that stay, from which that alone makes a hole.
+const STAYS: f64 = 0.15;
 /// Largest set that is looked for.
 const MOST_NAMED: u32 = 3;
 /// Most sets that are tried.
@@ -84,9 +89,8 @@ pub fn explain<'a>(
     let seen = Seen::over(passages);
     let drive = seen.worst;
     let present = present(case, &seen, store.perimeter_m());
-    let mut trial =
-        Trial { case, drive: &drive, seen: &seen, store, finder, left: MOST_TRIED, laid: None, passed: None };
-    let causes = trial.smallest(present);
+    let mut trial = Trial::new(case, &seen, store, finder, present);
+    let causes = trial.smallest();
     let in_hole = |lack: &&Lack| is_in(case.hole, case.target_m, store.perimeter_m(), lack);
     let radius_m = case.target_m;
     let sampled =
@@ -167,7 +171,7 @@ impl Seen {
 /// The factors that were present.
 fn present(case: &Case<'_>, seen: &Seen, perimeter_m: f64) -> Causes {
     let Case { hole, bounds_m: (from_m, to_m), target_m, .. } = *case;
-    let around_m = target_m / 2.0;
+    let around_m = (hole.diameter_m.min(WIDEST * target_m) + target_m) / 2.0;
     let lacking = case.lacks.between(from_m - around_m, to_m + around_m);
     let near = |lack: &&Lack| {
         // Whatever is lacking round the wall where the hole is all round.
@@ -191,7 +195,10 @@ fn present(case: &Case<'_>, seen: &Seen, perimeter_m: f64) -> Causes {
     let over = if coarse { drive.planned_along_m() } else { as_planned } / target_m;
     add(over > WELL_OVER || over > 1.0 && drive.speed_mps > OVER_PLAN * drive.planned_mps, Cause::TooFast);
     let is_slow = drive.is_slow_out_of_phase(1.0 / HELPS);
-    add(is_slow || drive.planned_gap_s < HELPS * drive.healthy_gap_s, Cause::Phase);
+    let is_uneven = drive.planned_gap_s < HELPS * drive.healthy_gap_s;
+    // At another speed heads apart along the hull may happen to be even.
+    let is_fast = drive.speed_mps > OVER_PLAN * drive.planned_mps;
+    add(is_slow || is_uneven || is_fast && drive.all_gap_s < HELPS * drive.healthy_at_plan_s, Cause::Phase);
     let steady = Drive { swing_m: 0.0, ..*drive };
     let aside = drive.middle_t_y_m < HELPS * drive.t_y_m;
     add(steady.along_m() < SWINGS * drive.along_m() || aside, Cause::OffAxis);
@@ -205,14 +212,20 @@ fn is_passed(case: &Case<'_>) -> bool {
     case.swept_by_all.is_some_and(|swept| from_m >= swept.from_m && to_m <= swept.to_m)
 }
 
-/// Silent heads would have pinged nobody knows where: in sectors, never heard, or all of them silent.
+/// Silent heads would have pinged nobody knows where: in sectors, never heard, or all of them silent for longer than is remembered.
 fn is_dark(case: &Case<'_>, seen: &Seen) -> bool {
     !seen.silent.is_empty() && seen.worst.is_in_sectors || is_unheard(case, seen)
 }
 
 /// Silent heads were never heard, or none was.
 fn is_unheard(case: &Case<'_>, seen: &Seen) -> bool {
-    !seen.silent.is_empty() && seen.worst.is_unheard || case.is_dark
+    !seen.silent.is_empty() && seen.worst.is_unheard || case.is_dark && !is_remembered(case)
+}
+
+/// Whether it is known where the silent heads would have pinged in the section.
+fn is_remembered(case: &Case<'_>) -> bool {
+    let mut lacking = case.lacks.between(case.bounds_m.0, case.bounds_m.1);
+    lacking.any(|lack| lack.why.has(Cause::HeadSilent))
 }
 
 /// Tries what a hole would have been without some of the factors.
@@ -222,16 +235,43 @@ struct Trial<'a> {
     seen: &'a Seen,
     store: &'a SampleStore,
     finder: &'a mut HoleFinder,
+    /// The factors that were present.
+    present: Causes,
     left: u32,
     /// Without which factors the wall was laid out last, and for circles of which radius, m.
     laid: Option<(Causes, f64)>,
     /// Without which factors the section was found last to have met the target itself.
     passed: Option<Causes>,
+    /// Diameter of the hole with all that is lacking put back, m, once it has been looked for.
+    full_m: Option<f64>,
 }
 
-impl Trial<'_> {
-    /// The smallest set among these factors without which the section would have met the target.
-    fn smallest(&mut self, present: Causes) -> Causes {
+impl<'a> Trial<'a> {
+    fn new(
+        case: &'a Case<'a>,
+        seen: &'a Seen,
+        store: &'a SampleStore,
+        finder: &'a mut HoleFinder,
+        present: Causes,
+    ) -> Self {
+        let drive = &seen.worst;
+        Self {
+            case,
+            drive,
+            seen,
+            store,
+            finder,
+            present,
+            left: MOST_TRIED,
+            laid: None,
+            passed: None,
+            full_m: None,
+        }
+    }
+
+    /// The smallest set among the factors present without which the section would have met the target.
+    fn smallest(&mut self) -> Causes {
+        let present = self.present;
         if present.is_empty() || !self.passes_without(present, AT_MOST) {
             return Causes::of(Cause::Unknown);
         }
@@ -307,19 +347,16 @@ impl Trial<'_> {
         if self.passed == Some(removed) {
             return true;
         }
-        let Case { bounds_m, first_visit, target_m, lacks, .. } = *self.case;
+        let target_m = self.case.target_m;
+        let is_all = removed.has(Cause::HeadSilent) && is_unheard(self.case, self.seen);
+        let stays = !is_all && self.covers(removed) && self.stays_m(removed) > times * target_m;
+        if stays || !self.is_sampled_without(removed, times * target_m) {
+            return false;
+        }
+        let bounds_m = self.case.bounds_m;
         let otherwise = self.otherwise(removed);
         let radius_m = times * target_m / 2.0;
-        if !self.laid.is_some_and(|(laid, most_m)| laid == removed && radius_m <= most_m) {
-            let reach_m = (target_m + bounds_m.1 - bounds_m.0) / otherwise.along;
-            let put_back = lacks
-                // Those about to be mirrored, too.
-                .between(bounds_m.0 - 2.0 * reach_m, bounds_m.1 + 2.0 * reach_m)
-                .filter(|lack| lack.why.is_within(removed))
-                .map(|lack| [lack.x_m, lack.arc_m]);
-            self.finder.lay_otherwise((self.store, first_visit), bounds_m, radius_m, &otherwise, put_back);
-            self.laid = Some((removed, radius_m));
-        }
+        self.lay(removed, radius_m, &otherwise);
         let mut passes = |radius_m| !self.finder.has_circle_otherwise(bounds_m, radius_m, &otherwise);
         // Most sets that do, do with nothing to spare, and needn't be searched for larger circles.
         if passes(target_m / 2.0) {
@@ -329,13 +366,115 @@ impl Trial<'_> {
         times > 1.0 && passes(radius_m)
     }
 
+    /// Lays out the wall as it would have been without some factors, unless it lies there.
+    fn lay(&mut self, removed: Causes, radius_m: f64, otherwise: &Otherwise) {
+        let Case { bounds_m, first_visit, target_m, lacks, .. } = *self.case;
+        if !self.laid.is_some_and(|(laid, most_m)| laid == removed && radius_m <= most_m) {
+            let reach_m = (target_m.max(2.0 * radius_m) + bounds_m.1 - bounds_m.0) / otherwise.along;
+            let put_back = lacks
+                // Those about to be mirrored, too.
+                .between(bounds_m.0 - 2.0 * reach_m, bounds_m.1 + 2.0 * reach_m)
+                .filter(|lack| lack.why.is_within(removed))
+                .map(|lack| [lack.x_m, lack.arc_m]);
+            self.finder.lay_otherwise((self.store, first_visit), bounds_m, radius_m, otherwise, put_back);
+            self.laid = Some((removed, radius_m));
+        }
+    }
+
+    /// Whether wall is taken to be covered without some factors, since nobody knows where what is lacking would have been.
+    fn covers(&self, removed: Causes) -> bool {
+        let is_lost = self.case.is_torn || self.seen.unseen || self.seen.adrift;
+        removed.has(Cause::PositionLost) && is_lost
+            || removed.has(Cause::HeadSilent) && is_dark(self.case, self.seen)
+    }
+
+    /// The distance between neighbours that is left without some factors, by how the vehicle and its heads moved alone, m; infinite where
+    /// much is lacking for reasons that stay.
+    fn stays_m(&self, removed: Causes) -> f64 {
+        let Case { bounds_m, lacks, .. } = *self.case;
+        let (mut all, mut stay) = (0_u32, 0_u32);
+        for lack in lacks.between(bounds_m.0, bounds_m.1) {
+            all += 1;
+            stay += u32::from(!lack.why.is_within(removed));
+        }
+        if f64::from(stay) > STAYS * f64::from(all) {
+            return f64::INFINITY;
+        }
+        let [_, then] = self.drives(removed);
+        spacing::t_max_m(then.along_m(), 0.0, then.t_y_m)
+    }
+
+    /// Whether what is lost by chance, and stays so, leaves enough: where beams no longer swing, the wall can't be drawn together for it.
+    fn is_sampled_without(&self, removed: Causes, target_m: f64) -> bool {
+        let is_lossy = self.present.less(removed).has(Cause::MissingReturns);
+        if !is_lossy || !removed.has(Cause::OffAxis) {
+            return true;
+        }
+        let [_, then] = self.drives(removed);
+        spacing::t_max_m(self.drive.passes_needed * then.along_m(), 0.0, then.t_y_m) <= target_m
+    }
+
+    /// How vehicle and heads moved, and how they would have without some factors; `healthy_gap_s` is the time between passes of the heads
+    /// that there are: where silent or stalled ones stay so, it is that without them.
+    fn drives(&self, removed: Causes) -> [Drive; 2] {
+        let stalls = Causes::of(Cause::HeadSilent).with(Cause::HeadStalled);
+        let all_turn = self.present.less(removed).less(stalls) == self.present.less(removed);
+        let mut now = *self.drive;
+        if !all_turn {
+            now.healthy_gap_s = now.gap_s.max(now.healthy_gap_s);
+        }
+        [now, now.without(removed, MARGIN * self.case.target_m, all_turn)]
+    }
+
+    /// Diameter of the hole with all that is lacking put back, m: what the figures of driving have to explain.
+    fn full_m(&mut self) -> f64 {
+        let diameter_m = self.case.hole.diameter_m;
+        if let Some(full_m) = self.full_m {
+            return full_m;
+        }
+        let lacking = [
+            Cause::OutOfRange,
+            Cause::MissingReturns,
+            Cause::Occluded,
+            Cause::HeadSilent,
+            Cause::HeadStalled,
+            Cause::PositionLost,
+        ];
+        let lacking: Causes = lacking.into_iter().filter(|cause| self.present.has(*cause)).collect();
+        let most_m = diameter_m.min(WIDEST * self.case.target_m);
+        let mut full_m = diameter_m;
+        if !lacking.is_empty() && most_m > self.case.target_m {
+            let otherwise = Otherwise { to_come: self.to_come(), ..Otherwise::NOTHING };
+            self.laid = None;
+            self.lay(lacking, most_m / 2.0, &otherwise);
+            self.laid = None;
+            let bounds_m = self.case.bounds_m;
+            let (mut least_m, mut larger_m) = (self.case.target_m / 2.0, most_m);
+            for _ in 0..SEARCHED {
+                let tried_m = math::sqrt(least_m * larger_m);
+                if self.finder.has_circle_otherwise(bounds_m, tried_m / 2.0, &otherwise) {
+                    least_m = tried_m;
+                } else {
+                    larger_m = tried_m;
+                }
+            }
+            full_m = larger_m;
+        }
+        self.full_m = Some(full_m);
+        full_m
+    }
+
+    /// Where samples may still land; beyond the end of what was passed, the wall isn't as it is before.
+    fn to_come(&self) -> Option<Reach> {
+        self.case.to_come.filter(|_| is_passed(self.case))
+    }
+
     /// How the wall would have been sampled without some factors.
-    fn otherwise(&self, removed: Causes) -> Otherwise {
+    fn otherwise(&mut self, removed: Causes) -> Otherwise {
         let all = Some(Reach { from_m: f64::NEG_INFINITY, to_m: f64::INFINITY });
         let swept = self.case.swept_by_all;
         let mut covered = [None; 4];
-        // Beyond the end of what was passed, the wall isn't as it is before.
-        let to_come = self.case.to_come.filter(|_| is_passed(self.case));
+        let to_come = self.to_come();
         if to_come.is_none() {
             covered[3] = self.case.to_come;
         }
@@ -345,21 +484,17 @@ impl Trial<'_> {
             covered[0] = Some(Reach { from_m: f64::NEG_INFINITY, to_m: before });
             covered[1] = Some(Reach { from_m: beyond, to_m: f64::INFINITY });
         }
-        if removed.has(Cause::PositionLost) && (self.case.is_torn || self.seen.unseen || self.seen.adrift)
-            || removed.has(Cause::HeadSilent) && is_dark(self.case, self.seen)
-        {
+        if self.covers(removed) {
             covered[2] = all;
         }
-        let then = self.drive.without(removed, MARGIN * self.case.target_m);
-        let ratio = |then: f64, was: f64| if was > 0.0 { (then / was).clamp(LEAST, 1.0) } else { 1.0 };
-        let finer = if removed.has(Cause::AngularStep) { FINER } else { 1.0 };
+        let [now, then] = self.drives(removed);
+        let ratio = |then: f64, was: f64| if was > 0.0 { (then / was).clamp(LEAST, MOST) } else { 1.0 };
+        let is_drawn = [Cause::TooFast, Cause::OffAxis, Cause::Phase].iter().any(|cause| removed.has(*cause));
+        // Figures of one moment don't explain more than the hole.
+        let hole_m = if is_drawn { self.full_m() } else { self.case.hole.diameter_m };
         Otherwise {
-            // Figures of one moment don't explain more than the hole.
-            along: ratio(
-                then.along_m(),
-                self.drive.along_m().min(self.case.hole.diameter_m.max(then.along_m())),
-            ),
-            around: ratio(then.t_y_m, self.drive.t_y_m) * finer,
+            along: ratio(then.along_m(), now.along_m().min(hole_m.max(then.along_m()))),
+            around: ratio(then.t_y_m, now.t_y_m),
             covered,
             to_come,
         }
@@ -377,26 +512,42 @@ impl Drive {
         }
     }
 
-    /// The same without some factors. `margin_m` is the target less a margin, for the speed that would have been right, m.
-    fn without(&self, removed: Causes, margin_m: f64) -> Self {
+    /// The same without some factors. `margin_m` is the target less a margin, for the speed that would have been right, m; `all_turn`: no
+    /// head is silent or out of step any more.
+    fn without(&self, removed: Causes, margin_m: f64, all_turn: bool) -> Self {
         let mut then = *self;
+        let mut slower = 1.0;
+        if removed.has(Cause::OutOfRange) {
+            slower *= self.other.longer_turn;
+        }
+        if removed.has(Cause::AngularStep) {
+            slower *= self.other.finer_turn;
+            then.t_y_m *= self.other.finer_step;
+            then.middle_t_y_m *= self.other.finer_step;
+        }
         if removed.has(Cause::OffAxis) {
-            (then.swing_m, then.t_y_m) = (0.0, self.middle_t_y_m.min(self.t_y_m));
+            (then.swing_m, then.t_y_m) = (0.0, then.middle_t_y_m.min(then.t_y_m));
         }
-        if removed.has(Cause::Phase) && self.is_slow_out_of_phase(1.0 / HELPS) {
-            (then.speed_mps, then.healthy_gap_s) = (self.planned_mps, self.all_gap_s);
-        } else if removed.has(Cause::Phase) {
-            then.healthy_gap_s = self.planned_gap_s.min(self.healthy_gap_s);
+        let is_at_plan = removed.has(Cause::Phase) && self.is_slow_out_of_phase(1.0 / HELPS);
+        if is_at_plan {
+            then.speed_mps = self.planned_mps;
         }
-        if removed.has(Cause::TooFast) {
-            // At the planned speed, heads as scheduled are evenly spread.
-            if self.planned_gap_s > 0.0 {
-                then.healthy_gap_s *= (self.all_gap_s / self.planned_gap_s).min(1.0);
-            }
-            let t_y_m = if removed.has(Cause::AngularStep) { FINER * then.t_y_m } else { self.middle_t_y_m };
+        let is_slowed = removed.has(Cause::TooFast);
+        let gap_s = match (all_turn, removed.has(Cause::Phase), is_slowed || is_at_plan) {
+            (true, true, true) => self.all_gap_s,
+            (true, true, false) => self.planned_gap_s.min(self.healthy_gap_s),
+            (true, false, true) => self.healthy_at_plan_s,
+            (false, true, _) => self.left_at_plan_s.min(self.healthy_gap_s),
+            (false, false, true) => self.gap_at_plan_s,
+            (_, false, false) => self.healthy_gap_s,
+        };
+        then.healthy_gap_s = slower * gap_s;
+        then.ping_period_s *= slower;
+        if is_slowed {
+            let t_y_m = then.middle_t_y_m;
             let squared = (margin_m - t_y_m) * (margin_m + t_y_m);
             let along_m = math::sqrt(squared.max(0.0)).max(0.3 * margin_m);
-            let fits = along_m / (then.speed_mps * self.all_gap_s + self.advance_m()).max(1e-9);
+            let fits = along_m / (then.speed_mps * slower * self.all_gap_s + then.advance_m()).max(1e-9);
             // What is advised allows for wall that the vehicle hides.
             let advised = if self.fits_mps > 0.0 { self.fits_mps / then.speed_mps.max(1e-9) } else { 1.0 };
             then.speed_mps *= fits.min(advised).min(1.0);

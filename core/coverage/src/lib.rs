@@ -55,7 +55,7 @@ pub use frontier::{Frontier, HeadReach, Outlook, Reach};
 pub use hole::{Hole, HoleFinder};
 pub use lacks::{Lack, Lacks};
 pub use metres::Metres;
-pub use passage::{Drive, Loss, PassError, Passage};
+pub use passage::{Drive, Loss, OtherSettings, PassError, Passage};
 pub use relief::Relief;
 pub use runs::{Run, RunChange, RunId, Runs};
 pub use section::{Judgement, Section, Spread, Verdict};

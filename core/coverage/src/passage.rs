@@ -55,6 +55,12 @@ pub struct Drive {
     pub planned_gap_s: f64,
     /// The same with all heads evenly spread.
     pub all_gap_s: f64,
+    /// `gap_s` at the planned speed; at this one where none is planned.
+    pub gap_at_plan_s: f64,
+    /// `healthy_gap_s` at that speed.
+    pub healthy_at_plan_s: f64,
+    /// The same of the heads that turn and never stood still, with their angles as scheduled.
+    pub left_at_plan_s: f64,
     /// Time between two pings, seconds.
     pub ping_period_s: f64,
     /// How far the beams have swung along the tunnel since the neighbouring passes, where they reach farthest, m.
@@ -74,6 +80,26 @@ pub struct Drive {
     pub is_in_sectors: bool,
     /// A head hasn't been heard since the dive began.
     pub is_unheard: bool,
+    /// What other settings of the heads would change.
+    pub other: OtherSettings,
+}
+
+/// How other settings of the heads compare to the present ones: ratios. A finer step takes longer to go round, and so does a longer range.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct OtherSettings {
+    /// Step of the coarsest mode that leaves room for a target, to the present one.
+    pub finer_step: f64,
+    /// Turn period of that mode to the present one.
+    pub finer_turn: f64,
+    /// Turn period at the shortest range setting that reaches all wall from the middle to the present one.
+    pub longer_turn: f64,
+}
+
+impl Default for OtherSettings {
+    /// Of heads whose settings aren't known: two modes finer, in the same time.
+    fn default() -> Self {
+        Self { finer_step: 0.375, finer_turn: 1.0, longer_turn: 1.0 }
+    }
 }
 
 /// Share of the planned speed below which another one is driven.

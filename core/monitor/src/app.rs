@@ -10,6 +10,7 @@ use bevy_ecs::world::World;
 use super::entities::{HeadSpecification, Mounted, SensorDecoder, SensorHealth};
 use super::error::PluginError;
 use super::loop_snapshot::StateParts;
+use super::other_settings;
 use super::resources::Digests;
 use super::ring::{self, Port, PortReader};
 use super::stage::{self, Stage};
@@ -136,7 +137,8 @@ impl App {
         entity.insert(Mounted { source, info: SensorInfo { mount: sensor.mount, kind } });
         if let Some(spec) = device.head() {
             let modes = device.modes(None).unwrap_or_default();
-            entity.insert(HeadSpecification { spec, modes });
+            let reaching = other_settings::reaching(device, &spec, &self.mission);
+            entity.insert(HeadSpecification { spec, modes, reaching });
         }
         Ok(source)
     }

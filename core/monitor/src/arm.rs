@@ -20,6 +20,7 @@ use super::messages::{
     AdviceList, Events, Notices, PlacedEvents, PlacedList, PositionedList, Requests, Standings,
 };
 use super::notes::Notes;
+use super::other_settings;
 use super::resources::{Coverage, Digests, Finder, Tally, Target, TickTime, TunnelDesign, VehicleEntities};
 use super::ring;
 use super::run::Loop;
@@ -153,10 +154,12 @@ impl App {
         let sources = u16::try_from(sources.len()).unwrap_or(0);
         let confidence_sd = mission.coverage.confidence_sd;
         world.insert_resource(LiveState::new(mission.target_m, confidence_sd, heads, sources));
+        let other = other_settings::of_heads(world, &mission.profile, mission.target_m);
         world.insert_resource(Target {
             target_m: mission.target_m,
             layout: mission.layout,
             planned_speed_mps: mission.planned_speed_mps,
+            other,
         });
         Ok(())
     }

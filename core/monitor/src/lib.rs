@@ -42,6 +42,7 @@ mod loss_count;
 pub mod merge;
 pub mod messages;
 pub mod notes;
+mod other_settings;
 pub mod outlet;
 pub mod pilot_text;
 pub mod report;

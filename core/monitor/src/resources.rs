@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 
 use super::result_stream::ResultStream;
 use headrace_coverage::{
-    Frontier, HoleFinder, Lacks, Relief, SampleStore, Sections, Soundings, Stretch, WallLimits,
+    Frontier, HoleFinder, Lacks, OtherSettings, Relief, SampleStore, Sections, Soundings, Stretch, WallLimits,
 };
 use headrace_fusion::NoFix;
 use headrace_geometry::site::Site;
@@ -40,6 +40,8 @@ pub struct Target {
     pub layout: HeadLayout,
     /// Speed for which the heads are put in phase, m/s; zero if none is planned.
     pub planned_speed_mps: f64,
+    /// What other settings of the heads would change.
+    pub(super) other: OtherSettings,
 }
 
 /// The vehicle's entity, that of each sensor by source, and that of each head by number.

@@ -63,6 +63,7 @@ pub(super) fn cover(
                     planned_mps: target.planned_speed_mps,
                     target_m: target.target_m,
                     confidence_sd: coverage.sections.confidence_sd(),
+                    other: target.other,
                 };
                 driving.note(*at, [situation, &healthy], &tunnel.profile, &plan);
                 lacking::note_beat(

@@ -3,7 +3,7 @@
 use bevy_ecs::prelude::Component;
 
 use super::lacking::Lacking;
-use headrace_coverage::Drive;
+use headrace_coverage::{Drive, OtherSettings};
 use headrace_geometry::frames::Vec3;
 use headrace_geometry::math;
 use headrace_geometry::time::{DurNs, MonoNs};
@@ -43,6 +43,8 @@ pub(super) struct Plan {
     pub(super) target_m: f64,
     /// Standard deviations of a hole that a verdict of pass keeps below it.
     pub(super) confidence_sd: f64,
+    /// What other settings of the heads would change.
+    pub(super) other: OtherSettings,
 }
 
 /// How vehicle and heads moved at the last beat, and what that needs of earlier ones.
@@ -80,6 +82,7 @@ impl Driving {
             return;
         };
         self.note_gaps(at, [situation, healthy], plan.planned_mps);
+        self.now.other = plan.other;
         self.note_fit(healthy, plan);
         let t_y_m = self.now.middle_t_y_m;
         let sampled = Sampled { target_m: plan.target_m, t_y_m, perimeter_m: profile.perimeter_m() };
@@ -157,15 +160,25 @@ impl Driving {
         }
         let speed_mps = situation.speed_mps;
         let gap_s = |passes: &Passes| passes.gap_s(passes.heads()).unwrap_or(0.0);
-        let passes = Phasing::of(situation).at(speed_mps);
+        let as_it_is = Phasing::of(situation);
+        let passes = as_it_is.at(speed_mps);
         let turning = passes.heads().len();
         let phasing = Phasing::of(healthy);
         let all = phasing.at(speed_mps);
         let healthy_gap_s = gap_s(&all);
-        let planned = phasing.as_scheduled(situation.configured, planned_mps).at(speed_mps);
-        let planned_gap_s = gap_s(&planned).min(healthy_gap_s);
+        let scheduled = phasing.as_scheduled(situation.configured, planned_mps);
+        let planned_gap_s = gap_s(&scheduled.at(speed_mps)).min(healthy_gap_s);
+        let plan_mps = if planned_mps > 0.0 { planned_mps } else { speed_mps };
+        let stalled = self.lacking.stalled;
+        let in_step = passes.heads().iter().filter(|head| !stalled.has(*head));
+        let in_step = in_step.fold(HeadSet::default(), HeadSet::with);
+        let scheduled_at_plan = scheduled.at(plan_mps);
+        let left_at_plan_s = scheduled_at_plan.gap_s(in_step);
+        let gap_at_plan_s = gap_s(&as_it_is.at(plan_mps));
+        let healthy_at_plan_s = gap_s(&phasing.at(plan_mps));
         let all_turn = turning == situation.configured && self.lacking.all_turn(at);
-        if all_turn && gap_s(&passes) <= IN_STEP * planned_gap_s {
+        // At another speed than the planned one heads that are in step may be uneven, and others even.
+        if all_turn && gap_at_plan_s <= IN_STEP * gap_s(&scheduled_at_plan).min(healthy_at_plan_s) {
             self.lacking.stalled = HeadSet::default();
         }
         let periods = healthy.heads.iter().flatten().map(HeadMotion::ping_period_s);
@@ -177,6 +190,9 @@ impl Driving {
             healthy_gap_s,
             planned_gap_s,
             all_gap_s: all.even_gap_s(),
+            gap_at_plan_s: if turning > 0 { gap_at_plan_s } else { self.now.gap_at_plan_s },
+            healthy_at_plan_s,
+            left_at_plan_s: left_at_plan_s.unwrap_or(self.now.left_at_plan_s),
             ping_period_s: periods.fold(0.0, f64::max),
             is_unheard: healthy.heads.iter().flatten().count() < situation.configured,
             is_in_sectors: situation.layout == HeadLayout::SectorOffset,

@@ -132,9 +132,11 @@ fn outcome(
         return sample(range_m);
     }
     let loss = match wall_m {
+        // Whether the vehicle is in the way can't be told of wall that isn't heard anyway.
+        Some(wall_m) if wall_m > longest_m(sonar, tunnel) => Loss::OutOfRange,
         _ if hidden => Loss::Occluded,
-        Some(wall_m) if wall_m <= longest_m(sonar, tunnel) => Loss::Missing,
-        _ => Loss::OutOfRange,
+        Some(_) => Loss::Missing,
+        None => Loss::OutOfRange,
     };
     Outcome::Lost(loss, aim)
 }

@@ -13,6 +13,7 @@ use headrace_geometry::frames::{Mount, Pose, Vec3, head_direction};
 use headrace_geometry::time::{DurNs, MonoNs};
 use headrace_geometry::tunnel::Profile;
 use headrace_sampling::head::{HeadMotion, HeadSet, MAX_HEADS};
+use headrace_sampling::losses::LossRate;
 use headrace_sampling::passes::Situation;
 use headrace_snapshot::stateful;
 
@@ -38,6 +39,8 @@ struct Turning {
     longest_m: f64,
     /// Of the latest pings at angles that the vehicle hides: those that got nothing, and all.
     hidden: [u16; 2],
+    /// Whether the last ping that it would have made would have got nothing.
+    would_lose: bool,
 }
 
 impl Turning {
@@ -49,6 +52,15 @@ impl Turning {
         if self.hidden[1] >= HIDDEN_PINGS {
             self.hidden = self.hidden.map(|count| count / 2);
         }
+    }
+
+    /// Whether a ping that it would have made would have got nothing: drawn from what it loses by chance, by the number that its time is.
+    fn would_lose(&mut self, when: MonoNs, rate: LossRate) -> bool {
+        let LossRate { share, after_lost } = rate;
+        let after_heard = share * (1.0 - after_lost) / (1.0 - share).max(1e-3);
+        let chance = if self.would_lose { after_lost } else { after_heard };
+        self.would_lose = unit_of(when.0) < chance;
+        self.would_lose
     }
 
     /// Whether the vehicle does hide what it is taken to hide.
@@ -207,7 +219,11 @@ pub(super) fn note_beat(
         while period.0 > 0 && at.since(when).0 >= 0 {
             let angle_rad = angle_rad + rate_radps * when.since(seen).as_secs_f64();
             let number = u8::try_from(number.0).unwrap_or(u8::MAX);
-            let ping = Away { at: when, head: number, angle_rad, why: Causes::of(cause), is_lost: true };
+            let rate = situation.losses.get(usize::from(number)).copied().unwrap_or_default();
+            let would_lose = head.would_lose(when, rate);
+            let cause = Causes::of(cause);
+            let why = if would_lose { cause.with(Cause::MissingReturns) } else { cause };
+            let ping = Away { at: when, head: number, angle_rad, why, is_lost: true };
             if let Some(pose) = situation.pose {
                 let back_m = speed_mps * at.since(when).as_secs_f64();
                 let pose = Pose { position: pose.position + Vec3::new(-back_m, 0.0, 0.0), ..pose };
@@ -270,6 +286,13 @@ fn owed(first: MonoNs, at: MonoNs, period: DurNs) -> i64 {
     if since < 0 { 0 } else { since.checked_div(period.0).map_or(0, |periods| periods.saturating_add(1)) }
 }
 
+/// A number from 0 to 1, the same each time, that is spread evenly over different ones. Source: Steele et al. 2014, the finalizer of splitmix64.
+fn unit_of(number: u64) -> f64 {
+    let mixed = (number ^ (number >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+    let mixed = (mixed ^ (mixed >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+    ((mixed ^ (mixed >> 31)) >> 11) as f64 / (1_u64 << 53) as f64
+}
+
 /// Keeps a ping without a fix; false if there is no room.
 fn keep(away: &mut Vec<Away>, ping: Away) -> bool {
     let has_room = away.len() < away.capacity();
@@ -329,10 +352,12 @@ impl Placing<'_> {
         // A ping that was made and got nothing was lost for another reason, too; one that wasn't would have been.
         let made = why == Causes::of(Cause::PositionLost);
         if ping.is_lost {
+            // What the head wouldn't have heard anyway, or not from there, isn't missing by chance.
+            let elsewhere = |why: Causes| why.without(Cause::MissingReturns);
             if wall.range_m > self.turning.longest_m {
-                why = why.with(Cause::OutOfRange);
+                why = elsewhere(why).with(Cause::OutOfRange);
             } else if self.turning.is_hidden() && (self.hidden)(ping.angle_rad) {
-                why = why.with(Cause::Occluded);
+                why = elsewhere(why).with(Cause::Occluded);
             } else if made {
                 why = why.with(Cause::MissingReturns);
             }
