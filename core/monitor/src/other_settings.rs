@@ -62,3 +62,51 @@ fn of_head(head: &HeadSpecification, farthest_m: f64, target_m: f64) -> OtherSet
         longer_turn: turn_s(reaching).map_or(1.0, |then_s| (then_s / now_s).max(1.0)),
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use headrace_geometry::frames::{Mount, Rot, Vec3};
+    use headrace_sampling::head::{Basis, HeadBody, Turn};
+
+    fn mode(name: &'static str, step_deg: f64, turn_s: f64) -> HeadMode {
+        HeadMode { name, turn: Turn::new(step_deg.to_radians(), turn_s).unwrap(), basis: Basis::Table }
+    }
+
+    fn head(step_deg: f64, reaching: Vec<HeadMode>) -> HeadSpecification {
+        let spec = HeadSpec {
+            mount: Mount { position: Vec3::zero(), rotation: Rot::identity() },
+            step_rad: step_deg.to_radians(),
+            ping_period_s: 0.02,
+            range_m: [0.3, 10.0],
+            sound_speed_mps: 1500.0,
+            beam_rad: 0.03,
+            body: HeadBody { radius_m: 0.0, ahead_m: 0.0, behind_m: 0.0 },
+        };
+        let modes = vec![mode("medium", 0.6, 10.8), mode("fast", 0.9, 8.0), mode("fastest", 2.4, 4.8)];
+        HeadSpecification { spec, modes, reaching }
+    }
+
+    #[test]
+    fn the_coarsest_mode_that_leaves_room_is_taken_and_takes_longer() {
+        // 0.9 degrees are 0.094 m on wall 6 m away, 0.6 degrees 0.063 m.
+        let at = |target_m: f64| of_head(&head(2.4, Vec::new()), 6.0, target_m);
+        let roomy = at(0.2);
+        assert!((roomy.finer_step - 0.375).abs() < 1e-9 && (roomy.finer_turn - 8.0 / 4.8).abs() < 1e-9);
+        let close = at(0.1);
+        assert!((close.finer_step - 0.25).abs() < 1e-9 && (close.finer_turn - 10.8 / 4.8).abs() < 1e-9);
+        // None leaves room: the finest.
+        assert_eq!(at(0.01), close);
+        let finest = of_head(&head(0.6, Vec::new()), 6.0, 0.2);
+        assert_eq!((finest.finer_step, finest.finer_turn, finest.longer_turn), (1.0, 1.0, 1.0));
+    }
+
+    #[test]
+    fn a_longer_range_takes_as_long_as_its_own_mode_does_there() {
+        let far = vec![mode("fast", 0.9, 10.0), mode("fastest", 2.4, 6.0)];
+        assert!((of_head(&head(2.4, far.clone()), 6.0, 0.2).longer_turn - 1.25).abs() < 1e-9);
+        assert!((of_head(&head(0.9, far), 6.0, 0.2).longer_turn - 1.25).abs() < 1e-9);
+        let near = vec![mode("fastest", 2.4, 4.0)];
+        assert_eq!(of_head(&head(2.4, near), 6.0, 0.2).longer_turn, 1.0);
+    }
+}

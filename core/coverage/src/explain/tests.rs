@@ -1,4 +1,7 @@
 use super::*;
+use crate::frontier::Reach;
+use crate::lacks::Lacks;
+use crate::passage::OtherSettings;
 use crate::store::{StoreLayout, WallSample};
 
 const PERIMETER_M: f64 = 18.0;
@@ -162,6 +165,36 @@ fn of_two_that_are_needed_both_are_named_and_of_two_that_suffice_the_one_the_pil
         named(&Wall { bare: BARE, why: both, ..Wall::default() }),
         [Cause::OutOfRange, Cause::PositionLost]
     );
+}
+
+/// What takes longer to go round leaves passes farther apart: where they leave no room for that, it isn't enough.
+#[test]
+fn a_longer_range_or_a_finer_step_is_not_for_nothing() {
+    let other = |turn: f64| OtherSettings { finer_step: 0.5, finer_turn: turn, longer_turn: turn };
+    let drive = |turn: f64| Drive { other: other(turn), ..sound() };
+    let far = |turn: f64| Wall {
+        bare: BARE,
+        why: Causes::of(Cause::OutOfRange),
+        drive: drive(turn),
+        ..Wall::default()
+    };
+    assert_eq!(named(&far(1.1)), [Cause::OutOfRange]);
+    assert_eq!(named(&far(2.2)), [Cause::Unknown]);
+    let coarse = |turn: f64| {
+        let drive = Drive { t_y_m: 0.6, middle_t_y_m: 0.6, ..drive(turn) };
+        Wall { along_m: 0.38, around_m: 0.6, drive, ..Wall::default() }
+    };
+    assert_eq!(named(&coarse(1.0)), [Cause::AngularStep]);
+    assert_eq!(named(&coarse(3.0)), [Cause::Unknown]);
+}
+
+/// A head that stays out of step leaves the passes as far apart as they are, however straight the vehicle goes.
+#[test]
+fn what_a_silent_head_leaves_stays_when_the_swing_is_taken_away() {
+    let why = Causes::of(Cause::HeadStalled);
+    let drive = Drive { swing_m: 0.4, gap_s: 4.0, gap_at_plan_s: 4.0, ..sound() };
+    let wall = Wall { along_m: 0.78, bare: Some([[9.0, 11.3], [3.0, 6.0]]), why, drive, ..Wall::default() };
+    assert_eq!(named(&wall), [Cause::OffAxis, Cause::HeadStalled]);
 }
 
 /// Of heads that were never there nothing else is known: however fast it went, that is no cause.

@@ -409,6 +409,26 @@ mod tests {
         assert!(!hides([10_000, 400]), "seen through for the last hundreds");
     }
 
+    /// A head that would have pinged on loses as often, and in as long runs, as it did while it was heard; twice the same pings, twice the same.
+    #[test]
+    fn what_would_have_been_lost_is_as_much_and_in_runs_as_long() {
+        let lost = |rate: LossRate| {
+            let mut turning = Turning::default();
+            (0..40_000).map(|k| turning.would_lose(MonoNs(k * 20_000_000), rate)).collect::<Vec<bool>>()
+        };
+        for (share, after_lost) in [(0.4, 0.4), (0.4, 0.95), (0.02, 0.5)] {
+            let rate = LossRate { share, after_lost };
+            let pings = lost(rate);
+            let count = pings.iter().filter(|lost| **lost).count() as f64;
+            let again = pings.windows(2).filter(|pair| pair[0] && pair[1]).count() as f64;
+            assert!((count / 40_000.0 - share).abs() < 0.1 * share + 0.01, "{rate:?}: {count}");
+            assert!((again / count - after_lost).abs() < 0.05, "{rate:?}: {again} of {count}");
+            assert_eq!(pings, lost(rate));
+        }
+        assert!(lost(LossRate::default()).iter().all(|lost| !lost));
+        assert!(lost(LossRate::independent(1.0)).iter().all(|lost| *lost));
+    }
+
     #[test]
     fn pings_without_a_fix_are_kept_until_there_is_no_room_and_that_is_known() {
         let (mut lacking, mut lacks) = (Lacking::default(), Lacks::default());

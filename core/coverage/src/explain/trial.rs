@@ -1,0 +1,275 @@
+//! What a section's hole would have been without some of the factors that were present.
+
+use super::case::{Case, HELPS, Seen, WIDEST, is_dark, is_passed, is_unheard};
+use crate::cause::Cause;
+use crate::causes::Causes;
+use crate::frontier::Reach;
+use crate::hole::{HoleFinder, Otherwise};
+use crate::passage::Drive;
+use crate::store::SampleStore;
+use headrace_geometry::math;
+use headrace_sampling::spacing;
+
+/// The share of the target that is left for the hole when speed is put right: a plan keeps a margin.
+const MARGIN: f64 = 0.85;
+/// Least and largest factor by which the wall is drawn together, or apart: a finer step or a longer range takes longer to go round.
+const LEAST: f64 = 0.1;
+const MOST: f64 = 3.0;
+/// Multiple of the target beyond which what is left of the hole says that something else is the matter.
+const AT_MOST: f64 = 1.3;
+/// Halvings by which the hole with all that is lacking put back is searched for.
+const SEARCHED: u32 = 5;
+/// Share of what is lacking near a hole, for reasons that stay, from which that alone makes a hole.
+const STAYS: f64 = 0.15;
+/// Largest set that is looked for.
+const MOST_NAMED: u32 = 3;
+/// Most sets that are tried.
+const MOST_TRIED: u32 = 120;
+
+/// Tries what a hole would have been without some of the factors.
+pub(super) struct Trial<'a> {
+    case: &'a Case<'a>,
+    drive: &'a Drive,
+    seen: &'a Seen,
+    store: &'a SampleStore,
+    finder: &'a mut HoleFinder,
+    /// The factors that were present.
+    present: Causes,
+    left: u32,
+    /// Diameter of the hole with all that is lacking put back, m, once it has been looked for.
+    full_m: Option<f64>,
+}
+
+impl<'a> Trial<'a> {
+    pub(super) fn new(
+        case: &'a Case<'a>,
+        seen: &'a Seen,
+        store: &'a SampleStore,
+        finder: &'a mut HoleFinder,
+        present: Causes,
+    ) -> Self {
+        let drive = &seen.worst;
+        Self { case, drive, seen, store, finder, present, left: MOST_TRIED, full_m: None }
+    }
+
+    /// The smallest set among the factors present without which the section would have met the target.
+    pub(super) fn smallest(&mut self) -> Causes {
+        let silent = Causes::of(Cause::HeadSilent);
+        // Where no head pinged their silence comes first: however the vehicle went is no cause, but what they wouldn't have heard may be.
+        let surely = if self.case.is_dark { silent } else { Causes::default() };
+        if self.case.is_dark {
+            let is_driven = |cause: &Cause| {
+                matches!(cause, Cause::TooFast | Cause::AngularStep | Cause::OffAxis | Cause::Phase)
+            };
+            self.present = self.present.iter().filter(|cause| !is_driven(cause)).collect();
+            self.present = self.present.union(surely);
+        }
+        let present = self.present;
+        if present.is_empty() || !self.passes_without(present, AT_MOST) {
+            return if surely.is_empty() { Causes::of(Cause::Unknown) } else { surely };
+        }
+        // Nothing else is known of wall that wasn't passed.
+        let not_passed = Causes::of(Cause::NotPassed);
+        if not_passed.is_within(present) && self.passes_without(not_passed, 1.0) {
+            return not_passed;
+        }
+        // Nor of heads that were never there.
+        if is_unheard(self.case, self.seen) && self.passes_without(silent, 1.0) {
+            return silent;
+        }
+        // A speed is changed most easily: what the planned one would have mended is put down to that.
+        let phase = Causes::of(Cause::Phase);
+        if phase.is_within(present)
+            && self.drive.is_slow_out_of_phase(1.0 / HELPS)
+            && self.passes_without(phase, 1.0)
+        {
+            return phase;
+        }
+        let (lost, is_only_adrift) = (Causes::of(Cause::PositionLost), self.is_only_adrift());
+        let mut needed = surely;
+        for size in 1..=present.len().min(MOST_NAMED) {
+            if size == 2 {
+                needed = surely.union(self.needed(present));
+            }
+            let sets = (1..=present.bits())
+                .filter(|bits| bits & !present.bits() == 0 && bits.count_ones() == size)
+                .map(Causes::from_bits);
+            let fit = |set: &Causes| {
+                let is_last = is_only_adrift && size == 1 && *set == lost;
+                set.len() == size && set.is_within(present) && needed.is_within(*set) && !is_last
+            };
+            for set in self.case.beside.into_iter().chain(sets).filter(fit) {
+                if self.passes_without(set, 1.0) {
+                    return set;
+                }
+            }
+            if size == 1 && is_only_adrift && self.passes_without(lost, 1.0) {
+                return lost;
+            }
+        }
+        present
+    }
+
+    /// Whether nothing but the error of one pass against the next speaks of the position: a fail is one in spite of that error, which explains
+    /// any hole, so that whatever else does comes first.
+    fn is_only_adrift(&self) -> bool {
+        self.seen.adrift && !self.seen.unseen && !self.case.is_torn
+    }
+
+    /// The factors without which no set will do: all the others together don't.
+    fn needed(&mut self, present: Causes) -> Causes {
+        let mut is_needed = |cause: &Cause| {
+            let others = Causes::from_bits(present.bits() & !Causes::of(*cause).bits());
+            !self.passes_without(others, 1.0)
+        };
+        present.iter().filter(|cause| is_needed(cause)).collect()
+    }
+
+    /// Whether the section would have met so many times the target without some factors.
+    fn passes_without(&mut self, removed: Causes, times: f64) -> bool {
+        if self.left == 0 {
+            return false;
+        }
+        self.left -= 1;
+        let target_m = self.case.target_m;
+        let is_all = removed.has(Cause::HeadSilent) && is_unheard(self.case, self.seen);
+        let stays = !is_all && self.covers(removed) && self.stays_m(removed) > times * target_m;
+        if stays || !self.is_sampled_without(removed, times * target_m) {
+            return false;
+        }
+        let bounds_m = self.case.bounds_m;
+        let otherwise = self.otherwise(removed);
+        let radius_m = times * target_m / 2.0;
+        self.lay(removed, radius_m, &otherwise);
+        !self.finder.has_circle_otherwise(bounds_m, radius_m, &otherwise)
+    }
+
+    /// Lays out the wall as it would have been without some factors.
+    fn lay(&mut self, removed: Causes, radius_m: f64, otherwise: &Otherwise) {
+        let Case { bounds_m, first_visit, target_m, lacks, .. } = *self.case;
+        let reach_m = (target_m.max(2.0 * radius_m) + bounds_m.1 - bounds_m.0) / otherwise.along;
+        let put_back = lacks
+            // Those about to be mirrored, too.
+            .between(bounds_m.0 - 2.0 * reach_m, bounds_m.1 + 2.0 * reach_m)
+            .filter(|lack| lack.why.is_within(removed))
+            .map(|lack| [lack.x_m, lack.arc_m]);
+        self.finder.lay_otherwise((self.store, first_visit), bounds_m, radius_m, otherwise, put_back);
+    }
+
+    /// Whether wall is taken to be covered without some factors, since nobody knows where what is lacking would have been.
+    fn covers(&self, removed: Causes) -> bool {
+        let is_lost = self.case.is_torn || self.seen.unseen || self.seen.adrift;
+        removed.has(Cause::PositionLost) && is_lost
+            || removed.has(Cause::HeadSilent) && is_dark(self.case, self.seen)
+    }
+
+    /// The distance between neighbours that is left without some factors, by how the vehicle and its heads moved alone, m; infinite where
+    /// much is lacking for reasons that stay.
+    fn stays_m(&self, removed: Causes) -> f64 {
+        let Case { bounds_m, lacks, .. } = *self.case;
+        let (mut all, mut stay) = (0_u32, 0_u32);
+        for lack in lacks.between(bounds_m.0, bounds_m.1) {
+            all += 1;
+            stay += u32::from(!lack.why.is_within(removed));
+        }
+        if f64::from(stay) > STAYS * f64::from(all) {
+            return f64::INFINITY;
+        }
+        let [_, then] = self.drives(removed);
+        spacing::t_max_m(then.along_m(), 0.0, then.t_y_m)
+    }
+
+    /// Whether what is lost by chance, and stays so, leaves enough: where beams no longer swing, the wall can't be drawn together for it.
+    fn is_sampled_without(&self, removed: Causes, target_m: f64) -> bool {
+        let is_lossy = self.present.less(removed).has(Cause::MissingReturns);
+        if !is_lossy || !removed.has(Cause::OffAxis) {
+            return true;
+        }
+        let [_, then] = self.drives(removed);
+        spacing::t_max_m(self.drive.passes_needed * then.along_m(), 0.0, then.t_y_m) <= target_m
+    }
+
+    /// How vehicle and heads moved, and how they would have without some factors; `healthy_gap_s` is the time between passes of the heads
+    /// that there are: where silent or stalled ones stay so, it is that without them.
+    fn drives(&self, removed: Causes) -> [Drive; 2] {
+        let stalls = Causes::of(Cause::HeadSilent).with(Cause::HeadStalled);
+        let all_turn = self.present.less(removed).less(stalls) == self.present.less(removed);
+        let mut now = *self.drive;
+        if !all_turn {
+            now.healthy_gap_s = now.gap_s.max(now.healthy_gap_s);
+        }
+        [now, now.without(removed, MARGIN * self.case.target_m, all_turn)]
+    }
+
+    /// Diameter of the hole with all that is lacking put back, m: what the figures of driving have to explain.
+    fn full_m(&mut self) -> f64 {
+        let diameter_m = self.case.hole.diameter_m;
+        if let Some(full_m) = self.full_m {
+            return full_m;
+        }
+        let lacking = [
+            Cause::OutOfRange,
+            Cause::MissingReturns,
+            Cause::Occluded,
+            Cause::HeadSilent,
+            Cause::HeadStalled,
+            Cause::PositionLost,
+        ];
+        let lacking: Causes = lacking.into_iter().filter(|cause| self.present.has(*cause)).collect();
+        let most_m = diameter_m.min(WIDEST * self.case.target_m);
+        let mut full_m = diameter_m;
+        if !lacking.is_empty() && most_m > self.case.target_m {
+            let otherwise = Otherwise { to_come: self.to_come(), ..Otherwise::NOTHING };
+            self.lay(lacking, most_m / 2.0, &otherwise);
+            let bounds_m = self.case.bounds_m;
+            let (mut least_m, mut larger_m) = (self.case.target_m / 2.0, most_m);
+            for _ in 0..SEARCHED {
+                let tried_m = math::sqrt(least_m * larger_m);
+                if self.finder.has_circle_otherwise(bounds_m, tried_m / 2.0, &otherwise) {
+                    least_m = tried_m;
+                } else {
+                    larger_m = tried_m;
+                }
+            }
+            full_m = larger_m;
+        }
+        self.full_m = Some(full_m);
+        full_m
+    }
+
+    /// Where samples may still land; beyond the end of what was passed, the wall isn't as it is before.
+    fn to_come(&self) -> Option<Reach> {
+        self.case.to_come.filter(|_| is_passed(self.case))
+    }
+
+    /// How the wall would have been sampled without some factors.
+    fn otherwise(&mut self, removed: Causes) -> Otherwise {
+        let all = Some(Reach { from_m: f64::NEG_INFINITY, to_m: f64::INFINITY });
+        let swept = self.case.swept_by_all;
+        let mut covered = [None; 4];
+        let to_come = self.to_come();
+        if to_come.is_none() {
+            covered[3] = self.case.to_come;
+        }
+        if removed.has(Cause::NotPassed) {
+            let before = swept.map_or(f64::INFINITY, |swept| swept.from_m);
+            let beyond = swept.map_or(f64::NEG_INFINITY, |swept| swept.to_m);
+            covered[0] = Some(Reach { from_m: f64::NEG_INFINITY, to_m: before });
+            covered[1] = Some(Reach { from_m: beyond, to_m: f64::INFINITY });
+        }
+        if self.covers(removed) {
+            covered[2] = all;
+        }
+        let [now, then] = self.drives(removed);
+        let ratio = |then: f64, was: f64| if was > 0.0 { (then / was).clamp(LEAST, MOST) } else { 1.0 };
+        let is_drawn = [Cause::TooFast, Cause::OffAxis, Cause::Phase].iter().any(|cause| removed.has(*cause));
+        // Figures of one moment don't explain more than the hole.
+        let hole_m = if is_drawn { self.full_m() } else { self.case.hole.diameter_m };
+        Otherwise {
+            along: ratio(then.along_m(), now.along_m().min(hole_m.max(then.along_m()))),
+            around: ratio(then.t_y_m, now.t_y_m),
+            covered,
+            to_come,
+        }
+    }
+}
