@@ -86,7 +86,7 @@ fn is_in(hole: &Hole, target_m: f64, perimeter_m: f64, lack: &Lack) -> bool {
 /// The factors that were present.
 fn present(case: &Case<'_>, seen: &Seen, perimeter_m: f64) -> Causes {
     let Case { hole, bounds_m: (from_m, to_m), target_m, .. } = *case;
-    let around_m = (hole.diameter_m.min(WIDEST * target_m) + target_m) / 2.0;
+    let around_m = f64::midpoint(hole.diameter_m.min(WIDEST * target_m), target_m);
     let lacking = case.lacks.between(from_m - around_m, to_m + around_m);
     let near = |lack: &&Lack| {
         // Whatever is lacking round the wall where the hole is all round.

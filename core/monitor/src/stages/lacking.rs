@@ -57,7 +57,9 @@ impl Turning {
     /// Whether a ping that it would have made would have got nothing: drawn from what it loses by chance, by the number that its time is.
     fn would_lose(&mut self, when: MonoNs, rate: LossRate) -> bool {
         let LossRate { share, after_lost } = rate;
-        let after_heard = share * (1.0 - after_lost) / (1.0 - share).max(1e-3);
+        // A head that lost all, or whose losses never end, says nothing of how they begin.
+        let is_known = share < 1.0 && after_lost < 1.0;
+        let after_heard = if is_known { share * (1.0 - after_lost) / (1.0 - share) } else { share };
         let chance = if self.would_lose { after_lost } else { after_heard };
         self.would_lose = unit_of(when.0) < chance;
         self.would_lose
