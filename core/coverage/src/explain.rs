@@ -33,6 +33,7 @@ const OVER_PLAN: f64 = 1.15;
 const SWINGS: f64 = 0.85;
 /// Share of the target from which steps from the middle count.
 const COARSE: f64 = 0.75;
+
 /// Determines the causes of a section's hole from the sections within T of it.
 ///
 /// Allocates: never.

@@ -118,10 +118,7 @@ impl<'a> Trial<'a> {
 
     /// The factors without which no set will do: all the others together don't.
     fn needed(&mut self, present: Causes) -> Causes {
-        let mut is_needed = |cause: &Cause| {
-            let others = Causes::from_bits(present.bits() & !Causes::of(*cause).bits());
-            !self.passes_without(others, 1.0)
-        };
+        let mut is_needed = |cause: &Cause| !self.passes_without(present.without(*cause), 1.0);
         present.iter().filter(|cause| is_needed(cause)).collect()
     }
 
@@ -193,7 +190,8 @@ impl<'a> Trial<'a> {
     /// that there are: where silent or stalled ones stay so, it is that without them.
     fn drives(&self, removed: Causes) -> [Drive; 2] {
         let stalls = Causes::of(Cause::HeadSilent).with(Cause::HeadStalled);
-        let all_turn = self.present.less(removed).less(stalls) == self.present.less(removed);
+        let staying = self.present.less(removed);
+        let all_turn = staying.less(stalls) == staying;
         let mut now = *self.drive;
         if !all_turn {
             now.healthy_gap_s = now.gap_s.max(now.healthy_gap_s);
