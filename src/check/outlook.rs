@@ -3,7 +3,7 @@
 use headrace_sampling::SamplingError;
 use headrace_sampling::head::HeadMode;
 use headrace_sampling::margin::ExpectedErrors;
-use headrace_sampling::plan::{Answer, Inspection, Planner, Question, ThinStrip};
+use headrace_sampling::plan::{Answer, HELD_SHARE, Inspection, Planner, Question, ThinStrip};
 use headrace_vehicle::{Finding, Grade, VehicleConfig};
 use serde_json::{Value, json};
 
@@ -13,6 +13,9 @@ pub(super) struct Outlook {
     own: Option<Answer>,
     /// The answer with the largest speed.
     best: Option<Answer>,
+    /// The largest speed with the heads started for the planned speed, m/s; `None` if none is planned, or they aren't all in one mode.
+    as_started_mps: Option<f64>,
+    planned_mps: f64,
     /// Strips that the vehicle hides from some heads.
     hidden: Vec<ThinStrip>,
     /// Ids of the heads.
@@ -21,6 +24,8 @@ pub(super) struct Outlook {
     length_m: f64,
 }
 
+/// Speeds that differ by less than this share are told as one: what the advice keeps back for measuring the speed.
+const TOLD_APART: f64 = 0.02;
 /// Turns that differ by less than this share are the same.
 const SAME: f64 = 1e-6;
 
@@ -61,10 +66,16 @@ impl Outlook {
         let answers = planner.answers(&question, None)?;
         let mode = planner.modes().iter().position(|planned| Some(planned.mode.name) == own);
         let briefing = planner.briefing(mode.unwrap_or(0), ANY_SPEED_MPS)?;
+        let planned_mps = vehicle.planned_speed_mps;
+        let as_started_mps = mode
+            .filter(|_| planned_mps > 0.0)
+            .and_then(|mode| planner.as_started_mps(mode, vehicle.target_m, planned_mps).ok());
         let best = answers.iter().find(|answer| answer.best && answer.v_max_mps.is_some()).cloned();
         Ok(Some(Self {
             own: answers.into_iter().find(|answer| Some(answer.mode) == own),
             best,
+            as_started_mps,
+            planned_mps,
             hidden: briefing.strips,
             heads: ids,
             perimeter_m: vehicle.tunnel.profile.perimeter_m(),
@@ -85,6 +96,15 @@ impl Outlook {
             let problem =
                 format!("is {planned_mps}, faster than the target allows: at most {v_max_mps:.3} m/s");
             found.push(warning("heads.planned_speed_mps", problem));
+        } else if let (Some(v_max_mps), Some(started_mps)) = (v_max_mps, self.as_started_mps)
+            && started_mps < planned_mps
+        {
+            let problem = format!(
+                "is {planned_mps}, which leaves no room: with the heads started for it at most {:.3} m/s; {:.3} leaves some",
+                down(started_mps),
+                down(HELD_SHARE * v_max_mps)
+            );
+            found.push(warning("heads.planned_speed_mps", problem));
         }
         found
     }
@@ -102,6 +122,17 @@ impl Outlook {
         match &self.own {
             Some(own) => lines.push(format!("plan in {}: {}", own.mode, speed(own))),
             None => lines.push("plan: the heads are not in one mode".to_owned()),
+        }
+        let v_max_mps = self.own.as_ref().and_then(|own| own.v_max_mps);
+        if let (Some(v_max_mps), Some(started_mps)) = (v_max_mps, self.as_started_mps)
+            && (started_mps / v_max_mps - 1.0).abs() > TOLD_APART
+        {
+            let hours = if started_mps > 0.0 { self.length_m / started_mps / 3600.0 } else { f64::INFINITY };
+            lines.push(format!(
+                "     with heads started for the planned {} m/s: at most {:.3} m/s, {hours:.1} h",
+                self.planned_mps,
+                down(started_mps)
+            ));
         }
         let is_own = |best: &&Answer| self.own.as_ref().is_some_and(|own| own.mode == best.mode);
         if let Some(best) = self.best.as_ref().filter(|best| !is_own(best)) {
@@ -156,7 +187,7 @@ impl Outlook {
             })
         };
         json!({
-            "own": self.own.as_ref().map(answer), "fastest": self.best.as_ref().map(answer),
+            "own": self.own.as_ref().map(answer), "as_started_v_max_mps": self.as_started_mps, "fastest": self.best.as_ref().map(answer),
             "hidden": self.hidden.iter().map(strip).collect::<Vec<_>>(),
         })
     }

@@ -21,12 +21,14 @@ pub(super) fn lines(findings: &Findings, args: &Plan) -> Result<String, Failure>
     let inspection = findings.planner.inspection();
     let held_mps = math::floor_to_i64(1e3 * HELD_SHARE * speed_mps) as f64 / 1e3;
     let mode = findings.planner.modes().get(number).map_or("", |planned| planned.mode.name);
-    let met =
-        findings.question.target_m.map(|target_m| format!(": {target_m} m at {speed_mps:.3} m/s in {mode}"));
+    let met = findings
+        .question
+        .target_m
+        .map(|target_m| format!(": {target_m} m in {mode}, driven at {held_mps:.3} m/s"));
     let target = args.target.map(|target_m| format!("target_m = {target_m}\n")).unwrap_or_default();
     let mut text = format!(
         "# In place of the same keys of {}{}\n{target}\n[heads]\nlayout = {:?}\n\
-         # Less than that by what a pilot's speed varies: heads apart along the hull are in phase about the planned speed only.\n\
+         # The most is {speed_mps:.3}, less what a pilot's speed varies: heads apart along the hull are in phase about the planned speed only.\n\
          planned_speed_mps = {held_mps:.3}\n",
         vehicle.display(),
         met.unwrap_or_default(),

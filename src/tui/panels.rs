@@ -270,6 +270,8 @@ fn sensor_words(sensor: &SensorRow, long: bool) -> (String, Lamp) {
         SensorState::Silent => (format!("{id} SILENT {age}"), Lamp::Red),
         SensorState::Never => (format!("{id} never heard"), Lamp::Red),
         SensorState::Stalled => (format!("{id} STALLED"), Lamp::Red),
+        SensorState::Hung => (format!("{id} hangs"), Lamp::Red),
+        SensorState::Deaf => (format!("{id} hears no wall"), Lamp::Red),
         SensorState::Distrusted => (format!("{id} not believed"), Lamp::Amber),
     };
     let why = if long && !why.is_empty() { format!(": {why}") } else { String::new() };

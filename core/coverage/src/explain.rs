@@ -29,6 +29,8 @@ use case::{HELPS, Seen, WIDEST, is_dark, is_passed};
 const WELL_OVER: f64 = 1.2;
 /// Speed over the planned one from which it wasn't kept to.
 const OVER_PLAN: f64 = 1.15;
+/// The same where it is over every speed that fits, too: no more than what measuring it may be off.
+const OVER_ALL: f64 = 1.03;
 /// The same of the swing between passes: even a steady vehicle sways.
 const SWINGS: f64 = 0.85;
 /// Share of the target from which steps from the middle count.
@@ -109,7 +111,11 @@ fn present(case: &Case<'_>, seen: &Seen, perimeter_m: f64) -> Causes {
     add(drive.middle_t_y_m > COARSE * target_m, Cause::AngularStep);
     let as_planned = spacing::t_max_m(drive.planned_along_m(), drive.advance_m(), drive.middle_t_y_m);
     let over = if coarse { drive.planned_along_m() } else { as_planned } / target_m;
-    add(over > WELL_OVER || over > 1.0 && drive.speed_mps > OVER_PLAN * drive.planned_mps, Cause::TooFast);
+    let is_over_all = drive.fits_mps > 0.0
+        && drive.planned_mps > 0.0
+        && drive.speed_mps > OVER_ALL * drive.fits_mps.max(drive.planned_mps);
+    let is_over_plan = over > 1.0 && drive.speed_mps > OVER_PLAN * drive.planned_mps;
+    add(over > WELL_OVER || is_over_plan || is_over_all, Cause::TooFast);
     let is_slow = drive.is_slow_out_of_phase(1.0 / HELPS);
     let is_uneven = drive.planned_gap_s < HELPS * drive.healthy_gap_s;
     // At another speed heads apart along the hull may happen to be even.

@@ -5,6 +5,7 @@
 
 use serde::{Deserialize, Serialize};
 
+use super::cause::Cause;
 use super::causes::Causes;
 use headrace_snapshot::stateful;
 
@@ -20,6 +21,8 @@ pub struct Lack {
     pub x_m: f64,
     /// Arc length, m.
     pub arc_m: f64,
+    /// The head that it is of, by number.
+    pub head: u8,
     /// All that would have to be otherwise for it to be there.
     pub why: Causes,
 }
@@ -73,6 +76,22 @@ impl Lacks {
         }
     }
 
+    /// Puts the latest lacks of a head that are put down to one cause down to another, as many as that; the chainages between which they
+    /// are, m, if there are any.
+    ///
+    /// Allocates: never.
+    pub fn revise(&mut self, head: u8, count: usize, [from, to]: [Cause; 2]) -> Option<[f64; 2]> {
+        let at = if self.ring.len() < ROOM { self.ring.len() } else { self.next as usize };
+        let (newer, older) = self.ring.split_at_mut(at);
+        let latest = newer.iter_mut().rev().chain(older.iter_mut().rev());
+        let of_head = latest.filter(|lack| lack.head == head && lack.why == Causes::of(from)).take(count);
+        of_head.fold(None, |between_m: Option<[f64; 2]>, lack| {
+            lack.why = Causes::of(to);
+            let [least_m, most_m] = between_m.unwrap_or([lack.x_m; 2]);
+            Some([least_m.min(lack.x_m), most_m.max(lack.x_m)])
+        })
+    }
+
     /// Those between two chainages, in no particular order.
     pub fn between(&self, from_m: f64, to_m: f64) -> impl Iterator<Item = &Lack> {
         let meets = move |extent_m: &[f64; 2]| extent_m[0] <= to_m && extent_m[1] >= from_m;
@@ -86,12 +105,11 @@ impl Lacks {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::cause::Cause;
 
     #[test]
     fn the_latest_are_kept() {
         let mut lacks = Lacks::default();
-        let lack = |x_m: f64| Lack { x_m, arc_m: 1.0, why: Causes::of(Cause::HeadSilent) };
+        let lack = |x_m: f64| Lack { x_m, arc_m: 1.0, head: 0, why: Causes::of(Cause::HeadSilent) };
         for k in 0..2 * ROOM + 10 {
             lacks.add(lack(k as f64));
         }
@@ -101,6 +119,23 @@ mod tests {
         assert_eq!(lacks.between(first, first + 4.0).count(), 5);
     }
 
+    #[test]
+    fn the_latest_of_one_head_are_put_down_to_something_else() {
+        let mut lacks = Lacks::default();
+        let (missing, silent) = (Cause::MissingReturns, Cause::HeadSilent);
+        for k in 0..ROOM + 100 {
+            let (head, why) = (u8::from(k % 2 == 1), if k % 5 == 0 { Cause::Occluded } else { missing });
+            lacks.add(Lack { x_m: k as f64, arc_m: 0.0, head, why: Causes::of(why) });
+        }
+        let last = (ROOM + 99) as f64;
+        // Of ten in a row head 1 has five, one of them occluded: the very last.
+        assert_eq!(lacks.revise(1, 8, [missing, silent]), Some([last - 18.0, last - 2.0]));
+        let revised = |lack: &&Lack| lack.why == Causes::of(silent);
+        let revised: Vec<Lack> = lacks.between(0.0, f64::INFINITY).filter(revised).copied().collect();
+        assert!(revised.len() == 8 && revised.iter().all(|lack| lack.head == 1 && lack.x_m >= last - 18.0));
+        assert_eq!(lacks.revise(2, 8, [missing, silent]), None);
+    }
+
     /// Whatever was looked for in blocks is what is there without them, while the ring fills and is written over, on a way there and back.
     #[test]
     fn none_is_passed_over() {
@@ -108,7 +143,7 @@ mod tests {
         for k in 0..ROOM + 5 * BLOCK + 77 {
             let along_m = (k % 9000) as f64 * 0.01;
             let x_m = if (k / 9000).is_multiple_of(2) { along_m } else { 90.0 - along_m };
-            lacks.add(Lack { x_m, arc_m: k as f64, why: Causes::of(Cause::HeadSilent) });
+            lacks.add(Lack { x_m, arc_m: k as f64, head: 0, why: Causes::of(Cause::HeadSilent) });
             if k % 977 == 0 || k >= ROOM && k % 101 == 0 {
                 let [from_m, to_m] = [x_m - 0.3, x_m + 0.1 * (k % 7) as f64];
                 let all = lacks.ring.iter().filter(|lack| (from_m..=to_m).contains(&lack.x_m));

@@ -63,7 +63,7 @@ pub use sections::{CONFIDENCE_SD, Judging, Request, Sections, back_to_m};
 pub use soundings::{GridLayout, GridNode, GridSummary, Soundings};
 pub use store::{Fidelity, Kept, SampleStore, StoreError, StoreLayout, StoreUse, WallSample};
 pub use trust::{Beam, Distrust};
-pub use unsure::{Driven, Stretch, Unsure};
+pub use unsure::{Driven, Largest, Stretch, Unsure};
 pub use visits::{Visit, Visits};
 pub use wall::{HeadWall, MOST_WAITING, Sorted, Taken};
 pub use wall_limits::{PlacedReturn, WallLimits};

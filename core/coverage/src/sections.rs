@@ -456,9 +456,9 @@ impl Sections {
     pub fn unsure(&self, index: i64) -> Option<Stretch> {
         let section = self.get(index)?;
         let hole_m = section.hole.map_or(0.0, |hole| hole.diameter_m);
-        let (from, to) = (index, index + 1);
-        let (why, driven) = (section.unsure()?, Driven::of(&section.passage.drive));
-        Some(Stretch { why, from, to, sections: 1, hole_m: [hole_m, section.hole_sd_m], driven })
+        let error_m = self.confidence_sd() * section.hole_sd_m;
+        let driven = Driven::of(&section.passage);
+        Some(Stretch::one(section.unsure()?, index, [hole_m, error_m, section.hole_sd_m], driven))
     }
 
     /// The unsure stretches of the way, in order. Allocates: for the end of a dive.

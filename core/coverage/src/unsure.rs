@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::passage::Drive;
+use super::passage::{Drive, Passage};
 
 /// Why a section has neither passed nor failed, though no more samples will come without turning back.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
@@ -63,11 +63,18 @@ pub struct Stretch {
     pub from: i64,
     /// Index after the last.
     pub to: i64,
-    /// How many of the sections between are unsure for this reason.
+    /// Those of the sections between that are unsure for this reason, and where more than the hole its error matters.
+    of: [Largest; 2],
+}
+
+/// Unsure sections, and the one of them with the largest hole.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+pub struct Largest {
+    /// How many.
     pub sections: u32,
     /// Largest hole, and the standard deviation of that hole, m.
     pub hole_m: [f64; 2],
-    /// How the section with the largest hole was driven.
+    /// How that section was driven.
     pub driven: Driven,
 }
 
@@ -80,23 +87,55 @@ pub struct Driven {
     pub fits_mps: f64,
     /// At this speed heads at their scheduled angles pass unevenly: those apart along the hull are out of phase.
     pub is_uneven: bool,
+    /// Heads were silent, or heard no wall: speeds are those of all heads.
+    pub is_short: bool,
 }
 
 /// Time between passes over that of evenly spread ones from which they are uneven.
 const UNEVEN: f64 = 1.05;
 
 impl Driven {
-    /// From how vehicle and heads moved.
-    pub fn of(drive: &Drive) -> Self {
-        let Drive { speed_mps, fits_mps, planned_gap_s, all_gap_s, .. } = *drive;
-        Self { speed_mps, fits_mps, is_uneven: planned_gap_s > UNEVEN * all_gap_s }
+    /// From a section's passage.
+    pub fn of(passage: &Passage) -> Self {
+        let Drive { speed_mps, passes_needed, planned_gap_s, all_gap_s, .. } = passage.drive;
+        Self {
+            speed_mps,
+            fits_mps: passage.drive.with_losses_mps(passes_needed),
+            is_uneven: planned_gap_s > UNEVEN * all_gap_s,
+            is_short: !passage.silent.is_empty(),
+        }
     }
 }
 
+/// Share of the hole from which its error is what matters.
+const MOSTLY_ERROR: f64 = 0.2;
 /// Sections farther apart than this are of different stretches, m.
 const JOIN_M: f64 = 0.5;
 
 impl Stretch {
+    /// Of one section: its hole and by how much that may be larger or smaller, m, with the standard deviation.
+    pub fn one(why: Unsure, index: i64, [hole_m, error_m, sd_m]: [f64; 3], driven: Driven) -> Self {
+        let section = Largest { sections: 1, hole_m: [hole_m, sd_m], driven };
+        let is_error = error_m > MOSTLY_ERROR * hole_m;
+        let of = if is_error { [Largest::default(), section] } else { [section, Largest::default()] };
+        Self { why, from: index, to: index + 1, of }
+    }
+
+    /// How many of its sections are unsure for this reason.
+    pub fn sections(&self) -> u32 {
+        self.of.iter().map(|of| of.sections).sum()
+    }
+
+    /// Whether in most of its sections the error matters more than the hole.
+    pub fn is_mostly_error(&self) -> bool {
+        self.of[1].sections > self.of[0].sections
+    }
+
+    /// What speaks for it: the largest hole of those sections that are most of it.
+    pub fn largest(&self) -> &Largest {
+        &self.of[usize::from(self.is_mostly_error())]
+    }
+
     /// Adds a section; false if it is unsure for another reason, or too far away.
     #[must_use]
     pub fn join(&mut self, other: &Self, section_m: f64) -> bool {
@@ -105,9 +144,12 @@ impl Stretch {
             return false;
         }
         (self.from, self.to) = (self.from.min(other.from), self.to.max(other.to));
-        self.sections += other.sections;
-        if other.hole_m[0] > self.hole_m[0] {
-            (self.hole_m, self.driven) = (other.hole_m, other.driven);
+        for (mine, other) in self.of.iter_mut().zip(&other.of) {
+            let sections = mine.sections + other.sections;
+            if other.hole_m[0] > mine.hole_m[0] {
+                *mine = *other;
+            }
+            mine.sections = sections;
         }
         true
     }
@@ -119,7 +161,7 @@ mod tests {
 
     fn one(why: Unsure, section: i64, hole_m: f64) -> Stretch {
         let driven = Driven { speed_mps: hole_m, ..Driven::default() };
-        Stretch { why, from: section, to: section + 1, sections: 1, hole_m: [hole_m, 0.1], driven }
+        Stretch::one(why, section, [hole_m, 0.1 * hole_m, 0.05 * hole_m], driven)
     }
 
     #[test]
@@ -129,7 +171,23 @@ mod tests {
         assert!(stretch.join(&one(Unsure::Position, 7, 0.5), 0.25), "two sections lie between");
         assert!(!stretch.join(&one(Unsure::Position, 15, 0.5), 0.25), "three");
         assert!(!stretch.join(&one(Unsure::DoubtfulReturns, 12, 0.5), 0.25), "another reason");
-        let all = Stretch { from: 7, sections: 3, ..one(Unsure::Position, 11, 0.6) };
-        assert_eq!(stretch, all);
+        assert_eq!((stretch.from, stretch.to, stretch.sections()), (7, 12, 3));
+        let largest = Largest { sections: 3, ..*one(Unsure::Position, 11, 0.6).largest() };
+        assert_eq!(*stretch.largest(), largest);
+    }
+
+    /// One section that nearly nothing is known of says nothing of the others, whatever the size of its hole.
+    #[test]
+    fn most_of_a_stretch_speaks_for_it() {
+        let lost = |section| Stretch::one(Unsure::Position, section, [0.9, 1.4, 0.7], Driven::default());
+        let mut stretch = lost(0);
+        assert!(stretch.is_mostly_error());
+        assert!(stretch.join(&one(Unsure::Position, 1, 0.5), 0.25));
+        assert!(stretch.join(&one(Unsure::Position, 2, 0.49), 0.25));
+        assert!(!stretch.is_mostly_error());
+        assert_eq!((stretch.sections(), stretch.largest().sections), (3, 2));
+        assert_eq!(stretch.largest().hole_m, one(Unsure::Position, 1, 0.5).largest().hole_m);
+        assert!(stretch.join(&lost(3), 0.25) && stretch.join(&lost(4), 0.25));
+        assert!(stretch.is_mostly_error() && stretch.sections() == 5);
     }
 }

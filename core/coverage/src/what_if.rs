@@ -41,7 +41,18 @@ impl Sections {
         } else {
             self.measured(outlook.way)
         };
-        targets_m.iter().map(|target_m| self.metres_of(&measured, section_m, *target_m, outlook)).collect()
+        // Of what was judged in this dive nothing has to be asked again; where all was measured, the sections that are flagged already count, too.
+        let is_own = |target_m: f64| {
+            (section_m - self.section_m()).abs() <= 0.0 && (target_m - self.target_m()).abs() <= 0.0
+        };
+        let metres = |target_m: &f64| {
+            if is_own(*target_m) {
+                self.metres(outlook.way)
+            } else {
+                self.metres_of(&measured, section_m, *target_m, outlook)
+            }
+        };
+        targets_m.iter().map(metres).collect()
     }
 
     /// Verdicts for another target, by section, of all whose hole has been measured: as [`Sections::what_if`] counts them.

@@ -112,6 +112,7 @@ mod tests {
             layout: HeadLayout::PhaseShift,
             configured: 0,
             heads: [None; headrace_sampling::head::MAX_HEADS],
+            deaf: headrace_sampling::head::HeadSet::default(),
             losses: [headrace_sampling::losses::LossRate::default(); headrace_sampling::head::MAX_HEADS],
         };
         let advice = Advisor::new(&profile, task, &[], &[]).advise(&nowhere, Swing::default(), None);

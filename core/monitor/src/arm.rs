@@ -21,6 +21,7 @@ use super::messages::{
 };
 use super::notes::Notes;
 use super::other_settings;
+use super::repeats::Repeats;
 use super::resources::{Coverage, Digests, Finder, Tally, Target, TickTime, TunnelDesign, VehicleEntities};
 use super::ring;
 use super::run::Loop;
@@ -33,7 +34,7 @@ use headrace_fusion::Navigation;
 use headrace_sampling::advice::{self, Task};
 use headrace_sampling::head::{HeadMode, HeadSet, HeadSpec, MAX_HEADS};
 use headrace_sensor::device::SensorKind;
-use headrace_sensor::reading::SourceId;
+use headrace_sensor::reading::{MAX_SOURCES, SourceId};
 use headrace_vehicle::Mission;
 
 /// Capacity for the readings of one tick: the shortest frame of any device has over ten bytes.
@@ -98,7 +99,8 @@ impl App {
         advisor: &advice::Advisor,
     ) -> VehicleEntities {
         let world = &mut self.world;
-        let navigator = Navigator { navigation, next_beat: None };
+        let repeats = vec![Repeats::default(); MAX_SOURCES];
+        let navigator = Navigator { navigation, next_beat: None, repeats, hung: 0 };
         let vehicle = world.spawn((navigator, VehicleState::default(), Driving::default())).id();
         let mut hidden = advisor.hidden_angles();
         let mut heads = Vec::new();

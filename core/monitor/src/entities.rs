@@ -10,6 +10,7 @@ use serde::{Deserialize, Serialize};
 pub use super::head_motion::MeasuredMotion;
 pub use super::loss_count::LossCount;
 use super::messages::PlacedPing;
+use super::repeats::Repeats;
 use headrace_coverage::{HeadReach, HeadWall, MOST_WAITING};
 use headrace_fusion::filter::cable::CableDoubt;
 use headrace_fusion::filter::pose_sd::PoseSd;
@@ -29,17 +30,23 @@ pub struct Navigator {
     pub navigation: Box<dyn Navigation>,
     /// The next multiple of the advice period; `None` before the first packet.
     pub next_beat: Option<MonoNs>,
+    /// Repetitions, by source.
+    pub repeats: Vec<Repeats>,
+    /// Bits of the sources that hang.
+    pub hung: u64,
 }
 
 impl Stateful for Navigator {
     fn save(&self, to: &mut Saver) {
         self.navigation.save(to);
         to.value(&self.next_beat);
+        to.value(&(&self.repeats, self.hung));
     }
 
     fn restore(&mut self, from: &mut Restorer<'_>) -> Result<(), SnapshotError> {
         self.navigation.restore(from)?;
         self.next_beat = from.value()?;
+        (self.repeats, self.hung) = from.value()?;
         Ok(())
     }
 }

@@ -120,6 +120,10 @@ pub enum SensorState {
     Silent,
     /// A head whose readings come from one angle.
     Stalled,
+    /// A head that turns and pings, and hears no wall.
+    Deaf,
+    /// It repeats its last reading.
+    Hung,
     /// A head that isn't believed.
     Distrusted,
     /// Readings come.
@@ -165,6 +169,10 @@ pub struct LiveState {
     pub heads: u64,
     /// Sources of the heads that turn.
     pub turning: u64,
+    /// Bits of the heads that turn and ping, and hear no wall.
+    pub deaf: u64,
+    /// Bits of the sources that repeat a reading.
+    pub hung: u64,
     /// Number of sources.
     pub sources: u16,
     /// Receive time of each source's last reading.
@@ -172,7 +180,7 @@ pub struct LiveState {
 }
 
 stateful!(LiveState {
-    state: now, at, position, chainage_m, sd, pass_sd_m, stand_s, speed_mps, advice, metres, unsure, passed, back_to_m, alerts, turning;
+    state: now, at, position, chainage_m, sd, pass_sd_m, stand_s, speed_mps, advice, metres, unsure, passed, back_to_m, alerts, turning, deaf, hung;
     slots: heard;
     fixed: target_m, confidence_sd, heads, sources;
 });
@@ -199,6 +207,8 @@ impl LiveState {
             alerts: [None; MOST_ALERTS],
             heads,
             turning: 0,
+            deaf: 0,
+            hung: 0,
             sources,
             heard: [None; MAX_SOURCES],
         }
@@ -234,6 +244,8 @@ impl LiveState {
             None => SensorState::Never,
             Some(age) if age.0 > OLD_AFTER.0 => SensorState::Silent,
             Some(_) if self.alerts.iter().flatten().any(distrusted) => SensorState::Distrusted,
+            Some(_) if bit(self.deaf) => SensorState::Deaf,
+            Some(_) if bit(self.hung) => SensorState::Hung,
             Some(_) if self.at.is_some() && bit(self.heads) && !bit(self.turning) => SensorState::Stalled,
             Some(_) => SensorState::Ok,
         }
@@ -244,6 +256,11 @@ impl LiveState {
         let is_silent =
             |source: &usize| matches!(self.sensor(*source), SensorState::Never | SensorState::Silent);
         (0..usize::from(self.sources)).filter(is_silent)
+    }
+
+    /// Sensors in a state, in the order of sources.
+    pub fn sensors_that_are(&self, state: SensorState) -> impl Iterator<Item = usize> + '_ {
+        (0..usize::from(self.sources)).filter(move |source| self.sensor(*source) == state)
     }
 
     /// Whether a profiling head gives readings.

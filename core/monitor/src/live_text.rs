@@ -1,7 +1,7 @@
 //! Words for what is told live: the place first, then what, then what to do. Terminals break them to their width.
 
 use super::alert_list::{AlertChange, ListedAlertJson};
-use super::live_state::{Condition, Lamp, LiveMetres, LiveState, PositionDoubt};
+use super::live_state::{Condition, Lamp, LiveMetres, LiveState, PositionDoubt, SensorState};
 use super::pilot_text::{AdviceFigures, actions_text, advice_text, cause_text, no_position_text, station};
 use super::telling::Told;
 pub use super::unsure_stretch::{helps_text, unsure_text};
@@ -93,7 +93,8 @@ impl PilotLine {
 pub fn status_line(state: &LiveState, profile: &Profile, name: &dyn Fn(usize) -> String) -> PilotLine {
     let condition = state.condition();
     let place = state.chainage_m.map_or_else(|| "-+---.--".to_owned(), station);
-    let v_max = state.v_max_mps().map_or_else(String::new, |mps| format!("{mps:.2} m/s"));
+    let decimals = speed_decimals(state.speed_mps, state.v_max_mps());
+    let v_max = state.v_max_mps().map_or_else(String::new, |mps| format!("{mps:.decimals$} m/s"));
     let (what, action) = match condition {
         Condition::NoData => (waiting_text(state).to_owned(), String::new()),
         Condition::Old(age) => (format!("OLD {}: nothing from any sensor", age_text(age)), "stop".to_owned()),
@@ -116,7 +117,7 @@ pub fn status_line(state: &LiveState, profile: &Profile, name: &dyn Fn(usize) ->
     let speed = match state.speed_mps {
         // No minus before a zero.
         Some(speed_mps) if !is_old => {
-            format!("{:.2} m/s", if speed_mps.abs() < 0.005 { 0.0 } else { speed_mps })
+            format!("{:.decimals$} m/s", if speed_mps.abs() < 0.005 { 0.0 } else { speed_mps })
         }
         _ => String::new(),
     };
@@ -132,12 +133,25 @@ pub fn status_line(state: &LiveState, profile: &Profile, name: &dyn Fn(usize) ->
             [one] => parts.push(format!("{} silent", name(*one))),
             some => parts.push(format!("{} of {} sensors silent", some.len(), state.sources)),
         }
+        let deaf = state.sensors_that_are(SensorState::Deaf);
+        parts.extend(deaf.map(|source| format!("{} hears no wall", name(source))));
+        let hung = state.sensors_that_are(SensorState::Hung);
+        parts.extend(hung.map(|source| format!("{} hangs", name(source))));
         let forecast = losses_text(state).or_else(|| forecast_text(state));
         let any_speed = matches!(condition, Condition::Passed | Condition::GoingBack(_));
         let counts = state.has_sonar() && state.speed_mps.is_some() && !any_speed;
         parts.extend(forecast.filter(|_| counts));
     }
     PilotLine { place, speed, what: parts, action, lamp: Some(condition.lamp()) }
+}
+
+/// Decimals with which the present speed and the one that is told are two figures: a speed isn't too fast for what reads the same.
+pub fn speed_decimals(speed_mps: Option<f64>, v_max_mps: Option<f64>) -> usize {
+    let hundredths = |mps: f64| (mps * 100.0).round();
+    let is_over = |(speed_mps, v_max_mps): (f64, f64)| {
+        speed_mps > v_max_mps && (hundredths(speed_mps) - hundredths(v_max_mps)).abs() < 0.5
+    };
+    if speed_mps.zip(v_max_mps).is_some_and(is_over) { 3 } else { 2 }
 }
 
 fn waiting_text(state: &LiveState) -> &'static str {
@@ -290,13 +304,17 @@ impl Told {
     pub fn adds_line(&self) -> bool {
         let Self::AlertChange { change, alert } = self else { return true };
         let is_left = matches!(alert.kind, "cable_left" | "time_left" | "battery_left");
-        let is_told_once = matches!(
-            alert.kind,
-            "head_scattered" | "head_constant" | "head_outvoted" | "cable_doubted" | "setting_doubted"
-        );
+        let is_sensor =
+            matches!(alert.kind, "sensor_silent" | "sensor_stalled" | "sensor_deaf" | "sensor_hung");
+        let is_told_once = is_sensor
+            || matches!(
+                alert.kind,
+                "head_scattered" | "head_constant" | "head_outvoted" | "cable_doubted" | "setting_doubted"
+            );
         match change {
             AlertChange::Acknowledged => true,
-            AlertChange::Raised | AlertChange::Changed => is_left,
+            AlertChange::Raised => is_left || is_sensor,
+            AlertChange::Changed => is_left,
             // Of what nobody has acknowledged the end is told when it comes, not when it is acknowledged.
             AlertChange::Rectified => is_told_once,
             AlertChange::Cleared => is_told_once && alert.rectified_s == alert.cleared_s,

@@ -48,6 +48,8 @@ pub struct Doubts {
     pub setting: Option<SettingDoubt>,
     /// How much longer the vehicle should stand still for its gyros' bias to be known, s.
     pub stand_s: u32,
+    /// Bits of the sources that hang: they repeat a reading, and count as silent.
+    pub hung: u64,
 }
 
 /// An epoch with its fix: a multiple of [`ADVICE_PERIOD`](super::advice_log::ADVICE_PERIOD), or a sonar ping.

@@ -34,8 +34,7 @@ pub struct CauseFigures {
     pub middle_t_y_m: f64,
     /// Share of pings without a return.
     pub missing_share: f64,
-    /// Where it takes several passes over each place for one, since returns are lost: the largest speed that allows for them,
-    /// m/s; else zero.
+    /// The largest speed that meets the target with the heads as scheduled, and allows for returns that are lost, m/s; zero if none is known.
     pub with_losses_mps: f64,
     /// How far the beams swung along the tunnel between two passes, m.
     pub swing_m: f64,
@@ -47,7 +46,7 @@ impl From<&Evidence> for CauseFigures {
     fn from(evidence: &Evidence) -> Self {
         let Evidence { causes, speed_mps, t_y_m, middle_t_y_m, missing_share, swing_m, silent_heads, .. } =
             *evidence;
-        let with_losses_mps = if evidence.is_lossy() { evidence.with_losses_mps } else { 0.0 };
+        let with_losses_mps = evidence.with_losses_mps;
         Self { causes, speed_mps, t_y_m, middle_t_y_m, missing_share, with_losses_mps, swing_m, silent_heads }
     }
 }
@@ -85,9 +84,19 @@ impl CauseFigures {
         }
     }
 
-    /// The speed at which to pass again, m/s: what is advised, or less where more was lost than that allows for.
+    /// The speed at which to pass again, m/s, beside the one that is advised now: that of the heads as scheduled where these are to be mended
+    /// first, else the lower of the two.
     pub fn again_mps(&self, v_max_mps: f64) -> f64 {
-        if self.with_losses_mps > 0.0 { v_max_mps.min(self.with_losses_mps) } else { v_max_mps }
+        let mended =
+            [Cause::HeadSilent, Cause::HeadStalled, Cause::Phase, Cause::AngularStep, Cause::OutOfRange];
+        let with_losses_mps = self.with_losses_mps;
+        if with_losses_mps <= 0.0 {
+            v_max_mps
+        } else if mended.iter().any(|cause| self.causes.has(*cause)) {
+            with_losses_mps
+        } else {
+            v_max_mps.min(with_losses_mps)
+        }
     }
 
     /// The main cause.
@@ -126,14 +135,14 @@ fn one_cause_text(cause: Cause, figures: &CauseFigures) -> String {
     }
 }
 
-/// Text of the heads that were silent, as people count them in the order of the vehicle file: sources' own names often have numbers
+/// Text of the heads that were silent, heard nothing or weren't believed, as people count them in the order of the vehicle file: sources' own names often have numbers
 /// that begin with 0.
 fn silent_text(heads: HeadSet) -> String {
     let numbers: Vec<String> = heads.iter().map(ordinal).collect();
     match numbers.as_slice() {
-        [] => "heads silent".to_owned(),
-        [only] => format!("the {only} head silent"),
-        [others @ .., last] => format!("the {} and {last} head silent", others.join(", ")),
+        [] => "no wall from the heads".to_owned(),
+        [only] => format!("no wall from the {only} head"),
+        [others @ .., last] => format!("no wall from the {} and {last} head", others.join(", ")),
     }
 }
 
@@ -188,7 +197,7 @@ pub fn action_text(action: Action, back_to_m: f64, at_most_mps: f64) -> String {
             return format!("{back}, then with the heads in phase, at {at_most_mps:.2} m/s");
         }
         Action::InPhase => format!("{back}, then with the heads in phase,"),
-        Action::Head => format!("{back}, then with that head repaired or without it,"),
+        Action::Head => format!("{back}, then with that head repaired,"),
         Action::HeadBack => format!("get what is silent back, then {back},"),
         Action::Position => format!("once the position is back, {back},"),
         Action::Again => format!("{back}, then from end to end,"),
@@ -418,9 +427,9 @@ mod tests {
     fn silent_heads_are_named_as_people_count() {
         let text =
             |heads: &[usize]| silent_text(heads.iter().fold(HeadSet::default(), |set, head| set.with(*head)));
-        assert_eq!(text(&[1]), "the 2nd head silent");
-        assert_eq!(text(&[0, 1, 3]), "the 1st, 2nd and 4th head silent");
-        assert_eq!(text(&[]), "heads silent");
+        assert_eq!(text(&[1]), "no wall from the 2nd head");
+        assert_eq!(text(&[0, 1, 3]), "no wall from the 1st, 2nd and 4th head");
+        assert_eq!(text(&[]), "no wall from the heads");
     }
 
     #[test]

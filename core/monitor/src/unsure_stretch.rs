@@ -24,6 +24,9 @@ pub struct UnsureStretch {
     /// How the section with that hole was driven.
     #[serde(skip)]
     pub driven: Driven,
+    /// In most of its sections the error matters more than the hole.
+    #[serde(skip)]
+    pub is_mostly_error: bool,
 }
 
 impl UnsureStretch {
@@ -34,16 +37,17 @@ impl UnsureStretch {
 
     /// The same with the length of a section, m, and the confidence, standard deviations.
     pub(super) fn from_sections(stretch: &Stretch, section_m: f64, confidence_sd: f64) -> Self {
-        let [hole_m, hole_sd_m] = stretch.hole_m;
+        let [hole_m, hole_sd_m] = stretch.largest().hole_m;
         Self {
             why: stretch.why,
             from_m: stretch.from as f64 * section_m,
             to_m: stretch.to as f64 * section_m,
-            metres_m: f64::from(stretch.sections) * section_m,
+            metres_m: f64::from(stretch.sections()) * section_m,
             hole_m,
             hole_sd_m,
             hole_error_m: confidence_sd * hole_sd_m,
-            driven: stretch.driven,
+            driven: stretch.largest().driven,
+            is_mostly_error: stretch.is_mostly_error(),
         }
     }
 }
@@ -67,19 +71,18 @@ pub fn unsure_text(stretch: &UnsureStretch) -> String {
 /// Shares of the speed that fits within which a speed is that one.
 const AS_FITS: [f64; 2] = [0.98, 1.02];
 
-/// Share of the hole from which its error is what matters.
-const MOSTLY_ERROR: f64 = 0.2;
-
 /// What would help; empty where nothing does.
 pub fn helps_text(stretch: &UnsureStretch) -> String {
     let surer = "again with a surer position";
     let helps = match stretch.why {
         Unsure::NotInspected => "pass it whole to inspect it",
         Unsure::Position => {
-            let Driven { speed_mps, fits_mps, is_uneven } = stretch.driven;
+            let Driven { speed_mps, fits_mps, is_uneven, is_short } = stretch.driven;
             let [least_mps, most_mps] = AS_FITS.map(|share| share * fits_mps);
-            return if stretch.hole_error_m > MOSTLY_ERROR * stretch.hole_m {
+            return if stretch.is_mostly_error {
                 surer.to_owned()
+            } else if is_short {
+                "again with the silent head back, or slower".to_owned()
             } else if fits_mps > 0.0 && speed_mps > most_mps {
                 format!("at most {fits_mps:.2} m/s, or {surer}")
             } else if speed_mps > 0.0 && speed_mps < least_mps && is_uneven {

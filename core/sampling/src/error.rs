@@ -115,6 +115,20 @@ pub enum SamplingError {
     },
 }
 
+impl SamplingError {
+    /// The same for the target that was asked for, m, where a smaller one was tried, to leave room for errors.
+    #[must_use]
+    pub(crate) fn of_target(mut self, asked_m: f64) -> Self {
+        if let Self::UnseenStrip { target_m, .. }
+        | Self::OffAxis { target_m }
+        | Self::AngularStep { target_m, .. } = &mut self
+        {
+            *target_m = asked_m;
+        }
+        self
+    }
+}
+
 /// `value` if it is finite and above zero.
 ///
 /// Errors: [`SamplingError::NotPositive`].

@@ -33,8 +33,10 @@ pub struct Situation {
     pub layout: HeadLayout,
     /// Number of heads of the vehicle.
     pub configured: usize,
-    /// The heads that turn and ping, by number.
+    /// The heads that turn, ping and hear the wall, by number.
     pub heads: [Option<HeadMotion>; MAX_HEADS],
+    /// The heads that turn and ping, but hear no wall.
+    pub deaf: HeadSet,
     /// What each head loses by chance, by number.
     pub losses: [LossRate; MAX_HEADS],
 }

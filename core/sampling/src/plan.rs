@@ -3,6 +3,7 @@
 mod answer;
 mod briefing;
 mod mounts;
+mod started;
 mod wall;
 
 use super::error::{SamplingError, not_negative, positive};
@@ -49,7 +50,7 @@ pub struct Inspection {
     pub layout: HeadLayout,
     /// Tolerated drift of the vehicle, up, down and sideways, m.
     pub drift_m: f64,
-    /// Tolerated steady heading off the tunnel's axis, radians.
+    /// Tolerated heading off the tunnel's axis, to either side, radians.
     pub yaw_rad: f64,
     /// Tolerated yaw rate, rad/s: beams swing along the wall between two passes.
     pub yaw_rate_radps: f64,
@@ -170,7 +171,9 @@ impl Planner {
         let mut speed_mps = known_mps;
         for _ in 0..FALLS {
             let margin_m = self.margin_m(planned, target_m, speed_mps);
-            speed_mps = self.known_v_max_mps(mode, target_m - margin_m)?.min(speed_mps);
+            let less_m = target_m - margin_m;
+            let known_mps = self.known_v_max_mps(mode, less_m).map_err(|why| why.of_target(target_m))?;
+            speed_mps = known_mps.min(speed_mps);
         }
         Ok(speed_mps)
     }
@@ -247,13 +250,16 @@ impl Planner {
         let planned = self.modes.get(mode);
         self.stances.iter().filter_map(move |stance| {
             let planned = planned?;
+            let Inspection { yaw_rad, yaw_rate_radps, .. } = self.inspection;
+            let swing_mps = yaw_rate_radps * stance.farthest_m;
             let going = Going {
                 ping_period_s: planned.ping_period_s,
-                swing_mps: self.inspection.yaw_rate_radps * stance.farthest_m,
+                swing_mps,
                 shift_m: stance.shift_m,
                 apart_m: stance.apart_m,
-                apart_swing_mps: self.inspection.yaw_rate_radps * stance.farthest_m,
-                swing_most_m: None,
+                apart_swing_mps: swing_mps,
+                // From one tolerated yaw to the other; a rate alone may go on for as long as it takes.
+                swing_most_m: (yaw_rad > 0.0).then(|| 2.0 * yaw_rad * stance.farthest_m),
             };
             Some(of(stance, &planned.passes.beside(stance.parallax_rad), &going))
         })

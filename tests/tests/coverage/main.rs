@@ -13,6 +13,7 @@ mod far_and_long;
 mod faults;
 mod field;
 mod flags;
+mod hung;
 mod interventions;
 mod memory;
 mod metamorphic;

@@ -8,7 +8,7 @@ use headrace_geometry::math;
 
 impl Drive {
     /// The largest speed that fits where it takes so many passes for one, m/s.
-    pub(super) fn with_losses_mps(&self, passes_needed: f64) -> f64 {
+    pub(crate) fn with_losses_mps(&self, passes_needed: f64) -> f64 {
         let turn_s = passes_needed * self.all_gap_s + self.ping_period_s;
         if passes_needed > 1.0 {
             self.fits_mps.min(self.fits_along_m / turn_s.max(1e-9))

@@ -81,7 +81,7 @@ fn named(wall: &Wall) -> Vec<Cause> {
             if !is_bare {
                 store.insert(WallSample { x_m, arc_m, head: 0, step_m: None, visit: 0 }).unwrap();
             } else if !wall.why.is_empty() {
-                lacks.add(Lack { x_m, arc_m, why: wall.why });
+                lacks.add(Lack { x_m, arc_m, head: 0, why: wall.why });
             }
         }
     }

@@ -79,7 +79,9 @@ impl<'a> Trial<'a> {
         }
         // A speed is changed most easily: what the planned one would have mended is put down to that.
         let phase = Causes::of(Cause::Phase);
+        let is_short = self.is_short();
         if phase.is_within(present)
+            && !is_short
             && self.drive.is_slow_out_of_phase(1.0 / HELPS)
             && self.passes_without(phase, 1.0)
         {
@@ -94,20 +96,27 @@ impl<'a> Trial<'a> {
             let sets = (1..=present.bits())
                 .filter(|bits| bits & !present.bits() == 0 && bits.count_ones() == size)
                 .map(Causes::from_bits);
+            // Of single ones those that may only seem to explain it come last.
+            let last = [(is_only_adrift, lost), (is_short, phase)];
+            let is_last = |set: &Causes| size == 1 && last.iter().any(|(is, last)| *is && set == last);
             let fit = |set: &Causes| {
-                let is_last = is_only_adrift && size == 1 && *set == lost;
-                set.len() == size && set.is_within(present) && needed.is_within(*set) && !is_last
+                set.len() == size && set.is_within(present) && needed.is_within(*set) && !is_last(set)
             };
-            for set in self.case.beside.into_iter().chain(sets).filter(fit) {
+            let of_last =
+                |(is, set): (bool, Causes)| (size == 1 && is && set.is_within(present)).then_some(set);
+            let sets = self.case.beside.into_iter().chain(sets).filter(fit);
+            for set in sets.chain(last.into_iter().filter_map(of_last)) {
                 if self.passes_without(set, 1.0) {
                     return set;
                 }
             }
-            if size == 1 && is_only_adrift && self.passes_without(lost, 1.0) {
-                return lost;
-            }
         }
         present
+    }
+
+    /// Whether a head is silent or has stood still: those that are left turn out of phase without it.
+    fn is_short(&self) -> bool {
+        self.present.has(Cause::HeadSilent) || self.present.has(Cause::HeadStalled)
     }
 
     /// Whether nothing but the error of one pass against the next speaks of the position: a fail is one in spite of that error, which explains

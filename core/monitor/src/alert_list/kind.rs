@@ -78,11 +78,15 @@ pub enum ListKind {
     TimeLeft,
     /// Little charge is left.
     BatteryLeft,
+    /// A head turns and pings, and hears no wall.
+    SensorDeaf,
+    /// A sensor repeats its last reading.
+    SensorHung,
 }
 
 impl ListKind {
     /// All of them.
-    pub const ALL: [Self; 22] = [
+    pub const ALL: [Self; 24] = [
         Self::Missed,
         Self::CannotSay,
         Self::TooFast,
@@ -105,6 +109,8 @@ impl ListKind {
         Self::CableLeft,
         Self::TimeLeft,
         Self::BatteryLeft,
+        Self::SensorDeaf,
+        Self::SensorHung,
     ];
 
     /// The word used in JSON.
@@ -132,6 +138,8 @@ impl ListKind {
             Self::CableLeft => "cable_left",
             Self::TimeLeft => "time_left",
             Self::BatteryLeft => "battery_left",
+            Self::SensorDeaf => "sensor_deaf",
+            Self::SensorHung => "sensor_hung",
         }
     }
 
@@ -145,6 +153,8 @@ impl ListKind {
             | Self::NoData
             | Self::SensorSilent
             | Self::SensorStalled
+            | Self::SensorDeaf
+            | Self::SensorHung
             | Self::HeadScattered
             | Self::HeadConstant
             | Self::HeadOutvoted => AlertClass::Sensor,
@@ -167,6 +177,8 @@ impl ListKind {
             | Self::PositionDoubtful
             | Self::SensorSilent
             | Self::SensorStalled
+            | Self::SensorDeaf
+            | Self::SensorHung
             | Self::HeadScattered
             | Self::HeadConstant
             | Self::HeadOutvoted
@@ -196,6 +208,8 @@ impl ListKind {
             self,
             Self::SensorSilent
                 | Self::SensorStalled
+                | Self::SensorDeaf
+                | Self::SensorHung
                 | Self::HeadScattered
                 | Self::HeadConstant
                 | Self::HeadOutvoted

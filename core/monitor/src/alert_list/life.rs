@@ -53,7 +53,7 @@ impl Figures {
         match *self {
             Self::None => 0.0,
             Self::Missed(_, _, at_most_mps) => at_most_mps,
-            Self::CannotSay(stretch) => stretch.hole_m[0],
+            Self::CannotSay(stretch) => stretch.largest().hole_m[0],
             Self::Advice(figures) => figures.speed_mps,
             Self::Lacking(lacking) => f64::from(lacking as u8),
             Self::Error(figure, _) | Self::Left(figure) | Self::Deviation(_, figure) => figure,

@@ -196,11 +196,19 @@ impl AlertList {
             self.observe(at, &Seen { kind, source, holds, figures: Figures::None }, to);
         }
         let is_head = |source: &u16| state.heads.checked_shr((*source).into()).unwrap_or(0) & 1 == 1;
-        for source in sources().filter(is_head) {
-            let has_turned = self.had.turning.checked_shr(source.into()).unwrap_or(0) & 1 == 1;
-            let stalled = state.sensor(source.into()) == SensorState::Stalled && (has_turned || is_late);
-            let (kind, source) = (ListKind::SensorStalled, Some(SourceId(source)));
+        for number in sources().filter(is_head) {
+            let has_turned = self.had.turning.checked_shr(number.into()).unwrap_or(0) & 1 == 1;
+            let stalled = state.sensor(number.into()) == SensorState::Stalled && (has_turned || is_late);
+            let (kind, source) = (ListKind::SensorStalled, Some(SourceId(number)));
             self.observe(at, &Seen { kind, source, holds: stalled, figures: Figures::None }, to);
+        }
+        for number in sources() {
+            for (kind, of) in
+                [(ListKind::SensorDeaf, SensorState::Deaf), (ListKind::SensorHung, SensorState::Hung)]
+            {
+                let (source, holds) = (Some(SourceId(number)), state.sensor(number.into()) == of);
+                self.observe(at, &Seen { kind, source, holds, figures: Figures::None }, to);
+            }
         }
         let no_sonar = state.heads != 0
             && (!state.has_sonar() || state.turning == 0)

@@ -132,6 +132,8 @@ fn plain_text(kind: ListKind, name: &str, place: &str) -> String {
     match kind {
         ListKind::SensorSilent => format!("{name} silent"),
         ListKind::SensorStalled => format!("{name} doesn't turn"),
+        ListKind::SensorHung => format!("{name} hangs: it says the same again and again"),
+        ListKind::SensorDeaf => format!("{name} hears no wall"),
         ListKind::NoSonar => "NO SONAR: nothing is seen".to_owned(),
         ListKind::NoData => "NO DATA: nothing from any sensor".to_owned(),
         ListKind::NotRecorded => "NOT RECORDED: the recording fails".to_owned(),

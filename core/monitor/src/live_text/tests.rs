@@ -72,14 +72,24 @@ fn stretch(why: Unsure) -> UnsureStretch {
         hole_sd_m: 0.04,
         hole_error_m: 0.08,
         driven: Driven::default(),
+        is_mostly_error: false,
     }
+}
+
+/// What is too fast doesn't read like what is told.
+#[test]
+fn a_speed_that_is_over_another_reads_like_another() {
+    assert_eq!(speed_decimals(Some(0.104), Some(0.098)), 3);
+    assert_eq!(speed_decimals(Some(0.098), Some(0.104)), 2, "it is within");
+    assert_eq!(speed_decimals(Some(0.12), Some(0.098)), 2);
+    assert_eq!(speed_decimals(None, Some(0.1)), 2);
 }
 
 /// Slower isn't always better: below the speed that the heads are in phase for, they are out of it.
 #[test]
 fn what_helps_an_unsure_stretch_is_the_speed_that_fits() {
     let helps = |speed_mps: f64, fits_mps: f64, is_uneven: bool| {
-        let driven = Driven { speed_mps, fits_mps, is_uneven };
+        let driven = Driven { speed_mps, fits_mps, is_uneven, is_short: false };
         helps_text(&UnsureStretch { driven, ..stretch(Unsure::Position) })
     };
     let surer = "again with a surer position";
@@ -90,9 +100,16 @@ fn what_helps_an_unsure_stretch_is_the_speed_that_fits() {
     assert_eq!(helps(0.1, 0.1, true), surer, "driven as told");
     assert_eq!(helps(0.1, 0.0, true), surer, "no speed is known");
     assert_eq!(helps(0.0, 0.1, true), surer, "never driven");
-    let driven = Driven { speed_mps: 0.2, fits_mps: 0.1, is_uneven: false };
-    let lost = UnsureStretch { hole_error_m: 0.3, driven, ..stretch(Unsure::Position) };
+    let driven = Driven { speed_mps: 0.2, fits_mps: 0.1, is_uneven: false, is_short: false };
+    let lost = UnsureStretch { is_mostly_error: true, driven, ..stretch(Unsure::Position) };
     assert_eq!(helps_text(&lost), surer, "the error is what matters");
+    let short = Driven { is_short: true, ..driven };
+    let silent = UnsureStretch { driven: short, ..stretch(Unsure::Position) };
+    assert_eq!(
+        helps_text(&silent),
+        "again with the silent head back, or slower",
+        "the speeds are those of all heads"
+    );
 }
 
 #[test]

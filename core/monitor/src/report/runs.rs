@@ -5,7 +5,7 @@ use serde::Serialize;
 use crate::app::SourceInfo;
 use crate::pilot_text::CauseFigures;
 use crate::run::Loop;
-use headrace_coverage::{Action, Cause, Evidence, Run, RunId, Runs, Sections};
+use headrace_coverage::{Action, Cause, Evidence, Run, RunId, Runs, Sections, Verdict};
 use headrace_geometry::time::MonoNs;
 use headrace_sensor::device::{SensorInfo, SensorKind};
 
@@ -83,7 +83,7 @@ pub(super) fn run_reports(dive: &Loop) -> Vec<RunReport> {
                 silent_sources: silent.filter_map(|head| heads.get(head).cloned()).collect(),
                 start_m,
                 end_m,
-                failed_m: f64::from(run.failed) * sections.section_m(),
+                failed_m: failed_m(sections, run),
                 hole_m: hole.diameter_m,
                 hole_x_m: hole.x_m,
                 hole_clock: profile.clock(hole.arc_m),
@@ -93,6 +93,12 @@ pub(super) fn run_reports(dive: &Loop) -> Vec<RunReport> {
             }
         })
         .collect()
+}
+
+/// Metres of a run's sections that fail, as it is judged now: a flag stays where nothing can be said since.
+fn failed_m(sections: &Sections, run: &Run) -> f64 {
+    let fails = |index: &i64| sections.get(*index).is_some_and(|section| section.verdict == Verdict::Fail);
+    (run.from..run.to).filter(fails).count() as f64 * sections.section_m()
 }
 
 /// Ids of the heads' sources, by number of the head.

@@ -16,6 +16,9 @@ use headrace_snapshot::stateful;
 /// The least speed at which heads apart along the hull are taken to follow each other, m/s.
 const SLOWEST_MPS: f64 = 0.05;
 
+/// At this speed or faster a vehicle is under way, m/s.
+const UNDER_WAY_MPS: f64 = 0.02;
+
 /// The advisor, and the time limit of the dive from its first packet.
 #[derive(Debug, Clone, Resource)]
 pub(crate) struct Advisor {
@@ -23,14 +26,22 @@ pub(crate) struct Advisor {
     pub(crate) dive_time: Option<DurNs>,
     looks: Looks,
     hysteresis: Hysteresis,
+    /// It went backwards when it was last under way.
+    astern: bool,
 }
 
-stateful!(Advisor { state: advisor, looks, hysteresis; fixed: dive_time; });
+stateful!(Advisor { state: advisor, looks, hysteresis, astern; fixed: dive_time; });
 
 impl Advisor {
     /// Allocates: all that it will ever use.
     pub(crate) fn new(advisor: advice::Advisor, target_m: f64, dive_time: Option<DurNs>) -> Self {
-        Self { advisor, dive_time, looks: Looks::default(), hysteresis: Hysteresis::new(target_m) }
+        Self {
+            advisor,
+            dive_time,
+            looks: Looks::default(),
+            hysteresis: Hysteresis::new(target_m),
+            astern: false,
+        }
     }
 
     /// The advice at each beat of a tick, in order; `begun` is the receive time of the first packet.
@@ -45,6 +56,12 @@ impl Advisor {
     /// Advice to show at a beat; `begun` is the receive time of the first packet.
     fn advise(&mut self, at: MonoNs, situation: &Situation, begun: Option<MonoNs>) -> Advice {
         let left = self.dive_time.zip(begun).map(|(time, begun)| (time - at.since(begun)).as_secs_f64());
+        // On the way back heads apart along the hull are in phase at other speeds, which don't hold any more once it goes on.
+        let astern = situation.speed_mps < 0.0;
+        if situation.speed_mps.abs() > UNDER_WAY_MPS && astern != self.astern {
+            self.astern = astern;
+            self.hysteresis.forget();
+        }
         let advice = self.advisor.advise(situation, swing(&mut self.looks, at, situation), left);
         self.hysteresis.show(at, advice)
     }

@@ -3,16 +3,18 @@
 use bevy_ecs::prelude::{Query, Res, ResMut};
 
 use crate::entities::{Head, HiddenAngles, LossCount, MeasuredMotion, Mounted};
+use crate::loss_count::Heard;
 use crate::messages::{
     Aim, Events, Hidden, Outcome, Placed, PlacedEvents, PlacedList, PlacedPing, Positioned, PositionedList,
 };
 use crate::resources::{Target, TunnelDesign, VehicleEntities};
+use headrace_coverage::deviation::off_m;
 use headrace_coverage::{Loss, PassError, Reach};
 use headrace_fusion::{Fix, NoFix};
 use headrace_geometry::frames::{Mount, Pose, Vec3, head_direction};
 use headrace_geometry::math;
 use headrace_geometry::time::MonoNs;
-use headrace_sampling::head::{HeadMotion, MAX_HEADS, SILENT_AFTER};
+use headrace_sampling::head::{HeadMotion, HeadSet, MAX_HEADS, SILENT_AFTER};
 use headrace_sampling::losses::LossRate;
 use headrace_sampling::passes::Situation;
 use headrace_sensor::reading::{Reading, SonarReturn};
@@ -79,7 +81,7 @@ pub(super) fn georeference(
                     origin: fix.ok().map(|fix| fix.pose.place(mount.position)),
                 };
                 if !ping.standing {
-                    count(&mut losses, &ping);
+                    count(&mut losses, &ping, sonar.range_m, &tunnel);
                 }
                 placed.0.push(Placed::Ping(ping));
                 of_events.0.push(index);
@@ -89,10 +91,18 @@ pub(super) fn georeference(
 }
 
 /// Counts a ping at wall that the head could hear.
-fn count(losses: &mut LossCount, ping: &PlacedPing) {
+fn count(losses: &mut LossCount, ping: &PlacedPing, range_m: Option<f64>, tunnel: &TunnelDesign) {
     match ping.outcome {
-        Outcome::Sample { .. } => losses.ping(ping.angle_rad, false),
-        Outcome::Lost(Loss::Missing, Some(_)) => losses.ping(ping.angle_rad, true),
+        Outcome::Sample { point, arc_m } => {
+            let off_m = off_m(&tunnel.profile, [point.y(), point.z()], arc_m);
+            losses.ping(ping.angle_rad, false);
+            let is_wall = off_m.abs() <= tunnel.contradiction_m;
+            losses.hear(ping.angle_rad, range_m.map(|range_m| Heard { range_m, off_m, is_wall }));
+        }
+        Outcome::Lost(Loss::Missing, Some(_)) => {
+            losses.ping(ping.angle_rad, true);
+            losses.hear(ping.angle_rad, None);
+        }
         Outcome::Lost(..) | Outcome::Unplaced(_) => {}
     }
 }
@@ -171,6 +181,7 @@ fn situation(
 ) -> Situation {
     let mut motions = [None; MAX_HEADS];
     let mut losses = [LossRate::default(); MAX_HEADS];
+    let mut deaf = HeadSet::default();
     for (head, mounted, track, lost, _) in heads {
         if let Some(slot) = losses.get_mut(head.0) {
             *slot = lost.rate();
@@ -184,7 +195,12 @@ fn situation(
             // Heads ping at different times; their angles are extrapolated to a common epoch.
             let angle_rad = angle_rad + rate_radps * at.since(last).as_secs_f64();
             let (mount, sector_rad) = (mounted.info.mount, track.sector_rad());
-            *slot = Some(HeadMotion { mount, angle_rad, rate_radps, step_rad, sector_rad });
+            let others = heads.iter().filter(|(other, ..)| other.0 != head.0);
+            if lost.is_deaf(others.map(|(.., lost, _)| lost.elsewhere())) {
+                deaf = deaf.with(head.0);
+            } else {
+                *slot = Some(HeadMotion { mount, angle_rad, rate_radps, step_rad, sector_rad });
+            }
         }
     }
     Situation {
@@ -194,6 +210,7 @@ fn situation(
         layout: target.layout,
         configured: heads.iter().len(),
         heads: motions,
+        deaf,
         losses,
     }
 }

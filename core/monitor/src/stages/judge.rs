@@ -69,7 +69,7 @@ pub(crate) fn judge_one(
             .number(evidence.swing_m)
             .integer(u64::from(evidence.silent_heads.bits()))
             .integer(u64::from(evidence.causes.bits()));
-        if evidence.is_lossy() {
+        {
             digests.judgements.number(evidence.with_losses_mps);
         }
     }

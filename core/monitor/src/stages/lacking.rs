@@ -10,6 +10,7 @@ use crate::messages::{Aim, Hidden, Outcome, PlacedPing};
 use crate::resources::Coverage;
 use headrace_coverage::{Cause, Causes, Drive, Lack, Lacks, Loss};
 use headrace_geometry::frames::{Mount, Pose, Vec3, head_direction};
+use headrace_geometry::math::{self, TAU};
 use headrace_geometry::time::{DurNs, MonoNs};
 use headrace_geometry::tunnel::Profile;
 use headrace_sampling::head::{HeadMotion, HeadSet, MAX_HEADS};
@@ -94,9 +95,11 @@ pub(crate) struct Lacking {
     forgot: bool,
     /// Heads that have stood still, and haven't been in step with the others since.
     pub(super) stalled: HeadSet,
+    /// Heads that heard no wall at the last beat.
+    deaf: HeadSet,
 }
 
-stateful!(Lacking { state: heads, pose, forgot, stalled; lists: away; });
+stateful!(Lacking { state: heads, pose, forgot, stalled, deaf; lists: away; });
 
 impl Default for Lacking {
     /// Allocates: startup only; all that it will ever use.
@@ -107,6 +110,7 @@ impl Default for Lacking {
             away: Vec::with_capacity(ROOM),
             forgot: false,
             stalled: HeadSet::default(),
+            deaf: HeadSet::default(),
         }
     }
 }
@@ -148,7 +152,7 @@ pub(super) fn note_ping(lacking: &mut Lacking, ping: &PlacedPing, lacks: &mut La
     if ping.standing {
         lacking.stalled = lacking.stalled.with(ping.head);
     }
-    let Lacking { heads, away, forgot, .. } = lacking;
+    let Lacking { heads, away, forgot, deaf, .. } = lacking;
     let Some(head) = heads.get_mut(ping.head) else { return };
     head.pinged = Some(ping.valid_at);
     head.longest_m = ping.longest_m;
@@ -162,19 +166,43 @@ pub(super) fn note_ping(lacking: &mut Lacking, ping: &PlacedPing, lacks: &mut La
             head.note_hidden(loss == Loss::Occluded, true);
             // Where the wall is heard at such angles all the same, what isn't is missing.
             let heard = loss == Loss::Occluded && !head.is_hidden();
-            let cause = if heard { Cause::MissingReturns } else { Cause::of_loss(loss) };
-            lacks.add(Lack { x_m, arc_m, why: Causes::of(cause) });
+            let cause = match loss {
+                Loss::Missing if deaf.has(ping.head) => Cause::HeadSilent,
+                Loss::Occluded if heard => Cause::MissingReturns,
+                loss => Cause::of_loss(loss),
+            };
+            lacks.add(Lack { x_m, arc_m, head: number_of(ping.head), why: Causes::of(cause) });
         }
         Outcome::Lost(_, None) | Outcome::Unplaced(_) if ping.fix.is_none() => {
             let is_lost = !matches!(ping.outcome, Outcome::Unplaced(_));
             let why = Causes::of(Cause::PositionLost);
-            let number = u8::try_from(ping.head).unwrap_or(u8::MAX);
-            *forgot |= !keep(
-                away,
-                Away { at: ping.valid_at, head: number, angle_rad: ping.angle_rad, why, is_lost },
-            );
+            let head = number_of(ping.head);
+            let away_ping = Away { at: ping.valid_at, head, angle_rad: ping.angle_rad, why, is_lost };
+            *forgot |= !keep(away, away_ping);
         }
         Outcome::Lost(_, None) | Outcome::Unplaced(_) => {}
+    }
+}
+
+/// A head's number as it is kept.
+pub(super) fn number_of(head: usize) -> u8 {
+    u8::try_from(head).unwrap_or(u8::MAX)
+}
+
+/// Notes the heads that hear no wall: what they haven't heard for a turn isn't missing by chance.
+fn note_deaf(lacking: &mut Lacking, deaf: HeadSet, coverage: &mut Coverage) {
+    let before = core::mem::replace(&mut lacking.deaf, deaf);
+    for head in deaf.iter().filter(|head| !before.has(*head)) {
+        let Some((.., step_rad)) = lacking.heads.get(head).and_then(|turning| turning.seen) else { continue };
+        let turn = usize::try_from(math::floor_to_i64(TAU / step_rad)).unwrap_or(0);
+        let causes = [Cause::MissingReturns, Cause::HeadSilent];
+        let Some([from_m, to_m]) = coverage.lacks.revise(number_of(head), turn, causes) else { continue };
+        let sections = &mut coverage.sections;
+        for index in sections.index_of(from_m)..=sections.index_of(to_m) {
+            if let Some(section) = sections.get_mut(index) {
+                section.passage.silent = section.passage.silent.with(head);
+            }
+        }
     }
 }
 
@@ -190,6 +218,7 @@ pub(super) fn note_beat(
     coverage: &mut Coverage,
 ) {
     let stalled = lacking.stalled;
+    note_deaf(lacking, situation.deaf, coverage);
     if let Some(pose) = situation.pose {
         note_away(lacking, now, heads, (at, pose), profile, coverage);
     }
@@ -220,7 +249,7 @@ pub(super) fn note_beat(
         }
         while period.0 > 0 && at.since(when).0 >= 0 {
             let angle_rad = angle_rad + rate_radps * when.since(seen).as_secs_f64();
-            let number = u8::try_from(number.0).unwrap_or(u8::MAX);
+            let number = number_of(number.0);
             let rate = situation.losses.get(usize::from(number)).copied().unwrap_or_default();
             let would_lose = head.would_lose(when, rate);
             let cause = Causes::of(cause);
@@ -364,7 +393,7 @@ impl Placing<'_> {
                 why = why.with(Cause::MissingReturns);
             }
         }
-        coverage.lacks.add(Lack { x_m, arc_m: wall.arc_m, why });
+        coverage.lacks.add(Lack { x_m, arc_m: wall.arc_m, head: ping.head, why });
     }
 }
 

@@ -162,7 +162,9 @@ pub(super) fn live(
             passed: standing.passed,
             back_to_m: standing.back_to_m,
             alerts: standing.alerts,
-            turning: source_bits(heads.map(|head| head.source), turning),
+            turning: source_bits(heads.clone().map(|head| head.source), turning),
+            hung: doubts.hung,
+            deaf: source_bits(heads.map(|head| head.source), situation.deaf),
             ..*state
         };
         digest(states, *at, situation, &state);

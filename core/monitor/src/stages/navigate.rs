@@ -4,7 +4,7 @@ use bevy_ecs::prelude::{Query, Res, ResMut, Single};
 
 use crate::advice_log::ADVICE_PERIOD;
 use crate::entities::{Mounted, Navigator, VehicleState};
-use crate::messages::{Doubts, Events, Positioned, PositionedList};
+use crate::messages::{Doubts, Event, Events, Positioned, PositionedList};
 use crate::resources::{Digests, VehicleEntities};
 use crate::result_stream::{RecordKind, ResultStream};
 use headrace_fusion::Times;
@@ -28,7 +28,7 @@ pub(super) fn navigate(
             let fix = navigator.navigation.fix(at);
             let navigation = &navigator.navigation;
             let (cable, setting) = (navigation.cable_doubt(), navigation.setting_doubt());
-            let doubts = Doubts { cable, setting, stand_s: navigation.stand_s() };
+            let doubts = Doubts { cable, setting, stand_s: navigation.stand_s(), hung: navigator.hung };
             let sd = navigation.pose_sd();
             *state = VehicleState { at: Some(at), fix, sd, cable_doubt: doubts.cable };
             digest(&mut digests.poses, at, &state);
@@ -39,9 +39,27 @@ pub(super) fn navigate(
             list.0.push(Positioned::Ping { event: index, fix });
         }
         if let Some(sensor) = entities.of_source(event.source).and_then(|entity| sensors.get(entity).ok()) {
+            if navigator.hangs(event) {
+                continue;
+            }
             let times = Times { received: event.received, valid: event.valid_at };
             navigator.navigation.update(event.source.index(), &sensor.info, times, &event.reading);
         }
+    }
+}
+
+impl Navigator {
+    /// Whether the unit that an event is from hangs: what it repeats says nothing.
+    fn hangs(&mut self, event: &Event) -> bool {
+        let source = event.source.index();
+        let bit = 1_u64 << (source % 64);
+        if let (Reading::AngularRate(rate_radps), Some(repeats)) =
+            (&event.reading, self.repeats.get_mut(source))
+        {
+            let hangs = repeats.hangs(event.received, *rate_radps);
+            self.hung = if hangs { self.hung | bit } else { self.hung & !bit };
+        }
+        self.hung & bit != 0
     }
 }
 

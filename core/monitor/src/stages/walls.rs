@@ -5,6 +5,7 @@ use bevy_ecs::system::SystemState;
 use bevy_ecs::world::World;
 
 use super::judge::digest_alert;
+use super::lacking::number_of;
 use super::samples::note_sample;
 use crate::alerts::{AlertKind, Alerts};
 use crate::entities::{HeadSweep, Waiting};
@@ -178,15 +179,24 @@ fn doubtful(sorting: &mut Sorting<'_>, sweep: &mut HeadSweep, ping: &PlacedPing)
     let lost = PlacedPing { outcome: Outcome::Lost(Loss::Missing, aim), ..*ping };
     store(sorting, sweep, &lost);
     let Coverage { lacks, sections, .. } = &mut *sorting.coverage;
+    // Whose returns don't count at all might as well be silent.
+    let is_distrusted = sweep.wall.distrusted().is_some();
     if let Some(reach) = ping.reach
         && let Some(section) = sections.get_mut(sections.index_of(reach.middle_m()))
     {
         section.passage.missing += 1;
+        if is_distrusted {
+            section.passage.silent = section.passage.silent.with(ping.head);
+        }
     }
     let Some(Aim { x_m, arc_m }) = aim else { return };
     // What is heard beside the vehicle's outline, and isn't the wall, is the vehicle.
-    let cause = if ping.hidden == Hidden::No { Cause::MissingReturns } else { Cause::Occluded };
-    lacks.add(Lack { x_m, arc_m, why: Causes::of(cause) });
+    let cause = match ping.hidden {
+        Hidden::No if is_distrusted => Cause::HeadSilent,
+        Hidden::No => Cause::MissingReturns,
+        Hidden::Yes | Hidden::Beside => Cause::Occluded,
+    };
+    lacks.add(Lack { x_m, arc_m, head: number_of(ping.head), why: Causes::of(cause) });
     if let Some(section) = sections.get_mut(sections.index_of(x_m)) {
         section.doubtful += 1;
     }

@@ -38,6 +38,8 @@ pub(super) fn note_beat(
         if coverage.frontier.is_silent(frontier.0.as_ref(), at) {
             note_silence(coverage, head.0, frontier.0.map(|before| before.latest()), here);
             frontier.0 = Some(HeadReach::silent_at(frontier.0, here));
+        } else if situation.deaf.has(head.0) {
+            note_silence(coverage, head.0, None, here);
         } else if frontier.0.is_none() {
             // Not heard yet, and perhaps about to ping.
             frontier.0 = Some(HeadReach::silent_at(None, here));

@@ -56,6 +56,11 @@ impl Hysteresis {
         }
     }
 
+    /// Forgets what was shown: the vehicle has turned back, and goes by other speeds.
+    pub fn forget(&mut self) {
+        *self = Self::new(self.target_m);
+    }
+
     /// Takes the advice at a timestamp of data time and returns the advice to show.
     ///
     /// Allocates: never.

@@ -54,6 +54,7 @@ impl Case {
             layout: HeadLayout::PhaseShift,
             configured: specs.len(),
             heads,
+            deaf: HeadSet::default(),
             losses: [LossRate::default(); MAX_HEADS],
         };
         Self { profile, specs, situation, target_m, left_s: None }

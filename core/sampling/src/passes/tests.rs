@@ -19,6 +19,7 @@ fn situation(angles_deg: &[f64], x_m: &[f64]) -> Situation {
         layout: HeadLayout::PhaseShift,
         configured,
         heads,
+        deaf: HeadSet::default(),
         losses: [LossRate::default(); MAX_HEADS],
     }
 }

@@ -28,6 +28,7 @@ fn advice(reason: Reason, v_max_mps: f64, t_m: f64) -> Advice {
         layout: HeadLayout::PhaseShift,
         configured: 0,
         heads: [None; headrace_sampling::head::MAX_HEADS],
+        deaf: headrace_sampling::head::HeadSet::default(),
         losses: [headrace_sampling::losses::LossRate::default(); headrace_sampling::head::MAX_HEADS],
     };
     let profile = shapes::circle(3.0).unwrap();

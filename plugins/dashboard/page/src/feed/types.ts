@@ -20,7 +20,7 @@ export interface Hello {
 }
 
 export interface Sensor {
-  id: string; state: "ok" | "silent" | "never" | "stalled" | "distrusted"; age_s: number | null; is_head: boolean;
+  id: string; state: "ok" | "silent" | "never" | "stalled" | "deaf" | "hung" | "distrusted"; age_s: number | null; is_head: boolean;
 }
 
 export interface Turn {

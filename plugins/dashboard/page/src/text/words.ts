@@ -25,7 +25,7 @@ export const VERDICTS = {
 } as const;
 
 export const SENSOR_STATES: Record<string, string> = {
-  ok: "ok", silent: "silent", never: "never heard", stalled: "doesn't turn", distrusted: "not believed",
+  ok: "ok", silent: "silent", never: "never heard", stalled: "doesn't turn", deaf: "hears no wall", hung: "hangs", distrusted: "not believed",
 };
 
 /** Words for a cause or why of the wire: too_fast is "too fast". */

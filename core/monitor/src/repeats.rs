@@ -1,0 +1,126 @@
+//! Inertial units that say the same again and again: a device that hangs repeats its last reading, which a turning vehicle contradicts only
+//! after it has been placed wrongly.
+//!
+//! A reading with noise hardly ever equals the one before to the last bit. Readings without noise do whenever the vehicle moves steadily:
+//! those of ideal dives, of which a repetition says nothing.
+
+use serde::{Deserialize, Serialize};
+
+use headrace_geometry::frames::{Sensor, Vec3};
+use headrace_geometry::math;
+use headrace_geometry::time::{DurNs, MonoNs};
+
+/// Time for which readings are the same, at least, before they are taken for repetitions.
+const FROZEN_AFTER: DurNs = DurNs(1_000_000_000);
+/// Chance with which noise alone may be the same for so long, as its logarithm: one in a billion.
+const BY_CHANCE_LN: f64 = -20.7;
+/// Weight of the latest difference, and of the latest run, among those before.
+const LATEST: f64 = 1.0 / 64.0;
+/// Share of differences that go against the one before from which a reading has noise. White noise: two thirds; a motion: hardly any.
+const NOISY: f64 = 0.3;
+
+/// What is known of one source's repetitions; part of the loop's state.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+pub struct Repeats {
+    last: Option<(MonoNs, [f64; 3])>,
+    /// The last differences that weren't zero, by axis.
+    steps: [f64; 3],
+    /// Share of differences that went against the one before, from 0 to 1.
+    to_and_fro: f64,
+    /// Readings in a row that were the same, as a mean, and of the present run.
+    usual_run: f64,
+    run: u32,
+    /// When the present run began.
+    since: MonoNs,
+}
+
+impl Repeats {
+    /// Takes a turn rate; whether the unit has hung by then.
+    ///
+    /// Allocates: never.
+    pub fn hangs(&mut self, at: MonoNs, rate_radps: Vec3<Sensor>) -> bool {
+        let now = [rate_radps.x(), rate_radps.y(), rate_radps.z()];
+        let Some((_, before)) = self.last.replace((at, now)) else {
+            (self.since, self.run) = (at, 1);
+            return false;
+        };
+        // To the last bit: a unit that hangs repeats its bytes.
+        if now.map(f64::to_bits) == before.map(f64::to_bits) {
+            self.run = self.run.saturating_add(1);
+            return self.has_hung(at);
+        }
+        self.usual_run += LATEST * (f64::from(self.run) - self.usual_run);
+        (self.since, self.run) = (at, 1);
+        for ((now, before), step) in now.into_iter().zip(before).zip(&mut self.steps) {
+            let next = now - before;
+            if next.to_bits() << 1 == 0 {
+                continue;
+            }
+            let against = f64::from(u8::from(next * *step < 0.0));
+            self.to_and_fro += LATEST / 3.0 * (against - self.to_and_fro);
+            *step = next;
+        }
+        false
+    }
+
+    fn has_hung(&self, at: MonoNs) -> bool {
+        let is_long = at.since(self.since).0 >= FROZEN_AFTER.0;
+        // The mean run of readings that equal the one before with a chance p is 1 / (1 - p).
+        let repeats = 1.0 - 1.0 / self.usual_run.max(1.01);
+        is_long && self.to_and_fro > NOISY && f64::from(self.run) * math::ln(repeats) < BY_CHANCE_LN
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Readings at 400 Hz; whether the unit has hung after each.
+    fn hangs(readings: impl IntoIterator<Item = [f64; 3]>) -> Vec<bool> {
+        let mut repeats = Repeats::default();
+        let mut of = |(k, [x, y, z]): (u64, [f64; 3])| repeats.hangs(MonoNs(k * 2_500_000), Vec3::new(x, y, z));
+        (0..).zip(readings).map(&mut of).collect()
+    }
+
+    /// A number from -1 to 1 that seems random: splitmix64.
+    fn noise(k: u64) -> f64 {
+        let mut z = k.wrapping_mul(0x9e37_79b9_7f4a_7c15);
+        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+        ((z ^ (z >> 31)) >> 11) as f64 / (1_u64 << 52) as f64 - 1.0
+    }
+
+    fn noisy(k: u64) -> [f64; 3] {
+        [0, 1, 2].map(|axis| 1e-3 * noise(3 * k + axis))
+    }
+
+    #[test]
+    fn a_unit_with_noise_that_repeats_itself_hangs_after_a_second_until_it_says_something_else() {
+        let frozen = noisy(999);
+        let all = hangs((0..1000).map(noisy).chain([frozen; 1000]).chain((2000..2100).map(noisy)));
+        let first = all.iter().position(|hangs| *hangs).unwrap();
+        assert_eq!(first, 999 + 400);
+        assert!(all[first..2000].iter().all(|hangs| *hangs) && all[2000..].iter().all(|hangs| !hangs));
+    }
+
+    /// The simulator's ideal units say the same as long as the vehicle moves the same way, and others after every change.
+    #[test]
+    fn a_unit_without_noise_never_does() {
+        let swaying = |k: u64| [1e-2 * math::sin(k as f64 / 800.0), 0.0, 2e-2 * math::cos(k as f64 / 1700.0)];
+        let still = [0.0; 3];
+        let all =
+            (0..4000).map(swaying).chain([still; 8000]).chain((0..4000).map(swaying)).chain([still; 8000]);
+        assert!(hangs(all).iter().all(|hangs| !hangs));
+    }
+
+    /// A coarse unit at rest says the same for a while: the coarser, the longer it takes to tell that from a repetition.
+    #[test]
+    fn a_coarse_unit_at_rest_does_not() {
+        // One reading in two hundred differs: three in a row that don't are nothing, nor are two thousand.
+        let coarse = |k: u64| {
+            let step = if noise(k) > 0.99 { 1e-3 * noise(7 * k).signum() } else { 0.0 };
+            [step, 0.0, 0.0]
+        };
+        assert!(hangs((0..200_000).map(coarse)).iter().all(|hangs| !hangs));
+    }
+}

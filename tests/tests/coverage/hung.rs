@@ -1,0 +1,90 @@
+//! Devices that hang: a head that says the same for ever is as good as silent, and so is an inertial unit.
+
+use headrace_coverage::Cause;
+use headrace_monitor::messages::Notice;
+use headrace_simulator::Scene;
+use headrace_tests::{scenes, truth};
+
+const NOISE: &str = "motion_within_turn = {}\nocclusion = {}\nrange_noise = { sd_m = 0.005 }\ndepth_noise = { noise_pa = 50 }\n\
+    imu_noise = { gyro_degps_rthz = 0.005, accel_mps2_rthz = 0.0006 }\n";
+const SWAY: &str =
+    "pilot_drift = { across_m = 0.3, up_m = 0.2, yaw_deg = 12, pitch_deg = 3, period_s = 25 }\n";
+
+/// VITA 2 with four heads stands for a minute, then goes on for so many metres.
+fn scene(start_m: f64, (length_m, speed_mps): (f64, f64), effects: &str) -> Scene {
+    let text = format!(
+        "seed = 5\nvehicle = \"vita2-4.toml\"\n[trajectory]\nkind = \"waypoints\"\n[[trajectory.waypoints]]\n\
+         chainage_m = {start_m}\nstay_s = 60\n[[trajectory.waypoints]]\nchainage_m = {}\nspeed_mps = {speed_mps}\n\
+         [effects]\n{NOISE}{effects}",
+        start_m + length_m
+    );
+    scenes::scene_from(&text, &scenes::vehicle_file)
+}
+
+fn hangs(sensor: &str, from_s: f64) -> String {
+    format!("device_faults = {{ sensors = [{sensor:?}], kind = \"stick\", from_s = {from_s} }}\n")
+}
+
+/// Truth, the ids of what was told to hang or to hear nothing, and the speeds advised at the end.
+struct Told {
+    /// True holes of the sections that pass, m.
+    passed_m: Vec<f64>,
+    causes: Vec<(Cause, Vec<String>)>,
+    alerts: Vec<(&'static str, String)>,
+    v_max_mps: f64,
+}
+
+fn dive(scene: &Scene) -> Told {
+    let mut v_max_mps = 0.0;
+    let judged = truth::dive_noting(scene, &scene.vehicle, &mut |dive| {
+        for notice in dive.notices() {
+            if let Notice::Advice(entry) = notice {
+                v_max_mps = entry.advice.v_max_mps;
+            }
+        }
+    });
+    let passed = judged.sections.iter().filter(|section| section.report.verdict == "pass");
+    let report = &judged.report;
+    Told {
+        passed_m: passed.map(|section| section.true_hole_m).collect(),
+        causes: report.runs.iter().map(|run| (run.cause, run.silent_sources.clone())).collect(),
+        alerts: report.alert_list.iter().map(|alert| (alert.kind, alert.text.clone())).collect(),
+        v_max_mps,
+    }
+}
+
+/// Until 9 s after it hung, nobody would have known: what that second does to the position is within what passes have to spare.
+#[test]
+fn while_the_inertial_unit_repeats_itself_nothing_over_the_target_passes_and_it_is_named() {
+    for (start_m, effects) in [(2.0, SWAY), (6900.0, SWAY)] {
+        let [sound, hung] = ["", &hangs("imu", 100.0)]
+            .map(|fault| dive(&scene(start_m, (15.0, 0.05), &format!("{effects}{fault}"))));
+        let is_named = |told: &Told| {
+            told.alerts.iter().any(|(kind, text)| *kind == "sensor_hung" && text.contains("imu"))
+        };
+        assert!(!is_named(&sound) && is_named(&hung), "{start_m}: {:?}", hung.alerts);
+        let worst_m = hung.passed_m.iter().copied().fold(0.0, f64::max);
+        assert!(worst_m <= 1.1 * 0.5, "{start_m}: {worst_m}");
+        assert!(sound.passed_m.len() > 2 * hung.passed_m.len(), "{start_m}: {}", sound.passed_m.len());
+    }
+}
+
+/// A head that hangs says one angle and one range for ever, one that hears nothing turns all the same: the speed that is told, the cause and
+/// the head that is named are those of a silent one.
+#[test]
+fn a_head_that_hears_nothing_is_told_as_a_silent_one() {
+    let deaf = "stuck_range = { range_m = 0.3, from_s = 90, sensors = [\"sonar_1\"] }\n";
+    let silent = "device_faults = { sensors = [\"sonar_1\"], kind = \"die\", from_s = 90 }\n";
+    let [deaf, silent, stuck] =
+        [deaf, silent, &hangs("sonar_1", 90.0)].map(|fault| dive(&scene(6900.0, (12.0, 0.1), fault)));
+    for (what, told) in [("deaf", &deaf), ("silent", &silent), ("stuck", &stuck)] {
+        let causes = &told.causes;
+        let is_its = |(cause, heads): &(Cause, Vec<String>)| {
+            matches!(cause, Cause::HeadSilent | Cause::HeadStalled)
+                && (heads == &["sonar_1"] || what == "stuck")
+        };
+        assert!(!causes.is_empty() && causes.iter().all(is_its), "{what}: {causes:?}");
+        assert!((told.v_max_mps / silent.v_max_mps - 1.0).abs() < 0.03, "{what}: {}", told.v_max_mps);
+        assert!(told.alerts.iter().any(|(_, text)| text.contains("sonar_1")), "{what}: {:?}", told.alerts);
+    }
+}
