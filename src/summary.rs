@@ -93,6 +93,16 @@ pub(crate) fn summary(report: &Report, columns: Option<usize>) -> String {
             ));
         }
     }
+    for (source, count) in
+        report.sources.iter().filter_map(|source| Some((source, source.line.as_ref()?.dropped_packets)))
+    {
+        if count > 0 {
+            line(format!(
+                "  LOST: {count} messages on the line of {} were dropped unread: the program, or the machine, stood",
+                source.id
+            ));
+        }
+    }
     for note in report.notes.iter().take(MOST_NOTES) {
         let place = note.station.clone().unwrap_or_else(|| "-+---.--".to_owned());
         let by = if note.by.is_empty() { String::new() } else { format!(" ({})", note.by) };

@@ -99,19 +99,22 @@ fn present(case: &Case<'_>, seen: &Seen, perimeter_m: f64) -> Causes {
     let mut present = lacking.filter(near).fold(Causes::default(), |all, lack| all.union(lack.why));
     let drive = &seen.worst;
     let is_passed = is_passed(case);
+    let is_lost = case.is_torn || seen.unseen || seen.adrift;
     let mut add = |is_present: bool, cause: Cause| {
         if is_present {
             present = present.with(cause);
         }
     };
     add(!is_passed && !case.none_alive || !hole.bounded && seen.silent.is_empty(), Cause::NotPassed);
-    add(case.is_torn || seen.unseen || seen.adrift, Cause::PositionLost);
+    add(is_lost, Cause::PositionLost);
     add(is_dark(case, seen), Cause::HeadSilent);
     let coarse = drive.middle_t_y_m > 0.9 * target_m;
     add(drive.middle_t_y_m > COARSE * target_m, Cause::AngularStep);
     let as_planned = spacing::t_max_m(drive.planned_along_m(), drive.advance_m(), drive.middle_t_y_m);
     let over = if coarse { drive.planned_along_m() } else { as_planned } / target_m;
-    let is_over_all = drive.fits_mps > 0.0
+    // Without a position the speed isn't known so well.
+    let is_over_all = !is_lost
+        && drive.fits_mps > 0.0
         && drive.planned_mps > 0.0
         && drive.speed_mps > OVER_ALL * drive.fits_mps.max(drive.planned_mps);
     let is_over_plan = over > 1.0 && drive.speed_mps > OVER_PLAN * drive.planned_mps;

@@ -157,9 +157,19 @@ fn ordinal(head: usize) -> String {
     format!("{}{suffix}", head + 1)
 }
 
-/// Text of the actions for a missed stretch, as of [`action_text`]; of several, the first two.
+/// Text of the actions for a missed stretch, as of [`action_text`]; of several, the first two: what has to be there before the vehicle goes
+/// back comes first, and slower is in the speed.
 pub fn actions_text(actions: &[Action], back_to_m: f64, at_most_mps: f64) -> String {
-    let Some((first, others)) = actions.split_first() else { return String::new() };
+    let mut two: Vec<Action> = actions.iter().copied().take(NAMED).collect();
+    if let [_, Action::Position | Action::HeadBack] = two.as_slice() {
+        two.reverse();
+    }
+    if let [_, Action::Slower] = two.as_slice()
+        && at_most_mps > 0.0
+    {
+        two.pop();
+    }
+    let Some((first, others)) = two.split_first() else { return String::new() };
     let text = action_text(*first, back_to_m, at_most_mps);
     others.first().map_or(text.clone(), |second| format!("{text}; and {}", short_text(*second)))
 }
@@ -456,5 +466,9 @@ mod tests {
             actions_text(&[Action::Slower, Action::OtherSide, Action::Again], 1240.5, 0.25),
             "go back to 1+240.50, then at most 0.25 m/s; and rolled to either side"
         );
+        let lost = [Action::Slower, Action::Position];
+        let back = "once the position is back, go back to 1+240.50";
+        assert_eq!(actions_text(&lost, 1240.5, 0.25), format!("{back}, at most 0.25 m/s"));
+        assert_eq!(actions_text(&lost, 1240.5, 0.0), format!("{back}; and slower"));
     }
 }

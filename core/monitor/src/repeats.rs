@@ -78,7 +78,8 @@ mod tests {
     /// Readings at 400 Hz; whether the unit has hung after each.
     fn hangs(readings: impl IntoIterator<Item = [f64; 3]>) -> Vec<bool> {
         let mut repeats = Repeats::default();
-        let mut of = |(k, [x, y, z]): (u64, [f64; 3])| repeats.hangs(MonoNs(k * 2_500_000), Vec3::new(x, y, z));
+        let mut of =
+            |(k, [x, y, z]): (u64, [f64; 3])| repeats.hangs(MonoNs(k * 2_500_000), Vec3::new(x, y, z));
         (0..).zip(readings).map(&mut of).collect()
     }
 

@@ -211,7 +211,9 @@ impl LineService {
 
     /// Delivers what the drivers still hold; returns each sensor's line history.
     pub fn end(mut self) -> Vec<(usize, LineHistory)> {
-        if matches!(self.state, LineState::Open(_)) {
+        let closed = LineState::Closed { until: self.common.host.now() };
+        if let LineState::Open(mut open) = core::mem::replace(&mut self.state, closed) {
+            self.count_dropped(open.line.as_mut());
             self.closed();
         }
         let strangers = self.senders.strangers.messages();
@@ -352,11 +354,21 @@ impl LineService {
         if now >= *look_at {
             *look_at = now + STANDING_PERIOD;
             self.look(line.complaint().as_deref(), now);
+            self.count_dropped(line);
             if self.devices.iter().all(|device| device.is_silent(now)) {
                 return Ok(Served::InSilence);
             }
         }
         Ok(Served::Open)
+    }
+
+    /// Counts what the carrier dropped unread, as lost by the line's first device: whose it was isn't known.
+    fn count_dropped(&mut self, line: &mut dyn Line) {
+        let dropped = line.dropped();
+        if let Some(first) = self.devices.first_mut().filter(|_| dropped > 0) {
+            tracing::warn!(dropped, "messages were dropped unread: this program, or the machine, stood");
+            first.history.dropped += dropped;
+        }
     }
 
     /// Maximum wait for bytes, bounded by the next driver deadline.

@@ -62,7 +62,7 @@ pub struct LineHistory {
     pub opened: u64,
     /// Times the line was lost, or reopened for silence.
     pub lost: u64,
-    /// Packets for which the loop's ring had no room.
+    /// Packets for which the loop's ring had no room, and messages that the carrier dropped unread.
     pub dropped: u64,
     /// Messages of senders that weren't believed.
     pub strangers: u64,

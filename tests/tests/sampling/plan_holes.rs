@@ -340,14 +340,14 @@ fn a_vehicle_that_swings_and_drifts() {
     };
     let swinging = |heads| swings(5.0, 1.05, heads);
     let swing: Way = |t| (0.0, f64::to_radians(5.0) * math::sin(TAU * t / 30.0));
-    // 15 degrees in 40 s: at its largest rate all through a turn of SLOW it would be 51.
-    let swing_wide: Way = |t| (0.0, f64::to_radians(15.0) * math::sin(TAU * t / 40.0));
+    // 15 degrees either way in 20 s: at its largest rate all through a turn of MEDIUM it would be 51, and is 30 at most.
+    let swing_wide: Way = |t| (0.0, f64::to_radians(15.0) * math::sin(TAU * t / 20.0));
     let drifting = |heads| Inspection { drift_m: 1.5, ..ceran(heads, PhaseShift) };
     hold(
         vec![
             ("swinging, one head", swinging(ideal(1)), "fast", 1.6, swing),
             ("swinging, four heads", swinging(vita_2_4()), "fast", 2.2, swing),
-            ("swinging widely", swings(15.0, 2.36, ideal(1)), "slow", 5.0, swing_wide),
+            ("swinging widely", swings(15.0, 4.72, ideal(1)), "medium", 5.0, swing_wide),
             ("drifting", drifting(vita_2_4()), "medium", 0.8, |t| (1.5 * math::sin(TAU * t / 60.0), 0.0)),
         ],
         0.3,

@@ -46,7 +46,7 @@ pub struct LineReport {
     pub opened: u64,
     /// Times it was lost, or closed after a silence timeout.
     pub lost: u64,
-    /// Packets dropped for lack of room.
+    /// Packets dropped for lack of room, or by the carrier, unread.
     pub dropped_packets: u64,
     /// Messages of senders that aren't the device, which weren't used.
     pub strangers: u64,

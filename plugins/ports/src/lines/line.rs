@@ -67,6 +67,11 @@ pub trait Line: Send {
         None
     }
 
+    /// Messages that were dropped since the last call, unread, as far as the carrier tells.
+    fn dropped(&mut self) -> u64 {
+        0
+    }
+
     /// Keep-alive, called about once a second on an idle line, for carriers that forget silent clients.
     ///
     /// Errors: the connection is lost.

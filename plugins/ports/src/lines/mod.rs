@@ -9,6 +9,7 @@ mod i2c;
 mod line;
 mod same_device;
 pub(crate) mod serial;
+mod socket_drops;
 mod tcp;
 mod udp;
 mod udp_listen;

@@ -7,6 +7,7 @@ use std::time::Duration;
 use headrace_geometry::time::{DurNs, MonoNs};
 
 use super::line::{Line, READ_BYTES, ReadTimeout, exchange_by_datagram, waited};
+use super::socket_drops::SocketDrops;
 use crate::clock;
 use crate::diagnosis;
 use crate::open_error::OpenError;
@@ -14,6 +15,7 @@ use crate::open_error::OpenError;
 struct Udp {
     socket: UdpSocket,
     timeout: ReadTimeout,
+    drops: SocketDrops,
 }
 
 pub(super) fn open(address: &str) -> Result<Box<dyn Line>, OpenError> {
@@ -24,7 +26,7 @@ pub(super) fn open(address: &str) -> Result<Box<dyn Line>, OpenError> {
         let socket = UdpSocket::bind(own)?;
         // A connected socket receives from the bridge only, and reports its absence.
         socket.connect(peer)?;
-        let mut line = Udp { socket, timeout: ReadTimeout::default() };
+        let mut line = Udp { socket, timeout: ReadTimeout::default(), drops: SocketDrops::default() };
         line.knock()?;
         Ok(line)
     };
@@ -50,6 +52,10 @@ impl Line for Udp {
         read_bytes: usize,
     ) -> io::Result<Option<(MonoNs, Vec<u8>)>> {
         exchange_by_datagram(self, write, read_bytes)
+    }
+
+    fn dropped(&mut self) -> u64 {
+        self.drops.new_ones(&self.socket)
     }
 
     fn knock(&mut self) -> io::Result<()> {

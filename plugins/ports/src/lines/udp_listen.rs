@@ -12,6 +12,7 @@ use std::time::Duration;
 use headrace_geometry::time::{DurNs, MonoNs};
 
 use super::line::{IsValid, Line, READ_BYTES, ReadTimeout, Senders, exchange_by_datagram, waited};
+use super::socket_drops::SocketDrops;
 use crate::clock;
 use crate::diagnosis;
 use crate::open_error::OpenError;
@@ -22,6 +23,7 @@ const MAX_CANDIDATES: usize = 8;
 struct UdpListen {
     socket: UdpSocket,
     timeout: ReadTimeout,
+    drops: SocketDrops,
     from: From,
     /// The sender that is heard, and that commands go to.
     peer: Option<SocketAddr>,
@@ -50,8 +52,8 @@ pub(super) fn open(address: &str, from: Option<&str>) -> Result<Box<dyn Line>, O
     })?;
     let socket = UdpSocket::bind(address).map_err(|error| diagnosis::opening(address, &error))?;
     let peer = if let From::Port(peer) = from { Some(peer) } else { None };
-    let (timeout, candidates) = (ReadTimeout::default(), VecDeque::new());
-    Ok(Box::new(UdpListen { socket, timeout, from, peer, candidates }))
+    let (timeout, drops) = (ReadTimeout::default(), SocketDrops::default());
+    Ok(Box::new(UdpListen { socket, timeout, drops, from, peer, candidates: VecDeque::new() }))
 }
 
 fn resolved(from: &str) -> io::Result<From> {
@@ -192,6 +194,10 @@ impl Line for UdpListen {
         read_bytes: usize,
     ) -> io::Result<Option<(MonoNs, Vec<u8>)>> {
         exchange_by_datagram(self, write, read_bytes)
+    }
+
+    fn dropped(&mut self) -> u64 {
+        self.drops.new_ones(&self.socket)
     }
 }
 
