@@ -1,14 +1,16 @@
 //! Files that commands write: what they may write over, and whether they can be written, found out before the work.
 
+mod claims;
+
 use std::fs::OpenOptions;
 use std::io::{ErrorKind, Read, Seek as _, SeekFrom};
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use headrace_replay::log::{DiveLog, RECOVERED_FROM, TRIMMED};
 
-use crate::cli::Overwrite;
 use crate::failure::Failure;
 use crate::files;
+pub(crate) use claims::Claims;
 
 /// Key of a log's metadata: the scene of which it is a simulation.
 pub(crate) const SIMULATED: &str = "simulated";
@@ -126,7 +128,7 @@ fn ends(path: &Path, mark: &str) -> bool {
 /// Checks, before the work, that a file may and can be written. Nothing is changed.
 ///
 /// Errors: a file is there that isn't of this kind, without `--force`; it can't be written or created.
-pub(crate) fn claim(path: &Path, kind: Kind, overwrite: &Overwrite) -> Result<(), Failure> {
+fn may_write(path: &Path, kind: Kind, force: bool) -> Result<(), Failure> {
     let failed = |source| Failure::Unwritable { path: path.to_owned(), source };
     if path.symlink_metadata().is_err() {
         // Creating it is the only sure test.
@@ -137,7 +139,7 @@ pub(crate) fn claim(path: &Path, kind: Kind, overwrite: &Overwrite) -> Result<()
         return Err(failed(ErrorKind::IsADirectory.into()));
     }
     // Terminals, pipes and /dev/null have nothing to lose.
-    if path.is_file() && !overwrite.force && !kind.is(path) {
+    if path.is_file() && !force && !kind.is(path) {
         return Err(Failure::Usage(format!(
             "writing {}: it exists, and {}; give another name, or overwrite it with --force",
             path.display(),
@@ -157,17 +159,6 @@ pub(crate) fn make_way(path: &Path) -> Result<(), Failure> {
             Err(Failure::Unwritable { path: path.to_owned(), source })
         }
         _ => Ok(()),
-    }
-}
-
-/// Checks that an output isn't one of the inputs.
-///
-/// Errors: it is.
-pub(crate) fn is_no_input(output: &Path, inputs: &[PathBuf]) -> Result<(), Failure> {
-    let real = |path: &Path| path.canonicalize().ok();
-    match inputs.iter().find(|input| real(input).is_some() && real(input) == real(output)) {
-        Some(_) => Err(Failure::Usage(format!("writing {}: it is read by this command", output.display()))),
-        None => Ok(()),
     }
 }
 

@@ -18,7 +18,7 @@ use crate::dive::{Dive, assemble_kept};
 use crate::failure::{self, Failure};
 use crate::files;
 use crate::output::{deliver, say};
-use crate::vehicle_file;
+use crate::vehicle_file::Given;
 use crate::watch::Watch;
 
 /// Segments of a log for which snapshots are saved: more than there are cores, and few enough for the file.
@@ -28,10 +28,9 @@ const SEGMENTS: u32 = 16;
 pub(crate) fn verify(args: &Verify) -> Result<u8, Failure> {
     let files = files_of(&args.logs)?;
     let mut player = Player::open(&files)?;
-    let (text, vehicle) = match &args.vehicle {
-        Some(path) => vehicle_file::read(path),
-        None => vehicle_file::attached(player.info(), &player.losses(), files::first_named(&args.logs)),
-    }?;
+    let given = Given::read(args.vehicle.as_deref())?;
+    let (text, vehicle) =
+        given.or_attached(player.info(), &player.losses(), files::first_named(&args.logs))?;
     let trimmed = player.info().metadata.get(TRIMMED).cloned();
     let dive = assemble_kept(&vehicle)?;
     let sources: Vec<SourceInfo> = dive.armed.sources().to_vec();

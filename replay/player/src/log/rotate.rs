@@ -30,12 +30,13 @@ pub struct Rotation {
     pub dive: String,
 }
 
-/// An existing file that would be taken for this recording or a part of it.
-pub(super) fn in_the_way(recording: &Path) -> std::io::Result<Option<PathBuf>> {
-    if recording.exists() {
-        return Ok(Some(recording.to_owned()));
-    }
-    parts_of(recording).map(|parts| parts.into_iter().next())
+/// The existing files that would be taken for this recording or a part of it.
+///
+/// Errors: its folder can't be read.
+pub fn in_the_way(recording: &Path) -> std::io::Result<Vec<PathBuf>> {
+    let mut files: Vec<PathBuf> = recording.exists().then(|| recording.to_owned()).into_iter().collect();
+    files.extend(parts_of(recording)?);
+    Ok(files)
 }
 
 /// The files next to a recording that are named as its parts, in order.
