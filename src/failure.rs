@@ -112,8 +112,24 @@ impl Failure {
             | Self::Routing(_)
             | Self::Segment(SegmentError::Unfit { .. })
             | Self::Collect(CollectError::Backwards { .. } | CollectError::TooLong { .. }) => USAGE,
+            Self::Log(error) if is_wrong_file(error) => USAGE,
             Self::Segment(SegmentError::Parted { .. }) => DIVERGED,
             _ => FAILED,
         }
     }
+}
+
+/// Whether it is the wrong file that was named, or one that may not be written, rather than a medium that fails.
+fn is_wrong_file(error: &LogError) -> bool {
+    matches!(
+        error,
+        LogError::Open { .. }
+            | LogError::Create { .. }
+            | LogError::NotMcap { .. }
+            | LogError::TooNew { .. }
+            | LogError::NoLogs { .. }
+            | LogError::NotAPart { .. }
+            | LogError::OtherDive { .. }
+            | LogError::PartTwice { .. }
+    )
 }

@@ -212,8 +212,28 @@ fn write(
     let mut writer = Writing::new(&mut file, files::bytes(files));
     let trimmed = rewrite(&mut || DiveLog::open(files), &mut writer, &mut work, &kept_results(args))?;
     drop(writer);
+    if trimmed.bytes_before == 0 && !spans.is_empty() {
+        return Err(nothing_kept(args, files)?);
+    }
     file.flush().and_then(|()| file.complete()).map_err(failed)?;
     Ok(trimmed)
+}
+
+/// Why nothing is written: no sensor's message is within the times or the chainage asked for.
+fn nothing_kept(args: &Trim, files: &[PathBuf]) -> Result<Failure, Failure> {
+    let mut log = DiveLog::open(files)?;
+    let last = log.times().map_or(MonoNs(0), |times| times.1);
+    let first = log.next()?.map_or(last, |message| message.log_time);
+    let option = |name: &str, at: Option<DurNs>| at.map(|at| format!("{name} {} s", at.as_secs_f64()));
+    let asked = [option("--from", args.from), option("--to", args.to)];
+    let chainage = args.chainage.map(|[from_m, to_m]| format!("--chainage {from_m}..{to_m}"));
+    let asked: Vec<String> = asked.into_iter().flatten().chain(chainage).collect();
+    Ok(Failure::Usage(format!(
+        "trim: no sensor's message of {} is within {}; the log spans 0 s to {:.3} s after its first message",
+        files::first_named(&args.logs).display(),
+        asked.join(" "),
+        last.since(first).as_secs_f64()
+    )))
 }
 
 fn tell(args: &Trim, trimmed: &Trimmed, spans: &[(MonoNs, MonoNs)], said: &[String]) -> Result<(), Failure> {

@@ -110,7 +110,7 @@ fn nothing_is_recorded_over_parts_and_dives_are_not_mixed() {
         assert!(answer.code == Some(2) && answer.stderr.contains("part001"), "{}", answer.stderr);
     }
     let answer = folder.headrace(&["replay", "a.part001.mcap", "b.part002.mcap"]);
-    assert_eq!(answer.code, Some(1), "{}", answer.stdout);
+    assert_eq!(answer.code, Some(2), "{}", answer.stdout);
     assert!(answer.stderr.contains("are parts of different recordings"), "{}", answer.stderr);
     for wrong in ["5", "10B", "fast", "0.1s"] {
         let arguments = ["run", "vehicle.toml", "--record", "c.mcap", "--rotate", wrong];
