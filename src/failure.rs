@@ -113,6 +113,8 @@ impl Failure {
             | Self::Segment(SegmentError::Unfit { .. })
             | Self::Collect(CollectError::Backwards { .. } | CollectError::TooLong { .. }) => USAGE,
             Self::Log(error) if is_wrong_file(error) => USAGE,
+            // Of the vehicle file; how the systems are ordered isn't in it.
+            Self::Plugin(error) if !matches!(error, PluginError::Schedule { .. }) => USAGE,
             Self::Segment(SegmentError::Parted { .. }) => DIVERGED,
             _ => FAILED,
         }
