@@ -51,6 +51,7 @@ mod vehicle_file;
 mod verify;
 mod watch;
 
+use std::io::IsTerminal as _;
 use std::process::ExitCode;
 
 use clap::{ColorChoice, CommandFactory as _, FromArgMatches as _};
@@ -68,8 +69,8 @@ pub fn main() -> ExitCode {
         logging::never_wait();
     }
     terminal::be_quiet(cli.verbosity.is_quiet());
-    // A dive isn't failed for its terminal.
-    let needs_output = !matches!(cli.command, Command::Run(_));
+    // A dive isn't failed for its output, nor anything for a terminal that is closed.
+    let needs_output = !matches!(cli.command, Command::Run(_)) && !std::io::stdout().is_terminal();
     let result = match cli.command {
         Command::Demo(demo) => commands::demo(&demo),
         Command::Run(run) => commands::run(&run),
