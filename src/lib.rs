@@ -116,7 +116,20 @@ fn with_output(code: u8) -> u8 {
 fn parse() -> Cli {
     let colour = if terminal::allows_colour() { ColorChoice::Auto } else { ColorChoice::Never };
     let matches = Cli::command().color(colour).try_get_matches();
-    matches
-        .and_then(|matches| Cli::from_arg_matches(&matches))
-        .unwrap_or_else(|error| output::end_with(&error))
+    matches.and_then(|matches| Cli::from_arg_matches(&matches)).unwrap_or_else(|error| end_with(&error))
+}
+
+/// Ends the program with an error of the command line, or with the help that was asked for.
+fn end_with(answer: &clap::Error) -> ! {
+    if answer.use_stderr() {
+        answer.exit();
+    }
+    let code = output::deliver_help(answer).map_or_else(
+        |failure| {
+            logging::complain(&format!("headrace: {failure}"));
+            failure.exit_code()
+        },
+        |()| failure::OK,
+    );
+    std::process::exit(code.into())
 }

@@ -11,8 +11,7 @@ use crossbeam::channel::{Receiver, RecvTimeoutError, SendTimeoutError, Sender, b
 use headrace_config::plain::{lines, one_line};
 use headrace_monitor::report::Report;
 
-use crate::failure::{self, Failure};
-use crate::logging::complain;
+use crate::failure::Failure;
 use crate::terminal;
 use crate::transient;
 
@@ -153,20 +152,6 @@ pub(crate) fn lost() -> Option<String> {
     LOST.get().map(|error| format!("writing standard output: {error}"))
 }
 
-/// Ends the program with what was asked for in place of a command, as help: on stdout, and with exit code 1 if it can't be written.
-pub(crate) fn end_with(text: &clap::Error) -> ! {
-    if text.use_stderr() {
-        text.exit();
-    }
-    match text.print().and_then(|()| io::stdout().flush()) {
-        Err(error) if error.kind() != io::ErrorKind::BrokenPipe => {
-            complain(&format!("headrace: {}", failed(error)));
-            std::process::exit(failure::FAILED.into())
-        }
-        _ => std::process::exit(failure::OK.into()),
-    }
-}
-
 /// The same with a line end.
 pub(crate) fn put_line(text: &str) {
     put(&format!("{text}\n"));
@@ -204,6 +189,13 @@ pub(crate) fn deliver_bytes(bytes: &[u8]) -> Result<(), Failure> {
         stdout.flush()
     };
     taken(stdout().and_then(write))
+}
+
+/// Writes help, which clap makes for a terminal or a file.
+///
+/// Errors: as of [`deliver`].
+pub(crate) fn deliver_help(help: &clap::Error) -> Result<(), Failure> {
+    taken(help.print().and_then(|()| io::stdout().flush()))
 }
 
 /// What became of output: whoever closes a pipe wants no more of it.
