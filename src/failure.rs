@@ -1,6 +1,6 @@
 //! Errors of commands, and their exit codes.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use headrace_calibration::collect::CollectError;
 use headrace_config::{ConfigError, ConfigErrors};
@@ -96,6 +96,14 @@ impl Failure {
                 words.lines().map(str::to_owned).collect()
             }
             _ => vec![words],
+        }
+    }
+
+    /// The error of a log that is written to `path`, which it names.
+    pub(crate) fn writing(path: &Path) -> impl Fn(LogError) -> Self {
+        move |error| match error {
+            LogError::Write { source, .. } => Self::Write { path: path.to_owned(), source },
+            error => error.into(),
         }
     }
 

@@ -33,7 +33,8 @@ fn write(files: &[PathBuf], output: &Path) -> Result<Recovered, Failure> {
     let from = format!("{} (sha256 {})", names.join(", "), files_digest(files)?);
     let mut file = WholeFile::create(output).map_err(failed)?;
     let mut writer = Writing::new(&mut file, files::bytes(files));
-    let recovered = rewrite(&mut || DiveLog::open(files), &mut writer, &result_channels(), &from)?;
+    let recovered = rewrite(&mut || DiveLog::open(files), &mut writer, &result_channels(), &from)
+        .map_err(Failure::writing(output))?;
     drop(writer);
     file.flush().and_then(|()| file.complete()).map_err(failed)?;
     Ok(recovered)

@@ -60,24 +60,26 @@ pub(crate) fn simulate(args: &Simulate) -> Result<u8, Failure> {
     let mut header = log_header(&scene.vehicle, &scene.vehicle_text, false);
     header.metadata.insert(SIMULATED.to_owned(), scene.name.clone());
     let failed = |source| Failure::Write { path: output.clone(), source };
-    let mut writer = LogWriter::new(WholeFile::create(output).map_err(failed)?, &header)?;
+    let mut writer = LogWriter::new(WholeFile::create(output).map_err(failed)?, &header)
+        .map_err(Failure::writing(output))?;
     let _phase = Phase::start("simulate");
     let mut progress = Progress::start();
     let (longest_s, at_most) = (simulation.duration_s(), if scene.is_advised() { "at most " } else { "" });
     while let Some(message) = simulation.next_message() {
         let after_s = message.at.since(START).as_secs_f64();
         progress.at(|| (format!("{after_s:.0} s of {at_most}{longest_s:.0} s"), Some(after_s / longest_s)));
-        match message.direction {
-            Direction::Received => writer.raw(message.source, message.at, message.at, message.bytes)?,
-            Direction::Sent => writer.sent(message.source, message.at, message.bytes)?,
-        }
+        let written = match message.direction {
+            Direction::Received => writer.raw(message.source, message.at, message.at, message.bytes),
+            Direction::Sent => writer.sent(message.source, message.at, message.bytes),
+        };
+        written.map_err(Failure::writing(output))?;
         if let Some(truth) = &mut truth {
             truth.write(&scene, &simulation.take_truth())?;
         }
     }
     // An advised pilot's dive is as long as he needs.
     let duration_s = simulation.duration_s();
-    let (file, written) = writer.finish()?;
+    let (file, written) = writer.finish().map_err(Failure::writing(output))?;
     file.complete().map_err(failed)?;
     let truth = truth.map(Truth::finish).transpose()?;
     drop(progress);

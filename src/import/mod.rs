@@ -105,13 +105,14 @@ fn write<S: Source>(
     header.metadata.insert("import_file".to_owned(), file_name.unwrap_or_default());
     let ids: Vec<String> = header.sources.iter().map(|source| source.id.clone()).collect();
     let failed = |source| Failure::Write { path: args.output.clone(), source };
-    let mut log = LogWriter::new(WholeFile::create(&args.output).map_err(failed)?, &header)?;
+    let mut log = LogWriter::new(WholeFile::create(&args.output).map_err(failed)?, &header)
+        .map_err(Failure::writing(&args.output))?;
     let mut progress = Progress::start();
     let imported = import.write(&mut log, takers, &mut |entries| {
         let share = read.get() as f64 / of_bytes as f64;
         progress.at(|| (format!("{entries} {}s", kind.entries()), Some(share)));
     })?;
-    let (file, _) = log.finish()?;
+    let (file, _) = log.finish().map_err(Failure::writing(&args.output))?;
     file.complete().map_err(failed)?;
     drop(progress);
     tell(args, kind, &ids, &imported)

@@ -210,7 +210,8 @@ fn write(
     };
     let mut file = WholeFile::create(&args.output).map_err(failed)?;
     let mut writer = Writing::new(&mut file, files::bytes(files));
-    let trimmed = rewrite(&mut || DiveLog::open(files), &mut writer, &mut work, &kept_results(args))?;
+    let trimmed = rewrite(&mut || DiveLog::open(files), &mut writer, &mut work, &kept_results(args))
+        .map_err(Failure::writing(&args.output))?;
     drop(writer);
     if trimmed.bytes_before == 0 && !spans.is_empty() {
         return Err(nothing_kept(args, files)?);
