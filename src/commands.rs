@@ -18,7 +18,7 @@ use headrace_vehicle::VehicleConfig;
 use crate::cli::{Demo, Output, Replay, Run, Speed};
 use crate::devices::KINDS;
 use crate::dive::{Clock, Dive, Recording, WhatIf, assemble_followed};
-use crate::expect;
+use crate::expect::{self, Golden};
 use crate::failure::{self, Failure};
 use crate::feeds::Interruptible;
 use crate::files;
@@ -26,7 +26,7 @@ use crate::followers::{Followers, Joining};
 use crate::interrupt;
 use crate::live;
 use crate::output::{put_line, say, show};
-use crate::outputs::{self, Kind};
+use crate::outputs::{self, Claims, Kind};
 use crate::page::{self, Of, Served, VoicesOf};
 use crate::play::{self, Directors, Playing};
 use crate::report_output::{exit_code, finish, note_losses};
@@ -35,7 +35,7 @@ use crate::smooth;
 use crate::summary::summary;
 use crate::terminal;
 use crate::tui;
-use crate::vehicle_file;
+use crate::vehicle_file::{self, Given};
 use crate::watch::{Show, Watch};
 
 /// `headrace demo`.
@@ -44,8 +44,9 @@ pub(crate) fn demo(args: &Demo) -> Result<u8, Failure> {
     let scene = Scene::parse(Document::new(name, text), &KINDS, &files::built_in, None)?;
     outputs::folder(&args.out)?;
     let (log, report_file) = (args.out.join("dive.mcap"), args.out.join("report.json"));
-    outputs::claim(&log, Kind::Simulation, &args.overwrite)?;
-    outputs::claim(&report_file, Kind::Report, &args.overwrite)?;
+    let mut claims = Claims::reading(args.page.files(), &args.overwrite);
+    claims.claim("--out", &log, Kind::Simulation)?;
+    claims.claim("--out", &report_file, Kind::Report)?;
     // The recorder writes new logs only.
     outputs::make_way(&log)?;
     let followers = Followers::of(&args.following)?;
@@ -104,10 +105,14 @@ fn demo_page(args: &Demo, scene: &Scene, log: &Path, dive: &Dive, in_lines: bool
 /// `headrace run`.
 pub(crate) fn run(args: &Run) -> Result<u8, Failure> {
     let (text, vehicle) = vehicle_file::read(&args.vehicle)?;
-    claim_report(&args.output, args.source.as_slice())?;
-    let Some(log) = &args.source else { return live::run(args, &text, &vehicle) };
+    let mut inputs = vehicle_file::files(&args.vehicle, &vehicle);
+    inputs.extend(files_of(args.source.as_slice())?);
+    inputs.extend(args.page.files());
+    let mut claims = Claims::reading(inputs, &args.output.overwrite);
+    claim_report(&args.output, &mut claims)?;
+    let Some(log) = &args.source else { return live::run(args, &text, &vehicle, claims) };
     let mut player = Player::open(&files_of(std::slice::from_ref(log))?)?;
-    live::make_room(&args.record, args)?;
+    live::make_room(&args.record, args, claims)?;
     let rotate = args.rotate;
     let paths = args.record.as_slice();
     let recording =
@@ -157,16 +162,11 @@ pub(crate) fn run(args: &Run) -> Result<u8, Failure> {
 /// `headrace replay`.
 pub(crate) fn replay(args: &Replay) -> Result<u8, Failure> {
     let (files, log) = (files_of(&args.logs)?, files::first_named(&args.logs));
-    claim_report(&args.output, &files)?;
-    if let Some(golden) = args.expect.as_deref().filter(|_| args.bless) {
-        outputs::is_no_input(golden, &files)?;
-        outputs::claim(golden, Kind::Report, &args.output.overwrite)?;
-    }
+    let given = Given::read(args.vehicle.as_deref())?;
+    claim_of_replay(args, &files, &given)?;
+    let golden = args.expect.as_deref().filter(|_| !args.bless).map(Golden::read).transpose()?;
     let mut player = Player::open(&files)?;
-    let (text, mut vehicle) = match &args.vehicle {
-        Some(path) => vehicle_file::read(path),
-        None => vehicle_file::attached(player.info(), &player.losses(), log),
-    }?;
+    let (text, mut vehicle) = given.or_attached(player.info(), &player.losses(), log)?;
     let what_if = what_if(args, &mut vehicle);
     let has_keys = args.following.may_command() || args.interactive && play::has_keys();
     let usual = Speed(if has_keys { Some(1.0) } else { None });
@@ -217,11 +217,11 @@ pub(crate) fn replay(args: &Replay) -> Result<u8, Failure> {
     }
     note_losses(&mut report, log, &player);
     let code = finish(&report, &args.output)?;
-    match &args.expect {
-        Some(golden) if args.bless => expect::bless(&report, golden).map(|()| code),
-        Some(golden) if expect::differs(&report, golden)? => Ok(failure::FAILED),
-        _ => Ok(code),
+    if let Some(path) = args.expect.as_deref().filter(|_| args.bless) {
+        expect::bless(&report, path)?;
     }
+    let differs = golden.map_or(Ok(false), |golden| golden.differs(&report))?;
+    Ok(if differs { failure::FAILED } else { code })
 }
 
 /// The files that a player plays.
@@ -252,11 +252,19 @@ fn replay_page(
     page::serve(&args.page, of, in_lines.then_some(&mut put_line))
 }
 
-/// Checks that the report can be written, and isn't one of the inputs.
-fn claim_report(output: &Output, inputs: &[PathBuf]) -> Result<(), Failure> {
-    let Some(report) = &output.report else { return Ok(()) };
-    outputs::is_no_input(report, inputs)?;
-    outputs::claim(report, Kind::Report, &output.overwrite)
+/// Checks that the report can be written.
+fn claim_report(output: &Output, claims: &mut Claims) -> Result<(), Failure> {
+    output.report.as_ref().map_or(Ok(()), |report| claims.claim("--report", report, Kind::Report))
+}
+
+/// Checks that what a replay writes can be written. The golden report is read, or with --bless written.
+fn claim_of_replay(args: &Replay, logs: &[PathBuf], given: &Given) -> Result<(), Failure> {
+    let read = args.expect.iter().filter(|_| !args.bless);
+    let inputs = logs.iter().chain(&given.files).chain(read).cloned().chain(args.page.files());
+    let mut claims = Claims::reading(inputs, &args.output.overwrite);
+    claim_report(&args.output, &mut claims)?;
+    let blessed = args.expect.as_ref().filter(|_| args.bless);
+    blessed.map_or(Ok(()), |golden| claims.claim("--expect", golden, Kind::Report))
 }
 
 /// Overrides the vehicle's settings by the options. Of several targets and section lengths the first is the dive's own; all are

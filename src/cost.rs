@@ -1,6 +1,6 @@
 //! `headrace cost`: what accuracy costs in time.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use headrace_cost::effort::Effort;
 use headrace_cost::page::{Bars, COST_VERSION, Results, table};
@@ -12,14 +12,16 @@ use crate::devices::KINDS;
 use crate::failure::{self, Failure};
 use crate::files;
 use crate::output::{say, show};
-use crate::outputs::{self, COST, Kind};
+use crate::outputs::{self, COST, Claims, Kind};
 use crate::vehicle_file;
 
 /// `headrace cost`.
 pub(crate) fn cost(args: &Cost) -> Result<u8, Failure> {
     let own = args.vehicle.as_deref().map(vehicle_file::read).transpose()?;
     if let Some(folder) = &args.out {
-        claim(folder, args)?;
+        let own = args.vehicle.as_deref().zip(own.as_ref());
+        let inputs = own.map(|(path, (_, vehicle))| vehicle_file::files(path, vehicle));
+        claim(folder, args, inputs.unwrap_or_default())?;
     }
     let inputs = Inputs {
         effort: if args.quick { Effort::Quick } else { Effort::Full },
@@ -60,11 +62,12 @@ pub(crate) fn cost(args: &Cost) -> Result<u8, Failure> {
 }
 
 /// Checks, before the work, that all files can be written.
-fn claim(folder: &Path, args: &Cost) -> Result<(), Failure> {
+fn claim(folder: &Path, args: &Cost, inputs: Vec<PathBuf>) -> Result<(), Failure> {
     outputs::folder(folder)?;
     let names = TRADES.iter().flat_map(|(name, _)| [format!("{name}.csv"), format!("{name}.svg")]);
+    let mut claims = Claims::reading(inputs, &args.overwrite);
     for name in names.chain(["README.md".to_owned(), "cost.json".to_owned()]) {
-        outputs::claim(&folder.join(name), Kind::Cost, &args.overwrite)?;
+        claims.claim("--out", &folder.join(name), Kind::Cost)?;
     }
     Ok(())
 }

@@ -14,11 +14,11 @@ use headrace_simulator::{START, Scene, Simulation};
 use crate::cli::Emulate;
 use crate::devices::KINDS;
 use crate::failure::{self, Failure};
-use crate::files;
+use crate::files::{self, Beside};
 use crate::live::connections;
 use crate::logging::complain;
 use crate::output::say;
-use crate::outputs::{self, Kind, REHEARSAL};
+use crate::outputs::{self, Claims, Kind, REHEARSAL};
 
 /// Longest wait for a host, ns; bounds the delay of a measurement.
 const WAIT_NS: u32 = 1_000_000;
@@ -26,7 +26,8 @@ const WAIT_NS: u32 = 1_000_000;
 /// `headrace emulate`.
 pub(crate) fn emulate(args: &Emulate) -> Result<u8, Failure> {
     let (name, text) = (args.scene.display().to_string(), files::read(&args.scene)?);
-    let load = files::bytes_beside(&args.scene);
+    let beside = Beside::of(&args.scene);
+    let load = |name: &str| beside.load(name);
     let scene = Scene::parse(Document::new(&name, &text), &KINDS, &load, args.seed)?;
     if scene.is_advised() {
         return Err(Failure::Usage(format!(
@@ -34,7 +35,7 @@ pub(crate) fn emulate(args: &Emulate) -> Result<u8, Failure> {
         )));
     }
     let vehicle_file = args.out.join("vehicle.toml");
-    claim(&scene, args, &vehicle_file)?;
+    claim(&scene, args, &vehicle_file, &beside)?;
     let stands = stands(&scene, args)?;
     write_vehicle(&scene, &stands, &args.out, &vehicle_file)?;
     for (config, stand) in scene.vehicle.sensor_configs.iter().zip(&stands) {
@@ -48,20 +49,25 @@ pub(crate) fn emulate(args: &Emulate) -> Result<u8, Failure> {
 }
 
 /// Checks that the vehicle file and the files that it refers to can be written.
-fn claim(scene: &Scene, args: &Emulate, vehicle_file: &Path) -> Result<(), Failure> {
+fn claim(scene: &Scene, args: &Emulate, vehicle_file: &Path, beside: &Beside) -> Result<(), Failure> {
     outputs::folder(&args.out)?;
-    outputs::claim(vehicle_file, Kind::Rehearsal, &args.overwrite)?;
+    let mut claims = Claims::reading(beside.files(), &args.overwrite);
+    claims.claim("--out", vehicle_file, Kind::Rehearsal)?;
     for (name, content) in &scene.vehicle.attachments {
         let path = args.out.join(name);
         if let Some(parent) = path.parent() {
             outputs::folder(parent)?;
         }
-        // The same file from an earlier rehearsal is no other one.
-        if !std::fs::read(&path).is_ok_and(|there| there == content.as_bytes()) {
-            outputs::claim(&path, Kind::Rehearsal, &args.overwrite)?;
+        if !holds(&path, content) {
+            claims.claim("--out", &path, Kind::Rehearsal)?;
         }
     }
     Ok(())
+}
+
+/// Whether a file is the same as one of an earlier rehearsal, which is no other one.
+fn holds(path: &Path, content: &str) -> bool {
+    std::fs::read(path).is_ok_and(|there| there == content.as_bytes())
 }
 
 /// A port for each sensor, of its `connect`'s carrier, or UDP if this machine lacks it.
@@ -98,7 +104,10 @@ fn write_vehicle(scene: &Scene, stands: &[EmulatedPort], folder: &Path, file: &P
     let section = Document::new("rehearsal", &changes).root()?;
     let text = config::changed(&with_connects(scene), &section)?;
     for (name, content) in &scene.vehicle.attachments {
-        files::write(&folder.join(name), content.as_bytes())?;
+        let path = folder.join(name);
+        if !holds(&path, content) {
+            files::write(&path, content.as_bytes())?;
+        }
     }
     let text = format!("{REHEARSAL}{}\n{text}", scene.name.replace('\n', " "));
     files::write(file, text.as_bytes())

@@ -12,17 +12,32 @@ use crate::logging::complain;
 /// Most differences listed.
 const SHOWN: usize = 20;
 
-/// Whether the report differs from a golden one. The log's name and hash, the history of ports and the golden report's
-/// tolerances are disregarded. Lists the differences on stderr.
-pub(crate) fn differs(report: &Report, golden: &Path) -> Result<bool, Failure> {
-    let wrong = |why: String| {
-        Failure::Usage(format!("reading {}: {why}; expected a report of headrace", golden.display()))
-    };
-    let mut expected: Value =
-        serde_json::from_str(&files::read_report(golden)?).map_err(|error| wrong(error.to_string()))?;
-    let allowed = Allowed::take(&mut expected).map_err(wrong)?;
-    drop_log(&mut expected);
-    Ok(tell(&expected, &without_log(report)?, &allowed))
+/// A golden report, without the log's name and hash and the history of ports.
+pub(crate) struct Golden {
+    expected: Value,
+    allowed: Allowed,
+}
+
+impl Golden {
+    /// Reads it.
+    ///
+    /// Errors: it can't be read, or isn't a report.
+    pub(crate) fn read(path: &Path) -> Result<Self, Failure> {
+        let wrong = |why: String| {
+            Failure::Usage(format!("reading {}: {why}; expected a report of headrace", path.display()))
+        };
+        let mut expected: Value =
+            serde_json::from_str(&files::read_report(path)?).map_err(|error| wrong(error.to_string()))?;
+        let allowed = Allowed::take(&mut expected).map_err(wrong)?;
+        drop_log(&mut expected);
+        Ok(Self { expected, allowed })
+    }
+
+    /// Whether a report differs from it by more than its tolerances, apart from the log and the ports. Lists the differences on
+    /// stderr.
+    pub(crate) fn differs(&self, report: &Report) -> Result<bool, Failure> {
+        Ok(tell(&self.expected, &without_log(report)?, &self.allowed))
+    }
 }
 
 /// Replaces the golden report, without the log's name and hash, keeping its tolerances. Lists the differences on stderr.

@@ -19,10 +19,10 @@ use crate::feeds::Interruptible;
 use crate::files;
 use crate::interrupt;
 use crate::output::say;
-use crate::outputs::{self, EXPORTED, Kind};
+use crate::outputs::{Claims, EXPORTED, Kind};
 use crate::page::{self, Of, VoicesOf};
 use crate::report_output::{exit_code, note_losses};
-use crate::vehicle_file;
+use crate::vehicle_file::Given;
 use crate::watch::Watch;
 
 /// Bytes of voices in a page: two hours.
@@ -31,13 +31,11 @@ const MOST_VOICE_BYTES: usize = 24 << 20;
 /// `headrace export`.
 pub(crate) fn export(args: &Export) -> Result<u8, Failure> {
     let (files, log) = (files_of(&args.logs)?, files::first_named(&args.logs));
-    outputs::is_no_input(&args.html, &files)?;
-    outputs::claim(&args.html, Kind::Page, &args.overwrite)?;
+    let given = Given::read(args.vehicle.as_deref())?;
+    let inputs = files.iter().chain(&given.files).cloned();
+    Claims::reading(inputs, &args.overwrite).claim("--html", &args.html, Kind::Page)?;
     let mut player = Player::open(&files)?;
-    let (text, vehicle) = match &args.vehicle {
-        Some(path) => vehicle_file::read(path),
-        None => vehicle_file::attached(player.info(), &player.losses(), log),
-    }?;
+    let (text, vehicle) = given.or_attached(player.info(), &player.losses(), log)?;
     let dive = assemble_followed(&vehicle, &text, None, true)?;
     player.connect(dive.armed.sources());
     let of = Of {

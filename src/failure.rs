@@ -1,6 +1,6 @@
 //! Errors of commands, and their exit codes.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use headrace_calibration::collect::CollectError;
 use headrace_config::{ConfigError, ConfigErrors};
@@ -99,6 +99,14 @@ impl Failure {
         }
     }
 
+    /// The error of a log that is written to `path`, which it names.
+    pub(crate) fn writing(path: &Path) -> impl Fn(LogError) -> Self {
+        move |error| match error {
+            LogError::Write { source, .. } => Self::Write { path: path.to_owned(), source },
+            error => error.into(),
+        }
+    }
+
     /// Its exit code.
     pub(crate) fn exit_code(&self) -> u8 {
         match self {
@@ -112,8 +120,26 @@ impl Failure {
             | Self::Routing(_)
             | Self::Segment(SegmentError::Unfit { .. })
             | Self::Collect(CollectError::Backwards { .. } | CollectError::TooLong { .. }) => USAGE,
+            Self::Log(error) if is_wrong_file(error) => USAGE,
+            // Of the vehicle file; how the systems are ordered isn't in it.
+            Self::Plugin(error) if !matches!(error, PluginError::Schedule { .. }) => USAGE,
             Self::Segment(SegmentError::Parted { .. }) => DIVERGED,
             _ => FAILED,
         }
     }
+}
+
+/// Whether it is the wrong file that was named, or one that may not be written, rather than a medium that fails.
+fn is_wrong_file(error: &LogError) -> bool {
+    matches!(
+        error,
+        LogError::Open { .. }
+            | LogError::Create { .. }
+            | LogError::NotMcap { .. }
+            | LogError::TooNew { .. }
+            | LogError::NoLogs { .. }
+            | LogError::NotAPart { .. }
+            | LogError::OtherDive { .. }
+            | LogError::PartTwice { .. }
+    )
 }

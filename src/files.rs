@@ -1,11 +1,13 @@
 //! Files: reading, writing, built-in and attached ones.
 
+use std::cell::RefCell;
 use std::fs::File;
-use std::io::{BufWriter, Write};
+use std::io::Write as _;
 use std::path::{Path, PathBuf};
 
 use headrace_monitor::report::Report;
 use headrace_replay::regular_file;
+use headrace_replay::whole_file::{self, WholeFile};
 
 use crate::failure::Failure;
 
@@ -49,17 +51,18 @@ pub(crate) fn bytes(files: &[PathBuf]) -> u64 {
     files.iter().filter_map(|file| file.metadata().ok()).map(|metadata| metadata.len()).sum()
 }
 
-/// Writes a file.
+/// Writes a file, whole or not at all.
 pub(crate) fn write(path: &Path, content: &[u8]) -> Result<(), Failure> {
-    std::fs::write(path, content).map_err(|source| Failure::Write { path: path.to_owned(), source })
+    whole_file::write(path, content).map_err(|source| Failure::Write { path: path.to_owned(), source })
 }
 
-/// Writes a report as JSON, without holding all of it in memory: a long dive's would take more than the dive.
+/// Writes a report as JSON, whole or not at all, and without holding all of it in memory: a long dive's would take more than the
+/// dive.
 pub(crate) fn write_json(path: &Path, report: &Report) -> Result<(), Failure> {
     let failed = |source| Failure::Write { path: path.to_owned(), source };
-    let mut file = BufWriter::new(File::create(path).map_err(failed)?);
+    let mut file = WholeFile::create(path).map_err(failed)?;
     serde_json::to_writer_pretty(&mut file, report).map_err(|error| failed(error.into()))?;
-    file.flush().map_err(failed)
+    file.flush().and_then(|()| file.complete()).map_err(failed)
 }
 
 /// Loader of the text files that `file` refers to, relative to its folder.
@@ -74,11 +77,33 @@ pub(crate) fn beside(file: &Path) -> impl Fn(&str) -> Result<String, String> {
 
 /// Loader of the files that `file` refers to, relative to its folder.
 pub(crate) fn bytes_beside(file: &Path) -> impl Fn(&str) -> Result<Vec<u8>, String> {
-    let folder: PathBuf = file.parent().map(Path::to_owned).unwrap_or_default();
-    move |name| {
-        let path = folder.join(name);
+    let beside = Beside::of(file);
+    move |name| beside.load(name)
+}
+
+/// Loads the files that a file refers to, and remembers which.
+pub(crate) struct Beside {
+    folder: PathBuf,
+    read: RefCell<Vec<PathBuf>>,
+}
+
+impl Beside {
+    pub(crate) fn of(file: &Path) -> Self {
+        let folder = file.parent().map(Path::to_owned).unwrap_or_default();
+        Self { folder, read: RefCell::new(vec![file.to_owned()]) }
+    }
+
+    /// Loads one of them.
+    pub(crate) fn load(&self, name: &str) -> Result<Vec<u8>, String> {
+        let path = self.folder.join(name);
+        self.read.borrow_mut().push(path.clone());
         regular_file::read(&path, DATA_BYTES)
             .map_err(|error| format!("can't be read at {}: {error}", path.display()))
+    }
+
+    /// The file, and those that it refers to as far as they have been loaded.
+    pub(crate) fn files(&self) -> Vec<PathBuf> {
+        self.read.borrow().clone()
     }
 }
 

@@ -51,6 +51,7 @@ mod vehicle_file;
 mod verify;
 mod watch;
 
+use std::io::IsTerminal as _;
 use std::process::ExitCode;
 
 use clap::{ColorChoice, CommandFactory as _, FromArgMatches as _};
@@ -68,6 +69,8 @@ pub fn main() -> ExitCode {
         logging::never_wait();
     }
     terminal::be_quiet(cli.verbosity.is_quiet());
+    // A dive isn't failed for its output, nor anything for a terminal that is closed.
+    let needs_output = !matches!(cli.command, Command::Run(_)) && !std::io::stdout().is_terminal();
     let result = match cli.command {
         Command::Demo(demo) => commands::demo(&demo),
         Command::Run(run) => commands::run(&run),
@@ -97,13 +100,36 @@ pub fn main() -> ExitCode {
         }
         failure.exit_code()
     });
+    let code = if needs_output { with_output(code) } else { code };
     logging::end();
     ExitCode::from(code)
+}
+
+/// The exit code of a command whose output matters: 1 in place of 0 if some of it couldn't be written.
+fn with_output(code: u8) -> u8 {
+    let Some(why) = output::lost() else { return code };
+    logging::complain(&format!("headrace: {why}"));
+    if code == failure::OK { failure::FAILED } else { code }
 }
 
 /// The command line, or the end of the program with help or an error.
 fn parse() -> Cli {
     let colour = if terminal::allows_colour() { ColorChoice::Auto } else { ColorChoice::Never };
-    let matches = Cli::command().color(colour).get_matches();
-    Cli::from_arg_matches(&matches).unwrap_or_else(|error| error.exit())
+    let matches = Cli::command().color(colour).try_get_matches();
+    matches.and_then(|matches| Cli::from_arg_matches(&matches)).unwrap_or_else(|error| end_with(&error))
+}
+
+/// Ends the program with an error of the command line, or with the help that was asked for.
+fn end_with(answer: &clap::Error) -> ! {
+    if answer.use_stderr() {
+        answer.exit();
+    }
+    let code = output::deliver_help(answer).map_or_else(
+        |failure| {
+            logging::complain(&format!("headrace: {failure}"));
+            failure.exit_code()
+        },
+        |()| failure::OK,
+    );
+    std::process::exit(code.into())
 }

@@ -20,7 +20,7 @@ use crate::failure::Failure;
 use crate::followers::{Followers, Joining};
 use crate::interrupt;
 use crate::output;
-use crate::outputs::{self, Kind};
+use crate::outputs::{self, Claims};
 use crate::page::{self, Of, Served, VoicesOf};
 use crate::report_output::finish;
 use crate::screen::Screen;
@@ -35,12 +35,12 @@ fn wrong_texts(vehicle: &VehicleConfig) -> Vec<String> {
 }
 
 /// Runs a dive on the vehicle's ports.
-pub(crate) fn run(args: &Run, text: &str, vehicle: &VehicleConfig) -> Result<u8, Failure> {
+pub(crate) fn run(args: &Run, text: &str, vehicle: &VehicleConfig, claims: Claims) -> Result<u8, Failure> {
     let required = required(args, vehicle)?;
     output::never_wait();
     let logs = if args.record.is_empty() { vec![new_log()] } else { args.record.clone() };
     if !args.no_record {
-        make_room(&logs, args)?;
+        make_room(&logs, args, claims)?;
     }
     let recording = (!args.no_record).then_some(Recording {
         paths: &logs,
@@ -143,20 +143,11 @@ fn begun_text(args: &Run, logs: &[PathBuf], vehicle: &VehicleConfig) -> String {
     format!("{}, target {} m: {where_to}; Ctrl-C ends the dive", vehicle.name, vehicle.target_m)
 }
 
-/// Checks that a dive can be recorded to these files; with `--force` removes those that are there.
-pub(crate) fn make_room(logs: &[PathBuf], args: &Run) -> Result<(), Failure> {
-    for (number, log) in logs.iter().enumerate() {
-        if logs.iter().take(number).any(|other| other == log) {
-            return Err(Failure::Usage(format!(
-                "run: --record {} is given twice; name two files",
-                log.display()
-            )));
-        }
-        let first = if args.rotate.is_some() { part_path(log, 1) } else { log.clone() };
-        outputs::claim(&first, Kind::Dive, &args.output.overwrite)?;
-        outputs::make_way(&first)?;
-    }
-    Ok(())
+/// Checks that a dive can be recorded to these files; with `--force` removes those that are there, the last of what may be refused.
+pub(crate) fn make_room(logs: &[PathBuf], args: &Run, mut claims: Claims) -> Result<(), Failure> {
+    let first = |log: &PathBuf| claims.claim_recording("--record", log, args.rotate.is_some());
+    let firsts = logs.iter().map(first).collect::<Result<Vec<_>, _>>()?;
+    firsts.iter().try_for_each(|first| outputs::make_way(first))
 }
 
 /// Each sensor's id and its connection, or why its `connect` is invalid.

@@ -8,7 +8,7 @@ use crate::cli::{Cli, Completions, Man};
 use crate::failure::{self, Failure};
 use crate::files;
 use crate::output::{deliver_bytes, say};
-use crate::outputs::{self, Kind};
+use crate::outputs::{self, Claims, Kind};
 
 /// Name of the program in completions and pages.
 const NAME: &str = "headrace";
@@ -31,8 +31,9 @@ pub(crate) fn man(args: &Man) -> Result<u8, Failure> {
     };
     outputs::folder(folder)?;
     let pages = pages(&command)?;
+    let mut claims = Claims::reading([], &args.overwrite);
     for (name, _) in &pages {
-        outputs::claim(&folder.join(name), Kind::Manual, &args.overwrite)?;
+        claims.claim("DIR", &folder.join(name), Kind::Manual)?;
     }
     for (name, page) in &pages {
         files::write(&folder.join(name), page)?;

@@ -14,7 +14,7 @@ use crate::cli::Notes;
 use crate::failure::{self, Failure};
 use crate::files;
 use crate::output::{deliver, say};
-use crate::outputs::{self, Kind};
+use crate::outputs::{self, Claims, Kind};
 
 /// `headrace notes`.
 pub(crate) fn notes(args: &Notes) -> Result<u8, Failure> {
@@ -23,9 +23,9 @@ pub(crate) fn notes(args: &Notes) -> Result<u8, Failure> {
     let named = args.out.as_deref().map(|folder| named(&found, folder)).unwrap_or_default();
     if let Some(folder) = &args.out {
         outputs::folder(folder)?;
+        let mut claims = Claims::reading(logs.clone(), &args.overwrite);
         for path in named.values() {
-            outputs::is_no_input(path, &logs)?;
-            outputs::claim(path, Kind::Voice, &args.overwrite)?;
+            claims.claim("--out", path, Kind::Voice)?;
         }
         each_voice(&logs, |voice| match named.get(&voice.id) {
             Some(path) => files::write(path, &voice.audio),

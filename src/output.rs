@@ -2,6 +2,7 @@
 
 use std::fmt::{self, Write as _};
 use std::io::{self, BufWriter, Write};
+use std::sync::OnceLock;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread;
 use std::time::Duration;
@@ -23,6 +24,9 @@ const PIECE: usize = 1 << 10;
 static GIVEN_UP: AtomicBool = AtomicBool::new(false);
 /// Whether stdout is given up where nobody reads it.
 static NEVER_WAITS: AtomicBool = AtomicBool::new(false);
+
+/// Why output is lost: the first error.
+static LOST: OnceLock<io::Error> = OnceLock::new();
 
 /// From now on stdout is left alone: a terminal that doesn't read must not keep a program from its end.
 pub(crate) fn give_up() {
@@ -112,12 +116,12 @@ pub(crate) fn put_waiting(text: &str) {
     }
     let mut stdout = io::stdout().lock();
     if let Err(error) = stdout.write_all(text.as_bytes()).and_then(|()| stdout.flush()) {
-        tracing::debug!(%error, "stdout is closed");
+        note(error);
     }
 }
 
-/// Writes `text` as it is: lines made fit already, and codes for the terminal. Errors are only logged: a closed pipe or a lost
-/// session doesn't end a dive. Nothing is written once the terminal has been given up.
+/// Writes `text` as it is: lines made fit already, and codes for the terminal. Errors are only logged and remembered (see [`lost`]):
+/// a closed pipe or a lost session doesn't end a dive. Nothing is written once the terminal has been given up.
 pub(crate) fn put(text: &str) {
     if GIVEN_UP.load(Ordering::Relaxed) {
         return;
@@ -130,9 +134,22 @@ pub(crate) fn put(text: &str) {
         Err(error) if error.kind() == io::ErrorKind::TimedOut => {
             tracing::warn!("the terminal doesn't read: not all is shown");
         }
-        Err(error) => tracing::debug!(%error, "stdout is closed"),
+        Err(error) => note(error),
         Ok(()) => {}
     }
+}
+
+/// Remembers that output is lost. Whoever closes a pipe wants no more of it.
+fn note(error: io::Error) {
+    tracing::debug!(%error, "stdout takes nothing");
+    if error.kind() != io::ErrorKind::BrokenPipe {
+        LOST.get_or_init(|| error);
+    }
+}
+
+/// Why output that no error told of is lost, if some is.
+pub(crate) fn lost() -> Option<String> {
+    LOST.get().map(|error| format!("writing standard output: {error}"))
 }
 
 /// The same with a line end.
@@ -158,7 +175,7 @@ pub(crate) fn aside(text: &str) {
 
 /// Writes output for another program, and a line end.
 ///
-/// Errors: stdout is closed, the write is short, or a live dive's is read by nobody.
+/// Errors: the write is short, or a live dive's is read by nobody; not that a pipe is closed.
 pub(crate) fn deliver(text: &str) -> Result<(), Failure> {
     deliver_bytes(format!("{}\n", lines(text)).as_bytes())
 }
@@ -171,7 +188,22 @@ pub(crate) fn deliver_bytes(bytes: &[u8]) -> Result<(), Failure> {
         stdout.write_all(bytes)?;
         stdout.flush()
     };
-    stdout().and_then(write).map_err(failed)
+    taken(stdout().and_then(write))
+}
+
+/// Writes help, which clap makes for a terminal or a file.
+///
+/// Errors: as of [`deliver`].
+pub(crate) fn deliver_help(help: &clap::Error) -> Result<(), Failure> {
+    taken(help.print().and_then(|()| io::stdout().flush()))
+}
+
+/// What became of output: whoever closes a pipe wants no more of it.
+fn taken(written: io::Result<()>) -> Result<(), Failure> {
+    match written {
+        Err(error) if error.kind() == io::ErrorKind::BrokenPipe => Ok(()),
+        other => other.map_err(failed),
+    }
 }
 
 /// Writes a report as JSON, without holding all of it in memory.
@@ -179,8 +211,8 @@ pub(crate) fn deliver_bytes(bytes: &[u8]) -> Result<(), Failure> {
 /// Errors: as of [`deliver`].
 pub(crate) fn deliver_json(report: &Report) -> Result<(), Failure> {
     let mut stdout = BufWriter::new(Plain(stdout().map_err(failed)?));
-    serde_json::to_writer_pretty(&mut stdout, report).map_err(|error| failed(error.into()))?;
-    stdout.write_all(b"\n").and_then(|()| stdout.flush()).map_err(failed)
+    let written = serde_json::to_writer_pretty(&mut stdout, report).map_err(io::Error::from);
+    taken(written.and_then(|()| stdout.write_all(b"\n")).and_then(|()| stdout.flush()))
 }
 
 fn failed(source: io::Error) -> Failure {

@@ -1,14 +1,16 @@
 //! Files that commands write: what they may write over, and whether they can be written, found out before the work.
 
+mod claims;
+
 use std::fs::OpenOptions;
 use std::io::{ErrorKind, Read, Seek as _, SeekFrom};
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use headrace_replay::log::{DiveLog, RECOVERED_FROM, TRIMMED};
 
-use crate::cli::Overwrite;
 use crate::failure::Failure;
 use crate::files;
+pub(crate) use claims::Claims;
 
 /// Key of a log's metadata: the scene of which it is a simulation.
 pub(crate) const SIMULATED: &str = "simulated";
@@ -47,6 +49,8 @@ pub(crate) enum Kind {
     Manual,
     Page,
     Cost,
+    /// Snapshots are made where there are none yet.
+    Snapshots,
     /// The recording of a voice note can't be told from any other.
     Voice,
 }
@@ -67,6 +71,7 @@ impl Kind {
             Self::Manual => "isn't a page of headrace's manual",
             Self::Page => "isn't an exported dive",
             Self::Voice => "may be another recording",
+            Self::Snapshots => "snapshots replace no file",
             Self::Cost => "isn't one that headrace cost has written",
         }
     }
@@ -78,7 +83,7 @@ impl Kind {
             log.is_ok_and(|log| log.header().metadata.contains_key(key))
         };
         match self {
-            Self::Dive | Self::Voice => false,
+            Self::Dive | Self::Voice | Self::Snapshots => false,
             Self::Simulation => logged(SIMULATED),
             Self::Import => logged(IMPORTED),
             Self::Trimmed => logged(TRIMMED),
@@ -126,7 +131,7 @@ fn ends(path: &Path, mark: &str) -> bool {
 /// Checks, before the work, that a file may and can be written. Nothing is changed.
 ///
 /// Errors: a file is there that isn't of this kind, without `--force`; it can't be written or created.
-pub(crate) fn claim(path: &Path, kind: Kind, overwrite: &Overwrite) -> Result<(), Failure> {
+fn may_write(path: &Path, kind: Kind, force: bool) -> Result<(), Failure> {
     let failed = |source| Failure::Unwritable { path: path.to_owned(), source };
     if path.symlink_metadata().is_err() {
         // Creating it is the only sure test.
@@ -137,7 +142,7 @@ pub(crate) fn claim(path: &Path, kind: Kind, overwrite: &Overwrite) -> Result<()
         return Err(failed(ErrorKind::IsADirectory.into()));
     }
     // Terminals, pipes and /dev/null have nothing to lose.
-    if path.is_file() && !overwrite.force && !kind.is(path) {
+    if path.is_file() && !force && !kind.is(path) {
         return Err(Failure::Usage(format!(
             "writing {}: it exists, and {}; give another name, or overwrite it with --force",
             path.display(),
@@ -157,17 +162,6 @@ pub(crate) fn make_way(path: &Path) -> Result<(), Failure> {
             Err(Failure::Unwritable { path: path.to_owned(), source })
         }
         _ => Ok(()),
-    }
-}
-
-/// Checks that an output isn't one of the inputs.
-///
-/// Errors: it is.
-pub(crate) fn is_no_input(output: &Path, inputs: &[PathBuf]) -> Result<(), Failure> {
-    let real = |path: &Path| path.canonicalize().ok();
-    match inputs.iter().find(|input| real(input).is_some() && real(input) == real(output)) {
-        Some(_) => Err(Failure::Usage(format!("writing {}: it is read by this command", output.display()))),
-        None => Ok(()),
     }
 }
 

@@ -1,18 +1,18 @@
 //! `headrace recover`: the readable part of a damaged log as a valid one.
 
-use std::fs::OpenOptions;
-use std::io::{BufWriter, Write};
+use std::io::Write as _;
 use std::path::{Path, PathBuf};
 
 use headrace_replay::log::{DiveLog, Recovered, files_digest, files_of, recover as rewrite};
 use headrace_replay::record::result_channels;
+use headrace_replay::whole_file::WholeFile;
 use serde_json::json;
 
 use crate::cli::Recover;
 use crate::failure::{self, Failure};
 use crate::files;
 use crate::output::{deliver, say};
-use crate::outputs::{self, Kind};
+use crate::outputs::{Claims, Kind};
 use crate::progress::Writing;
 
 /// `headrace recover`.
@@ -20,30 +20,24 @@ pub(crate) fn recover(args: &Recover) -> Result<u8, Failure> {
     // Fails before the output is created.
     let files = files_of(&args.logs)?;
     DiveLog::open(&files)?;
-    outputs::is_no_input(&args.output, &files)?;
-    outputs::claim(&args.output, Kind::Recovered, &args.overwrite)?;
-    outputs::make_way(&args.output)?;
+    Claims::reading(files.clone(), &args.overwrite).claim("-o", &args.output, Kind::Recovered)?;
     let recovered = write(&files, &args.output)?;
     tell(args, &recovered)?;
     Ok(if recovered.losses.is_empty() { failure::OK } else { failure::DATA_LOST })
 }
 
-/// Writes the new log; deletes it again if that fails.
+/// Writes the new log, whole or not at all.
 fn write(files: &[PathBuf], output: &Path) -> Result<Recovered, Failure> {
     let failed = |source| Failure::Write { path: output.to_owned(), source };
     let names: Vec<String> = files.iter().map(|file| file.display().to_string()).collect();
     let from = format!("{} (sha256 {})", names.join(", "), files_digest(files)?);
-    let file = OpenOptions::new().write(true).create_new(true).open(output).map_err(failed)?;
-    let mut writer = BufWriter::new(Writing::new(&file, files::bytes(files)));
-    let written = rewrite(&mut || DiveLog::open(files), &mut writer, &result_channels(), &from)
-        .map_err(Failure::from)
-        .and_then(|recovered| {
-            writer.flush().and_then(|()| file.sync_all()).map(|()| recovered).map_err(failed)
-        });
-    if written.is_err() {
-        std::fs::remove_file(output).map_err(failed)?;
-    }
-    written
+    let mut file = WholeFile::create(output).map_err(failed)?;
+    let mut writer = Writing::new(&mut file, files::bytes(files));
+    let recovered = rewrite(&mut || DiveLog::open(files), &mut writer, &result_channels(), &from)
+        .map_err(Failure::writing(output))?;
+    drop(writer);
+    file.flush().and_then(|()| file.complete()).map_err(failed)?;
+    Ok(recovered)
 }
 
 fn tell(args: &Recover, recovered: &Recovered) -> Result<(), Failure> {

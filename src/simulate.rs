@@ -1,13 +1,13 @@
 //! `headrace simulate`: a scene as a log, with its ground truth.
 
-use std::fs::File;
-use std::io::{BufWriter, Write};
+use std::io::Write as _;
 use std::path::{Path, PathBuf};
 
 use headrace_config::Document;
 use headrace_geometry::time::MonoNs;
 use headrace_replay::log::LogWriter;
 use headrace_replay::simulation;
+use headrace_replay::whole_file::WholeFile;
 use headrace_sensor::device::Direction;
 use headrace_simulator::environment::What;
 use headrace_simulator::{START, Scene, Simulation, SoundingTruth, Take, TruthRow};
@@ -18,9 +18,9 @@ use crate::devices::KINDS;
 use crate::dive::log_header;
 use crate::explain::{explain, worth_of};
 use crate::failure::{self, Failure};
-use crate::files;
+use crate::files::{self, Beside};
 use crate::output::{append, deliver, say};
-use crate::outputs::{self, Kind, SIMULATED, TRUTH};
+use crate::outputs::{Claims, Kind, SIMULATED, TRUTH};
 use crate::phase::Phase;
 use crate::progress::Progress;
 
@@ -28,7 +28,8 @@ use crate::progress::Progress;
 pub(crate) fn simulate(args: &Simulate) -> Result<u8, Failure> {
     let text = files::read(&args.scene)?;
     let name = args.scene.display().to_string();
-    let load = files::bytes_beside(&args.scene);
+    let beside = Beside::of(&args.scene);
+    let load = |name: &str| beside.load(name);
     let take = args.take.map(|take| match take {
         TakeWhat::Only => Take::Only,
         TakeWhat::Called => Take::Called,
@@ -49,40 +50,43 @@ pub(crate) fn simulate(args: &Simulate) -> Result<u8, Failure> {
         let what = "simulate: needs -o LOG.mcap for the log, or --explain to list what would be simulated";
         return Err(Failure::Usage(what.to_owned()));
     };
-    outputs::claim(output, Kind::Simulation, &args.overwrite)?;
+    let mut claims = Claims::reading(beside.files(), &args.overwrite);
+    claims.claim("-o", output, Kind::Simulation)?;
     if let Some(truth) = &args.truth {
-        outputs::claim(truth, Kind::Truth, &args.overwrite)?;
+        claims.claim("--truth", truth, Kind::Truth)?;
     }
     let mut simulation = simulation(&scene, args.truth.is_some())?;
     let mut truth = args.truth.as_deref().map(|path| Truth::create(path, &scene, &simulation)).transpose()?;
     let mut header = log_header(&scene.vehicle, &scene.vehicle_text, false);
     header.metadata.insert(SIMULATED.to_owned(), scene.name.clone());
-    let mut writer = LogWriter::create(output, &header)?;
+    let failed = |source| Failure::Write { path: output.clone(), source };
+    let mut writer = LogWriter::new(WholeFile::create(output).map_err(failed)?, &header)
+        .map_err(Failure::writing(output))?;
     let _phase = Phase::start("simulate");
     let mut progress = Progress::start();
     let (longest_s, at_most) = (simulation.duration_s(), if scene.is_advised() { "at most " } else { "" });
     while let Some(message) = simulation.next_message() {
         let after_s = message.at.since(START).as_secs_f64();
         progress.at(|| (format!("{after_s:.0} s of {at_most}{longest_s:.0} s"), Some(after_s / longest_s)));
-        match message.direction {
-            Direction::Received => writer.raw(message.source, message.at, message.at, message.bytes)?,
-            Direction::Sent => writer.sent(message.source, message.at, message.bytes)?,
-        }
+        let written = match message.direction {
+            Direction::Received => writer.raw(message.source, message.at, message.at, message.bytes),
+            Direction::Sent => writer.sent(message.source, message.at, message.bytes),
+        };
+        written.map_err(Failure::writing(output))?;
         if let Some(truth) = &mut truth {
             truth.write(&scene, &simulation.take_truth())?;
         }
     }
     // An advised pilot's dive is as long as he needs.
     let duration_s = simulation.duration_s();
-    let (_, written) = writer.finish()?;
-    if let Some(truth) = &mut truth {
-        truth.finish()?;
-    }
+    let (file, written) = writer.finish().map_err(Failure::writing(output))?;
+    file.complete().map_err(failed)?;
+    let truth = truth.map(Truth::finish).transpose()?;
     drop(progress);
     if args.json {
         let shown = json!({
             "scene": scene.name, "seed": scene.seed, "duration_s": duration_s, "messages": written.messages,
-            "bytes": written.bytes, "truth_rows": truth.map(|truth| truth.rows),
+            "bytes": written.bytes, "truth_rows": truth,
         });
         deliver(&shown.to_string())?;
     } else {
@@ -95,8 +99,8 @@ pub(crate) fn simulate(args: &Simulate) -> Result<u8, Failure> {
             written.bytes,
             output.display()
         ));
-        if let Some(truth) = truth {
-            say(&format!("ground truth of {} measurements in {}", truth.rows, truth.path.display()));
+        if let (Some(rows), Some(path)) = (truth, &args.truth) {
+            say(&format!("ground truth of {rows} measurements in {}", path.display()));
         }
     }
     Ok(failure::OK)
@@ -105,7 +109,7 @@ pub(crate) fn simulate(args: &Simulate) -> Result<u8, Failure> {
 /// The ground truth: CSV, a row per measurement.
 struct Truth {
     path: PathBuf,
-    file: BufWriter<File>,
+    file: WholeFile,
     effects: Vec<&'static str>,
     features: Vec<String>,
     rows: u64,
@@ -117,7 +121,7 @@ const COLUMNS: &str = "time_s,source,sense,number,chainage_m,x_m,y_m,z_m,roll_de
 impl Truth {
     fn create(path: &Path, scene: &Scene, simulation: &Simulation) -> Result<Self, Failure> {
         let failed = |source| Failure::Write { path: path.to_owned(), source };
-        let file = BufWriter::new(File::create(path).map_err(failed)?);
+        let file = WholeFile::create(path).map_err(failed)?;
         let effects = simulation.added().iter().map(|added| added.effect).collect();
         let features =
             simulation.scenery().map(|scenery| scenery.environment.features().to_vec()).unwrap_or_default();
@@ -136,8 +140,11 @@ impl Truth {
         Ok(())
     }
 
-    fn finish(&mut self) -> Result<(), Failure> {
-        self.file.flush().map_err(|source| Failure::Write { path: self.path.clone(), source })
+    /// Puts it in its place; returns its number of rows.
+    fn finish(self) -> Result<u64, Failure> {
+        let Self { path, file, rows, .. } = self;
+        file.complete().map_err(|source| Failure::Write { path, source })?;
+        Ok(rows)
     }
 
     fn line(&mut self, text: &str) -> Result<(), Failure> {

@@ -1,6 +1,6 @@
 //! Vehicle files: from disk, or attached to a log.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use headrace_config::{Document, Loader};
 use headrace_replay::log::LogInfo;
@@ -16,6 +16,41 @@ pub(crate) fn read(path: &Path) -> Result<(String, VehicleConfig), Failure> {
     let text = files::read(path)?;
     let vehicle = parse(&path.display().to_string(), &text, &files::beside(path))?;
     Ok((text, vehicle))
+}
+
+/// The vehicle file that an option names, if it is given, and what it was read from.
+#[derive(Default)]
+pub(crate) struct Given {
+    /// Its text, and the vehicle.
+    vehicle: Option<(String, VehicleConfig)>,
+    /// It and the files that it refers to.
+    pub(crate) files: Vec<PathBuf>,
+}
+
+impl Given {
+    /// Reads it.
+    pub(crate) fn read(path: Option<&Path>) -> Result<Self, Failure> {
+        let Some(path) = path else { return Ok(Self::default()) };
+        let (text, vehicle) = read(path)?;
+        Ok(Self { files: files(path, &vehicle), vehicle: Some((text, vehicle)) })
+    }
+
+    /// It, where it is given, or else the one attached to a log; see [`attached`].
+    pub(crate) fn or_attached(
+        self,
+        info: &LogInfo,
+        losses: &[String],
+        log: &Path,
+    ) -> Result<(String, VehicleConfig), Failure> {
+        self.vehicle.map_or_else(|| attached(info, losses, log), Ok)
+    }
+}
+
+/// A vehicle file and the files that it refers to.
+pub(crate) fn files(path: &Path, vehicle: &VehicleConfig) -> Vec<PathBuf> {
+    let folder = path.parent().unwrap_or(Path::new(""));
+    let others = vehicle.attachments.iter().map(|(name, _)| folder.join(name));
+    std::iter::once(path.to_owned()).chain(others).collect()
 }
 
 /// Parses the vehicle file attached to a log; returns its text, too.

@@ -13,12 +13,13 @@ use headrace_replay::verify::{Difference, Verified, Verifier, What};
 use headrace_vehicle::VehicleConfig;
 use serde_json::{Value, json};
 
-use crate::cli::Verify;
+use crate::cli::{Overwrite, Verify};
 use crate::dive::{Dive, assemble_kept};
 use crate::failure::{self, Failure};
 use crate::files;
 use crate::output::{deliver, say};
-use crate::vehicle_file;
+use crate::outputs::{Claims, Kind};
+use crate::vehicle_file::Given;
 use crate::watch::Watch;
 
 /// Segments of a log for which snapshots are saved: more than there are cores, and few enough for the file.
@@ -27,11 +28,13 @@ const SEGMENTS: u32 = 16;
 /// `headrace verify`.
 pub(crate) fn verify(args: &Verify) -> Result<u8, Failure> {
     let files = files_of(&args.logs)?;
+    let given = Given::read(args.vehicle.as_deref())?;
+    if let Some(snapshots) = &args.snapshots {
+        look_at(snapshots, files.iter().chain(&given.files))?;
+    }
     let mut player = Player::open(&files)?;
-    let (text, vehicle) = match &args.vehicle {
-        Some(path) => vehicle_file::read(path),
-        None => vehicle_file::attached(player.info(), &player.losses(), files::first_named(&args.logs)),
-    }?;
+    let (text, vehicle) =
+        given.or_attached(player.info(), &player.losses(), files::first_named(&args.logs))?;
     let trimmed = player.info().metadata.get(TRIMMED).cloned();
     let dive = assemble_kept(&vehicle)?;
     let sources: Vec<SourceInfo> = dive.armed.sources().to_vec();
@@ -42,6 +45,19 @@ pub(crate) fn verify(args: &Verify) -> Result<u8, Failure> {
         whole(args, &files, &mut player, dive)?
     };
     tell(args, &verified, (&losses, trimmed.as_deref()), &sources)
+}
+
+/// Checks that a file of snapshots can be read, or made where there is none.
+fn look_at<'a>(snapshots: &Path, inputs: impl Iterator<Item = &'a PathBuf>) -> Result<(), Failure> {
+    if snapshots.is_dir() {
+        let source = std::io::ErrorKind::IsADirectory.into();
+        return Err(Failure::Read { path: snapshots.to_owned(), source });
+    }
+    if snapshots.exists() {
+        return files::open(snapshots).map(|_| ());
+    }
+    let never = Overwrite { force: false };
+    Claims::reading(inputs.cloned(), &never).claim("--snapshots", snapshots, Kind::Snapshots)
 }
 
 fn tick(args: &Verify) -> DurNs {

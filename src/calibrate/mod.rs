@@ -18,15 +18,13 @@ use crate::failure::{self, Failure};
 use crate::feeds::{Followed, share};
 use crate::output::{deliver, show};
 use crate::progress::Progress;
-use crate::vehicle_file;
+use crate::vehicle_file::Given;
 
 /// Estimates a vehicle file's values from a log.
 pub(crate) fn calibrate(args: &Calibrate) -> Result<u8, Failure> {
     let mut player = Player::open(&files_of(std::slice::from_ref(&args.log))?)?;
-    let (text, vehicle) = match &args.vehicle {
-        Some(path) => vehicle_file::read(path),
-        None => vehicle_file::attached(player.info(), &player.losses(), &args.log),
-    }?;
+    let given = Given::read(args.vehicle.as_deref())?;
+    let (text, vehicle) = given.or_attached(player.info(), &player.losses(), &args.log)?;
     let dive = assemble(&vehicle, &text, None)?;
     player.connect(dive.armed.sources());
     let window = Window { from_s: args.from, to_s: args.to, at_surface_s: args.at_surface };

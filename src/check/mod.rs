@@ -3,6 +3,7 @@
 mod outlook;
 
 use headrace_config::{ConfigErrors, Document};
+use headrace_sensor::reading::MAX_SOURCES;
 use headrace_simulator::{Scene, SceneError, Simulation, calm};
 use headrace_vehicle::{Finding, Grade, VehicleConfig};
 use serde_json::{Value, json};
@@ -132,6 +133,7 @@ impl Readable {
         };
         vehicle_file::log(name, &vehicle);
         let mut findings = vehicle.findings();
+        findings.extend(too_many(&vehicle));
         // What a plan finds of a vehicle that can't work follows from that.
         if findings.iter().all(|finding| finding.grade != Grade::Error) {
             findings.extend(outlook.iter().flat_map(|outlook| outlook.findings(&vehicle)));
@@ -165,6 +167,18 @@ impl Readable {
         }
         lines.join("\n") + "\n"
     }
+}
+
+/// Sensors beyond those that a dive has room for.
+fn too_many(vehicle: &VehicleConfig) -> Option<Finding> {
+    let count = vehicle.sensor_configs.len();
+    let problem =
+        format!("{count} sensors; a vehicle has up to {MAX_SOURCES}: leave out this one and those after it");
+    (count > MAX_SOURCES).then(|| Finding {
+        grade: Grade::Error,
+        key: format!("sensors[{MAX_SOURCES}].id"),
+        problem,
+    })
 }
 
 /// A finding with its line; its key with the value that is there.

@@ -36,6 +36,13 @@ pub(crate) struct PageArgs {
     pub(crate) page_origin: Vec<String>,
 }
 
+impl PageArgs {
+    /// The files that the page reads.
+    pub(crate) fn files(&self) -> impl Iterator<Item = PathBuf> {
+        [&self.page_token_file, &self.page_cert, &self.page_key].into_iter().flatten().cloned()
+    }
+}
+
 fn address(text: &str) -> Result<SocketAddr, String> {
     let with_port = |ip: IpAddr| SocketAddr::new(ip, PORT);
     let port = |text: &str| text.parse().ok().map(|port| SocketAddr::new(Ipv4Addr::LOCALHOST.into(), port));

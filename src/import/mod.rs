@@ -5,7 +5,8 @@ mod ros;
 use std::cell::Cell;
 use std::fs::File;
 use std::io::{self, BufRead as _, BufReader, Read, Seek, SeekFrom};
-use std::path::Path;
+use std::iter;
+use std::path::{Path, PathBuf};
 use std::rc::Rc;
 
 use headrace_config::Document;
@@ -16,6 +17,7 @@ use headrace_import::{
     BEGIN, FileKind, Format, Import, ImportError, Imported, Input, Source, Taker, detect, routing,
 };
 use headrace_replay::log::{LogError, LogHeader, LogWriter};
+use headrace_replay::whole_file::WholeFile;
 use headrace_vehicle::VehicleConfig;
 use serde_json::json;
 
@@ -25,7 +27,7 @@ use crate::failure::{self, Failure};
 use crate::files;
 use crate::logging::complain;
 use crate::output::{deliver, say};
-use crate::outputs::{self, IMPORTED, Kind};
+use crate::outputs::{Claims, IMPORTED, Kind};
 use crate::progress::Progress;
 use crate::vehicle_file;
 
@@ -36,6 +38,10 @@ pub(crate) fn import(args: &cli::Import) -> Result<u8, Failure> {
         None => kind_of(&args.file)?,
     };
     let vehicle = args.vehicle.as_deref().map(vehicle_file::read).transpose()?;
+    let mut inputs: Vec<PathBuf> = iter::once(&args.file).chain(&args.map).cloned().collect();
+    if let (Some(path), Some((_, vehicle))) = (&args.vehicle, &vehicle) {
+        inputs.extend(vehicle_file::files(path, vehicle));
+    }
     let mut header = match &vehicle {
         Some((text, vehicle)) => log_header(vehicle, text, false),
         None => LogHeader {
@@ -47,8 +53,7 @@ pub(crate) fn import(args: &cli::Import) -> Result<u8, Failure> {
     if vehicle.is_none() {
         header.sources = routing::sources(kind, &args.source);
     }
-    outputs::is_no_input(&args.output, std::slice::from_ref(&args.file))?;
-    outputs::claim(&args.output, Kind::Import, &args.overwrite)?;
+    Claims::reading(inputs, &args.overwrite).claim("-o", &args.output, Kind::Import)?;
     let name = args.file.display().to_string();
     let file = files::open(&args.file)?;
     let read = Rc::new(Cell::new(0));
@@ -99,13 +104,16 @@ fn write<S: Source>(
     let file_name = args.file.file_name().map(|name| name.to_string_lossy().into_owned());
     header.metadata.insert("import_file".to_owned(), file_name.unwrap_or_default());
     let ids: Vec<String> = header.sources.iter().map(|source| source.id.clone()).collect();
-    let mut log = LogWriter::create(&args.output, &header)?;
+    let failed = |source| Failure::Write { path: args.output.clone(), source };
+    let mut log = LogWriter::new(WholeFile::create(&args.output).map_err(failed)?, &header)
+        .map_err(Failure::writing(&args.output))?;
     let mut progress = Progress::start();
     let imported = import.write(&mut log, takers, &mut |entries| {
         let share = read.get() as f64 / of_bytes as f64;
         progress.at(|| (format!("{entries} {}s", kind.entries()), Some(share)));
     })?;
-    log.finish()?;
+    let (file, _) = log.finish().map_err(Failure::writing(&args.output))?;
+    file.complete().map_err(failed)?;
     drop(progress);
     tell(args, kind, &ids, &imported)
 }

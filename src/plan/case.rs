@@ -1,6 +1,6 @@
 //! The inspection to plan, from a vehicle file or from options alone.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use headrace_config::Document;
 use headrace_config::Loader;
@@ -37,6 +37,8 @@ pub(super) struct Case {
     pub(super) question: Question,
     /// Errors of position to expect; `None` without a vehicle file.
     pub(super) errors: Option<ExpectedErrors>,
+    /// The files that it was read from.
+    pub(super) inputs: Vec<PathBuf>,
 }
 
 type Head = (HeadSpec, Vec<HeadMode>);
@@ -84,6 +86,7 @@ impl Case {
         let name = path.file_name().map(|name| name.to_string_lossy()).unwrap_or_default();
         let errors = calm::expected_errors(&vehicle, &name, &KINDS, &files::bytes_beside(path));
         let errors = errors.map_err(|why| Failure::Usage(format!("plan: {why}")))?;
+        let mut inputs = vehicle_file::files(path, &vehicle);
         let case = Self::new(
             tunnel.unwrap_or(vehicle.tunnel),
             heads,
@@ -93,7 +96,8 @@ impl Case {
             question,
             args,
         );
-        Ok(Self { errors, ..case })
+        inputs.extend_from_slice(&case.inputs);
+        Ok(Self { errors, inputs, ..case })
     }
 
     fn new(
@@ -119,15 +123,34 @@ impl Case {
             yaw_rate_radps: args.yaw_rate.to_radians(),
             sound_speed_mps,
         };
-        Self { inspection, heads: ids, tunnel: tunnel.name, range_m, question, errors: None }
+        Self {
+            inspection,
+            heads: ids,
+            tunnel: tunnel.name,
+            range_m,
+            question,
+            errors: None,
+            inputs: tunnel_file(args),
+        }
     }
+}
+
+/// Whether a tunnel's name is that of a polyline file.
+fn is_file(name: &str) -> bool {
+    Path::new(name).extension().is_some_and(|extension| extension == "csv")
+}
+
+/// The file that the tunnel is read from, if it is read from one.
+fn tunnel_file(args: &Plan) -> Vec<PathBuf> {
+    let name = args.tunnel.as_deref().and_then(|tunnel| tunnel.split(',').next()).map(str::trim);
+    name.filter(|name| is_file(name)).map(PathBuf::from).into_iter().collect()
 }
 
 /// A tunnel from `NAME`, `NAME,KEY=VALUE,...` with the keys of a vehicle file, or a polyline file.
 fn tunnel(text: &str) -> Result<TunnelConfig, Failure> {
     let mut parts = text.split(',');
     let name = parts.next().unwrap_or_default().trim();
-    let begin = if Path::new(name).extension().is_some_and(|extension| extension == "csv") {
+    let begin = if is_file(name) {
         format!("profile = \"polyline\"\nfile = {name:?}\n")
     } else {
         format!("profile = {name:?}\n")

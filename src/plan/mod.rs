@@ -17,20 +17,22 @@ use crate::cli::Plan;
 use crate::failure::{self, Failure};
 use crate::files;
 use crate::output::{deliver, say, show};
-use crate::outputs::{self, Kind, PICTURE};
+use crate::outputs::{self, Claims, Kind, PICTURE};
 use case::Case;
 use findings::{Findings, printed_mps};
 use pictures::Shown;
 
 /// `headrace plan`.
 pub(crate) fn plan(args: &Plan) -> Result<u8, Failure> {
+    let case = Case::of(args)?;
     if let Some(folder) = &args.svg {
         outputs::folder(folder)?;
+        let mut claims = Claims::reading(case.inputs.iter().cloned(), &args.overwrite);
         for (name, _) in PICTURES {
-            outputs::claim(&folder.join(name), Kind::Picture, &args.overwrite)?;
+            claims.claim("--svg", &folder.join(name), Kind::Picture)?;
         }
     }
-    let findings = find(Case::of(args)?, args)?;
+    let findings = find(case, args)?;
     if let Some(folder) = &args.svg {
         draw(&findings, folder)?;
     }
@@ -50,7 +52,7 @@ pub(crate) fn plan(args: &Plan) -> Result<u8, Failure> {
 }
 
 fn find(case: Case, args: &Plan) -> Result<Findings, Failure> {
-    let Case { inspection, heads, tunnel, range_m, question, errors } = case;
+    let Case { inspection, heads, tunnel, range_m, question, errors, inputs: _ } = case;
     let planner = Planner::new(inspection)?.with_errors(errors);
     let only = (args.mode != "all").then_some(args.mode.as_str());
     let answers = planner.answers(&question, only)?;

@@ -2,8 +2,7 @@
 
 mod anonymous;
 
-use std::fs::OpenOptions;
-use std::io::{BufWriter, Write};
+use std::io::Write as _;
 use std::path::PathBuf;
 
 use headrace_geometry::time::{DurNs, MonoNs};
@@ -15,6 +14,7 @@ use headrace_replay::log::{
 };
 use headrace_replay::player::{Player, seconds};
 use headrace_replay::record::result_channels;
+use headrace_replay::whole_file::WholeFile;
 use headrace_sensor::device::Needless;
 use headrace_vehicle::VehicleConfig;
 use serde_json::json;
@@ -24,9 +24,9 @@ use crate::dive::assemble_kept;
 use crate::failure::{self, Failure};
 use crate::files;
 use crate::output::{deliver, say};
-use crate::outputs::{self, Kind};
+use crate::outputs::{Claims, Kind};
 use crate::progress::Writing;
-use crate::vehicle_file;
+use crate::vehicle_file::Given;
 use crate::watch::Watch;
 use anonymous::Anonymous;
 
@@ -38,11 +38,12 @@ const BRIDGED: DurNs = DurNs::from_millis(2000);
 /// `headrace trim`.
 pub(crate) fn trim(args: &Trim) -> Result<u8, Failure> {
     let files = files_of(&args.logs)?;
-    outputs::is_no_input(&args.output, &files)?;
-    outputs::claim(&args.output, Kind::Trimmed, &args.overwrite)?;
+    let given = Given::read(args.vehicle.as_deref().filter(|_| needs_vehicle(args)))?;
+    let inputs = files.iter().chain(&given.files).chain(&args.vehicle).cloned();
+    Claims::reading(inputs, &args.overwrite).claim("-o", &args.output, Kind::Trimmed)?;
     let log = DiveLog::open(&files)?;
     let info = log.header().clone();
-    let vehicle = vehicle(args, &files, &info)?;
+    let vehicle = vehicle(args, given, &files, &info)?;
     let spans = spans(args, &files, vehicle.as_ref())?;
     let anonymous = match &vehicle {
         Some(vehicle) if args.anonymise => Some(Anonymous::of(&log, vehicle)?),
@@ -55,16 +56,23 @@ pub(crate) fn trim(args: &Trim) -> Result<u8, Failure> {
     Ok(if trimmed.losses > 0 { failure::DATA_LOST } else { failure::OK })
 }
 
+/// Whether the options need the vehicle.
+fn needs_vehicle(args: &Trim) -> bool {
+    args.chainage.is_some() || args.drop_echoes || args.anonymise
+}
+
 /// The vehicle, if the options need it.
-fn vehicle(args: &Trim, files: &[PathBuf], info: &LogInfo) -> Result<Option<VehicleConfig>, Failure> {
-    if args.chainage.is_none() && !args.drop_echoes && !args.anonymise {
+fn vehicle(
+    args: &Trim,
+    given: Given,
+    files: &[PathBuf],
+    info: &LogInfo,
+) -> Result<Option<VehicleConfig>, Failure> {
+    if !needs_vehicle(args) {
         return Ok(None);
     }
     let losses = Player::open(files)?.losses();
-    let (_, vehicle) = match &args.vehicle {
-        Some(path) => vehicle_file::read(path),
-        None => vehicle_file::attached(info, &losses, files::first_named(&args.logs)),
-    }?;
+    let (_, vehicle) = given.or_attached(info, &losses, files::first_named(&args.logs))?;
     Ok(Some(vehicle))
 }
 
@@ -153,7 +161,7 @@ fn kept_results(args: &Trim) -> Vec<ResultChannel> {
     result_channels().into_iter().filter(is_kept).collect()
 }
 
-/// Writes the new log; deletes it again if that fails.
+/// Writes the new log, whole or not at all.
 fn write(
     args: &Trim,
     files: &[PathBuf],
@@ -200,16 +208,33 @@ fn write(
         change: &mut change,
         voices: !args.anonymise,
     };
-    outputs::make_way(&args.output)?;
-    let file = OpenOptions::new().write(true).create_new(true).open(&args.output).map_err(failed)?;
-    let mut writer = BufWriter::new(Writing::new(&file, files::bytes(files)));
-    let written = rewrite(&mut || DiveLog::open(files), &mut writer, &mut work, &kept_results(args))
-        .map_err(Failure::from)
-        .and_then(|trimmed| writer.flush().and_then(|()| file.sync_all()).map(|()| trimmed).map_err(failed));
-    if written.is_err() {
-        std::fs::remove_file(&args.output).map_err(failed)?;
+    let mut file = WholeFile::create(&args.output).map_err(failed)?;
+    let mut writer = Writing::new(&mut file, files::bytes(files));
+    let trimmed = rewrite(&mut || DiveLog::open(files), &mut writer, &mut work, &kept_results(args))
+        .map_err(Failure::writing(&args.output))?;
+    drop(writer);
+    if trimmed.bytes_before == 0 && !spans.is_empty() {
+        return Err(nothing_kept(args, files)?);
     }
-    written
+    file.flush().and_then(|()| file.complete()).map_err(failed)?;
+    Ok(trimmed)
+}
+
+/// Why nothing is written: no sensor's message is within the times or the chainage asked for.
+fn nothing_kept(args: &Trim, files: &[PathBuf]) -> Result<Failure, Failure> {
+    let mut log = DiveLog::open(files)?;
+    let last = log.times().map_or(MonoNs(0), |times| times.1);
+    let first = log.next()?.map_or(last, |message| message.log_time);
+    let option = |name: &str, at: Option<DurNs>| at.map(|at| format!("{name} {} s", at.as_secs_f64()));
+    let asked = [option("--from", args.from), option("--to", args.to)];
+    let chainage = args.chainage.map(|[from_m, to_m]| format!("--chainage {from_m}..{to_m}"));
+    let asked: Vec<String> = asked.into_iter().flatten().chain(chainage).collect();
+    Ok(Failure::Usage(format!(
+        "trim: no sensor's message of {} is within {}; the log spans 0 s to {:.3} s after its first message",
+        files::first_named(&args.logs).display(),
+        asked.join(" "),
+        last.since(first).as_secs_f64()
+    )))
 }
 
 fn tell(args: &Trim, trimmed: &Trimmed, spans: &[(MonoNs, MonoNs)], said: &[String]) -> Result<(), Failure> {

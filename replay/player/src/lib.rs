@@ -18,6 +18,7 @@ pub mod snapshot_store;
 pub mod threads;
 pub mod verify;
 pub mod view;
+pub mod whole_file;
 pub mod worth;
 
 pub use adviser::{SimulationError, simulation, simulation_believing};

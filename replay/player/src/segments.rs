@@ -5,7 +5,7 @@
 //! file but where its segments end.
 
 use std::fs::File;
-use std::io::{BufReader, BufWriter, ErrorKind, Read, Seek, SeekFrom, Write};
+use std::io::{BufReader, ErrorKind, Read, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicUsize, Ordering};
 
@@ -20,6 +20,7 @@ use crate::player::{Player, PlayerPlace, seconds};
 use crate::results::STREAMS;
 use crate::threads::joined;
 use crate::verify::{StreamVerified, Verified, Verifier, combined};
+use crate::whole_file::WholeFile;
 
 /// What a file of snapshots begins with.
 const MAGIC: &[u8] = b"headrace snapshots 1\n";
@@ -115,9 +116,7 @@ impl Segmented<'_> {
         let (from, to) = player.span().unwrap_or_default();
         let begin_s =
             |number: u32| to.since(from).as_secs_f64() / f64::from(segments.max(1)) * f64::from(number);
-        let part = self.snapshots.with_extension("part");
-        let file = File::create(&part).map_err(|error| self.file_error(error))?;
-        let mut file = BufWriter::new(file);
+        let mut file = WholeFile::create(self.snapshots).map_err(|error| self.file_error(error))?;
         let mut write = |bytes: &[u8]| {
             let length = (bytes.len() as u64).to_le_bytes();
             file.write_all(&length).and_then(|()| file.write_all(bytes))
@@ -133,8 +132,7 @@ impl Segmented<'_> {
             }
             run_tick(&mut driver, &mut dive, &mut player, &mut verifier)?;
         }
-        let kept = file.flush().and_then(|()| std::fs::rename(&part, self.snapshots));
-        kept.map_err(|error| self.file_error(error))?;
+        file.complete().map_err(|error| self.file_error(error))?;
         let streams = ended(&mut dive, verifier)?;
         Ok((combined(&[streams]), player.losses()))
     }

@@ -473,3 +473,46 @@ fn every_command_has_help_with_an_example() {
         assert!(answer.stdout.contains(&format!("Example:\n  headrace {command}")), "{}", answer.stdout);
     }
 }
+
+#[test]
+fn a_wrong_log_is_a_wrong_argument_and_leaves_nothing() {
+    let folder = Folder::new();
+    folder.write("vehicle.toml", VEHICLE);
+    folder.write("empty.mcap", "");
+    folder.write("gzip.mcap", [0x1f, 0x8b, 8, 0, 0, 0, 0, 0, 0, 3]);
+    std::fs::create_dir(folder.path("folder.mcap")).unwrap();
+    let mut wrong = vec!["none.mcap", "empty.mcap", "gzip.mcap", "folder.mcap", "vehicle.toml"];
+    let fifo = std::process::Command::new("mkfifo").arg(folder.path("fifo.mcap")).status();
+    if fifo.is_ok_and(|status| status.success()) {
+        wrong.push("fifo.mcap");
+    }
+    for log in wrong {
+        for command in [
+            &["replay", log][..],
+            &["verify", log],
+            &["notes", log],
+            &["calibrate", log],
+            &["recover", log, "-o", "out.mcap"],
+            &["trim", log, "-o", "out.mcap"],
+            &["export", log, "--html", "out.mcap"],
+            &["run", "vehicle.toml", "--source", log, "--record", "out.mcap"],
+        ] {
+            let answer = folder.headrace(command);
+            let said = (answer.code, answer.stdout.as_str());
+            assert_eq!(said, (Some(2), ""), "{command:?}: {}", answer.stderr);
+            assert!(answer.stderr.contains(log), "{command:?}: {}", answer.stderr);
+            assert!(!folder.path("out.mcap").exists(), "{command:?}");
+        }
+    }
+}
+
+#[test]
+fn snapshots_that_cannot_be_had_are_told_before_the_work() {
+    let folder = Folder::with_dive();
+    folder.record("dive.mcap", "live.mcap", &[]);
+    for wrong in ["none/snapshots", "."] {
+        let answer = folder.headrace(&["verify", "live.mcap", "--snapshots", wrong]);
+        assert_eq!((answer.code, answer.stdout.as_str()), (Some(2), ""), "{wrong}: {}", answer.stderr);
+        assert!(answer.stderr.contains(wrong), "{}", answer.stderr);
+    }
+}

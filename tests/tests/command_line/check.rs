@@ -311,3 +311,30 @@ fn a_profile_finer_than_a_sonar_tells_is_named() {
     20000 points: headrace: warning: vehicle.toml:6: tunnel.file: is finer than a sonar tells: 19999 of 20000 edges are shorter than 2 mm, the finest step of a range here, the first of 0.943 mm at 0.000 m round the wall (6:00); which way so short an edge faces is the survey's error, points every 10 mm say as much
     ");
 }
+
+#[test]
+fn more_sensors_than_a_dive_takes_are_told_as_a_dive_refuses_them() {
+    let folder = Folder::with_dive();
+    let with = |count: usize| {
+        let mut text = VEHICLE.to_owned();
+        for number in VEHICLE.matches("[[sensors]]").count()..count {
+            write!(text, "\n[[sensors]]\nid = \"depth_{number}\"\nplugin = \"bar100\"\n").unwrap();
+        }
+        folder.write("many.toml", text);
+    };
+    let commands: [&[&str]; 3] = [
+        &["check", "many.toml"],
+        &["replay", "dive.mcap", "--vehicle", "many.toml"],
+        &["run", "many.toml", "--source", "dive.mcap", "--speed", "max"],
+    ];
+    for (count, code) in [(64, 0), (65, 2)] {
+        with(count);
+        for command in commands {
+            let answer = folder.headrace(command);
+            assert_eq!(answer.code, Some(code), "{count}, {command:?}: {}", answer.stderr);
+            assert_eq!(answer.stderr.contains("64"), code == 2, "{count}, {command:?}: {}", answer.stderr);
+        }
+    }
+    let answer = folder.headrace(&["check", "many.toml"]);
+    assert!(answer.stderr.contains("many.toml:284: sensors[64].id: 65 sensors"), "{}", answer.stderr);
+}

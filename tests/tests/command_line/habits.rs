@@ -4,7 +4,7 @@ use std::io::Write as _;
 use std::process::{Command, Stdio};
 
 use headrace_tests::screen::Screen;
-use headrace_tests::{Folder, root, skipped};
+use headrace_tests::{Folder, program, root, skipped};
 
 /// The commands that help lists.
 fn commands(folder: &Folder) -> Vec<String> {
@@ -106,4 +106,47 @@ fn work_over_two_seconds_says_how_long_it_still_takes() {
     assert_eq!(quiet.shown(), "");
     quiet.signal(rustix::process::Signal::TERM);
     quiet.end();
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn output_that_cannot_be_written_is_no_success() {
+    let folder = Folder::with_dive();
+    folder.record("dive.mcap", "live.mcap", &[]);
+    let code = |arguments: &[&str], to: Stdio| {
+        let output = program().args(arguments).current_dir(folder.path("")).stdout(to).output().unwrap();
+        (output.status.code(), String::from_utf8(output.stderr).unwrap())
+    };
+    let full = || Stdio::from(std::fs::OpenOptions::new().write(true).open("/dev/full").unwrap());
+    let vehicle = root().join("deploy/vehicles/vita1.toml");
+    for arguments in [
+        &["replay", "live.mcap"][..],
+        &["replay", "live.mcap", "-q"],
+        &["replay", "live.mcap", "--json"],
+        &["verify", "live.mcap"],
+        &["check", "vehicle.toml"],
+        &["notes", "live.mcap"],
+        &["trim", "live.mcap", "-o", "part.mcap"],
+        &["plan", "--vehicle", vehicle.to_str().unwrap()],
+        &["simulate", "scene.toml", "--explain"],
+        &["devices"],
+        &["demo", "--speed", "max", "--no-page"],
+        &["completions", "bash"],
+        &["help"],
+        &["replay", "--help"],
+        &["--version"],
+    ] {
+        let (failed, said) = code(arguments, full());
+        assert_eq!(failed, Some(1), "{arguments:?}: {said}");
+        assert!(said.contains("standard output: No space left on device"), "{arguments:?}: {said}");
+    }
+    // A dive isn't failed for its terminal.
+    let dive = ["run", "vehicle.toml", "--source", "dive.mcap", "--speed", "max"];
+    assert_eq!(code(&dive, full()).0, Some(0));
+    // Whoever closes a pipe wants no more of it.
+    for arguments in [&["replay", "live.mcap"][..], &["replay", "live.mcap", "--json"], &["help"], &dive] {
+        let (reader, writer) = std::io::pipe().unwrap();
+        drop(reader);
+        assert_eq!(code(arguments, writer.into()), (Some(0), String::new()), "{arguments:?}");
+    }
 }

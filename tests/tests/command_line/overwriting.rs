@@ -1,6 +1,9 @@
 //! What is there already isn't overwritten unasked, and outputs are tried before the work begins.
 
-use headrace_tests::{Folder, VEHICLE, root};
+use std::collections::BTreeMap;
+use std::ffi::OsString;
+
+use headrace_tests::{Folder, VEHICLE, program, root, skipped};
 
 /// A command that must refuse to write over a file, which stays as it is; and which does with `--force`, if it may.
 #[track_caller]
@@ -10,6 +13,38 @@ fn refuses(folder: &Folder, command: &[&str], there: &str) {
     assert_eq!((answer.code, answer.stdout.as_str()), (Some(2), ""), "{command:?}: {}", answer.stderr);
     assert!(answer.stderr.contains(there) && answer.stderr.contains("--force"), "{}", answer.stderr);
     assert_eq!(folder.read(there), before, "{command:?}");
+}
+
+/// A command that must refuse to write a file that it reads, even with `--force`: nothing changes in the folder.
+#[track_caller]
+fn never(folder: &Folder, command: &[&str]) {
+    let before = content(folder);
+    for further in [&[][..], &["--force"]] {
+        let command = [command, further].concat();
+        let answer = folder.headrace(&command);
+        assert_eq!((answer.code, answer.stdout.as_str()), (Some(2), ""), "{command:?}: {}", answer.stderr);
+        assert!(answer.stderr.contains("it is read by this command"), "{command:?}: {}", answer.stderr);
+        assert!(content(folder) == before, "{command:?}: the folder's files are others now");
+    }
+}
+
+/// A command that must refuse to write two outputs into one file, and name both: nothing changes in the folder.
+#[track_caller]
+fn two_files(folder: &Folder, command: &[&str], named: &[&str]) {
+    let before = content(folder);
+    let command = [command, &["--force"]].concat();
+    let answer = folder.headrace(&command);
+    assert_eq!((answer.code, answer.stdout.as_str()), (Some(2), ""), "{command:?}: {}", answer.stderr);
+    for name in named {
+        assert!(answer.stderr.contains(name), "{command:?}: no {name:?} in {}", answer.stderr);
+    }
+    assert!(content(folder) == before, "{command:?}: the folder's files are others now");
+}
+
+/// Names and content of the files in a folder.
+fn content(folder: &Folder) -> BTreeMap<OsString, Option<Vec<u8>>> {
+    let entries = std::fs::read_dir(folder.path("")).unwrap().map(|entry| entry.unwrap());
+    entries.map(|entry| (entry.file_name(), std::fs::read(entry.path()).ok())).collect()
 }
 
 #[track_caller]
@@ -27,8 +62,9 @@ fn a_simulation_overwrites_simulations_only() {
     accepts(&folder, &to("dive.mcap"), "dive.mcap");
     folder.record("dive.mcap", "live.mcap", &[]);
     refuses(&folder, &to("live.mcap"), "live.mcap");
-    refuses(&folder, &to("vehicle.toml"), "vehicle.toml");
-    refuses(&folder, &[&to("new.mcap")[..], &["--truth", "vehicle.toml"]].concat(), "vehicle.toml");
+    folder.write("other.toml", VEHICLE);
+    refuses(&folder, &to("other.toml"), "other.toml");
+    refuses(&folder, &[&to("new.mcap")[..], &["--truth", "other.toml"]].concat(), "other.toml");
     assert!(!folder.path("new.mcap").exists());
     accepts(&folder, &[&to("live.mcap")[..], &["--force"]].concat(), "live.mcap");
     for _ in 0..2 {
@@ -46,7 +82,8 @@ fn a_report_overwrites_reports_only() {
     }
     folder.write("other.json", "{\"version\": 1}");
     folder.record("dive.mcap", "live.mcap", &[]);
-    for there in ["vehicle.toml", "other.json", "live.mcap"] {
+    folder.write("other.toml", VEHICLE);
+    for there in ["other.toml", "other.json", "live.mcap"] {
         refuses(&folder, &to(there), there);
         refuses(
             &folder,
@@ -70,7 +107,8 @@ fn recordings_and_what_is_made_of_them_overwrite_no_other_log() {
     folder.record("dive.mcap", "live.mcap", &[]);
     folder.record("dive.mcap", "live_2.mcap", &[]);
     let record = ["run", "vehicle.toml", "--source", "dive.mcap", "--speed", "max", "--record"];
-    for there in ["live.mcap", "dive.mcap", "vehicle.toml"] {
+    folder.write("other.toml", VEHICLE);
+    for there in ["live.mcap", "other.toml"] {
         refuses(&folder, &[&record[..], &[there]].concat(), there);
     }
     let trim = ["trim", "live.mcap", "--to", "5s", "-o"];
@@ -96,7 +134,10 @@ fn imports_rehearsals_and_pictures_overwrite_their_own_only() {
     for _ in 0..2 {
         accepts(&folder, &[&import[..], &["imported.mcap"]].concat(), "imported.mcap");
     }
-    refuses(&folder, &["emulate", "scene.toml", "--out", "."], "vehicle.toml");
+    std::fs::create_dir(folder.path("rehearsal")).unwrap();
+    folder.write("rehearsal/vehicle.toml", VEHICLE);
+    refuses(&folder, &["emulate", "scene.toml", "--out", "rehearsal"], "rehearsal/vehicle.toml");
+    never(&folder, &["emulate", "scene.toml", "--out", "."]);
     std::fs::create_dir(folder.path("pictures")).unwrap();
     folder.write("pictures/hours.svg", "<svg/>");
     let file = root().join("deploy/vehicles/vita1.toml");
@@ -157,5 +198,144 @@ fn what_is_no_file_is_never_removed_to_make_way() {
         let answer = folder.headrace(&arguments);
         assert_ne!(answer.code, Some(0), "{}", answer.stderr);
         assert!(link.symlink_metadata().unwrap().is_symlink(), "{force:?}: it is gone");
+    }
+}
+
+#[test]
+fn what_a_command_reads_it_never_writes() {
+    let folder = Folder::with_dive();
+    folder.record("dive.mcap", "live.mcap", &[]);
+    folder.write("candump.log", "(1700000000.000000) can0 020#0001\n");
+    let run = ["run", "vehicle.toml", "--source", "live.mcap", "--speed", "max"];
+    for further in [["--record", "vehicle.toml"], ["--record", "live.mcap"], ["--report", "./vehicle.toml"]] {
+        never(&folder, &[&run[..], &further].concat());
+    }
+    let import = ["import", "candump.log", "--source", "imu=can0", "--vehicle", "vehicle.toml", "-o"];
+    for command in [
+        &["run", "vehicle.toml", "--record", "vehicle.toml"][..],
+        &["run", "vehicle.toml", "--report", "vehicle.toml"],
+        &["simulate", "scene.toml", "-o", "scene.toml"],
+        &["simulate", "scene.toml", "-o", "vehicle.toml"],
+        &["simulate", "scene.toml", "-o", "new.mcap", "--truth", "scene.toml"],
+        &["replay", "live.mcap", "--vehicle", "vehicle.toml", "--report", "vehicle.toml"],
+        &["export", "live.mcap", "--vehicle", "vehicle.toml", "--html", "vehicle.toml"],
+        &["trim", "live.mcap", "--chainage", "0..9", "--vehicle", "vehicle.toml", "-o", "vehicle.toml"],
+        &[&import[..], &["vehicle.toml"]].concat(),
+        &[&import[..], &["candump.log"]].concat(),
+    ] {
+        never(&folder, command);
+    }
+}
+
+#[cfg(unix)]
+#[test]
+fn links_to_what_a_command_reads_are_seen() {
+    use std::os::unix::fs::symlink;
+    let folder = Folder::with_dive();
+    std::fs::hard_link(folder.path("dive.mcap"), folder.path("hard.mcap")).unwrap();
+    symlink("dive.mcap", folder.path("soft.mcap")).unwrap();
+    for (read, written) in
+        [("hard.mcap", "dive.mcap"), ("soft.mcap", "dive.mcap"), ("dive.mcap", "soft.mcap")]
+    {
+        never(&folder, &["replay", read, "--report", written]);
+        never(&folder, &["recover", read, "-o", written]);
+    }
+    let golden = folder.headrace(&["replay", "dive.mcap", "--report", "golden.json"]);
+    assert_eq!(golden.code, Some(0), "{}", golden.stderr);
+    std::fs::hard_link(folder.path("golden.json"), folder.path("again.json")).unwrap();
+    never(&folder, &["replay", "dive.mcap", "--expect", "golden.json", "--report", "again.json"]);
+    let bless = ["replay", "dive.mcap", "--expect", "golden.json", "--bless", "--report", "again.json"];
+    two_files(&folder, &bless, &["--report again.json", "golden.json (--expect)"]);
+    let twice = ["simulate", "scene.toml", "-o", "again.json", "--truth", "golden.json"];
+    two_files(&folder, &twice, &["-o again.json", "golden.json (--truth)"]);
+}
+
+#[test]
+fn outputs_of_a_command_are_different_files() {
+    let folder = Folder::with_dive();
+    let run = ["run", "vehicle.toml", "--source", "dive.mcap", "--speed", "max", "--record", "x.mcap"];
+    let live = ["run", "vehicle.toml", "--for", "1", "--record", "x.mcap"];
+    for run in [&run[..], &live] {
+        for report in ["x.mcap", "./x.mcap", "x.part002.mcap", "x.part001.mcap"] {
+            for rotate in [&[][..], &["--rotate", "5s"]] {
+                let command = [run, &["--report", report], rotate].concat();
+                two_files(&folder, &command, &["--record", "--report", report]);
+            }
+        }
+        for second in ["x.mcap", "./x.mcap"] {
+            two_files(&folder, &[run, &["--record", second]].concat(), &["--record", second, "given twice"]);
+        }
+        let part = [run, &["--record", "x.part002.mcap"]].concat();
+        two_files(&folder, &part, &["--record x.mcap", "x.part002.mcap", "name of a part"]);
+    }
+    let simulate = ["simulate", "scene.toml", "-o", "new.mcap", "--truth", "./new.mcap"];
+    two_files(&folder, &simulate, &["-o new.mcap", "./new.mcap (--truth)"]);
+    // What has nothing to lose may be named twice.
+    #[cfg(unix)]
+    accepts(&folder, &["simulate", "scene.toml", "-o", "/dev/null", "--truth", "/dev/null"], "vehicle.toml");
+}
+
+#[test]
+fn a_dive_is_not_removed_for_a_recording_that_cannot_begin() {
+    let folder = Folder::with_dive();
+    folder.record("dive.mcap", "live.mcap", &[]);
+    folder.record("dive.mcap", "other.mcap", &[]);
+    std::fs::rename(folder.path("other.mcap"), folder.path("live.part002.mcap")).unwrap();
+    let before = content(&folder);
+    let record = ["run", "vehicle.toml", "--source", "dive.mcap", "--speed", "max", "--record", "live.mcap"];
+    let answer = folder.headrace(&[&record[..], &["--force"]].concat());
+    assert_eq!(answer.code, Some(2), "{}", answer.stderr);
+    assert!(answer.stderr.contains("live.part002.mcap exists"), "{}", answer.stderr);
+    assert!(content(&folder) == before, "the dive is gone");
+}
+
+#[test]
+fn the_expected_report_is_read_before_the_replay_and_not_replaced() {
+    let folder = Folder::with_dive();
+    let golden = ["replay", "dive.mcap", "--report", "golden.json"];
+    accepts(&folder, &golden, "golden.json");
+    never(&folder, &["replay", "dive.mcap", "--expect", "golden.json", "--report", "golden.json"]);
+    folder.write("broken.json", "{");
+    for expected in ["none.json", "broken.json", "dive.mcap"] {
+        let answer = folder.headrace(&["replay", "dive.mcap", "--expect", expected]);
+        // Nothing on stdout: nothing was replayed.
+        assert_eq!((answer.code, answer.stdout.as_str()), (Some(2), ""), "{expected}: {}", answer.stderr);
+        assert!(answer.stderr.contains(expected), "{}", answer.stderr);
+    }
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn what_was_there_stays_where_the_new_file_cannot_be_written() {
+    let folder = Folder::with_dive();
+    folder.record("dive.mcap", "live.mcap", &[]);
+    let commands: [&[&str]; 5] = [
+        &["replay", "live.mcap", "--report", "report.json"],
+        &["export", "live.mcap", "--html", "page.html"],
+        &["trim", "live.mcap", "--to", "9s", "-o", "part.mcap"],
+        &["recover", "live.mcap", "-o", "whole.mcap"],
+        &["simulate", "scene.toml", "-o", "new.mcap", "--truth", "truth.csv"],
+    ];
+    let full = |command: &[&str]| {
+        let mut strace = std::process::Command::new("strace");
+        strace.args(["-f", "-qq", "-o", "/dev/null", "-e", "trace=fsync", "-e", "inject=fsync:error=ENOSPC"]);
+        strace.arg(program().get_program()).args(command).current_dir(folder.path("")).output()
+    };
+    if !full(&["--version"]).is_ok_and(|output| output.status.success()) {
+        return skipped("strace isn't there, or not allowed");
+    }
+    for there in [false, true] {
+        for command in commands {
+            if there {
+                accepts(&folder, command, "vehicle.toml");
+            }
+            let before = content(&folder);
+            let output = full(command).unwrap();
+            let said = String::from_utf8(output.stderr).unwrap();
+            assert_eq!(output.status.code(), Some(1), "{command:?}: {said}");
+            let told = said.contains("No space left on device") && said.contains("writing ");
+            assert!(told, "{command:?}: {said}");
+            assert!(content(&folder) == before, "{command:?}: other files are left than were there");
+        }
     }
 }

@@ -103,7 +103,7 @@ fn a_golden_report_may_state_tolerances() {
         change(&mut golden);
         golden["tolerances"] = tolerances;
         folder.write("golden.json", golden.to_string());
-        folder.replay("dive.mcap", &["--expect", "golden.json"]).0.unwrap()
+        folder.headrace(&["replay", "dive.mcap", "--expect", "golden.json"]).code.unwrap()
     };
     let hole_m = report["sections"][3]["hole_m"].as_f64().unwrap();
     let other = |golden: &mut serde_json::Value| {

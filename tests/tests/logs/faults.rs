@@ -274,3 +274,70 @@ fn a_dive_on_ports_outlives_its_terminal_and_ends_when_told() {
         std::fs::remove_file(folder.path("log.mcap")).unwrap();
     }
 }
+
+/// A recording that another program takes away in mid-dive is told at once and goes on in another part: what was in it is lost.
+#[cfg(target_os = "linux")]
+#[test]
+fn a_recording_that_is_taken_away_is_told_and_goes_on() {
+    let folder = Folder::with_dive();
+    let (log, other) = (folder.path("log.mcap"), folder.path("other.mcap"));
+    let digest = folder.digest("dive.mcap", &[]);
+    let cases: [(&str, &dyn Fn()); 4] = [
+        ("deleted the file", &|| std::fs::remove_file(&log).unwrap()),
+        ("cut the file short", &|| drop(std::fs::File::create(&log).unwrap())),
+        ("another file in its place", &|| {
+            std::fs::rename(&log, folder.path("aside.mcap")).unwrap();
+            folder.write("log.mcap", "another's");
+        }),
+        ("deleted the file", &|| {
+            std::fs::copy(folder.path("dive.mcap"), &other).unwrap();
+            std::fs::rename(&other, &log).unwrap();
+        }),
+    ];
+    for (words, take) in cases {
+        let mut dive = headrace_tests::program();
+        let arguments = ["--record", "log.mcap", "--report", "report.json", "--speed", "5x", "--json-lines"];
+        let dive = dive.args(DIVE).args(arguments).current_dir(folder.path(""));
+        let mut dive = dive.stdout(Stdio::piped()).stderr(Stdio::null()).spawn().unwrap();
+        wait_for(&log, &mut dive);
+        std::thread::sleep(Duration::from_secs(1));
+        take();
+        let output = dive.wait_with_output().unwrap();
+        assert_eq!(output.status.code(), Some(3), "{words}");
+        let lines = String::from_utf8(output.stdout).unwrap();
+        let lines: Vec<Value> = lines.lines().map(|line| serde_json::from_str(line).unwrap()).collect();
+        let told: Vec<_> = lines.iter().filter(|line| line["type"] == "recording").collect();
+        assert_eq!(
+            told.iter().map(|line| line["fails"].as_bool().unwrap()).collect::<Vec<_>>(),
+            [true, false]
+        );
+        assert!(told[0]["text"].as_str().unwrap().contains(words), "{words}: {}", told[0]);
+        assert!(told[1]["text"].as_str().unwrap().contains("messages are missing"), "{}", told[1]);
+        let report: Value = serde_json::from_slice(&folder.read("report.json")).unwrap();
+        assert_eq!(report["digest"], digest.as_str());
+        assert!(losses(&report).contains(words), "{words}: {}", losses(&report));
+        // The rest is there, and says what is missing before it.
+        let (code, rest) = folder.replay("log.part002.mcap", &[]);
+        assert!(code == Some(3) && losses(&rest).contains(words), "{code:?}: {}", losses(&rest));
+        assert!(rest["log"]["messages"].as_u64() > Some(1000), "{}", rest["log"]);
+        for file in ["log.mcap", "log.part002.mcap", "aside.mcap"] {
+            std::fs::remove_file(folder.path(file)).ok();
+        }
+    }
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn a_recording_that_is_moved_is_whole() {
+    let folder = Folder::with_dive();
+    let digest = folder.digest("dive.mcap", &[]);
+    let mut dive = headrace_tests::program();
+    let dive = dive.args(DIVE).args(["--record", "log.mcap", "--speed", "10x"]).current_dir(folder.path(""));
+    let mut dive = dive.stdout(Stdio::piped()).stderr(Stdio::null()).spawn().unwrap();
+    wait_for(&folder.path("log.mcap"), &mut dive);
+    std::fs::rename(folder.path("log.mcap"), folder.path("moved.mcap")).unwrap();
+    // It can't be read back by its name, which is a loss of the report.
+    assert_eq!(dive.wait_with_output().unwrap().status.code(), Some(3));
+    assert!(!folder.path("log.part002.mcap").exists());
+    assert_eq!(folder.digest("moved.mcap", &[]), digest);
+}

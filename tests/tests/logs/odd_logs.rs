@@ -108,6 +108,6 @@ fn a_log_of_a_later_format_is_refused() {
     writer.write_metadata(&record).unwrap();
     writer.finish().unwrap();
     let answer = replay(&folder, "later.mcap");
-    assert_eq!((answer.code, answer.stdout.as_str()), (Some(1), ""));
+    assert_eq!((answer.code, answer.stdout.as_str()), (Some(2), ""));
     insta::assert_snapshot!(answer.stderr, @"headrace: later.mcap is a log of format 2; this program reads formats up to 1");
 }

@@ -61,7 +61,7 @@ fn nothing_is_overwritten_and_what_is_no_log_leaves_nothing() {
         assert!(answer.stderr.contains(output) && answer.stderr.contains(why), "{}", answer.stderr);
     }
     let answer = folder.headrace(&["recover", "vehicle.toml", "-o", "none.mcap"]);
-    assert_eq!(answer.code, Some(1));
+    assert_eq!(answer.code, Some(2));
     assert!(answer.stderr.contains("is not an MCAP file"), "{}", answer.stderr);
     assert!(!folder.path("none.mcap").exists());
 }

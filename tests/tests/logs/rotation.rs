@@ -110,7 +110,7 @@ fn nothing_is_recorded_over_parts_and_dives_are_not_mixed() {
         assert!(answer.code == Some(2) && answer.stderr.contains("part001"), "{}", answer.stderr);
     }
     let answer = folder.headrace(&["replay", "a.part001.mcap", "b.part002.mcap"]);
-    assert_eq!(answer.code, Some(1), "{}", answer.stdout);
+    assert_eq!(answer.code, Some(2), "{}", answer.stdout);
     assert!(answer.stderr.contains("are parts of different recordings"), "{}", answer.stderr);
     for wrong in ["5", "10B", "fast", "0.1s"] {
         let arguments = ["run", "vehicle.toml", "--record", "c.mcap", "--rotate", wrong];
@@ -155,4 +155,34 @@ fn a_dive_that_is_killed_between_parts_reads_to_its_last_second() {
     }
     println!("{KILLS} kills, {parts} parts, {same} results the same");
     assert!(parts > 20 && same > 1000, "{parts} parts, {same} results");
+}
+
+#[test]
+fn a_part_that_is_named_twice_is_read_once() {
+    let folder = Folder::with_dive();
+    record(&folder, &["--record", "a.mcap", "--rotate", "5s"]);
+    let digest = folder.digest("a.mcap", &[]);
+    // As after an error: the first part has the recording's name.
+    std::fs::rename(folder.path("a.part001.mcap"), folder.path("a.mcap")).unwrap();
+    let mut names: Vec<String> = std::fs::read_dir(folder.path(""))
+        .unwrap()
+        .map(|entry| entry.unwrap().file_name().into_string().unwrap())
+        .filter(|name| name.starts_with("a."))
+        .collect();
+    names.sort();
+    assert!(names.len() > 2, "{names:?}");
+    let names: Vec<&str> = names.iter().map(String::as_str).collect();
+    for further in [&names[1..], &["a.part002.mcap"], &["./a.part002.mcap", "a.mcap"]] {
+        assert_eq!(folder.digest("a.mcap", further), digest, "{further:?}");
+    }
+    // Another file that says that it is the same part is one too many, and both are named.
+    std::fs::copy(folder.path("a.part002.mcap"), folder.path("b.mcap")).unwrap();
+    let answer = folder.headrace(&["replay", "a.mcap", "b.mcap"]);
+    assert_eq!(answer.code, Some(2), "{}", answer.stdout);
+    let both = "a.part002.mcap and b.mcap are both part 2";
+    assert!(
+        answer.stderr.contains(both) || answer.stderr.contains("b.mcap and a.part002.mcap"),
+        "{}",
+        answer.stderr
+    );
 }

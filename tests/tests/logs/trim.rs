@@ -1,6 +1,6 @@
 //! Trimmed logs: with nothing cut the same dive, cut the same verdicts inside, and no name left where none is to be.
 
-use headrace_tests::{Folder, VEHICLE, raw_messages, write_log};
+use headrace_tests::{Folder, SCENE, VEHICLE, raw_messages, write_log};
 use mcap::WriteOptions;
 use serde_json::Value;
 
@@ -152,4 +152,24 @@ fn an_anonymous_log_has_no_name_address_comment_or_time_of_day() {
     );
     let answer = folder.headrace(&["trim", "live.mcap", "-o", "more.mcap", "--from", "5s", "--to", "5s"]);
     assert_eq!(answer.code, Some(2), "{}", answer.stdout);
+}
+
+#[test]
+fn times_outside_the_dive_are_refused_and_leave_what_was_there() {
+    let folder = recorded(SCENE, VEHICLE);
+    trim(&folder, "part.mcap", &["--to", "5s"]);
+    let before = folder.read("part.mcap");
+    let times_s =
+        raw_messages(&folder.read("dive.mcap")).iter().map(|m| m.log_time as f64 * 1e-9).collect::<Vec<_>>();
+    let span_s = times_s[times_s.len() - 1] - times_s[0];
+    for log in ["dive.mcap", "live.mcap"] {
+        for (from, output) in [("20min", "part.mcap"), ("99h", "new.mcap")] {
+            let answer = folder.headrace(&["trim", log, "-o", output, "--from", from]);
+            assert_eq!((answer.code, answer.stdout.as_str()), (Some(2), ""), "{}", answer.stderr);
+            let (_, told) = answer.stderr.split_once("the log spans 0 s to ").unwrap();
+            let told_s: f64 = told.split_whitespace().next().unwrap().parse().unwrap();
+            assert!((told_s - span_s).abs() < 1.0, "{span_s}: {}", answer.stderr);
+        }
+    }
+    assert!(folder.read("part.mcap") == before && !folder.path("new.mcap").exists());
 }

@@ -88,7 +88,7 @@ pub fn part_path(recording: &Path, number: u32) -> PathBuf {
 }
 
 /// Recording and part number from a part's file name.
-pub(super) fn named_part(path: &Path) -> Option<(PathBuf, u32)> {
+pub fn named_part(path: &Path) -> Option<(PathBuf, u32)> {
     let extension = path.extension().map(|e| format!(".{}", e.to_string_lossy())).unwrap_or_default();
     let stem = path.file_stem()?.to_string_lossy().into_owned();
     let (recording, number) = stem.rsplit_once(NAME_MARK)?;

@@ -95,8 +95,8 @@ impl Recorder {
         derived: Option<Box<dyn DerivedChannels>>,
     ) -> Result<(RecorderPort, RecorderHandle), LogError> {
         let failed = |path: &Path, source| LogError::Create { path: path.to_owned(), source };
-        if let Some(other) = in_the_way(path).map_err(|source| failed(path, source))? {
-            return Err(failed(&other, ErrorKind::AlreadyExists.into()));
+        if let [other, ..] = in_the_way(path).map_err(|source| failed(path, source))?.as_slice() {
+            return Err(failed(other, ErrorKind::AlreadyExists.into()));
         }
         Self::spawn(Self::unthreaded(Box::new(Disk), path, header, rotation, queue_bytes, derived)?)
     }

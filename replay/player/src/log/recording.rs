@@ -15,7 +15,7 @@ use super::backlog::{Backlog, Head, Tally};
 use super::fault::{RecordingEvent, RecordingFault, add};
 use super::part::{PartHead, part_path};
 use super::rotate::{Every, Rotation};
-use super::storage::{Buffered, Storage};
+use super::storage::{Buffered, Storage, Taken};
 use super::writer::{Lane, LogHeader, LogWriter, PartSummary, Summary};
 
 /// A sync is due once so much isn't certain, bytes.
@@ -42,6 +42,10 @@ struct OpenPart {
     fresh: bool,
     /// Messages from sources that are certain.
     raw_messages: u64,
+    /// Messages that are certain, and their bytes.
+    certain: (u64, u64),
+    /// Log time of the last message before it.
+    before: Option<MonoNs>,
 }
 
 /// Time without a part that can be written on.
@@ -193,6 +197,7 @@ impl Recording {
         let Some(part) = &mut self.open else { return };
         while let Some(head) = self.backlog.pop() {
             part.raw_messages += u64::from(matches!(head.lane, Lane::Raw(_)));
+            part.certain = (part.certain.0 + 1, part.certain.1 + head.len as u64);
             self.sum.messages += 1;
             self.sum.message_bytes += head.len as u64;
             self.settled.add(&head);
@@ -204,11 +209,18 @@ impl Recording {
     /// Leaves the open part as it is.
     fn fail(&mut self, error: &LogError) {
         let Some(part) = self.open.take() else { return };
-        let OpenPart { path, log, fresh, raw_messages, .. } = part;
+        let OpenPart { path, log, fresh, raw_messages, certain, before, .. } = part;
         let bytes = log.bytes();
         drop(log);
+        let is_taken = matches!(error, LogError::Write { source, .. } if Taken::is_in(source));
+        let (mut lost, mut from) = (0, self.settled.last);
         // A part of which nothing is certain isn't one; but the first has the recording's name.
-        if fresh && self.number > 1 {
+        if is_taken {
+            // Nor is one that isn't there any more. What is there in its place is another's.
+            (lost, from) = (certain.0, before);
+            self.sum.messages -= certain.0;
+            self.sum.message_bytes -= certain.1;
+        } else if fresh && self.number > 1 {
             self.number -= 1;
             self.discard(&path);
         } else {
@@ -223,8 +235,7 @@ impl Recording {
         tracing::error!("nothing is recorded to {}: {error}", path.display());
         let error = error.to_string();
         self.events.push(RecordingEvent::Failed { path: path.clone(), error: error.clone() });
-        let fault =
-            RecordingFault { path, error, lost: 0, from: self.settled.last, to: None, continued: None };
+        let fault = RecordingFault { path, error, lost, from, to: None, continued: None };
         self.outage = Some(Outage { fault, retry_at: self.now, wait: FIRST_WAIT });
     }
 
@@ -343,7 +354,17 @@ impl Recording {
                     Some(Every::Bytes(bytes)) => bytes,
                     Some(Every::Span(_)) | None => u64::MAX,
                 };
-                Ok(OpenPart { path, log, began: None, ends_at, fresh: true, raw_messages: 0 })
+                let (certain, before) = ((0, 0), self.settled.last);
+                Ok(OpenPart {
+                    path,
+                    log,
+                    began: None,
+                    ends_at,
+                    fresh: true,
+                    raw_messages: 0,
+                    certain,
+                    before,
+                })
             }
             Err(error) => {
                 // A file without a header is no part.

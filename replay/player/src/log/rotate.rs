@@ -1,5 +1,6 @@
 //! When a recording goes on in another part, and the files that are taken for its parts.
 
+use std::collections::BTreeSet;
 use std::fs::File;
 use std::path::{Path, PathBuf};
 
@@ -30,12 +31,13 @@ pub struct Rotation {
     pub dive: String,
 }
 
-/// An existing file that would be taken for this recording or a part of it.
-pub(super) fn in_the_way(recording: &Path) -> std::io::Result<Option<PathBuf>> {
-    if recording.exists() {
-        return Ok(Some(recording.to_owned()));
-    }
-    parts_of(recording).map(|parts| parts.into_iter().next())
+/// The existing files that would be taken for this recording or a part of it.
+///
+/// Errors: its folder can't be read.
+pub fn in_the_way(recording: &Path) -> std::io::Result<Vec<PathBuf>> {
+    let mut files: Vec<PathBuf> = recording.exists().then(|| recording.to_owned()).into_iter().collect();
+    files.extend(parts_of(recording)?);
+    Ok(files)
 }
 
 /// The files next to a recording that are named as its parts, in order.
@@ -58,9 +60,11 @@ pub(super) fn parts_of(recording: &Path) -> std::io::Result<Vec<PathBuf>> {
 /// Files of the paths a user named: a log, with the parts in which its recording went on after an error; a folder of logs; or a
 /// recording in parts by the name it was given.
 ///
+/// A file that is named twice, or once by itself and once as a part, is one of them once.
+///
 /// Errors: a folder can't be read or contains no log.
 pub fn files_of(named: &[PathBuf]) -> Result<Vec<PathBuf>, LogError> {
-    let mut files = Vec::new();
+    let mut files: Vec<PathBuf> = Vec::new();
     for path in named {
         let failed = |source| LogError::Open { path: path.to_owned(), source };
         if path.is_dir() {
@@ -82,6 +86,8 @@ pub fn files_of(named: &[PathBuf]) -> Result<Vec<PathBuf>, LogError> {
             files.extend(if parts.is_empty() { vec![path.clone()] } else { parts });
         }
     }
+    let mut seen = BTreeSet::new();
+    files.retain(|file| seen.insert(file.canonicalize().unwrap_or_else(|_| file.clone())));
     Ok(files)
 }
 

@@ -1,8 +1,8 @@
 //! Where a recorder keeps its files: the disk, or in tests anything whose every operation can fail or wait.
 
-use std::fs::{File, OpenOptions};
+use std::fs::{File, Metadata, OpenOptions};
 use std::io;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// Files that are created once and only grow.
 pub trait Storage: Send {
@@ -27,9 +27,10 @@ pub trait StoredFile: Send {
     /// Errors: the system's; `Interrupted` is tried again.
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize>;
 
-    /// Once this returns, what was written survives a power cut. After an error nothing written since the last success may.
+    /// Once this returns, what was written survives a power cut. After an error nothing written since the last success may, or,
+    /// where another program has taken the file away, nothing at all.
     ///
-    /// Errors: the system's.
+    /// Errors: the system's; the file was taken away.
     fn sync(&mut self) -> io::Result<()>;
 }
 
@@ -39,7 +40,8 @@ pub struct Disk;
 
 impl Storage for Disk {
     fn create(&mut self, path: &Path) -> io::Result<Box<dyn StoredFile>> {
-        let file = OpenOptions::new().write(true).create_new(true).open(path)?;
+        // What is appended to a file that others have cut short leaves it shorter than what was written.
+        let file = OpenOptions::new().append(true).create_new(true).open(path)?;
         // Only on Unix: other systems don't open folders.
         let synced = if cfg!(unix) {
             File::open(folder_of(path)).and_then(|folder| folder.sync_all())
@@ -52,7 +54,7 @@ impl Storage for Disk {
             return Err(error);
         }
         tracing::info!(path = %path.display(), "log created");
-        Ok(Box::new(file))
+        Ok(Box::new(DiskFile::new(file, path)))
     }
 
     fn remove(&mut self, path: &Path) -> io::Result<()> {
@@ -66,18 +68,97 @@ impl Storage for Disk {
     }
 }
 
-impl StoredFile for File {
-    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
-        io::Write::write(self, bytes)
-    }
+/// What another program has done to a recording's file: all that was in it is gone, or not where it is looked for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+pub(super) enum Taken {
+    #[error("another program has deleted the file")]
+    Deleted,
+    #[error("another program has cut the file short")]
+    CutShort,
+    #[error("another program has put another file in its place")]
+    Replaced,
+}
 
-    fn sync(&mut self) -> io::Result<()> {
-        self.sync_data()
+impl Taken {
+    /// Whether an error is one of these.
+    pub(super) fn is_in(error: &io::Error) -> bool {
+        error.get_ref().is_some_and(<dyn std::error::Error + Send + Sync>::is::<Self>)
     }
 }
 
+/// A file on the disk, which others may take away. One that is moved is written on: nothing of it is lost.
+struct DiskFile {
+    file: File,
+    path: PathBuf,
+    written: u64,
+    /// Device and number, where the file system says the same of the open file as of its name.
+    known: Option<(u64, u64)>,
+    /// Whether it has been synced: a dive begins with a header that is taken away, and goes on elsewhere.
+    is_begun: bool,
+}
+
+impl DiskFile {
+    fn new(file: File, path: &Path) -> Self {
+        let own = file.metadata().ok().filter(|own| links(own) > 0).map(|own| number(&own));
+        let known = own.filter(|own| std::fs::metadata(path).is_ok_and(|there| number(&there) == *own));
+        Self { file, path: path.to_owned(), written: 0, known, is_begun: false }
+    }
+
+    /// What others have done to it.
+    fn taken(&self) -> Option<Taken> {
+        // Where the system doesn't say, it is taken to be there.
+        let own = self.file.metadata().ok()?;
+        if own.len() < self.written {
+            return Some(Taken::CutShort);
+        }
+        let known = self.known?;
+        if links(&own) == 0 {
+            return Some(Taken::Deleted);
+        }
+        let there = std::fs::metadata(&self.path).ok()?;
+        (number(&there) != known).then_some(Taken::Replaced)
+    }
+}
+
+impl StoredFile for DiskFile {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        let count = io::Write::write(&mut self.file, bytes)?;
+        self.written += count as u64;
+        Ok(count)
+    }
+
+    fn sync(&mut self) -> io::Result<()> {
+        self.file.sync_data()?;
+        let is_begun = core::mem::replace(&mut self.is_begun, true);
+        self.taken().filter(|_| is_begun).map_or(Ok(()), |taken| Err(io::Error::other(taken)))
+    }
+}
+
+/// Names that a file has.
+#[cfg(unix)]
+fn links(file: &Metadata) -> u64 {
+    std::os::unix::fs::MetadataExt::nlink(file)
+}
+
+#[cfg(not(unix))]
+fn links(_: &Metadata) -> u64 {
+    1
+}
+
+/// Device and number of a file.
+#[cfg(unix)]
+fn number(file: &Metadata) -> (u64, u64) {
+    use std::os::unix::fs::MetadataExt as _;
+    (file.dev(), file.ino())
+}
+
+#[cfg(not(unix))]
+fn number(_: &Metadata) -> (u64, u64) {
+    (0, 0)
+}
+
 /// The folder that a file is in.
-pub(super) fn folder_of(path: &Path) -> &Path {
+pub(crate) fn folder_of(path: &Path) -> &Path {
     path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."))
 }
 

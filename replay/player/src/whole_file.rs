@@ -1,0 +1,170 @@
+//! Files that are there whole or not at all: written beside their place, and put there once they are complete and synced. What
+//! was there before stays until then, and for good where the writing fails.
+
+use std::fs::{File, OpenOptions};
+use std::io::{BufWriter, ErrorKind, Result, Seek, SeekFrom, Write};
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicU32, Ordering};
+
+use crate::log::folder_of;
+
+/// A file that is being written. Dropping it before [`WholeFile::complete`] leaves what was there before, and nothing else.
+#[derive(Debug)]
+pub struct WholeFile {
+    file: BufWriter<File>,
+    /// Where it is written, and where it belongs; `None` for what is written in its place.
+    beside: Option<(PathBuf, PathBuf)>,
+}
+
+impl WholeFile {
+    /// Begins a file that is to be at `path`, or where a link there leads. What can't be replaced is written in its place:
+    /// pipes, terminals and devices, and a file whose folder takes no other one.
+    ///
+    /// Errors: the system's.
+    pub fn create(path: &Path) -> Result<Self> {
+        let there = std::fs::metadata(path);
+        if there.as_ref().is_ok_and(|there| !there.is_file()) {
+            return Self::in_place(path);
+        }
+        let place = path.canonicalize().unwrap_or_else(|_| path.to_owned());
+        let beside = name_beside(&place);
+        let file = match OpenOptions::new().write(true).create_new(true).open(&beside) {
+            Ok(file) => file,
+            Err(error) if there.is_ok() && is_refused(error.kind()) => return Self::in_place(path),
+            Err(error) => return Err(error),
+        };
+        let whole = Self { file: BufWriter::new(file), beside: Some((beside, place)) };
+        if let Ok(there) = there {
+            whole.file.get_ref().set_permissions(there.permissions())?;
+        }
+        Ok(whole)
+    }
+
+    fn in_place(path: &Path) -> Result<Self> {
+        Ok(Self { file: BufWriter::new(File::create(path)?), beside: None })
+    }
+
+    /// Puts the file in its place. Once this returns it survives a power cut.
+    ///
+    /// Errors: the system's; what was there before is there still.
+    pub fn complete(mut self) -> Result<()> {
+        self.file.flush()?;
+        let Some((beside, place)) = &self.beside else { return Ok(()) };
+        self.file.get_ref().sync_all()?;
+        std::fs::rename(beside, place)?;
+        let folder = folder_of(place).to_owned();
+        self.beside = None;
+        // Other systems don't open folders, and not every file system syncs them.
+        if cfg!(unix) {
+            File::open(folder).and_then(|folder| folder.sync_all()).ok();
+        }
+        Ok(())
+    }
+}
+
+/// Writes a whole file.
+///
+/// Errors: the system's; what was there before is there still.
+pub fn write(path: &Path, content: &[u8]) -> Result<()> {
+    let mut file = WholeFile::create(path)?;
+    file.write_all(content)?;
+    file.complete()
+}
+
+impl Write for WholeFile {
+    fn write(&mut self, bytes: &[u8]) -> Result<usize> {
+        self.file.write(bytes)
+    }
+
+    fn flush(&mut self) -> Result<()> {
+        self.file.flush()
+    }
+}
+
+impl Seek for WholeFile {
+    fn seek(&mut self, to: SeekFrom) -> Result<u64> {
+        self.file.seek(to)
+    }
+}
+
+impl Drop for WholeFile {
+    fn drop(&mut self) {
+        let Some((beside, _)) = &self.beside else { return };
+        if let Err(error) = std::fs::remove_file(beside) {
+            tracing::warn!("{} is left behind: {error}", beside.display());
+        }
+    }
+}
+
+/// A new name beside a file's, that no folder of logs is read with.
+fn name_beside(place: &Path) -> PathBuf {
+    static COUNT: AtomicU32 = AtomicU32::new(0);
+    let mut name = place.file_name().unwrap_or_default().to_owned();
+    let count = COUNT.fetch_add(1, Ordering::Relaxed);
+    name.push(format!(".{}-{count}.unfinished", std::process::id()));
+    place.with_file_name(name)
+}
+
+/// Whether a folder takes no further file, while one that is in it may still be written.
+fn is_refused(kind: ErrorKind) -> bool {
+    use ErrorKind::{InvalidFilename, PermissionDenied, ReadOnlyFilesystem};
+    matches!(kind, InvalidFilename | PermissionDenied | ReadOnlyFilesystem)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn folder(name: &str) -> PathBuf {
+        let folder = std::env::temp_dir().join(format!("headrace-whole-{name}-{}", std::process::id()));
+        std::fs::create_dir_all(&folder).unwrap();
+        folder
+    }
+
+    fn names(folder: &Path) -> Vec<String> {
+        let entries = std::fs::read_dir(folder).unwrap();
+        let mut names: Vec<_> =
+            entries.map(|entry| entry.unwrap().file_name().into_string().unwrap()).collect();
+        names.sort();
+        names
+    }
+
+    #[test]
+    fn what_was_there_stays_until_the_new_file_is_complete() {
+        let folder = folder("stays");
+        let path = folder.join("report.json");
+        write(&path, b"old").unwrap();
+        let mut file = WholeFile::create(&path).unwrap();
+        file.write_all(b"new").unwrap();
+        file.flush().unwrap();
+        assert_eq!(std::fs::read(&path).unwrap(), b"old");
+        drop(file);
+        assert_eq!(
+            (std::fs::read(&path).unwrap(), names(&folder)),
+            (b"old".into(), vec!["report.json".into()])
+        );
+        write(&path, b"new").unwrap();
+        assert_eq!(
+            (std::fs::read(&path).unwrap(), names(&folder)),
+            (b"new".into(), vec!["report.json".into()])
+        );
+        std::fs::remove_dir_all(folder).unwrap();
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn links_and_permissions_stay_and_devices_are_written_to() {
+        use std::os::unix::fs::{PermissionsExt as _, symlink};
+        let folder = folder("links");
+        let (path, link) = (folder.join("real.json"), folder.join("link.json"));
+        std::fs::write(&path, "old").unwrap();
+        std::fs::set_permissions(&path, std::fs::Permissions::from_mode(0o640)).unwrap();
+        symlink("real.json", &link).unwrap();
+        write(&link, b"new").unwrap();
+        assert!(link.symlink_metadata().unwrap().is_symlink());
+        assert_eq!(std::fs::read(&path).unwrap(), b"new");
+        assert_eq!(path.metadata().unwrap().permissions().mode() & 0o777, 0o640);
+        write(Path::new("/dev/null"), b"new").unwrap();
+        std::fs::remove_dir_all(folder).unwrap();
+    }
+}
