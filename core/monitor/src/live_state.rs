@@ -110,6 +110,9 @@ pub struct ActiveAlert {
 /// The alerts that hold now.
 pub type ActiveAlerts = [Option<ActiveAlert>; MOST_ALERTS];
 
+/// No pilot drives slower, m/s: a largest speed below it is none.
+pub const LEAST_MPS: f64 = 0.005;
+
 /// State of a sensor.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
@@ -272,7 +275,7 @@ impl LiveState {
     /// The largest speed advised, m/s; `None` where none can be.
     pub fn v_max_mps(&self) -> Option<f64> {
         let advice = self.advice.as_ref().filter(|advice| advice.reason == Reason::HelixPitch)?;
-        Some(advice.v_max_mps).filter(|v_max_mps| *v_max_mps > 0.0)
+        Some(advice.v_max_mps).filter(|v_max_mps| *v_max_mps >= LEAST_MPS)
     }
 
     /// Share of returns that are lost, where making up for them takes a fifth of the speed or more; else `None`.

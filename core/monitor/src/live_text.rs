@@ -93,7 +93,9 @@ impl PilotLine {
 pub fn status_line(state: &LiveState, profile: &Profile, name: &dyn Fn(usize) -> String) -> PilotLine {
     let condition = state.condition();
     let place = state.chainage_m.map_or_else(|| "-+---.--".to_owned(), station);
-    let decimals = speed_decimals(state.speed_mps, state.v_max_mps());
+    // What is within the errors of measuring a speed is called ok though it is a little over.
+    let is_over = matches!(condition, Condition::TooFast | Condition::Over | Condition::TurnUnsure);
+    let decimals = if is_over { speed_decimals(state.speed_mps, state.v_max_mps()) } else { 2 };
     let v_max = state.v_max_mps().map_or_else(String::new, |mps| format!("{mps:.decimals$} m/s"));
     let (what, action) = match condition {
         Condition::NoData => (waiting_text(state).to_owned(), String::new()),

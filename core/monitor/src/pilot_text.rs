@@ -3,6 +3,7 @@
 
 use super::advice_log::AdviceEntry;
 use super::alerts::AlertKind;
+use super::live_state::LEAST_MPS;
 use serde::{Deserialize, Serialize};
 
 use headrace_coverage::{Action, Cause, Causes, Evidence, Run, Sections};
@@ -390,6 +391,7 @@ impl AdviceFigures {
 /// Text of advice, with its figures.
 pub fn advice_text(advice: &AdviceFigures, profile: &Profile) -> String {
     match advice.reason {
+        Reason::HelixPitch if advice.v_max_mps < LEAST_MPS => "no speed is slow enough here".to_owned(),
         Reason::HelixPitch if advice.will_exceed && advice.speed_mps.abs() > advice.v_max_mps => {
             format!("TOO FAST: at most {:.2} m/s", advice.v_max_mps)
         }

@@ -5,10 +5,14 @@ use crate::cause::Cause;
 use crate::causes::Causes;
 use crate::passage::Drive;
 use headrace_geometry::math;
+use headrace_sampling::losses::MOST_PASSES;
 
 impl Drive {
-    /// The largest speed that fits where it takes so many passes for one, m/s.
+    /// The largest speed that fits where it takes so many passes for one, m/s; zero where so much is lost that no speed is worth driving.
     pub(crate) fn with_losses_mps(&self, passes_needed: f64) -> f64 {
+        if passes_needed >= MOST_PASSES {
+            return 0.0;
+        }
         let turn_s = passes_needed * self.all_gap_s + self.ping_period_s;
         if passes_needed > 1.0 {
             self.fits_mps.min(self.fits_along_m / turn_s.max(1e-9))
