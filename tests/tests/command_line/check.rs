@@ -338,3 +338,25 @@ fn more_sensors_than_a_dive_takes_are_told_as_a_dive_refuses_them() {
     let answer = folder.headrace(&["check", "many.toml"]);
     assert!(answer.stderr.contains("many.toml:284: sensors[64].id: 65 sensors"), "{}", answer.stderr);
 }
+
+/// What a file plans is what it is: heads that are started for its planned speed, at which `run` will give the same advice.
+#[test]
+fn what_the_planned_speed_allows_is_told_beside_what_a_plan_could() {
+    let folder = Folder::new();
+    let vita = std::fs::read_to_string(root().join("deploy/vehicles/vita2-4.toml")).unwrap();
+    let planned = |mps: &str| {
+        let text = changed(&vita, &[("planned_speed_mps = 0.10\n", &format!("planned_speed_mps = {mps}\n"))]);
+        folder.write("vehicle.toml", text);
+        folder.headrace(&["check", "vehicle.toml"])
+    };
+    let usual = planned("0.10");
+    assert!(
+        usual.stdout.contains("with heads started for the planned 0.1 m/s: at most 0.102 m/s"),
+        "{}",
+        usual.stdout
+    );
+    assert!(!usual.stderr.contains("planned_speed_mps"), "{}", usual.stderr);
+    let most = planned("0.1129");
+    assert!(most.stderr.contains("0.1129, which leaves no room"), "{}", most.stderr);
+    assert_eq!((usual.code, most.code), (Some(0), Some(0)));
+}

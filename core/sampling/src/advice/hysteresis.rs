@@ -158,6 +158,20 @@ mod tests {
     }
 
     #[test]
+    fn what_is_forgotten_holds_nothing_back() {
+        let mut steady = Hysteresis::new(TARGET_M);
+        let show = |steady: &mut Hysteresis, k: u64, mps: f64| {
+            steady.show(MonoNs(3_000_000_000 + k * 200_000_000), speed(mps)).v_max_mps
+        };
+        for k in 0..20 {
+            show(&mut steady, k, 0.1);
+        }
+        assert!((show(&mut steady, 20, 0.2) - 0.1).abs() < 1e-12, "a higher speed waits");
+        steady.forget();
+        assert!((show(&mut steady, 21, 0.2) - 0.2).abs() < 1e-12);
+    }
+
+    #[test]
     fn a_graver_reason_shows_at_once_and_a_lesser_one_after_a_second() {
         let ladder = [Reason::HelixPitch, Reason::AngularStep, Reason::NoReturns, Reason::NoHeadingOrFix];
         for pair in ladder.windows(2) {

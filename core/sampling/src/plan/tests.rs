@@ -265,3 +265,35 @@ fn heads_side_by_side_gain_by_standing_in_line_and_those_in_line_nothing() {
     assert_eq!(there.in_line(0.5).unwrap(), None);
     assert_eq!(Planner::new(ideal(1)).unwrap().in_line(0.5).unwrap(), None);
 }
+
+/// Heads apart along the hull are in phase about the speed that they were started for: what live will say of a file isn't what a plan says that
+/// may start them anew.
+#[test]
+fn heads_started_for_another_speed_allow_less() {
+    let target_m = 0.6;
+    let mode = 2;
+    let apart = Planner::new(vita_2(HeadLayout::PhaseShift)).unwrap();
+    let v_max_mps = apart.v_max_mps(mode, target_m).unwrap();
+    let started = |planner: &Planner, share: f64| {
+        planner.as_started_mps(mode, target_m, share * v_max_mps).unwrap() / v_max_mps
+    };
+    let held = started(&apart, HELD_SHARE);
+    assert!(held > HELD_SHARE && held <= 1.0, "{held}");
+    assert!(started(&apart, 0.7) < 0.9, "{}", started(&apart, 0.7));
+    // Without heads apart it makes no difference but the share that is kept back for measuring the speed.
+    let alone = Planner::new(ideal(1)).unwrap();
+    let [slow, fast] = [0.3, 0.9].map(|share| started(&alone, share));
+    assert!((slow - fast).abs() < 1e-3);
+    assert!(
+        apart.as_started_mps(mode, target_m, 0.0).is_err()
+            && apart.as_started_mps(99, target_m, 0.1).is_err()
+    );
+}
+
+/// The target of an error is the one that was asked for, not what errors of position leave of it.
+#[test]
+fn a_target_that_no_speed_meets_is_told_as_it_was_asked_for() {
+    let swinging = Inspection { yaw_rate_radps: 10.0, ..vita_2(HeadLayout::PhaseShift) };
+    let why = Planner::new(swinging).unwrap().v_max_mps(2, 0.6).unwrap_err();
+    assert!(why.to_string().contains("a target of 0.6 m"), "{why}");
+}
