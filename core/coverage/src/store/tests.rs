@@ -316,3 +316,19 @@ fn samples_keep_their_visits_when_packed() {
     pack_the_first_40_m(&mut store);
     assert_eq!(visits(&store), before);
 }
+
+/// One stretch may hold as many samples as the open ones have room for.
+#[test]
+fn a_stretch_that_needs_all_the_room_is_opened_again() {
+    let mut store = SampleStore::new(StoreLayout { capacity: 4, ..LAYOUT });
+    for k in 0..4 {
+        let at = f64::from(k);
+        let step_m = (k > 0).then_some([0.01, 0.1]);
+        store.insert(WallSample { step_m, ..sample(1.0 + 0.01 * at, 2.0 + 0.1 * at) }).unwrap();
+    }
+    store.insert(sample(100.0, 0.0)).unwrap();
+    assert!(store.bricks.iter().take(30).all(|brick| brick.slot == 0), "it was packed for the one far away");
+    // The step from 2.2 to 2.3 m crosses at its middle.
+    let distance = store.nearest_pass_m(1.5, 2.25, 5.0).unwrap();
+    assert!((distance - 0.475).abs() < 3e-5, "{distance}");
+}
