@@ -6,4 +6,5 @@ mod jacobians;
 mod noise;
 mod oracle;
 mod properties;
+mod rest;
 mod rig;
