@@ -3,6 +3,7 @@
 mod faults;
 mod hard_cases;
 mod jacobians;
+mod journal;
 mod noise;
 mod oracle;
 mod properties;
