@@ -332,3 +332,21 @@ fn a_stretch_that_needs_all_the_room_is_opened_again() {
     let distance = store.nearest_pass_m(1.5, 2.25, 5.0).unwrap();
     assert!((distance - 0.475).abs() < 3e-5, "{distance}");
 }
+
+/// A head that turns on, its samples in single steps or not, takes four bytes a sample once packed.
+#[test]
+fn a_sweep_takes_a_word_a_sample_when_packed() {
+    for is_stepped in [true, false] {
+        let mut store = SampleStore::new(LAYOUT);
+        let all = store.arena.free_words();
+        for k in 0..10_000 {
+            let at = f64::from(k);
+            let step_m = (is_stepped && k > 0).then_some([0.003, 0.05]);
+            let sample = sample(0.003 * at, 0.05 * at % PERIMETER_M);
+            assert_eq!(store.insert(WallSample { step_m, ..sample }), Ok(Kept::Stored));
+        }
+        pack_the_first_40_m(&mut store);
+        let words = all - store.arena.free_words();
+        assert!((10_000..12_000).contains(&words), "{is_stepped}: {words}");
+    }
+}
