@@ -300,3 +300,26 @@ fn who_was_too_fast_would_have_gone_as_fast_as_fits_and_no_faster() {
     let coarse = Drive { t_y_m: 0.6, middle_t_y_m: 0.6, ..drive };
     assert!((slowed_mps(coarse) - 0.15 / 2.02).abs() < 1e-9, "{}", slowed_mps(coarse));
 }
+
+/// At 0.1 m/s heads pass as far apart after 4 s as after 2 s at the planned 0.2 m/s: only what is farther by more than it takes to help is mended
+/// by going as planned.
+#[test]
+fn who_was_slower_than_planned_would_have_gone_as_planned_if_that_helps() {
+    let then = |planned_gap_s: f64| {
+        let drive = Drive {
+            speed_mps: 0.1,
+            planned_mps: 0.2,
+            fits_mps: 0.2,
+            planned_gap_s,
+            healthy_gap_s: 5.0,
+            all_gap_s: 2.0,
+            ..sound()
+        };
+        let then = drive.without(Causes::of(Cause::Phase), 0.5, true);
+        (then.speed_mps, then.healthy_gap_s)
+    };
+    let near = |found: (f64, f64), speed_mps: f64, gap_s: f64| {
+        (found.0 - speed_mps).abs() < 1e-12 && (found.1 - gap_s).abs() < 1e-12
+    };
+    assert!(near(then(4.4), 0.2, 2.0) && near(then(4.2), 0.1, 4.2) && near(then(3.9), 0.1, 3.9));
+}

@@ -243,3 +243,71 @@ fn note_frontier(
         sections.due(&moved, &outlook, &mut |request| requests.0.push(request));
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use headrace_coverage::{HoleFinder, Judging, Lacks, Reach, Request, SampleStore, StoreLayout};
+    use headrace_geometry::frames::{Point3, Pose, Rot};
+    use headrace_geometry::time::MonoNs;
+    use headrace_geometry::tunnel::shapes;
+    use headrace_sampling::head::MAX_HEADS;
+    use headrace_sampling::layout::HeadLayout;
+    use headrace_sampling::losses::LossRate;
+
+    /// Sections of which those of these indices have failed.
+    fn missed(failed: &[i64]) -> Sections {
+        let profile = shapes::circle(3.0).unwrap();
+        let perimeter_m = profile.perimeter_m();
+        let layout = StoreLayout { perimeter_m, from_m: 0.0, to_m: 30.0, cell_m: 0.25, capacity: 100 };
+        let mut sections = Sections::new(0.25, 0.5, 0.0, 30.0);
+        let mut judging = Judging {
+            store: &SampleStore::new(layout),
+            lacks: &Lacks::default(),
+            finder: &mut HoleFinder::default(),
+            profile: &profile,
+            tell: &mut |_, _| {},
+        };
+        for section in failed {
+            let request = Request {
+                section: *section,
+                at: MonoNs(0),
+                swept_by_all: None,
+                none_alive: false,
+                to_come: Some(Reach { from_m: 29.0, to_m: f64::INFINITY }),
+                not_passed: None,
+                ended: None,
+                only_fails: false,
+            };
+            sections.judge(&request, &mut judging);
+        }
+        sections
+    }
+
+    /// Half a metre, the target, before the stretch from 5 m on, or that from 10 m on.
+    #[test]
+    fn who_goes_back_turns_round_before_the_nearest_missed_stretch() {
+        let turns_m = |failed: &[i64], speed_mps: f64, x_m: Option<f64>| {
+            let pose =
+                x_m.map(|x_m| Pose { position: Point3::new(x_m, 0.0, 3.0), attitude: Rot::identity() });
+            let situation = Situation {
+                pose,
+                speed_mps,
+                pass_error_m: 0.0,
+                layout: HeadLayout::PhaseShift,
+                configured: 0,
+                heads: [None; MAX_HEADS],
+                losses: [LossRate::default(); MAX_HEADS],
+            };
+            back_to_m(&missed(failed), &situation)
+        };
+        let two = [20, 21, 40];
+        assert_eq!(turns_m(&two, -0.1, Some(12.0)), Some(9.5));
+        assert_eq!(turns_m(&two, -0.1, Some(9.6)), Some(9.5));
+        assert_eq!(turns_m(&two, -0.1, Some(9.4)), Some(4.5), "past the one there is the other");
+        assert_eq!(turns_m(&two, -0.1, Some(4.4)), None, "past both");
+        assert_eq!(turns_m(&[], -0.1, Some(12.0)), None, "nothing is missed");
+        assert_eq!(turns_m(&two, -0.1, None), None, "nobody knows where it is");
+        assert_eq!((turns_m(&two, 0.1, Some(12.0)), turns_m(&two, -0.01, Some(12.0))), (None, None));
+    }
+}

@@ -344,4 +344,30 @@ mod tests {
         // From the middle a step is one everywhere.
         assert!(of([0.0, 0.0], 3).iter().all(|step| near(*step, 3.0)));
     }
+
+    /// Beside the middle by so much, a step goes farther along the wall on the other side.
+    #[test]
+    fn steps_are_found_anew_after_five_centimetres_or_another_step() {
+        let profile = shapes::circle(3.0).unwrap();
+        let mut driving = Driving::default();
+        let mut t_y_m = |aside_m: f64, finer: f64| {
+            let mut situation = situation(EVEN, 0.1, &profile);
+            for motion in situation.heads.iter_mut().flatten() {
+                motion.step_rad *= finer;
+            }
+            let [y_m, z_m] = profile.reference();
+            driving.note_steps(&situation, [y_m + aside_m, z_m], &profile);
+            (driving.now.t_y_m, driving.now.middle_t_y_m)
+        };
+        let near = |found: (f64, f64), t_y_m: f64, middle_m: f64| {
+            (found.0 - t_y_m).abs() < 1e-5 && (found.1 - middle_m).abs() < 1e-5
+        };
+        let middle_m = 3.0 * STEP_RAD;
+        assert!(near(t_y_m(0.0, 1.0), middle_m, middle_m));
+        assert!(near(t_y_m(0.04, 1.0), middle_m, middle_m), "little has changed");
+        assert!(near(t_y_m(0.3, 1.0), 3.3 * STEP_RAD, middle_m));
+        assert!(near(t_y_m(0.26, 1.0), 3.3 * STEP_RAD, middle_m), "little has since");
+        assert!(near(t_y_m(0.26, 0.5), 1.63 * STEP_RAD, 0.5 * middle_m), "another mode");
+        assert!(near(t_y_m(0.0, 0.5), 0.5 * middle_m, 0.5 * middle_m));
+    }
 }
