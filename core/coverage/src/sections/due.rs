@@ -266,7 +266,12 @@ mod tests {
         // A yaw of 0.02 moves what is 3 m beside the vehicle by 0.06 m, and nothing above it: 0.5 m and thrice 0.072 m there.
         assert!(!fails(0.35, true, [0.0, 0.02], 10.9) && fails(0.365, true, [0.0, 0.02], 10.9));
         assert!(fails(0.265, false, [0.0, 0.02], 10.9));
-        assert!(fails(0.265, false, [0.0, 0.1], 10.9), "though it would have to be far larger elsewhere");
+        for (to_come_m, yaw_rad) in
+            [10.9, 10.45].into_iter().flat_map(|x_m| [0.0, 0.06, 0.1].map(|yaw| (x_m, yaw)))
+        {
+            // Though it would have to be far larger elsewhere.
+            assert!(fails(0.265, false, [0.0, yaw_rad], to_come_m), "{to_come_m} {yaw_rad}");
+        }
         assert!(!fails(0.3, true, [0.0; 2], 10.3), "a sample may still land in it");
     }
 }

@@ -201,6 +201,8 @@ fn what_is_outside_or_too_much_is_refused() {
         assert_eq!(store.insert(WallSample { x_m, ..sample }), Err(StoreError::Outside));
     }
     assert_eq!(store.insert(WallSample { arc_m: f64::INFINITY, ..sample }), Err(StoreError::Outside));
+    assert!(store.covers(0.0, 1.0) && store.covers(1.0, 7.0) && !store.covers(1.1, 1.0));
+    assert!(!store.covers(0.5, f64::NAN) && !store.covers(f64::NAN, 1.0));
     assert_eq!(store.insert(sample), Ok(Kept::Stored));
     assert_eq!(store.insert(sample), Err(StoreError::Full));
 }
@@ -348,5 +350,12 @@ fn a_sweep_takes_a_word_a_sample_when_packed() {
         pack_the_first_40_m(&mut store);
         let words = all - store.arena.free_words();
         assert!((10_000..12_000).contains(&words), "{is_stepped}: {words}");
+    }
+}
+
+#[test]
+fn cells_are_of_half_the_target_within_reason() {
+    for (target_m, cell_m) in [(0.5, 0.25), (0.8, 0.4), (1.0, 0.5), (6.0, 0.5), (0.1, 0.05), (0.02, 0.05)] {
+        assert!((StoreLayout::cell_for_target_m(target_m) - cell_m).abs() < 1e-12, "{target_m}");
     }
 }
