@@ -1,11 +1,10 @@
+use super::super::fixtures::{coverage, mount, pipe};
 use super::*;
 use crate::entities::{Head, HeadFrontier, HeadSweep, HiddenAngles, Mounted};
 use bevy_ecs::system::SystemState;
 use bevy_ecs::world::World;
-use headrace_coverage::{Frontier, GridLayout, Relief, SampleStore, Sections, Soundings, StoreLayout};
 use headrace_geometry::frames::{Point3, Rot};
 use headrace_geometry::math;
-use headrace_geometry::tunnel::shapes;
 use headrace_sampling::layout::HeadLayout;
 use headrace_sensor::device::{SensorInfo, SensorKind};
 use headrace_sensor::reading::SourceId;
@@ -88,33 +87,12 @@ fn pings_without_a_fix_are_kept_until_there_is_no_room_and_that_is_known() {
     );
 }
 
-fn pipe() -> Profile {
-    shapes::circle(3.0).unwrap()
-}
-
-fn coverage(profile: &Profile) -> Coverage {
-    let (perimeter_m, from_m, to_m) = (profile.perimeter_m(), 0.0, 30.0);
-    Coverage {
-        store: SampleStore::new(StoreLayout { perimeter_m, from_m, to_m, cell_m: 0.25, capacity: 100 }),
-        sections: Sections::new(0.25, 0.5, from_m, to_m),
-        frontier: Frontier::default(),
-        soundings: Soundings::new(GridLayout { perimeter_m, from_m, to_m, node_m: 0.5 }),
-        relief: Relief::default(),
-        unsure: None,
-        lacks: Lacks::default(),
-    }
-}
-
 fn lacks_of(lacks: &Lacks) -> Vec<Lack> {
     lacks.between(f64::NEG_INFINITY, f64::INFINITY).copied().collect()
 }
 
 fn all_of(causes: &[Cause]) -> Causes {
     causes.iter().fold(Causes::default(), |all, cause| all.with(*cause))
-}
-
-fn mount() -> Mount {
-    Mount { position: Vec3::zero(), rotation: Rot::identity() }
 }
 
 /// What is lost at angles that the vehicle is taken to hide is lost by it, unless the wall is heard at such angles all the same.
@@ -153,7 +131,7 @@ fn a_ping_lacks_where_it_was_aimed_for_all_that_kept_it_from_the_wall() {
     let pose = Pose { position: Point3::new(10.0, y_m, z_m), attitude };
     let drive = Drive { speed_mps: 0.3, healthy_gap_s: 2.0, ..Drive::default() };
     let lack = |why: &[Cause], is_lost: bool, longest_m: f64, hidden: [u16; 2], hides: bool| {
-        let mut coverage = coverage(&profile);
+        let mut coverage = coverage();
         let turning = Turning { longest_m, hidden, ..Turning::default() };
         let hides = |_| hides;
         let placing = Placing { mount: &mount(), turning: &turning, profile: &profile, hidden: &hides };
@@ -215,7 +193,7 @@ impl Dive {
         let mut lacking = Lacking::default();
         let (seen, last) = (Some((at(10.0), 1.0, STEP_RAD / 0.02, STEP_RAD)), Some(at(10.0)));
         lacking.heads[0] = Turning { seen, pinged: last, moved: last, longest_m: 5.0, ..Turning::default() };
-        Self { world, coverage: coverage(&profile), profile, lacking }
+        Self { world, coverage: coverage(), profile, lacking }
     }
 
     /// What is lacking after a beat, with or without a fix.
