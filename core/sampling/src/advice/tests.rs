@@ -193,6 +193,18 @@ fn alternatives_give_speed_hours_and_whether_they_suffice() {
     assert!(!suffices(0.299) && suffices(0.301) && !suffices(slow.v_max_mps));
 }
 
+/// Two heads in sectors of half a turn each: a place waits for as long as a whole turn takes.
+#[test]
+fn in_sectors_alternatives_go_there_and_back_in_the_time_of_their_mode() {
+    let mut case = Case::new(&[10.0, 190.0], &[0.0; 2], 0.05, 0.8);
+    case.situation.layout = HeadLayout::SectorOffset;
+    let advice = case.advice();
+    let [slow, fast, _] = [0, 1, 2].map(|k| advice.alternatives[k].unwrap().v_max_mps);
+    assert!((fast - advice.v_max_mps).abs() < 1e-9, "as they are: {fast} {}", advice.v_max_mps);
+    // 21.6 s and a ping, with steps along the wall that hardly count.
+    assert!((slow / (0.8 / 21.618 * 0.99) - 1.0).abs() < 0.01, "{slow}");
+}
+
 #[test]
 fn where_slower_does_not_help_it_says_what_would() {
     let mut case = Case::new(&[0.0], &[0.0], 0.2, 0.1);

@@ -212,7 +212,8 @@ impl Dive {
         let mut state = SystemState::<Heads<'_, '_>>::new(&mut self.world);
         let heads = state.get_mut(&mut self.world).unwrap();
         let beat = (at(seconds), &situation);
-        note_beat(&mut self.lacking, Drive::default(), &heads, beat, &self.profile, &mut self.coverage);
+        let now = Drive { healthy_gap_s: 2.0, ..Drive::default() };
+        note_beat(&mut self.lacking, now, &heads, beat, &self.profile, &mut self.coverage);
         lacks_of(&self.coverage.lacks)
     }
 
@@ -256,6 +257,9 @@ fn what_would_have_been_pinged_without_a_fix_is_placed_later() {
     assert_eq!((all.len(), dive.lacking.away.len(), dive.lacking.forgot), (100, 0, false));
     assert!(dive.are_pings_after_10_s(&all[..50], &[Cause::HeadSilent, Cause::PositionLost]), "{all:?}");
     assert!(all[50..].iter().all(|lack| lack.why == Causes::of(Cause::HeadSilent)));
+    // They went by as fast as the way between took.
+    let section = dive.coverage.sections.get(8).unwrap();
+    assert!((section.passage.drive.speed_mps - 0.1).abs() < 1e-9, "{:?}", section.passage.drive);
     // More than there is room for: those that are kept are the first.
     let mut dive = Dive::new();
     dive.beat(10.0, true);
@@ -270,4 +274,17 @@ fn what_would_have_been_pinged_without_a_fix_is_placed_later() {
         (Some(true), false),
         "nobody knows what was lacking there"
     );
+}
+
+/// After a gap in a log the work of a beat is bounded, and it is known that something is left out.
+#[test]
+fn of_what_is_owed_at_once_the_latest_are_noted() {
+    for (owed, is_forgotten) in [(ROOM, false), (ROOM + 1, true)] {
+        let mut dive = Dive::new();
+        dive.beat(10.0, true);
+        let lacks = dive.beat(10.0 + 0.02 * owed as f64, true);
+        assert_eq!((lacks.len(), dive.lacking.forgot), (ROOM, is_forgotten));
+        let last_m = lacks.last().unwrap().x_m;
+        assert!((last_m - (2.0 + 0.002 * owed as f64)).abs() < 1e-6, "{last_m}");
+    }
 }
