@@ -288,3 +288,23 @@ fn of_what_is_owed_at_once_the_latest_are_noted() {
         assert!((last_m - (2.0 + 0.002 * owed as f64)).abs() < 1e-6, "{last_m}");
     }
 }
+
+/// Draws by time are as even as draws by chance, whatever the time between pings, and no two are the same.
+#[test]
+fn draws_by_time_are_spread_evenly() {
+    for period_ns in [1_u64, 18_000_000, 20_000_000, 1 << 30, 1_000_000_000] {
+        let draws: Vec<f64> = (0..16_384).map(|k| unit_of(3_600_000_000_000 + k * period_ns)).collect();
+        let mut counts = [0_i32; 16];
+        for draw in &draws {
+            counts[usize::try_from(math::floor_to_i64(16.0 * draw)).unwrap()] += 1;
+        }
+        // 1024 each, to five standard deviations.
+        assert!(counts.iter().all(|count| (count - 1024).abs() < 160), "{period_ns}: {counts:?}");
+        // What follows the lower half is as even: neighbours have nothing to do with each other.
+        let after_low = draws.windows(2).filter(|pair| pair[0] < 0.5 && pair[1] < 0.5).count();
+        assert!(after_low.abs_diff(4096) < 300, "{period_ns}: {after_low}");
+        let mut sorted = draws;
+        sorted.sort_by(f64::total_cmp);
+        assert!(sorted.windows(2).all(|pair| pair[0] < pair[1]), "{period_ns}");
+    }
+}
