@@ -145,9 +145,10 @@ impl Sections {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::hole::HoleFinder;
+    use crate::hole::{Hole, HoleFinder};
     use crate::lacks::Lacks;
     use crate::passage::PassError;
+    use crate::section::Section;
     use crate::store::{SampleStore, StoreLayout, WallSample};
     use headrace_fusion::relative::Relative;
     use headrace_geometry::time::MonoNs;
@@ -199,6 +200,79 @@ mod tests {
         assert_eq!(asked(Some(8..12), None), [], "it has been nowhere");
         assert_eq!(asked(Some(8..12), way), [(8, true), (9, true), (10, false)]);
         assert_eq!(asked(Some(8..40), way), [(8, true), (9, true)], "nothing has come since");
+    }
+
+    /// What is asked of sections when the heads, whose samples may land from 3.25 m on, have left 2.5 to 3 m: the section, and whether only
+    /// for a certain fail.
+    fn due(set: impl Fn(&mut Sections)) -> Vec<(i64, bool)> {
+        let mut sections = Sections::new(0.25, 0.5, 1.0, 10.0);
+        set(&mut sections);
+        let to_come = Some(Reach { from_m: 3.25, to_m: f64::INFINITY });
+        let moved = Moved { left_behind: 10..12, left_ahead: 16..16, way_grown: false, to_come };
+        let outlook = Outlook {
+            at: MonoNs(7),
+            way: Some(Reach { from_m: 1.1, to_m: 3.9 }),
+            swept_by_all: None,
+            none_alive: false,
+            to_come,
+            not_passed: None,
+            through: None,
+            still_zone: None,
+        };
+        let mut all = Vec::new();
+        sections.due(&moved, &outlook, &mut |request| all.push((request.section, request.only_fails)));
+        all.sort_unstable();
+        all
+    }
+
+    /// All but this section are settled, and have been judged.
+    fn alone(index: i64, set: impl Fn(&mut Section)) -> Vec<(i64, bool)> {
+        due(|sections| {
+            for other in 4..16 {
+                let section = sections.get_mut(other).unwrap();
+                (section.hole, section.settled) = (Some(hole(0.3, 1.0)), true);
+                if other == index {
+                    set(section);
+                }
+            }
+        })
+    }
+
+    fn hole(diameter_m: f64, x_m: f64) -> Hole {
+        Hole { diameter_m, least_m: diameter_m, most_m: diameter_m, x_m, arc_m: 1.0, bounded: true }
+    }
+
+    #[test]
+    fn what_has_been_left_without_a_judgement_is_judged() {
+        let found = due(|_| {});
+        // All that lies behind, whole; at the zone's ends what may fail by a part that is left; nothing of what is to come.
+        let mut expected: Vec<_> = (4..12).map(|index| (index, false)).collect();
+        expected.extend([(12, true), (15, true)]);
+        assert_eq!(found, expected);
+        assert_eq!(alone(10, |_| {}), [], "it has been judged, and nothing has come since");
+        assert_eq!(alone(10, |section| section.stale = true)[0], (10, false));
+        assert_eq!(alone(10, |section| section.not_inspected = true)[0], (10, false));
+        assert_eq!(alone(10, |section| section.hole = None), [(10, false)]);
+        assert_eq!(alone(9, |section| section.stale = true), [], "it was left before");
+    }
+
+    /// Of a large hole what is out of reach, twice as far as its centre, may be too large already; out of reach as a whole it is judged for good.
+    #[test]
+    fn a_hole_that_may_still_be_filled_is_judged_once_enough_of_it_is_left() {
+        let at = |diameter_m: f64, x_m: f64, sd_m: f64, verdict: Verdict, flagged: bool| {
+            alone(9, |section| {
+                (section.hole, section.hole_sd_m) = (Some(hole(diameter_m, x_m)), sd_m);
+                (section.verdict, section.settled) = (verdict, false);
+                section.flagged = flagged.then_some(MonoNs(1));
+            })
+        };
+        let open = Verdict::Open;
+        assert_eq!(at(0.6, 2.3, 0.0, open, false), [(9, false)], "as a whole: it is 0.95 m away");
+        assert_eq!(at(2.0, 2.9, 0.0, open, false), [(9, false)], "0.7 m of it");
+        assert_eq!(at(2.0, 2.9, 0.15, open, false), [(9, true)], "0.4 m for certain");
+        assert_eq!(at(2.0, 3.1, 0.0, open, false), [(9, true)], "0.3 m of it");
+        assert_eq!(at(2.0, 2.9, 0.0, Verdict::CannotSay, false), [], "nothing is open");
+        assert_eq!(at(2.0, 3.1, 0.0, open, true), [], "it is flagged already");
     }
 
     const PERIMETER_M: f64 = 6.0 * core::f64::consts::PI;
