@@ -130,4 +130,24 @@ mod tests {
         let all_round = Opening { arc_m: None, ..gate() };
         assert!((all_round.share_of(5.0, 5.25, &profile) - 1.0).abs() < 1e-12);
     }
+
+    /// 2 m by 4 m: every 5 cm, or every 2 cm where the target is 0.2 m.
+    #[test]
+    fn it_takes_as_much_room_as_is_counted_for_it() {
+        let profile = shapes::circle(3.0).unwrap();
+        for (target_m, expected) in [(0.8, 41 * 81), (0.2, 101 * 201)] {
+            let layout = StoreLayout {
+                perimeter_m: profile.perimeter_m(),
+                from_m: 0.0,
+                to_m: 10.0,
+                cell_m: 0.25,
+                capacity: 100_000,
+            };
+            let mut store = SampleStore::new(layout);
+            gate().fill(&mut store, target_m).unwrap();
+            let counted = gate().places(profile.perimeter_m(), target_m);
+            let filled = i64::try_from(store.usage().kept + store.usage().thinned).unwrap();
+            assert_eq!((counted, filled), (expected, expected), "{target_m}");
+        }
+    }
 }

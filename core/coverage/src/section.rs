@@ -263,6 +263,35 @@ mod tests {
     }
 
     #[test]
+    fn a_flag_is_raised_by_a_fail_cleared_by_a_pass_and_raised_anew() {
+        let mut section = Section::default();
+        for (at, verdict, expected, is_flagged) in [
+            (1, Verdict::Open, Judgement::Updated, false),
+            (2, Verdict::Pass, Judgement::Updated, false),
+            (3, Verdict::Fail, Judgement::Raised, true),
+            (4, Verdict::Fail, Judgement::Updated, true),
+            (5, Verdict::CannotSay, Judgement::Updated, true),
+            (6, Verdict::Pass, Judgement::Cleared, false),
+            (7, Verdict::Pass, Judgement::Updated, false),
+            (8, Verdict::Fail, Judgement::Raised, true),
+        ] {
+            section.verdict = verdict;
+            assert_eq!((section.flag(MonoNs(at)), section.is_flagged()), (expected, is_flagged), "at {at}");
+            let since = section.flagged.map(|at| at.0);
+            assert_eq!(
+                since,
+                if at < 3 {
+                    None
+                } else if at < 8 {
+                    Some(3)
+                } else {
+                    Some(8)
+                }
+            );
+        }
+    }
+
+    #[test]
     fn a_spread_keeps_its_digits_far_from_zero_and_whatever_is_merged() {
         let values = [1e8 + 1.0, 1e8 + 2.0, 1e8 + 4.0, 1e8 + 9.0];
         let (mut whole, mut first, mut second) = (Spread::default(), Spread::default(), Spread::default());

@@ -106,4 +106,15 @@ mod tests {
         assert_eq!(angles_deg(&schedule, 1, 11), there_and_back.map(|angle| angle + 180.0));
         assert!((schedule.sweep_s().unwrap() - 0.12).abs() < 1e-12);
     }
+
+    #[test]
+    fn each_head_begins_where_its_program_does() {
+        let heads = [head(30.0), head(30.0), head(30.0)];
+        for layout in [HeadLayout::PhaseShift, HeadLayout::SectorOffset] {
+            let schedule = Schedule::new(&heads, layout, 0.1).unwrap();
+            let starts: Vec<_> = schedule.programs().map(|program| Some(program.start_rad)).collect();
+            let angles: Vec<_> = (0..3).map(|head| schedule.angle_rad(head, DurNs::ZERO)).collect();
+            assert_eq!(starts, angles, "{layout:?}");
+        }
+    }
 }

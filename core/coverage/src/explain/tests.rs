@@ -234,3 +234,92 @@ fn with_losses_the_speed_is_that_at_which_all_passes_needed_fit() {
     assert!((drive.with_losses_mps(1.5) - 0.4 / 3.02).abs() < 1e-12);
     assert!((drive.with_losses_mps(1.01) - 0.19).abs() < 1e-12, "no faster than without losses");
 }
+
+/// What would have been is between the times that were measured: as scheduled, had none stood still, at the planned speed.
+#[test]
+fn without_a_cause_the_passes_are_those_of_who_is_left() {
+    let drive = Drive {
+        healthy_gap_s: 4.0,
+        planned_gap_s: 3.0,
+        all_gap_s: 2.0,
+        gap_at_plan_s: 6.0,
+        healthy_at_plan_s: 3.5,
+        left_at_plan_s: 2.5,
+        ping_period_s: 0.02,
+        swing_m: 0.3,
+        t_y_m: 0.24,
+        middle_t_y_m: 0.2,
+        other: OtherSettings { finer_step: 0.5, finer_turn: 1.5, longer_turn: 2.0 },
+        ..sound()
+    };
+    let without = |causes: &[Cause], all_turn: bool| {
+        let removed = causes.iter().fold(Causes::default(), |all, cause| all.with(*cause));
+        drive.without(removed, 0.5, all_turn)
+    };
+    let near = |found: f64, expected: f64| (found - expected).abs() < 1e-9;
+    let (phase, fast) = (Cause::Phase, Cause::TooFast);
+    for (causes, all_turn, gap_s) in [
+        (&[][..], true, 4.0),
+        (&[][..], false, 4.0),
+        (&[phase], true, 3.0),
+        (&[phase], false, 2.5),
+        (&[fast], true, 3.5),
+        (&[fast], false, 6.0),
+        (&[phase, fast], true, 2.0),
+        (&[phase, fast], false, 2.5),
+    ] {
+        let then = without(causes, all_turn);
+        assert!(near(then.healthy_gap_s, gap_s), "{causes:?} {all_turn}: {}", then.healthy_gap_s);
+    }
+    // A longer range takes twice as long, a finer mode half as long again: all that turns with the heads.
+    for (causes, slower, finer) in [
+        (&[Cause::OutOfRange][..], 2.0, 1.0),
+        (&[Cause::AngularStep], 1.5, 0.5),
+        (&[Cause::OutOfRange, Cause::AngularStep], 3.0, 0.5),
+    ] {
+        let then = without(causes, true);
+        let found = [then.healthy_gap_s, then.ping_period_s, then.t_y_m, then.middle_t_y_m, then.swing_m];
+        let expected = [4.0 * slower, 0.02 * slower, 0.24 * finer, 0.2 * finer, 0.3];
+        assert!(found.iter().zip(expected).all(|(a, b)| near(*a, b)), "{causes:?}: {found:?}");
+    }
+    let straight = without(&[Cause::OffAxis], true);
+    assert!(near(straight.swing_m, 0.0) && near(straight.t_y_m, 0.2) && near(straight.healthy_gap_s, 4.0));
+}
+
+/// Of 0.5 m with steps of 0.3 m along the wall 0.4 m are left along the tunnel.
+#[test]
+fn who_was_too_fast_would_have_gone_as_fast_as_fits_and_no_faster() {
+    let drive = Drive { speed_mps: 0.4, t_y_m: 0.3, middle_t_y_m: 0.3, ..sound() };
+    let slowed_mps = |drive: Drive| drive.without(Causes::of(Cause::TooFast), 0.5, true).speed_mps;
+    // A pass takes 2 s, and a ping after it.
+    assert!((slowed_mps(drive) - 0.4 / 2.02).abs() < 1e-9, "{}", slowed_mps(drive));
+    assert!((slowed_mps(Drive { fits_mps: 0.1, ..drive }) - 0.1).abs() < 1e-9, "hidden wall takes more");
+    assert!((slowed_mps(Drive { fits_mps: 0.35, ..drive }) - 0.4 / 2.02).abs() < 1e-9);
+    assert!((slowed_mps(Drive { speed_mps: 0.15, ..drive }) - 0.15).abs() < 1e-9, "it wasn't too fast");
+    // Where steps leave nothing, three tenths of the target do.
+    let coarse = Drive { t_y_m: 0.6, middle_t_y_m: 0.6, ..drive };
+    assert!((slowed_mps(coarse) - 0.15 / 2.02).abs() < 1e-9, "{}", slowed_mps(coarse));
+}
+
+/// At 0.1 m/s heads pass as far apart after 4 s as after 2 s at the planned 0.2 m/s: only what is farther by more than it takes to help is mended
+/// by going as planned.
+#[test]
+fn who_was_slower_than_planned_would_have_gone_as_planned_if_that_helps() {
+    let then = |planned_gap_s: f64| {
+        let drive = Drive {
+            speed_mps: 0.1,
+            planned_mps: 0.2,
+            fits_mps: 0.2,
+            planned_gap_s,
+            healthy_gap_s: 5.0,
+            all_gap_s: 2.0,
+            ..sound()
+        };
+        let then = drive.without(Causes::of(Cause::Phase), 0.5, true);
+        (then.speed_mps, then.healthy_gap_s)
+    };
+    let near = |found: (f64, f64), speed_mps: f64, gap_s: f64| {
+        (found.0 - speed_mps).abs() < 1e-12 && (found.1 - gap_s).abs() < 1e-12
+    };
+    assert!(near(then(4.4), 0.2, 2.0) && near(then(4.2), 0.1, 4.2) && near(then(3.9), 0.1, 3.9));
+}

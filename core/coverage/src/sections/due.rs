@@ -145,6 +145,14 @@ impl Sections {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::hole::{Hole, HoleFinder};
+    use crate::lacks::Lacks;
+    use crate::passage::PassError;
+    use crate::section::Section;
+    use crate::store::{SampleStore, StoreLayout, WallSample};
+    use headrace_fusion::relative::Relative;
+    use headrace_geometry::time::MonoNs;
+    use headrace_geometry::tunnel::shapes;
 
     /// What is left in part is looked at every few centimetres of the way, behind and ahead.
     #[test]
@@ -160,5 +168,184 @@ mod tests {
         }
         sections.look_again(Some(Reach { from_m: f64::NEG_INFINITY, to_m: f64::INFINITY }));
         assert_eq!(sections.next_look_m.map(f64::to_bits), LOOK_AT_ONCE.map(f64::to_bits));
+    }
+
+    /// Of a stretch in which the vehicle stands, what has failed is judged again only once there is something new; all else may come to fail.
+    #[test]
+    fn where_the_vehicle_stands_what_is_new_is_judged() {
+        let mut sections = Sections::new(0.25, 0.5, -1.0, 10.0);
+        for (index, flagged, stale) in
+            [(8, false, true), (9, false, false), (10, true, true), (11, true, false)]
+        {
+            let section = sections.get_mut(index).unwrap();
+            (section.flagged, section.stale) = (flagged.then_some(MonoNs(1)), stale);
+        }
+        let mut asked = |still_zone: Option<core::ops::Range<i64>>, way: Option<Reach>| {
+            let outlook = Outlook {
+                at: MonoNs(7),
+                way,
+                swept_by_all: None,
+                none_alive: false,
+                to_come: None,
+                not_passed: None,
+                through: None,
+                still_zone,
+            };
+            let mut all = Vec::new();
+            sections.look_around(&outlook, &mut |request| all.push((request.section, request.only_fails)));
+            all
+        };
+        let way = Some(Reach { from_m: 0.1, to_m: 2.9 });
+        assert_eq!(asked(None, way), [], "it moves");
+        assert_eq!(asked(Some(8..12), None), [], "it has been nowhere");
+        assert_eq!(asked(Some(8..12), way), [(8, true), (9, true), (10, false)]);
+        assert_eq!(asked(Some(8..40), way), [(8, true), (9, true)], "nothing has come since");
+    }
+
+    /// What is asked of sections when the heads, whose samples may land from 3.25 m on, have left 2.5 to 3 m: the section, and whether only
+    /// for a certain fail.
+    fn due(set: impl Fn(&mut Sections)) -> Vec<(i64, bool)> {
+        let mut sections = Sections::new(0.25, 0.5, 1.0, 10.0);
+        set(&mut sections);
+        let to_come = Some(Reach { from_m: 3.25, to_m: f64::INFINITY });
+        let moved = Moved { left_behind: 10..12, left_ahead: 16..16, way_grown: false, to_come };
+        let outlook = Outlook {
+            at: MonoNs(7),
+            way: Some(Reach { from_m: 1.1, to_m: 3.9 }),
+            swept_by_all: None,
+            none_alive: false,
+            to_come,
+            not_passed: None,
+            through: None,
+            still_zone: None,
+        };
+        let mut all = Vec::new();
+        sections.due(&moved, &outlook, &mut |request| all.push((request.section, request.only_fails)));
+        all.sort_unstable();
+        all
+    }
+
+    /// All but this section are settled, and have been judged.
+    fn alone(index: i64, set: impl Fn(&mut Section)) -> Vec<(i64, bool)> {
+        due(|sections| {
+            for other in 4..16 {
+                let section = sections.get_mut(other).unwrap();
+                (section.hole, section.settled) = (Some(hole(0.3, 1.0)), true);
+                if other == index {
+                    set(section);
+                }
+            }
+        })
+    }
+
+    fn hole(diameter_m: f64, x_m: f64) -> Hole {
+        Hole { diameter_m, least_m: diameter_m, most_m: diameter_m, x_m, arc_m: 1.0, bounded: true }
+    }
+
+    #[test]
+    fn what_has_been_left_without_a_judgement_is_judged() {
+        let found = due(|_| {});
+        // All that lies behind, whole; at the zone's ends what may fail by a part that is left; nothing of what is to come.
+        let mut expected: Vec<_> = (4..12).map(|index| (index, false)).collect();
+        expected.extend([(12, true), (15, true)]);
+        assert_eq!(found, expected);
+        assert_eq!(alone(10, |_| {}), [], "it has been judged, and nothing has come since");
+        assert_eq!(alone(10, |section| section.stale = true)[0], (10, false));
+        assert_eq!(alone(10, |section| section.not_inspected = true)[0], (10, false));
+        assert_eq!(alone(10, |section| section.hole = None), [(10, false)]);
+        assert_eq!(alone(9, |section| section.stale = true), [], "it was left before");
+    }
+
+    /// Of a large hole what is out of reach, twice as far as its centre, may be too large already; out of reach as a whole it is judged for good.
+    #[test]
+    fn a_hole_that_may_still_be_filled_is_judged_once_enough_of_it_is_left() {
+        let at = |diameter_m: f64, x_m: f64, sd_m: f64, verdict: Verdict, flagged: bool| {
+            alone(9, |section| {
+                (section.hole, section.hole_sd_m) = (Some(hole(diameter_m, x_m)), sd_m);
+                (section.verdict, section.settled) = (verdict, false);
+                section.flagged = flagged.then_some(MonoNs(1));
+            })
+        };
+        let open = Verdict::Open;
+        assert_eq!(at(0.6, 2.3, 0.0, open, false), [(9, false)], "as a whole: it is 0.95 m away");
+        assert_eq!(at(2.0, 2.9, 0.0, open, false), [(9, false)], "0.7 m of it");
+        assert_eq!(at(2.0, 2.9, 0.15, open, false), [(9, true)], "0.4 m for certain");
+        assert_eq!(at(2.0, 3.1, 0.0, open, false), [(9, true)], "0.3 m of it");
+        assert_eq!(at(2.0, 2.9, 0.0, Verdict::CannotSay, false), [], "nothing is open");
+        assert_eq!(at(2.0, 3.1, 0.0, open, true), [], "it is flagged already");
+    }
+
+    const PERIMETER_M: f64 = 6.0 * core::f64::consts::PI;
+
+    /// Whether a section fails for certain whose wall, of a pipe of 3 m radius, has one empty circle, where the wall is `beside` the vehicle
+    /// or above it: with so much of an error of chainage, m, and of yaw, rad. Samples may still land from 0.65 m beyond it on, and nobody has
+    /// been there up to 1 m before.
+    fn fails(circle_m: f64, is_beside: bool, [along_m, yaw_rad]: [f64; 2], to_come_m: f64) -> bool {
+        let profile = shapes::circle(3.0).unwrap();
+        let [y_m, z_m] = profile.reference();
+        let arc_m = profile.arc_of(if is_beside { [y_m + 3.0, z_m] } else { [y_m, z_m + 3.0] });
+        let layout =
+            StoreLayout { perimeter_m: PERIMETER_M, from_m: 0.0, to_m: 20.0, cell_m: 0.25, capacity: 40_000 };
+        let mut store = SampleStore::new(layout);
+        let mut put = |x_m: f64, arc_m: f64| {
+            store.insert(WallSample { x_m, arc_m, head: 0, step_m: None, visit: 0 }).unwrap();
+        };
+        for (i, k) in (-20..=20).flat_map(|i| (0..188).map(move |k| (i, k))) {
+            let (x_m, around_m) = (0.1 * f64::from(i), PERIMETER_M / 188.0 * f64::from(k));
+            let off_m = math::hypot(x_m, math::wrap_signed(around_m, PERIMETER_M));
+            if off_m > circle_m {
+                put(10.125 + x_m, arc_m + around_m);
+            }
+        }
+        for k in 0..90 {
+            let (sin, cos) = math::sin_cos(math::TAU / 90.0 * f64::from(k));
+            put(10.125 + circle_m * cos, arc_m + circle_m * sin);
+        }
+        let mut sections = Sections::new(0.25, 0.5, 0.0, 20.0).with_confidence_sd(3.0);
+        let passage = &mut sections.get_mut(40).unwrap().passage;
+        let (along, yaw) = (along_m * along_m, yaw_rad * yaw_rad);
+        let relative = Relative::new([[along, 0.0, 0.0], [0.0; 3], [0.0, 0.0, yaw]]);
+        (passage.placed, passage.pass_error) = (1, PassError { relative, from_m: [y_m, z_m] });
+        let request = Request {
+            section: 40,
+            at: MonoNs(0),
+            swept_by_all: None,
+            none_alive: false,
+            to_come: Some(Reach { from_m: to_come_m, to_m: f64::INFINITY }),
+            not_passed: Some(Reach { from_m: f64::NEG_INFINITY, to_m: 9.0 }),
+            ended: None,
+            only_fails: true,
+        };
+        let mut judging = Judging {
+            store: &store,
+            lacks: &Lacks::default(),
+            finder: &mut HoleFinder::default(),
+            profile: &profile,
+            tell: &mut |_, _| {},
+        };
+        let everywhere = Request { not_passed: None, ..request };
+        assert!(!sections.fails_already(&everywhere, &mut judging), "only where some heads haven't been");
+        sections.fails_already(&request, &mut judging)
+    }
+
+    /// Three standard deviations of its diameter above the target of 0.5 m. A hole's error is 1.2 of that of a pass.
+    #[test]
+    fn a_circle_that_nothing_can_fill_fails_by_its_errors_where_it_is() {
+        for is_beside in [true, false] {
+            let fails = |circle_m: f64, errors: [f64; 2]| fails(circle_m, is_beside, errors, 10.9);
+            assert!(!fails(0.245, [0.0; 2]) && fails(0.255, [0.0; 2]), "as large as the target");
+            // 0.5 m and thrice 0.06 m.
+            assert!(!fails(0.335, [0.05, 0.0]) && fails(0.345, [0.05, 0.0]));
+        }
+        // A yaw of 0.02 moves what is 3 m beside the vehicle by 0.06 m, and nothing above it: 0.5 m and thrice 0.072 m there.
+        assert!(!fails(0.35, true, [0.0, 0.02], 10.9) && fails(0.365, true, [0.0, 0.02], 10.9));
+        assert!(fails(0.265, false, [0.0, 0.02], 10.9));
+        for (to_come_m, yaw_rad) in
+            [10.9, 10.45].into_iter().flat_map(|x_m| [0.0, 0.06, 0.1].map(|yaw| (x_m, yaw)))
+        {
+            // Though it would have to be far larger elsewhere.
+            assert!(fails(0.265, false, [0.0, yaw_rad], to_come_m), "{to_come_m} {yaw_rad}");
+        }
+        assert!(!fails(0.3, true, [0.0; 2], 10.3), "a sample may still land in it");
     }
 }

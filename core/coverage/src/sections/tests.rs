@@ -1,6 +1,8 @@
 use super::super::hole::FARTHEST_M;
 use super::*;
+use crate::store::{StoreLayout, WallSample};
 use headrace_fusion::relative::Relative;
+use headrace_geometry::tunnel::shapes;
 
 const SECTION_M: f64 = 0.25;
 
@@ -109,4 +111,70 @@ fn bounds_on_either_side_of_the_target_say_nothing() {
     assert_eq!(within(0.51, 0.501, 0.51), Verdict::Fail);
     assert_eq!(within(0.49, 0.49, 0.505), Verdict::CannotSay);
     assert_eq!(within(0.49, 0.45, 0.5), Verdict::Pass);
+}
+
+/// Judges a section of a pipe seen by two visits, a mesh of samples each, m: the second is of another stretch of navigation or of the same one.
+/// Returns its verdict, its hole's diameter, m, and the first visit that counts.
+fn seen_twice(meshes_m: [f64; 2], is_related: bool) -> (Verdict, f64, u32) {
+    let profile = shapes::circle(3.0).unwrap();
+    let perimeter_m = profile.perimeter_m();
+    let layout = StoreLayout { perimeter_m, from_m: 0.0, to_m: 10.0, cell_m: 0.25, capacity: 20_000 };
+    let mut store = SampleStore::new(layout);
+    let mut sections = sections();
+    for (number, mesh_m) in (0..).zip(meshes_m) {
+        let tie = if is_related { 0 } else { number };
+        let visit = Visit {
+            number,
+            tie,
+            at: MonoNs(u64::from(number) * 60_000_000_000),
+            errors: [PassError::default(); 2],
+        };
+        let around = math::round_to_i64(perimeter_m / mesh_m);
+        // The middle between two rows is that of the section.
+        let rows = math::floor_to_i64(2.0 / mesh_m);
+        for (i, k) in (-rows..rows).flat_map(|i| (0..around).map(move |k| (i, k))) {
+            let (x_m, arc_m) = (5.125 + mesh_m * (i as f64 + 0.5), perimeter_m / around as f64 * k as f64);
+            store.insert(WallSample { x_m, arc_m, head: 0, step_m: None, visit: number }).unwrap();
+            sections.touch(x_m, &visit, &profile);
+        }
+    }
+    let mut judging = Judging {
+        store: &store,
+        lacks: &Lacks::default(),
+        finder: &mut HoleFinder::default(),
+        profile: &profile,
+        tell: &mut |_, _| {},
+    };
+    let request = Request {
+        section: 20,
+        at: MonoNs(0),
+        swept_by_all: None,
+        none_alive: false,
+        to_come: Some(Reach { from_m: 9.0, to_m: f64::INFINITY }),
+        not_passed: None,
+        ended: None,
+        only_fails: false,
+    };
+    sections.judge(&request, &mut judging);
+    let section = sections.get(20).unwrap();
+    (section.verdict, section.hole.unwrap().diameter_m, section.visits.first())
+}
+
+/// A mesh leaves holes as wide as its diagonal: 0.28 m of 0.2 m, 0.48 m of 0.34 m, for a target of 0.5 m.
+#[test]
+fn holes_are_those_of_all_visits_unless_the_newest_alone_shows_that_they_are_small() {
+    let fine_m = 0.2 * math::sqrt(2.0);
+    let (verdict, hole_m, first) = seen_twice([0.2, 0.34], true);
+    assert!(hole_m < fine_m + 1e-3, "{hole_m}");
+    assert_eq!((verdict, first), (Verdict::Pass, 0), "each adds to what the other shows");
+    let (verdict, hole_m, first) = seen_twice([0.2, 0.34], false);
+    assert!((hole_m - 0.34 * math::sqrt(2.0)).abs() < 0.01, "{hole_m}");
+    assert_eq!((verdict, first), (Verdict::Pass, 1), "nothing relates the first to it");
+    let (verdict, hole_m, first) = seen_twice([0.2, 0.6], false);
+    assert!(hole_m < fine_m + 1e-3, "{hole_m}");
+    assert_eq!((verdict, first), (Verdict::CannotSay, 0), "neither the newest alone, nor both");
+    let (verdict, hole_m, first) = seen_twice([0.6, 0.2], true);
+    assert!(hole_m < fine_m + 1e-3, "{hole_m}");
+    assert_eq!((verdict, first), (Verdict::Pass, 0));
+    assert_eq!(seen_twice([0.6, 0.62], true).0, Verdict::Fail, "both are too wide, even together");
 }

@@ -201,6 +201,8 @@ fn what_is_outside_or_too_much_is_refused() {
         assert_eq!(store.insert(WallSample { x_m, ..sample }), Err(StoreError::Outside));
     }
     assert_eq!(store.insert(WallSample { arc_m: f64::INFINITY, ..sample }), Err(StoreError::Outside));
+    assert!(store.covers(0.0, 1.0) && store.covers(1.0, 7.0) && !store.covers(1.1, 1.0));
+    assert!(!store.covers(0.5, f64::NAN) && !store.covers(f64::NAN, 1.0));
     assert_eq!(store.insert(sample), Ok(Kept::Stored));
     assert_eq!(store.insert(sample), Err(StoreError::Full));
 }
@@ -315,4 +317,45 @@ fn samples_keep_their_visits_when_packed() {
     assert_eq!(before.len(), 90);
     pack_the_first_40_m(&mut store);
     assert_eq!(visits(&store), before);
+}
+
+/// One stretch may hold as many samples as the open ones have room for.
+#[test]
+fn a_stretch_that_needs_all_the_room_is_opened_again() {
+    let mut store = SampleStore::new(StoreLayout { capacity: 4, ..LAYOUT });
+    for k in 0..4 {
+        let at = f64::from(k);
+        let step_m = (k > 0).then_some([0.01, 0.1]);
+        store.insert(WallSample { step_m, ..sample(1.0 + 0.01 * at, 2.0 + 0.1 * at) }).unwrap();
+    }
+    store.insert(sample(100.0, 0.0)).unwrap();
+    assert!(store.bricks.iter().take(30).all(|brick| brick.slot == 0), "it was packed for the one far away");
+    // The step from 2.2 to 2.3 m crosses at its middle.
+    let distance = store.nearest_pass_m(1.5, 2.25, 5.0).unwrap();
+    assert!((distance - 0.475).abs() < 3e-5, "{distance}");
+}
+
+/// A head that turns on, its samples in single steps or not, takes four bytes a sample once packed.
+#[test]
+fn a_sweep_takes_a_word_a_sample_when_packed() {
+    for is_stepped in [true, false] {
+        let mut store = SampleStore::new(LAYOUT);
+        let all = store.arena.free_words();
+        for k in 0..10_000 {
+            let at = f64::from(k);
+            let step_m = (is_stepped && k > 0).then_some([0.003, 0.05]);
+            let sample = sample(0.003 * at, 0.05 * at % PERIMETER_M);
+            assert_eq!(store.insert(WallSample { step_m, ..sample }), Ok(Kept::Stored));
+        }
+        pack_the_first_40_m(&mut store);
+        let words = all - store.arena.free_words();
+        assert!((10_000..12_000).contains(&words), "{is_stepped}: {words}");
+    }
+}
+
+#[test]
+fn cells_are_of_half_the_target_within_reason() {
+    for (target_m, cell_m) in [(0.5, 0.25), (0.8, 0.4), (1.0, 0.5), (6.0, 0.5), (0.1, 0.05), (0.02, 0.05)] {
+        assert!((StoreLayout::cell_for_target_m(target_m) - cell_m).abs() < 1e-12, "{target_m}");
+    }
 }

@@ -334,4 +334,58 @@ mod tests {
         assert!(!leaves_again(10, -0.4) && !leaves_again(10, -0.45) && !leaves_again(10, -0.35));
         assert!(leaves_again(10, -0.47) && leaves_again(10, -0.33));
     }
+
+    /// What ends the doubt of a counter that was off by -0.4 m, and when, s: while the vehicle goes on at this speed it counts a share of that,
+    /// and so much is unsure.
+    fn ends(share: f64, speed_mps: f64, sd_m: f64) -> Option<(f64, Use)> {
+        let reading = |t: f64| {
+            let (expected_m, shown_m) = (7.0 + speed_mps * t, 6.6 + share * speed_mps * t);
+            let at = MonoNs(1_000_000_000) + DurNs::from_secs_f64(t);
+            CableReading { at, shown_m, off_m: shown_m - expected_m, sd_m, agrees: false }
+        };
+        let mut doubt = Doubt::between(reading(0.0), &reading(0.0), 0.0);
+        let times = (1..200).map(|k| f64::from(k) / 10.0);
+        times.map(|t| (t, doubt.take(&reading(t)))).find(|(_, used)| *used != Use::Withhold)
+    }
+
+    /// Truly: within a tenth of its way and a centimetre; where the vehicle's way is unsure, within four tenths.
+    #[test]
+    fn a_counter_has_slipped_once_it_runs_truly_again() {
+        let slipped = |share: f64, speed_mps: f64, sd_m: f64| match ends(share, speed_mps, sd_m) {
+            Some((at_s, Use::Slipped(slip))) => Some((at_s, slip.lost_m, slip.doubted_m)),
+            other => {
+                assert_eq!(other, None, "{share} {speed_mps} {sd_m}");
+                None
+            }
+        };
+        for (share, speed_mps, sd_m, at_s, lost_m, doubted_m) in [
+            // Over a second, half of whose way is in doubt.
+            (1.0, 0.1, 0.0, 1.0, -0.4, 0.05),
+            (1.0, 0.2, 0.0, 1.0, -0.4, 0.1),
+            (0.95, 0.1, 0.0, 1.0, -0.405, 0.05),
+            (0.8, 0.1, 0.5, 1.0, -0.42, 0.05),
+            (1.3, 0.1, 0.5, 1.0, -0.37, 0.065),
+            // Over five centimetres.
+            (1.0, 0.03, 0.0, 1.7, -0.4, 0.0255),
+            // Both stand, for five seconds.
+            (1.0, 0.0, 0.0, 5.0, -0.4, 0.0),
+        ] {
+            let found = slipped(share, speed_mps, sd_m).unwrap();
+            let off = [found.0 - at_s, found.1 - lost_m, found.2 - doubted_m];
+            assert!(off.iter().all(|off| off.abs() < 1e-6), "{share} {speed_mps} {sd_m}: {found:?}");
+        }
+        for (share, speed_mps, sd_m) in [(0.8, 0.1, 0.0), (0.5, 0.1, 0.5), (0.0, 0.1, 0.5), (2.0, 0.1, 0.5)] {
+            assert_eq!(slipped(share, speed_mps, sd_m), None, "{share} {sd_m}");
+        }
+    }
+
+    /// Beyond a metre the inertial unit doesn't know better: a counter that runs by a decimetre is taken for what it shows.
+    #[test]
+    fn where_nothing_else_is_known_a_counter_that_runs_is_sought() {
+        let (at_s, used) = ends(1.0, 0.3, 1.1).unwrap();
+        let Use::Seek(lacking_m) = used else { panic!("{used:?}") };
+        // From the first such reading, at 0.1 s, on; the way is 0.3 m/s since the doubt began.
+        assert!((at_s - 0.5).abs() < 1e-9 && (lacking_m - 0.15).abs() < 1e-9, "{at_s} {lacking_m}");
+        assert_eq!(ends(0.0, 0.3, 1.1), None, "it stands");
+    }
 }

@@ -197,3 +197,118 @@ impl Navigation for TrackNavigation {
         self.track.fix(self.clock, at)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use headrace_geometry::frames::{Point3, Rot, Tunnel};
+    use headrace_geometry::math;
+
+    /// Where the inertial unit sits, ahead of the vehicle's origin.
+    fn unit_at() -> Vec3<Body> {
+        Vec3::new(0.3, 0.0, 0.0)
+    }
+
+    fn at(t: f64) -> MonoNs {
+        MonoNs(50_000_000_000) + DurNs::from_secs_f64(t)
+    }
+
+    fn turned(yaw_rad: f64) -> Rot<Tunnel, Body> {
+        let turn: Rot<Tunnel, Tunnel> = rotation(Vec3::new(0.0, 0.0, yaw_rad));
+        turn * Rot::identity()
+    }
+
+    /// After `t` s of this drive: half a metre a second further in and turned left by 0.2 rad, ever faster by 0.1 m/s.
+    fn point(t: f64, from_x_m: f64) -> Point {
+        let mut state = State::at_rest(Point3::new(from_x_m + 0.5 * t, 1.0, 2.0), turned(0.2 * t));
+        state.velocity_mps = Vec3::new(0.4 + 0.1 * t, 0.0, 0.0);
+        Point::of(at(t), &state, &PoseSd { along_m: 0.1, place_m: 0.05, tilt_rad: 0.01, yaw_rad: 0.02 })
+    }
+
+    /// Two drives of the first clock, the second from 10 s on, and one of the clock after it had been set back. An error between passes is known
+    /// at 0 s and at 2 s.
+    fn track() -> Track {
+        let drives =
+            [(0, 0.0, vec![0.0, 1.0, 2.0]), (0, 100.0, vec![10.0, 11.0, 14.0]), (1, 200.0, vec![1.0, 2.0])];
+        let (mut pieces, mut points, mut relatives) = (Vec::new(), Vec::new(), Vec::new());
+        for (clock, from_x_m, times) in drives.iter().rev() {
+            let begun = (points.len(), relatives.len());
+            points.extend(times.iter().rev().map(|t| point(*t, *from_x_m)));
+            if *from_x_m < 50.0 {
+                relatives.extend([(at(2.0), Relative::along(0.2)), (at(0.0), Relative::along(0.1))]);
+            }
+            pieces.push(Piece {
+                clock: *clock,
+                unit_at: unit_at(),
+                points: begun.0..points.len(),
+                relatives: begun.1..relatives.len(),
+            });
+        }
+        Track::of_reversed(pieces, points, relatives, DurNs(100_000_000))
+    }
+
+    #[test]
+    fn the_way_is_even_between_points_and_goes_on_for_an_epoch() {
+        let track = track();
+        for t in [0.0, 0.25, 0.5, 1.0, 1.7, 2.0, 2.09] {
+            let fix = track.fix(0, at(t)).unwrap();
+            assert!((fix.speed_mps - (0.4 + 0.1 * t)).abs() < 1e-9, "{t}: {}", fix.speed_mps);
+            // The unit is ahead of the origin, where the vehicle is turned to.
+            let (ahead_m, aside_m) = (0.3 * math::cos(0.2 * t), 0.3 * math::sin(0.2 * t));
+            let place = fix.pose.position;
+            let off_m = [place.x() - (0.5 * t - ahead_m), place.y() - (1.0 - aside_m), place.z() - 2.0];
+            assert!(off_m.iter().all(|off_m| off_m.abs() < 1e-9), "{t}: {place:?}");
+            assert!(rotation_vector(fix.pose.attitude * turned(0.2 * t).inverse()).norm() < 1e-9, "{t}");
+            // Variances go from 0.01 to 0.04 m^2.
+            let variance_m2 = 0.01 + 0.015 * t.min(2.0);
+            assert!((fix.relative.sd_m(Vec3::zero()) - math::sqrt(variance_m2)).abs() < 1e-9, "{t}");
+            // Two visits that have nothing in common, where the unit is.
+            let revisit_m = fix.revisit.sd_m(fix.pose.attitude * unit_at());
+            assert!((revisit_m - 0.1 * math::sqrt(2.0)).abs() < 1e-9, "{t}: {revisit_m}");
+        }
+    }
+
+    #[test]
+    fn nothing_is_known_where_no_drive_was() {
+        let track = track();
+        let lacks = |clock: u32, t: f64| track.fix(clock, at(t)).err();
+        for (clock, t) in
+            [(0, -0.01), (0, 2.11), (0, 9.99), (0, 12.0), (0, 14.11), (1, 0.5), (1, 10.5), (2, 1.0)]
+        {
+            assert_eq!(lacks(clock, t), Some(NoFix::Heading), "{clock} {t}");
+        }
+        let at_x_m = |clock: u32, t: f64| {
+            let fix = track.fix(clock, at(t)).unwrap();
+            (fix.tie, (fix.pose.position + fix.pose.attitude * unit_at()).x())
+        };
+        for (clock, t, tie, x_m) in [(0, 1.5, 0, 0.75), (0, 10.5, 3, 105.25), (1, 1.5, 6, 200.75)] {
+            let (of, is_m) = at_x_m(clock, t);
+            assert!(of == tie && (is_m - x_m).abs() < 1e-9, "{clock} {t}: {of} {is_m}");
+        }
+        assert_eq!((track.pieces(), track.len(), track.is_empty()), (3, 8, false));
+        let none = Track::default();
+        assert_eq!((none.pieces(), none.len(), none.is_empty()), (0, 0, true));
+    }
+
+    /// A clock set back by 10 s or more begins anew; what came before it is then of the clock before.
+    #[test]
+    fn a_clock_set_back_leads_to_the_drive_after_it() {
+        let mut navigation = TrackNavigation::new(track(), [None; MAX_SOURCES]);
+        let mut hear = |t: f64| {
+            let times = Times { received: at(t), valid: at(t) };
+            navigation.update(0, &SensorInfo::other(), times, &Reading::AngularRate(Vec3::zero()));
+            [1.5, 10.5].map(|t| navigation.fix(at(t)).map_or(-1.0, |fix| fix.pose.position.x() - 0.5 * t))
+        };
+        let is = |found: [f64; 2], drives: [f64; 2]| {
+            // The vehicle's origin is at most 0.3 m behind the unit.
+            found.iter().zip(drives).all(|(found, drive)| (found - drive).abs() <= 0.3 + 1e-9)
+        };
+        let none = -1.0;
+        assert!(is(hear(1.5), [0.0, 100.0]));
+        assert!(is(hear(10.6), [0.0, 100.0]));
+        assert!(is(hear(2.0), [0.0, 100.0]), "late by less than 10 s: of the same clock");
+        assert!(is(hear(11.4), [0.0, 100.0]));
+        assert!(is(hear(11.6), [none, 100.0]), "a ping of 10 s ago is of a clock set back");
+        assert!(is(hear(1.4), [200.0, none]), "it was set back");
+    }
+}

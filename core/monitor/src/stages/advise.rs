@@ -129,3 +129,102 @@ pub(super) fn tell(
         notices.0.push(Notice::Advice(entry));
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::fixtures::{mount, pinged, pipe, pose, situation};
+    use super::*;
+    use crate::messages::Doubts;
+    use headrace_geometry::frames::{Mount, Pose, Rot};
+    use headrace_geometry::math;
+    use headrace_sampling::advice::Task;
+    use headrace_sampling::head::{HeadBody, HeadMotion, HeadSpec};
+    use headrace_sampling::layout::HeadLayout;
+
+    fn at(seconds: f64) -> MonoNs {
+        MonoNs(0) + DurNs::from_secs_f64(seconds)
+    }
+
+    /// Two heads that turn in 8 s, so far apart along the hull, m.
+    fn two_heads(apart_m: f64) -> Situation {
+        let mut situation = Situation { configured: 2, ..situation(Some(5.0)) };
+        for (number, slot) in situation.heads.iter_mut().take(2).enumerate() {
+            *slot = Some(HeadMotion {
+                mount: Mount {
+                    position: Vec3::new(apart_m * number as f64, 0.0, 0.0),
+                    rotation: Rot::identity(),
+                },
+                angle_rad: math::TAU / 2.0 * number as f64,
+                rate_radps: math::TAU / 8.0,
+                step_rad: 0.0157,
+                sector_rad: None,
+            });
+        }
+        situation
+    }
+
+    #[test]
+    fn each_beat_of_a_tick_has_its_advice_with_the_time_that_is_left() {
+        let task = Task {
+            target_m: 0.5,
+            confidence_sd: 2.0,
+            length_m: 100.0,
+            layout: HeadLayout::PhaseShift,
+            sound_speed_mps: 1447.0,
+            looks: advice::Looks::default(),
+        };
+        let head = HeadSpec {
+            mount: mount(),
+            step_rad: 0.0157,
+            ping_period_s: 0.02,
+            range_m: [0.2, 10.0],
+            sound_speed_mps: 1447.0,
+            beam_rad: 0.024,
+            body: HeadBody { radius_m: 0.0, ahead_m: 0.0, behind_m: 0.0 },
+        };
+        let heads = [(head, Vec::new()), (head, Vec::new())];
+        let new = |dive_time| Advisor::new(advice::Advisor::new(&pipe(), task, &heads, &[]), 0.5, dive_time);
+        let doubts = Doubts { cable: None, setting: None, stand_s: 0, hung: 0 };
+        let beat = |seconds: f64| Placed::Situation(at(seconds), two_heads(0.0), doubts);
+        let placed = [beat(30.0), Placed::Ping(pinged(5.0, 1.0)), beat(30.2)];
+        let left_s = |dive_s: Option<f64>, begun_s: Option<f64>| {
+            let (mut advisor, mut list) = (new(dive_s.map(DurNs::from_secs_f64)), Vec::new());
+            for _ in 0..2 {
+                advisor.fill(&placed, begun_s.map(at), &mut list);
+            }
+            list.iter().map(|advice| advice.left.time_s).collect::<Vec<_>>()
+        };
+        assert_eq!(left_s(Some(100.0), Some(10.0)), [Some(80.0), Some(79.8)], "of this tick alone");
+        assert_eq!(left_s(None, Some(10.0)), [None, None]);
+        assert_eq!(left_s(Some(100.0), None), [None, None], "it hasn't begun");
+    }
+
+    /// A vehicle that yaws by 0.01 rad/s. Heads 180 degrees apart pass every 4 s; those 0.8 m apart come to a place 8 s after one another at
+    /// 0.1 m/s.
+    #[test]
+    fn a_swing_is_that_between_passes_and_between_heads_apart() {
+        let swung = |apart_m: f64, speed_mps: f64| {
+            let mut looks = Looks::default();
+            let mut last = Swing::default();
+            for beat in 0..150 {
+                let seconds = 0.2 * f64::from(beat);
+                let attitude = Rot::from_roll_pitch_yaw(0.0, 0.0, 0.01 * seconds);
+                let pose = Some(Pose { attitude, ..pose(5.0) });
+                let turned = Situation { pose, speed_mps, ..two_heads(apart_m) };
+                last = swing(&mut looks, at(seconds), &turned);
+            }
+            last
+        };
+        // To a beat.
+        let near = |found: f64, expected: f64| (found - expected).abs() < 0.05 * expected;
+        for (apart_m, speed_mps) in [(0.8, 0.1), (0.8, -0.1), (0.8, 0.2)] {
+            let found = swung(apart_m, speed_mps);
+            assert!(near(found.rate_radps, 0.01) && near(found.apart_rate_radps, 0.01), "{found:?}");
+        }
+        let side_by_side = swung(0.0, 0.1);
+        assert!(near(side_by_side.rate_radps, 0.01) && side_by_side.apart_rate_radps.abs() <= 0.0);
+        // At rest they are taken to follow at 0.05 m/s: in 16 s. Only the last half minute counts, all of it together.
+        let at_rest = swung(0.8, 0.0);
+        assert!(near(at_rest.apart_rate_radps, 0.01) && near(at_rest.most_rad, 0.298), "{at_rest:?}");
+    }
+}

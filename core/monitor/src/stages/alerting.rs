@@ -158,3 +158,129 @@ fn digest_note(stream: &mut ResultStream, note: &Note) {
     last.iter_mut().zip(rest).for_each(|(byte, of)| *byte = *of);
     stream.integer(u64::from_le_bytes(last));
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use headrace_coverage::{
+        HoleFinder, Judging, Lacks, Reach, Request, RunChange, RunId, SampleStore, Sections, StoreLayout,
+    };
+    use headrace_geometry::time::MonoNs;
+    use headrace_geometry::tunnel::shapes;
+    use headrace_sensor::reading::{Reading, SourceId};
+    use headrace_vehicle::{AlertTiming, LimitsConfig};
+
+    const NOW: MonoNs = MonoNs(9_000_000_000);
+
+    /// The run of a section without a sample, raised at the event of this index, or at the beat before it.
+    fn run(event: usize, at_beat: bool) -> RunInput {
+        let profile = shapes::circle(3.0).unwrap();
+        let perimeter_m = profile.perimeter_m();
+        let layout = StoreLayout { perimeter_m, from_m: 0.0, to_m: 20.0, cell_m: 0.25, capacity: 100 };
+        let mut sections = Sections::new(0.25, 0.5, 0.0, 20.0);
+        let mut told: Option<(RunId, RunChange)> = None;
+        let request = Request {
+            section: 4,
+            at: NOW,
+            swept_by_all: None,
+            none_alive: false,
+            to_come: Some(Reach { from_m: 19.0, to_m: f64::INFINITY }),
+            not_passed: None,
+            ended: None,
+            only_fails: false,
+        };
+        let mut judging = Judging {
+            store: &SampleStore::new(layout),
+            lacks: &Lacks::default(),
+            finder: &mut HoleFinder::default(),
+            profile: &profile,
+            tell: &mut |id, change| told = Some((id, change)),
+        };
+        sections.judge(&request, &mut judging);
+        RunInput::of((event, at_beat), NOW, told.unwrap(), &sections).unwrap()
+    }
+
+    /// What a tick brings: a run, a command that acknowledges all alerts, and a reading at each of ten events.
+    struct Bench {
+        list: AlertList,
+        notes: Notes,
+        console: Console,
+        runs: RunInputs,
+        commands: Commands,
+        notices: Notices,
+        stream: ResultStream,
+        events: Vec<Event>,
+        state: LiveState,
+    }
+
+    impl Bench {
+        fn new(run: RunInput, command_before: usize) -> Self {
+            let event = |k: u64| Event {
+                source: SourceId(2),
+                received: MonoNs(k),
+                valid_at: MonoNs(k),
+                reading: Reading::AngularRate(headrace_geometry::frames::Vec3::zero()),
+            };
+            let command = Command::Acknowledge { alert: 0, by: crate::console::Who::default() };
+            let mut commands = Commands::new();
+            commands.0.push(ReceivedCommand { before: command_before, at: NOW, command });
+            Self {
+                list: AlertList::new(AlertTiming::default(), LimitsConfig::default(), 100),
+                notes: Notes::default(),
+                console: Console::new(SourceId(9)),
+                runs: RunInputs(vec![run]),
+                commands,
+                notices: Notices(Vec::with_capacity(100)),
+                stream: ResultStream::default(),
+                events: (0..10).map(event).collect(),
+                state: LiveState::new(0.5, 2.0, 0, 3),
+            }
+        }
+
+        /// Goes up to the beat that precedes the event of this index, or through the tick: alerts raised, those acknowledged, commands without
+        /// effect, and the last reading heard.
+        fn until(&mut self, beat: Option<usize>) -> (u32, usize, u64, Option<u64>) {
+            let mut alerting = Alerting {
+                list: &mut self.list,
+                notes: &mut self.notes,
+                console: &mut self.console,
+                runs: &self.runs,
+                commands: &self.commands,
+                notices: &mut self.notices,
+                stream: &mut self.stream,
+                events: &self.events,
+                taken: (0, 0, 0),
+            };
+            match beat {
+                Some(event) => alerting.before(event, &mut self.state),
+                None => alerting.rest(&mut self.state),
+            }
+            let acknowledged = self.list.iter().filter(|alert| alert.acknowledged.is_some()).count();
+            let heard = self.state.heard.get(2).copied().flatten().map(|at| at.0);
+            (self.list.raised(), acknowledged, self.console.counts.without_effect, heard)
+        }
+    }
+
+    #[test]
+    fn a_command_comes_before_what_the_event_after_it_brings() {
+        for (before, acknowledged) in [(4, 0), (5, 0), (6, 1), (9, 1)] {
+            let found = Bench::new(run(5, false), before).until(None);
+            assert_eq!(found, (1, acknowledged, 1 - acknowledged as u64, Some(9)), "{before}");
+        }
+    }
+
+    #[test]
+    fn a_beat_has_what_came_before_the_event_that_it_precedes() {
+        let at = |run: RunInput, command_before: usize, beat: usize| {
+            Bench::new(run, command_before).until(Some(beat))
+        };
+        assert_eq!(at(run(4, false), 9, 5), (1, 0, 0, Some(4)));
+        assert_eq!(at(run(5, false), 9, 5), (0, 0, 0, Some(4)), "that event comes after the beat");
+        assert_eq!(at(run(5, true), 9, 5), (1, 0, 0, Some(4)), "at the beat itself");
+        assert_eq!(at(run(6, true), 9, 5), (0, 0, 0, Some(4)));
+        assert_eq!(at(run(9, false), 5, 5), (0, 0, 1, Some(4)), "a command just before it");
+        assert_eq!(at(run(9, false), 6, 5), (0, 0, 0, Some(4)), "one after it");
+        assert_eq!(at(run(2, false), 4, 5), (1, 1, 0, Some(4)));
+        assert_eq!(at(run(2, false), 4, 0), (0, 0, 0, None));
+    }
+}

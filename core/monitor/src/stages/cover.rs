@@ -243,3 +243,198 @@ fn note_frontier(
         sections.due(&moved, &outlook, &mut |request| requests.0.push(request));
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::fixtures::{coverage, fix, heard, mount, pinged, pipe, situation};
+    use super::*;
+    use crate::entities::{Head, HeadSweep, HiddenAngles, Mounted};
+    use bevy_ecs::system::SystemState;
+    use bevy_ecs::world::World;
+    use headrace_coverage::{HoleFinder, Judging, Lacks, Reach, Request};
+    use headrace_fusion::{Fix, NoFix};
+    use headrace_geometry::time::MonoNs;
+    use headrace_sensor::device::{SensorInfo, SensorKind};
+    use headrace_sensor::reading::SourceId;
+
+    /// Sections of which those of these indices have failed.
+    fn missed(failed: &[i64]) -> Sections {
+        let (Coverage { store, mut sections, .. }, profile) = (coverage(), pipe());
+        let mut judging = Judging {
+            store: &store,
+            lacks: &Lacks::default(),
+            finder: &mut HoleFinder::default(),
+            profile: &profile,
+            tell: &mut |_, _| {},
+        };
+        for section in failed {
+            let request = Request {
+                section: *section,
+                at: MonoNs(0),
+                swept_by_all: None,
+                none_alive: false,
+                to_come: Some(Reach { from_m: 29.0, to_m: f64::INFINITY }),
+                not_passed: None,
+                ended: None,
+                only_fails: false,
+            };
+            sections.judge(&request, &mut judging);
+        }
+        sections
+    }
+
+    /// Half a metre, the target, before the stretch from 5 m on, or that from 10 m on.
+    #[test]
+    fn who_goes_back_turns_round_before_the_nearest_missed_stretch() {
+        let turns_m = |failed: &[i64], speed_mps: f64, x_m: Option<f64>| {
+            back_to_m(&missed(failed), &Situation { speed_mps, ..situation(x_m) })
+        };
+        let two = [20, 21, 40];
+        assert_eq!(turns_m(&two, -0.1, Some(12.0)), Some(9.5));
+        assert_eq!(turns_m(&two, -0.1, Some(9.6)), Some(9.5));
+        assert_eq!(turns_m(&two, -0.1, Some(9.4)), Some(4.5), "past the one there is the other");
+        assert_eq!(turns_m(&two, -0.1, Some(4.4)), None, "past both");
+        assert_eq!(turns_m(&[], -0.1, Some(12.0)), None, "nothing is missed");
+        assert_eq!(turns_m(&two, -0.1, None), None, "nobody knows where it is");
+        assert_eq!((turns_m(&two, 0.1, Some(12.0)), turns_m(&two, -0.01, Some(12.0))), (None, None));
+    }
+
+    #[test]
+    fn every_ping_is_counted_once_by_what_came_of_it() {
+        let mut tally = Tally::default();
+        let of = |outcome: Outcome, has_fix: bool| {
+            let ping = pinged(5.1, 1.0);
+            PlacedPing { outcome, fix: ping.fix.filter(|_| has_fix), ..ping }
+        };
+        let pings = [
+            heard(5.1, 1.0, 3.0),
+            of(Outcome::Lost(Loss::Missing, None), true),
+            of(Outcome::Lost(Loss::Missing, None), false),
+            of(Outcome::Lost(Loss::OutOfRange, None), true),
+            of(Outcome::Lost(Loss::Occluded, None), true),
+            of(Outcome::Lost(Loss::Occluded, None), true),
+            of(Outcome::Lost(Loss::Occluded, None), true),
+            of(Outcome::Unplaced(NoFix::Chainage), false),
+            of(Outcome::Unplaced(NoFix::Section), false),
+            of(Outcome::Unplaced(NoFix::Section), false),
+        ];
+        for ping in pings {
+            count(&mut tally, &ping);
+        }
+        let expected = Tally {
+            missing: 2,
+            out_of_range: 1,
+            occluded: 3,
+            unplaced: 3,
+            lacking: [0, 1, 2],
+            without_fix: 4,
+            ..Tally::default()
+        };
+        assert_eq!(tally, expected, "a return is counted when it is known what it is");
+    }
+
+    /// A ping without a fix counts where its head was last known to be.
+    #[test]
+    fn a_section_s_passage_has_its_pings_and_its_worst_moment() {
+        let (mut coverage, profile) = (coverage(), pipe());
+        let here = Reach { from_m: 7.0, to_m: 7.2 };
+        let frontier = HeadFrontier(Some(HeadReach::after(None, MonoNs(0), here)));
+        let drive = Drive { healthy_gap_s: 2.0, speed_mps: 0.4, ..Drive::default() };
+        let slow =
+            PlacedPing { fix: Some(Fix { speed_mps: -0.05, ..fix(5.1, 0.01) }), ..heard(5.1, 1.0, 3.0) };
+        let fast = PlacedPing { fix: Some(Fix { speed_mps: 0.2, ..fix(5.1, 0.02) }), ..pinged(5.1, 1.0) };
+        let of = |loss: Loss| PlacedPing { outcome: Outcome::Lost(loss, None), ..slow };
+        let away = PlacedPing {
+            fix: None,
+            reach: None,
+            standing: true,
+            outcome: Outcome::Unplaced(NoFix::Heading),
+            ..slow
+        };
+        for ping in [slow, fast, slow, of(Loss::OutOfRange), of(Loss::Occluded), away, away] {
+            note_passage(&mut coverage, &frontier, &drive, (&ping, &profile));
+        }
+        let passage = coverage.sections.get(20).unwrap().passage;
+        let counts = [passage.pings, passage.placed, passage.missing, passage.out_of_range, passage.occluded];
+        assert_eq!((counts, passage.unplaced, passage.standing), ([5, 5, 1, 1, 1], 0, 0));
+        assert_eq!((passage.drive, passage.adrift), (Drive { speed_mps: 0.2, ..drive }, false));
+        assert_eq!(passage.pass_error, PassError::of(&fast.fix.unwrap()));
+        let elsewhere = coverage.sections.get(28).unwrap().passage;
+        let counts = [elsewhere.pings, elsewhere.placed, elsewhere.unplaced, elsewhere.standing];
+        assert_eq!(counts, [2, 0, 2, 2]);
+        // Nobody knows where a head is that never was anywhere.
+        note_passage(&mut coverage, &HeadFrontier(None), &drive, (&away, &profile));
+        assert_eq!(coverage.sections.get(28).unwrap().passage, elsewhere);
+    }
+
+    /// Where two standard deviations against the pass before make up the target, its speed says nothing: a hole's error is 1.2 of a pass's.
+    #[test]
+    fn a_ping_whose_place_is_too_unsure_says_nothing_of_the_speed() {
+        let profile = pipe();
+        let noted = |sd_m: f64| {
+            let mut coverage = coverage();
+            let ping = PlacedPing { fix: Some(fix(5.1, sd_m)), ..heard(5.1, 1.0, 3.0) };
+            let drive = Drive { healthy_gap_s: 2.0, ..Drive::default() };
+            note_passage(&mut coverage, &HeadFrontier(None), &drive, (&ping, &profile));
+            let passage = coverage.sections.get(20).unwrap().passage;
+            (passage.adrift, passage.drive.speed_mps > 0.0)
+        };
+        assert_eq!((noted(0.2), noted(0.215)), ((false, true), (true, false)));
+    }
+
+    #[test]
+    fn a_head_s_reach_is_where_it_last_had_a_fix_while_it_is_heard() {
+        let at = |seconds: u64| MonoNs(seconds * 1_000_000_000);
+        let ping = |seconds: u64, x_m: Option<f64>| PlacedPing {
+            received: at(seconds),
+            fix: x_m.map(|x_m| fix(x_m, 0.0)),
+            reach: x_m.map(|x_m| Reach { from_m: x_m, to_m: x_m }),
+            ..pinged(5.0, 1.0)
+        };
+        let mut frontier = HeadFrontier(None);
+        note_reach(&mut frontier, &ping(1, None));
+        assert_eq!(frontier.0, None);
+        note_reach(&mut frontier, &ping(2, Some(5.0)));
+        note_reach(&mut frontier, &ping(9, None));
+        let expected = HeadReach::after(None, at(9), Reach { from_m: 5.0, to_m: 5.0 });
+        assert_eq!(frontier.0, Some(expected), "heard at 9 s, where it was at 2 s");
+        note_reach(&mut frontier, &ping(10, Some(6.0)));
+        assert_eq!(frontier.0.map(|reach| reach.latest()), Some(Reach { from_m: 6.0, to_m: 6.0 }));
+    }
+
+    /// At 0.4 m/s five seconds are 2 m: all from a quarter of a metre behind the rear head to that before where the front one will be.
+    #[test]
+    fn all_has_passed_where_what_is_seen_and_comes_soon_has() {
+        let passed = |between: core::ops::Range<i64>, speed_mps: f64, x_m: Option<f64>| {
+            let mut coverage = coverage();
+            for index in between {
+                coverage.sections.get_mut(index).unwrap().verdict = Verdict::Pass;
+            }
+            let mut world = World::new();
+            for (number, here_m) in [5.0, 6.0].into_iter().enumerate() {
+                let reach = HeadReach::after(None, MonoNs(0), Reach { from_m: here_m, to_m: here_m });
+                let info = SensorInfo { mount: mount(), kind: SensorKind::Head };
+                let mounted = Mounted { source: SourceId(0), info };
+                let sweep = HeadSweep::default();
+                world.spawn((
+                    Head(number),
+                    mounted,
+                    HiddenAngles(Vec::new()),
+                    sweep,
+                    HeadFrontier(Some(reach)),
+                ));
+            }
+            let mut state = SystemState::<Heads<'_, '_>>::new(&mut world);
+            let heads = state.get_mut(&mut world).unwrap();
+            is_passed(&coverage, &heads, &Situation { speed_mps, ..situation(x_m) })
+        };
+        // From 4.75 m, section 19, to 8.25 m, section 33; going back from 2.75 m, section 11, to 6.25 m, section 25.
+        assert!(passed(19..34, 0.4, Some(5.5)) && passed(11..26, -0.4, Some(5.5)));
+        assert!(passed(19..26, 0.0, Some(5.5)));
+        for between in [20..34, 19..33, 19..26] {
+            assert!(!passed(between.clone(), 0.4, Some(5.5)), "{between:?}");
+        }
+        assert!(!passed(12..26, -0.4, Some(5.5)) && !passed(11..25, -0.4, Some(5.5)));
+        assert!(!passed(0..120, 0.4, None), "without a place nothing is known");
+    }
+}

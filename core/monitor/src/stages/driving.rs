@@ -228,3 +228,147 @@ fn apart_m(situation: &Situation) -> f64 {
     let x_m = || situation.heads.iter().flatten().map(|motion| motion.mount.position.x());
     (x_m().fold(f64::NEG_INFINITY, f64::max) - x_m().fold(f64::INFINITY, f64::min)).max(0.0)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use headrace_geometry::frames::{Mount, Point3, Pose, Rot};
+    use headrace_geometry::tunnel::shapes;
+    use headrace_sampling::head::MAX_HEADS;
+    use headrace_sampling::losses::LossRate;
+
+    const STEP_RAD: f64 = 0.9 * math::TAU / 360.0;
+
+    /// Four heads side by side that turn in 8 s, at these angles, on a vehicle in the middle of a pipe.
+    fn situation(angles_deg: [f64; 4], speed_mps: f64, profile: &Profile) -> Situation {
+        let mut heads = [None; MAX_HEADS];
+        for (slot, angle_deg) in heads.iter_mut().zip(angles_deg) {
+            *slot = Some(HeadMotion {
+                mount: Mount { position: Vec3::zero(), rotation: Rot::identity() },
+                angle_rad: angle_deg.to_radians(),
+                rate_radps: math::TAU / 8.0,
+                step_rad: STEP_RAD,
+                sector_rad: None,
+            });
+        }
+        let [y_m, z_m] = profile.reference();
+        Situation {
+            pose: Some(Pose { position: Point3::new(5.0, y_m, z_m), attitude: Rot::identity() }),
+            speed_mps,
+            pass_error_m: 0.0,
+            layout: HeadLayout::PhaseShift,
+            configured: 4,
+            heads,
+            deaf: headrace_sampling::head::HeadSet::default(),
+            losses: [LossRate::default(); MAX_HEADS],
+        }
+    }
+
+    const EVEN: [f64; 4] = [0.0, 90.0, 180.0, 270.0];
+
+    fn noted(driving: &mut Driving, angles_deg: [f64; 4], speed_mps: f64, planned_mps: f64) -> Drive {
+        let profile = shapes::circle(3.0).unwrap();
+        let plan = Plan { planned_mps, target_m: 0.5, confidence_sd: 2.0, other: OtherSettings::default() };
+        let situation = situation(angles_deg, speed_mps, &profile);
+        driving.note(MonoNs(60_000_000_000), [&situation, &situation], &profile, &plan);
+        driving.now
+    }
+
+    /// Of four heads a quarter of a turn apart, 8 s a turn, one leaves a gap of half a turn.
+    #[test]
+    fn a_head_that_stood_still_is_not_counted_on_until_it_is_in_step() {
+        let near = |found: f64, expected: f64| (found - expected).abs() < 1e-9;
+        let mut driving = Driving::default();
+        assert!(near(noted(&mut driving, EVEN, 0.2, 0.2).left_at_plan_s, 2.0), "none did");
+        driving.lacking.stalled = HeadSet::default().with(1);
+        // Half an eighth of a turn late.
+        let late = noted(&mut driving, [0.0, 67.5, 180.0, 270.0], 0.2, 0.2);
+        assert!(near(late.left_at_plan_s, 4.0) && near(late.gap_s, 2.5) && near(late.planned_gap_s, 2.0));
+        assert!(driving.lacking.stalled.has(1));
+        let again = noted(&mut driving, EVEN, 0.2, 0.2);
+        assert!(near(again.left_at_plan_s, 4.0) && near(again.gap_s, 2.0));
+        assert!(driving.lacking.stalled.is_empty(), "it is in step again");
+        assert!(near(noted(&mut driving, EVEN, 0.2, 0.2).left_at_plan_s, 2.0));
+    }
+
+    /// From the middle of a pipe of 3 m radius a step goes 0.0471 m along the wall, which leaves 0.4978 m of the target along the tunnel, for 2 s
+    /// and a ping.
+    #[test]
+    fn the_speed_that_fits_leaves_room_for_the_steps() {
+        let along_m = math::sqrt(0.25 - 9.0 * STEP_RAD * STEP_RAD);
+        let most_mps = along_m / 2.02;
+        let fits_mps = |planned_mps: f64| {
+            let mut driving = Driving::default();
+            // Steps are known from the first beat on.
+            noted(&mut driving, EVEN, -0.1, planned_mps);
+            let now = noted(&mut driving, EVEN, -0.1, planned_mps);
+            assert!((now.fits_along_m - along_m).abs() < 1e-6 && (now.speed_mps - 0.1).abs() < 1e-12);
+            assert!((now.t_y_m - 3.0 * STEP_RAD).abs() < 1e-6 && (now.ping_period_s - 0.02).abs() < 1e-12);
+            now.fits_mps
+        };
+        assert!((fits_mps(0.2) - 0.2).abs() < 1e-12, "as planned");
+        // Of what is tried, three hundredths apart, the fastest.
+        for planned_mps in [0.0, 1.02 * most_mps] {
+            let found = fits_mps(planned_mps);
+            assert!(found <= most_mps && found > 0.96 * most_mps, "{planned_mps}: {found} of {most_mps}");
+        }
+    }
+
+    /// In a pipe of 3 m radius, seen from 1 m below its middle: a step goes twice as far along the floor as a metre away, four times along
+    /// the ceiling, and thrice to the sides.
+    #[test]
+    fn steps_are_the_largest_where_a_place_waits_so_long() {
+        const SMALL_RAD: f64 = 1e-4;
+        let profile = shapes::circle(3.0).unwrap();
+        let [y_m, z_m] = profile.reference();
+        let of = |[right_m, up_m]: [f64; 2], sectors: usize| {
+            let steps_m = steps_by_wait_m(&profile, [y_m - right_m, z_m + up_m], SMALL_RAD, sectors);
+            steps_m.map(|step_m| step_m / SMALL_RAD)
+        };
+        let near = |found: f64, expected: f64| (found - expected).abs() < 0.02 * expected;
+        let all = of([0.0, -1.0], 0);
+        assert!(
+            near(all[0], 4.0) && all[1..].iter().all(|step| step.abs() <= 0.0),
+            "all wait alike: {all:?}"
+        );
+        // Two sectors end below and above; the middle quarter of each is at a side.
+        let below = of([0.0, -1.0], 2);
+        assert!(near(below[0], 4.0) && (3.0..3.5).contains(&below[3]), "{below:?}");
+        assert!(below.windows(2).all(|pair| pair[0] > pair[1]), "ever less from the ceiling on: {below:?}");
+        for aside_m in [-1.0, 1.0] {
+            let beside = of([aside_m, 0.0], 2);
+            assert!(near(beside[3], 4.0) && (3.0..3.7).contains(&beside[0]), "{beside:?}");
+        }
+        // Four end at the sides, too; the middle quarter of the upper ones begins at 34 degrees, where a step goes 3.83 times as far.
+        let four = of([0.0, -1.0], 4);
+        assert!(near(four[0], 4.0) && near(four[3], 3.83), "{four:?}");
+        // From the middle a step is one everywhere.
+        assert!(of([0.0, 0.0], 3).iter().all(|step| near(*step, 3.0)));
+    }
+
+    /// Beside the middle by so much, a step goes farther along the wall on the other side.
+    #[test]
+    fn steps_are_found_anew_after_five_centimetres_or_another_step() {
+        let profile = shapes::circle(3.0).unwrap();
+        let mut driving = Driving::default();
+        let mut t_y_m = |aside_m: f64, finer: f64| {
+            let mut situation = situation(EVEN, 0.1, &profile);
+            for motion in situation.heads.iter_mut().flatten() {
+                motion.step_rad *= finer;
+            }
+            let [y_m, z_m] = profile.reference();
+            driving.note_steps(&situation, [y_m + aside_m, z_m], &profile);
+            (driving.now.t_y_m, driving.now.middle_t_y_m)
+        };
+        let near = |found: (f64, f64), t_y_m: f64, middle_m: f64| {
+            (found.0 - t_y_m).abs() < 1e-5 && (found.1 - middle_m).abs() < 1e-5
+        };
+        let middle_m = 3.0 * STEP_RAD;
+        assert!(near(t_y_m(0.0, 1.0), middle_m, middle_m));
+        assert!(near(t_y_m(0.04, 1.0), middle_m, middle_m), "little has changed");
+        assert!(near(t_y_m(0.3, 1.0), 3.3 * STEP_RAD, middle_m));
+        assert!(near(t_y_m(0.26, 1.0), 3.3 * STEP_RAD, middle_m), "little has since");
+        assert!(near(t_y_m(0.26, 0.5), 1.63 * STEP_RAD, 0.5 * middle_m), "another mode");
+        assert!(near(t_y_m(0.0, 0.5), 0.5 * middle_m, 0.5 * middle_m));
+    }
+}

@@ -218,18 +218,28 @@ fn situation(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use headrace_coverage::WallLimits;
+    use bevy_ecs::system::SystemState;
+    use bevy_ecs::world::World;
+    use headrace_coverage::{OtherSettings, WallLimits};
     use headrace_fusion::relative::Relative;
     use headrace_geometry::frames::{Point3, Rot};
     use headrace_geometry::site::Site;
+    use headrace_geometry::time::DurNs;
     use headrace_geometry::tunnel::shapes;
+    use headrace_sampling::layout::HeadLayout;
+    use headrace_sensor::device::{SensorInfo, SensorKind};
+    use headrace_sensor::reading::SourceId;
 
-    /// In the middle of a pipe of 3 m radius, a ping at 90 degrees, to the left, through water as fast as the head believes.
-    fn heard(range_m: Option<f64>, hidden: bool) -> Outcome {
+    fn tunnel() -> TunnelDesign {
         let profile = shapes::circle(3.0).unwrap();
         let limits = WallLimits::new(profile.perimeter_m(), 1.0);
         let (site, length_m) = (Site::default(), 30.0);
-        let tunnel = TunnelDesign { profile, site, length_m, contradiction_m: 1.0, limits };
+        TunnelDesign { profile, site, length_m, contradiction_m: 1.0, limits }
+    }
+
+    /// In the middle of a pipe of 3 m radius, a ping at 90 degrees, to the left, through water as fast as the head believes.
+    fn heard(range_m: Option<f64>, hidden: bool) -> Outcome {
+        let tunnel = tunnel();
         let [y_m, z_m] = tunnel.profile.reference();
         let pose = Pose { position: Point3::new(10.0, y_m, z_m), attitude: Rot::identity() };
         let relative = Relative::along(0.01);
@@ -254,5 +264,40 @@ mod tests {
         assert!(matches!(heard(Some(1.6), true), Outcome::Sample { .. }));
         assert!(matches!(heard(None, true), Outcome::Lost(Loss::Occluded, Some(_))));
         assert!(matches!(heard(None, false), Outcome::Lost(Loss::Missing, Some(_))));
+    }
+
+    /// Whether or not they have pinged at a beat, they turn on as they did; who has been silent for more than two seconds is nowhere.
+    #[test]
+    fn heads_are_where_they_have_turned_to_by_the_beat() {
+        const RATE_RADPS: f64 = 0.785;
+        let at = |seconds: f64| MonoNs(0) + DurNs::from_secs_f64(seconds);
+        // 400 pings in 8 s, from these times on, at these rates.
+        let heads = [(1.0, RATE_RADPS), (3.0, -RATE_RADPS), (0.5, RATE_RADPS)];
+        let mut world = World::new();
+        for (number, (from_s, rate_radps)) in heads.into_iter().enumerate() {
+            let mut motion = MeasuredMotion::default();
+            for ping in 0..400_u32 {
+                let after_s = 0.02 * f64::from(ping);
+                motion.ping(at(from_s + after_s), 1.0 + rate_radps * after_s);
+            }
+            let mount = Mount { position: Vec3::zero(), rotation: Rot::identity() };
+            let info = SensorInfo { mount, kind: SensorKind::Head };
+            let mounted = Mounted { source: SourceId(0), info };
+            world.spawn((Head(number), mounted, motion, LossCount::default(), HiddenAngles(Vec::new())));
+        }
+        let (tunnel, other) = (tunnel(), OtherSettings::default());
+        let layout = HeadLayout::PhaseShift;
+        let target = Target { target_m: 0.5, layout, planned_speed_mps: 0.0, other };
+        let mut state = SystemState::<Heads<'_, '_>>::new(&mut world);
+        let query = state.get_mut(&mut world).unwrap();
+        let found = situation(at(10.53), Err(NoFix::Heading), &tunnel, &target, &query);
+        for (motion, (from_s, rate_radps)) in found.heads.iter().zip(heads).take(2) {
+            let motion = motion.unwrap();
+            let off_rad = motion.angle_rad - 1.0 - rate_radps * (10.53 - from_s);
+            assert!(math::wrap_signed(off_rad, math::TAU).abs() < 1e-6, "{from_s}: {off_rad}");
+            assert!((motion.rate_radps - rate_radps).abs() < 1e-6);
+        }
+        assert!(found.heads[2..].iter().all(Option::is_none), "the last ping of the third was at 8.48 s");
+        assert_eq!((found.configured, found.pose.is_none()), (3, true));
     }
 }

@@ -110,3 +110,80 @@ pub(crate) fn digest_alert(
         alert.integer(u64::from(source.0));
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::fixtures::{coverage, pipe};
+    use super::*;
+    use headrace_coverage::{Judgement, Reach, Unsure};
+
+    const AT: MonoNs = MonoNs(7_000_000_000);
+
+    /// Judges a section without a sample, 20 m before where samples may still land; some heads haven't been up to a chainage, m.
+    fn judged(coverage: &mut Coverage, section: i64, not_passed_m: f64) -> (Vec<Notice>, Vec<RunInput>) {
+        let request = Request {
+            section,
+            at: AT,
+            swept_by_all: None,
+            none_alive: false,
+            to_come: Some(Reach { from_m: 31.0, to_m: f64::INFINITY }),
+            not_passed: Some(Reach { from_m: f64::NEG_INFINITY, to_m: not_passed_m }),
+            ended: None,
+            only_fails: false,
+        };
+        let (mut notices, mut runs) = (Notices(Vec::new()), RunInputs(Vec::with_capacity(8)));
+        let mut results = Results {
+            finder: &mut Finder::default(),
+            notices: &mut notices,
+            digests: &mut Digests::default(),
+            alerts: &mut Alerts::default(),
+            runs: &mut runs,
+            place: (3, true),
+        };
+        judge_one(&request, &pipe(), coverage, &mut results);
+        (notices.0, runs.0)
+    }
+
+    #[test]
+    fn a_fail_is_told_with_its_run_and_what_is_unsure_with_its_stretch() {
+        let mut coverage = coverage();
+        let (notices, runs) = judged(&mut coverage, 40, -20.0);
+        let run = Notice::Run { id: RunId(0), at: AT, change: RunChange::Raised };
+        let section = Notice::Section { section: 40, at: AT, change: Judgement::Raised };
+        assert_eq!((notices, coverage.unsure), (vec![run, section], None));
+        let found = runs.iter().map(|run| (run.id, run.change, run.event, run.at_beat, run.at));
+        assert_eq!(found.collect::<Vec<_>>(), [(RunId(0), RunChange::Raised, 3, true, AT)]);
+        // Where not all heads have been nothing can be said: one stretch of neighbours, and another one far away.
+        for (section, from, to, sections) in [(20, 20, 21, 1), (21, 20, 22, 2), (60, 60, 61, 1)] {
+            let (notices, runs) = judged(&mut coverage, section, 20.0);
+            assert_eq!((notices.len(), runs.len()), (1, 0));
+            let unsure = coverage.unsure.unwrap();
+            let found = (unsure.why, unsure.from, unsure.to, unsure.sections());
+            assert_eq!(found, (Unsure::NotInspected, from, to, sections));
+        }
+    }
+
+    /// Alerts of what is cleared go to the runs that are left, which must be known by then.
+    #[test]
+    fn runs_that_are_cleared_come_last_while_there_is_room() {
+        let mut coverage = coverage();
+        for section in [20, 40, 60] {
+            judged(&mut coverage, section, -20.0);
+        }
+        let run = |id: u32, change: RunChange| Notice::Run { id: RunId(id), at: AT, change };
+        let section = Notice::Section { section: 9, at: AT, change: Judgement::Updated };
+        let notices = [
+            run(0, RunChange::Cleared),
+            section,
+            run(1, RunChange::Merged),
+            run(9, RunChange::Raised),
+            run(2, RunChange::Changed),
+        ];
+        for (room, expected) in [(8, vec![1, 2, 0]), (2, vec![1, 2])] {
+            let mut runs = RunInputs(Vec::with_capacity(room));
+            note_runs(&notices, (5, false), &coverage.sections, &mut runs);
+            assert_eq!(runs.0.iter().map(|run| run.id.0).collect::<Vec<_>>(), expected);
+            assert!(runs.0.iter().all(|run| (run.event, run.at_beat, run.at) == (5, false, AT)));
+        }
+    }
+}

@@ -204,3 +204,132 @@ fn digest(stream: &mut ResultStream, at: MonoNs, situation: &Situation, state: &
         stream.integer(heard.map_or(u64::MAX, |heard| heard.0));
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use bevy_ecs::system::RunSystemOnce as _;
+    use bevy_ecs::world::World;
+    use headrace_fusion::filter::cable::CableDoubt;
+    use headrace_fusion::relative::Relative;
+    use headrace_fusion::{Fix, NoFix};
+    use headrace_geometry::frames::{Point3, Pose, Rot};
+    use headrace_geometry::tunnel::shapes;
+    use headrace_sampling::advice::{Advice, Advisor, Looks, Task};
+    use headrace_sampling::head::MAX_HEADS;
+    use headrace_sampling::layout::HeadLayout;
+    use headrace_sampling::losses::LossRate;
+    use headrace_sampling::swing::Swing;
+    use headrace_vehicle::{AlertTiming, LimitsConfig};
+
+    const AT: MonoNs = MonoNs(9_000_000_000);
+
+    fn situation(pose: Option<Pose>, pass_error_m: f64) -> Situation {
+        Situation {
+            pose,
+            speed_mps: 0.07,
+            pass_error_m,
+            layout: HeadLayout::PhaseShift,
+            configured: 0,
+            heads: [None; MAX_HEADS],
+            deaf: HeadSet::default(),
+            losses: [LossRate::default(); MAX_HEADS],
+        }
+    }
+
+    fn advice(of: &Situation) -> Advice {
+        let task = Task {
+            target_m: 0.5,
+            confidence_sd: 2.0,
+            length_m: 100.0,
+            layout: HeadLayout::PhaseShift,
+            sound_speed_mps: 1447.0,
+            looks: Looks::default(),
+        };
+        Advisor::new(&shapes::circle(3.0).unwrap(), task, &[], &[]).advise(of, Swing::default(), None)
+    }
+
+    /// The live state after a beat at which passes were so unsure against one another, for a target of half a metre and two standard deviations.
+    fn after(pass_error_m: f64, is_cable_doubted: bool, lacking: Option<NoFix>) -> LiveState {
+        let pose = Pose { position: Point3::new(12.5, 0.0, 3.0), attitude: Rot::identity() };
+        let relative = Relative::along(pass_error_m);
+        let fix = Fix { pose, speed_mps: 0.07, relative, revisit: relative, tie: 0, settled: 0 };
+        let fix = lacking.map_or(Ok(fix), Err);
+        let cable = is_cable_doubted.then_some(CableDoubt { since: AT, from_m: 12.0, way_m: 0.5 });
+        let doubts = Doubts { cable, setting: None, stand_s: 3, hung: 0 };
+        let situation = situation(fix.ok().map(|fix| fix.pose), pass_error_m);
+        let standing = Standing {
+            metres: LiveMetres::default(),
+            unsure: None,
+            passed: false,
+            back_to_m: None,
+            alerts: [None; crate::alerts::MOST_ALERTS],
+        };
+        let mut world = World::new();
+        let vehicle = world.spawn_empty().id();
+        world.insert_resource(VehicleEntities { vehicle, by_source: Vec::new(), heads: Vec::new() });
+        world.insert_resource(Events(Vec::new()));
+        world.insert_resource(PositionedList(vec![Positioned::Beat {
+            at: AT,
+            fix,
+            doubts,
+            sd: None,
+            before: 0,
+        }]));
+        world.insert_resource(PlacedList(vec![Placed::Situation(AT, situation, doubts)]));
+        world.insert_resource(Standings(vec![standing]));
+        world.insert_resource(AdviceList(vec![advice(&situation)]));
+        world.insert_resource(RunInputs(Vec::new()));
+        world.insert_resource(Commands::new());
+        world.insert_resource(AlertList::new(AlertTiming::default(), LimitsConfig::default(), 100));
+        world.insert_resource(Notes::default());
+        world.insert_resource(Console::new(SourceId(9)));
+        world.insert_resource(Notices(Vec::new()));
+        world.insert_resource(TickTime { index: 4, now: MonoNs(9_050_000_000) });
+        world.insert_resource(LiveState::new(0.5, 2.0, 0, 0));
+        world.insert_resource(Digests::default());
+        world.run_system_once(live).unwrap();
+        *world.resource::<LiveState>()
+    }
+
+    /// Two standard deviations may take a fifth of the target.
+    #[test]
+    fn a_position_is_doubtful_where_passes_are_too_unsure_or_the_cable_is_not_believed() {
+        let spread = PositionState::Doubtful(PositionDoubt::Spread);
+        let cable = PositionState::Doubtful(PositionDoubt::Cable);
+        for (pass_error_m, is_cable_doubted, lacking, expected) in [
+            (0.0, false, None, PositionState::Ok),
+            (0.049, false, None, PositionState::Ok),
+            (0.051, false, None, spread),
+            (0.3, false, None, spread),
+            (0.049, true, None, cable),
+            (0.051, true, None, cable),
+            (0.0, false, Some(NoFix::Chainage), PositionState::None(NoFix::Chainage)),
+        ] {
+            let state = after(pass_error_m, is_cable_doubted, lacking);
+            assert_eq!(state.position, expected, "{pass_error_m}");
+            let has_fix = lacking.is_none();
+            assert_eq!(
+                (state.chainage_m, state.speed_mps),
+                (has_fix.then_some(12.5), has_fix.then_some(0.07))
+            );
+            assert_eq!((state.at, state.now, state.stand_s), (Some(AT), MonoNs(9_050_000_000), 3));
+        }
+    }
+
+    /// A head that isn't believed is told of by its own alert, and by no other.
+    #[test]
+    fn of_each_head_it_is_known_why_it_is_not_believed() {
+        let kinds = [AlertKind::HeadScattered, AlertKind::HeadConstant, AlertKind::HeadOutvoted];
+        for (added, kind) in [(0, kinds[0]), (5, kinds[1]), (63, kinds[2])] {
+            let mut bits = HeadBits::default();
+            bits.add(SourceId(added), kind);
+            bits.add(SourceId(added), kind);
+            bits.add(SourceId(7), kind);
+            for (source, asked) in (0..64).flat_map(|source| kinds.map(|asked| (source, asked))) {
+                let expected = asked == kind && (source == added || source == 7);
+                assert_eq!(bits.has(SourceId(source), asked), expected, "{source} {asked:?}");
+            }
+        }
+    }
+}

@@ -98,3 +98,32 @@ fn digest(poses: &mut ResultStream, at: MonoNs, state: &VehicleState) {
         poses.number(sd.along_m).number(sd.place_m).number(sd.tilt_rad).number(sd.yaw_rad);
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use headrace_geometry::time::DurNs;
+
+    /// Five times a second; the time before the first packet has none.
+    #[test]
+    fn each_beat_comes_once_and_after_a_gap_only_the_last() {
+        let at = |seconds: f64| MonoNs(0) + DurNs::from_secs_f64(seconds);
+        let mut next = None;
+        for (now_s, beat_s) in [
+            (1.05, None),
+            (1.199, None),
+            (1.2, Some(1.2)),
+            (1.21, None),
+            // The time goes back, and catches up.
+            (0.3, None),
+            (1.39, None),
+            (1.43, Some(1.4)),
+            // After a gap.
+            (5.07, Some(5.0)),
+            (5.19, None),
+            (5.2, Some(5.2)),
+        ] {
+            assert_eq!(beat_before(&mut next, at(now_s)), beat_s.map(at), "at {now_s} s");
+        }
+    }
+}

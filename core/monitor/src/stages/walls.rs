@@ -234,3 +234,190 @@ fn digest(digests: &mut Digests, ping: &PlacedPing, kind: RecordKind) {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::fixtures::{coverage, heard, pinged, tunnel};
+    use super::*;
+    use bevy_ecs::world::World;
+    use headrace_coverage::Frontier;
+    use headrace_geometry::time::MonoNs;
+
+    struct Bench {
+        coverage: Coverage,
+        tunnel: TunnelDesign,
+        tally: Tally,
+        notices: Notices,
+        alerts: Alerts,
+        sweep: HeadSweep,
+    }
+
+    impl Bench {
+        fn new() -> Self {
+            Self {
+                coverage: coverage(),
+                tunnel: tunnel(),
+                tally: Tally::default(),
+                notices: Notices(Vec::new()),
+                alerts: Alerts::default(),
+                sweep: HeadSweep::default(),
+            }
+        }
+
+        /// Takes a ping: how many samples there are then, and how many doubtful returns.
+        fn note(&mut self, ping: &PlacedPing) -> (u64, u64) {
+            let mut sorting = Sorting {
+                coverage: &mut self.coverage,
+                tunnel: &self.tunnel,
+                tally: &mut self.tally,
+                notices: &mut self.notices,
+                digests: &mut Digests::default(),
+                alerts: &mut self.alerts,
+            };
+            assert_eq!(note_ping(&mut sorting, &mut self.sweep, ping), None);
+            (self.tally.samples, self.tally.doubtful)
+        }
+
+        fn lacks(&self) -> Vec<Lack> {
+            self.coverage.lacks.between(f64::NEG_INFINITY, f64::INFINITY).copied().collect()
+        }
+    }
+
+    const STEP_RAD: f64 = 0.0157;
+
+    /// The return of this number on the way round, from the wall at its range or from before it.
+    fn at(number: u32, range_m: f64) -> PlacedPing {
+        heard(5.1, 1.0 + STEP_RAD * f64::from(number), range_m)
+    }
+
+    /// What comes alone from before the wall waits for the next return, and is a missing one then: in a hole, and for its cause.
+    #[test]
+    fn what_nobody_agrees_with_is_missing_where_it_was_aimed() {
+        for (hidden, cause) in [(Hidden::No, Cause::MissingReturns), (Hidden::Beside, Cause::Occluded)] {
+            let mut bench = Bench::new();
+            assert_eq!(bench.note(&at(0, 3.0)), (1, 0));
+            assert_eq!(bench.note(&PlacedPing { hidden, ..at(1, 1.5) }), (1, 0), "it waits");
+            assert_eq!((bench.note(&at(2, 3.0)), bench.lacks().len()), ((2, 1), 1));
+            let lack = bench.lacks()[0];
+            let Outcome::Sample { arc_m, .. } = at(1, 3.0).outcome else { panic!() };
+            assert!((lack.x_m - 5.1).abs() < 1e-9 && (lack.arc_m - arc_m).abs() < 1e-9, "{lack:?}");
+            assert_eq!(lack.why, Causes::of(cause));
+            let section = bench.coverage.sections.get(20).unwrap();
+            assert_eq!((section.samples, section.doubtful, section.passage.missing), (2, 1, 1));
+            assert!(section.t_y_m.count == 1 && section.deviation.mean_m().is_some());
+        }
+    }
+
+    /// A rock of 0.6 m, wide enough for its height, is wall from its first return on.
+    #[test]
+    fn what_waits_is_wall_once_others_agree() {
+        let mut bench = Bench::new();
+        bench.note(&at(0, 3.0));
+        let mut found = Vec::new();
+        for number in 1..20 {
+            found.push(bench.note(&at(number, 2.4)));
+        }
+        assert_eq!(found[0], (1, 0), "the first waits");
+        assert_eq!(found.last(), Some(&(20, 0)), "{found:?}");
+        assert!(bench.lacks().is_empty() && bench.sweep.waiting.last_mut().is_none());
+        // All in single steps: a pass crosses each.
+        let crossed = |number: f64| {
+            let Outcome::Sample { arc_m, .. } = heard(5.1, 1.0 + STEP_RAD * number, 2.4).outcome else {
+                panic!()
+            };
+            bench.coverage.store.clone().nearest_pass_m(5.1, arc_m, 0.5).is_some()
+        };
+        assert!((1..18).all(|number| crossed(f64::from(number) + 0.5)));
+    }
+
+    /// A rock's first two returns: what came between, while the first waited, counts once that is settled.
+    #[test]
+    fn a_loss_after_one_that_waits_breaks_the_sweep() {
+        let is_stepped = |between: Option<PlacedPing>| {
+            let mut bench = Bench::new();
+            bench.note(&at(0, 3.0));
+            bench.note(&at(1, 2.4));
+            if let Some(between) = between {
+                bench.note(&between);
+            }
+            assert_eq!(bench.note(&at(4, 2.4)), (3, 0));
+            let Outcome::Sample { arc_m, .. } = heard(5.1, 1.0 + 2.5 * STEP_RAD, 2.4).outcome else {
+                panic!()
+            };
+            let is_crossed = bench.coverage.store.nearest_pass_m(5.1, arc_m, 0.5).is_some();
+            (is_crossed, bench.coverage.sections.get(20).unwrap().t_y_m.count)
+        };
+        let lost = pinged(5.1, 1.0 + 2.0 * STEP_RAD);
+        assert_eq!(is_stepped(None), (true, 2));
+        assert_eq!(is_stepped(Some(lost)), (false, 2));
+        assert_eq!(
+            is_stepped(Some(PlacedPing { new_sweep: true, ..lost })),
+            (false, 1),
+            "nothing is before it"
+        );
+    }
+
+    #[test]
+    fn a_return_beyond_the_tunnel_s_end_is_told_once_with_how_far() {
+        let mut bench = Bench::new();
+        let mut note = |x_m: f64| {
+            bench.note(&PlacedPing { new_sweep: true, ..heard(x_m, 1.0, 3.0) });
+            let alert = bench.alerts.get(AlertKind::OutsideTunnel, None).copied();
+            (alert.map(|alert| alert.worst_m), bench.notices.0.len())
+        };
+        assert_eq!(note(29.9), (None, 0));
+        let (worst_m, told) = note(30.4);
+        assert!((worst_m.unwrap() - 0.4).abs() < 1e-9 && told == 1, "{worst_m:?} {told}");
+        let (worst_m, told) = note(31.5);
+        assert!((worst_m.unwrap() - 1.5).abs() < 1e-9 && told == 1, "{worst_m:?} {told}");
+        assert_eq!((bench.tally.samples, bench.tally.outside), (3, 0));
+        bench.note(&PlacedPing { new_sweep: true, ..heard(33.0, 1.0, 3.0) });
+        assert_eq!((bench.tally.samples, bench.tally.outside), (4, 1), "beyond what is stored");
+    }
+
+    /// Sections that hold samples of a head that isn't believed any more are judged again, if they have been.
+    #[test]
+    fn what_a_distrusted_head_has_seen_is_judged_again() {
+        let mut coverage = coverage();
+        let hole = headrace_coverage::Hole {
+            diameter_m: 0.3,
+            least_m: 0.3,
+            most_m: 0.3,
+            x_m: 5.1,
+            arc_m: 1.0,
+            bounded: true,
+        };
+        for index in [19, 21, 23] {
+            coverage.sections.get_mut(index).unwrap().hole = Some(hole);
+        }
+        let outlook = Frontier::default().outlook(core::iter::empty(), MonoNs(7));
+        let mut requests = Requests(Vec::new());
+        suspect(&mut coverage, [5.1, 5.8], &outlook, &mut requests);
+        let suspects = (0..40).filter(|index| coverage.sections.get(*index).unwrap().suspect);
+        assert_eq!(suspects.collect::<Vec<_>>(), [20, 21, 22, 23]);
+        let asked = requests.0.iter().map(|request| (request.section, request.at, request.only_fails));
+        assert_eq!(asked.collect::<Vec<_>>(), [(21, MonoNs(7), false), (23, MonoNs(7), false)]);
+    }
+
+    #[test]
+    fn what_still_waits_at_the_end_of_a_dive_is_doubtful() {
+        let mut bench = Bench::new();
+        bench.note(&at(0, 3.0));
+        bench.note(&at(1, 1.5));
+        let mut world = World::new();
+        let head = world.spawn(bench.sweep).id();
+        let vehicle = world.spawn_empty().id();
+        world.insert_resource(VehicleEntities { vehicle, by_source: vec![head], heads: vec![head] });
+        world.insert_resource(bench.coverage);
+        world.insert_resource(bench.tunnel);
+        world.insert_resource(bench.tally);
+        world.insert_resource(bench.notices);
+        world.insert_resource(Digests::default());
+        world.insert_resource(bench.alerts);
+        end_returns(&mut world);
+        let tally = *world.resource::<Tally>();
+        assert_eq!((tally.samples, tally.doubtful), (1, 1));
+        let lacks = &world.resource::<Coverage>().lacks;
+        assert_eq!(lacks.between(5.0, 5.2).count(), 1);
+    }
+}

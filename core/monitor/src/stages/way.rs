@@ -68,3 +68,109 @@ fn note_silence(coverage: &mut Coverage, head: usize, before: Option<Reach>, her
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::fixtures::{coverage, mount, situation, tunnel};
+    use super::*;
+    use bevy_ecs::system::SystemState;
+    use bevy_ecs::world::World;
+    use headrace_geometry::frames::{Mount, Vec3};
+    use headrace_sampling::head::HeadSet;
+    use headrace_sensor::device::{SensorInfo, SensorKind};
+    use headrace_sensor::reading::SourceId;
+
+    fn at(seconds: u64) -> MonoNs {
+        MonoNs(seconds * 1_000_000_000)
+    }
+
+    /// A vehicle whose heads, half a metre ahead and half a metre astern, were last heard at these times, at 4.5 m and 3.5 m.
+    struct Bench {
+        world: World,
+        coverage: Coverage,
+        requests: Requests,
+    }
+
+    impl Bench {
+        fn new(heard_s: [Option<u64>; 2]) -> Self {
+            let (mut world, mut coverage) = (World::new(), coverage());
+            for (number, (ahead_m, heard_s)) in [0.5, -0.5].into_iter().zip(heard_s).enumerate() {
+                let info = SensorInfo {
+                    mount: Mount { position: Vec3::new(ahead_m, 0.0, 0.0), ..mount() },
+                    kind: SensorKind::Head,
+                };
+                let mounted = Mounted { source: SourceId(0), info };
+                let here = Reach { from_m: 4.0 + ahead_m, to_m: 4.0 + ahead_m };
+                let reach = heard_s.map(|seconds| HeadReach::after(None, at(seconds), here));
+                if let Some(seconds) = heard_s {
+                    coverage.frontier.hear(at(seconds));
+                }
+                let sweep = HeadSweep::default();
+                world.spawn((Head(number), mounted, HiddenAngles(Vec::new()), sweep, HeadFrontier(reach)));
+            }
+            Self { world, coverage, requests: Requests(Vec::new()) }
+        }
+
+        /// Where the heads are taken to be after a beat at a chainage, m.
+        fn beat(&mut self, seconds: u64, x_m: Option<f64>) -> [Option<f64>; 2] {
+            let tunnel = tunnel();
+            let mut state = SystemState::<Heads<'_, '_>>::new(&mut self.world);
+            let mut heads = state.get_mut(&mut self.world).unwrap();
+            let beat = (at(seconds), &situation(x_m));
+            note_beat(&mut self.coverage, &mut heads, &tunnel, beat, &mut self.requests);
+            let mut places = heads.iter().map(|(.., reach)| reach.0.map(|reach| reach.latest().middle_m()));
+            [places.next().flatten(), places.next().flatten()]
+        }
+
+        /// Sections that a head has gone through in silence.
+        fn silent(&self, head: usize) -> Vec<i64> {
+            let sections = 0..128;
+            let passage = |index: &i64| self.coverage.sections.get(*index).unwrap().passage.silent.has(head);
+            sections.filter(passage).collect()
+        }
+    }
+
+    #[test]
+    fn a_silent_head_goes_on_with_the_vehicle_and_leaves_its_mark() {
+        // The second is silent from 1 s on, the first is heard.
+        let mut bench = Bench::new([Some(9), Some(1)]);
+        assert_eq!(bench.beat(10, Some(5.0)), [Some(4.5), Some(4.5)], "the first is where it last pinged");
+        // From 3.5 m to 4.5 m.
+        assert_eq!((bench.silent(0), bench.silent(1)), (vec![], (14..=18).collect()));
+        assert_eq!(bench.beat(11, Some(5.6)), [Some(4.5), Some(5.1)]);
+        assert_eq!((bench.silent(0), bench.silent(1)), (vec![], (14..=20).collect()));
+        let way = bench.coverage.frontier.way().unwrap();
+        assert!((way.from_m - 4.5).abs() < 1e-9 && (way.to_m - 6.1).abs() < 1e-9, "{way:?}");
+        // All heads, pinging or not, have been where the rear one was at last, from where the front one was at first.
+        let through = bench.coverage.frontier.through();
+        assert_eq!(through, None, "nowhere: 5.1 m isn't beyond 5.5 m");
+        bench.beat(12, Some(7.0));
+        let through = bench.coverage.frontier.through().unwrap();
+        assert!((through.from_m - 5.5).abs() < 1e-9 && (through.to_m - 6.5).abs() < 1e-9, "{through:?}");
+    }
+
+    #[test]
+    fn what_silent_heads_leave_is_judged_at_the_beat() {
+        let mut bench = Bench::new([Some(1), Some(1)]);
+        bench.beat(10, Some(5.0));
+        bench.requests.0.clear();
+        for seconds in 11..=20 {
+            bench.beat(seconds, Some(5.0 + 0.3 * (seconds - 10) as f64));
+        }
+        // From 4.5 m, where the way begins with the rear head, to a quarter of a metre before where that is, 7.5 m.
+        let whole = bench.requests.0.iter().filter(|request| !request.only_fails);
+        let mut left: Vec<i64> = whole.map(|request| request.section).collect();
+        left.sort_unstable();
+        left.dedup();
+        assert_eq!(left, (18..=28).collect::<Vec<_>>());
+        assert_eq!(bench.silent(0).last(), Some(&34), "8.5 m");
+    }
+
+    #[test]
+    fn nothing_is_known_of_the_way_without_a_fix() {
+        let mut bench = Bench::new([Some(1), None]);
+        assert_eq!(bench.beat(10, None), [Some(4.5), None]);
+        assert!(bench.coverage.frontier.way().is_none() && bench.silent(0).is_empty());
+        assert_eq!(HeadSet::default(), bench.coverage.sections.get(18).unwrap().passage.silent);
+    }
+}

@@ -194,6 +194,18 @@ fn alternatives_give_speed_hours_and_whether_they_suffice() {
     assert!(!suffices(0.299) && suffices(0.301) && !suffices(slow.v_max_mps));
 }
 
+/// Two heads in sectors of half a turn each: a place waits for as long as a whole turn takes.
+#[test]
+fn in_sectors_alternatives_go_there_and_back_in_the_time_of_their_mode() {
+    let mut case = Case::new(&[10.0, 190.0], &[0.0; 2], 0.05, 0.8);
+    case.situation.layout = HeadLayout::SectorOffset;
+    let advice = case.advice();
+    let [slow, fast, _] = [0, 1, 2].map(|k| advice.alternatives[k].unwrap().v_max_mps);
+    assert!((fast - advice.v_max_mps).abs() < 1e-9, "as they are: {fast} {}", advice.v_max_mps);
+    // 21.6 s and a ping, with steps along the wall that hardly count.
+    assert!((slow / (0.8 / 21.618 * 0.99) - 1.0).abs() < 0.01, "{slow}");
+}
+
 #[test]
 fn where_slower_does_not_help_it_says_what_would() {
     let mut case = Case::new(&[0.0], &[0.0], 0.2, 0.1);
@@ -493,4 +505,38 @@ fn a_higher_interval_is_told_once_it_meets_the_target_with_something_to_spare() 
         last_mps = Some(now_mps).filter(|now_mps| *now_mps > 0.0);
     }
     assert!(jumps > 0 && waited > 0, "{jumps} told at once, {waited} waited");
+}
+
+/// Heads 1.1 m apart that were started for 0.1 m/s meet 0.5 m in some intervals of speed: which is nearest, and where the highest begins.
+#[test]
+fn of_several_intervals_of_speed_the_nearest_and_the_highest_are_told() {
+    let started_deg = 180.0 - 360.0 * 1.1 / (0.1 * 8.0);
+    let (mut inside, mut outside) = (0, 0);
+    for speed_mps in (0..60).map(|k| 0.025 + 0.002 * f64::from(k)) {
+        let case = Case::new(&[0.0, started_deg], &[0.0, -1.1], speed_mps, 0.5);
+        let advice = case.advice();
+        let t_m = |speed_mps: f64| case.t_at_m(&advice, speed_mps);
+        let from_mps = advice.from_mps;
+        for share in (0..=100).map(|k| f64::from(k) / 100.0) {
+            let within_mps = from_mps + share * (advice.v_max_mps - from_mps);
+            assert!(t_m(within_mps) <= 0.5, "{speed_mps}: {within_mps}");
+        }
+        assert!(from_mps > 0.0 && t_m(0.985 * from_mps) > 0.5, "{speed_mps}: {from_mps}");
+        let Some(nearest_mps) = advice.nearest_mps else {
+            assert!(t_m(speed_mps) <= 0.5, "{speed_mps}");
+            inside += 1;
+            continue;
+        };
+        outside += 1;
+        assert!(t_m(speed_mps) > 0.5 && t_m(nearest_mps) <= 0.5, "{speed_mps}: {nearest_mps}");
+        // What is nearer, by more than the hundredth of what is tried, doesn't meet it but for the narrowest intervals.
+        let off = math::ln(nearest_mps / speed_mps).abs() - 0.01;
+        for nearer in (1..200).map(|k| 0.003 * f64::from(k)).filter(|nearer| *nearer < off) {
+            let by = math::exp(nearer);
+            assert!(t_m(speed_mps * by).min(t_m(speed_mps / by)) > 0.48, "{speed_mps}: {nearer}");
+        }
+    }
+    assert!(inside > 10 && outside > 10, "{inside} {outside}");
+    let standing = Case::new(&[0.0, started_deg], &[0.0, -1.1], 0.01, 0.5).advice();
+    assert!(standing.nearest_mps.is_none() && standing.from_mps > 0.0, "who stands has no speed to change");
 }

@@ -171,3 +171,38 @@ fn parallax_grows_as_the_wall_comes_near() {
     assert!((of(&wide, 6.0) - 0.05).abs() < 1e-3 && of(&narrow, 1.0) > 0.29);
     assert!(parallax_rad(&wide, &[[0.1, 6.0]]) <= 0.0 && parallax_rad(&wide, &[]) <= 0.0);
 }
+
+/// Wherever along the hull the vehicle's origin is.
+#[test]
+fn who_follow_one_another_are_apart_by_a_share_of_the_hull() {
+    for origin_m in [-3.0, 0.0, 0.4, 5.0] {
+        let at = |x_m: &[f64]| {
+            let x_m: Vec<f64> = x_m.iter().map(|x_m| x_m + origin_m).collect();
+            let angles: Vec<f64> =
+                (0..x_m.len()).map(|head| 360.0 * head as f64 / x_m.len() as f64).collect();
+            Phasing::of(&situation(&angles, &x_m))
+        };
+        for (x_m, apart_m, share) in [
+            (vec![0.9, -0.3], 1.2, 1.0),
+            (vec![0.9, 0.9, -0.3, -0.3], 1.2, 0.5),
+            (vec![0.9, -0.3, 0.9, -0.3], 1.2, 1.0),
+            // From the last to the first over all of it, and twice over half.
+            (vec![0.0, 0.4, 0.8], 0.8, 2.0 / 3.0),
+            (vec![0.7, 0.7], 0.0, 0.0),
+            (vec![0.7], 0.0, 0.0),
+            (vec![], 0.0, 0.0),
+        ] {
+            let heads = at(&x_m);
+            assert!((heads.apart_m() - apart_m).abs() < 1e-12, "{x_m:?}: {}", heads.apart_m());
+            assert!((heads.neighbours_apart() - share).abs() < 1e-9, "{x_m:?}: {}", heads.neighbours_apart());
+            assert_eq!(heads.fits_some_speeds(), apart_m > 0.0, "{x_m:?}");
+        }
+    }
+    // Out of step, nobody follows anyone.
+    let mut loose = situation(&[0.0, 180.0], &[0.9, -0.3]);
+    loose.heads[1].as_mut().unwrap().rate_radps = -TAU / 8.0;
+    let heads = Phasing::of(&loose);
+    assert!(
+        heads.apart_m().abs() <= 0.0 && heads.neighbours_apart().abs() <= 0.0 && !heads.fits_some_speeds()
+    );
+}

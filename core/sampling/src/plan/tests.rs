@@ -297,3 +297,26 @@ fn a_target_that_no_speed_meets_is_told_as_it_was_asked_for() {
     let why = Planner::new(swinging).unwrap().v_max_mps(2, 0.6).unwrap_err();
     assert!(why.to_string().contains("a target of 0.6 m"), "{why}");
 }
+
+/// From one place all heads see the same neighbours as one does; from different places the least and the most are those of any of them.
+#[test]
+fn distances_of_neighbours_are_those_of_all_heads() {
+    let chords_m = |inspection: Inspection| {
+        let planner = Planner::new(inspection).unwrap();
+        planner.modes().iter().map(|mode| mode.chords_m).collect::<Vec<_>>()
+    };
+    let one = chords_m(ideal(1));
+    for (four, one) in chords_m(ideal(4)).iter().zip(&one) {
+        assert!(four.iter().zip(one).all(|(a, b)| (a - b).abs() < 1e-12), "{four:?} {one:?}");
+    }
+    let aside = |y_m: f64| inspection(vec![head([0.0, y_m, 0.0], false, 0.0)], HeadLayout::PhaseShift);
+    let both = [head([0.0, 1.5, 0.0], false, 0.0), head([0.0, -0.5, 0.0], false, 0.0)];
+    let both = chords_m(inspection(both.to_vec(), HeadLayout::PhaseShift));
+    let [left, right] = [1.5, -0.5].map(|y_m| chords_m(aside(y_m)));
+    for ((both, left), right) in both.iter().zip(&left).zip(&right) {
+        let mean_m = f64::midpoint(left[1], right[1]);
+        let expected = [left[0].min(right[0]), mean_m, left[2].max(right[2])];
+        assert!(both.iter().zip(expected).all(|(a, b)| (a - b).abs() < 1e-12), "{both:?} {expected:?}");
+        assert!(both[0] < both[1] && both[1] < both[2]);
+    }
+}

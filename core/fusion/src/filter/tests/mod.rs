@@ -3,7 +3,9 @@
 mod faults;
 mod hard_cases;
 mod jacobians;
+mod journal;
 mod noise;
 mod oracle;
 mod properties;
+mod rest;
 mod rig;

@@ -1,0 +1,79 @@
+//! What the filter records for smoothing.
+
+use super::rig::{IMU, Rig, at, cruise};
+use crate::Navigation as _;
+use crate::filter::FilterNavigation;
+use crate::smooth::journal::{Journal, JournalReader};
+use crate::smooth::step::{Move, Placed};
+use headrace_geometry::time::DurNs;
+
+fn recorded(rig: &Rig) -> (FilterNavigation, JournalReader) {
+    let (journal, reader) = Journal::new(10_000);
+    (rig.navigation().with_journal(journal), reader)
+}
+
+fn steps(reader: &JournalReader) -> Vec<Placed> {
+    core::iter::from_fn(|| reader.next()).map(|words| Placed::of_words(&words).unwrap()).collect()
+}
+
+/// The steps by their numbers of piece and clock.
+fn pieces(steps: &[Placed]) -> Vec<((u32, u32), &[Placed])> {
+    steps.chunk_by(|a, b| a.piece == b.piece).map(|piece| ((piece[0].piece, piece[0].clock), piece)).collect()
+}
+
+/// Each step begins where the one before ends; the last is the end, and the only one.
+fn is_whole(piece: &[Placed]) -> bool {
+    let is_end = |placed: &&Placed| matches!(placed.step.by, Move::End);
+    piece.windows(2).all(|two| two[0].step.to == two[1].step.at)
+        && piece.iter().filter(is_end).count() == 1
+        && piece.last().as_ref().is_some_and(is_end)
+}
+
+#[test]
+fn a_drive_never_known_leaves_no_steps() {
+    let rig = Rig::new(cruise, 5);
+    let (mut nav, reader) = recorded(&rig);
+    for event in rig.events(0.0, 1.0).iter().filter(|event| event.source == IMU) {
+        Rig::hear(&mut nav, event);
+    }
+    assert!(nav.running().is_none());
+    nav.end();
+    assert_eq!(steps(&reader).len(), 0);
+}
+
+/// A clock set back by more than 10 s ends what is known, once, though nothing is heard any more before the end.
+#[test]
+fn what_is_known_is_recorded_to_its_end_and_ends_once() {
+    let rig = Rig::new(cruise, 5);
+    let (mut nav, reader) = recorded(&rig);
+    for event in rig.events(0.0, 30.0) {
+        Rig::hear(&mut nav, &event);
+    }
+    let ended = nav.received;
+    for event in &rig.events(0.0, 0.1) {
+        Rig::hear(&mut nav, event);
+    }
+    nav.end();
+    let all = steps(&reader);
+    let found = pieces(&all);
+    assert_eq!(found.iter().map(|(numbers, _)| *numbers).collect::<Vec<_>>(), [(1, 0)]);
+    assert!(is_whole(found[0].1));
+    let last = all.last().unwrap().step.at;
+    assert!(ended.since(last) < DurNs::from_secs_f64(1.0), "the last epochs are in it");
+}
+
+#[test]
+fn a_drive_goes_on_as_another_piece_after_the_clock_was_set_back() {
+    let rig = Rig::new(cruise, 5);
+    let (mut nav, reader) = recorded(&rig);
+    for event in rig.events(0.0, 30.0).iter().chain(&rig.events(0.0, 20.0)) {
+        Rig::hear(&mut nav, event);
+    }
+    nav.end();
+    let all = steps(&reader);
+    let found = pieces(&all);
+    assert_eq!(found.iter().map(|(numbers, _)| *numbers).collect::<Vec<_>>(), [(1, 0), (2, 1)]);
+    assert!(found.iter().all(|(_, piece)| is_whole(piece)));
+    let last = all.last().unwrap().step.at;
+    assert!(at(20.0).since(last) < DurNs::from_secs_f64(0.1), "all that was heard is fused at the end");
+}

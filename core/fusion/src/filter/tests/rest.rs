@@ -1,0 +1,39 @@
+//! What standing still tells the filter.
+
+use crate::filter::eskf::Eskf;
+use crate::filter::factors::Factors;
+use crate::filter::state::{ERRORS, Errors, RATE_BIAS, State, VELOCITY};
+use headrace_geometry::frames::{Point3, Rot, Vec3};
+use headrace_geometry::time::MonoNs;
+
+/// An estimate of this speed along one axis, as sure of it as rest is, 0.02 m/s, and of the gyros' bias as a mean at rest is, 1e-3 rad/s.
+fn moving(axis: usize, speed_mps: f64) -> Eskf {
+    let mut variances: Errors = [0.0; ERRORS];
+    variances[VELOCITY..VELOCITY + 3].fill(0.02 * 0.02);
+    variances[RATE_BIAS..RATE_BIAS + 3].fill(1e-3 * 1e-3);
+    let along = |k: usize| if k == axis { speed_mps } else { 0.0 };
+    let velocity_mps = Vec3::new(along(0), along(1), along(2));
+    let state = State { velocity_mps, ..State::at_rest(Point3::zero(), Rot::identity()) };
+    let mut eskf = Eskf::default();
+    eskf.begin(MonoNs(0), state, Factors::independent(variances));
+    eskf
+}
+
+/// A difference of two equal normal errors of 0.02 m/s is beyond 0.11 m/s once in ten thousand times.
+#[test]
+fn who_surely_moves_is_not_at_rest_whichever_way() {
+    let turn = Vec3::new(2e-3, -4e-3, 6e-3);
+    for (axis, side) in [(0, 1.0), (0, -1.0), (1, 1.0), (1, -1.0), (2, 1.0), (2, -1.0)] {
+        let mut moves = moving(axis, side * 0.115);
+        let before = moves.state;
+        moves.rest(Some(turn));
+        assert_eq!(moves.state, before, "{axis} {side}: it moves, and turns perhaps");
+        let mut stands = moving(axis, side * 0.105);
+        stands.rest(Some(turn));
+        // As sure of one as of the other: the mean of both.
+        let half = stands.state.velocity_mps.scaled(2.0) + -before.velocity_mps.scaled(0.105 / 0.115);
+        assert!(half.norm() < 1e-12, "{axis} {side}: {:?}", stands.state.velocity_mps);
+        let bias = stands.state.rate_bias_radps + -turn.scaled(0.5);
+        assert!(bias.norm() < 1e-12, "{axis} {side}: {:?}", stands.state.rate_bias_radps);
+    }
+}

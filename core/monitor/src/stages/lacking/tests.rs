@@ -1,0 +1,311 @@
+use super::super::fixtures::{coverage, mount, pipe};
+use super::*;
+use crate::entities::{Head, HeadFrontier, HeadSweep, HiddenAngles, Mounted};
+use bevy_ecs::system::SystemState;
+use bevy_ecs::world::World;
+use headrace_geometry::frames::{Point3, Rot};
+use headrace_geometry::math;
+use headrace_sampling::layout::HeadLayout;
+use headrace_sensor::device::{SensorInfo, SensorKind};
+use headrace_sensor::reading::SourceId;
+
+/// A ping made without a fix, with a return or without one.
+fn away(at_ms: u64, outcome: Outcome) -> PlacedPing {
+    let at = MonoNs(at_ms * 1_000_000);
+    PlacedPing {
+        head: 1,
+        received: at,
+        valid_at: at,
+        fix: None,
+        reach: None,
+        single_step: true,
+        new_sweep: false,
+        standing: false,
+        outcome,
+        angle_rad: 0.1,
+        hidden: Hidden::No,
+        longest_m: 5.0,
+        source: SourceId(3),
+        origin: None,
+    }
+}
+
+/// What is taken to hide a head does so once seven in ten of the pings there get nothing; the latest hundreds count.
+#[test]
+fn the_vehicle_hides_where_most_pings_get_nothing() {
+    let hides = |pings: [u32; 2]| {
+        let mut turning = Turning::default();
+        for (count, is_lost) in pings.into_iter().zip([true, false]) {
+            (0..count).for_each(|_| turning.note_hidden(true, is_lost));
+        }
+        turning.note_hidden(false, false);
+        turning.is_hidden()
+    };
+    assert!(hides([0, 0]), "until something is seen there");
+    assert!(hides([70, 30]) && !hides([69, 31]));
+    assert!(!hides([0, 3]) && hides([1, 0]));
+    assert!(!hides([10_000, 400]), "seen through for the last hundreds");
+}
+
+/// A head that would have pinged on loses as often, and in as long runs, as it did while it was heard; twice the same pings, twice the same.
+#[test]
+fn what_would_have_been_lost_is_as_much_and_in_runs_as_long() {
+    let lost = |rate: LossRate| {
+        let mut turning = Turning::default();
+        (0..40_000).map(|k| turning.would_lose(MonoNs(k * 20_000_000), rate)).collect::<Vec<bool>>()
+    };
+    for (share, after_lost) in [(0.4, 0.4), (0.4, 0.95), (0.02, 0.5)] {
+        let rate = LossRate { share, after_lost };
+        let pings = lost(rate);
+        let count = pings.iter().filter(|lost| **lost).count() as f64;
+        let again = pings.windows(2).filter(|pair| pair[0] && pair[1]).count() as f64;
+        assert!((count / 40_000.0 - share).abs() < 0.1 * share + 0.01, "{rate:?}: {count}");
+        assert!((again / count - after_lost).abs() < 0.05, "{rate:?}: {again} of {count}");
+        assert_eq!(pings, lost(rate));
+    }
+    assert!(lost(LossRate::default()).iter().all(|lost| !lost));
+    assert!(lost(LossRate::independent(1.0)).iter().all(|lost| *lost));
+}
+
+#[test]
+fn pings_without_a_fix_are_kept_until_there_is_no_room_and_that_is_known() {
+    let (mut lacking, mut lacks) = (Lacking::default(), Lacks::default());
+    let unplaced = Outcome::Unplaced(headrace_fusion::NoFix::Chainage);
+    let missing = Outcome::Lost(Loss::Missing, None);
+    for (k, outcome) in (0..ROOM).zip([unplaced, missing].into_iter().cycle()) {
+        note_ping(&mut lacking, &away(k as u64, outcome), &mut lacks);
+    }
+    assert_eq!((lacking.away.len(), lacking.forgot), (ROOM, false));
+    let [first, second] = [lacking.away[0], lacking.away[1]];
+    assert_eq!((first.is_lost, second.is_lost), (false, true), "a return that couldn't be placed isn't lost");
+    assert!([first, second].iter().all(|ping| ping.why == Causes::of(Cause::PositionLost) && ping.head == 1));
+    note_ping(&mut lacking, &away(ROOM as u64, unplaced), &mut lacks);
+    assert_eq!(
+        (lacking.away.len(), lacking.forgot),
+        (ROOM, true),
+        "a stretch that isn't remembered is known"
+    );
+}
+
+fn lacks_of(lacks: &Lacks) -> Vec<Lack> {
+    lacks.between(f64::NEG_INFINITY, f64::INFINITY).copied().collect()
+}
+
+fn all_of(causes: &[Cause]) -> Causes {
+    causes.iter().fold(Causes::default(), |all, cause| all.with(*cause))
+}
+
+/// What is lost at angles that the vehicle is taken to hide is lost by it, unless the wall is heard at such angles all the same.
+#[test]
+fn what_is_not_heard_past_the_vehicle_is_missing_once_others_are() {
+    let (mut lacking, mut lacks) = (Lacking::default(), Lacks::default());
+    let aim = Some(Aim { x_m: 3.0, arc_m: 2.0 });
+    let lost = |loss: Loss| away(5, Outcome::Lost(loss, aim));
+    let mut causes = |pings: &[PlacedPing]| {
+        for ping in pings {
+            note_ping(&mut lacking, ping, &mut lacks);
+        }
+        lacks_of(&lacks).last().map(|lack| lack.why)
+    };
+    assert_eq!(causes(&[lost(Loss::Missing)]), Some(Causes::of(Cause::MissingReturns)));
+    assert_eq!(causes(&[lost(Loss::OutOfRange)]), Some(Causes::of(Cause::OutOfRange)));
+    assert_eq!(causes(&[lost(Loss::Occluded); 10]), Some(Causes::of(Cause::Occluded)));
+    let point = Point3::new(3.0, 3.0, 3.0);
+    let heard = PlacedPing { hidden: Hidden::Yes, ..away(5, Outcome::Sample { point, arc_m: 2.0 }) };
+    causes(&[heard; 40]);
+    assert_eq!(causes(&[lost(Loss::Occluded)]), Some(Causes::of(Cause::MissingReturns)));
+    assert_eq!(causes(&[lost(Loss::OutOfRange)]), Some(Causes::of(Cause::OutOfRange)));
+    let before = lacks_of(&lacks).len();
+    assert_eq!(before, 14, "samples are none");
+    note_ping(&mut lacking, &PlacedPing { standing: true, ..lost(Loss::Missing) }, &mut lacks);
+    assert_eq!(lacks_of(&lacks).len(), before, "where a head stands and looks, nothing is lacking");
+    assert!(lacking.stalled.has(1) && !lacking.stalled.has(0));
+}
+
+/// To the left, where the wall is 3 m away, by a vehicle that is turned to the left by 0.1 rad: the beam meets it 3 tan 0.1 m astern.
+#[test]
+fn a_ping_lacks_where_it_was_aimed_for_all_that_kept_it_from_the_wall() {
+    let profile = pipe();
+    let [y_m, z_m] = profile.reference();
+    let attitude = Rot::from_roll_pitch_yaw(0.0, 0.0, 0.1);
+    let pose = Pose { position: Point3::new(10.0, y_m, z_m), attitude };
+    let drive = Drive { speed_mps: 0.3, healthy_gap_s: 2.0, ..Drive::default() };
+    let lack = |why: &[Cause], is_lost: bool, longest_m: f64, hidden: [u16; 2], hides: bool| {
+        let mut coverage = coverage();
+        let turning = Turning { longest_m, hidden, ..Turning::default() };
+        let hides = |_| hides;
+        let placing = Placing { mount: &mount(), turning: &turning, profile: &profile, hidden: &hides };
+        let ping = Away { at: MonoNs(0), head: 0, angle_rad: math::FRAC_PI_2, why: all_of(why), is_lost };
+        placing.lack(&pose, &ping, drive, &mut coverage);
+        let found = lacks_of(&coverage.lacks);
+        let x_m = 10.0 - 3.0 * math::sin(0.1) / math::cos(0.1);
+        let arc_m = profile.arc_of([y_m + 3.0, z_m]);
+        assert!((found[0].x_m - x_m).abs() < 1e-9 && (found[0].arc_m - arc_m).abs() < 1e-9, "{found:?}");
+        let section = coverage.sections.get(coverage.sections.index_of(x_m)).unwrap();
+        assert_eq!((found.len(), section.passage.drive), (1, drive));
+        found[0].why
+    };
+    let (position, silent) = (Cause::PositionLost, Cause::HeadSilent);
+    let (missing, far, occluded) = (Cause::MissingReturns, Cause::OutOfRange, Cause::Occluded);
+    let (seen_through, hidden) = ([1, 100], [99, 100]);
+    for (why, is_lost, longest_m, counts, hides, expected) in [
+        (&[position][..], false, 5.0, hidden, true, &[position][..]),
+        (&[position], true, 5.0, hidden, false, &[position, missing]),
+        (&[position], true, 2.9, hidden, false, &[position, far]),
+        (&[position], true, 5.0, hidden, true, &[position, occluded]),
+        (&[position], true, 5.0, seen_through, true, &[position, missing]),
+        (&[silent], true, 5.0, hidden, false, &[silent]),
+        (&[silent, missing], true, 5.0, hidden, false, &[silent, missing]),
+        (&[silent, missing], true, 2.9, hidden, true, &[silent, far]),
+        (&[silent, missing], true, 5.0, hidden, true, &[silent, occluded]),
+        (&[silent, missing], true, 5.0, seen_through, true, &[silent, missing]),
+    ] {
+        assert_eq!(
+            lack(why, is_lost, longest_m, counts, hides),
+            all_of(expected),
+            "{why:?} {longest_m} {hides}"
+        );
+    }
+}
+
+/// A dive at 0.1 m/s from chainage 1 m on whose only head has turned at 50 pings a second until 10 s.
+struct Dive {
+    world: World,
+    profile: Profile,
+    coverage: Coverage,
+    lacking: Lacking,
+}
+
+const STEP_RAD: f64 = 0.0157;
+
+fn at(seconds: f64) -> MonoNs {
+    MonoNs(0) + DurNs::from_secs_f64(seconds)
+}
+
+impl Dive {
+    fn new() -> Self {
+        let profile = pipe();
+        let mut world = World::new();
+        let mounted =
+            Mounted { source: SourceId(0), info: SensorInfo { mount: mount(), kind: SensorKind::Head } };
+        let (sweep, frontier) = (HeadSweep::default(), HeadFrontier::default());
+        world.spawn((Head(0), mounted, HiddenAngles(Vec::new()), sweep, frontier));
+        let mut lacking = Lacking::default();
+        let (seen, last) = (Some((at(10.0), 1.0, STEP_RAD / 0.02, STEP_RAD)), Some(at(10.0)));
+        lacking.heads[0] = Turning { seen, pinged: last, moved: last, longest_m: 5.0, ..Turning::default() };
+        Self { world, coverage: coverage(), profile, lacking }
+    }
+
+    /// What is lacking after a beat, with or without a fix.
+    fn beat(&mut self, seconds: f64, has_fix: bool) -> Vec<Lack> {
+        let [y_m, z_m] = self.profile.reference();
+        let position = Point3::new(1.0 + 0.1 * seconds, y_m, z_m);
+        let situation = Situation {
+            pose: has_fix.then_some(Pose { position, attitude: Rot::identity() }),
+            speed_mps: 0.1,
+            pass_error_m: 0.0,
+            layout: HeadLayout::PhaseShift,
+            configured: 1,
+            heads: [None; MAX_HEADS],
+            deaf: headrace_sampling::head::HeadSet::default(),
+            losses: [LossRate::default(); MAX_HEADS],
+        };
+        let mut state = SystemState::<Heads<'_, '_>>::new(&mut self.world);
+        let heads = state.get_mut(&mut self.world).unwrap();
+        let beat = (at(seconds), &situation);
+        let now = Drive { healthy_gap_s: 2.0, ..Drive::default() };
+        note_beat(&mut self.lacking, now, &heads, beat, &self.profile, &mut self.coverage);
+        lacks_of(&self.coverage.lacks)
+    }
+
+    /// Whether lacks are those of the pings after 10 s, in order, each where the head would have been.
+    fn are_pings_after_10_s(&self, lacks: &[Lack], why: &[Cause]) -> bool {
+        let [y_m, z_m] = self.profile.reference();
+        (1_u32..).zip(lacks).all(|(ping, lack)| {
+            let after_s = 0.02 * f64::from(ping);
+            let (sin, cos) = math::sin_cos(1.0 + STEP_RAD * f64::from(ping));
+            let arc_m = self.profile.arc_of([y_m + 3.0 * sin, z_m - 3.0 * cos]);
+            let off_m = math::wrap_signed(lack.arc_m - arc_m, self.profile.perimeter_m());
+            let x_m = 1.0 + 0.1 * (10.0 + after_s);
+            (lack.x_m - x_m).abs() < 1e-6 && off_m.abs() < 1e-6 && lack.why == all_of(why)
+        })
+    }
+}
+
+#[test]
+fn a_silent_head_lacks_where_it_would_have_turned_on_to() {
+    let mut dive = Dive::new();
+    assert_eq!(dive.beat(10.2, true).len(), 0, "it may yet ping");
+    // A second of pings, and another one.
+    let first = dive.beat(11.0, true);
+    assert!(first.len() == 50 && dive.are_pings_after_10_s(&first, &[Cause::HeadSilent]), "{first:?}");
+    let second = dive.beat(12.0, true);
+    assert!(second.len() == 100 && dive.are_pings_after_10_s(&second, &[Cause::HeadSilent]));
+    // One that pings, and stands.
+    let mut dive = Dive::new();
+    dive.lacking.heads[0].pinged = Some(at(10.9));
+    let first = dive.beat(11.0, true);
+    assert!(first.len() == 50 && dive.are_pings_after_10_s(&first, &[Cause::HeadStalled]));
+}
+
+/// Without a fix they are lacking for that, too, and placed along the way once there is one again.
+#[test]
+fn what_would_have_been_pinged_without_a_fix_is_placed_later() {
+    let mut dive = Dive::new();
+    dive.beat(10.0, true);
+    assert_eq!((dive.beat(11.0, false).len(), dive.lacking.away.len()), (0, 50));
+    let all = dive.beat(12.0, true);
+    assert_eq!((all.len(), dive.lacking.away.len(), dive.lacking.forgot), (100, 0, false));
+    assert!(dive.are_pings_after_10_s(&all[..50], &[Cause::HeadSilent, Cause::PositionLost]), "{all:?}");
+    assert!(all[50..].iter().all(|lack| lack.why == Causes::of(Cause::HeadSilent)));
+    // They went by as fast as the way between took.
+    let section = dive.coverage.sections.get(8).unwrap();
+    assert!((section.passage.drive.speed_mps - 0.1).abs() < 1e-9, "{:?}", section.passage.drive);
+    // More than there is room for: those that are kept are the first.
+    let mut dive = Dive::new();
+    dive.beat(10.0, true);
+    dive.beat(10.0 + 0.02 * (ROOM as f64 + 500.0), false);
+    assert_eq!((dive.lacking.away.len(), dive.lacking.forgot), (ROOM, true));
+    assert_eq!(dive.lacking.away[ROOM - 1].at, at(10.0 + 0.02 * ROOM as f64));
+    let seen = |dive: &Dive| dive.coverage.sections.get(10).map(|section| section.passage.unseen);
+    assert_eq!(seen(&dive), Some(false));
+    dive.beat(700.0, true);
+    assert_eq!(
+        (seen(&dive), dive.lacking.forgot),
+        (Some(true), false),
+        "nobody knows what was lacking there"
+    );
+}
+
+/// After a gap in a log the work of a beat is bounded, and it is known that something is left out.
+#[test]
+fn of_what_is_owed_at_once_the_latest_are_noted() {
+    for (owed, is_forgotten) in [(ROOM, false), (ROOM + 1, true)] {
+        let mut dive = Dive::new();
+        dive.beat(10.0, true);
+        let lacks = dive.beat(10.0 + 0.02 * owed as f64, true);
+        assert_eq!((lacks.len(), dive.lacking.forgot), (ROOM, is_forgotten));
+        let last_m = lacks.last().unwrap().x_m;
+        assert!((last_m - (2.0 + 0.002 * owed as f64)).abs() < 1e-6, "{last_m}");
+    }
+}
+
+/// Draws by time are as even as draws by chance, whatever the time between pings, and no two are the same.
+#[test]
+fn draws_by_time_are_spread_evenly() {
+    for period_ns in [1_u64, 18_000_000, 20_000_000, 1 << 30, 1_000_000_000] {
+        let draws: Vec<f64> = (0..16_384).map(|k| unit_of(3_600_000_000_000 + k * period_ns)).collect();
+        let mut counts = [0_i32; 16];
+        for draw in &draws {
+            counts[usize::try_from(math::floor_to_i64(16.0 * draw)).unwrap()] += 1;
+        }
+        // 1024 each, to five standard deviations.
+        assert!(counts.iter().all(|count| (count - 1024).abs() < 160), "{period_ns}: {counts:?}");
+        // What follows the lower half is as even: neighbours have nothing to do with each other.
+        let after_low = draws.windows(2).filter(|pair| pair[0] < 0.5 && pair[1] < 0.5).count();
+        assert!(after_low.abs_diff(4096) < 300, "{period_ns}: {after_low}");
+        let mut sorted = draws;
+        sorted.sort_by(f64::total_cmp);
+        assert!(sorted.windows(2).all(|pair| pair[0] < pair[1]), "{period_ns}");
+    }
+}
