@@ -298,3 +298,23 @@ fn without_room_more_is_hidden_and_not_less() {
         assert!(is_hidden(&few, arc_m) || !is_hidden(&all, arc_m), "{arc_m}");
     }
 }
+
+/// In either direction of rotation: just before its end it is the same strip, just beyond another one, over the seam, too.
+#[test]
+fn each_sounding_knows_how_far_its_strip_goes_on() {
+    let mut strips = strips(&[all_around(&[arc(4.0, 3.0), arc(28.0, 3.5)]), all_around(&[arc(10.0, 5.0)])]);
+    let ring = ring(&pipe());
+    for (forward, side) in [(true, 1.0), (false, -1.0)] {
+        strips.find_strips(&ring, forward);
+        assert_eq!(strips.strip_of.len(), ring.soundings().len());
+        for (sounding, (number, left_m)) in ring.soundings().iter().zip(&strips.strip_of) {
+            let at = |on_m: f64| {
+                number_at(&strips.strips, math::wrap(sounding.arc_m + side * on_m, 30.0), strips.perimeter_m)
+            };
+            if *left_m > 1e-3 {
+                assert_eq!((at(0.0), at(left_m - 1e-4)), (*number, *number), "{forward} {}", sounding.arc_m);
+                assert_ne!(at(left_m + 1e-4), *number, "{forward} {}: {left_m}", sounding.arc_m);
+            }
+        }
+    }
+}
