@@ -93,15 +93,8 @@ pub(crate) fn summary(report: &Report, columns: Option<usize>) -> String {
             ));
         }
     }
-    for (source, count) in
-        report.sources.iter().filter_map(|source| Some((source, source.line.as_ref()?.dropped_packets)))
-    {
-        if count > 0 {
-            line(format!(
-                "  LOST: {count} messages on the line of {} were dropped unread: the program, or the machine, stood",
-                source.id
-            ));
-        }
+    for source in report.sources.iter().filter_map(dropped) {
+        line(source);
     }
     for note in report.notes.iter().take(MOST_NOTES) {
         let place = note.station.clone().unwrap_or_else(|| "-+---.--".to_owned());
@@ -119,6 +112,16 @@ pub(crate) fn summary(report: &Report, columns: Option<usize>) -> String {
     }
     line(format!("digest {}", report.digest));
     text
+}
+
+/// What came for a sensor and was dropped unread.
+fn dropped(source: &SourceReport) -> Option<String> {
+    let count = source.line.as_ref()?.dropped_packets;
+    let line = format!(
+        "  LOST: {count} messages on the line of {} were dropped unread: the program, or the machine, stood",
+        source.id
+    );
+    (count > 0).then_some(line)
 }
 
 /// How long a sensor was silent, if that is worth a line; a dive without a position or sonar says by itself what it never heard.

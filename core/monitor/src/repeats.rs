@@ -98,7 +98,9 @@ mod tests {
     #[test]
     fn a_unit_with_noise_that_repeats_itself_hangs_after_a_second_until_it_says_something_else() {
         let frozen = noisy(999);
-        let all = hangs((0..1000).map(noisy).chain([frozen; 1000]).chain((2000..2100).map(noisy)));
+        let all = hangs(
+            (0..1000).map(noisy).chain(std::iter::repeat_n(frozen, 1000)).chain((2000..2100).map(noisy)),
+        );
         let first = all.iter().position(|hangs| *hangs).unwrap();
         assert_eq!(first, 999 + 400);
         assert!(all[first..2000].iter().all(|hangs| *hangs) && all[2000..].iter().all(|hangs| !hangs));
@@ -109,8 +111,11 @@ mod tests {
     fn a_unit_without_noise_never_does() {
         let swaying = |k: u64| [1e-2 * math::sin(k as f64 / 800.0), 0.0, 2e-2 * math::cos(k as f64 / 1700.0)];
         let still = [0.0; 3];
-        let all =
-            (0..4000).map(swaying).chain([still; 8000]).chain((0..4000).map(swaying)).chain([still; 8000]);
+        let all = (0..4000)
+            .map(swaying)
+            .chain(std::iter::repeat_n(still, 8000))
+            .chain((0..4000).map(swaying))
+            .chain(std::iter::repeat_n(still, 8000));
         assert!(hangs(all).iter().all(|hangs| !hangs));
     }
 

@@ -259,7 +259,7 @@ impl Planner {
                 apart_m: stance.apart_m,
                 apart_swing_mps: swing_mps,
                 // From one tolerated yaw to the other; a rate alone may go on for as long as it takes.
-                swing_most_m: (yaw_rad > 0.0).then(|| 2.0 * yaw_rad * stance.farthest_m),
+                swing_most_m: (yaw_rad > 0.0).then_some(2.0 * yaw_rad * stance.farthest_m),
             };
             Some(of(stance, &planned.passes.beside(stance.parallax_rad), &going))
         })
