@@ -89,6 +89,8 @@ pub struct LossCount {
     unheard_rad: f64,
     /// Share of its latest returns that aren't where the design has its wall.
     elsewhere: f64,
+    /// Angle over which returns have been heard, radians, up to a turn.
+    heard_rad: f64,
     /// Returns of one range.
     same: SameRange,
 }
@@ -170,6 +172,7 @@ impl LossCount {
             *self = Self { last_rad: angle_rad, ..Self::default() };
         }
         self.unheard_rad = 0.0;
+        self.heard_rad = (self.heard_rad + turned_rad).min(TAU);
         let weight = (turned_rad / ELSEWHERE_RAD).min(1.0);
         self.elsewhere += weight * (f64::from(u8::from(!heard.is_wall)) - self.elsewhere);
         self.same.add(heard, turned_rad);
@@ -185,9 +188,11 @@ impl LossCount {
         hears_nothing || self.elsewhere > most && others.any(|elsewhere| elsewhere < least)
     }
 
-    /// Share of its latest returns that aren't where the design has its wall, from 0 to 1; 1 where nothing was heard for a whole turn.
+    /// Share of its latest returns that aren't where the design has its wall, from 0 to 1; 1 before it has heard a whole turn, and where nothing was
+    /// heard for one.
     pub fn elsewhere(&self) -> f64 {
-        if self.unheard_rad >= DEAF_RAD { 1.0 } else { self.elsewhere }
+        let is_known = self.heard_rad >= TAU && self.unheard_rad < DEAF_RAD;
+        if is_known { self.elsewhere } else { 1.0 }
     }
 
     /// Shares lost by chance; of a head that hears hardly anything, all.
@@ -257,6 +262,8 @@ mod tests {
         );
         assert!(!elsewhere.is_deaf(std::iter::empty()), "a single head");
         assert!(!hears.is_deaf([hears.elsewhere()].into_iter()));
+        let begins = hearing(100, |_| Some(true));
+        assert!(!elsewhere.is_deaf([begins.elsewhere()].into_iter()), "nothing is known of the other yet");
         // A rock and a niche of a third of the turn.
         let rock = hearing(4000, |ping| Some(ping % 400 >= 130));
         assert!(!rock.is_deaf([hears.elsewhere()].into_iter()));
