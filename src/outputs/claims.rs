@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use headrace_replay::log::{in_the_way, named_part, part_path};
+use headrace_replay::whole_file::number_of;
 
 use super::{Kind, may_write};
 use crate::cli::Overwrite;
@@ -107,7 +108,8 @@ fn is_same(one: &Path, other: &Path) -> bool {
     if is_special(one) || is_special(other) {
         return false;
     }
-    place(one) == place(other) || inode(one).is_some_and(|inode| self::inode(other) == Some(inode))
+    let number = |path: &Path| path.metadata().ok().and_then(|there| number_of(&there));
+    place(one) == place(other) || number(one).is_some_and(|one| number(other) == Some(one))
 }
 
 /// Where a path leads, also where no file is there yet.
@@ -118,16 +120,4 @@ fn place(path: &Path) -> PathBuf {
         path.file_name().map(|name| folder.join(name))
     };
     path.canonicalize().ok().or_else(beside).unwrap_or_else(|| path.to_owned())
-}
-
-/// What a file is besides its names.
-#[cfg(unix)]
-fn inode(path: &Path) -> Option<(u64, u64)> {
-    use std::os::unix::fs::MetadataExt as _;
-    path.metadata().ok().map(|there| (there.dev(), there.ino()))
-}
-
-#[cfg(not(unix))]
-fn inode(_: &Path) -> Option<(u64, u64)> {
-    None
 }

@@ -46,11 +46,4 @@ pub struct Evidence {
     pub silent_heads: HeadSet,
 }
 
-impl Evidence {
-    /// Whether returns were lost such that it takes a lower speed to make up for them.
-    pub fn is_lossy(&self) -> bool {
-        self.with_losses_mps < self.fits_mps
-    }
-}
-
 mod head_numbers;

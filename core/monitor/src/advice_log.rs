@@ -87,35 +87,12 @@ impl AdviceLog {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use headrace_geometry::tunnel::shapes;
-    use headrace_sampling::advice::{Advisor, Looks, Task};
-    use headrace_sampling::layout::HeadLayout;
-    use headrace_sampling::passes::Situation;
-    use headrace_sampling::swing::Swing;
+    use crate::fixtures::{advice, situation};
 
     /// Advice that changes at every beat for ten hours is logged from beginning to end within the capacity.
     #[test]
     fn the_advice_s_history_does_not_grow_with_hours() {
-        let profile = shapes::circle(3.0).unwrap();
-        let task = Task {
-            target_m: 0.5,
-            confidence_sd: 2.0,
-            length_m: 100.0,
-            layout: HeadLayout::PhaseShift,
-            sound_speed_mps: 1447.0,
-            looks: Looks::default(),
-        };
-        let nowhere = Situation {
-            pose: None,
-            speed_mps: 0.0,
-            pass_error_m: 0.0,
-            layout: HeadLayout::PhaseShift,
-            configured: 0,
-            heads: [None; headrace_sampling::head::MAX_HEADS],
-            deaf: headrace_sampling::head::HeadSet::default(),
-            losses: [headrace_sampling::losses::LossRate::default(); headrace_sampling::head::MAX_HEADS],
-        };
-        let advice = Advisor::new(&profile, task, &[], &[]).advise(&nowhere, Swing::default(), None);
+        let advice = advice(&situation(None));
         let mut log = AdviceLog::default();
         let room = log.entries.capacity();
         let beats = 180_000_u32;

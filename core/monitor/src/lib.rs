@@ -34,7 +34,10 @@ pub mod digest;
 pub mod entities;
 mod error;
 pub mod feed;
+#[cfg(test)]
+mod fixtures;
 mod head_motion;
+mod hearing;
 pub mod live_state;
 pub mod live_text;
 mod loop_snapshot;

@@ -148,7 +148,7 @@ pub fn status_line(state: &LiveState, profile: &Profile, name: &dyn Fn(usize) ->
 }
 
 /// Decimals with which the present speed and the one that is told are two figures: a speed isn't too fast for what reads the same.
-pub fn speed_decimals(speed_mps: Option<f64>, v_max_mps: Option<f64>) -> usize {
+fn speed_decimals(speed_mps: Option<f64>, v_max_mps: Option<f64>) -> usize {
     let hundredths = |mps: f64| (mps * 100.0).round();
     let is_over = |(speed_mps, v_max_mps): (f64, f64)| {
         speed_mps > v_max_mps && (hundredths(speed_mps) - hundredths(v_max_mps)).abs() < 0.5

@@ -11,7 +11,7 @@ use headrace_geometry::math;
 use headrace_geometry::time::{DurNs, MonoNs};
 
 /// Time for which readings are the same, at least, before they are taken for repetitions.
-const FROZEN_AFTER: DurNs = DurNs(1_000_000_000);
+const HANGS_AFTER: DurNs = DurNs(1_000_000_000);
 /// Chance with which noise alone may be the same for so long, as its logarithm: one in a billion.
 const BY_CHANCE_LN: f64 = -20.7;
 /// Weight of the latest difference, and of the latest run, among those before.
@@ -22,7 +22,7 @@ const NOISY: f64 = 0.3;
 /// What is known of one source's repetitions; part of the loop's state.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct Repeats {
-    last: Option<(MonoNs, [f64; 3])>,
+    last: Option<[f64; 3]>,
     /// The last differences that weren't zero, by axis.
     steps: [f64; 3],
     /// Share of differences that went against the one before, from 0 to 1.
@@ -40,7 +40,7 @@ impl Repeats {
     /// Allocates: never.
     pub fn hangs(&mut self, at: MonoNs, rate_radps: Vec3<Sensor>) -> bool {
         let now = [rate_radps.x(), rate_radps.y(), rate_radps.z()];
-        let Some((_, before)) = self.last.replace((at, now)) else {
+        let Some(before) = self.last.replace(now) else {
             (self.since, self.run) = (at, 1);
             return false;
         };
@@ -64,7 +64,7 @@ impl Repeats {
     }
 
     fn has_hung(&self, at: MonoNs) -> bool {
-        let is_long = at.since(self.since).0 >= FROZEN_AFTER.0;
+        let is_long = at.since(self.since).0 >= HANGS_AFTER.0;
         // The mean run of readings that equal the one before with a chance p is 1 / (1 - p).
         let repeats = 1.0 - 1.0 / self.usual_run.max(1.01);
         is_long && self.to_and_fro > NOISY && f64::from(self.run) * math::ln(repeats) < BY_CHANCE_LN

@@ -169,6 +169,11 @@ impl Advisor {
         }
     }
 
+    /// Whether it went backwards when it was last under way.
+    pub fn is_astern(&self) -> bool {
+        self.astern
+    }
+
     /// The angles that the vehicle hides from each head, in its sensor frame.
     pub fn hidden_angles(&self) -> impl Iterator<Item = &[AngleRange]> {
         self.heads.iter().map(|head| head.hidden.as_slice())

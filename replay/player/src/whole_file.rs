@@ -1,12 +1,10 @@
 //! Files that are there whole or not at all: written beside their place, and put there once they are complete and synced. What
 //! was there before stays until then, and for good where the writing fails.
 
-use std::fs::{File, OpenOptions};
+use std::fs::{File, Metadata, OpenOptions};
 use std::io::{BufWriter, ErrorKind, Result, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU32, Ordering};
-
-use crate::log::folder_of;
 
 /// A file that is being written. Dropping it before [`WholeFile::complete`] leaves what was there before, and nothing else.
 #[derive(Debug)]
@@ -94,6 +92,24 @@ impl Drop for WholeFile {
             tracing::warn!("{} is left behind: {error}", beside.display());
         }
     }
+}
+
+/// The folder that a file is in.
+pub(crate) fn folder_of(path: &Path) -> &Path {
+    path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."))
+}
+
+/// What a file is besides its names: its device and its number there; `None` where the system has none.
+#[cfg(unix)]
+pub fn number_of(file: &Metadata) -> Option<(u64, u64)> {
+    use std::os::unix::fs::MetadataExt as _;
+    Some((file.dev(), file.ino()))
+}
+
+/// What a file is besides its names: its device and its number there; `None` where the system has none.
+#[cfg(not(unix))]
+pub fn number_of(_: &Metadata) -> Option<(u64, u64)> {
+    None
 }
 
 /// A new name beside a file's, that no folder of logs is read with.

@@ -53,7 +53,7 @@ fn dive(scene: &Scene) -> Told {
     }
 }
 
-/// Until 9 s after it hung, nobody would have known: what that second does to the position is within what passes have to spare.
+/// For a second nobody knows: what that does to the position is within what passes have to spare.
 #[test]
 fn while_the_inertial_unit_repeats_itself_nothing_over_the_target_passes_and_it_is_named() {
     for (start_m, effects) in [(2.0, SWAY), (6900.0, SWAY)] {

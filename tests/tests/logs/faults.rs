@@ -196,7 +196,16 @@ fn a_stderr_that_nobody_reads_holds_up_no_recording_that_fails() {
 
 /// Waits until a dive writes to a file: an empty one is only tried before the dive begins.
 fn wait_for(path: &Path, dive: &mut Child) {
-    while std::fs::metadata(path).map_or(0, |file| file.len()) == 0 {
+    wait_for_more(path, 0, dive);
+}
+
+/// Waits until a file is longer than so many bytes; returns its length.
+fn wait_for_more(path: &Path, than: u64, dive: &mut Child) -> u64 {
+    loop {
+        let len = std::fs::metadata(path).map_or(0, |file| file.len());
+        if len > than {
+            return len;
+        }
         assert!(dive.try_wait().unwrap().is_none(), "the dive has ended without {}", path.display());
         std::thread::sleep(Duration::from_millis(1));
     }
@@ -299,8 +308,9 @@ fn a_recording_that_is_taken_away_is_told_and_goes_on() {
         let arguments = ["--record", "log.mcap", "--report", "report.json", "--speed", "5x", "--json-lines"];
         let dive = dive.args(DIVE).args(arguments).current_dir(folder.path(""));
         let mut dive = dive.stdout(Stdio::piped()).stderr(Stdio::null()).spawn().unwrap();
-        wait_for(&log, &mut dive);
-        std::thread::sleep(Duration::from_secs(1));
+        // Once more is there than a header, which is found missing at the next sync alone.
+        let header = wait_for_more(&log, 0, &mut dive);
+        wait_for_more(&log, header, &mut dive);
         take();
         let output = dive.wait_with_output().unwrap();
         assert_eq!(output.status.code(), Some(3), "{words}");

@@ -16,9 +16,6 @@ use headrace_snapshot::stateful;
 /// The least speed at which heads apart along the hull are taken to follow each other, m/s.
 const SLOWEST_MPS: f64 = 0.05;
 
-/// At this speed or faster a vehicle is under way, m/s.
-const UNDER_WAY_MPS: f64 = 0.02;
-
 /// The advisor, and the time limit of the dive from its first packet.
 #[derive(Debug, Clone, Resource)]
 pub(crate) struct Advisor {
@@ -26,22 +23,14 @@ pub(crate) struct Advisor {
     pub(crate) dive_time: Option<DurNs>,
     looks: Looks,
     hysteresis: Hysteresis,
-    /// It went backwards when it was last under way.
-    astern: bool,
 }
 
-stateful!(Advisor { state: advisor, looks, hysteresis, astern; fixed: dive_time; });
+stateful!(Advisor { state: advisor, looks, hysteresis; fixed: dive_time; });
 
 impl Advisor {
     /// Allocates: all that it will ever use.
     pub(crate) fn new(advisor: advice::Advisor, target_m: f64, dive_time: Option<DurNs>) -> Self {
-        Self {
-            advisor,
-            dive_time,
-            looks: Looks::default(),
-            hysteresis: Hysteresis::new(target_m),
-            astern: false,
-        }
+        Self { advisor, dive_time, looks: Looks::default(), hysteresis: Hysteresis::new(target_m) }
     }
 
     /// The advice at each beat of a tick, in order; `begun` is the receive time of the first packet.
@@ -56,13 +45,12 @@ impl Advisor {
     /// Advice to show at a beat; `begun` is the receive time of the first packet.
     fn advise(&mut self, at: MonoNs, situation: &Situation, begun: Option<MonoNs>) -> Advice {
         let left = self.dive_time.zip(begun).map(|(time, begun)| (time - at.since(begun)).as_secs_f64());
+        let was_astern = self.advisor.is_astern();
+        let advice = self.advisor.advise(situation, swing(&mut self.looks, at, situation), left);
         // On the way back heads apart along the hull are in phase at other speeds, which don't hold any more once it goes on.
-        let astern = situation.speed_mps < 0.0;
-        if situation.speed_mps.abs() > UNDER_WAY_MPS && astern != self.astern {
-            self.astern = astern;
+        if self.advisor.is_astern() != was_astern {
             self.hysteresis.forget();
         }
-        let advice = self.advisor.advise(situation, swing(&mut self.looks, at, situation), left);
         self.hysteresis.show(at, advice)
     }
 }
@@ -132,14 +120,12 @@ pub(super) fn tell(
 
 #[cfg(test)]
 mod tests {
-    use super::super::fixtures::{mount, pinged, pipe, pose, situation};
     use super::*;
+    use crate::fixtures::{mount, pinged, pipe, pose, situation, task};
     use crate::messages::Doubts;
     use headrace_geometry::frames::{Mount, Pose, Rot};
     use headrace_geometry::math;
-    use headrace_sampling::advice::Task;
     use headrace_sampling::head::{HeadBody, HeadMotion, HeadSpec};
-    use headrace_sampling::layout::HeadLayout;
 
     fn at(seconds: f64) -> MonoNs {
         MonoNs(0) + DurNs::from_secs_f64(seconds)
@@ -165,14 +151,6 @@ mod tests {
 
     #[test]
     fn each_beat_of_a_tick_has_its_advice_with_the_time_that_is_left() {
-        let task = Task {
-            target_m: 0.5,
-            confidence_sd: 2.0,
-            length_m: 100.0,
-            layout: HeadLayout::PhaseShift,
-            sound_speed_mps: 1447.0,
-            looks: advice::Looks::default(),
-        };
         let head = HeadSpec {
             mount: mount(),
             step_rad: 0.0157,
@@ -183,7 +161,8 @@ mod tests {
             body: HeadBody { radius_m: 0.0, ahead_m: 0.0, behind_m: 0.0 },
         };
         let heads = [(head, Vec::new()), (head, Vec::new())];
-        let new = |dive_time| Advisor::new(advice::Advisor::new(&pipe(), task, &heads, &[]), 0.5, dive_time);
+        let new =
+            |dive_time| Advisor::new(advice::Advisor::new(&pipe(), task(), &heads, &[]), 0.5, dive_time);
         let doubts = Doubts { cable: None, setting: None, stand_s: 0, hung: 0 };
         let beat = |seconds: f64| Placed::Situation(at(seconds), two_heads(0.0), doubts);
         let placed = [beat(30.0), Placed::Ping(pinged(5.0, 1.0)), beat(30.2)];

@@ -246,9 +246,9 @@ fn note_frontier(
 
 #[cfg(test)]
 mod tests {
-    use super::super::fixtures::{coverage, fix, heard, mount, pinged, pipe, situation};
     use super::*;
     use crate::entities::{Head, HeadSweep, HiddenAngles, Mounted};
+    use crate::fixtures::{coverage, fix, heard, mount, pinged, pipe, situation};
     use bevy_ecs::system::SystemState;
     use bevy_ecs::world::World;
     use headrace_coverage::{HoleFinder, Judging, Lacks, Reach, Request};

@@ -3,7 +3,7 @@
 use bevy_ecs::prelude::{Query, Res, ResMut};
 
 use crate::entities::{Head, HiddenAngles, LossCount, MeasuredMotion, Mounted};
-use crate::loss_count::Heard;
+use crate::hearing::Heard;
 use crate::messages::{
     Aim, Events, Hidden, Outcome, Placed, PlacedEvents, PlacedList, PlacedPing, Positioned, PositionedList,
 };
@@ -196,7 +196,7 @@ fn situation(
             let angle_rad = angle_rad + rate_radps * at.since(last).as_secs_f64();
             let (mount, sector_rad) = (mounted.info.mount, track.sector_rad());
             let others = heads.iter().filter(|(other, ..)| other.0 != head.0);
-            if lost.is_deaf(others.map(|(.., lost, _)| lost.elsewhere())) {
+            if lost.hearing().is_deaf(others.map(|(.., lost, _)| lost.hearing().elsewhere())) {
                 deaf = deaf.with(head.0);
             } else {
                 *slot = Some(HeadMotion { mount, angle_rad, rate_radps, step_rad, sector_rad });

@@ -68,10 +68,8 @@ pub(crate) fn judge_one(
             .number(evidence.missing_share)
             .number(evidence.swing_m)
             .integer(u64::from(evidence.silent_heads.bits()))
-            .integer(u64::from(evidence.causes.bits()));
-        {
-            digests.judgements.number(evidence.with_losses_mps);
-        }
+            .integer(u64::from(evidence.causes.bits()))
+            .number(evidence.with_losses_mps);
     }
     if section.contradicts() {
         let off_m = section.deviation.mean_m().unwrap_or(0.0);
@@ -113,8 +111,8 @@ pub(crate) fn digest_alert(
 
 #[cfg(test)]
 mod tests {
-    use super::super::fixtures::{coverage, pipe};
     use super::*;
+    use crate::fixtures::{coverage, pipe};
     use headrace_coverage::{Judgement, Reach, Unsure};
 
     const AT: MonoNs = MonoNs(7_000_000_000);

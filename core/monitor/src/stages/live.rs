@@ -208,46 +208,16 @@ fn digest(stream: &mut ResultStream, at: MonoNs, situation: &Situation, state: &
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::fixtures::{advice, situation};
     use bevy_ecs::system::RunSystemOnce as _;
     use bevy_ecs::world::World;
     use headrace_fusion::filter::cable::CableDoubt;
     use headrace_fusion::relative::Relative;
     use headrace_fusion::{Fix, NoFix};
     use headrace_geometry::frames::{Point3, Pose, Rot};
-    use headrace_geometry::tunnel::shapes;
-    use headrace_sampling::advice::{Advice, Advisor, Looks, Task};
-    use headrace_sampling::head::MAX_HEADS;
-    use headrace_sampling::layout::HeadLayout;
-    use headrace_sampling::losses::LossRate;
-    use headrace_sampling::swing::Swing;
     use headrace_vehicle::{AlertTiming, LimitsConfig};
 
     const AT: MonoNs = MonoNs(9_000_000_000);
-
-    fn situation(pose: Option<Pose>, pass_error_m: f64) -> Situation {
-        Situation {
-            pose,
-            speed_mps: 0.07,
-            pass_error_m,
-            layout: HeadLayout::PhaseShift,
-            configured: 0,
-            heads: [None; MAX_HEADS],
-            deaf: HeadSet::default(),
-            losses: [LossRate::default(); MAX_HEADS],
-        }
-    }
-
-    fn advice(of: &Situation) -> Advice {
-        let task = Task {
-            target_m: 0.5,
-            confidence_sd: 2.0,
-            length_m: 100.0,
-            layout: HeadLayout::PhaseShift,
-            sound_speed_mps: 1447.0,
-            looks: Looks::default(),
-        };
-        Advisor::new(&shapes::circle(3.0).unwrap(), task, &[], &[]).advise(of, Swing::default(), None)
-    }
 
     /// The live state after a beat at which passes were so unsure against one another, for a target of half a metre and two standard deviations.
     fn after(pass_error_m: f64, is_cable_doubted: bool, lacking: Option<NoFix>) -> LiveState {
@@ -257,7 +227,8 @@ mod tests {
         let fix = lacking.map_or(Ok(fix), Err);
         let cable = is_cable_doubted.then_some(CableDoubt { since: AT, from_m: 12.0, way_m: 0.5 });
         let doubts = Doubts { cable, setting: None, stand_s: 3, hung: 0 };
-        let situation = situation(fix.ok().map(|fix| fix.pose), pass_error_m);
+        let pose = fix.ok().map(|fix| fix.pose);
+        let situation = Situation { pose, speed_mps: 0.07, pass_error_m, ..situation(None) };
         let standing = Standing {
             metres: LiveMetres::default(),
             unsure: None,

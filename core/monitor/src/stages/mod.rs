@@ -8,8 +8,6 @@ mod cover;
 mod decode;
 mod doubt;
 mod driving;
-#[cfg(test)]
-mod fixtures;
 mod georeference;
 mod judge;
 mod lacking;

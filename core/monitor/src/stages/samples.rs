@@ -69,8 +69,8 @@ pub(super) fn note_sample(
 
 #[cfg(test)]
 mod tests {
-    use super::super::fixtures::{coverage, heard, pinged, tunnel};
     use super::*;
+    use crate::fixtures::{coverage, heard, pinged, tunnel};
 
     /// Steps of a tenth of a radian, of which each is 0.3 m along the wall and a centimetre along the tunnel.
     fn at(step: u32) -> PlacedPing {

@@ -237,8 +237,8 @@ fn digest(digests: &mut Digests, ping: &PlacedPing, kind: RecordKind) {
 
 #[cfg(test)]
 mod tests {
-    use super::super::fixtures::{coverage, heard, pinged, tunnel};
     use super::*;
+    use crate::fixtures::{coverage, heard, pinged, tunnel};
     use bevy_ecs::world::World;
     use headrace_coverage::Frontier;
     use headrace_geometry::time::MonoNs;

@@ -71,8 +71,8 @@ fn note_silence(coverage: &mut Coverage, head: usize, before: Option<Reach>, her
 
 #[cfg(test)]
 mod tests {
-    use super::super::fixtures::{coverage, mount, situation, tunnel};
     use super::*;
+    use crate::fixtures::{coverage, mount, situation, tunnel};
     use bevy_ecs::system::SystemState;
     use bevy_ecs::world::World;
     use headrace_geometry::frames::{Mount, Vec3};

@@ -73,7 +73,6 @@ pub use recorder::{Recorder, RecorderHandle, RecorderPort};
 pub use recover::{RECOVERED_FROM, Recovered, recover};
 pub use rotate::{Every, Rotation, files_of, in_the_way};
 pub use space::LeftOut;
-pub(crate) use storage::folder_of;
 pub use storage::{Disk, Storage, StoredFile};
 pub use trim::{Change, TRIMMED, Trim, Trimmed, trim};
 pub use voice::VoicePort;

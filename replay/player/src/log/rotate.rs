@@ -11,7 +11,7 @@ use super::fields::Fields;
 use super::format::unseal;
 use super::framing::{Found, Item, LogFile, look};
 use super::part::{PART, PartHead, named_part};
-use super::storage::folder_of;
+use crate::whole_file::folder_of;
 
 /// When a part of a recording ends.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -4,6 +4,8 @@ use std::fs::{File, Metadata, OpenOptions};
 use std::io;
 use std::path::{Path, PathBuf};
 
+use crate::whole_file::{folder_of, number_of};
+
 /// Files that are created once and only grow.
 pub trait Storage: Send {
     /// Creates a file, which must not exist. Once this returns its name survives a power cut.
@@ -99,8 +101,9 @@ struct DiskFile {
 
 impl DiskFile {
     fn new(file: File, path: &Path) -> Self {
-        let own = file.metadata().ok().filter(|own| links(own) > 0).map(|own| number(&own));
-        let known = own.filter(|own| std::fs::metadata(path).is_ok_and(|there| number(&there) == *own));
+        let own = file.metadata().ok().filter(|own| links(own) > 0).and_then(|own| number_of(&own));
+        let there = std::fs::metadata(path).ok().and_then(|there| number_of(&there));
+        let known = own.filter(|_| own == there);
         Self { file, path: path.to_owned(), written: 0, known, is_begun: false }
     }
 
@@ -116,7 +119,7 @@ impl DiskFile {
             return Some(Taken::Deleted);
         }
         let there = std::fs::metadata(&self.path).ok()?;
-        (number(&there) != known).then_some(Taken::Replaced)
+        (number_of(&there) != Some(known)).then_some(Taken::Replaced)
     }
 }
 
@@ -143,23 +146,6 @@ fn links(file: &Metadata) -> u64 {
 #[cfg(not(unix))]
 fn links(_: &Metadata) -> u64 {
     1
-}
-
-/// Device and number of a file.
-#[cfg(unix)]
-fn number(file: &Metadata) -> (u64, u64) {
-    use std::os::unix::fs::MetadataExt as _;
-    (file.dev(), file.ino())
-}
-
-#[cfg(not(unix))]
-fn number(_: &Metadata) -> (u64, u64) {
-    (0, 0)
-}
-
-/// The folder that a file is in.
-pub(crate) fn folder_of(path: &Path) -> &Path {
-    path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."))
 }
 
 /// Bytes gathered before they are passed to the file.

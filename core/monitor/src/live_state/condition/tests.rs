@@ -1,11 +1,8 @@
 use super::*;
+use crate::fixtures;
 use crate::live_state::{LiveMetres, SensorState};
 use headrace_geometry::time::MonoNs;
-use headrace_geometry::tunnel::shapes;
-use headrace_sampling::advice::{Advice, Advisor, Looks, Task};
-use headrace_sampling::layout::HeadLayout;
-use headrace_sampling::passes::Situation;
-use headrace_sampling::swing::Swing;
+use headrace_sampling::advice::Advice;
 
 const fn at(seconds: u64) -> MonoNs {
     MonoNs(seconds * 1_000_000_000)
@@ -13,26 +10,7 @@ const fn at(seconds: u64) -> MonoNs {
 
 /// Advice of a speed.
 fn advice(reason: Reason, v_max_mps: f64, t_m: f64) -> Advice {
-    let task = Task {
-        target_m: 0.5,
-        confidence_sd: 2.0,
-        length_m: 100.0,
-        layout: HeadLayout::PhaseShift,
-        sound_speed_mps: 1447.0,
-        looks: Looks::default(),
-    };
-    let nowhere = Situation {
-        pose: None,
-        speed_mps: 0.0,
-        pass_error_m: 0.0,
-        layout: HeadLayout::PhaseShift,
-        configured: 0,
-        heads: [None; headrace_sampling::head::MAX_HEADS],
-        deaf: headrace_sampling::head::HeadSet::default(),
-        losses: [headrace_sampling::losses::LossRate::default(); headrace_sampling::head::MAX_HEADS],
-    };
-    let profile = shapes::circle(3.0).unwrap();
-    let none = Advisor::new(&profile, task, &[], &[]).advise(&nowhere, Swing::default(), None);
+    let none = fixtures::advice(&fixtures::situation(None));
     Advice { reason, v_max_mps, predicted_t_m: Some(t_m), will_exceed: t_m > 0.5, ..none }
 }
 

@@ -1,6 +1,6 @@
-use super::super::fixtures::{coverage, mount, pipe};
 use super::*;
 use crate::entities::{Head, HeadFrontier, HeadSweep, HiddenAngles, Mounted};
+use crate::fixtures::{coverage, mount, pipe};
 use bevy_ecs::system::SystemState;
 use bevy_ecs::world::World;
 use headrace_geometry::frames::{Point3, Rot};

@@ -1,4 +1,4 @@
-//! A pipe and its coverage for the tests of the stages.
+//! A pipe, its coverage and the advice in it, for tests.
 
 use crate::messages::{Hidden, Outcome, PlacedPing};
 use crate::resources::{Coverage, TunnelDesign};
@@ -12,26 +12,28 @@ use headrace_geometry::math;
 use headrace_geometry::site::Site;
 use headrace_geometry::time::MonoNs;
 use headrace_geometry::tunnel::{Profile, shapes};
-use headrace_sampling::head::MAX_HEADS;
+use headrace_sampling::advice::{Advice, Advisor, Looks, Task};
+use headrace_sampling::head::{HeadSet, MAX_HEADS};
 use headrace_sampling::layout::HeadLayout;
 use headrace_sampling::losses::LossRate;
 use headrace_sampling::passes::Situation;
+use headrace_sampling::swing::Swing;
 use headrace_sensor::reading::SourceId;
 
 /// Of 3 m radius.
-pub(super) fn pipe() -> Profile {
+pub(crate) fn pipe() -> Profile {
     shapes::circle(3.0).unwrap()
 }
 
 /// 30 m of that pipe.
-pub(super) fn tunnel() -> TunnelDesign {
+pub(crate) fn tunnel() -> TunnelDesign {
     let profile = pipe();
     let limits = WallLimits::new(profile.perimeter_m(), 1.0);
     TunnelDesign { profile, site: Site::default(), length_m: 30.0, contradiction_m: 1.0, limits }
 }
 
 /// Nothing of it seen yet, for a target of half a metre.
-pub(super) fn coverage() -> Coverage {
+pub(crate) fn coverage() -> Coverage {
     let (perimeter_m, from_m, to_m) = (pipe().perimeter_m(), 0.0, 32.0);
     Coverage {
         store: SampleStore::new(StoreLayout { perimeter_m, from_m, to_m, cell_m: 0.25, capacity: 10_000 }),
@@ -45,24 +47,24 @@ pub(super) fn coverage() -> Coverage {
 }
 
 /// At the vehicle's origin, facing forward.
-pub(super) fn mount() -> Mount {
+pub(crate) fn mount() -> Mount {
     Mount { position: Vec3::zero(), rotation: Rot::identity() }
 }
 
 /// Level in the middle of the pipe.
-pub(super) fn pose(x_m: f64) -> Pose {
+pub(crate) fn pose(x_m: f64) -> Pose {
     let [y_m, z_m] = pipe().reference();
     Pose { position: Point3::new(x_m, y_m, z_m), attitude: Rot::identity() }
 }
 
 /// There, at 0.1 m/s, with an error of chainage between passes, m.
-pub(super) fn fix(x_m: f64, pass_error_m: f64) -> Fix {
+pub(crate) fn fix(x_m: f64, pass_error_m: f64) -> Fix {
     let relative = Relative::along(pass_error_m);
     Fix { pose: pose(x_m), speed_mps: 0.1, relative, revisit: relative, tie: 0, settled: 0 }
 }
 
 /// A vehicle without heads there, at 0.1 m/s; nowhere without a chainage.
-pub(super) fn situation(x_m: Option<f64>) -> Situation {
+pub(crate) fn situation(x_m: Option<f64>) -> Situation {
     Situation {
         pose: x_m.map(pose),
         speed_mps: 0.1,
@@ -70,13 +72,30 @@ pub(super) fn situation(x_m: Option<f64>) -> Situation {
         layout: HeadLayout::PhaseShift,
         configured: 0,
         heads: [None; MAX_HEADS],
-        deaf: headrace_sampling::head::HeadSet::default(),
+        deaf: HeadSet::default(),
         losses: [LossRate::default(); MAX_HEADS],
     }
 }
 
+/// Half a metre with two standard deviations, in 100 m.
+pub(crate) fn task() -> Task {
+    Task {
+        target_m: 0.5,
+        confidence_sd: 2.0,
+        length_m: 100.0,
+        layout: HeadLayout::PhaseShift,
+        sound_speed_mps: 1447.0,
+        looks: Looks::default(),
+    }
+}
+
+/// The advice of a vehicle without heads.
+pub(crate) fn advice(of: &Situation) -> Advice {
+    Advisor::new(&pipe(), task(), &[], &[]).advise(of, Swing::default(), None)
+}
+
 /// A return from a wall at this range, at an angle from the pipe's floor, of a head in its middle, in a single step.
-pub(super) fn heard(x_m: f64, angle_rad: f64, range_m: f64) -> PlacedPing {
+pub(crate) fn heard(x_m: f64, angle_rad: f64, range_m: f64) -> PlacedPing {
     let origin = pose(x_m).position;
     let (sin, cos) = math::sin_cos(angle_rad);
     let point = Point3::new(x_m, origin.y() + range_m * sin, origin.z() - range_m * cos);
@@ -85,7 +104,7 @@ pub(super) fn heard(x_m: f64, angle_rad: f64, range_m: f64) -> PlacedPing {
 }
 
 /// A ping there that got nothing within range.
-pub(super) fn pinged(x_m: f64, angle_rad: f64) -> PlacedPing {
+pub(crate) fn pinged(x_m: f64, angle_rad: f64) -> PlacedPing {
     PlacedPing {
         head: 0,
         received: MonoNs(1_000_000_000),
