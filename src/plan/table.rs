@@ -6,6 +6,7 @@ use headrace_sampling::margin::{Margin, Margins};
 use headrace_sampling::plan::{Answer, Briefing, Heard, InLine, Spacing, ThinStrip};
 
 use super::findings::{Findings, printed_mps};
+use crate::output::append;
 
 /// The plan as text with a table of modes.
 pub(super) fn table(findings: &Findings) -> String {
@@ -39,7 +40,7 @@ pub(super) fn heads(findings: &Findings) -> String {
 fn tunnel_line(findings: &Findings) -> String {
     let inspection = findings.planner.inspection();
     let [y, z] = inspection.place;
-    let allowed = match (inspection.drift_m > 0.0, inspection.yaw_rad > 0.0) {
+    let mut allowed = match (inspection.drift_m > 0.0, inspection.yaw_rad > 0.0) {
         (false, false) => String::new(),
         _ => format!(
             "; allowing for a constant offset of {} m and yaw of {:.1} degrees",
@@ -47,6 +48,12 @@ fn tunnel_line(findings: &Findings) -> String {
             inspection.yaw_rad.to_degrees()
         ),
     };
+    if inspection.yaw_rate_radps > 0.0 {
+        append(
+            &mut allowed,
+            format_args!("; turning by {:.1} degrees/s", inspection.yaw_rate_radps.to_degrees()),
+        );
+    }
     format!(
         "{}: perimeter {:.2} m, {} m long; vehicle at y {y:.2} m, z {z:.2} m{allowed}",
         findings.tunnel,
