@@ -1,12 +1,13 @@
 //! Causes told against true ones, over random dives with one or two injected causes: `cargo bench -p headrace_benches
 //! --bench causes [-- FROM TO [wrong]]`, by numbers of dives, 0 to 500 unless given; `wrong` lists the stretches told
-//! wrongly, `sections` all sections; `remedies` does what was told about each run, too.
+//! wrongly, `sections` all sections; `remedies` does what was told about each run, too; `knowing` tells how often one is right who knows all of a dive
+//! but its noise.
 
 #![allow(clippy::unwrap_used, clippy::panic, reason = "a bench stops at what it can't do")]
 
 use std::sync::atomic::{AtomicU64, Ordering};
 
-use headrace_tests::interventions::{Judged, Matrix, intervene, kinds, remedies};
+use headrace_tests::interventions::{Judged, Knowing, Matrix, intervene, kinds, remedies};
 
 /// Holes without each of the causes alone, over the target: the median and the largest of a stretch.
 fn over_target(sections: &[Judged], target_m: f64) -> String {
@@ -25,6 +26,7 @@ fn main() {
     let (from, to) = (number(0).unwrap_or(0), number(1).unwrap_or(500));
     let wrong = arguments.iter().any(|word| word == "wrong");
     let remedy = arguments.iter().any(|word| word == "remedies");
+    let is_knowing = arguments.iter().any(|word| word == "knowing");
     let sections = arguments.iter().any(|word| word == "sections");
     let next = AtomicU64::new(from);
     let work = || {
@@ -33,7 +35,11 @@ fn main() {
         let dive = |seed: u64| {
             let dive = intervene(seed, &kinds(seed));
             let done = if remedy { remedies(&dive) } else { Vec::new() };
-            (seed, dive, done)
+            let mut knowing = Knowing::default();
+            if is_knowing {
+                knowing.add(&dive);
+            }
+            (seed, dive, done, knowing)
         };
         numbers.map(dive).collect::<Vec<_>>()
     };
@@ -44,11 +50,18 @@ fn main() {
     dives.sort_by_key(|(seed, ..)| *seed);
     let mut matrix = Matrix::default();
     let (mut runs, mut clear) = (0, 0);
-    for (seed, dive, done) in &dives {
+    for (seed, dive, done, _) in &dives {
         for remedied in done {
             (runs, clear) = (runs + 1, clear + u32::from(remedied.clears));
             if wrong && !remedied.clears {
-                println!("dive {seed}: not cleared: {:?}; {:?}", remedied.told, dive.drawn.injected);
+                let over = remedied.then_m.iter().filter(|[_, hole_m]| *hole_m > dive.drawn.target_m);
+                println!(
+                    "dive {seed}: not cleared: {:?}; T {:.3}, then {:.2?}; {:?}",
+                    remedied.told,
+                    dive.drawn.target_m,
+                    over.collect::<Vec<_>>(),
+                    dive.drawn.injected
+                );
             }
         }
         matrix.add(dive);
@@ -92,5 +105,10 @@ fn main() {
     print!("{}", matrix.text());
     if remedy {
         println!("runs cleared by what was told to do: {clear} of {runs}");
+    }
+    if is_knowing {
+        let Knowing { stretches, pairs } = dives.iter().fold(Knowing::default(), |sum, dive| sum.and(dive.3));
+        println!("who knows all but the noise: stretches, two causes: {}", stretches.text());
+        println!("of these stretches whose true set is two: {}", pairs.text());
     }
 }

@@ -25,13 +25,15 @@ pub enum Action {
     HeadBack,
     /// With the position fix restored.
     Position,
+    /// A higher gain: so much is lost, or always of the same wall, that lower speed does not help.
+    HigherGain,
     /// No change: pass again, from end to end.
     Again,
 }
 
 impl Action {
     /// All of them.
-    pub const ALL: [Self; 10] = [
+    pub const ALL: [Self; 11] = [
         Self::Slower,
         Self::FinerMode,
         Self::LongerRange,
@@ -41,14 +43,18 @@ impl Action {
         Self::Head,
         Self::HeadBack,
         Self::Position,
+        Self::HigherGain,
         Self::Again,
     ];
 
-    /// The actions against several causes, in their order.
-    pub fn against(causes: impl IntoIterator<Item = Cause>) -> Vec<Self> {
+    /// The actions against several causes, in their order; `is_beyond_speed`: no speed makes up for the returns that are missing.
+    pub fn against(causes: impl IntoIterator<Item = Cause>, is_beyond_speed: bool) -> Vec<Self> {
         let mut actions: Vec<Self> = Vec::new();
         for cause in causes {
-            let action = Self::of(cause);
+            let action = match cause {
+                Cause::MissingReturns if is_beyond_speed => Self::HigherGain,
+                cause => Self::of(cause),
+            };
             if !actions.contains(&action) {
                 actions.push(action);
             }
@@ -57,7 +63,7 @@ impl Action {
     }
 
     /// The action against a cause.
-    pub fn of(cause: Cause) -> Self {
+    fn of(cause: Cause) -> Self {
         match cause {
             Cause::TooFast => Self::Slower,
             Cause::AngularStep => Self::FinerMode,
@@ -84,6 +90,7 @@ impl Action {
             Self::Head => "head",
             Self::HeadBack => "head_back",
             Self::Position => "position",
+            Self::HigherGain => "higher_gain",
             Self::Again => "again",
         }
     }

@@ -2,6 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
+use super::again::Failing;
 use super::cause::Cause;
 use super::causes::Causes;
 use headrace_sampling::head::HeadSet;
@@ -44,6 +45,13 @@ pub struct Evidence {
     /// Heads that went by without a ping, by number.
     #[serde(with = "head_numbers")]
     pub silent_heads: HeadSet,
+}
+
+impl Evidence {
+    /// As sections of a run are counted.
+    pub fn failing(&self) -> Failing {
+        Failing { causes: self.causes, again_mps: self.with_losses_mps }
+    }
 }
 
 mod head_numbers;

@@ -18,7 +18,7 @@ use super::lacks::Lack;
 use super::passage::{Drive, Passage};
 use super::store::SampleStore;
 use headrace_geometry::math;
-use headrace_sampling::losses::{LossRate, Sampled};
+use headrace_sampling::losses::{LossRate, MOST_PASSES, Sampled};
 use headrace_sampling::spacing;
 use trial::Trial;
 
@@ -29,6 +29,8 @@ use case::{HELPS, Seen, WIDEST, is_dark, is_passed};
 const WELL_OVER: f64 = 1.2;
 /// Speed over the planned one from which it wasn't kept to.
 const OVER_PLAN: f64 = 1.15;
+/// The same of both without a position, when the speed is known by the inertial unit alone.
+const OVER_LOST: f64 = 1.4;
 /// The same where it is over every speed that fits, too: no more than what measuring it may be off.
 const OVER_ALL: f64 = 1.03;
 /// The same of the swing between passes: even a steady vehicle sways.
@@ -58,7 +60,11 @@ pub fn explain<'a>(
     let is_lossy = causes.has(Cause::MissingReturns);
     let here =
         if is_lossy { sampled.passes_needed(iter::once(LossRate::independent(missing_share))) } else { 1.0 };
-    let passes_needed = here.max(drive.passes_needed);
+    // Where something else has made it, too, losses have to be as wide as the target alone.
+    let times = if causes.len() > 1 { 1.0 } else { WIDEST };
+    let hole_m = case.hole.diameter_m.min(times * case.target_m);
+    let is_by_chance = !is_lossy || sampled.is_by_chance(hole_m, drive.along_m(), drive.lost);
+    let passes_needed = if is_by_chance { here.max(drive.passes_needed) } else { MOST_PASSES };
     let lost = case.lacks.between(case.hole.x_m - radius_m, case.hole.x_m + radius_m).filter(in_hole).count();
     Evidence {
         cause: causes.iter().next().unwrap_or(Cause::Unknown),
@@ -113,12 +119,14 @@ fn present(case: &Case<'_>, seen: &Seen, perimeter_m: f64) -> Causes {
     let as_planned = spacing::t_max_m(drive.planned_along_m(), drive.advance_m(), drive.middle_t_y_m);
     let over = if coarse { drive.planned_along_m() } else { as_planned } / target_m;
     // Without a position the speed isn't known so well.
+    let well_over = if is_lost { OVER_LOST } else { WELL_OVER };
+    let over_planned = if is_lost { OVER_LOST } else { OVER_PLAN };
     let is_over_all = !is_lost
         && drive.fits_mps > 0.0
         && drive.planned_mps > 0.0
         && drive.speed_mps > OVER_ALL * drive.fits_mps.max(drive.planned_mps);
-    let is_over_plan = over > 1.0 && drive.speed_mps > OVER_PLAN * drive.planned_mps;
-    add(over > WELL_OVER || is_over_plan || is_over_all, Cause::TooFast);
+    let is_over_plan = over > 1.0 && drive.speed_mps > over_planned * drive.planned_mps;
+    add(over > well_over || is_over_plan || is_over_all, Cause::TooFast);
     let is_slow = drive.is_slow_out_of_phase(1.0 / HELPS);
     let is_uneven = drive.planned_gap_s < HELPS * drive.healthy_gap_s;
     // At another speed heads apart along the hull may happen to be even.

@@ -23,6 +23,7 @@
 #![cfg_attr(test, allow(clippy::cast_possible_truncation))]
 
 pub mod action;
+pub mod again;
 pub mod cause;
 pub mod causes;
 pub mod deviation;
@@ -48,6 +49,7 @@ pub mod wall_limits;
 pub mod what_if;
 
 pub use action::Action;
+pub use again::{Again, Failing};
 pub use cause::Cause;
 pub use causes::Causes;
 pub use evidence::Evidence;

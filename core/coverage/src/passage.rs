@@ -8,6 +8,7 @@ use headrace_geometry::frames::Vec3;
 use headrace_geometry::math;
 use headrace_geometry::tunnel::Profile;
 use headrace_sampling::head::HeadSet;
+use headrace_sampling::losses::LossRate;
 
 /// Statistics of the pings made within a section.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
@@ -76,6 +77,8 @@ pub struct Drive {
     pub fits_along_m: f64,
     /// Passes over each place that it takes for one, as the heads lose returns: see [`headrace_sampling::losses`].
     pub passes_needed: f64,
+    /// How often the head loses returns by chance that loses most.
+    pub lost: LossRate,
     /// Heads go back and forth in sectors.
     pub is_in_sectors: bool,
     /// A head hasn't been heard since the dive began.

@@ -2,6 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
+use super::again::{Again, Failing, NAMED_OF, Tally};
 use super::cause::Cause;
 use super::causes::Causes;
 use super::hole::Hole;
@@ -10,9 +11,6 @@ use headrace_snapshot::stateful;
 
 /// Maximum gap between neighbouring failed sections of one run, m.
 const JOIN_M: f64 = 0.5;
-
-/// Of a run's failing sections, one of so many has a cause that is named beside the main one.
-const NAMED_OF: u32 = 10;
 
 /// Number of a run; never reused.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
@@ -25,6 +23,8 @@ pub struct Run {
     pub cause: Cause,
     /// How many of them have each cause, in the order of [`Cause::ALL`].
     counts: [u32; Cause::ALL.len()],
+    /// How they are to be passed again.
+    tally: Tally,
     /// Index of the first section.
     pub from: i64,
     /// Index after the last.
@@ -70,22 +70,35 @@ impl Run {
         causes
     }
 
-    /// Counts a section's causes.
-    fn count_in(&mut self, causes: Causes) {
-        for cause in causes.iter() {
+    /// How to pass it again.
+    pub fn again(&self) -> Again {
+        self.tally.again(self.failed)
+    }
+
+    /// Counts a section.
+    fn count_in(&mut self, section: &Failing) {
+        self.tally.add(section);
+        for cause in section.causes.iter() {
             if let Some(count) = self.counts.get_mut(cause as usize) {
                 *count += 1;
             }
         }
     }
 
-    /// Takes a section's causes from what was counted.
-    fn count_out(&mut self, causes: Causes) {
-        for cause in causes.iter() {
+    /// Takes a section from what was counted; true if the lowest speed has to be found anew.
+    fn count_out(&mut self, section: &Failing) -> bool {
+        for cause in section.causes.iter() {
             if let Some(count) = self.counts.get_mut(cause as usize) {
                 *count = count.saturating_sub(1);
             }
         }
+        self.tally.remove(section)
+    }
+
+    /// Counts none.
+    fn count_none(&mut self) {
+        self.counts.fill(0);
+        self.tally = Tally::default();
     }
 
     /// Makes the most frequent cause the main one.
@@ -116,11 +129,11 @@ pub struct Runs {
     runs: Vec<Run>,
     /// Per section: the number of its run plus one, or zero.
     member: Vec<u32>,
-    /// Per section of a run: what it was put down to.
-    causes: Vec<Causes>,
+    /// Per section of a run: why it fails.
+    failing: Vec<Failing>,
 }
 
-stateful!(Runs { lists: runs; slots: member, causes; fixed: first, join; });
+stateful!(Runs { lists: runs; slots: member, failing; fixed: first, join; });
 
 /// Context for updating runs.
 pub struct Telling<'a> {
@@ -138,8 +151,8 @@ impl Runs {
     /// Allocates: startup only; all that it will ever use.
     pub fn new(first: i64, count: usize, section_m: f64) -> Self {
         let join = headrace_geometry::math::floor_to_i64(JOIN_M / section_m + 1e-9).max(0) + 1;
-        let (member, causes) = (vec![0; count], vec![Causes::default(); count]);
-        Self { first, join, runs: Vec::with_capacity(count), member, causes }
+        let (member, failing) = (vec![0; count], vec![Failing::default(); count]);
+        Self { first, join, runs: Vec::with_capacity(count), member, failing }
     }
 
     /// All runs so far, by number.
@@ -157,54 +170,67 @@ impl Runs {
         self.member.get(self.slot(section)?).copied()?.checked_sub(1).map(RunId)
     }
 
-    /// Updates the state of a section: it fails for these causes, or doesn't fail (`None`).
+    /// Updates the state of a section: it fails, or doesn't (`None`).
     ///
     /// Allocates: never.
-    pub fn set(&mut self, section: i64, causes: Option<Causes>, telling: &mut Telling<'_>) {
-        match (self.of(section), causes) {
-            (Some(id), Some(causes)) => {
-                let before = self.causes_of(section);
-                self.put_down_to(section, causes);
-                if let Some(run) = self.runs.get_mut(id.0 as usize) {
-                    run.count_out(before);
-                    run.count_in(causes);
-                    run.choose();
-                }
+    pub fn set(&mut self, section: i64, failing: Option<Failing>, telling: &mut Telling<'_>) {
+        match (self.of(section), failing) {
+            (Some(id), Some(failing)) => {
+                let before = self.failing_at(section);
+                self.put_down_to(section, failing);
+                self.count_again(id, [&before, &failing]);
                 self.measure_again(id, section, telling);
                 (telling.tell)(id, RunChange::Changed);
             }
             (Some(id), None) => self.leave(section, id, telling),
-            (None, Some(causes)) => self.join(section, causes, telling),
+            (None, Some(failing)) => self.join(section, failing, telling),
             (None, None) => {}
         }
     }
 
-    /// What a section was put down to.
-    fn causes_of(&self, section: i64) -> Causes {
-        self.slot(section).and_then(|slot| self.causes.get(slot)).copied().unwrap_or_default()
+    /// Counts a section of a run otherwise than before.
+    fn count_again(&mut self, id: RunId, [before, now]: [&Failing; 2]) {
+        let Some(mut run) = self.get(id).copied() else { return };
+        let was_least = run.count_out(before);
+        if was_least && !run.tally.is_least(now) {
+            run.count_none();
+            let members = (run.from..run.to).filter(|index| self.of(*index) == Some(id));
+            members.for_each(|index| run.count_in(&self.failing_at(index)));
+        } else {
+            run.count_in(now);
+        }
+        run.choose();
+        if let Some(slot) = self.runs.get_mut(id.0 as usize) {
+            *slot = run;
+        }
     }
 
-    fn put_down_to(&mut self, section: i64, causes: Causes) {
-        if let Some(slot) = self.slot(section).and_then(|slot| self.causes.get_mut(slot)) {
-            *slot = causes;
+    /// Why a section fails.
+    fn failing_at(&self, section: i64) -> Failing {
+        self.slot(section).and_then(|slot| self.failing.get(slot)).copied().unwrap_or_default()
+    }
+
+    fn put_down_to(&mut self, section: i64, failing: Failing) {
+        if let Some(slot) = self.slot(section).and_then(|slot| self.failing.get_mut(slot)) {
+            *slot = failing;
         }
     }
 
     /// Adds a failed section to the runs beside it, merging them, or starts a run.
-    fn join(&mut self, section: i64, causes: Causes, telling: &mut Telling<'_>) {
+    fn join(&mut self, section: i64, failing: Failing, telling: &mut Telling<'_>) {
         let near = |side: i64| (1..=self.join).find_map(|step| self.of(section + side * step));
         let (kept, other) = match (near(-1), near(1)) {
             (Some(a), Some(b)) if a != b => (a.min(b), Some(a.max(b))),
             (Some(id), _) | (None, Some(id)) => (id, None),
             (None, None) => {
-                if let Some(id) = self.begin(section, causes, telling) {
+                if let Some(id) = self.begin(section, failing, telling) {
                     (telling.tell)(id, RunChange::Raised);
                 }
                 return;
             }
         };
         self.put(section, kept);
-        self.put_down_to(section, causes);
+        self.put_down_to(section, failing);
         self.add(kept, section, telling);
         if let Some(other) = other {
             self.merge(other, kept, telling.at);
@@ -222,7 +248,7 @@ impl Runs {
         let earlier = (run.from..section).rev().find(|index| self.of(*index) == Some(id));
         if let (Some(earlier), Some(later)) = (earlier, later)
             && later - earlier > self.join
-            && let Some(new) = self.begin(later, self.causes_of(later), telling)
+            && let Some(new) = self.begin(later, self.failing_at(later), telling)
         {
             for index in later..run.to {
                 if self.of(index) == Some(id) {
@@ -237,7 +263,7 @@ impl Runs {
         (telling.tell)(id, if open { RunChange::Changed } else { RunChange::Cleared });
     }
 
-    fn begin(&mut self, section: i64, causes: Causes, telling: &Telling<'_>) -> Option<RunId> {
+    fn begin(&mut self, section: i64, failing: Failing, telling: &Telling<'_>) -> Option<RunId> {
         if self.runs.len() == self.runs.capacity() {
             // More runs than sections so far: this section is still flagged, but in no run.
             return None;
@@ -246,8 +272,9 @@ impl Runs {
         let worst = (section, (telling.hole)(section)?);
         let (from, to, at) = (section, section + 1, telling.at);
         let mut run = Run {
-            cause: causes.iter().next().unwrap_or(Cause::Unknown),
+            cause: failing.causes.iter().next().unwrap_or(Cause::Unknown),
             counts: [0; Cause::ALL.len()],
+            tally: Tally::default(),
             from,
             to,
             failed: 1,
@@ -257,10 +284,10 @@ impl Runs {
             cleared: None,
             merged_into: None,
         };
-        run.count_in(causes);
+        run.count_in(&failing);
         self.runs.push(run);
         self.put(section, id);
-        self.put_down_to(section, causes);
+        self.put_down_to(section, failing);
         Some(id)
     }
 
@@ -275,20 +302,21 @@ impl Runs {
             kept.failed += run.failed;
             kept.worst = larger(kept.worst, run.worst);
             kept.counts.iter_mut().zip(run.counts).for_each(|(count, more)| *count += more);
+            kept.tally.join(&run.tally);
             kept.choose();
         }
         if let Some(run) = self.runs.get_mut(other.0 as usize) {
             (run.failed, run.changed, run.cleared, run.merged_into) = (0, at, Some(at), Some(kept));
-            run.counts.fill(0);
+            run.count_none();
         }
     }
 
     /// Updates a run for a section just added.
     fn add(&mut self, id: RunId, section: i64, telling: &Telling<'_>) {
-        let (hole, causes) = ((telling.hole)(section), self.causes_of(section));
+        let (hole, failing) = ((telling.hole)(section), self.failing_at(section));
         if let Some(run) = self.runs.get_mut(id.0 as usize) {
             run.failed += 1;
-            run.count_in(causes);
+            run.count_in(&failing);
             run.choose();
             run.changed = telling.at;
             run.worst = hole.map_or(run.worst, |hole| larger(run.worst, (section, hole)));
@@ -319,8 +347,8 @@ impl Runs {
         let (from, to) = ends.map_or((run.from, run.to), |(first, last)| (first, last + 1));
         let cleared = (failed == 0).then_some(telling.at);
         let mut now = Run { failed, worst, from, to, cleared, changed: telling.at, ..run };
-        now.counts.fill(0);
-        members().for_each(|index| now.count_in(self.causes_of(index)));
+        now.count_none();
+        members().for_each(|index| now.count_in(&self.failing_at(index)));
         now.choose();
         if let Some(run) = self.runs.get_mut(id.0 as usize) {
             *run = now;

@@ -393,9 +393,10 @@ impl Sections {
         let Self { sections, runs, first, .. } = self;
         let get = |index: i64| sections.get(usize::try_from(index - *first).ok()?);
         let flagged = get(request.section).filter(|section| section.is_flagged());
-        let causes = flagged.and_then(|section| section.evidence).map(|evidence| evidence.causes);
+        let evidence = flagged.and_then(|section| section.evidence);
+        let failing = evidence.as_ref().map(Evidence::failing);
         let hole = |index: i64| get(index)?.hole;
-        runs.set(request.section, causes, &mut Telling { at: request.at, hole: &hole, tell: judging.tell });
+        runs.set(request.section, failing, &mut Telling { at: request.at, hole: &hole, tell: judging.tell });
     }
 
     /// The causes of a hole, from the passages of the sections within T. Of a section that isn't left yet, those of the

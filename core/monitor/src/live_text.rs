@@ -5,7 +5,6 @@ use super::live_state::{Condition, Lamp, LiveMetres, LiveState, PositionDoubt, S
 use super::pilot_text::{AdviceFigures, actions_text, advice_text, cause_text, no_position_text, station};
 use super::telling::Told;
 pub use super::unsure_stretch::{helps_text, unsure_text};
-use headrace_coverage::Action;
 use headrace_geometry::time::DurNs;
 use headrace_geometry::tunnel::Profile;
 
@@ -234,8 +233,7 @@ pub fn told_line(told: &Told, profile: &Profile) -> PilotLine {
     match told {
         Told::Flag { from_m, missed, .. } => {
             let at_most_mps = missed.figures.again_mps(missed.v_max_mps);
-            let action =
-                actions_text(&Action::against(missed.figures.causes.iter()), missed.back_to_m, at_most_mps);
+            let action = actions_text(&missed.figures.actions(), missed.back_to_m, at_most_mps);
             let clock = profile.clock(missed.hole_arc_m);
             let what = format!(
                 "MISSED: {}, holes over {} m at {clock}",

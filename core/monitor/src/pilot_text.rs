@@ -6,7 +6,7 @@ use super::alerts::AlertKind;
 use super::live_state::LEAST_MPS;
 use serde::{Deserialize, Serialize};
 
-use headrace_coverage::{Action, Cause, Causes, Evidence, Run, Sections};
+use headrace_coverage::{Action, Again, Cause, Causes, Evidence, Run, Sections};
 use headrace_fusion::NoFix;
 use headrace_fusion::filter::suspicion::{Setting, SettingDoubt};
 use headrace_geometry::tunnel::Profile;
@@ -35,8 +35,8 @@ pub struct CauseFigures {
     pub middle_t_y_m: f64,
     /// Share of pings without a return.
     pub missing_share: f64,
-    /// The largest speed that meets the target with the heads as scheduled, and allows for returns that are lost, m/s; zero if none is known.
-    pub with_losses_mps: f64,
+    /// How to pass again, with the heads as scheduled.
+    pub again: Again,
     /// How far the beams swung along the tunnel between two passes, m.
     pub swing_m: f64,
     /// Heads that went by without a ping.
@@ -47,8 +47,8 @@ impl From<&Evidence> for CauseFigures {
     fn from(evidence: &Evidence) -> Self {
         let Evidence { causes, speed_mps, t_y_m, middle_t_y_m, missing_share, swing_m, silent_heads, .. } =
             *evidence;
-        let with_losses_mps = evidence.with_losses_mps;
-        Self { causes, speed_mps, t_y_m, middle_t_y_m, missing_share, with_losses_mps, swing_m, silent_heads }
+        let again = Again::of(&evidence.failing());
+        Self { causes, speed_mps, t_y_m, middle_t_y_m, missing_share, again, swing_m, silent_heads }
     }
 }
 
@@ -56,7 +56,8 @@ impl CauseFigures {
     /// Those of a run: of each cause that is named, the figures of the section that speaks for it.
     pub fn of_run(sections: &Sections, run: &Run) -> Option<Self> {
         let causes = run.named();
-        let mut figures = Self { causes, ..Self::from(&sections.evidence_of(run, run.cause)?) };
+        let main = Self::from(&sections.evidence_of(run, run.cause)?);
+        let mut figures = Self { causes, again: run.again(), ..main };
         for other in causes.iter().filter(|cause| *cause != run.cause) {
             if let Some(evidence) = sections.evidence_of(run, other) {
                 figures.take(other, &evidence);
@@ -72,9 +73,7 @@ impl CauseFigures {
             Cause::AngularStep | Cause::OffAxis => {
                 (self.t_y_m, self.middle_t_y_m, self.swing_m) = (from.t_y_m, from.middle_t_y_m, from.swing_m);
             }
-            Cause::MissingReturns => {
-                (self.missing_share, self.with_losses_mps) = (from.missing_share, from.with_losses_mps);
-            }
+            Cause::MissingReturns => self.missing_share = from.missing_share,
             Cause::HeadSilent => self.silent_heads = from.silent_heads,
             Cause::OutOfRange
             | Cause::NotPassed
@@ -90,14 +89,19 @@ impl CauseFigures {
     pub fn again_mps(&self, v_max_mps: f64) -> f64 {
         let mended =
             [Cause::HeadSilent, Cause::HeadStalled, Cause::Phase, Cause::AngularStep, Cause::OutOfRange];
-        let with_losses_mps = self.with_losses_mps;
-        if with_losses_mps <= 0.0 {
-            v_max_mps
+        let Again { at_most_mps, is_beyond_speed } = self.again;
+        if at_most_mps <= 0.0 {
+            if is_beyond_speed { 0.0 } else { v_max_mps }
         } else if mended.iter().any(|cause| self.causes.has(*cause)) {
-            with_losses_mps
+            at_most_mps
         } else {
-            v_max_mps.min(with_losses_mps)
+            v_max_mps.min(at_most_mps)
         }
+    }
+
+    /// What to change, for each of the causes.
+    pub fn actions(&self) -> Vec<Action> {
+        Action::against(self.causes.iter(), self.again.is_beyond_speed)
     }
 
     /// The main cause.
@@ -181,12 +185,13 @@ fn short_text(action: Action) -> &'static str {
         Action::Slower => "slower",
         Action::FinerMode => "in a finer mode",
         Action::LongerRange => "with a longer range",
-        Action::OtherSide => "rolled to either side",
+        Action::OtherSide => "once rolled to each side",
         Action::Middle => "in the middle and steady",
         Action::InPhase => "with the heads in phase",
         Action::Head => "with that head repaired",
         Action::HeadBack => "with what is silent back",
         Action::Position => "once the position is back",
+        Action::HigherGain => "with a higher gain",
         Action::Again => "from end to end",
     }
 }
@@ -199,9 +204,10 @@ pub fn action_text(action: Action, back_to_m: f64, at_most_mps: f64) -> String {
         // The speed is for the present mode and range setting.
         Action::FinerMode => return "slower won't help, a finer mode will".to_owned(),
         Action::LongerRange => return "set a longer range".to_owned(),
+        Action::HigherGain => return "slower won't help, a higher gain may".to_owned(),
         Action::Slower if at_most_mps > 0.0 => format!("{back}, then"),
         Action::Slower => back,
-        Action::OtherSide => format!("{back}, then rolled to either side,"),
+        Action::OtherSide => format!("{back}, then once rolled to each side,"),
         Action::Middle => format!("{back}, then in the middle and steady,"),
         // Slower, heads apart along the hull are out of phase again.
         Action::InPhase if at_most_mps > 0.0 => {
@@ -284,7 +290,7 @@ pub fn flag_text(missed: &Missed, profile: &Profile) -> String {
         station(*start_m),
         cause_text(figures),
         profile.clock(*hole_arc_m),
-        actions_text(&Action::against(figures.causes.iter()), *back_to_m, figures.again_mps(*v_max_mps)),
+        actions_text(&figures.actions(), *back_to_m, figures.again_mps(*v_max_mps)),
     )
 }
 
@@ -452,7 +458,7 @@ mod tests {
             assert!(!without.contains("m/s") && !without.ends_with([',', ' ']), "{without:?}");
             let with = at(action, 0.25);
             let speed = match action {
-                Action::FinerMode | Action::LongerRange => "",
+                Action::FinerMode | Action::LongerRange | Action::HigherGain => "",
                 Action::InPhase => "in phase, at 0.25 m/s",
                 _ => "at most 0.25 m/s",
             };
@@ -466,7 +472,7 @@ mod tests {
         assert_eq!(at(Action::Again, 0.0), "go back to 1+240.50, then from end to end");
         assert_eq!(
             actions_text(&[Action::Slower, Action::OtherSide, Action::Again], 1240.5, 0.25),
-            "go back to 1+240.50, then at most 0.25 m/s; and rolled to either side"
+            "go back to 1+240.50, then at most 0.25 m/s; and once rolled to each side"
         );
         let lost = [Action::Slower, Action::Position];
         let back = "once the position is back, go back to 1+240.50";

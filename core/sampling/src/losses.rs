@@ -16,6 +16,10 @@ const STRETCH_M: f64 = 0.25;
 const MAY_FAIL: f64 = 0.05;
 /// Most passes that are asked for: beyond, nobody waits, and the returns have to come back.
 pub const MOST_PASSES: f64 = 10.0;
+/// Chance below which a hole isn't taken to have come by chance.
+const HARDLY: f64 = 1e-3;
+/// Share of a hole's diameter, along and around, that the passes through it and their lost pings have to be wide.
+const INNER: f64 = 0.7;
 /// Shares of lost returns count at most as this: a head that hears one ping in a thousand hears nothing.
 const MOST_SHARE: f64 = 0.999;
 
@@ -91,6 +95,21 @@ impl Sampled {
         // The more passes, the more places at which they may fail together.
         let once = self.passes_for(places, along_m, heads);
         self.passes_for(places * once, along_m, heads)
+    }
+
+    /// Whether a hole of this diameter, m, may have come by chance where passes are `along_m` apart and heads lose so much by chance. Where it
+    /// can't, nothing comes back from that wall, and no speed helps.
+    ///
+    /// Source: `docs/coverage.md`, "Lost returns".
+    pub fn is_by_chance(&self, hole_m: f64, along_m: f64, rate: LossRate) -> bool {
+        let rate = rate.clamped();
+        if self.t_y_m <= 0.0 || along_m <= 0.0 {
+            return true;
+        }
+        let inner_m = INNER * hole_m;
+        let places = self.perimeter_m / self.t_y_m * STRETCH_M / along_m;
+        let chance = rate.chance_of_run((inner_m / self.t_y_m).max(1.0));
+        places.max(1.0) * power(chance, (inner_m / along_m).max(1.0)) >= HARDLY
     }
 
     /// Pings that must be lost for a pass to be lost as wide as the target, one at least.

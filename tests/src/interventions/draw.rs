@@ -12,6 +12,8 @@ use crate::random_dives::Draw;
 pub(super) const START_M: f64 = 3.0;
 /// How far a vehicle that doesn't turn back too early goes on, or one that does goes back, m.
 const ON_M: f64 = 4.5;
+/// Way over which it rolls when it is passed again rolled, m.
+const ROLLS_OVER_M: f64 = 1.0;
 
 /// What gives a position; none of it behind the hull.
 const SENSORS: &str = r#"[[sensors]]
@@ -113,6 +115,8 @@ struct Tunnel {
 pub struct Drawn {
     /// Number that it was drawn from.
     pub seed: u64,
+    /// Which noise its effects draw.
+    noise: u64,
     /// What is injected.
     pub injected: Vec<Injected>,
     /// Chainage of the far end, m.
@@ -134,7 +138,7 @@ pub struct Drawn {
     swaying: bool,
     /// A stretch passed at most so fast, m/s.
     at_most: Option<([f64; 2], f64)>,
-    /// A stretch passed again in the end, rolled so far to one side on the way back, then to the other, degrees.
+    /// A stretch passed again in the end, once rolled so far to each side, degrees.
     again: Option<([f64; 2], f64)>,
 }
 
@@ -224,6 +228,7 @@ impl Drawn {
         let length_m = (speed_mps * draw.between(110.0, 150.0)).clamp(9.0, 22.0);
         let mut drawn = Self {
             seed,
+            noise: seed,
             injected: Vec::new(),
             end_m: START_M + length_m,
             speed_mps,
@@ -244,6 +249,12 @@ impl Drawn {
             drawn.injected.push(injected);
         }
         drawn
+    }
+
+    /// The same dive with other noise, by its number.
+    #[must_use]
+    pub fn with_noise(&self, noise: u64) -> Self {
+        Self { noise: self.seed + 1_000_000 * noise, ..self.clone() }
     }
 
     /// The same dive without these causes, a stretch at most so fast (m/s), and perhaps passed again, rolled so far (degrees).
@@ -356,7 +367,7 @@ impl Drawn {
     /// The scene file with what `is_in` of the injected causes.
     pub fn scene(&self, is_in: &dyn Fn(usize) -> bool) -> String {
         let path = self.path(is_in);
-        let mut text = format!("seed = {}\nvehicle = \"vehicle.toml\"\n{}", self.seed, path.text());
+        let mut text = format!("seed = {}\nvehicle = \"vehicle.toml\"\n{}", self.noise, path.text());
         text.push_str(
             "[effects.motion_within_turn]\n[effects.range_noise]\nsd_m = 0.01\n\
              [effects.imu_noise]\ngyro_degps_rthz = 0.003\n",
@@ -405,13 +416,16 @@ impl Drawn {
         let last_m = if turns_back { self.end_m - ON_M } else { self.end_m + ON_M };
         points.push(self.point(&|_| false, last_m, last_m));
         if let Some(([from_m, to_m], roll_deg)) = self.again {
-            // Back, and forward again: the way back counts, too.
+            // Heads apart along the hull are in phase on the way there alone: who is to be rolled to each side goes over it twice.
             let from_m = from_m.max(START_M);
             let to_m = to_m.min(self.end_m + ON_M);
-            for (x_m, roll_deg) in
-                [(last_m - 0.2, -roll_deg), (from_m, -roll_deg), (from_m + 0.2, roll_deg), (to_m, roll_deg)]
-            {
-                points.push(Point { roll_deg, ..self.point(&|_| false, x_m, from_m) });
+            let sides_deg: &[f64] = if roll_deg > 0.0 { &[-roll_deg, roll_deg] } else { &[0.0] };
+            let mut at_m = last_m;
+            for roll_deg in sides_deg {
+                for x_m in [at_m - ROLLS_OVER_M, from_m, from_m + 0.2, to_m] {
+                    points.push(Point { roll_deg: *roll_deg, ..self.point(&|_| false, x_m, from_m) });
+                }
+                at_m = to_m;
             }
         }
         Path(points)

@@ -17,9 +17,20 @@ pub struct Count {
 }
 
 impl Count {
-    fn add(&mut self, right: bool) {
+    pub(super) fn add(&mut self, right: bool) {
         self.all += 1;
         self.right += u32::from(right);
+    }
+
+    /// The sum.
+    #[must_use]
+    pub(super) fn and(self, other: Self) -> Self {
+        Self { all: self.all + other.all, right: self.right + other.right }
+    }
+
+    /// "3 of 4 (75.0 %)".
+    pub fn text(self) -> String {
+        format!("{} of {} ({:.1} %)", self.right, self.all, 100.0 * self.share())
     }
 
     /// Share of right ones; 1 of nothing.
@@ -115,8 +126,7 @@ impl Matrix {
             ("the same, or what is told alone brings holes within 1.05 of the target", self.close_pairs),
             ("stretches of at most one run", self.one_run),
         ] {
-            writeln!(text, "{what}: {} of {} ({:.1} %)", count.right, count.all, 100.0 * count.share())
-                .unwrap();
+            writeln!(text, "{what}: {}", count.text()).unwrap();
         }
         writeln!(text, "dives without a failed section: {}", self.idle).unwrap();
         text

@@ -6,6 +6,7 @@
 //! used here: simulations alone decide.
 
 mod draw;
+mod knowing;
 mod matrix;
 mod remedy;
 
@@ -14,6 +15,7 @@ use headrace_monitor::report::{Report, SectionReport};
 
 use crate::scenes;
 pub use draw::{Drawn, Injected, KINDS};
+pub use knowing::Knowing;
 pub use matrix::Matrix;
 pub use remedy::remedies;
 
@@ -128,10 +130,7 @@ pub fn intervene(seed: u64, kinds: &[usize]) -> Intervened {
     let mut sections = Vec::new();
     for section in all.sections.iter().filter(is_inner) {
         let Some(evidence) = section.cause.as_ref().filter(|_| section.verdict == "fail") else { continue };
-        let hole_m = |report: &Report| {
-            let same = report.sections.iter().find(|other| (other.start_m - section.start_m).abs() < 1e-6);
-            same.and_then(|same| same.hole_m).unwrap_or(f64::INFINITY)
-        };
+        let hole_m = |report: &Report| hole_at_m(report, section.start_m);
         let without_m: Vec<f64> = without.iter().map(hole_m).collect();
         let passes = |report: &Report| hole_m(report) <= drawn.target_m;
         let Some(right) =
@@ -154,6 +153,12 @@ pub fn intervene(seed: u64, kinds: &[usize]) -> Intervened {
         });
     }
     Intervened { drawn, report: all, sections }
+}
+
+/// Diameter of the hole of the section that begins there, m; infinite where there is no hole to be measured.
+fn hole_at_m(report: &Report, start_m: f64) -> f64 {
+    let same = report.sections.iter().find(|other| (other.start_m - start_m).abs() < 1e-6);
+    same.and_then(|same| same.hole_m).unwrap_or(f64::INFINITY)
 }
 
 /// The causes told of a section, sorted.

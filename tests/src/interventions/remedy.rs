@@ -3,7 +3,7 @@
 use headrace_coverage::Action;
 use headrace_monitor::report::ReturnReport;
 
-use super::{Injected, Intervened, Judged, report};
+use super::{Injected, Intervened, Judged, hole_at_m, report};
 
 /// How much more than the stretch is passed otherwise, m: heads sit apart along the hull.
 const ROOM_M: f64 = 2.0;
@@ -15,6 +15,8 @@ const ROLLED_DEG: f64 = 75.0;
 pub struct Remedied {
     /// What was told.
     pub told: ReturnReport,
+    /// Holes of its sections then, by where they begin, m; infinite where there is none to be measured.
+    pub then_m: Vec<[f64; 2]>,
     /// Whether all of its sections then meet the target.
     pub clears: bool,
 }
@@ -30,6 +32,7 @@ fn mends(action: Action, injected: &Injected) -> bool {
         Action::HeadBack => matches!(injected, Injected::HeadSilent { .. }),
         Action::Position => matches!(injected, Injected::PositionLost { .. }),
         Action::Again => *injected == Injected::NotPassed,
+        Action::HigherGain => matches!(injected, Injected::MissingReturns { .. }),
         Action::Slower | Action::OtherSide => false,
     }
 }
@@ -55,10 +58,12 @@ fn remedy(dive: &Intervened, told: &ReturnReport, sections: &[Judged]) -> Remedi
     } else {
         (has(Action::Again) && !turned_back).then_some(0.0)
     };
-    let then = report(&dive.drawn.changed(&mended, over_m, told.at_most_mps, again_deg), &|_| true);
-    let clears = sections.iter().all(|section| {
-        let same = then.sections.iter().find(|other| (other.start_m - section.ends_m[0]).abs() < 1e-6);
-        same.and_then(|same| same.hole_m).is_some_and(|hole_m| hole_m <= dive.drawn.target_m)
-    });
-    Remedied { told: told.clone(), clears }
+    // Slower without a speed is the planned one, in other settings of the heads.
+    let at_most_mps =
+        if told.at_most_mps > 0.0 || !has(Action::Slower) { told.at_most_mps } else { dive.drawn.speed_mps };
+    let then = report(&dive.drawn.changed(&mended, over_m, at_most_mps, again_deg), &|_| true);
+    let then_m: Vec<[f64; 2]> =
+        sections.iter().map(|section| [section.ends_m[0], hole_at_m(&then, section.ends_m[0])]).collect();
+    let clears = then_m.iter().all(|[_, hole_m]| *hole_m <= dive.drawn.target_m);
+    Remedied { told: told.clone(), then_m, clears }
 }

@@ -1,6 +1,6 @@
 //! Causes by intervention: a tenth of the bench's dives, and what is told of them.
 
-use headrace_tests::interventions::{Matrix, intervene, kinds};
+use headrace_tests::interventions::{Matrix, intervene, kinds, remedies};
 
 const DIVES: u64 = 50;
 
@@ -11,18 +11,27 @@ fn what_is_told_of_a_fail_is_what_removed_lets_the_section_pass() {
     let of_thread = |thread: u64| -> Vec<_> {
         (0..DIVES)
             .filter(|seed| seed % threads == thread)
-            .map(|seed| intervene(10 * seed + seed % 2, &kinds(10 * seed + seed % 2)))
+            .map(|seed| {
+                let dive = intervene(10 * seed + seed % 2, &kinds(10 * seed + seed % 2));
+                // Of every other two, what was told to do is done.
+                let done = if seed % 4 < 2 { remedies(&dive) } else { Vec::new() };
+                (dive, done)
+            })
             .collect()
     };
     let dives = std::thread::scope(|scope| {
         let running: Vec<_> = (0..threads).map(|thread| scope.spawn(move || of_thread(thread))).collect();
         running.into_iter().flat_map(|thread| thread.join().unwrap()).collect::<Vec<_>>()
     });
-    for dive in &dives {
+    let (mut runs, mut cleared) = (0, 0);
+    for (dive, done) in &dives {
         matrix.add(dive);
+        runs += done.len();
+        cleared += done.iter().filter(|remedied| remedied.clears).count();
     }
-    let text = matrix.text();
+    let text = format!("{}runs cleared by what was told to do: {cleared} of {runs}\n", matrix.text());
     println!("{text}");
+    assert!(runs >= 20 && 10 * cleared >= 9 * runs, "remedies\n{text}");
     assert!(matrix.sections[0].all > 300 && matrix.stretches[1].all > 25, "too few fails\n{text}");
     assert!(matrix.sections[0].share() >= 0.95, "sections, one cause\n{text}");
     assert!(matrix.stretches[1].share() >= 0.65, "stretches, two causes\n{text}");

@@ -1,10 +1,12 @@
 //! What a section's hole would have been without some of the factors that were present.
 
 use super::case::{Case, HELPS, Seen, WIDEST, is_dark, is_passed, is_unheard};
+use super::is_in;
 use crate::cause::Cause;
 use crate::causes::Causes;
 use crate::frontier::Reach;
 use crate::hole::{HoleFinder, Otherwise};
+use crate::lacks::Lack;
 use crate::passage::Drive;
 use crate::store::SampleStore;
 use headrace_geometry::math;
@@ -33,11 +35,13 @@ pub(super) struct Trial<'a> {
     seen: &'a Seen,
     store: &'a SampleStore,
     finder: &'a mut HoleFinder,
-    /// The factors that were present.
+    /// The factors that were present, and those of them for which samples are lacking.
     present: Causes,
+    lacking: Causes,
     left: u32,
-    /// Diameter of the hole with all that is lacking put back, m, once it has been looked for.
-    full_m: Option<f64>,
+    /// Between what the diameter of the hole with all that is lacking put back is known to be, m, and how often that may still be halved.
+    full_m: [f64; 2],
+    halvings: u32,
 }
 
 impl<'a> Trial<'a> {
@@ -49,7 +53,25 @@ impl<'a> Trial<'a> {
         present: Causes,
     ) -> Self {
         let drive = &seen.worst;
-        Self { case, drive, seen, store, finder, present, left: MOST_TRIED, full_m: None }
+        let lacking = [
+            Cause::OutOfRange,
+            Cause::MissingReturns,
+            Cause::Occluded,
+            Cause::HeadSilent,
+            Cause::HeadStalled,
+            Cause::PositionLost,
+        ];
+        let lacking: Causes = lacking.into_iter().filter(|cause| present.has(*cause)).collect();
+        let most_m = case.hole.diameter_m.min(WIDEST * case.target_m);
+        let [from_m, to_m] = [-0.5, 0.5].map(|side| case.hole.x_m + side * case.hole.diameter_m);
+        // What would be put back elsewhere leaves it as large.
+        let fills = |lack: &Lack| {
+            lack.why.is_within(lacking) && is_in(case.hole, case.hole.diameter_m, store.perimeter_m(), lack)
+        };
+        let is_whole = most_m <= case.target_m || !case.lacks.between(from_m, to_m).any(fills);
+        let full_m = if is_whole { [case.hole.diameter_m; 2] } else { [case.target_m / 2.0, most_m] };
+        let halvings = if is_whole { 0 } else { SEARCHED };
+        Self { case, drive, seen, store, finder, present, left: MOST_TRIED, lacking, full_m, halvings }
     }
 
     /// The smallest set among the factors present without which the section would have met the target.
@@ -64,54 +86,49 @@ impl<'a> Trial<'a> {
             self.present = self.present.iter().filter(|cause| !is_driven(cause)).collect();
             self.present = self.present.union(surely);
         }
+        if let Some(alone) = self.alone(surely) {
+            return alone;
+        }
         let present = self.present;
         if present.is_empty() || !self.passes_without(present, AT_MOST) {
             return if surely.is_empty() { Causes::of(Cause::Unknown) } else { surely };
         }
-        // Nothing else is known of wall that wasn't passed.
-        let not_passed = Causes::of(Cause::NotPassed);
-        if not_passed.is_within(present) && self.passes_without(not_passed, 1.0) {
-            return not_passed;
-        }
-        // Nor of heads that were never there.
-        if is_unheard(self.case, self.seen) && self.passes_without(silent, 1.0) {
-            return silent;
-        }
-        // A speed is changed most easily: what the planned one would have mended is put down to that.
-        let phase = Causes::of(Cause::Phase);
-        let is_short = self.is_short();
-        if phase.is_within(present)
-            && !is_short
-            && self.drive.is_slow_out_of_phase(1.0 / HELPS)
-            && self.passes_without(phase, 1.0)
-        {
-            return phase;
-        }
-        let (lost, is_only_adrift) = (Causes::of(Cause::PositionLost), self.is_only_adrift());
-        let mut needed = surely;
-        for size in 1..=present.len().min(MOST_NAMED) {
-            if size == 2 {
-                needed = surely.union(self.needed(present));
-            }
-            let sets = (1..=present.bits())
-                .filter(|bits| bits & !present.bits() == 0 && bits.count_ones() == size)
-                .map(Causes::from_bits);
-            // Of single ones those that may only seem to explain it come last.
-            let last = [(is_only_adrift, lost), (is_short, phase)];
-            let is_last = |set: &Causes| size == 1 && last.iter().any(|(is, last)| *is && set == last);
-            let fit = |set: &Causes| {
-                set.len() == size && set.is_within(present) && needed.is_within(*set) && !is_last(set)
-            };
-            let of_last =
-                |(is, set): (bool, Causes)| (size == 1 && is && set.is_within(present)).then_some(set);
-            let sets = self.case.beside.into_iter().chain(sets).filter(fit);
-            for set in sets.chain(last.into_iter().filter_map(of_last)) {
+        let needed = surely.union(self.needed(present));
+        for size in 2..=present.len().min(MOST_NAMED) {
+            let fit = |set: &Causes| set.len() == size && set.is_within(present) && needed.is_within(*set);
+            let sets = (1..=present.bits()).filter(|bits| bits & !present.bits() == 0).map(Causes::from_bits);
+            for set in self.case.beside.into_iter().chain(sets).filter(fit) {
                 if self.passes_without(set, 1.0) {
                     return set;
                 }
             }
         }
         present
+    }
+
+    /// The one factor without which the section would have met the target, if any is enough; the one that is sure where there is one.
+    fn alone(&mut self, surely: Causes) -> Option<Causes> {
+        let [not_passed, silent, phase, lost] =
+            [Cause::NotPassed, Cause::HeadSilent, Cause::Phase, Cause::PositionLost].map(Causes::of);
+        let is_short = self.is_short();
+        let first = [
+            // Nothing else is known of wall that wasn't passed.
+            (true, not_passed),
+            // Nor of heads that were never there.
+            (is_unheard(self.case, self.seen), silent),
+            // A speed is changed most easily: what the planned one would have mended is put down to that.
+            (!is_short && self.drive.is_slow_out_of_phase(1.0 / HELPS), phase),
+        ];
+        // Those that may only seem to explain it come last.
+        let last = [(self.is_only_adrift(), lost), (is_short, phase)];
+        let present = self.present;
+        let is_last = |set: &Causes| last.iter().any(|(is, last)| *is && set == last);
+        let fit = |set: &Causes| set.len() == 1 && surely.is_within(*set) && !is_last(set);
+        let others = self.case.beside.into_iter().chain(present.iter().map(Causes::of)).filter(fit);
+        let those = |(is, set): (bool, Causes)| is.then_some(set);
+        let in_turn =
+            first.into_iter().filter_map(those).chain(others).chain(last.into_iter().filter_map(those));
+        in_turn.filter(|set| set.is_within(present)).find(|set| self.passes_without(*set, 1.0))
     }
 
     /// Whether a head is silent or has stood still: those that are left turn out of phase without it.
@@ -208,40 +225,26 @@ impl<'a> Trial<'a> {
         [now, now.without(removed, MARGIN * self.case.target_m, all_turn)]
     }
 
-    /// Diameter of the hole with all that is lacking put back, m: what the figures of driving have to explain.
-    fn full_m(&mut self) -> f64 {
-        let diameter_m = self.case.hole.diameter_m;
-        if let Some(full_m) = self.full_m {
-            return full_m;
-        }
-        let lacking = [
-            Cause::OutOfRange,
-            Cause::MissingReturns,
-            Cause::Occluded,
-            Cause::HeadSilent,
-            Cause::HeadStalled,
-            Cause::PositionLost,
-        ];
-        let lacking: Causes = lacking.into_iter().filter(|cause| self.present.has(*cause)).collect();
-        let most_m = diameter_m.min(WIDEST * self.case.target_m);
-        let mut full_m = diameter_m;
-        if !lacking.is_empty() && most_m > self.case.target_m {
+    /// What the figures of driving have to explain: the diameter of the hole with all that is lacking put back, m, as nearly as it matters where
+    /// it lies between two.
+    fn full_m(&mut self, [least_m, most_m]: [f64; 2]) -> f64 {
+        let matters = |[smaller_m, larger_m]: [f64; 2]| smaller_m < most_m && larger_m > least_m;
+        if least_m < most_m && self.halvings > 0 && matters(self.full_m) {
             let otherwise = Otherwise { to_come: self.to_come(), ..Otherwise::NOTHING };
-            self.lay(lacking, most_m / 2.0, &otherwise);
-            let bounds_m = self.case.bounds_m;
-            let (mut least_m, mut larger_m) = (self.case.target_m / 2.0, most_m);
-            for _ in 0..SEARCHED {
-                let tried_m = math::sqrt(least_m * larger_m);
-                if self.finder.has_circle_otherwise(bounds_m, tried_m / 2.0, &otherwise) {
-                    least_m = tried_m;
+            let [mut smaller_m, mut larger_m] = self.full_m;
+            self.lay(self.lacking, larger_m / 2.0, &otherwise);
+            while self.halvings > 0 && matters([smaller_m, larger_m]) {
+                self.halvings -= 1;
+                let tried_m = math::sqrt(smaller_m * larger_m);
+                if self.finder.has_circle_otherwise(self.case.bounds_m, tried_m / 2.0, &otherwise) {
+                    smaller_m = tried_m;
                 } else {
                     larger_m = tried_m;
                 }
             }
-            full_m = larger_m;
+            self.full_m = [smaller_m, larger_m];
         }
-        self.full_m = Some(full_m);
-        full_m
+        self.full_m[1]
     }
 
     /// Where samples may still land; beyond the end of what was passed, the wall isn't as it is before.
@@ -271,9 +274,10 @@ impl<'a> Trial<'a> {
         let ratio = |then: f64, was: f64| if was > 0.0 { (then / was).clamp(LEAST, MOST) } else { 1.0 };
         let is_drawn = [Cause::TooFast, Cause::OffAxis, Cause::Phase].iter().any(|cause| removed.has(*cause));
         // Figures of one moment don't explain more than the hole.
-        let hole_m = if is_drawn { self.full_m() } else { self.case.hole.diameter_m };
+        let [now_m, then_m] = [now.along_m(), then.along_m()];
+        let hole_m = if is_drawn { self.full_m([then_m, now_m]) } else { self.case.hole.diameter_m };
         Otherwise {
-            along: ratio(then.along_m(), now.along_m().min(hole_m.max(then.along_m()))),
+            along: ratio(then_m, now_m.min(hole_m.max(then_m))),
             around: ratio(then.t_y_m, now.t_y_m),
             covered,
             to_come,

@@ -7,7 +7,7 @@ const COUNT: i64 = 60;
 /// Runs, and the section states that they are checked against.
 struct Rig {
     runs: Runs,
-    causes: Vec<Option<Causes>>,
+    failing: Vec<Option<Failing>>,
     holes: Vec<f64>,
     told: Vec<(RunId, RunChange)>,
 }
@@ -17,7 +17,7 @@ impl Rig {
         let count = usize::try_from(COUNT).unwrap();
         Self {
             runs: Runs::new(-5, count, 0.25),
-            causes: vec![None; count],
+            failing: vec![None; count],
             holes: vec![0.0; count],
             told: Vec::new(),
         }
@@ -29,7 +29,10 @@ impl Rig {
 
     fn say_all(&mut self, section: i64, causes: Option<Causes>, diameter_m: f64) {
         let slot = usize::try_from(section + 5).unwrap();
-        (self.causes[slot], self.holes[slot]) = (causes, diameter_m);
+        // Some speed mends all but the largest holes.
+        let again_mps = if diameter_m < 1.0 { 0.1 * diameter_m } else { 0.0 };
+        let failing = causes.map(|causes| Failing { causes, again_mps });
+        (self.failing[slot], self.holes[slot]) = (failing, diameter_m);
         let Self { runs, holes, told, .. } = self;
         let hole = |index: i64| {
             let diameter_m = *holes.get(usize::try_from(index + 5).ok()?)?;
@@ -43,12 +46,13 @@ impl Rig {
             })
         };
         let mut tell = |id, change| told.push((id, change));
-        runs.set(section, causes, &mut Telling { at: MonoNs(1), hole: &hole, tell: &mut tell });
+        runs.set(section, failing, &mut Telling { at: MonoNs(1), hole: &hole, tell: &mut tell });
     }
 
     /// Checks every open run against the sections.
     fn check(&self) {
-        let causes = |index: i64| self.causes[usize::try_from(index + 5).unwrap()];
+        let failing = |index: i64| self.failing[usize::try_from(index + 5).unwrap()];
+        let causes = |index: i64| failing(index).map(|failing| failing.causes);
         let indexes = || -5..COUNT - 5;
         for index in indexes() {
             let run = self.runs.of(index).map(|id| self.runs.get(id).unwrap());
@@ -73,6 +77,20 @@ impl Rig {
             }
             let having =
                 |cause: Cause| members.iter().filter(|index| causes(**index).unwrap().has(cause)).count();
+            let speeds = || members.iter().map(|index| failing(*index).unwrap().again_mps);
+            let mended = speeds().filter(|mps| *mps > 0.0);
+            let least_mps = mended.clone().reduce(f64::min).filter(|_| 2 * mended.count() >= members.len());
+            let missing = |index: &&i64| causes(**index).unwrap().has(Cause::MissingReturns);
+            let beyond =
+                members.iter().filter(missing).filter(|index| failing(**index).unwrap().again_mps <= 0.0);
+            let beyond = beyond.count();
+            assert_eq!(
+                run.again(),
+                Again {
+                    at_most_mps: least_mps.unwrap_or(0.0),
+                    is_beyond_speed: beyond > 0 && 10 * beyond >= members.len()
+                }
+            );
             for cause in Cause::ALL {
                 assert_eq!(run.count(cause) as usize, having(cause));
                 assert!(having(run.cause) >= having(cause), "{cause:?} is more frequent in run {number}");
@@ -146,7 +164,8 @@ proptest! {
         let mut rig = Rig::new();
         for (section, cause, diameter_m) in said {
             let both = Causes::of(Cause::TooFast).with(Cause::Phase);
-            let causes = [None, Some(Causes::of(Cause::TooFast)), Some(both), Some(Causes::of(Cause::Phase))];
+            let lost = Causes::of(Cause::MissingReturns);
+            let causes = [None, Some(Causes::of(Cause::TooFast)), Some(both), Some(lost)];
             rig.say_all(section, causes[usize::from(cause)], diameter_m);
         }
         // So many changes may exhaust the run numbers; then sections are in no run.

@@ -6,7 +6,7 @@ use crate::pilot_text::{
     actions_text, advice_text, alert_text, cause_text, no_position_text, setting_text, speed_text, station,
 };
 use crate::unsure_stretch::{UnsureStretch, helps_text, unsure_text};
-use headrace_coverage::{Action, Sections, Stretch};
+use headrace_coverage::{Sections, Stretch};
 use headrace_geometry::tunnel::Profile;
 
 /// What words need of the dive.
@@ -112,7 +112,7 @@ impl ListedAlert {
             (_, Figures::Missed(causes, _, v_max_mps)) => {
                 let from_m = self.bounds_m(around.section_m).0.unwrap_or(0.0);
                 let back_to_m = around.sections.back_to_m(from_m);
-                actions_text(&Action::against(causes.causes.iter()), back_to_m, causes.again_mps(*v_max_mps))
+                actions_text(&causes.actions(), back_to_m, causes.again_mps(*v_max_mps))
             }
             (_, Figures::CannotSay(stretch)) => helps_text(&around.unsure(stretch)),
             (ListKind::TooFast, Figures::Advice(figures)) => speed_text("at most", figures.v_max_mps),

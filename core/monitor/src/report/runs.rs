@@ -5,7 +5,7 @@ use serde::Serialize;
 use crate::app::SourceInfo;
 use crate::pilot_text::CauseFigures;
 use crate::run::Loop;
-use headrace_coverage::{Action, Cause, Evidence, Run, RunId, Runs, Sections, Verdict};
+use headrace_coverage::{Action, Again, Cause, Run, RunId, Runs, Sections, Verdict};
 use headrace_geometry::time::MonoNs;
 use headrace_sensor::device::{SensorInfo, SensorKind};
 
@@ -61,7 +61,7 @@ pub struct ReturnReport {
     pub actions: Vec<Action>,
     /// Maximum speed then, m/s: the planned one where that meets the target; zero if none does in this mode.
     pub at_most_mps: f64,
-    /// Seconds at that speed.
+    /// Seconds at that speed, twice over it where it is to be passed rolled to each side.
     pub takes_s: Option<f64>,
 }
 
@@ -118,19 +118,17 @@ pub fn way_home(sections: &Sections) -> Vec<ReturnReport> {
 
 fn stop(sections: &Sections, id: RunId, run: &Run) -> ReturnReport {
     let (to_m, from_m) = (sections.bounds_m(run.from).0, sections.bounds_m(run.to - 1).1);
-    let flagged = |index: i64| sections.get(index).filter(|section| section.is_flagged())?.evidence;
-    let evidence = (run.from..run.to).filter_map(flagged);
-    let speeds = evidence.map(|evidence: Evidence| evidence.with_losses_mps).filter(|mps| *mps > 0.0);
-    let at_most_mps = speeds.reduce(f64::min).unwrap_or(0.0);
-    let takes_s = (at_most_mps > 0.0).then(|| (from_m - to_m) / at_most_mps);
-    let actions = Action::against(run.causes());
+    let Again { at_most_mps, is_beyond_speed } = run.again();
+    let actions = Action::against(run.causes(), is_beyond_speed);
+    let times = if actions.contains(&Action::OtherSide) { 2.0 } else { 1.0 };
+    let takes_s = (at_most_mps > 0.0).then(|| times * (from_m - to_m) / at_most_mps);
     let back_to_m = sections.back_to_m(to_m);
     ReturnReport {
         run: id.0,
         from_m,
         to_m,
         back_to_m,
-        action: Action::of(run.cause),
+        action: actions.first().copied().unwrap_or(Action::Again),
         actions,
         at_most_mps,
         takes_s,

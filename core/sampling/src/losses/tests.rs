@@ -148,3 +148,23 @@ fn without_losses_or_without_a_speed_it_asks_for_nothing() {
     // Steps longer than the target: no speed is to be divided.
     assert!((passes(0.6, &[LossRate::independent(0.5)]) - 1.0).abs() <= 0.0);
 }
+
+/// What is lost by chance makes small holes often and large ones never; where nothing is lost by chance, no hole is.
+#[test]
+fn a_hole_came_by_chance_where_its_losses_can_have_met() {
+    let hole = |hole_m: f64, rate: LossRate| sampled(0.1).is_by_chance(hole_m, 0.3, rate);
+    let often = LossRate { share: 0.3, after_lost: 0.6 };
+    assert!(hole(0.55, often), "one pass and three pings");
+    assert!(!hole(2.0, often), "nearly five passes, each of fourteen pings");
+    let [never, runs] = [LossRate::default(), LossRate { share: 0.58, after_lost: 0.98 }];
+    assert!(!hole(0.55, never));
+    assert!(hole(2.0, runs), "most of each turn is lost in long runs");
+    // The same hole is likelier where more is lost, and where it is smaller.
+    for share in 1..9 {
+        let rate = LossRate::independent(f64::from(share) / 10.0);
+        let largest = |from: i32| (from..60).rev().find(|n| hole(f64::from(*n) / 20.0, rate)).unwrap_or(0);
+        let more = LossRate::independent(f64::from(share + 1) / 10.0);
+        let of_more = (0..60).rev().find(|n| hole(f64::from(*n) / 20.0, more)).unwrap_or(0);
+        assert!(of_more >= largest(0) && (1..=largest(0)).all(|n| hole(f64::from(n) / 20.0, rate)));
+    }
+}

@@ -28,7 +28,7 @@ mod wall;
 #[cfg(test)]
 mod tests;
 
-use headrace_coverage::{Cause, Causes, Verdict};
+use headrace_coverage::{Again, Cause, Causes, Failing, Verdict};
 use headrace_fusion::NoFix;
 use headrace_geometry::frames::{Body, Rot, Tunnel};
 use headrace_geometry::time::{DurNs, MonoNs};
@@ -212,17 +212,18 @@ impl View {
         let figures = words.numbers().zip(cause);
         let silent = words.integer().and_then(|bits| u8::try_from(bits).ok()).map(HeadSet::from_bits);
         let causes = words.integer().and_then(|bits| u16::try_from(bits).ok()).map(Causes::from_bits);
-        let with_losses_mps = words.number().unwrap_or(0.0);
+        let again_mps = words.number().unwrap_or(0.0);
         let cause = figures.map(|([speed_mps, t_y_m, middle_t_y_m, missing_share, swing_m], cause)| {
             let silent_heads = silent.unwrap_or_default();
             let causes = causes.unwrap_or(Causes::of(cause));
+            let again = Again::of(&Failing { causes, again_mps });
             CauseFigures {
                 causes,
                 speed_mps,
                 t_y_m,
                 middle_t_y_m,
                 missing_share,
-                with_losses_mps,
+                again,
                 swing_m,
                 silent_heads,
             }

@@ -1,0 +1,67 @@
+//! What the best of tellers could tell: one who knows what was injected, and simulates the very dive without each of it, with other noise than
+//! the judge. How often it is right bounds what can be told from a dive.
+
+use std::collections::BTreeMap;
+
+use headrace_coverage::Cause;
+
+use super::matrix::Count;
+use super::{Intervened, Right, hole_at_m, report, right};
+
+/// Noises that it tries.
+const NOISES: u64 = 3;
+
+/// How often a teller who knows all but the noise is right about dives with two causes.
+#[derive(Debug, Default, Clone, Copy)]
+pub struct Knowing {
+    /// Stretches.
+    pub stretches: Count,
+    /// Stretches whose true set is two.
+    pub pairs: Count,
+}
+
+impl Knowing {
+    /// Adds a dive; one with a single cause says nothing.
+    pub fn add(&mut self, dive: &Intervened) {
+        if dive.drawn.injected.len() < 2 {
+            return;
+        }
+        let told: Vec<Vec<Right>> = (1..=NOISES).map(|noise| dive.with_noise(noise)).collect();
+        let mut from = 0;
+        for stretch in dive.stretches() {
+            let of_stretch = from..from + stretch.sections.len();
+            from = of_stretch.end;
+            let sets = told.iter().flat_map(|told| &told[of_stretch.clone()]).flatten();
+            let mut counts: BTreeMap<Vec<usize>, u32> = BTreeMap::new();
+            for set in sets {
+                *counts.entry(set.iter().map(|cause| *cause as usize).collect()).or_default() += 1;
+            }
+            let most = counts.into_iter().max_by_key(|(_, count)| *count).map(|(set, _)| set);
+            let numbers = |set: &Vec<Cause>| set.iter().map(|cause| *cause as usize).collect::<Vec<_>>();
+            let is_right = most.is_some_and(|most| stretch.right.iter().any(|set| numbers(set) == most));
+            self.stretches.add(is_right);
+            if stretch.right.iter().all(|set| set.len() > 1) {
+                self.pairs.add(is_right);
+            }
+        }
+    }
+
+    /// Adds up.
+    #[must_use]
+    pub fn and(self, other: Self) -> Self {
+        Self { stretches: self.stretches.and(other.stretches), pairs: self.pairs.and(other.pairs) }
+    }
+}
+
+impl Intervened {
+    /// The sets of causes that are right of each section, had the noise of the dives without each cause been another one.
+    fn with_noise(&self, noise: u64) -> Vec<Right> {
+        let drawn = self.drawn.with_noise(noise);
+        let without = [0, 1].map(|k| report(&drawn, &|other| other != k));
+        let right_of = |start_m: f64| {
+            let alone = without.iter().map(|report| hole_at_m(report, start_m) <= drawn.target_m);
+            right(&drawn, &alone.collect::<Vec<_>>(), true).unwrap_or_default()
+        };
+        self.sections.iter().map(|section| right_of(section.ends_m[0])).collect()
+    }
+}
