@@ -17,7 +17,7 @@ use headrace_vehicle::VehicleConfig;
 
 use crate::cli::{Demo, Output, Replay, Run, Speed};
 use crate::devices::KINDS;
-use crate::dive::{Clock, Dive, Recording, WhatIf, assemble_followed};
+use crate::dive::{Clock, Dive, Recording, assemble_followed};
 use crate::expect::{self, Golden};
 use crate::failure::{self, Failure};
 use crate::feeds::Interruptible;
@@ -37,6 +37,7 @@ use crate::terminal;
 use crate::tui;
 use crate::vehicle_file::{self, Given};
 use crate::watch::{Show, Watch};
+use crate::what_if;
 
 /// `headrace demo`.
 pub(crate) fn demo(args: &Demo) -> Result<u8, Failure> {
@@ -167,18 +168,18 @@ pub(crate) fn replay(args: &Replay) -> Result<u8, Failure> {
     let golden = args.expect.as_deref().filter(|_| !args.bless).map(Golden::read).transpose()?;
     let mut player = Player::open(&files)?;
     let (text, mut vehicle) = given.or_attached(player.info(), &player.losses(), log)?;
-    let what_if = what_if(args, &mut vehicle);
+    set(args, &mut vehicle);
     let has_keys = args.following.may_command() || args.interactive && play::has_keys();
     let usual = Speed(if has_keys { Some(1.0) } else { None });
     let pace =
         Pace { tick: DurNs::from_millis(i64::from(args.tick_ms)), speed: args.speed.unwrap_or(usual).0 };
     let mut served = None;
     let mut report = if args.smooth {
-        smooth::smoothed(&files, &mut player, (&vehicle, &text), (pace, args.threads.of_replay()), what_if)?
+        smooth::smoothed(&files, &mut player, (&vehicle, &text), (pace, args.threads.of_replay()))?
     } else {
         let is_watched = pace.speed.is_some() && !terminal::is_quiet();
         let is_served = page::is_wanted(&args.page, is_watched);
-        let dive = assemble_followed(&vehicle, &text, None, is_served)?.asking(what_if);
+        let dive = assemble_followed(&vehicle, &text, None, is_served)?;
         player.connect(dive.armed.sources());
         let (sender, commands) = unbounded();
         let followers = Followers::of(&args.following)?;
@@ -216,6 +217,7 @@ pub(crate) fn replay(args: &Replay) -> Result<u8, Failure> {
         served.end(&report);
     }
     note_losses(&mut report, log, &player);
+    report.what_if = what_if::reports(args, &files, (vehicle, &text), &report)?;
     let code = finish(&report, &args.output)?;
     if let Some(path) = args.expect.as_deref().filter(|_| args.bless) {
         expect::bless(&report, path)?;
@@ -267,15 +269,9 @@ fn claim_of_replay(args: &Replay, logs: &[PathBuf], given: &Given) -> Result<(),
     blessed.map_or(Ok(()), |golden| claims.claim("--expect", golden, Kind::Report))
 }
 
-/// Overrides the vehicle's settings by the options. Of several targets and section lengths the first is the dive's own; all are
-/// returned for evaluation as alternatives.
-fn what_if(args: &Replay, vehicle: &mut VehicleConfig) -> WhatIf {
+/// Overrides the vehicle's settings by the options: of several targets and section lengths the first is the dive's own.
+fn set(args: &Replay, vehicle: &mut VehicleConfig) {
     vehicle.target_m = args.target.first().copied().unwrap_or(vehicle.target_m);
     vehicle.section_m = args.section.first().copied().unwrap_or(vehicle.section_m);
     vehicle.site.sound_speed_mps = args.sound_speed.unwrap_or(vehicle.site.sound_speed_mps);
-    if args.target.len() < 2 && args.section.len() < 2 {
-        return WhatIf::default();
-    }
-    let or = |asked: &[f64], own: f64| if asked.is_empty() { vec![own] } else { asked.to_vec() };
-    WhatIf { targets_m: or(&args.target, vehicle.target_m), sections_m: or(&args.section, vehicle.section_m) }
 }

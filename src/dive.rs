@@ -48,7 +48,6 @@ pub(crate) struct Dive {
     pub(crate) armed: Loop,
     notices: NoticeReceiver,
     recorders: Vec<(PathBuf, RecorderHandle)>,
-    what_if: WhatIf,
     operator: Option<Operator>,
 }
 
@@ -88,13 +87,6 @@ pub(crate) enum Clock {
     Theirs,
 }
 
-/// Alternative targets and section lengths to evaluate at the end, m.
-#[derive(Debug, Clone, Default)]
-pub(crate) struct WhatIf {
-    pub(crate) targets_m: Vec<f64>,
-    pub(crate) sections_m: Vec<f64>,
-}
-
 /// Assembles the loop for a vehicle.
 pub(crate) fn assemble(
     vehicle: &VehicleConfig,
@@ -120,7 +112,7 @@ pub(crate) fn assemble_followed(
         Some(recording) => record(&mut app, vehicle, vehicle_text, recording)?,
     };
     let armed = arm(app, vehicle, vehicle.navigation())?;
-    Ok(Dive { armed, notices, recorders, what_if: WhatIf::default(), operator: None })
+    Ok(Dive { armed, notices, recorders, operator: None })
 }
 
 /// The same, keeping all results for a comparison, and without a recording.
@@ -128,7 +120,7 @@ pub(crate) fn assemble_kept(vehicle: &VehicleConfig) -> Result<Dive, Failure> {
     let (mut app, notices) = app(vehicle)?;
     app.keep_results();
     let armed = arm(app, vehicle, vehicle.navigation())?;
-    Ok(Dive { armed, notices, recorders: Vec::new(), what_if: WhatIf::default(), operator: None })
+    Ok(Dive { armed, notices, recorders: Vec::new(), operator: None })
 }
 
 /// The same with another navigation than the vehicle file's.
@@ -144,7 +136,7 @@ pub(crate) fn assemble_with(
         Some(recording) => record(&mut app, vehicle, vehicle_text, recording)?,
     };
     let armed = arm(app, vehicle, navigation)?;
-    Ok(Dive { armed, notices, recorders, what_if: WhatIf::default(), operator: None })
+    Ok(Dive { armed, notices, recorders, operator: None })
 }
 
 /// Starts the recorders of a dive.
@@ -276,11 +268,6 @@ impl Dive {
     /// Takes commands for the loop, from any thread; `None` for a dive without an operator.
     pub(crate) fn console(&self) -> Option<ConsolePort> {
         self.operator.as_ref().map(|operator| operator.port.clone())
-    }
-
-    /// Evaluates these alternatives at the end.
-    pub(crate) fn asking(self, what_if: WhatIf) -> Self {
-        Self { what_if, ..self }
     }
 
     /// Runs the loop until the feed ends; returns the report.
@@ -424,8 +411,6 @@ impl Dive {
     fn end(mut self, watch: &mut Watch, beside: &mut dyn FnMut(&Loop)) -> Report {
         let _phase = Phase::start("report");
         self.armed.finish(&mut |notice, dive| watch.notice(notice, dive));
-        // Before the samples are released below.
-        let what_if = self.armed.what_if(&self.what_if.targets_m, &self.what_if.sections_m);
         watch.end(&self.armed);
         beside(&self.armed);
         // Records the last judgements, too.
@@ -434,7 +419,6 @@ impl Dive {
         // A long dive's report takes as much memory as its samples, which are no longer needed.
         self.armed.release_samples();
         let mut report = Report::of(&self.armed);
-        report.what_if = what_if;
         let recorders = core::mem::take(&mut self.recorders);
         drop(self.armed);
         report.log = recorded(recorders, &report);

@@ -50,6 +50,7 @@ mod tui;
 mod vehicle_file;
 mod verify;
 mod watch;
+mod what_if;
 
 use std::io::IsTerminal as _;
 use std::process::ExitCode;

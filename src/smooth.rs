@@ -9,7 +9,7 @@ use headrace_replay::smooth::FirstPass;
 use headrace_vehicle::NavigationConfig;
 use headrace_vehicle::VehicleConfig;
 
-use crate::dive::{WhatIf, assemble_with};
+use crate::dive::assemble_with;
 use crate::failure::Failure;
 use crate::phase::Phase;
 use crate::watch::Watch;
@@ -20,7 +20,6 @@ pub(crate) fn smoothed(
     player: &mut Player,
     (vehicle, text): (&VehicleConfig, &str),
     (pace, threads): (Pace, usize),
-    what_if: WhatIf,
 ) -> Result<Report, Failure> {
     let NavigationConfig::Filter(settings) = vehicle.navigation else {
         return Err(Failure::Usage(format!(
@@ -40,7 +39,7 @@ pub(crate) fn smoothed(
     let (navigation, changes) = pass.smooth()?;
     drop(backward);
     let _judging = Phase::start("replay along the smoothed trajectory");
-    let dive = assemble_with(vehicle, navigation, text, None)?.asking(what_if);
+    let dive = assemble_with(vehicle, navigation, text, None)?;
     player.connect(dive.armed.sources());
     let mut report = dive.run_on(threads, (player, pace), &mut Watch::quiet(), &mut |_| ())?;
     changes.complete(&before, &mut report);

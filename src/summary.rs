@@ -8,6 +8,7 @@ use headrace_monitor::pilot_text::{actions_text, cause_text, station};
 use headrace_monitor::report::{ChangeReport, JudgedReport, SmoothingReport};
 use headrace_monitor::report::{NotInspectedReport, Report, RunReport, SourceReport};
 use headrace_monitor::telling::UnsureStretch;
+use headrace_monitor::what_if::WhatIfReport;
 
 use crate::output::append;
 
@@ -53,9 +54,17 @@ pub(crate) fn summary(report: &Report, columns: Option<usize>) -> String {
             line(stretch);
         }
         for other in &report.what_if {
+            let metres = LiveMetres {
+                pass_m: other.pass_m,
+                fail_m: other.fail_m,
+                cannot_say_m: other.cannot_say_m,
+                open_m: other.open_m - other.not_inspected_m,
+                not_inspected_m: other.not_inspected_m,
+            };
+            let WhatIfReport { target_m, section_m, .. } = other;
             line(format!(
-                "  with target {} m in sections of {} m: passed {:.2} m   missed {:.2} m   can't say {:.2} m   open {:.2} m",
-                other.target_m, other.section_m, other.pass_m, other.fail_m, other.cannot_say_m, other.open_m
+                "  with target {target_m} m in sections of {section_m} m: {}",
+                metres_text(&metres)
             ));
         }
         let metres = |value: Option<f64>| value.map_or_else(|| "-".to_owned(), |v| format!("{v:.3}"));
@@ -183,8 +192,11 @@ fn missed(run: &RunReport, report: &Report) -> String {
     let back = report.way_home.iter().find(|back| back.run == run.id);
     let action =
         back.map(|back| format!("  -> {}", actions_text(&back.actions, back.back_to_m, back.at_most_mps)));
+    // Of the rest nothing can be said since.
+    let is_whole = run.failed_m > run.end_m - run.start_m - 1e-6;
+    let of_it = if is_whole { String::new() } else { format!(" {:.2} m of it", run.failed_m) };
     format!(
-        "  {} to {}  MISSED: {cause}, holes up to {:.2} m{}",
+        "  {} to {}  MISSED{of_it}: {cause}, holes up to {:.2} m{}",
         station(run.start_m),
         station(run.end_m),
         run.hole_m,

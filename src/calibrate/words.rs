@@ -56,7 +56,9 @@ pub(super) fn text(
             line(&format!("  {}, {}: {}", open.of, open.what, open.why));
         }
     }
-    if table.lines.is_empty() {
+    if table.lines.is_empty() && table.is_amiss() {
+        line("\nsomething is wrong, see above; no line of the vehicle file is known that mends it");
+    } else if table.lines.is_empty() {
         line("\nnothing to change in the vehicle file");
     } else {
         line("\nfor the vehicle file");

@@ -1,13 +1,9 @@
-//! Verdicts of the same samples for other targets and section lengths.
+//! Verdicts of the same holes for another target.
 
-use super::frontier::{Outlook, Reach, clear_of};
-use super::hole::{Hole, HoleFinder};
-use super::metres::Metres;
+use super::frontier::{Outlook, clear_of};
+use super::hole::Hole;
 use super::section::{Section, Verdict};
 use super::sections::{Sections, verdict};
-use super::store::SampleStore;
-use headrace_geometry::math;
-use headrace_geometry::tunnel::Profile;
 
 /// A section's hole, independent of the target.
 #[derive(Debug, Clone, Copy)]
@@ -26,81 +22,12 @@ impl Measured {
 }
 
 impl Sections {
-    /// Metres by verdict for each target, for a given section length. The present length reuses the holes as last
-    /// measured, which don't depend on the target once a dive has ended.
-    pub fn what_if(
-        &self,
-        section_m: f64,
-        targets_m: &[f64],
-        outlook: &Outlook,
-        (store, finder): (&SampleStore, &mut HoleFinder),
-        profile: &Profile,
-    ) -> Vec<Metres> {
-        let measured = if (section_m - self.section_m()).abs() > 0.0 {
-            self.measured_anew(section_m, outlook.way, store, finder, profile)
-        } else {
-            self.measured(outlook.way)
-        };
-        // Of what was judged in this dive nothing has to be asked again; where all was measured, the sections that are flagged already count, too.
-        let is_own = |target_m: f64| {
-            (section_m - self.section_m()).abs() <= 0.0 && (target_m - self.target_m()).abs() <= 0.0
-        };
-        let metres = |target_m: &f64| {
-            if is_own(*target_m) {
-                self.metres(outlook.way)
-            } else {
-                self.metres_of(&measured, section_m, *target_m, outlook)
-            }
-        };
-        targets_m.iter().map(metres).collect()
-    }
-
-    /// Verdicts for another target, by section, of all whose hole has been measured: as [`Sections::what_if`] counts them.
+    /// Verdicts for another target, by section, of all whose hole has been measured. Which visits count, and what was settled when, is as for the
+    /// dive's own target: who wants to know what another one would have been told plays the dive again with it.
     pub fn verdicts_at(&self, target_m: f64, outlook: &Outlook) -> impl Iterator<Item = (i64, Verdict)> {
         self.sections_of(outlook.way).filter_map(move |index| {
             Some((index, self.verdict_of(&Measured::of(self.get(index)?)?, target_m, outlook)))
         })
-    }
-
-    fn measured(&self, way: Option<Reach>) -> Vec<Measured> {
-        self.sections_of(way).filter_map(|index| Measured::of(self.get(index)?)).collect()
-    }
-
-    fn measured_anew(
-        &self,
-        section_m: f64,
-        way: Option<Reach>,
-        store: &SampleStore,
-        finder: &mut HoleFinder,
-        profile: &Profile,
-    ) -> Vec<Measured> {
-        let sections = self.sections_of(way);
-        let (first_m, end_m) = (self.bounds_m(sections.start).0, self.bounds_m(sections.end).0);
-        let indexes = math::floor_to_i64(first_m / section_m)..-math::floor_to_i64(-end_m / section_m);
-        let section = |index: i64| {
-            let (from_m, to_m) = (index as f64 * section_m, (index + 1) as f64 * section_m);
-            // Slightly inside, so that a common border is no overlap.
-            let overlapped = self.index_of(from_m + 1e-9)..=self.index_of(to_m - 1e-9);
-            let overlapped = || overlapped.clone().filter_map(|old| self.get(old));
-            let first_visit = overlapped().map(|old| old.visits.first()).max().unwrap_or(0);
-            let hole = finder.largest_since(store, from_m, to_m, first_visit);
-            let wall_m = profile.point_at(hole.arc_m);
-            let sd_m = |old: &Section| old.visits.sd_m(old.passage.pass_error.sd_m(wall_m));
-            Measured {
-                hole,
-                sd_m: overlapped().map(sd_m).fold(0.0, f64::max),
-                doubtful: overlapped().any(|old| old.doubt().is_some()),
-            }
-        };
-        indexes.map(section).collect()
-    }
-
-    fn metres_of(&self, measured: &[Measured], section_m: f64, target_m: f64, outlook: &Outlook) -> Metres {
-        let mut metres = Metres::default();
-        for one in measured {
-            metres.add(self.verdict_of(one, target_m, outlook), section_m);
-        }
-        metres
     }
 
     fn verdict_of(
@@ -121,19 +48,16 @@ impl Sections {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::frontier::Reach;
+    use crate::hole::HoleFinder;
     use crate::lacks::Lacks;
-    use crate::passage::PassError;
     use crate::sections::{Judging, Request};
-    use crate::store::{StoreLayout, WallSample};
-    use headrace_fusion::relative::Relative;
+    use crate::store::{SampleStore, StoreLayout, WallSample};
     use headrace_geometry::time::MonoNs;
     use headrace_geometry::tunnel::shapes;
 
     /// A pipe with samples every 0.2 m but for 0.6 m from 5 m on, of which 3 m to 7 m are the way, judged in sections of a quarter of a metre.
     struct Seen {
-        profile: Profile,
-        store: SampleStore,
-        finder: HoleFinder,
         sections: Sections,
         outlook: Outlook,
     }
@@ -160,82 +84,53 @@ mod tests {
                 through: None,
                 still_zone: None,
             };
-            let (sections, finder) = (Sections::new(0.25, 0.5, 0.0, 10.0), HoleFinder::default());
-            let mut seen = Self { profile, store, finder, sections, outlook };
+            let mut finder = HoleFinder::default();
+            let mut seen = Self { sections: Sections::new(0.25, 0.5, 0.0, 10.0), outlook };
             for index in seen.sections.sections_of(seen.outlook.way) {
                 let mut judging = Judging {
-                    store: &seen.store,
+                    store: &store,
                     lacks: &Lacks::default(),
-                    finder: &mut seen.finder,
-                    profile: &seen.profile,
+                    finder: &mut finder,
+                    profile: &profile,
                     tell: &mut |_, _| {},
                 };
                 seen.sections.judge(&Request::at(&seen.outlook)(index), &mut judging);
             }
             seen
         }
-
-        /// Metres that pass, that fail, and of which neither can be said.
-        fn metres(&mut self, section_m: f64, target_m: f64) -> [f64; 3] {
-            let Self { profile, store, finder, sections, outlook } = self;
-            let metres = sections.what_if(section_m, &[target_m], outlook, (store, finder), profile);
-            assert_eq!((metres.len(), metres[0].open_m.abs() <= 0.0), (1, true));
-            [metres[0].pass_m, metres[0].fail_m, metres[0].cannot_say_m]
-        }
     }
 
     /// From 5 m to 5.6 m a circle has 0.63 m; centred at most a quarter of a metre beyond 5 m, 0.54 m.
     #[test]
-    fn other_targets_and_sections_have_the_holes_that_are_in_them() {
-        let mut seen = Seen::new();
-        for (section_m, target_m, expected) in [
-            // The way touches 17 sections of a quarter of a metre, to 7.25 m.
-            (0.25, 0.5, [3.75, 0.5, 0.0]),
-            (0.25, 0.6, [4.0, 0.25, 0.0]),
-            (0.25, 0.7, [4.25, 0.0, 0.0]),
-            (0.25, 0.2, [0.0, 4.25, 0.0]),
-            // Those touch nine of half a metre, and five of a metre.
-            (0.5, 0.5, [4.0, 0.5, 0.0]),
-            (1.0, 0.5, [4.0, 1.0, 0.0]),
-            (1.0, 0.7, [5.0, 0.0, 0.0]),
-            (1.0, 0.2, [0.0, 5.0, 0.0]),
-        ] {
-            let found = seen.metres(section_m, target_m);
-            assert!(
-                found.iter().zip(expected).all(|(a, b)| (a - b).abs() < 1e-9),
-                "{section_m} {target_m}: {found:?}"
-            );
+    fn another_target_has_the_holes_that_there_are() {
+        let seen = Seen::new();
+        for (target_m, failing) in [(0.5, 20..22), (0.6, 21..22), (0.7, 0..0), (0.2, 12..29)] {
+            let verdicts: Vec<_> = seen.sections.verdicts_at(target_m, &seen.outlook).collect();
+            let verdict = |index: &i64| if failing.contains(index) { Verdict::Fail } else { Verdict::Pass };
+            let expected: Vec<_> = (12..29).map(|index| (index, verdict(&index))).collect();
+            assert_eq!(verdicts, expected, "{target_m}");
         }
-        let verdicts: Vec<_> = seen.sections.verdicts_at(0.6, &seen.outlook).collect();
-        let expected = (12..29).map(|index| (index, if index == 21 { Verdict::Fail } else { Verdict::Pass }));
-        assert_eq!(verdicts, expected.collect::<Vec<_>>());
     }
 
-    /// What is unsure of a section is so of all that it touches: two standard deviations of 0.05 m, and a doubt.
+    /// Two standard deviations of 0.05 m, and a doubt.
     #[test]
-    fn errors_and_doubts_are_those_of_the_sections_that_are_touched() {
+    fn errors_and_doubts_are_those_of_the_section() {
         let mut seen = Seen::new();
-        let error = PassError { relative: Relative::along(1.0), from_m: [0.0; 2] };
-        let relative = Relative::along(0.05 / error.sd_m([0.0; 2]));
-        // From 5.5 m to 5.75 m.
-        seen.sections.get_mut(22).unwrap().passage.pass_error = PassError { relative, ..error };
-        for (target_m, expected) in [
-            (0.5, [4.0, 1.0, 0.0]),
-            (0.55, [4.0, 0.0, 1.0]),
-            (0.72, [4.0, 0.0, 1.0]),
-            (0.74, [5.0, 0.0, 0.0]),
+        let of = |seen: &Seen, index: i64, target_m: f64| {
+            seen.sections.verdicts_at(target_m, &seen.outlook).find(|(at, _)| *at == index).unwrap().1
+        };
+        let hole_m = seen.sections.get(15).unwrap().hole.unwrap().diameter_m;
+        seen.sections.get_mut(15).unwrap().hole_sd_m = 0.05;
+        for (more_m, expected) in [
+            (-0.11, Verdict::Fail),
+            (-0.09, Verdict::CannotSay),
+            (0.09, Verdict::CannotSay),
+            (0.11, Verdict::Pass),
         ] {
-            let found = seen.metres(1.0, target_m);
-            assert!(found.iter().zip(expected).all(|(a, b)| (a - b).abs() < 1e-9), "{target_m}: {found:?}");
+            assert_eq!(of(&seen, 15, hole_m + more_m), expected, "{more_m}");
         }
-        // From 3.75 m to 4 m: of two neighbours at a common border only the one that it lies in.
         seen.sections.get_mut(15).unwrap().suspect = true;
-        let found = seen.metres(1.0, 0.74);
-        assert!(found.iter().zip([4.0, 0.0, 1.0]).all(|(a, b)| (a - b).abs() < 1e-9), "{found:?}");
-        let found = seen.metres(1.0, 0.2);
-        assert!(
-            found.iter().zip([0.0, 5.0, 0.0]).all(|(a, b)| (a - b).abs() < 1e-9),
-            "a fail is one: {found:?}"
-        );
+        assert_eq!(of(&seen, 15, hole_m + 0.11), Verdict::CannotSay);
+        assert_eq!(of(&seen, 15, hole_m - 0.11), Verdict::Fail, "a fail is one");
     }
 }

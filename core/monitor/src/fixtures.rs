@@ -74,6 +74,7 @@ pub(crate) fn situation(x_m: Option<f64>) -> Situation {
         heads: [None; MAX_HEADS],
         deaf: HeadSet::default(),
         losses: [LossRate::default(); MAX_HEADS],
+        lost_at_most: LossRate::default(),
     }
 }
 

@@ -117,6 +117,15 @@ impl LossCount {
         &self.hearing
     }
 
+    /// The most that may be lost by chance: all that is lost, as long as too few pings have been counted to tell.
+    pub fn at_most(&self) -> LossRate {
+        if self.by_chance.all >= LEAST {
+            self.rate()
+        } else {
+            LossRate { share: self.any.share(), after_lost: 1.0 }
+        }
+    }
+
     /// Shares lost by chance; of a head that hears hardly anything, all.
     pub fn rate(&self) -> LossRate {
         let deaf = ((self.any.share() - NEARLY_ALL) / (1.0 - NEARLY_ALL)).max(0.0);
@@ -174,6 +183,21 @@ mod tests {
         // In pairs: after the first of two the second is lost, after the second it is as it was.
         let pairs = turned(24_000, |ping| chance(ping / 2, 10));
         assert!((pairs.share - 0.1).abs() < 0.03 && (pairs.after_lost - 0.55).abs() < 0.1, "{pairs:?}");
+    }
+
+    #[test]
+    fn until_enough_is_counted_all_may_be_lost_by_chance() {
+        let mut count = LossCount::default();
+        let mut at_most = |pings: std::ops::Range<u32>| {
+            for ping in pings {
+                count.ping(f64::from(ping) * STEP_RAD, ping % 400 < 120);
+            }
+            count.at_most()
+        };
+        // 280 of a turn of 400 are heard, and count once they are heard for the third time.
+        let early = at_most(0..1000);
+        assert!(early.share > 0.3 && early.after_lost >= 1.0, "{early:?}");
+        assert_eq!(at_most(1000..1100), LossRate::default());
     }
 
     #[test]

@@ -255,10 +255,6 @@ impl Loop {
         self.coverage().frontier.outlook(self.of_sensors().filter_map(|reach: &HeadFrontier| reach.0), at)
     }
 
-    pub(super) fn world_mut(&mut self) -> &mut World {
-        &mut self.world
-    }
-
     /// Judges the unsettled sections: the dive has ended, and no sample will come. `hear` gets their notices in batches,
     /// with the loop's state at that point: those of a long dive at once would take more memory than its samples.
     pub fn finish(&mut self, hear: &mut dyn FnMut(&Notice, &Self)) {

@@ -1,10 +1,9 @@
 //! Verdicts of a dive's samples for other targets and section lengths.
 
-use bevy_ecs::world::Mut;
 use headrace_coverage::Verdict;
 use serde::Serialize;
 
-use super::resources::{Coverage, Finder};
+use super::report::Report;
 use super::run::Loop;
 
 /// Metres by verdict for another target, or in sections of another length.
@@ -20,36 +19,31 @@ pub struct WhatIfReport {
     pub fail_m: f64,
     /// Metres undecided within the error of the hole.
     pub cannot_say_m: f64,
-    /// Metres that would still be open.
+    /// Metres that would still be open, or weren't inspected.
     pub open_m: f64,
+    /// Of these, metres that weren't seen from both sides.
+    pub not_inspected_m: f64,
+}
+
+impl WhatIfReport {
+    /// Of a dive that was judged by that target in these sections.
+    pub fn of(report: &Report) -> Self {
+        let sum = &report.summary;
+        Self {
+            target_m: report.target_m,
+            section_m: report.section_m,
+            pass_m: sum.pass_m,
+            fail_m: sum.fail_m,
+            cannot_say_m: sum.cannot_say_m,
+            open_m: sum.open_m,
+            not_inspected_m: sum.not_inspected_m,
+        }
+    }
 }
 
 impl Loop {
     /// Verdicts for another target as of now, by section, of those whose hole has been measured.
     pub fn verdicts_at(&self, target_m: f64) -> Vec<(i64, Verdict)> {
         self.coverage().sections.verdicts_at(target_m, &self.outlook()).collect()
-    }
-
-    /// Verdicts of its samples for every target and section length, once the dive has ended.
-    pub fn what_if(&mut self, targets_m: &[f64], sections_m: &[f64]) -> Vec<WhatIfReport> {
-        let outlook = self.outlook();
-        let profile = self.mission().profile.clone();
-        let mut all = Vec::new();
-        self.world_mut().resource_scope(|world, mut finder: Mut<'_, Finder>| {
-            let Coverage { store, sections, .. } = world.resource::<Coverage>();
-            for section_m in sections_m {
-                let searched = (store, &mut finder.0);
-                let metres = sections.what_if(*section_m, targets_m, &outlook, searched, &profile);
-                all.extend(targets_m.iter().zip(metres).map(|(target_m, metres)| WhatIfReport {
-                    target_m: *target_m,
-                    section_m: *section_m,
-                    pass_m: metres.pass_m,
-                    fail_m: metres.fail_m,
-                    cannot_say_m: metres.cannot_say_m,
-                    open_m: metres.open_m,
-                }));
-            }
-        });
-        all
     }
 }

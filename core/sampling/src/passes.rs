@@ -39,6 +39,8 @@ pub struct Situation {
     pub deaf: HeadSet,
     /// What each head loses by chance, by number.
     pub losses: [LossRate; MAX_HEADS],
+    /// The most that any of them may lose by chance: all that it lacks, as long as too few pings have been counted to tell.
+    pub lost_at_most: LossRate,
 }
 
 impl Situation {

@@ -10,9 +10,9 @@ pub struct Estimate {
 }
 
 impl Estimate {
-    /// Whether it differs from `other` by more than two standard deviations.
+    /// Whether it differs from `other` by more than three standard deviations: of so many quantities one is soon two off by chance.
     pub fn differs_from(&self, other: f64) -> bool {
-        (self.value - other).abs() > 2.0 * self.sd
+        (self.value - other).abs() > 3.0 * self.sd
     }
 }
 
@@ -131,6 +131,38 @@ pub enum Untold {
     NoBest {
         /// Search range to either side, ms.
         reach_ms: f64,
+    },
+    /// The likelihood is still growing at the end of the search range.
+    #[error(
+        "it is later than the file's by {reach_ms:.0} ms or more: set latency_ms = {then_ms:.0}, and calibrate again"
+    )]
+    Later {
+        /// Search range to either side, ms.
+        reach_ms: f64,
+        /// Latency at the end of the range, ms.
+        then_ms: f64,
+    },
+    /// A device that answers before it is asked again can't be as late as that.
+    #[error(
+        "{found_ms:.0} ms would fit best, and it answers every {every_ms:.0} ms: it can't be as late; look for what delays its line, or \
+         for what else is wrong"
+    )]
+    Slow {
+        /// The likeliest latency, ms.
+        found_ms: f64,
+        /// Time between its answers, ms.
+        every_ms: f64,
+    },
+    /// Ranges don't fit the design profile's size.
+    #[error(
+        "ranges are {long_pct:+.1} % long for this profile: sound_speed_mps = {sound_mps:.0} fits, or the wall is that much larger than the \
+         file says; mend that first, other values can't be told till then"
+    )]
+    Scaled {
+        /// By how much ranges are too long, %.
+        long_pct: f64,
+        /// Speed of sound with which they aren't, m/s.
+        sound_mps: f64,
     },
     /// The filter disagrees with the measurements.
     #[error(

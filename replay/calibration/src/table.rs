@@ -8,6 +8,9 @@ use crate::findings::Findings;
 use crate::heads::Head;
 use crate::zero::Zero;
 
+/// Share by which ranges may be long or short for the profile: three times what tables of the speed of sound are off.
+const MOST_SCALE: f64 = 0.01;
+
 /// A value in the unit of its row.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Value {
@@ -85,7 +88,26 @@ impl Table {
         }
         table.tethers(vehicle, findings);
         table.lags(vehicle, findings);
+        table.scale(vehicle, findings);
         table
+    }
+
+    /// Where ranges don't fit the profile's size nothing else is to be changed: all other values are fitted to walls that aren't there.
+    fn scale(&mut self, vehicle: &VehicleConfig, findings: &Findings) {
+        let Ok(heads) = &findings.heads else { return };
+        let Estimate { value, sd } = heads.scale;
+        if value.abs() > MOST_SCALE && value.abs() > 3.0 * sd {
+            self.lines.clear();
+            let sound_mps = vehicle.site.sound_speed_mps / (1.0 + value);
+            self.open("water", "speed of sound", Untold::Scaled { long_pct: value * 100.0, sound_mps });
+        }
+    }
+
+    /// Whether something is amiss for which there is no line.
+    pub fn is_amiss(&self) -> bool {
+        let amiss =
+            |why: &Untold| matches!(why, Untold::Later { .. } | Untold::Slow { .. } | Untold::Scaled { .. });
+        self.open.iter().any(|open| amiss(&open.why))
     }
 
     fn open(&mut self, of: &str, what: &'static str, why: Untold) {
@@ -203,10 +225,10 @@ impl Table {
             let file_ms = latency.map_or(0.0, |latency| latency.as_secs_f64() * 1e3);
             let found = lag.offset_s.map(|of| Estimate { value: file_ms + of.value * 1e3, sd: of.sd * 1e3 });
             self.number(&id, ("latency", "ms", 1), file_ms, found);
-            // Of many sources one is soon two standard deviations off by chance; and a latency is positive.
+            // A latency is positive.
             if let Ok(found) = found
                 && found.value > 0.0
-                && (found.value - file_ms).abs() > 3.0 * found.sd
+                && found.differs_from(file_ms)
             {
                 self.line(&sensor(&id), format!("latency_ms = {}", number(found.value, 1)));
             }

@@ -83,6 +83,14 @@ pub fn lags(
     };
     let mut lags: Vec<Lag> = sources.iter().zip(&coarse).map(lag).collect();
     own_up(&mut lags, latencies);
+    for lag in &mut lags {
+        let latency_s = latencies.get(lag.source).map_or(0.0, |latency| latency.as_secs_f64());
+        lag.offset_s = lag.offset_s.and_then(|offset| runs.possible(lag.source, latency_s, offset));
+        if let (Err(Untold::NoBest { .. }), true) = (lag.offset_s, runs.is_later(lag.source)) {
+            let reach_ms = REACH_S * 1e3;
+            lag.offset_s = Err(Untold::Later { reach_ms, then_ms: latency_s * 1e3 + reach_ms });
+        }
+    }
     Ok(lags)
 }
 
@@ -115,6 +123,8 @@ struct Runs<'a, 'b> {
     material: &'a Material<'a>,
     events: &'a [Event],
     shifts_s: Vec<f64>,
+    /// By source: whether the likelihood was clearly best at the late end of the range.
+    later: Vec<bool>,
     /// Share of measurements gated in the last run.
     gated: f64,
     progress: &'b mut dyn FnMut(),
@@ -125,7 +135,14 @@ impl<'a, 'b> Runs<'a, 'b> {
         let first = material.events.first().map_or(MonoNs(0), |event| event.received);
         let end = material.events.partition_point(|event| event.received.since(first).0 < MOST.0);
         let events = material.events.get(..end).unwrap_or(material.events);
-        Self { material, events, shifts_s: vec![0.0; material.sensors.len()], gated: 0.0, progress }
+        Self {
+            material,
+            events,
+            shifts_s: vec![0.0; material.sensors.len()],
+            later: vec![false; material.sensors.len()],
+            gated: 0.0,
+            progress,
+        }
     }
 
     /// The sources used by navigation that have enough readings.
@@ -141,6 +158,25 @@ impl<'a, 'b> Runs<'a, 'b> {
             (sensor.kind != SensorKind::Other && count >= LEAST_READINGS).then_some(source)
         };
         sensors.filter_map(speaks).collect()
+    }
+
+    fn is_later(&self, source: usize) -> bool {
+        self.later.get(source).copied().unwrap_or(false)
+    }
+
+    /// An offset, unless a device that answers before it is asked again would then be later than that.
+    fn possible(&self, source: usize, latency_s: f64, offset: Estimate) -> Result<Estimate, Untold> {
+        let answers = |kind: SensorKind| matches!(kind, SensorKind::Head | SensorKind::Echosounder { .. });
+        let is_asked = self.material.sensors.get(source).is_some_and(|sensor| answers(sensor.kind));
+        let of_source = || self.events.iter().filter(|event| event.source.index() == source);
+        let (count, late_s) = (of_source().count(), latency_s + offset.value);
+        let ends = of_source().next().zip(of_source().last());
+        let span_s = ends.map_or(0.0, |(first, last)| last.received.since(first.received).as_secs_f64());
+        let every_s = span_s / count.saturating_sub(1).max(1) as f64;
+        if is_asked && late_s >= every_s && every_s > 0.0 {
+            return Err(Untold::Slow { found_ms: late_s * 1e3, every_ms: every_s * 1e3 });
+        }
+        Ok(offset)
     }
 
     fn shift_s(&self, source: usize) -> f64 {
@@ -195,6 +231,10 @@ impl<'a, 'b> Runs<'a, 'b> {
             points.push((by_s, self.surprise_at(source, by_s)?));
         }
         points.sort_unstable_by(|a, b| a.0.total_cmp(&b.0));
+        let latest = points.last().map_or(f64::INFINITY, |point| point.1);
+        if let Some(later) = self.later.get_mut(source) {
+            *later = base - latest > CLEAR && points.iter().all(|point| point.1 >= latest);
+        }
         let best = (1..points.len() - 1).min_by(|a, b| {
             let of = |k: &usize| points.get(*k).map_or(f64::INFINITY, |point| point.1);
             of(a).total_cmp(&of(b))

@@ -51,6 +51,8 @@ fn quantities(sense: Sense) -> &'static [Quantity] {
 /// A table with a known header; its streams are the sensors' ids.
 pub struct Csv {
     separator: char,
+    /// Cells of a row.
+    cells: usize,
     time: (usize, u128),
     clock: Clock,
     targets: Vec<Target>,
@@ -72,6 +74,8 @@ impl Csv {
     pub fn new(mapping: &Section<'_>, vehicle: &VehicleConfig, header: &str) -> Result<Self, ConfigError> {
         let separators = [(",", ','), (";", ';'), ("\t", '\t')];
         let separator = mapping.choice("separator", &separators)?.unwrap_or(',');
+        // Spreadsheets begin their text with a byte order mark.
+        let header = header.trim_start_matches('\u{feff}');
         let names: Vec<&str> = header.trim().split(separator).map(cell).collect();
         let units = [("s", 1_000_000_000), ("ms", 1_000_000), ("us", 1000), ("ns", 1)];
         let unit_ns = mapping.choice("time_unit", &units)?.unwrap_or(1_000_000_000);
@@ -102,11 +106,16 @@ impl Csv {
             }
         }
         mapping.finish()?;
-        Ok(Self { separator, time, clock, targets, header_passed: false })
+        Ok(Self { separator, cells: names.len(), time, clock, targets, header_passed: false })
     }
 
     fn row(&mut self, line: &str, out: &mut Vec<Entry>) -> Result<(), &'static str> {
         let cells: Vec<&str> = line.split(self.separator).map(cell).collect();
+        if cells.len() != self.cells {
+            return Err(
+                "rows with other cells than the header: cut short, or numbers with the separator in them",
+            );
+        }
         let time = cells.get(self.time.0).copied().unwrap_or_default();
         let stamp_ns = nanoseconds(time, self.time.1).ok_or("rows whose time is no number from 0 on")?;
         let mut whole = Ok(());
@@ -186,11 +195,26 @@ impl Target {
         let Some(value) = value(self.sensor.sense, values, empty(1)) else {
             return Err("rows with a cell that is no number");
         };
+        let is_reached = |range_m: f64| {
+            self.sensor.reach_m.is_none_or(|[least_m, most_m]| (least_m..=most_m).contains(&range_m))
+        };
+        let (value, is_beyond) = match value {
+            Value::Beam(angle_rad, Some(range_m)) if !is_reached(range_m) => {
+                (Value::Beam(angle_rad, None), true)
+            }
+            value => (value, false),
+        };
         let stream = self.sensor.id.clone();
         let told = self.sensor.tell(MonoNs(stamp_ns), &value, &mut |at, bytes| {
             out.push(Entry { stamp_ns: at.0, stream: stream.clone(), bytes: bytes.to_vec() });
         });
-        if told { Ok(()) } else { Err("rows with values that the sensor can't say") }
+        match (told, is_beyond) {
+            (true, true) => Err(
+                "rows with ranges that the head doesn't tell at its range setting: as if nothing was heard",
+            ),
+            (true, false) => Ok(()),
+            (false, _) => Err("rows with values that the sensor can't say"),
+        }
     }
 }
 

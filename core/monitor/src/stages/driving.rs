@@ -10,7 +10,7 @@ use headrace_geometry::time::{DurNs, MonoNs};
 use headrace_geometry::tunnel::{Profile, Yz};
 use headrace_sampling::head::{HeadMotion, HeadSet};
 use headrace_sampling::layout::HeadLayout;
-use headrace_sampling::losses::{LossRate, Sampled};
+use headrace_sampling::losses::Sampled;
 use headrace_sampling::margin::position_margin_m;
 use headrace_sampling::passes::{Passes, Phasing, Situation};
 use headrace_sampling::swing::Looks;
@@ -87,8 +87,7 @@ impl Driving {
         let t_y_m = self.now.middle_t_y_m;
         let sampled = Sampled { target_m: plan.target_m, t_y_m, perimeter_m: profile.perimeter_m() };
         self.now.passes_needed = sampled.passes_needed(situation.losses_of_turning());
-        let more = |one: LossRate, other: LossRate| if other.share > one.share { other } else { one };
-        self.now.lost = situation.losses_of_turning().fold(LossRate::default(), more);
+        self.now.lost = situation.lost_at_most;
         let place_m = [pose.position.y(), pose.position.z()];
         self.note_steps(situation, place_m, profile);
         let look = pose.attitude * Vec3::new(1.0, 0.0, 0.0);
@@ -262,6 +261,7 @@ mod tests {
             heads,
             deaf: headrace_sampling::head::HeadSet::default(),
             losses: [LossRate::default(); MAX_HEADS],
+            lost_at_most: LossRate::default(),
         }
     }
 

@@ -181,6 +181,7 @@ fn situation(
 ) -> Situation {
     let mut motions = [None; MAX_HEADS];
     let mut losses = [LossRate::default(); MAX_HEADS];
+    let mut lost_at_most = LossRate::default();
     let mut deaf = HeadSet::default();
     for (head, mounted, track, lost, _) in heads {
         if let Some(slot) = losses.get_mut(head.0) {
@@ -200,6 +201,8 @@ fn situation(
                 deaf = deaf.with(head.0);
             } else {
                 *slot = Some(HeadMotion { mount, angle_rad, rate_radps, step_rad, sector_rad });
+                let at_most = lost.at_most();
+                lost_at_most = if at_most.share > lost_at_most.share { at_most } else { lost_at_most };
             }
         }
     }
@@ -212,6 +215,7 @@ fn situation(
         heads: motions,
         deaf,
         losses,
+        lost_at_most,
     }
 }
 

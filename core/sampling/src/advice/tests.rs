@@ -56,6 +56,7 @@ impl Case {
             heads,
             deaf: HeadSet::default(),
             losses: [LossRate::default(); MAX_HEADS],
+            lost_at_most: LossRate::default(),
         };
         Self { profile, specs, situation, target_m, left_s: None }
     }

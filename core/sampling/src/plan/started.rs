@@ -55,6 +55,7 @@ impl Planner {
             heads: motions,
             deaf: HeadSet::default(),
             losses: [LossRate::default(); MAX_HEADS],
+            lost_at_most: LossRate::default(),
         };
         let mut advisor = Advisor::new(&inspection.profile, task, &heads, &inspection.hull);
         // Of several outdated rings each call casts one.

@@ -209,6 +209,7 @@ impl Dive {
             heads: [None; MAX_HEADS],
             deaf: headrace_sampling::head::HeadSet::default(),
             losses: [LossRate::default(); MAX_HEADS],
+            lost_at_most: LossRate::default(),
         };
         let mut state = SystemState::<Heads<'_, '_>>::new(&mut self.world);
         let heads = state.get_mut(&mut self.world).unwrap();

@@ -1,0 +1,63 @@
+//! `replay` with several targets or section lengths: what else the dive would have been told.
+
+use std::path::PathBuf;
+
+use headrace_geometry::time::DurNs;
+use headrace_monitor::report::Report;
+use headrace_monitor::what_if::WhatIfReport;
+use headrace_replay::drive::Pace;
+use headrace_replay::player::Player;
+use headrace_vehicle::VehicleConfig;
+
+use crate::cli::Replay;
+use crate::dive::assemble;
+use crate::failure::Failure;
+use crate::phase::Phase;
+use crate::smooth;
+use crate::watch::Watch;
+
+/// The dive judged by each of several targets in sections of each of several lengths; nothing where there is one of each. Which visits count and
+/// what was flagged when depends on the target, so that each is a replay of its own, but for the one that has been played.
+pub(crate) fn reports(
+    args: &Replay,
+    files: &[PathBuf],
+    (mut vehicle, text): (VehicleConfig, &str),
+    played: &Report,
+) -> Result<Vec<WhatIfReport>, Failure> {
+    let own = |asked: &[f64], own: f64| if asked.is_empty() { vec![own] } else { asked.to_vec() };
+    let (targets_m, sections_m) =
+        (own(&args.target, vehicle.target_m), own(&args.section, vehicle.section_m));
+    let mut all = Vec::new();
+    if targets_m.len() < 2 && sections_m.len() < 2 {
+        return Ok(all);
+    }
+    let _phase = Phase::start("other targets and sections");
+    for section_m in sections_m {
+        for target_m in &targets_m {
+            (vehicle.target_m, vehicle.section_m) = (*target_m, section_m);
+            let is_played = target_m.to_bits() == played.target_m.to_bits()
+                && section_m.to_bits() == played.section_m.to_bits();
+            all.push(if is_played {
+                WhatIfReport::of(played)
+            } else {
+                WhatIfReport::of(&replayed(args, files, (&vehicle, text))?)
+            });
+        }
+    }
+    Ok(all)
+}
+
+fn replayed(
+    args: &Replay,
+    files: &[PathBuf],
+    (vehicle, text): (&VehicleConfig, &str),
+) -> Result<Report, Failure> {
+    let pace = Pace { tick: DurNs::from_millis(i64::from(args.tick_ms)), speed: None };
+    let (mut player, threads) = (Player::open(files)?, args.threads.of_replay());
+    if args.smooth {
+        return smooth::smoothed(files, &mut player, (vehicle, text), (pace, threads));
+    }
+    let dive = assemble(vehicle, text, None)?;
+    player.connect(dive.armed.sources());
+    dive.run_on(threads, (&mut player, pace), &mut Watch::quiet(), &mut |_| ())
+}
