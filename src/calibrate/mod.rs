@@ -11,6 +11,7 @@ use headrace_geometry::time::MonoNs;
 use headrace_replay::drive::PacketSource as _;
 use headrace_replay::log::files_of;
 use headrace_replay::player::Player;
+use headrace_vehicle::VehicleConfig;
 
 use crate::cli::Calibrate;
 use crate::dive::assemble;
@@ -25,6 +26,7 @@ pub(crate) fn calibrate(args: &Calibrate) -> Result<u8, Failure> {
     let mut player = Player::open(&files_of(std::slice::from_ref(&args.log))?)?;
     let given = Given::read(args.vehicle.as_deref())?;
     let (text, vehicle) = given.or_attached(player.info(), &player.losses(), &args.log)?;
+    check(args, &vehicle, &player)?;
     let dive = assemble(&vehicle, &text, None)?;
     player.connect(dive.armed.sources());
     let window = Window { from_s: args.from, to_s: args.to, at_surface_s: args.at_surface };
@@ -53,4 +55,26 @@ pub(crate) fn calibrate(args: &Calibrate) -> Result<u8, Failure> {
     } else {
         failure::OK
     })
+}
+
+/// What is said of the log has to be of it.
+///
+/// Errors: a chainage that isn't in the tunnel, a part that the log hasn't.
+fn check(args: &Calibrate, vehicle: &VehicleConfig, player: &Player) -> Result<(), Failure> {
+    let length_m = vehicle.tunnel.length_m;
+    if let Some(chainage_m) = args.chainage.filter(|chainage_m| !(0.0..=length_m).contains(chainage_m)) {
+        return Err(Failure::Usage(format!(
+            "calibrating by {}: --chainage {chainage_m} is not in the tunnel, which is {length_m} m long",
+            args.log.display()
+        )));
+    }
+    let lasts_s = player.span().map_or(0.0, |(first, last)| last.since(first).as_secs_f64());
+    if args.from > lasts_s {
+        return Err(Failure::Usage(format!(
+            "calibrating by {}: --from {} is after the log's end, at {lasts_s:.1} s",
+            args.log.display(),
+            args.from
+        )));
+    }
+    Ok(())
 }

@@ -199,7 +199,7 @@ mod tests {
             TypeId::of::<HeadSpecification>(),
             TypeId::of::<HiddenAngles>(),
         ];
-        let world = dive.world_mut();
+        let world = &mut dive.world;
         let parts: Vec<TypeId> = world.resource::<StateParts>().0.iter().map(|part| part.kind).collect();
         let found = [resources(world), components(world)].concat();
         let sorted = [&parts[..], &no_state, &bevys_own].concat();

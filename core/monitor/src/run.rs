@@ -48,7 +48,7 @@ type AtEnd<'w> = (
 
 /// A loop that runs. All memory is allocated; a tick takes no lock, makes no system call and formats nothing.
 pub struct Loop {
-    world: World,
+    pub(super) world: World,
     schedule: Schedule,
     readers: Vec<PortReader>,
     ports: Vec<Option<Port>>,

@@ -236,6 +236,7 @@ mod tests {
     use headrace_geometry::frames::{Mount, Point3, Pose, Rot};
     use headrace_geometry::tunnel::shapes;
     use headrace_sampling::head::MAX_HEADS;
+    use headrace_sampling::losses::LossRate;
 
     const STEP_RAD: f64 = 0.9 * math::TAU / 360.0;
 

@@ -21,6 +21,7 @@ fn situation(angles_deg: &[f64], x_m: &[f64]) -> Situation {
         heads,
         deaf: HeadSet::default(),
         losses: [LossRate::default(); MAX_HEADS],
+        lost_at_most: LossRate::default(),
     }
 }
 
