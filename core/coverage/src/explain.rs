@@ -13,7 +13,7 @@ use core::iter;
 use super::cause::Cause;
 use super::causes::Causes;
 use super::evidence::Evidence;
-use super::hole::{Hole, HoleFinder};
+use super::hole::HoleFinder;
 use super::lacks::Lack;
 use super::passage::{Drive, Passage};
 use super::store::SampleStore;
@@ -23,7 +23,7 @@ use headrace_sampling::spacing;
 use trial::Trial;
 
 pub use case::Case;
-use case::{HELPS, Seen, WIDEST, is_dark, is_passed};
+use case::{HELPS, Seen, WIDEST, is_dark, is_in, is_passed};
 
 /// T as driven over the target from which speed counts although it was the planned one: T is an upper bound of D.
 const WELL_OVER: f64 = 1.2;
@@ -84,12 +84,6 @@ pub fn explain<'a>(
         swing_m: drive.swing_m,
         silent_heads: seen.silent,
     }
-}
-
-/// Whether a lack lies in a hole, as far as the target matters: the hole may still shrink from ahead.
-fn is_in(hole: &Hole, target_m: f64, perimeter_m: f64, lack: &Lack) -> bool {
-    let around_m = math::wrap_signed(lack.arc_m - hole.arc_m, perimeter_m);
-    math::hypot(lack.x_m - hole.x_m, around_m) < hole.diameter_m.min(target_m) / 2.0
 }
 
 /// The factors that were present.

@@ -3,7 +3,6 @@
 use headrace_coverage::Verdict;
 use serde::Serialize;
 
-use super::report::Report;
 use super::run::Loop;
 
 /// Metres by verdict for another target, or in sections of another length.
@@ -23,22 +22,6 @@ pub struct WhatIfReport {
     pub open_m: f64,
     /// Of these, metres that weren't seen from both sides.
     pub not_inspected_m: f64,
-}
-
-impl WhatIfReport {
-    /// Of a dive that was judged by that target in these sections.
-    pub fn of(report: &Report) -> Self {
-        let sum = &report.summary;
-        Self {
-            target_m: report.target_m,
-            section_m: report.section_m,
-            pass_m: sum.pass_m,
-            fail_m: sum.fail_m,
-            cannot_say_m: sum.cannot_say_m,
-            open_m: sum.open_m,
-            not_inspected_m: sum.not_inspected_m,
-        }
-    }
 }
 
 impl Loop {

@@ -270,6 +270,32 @@ fn a_table_becomes_the_bytes_that_its_sensors_would_have_sent() {
     refused(&folder, &arguments[1..6], &["--map MAPPING.toml"]);
 }
 
+/// Rows that were cut, decimal commas beside commas, and ranges beyond the setting are told, and none of their values lands in another column; a
+/// byte order mark is none of the first column's name.
+#[test]
+fn rows_that_are_not_as_the_header_are_lost_and_told() {
+    let folder = Folder::new();
+    folder.write("vehicle.toml", format!("{TUNNEL}{HEAD}"));
+    folder.write("map.toml", mapping(&[("a", "sonar_0", "angle", "deg"), ("r", "sonar_0", "range", "m")]));
+    let import = |rows: &str| {
+        folder.write("table.csv", format!("\u{feff}t_s,a,r\n{rows}"));
+        let arguments = ["import", "table.csv", "--vehicle", "vehicle.toml", "-o", "out.mcap", "--force"];
+        let answer = folder.headrace(&[&arguments[..], &["--map", "map.toml", "--json"]].concat());
+        (answer.code, json(&answer)["messages"]["sonar_0"].as_u64().unwrap(), answer.stderr)
+    };
+    let (code, messages, _) = import("1,0.0,3.0\n1.1,2.4,3.1\n1.2,4.8,\n");
+    assert_eq!((code, messages), (Some(0), 3));
+    for (rows, told, words) in [
+        ("1,0.0,3.0\n1.1,2,4,3,1\n1.2,4.8,3.0\n", 2, "rows with other cells than the header"),
+        ("1,0.0,3.0\n1.1,2.4,3.1\n1.2,4", 2, "rows with other cells than the header"),
+        ("1,0.0,3.0\n1.1,2.4,30\n1.2,4.8,3.0\n", 3, "at its range setting: as if nothing was heard"),
+    ] {
+        let (code, messages, said) = import(rows);
+        assert_eq!((code, messages), (Some(3), told), "{rows}: {said}");
+        assert!(said.contains(words), "{said}");
+    }
+}
+
 #[test]
 fn what_is_no_such_file_is_named_with_what_it_looks_like() {
     let folder = Folder::new();

@@ -4,8 +4,9 @@ use crate::cause::Cause;
 use crate::causes::Causes;
 use crate::frontier::Reach;
 use crate::hole::Hole;
-use crate::lacks::Lacks;
+use crate::lacks::{Lack, Lacks};
 use crate::passage::{Drive, Passage};
+use headrace_geometry::math;
 use headrace_sampling::head::HeadSet;
 
 /// Without a factor that was present, distances are at most this share of what they were.
@@ -102,4 +103,10 @@ pub(super) fn is_unheard(case: &Case<'_>, seen: &Seen) -> bool {
 pub(super) fn is_remembered(case: &Case<'_>) -> bool {
     let mut lacking = case.lacks.between(case.bounds_m.0, case.bounds_m.1);
     lacking.any(|lack| lack.why.has(Cause::HeadSilent))
+}
+
+/// Whether a lack lies in a hole, as far as the target matters: the hole may still shrink from ahead.
+pub(super) fn is_in(hole: &Hole, target_m: f64, perimeter_m: f64, lack: &Lack) -> bool {
+    let around_m = math::wrap_signed(lack.arc_m - hole.arc_m, perimeter_m);
+    math::hypot(lack.x_m - hole.x_m, around_m) < hole.diameter_m.min(target_m) / 2.0
 }

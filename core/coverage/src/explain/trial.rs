@@ -1,7 +1,6 @@
 //! What a section's hole would have been without some of the factors that were present.
 
-use super::case::{Case, HELPS, Seen, WIDEST, is_dark, is_passed, is_unheard};
-use super::is_in;
+use super::case::{Case, HELPS, Seen, WIDEST, is_dark, is_in, is_passed, is_unheard};
 use crate::cause::Cause;
 use crate::causes::Causes;
 use crate::frontier::Reach;

@@ -171,7 +171,10 @@ pub(super) fn note_ping(lacking: &mut Lacking, ping: &PlacedPing, lacks: &mut La
                 Loss::Occluded if heard => Cause::MissingReturns,
                 loss => Cause::of_loss(loss),
             };
-            lacks.add(Lack { x_m, arc_m, head: number_of(ping.head), why: Causes::of(cause) });
+            // With a longer range the vehicle would be in the way still.
+            let stays = loss == Loss::OutOfRange && ping.hidden == Hidden::Yes && head.is_hidden();
+            let why = if stays { Causes::of(cause).with(Cause::Occluded) } else { Causes::of(cause) };
+            lacks.add(Lack { x_m, arc_m, head: number_of(ping.head), why });
         }
         Outcome::Lost(_, None) | Outcome::Unplaced(_) if ping.fix.is_none() => {
             let is_lost = !matches!(ping.outcome, Outcome::Unplaced(_));
@@ -385,10 +388,12 @@ impl Placing<'_> {
         if ping.is_lost {
             // What the head wouldn't have heard anyway, or not from there, isn't missing by chance.
             let elsewhere = |why: Causes| why.without(Cause::MissingReturns);
-            if wall.range_m > self.turning.longest_m {
-                why = elsewhere(why).with(Cause::OutOfRange);
-            } else if self.turning.is_hidden() && (self.hidden)(ping.angle_rad) {
-                why = elsewhere(why).with(Cause::Occluded);
+            let is_far = wall.range_m > self.turning.longest_m;
+            let is_hidden = self.turning.is_hidden() && (self.hidden)(ping.angle_rad);
+            let because = |why: Causes, is: bool, cause: Cause| if is { why.with(cause) } else { why };
+            if is_far || is_hidden {
+                why = because(elsewhere(why), is_far, Cause::OutOfRange);
+                why = because(why, is_hidden, Cause::Occluded);
             } else if made {
                 why = why.with(Cause::MissingReturns);
             }

@@ -156,7 +156,8 @@ fn a_ping_lacks_where_it_was_aimed_for_all_that_kept_it_from_the_wall() {
         (&[position], true, 5.0, seen_through, true, &[position, missing]),
         (&[silent], true, 5.0, hidden, false, &[silent]),
         (&[silent, missing], true, 5.0, hidden, false, &[silent, missing]),
-        (&[silent, missing], true, 2.9, hidden, true, &[silent, far]),
+        (&[silent, missing], true, 2.9, hidden, true, &[silent, far, occluded]),
+        (&[silent, missing], true, 2.9, hidden, false, &[silent, far]),
         (&[silent, missing], true, 5.0, hidden, true, &[silent, occluded]),
         (&[silent, missing], true, 5.0, seen_through, true, &[silent, missing]),
     ] {
