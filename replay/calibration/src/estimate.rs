@@ -155,8 +155,8 @@ pub enum Untold {
     },
     /// Ranges don't fit the design profile's size.
     #[error(
-        "ranges are {long_pct:+.1} % long for this profile: sound_speed_mps = {sound_mps:.0} fits, or the wall is that much larger than the \
-         file says; mend that first, other values can't be told till then"
+        "ranges are {long_pct:+.1} % long for this profile: sound_speed_mps = {sound_mps:.0} fits, or the file's wall is off by as much; \
+         mend that first, other values can't be told till then"
     )]
     Scaled {
         /// By how much ranges are too long, %.
