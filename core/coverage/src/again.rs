@@ -106,7 +106,9 @@ mod tests {
 
     fn again(sections: &[Failing]) -> Again {
         let mut tally = Tally::default();
-        sections.iter().for_each(|section| tally.add(section));
+        for section in sections {
+            tally.add(section);
+        }
         tally.again(u32::try_from(sections.len()).unwrap())
     }
 

@@ -170,7 +170,7 @@ impl<'a, 'b> Runs<'a, 'b> {
         let is_asked = self.material.sensors.get(source).is_some_and(|sensor| answers(sensor.kind));
         let of_source = || self.events.iter().filter(|event| event.source.index() == source);
         let (count, late_s) = (of_source().count(), latency_s + offset.value);
-        let ends = of_source().next().zip(of_source().last());
+        let ends = of_source().next().zip(of_source().next_back());
         let span_s = ends.map_or(0.0, |(first, last)| last.received.since(first.received).as_secs_f64());
         let every_s = span_s / count.saturating_sub(1).max(1) as f64;
         if is_asked && late_s >= every_s && every_s > 0.0 {

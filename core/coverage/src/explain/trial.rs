@@ -98,11 +98,19 @@ impl<'a> Trial<'a> {
             let sets = (1..=present.bits()).filter(|bits| bits & !present.bits() == 0).map(Causes::from_bits);
             for set in self.case.beside.into_iter().chain(sets).filter(fit) {
                 if self.passes_without(set, 1.0) {
-                    return set;
+                    return self.less_occluded(set);
                 }
             }
         }
         present
+    }
+
+    /// A set without `occluded`, where that is of wall out of range and the rest nearly does: heads that hide wall from each other do so with
+    /// a longer range, too, and others see it.
+    fn less_occluded(&mut self, set: Causes) -> Causes {
+        let rest = set.without(Cause::Occluded);
+        let is_far = set.has(Cause::Occluded) && set.has(Cause::OutOfRange);
+        if is_far && self.passes_without(rest, AT_MOST) { rest } else { set }
     }
 
     /// The one factor without which the section would have met the target, if any is enough; the one that is sure where there is one.
