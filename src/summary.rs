@@ -54,18 +54,7 @@ pub(crate) fn summary(report: &Report, columns: Option<usize>) -> String {
             line(stretch);
         }
         for other in &report.what_if {
-            let metres = LiveMetres {
-                pass_m: other.pass_m,
-                fail_m: other.fail_m,
-                cannot_say_m: other.cannot_say_m,
-                open_m: other.open_m - other.not_inspected_m,
-                not_inspected_m: other.not_inspected_m,
-            };
-            let WhatIfReport { target_m, section_m, .. } = other;
-            line(format!(
-                "  with target {target_m} m in sections of {section_m} m: {}",
-                metres_text(&metres)
-            ));
+            line(what_if(other));
         }
         let metres = |value: Option<f64>| value.map_or_else(|| "-".to_owned(), |v| format!("{v:.3}"));
         line(format!(
@@ -167,6 +156,19 @@ fn not_inspected_text(why: &NotInspectedReport) -> String {
         [] => text,
         silent => format!("{text}; nothing came from {}", silent.join(", ")),
     }
+}
+
+/// What another target, or other sections, would have been told.
+fn what_if(other: &WhatIfReport) -> String {
+    let metres = LiveMetres {
+        pass_m: other.pass_m,
+        fail_m: other.fail_m,
+        cannot_say_m: other.cannot_say_m,
+        open_m: other.open_m - other.not_inspected_m,
+        not_inspected_m: other.not_inspected_m,
+    };
+    let WhatIfReport { target_m, section_m, .. } = other;
+    format!("  with target {target_m} m in sections of {section_m} m: {}", metres_text(&metres))
 }
 
 /// The stretches that are missed or of which nothing can be said, along the tunnel, a line each: where, what, what to do.
