@@ -217,7 +217,11 @@ pub(crate) fn replay(args: &Replay) -> Result<u8, Failure> {
         served.end(&report);
     }
     note_losses(&mut report, log, &player);
-    report.what_if = what_if::reports(args, &files, (vehicle, &text), &report)?;
+    if player.coming()?.is_none() {
+        report.what_if = what_if::reports(args, &files, (vehicle, &text), &report)?;
+    } else if what_if::is_asked(args) {
+        tracing::warn!("other targets and sections aren't judged: the replay was ended before its log");
+    }
     let code = finish(&report, &args.output)?;
     if let Some(path) = args.expect.as_deref().filter(|_| args.bless) {
         expect::bless(&report, path)?;

@@ -11,6 +11,7 @@ use headrace_monitor::telling::UnsureStretch;
 use headrace_monitor::what_if::WhatIfReport;
 
 use crate::output::append;
+use crate::what_if;
 
 /// Silence of a sensor that is told, s.
 const SILENT_S: f64 = 5.0;
@@ -42,19 +43,13 @@ pub(crate) fn summary(report: &Report, columns: Option<usize>) -> String {
             report.confidence_sd
         ));
         let sum = &report.summary;
-        let metres = LiveMetres {
-            pass_m: sum.pass_m,
-            fail_m: sum.fail_m,
-            cannot_say_m: sum.cannot_say_m,
-            open_m: sum.open_m - sum.not_inspected_m,
-            not_inspected_m: sum.not_inspected_m,
-        };
-        line(format!("  {}", metres_text(&metres)));
+        line(format!("  {}", metres(&what_if::of(report))));
         for stretch in stretches(report) {
             line(stretch);
         }
         for other in &report.what_if {
-            line(what_if(other));
+            let WhatIfReport { target_m, section_m, .. } = other;
+            line(format!("  with target {target_m} m in sections of {section_m} m: {}", metres(other)));
         }
         let metres = |value: Option<f64>| value.map_or_else(|| "-".to_owned(), |v| format!("{v:.3}"));
         line(format!(
@@ -158,17 +153,16 @@ fn not_inspected_text(why: &NotInspectedReport) -> String {
     }
 }
 
-/// What another target, or other sections, would have been told.
-fn what_if(other: &WhatIfReport) -> String {
-    let metres = LiveMetres {
-        pass_m: other.pass_m,
-        fail_m: other.fail_m,
-        cannot_say_m: other.cannot_say_m,
-        open_m: other.open_m - other.not_inspected_m,
-        not_inspected_m: other.not_inspected_m,
-    };
-    let WhatIfReport { target_m, section_m, .. } = other;
-    format!("  with target {target_m} m in sections of {section_m} m: {}", metres_text(&metres))
+/// Metres by verdict, the open ones without those that weren't inspected.
+fn metres(judged: &WhatIfReport) -> String {
+    let WhatIfReport { pass_m, fail_m, cannot_say_m, open_m, not_inspected_m, .. } = *judged;
+    metres_text(&LiveMetres {
+        pass_m,
+        fail_m,
+        cannot_say_m,
+        open_m: open_m - not_inspected_m,
+        not_inspected_m,
+    })
 }
 
 /// The stretches that are missed or of which nothing can be said, along the tunnel, a line each: where, what, what to do.
@@ -194,7 +188,7 @@ fn missed(run: &RunReport, report: &Report) -> String {
     let back = report.way_home.iter().find(|back| back.run == run.id);
     let action =
         back.map(|back| format!("  -> {}", actions_text(&back.actions, back.back_to_m, back.at_most_mps)));
-    // Of the rest nothing can be said since.
+    // The rest passes, or nothing can be said of it since.
     let is_whole = run.failed_m > run.end_m - run.start_m - 1e-6;
     let of_it = if is_whole { String::new() } else { format!(" {:.2} m of it", run.failed_m) };
     format!(

@@ -28,7 +28,7 @@ pub(crate) fn reports(
     let (targets_m, sections_m) =
         (own(&args.target, vehicle.target_m), own(&args.section, vehicle.section_m));
     let mut all = Vec::new();
-    if targets_m.len() < 2 && sections_m.len() < 2 {
+    if !is_asked(args) {
         return Ok(all);
     }
     let _phase = Phase::start("other targets and sections");
@@ -41,6 +41,11 @@ pub(crate) fn reports(
         }
     }
     Ok(all)
+}
+
+/// Whether there are several targets, or several lengths of sections.
+pub(crate) fn is_asked(args: &Replay) -> bool {
+    args.target.len() > 1 || args.section.len() > 1
 }
 
 fn replayed(
@@ -59,7 +64,7 @@ fn replayed(
 }
 
 /// What a dive was told.
-fn of(report: &Report) -> WhatIfReport {
+pub(crate) fn of(report: &Report) -> WhatIfReport {
     let sum = &report.summary;
     WhatIfReport {
         target_m: report.target_m,

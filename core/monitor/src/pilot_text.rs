@@ -169,8 +169,9 @@ pub fn actions_text(actions: &[Action], back_to_m: f64, at_most_mps: f64) -> Str
     if let [_, Action::Position | Action::HeadBack] = two.as_slice() {
         two.reverse();
     }
-    if let [_, Action::Slower] = two.as_slice()
-        && at_most_mps > 0.0
+    // It is in the speed, or what comes first says that it won't help.
+    if let [first, Action::Slower] = two.as_slice()
+        && (at_most_mps > 0.0 || matches!(first, Action::FinerMode | Action::HigherGain))
     {
         two.pop();
     }
@@ -204,6 +205,8 @@ pub fn action_text(action: Action, back_to_m: f64, at_most_mps: f64) -> String {
         // The speed is for the present mode and range setting.
         Action::FinerMode => return "slower won't help, a finer mode will".to_owned(),
         Action::LongerRange => return "set a longer range".to_owned(),
+        // Elsewhere in the stretch a speed helps.
+        Action::HigherGain if at_most_mps > 0.0 => format!("{back}, then with a higher gain,"),
         Action::HigherGain => return "slower won't help, a higher gain may".to_owned(),
         Action::Slower if at_most_mps > 0.0 => format!("{back}, then"),
         Action::Slower => back,
@@ -458,7 +461,7 @@ mod tests {
             assert!(!without.contains("m/s") && !without.ends_with([',', ' ']), "{without:?}");
             let with = at(action, 0.25);
             let speed = match action {
-                Action::FinerMode | Action::LongerRange | Action::HigherGain => "",
+                Action::FinerMode | Action::LongerRange => "",
                 Action::InPhase => "in phase, at 0.25 m/s",
                 _ => "at most 0.25 m/s",
             };
@@ -474,6 +477,13 @@ mod tests {
             actions_text(&[Action::Slower, Action::OtherSide, Action::Again], 1240.5, 0.25),
             "go back to 1+240.50, then at most 0.25 m/s; and once rolled to each side"
         );
+        // Where a speed helps elsewhere in the stretch, it isn't said that slower won't.
+        let lossy = [Action::HigherGain, Action::Slower];
+        assert_eq!(
+            actions_text(&lossy, 1240.5, 0.25),
+            "go back to 1+240.50, then with a higher gain, at most 0.25 m/s"
+        );
+        assert_eq!(actions_text(&lossy, 1240.5, 0.0), "slower won't help, a higher gain may");
         let lost = [Action::Slower, Action::Position];
         let back = "once the position is back, go back to 1+240.50";
         assert_eq!(actions_text(&lost, 1240.5, 0.25), format!("{back}, at most 0.25 m/s"));

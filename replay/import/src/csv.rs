@@ -8,7 +8,7 @@ use headrace_geometry::time::MonoNs;
 use headrace_sensor::device::Sense;
 use headrace_vehicle::VehicleConfig;
 
-use crate::emulated::{EmulatedSensor, Value};
+use crate::emulated::{BEYOND, EmulatedSensor, Value};
 use crate::{Clock, Entry, Format, Step};
 
 /// Most values per sensor.
@@ -111,7 +111,8 @@ impl Csv {
 
     fn row(&mut self, line: &str, out: &mut Vec<Entry>) -> Result<(), &'static str> {
         let cells: Vec<&str> = line.split(self.separator).map(cell).collect();
-        if cells.len() != self.cells {
+        // Cells beyond the header's may be there as long as they are empty.
+        if cells.get(self.cells..).is_none_or(|more| more.iter().any(|cell| !cell.is_empty())) {
             return Err(
                 "rows with other cells than the header: cut short, or numbers with the separator in them",
             );
@@ -195,23 +196,13 @@ impl Target {
         let Some(value) = value(self.sensor.sense, values, empty(1)) else {
             return Err("rows with a cell that is no number");
         };
-        let is_reached = |range_m: f64| {
-            self.sensor.reach_m.is_none_or(|[least_m, most_m]| (least_m..=most_m).contains(&range_m))
-        };
-        let (value, is_beyond) = match value {
-            Value::Beam(angle_rad, Some(range_m)) if !is_reached(range_m) => {
-                (Value::Beam(angle_rad, None), true)
-            }
-            value => (value, false),
-        };
+        let (value, is_beyond) = self.sensor.within_reach(value);
         let stream = self.sensor.id.clone();
         let told = self.sensor.tell(MonoNs(stamp_ns), &value, &mut |at, bytes| {
             out.push(Entry { stamp_ns: at.0, stream: stream.clone(), bytes: bytes.to_vec() });
         });
         match (told, is_beyond) {
-            (true, true) => Err(
-                "rows with ranges that the head doesn't tell at its range setting: as if nothing was heard",
-            ),
+            (true, true) => Err(BEYOND),
             (true, false) => Ok(()),
             (false, _) => Err("rows with values that the sensor can't say"),
         }

@@ -48,12 +48,16 @@ impl Value {
     }
 }
 
+/// What ranges beyond a head's setting are lost as.
+pub(super) const BEYOND: &str =
+    "ranges that the head doesn't tell at its range setting: as if nothing was heard";
+
 /// A sensor of the vehicle file.
 pub(super) struct EmulatedSensor {
     pub(super) id: String,
     pub(super) sense: Sense,
-    /// For a head, its measurable ranges, metres at the site's speed of sound.
-    pub(super) reach_m: Option<[f64; 2]>,
+    /// For a head, its measurable ranges, m at the site's speed of sound.
+    reach_m: Option<[f64; 2]>,
     emulated: Emulated,
 }
 
@@ -93,6 +97,24 @@ impl EmulatedSensor {
         };
         let reach_m = head.map(|head| head.reach_m(vehicle.site.sound_speed_mps));
         Self { id: id.to_owned(), sense: device.sense(), reach_m, emulated: device.emulator(&setup) }
+    }
+
+    /// Whether it is a head.
+    pub(super) fn is_head(&self) -> bool {
+        self.reach_m.is_some()
+    }
+
+    /// A value as the sensor can tell it: of a beam whose range a head doesn't measure at its range setting, that nothing was heard; and whether
+    /// that is so.
+    pub(super) fn within_reach(&self, value: Value) -> (Value, bool) {
+        match (value, self.reach_m) {
+            (Value::Beam(angle_rad, Some(range_m)), Some([least_m, most_m]))
+                if !(least_m..=most_m).contains(&range_m) =>
+            {
+                (Value::Beam(angle_rad, None), true)
+            }
+            (value, _) => (value, false),
+        }
     }
 
     /// Emits the bytes that the sensor would have sent, each with its receive time. `false` if it can't encode the value, or the

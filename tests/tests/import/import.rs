@@ -283,7 +283,7 @@ fn rows_that_are_not_as_the_header_are_lost_and_told() {
         let answer = folder.headrace(&[&arguments[..], &["--map", "map.toml", "--json"]].concat());
         (answer.code, json(&answer)["messages"]["sonar_0"].as_u64().unwrap(), answer.stderr)
     };
-    let (code, messages, _) = import("1,0.0,3.0\n1.1,2.4,3.1\n1.2,4.8,\n");
+    let (code, messages, _) = import("1,0.0,3.0\n1.1,2.4,3.1,\n1.2,4.8,\n");
     assert_eq!((code, messages), (Some(0), 3));
     for (rows, told, words) in [
         ("1,0.0,3.0\n1.1,2,4,3,1\n1.2,4.8,3.0\n", 2, "rows with other cells than the header"),

@@ -20,6 +20,7 @@ use headrace_tests::Folder;
 use headrace_tests::scenes;
 use headrace_vehicle::VehicleConfig;
 use proptest::prelude::*;
+use serde_json::Value;
 
 /// Each stop: the time, the tick, the digest, and whether it was the end.
 #[derive(Default)]
@@ -328,6 +329,18 @@ fn interactive(folder: &Folder, arguments: &[&str], lines: &str) -> Output {
         .unwrap();
     program.stdin.take().unwrap().write_all(lines.as_bytes()).unwrap();
     program.wait_with_output().unwrap()
+}
+
+/// Other targets are judged by the whole log: beside what was played of it their figures would be of another dive.
+#[test]
+fn a_replay_that_was_left_is_not_judged_by_other_targets() {
+    let folder = logs();
+    let arguments = ["ticks.mcap", "--speed", "1x", "--target", "0.5,0.3", "--report", "left.json"];
+    let answer = interactive(&folder, &arguments, "pause\nseek 12s\nend\n");
+    let report: Value = serde_json::from_slice(&folder.read("left.json")).unwrap();
+    assert_eq!(report["what_if"], serde_json::json!([]));
+    let said = String::from_utf8_lossy(&answer.stderr);
+    assert!(said.contains("the replay was ended before its log"), "{said}");
 }
 
 #[test]

@@ -9,7 +9,7 @@ use super::clocks::{Base, Clocks};
 use super::message::{Read, Type, Values, read};
 use super::points::{Beam, Beams, Plane};
 use super::wire::Encoding;
-use crate::emulated::{EmulatedSensor, Value};
+use crate::emulated::{BEYOND, EmulatedSensor, Value};
 use crate::{Entry, Told};
 
 /// A mapping's settings for a topic, apart from its sensor.
@@ -72,7 +72,7 @@ impl Feed {
     }
 
     pub(super) fn is_of_head(&self) -> bool {
-        self.sensor.reach_m.is_some()
+        self.sensor.is_head()
     }
 
     pub(super) fn sensor_id(&self) -> &str {
@@ -167,20 +167,17 @@ impl Feed {
         if told.beams.len() > 1 && last_s <= first_s {
             *self.noted.entry("of several beams without times: all are given one").or_default() += 1;
         }
-        let reach_m = self.sensor.reach_m;
         let mut unsaid = 0_u64;
         let mut beyond = 0_u64;
         for Beam { angle_rad, range_m, after_s } in &told.beams {
             let from_s = if at.1 { *after_s } else { after_s - last_s };
             let at_ns = at.0.saturating_add_signed(headrace_geometry::time::DurNs::from_secs_f64(from_s).0);
-            let reached = |range: f64| reach_m.is_none_or(|[least, most]| (least..=most).contains(&range));
-            beyond += u64::from(range_m.is_some_and(|range| !reached(range)));
-            let value = Value::Beam(*angle_rad, *range_m);
+            let (value, is_beyond) = self.sensor.within_reach(Value::Beam(*angle_rad, *range_m));
+            beyond += u64::from(is_beyond);
             unsaid += u64::from(self.say((at_ns, at.1), &value, out).is_err());
         }
         if beyond > 0 {
-            let what = "ranges that the head doesn't tell at its range setting: as if nothing was heard";
-            *self.lost.entry(what).or_default() += beyond;
+            *self.lost.entry(BEYOND).or_default() += beyond;
         }
         if unsaid > 0 { Err("with beams that the sensor can't say") } else { Ok(()) }
     }
