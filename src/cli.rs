@@ -296,10 +296,10 @@ pub(crate) struct Replay {
     /// Vehicle file, overriding the one attached to the log.
     #[arg(long, value_name = "FILE")]
     pub(crate) vehicle: Option<PathBuf>,
-    /// Target T, metres, overriding the vehicle file's; further targets are evaluated as alternatives.
+    /// Target T, metres, overriding the vehicle file's; each further one is judged by a replay of its own.
     #[arg(long, value_name = "METRES,..", value_parser = target, value_delimiter = ',')]
     pub(crate) target: Vec<f64>,
-    /// Section length, metres, overriding the vehicle file's; further lengths are evaluated as alternatives.
+    /// Section length, metres, overriding the vehicle file's; each further one is judged by a replay of its own.
     #[arg(long, value_name = "METRES,..", value_parser = section, value_delimiter = ',')]
     pub(crate) section: Vec<f64>,
     /// Speed of sound in the water, m/s, overriding the vehicle file's.
