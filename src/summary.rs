@@ -11,7 +11,6 @@ use headrace_monitor::telling::UnsureStretch;
 use headrace_monitor::what_if::WhatIfReport;
 
 use crate::output::append;
-use crate::what_if;
 
 /// Silence of a sensor that is told, s.
 const SILENT_S: f64 = 5.0;
@@ -43,7 +42,7 @@ pub(crate) fn summary(report: &Report, columns: Option<usize>) -> String {
             report.confidence_sd
         ));
         let sum = &report.summary;
-        line(format!("  {}", metres(&what_if::of(report))));
+        line(format!("  {}", metres(&report.metres())));
         for stretch in stretches(report) {
             line(stretch);
         }

@@ -37,7 +37,11 @@ pub(crate) fn reports(
             (vehicle.target_m, vehicle.section_m) = (*target_m, section_m);
             let is_played = target_m.to_bits() == played.target_m.to_bits()
                 && section_m.to_bits() == played.section_m.to_bits();
-            all.push(if is_played { of(played) } else { of(&replayed(args, files, (&vehicle, text))?) });
+            all.push(if is_played {
+                played.metres()
+            } else {
+                replayed(args, files, (&vehicle, text))?.metres()
+            });
         }
     }
     Ok(all)
@@ -61,18 +65,4 @@ fn replayed(
     let dive = assemble(vehicle, text, None)?;
     player.connect(dive.armed.sources());
     dive.run_on(threads, (&mut player, pace), &mut Watch::quiet(), &mut |_| ())
-}
-
-/// What a dive was told.
-pub(crate) fn of(report: &Report) -> WhatIfReport {
-    let sum = &report.summary;
-    WhatIfReport {
-        target_m: report.target_m,
-        section_m: report.section_m,
-        pass_m: sum.pass_m,
-        fail_m: sum.fail_m,
-        cannot_say_m: sum.cannot_say_m,
-        open_m: sum.open_m,
-        not_inspected_m: sum.not_inspected_m,
-    }
 }

@@ -303,6 +303,20 @@ impl Report {
         }
     }
 
+    /// Metres by verdict for the target and the sections that the dive was judged by.
+    pub fn metres(&self) -> WhatIfReport {
+        let sum = &self.summary;
+        WhatIfReport {
+            target_m: self.target_m,
+            section_m: self.section_m,
+            pass_m: sum.pass_m,
+            fail_m: sum.fail_m,
+            cannot_say_m: sum.cannot_say_m,
+            open_m: sum.open_m,
+            not_inspected_m: sum.not_inspected_m,
+        }
+    }
+
     /// Whether any received data were lost before the results.
     pub fn lost_data(&self) -> bool {
         let rejected = &self.dive.samples_rejected;
