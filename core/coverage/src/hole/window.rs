@@ -171,12 +171,12 @@ impl Window {
         let [per_turn, per_row, _] = self.per_m;
         let turn = libm::floor(arc_m * per_turn);
         let arc_m = arc_m - turn * self.perimeter_m;
-        let mut best = Search { x_m, arc_m, limit2: within_m * within_m, found: None };
+        let mut best = Search { x_m, arc_m, limit2: within_m * within_m, enough2, found: None };
         let centre = whole((x_m - self.from_m) * per_row).min(self.rows - 1);
         // Outwards from the point's row, one row to either side at a time.
         self.look_in_row(centre, &mut best);
         for ring in 1..self.rows {
-            if best.limit2 <= enough2 && best.found.is_some() {
+            if best.is_enough() {
                 break;
             }
             let below = (centre >= ring).then(|| centre - ring);
@@ -220,6 +220,9 @@ impl Window {
         if right >= 2 * columns {
             self.look_at(first, first + right - 2 * columns + 1, 1.0, best);
         }
+        if best.is_enough() {
+            return true;
+        }
         let (left, right) = (left.max(columns) - columns, right.min(2 * columns - 1) - columns);
         self.look_at(first + left, first + right + 1, 0.0, best);
         true
@@ -236,7 +239,9 @@ impl Window {
         let arc_m = best.arc_m - turns * self.perimeter_m;
         for spot in self.spots(from, to) {
             let (dx, darc) = (spot.x_m - best.x_m, spot.arc_m - arc_m);
-            best.take(spot, turns, dx * dx + darc * darc);
+            if best.takes(spot, turns, dx * dx + darc * darc) && best.is_enough() {
+                return;
+            }
         }
     }
 
@@ -253,7 +258,9 @@ impl Window {
                 0.0
             };
             let darc = straight + turns * self.perimeter_m;
-            best.take(spot, turns, dx * dx + darc * darc);
+            if best.takes(spot, turns, dx * dx + darc * darc) && best.is_enough() {
+                return;
+            }
         }
     }
 }
@@ -263,14 +270,22 @@ struct Search {
     x_m: f64,
     arc_m: f64,
     limit2: f64,
+    /// Squared distance at which no nearer one is looked for, m2.
+    enough2: f64,
     found: Option<(Spot, f64)>,
 }
 
 impl Search {
-    fn take(&mut self, spot: &Spot, turns: f64, distance2: f64) {
-        if distance2 < self.limit2 || (distance2 <= self.limit2 && self.found.is_none()) {
+    fn takes(&mut self, spot: &Spot, turns: f64, distance2: f64) -> bool {
+        let is_nearer = distance2 < self.limit2 || (distance2 <= self.limit2 && self.found.is_none());
+        if is_nearer {
             (self.limit2, self.found) = (distance2, Some((*spot, turns)));
         }
+        is_nearer
+    }
+
+    fn is_enough(&self) -> bool {
+        self.limit2 <= self.enough2 && self.found.is_some()
     }
 }
 
