@@ -190,11 +190,6 @@ impl Outing {
             let count = sections.iter().filter(|section| section.report.verdict == verdict).count();
             count as f64 / sections.len().max(1) as f64
         };
-        if std::env::var_os("SHOWN").is_some() {
-            let m = |of: &dyn Fn(&AdviceEntry) -> f64| { let mut v: Vec<f64> = beats.iter().map(of).collect(); v.sort_by(f64::total_cmp); [v[0], v[v.len()/2], v[v.len()-1]] };
-            eprintln!("{} at {speed_mps:.4} T {} gap {:?} sure {:.4?} t_y {:.4?} pred {:.4?} v {:.4?}", self.seed, self.target_m, m(&|b| b.advice.pass_gap_s), m(&|b| b.advice.sure_m), m(&|b| b.advice.t_y_m), m(&|b| b.advice.predicted_t_m.unwrap_or(f64::NAN)), m(&|b| b.advice.v_max_mps));
-            for s in &sections { eprintln!("   {:.2} {} D {:.4} sd {:.4} ({:.4}) true {:.4} arc {:.2} tx {:?} at {:?}", s.report.start_m, s.report.verdict, s.report.hole_m.unwrap_or(0.0), s.report.hole_sd_m, (self.target_m - s.report.hole_m.unwrap_or(0.0)) / s.report.hole_sd_m, s.true_hole_m, s.report.hole_arc_m.unwrap_or(0.0), s.report.t_x.max_m, s.report.hole_x_m); }
-        }
         let falsely = sections
             .iter()
             .filter(|section| section.report.verdict == "pass" && section.true_hole_m > self.target_m);
