@@ -276,6 +276,7 @@ struct Search {
 }
 
 impl Search {
+    /// Takes a sample that is nearer than the one found, and says whether it is.
     fn takes(&mut self, spot: &Spot, turns: f64, distance2: f64) -> bool {
         let is_nearer = distance2 < self.limit2 || (distance2 <= self.limit2 && self.found.is_none());
         if is_nearer {
@@ -284,6 +285,7 @@ impl Search {
         is_nearer
     }
 
+    /// Whether what was found is so near that no nearer one is looked for.
     fn is_enough(&self) -> bool {
         self.limit2 <= self.enough2 && self.found.is_some()
     }
