@@ -26,9 +26,8 @@ use ring_cache::AdvisedHead;
 pub use answer::{Advice, Alternative, Anew, Left, ModeName, Reason, Remedy};
 pub use hysteresis::Hysteresis;
 pub use ring_cache::Looks;
+pub use search::SPEED_MARGIN;
 
-/// Share of the speed held back for the error of its measurement.
-pub const SPEED_MARGIN: f64 = 0.01;
 /// Maximum number of modes per head with alternatives.
 pub const MAX_MODES: usize = 8;
 
@@ -365,8 +364,7 @@ impl Advisor {
         if speed_mps <= 0.0 {
             bound?;
         }
-        let meets = |speed_mps: f64| driving.meets(speed_mps, 0.0);
-        Ok(Fastest { speed_mps, advised_mps: search::kept_back_mps(speed_mps, SPEED_MARGIN, meets), t_y_m })
+        Ok(Fastest { speed_mps, advised_mps: driving.kept_back_mps(speed_mps), t_y_m })
     }
 
     /// How far the vehicle may move before rings are recast, m.

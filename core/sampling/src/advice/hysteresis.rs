@@ -1,7 +1,7 @@
 //! Hysteresis of the displayed advice, so that it doesn't chatter.
 
-use super::SPEED_MARGIN;
 use super::answer::{Advice, Reason};
+use super::search::SPEED_MARGIN;
 use headrace_geometry::time::{DurNs, MonoNs};
 use headrace_snapshot::stateful;
 
@@ -10,8 +10,8 @@ const HOLD: DurNs = DurNs(1_000_000_000);
 /// A higher speed is shown once it has been higher for this long, and by this share: 3 mm/s at 0.1 m/s.
 const RISES_AFTER: DurNs = DurNs(10_000_000_000);
 const RISES_BY: f64 = 0.03;
-/// A lower speed is shown at once where it is lower by this share; less is within the margin held back.
-const FALLS_BY: f64 = SPEED_MARGIN;
+/// A lower speed is shown at once where it is lower by this share; less is within half of the margin held back.
+const FALLS_BY: f64 = SPEED_MARGIN / 2.0;
 /// Number of advice updates kept: those within `HOLD` at 5 Hz.
 const HELD: usize = 6;
 /// A turn is forecast to exceed the target when the predicted T is above it by this share: half of the speed margin, so
@@ -22,8 +22,8 @@ const MAYBE_BEYOND: f64 = 0.03;
 
 /// Shows the most restrictive advice of the last second: the gravest reason and, within it, the lowest speed.
 ///
-/// A graver reason shows at once, a lesser one after it has held for a second. A speed lower by a hundredth shows at once, one
-/// higher by three hundredths after ten seconds, and then the least of these; smaller changes don't show. Until there has
+/// A graver reason shows at once, a lesser one after it has held for a second. A speed lower by half a hundredth shows at once,
+/// one higher by three hundredths after ten seconds, and then the least of these; smaller changes don't show. Until there has
 /// been a speed, or a reason against any, advice is shown unfiltered.
 #[derive(Debug, Clone)]
 pub struct Hysteresis {
@@ -207,10 +207,10 @@ mod tests {
         let wavering = (0..300).map(|k| speed(0.1 + if k % 7 < 3 { 0.0009 } else { 0.0027 }));
         let speeds: Vec<f64> = shown(wavering).iter().map(|advice| advice.v_max_mps).collect();
         assert!(speeds[1..].iter().all(|speed_mps| (speed_mps - 0.1009).abs() < 1e-12));
-        // What sinks slowly is followed, never more than a hundredth above it.
+        // What sinks slowly is followed, never more than half a hundredth above it.
         let sinking: Vec<_> = (0..300).map(|k| speed(0.1 - 1e-4 * f64::from(k))).collect();
         let shown = shown(sinking.iter().copied());
-        let over = |(shown, given): (&Advice, &Advice)| shown.v_max_mps > given.v_max_mps * 1.0102;
+        let over = |(shown, given): (&Advice, &Advice)| shown.v_max_mps > given.v_max_mps * 1.0051;
         assert!(!shown.iter().zip(&sinking).any(over));
     }
 

@@ -4,7 +4,7 @@
 //! the upper end of the highest interval. An interval that shrinks to nothing while heads run out of phase ends the
 //! continuity, since the next one may be far below; there, and back again, [`EASE`] is between.
 
-use super::search;
+use super::search::{self, SPEED_MARGIN};
 use crate::margin::SureTarget;
 use crate::passes::{Passes, Phasing};
 use crate::spacing;
@@ -103,6 +103,21 @@ impl Driving<'_> {
             return if within < last_mps * (1.0 - NEAR) { top_mps } else { within };
         }
         top_mps
+    }
+
+    /// A speed that meets the target, m/s, reduced by [`SPEED_MARGIN`]; by up to twice that where T grows faster than the
+    /// speed just above it, as where heads run out of phase: an error of a hundredth then costs more than a hundredth of T.
+    pub(super) fn kept_back_mps(&self, fastest_mps: f64) -> f64 {
+        const STEEP: f64 = 2.0 * SPEED_MARGIN;
+        let meets = |speed_mps: f64| self.meets(speed_mps, 0.0);
+        let less_mps = search::kept_back_mps(fastest_mps, SPEED_MARGIN, meets);
+        let nearly = |speed_mps: f64| self.meets(speed_mps, STEEP);
+        let beyond_mps = fastest_mps * (1.0 - SPEED_MARGIN) * (1.0 + STEEP);
+        if fastest_mps <= 0.0 || nearly(beyond_mps) {
+            return less_mps;
+        }
+        let edge_mps = search::edge_mps(fastest_mps, beyond_mps, nearly);
+        less_mps.min(search::kept_back_mps(fastest_mps, 1.0 - edge_mps / fastest_mps / (1.0 + STEEP), meets))
     }
 
     /// The best speed near one that met the target, where it misses it by little.

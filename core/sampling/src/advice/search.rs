@@ -1,5 +1,8 @@
 //! Search for speeds that meet a target, which may form several intervals.
 
+/// Share of the speed held back for the error of its measurement.
+pub const SPEED_MARGIN: f64 = 0.01;
+
 /// The largest speed up to `bound_mps` that meets the target where all slower ones do; zero if there is none.
 pub(super) fn highest_mps(bound_mps: f64, meets: impl Fn(f64) -> bool) -> f64 {
     const LEAST_SHARE: f64 = 1e-3;
@@ -43,7 +46,7 @@ pub(super) fn kept_back_mps(fastest_mps: f64, share: f64, meets: impl Fn(f64) ->
 }
 
 /// Edge of the interval, by bisection between a speed that meets the target and one that doesn't.
-fn edge_mps(mut good: f64, mut bad: f64, meets: impl Fn(f64) -> bool) -> f64 {
+pub(super) fn edge_mps(mut good: f64, mut bad: f64, meets: impl Fn(f64) -> bool) -> f64 {
     for _ in 0..30 {
         let middle = f64::midpoint(good, bad);
         if meets(middle) {
