@@ -8,6 +8,8 @@ use headrace_fusion::Navigation;
 use headrace_geometry::time::MonoNs;
 use headrace_monitor::App;
 use headrace_monitor::console::{CONSOLE_ID, Command, ConsoleInput, ConsolePort};
+use headrace_monitor::entities::HeadSpecification;
+use headrace_monitor::head_words::HeadWords;
 use headrace_monitor::outlet::{NoticeOutlet, NoticeReceiver};
 use headrace_monitor::report::{LineReport, LogReport, Report};
 use headrace_monitor::run::Loop;
@@ -194,6 +196,13 @@ fn app(vehicle: &VehicleConfig) -> Result<(App, NoticeReceiver), Failure> {
 /// Tunnel and heads for viewers.
 pub(crate) fn view_site(vehicle: &VehicleConfig) -> Site {
     let heads = (0..).zip(&vehicle.sensors).filter(|(_, sensor)| sensor.head().is_some());
+    let mission = vehicle.mission();
+    let specified = vehicle.sensors.iter().filter_map(|sensor| {
+        let (device, spec) = (sensor.as_ref(), sensor.head()?);
+        let head = HeadSpecification::of(device, spec, &mission);
+        Some(head.settings(&sensor.specification().sensor.id, &mission.profile, mission.target_m))
+    });
+    let head_words = HeadWords::of(specified);
     let reaches = heads.clone().map(|(_, sensor)| sensor.specification().sensor.mount.position.x().abs());
     Site {
         profile: vehicle.tunnel.profile.clone(),
@@ -201,6 +210,7 @@ pub(crate) fn view_site(vehicle: &VehicleConfig) -> Site {
         section_m: vehicle.section_m,
         run_up_m: reaches.fold(0.0, f64::max) + vehicle.target_m,
         length_m: vehicle.tunnel.length_m,
+        head_words,
         heads: heads.map(|(source, _)| source).collect(),
     }
 }

@@ -1,16 +1,14 @@
 //! Summary of a report as text.
 
 use headrace_config::plain::one_line;
-use headrace_coverage::{Cause, Unsure};
+use headrace_coverage::Unsure;
 use headrace_monitor::live_state::LiveMetres;
-use headrace_monitor::live_text::{helps_text, metres_text, unsure_text};
+use headrace_monitor::live_text::{helps_text, metres_text, of_it_text, unsure_text};
 use headrace_monitor::pilot_text::{actions_text, cause_text, station};
 use headrace_monitor::report::{ChangeReport, JudgedReport, SmoothingReport};
 use headrace_monitor::report::{NotInspectedReport, Report, RunReport, SourceReport};
 use headrace_monitor::telling::UnsureStretch;
 use headrace_monitor::what_if::WhatIfReport;
-
-use crate::output::append;
 
 /// Silence of a sensor that is told, s.
 const SILENT_S: f64 = 5.0;
@@ -180,18 +178,16 @@ fn stretches(report: &Report) -> Vec<String> {
 }
 
 fn missed(run: &RunReport, report: &Report) -> String {
-    let mut cause = run.figures.as_ref().map_or_else(|| run.cause.as_str().to_owned(), cause_text);
-    if run.cause == Cause::HeadSilent && !run.silent_sources.is_empty() {
-        append(&mut cause, format_args!(" ({})", run.silent_sources.join(", ")));
-    }
+    let heads = &report.heads;
+    let figures = run.figures.as_ref();
+    let cause = figures.map_or_else(|| run.cause.as_str().to_owned(), |figures| cause_text(figures, heads));
     let back = report.way_home.iter().find(|back| back.run == run.id);
-    let action =
-        back.map(|back| format!("  -> {}", actions_text(&back.actions, back.back_to_m, back.at_most_mps)));
+    let action = back
+        .map(|back| format!("  -> {}", actions_text(&back.actions, back.back_to_m, back.at_most_mps, heads)));
     // The rest passes, or nothing can be said of it since.
-    let is_whole = run.failed_m > run.end_m - run.start_m - 1e-6;
-    let of_it = if is_whole { String::new() } else { format!(" {:.2} m of it", run.failed_m) };
+    let of_it = of_it_text(run.failed_m, run.end_m - run.start_m);
     format!(
-        "  {} to {}  MISSED{of_it}: {cause}, holes up to {:.2} m{}",
+        "  {} to {}{of_it}  MISSED: {cause}, holes up to {:.2} m{}",
         station(run.start_m),
         station(run.end_m),
         run.hole_m,
@@ -206,7 +202,8 @@ fn unsure(stretch: &UnsureStretch) -> String {
     if !helps.is_empty() {
         helps.insert_str(0, "  -> ");
     }
-    format!("  {from} to {to}  {what}: {}{helps}", unsure_text(stretch))
+    let of_it = of_it_text(stretch.metres_m, stretch.to_m - stretch.from_m);
+    format!("  {from} to {to}{of_it}  {what}: {}{helps}", unsure_text(stretch))
 }
 
 /// A line broken to so many columns, if that is said; what is carried over is indented.

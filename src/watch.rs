@@ -131,7 +131,7 @@ impl Watch {
         self.tell(state.now, &told, dive);
         let condition = state.condition();
         if self.is_due(state, condition) {
-            self.shown = Some((state.now, condition));
+            self.shown = Some((as_of(state), condition));
             self.status(state, dive);
         }
     }
@@ -232,11 +232,10 @@ impl Watch {
     }
 
     fn is_due(&self, state: &LiveState, condition: Condition) -> bool {
-        let now = state.now;
         let Some((shown, before)) = self.shown else {
             return condition != Condition::NoData || !state.heard.iter().any(Option::is_some);
         };
-        let since = now.since(shown).0.abs();
+        let since = as_of(state).since(shown).0.abs();
         if self.show == Show::JsonLines || self.screen.overwrites {
             return since >= REFRESH_EVERY.0 || before.as_str() != condition.as_str();
         }
@@ -246,7 +245,7 @@ impl Watch {
     fn status(&mut self, state: &LiveState, dive: &Loop) {
         let name =
             |source: usize| dive.sources().get(source).map_or_else(String::new, |info| info.id.clone());
-        let mut line = status_line(state, &dive.mission().profile, &name);
+        let mut line = status_line(state, &dive.mission().profile, dive.head_words(), &name);
         if let Some((words, fails)) = self.recordings() {
             line.what.insert(line.what.len().min(1), words.to_owned());
             line.lamp = if fails { Some(Lamp::Red) } else { line.lamp };
@@ -276,7 +275,7 @@ impl Watch {
 
     fn tell(&mut self, at: MonoNs, told: &[Told], dive: &Loop) {
         for one in told {
-            let line = told_line(one, &dive.mission().profile);
+            let line = told_line(one, &dive.mission().profile, dive.head_words());
             if self.show == Show::Lines {
                 if one.adds_line() {
                     self.line(&line);
@@ -314,4 +313,10 @@ impl Watch {
             printer.line(text);
         }
     }
+}
+
+/// The time of what a state shows: its beat, wherever the tick ended that brought it, so that the same dive has the same lines; where no
+/// beats come, the time of the tick.
+fn as_of(state: &LiveState) -> MonoNs {
+    state.at.filter(|_| !state.is_old()).unwrap_or(state.now)
 }

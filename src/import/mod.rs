@@ -196,9 +196,13 @@ fn tell(args: &cli::Import, kind: FileKind, ids: &[String], imported: &Imported)
     Ok(if imported.losses.is_empty() { failure::OK } else { failure::DATA_LOST })
 }
 
-/// Kind of a file by its extension.
+/// Kind of a file by its extension. A log of an autopilot's memory has that of Ping Viewer's, and is refused before anything is asked of it.
 fn kind_of(path: &Path) -> Result<FileKind, Failure> {
-    FileKind::of(path).map_or_else(
+    let kind = FileKind::of(path);
+    if kind == Some(FileKind::Ping) && front_of(path)?.starts_with(&detect::DATAFLASH) {
+        return Err(named(path, &format!("importing {}: no log of Ping Viewer", path.display())));
+    }
+    kind.map_or_else(
         || {
             let problem = "its name doesn't say which format it has; known are .tlog, .log (candump), .852, .81a, .81b, \
                  .81s, .31l (imagenex), .bin (ping), .csv, .bag (rosbag) and .mcap (of ROS); \
@@ -222,14 +226,18 @@ fn unusable(path: &Path, error: ImportError) -> Failure {
 
 /// Error for a file of the wrong kind, with its apparent kind.
 fn named(path: &Path, problem: &str) -> Failure {
-    let mut front = Vec::new();
-    let file = match files::open(path) {
-        Ok(file) => file,
+    let front = match front_of(path) {
+        Ok(front) => front,
         Err(failure) => return failure,
     };
-    if let Err(source) = file.take(detect::ENOUGH_BYTES as u64).read_to_end(&mut front) {
-        return Failure::Read { path: path.to_owned(), source };
-    }
     let looks = detect::looks_like(&front).map(|words| format!("; it looks like this: {words}"));
     Failure::Usage(format!("{problem}{}", looks.unwrap_or_default()))
+}
+
+/// The first bytes of a file.
+fn front_of(path: &Path) -> Result<Vec<u8>, Failure> {
+    let mut front = Vec::new();
+    let mut file = files::open(path)?.take(detect::ENOUGH_BYTES as u64);
+    file.read_to_end(&mut front).map_err(|source| Failure::Read { path: path.to_owned(), source })?;
+    Ok(front)
 }

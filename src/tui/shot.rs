@@ -4,6 +4,7 @@ use std::collections::{BTreeMap, BTreeSet, VecDeque};
 
 use headrace_geometry::time::{DurNs, MonoNs};
 use headrace_geometry::tunnel::Profile;
+use headrace_monitor::head_words::HeadWords;
 use headrace_monitor::live_state::{Condition, LiveState, SensorState};
 use headrace_monitor::live_text::{PilotLine, status_line, told_line};
 use headrace_monitor::messages::Notice;
@@ -137,11 +138,13 @@ impl Eye {
 
     pub(super) fn shot(&mut self, dive: &Loop, stopped: Option<Stop>) -> Shot {
         let state = *dive.live_state();
-        let profile = &dive.mission().profile;
+        let (profile, heads) = (&dive.mission().profile, dive.head_words());
         let name =
             |source: usize| dive.sources().get(source).map_or_else(String::new, |info| info.id.clone());
-        let reason =
-            state.advice.as_ref().map_or_else(String::new, |advice| reason_text(advice, &state, profile));
+        let reason = state
+            .advice
+            .as_ref()
+            .map_or_else(String::new, |advice| reason_text(advice, &state, (profile, heads)));
         let (alerts, alerts_hidden) = alerts::rows(dive);
         let fails = self.failed.values().any(|fails| *fails);
         let words = if fails { "NOT RECORDED" } else { "recording had failed" };
@@ -149,7 +152,7 @@ impl Eye {
             vehicle: self.vehicle.clone(),
             time: dive.tally().span.map_or(DurNs(0), |(begun, _)| DurNs(state.now.since(begun).0.max(0))),
             stopped,
-            status: status_line(&state, profile, &name),
+            status: status_line(&state, profile, heads, &name),
             reason,
             sensors: self.sensors(&state, dive),
             alerts,
@@ -213,17 +216,17 @@ impl Eye {
 }
 
 /// What limits the speed. What the condition says isn't said again.
-fn reason_text(advice: &Advice, state: &LiveState, profile: &Profile) -> String {
+fn reason_text(advice: &Advice, state: &LiveState, (profile, heads): (&Profile, &HeadWords)) -> String {
     let is_told = matches!(state.condition(), Condition::TurnFails | Condition::NoSpeed);
     if advice.reason == Reason::HelixPitch && !is_told {
         return "the distance between turns limits the speed".to_owned();
     }
-    advice_text(&AdviceFigures::of(advice, state.speed_mps.unwrap_or(0.0)), profile)
+    advice_text(&AdviceFigures::of(advice, state.speed_mps.unwrap_or(0.0)), profile, heads)
 }
 
 /// The line of what is told, where it adds something to the list of alerts.
 fn tell(one: &Told, dive: &Loop, to: &mut Vec<PilotLine>) {
     if one.adds_line() {
-        to.push(told_line(one, &dive.mission().profile));
+        to.push(told_line(one, &dive.mission().profile, dive.head_words()));
     }
 }

@@ -9,8 +9,9 @@ use super::hole::Hole;
 use headrace_geometry::time::MonoNs;
 use headrace_snapshot::stateful;
 
-/// Maximum gap between neighbouring failed sections of one run, m.
-const JOIN_M: f64 = 0.5;
+/// Maximum gap between sections of one run, or of one stretch that can't be said, m: who goes back for one and turns round before it passes the
+/// other, too.
+pub(super) const JOIN_M: f64 = 2.0;
 
 /// Number of a run; never reused.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
@@ -168,6 +169,11 @@ impl Runs {
     /// The run that a section belongs to.
     pub fn of(&self, section: i64) -> Option<RunId> {
         self.member.get(self.slot(section)?).copied()?.checked_sub(1).map(RunId)
+    }
+
+    /// Whether a section is too far from a run to be of it.
+    pub fn is_beyond(&self, run: &Run, section: i64) -> bool {
+        section - run.to >= self.join || run.from - section > self.join
     }
 
     /// Updates the state of a section: it fails, or doesn't (`None`).

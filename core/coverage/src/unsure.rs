@@ -1,8 +1,10 @@
 //! Stretches of which neither a pass nor a fail can be told, though nothing more will come: why, and how far they go.
 
+use core::ops::Range;
 use serde::{Deserialize, Serialize};
 
 use super::passage::{Drive, Passage};
+use super::runs::JOIN_M;
 
 /// Why a section has neither passed nor failed, though no more samples will come without turning back.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
@@ -109,8 +111,6 @@ impl Driven {
 
 /// Share of the hole from which its error is what matters.
 const MOSTLY_ERROR: f64 = 0.2;
-/// Sections farther apart than this are of different stretches, m.
-const JOIN_M: f64 = 0.5;
 
 impl Stretch {
     /// Of one section: its hole and by how much that may be larger or smaller, m, with the standard deviation.
@@ -136,11 +136,16 @@ impl Stretch {
         &self.of[usize::from(self.is_mostly_error())]
     }
 
+    /// Whether sections are too far away to be of it.
+    pub fn is_beyond(&self, sections: Range<i64>, section_m: f64) -> bool {
+        let apart = (sections.start - self.to).max(self.from - sections.end);
+        apart as f64 * section_m > JOIN_M + 1e-9
+    }
+
     /// Adds a section; false if it is unsure for another reason, or too far away.
     #[must_use]
     pub fn join(&mut self, other: &Self, section_m: f64) -> bool {
-        let apart = (other.from - self.to).max(self.from - other.to);
-        if self.why != other.why || apart as f64 * section_m > JOIN_M + 1e-9 {
+        if self.why != other.why || self.is_beyond(other.from..other.to, section_m) {
             return false;
         }
         (self.from, self.to) = (self.from.min(other.from), self.to.max(other.to));
@@ -165,13 +170,15 @@ mod tests {
     }
 
     #[test]
-    fn neighbours_within_half_a_metre_are_one_stretch() {
+    fn neighbours_within_two_metres_are_one_stretch() {
         let mut stretch = one(Unsure::Position, 10, 0.4);
         assert!(stretch.join(&one(Unsure::Position, 11, 0.6), 0.25));
-        assert!(stretch.join(&one(Unsure::Position, 7, 0.5), 0.25), "two sections lie between");
-        assert!(!stretch.join(&one(Unsure::Position, 15, 0.5), 0.25), "three");
+        assert!(stretch.join(&one(Unsure::Position, 1, 0.5), 0.25), "eight sections lie between");
+        assert!(!stretch.join(&one(Unsure::Position, 21, 0.5), 0.25), "nine");
+        assert!(!stretch.is_beyond(20..21, 0.25) && stretch.is_beyond(21..22, 0.25));
+        assert!(!stretch.is_beyond(-8..-7, 0.25) && stretch.is_beyond(-9..-8, 0.25));
         assert!(!stretch.join(&one(Unsure::DoubtfulReturns, 12, 0.5), 0.25), "another reason");
-        assert_eq!((stretch.from, stretch.to, stretch.sections()), (7, 12, 3));
+        assert_eq!((stretch.from, stretch.to, stretch.sections()), (1, 12, 3));
         let largest = Largest { sections: 3, ..*one(Unsure::Position, 11, 0.6).largest() };
         assert_eq!(*stretch.largest(), largest);
     }

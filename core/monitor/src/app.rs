@@ -10,7 +10,6 @@ use bevy_ecs::world::World;
 use super::entities::{HeadSpecification, Mounted, SensorDecoder, SensorHealth};
 use super::error::PluginError;
 use super::loop_snapshot::StateParts;
-use super::other_settings;
 use super::resources::Digests;
 use super::ring::{self, Port, PortReader};
 use super::stage::{self, Stage};
@@ -136,9 +135,7 @@ impl App {
         let mut entity = self.world.entity_mut(*entity);
         entity.insert(Mounted { source, info: SensorInfo { mount: sensor.mount, kind } });
         if let Some(spec) = device.head() {
-            let modes = device.modes(None).unwrap_or_default();
-            let reaching = other_settings::reaching(device, &spec, &self.mission);
-            entity.insert(HeadSpecification { spec, modes, reaching });
+            entity.insert(HeadSpecification::of(device, spec, &self.mission));
         }
         Ok(source)
     }

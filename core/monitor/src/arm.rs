@@ -14,6 +14,7 @@ use super::entities::{
     Navigator, VehicleState,
 };
 use super::error::PluginError;
+use super::head_words::HeadWords;
 use super::live_state::{LiveState, source_bits};
 use super::merge::{Inbox, MAX_TICK_BYTES, MAX_TICK_PACKETS};
 use super::messages::{
@@ -152,10 +153,14 @@ impl App {
             contradiction_m: mission.coverage.contradiction_m,
             limits: WallLimits::new(mission.profile.perimeter_m(), mission.coverage.contradiction_m),
         });
+        let words = head_words(world, mission, sources);
+        world.insert_resource(words);
         let heads = source_bits(heads.into_iter(), HeadSet::from_bits(u8::MAX));
         let sources = u16::try_from(sources.len()).unwrap_or(0);
         let confidence_sd = mission.coverage.confidence_sd;
-        world.insert_resource(LiveState::new(mission.target_m, confidence_sd, heads, sources));
+        let live = LiveState::new(mission.target_m, confidence_sd, heads, sources);
+        let (length_m, heads_reach_m) = (mission.length_m, reach_m);
+        world.insert_resource(LiveState { length_m, heads_reach_m, ..live });
         let other = other_settings::of_heads(world, &mission.profile, mission.target_m);
         world.insert_resource(Target {
             target_m: mission.target_m,
@@ -212,6 +217,19 @@ fn sound_source(mission: &Mission, sources: &[SourceInfo]) -> Result<Option<Sour
     let place =
         sources.iter().position(|source| source.id == *id).and_then(|place| u16::try_from(place).ok());
     place.map(|place| Some(SourceId(place))).ok_or_else(|| PluginError::MissingSource { id: id.clone() })
+}
+
+/// What the heads are called and could be set to.
+fn head_words(world: &mut World, mission: &Mission, sources: &[SourceInfo]) -> HeadWords {
+    let mut heads = world.query::<(&Head, &Mounted, &HeadSpecification)>();
+    let mut heads: Vec<_> = heads.iter(world).collect();
+    heads.sort_by_key(|(head, ..)| head.0);
+    let name = |mounted: &Mounted| sources.get(mounted.source.index()).map_or("", |source| &source.id);
+    HeadWords::of(
+        heads
+            .into_iter()
+            .map(|(_, mounted, head)| head.settings(name(mounted), &mission.profile, mission.target_m)),
+    )
 }
 
 /// How far heads sit before or behind the vehicle's origin at most, m.

@@ -142,8 +142,8 @@ pub struct HeadSpecification {
     pub spec: HeadSpec,
     /// Modes that it can be set to.
     pub modes: Vec<HeadMode>,
-    /// The same at the shortest range setting, its own or a longer one, that reaches all wall from the middle; empty if none does.
-    pub reaching: Vec<HeadMode>,
+    /// The shortest range setting, m, its own or a longer one, that reaches all wall from the middle, and the modes there; none if none does.
+    pub reaching: Option<(f64, Vec<HeadMode>)>,
 }
 
 /// Angles of a head occluded by the vehicle, in the head's frame.

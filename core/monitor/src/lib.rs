@@ -37,6 +37,7 @@ pub mod feed;
 #[cfg(test)]
 mod fixtures;
 mod head_motion;
+pub mod head_words;
 mod hearing;
 pub mod live_state;
 pub mod live_text;

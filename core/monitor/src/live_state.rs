@@ -158,6 +158,10 @@ pub struct LiveState {
     pub target_m: f64,
     /// Standard deviations of a hole that a pass keeps clear of the target.
     pub confidence_sd: f64,
+    /// Length of the tunnel, m.
+    pub length_m: f64,
+    /// How far heads sit before or behind the vehicle's origin at most, m.
+    pub heads_reach_m: f64,
     /// Metres of the way.
     pub metres: LiveMetres,
     /// The stretch of which nothing could be said that was judged last.
@@ -185,11 +189,11 @@ pub struct LiveState {
 stateful!(LiveState {
     state: now, at, position, chainage_m, sd, pass_sd_m, stand_s, speed_mps, advice, metres, unsure, passed, back_to_m, alerts, turning, deaf, hung;
     slots: heard;
-    fixed: target_m, confidence_sd, heads, sources;
+    fixed: target_m, confidence_sd, length_m, heads_reach_m, heads, sources;
 });
 
 impl LiveState {
-    /// Before the first beat.
+    /// Before the first beat, in a tunnel of any length.
     pub(super) fn new(target_m: f64, confidence_sd: f64, heads: u64, sources: u16) -> Self {
         Self {
             now: MonoNs(0),
@@ -203,6 +207,8 @@ impl LiveState {
             advice: None,
             target_m,
             confidence_sd,
+            length_m: f64::INFINITY,
+            heads_reach_m: 0.0,
             metres: LiveMetres::default(),
             unsure: None,
             passed: false,
@@ -215,6 +221,14 @@ impl LiveState {
             sources,
             heard: [None; MAX_SOURCES],
         }
+    }
+
+    /// The end of the tunnel, m, that no head is inside of; `None` where one may be.
+    pub fn outside_m(&self) -> Option<f64> {
+        let x_m = self.chainage_m?;
+        let beyond = x_m > self.length_m + self.heads_reach_m;
+        let before = x_m < -self.heads_reach_m;
+        if beyond { Some(self.length_m) } else { before.then_some(0.0) }
     }
 
     /// Whether the pilot is told to stand still rather than a speed, for the gyros' bias.

@@ -1,6 +1,7 @@
 //! Words for what is told live: the place first, then what, then what to do. Terminals break them to their width.
 
 use super::alert_list::{AlertChange, ListedAlertJson};
+use super::head_words::HeadWords;
 use super::live_state::{Condition, Lamp, LiveMetres, LiveState, PositionDoubt, SensorState};
 use super::pilot_text::{AdviceFigures, actions_text, advice_text, cause_text, no_position_text, station};
 use super::telling::Told;
@@ -89,7 +90,12 @@ impl PilotLine {
 
 /// The status: where, how fast, what holds and what to do about it; then the turn's forecast, silent sensors, and failed
 /// metres. `name` gives a source's id.
-pub fn status_line(state: &LiveState, profile: &Profile, name: &dyn Fn(usize) -> String) -> PilotLine {
+pub fn status_line(
+    state: &LiveState,
+    profile: &Profile,
+    heads: &HeadWords,
+    name: &dyn Fn(usize) -> String,
+) -> PilotLine {
     let condition = state.condition();
     let place = state.chainage_m.map_or_else(|| "-+---.--".to_owned(), station);
     // What is within the errors of measuring a speed is called ok though it is a little over.
@@ -100,10 +106,14 @@ pub fn status_line(state: &LiveState, profile: &Profile, name: &dyn Fn(usize) ->
         Condition::NoData => (waiting_text(state).to_owned(), String::new()),
         Condition::Old(age) => (format!("OLD {}: nothing from any sensor", age_text(age)), "stop".to_owned()),
         Condition::NoPosition(lacking) => (no_position_text(lacking).to_owned(), "hold still".to_owned()),
+        Condition::Outside(end_m) => {
+            let which = if state.chainage_m.is_some_and(|x_m| x_m < end_m) { "begins" } else { "ends" };
+            (format!("OUTSIDE: the tunnel {which} at {}", station(end_m)), String::new())
+        }
         Condition::NoSonar => ("NO SONAR: nothing is seen".to_owned(), "stop".to_owned()),
         Condition::Passed => ("passed here".to_owned(), String::new()),
         Condition::GoingBack(to_m) => (format!("going back to {}", station(to_m)), String::new()),
-        Condition::NoSpeed => (no_speed_text(state, profile), String::new()),
+        Condition::NoSpeed => (no_speed_text(state, profile, heads), String::new()),
         Condition::TooFast => ("TOO FAST".to_owned(), format!("at most {v_max}")),
         Condition::TurnFails => (turn_text("THIS TURN MISSES", state), format!("go {v_max}")),
         Condition::CannotSay(PositionDoubt::Spread) if state.asks_to_stand() => {
@@ -139,7 +149,8 @@ pub fn status_line(state: &LiveState, profile: &Profile, name: &dyn Fn(usize) ->
         let hung = state.sensors_that_are(SensorState::Hung);
         parts.extend(hung.map(|source| format!("{} hangs", name(source))));
         let forecast = losses_text(state).or_else(|| forecast_text(state));
-        let any_speed = matches!(condition, Condition::Passed | Condition::GoingBack(_));
+        let any_speed =
+            matches!(condition, Condition::Passed | Condition::GoingBack(_) | Condition::Outside(_));
         let counts = state.has_sonar() && state.speed_mps.is_some() && !any_speed;
         parts.extend(forecast.filter(|_| counts));
     }
@@ -169,8 +180,8 @@ fn figures(state: &LiveState) -> Option<AdviceFigures> {
     state.advice.as_ref().map(|advice| AdviceFigures::of(advice, state.speed_mps.unwrap_or(0.0)))
 }
 
-fn no_speed_text(state: &LiveState, profile: &Profile) -> String {
-    figures(state).map_or_else(String::new, |figures| advice_text(&figures, profile))
+fn no_speed_text(state: &LiveState, profile: &Profile, heads: &HeadWords) -> String {
+    figures(state).map_or_else(String::new, |figures| advice_text(&figures, profile, heads))
 }
 
 fn turn_text(what: &str, state: &LiveState) -> String {
@@ -220,8 +231,13 @@ pub fn metres_text(metres: &LiveMetres) -> String {
     core::iter::once(passed).chain(parts).collect::<Vec<_>>().join(", ")
 }
 
+/// How much of a stretch it is, m; empty where it is all of it, or none any more.
+pub fn of_it_text(part_m: f64, whole_m: f64) -> String {
+    if part_m <= 0.0 || part_m > whole_m - 1e-6 { String::new() } else { format!(", {part_m:.2} m of it") }
+}
+
 /// Line of something to tell.
-pub fn told_line(told: &Told, profile: &Profile) -> PilotLine {
+pub fn told_line(told: &Told, profile: &Profile, heads: &HeadWords) -> PilotLine {
     let line = |place: String, what: String, action: String, lamp: Option<Lamp>| PilotLine {
         place,
         speed: String::new(),
@@ -233,17 +249,18 @@ pub fn told_line(told: &Told, profile: &Profile) -> PilotLine {
     match told {
         Told::Flag { from_m, missed, .. } => {
             let at_most_mps = missed.figures.again_mps(missed.v_max_mps);
-            let action = actions_text(&missed.figures.actions(), missed.back_to_m, at_most_mps);
+            let action = actions_text(&missed.figures.actions(), missed.back_to_m, at_most_mps, heads);
             let clock = profile.clock(missed.hole_arc_m);
             let what = format!(
                 "MISSED: {}, holes over {} m at {clock}",
-                cause_text(&missed.figures),
+                cause_text(&missed.figures, heads),
                 missed.target_m
             );
             line(station(*from_m), what, action, Some(Lamp::Red))
         }
-        Told::FlagEnds { from_m, to_m, .. } => {
-            line(station(*from_m), format!("missed until {}", station(*to_m)), String::new(), None)
+        Told::FlagEnds { from_m, to_m, failed_m, .. } => {
+            let of_it = of_it_text(*failed_m, to_m - from_m);
+            line(station(*from_m), format!("missed until {}{of_it}", station(*to_m)), String::new(), None)
         }
         Told::Cleared { from_m, to_m, .. } => line(
             station(*from_m),
@@ -256,7 +273,8 @@ pub fn told_line(told: &Told, profile: &Profile) -> PilotLine {
             line(station(stretch.from_m), what, helps_text(stretch), Some(Lamp::Amber))
         }
         Told::CannotSayEnds(stretch) => {
-            let what = format!("can't say until {}", station(stretch.to_m));
+            let of_it = of_it_text(stretch.metres_m, stretch.to_m - stretch.from_m);
+            let what = format!("can't say until {}{of_it}", station(stretch.to_m));
             line(station(stretch.from_m), what, String::new(), None)
         }
         Told::NotInspected(stretch) => {

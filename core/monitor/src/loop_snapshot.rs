@@ -130,6 +130,7 @@ mod tests {
     use super::*;
     use crate::console::Commands;
     use crate::entities::{Head, HeadSpecification, HiddenAngles, Mounted};
+    use crate::head_words::HeadWords;
     use crate::merge::Inbox;
     use crate::messages::{
         AdviceList, Events, Notices, PlacedEvents, PlacedList, PositionedList, Requests, Standings,
@@ -194,6 +195,7 @@ mod tests {
             TypeId::of::<Notices>(),
             TypeId::of::<TunnelDesign>(),
             TypeId::of::<Target>(),
+            TypeId::of::<HeadWords>(),
             TypeId::of::<Mounted>(),
             TypeId::of::<Head>(),
             TypeId::of::<HeadSpecification>(),

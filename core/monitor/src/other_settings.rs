@@ -4,31 +4,68 @@
 use bevy_ecs::prelude::World;
 
 use super::entities::HeadSpecification;
+use super::head_words::HeadSettings;
 use headrace_coverage::OtherSettings;
 use headrace_geometry::tunnel::Profile;
+use headrace_sampling::advice::ModeName;
 use headrace_sampling::head::{HeadMode, HeadSpec};
+use headrace_sampling::spacing::speed_for_target_mps;
 use headrace_sensor::device::Device;
 use headrace_vehicle::Mission;
 
 /// Range settings that are asked for, whole metres up to this one.
 const LONGEST_M: u32 = 200;
-/// Share of the target that the step along the wall of a mode that is fine enough leaves room in.
-const FINE_ENOUGH: f64 = 0.75;
 /// Steps closer together than this are equal, radians.
 const SAME_STEP_RAD: f64 = 1e-6;
 
-/// Modes of a head at the shortest range setting, its own or a longer one, that reaches all wall from the middle of the tunnel; none where
-/// no setting does.
-pub(super) fn reaching(device: &dyn Device, spec: &HeadSpec, mission: &Mission) -> Vec<HeadMode> {
+impl HeadSpecification {
+    /// Of a device that is a head, for a mission.
+    pub fn of(device: &dyn Device, spec: HeadSpec, mission: &Mission) -> Self {
+        let modes = device.modes(None).unwrap_or_default();
+        Self { spec, modes, reaching: reaching(device, &spec, mission) }
+    }
+
+    /// With its source's id: what it could be set to in a tunnel that is inspected with a target T, m.
+    pub fn settings(&self, name: &str, profile: &Profile, target_m: f64) -> HeadSettings {
+        let [_, own_m] = self.spec.range_m;
+        let range_m = self.reaching.as_ref().map(|(range_m, _)| *range_m);
+        let finer = self.finer(profile.farthest_m(profile.reference()), target_m);
+        HeadSettings {
+            name: name.to_owned(),
+            finer: finer.map(|mode| ModeName::new(mode.name)),
+            longer_m: range_m.filter(|range_m| *range_m > own_m),
+        }
+    }
+
+    /// Of the modes with a finer step, the one that lets the vehicle go fastest along wall as far away as `farthest_m`; where none meets the
+    /// target, the finest.
+    fn finer(&self, farthest_m: f64, target_m: f64) -> Option<&HeadMode> {
+        let step_rad = |mode: &HeadMode| mode.turn.step_rad();
+        let finer = || self.modes.iter().filter(|mode| step_rad(mode) < self.spec.step_rad - SAME_STEP_RAD);
+        let speed_mps = |mode: &HeadMode| {
+            // The step along a wall that beams meet squarely.
+            let t_y_m = step_rad(mode) * farthest_m;
+            speed_for_target_mps(target_m, t_y_m, mode.turn.period_s(), mode.turn.ping_period_s())
+        };
+        let fitting = finer().filter_map(|mode| Some((mode, speed_mps(mode)?)));
+        let fastest = fitting.max_by(|(_, one_mps), (_, other_mps)| one_mps.total_cmp(other_mps));
+        let finest = || finer().min_by(|one, other| step_rad(one).total_cmp(&step_rad(other)));
+        fastest.map(|(mode, _)| mode).or_else(finest)
+    }
+}
+
+/// The shortest range setting of a head, m, its own or a longer one, that reaches all wall from the middle of the tunnel, with the modes
+/// there; none where no setting does.
+fn reaching(device: &dyn Device, spec: &HeadSpec, mission: &Mission) -> Option<(f64, Vec<HeadMode>)> {
     let profile = &mission.profile;
     let wall_m = profile.farthest_m(profile.reference());
     let set_m = wall_m * spec.sound_speed_mps / mission.site.sound_speed_mps;
     let [_, own_m] = spec.range_m;
     if own_m >= set_m {
-        return device.modes(None).unwrap_or_default();
+        return Some((own_m, device.modes(None).unwrap_or_default()));
     }
     let longer_m = (1..=LONGEST_M).map(f64::from).filter(|range_m| *range_m >= set_m);
-    longer_m.into_iter().find_map(|range_m| device.modes(Some(range_m)).ok()).unwrap_or_default()
+    longer_m.into_iter().find_map(|range_m| Some((range_m, device.modes(Some(range_m)).ok()?)))
 }
 
 /// Of all heads of a world, those that change most: what holds for the vehicle is what its slowest head does.
@@ -51,15 +88,14 @@ fn of_head(head: &HeadSpecification, farthest_m: f64, target_m: f64) -> OtherSet
         modes.iter().find(same).map(|mode| mode.turn.period_s())
     };
     let Some(now_s) = turn_s(modes) else { return OtherSettings::default() };
-    let finer = || modes.iter().filter(|mode| mode.turn.step_rad() < spec.step_rad - SAME_STEP_RAD);
-    let by_step = |a: &&HeadMode, b: &&HeadMode| a.turn.step_rad().total_cmp(&b.turn.step_rad());
-    // The step along a wall that beams meet squarely.
-    let is_fine = |mode: &&HeadMode| mode.turn.step_rad() * farthest_m <= FINE_ENOUGH * target_m;
-    let chosen = finer().filter(is_fine).max_by(by_step).or_else(|| finer().min_by(by_step));
+    let chosen = head.finer(farthest_m, target_m);
     OtherSettings {
         finer_step: chosen.map_or(1.0, |mode| mode.turn.step_rad() / spec.step_rad),
         finer_turn: chosen.map_or(1.0, |mode| mode.turn.period_s() / now_s),
-        longer_turn: turn_s(reaching).map_or(1.0, |then_s| (then_s / now_s).max(1.0)),
+        longer_turn: reaching
+            .as_ref()
+            .and_then(|(_, modes)| turn_s(modes))
+            .map_or(1.0, |then_s| (then_s / now_s).max(1.0)),
     }
 }
 
@@ -73,7 +109,7 @@ mod tests {
         HeadMode { name, turn: Turn::new(step_deg.to_radians(), turn_s).unwrap(), basis: Basis::Table }
     }
 
-    fn head(step_deg: f64, reaching: Vec<HeadMode>) -> HeadSpecification {
+    fn head(step_deg: f64, reaching: Option<(f64, Vec<HeadMode>)>) -> HeadSpecification {
         let spec = HeadSpec {
             mount: Mount { position: Vec3::zero(), rotation: Rot::identity() },
             step_rad: step_deg.to_radians(),
@@ -90,23 +126,23 @@ mod tests {
     #[test]
     fn the_coarsest_mode_that_leaves_room_is_taken_and_takes_longer() {
         // 0.9 degrees are 0.094 m on wall 6 m away, 0.6 degrees 0.063 m.
-        let at = |target_m: f64| of_head(&head(2.4, Vec::new()), 6.0, target_m);
+        let at = |target_m: f64| of_head(&head(2.4, None), 6.0, target_m);
         let roomy = at(0.2);
         assert!((roomy.finer_step - 0.375).abs() < 1e-9 && (roomy.finer_turn - 8.0 / 4.8).abs() < 1e-9);
         let close = at(0.1);
         assert!((close.finer_step - 0.25).abs() < 1e-9 && (close.finer_turn - 10.8 / 4.8).abs() < 1e-9);
         // None leaves room: the finest.
         assert_eq!(at(0.01), close);
-        let finest = of_head(&head(0.6, Vec::new()), 6.0, 0.2);
+        let finest = of_head(&head(0.6, None), 6.0, 0.2);
         assert_eq!((finest.finer_step, finest.finer_turn, finest.longer_turn), (1.0, 1.0, 1.0));
     }
 
     #[test]
     fn a_longer_range_takes_as_long_as_its_own_mode_does_there() {
         let far = vec![mode("fast", 0.9, 10.0), mode("fastest", 2.4, 6.0)];
-        assert!((of_head(&head(2.4, far.clone()), 6.0, 0.2).longer_turn - 1.25).abs() < 1e-9);
-        assert!((of_head(&head(0.9, far), 6.0, 0.2).longer_turn - 1.25).abs() < 1e-9);
+        assert!((of_head(&head(2.4, Some((12.0, far.clone()))), 6.0, 0.2).longer_turn - 1.25).abs() < 1e-9);
+        assert!((of_head(&head(0.9, Some((12.0, far))), 6.0, 0.2).longer_turn - 1.25).abs() < 1e-9);
         let near = vec![mode("fastest", 2.4, 4.0)];
-        assert!((of_head(&head(2.4, near), 6.0, 0.2).longer_turn - 1.0).abs() < 1e-12);
+        assert!((of_head(&head(2.4, Some((10.0, near))), 6.0, 0.2).longer_turn - 1.0).abs() < 1e-12);
     }
 }

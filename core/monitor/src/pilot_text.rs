@@ -3,6 +3,7 @@
 
 use super::advice_log::AdviceEntry;
 use super::alerts::AlertKind;
+use super::head_words::HeadWords;
 use super::live_state::LEAST_MPS;
 use serde::{Deserialize, Serialize};
 
@@ -114,13 +115,13 @@ impl CauseFigures {
 const NAMED: usize = 2;
 
 /// Text of a fail's causes, with their figures; of several, the first two.
-pub fn cause_text(figures: &CauseFigures) -> String {
+pub fn cause_text(figures: &CauseFigures, heads: &HeadWords) -> String {
     let texts: Vec<String> =
-        figures.causes.iter().take(NAMED).map(|cause| one_cause_text(cause, figures)).collect();
-    if texts.is_empty() { one_cause_text(Cause::Unknown, figures) } else { texts.join(" and ") }
+        figures.causes.iter().take(NAMED).map(|cause| one_cause_text(cause, figures, heads)).collect();
+    if texts.is_empty() { one_cause_text(Cause::Unknown, figures, heads) } else { texts.join(" and ") }
 }
 
-fn one_cause_text(cause: Cause, figures: &CauseFigures) -> String {
+fn one_cause_text(cause: Cause, figures: &CauseFigures, heads: &HeadWords) -> String {
     match cause {
         Cause::TooFast => format!("too fast ({:.2} m/s)", figures.speed_mps),
         Cause::AngularStep => format!("steps of {:.2} m along the wall", figures.t_y_m),
@@ -132,7 +133,7 @@ fn one_cause_text(cause: Cause, figures: &CauseFigures) -> String {
         }
         Cause::OffAxis => format!("off the middle (steps of {:.2} m along the wall)", figures.t_y_m),
         Cause::HeadStalled => "a head stood still".to_owned(),
-        Cause::HeadSilent => silent_text(figures.silent_heads),
+        Cause::HeadSilent => heads.silent(figures.silent_heads),
         Cause::Phase => format!("heads out of phase ({:.2} m/s)", figures.speed_mps),
         Cause::PositionLost => "position lost".to_owned(),
         Cause::NotPassed => "not passed on both sides".to_owned(),
@@ -140,31 +141,9 @@ fn one_cause_text(cause: Cause, figures: &CauseFigures) -> String {
     }
 }
 
-/// Text of the heads that were silent, heard nothing or weren't believed, as people count them in the order of the vehicle file: sources' own names often have numbers
-/// that begin with 0.
-fn silent_text(heads: HeadSet) -> String {
-    let numbers: Vec<String> = heads.iter().map(ordinal).collect();
-    match numbers.as_slice() {
-        [] => "no wall from the heads".to_owned(),
-        [only] => format!("no wall from the {only} head"),
-        [others @ .., last] => format!("no wall from the {} and {last} head", others.join(", ")),
-    }
-}
-
-/// "1st" of 0.
-fn ordinal(head: usize) -> String {
-    let suffix = match head {
-        0 => "st",
-        1 => "nd",
-        2 => "rd",
-        _ => "th",
-    };
-    format!("{}{suffix}", head + 1)
-}
-
 /// Text of the actions for a missed stretch, as of [`action_text`]; of several, the first two: what has to be there before the vehicle goes
 /// back comes first, and slower is in the speed.
-pub fn actions_text(actions: &[Action], back_to_m: f64, at_most_mps: f64) -> String {
+pub fn actions_text(actions: &[Action], back_to_m: f64, at_most_mps: f64, heads: &HeadWords) -> String {
     let mut two: Vec<Action> = actions.iter().copied().take(NAMED).collect();
     if let [_, Action::Position | Action::HeadBack] = two.as_slice() {
         two.reverse();
@@ -176,16 +155,16 @@ pub fn actions_text(actions: &[Action], back_to_m: f64, at_most_mps: f64) -> Str
         two.pop();
     }
     let Some((first, others)) = two.split_first() else { return String::new() };
-    let text = action_text(*first, back_to_m, at_most_mps);
-    others.first().map_or(text.clone(), |second| format!("{text}; and {}", short_text(*second)))
+    let text = action_text(*first, back_to_m, at_most_mps, heads);
+    others.first().map_or(text.clone(), |second| format!("{text}; and {}", short_text(*second, heads)))
 }
 
 /// Text of an action beside another one.
-fn short_text(action: Action) -> &'static str {
-    match action {
+fn short_text(action: Action, heads: &HeadWords) -> String {
+    let text = match action {
         Action::Slower => "slower",
-        Action::FinerMode => "in a finer mode",
-        Action::LongerRange => "with a longer range",
+        Action::FinerMode => return format!("in {}", heads.finer_mode()),
+        Action::LongerRange => return format!("with {}", heads.longer_range()),
         Action::OtherSide => "once rolled to each side",
         Action::Middle => "in the middle and steady",
         Action::InPhase => "with the heads in phase",
@@ -194,17 +173,18 @@ fn short_text(action: Action) -> &'static str {
         Action::Position => "once the position is back",
         Action::HigherGain => "with a higher gain",
         Action::Again => "from end to end",
-    }
+    };
+    text.to_owned()
 }
 
 /// Text of the action for a missed stretch that the vehicle is to go back for to a chainage, m, with the maximum speed, m/s; zero if
 /// no speed is known to meet the target.
-pub fn action_text(action: Action, back_to_m: f64, at_most_mps: f64) -> String {
+pub fn action_text(action: Action, back_to_m: f64, at_most_mps: f64, heads: &HeadWords) -> String {
     let back = format!("go back to {}", station(back_to_m));
     let text = match action {
         // The speed is for the present mode and range setting.
-        Action::FinerMode => return "slower won't help, a finer mode will".to_owned(),
-        Action::LongerRange => return "set a longer range".to_owned(),
+        Action::FinerMode => return format!("slower won't help: {}, then {back}", heads.set_finer()),
+        Action::LongerRange => return format!("set {}, then {back}", heads.longer_range()),
         // Elsewhere in the stretch a speed helps.
         Action::HigherGain if at_most_mps > 0.0 => format!("{back}, then with a higher gain,"),
         Action::HigherGain => return "slower won't help, a higher gain may".to_owned(),
@@ -249,9 +229,14 @@ pub(super) fn no_position_text(lacking: NoFix) -> &'static str {
 }
 
 /// What would gain speed: the remedy where slower doesn't help, else a mode that all heads have and that allows more.
-pub fn gain_text(advice: &Advice) -> Option<String> {
+pub fn gain_text(advice: &Advice, heads: &HeadWords) -> Option<String> {
     if advice.remedy.is_some() {
         return Some(remedy_text(advice.remedy));
+    }
+    if advice.unseen_m.is_some()
+        && let Some(sees) = heads.seeing_more()
+    {
+        return Some(sees);
     }
     let others = advice.alternatives.iter().flatten();
     let best = others.max_by(|one, other| one.v_max_mps.total_cmp(&other.v_max_mps))?;
@@ -286,14 +271,14 @@ pub struct Missed {
 }
 
 /// Text of a flag: location, cause and action.
-pub fn flag_text(missed: &Missed, profile: &Profile) -> String {
+pub fn flag_text(missed: &Missed, profile: &Profile, heads: &HeadWords) -> String {
     let Missed { start_m, back_to_m, figures, hole_arc_m, target_m, v_max_mps } = missed;
     format!(
         "ch {}  {}: holes over {target_m} m at {} o'clock; {}",
         station(*start_m),
-        cause_text(figures),
+        cause_text(figures, heads),
         profile.clock(*hole_arc_m),
-        actions_text(&figures.actions(), *back_to_m, figures.again_mps(*v_max_mps)),
+        actions_text(&figures.actions(), *back_to_m, figures.again_mps(*v_max_mps), heads),
     )
 }
 
@@ -398,7 +383,7 @@ impl AdviceFigures {
 }
 
 /// Text of advice, with its figures.
-pub fn advice_text(advice: &AdviceFigures, profile: &Profile) -> String {
+pub fn advice_text(advice: &AdviceFigures, profile: &Profile, heads: &HeadWords) -> String {
     match advice.reason {
         Reason::HelixPitch if advice.v_max_mps < LEAST_MPS => "no speed is slow enough here".to_owned(),
         Reason::HelixPitch if advice.will_exceed && advice.speed_mps.abs() > advice.v_max_mps => {
@@ -410,7 +395,9 @@ pub fn advice_text(advice: &AdviceFigures, profile: &Profile) -> String {
         }
         Reason::HelixPitch => format!("may go {:.2} m/s (distance between turns)", advice.v_max_mps),
         Reason::AngularStep => {
-            let remedy = remedy_text(advice.remedy);
+            let more_seen =
+                heads.seeing_more().filter(|_| advice.remedy.is_none() && advice.unseen_m.is_some());
+            let remedy = more_seen.unwrap_or_else(|| remedy_text(advice.remedy));
             match (advice.remedy, advice.unseen_m) {
                 (Some(Remedy::HoldHeading), _) => format!("slower won't help: {remedy}"),
                 (_, Some([width_m, arc_m])) => {
@@ -430,6 +417,7 @@ pub fn advice_text(advice: &AdviceFigures, profile: &Profile) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::head_words::tests::two;
 
     #[test]
     fn stationing_as_engineers_write_it() {
@@ -445,17 +433,8 @@ mod tests {
     }
 
     #[test]
-    fn silent_heads_are_named_as_people_count() {
-        let text =
-            |heads: &[usize]| silent_text(heads.iter().fold(HeadSet::default(), |set, head| set.with(*head)));
-        assert_eq!(text(&[1]), "no wall from the 2nd head");
-        assert_eq!(text(&[0, 1, 3]), "no wall from the 1st, 2nd and 4th head");
-        assert_eq!(text(&[]), "no wall from the heads");
-    }
-
-    #[test]
     fn every_action_says_what_to_do_and_a_speed_where_it_holds() {
-        let at = |action, at_most_mps| action_text(action, 1240.5, at_most_mps);
+        let at = |action, at_most_mps| action_text(action, 1240.5, at_most_mps, &two());
         for action in Action::ALL {
             let without = at(action, 0.0);
             assert!(!without.contains("m/s") && !without.ends_with([',', ' ']), "{without:?}");
@@ -474,19 +453,19 @@ mod tests {
         );
         assert_eq!(at(Action::Again, 0.0), "go back to 1+240.50, then from end to end");
         assert_eq!(
-            actions_text(&[Action::Slower, Action::OtherSide, Action::Again], 1240.5, 0.25),
+            actions_text(&[Action::Slower, Action::OtherSide, Action::Again], 1240.5, 0.25, &two()),
             "go back to 1+240.50, then at most 0.25 m/s; and once rolled to each side"
         );
         // Where a speed helps elsewhere in the stretch, it isn't said that slower won't.
         let lossy = [Action::HigherGain, Action::Slower];
         assert_eq!(
-            actions_text(&lossy, 1240.5, 0.25),
+            actions_text(&lossy, 1240.5, 0.25, &two()),
             "go back to 1+240.50, then with a higher gain, at most 0.25 m/s"
         );
-        assert_eq!(actions_text(&lossy, 1240.5, 0.0), "slower won't help, a higher gain may");
+        assert_eq!(actions_text(&lossy, 1240.5, 0.0, &two()), "slower won't help, a higher gain may");
         let lost = [Action::Slower, Action::Position];
         let back = "once the position is back, go back to 1+240.50";
-        assert_eq!(actions_text(&lost, 1240.5, 0.25), format!("{back}, at most 0.25 m/s"));
-        assert_eq!(actions_text(&lost, 1240.5, 0.0), format!("{back}; and slower"));
+        assert_eq!(actions_text(&lost, 1240.5, 0.25, &two()), format!("{back}, at most 0.25 m/s"));
+        assert_eq!(actions_text(&lost, 1240.5, 0.0, &two()), format!("{back}; and slower"));
     }
 }

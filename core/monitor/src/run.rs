@@ -13,6 +13,7 @@ use super::app::{App, SourceInfo};
 use super::console::{Console, ConsoleCounts};
 use super::digest::Digest;
 use super::entities::{HeadFrontier, Mounted, Navigator, SensorDecoder, SensorHealth, VehicleState};
+use super::head_words::HeadWords;
 use super::live_state::LiveState;
 use super::live_state::json::LiveStateJson;
 use super::loop_snapshot;
@@ -124,6 +125,11 @@ impl Loop {
         &self.mission
     }
 
+    /// What the heads are called and could be set to.
+    pub fn head_words(&self) -> &HeadWords {
+        self.world.resource::<HeadWords>()
+    }
+
     /// Ticks run so far.
     pub fn ticks(&self) -> u64 {
         self.ticks
@@ -198,7 +204,7 @@ impl Loop {
 
     /// What words of alerts need.
     pub fn surroundings(&self) -> Surroundings<'_> {
-        Surroundings::of(&self.sources, &self.mission.profile, &self.coverage().sections)
+        Surroundings::of(&self.sources, &self.mission.profile, &self.coverage().sections, self.head_words())
     }
 
     /// The live state with the alerts, as JSON.

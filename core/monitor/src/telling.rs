@@ -47,6 +47,8 @@ pub enum Told {
         from_m: f64,
         /// Where it ends.
         to_m: f64,
+        /// Metres of it that fail.
+        failed_m: f64,
     },
     /// A stretch that was missed was passed again, and none of it fails any more.
     Cleared {
@@ -103,6 +105,8 @@ pub struct Teller {
     missed: Vec<ToldMissed>,
     /// The stretch that was told last, until its end is.
     unsure: Option<Stretch>,
+    /// It was told as one whose errors matter most.
+    told_as_error: bool,
     /// The stretches whose ends have been told.
     told: Vec<Stretch>,
     /// Sections at an end of the way, until the vehicle is well beyond.
@@ -212,8 +216,8 @@ impl Teller {
         let lasts = |here: &Stretch| is_settled || here.why == Unsure::NotInspected;
         let Some(here) = sections.unsure(section).filter(lasts) else {
             let is_judged = sections.get(section).is_some_and(|section| section.verdict != Verdict::Open);
-            let beside = |last: &Stretch| section == last.to || section == last.from - 1;
-            if is_judged && self.unsure.as_ref().is_some_and(beside) {
+            let is_over = |last: &Stretch| last.is_beyond(section..section + 1, section_m);
+            if is_judged && self.unsure.as_ref().is_some_and(is_over) {
                 self.close_unsure(sections, tell);
             }
             return;
@@ -230,27 +234,38 @@ impl Teller {
                 self.tell_ends(sections, tell);
                 self.at_ends = Some(here);
             }
-        } else if !self.unsure.as_mut().is_some_and(|last| last.join(&here, section_m)) {
-            self.close_unsure(sections, tell);
-            self.unsure = Some(here);
-            tell(Told::CannotSay(UnsureStretch::of(&here, sections)));
+            return;
         }
+        if let Some(last) = &mut self.unsure
+            && last.join(&here, section_m)
+        {
+            // What the first sections wait for isn't what most of it does.
+            let now = as_it_is(last, sections);
+            if self.told_as_error && !now.is_mostly_error() {
+                self.told_as_error = false;
+                tell(Told::CannotSay(UnsureStretch::of(&now, sections)));
+            }
+            return;
+        }
+        self.close_unsure(sections, tell);
+        (self.unsure, self.told_as_error) = (Some(here), here.is_mostly_error());
+        tell(Told::CannotSay(UnsureStretch::of(&here, sections)));
     }
 
     fn close_unsure(&mut self, sections: &Sections, tell: &mut dyn FnMut(Told)) {
         if let Some(stretch) = self.unsure.take() {
             self.told.push(stretch);
-            tell(Told::CannotSayEnds(UnsureStretch::of(&stretch, sections)));
+            tell(Told::CannotSayEnds(UnsureStretch::of(&as_it_is(&stretch, sections), sections)));
         }
     }
 
-    /// Tells the end of the run flagged last at a neighbouring section that doesn't fail.
+    /// Tells the end of the run flagged last once a section that is too far away to be of it doesn't fail.
     fn close_run_at(&mut self, section: i64, sections: &Sections, tell: &mut dyn FnMut(Told)) {
         // An open section may still join the run.
         let other = |section: &Section| !section.is_flagged() && section.verdict != Verdict::Open;
         let ends = sections.get(section).is_some_and(other);
         let run = self.run.and_then(|(id, _)| sections.runs().get(id));
-        if ends && run.is_some_and(|run| section == run.to || section == run.from - 1) {
+        if ends && run.is_some_and(|run| sections.runs().is_beyond(run, section)) {
             self.close_run(sections, tell);
         }
     }
@@ -259,7 +274,8 @@ impl Teller {
         let Some((id, _)) = self.run.take() else { return };
         let Some(run) = sections.runs().get(id) else { return };
         let (from_m, to_m) = bounds_m(run, sections);
-        tell(Told::FlagEnds { run: id.0, from_m, to_m });
+        let failed_m = f64::from(run.failed) * sections.section_m();
+        tell(Told::FlagEnds { run: id.0, from_m, to_m, failed_m });
     }
 
     fn run(&mut self, id: RunId, change: RunChange, dive: &Loop, tell: &mut dyn FnMut(Told)) {
@@ -334,6 +350,21 @@ impl Teller {
         *told = told.union(evidence.causes);
         tell(flag(id, run, index, &evidence, dive));
     }
+}
+
+/// A stretch by what its sections are now, each once, with the bounds that it was told with; as it was where none is unsure any more.
+fn as_it_is(told: &Stretch, sections: &Sections) -> Stretch {
+    let each = (told.from..told.to).filter_map(|index| sections.unsure(index));
+    let mut each = each.filter(|here| here.why == told.why);
+    let Some(mut now) = each.next() else { return *told };
+    (now.from, now.to) = (told.from, told.to);
+    for here in each {
+        // All of them are within these bounds.
+        if !now.join(&here, sections.section_m()) {
+            break;
+        }
+    }
+    now
 }
 
 /// What is told of a run from one of its sections on.

@@ -325,7 +325,7 @@ impl Collector {
             let mut value =
                 serde_json::to_value(one).unwrap_or_else(|error| json!({"error": error.to_string()}));
             if let Some(object) = value.as_object_mut() {
-                let line = told_line(one, &dive.mission().profile);
+                let line = told_line(one, &dive.mission().profile, dive.head_words());
                 object.insert("t_s".to_owned(), dive.now().as_secs_f64().into());
                 object.entry("text").or_insert_with(|| line.text().into());
             }
@@ -455,7 +455,7 @@ impl Collector {
         let rates = self.sensors.iter().map(|sensor| RateJson { id: sensor.id.clone(), hz: sensor.hz });
         let name =
             |source: usize| dive.sources().get(source).map_or_else(String::new, |info| info.id.clone());
-        let text = status_line(dive.live_state(), &dive.mission().profile, &name).text();
+        let text = status_line(dive.live_state(), &dive.mission().profile, dive.head_words(), &name).text();
         let compared = self.compared.as_ref().map(Compared::json);
         Beside {
             pose,

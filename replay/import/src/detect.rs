@@ -1,5 +1,7 @@
 //! Recognises kinds of files by their first bytes.
 
+/// What a dataflash log of ArduPilot begins with.
+pub const DATAFLASH: [u8; 2] = *b"\xA3\x95";
 /// Bytes sufficient for recognition.
 pub const ENOUGH_BYTES: usize = 64;
 
@@ -19,7 +21,7 @@ pub fn looks_like(front: &[u8]) -> Option<&'static str> {
             b"SQLite format 3",
             "an SQLite file, perhaps a ROS 2 bag; `ros2 bag convert` makes MCAP of it, which can be imported",
         ),
-        (b"\xA3\x95", "a dataflash log of ArduPilot (.BIN); its telemetry log (.tlog) can be imported"),
+        (&DATAFLASH, "a dataflash log of ArduPilot (.BIN); its telemetry log (.tlog) can be imported"),
         (b"852", "an Imagenex file"),
         (b"81A", "an Imagenex file"),
         (b"81B", "an Imagenex file"),

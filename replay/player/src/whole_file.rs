@@ -10,8 +10,17 @@ use std::sync::atomic::{AtomicU32, Ordering};
 #[derive(Debug)]
 pub struct WholeFile {
     file: BufWriter<File>,
-    /// Where it is written, and where it belongs; `None` for what is written in its place.
-    beside: Option<(PathBuf, PathBuf)>,
+    /// Where it belongs, and its name until then; `None` for what is written in its place.
+    beside: Option<(PathBuf, Beside)>,
+}
+
+/// How a file is kept beside its place.
+#[derive(Debug)]
+enum Beside {
+    /// Under a name of its own.
+    Named(PathBuf),
+    /// Without a name: nothing is left behind, whatever ends the program.
+    Nameless,
 }
 
 impl WholeFile {
@@ -25,13 +34,12 @@ impl WholeFile {
             return Self::in_place(path);
         }
         let place = path.canonicalize().unwrap_or_else(|_| path.to_owned());
-        let beside = name_beside(&place);
-        let file = match OpenOptions::new().write(true).create_new(true).open(&beside) {
-            Ok(file) => file,
+        let (file, beside) = match beside(&place) {
+            Ok(begun) => begun,
             Err(error) if there.is_ok() && is_refused(error.kind()) => return Self::in_place(path),
             Err(error) => return Err(error),
         };
-        let whole = Self { file: BufWriter::new(file), beside: Some((beside, place)) };
+        let whole = Self { file: BufWriter::new(file), beside: Some((place, beside)) };
         if let Ok(there) = there {
             whole.file.get_ref().set_permissions(there.permissions())?;
         }
@@ -47,9 +55,17 @@ impl WholeFile {
     /// Errors: the system's; what was there before is there still.
     pub fn complete(mut self) -> Result<()> {
         self.file.flush()?;
-        let Some((beside, place)) = &self.beside else { return Ok(()) };
+        let Some((place, beside)) = &mut self.beside else { return Ok(()) };
         self.file.get_ref().sync_all()?;
-        std::fs::rename(beside, place)?;
+        if matches!(beside, Beside::Nameless) {
+            // What has no name can't replace a file at once.
+            let name = name_beside(place);
+            give_name(self.file.get_ref(), &name)?;
+            *beside = Beside::Named(name);
+        }
+        if let Beside::Named(name) = beside {
+            std::fs::rename(name, &*place)?;
+        }
         let folder = folder_of(place).to_owned();
         self.beside = None;
         // Other systems don't open folders, and not every file system syncs them.
@@ -87,11 +103,55 @@ impl Seek for WholeFile {
 
 impl Drop for WholeFile {
     fn drop(&mut self) {
-        let Some((beside, _)) = &self.beside else { return };
-        if let Err(error) = std::fs::remove_file(beside) {
-            tracing::warn!("{} is left behind: {error}", beside.display());
+        let Some((_, Beside::Named(name))) = &self.beside else { return };
+        if let Err(error) = std::fs::remove_file(name) {
+            tracing::warn!("{} is left behind: {error}", name.display());
         }
     }
+}
+
+/// Begins a file beside its place: without a name where the system knows such files.
+fn beside(place: &Path) -> Result<(File, Beside)> {
+    if let Some(file) = nameless(folder_of(place)) {
+        return Ok((file, Beside::Nameless));
+    }
+    let name = name_beside(place);
+    Ok((OpenOptions::new().write(true).create_new(true).open(&name)?, Beside::Named(name)))
+}
+
+/// A file without a name, which can be given one; `None` where file system or kernel have none, or `/proc` isn't there.
+#[cfg(target_os = "linux")]
+fn nameless(folder: &Path) -> Option<File> {
+    use rustix::fs::{CWD, Mode, OFlags, openat};
+    let flags = OFlags::TMPFILE | OFlags::WRONLY | OFlags::CLOEXEC;
+    let file = File::from(openat(CWD, folder, flags, Mode::from_raw_mode(0o666)).ok()?);
+    path_of(&file).exists().then_some(file)
+}
+
+/// A file without a name; `None`, since this system has none.
+#[cfg(not(target_os = "linux"))]
+fn nameless(_: &Path) -> Option<File> {
+    None
+}
+
+/// Gives a file without a name one.
+#[cfg(target_os = "linux")]
+fn give_name(file: &File, name: &Path) -> Result<()> {
+    use rustix::fs::{AtFlags, CWD, linkat};
+    Ok(linkat(CWD, path_of(file), CWD, name, AtFlags::SYMLINK_FOLLOW)?)
+}
+
+/// Gives a file without a name one: there is none.
+#[cfg(not(target_os = "linux"))]
+fn give_name(_: &File, _: &Path) -> Result<()> {
+    Err(ErrorKind::Unsupported.into())
+}
+
+/// An open file among the process's own.
+#[cfg(target_os = "linux")]
+fn path_of(file: &File) -> PathBuf {
+    use std::os::fd::AsRawFd as _;
+    format!("/proc/self/fd/{}", file.as_raw_fd()).into()
 }
 
 /// The folder that a file is in.
@@ -154,6 +214,10 @@ mod tests {
         file.write_all(b"new").unwrap();
         file.flush().unwrap();
         assert_eq!(std::fs::read(&path).unwrap(), b"old");
+        // A program that is killed now leaves nothing behind.
+        if nameless(&folder).is_some() {
+            assert_eq!(names(&folder), ["report.json"]);
+        }
         drop(file);
         assert_eq!(
             (std::fs::read(&path).unwrap(), names(&folder)),

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::ffi::OsString;
 
-use headrace_tests::{Folder, VEHICLE, program, root, skipped};
+use headrace_tests::{Folder, SCENE, VEHICLE, program, root, skipped};
 
 /// A command that must refuse to write over a file, which stays as it is; and which does with `--force`, if it may.
 #[track_caller]
@@ -337,5 +337,37 @@ fn what_was_there_stays_where_the_new_file_cannot_be_written() {
             assert!(told, "{command:?}: {said}");
             assert!(content(&folder) == before, "{command:?}: other files are left than were there");
         }
+    }
+}
+
+/// A simulation that is killed in the middle leaves nothing behind, whatever kills it; where the file system knows files without a name.
+#[test]
+#[cfg(target_os = "linux")]
+fn a_simulation_that_is_killed_leaves_nothing_behind() {
+    let folder = Folder::with_dive();
+    folder.write("long.toml", SCENE.replace("speed_mps = 0.2", "speed_mps = 0.001"));
+    let before = content(&folder);
+    let mut command = program();
+    command.args(["simulate", "long.toml", "-o", "long.mcap"]).current_dir(folder.path(""));
+    let mut child = command.spawn().unwrap();
+    let number = child.id();
+    let opened = || {
+        let files = std::fs::read_dir(format!("/proc/{number}/fd")).into_iter().flatten().flatten();
+        let mut targets = files.filter_map(|file| std::fs::read_link(file.path()).ok());
+        targets.find(|target| target.starts_with(folder.path("")) && !target.ends_with("long.toml"))
+    };
+    let begun = loop {
+        if let Some(file) = opened() {
+            break file;
+        }
+        assert_eq!(child.try_wait().unwrap(), None, "it has ended");
+        std::thread::sleep(std::time::Duration::from_millis(10));
+    };
+    child.kill().unwrap();
+    child.wait().unwrap();
+    if begun.to_string_lossy().ends_with("(deleted)") {
+        assert!(content(&folder) == before, "{begun:?}: {:?}", content(&folder).keys());
+    } else {
+        skipped("a simulation that is killed: this file system knows no files without a name");
     }
 }

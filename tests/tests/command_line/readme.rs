@@ -9,12 +9,12 @@ const LEFT_OUT: &str = "    [...]";
 /// Tells this test to write the README anew.
 const RENEW: &str = "HEADRACE_RENEW_README";
 
-/// Of the demonstration's output in a pipe: from the state before the flag to where what was missed ends, from the state before it
+/// Of the demonstration's output in a pipe: from the state before the flag to the first that is good again, from the state before it
 /// is cleared to that, and the summary of the way. Nothing within these is left out.
 fn excerpt(stdout: &str) -> String {
     let lines: Vec<&str> = stdout.lines().collect();
     let first = lines.iter().position(|line| line.contains("MISSED: ")).unwrap() - 1;
-    let last = lines.iter().position(|line| line.contains("missed until ")).unwrap();
+    let last = first + 2 + lines[first + 2..].iter().position(|line| line.contains("  ok up to ")).unwrap();
     let cleared = lines.iter().rposition(|line| line.contains("CLEARED until ")).unwrap();
     let summary = lines.iter().position(|line| line.contains(" samples, target ")).unwrap();
     let end = lines.iter().position(|line| line.starts_with("  largest hole")).unwrap();

@@ -37,12 +37,12 @@ fn samples_behind_the_portal_are_said_once_with_how_far() {
     let scene = SCENE.replace("start_m = 3", "start_m = 0.6");
     let vehicle = VEHICLE.replace(
         "id = \"sonar_1\"\nplugin = \"imagenex881\"\n",
-        "id = \"sonar_1\"\nplugin = \"imagenex881\"\nposition_m = [-1.4, 0, 0]\n",
+        "id = \"sonar_1\"\nplugin = \"imagenex881\"\nposition_m = [-2.4, 0, 0]\n",
     );
     let (report, said) = dive(&vehicle, &scene);
     let alerts = report["alerts"].as_array().unwrap();
     assert_eq!((alerts.len(), &alerts[0]["kind"]), (1, &Value::from("outside_tunnel")));
-    assert!((0.3..1.0).contains(&alerts[0]["worst_m"].as_f64().unwrap()), "{alerts:?}");
+    assert!((1.3..2.0).contains(&alerts[0]["worst_m"].as_f64().unwrap()), "{alerts:?}");
     assert_eq!(said.matches("outside the tunnel").count(), 1, "{said}");
     assert!(report["sections"].as_array().unwrap().iter().all(|s| s["start_m"].as_f64().unwrap() >= 0.0));
 }

@@ -104,6 +104,14 @@ fn check_telemetry(file: &str, wanted: &Telemetry) {
 }
 
 #[test]
+fn a_log_of_an_autopilot_s_memory_is_told_before_anything_is_asked_of_it() {
+    let folder = Folder::new();
+    folder.write("00000012.BIN", [b"\xA3\x95\x80".as_slice(), &[7; 500]].concat());
+    let dataflash = ["no log of Ping Viewer", "a dataflash log of ArduPilot", ".tlog"];
+    refused(&folder, &["00000012.BIN", "-o", "out.mcap"], &dataflash);
+}
+
+#[test]
 fn a_telemetry_log_cut_off_gives_what_is_whole_and_says_so() {
     let folder = Folder::new();
     folder.write("vehicle.toml", format!("{TUNNEL}{AUTOPILOT}"));

@@ -2,6 +2,7 @@
 
 use super::{AlertState, Figures, ListKind, ListedAlert};
 use crate::app::SourceInfo;
+use crate::head_words::HeadWords;
 use crate::pilot_text::{
     actions_text, advice_text, alert_text, cause_text, no_position_text, setting_text, speed_text, station,
 };
@@ -24,11 +25,18 @@ pub struct Surroundings<'a> {
     pub confidence_sd: f64,
     /// The sections, for where to go back to.
     pub sections: &'a Sections,
+    /// What the heads are called and could be set to.
+    pub heads: &'a HeadWords,
 }
 
 impl<'a> Surroundings<'a> {
     /// Those of a dive.
-    pub(crate) fn of(sources: &'a [SourceInfo], profile: &'a Profile, sections: &'a Sections) -> Self {
+    pub(crate) fn of(
+        sources: &'a [SourceInfo],
+        profile: &'a Profile,
+        sections: &'a Sections,
+        heads: &'a HeadWords,
+    ) -> Self {
         Self {
             sources,
             profile,
@@ -36,6 +44,7 @@ impl<'a> Surroundings<'a> {
             target_m: sections.target_m(),
             confidence_sd: sections.confidence_sd(),
             sections,
+            heads,
         }
     }
 
@@ -67,7 +76,7 @@ impl ListedAlert {
         match (self.kind, &self.figures) {
             (_, Figures::Missed(causes, arc_m, _)) => {
                 let clock = around.profile.clock(*arc_m);
-                format!("MISSED {place}, at {clock}: {}", cause_text(causes))
+                format!("MISSED {place}, at {clock}: {}", cause_text(causes, around.heads))
             }
             (_, Figures::CannotSay(stretch)) => {
                 format!("CAN'T SAY {place}: {}", unsure_text(&around.unsure(stretch)))
@@ -82,7 +91,7 @@ impl ListedAlert {
                     figures.phase_error_rad.to_degrees().abs()
                 )
             }
-            (_, Figures::Advice(figures)) => advice_text(figures, around.profile),
+            (_, Figures::Advice(figures)) => advice_text(figures, around.profile, around.heads),
             (_, Figures::Lacking(lacking)) => no_position_text(*lacking).to_owned(),
             (_, Figures::Error(error_m, _)) => format!("CAN'T SAY: position ±{error_m:.2} m"),
             (kind, Figures::Deviation(x_m, off_m)) => match kind.of_dive() {
@@ -112,7 +121,7 @@ impl ListedAlert {
             (_, Figures::Missed(causes, _, v_max_mps)) => {
                 let from_m = self.bounds_m(around.section_m).0.unwrap_or(0.0);
                 let back_to_m = around.sections.back_to_m(from_m);
-                actions_text(&causes.actions(), back_to_m, causes.again_mps(*v_max_mps))
+                actions_text(&causes.actions(), back_to_m, causes.again_mps(*v_max_mps), around.heads)
             }
             (_, Figures::CannotSay(stretch)) => helps_text(&around.unsure(stretch)),
             (ListKind::TooFast, Figures::Advice(figures)) => speed_text("at most", figures.v_max_mps),

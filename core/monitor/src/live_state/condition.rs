@@ -23,6 +23,8 @@ pub enum Condition {
     Old(DurNs),
     /// There is no position, for want of this.
     NoPosition(NoFix),
+    /// No head is over the tunnel, which ends or begins at this chainage (m), the position sure.
+    Outside(f64),
     /// No profiling head gives readings.
     NoSonar,
     /// All wall here has passed, and the position is sure: any speed will do.
@@ -64,6 +66,7 @@ impl Condition {
             Self::NoData => "no_data",
             Self::Old(_) => "old",
             Self::NoPosition(_) => "no_position",
+            Self::Outside(_) => "outside",
             Self::NoSonar => "no_sonar",
             Self::Passed => "passed",
             Self::GoingBack(_) => "going_back",
@@ -81,9 +84,12 @@ impl Condition {
     pub fn lamp(self) -> Lamp {
         match self {
             Self::Good | Self::Passed | Self::GoingBack(_) => Lamp::Green,
-            Self::Over | Self::TurnFails | Self::TurnUnsure | Self::CannotSay(_) | Self::NoData => {
-                Lamp::Amber
-            }
+            Self::Over
+            | Self::TurnFails
+            | Self::TurnUnsure
+            | Self::CannotSay(_)
+            | Self::NoData
+            | Self::Outside(_) => Lamp::Amber,
             Self::Old(_) | Self::NoPosition(_) | Self::NoSonar | Self::NoSpeed | Self::TooFast => Lamp::Red,
         }
     }
@@ -103,6 +109,9 @@ impl LiveState {
         }
         if let PositionState::None(lacking) = self.position {
             return Condition::NoPosition(lacking);
+        }
+        if let Some(end_m) = self.outside_m().filter(|_| self.position == PositionState::Ok) {
+            return Condition::Outside(end_m);
         }
         let Some(advice) = self.advice.as_ref().filter(|_| self.has_sonar()) else {
             return Condition::NoSonar;

@@ -219,7 +219,7 @@ impl LiveState {
                 })
                 .collect(),
             alert_counts: alerts.counts(),
-            remedy: advice.and_then(gain_text),
+            remedy: advice.and_then(|advice| gain_text(advice, around.heads)),
             left: alerts.left(self),
             alert_list: shown.into_iter().map(|alert| alert.json(around, self.now)).collect(),
             alerts_hidden,

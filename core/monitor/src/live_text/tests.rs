@@ -1,4 +1,5 @@
 use super::*;
+use crate::head_words::tests::two;
 use crate::live_state::{PositionState, test_state};
 use crate::unsure_stretch::UnsureStretch;
 use headrace_coverage::{Driven, Unsure};
@@ -8,7 +9,7 @@ use headrace_geometry::tunnel::shapes;
 
 fn status(state: &LiveState) -> PilotLine {
     let profile = shapes::circle(3.0).unwrap();
-    status_line(state, &profile, &|source| ["sonar_0", "sonar_1", "tether"][source].to_owned())
+    status_line(state, &profile, &two(), &|source| ["sonar_0", "sonar_1", "tether"][source].to_owned())
 }
 
 /// What there is to show, as states.
@@ -122,7 +123,7 @@ fn what_cannot_be_said_is_told_with_why_and_what_helps() {
         } else {
             Told::CannotSay(stretch(why))
         };
-        let lines = told_line(&told, &profile).broken(60);
+        let lines = told_line(&told, &profile, &two()).broken(60);
         assert!(lines.iter().all(|line| line.chars().count() <= 60), "{lines:#?}");
         text.push_str(&lines.join("\n"));
         text.push('\n');

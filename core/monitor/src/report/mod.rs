@@ -5,6 +5,7 @@ use serde::Serialize;
 use super::alert_list::{ListedAlertJson, NoteJson};
 use super::alerts::Alert;
 use super::console::ConsoleCounts;
+use super::head_words::HeadWords;
 use super::resources::{Coverage, Tally};
 use super::run::Loop;
 use super::what_if::WhatIfReport;
@@ -73,6 +74,9 @@ pub struct Report {
     pub survey: SurveyReport,
     /// Metres by verdict for the additional targets and section lengths requested.
     pub what_if: Vec<WhatIfReport>,
+    /// What its text calls the heads, and what they could be set to.
+    #[serde(skip)]
+    pub heads: HeadWords,
     /// Declared openings of the wall, excluded from verdicts.
     pub openings: Vec<OpeningReport>,
     /// Alerts about the dive as a whole.
@@ -289,6 +293,7 @@ impl Report {
             way_home: runs::way_home(sections),
             survey: survey::survey(coverage, &dive.mission().profile),
             what_if: Vec::new(),
+            heads: dive.head_words().clone(),
             openings: dive.mission().coverage.openings.iter().map(opening_report).collect(),
             alerts: dive.alerts().iter().map(|alert| alert_report(alert, dive)).collect(),
             alert_list: listed(dive),

@@ -17,6 +17,9 @@ use headrace_coverage::{Beam, Cause, Causes, Lack, Loss, Outlook, PlacedReturn, 
 use headrace_geometry::frames::{Point3, Tunnel};
 use headrace_geometry::math;
 
+/// Metres beyond either end of the tunnel from which samples are told.
+const WELL_BEYOND_M: f64 = 1.0;
+
 /// What sorting reads and writes, apart from the head.
 pub(super) struct Sorting<'a> {
     pub(super) coverage: &'a mut Coverage,
@@ -211,12 +214,12 @@ fn aim(tunnel: &TunnelDesign, origin: &Point3<Tunnel>, point: &Point3<Tunnel>) -
     Some(Aim { x_m: origin.x() + wall.range_m * beam.x() / length_m, arc_m: wall.arc_m })
 }
 
-/// Chainage of a sample beyond either end of the tunnel, and by how much, m.
+/// Chainage of a sample well beyond either end of the tunnel, and by how much, m: heads of a vehicle that turns at an end reach over it.
 fn beyond_end_m(ping: &PlacedPing, length_m: f64) -> Option<(f64, f64)> {
     let Outcome::Sample { point, .. } = ping.outcome else { return None };
     let x_m = point.x();
     let beyond_m = (-x_m).max(x_m - length_m);
-    (beyond_m > 0.0).then_some((x_m, beyond_m))
+    (beyond_m > WELL_BEYOND_M).then_some((x_m, beyond_m))
 }
 
 fn digest(digests: &mut Digests, ping: &PlacedPing, kind: RecordKind) {
@@ -366,13 +369,14 @@ mod tests {
             (alert.map(|alert| alert.worst_m), bench.notices.0.len())
         };
         assert_eq!(note(29.9), (None, 0));
-        let (worst_m, told) = note(30.4);
-        assert!((worst_m.unwrap() - 0.4).abs() < 1e-9 && told == 1, "{worst_m:?} {told}");
+        assert_eq!(note(30.9), (None, 0), "heads reach over the end");
+        let (worst_m, told) = note(31.1);
+        assert!((worst_m.unwrap() - 1.1).abs() < 1e-9 && told == 1, "{worst_m:?} {told}");
         let (worst_m, told) = note(31.5);
         assert!((worst_m.unwrap() - 1.5).abs() < 1e-9 && told == 1, "{worst_m:?} {told}");
-        assert_eq!((bench.tally.samples, bench.tally.outside), (3, 0));
+        assert_eq!((bench.tally.samples, bench.tally.outside), (4, 0));
         bench.note(&PlacedPing { new_sweep: true, ..heard(33.0, 1.0, 3.0) });
-        assert_eq!((bench.tally.samples, bench.tally.outside), (4, 1), "beyond what is stored");
+        assert_eq!((bench.tally.samples, bench.tally.outside), (5, 1), "beyond what is stored");
     }
 
     /// Sections that hold samples of a head that isn't believed any more are judged again, if they have been.

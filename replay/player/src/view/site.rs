@@ -1,6 +1,7 @@
 //! The site shown, and its frames.
 
 use headrace_geometry::tunnel::Profile;
+use headrace_monitor::head_words::HeadWords;
 
 /// Frame names.
 pub(super) const TUNNEL: &str = "tunnel";
@@ -20,6 +21,8 @@ pub struct Site {
     pub run_up_m: f64,
     /// Length of the tunnel, m.
     pub length_m: f64,
+    /// What the heads are called and could be set to.
+    pub head_words: HeadWords,
     /// Numbers of the sources that are heads.
     pub heads: Vec<u64>,
 }

@@ -2,6 +2,7 @@ use std::collections::BTreeMap;
 
 use headrace_coverage::{Judgement, RunChange};
 use headrace_geometry::tunnel::shapes;
+use headrace_monitor::head_words::HeadWords;
 use serde_json::Value;
 
 use super::*;
@@ -13,6 +14,7 @@ fn view() -> View {
         section_m: 0.25,
         run_up_m: 0.5,
         length_m: 100.0,
+        head_words: HeadWords::default(),
         heads: vec![2, 5],
     })
 }

@@ -149,3 +149,17 @@ fn sensors_say_how_they_are() {
     assert_eq!(all, [SensorState::Ok, SensorState::Stalled, SensorState::Never]);
     assert_eq!(state.silent().collect::<Vec<_>>(), [2]);
 }
+
+/// Heads are up to half a metre before or behind: until none can be over the tunnel, what is seen counts.
+#[test]
+fn before_the_beginning_and_beyond_the_end_nothing_is_inspected() {
+    let at = |x_m: f64| LiveState { chainage_m: Some(x_m), length_m: 100.0, heads_reach_m: 0.5, ..state() };
+    let shown = [-0.6, -0.4, 50.0, 100.4, 100.6].map(|x_m| at(x_m).condition());
+    let [before, inside @ .., beyond] = shown;
+    assert_eq!([before, beyond], [Condition::Outside(0.0), Condition::Outside(100.0)]);
+    assert_eq!(inside, [Condition::Good; 3]);
+    assert_eq!((beyond.as_str(), beyond.lamp()), ("outside", Lamp::Amber));
+    // Where it isn't sure of its place, that is what it has to know.
+    let unsure = LiveState { position: PositionState::Doubtful(PositionDoubt::Cable), ..at(100.6) };
+    assert_eq!(unsure.condition(), Condition::CannotSay(PositionDoubt::Cable));
+}

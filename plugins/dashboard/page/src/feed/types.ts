@@ -3,7 +3,7 @@
 export type Mode = "live" | "demo" | "replay" | "file";
 export type Lamp = "green" | "amber" | "red";
 export type Condition =
-  | "no_data" | "old" | "no_position" | "no_sonar" | "passed" | "going_back" | "no_speed" | "too_fast" | "turn_fails" | "cannot_say" | "over" | "turn_unsure" | "good";
+  | "no_data" | "old" | "no_position" | "outside" | "no_sonar" | "passed" | "going_back" | "no_speed" | "too_fast" | "turn_fails" | "cannot_say" | "over" | "turn_unsure" | "good";
 export type Priority = "emergency_alarm" | "alarm" | "warning" | "caution";
 export type AlertClass = "coverage" | "speed" | "position" | "sensor" | "recording" | "setting";
 

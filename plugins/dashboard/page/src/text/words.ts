@@ -48,6 +48,7 @@ export function conditionWords(state: State): { word: string; advice: string } {
     no_data: ["WAITING", "for the first data"],
     old: [`OLD ${span(state.age_s ?? 0)}`, "nothing from any sensor: stop"],
     no_position: ["NO POSITION", `${POSITION_WHY[state.position.why ?? ""] ?? "no position"}: hold still`],
+    outside: ["OUTSIDE", "no head is over the tunnel"],
     no_sonar: ["NO SONAR", "nothing is seen: stop"],
     passed: ["PASSED HERE", "any speed will do"],
     going_back: ["GOING BACK", "for what was missed: any speed will do"],
