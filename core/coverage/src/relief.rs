@@ -244,4 +244,23 @@ mod tests {
         assert!((off_m + 0.5).abs() < 0.05, "{off_m}");
         assert!(between_m.iter().all(|x_m| (x_m - 7.0).abs() < 1e-12), "{between_m:?}");
     }
+
+    /// Where a head sees what another one contradicts, it is outvoted, unless the other isn't believed itself.
+    #[test]
+    fn a_head_that_is_not_believed_outvotes_nobody() {
+        let limits = WallLimits::new(20.0, 0.3);
+        let of = |off_m: f64| PlacedReturn { x_m: 7.0, arc_m: 3.0, off_m };
+        let outvoted = |believed: bool| {
+            let mut relief = Relief::default();
+            relief.believe(1, believed);
+            relief.vote(1, &of(0.0), &limits);
+            relief.vote(0, &of(-1.0), &limits);
+            relief.ballot(0).outvoted
+        };
+        assert_eq!([outvoted(true), outvoted(false)], [1, 0]);
+        let mut relief = Relief::default();
+        relief.believe(1, false);
+        relief.believe(1, true);
+        assert_eq!(relief.distrusted, 0, "it is believed again");
+    }
 }

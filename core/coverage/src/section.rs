@@ -306,4 +306,11 @@ mod tests {
         }
         assert_eq!((Spread::default().mean(), Spread::default().sd()), (None, None));
     }
+
+    /// What isn't judged yet is unsure at an end of the way alone.
+    #[test]
+    fn an_open_section_is_unsure_at_an_end_of_the_way_alone() {
+        let unsure = |not_inspected| Section { not_inspected, ..Section::default() }.unsure();
+        assert_eq!([unsure(true), unsure(false)], [Some(Unsure::NotInspected), None]);
+    }
 }

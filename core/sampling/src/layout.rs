@@ -326,4 +326,15 @@ mod tests {
             assert!(is_met(apart_m, speed_mps, rule.turn_s), "{rule:?}");
         }
     }
+
+    #[test]
+    fn the_first_head_of_sectors_is_in_its_own() {
+        let sector = Sector { number: 1, of: 4, behind_m: 0.5, reversed: false };
+        let at = |angle_rad: f64| in_step(InSector { angle_rad, growing: true }, &sector, 8.0, 0.1);
+        assert!(at(0.0).is_ok() && at(TAU / 4.0).is_ok());
+        assert!(at(TAU / 4.0 + 0.01).is_err() && at(TAU / 2.0).is_err());
+        let beyond =
+            in_step(InSector { angle_rad: 0.1, growing: true }, &Sector { number: 4, ..sector }, 8.0, 0.1);
+        assert!(matches!(beyond, Err(SamplingError::HeadCount { heads: 5 })), "{beyond:?}");
+    }
 }

@@ -460,3 +460,22 @@ fn note(alternatives: &mut Vec<Alternative>, (source, other, is_echo): (u16, u16
         alternative.note(missed_m);
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn heads_that_sit_otherwise_have_an_angle_and_only_those() {
+        for by_rad in [0.05, -0.02] {
+            for setting in
+                [Setting::HeadTurned(by_rad), Setting::HeadPitched(by_rad), Setting::HeadYawed(by_rad)]
+            {
+                assert_eq!((setting.angle_rad(), setting.figure()), (Some(by_rad), by_rad));
+            }
+        }
+        for setting in [Setting::RangeScale(0.03), Setting::WrongWayRound, Setting::Swapped(3)] {
+            assert_eq!(setting.angle_rad(), None, "{setting:?}");
+        }
+    }
+}

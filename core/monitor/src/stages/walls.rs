@@ -360,6 +360,27 @@ mod tests {
         );
     }
 
+    /// The digest of results tells where each sample lies.
+    #[test]
+    fn a_sample_is_in_the_digest_with_its_place() {
+        let digest = |x_m: f64| {
+            let (mut bench, mut digests) = (Bench::new(), Digests::default());
+            let mut sorting = Sorting {
+                coverage: &mut bench.coverage,
+                tunnel: &bench.tunnel,
+                tally: &mut bench.tally,
+                notices: &mut bench.notices,
+                digests: &mut digests,
+                alerts: &mut bench.alerts,
+            };
+            note_ping(&mut sorting, &mut bench.sweep, &heard(x_m, 1.0, 3.0));
+            assert_eq!(bench.tally.samples, 1);
+            digests.pings.value()
+        };
+        let none = Digests::default().pings.value();
+        assert!(digest(5.1) != none && digest(5.1) == digest(5.1) && digest(5.1) != digest(5.2));
+    }
+
     #[test]
     fn a_return_beyond_the_tunnel_s_end_is_told_once_with_how_far() {
         let mut bench = Bench::new();

@@ -578,3 +578,9 @@ fn a_speed_keeps_away_from_where_t_grows_faster_than_the_speed() {
     }
     assert!(even > 40 && steep > 40, "{even} {steep}");
 }
+
+#[test]
+fn what_is_lost_is_the_mean_of_the_heads_that_turn() {
+    assert!((mean([0.1, 0.2, 0.6].into_iter()) - 0.3).abs() < 1e-12);
+    assert!(mean(core::iter::empty()).abs() <= 0.0);
+}

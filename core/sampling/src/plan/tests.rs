@@ -320,3 +320,15 @@ fn distances_of_neighbours_are_those_of_all_heads() {
         assert!(both[0] < both[1] && both[1] < both[2]);
     }
 }
+
+/// At 0.2 rad/s beams go 2.4 m along wall 6 m away between two passes, but no farther than from one tolerated yaw to the other.
+#[test]
+fn a_swing_ends_at_the_tolerated_yaw() {
+    let v_mps = |yaw_deg: f64, rate_radps: f64| {
+        let of = Inspection { yaw_rad: yaw_deg.to_radians(), yaw_rate_radps: rate_radps, ..ideal(4) };
+        Planner::new(of).unwrap().v_max_mps(2, 1.2)
+    };
+    let [still, swinging] = [0.0, 0.2].map(|rate_radps| v_mps(0.5, rate_radps).unwrap());
+    assert!((0.5 * still..0.97 * still).contains(&swinging), "{still} {swinging}");
+    assert!(v_mps(20.0, 0.2).is_err(), "too far for any speed");
+}
