@@ -207,3 +207,17 @@ fn who_follow_one_another_are_apart_by_a_share_of_the_hull() {
         heads.apart_m().abs() <= 0.0 && heads.neighbours_apart().abs() <= 0.0 && !heads.fits_some_speeds()
     );
 }
+
+/// Heads apart along the hull that are scheduled for a speed share the turn at that speed, wherever they stand now, and not at another.
+#[test]
+fn heads_as_scheduled_share_the_turn_at_the_planned_speed() {
+    for x_m in [[0.8, 0.0, -0.5], [0.0, 1.3, 0.2]] {
+        let phasing = Phasing::of(&situation(&[3.0, 200.0, 77.0], &x_m)).as_scheduled(3, 0.1);
+        let gap_s = |mps: f64| all(&phasing.at(mps));
+        assert!((gap_s(0.1) - 8.0 / 3.0).abs() < 1e-9, "{x_m:?}: {}", gap_s(0.1));
+        assert!(gap_s(0.13) > 3.0, "{x_m:?}: {}", gap_s(0.13));
+        // A schedule for no speed is for heads at one place of the hull.
+        let at_rest = Phasing::of(&situation(&[3.0, 200.0, 77.0], &[0.0; 3])).as_scheduled(3, 0.0);
+        assert!((all(&at_rest.at(0.1)) - 8.0 / 3.0).abs() < 1e-9);
+    }
+}
