@@ -1,4 +1,5 @@
 // The condition, the speed, what is allowed and why: what a pilot reads at two metres.
+import type { Condition } from "../feed/types";
 import { shown, age_s, isOld } from "../store/age";
 import { store } from "../store/store";
 import { useTopics } from "../store/topic";
@@ -29,11 +30,17 @@ export function Announcer() {
   return <div class="sr" role="status" aria-live="polite">{said}</div>;
 }
 
+/** Where nothing bounds the speed, and what there is to say of it. */
+const UNBOUNDED: Partial<Record<Condition, string>> = {
+  passed: "all wall here has passed",
+  going_back: "at most max, the way back counts, too",
+  outside: "no wall here is judged",
+};
+
 export function Speed() {
   useTopics(store.topics.state);
   const { state } = store;
-  // Over wall that has passed, and on the way back, nothing bounds the speed.
-  const bounded = state?.condition !== "passed" && state?.condition !== "going_back";
+  const unbounded = state ? UNBOUNDED[state.condition] : undefined, bounded = unbounded === undefined;
   const speed = state?.speed_mps ?? null, most = bounded ? (state?.v_max_mps ?? null) : null;
   const margin = state?.margins.speed_mps ?? null, lost = state?.margins.lost_share ?? null;
   return (
@@ -48,7 +55,7 @@ export function Speed() {
         {state?.reason && bounded ? <span><b>limit</b> {lost === null ? (REASONS[state.reason] ?? state.reason) : `${figure(100 * lost, 0)} % of returns lost`}</span> : null}
         {state?.remedy && bounded ? <span class="remedy"><b>to gain more</b> {state.remedy}</span> : null}
       </div>
-      {bounded ? <Forecast /> : <div class="forecast">{state?.condition === "passed" ? "all wall here has passed" : "at most max, the way back counts, too"}</div>}
+      {bounded ? <Forecast /> : <div class="forecast">{unbounded}</div>}
     </div>
   );
 }
