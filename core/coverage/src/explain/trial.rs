@@ -179,7 +179,8 @@ impl<'a> Trial<'a> {
         let Case { bounds_m, first_visit, target_m, lacks, .. } = *self.case;
         let reach_m = (target_m.max(2.0 * radius_m) + bounds_m.1 - bounds_m.0) / otherwise.along;
         let put_back = lacks
-            .between(bounds_m.0 - reach_m, bounds_m.1 + reach_m)
+            // Those about to be mirrored, too.
+            .between(bounds_m.0 - 2.0 * reach_m, bounds_m.1 + 2.0 * reach_m)
             .filter(|lack| lack.why.is_within(removed))
             .map(|lack| [lack.x_m, lack.arc_m]);
         self.finder.lay_otherwise((self.store, first_visit), bounds_m, radius_m, otherwise, put_back);

@@ -16,7 +16,7 @@ pub struct Otherwise {
     pub around: f64,
     /// Stretches whose wall would have been covered.
     pub covered: [Option<Reach>; 4],
-    /// Where samples may still land: no circle reaches as far as that.
+    /// Where samples may still land: the wall there is taken to become as it is on this side.
     pub to_come: Option<Reach>,
 }
 
@@ -30,6 +30,23 @@ impl Otherwise {
         let covered_m = self.covered.iter().flatten().map(off_m).fold(f64::INFINITY, f64::min) * self.along;
         self.to_come.as_ref().map(off_m).map_or(covered_m, |to_come_m| covered_m.min(to_come_m))
     }
+
+    /// The end of where samples may still land at which the wall is mirrored, m.
+    fn mirror_m(&self) -> Option<f64> {
+        self.to_come.iter().flat_map(|reach| [reach.from_m, reach.to_m]).find(|x_m| x_m.is_finite())
+    }
+}
+
+/// A stretch and its mirror image, in ascending order, and as one where they meet: all between two that are far apart is neither.
+fn with_mirrored([from_m, to_m]: [f64; 2], mirror_m: f64) -> [Option<[f64; 2]>; 2] {
+    let image_m = [2.0 * mirror_m - to_m, 2.0 * mirror_m - from_m];
+    if image_m[0] > to_m {
+        return [Some([from_m, to_m]), Some(image_m)];
+    }
+    if image_m[1] < from_m {
+        return [Some(image_m), Some([from_m, to_m])];
+    }
+    [Some([from_m.min(image_m[0]), to_m.max(image_m[1])]), None]
 }
 
 impl HoleFinder {
@@ -51,12 +68,22 @@ impl HoleFinder {
         let perimeter_m = store.perimeter_m() * around;
         let reach_m = radius_m + length_m;
         window.begin(perimeter_m, from_m, (-reach_m, length_m + reach_m), cell_m(radius_m));
-        let mut take = |x_m: f64, arc_m: f64| window.push((x_m - from_m) * along, arc_m * around);
-        store.each_between(from_m - reach_m / along, to_m + reach_m / along, |x_m, arc_m, visit| {
-            if visit >= first_visit {
-                take(x_m, arc_m);
+        let mirror_m = otherwise.mirror_m();
+        let mut take = |x_m: f64, arc_m: f64| {
+            window.push((x_m - from_m) * along, arc_m * around);
+            if let Some(mirror_m) = mirror_m {
+                window.push((2.0 * mirror_m - x_m - from_m) * along, arc_m * around);
             }
-        });
+        };
+        let ends_m = [from_m - reach_m / along, to_m + reach_m / along];
+        let stretches_m = mirror_m.map_or([Some(ends_m), None], |mirror_m| with_mirrored(ends_m, mirror_m));
+        for [least_m, most_m] in stretches_m.into_iter().flatten() {
+            store.each_between(least_m, most_m, |x_m, arc_m, visit| {
+                if visit >= first_visit {
+                    take(x_m, arc_m);
+                }
+            });
+        }
         for [x_m, arc_m] in more {
             take(x_m, arc_m);
         }
@@ -141,7 +168,7 @@ mod tests {
     }
 
     #[test]
-    fn a_hole_ends_where_samples_may_still_land() {
+    fn where_samples_may_still_land_the_wall_becomes_as_it_is_before() {
         // Drawn together, a circle at the end reaches ahead, where nothing has landed yet.
         let ends = |i: u32, _| i <= 10;
         let otherwise = Otherwise { along: 0.3, ..Otherwise::NOTHING };
@@ -152,6 +179,17 @@ mod tests {
         let strip = |i: u32, k: u32| i <= 11 && k != 4;
         let to_come = Some(Reach { from_m: 6.0, to_m: f64::INFINITY });
         assert!(has(strip, 0.4, &Otherwise { to_come, ..otherwise }, &[]));
+    }
+
+    #[test]
+    fn a_mirror_far_away_brings_nothing_of_what_lies_between() {
+        let same = |found: [Option<[f64; 2]>; 2], expected: &[[f64; 2]]| {
+            assert_eq!(found.into_iter().flatten().collect::<Vec<_>>(), expected);
+        };
+        same(with_mirrored([10.0, 12.0], 100.0), &[[10.0, 12.0], [188.0, 190.0]]);
+        same(with_mirrored([10.0, 12.0], 5.0), &[[-2.0, 0.0], [10.0, 12.0]]);
+        same(with_mirrored([10.0, 12.0], 11.5), &[[10.0, 13.0]]);
+        same(with_mirrored([10.0, 12.0], 12.0), &[[10.0, 14.0]]);
     }
 
     #[test]
