@@ -9,9 +9,9 @@ use super::hole::Hole;
 use headrace_geometry::time::MonoNs;
 use headrace_snapshot::stateful;
 
-/// Maximum gap between sections of one run, or of one stretch that can't be said, m: who goes back for one and turns round before it passes the
-/// other, too.
-pub(super) const JOIN_M: f64 = 2.0;
+/// Maximum gap between neighbouring failed sections of one run, m: over longer ones the speed that one section asks for says nothing of the
+/// next.
+const JOIN_M: f64 = 0.5;
 
 /// Number of a run; never reused.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]

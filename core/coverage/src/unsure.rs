@@ -4,7 +4,6 @@ use core::ops::Range;
 use serde::{Deserialize, Serialize};
 
 use super::passage::{Drive, Passage};
-use super::runs::JOIN_M;
 
 /// Why a section has neither passed nor failed, though no more samples will come without turning back.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
@@ -111,6 +110,8 @@ impl Driven {
 
 /// Share of the hole from which its error is what matters.
 const MOSTLY_ERROR: f64 = 0.2;
+/// Sections farther apart than this are of different stretches, m: who goes over one again passes the other, too.
+const JOIN_M: f64 = 2.0;
 
 impl Stretch {
     /// Of one section: its hole and by how much that may be larger or smaller, m, with the standard deviation.

@@ -3,8 +3,6 @@ use proptest::prelude::*;
 use super::*;
 
 const COUNT: i64 = 60;
-/// Sections of 0.25 m with this much between their beginnings have two metres between them.
-const JOINED: i64 = 9;
 
 /// Runs, and the section states that they are checked against.
 struct Rig {
@@ -68,16 +66,13 @@ impl Rig {
             assert_eq!(run.cleared.is_some(), members.is_empty());
             let (Some(first), Some(last)) = (members.first(), members.last()) else { continue };
             assert_eq!((run.from, run.to), (*first, *last + 1));
-            assert!(
-                members.windows(2).all(|pair| pair[1] - pair[0] <= JOINED),
-                "run {number} has fallen apart"
-            );
+            assert!(members.windows(2).all(|pair| pair[1] - pair[0] <= 3), "run {number} has fallen apart");
             let largest = members
                 .iter()
                 .map(|index| self.holes[usize::try_from(index + 5).unwrap()])
                 .fold(0.0, f64::max);
             assert!((run.worst.1.diameter_m - largest).abs() < 1e-12);
-            for other in last + 1..=(last + JOINED).min(COUNT - 6) {
+            for other in last + 1..=(last + 3).min(COUNT - 6) {
                 assert!(self.runs.of(other).is_none(), "run {number} and its neighbour");
             }
             let having =
@@ -109,13 +104,13 @@ fn neighbours_are_one_run_that_grows_merges_and_is_cleared() {
     let mut rig = Rig::new();
     rig.say(10, Some(Cause::TooFast), 1.0);
     rig.say(11, Some(Cause::TooFast), 1.5);
-    rig.say(29, Some(Cause::TooFast), 1.2);
-    // Within two metres of both.
-    rig.say(20, Some(Cause::Phase), 1.1);
+    rig.say(16, Some(Cause::TooFast), 1.2);
+    // Within half a metre of both.
+    rig.say(14, Some(Cause::Phase), 1.1);
     let first = *rig.runs.get(RunId(0)).unwrap();
-    assert_eq!((first.from, first.to, first.failed, first.worst.0), (10, 30, 4, 11));
+    assert_eq!((first.from, first.to, first.failed, first.worst.0), (10, 17, 4, 11));
     assert_eq!(rig.runs.get(RunId(1)).unwrap().merged_into, Some(RunId(0)));
-    for section in [10, 11, 20, 29] {
+    for section in [10, 11, 14, 16] {
         rig.say(section, None, 0.2);
     }
     assert!(rig.told.contains(&(RunId(0), RunChange::Cleared)));
@@ -148,14 +143,14 @@ fn a_run_has_the_cause_of_most_of_its_sections_and_names_the_next() {
 #[test]
 fn a_run_filled_in_its_middle_falls_in_two_and_the_first_part_keeps_the_number() {
     let mut rig = Rig::new();
-    for section in 0..16 {
+    for section in 0..9 {
         rig.say(section, Some(Cause::MissingReturns), 0.6 + 0.1 * section as f64);
     }
-    for section in 3..12 {
+    for section in 3..6 {
         rig.say(section, None, 0.1);
     }
     let (first, second) = (*rig.runs.get(RunId(0)).unwrap(), *rig.runs.get(RunId(1)).unwrap());
-    assert_eq!((first.from, first.to, second.from, second.to), (0, 3, 12, 16));
+    assert_eq!((first.from, first.to, second.from, second.to), (0, 3, 6, 9));
     assert!((first.worst.1.diameter_m - 0.8).abs() < 1e-12 && second.raised == MonoNs(1));
     rig.check();
 }
