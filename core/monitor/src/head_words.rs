@@ -92,9 +92,11 @@ pub(crate) mod tests {
             two().silent(heads.iter().fold(HeadSet::default(), |set, head| set.with(*head)))
         };
         assert_eq!(text(&[1]), "no wall from stern");
+        assert_eq!(text(&[0, 1]), "no wall from any head");
         assert_eq!(text(&[0, 1, 3]), "no wall from bow, stern and a head");
         assert_eq!(text(&[]), "no wall from the heads");
     }
+
     /// A mode is named where it is one that all heads have, a range where it is one that is enough for all.
     #[test]
     fn settings_are_named_that_help_all_heads() {

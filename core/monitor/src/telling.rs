@@ -237,13 +237,12 @@ impl Teller {
             return;
         }
         if let Some(last) = &mut self.unsure
-            && last.join(&here, section_m)
+            && (is_told(last) || last.join(&here, section_m))
         {
             // What the first sections wait for isn't what most of it does.
-            let now = as_it_is(last, sections);
-            if self.told_as_error && !now.is_mostly_error() {
+            if self.told_as_error && !last.is_mostly_error() {
                 self.told_as_error = false;
-                tell(Told::CannotSay(UnsureStretch::of(&now, sections)));
+                tell(Told::CannotSay(UnsureStretch::of(last, sections)));
             }
             return;
         }
