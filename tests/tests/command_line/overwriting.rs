@@ -341,8 +341,8 @@ fn what_was_there_stays_where_the_new_file_cannot_be_written() {
 }
 
 /// A simulation that is killed in the middle leaves nothing behind, whatever kills it; where the file system knows files without a name.
-#[test]
 #[cfg(target_os = "linux")]
+#[test]
 fn a_simulation_that_is_killed_leaves_nothing_behind() {
     let folder = Folder::with_dive();
     folder.write("long.toml", SCENE.replace("speed_mps = 0.2", "speed_mps = 0.001"));
