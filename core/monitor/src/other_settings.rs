@@ -6,9 +6,11 @@ use bevy_ecs::prelude::World;
 use super::entities::HeadSpecification;
 use super::head_words::HeadSettings;
 use headrace_coverage::OtherSettings;
+use headrace_geometry::frames::{Point3, Pose, Rot};
 use headrace_geometry::tunnel::Profile;
-use headrace_sampling::advice::ModeName;
+use headrace_sampling::advice::{Looks, ModeName};
 use headrace_sampling::head::{HeadMode, HeadSpec};
+use headrace_sampling::ring::{Ring, Standing};
 use headrace_sampling::spacing::speed_for_target_mps;
 use headrace_sensor::device::Device;
 use headrace_vehicle::Mission;
@@ -29,7 +31,10 @@ impl HeadSpecification {
     pub fn settings(&self, name: &str, profile: &Profile, target_m: f64) -> HeadSettings {
         let [_, own_m] = self.spec.range_m;
         let range_m = self.reaching.as_ref().map(|(range_m, _)| *range_m);
-        let finer = self.finer(profile.farthest_m(profile.reference()), target_m);
+        // As many as live advice looks at the wall with, whose mode is on the same screen.
+        let rays = Looks::default().ring;
+        let ring = self.ring_in_the_middle(profile, rays).unwrap_or_default();
+        let finer = self.finer(target_m, |step_rad| ring.largest_step_m(Ring::stride(step_rad, rays)));
         HeadSettings {
             name: name.to_owned(),
             finer: finer.map(|mode| ModeName::new(mode.name)),
@@ -37,20 +42,26 @@ impl HeadSpecification {
         }
     }
 
-    /// Of the modes with a finer step, the one that lets the vehicle go fastest along wall as far away as `farthest_m`; where none meets the
-    /// target, the finest.
-    fn finer(&self, farthest_m: f64, target_m: f64) -> Option<&HeadMode> {
+    /// Of the modes with a finer step, the one that lets the vehicle go fastest; where none meets the target, the finest. `t_y_m` is the step
+    /// along the wall, m, of a step of the head, radians.
+    fn finer(&self, target_m: f64, t_y_m: impl Fn(f64) -> f64) -> Option<&HeadMode> {
         let step_rad = |mode: &HeadMode| mode.turn.step_rad();
         let finer = || self.modes.iter().filter(|mode| step_rad(mode) < self.spec.step_rad - SAME_STEP_RAD);
         let speed_mps = |mode: &HeadMode| {
-            // The step along a wall that beams meet squarely.
-            let t_y_m = step_rad(mode) * farthest_m;
+            let t_y_m = t_y_m(step_rad(mode));
             speed_for_target_mps(target_m, t_y_m, mode.turn.period_s(), mode.turn.ping_period_s())
         };
         let fitting = finer().filter_map(|mode| Some((mode, speed_mps(mode)?)));
         let fastest = fitting.max_by(|(_, one_mps), (_, other_mps)| one_mps.total_cmp(other_mps));
         let finest = || finer().min_by(|one, other| step_rad(one).total_cmp(&step_rad(other)));
         fastest.map(|(mode, _)| mode).or_else(finest)
+    }
+
+    /// The wall as it sees it where the vehicle is level in the middle; none where it is outside then.
+    fn ring_in_the_middle(&self, profile: &Profile, rays: u32) -> Option<Ring> {
+        let [y, z] = profile.reference();
+        let pose = Pose { position: Point3::new(0.0, y, z), attitude: Rot::identity() };
+        Ring::cast(&Standing::new(profile, &pose, &self.spec.mount).ok()?, 0.0, rays).ok()
     }
 }
 
@@ -88,7 +99,8 @@ fn of_head(head: &HeadSpecification, farthest_m: f64, target_m: f64) -> OtherSet
         modes.iter().find(same).map(|mode| mode.turn.period_s())
     };
     let Some(now_s) = turn_s(modes) else { return OtherSettings::default() };
-    let chosen = head.finer(farthest_m, target_m);
+    // By steps that beams meet squarely: whether a mode would do in corners, too, the trial's samples say.
+    let chosen = head.finer(target_m, |step_rad| step_rad * farthest_m);
     OtherSettings {
         finer_step: chosen.map_or(1.0, |mode| mode.turn.step_rad() / spec.step_rad),
         finer_turn: chosen.map_or(1.0, |mode| mode.turn.period_s() / now_s),
@@ -102,7 +114,8 @@ fn of_head(head: &HeadSpecification, farthest_m: f64, target_m: f64) -> OtherSet
 #[cfg(test)]
 mod tests {
     use super::*;
-    use headrace_geometry::frames::{Mount, Rot, Vec3};
+    use headrace_geometry::frames::{Mount, Vec3};
+    use headrace_geometry::tunnel::shapes;
     use headrace_sampling::head::{Basis, HeadBody, Turn};
 
     fn mode(name: &'static str, step_deg: f64, turn_s: f64) -> HeadMode {
@@ -124,17 +137,28 @@ mod tests {
     }
 
     #[test]
-    fn the_coarsest_mode_that_leaves_room_is_taken_and_takes_longer() {
+    fn the_mode_in_which_it_goes_fastest_is_taken_and_takes_longer() {
         // 0.9 degrees are 0.094 m on wall 6 m away, 0.6 degrees 0.063 m.
         let at = |target_m: f64| of_head(&head(2.4, None), 6.0, target_m);
         let roomy = at(0.2);
         assert!((roomy.finer_step - 0.375).abs() < 1e-9 && (roomy.finer_turn - 8.0 / 4.8).abs() < 1e-9);
         let close = at(0.1);
         assert!((close.finer_step - 0.25).abs() < 1e-9 && (close.finer_turn - 10.8 / 4.8).abs() < 1e-9);
-        // None leaves room: the finest.
+        // None meets the target: the finest.
         assert_eq!(at(0.01), close);
         let finest = of_head(&head(0.6, None), 6.0, 0.2);
         assert_eq!((finest.finer_step, finest.finer_turn, finest.longer_turn), (1.0, 1.0, 1.0));
+    }
+
+    /// In a corner, or where beams graze the wall, a step is longer than where they meet it squarely: what would do there isn't named.
+    #[test]
+    fn the_wall_as_it_is_decides() {
+        let ceran = shapes::ceran().unwrap();
+        let named = |target_m: f64| head(2.4, None).settings("", &ceran, target_m).finer;
+        let farthest_m = ceran.farthest_m(ceran.reference());
+        assert!(0.9_f64.to_radians() * farthest_m < 0.13, "squarely FAST would do");
+        assert_eq!(named(0.14).unwrap().as_str(), "medium");
+        assert_eq!(named(0.5).unwrap().as_str(), "fast");
     }
 
     #[test]
