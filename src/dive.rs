@@ -16,7 +16,7 @@ use headrace_monitor::run::Loop;
 use headrace_ports::Supervisor;
 use headrace_replay::drive::{DriveError, Pace, PacketSource, drive};
 use headrace_replay::log::{
-    DerivedChannels, Every, LeftOut, LogHeader, Recorder, RecorderHandle, RecordingFault, Rotation, SentPort,
+    DerivedChannels, Every, LeftOut, LogHeader, Recorder, RecorderHandle, RecordingFault, Rotation, LinePort,
     SourceInfo, Summary, VoicePort, dive_name,
 };
 use headrace_replay::player::seconds;
@@ -407,9 +407,9 @@ impl Dive {
         report
     }
 
-    /// The recorders' inputs for bytes sent to devices.
-    pub(crate) fn sent_ports(&self) -> Vec<SentPort> {
-        self.recorders.iter().map(|(_, handle)| handle.sent_port()).collect()
+    /// The recorders' inputs for what goes on on devices' lines beside the loop.
+    pub(crate) fn line_ports(&self) -> Vec<LinePort> {
+        self.recorders.iter().map(|(_, handle)| handle.line_port()).collect()
     }
 
     /// The recorders' inputs for recordings of voice notes.

@@ -23,6 +23,7 @@ mod foxglove_live;
 pub mod import;
 mod interrupt;
 mod inventory;
+pub mod line_record;
 mod live;
 mod logging;
 mod manual;

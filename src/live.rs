@@ -7,7 +7,7 @@ use std::sync::atomic::Ordering;
 
 use headrace_dashboard::Mode;
 use headrace_geometry::time::{DurNs, MonoNs};
-use headrace_ports::{Connection, Phase, SentSink, Status, Supervisor};
+use headrace_ports::{Connection, LineRecord, Phase, Status, Supervisor};
 use headrace_replay::log::part_path;
 use headrace_sensor::connect::{Connect, ConnectError};
 use headrace_sensor::driver::DriverSetup;
@@ -19,6 +19,7 @@ use crate::dive::{Clock, Dive, Recording, assemble_followed};
 use crate::failure::Failure;
 use crate::followers::{Followers, Joining};
 use crate::interrupt;
+use crate::line_record::InRecordings;
 use crate::output;
 use crate::outputs::{self, Claims};
 use crate::page::{self, Of, Served, VoicesOf};
@@ -208,14 +209,9 @@ fn supervisor(dive: &mut Dive, vehicle: &VehicleConfig, begun: MonoNs) -> Result
             driver: device.driver(&DriverSetup { begun, head }),
         });
     }
-    let ports = dive.sent_ports();
-    let sink: SentSink = Arc::new(move |source, at, bytes: &[u8]| {
-        for port in &ports {
-            port.sent(u16::try_from(source).unwrap_or(u16::MAX), at, bytes);
-        }
-    });
-    let sent = (!dive.sent_ports().is_empty()).then_some(sink);
-    Supervisor::start(served, sent)
+    let ports = dive.line_ports();
+    let record = (!ports.is_empty()).then(|| Arc::new(InRecordings(ports)) as Arc<dyn LineRecord>);
+    Supervisor::start(served, record)
         .map_err(|source| Failure::System { what: "starting the port threads", source })
 }
 

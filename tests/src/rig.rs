@@ -8,12 +8,13 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use headrace::devices::KINDS;
+use headrace::line_record::InRecordings;
 use headrace_config::Document;
 use headrace_geometry::time::DurNs;
 use headrace_monitor::App;
 use headrace_monitor::report::Report;
 use headrace_monitor::run::Loop;
-use headrace_ports::{Connection, LineHistory, Phase, SentSink, Supervisor};
+use headrace_ports::{Connection, LineHistory, LineRecord, Phase, Supervisor};
 use headrace_replay::drive::{Pace, drive};
 use headrace_replay::log::{LogHeader, Recorder, RecorderHandle, Rotation, SourceInfo};
 use headrace_replay::player::Player;
@@ -130,14 +131,10 @@ impl Rig {
         }
         let start = |(devices, end, fault)| Faulty::start(devices, end, fault);
         let devices: Vec<Faulty> = lines.into_iter().map(start).collect();
-        let sent = handle.as_ref().map(|handle| {
-            let port = handle.sent_port();
-            let sink: SentSink = Arc::new(move |source, at, bytes: &[u8]| {
-                port.sent(u16::try_from(source).unwrap(), at, bytes);
-            });
-            sink
+        let record = handle.as_ref().map(|handle| {
+            Arc::new(InRecordings(vec![handle.line_port()])) as Arc<dyn LineRecord>
         });
-        let supervisor = Supervisor::start(connections, sent).unwrap();
+        let supervisor = Supervisor::start(connections, record).unwrap();
         let count = on.len();
         let view = View {
             good: vec![0; count],

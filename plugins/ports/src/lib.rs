@@ -23,7 +23,7 @@ pub use device_end::{EmulatedPort, wait_for_any};
 pub use discover::can::is_interface_up;
 pub use discover::{Found, Machine, Presence, Rights, User, discover, presence};
 pub use host::Host;
-pub use line_service::{Attached, Common, LineService, SentSink};
+pub use line_service::{Attached, Common, LineRecord, LineService};
 pub use lines::{IsValid, Line, READ_BYTES, Senders};
 pub use open_error::{OpenError, OpenErrorKind};
 #[cfg(target_os = "linux")]

@@ -34,8 +34,14 @@ const LONG_ENOUGH: DurNs = DurNs::from_millis(2_000);
 /// Keep-alive interval on an idle connection.
 const KNOCK_PERIOD: DurNs = DurNs::from_millis(1_000);
 
-/// Sink for messages sent to devices: sensor index, time, bytes.
-pub type SentSink = Arc<dyn Fn(usize, MonoNs, &[u8]) + Send + Sync>;
+/// Records what goes on on the lines beside the loop. Called by their threads; sensors are numbered as in the vehicle file.
+pub trait LineRecord: Send + Sync {
+    /// Bytes sent to a sensor.
+    fn sent(&self, sensor: usize, at: MonoNs, bytes: &[u8]);
+
+    /// Packets of a sensor that were dropped between two times: there was no room for them, or the carrier gave them up unread.
+    fn lost(&self, sensor: usize, from: MonoNs, to: MonoNs, packets: u64);
+}
 
 /// A sensor on a line.
 pub struct Attached {
@@ -58,8 +64,8 @@ pub struct Common {
     pub board: Board,
     /// Wakes the loop when packets have come.
     pub waker: Waker,
-    /// Gets all messages sent to devices.
-    pub sent: Option<SentSink>,
+    /// Gets all messages sent to devices, and what was lost of theirs.
+    pub record: Option<Arc<dyn LineRecord>>,
 }
 
 /// A line and the devices on it.
@@ -95,6 +101,9 @@ struct OpenLine {
 struct AttachedState {
     attached: Attached,
     history: LineHistory,
+    /// Dropped packets that the record knows of, and until when.
+    dropped_told: u64,
+    dropped_until: MonoNs,
     status: Option<(Phase, String)>,
     /// Good frames so far, their number when the line was opened, and the times of the last bytes and last good frame.
     frames: u64,
@@ -152,6 +161,8 @@ impl LineService {
         let device = |attached| AttachedState {
             attached,
             history: LineHistory::default(),
+            dropped_told: 0,
+            dropped_until: now,
             status: None,
             frames: 0,
             frames_before: 0,
@@ -204,7 +215,10 @@ impl LineService {
             LineState::Closed { .. } => self.open(),
             LineState::Open(mut open) => match self.serve(&mut open) {
                 Ok(Served::Open) => LineState::Open(open),
-                ended => self.ended(open.opened, ended.map(|_| ())),
+                ended => {
+                    self.count_dropped(open.line.as_mut());
+                    self.ended(open.opened, ended.map(|_| ()))
+                }
             },
         };
     }
@@ -215,6 +229,7 @@ impl LineService {
         if let LineState::Open(mut open) = core::mem::replace(&mut self.state, closed) {
             self.count_dropped(open.line.as_mut());
             self.closed();
+            self.tell_dropped();
         }
         let strangers = self.senders.strangers.messages();
         let history = |mut device: AttachedState| {
@@ -279,6 +294,7 @@ impl LineService {
     /// Closes a line that was opened at that time, in silence or after an error.
     fn ended(&mut self, opened: MonoNs, ended: io::Result<()>) -> LineState {
         self.closed();
+        self.tell_dropped();
         let served = self.common.host.now().since(opened);
         if served >= LONG_ENOUGH && self.devices.iter().any(|device| device.last_frame >= opened) {
             self.pause = FIRST_PAUSE;
@@ -355,11 +371,24 @@ impl LineService {
             *look_at = now + STANDING_PERIOD;
             self.look(line.complaint().as_deref(), now);
             self.count_dropped(line);
+            self.tell_dropped();
             if self.devices.iter().all(|device| device.is_silent(now)) {
                 return Ok(Served::InSilence);
             }
         }
         Ok(Served::Open)
+    }
+
+    /// Has the record state what was dropped since it did so last.
+    fn tell_dropped(&mut self) {
+        let now = self.common.host.now();
+        for AttachedState { attached, history, dropped_told, dropped_until, .. } in &mut self.devices {
+            let packets = history.dropped - *dropped_told;
+            if let Some(record) = self.common.record.as_ref().filter(|_| packets > 0) {
+                record.lost(attached.source, *dropped_until, now, packets);
+            }
+            (*dropped_told, *dropped_until) = (history.dropped, now);
+        }
     }
 
     /// Counts what the carrier dropped unread, as lost by the line's first device: whose it was isn't known.
@@ -467,8 +496,8 @@ fn with_senders(words: String, phase: Phase, senders: &Senders, driver: &dyn Dri
 
 impl Common {
     fn note_sent(&self, source: usize, bytes: &[u8]) {
-        if let Some(sent) = &self.sent {
-            sent(source, self.host.now(), bytes);
+        if let Some(record) = &self.record {
+            record.sent(source, self.host.now(), bytes);
         }
     }
 }

@@ -17,7 +17,7 @@ use headrace_sensor::driver::Driver;
 
 use crate::clock;
 use crate::host::RealHost;
-use crate::line_service::{Attached, Common, LineService, SentSink};
+use crate::line_service::{Attached, Common, LineRecord, LineService};
 use crate::status::{Board, LineHistory, Status};
 use crate::wake::{self, Waker};
 
@@ -52,15 +52,15 @@ pub struct Supervisor {
 }
 
 impl Supervisor {
-    /// Starts the threads, which wake this one for the loop. `sent` receives all messages sent to devices.
+    /// Starts the threads, which wake this one for the loop. `record` gets what goes on on the lines beside the loop.
     ///
     /// Errors: a thread can't be started.
-    pub fn start(connections: Vec<Connection>, sent: Option<SentSink>) -> io::Result<Self> {
+    pub fn start(connections: Vec<Connection>, record: Option<Arc<dyn LineRecord>>) -> io::Result<Self> {
         let stopping = Arc::new(AtomicBool::new(false));
         let board = Board::new(BOARD);
         let waker = Waker::of_this_thread();
         let host = Arc::new(RealHost);
-        let common = Common { host, stopping: Arc::clone(&stopping), board: board.clone(), waker, sent };
+        let common = Common { host, stopping: Arc::clone(&stopping), board: board.clone(), waker, record };
         let sensors = connections.iter().map(|hand| hand.source + 1).max().unwrap_or(0);
         let mut supervisor =
             Self { sensors, threads: Vec::new(), stopping, board, on_this_thread: PhantomData };

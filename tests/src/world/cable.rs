@@ -53,15 +53,29 @@ pub struct Cable {
     failure: AtomicU64,
     /// Lines opened on it so far.
     opened: AtomicU64,
+    /// Datagrams that the machine gave up unread since it was last asked.
+    unread: AtomicU64,
 }
+
+/// Datagrams that the machine keeps for a port which doesn't read.
+const KEPT_DATAGRAMS: usize = 400;
 
 impl Cable {
     /// A sound cable.
     pub fn new(connect: Connect) -> Self {
         let (to_host, to_device) = (SegQueue::new(), SegQueue::new());
         let [refuses, deaf] = [AtomicBool::new(false), AtomicBool::new(false)];
-        let [breaks, failure, opened] = [AtomicU64::new(0), AtomicU64::new(0), AtomicU64::new(0)];
-        Self { connect, to_host, to_device, refuses, deaf, breaks, failure, opened }
+        let [breaks, failure, opened, unread] = [0; 4].map(AtomicU64::new);
+        Self { connect, to_host, to_device, refuses, deaf, breaks, failure, opened, unread }
+    }
+
+    /// A message of the device arrives. Datagrams are given up where too many wait.
+    pub fn arrive(&self, bytes: Vec<u8>) {
+        if matches!(self.connect, Connect::Udp { .. }) && self.to_host.len() >= KEPT_DATAGRAMS {
+            self.unread.fetch_add(1, Ordering::SeqCst);
+        } else {
+            self.to_host.push(bytes);
+        }
     }
 
     /// Breaks the connection; what hasn't been read is lost.
@@ -147,6 +161,10 @@ impl Line for OpenCable {
         }
         self.cable.to_device.push(bytes.to_vec());
         Ok(())
+    }
+
+    fn dropped(&mut self) -> u64 {
+        self.cable.unread.swap(0, Ordering::SeqCst)
     }
 
     /// Asks as over UDP: with the length of the answer, which comes as a message.

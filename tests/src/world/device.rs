@@ -88,7 +88,7 @@ impl Device {
         while self.under_way.front().is_some_and(|(at, _)| *at <= now) {
             let (_, bytes) = self.under_way.pop_front().unwrap();
             if self.cable.is_open() {
-                self.cable.to_host.push(bytes);
+                self.cable.arrive(bytes);
             }
         }
     }

@@ -23,7 +23,8 @@ pub fn broken(lived: &Lived, replayed: &Result<Replayed, String>) -> Vec<String>
 /// No fault touches another device; no delay loses a frame; after all faults every device runs again.
 fn of_line(lived: &Lived, number: usize, line: &Line) -> Option<String> {
     let finished = lived.plan.ending == Ending::Finished;
-    let loop_stalled = lived.plan.machine.iter().any(|window| window.what == MachineFault::LoopStalls);
+    let is_of = |fault: MachineFault| matches!(fault, MachineFault::LoopStalls | MachineFault::PortsStall);
+    let stalled = lived.plan.machine.iter().any(|window| is_of(window.what));
     let Line { untouched, lossless, whole, good, history } = line;
     let what = if *untouched && (history.opened, history.lost) != (1, 0) {
         "nothing happened to it, and its line was lost"
@@ -31,8 +32,8 @@ fn of_line(lived: &Lived, number: usize, line: &Line) -> Option<String> {
         "more frames were found than sent"
     } else if *lossless && finished && *good < *whole && history.dropped == 0 {
         "frames are missing, and none was counted"
-    } else if history.dropped > 0 && !loop_stalled {
-        "packets were dropped although the loop ran"
+    } else if history.dropped > 0 && !stalled && *untouched {
+        "packets were dropped although nothing held them up"
     } else if finished && !history.last.starts_with("running") {
         "it doesn't run again"
     } else {
@@ -41,14 +42,18 @@ fn of_line(lived: &Lived, number: usize, line: &Line) -> Option<String> {
     Some(format!("device {number}: {what}: {line:?}"))
 }
 
-/// A log has what the loop took, in that order; what is missing was told, by the recorder and by the reader; and nothing is said
-/// to be missing that isn't.
+/// A log has what the loop took, in that order; what is missing was told, by the recorder and by the reader; what lines dropped before
+/// the loop could take it is stated; and nothing is said to be missing that isn't.
 fn of_log(lived: &Lived, replayed: &Replayed) -> Vec<String> {
     let finished = lived.plan.ending == Ending::Finished;
     let (ours, theirs) = (&lived.consumed, &replayed.consumed);
     let mut rest = ours.iter();
     let invented = theirs.iter().filter(|packet| !rest.any(|other| other == *packet)).count();
     let missing = ours.len() - theirs.len().min(ours.len());
+    let (dropped, losses): (Vec<&String>, Vec<&String>) =
+        replayed.losses.iter().partition(|loss| loss.contains(" dropped before the program took them"));
+    let count = |loss: &String| loss.split(" packets ").next()?.rsplit(' ').next()?.parse::<u64>().ok();
+    let dropped: u64 = dropped.into_iter().filter_map(count).sum();
     let mut broken = Vec::new();
     let mut hold = |holds: bool, what: &str| {
         if !holds {
@@ -57,7 +62,7 @@ fn of_log(lived: &Lived, replayed: &Replayed) -> Vec<String> {
         }
     };
     hold(invented == 0, "the log has what the loop never took, or in another order");
-    hold(missing == 0 || !replayed.losses.is_empty(), "packets are missing without a word");
+    hold(missing == 0 || !losses.is_empty(), "packets are missing without a word");
     hold(theirs.len() >= lived.certain, "packets are missing that had been synced");
     if finished {
         let summary = lived.summary.as_ref().unwrap();
@@ -65,9 +70,11 @@ fn of_log(lived: &Lived, replayed: &Replayed) -> Vec<String> {
         let skipped = usize::try_from(summary.skipped).unwrap();
         hold(told || missing == skipped, "packets are missing of which the recorder says nothing");
         hold(missing > 0 || replayed.digest == lived.digest, "the replay's results differ");
+        let lines_dropped: u64 = lived.lines.iter().map(|line| line.history.dropped).sum();
+        hold(dropped == lines_dropped, "the log doesn't say what the lines dropped");
         let untroubled = lived.disk_failures == 0 && skipped == 0;
         hold(!untroubled || summary.faults.is_empty(), "the recorder reports a fault that wasn't");
-        hold(!untroubled || replayed.losses.is_empty(), "losses are told, and the disk gave no trouble");
+        hold(!untroubled || losses.is_empty(), "losses are told, and the disk gave no trouble");
     }
     broken
 }

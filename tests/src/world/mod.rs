@@ -16,13 +16,14 @@ use std::sync::atomic::AtomicBool;
 use std::time::Duration;
 
 use headrace::devices::KINDS;
+use headrace::line_record::InRecordings;
 use headrace_config::Document;
 use headrace_geometry::time::{DurNs, MonoNs};
 use headrace_monitor::App;
 use headrace_monitor::merge::Inbox;
 use headrace_monitor::outlet::{NoticeOutlet, NoticeReceiver};
 use headrace_monitor::run::Loop;
-use headrace_ports::{Attached, Board, Common, LineHistory, LineService, Waker};
+use headrace_ports::{Attached, Board, Common, LineHistory, LineRecord, LineService, Waker};
 use headrace_replay::drive::{Pace, drive};
 use headrace_replay::log::{
     LogHeader, Recorder, RecorderWorker, RecordingEvent, Rotation, SourceInfo, Summary,
@@ -199,7 +200,8 @@ impl World {
             stopping: Arc::new(AtomicBool::new(false)),
             board: board.clone(),
             waker: Waker::of_this_thread(),
-            sent: None,
+            record: (sabotage != Some(Sabotage::DropsUntold))
+                .then(|| Arc::new(InRecordings(vec![recorder.line_port()])) as Arc<dyn LineRecord>),
         };
         let mut programs = vehicle.programs().unwrap().into_iter();
         let (mut devices, mut services) = (Vec::new(), Vec::new());

@@ -11,9 +11,12 @@ pub enum Sabotage {
     DiskForgets,
     /// Syncs are reported and not done.
     SyncLies,
+    /// What lines drop isn't recorded.
+    DropsUntold,
 }
 
 impl Sabotage {
     /// All of them.
-    pub const ALL: [Self; 4] = [Self::CableLoses, Self::NeighbourBreaks, Self::DiskForgets, Self::SyncLies];
+    pub const ALL: [Self; 5] =
+        [Self::CableLoses, Self::NeighbourBreaks, Self::DiskForgets, Self::SyncLies, Self::DropsUntold];
 }

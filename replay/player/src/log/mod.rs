@@ -67,7 +67,7 @@ pub use error::LogError;
 pub use fault::{RecordingEvent, RecordingFault};
 pub use loss::{Loss, LossKind, Many};
 pub use part::{Part, PartEnd, PartHead, Progress, dive_name, named_part, part_path};
-pub use queue::{Full, SentPort};
+pub use queue::{Full, LinePort};
 pub use reader::{ChannelInfo, LogInfo, LogMessage, LogPlace, LogReader, MessageKind};
 pub use recorder::{Recorder, RecorderHandle, RecorderPort};
 pub use recover::{RECOVERED_FROM, Recovered, recover};

@@ -42,6 +42,10 @@ pub(super) struct State {
     /// Bytes that the port threads sent to the devices, which don't pass through the loop.
     pub(super) sent: ArrayQueue<SentMessage>,
     pub(super) sent_dropped: AtomicU64,
+    /// Packets that lines dropped before the loop could take them.
+    pub(super) dropped: ArrayQueue<Dropped>,
+    /// Those of which there was no room to say more.
+    pub(super) dropped_besides: AtomicU64,
     /// Recordings of voice notes, which don't pass through the loop either.
     pub(super) voices: ArrayQueue<Vec<u8>>,
     /// Whether the recorder takes no further one: set before it takes the last.
@@ -65,14 +69,23 @@ pub(super) struct SentMessage {
     pub(super) bytes: Vec<u8>,
 }
 
-/// Logs bytes sent to devices, from any thread. When the queue is full the oldest message is dropped and counted.
+/// Packets of a source that were dropped before the loop could take them.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct Dropped {
+    pub(super) source: u16,
+    /// Times between which.
+    pub(super) span: (MonoNs, MonoNs),
+    pub(super) packets: u64,
+}
+
+/// Logs what goes on on devices' lines beside the loop, from any thread.
 #[derive(Clone)]
-pub struct SentPort {
+pub struct LinePort {
     pub(super) state: Arc<State>,
 }
 
-impl SentPort {
-    /// Logs bytes sent to `source`. Never blocks.
+impl LinePort {
+    /// Logs bytes sent to `source`. Never blocks: when the queue is full the oldest message is dropped and counted.
     pub fn sent(&self, source: u16, at: MonoNs, bytes: &[u8]) {
         let message = SentMessage { source, at, bytes: bytes.to_vec() };
         if self.state.sent.force_push(message).is_some() {
@@ -80,8 +93,15 @@ impl SentPort {
         }
     }
 
-    /// Number of messages dropped.
-    pub fn dropped(&self) -> u64 {
+    /// States in the log that packets of `source` were dropped between two times, before the loop could take them. Never blocks.
+    pub fn lost(&self, source: u16, from: MonoNs, to: MonoNs, packets: u64) {
+        if let Some(oldest) = self.state.dropped.force_push(Dropped { source, span: (from, to), packets }) {
+            self.state.dropped_besides.fetch_add(oldest.packets, Ordering::Relaxed);
+        }
+    }
+
+    /// Number of messages sent that were dropped.
+    pub fn sent_dropped(&self) -> u64 {
         self.state.sent_dropped.load(Ordering::Relaxed)
     }
 }

@@ -21,7 +21,7 @@ use super::LogError;
 use super::derived_channels::DerivedChannels;
 use super::fault::RecordingEvent;
 use super::format::{TICK_HEAD_BYTES, order_bytes, tick_head};
-use super::queue::{ENTRY_HEAD_BYTES, Entries, Full, Gap, Queue, SentPort, State, until_stopped};
+use super::queue::{ENTRY_HEAD_BYTES, Entries, Full, Gap, Queue, LinePort, State, until_stopped};
 use super::recording::Recording;
 use super::rotate::{Rotation, in_the_way};
 use super::storage::{Disk, OneWriter, Storage};
@@ -123,6 +123,8 @@ impl Recorder {
             events: ArrayQueue::new(EVENTS),
             sent: ArrayQueue::new(SENT_MESSAGES),
             sent_dropped: AtomicU64::new(0),
+            dropped: ArrayQueue::new(EVENTS),
+            dropped_besides: AtomicU64::new(0),
             voices: ArrayQueue::new(VOICES),
             voices_end: AtomicBool::new(false),
             results_missing: AtomicU64::new(0),
@@ -291,9 +293,9 @@ impl RecorderHandle {
         self.state.events.pop()
     }
 
-    /// A port for bytes sent to the devices.
-    pub fn sent_port(&self) -> SentPort {
-        SentPort { state: Arc::clone(&self.state) }
+    /// A port for what goes on on devices' lines beside the loop.
+    pub fn line_port(&self) -> LinePort {
+        LinePort { state: Arc::clone(&self.state) }
     }
 
     /// A port for the recordings of voice notes.

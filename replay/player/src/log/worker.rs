@@ -1,5 +1,6 @@
 //! The recorder's work: takes entries from the queue and writes them.
 
+use std::collections::BTreeMap;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Duration;
@@ -8,7 +9,7 @@ use headrace_geometry::time::MonoNs;
 
 use super::derived_channels::{DerivedChannels, Made};
 use super::fault::RecordingEvent;
-use super::queue::{ClosedWhenDropped, Entry, Gap, Queue, SentPort, State};
+use super::queue::{ClosedWhenDropped, Dropped, Entry, Gap, Queue, LinePort, State};
 use super::recording::Recording;
 use super::space::{LONGEST_KEPT_BYTES, Space};
 use super::voice::VoicePort;
@@ -17,6 +18,8 @@ use super::writer::{Lane, LogHeader, Summary};
 /// Interval at which a chunk is closed and synced. Half of the second that a power cut may cost, since closing
 /// and syncing take time too.
 const FLUSH_PERIOD: Duration = Duration::from_millis(500);
+/// Time between two statements of what lines dropped.
+const DROPPED_PERIOD: Duration = Duration::from_secs(5);
 /// Entries between two readings of the clock.
 const BATCH: usize = 256;
 
@@ -32,6 +35,11 @@ pub struct RecorderWorker {
     beside: Beside,
     /// Packets of skipped ticks.
     skipped: u64,
+    /// Names of the sources.
+    ids: Vec<String>,
+    /// What lines have dropped since that was last stated, by source, and when that was.
+    dropped: BTreeMap<u16, Dropped>,
+    dropped_stated: Duration,
     /// Log time of the last entry: voice notes' recordings have no other clock of the dive.
     last: Option<MonoNs>,
     state: Arc<State>,
@@ -84,15 +92,18 @@ impl RecorderWorker {
             echoes: Echoes::of(header),
             beside: Beside { derived, made: Vec::new() },
             skipped: 0,
+            ids: header.sources.iter().map(|source| source.id.clone()).collect(),
+            dropped: BTreeMap::new(),
+            dropped_stated: Duration::ZERO,
             last: None,
             state,
             _closed: closed,
         }
     }
 
-    /// A port for bytes sent to the devices.
-    pub fn sent_port(&self) -> SentPort {
-        SentPort { state: Arc::clone(&self.state) }
+    /// A port for what goes on on devices' lines beside the loop.
+    pub fn line_port(&self) -> LinePort {
+        LinePort { state: Arc::clone(&self.state) }
     }
 
     /// A port for the recordings of voice notes.
@@ -127,6 +138,7 @@ impl RecorderWorker {
         taken += self.write_sent();
         taken += self.write_voices();
         self.state_gaps();
+        self.state_dropped(now, false);
         self.flush_in_time(now);
         self.tell();
         taken > 0
@@ -136,6 +148,7 @@ impl RecorderWorker {
     pub fn finish(mut self, now: Duration) -> Summary {
         self.state.voices_end.store(true, Ordering::SeqCst);
         while self.step(now) {}
+        self.state_dropped(now, true);
         self.write_made(|derived, made| derived.end(made));
         let left_out = self.space.left_out();
         if let Some((from, to)) = left_out.span {
@@ -165,6 +178,33 @@ impl RecorderWorker {
             self.skipped += packets;
             let words = format!("{packets} packets not recorded: the recorder was behind");
             self.recording.state(Some(from), Some(to), &words);
+        }
+    }
+
+    /// States what lines dropped: at the end, else every few seconds, so that a log in which packets are missing for hours stays readable.
+    fn state_dropped(&mut self, now: Duration, at_end: bool) {
+        let dropped = core::iter::from_fn(|| self.state.dropped.pop());
+        for Dropped { source, span: (from, to), packets } in dropped {
+            let sum = self.dropped.entry(source).or_insert(Dropped { source, span: (from, to), packets: 0 });
+            sum.span.1 = to;
+            sum.packets += packets;
+        }
+        if !at_end && now.saturating_sub(self.dropped_stated) < DROPPED_PERIOD {
+            return;
+        }
+        let besides = self.state.dropped_besides.swap(0, Ordering::Relaxed);
+        if self.dropped.is_empty() && besides == 0 {
+            return;
+        }
+        self.dropped_stated = now;
+        for Dropped { source, span: (from, to), packets } in core::mem::take(&mut self.dropped).into_values() {
+            let id = self.ids.get(usize::from(source)).map_or("an unknown source", String::as_str);
+            let words = format!("{packets} packets of {id} dropped before the program took them: it, or the machine, stood");
+            self.recording.state(Some(from), Some(to), &words);
+        }
+        if besides > 0 {
+            let words = format!("{besides} packets dropped before the program took them: it, or the machine, stood");
+            self.recording.state(None, Some(self.last.unwrap_or_default()), &words);
         }
     }
 

@@ -262,16 +262,16 @@ fn a_disk_that_fills_keeps_what_is_small_and_says_what_it_left_out() {
 fn what_there_was_no_room_for_is_counted() {
     let (medium, _flushed) = slow(0);
     let (mut port, handle) = Recorder::start(medium, &header(true), 0).unwrap();
-    let sent = handle.sent_port();
+    let sent = handle.line_port();
     // Faster than any thread empties it: the queue holds 2,048.
     for number in 0..1_000_000_u64 {
         sent.sent(1, MonoNs(number), b"poll");
-        if sent.dropped() > 0 {
+        if sent.sent_dropped() > 0 {
             break;
         }
     }
     port.miss_results();
-    let dropped = sent.dropped();
+    let dropped = sent.sent_dropped();
     let summary = handle.finish().unwrap();
     assert!(dropped > 0);
     assert_eq!((summary.sent_dropped, summary.results_missing), (dropped, 1));
