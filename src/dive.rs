@@ -16,7 +16,7 @@ use headrace_monitor::run::Loop;
 use headrace_ports::Supervisor;
 use headrace_replay::drive::{DriveError, Pace, PacketSource, drive};
 use headrace_replay::log::{
-    DerivedChannels, Every, LeftOut, LogHeader, Recorder, RecorderHandle, RecordingFault, Rotation, LinePort,
+    DerivedChannels, Every, LeftOut, LinePort, LogHeader, Recorder, RecorderHandle, RecordingFault, Rotation,
     SourceInfo, Summary, VoicePort, dive_name,
 };
 use headrace_replay::player::seconds;

@@ -131,9 +131,9 @@ impl Rig {
         }
         let start = |(devices, end, fault)| Faulty::start(devices, end, fault);
         let devices: Vec<Faulty> = lines.into_iter().map(start).collect();
-        let record = handle.as_ref().map(|handle| {
-            Arc::new(InRecordings(vec![handle.line_port()])) as Arc<dyn LineRecord>
-        });
+        let record = handle
+            .as_ref()
+            .map(|handle| Arc::new(InRecordings(vec![handle.line_port()])) as Arc<dyn LineRecord>);
         let supervisor = Supervisor::start(connections, record).unwrap();
         let count = on.len();
         let view = View {

@@ -21,7 +21,7 @@ use super::LogError;
 use super::derived_channels::DerivedChannels;
 use super::fault::RecordingEvent;
 use super::format::{TICK_HEAD_BYTES, order_bytes, tick_head};
-use super::queue::{ENTRY_HEAD_BYTES, Entries, Full, Gap, Queue, LinePort, State, until_stopped};
+use super::queue::{ENTRY_HEAD_BYTES, Entries, Full, Gap, LinePort, Queue, State, until_stopped};
 use super::recording::Recording;
 use super::rotate::{Rotation, in_the_way};
 use super::storage::{Disk, OneWriter, Storage};

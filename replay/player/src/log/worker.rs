@@ -9,7 +9,7 @@ use headrace_geometry::time::MonoNs;
 
 use super::derived_channels::{DerivedChannels, Made};
 use super::fault::RecordingEvent;
-use super::queue::{ClosedWhenDropped, Dropped, Entry, Gap, Queue, LinePort, State};
+use super::queue::{ClosedWhenDropped, Dropped, Entry, Gap, LinePort, Queue, State};
 use super::recording::Recording;
 use super::space::{LONGEST_KEPT_BYTES, Space};
 use super::voice::VoicePort;
@@ -197,13 +197,17 @@ impl RecorderWorker {
             return;
         }
         self.dropped_stated = now;
-        for Dropped { source, span: (from, to), packets } in core::mem::take(&mut self.dropped).into_values() {
+        for Dropped { source, span: (from, to), packets } in core::mem::take(&mut self.dropped).into_values()
+        {
             let id = self.ids.get(usize::from(source)).map_or("an unknown source", String::as_str);
-            let words = format!("{packets} packets of {id} dropped before the program took them: it, or the machine, stood");
+            let words = format!(
+                "{packets} packets of {id} dropped before the program took them: it, or the machine, stood"
+            );
             self.recording.state(Some(from), Some(to), &words);
         }
         if besides > 0 {
-            let words = format!("{besides} packets dropped before the program took them: it, or the machine, stood");
+            let words =
+                format!("{besides} packets dropped before the program took them: it, or the machine, stood");
             self.recording.state(None, Some(self.last.unwrap_or_default()), &words);
         }
     }

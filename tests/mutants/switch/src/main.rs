@@ -107,7 +107,10 @@ impl Text<'_> {
         let raw = |range: &Range<usize>| &self.source[range.clone()];
         let on = |mutant: &Mutant| format!("crate::switched::on({})", mutant.id);
         let choice = |of: &dyn Fn(&Mutant) -> String, or: String| {
-            let each: String = mutants.iter().map(|mutant| format!("\nif {} {{ {} }}\nelse ", on(mutant), of(mutant))).collect();
+            let each: String = mutants
+                .iter()
+                .map(|mutant| format!("\nif {} {{ {} }}\nelse ", on(mutant), of(mutant)))
+                .collect();
             format!("({each}{{ {or} }})")
         };
         match &place.kind {
@@ -118,12 +121,16 @@ impl Text<'_> {
             Kind::Unary { operator, operand } => {
                 choice(&|_| raw(operand).to_owned(), format!("{} {}", raw(operator), inner(operand)))
             }
-            Kind::Guard => mutants.iter().fold(inner(&place.range), |guard, mutant| match mutant.replacement.as_str() {
-                "true" => format!("(\n{} || ({guard}))", on(mutant)),
-                _ => format!("(\n!{} && ({guard}))", on(mutant)),
-            }),
+            Kind::Guard => {
+                mutants.iter().fold(inner(&place.range), |guard, mutant| match mutant.replacement.as_str() {
+                    "true" => format!("(\n{} || ({guard}))", on(mutant)),
+                    _ => format!("(\n!{} && ({guard}))", on(mutant)),
+                })
+            }
             Kind::Body => {
-                let each = mutants.iter().map(|mutant| format!("\nif {} {{ return {}; }}\n", on(mutant), mutant.replacement));
+                let each = mutants
+                    .iter()
+                    .map(|mutant| format!("\nif {} {{ return {}; }}\n", on(mutant), mutant.replacement));
                 each.collect::<String>() + &inner(&place.range)
             }
             Kind::Arm { guard } => mutants.iter().fold(String::new(), |_, mutant| match guard {

@@ -4,7 +4,10 @@ use std::ops::Range;
 
 use syn::spanned::Spanned;
 use syn::visit::{self, Visit};
-use syn::{Arm, BinOp, Block, Expr, ExprBinary, ExprRepeat, ExprUnary, ImplItemConst, ImplItemFn, ItemConst, ItemFn, ItemStatic, TraitItemFn, TypeArray};
+use syn::{
+    Arm, BinOp, Block, Expr, ExprBinary, ExprRepeat, ExprUnary, ImplItemConst, ImplItemFn, ItemConst, ItemFn,
+    ItemStatic, TraitItemFn, TypeArray,
+};
 
 use crate::{Position, start};
 
@@ -17,13 +20,22 @@ pub(crate) struct Place {
 }
 
 pub(crate) enum Kind {
-    Binary { left: Range<usize>, operator: Range<usize>, right: Range<usize> },
-    Unary { operator: Range<usize>, operand: Range<usize> },
+    Binary {
+        left: Range<usize>,
+        operator: Range<usize>,
+        right: Range<usize>,
+    },
+    Unary {
+        operator: Range<usize>,
+        operand: Range<usize>,
+    },
     Guard,
     /// A function's statements.
     Body,
     /// An arm of a match up to its arrow.
-    Arm { guard: Option<Range<usize>> },
+    Arm {
+        guard: Option<Range<usize>>,
+    },
 }
 
 impl Kind {
@@ -91,7 +103,11 @@ impl<'a> Visit<'a> for Found {
 
     fn visit_expr_binary(&mut self, binary: &'a ExprBinary) {
         if !binds(&binary.left) && !binds(&binary.right) {
-            let kind = Kind::Binary { left: range(&binary.left), operator: range(&binary.op), right: range(&binary.right) };
+            let kind = Kind::Binary {
+                left: range(&binary.left),
+                operator: range(&binary.op),
+                right: range(&binary.right),
+            };
             self.0.push(Place { range: range(binary), named_at: start(&binary.op), kind });
         }
         visit::visit_expr_binary(self, binary);

@@ -277,6 +277,64 @@ fn what_there_was_no_room_for_is_counted() {
     assert_eq!((summary.sent_dropped, summary.results_missing), (dropped, 1));
 }
 
+/// Steps at the times given, with packets dropped before each; what the log then says of drops.
+fn drops_stated(drops: &[(Duration, u16, u64)]) -> Vec<String> {
+    let (medium, flushed) = slow(0);
+    let storage = Box::new(Within(None, Some(medium)));
+    let (path, rotation) = (Path::new("dive.mcap"), Rotation::default());
+    let (mut port, mut worker) =
+        Recorder::unthreaded(storage, path, &header(true), &rotation, 0, None).unwrap();
+    let line = worker.line_port();
+    port.tick(1, MonoNs(1), &[]).unwrap();
+    for &(now, source, packets) in drops {
+        let at = |now: Duration| MonoNs(u64::try_from(now.as_nanos()).unwrap());
+        line.lost(source, at(now.saturating_sub(Duration::from_secs(1))), at(now), packets);
+        worker.step(now);
+    }
+    worker.finish(Duration::from_secs(100));
+    let (_, losses) = read(&flushed.iter().last().unwrap());
+    losses.iter().map(ToString::to_string).collect()
+}
+
+#[test]
+fn what_lines_drop_is_stated_by_source_every_few_seconds() {
+    let s = Duration::from_secs;
+    let words = |packets: u64, id: &str, from: u64, to: u64| {
+        format!(
+            "{packets} packets of {id} dropped before the program took them: it, or the machine, stood (after {from}.000 s, \
+             before {to}.000 s)"
+        )
+    };
+    let [first, second] = [0, 1].map(|number: usize| header(true).sources[number].id.clone());
+    assert_eq!(drops_stated(&[(s(1), 0, 7)]), [words(7, &first, 0, 1)]);
+    assert_eq!(
+        drops_stated(&[(s(6), 1, 1), (s(7), 1, 2), (s(8), 0, 3), (s(11), 1, 4), (s(12), 1, 5)]),
+        [
+            words(1, &second, 5, 6),
+            words(3, &first, 7, 8),
+            words(6, &second, 6, 11),
+            words(5, &second, 11, 12)
+        ]
+    );
+}
+
+/// No count is lost where the recorder takes none for a while, though whose the packets were isn't known of all.
+#[test]
+fn drops_for_which_there_is_no_room_are_counted() {
+    let (medium, flushed) = slow(0);
+    let (mut port, handle) = Recorder::start(medium, &header(true), 0).unwrap();
+    port.tick(1, MonoNs(1), &[]).unwrap();
+    let line = handle.line_port();
+    for number in 0..100_000 {
+        line.lost(0, MonoNs(number), MonoNs(number + 1), 2);
+    }
+    handle.finish().unwrap();
+    let (_, losses) = read(&flushed.iter().last().unwrap());
+    let counts =
+        losses.iter().map(|loss| loss.to_string().split(' ').next().unwrap().parse::<u64>().unwrap());
+    assert_eq!(counts.sum::<u64>(), 200_000, "{losses:?}");
+}
+
 /// Derives a message from each result except the last channel's, for existing channels and for one that doesn't exist.
 struct Echoing;
 
