@@ -5,6 +5,8 @@
 
 pub mod advised;
 #[cfg(unix)]
+mod drops;
+#[cfg(unix)]
 pub mod faulty;
 pub mod field;
 pub mod field_table;

@@ -2,6 +2,7 @@
 
 use super::plan::{Ending, MachineFault};
 use super::{Line, Lived, Replayed};
+use crate::drops;
 
 /// A loop that runs takes what comes, recorded or not, within some steps.
 const LONGEST_WAIT_NS: i64 = 500_000_000;
@@ -50,10 +51,7 @@ fn of_log(lived: &Lived, replayed: &Replayed) -> Vec<String> {
     let mut rest = ours.iter();
     let invented = theirs.iter().filter(|packet| !rest.any(|other| other == *packet)).count();
     let missing = ours.len() - theirs.len().min(ours.len());
-    let (dropped, losses): (Vec<&String>, Vec<&String>) =
-        replayed.losses.iter().partition(|loss| loss.contains(" dropped before the program took them"));
-    let count = |loss: &String| loss.split(" packets ").next()?.rsplit(' ').next()?.parse::<u64>().ok();
-    let dropped: u64 = dropped.into_iter().filter_map(count).sum();
+    let (dropped, losses) = drops::apart(&replayed.losses);
     let mut broken = Vec::new();
     let mut hold = |holds: bool, what: &str| {
         if !holds {
