@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Runs mutants drawn from those that cargo-mutants makes, in the copy of the sources that tests/mutants/run has made.
 
-sample.py N SEED MINUTES [PART]: cargo-mutants lists and words the mutants; N of those whose name has PART are drawn. `switch` puts all of
+sample.py N SEED MINUTES [PART]: cargo-mutants lists and words the mutants; N of those whose name matches PART are drawn. `switch` puts all of
 them behind a switch, so that they are built once. Each is then judged by its crate's own tests, and where these pass by tests of dives
 (tests/tests), the quick ones first, up to the first that fails. No golden file, digest or snapshot of results is among them. Two run at a
 time. Exit code 0.
@@ -44,7 +44,7 @@ def drawn(count, seed, part):
     listing = ["cargo", "mutants", "--workspace", "--config", "tests/mutants/mutants.toml", "--list", "--json"]
     listed = json.loads(subprocess.run(listing, stdout=subprocess.PIPE, check=True).stdout)
     # Fields left to their defaults are mostly those that tests build from parts.
-    mutants = [mutant for mutant in listed if "delete field" not in mutant["name"] and part in mutant["name"]]
+    mutants = [mutant for mutant in listed if "delete field" not in mutant["name"] and re.search(part, mutant["name"])]
     chosen = random.Random(seed).sample(mutants, min(count, len(mutants)))
     for number, mutant in enumerate(chosen, 1):
         mutant["id"] = number

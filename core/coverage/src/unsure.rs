@@ -190,6 +190,9 @@ mod tests {
         let lost = |section| Stretch::one(Unsure::Position, section, [0.9, 1.4, 0.7], Driven::default());
         let mut stretch = lost(0);
         assert!(stretch.is_mostly_error());
+        let third =
+            |hole_m: f64| Stretch::one(Unsure::Position, 0, [hole_m, 0.3 * hole_m, 0.1], Driven::default());
+        assert!(third(1.0).is_mostly_error() && third(0.2).is_mostly_error(), "whatever the hole's size");
         assert!(stretch.join(&one(Unsure::Position, 1, 0.5), 0.25));
         assert!(stretch.join(&one(Unsure::Position, 2, 0.49), 0.25));
         assert!(!stretch.is_mostly_error());

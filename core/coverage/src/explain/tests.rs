@@ -167,6 +167,16 @@ fn of_two_that_are_needed_both_are_named_and_of_two_that_suffice_the_one_the_pil
     );
 }
 
+/// A swing that makes it a little worse is present, but the others suffice without it.
+#[test]
+fn of_three_that_are_present_the_two_that_suffice_are_named() {
+    let wide = Some([[8.6, 11.7], [3.0, 5.5]]);
+    let drive = Drive { speed_mps: 0.35, swing_m: 0.1, ..sound() };
+    let wall =
+        Wall { along_m: 0.7, drive, bare: wide, why: Causes::of(Cause::MissingReturns), ..Wall::default() };
+    assert_eq!(named(&wall), [Cause::TooFast, Cause::MissingReturns]);
+}
+
 /// What takes longer to go round leaves passes farther apart: where they leave no room for that, it isn't enough.
 #[test]
 fn a_longer_range_or_a_finer_step_is_not_for_nothing() {

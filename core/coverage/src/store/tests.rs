@@ -359,3 +359,21 @@ fn cells_are_of_half_the_target_within_reason() {
         assert!((StoreLayout::cell_for_target_m(target_m) - cell_m).abs() < 1e-12, "{target_m}");
     }
 }
+
+/// Samples are found where they are, wherever the wall begins.
+#[test]
+fn a_pass_is_found_within_little_of_its_place() {
+    for from_m in [-1.0, 0.0, 6000.0] {
+        let layout = StoreLayout { from_m, to_m: from_m + 40.0, ..LAYOUT };
+        let mut store = SampleStore::new(layout);
+        for k in 0..30 {
+            let x_m = from_m + 1.0 + f64::from(k);
+            store.insert(WallSample { step_m: Some([0.0, 0.2]), ..sample(x_m, 1.1) }).unwrap();
+        }
+        for k in 0..30 {
+            let x_m = from_m + 1.05 + f64::from(k);
+            let found = store.nearest_pass_m(x_m, 1.0, 0.1);
+            assert!(found.is_some_and(|m| (m - 0.05).abs() < 1e-4), "{from_m} {x_m}: {found:?}");
+        }
+    }
+}

@@ -58,3 +58,31 @@ impl Spell {
         [line.squares - dot(&by, &by), line.residuals - dot(&by, &residuals)]
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Of three readings with residuals of 1, 2 and 3 m by a parameter; some of it the pose explains as well, all of it if it does so alone.
+    #[test]
+    fn what_a_pose_explains_is_taken_off() {
+        let line = |by_pose: [f64; POSE]| Line { squares: 3.0, residuals: 6.0, by_pose };
+        let spell = |weight: f64| {
+            let mut spell = Spell::default();
+            for residual_m in [1.0, 2.0, 3.0] {
+                spell.add([1.0, 0.0, 0.0, 0.0, 0.0], residual_m, weight);
+            }
+            spell
+        };
+        let freed = |spell: &Spell, line: &Line| spell.freed(line, &spell.factor().unwrap());
+        let alone = freed(&spell(1.0), &line([0.0; POSE]));
+        assert!((alone[0] - 3.0).abs() < 1e-12 && (alone[1] - 6.0).abs() < 1e-12, "{alone:?}");
+        // The pose is known to 0.3 m beforehand: of 3 readings and 11.1 of the prior that leaves 1 - 3 / 14.1.
+        let like_it = freed(&spell(1.0), &line([3.0, 0.0, 0.0, 0.0, 0.0]));
+        let left = 1.0 - 3.0 / (3.0 + 1.0 / 0.09);
+        assert!(
+            (like_it[0] - 3.0 * left).abs() < 1e-9 && (like_it[1] - 6.0 * left).abs() < 1e-9,
+            "{like_it:?}"
+        );
+    }
+}

@@ -286,6 +286,7 @@ mod tests {
         // Half an eighth of a turn late.
         let late = noted(&mut driving, [0.0, 67.5, 180.0, 270.0], 0.2, 0.2);
         assert!(near(late.left_at_plan_s, 4.0) && near(late.gap_s, 2.5) && near(late.planned_gap_s, 2.0));
+        assert!(near(late.even_gap_s, 2.0), "were they even");
         assert!(driving.lacking.stalled.has(1));
         let again = noted(&mut driving, EVEN, 0.2, 0.2);
         assert!(near(again.left_at_plan_s, 4.0) && near(again.gap_s, 2.0));

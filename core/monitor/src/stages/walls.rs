@@ -243,7 +243,7 @@ mod tests {
     use super::*;
     use crate::fixtures::{coverage, heard, pinged, tunnel};
     use bevy_ecs::world::World;
-    use headrace_coverage::Frontier;
+    use headrace_coverage::{Frontier, SampleStore, StoreLayout};
     use headrace_geometry::time::MonoNs;
 
     struct Bench {
@@ -331,6 +331,18 @@ mod tests {
             bench.coverage.store.clone().nearest_pass_m(5.1, arc_m, 0.5).is_some()
         };
         assert!((1..18).all(|number| crossed(f64::from(number) + 0.5)));
+    }
+
+    #[test]
+    fn samples_for_which_there_is_no_room_are_counted() {
+        let mut bench = Bench::new();
+        let perimeter_m = bench.tunnel.profile.perimeter_m();
+        let layout = StoreLayout { perimeter_m, from_m: 0.0, to_m: 32.0, cell_m: 0.25, capacity: 2 };
+        bench.coverage.store = SampleStore::new(layout);
+        for number in 0..5 {
+            bench.note(&at(number, 3.0));
+        }
+        assert_eq!((bench.tally.samples, bench.tally.not_stored, bench.tally.outside), (5, 3, 0));
     }
 
     /// A rock's first two returns: what came between, while the first waited, counts once that is settled.

@@ -269,6 +269,22 @@ fn old_rings_are_cast_one_a_call_and_the_same_in_the_end() {
     assert!((advisor.advise(&then, Swing::default(), None).t_y_m - fresh).abs() < 1e-12);
 }
 
+#[test]
+fn while_the_vehicle_moves_on_each_head_s_ring_has_its_turn() {
+    let case = Case::new(&[0.0, 120.0, 240.0], &[0.0; 3], 0.1, 0.5);
+    let mut advisor = case.advisor();
+    let pose = case.situation.pose.unwrap();
+    let at = |step: i32| Point3::new(100.0, pose.position.y() + 0.1 * f64::from(step % 9), pose.position.z());
+    for step in 0..12 {
+        let now = Pose { position: at(step), ..pose };
+        advisor.advise(&Situation { pose: Some(now), ..case.situation }, Swing::default(), None);
+    }
+    for head in &advisor.heads {
+        let latest = (9..12).map(|step| Pose { position: at(step), ..pose });
+        assert!(latest.into_iter().any(|pose| head.is_near(&pose, 1e-9)), "a ring is of {:?}", head.cast_at);
+    }
+}
+
 /// Heads side by side, each hiding some of the wall from the next.
 fn hiding_each_other() -> Case {
     let mut case = Case::new(&[0.0, 90.0, 180.0, 270.0], &[0.0; 4], 0.125, 0.5);

@@ -192,6 +192,38 @@ fn what_cannot_be_planned_is_named() {
     assert!(answers[0].v_max_mps.is_some() && answers[4].reason == Some("angular_step"));
 }
 
+/// One head alone in the middle loses nothing to margins, four of a vehicle something to each of the first.
+#[test]
+fn margins_go_from_the_geometry_alone_to_the_largest_speed() {
+    for (inspection, loses) in [(ideal(1), false), (vita_2(HeadLayout::PhaseShift), true)] {
+        let planner = Planner::new(inspection).unwrap();
+        let (mode, target_m) = (2, 0.5);
+        let margins = planner.margins(mode, target_m).unwrap();
+        let Margins { geometry_mps, hidden_mps, phase_mps, swing_mps, position_mps, losses_mps, .. } =
+            margins;
+        let speeds = [geometry_mps, hidden_mps, phase_mps, swing_mps, position_mps, losses_mps];
+        assert!(speeds.windows(2).all(|pair| pair[0] >= pair[1]), "{speeds:?}");
+        let most_mps = planner.v_max_mps(mode, target_m).unwrap();
+        assert!(most_mps > 0.0 && (position_mps - most_mps).abs() < 1e-12, "{speeds:?}");
+        assert_eq!(geometry_mps > 1.001 * phase_mps, loses, "{speeds:?}");
+    }
+}
+
+/// What every head reaches is what the shortest range reaches; a mode's pings are those of a turn.
+#[test]
+fn a_plan_knows_its_reach_and_the_time_between_pings() {
+    let mut shorter = ideal(2);
+    shorter.heads[1].0.range_m[1] = 8.0;
+    // In water that is faster by a tenth, the same times are ranges longer by a tenth.
+    shorter.sound_speed_mps = 1650.0;
+    let planner = Planner::new(shorter).unwrap();
+    assert!((planner.reach_m() - 8.8).abs() < 1e-9, "{}", planner.reach_m());
+    for (planned, (name, step_deg, period_s)) in planner.modes().iter().zip(MODES) {
+        let period_s = period_s * step_deg / 360.0;
+        assert!((planned.ping_period_s() - period_s).abs() < 1e-9, "{name}: {}", planned.ping_period_s());
+    }
+}
+
 #[test]
 fn drift_and_yaw_only_make_it_worse() {
     let still = Planner::new(ideal(2)).unwrap();
