@@ -167,6 +167,15 @@ mod tests {
         }
     }
 
+    /// Of a bare stretch of 2.5 m, drawn together to 0.75 m, the wall on both sides counts.
+    #[test]
+    fn what_is_drawn_near_from_far_away_counts() {
+        let sides = |i: u32, _| i <= 8 || i >= 13;
+        let otherwise = Otherwise { along: 0.3, ..Otherwise::NOTHING };
+        assert!(has(sides, 0.44, &otherwise, &[]));
+        assert!(!has(sides, 0.47, &otherwise, &[]));
+    }
+
     #[test]
     fn where_samples_may_still_land_the_wall_becomes_as_it_is_before() {
         // Drawn together, a circle at the end reaches ahead, where nothing has landed yet.

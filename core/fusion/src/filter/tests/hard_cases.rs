@@ -276,6 +276,18 @@ fn a_fix_of_a_moment_ago_is_turned_back_too() {
 }
 
 #[test]
+fn a_fix_of_a_moment_ago_is_where_the_vehicle_was() {
+    let rig = Rig::new(cruise, 1);
+    let mut nav = rig.navigation();
+    rig.run(&mut nav, &rig.events(0.0, 30.0));
+    let x_m = |back_s: f64| nav.fix(at(30.0 - back_s)).unwrap().pose.position.x();
+    for back_s in [0.3, 0.5, 0.9] {
+        let gone_m = x_m(0.0) - x_m(back_s);
+        assert!((gone_m - 0.2 * back_s).abs() < 0.02, "{gone_m} m in {back_s} s");
+    }
+}
+
+#[test]
 fn the_receive_time_may_do_anything() {
     let rig = Rig::new(rest, 2);
     // The clock stands still for a second at a time; then goes back by as much with each.
