@@ -9,3 +9,4 @@ mod oracle;
 mod properties;
 mod rest;
 mod rig;
+mod wrong_settings;
