@@ -167,11 +167,11 @@ fn of_two_that_are_needed_both_are_named_and_of_two_that_suffice_the_one_the_pil
     );
 }
 
-/// A swing that makes it a little worse is present, but the others suffice without it.
+/// Heads a little out of phase make it worse, but without the others it would pass.
 #[test]
 fn of_three_that_are_present_the_two_that_suffice_are_named() {
     let wide = Some([[8.6, 11.7], [3.0, 5.5]]);
-    let drive = Drive { speed_mps: 0.35, swing_m: 0.1, ..sound() };
+    let drive = Drive { speed_mps: 0.35, gap_s: 2.4, healthy_gap_s: 2.4, ..sound() };
     let wall =
         Wall { along_m: 0.7, drive, bare: wide, why: Causes::of(Cause::MissingReturns), ..Wall::default() };
     assert_eq!(named(&wall), [Cause::TooFast, Cause::MissingReturns]);
