@@ -294,6 +294,20 @@ mod tests {
         assert!(near(noted(&mut driving, EVEN, 0.2, 0.2).left_at_plan_s, 2.0));
     }
 
+    #[test]
+    fn while_all_heads_stand_still_the_times_between_passes_are_those_of_before() {
+        let profile = shapes::circle(3.0).unwrap();
+        let plan =
+            Plan { planned_mps: 0.2, target_m: 0.5, confidence_sd: 2.0, other: OtherSettings::default() };
+        let mut driving = Driving::default();
+        let before = noted(&mut driving, EVEN, 0.2, 0.2);
+        let healthy = situation(EVEN, 0.2, &profile);
+        let none = Situation { heads: [None; MAX_HEADS], ..healthy };
+        driving.note(MonoNs(90_000_000_000), [&none, &healthy], &profile, &plan);
+        let times = |drive: &Drive| [drive.gap_s, drive.even_gap_s, drive.gap_at_plan_s].map(f64::to_bits);
+        assert_eq!(times(&driving.now), times(&before), "{:?}", driving.now);
+    }
+
     /// From the middle of a pipe of 3 m radius a step goes 0.0471 m along the wall, which leaves 0.4978 m of the target along the tunnel, for 2 s
     /// and a ping.
     #[test]
