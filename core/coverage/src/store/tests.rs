@@ -377,3 +377,18 @@ fn a_pass_is_found_within_little_of_its_place() {
         }
     }
 }
+
+/// The wall's last place is one of its last row.
+#[test]
+fn a_sample_at_the_very_end_is_found() {
+    let layout = StoreLayout { from_m: 0.0, to_m: 10.0, cell_m: 0.25, ..LAYOUT };
+    let mut store = SampleStore::new(layout);
+    for (k, x_m) in [9.4, 10.0].into_iter().enumerate() {
+        let sample = WallSample { step_m: Some([0.0, 0.2]), ..sample(x_m, 1.1) };
+        assert_eq!(store.insert(sample), Ok(Kept::Stored), "{k}");
+    }
+    let mut found = Vec::new();
+    store.each_between(9.9, 10.0, |x_m, _, _| found.push(x_m));
+    assert!(found.len() == 1 && (found[0] - 10.0).abs() < 1e-4, "{found:?}");
+    assert!(store.nearest_pass_m(9.95, 1.0, 0.1).is_some_and(|m| (m - 0.05).abs() < 1e-4));
+}

@@ -274,7 +274,7 @@ fn while_the_vehicle_moves_on_each_head_s_ring_has_its_turn() {
     let case = Case::new(&[0.0, 120.0, 240.0], &[0.0; 3], 0.1, 0.5);
     let mut advisor = case.advisor();
     let pose = case.situation.pose.unwrap();
-    let at = |step: i32| Point3::new(100.0, pose.position.y() + 0.1 * f64::from(step % 9), pose.position.z());
+    let at = |step: i32| Point3::new(100.0, pose.position.y() + 0.1 * f64::from(step), pose.position.z());
     for step in 0..12 {
         let now = Pose { position: at(step), ..pose };
         advisor.advise(&Situation { pose: Some(now), ..case.situation }, Swing::default(), None);
