@@ -274,15 +274,12 @@ fn while_the_vehicle_moves_on_each_head_s_ring_has_its_turn() {
     let case = Case::new(&[0.0, 120.0, 240.0], &[0.0; 3], 0.1, 0.5);
     let mut advisor = case.advisor();
     let pose = case.situation.pose.unwrap();
-    let at = |step: i32| Point3::new(100.0, pose.position.y() + 0.1 * f64::from(step), pose.position.z());
+    let [y_m, z_m] = [pose.position.y(), pose.position.z()];
+    let at = |step: i32| Pose { position: Point3::new(100.0, y_m + 0.1 * f64::from(step), z_m), ..pose };
     for step in 0..12 {
-        let now = Pose { position: at(step), ..pose };
-        advisor.advise(&Situation { pose: Some(now), ..case.situation }, Swing::default(), None);
+        advisor.advise(&Situation { pose: Some(at(step)), ..case.situation }, Swing::default(), None);
     }
-    for head in &advisor.heads {
-        let latest = (9..12).map(|step| Pose { position: at(step), ..pose });
-        assert!(latest.into_iter().any(|pose| head.is_near(&pose, 1e-9)), "a ring is of {:?}", head.cast_at);
-    }
+    assert!(advisor.heads.iter().all(|head| (9..12).any(|step| head.is_near(&at(step), 1e-9))));
 }
 
 /// Heads side by side, each hiding some of the wall from the next.
