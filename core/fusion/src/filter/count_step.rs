@@ -1,0 +1,136 @@
+//! The step of a tether counter, recognised from its counts.
+//!
+//! A file may state a smaller step than the counter has: its converter's instead of its wheel's. A counter that stands between its changes
+//! shows its step; changes that are multiples of one step show it, too.
+
+use serde::{Deserialize, Serialize};
+
+use headrace_geometry::math;
+
+/// Changes of the count in a block. The step is the larger of the last two blocks': a garbled reading spoils one of them.
+const BLOCK: u32 = 50;
+/// Most readings that are taken for looks at one and the same rounding error.
+const MOST_LOOKS: f64 = 50.0;
+
+/// See the module's description. Changes are in stated steps.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+pub struct CountStep {
+    last_m: Option<f64>,
+    /// Smallest and largest change of the block under way, and greatest common divisor of its changes.
+    smallest: u64,
+    largest: u64,
+    common: u64,
+    /// Readings that differ from the one before, and that don't.
+    changes: u32,
+    stands: u32,
+    /// Steps of the last two blocks that show one.
+    blocks: [u64; 2],
+}
+
+impl CountStep {
+    /// Takes a reading of a counter whose step is stated, m.
+    pub fn hear(&mut self, length_m: f64, stated_m: f64) {
+        let Some(before_m) = self.last_m.replace(length_m) else { return };
+        let change = math::round_to_i64((length_m - before_m) / stated_m).unsigned_abs();
+        if change == 0 {
+            self.stands = self.stands.saturating_add(1);
+            return;
+        }
+        self.smallest = if self.changes == 0 { change } else { self.smallest.min(change) };
+        self.largest = self.largest.max(change);
+        self.common = common_divisor(self.common, change);
+        self.changes += 1;
+        if self.changes == BLOCK {
+            let [_, latest] = self.blocks;
+            // Changes that are all alike show a way, and no step.
+            if self.stands >= BLOCK / 5 {
+                self.blocks = [latest, self.smallest];
+            } else if self.smallest < self.largest {
+                self.blocks = [latest, self.common];
+            }
+            *self = Self { last_m: self.last_m, blocks: self.blocks, ..Self::default() };
+        }
+    }
+
+    /// The step, m: as stated, or larger where the counts say so.
+    pub fn step_m(&self, stated_m: f64) -> f64 {
+        let [before, latest] = self.blocks;
+        stated_m * before.max(latest).max(1) as f64
+    }
+}
+
+/// Euclid's algorithm; zero is divided by everything.
+fn common_divisor(mut a: u64, mut b: u64) -> u64 {
+    while b > 0 {
+        (a, b) = (b, a % b);
+    }
+    a
+}
+
+/// How many successive readings share a rounding error, where the counter moves so far between two of them, m: it repeats as far as the
+/// way is a whole number of steps, a standing counter's for ever.
+pub fn looks_at_an_error(way_m: f64, step_m: f64) -> f64 {
+    let steps = way_m / step_m;
+    let phase = (steps - math::round_to_i64(steps) as f64).abs();
+    (0.5 / phase.max(1e-6)).clamp(1.0, MOST_LOOKS)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The step recognised from a way, m, by time, s, that a wheel of this step shows 50 times a second, rounded to stated steps.
+    fn recognised_m(step_m: f64, stated_m: f64, way_m: impl Fn(f64) -> f64) -> f64 {
+        let mut step = CountStep::default();
+        for k in 0..3000_u32 {
+            let shown_m = math::floor_to_i64(way_m(f64::from(k) / 50.0) / step_m) as f64 * step_m;
+            step.hear(math::round_to_i64(shown_m / stated_m) as f64 * stated_m, stated_m);
+        }
+        step.step_m(stated_m)
+    }
+
+    #[test]
+    fn a_step_larger_than_stated_is_recognised() {
+        for step_m in [0.005, 0.01, 0.0123, 0.025, 0.05] {
+            for speed_mps in [0.05, 0.1, 0.2] {
+                let swaying = |t: f64| speed_mps * t + 0.1 * math::sin(0.3 * t);
+                let found_m = recognised_m(step_m, 0.0005, swaying);
+                assert!((found_m - step_m).abs() <= 0.000_51, "{step_m} at {speed_mps}: {found_m}");
+            }
+        }
+        // Multiples of one step show it without standing between them.
+        let found_m = recognised_m(0.01, 0.0005, |t| 2.0 * t + 1.7 * math::sin(0.7 * t));
+        assert!((found_m - 0.01).abs() < 1e-9, "{found_m}");
+    }
+
+    #[test]
+    fn a_step_is_never_smaller_than_stated() {
+        for speed_mps in [0.003, 0.2] {
+            let found_m = recognised_m(0.0005, 0.0005, |t| speed_mps * t + 0.02 * math::sin(0.4 * t));
+            assert!((found_m - 0.0005).abs() < 1e-12, "{speed_mps}: {found_m}");
+        }
+        assert!((recognised_m(0.0005, 0.02, |t| 0.2 * t) - 0.02).abs() < 1e-12, "as stated");
+        assert!((recognised_m(0.01, 0.0005, |_| 3.0) - 0.0005).abs() < 1e-12, "it stands");
+    }
+
+    #[test]
+    fn one_garbled_reading_hides_no_step() {
+        let mut step = CountStep::default();
+        for k in 0..6000_u32 {
+            let t = f64::from(k) / 50.0;
+            let length_m = math::floor_to_i64(0.2 * t / 0.01) as f64 * 0.01;
+            step.hear(if k == 3000 { length_m + 0.003 } else { length_m }, 0.0005);
+        }
+        assert!((step.step_m(0.0005) - 0.01).abs() < 1e-9, "{}", step.step_m(0.0005));
+    }
+
+    #[test]
+    fn readings_share_a_rounding_error_while_their_way_is_a_whole_number_of_steps() {
+        for (way_m, looks) in
+            [(0.005, 1.0), (0.0025, 2.0), (0.012, 2.5), (0.01, 50.0), (0.0, 50.0), (0.02, 50.0)]
+        {
+            let found = looks_at_an_error(way_m, 0.01);
+            assert!((found - looks).abs() < 1e-9, "{way_m}: {found}");
+        }
+    }
+}

@@ -1,0 +1,128 @@
+//! Whether the filter knows how far off it is: dives drawn from seeds, over all that varies in the field.
+//!
+//!     cargo test --release -p headrace_fusion --test consistency -- --ignored --nocapture      # 2,000 dives, as docs/fusion.md shows
+//!     HEADRACE_DIVES=53..54 HEADRACE_TRACE=dive.csv cargo test -p headrace_fusion --test consistency -- --ignored
+//!
+//! The world here shares no code with the filter's models or with the simulator.
+
+#![expect(
+    clippy::unwrap_used,
+    clippy::cast_possible_truncation,
+    reason = "a test stops at what it can't do; times are small"
+)]
+
+mod tally;
+mod world;
+
+use std::ops::Range;
+
+use tally::{Tally, share};
+use world::{Fault, Motion, Recipe};
+
+/// Dives of the ordinary test, a tenth of those of docs/fusion.md.
+const FEW: Range<u64> = 0..200;
+const MANY: Range<u64> = 0..2000;
+
+/// Dives them on all processors, in order of their seeds.
+fn dives(seeds: Range<u64>) -> Vec<(Recipe, Tally)> {
+    let threads = std::thread::available_parallelism().map_or(1, |n| n.get() as u64);
+    let of_thread = |thread: u64| {
+        let own = seeds.clone().filter(move |seed| seed % threads == thread);
+        own.map(|seed| (Recipe::of(seed), tally::run(Recipe::of(seed), None))).collect::<Vec<_>>()
+    };
+    let mut all: Vec<(Recipe, Tally)> = std::thread::scope(|scope| {
+        let threads: Vec<_> = (0..threads).map(|thread| scope.spawn(move || of_thread(thread))).collect();
+        threads.into_iter().flat_map(|thread| thread.join().unwrap()).collect()
+    });
+    all.sort_by_key(|(recipe, _)| recipe.seed);
+    all
+}
+
+/// A cable with slack that is lively for an ordinary one, and steps of centimetres, as the vehicle file declares them.
+fn is_lively_and_stepped(recipe: &Recipe) -> bool {
+    recipe.fault == Fault::None && recipe.is_declared && recipe.slack_m <= 0.06 && recipe.quantum_m >= 0.004
+}
+
+fn of<'a>(all: &'a [(Recipe, Tally)], pick: &dyn Fn(&Recipe) -> bool) -> Vec<&'a Tally> {
+    all.iter().filter(|(recipe, _)| pick(recipe)).map(|(_, tally)| tally).collect()
+}
+
+/// Prints a row of docs/fusion.md.
+fn row(name: &str, all: &[(Recipe, Tally)], pick: &dyn Fn(&Recipe) -> bool) {
+    let of = of(all, pick);
+    let most = |of_one: fn(&Tally) -> f64| of.iter().map(|tally| of_one(tally)).fold(0.0, f64::max);
+    println!(
+        "| {name} | {} | {:.1} % | {:.1} | {:.1} | {} | {:.1} % | {:.2} m | {:.2} m/s |",
+        of.len(),
+        100.0 * share(&of, |tally| [tally.within, tally.fixes]),
+        most(|tally| tally.worst),
+        most(|tally| tally.worst_pass),
+        of.iter().filter(|tally| tally.silent > 0).count(),
+        100.0 * share(&of, |tally| [tally.unsure, tally.epochs]),
+        most(|tally| tally.error_m),
+        most(|tally| tally.speed_off_mps),
+    );
+}
+
+fn table(all: &[(Recipe, Tally)]) {
+    println!(
+        "| dives | number | within 2 sd | worst error, sd | between passes, sd | silent | can't say | error | speed off |"
+    );
+    println!("|---|---|---|---|---|---|---|---|---|");
+    row("all", all, &|_| true);
+    row("declared as they are", all, &|recipe| recipe.is_declared);
+    row("with default settings", all, &|recipe| !recipe.is_declared);
+    row("lively and stepped, declared", all, &is_lively_and_stepped);
+    for fault in Fault::ALL {
+        row(&format!("fault: {fault:?}"), all, &|recipe| recipe.fault == fault);
+    }
+    let sound = |recipe: &Recipe| recipe.fault == Fault::None;
+    for motion in Motion::ALL {
+        row(&format!("{motion:?}, no fault"), all, &|recipe| recipe.motion == motion && sound(recipe));
+    }
+    for (number, class) in ["data sheet", "small vehicle's", "cheap"].into_iter().enumerate() {
+        row(&format!("inertial unit: {class}"), all, &|recipe| recipe.imu_class == number && sound(recipe));
+    }
+    for (least, most) in [(0.0, 0.002), (0.002, 0.008), (0.008, 0.012), (0.012, 0.06)] {
+        let is_it = |recipe: &Recipe| (least..most).contains(&recipe.quantum_m) && sound(recipe);
+        row(&format!("steps of {:.0} to {:.0} mm", 1e3 * least, 1e3 * most), all, &is_it);
+    }
+    for (least, most) in [(0.0, 0.01), (0.01, 0.03), (0.03, 0.1), (0.1, 1.0)] {
+        let is_it = |recipe: &Recipe| (least..most).contains(&recipe.slack_rate_mps()) && sound(recipe);
+        row(&format!("slack changes by {least} to {most} m/s"), all, &is_it);
+    }
+    for (recipe, tally) in all.iter().filter(|(_, tally)| tally.silent > 0) {
+        println!("silent: {recipe:?}: {tally:?}");
+    }
+}
+
+/// Without limits of their own: those of two thousand dives are in docs/fusion.md.
+#[test]
+fn errors_are_within_their_standard_deviations_or_reported() {
+    let all = dives(FEW);
+    table(&all);
+    let silent = all.iter().filter(|(_, tally)| tally.silent > 0).count();
+    assert!(silent <= 2, "{silent} dives with an unreported error of over 5 sd");
+    let within = |pick: &dyn Fn(&Recipe) -> bool| share(&of(&all, pick), |tally| [tally.within, tally.fixes]);
+    assert!((0.93..0.995).contains(&within(&|recipe| recipe.is_declared)));
+    assert!(within(&|recipe| !recipe.is_declared) > 0.93);
+    let unsure = share(&of(&all, &is_lively_and_stepped), |tally| [tally.unsure, tally.epochs]);
+    assert!(unsure <= 0.08, "{unsure}");
+}
+
+#[test]
+#[ignore = "takes minutes"]
+fn two_thousand_dives() {
+    let seeds = std::env::var("HEADRACE_DIVES").map_or(MANY, |range| {
+        let (from, to) = range.split_once("..").unwrap();
+        from.parse().unwrap()..to.parse().unwrap()
+    });
+    if let Ok(path) = std::env::var("HEADRACE_TRACE") {
+        let mut trace = String::new();
+        let recipe = Recipe::of(seeds.start);
+        println!("{recipe:?}: {:?}", tally::run(recipe, Some(&mut trace)));
+        std::fs::write(path, trace).unwrap();
+        return;
+    }
+    table(&dives(seeds));
+}

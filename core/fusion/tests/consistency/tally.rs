@@ -1,0 +1,118 @@
+//! A dive through the filter, held against the truth.
+
+use std::collections::VecDeque;
+use std::fmt::Write as _;
+
+use headrace_fusion::filter::FilterNavigation;
+use headrace_fusion::stuck_sensor::StuckSensor;
+use headrace_fusion::{Navigation as _, Times};
+use headrace_geometry::frames::Vec3;
+use headrace_sensor::reading::Reading;
+
+use crate::world::{Dive, IMU, Recipe, seconds, sensor};
+
+/// The estimate settles until then, s; and until then passes aren't compared.
+const SETTLED_S: f64 = 10.0;
+const COMPARED_S: f64 = 20.0;
+/// Time between two passes of heads over a place, s.
+const PASS_S: f64 = 2.2;
+/// Errors of more standard deviations must be reported.
+const FAR_SDS: f64 = 5.0;
+/// Twice the standard deviation between passes beyond which the loop reports a doubtful position, and judges little: a fifth of a target of
+/// 1 m.
+const DOUBTFUL_M: f64 = 0.2;
+
+/// What a dive has shown.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct Tally {
+    /// Epochs, those with a fix, and those of them that are within two standard deviations.
+    pub(crate) epochs: u64,
+    pub(crate) fixes: u64,
+    pub(crate) within: u64,
+    /// Epochs in which the position is doubtful, or unknown.
+    pub(crate) unsure: u64,
+    /// Epochs with an error of over five standard deviations that nothing reports, and the first of them, s.
+    pub(crate) silent: u64,
+    pub(crate) first_silent_s: Option<f64>,
+    /// Largest error over its standard deviation: of chainage, and between passes.
+    pub(crate) worst: f64,
+    pub(crate) worst_pass: f64,
+    /// Largest error of chainage and of speed while there is a fix, m, m/s.
+    pub(crate) error_m: f64,
+    pub(crate) speed_off_mps: f64,
+}
+
+/// Share of two counts over dives.
+pub(crate) fn share(of: &[&Tally], counts: impl Fn(&Tally) -> [u64; 2]) -> f64 {
+    let sums = of.iter().map(|tally| counts(tally)).fold([0, 0], |[a, b], [c, d]| [a + c, b + d]);
+    sums[0] as f64 / sums[1].max(1) as f64
+}
+
+/// Dives it; into `trace` go time, error, standard deviation, speed, true speed, standard deviation between passes, and whether a doubt is
+/// reported, as CSV.
+pub(crate) fn run(recipe: Recipe, mut trace: Option<&mut String>) -> Tally {
+    let dive = Dive::new(recipe);
+    let mut nav = FilterNavigation::new(dive.profile.clone(), dive.site, recipe.settings());
+    let (mut tally, mut last, mut errors) = (Tally::default(), None, VecDeque::new());
+    // The loop withholds a hung unit's readings.
+    let (mut stuck, mut hangs) = (StuckSensor::default(), false);
+    for (valid, source, reading) in dive.events() {
+        if let Reading::AngularRate(rate) = reading {
+            hangs = stuck.hangs(valid, rate);
+        }
+        if source == IMU && hangs {
+            continue;
+        }
+        nav.update(source, &sensor(source), Times { received: valid, valid }, &reading);
+        let now = nav.running().map(|running| running.at);
+        if now.is_some_and(|now| seconds(now) >= SETTLED_S) && now != last {
+            tally.look(&dive, &nav, &mut errors, &mut trace);
+        }
+        last = now;
+    }
+    tally
+}
+
+impl Tally {
+    fn look(
+        &mut self,
+        dive: &Dive,
+        nav: &FilterNavigation,
+        errors: &mut VecDeque<(f64, f64, u32)>,
+        trace: &mut Option<&mut String>,
+    ) {
+        let running = nav.running().unwrap();
+        let t = seconds(running.at);
+        self.epochs += 1;
+        let Ok(fix) = nav.fix(running.at) else {
+            self.unsure += 1;
+            return;
+        };
+        self.fixes += 1;
+        let sd_m = running.pose_sd().along_m;
+        let error_m = fix.pose.position.x() - dive.chainage_m(t);
+        let speed_mps = (dive.chainage_m(t + 0.05) - dive.chainage_m(t - 0.05)) / 0.1;
+        let pass_sd_m = fix.relative.sd_m(Vec3::zero());
+        let is_reported = nav.cable_doubt().is_some() || 2.0 * pass_sd_m > DOUBTFUL_M;
+        errors.push_back((t, error_m, fix.tie));
+        while errors.front().is_some_and(|(then, ..)| t - then > PASS_S) {
+            errors.pop_front();
+        }
+        let before = errors.front().filter(|(.., tie)| *tie == fix.tie && t > COMPARED_S);
+        let pass = before.map_or(0.0, |(_, before_m, _)| (error_m - before_m).abs() / pass_sd_m);
+        self.within += u64::from(error_m.abs() <= 2.0 * sd_m);
+        self.unsure += u64::from(is_reported);
+        self.worst = self.worst.max(error_m.abs() / sd_m);
+        self.worst_pass = self.worst_pass.max(pass);
+        self.error_m = self.error_m.max(error_m.abs());
+        self.speed_off_mps = self.speed_off_mps.max((fix.speed_mps - speed_mps).abs());
+        if pass.max(error_m.abs() / sd_m) > FAR_SDS && !is_reported {
+            self.silent += 1;
+            self.first_silent_s.get_or_insert(t);
+        }
+        if let Some(trace) = trace {
+            let speeds = format!("{},{speed_mps}", fix.speed_mps);
+            writeln!(trace, "{t},{error_m},{sd_m},{speeds},{pass_sd_m},{}", u8::from(is_reported)).unwrap();
+        }
+    }
+}
