@@ -9,11 +9,10 @@ use serde::{Deserialize, Serialize};
 use headrace_geometry::math;
 use headrace_geometry::time::{DurNs, MonoNs};
 
-/// Time beyond the gate after which counter and estimate are in dispute, with innovations of so many standard deviations.
+/// Time beyond the gate after which counter and estimate are in dispute, with innovations of so many standard deviations, and with any.
 const DISPUTED_AFTER: DurNs = DurNs(500_000_000);
 const DISPUTED_SDS: f64 = 6.0;
-/// Time beyond the gate after which any source and the estimate are in dispute.
-pub const PERSISTS_FOR: DurNs = DurNs(2_000_000_000);
+const PERSISTS_FOR: DurNs = DurNs(2_000_000_000);
 /// Least difference between two counts, m.
 const SAME_COUNT_M: f64 = 1e-6;
 /// Time constant by which corrections are forgotten: those of a counter that goes wrong before it shows, s.

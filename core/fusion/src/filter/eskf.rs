@@ -427,14 +427,6 @@ impl Eskf {
             agrees = self.trusts(&reading, errors);
         } else {
             self.agreement.note(kind, &row, agrees);
-            // Walls are judged together, by `Agreement`.
-            let is_wall = matches!(kind, SensorKind::Head | SensorKind::Echosounder { .. });
-            if !is_wall && source.rejects(number, waiting.at, innovation, agrees) {
-                for (slot, along) in self.doubts.iter_mut().zip(&along) {
-                    let differs = innovation * along / of_estimate;
-                    *slot += differs * differs;
-                }
-            }
         }
         if agrees {
             if self.is_blind || !is_white {

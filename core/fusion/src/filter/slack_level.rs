@@ -36,6 +36,8 @@ const FEW: u32 = 50;
 const ENOUGH: u32 = 200;
 /// How many times faster than declared slack is taken to be until it has been compared.
 const AT_FIRST: f64 = 2.0;
+/// Time by which counter and inertial unit may be late against one another where a speed changes, s.
+const LATE_S: f64 = 0.03;
 /// Averages are compared with the model this often.
 const COMPARES: DurNs = DurNs(1_000_000_000);
 /// Readings farther apart than this aren't compared.
@@ -52,20 +54,19 @@ pub(super) struct SlackLevel {
     way_m: f64,
     speed_mps: f64,
     /// The position through the last epoch.
-    knots: Vec<(MonoNs, f64)>,
-    /// Counter less inertial position.
-    differences: Vec<(MonoNs, f64)>,
+    knots: Vec<(MonoNs, [f64; 1])>,
+    /// Counter less inertial position, and what the counter shows, m.
+    differences: Vec<(MonoNs, [f64; 2])>,
     /// Mean squares of third differences by lag, m^2, and their means, m; weights of the averages so far.
     squares_m2: [f64; LAGS_S.len()],
     means_m: [f64; LAGS_S.len()],
     seen: [u32; LAGS_S.len()],
-    /// Time up to which differences have been averaged, and of the last comparison.
-    averaged: MonoNs,
+    /// Time of the last comparison with the model.
     compared: MonoNs,
     slack: Option<Wander>,
 }
 
-stateful!(SlackLevel { state: attitude, way_m, speed_mps, squares_m2, means_m, seen, averaged, compared, slack; lists: knots, differences; });
+stateful!(SlackLevel { state: attitude, way_m, speed_mps, squares_m2, means_m, seen, compared, slack; lists: knots, differences; });
 
 impl Default for SlackLevel {
     /// Allocated without readings.
@@ -79,7 +80,6 @@ impl Default for SlackLevel {
             squares_m2: [0.0; LAGS_S.len()],
             means_m: [0.0; LAGS_S.len()],
             seen: [0; LAGS_S.len()],
-            averaged: MonoNs(0),
             compared: MonoNs(0),
             slack: None,
         }
@@ -101,7 +101,7 @@ impl SlackLevel {
     /// Begins an epoch at a time.
     pub(super) fn begin(&mut self, at: MonoNs) {
         self.knots.clear();
-        self.knots.push((at, self.way_m));
+        self.knots.push((at, [self.way_m]));
     }
 
     /// Takes the inertial data from the last knot to `until`, as measured, of a vehicle of about this attitude. Without them nothing is
@@ -128,7 +128,7 @@ impl SlackLevel {
         let back = rotation(back.scaled(dt_s / LEVELS_S));
         self.attitude = Some(back * (middle * rotation(rate.scaled(dt_s / 2.0))));
         if self.knots.len() < KNOTS {
-            self.knots.push((until, self.way_m));
+            self.knots.push((until, [self.way_m]));
         }
     }
 
@@ -136,26 +136,24 @@ impl SlackLevel {
     ///
     /// Allocates: never.
     pub(super) fn hear(&mut self, at: MonoNs, shown_m: f64, noise_m2: f64, settings: &Settings) -> bool {
-        let Some(inertial_m) = at_time(&self.knots, at).filter(|_| self.attitude.is_some()) else {
+        let Some([inertial_m]) = at_time(&self.knots, at).filter(|_| self.attitude.is_some()) else {
             return true;
         };
-        if self.differences.last().is_some_and(|(last, _)| !(1..GAP.0).contains(&at.since(*last).0)) {
+        let since = self.differences.last().map(|(last, _)| at.since(*last));
+        if since.is_some_and(|since| !(1..GAP.0).contains(&since.0)) {
             self.differences.clear();
         }
         if self.differences.len() == ROOM {
             self.differences.remove(0);
         }
-        self.differences.push((at, shown_m - inertial_m));
+        self.differences.push((at, [shown_m - inertial_m, shown_m]));
         let mut agrees = true;
-        while let Some((due, _)) = self.next_due(at) {
-            let dt_s = due.since(self.averaged).as_secs_f64().min(GAP.as_secs_f64());
-            self.averaged = due;
-            for (k, lag_s) in LAGS_S.into_iter().enumerate() {
-                if let Some(third_m) = self.third_difference_m(due, lag_s) {
-                    let floor_m2 = 20.0 * noise_m2 + inertial_m2(lag_s, settings);
-                    agrees &= self.note(k, third_m, dt_s, floor_m2);
-                }
-            }
+        for (k, lag_s) in LAGS_S.into_iter().enumerate() {
+            let Some([third_m, spread_m]) = self.third_difference_m(at, lag_s) else { continue };
+            let late_m = LATE_S * spread_m / lag_s;
+            let floor_m2 = 20.0 * noise_m2 + inertial_m2(lag_s, settings);
+            let dt_s = since.map_or(0.0, DurNs::as_secs_f64);
+            agrees &= self.note(k, third_m, dt_s, [floor_m2, late_m * late_m]);
         }
         if self.seen[0] >= FEW && !(0..COMPARES.0).contains(&at.since(self.compared).0) {
             self.compared = at;
@@ -164,38 +162,34 @@ impl SlackLevel {
         agrees
     }
 
-    /// The first difference that isn't averaged yet, of those up to a time.
-    fn next_due(&self, until: MonoNs) -> Option<(MonoNs, f64)> {
-        let next = self.differences.partition_point(|(then, _)| *then <= self.averaged);
-        self.differences.get(next).copied().filter(|(then, _)| *then <= until)
-    }
-
     /// Compares nothing across this time: the counter has stuck or slipped, or a force is missing.
     pub(super) fn skip(&mut self) {
         self.differences.clear();
     }
 
-    fn third_difference_m(&self, at: MonoNs, lag_s: f64) -> Option<f64> {
-        let mut sum_m = 0.0;
-        for (number, weight) in [1.0, -3.0, 3.0, -1.0].into_iter().enumerate() {
-            let then = at - DurNs::from_secs_f64(number as f64 * lag_s);
-            sum_m += weight * at_time(&self.differences, then)?;
-        }
-        Some(sum_m)
+    /// Third difference of counter less inertial position, and how far the counter's ways over three successive lags differ, m.
+    fn third_difference_m(&self, at: MonoNs, lag_s: f64) -> Option<[f64; 2]> {
+        let then = |lags: f64| at_time(&self.differences, at - DurNs::from_secs_f64(lags * lag_s));
+        let [[u0, z0], [u1, z1], [u2, z2], [u3, z3]] = [then(0.0)?, then(1.0)?, then(2.0)?, then(3.0)?];
+        let ways_m = [z0 - z1, z1 - z2, z2 - z3];
+        let most_m = ways_m.into_iter().fold(f64::NEG_INFINITY, f64::max);
+        let least_m = ways_m.into_iter().fold(f64::INFINITY, f64::min);
+        Some([u0 - 3.0 * u1 + 3.0 * u2 - u3, most_m - least_m])
     }
 
-    fn note(&mut self, lag: usize, third_m: f64, dt_s: f64, floor_m2: f64) -> bool {
+    /// Averages a third difference; whether it is as usual, or at most what noise and readings that come late explain, m^2.
+    fn note(&mut self, lag: usize, third_m: f64, dt_s: f64, [noise_m2, late_m2]: [f64; 2]) -> bool {
         let (Some(square_m2), Some(mean_m), Some(seen)) =
             (self.squares_m2.get_mut(lag), self.means_m.get_mut(lag), self.seen.get_mut(lag))
         else {
             return true;
         };
-        let floor_m2 = if *seen < ENOUGH { floor_m2 } else { 1e-6 };
-        let agrees = *seen < FEW
-            || (third_m - *mean_m) * (third_m - *mean_m) < AGREES_SDS * AGREES_SDS * square_m2.max(floor_m2);
+        // Noise is what it has shown itself to be, once that is known.
+        let usual_m2 = if *seen < ENOUGH { square_m2.max(noise_m2) } else { *square_m2 } + late_m2;
+        let off_m = third_m - *mean_m;
+        let agrees = *seen < FEW || off_m * off_m < AGREES_SDS * AGREES_SDS * usual_m2;
         *seen = seen.saturating_add(1);
         let share = (dt_s / MEMORY_S).max(1.0 / f64::from(*seen)).min(1.0);
-        let off_m = third_m - *mean_m;
         *mean_m += share * off_m;
         let most_m2 = MOST_SDS * MOST_SDS * square_m2.max(1e-4);
         let counted_m2 = if *seen > 20 { (off_m * off_m).min(most_m2) } else { off_m * off_m };
@@ -253,16 +247,16 @@ fn inertial_m2(lag_s: f64, settings: &Settings) -> f64 {
     settings.force_noise * settings.force_noise * cubed + 0.55 * walk * cubed * lag_s * lag_s
 }
 
-/// The value at a time, between its neighbours; `None` outside.
-fn at_time(values: &[(MonoNs, f64)], at: MonoNs) -> Option<f64> {
+/// The values at a time, between their neighbours; `None` outside.
+fn at_time<const N: usize>(values: &[(MonoNs, [f64; N])], at: MonoNs) -> Option<[f64; N]> {
     let next = values.partition_point(|(then, _)| *then < at);
-    let (after, value) = *values.get(next)?;
+    let (after, to) = *values.get(next)?;
     if after == at {
-        return Some(value);
+        return Some(to);
     }
     let (before, from) = *values.get(next.checked_sub(1)?)?;
     let share = at.since(before).as_secs_f64() / after.since(before).as_secs_f64();
-    Some(from + share * (value - from))
+    Some(core::array::from_fn(|k| from[k] + share * (to[k] - from[k])))
 }
 
 #[cfg(test)]

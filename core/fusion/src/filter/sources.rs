@@ -2,7 +2,6 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::cable::PERSISTS_FOR;
 use super::count_step::CountStep;
 use super::noise_level::NoiseLevel;
 use crate::one_range::OneRange;
@@ -70,8 +69,6 @@ pub struct Source {
     pub turning: Turning,
     /// Level of its noise.
     pub noise_level: NoiseLevel,
-    /// Since when each scalar of its readings has been rejected on one side, and on which.
-    rejected: [Option<(MonoNs, bool)>; 3],
     /// For a tether counter, its step.
     pub count_step: CountStep,
     /// For a head, whether its range follows the wall.
@@ -95,7 +92,6 @@ impl Source {
             taken: None,
             turning: Turning::default(),
             noise_level: NoiseLevel::default(),
-            rejected: [None; 3],
             count_step: CountStep::default(),
             one_range: OneRange::default(),
         }
@@ -116,22 +112,6 @@ impl Source {
     /// Whether a head's last returns are of one range where those of the estimate vary.
     fn is_stuck(&self) -> bool {
         self.one_range.is_stuck(FEW_OF_ONE_RANGE, VARIES_M)
-    }
-
-    /// Notes whether an innovation of the scalar of this number agrees; whether it has been rejected on the same side for two seconds, in
-    /// which case they begin anew. A source that stays so is evidence against the estimate as much as against itself.
-    pub fn rejects(&mut self, number: usize, at: MonoNs, innovation: f64, agrees: bool) -> bool {
-        let Some(rejected) = self.rejected.get_mut(number) else { return false };
-        let side = innovation > 0.0;
-        if agrees || rejected.is_none_or(|(_, before)| before != side) {
-            *rejected = (!agrees).then_some((at, side));
-            return false;
-        }
-        let persists = rejected.is_some_and(|(since, _)| at.since(since).0 >= PERSISTS_FOR.0);
-        if persists {
-            *rejected = Some((at, side));
-        }
-        persists
     }
 
     /// Counts a reading's scalar of this number as one that isn't used.
