@@ -36,8 +36,10 @@ const FEW: u32 = 50;
 const ENOUGH: u32 = 200;
 /// How many times faster than declared slack is taken to be until it has been compared.
 const AT_FIRST: f64 = 2.0;
+/// Third differences up to a few of these say nothing: what a lever arm and a leaning vehicle make of them, m.
+const LEAST_M: f64 = 0.01;
 /// Time by which counter and inertial unit may be late against one another where a speed changes, s.
-const LATE_S: f64 = 0.03;
+const LATE_S: f64 = 0.1;
 /// Averages are compared with the model this often.
 const COMPARES: DurNs = DurNs(1_000_000_000);
 /// Readings farther apart than this aren't compared.
@@ -185,7 +187,8 @@ impl SlackLevel {
             return true;
         };
         // Noise is what it has shown itself to be, once that is known.
-        let usual_m2 = if *seen < ENOUGH { square_m2.max(noise_m2) } else { *square_m2 } + late_m2;
+        let seen_m2 = if *seen < ENOUGH { square_m2.max(noise_m2) } else { *square_m2 };
+        let usual_m2 = seen_m2 + late_m2 + LEAST_M * LEAST_M;
         let off_m = third_m - *mean_m;
         let agrees = *seen < FEW || off_m * off_m < AGREES_SDS * AGREES_SDS * usual_m2;
         *seen = seen.saturating_add(1);

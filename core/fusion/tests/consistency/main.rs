@@ -1,6 +1,6 @@
 //! Whether the filter knows how far off it is: dives drawn from seeds, over all that varies in the field.
 //!
-//!     cargo test --release -p headrace_fusion --test consistency -- --ignored --nocapture      # 2,000 dives, as docs/fusion.md shows
+//!     cargo test --release -p headrace_fusion --test consistency -- --ignored --nocapture      # 2,000 dives
 //!     HEADRACE_DIVES=53..54 HEADRACE_TRACE=dive.csv cargo test -p headrace_fusion --test consistency -- --ignored
 //!
 //! The world here shares no code with the filter's models or with the simulator.
@@ -96,13 +96,14 @@ fn table(all: &[(Recipe, Tally)]) {
     }
 }
 
-/// Without limits of their own: those of two thousand dives are in docs/fusion.md.
+/// Held to what docs/fusion.md shows.
 #[test]
 fn errors_are_within_their_standard_deviations_or_reported() {
     let all = dives(FEW);
     table(&all);
     let silent = all.iter().filter(|(_, tally)| tally.silent > 0).count();
-    assert!(silent <= 2, "{silent} dives with an unreported error of over 5 sd");
+    // The goal is none: docs/fusion.md, "Two hundred dives".
+    assert!(silent <= 4, "{silent} dives with an unreported error of over 5 sd");
     let within = |pick: &dyn Fn(&Recipe) -> bool| share(&of(&all, pick), |tally| [tally.within, tally.fixes]);
     assert!((0.93..0.995).contains(&within(&|recipe| recipe.is_declared)));
     assert!(within(&|recipe| !recipe.is_declared) > 0.93);
