@@ -22,7 +22,7 @@ const NOTICED_AFTER: DurNs = DurNs(1_000_000_000);
 const RETURNED_AFTER: DurNs = DurNs(500_000_000);
 /// Standard deviation of the innovation up to which a reading that agrees says that nothing was lost, m.
 const SURE_M: f64 = 0.3;
-/// Share of the vehicle's way meanwhile, and length, that such a reading may lack.
+/// Share of the vehicle's way meanwhile, and length, that such a reading may lack; no difference of less is disputed.
 const MISSING_SHARE: f64 = 0.1;
 const MISSING_M: f64 = 0.02;
 /// A counter runs as the vehicle does within a tenth of its way and this, over so long and so far.
@@ -176,7 +176,8 @@ impl Cable {
         }
         let first = *self.left.get_or_insert(*reading);
         let is_far = lasts(&first, DISPUTED_AFTER) && reading.off_m.abs() > DISPUTED_SDS * reading.sd_m;
-        (is_far || lasts(&first, PERSISTS_FOR) || !reading.is_usual).then_some(first)
+        let disagrees = is_far || lasts(&first, PERSISTS_FOR) || !reading.is_usual;
+        (disagrees && reading.off_m.abs() > MISSING_M).then_some(first)
     }
 }
 
@@ -272,9 +273,17 @@ mod tests {
 
     #[test]
     fn any_two_seconds_beyond_the_gate_begin_a_dispute() {
-        let at_s = disputed_at(1.0, |t, reading| reading.agrees = t < 3.0).unwrap();
+        let rejected = |until_s: f64, off_m: f64| {
+            move |t: f64, reading: &mut CableReading| {
+                reading.agrees = !(3.0..until_s).contains(&t);
+                reading.off_m = off_m;
+                reading.sd_m = 0.005;
+            }
+        };
+        let at_s = disputed_at(1.0, rejected(9.0, 0.025)).unwrap();
         assert!((at_s - 5.0).abs() < 1e-9, "{at_s}");
-        assert_eq!(disputed_at(1.0, |t, reading| reading.agrees = !(3.0..4.9).contains(&t)), None);
+        assert_eq!(disputed_at(1.0, rejected(4.9, 0.025)), None);
+        assert_eq!(disputed_at(1.0, rejected(9.0, 0.015)), None, "too little to matter");
     }
 
     #[test]
