@@ -49,6 +49,7 @@ pub mod notes;
 mod other_settings;
 pub mod outlet;
 pub mod pilot_text;
+mod repeats;
 pub mod report;
 pub mod resources;
 pub mod result_stream;

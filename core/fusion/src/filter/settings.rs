@@ -1,8 +1,6 @@
 //! Noise settings of the sensors. Defaults suit a small vehicle with a MEMS unit; a vehicle file's `[navigation]` table
 //! overrides them.
 
-use serde::{Deserialize, Serialize};
-
 use headrace_geometry::math;
 use headrace_geometry::time::DurNs;
 use headrace_sensor::device::{BiasSpec, InertialNoise, SensorKind};
@@ -10,7 +8,7 @@ use headrace_sensor::device::{BiasSpec, InertialNoise, SensorKind};
 /// One degree in radians.
 const DEGREE: f64 = core::f64::consts::PI / 180.0;
 /// A Gauss-Markov process about zero.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Wander {
     /// Standard deviation, in the unit of the process.
     pub reach: f64,

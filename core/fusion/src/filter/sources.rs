@@ -2,7 +2,6 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::count_step::CountStep;
 use super::noise_level::NoiseLevel;
 use crate::one_range::OneRange;
 use headrace_geometry::math;
@@ -69,8 +68,6 @@ pub struct Source {
     pub turning: Turning,
     /// Level of its noise.
     pub noise_level: NoiseLevel,
-    /// For a tether counter, its step.
-    pub count_step: CountStep,
     /// For a head, whether its range follows the wall.
     pub one_range: OneRange,
 }
@@ -92,7 +89,6 @@ impl Source {
             taken: None,
             turning: Turning::default(),
             noise_level: NoiseLevel::default(),
-            count_step: CountStep::default(),
             one_range: OneRange::default(),
         }
     }

@@ -1,14 +1,11 @@
 //! Scalar updates of a reading.
 
-use super::TETHER_PERIOD;
 use super::context::Context;
-use super::count_step::looks_at_an_error;
 use super::measure::{self, Beam, ScalarUpdate, with_quantum};
 use super::sources::Source;
 use super::state::State;
 use super::window::{Waiting, Window};
 use headrace_geometry::frames::{Rot, Sensor, Tunnel, Vec3, head_direction};
-use headrace_geometry::math;
 use headrace_geometry::site::Site;
 use headrace_geometry::time::DurNs;
 use headrace_sensor::device::SensorKind;
@@ -49,9 +46,7 @@ pub(super) fn rows(
             one(Some(measure::height(state, offset, height_m, sd_m)))
         }
         (SensorKind::Tether { zero_at_m, scale }, Reading::TetherLength(length)) => {
-            let step_m = source.count_step.step_m(length.resolution_m) * scale.abs();
-            let looks = looks_at_an_error(state.velocity_mps.x() * TETHER_PERIOD.as_secs_f64(), step_m);
-            let sd_m = with_quantum(settings.tether_sd_m, step_m * math::sqrt(looks));
+            let sd_m = with_quantum(settings.tether_sd_m, length.resolution_m * scale.abs());
             let chainage_m = zero_at_m + scale * length.length_m;
             one(Some(measure::chainage(state, -*unit_at, chainage_m, sd_m)))
         }

@@ -6,11 +6,11 @@ use super::rig::{HEADS, Rig, cruise};
 use crate::Navigation as _;
 use headrace_sensor::reading::{Reading, SonarReturn};
 
-/// What is doubted after four and a half minutes in which each head's returns, by its number, were changed, and every echo scaled.
+/// What is doubted after four minutes in which each head's returns, by its number, were changed, and every echo scaled.
 fn doubted(echoes: f64, change: impl Fn(usize, SonarReturn) -> SonarReturn) -> Option<SettingDoubt> {
     let rig = Rig::new(cruise, 3);
     let mut nav: FilterNavigation = rig.navigation();
-    for mut event in rig.events(0.0, 270.0) {
+    for mut event in rig.events(0.0, 240.0) {
         event.reading = match event.reading {
             Reading::Sonar(sonar) => Reading::Sonar(change(event.source - HEADS, sonar)),
             Reading::Echo(mut echo) => {
