@@ -1,9 +1,8 @@
-//! Whether the filter knows how far off it is: dives drawn from seeds, over all that varies in the field.
+//! The filter's errors against its standard deviations, in dives drawn from seeds over all that varies in the field.
 //!
-//!     cargo test --release -p headrace_fusion --test consistency -- --ignored --nocapture      # 2,000 dives
-//!     HEADRACE_DIVES=53..54 HEADRACE_TRACE=dive.csv cargo test -p headrace_fusion --test consistency -- --ignored
+//!     cargo test --release -p headrace_fusion --test consistency two_thousand -- --ignored --nocapture
 //!
-//! The world here shares no code with the filter's models or with the simulator.
+//! `HEADRACE_DIVES=53..54` selects seeds. With `HEADRACE_TRACE=dive.csv` the first of them is written as CSV.
 
 #![expect(
     clippy::unwrap_used,
@@ -23,7 +22,7 @@ use world::{Fault, Motion, Recipe};
 const FEW: Range<u64> = 0..200;
 const MANY: Range<u64> = 0..2000;
 
-/// Dives them on all processors, in order of their seeds.
+/// Runs the dives on all processors; results are in order of their seeds.
 fn dives(seeds: Range<u64>) -> Vec<(Recipe, Tally)> {
     let threads = std::thread::available_parallelism().map_or(1, |n| n.get() as u64);
     let of_thread = |thread: u64| {
@@ -96,7 +95,7 @@ fn table(all: &[(Recipe, Tally)]) {
     }
 }
 
-/// The goal of a filter that knows how far off it is. It isn't met yet: with rounded counts or lively slack the position runs away unreported.
+/// The filter misses this goal: with rounded counts or lively slack the position runs away unreported.
 #[test]
 #[ignore = "not met yet: 39 of 200 dives have an unreported error"]
 fn errors_are_within_their_standard_deviations_or_reported() {

@@ -46,7 +46,7 @@ pub(crate) fn share(of: &[&Tally], counts: impl Fn(&Tally) -> [u64; 2]) -> f64 {
     sums[0] as f64 / sums[1].max(1) as f64
 }
 
-/// Dives it; into `trace` go time, error, standard deviation, speed, true speed, standard deviation between passes, and whether a doubt is
+/// Runs a dive; into `trace` go time, error, standard deviation, speed, true speed, standard deviation between passes, and whether a doubt is
 /// reported, as CSV.
 pub(crate) fn run(recipe: Recipe, mut trace: Option<&mut String>) -> Tally {
     let dive = Dive::new(recipe);

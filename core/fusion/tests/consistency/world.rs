@@ -1,6 +1,6 @@
 //! Dives drawn from seeds: a true motion, and the readings that sensors of known errors give of it.
 //!
-//! Shares no code with the simulator or with the filter's models: it is the oracle of both.
+//! It shares no code with the simulator, and with the filter only the wall, the site and the units.
 
 use headrace_fusion::filter::settings::Settings;
 use headrace_geometry::frames::{Body, Mount, Point3, Pose, Rot, Sensor, Tunnel, Vec3, head_direction};
@@ -208,7 +208,7 @@ pub(crate) struct Dive {
     pub(crate) recipe: Recipe,
     pub(crate) profile: Profile,
     pub(crate) site: Site,
-    /// Speed along the tunnel by steps of [`STEP_S`], and its integral.
+    /// Way along the tunnel by steps of [`STEP_S`], m.
     way_m: Vec<f64>,
     slack: Sines,
     swaying: [Sines; 5],
@@ -217,6 +217,7 @@ pub(crate) struct Dive {
     tilts: [Sines; 3],
 }
 
+/// Time between the points of a dive's way, s.
 const STEP_S: f64 = 0.005;
 
 impl Dive {
@@ -455,14 +456,10 @@ fn way(recipe: &Recipe, draws: &mut Draws) -> Vec<f64> {
         }
         Motion::BackAndForth => {
             let phase = math::wrap(t - 10.0, 80.0);
-            if phase < 45.0 {
-                speed
-            } else if phase < 50.0 {
-                0.0
-            } else if phase < 75.0 {
-                -speed
-            } else {
-                0.0
+            match phase {
+                ..45.0 => speed,
+                50.0..75.0 => -speed,
+                _ => 0.0,
             }
         }
     };
