@@ -1,5 +1,6 @@
 //! `headrace check`: all that is wrong with a vehicle or scene file, and what a plan makes of it.
 
+mod cable;
 mod outlook;
 
 use headrace_config::{ConfigErrors, Document};
@@ -15,6 +16,7 @@ use crate::files;
 use crate::logging::complain;
 use crate::output::{deliver, show};
 use crate::vehicle_file;
+use cable::Cable;
 use outlook::Outlook;
 
 /// Something found, with its place.
@@ -32,6 +34,7 @@ struct Readable {
     /// The scene and its duration, s, if it is one.
     scene: Option<(String, f64)>,
     outlook: Option<Outlook>,
+    cable: Option<Cable>,
 }
 
 /// `headrace check`.
@@ -119,8 +122,9 @@ impl Readable {
         let named = |file: &str| vehicle.attachments.iter().find(|(attached, _)| attached == file);
         let own = |file: &str| Ok(named(file).map_or(text, |(_, text)| text.as_str()).as_bytes().to_vec());
         let errors = calm::expected_errors(&vehicle, "vehicle.toml", &KINDS, &own);
-        let outlook = errors.map_err(|why| why.to_string());
-        let outlook = outlook.and_then(|errors| Outlook::of(&vehicle, errors).map_err(|why| why.to_string()));
+        let errors = errors.map_err(|why| why.to_string());
+        let outlook =
+            errors.clone().and_then(|errors| Outlook::of(&vehicle, errors).map_err(|why| why.to_string()));
         let outlook = match outlook {
             Ok(outlook) => outlook,
             Err(why) => {
@@ -140,7 +144,9 @@ impl Readable {
         }
         found.extend(findings.into_iter().map(|finding| placed(finding, name, text)));
         found.sort_by_key(|one| (one.grade == Grade::Warning, one.line));
-        Self { vehicle, scene: None, outlook }
+        let v_max_mps = outlook.as_ref().and_then(Outlook::v_max_mps);
+        let cable = Cable::of(&vehicle, text, errors.ok().flatten().as_ref(), v_max_mps);
+        Self { vehicle, scene: None, outlook, cable }
     }
 
     fn text(&self) -> String {
@@ -165,6 +171,7 @@ impl Readable {
             Some(outlook) => lines.extend(outlook.lines()),
             None => lines.push("no profiling head: nothing to plan".to_owned()),
         }
+        lines.extend(self.cable.as_ref().map(Cable::line));
         lines.join("\n") + "\n"
     }
 }
@@ -209,6 +216,7 @@ fn json(readable: Option<&Readable>, found: &[Found]) -> Value {
             ("sensors", vehicle.sensor_configs.iter().map(sensor).collect()),
             ("scene", json!(readable.scene.as_ref().map(|(name, _)| name))),
             ("duration_s", json!(readable.scene.as_ref().map(|(_, duration_s)| duration_s))),
+            ("cable", json!(readable.cable.as_ref().map(Cable::json))),
             ("plan", json!(readable.outlook.as_ref().map(Outlook::json))),
         ];
         shown.extend(entries.map(|(key, value)| (key.to_owned(), value)));

@@ -83,6 +83,11 @@ impl Outlook {
         }))
     }
 
+    /// The largest speed in the heads' own mode, m/s.
+    pub(super) fn v_max_mps(&self) -> Option<f64> {
+        self.own.as_ref().and_then(|own| own.v_max_mps)
+    }
+
     /// What the plan finds wrong.
     pub(super) fn findings(&self, vehicle: &VehicleConfig) -> Vec<Finding> {
         let warning = |key: &str, problem| Finding { grade: Grade::Warning, key: key.to_owned(), problem };
@@ -91,7 +96,7 @@ impl Outlook {
             found.push(warning("target_m", format!("can't be met in {mode} at any speed: {why}")));
         }
         let planned_mps = vehicle.planned_speed_mps;
-        let v_max_mps = self.own.as_ref().and_then(|own| own.v_max_mps);
+        let v_max_mps = self.v_max_mps();
         if let Some(v_max_mps) = v_max_mps.filter(|v_max_mps| planned_mps > *v_max_mps) {
             let problem =
                 format!("is {planned_mps}, faster than the target allows: at most {v_max_mps:.3} m/s");
@@ -123,7 +128,7 @@ impl Outlook {
             Some(own) => lines.push(format!("plan in {}: {}", own.mode, speed(own))),
             None => lines.push("plan: the heads are not in one mode".to_owned()),
         }
-        let v_max_mps = self.own.as_ref().and_then(|own| own.v_max_mps);
+        let v_max_mps = self.v_max_mps();
         if let (Some(v_max_mps), Some(started_mps)) = (v_max_mps, self.as_started_mps)
             && (started_mps / v_max_mps - 1.0).abs() > TOLD_APART
         {

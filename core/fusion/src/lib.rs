@@ -31,6 +31,7 @@ pub mod one_range;
 pub mod relative;
 pub mod section;
 pub mod smooth;
+pub mod stuck_sensor;
 
 use self::filter::cable::CableDoubt;
 use self::filter::pose_sd::PoseSd;

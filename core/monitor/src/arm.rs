@@ -22,7 +22,7 @@ use super::messages::{
 };
 use super::notes::Notes;
 use super::other_settings;
-use super::repeats::Repeats;
+
 use super::resources::{Coverage, Digests, Finder, Tally, Target, TickTime, TunnelDesign, VehicleEntities};
 use super::ring;
 use super::run::Loop;
@@ -32,6 +32,7 @@ use headrace_coverage::{
     WallLimits,
 };
 use headrace_fusion::Navigation;
+use headrace_fusion::stuck_sensor::StuckSensor;
 use headrace_sampling::advice::{self, Task};
 use headrace_sampling::head::{HeadMode, HeadSet, HeadSpec, MAX_HEADS};
 use headrace_sensor::device::SensorKind;
@@ -100,7 +101,7 @@ impl App {
         advisor: &advice::Advisor,
     ) -> VehicleEntities {
         let world = &mut self.world;
-        let repeats = vec![Repeats::default(); MAX_SOURCES];
+        let repeats = vec![StuckSensor::default(); MAX_SOURCES];
         let navigator = Navigator { navigation, next_beat: None, repeats, hung: 0 };
         let vehicle = world.spawn((navigator, VehicleState::default(), Driving::default())).id();
         let mut hidden = advisor.hidden_angles();

@@ -10,10 +10,11 @@ use serde::{Deserialize, Serialize};
 pub use super::head_motion::MeasuredMotion;
 pub use super::loss_count::LossCount;
 use super::messages::PlacedPing;
-use super::repeats::Repeats;
+
 use headrace_coverage::{HeadReach, HeadWall, MOST_WAITING};
 use headrace_fusion::filter::cable::CableDoubt;
 use headrace_fusion::filter::pose_sd::PoseSd;
+use headrace_fusion::stuck_sensor::StuckSensor;
 use headrace_fusion::{Fix, Navigation, NoFix};
 use headrace_geometry::frames::{Point3, Tunnel};
 use headrace_geometry::time::{DurNs, MonoNs};
@@ -31,7 +32,7 @@ pub struct Navigator {
     /// The next multiple of the advice period; `None` before the first packet.
     pub next_beat: Option<MonoNs>,
     /// Repetitions, by source.
-    pub repeats: Vec<Repeats>,
+    pub repeats: Vec<StuckSensor>,
     /// Bits of the sources that hang.
     pub hung: u64,
 }

@@ -49,7 +49,6 @@ pub mod notes;
 mod other_settings;
 pub mod outlet;
 pub mod pilot_text;
-mod repeats;
 pub mod report;
 pub mod resources;
 pub mod result_stream;

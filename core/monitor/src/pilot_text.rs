@@ -309,7 +309,8 @@ pub fn alert_text(kind: AlertKind, head: &str, x_m: f64, off_m: f64) -> String {
         ),
         AlertKind::SettingDoubted => format!("ch {x}  ranges contradict a setting of the vehicle file"),
         AlertKind::CableDoubted => format!(
-            "ch {x}  the cable's counter sticks or slips: position by the inertial unit alone; sections there wait"
+            "ch {x}  cable counter and inertial unit differ by {:.2} m: position by the inertial unit alone; sections there wait",
+            off_m.abs()
         ),
     }
 }

@@ -99,6 +99,15 @@ pub struct BiasSpec {
     pub time_s: f64,
 }
 
+/// What is known of a cable counter beforehand.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct CounterSpec {
+    /// Smallest change of the length, m; `None` where only its readings tell.
+    pub step_m: Option<f64>,
+    /// Noise beside that, standard deviation, m; `None` where it isn't known.
+    pub sd_m: Option<f64>,
+}
+
 /// One kind of device, by its name in vehicle files: `plugin = "imagenex881"`.
 pub trait DeviceKind: Sync {
     /// The name in vehicle files and in the logs' channel metadata.
@@ -153,6 +162,11 @@ pub trait Device: Send + Sync {
 
     /// For an inertial unit whose noise is known, that noise: navigation goes by it unless the vehicle file says otherwise.
     fn inertial_noise(&self) -> Option<InertialNoise> {
+        None
+    }
+
+    /// For a cable counter, what is known of it: navigation goes by its noise unless the vehicle file says otherwise.
+    fn counter(&self) -> Option<CounterSpec> {
         None
     }
 

@@ -10,7 +10,7 @@ use headrace_fusion::filter::settings::Settings;
 use headrace_geometry::site::Site;
 use headrace_geometry::time::DurNs;
 use headrace_geometry::tunnel::Profile;
-use headrace_sensor::device::InertialNoise;
+use headrace_sensor::device::{CounterSpec, InertialNoise};
 
 /// One degree, radians.
 const DEGREE: f64 = core::f64::consts::PI / 180.0;
@@ -35,13 +35,18 @@ pub enum NavigationConfig {
 }
 
 impl NavigationConfig {
-    /// Reads the table; without one, a filter. What the table doesn't say is the inertial unit's `noise` where that is known,
-    /// and a default otherwise.
+    /// Reads the table; without one, a filter. What the table doesn't say is the inertial unit's `noise` and the cable `counter`'s where they
+    /// are known, and a default otherwise.
     ///
     /// Errors: the first key that is unknown or out of range.
-    pub fn parse(section: Option<Section<'_>>, noise: Option<InertialNoise>) -> Result<Self, ConfigError> {
+    pub fn parse(
+        section: Option<Section<'_>>,
+        noise: Option<InertialNoise>,
+        counter: Option<CounterSpec>,
+    ) -> Result<Self, ConfigError> {
         let usual = Settings::default();
-        let usual = noise.map_or(usual, |noise| usual.with_inertial(&noise));
+        let mut usual = noise.map_or(usual, |noise| usual.with_inertial(&noise));
+        usual.tether_sd_m = counter.and_then(|counter| counter.sd_m).unwrap_or(usual.tether_sd_m);
         let Some(section) = section else { return Ok(Self::Filter(usual)) };
         let by_filter = section.choice("way", &[("filter", true), ("direct", false)])?.unwrap_or(true);
         let settings = settings(&section, &usual)?;
@@ -120,7 +125,7 @@ mod tests {
     fn parsed(text: &str) -> Result<Settings, String> {
         let root = Document::new("vehicle.toml", text).root().unwrap();
         let section = root.section("navigation").unwrap();
-        match NavigationConfig::parse(section, None).map_err(|why| why.to_string())? {
+        match NavigationConfig::parse(section, None, None).map_err(|why| why.to_string())? {
             NavigationConfig::Filter(settings) => Ok(settings),
             NavigationConfig::Direct => Err("direct".to_owned()),
         }

@@ -21,7 +21,7 @@ use headrace_sampling::head::{HeadProgram, HeadSpec};
 use headrace_sampling::layout::{self, HeadLayout};
 use headrace_sampling::occlusion::Obstacle;
 use headrace_sensor::SensorConfig;
-use headrace_sensor::device::{Device, DeviceKind, Sense};
+use headrace_sensor::device::{CounterSpec, Device, DeviceKind, Sense};
 
 /// A validated vehicle file.
 pub struct VehicleConfig {
@@ -59,6 +59,8 @@ pub struct VehicleConfig {
     pub sensors: Vec<Box<dyn Device>>,
     /// The common part of each sensor's table, in the same order.
     pub sensor_configs: Vec<SensorConfig>,
+    /// What is known of the cable counter; `None` without one.
+    pub counter: Option<CounterSpec>,
     /// Files that this one refers to, with their text, so that a log can be replayed without them.
     pub attachments: Vec<(String, String)>,
 }
@@ -130,8 +132,9 @@ impl VehicleConfig {
         let devices = sensors.as_ref().map(|sensors| sensors.devices.as_slice());
         let noise =
             devices.iter().flat_map(|devices| devices.iter()).find_map(|sensor| sensor.inertial_noise());
+        let counter = devices.iter().flat_map(|devices| devices.iter()).find_map(|sensor| sensor.counter());
         let navigation = root.section("navigation")?;
-        let navigation = root.part(|| NavigationConfig::parse(navigation, noise))?;
+        let navigation = root.part(|| NavigationConfig::parse(navigation, noise, counter))?;
         let heads = match root.section("heads")? {
             Some(section) => root.part(|| parse_heads(&section, devices))?,
             None => Some((HeadLayout::PhaseShift, 0.0)),
@@ -170,6 +173,7 @@ impl VehicleConfig {
             hull,
             coverage,
             navigation: root.required("navigation", navigation)?,
+            counter,
             looks: root.required("advice", looks)?,
             dive_time: dive_time.map(|hours| DurNs::from_secs_f64(hours * 3600.0)),
             alerts: root.required("alerts", alerts)?,

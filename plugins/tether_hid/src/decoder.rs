@@ -27,10 +27,19 @@ pub struct Counter {
     pub counting: Counting,
     /// Counts per metre of cable; negative if the count falls as cable is paid out.
     pub counts_per_metre: f64,
+    /// Smallest change of the length by the wheel's build, m; at most a count's where the wheel is as fine as its counts.
+    pub step_m: f64,
     /// Maximum winch speed, m/s.
     pub max_speed_mps: f64,
     /// Delay from a reading's time of validity to its receipt.
     pub latency: DurNs,
+}
+
+impl Counter {
+    /// Smallest change of the length that it shows, m.
+    pub fn resolution_m(&self) -> f64 {
+        self.step_m.max(1.0 / self.counts_per_metre.abs())
+    }
 }
 
 /// Decodes reports into readings.
@@ -94,7 +103,7 @@ impl Decoder for HidDecoder {
             let Some(counts) = tracker.take(packet.received, &report) else { return };
             let length = TetherLength {
                 length_m: counts as f64 / counter.counts_per_metre,
-                resolution_m: 1.0 / counter.counts_per_metre.abs(),
+                resolution_m: counter.resolution_m(),
             };
             sink(Decoded {
                 valid_at: packet.received - counter.latency,

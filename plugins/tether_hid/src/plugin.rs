@@ -3,7 +3,7 @@
 use headrace_sensor::SensorConfig;
 use headrace_sensor::config::{ConfigError, Section};
 use headrace_sensor::device::{
-    Decoder, Device, DeviceKind, Emulated, EmulatorSetup, Sense, SensorKind, SensorSpec,
+    CounterSpec, Decoder, Device, DeviceKind, Emulated, EmulatorSetup, Sense, SensorKind, SensorSpec,
 };
 use headrace_sensor::driver::{Carrier, Driver, DriverSetup};
 
@@ -36,9 +36,27 @@ pub struct CableCounter {
 /// Wire format of the counter.
 #[derive(Debug, Clone)]
 enum Wire {
-    Hid { decoder: Box<HidDecoder>, counter: Counter },
+    Hid { decoder: Box<HidDecoder>, counter: Counter, sd_m: Option<f64> },
     Line { metres_per_unit: f64 },
 }
+
+/// Counters as they are commonly built.
+#[derive(Clone, Copy)]
+struct Preset {
+    counts_per_metre: f64,
+    /// Noise beside the rounding, m: a cable that slips a little on its wheel.
+    sd_m: f64,
+}
+
+/// A wheel of half a metre with an optical encoder of 1,000 counts a turn; and one with a magnet every centimetre, which lead and lag by up to
+/// their distance.
+const PRESETS: [(&str, Preset); 2] = [
+    ("encoder_wheel", Preset { counts_per_metre: 2000.0, sd_m: 0.005 }),
+    ("magnet_wheel", Preset { counts_per_metre: 100.0, sd_m: 0.01 }),
+];
+
+/// Steps of wheels, m.
+const STEP_M: core::ops::RangeInclusive<f64> = 1e-5..=1.0;
 
 #[derive(Clone, Copy)]
 enum WireKind {
@@ -87,7 +105,10 @@ fn hid(reeling: &Reeling, own: &Section<'_>) -> Result<Wire, ConfigError> {
     layout.auxiliary_offset = clock_offset.or(layout.auxiliary_offset);
     let countings = [("absolute", Counting::Absolute), ("delta", Counting::Delta)];
     let counting = own.choice("mode", &countings)?.unwrap_or(Counting::Absolute);
+    let preset = own.choice("preset", &PRESETS)?;
     let counts_per_metre = own.number("counts_per_metre", -1.0e6..=1.0e6)?;
+    let counts_per_metre = counts_per_metre.or(preset.map(|preset| preset.counts_per_metre));
+    let step_m = own.number("step_m", STEP_M)?.or(preset.map(|preset| 1.0 / preset.counts_per_metre));
     let max_speed_mps = own.number("max_speed_mps", 0.1..=20.0)?.unwrap_or(3.0);
     let counts_per_metre = own.required("counts_per_metre", counts_per_metre)?;
     if counts_per_metre.abs() < 0.1 {
@@ -107,12 +128,13 @@ fn hid(reeling: &Reeling, own: &Section<'_>) -> Result<Wire, ConfigError> {
         auxiliary_is_ms: clock_offset.is_some(),
         counting,
         counts_per_metre,
+        step_m: step_m.unwrap_or(0.0),
         max_speed_mps,
         latency: reeling.latency,
     };
     let decoder =
         HidDecoder::new(counter).map_err(|error| own.invalid("report_bytes", &error.to_string()))?;
-    Ok(Wire::Hid { decoder: Box::new(decoder), counter })
+    Ok(Wire::Hid { decoder: Box::new(decoder), counter, sd_m: preset.map(|preset| preset.sd_m) })
 }
 
 /// The reference layout, overridden by the keys. Sequence, status and auxiliary value default to the reference only if the
@@ -185,6 +207,14 @@ impl Device for CableCounter {
                 Emulated::Tether(Box::new(LineEmulator::new(self.reeling, *metres_per_unit, setup.start)))
             }
         }
+    }
+
+    fn counter(&self) -> Option<CounterSpec> {
+        let (step_m, sd_m) = match &self.wire {
+            Wire::Hid { counter, sd_m, .. } => (Some(counter.resolution_m()), *sd_m),
+            Wire::Line { .. } => (None, None),
+        };
+        Some(CounterSpec { step_m: step_m.map(|step_m| step_m * self.reeling.scale.abs()), sd_m })
     }
 
     fn report_descriptor(&self) -> Option<Vec<u8>> {

@@ -40,6 +40,7 @@ fn reference_counter() -> Counter {
         auxiliary_is_ms: false,
         counting: Counting::Absolute,
         counts_per_metre: 2000.0,
+        step_m: 0.0,
         max_speed_mps: 3.0,
         latency: DurNs::from_millis(4),
     }
@@ -186,4 +187,31 @@ fn wrong_keys_are_named() {
     assert!(error("counts_per_metre = 9000\nwidth_bits = 8\n").contains("max_speed_mps"));
     assert!(error("kind = \"lci90\"\ncounts_per_metre = 2000\n").contains("is not a key here"));
     assert!(error("counts_per_metre = 2000\nscale = 0\n").contains("away from zero"));
+}
+
+#[test]
+fn presets_carry_step_and_noise_and_keys_override_them() {
+    for (own, resolution_m, sd_m) in [
+        ("preset = \"encoder_wheel\"\n", 0.0005, Some(0.005)),
+        ("preset = \"magnet_wheel\"\n", 0.01, Some(0.01)),
+        ("preset = \"magnet_wheel\"\nstep_m = 0.02\n", 0.02, Some(0.01)),
+        ("preset = \"magnet_wheel\"\ncounts_per_metre = 25\n", 0.04, Some(0.01)),
+        ("counts_per_metre = 2000\nstep_m = 0.05\n", 0.05, None),
+        ("counts_per_metre = 2000\n", 0.0005, None),
+    ] {
+        let counter = configured(own).unwrap().counter().unwrap();
+        let step_m = counter.step_m.unwrap();
+        assert!((step_m - resolution_m).abs() < 1e-12, "{own}: {step_m}");
+        assert_eq!(counter.sd_m, sd_m, "{own}");
+    }
+    let line = configured("kind = \"lci90\"\n").unwrap().counter().unwrap();
+    assert_eq!((line.step_m, line.sd_m), (None, None), "its lines tell");
+    for (wrong, said) in [
+        ("preset = \"wheel\"\n", "encoder_wheel, magnet_wheel"),
+        ("kind = \"lci90\"\npreset = \"magnet_wheel\"\n", "is not a key here"),
+        ("counts_per_metre = 2000\nstep_m = 0\n", "must be a number from"),
+    ] {
+        let error = configured(wrong).err().unwrap().to_string();
+        assert!(error.contains(said), "{error}");
+    }
 }

@@ -76,7 +76,7 @@ fn a_wrong_vehicle_file_is_refused_with_file_line_key_value_and_what_is_allowed(
     unknown key in a table
         headrace: vehicle.toml:11: water.salt: is not a key here; known are sound_speed_mps, density_kgpm3, gravity_mps2, surface_pressure_pa, surface_above_floor_m, sound_speed_from
     unknown key of a sensor
-        headrace: vehicle.toml:62: sensors[8].colour: is not a key here; known are id, plugin, position_m, angles_deg, connect, latency_ms, kind, scale, zero_at_m, rate_hz, report_id, width_bits, report_bytes, offset, signed, endian, sequence_offset, status_offset, clock_ms_offset, mode, counts_per_metre, max_speed_mps
+        headrace: vehicle.toml:62: sensors[8].colour: is not a key here; known are id, plugin, position_m, angles_deg, connect, latency_ms, kind, scale, zero_at_m, rate_hz, report_id, width_bits, report_bytes, offset, signed, endian, sequence_offset, status_offset, clock_ms_offset, mode, preset, counts_per_metre, step_m, max_speed_mps
     unknown table
         headrace: vehicle.toml:12: head: is not a key here; did you mean heads?
     text in place of a number

@@ -360,3 +360,30 @@ fn what_the_planned_speed_allows_is_told_beside_what_a_plan_could() {
     assert!(most.stderr.contains("0.1129, which leaves no room"), "{}", most.stderr);
     assert_eq!((usual.code, most.code), (Some(0), Some(0)));
 }
+
+/// What a counter's steps, the slack and the speed allow together, and which keys are missing.
+#[test]
+fn what_cable_and_speed_allow_is_told_with_the_keys_that_are_missing() {
+    let folder = Folder::new();
+    let slack = "[navigation]\nslack_sd_m = 0.2\nslack_time_s = 5\n\n[[sensors]]\nid = \"sonar_0\"";
+    let counts = "counts_per_metre = 2000";
+    let cases: [(&str, Vec<(&str, &str)>); 4] = [
+        ("nothing said", vec![]),
+        ("slack said", vec![("[[sensors]]\nid = \"sonar_0\"", slack)]),
+        ("a wheel with magnets", vec![(counts, "preset = \"magnet_wheel\"")]),
+        ("steps of 5 cm", vec![(counts, "counts_per_metre = 2000\nstep_m = 0.05")]),
+    ];
+    let mut said = String::new();
+    for (what, changes) in cases {
+        folder.write("vehicle.toml", changed(VEHICLE, &changes));
+        let answer = folder.headrace(&["check", "vehicle.toml"]);
+        let line = answer.stdout.lines().find(|line| line.starts_with("cable: ")).unwrap();
+        writeln!(said, "{what}: {line}").unwrap();
+    }
+    insta::assert_snapshot!(said, @"
+    nothing said: cable: steps of 0.5 mm, slack of 0.06 m (sd) in 10 s; at 0.200 m/s a hole is measured to 0.067 m (sd), so that holes up to 1.07 m pass; not in the file: navigation.slack_sd_m, navigation.slack_time_s, sensors[8].step_m
+    slack said: cable: steps of 0.5 mm, slack of 0.2 m (sd) in 5 s; at 0.200 m/s a hole is measured to 0.194 m (sd), so that holes up to 0.81 m pass; not in the file: sensors[8].step_m
+    a wheel with magnets: cable: steps of 10 mm, slack of 0.06 m (sd) in 10 s; at 0.200 m/s a hole is measured to 0.069 m (sd), so that holes up to 1.06 m pass; not in the file: navigation.slack_sd_m, navigation.slack_time_s
+    steps of 5 cm: cable: steps of 50 mm, slack of 0.06 m (sd) in 10 s; at 0.200 m/s a hole is measured to 0.086 m (sd), so that holes up to 1.03 m pass; not in the file: navigation.slack_sd_m, navigation.slack_time_s
+    ");
+}

@@ -27,14 +27,14 @@ fn a_vehicle_s_plan_in_words() {
 
                                        T_y at rest, m         at  T_x, m, seen by   T_max  sure to hit, m   v_max   hours
       mode     step   turn  overlap    min   mean  worst     m/s    all    fewest       m   once    twice     m/s  needed
-      slow      0.3   21.60     4.67  0.016  0.030  0.064   0.041  0.222     0.443   0.458   0.46     0.92   0.041    47.4
-      medium    0.6   10.80     2.33  0.032  0.060  0.126   0.083  0.226     0.452   0.471   0.47     0.94   0.083    23.2
-      fast      0.9    8.00     1.56  0.049  0.090  0.188   0.113  0.226     0.452   0.477   0.48     0.95   0.113    17.2
-    * faster    1.2    6.60     1.17  0.065  0.120  0.249   0.135  0.224     0.448   0.480   0.48     0.96   0.135    14.3
+      slow      0.3   21.60     4.67  0.016  0.030  0.064   0.041  0.221     0.443   0.458   0.46     0.92   0.041    47.4
+      medium    0.6   10.80     2.33  0.032  0.060  0.126   0.083  0.226     0.451   0.471   0.47     0.94   0.083    23.3
+      fast      0.9    8.00     1.56  0.049  0.090  0.188   0.112  0.226     0.452   0.477   0.48     0.95   0.112    17.2
+    * faster    1.2    6.60     1.17  0.065  0.120  0.249   0.135  0.223     0.447   0.480   0.48     0.96   0.135    14.4
       fastest   2.4    4.80     0.58  0.130  0.239  0.481   0.063  0.076     0.152   0.488   0.49     0.98   0.063    30.7
 
-    * fastest for the target: faster, at most 0.135 m/s, 14.3 h one way
-    faster: 0.259 m/s by geometry, 0.146 with what the vehicle hides, 0.142 with heads side by side or askew, 0.136 with the distance between passes known to 1.2 cm
+    * fastest for the target: faster, at most 0.135 m/s, 14.4 h one way
+    faster: 0.259 m/s by geometry, 0.146 with what the vehicle hides, 0.142 with heads side by side or askew, 0.135 with the distance between passes known to 1.2 cm
     with the heads in line, x 0.41, 0.69, -0.69, -0.41 m, y 0.00, z 0.00: faster, at most 0.251 m/s, 7.7 h
     sonar_0: 15.3 degrees about 270 are hidden by the vehicle, 1.66 m of wall at 3:00
     sonar_1: 15.3 degrees about 90 are hidden by the vehicle, 1.66 m of wall at 9:00

@@ -130,7 +130,8 @@ fn smoothed_dives_are_nearer_to_the_truth_and_know_how_near() {
             "D of {} sections, {name}: error {error_m:.4} m, sigma {arc_m:.4} m, within two: {within:.3}",
             holes.len()
         );
-        assert!((0.9..=0.995).contains(&within), "{name}: {within}");
+        // Told to be faster than it is, slack makes less sure than one could be.
+        assert!((0.9..=0.998).contains(&within), "{name}: {within}");
     }
 }
 
@@ -241,13 +242,13 @@ fn replay_says_what_smoothing_changed() {
     let about = |line: &&str| ["  smoothed", "  changed:"].iter().any(|words| line.contains(words));
     let said: Vec<&str> = answer.stdout.lines().filter(about).collect();
     insta::assert_snapshot!(said.join("\n"), @r"
-      smoothed 593 estimates; by the filter alone: passed 4.25 m   missed 2.50 m   can't say 4.25 m   open 1.50 m
-      0+003.50 to 0+003.75  changed: can't say to pass, holes 0.557±0.176 to 0.530±0.012 m
-      0+007.75 to 0+010.75  changed: can't say to pass, holes 0.596±0.223 to 0.550±0.012 m
-      0+011.00 to 0+011.50  changed: can't say to pass, holes 0.454±0.223 to 0.561±0.068 m
-      0+011.50 to 0+011.75  changed: can't say to fail, holes 0.595±0.051 to 1.057±0.078 m
-      0+014.25 to 0+014.50  changed: pass to fail, holes 0.444±0.014 to 6.553±0.000 m
-      0+015.00 to 0+015.50  changed: open to not passed, holes 2.243±0.013 to - m
+      smoothed 591 estimates; by the filter alone: passed 6.25 m   missed 0.00 m   can't say 4.75 m   open 1.00 m
+      0+003.50 to 0+004.00  changed: can't say to pass, holes 0.553±0.170 to 0.504±0.020 m
+      0+006.00 to 0+006.25  changed: can't say to pass, holes 0.553±0.079 to 0.490±0.017 m
+      0+006.50 to 0+006.75  changed: can't say to pass, holes 0.558±0.079 to 0.489±0.016 m
+      0+009.00 to 0+011.50  changed: can't say to pass, holes 0.659±0.097 to 0.508±0.013 m
+      0+012.25 to 0+013.50  changed: can't say to pass, holes 0.621±0.086 to 0.441±0.013 m
+      0+015.00 to 0+015.25  changed: not passed to open, holes - to 1.710±0.052 m
     ");
     let report: serde_json::Value = serde_json::from_slice(&folder.read("r.json")).unwrap();
     let smoothing = &report["smoothing"];

@@ -5,7 +5,7 @@ use core::ops::Range;
 use serde::{Deserialize, Serialize};
 
 use super::measure::ScalarUpdate;
-use super::state::{ATTITUDE, Errors, FORCE_BIAS, HEADING, POSITION, RANGES, VELOCITY};
+use super::state::{ATTITUDE, Errors, HEADING, POSITION, RANGES, VELOCITY};
 use headrace_sensor::device::SensorKind;
 
 /// Averaging length, in measurements of a kind.
@@ -21,10 +21,6 @@ const LOST_TILT_RAD: f64 = 0.1;
 const LOST_YAW_RAD: f64 = 0.1;
 const LOST_RAD: f64 = 1.0;
 const LOST_SCALE: f64 = 0.03;
-/// The same where inertial data have led the speed astray, m/s, radians, m/s^2.
-const WRONG_MPS: f64 = 0.1;
-const WRONG_TILT_RAD: f64 = 0.01;
-const WRONG_MPS2: f64 = 0.03;
 
 /// Whether ranges agree with the wall, and attitudes with the tilt. `cable.rs` has the cable.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
@@ -93,13 +89,6 @@ impl Agreement {
             add(variances, ATTITUDE..ATTITUDE + 3, LOST_RAD);
         }
     }
-}
-
-/// Adds variances where the speed is no longer what the inertial unit says: what drives it isn't known so well, either.
-pub fn seek_speed(variances: &mut Errors) {
-    add(variances, VELOCITY..VELOCITY + 1, WRONG_MPS);
-    add(variances, ATTITUDE..ATTITUDE + 2, WRONG_TILT_RAD);
-    add(variances, FORCE_BIAS..FORCE_BIAS + 3, WRONG_MPS2);
 }
 
 /// Adds variances where the chainage is lost. Nothing is linearized about it: any distance will do.

@@ -2,8 +2,8 @@
 
 use core::ops::Range;
 
-use super::agreement::{self, Agreement};
-use super::cable::{Cable, CableReading, Slip, Use};
+use super::agreement::Agreement;
+use super::cable::Cable;
 use super::clones::ErrorClones;
 use super::context::Context;
 use super::factors::{Factors, Gain};
@@ -13,10 +13,11 @@ use super::pose_sd::PoseSd;
 use super::roughness::{Look, Roughness};
 use super::seen_again::SeenAgain;
 use super::settings::Settings;
-use super::sources::{self, Source};
+use super::slack_level::SlackLevel;
+use super::sources::{self, Source, TETHER_PERIOD};
 use super::state::{
-    self, ATTITUDE, CREEP, ERRORS, Errors, FORCE_BIAS, HEADING, POSITION, RANGES, RATE_BIAS, SLACK, State,
-    VELOCITY, add_to, put,
+    self, ATTITUDE, ERRORS, Errors, FORCE_BIAS, HEADING, POSITION, RANGES, RATE_BIAS, State, VELOCITY,
+    add_to, put,
 };
 use super::suspicion::Suspicions;
 use super::unrest::Unrest;
@@ -30,6 +31,8 @@ use headrace_geometry::tunnel::Profile;
 use headrace_sensor::device::SensorKind;
 use headrace_sensor::reading::{Reading, SonarReturn};
 use headrace_snapshot::stateful;
+
+mod counter;
 
 /// Room for the inertial sample times of an epoch.
 const KNOTS: usize = 256;
@@ -46,19 +49,12 @@ const SPEED_SD_MPS: f64 = 0.5;
 /// Standard deviation added to an estimate beyond the wall, m.
 const BEYOND_M: f64 = 1.5;
 
-/// Share of the change of a counter's rate that may have got into the speed before the counter wasn't believed.
-const MISLED_SHARE: f64 = 0.3;
-/// The loosest cable allowed for, m.
-const LOOSEST_M: f64 = 0.5;
 /// Standard deviation from which a gyro's bias is known: a pass of 3 s is off by a milliradian, and standing would show little more, rad/s.
 pub(super) const BIAS_KNOWN_RADPS: f64 = 3e-4;
-/// Time over which a loose cable is taken to tighten, s.
-const TIGHTENS_OVER_S: f64 = 100.0;
-/// Least cosine of the incidence at which a head's range is believed more than declared. Where a hull is pitched over the top, beams look along the
-/// tunnel, and few of them hold the attitude.
-const SQUARE: f64 = 0.8;
 /// Square of an innovation over its variance up to which the wall may be as smooth as it has shown itself.
 const SMOOTH: f64 = 4.0;
+/// Largest step of a counter, as a share of its noise, whose rounding doesn't count.
+const FINE_SHARE: f64 = 0.2;
 /// Time within which an estimate settles.
 const SETTLES_WITHIN: DurNs = DurNs(20_000_000_000);
 /// Yaw known to this hardly moves what was placed, 5 cm at 6 m: what its getting surer would gain, relating nothing to it any more costs.
@@ -80,6 +76,8 @@ pub struct Eskf {
     pub clones: ErrorClones,
     /// When the chainage was last reacquired.
     pub way_sought: Option<MonoNs>,
+    /// Variance of what the counter may have lost without the vehicle's having stood still, m^2.
+    slipped_m2: f64,
     /// How often what was placed before has lost its relation to what is placed from then on.
     pub ties: u32,
     /// When the estimate began, and the standard deviation of yaw then or when it had last halved, radians.
@@ -92,6 +90,7 @@ pub struct Eskf {
     /// Whether the cable counter is believed.
     pub cable: Cable,
     unrest: Unrest,
+    slack_level: SlackLevel,
     /// How rough the wall is.
     roughness: Roughness,
     seen_again: SeenAgain,
@@ -101,8 +100,6 @@ pub struct Eskf {
     pub is_at_rest: bool,
     /// Whether inertial data were lacking in the last epoch: what the vehicle did is then a guess, of which no noise is learnt.
     is_blind: bool,
-    /// How loose the cable hangs beyond what is declared, a standard deviation, m.
-    loose_m: f64,
     /// Settings that the ranges contradict.
     pub suspicions: Suspicions,
     /// Variances to add at the end of the epoch.
@@ -112,7 +109,7 @@ pub struct Eskf {
     keeps_steps: bool,
 }
 
-stateful!(Eskf { state: at, state, factors, clones, way_sought, ties, begun, settled, agreement, cable, unrest, roughness, seen_again, smoothness, is_at_rest, is_blind, loose_m, suspicions, doubts; lists: knots; fixed: steps, keeps_steps; });
+stateful!(Eskf { state: at, state, factors, clones, way_sought, slipped_m2, ties, begun, settled, agreement, cable, unrest, slack_level, roughness, seen_again, smoothness, is_at_rest, is_blind, suspicions, doubts; lists: knots; fixed: steps, keeps_steps; });
 
 impl Default for Eskf {
     /// Allocated buffers without an estimate.
@@ -123,6 +120,7 @@ impl Default for Eskf {
             factors: Factors::independent([0.0; ERRORS]),
             clones: ErrorClones::default(),
             way_sought: None,
+            slipped_m2: 0.0,
             ties: 0,
             begun: (MonoNs(0), 0.0),
             settled: 0,
@@ -130,12 +128,12 @@ impl Default for Eskf {
             agreement: Agreement::default(),
             cable: Cable::default(),
             unrest: Unrest::default(),
+            slack_level: SlackLevel::default(),
             roughness: Roughness::default(),
             seen_again: SeenAgain::default(),
             smoothness: 1.0,
             is_at_rest: false,
             is_blind: false,
-            loose_m: 0.0,
             suspicions: Suspicions::default(),
             doubts: [0.0; ERRORS],
             steps: Vec::new(),
@@ -159,8 +157,10 @@ impl Eskf {
         self.clones.clear();
         self.agreement = Agreement::default();
         self.cable = Cable::default();
+        self.slack_level.skip();
         self.doubts = [0.0; ERRORS];
         self.way_sought = None;
+        self.slipped_m2 = 0.0;
         self.ties += 1;
         self.begun = (at, self.pose_sd().yaw_rad);
     }
@@ -188,12 +188,8 @@ impl Eskf {
         sources: &mut [Option<Source>],
     ) {
         let (mut nominal, leg) = self.propagate(to, context, window);
-        let declared_m = context.settings.slack.reach;
-        let looseness = 1.0 + self.loose_m * self.loose_m / (declared_m * declared_m);
-        let [rate, force] = self.unrest.factors();
-        let leg = leg.with_unrest([rate, force, looseness]);
+        let leg = leg.with_noise(self.unrest.factors(), self.slack_level.slack(&context.settings));
         self.is_blind = leg.is_blind();
-        self.loose_m *= math::exp(-leg.dt_s() / TIGHTENS_OVER_S);
         let transition = leg.transition(&context.settings);
         transition.fade(&mut nominal);
         self.keep(to, &Move::Leg(leg), nominal);
@@ -201,8 +197,12 @@ impl Eskf {
         leg.disturb(&context.settings, &transition, &mut self.factors);
         self.clones.carry(&transition);
         let is_bias_known = self.factors.variance(RATE_BIAS + 2) < BIAS_KNOWN_RADPS * BIAS_KNOWN_RADPS;
-        self.smoothness = if is_bias_known { 1.0 } else { smoothness(sources) };
+        self.smoothness = if is_bias_known { 1.0 } else { sources::smoothness(sources) };
         self.seen_again.pass(nominal.position.x(), &context.settings);
+        let jolt_mps = window.jolted(to);
+        if jolt_mps > 0.0 {
+            self.slack_level.skip();
+        }
         let mut errors = [0.0; ERRORS];
         while let Some(waiting) = window.pop(to) {
             // Each reading is compared with the best estimate so far: after a silence the first ones move it far.
@@ -213,6 +213,12 @@ impl Eskf {
             self.suspicions.hear(&then, &context.design(), sources, &waiting);
             let others_change = sources::others_change(sources, waiting.source);
             let Some(Some(source)) = sources.get_mut(waiting.source) else { continue };
+            if let Reading::TetherLength(length) = waiting.reading {
+                source.count_step.hear(waiting.at, length.length_m, length.resolution_m);
+                if !source.is_due(waiting.at, TETHER_PERIOD) {
+                    continue;
+                }
+            }
             for (number, row) in rows(&then, context, source, &waiting, window).into_iter().enumerate() {
                 let again = |state: &State| {
                     rows(state, context, source, &waiting, window).get(number).copied().flatten()
@@ -235,7 +241,7 @@ impl Eskf {
         self.clones.note(to, &self.factors);
         self.settle();
         self.unrest.pass(leg.dt_s(), &context.settings);
-        self.note_jolt(window.jolted(to), context.settings.epoch.as_secs_f64());
+        self.note_jolt(jolt_mps, context.settings.epoch.as_secs_f64());
         self.agreement.seek(&mut self.doubts);
         let doubts = core::mem::replace(&mut self.doubts, [0.0; ERRORS]);
         if doubts.iter().any(|variance| *variance > 0.0) {
@@ -251,41 +257,6 @@ impl Eskf {
             add_to(&mut self.doubts, VELOCITY + k, variance);
             add_to(&mut self.doubts, POSITION + k, way);
         }
-    }
-
-    /// Judges a cable reading; whether it is to be fused. What it has lost becomes creep.
-    fn trusts(&mut self, reading: &CableReading, errors: &mut Errors) -> bool {
-        match self.cable.take(reading) {
-            Use::Fuse => return true,
-            Use::Withhold => {}
-            Use::Left(by_mps) => {
-                let misled_mps = MISLED_SHARE * by_mps.min(SPEED_SD_MPS);
-                add_to(&mut self.doubts, VELOCITY, misled_mps * misled_mps);
-                self.ties += 1;
-            }
-            Use::Slipped(Slip { lost_m, doubted_m }) => {
-                // The vehicle stays where it is, so that what is placed now fits what was placed in the doubt.
-                add_to(errors, CREEP, lost_m);
-                add_to(&mut self.doubts, CREEP, lost_m * lost_m);
-                add_to(&mut self.doubts, POSITION, doubted_m * doubted_m);
-                self.ties += 1;
-            }
-            Use::Loose(by_m) => {
-                self.loose_m = self.loose_m.max(by_m.min(LOOSEST_M));
-                add_to(&mut self.doubts, SLACK, self.loose_m * self.loose_m);
-                add_to(&mut self.doubts, POSITION, by_m * by_m);
-                agreement::seek_speed(&mut self.doubts);
-                self.ties += 1;
-            }
-            Use::Unsteady => agreement::seek_speed(&mut self.doubts),
-            Use::Seek(lacking_m) => {
-                self.way_sought = Some(reading.at);
-                add_to(&mut self.doubts, CREEP, lacking_m * lacking_m);
-                agreement::seek_way(&mut self.doubts);
-                self.ties += 1;
-            }
-        }
-        false
     }
 
     /// Adds to the error variances; the estimate stays.
@@ -334,8 +305,10 @@ impl Eskf {
         let (mut now, mut state) = (self.at, self.state);
         self.knots.clear();
         self.knots.push((now, state));
+        self.slack_level.begin(now);
         while now < to {
             let (felt, until) = window.felt(now, to);
+            self.slack_level.go_on(&felt, until, &self.state, context.site.gravity_mps2);
             state.go_on(&felt, until.since(now).as_secs_f64(), context.site.gravity_mps2, &mut leg);
             now = until;
             if self.knots.len() < KNOTS {
@@ -372,8 +345,11 @@ impl Eskf {
             row.unless_sure(source.noise_level.is_usual(), |by| math::sqrt(self.factors.variance_along(by)));
         row.noise += self.left_out(row.bends);
         let (kind, declared) = (source.sensor.kind, row.noise);
-        let is_head_square = kind == SensorKind::Head && is_square(&row);
-        if settings.learns {
+        let is_head_square = kind == SensorKind::Head && row.is_square();
+        // A counter's rounding is an error that its readings share: nothing is learnt from innovations in which it counts.
+        let is_white = !matches!(&waiting.reading, Reading::TetherLength(length)
+            if source.count_step.step_m(length.resolution_m) > FINE_SHARE * settings.tether_sd_m);
+        if settings.learns && is_white {
             row.noise *= source.noise_level.factor(kind, number);
         }
         let innovation = row.residual - row.found(known, errors);
@@ -391,28 +367,24 @@ impl Eskf {
         row.noise = white + bumps;
         let variance = of_estimate + row.noise;
         let nis = innovation * innovation / variance;
-        let mut agrees = nis <= settings.gate;
+        let is_near = nis <= settings.gate;
         source.consistency.count(nis, settings.gate, variance, settings.usual_variance(kind));
         let part = |from: usize| [0, 1, 2].map(|k| along.get(from + k).copied().unwrap_or(0.0));
         if is_head_square && !self.is_blind {
-            source.noise_level.note_share((innovation * innovation - of_estimate) / declared, agrees);
+            source.noise_level.note_share((innovation * innovation - of_estimate) / declared, is_near);
         }
         let relative = source.noise_level.relative(nis.min(settings.gate));
         // Rocks move the heads' ranges as restless gyros would.
         if kind != SensorKind::Head {
             self.unrest.note([part(RATE_BIAS), part(FORCE_BIAS)], variance, relative);
         }
-        if let (SensorKind::Tether { zero_at_m, scale }, Reading::TetherLength(length)) =
-            (kind, &waiting.reading)
-        {
-            let shown_m = zero_at_m + scale * length.length_m;
-            let (at, sd_m) = (waiting.at, math::sqrt(variance));
-            agrees = self.trusts(&CableReading { at, shown_m, off_m: innovation, sd_m, agrees }, errors);
-        } else {
-            self.agreement.note(kind, &row, agrees);
+        let believes = self.believes_counter(waiting, source, [innovation, variance], settings, errors);
+        if believes.is_none() {
+            self.agreement.note(kind, &row, is_near);
         }
+        let agrees = believes.unwrap_or(is_near);
         if agrees {
-            if self.is_blind {
+            if self.is_blind || !is_white {
                 source.noise_level.skip(number);
             } else {
                 source.noise_level.note(kind, number, innovation, of_estimate + white);
@@ -428,6 +400,11 @@ impl Eskf {
             }
             if matches!(kind, SensorKind::Head | SensorKind::Echosounder { .. }) {
                 self.correct_by_wall(&row, settings.wall_share, known, errors);
+            } else if matches!(kind, SensorKind::Tether { .. }) {
+                let before = [POSITION, VELOCITY].map(|i| errors.get(i).copied().unwrap_or(0.0));
+                self.correct(&row, known, errors);
+                let after = [POSITION, VELOCITY].map(|i| errors.get(i).copied().unwrap_or(0.0));
+                self.cable.note_corrections([after[0] - before[0], after[1] - before[1]]);
             } else {
                 self.correct(&row, known, errors);
             }
@@ -528,7 +505,13 @@ impl Eskf {
 
     /// Standard deviations of the estimate.
     pub fn pose_sd(&self) -> PoseSd {
-        PoseSd::of(&self.factors)
+        let along_m = math::sqrt(self.along_sd_m() * self.along_sd_m() + self.slipped_m2);
+        PoseSd { along_m, ..PoseSd::of(&self.factors) }
+    }
+
+    /// Standard deviation of the chainage without what the counter has lost for good: what samples placed from now on share, m.
+    pub fn along_sd_m(&self) -> f64 {
+        math::hypot(PoseSd::of(&self.factors).along_m, self.cable.differs_m())
     }
 
     /// Bounds the speed by its prior, against unaided accelerometers that integrate gravity.
@@ -571,16 +554,4 @@ impl Eskf {
             *error += k * innovation;
         }
     }
-}
-
-/// Share of the declared variance of heads' ranges that the wall leaves them: that of the head that shows most. Where one begins to see rocks, the
-/// others will.
-fn smoothness(sources: &[Option<Source>]) -> f64 {
-    let heads = sources.iter().flatten().filter(|source| source.sensor.kind == SensorKind::Head);
-    heads.filter_map(|head| head.noise_level.smoothness()).reduce(f64::max).unwrap_or(1.0)
-}
-
-/// Whether a beam meets the wall squarely: a range changes by the place as one over the cosine of the incidence.
-fn is_square(row: &ScalarUpdate) -> bool {
-    state::vec::<Tunnel>(&row.h, POSITION).norm() < 1.0 / SQUARE
 }

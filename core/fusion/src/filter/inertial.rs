@@ -24,7 +24,7 @@ pub struct Felt {
 }
 
 /// Number of values of a leg.
-pub const LEG_NUMBERS: usize = 1 + 5 * 9 + 2 * 3 + 2 + 2 + 3;
+pub const LEG_NUMBERS: usize = 1 + 5 * 9 + 2 * 3 + 2 + 2 + 2 + 2;
 
 /// Propagation accumulated since the errors were last propagated.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -45,8 +45,10 @@ pub struct Leg {
     blind_s: [f64; 2],
     /// Way along the tunnel, m, and the cable's scale error on it: what creeps.
     creeping: [f64; 2],
-    /// Factors of the process noise of gyro biases, accelerometer biases and slack.
-    unrest: [f64; 3],
+    /// Factors of the process noise of gyro biases and accelerometer biases.
+    unrest: [f64; 2],
+    /// The cable's slack.
+    slack: [f64; 2],
 }
 
 impl Default for Leg {
@@ -62,7 +64,8 @@ impl Default for Leg {
             tilting_twice: Matrix3::zeros(),
             blind_s: [0.0; 2],
             creeping: [0.0; 2],
-            unrest: [1.0; 3],
+            unrest: [1.0; 2],
+            slack: [0.0, 1.0],
         }
     }
 }
@@ -123,8 +126,8 @@ impl Leg {
     }
 
     /// Process noise of the slack: two equal lags in series, driven by white noise.
-    fn slack_noises(&self, settings: &Settings) -> [Noise; 2] {
-        let slack = settings.slack;
+    fn slack_noises(&self) -> [Noise; 2] {
+        let slack = self.slack();
         let lags = self.dt_s / slack.time_s;
         let left = math::exp(-2.0 * lags);
         let drive = slack.drive();
@@ -140,12 +143,17 @@ impl Leg {
         ]
     }
 
+    fn slack(&self) -> Wander {
+        let [reach, time_s] = self.slack;
+        Wander { reach, time_s }
+    }
+
     /// Its values, for a record.
     pub fn numbers(&self) -> impl Iterator<Item = f64> + '_ {
         let squares = [&self.turned, &self.pushed, &self.pushed_twice, &self.tilting, &self.tilting_twice];
         let squares = squares.into_iter().flat_map(|matrix| matrix.iter().copied());
         let ways = [&self.velocity, &self.way].into_iter().flat_map(|way| way.iter().copied());
-        let rest = self.blind_s.into_iter().chain(self.creeping).chain(self.unrest);
+        let rest = self.blind_s.into_iter().chain(self.creeping).chain(self.unrest).chain(self.slack);
         [self.dt_s].into_iter().chain(squares).chain(ways).chain(rest)
     }
 
@@ -162,16 +170,17 @@ impl Leg {
         let squares = squares.into_iter().flat_map(|matrix| matrix.iter_mut());
         let ways = [&mut leg.velocity, &mut leg.way].into_iter().flat_map(|way| way.iter_mut());
         let rest = leg.blind_s.iter_mut().chain(&mut leg.creeping).chain(&mut leg.unrest);
+        let rest = rest.chain(&mut leg.slack);
         for slot in squares.chain(ways).chain(rest) {
             *slot = numbers.next()?;
         }
         Some(leg)
     }
 
-    /// The same with these factors of the process noise of gyro biases, accelerometer biases and slack.
+    /// The same with these factors of the process noise of gyro biases and accelerometer biases, and this slack.
     #[must_use]
-    pub fn with_unrest(self, unrest: [f64; 3]) -> Self {
-        Self { unrest, ..self }
+    pub fn with_noise(self, unrest: [f64; 2], slack: Wander) -> Self {
+        Self { unrest, slack: [slack.reach, slack.time_s], ..self }
     }
 
     /// Its duration, s.
@@ -204,8 +213,8 @@ impl Leg {
                 (RATE_BIAS, fading(settings.rate_bias.time_s)),
                 (RATE_BIAS + 1, fading(settings.rate_bias.time_s)),
                 (RATE_BIAS + 2, fading(settings.rate_bias.time_s)),
-                (SLACK, fading(settings.slack.time_s)),
-                (SLACK_RATE, fading(settings.slack.time_s)),
+                (SLACK, fading(self.slack().time_s)),
+                (SLACK_RATE, fading(self.slack().time_s)),
                 (HEADING, fading(settings.heading.time_s)),
             ],
         }
@@ -236,11 +245,11 @@ impl Leg {
             let left = transition.left_of(i);
             Noise::of_one(i, wander.reach * wander.reach * (1.0 - left * left))
         };
-        let [rate_unrest, force_unrest, slack_unrest] = self.unrest;
+        let [rate_unrest, force_unrest] = self.unrest;
         let force = |k: usize| fading(FORCE_BIAS + k, settings.force_bias).scaled(force_unrest);
         let rate = |k: usize| fading(RATE_BIAS + k, settings.rate_bias).scaled(rate_unrest);
         let white = |i: usize, noise: f64| Noise::of_one(i, noise * noise * self.dt_s);
-        let [slack, slack_alone] = self.slack_noises(settings).map(|noise| noise.scaled(slack_unrest));
+        let [slack, slack_alone] = self.slack_noises();
         [
             slack,
             slack_alone,

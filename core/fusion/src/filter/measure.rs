@@ -4,11 +4,15 @@
 
 use super::state::{
     ATTITUDE, CREEP, DEPTH, ERRORS, Errors, HEADING, POSITION, RANGES, RATE_BIAS, SLACK, State, VELOCITY,
-    put, rotation_vector,
+    put, rotation_vector, vec,
 };
 use headrace_geometry::frames::{Body, Rot, Sensor, Tunnel, Vec3};
 use headrace_geometry::math;
 use headrace_geometry::tunnel::Profile;
+
+/// Least cosine of the incidence at which a head's range is believed more than declared. Where a hull is pitched over the top, beams look along the
+/// tunnel, and few of them hold the attitude.
+const SQUARE: f64 = 0.8;
 
 /// A scalar measurement.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -73,6 +77,11 @@ impl ScalarUpdate {
             self.noise += unknown_m * unknown_m;
         }
         self
+    }
+
+    /// Whether a beam meets the wall squarely: a range changes by the place as one over the cosine of the incidence.
+    pub fn is_square(&self) -> bool {
+        vec::<Tunnel>(&self.h, POSITION).norm() < 1.0 / SQUARE
     }
 
     /// Part of the residual due to the errors found since `known`.

@@ -8,6 +8,7 @@ pub mod align;
 pub mod cable;
 pub mod clones;
 pub mod context;
+pub mod count_step;
 pub mod eskf;
 mod evidence;
 pub mod factors;
@@ -18,6 +19,7 @@ pub mod pose_sd;
 mod roughness;
 mod seen_again;
 pub mod settings;
+mod slack_level;
 pub mod sources;
 mod spell;
 pub mod state;
@@ -37,7 +39,7 @@ use self::context::Context;
 use self::eskf::{BIAS_KNOWN_RADPS, Eskf};
 use self::pose_sd::PoseSd;
 use self::settings::Settings;
-use self::sources::{Consistency, Source};
+use self::sources::{ATTITUDE_PERIOD, Consistency, DEPTH_PERIOD, Source};
 use self::state::{RANGES, RATE_BIAS, State, rotation};
 use self::suspicion::SettingDoubt;
 use self::window::{Waiting, Window};
@@ -61,10 +63,6 @@ use headrace_snapshot::stateful;
 pub(super) const CARRIES: DurNs = DurNs(2_000_000_000);
 /// A clock that goes back by more than this has been set; readings stamped further in the future are rejected.
 pub(super) const CLOCK_JUMP: DurNs = DurNs(10_000_000_000);
-/// Update periods of attitudes, cables and depths: their errors are correlated over longer times.
-const ATTITUDE_PERIOD: DurNs = DurNs(100_000_000);
-const TETHER_PERIOD: DurNs = DurNs(100_000_000);
-const DEPTH_PERIOD: DurNs = DurNs(500_000_000);
 /// Standard deviations beyond which the estimate is restarted: linearized updates wouldn't converge.
 const LOST_PLACE_M: f64 = 3.0;
 const LOST_TILT_RAD: f64 = 0.2;
@@ -222,8 +220,10 @@ impl FilterNavigation {
         let relative = self.running.clones.relative(pass_gap);
         // At first nothing relates what is placed now to what was placed before.
         self.revisit = sd.independent();
-        let relative = relative.unwrap_or(self.revisit);
-        self.standing = match sd.standing(relative) {
+        let differs = Relative::along(self.running.cable.differs_m());
+        let relative = relative.unwrap_or(self.revisit).weighted(1.0, &differs, 1.0);
+        let unslipped = PoseSd { along_m: self.running.along_sd_m(), ..sd };
+        self.standing = match unslipped.standing(relative) {
             Ok(_) if self.has_jumped() => Err(NoFix::Chainage),
             standing => standing,
         };
@@ -298,9 +298,9 @@ impl FilterNavigation {
                 echo.range_m.is_some() && echo.confidence >= min_confidence
             }
             (SensorKind::Imu, Reading::Attitude(_)) => source.is_due(at, ATTITUDE_PERIOD),
-            (SensorKind::Tether { .. }, Reading::TetherLength(_)) => source.is_due(at, TETHER_PERIOD),
             (SensorKind::Depth, Reading::Pressure(_)) => source.is_due(at, DEPTH_PERIOD),
-            (SensorKind::VelocityLog, Reading::VelocityOverGround(_)) => true,
+            (SensorKind::VelocityLog, Reading::VelocityOverGround(_))
+            | (SensorKind::Tether { .. }, Reading::TetherLength(_)) => true,
             (SensorKind::Imu, Reading::AngularRate(_) | Reading::SpecificForce(_))
                 if self.unit != Some(number) =>
             {

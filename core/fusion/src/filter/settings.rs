@@ -1,6 +1,8 @@
 //! Noise settings of the sensors. Defaults suit a small vehicle with a MEMS unit; a vehicle file's `[navigation]` table
 //! overrides them.
 
+use serde::{Deserialize, Serialize};
+
 use headrace_geometry::math;
 use headrace_geometry::time::DurNs;
 use headrace_sensor::device::{BiasSpec, InertialNoise, SensorKind};
@@ -8,7 +10,7 @@ use headrace_sensor::device::{BiasSpec, InertialNoise, SensorKind};
 /// One degree in radians.
 const DEGREE: f64 = core::f64::consts::PI / 180.0;
 /// A Gauss-Markov process about zero.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Wander {
     /// Standard deviation, in the unit of the process.
     pub reach: f64,
@@ -22,6 +24,11 @@ impl Wander {
     pub fn of_bias(bias: &BiasSpec) -> Self {
         let variance = bias.turn_on * bias.turn_on + bias.in_run * bias.in_run;
         Self { reach: math::sqrt(variance), time_s: bias.time_s * variance / (bias.in_run * bias.in_run) }
+    }
+
+    /// Variance by which a process of one lag wanders in a second.
+    pub fn density(&self) -> f64 {
+        2.0 * self.reach * self.reach / self.time_s
     }
 
     /// Standard deviation of the driving rate of a smooth process (two equal lags in series) of standard deviation `reach`.
@@ -108,7 +115,7 @@ impl Default for Settings {
             rate_noise: 0.01 * DEGREE,
             force_noise: 0.003,
             blind_rate_noise: 2.0 * DEGREE,
-            blind_force_noise: 0.03,
+            blind_force_noise: 0.1,
             rate_bias: Wander { reach: 0.2 * DEGREE, time_s: 1000.0 },
             force_bias: Wander { reach: 0.03, time_s: 300.0 },
             tether_sd_m: 0.005,

@@ -2,6 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
+use super::count_step::CountStep;
 use super::noise_level::NoiseLevel;
 use crate::one_range::OneRange;
 use headrace_geometry::math;
@@ -15,6 +16,12 @@ use headrace_sensor::sampling::head::SILENT_AFTER;
 const FEW_OF_ONE_RANGE: u32 = 3;
 const VARIES_M: f64 = 0.05;
 const SURE_M: f64 = 0.02;
+/// Update periods of attitudes, cables and depths: their errors are correlated over longer times.
+pub const ATTITUDE_PERIOD: DurNs = DurNs(100_000_000);
+/// See [`ATTITUDE_PERIOD`].
+pub const TETHER_PERIOD: DurNs = DurNs(100_000_000);
+/// See [`ATTITUDE_PERIOD`].
+pub const DEPTH_PERIOD: DurNs = DurNs(500_000_000);
 /// Weight of a new turn rate in the running mean.
 const RATE_SHARE: f64 = 0.05;
 
@@ -68,6 +75,8 @@ pub struct Source {
     pub turning: Turning,
     /// Level of its noise.
     pub noise_level: NoiseLevel,
+    /// For a tether counter, its step.
+    pub count_step: CountStep,
     /// For a head, whether its range follows the wall.
     pub one_range: OneRange,
 }
@@ -89,6 +98,7 @@ impl Source {
             taken: None,
             turning: Turning::default(),
             noise_level: NoiseLevel::default(),
+            count_step: CountStep::default(),
             one_range: OneRange::default(),
         }
     }
@@ -135,6 +145,13 @@ pub fn others_change(sources: &[Option<Source>], source: usize) -> bool {
             other.sensor.kind == SensorKind::Head && other.one_range.is_heard() && !other.is_stuck()
         })
     })
+}
+
+/// Share of the declared variance of heads' ranges that the wall leaves them: that of the head that shows most. Where one begins to see rocks, the
+/// others will.
+pub fn smoothness(sources: &[Option<Source>]) -> f64 {
+    let heads = sources.iter().flatten().filter(|source| source.sensor.kind == SensorKind::Head);
+    heads.filter_map(|head| head.noise_level.smoothness()).reduce(f64::max).unwrap_or(1.0)
 }
 
 impl Turning {

@@ -43,7 +43,7 @@ impl Default for Unrest {
 
 /// Largest factor for a process: what makes it as restless as the worst unit.
 fn most(wander: Wander, worst: f64) -> f64 {
-    let density = 2.0 * wander.reach * wander.reach / wander.time_s;
+    let density = wander.density();
     (worst * worst / density).max(1.0)
 }
 

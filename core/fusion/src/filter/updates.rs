@@ -2,10 +2,11 @@
 
 use super::context::Context;
 use super::measure::{self, Beam, ScalarUpdate, with_quantum};
-use super::sources::Source;
+use super::sources::{Source, TETHER_PERIOD};
 use super::state::State;
 use super::window::{Waiting, Window};
 use headrace_geometry::frames::{Rot, Sensor, Tunnel, Vec3, head_direction};
+use headrace_geometry::math;
 use headrace_geometry::site::Site;
 use headrace_geometry::time::DurNs;
 use headrace_sensor::device::SensorKind;
@@ -46,7 +47,10 @@ pub(super) fn rows(
             one(Some(measure::height(state, offset, height_m, sd_m)))
         }
         (SensorKind::Tether { zero_at_m, scale }, Reading::TetherLength(length)) => {
-            let sd_m = with_quantum(settings.tether_sd_m, length.resolution_m * scale.abs());
+            let step_m = source.count_step.step_m(length.resolution_m) * scale.abs();
+            let way_m = state.velocity_mps.x() * TETHER_PERIOD.as_secs_f64();
+            let looks = source.count_step.looks_at_an_error(waiting.at, TETHER_PERIOD, way_m, step_m);
+            let sd_m = with_quantum(settings.tether_sd_m, step_m * math::sqrt(looks));
             let chainage_m = zero_at_m + scale * length.length_m;
             one(Some(measure::chainage(state, -*unit_at, chainage_m, sd_m)))
         }

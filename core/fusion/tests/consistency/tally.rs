@@ -4,10 +4,12 @@ use std::collections::VecDeque;
 use std::fmt::Write as _;
 
 use headrace_fusion::filter::FilterNavigation;
+use headrace_fusion::stuck_sensor::StuckSensor;
 use headrace_fusion::{Navigation as _, Times};
 use headrace_geometry::frames::Vec3;
+use headrace_sensor::reading::Reading;
 
-use crate::world::{Dive, Fault, IMU, Recipe, seconds, sensor};
+use crate::world::{Dive, IMU, Recipe, seconds, sensor};
 
 /// The estimate settles until then, s; and until then passes aren't compared.
 const SETTLED_S: f64 = 10.0;
@@ -52,10 +54,13 @@ pub(crate) fn run(recipe: Recipe, mut trace: Option<&mut String>) -> Tally {
     let dive = Dive::new(recipe);
     let mut nav = FilterNavigation::new(dive.profile.clone(), dive.site, recipe.settings());
     let (mut tally, mut last, mut errors) = (Tally::default(), None, VecDeque::new());
+    // The loop withholds a hung unit's readings.
+    let (mut stuck, mut hangs) = (StuckSensor::default(), false);
     for (valid, source, reading) in dive.events() {
-        // The loop withholds the readings of a unit that has hung for a second.
-        let t = seconds(valid);
-        if source == IMU && dive.is_faulty(t, Fault::ImuHangs) && dive.is_faulty(t - 1.0, Fault::ImuHangs) {
+        if let Reading::AngularRate(rate) = reading {
+            hangs = stuck.hangs(valid, rate);
+        }
+        if source == IMU && hangs {
             continue;
         }
         nav.update(source, &sensor(source), Times { received: valid, valid }, &reading);

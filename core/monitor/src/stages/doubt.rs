@@ -19,10 +19,10 @@ pub(super) fn note(
         notices.0.push(Notice::Alert(kind, None));
         digest_alert(digests, kind, None, at, (x_m, off_m));
     };
-    if let Some(CableDoubt { since, from_m, way_m }) = doubts.cable
-        && alerts.note_lasting(AlertKind::CableDoubted, since, from_m, way_m)
+    if let Some(CableDoubt { since, from_m, differs_m }) = doubts.cable
+        && alerts.note_lasting(AlertKind::CableDoubted, since, from_m, differs_m)
     {
-        tell(AlertKind::CableDoubted, from_m, way_m);
+        tell(AlertKind::CableDoubted, from_m, differs_m);
     }
     let x_m = situation.pose.map(|pose| pose.position.x());
     if let Some((doubt, x_m)) = doubts.setting.zip(x_m)

@@ -225,7 +225,7 @@ mod tests {
         let relative = Relative::along(pass_error_m);
         let fix = Fix { pose, speed_mps: 0.07, relative, revisit: relative, tie: 0, settled: 0 };
         let fix = lacking.map_or(Ok(fix), Err);
-        let cable = is_cable_doubted.then_some(CableDoubt { since: AT, from_m: 12.0, way_m: 0.5 });
+        let cable = is_cable_doubted.then_some(CableDoubt { since: AT, from_m: 12.0, differs_m: 0.5 });
         let doubts = Doubts { cable, setting: None, stand_s: 3, hung: 0 };
         let pose = fix.ok().map(|fix| fix.pose);
         let situation = Situation { pose, speed_mps: 0.07, pass_error_m, ..situation(None) };

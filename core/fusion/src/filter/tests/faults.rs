@@ -100,19 +100,23 @@ fn uncertainty_grows_while_nothing_is_heard() {
     let rig = Rig::new(rest, 1);
     let mut nav = rig.navigation();
     rig.run(&mut nav, &rig.events(0.0, FAULT_S));
+    // The first beat brings the last readings of the window.
+    let last = at(FAULT_S + 1.0);
+    Rig::hear(&mut nav, &Event { received: last, valid: last, source: OTHER, reading: rig.rate(0.0) });
     let mut before = nav.running().unwrap().factors;
-    for k in 1..30 {
-        let t = at(FAULT_S + 0.5 * f64::from(k));
+    for k in 1..24 {
+        let t = at(FAULT_S + 1.0 + 0.5 * f64::from(k));
         let beat = Event { received: t, valid: t, source: OTHER, reading: rig.rate(0.0) };
         Rig::hear(&mut nav, &beat);
         let running = nav.running().unwrap();
         // What the cable has crept stays; position, velocity and attitude don't.
         for i in (0..10).filter(|i| *i != CREEP) {
-            assert!(running.factors.variance(i) > before.variance(i), "error {i} at beat {k}");
+            let (now, then) = (running.factors.variance(i), before.variance(i));
+            assert!(now > then, "error {i} at beat {k}: {now}, {then} before");
         }
         before = running.factors;
     }
-    assert!(matches!(nav.fix(at(FAULT_S + 14.5)), Err(NoFix::Chainage | NoFix::Section | NoFix::Heading)));
+    assert!(matches!(nav.fix(at(FAULT_S + 15.5)), Err(NoFix::Chainage | NoFix::Section | NoFix::Heading)));
     // Nor does the estimate drift off.
     assert!((nav.running().unwrap().state.position - rig.unit(0.0)).norm() < 1.0);
 }
@@ -225,8 +229,8 @@ fn a_sensor_that_jumps_and_comes_back_is_left_out() {
         let mut nav = rig.navigation();
         let tally = rig.run(&mut nav, &events);
         let consistency = nav.consistency(source).unwrap();
-        // A counter that has slipped is tied to the vehicle anew by its next reading.
-        let lacking = if source == TETHER { 4 } else { 0 };
+        // While counter and estimate differ by metres the chainage isn't known: the jump, and a second until the counter runs truly.
+        let lacking = if source == TETHER { 45 } else { 0 };
         assert!(
             tally.lacking <= lacking && consistency.gated >= 6,
             "source {source}: {tally:?} {consistency:?}"

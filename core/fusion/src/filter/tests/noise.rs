@@ -14,7 +14,7 @@ use headrace_geometry::math;
 /// A leg of a vehicle at rest, and the covariance it adds to zero.
 fn leg(settings: &Settings, dt_s: f64, felt: Felt) -> (Transition, Factors<ERRORS>) {
     let mut state = Draws::new(1).state();
-    let mut leg = Leg::default();
+    let mut leg = Leg::default().with_noise([1.0; 2], settings.slack);
     state.go_on(&felt, dt_s, 9.81, &mut leg);
     let transition = leg.transition(settings);
     let mut factors = Factors::independent([0.0; ERRORS]);

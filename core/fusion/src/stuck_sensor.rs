@@ -21,7 +21,7 @@ const NOISY: f64 = 0.3;
 
 /// What is known of one source's repetitions; part of the loop's state.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
-pub struct Repeats {
+pub struct StuckSensor {
     last: Option<[f64; 3]>,
     /// The last differences that weren't zero, by axis.
     steps: [f64; 3],
@@ -34,7 +34,7 @@ pub struct Repeats {
     since: MonoNs,
 }
 
-impl Repeats {
+impl StuckSensor {
     /// Takes a turn rate; whether the unit has hung by then.
     ///
     /// Allocates: never.
@@ -77,7 +77,7 @@ mod tests {
 
     /// Readings at 400 Hz; whether the unit has hung after each.
     fn hangs(readings: impl IntoIterator<Item = [f64; 3]>) -> Vec<bool> {
-        let mut repeats = Repeats::default();
+        let mut repeats = StuckSensor::default();
         let mut of =
             |(k, [x, y, z]): (u64, [f64; 3])| repeats.hangs(MonoNs(k * 2_500_000), Vec3::new(x, y, z));
         (0..).zip(readings).map(&mut of).collect()

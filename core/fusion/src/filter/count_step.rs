@@ -1,0 +1,190 @@
+//! The step of a tether counter, recognised from its counts.
+//!
+//! A file may state a smaller step than the counter has: its converter's instead of its wheel's. A counter that stands between its changes
+//! shows its step; changes that are multiples of one step show it, too.
+
+use serde::{Deserialize, Serialize};
+
+use headrace_geometry::math;
+use headrace_geometry::time::{DurNs, MonoNs};
+
+/// Changes of the count in a block. The step is the larger of the last two blocks': a garbled reading spoils one of them.
+const BLOCK: u32 = 50;
+/// What a counter that hasn't moved yet may have for a step, m.
+const COMMON_STEP_M: f64 = 0.01;
+/// Most readings that are taken for looks at one and the same rounding error.
+const MOST_LOOKS: f64 = 50.0;
+
+/// See the module's description. Changes are in stated steps.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+pub struct CountStep {
+    last_m: Option<f64>,
+    /// When the count changed last.
+    changed: MonoNs,
+    /// Smallest and largest change of the block under way, and greatest common divisor of its changes.
+    smallest: u64,
+    largest: u64,
+    common: u64,
+    /// Readings that differ from the one before, and that don't.
+    changes: u32,
+    stands: u32,
+    /// Steps of the last two blocks that show one.
+    blocks: [u64; 2],
+}
+
+impl CountStep {
+    /// Takes a reading of a counter whose step is stated, m.
+    pub fn hear(&mut self, at: MonoNs, length_m: f64, stated_m: f64) {
+        let before_m = self.last_m.replace(length_m).unwrap_or(f64::INFINITY);
+        if before_m.is_infinite() {
+            self.changed = at;
+            return;
+        }
+        let change = math::round_to_i64((length_m - before_m) / stated_m).unsigned_abs();
+        if change == 0 {
+            self.stands = self.stands.saturating_add(1);
+            return;
+        }
+        self.changed = at;
+        self.smallest = if self.changes == 0 { change } else { self.smallest.min(change) };
+        self.largest = self.largest.max(change);
+        self.common = common_divisor(self.common, change);
+        self.changes += 1;
+        if self.changes == BLOCK {
+            let [_, latest] = self.blocks;
+            // Changes that are all alike show a way, and no step.
+            if self.stands >= BLOCK / 5 {
+                self.blocks = [latest, self.smallest];
+            } else if self.smallest < self.largest {
+                self.blocks = [latest, self.common];
+            }
+            *self =
+                Self { last_m: self.last_m, changed: self.changed, blocks: self.blocks, ..Self::default() };
+        }
+    }
+
+    /// The step, m: as stated, or larger where the counts say so.
+    pub fn step_m(&self, stated_m: f64) -> f64 {
+        let [before, latest] = self.blocks;
+        if before.max(latest) > 0 {
+            return stated_m * before.max(latest) as f64;
+        }
+        // Until a block is full, the smallest change so far is the best guess, and before the first one a common step.
+        match (self.changes, self.stands >= self.changes) {
+            (0, _) => stated_m.max(COMMON_STEP_M),
+            (_, true) => stated_m * self.smallest as f64,
+            _ => stated_m,
+        }
+    }
+
+    /// How many readings of this period share the rounding error of one now, where the counter moves so far between two of them, m: those
+    /// since the count changed; and as many as repeat an error because their way is a whole number of steps.
+    pub fn looks_at_an_error(&self, at: MonoNs, period: DurNs, way_m: f64, step_m: f64) -> f64 {
+        let stood = at.since(self.changed).as_secs_f64() / period.as_secs_f64();
+        let steps = way_m / step_m;
+        let phase = (steps - math::round_to_i64(steps) as f64).abs();
+        (0.5 / phase.max(1e-6)).max(stood).clamp(1.0, MOST_LOOKS)
+    }
+}
+
+/// Euclid's algorithm; zero is divided by everything.
+fn common_divisor(mut a: u64, mut b: u64) -> u64 {
+    while b > 0 {
+        (a, b) = (b, a % b);
+    }
+    a
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// 50 readings a second.
+    fn at(k: u32) -> MonoNs {
+        MonoNs(7_000_000_000 + 20_000_000 * u64::from(k))
+    }
+
+    /// The step recognised from a way, m, by time, s, that a wheel of this step shows 50 times a second, rounded to stated steps.
+    fn recognised_m(step_m: f64, stated_m: f64, way_m: impl Fn(f64) -> f64) -> f64 {
+        let mut step = CountStep::default();
+        for k in 0..3000_u32 {
+            let shown_m = math::floor_to_i64(way_m(f64::from(k) / 50.0) / step_m) as f64 * step_m;
+            step.hear(at(k), math::round_to_i64(shown_m / stated_m) as f64 * stated_m, stated_m);
+        }
+        step.step_m(stated_m)
+    }
+
+    #[test]
+    fn a_step_larger_than_stated_is_recognised() {
+        for step_m in [0.005, 0.01, 0.0123, 0.025, 0.05] {
+            for speed_mps in [0.05, 0.1, 0.2] {
+                let swaying = |t: f64| speed_mps * t + 0.1 * math::sin(0.3 * t);
+                let found_m = recognised_m(step_m, 0.0005, swaying);
+                assert!((found_m - step_m).abs() <= 0.000_51, "{step_m} at {speed_mps}: {found_m}");
+            }
+        }
+        // Multiples of one step show it without standing between them.
+        let found_m = recognised_m(0.01, 0.0005, |t| 2.0 * t + 1.7 * math::sin(0.7 * t));
+        assert!((found_m - 0.01).abs() < 1e-9, "{found_m}");
+    }
+
+    #[test]
+    fn a_step_is_never_smaller_than_stated() {
+        for speed_mps in [0.003, 0.2] {
+            let found_m = recognised_m(0.0005, 0.0005, |t| speed_mps * t + 0.02 * math::sin(0.4 * t));
+            assert!((found_m - 0.0005).abs() < 1e-12, "{speed_mps}: {found_m}");
+        }
+        assert!((recognised_m(0.0005, 0.02, |t| 0.2 * t) - 0.02).abs() < 1e-12, "as stated");
+        assert!((recognised_m(0.01, 0.0005, |_| 3.0) - COMMON_STEP_M).abs() < 1e-12, "it stands");
+    }
+
+    #[test]
+    fn one_garbled_reading_hides_no_step() {
+        let mut step = CountStep::default();
+        for k in 0..6000_u32 {
+            let t = f64::from(k) / 50.0;
+            let length_m = math::floor_to_i64(0.2 * t / 0.01) as f64 * 0.01;
+            step.hear(at(k), if k == 3000 { length_m + 0.003 } else { length_m }, 0.0005);
+        }
+        assert!((step.step_m(0.0005) - 0.01).abs() < 1e-9, "{}", step.step_m(0.0005));
+    }
+
+    #[test]
+    fn readings_share_a_rounding_error_while_the_count_stands_or_their_way_is_a_whole_number_of_steps() {
+        let mut step = CountStep::default();
+        let at = |t: f64| MonoNs(7_000_000_000) + DurNs::from_secs_f64(t);
+        for k in 0..=20_u32 {
+            let t = f64::from(k) / 10.0;
+            step.hear(at(t), if t < 1.0 { 3.0 } else { 3.01 }, 0.01);
+        }
+        let period = DurNs(100_000_000);
+        for (since_s, way_m, looks) in [
+            (0.0, 0.005, 1.0),
+            (0.0, 0.0025, 2.0),
+            (0.0, 0.012, 2.5),
+            (0.0, 0.01, 50.0),
+            (0.0, 0.02, 50.0),
+            (0.7, 0.005, 7.0),
+            (0.7, 0.000_5, 10.0),
+            (9.0, 0.005, 50.0),
+        ] {
+            let found = step.looks_at_an_error(at(1.0 + since_s), period, way_m, 0.01);
+            assert!((found - looks).abs() < 1e-6, "{since_s} {way_m}: {found}");
+        }
+    }
+
+    /// Before it has moved, a common step; then the smallest change so far.
+    #[test]
+    fn a_step_is_guessed_until_counts_show_it() {
+        let mut step = CountStep::default();
+        for k in 0..100 {
+            step.hear(at(k), 3.0, 0.0005);
+        }
+        assert!((step.step_m(0.0005) - COMMON_STEP_M).abs() < 1e-12);
+        assert!((step.step_m(0.05) - 0.05).abs() < 1e-12, "as stated");
+        step.hear(at(100), 3.048, 0.0005);
+        assert!((step.step_m(0.0005) - 0.048).abs() < 1e-12);
+        step.hear(at(101), 3.0485, 0.0005);
+        assert!((step.step_m(0.0005) - 0.0005).abs() < 1e-12, "it is finer");
+    }
+}

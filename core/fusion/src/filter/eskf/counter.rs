@@ -1,0 +1,82 @@
+//! The counter's readings against the estimate: what is fused, and what a dispute changes.
+
+use headrace_geometry::math;
+use headrace_sensor::device::SensorKind;
+use headrace_sensor::reading::Reading;
+
+use super::Eskf;
+use crate::filter::agreement;
+use crate::filter::cable::{CableReading, Use};
+use crate::filter::settings::Settings;
+use crate::filter::slack_level::Noises;
+use crate::filter::sources::Source;
+use crate::filter::state::{CREEP, Errors, POSITION, RATE_BIAS, VELOCITY, add_to};
+use crate::filter::window::Waiting;
+
+/// Steps by which a lively slack moves a counter in a second.
+const LIVELY_STEPS: f64 = 4.0;
+
+impl Eskf {
+    /// Judges a counter's reading by its innovation and that one's variance, m and m^2: whether to fuse it. `None` of other sensors.
+    pub(super) fn believes_counter(
+        &mut self,
+        waiting: &Waiting,
+        source: &Source,
+        [off_m, variance_m2]: [f64; 2],
+        settings: &Settings,
+        errors: &mut Errors,
+    ) -> Option<bool> {
+        let (SensorKind::Tether { zero_at_m, scale }, Reading::TetherLength(length)) =
+            (source.sensor.kind, waiting.reading)
+        else {
+            return None;
+        };
+        let (at, shown_m) = (waiting.at, zero_at_m + scale * length.length_m);
+        let step_m = source.count_step.step_m(length.resolution_m) * scale.abs();
+        let known = self.factors.variance(RATE_BIAS).max(self.factors.variance(RATE_BIAS + 1));
+        let [restless, _] = self.unrest.factors();
+        let noises = Noises::of(
+            settings.tether_sd_m * settings.tether_sd_m + step_m * step_m / 12.0,
+            known,
+            restless * settings.rate_bias.density(),
+        );
+        let is_usual = self.slack_level.hear(at, shown_m, noises, settings);
+        let is_lively = self.slack_level.usual_m() > LIVELY_STEPS * step_m;
+        let agrees = off_m * off_m <= settings.gate * variance_m2;
+        let sd_m = math::sqrt(variance_m2);
+        Some(self.trusts(&CableReading { at, shown_m, off_m, sd_m, agrees, is_usual, is_lively }, errors))
+    }
+
+    /// Judges a cable reading; whether it is to be fused. What it has lost becomes creep.
+    fn trusts(&mut self, reading: &CableReading, errors: &mut Errors) -> bool {
+        match self.cable.take(reading) {
+            Use::Fuse => return true,
+            Use::Withhold => {}
+            Use::Dispute(corrections) => {
+                for (i, by) in [POSITION, VELOCITY].into_iter().zip(corrections) {
+                    add_to(errors, i, -by);
+                    add_to(&mut self.doubts, i, by * by);
+                }
+                self.ties += 1;
+            }
+            Use::Slipped(lost_m) => {
+                self.slack_level.skip();
+                // The vehicle stays where it is, so that what is placed now fits what was placed in the doubt.
+                add_to(errors, CREEP, lost_m);
+                add_to(&mut self.doubts, CREEP, lost_m * lost_m);
+                // Either may have been wrong: what the counter has lost, and what the vehicle may have made meanwhile.
+                self.slipped_m2 += (lost_m * lost_m).max(reading.sd_m * reading.sd_m);
+                self.ties += 1;
+            }
+            Use::Seek(lacking_m) => {
+                self.way_sought = Some(reading.at);
+                self.slack_level.skip();
+                self.slipped_m2 += lacking_m * lacking_m;
+                add_to(&mut self.doubts, CREEP, lacking_m * lacking_m);
+                agreement::seek_way(&mut self.doubts);
+                self.ties += 1;
+            }
+        }
+        false
+    }
+}

@@ -1,0 +1,409 @@
+//! How fast and how far the cable's slack changes, measured by comparing the counter with inertial motion in raw form.
+//!
+//! The difference of both is slack, plus what the inertial unit's constant errors make of it: a polynomial of second degree in time. Its
+//! third differences show slack alone. They are compared, at several lags, with those of the slack model; where they are larger than
+//! declared, the slack is faster or reaches farther. A third difference that is far larger than usual shows that the counter or the
+//! inertial unit has gone wrong. No cable reading has changed what is compared here: of the estimate only its heading is used.
+//! Derivation: `docs/fusion.md`, "Slack".
+
+use super::inertial::Felt;
+use super::settings::{Settings, Wander};
+use super::state::{State, matrix, rotation, rotation_vector};
+use headrace_geometry::frames::{Body, Rot, Tunnel, Vec3};
+use headrace_geometry::math;
+use headrace_geometry::time::{DurNs, MonoNs};
+use headrace_snapshot::stateful;
+
+/// Lags of the third differences, s.
+const LAGS_S: [f64; 4] = [0.5, 1.0, 2.0, 4.0];
+/// Room for the differences between counter and inertial motion: those of three of the longest lags at ten a second.
+const ROOM: usize = 256;
+/// Room for inertial samples of an epoch.
+const KNOTS: usize = 256;
+/// Averaging time of the mean squares, s.
+const MEMORY_S: f64 = 40.0;
+/// Times its rms that a third difference counts at most: faults are rare and large, slack isn't.
+const MOST_SDS: f64 = 3.0;
+/// Standard deviations by which a mean square may exceed what noise explains: it is of few independent differences.
+const MARGIN_SDS: f64 = 1.5;
+/// Time constant by which inertial velocity is forgotten, s: it keeps numbers small and hardly changes a third difference.
+const FORGETS_S: f64 = 1000.0;
+/// Time over which the attitude is levelled and turned to the estimate's heading, s: slowly, as only what changes within a lag counts.
+const LEVELS_S: f64 = 100.0;
+/// Difference from the estimate's attitude from which one of both is lost, and nothing is compared, rad.
+const MOST_OFF_RAD: f64 = 0.3;
+/// Standard deviations within which counter and inertial motion agree, once so many differences have been seen.
+const AGREES_SDS: f64 = 4.0;
+const FEW: u32 = 50;
+const ENOUGH: u32 = 200;
+/// How many times faster than declared slack is taken to be until it has been compared.
+const AT_FIRST: f64 = 2.0;
+/// Third differences up to a few of these say nothing: what a lever arm and a leaning vehicle make of them, m.
+const LEAST_M: f64 = 0.01;
+/// Time by which counter and inertial unit may be late against one another where a speed changes, s.
+const LATE_S: f64 = 0.1;
+/// Averages are compared with the model this often.
+const COMPARES: DurNs = DurNs(1_000_000_000);
+/// Readings farther apart than this aren't compared.
+const GAP: DurNs = DurNs(1_500_000_000);
+/// Shortest time constant, and farthest reach, of slack: faster is noise of the counter; farther is a fault. s, m.
+const LEAST_TIME_S: f64 = 0.15;
+const MOST_REACH_M: f64 = 0.15;
+
+/// See the module's description.
+#[derive(Debug, Clone)]
+pub(super) struct SlackLevel {
+    attitude: Option<Rot<Tunnel, Body>>,
+    /// Inertial position and velocity along the tunnel, without their constants.
+    way_m: f64,
+    speed_mps: f64,
+    /// The position through the last epoch.
+    knots: Vec<(MonoNs, [f64; 1])>,
+    /// Counter less inertial position, and what the counter shows, m.
+    differences: Vec<(MonoNs, [f64; 2])>,
+    /// Mean squares of third differences by lag, m^2, and their means, m; weights of the averages so far.
+    squares_m2: [f64; LAGS_S.len()],
+    means_m: [f64; LAGS_S.len()],
+    seen: [u32; LAGS_S.len()],
+    /// Time of the last comparison with the model.
+    compared: MonoNs,
+    slack: Option<Wander>,
+}
+
+stateful!(SlackLevel { state: attitude, way_m, speed_mps, squares_m2, means_m, seen, compared, slack; lists: knots, differences; });
+
+impl Default for SlackLevel {
+    /// Allocated without readings.
+    fn default() -> Self {
+        Self {
+            attitude: None,
+            way_m: 0.0,
+            speed_mps: 0.0,
+            knots: Vec::with_capacity(KNOTS),
+            differences: Vec::with_capacity(ROOM),
+            squares_m2: [0.0; LAGS_S.len()],
+            means_m: [0.0; LAGS_S.len()],
+            seen: [0; LAGS_S.len()],
+            compared: MonoNs(0),
+            slack: None,
+        }
+    }
+}
+
+impl SlackLevel {
+    /// The slack's reach and time constant: as declared, or farther and faster where that has shown itself.
+    pub(super) fn slack(&self, settings: &Settings) -> Wander {
+        let declared = settings.slack;
+        self.slack.unwrap_or(Wander { time_s: declared.time_s / AT_FIRST, ..declared })
+    }
+
+    /// Usual third difference over a second, m: what a counter that lives shows.
+    pub(super) fn usual_m(&self) -> f64 {
+        math::sqrt(self.squares_m2[1])
+    }
+
+    /// Begins an epoch at a time.
+    pub(super) fn begin(&mut self, at: MonoNs) {
+        self.knots.clear();
+        self.knots.push((at, [self.way_m]));
+    }
+
+    /// Takes the inertial data from the last knot to `until`, of a vehicle of about this heading and gyro bias. Without them nothing is
+    /// compared.
+    ///
+    /// Allocates: never.
+    pub(super) fn go_on(&mut self, felt: &Felt, until: MonoNs, about: &State, gravity_mps2: f64) {
+        let Some((from, _)) = self.knots.last().copied() else { return };
+        let dt_s = until.since(from).as_secs_f64();
+        let (Some(rate), Some(force)) = (felt.rate_radps, felt.force_mps2) else {
+            self.differences.clear();
+            self.attitude = None;
+            return;
+        };
+        let rate = rate + -about.rate_bias_radps;
+        let before = self.attitude.unwrap_or(about.attitude);
+        let off = rotation_vector(about.attitude * before.inverse());
+        if off.norm() > MOST_OFF_RAD {
+            self.skip();
+            self.attitude = None;
+            return;
+        }
+        let middle = before * rotation(rate.scaled(dt_s / 2.0));
+        let up = matrix(middle) * force.0;
+        let gain = up.x - self.speed_mps / FORGETS_S;
+        self.way_m += (self.speed_mps + gain * dt_s / 2.0) * dt_s;
+        self.speed_mps += gain * dt_s;
+        // Gravity is up: what it leans is turned back.
+        let back = Vec3::<Tunnel>::new(up.y / gravity_mps2, -up.x / gravity_mps2, off.z());
+        let back = rotation(back.scaled(dt_s / LEVELS_S));
+        self.attitude = Some(back * (middle * rotation(rate.scaled(dt_s / 2.0))));
+        if self.knots.len() < KNOTS {
+            self.knots.push((until, [self.way_m]));
+        }
+    }
+
+    /// Takes a reading of the counter, of the epoch that was begun last; whether counter and inertial motion agree as well as usual.
+    ///
+    /// Allocates: never.
+    pub(super) fn hear(&mut self, at: MonoNs, shown_m: f64, noises: Noises, settings: &Settings) -> bool {
+        let Some([inertial_m]) = at_time(&self.knots, at).filter(|_| self.attitude.is_some()) else {
+            return true;
+        };
+        let since = self.differences.last().map(|(last, _)| at.since(*last));
+        if since.is_some_and(|since| !(1..GAP.0).contains(&since.0)) {
+            self.differences.clear();
+        }
+        if self.differences.len() == ROOM {
+            self.differences.remove(0);
+        }
+        self.differences.push((at, [shown_m - inertial_m, shown_m]));
+        let mut agrees = true;
+        for (k, lag_s) in LAGS_S.into_iter().enumerate() {
+            let Some([third_m, spread_m]) = self.third_difference_m(at, lag_s) else { continue };
+            let late_m = LATE_S * spread_m / lag_s;
+            let floor_m2 = noises.third_square_m2(lag_s, settings);
+            let dt_s = since.map_or(0.0, DurNs::as_secs_f64);
+            agrees &= self.note(k, third_m, dt_s, [floor_m2, late_m * late_m]);
+        }
+        if self.seen[0] >= FEW && !(0..COMPARES.0).contains(&at.since(self.compared).0) {
+            self.compared = at;
+            self.slack = Some(self.shown(noises, settings));
+        }
+        agrees
+    }
+
+    /// Compares nothing across this time: the counter has stuck or slipped, or a force is missing.
+    pub(super) fn skip(&mut self) {
+        self.differences.clear();
+    }
+
+    /// Third difference of counter less inertial position, and how far the counter's ways over three successive lags differ, m.
+    fn third_difference_m(&self, at: MonoNs, lag_s: f64) -> Option<[f64; 2]> {
+        let then = |lags: f64| at_time(&self.differences, at - DurNs::from_secs_f64(lags * lag_s));
+        let [[u0, z0], [u1, z1], [u2, z2], [u3, z3]] = [then(0.0)?, then(1.0)?, then(2.0)?, then(3.0)?];
+        let ways_m = [z0 - z1, z1 - z2, z2 - z3];
+        let most_m = ways_m.into_iter().fold(f64::NEG_INFINITY, f64::max);
+        let least_m = ways_m.into_iter().fold(f64::INFINITY, f64::min);
+        Some([u0 - 3.0 * u1 + 3.0 * u2 - u3, most_m - least_m])
+    }
+
+    /// Averages a third difference; whether it is as usual, or at most what noise and readings that come late explain, m^2.
+    fn note(&mut self, lag: usize, third_m: f64, dt_s: f64, [noise_m2, late_m2]: [f64; 2]) -> bool {
+        let (Some(square_m2), Some(mean_m), Some(seen)) =
+            (self.squares_m2.get_mut(lag), self.means_m.get_mut(lag), self.seen.get_mut(lag))
+        else {
+            return true;
+        };
+        // Noise is what it has shown itself to be, once that is known.
+        let seen_m2 = if *seen < ENOUGH { square_m2.max(noise_m2) } else { *square_m2 };
+        let usual_m2 = seen_m2 + late_m2 + LEAST_M * LEAST_M;
+        let off_m = third_m - *mean_m;
+        let agrees = *seen < FEW || off_m * off_m < AGREES_SDS * AGREES_SDS * usual_m2;
+        *seen = seen.saturating_add(1);
+        let share = (dt_s / MEMORY_S).max(1.0 / f64::from(*seen)).min(1.0);
+        *mean_m += share * off_m;
+        let most_m2 = MOST_SDS * MOST_SDS * square_m2.max(1e-4);
+        let counted_m2 = if *seen > 20 { (off_m * off_m).min(most_m2) } else { off_m * off_m };
+        *square_m2 += share * (counted_m2 - *square_m2);
+        agrees
+    }
+
+    /// The slowest slack of the declared reach whose third differences are as large as those seen, or of a farther one.
+    fn shown(&self, noises: Noises, settings: &Settings) -> Wander {
+        let declared = settings.slack;
+        let seen_m2: [f64; LAGS_S.len()] = core::array::from_fn(|k| {
+            let (lag_s, square_m2) = (LAGS_S[k], self.squares_m2[k]);
+            let margin = 1.0 + MARGIN_SDS * math::sqrt(3.0 * lag_s / MEMORY_S);
+            square_m2 - margin * noises.third_square_m2(lag_s, settings)
+        });
+        let least_reach =
+            seen_m2.iter().map(|seen| math::sqrt(seen.max(0.0) / 20.0)).fold(declared.reach, f64::max);
+        let most_reach = MOST_REACH_M.max(declared.reach);
+        // A faster slack reaches farther: a sine lies above a broad spectrum of the same variance.
+        let model = |time_s: f64| {
+            let reach = declared.reach * math::sqrt(math::sqrt(math::sqrt(declared.time_s / time_s)));
+            Wander { reach: reach.max(least_reach).min(most_reach), time_s }
+        };
+        let is_enough = |slack: Wander| {
+            let shares = LAGS_S.iter().map(|lag_s| third_square(lag_s / slack.time_s));
+            let seen = seen_m2.iter().map(|seen| seen / (slack.reach * slack.reach));
+            shares.zip(seen).all(|(share, seen)| share >= seen)
+        };
+        let (mut slow_s, mut fast_s) = (declared.time_s, LEAST_TIME_S.min(declared.time_s));
+        if is_enough(model(slow_s)) {
+            return model(slow_s);
+        }
+        for _ in 0..12 {
+            let middle_s = math::sqrt(slow_s * fast_s);
+            if is_enough(model(middle_s)) { fast_s = middle_s } else { slow_s = middle_s }
+        }
+        model(fast_s)
+    }
+}
+
+/// Mean square of the slack's third difference over its variance, at a lag of so many time constants: autocorrelation (1 + x) e^-x.
+fn third_square(x: f64) -> f64 {
+    let correlation = |x: f64| (1.0 + x) * math::exp(-x);
+    20.0 - 30.0 * correlation(x) + 12.0 * correlation(2.0 * x) - 2.0 * correlation(3.0 * x)
+}
+
+/// What is not slack in the difference of counter and inertial motion.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Noises {
+    /// Variance of the counter's noise and rounding, m^2.
+    pub counter_m2: f64,
+    /// Variance of what a gyro's bias as it is known changes within the averages, rad^2/s^2: it tilts what gravity is taken for.
+    pub rate_bias_rad2ps2: f64,
+}
+
+impl Noises {
+    /// Of a counter's variance, m^2; and of a gyro's bias that is known with a variance, rad^2/s^2, and wanders, rad^2/s^3: an error that
+    /// stays is in the mean.
+    pub(super) fn of(counter_m2: f64, known: f64, wander: f64) -> Self {
+        let renewed = 1.0 - math::exp(-MEMORY_S * wander / known.max(f64::MIN_POSITIVE));
+        Self { counter_m2, rate_bias_rad2ps2: renewed * known }
+    }
+
+    /// Mean square of their third difference at a lag, m^2: of the counter's white noise, and of the inertial unit's declared noise, that is
+    /// white force noise, a walk of tilt and of bias, and a turn of gravity.
+    fn third_square_m2(self, lag_s: f64, settings: &Settings) -> f64 {
+        const GRAVITY_MPS2: f64 = 9.81;
+        let tilting = GRAVITY_MPS2 * settings.rate_noise;
+        let cubed = lag_s * lag_s * lag_s;
+        let walk = tilting * tilting + settings.force_bias.density();
+        let turn = GRAVITY_MPS2 * GRAVITY_MPS2 * self.rate_bias_rad2ps2;
+        let inertial =
+            settings.force_noise * settings.force_noise + 0.55 * walk * lag_s * lag_s + turn * cubed;
+        20.0 * self.counter_m2 + inertial * cubed
+    }
+}
+
+/// The values at a time, between their neighbours; `None` outside.
+fn at_time<const N: usize>(values: &[(MonoNs, [f64; N])], at: MonoNs) -> Option<[f64; N]> {
+    let next = values.partition_point(|(then, _)| *then < at);
+    let (after, to) = *values.get(next)?;
+    if after == at {
+        return Some(to);
+    }
+    let (before, from) = *values.get(next.checked_sub(1)?)?;
+    let share = at.since(before).as_secs_f64() / after.since(before).as_secs_f64();
+    Some(core::array::from_fn(|k| from[k] + share * (to[k] - from[k])))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use headrace_geometry::frames::Point3;
+
+    const GRAVITY_MPS2: f64 = 9.806_65;
+    const NOISES: Noises = Noises { counter_m2: 1e-6, rate_bias_rad2ps2: 0.0 };
+
+    fn still() -> State {
+        State::at_rest(Point3::zero(), Rot::identity())
+    }
+
+    /// The level after two minutes of a vehicle that moves and tilts along a known way: its counter shows `slack_m` more, by time, s.
+    fn level_after(slack_m: impl Fn(f64) -> f64) -> (SlackLevel, u32) {
+        let (mut level, mut unusual) = (SlackLevel::default(), 0);
+        let at = |t: f64| MonoNs(7_000_000_000) + DurNs::from_secs_f64(t);
+        let way_m = |t: f64| 0.2 * t + 0.3 * math::sin(t / 6.0);
+        for epoch in 1..1200_u32 {
+            let from_s = f64::from(epoch) / 10.0;
+            level.begin(at(from_s - 0.1));
+            for k in 1..=10_u32 {
+                let t = from_s - 0.1 + f64::from(k) / 100.0;
+                // A unit tilted by a degree, whose gyros and accelerometers are off.
+                let force_mps2 = -0.3 / 36.0 * math::sin((t - 0.005) / 6.0);
+                let force = Vec3::new(force_mps2 + 0.17 + 0.02, 0.01, GRAVITY_MPS2);
+                let felt = Felt { rate_radps: Some(Vec3::new(1e-4, 2e-4, 0.0)), force_mps2: Some(force) };
+                level.go_on(&felt, at(t), &still(), GRAVITY_MPS2);
+            }
+            let is_usual =
+                level.hear(at(from_s), way_m(from_s) + slack_m(from_s), NOISES, &Settings::default());
+            unusual += u32::from(!is_usual);
+        }
+        (level, unusual)
+    }
+
+    #[test]
+    fn a_taut_or_slow_cable_is_as_declared() {
+        let declared = Settings::default().slack;
+        for slack_m in [0.0, 0.02] {
+            let (level, unusual) = level_after(|t| slack_m * math::sin(t / 6.0));
+            assert_eq!((level.slack(&Settings::default()), unusual), (declared, 0), "{slack_m}");
+        }
+    }
+
+    /// The fastest change of a sine is its amplitude times its angular frequency; of the model, three standard deviations of its rate.
+    #[test]
+    fn a_lively_cable_is_faster_than_declared_and_reaches_farther_if_it_must() {
+        for (amplitude_m, period_s) in [(0.06, 8.0), (0.06, 3.0), (0.15, 4.0), (0.03, 2.0)] {
+            let omega = math::TAU / period_s;
+            let (level, _) = level_after(|t| amplitude_m * math::sin(omega * t));
+            let Wander { reach, time_s } = level.slack(&Settings::default());
+            let (rate_mps, needed_mps) = (reach / time_s, amplitude_m * omega);
+            assert!(3.0 * rate_mps > needed_mps, "{amplitude_m} {period_s}: {rate_mps} for {needed_mps}");
+            assert!(3.0 * reach > amplitude_m && reach <= MOST_REACH_M, "{reach}");
+        }
+    }
+
+    #[test]
+    fn a_counter_that_sticks_is_unusual_within_a_second() {
+        let sticks = |t: f64| {
+            if (60.0..70.0).contains(&t) {
+                -0.2 * (t - 60.0)
+            } else if t < 60.0 {
+                0.0
+            } else {
+                -2.0
+            }
+        };
+        assert_eq!(level_after(|_| 0.0).1, 0);
+        let (_, unusual) = level_after(sticks);
+        assert!(unusual > 50, "{unusual}");
+        let (_, unusual) = level_after(|t| if t < 119.0 { 0.0 } else { -0.2 * (t - 119.0) });
+        assert!(unusual > 2, "{unusual}");
+    }
+
+    #[test]
+    fn without_inertial_data_nothing_is_compared() {
+        let (mut level, _) = level_after(|_| 0.0);
+        level.begin(MonoNs(127_000_000_000));
+        level.go_on(
+            &Felt { rate_radps: None, force_mps2: None },
+            MonoNs(127_100_000_000),
+            &still(),
+            GRAVITY_MPS2,
+        );
+        assert!(level.hear(MonoNs(127_100_000_000), 900.0, NOISES, &Settings::default()));
+        assert!(level.differences.is_empty());
+    }
+
+    /// Against the process itself: two lags in series, stepped by a thousandth of their time.
+    #[test]
+    fn third_differences_of_the_slack_model_are_those_of_the_process() {
+        let (mut seed, mut rate, mut slack) = (3_u64, 0.0, 0.0);
+        let mut draw = || {
+            (0..12).fold(-6.0, |sum, _| {
+                seed = seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+                sum + (seed >> 11) as f64 / (1_u64 << 53) as f64
+            })
+        };
+        let step = 0.01;
+        let mut values = Vec::new();
+        for _ in 0..400_000 {
+            slack += step * (rate - slack);
+            rate += -step * rate + 2.0 * math::sqrt(step) * draw();
+            values.push(slack);
+        }
+        for lag in [30_usize, 100, 300] {
+            let third = |k: usize| {
+                values[k] - 3.0 * values[k - lag] + 3.0 * values[k - 2 * lag] - values[k - 3 * lag]
+            };
+            let mean = (3 * lag..values.len()).map(|k| third(k) * third(k)).sum::<f64>()
+                / (values.len() - 3 * lag) as f64;
+            let expected = third_square(lag as f64 * step);
+            assert!((mean / expected - 1.0).abs() < 0.1, "{lag}: {mean} for {expected}");
+        }
+    }
+}

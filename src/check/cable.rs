@@ -1,0 +1,86 @@
+//! What the counter's steps, the cable's slack and a speed allow together.
+
+use headrace_config::Document;
+use headrace_sampling::margin::ExpectedErrors;
+use headrace_sensor::device::Sense;
+use headrace_vehicle::{NavigationConfig, VehicleConfig};
+use serde_json::{Value, json};
+
+/// Of a vehicle with a cable counter, navigated by the filter.
+pub(super) struct Cable {
+    /// Smallest change of the chainage that it shows, m; `None` where only its readings tell.
+    step_m: Option<f64>,
+    /// Standard deviation of the slack, m, and its time constant, s.
+    slack: [f64; 2],
+    /// The planned speed, or else the largest one, m/s; the standard deviation of a hole at it, and the largest hole that passes, m.
+    at_speed: Option<[f64; 3]>,
+    /// Keys that the file lacks.
+    missing: Vec<String>,
+}
+
+impl Cable {
+    /// For the errors between passes that the sensors leave, and the largest speed, m/s. `None` without a counter or without the filter.
+    pub(super) fn of(
+        vehicle: &VehicleConfig,
+        text: &str,
+        errors: Option<&ExpectedErrors>,
+        v_max_mps: Option<f64>,
+    ) -> Option<Self> {
+        let NavigationConfig::Filter(settings) = &vehicle.navigation else { return None };
+        let step_m = vehicle.counter?.step_m;
+        let planned_mps = Some(vehicle.planned_speed_mps).filter(|planned| *planned > 0.0);
+        let at_speed = errors.zip(planned_mps.or(v_max_mps)).map(|(errors, speed_mps)| {
+            // Passes over a hole of the target's size are that far apart.
+            let sd_m = errors.pass_error_m(vehicle.target_m / speed_mps);
+            [speed_mps, sd_m, (vehicle.target_m - errors.confidence_sd * sd_m).max(0.0)]
+        });
+        let slack = [settings.slack.reach, settings.slack.time_s];
+        Some(Self { step_m, slack, at_speed, missing: missing(vehicle, text) })
+    }
+
+    /// Words for the summary.
+    pub(super) fn line(&self) -> String {
+        let step = self.step_m.map_or("steps as its lines tell".to_owned(), |step_m| {
+            format!("steps of {} mm", (step_m * 1e4).round() / 10.0)
+        });
+        let [slack_m, time_s] = self.slack;
+        let mut line = format!("cable: {step}, slack of {slack_m} m (sd) in {time_s} s");
+        if let Some([speed_mps, sd_m, most_m]) = self.at_speed {
+            line += &format!(
+                "; at {speed_mps:.3} m/s a hole is measured to {sd_m:.3} m (sd), so that holes up to {most_m:.2} m pass"
+            );
+        }
+        if !self.missing.is_empty() {
+            line += &format!("; not in the file: {}", self.missing.join(", "));
+        }
+        line
+    }
+
+    /// The same for programs.
+    pub(super) fn json(&self) -> Value {
+        let [slack_m, time_s] = self.slack;
+        let [speed_mps, sd_m, most_m] = [0, 1, 2].map(|k| self.at_speed.and_then(|at| at.get(k).copied()));
+        json!({
+            "step_m": self.step_m, "slack_sd_m": slack_m, "slack_time_s": time_s, "speed_mps": speed_mps,
+            "hole_sd_m": sd_m, "passes_up_to_m": most_m, "missing": self.missing,
+        })
+    }
+}
+
+/// Keys of the cable that the file lacks: what counts then are usual values.
+fn missing(vehicle: &VehicleConfig, text: &str) -> Vec<String> {
+    let Ok(root) = Document::new("", text).root() else { return Vec::new() };
+    let navigation = root.section("navigation").ok().flatten();
+    let is_said = |key: &&str| navigation.as_ref().is_some_and(|section| section.keys().contains(key));
+    let slack = ["slack_sd_m", "slack_time_s"].into_iter().filter(|key| !is_said(key));
+    let mut missing: Vec<String> = slack.map(|key| format!("navigation.{key}")).collect();
+    let sensors = root.sections("sensors").unwrap_or_default();
+    let counter = vehicle.sensors.iter().position(|sensor| sensor.sense() == Sense::Tether);
+    if let Some((number, table)) = counter.and_then(|number| Some((number, sensors.get(number)?)))
+        && vehicle.counter.is_some_and(|counter| counter.step_m.is_some())
+        && !table.keys().iter().any(|key| ["step_m", "preset"].contains(key))
+    {
+        missing.push(format!("sensors[{number}].step_m"));
+    }
+    missing
+}
