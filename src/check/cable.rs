@@ -44,16 +44,16 @@ impl Cable {
             format!("steps of {} mm", (step_m * 1e4).round() / 10.0)
         });
         let [slack_m, time_s] = self.slack;
-        let mut line = format!("cable: {step}, slack of {slack_m} m (sd) in {time_s} s");
-        if let Some([speed_mps, sd_m, most_m]) = self.at_speed {
-            line += &format!(
-                "; at {speed_mps:.3} m/s a hole is measured to {sd_m:.3} m (sd), so that holes up to {most_m:.2} m pass"
-            );
-        }
+        let mut parts = vec![format!("cable: {step}, slack of {slack_m} m (sd) in {time_s} s")];
+        parts.extend(self.at_speed.map(|[speed_mps, sd_m, most_m]| {
+            format!(
+                "at {speed_mps:.3} m/s a hole is measured to {sd_m:.3} m (sd), so that holes up to {most_m:.2} m pass"
+            )
+        }));
         if !self.missing.is_empty() {
-            line += &format!("; not in the file: {}", self.missing.join(", "));
+            parts.push(format!("not in the file: {}", self.missing.join(", ")));
         }
-        line
+        parts.join("; ")
     }
 
     /// The same for programs.

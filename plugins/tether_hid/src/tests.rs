@@ -211,7 +211,7 @@ fn presets_carry_step_and_noise_and_keys_override_them() {
         ("kind = \"lci90\"\npreset = \"magnet_wheel\"\n", "is not a key here"),
         ("counts_per_metre = 2000\nstep_m = 0\n", "must be a number from"),
     ] {
-        let error = configured(wrong).err().unwrap().to_string();
+        let error = configured(wrong).err().unwrap();
         assert!(error.contains(said), "{error}");
     }
 }
