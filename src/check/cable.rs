@@ -1,4 +1,4 @@
-//! What the counter's steps, the cable's slack and a speed allow together.
+//! Accuracy that counter steps, slack and speed allow together.
 
 use headrace_config::Document;
 use headrace_sampling::margin::ExpectedErrors;
@@ -6,9 +6,9 @@ use headrace_sensor::device::Sense;
 use headrace_vehicle::{NavigationConfig, VehicleConfig};
 use serde_json::{Value, json};
 
-/// Of a vehicle with a cable counter, navigated by the filter.
+/// Cable accuracy of a vehicle with a counter and the filter.
 pub(super) struct Cable {
-    /// Smallest change of the chainage that it shows, m; `None` where only its readings tell.
+    /// Smallest change of the chainage, m; `None` if each reading carries it.
     step_m: Option<f64>,
     /// Standard deviation of the slack, m, and its time constant, s.
     slack: [f64; 2],
@@ -40,7 +40,7 @@ impl Cable {
 
     /// Words for the summary.
     pub(super) fn line(&self) -> String {
-        let step = self.step_m.map_or("steps as its lines tell".to_owned(), |step_m| {
+        let step = self.step_m.map_or("steps given by each reading".to_owned(), |step_m| {
             format!("steps of {} mm", (step_m * 1e4).round() / 10.0)
         });
         let [slack_m, time_s] = self.slack;
@@ -67,7 +67,7 @@ impl Cable {
     }
 }
 
-/// Keys of the cable that the file lacks: what counts then are usual values.
+/// Keys of the cable that the file lacks. Defaults apply instead.
 fn missing(vehicle: &VehicleConfig, text: &str) -> Vec<String> {
     let Ok(root) = Document::new("", text).root() else { return Vec::new() };
     let navigation = root.section("navigation").ok().flatten();

@@ -99,12 +99,12 @@ pub struct BiasSpec {
     pub time_s: f64,
 }
 
-/// What is known of a cable counter beforehand.
+/// Step and noise of a cable counter, from its vehicle file or preset.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct CounterSpec {
-    /// Smallest change of the length, m; `None` where only its readings tell.
+    /// Smallest change of the length, m; `None` if each reading carries it.
     pub step_m: Option<f64>,
-    /// Noise beside that, standard deviation, m; `None` where it isn't known.
+    /// Noise without rounding, standard deviation, m; `None` if unknown.
     pub sd_m: Option<f64>,
 }
 
@@ -165,7 +165,7 @@ pub trait Device: Send + Sync {
         None
     }
 
-    /// For a cable counter, what is known of it: navigation goes by its noise unless the vehicle file says otherwise.
+    /// Step and noise of a cable counter; `[navigation]` overrides the noise.
     fn counter(&self) -> Option<CounterSpec> {
         None
     }

@@ -59,7 +59,7 @@ pub struct VehicleConfig {
     pub sensors: Vec<Box<dyn Device>>,
     /// The common part of each sensor's table, in the same order.
     pub sensor_configs: Vec<SensorConfig>,
-    /// What is known of the cable counter; `None` without one.
+    /// Step and noise of the cable counter; `None` without one.
     pub counter: Option<CounterSpec>,
     /// Files that this one refers to, with their text, so that a log can be replayed without them.
     pub attachments: Vec<(String, String)>,

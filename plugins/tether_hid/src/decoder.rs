@@ -27,7 +27,7 @@ pub struct Counter {
     pub counting: Counting,
     /// Counts per metre of cable; negative if the count falls as cable is paid out.
     pub counts_per_metre: f64,
-    /// Smallest change of the length by the wheel's build, m; at most a count's where the wheel is as fine as its counts.
+    /// Smallest change of the length by the wheel's construction, m; 0 if it is one count.
     pub step_m: f64,
     /// Maximum winch speed, m/s.
     pub max_speed_mps: f64,

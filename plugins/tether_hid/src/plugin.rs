@@ -44,12 +44,12 @@ enum Wire {
 #[derive(Clone, Copy)]
 struct Preset {
     counts_per_metre: f64,
-    /// Noise beside the rounding, m: a cable that slips a little on its wheel.
+    /// Noise without rounding, m: the cable slips a little on its wheel.
     sd_m: f64,
 }
 
-/// A wheel of half a metre with an optical encoder of 1,000 counts a turn; and one with a magnet every centimetre, which lead and lag by up to
-/// their distance.
+/// Typical builds: an encoder of 1,000 counts a turn on a wheel of 0.5 m, and a wheel with a magnet every centimetre. The noise is assumed, not
+/// from a datasheet.
 const PRESETS: [(&str, Preset); 2] = [
     ("encoder_wheel", Preset { counts_per_metre: 2000.0, sd_m: 0.005 }),
     ("magnet_wheel", Preset { counts_per_metre: 100.0, sd_m: 0.01 }),

@@ -361,9 +361,8 @@ fn what_the_planned_speed_allows_is_told_beside_what_a_plan_could() {
     assert_eq!((usual.code, most.code), (Some(0), Some(0)));
 }
 
-/// What a counter's steps, the slack and the speed allow together, and which keys are missing.
 #[test]
-fn what_cable_and_speed_allow_is_told_with_the_keys_that_are_missing() {
+fn check_says_what_cable_and_speed_allow_and_names_missing_keys() {
     let folder = Folder::new();
     let slack = "[navigation]\nslack_sd_m = 0.2\nslack_time_s = 5\n\n[[sensors]]\nid = \"sonar_0\"";
     let counts = "counts_per_metre = 2000";

@@ -10,7 +10,7 @@ use headrace_geometry::time::{DurNs, MonoNs};
 
 /// Changes of the count in a block. The step is the larger of the last two blocks': a garbled reading spoils one of them.
 const BLOCK: u32 = 50;
-/// What a counter that hasn't moved yet may have for a step, m.
+/// Step of a counter that has not moved yet, m: common steps are 0.5 mm to 1 cm.
 const COMMON_STEP_M: f64 = 0.01;
 /// Most readings that are taken for looks at one and the same rounding error.
 const MOST_LOOKS: f64 = 50.0;
@@ -35,11 +35,10 @@ pub struct CountStep {
 impl CountStep {
     /// Takes a reading of a counter whose step is stated, m.
     pub fn hear(&mut self, at: MonoNs, length_m: f64, stated_m: f64) {
-        let before_m = self.last_m.replace(length_m).unwrap_or(f64::INFINITY);
-        if before_m.is_infinite() {
+        let Some(before_m) = self.last_m.replace(length_m) else {
             self.changed = at;
             return;
-        }
+        };
         let change = math::round_to_i64((length_m - before_m) / stated_m).unsigned_abs();
         if change == 0 {
             self.stands = self.stands.saturating_add(1);

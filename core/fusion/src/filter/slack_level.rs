@@ -30,7 +30,7 @@ const MARGIN_SDS: f64 = 1.5;
 const FORGETS_S: f64 = 1000.0;
 /// Time over which the attitude is levelled and turned to the estimate's heading, s: slowly, as only what changes within a lag counts.
 const LEVELS_S: f64 = 100.0;
-/// Difference from the estimate's attitude from which one of both is lost, and nothing is compared, rad.
+/// Largest difference from the estimate's attitude, rad. Beyond it the track begins anew.
 const MOST_OFF_RAD: f64 = 0.3;
 /// Standard deviations within which counter and inertial motion agree, once so many differences have been seen.
 const AGREES_SDS: f64 = 4.0;
@@ -42,6 +42,8 @@ const AT_FIRST: f64 = 2.0;
 const LEAST_M: f64 = 0.01;
 /// Time by which counter and inertial unit may be late against one another where a speed changes, s.
 const LATE_S: f64 = 0.1;
+/// Slack is lively if it usually moves the counter by more than so many steps in a second.
+const LIVELY_STEPS: f64 = 4.0;
 /// Averages are compared with the model this often.
 const COMPARES: DurNs = DurNs(1_000_000_000);
 /// Readings farther apart than this aren't compared.
@@ -97,9 +99,11 @@ impl SlackLevel {
         self.slack.unwrap_or(Wander { time_s: declared.time_s / AT_FIRST, ..declared })
     }
 
-    /// Usual third difference over a second, m: what a counter that lives shows.
-    pub(super) fn usual_m(&self) -> f64 {
-        math::sqrt(self.squares_m2[1])
+    /// Whether slack moves a counter of this step, m, all the time: third differences over a second usually exceed [`LIVELY_STEPS`] and the
+    /// noise.
+    pub(super) fn is_lively(&self, step_m: f64, noises: Noises, settings: &Settings) -> bool {
+        let least_m = LIVELY_STEPS * step_m;
+        self.squares_m2[1] > (least_m * least_m).max(noises.third_square_m2(1.0, settings))
     }
 
     /// Begins an epoch at a time.
@@ -247,18 +251,18 @@ fn third_square(x: f64) -> f64 {
     20.0 - 30.0 * correlation(x) + 12.0 * correlation(2.0 * x) - 2.0 * correlation(3.0 * x)
 }
 
-/// What is not slack in the difference of counter and inertial motion.
+/// Noise in the difference of counter and inertial motion.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Noises {
     /// Variance of the counter's noise and rounding, m^2.
     pub counter_m2: f64,
-    /// Variance of what a gyro's bias as it is known changes within the averages, rad^2/s^2: it tilts what gravity is taken for.
+    /// Variance of the change of a gyro bias error within [`MEMORY_S`], rad^2/s^2: it tilts gravity.
     pub rate_bias_rad2ps2: f64,
 }
 
 impl Noises {
-    /// Of a counter's variance, m^2; and of a gyro's bias that is known with a variance, rad^2/s^2, and wanders, rad^2/s^3: an error that
-    /// stays is in the mean.
+    /// From the counter's variance, m^2, the variance of the estimated gyro bias, rad^2/s^2, and its random walk, rad^2/s^3. A constant bias
+    /// error does not count: it is in the mean.
     pub(super) fn of(counter_m2: f64, known: f64, wander: f64) -> Self {
         let renewed = 1.0 - math::exp(-MEMORY_S * wander / known.max(f64::MIN_POSITIVE));
         Self { counter_m2, rate_bias_rad2ps2: renewed * known }

@@ -13,9 +13,6 @@ use crate::filter::sources::Source;
 use crate::filter::state::{CREEP, Errors, POSITION, RATE_BIAS, VELOCITY, add_to};
 use crate::filter::window::Waiting;
 
-/// Steps by which a lively slack moves a counter in a second.
-const LIVELY_STEPS: f64 = 4.0;
-
 impl Eskf {
     /// Judges a counter's reading by its innovation and that one's variance, m and m^2: whether to fuse it. `None` of other sensors.
     pub(super) fn believes_counter(
@@ -41,7 +38,7 @@ impl Eskf {
             restless * settings.rate_bias.density(),
         );
         let is_usual = self.slack_level.hear(at, shown_m, noises, settings);
-        let is_lively = self.slack_level.usual_m() > LIVELY_STEPS * step_m;
+        let is_lively = self.slack_level.is_lively(step_m, noises, settings);
         let agrees = off_m * off_m <= settings.gate * variance_m2;
         let sd_m = math::sqrt(variance_m2);
         Some(self.trusts(&CableReading { at, shown_m, off_m, sd_m, agrees, is_usual, is_lively }, errors))
