@@ -320,6 +320,53 @@ fn a_power_cut_leaves_all_that_was_synced_also_after_an_error() {
     }
 }
 
+/// Seconds of a dive that a kill costs where each sync takes so long: 20 ms make a tick and 20 packets.
+fn lost_s(sync: Duration) -> f64 {
+    const TICK: Duration = Duration::from_millis(20);
+    let folder = Folder::new("slow syncs");
+    let path = folder.0.join("dive.mcap");
+    let waited_ns = Arc::new(std::sync::atomic::AtomicU64::new(0));
+    let waits = Arc::clone(&waited_ns);
+    let sync_ns = u64::try_from(sync.as_nanos()).unwrap();
+    let storage = Faulty::new(move |op, _| {
+        if op == Op::Sync {
+            waits.fetch_add(sync_ns, std::sync::atomic::Ordering::Relaxed);
+        }
+        None
+    });
+    let begun =
+        Recorder::unthreaded(Box::new(storage.clone()), &path, &header(true), &rotation(None), 8 << 20, None);
+    let (mut port, mut worker) = begun.unwrap();
+    let waited = || Duration::from_nanos(waited_ns.swap(0, std::sync::atomic::Ordering::Relaxed));
+    let (mut now, mut ticks) = (waited(), 0);
+    while now < Duration::from_secs(40) {
+        while TICK * ticks < now {
+            let at = MonoNs(u64::from(ticks) * 20_000_000 + 1);
+            for packet in 0..20 {
+                port.raw(0, at, at, &noise(packet, 100)).unwrap();
+            }
+            port.tick(ticks.into(), at, &[0; 20]).unwrap();
+            ticks += 1;
+        }
+        if !worker.step(now) {
+            now += Duration::from_millis(2);
+        }
+        now += waited();
+    }
+    // Killed in the last moment of a sync, or between two.
+    storage.store(false);
+    let (seen, _) = read_back(&folder);
+    now.as_secs_f64() - seen.last().unwrap().1 as f64 / 1e9
+}
+
+#[test]
+fn slow_syncs_cost_no_more_than_a_second_and_a_sync() {
+    for sync_s in [0.001, 0.01, 0.1, 0.25, 0.5, 0.7, 1.0, 2.0, 5.0] {
+        let lost = lost_s(Duration::from_secs_f64(sync_s));
+        assert!(lost <= 1.0 + sync_s, "{lost} s are lost where a sync takes {sync_s} s");
+    }
+}
+
 #[test]
 fn a_recording_with_a_fault_is_recovered_as_one_log_that_tells_it() {
     let folder = Folder::new("recovered");
