@@ -22,7 +22,7 @@ pub enum AlertKind {
     HeadConstant,
     /// A head contradicts the design where other heads agree with it.
     HeadOutvoted,
-    /// The cable's counter sticks, slips or runs free: its readings aren't used.
+    /// The cable's counter differs from the inertial unit or from a velocity log: one of them has gone wrong.
     CableDoubted,
     /// Ranges contradict a setting of the vehicle file.
     SettingDoubted,
@@ -30,8 +30,8 @@ pub enum AlertKind {
 
 /// Kinds of alerts that name a head.
 const HEAD_KINDS: usize = 3;
-/// Most alerts: one of each kind, or of each kind and head.
-pub const MOST_ALERTS: usize = AlertKind::ALL.len() - HEAD_KINDS + HEAD_KINDS * MAX_HEADS;
+/// Most alerts: one of each kind, or of each kind and head, and one of the cable and a velocity log.
+pub const MOST_ALERTS: usize = AlertKind::ALL.len() + 1 - HEAD_KINDS + HEAD_KINDS * MAX_HEADS;
 
 impl AlertKind {
     /// All of them.
@@ -83,10 +83,10 @@ pub struct Alert {
     /// Chainage of its first occurrence, m.
     pub x_m: f64,
     /// Largest deviation, m: beyond the end, or a section's mean from the design profile. Of a head, the mean between
-    /// successive returns, its constant range, or its mean deviation from the design. Of the cable's counter, the longest way
-    /// on which it wasn't believed.
+    /// successive returns, its constant range, or its mean deviation from the design. Of the cable's counter, the largest difference
+    /// from the other source.
     pub worst_m: f64,
-    /// The head that isn't believed.
+    /// The head that isn't believed, or the velocity log that the cable's counter differs from.
     pub source: Option<SourceId>,
     /// The setting in doubt, as last judged.
     pub setting: Option<SettingDoubt>,
@@ -102,7 +102,7 @@ impl Alerts {
         self.note_of(None, kind, at, x_m, off_m)
     }
 
-    /// The same of a head.
+    /// The same of a head, or of the velocity log that the cable differs from.
     pub fn note_of(
         &mut self,
         source: Option<SourceId>,
@@ -133,13 +133,20 @@ impl Alerts {
     }
 
     /// Records an occurrence that lasts and began at `since`, and is counted once; true when the first one is recorded first.
-    pub fn note_lasting(&mut self, kind: AlertKind, since: MonoNs, x_m: f64, off_m: f64) -> bool {
-        match self.get_mut(kind) {
+    pub fn note_lasting(
+        &mut self,
+        source: Option<SourceId>,
+        kind: AlertKind,
+        since: MonoNs,
+        x_m: f64,
+        off_m: f64,
+    ) -> bool {
+        match self.get_mut(kind, source) {
             Some(alert) if alert.latest == since => {
                 alert.worst_m = alert.worst_m.max(off_m);
                 false
             }
-            _ => self.note(kind, since, x_m, off_m),
+            _ => self.note_of(source, kind, since, x_m, off_m),
         }
     }
 
@@ -152,7 +159,7 @@ impl Alerts {
         if is_new {
             self.note(kind, at, x_m, 0.0);
         }
-        if let Some(alert) = self.get_mut(kind) {
+        if let Some(alert) = self.get_mut(kind, None) {
             alert.setting = Some(*doubt);
         }
         is_new
@@ -163,8 +170,8 @@ impl Alerts {
         self.iter().find(|alert| alert.kind == kind && alert.source == source)
     }
 
-    fn get_mut(&mut self, kind: AlertKind) -> Option<&mut Alert> {
-        self.0.iter_mut().flatten().find(|alert| alert.kind == kind && alert.source.is_none())
+    fn get_mut(&mut self, kind: AlertKind, source: Option<SourceId>) -> Option<&mut Alert> {
+        self.0.iter_mut().flatten().find(|alert| alert.kind == kind && alert.source == source)
     }
 
     /// All alerts.

@@ -287,7 +287,7 @@ pub fn cleared_text(from_m: f64, to_m: f64) -> String {
     format!("cleared  ch {} to {}", station(from_m), station(to_m))
 }
 
-/// Text of an alert at a chainage, m, with the deviation, m, and the head where it names one.
+/// Text of an alert at a chainage, m, with the deviation, m, and the head or velocity log where it names one.
 pub fn alert_text(kind: AlertKind, head: &str, x_m: f64, off_m: f64) -> String {
     let x = station(x_m);
     match kind {
@@ -308,6 +308,10 @@ pub fn alert_text(kind: AlertKind, head: &str, x_m: f64, off_m: f64) -> String {
             "ch {x}  {head} sees a wall {off_m:+.2} m off the one that other heads see; its returns don't count"
         ),
         AlertKind::SettingDoubted => format!("ch {x}  ranges contradict a setting of the vehicle file"),
+        AlertKind::CableDoubted if !head.is_empty() => format!(
+            "ch {x}  cable counter and {head} differ by {:.2} m: one of them is wrong; sections there wait",
+            off_m.abs()
+        ),
         AlertKind::CableDoubted => format!(
             "ch {x}  cable counter and inertial unit differ by {:.2} m: position by the inertial unit alone; sections there wait",
             off_m.abs()

@@ -8,6 +8,7 @@ mod causes;
 mod confidence;
 mod cost;
 mod cost_trades;
+mod counters;
 mod dives;
 mod far_and_long;
 mod faults;

@@ -8,6 +8,7 @@ use serde::{Deserialize, Serialize};
 
 use headrace_geometry::math;
 use headrace_geometry::time::{DurNs, MonoNs};
+use headrace_sensor::reading::SourceId;
 
 /// Averaging time of innovations, s. A dispute takes back the corrections of about as long: the counter went wrong before it was noticed.
 const RECENT_S: f64 = 1.0;
@@ -49,8 +50,10 @@ pub struct CableDoubt {
     pub since: MonoNs,
     /// Chainage expected then, m.
     pub from_m: f64,
-    /// Largest difference since between the counter and the estimate, which the inertial unit carries, m.
+    /// Largest difference since between the counter and the other source, m.
     pub differs_m: f64,
+    /// The velocity log that it differs from; `None` of the estimate, which the inertial unit carries.
+    pub log: Option<SourceId>,
 }
 
 /// A reading against the estimate.
@@ -129,7 +132,7 @@ impl Cable {
     pub fn doubt(&self, now: MonoNs) -> Option<CableDoubt> {
         let Dispute { first, most_m: differs_m, .. } = self.dispute?;
         let has_lasted = now.since(first.at).0 >= NOTICED_AFTER.0;
-        has_lasted.then(|| CableDoubt { since: first.at, from_m: first.expected_m(), differs_m })
+        has_lasted.then(|| CableDoubt { since: first.at, from_m: first.expected_m(), differs_m, log: None })
     }
 
     /// By how much the hypotheses differ, m: 0 while counter and estimate agree.

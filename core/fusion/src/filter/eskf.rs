@@ -14,7 +14,7 @@ use super::roughness::{Look, Roughness};
 use super::seen_again::SeenAgain;
 use super::settings::Settings;
 use super::slack_level::SlackLevel;
-use super::sources::{self, Source, TETHER_PERIOD};
+use super::sources::{self, Source, TETHER_PERIOD, VELOCITY_LOOKS};
 use super::state::{
     self, ATTITUDE, ERRORS, Errors, FORCE_BIAS, HEADING, POSITION, RANGES, RATE_BIAS, State, VELOCITY,
     add_to, put,
@@ -389,7 +389,9 @@ impl Eskf {
             } else {
                 source.noise_level.note(kind, number, innovation, of_estimate + white);
             }
-            if matches!(kind, SensorKind::Echosounder { .. }) {
+            if kind == SensorKind::VelocityLog {
+                row.noise = declared * VELOCITY_LOOKS;
+            } else if matches!(kind, SensorKind::Echosounder { .. }) {
                 row.noise =
                     self.spread_over_looks(&row, waiting, [white, bumps, innovation, of_estimate], settings);
             } else if let Reading::Sonar(SonarReturn { range_m: Some(range_m), .. }) = waiting.reading

@@ -16,6 +16,7 @@ pub mod inertial;
 pub mod measure;
 pub mod noise_level;
 pub mod pose_sd;
+mod raw_ways;
 mod roughness;
 mod seen_again;
 pub mod settings;
@@ -38,8 +39,9 @@ use self::cable::CableDoubt;
 use self::context::Context;
 use self::eskf::{BIAS_KNOWN_RADPS, Eskf};
 use self::pose_sd::PoseSd;
+use self::raw_ways::RawWays;
 use self::settings::Settings;
-use self::sources::{ATTITUDE_PERIOD, Consistency, DEPTH_PERIOD, Source};
+use self::sources::{ATTITUDE_PERIOD, Consistency, DEPTH_PERIOD, Source, VELOCITY_PERIOD};
 use self::state::{RANGES, RATE_BIAS, State, rotation};
 use self::suspicion::SettingDoubt;
 use self::window::{Waiting, Window};
@@ -85,6 +87,7 @@ pub struct FilterNavigation {
     unit: Option<usize>,
     listening: Listening,
     stillness: Stillness,
+    raw_ways: RawWays,
     running: Eskf,
     is_running: bool,
     /// Epochs begin at this time, and at multiples of their length after it.
@@ -101,7 +104,7 @@ pub struct FilterNavigation {
     journal: Option<Journal>,
 }
 
-stateful!(FilterNavigation { state: context, window, unit, listening, stillness, running, is_running, epoch_zero, received, standing, revisit, restarts; lists: ahead; slots: sources; fixed: journal; });
+stateful!(FilterNavigation { state: context, window, unit, listening, stillness, raw_ways, running, is_running, epoch_zero, received, standing, revisit, restarts; lists: ahead; slots: sources; fixed: journal; });
 
 impl FilterNavigation {
     /// Without readings yet.
@@ -113,6 +116,7 @@ impl FilterNavigation {
             sources: vec![None; MAX_SOURCES],
             listening: Listening::default(),
             stillness: Stillness::default(),
+            raw_ways: RawWays::default(),
             running: Eskf::default(),
             is_running: false,
             epoch_zero: MonoNs(0),
@@ -166,14 +170,17 @@ impl FilterNavigation {
                 self.window.next_heard(self.running.at).map_or(last, |heard| self.epoch_before(heard));
             let to = due.max(heard).min(last);
             let is_silent = to.since(self.running.at).0 > SILENCE.0;
-            self.running.is_at_rest = self.stillness.is_still() && self.cable_doubt().is_none();
+            self.running.is_at_rest = self.stillness.is_still() && self.dispute().is_none();
             self.running.advance(to, &self.context, &mut self.window, &mut self.sources);
-            if self.running.is_at_rest && self.cable_doubt().is_none() {
+            if self.running.is_at_rest && self.dispute().is_none() {
                 let unit = self.unit.and_then(|unit| self.sources.get(unit).copied().flatten());
                 let mean = self.stillness.take_mean_rate().zip(unit);
                 self.running.rest(mean.map(|(rate, unit)| unit.sensor.mount.rotation * rate));
             }
             self.window.forget(to);
+            let is_told = self.dispute().is_some() || self.has_jumped();
+            let estimate_m = (!is_told).then(|| self.running.state.position.x());
+            self.raw_ways.compare(to, estimate_m, self.running.ties, &self.context.settings);
             self.write_steps();
             if is_silent {
                 self.begin_anew(self.running.pose_sd().along_m);
@@ -181,6 +188,16 @@ impl FilterNavigation {
             }
         }
         self.after_epochs();
+    }
+
+    /// The filter's own dispute with the cable's counter.
+    fn dispute(&self) -> Option<CableDoubt> {
+        self.running().and_then(|running| running.cable.doubt(running.at))
+    }
+
+    /// By how much ways in raw form differ, as an error along the tunnel.
+    fn raw_error(&self) -> Relative {
+        Relative::along(self.raw_ways.doubt().map_or(0.0, |doubt| doubt.differs_m))
     }
 
     fn write_steps(&mut self) {
@@ -299,8 +316,8 @@ impl FilterNavigation {
             }
             (SensorKind::Imu, Reading::Attitude(_)) => source.is_due(at, ATTITUDE_PERIOD),
             (SensorKind::Depth, Reading::Pressure(_)) => source.is_due(at, DEPTH_PERIOD),
-            (SensorKind::VelocityLog, Reading::VelocityOverGround(_))
-            | (SensorKind::Tether { .. }, Reading::TetherLength(_)) => true,
+            (SensorKind::VelocityLog, Reading::VelocityOverGround(_)) => source.is_due(at, VELOCITY_PERIOD),
+            (SensorKind::Tether { .. }, Reading::TetherLength(_)) => true,
             (SensorKind::Imu, Reading::AngularRate(_) | Reading::SpecificForce(_))
                 if self.unit != Some(number) =>
             {
@@ -357,6 +374,7 @@ impl Navigation for FilterNavigation {
             source.consistency.dropped += 1;
             return;
         }
+        self.raw_ways.hear(times.valid, number, sensor, reading, &self.context.site);
         if !self.is_running {
             if sensor.kind == SensorKind::Imu && self.unit.is_none() {
                 self.unit = Some(number);
@@ -399,7 +417,8 @@ impl Navigation for FilterNavigation {
     }
 
     fn pose_sd(&self) -> Option<PoseSd> {
-        self.running().map(Eskf::pose_sd)
+        let raw_m = self.raw_error().sd_m(Vec3::zero());
+        self.running().map(Eskf::pose_sd).map(|sd| PoseSd { along_m: math::hypot(sd.along_m, raw_m), ..sd })
     }
 
     fn stand_s(&self) -> u32 {
@@ -416,11 +435,11 @@ impl Navigation for FilterNavigation {
     }
 
     fn cable_doubt(&self) -> Option<CableDoubt> {
-        self.running().and_then(|running| running.cable.doubt(running.at))
+        self.dispute().or_else(|| self.raw_ways.doubt())
     }
 
     fn fix(&self, at: MonoNs) -> Result<Fix, NoFix> {
-        let relative = self.standing?;
+        let relative = self.standing?.weighted(1.0, &self.raw_error(), 1.0);
         let before = self.ahead.partition_point(|(knot, _)| *knot <= at);
         let (from, state) = self.ahead.get(before.saturating_sub(1)).ok_or(NoFix::Heading)?;
         let mut state = *state;

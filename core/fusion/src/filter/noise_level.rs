@@ -56,9 +56,9 @@ fn limits(kind: SensorKind, scalar: usize) -> Option<[f64; 2]> {
         SensorKind::Head => Some([1.0, 9.0]),
         SensorKind::Echosounder { .. } => Some([0.02, 9.0]),
         SensorKind::Tether { .. } => Some([0.04, 4.0]),
-        SensorKind::Depth | SensorKind::VelocityLog => Some([0.02, 4.0]),
+        SensorKind::Depth => Some([0.02, 4.0]),
         SensorKind::Imu if scalar == 2 => Some([0.02, 4.0]),
-        SensorKind::Imu | SensorKind::Other => None,
+        SensorKind::Imu | SensorKind::VelocityLog | SensorKind::Other => None,
     }
 }
 

@@ -50,7 +50,7 @@ const COMPARES: DurNs = DurNs(1_000_000_000);
 const GAP: DurNs = DurNs(1_500_000_000);
 /// Shortest time constant, and farthest reach, of slack: faster is noise of the counter; farther is a fault. s, m.
 const LEAST_TIME_S: f64 = 0.15;
-const MOST_REACH_M: f64 = 0.15;
+pub(super) const MOST_REACH_M: f64 = 0.15;
 
 /// See the module's description.
 #[derive(Debug, Clone)]
@@ -283,7 +283,7 @@ impl Noises {
 }
 
 /// The values at a time, between their neighbours; `None` outside.
-fn at_time<const N: usize>(values: &[(MonoNs, [f64; N])], at: MonoNs) -> Option<[f64; N]> {
+pub(super) fn at_time<const N: usize>(values: &[(MonoNs, [f64; N])], at: MonoNs) -> Option<[f64; N]> {
     let next = values.partition_point(|(then, _)| *then < at);
     let (after, to) = *values.get(next)?;
     if after == at {

@@ -16,18 +16,20 @@ mod world;
 use std::ops::Range;
 
 use tally::{Tally, share};
-use world::{Fault, Motion, Recipe};
+use world::{Fault, Log, Motion, Recipe};
 
 /// Dives of the ordinary test, a tenth of the many.
 const FEW: Range<u64> = 0..200;
+/// Dives with a velocity log, of four kinds in turn.
+const WITH_LOG: Range<u64> = 0..80;
 const MANY: Range<u64> = 0..2000;
 
-/// Runs the dives on all processors; results are in order of their seeds.
-fn dives(seeds: Range<u64>) -> Vec<(Recipe, Tally)> {
+/// Runs the dives of recipes on all processors; results are in order of their seeds.
+fn dives(seeds: Range<u64>, recipe: fn(u64) -> Recipe) -> Vec<(Recipe, Tally)> {
     let threads = std::thread::available_parallelism().map_or(1, |n| n.get() as u64);
     let of_thread = |thread: u64| {
         let own = seeds.clone().filter(move |seed| seed % threads == thread);
-        own.map(|seed| (Recipe::of(seed), tally::run(Recipe::of(seed), None))).collect::<Vec<_>>()
+        own.map(|seed| (recipe(seed), tally::run(recipe(seed), None))).collect::<Vec<_>>()
     };
     let mut all: Vec<(Recipe, Tally)> = std::thread::scope(|scope| {
         let threads: Vec<_> = (0..threads).map(|thread| scope.spawn(move || of_thread(thread))).collect();
@@ -75,6 +77,9 @@ fn table(all: &[(Recipe, Tally)]) {
     for fault in Fault::ALL {
         row(&format!("fault: {fault:?}"), all, &|recipe| recipe.fault == fault);
     }
+    for log in Log::ALL {
+        row(&format!("velocity log: {log:?}"), all, &|recipe| recipe.log == log);
+    }
     let sound = |recipe: &Recipe| recipe.fault == Fault::None;
     for motion in Motion::ALL {
         row(&format!("{motion:?}, no fault"), all, &|recipe| recipe.motion == motion && sound(recipe));
@@ -97,7 +102,7 @@ fn table(all: &[(Recipe, Tally)]) {
 
 #[test]
 fn errors_are_within_their_standard_deviations_or_reported() {
-    let all = dives(FEW);
+    let all = dives(FEW, Recipe::of);
     table(&all);
     let silent = |is_declared: bool| {
         all.iter().filter(|(recipe, tally)| recipe.is_declared == is_declared && tally.silent > 0).count()
@@ -111,6 +116,25 @@ fn errors_are_within_their_standard_deviations_or_reported() {
     assert!(within(&|recipe| !recipe.is_declared) > 0.93);
     let unsure = share(&of(&all, &is_lively_and_stepped), |tally| [tally.unsure, tally.epochs]);
     assert!(unsure <= 0.08, "{unsure}");
+}
+
+/// A log that hangs, that is a fifth off, or that follows drifting silt is a reason to be unsure, and no reason to be wrong.
+#[test]
+fn a_velocity_log_that_is_wrong_makes_no_error_that_is_not_reported() {
+    let all = dives(WITH_LOG, Recipe::with_log);
+    table(&all);
+    let silent = |is_declared: bool| {
+        all.iter().filter(|(recipe, tally)| recipe.is_declared == is_declared && tally.silent > 0).count()
+    };
+    assert_eq!(silent(true), 0);
+    // Undeclared slack, as without a log.
+    assert!(silent(false) <= 2, "{}", silent(false));
+    let of = |log: Log| of(&all, &move |recipe: &Recipe| recipe.log == log);
+    for log in Log::ALL {
+        assert!(share(&of(log), |tally| [tally.within, tally.fixes]) > 0.9, "{log:?}");
+    }
+    let unsure = share(&of(Log::Sound), |tally| [tally.unsure, tally.epochs]);
+    assert!(unsure < 0.15, "a sound log is no reason to be unsure: {unsure}");
 }
 
 #[test]
@@ -127,5 +151,6 @@ fn two_thousand_dives() {
         std::fs::write(path, trace).unwrap();
         return;
     }
-    table(&dives(seeds));
+    table(&dives(seeds.clone(), Recipe::of));
+    table(&dives(seeds.start..seeds.start + (seeds.end - seeds.start) / 5, Recipe::with_log));
 }

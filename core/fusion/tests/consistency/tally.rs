@@ -9,7 +9,7 @@ use headrace_fusion::{Navigation as _, Times};
 use headrace_geometry::frames::Vec3;
 use headrace_sensor::reading::Reading;
 
-use crate::world::{Dive, IMU, Recipe, seconds, sensor};
+use crate::world::{Dive, Recipe, VELOCITY_LOG, seconds, sensor};
 
 /// The estimate settles until then, s; and until then passes aren't compared.
 const SETTLED_S: f64 = 10.0;
@@ -54,13 +54,14 @@ pub(crate) fn run(recipe: Recipe, mut trace: Option<&mut String>) -> Tally {
     let dive = Dive::new(recipe);
     let mut nav = FilterNavigation::new(dive.profile.clone(), dive.site, recipe.settings());
     let (mut tally, mut last, mut errors) = (Tally::default(), None, VecDeque::new());
-    // The loop withholds a hung unit's readings.
-    let (mut stuck, mut hangs) = (StuckSensor::default(), false);
+    // The loop withholds what a hung unit or log repeats.
+    let mut stuck = [(StuckSensor::default(), false); VELOCITY_LOG + 1];
     for (valid, source, reading) in dive.events() {
-        if let Reading::AngularRate(rate) = reading {
-            hangs = stuck.hangs(valid, rate);
+        let (stuck, hangs) = &mut stuck[source];
+        if let Reading::AngularRate(vector) | Reading::VelocityOverGround(vector) = reading {
+            *hangs = stuck.hangs(valid, vector);
         }
-        if source == IMU && hangs {
+        if *hangs {
             continue;
         }
         nav.update(source, &sensor(source), Times { received: valid, valid }, &reading);

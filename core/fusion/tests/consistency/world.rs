@@ -19,6 +19,8 @@ pub(crate) const ECHOES: usize = 3;
 /// The first of two.
 pub(crate) const HEADS: usize = 7;
 
+pub(crate) const VELOCITY_LOG: usize = 9;
+
 const DEGREE: f64 = core::f64::consts::PI / 180.0;
 const ORIGIN: MonoNs = MonoNs(5_000_000_000_000);
 const GRAVITY_MPS2: f64 = 9.80665;
@@ -51,6 +53,24 @@ pub(crate) enum Fault {
     EchoHangs,
 }
 
+/// What a velocity log does.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Log {
+    /// There is none.
+    None,
+    Sound,
+    /// It repeats its last reading for a while.
+    Hangs,
+    /// It shows a fifth too much, always.
+    Scaled,
+    /// It follows silt that drifts at 0.15 m/s, for a while.
+    Drifts,
+}
+
+impl Log {
+    pub(crate) const ALL: [Self; 4] = [Self::Sound, Self::Hangs, Self::Scaled, Self::Drifts];
+}
+
 impl Motion {
     pub(crate) const ALL: [Self; 4] = [Self::Steady, Self::Swaying, Self::StopAndGo, Self::BackAndForth];
 }
@@ -81,6 +101,7 @@ pub(crate) struct Recipe {
     pub(crate) fault: Fault,
     pub(crate) fault_from_s: f64,
     pub(crate) fault_for_s: f64,
+    pub(crate) log: Log,
     pub(crate) start_m: f64,
     pub(crate) duration_s: f64,
 }
@@ -154,9 +175,15 @@ impl Recipe {
             fault,
             fault_from_s: draws.between(25.0, duration_s - 15.0),
             fault_for_s,
+            log: Log::None,
             start_m: draws.one_of(&[10.0, 3000.0, 6900.0]),
             duration_s,
         }
+    }
+
+    /// The dive of a seed with a velocity log, sound or not in turn.
+    pub(crate) fn with_log(seed: u64) -> Self {
+        Self { log: Log::ALL[seed as usize % Log::ALL.len()], fault: Fault::None, ..Self::of(seed) }
     }
 
     /// Fastest change of a slack that is one sine, m/s.
@@ -326,8 +353,33 @@ impl Dive {
                 Some(self.sonar(HEADS + k, t, &mut draws))
             });
         }
+        let mut draws = Draws(self.recipe.seed ^ 0xD0BB);
+        let mut held = None;
+        every(0.125, 0.017, VELOCITY_LOG, &mut |t| self.over_ground(t, &mut held, &mut draws));
         events.sort_by_key(|(at, ..)| *at);
         events
+    }
+
+    fn over_ground(&self, t: f64, held: &mut Option<Reading>, draws: &mut Draws) -> Option<Reading> {
+        const H_S: f64 = 0.01;
+        let Recipe { log, fault_from_s, fault_for_s, .. } = self.recipe;
+        let mount = sensor(VELOCITY_LOG).mount;
+        let at = |t: f64| self.pose(t).place(mount.position);
+        let moved = (at(t + H_S) - at(t - H_S)).scaled(0.5 / H_S);
+        let moved = self.pose(t).attitude.inverse() * moved + draws.normal3::<Body>(0.01);
+        let is_now = (fault_from_s..fault_from_s + fault_for_s).contains(&t);
+        let moved = match log {
+            Log::None => return None,
+            Log::Scaled => moved.scaled(1.2),
+            Log::Drifts if is_now => moved + Vec3::new(-0.15, 0.0, 0.0),
+            Log::Sound | Log::Hangs | Log::Drifts => moved,
+        };
+        let reading = Reading::VelocityOverGround(mount.rotation.inverse() * moved);
+        if log == Log::Hangs && is_now {
+            return Some(*held.get_or_insert(reading));
+        }
+        *held = None;
+        Some(reading)
     }
 
     fn inertial(&self, every: &mut Every<'_>) {
@@ -508,6 +560,7 @@ pub(crate) fn sensor(source: usize) -> SensorInfo {
         6 => (at(0.1, 0.0, 0.1, 0.0, -quarter, 0.0), echosounder),
         HEADS => (at(0.4, 0.0, 0.0, 0.0, 0.0, 0.0), SensorKind::Head),
         8 => (at(-0.4, 0.0, 0.0, 0.0, 0.0, math::PI), SensorKind::Head),
+        VELOCITY_LOG => (at(-0.1, 0.0, -0.1, 0.0, 0.0, 0.0), SensorKind::VelocityLog),
         _ => unreachable!(),
     };
     SensorInfo { mount, kind }

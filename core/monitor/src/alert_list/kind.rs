@@ -202,7 +202,12 @@ impl ListKind {
         AlertKind::ALL.into_iter().find(|kind| Self::from(*kind) == self)
     }
 
-    /// Whether there may be one for each sensor.
+    /// Whether there may be one for each sensor, besides one for none: the cable's counter may differ from a velocity log.
+    pub(super) fn may_name_a_sensor(self) -> bool {
+        self.is_of_sensor() || self == Self::CableDoubted
+    }
+
+    /// Whether there is one for each sensor.
     pub(super) fn is_of_sensor(self) -> bool {
         matches!(
             self,

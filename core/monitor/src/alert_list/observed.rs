@@ -159,9 +159,10 @@ impl AlertList {
             state.alerts.iter().flatten().find(is_it).copied()
         };
         for kind in crate::alerts::AlertKind::ALL.map(ListKind::from) {
-            let sources = if kind.is_of_sensor() { usize::from(state.sources) } else { 1 };
-            for number in (0..).take(sources) {
-                let source = kind.is_of_sensor().then_some(SourceId(number));
+            let of_none = (!kind.is_of_sensor()).then_some(None);
+            let sources = if kind.may_name_a_sensor() { usize::from(state.sources) } else { 0 };
+            let of_sensors = (0..).take(sources).map(|number| Some(SourceId(number)));
+            for source in of_none.into_iter().chain(of_sensors) {
                 let found = active(kind, source);
                 let figures = match (found, setting) {
                     (Some(alert), Some(doubt)) if kind == ListKind::SettingDoubted => {

@@ -230,10 +230,10 @@ pub struct AlertReport {
     /// Chainage of its first occurrence, m.
     pub x_m: f64,
     /// Largest deviation, m: beyond the end of the tunnel, or a section's mean from the design profile. Of a head: mean
-    /// between successive returns, constant range, or mean deviation from the design. Of the cable's counter, the longest way on
-    /// which it wasn't believed. Of a setting, 0.
+    /// between successive returns, constant range, or mean deviation from the design. Of the cable's counter, the largest difference
+    /// from the other source. Of a setting, 0.
     pub worst_m: f64,
-    /// The head that isn't believed, by its id.
+    /// The head that isn't believed, or the velocity log that the cable's counter differs from, by its id.
     pub head: Option<String>,
     /// The setting in doubt; `None` for other alerts.
     pub setting: Option<SettingReport>,

@@ -7,6 +7,7 @@ use crate::resources::Digests;
 use headrace_fusion::filter::cable::CableDoubt;
 use headrace_geometry::time::MonoNs;
 use headrace_sampling::passes::Situation;
+use headrace_sensor::reading::SourceId;
 
 /// Notes the doubts of a beat.
 pub(super) fn note(
@@ -15,19 +16,20 @@ pub(super) fn note(
     doubts: &Doubts,
     (alerts, notices, digests): (&mut Alerts, &mut Notices, &mut Digests),
 ) {
-    let mut tell = |kind: AlertKind, x_m: f64, off_m: f64| {
-        notices.0.push(Notice::Alert(kind, None));
-        digest_alert(digests, kind, None, at, (x_m, off_m));
+    let mut tell = |source: Option<SourceId>, kind: AlertKind, x_m: f64, off_m: f64| {
+        notices.0.push(Notice::Alert(kind, source));
+        digest_alert(digests, kind, source, at, (x_m, off_m));
     };
-    if let Some(CableDoubt { since, from_m, differs_m }) = doubts.cable
-        && alerts.note_lasting(AlertKind::CableDoubted, since, from_m, differs_m)
-    {
-        tell(AlertKind::CableDoubted, from_m, differs_m);
+    if let Some(CableDoubt { since, from_m, differs_m, log }) = doubts.cable {
+        let kind = AlertKind::CableDoubted;
+        if alerts.note_lasting(log, kind, since, from_m, differs_m) {
+            tell(log, kind, from_m, differs_m);
+        }
     }
     let x_m = situation.pose.map(|pose| pose.position.x());
     if let Some((doubt, x_m)) = doubts.setting.zip(x_m)
         && alerts.note_setting(at, x_m, &doubt)
     {
-        tell(AlertKind::SettingDoubted, x_m, doubt.setting.figure());
+        tell(None, AlertKind::SettingDoubted, x_m, doubt.setting.figure());
     }
 }

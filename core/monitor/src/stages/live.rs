@@ -64,7 +64,7 @@ fn active<'a>(
     }
     let mut active = [None; crate::alerts::MOST_ALERTS];
     let holds = alerts.iter().filter(|alert| match alert.kind {
-        AlertKind::CableDoubted => doubts.cable.is_some(),
+        AlertKind::CableDoubted => doubts.cable.is_some_and(|doubt| doubt.log == alert.source),
         AlertKind::SettingDoubted => doubts.setting.is_some(),
         AlertKind::OutsideTunnel | AlertKind::ProfileContradicted => at.since(alert.latest).0 <= HOLDS.0,
         kind @ (AlertKind::HeadScattered | AlertKind::HeadConstant | AlertKind::HeadOutvoted) => {
@@ -225,7 +225,8 @@ mod tests {
         let relative = Relative::along(pass_error_m);
         let fix = Fix { pose, speed_mps: 0.07, relative, revisit: relative, tie: 0, settled: 0 };
         let fix = lacking.map_or(Ok(fix), Err);
-        let cable = is_cable_doubted.then_some(CableDoubt { since: AT, from_m: 12.0, differs_m: 0.5 });
+        let cable =
+            is_cable_doubted.then_some(CableDoubt { since: AT, from_m: 12.0, differs_m: 0.5, log: None });
         let doubts = Doubts { cable, setting: None, stand_s: 3, hung: 0 };
         let pose = fix.ok().map(|fix| fix.pose);
         let situation = Situation { pose, speed_mps: 0.07, pass_error_m, ..situation(None) };

@@ -49,14 +49,14 @@ pub(super) fn navigate(
 }
 
 impl Navigator {
-    /// Whether the unit that an event is from hangs: what it repeats says nothing.
+    /// Whether the inertial unit or velocity log that an event is from hangs: what it repeats says nothing.
     fn hangs(&mut self, event: &Event) -> bool {
         let source = event.source.index();
         let bit = 1_u64 << (source % 64);
-        if let (Reading::AngularRate(rate_radps), Some(repeats)) =
+        if let (Reading::AngularRate(vector) | Reading::VelocityOverGround(vector), Some(repeats)) =
             (&event.reading, self.repeats.get_mut(source))
         {
-            let hangs = repeats.hangs(event.received, *rate_radps);
+            let hangs = repeats.hangs(event.received, *vector);
             self.hung = if hangs { self.hung | bit } else { self.hung & !bit };
         }
         self.hung & bit != 0

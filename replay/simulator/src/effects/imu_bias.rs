@@ -22,6 +22,8 @@ use crate::stages::Stage;
 
 /// Step of the draws for constant parts; no sample has this number.
 const CONSTANT: u64 = u64::MAX;
+/// Block of the tilt's draws, after the biases'.
+const TILT: u64 = 3;
 
 /// Varying and constant biases of an inertial unit, independent for each axis.
 ///
@@ -29,7 +31,8 @@ const CONSTANT: u64 = u64::MAX;
 /// falls to 1/e within `tau_s` (300 by default); they are stationary from the first sample.
 /// `gyro_constant_degps` and `accel_constant_mps2` are standard deviations of parts constant through the dive.
 /// `attitude_drift_deg_per_hour` turns the unit's own attitude about the vertical at a constant rate, positive to the
-/// left: the effect of biases on the unit's own filter isn't simulated otherwise. All are zero by default.
+/// left, and `tilt_deg` is the standard deviation of a process like the biases' that tilts it, within `tilt_tau_s` (30 by default): the effect
+/// of biases and accelerations on the unit's own filter isn't simulated otherwise. All are zero by default.
 /// Source: Brown and Hwang, Introduction to Random Signals and Applied Kalman Filtering, 4th ed., §4.4 (exact steps).
 pub(super) struct ImuBiasKind;
 
@@ -41,6 +44,8 @@ struct Parameters {
     gyro_constant_radps: f64,
     accel_constant_mps2: f64,
     drift_radps: f64,
+    tilt_rad: f64,
+    tilt_tau_s: f64,
 }
 
 #[derive(Component)]
@@ -50,9 +55,11 @@ struct ImuBias {
     constant: [f64; 6],
     /// In standard deviations: turn rates, then forces.
     wandering: [f64; 6],
+    /// Roll and pitch of the attitude, in standard deviations.
+    tilt: [f64; 2],
     before: Option<MonoNs>,
-    /// Sample interval, correlation over it, and weight of the new draw; kept, as most samples come at one rate.
-    kept: (DurNs, f64, f64),
+    /// Sample interval, and of biases and tilt the correlation over it and the weight of the new draw; kept, as most samples come at one rate.
+    kept: (DurNs, [[f64; 2]; 2]),
 }
 
 impl EffectKind for ImuBiasKind {
@@ -71,7 +78,9 @@ impl EffectKind for ImuBiasKind {
             let gyro_constant = keys::or_zero(table, "gyro_constant_degps", 0.0..=100.0)?;
             let accel_constant_mps2 = keys::or_zero(table, "accel_constant_mps2", 0.0..=10.0)?;
             let drift = keys::or_zero(table, "attitude_drift_deg_per_hour", -3600.0..=3600.0)?;
+            let tilt = keys::or_zero(table, "tilt_deg", 0.0..=30.0)?;
             let values = [
+                ("tilt_deg", tilt),
                 ("gyro_degps", gyro),
                 ("accel_mps2", accel_mps2),
                 ("gyro_constant_degps", gyro_constant),
@@ -86,6 +95,8 @@ impl EffectKind for ImuBiasKind {
                 gyro_constant_radps: gyro_constant.to_radians(),
                 accel_constant_mps2,
                 drift_radps: drift.to_radians() / 3600.0,
+                tilt_rad: tilt.to_radians(),
+                tilt_tau_s: table.number("tilt_tau_s", 1.0..=1e6)?.unwrap_or(30.0),
             })
         })?))
     }
@@ -119,27 +130,34 @@ impl ImuBias {
         for (axis, value) in constant.iter_mut().enumerate() {
             *value *= if axis < 3 { sds[0] } else { sds[1] };
         }
-        let kept = (DurNs::ZERO, 1.0, 0.0);
-        Self { parameters, stream, constant, wandering: [0.0; 6], before: None, kept }
+        let kept = (DurNs::ZERO, [[1.0, 0.0]; 2]);
+        Self { parameters, stream, constant, wandering: [0.0; 6], tilt: [0.0; 2], before: None, kept }
     }
 
     fn wander(&mut self, step: u64, at: MonoNs) {
-        let Parameters { gyro_radps, accel_mps2, tau_s, .. } = self.parameters;
-        if gyro_radps == 0.0 && accel_mps2 == 0.0 {
+        let Parameters { gyro_radps, accel_mps2, tau_s, tilt_rad, tilt_tau_s, .. } = self.parameters;
+        if gyro_radps == 0.0 && accel_mps2 == 0.0 && tilt_rad == 0.0 {
             return;
         }
         let drawn = six(self.stream, step);
+        let tilted = if tilt_rad > 0.0 { self.stream.block(step, TILT).normal() } else { [0.0; 2] };
         match self.before {
-            None => self.wandering = drawn,
+            None => (self.wandering, self.tilt) = (drawn, tilted),
             Some(before) => {
                 let elapsed = at.since(before);
                 if self.kept.0 != elapsed {
-                    let kept = math::exp(-elapsed.as_secs_f64() / tau_s);
-                    self.kept = (elapsed, kept, math::sqrt((1.0 - kept * kept).max(0.0)));
+                    let of = |tau_s: f64| {
+                        let kept = math::exp(-elapsed.as_secs_f64() / tau_s);
+                        [kept, math::sqrt((1.0 - kept * kept).max(0.0))]
+                    };
+                    self.kept = (elapsed, [of(tau_s), of(tilt_tau_s)]);
                 }
-                let (_, kept, fresh) = self.kept;
+                let (_, [[kept, fresh], [tilt_kept, tilt_fresh]]) = self.kept;
                 for (value, new) in self.wandering.iter_mut().zip(drawn) {
                     *value = *value * kept + new * fresh;
+                }
+                for (value, new) in self.tilt.iter_mut().zip(tilted) {
+                    *value = *value * tilt_kept + new * tilt_fresh;
                 }
             }
         }
@@ -147,7 +165,7 @@ impl ImuBias {
     }
 
     fn disturb(&self, inertia: &mut Inertia) {
-        let Parameters { gyro_radps, accel_mps2, drift_radps, .. } = self.parameters;
+        let Parameters { gyro_radps, accel_mps2, drift_radps, tilt_rad, .. } = self.parameters;
         let [a, b, c, d, e, f] = self.wandering;
         let [p, q, r, s, t, u] = self.constant;
         let rate = Vec3::new(a, b, c).scaled(gyro_radps) + Vec3::new(p, q, r);
@@ -157,6 +175,11 @@ impl ImuBias {
         if drift_radps != 0.0 {
             let yaw_rad = drift_radps * inertia.at.since(START).as_secs_f64();
             let turned = Rot::<Level, Level>::from_roll_pitch_yaw(0.0, 0.0, yaw_rad);
+            inertia.attitude = turned * inertia.attitude;
+        }
+        if tilt_rad > 0.0 {
+            let [roll, pitch] = self.tilt.map(|tilt| tilt_rad * tilt);
+            let turned = Rot::<Level, Level>::from_roll_pitch_yaw(roll, pitch, 0.0);
             inertia.attitude = turned * inertia.attitude;
         }
     }
@@ -180,6 +203,8 @@ mod tests {
             gyro_constant_radps: 0.0,
             accel_constant_mps2: 0.0,
             drift_radps: 0.0,
+            tilt_rad: f64::to_radians(0.5),
+            tilt_tau_s: 30.0,
         };
         ImuBias::new(parameters, Stream::new(seed, "imu_bias", "imu"))
     }
@@ -253,6 +278,37 @@ mod tests {
             let yaw_deg = (leaning.attitude * plain.attitude.inverse()).roll_pitch_yaw().2.to_degrees();
             assert!((yaw_deg - 0.01 * plain.at.since(START).as_secs_f64()).abs() < 1e-9);
         }
+    }
+
+    /// Stationary, with the correlation that the time constant says, about level axes alone.
+    #[test]
+    fn a_tilt_wanders_about_level_axes_and_leaves_rates_and_forces_alone() {
+        let keys = "[effects.imu_bias]\ntilt_deg = 0.5\ntilt_tau_s = 2\n";
+        let (plain, tilted) =
+            (Bench::long("").run::<Inertia>("imu"), Bench::long(keys).run::<Inertia>("imu"));
+        let off: Vec<[f64; 3]> = plain
+            .iter()
+            .zip(&tilted)
+            .map(|(plain, tilted)| {
+                assert_eq!((plain.rate_radps, plain.force_mps2), (tilted.rate_radps, tilted.force_mps2));
+                let (roll, pitch, yaw) = (tilted.attitude * plain.attitude.inverse()).roll_pitch_yaw();
+                [roll, pitch, yaw]
+            })
+            .collect();
+        let lag = plain.iter().position(|inertia| inertia.at.since(plain[0].at).0 >= 2_000_000_000).unwrap();
+        let wanted = f64::to_radians(0.5) * f64::to_radians(0.5);
+        // Of a process of correlation time tau, n samples over t seconds are worth t / (2 tau).
+        let worth = plain.len() as f64 / lag as f64 / 2.0;
+        for axis in 0..2 {
+            let product = |lag: usize| {
+                let pairs = off.iter().zip(off.iter().skip(lag));
+                pairs.map(|(a, b)| a[axis] * b[axis]).sum::<f64>() / (off.len() - lag) as f64
+            };
+            let tolerance = 5.0 * math::sqrt(2.0 / worth);
+            assert!((product(0) / wanted - 1.0).abs() < tolerance, "{axis}: {}", product(0) / wanted);
+            assert!((product(lag) / wanted - math::exp(-1.0)).abs() < tolerance, "{axis}");
+        }
+        assert!(off.iter().all(|[.., yaw]| yaw.abs() < 1e-3));
     }
 
     #[test]

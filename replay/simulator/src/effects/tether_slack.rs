@@ -2,6 +2,7 @@
 
 use bevy_ecs::prelude::{Component, Query};
 use headrace_config::{ConfigError, Section};
+use headrace_geometry::math;
 use headrace_sensor::device::Sense;
 use headrace_sensor::measurement::Payout;
 
@@ -20,17 +21,32 @@ use crate::trajectory::{Knots, wandering};
 /// Slack is relative to its mean, which zeroing the counter removes, so it has either sign though no cable is shorter than
 /// the distance. `reach_m` (0.15 by default) is the largest value either way; the standard deviation is 0.4 of it.
 /// `period_s` (30 by default) is the period of the variation: control points of a cubic B-spline are half of it apart.
+/// `swings` are tables of `reach_m` and `period_s`: a cable that swings as a sine, at a random phase, also while the vehicle stands, with its full
+/// reach each time. With them, slack wanders only if `reach_m` is given, too.
 pub(super) struct TetherSlackKind;
 
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone)]
 struct Parameters {
+    /// 0 where slack doesn't wander.
+    reach_m: f64,
+    period_s: f64,
+    swings: Vec<Swing>,
+}
+
+#[derive(Debug, Clone, Copy)]
+struct Swing {
     reach_m: f64,
     period_s: f64,
 }
 
+/// Step of the draws for the phases of swings: far from those of knots.
+const PHASES: u64 = u64::MAX;
+
 #[derive(Component)]
 struct TetherSlack {
     slack: Knots,
+    /// Swings with their phases, radians.
+    swings: Vec<(Swing, f64)>,
 }
 
 impl EffectKind for TetherSlackKind {
@@ -44,9 +60,11 @@ impl EffectKind for TetherSlackKind {
 
     fn read(&self, tables: Vec<Section<'_>>, facts: &Facts) -> Result<Box<dyn Effect>, ConfigError> {
         Ok(Box::new(PerSensor::read(tables, facts, &[Sense::Tether], |table| {
-            let reach_m = table.number("reach_m", 0.001..=50.0)?.unwrap_or(0.15);
+            let swings = table.sections("swings")?.into_iter().map(swing).collect::<Result<Vec<_>, _>>()?;
+            let usual_m = if swings.is_empty() { 0.15 } else { 0.0 };
+            let reach_m = table.number("reach_m", 0.001..=50.0)?.unwrap_or(usual_m);
             let period_s = table.number("period_s", 1.0..=3600.0)?.unwrap_or(30.0);
-            Ok(Parameters { reach_m, period_s })
+            Ok(Parameters { reach_m, period_s, swings })
         })?))
     }
 }
@@ -54,29 +72,43 @@ impl EffectKind for TetherSlackKind {
 impl Effect for PerSensor<Parameters> {
     fn build(&self, sim: &mut Builder<'_>) -> Result<(), SceneError> {
         let duration_s = sim.duration_s();
-        for (source, Parameters { reach_m, period_s }) in &self.0 {
+        for (source, Parameters { reach_m, period_s, swings }) in &self.0 {
             let stream = sim.stream(*source);
             let slack = wandering(stream, duration_s, *period_s, [*reach_m, 0.0, 0.0, 0.0, 0.0, 0.0]);
-            sim.insert(*source, TetherSlack { slack });
+            let phase_rad = |number: u64| math::TAU * stream.block(PHASES, number).uniform()[0];
+            let swings = swings.iter().zip(0..).map(|(swing, number)| (*swing, phase_rad(number)));
+            let swings = swings.collect();
+            sim.insert(*source, TetherSlack { slack, swings });
         }
         sim.system(Stage::Feel, hang);
         Ok(())
     }
 }
 
+/// Reads a swing.
+fn swing(table: Section<'_>) -> Result<Swing, ConfigError> {
+    let needed = |key, allowed| table.number(key, allowed).and_then(|number| table.required(key, number));
+    let swing =
+        Swing { reach_m: needed("reach_m", 0.001..=50.0)?, period_s: needed("period_s", 0.1..=3600.0)? };
+    table.finish()?;
+    Ok(swing)
+}
+
 fn hang(mut counters: Query<'_, '_, (&mut Samples<Payout>, &TetherSlack)>) {
-    for (mut samples, TetherSlack { slack }) in &mut counters {
+    for (mut samples, TetherSlack { slack, swings }) in &mut counters {
         for payout in &mut samples.list {
-            let [more_m, ..] = slack.at(payout.at.since(START).as_secs_f64());
-            payout.chainage_m += more_m;
+            let t = payout.at.since(START).as_secs_f64();
+            let [more_m, ..] = slack.at(t);
+            let swung_m = swings.iter().map(|(swing, phase_rad)| {
+                swing.reach_m * math::sin(math::TAU * t / swing.period_s + phase_rad)
+            });
+            payout.chainage_m += more_m + swung_m.sum::<f64>();
         }
     }
 }
 
 #[cfg(test)]
 mod tests {
-    use headrace_geometry::math;
-
     use super::*;
     use crate::testing_motion::{Bench, LONG, refusal, same_in_any_slices};
 
@@ -103,9 +135,40 @@ mod tests {
         }
     }
 
+    /// Against sines fitted by least squares: each swing has its reach and period, and nothing is left.
+    #[test]
+    fn a_swing_is_a_sine_of_its_full_reach_and_comes_alone() {
+        let keys = "[effects.tether_slack]\nswings = [{ reach_m = 0.03, period_s = 8 }, { reach_m = 0.055, period_s = 20 }]\n";
+        let (plain, slack) = (Bench::on(LONG, "").run("tether"), Bench::on(LONG, keys).run("tether"));
+        let more = plain
+            .iter()
+            .zip(&slack)
+            .map(|(a, b): (&Payout, &Payout)| (a.at.since(START).as_secs_f64(), b.chainage_m - a.chainage_m));
+        // Whole periods of both.
+        let more: Vec<(f64, f64)> = more.filter(|(t, _)| *t < 200.0).collect();
+        assert!(more.len() > 9000, "{}", more.len());
+        let mut left = more.clone();
+        for (reach_m, period_s) in [(0.03, 8.0), (0.055, 20.0)] {
+            let part = |wave: fn(f64) -> f64| {
+                let sum: f64 = more.iter().map(|(t, m)| m * wave(math::TAU * t / period_s)).sum();
+                2.0 * sum / more.len() as f64
+            };
+            let [s, c] = [part(math::sin), part(math::cos)];
+            assert!((math::hypot(s, c) - reach_m).abs() < 5e-4, "{period_s}: {s} {c}");
+            for (t, m) in &mut left {
+                let turned = math::TAU * *t / period_s;
+                *m -= s * math::sin(turned) + c * math::cos(turned);
+            }
+        }
+        assert!(left.iter().all(|(_, m)| m.abs() < 2e-3));
+    }
+
     #[test]
     fn slices_make_no_difference_and_other_sensors_are_refused() {
         same_in_any_slices(&Bench::turning("[effects.tether_slack]\n"));
+        same_in_any_slices(&Bench::turning(
+            "[effects.tether_slack]\nreach_m = 0.1\nswings = [{ reach_m = 0.1, period_s = 7 }]\n",
+        ));
         assert!(refusal("[effects.tether_slack]\nsensors = [\"imu\"]\n").contains("can act on: tether"));
     }
 }

@@ -1,0 +1,312 @@
+//! Ways along the tunnel by the cable counter and by a velocity log, in raw form, and by the estimate: whether they differ by more than
+//! their data sheets allow.
+//!
+//! The check takes readings, and never the filter's covariance, gates or learnt noise: where the filter convinces itself of a wrong speed,
+//! this still tells. The inertial unit, which gives changes of speed only, is compared with the counter in `slack_level.rs`. Derivation:
+//! `docs/fusion.md`, "Ways in raw form".
+
+use super::cable::CableDoubt;
+use super::settings::Settings;
+use super::slack_level::{MOST_REACH_M, at_time};
+use super::updates::in_tunnel;
+use headrace_geometry::frames::{Body, Rot, Tunnel};
+use headrace_geometry::math;
+use headrace_geometry::site::Site;
+use headrace_geometry::time::{DurNs, MonoNs};
+use headrace_sensor::device::{SensorInfo, SensorKind};
+use headrace_sensor::reading::{Reading, SourceId};
+use headrace_snapshot::stateful;
+
+/// Times over which ways are compared, s.
+const WINDOWS_S: [f64; 3] = [2.0, 10.0, 60.0];
+/// Time between two comparisons, and room for those of the longest window.
+const EVERY: DurNs = DurNs(200_000_000);
+const ROOM: usize = 320;
+/// Room for the last readings of a source: a second and a half of a counter at 50 Hz.
+const READINGS: usize = 96;
+/// A source that says nothing for so long isn't compared.
+const SILENT: DurNs = DurNs(1_000_000_000);
+/// Ways are compared so long after: readings come late.
+const BEHIND: DurNs = DurNs(500_000_000);
+/// Standard deviations that ways may differ by, and how long they must differ by more.
+const MOST_SDS: f64 = 5.0;
+const LASTS: DurNs = DurNs(1_000_000_000);
+/// Scale error of a velocity log, a ratio: 1 % on the data sheet of the A50, and its mount.
+const LOG_SCALE: f64 = 0.015;
+/// Correlation time of its noise, s.
+const LOG_TIME_S: f64 = 0.25;
+
+/// See the module's description.
+#[derive(Debug, Clone)]
+pub(super) struct RawWays {
+    /// The counter's last readings, as chainages, the velocity log's way by its readings, and the last estimates, m.
+    cable: Vec<(MonoNs, [f64; 1])>,
+    log: Vec<(MonoNs, [f64; 1])>,
+    estimate: Vec<(MonoNs, [f64; 1])>,
+    /// The velocity log that is compared.
+    log_source: Option<usize>,
+    /// The last attitude that an inertial unit has told.
+    attitude: Option<(MonoNs, Rot<Tunnel, Body>)>,
+    /// Ways by cable, log and estimate, m; not a number where there is none.
+    rows: Vec<(MonoNs, [f64; 3])>,
+    /// When the cable began to differ from log and estimate.
+    since: [Option<MonoNs>; 2],
+    doubt: Option<CableDoubt>,
+    /// The estimate's [`super::eskf::Eskf::ties`] at the last comparison.
+    ties: u32,
+}
+
+stateful!(RawWays { state: log_source, attitude, since, doubt, ties; lists: cable, log, estimate, rows; });
+
+impl Default for RawWays {
+    /// Allocated without readings.
+    fn default() -> Self {
+        let readings = || Vec::with_capacity(READINGS);
+        let rows = Vec::with_capacity(ROOM);
+        Self {
+            cable: readings(),
+            log: readings(),
+            estimate: readings(),
+            log_source: None,
+            attitude: None,
+            rows,
+            since: [None; 2],
+            doubt: None,
+            ties: 0,
+        }
+    }
+}
+
+impl RawWays {
+    /// Takes a reading.
+    ///
+    /// Allocates: never.
+    pub(super) fn hear(
+        &mut self,
+        at: MonoNs,
+        source: usize,
+        sensor: &SensorInfo,
+        reading: &Reading,
+        site: &Site,
+    ) {
+        match (sensor.kind, reading) {
+            (SensorKind::Tether { zero_at_m, scale }, Reading::TetherLength(length)) => {
+                append(&mut self.cable, at, zero_at_m + scale * length.length_m);
+            }
+            (SensorKind::Imu, Reading::Attitude(level)) => {
+                self.attitude = Some((at, in_tunnel(site, *level) * sensor.mount.rotation.inverse()));
+            }
+            (SensorKind::VelocityLog, Reading::VelocityOverGround(moved))
+                if *self.log_source.get_or_insert(source) == source =>
+            {
+                let moved = sensor.mount.rotation * *moved;
+                let attitude = self.attitude.filter(|(told, _)| at.since(*told).0 < SILENT.0);
+                let along_mps = attitude.map_or(moved.x(), |(_, attitude)| (attitude * moved).x());
+                let before = self.log.last().copied().filter(|(then, _)| at.since(*then).0 < SILENT.0);
+                let way_m =
+                    before.map_or(0.0, |(then, [way_m])| way_m + along_mps * at.since(then).as_secs_f64());
+                if before.is_none() {
+                    self.log.clear();
+                    self.forget(1);
+                }
+                append(&mut self.log, at, way_m);
+            }
+            _ => {}
+        }
+    }
+
+    /// Compares the ways up to an epoch's end, where the estimate's chainage is this, m. `None` where the filter itself has told that it
+    /// differs from the cable. What it was before its `ties` changed has nothing to do with what it is after.
+    ///
+    /// Allocates: never.
+    pub(super) fn compare(&mut self, at: MonoNs, estimate_m: Option<f64>, ties: u32, settings: &Settings) {
+        // What is told of a difference is told by the filter until it is over.
+        if core::mem::replace(&mut self.ties, ties) != ties || estimate_m.is_none() {
+            self.estimate.clear();
+            self.forget(2);
+        }
+        if let Some(estimate_m) = estimate_m {
+            append(&mut self.estimate, at, estimate_m);
+        }
+        let at = at - BEHIND;
+        let since = self.rows.last().map(|(last, _)| at.since(*last));
+        if since.is_some_and(|since| (0..EVERY.0).contains(&since.0)) {
+            return;
+        }
+        if since.is_some_and(|since| !(0..SILENT.0).contains(&since.0)) {
+            self.rows.clear();
+        }
+        if self.rows.len() == ROOM {
+            self.rows.remove(0);
+        }
+        let way = |readings| at_time(readings, at).map_or(f64::NAN, |[way_m]| way_m);
+        self.rows.push((at, [way(&self.cable), way(&self.log), way(&self.estimate)]));
+        let mut doubt: Option<CableDoubt> = None;
+        for (k, other) in [1, 2].into_iter().enumerate() {
+            let differs_m = WINDOWS_S
+                .into_iter()
+                .filter_map(|window_s| self.differs_m(other, window_s, settings))
+                .fold(0.0, f64::max);
+            let Some(since) = self.since.get_mut(k) else { continue };
+            if differs_m <= 0.0 {
+                *since = None;
+                continue;
+            }
+            let since = *since.get_or_insert(at);
+            if at.since(since).0 >= LASTS.0 && doubt.is_none_or(|known| known.differs_m < differs_m) {
+                let log = if other == 1 { self.log_source } else { None };
+                let log = log.and_then(|number| u16::try_from(number).ok()).map(SourceId);
+                doubt = Some(CableDoubt { since, from_m: self.cable_m(), differs_m, log });
+            }
+        }
+        self.doubt = doubt.map(|doubt| match self.doubt {
+            Some(known) if known.since == doubt.since && known.log == doubt.log => {
+                CableDoubt { from_m: known.from_m, differs_m: known.differs_m.max(doubt.differs_m), ..doubt }
+            }
+            _ => doubt,
+        });
+    }
+
+    /// What the cable shows, m.
+    fn cable_m(&self) -> f64 {
+        self.cable.last().map_or(0.0, |(_, [shown_m])| *shown_m)
+    }
+
+    /// The difference that has lasted.
+    pub(super) fn doubt(&self) -> Option<CableDoubt> {
+        self.doubt
+    }
+
+    /// Forgets the ways of a column.
+    fn forget(&mut self, column: usize) {
+        for (_, row) in &mut self.rows {
+            if let Some(way_m) = row.get_mut(column) {
+                *way_m = f64::NAN;
+            }
+        }
+    }
+
+    /// By how much the cable's way over the last seconds, or as long as both have been heard, differs from another one, m; `None` where one
+    /// is missing or they may.
+    fn differs_m(&self, other: usize, window_s: f64, settings: &Settings) -> Option<f64> {
+        let (at, now) = self.rows.last()?;
+        let from = self.rows.partition_point(|(then, _)| at.since(*then).as_secs_f64() > window_s);
+        let both = |row: &[f64; 3]| {
+            Some([*row.first()?, *row.get(other)?]).filter(|ways| ways.iter().all(|way| way.is_finite()))
+        };
+        let then = self.rows.get(from..)?.iter().find_map(|(_, row)| both(row))?;
+        let now = both(now)?;
+        let (cable_m, other_m) = (now[0] - then[0], now[1] - then[1]);
+        let differs_m = (cable_m - other_m).abs();
+        let scale = math::hypot(settings.scale_sd, if other == 1 { LOG_SCALE } else { 0.0 });
+        let of_scale_m = scale * cable_m.abs().max(other_m.abs());
+        let log_m2 = settings.velocity_sd_mps * settings.velocity_sd_mps * LOG_TIME_S * window_s;
+        let counter_m2 = 2.0 * settings.tether_sd_m * settings.tether_sd_m;
+        let variance_m2 = counter_m2 + of_scale_m * of_scale_m + if other == 1 { log_m2 } else { 0.0 };
+        // Slack has an end, on either side.
+        let slack_m = 2.0 * MOST_REACH_M.max(3.0 * settings.slack.reach);
+        (differs_m > slack_m + MOST_SDS * math::sqrt(variance_m2)).then_some(differs_m)
+    }
+}
+
+/// Adds a reading; what isn't later than those before begins anew.
+fn append(readings: &mut Vec<(MonoNs, [f64; 1])>, at: MonoNs, way_m: f64) {
+    if readings.last().is_some_and(|(last, _)| !(1..SILENT.0).contains(&at.since(*last).0)) {
+        readings.clear();
+    }
+    if readings.len() == READINGS {
+        readings.remove(0);
+    }
+    readings.push((at, [way_m]));
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use headrace_geometry::frames::Vec3;
+    use headrace_sensor::reading::TetherLength;
+
+    const TETHER: usize = 1;
+    const LOG: usize = 4;
+
+    /// A vehicle that goes to and fro, by time, s, m.
+    fn way_m(t: f64) -> f64 {
+        3000.0 + 0.2 * t + 2.0 * math::sin(t / 20.0)
+    }
+
+    fn speed_mps(t: f64) -> f64 {
+        0.2 + 0.1 * math::cos(t / 20.0)
+    }
+
+    /// Compares for so long, s; when there was a doubt first, and the last one. Each function gives what a source shows, by time.
+    fn compared(
+        lasts_s: u32,
+        cable_m: impl Fn(f64) -> f64,
+        log_mps: impl Fn(f64) -> Option<f64>,
+        estimate_m: impl Fn(f64) -> Option<f64>,
+    ) -> (Option<f64>, Option<CableDoubt>) {
+        let (mut ways, mut first) = (RawWays::default(), None);
+        let (site, settings) = (Site::default(), Settings::default());
+        let at = |t: f64| MonoNs(9_000_000_000) + DurNs::from_secs_f64(t);
+        let of = |kind: SensorKind| SensorInfo { kind, ..SensorInfo::other() };
+        let (tether, log) =
+            (of(SensorKind::Tether { zero_at_m: 0.0, scale: 1.0 }), of(SensorKind::VelocityLog));
+        for k in 1..10 * lasts_s {
+            let t = f64::from(k) / 10.0;
+            let length = TetherLength { length_m: cable_m(t), resolution_m: 0.01 };
+            ways.hear(at(t), TETHER, &tether, &Reading::TetherLength(length), &site);
+            if let Some(along_mps) = log_mps(t) {
+                let moved = Vec3::new(along_mps, 0.02, 0.0);
+                ways.hear(at(t), LOG, &log, &Reading::VelocityOverGround(moved), &site);
+            }
+            ways.compare(at(t - 0.2), estimate_m(t - 0.2), 1, &settings);
+            if ways.doubt().is_some() {
+                first = first.or(Some(t));
+            }
+        }
+        (first, ways.doubt())
+    }
+
+    #[test]
+    fn sound_sources_with_slack_and_scale_errors_of_their_data_sheets_agree() {
+        for period_s in [3.0, 20.0, 60.0] {
+            let cable_m = |t: f64| 1.002 * way_m(t) + 0.15 * math::sin(t * math::TAU / period_s);
+            let none = compared(300, cable_m, |t| Some(1.01 * speed_mps(t) + 0.002), |t| Some(way_m(t)));
+            assert_eq!(none, (None, None), "{period_s}");
+        }
+    }
+
+    #[test]
+    fn a_velocity_log_a_fifth_off_is_named_with_the_difference() {
+        let (first_s, doubt) = compared(120, way_m, |t| Some(1.2 * speed_mps(t)), |t| Some(way_m(t)));
+        let doubt = doubt.unwrap();
+        // A fifth of the last minute's 12 m, or less where the vehicle is slow.
+        assert!((0.5..3.6).contains(&doubt.differs_m) && doubt.log == Some(SourceId(4)), "{doubt:?}");
+        assert!((5.0..20.0).contains(&first_s.unwrap()), "{first_s:?}");
+    }
+
+    #[test]
+    fn a_counter_that_stands_differs_from_the_log_within_seconds() {
+        let stands = |t: f64| way_m(t.min(60.0));
+        let (first_s, doubt) = compared(70, stands, |t| Some(speed_mps(t)), |t| Some(way_m(t.min(60.0))));
+        assert!((61.0..68.0).contains(&first_s.unwrap()), "{first_s:?}");
+        assert_eq!(doubt.unwrap().log, Some(SourceId(4)));
+    }
+
+    #[test]
+    fn an_estimate_that_runs_away_from_the_counter_is_told_unless_it_was_told_before() {
+        let runs = |t: f64| Some(way_m(t) + 0.5 * (t - 60.0).max(0.0));
+        let (first_s, doubt) = compared(70, way_m, |_| None, runs);
+        assert!((61.0..63.0).contains(&first_s.unwrap()), "{first_s:?}");
+        let doubt = doubt.unwrap();
+        assert!(doubt.log.is_none() && (4.0..5.0).contains(&doubt.differs_m), "{doubt:?}");
+        let told = |t: f64| runs(t).filter(|_| t < 60.0);
+        assert_eq!(compared(70, way_m, |_| None, told), (None, None));
+    }
+
+    #[test]
+    fn a_log_that_was_silent_is_compared_from_then_on() {
+        let log_mps = |t: f64| (!(30.0..50.0).contains(&t)).then(|| speed_mps(t));
+        assert_eq!(compared(120, way_m, log_mps, |t| Some(way_m(t))), (None, None));
+    }
+}

@@ -1,0 +1,113 @@
+//! Counters of whole centimetres on cables that swing: no wrong speed is told, and no verdict follows from one.
+
+use headrace_simulator::Scene;
+use headrace_tests::{scenes, truth};
+
+/// As many dives of each kind.
+const DIVES: u64 = 8;
+/// Largest error of the speed that is told, m/s: 0.98 was told of a vehicle that kept 0.2.
+const SPEED_OFF_MPS: f64 = 0.2;
+
+/// Ways between stops, m, and the speed on each, m/s; and how long the vehicle stays at the end of each, s.
+type Legs = &'static [(f64, f64, f64)];
+const STEADY: Legs = &[(14.0, 0.2, 0.0)];
+const STOP_AND_GO: Legs = &[(3.0, 0.3, 6.0), (2.0, 0.2, 11.0), (4.0, 0.31, 4.0), (3.0, 0.25, 0.0)];
+const WANDERING: &str = "tether_slack = { reach_m = 0.06, period_s = 30 }\n";
+/// Three swings that reach 10 cm together, one of them as long as a head's turn, and a unit whose attitude wanders as the cable does.
+const SWINGING: &str = "tether_slack = { swings = [{ reach_m = 0.03, period_s = 8 }, { reach_m = 0.021, period_s = 10 }, \
+    { reach_m = 0.055, period_s = 20 }] }\n";
+
+fn scene(seed: u64, legs: Legs, slack: &str, start_m: f64) -> Scene {
+    let mut at_m = start_m;
+    let ends = legs.iter().map(|(way_m, speed_mps, stay_s)| {
+        at_m += way_m;
+        format!("[[trajectory.waypoints]]\nchainage_m = {at_m}\nspeed_mps = {speed_mps}\nstay_s = {stay_s}\n")
+    });
+    let ends: String = ends.collect();
+    let text = format!(
+        "vehicle = \"vita2-2.toml\"\n[vehicle_changes]\ntarget_m = 1.0\nheads.planned_speed_mps = 0.2\n\
+         [trajectory]\nkind = \"waypoints\"\n[[trajectory.waypoints]]\nchainage_m = {start_m}\nstay_s = 8\n{ends}[effects]\nmotion_within_turn = {{}}\nocclusion = {{}}\n\
+         range_noise = {{ sd_m = 0.02 }}\n\
+         pilot_drift = {{ across_m = 0.3, up_m = 0.2, yaw_deg = 3, pitch_deg = 1, roll_deg = 1, period_s = 30 }}\n\
+         imu_noise = {{ gyro_degps_rthz = 0.01, accel_mps2_rthz = 0.003, attitude_deg = 0.1 }}\n\
+         imu_bias = {{ gyro_degps = 0.05, accel_mps2 = 0.015, tau_s = 300, tilt_deg = 0.5 }}\n{slack}\
+         tether_quantum = {{ quantum_m = 0.01 }}\n"
+    );
+    scenes::seeded(&text, &|name: &str| scenes::vehicle_file(name), Some(seed))
+}
+
+/// What a dive tells wrongly.
+#[derive(Debug, Default)]
+struct Wrong {
+    /// Largest error of the speed that is told while there is a fix, m/s.
+    speed_mps: f64,
+    /// Sections that pass with a true hole over 1.1 T, or fail with one below 0.9 T.
+    passed: usize,
+    failed: usize,
+    /// Sections that can't be said, and all.
+    cannot_say: usize,
+    sections: usize,
+}
+
+fn wrong(scene: &Scene, most_mps: f64) -> Wrong {
+    let mut wrong = Wrong::default();
+    let dive = truth::dive_noting(scene, &scene.vehicle, &mut |dive| {
+        if let Ok(fix) = dive.vehicle().fix {
+            wrong.speed_mps = wrong.speed_mps.max(fix.speed_mps - most_mps).max(-fix.speed_mps);
+        }
+    });
+    let (target_m, way_m) = (dive.report.target_m, dive.truth.way_m);
+    let is_inner = |section: &&truth::JudgedSection| {
+        section.report.start_m > way_m[0] + 1.0 && section.report.end_m < way_m[1] - 1.0
+    };
+    for section in dive.sections.iter().filter(is_inner) {
+        let ratio = section.true_hole_m / target_m;
+        wrong.sections += 1;
+        match section.report.verdict {
+            "pass" => wrong.passed += usize::from(ratio > 1.1),
+            "fail" => wrong.failed += usize::from(ratio < 0.9),
+            _ => wrong.cannot_say += 1,
+        }
+    }
+    wrong
+}
+
+/// Dives of a kind, and what they tell wrongly together; the share of sections that can't be said.
+fn dives(legs: Legs, slack: &str) -> (Wrong, f64) {
+    let most_mps = legs.iter().fold(0.0, |most: f64, (_, speed_mps, _)| most.max(*speed_mps));
+    let mut all = Wrong::default();
+    for (seed, start_m) in (0..DIVES).zip([20.0, 3000.0, 6900.0].into_iter().cycle()) {
+        let one = wrong(&scene(seed, legs, slack, start_m), most_mps);
+        println!("seed {seed}: {one:?}");
+        all = Wrong {
+            speed_mps: all.speed_mps.max(one.speed_mps),
+            passed: all.passed + one.passed,
+            failed: all.failed + one.failed,
+            cannot_say: all.cannot_say + one.cannot_say,
+            sections: all.sections + one.sections,
+        };
+    }
+    let share = all.cannot_say as f64 / all.sections as f64;
+    (all, share)
+}
+
+/// Of a cable that swings by 11 cm and is declared taut, much can't be said: what changes by 5 cm/s is as likely the vehicle, for a unit of this
+/// class. Nothing passes wrongly.
+#[test]
+fn val_counters_of_centimetres_on_lively_cables_tell_no_wrong_speed_and_no_wrong_verdict() {
+    let (wandering, swinging) = ([WANDERING, "0.06 m"], [SWINGING, "0.11 m"]);
+    for (legs, [slack, reach], most) in [
+        (STEADY, wandering, 0.2),
+        (STOP_AND_GO, wandering, 0.2),
+        (STEADY, swinging, 0.8),
+        (STOP_AND_GO, swinging, 0.8),
+    ] {
+        let (wrong, cannot_say) = dives(legs, slack);
+        println!("slack of {reach}: {wrong:?}, can't say {:.1} %", 100.0 * cannot_say);
+        assert!(wrong.sections > 200, "{reach}: {wrong:?}");
+        assert!(wrong.speed_mps < SPEED_OFF_MPS, "{reach}: {wrong:?}");
+        // A fail costs a way back, a pass a rock: one section in a hundred may fail for nothing.
+        assert!(wrong.passed == 0 && 100 * wrong.failed <= wrong.sections, "{reach}: {wrong:?}");
+        assert!(cannot_say <= most, "{reach}: {cannot_say}");
+    }
+}
