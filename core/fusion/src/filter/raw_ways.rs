@@ -36,6 +36,11 @@ const LOG_SCALE: f64 = 0.015;
 /// Correlation time of its noise, s.
 const LOG_TIME_S: f64 = 0.25;
 
+/// Columns of a row: ways by the cable's counter, by the log, and by the estimate.
+const CABLE: usize = 0;
+const LOG: usize = 1;
+const ESTIMATE: usize = 2;
+
 /// See the module's description.
 #[derive(Debug, Clone)]
 pub(super) struct RawWays {
@@ -47,7 +52,7 @@ pub(super) struct RawWays {
     log_source: Option<usize>,
     /// The last attitude that an inertial unit has told.
     attitude: Option<(MonoNs, Rot<Tunnel, Body>)>,
-    /// Ways by cable, log and estimate, m; not a number where there is none.
+    /// Ways, m, by column; not a number where there is none.
     rows: Vec<(MonoNs, [f64; 3])>,
     /// When the cable began to differ from log and estimate.
     since: [Option<MonoNs>; 2],
@@ -107,7 +112,7 @@ impl RawWays {
                     before.map_or(0.0, |(then, [way_m])| way_m + along_mps * at.since(then).as_secs_f64());
                 if before.is_none() {
                     self.log.clear();
-                    self.forget(1);
+                    self.forget(LOG);
                 }
                 append(&mut self.log, at, way_m);
             }
@@ -123,7 +128,7 @@ impl RawWays {
         // What is told of a difference is told by the filter until it is over.
         if core::mem::replace(&mut self.ties, ties) != ties || estimate_m.is_none() {
             self.estimate.clear();
-            self.forget(2);
+            self.forget(ESTIMATE);
         }
         if let Some(estimate_m) = estimate_m {
             append(&mut self.estimate, at, estimate_m);
@@ -141,12 +146,16 @@ impl RawWays {
         }
         let way = |readings| at_time(readings, at).map_or(f64::NAN, |[way_m]| way_m);
         self.rows.push((at, [way(&self.cable), way(&self.log), way(&self.estimate)]));
+        self.judge(at, settings);
+    }
+
+    /// Notes since when the cable's way differs from the others, and the largest difference that has lasted.
+    fn judge(&mut self, at: MonoNs, settings: &Settings) {
         let mut doubt: Option<CableDoubt> = None;
-        for (k, other) in [1, 2].into_iter().enumerate() {
-            let differs_m = WINDOWS_S
-                .into_iter()
-                .filter_map(|window_s| self.differs_m(other, window_s, settings))
-                .fold(0.0, f64::max);
+        for (k, other) in [LOG, ESTIMATE].into_iter().enumerate() {
+            let windows = WINDOWS_S.into_iter();
+            let differs_m = windows.filter_map(|window_s| self.differs_m(other, window_s, settings));
+            let differs_m = differs_m.fold(0.0, f64::max);
             let Some(since) = self.since.get_mut(k) else { continue };
             if differs_m <= 0.0 {
                 *since = None;
@@ -154,14 +163,15 @@ impl RawWays {
             }
             let since = *since.get_or_insert(at);
             if at.since(since).0 >= LASTS.0 && doubt.is_none_or(|known| known.differs_m < differs_m) {
-                let log = if other == 1 { self.log_source } else { None };
+                let log = self.log_source.filter(|_| other == LOG);
                 let log = log.and_then(|number| u16::try_from(number).ok()).map(SourceId);
                 doubt = Some(CableDoubt { since, from_m: self.cable_m(), differs_m, log });
             }
         }
         self.doubt = doubt.map(|doubt| match self.doubt {
             Some(known) if known.since == doubt.since && known.log == doubt.log => {
-                CableDoubt { from_m: known.from_m, differs_m: known.differs_m.max(doubt.differs_m), ..doubt }
+                let differs_m = known.differs_m.max(doubt.differs_m);
+                CableDoubt { differs_m, ..known }
             }
             _ => doubt,
         });
@@ -190,19 +200,19 @@ impl RawWays {
     /// is missing or they may.
     fn differs_m(&self, other: usize, window_s: f64, settings: &Settings) -> Option<f64> {
         let (at, now) = self.rows.last()?;
-        let from = self.rows.partition_point(|(then, _)| at.since(*then).as_secs_f64() > window_s);
         let both = |row: &[f64; 3]| {
-            Some([*row.first()?, *row.get(other)?]).filter(|ways| ways.iter().all(|way| way.is_finite()))
+            Some([*row.get(CABLE)?, *row.get(other)?]).filter(|ways| ways.iter().all(|way| way.is_finite()))
         };
-        let then = self.rows.get(from..)?.iter().find_map(|(_, row)| both(row))?;
         let now = both(now)?;
+        let from = self.rows.partition_point(|(then, _)| at.since(*then).as_secs_f64() > window_s);
+        let then = self.rows.get(from..)?.iter().find_map(|(_, row)| both(row))?;
         let (cable_m, other_m) = (now[0] - then[0], now[1] - then[1]);
         let differs_m = (cable_m - other_m).abs();
-        let scale = math::hypot(settings.scale_sd, if other == 1 { LOG_SCALE } else { 0.0 });
-        let of_scale_m = scale * cable_m.abs().max(other_m.abs());
-        let log_m2 = settings.velocity_sd_mps * settings.velocity_sd_mps * LOG_TIME_S * window_s;
+        let [log_scale, log_mps] =
+            if other == LOG { [LOG_SCALE, settings.velocity_sd_mps] } else { [0.0; 2] };
+        let of_scale_m = math::hypot(settings.scale_sd, log_scale) * f64::max(cable_m.abs(), other_m.abs());
         let counter_m2 = 2.0 * settings.tether_sd_m * settings.tether_sd_m;
-        let variance_m2 = counter_m2 + of_scale_m * of_scale_m + if other == 1 { log_m2 } else { 0.0 };
+        let variance_m2 = counter_m2 + of_scale_m * of_scale_m + log_mps * log_mps * LOG_TIME_S * window_s;
         // Slack has an end, on either side.
         let slack_m = 2.0 * MOST_REACH_M.max(3.0 * settings.slack.reach);
         (differs_m > slack_m + MOST_SDS * math::sqrt(variance_m2)).then_some(differs_m)
@@ -227,7 +237,7 @@ mod tests {
     use headrace_sensor::reading::TetherLength;
 
     const TETHER: usize = 1;
-    const LOG: usize = 4;
+    const DVL: usize = 4;
 
     /// A vehicle that goes to and fro, by time, s, m.
     fn way_m(t: f64) -> f64 {
@@ -257,7 +267,7 @@ mod tests {
             ways.hear(at(t), TETHER, &tether, &Reading::TetherLength(length), &site);
             if let Some(along_mps) = log_mps(t) {
                 let moved = Vec3::new(along_mps, 0.02, 0.0);
-                ways.hear(at(t), LOG, &log, &Reading::VelocityOverGround(moved), &site);
+                ways.hear(at(t), DVL, &log, &Reading::VelocityOverGround(moved), &site);
             }
             ways.compare(at(t - 0.2), estimate_m(t - 0.2), 1, &settings);
             if ways.doubt().is_some() {
