@@ -13,7 +13,6 @@ use headrace_replay::SimulationError;
 use headrace_replay::drive::DriveError;
 use headrace_replay::log::LogError;
 use headrace_replay::playback::PlaybackError;
-use headrace_replay::segments::SegmentError;
 use headrace_replay::smooth::SmoothError;
 use headrace_replay::worth::WorthError;
 use headrace_sampling::SamplingError;
@@ -63,8 +62,6 @@ pub(crate) enum Failure {
     Worth(#[from] WorthError),
     #[error(transparent)]
     Playback(#[from] PlaybackError),
-    #[error(transparent)]
-    Segment(#[from] SegmentError),
     #[error(transparent)]
     Export(#[from] ExportError),
     #[error("writing the report as JSON: {0}")]
@@ -118,12 +115,10 @@ impl Failure {
             | Self::Read { .. }
             | Self::Unwritable { .. }
             | Self::Routing(_)
-            | Self::Segment(SegmentError::Unfit { .. })
             | Self::Collect(CollectError::Backwards { .. } | CollectError::TooLong { .. }) => USAGE,
             Self::Log(error) if is_wrong_file(error) => USAGE,
             // Of the vehicle file; how the systems are ordered isn't in it.
             Self::Plugin(error) if !matches!(error, PluginError::Schedule { .. }) => USAGE,
-            Self::Segment(SegmentError::Parted { .. }) => DIVERGED,
             _ => FAILED,
         }
     }

@@ -49,8 +49,6 @@ pub(crate) enum Kind {
     Manual,
     Page,
     Cost,
-    /// Snapshots are made where there are none yet.
-    Snapshots,
     /// The recording of a voice note can't be told from any other.
     Voice,
 }
@@ -71,7 +69,6 @@ impl Kind {
             Self::Manual => "isn't a page of headrace's manual",
             Self::Page => "isn't an exported dive",
             Self::Voice => "may be another recording",
-            Self::Snapshots => "snapshots replace no file",
             Self::Cost => "isn't one that headrace cost has written",
         }
     }
@@ -83,7 +80,7 @@ impl Kind {
             log.is_ok_and(|log| log.header().metadata.contains_key(key))
         };
         match self {
-            Self::Dive | Self::Voice | Self::Snapshots => false,
+            Self::Dive | Self::Voice => false,
             Self::Simulation => logged(SIMULATED),
             Self::Import => logged(IMPORTED),
             Self::Trimmed => logged(TRIMMED),

@@ -1,6 +1,6 @@
 //! `headrace verify`: a replay compared with the results published live.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use headrace_geometry::time::DurNs;
 use headrace_monitor::SourceInfo;
@@ -8,69 +8,39 @@ use headrace_monitor::result_stream::WordKind;
 use headrace_replay::drive::Pace;
 use headrace_replay::log::{TRIMMED, files_of};
 use headrace_replay::player::Player;
-use headrace_replay::segments::{Segmented, VerifiedLog};
 use headrace_replay::verify::{Difference, Verified, Verifier, What};
-use headrace_vehicle::VehicleConfig;
 use serde_json::{Value, json};
 
-use crate::cli::{Overwrite, Verify};
+use crate::cli::Verify;
 use crate::dive::{Dive, assemble_kept};
 use crate::failure::{self, Failure};
 use crate::files;
 use crate::output::{deliver, say};
-use crate::outputs::{Claims, Kind};
 use crate::vehicle_file::Given;
 use crate::watch::Watch;
-
-/// Segments of a log for which snapshots are saved: more than there are cores, and few enough for the file.
-const SEGMENTS: u32 = 16;
 
 /// `headrace verify`.
 pub(crate) fn verify(args: &Verify) -> Result<u8, Failure> {
     let files = files_of(&args.logs)?;
     let given = Given::read(args.vehicle.as_deref())?;
-    if let Some(snapshots) = &args.snapshots {
-        look_at(snapshots, files.iter().chain(&given.files))?;
-    }
     let mut player = Player::open(&files)?;
-    let (text, vehicle) =
-        given.or_attached(player.info(), &player.losses(), files::first_named(&args.logs))?;
+    let (_, vehicle) = given.or_attached(player.info(), &player.losses(), files::first_named(&args.logs))?;
     let trimmed = player.info().metadata.get(TRIMMED).cloned();
     let dive = assemble_kept(&vehicle)?;
     let sources: Vec<SourceInfo> = dive.armed.sources().to_vec();
-    let (verified, losses) = if let Some(snapshots) = &args.snapshots {
-        in_segments(args, snapshots, &files, dive, (&vehicle, &text))?
-    } else {
-        player.connect(&sources);
-        whole(args, &files, &mut player, dive)?
-    };
-    tell(args, &verified, (&losses, trimmed.as_deref()), &sources)
+    player.connect(&sources);
+    let verified = compared(args, &files, &mut player, dive)?;
+    tell(args, &verified, (&player.losses(), trimmed.as_deref()), &sources)
 }
 
-/// Checks that a file of snapshots can be read, or made where there is none.
-fn look_at<'a>(snapshots: &Path, inputs: impl Iterator<Item = &'a PathBuf>) -> Result<(), Failure> {
-    if snapshots.is_dir() {
-        let source = std::io::ErrorKind::IsADirectory.into();
-        return Err(Failure::Read { path: snapshots.to_owned(), source });
-    }
-    if snapshots.exists() {
-        return files::open(snapshots).map(|_| ());
-    }
-    let never = Overwrite { force: false };
-    Claims::reading(inputs.cloned(), &never).claim("--snapshots", snapshots, Kind::Snapshots)
-}
-
-fn tick(args: &Verify) -> DurNs {
-    DurNs::from_millis(i64::from(args.tick_ms))
-}
-
-/// Verifies a log in one piece.
-fn whole(args: &Verify, files: &[PathBuf], player: &mut Player, dive: Dive) -> Result<VerifiedLog, Failure> {
+/// Replays a log, and compares.
+fn compared(args: &Verify, files: &[PathBuf], player: &mut Player, dive: Dive) -> Result<Verified, Failure> {
+    let tick = DurNs::from_millis(i64::from(args.tick_ms));
     let mut verifier = Verifier::open(files)?;
     let mut failed = None;
     dive.run_on(
         args.threads.of_replay(),
-        (player, Pace { tick: tick(args), speed: None }),
+        (player, Pace { tick, speed: None }),
         &mut Watch::quiet(),
         &mut |dive| {
             if failed.is_none() {
@@ -81,36 +51,7 @@ fn whole(args: &Verify, files: &[PathBuf], player: &mut Player, dive: Dive) -> R
     if let Some(error) = failed {
         return Err(error.into());
     }
-    Ok((verifier.finish()?, player.losses()))
-}
-
-/// Verifies a log in segments between the snapshots of a file, or makes the file.
-fn in_segments(
-    args: &Verify,
-    snapshots: &Path,
-    files: &[PathBuf],
-    dive: Dive,
-    (vehicle, text): (&VehicleConfig, &str),
-) -> Result<VerifiedLog, Failure> {
-    let mut bytes = 0;
-    for path in files {
-        let read = |source| Failure::Read { path: path.clone(), source };
-        bytes += std::fs::metadata(path).map_err(read)?.len();
-    }
-    let version = env!("CARGO_PKG_VERSION");
-    let of =
-        format!("headrace {version}, ticks of {} ms, log of {bytes} bytes, vehicle\n{text}", args.tick_ms);
-    let segmented = Segmented { log: files, tick: tick(args), snapshots, of: &of };
-    if !snapshots.exists() {
-        return Ok(segmented.verify_and_save(dive.armed, SEGMENTS)?);
-    }
-    let places = segmented.snapshots()?;
-    let threads = args.threads.side_by_side().min(places.len()).max(1);
-    let mut dives = vec![dive.armed];
-    for _ in 1..threads {
-        dives.push(assemble_kept(vehicle)?.armed);
-    }
-    Ok(segmented.verify(dives, &places)?)
+    Ok(verifier.finish()?)
 }
 
 fn tell(

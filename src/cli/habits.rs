@@ -29,11 +29,6 @@ impl Threads {
         let usual = if cores() > 1 { MOST_THREADS } else { 1 };
         self.threads.map_or(usual, usize::from)
     }
-
-    /// Threads of replays side by side.
-    pub(crate) fn side_by_side(&self) -> usize {
-        self.threads.map_or_else(cores, usize::from)
-    }
 }
 
 fn cores() -> usize {

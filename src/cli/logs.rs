@@ -52,10 +52,6 @@ pub(crate) struct Verify {
     pub(crate) tick_ms: u32,
     #[command(flatten)]
     pub(crate) threads: Threads,
-    /// File of snapshots of the dive. It is made if there is none; with it, segments between them are verified side by side, by
-    /// default on all cores, each from its snapshot to the next's.
-    #[arg(long, value_name = "FILE")]
-    pub(crate) snapshots: Option<PathBuf>,
     /// Print JSON.
     #[arg(long)]
     pub(crate) json: bool,

@@ -9,8 +9,7 @@ use headrace_geometry::time::{DurNs, MonoNs};
 use headrace_monitor::console::{CONSOLE_ID, Command};
 use headrace_replay::drive::Pace;
 use headrace_replay::log::{
-    DiveLog, LogHeader, LogInfo, ResultChannel, Trim as Work, Trimmed, files_digest, files_of,
-    trim as rewrite,
+    DiveLog, LogHeader, LogInfo, Trim as Work, Trimmed, files_digest, files_of, trim as rewrite,
 };
 use headrace_replay::player::{Player, seconds};
 use headrace_replay::record::result_channels;
@@ -155,12 +154,6 @@ fn what_is_done(args: &Trim, files: &[PathBuf], spans: &[(MonoNs, MonoNs)]) -> R
     Ok(said)
 }
 
-/// Channels of results that the new log may have: those of alerts and notes name people.
-fn kept_results(args: &Trim) -> Vec<ResultChannel> {
-    let is_kept = |channel: &ResultChannel| !args.anonymise || !channel.topic.ends_with("/alerts");
-    result_channels().into_iter().filter(is_kept).collect()
-}
-
 /// Writes the new log, whole or not at all.
 fn write(
     args: &Trim,
@@ -207,10 +200,12 @@ fn write(
         header: &header,
         change: &mut change,
         voices: !args.anonymise,
+        // Alerts and notes name people.
+        results: &|topic| !args.anonymise || !topic.ends_with("/alerts"),
     };
     let mut file = WholeFile::create(&args.output).map_err(failed)?;
     let mut writer = Writing::new(&mut file, files::bytes(files));
-    let trimmed = rewrite(&mut || DiveLog::open(files), &mut writer, &mut work, &kept_results(args))
+    let trimmed = rewrite(&mut || DiveLog::open(files), &mut writer, &mut work, &result_channels())
         .map_err(Failure::writing(&args.output))?;
     drop(writer);
     if trimmed.bytes_before == 0 && !spans.is_empty() {

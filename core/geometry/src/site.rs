@@ -3,7 +3,7 @@
 /// The site's constants.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Site {
-    /// Speed of sound in the tunnel's water, m/s. Ranges are rescaled to it (metrics.md, "Errors and uncertainty").
+    /// Speed of sound in the tunnel's water, m/s. Ranges are rescaled to it.
     pub sound_speed_mps: f64,
     /// Density of the water, kg/m^3.
     pub density_kgpm3: f64,

@@ -1,5 +1,5 @@
-//! Texts for the pilot, with figures and units: the only table of causes, remedies and advice in plain text. The
-//! terminal, the log for viewers and the summary of a report use it; the words in JSON are the enums' `as_str`.
+//! Texts for the pilot, with figures and units: causes, remedies and advice in plain text. The terminal, the log for viewers and the summary
+//! of a report use them; the words in JSON are the enums' `as_str`, and the page's labels are in `plugins/dashboard/page/src/text`.
 
 use super::advice_log::AdviceEntry;
 use super::alerts::AlertKind;

@@ -189,7 +189,7 @@ impl Advisor {
     ///
     /// Heads apart along the hull keep their phases in some intervals of speed only: the result is the upper end of the
     /// highest, whatever the present speed; see [`Advice::from_mps`] and [`Advice::nearest_mps`].
-    /// Source: metrics.md, "Speed advice".
+    /// Source: docs/decisions/0005-advice-and-plan.md.
     /// Allocates: never.
     pub fn advise(&mut self, situation: &Situation, swing: Swing, left_s: Option<f64>) -> Advice {
         let Some(pose) = situation.pose else { return Advice::nothing(Reason::NoHeadingOrFix) };

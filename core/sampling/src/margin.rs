@@ -1,7 +1,7 @@
 //! What position errors take from a target, and what each margin costs in speed.
 //!
 //! Plan, live advice and report use the same functions, so that a speed that is planned is the speed that is advised.
-//! Source: metrics.md, "v_max is one figure".
+//! Source: docs/decisions/0005-advice-and-plan.md.
 
 use headrace_geometry::math;
 use serde::{Deserialize, Serialize};

@@ -18,7 +18,7 @@ pub fn t_max_m(t_x_m: f64, advance_m: f64, t_y_m: f64) -> f64 {
 ///
 /// `pass_gap_s` is the time between passes (T_rev / s for s evenly interleaved heads), `ping_period_s` that between
 /// pings (T_s).
-/// Source: Eq. 16 solved for v (metrics.md, "Speed advice").
+/// Source: Eq. 16 solved for v (docs/decisions/0005-advice-and-plan.md).
 pub fn speed_for_target_mps(target_m: f64, t_y_m: f64, pass_gap_s: f64, ping_period_s: f64) -> Option<f64> {
     let time_s = pass_gap_s + ping_period_s;
     along_m(target_m, t_y_m).filter(|_| time_s > 0.0).map(|along_m| along_m / time_s)

@@ -194,17 +194,7 @@ impl Driver {
 
     /// Continues after a tick that ended at `until`, when feed and loop have jumped there.
     pub fn jump_to(&mut self, until: MonoNs) {
-        self.go_to(Some(until));
-    }
-
-    /// The same; `None` is before the first tick.
-    pub(crate) fn go_to(&mut self, until: Option<MonoNs>) {
-        self.until = until;
-    }
-
-    /// The end of the last tick; `None` before the first.
-    pub(crate) fn ended_at(&self) -> Option<MonoNs> {
-        self.until
+        self.until = Some(until);
     }
 }
 

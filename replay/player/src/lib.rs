@@ -11,7 +11,6 @@ pub mod player;
 pub mod record;
 pub mod regular_file;
 mod results;
-pub mod segments;
 mod simulation_feed;
 pub mod smooth;
 pub mod snapshot_store;

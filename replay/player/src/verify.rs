@@ -8,7 +8,6 @@ use headrace_monitor::run::Loop;
 
 use crate::log::format::RESULT_PREFIX;
 use crate::log::{DiveLog, LogError, MessageKind};
-use crate::player::PlayerPlace;
 use crate::results::{STREAMS, read_results, stream_of};
 
 /// Most memory of a stream's results that wait for the replay, bytes; a true log's are a tick ahead.
@@ -61,36 +60,6 @@ pub enum What {
     Added,
 }
 
-/// Result of a comparison of one stream.
-#[derive(Debug, Clone)]
-pub(crate) struct StreamVerified {
-    same: u64,
-    unrecorded: u64,
-    difference: Option<Difference>,
-    /// Whether the log contains results of any stream.
-    has_results: bool,
-}
-
-/// The result of segments that follow each other: of each stream as far as its first difference.
-pub(crate) fn combined(segments: &[[StreamVerified; STREAMS.len()]]) -> Verified {
-    let has_results = segments.iter().flatten().any(|stream| stream.has_results);
-    let mut all = Verified { same: 0, unrecorded: 0, differences: Vec::new(), has_results };
-    for stream in 0..STREAMS.len() {
-        for found in segments.iter().filter_map(|segment| segment.get(stream)) {
-            all.same += found.same;
-            all.unrecorded += found.unrecorded;
-            if let Some(difference) = &found.difference {
-                all.differences.push(difference.clone());
-                break;
-            }
-        }
-    }
-    // A log without any results isn't one of a live dive.
-    all.differences.retain(|_| has_results);
-    all.differences.sort_by_key(|difference| difference.tick);
-    all
-}
-
 /// Compares during a replay.
 pub struct Verifier {
     reader: DiveLog,
@@ -107,8 +76,6 @@ struct Stream {
     waiting: VecDeque<Batch>,
     /// Memory of those.
     waiting_bytes: usize,
-    /// Number of the first record to compare: those before it are another segment's.
-    first: u64,
     /// Number of the replay's next record.
     next: u64,
     same: u64,
@@ -162,15 +129,10 @@ impl Stream {
     }
 
     /// Adds a tick's results. When too many wait, the dive published what the replay doesn't have.
-    fn wait(&mut self, mut batch: Batch, name: &'static str) {
+    fn wait(&mut self, batch: Batch, name: &'static str) {
         // Nothing is compared after a difference.
         if self.difference.is_some() {
             return;
-        }
-        while batch.next < self.first {
-            let Some((_, rest)) = first_record(batch.rest()) else { return };
-            batch.at = batch.words.len() - rest.len();
-            batch.next += 1;
         }
         self.waiting_bytes += batch.memory();
         self.waiting.push_back(batch);
@@ -225,59 +187,30 @@ impl Verifier {
         Ok(())
     }
 
-    /// For a segment of a log that begins at a place of its player, when the replay has published so many records of each stream.
-    ///
-    /// Errors: the log can't be read.
-    pub(crate) fn from_place(
-        log: &[PathBuf],
-        place: &PlayerPlace,
-        records: [u64; STREAMS.len()],
-    ) -> Result<Self, LogError> {
-        let mut verifier = Self::open(log)?;
-        verifier.reader.go_to(&place.log)?;
-        for (stream, first) in verifier.streams.iter_mut().zip(records) {
-            (stream.first, stream.next) = (first, first);
-        }
-        Ok(verifier)
-    }
-
     /// Completes the comparison at the end of the replay.
     ///
     /// Errors: reading the log fails.
-    pub fn finish(self) -> Result<Verified, LogError> {
-        Ok(combined(&[self.at_end()?]))
-    }
-
-    /// What has been found at the end of a segment after which another one follows.
-    pub(crate) fn so_far(mut self) -> [StreamVerified; STREAMS.len()] {
-        // Logs of before the live state or the list of alerts was recorded have no channel for them.
-        let topics = self.reader.result_topics();
-        for (stream, name) in self.streams.iter_mut().zip(STREAMS).filter(|(_, name)| LATER.contains(name)) {
-            if !topics.iter().any(|topic| topic.strip_prefix(RESULT_PREFIX) == Some(name)) {
-                stream.difference = None;
-            }
-        }
-        let has_results = self.has_results;
-        self.streams.map(|Stream { same, unrecorded, difference, .. }| StreamVerified {
-            same,
-            unrecorded,
-            difference,
-            has_results,
-        })
-    }
-
-    /// What has been found at the end of the dive.
-    ///
-    /// Errors: reading the log fails.
-    pub(crate) fn at_end(mut self) -> Result<[StreamVerified; STREAMS.len()], LogError> {
+    pub fn finish(mut self) -> Result<Verified, LogError> {
         while self.read()? {}
+        let topics = self.reader.result_topics();
+        let has_channel =
+            |name: &str| topics.iter().any(|topic| topic.strip_prefix(RESULT_PREFIX) == Some(name));
+        let has_results = self.has_results;
+        let mut verified = Verified { same: 0, unrecorded: 0, differences: Vec::new(), has_results };
         for (stream, name) in self.streams.iter_mut().zip(STREAMS) {
             let left = stream.waiting.front().map(|batch| batch.tick).filter(|_| stream.difference.is_none());
             if let Some(tick) = left {
                 stream.part(tick, name, What::Missing);
             }
+            // Logs of before the live state or the list of alerts was recorded have no channel for them; a log without any results isn't
+            // one of a live dive.
+            let is_told = has_results && (has_channel(name) || !LATER.contains(&name));
+            verified.same += stream.same;
+            verified.unrecorded += stream.unrecorded;
+            verified.differences.extend(stream.difference.take().filter(|_| is_told));
         }
-        Ok(self.so_far())
+        verified.differences.sort_by_key(|difference| difference.tick);
+        Ok(verified)
     }
 
     /// Compares a record of the replay with the live dive's of the same number.

@@ -505,14 +505,3 @@ fn a_wrong_log_is_a_wrong_argument_and_leaves_nothing() {
         }
     }
 }
-
-#[test]
-fn snapshots_that_cannot_be_had_are_told_before_the_work() {
-    let folder = Folder::with_dive();
-    folder.record("dive.mcap", "live.mcap", &[]);
-    for wrong in ["none/snapshots", "."] {
-        let answer = folder.headrace(&["verify", "live.mcap", "--snapshots", wrong]);
-        assert_eq!((answer.code, answer.stdout.as_str()), (Some(2), ""), "{wrong}: {}", answer.stderr);
-        assert!(answer.stderr.contains(wrong), "{}", answer.stderr);
-    }
-}

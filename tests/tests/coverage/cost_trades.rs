@@ -114,7 +114,7 @@ fn nothing_left_out_changes_nothing_and_rays_converge() {
     );
 }
 
-/// Sureness is bought as metrics.md has it: with k standard deviations a hole of T - k (sigma - 2 mm) is planned for.
+/// Sureness has a price: with k standard deviations a hole of T - k (sigma - 2 mm) is planned for.
 #[test]
 fn hours_of_sureness_are_those_of_a_target_that_much_smaller() {
     let trade = measured(sureness::measure);

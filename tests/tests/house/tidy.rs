@@ -1,6 +1,6 @@
 //! Layers, a core without I/O and locks, short files, and what each crate states about itself.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use crate::workspace::{Package, root, sources, workspace};
 
@@ -192,4 +192,73 @@ fn versions_and_lints_are_stated_in_the_root_alone() {
             assert!(versions.is_empty(), "{name}: {versions:?}; versions belong into the root's Cargo.toml");
         }
     }
+}
+
+/// Names of documents in a text: words that end as their files do.
+fn documents_in(text: &str) -> impl Iterator<Item = &str> {
+    let is_part = |c: char| c.is_ascii_alphanumeric() || "_-./".contains(c);
+    text.split(move |c: char| !is_part(c)).map(|word| word.trim_end_matches('.')).filter(|word| {
+        // In pieces, so that this file names none.
+        word.strip_suffix(["m", "d"].concat().as_str())
+            .and_then(|stem| stem.strip_suffix('.'))
+            .is_some_and(|stem| !stem.is_empty())
+    })
+}
+
+/// All files below a folder that people read or edit, without what is built.
+fn readable(folder: &Path, found: &mut Vec<PathBuf>) {
+    for entry in std::fs::read_dir(folder).unwrap_or_else(|error| panic!("{}: {error}", folder.display())) {
+        let path = entry.unwrap().path();
+        let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
+        if path.is_dir() {
+            if !["target", "node_modules", ".git"].contains(&name.as_str()) {
+                readable(&path, found);
+            }
+        } else if ["rs", "md", "toml", "ts", "py"]
+            .iter()
+            .any(|end| path.extension().is_some_and(|e| e == *end))
+        {
+            found.push(path);
+        }
+    }
+}
+
+/// What is named as a source, or for more, is in the tree.
+#[test]
+fn documents_that_are_named_exist() {
+    let mut files = Vec::new();
+    readable(root(), &mut files);
+    let names: Vec<String> =
+        files.iter().map(|file| file.strip_prefix(root()).unwrap().to_string_lossy().into_owned()).collect();
+    let exists = |named: &str| {
+        let named = named.trim_start_matches("../").trim_start_matches("./").trim_start_matches('/');
+        names.iter().any(|name| name == named || name.ends_with(&format!("/{named}")))
+    };
+    let (mut said, mut seen) = (Vec::new(), 0);
+    for (file, name) in files.iter().zip(&names) {
+        // What changed tells of files as they were.
+        if name == "CHANGELOG.md" {
+            continue;
+        }
+        let text = std::fs::read_to_string(file).unwrap();
+        for (number, line) in text.lines().enumerate() {
+            seen += documents_in(line).count();
+            let missing = documents_in(line).filter(|named| !exists(named));
+            said.extend(missing.map(|named| format!("{name}:{}: {named}", number + 1)));
+        }
+    }
+    assert!(seen > 100, "{seen}");
+    assert!(said.is_empty(), "documents that aren't there: {said:#?}");
+}
+
+#[test]
+fn documents_are_found_in_any_text() {
+    let name = |stem: &str| [stem, ".m", "d"].concat();
+    let text = format!(
+        "/// see `{}`, ({}#ways), and {}. No md, no .mdx.",
+        name("docs/a-b"),
+        name("../c"),
+        name("d_1")
+    );
+    assert_eq!(documents_in(&text).collect::<Vec<_>>(), [name("docs/a-b"), name("../c"), name("d_1")]);
 }

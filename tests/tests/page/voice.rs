@@ -68,6 +68,16 @@ fn recordings(folder: &Folder, logs: &[&str]) -> Vec<(u32, Vec<u8>)> {
     found
 }
 
+/// Whether any message of a log has these bytes, once it is unpacked.
+fn mentions(folder: &Folder, log: &str, words: &str) -> bool {
+    let mut log = DiveLog::open(&[folder.path(log)]).unwrap();
+    let mut is_found = false;
+    while let Some(message) = log.next().unwrap() {
+        is_found |= message.data.windows(words.len()).any(|part| part == words.as_bytes());
+    }
+    is_found
+}
+
 /// The same log without its recordings.
 fn without_voices(folder: &Folder, from: &str, to: &str) {
     let files = [folder.path(from)];
@@ -78,6 +88,7 @@ fn without_voices(folder: &Folder, from: &str, to: &str) {
         header: &|_, header| header,
         change: &mut keep_all,
         voices: false,
+        results: &|_| true,
     };
     let output = BufWriter::new(File::create(folder.path(to)).unwrap());
     trim(&mut || DiveLog::open(&files), output, &mut work, &[]).unwrap();
@@ -131,6 +142,8 @@ fn a_voice_is_a_note_of_the_moment_it_began_and_its_bytes_are_in_the_log() {
     assert_eq!(recordings(&folder, &["recovered.mcap"]), [(7, audio.clone())]);
     assert_eq!(folder.headrace(&["trim", LOG, "--anonymise", "-o", "public.mcap"]).code, Some(0));
     assert_eq!(recordings(&folder, &["public.mcap"]), [], "a voice tells who speaks");
+    assert!(!mentions(&folder, "public.mcap", "\"AB\""), "who noted something");
+    assert!(mentions(&folder, LOG, "\"AB\""), "else the line above says nothing");
 
     let replay = Serving::start(&folder, &["replay", LOG, ANY]);
     let mut viewer = Viewer::connect(&replay, "", &[]).unwrap();

@@ -1,4 +1,4 @@
-//! metrics.md's table of ideal scenes: SLOW to FASTEST with 1, 2 and 4 heads in phase shift, together at the circle's
+//! The table of ideal scenes: SLOW to FASTEST with 1, 2 and 4 heads in phase shift, together at the circle's
 //! centre of the `ceran` profile, at 0.197 m/s, from a scene to bytes to a log to a report.
 //!
 //! The mean distance between passes must be v T / s within 0.5 %, and the largest hole over nine metres within 0.1 % of

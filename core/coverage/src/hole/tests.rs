@@ -269,7 +269,7 @@ fn chainage_of_seven_and_of_a_thousand_kilometres() {
     }
 }
 
-/// metrics.md's reference values: `ceran`, 0.197 m/s, heads at the circle's centre in phase shift, as positions only.
+/// Reference values: `ceran`, 0.197 m/s, heads at the circle's centre in phase shift, as positions only.
 #[test]
 fn val_reference_holes_of_ideal_helices() {
     let profile = headrace_geometry::tunnel::shapes::ceran().unwrap();

@@ -79,7 +79,7 @@ fn v_max_put_back_into_the_forward_equations_is_the_target() {
     }
 }
 
-/// metrics.md's table: T_max of Eq. 16, here for the worst start of a head's pings, which is at most a little more.
+/// The reference table: T_max of Eq. 16, here for the worst start of a head's pings, which is at most a little more.
 #[test]
 fn val_ideal_heads_give_the_reference_table() {
     let expected = [

@@ -23,7 +23,7 @@ fn standing(profile: &Profile) -> Standing<'_> {
     Standing::new(profile, &pose(profile, 0.0, 0.0, 0.0), &mount()).unwrap()
 }
 
-/// metrics.md's table: T_max of Eq. 16 for `ceran` at 0.197 m/s, with the pings where they fall.
+/// The reference table: T_max of Eq. 16 for `ceran` at 0.197 m/s, with the pings where they fall.
 #[test]
 fn val_t_max_of_the_reference_table() {
     let profile = shapes::ceran().unwrap();

@@ -27,6 +27,8 @@ pub struct Trim<'a> {
     pub change: Change<'a>,
     /// Whether recordings of voice notes are kept, as long as they are within the spans.
     pub voices: bool,
+    /// Whether the results of a topic are kept, where all of the dive is.
+    pub results: &'a dyn Fn(&str) -> bool,
 }
 
 /// Outcome of trimming.
@@ -36,7 +38,7 @@ pub struct Trimmed {
     pub messages: u64,
     /// Messages outside the spans.
     pub cut: u64,
-    /// Result messages dropped: a part of a dive isn't judged like the whole.
+    /// Result messages dropped: a part of a dive isn't judged like the whole, and some name people.
     pub results: u64,
     /// Source messages that were changed.
     pub changed: u64,
@@ -64,7 +66,8 @@ pub fn trim<R: Read + Seek, W: Write>(
 ) -> Result<Trimmed, LogError> {
     let found = look_through(open()?)?;
     let mut reader = open()?;
-    let topics = if trim.spans.is_empty() { found.topics } else { Vec::new() };
+    let mut topics = if trim.spans.is_empty() { found.topics } else { Vec::new() };
+    topics.retain(|topic| (trim.results)(topic));
     let mut begin = header(&reader, &topics, found.sources, known);
     begin.metadata.insert(TRIMMED.to_owned(), trim.words.clone());
     begin.part = None;

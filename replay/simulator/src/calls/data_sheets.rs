@@ -2,13 +2,13 @@
 //!
 //! | model | effect | parameters | source |
 //! |---|---|---|---|
-//! | imagenex881 | beam_cone | the beam's width, as its frequency has it | imagenex-881l.md, §4: 2.4 to 1.4 degrees |
-//! | | echo_strength | its own defaults | imagenex-881l.md, §2 |
-//! | | range_quantisation | 500 points | imagenex-881l.md, §2, field 19; Jorge et al. 2021, §9.2 |
+//! | imagenex881 | beam_cone | the beam's width, as its frequency has it | the data sheet: 2.4 to 1.4 degrees |
+//! | | echo_strength | its own defaults | the data sheet |
+//! | | range_quantisation | 500 points | the switch command, field 19; Jorge et al. 2021, §9.2 |
 //! | | range_noise | 10 mm | field.md, "data sheet" |
-//! | ping1d | beam_cone | 30 degrees | ping.md, §2: 0.52 rad |
+//! | ping1d | beam_cone | 30 degrees | the data sheet: 0.52 rad |
 //! | | range_noise, outliers, missing_returns | 20 mm; 8 %; 5 % in runs of 8 | field.md, "data sheet" |
-//! | bar100 | depth_steps, depth_noise | 31.2 mm; a count of 305 Pa / 2 | bar100.md, §1: 3.05 mbar; resolution 3 mbar |
+//! | bar100 | depth_steps, depth_noise | 31.2 mm; a count of 305 Pa / 2 | the data sheet: 3.05 mbar; resolution 3 mbar |
 //! | those with a known noise | imu_noise, imu_bias | the device's own figures | its crate, by [`Device::inertial_noise`] |
 //!
 //! A head calls for more by being on a vehicle: see [`of_vehicle`].

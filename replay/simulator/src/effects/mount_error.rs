@@ -17,7 +17,6 @@ use crate::sensing::Mounted;
 /// `position_m` and `angles_deg` (roll, pitch and yaw, before those of the file) are added to all sensors named;
 /// `position_sd_m`, to 1, and `angles_sd_deg`, to 30, are the standard deviations of further errors, drawn for each axis and
 /// sensor. A head that hides the wall from others is where the file says.
-/// Source: metrics.md, "Errors and uncertainty" (mounting angles).
 pub(super) struct MountErrorKind;
 
 #[derive(Debug, Clone, Copy)]

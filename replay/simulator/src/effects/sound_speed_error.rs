@@ -18,7 +18,6 @@ use crate::stages::Stage;
 ///
 /// Keys, one of them: `true_mps`, the true speed, from 1300 to 1700 m/s; `share`, its relative excess over the file's,
 /// from -0.1 to 0.1.
-/// Source: metrics.md, "Errors and uncertainty".
 pub(super) struct SoundSpeedErrorKind;
 
 #[derive(Debug, Clone, Copy)]

@@ -23,7 +23,7 @@ fn all() -> Vec<(&'static str, Profile)> {
     ]
 }
 
-/// Dimensions of the paper's tunnel as derived in errata.md.
+/// Dimensions of the paper's tunnel as derived from its figures.
 #[test]
 fn val_ceran_has_the_errata_s_dimensions() {
     let ceran = ceran().unwrap();

@@ -6,7 +6,7 @@ use headrace_geometry::math;
 /// the frequency, absorption and pulse for which that is so: the head's largest range setting when profiling, with the
 /// settings that DUNE gives it there. No source states the head's source level, noise or threshold.
 ///
-/// Source: imagenex-881l.md, §2 (range settings to 100 m; 675 kHz and 0.2 dB/m above 5 m; 540 us at 100 m).
+/// Source: the 881L's data sheet and switch command (range settings to 100 m; 675 kHz and 0.2 dB/m above 5 m; 540 us at 100 m).
 const HEARD_M: f64 = 100.0;
 const HEARD_AT_KHZ: f64 = 675.0;
 const HEARD_DBPM: f64 = 0.2;
@@ -95,21 +95,21 @@ fn heard_db() -> f64 {
 
 /// Frequency of a beam of this full width, kHz: 2.4 degrees at 600 kHz, 1.4 at 1 MHz.
 ///
-/// Source: imagenex-881l.md, §4.
+/// Source: the 881L's data sheet, beam widths.
 pub(crate) fn frequency_of_khz(beam_rad: f64) -> f64 {
     (600.0 + (2.4 - beam_rad.to_degrees()) * 400.0).clamp(600.0, 1000.0)
 }
 
 /// Absorption that the head is told to make up for, dB/m: at 1 MHz, and at 675 kHz.
 ///
-/// Source: imagenex-881l.md, §2, DUNE's defaults; the edge is halfway.
+/// Source: the switch command as DUNE's driver sets it; the edge is halfway.
 pub(super) fn usual_absorption_dbpm(frequency_khz: f64) -> f64 {
     if frequency_khz > 837.0 { 0.6 } else { 0.2 }
 }
 
 /// Length of the pulse at a range setting, microseconds.
 ///
-/// Source: imagenex-881l.md, §2, field 14.
+/// Source: the switch command, field 14.
 pub(crate) fn pulse_of_us(range_m: f64) -> f64 {
     const UP_TO: [(f64, f64); 8] = [
         (4.0, 20.0),
