@@ -22,10 +22,11 @@ const WINDOWS_S: [f64; 3] = [2.0, 10.0, 60.0];
 /// Time between two comparisons, and room for those of the longest window.
 const EVERY: DurNs = DurNs(200_000_000);
 const ROOM: usize = 320;
-/// Room for the last readings of a source: a second and a half of a counter at 50 Hz.
+/// Room for the last readings of a source, and the least time between those kept: the longest window of the filter and more, at any rate.
 const READINGS: usize = 96;
-/// A source that says nothing for so long isn't compared.
-const SILENT: DurNs = DurNs(1_000_000_000);
+const NEAR: DurNs = DurNs(20_000_000);
+/// A source that says nothing for so long isn't compared; a velocity log may speak every two seconds.
+const SILENT: DurNs = DurNs(3_000_000_000);
 /// Ways are compared so long after: readings come late.
 const BEHIND: DurNs = DurNs(500_000_000);
 /// Standard deviations that ways may differ by, and how long they must differ by more.
@@ -107,7 +108,8 @@ impl RawWays {
                 let moved = sensor.mount.rotation * *moved;
                 let attitude = self.attitude.filter(|(told, _)| at.since(*told).0 < SILENT.0);
                 let along_mps = attitude.map_or(moved.x(), |(_, attitude)| (attitude * moved).x());
-                let before = self.log.last().copied().filter(|(then, _)| at.since(*then).0 < SILENT.0);
+                let is_near = |then: MonoNs| (0..SILENT.0).contains(&at.since(then).0);
+                let before = self.log.last().copied().filter(|(then, _)| is_near(*then));
                 let way_m =
                     before.map_or(0.0, |(then, [way_m])| way_m + along_mps * at.since(then).as_secs_f64());
                 if before.is_none() {
@@ -199,11 +201,12 @@ impl RawWays {
     /// By how much the cable's way over the last seconds, or as long as both have been heard, differs from another one, m; `None` where one
     /// is missing or they may.
     fn differs_m(&self, other: usize, window_s: f64, settings: &Settings) -> Option<f64> {
-        let (at, now) = self.rows.last()?;
+        let (at, _) = self.rows.last()?;
         let both = |row: &[f64; 3]| {
             Some([*row.get(CABLE)?, *row.get(other)?]).filter(|ways| ways.iter().all(|way| way.is_finite()))
         };
-        let now = both(now)?;
+        let recent = self.rows.iter().rev().take_while(|(then, _)| at.since(*then).0 < SILENT.0);
+        let now = recent.filter_map(|(_, row)| both(row)).next()?;
         let from = self.rows.partition_point(|(then, _)| at.since(*then).as_secs_f64() > window_s);
         let then = self.rows.get(from..)?.iter().find_map(|(_, row)| both(row))?;
         let (cable_m, other_m) = (now[0] - then[0], now[1] - then[1]);
@@ -219,8 +222,11 @@ impl RawWays {
     }
 }
 
-/// Adds a reading; what isn't later than those before begins anew.
+/// Adds a reading that isn't near the last; what is earlier than those before, or much later, begins anew.
 fn append(readings: &mut Vec<(MonoNs, [f64; 1])>, at: MonoNs, way_m: f64) {
+    if readings.last().is_some_and(|(last, _)| (0..NEAR.0).contains(&at.since(*last).0)) {
+        return;
+    }
     if readings.last().is_some_and(|(last, _)| !(1..SILENT.0).contains(&at.since(*last).0)) {
         readings.clear();
     }
@@ -255,21 +261,38 @@ mod tests {
         log_mps: impl Fn(f64) -> Option<f64>,
         estimate_m: impl Fn(f64) -> Option<f64>,
     ) -> (Option<f64>, Option<CableDoubt>) {
+        compared_at(10, 1, lasts_s, (cable_m, log_mps, estimate_m))
+    }
+
+    /// The same of a counter of so many readings a second, and a log of one in so many of them.
+    fn compared_at(
+        rate_hz: u32,
+        log_every: u32,
+        lasts_s: u32,
+        (cable_m, log_mps, estimate_m): (
+            impl Fn(f64) -> f64,
+            impl Fn(f64) -> Option<f64>,
+            impl Fn(f64) -> Option<f64>,
+        ),
+    ) -> (Option<f64>, Option<CableDoubt>) {
         let (mut ways, mut first) = (RawWays::default(), None);
         let (site, settings) = (Site::default(), Settings::default());
         let at = |t: f64| MonoNs(9_000_000_000) + DurNs::from_secs_f64(t);
         let of = |kind: SensorKind| SensorInfo { kind, ..SensorInfo::other() };
         let (tether, log) =
             (of(SensorKind::Tether { zero_at_m: 0.0, scale: 1.0 }), of(SensorKind::VelocityLog));
-        for k in 1..10 * lasts_s {
-            let t = f64::from(k) / 10.0;
+        for k in 1..rate_hz * lasts_s {
+            let t = f64::from(k) / f64::from(rate_hz);
             let length = TetherLength { length_m: cable_m(t), resolution_m: 0.01 };
             ways.hear(at(t), TETHER, &tether, &Reading::TetherLength(length), &site);
-            if let Some(along_mps) = log_mps(t) {
+            if let Some(along_mps) = log_mps(t).filter(|_| k.is_multiple_of(log_every)) {
                 let moved = Vec3::new(along_mps, 0.02, 0.0);
                 ways.hear(at(t), DVL, &log, &Reading::VelocityOverGround(moved), &site);
             }
-            ways.compare(at(t - 0.2), estimate_m(t - 0.2), 1, &settings);
+            // An epoch is a tenth of a second.
+            if k.is_multiple_of(rate_hz / 10) {
+                ways.compare(at(t - 0.2), estimate_m(t - 0.2), 1, &settings);
+            }
             if ways.doubt().is_some() {
                 first = first.or(Some(t));
             }
@@ -312,6 +335,20 @@ mod tests {
         assert!(doubt.log.is_none() && (4.0..5.0).contains(&doubt.differs_m), "{doubt:?}");
         let told = |t: f64| runs(t).filter(|_| t < 60.0);
         assert_eq!(compared(70, way_m, |_| None, told), (None, None));
+    }
+
+    #[test]
+    fn counters_of_any_rate_are_compared_with_logs_of_any_rate() {
+        for (rate_hz, log_every) in [(10, 1), (10, 10), (10, 20), (50, 5), (200, 50), (1000, 125)] {
+            let log_mps = |t: f64| Some(1.2 * speed_mps(t));
+            let compare = |share: f64| {
+                let log_mps = move |t: f64| log_mps(t).map(|mps| share * mps);
+                compared_at(rate_hz, log_every, 60, (way_m, log_mps, |t: f64| Some(way_m(t))))
+            };
+            let (first_s, doubt) = compare(1.0);
+            assert!((5.0..25.0).contains(&first_s.unwrap()) && doubt.is_some(), "{rate_hz}: {first_s:?}");
+            assert_eq!(compare(1.0 / 1.2), (None, None), "{rate_hz}");
+        }
     }
 
     #[test]
