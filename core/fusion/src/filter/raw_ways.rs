@@ -205,8 +205,8 @@ impl RawWays {
         let both = |row: &[f64; 3]| {
             Some([*row.get(CABLE)?, *row.get(other)?]).filter(|ways| ways.iter().all(|way| way.is_finite()))
         };
-        let recent = self.rows.iter().rev().take_while(|(then, _)| at.since(*then).0 < SILENT.0);
-        let now = recent.filter_map(|(_, row)| both(row)).next()?;
+        let mut recent = self.rows.iter().rev().take_while(|(then, _)| at.since(*then).0 < SILENT.0);
+        let now = recent.find_map(|(_, row)| both(row))?;
         let from = self.rows.partition_point(|(then, _)| at.since(*then).as_secs_f64() > window_s);
         let then = self.rows.get(from..)?.iter().find_map(|(_, row)| both(row))?;
         let (cable_m, other_m) = (now[0] - then[0], now[1] - then[1]);
