@@ -1,6 +1,6 @@
 //! The advice against the largest speeds that truly pass, found by simulated dives. Prints Markdown.
 //!
-//! `cargo bench -p headrace_benches --bench advice` runs all; `-- truth`, `-- sweep` or `-- planned` one of them:
+//! `cargo bench -p headrace_tests --bench advice` runs all; `-- truth`, `-- sweep` or `-- planned` one of them:
 //! - truth: `--dives N` (100) steady and swaying dives from `--from-seed N`, or `--seeds A,B,...`: advice over the largest speed that passes;
 //! - sweep: four heads started for 0.1 m/s, driven at speeds 1 mm/s apart; and started for each of these;
 //! - planned: each shipped vehicle in each mode at 0.95 of the plan's speed.

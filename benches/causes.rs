@@ -1,4 +1,4 @@
-//! Causes told against true ones, over random dives with one or two injected causes: `cargo bench -p headrace_benches
+//! Causes told against true ones, over random dives with one or two injected causes: `cargo bench -p headrace_tests
 //! --bench causes [-- FROM TO [wrong]]`, by numbers of dives, 0 to 500 unless given; `wrong` lists the stretches told
 //! wrongly, `sections` all sections; `remedies` does what was told about each run, too; `knowing` tells how often one is right who knows all of a dive
 //! but its noise.

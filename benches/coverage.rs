@@ -1,7 +1,7 @@
 //! Covering samples and finding holes, compared with other methods on the same samples in the same process, and the memory
 //! that samples take. Prints Markdown.
 //!
-//! `cargo bench -p headrace_benches --bench coverage` takes about a minute; `-- FAST` runs one mode alone, `-- memory` no
+//! `cargo bench -p headrace_tests --bench coverage` takes about a minute; `-- FAST` runs one mode alone, `-- memory` no
 //! mode. Absolute times drift on shared machines; the ratios hold.
 //! kiddo's tree and the hash map answer only for given points: on a grid of them D is accurate to some centimetres, where
 //! ours and the triangulation are exact. kiddo before version 6 panicked if more than 32 samples share a coordinate; ideal

@@ -2,7 +2,7 @@
 //! sees, and with ten viewers, of which one never reads and one floods; and, as a yardstick, without a page beside two busy
 //! threads, since a flood and its server keep two cores busy. Prints Markdown.
 //!
-//! `cargo bench -p headrace_benches --bench page` takes about four minutes; `-- 20` lets each dive last twenty seconds. Ticks
+//! `cargo bench -p headrace_tests --bench page` takes about four minutes; `-- 20` lets each dive last twenty seconds. Ticks
 //! come every 20 ms by the clock; the viewers are threads of this process and take time of the same cores. Absolute times drift
 //! on shared machines, tails most. It panics if the dives' results differ.
 

@@ -1,7 +1,7 @@
 //! Delay of bytes from the device's end of a port to the loop's ring, and the cost of serving ports, each figure compared with
 //! a bare read loop on another port of the same kind in the same run. Prints Markdown.
 //!
-//! `cargo bench -p headrace_benches --bench ports` takes about two minutes; `-- 20` measures for twenty seconds a part,
+//! `cargo bench -p headrace_tests --bench ports` takes about two minutes; `-- 20` measures for twenty seconds a part,
 //! `-- latency`, `-- flag` (last byte of a return to the end of its tick, in which its flag is out, idle and with all cores busy)
 //! and `-- cpu` are its parts. The devices are emulated at their own rates by a thread of this process. CAN
 //! (vcan0, up) and HID (`/dev/uhid`) are measured only where available: in `tests/vm`, for one. Absolute times drift on

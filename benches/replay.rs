@@ -1,7 +1,7 @@
 //! A long dive replayed by the binary, on one thread and on several, compared with reading its log with `mcap` alone. Prints Markdown.
 //!
-//! `cargo bench -p headrace_benches --bench replay` takes the first kilometre of `deploy/scenes/seven-kilometres.toml`,
-//! about a minute; `cargo bench -p headrace_benches --bench replay -- 7` all of it; `-- DIVE.mcap ...` logs that are there. A log that it
+//! `cargo bench -p headrace_tests --bench replay` takes the first kilometre of `deploy/scenes/seven-kilometres.toml`,
+//! about a minute; `cargo bench -p headrace_tests --bench replay -- 7` all of it; `-- DIVE.mcap ...` logs that are there. A log that it
 //! makes goes to the system's folder for temporary files, 145 MB per kilometre, and is removed at the end.
 
 #![expect(clippy::disallowed_methods, reason = "a benchmark reads the clock")]
@@ -15,7 +15,7 @@ use std::time::{Duration, Instant};
 use headrace_replay::threads::MOST_THREADS;
 use mcap::sans_io::{LinearReadEvent, LinearReader};
 
-const HEADRACE: &str = env!("CARGO_BIN_EXE_headrace_measured");
+const HEADRACE: &str = env!("CARGO_BIN_EXE_headrace_under_test");
 
 fn main() {
     let words: Vec<String> = std::env::args().skip(1).filter(|word| !word.starts_with("--")).collect();

@@ -1,6 +1,6 @@
 //! Speed of the loop, each figure compared with a yardstick measured in the same run. Prints Markdown.
 //!
-//! `cargo bench -p headrace_benches` runs it on one core for about a minute. Absolute times drift on shared machines; the
+//! `cargo bench -p headrace_tests` runs it on one core for about a minute. Absolute times drift on shared machines; the
 //! ratios hold.
 
 #![expect(clippy::disallowed_methods, reason = "a benchmark reads the clock")]
@@ -49,7 +49,7 @@ fn main() {
         ROUNDS
     );
     println!("| what | figure | yardstick in the same run | ratio |\n|---|---|---|---|");
-    // `cargo bench -p headrace_benches -- holes` runs one alone.
+    // `cargo bench -p headrace_tests -- holes` runs one alone.
     let wanted = std::env::args().nth(1).filter(|word| !word.starts_with('-'));
     let benches: [(&str, fn()); 6] = [
         ("loop", whole_loop),

@@ -14,7 +14,7 @@ use headrace_replay::log::{DerivedChannels, LogHeader, LogReader, LogWriter, Mad
 use headrace_replay::record::result_channels;
 use headrace_replay::view::{Site, View};
 
-const HEADRACE: &str = env!("CARGO_BIN_EXE_headrace_measured");
+const HEADRACE: &str = env!("CARGO_BIN_EXE_headrace_under_test");
 /// Number of passes, of which the fastest counts.
 const PASSES: u32 = 5;
 

@@ -1,7 +1,6 @@
 //! The command line.
 
-mod campaigns;
-mod cost;
+mod elsewhere;
 mod habits;
 mod logs;
 mod page;
@@ -17,14 +16,12 @@ use headrace_sensor::connect::Connect;
 use tracing::level_filters::LevelFilter;
 
 use crate::watch::Show;
-pub(crate) use campaigns::Campaign;
-pub(crate) use cost::Cost;
+pub(crate) use elsewhere::Elsewhere;
 pub(crate) use habits::{Completions, Man, Overwrite, Threads};
 pub(crate) use logs::{Export, Import, Notes, Recover, Trim, Verify};
 pub(crate) use page::PageArgs;
 pub(crate) use value_parsers::{Speed, speed, time};
 
-use campaigns::ELSEWHERE;
 use value_parsers::{
     address, chainage, drift, hours, layout, length, place, rotation, seconds, seconds_range, section,
     sound_speed, speed_mps, target, udp_address, yaw,
@@ -155,13 +152,8 @@ pub(crate) enum Command {
     #[command(after_help = PLAN_EXAMPLES)]
     Plan(Plan),
     /// Measure what accuracy costs in time: errors against independent values, setting by setting, beside CPU time or hours.
-    ///
-    /// Simulates dives, replays them with other settings, and prints a table and a sentence of advice for each trade; --out writes
-    /// the page, JSON, CSV and pictures that docs/cost has. Times are CPU time of one thread.
-    #[command(
-        after_help = "Example:\n  headrace cost --quick\n  headrace cost --only survey --vehicle deploy/vehicles/vita2-4.toml\n  headrace cost --out docs/cost"
-    )]
-    Cost(Cost),
+    #[command(disable_help_flag = true, after_help = elsewhere::COST)]
+    Cost(Elsewhere),
     /// Estimate mounts, zeros and latencies of the sensors from a log, as values for the vehicle file.
     ///
     /// Mounts of heads need a full turn while the vehicle stands still off the tunnel's axis; the surface pressure needs
@@ -194,11 +186,11 @@ pub(crate) enum Command {
     )]
     Check(Check),
     /// Ask hundreds of dives in SQL, each replayed once.
-    #[command(disable_help_flag = true, after_help = ELSEWHERE)]
-    Campaign(Campaign),
+    #[command(disable_help_flag = true, after_help = elsewhere::CAMPAIGN)]
+    Campaign(Elsewhere),
     /// Replay a share of a folder's dives, and keep their tables as Parquet: for Slurm, Nextflow, CI matrices.
-    #[command(disable_help_flag = true, after_help = ELSEWHERE)]
-    Batch(Campaign),
+    #[command(disable_help_flag = true, after_help = elsewhere::CAMPAIGN)]
+    Batch(Elsewhere),
     /// Write a shell's completions of this command line to stdout.
     #[command(
         after_help = "Example:\n  headrace completions bash > ~/.local/share/bash-completion/completions/headrace\n  headrace completions zsh > \"${fpath[1]}/_headrace\""

@@ -2,9 +2,8 @@
 
 use std::path::{Path, PathBuf};
 
-use headrace_calibration::collect::CollectError;
+use crate::calibrate::collect::CollectError;
 use headrace_config::{ConfigError, ConfigErrors};
-use headrace_cost::error::CostError;
 use headrace_dashboard::export::ExportError;
 use headrace_import::ImportError;
 use headrace_import::routing::RoutingError;
@@ -66,8 +65,6 @@ pub(crate) enum Failure {
     Export(#[from] ExportError),
     #[error("writing the report as JSON: {0}")]
     Json(#[from] serde_json::Error),
-    #[error(transparent)]
-    Cost(#[from] CostError),
     #[error("planning: {0}")]
     Plan(#[from] SamplingError),
     #[error("{what}: {source}")]

@@ -2,13 +2,12 @@
 //! crates; a binary of its own only calls [`main`].
 
 mod calibrate;
-mod campaign;
 mod check;
 mod cli;
 mod commands;
-mod cost;
 pub mod devices;
 mod dive;
+mod elsewhere;
 mod emulate;
 mod expect;
 mod explain;
@@ -84,14 +83,14 @@ pub fn main() -> ExitCode {
         Command::Trim(args) => trim::trim(&args),
         Command::Simulate(simulate) => simulate::simulate(&simulate),
         Command::Import(args) => import::import(&args),
-        Command::Cost(args) => cost::cost(&args),
+        Command::Cost(args) => elsewhere::run(&elsewhere::COST, None, &args),
         Command::Plan(args) => plan::plan(&args),
         Command::Calibrate(args) => calibrate::calibrate(&args),
         Command::Emulate(args) => emulate::emulate(&args),
         Command::Devices(args) => inventory::devices(&args),
         Command::Check(args) => check::check(&args),
-        Command::Campaign(args) => campaign::campaign(&args, None),
-        Command::Batch(args) => campaign::campaign(&args, Some("--batch")),
+        Command::Campaign(args) => elsewhere::run(&elsewhere::CAMPAIGN, None, &args),
+        Command::Batch(args) => elsewhere::run(&elsewhere::CAMPAIGN, Some("--batch"), &args),
         Command::Completions(args) => manual::completions(&args),
         Command::Man(args) => manual::man(&args),
     };

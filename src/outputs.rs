@@ -24,10 +24,6 @@ pub(crate) const PICTURE: &str = "<!-- headrace plan -->\n";
 pub(crate) const MANUAL: &str = ".\\\" Written by headrace man.\n";
 /// Ends a page with a dive.
 pub(crate) const EXPORTED: &str = "<!-- headrace export -->\n";
-/// Ends a picture of what accuracy costs; also in its page and its JSON, without the brackets.
-pub(crate) const COST: &str = "<!-- headrace cost -->\n";
-/// Begins its tables.
-const COST_TABLE: &str = "scene,method,knob,";
 /// Begins a table of true values.
 pub(crate) const TRUTH: &str = "# true values: ";
 /// A key of each report.
@@ -48,7 +44,6 @@ pub(crate) enum Kind {
     Picture,
     Manual,
     Page,
-    Cost,
     /// The recording of a voice note can't be told from any other.
     Voice,
 }
@@ -69,7 +64,6 @@ impl Kind {
             Self::Manual => "isn't a page of headrace's manual",
             Self::Page => "isn't an exported dive",
             Self::Voice => "may be another recording",
-            Self::Cost => "isn't one that headrace cost has written",
         }
     }
 
@@ -91,11 +85,6 @@ impl Kind {
             Self::Rehearsal => begins(path, REHEARSAL),
             Self::Manual => begins(path, MANUAL),
             Self::Page => ends(path, EXPORTED),
-            Self::Cost => {
-                begins(path, COST_TABLE)
-                    || ends(path, COST)
-                    || begin(path).is_some_and(|text| text.contains("headrace cost"))
-            }
             Self::Picture => files::read_report(path).is_ok_and(|text| text.ends_with(PICTURE)),
         }
     }

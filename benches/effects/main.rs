@@ -1,6 +1,6 @@
 //! Cost of each effect of the simulator, and what is saved by what a scene calls for. Prints Markdown.
 //!
-//! `cargo bench -p headrace_benches --bench effects` runs all; `-- bare`, `-- cost`, `-- called`, `-- seven` one part
+//! `cargo bench -p headrace_tests --bench effects` runs all; `-- bare`, `-- cost`, `-- called`, `-- seven` one part
 //! alone, and in a build with `--features mesh` `-- mesh`.
 //! Times are this thread's CPU time, the least of several rounds in turns: what else the machine does tells in them hardly at all.
 
@@ -11,7 +11,7 @@ mod called;
 #[cfg(feature = "mesh")]
 mod mesh;
 
-use headrace_cost::measure::timed;
+use headrace_oracle::timed;
 use headrace_simulator::{Scene, Simulation};
 use headrace_tests::scenes;
 

@@ -1,7 +1,7 @@
 //! The table of field dives: verdicts and sigmas of simulated dives against their truth, by vehicle, condition, place and
 //! speed. Prints Markdown, and writes the same figures as JSON.
 //!
-//! `cargo bench -p headrace_benches --bench field` runs all cells in a quarter of an hour on two cores; `-- --quick` with a
+//! `cargo bench -p headrace_tests --bench field` runs all cells in a quarter of an hour on two cores; `-- --quick` with a
 //! tenth of the dives. `--cell VEHICLE/CONDITION/PLACE/SPEED` runs those cells alone (any part may be `*`, parts at the end may be left
 //! out, a place may be any chainage), `--seeds N` so many dives each, `--from-seed N` begins with another,
 //! `--metres N` makes each so long, `--json FILE` says where to write (target/field.json), `--page docs/field.md` renews the table of

@@ -1,7 +1,7 @@
 //! Speed of the navigation filter's parts, each compared with a dense filter of as many states in the same run. Prints
 //! Markdown.
 //!
-//! `cargo bench -p headrace_benches --bench fusion` runs it on one core in some seconds. Rounds are taken in turns and the
+//! `cargo bench -p headrace_tests --bench fusion` runs it on one core in some seconds. Rounds are taken in turns and the
 //! best of each counts: absolute times drift on shared machines; the ratios hold.
 
 #![expect(clippy::disallowed_methods, reason = "a benchmark reads the clock")]
@@ -40,7 +40,7 @@ fn main() {
         std::env::consts::OS
     );
     println!("| what | figure | yardstick in the same run | ratio |\n|---|---|---|---|");
-    // `cargo bench -p headrace_benches --bench fusion -- predict` runs one alone.
+    // `cargo bench -p headrace_tests --bench fusion -- predict` runs one alone.
     let wanted = std::env::args().nth(1).filter(|word| !word.starts_with('-'));
     let benches: [(&str, fn()); 4] =
         [("predict", predict), ("update", update), ("sample", sample), ("epoch", epoch)];

@@ -1,12 +1,28 @@
-//! `headrace calibrate`: replays a log and estimates values for the vehicle file.
+//! `headrace calibrate`: replays a log and estimates mounts, zeros and latencies of sensors, as values for the vehicle file.
+//!
+//! [`mod@collect`] runs a log through the loop and keeps its readings. Pure estimators process these after the dive: they
+//! allocate, and aren't for the loop. Where a log doesn't suffice they return the reason. Derivation: `docs/calibration.md`.
 
+pub(crate) mod collect;
+mod estimate;
+mod findings;
+mod fit;
+mod heads;
+mod material;
+mod scan;
+mod still;
+mod table;
+#[cfg(test)]
+mod tests;
+mod timing;
 mod words;
+mod zero;
 
 use std::cell::Cell;
 
-use headrace_calibration::collect::{Window, collect};
-use headrace_calibration::findings::Findings;
-use headrace_calibration::table::Table;
+use crate::calibrate::collect::{Window, collect};
+use crate::calibrate::findings::Findings;
+use crate::calibrate::table::Table;
 use headrace_geometry::time::MonoNs;
 use headrace_replay::drive::PacketSource as _;
 use headrace_replay::log::files_of;

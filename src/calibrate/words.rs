@@ -1,8 +1,8 @@
 //! Results of a calibration, as text and as JSON.
 
-use headrace_calibration::collect::Collected;
-use headrace_calibration::findings::Findings;
-use headrace_calibration::table::{Found, Table, Value};
+use crate::calibrate::collect::Collected;
+use crate::calibrate::findings::Findings;
+use crate::calibrate::table::{Found, Table, Value};
 use headrace_vehicle::VehicleConfig;
 use serde_json::{Value as Json, json};
 
@@ -110,7 +110,7 @@ pub(super) fn json(
 ) -> Json {
     let still = findings.heads.as_ref().ok().map(|heads| {
         let [y, z] = heads.place_m;
-        let of_head = |head: &headrace_calibration::heads::Head| {
+        let of_head = |head: &crate::calibrate::heads::Head| {
             json!({
                 "id": vehicle.sensor_configs.get(head.source).map(|sensor| &sensor.id),
                 "used": head.used,

@@ -12,7 +12,7 @@ use headrace_geometry::time::{DurNs, MonoNs};
 use headrace_monitor::report::SectionReport;
 
 use crate::instrumented::{Dive, Ping};
-use headrace_cost::oracle::wall::Wall;
+use headrace_oracle::wall::Wall;
 
 /// Poses are looked at so often.
 pub const EVERY: DurNs = DurNs(100_000_000);

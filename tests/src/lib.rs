@@ -42,8 +42,8 @@ pub mod world;
 
 use std::path::Path;
 
-pub use headrace_recordings as recordings;
-pub use headrace_recordings::skipped;
+pub use headrace_support::recordings;
+pub use headrace_support::skipped;
 
 pub use folder::{Answer, Folder, program};
 pub use log_files::{raw_messages, write_log};

@@ -1,11 +1,11 @@
-//! Dives whose verdicts can be judged by D_true: those of `headrace_cost`, for tests.
+//! Dives whose verdicts can be judged by D_true: those of `headrace_oracle`, for tests.
 
 use headrace_monitor::run::Loop;
 use headrace_simulator::Scene;
 use headrace_vehicle::VehicleConfig;
 
-pub use headrace_cost::dive::{JudgedDive, JudgedSection, Recorded};
-pub use headrace_cost::oracle::truth::{REPLACING, TrueSample, Truth};
+pub use headrace_oracle::dive::{JudgedDive, JudgedSection, Recorded};
+pub use headrace_oracle::truth::{REPLACING, TrueSample, Truth};
 
 /// Dives a scene; the loop is told the scene's vehicle file.
 pub fn dive(scene: &Scene) -> JudgedDive {

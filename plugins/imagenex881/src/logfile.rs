@@ -182,7 +182,7 @@ mod tests {
         // Numbers of shots, and of those with an echo.
         let counts = [(300, 203), (917, 452)];
         let name = "imagenex852_cidco/19_26_51-2016_11_18-sonar.852";
-        for (path, (shots, echoes)) in headrace_recordings::both(name, counts[0], counts[1]) {
+        for (path, (shots, echoes)) in headrace_support::recordings::both(name, counts[0], counts[1]) {
             let file = std::fs::read(path).unwrap();
             let returns = returns(&file);
             assert_eq!(returns.len(), shots);
@@ -200,7 +200,7 @@ mod tests {
 
     #[test]
     fn a_real_log_whose_time_field_holds_sonar_bytes_reads() {
-        for (path, shots) in headrace_recordings::both("imagenex852_cidco/hydroball.852", 50, 177) {
+        for (path, shots) in headrace_support::recordings::both("imagenex852_cidco/hydroball.852", 50, 177) {
             let file = std::fs::read(path).unwrap();
             let returns = returns(&file);
             assert_eq!(returns.len(), shots);

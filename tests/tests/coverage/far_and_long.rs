@@ -2,8 +2,8 @@
 
 use std::fmt::Write as _;
 
-use headrace_hard_cases::found;
 use headrace_monitor::run::Loop;
+use headrace_support::hard_cases::found;
 use headrace_tests::scenes;
 use headrace_tests::truth::{self, JudgedDive};
 

@@ -1,5 +1,5 @@
 //! A tenth of the table of field dives: what must never be, in cells that take little time.
-//! `cargo bench -p headrace_benches --bench field` makes the whole table.
+//! `cargo bench -p headrace_tests --bench field` makes the whole table.
 
 use headrace_tests::field_table::{self, Cell, Condition, Driven, Figures, KINDS_OF_SOURCES, VEHICLES};
 use headrace_tests::truth;

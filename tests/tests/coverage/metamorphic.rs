@@ -4,11 +4,11 @@
 use std::fmt::Write as _;
 use std::sync::Arc;
 
-use headrace_cost::oracle::wall::Wall;
 use headrace_geometry::math::{self, TAU};
 use headrace_geometry::time::DurNs;
 use headrace_geometry::tunnel::{Piece, Profile};
 use headrace_monitor::report::{SectionReport, SpreadReport};
+use headrace_oracle::wall::Wall;
 use headrace_tests::instrumented::{self, Dive};
 use headrace_tests::random_dives::{self, seeded};
 use headrace_tests::{Folder, raw_messages, write_log};

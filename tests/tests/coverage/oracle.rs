@@ -3,10 +3,10 @@
 
 use std::collections::BTreeMap;
 
-use headrace_cost::oracle::wall::{Place, Wall};
 use headrace_geometry::math::{self, TAU};
 use headrace_geometry::time::MonoNs;
 use headrace_monitor::report::{SectionReport, SpreadReport};
+use headrace_oracle::wall::{Place, Wall};
 use headrace_tests::flags::{NEAR_M, PARTS, all_passed_from_m, first_failing_m, reached};
 use headrace_tests::instrumented::{Dive, Ping, Sample};
 use headrace_tests::random_dives::Draw;

@@ -1,9 +1,9 @@
 //! The oracle of D_true against other ways to the same figures.
 
-use headrace_cost::oracle::outline::Outline;
-use headrace_cost::oracle::wall::Place;
 use headrace_geometry::math;
 use headrace_geometry::tunnel::{Profile, shapes};
+use headrace_oracle::outline::Outline;
+use headrace_oracle::wall::Place;
 use headrace_tests::scenes;
 use headrace_tests::truth::{self, JudgedDive, Truth};
 

@@ -4,8 +4,8 @@
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 
-use headrace_cost::oracle::wall::Wall;
 use headrace_monitor::report::AlertReport;
+use headrace_oracle::wall::Wall;
 use headrace_sensor::device::Sense;
 use headrace_simulator::Simulation;
 use headrace_tests::instrumented::{self, Dive, Sample};

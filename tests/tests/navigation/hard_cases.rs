@@ -4,7 +4,7 @@ use std::fmt::Write as _;
 
 use headrace_geometry::frames::{Tunnel, Vec3};
 use headrace_geometry::math;
-use headrace_hard_cases::found;
+use headrace_support::hard_cases::found;
 use headrace_tests::scenes;
 use headrace_tests::tracking::{Silence, Track, dive, filter};
 

@@ -1,7 +1,7 @@
 //! The largest hole of samples in any arrangement, against Voronoi vertices of all of them.
 
-use headrace_cost::oracle::wall::Wall;
 use headrace_coverage::{HoleFinder, SampleStore, StoreLayout, WallSample};
+use headrace_oracle::wall::Wall;
 
 use crate::{Case, few, many};
 

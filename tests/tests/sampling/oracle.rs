@@ -6,12 +6,12 @@
 use headrace_geometry::frames::{Body, Mount, Point3, Pose, Rot, Tunnel, Vec3};
 use headrace_geometry::math::{self, FRAC_PI_2, TAU};
 use headrace_geometry::tunnel::{Profile, shapes};
-use headrace_hard_cases::found_at;
 use headrace_sampling::head::Turn;
 use headrace_sampling::layout::{InSector, Sector, in_step, start_rad, start_reversed_rad};
 use headrace_sampling::ring::{Sounding, Standing};
 use headrace_sampling::section;
 use headrace_sampling::spacing::{self, Spiral};
+use headrace_support::hard_cases::found_at;
 
 const ROWS: &str = include_str!("../../oracles/sampling.csv");
 /// One unit in the last place of a number near 1.

@@ -1,56 +1,49 @@
-//! The trade Survey shows what `headrace plan` says.
+//! `docs/cost` prices surveys by what `headrace plan` says.
 
-use headrace::devices::KINDS;
-use headrace_cost::effort::Effort;
-use headrace_cost::point::Point;
-use headrace_cost::scene::{Inputs, file};
-use headrace_cost::trades::survey;
 use headrace_tests::{program, root};
 use serde_json::Value;
 
-/// What `plan` says of a point: speed and hours of its mode.
-fn planned(point: &Point) -> [f64; 2] {
-    let vehicle = root().join("deploy/vehicles/vita1.toml");
+/// Vehicles of the page, with their files.
+const VEHICLES: [(&str, &str); 4] = [
+    ("VITA 1, one head", "vita1.toml"),
+    ("VITA 2, two heads", "vita2-2.toml"),
+    ("VITA 2, three heads", "vita2-3.toml"),
+    ("VITA 2, four heads", "vita2-4.toml"),
+];
+
+/// What `plan` says of a vehicle's mode: speed and hours.
+fn planned(file: &str, target_m: &Value, mode: &str) -> [f64; 2] {
+    let vehicle = root().join("deploy/vehicles").join(file);
     let mut command = program();
-    command
-        .args(["plan", "--json", "--target", &point.number.unwrap().to_string(), "--vehicle"])
-        .arg(vehicle);
-    let (layout, drift) = point.method.split_once(", ").unwrap_or_default();
-    if let Some(drift_m) = drift.strip_suffix(" m off") {
-        command.args(["--layout", &layout.replace(' ', "_"), "--drift", drift_m]);
-    }
+    command.args(["plan", "--json", "--target", &target_m.to_string(), "--vehicle"]).arg(vehicle);
     let output = command.output().unwrap();
     let plan: Value = serde_json::from_slice(&output.stdout)
         .unwrap_or_else(|why| panic!("{why}: {}", String::from_utf8_lossy(&output.stderr)));
-    // Of a scene of modes the method is one; in others the value names the fastest.
-    let mode = point.value.split_once(", ").map_or(point.method.as_str(), |(_, mode)| mode);
     let answer = plan["modes"].as_array().unwrap().iter().find(|answer| answer["mode"] == mode).unwrap();
     ["v_max_mps", "needed_h"].map(|key| answer[key].as_f64().unwrap())
 }
 
 #[test]
-fn survey_shows_what_plan_says_to_the_bit() {
-    let text = file("vita1.toml").unwrap();
-    let inputs = Inputs { effort: Effort::Quick, kinds: &KINDS, vehicle: Some(("VITA 1", text)) };
-    let trade = survey::measure(&inputs, &mut |_| {}).unwrap();
-    let scenes = trade.scenes();
-    assert_eq!(scenes.len(), 3);
-    for scene in scenes {
-        let points = trade.points.iter().filter(|point| point.scene == scene).count();
-        assert!(points >= 3, "{points} points of {scene:?}");
+fn the_survey_of_docs_cost_says_what_plan_says_to_the_bit() {
+    let results: Value =
+        serde_json::from_str(&std::fs::read_to_string(root().join("docs/cost/cost.json")).unwrap()).unwrap();
+    let trade = results["trades"].as_array().unwrap().iter().find(|trade| trade["name"] == "survey").unwrap();
+    let mut compared = 0;
+    for point in trade["points"].as_array().unwrap() {
+        let method = point["method"].as_str().unwrap();
+        let Some((_, file)) = VEHICLES.iter().find(|(name, _)| *name == method) else { continue };
+        let (_, mode) = point["value"].as_str().unwrap().split_once(", ").unwrap();
+        let figure = |name: &str| {
+            let error = point["errors"].as_array().unwrap().iter().find(|error| error["name"] == name);
+            error.unwrap()["interval"]["middle"].as_f64().unwrap()
+        };
+        let shown = [figure("speed"), figure("there")];
+        assert_eq!(
+            shown.map(f64::to_bits),
+            planned(file, &point["number"], mode).map(f64::to_bits),
+            "{point}"
+        );
+        compared += 1;
     }
-    for point in &trade.points {
-        let figure =
-            |name: &str| point.errors.iter().find(|error| error.name == name).unwrap().interval.middle;
-        let found = [figure("speed"), figure("there")];
-        assert_eq!(found.map(f64::to_bits), planned(point).map(f64::to_bits), "{point:?}");
-        let hours = figure("there") + figure("back") + figure("again");
-        assert!((point.cost.middle - hours).abs() < 1e-9, "{point:?}");
-        // Promised and kept.
-        let hole_m = point.errors.iter().find(|error| error.name.starts_with("largest D_true"));
-        if let Some(hole_m) = hole_m.filter(|_| !point.method.contains(" m off")) {
-            assert!(hole_m.interval.middle <= point.error(), "{point:?}");
-        }
-    }
-    assert!(trade.oracle.size < 1e-3 * 0.4, "{}", trade.oracle.size);
+    assert!(compared >= 12, "{compared} points");
 }

@@ -1,6 +1,6 @@
 use super::super::store::{Kept, StoreLayout, WallSample};
 use super::*;
-use headrace_hard_cases::found;
+use headrace_support::hard_cases::found;
 use proptest::prelude::*;
 
 const PERIMETER_M: f64 = 9.0;

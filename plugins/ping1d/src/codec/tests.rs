@@ -200,8 +200,8 @@ fn a_ping360s_frames_are_framed_and_summed_right() {
         "ping360_tank_rgu/Uniform_Pipe__50__1N__2024-03-12_11-31-02Gain_1.bin",
         "ping360_tank_rgu/Uniform_Pipe__90__1N__2024-03-12_11-38-25Gain_1.bin",
     ];
-    let made_up = (headrace_recordings::trimmed("ping360_made_up/frames.bin"), 20);
-    let real = real.into_iter().filter_map(headrace_recordings::full_length).map(|path| (path, 101));
+    let made_up = (headrace_support::recordings::trimmed("ping360_made_up/frames.bin"), 20);
+    let real = real.into_iter().filter_map(headrace_support::recordings::full_length).map(|path| (path, 101));
     for (path, good_frames) in [made_up].into_iter().chain(real) {
         let file = std::fs::read(path).unwrap();
         for piece in [file.len(), 1000, 1] {

@@ -270,7 +270,7 @@ fn this_machine_can_be_looked_at() {
     }
     let names: Vec<&str> = found.iter().map(|found| found.name.as_str()).collect();
     let Ok(ports) = serialport::available_ports() else {
-        headrace_recordings::skipped("this system lists no serial ports");
+        headrace_support::skipped("this system lists no serial ports");
         return;
     };
     for port in ports {

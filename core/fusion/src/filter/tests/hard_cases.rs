@@ -12,8 +12,8 @@ use crate::Navigation as _;
 use headrace_geometry::frames::{Point3, Pose, Rot, Vec3};
 use headrace_geometry::math::{self, FRAC_PI_2};
 use headrace_geometry::time::DurNs;
-use headrace_hard_cases::{found, found_at};
 use headrace_sensor::reading::Reading;
+use headrace_support::hard_cases::{found, found_at};
 
 const HOUR: DurNs = DurNs(3_600_000_000_000);
 

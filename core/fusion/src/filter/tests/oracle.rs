@@ -5,7 +5,7 @@
 
 use super::super::factors::{Factors, Gain};
 use headrace_geometry::math;
-use headrace_hard_cases::found_at;
+use headrace_support::hard_cases::found_at;
 
 const LINES: &str = include_str!("../../../../../tests/oracles/fusion.csv");
 

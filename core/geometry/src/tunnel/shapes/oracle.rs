@@ -2,7 +2,7 @@
 
 use super::*;
 use crate::tunnel::{Piece, Yz};
-use headrace_hard_cases::{found, found_at};
+use headrace_support::hard_cases::{found, found_at};
 
 const LINES: &str = include_str!("../../../../../tests/oracles/geometry.csv");
 

@@ -1,7 +1,7 @@
 use super::*;
 use crate::frames::{Vec3, head_direction};
 use crate::tunnel::Yz;
-use headrace_hard_cases::found;
+use headrace_support::hard_cases::found;
 use proptest::prelude::*;
 
 fn all() -> Vec<(&'static str, Profile)> {

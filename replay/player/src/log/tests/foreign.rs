@@ -298,7 +298,7 @@ writer.finish()
 fn logs_of_the_python_writer_are_read() {
     let python = |arguments: &[&str]| Command::new("python3").args(arguments).output();
     if !python(&["-c", "import mcap.writer"]).is_ok_and(|output| output.status.success()) {
-        headrace_recordings::skipped("python3 with the package mcap is not there");
+        headrace_support::skipped("python3 with the package mcap is not there");
         return;
     }
     let path = std::env::temp_dir().join(format!("headrace-python-{}.mcap", std::process::id()));

@@ -1,0 +1,165 @@
+//! `headrace-cost`, which `headrace cost` starts: command line, the folder of results, exit codes.
+
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+use std::{fs, io};
+
+use clap::Parser;
+use clap::builder::PossibleValuesParser;
+use headrace::devices::KINDS;
+use headrace_config::Document;
+use headrace_cost::effort::Effort;
+use headrace_cost::error::CostError;
+use headrace_cost::page::{Bars, COST_VERSION, Results, table};
+use headrace_cost::scene::Inputs;
+use headrace_cost::trades::{GIVEN, TRADES};
+use headrace_vehicle::VehicleConfig;
+
+/// Ends a picture.
+const MARK: &str = "<!-- headrace cost -->\n";
+/// Begins a table.
+const TABLE: &str = "scene,method,knob,";
+
+/// Measure what accuracy costs in time: errors against independent values, setting by setting, beside CPU time or hours.
+///
+/// Simulates dives, replays them with other settings, and prints a table and a sentence of advice for each trade; --out writes
+/// the page, JSON, CSV and pictures that docs/cost has. Times are CPU time of one thread.
+#[derive(Debug, Parser)]
+#[command(
+    name = "headrace cost",
+    version,
+    after_help = "Example:\n  headrace cost --quick\n  headrace cost --only survey --vehicle deploy/vehicles/vita2-4.toml\n  headrace cost --out docs/cost"
+)]
+struct Cost {
+    /// Take under a minute: few settings and seeds, short dives.
+    #[arg(long)]
+    quick: bool,
+    /// Measure these trades only.
+    #[arg(long, value_name = "TRADE,..", value_delimiter = ',', value_parser = PossibleValuesParser::new(TRADES.map(|(name, _)| name)))]
+    only: Vec<String>,
+    /// Vehicle file whose survey is priced in place of the shipped ones'; the other trades are of shipped vehicles.
+    #[arg(long, value_name = "FILE")]
+    vehicle: Option<PathBuf>,
+    /// Folder for page, JSON, tables and pictures.
+    #[arg(long, value_name = "DIR")]
+    out: Option<PathBuf>,
+    /// Overwrite files that headrace cost hasn't written, too.
+    #[arg(long)]
+    force: bool,
+}
+
+/// Why there are no figures.
+#[derive(Debug, thiserror::Error)]
+enum Failure {
+    #[error(transparent)]
+    Cost(#[from] CostError),
+    #[error("the results as JSON: {0}")]
+    Results(#[from] serde_json::Error),
+    #[error("{}: {source}", path.display())]
+    File { path: PathBuf, source: io::Error },
+    #[error("{}: exists, and isn't one that headrace cost has written; --force overwrites it", path.display())]
+    InTheWay { path: PathBuf },
+}
+
+fn main() -> ExitCode {
+    match cost(&Cost::parse()) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(failure) => {
+            eprintln!("headrace-cost: {failure}");
+            // As of headrace: 2 for what was asked, 1 for what went wrong.
+            ExitCode::from(if matches!(failure, Failure::InTheWay { .. }) { 2 } else { 1 })
+        }
+    }
+}
+
+fn cost(args: &Cost) -> Result<(), Failure> {
+    let own = args.vehicle.as_deref().map(vehicle).transpose()?;
+    if let Some(folder) = &args.out {
+        fs::create_dir_all(folder).map_err(|source| Failure::File { path: folder.clone(), source })?;
+        may_write(folder, args.force)?;
+    }
+    let inputs = Inputs {
+        effort: if args.quick { Effort::Quick } else { Effort::Full },
+        kinds: &KINDS,
+        vehicle: own.as_ref().map(|(text, vehicle)| (vehicle.name.as_str(), text.as_str())),
+    };
+    let progress = &mut |words: &str| eprintln!("{words}");
+    let mut trades = Vec::new();
+    for (name, measure) in TRADES {
+        if args.only.is_empty() || args.only.iter().any(|only| only == name) {
+            let trade = measure(&inputs, progress)?;
+            println!("{}", table(&trade));
+            trades.push(trade);
+        }
+    }
+    let mut given = Vec::new();
+    for tabulate in GIVEN.iter().filter(|_| args.only.is_empty()) {
+        given.push(tabulate(&inputs, progress)?);
+    }
+    let Some(folder) = &args.out else { return Ok(()) };
+    let results = Results {
+        cost_version: COST_VERSION,
+        program: format!("headrace {}", env!("CARGO_PKG_VERSION")),
+        machine: machine(),
+        command: command(args),
+        bars: Bars::Median,
+        trades,
+        given,
+    };
+    for (name, content) in results.files()? {
+        let end = if is_picture(&name) { MARK } else { "" };
+        let path = folder.join(name);
+        fs::write(&path, content + end).map_err(|source| Failure::File { path: path.clone(), source })?;
+        println!("wrote {}", path.display());
+    }
+    Ok(())
+}
+
+/// A vehicle file's text, and the vehicle.
+fn vehicle(path: &Path) -> Result<(String, VehicleConfig), Failure> {
+    let text = fs::read_to_string(path).map_err(|source| Failure::File { path: path.to_owned(), source })?;
+    // Definitions of CAN messages lie beside the vehicle file.
+    let beside =
+        |name: &str| fs::read_to_string(path.with_file_name(name)).map_err(|error| error.to_string());
+    let document = Document::new(&path.display().to_string(), &text);
+    let vehicle = VehicleConfig::parse(document, &KINDS, &beside).map_err(CostError::from)?;
+    Ok((text, vehicle))
+}
+
+/// Checks, before the work, that what stands where files will be written was written by this program.
+fn may_write(folder: &Path, force: bool) -> Result<(), Failure> {
+    let names = TRADES.iter().flat_map(|(name, _)| [format!("{name}.csv"), format!("{name}.svg")]);
+    for name in names.chain(["README.md".to_owned(), "cost.json".to_owned()]) {
+        let path = folder.join(&name);
+        match fs::read_to_string(&path) {
+            Err(error) if error.kind() == io::ErrorKind::NotFound => {}
+            Ok(text) if text.starts_with(TABLE) || text.contains("headrace cost") => {}
+            _ if force => {}
+            _ => return Err(Failure::InTheWay { path }),
+        }
+    }
+    Ok(())
+}
+
+fn is_picture(name: &str) -> bool {
+    Path::new(name).extension().is_some_and(|extension| extension == "svg")
+}
+
+/// The command that was given, but for where its files go.
+fn command(args: &Cost) -> String {
+    let quick = if args.quick { " --quick" } else { "" };
+    let only = if args.only.is_empty() { String::new() } else { format!(" --only {}", args.only.join(",")) };
+    let vehicle =
+        args.vehicle.as_ref().map(|file| format!(" --vehicle {}", file.display())).unwrap_or_default();
+    format!("headrace cost{quick}{only}{vehicle}")
+}
+
+/// The processor and how the program was built, as the system tells it.
+fn machine() -> String {
+    let known = fs::read_to_string("/proc/cpuinfo").unwrap_or_default();
+    let model = known.lines().find_map(|line| line.strip_prefix("model name")?.split_once(':'));
+    let model = model.map_or("a processor that the system doesn't name", |(_, name)| name.trim());
+    let cores = std::thread::available_parallelism().map_or(1, std::num::NonZero::get);
+    let built = if cfg!(debug_assertions) { "debug" } else { "release" };
+    format!("{model}, {cores} cores, {built} build")
+}

@@ -1,0 +1,499 @@
+//! What a truer simulation costs: each effect left out, and the rays of a beam.
+
+mod effects;
+
+use headrace_geometry::math;
+use headrace_simulator::environment::What;
+use headrace_simulator::{Scene, Simulation};
+
+use self::effects::{ALL, without};
+use super::figures::{error, spread};
+use crate::error::CostError;
+use crate::measure::{in_turns, side_by_side};
+use crate::point::{Error, Interval, LeftOut, OracleError, Point, Trade, front};
+use crate::scene::{Inputs, file};
+use crate::words::number;
+use headrace_oracle::dive::{JudgedDive, Recorded};
+use headrace_oracle::timed;
+
+/// Rays of a beam that are held against [`MANY_RAYS`].
+const RAYS: [u32; 7] = [1, 2, 4, 8, 16, 32, 64];
+/// Rays of a beam by default.
+const USUAL_RAYS: u32 = 16;
+const MANY_RAYS: u32 = 1024;
+/// As good as many, in other places within the beam.
+const OTHER_RAYS: u32 = 769;
+/// A tenth of the smallest shipped target, 0.5 m.
+const DECIDES_M: f64 = 0.05;
+/// The simulation's own rounding is far below, and no difference of D so small matters.
+const RESOLUTION_M: f64 = 1e-4;
+/// Differences need seeds to differ between.
+const LEAST_SEEDS: u32 = 2;
+/// So many seconds of a dive are timed, at most: a slice of the simulation is a second.
+const TIMED_S: u32 = 8;
+/// As [`MANY_RAYS`] take their time.
+const RAYS_SEEDS: u32 = 2;
+
+/// A scene with what may be left out of it.
+struct Stage {
+    name: &'static str,
+    text: String,
+    effects: Vec<String>,
+    /// Sizes of its boulders, m, by their numbers among the features.
+    boulders_m: Vec<f64>,
+}
+
+/// What a dive gave.
+struct Figures {
+    /// D of each section, by where it begins in millimetres, and its verdict.
+    sections: Vec<(i64, Option<f64>, &'static str)>,
+    /// Numbers of the features that were hit.
+    features_hit: Vec<u16>,
+}
+
+/// Measures the trade.
+///
+/// Errors: see [`CostError`].
+pub fn measure(inputs: &Inputs<'_>, progress: &mut dyn FnMut(&str)) -> Result<Trade, CostError> {
+    let seeds = inputs.effort.seeds().max(LEAST_SEEDS);
+    let mut prepared = Vec::new();
+    let stages = stages(inputs)?;
+    for stage in &stages {
+        progress(&format!("simulation: effects of {}", stage.name));
+        prepared.extend(effects_of(inputs, stage, seeds)?);
+    }
+    let mut size = 0.0_f64;
+    for stage in &beams(inputs)? {
+        progress(&format!("simulation: rays of {}", stage.name));
+        let (of_rays, off_m) = rays_of(inputs, stage, seeds.min(RAYS_SEEDS))?;
+        prepared.extend(of_rays);
+        size = size.max(off_m);
+    }
+    progress("simulation: costs");
+    let mut points = points(inputs, prepared)?;
+    front(&mut points, RESOLUTION_M);
+    let (reasons, advice) = (reasons(&points), advice(&points));
+    Ok(Trade {
+        name: "simulation".to_owned(),
+        title: "Simulation".to_owned(),
+        question: "What does each effect cost, and what does leaving it out do to the results?".to_owned(),
+        error_axis: "change of D, mean over a scene's sections, m".to_owned(),
+        cost_axis: "simulation, ns of CPU a return".to_owned(),
+        cost_unit: "ns a return".to_owned(),
+        cost_is_computed: false,
+        decides: Some(DECIDES_M),
+        points,
+        left_out: left_out(inputs),
+        oracle: OracleError {
+            how: format!("{MANY_RAYS} rays against {OTHER_RAYS}, which lie elsewhere within the beam"),
+            size,
+        },
+        reasons,
+        advice,
+    })
+}
+
+fn stages(inputs: &Inputs<'_>) -> Result<Vec<Stage>, CostError> {
+    let stage = |name, text: String| {
+        let effects = effects::named(&text);
+        Stage { name, text, effects, boulders_m: Vec::new() }
+    };
+    let shorter = |text: &str, from: &str, to: &str| {
+        let found = text.contains(from);
+        let why = || CostError::Figure {
+            what: "a shipped scene over another stretch".to_owned(),
+            why: format!("it doesn't have {from:?}"),
+        };
+        found.then(|| text.replace(from, to)).ok_or_else(why)
+    };
+    let boulders_m: Vec<f64> = (0..BOULDERS).map(boulder_m).collect();
+    let boulders: String = boulders_m.iter().enumerate().map(|(number, m)| boulder(number, *m)).collect();
+    let mut stages = vec![
+        Stage { boulders_m, ..stage("boulders", format!("{AMONG_BOULDERS}{boulders}{BOULDERS_EFFECTS}")) },
+        stage("small pipe", shorter(file("small-pipe.toml")?, "distance_m = 30", "distance_m = 3\n")?),
+    ];
+    if inputs.effort.pick(false, true) {
+        let collapse = file("collapse.toml")?;
+        let collapse = shorter(collapse, "start_m = 5\n", "start_m = 18\n")?;
+        stages.push(stage("collapse", shorter(&collapse, "distance_m = 45", "distance_m = 2\n")?));
+        stages.push(field(18)?);
+        stages.push(stage("all effects", format!("{BARE}{ALL}")));
+    }
+    Ok(stages)
+}
+
+/// Boulders round the wall, from the smallest to the largest, m.
+const BOULDERS: u32 = 60;
+const SMALLEST_M: f64 = 0.02;
+const LARGEST_M: f64 = 0.8;
+
+/// Size of a boulder, m: neighbours in number are neighbours in size.
+fn boulder_m(number: u32) -> f64 {
+    SMALLEST_M + (LARGEST_M - SMALLEST_M) * f64::from(number) / f64::from(BOULDERS - 1)
+}
+
+/// A boulder of the scene, none near another of its size: chainage and arc length follow additive sequences of golden ratio and
+/// root of two.
+fn boulder(number: usize, size_m: f64) -> String {
+    let share = |by: f64| math::wrap(number as f64 * by, 1.0);
+    let (chainage_m, arc_m) = (5.5 + 3.0 * share(0.618_033_988_7), 28.0 * share(0.414_213_562_4));
+    format!(
+        "[[tunnel.features]]\nkind = \"boulder\"\nchainage_m = {chainage_m}\narc_m = {arc_m}\nsize_m = {size_m}\nsunk = 0.5\n"
+    )
+}
+
+const AMONG_BOULDERS: &str = "vehicle = \"vita2-4.toml\"\n[trajectory]\nstart_m = 5\n[[trajectory.legs]]\ndistance_m = 4\nspeed_mps = 0.1\n";
+/// The effects of the shipped scene of boulders.
+const BOULDERS_EFFECTS: &str =
+    "[effects]\nmotion_within_turn = {}\nocclusion = {}\nbeam_cone = {}\nrange_noise = { sd_m = 0.01 }\n";
+/// VITA 2 with four heads along a plain stretch.
+const BARE: &str = "vehicle = \"vita2-4.toml\"\n[trajectory]\nstart_m = 5\n[[trajectory.legs]]\ndistance_m = 4\nspeed_mps = 0.09\n";
+
+/// The scenes whose beams' rays are varied: short ones, since a thousand rays take their time. The first is the one on which both
+/// references are held against each other.
+fn beams(inputs: &Inputs<'_>) -> Result<Vec<Stage>, CostError> {
+    let lengths = inputs.effort.pick(&[("field", 14.0)][..], &[("field", 20.0), ("boulders", 0.6)]);
+    let mut of_field = vec![field(20)?];
+    of_field.extend(stages(inputs)?.into_iter().filter(|stage| stage.name == "boulders"));
+    let mut beams = Vec::new();
+    for (mut stage, (_, metres)) in of_field.into_iter().zip(lengths) {
+        let legs = stage.text.lines().map(|line| {
+            if line.starts_with("distance_m") {
+                format!("distance_m = {metres}\n")
+            } else {
+                format!("{line}\n")
+            }
+        });
+        stage.text = legs.collect();
+        beams.push(stage);
+    }
+    Ok(beams)
+}
+
+/// The shipped field scene over so many metres.
+fn field(length_m: u32) -> Result<Stage, CostError> {
+    let text = file("vita1-field.toml")?.replace("distance_m = 130", &format!("distance_m = {length_m}"));
+    // At the speed that its vehicle file plans.
+    let planned = text.replace("speed_mps = 0.16", "speed_mps = 0.197");
+    if planned == text {
+        let why = "the shipped scene has another speed than this trade changes".to_owned();
+        return Err(CostError::Figure { what: "vita1-field.toml as planned".to_owned(), why });
+    }
+    let text = planned;
+    let effects = effects::named(&text);
+    Ok(Stage { name: "field", text, effects, boulders_m: Vec::new() })
+}
+
+/// A marker whose errors are known, with what is timed of it: a point without its cost.
+struct Prepared {
+    point: Point,
+    scene: Scene,
+    /// Returns of a head in the time that is simulated.
+    returns: f64,
+}
+
+impl Prepared {
+    /// The first seed's scene is timed.
+    fn of(inputs: &Inputs<'_>, text: &str, point: Point) -> Result<Self, CostError> {
+        let scene = inputs.scene(text, 1)?;
+        let recorded = Recorded::of(&scene, &scene.vehicle)?;
+        let recorded_s = recorded.duration_s().max(f64::from(TIMED_S));
+        let returns = recorded.truth.returns.max(1) as f64 * f64::from(TIMED_S) / recorded_s;
+        Ok(Self { point, scene, returns })
+    }
+
+    /// CPU time of a simulation, ns a return of a head.
+    fn cost_ns(&self) -> Result<f64, CostError> {
+        let mut simulation = Simulation::new(&self.scene)?;
+        let ((), cpu_s) = timed(|| (0..TIMED_S).take_while(|_| simulation.advance()).for_each(drop));
+        Ok(cpu_s * 1e9 / self.returns)
+    }
+}
+
+/// Times all markers of all scenes in turns; what leaving an effect out saves is against its scene's whole.
+fn points(inputs: &Inputs<'_>, prepared: Vec<Prepared>) -> Result<Vec<Point>, CostError> {
+    let costs = in_turns(inputs.effort.rounds(), &prepared, Prepared::cost_ns)?;
+    let mut whole = f64::NAN;
+    let mut points = Vec::new();
+    for (Prepared { mut point, .. }, cost) in prepared.into_iter().zip(costs) {
+        point.cost = cost;
+        if point.method == LEFT_OUT {
+            whole = if point.is_default { cost.middle } else { whole };
+            point.errors.push(Error::new("saved", "ns a return", Interval::exact(whole - cost.middle)));
+        }
+        points.push(point);
+    }
+    Ok(points)
+}
+
+/// The line of effects that are left out, one by one; the default leaves none out and comes first.
+const LEFT_OUT: &str = "left out";
+
+fn effects_of(inputs: &Inputs<'_>, stage: &Stage, seeds: u32) -> Result<Vec<Prepared>, CostError> {
+    let mut texts = vec![("none".to_owned(), stage.text.clone())];
+    for effect in &stage.effects {
+        texts.push((effect.clone(), without(&stage.text, effect)?));
+    }
+    let (differences, hits) = differences(inputs, &texts, seeds)?;
+    let mut prepared = Vec::new();
+    for (((effect, text), differences), hits) in texts.iter().zip(differences).zip(hits) {
+        let mut errors = differences.errors();
+        errors.extend(boulders_hit(&stage.boulders_m, &hits));
+        let point = Point {
+            method: LEFT_OUT.to_owned(),
+            knob: "effect left out".to_owned(),
+            value: effect.clone(),
+            number: None,
+            is_default: effect == "none",
+            scene: stage.name.to_owned(),
+            seeds,
+            errors,
+            cost: Interval::exact(f64::NAN),
+            instructions: None,
+            on_front: false,
+        };
+        prepared.push(Prepared::of(inputs, text, point)?);
+    }
+    Ok(prepared)
+}
+
+/// Markers of rays, and how far two references are from one another, m.
+fn rays_of(inputs: &Inputs<'_>, stage: &Stage, seeds: u32) -> Result<(Vec<Prepared>, f64), CostError> {
+    let rays = || [MANY_RAYS].into_iter().chain(RAYS);
+    let text = |rays: u32| Ok((rays.to_string(), effects::with_rays(&stage.text, rays)?));
+    let texts = rays().map(text).collect::<Result<Vec<_>, CostError>>()?;
+    let (differences, _) = differences(inputs, &texts, seeds)?;
+    let mut prepared = Vec::new();
+    for ((rays, differences), (_, text)) in rays().zip(differences).zip(&texts).skip(1) {
+        let point = Point {
+            method: "rays of a beam".to_owned(),
+            knob: "rays".to_owned(),
+            value: rays.to_string(),
+            number: Some(f64::from(rays)),
+            is_default: rays == USUAL_RAYS,
+            scene: format!("{}, rays", stage.name),
+            seeds,
+            errors: differences.errors(),
+            cost: Interval::exact(f64::NAN),
+            instructions: None,
+            on_front: false,
+        };
+        prepared.push(Prepared::of(inputs, text, point)?);
+    }
+    if stage.name != "field" {
+        return Ok((prepared, 0.0));
+    }
+    // One dive says how far two references are apart.
+    let others = [MANY_RAYS, OTHER_RAYS].map(text).into_iter().collect::<Result<Vec<_>, CostError>>()?;
+    let (references, _) = self::differences(inputs, &others, 1)?;
+    Ok((prepared, references.get(1).map_or(f64::NAN, Differences::change_m)))
+}
+
+/// Of each seed: how a change of the scene changed its figures.
+#[derive(Default)]
+struct Differences {
+    hole_m: Vec<f64>,
+    passed: Vec<f64>,
+    other_verdicts: Vec<f64>,
+}
+
+impl Differences {
+    fn change_m(&self) -> f64 {
+        spread(&self.hole_m).map_or(f64::NAN, |change| change.middle.abs())
+    }
+
+    /// The size of the mean change first, with the interval of its size; then the change itself.
+    fn errors(&self) -> Vec<Error> {
+        let size = spread(&self.hole_m).map(|Interval { low, middle, high }| Interval {
+            low: if low <= 0.0 && high >= 0.0 { 0.0 } else { low.abs().min(high.abs()) },
+            middle: middle.abs(),
+            high: low.abs().max(high.abs()),
+        });
+        let size = size.map(|size| Error::new("size of the change of D", "m", size));
+        let rest = [
+            error("change of D", "m", &self.hole_m),
+            error("change of metres passed", "m in 100", &self.passed),
+            error("other verdicts", "m in 100", &self.other_verdicts),
+        ];
+        size.into_iter().chain(rest.into_iter().flatten()).collect()
+    }
+}
+
+/// Dives each text with the same seeds, and compares each with the first text's; and which features each met, dive by dive.
+fn differences(
+    inputs: &Inputs<'_>,
+    texts: &[(String, String)],
+    seeds: u32,
+) -> Result<(Vec<Differences>, Vec<Hits>), CostError> {
+    let mut differences: Vec<Differences> = texts.iter().map(|_| Differences::default()).collect();
+    let mut hits: Vec<Hits> = texts.iter().map(|_| Hits::new()).collect();
+    let seeds: Vec<u32> = (1..=seeds).collect();
+    let dives = seeds.iter().flat_map(|seed| texts.iter().map(move |(_, text)| (*seed, text)));
+    let figures = side_by_side(&dives.collect::<Vec<_>>(), |(seed, text)| {
+        let with_features = *seed == 1 && text.contains("\"boulder\"") && !text.contains("rays = ");
+        Figures::of(&inputs.scene(text, *seed)?, with_features)
+    })?;
+    for (seed, of_seed) in seeds.iter().zip(figures.chunks(texts.len().max(1))) {
+        for ((figures, differences), hits) in of_seed.iter().zip(&mut differences).zip(&mut hits) {
+            compare(of_seed.first().unwrap_or(figures), figures, differences);
+            if *seed == 1 {
+                hits.push(figures.features_hit.clone());
+            }
+        }
+    }
+    Ok((differences, hits))
+}
+
+/// Numbers of the features that were hit, dive by dive.
+type Hits = Vec<Vec<u16>>;
+
+/// The smallest boulder hit and the largest missed, m; nothing where there are none.
+fn boulders_hit(sizes_m: &[f64], hits: &Hits) -> Vec<Error> {
+    let by_number = || (0_u16..).zip(sizes_m);
+    let (mut smallest_m, mut missed_m) = (Vec::new(), Vec::new());
+    for hit in hits.iter().filter(|_| !sizes_m.is_empty()) {
+        let sizes =
+            |is_hit: bool| by_number().filter(move |(n, _)| hit.contains(n) == is_hit).map(|(_, m)| *m);
+        smallest_m.extend(sizes(true).min_by(f64::total_cmp));
+        missed_m.push(sizes(false).fold(0.0, f64::max));
+    }
+    let errors =
+        [error("smallest boulder hit", "m", &smallest_m), error("largest boulder missed", "m", &missed_m)];
+    errors.into_iter().flatten().collect()
+}
+
+/// Section by section: both dives are of one vehicle on one way.
+fn compare(whole: &Figures, other: &Figures, differences: &mut Differences) {
+    let (mut changes_m, mut count, mut passed, mut differing) = (Vec::new(), 0.0, 0.0, 0.0);
+    for (start, hole_m, verdict) in &other.sections {
+        let Some((_, hole_before_m, before)) = whole.sections.iter().find(|(of, ..)| of == start) else {
+            continue;
+        };
+        changes_m.extend(hole_m.zip(*hole_before_m).map(|(now_m, before_m)| now_m - before_m));
+        let is = |word: &str, is: &str| f64::from(u8::from(word == is));
+        count += 1.0;
+        passed += is(verdict, "pass") - is(before, "pass");
+        differing += f64::from(u8::from(verdict != before));
+    }
+    if changes_m.is_empty() {
+        return;
+    }
+    differences.hole_m.push(changes_m.iter().sum::<f64>() / changes_m.len() as f64);
+    differences.passed.push(100.0 * passed / count);
+    differences.other_verdicts.push(100.0 * differing / count);
+}
+
+impl Figures {
+    fn of(scene: &Scene, has_boulders: bool) -> Result<Self, CostError> {
+        let JudgedDive { report, .. } = Recorded::of(scene, &scene.vehicle)?.judged(&scene.vehicle)?;
+        let millimetres = |m: f64| math::round_to_i64(1000.0 * m);
+        let section = |section: &headrace_monitor::report::SectionReport| {
+            let hole_m = section.hole_m.filter(|_| section.hole_bounded);
+            (millimetres(section.start_m), hole_m, section.verdict)
+        };
+        let sections = report.sections.iter().filter(|section| !section.not_inspected).map(section).collect();
+        let features_hit = if has_boulders { features_hit(scene)? } else { Vec::new() };
+        Ok(Self { sections, features_hit })
+    }
+}
+
+/// Numbers of the features that the axes of beams met and whose returns were heard.
+fn features_hit(scene: &Scene) -> Result<Vec<u16>, CostError> {
+    let mut simulation = Simulation::with_truth(scene)?;
+    let mut hit = Vec::new();
+    while simulation.advance() {
+        for sounding in simulation.take_truth().into_iter().filter_map(|row| row.sounding) {
+            if let (Some((wall, _)), Some(_)) = (sounding.wall, sounding.measured.range_m)
+                && let What::Feature(feature) = wall.what
+            {
+                hit.push(feature);
+            }
+        }
+    }
+    hit.sort_unstable();
+    hit.dedup();
+    Ok(hit)
+}
+
+fn left_out(inputs: &Inputs<'_>) -> Vec<LeftOut> {
+    let mut left_out = vec![
+        LeftOut {
+            what: "steps of rays by distance".to_owned(),
+            why: "a ray in a bent or narrowing tunnel advances by what the wall's slope bounds, and ends at a root to 1e-11 m \
+                  (`LEAST_STEP_M` and `ROOT_M` of the tube): shorter steps would change no result, and longer ones would miss walls"
+                .to_owned(),
+        },
+        LeftOut {
+            what: "rays in the small pipe and the collapse".to_owned(),
+            why: "a thousand rays take minutes where walls bend or blocks lie about".to_owned(),
+        },
+    ];
+    if inputs.effort.pick(true, false) {
+        left_out.push(LeftOut {
+            what: "collapse, field, all effects, rays among boulders, and three of five seeds".to_owned(),
+            why: "`--quick`; the whole measurement has them".to_owned(),
+        });
+    }
+    left_out
+}
+
+/// A change of D below this counts as none, m.
+const UNCHANGED_M: f64 = 0.01;
+
+/// Why a beam has as many rays, and a scene all its effects.
+fn reasons(points: &[Point]) -> Vec<String> {
+    let of_rays = |rays: u32| {
+        let is = move |point: &&Point| point.knob == "rays" && point.value == rays.to_string();
+        points.iter().filter(is).find(|point| !point.errors.is_empty())
+    };
+    let rays = of_rays(1).zip(of_rays(USUAL_RAYS)).map(|(one, usual)| {
+        format!(
+            "{USUAL_RAYS} rays stay the default where fewer change D no more: in the {} scene one ray is {} m off the D of {MANY_RAYS} and \
+             {USUAL_RAYS} are {} m, for {} ns a return in place of {}. Where a boulder's edge cuts a beam its rays alone find it, and D \
+             doesn't show it.",
+            usual.scene.trim_end_matches(", rays"),
+            number(one.error()),
+            number(usual.error()),
+            number(usual.cost.middle),
+            number(one.cost.middle)
+        )
+    });
+    let left_out: Vec<&Point> =
+        points.iter().filter(|point| point.method == LEFT_OUT && !point.is_default).collect();
+    let surely = |point: &&&Point| {
+        point.errors.first().is_some_and(|error| error.unit == "m" && error.interval.low > UNCHANGED_M)
+    };
+    let effects = (!left_out.is_empty()).then(|| {
+        format!(
+            "All effects of a scene stay on where leaving one out changes no D: what an effect does depends on the scene. Of {} that were \
+             left out of one scene each time, {} surely change D by more than {UNCHANGED_M} m.",
+            left_out.len(),
+            left_out.iter().filter(surely).count()
+        )
+    });
+    rays.into_iter().chain(effects).collect()
+}
+
+/// The dearest effect that changed nothing, and the one that changed most.
+fn advice(points: &[Point]) -> String {
+    let left_out = || points.iter().filter(|point| point.method == LEFT_OUT && !point.is_default);
+    let figure = |point: &Point, name: &str| {
+        let found = point.errors.iter().find(|error| error.name == name);
+        found.map_or(f64::NAN, |error| error.interval.middle)
+    };
+    let most = left_out().max_by(|a, b| a.error().total_cmp(&b.error()));
+    let within = |point: &&Point| point.errors.first().is_some_and(|error| error.interval.high < UNCHANGED_M);
+    let idle = left_out().filter(within).max_by(|a, b| figure(a, "saved").total_cmp(&figure(b, "saved")));
+    let most = most.map(|point| {
+        let by_m = figure(point, "change of D");
+        format!("Leaving out `{}` changes D most, by {by_m:+.3} m ({}).", point.value, point.scene)
+    });
+    let idle = idle.map(|point| {
+        let saved_ns = figure(point, "saved");
+        format!(
+            "Of those that change D by less than 1 cm, `{}` costs most: {saved_ns:.0} ns a return ({}).",
+            point.value, point.scene
+        )
+    });
+    [most, idle].into_iter().flatten().collect::<Vec<_>>().join(" ")
+}

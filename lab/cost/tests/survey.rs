@@ -1,0 +1,33 @@
+//! The trade Survey keeps what it promises. That it shows what `headrace plan` says is tested with the program: `tests/tests/sampling/survey.rs`.
+
+#![expect(clippy::unwrap_used, clippy::panic, reason = "a test stops at what it can't do")]
+
+use headrace::devices::KINDS;
+use headrace_cost::effort::Effort;
+use headrace_cost::scene::{Inputs, file};
+use headrace_cost::trades::survey;
+
+#[test]
+fn hours_add_up_and_no_true_hole_is_over_the_target_promised() {
+    let text = file("vita1.toml").unwrap();
+    let inputs = Inputs { effort: Effort::Quick, kinds: &KINDS, vehicle: Some(("VITA 1", text)) };
+    let trade = survey::measure(&inputs, &mut |_| {}).unwrap();
+    let scenes = trade.scenes();
+    assert_eq!(scenes.len(), 3);
+    for scene in scenes {
+        let points = trade.points.iter().filter(|point| point.scene == scene).count();
+        assert!(points >= 3, "{points} points of {scene:?}");
+    }
+    for point in &trade.points {
+        let figure =
+            |name: &str| point.errors.iter().find(|error| error.name == name).unwrap().interval.middle;
+        let hours = figure("there") + figure("back") + figure("again");
+        assert!((point.cost.middle - hours).abs() < 1e-9, "{point:?}");
+        // Promised and kept.
+        let hole_m = point.errors.iter().find(|error| error.name.starts_with("largest D_true"));
+        if let Some(hole_m) = hole_m.filter(|_| !point.method.contains(" m off")) {
+            assert!(hole_m.interval.middle <= point.error(), "{point:?}");
+        }
+    }
+    assert!(trade.oracle.size < 1e-3 * 0.4, "{}", trade.oracle.size);
+}

@@ -1,0 +1,136 @@
+//! The readings of a part of a log, as decoded by the loop.
+
+use headrace_geometry::time::{DurNs, MonoNs};
+use headrace_monitor::messages::Event;
+use headrace_monitor::ring::{Port, RingError};
+use headrace_monitor::run::Loop;
+use headrace_replay::drive::{Coming, DriveError, Pace, PacketSource, drive};
+use headrace_replay::log::LogError;
+use headrace_sensor::device::SensorInfo;
+
+/// Longest part of a log held in memory, s.
+const MOST_S: f64 = 1200.0;
+
+/// Time window of the readings, in seconds from the log's first message.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Window {
+    /// Start.
+    pub(crate) from_s: f64,
+    /// End; without it, the longest window that can be held.
+    pub(crate) to_s: Option<f64>,
+    /// Time of the vehicle at the surface, from and to.
+    pub(crate) at_surface_s: Option<[f64; 2]>,
+}
+
+/// Why readings can't be collected.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub(crate) enum CollectError {
+    /// The window ends before it begins.
+    #[error("calibrating: --to {to_s} is not after --from {from_s}")]
+    Backwards {
+        /// Its beginning, s.
+        from_s: f64,
+        /// Its end, s.
+        to_s: f64,
+    },
+    /// The window is too long to be held.
+    #[error(
+        "calibrating from {from_s} to {to_s} s: that is more than can be looked at; the most is {MOST_S} s"
+    )]
+    TooLong {
+        /// Its beginning, s.
+        from_s: f64,
+        /// Its end, s.
+        to_s: f64,
+    },
+    /// The log can't be read.
+    #[error(transparent)]
+    Log(#[from] LogError),
+    /// The loop can't be driven.
+    #[error(transparent)]
+    Drive(#[from] DriveError),
+}
+
+/// Readings of a part of a log.
+#[derive(Debug)]
+pub(crate) struct Collected {
+    /// Time of the log's first message.
+    pub(crate) first: MonoNs,
+    /// Start of the requested part.
+    pub(crate) from: MonoNs,
+    /// Its end.
+    pub(crate) to: MonoNs,
+    /// Time of the vehicle at the surface, from and to.
+    pub(crate) at_surface: Option<[MonoNs; 2]>,
+    /// The sensors of the vehicle file, by source.
+    pub(crate) sensors: Vec<SensorInfo>,
+    /// Readings of that part and of the time at the surface, in order.
+    pub(crate) events: Vec<Event>,
+}
+
+impl Collected {
+    /// The readings of the requested part.
+    pub(crate) fn within(&self) -> impl Iterator<Item = &Event> {
+        self.events.iter().filter(|event| event.received >= self.from && event.received < self.to)
+    }
+
+    /// Seconds from the log's first message.
+    pub(crate) fn seconds(&self, at: MonoNs) -> f64 {
+        at.since(self.first).as_secs_f64()
+    }
+}
+
+/// A packet source truncated at `end`.
+struct Until<'a> {
+    feed: &'a mut dyn PacketSource,
+    end: MonoNs,
+}
+
+impl PacketSource for Until<'_> {
+    fn coming(&mut self) -> Result<Option<Coming>, LogError> {
+        Ok(self.feed.coming()?.filter(|coming| coming.at < self.end))
+    }
+
+    fn send(&mut self, port: &mut Port) -> Result<(), RingError> {
+        self.feed.send(port)
+    }
+}
+
+/// Runs a log through the loop up to the end of the window, and keeps the readings within. `progress` is given the number
+/// kept so far.
+///
+/// What comes before the window is run as well: the decoders' state depends on it.
+///
+/// Errors: see [`CollectError`].
+pub(crate) fn collect(
+    mut dive: Loop,
+    feed: &mut dyn PacketSource,
+    window: &Window,
+    progress: &mut dyn FnMut(usize),
+) -> Result<Collected, CollectError> {
+    let first = feed.coming()?.map_or(MonoNs(0), |coming| coming.at);
+    let after = |seconds: f64| first + DurNs::from_secs_f64(seconds);
+    let from_s = window.from_s;
+    let to_s = window.to_s.unwrap_or(from_s + MOST_S);
+    if to_s <= from_s {
+        return Err(CollectError::Backwards { from_s, to_s });
+    }
+    if to_s - from_s > MOST_S {
+        return Err(CollectError::TooLong { from_s, to_s });
+    }
+    let (from, to) = (after(from_s), after(to_s));
+    let at_surface = window.at_surface_s.map(|span| span.map(after));
+    let end = at_surface.map_or(to, |[_, surface_to]| to.max(surface_to));
+    let is_wanted =
+        |at: MonoNs| (at >= from && at < to) || at_surface.is_some_and(|[from, to]| at >= from && at < to);
+    let sensors = dive.sensors();
+    let mut events: Vec<Event> = Vec::new();
+    drive(&mut dive, &mut Until { feed, end }, Pace::default(), &mut |dive| {
+        let heard = dive.readings();
+        events.extend(heard.iter().filter(|event| is_wanted(event.received)));
+        progress(events.len());
+    })?;
+    let last = events.last().map_or(from, |event| event.received + DurNs(1));
+    Ok(Collected { first, from, to: to.min(last.max(from)), at_surface, sensors, events })
+}

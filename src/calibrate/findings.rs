@@ -1,0 +1,94 @@
+//! All estimates for a vehicle file from a log.
+
+use headrace_fusion::filter::settings::Settings;
+use headrace_monitor::messages::Event;
+use headrace_sensor::device::{SensorInfo, SensorKind};
+use headrace_vehicle::{NavigationConfig, VehicleConfig};
+
+use crate::calibrate::collect::Collected;
+use crate::calibrate::estimate::Untold;
+use crate::calibrate::heads::{Heads, heads};
+use crate::calibrate::material::Material;
+use crate::calibrate::still::longest;
+use crate::calibrate::timing::{Lag, lags};
+use crate::calibrate::zero::{self, Zero};
+
+/// Result of each estimator, or the reason why there is none.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Findings {
+    /// Mounts of the heads.
+    pub(crate) heads: Result<Heads, Untold>,
+    /// Pressure at the surface, Pa.
+    pub(crate) surface: Result<Zero, Untold>,
+    /// Height of the water's surface above the floor, m.
+    pub(crate) level: Result<Zero, Untold>,
+    /// Chainage at which each cable counter reads zero, m, with the file's value.
+    pub(crate) tethers: Result<Vec<(Zero, f64)>, Untold>,
+    /// Time offsets.
+    pub(crate) lags: Result<Vec<Lag>, Untold>,
+}
+
+impl Findings {
+    /// Runs all estimators on the collected part of a log. `chainage_m` is the true chainage at which the vehicle stood still;
+    /// `progress` is given the name of each long step.
+    pub(crate) fn of(
+        vehicle: &VehicleConfig,
+        collected: &Collected,
+        chainage_m: Option<f64>,
+        progress: &mut dyn FnMut(&str),
+    ) -> Self {
+        let settings = match vehicle.navigation {
+            NavigationConfig::Filter(settings) => settings,
+            NavigationConfig::Direct => Settings::default(),
+        };
+        let within: Vec<Event> = collected.within().copied().collect();
+        let all = Material {
+            profile: &vehicle.tunnel.profile,
+            site: vehicle.site,
+            settings,
+            sensors: &collected.sensors,
+            events: &collected.events,
+        };
+        let in_time = Material { events: &within, ..all };
+        progress("how the heads sit");
+        let heads = heads(&in_time);
+        let surface = match collected.at_surface {
+            Some([from, to]) => zero::surface(&all, from, to),
+            None => Err(Untold::NoSurface),
+        };
+        let surface_pa = surface.as_ref().ok().map(|zero| zero.found.value);
+        let level = heads
+            .as_ref()
+            .map_err(|why| *why)
+            .and_then(|heads| zero::water_level(&in_time, heads, surface_pa));
+        let tethers = chainage_m.ok_or(Untold::NoChainage).and_then(|chainage_m| {
+            let zeros = zero::tethers(&in_time, &longest(&in_time)?, chainage_m)?;
+            let filed_m = |zero: &Zero| match collected.sensors.get(zero.source).map(|sensor| sensor.kind) {
+                Some(SensorKind::Tether { zero_at_m, .. }) => zero_at_m,
+                _ => 0.0,
+            };
+            Ok(zeros.into_iter().map(|zero| (zero, filed_m(&zero))).collect())
+        });
+        // Time offsets are estimated with the mounts found for the heads.
+        let sensors = sitting(&collected.sensors, heads.as_ref().ok());
+        let sitting = Material { sensors: &sensors, ..in_time };
+        let latencies: Vec<_> = vehicle.sensor_configs.iter().map(|sensor| sensor.latency).collect();
+        let mut runs = 0_u32;
+        let lags = lags(&sitting, &latencies, &mut || {
+            runs += 1;
+            progress(&format!("time offsets: run {runs} of the filter"));
+        });
+        Self { heads, surface, level, tethers, lags }
+    }
+}
+
+/// The sensors, with the mounts found for the heads.
+fn sitting(sensors: &[SensorInfo], heads: Option<&Heads>) -> Vec<SensorInfo> {
+    let mut sensors = sensors.to_vec();
+    for head in heads.iter().flat_map(|heads| &heads.heads) {
+        if let Some(sensor) = sensors.get_mut(head.source) {
+            sensor.mount = head.found;
+        }
+    }
+    sensors
+}

@@ -1,0 +1,335 @@
+//! Mounts of the heads, from their turns while the vehicle stands still in a tunnel of known profile.
+
+use crate::calibrate::estimate::{Estimate, Untold, median};
+use crate::calibrate::fit::{ANGLE_SD_RAD, COMMON, Fit, OFFSET_SD_M, OWN, Problem, is_outlier, moved, own};
+use crate::calibrate::material::Material;
+use crate::calibrate::scan::{HeadScan, Scan, gather};
+use crate::calibrate::still::{Still, longest};
+use headrace_fusion::section::{Echo, settle};
+use headrace_geometry::frames::{Mount, Vec3};
+use headrace_geometry::math::{self, TAU};
+use headrace_sampling::head::MAX_HEADS;
+
+/// Minimum sector of wall seen by a head to be calibrated, degrees.
+const LEAST_SEEN_DEG: f64 = 120.0;
+/// Largest median residual; beyond it the wall doesn't match the profile, m.
+const MOST_MEDIAN_M: f64 = 0.15;
+/// Largest remaining share of the file's uncertainty for an unknown to count as estimated.
+const TOLD: f64 = 0.3;
+/// Cost difference for a clear sense of rotation, in squared standard deviations: once in 10,000 by chance.
+const CLEAR: f64 = 15.0;
+/// Search of a head's angle: number of starts, rounds from each, and stride of the returns.
+const STARTS: usize = 24;
+const START_ROUNDS: usize = 2;
+const START_STRIDE: usize = 5;
+const ROUNDS: usize = 12;
+
+/// One head, against the vehicle file.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Head {
+    /// Its source.
+    pub(crate) source: usize,
+    /// Mount in the vehicle file.
+    pub(crate) filed: Mount,
+    /// Estimated mount; where there is no estimate, that of the file.
+    pub(crate) found: Mount,
+    /// Sector in which it received returns, degrees.
+    pub(crate) seen_deg: f64,
+    /// Returns used.
+    pub(crate) used: usize,
+    /// Returns rejected as outliers, or because they grazed the wall.
+    pub(crate) rejected: usize,
+    /// Root mean square residual of the returns used, m.
+    pub(crate) rms_m: f64,
+    /// Angle about its axis to be added to the file's, radians, in the estimated sense of rotation.
+    pub(crate) angle_rad: Result<Estimate, Untold>,
+    /// Offset to the left of the file's position, relative to the other heads, m.
+    pub(crate) left_m: Result<Estimate, Untold>,
+    /// Offset upwards, likewise, m.
+    pub(crate) up_m: Result<Estimate, Untold>,
+    /// Whether it turns the opposite way (faces aft where the file has forward).
+    pub(crate) is_mirrored: Result<bool, Untold>,
+}
+
+/// All heads, and the vehicle's position.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Heads {
+    /// The time at rest.
+    pub(crate) still: Still,
+    /// y and z of the body's origin, m.
+    pub(crate) place_m: [Estimate; 2],
+    /// Relative excess of the ranges over those of the profile.
+    pub(crate) scale: Estimate,
+    /// Median of the absolute residuals, m.
+    pub(crate) median_m: f64,
+    /// The heads, by source.
+    pub(crate) heads: Vec<Head>,
+}
+
+/// Calibrates the heads from the longest time in which the vehicle stood still.
+///
+/// Errors: there is no such time, or the wall doesn't match the profile.
+pub(crate) fn heads(material: &Material<'_>) -> Result<Heads, Untold> {
+    let still = longest(material)?;
+    let scan = gather(material, &still)?;
+    let (scans, little): (Vec<HeadScan>, Vec<HeadScan>) =
+        scan.heads.iter().cloned().partition(|head| head.seen_rad().to_degrees() >= LEAST_SEEN_DEG);
+    if scans.is_empty() {
+        let seen_deg = little.iter().map(|head| head.seen_rad().to_degrees()).fold(0.0, f64::max);
+        return Err(Untold::LittleWall { seen_deg, least_deg: LEAST_SEEN_DEG });
+    }
+    let scan = Scan { heads: scans, ..scan };
+    let mut found = match scan.heads.len() {
+        1 => solve::<{ COMMON + OWN }>(material, &scan, still),
+        2 => solve::<{ COMMON + 2 * OWN }>(material, &scan, still),
+        3 | 4 => solve::<{ COMMON + 4 * OWN }>(material, &scan, still),
+        _ => solve::<{ COMMON + MAX_HEADS * OWN }>(material, &scan, still),
+    }?;
+    found.heads.extend(little.iter().map(unseen));
+    found.heads.sort_unstable_by_key(|head| head.source);
+    Ok(found)
+}
+
+/// A head that has seen too little of the wall.
+fn unseen(head: &HeadScan) -> Head {
+    let seen_deg = head.seen_rad().to_degrees();
+    let why = Untold::LittleWall { seen_deg, least_deg: LEAST_SEEN_DEG };
+    Head {
+        source: head.source,
+        filed: head.mount,
+        found: head.mount,
+        seen_deg,
+        used: 0,
+        rejected: head.returns.len(),
+        rms_m: 0.0,
+        angle_rad: Err(why),
+        left_m: Err(why),
+        up_m: Err(why),
+        is_mirrored: Err(why),
+    }
+}
+
+fn solve<const N: usize>(material: &Material<'_>, scan: &Scan, still: Still) -> Result<Heads, Untold> {
+    let place = first_place(material, scan);
+    let guesses: Vec<[Guess; 2]> = scan
+        .heads
+        .iter()
+        .map(|head| [false, true].map(|is_mirrored| search(material, scan, head, is_mirrored, place)))
+        .collect();
+    let senses = Senses::choose::<N>(material, scan, &guesses);
+    let fit = joint::<N>(material, scan, &guesses, &senses.mirrored);
+    let problem = problem(material, scan, &scan.heads, &senses.mirrored, 1);
+    let residuals = problem.residuals(&fit.x);
+    let mut sizes: Vec<f64> =
+        residuals.iter().filter_map(|one| one.row.map(|(_, off_m)| off_m.abs())).collect();
+    let median_m = median(&mut sizes).unwrap_or(f64::INFINITY);
+    if median_m > MOST_MEDIAN_M {
+        return Err(Untold::Contradicted { median_m, most_m: MOST_MEDIAN_M });
+    }
+    let count = scan.heads.len();
+    let heads = scan.heads.iter().enumerate().map(|(number, head)| {
+        let mut used = (0, 0.0);
+        for (_, off_m) in residuals.iter().filter(|one| one.head == number).filter_map(|one| one.row) {
+            if !is_outlier(off_m, fit.scale_m) {
+                used = (used.0 + 1, used.1 + off_m * off_m);
+            }
+        }
+        let is_mirrored = senses.of(number);
+        let angle_rad = angle(&fit, number);
+        let [left_m, up_m] = [1, 2].map(|i| offset(&fit, number, i, count));
+        let value = |of: &Result<Estimate, Untold>| of.as_ref().map_or(0.0, |of| of.value);
+        let turned = senses.mirrored.get(number).copied().unwrap_or(false);
+        Head {
+            source: head.source,
+            filed: head.mount,
+            found: moved(&head.mount, [value(&angle_rad), value(&left_m), value(&up_m)], turned),
+            seen_deg: head.seen_rad().to_degrees(),
+            used: used.0,
+            rejected: head.returns.len() - used.0,
+            rms_m: math::sqrt(used.1 / (used.0.max(1) as f64)),
+            angle_rad,
+            left_m,
+            up_m,
+            is_mirrored,
+        }
+    });
+    let heads = heads.collect();
+    let [y, z, scale] = [0, 1, 5].map(|i| estimate(&fit, &[(i, 1.0)]));
+    Ok(Heads { still, place_m: [y, z], scale, median_m, heads })
+}
+
+/// Position of the vehicle by the echosounders, or the middle of the section.
+fn first_place(material: &Material<'_>, scan: &Scan) -> [f64; 2] {
+    let start = material.profile.reference();
+    let echoes = scan.echoes.iter().map(|echo| Echo { mount: echo.mount, range_m: echo.range_m });
+    settle(material.profile, scan.attitude, start, (start, [2.0; 2]), material.settings.echo_sd_m, &echoes)
+        .at_m
+}
+
+fn problem<'a>(
+    material: &'a Material<'_>,
+    scan: &'a Scan,
+    heads: &'a [HeadScan],
+    mirrored: &'a [bool],
+    stride: usize,
+) -> Problem<'a> {
+    Problem {
+        profile: material.profile,
+        settings: &material.settings,
+        heads,
+        echoes: &scan.echoes,
+        attitude: scan.attitude,
+        mirrored,
+        stride,
+    }
+}
+
+/// Fit of one head alone: its unknowns and the common ones.
+type Guess = Fit<{ COMMON + OWN }>;
+
+/// Best fit of one head alone, over all angles.
+fn search(
+    material: &Material<'_>,
+    scan: &Scan,
+    head: &HeadScan,
+    is_mirrored: bool,
+    [y_m, z_m]: [f64; 2],
+) -> Guess {
+    let (heads, mirrored) = (core::slice::from_ref(head), [is_mirrored]);
+    let coarse = problem(material, scan, heads, &mirrored, START_STRIDE);
+    let mut best: Option<Guess> = None;
+    for start in 0..STARTS {
+        let angle_rad = math::wrap_signed(start as f64 * TAU / STARTS as f64, TAU);
+        let fit = coarse.fit([y_m, z_m, 0.0, 0.0, 0.0, 0.0, angle_rad, 0.0, 0.0], START_ROUNDS);
+        if best.as_ref().is_none_or(|best| fit.cost < best.cost) {
+            best = Some(fit);
+        }
+    }
+    let start = best.map_or([0.0; COMMON + OWN], |best| best.x);
+    problem(material, scan, heads, &mirrored, 1).fit(start, ROUNDS)
+}
+
+/// Fits all heads together, starting from the fit of each alone.
+fn joint<const N: usize>(
+    material: &Material<'_>,
+    scan: &Scan,
+    guesses: &[[Guess; 2]],
+    mirrored: &[bool],
+) -> Fit<N> {
+    let mut start = [0.0; N];
+    let chosen = guesses
+        .iter()
+        .zip(mirrored)
+        .map(|([straight, other], is_mirrored)| if *is_mirrored { other } else { straight });
+    let share = 1.0 / guesses.len().max(1) as f64;
+    for (number, guess) in chosen.enumerate() {
+        for (slot, value) in start.iter_mut().zip(guess.x.iter().take(2)) {
+            *slot += share * value;
+        }
+        for (slot, value) in start.iter_mut().skip(own(number, 0)).zip(guess.x.iter().skip(COMMON).take(1)) {
+            *slot = *value;
+        }
+    }
+    if !material
+        .profile
+        .contains([start.first().copied().unwrap_or(0.0), start.get(1).copied().unwrap_or(0.0)])
+    {
+        for (slot, value) in start.iter_mut().zip(material.profile.reference()) {
+            *slot = value;
+        }
+    }
+    problem(material, scan, &scan.heads, mirrored, 1).fit(start, ROUNDS)
+}
+
+/// Heads that turn the opposite way to the file, and how much worse the alternatives fit.
+struct Senses {
+    mirrored: Vec<bool>,
+    margins: Vec<f64>,
+}
+
+impl Senses {
+    /// The senses that fit best, searched one head at a time; the file's, where none is clearly better.
+    ///
+    /// A symmetric section with the vehicle on the other side looks the same when all heads turn the opposite way: that is
+    /// tried, too.
+    fn choose<const N: usize>(material: &Material<'_>, scan: &Scan, guesses: &[[Guess; 2]]) -> Self {
+        let count = scan.heads.len();
+        let cost = |mirrored: &[bool]| joint::<N>(material, scan, guesses, mirrored).cost;
+        let other = |mirrored: &[bool], which: usize| -> Vec<bool> {
+            let turned = |(number, is): (usize, &bool)| *is != (which == count || which == number);
+            mirrored.iter().enumerate().map(turned).collect()
+        };
+        let filed = vec![false; count];
+        let filed_cost = cost(&filed);
+        let (mut best, mut best_cost) = (filed.clone(), filed_cost);
+        let mut margins = vec![0.0; count];
+        for _ in 0..=count {
+            let costs: Vec<f64> = (0..=count).map(|which| cost(&other(&best, which))).collect();
+            let all = costs.last().copied().unwrap_or(f64::INFINITY);
+            margins = costs.iter().take(count).map(|one| one.min(all) - best_cost).collect();
+            let better = costs.iter().enumerate().min_by(|a, b| a.1.total_cmp(b.1));
+            match better {
+                Some((which, least)) if *least < best_cost => {
+                    best = other(&best, which);
+                    best_cost = *least;
+                }
+                _ => break,
+            }
+        }
+        if filed_cost - best_cost < CLEAR {
+            best = filed;
+        }
+        Self { mirrored: best, margins }
+    }
+
+    fn of(&self, head: usize) -> Result<bool, Untold> {
+        let margin = self.margins.get(head).copied().unwrap_or(0.0);
+        if margin < CLEAR {
+            return Err(Untold::Mirror { margin: margin.max(0.0), needed: CLEAR });
+        }
+        Ok(self.mirrored.get(head).copied().unwrap_or(false))
+    }
+}
+
+/// A weighted sum of unknowns.
+fn estimate<const N: usize>(fit: &Fit<N>, parts: &[(usize, f64)]) -> Estimate {
+    let mut h = [0.0; N];
+    let mut value = 0.0;
+    for (i, share) in parts {
+        if let Some(slot) = h.get_mut(*i) {
+            *slot += share;
+        }
+        value += share * fit.x.get(*i).copied().unwrap_or(0.0);
+    }
+    Estimate { value, sd: math::sqrt(fit.factors.variance_along(&h)) }
+}
+
+fn angle<const N: usize>(fit: &Fit<N>, head: usize) -> Result<Estimate, Untold> {
+    let angle = estimate(fit, &[(own(head, 0), 1.0)]);
+    if angle.sd > TOLD * ANGLE_SD_RAD {
+        return Err(Untold::Round { sd_deg: angle.sd.to_degrees() });
+    }
+    Ok(angle)
+}
+
+/// Offset of a head from the file's position, relative to the mean of all heads.
+fn offset<const N: usize>(fit: &Fit<N>, head: usize, i: usize, count: usize) -> Result<Estimate, Untold> {
+    if count < 2 {
+        return Err(Untold::OneHead);
+    }
+    let share = |other: usize| f64::from(u8::from(other == head)) - 1.0 / count as f64;
+    let parts: Vec<(usize, f64)> = (0..count).map(|other| (own(other, i), share(other))).collect();
+    let apart = estimate(fit, &parts);
+    if apart.sd > TOLD * OFFSET_SD_M {
+        return Err(Untold::LikePlace { sd_m: apart.sd });
+    }
+    Ok(apart)
+}
+
+impl Heads {
+    /// Height above the tunnel's floor of a point `up_m` from the body's origin, m.
+    pub(crate) fn height_m(&self, up_m: Vec3<headrace_geometry::frames::Tunnel>) -> Estimate {
+        let [_, z] = self.place_m;
+        Estimate { value: z.value + up_m.z(), sd: z.sd }
+    }
+}

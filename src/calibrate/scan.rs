@@ -1,0 +1,180 @@
+//! Ranges to the wall while the vehicle stood still.
+
+use std::collections::BTreeMap;
+
+use crate::calibrate::estimate::{Untold, median};
+use crate::calibrate::material::Material;
+use crate::calibrate::still::Still;
+use headrace_fusion::filter::updates::in_tunnel;
+use headrace_geometry::frames::{Body, Mount, Rot, Tunnel};
+use headrace_geometry::math::{self, TAU};
+use headrace_geometry::time::MonoNs;
+use headrace_monitor::messages::Event;
+use headrace_sensor::device::{SensorInfo, SensorKind};
+use headrace_sensor::reading::Reading;
+
+/// Returns within this angle see the same roughness of the wall: together they count as one.
+pub(super) const SAME_WALL_RAD: f64 = TAU / SECTORS as f64;
+const SECTORS: usize = 120;
+/// Most returns used of one piece of wall: more add no information.
+const MOST_OF_A_SECTOR: usize = 8;
+
+/// A return of a head.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Return {
+    /// Head angle reported, in its frame, radians.
+    pub(crate) angle_rad: f64,
+    /// Range at the site's speed of sound, m.
+    pub(crate) range_m: f64,
+    /// Attitude of the vehicle at that time.
+    pub(crate) attitude: Rot<Tunnel, Body>,
+    /// Its weight within its piece of wall.
+    pub(crate) share: f64,
+}
+
+/// All returns of a head.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct HeadScan {
+    /// The source.
+    pub(crate) source: usize,
+    /// Mount in the vehicle file.
+    pub(crate) mount: Mount,
+    /// Its returns.
+    pub(crate) returns: Vec<Return>,
+}
+
+/// Range of an echosounder.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct EchoScan {
+    /// Mount in the vehicle file.
+    pub(crate) mount: Mount,
+    /// Median of its ranges, at the site's speed of sound, m.
+    pub(crate) range_m: f64,
+}
+
+/// See the module's description.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Scan {
+    /// Attitude of the vehicle in the middle of the time at rest.
+    pub(crate) attitude: Rot<Tunnel, Body>,
+    /// The heads that heard the wall.
+    pub(crate) heads: Vec<HeadScan>,
+    /// The echosounders that heard it.
+    pub(crate) echoes: Vec<EchoScan>,
+}
+
+impl HeadScan {
+    /// Sector of wall it has seen, radians of its turn.
+    pub(crate) fn seen_rad(&self) -> f64 {
+        let mut seen = [false; SECTORS];
+        for one in &self.returns {
+            if let Some(slot) = seen.get_mut(sector(one.angle_rad)) {
+                *slot = true;
+            }
+        }
+        seen.iter().filter(|seen| **seen).count() as f64 * SAME_WALL_RAD
+    }
+
+    /// Drops redundant returns, and weights the rest.
+    fn thin(&mut self) {
+        let mut counts = [0_usize; SECTORS];
+        for one in &self.returns {
+            if let Some(count) = counts.get_mut(sector(one.angle_rad)) {
+                *count += 1;
+            }
+        }
+        let mut passed = [0_usize; SECTORS];
+        let mut kept = [0_usize; SECTORS];
+        self.returns.retain(|one| {
+            let of = sector(one.angle_rad);
+            let (Some(count), Some(passed), Some(kept)) =
+                (counts.get(of), passed.get_mut(of), kept.get_mut(of))
+            else {
+                return false;
+            };
+            let keep = (*passed).is_multiple_of(count.div_ceil(MOST_OF_A_SECTOR));
+            *passed += 1;
+            *kept += usize::from(keep);
+            keep
+        });
+        for one in &mut self.returns {
+            let count = kept.get(sector(one.angle_rad)).copied().unwrap_or(1);
+            one.share = 1.0 / count.max(1) as f64;
+        }
+    }
+}
+
+fn sector(angle_rad: f64) -> usize {
+    let sector = math::floor_to_i64(math::wrap(angle_rad, TAU) / SAME_WALL_RAD);
+    usize::try_from(sector).unwrap_or(0).min(SECTORS - 1)
+}
+
+/// Gathers the ranges of a time at rest.
+///
+/// Errors: no attitude, or no head that heard the wall.
+pub(crate) fn gather(material: &Material<'_>, still: &Still) -> Result<Scan, Untold> {
+    let attitudes = attitudes(material, still);
+    let middle = attitudes.get(attitudes.len() / 2);
+    let (_, attitude) = *middle.ok_or(Untold::Missing { what: "an inertial unit's attitude" })?;
+    let heads = heads(material, still, &attitudes);
+    if heads.is_empty() {
+        return Err(Untold::Missing { what: "any profiling head" });
+    }
+    Ok(Scan { attitude, heads, echoes: echoes(material, still) })
+}
+
+/// Attitudes of the vehicle, by time.
+fn attitudes(material: &Material<'_>, still: &Still) -> Vec<(MonoNs, Rot<Tunnel, Body>)> {
+    let attitude = |(event, sensor): (&Event, &SensorInfo)| match (sensor.kind, event.reading) {
+        (SensorKind::Imu, Reading::Attitude(level)) => {
+            let attitude = in_tunnel(&material.site, level) * sensor.mount.rotation.inverse();
+            Some((event.valid_at, attitude))
+        }
+        _ => None,
+    };
+    material.during(still.from, still.to).filter_map(attitude).collect()
+}
+
+/// The heads that heard the wall, by source.
+fn heads(material: &Material<'_>, still: &Still, attitudes: &[(MonoNs, Rot<Tunnel, Body>)]) -> Vec<HeadScan> {
+    let mut heads: BTreeMap<usize, HeadScan> = BTreeMap::new();
+    for (event, sensor) in material.during(still.from, still.to) {
+        let (SensorKind::Head, Reading::Sonar(sonar)) = (sensor.kind, event.reading) else { continue };
+        let before = attitudes.partition_point(|(at, _)| *at <= event.valid_at).saturating_sub(1);
+        let (Some(range_m), Some((_, attitude)), true) =
+            (sonar.range_m, attitudes.get(before), event.reading.is_finite())
+        else {
+            continue;
+        };
+        let range_m = material.site.rescaled_range_m(range_m, sonar.sound_speed_mps);
+        let source = event.source.index();
+        let head = heads.entry(source).or_insert_with(|| HeadScan {
+            source,
+            mount: sensor.mount,
+            returns: Vec::new(),
+        });
+        head.returns.push(Return { angle_rad: sonar.angle_rad, range_m, attitude: *attitude, share: 1.0 });
+    }
+    heads.values_mut().for_each(HeadScan::thin);
+    heads.into_values().collect()
+}
+
+/// The echosounders that heard the wall, by source.
+fn echoes(material: &Material<'_>, still: &Still) -> Vec<EchoScan> {
+    let mut heard: BTreeMap<usize, (Mount, Vec<f64>)> = BTreeMap::new();
+    for (event, sensor) in material.during(still.from, still.to) {
+        let (SensorKind::Echosounder { min_confidence }, Reading::Echo(echo)) = (sensor.kind, event.reading)
+        else {
+            continue;
+        };
+        let is_sure = echo.confidence >= min_confidence && event.reading.is_finite();
+        if let (Some(range_m), true) = (echo.range_m, is_sure) {
+            let range_m = material.site.rescaled_range_m(range_m, echo.sound_speed_mps);
+            heard.entry(event.source.index()).or_insert((sensor.mount, Vec::new())).1.push(range_m);
+        }
+    }
+    let middle = |(mount, mut ranges_m): (Mount, Vec<f64>)| {
+        median(&mut ranges_m).map(|range_m| EchoScan { mount, range_m })
+    };
+    heard.into_values().filter_map(middle).collect()
+}

@@ -1,0 +1,52 @@
+//! Walls of long dives, block by block: a search of [`Wall`] looks at all of its samples.
+
+use std::cell::RefCell;
+use std::collections::BTreeMap;
+
+use super::truth::Truth;
+use super::wall::Wall;
+use crate::TruthError;
+
+/// Length of a block, and of the wall beyond it on either side that is searched with it, m.
+const BLOCK_M: f64 = 64.0;
+const BEYOND_M: f64 = 32.0;
+/// Longest way that is one block, m.
+const WHOLE_M: f64 = 256.0;
+
+/// The wall of a dive.
+pub(crate) struct Blocks {
+    /// Of a dive that isn't long.
+    whole: Option<Wall>,
+    /// Of a long one, by number, as they are asked for.
+    blocks: RefCell<BTreeMap<i64, Wall>>,
+}
+
+impl Blocks {
+    /// Of a dive's true samples; those of a long way are taken when they are asked for.
+    ///
+    /// Errors: as for [`Wall::new`].
+    pub(crate) fn of(truth: &Truth) -> Result<Self, TruthError> {
+        let is_long = truth.way_m[1] - truth.way_m[0] > WHOLE_M;
+        let whole = if is_long { None } else { Some(truth.wall()?) };
+        Ok(Self { whole, blocks: RefCell::default() })
+    }
+
+    /// D of a stretch, m; infinite without a sample near it, or where samples can't be taken.
+    pub(crate) fn hole_m(&self, truth: &Truth, from_m: f64, to_m: f64) -> f64 {
+        if let Some(whole) = &self.whole {
+            return whole.hole_m(from_m, to_m);
+        }
+        let number = headrace_geometry::math::floor_to_i64(from_m / BLOCK_M);
+        let mut blocks = self.blocks.borrow_mut();
+        let wall = blocks.entry(number).or_insert_with(|| {
+            let [begins_m, ends_m] = [number, number + 1].map(|k| k as f64 * BLOCK_M);
+            let near = (begins_m - BEYOND_M)..(ends_m + BEYOND_M);
+            let places =
+                truth.samples.iter().map(|sample| sample.place).filter(|[x_m, _]| near.contains(x_m));
+            // Samples that are numbers, which these are, are always taken.
+            Wall::new(places, truth.perimeter_m).unwrap_or_default()
+        });
+        // A larger circle may hold samples from farther away.
+        Some(wall.hole_m(from_m, to_m)).filter(|hole_m| *hole_m < 2.0 * BEYOND_M).unwrap_or(f64::INFINITY)
+    }
+}

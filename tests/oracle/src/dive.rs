@@ -1,0 +1,347 @@
+//! A dive simulated once, and replayed through the loop with any settings: what is reported, what it costs, and D_true of each
+//! section.
+//!
+//! The loop's chainage may be off as a whole (slack, the wheel's scale): sections are those of its chainage, which is also
+//! where a vehicle would be sent back to. Each is compared with the stretch of wall that it was: its bounds are moved by the
+//! median of the difference (true less estimated chainage of the vehicle) over the pings whose samples landed in or near it.
+
+use std::cell::RefCell;
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+use bevy_ecs::prelude::{Res, ResMut, Resource};
+use headrace_fusion::Navigation;
+use headrace_geometry::time::MonoNs;
+use headrace_monitor::messages::{Outcome, Placed, PlacedList};
+use headrace_monitor::report::{Report, SectionReport};
+use headrace_monitor::ring::{Port, RingError};
+use headrace_monitor::run::Loop;
+use headrace_monitor::stage::Stage;
+use headrace_monitor::{App, Plugin, PluginError};
+use headrace_replay::drive::{Coming, Pace, PacketSource, drive};
+use headrace_replay::log::LogError;
+use headrace_sensor::device::Direction;
+use headrace_sensor::reading::SourceId;
+use headrace_simulator::{Scene, Scenery, Simulation};
+use headrace_vehicle::VehicleConfig;
+
+use crate::TruthError;
+use crate::blocks::Blocks;
+use crate::timed;
+use crate::truth::{Truth, TruthTaker};
+
+/// How far from a section samples still say how far off its chainage is, m.
+const NEAR_M: f64 = 1.0;
+
+/// Packets that devices sent, in the order of their times.
+#[derive(Debug, Default)]
+pub struct Packets {
+    /// Receive time, source, and where its bytes end.
+    list: Vec<(MonoNs, u16, usize)>,
+    bytes: Vec<u8>,
+}
+
+impl Packets {
+    fn push(&mut self, at: MonoNs, source: u16, bytes: &[u8]) {
+        self.bytes.extend_from_slice(bytes);
+        self.list.push((at, source, self.bytes.len()));
+    }
+
+    /// Number of packets.
+    pub fn len(&self) -> usize {
+        self.list.len()
+    }
+
+    /// Whether there are none.
+    pub fn is_empty(&self) -> bool {
+        self.list.is_empty()
+    }
+
+    /// The packets from the first one on, for a loop.
+    pub fn feed(&self) -> PacketFeed<'_> {
+        PacketFeed { packets: self, next: 0, from: 0 }
+    }
+}
+
+/// Packets in memory as a source of packets.
+#[derive(Debug)]
+pub struct PacketFeed<'a> {
+    packets: &'a Packets,
+    next: usize,
+    /// Where the next packet's bytes begin.
+    from: usize,
+}
+
+impl PacketSource for PacketFeed<'_> {
+    fn coming(&mut self) -> Result<Option<Coming>, LogError> {
+        let coming = |(at, source, end): &(MonoNs, u16, usize)| Coming {
+            at: *at,
+            source: SourceId(*source),
+            len: end - self.from,
+        };
+        Ok(self.packets.list.get(self.next).map(coming))
+    }
+
+    fn send(&mut self, port: &mut Port) -> Result<(), RingError> {
+        if let Some((at, _, end)) = self.packets.list.get(self.next) {
+            port.send(*at, self.packets.bytes.get(self.from..*end).unwrap_or_default())?;
+            (self.next, self.from) = (self.next + 1, *end);
+        }
+        Ok(())
+    }
+}
+
+/// A simulated dive.
+pub struct Recorded {
+    /// What its devices sent.
+    pub packets: Packets,
+    /// Where beams met the wall.
+    pub truth: Arc<Truth>,
+    /// Where the vehicle truly was.
+    pub scenery: Scenery,
+    wall: Blocks,
+    /// D_true of stretches that were asked for, by the bits of their bounds.
+    holes_m: RefCell<BTreeMap<[u64; 2], f64>>,
+}
+
+/// A section as it was judged, and as it truly was.
+#[derive(Debug, Clone)]
+pub struct JudgedSection {
+    /// What was reported.
+    pub report: SectionReport,
+    /// D_true, m; infinite without a single sample.
+    pub true_hole_m: f64,
+    /// True less estimated chainage, m.
+    pub shift_m: f64,
+}
+
+/// A dive, reported and true.
+pub struct JudgedDive {
+    /// Report of the loop.
+    pub report: Report,
+    /// The truth.
+    pub truth: Arc<Truth>,
+    /// All sections, in order.
+    pub sections: Vec<JudgedSection>,
+}
+
+/// Dives a scene; the loop is told the scene's vehicle file.
+///
+/// Errors: see [`TruthError`].
+pub fn dive(scene: &Scene) -> Result<JudgedDive, TruthError> {
+    dive_believing(scene, &scene.vehicle)
+}
+
+/// Dives a scene, the loop being told another vehicle file, whose sensors must send the same bytes.
+///
+/// Errors: see [`TruthError`].
+pub fn dive_believing(scene: &Scene, believed: &VehicleConfig) -> Result<JudgedDive, TruthError> {
+    Recorded::of(scene, believed)?.judged(believed)
+}
+
+impl Recorded {
+    /// Simulates a scene. A pilot who heeds advice hears a loop that is told `believed`, which also has the profile for arc lengths.
+    ///
+    /// Errors: a scene that can't be simulated, or whose truth the oracle can't take.
+    pub fn of(scene: &Scene, believed: &VehicleConfig) -> Result<Self, TruthError> {
+        let mut simulation = headrace_replay::simulation_believing(scene, believed, true)?;
+        let mut taker = TruthTaker::new(scene, &simulation, &believed.tunnel.profile);
+        let mut packets = Packets::default();
+        while let Some(message) = simulation.next_message() {
+            if message.direction == Direction::Received {
+                packets.push(message.at, message.source, message.bytes);
+            }
+            taker.note(&mut simulation);
+        }
+        taker.note(&mut simulation);
+        let scenery = scenery_of(&simulation)?;
+        let truth = taker.truth();
+        Ok(Self {
+            packets,
+            wall: Blocks::of(&truth)?,
+            truth: Arc::new(truth),
+            scenery,
+            holes_m: RefCell::new(BTreeMap::new()),
+        })
+    }
+
+    /// From the first to the last packet, s.
+    pub fn duration_s(&self) -> f64 {
+        let ends = self.packets.list.first().zip(self.packets.list.last());
+        ends.map_or(0.0, |((first, ..), (last, ..))| last.since(*first).as_secs_f64())
+    }
+
+    /// D_true of a stretch of true chainage, m; infinite without a single sample.
+    pub fn true_hole_m(&self, from_m: f64, to_m: f64) -> f64 {
+        let key = [from_m.to_bits(), to_m.to_bits()];
+        *self.holes_m.borrow_mut().entry(key).or_insert_with(|| self.wall.hole_m(&self.truth, from_m, to_m))
+    }
+
+    /// Replays it with the settings of a vehicle file and judges what is reported by the truth.
+    ///
+    /// Errors: the loop can't be armed or driven.
+    pub fn judged(&self, vehicle: &VehicleConfig) -> Result<JudgedDive, TruthError> {
+        self.judged_with(vehicle, vehicle.navigation(), &mut |_| {})
+    }
+
+    /// The same with another navigation; `note` sees the loop after each tick.
+    ///
+    /// Errors: the loop can't be armed or driven.
+    pub fn judged_with(
+        &self,
+        vehicle: &VehicleConfig,
+        navigation: Box<dyn Navigation>,
+        note: &mut dyn FnMut(&Loop),
+    ) -> Result<JudgedDive, TruthError> {
+        Ok(self.judge(&self.replayed(vehicle, navigation, note)?))
+    }
+
+    /// A loop at the end of a replay, for [`Recorded::judge`].
+    ///
+    /// Errors: the loop can't be armed or driven.
+    pub fn replayed(
+        &self,
+        vehicle: &VehicleConfig,
+        navigation: Box<dyn Navigation>,
+        note: &mut dyn FnMut(&Loop),
+    ) -> Result<Loop, TruthError> {
+        let mut dive = armed(vehicle, navigation, &[&Watch])?;
+        drive(&mut dive, &mut self.packets.feed(), Pace::default(), &mut |dive: &Loop| note(dive))?;
+        dive.finish(&mut |_, _| {});
+        Ok(dive)
+    }
+
+    /// What a replayed loop reports, beside the truth.
+    pub fn judge(&self, dive: &Loop) -> JudgedDive {
+        let report = Report::of(dive);
+        let shifts = dive.resource::<Seen>().map_or_else(Shifts::default, |seen| seen.shifts(&self.scenery));
+        let judge = |section: &SectionReport| {
+            let shift_m = shifts.about(section.start_m, section.end_m);
+            let true_hole_m = self.true_hole_m(section.start_m + shift_m, section.end_m + shift_m);
+            JudgedSection { report: section.clone(), true_hole_m, shift_m }
+        };
+        let sections = report.sections.iter().map(judge).collect();
+        JudgedDive { report, truth: Arc::clone(&self.truth), sections }
+    }
+
+    /// CPU time of a replay with the settings of a vehicle file, s; without arming and without the report.
+    ///
+    /// Errors: the loop can't be armed or driven.
+    pub fn cpu_s(&self, vehicle: &VehicleConfig) -> Result<f64, TruthError> {
+        self.cpu_with_s(vehicle, vehicle.navigation(), Pace::default())
+    }
+
+    /// The same with another navigation and length of ticks.
+    ///
+    /// Errors: the loop can't be armed or driven.
+    pub fn cpu_with_s(
+        &self,
+        vehicle: &VehicleConfig,
+        navigation: Box<dyn Navigation>,
+        pace: Pace,
+    ) -> Result<f64, TruthError> {
+        Ok(self.timed_with(vehicle, navigation, pace)?.1)
+    }
+
+    /// A loop at the end of a replay, and the CPU time of it, s.
+    ///
+    /// Errors: the loop can't be armed or driven.
+    pub fn timed(&self, vehicle: &VehicleConfig) -> Result<(Loop, f64), TruthError> {
+        self.timed_with(vehicle, vehicle.navigation(), Pace::default())
+    }
+
+    fn timed_with(
+        &self,
+        vehicle: &VehicleConfig,
+        navigation: Box<dyn Navigation>,
+        pace: Pace,
+    ) -> Result<(Loop, f64), TruthError> {
+        let mut dive = armed(vehicle, navigation, &[])?;
+        let (driven, cpu_s) = timed(|| {
+            let driven = drive(&mut dive, &mut self.packets.feed(), pace, &mut |_| {});
+            dive.finish(&mut |_, _| {});
+            driven
+        });
+        driven?;
+        Ok((dive, cpu_s))
+    }
+}
+
+/// A loop of a vehicle file, armed.
+///
+/// Errors: see [`PluginError`].
+pub fn armed(
+    vehicle: &VehicleConfig,
+    navigation: Box<dyn Navigation>,
+    plugins: &[&dyn Plugin],
+) -> Result<Loop, PluginError> {
+    let mut app = App::new(vehicle.mission());
+    for sensor in &vehicle.sensors {
+        app.add_device(sensor.as_ref())?;
+    }
+    for plugin in plugins {
+        app.add_plugin(*plugin)?;
+    }
+    app.arm(navigation)
+}
+
+fn scenery_of(simulation: &Simulation) -> Result<Scenery, TruthError> {
+    simulation.scenery().cloned().ok_or_else(|| TruthError::Figure {
+        what: "a simulated dive".to_owned(),
+        why: "the simulation has no scenery".to_owned(),
+    })
+}
+
+/// Of each placed sample: when, its chainage, the vehicle's; as estimated.
+#[derive(Resource, Default)]
+struct Seen(Vec<(MonoNs, f64, f64)>);
+
+/// Copies how samples were placed, and touches nothing.
+struct Watch;
+
+impl Plugin for Watch {
+    fn build(&self, app: &mut App) -> Result<(), PluginError> {
+        app.insert_resource(Seen::default());
+        app.add_systems(Stage::Judge, watch);
+        Ok(())
+    }
+}
+
+#[expect(clippy::needless_pass_by_value, reason = "systems take their parameters by value")]
+fn watch(placed: Res<'_, PlacedList>, mut seen: ResMut<'_, Seen>) {
+    for item in &placed.0 {
+        if let Placed::Ping(ping) = item
+            && let (Outcome::Sample { point, .. }, Some(fix)) = (ping.outcome, ping.fix)
+        {
+            seen.0.push((ping.valid_at, point.x(), fix.pose.position.x()));
+        }
+    }
+}
+
+impl Seen {
+    fn shifts(&self, scenery: &Scenery) -> Shifts {
+        let shift = |(at, sample_x_m, x_m): &(MonoNs, f64, f64)| (*sample_x_m, scenery.chainage_m(*at) - x_m);
+        let mut shifts: Vec<(f64, f64)> = self.0.iter().map(shift).collect();
+        shifts.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.total_cmp(&b.1)));
+        Shifts(shifts)
+    }
+}
+
+/// Estimated chainage of samples, and by how much more the vehicle's true chainage was, m; by chainage.
+#[derive(Default)]
+struct Shifts(Vec<(f64, f64)>);
+
+impl Shifts {
+    /// The median about a section; of the nearest sample where there are none about it; 0 without any.
+    fn about(&self, from_m: f64, to_m: f64) -> f64 {
+        let before = |x_m: f64| self.0.partition_point(|(sample_x_m, _)| *sample_x_m < x_m);
+        let near = self.0.get(before(from_m - NEAR_M)..before(to_m + NEAR_M)).unwrap_or_default();
+        let mut near: Vec<f64> = near.iter().map(|(_, by_m)| *by_m).collect();
+        if near.is_empty() {
+            let after = before(from_m).min(self.0.len().saturating_sub(1));
+            return self.0.get(after).map_or(0.0, |(_, by_m)| *by_m);
+        }
+        let middle = near.len() / 2;
+        *near.select_nth_unstable_by(middle, f64::total_cmp).1
+    }
+}
