@@ -19,6 +19,7 @@ use headrace_coverage::{
     GridLayout, HoleFinder, PassError, SampleStore, Sections, Soundings, StoreLayout, Visit, WallSample,
 };
 use headrace_geometry::math;
+use headrace_geometry::snapshot::{Restorer, Saver, SnapshotError, Stateful};
 use headrace_geometry::time::{DurNs, MonoNs};
 use headrace_geometry::tunnel::shapes;
 use headrace_monitor::alert_list::AlertList;
@@ -30,7 +31,6 @@ use headrace_sensor::codec::CodecCounts;
 use headrace_sensor::device::{Decoder, Direction};
 use headrace_sensor::reading::{Decoded, Packet};
 use headrace_simulator::{START, Scene, Simulation};
-use headrace_snapshot::{Restorer, Saver, SnapshotError, Stateful};
 use headrace_tests::scenes;
 use headrace_vehicle::Mission;
 

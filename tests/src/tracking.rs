@@ -10,6 +10,7 @@ use headrace_fusion::filter::state::{ERRORS, Errors, State};
 use headrace_fusion::relative::Relative;
 use headrace_fusion::{Fix, Navigation, NoFix, Times};
 use headrace_geometry::frames::Pose;
+use headrace_geometry::snapshot::{Restorer, Saver, SnapshotError, Stateful};
 use headrace_geometry::time::MonoNs;
 use headrace_monitor::App;
 use headrace_monitor::report::Report;
@@ -18,7 +19,6 @@ use headrace_replay::drive::{Pace, drive};
 use headrace_sensor::device::SensorInfo;
 use headrace_sensor::reading::Reading;
 use headrace_simulator::{START, Scene, Scenery, Simulation};
-use headrace_snapshot::{Restorer, Saver, SnapshotError, Stateful};
 use headrace_vehicle::NavigationConfig;
 
 /// More than a dive of an hour says.

@@ -13,7 +13,7 @@ use self::division::Division;
 use self::window::{Nearest, Window};
 use super::store::SampleStore;
 use headrace_geometry::math;
-use headrace_snapshot::stateful;
+use headrace_geometry::snapshot::stateful;
 
 mod certain;
 mod division;

@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 
 use super::cause::Cause;
 use super::causes::Causes;
-use headrace_snapshot::stateful;
+use headrace_geometry::snapshot::stateful;
 
 /// Capacity: five minutes of four heads that all get nothing.
 const ROOM: usize = 1 << 16;

@@ -4,8 +4,8 @@ use serde::{Deserialize, Serialize};
 
 use super::wall_limits::{PlacedReturn, WallLimits};
 use headrace_geometry::math;
+use headrace_geometry::snapshot::stateful;
 use headrace_sampling::head::MAX_HEADS;
-use headrace_snapshot::stateful;
 
 /// Bins around the perimeter: about a step of a head.
 const BINS: i64 = 128;

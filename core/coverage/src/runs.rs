@@ -6,8 +6,8 @@ use super::again::{Again, Failing, NAMED_OF, Tally};
 use super::cause::Cause;
 use super::causes::Causes;
 use super::hole::Hole;
+use headrace_geometry::snapshot::stateful;
 use headrace_geometry::time::MonoNs;
-use headrace_snapshot::stateful;
 
 /// Maximum gap between neighbouring failed sections of one run, m: over longer ones the speed that one section asks for says nothing of the
 /// next.

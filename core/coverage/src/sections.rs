@@ -20,9 +20,9 @@ use super::store::SampleStore;
 use super::unsure::{Driven, Stretch};
 use super::visits::Visit;
 use headrace_geometry::math;
+use headrace_geometry::snapshot::stateful;
 use headrace_geometry::time::MonoNs;
 use headrace_geometry::tunnel::Profile;
-use headrace_snapshot::stateful;
 
 /// Request to judge a section as of a given time.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -4,7 +4,7 @@
 //! never replaces it. Source: docs/coverage.md, "For surveyors".
 
 use headrace_geometry::math;
-use headrace_snapshot::stateful;
+use headrace_geometry::snapshot::stateful;
 
 /// Minimum samples per node.
 pub const ENOUGH: u16 = 5;

@@ -37,10 +37,10 @@ use self::filter::cable::CableDoubt;
 use self::filter::pose_sd::PoseSd;
 use self::filter::sources::Consistency;
 use self::filter::suspicion::SettingDoubt;
+use headrace_geometry::snapshot::Stateful;
 use headrace_geometry::time::MonoNs;
 use headrace_sensor::device::SensorInfo;
 use headrace_sensor::reading::Reading;
-use headrace_snapshot::Stateful;
 
 pub use self::fix::{Fix, NoFix, Times};
 

@@ -1,4 +1,4 @@
-//! Units, integer time, frames, mathematics, the site and tunnel profiles: the base of every other crate.
+//! Units, integer time, frames, mathematics, the site, tunnel profiles, and state as bytes: the base of every other crate.
 //!
 //! Vectors carry their frame as a type, and a tunnel's wall is addressed by chainage and arc length. Pure: no I/O, no
 //! threads, no clock, no randomness. Transcendental functions come from [`math`] alone.
@@ -22,5 +22,6 @@
 pub mod frames;
 pub mod math;
 pub mod site;
+pub mod snapshot;
 pub mod time;
 pub mod tunnel;

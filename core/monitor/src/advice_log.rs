@@ -3,9 +3,9 @@
 use bevy_ecs::prelude::Resource;
 use serde::{Deserialize, Serialize};
 
+use headrace_geometry::snapshot::stateful;
 use headrace_geometry::time::{DurNs, MonoNs};
 use headrace_sampling::advice::Advice;
-use headrace_snapshot::stateful;
 
 /// Period of the advice, in data time.
 pub const ADVICE_PERIOD: DurNs = DurNs(200_000_000);

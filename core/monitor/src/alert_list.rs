@@ -13,9 +13,9 @@ use super::pilot_text::{AdviceFigures, CauseFigures};
 use headrace_coverage::Stretch;
 use headrace_fusion::NoFix;
 use headrace_fusion::filter::suspicion::SettingDoubt;
+use headrace_geometry::snapshot::stateful;
 use headrace_geometry::time::{DurNs, MonoNs};
 use headrace_sensor::reading::SourceId;
-use headrace_snapshot::stateful;
 use headrace_vehicle::{AlertTiming, LimitsConfig};
 
 pub mod json;

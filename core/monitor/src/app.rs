@@ -14,9 +14,9 @@ use super::resources::Digests;
 use super::ring::{self, Port, PortReader};
 use super::stage::{self, Stage};
 use super::stages;
+use headrace_geometry::snapshot::Stateful;
 use headrace_sensor::device::{Decoder, Device, SensorInfo, SensorSpec};
 use headrace_sensor::reading::{MAX_SOURCES, SourceId};
-use headrace_snapshot::Stateful;
 use headrace_vehicle::{CONSOLE_ID, Mission};
 
 /// A source of bytes, as a plugin registers it.

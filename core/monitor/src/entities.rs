@@ -17,12 +17,12 @@ use headrace_fusion::filter::pose_sd::PoseSd;
 use headrace_fusion::stuck_sensor::StuckSensor;
 use headrace_fusion::{Fix, Navigation, NoFix};
 use headrace_geometry::frames::{Point3, Tunnel};
+use headrace_geometry::snapshot::{Restorer, Saver, SnapshotError, Stateful};
 use headrace_geometry::time::{DurNs, MonoNs};
 use headrace_sampling::head::{HeadMode, HeadSpec};
 use headrace_sampling::occlusion::AngleRange;
 use headrace_sensor::device::{Decoder, SensorInfo};
 use headrace_sensor::reading::SourceId;
-use headrace_snapshot::{Restorer, Saver, SnapshotError, Stateful};
 
 /// The vehicle's estimator: readings to fixes.
 #[derive(Component)]

@@ -11,11 +11,11 @@ use super::alerts::{AlertKind, MOST_ALERTS};
 use headrace_coverage::Stretch;
 use headrace_fusion::NoFix;
 use headrace_fusion::filter::pose_sd::PoseSd;
+use headrace_geometry::snapshot::stateful;
 use headrace_geometry::time::{DurNs, MonoNs};
 use headrace_sampling::advice::{Advice, Reason};
 use headrace_sampling::head::HeadSet;
 use headrace_sensor::reading::{MAX_SOURCES, SourceId};
-use headrace_snapshot::stateful;
 
 mod condition;
 pub mod json;

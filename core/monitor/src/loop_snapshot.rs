@@ -18,7 +18,7 @@ use super::live_state::LiveState;
 use super::notes::Notes;
 use super::resources::{Coverage, Digests, Finder, Tally, TickTime, VehicleEntities};
 use super::stages::{Advisor, Driving, SoundSpeed};
-use headrace_snapshot::{Restorer, Saver, SnapshotError, Stateful};
+use headrace_geometry::snapshot::{Restorer, Saver, SnapshotError, Stateful};
 
 /// A part of the state: its name, resource or component type, and save and restore functions.
 struct Part {

@@ -4,8 +4,8 @@ use bevy_ecs::prelude::Resource;
 use serde::{Deserialize, Serialize};
 
 use super::console::{NoteText, Who};
+use headrace_geometry::snapshot::stateful;
 use headrace_geometry::time::MonoNs;
-use headrace_snapshot::stateful;
 
 /// Notes that are kept; later ones are in the log alone.
 pub const MOST_NOTES: usize = 1000;

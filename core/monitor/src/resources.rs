@@ -10,11 +10,11 @@ use headrace_coverage::{
 };
 use headrace_fusion::NoFix;
 use headrace_geometry::site::Site;
+use headrace_geometry::snapshot::{Restorer, Saver, SnapshotError, Stateful, stateful};
 use headrace_geometry::time::MonoNs;
 use headrace_geometry::tunnel::Profile;
 use headrace_sampling::layout::HeadLayout;
 use headrace_sensor::reading::SourceId;
-use headrace_snapshot::{Restorer, Saver, SnapshotError, Stateful, stateful};
 
 /// The tunnel as designed, and its water.
 #[derive(Debug, Clone, Resource)]

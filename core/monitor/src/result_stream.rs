@@ -4,7 +4,7 @@
 //! numbers. The header has the record's kind in its lowest byte and the number of words above it. Only words are hashed.
 
 use super::digest::Digest;
-use headrace_snapshot::stateful;
+use headrace_geometry::snapshot::stateful;
 
 /// Capacity of a stream per tick, words; those beyond are hashed, but not kept, and counted as lost.
 const MAX_TICK_WORDS: usize = 1 << 16;

@@ -26,11 +26,11 @@ use super::stages::{Results, RunInputs, SoundSpeed, judge_one};
 use headrace_coverage::{Outlook, Request};
 use headrace_fusion::filter::sources::Consistency;
 use headrace_fusion::{Fix, NoFix};
+use headrace_geometry::snapshot::{Restorer, Saver, SnapshotError};
 use headrace_geometry::time::MonoNs;
 use headrace_sensor::codec::CodecCounts;
 use headrace_sensor::device::SensorInfo;
 use headrace_sensor::device_clock::ClockReport;
-use headrace_snapshot::{Restorer, Saver, SnapshotError};
 use headrace_vehicle::Mission;
 
 /// Sections judged per batch at the end of a dive, before their notices are delivered.

@@ -26,9 +26,9 @@ use super::ring::PortReader;
 use super::run::Loop;
 use super::stage::{self, PlacedElsewhere};
 use super::stages::{self, Advisor, SoundSpeed};
+use headrace_geometry::snapshot::{Restorer, Saver, SnapshotError, Stateful};
 use headrace_geometry::time::MonoNs;
 use headrace_sampling::advice::Advice;
-use headrace_snapshot::{Restorer, Saver, SnapshotError, Stateful};
 
 /// The lists with which a split loop was armed: they have room for any tick's, and wait until it is whole again.
 #[derive(Debug, Resource)]

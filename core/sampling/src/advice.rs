@@ -18,8 +18,8 @@ use super::strips::{Going, PARTS, Strips, View};
 use super::swing::Swing;
 use headrace_geometry::frames::{Point3, Pose, Rot};
 use headrace_geometry::math;
+use headrace_geometry::snapshot::stateful;
 use headrace_geometry::tunnel::Profile;
-use headrace_snapshot::stateful;
 use intervals::Driving;
 use ring_cache::AdvisedHead;
 

@@ -6,8 +6,8 @@ use serde::{Deserialize, Serialize};
 use super::error::{SamplingError, positive};
 use headrace_geometry::frames::{Mount, Point3, Pose, Rot, Sensor, Tunnel, Vec3, head_direction};
 use headrace_geometry::math::{self, TAU};
+use headrace_geometry::snapshot::stateful;
 use headrace_geometry::tunnel::{Profile, WallHit};
-use headrace_snapshot::stateful;
 
 /// A beam with a longer range than this runs along the tunnel, m.
 const ALONG_M: f64 = 1000.0;

@@ -7,7 +7,7 @@ use super::head::{HeadSet, MAX_HEADS};
 use super::passes::Passes;
 use super::ring::{Ring, Sounding};
 use headrace_geometry::math;
-use headrace_snapshot::stateful;
+use headrace_geometry::snapshot::stateful;
 
 mod arc;
 mod limit;

@@ -2,8 +2,8 @@
 
 use headrace_geometry::frames::{Tunnel, Vec3};
 use headrace_geometry::math;
+use headrace_geometry::snapshot::stateful;
 use headrace_geometry::time::{DurNs, MonoNs};
-use headrace_snapshot::stateful;
 
 /// Number of headings kept: at 5 Hz, `WINDOW` plus a turn of a head in its slowest mode.
 const BEATS: usize = 320;

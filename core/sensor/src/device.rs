@@ -12,9 +12,9 @@ use crate::device_clock::ClockReport;
 use headrace_config::{ConfigError, Section};
 use headrace_geometry::frames::{Mount, Rot, Vec3};
 use headrace_geometry::site::Site;
+use headrace_geometry::snapshot::Stateful;
 use headrace_geometry::time::{DurNs, MonoNs};
 use headrace_sampling::head::{HeadMode, HeadProgram, HeadSpec};
-use headrace_snapshot::Stateful;
 use serde::{Deserialize, Serialize};
 
 /// Keys common to all `[[sensors]]` tables.

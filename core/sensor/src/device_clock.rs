@@ -9,8 +9,8 @@
 use serde::{Deserialize, Serialize};
 
 use headrace_geometry::math;
+use headrace_geometry::snapshot::array;
 use headrace_geometry::time::{DurNs, MonoNs};
-use headrace_snapshot::array;
 
 mod sample_times;
 

@@ -39,6 +39,6 @@ pub mod reading;
 pub use device::SensorConfig;
 pub use headrace_config as config;
 pub use headrace_geometry as geometry;
+pub use headrace_geometry::snapshot;
+pub use headrace_geometry::snapshot::stateful;
 pub use headrace_sampling as sampling;
-pub use headrace_snapshot as snapshot;
-pub use headrace_snapshot::stateful;

@@ -3,10 +3,10 @@
 use std::time::{Duration, Instant};
 
 use crossbeam::channel::{Receiver, RecvTimeoutError};
+use headrace_geometry::snapshot::{Restorer, Saver, SnapshotError};
 use headrace_geometry::time::{DurNs, MonoNs};
 use headrace_monitor::messages::Notice;
 use headrace_monitor::run::Loop;
-use headrace_snapshot::{Restorer, Saver, SnapshotError};
 
 use crate::drive::{Clock, DriveError, Driver, Pace};
 use crate::log::LogError;

@@ -7,6 +7,7 @@ use std::time::Duration;
 
 use headrace_fusion::direct::DirectNavigation;
 use headrace_geometry::site::Site;
+use headrace_geometry::snapshot::{Restorer, Saver, SnapshotError, Stateful};
 use headrace_geometry::time::MonoNs;
 use headrace_geometry::tunnel::shapes;
 use headrace_monitor::{App, SourceSpec};
@@ -16,7 +17,6 @@ use headrace_sensor::connect::Connect;
 use headrace_sensor::device::Decoder;
 use headrace_sensor::driver::{DeviceHealth, Driver, Wire};
 use headrace_sensor::reading::{Decoded, Packet};
-use headrace_snapshot::{Restorer, Saver, SnapshotError, Stateful};
 use headrace_vehicle::Mission;
 
 /// Decodes nothing.

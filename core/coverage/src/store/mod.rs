@@ -15,8 +15,8 @@ use serde::{Deserialize, Serialize};
 use self::open::{CellAt, OpenBricks};
 use self::packed::{Arena, Lattice, MOST_WORDS, Packed, Reader, Writer};
 use headrace_geometry::math;
+use headrace_geometry::snapshot::stateful;
 use headrace_sampling::head::MAX_HEADS;
-use headrace_snapshot::stateful;
 
 /// Bricks open at a time. At a metre each they extend beyond any search radius to either side.
 const OPEN_BRICKS: usize = 64;

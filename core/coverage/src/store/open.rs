@@ -3,8 +3,8 @@
 use serde::{Deserialize, Serialize};
 
 use super::packed::Packed;
+use headrace_geometry::snapshot::stateful;
 use headrace_sampling::head::MAX_HEADS;
-use headrace_snapshot::stateful;
 
 /// List link: node index plus one, or zero for none.
 type Link = u32;

@@ -6,8 +6,8 @@
 //! packed again without further loss.
 
 use headrace_geometry::math;
+use headrace_geometry::snapshot::{Restorer, Saver, SnapshotError, Stateful};
 use headrace_sampling::head::MAX_HEADS;
-use headrace_snapshot::{Restorer, Saver, SnapshotError, Stateful};
 
 /// Quanta per metre.
 const QUANTA_PER_M: f64 = 131_072.0;

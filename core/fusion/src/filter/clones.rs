@@ -11,8 +11,8 @@ use super::factors::{Factors, Gain};
 use super::inertial::Transition;
 use super::state::{ATTITUDE, ERRORS, Errors, POSITION};
 use crate::relative::Relative;
+use headrace_geometry::snapshot::stateful;
 use headrace_geometry::time::{DurNs, MonoNs};
-use headrace_snapshot::stateful;
 
 /// Time between two clones.
 pub const STEP: DurNs = DurNs(2_000_000_000);

@@ -4,8 +4,8 @@ use super::settings::Settings;
 use super::suspicion::Design;
 use headrace_geometry::frames::{Body, Vec3};
 use headrace_geometry::site::Site;
+use headrace_geometry::snapshot::stateful;
 use headrace_geometry::tunnel::Profile;
-use headrace_snapshot::stateful;
 
 /// Parameters of a dive.
 #[derive(Debug, Clone)]

@@ -26,11 +26,11 @@ use super::window::{Waiting, Window};
 use crate::smooth::step::{Move, Step};
 use headrace_geometry::frames::{Body, Point3, Rot, Tunnel, Vec3};
 use headrace_geometry::math;
+use headrace_geometry::snapshot::stateful;
 use headrace_geometry::time::{DurNs, MonoNs};
 use headrace_geometry::tunnel::Profile;
 use headrace_sensor::device::SensorKind;
 use headrace_sensor::reading::{Reading, SonarReturn};
-use headrace_snapshot::stateful;
 
 mod counter;
 

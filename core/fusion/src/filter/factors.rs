@@ -7,7 +7,7 @@
 //! Source: Bierman, Factorization Methods for Discrete Sequential Estimation, 1977: V.3 (measurement), III.4
 //! (addition of a dyad, after Agee and Turner).
 
-use headrace_snapshot::{Restorer, Saver, SnapshotError, Stateful};
+use headrace_geometry::snapshot::{Restorer, Saver, SnapshotError, Stateful};
 
 /// Factors of the covariance of `N` errors.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -53,13 +53,13 @@ use super::{Fix, Navigation, NoFix, Times};
 use headrace_geometry::frames::{Body, Pose, Vec3};
 use headrace_geometry::math;
 use headrace_geometry::site::Site;
+use headrace_geometry::snapshot::stateful;
 use headrace_geometry::time::{DurNs, MonoNs};
 use headrace_geometry::tunnel::Profile;
 use headrace_sampling::margin::{APART_SHARE, error_time_s};
 use headrace_sensor::device::{SensorInfo, SensorKind};
 use headrace_sensor::reading::MAX_SOURCES;
 use headrace_sensor::reading::Reading;
-use headrace_snapshot::stateful;
 
 /// Longest extrapolation of a fix beyond the last inertial sample.
 pub(super) const CARRIES: DurNs = DurNs(2_000_000_000);

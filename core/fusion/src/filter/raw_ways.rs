@@ -12,10 +12,10 @@ use super::updates::in_tunnel;
 use headrace_geometry::frames::{Body, Rot, Tunnel};
 use headrace_geometry::math;
 use headrace_geometry::site::Site;
+use headrace_geometry::snapshot::stateful;
 use headrace_geometry::time::{DurNs, MonoNs};
 use headrace_sensor::device::{SensorInfo, SensorKind};
 use headrace_sensor::reading::{Reading, SourceId};
-use headrace_snapshot::stateful;
 
 /// Times over which ways are compared, s.
 const WINDOWS_S: [f64; 3] = [2.0, 10.0, 60.0];

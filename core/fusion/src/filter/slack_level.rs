@@ -11,8 +11,8 @@ use super::settings::{Settings, Wander};
 use super::state::{State, matrix, rotation, rotation_vector};
 use headrace_geometry::frames::{Body, Rot, Tunnel, Vec3};
 use headrace_geometry::math;
+use headrace_geometry::snapshot::stateful;
 use headrace_geometry::time::{DurNs, MonoNs};
-use headrace_snapshot::stateful;
 
 /// Lags of the third differences, s.
 const LAGS_S: [f64; 4] = [0.5, 1.0, 2.0, 4.0];

@@ -17,11 +17,11 @@ use super::window::Waiting;
 use headrace_geometry::frames::{Body, Rot, Sensor, Tunnel, Vec3, head_direction};
 use headrace_geometry::math;
 use headrace_geometry::site::Site;
+use headrace_geometry::snapshot::stateful;
 use headrace_geometry::time::{DurNs, MonoNs};
 use headrace_geometry::tunnel::Profile;
 use headrace_sensor::device::{SensorInfo, SensorKind};
 use headrace_sensor::reading::Reading;
-use headrace_snapshot::stateful;
 
 /// Length of a spell: as long as a filter that is told wrong ranges stays about where it is.
 const SPELL: DurNs = DurNs(2_000_000_000);

@@ -4,9 +4,9 @@ use serde::{Deserialize, Serialize};
 
 use crate::filter::inertial::Felt;
 use headrace_geometry::frames::{Body, Vec3};
+use headrace_geometry::snapshot::stateful;
 use headrace_geometry::time::{DurNs, MonoNs};
 use headrace_sensor::reading::Reading;
-use headrace_snapshot::stateful;
 
 /// Room for waiting readings; four heads, four sounders and the rest have a tenth of it in a window.
 const MOST: usize = 1024;

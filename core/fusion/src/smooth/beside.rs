@@ -13,11 +13,11 @@ use crate::filter::sources::Consistency;
 use crate::filter::suspicion::SettingDoubt;
 use crate::{Fix, Navigation, NoFix, Times};
 use headrace_geometry::site::Site;
+use headrace_geometry::snapshot::stateful;
 use headrace_geometry::time::MonoNs;
 use headrace_geometry::tunnel::Profile;
 use headrace_sensor::device::SensorInfo;
 use headrace_sensor::reading::Reading;
-use headrace_snapshot::stateful;
 
 /// The filter with a smoother's beside it. Fixes and all else that it tells are bit for bit those of the filter alone.
 pub struct BesideNavigation {

@@ -3,7 +3,7 @@ use super::*;
 use crate::messages::Notices;
 use crate::result_stream::ResultStream;
 use headrace_coverage::{RunChange, RunId};
-use headrace_snapshot::{Restorer, Saver, Stateful as _};
+use headrace_geometry::snapshot::{Restorer, Saver, Stateful as _};
 use headrace_vehicle::ClassTiming;
 use proptest::prelude::*;
 

@@ -4,9 +4,9 @@ use bevy_ecs::prelude::Resource;
 use serde::{Deserialize, Serialize};
 
 use super::command::Command;
+use headrace_geometry::snapshot::stateful;
 use headrace_geometry::time::MonoNs;
 use headrace_sensor::reading::{Packet, SourceId};
-use headrace_snapshot::stateful;
 
 /// Most commands of a tick: more than the source's ring holds.
 const MOST_OF_TICK: usize = 256;

@@ -7,11 +7,11 @@ use crate::messages::{AdviceList, Notice, Notices, Placed, PlacedList};
 use crate::resources::{Digests, Tally};
 use crate::result_stream::{RecordKind, ResultStream};
 use headrace_geometry::frames::Vec3;
+use headrace_geometry::snapshot::stateful;
 use headrace_geometry::time::{DurNs, MonoNs};
 use headrace_sampling::advice::{self, Advice, Hysteresis, Remedy};
 use headrace_sampling::passes::{Phasing, Situation};
 use headrace_sampling::swing::{Looks, Swing};
-use headrace_snapshot::stateful;
 
 /// The least speed at which heads apart along the hull are taken to follow each other, m/s.
 const SLOWEST_MPS: f64 = 0.05;

@@ -6,6 +6,7 @@ use super::lacking::Lacking;
 use headrace_coverage::{Drive, OtherSettings};
 use headrace_geometry::frames::Vec3;
 use headrace_geometry::math;
+use headrace_geometry::snapshot::stateful;
 use headrace_geometry::time::{DurNs, MonoNs};
 use headrace_geometry::tunnel::{Profile, Yz};
 use headrace_sampling::head::{HeadMotion, HeadSet};
@@ -14,7 +15,6 @@ use headrace_sampling::losses::Sampled;
 use headrace_sampling::margin::position_margin_m;
 use headrace_sampling::passes::{Passes, Phasing, Situation};
 use headrace_sampling::swing::Looks;
-use headrace_snapshot::stateful;
 
 /// Maximum look-back over the time between neighbouring passes, seconds.
 const LONGEST_S: f64 = 50.0;

@@ -11,12 +11,12 @@ use crate::resources::Coverage;
 use headrace_coverage::{Cause, Causes, Drive, Lack, Lacks, Loss};
 use headrace_geometry::frames::{Mount, Pose, Vec3, head_direction};
 use headrace_geometry::math::{self, TAU};
+use headrace_geometry::snapshot::stateful;
 use headrace_geometry::time::{DurNs, MonoNs};
 use headrace_geometry::tunnel::Profile;
 use headrace_sampling::head::{HeadMotion, HeadSet, MAX_HEADS};
 use headrace_sampling::losses::LossRate;
 use headrace_sampling::passes::Situation;
-use headrace_snapshot::stateful;
 
 /// Time without a ping at a new angle after which a head is lacking.
 const LACKING_AFTER: DurNs = DurNs(400_000_000);

@@ -3,9 +3,9 @@
 use bevy_ecs::prelude::Resource;
 
 use headrace_geometry::site::fresh_water_sound_speed_mps;
+use headrace_geometry::snapshot::stateful;
 use headrace_geometry::time::MonoNs;
 use headrace_sensor::reading::{Decoded, Reading, SourceId};
-use headrace_snapshot::stateful;
 
 /// Plausible water temperatures, degrees Celsius; outside, the sensor is faulty or out of the water.
 const WATER_DEGC: core::ops::RangeInclusive<f64> = 0.0..=40.0;

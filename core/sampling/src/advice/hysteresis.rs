@@ -2,8 +2,8 @@
 
 use super::answer::{Advice, Reason};
 use super::search::SPEED_MARGIN;
+use headrace_geometry::snapshot::stateful;
 use headrace_geometry::time::{DurNs, MonoNs};
-use headrace_snapshot::stateful;
 
 /// Less restrictive advice is shown once nothing more restrictive has come for this long.
 const HOLD: DurNs = DurNs(1_000_000_000);

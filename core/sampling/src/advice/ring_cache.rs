@@ -6,8 +6,8 @@ use crate::occlusion::AngleRange;
 use crate::ring::{Ring, Standing};
 use crate::strips::{Arc, Sector, View};
 use headrace_geometry::frames::Pose;
+use headrace_geometry::snapshot::stateful;
 use headrace_geometry::tunnel::Profile;
-use headrace_snapshot::stateful;
 
 /// Relative change of the speed that is tolerated before the rings are recast.
 const SHARE: f64 = 0.002;

@@ -4,7 +4,7 @@ use super::arc::Arc;
 use super::sector::Sector;
 use crate::ring::Ring;
 use headrace_geometry::math;
-use headrace_snapshot::stateful;
+use headrace_geometry::snapshot::stateful;
 
 /// The parts of the wall that one head sees.
 #[derive(Debug, Clone, PartialEq, Default)]

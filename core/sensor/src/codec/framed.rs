@@ -1,7 +1,7 @@
 //! Framing with rescanning, written once for every codec.
 
 use super::{Codec, CodecCounts};
-use headrace_snapshot::{Restorer, Saver, SnapshotError, Stateful};
+use headrace_geometry::snapshot::{Restorer, Saver, SnapshotError, Stateful};
 
 /// Verdict on a frame candidate at the front of the held bytes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

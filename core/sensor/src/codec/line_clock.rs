@@ -3,8 +3,8 @@
 use serde::{Deserialize, Serialize};
 
 use super::{Codec as _, Framed, Framing};
+use headrace_geometry::snapshot::stateful;
 use headrace_geometry::time::{DurNs, MonoNs};
-use headrace_snapshot::stateful;
 
 /// Packets tracked by a [`LineClock`]: a kilobyte from a port that delivers 32 bytes at a time.
 const MAX_PARTS: usize = 32;

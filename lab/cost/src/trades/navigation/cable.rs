@@ -4,11 +4,11 @@ use headrace_fusion::relative::Relative;
 use headrace_fusion::{Fix, Navigation, NoFix, Times};
 use headrace_geometry::frames::{Point3, Pose, Rot};
 use headrace_geometry::math;
+use headrace_geometry::snapshot::stateful;
 use headrace_geometry::time::MonoNs;
 use headrace_geometry::tunnel::{Profile, Yz};
 use headrace_sensor::device::{SensorInfo, SensorKind};
 use headrace_sensor::reading::Reading;
-use headrace_snapshot::stateful;
 
 /// Time over which the speed is taken, s.
 const SPEED_OVER_S: f64 = 1.0;

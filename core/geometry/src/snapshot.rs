@@ -5,7 +5,7 @@
 //! so that a new field can't be forgotten.
 //!
 //! ```
-//! use headrace_snapshot::{Restorer, Saver, Stateful as _, stateful};
+//! use headrace_geometry::snapshot::{Restorer, Saver, Stateful as _, stateful};
 //!
 //! struct Counter {
 //!     name: &'static str,
@@ -20,16 +20,15 @@
 //! let mut other = Counter { name: "second", count: 0 };
 //! other.restore(&mut Restorer::new(&bytes))?;
 //! assert_eq!((other.name, other.count), ("second", 3));
-//! # Ok::<(), headrace_snapshot::SnapshotError>(())
+//! # Ok::<(), headrace_geometry::snapshot::SnapshotError>(())
 //! ```
 //!
 //! Snapshots are for the program that wrote them: no version reads another's.
 
-#![cfg_attr(not(test), warn(clippy::cast_possible_truncation))]
-#![cfg_attr(test, allow(clippy::cast_possible_truncation))]
-
 use serde::Serialize;
 use serde::de::DeserializeOwned;
+
+pub use crate::stateful;
 
 /// State that can be saved and restored to continue a run.
 pub trait Stateful {
@@ -246,7 +245,7 @@ pub mod array {
     }
 }
 
-/// Implements [`Stateful`](crate::Stateful) for a type, given its fields by kind: `state` (values, or stateful fields),
+/// Implements [`Stateful`](crate::snapshot::Stateful) for a type, given its fields by kind: `state` (values, or stateful fields),
 /// `lists` (a `Vec` of values that keeps its capacity), `slots` (arrays or slices of fixed length), `each` (stateful
 /// elements whose number is a setting) and `fixed` (settings and working memory: not saved). A type with an unlisted
 /// field doesn't compile.
@@ -259,10 +258,10 @@ macro_rules! stateful {
         $(each: $($each:ident),+;)?
         $(fixed: $($fixed:ident),+;)?
     }) => {
-        impl $crate::Stateful for $type {
-            fn save(&self, to: &mut $crate::Saver) {
+        impl $crate::snapshot::Stateful for $type {
+            fn save(&self, to: &mut $crate::snapshot::Saver) {
                 let Self { $($($state,)+)? $($($list,)+)? $($($slots,)+)? $($($each,)+)? $($($fixed: _,)+)? } = self;
-                $($($crate::Stateful::save($state, to);)+)?
+                $($($crate::snapshot::Stateful::save($state, to);)+)?
                 $($(to.list($list);)+)?
                 $($(to.list($slots);)+)?
                 $($(to.each($each.iter());)+)?
@@ -270,10 +269,10 @@ macro_rules! stateful {
 
             fn restore(
                 &mut self,
-                from: &mut $crate::Restorer<'_>,
-            ) -> Result<(), $crate::SnapshotError> {
+                from: &mut $crate::snapshot::Restorer<'_>,
+            ) -> Result<(), $crate::snapshot::SnapshotError> {
                 let Self { $($($state,)+)? $($($list,)+)? $($($slots,)+)? $($($each,)+)? $($($fixed: _,)+)? } = self;
-                $($($crate::Stateful::restore($state, from)?;)+)?
+                $($($crate::snapshot::Stateful::restore($state, from)?;)+)?
                 $($(from.list($list)?;)+)?
                 $($(from.slots($slots)?;)+)?
                 $($(from.each($each.iter_mut())?;)+)?
