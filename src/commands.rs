@@ -17,7 +17,7 @@ use headrace_vehicle::VehicleConfig;
 
 use crate::cli::{Demo, Output, Replay, Run, Speed};
 use crate::devices::KINDS;
-use crate::dive::{Clock, Dive, Recording, assemble_followed};
+use crate::dive::{Assembly, Clock, Dive, Recording};
 use crate::expect::{self, Golden};
 use crate::failure::{self, Failure};
 use crate::feeds::Interruptible;
@@ -54,7 +54,10 @@ pub(crate) fn demo(args: &Demo) -> Result<u8, Failure> {
     let interrupted = interrupt::flag()?;
     let recording = Recording::simulated(&log, &scene.name);
     let is_served = page::is_wanted(&args.page, true);
-    let dive = assemble_followed(&scene.vehicle, &scene.vehicle_text, Some(recording), is_served)?
+    let dive = Assembly::of(&scene.vehicle, &scene.vehicle_text)
+        .recorded(Some(recording))
+        .kept(is_served)
+        .assemble()?
         .operated(Clock::Theirs);
     let shown = followers.show(Show::Lines);
     let mut watch = Watch::new(shown);
@@ -70,7 +73,7 @@ pub(crate) fn demo(args: &Demo) -> Result<u8, Failure> {
     let mut feed = SimulationFeed::new(simulation(&scene, false)?);
     let pace = Pace { speed: args.speed.0, ..Pace::default() };
     let mut feed = Interruptible { feed: &mut feed, interrupted: &interrupted };
-    let report = dive.run(&mut feed, pace, &mut watch)?;
+    let report = dive.run(&mut feed, pace, &mut watch, &mut |_| ())?;
     if let Some(served) = served {
         served.end(&report);
     }
@@ -124,7 +127,7 @@ pub(crate) fn run(args: &Run) -> Result<u8, Failure> {
         ));
     }
     let is_served = page::is_wanted(&args.page, args.speed.0.is_some());
-    let dive = assemble_followed(&vehicle, &text, recording, is_served)?;
+    let dive = Assembly::of(&vehicle, &text).recorded(recording).kept(is_served).assemble()?;
     player.connect(dive.armed.sources());
     let pace = Pace { speed: args.speed.0, ..Pace::default() };
     let followers = Followers::of(&args.following)?;
@@ -152,7 +155,7 @@ pub(crate) fn run(args: &Run) -> Result<u8, Failure> {
     }
     let mut feed = Interruptible { feed: &mut player, interrupted: &interrupted };
     let mut watch = followers.join(watch, Joining::new(&vehicle, tui::Mode::Source, &interrupted))?;
-    let mut report = dive.run(&mut feed, pace, &mut watch)?;
+    let mut report = dive.run(&mut feed, pace, &mut watch, &mut |_| ())?;
     note_losses(&mut report, log, &player);
     if let Some(served) = served {
         served.end(&report);
@@ -179,7 +182,7 @@ pub(crate) fn replay(args: &Replay) -> Result<u8, Failure> {
     } else {
         let is_watched = pace.speed.is_some() && !terminal::is_quiet();
         let is_served = page::is_wanted(&args.page, is_watched);
-        let dive = assemble_followed(&vehicle, &text, None, is_served)?;
+        let dive = Assembly::of(&vehicle, &text).kept(is_served).assemble()?;
         player.connect(dive.armed.sources());
         let (sender, commands) = unbounded();
         let followers = Followers::of(&args.following)?;

@@ -89,56 +89,52 @@ pub(crate) enum Clock {
     Theirs,
 }
 
-/// Assembles the loop for a vehicle.
-pub(crate) fn assemble(
-    vehicle: &VehicleConfig,
-    vehicle_text: &str,
-    record_to: Option<Recording<'_>>,
-) -> Result<Dive, Failure> {
-    assemble_with(vehicle, vehicle.navigation(), vehicle_text, record_to)
+/// What a dive is assembled from: a vehicle, and what else is asked for.
+pub(crate) struct Assembly<'a> {
+    vehicle: &'a VehicleConfig,
+    text: &'a str,
+    recording: Option<Recording<'a>>,
+    keeps_results: bool,
+    navigation: Option<Box<dyn Navigation>>,
 }
 
-/// The same for a dive that is followed: its results are kept for each tick.
-pub(crate) fn assemble_followed(
-    vehicle: &VehicleConfig,
-    vehicle_text: &str,
-    record_to: Option<Recording<'_>>,
-    is_followed: bool,
-) -> Result<Dive, Failure> {
-    let (mut app, notices) = app(vehicle)?;
-    if is_followed {
-        app.keep_results();
+impl<'a> Assembly<'a> {
+    /// A vehicle, and the text of its file, with the navigation that the file states.
+    pub(crate) fn of(vehicle: &'a VehicleConfig, text: &'a str) -> Self {
+        Self { vehicle, text, recording: None, keeps_results: false, navigation: None }
     }
-    let recorders = match record_to {
-        None => Vec::new(),
-        Some(recording) => record(&mut app, vehicle, vehicle_text, recording)?,
-    };
-    let armed = arm(app, vehicle, vehicle.navigation())?;
-    Ok(Dive { armed, notices, recorders, operator: None })
-}
 
-/// The same, keeping all results for a comparison, and without a recording.
-pub(crate) fn assemble_kept(vehicle: &VehicleConfig) -> Result<Dive, Failure> {
-    let (mut app, notices) = app(vehicle)?;
-    app.keep_results();
-    let armed = arm(app, vehicle, vehicle.navigation())?;
-    Ok(Dive { armed, notices, recorders: Vec::new(), operator: None })
-}
+    /// Records the dive, if this is a recording.
+    pub(crate) fn recorded(self, recording: Option<Recording<'a>>) -> Self {
+        Self { recording, ..self }
+    }
 
-/// The same with another navigation than the vehicle file's.
-pub(crate) fn assemble_with(
-    vehicle: &VehicleConfig,
-    navigation: Box<dyn Navigation>,
-    vehicle_text: &str,
-    record_to: Option<Recording<'_>>,
-) -> Result<Dive, Failure> {
-    let (mut app, notices) = app(vehicle)?;
-    let recorders = match record_to {
-        None => Vec::new(),
-        Some(recording) => record(&mut app, vehicle, vehicle_text, recording)?,
-    };
-    let armed = arm(app, vehicle, navigation)?;
-    Ok(Dive { armed, notices, recorders, operator: None })
+    /// Keeps its results for each tick, if it is followed or compared.
+    pub(crate) fn kept(self, keeps_results: bool) -> Self {
+        Self { keeps_results, ..self }
+    }
+
+    /// Navigates otherwise than the vehicle file states.
+    pub(crate) fn navigated(self, navigation: Box<dyn Navigation>) -> Self {
+        Self { navigation: Some(navigation), ..self }
+    }
+
+    /// Starts the recorders, and arms the loop.
+    ///
+    /// Errors: a device or plugin that doesn't fit; a recording that can't be made.
+    pub(crate) fn assemble(self) -> Result<Dive, Failure> {
+        let vehicle = self.vehicle;
+        let (mut app, notices) = app(vehicle)?;
+        if self.keeps_results {
+            app.keep_results();
+        }
+        let recorders = match self.recording {
+            None => Vec::new(),
+            Some(recording) => record(&mut app, vehicle, self.text, recording)?,
+        };
+        let armed = arm(app, vehicle, self.navigation.unwrap_or_else(|| vehicle.navigation()))?;
+        Ok(Dive { armed, notices, recorders, operator: None })
+    }
 }
 
 /// Starts the recorders of a dive.
@@ -280,18 +276,8 @@ impl Dive {
         self.operator.as_ref().map(|operator| operator.port.clone())
     }
 
-    /// Runs the loop until the feed ends; returns the report.
+    /// Runs the loop until the feed ends; returns the report. `beside` is called after every tick and at the end.
     pub(crate) fn run(
-        self,
-        feed: &mut dyn PacketSource,
-        pace: Pace,
-        watch: &mut Watch,
-    ) -> Result<Report, Failure> {
-        self.run_beside(feed, pace, watch, &mut |_| {})
-    }
-
-    /// The same; `beside` is called after every tick and at the end.
-    pub(crate) fn run_beside(
         self,
         feed: &mut dyn PacketSource,
         pace: Pace,

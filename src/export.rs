@@ -13,7 +13,7 @@ use headrace_replay::player::Player;
 use serde_json::json;
 
 use crate::cli::Export;
-use crate::dive::assemble_followed;
+use crate::dive::Assembly;
 use crate::failure::Failure;
 use crate::feeds::Interruptible;
 use crate::files;
@@ -36,7 +36,7 @@ pub(crate) fn export(args: &Export) -> Result<u8, Failure> {
     Claims::reading(inputs, &args.overwrite).claim("--html", &args.html, Kind::Page)?;
     let mut player = Player::open(&files)?;
     let (text, vehicle) = given.or_attached(player.info(), &player.losses(), log)?;
-    let dive = assemble_followed(&vehicle, &text, None, true)?;
+    let dive = Assembly::of(&vehicle, &text).kept(true).assemble()?;
     player.connect(dive.armed.sources());
     let of = Of {
         vehicle: &vehicle,
@@ -54,7 +54,7 @@ pub(crate) fn export(args: &Export) -> Result<u8, Failure> {
     let mut watch = Watch::quiet().followed_by(page::following(export.collector(&dive.armed)));
     let interrupted = interrupt::flag()?;
     let mut feed = Interruptible { feed: &mut player, interrupted: &interrupted };
-    let mut report = dive.run(&mut feed, Pace::default(), &mut watch)?;
+    let mut report = dive.run(&mut feed, Pace::default(), &mut watch, &mut |_| ())?;
     drop(watch);
     note_losses(&mut report, log, &player);
     let (voices, left_out) = voices(&files, &report)?;

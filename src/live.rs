@@ -15,7 +15,7 @@ use headrace_vehicle::Grade;
 use headrace_vehicle::VehicleConfig;
 
 use crate::cli::Run;
-use crate::dive::{Clock, Dive, Recording, assemble_followed};
+use crate::dive::{Assembly, Clock, Dive, Recording};
 use crate::failure::Failure;
 use crate::followers::{Followers, Joining};
 use crate::interrupt;
@@ -50,7 +50,8 @@ pub(crate) fn run(args: &Run, text: &str, vehicle: &VehicleConfig, claims: Claim
         scene: None,
     });
     let is_served = page::is_wanted(&args.page, true);
-    let mut dive = assemble_followed(vehicle, text, recording, is_served)?.operated(Clock::Ours);
+    let mut dive =
+        Assembly::of(vehicle, text).recorded(recording).kept(is_served).assemble()?.operated(Clock::Ours);
     let begun = headrace_ports::now();
     let supervisor = supervisor(&mut dive, vehicle, begun)?;
     let followers = Followers::of(&args.following)?;

@@ -12,7 +12,7 @@ use headrace_replay::verify::{Difference, Verified, Verifier, What};
 use serde_json::{Value, json};
 
 use crate::cli::Verify;
-use crate::dive::{Dive, assemble_kept};
+use crate::dive::{Assembly, Dive};
 use crate::failure::{self, Failure};
 use crate::files;
 use crate::output::{deliver, say};
@@ -26,7 +26,7 @@ pub(crate) fn verify(args: &Verify) -> Result<u8, Failure> {
     let mut player = Player::open(&files)?;
     let (_, vehicle) = given.or_attached(player.info(), &player.losses(), files::first_named(&args.logs))?;
     let trimmed = player.info().metadata.get(TRIMMED).cloned();
-    let dive = assemble_kept(&vehicle)?;
+    let dive = Assembly::of(&vehicle, "").kept(true).assemble()?;
     let sources: Vec<SourceInfo> = dive.armed.sources().to_vec();
     player.connect(&sources);
     let verified = compared(args, &files, &mut player, dive)?;

@@ -10,7 +10,7 @@ use headrace_replay::player::Player;
 use headrace_vehicle::VehicleConfig;
 
 use crate::cli::Replay;
-use crate::dive::assemble;
+use crate::dive::Assembly;
 use crate::failure::Failure;
 use crate::phase::Phase;
 use crate::smooth;
@@ -62,7 +62,7 @@ fn replayed(
     if args.smooth {
         return smooth::smoothed(files, &mut player, (vehicle, text), (pace, threads));
     }
-    let dive = assemble(vehicle, text, None)?;
+    let dive = Assembly::of(vehicle, text).assemble()?;
     player.connect(dive.armed.sources());
     dive.run_on(threads, (&mut player, pace), &mut Watch::quiet(), &mut |_| ())
 }

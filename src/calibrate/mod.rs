@@ -30,7 +30,7 @@ use headrace_replay::player::Player;
 use headrace_vehicle::VehicleConfig;
 
 use crate::cli::Calibrate;
-use crate::dive::assemble;
+use crate::dive::Assembly;
 use crate::failure::{self, Failure};
 use crate::feeds::{Followed, share};
 use crate::output::{deliver, show};
@@ -43,7 +43,7 @@ pub(crate) fn calibrate(args: &Calibrate) -> Result<u8, Failure> {
     let given = Given::read(args.vehicle.as_deref())?;
     let (text, vehicle) = given.or_attached(player.info(), &player.losses(), &args.log)?;
     check(args, &vehicle, &player)?;
-    let dive = assemble(&vehicle, &text, None)?;
+    let dive = Assembly::of(&vehicle, &text).assemble()?;
     player.connect(dive.armed.sources());
     let window = Window { from_s: args.from, to_s: args.to, at_surface_s: args.at_surface };
     let mut progress = Progress::start();

@@ -19,7 +19,7 @@ use headrace_vehicle::VehicleConfig;
 use serde_json::json;
 
 use crate::cli::Trim;
-use crate::dive::assemble_kept;
+use crate::dive::Assembly;
 use crate::failure::{self, Failure};
 use crate::files;
 use crate::output::{deliver, say};
@@ -111,12 +111,12 @@ fn when_within(
     from_m: f64,
     to_m: f64,
 ) -> Result<Vec<(MonoNs, MonoNs)>, Failure> {
-    let dive = assemble_kept(vehicle)?;
+    let dive = Assembly::of(vehicle, "").kept(true).assemble()?;
     let mut player = Player::open(files)?;
     player.connect(dive.armed.sources());
     let mut spans: Vec<(MonoNs, MonoNs)> = Vec::new();
     let pace = Pace { tick: TICK, speed: None };
-    dive.run_beside(&mut player, pace, &mut Watch::quiet(), &mut |dive| {
+    dive.run(&mut player, pace, &mut Watch::quiet(), &mut |dive| {
         let now = dive.now();
         let Ok(fix) = dive.fix(now) else { return };
         if !(from_m..=to_m).contains(&fix.pose.position.x()) {
