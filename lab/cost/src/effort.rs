@@ -23,9 +23,10 @@ impl Effort {
         self.pick(1, 5)
     }
 
-    /// Times that every setting is measured, in turns: six are the fewest of which a median has an interval of 95 %.
+    /// Times that every setting is measured, in turns. Six are the fewest of which a median has an interval of 95 %; of three it has their
+    /// least and largest.
     pub fn rounds(self) -> u32 {
-        self.pick(6, 9)
+        self.pick(3, 9)
     }
 
     /// Length of a dive, m.

@@ -121,7 +121,8 @@ fn vehicle(path: &Path) -> Result<(String, VehicleConfig), Failure> {
     // Definitions of CAN messages lie beside the vehicle file.
     let beside =
         |name: &str| fs::read_to_string(path.with_file_name(name)).map_err(|error| error.to_string());
-    let document = Document::new(&path.display().to_string(), &text);
+    let name = path.display().to_string();
+    let document = Document::new(&name, &text);
     let vehicle = VehicleConfig::parse(document, &KINDS, &beside).map_err(CostError::from)?;
     Ok((text, vehicle))
 }

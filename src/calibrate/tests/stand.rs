@@ -175,7 +175,7 @@ impl Stand {
             let at = MonoNs(9_000_000_000) + DurNs::from_millis(50 * k as i64);
             let t = 0.05 * k as f64;
             let mut say = |source: usize, reading: Reading| {
-                let source = SourceId(source as u16);
+                let source = SourceId(u16::try_from(source).unwrap());
                 events.push(Event { source, received: at, valid_at: at, reading });
             };
             let axis = Rot::<Level, Tunnel>::from_roll_pitch_yaw(0.0, 0.0, self.site.axis_yaw_rad);

@@ -32,7 +32,7 @@ impl Bars {
         match self {
             Self::Quartiles => "median and quartiles of nine rounds in turns",
             Self::Median => {
-                "median of rounds in turns (nine; with `--quick` six) with its 95 % interval, by signs"
+                "median of rounds in turns (nine; with `--quick` three) with its 95 % interval, by signs"
             }
         }
     }

@@ -152,7 +152,7 @@ const BARE: &str = "vehicle = \"vita2-4.toml\"\n[trajectory]\nstart_m = 5\n[[tra
 /// The scenes whose beams' rays are varied: short ones, since a thousand rays take their time. The first is the one on which both
 /// references are held against each other.
 fn beams(inputs: &Inputs<'_>) -> Result<Vec<Stage>, CostError> {
-    let lengths = inputs.effort.pick(&[("field", 14.0)][..], &[("field", 20.0), ("boulders", 0.6)]);
+    let lengths = inputs.effort.pick(&[("field", 7.0)][..], &[("field", 20.0), ("boulders", 0.6)]);
     let mut of_field = vec![field(20)?];
     of_field.extend(stages(inputs)?.into_iter().filter(|stage| stage.name == "boulders"));
     let mut beams = Vec::new();

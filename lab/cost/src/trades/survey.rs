@@ -18,7 +18,7 @@ use headrace_oracle::truth::{Truth, TruthTaker};
 
 /// Targets, m.
 const TARGETS_M: [f64; 8] = [0.2, 0.3, 0.4, 0.5, 0.7, 1.0, 1.4, 2.0];
-const QUICK_TARGETS_M: [f64; 3] = [0.4, 0.5, 1.0];
+const QUICK_TARGETS_M: [f64; 3] = [0.5, 0.7, 1.0];
 /// Modes, drifts and layouts are compared at these.
 const FEW_TARGETS_M: [f64; 4] = [0.4, 0.5, 1.0, 2.0];
 const QUICK_FEW_TARGETS_M: [f64; 1] = [SHIPPED_M];
