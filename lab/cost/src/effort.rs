@@ -31,6 +31,6 @@ impl Effort {
 
     /// Length of a dive, m.
     pub fn length_m(self) -> f64 {
-        self.pick(8.0, 40.0)
+        self.pick(6.5, 40.0)
     }
 }
