@@ -1,6 +1,6 @@
 //! What `headrace cost` shows of errors: planted ones are found, and the page is its data's.
 
-#![expect(clippy::unwrap_used, clippy::panic, reason = "a test stops at what it can't do")]
+#![allow(clippy::unwrap_used, clippy::panic, reason = "a test stops at what it can't do")]
 
 use std::path::{Path, PathBuf};
 

@@ -1,6 +1,6 @@
 //! The trade Survey keeps what it promises. That it shows what `headrace plan` says is tested with the program: `tests/tests/sampling/survey.rs`.
 
-#![expect(clippy::unwrap_used, clippy::panic, reason = "a test stops at what it can't do")]
+#![allow(clippy::unwrap_used, clippy::panic, reason = "a test stops at what it can't do")]
 
 use headrace::devices::KINDS;
 use headrace_cost::effort::Effort;

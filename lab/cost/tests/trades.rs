@@ -1,6 +1,6 @@
 //! What the trades of `headrace cost` must find, whatever the machine: planted differences, and that what is the same is.
 
-#![expect(clippy::unwrap_used, clippy::panic, reason = "a test stops at what it can't do")]
+#![allow(clippy::unwrap_used, clippy::panic, reason = "a test stops at what it can't do")]
 
 use headrace_cost::effort::Effort;
 use headrace_cost::point::{Point, Trade};
