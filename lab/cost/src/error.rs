@@ -1,10 +1,7 @@
 //! Why a trade can't be measured.
 
 use headrace_config::ConfigErrors;
-use headrace_monitor::PluginError;
 use headrace_oracle::TruthError;
-use headrace_replay::SimulationError;
-use headrace_replay::drive::DriveError;
 use headrace_sampling::SamplingError;
 use headrace_simulator::SceneError;
 
@@ -18,15 +15,6 @@ pub enum CostError {
     /// A vehicle file is wrong.
     #[error("measuring a vehicle: {0}")]
     Vehicle(#[from] ConfigErrors),
-    /// A scene can't be simulated.
-    #[error("measuring a scene: {0}")]
-    Simulation(#[from] SimulationError),
-    /// A loop can't be armed.
-    #[error("arming a loop to measure: {0}")]
-    Arming(#[from] PluginError),
-    /// A loop can't be driven.
-    #[error("driving a loop to measure: {0}")]
-    Driving(#[from] DriveError),
     /// A plan can't be made.
     #[error("planning a survey to price: {0}")]
     Planning(#[from] SamplingError),

@@ -1,13 +1,14 @@
 //! `headrace-cost`, which `headrace cost` starts: command line, the folder of results, exit codes.
 
+use std::io::Write as _;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::{fs, io};
 
-use clap::Parser;
 use clap::builder::PossibleValuesParser;
+use clap::{Args, Parser};
 use headrace::devices::KINDS;
-use headrace_config::Document;
+use headrace_config::{ConfigErrors, Document};
 use headrace_cost::effort::Effort;
 use headrace_cost::error::CostError;
 use headrace_cost::page::{Bars, COST_VERSION, Results, table};
@@ -46,6 +47,19 @@ struct Cost {
     /// Overwrite files that headrace cost hasn't written, too.
     #[arg(long)]
     force: bool,
+    #[command(flatten)]
+    verbosity: Verbosity,
+}
+
+/// What is told beside the results.
+#[derive(Debug, Args)]
+struct Verbosity {
+    /// Tell on stderr what is being measured.
+    #[arg(short, long, conflicts_with = "quiet")]
+    verbose: bool,
+    /// Show results and errors only, as without --verbose.
+    #[arg(short, long)]
+    quiet: bool,
 }
 
 /// Why there are no figures.
@@ -55,8 +69,14 @@ enum Failure {
     Cost(#[from] CostError),
     #[error("the results as JSON: {0}")]
     Results(#[from] serde_json::Error),
-    #[error("{}: {source}", path.display())]
-    File { path: PathBuf, source: io::Error },
+    #[error("reading {}: {source}", path.display())]
+    Vehicle { path: PathBuf, source: io::Error },
+    #[error("{0}")]
+    Invalid(#[from] ConfigErrors),
+    #[error("writing {}: {source}", path.display())]
+    Unwritable { path: PathBuf, source: io::Error },
+    #[error("writing to stdout: {0}")]
+    Stdout(io::Error),
     #[error("{}: exists, and isn't one that headrace cost has written; --force overwrites it", path.display())]
     InTheWay { path: PathBuf },
 }
@@ -67,7 +87,9 @@ fn main() -> ExitCode {
         Err(failure) => {
             eprintln!("headrace-cost: {failure}");
             // As of headrace: 2 for what was asked, 1 for what went wrong.
-            ExitCode::from(if matches!(failure, Failure::InTheWay { .. }) { 2 } else { 1 })
+            let is_asked =
+                matches!(failure, Failure::Vehicle { .. } | Failure::Invalid(_) | Failure::InTheWay { .. });
+            ExitCode::from(if is_asked { 2 } else { 1 })
         }
     }
 }
@@ -75,7 +97,7 @@ fn main() -> ExitCode {
 fn cost(args: &Cost) -> Result<(), Failure> {
     let own = args.vehicle.as_deref().map(vehicle).transpose()?;
     if let Some(folder) = &args.out {
-        fs::create_dir_all(folder).map_err(|source| Failure::File { path: folder.clone(), source })?;
+        fs::create_dir_all(folder).map_err(|source| Failure::Unwritable { path: folder.clone(), source })?;
         may_write(folder, args.force)?;
     }
     let inputs = Inputs {
@@ -83,12 +105,16 @@ fn cost(args: &Cost) -> Result<(), Failure> {
         kinds: &KINDS,
         vehicle: own.as_ref().map(|(text, vehicle)| (vehicle.name.as_str(), text.as_str())),
     };
-    let progress = &mut |words: &str| eprintln!("{words}");
+    let progress = &mut |words: &str| {
+        if args.verbosity.verbose {
+            eprintln!("{words}");
+        }
+    };
     let mut trades = Vec::new();
     for (name, measure) in TRADES {
         if args.only.is_empty() || args.only.iter().any(|only| only == name) {
             let trade = measure(&inputs, progress)?;
-            println!("{}", table(&trade));
+            say(&table(&trade))?;
             trades.push(trade);
         }
     }
@@ -109,21 +135,31 @@ fn cost(args: &Cost) -> Result<(), Failure> {
     for (name, content) in results.files()? {
         let end = if is_picture(&name) { MARK } else { "" };
         let path = folder.join(name);
-        fs::write(&path, content + end).map_err(|source| Failure::File { path: path.clone(), source })?;
-        println!("wrote {}", path.display());
+        fs::write(&path, content + end)
+            .map_err(|source| Failure::Unwritable { path: path.clone(), source })?;
+        say(&format!("wrote {}", path.display()))?;
     }
     Ok(())
 }
 
+/// Writes lines to stdout; one that is closed, as below `head`, ends nothing.
+fn say(text: &str) -> Result<(), Failure> {
+    match writeln!(io::stdout(), "{text}") {
+        Err(error) if error.kind() != io::ErrorKind::BrokenPipe => Err(Failure::Stdout(error)),
+        _ => Ok(()),
+    }
+}
+
 /// A vehicle file's text, and the vehicle.
 fn vehicle(path: &Path) -> Result<(String, VehicleConfig), Failure> {
-    let text = fs::read_to_string(path).map_err(|source| Failure::File { path: path.to_owned(), source })?;
+    let text =
+        fs::read_to_string(path).map_err(|source| Failure::Vehicle { path: path.to_owned(), source })?;
     // Definitions of CAN messages lie beside the vehicle file.
     let beside =
         |name: &str| fs::read_to_string(path.with_file_name(name)).map_err(|error| error.to_string());
     let name = path.display().to_string();
     let document = Document::new(&name, &text);
-    let vehicle = VehicleConfig::parse(document, &KINDS, &beside).map_err(CostError::from)?;
+    let vehicle = VehicleConfig::parse(document, &KINDS, &beside)?;
     Ok((text, vehicle))
 }
 

@@ -20,7 +20,7 @@ use crate::point::{Error, Interval, LeftOut, OracleError, Point, Trade, front, q
 use crate::scene::{Inputs, file};
 use crate::words::number;
 use headrace_oracle::dive::{Recorded, armed};
-use headrace_oracle::timed;
+use headrace_oracle::{TruthError, timed};
 
 /// The finest ring and look, which settings are held against, and another lattice of rays as fine but for a sixth.
 const FINEST: Looks = Looks { ring: 3600, anew_m: Some(0.001) };
@@ -275,8 +275,8 @@ fn tick(tick_ms: u32) -> DurNs {
 
 impl Ran {
     fn of(recorded: &Recorded, vehicle: &VehicleConfig, tick_ms: u32) -> Result<Self, CostError> {
-        let mut dive = armed(vehicle, vehicle.navigation(), &[])?;
-        let mut driver = Driver::new(&mut dive, tick(tick_ms))?;
+        let mut dive = armed(vehicle, vehicle.navigation(), &[]).map_err(TruthError::from)?;
+        let mut driver = Driver::new(&mut dive, tick(tick_ms)).map_err(TruthError::from)?;
         let mut feed = recorded.packets.feed();
         let (mut v_max_mps, mut ticks_s) = (Vec::new(), Vec::new());
         let mut note = |dive: &Loop| {
@@ -284,9 +284,9 @@ impl Ran {
                 v_max_mps.extend(advice.0.iter().map(|advice| advice.v_max_mps));
             }
         };
-        while driver.due(&mut feed)?.is_some() {
+        while driver.due(&mut feed).map_err(TruthError::from)?.is_some() {
             let (ticked, tick_s) = timed(|| driver.tick(&mut dive, &mut feed, &mut note));
-            ticked?;
+            ticked.map_err(TruthError::from)?;
             ticks_s.push(tick_s);
         }
         dive.finish(&mut |_, _| {});
