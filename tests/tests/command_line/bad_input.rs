@@ -466,7 +466,11 @@ fn every_command_has_help_with_an_example() {
         let answer = folder.headrace(&[command, "--help"]);
         // Done by a program that needn't be there: then it is said how to build it.
         if ["campaign", "batch", "cost"].contains(&command) && answer.code == Some(2) {
-            assert!(answer.stderr.contains("cargo build --release --manifest-path lab/Cargo.toml -p headrace_c"), "{}", answer.stderr);
+            assert!(
+                answer.stderr.contains("cargo build --release --manifest-path lab/Cargo.toml -p headrace_c"),
+                "{}",
+                answer.stderr
+            );
             continue;
         }
         assert_eq!((answer.code, answer.stderr.as_str()), (Some(0), ""), "{command}");
