@@ -39,9 +39,9 @@ fn calls(trace: &str) -> (Vec<&str>, usize) {
             within = None;
             parts += 1;
         } else if within == Some(thread)
-            // Lines on signals, and the mark itself where another thread's call came between.
+            // Lines on signals, and ends of calls, the mark's too, where another thread's came between.
             && !call.starts_with("---")
-            && !call.starts_with("<... getppid resumed>")
+            && !call.starts_with("<... ")
         {
             calls.push(call);
         }
