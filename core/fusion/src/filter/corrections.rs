@@ -16,7 +16,8 @@ const STUCK_SHARE: f64 = 0.3;
 /// Standard deviations of the corrections that chance explains. With none, stops make a position unsure (can't say in 24 % of the seeded
 /// dives, instead of 19); with one, wheels that stick are silent in 9 of 800 instead of 6.
 const CHANCE_SDS: f64 = 0.5;
-/// Time for which what is lost counts between passes, s: about a head's turn.
+/// Time for which what is lost counts between passes, s: about a head's turn. It is that of a count's first such time, too: what a vehicle
+/// that hovers for minutes is corrected by says nothing of the wheel.
 const PASSES_S: f64 = 20.0;
 
 /// See the module's description.
@@ -28,7 +29,8 @@ pub struct Corrections {
     by_chance: [f64; 2],
     /// For how long the count has stood, s.
     stood_s: f64,
-    /// Standard deviation of what may be lost between passes, m.
+    /// Standard deviation of what this stand may have lost, and of what may be lost between passes, m.
+    lacks_m: f64,
     lost_m: f64,
     /// Variance of what may be lost for good and has not been asked for, m^2.
     slipped_m2: f64,
@@ -49,18 +51,33 @@ impl Corrections {
     pub fn pass(&mut self, dt_s: f64, is_same: bool) {
         self.lost_m *= math::exp(-dt_s / PASSES_S);
         if is_same {
-            self.stood_s += dt_s;
-            for [way_m, speed_mps] in [&mut self.sums, &mut self.by_chance] {
-                *way_m += *speed_mps * dt_s;
-            }
-            self.lost_m = self.lost_m.max(self.may_lack_m());
+            self.stand(dt_s);
             return;
         }
         if self.stood_s >= STANDS_S {
-            self.slipped_m2 += self.may_lack_m() * self.may_lack_m();
+            self.slipped_m2 += self.lacks_m * self.lacks_m;
         }
-        self.stood_s = 0.0;
-        let left = math::exp(-dt_s / RECENT_S);
+        (self.stood_s, self.lacks_m) = (0.0, 0.0);
+        self.fade(dt_s / RECENT_S);
+    }
+
+    fn stand(&mut self, dt_s: f64) {
+        self.stood_s += dt_s;
+        // The corrected speed is missing in the way.
+        for [way_m, speed_mps] in [&mut self.sums, &mut self.by_chance] {
+            *way_m += *speed_mps * dt_s;
+        }
+        if self.stood_s <= PASSES_S {
+            let ([way_m, _], [chance_m, _]) = (self.sums, self.by_chance);
+            self.lacks_m = self.lacks_m.max(STUCK_SHARE * (way_m.abs() - CHANCE_SDS * chance_m));
+        } else {
+            self.fade(dt_s / PASSES_S);
+        }
+        self.lost_m = self.lost_m.max(self.lacks_m);
+    }
+
+    fn fade(&mut self, times: f64) {
+        let left = math::exp(-times);
         for sum in self.sums.iter_mut().chain(&mut self.by_chance) {
             *sum *= left;
         }
@@ -79,11 +96,6 @@ impl Corrections {
     /// Variance of what may be lost for good since this was last asked, m^2.
     pub fn take_slipped_m2(&mut self) -> f64 {
         core::mem::take(&mut self.slipped_m2)
-    }
-
-    fn may_lack_m(&self) -> f64 {
-        let ([way_m, _], [chance_m, _]) = (self.sums, self.by_chance);
-        STUCK_SHARE * (way_m.abs() - CHANCE_SDS * chance_m).max(0.0)
     }
 }
 
@@ -138,6 +150,25 @@ mod tests {
             stood(50, 0.0, [variance, 1.0]).lost_m() < 1e-9,
             "a filter that is unsure of the speed needs the counter"
         );
+    }
+
+    /// Corrections of a vehicle that hovers go to and fro.
+    #[test]
+    fn of_one_that_stands_for_long_the_first_part_counts_and_the_last_is_taken_back() {
+        let mut corrections = stood(190, 0.0, [0.0; 2]);
+        let first_m = corrections.lost_m();
+        assert!((first_m - 0.3e-3 * (lately() + 189.0)).abs() < 1e-4, "{first_m}");
+        for _ in 0..2000 {
+            corrections.pass(0.1, true);
+            corrections.note([-0.001, 0.0], [0.0; 2]);
+        }
+        assert!(
+            (0.0..0.004).contains(&(corrections.lost_m() - first_m)),
+            "up to 20 s: {}",
+            corrections.lost_m()
+        );
+        let [way_m, _] = corrections.take_back();
+        assert!((way_m + 0.2).abs() < 0.005, "20 s of a millimetre each: {way_m}");
     }
 
     /// It counts for a head's turn between passes, and for good in the position; a slow vehicle's coarse steps are no stops.

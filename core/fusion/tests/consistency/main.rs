@@ -22,6 +22,8 @@ use world::{Fault, Log, Motion, Recipe};
 const FEW: Range<u64> = 0..200;
 /// Dives with a velocity log, of four kinds in turn.
 const WITH_LOG: Range<u64> = 0..80;
+/// Dives of a vehicle that hovers.
+const HOVERING: Range<u64> = 0..24;
 const MANY: Range<u64> = 0..2000;
 
 /// Runs the dives of recipes on all processors; results are in order of their seeds.
@@ -129,6 +131,16 @@ fn a_velocity_log_that_is_wrong_makes_no_error_that_is_not_reported() {
     }
     let unsure = share(&of(Log::Sound), |tally| [tally.unsure, tally.epochs]);
     assert!(unsure < 0.15, "a sound log is no reason to be unsure: {unsure}");
+}
+
+/// A count that stands for minutes is mostly that of a vehicle that hovers.
+#[test]
+fn a_vehicle_that_hovers_stays_sure_of_its_place() {
+    let all = dives(HOVERING, Recipe::hovering);
+    table(&all);
+    let unsure = share(&of(&all, &|_| true), |tally| [tally.unsure, tally.epochs]);
+    assert!(unsure < 0.02, "{unsure}");
+    assert_eq!(all.iter().filter(|(_, tally)| tally.silent > 0).count(), 0);
 }
 
 #[test]
