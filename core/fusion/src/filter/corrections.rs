@@ -23,7 +23,9 @@ const PASSES_S: f64 = 20.0;
 /// See the module's description.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct Corrections {
-    /// Sum of corrections of chainage and speed, m and m/s: of the last second, and all since the count changed.
+    /// Corrections of chainage and speed of the last second, m and m/s.
+    recent: [f64; 2],
+    /// The same with all since the count changed, the speeds carried on.
     sums: [f64; 2],
     /// Standard deviations that the covariance expects of them, m and m/s.
     by_chance: [f64; 2],
@@ -39,8 +41,10 @@ pub struct Corrections {
 impl Corrections {
     /// Notes how a reading that was fused has corrected chainage and speed, m and m/s, and what variance that took from them, m^2 and m^2/s^2.
     pub fn note(&mut self, by: [f64; 2], variances: [f64; 2]) {
-        for (sum, by) in self.sums.iter_mut().zip(by) {
-            *sum += by;
+        for sums in [&mut self.recent, &mut self.sums] {
+            for (sum, by) in sums.iter_mut().zip(by) {
+                *sum += by;
+            }
         }
         for (sd, variance) in self.by_chance.iter_mut().zip(variances) {
             *sd = math::sqrt(*sd * *sd + variance.max(0.0));
@@ -50,6 +54,7 @@ impl Corrections {
     /// Takes a reading so long after the one before, s, whose count is the same or not.
     pub fn pass(&mut self, dt_s: f64, is_same: bool) {
         self.lost_m *= math::exp(-dt_s / PASSES_S);
+        self.recent = self.recent.map(|sum| sum * math::exp(-dt_s / RECENT_S));
         if is_same {
             self.stand(dt_s);
             return;
@@ -83,9 +88,11 @@ impl Corrections {
         }
     }
 
-    /// The corrections, m and m/s, to be taken back: none are left.
+    /// Those of the last second, m and m/s, to be taken back: none are left. What a counter that is wound by half metres has made of the
+    /// estimate since its count changed is mostly right: with all of it taken back the chainage left the truth by 4 to 18 m instead of 1 to 3
+    /// (the scene `leak-current`).
     pub fn take_back(&mut self) -> [f64; 2] {
-        core::mem::take(self).sums
+        core::mem::take(self).recent
     }
 
     /// Standard deviation of what counter and estimate may have lost between passes, m.
@@ -127,14 +134,20 @@ mod tests {
         assert_eq!(corrections, Corrections::default());
     }
 
+    /// What has been wrong for long has been believed for long.
+    #[test]
+    fn of_one_that_stands_the_last_second_is_taken_back_too() {
+        let [way_m, speed_mps] = stood(50, -0.002, [0.0; 2]).take_back();
+        assert!((way_m - 0.001 * lately()).abs() < 1e-6 && (speed_mps + 2.0 * way_m).abs() < 1e-6, "{way_m}");
+    }
+
     /// The estimate as the counter has made it, less that without it: what the speed lost becomes way.
     #[test]
-    fn of_one_that_stands_all_is_taken_back_with_the_way_that_the_speed_would_have_made() {
-        let [way_m, speed_mps] = stood(50, -0.002, [0.0; 2]).take_back();
-        let speeds = (0..50).map(|k| -0.002 * (lately() + f64::from(k)));
-        let expected_m = 0.001 * (lately() + 50.0) + speeds.map(|speed| 0.1 * speed).sum::<f64>();
-        assert!((way_m - expected_m).abs() < 1e-4, "{way_m} {expected_m}");
-        assert!((speed_mps + 0.002 * (lately() + 50.0)).abs() < 1e-4, "{speed_mps}");
+    fn a_speed_that_was_corrected_is_missing_in_the_way() {
+        let speeds = (0..50).map(|k| 0.002 * (lately() + f64::from(k)));
+        let expected_m = 0.001 * (lately() + 49.0) + speeds.map(|speed| 0.1 * speed).sum::<f64>();
+        let lost_m = stood(50, 0.002, [0.0; 2]).lost_m();
+        assert!((lost_m - 0.3 * expected_m).abs() < 1e-4, "{lost_m} {expected_m}");
     }
 
     #[test]
@@ -154,7 +167,7 @@ mod tests {
 
     /// Corrections of a vehicle that hovers go to and fro.
     #[test]
-    fn of_one_that_stands_for_long_the_first_part_counts_and_the_last_is_taken_back() {
+    fn of_one_that_stands_for_long_the_first_part_counts() {
         let mut corrections = stood(190, 0.0, [0.0; 2]);
         let first_m = corrections.lost_m();
         assert!((first_m - 0.3e-3 * (lately() + 189.0)).abs() < 1e-4, "{first_m}");
@@ -163,8 +176,6 @@ mod tests {
             corrections.note([-0.001, 0.0], [0.0; 2]);
         }
         assert!((corrections.lost_m() - first_m).abs() < 0.004, "{}", corrections.lost_m());
-        let [way_m, _] = corrections.take_back();
-        assert!((way_m + 0.2).abs() < 0.005, "20 s of a millimetre each: {way_m}");
     }
 
     /// It counts for a head's turn between passes, and for good in the position; a slow vehicle's coarse steps are no stops.
