@@ -8,7 +8,6 @@ pub mod align;
 pub mod cable;
 pub mod clones;
 pub mod context;
-pub mod corrections;
 pub mod count_step;
 pub mod eskf;
 mod evidence;
