@@ -120,7 +120,11 @@ pub fn field_with(seed: u64, length_m: f64, settings: &str, without: &str) -> Sc
     assert!(shorter.contains(&length) && planned != scene && scene.contains(without));
     let load = |name: &str| {
         let text = String::from_utf8(scenes::vehicle_file(name)?).map_err(|error| error.to_string())?;
-        Ok(text.replace("[heads]", settings).into_bytes())
+        // Settings stand in the place of the vehicle's own.
+        let own = text.find("[navigation]").filter(|_| settings.starts_with("[navigation]"));
+        let (before, heads) = text.split_at(text.find("[heads]").ok_or("no heads")?);
+        let before = own.map_or(before, |from| &before[..from]);
+        Ok((before.to_owned() + &heads.replacen("[heads]", settings, 1)).into_bytes())
     };
     scenes::seeded(&shorter, &load, Some(seed))
 }

@@ -11,7 +11,7 @@ use headrace_geometry::math;
 use headrace_geometry::time::{DurNs, MonoNs};
 
 /// Time for which readings are the same, at least, before they are taken for repetitions.
-const HANGS_AFTER: DurNs = DurNs(1_000_000_000);
+const HANGS_AFTER: DurNs = DurNs(500_000_000);
 /// Chance with which noise alone may be the same for so long, as its logarithm: one in a billion.
 const BY_CHANCE_LN: f64 = -20.7;
 /// Weight of the latest difference, and of the latest run, among those before.
@@ -96,13 +96,13 @@ mod tests {
     }
 
     #[test]
-    fn a_unit_with_noise_that_repeats_itself_hangs_after_a_second_until_it_says_something_else() {
+    fn a_unit_with_noise_that_repeats_itself_hangs_after_half_a_second_until_it_says_something_else() {
         let frozen = noisy(999);
         let all = hangs(
             (0..1000).map(noisy).chain(std::iter::repeat_n(frozen, 1000)).chain((2000..2100).map(noisy)),
         );
         let first = all.iter().position(|hangs| *hangs).unwrap();
-        assert_eq!(first, 999 + 400);
+        assert_eq!(first, 999 + 200);
         assert!(all[first..2000].iter().all(|hangs| *hangs) && all[2000..].iter().all(|hangs| !hangs));
     }
 

@@ -204,14 +204,14 @@ const MEMS_TOLD: &str = "gyro_noise_degps_rthz = 0.007\naccel_noise_mps2_rthz = 
      gyro_bias_time_s = 300\naccel_bias_mps2 = 0.02\naccel_bias_time_s = 300\n";
 const STEEL: &str = "magnetic_disturbance = { per_100m = 4, up_to_deg = 10, length_m = 6 }\n";
 const SLACK: &str = "tether_slack = { reach_m = 0.15, period_s = 30 }\n";
-/// Standard deviations of slack that are told: of a cable that doesn't hang, and of that one, m.
-const TAUT_M: f64 = 0.003;
-const HANGS_M: f64 = 0.06;
+/// Slack that is told: of a cable that doesn't hang, and of that one.
+const TAUT: &str = "slack_sd_m = 0.003\nslack_time_s = 10\n";
+const HANGS: &str = "slack_sd_m = 0.06\nslack_time_s = 10\n";
 
 /// What the data sheet's effects are, said in the vehicle file: counts of 2 cm and noise of 1 cm of heads with ranges of 10 m, noise
 /// of echosounders and depth (152 Pa), of attitudes; nothing of cable and its scale. Units say theirs by their preset.
 const TRUE_NOISES: &str = "return_sd_m = 0.0116\necho_sd_m = 0.02\ndepth_sd_m = 0.0155\ntilt_sd_deg = 0.3\nattitude_sd_deg = 0.3\n\
-     heading_sd_deg = 0.3\ndeviation_deg = 0.01\ntether_sd_m = 0.0001\nslack_sd_m = 0.0001\ntether_scale_sd = 0.00001\n";
+     heading_sd_deg = 0.3\ndeviation_deg = 0.01\ntether_sd_m = 0.0001\nslack_sd_m = 0.0001\nslack_time_s = 10\ntether_scale_sd = 0.00001\n";
 
 /// Standard deviation of a rough wall's bumps: with the heads' own noise what vehicle files allow for, 3 cm, m.
 const ROUGH_M: f64 = 0.028;
@@ -263,7 +263,7 @@ impl Cell {
             Some("mode") => format!("mode = {mode:?}"),
             Some("layout") => format!("layout = {layout:?}"),
             Some("planned_speed_mps") => "planned_speed_mps = PLANNED".to_owned(),
-            Some("[navigation]" | "slack_sd_m") => String::new(),
+            Some("[navigation]" | "slack_sd_m" | "slack_time_s") => String::new(),
             _ => line.to_owned(),
         });
         let told = lines.collect::<Vec<_>>().join("\n");
@@ -273,9 +273,9 @@ impl Cell {
     /// Who knows that a cable hangs, or doesn't, and what a unit is worth, says so in the vehicle file.
     fn told_navigation(&self) -> String {
         match self.condition {
-            Condition::Poor => format!("slack_sd_m = {HANGS_M}\n{MEMS_TOLD}"),
+            Condition::Poor => format!("{HANGS}{MEMS_TOLD}"),
             Condition::Told => TRUE_NOISES.to_owned(),
-            _ => format!("slack_sd_m = {TAUT_M}\n"),
+            _ => TAUT.to_owned(),
         }
     }
 

@@ -380,9 +380,9 @@ fn check_says_what_cable_and_speed_allow_and_names_missing_keys() {
         writeln!(said, "{what}: {line}").unwrap();
     }
     insta::assert_snapshot!(said, @"
-    nothing said: cable: steps of 0.5 mm, slack of 0.06 m (sd) in 10 s; at 0.200 m/s a hole is measured to 0.067 m (sd), so that holes up to 1.07 m pass; not in the file: navigation.slack_sd_m, navigation.slack_time_s, sensors[8].step_m
+    nothing said: cable: steps of 0.5 mm, slack of 0.06 m (sd) in 2.5 s; at 0.200 m/s a hole is measured to 0.097 m (sd), so that holes up to 1.01 m pass; not in the file: navigation.slack_sd_m, navigation.slack_time_s, sensors[8].step_m
     slack said: cable: steps of 0.5 mm, slack of 0.2 m (sd) in 5 s; at 0.200 m/s a hole is measured to 0.194 m (sd), so that holes up to 0.81 m pass; not in the file: sensors[8].step_m
-    a wheel with magnets: cable: steps of 10 mm, slack of 0.06 m (sd) in 10 s; at 0.200 m/s a hole is measured to 0.069 m (sd), so that holes up to 1.06 m pass; not in the file: navigation.slack_sd_m, navigation.slack_time_s
-    steps of 5 cm: cable: steps of 50 mm, slack of 0.06 m (sd) in 10 s; at 0.200 m/s a hole is measured to 0.086 m (sd), so that holes up to 1.03 m pass; not in the file: navigation.slack_sd_m, navigation.slack_time_s
+    a wheel with magnets: cable: steps of 10 mm, slack of 0.06 m (sd) in 2.5 s; at 0.200 m/s a hole is measured to 0.102 m (sd), so that holes up to 1.00 m pass; not in the file: navigation.slack_sd_m, navigation.slack_time_s
+    steps of 5 cm: cable: steps of 50 mm, slack of 0.06 m (sd) in 2.5 s; at 0.200 m/s a hole is measured to 0.119 m (sd), so that holes up to 0.96 m pass; not in the file: navigation.slack_sd_m, navigation.slack_time_s
     ");
 }

@@ -22,7 +22,8 @@ fn dive(seed: u64, legs: &[(f64, f64)], effects: &str) -> truth::JudgedDive {
 /// another.
 fn vehicle(name: &str) -> Result<Vec<u8>, String> {
     let file = String::from_utf8(scenes::vehicle_file(name)?).map_err(|error| error.to_string())?;
-    Ok(file.replace("slack_sd_m = 0.02", "slack_sd_m = 0.06\nslack_time_s = 60").into_bytes())
+    let file = file.replace("slack_sd_m = 0.02", "slack_sd_m = 0.06");
+    Ok(file.replace("slack_time_s = 10", "slack_time_s = 60").into_bytes())
 }
 
 /// Sections between two chainages with this verdict, by their start, m.

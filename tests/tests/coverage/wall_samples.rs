@@ -20,7 +20,7 @@ const DRIFT: &str = "pilot_drift = { across_m = 0.2, up_m = 0.1, yaw_deg = 6, pe
 /// A vehicle of this many heads, in front and aft by turns, in a pipe of 1 m radius.
 fn pipe(heads: usize) -> String {
     let mut text = "target_m = 0.25\n[tunnel]\nprofile = \"circle\"\nradius_m = 1\nlength_m = 30\n[water]\n\
-        sound_speed_mps = 1447\n[heads]\nplanned_speed_mps = 0.03\n"
+        sound_speed_mps = 1447\n[navigation]\nslack_time_s = 10\n[heads]\nplanned_speed_mps = 0.03\n"
         .to_owned();
     for number in 0..heads {
         let x_m = if number % 2 == 0 { 0.3 } else { -0.3 };

@@ -242,13 +242,11 @@ fn replay_says_what_smoothing_changed() {
     let about = |line: &&str| ["  smoothed", "  changed:"].iter().any(|words| line.contains(words));
     let said: Vec<&str> = answer.stdout.lines().filter(about).collect();
     insta::assert_snapshot!(said.join("\n"), @r"
-      smoothed 591 estimates; by the filter alone: passed 6.25 m   missed 0.00 m   can't say 4.75 m   open 1.00 m
-      0+003.50 to 0+004.00  changed: can't say to pass, holes 0.553±0.170 to 0.504±0.020 m
-      0+006.00 to 0+006.25  changed: can't say to pass, holes 0.553±0.079 to 0.490±0.017 m
-      0+006.50 to 0+006.75  changed: can't say to pass, holes 0.558±0.079 to 0.489±0.016 m
-      0+009.00 to 0+011.50  changed: can't say to pass, holes 0.659±0.097 to 0.508±0.013 m
-      0+012.25 to 0+013.50  changed: can't say to pass, holes 0.621±0.086 to 0.441±0.013 m
-      0+015.00 to 0+015.25  changed: not passed to open, holes - to 1.710±0.052 m
+      smoothed 591 estimates; by the filter alone: passed 8.00 m   missed 0.00 m   can't say 3.00 m   open 1.00 m
+      0+003.50 to 0+004.00  changed: can't say to pass, holes 0.544±0.127 to 0.458±0.041 m
+      0+009.75 to 0+011.25  changed: can't say to pass, holes 0.664±0.088 to 0.508±0.012 m
+      0+012.25 to 0+013.25  changed: can't say to pass, holes 0.587±0.080 to 0.440±0.012 m
+      0+015.00 to 0+015.25  changed: not passed to open, holes - to 1.709±0.050 m
     ");
     let report: serde_json::Value = serde_json::from_slice(&folder.read("r.json")).unwrap();
     let smoothing = &report["smoothing"];

@@ -6,11 +6,12 @@
 
 use serde::{Deserialize, Serialize};
 
+use super::corrections::Corrections;
 use headrace_geometry::math;
 use headrace_geometry::time::{DurNs, MonoNs};
 use headrace_sensor::reading::SourceId;
 
-/// Averaging time of innovations, s. A dispute takes back the corrections of about as long: the counter went wrong before it was noticed.
+/// Averaging time of innovations, s.
 const RECENT_S: f64 = 1.0;
 /// A dispute begins when the mean exceeds so many of its standard deviations. From 3 to 6 the number of silent seeded dives is about the same;
 /// with 4, slack of seven times the declared size disputes a sound counter.
@@ -105,8 +106,8 @@ pub struct Cable {
     changed: Option<CableReading>,
     /// The first of successive readings beyond the gate.
     left: Option<CableReading>,
-    /// What readings have lately made of chainage and speed, m and m/s.
-    corrections: [f64; 2],
+    /// What readings have lately made of the estimate.
+    pub corrections: Corrections,
     /// Mean of the last innovations, in standard deviations.
     mean_sds: f64,
     dispute: Option<Dispute>,
@@ -135,17 +136,11 @@ impl Cable {
         has_lasted.then(|| CableDoubt { since: first.at, from_m: first.expected_m(), differs_m, log: None })
     }
 
-    /// By how much the hypotheses differ, m: 0 while counter and estimate agree.
+    /// By how much the hypotheses differ, m: 0 while counter and estimate agree and the count changes.
     pub fn differs_m(&self) -> f64 {
         let disagrees = self.dispute.is_some() || self.left.is_some();
-        self.last.filter(|_| disagrees).map_or(0.0, |last| last.off_m.abs())
-    }
-
-    /// Notes how a reading that was fused has corrected chainage and speed, m and m/s.
-    pub fn note_corrections(&mut self, by: [f64; 2]) {
-        for (sum, by) in self.corrections.iter_mut().zip(by) {
-            *sum += by;
-        }
+        let off_m = self.last.filter(|_| disagrees).map_or(0.0, |last| last.off_m);
+        math::hypot(off_m, self.corrections.lost_m())
     }
 
     /// Takes a reading.
@@ -158,16 +153,17 @@ impl Cable {
             }
             return used;
         }
-        let dt_s = before.map_or(0.0, |before| reading.at.since(before.at).as_secs_f64());
-        let left = math::exp(-dt_s.max(0.0) / RECENT_S);
-        self.corrections = self.corrections.map(|by| left * by);
+        let dt_s = before.map_or(0.0, |before| reading.at.since(before.at).as_secs_f64()).max(0.0);
+        let left = math::exp(-dt_s / RECENT_S);
+        let is_same = before.is_some_and(|before| (before.shown_m - reading.shown_m).abs() <= SAME_COUNT_M);
+        self.corrections.pass(dt_s, is_same);
         let off_sds = (reading.off_m / reading.sd_m).clamp(-MOST_SDS, MOST_SDS);
         self.mean_sds = left * self.mean_sds + (1.0 - left) * off_sds;
         // Of white innovations the mean has this standard deviation.
         let is_apart = self.mean_sds.abs() > DISPUTED_SDS * math::sqrt((1.0 - left) / (1.0 + left));
         if let Some(first) = self.goes_wrong(reading, is_apart) {
             self.dispute = Some(Dispute::between(first, reading));
-            return Use::Dispute(core::mem::take(&mut self.corrections));
+            return Use::Dispute(self.corrections.take_back());
         }
         if reading.agrees { Use::Fuse } else { Use::Withhold }
     }
@@ -324,17 +320,17 @@ mod tests {
     }
 
     #[test]
-    fn a_dispute_takes_back_the_corrections_of_the_last_second() {
+    fn a_dispute_takes_back_the_corrections_and_what_a_standing_count_made_is_uncertain_before() {
         let mut cable = Cable::default();
         for k in 0..100_u32 {
             assert_eq!(cable.take(&reading(f64::from(k) / 10.0, 7.0, 0.0, 0.005)), Use::Fuse);
-            cable.note_corrections([0.001, -0.002]);
+            cable.corrections.note([0.001, 0.0], [0.0; 2]);
         }
+        assert!((cable.differs_m() - 0.3 * 0.099).abs() < 1e-9, "{}", cable.differs_m());
         let unusual = CableReading { is_usual: false, ..reading(10.0, 7.0, 0.0, 0.005) };
-        let Use::Dispute([way_m, speed_mps]) = cable.take(&unusual) else { panic!("no dispute") };
+        let Use::Dispute([way_m, _]) = cable.take(&unusual) else { panic!("no dispute") };
         // A sum that fades over a second: 1 / (e^0.1 - 1) corrections.
-        let expected_m = 0.001 / (math::exp(0.1) - 1.0);
-        assert!((way_m - expected_m).abs() < 1e-6 && (speed_mps + 2.0 * expected_m).abs() < 1e-6, "{way_m}");
+        assert!((way_m - 0.001 / (math::exp(0.1) - 1.0)).abs() < 1e-6, "{way_m}");
     }
 
     #[test]

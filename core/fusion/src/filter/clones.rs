@@ -18,6 +18,8 @@ use headrace_geometry::time::{DurNs, MonoNs};
 pub const STEP: DurNs = DurNs(2_000_000_000);
 /// Clones kept: over four turns of a head in its slowest mode (4 x 28 s).
 pub const CLONES: usize = 60;
+/// Share to which the variance of the chainage has fallen where it became sure at once: as a silent cable is heard again.
+const SURE_SHARE: f64 = 0.1;
 /// Errors that move a sample along the tunnel: chainage, pitch and yaw.
 pub const MOVING: [usize; 3] = [POSITION, ATTITUDE + 1, ATTITUDE + 2];
 
@@ -32,6 +34,18 @@ struct Moment {
     since_last: Square,
     /// Relative to the newest clone.
     relative: Relative,
+}
+
+impl Moment {
+    /// Variance of the chainage, m^2.
+    fn chainage_m2(&self) -> f64 {
+        self.rows[0][POSITION]
+    }
+
+    /// Whether its chainage is unsure beside one of a later time with this variance, m^2.
+    fn is_unsure_beside(&self, later_m2: f64) -> bool {
+        later_m2 < SURE_SHARE * self.chainage_m2()
+    }
 }
 
 /// See the module's description.
@@ -76,9 +90,12 @@ impl ErrorClones {
         }
     }
 
-    /// Adds a clone when the last one is old enough.
+    /// Adds a clone when the last one is old enough, or the chainage has become sure since.
     pub fn note(&mut self, at: MonoNs, factors: &Factors<ERRORS>) {
-        if self.newest().is_some_and(|newest| at.since(newest.at).0 < STEP.0) {
+        let is_enough = |newest: &Moment| {
+            at.since(newest.at).0 < STEP.0 && !newest.is_unsure_beside(factors.variance(POSITION))
+        };
+        if self.newest().is_some_and(is_enough) {
             return;
         }
         let rows = factors.rows(MOVING);
@@ -98,16 +115,20 @@ impl ErrorClones {
         let newest = self.newest()?;
         let kept = self.clones.len();
         // Zero over no time.
-        let (mut newer_s, mut newer) = (0.0, Relative::default());
+        let (mut newer_s, mut newer, mut newer_m2) = (0.0, Relative::default(), newest.chainage_m2());
         let wanted_s = lag.as_secs_f64();
         for back in 1..kept {
             let clone = self.back(back)?;
             let age_s = newest.at.since(clone.at).as_secs_f64();
             if age_s >= wanted_s {
+                // What was placed in between was placed as unsurely as before.
+                if clone.is_unsure_beside(newer_m2) {
+                    return Some(clone.relative);
+                }
                 let share = (wanted_s - newer_s) / (age_s - newer_s);
                 return Some(newer.weighted(1.0 - share, &clone.relative, share));
             }
-            (newer_s, newer) = (age_s, clone.relative);
+            (newer_s, newer, newer_m2) = (age_s, clone.relative, clone.chainage_m2());
         }
         // Beyond the oldest clone, extrapolated linearly in time.
         (kept > 1).then(|| newer.weighted(wanted_s / newer_s, &newer, 0.0))
@@ -164,4 +185,40 @@ fn product(row: &Errors, columns: &Square) -> Errors {
 
 fn identity() -> Square {
     core::array::from_fn(|j| core::array::from_fn(|i| if i == j { 1.0 } else { 0.0 }))
+}
+
+#[cfg(test)]
+mod tests {
+    use headrace_geometry::frames::Vec3;
+
+    use super::*;
+
+    /// What was placed while a cable was silent was placed unsurely until it was heard, not ever more surely in the 2 s before.
+    #[test]
+    fn a_chainage_that_becomes_sure_at_once_was_unsure_until_then() {
+        let mut clones = ErrorClones::default();
+        let mut factors = Factors::independent(core::array::from_fn(|_| 1.0));
+        let at = |k: i64| MonoNs(0) + DurNs::from_millis(100 * k);
+        for k in 0..=50 {
+            clones.note(at(k), &factors);
+        }
+        let chainage = core::array::from_fn(|i| if i == POSITION { 1.0 } else { 0.0 });
+        let gain = factors.measure(&chainage, 1e-4);
+        clones.measure(&chainage, &gain);
+        clones.note(at(51), &factors);
+        let sd_m = |clones: &ErrorClones, lag_s: f64| {
+            clones.relative(DurNs::from_secs_f64(lag_s)).unwrap().sd_m(Vec3::zero())
+        };
+        // The last clone before was 1.1 s old.
+        for lag_s in [0.1, 0.5, 1.1, 2.0, 4.0] {
+            let is_m = sd_m(&clones, lag_s);
+            assert!((is_m - 1.0).abs() < 0.01, "{lag_s}: {is_m}");
+        }
+        for k in 52..=90 {
+            clones.note(at(k), &factors);
+        }
+        // Surely placed since, at 5.1, 7.1 and, as the newest, 8.1 s or before; and before that as unsurely as ever.
+        let [since_m, before_m] = [1.9, 4.0].map(|lag_s| sd_m(&clones, lag_s));
+        assert!(since_m < 0.1 && (before_m - 1.0).abs() < 0.01, "{since_m} {before_m}");
+    }
 }

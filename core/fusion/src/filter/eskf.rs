@@ -403,10 +403,7 @@ impl Eskf {
             if matches!(kind, SensorKind::Head | SensorKind::Echosounder { .. }) {
                 self.correct_by_wall(&row, settings.wall_share, known, errors);
             } else if matches!(kind, SensorKind::Tether { .. }) {
-                let before = [POSITION, VELOCITY].map(|i| errors.get(i).copied().unwrap_or(0.0));
-                self.correct(&row, known, errors);
-                let after = [POSITION, VELOCITY].map(|i| errors.get(i).copied().unwrap_or(0.0));
-                self.cable.note_corrections([after[0] - before[0], after[1] - before[1]]);
+                self.correct_by_counter(&row, known, errors);
             } else {
                 self.correct(&row, known, errors);
             }

@@ -8,6 +8,7 @@ pub mod align;
 pub mod cable;
 pub mod clones;
 pub mod context;
+pub mod corrections;
 pub mod count_step;
 pub mod eskf;
 mod evidence;

@@ -54,7 +54,7 @@ pub struct Settings {
     pub force_bias: Wander,
     /// Noise of a tether counter, its quantum excluded, m.
     pub tether_sd_m: f64,
-    /// Slack of the cable, m, a smooth process: two lags in series.
+    /// Slack of the cable, m, a smooth process: two lags in series. By default that of one that swings within 16 s: nobody has promised less.
     pub slack: Wander,
     /// Initial scale error of the cable, a ratio, and its random walk, per root of a second.
     pub scale_sd: f64,
@@ -119,7 +119,7 @@ impl Default for Settings {
             rate_bias: Wander { reach: 0.2 * DEGREE, time_s: 1000.0 },
             force_bias: Wander { reach: 0.03, time_s: 300.0 },
             tether_sd_m: 0.005,
-            slack: Wander { reach: 0.06, time_s: 10.0 },
+            slack: Wander { reach: 0.06, time_s: 2.5 },
             scale_sd: 0.002,
             // Nobody sets it: a wheel's scale doesn't change within a dive. It keeps the variance from becoming zero.
             scale_noise: 1e-9,

@@ -186,6 +186,14 @@ impl Recipe {
         Self { log: Log::ALL[seed as usize % Log::ALL.len()], fault: Fault::None, ..Self::of(seed) }
     }
 
+    /// A vehicle that hovers for five minutes, with a cable that is as the vehicle file says.
+    pub(crate) fn hovering(seed: u64) -> Self {
+        let recipe = Self::of(seed);
+        let slack_m = recipe.slack_m.min(0.06);
+        let hovers = Self { speed_mps: 0.0, slack_m, is_declared: true, fault: Fault::None, ..recipe };
+        Self { duration_s: 300.0, motion: Motion::ALL[seed as usize % 2], ..hovers }
+    }
+
     /// Fastest change of a slack that is one sine, m/s.
     pub(crate) fn slack_rate_mps(&self) -> f64 {
         self.slack_m * math::TAU / self.slack_period_s

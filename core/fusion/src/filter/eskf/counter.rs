@@ -7,6 +7,7 @@ use headrace_sensor::reading::Reading;
 use super::Eskf;
 use crate::filter::agreement;
 use crate::filter::cable::{CableReading, Use};
+use crate::filter::measure::ScalarUpdate;
 use crate::filter::settings::Settings;
 use crate::filter::slack_level::Noises;
 use crate::filter::sources::Source;
@@ -44,9 +45,23 @@ impl Eskf {
         Some(self.trusts(&CableReading { at, shown_m, off_m, sd_m, agrees, is_usual, is_lively }, errors))
     }
 
+    /// Corrects by a counter's reading, and notes what that has made of the estimate.
+    pub(super) fn correct_by_counter(&mut self, row: &ScalarUpdate, known: &Errors, errors: &mut Errors) {
+        let along = |eskf: &Self, errors: &Errors| {
+            [POSITION, VELOCITY].map(|i| [errors.get(i).copied().unwrap_or(0.0), eskf.factors.variance(i)])
+        };
+        let [before_p, before_v] = along(self, errors);
+        self.correct(row, known, errors);
+        let [after_p, after_v] = along(self, errors);
+        let by = [after_p[0] - before_p[0], after_v[0] - before_v[0]];
+        self.cable.corrections.note(by, [before_p[1] - after_p[1], before_v[1] - after_v[1]]);
+    }
+
     /// Judges a cable reading; whether it is to be fused. What it has lost becomes creep.
     fn trusts(&mut self, reading: &CableReading, errors: &mut Errors) -> bool {
-        match self.cable.take(reading) {
+        let used = self.cable.take(reading);
+        self.slipped_m2 += self.cable.corrections.take_slipped_m2();
+        match used {
             Use::Fuse => return true,
             Use::Withhold => {}
             Use::Dispute(corrections) => {
