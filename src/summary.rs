@@ -6,7 +6,7 @@ use headrace_monitor::live_state::LiveMetres;
 use headrace_monitor::live_text::{helps_text, metres_text, of_it_text, unsure_text};
 use headrace_monitor::pilot_text::{actions_text, cause_text, station};
 use headrace_monitor::report::{ChangeReport, JudgedReport, SmoothingReport};
-use headrace_monitor::report::{NotInspectedReport, Report, RunReport, SourceReport};
+use headrace_monitor::report::{DiveReport, NotInspectedReport, Report, RunReport, SourceReport};
 use headrace_monitor::telling::UnsureStretch;
 use headrace_monitor::what_if::WhatIfReport;
 
@@ -26,7 +26,7 @@ pub(crate) fn summary(report: &Report, columns: Option<usize>) -> String {
     };
     let dive = &report.dive;
     if let Some(why) = &report.not_inspected {
-        line(not_inspected_text(why));
+        line(not_inspected_text(why, dive));
     }
     if let (Some(from_m), Some(to_m)) = (report.way.from_m, report.way.to_m) {
         line(format!(
@@ -128,7 +128,7 @@ fn silence(source: &SourceReport) -> Option<String> {
 }
 
 /// Why a dive is no inspection.
-fn not_inspected_text(why: &NotInspectedReport) -> String {
+fn not_inspected_text(why: &NotInspectedReport, dive: &DiveReport) -> String {
     let lacking = why
         .lacking
         .map_or_else(|| "position".to_owned(), |lacking| lacking.trim_start_matches("no_").replace('_', " "));
@@ -136,6 +136,7 @@ fn not_inspected_text(why: &NotInspectedReport) -> String {
         "no_sonar" => {
             return "NO COVERAGE: no profiling sonar returns in this dive; nothing was inspected".to_owned();
         }
+        "outside_tunnel" => return outside_text(dive),
         "no_position" => {
             format!("NOTHING WAS JUDGED: the vehicle never had a position, there was no {lacking}")
         }
@@ -150,16 +151,21 @@ fn not_inspected_text(why: &NotInspectedReport) -> String {
     }
 }
 
-/// Metres by verdict, the open ones without those that weren't inspected.
+/// Where the heads of a dive that was never within the tunnel were, and what to check.
+fn outside_text(dive: &DiveReport) -> String {
+    let place = match (dive.from_m, dive.to_m) {
+        (Some(from_m), Some(to_m)) => format!(" from {} to {}", station(from_m), station(to_m)),
+        _ => String::new(),
+    };
+    format!(
+        "NOTHING WAS JUDGED: the heads were outside the tunnel{place}: check the tether's zero and length_m"
+    )
+}
+
+/// Metres by verdict.
 fn metres(judged: &WhatIfReport) -> String {
     let WhatIfReport { pass_m, fail_m, cannot_say_m, open_m, not_inspected_m, .. } = *judged;
-    metres_text(&LiveMetres {
-        pass_m,
-        fail_m,
-        cannot_say_m,
-        open_m: open_m - not_inspected_m,
-        not_inspected_m,
-    })
+    metres_text(&LiveMetres { pass_m, fail_m, cannot_say_m, open_m, not_inspected_m })
 }
 
 /// The stretches that are missed or of which nothing can be said, along the tunnel, a line each: where, what, what to do.
@@ -232,8 +238,8 @@ pub(crate) fn broken(line: &str, columns: Option<usize>) -> Vec<String> {
 fn smoothing(report: &SmoothingReport) -> Vec<String> {
     let was = &report.before;
     let mut lines = vec![format!(
-        "  smoothed {} estimates; by the filter alone: passed {:.2} m   missed {:.2} m   can't say {:.2} m   open {:.2} m",
-        report.estimates, was.pass_m, was.fail_m, was.cannot_say_m, was.open_m
+        "  smoothed {} estimates; by the filter alone: passed {:.2} m   missed {:.2} m   can't say {:.2} m   open {:.2} m   not inspected {:.2} m",
+        report.estimates, was.pass_m, was.fail_m, was.cannot_say_m, was.open_m, was.not_inspected_m
     )];
     if report.changed.is_empty() {
         lines.push("  no verdict has changed".to_owned());

@@ -370,8 +370,8 @@ impl Sections {
                 all = all.saturating_sub(count as usize);
             }
         }
-        metres.add(Verdict::Open, all as f64 * section_m);
         metres.not_inspected_m = self.judged.last().map_or(0.0, |count| f64::from(*count) * section_m);
+        metres.add(Verdict::Open, all as f64 * section_m - metres.not_inspected_m);
         metres
     }
 

@@ -18,9 +18,9 @@ pub struct WhatIfReport {
     pub fail_m: f64,
     /// Metres undecided within the error of the hole.
     pub cannot_say_m: f64,
-    /// Metres that would still be open, or weren't inspected.
+    /// Metres that would still be open.
     pub open_m: f64,
-    /// Of these, metres that weren't seen from both sides.
+    /// Metres that wouldn't have been seen from both sides.
     pub not_inspected_m: f64,
 }
 

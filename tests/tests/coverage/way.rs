@@ -32,8 +32,7 @@ const ALL: &str = r#""sonar_0", "sonar_1", "sonar_2", "sonar_3""#;
 /// The sums by verdict are the way, and the sections reported are those of the way, one after the other.
 #[track_caller]
 fn accounted_for(what: &str, report: &Report) {
-    let sum = &report.summary;
-    let all_m = sum.pass_m + sum.fail_m + sum.cannot_say_m + sum.open_m;
+    let all_m = report.summary.way_m();
     assert!((all_m - report.way.length_m).abs() < 1e-9, "{what}: {all_m} m of {:?}", report.way);
     let ends = (report.sections.first().map(|s| s.start_m), report.sections.last().map(|s| s.end_m));
     assert_eq!(ends, (report.way.from_m, report.way.to_m), "{what}");
@@ -204,6 +203,32 @@ fn the_sums_are_the_way_on_dives_of_all_kinds() {
     }
 }
 
+/// Short dives in and beyond a short tunnel, there and back, that end anywhere within a section.
+#[test]
+fn metres_by_verdict_add_up_to_the_way_wherever_a_dive_begins_turns_and_ends() {
+    let vehicle = SHORT.replace("length_m = 100", "length_m = 8");
+    let (mut outside, mut open_m, mut not_inspected_m) = (0, 0.0, 0.0);
+    for seed in 0..60 {
+        let mut draw = Draw::new(seed);
+        let start_m = draw.between(-2.0, 10.0);
+        let mut scene = format!("vehicle = \"vehicle.toml\"\n[trajectory]\nstart_m = {start_m}\n");
+        let (legs, first) = (1 + seed % 3, seed / 3 % 2);
+        for leg in 0..legs {
+            let speed_mps = if (leg + first) % 2 == 0 { 0.2 } else { -0.2 };
+            let distance_m = draw.between(0.5, 2.5);
+            scene += &format!("[[trajectory.legs]]\ndistance_m = {distance_m}\nspeed_mps = {speed_mps}\n");
+        }
+        let report = instrumented::dive(&vehicle, &scene).report;
+        accounted_for(&format!("seed {seed}"), &report);
+        let reason = report.not_inspected.as_ref().map(|why| why.reason);
+        assert_eq!(report.way.from_m.is_none(), reason == Some("outside_tunnel"), "seed {seed}: {reason:?}");
+        outside += usize::from(reason.is_some());
+        open_m += report.summary.open_m;
+        not_inspected_m += report.summary.not_inspected_m;
+    }
+    assert!(outside > 2 && open_m > 1.0 && not_inspected_m > 5.0, "{outside}, {open_m}, {not_inspected_m}");
+}
+
 #[test]
 fn wherever_heads_fall_silent_what_is_left_unseen_fails_at_once_and_the_sums_are_the_way() {
     let mut dark = 0;
@@ -274,6 +299,20 @@ fn without_a_position_nothing_is_judged_and_that_is_said_first() {
         assert_eq!(why["silent_sources"], serde_json::json!([sensor]));
         assert_eq!(report["way"]["length_m"], 0.0);
     }
+}
+
+#[test]
+fn a_dive_outside_the_tunnel_is_no_inspection_and_exits_with_1() {
+    let folder = Folder::new();
+    folder.write("vehicle.toml", SHORT);
+    folder.write("scene.toml", SCENE.replace("start_m = 3", "start_m = 105"));
+    folder.simulate("scene.toml", "dive.mcap");
+    let (code, report) = folder.replay("dive.mcap", &[]);
+    assert_eq!((code, &report["way"]["length_m"]), (Some(1), &0.0.into()));
+    assert_eq!(report["not_inspected"]["reason"], "outside_tunnel");
+    let answer = folder.headrace(&["replay", "dive.mcap"]);
+    let said = "NOTHING WAS JUDGED: the heads were outside the tunnel from 0+105.20 to 0+109.00: check";
+    assert!(answer.stdout.contains(said), "{}", answer.stdout);
 }
 
 #[test]

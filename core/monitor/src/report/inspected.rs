@@ -23,7 +23,7 @@ pub struct WayReport {
 /// Why a dive is no inspection.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct NotInspectedReport {
-    /// `no_sonar`, `no_position` or `mostly_no_position`.
+    /// `no_sonar`, `no_position`, `outside_tunnel` or `mostly_no_position`.
     pub reason: &'static str,
     /// What most returns without a position lacked: `no_heading`, `no_chainage` or `no_place_in_section`.
     pub lacking: Option<&'static str>,
@@ -50,6 +50,7 @@ pub(super) fn not_inspected(dive: &Loop) -> Option<NotInspectedReport> {
     let reason = match share {
         _ if pings == 0 => "no_sonar",
         share if share >= 1.0 => "no_position",
+        _ if way_report(dive.coverage()).from_m.is_none() => "outside_tunnel",
         share if share > MOST => "mostly_no_position",
         _ => return None,
     };

@@ -37,7 +37,7 @@ pub use survey::{HolidayReport, NodeRowReport, SurveyReport};
 pub use unsure::UnsureReport;
 
 /// Version of the report schema.
-pub const REPORT_VERSION: u32 = 6;
+pub const REPORT_VERSION: u32 = 7;
 
 /// A whole report. Field names are the contract.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -186,7 +186,7 @@ pub struct SummaryReport {
     pub cannot_say_m: f64,
     /// Metres still open.
     pub open_m: f64,
-    /// Of the open metres, those where the way begins or turns back that not all heads have passed.
+    /// Metres where the way begins or turns back that not all heads have passed.
     pub not_inspected_m: f64,
     /// Fails that were flagged, and flags that a later pass cleared.
     pub flags_raised: u32,
@@ -274,7 +274,7 @@ impl Report {
         let sections = &coverage.sections;
         let of_the_way =
             || sections.sections_of(coverage.frontier.way()).filter_map(|k| Some((k, sections.get(k)?)));
-        Self {
+        let report = Self {
             report_version: REPORT_VERSION,
             not_inspected: inspected::not_inspected(dive),
             log: None,
@@ -305,7 +305,10 @@ impl Report {
             advice_dropped: log.dropped,
             sources: sources::source_reports(dive),
             smoothing: None,
-        }
+        };
+        let (sum_m, way_m) = (report.summary.way_m(), report.way.length_m);
+        debug_assert!((sum_m - way_m).abs() < 1e-6, "metres by verdict: {sum_m} m of a way of {way_m} m");
+        report
     }
 
     /// Metres by verdict for the target and the sections that the dive was judged by.
@@ -328,6 +331,13 @@ impl Report {
         let dropped =
             self.sources.iter().flat_map(|source| &source.line).any(|line| line.dropped_packets > 0);
         rejected.not_stored > 0 || dropped || self.log.as_ref().is_some_and(|log| !log.losses.is_empty())
+    }
+}
+
+impl SummaryReport {
+    /// Sum of the metres by verdict, m.
+    pub fn way_m(&self) -> f64 {
+        self.pass_m + self.fail_m + self.cannot_say_m + self.open_m + self.not_inspected_m
     }
 }
 
@@ -386,16 +396,17 @@ fn summarise<'a>(section_m: f64, sections: impl Iterator<Item = &'a Section>) ->
         if let Some(found) = section.hole {
             hole.add(found.diameter_m);
         }
-        let place = match section.verdict {
-            Verdict::Pass => 0,
-            Verdict::Fail => 1,
-            Verdict::CannotSay => 2,
-            Verdict::Open => 3,
+        // Each section counts once, so that the sums add up to the way.
+        let place = match (section.verdict, section.not_inspected) {
+            (Verdict::Pass, _) => 0,
+            (Verdict::Fail, _) => 1,
+            (Verdict::CannotSay, _) => 2,
+            (Verdict::Open, false) => 3,
+            (Verdict::Open, true) => 4,
         };
         if let Some(count) = counts.get_mut(place) {
             *count += 1;
         }
-        counts[4] += u32::from(section.not_inspected);
         raised += u32::from(section.flagged.is_some());
         cleared += u32::from(section.cleared.is_some());
     }

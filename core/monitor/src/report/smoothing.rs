@@ -30,6 +30,8 @@ pub struct MetresReport {
     pub cannot_say_m: f64,
     /// Metres still open.
     pub open_m: f64,
+    /// Metres that not all heads have passed.
+    pub not_inspected_m: f64,
 }
 
 /// A section whose verdict has changed.

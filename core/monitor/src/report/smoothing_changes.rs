@@ -17,8 +17,8 @@ pub fn compare(filter: &Report, smoothed: &Report, estimates: u64, pieces: u64) 
 }
 
 fn metres(summary: &SummaryReport) -> MetresReport {
-    let SummaryReport { pass_m, fail_m, cannot_say_m, open_m, .. } = *summary;
-    MetresReport { pass_m, fail_m, cannot_say_m, open_m }
+    let SummaryReport { pass_m, fail_m, cannot_say_m, open_m, not_inspected_m, .. } = *summary;
+    MetresReport { pass_m, fail_m, cannot_say_m, open_m, not_inspected_m }
 }
 
 fn judged(section: &SectionReport) -> JudgedReport {

@@ -40,7 +40,7 @@ pub(super) fn standing<'a>(
             pass_m: metres.pass_m,
             fail_m: metres.fail_m,
             cannot_say_m: metres.cannot_say_m,
-            open_m: metres.open_m - metres.not_inspected_m,
+            open_m: metres.open_m,
             not_inspected_m: metres.not_inspected_m,
         },
         unsure: coverage.unsure,

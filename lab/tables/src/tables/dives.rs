@@ -114,7 +114,7 @@ pub(crate) fn dives<'a>() -> Table<Row<'a>> {
             ),
             Column(
                 "not_inspected",
-                "Why the dive is no inspection: `no_sonar`, `no_position`, `mostly_no_position`; null where it is one",
+                "Why the dive is no inspection: `no_sonar`, `no_position`, `outside_tunnel`, `mostly_no_position`; null where it is one",
                 Get::Text(|row| row.report()?.not_inspected.as_ref().map(|why| why.reason.to_owned())),
             ),
             Column(
@@ -150,7 +150,7 @@ pub(crate) fn dives<'a>() -> Table<Row<'a>> {
             of_report!(number "fail_m", "Metres that fail", |report| Some(report.summary.fail_m)),
             of_report!(number "cannot_say_m", "Metres of which neither can be said", |report| Some(report.summary.cannot_say_m)),
             of_report!(number "open_m", "Metres still open", |report| Some(report.summary.open_m)),
-            of_report!(number "not_inspected_m", "Of the open metres, those where the way begins or turns back that not all heads have passed", |report| Some(report.summary.not_inspected_m)),
+            of_report!(number "not_inspected_m", "Metres where the way begins or turns back that not all heads have passed", |report| Some(report.summary.not_inspected_m)),
             of_report!(count "flags_raised", "Flags raised", |report| count(report.summary.flags_raised)),
             of_report!(count "flags_cleared", "Of these, cleared by a later pass", |report| count(report.summary.flags_cleared)),
             of_report!(number "d_most_m", "Diameter D of the largest hole of all sections, m", |report| report.summary.hole.max_m),
