@@ -1,8 +1,11 @@
 //! Signals: a dive ends in good order, and nothing else ends it.
 
+use std::io::Read as _;
 use std::os::unix::net::UnixStream;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::thread;
+use std::time::{Duration, Instant};
 
 use signal_hook::consts::{
     SIGALRM, SIGHUP, SIGINT, SIGTERM, SIGTSTP, SIGUSR1, SIGUSR2, SIGVTALRM, SIGXCPU, SIGXFSZ,
@@ -15,7 +18,26 @@ use crate::failure::Failure;
 /// is then an error like that of a full disk.
 const PASSED_OVER: [i32; 8] = [SIGHUP, SIGTSTP, SIGUSR1, SIGUSR2, SIGXFSZ, SIGXCPU, SIGALRM, SIGVTALRM];
 
-/// A flag set by SIGINT, SIGTERM or a closed terminal; a second SIGINT or SIGTERM ends the program at once.
+/// Requests to end within this time count as one: `timeout -s INT` signals the program, then its group, and a key that is held
+/// repeats.
+const ONE_REQUEST: Duration = Duration::from_secs(1);
+/// Stack of the thread that waits for signals: it calls nothing deep.
+const STACK_BYTES: usize = 64 << 10;
+
+/// Tells a second request to end from a repetition of the first.
+#[derive(Debug, Default)]
+pub(crate) struct Requests {
+    first: Option<Instant>,
+}
+
+impl Requests {
+    /// Counts a request at `now`; whether it is a second one, by which the program ends at once.
+    pub(crate) fn is_second(&mut self, now: Instant) -> bool {
+        now.duration_since(*self.first.get_or_insert(now)) >= ONE_REQUEST
+    }
+}
+
+/// A flag set by SIGINT, SIGTERM or a closed terminal; a second SIGINT or SIGTERM, over a second later, ends the program at once.
 pub(crate) fn flag() -> Result<Arc<AtomicBool>, Failure> {
     let flag = ending()?;
     on(SIGHUP, &flag)?;
@@ -51,13 +73,32 @@ pub(crate) fn seconds() -> std::io::Result<UnixStream> {
 
 fn ending() -> Result<Arc<AtomicBool>, Failure> {
     let flag = Arc::new(AtomicBool::new(false));
+    let ends_at_once = Arc::new(AtomicBool::new(false));
+    let is_ours = !LEFT_TO_KEYS.load(Ordering::Relaxed);
     for signal in [SIGINT, SIGTERM] {
-        if !LEFT_TO_KEYS.load(Ordering::Relaxed) {
-            signal_hook::flag::register_conditional_shutdown(signal, 1, Arc::clone(&flag)).map_err(failed)?;
+        if is_ours {
+            let armed = Arc::clone(&ends_at_once);
+            signal_hook::flag::register_conditional_shutdown(signal, 1, armed).map_err(failed)?;
         }
         on(signal, &flag)?;
     }
+    if is_ours {
+        arm_later(ends_at_once)?;
+    }
     Ok(flag)
+}
+
+/// Sets `armed` once the first request can't be repeated any more.
+fn arm_later(armed: Arc<AtomicBool>) -> Result<(), Failure> {
+    let mut signals = seconds().map_err(failed)?;
+    let wait = move || {
+        if signals.read_exact(&mut [0]).is_ok() {
+            thread::sleep(ONE_REQUEST);
+            armed.store(true, Ordering::Relaxed);
+        }
+    };
+    let thread = thread::Builder::new().name("signals".to_owned()).stack_size(STACK_BYTES).spawn(wait);
+    thread.map(drop).map_err(failed)
 }
 
 fn on(signal: i32, flag: &Arc<AtomicBool>) -> Result<(), Failure> {
@@ -66,4 +107,17 @@ fn on(signal: i32, flag: &Arc<AtomicBool>) -> Result<(), Failure> {
 
 fn failed(source: std::io::Error) -> Failure {
     Failure::System { what: "installing the signal handlers", source }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn requests_within_a_second_count_as_one() {
+        let (begun, mut requests) = (Instant::now(), Requests::default());
+        let is_second = [0, 1, 300, 999, 1000, 1500]
+            .map(|at_ms| requests.is_second(begun + Duration::from_millis(at_ms)));
+        assert_eq!(is_second, [false, false, false, false, true, true]);
+    }
 }

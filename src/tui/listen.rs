@@ -4,6 +4,7 @@ use std::io;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread;
+use std::time::Instant;
 
 use crossbeam::channel::Sender;
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
@@ -11,13 +12,13 @@ use rustix::event::{PollFd, PollFlags, Timespec, poll};
 use super::hold;
 use super::keys::{INTERRUPT, Key, keys};
 use super::message::Message;
-use crate::interrupt;
+use crate::interrupt::{self, Requests};
 
 /// Longest wait for a key before the end is noticed.
 const WAIT: Timespec = Timespec { tv_sec: 0, tv_nsec: 100_000_000 };
 
-/// Sends keys until what it returns is set. Ctrl-C sets the flag as SIGINT does; a second one ends the program at once, the
-/// terminal in order.
+/// Sends keys until what it returns is set. Ctrl-C sets the flag as SIGINT does; a second one, over a second later, ends the
+/// program at once, the terminal in order.
 ///
 /// Errors: signals can't be counted, or the thread not started.
 pub(super) fn listen(to: Sender<Message>, interrupted: Arc<AtomicBool>) -> io::Result<Arc<AtomicBool>> {
@@ -26,7 +27,7 @@ pub(super) fn listen(to: Sender<Message>, interrupted: Arc<AtomicBool>) -> io::R
     let signals = interrupt::seconds()?;
     let read = move || {
         let mut bytes = [0; 256];
-        let (mut signalled, mut is_told) = (0_u32, false);
+        let (mut requests, mut is_told) = (Requests::default(), false);
         while !until.load(Ordering::Relaxed) {
             if !is_told && interrupted.load(Ordering::Relaxed) {
                 is_told = to.try_send(Message::Interrupted).is_ok();
@@ -37,11 +38,11 @@ pub(super) fn listen(to: Sender<Message>, interrupted: Arc<AtomicBool>) -> io::R
                 continue;
             }
             let [by_signal, by_key] = waiting.map(|one| !one.revents().is_empty());
-            if by_signal && let Ok(count) = rustix::io::read(&signals, &mut bytes) {
-                signalled += u32::try_from(count).unwrap_or(u32::MAX);
-                if signalled > 1 {
-                    end_at_once();
-                }
+            if by_signal
+                && rustix::io::read(&signals, &mut bytes).is_ok()
+                && requests.is_second(Instant::now())
+            {
+                end_at_once();
             }
             if !by_key {
                 continue;
@@ -53,9 +54,10 @@ pub(super) fn listen(to: Sender<Message>, interrupted: Arc<AtomicBool>) -> io::R
                     for key in keys(bytes.get(..count).unwrap_or_default()) {
                         if key != Key::Character(INTERRUPT) {
                             to.try_send(Message::Key(key)).ok();
-                        } else if interrupted.swap(true, Ordering::Relaxed) {
+                        } else if requests.is_second(Instant::now()) {
                             end_at_once();
                         }
+                        interrupted.store(true, Ordering::Relaxed);
                     }
                 }
                 Err(_) => {}

@@ -76,6 +76,9 @@ fn an_interrupted_demonstration_leaves_its_report_and_summary() {
     let folder = Folder::new();
     let mut screen = Screen::run(&folder, &["demo", "--speed", "20x", "--out", "demo"], 100, &[]);
     screen.until("m/s");
+    // A wrapper signals the program, and then its group.
+    screen.signal(Signal::INT);
+    std::thread::sleep(std::time::Duration::from_millis(5));
     screen.signal(Signal::INT);
     let (code, shown) = screen.end();
     assert!(matches!(code, Some(0 | 1)), "{code:?}: {shown}");

@@ -103,7 +103,7 @@ fn every_way_out_leaves_the_terminal_in_order() {
         ("ctrl-c", &|screen| screen.press(b"\x03"), true),
         ("SIGTERM", &|screen| screen.signal(Signal::TERM), true),
         ("SIGHUP", &|screen| screen.signal(Signal::HUP), true),
-        ("ctrl-c twice", &|screen| screen.press(b"\x03\x03"), false),
+        ("ctrl-c twice within a second", &|screen| screen.press(b"\x03\x03"), true),
     ];
     for arguments in [&play[..], &demo] {
         for (way, leave, in_good_order) in ways {
