@@ -1,7 +1,7 @@
 //! Output on stdout. A closed terminal ends neither a dive nor its recording.
 
 use std::fmt::{self, Write as _};
-use std::io::{self, BufWriter, Write};
+use std::io::{self, BufWriter, ErrorKind, StdoutLock, Write};
 use std::sync::OnceLock;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread;
@@ -10,6 +10,7 @@ use std::time::Duration;
 use crossbeam::channel::{Receiver, RecvTimeoutError, SendTimeoutError, Sender, bounded};
 use headrace_config::plain::{lines, one_line};
 use headrace_monitor::report::Report;
+use rustix::event::{PollFd, PollFlags, poll};
 
 use crate::failure::Failure;
 use crate::terminal;
@@ -45,7 +46,42 @@ fn stdout() -> io::Result<Box<dyn Write>> {
     match (GIVEN_UP.load(Ordering::Relaxed), NEVER_WAITS.load(Ordering::Relaxed)) {
         (true, _) => Err(unread()),
         (false, true) => Ok(Box::new(Unheld::start()?)),
-        (false, false) => Ok(Box::new(io::stdout().lock())),
+        (false, false) => Ok(Box::new(Waiting::start())),
+    }
+}
+
+/// Stdout that waits until it takes more, also where its pipe was set not to wait by another process that shares it.
+struct Waiting(StdoutLock<'static>);
+
+impl Waiting {
+    fn start() -> Self {
+        Self(io::stdout().lock())
+    }
+
+    fn retry<T>(&mut self, write: impl Fn(&mut StdoutLock<'static>) -> io::Result<T>) -> io::Result<T> {
+        loop {
+            match write(&mut self.0) {
+                Err(error) if error.kind() == ErrorKind::WouldBlock => self.wait()?,
+                other => return other,
+            }
+        }
+    }
+
+    fn wait(&self) -> io::Result<()> {
+        match poll(&mut [PollFd::new(&self.0, PollFlags::OUT)], None) {
+            Ok(_) | Err(rustix::io::Errno::INTR) => Ok(()),
+            Err(error) => Err(error.into()),
+        }
+    }
+}
+
+impl Write for Waiting {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        self.retry(|stdout| stdout.write(bytes))
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        self.retry(Write::flush)
     }
 }
 
@@ -65,7 +101,7 @@ impl Unheld {
         let (pieces, queue) = bounded::<Vec<u8>>(0);
         let (ended, done) = bounded(1);
         let write = move || {
-            let mut stdout = io::stdout().lock();
+            let mut stdout = Waiting::start();
             let result = queue.iter().try_for_each(|piece| stdout.write_all(&piece));
             drop(queue);
             // Nobody may wait for it any more.
@@ -114,7 +150,7 @@ pub(crate) fn put_waiting(text: &str) {
     if GIVEN_UP.load(Ordering::Relaxed) {
         return;
     }
-    let mut stdout = io::stdout().lock();
+    let mut stdout = Waiting::start();
     if let Err(error) = stdout.write_all(text.as_bytes()).and_then(|()| stdout.flush()) {
         note(error);
     }

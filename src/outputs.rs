@@ -7,6 +7,7 @@ use std::io::{ErrorKind, Read, Seek as _, SeekFrom};
 use std::path::Path;
 
 use headrace_replay::log::{DiveLog, RECOVERED_FROM, TRIMMED};
+use headrace_replay::whole_file::is_pipe;
 
 use crate::failure::Failure;
 use crate::files;
@@ -134,6 +135,10 @@ fn may_write(path: &Path, kind: Kind, force: bool) -> Result<(), Failure> {
             path.display(),
             kind.refusal()
         )));
+    }
+    if is_pipe(path) {
+        // Opening it waits for a reader, and closing it again ends the reader's input.
+        return rustix::fs::access(path, rustix::fs::Access::WRITE_OK).map_err(|error| failed(error.into()));
     }
     OpenOptions::new().write(true).open(path).map(|_| ()).map_err(failed)
 }

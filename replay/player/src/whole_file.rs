@@ -2,9 +2,13 @@
 //! was there before stays until then, and for good where the writing fails.
 
 use std::fs::{File, Metadata, OpenOptions};
-use std::io::{BufWriter, ErrorKind, Result, Seek, SeekFrom, Write};
+use std::io::{BufWriter, Error, ErrorKind, Result, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU32, Ordering};
+use std::time::{Duration, Instant};
+
+/// How long a named pipe is waited for that no process reads.
+const READER_WITHIN: Duration = Duration::from_secs(2);
 
 /// A file that is being written. Dropping it before [`WholeFile::complete`] leaves what was there before, and nothing else.
 #[derive(Debug)]
@@ -47,7 +51,8 @@ impl WholeFile {
     }
 
     fn in_place(path: &Path) -> Result<Self> {
-        Ok(Self { file: BufWriter::new(File::create(path)?), beside: None })
+        let file = if is_pipe(path) { open_pipe(path)? } else { File::create(path)? };
+        Ok(Self { file: BufWriter::new(file), beside: None })
     }
 
     /// Puts the file in its place. Once this returns it survives a power cut.
@@ -108,6 +113,51 @@ impl Drop for WholeFile {
             tracing::warn!("{} is left behind: {error}", name.display());
         }
     }
+}
+
+/// Whether a path is a named pipe, which opens only once somebody reads it.
+#[cfg(unix)]
+pub fn is_pipe(path: &Path) -> bool {
+    use std::os::unix::fs::FileTypeExt as _;
+    std::fs::metadata(path).is_ok_and(|there| there.file_type().is_fifo())
+}
+
+/// Whether a path is a named pipe: this system has none among its files.
+#[cfg(not(unix))]
+pub fn is_pipe(_: &Path) -> bool {
+    false
+}
+
+/// Opens a named pipe for writing, once a process reads it.
+///
+/// Errors: the system's; or nobody reads it within [`READER_WITHIN`].
+#[cfg(unix)]
+fn open_pipe(path: &Path) -> Result<File> {
+    use rustix::fs::{Mode, OFlags, fcntl_setfl, open};
+    use rustix::io::Errno;
+    let begun = Instant::now();
+    loop {
+        match open(path, OFlags::WRONLY | OFlags::NONBLOCK | OFlags::CLOEXEC, Mode::empty()) {
+            Ok(pipe) => {
+                // A slow reader is waited for.
+                fcntl_setfl(&pipe, OFlags::empty())?;
+                return Ok(pipe.into());
+            }
+            Err(Errno::NXIO) if begun.elapsed() < READER_WITHIN => std::thread::sleep(READER_WITHIN / 100),
+            Err(Errno::NXIO) => {
+                let words =
+                    format!("it is a pipe that no process has read within {} s", READER_WITHIN.as_secs());
+                return Err(Error::new(ErrorKind::TimedOut, words));
+            }
+            Err(error) => return Err(error.into()),
+        }
+    }
+}
+
+/// Opens a named pipe for writing.
+#[cfg(not(unix))]
+fn open_pipe(path: &Path) -> Result<File> {
+    File::create(path)
 }
 
 /// Begins a file beside its place: without a name where the system knows such files.
@@ -245,6 +295,34 @@ mod tests {
         assert_eq!(std::fs::read(&path).unwrap(), b"new");
         assert_eq!(path.metadata().unwrap().permissions().mode() & 0o777, 0o640);
         write(Path::new("/dev/null"), b"new").unwrap();
+        std::fs::remove_dir_all(folder).unwrap();
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn pipes_are_written_whole_to_a_reader_and_refused_without_one() {
+        use rustix::fs::{CWD, FileType, Mode, mknodat};
+        let folder = folder("pipe");
+        let pipe = folder.join("pipe");
+        mknodat(CWD, &pipe, FileType::Fifo, Mode::RUSR | Mode::WUSR, 0).unwrap();
+        let error = write(&pipe, b"new").unwrap_err();
+        assert_eq!(error.to_string(), "it is a pipe that no process has read within 2 s");
+        // More than a pipe holds, to a reader that comes later and is slow.
+        let content: Vec<u8> = (0..=255).cycle().take(200_000).collect();
+        let read = {
+            let pipe = pipe.clone();
+            move || {
+                std::thread::sleep(Duration::from_millis(200));
+                let mut file = File::open(pipe).unwrap();
+                std::thread::sleep(Duration::from_millis(200));
+                let mut bytes = Vec::new();
+                std::io::Read::read_to_end(&mut file, &mut bytes).unwrap();
+                bytes
+            }
+        };
+        let reader = std::thread::spawn(read);
+        write(&pipe, &content).unwrap();
+        assert!(reader.join().unwrap() == content);
         std::fs::remove_dir_all(folder).unwrap();
     }
 }
