@@ -189,6 +189,34 @@ fn files_that_are_bombs_are_refused_with_the_limit() {
     assert!(wrong.is_empty(), "{}", wrong.join("\n"));
 }
 
+/// Lists of one-letter names take the most memory for each byte.
+#[test]
+fn dbc_files_of_any_length_stay_within_the_memory() {
+    let folder = Folder::new();
+    let signals = "[sensors.signals]\nrate = [\"GyroX\", \"GyroY\", \"GyroZ\"]\nforce = [\"AccX\", \"AccY\", \"AccZ\"]\n\
+        quaternion = [\"QuatW\", \"QuatX\", \"QuatY\", \"QuatZ\"]\n";
+    folder.write(
+        "vehicle.toml",
+        change(VEHICLE, "preset = \"xsens_mti600\"\n", &format!("dbc = \"unit.dbc\"\n{signals}")),
+    );
+    let unit = include_str!("../../../plugins/imu_can/dbc/xsens_mti600.dbc");
+    for (bytes, code) in [((1 << 20) - 16, 0), (4 << 20, 2)] {
+        for list in ["BU_: ", "SIG_GROUP_ 1 g 1: ", "VAL_TABLE_ t "] {
+            let entry = if list.starts_with("VAL") { "0 \"\" " } else { "A " };
+            let names = format!("{list}{};\n", entry.repeat((bytes - unit.len() - list.len()) / entry.len()));
+            let text = if list.starts_with("BU_") {
+                change(unit, "BU_:", names.trim_end_matches(";\n"))
+            } else {
+                format!("{unit}{names}")
+            };
+            folder.write("unit.dbc", text);
+            let ran = run(&folder, &["check", "vehicle.toml"]);
+            assert_eq!(ran.code, Some(code), "{list} {bytes}: {}", ran.stderr);
+            assert!(ran.most_mib < MOST_MIB, "{list} {bytes}: {} MiB", ran.most_mib);
+        }
+    }
+}
+
 #[test]
 fn a_pipe_or_a_device_in_place_of_a_file_keeps_nobody_waiting() {
     let folder = Folder::new();

@@ -7,8 +7,9 @@ use can_dbc::{ByteOrder, Dbc, MessageId, MultiplexIndicator, SignalExtendedValue
 use super::layout::{Bits, DATA_BYTES, Layout, Order};
 use crate::frame::CanId;
 
-/// Maximum text size: files of IMUs have some kilobytes, of whole vehicles some hundreds.
-const MOST_BYTES: usize = 4 << 20;
+/// Maximum text size: files of IMUs have some kilobytes, of whole vehicles some hundreds. The parser takes up to 75 bytes of
+/// memory for each byte of text (lists of one-letter names).
+const MOST_BYTES: usize = 1 << 20;
 
 /// Maximum number of names listed in an error.
 const MOST_NAMES: usize = 40;
@@ -29,7 +30,9 @@ pub enum DbcError {
         problem: String,
     },
     /// Text too long.
-    #[error("reading the DBC: {0} bytes; at most {MOST_BYTES} are read")]
+    #[error(
+        "reading the DBC: {0} bytes; at most {MOST_BYTES} are read: leave only the messages of the unit in it"
+    )]
     Long(usize),
     /// No such signal.
     #[error("looking for the signal {wanted:?}: the DBC has none of that name; it has {has}")]
