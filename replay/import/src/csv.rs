@@ -139,9 +139,14 @@ impl Format for Csv {
             None if end => (front, front.len()),
             None => return Step::More,
         };
+        let is_ended = line.len() < used;
         let line = line.trim_ascii();
         if !core::mem::replace(&mut self.header_passed, true) || line.is_empty() {
             return Step::Took(used);
+        }
+        if !is_ended {
+            // Half a number is a number, too.
+            return Step::Lost(used, "a last row without a line end: it may be cut short, and isn't taken");
         }
         let Ok(line) = str::from_utf8(line) else { return Step::Lost(used, "rows that are no text") };
         match self.row(line, out) {

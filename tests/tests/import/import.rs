@@ -295,7 +295,8 @@ fn rows_that_are_not_as_the_header_are_lost_and_told() {
     assert_eq!((code, messages), (Some(0), 3));
     for (rows, told, words) in [
         ("1,0.0,3.0\n1.1,2,4,3,1\n1.2,4.8,3.0\n", 2, "rows with other cells than the header"),
-        ("1,0.0,3.0\n1.1,2.4,3.1\n1.2,4", 2, "rows with other cells than the header"),
+        ("1,0.0,3.0\n1.1,2.4,3.1\n1.2,4\n", 2, "rows with other cells than the header"),
+        ("1,0.0,3.0\n1.1,2.4,3.1\n1.2,4.8,2", 2, "a last row without a line end: it may be cut short"),
         ("1,0.0,3.0\n1.1,2.4,30\n1.2,4.8,3.0\n", 3, "at its range setting: as if nothing was heard"),
     ] {
         let (code, messages, said) = import(rows);

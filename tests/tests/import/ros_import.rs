@@ -233,6 +233,29 @@ fn changed(folder: &Folder, name: &str, change: impl FnOnce(&mut Vec<u8>)) -> (O
     (answer.code, answer.stderr)
 }
 
+/// States three more messages than the recording has.
+fn state_three_more(bytes: &mut [u8]) {
+    let number = |bytes: &[u8], at: usize| u64::from_le_bytes(bytes[at..at + 8].try_into().unwrap());
+    // The closing magic has 8 bytes, and the footer before it 20, of which the first 8 say where the summary begins.
+    let mut at = usize::try_from(number(bytes, bytes.len() - 28)).unwrap();
+    while bytes[at] != mcap::records::op::STATISTICS {
+        at += 9 + usize::try_from(number(bytes, at + 1)).unwrap();
+    }
+    let count = number(bytes, at + 9) + 3;
+    bytes[at + 9..at + 17].copy_from_slice(&count.to_le_bytes());
+}
+
+#[test]
+fn messages_missing_from_a_stated_count_are_told() {
+    let folder = folder("");
+    let (code, said) = changed(&folder, "humble.mcap", |bytes| state_three_more(bytes));
+    assert_eq!(code, Some(3), "{said}");
+    assert!(
+        said.contains("3 of the ") && said.contains(" messages that its summary states are missing"),
+        "{said}"
+    );
+}
+
 fn find(bytes: &[u8], what: &[u8], after: usize) -> usize {
     after + bytes[after..].windows(what.len()).position(|window| window == what).unwrap()
 }

@@ -6,6 +6,7 @@ use std::collections::BTreeMap;
 use std::io::{Read, Seek};
 
 use super::bag::FIRST_UTC_NS;
+use super::stated::stated_messages;
 use super::{Encoding, Feeds, Topic, Type};
 use crate::order::Order;
 use crate::{Clock, Entry, ImportError, Source};
@@ -24,6 +25,11 @@ pub struct Mcap<R> {
     feeds: Feeds,
     found: Vec<Entry>,
     first_ns: Option<u64>,
+    /// Messages that its summary states; `None` where it states none.
+    stated: Option<u64>,
+    /// Messages read.
+    read: u64,
+    is_at_end: bool,
 }
 
 impl<R: Read + Seek> Mcap<R> {
@@ -33,6 +39,8 @@ impl<R: Read + Seek> Mcap<R> {
     pub fn open(name: &str, mut file: R) -> Result<Self, ImportError> {
         let failed = |source| ImportError::Read { name: name.to_owned(), offset: 0, source };
         let bytes = file.seek(std::io::SeekFrom::End(0)).map_err(failed)?;
+        // The reader tells what can't be read.
+        let stated = stated_messages(&mut file, bytes).ok().flatten();
         let reader = LogReader::new(file, name.to_owned())?;
         if reader.header().metadata.contains_key(FORMAT_KEY) {
             return Err(ImportError::DiveLog { name: name.to_owned() });
@@ -46,6 +54,9 @@ impl<R: Read + Seek> Mcap<R> {
             feeds: Feeds::default(),
             found: Vec::new(),
             first_ns: None,
+            stated,
+            read: 0,
+            is_at_end: false,
         })
     }
 
@@ -85,7 +96,11 @@ impl<R: Read + Seek> Source for Mcap<R> {
 
     fn more(&mut self, order: &mut Order) -> Result<bool, ImportError> {
         for _ in 0..AT_A_TIME {
-            let Some(message) = self.reader.next()? else { return Ok(false) };
+            let Some(message) = self.reader.next()? else {
+                self.is_at_end = true;
+                return Ok(false);
+            };
+            self.read += 1;
             let at_ns = message.log_time.0;
             self.first_ns = Some(self.first_ns.map_or(at_ns, |first_ns| first_ns.min(at_ns)));
             if let Some((topic, encoding)) = self.channels.get(&message.channel) {
@@ -114,6 +129,11 @@ impl<R: Read + Seek> Source for Mcap<R> {
     fn told(&self) -> crate::Told {
         let mut told = self.feeds.told();
         told.losses.extend(self.reader.losses().iter().map(ToString::to_string));
+        if let Some(stated) = self.stated.filter(|stated| self.is_at_end && *stated > self.read) {
+            let missing = stated - self.read;
+            told.losses
+                .push(format!("{missing} of the {stated} messages that its summary states are missing"));
+        }
         if self.reader.late() > 0 {
             told.losses.push(format!(
                 "{} messages stand too late in the file to be put in order",

@@ -11,6 +11,7 @@ pub mod mcap;
 mod message;
 mod points;
 mod ranges;
+mod stated;
 mod unpack;
 mod wire;
 
