@@ -121,9 +121,10 @@ impl<'a> Assembly<'a> {
 
     /// Starts the recorders, and arms the loop.
     ///
-    /// Errors: a device or plugin that doesn't fit; a recording that can't be made.
+    /// Errors: too little memory; a device or plugin that doesn't fit; a recording that can't be made.
     pub(crate) fn assemble(self) -> Result<Dive, Failure> {
         let vehicle = self.vehicle;
+        memory::check_room(ring_bytes(vehicle))?;
         let (mut app, notices) = app(vehicle)?;
         if self.keeps_results {
             app.keep_results();
@@ -168,11 +169,16 @@ fn record(
 fn arm(app: App, vehicle: &VehicleConfig, navigation: Box<dyn Navigation>) -> Result<Loop, Failure> {
     let armed = app.arm(navigation)?;
     if tracing::enabled!(tracing::Level::INFO) {
-        let ring_bytes: usize = vehicle.sensors.iter().map(|sensor| sensor.specification().ring_bytes).sum();
+        let ring_bytes = ring_bytes(vehicle);
         let (sensors, resident_kib) = (vehicle.sensors.len(), memory::resident_kib());
         tracing::info!(sensors, ring_bytes, resident_kib, "loop armed");
     }
     Ok(armed)
+}
+
+/// Size of all sensors' rings, bytes.
+fn ring_bytes(vehicle: &VehicleConfig) -> usize {
+    vehicle.sensors.iter().map(|sensor| sensor.specification().ring_bytes).sum()
 }
 
 /// The vehicle's sensors, and the queue of notices to the terminal.

@@ -69,6 +69,10 @@ pub(crate) enum Failure {
     Plan(#[from] SamplingError),
     #[error("{what}: {source}")]
     System { what: &'static str, source: std::io::Error },
+    #[error(
+        "reserving {mib} MiB of address space for the dive: the system refuses it; raise the limit (ulimit -v) or free memory"
+    )]
+    NoRoom { mib: usize },
     #[error("{0}")]
     Required(String),
     #[error("{0}")]

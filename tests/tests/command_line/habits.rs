@@ -108,6 +108,60 @@ fn work_over_two_seconds_says_how_long_it_still_takes() {
     quiet.end();
 }
 
+/// A process that shares stdout may set it not to wait.
+#[cfg(target_os = "linux")]
+#[test]
+fn report_is_whole_on_a_pipe_that_does_not_wait() {
+    use rustix::fs::{OFlags, fcntl_setfl};
+    let folder = Folder::with_dive();
+    let (mut reader, mut writer) = std::io::pipe().unwrap();
+    fcntl_setfl(&writer, OFlags::NONBLOCK).unwrap();
+    // A pipe holds 64 KiB; spaces may precede JSON.
+    writer.write_all(&[b' '; 60_000]).unwrap();
+    let mut replay = program();
+    replay.args(["replay", "dive.mcap", "--json"]).current_dir(folder.path(""));
+    let mut replay = replay.stdout(writer).spawn().unwrap();
+    std::thread::sleep(std::time::Duration::from_secs(2));
+    let mut bytes = Vec::new();
+    std::io::Read::read_to_end(&mut reader, &mut bytes).unwrap();
+    assert_eq!(replay.wait().unwrap().code(), Some(0));
+    let report: serde_json::Value = serde_json::from_slice(&bytes).unwrap();
+    assert!(bytes.len() > 1 << 16 && report["summary"].is_object());
+}
+
+#[test]
+fn report_to_a_named_pipe_without_a_reader_fails_and_with_one_is_whole() {
+    use rustix::fs::{CWD, FileType, Mode, mknodat};
+    let folder = Folder::with_dive();
+    mknodat(CWD, folder.path("pipe"), FileType::Fifo, Mode::RUSR | Mode::WUSR, 0).unwrap();
+    let replay = ["replay", "dive.mcap", "--report", "pipe"];
+    let answer = folder.headrace(&replay);
+    assert_eq!(answer.code, Some(1), "{}", answer.stderr);
+    let said = "writing pipe: it is a pipe that no process has read within 2 s";
+    assert!(answer.stderr.contains(said), "{}", answer.stderr);
+    let pipe = folder.path("pipe");
+    let reader = std::thread::spawn(move || std::fs::read(pipe).unwrap());
+    assert_eq!(folder.headrace(&replay).code, Some(0));
+    let report: serde_json::Value = serde_json::from_slice(&reader.join().unwrap()).unwrap();
+    assert!(report["summary"].is_object());
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn too_little_address_space_is_refused_and_nothing_aborts() {
+    let folder = Folder::with_dive();
+    let headrace = program();
+    for limit_kib in [100_000, 150_000, 200_000] {
+        let mut limited = Command::new("sh");
+        let line = format!("ulimit -v {limit_kib} && exec \"$0\" replay dive.mcap");
+        limited.args(["-c", &line]).arg(headrace.get_program()).current_dir(folder.path(""));
+        let output = limited.output().unwrap();
+        let said = String::from_utf8(output.stderr).unwrap();
+        assert_eq!(output.status.code(), Some(1), "{limit_kib}: {said}");
+        assert!(said.contains("MiB of address space for the dive: the system refuses it"), "{said}");
+    }
+}
+
 #[cfg(target_os = "linux")]
 #[test]
 fn output_that_cannot_be_written_is_no_success() {
