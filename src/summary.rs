@@ -92,7 +92,10 @@ pub(crate) fn summary(report: &Report, columns: Option<usize>) -> String {
         line(format!("  {} at {place}: {}{by}", note.number, note.words()));
     }
     if report.notes.len() > MOST_NOTES {
-        line(format!("  and {} further notes, all in the report", report.notes.len() - MOST_NOTES));
+        line(format!("  and {} further notes in the report", report.notes.len() - MOST_NOTES));
+    }
+    if report.notes_dropped > 0 {
+        line(format!("  and {} notes in the log alone", report.notes_dropped));
     }
     for loss in report.log.iter().flat_map(|log| &log.losses) {
         line(format!("  LOST: {loss}"));

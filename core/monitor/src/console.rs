@@ -4,9 +4,11 @@
 //! `/raw/console`, so that a replay has it where it was. It is no sensor: it has no lamp, no readings, and no place in navigation.
 
 use std::sync::Arc;
+use std::sync::atomic::{AtomicUsize, Ordering};
 
 use crossbeam::queue::ArrayQueue;
 
+use super::notes::MOST_NOTES;
 use super::ring::Port;
 use super::run::Loop;
 use headrace_geometry::time::{DurNs, MonoNs};
@@ -33,6 +35,11 @@ pub enum ConsoleError {
     /// Too many wait.
     #[error("sending a command to the loop: {MOST_WAITING} are waiting already; send it again")]
     Full,
+    /// The dive has all notes that its report holds.
+    #[error(
+        "sending a note to the loop: the dive has {MOST_NOTES} notes, and its report holds no more; none is taken from now on"
+    )]
+    MostNotes,
 }
 
 /// Takes commands from any thread; never blocks.
@@ -40,6 +47,8 @@ pub enum ConsoleError {
 pub struct ConsolePort {
     waiting: Arc<ArrayQueue<(Option<MonoNs>, Command)>>,
     clock: Option<Arc<DiveClock>>,
+    /// Notes that all ports have taken.
+    notes: Arc<AtomicUsize>,
 }
 
 /// The clock of a dive's timestamps.
@@ -48,11 +57,18 @@ type DiveClock = dyn Fn() -> MonoNs + Send + Sync;
 impl ConsolePort {
     /// Hands a command to the loop, stamped with the dive's clock. The loop takes it at its next tick.
     ///
-    /// Errors: too many wait; the command was not taken.
+    /// Errors: too many wait, or the report has no room for a further note; the command was not taken.
     pub fn send(&self, command: &Command) -> Result<(), ConsoleError> {
-        self.waiting
-            .push((self.clock.as_ref().map(|clock| clock()), *command))
-            .map_err(|_| ConsoleError::Full)
+        let is_note = matches!(command, Command::Note { .. } | Command::Voice { .. });
+        let one_more = |notes| (notes < MOST_NOTES).then_some(notes + 1);
+        if is_note && self.notes.fetch_update(Ordering::Relaxed, Ordering::Relaxed, one_more).is_err() {
+            return Err(ConsoleError::MostNotes);
+        }
+        let sent = self.waiting.push((self.clock.as_ref().map(|clock| clock()), *command));
+        if is_note && sent.is_err() {
+            self.notes.fetch_sub(1, Ordering::Relaxed);
+        }
+        sent.map_err(|_| ConsoleError::Full)
     }
 }
 
@@ -76,7 +92,7 @@ impl ConsoleInput {
         let port = dive.take_console()?;
         let waiting = Arc::new(ArrayQueue::new(MOST_WAITING));
         let input = Self { waiting: Arc::clone(&waiting), port, time_told: MonoNs(0) };
-        Some((input, ConsolePort { waiting, clock }))
+        Some((input, ConsolePort { waiting, clock, notes: Arc::default() }))
     }
 
     /// Moves what waits into the ring, for the next tick, at `now`; what finds no room goes on waiting.

@@ -7,7 +7,7 @@ use super::console::{NoteText, Who};
 use headrace_geometry::snapshot::stateful;
 use headrace_geometry::time::MonoNs;
 
-/// Notes that are kept; later ones are in the log alone.
+/// Notes that are kept, and taken in a dive; later ones of an older log are in that alone.
 pub const MOST_NOTES: usize = 1000;
 
 /// What was spoken, of a voice note.

@@ -34,6 +34,34 @@ fn commands_are_read_as_they_are_written_down() {
 }
 
 #[test]
+fn ports_take_as_many_notes_as_the_report_holds() {
+    let waiting = Arc::new(ArrayQueue::new(MOST_WAITING));
+    let port = ConsolePort { waiting: Arc::clone(&waiting), clock: None, notes: Arc::default() };
+    let other = port.clone();
+    let note = Command::Note { text: NoteText::default(), by: who("AB") };
+    let voice = Command::Voice { id: 7, by: who("AB") };
+    let mut taken = 0;
+    for _ in 0..MOST_NOTES {
+        taken +=
+            [(&port, note), (&other, voice)].iter().filter(|(port, note)| port.send(note).is_ok()).count();
+        while waiting.pop().is_some() {}
+    }
+    assert_eq!(taken, MOST_NOTES);
+    assert_eq!(port.send(&note), Err(ConsoleError::MostNotes));
+    assert_eq!(port.send(&Command::Silence { by: who("AB") }), Ok(()), "other commands go on");
+}
+
+#[test]
+fn notes_that_find_no_room_in_the_queue_are_not_counted() {
+    let port = ConsolePort { waiting: Arc::new(ArrayQueue::new(1)), clock: None, notes: Arc::default() };
+    let note = Command::Note { text: NoteText::default(), by: who("AB") };
+    assert_eq!(port.send(&note), Ok(()));
+    for _ in 0..2 * MOST_NOTES {
+        assert_eq!(port.send(&note), Err(ConsoleError::Full));
+    }
+}
+
+#[test]
 fn what_is_no_command_is_refused_with_its_place() {
     let long = format!(r#"{{"do":"note","text":"{}","by":"AB"}}"#, "x".repeat(241));
     let longest = format!(r#"{{"do":"time"{}}}"#, " ".repeat(500));
