@@ -266,6 +266,7 @@ fn serve(scene: &Scene) -> Page {
         tokens: None,
         hosts: Vec::new(),
         origins: Vec::new(),
+        proxies: Vec::new(),
         tls: None,
     };
     let act = Arc::new(|_| Err("a bench takes no commands".to_owned()));

@@ -110,6 +110,7 @@ fn start(args: &PageArgs, of: Of<'_>, lines: Option<&mut dyn FnMut(&str)>) -> Re
         tokens: tokens.clone(),
         hosts: hosts(args),
         origins: args.page_origin.clone(),
+        proxies: args.page_proxy.clone(),
         tls: tls.map(|(certificate, key)| TlsFiles { certificate, key }),
     };
     let instance = Token::random().map_err(|error| format!("the page has no random number: {error}"))?;

@@ -34,6 +34,9 @@ pub(crate) struct PageArgs {
     /// Origin of another page that may frame this one and send its actions, as http://blueos.local.
     #[arg(long, value_name = "ORIGIN", value_parser = origin)]
     pub(crate) page_origin: Vec<String>,
+    /// Address of a proxy in front of the page. Limits then count by the address that it states in X-Forwarded-For.
+    #[arg(long, value_name = "ADDRESS")]
+    pub(crate) page_proxy: Vec<IpAddr>,
 }
 
 impl PageArgs {

@@ -1,5 +1,6 @@
 //! Who may see and do what: tokens, hosts, origins.
 
+use std::collections::BTreeSet;
 use std::fmt;
 use std::net::IpAddr;
 
@@ -91,26 +92,20 @@ pub(crate) struct Access {
 }
 
 impl Access {
-    /// The role of a request by its token: of the cookie, of `Authorization: Bearer`, or of the query.
-    pub(crate) fn role(&self, headers: &HeaderMap, uri: &Uri) -> Option<Role> {
-        if self.tokens.is_none() {
-            return Some(Role::Operator);
-        }
-        let text = |name| headers.get(name).and_then(|value| value.to_str().ok());
-        let cookies = headers.get_all(header::COOKIE).iter().filter_map(|value| value.to_str().ok());
-        let cookies = cookies.flat_map(|line| line.split(';')).filter_map(|pair| pair.trim().split_once('='));
-        let of_cookie = cookies.filter(|(name, _)| *name == COOKIE).map(|(_, token)| token.to_owned());
-        let bearer =
-            text(header::AUTHORIZATION).and_then(|value| value.strip_prefix("Bearer ")).map(str::to_owned);
-        of_cookie.chain(bearer).chain(query(uri, "token")).filter_map(|token| self.role_of(&token)).max()
-    }
-
     /// The role of a token.
     pub(crate) fn role_of(&self, token: &str) -> Option<Role> {
         let tokens = self.tokens.as_ref()?;
         // Both are compared, whichever it is.
         let (operates, sees) = (tokens.operator.is(token), tokens.viewer.is(token));
         if operates { Some(Role::Operator) } else { sees.then_some(Role::Viewer) }
+    }
+
+    /// Whether this is the token of a role. Others aren't compared.
+    pub(crate) fn is_token_of(&self, role: Role, token: &str) -> bool {
+        self.tokens.as_ref().is_some_and(|tokens| match role {
+            Role::Viewer => tokens.viewer.is(token),
+            Role::Operator => tokens.operator.is(token),
+        })
     }
 
     /// Whether the request names this machine: another name that leads here is DNS rebinding.
@@ -137,6 +132,16 @@ impl Access {
         let authority = origin.strip_prefix("http://").or_else(|| origin.strip_prefix("https://"));
         authority == Some(host) || self.origins.iter().any(|known| known == origin)
     }
+}
+
+/// All tokens of a request, each once: of cookies, of `Authorization: Bearer`, and of the query.
+pub(crate) fn tokens_of(headers: &HeaderMap, uri: &Uri) -> BTreeSet<String> {
+    let values = |name| headers.get_all(name).iter().filter_map(|value| value.to_str().ok());
+    let cookies = values(header::COOKIE).flat_map(|line| line.split(';'));
+    let cookies = cookies.filter_map(|pair| pair.trim().split_once('=')).filter(|(name, _)| *name == COOKIE);
+    let bearers = values(header::AUTHORIZATION).filter_map(|value| value.strip_prefix("Bearer "));
+    let all = cookies.map(|(_, token)| token).chain(bearers).map(str::to_owned);
+    all.chain(query(uri, "token")).collect()
 }
 
 /// A host without its port.
@@ -188,16 +193,27 @@ mod tests {
     }
 
     #[test]
-    fn a_role_is_that_of_the_token_wherever_it_is() {
+    fn tokens_come_from_cookies_bearer_and_query_each_once() {
+        let tokens = |pairs: &[(header::HeaderName, &str)], uri: &'static str| {
+            let headers = pairs.iter().map(|(name, value)| (name, HeaderValue::from_str(value).unwrap()));
+            let mut map = HeaderMap::new();
+            for (name, value) in headers {
+                map.append(name, value);
+            }
+            tokens_of(&map, &Uri::from_static(uri)).into_iter().collect::<Vec<_>>().join(" ")
+        };
+        assert_eq!(tokens(&[], "/"), "");
+        assert_eq!(tokens(&[(header::COOKIE, "a=b; headrace_token=x")], "/"), "x");
+        assert_eq!(tokens(&[(header::AUTHORIZATION, "Bearer y")], "/feed?x=1&token=%7a"), "y z");
+        let lines = [(header::COOKIE, "headrace_token=1"), (header::COOKIE, "headrace_token=2")];
+        assert_eq!(tokens(&[lines.as_slice(), &lines].concat(), "/?token=1"), "1 2");
+    }
+
+    #[test]
+    fn role_is_that_of_the_token() {
         let access = access(false);
-        let role = |pairs: &[_], uri: &'static str| access.role(&headers(pairs), &Uri::from_static(uri));
-        assert_eq!(role(&[], "/"), None);
-        assert_eq!(
-            role(&[(header::COOKIE, "a=b; headrace_token=viewer-0123456789")], "/"),
-            Some(Role::Viewer)
-        );
-        assert_eq!(role(&[(header::AUTHORIZATION, "Bearer operator-01234567")], "/"), Some(Role::Operator));
-        assert_eq!(role(&[], "/feed?x=1&token=operator%2d01234567"), Some(Role::Operator));
+        assert_eq!(access.role_of("viewer-0123456789"), Some(Role::Viewer));
+        assert_eq!(access.role_of("operator-01234567"), Some(Role::Operator));
         for wrong in ["operator-0123456", "operator-012345678", "operator-01234568", ""] {
             assert_eq!(access.role_of(wrong), None, "{wrong:?}");
         }

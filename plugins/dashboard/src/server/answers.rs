@@ -2,10 +2,8 @@
 
 use std::convert::Infallible;
 use std::sync::Arc;
-use std::sync::atomic::Ordering;
 use std::time::Duration;
 
-use axum::Router;
 use axum::body::{Body as HttpBody, Bytes, to_bytes};
 use axum::extract::ws::WebSocketUpgrade;
 use axum::extract::ws::rejection::WebSocketUpgradeRejection;
@@ -14,10 +12,13 @@ use axum::http::{HeaderMap, HeaderName, HeaderValue, Method, StatusCode, Uri, he
 use axum::middleware::{self, Next};
 use axum::response::{IntoResponse, Response};
 use axum::routing::{get, post};
+use axum::{Extension, Router};
 use serde_json::{Value, json};
-use tokio::time::Instant;
+use tokio::time::{Instant, timeout};
 
-use super::reply::{Here, admit, json_answer, plain};
+use super::client::{Admitted, Caller, Denied};
+use super::reply::{Here, json_answer, plain, refused};
+use super::stall::STALLED_AFTER;
 use super::{Shared, feed, metrics, neighbours, voices};
 use crate::access::{COOKIE, name_of, query};
 use crate::assets;
@@ -30,6 +31,7 @@ const SUBPROTOCOL: &str = "headrace.feed.1";
 const LONGEST_READ: usize = 16 << 10;
 /// How long a browser keeps the token, seconds: a day.
 const COOKIE_S: u32 = 86_400;
+const TOO_MANY_STREAMS: &str = "too many viewers, or too many from this address\n";
 
 /// All addresses.
 pub(super) fn router(shared: Arc<Shared>) -> Router {
@@ -128,20 +130,17 @@ async fn asset(Path(path): Path<String>) -> Response {
 }
 
 /// Takes a token, and keeps it in the browser.
-async fn login(State(shared): Here, uri: Uri) -> Response {
-    let role = query(&uri, "token").and_then(|token| Some((shared.access.role_of(&token)?, token)));
+///
+/// The cookie that the browser sends with it is an old one, and isn't looked at.
+async fn login(State(shared): Here, caller: Extension<Caller>, headers: HeaderMap, uri: Uri) -> Response {
     let home = [(header::LOCATION, "/")];
-    let Some((_, token)) = role else {
-        if shared.access.tokens.is_none() {
-            return (StatusCode::SEE_OTHER, home).into_response();
-        }
-        Shared::count(&shared.counts.unauthorised, 1);
-        return if shared.may_fail.take() {
-            plain(StatusCode::UNAUTHORIZED, "that isn't the token\n")
-        } else {
-            plain(StatusCode::TOO_MANY_REQUESTS, "too many wrong tokens; try again in a while\n")
-        };
-    };
+    if shared.access.tokens.is_none() {
+        return (StatusCode::SEE_OTHER, home).into_response();
+    }
+    let token = query(&uri, "token").unwrap_or_default();
+    if let Err(denied) = Admitted::of_tokens(&shared, &caller, &headers, &[token.clone()].into()) {
+        return denied.into_response();
+    }
     let secure = if shared.is_tls { "; Secure" } else { "" };
     let cookie = format!("{COOKIE}={token}; Path=/; Max-Age={COOKIE_S}; HttpOnly; SameSite=Strict{secure}");
     (StatusCode::SEE_OTHER, home, [(header::SET_COOKIE, cookie)]).into_response()
@@ -149,21 +148,18 @@ async fn login(State(shared): Here, uri: Uri) -> Response {
 
 async fn socket(
     State(shared): Here,
-    headers: HeaderMap,
+    admitted: Admitted,
     uri: Uri,
     upgrade: Result<WebSocketUpgrade, WebSocketUpgradeRejection>,
 ) -> Response {
-    let role = match admit(&shared, &headers, &uri) {
-        Ok(role) => role,
-        Err(answer) => return *answer,
-    };
     let upgrade = match upgrade {
         Ok(upgrade) => upgrade,
         Err(rejection) => return rejection.into_response(),
     };
-    if shared.counts.viewers.load(Ordering::Relaxed) >= feed::MOST_VIEWERS {
-        return plain(StatusCode::SERVICE_UNAVAILABLE, "too many viewers\n");
+    if !admitted.may_stream() {
+        return plain(StatusCode::SERVICE_UNAVAILABLE, TOO_MANY_STREAMS);
     }
+    let role = admitted.role;
     let since = query(&uri, "since").and_then(|since| since.parse().ok());
     let resume = query(&uri, "instance").zip(since).map(|(instance, since)| feed::Resume { instance, since });
     let upgrade =
@@ -172,13 +168,13 @@ async fn socket(
 }
 
 /// The texts of the feed, a line each, with a state a second.
-async fn lines(State(shared): Here, headers: HeaderMap, uri: Uri) -> Response {
-    if let Err(answer) = admit(&shared, &headers, &uri) {
-        return *answer;
-    }
+async fn lines(State(shared): Here, admitted: Admitted) -> Response {
     let Some(batches) = shared.fan().as_ref().map(tokio::sync::broadcast::Sender::subscribe) else {
         return plain(StatusCode::SERVICE_UNAVAILABLE, "the dive has ended\n");
     };
+    if !admitted.may_stream() {
+        return plain(StatusCode::SERVICE_UNAVAILABLE, TOO_MANY_STREAMS);
+    }
     let stream = futures_util::stream::unfold((batches, None), |(mut batches, mut stated)| async move {
         loop {
             use tokio::sync::broadcast::error::RecvError;
@@ -213,10 +209,7 @@ fn lines_of(batch: &[Message], stated: &mut Option<Instant>) -> String {
     text
 }
 
-async fn samples(State(shared): Here, headers: HeaderMap, uri: Uri) -> Response {
-    if let Err(answer) = admit(&shared, &headers, &uri) {
-        return *answer;
-    }
+async fn samples(State(shared): Here, _: Admitted, uri: Uri) -> Response {
     let number = |key| query(&uri, key)?.parse::<f32>().ok().filter(|value| value.is_finite());
     let (Some(from_m), Some(to_m)) = (number("from_m"), number("to_m")) else {
         return plain(StatusCode::BAD_REQUEST, "needs from_m and to_m, metres of chainage\n");
@@ -227,16 +220,13 @@ async fn samples(State(shared): Here, headers: HeaderMap, uri: Uri) -> Response 
         (HeaderName::from_static("headrace-one-of"), step.to_string()),
         (HeaderName::from_static("headrace-most"), MOST_IN_RANGE.to_string()),
     ];
-    (axum::response::AppendHeaders(head), frame).into_response()
+    (head, frame).into_response()
 }
 
-async fn state(State(shared): Here, headers: HeaderMap, uri: Uri) -> Response {
-    match admit(&shared, &headers, &uri) {
-        Ok(_) => json_answer(
-            &shared.model().state().unwrap_or(json!({"type": "state", "old": true, "condition": "no_data"})),
-        ),
-        Err(answer) => *answer,
-    }
+async fn state(State(shared): Here, _: Admitted) -> Response {
+    json_answer(
+        &shared.model().state().unwrap_or(json!({"type": "state", "old": true, "condition": "no_data"})),
+    )
 }
 
 async fn schema() -> Response {
@@ -244,13 +234,8 @@ async fn schema() -> Response {
     (kind, include_str!("../../../../docs/page-feed.schema.json")).into_response()
 }
 
-async fn figures(State(shared): Here, headers: HeaderMap, uri: Uri) -> Response {
-    match admit(&shared, &headers, &uri) {
-        Ok(_) => {
-            ([(header::CONTENT_TYPE, "text/plain; version=0.0.4")], metrics::metrics(&shared)).into_response()
-        }
-        Err(answer) => *answer,
-    }
+async fn figures(State(shared): Here, _: Admitted) -> Response {
+    ([(header::CONTENT_TYPE, "text/plain; version=0.0.4")], metrics::metrics(&shared)).into_response()
 }
 
 async fn extras(State(shared): Here, headers: HeaderMap) -> Response {
@@ -283,31 +268,28 @@ async fn preflight(State(shared): Here, headers: HeaderMap) -> Response {
 async fn action(
     State(shared): Here,
     Path(name): Path<String>,
+    admitted: Result<Admitted, Denied>,
     headers: HeaderMap,
-    uri: Uri,
     body: HttpBody,
 ) -> Response {
     let set = allowed(&shared, &headers);
-    match act(&shared, &name, &headers, &uri, body).await {
+    let admitted = match admitted {
+        Ok(admitted) => admitted,
+        Err(denied) => return (set, denied.refusal(&shared)).into_response(),
+    };
+    match act(&shared, &name, &admitted, body).await {
         Ok(done) => (set, json_answer(&done)).into_response(),
-        Err((status, why)) => {
-            Shared::count(&shared.counts.refused, 1);
-            let refused = json!({"type": "refused", "why": why}).to_string();
-            (status, set, [(header::CONTENT_TYPE, "application/json")], refused).into_response()
-        }
+        Err((status, why)) => (set, refused(&shared, status, &why)).into_response(),
     }
 }
 
 async fn act(
     shared: &Shared,
     name: &str,
-    headers: &HeaderMap,
-    uri: &Uri,
+    admitted: &Admitted,
     body: HttpBody,
 ) -> Result<Value, (StatusCode, String)> {
-    let role =
-        shared.access.role(headers, uri).ok_or((StatusCode::UNAUTHORIZED, "a token is needed".to_owned()))?;
-    if !feed::may(shared, role).operate {
+    if !feed::may(shared, admitted.role).operate {
         return Err((StatusCode::FORBIDDEN, "not in this dive, or the token is a viewer's".to_owned()));
     }
     if !["acknowledge", "silence", "mark", "note"].contains(&name) {
@@ -317,7 +299,14 @@ async fn act(
         ));
     }
     let too_long = |_| (StatusCode::PAYLOAD_TOO_LARGE, format!("at most {LONGEST} bytes"));
-    let bytes = to_bytes(body, LONGEST).await.map_err(too_long)?;
+    if !shared.actions.take(admitted.client, 1) {
+        let why = format!("over {} actions a second from this address; send it again", feed::MOST_PER_S);
+        return Err((StatusCode::TOO_MANY_REQUESTS, why));
+    }
+    let late = |_| {
+        (StatusCode::REQUEST_TIMEOUT, format!("the action took over {} s to come", STALLED_AFTER.as_secs()))
+    };
+    let bytes = timeout(STALLED_AFTER, to_bytes(body, LONGEST)).await.map_err(late)?.map_err(too_long)?;
     let wrong = |why: String| (StatusCode::BAD_REQUEST, why);
     let mut value: Value = if bytes.is_empty() {
         json!({})

@@ -4,26 +4,30 @@ use std::sync::Arc;
 use std::sync::atomic::Ordering;
 use std::time::Duration;
 
+use axum::body::Bytes;
 use axum::extract::ws::{CloseFrame, Message as Frame, WebSocket, close_code};
 use serde_json::{Value, json};
 use tokio::sync::broadcast::error::RecvError;
-use tokio::time::{Instant, timeout};
+use tokio::time::{Instant, sleep_until, timeout};
 
 use super::Shared;
-use super::metrics::Budget;
+use super::budget::Budget;
+use super::stall::STALLED_AFTER;
 use crate::access::Role;
 use crate::command::{Asked, Command, LONGEST};
 use crate::model::{Body, Message, Sort};
 use crate::site::May;
 
-/// Viewers at a time.
-pub(super) const MOST_VIEWERS: usize = 32;
-/// A viewer that takes nothing for so long is dropped.
-const STALLED_AFTER: Duration = Duration::from_secs(10);
+/// A viewer is sent a ping so long after its answer to the last one, and must answer within so long: a stalled one is dropped within
+/// [`STALLED_AFTER`], however much of the feed its machine holds for it unread.
+const PING_EVERY: Duration = Duration::from_secs(2);
+const ANSWERS_WITHIN: Duration = Duration::from_secs(8);
+/// A viewer that takes a long message more slowly than this is dropped, bytes a second.
+const SLOWEST_PER_S: f64 = 20_000.0;
 /// Messages read of a viewer after it was told that its connection is closed.
 const MOST_AFTER_CLOSE: usize = 64;
 /// Messages a second from a viewer.
-const MOST_PER_S: f64 = 20.0;
+pub(super) const MOST_PER_S: f64 = 20.0;
 
 /// Where a viewer was when it was lost.
 pub(super) struct Resume {
@@ -70,6 +74,10 @@ struct Viewer {
     state_every: Duration,
     state_sent: Option<Instant>,
     budget: Budget,
+    /// When the next ping is due.
+    ping_at: Instant,
+    /// When the answer to the last ping is due.
+    answer_by: Option<Instant>,
 }
 
 /// Serves a viewer until it goes.
@@ -86,15 +94,13 @@ pub(super) async fn serve(socket: WebSocket, shared: Arc<Shared>, role: Role, re
         state_every: Duration::ZERO,
         state_sent: None,
         budget: Budget::new(MOST_PER_S, MOST_PER_S),
+        ping_at: Instant::now(),
+        answer_by: None,
     };
     let (code, reason) = match viewer.watch().await {
         Over::Gone => return,
         Over::Stalled => {
-            Shared::count(&viewer.shared.counts.stalled, 1);
-            tracing::info!(
-                "a viewer of the page took nothing for {} s and was dropped",
-                STALLED_AFTER.as_secs()
-            );
+            viewer.shared.count_stalled();
             return;
         }
         Over::Refused => (close_code::POLICY, "refused"),
@@ -164,6 +170,11 @@ impl Viewer {
                             return over;
                         }
                     }
+                    () = sleep_until(self.answer_by.unwrap_or(self.ping_at)) => {
+                        if let Err(over) = self.ping().await {
+                            return over;
+                        }
+                    }
                 }
             }
         }
@@ -198,28 +209,49 @@ impl Viewer {
             Body::Text(text) => (Frame::Text(text.clone()), text.len()),
             Body::Binary(bytes) => (Frame::Binary(bytes.clone()), bytes.len()),
         };
-        self.put(frame).await?;
+        self.put(frame, bytes).await?;
         self.seq = self.seq.max(message.seq);
         Shared::count(&self.shared.counts.bytes, bytes as u64);
         Ok(())
     }
 
-    async fn put(&mut self, frame: Frame) -> Result<(), Over> {
-        match timeout(STALLED_AFTER, self.socket.send(frame)).await {
-            Ok(Ok(())) => Ok(()),
+    async fn put(&mut self, frame: Frame, bytes: usize) -> Result<(), Over> {
+        let began = Instant::now();
+        let within = STALLED_AFTER + Duration::from_secs_f64(bytes as f64 / SLOWEST_PER_S);
+        match timeout(within, self.socket.send(frame)).await {
+            Ok(Ok(())) => {
+                // An answer isn't read meanwhile, and what a slow line holds comes before it.
+                self.answer_by = self.answer_by.map(|by| by + began.elapsed());
+                Ok(())
+            }
             Ok(Err(_)) => Err(Over::Gone),
             Err(_) => Err(Over::Stalled),
         }
     }
 
+    /// Sends a ping. Its answer shows that all before it has been read.
+    async fn ping(&mut self) -> Result<(), Over> {
+        if self.answer_by.is_some() {
+            return Err(Over::Stalled);
+        }
+        self.put(Frame::Ping(Bytes::new()), 0).await?;
+        self.answer_by = Some(Instant::now() + ANSWERS_WITHIN);
+        Ok(())
+    }
+
     async fn answer(&mut self, value: &Value) -> Result<(), Over> {
-        self.put(Frame::Text(value.to_string().into())).await
+        let text = value.to_string();
+        let bytes = text.len();
+        self.put(Frame::Text(text.into()), bytes).await
     }
 
     async fn hear(&mut self, message: Frame) -> Result<(), Over> {
         let text = match message {
             Frame::Text(text) => text,
             Frame::Ping(_) | Frame::Pong(_) => {
+                if matches!(message, Frame::Pong(_)) && self.answer_by.take().is_some() {
+                    self.ping_at = Instant::now() + PING_EVERY;
+                }
                 return if self.budget.take() {
                     Ok(())
                 } else {

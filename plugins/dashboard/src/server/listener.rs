@@ -1,33 +1,36 @@
-//! Connections: a bounded number, with TLS where there is a certificate.
+//! Connections: accepted at once, with TLS where there is a certificate, and closed where they show nothing in time.
 
 use std::io;
 use std::net::SocketAddr;
-use std::pin::Pin;
 use std::sync::Arc;
-use std::task::{Context, Poll};
 use std::time::Duration;
 
-use tokio::io::{AsyncRead, AsyncWrite, ReadBuf};
-use tokio::net::TcpListener;
-use tokio::sync::{OwnedSemaphorePermit, Semaphore};
+use hyper::body::Incoming;
+use hyper::server::conn::http1;
+use hyper::service::{Service as _, service_fn};
+use hyper_util::rt::{TokioIo, TokioTimer};
+use hyper_util::service::TowerToHyperService;
+use tokio::io::{AsyncRead, AsyncWrite};
+use tokio::net::{TcpListener, TcpSocket, TcpStream};
 
-use super::TlsFiles;
+use super::client::{Caller, Client};
+use super::stall::Stream;
+use super::{Shared, TlsFiles, answers};
 
-/// Connections at a time; more wait.
-const MOST: usize = 128;
 /// Wait after a connection couldn't be taken.
 const PAUSE: Duration = Duration::from_millis(100);
-
-/// A stream of bytes both ways.
-pub(super) trait Duplex: AsyncRead + AsyncWrite + Send + Unpin {}
-impl<T: AsyncRead + AsyncWrite + Send + Unpin> Duplex for T {}
-
-/// A connection, and its place among those allowed.
-pub(super) struct Connection {
-    io: Box<dyn Duplex>,
-    #[cfg_attr(not(feature = "tls"), expect(dead_code, reason = "held, and moved by a handshake alone"))]
-    place: OwnedSemaphorePermit,
-}
+/// A connection whose next request's head isn't there in so long is closed: silent, half sent or idle.
+const HEAD_WITHIN: Duration = Duration::from_secs(10);
+/// How long a TLS handshake may take.
+#[cfg(feature = "tls")]
+const HANDSHAKE_WITHIN: Duration = Duration::from_secs(5);
+/// Bytes that the kernel holds for a connection to send, and as much again for its own needs. On its own it holds megabytes, and hides
+/// for a minute that a viewer takes nothing.
+const SEND_BUFFER: u32 = 32 << 10;
+/// Bytes that are held for a connection here: the longest head of a request, and what of an answer waits to be sent.
+const HELD: usize = 64 << 10;
+/// Connections that the kernel holds until they are accepted.
+const BACKLOG: u32 = 1024;
 
 /// Certificate and key.
 pub(super) struct Tls {
@@ -77,143 +80,79 @@ impl Tls {
     }
 }
 
-/// A port that is listened on.
-pub(super) struct Listening {
-    listener: TcpListener,
-    places: Arc<Semaphore>,
-    #[cfg(feature = "tls")]
-    tls: Option<secure::Handshakes>,
+/// Listens on an address. Must be called within the runtime.
+///
+/// Errors: the system's.
+pub(super) fn listen(address: SocketAddr) -> io::Result<TcpListener> {
+    let socket = if address.is_ipv4() { TcpSocket::new_v4() } else { TcpSocket::new_v6() }?;
+    // As the standard library does: elsewhere it would let two programs share a port.
+    #[cfg(unix)]
+    socket.set_reuseaddr(true)?;
+    // Accepted connections inherit it.
+    socket.set_send_buffer_size(SEND_BUFFER)?;
+    socket.bind(address)?;
+    socket.listen(BACKLOG)
 }
 
-impl Listening {
-    /// Listens on.
-    ///
-    /// Errors: the socket can't be polled.
-    #[cfg_attr(
-        not(feature = "tls"),
-        expect(unused_variables, clippy::needless_pass_by_value, reason = "without TLS there is none")
-    )]
-    pub(super) fn new(listener: std::net::TcpListener, tls: Option<Tls>) -> io::Result<Self> {
-        listener.set_nonblocking(true)?;
-        Ok(Self {
-            listener: TcpListener::from_std(listener)?,
-            places: Arc::new(Semaphore::new(MOST)),
+/// Accepts connections until it is aborted.
+pub(super) async fn accept(listener: TcpListener, tls: Option<Tls>, shared: Arc<Shared>) {
+    let app = App::new(answers::router(Arc::clone(&shared)));
+    let tls = tls.map(Arc::new);
+    loop {
+        match listener.accept().await {
+            Ok((tcp, from)) => {
+                // Small messages are due at once.
+                if let Err(error) = tcp.set_nodelay(true) {
+                    tracing::debug!(%error, "a connection of the page delays small messages");
+                }
+                let place = Arc::new(shared.places.enter(Client::of_address(from.ip())));
+                let caller = Caller { peer: from.ip(), place };
+                tokio::spawn(serve(tcp, caller, app.clone(), tls.clone(), Arc::clone(&shared)));
+            }
+            Err(error) => {
+                tracing::debug!(%error, "a connection of the page couldn't be taken");
+                tokio::time::sleep(PAUSE).await;
+            }
+        }
+        // Each has its turn before enough others come to take its place.
+        tokio::task::yield_now().await;
+    }
+}
+
+type App = TowerToHyperService<axum::Router>;
+
+/// Serves a connection until it ends or its place is another's.
+async fn serve(tcp: TcpStream, caller: Caller, app: App, tls: Option<Arc<Tls>>, shared: Arc<Shared>) {
+    let place = Arc::clone(&caller.place);
+    let stream = Stream::new(tcp, Arc::clone(&place), shared);
+    let serving = async {
+        match tls {
+            None => answer(stream, caller, app).await,
+            #[cfg(not(feature = "tls"))]
+            Some(_) => {}
             #[cfg(feature = "tls")]
-            tls: tls.map(|tls| secure::Handshakes::new(tls.acceptor)),
-        })
-    }
-
-    async fn plain(&self) -> (Connection, SocketAddr) {
-        loop {
-            let place = Arc::clone(&self.places).acquire_owned().await;
-            match (self.listener.accept().await, place) {
-                (Ok((stream, from)), Ok(place)) => {
-                    // Small messages are due at once.
-                    if let Err(error) = stream.set_nodelay(true) {
-                        tracing::debug!(%error, "a connection of the page delays small messages");
-                    }
-                    return (Connection { io: Box::new(stream), place }, from);
-                }
-                (Err(error), _) => {
-                    tracing::debug!(%error, "a connection of the page couldn't be taken");
-                    tokio::time::sleep(PAUSE).await;
-                }
-                (_, Err(_)) => tokio::time::sleep(PAUSE).await,
-            }
+            Some(tls) => match tokio::time::timeout(HANDSHAKE_WITHIN, tls.acceptor.accept(stream)).await {
+                Ok(Ok(stream)) => answer(stream, caller, app).await,
+                Ok(Err(error)) => tracing::debug!(%error, "a handshake of the page failed"),
+                Err(_) => tracing::debug!("a handshake of the page took too long"),
+            },
         }
+    };
+    tokio::select! {
+        () = serving => {}
+        () = place.closed() => tracing::debug!("a connection of the page was closed for a newer one"),
     }
 }
 
-impl axum::serve::Listener for Listening {
-    type Io = Connection;
-    type Addr = SocketAddr;
-
-    #[cfg(not(feature = "tls"))]
-    async fn accept(&mut self) -> (Connection, SocketAddr) {
-        self.plain().await
-    }
-
-    #[cfg(feature = "tls")]
-    async fn accept(&mut self) -> (Connection, SocketAddr) {
-        let Some(mut tls) = self.tls.take() else { return self.plain().await };
-        let ready = loop {
-            tokio::select! {
-                (connection, from) = self.plain() => tls.begin(connection, from),
-                Some(ready) = tls.ready() => break ready,
-            }
-        };
-        self.tls = Some(tls);
-        ready
-    }
-
-    fn local_addr(&self) -> io::Result<SocketAddr> {
-        self.listener.local_addr()
-    }
-}
-
-#[cfg(feature = "tls")]
-mod secure {
-    use super::{Connection, Duration, SocketAddr};
-    use tokio::sync::mpsc;
-    use tokio_rustls::TlsAcceptor;
-
-    /// How long a handshake may take.
-    const WITHIN: Duration = Duration::from_secs(5);
-
-    /// Handshakes that go on side by side: a slow one holds up no other.
-    pub(super) struct Handshakes {
-        acceptor: TlsAcceptor,
-        done: mpsc::Sender<(Connection, SocketAddr)>,
-        ready: mpsc::Receiver<(Connection, SocketAddr)>,
-    }
-
-    impl Handshakes {
-        pub(super) fn new(acceptor: TlsAcceptor) -> Self {
-            let (done, ready) = mpsc::channel(16);
-            Self { acceptor, done, ready }
-        }
-
-        pub(super) fn begin(&self, connection: Connection, from: SocketAddr) {
-            let (acceptor, done) = (self.acceptor.clone(), self.done.clone());
-            tokio::spawn(async move {
-                let Connection { io, place } = connection;
-                match tokio::time::timeout(WITHIN, acceptor.accept(io)).await {
-                    Ok(Ok(stream)) => {
-                        // Nobody takes it once the page has ended.
-                        let _ended = done.send((Connection { io: Box::new(stream), place }, from)).await;
-                    }
-                    Ok(Err(error)) => tracing::debug!(%error, "a handshake of the page failed"),
-                    Err(_) => tracing::debug!("a handshake of the page took too long"),
-                }
-            });
-        }
-
-        pub(super) async fn ready(&mut self) -> Option<(Connection, SocketAddr)> {
-            self.ready.recv().await
-        }
-    }
-}
-
-impl AsyncRead for Connection {
-    fn poll_read(
-        mut self: Pin<&mut Self>,
-        cx: &mut Context<'_>,
-        buf: &mut ReadBuf<'_>,
-    ) -> Poll<io::Result<()>> {
-        Pin::new(&mut self.io).poll_read(cx, buf)
-    }
-}
-
-impl AsyncWrite for Connection {
-    fn poll_write(mut self: Pin<&mut Self>, cx: &mut Context<'_>, bytes: &[u8]) -> Poll<io::Result<usize>> {
-        Pin::new(&mut self.io).poll_write(cx, bytes)
-    }
-
-    fn poll_flush(mut self: Pin<&mut Self>, cx: &mut Context<'_>) -> Poll<io::Result<()>> {
-        Pin::new(&mut self.io).poll_flush(cx)
-    }
-
-    fn poll_shutdown(mut self: Pin<&mut Self>, cx: &mut Context<'_>) -> Poll<io::Result<()>> {
-        Pin::new(&mut self.io).poll_shutdown(cx)
+/// Answers the requests of a connection.
+async fn answer(stream: impl AsyncRead + AsyncWrite + Send + Unpin + 'static, caller: Caller, app: App) {
+    let service = service_fn(move |mut request: hyper::Request<Incoming>| {
+        request.extensions_mut().insert(caller.clone());
+        app.call(request)
+    });
+    let mut http = http1::Builder::new();
+    http.timer(TokioTimer::new()).header_read_timeout(HEAD_WITHIN).max_buf_size(HELD);
+    if let Err(error) = http.serve_connection(TokioIo::new(stream), service).with_upgrades().await {
+        tracing::debug!(%error, "a connection of the page failed");
     }
 }

@@ -1,39 +1,11 @@
-//! Figures of the page and the dive for Prometheus, and budgets of requests.
-
-#![expect(clippy::disallowed_types, reason = "locks between the page's threads; the loop's takes none")]
+//! Figures of the page and the dive for Prometheus.
 
 use std::fmt::Write as _;
 use std::sync::atomic::Ordering;
-use std::sync::{Mutex, PoisonError};
 
 use serde_json::Value;
-use tokio::time::Instant;
 
 use super::Shared;
-
-/// So many at once, and so many a second after that.
-pub(crate) struct Budget {
-    most: f64,
-    per_s: f64,
-    left: Mutex<(f64, Option<Instant>)>,
-}
-
-impl Budget {
-    pub(crate) fn new(most: f64, per_s: f64) -> Self {
-        Self { most, per_s, left: Mutex::new((most, None)) }
-    }
-
-    /// Takes one, if there is one left.
-    pub(crate) fn take(&self) -> bool {
-        let mut left = self.left.lock().unwrap_or_else(PoisonError::into_inner);
-        let now = Instant::now();
-        let since_s = left.1.map_or(0.0, |last| now.duration_since(last).as_secs_f64());
-        let budget = (left.0 + since_s * self.per_s).min(self.most);
-        let has_one = budget >= 1.0;
-        *left = (if has_one { budget - 1.0 } else { budget }, Some(now));
-        has_one
-    }
-}
 
 /// In Prometheus' text format.
 pub(super) fn metrics(shared: &Shared) -> String {

@@ -3,16 +3,20 @@
 #![expect(clippy::disallowed_types, reason = "locks between the page's threads; the loop's takes none")]
 
 mod answers;
+mod budget;
+mod client;
 mod feed;
 mod listener;
 mod metrics;
 mod neighbours;
+mod places;
 mod pump;
 mod reply;
+mod stall;
 mod voices;
 
 use std::io;
-use std::net::{SocketAddr, TcpListener};
+use std::net::{IpAddr, SocketAddr};
 use std::sync::atomic::{AtomicBool, AtomicU64, AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::thread::JoinHandle;
@@ -20,6 +24,7 @@ use std::time::Duration;
 
 use headrace_monitor::run::Loop;
 use headrace_monitor::voice::Voice;
+use tokio::net::TcpListener;
 use tokio::sync::{Notify, broadcast, mpsc};
 
 use crate::access::{Access, Tokens};
@@ -35,6 +40,9 @@ pub const PORT: u16 = 8881;
 const PORTS: u16 = 10;
 /// Batches that a viewer may be behind before it gets all that has changed at once.
 const BATCHES: usize = 64;
+/// Wrong tokens that a client may send at once, and so many a second after that.
+const MOST_GUESSES: f64 = 20.0;
+const GUESSES_PER_S: f64 = 1.0;
 /// How long viewers get for the last messages.
 const ENDS_WITHIN: Duration = Duration::from_secs(1);
 
@@ -58,6 +66,8 @@ pub struct Settings {
     pub hosts: Vec<String>,
     /// Origins of pages that may frame this one and send actions.
     pub origins: Vec<String>,
+    /// Proxies whose `X-Forwarded-For` is believed.
+    pub proxies: Vec<IpAddr>,
     /// Certificate and key.
     pub tls: Option<TlsFiles>,
 }
@@ -128,7 +138,13 @@ pub(crate) struct Shared {
     pub(crate) direct: Direct,
     pub(crate) voices: voices::Desk,
     pub(crate) is_tls: bool,
-    pub(crate) may_fail: metrics::Budget,
+    proxies: Vec<IpAddr>,
+    places: Arc<places::Places>,
+    /// Wrong tokens of each client.
+    guesses: budget::Budgets,
+    wrong_tokens: client::WrongTokens,
+    /// Actions of each operator by HTTP.
+    actions: budget::Budgets,
     stop: Notify,
     has_ended: AtomicBool,
 }
@@ -140,6 +156,15 @@ impl Shared {
 
     fn fan(&self) -> MutexGuard<'_, Option<broadcast::Sender<Arc<[Message]>>>> {
         self.fan.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// A viewer took nothing for too long.
+    fn count_stalled(&self) {
+        Self::count(&self.counts.stalled, 1);
+        tracing::info!(
+            "a viewer of the page took nothing for {} s and was dropped",
+            stall::STALLED_AFTER.as_secs()
+        );
     }
 
     pub(crate) fn count(counter: &AtomicU64, by: u64) {
@@ -169,13 +194,18 @@ impl Page {
         direct: Direct,
         voices: Voices,
     ) -> Result<Self, PageError> {
-        let (listener, taken) = bind(settings.address)?;
+        let runtime = tokio::runtime::Builder::new_current_thread().enable_io().enable_time().build();
+        let runtime = runtime.map_err(PageError::Thread)?;
+        let (listener, taken) = {
+            let _within = runtime.enter();
+            bind(settings.address)?
+        };
         let address = listener.local_addr().map_err(PageError::Thread)?;
         let tls = settings.tls.as_ref().map(listener::Tls::read).transpose().map_err(PageError::Tls)?;
         let (sender, receiver) = mpsc::channel(WAITING);
         let (fan, _) = broadcast::channel(BATCHES);
         let is_loopback = address.ip().is_loopback();
-        let Settings { tokens, hosts, origins, .. } = settings;
+        let Settings { tokens, hosts, origins, proxies, .. } = settings;
         let shared = Arc::new(Shared {
             model: Mutex::new(Model::new(site, instance)),
             access: Access { tokens, hosts, origins, is_loopback },
@@ -185,12 +215,14 @@ impl Page {
             direct,
             voices: voices::Desk::new(voices),
             is_tls: tls.is_some(),
-            may_fail: metrics::Budget::new(20.0, 1.0),
+            proxies: proxies.iter().map(IpAddr::to_canonical).collect(),
+            places: Arc::default(),
+            guesses: budget::Budgets::new(MOST_GUESSES, GUESSES_PER_S),
+            wrong_tokens: client::WrongTokens::default(),
+            actions: budget::Budgets::new(feed::MOST_PER_S, feed::MOST_PER_S),
             stop: Notify::new(),
             has_ended: AtomicBool::new(false),
         });
-        let runtime = tokio::runtime::Builder::new_current_thread().enable_io().enable_time().build();
-        let runtime = runtime.map_err(PageError::Thread)?;
         let of_thread = Arc::clone(&shared);
         let serve = move || runtime.block_on(serve(listener, tls, receiver, of_thread));
         let thread =
@@ -260,7 +292,7 @@ fn bind(asked: SocketAddr) -> Result<(TcpListener, Vec<u16>), PageError> {
     let mut failed = io::Error::other("no port");
     for step in 0..PORTS {
         let Some(port) = asked.port().checked_add(step) else { break };
-        match TcpListener::bind(SocketAddr::new(asked.ip(), port)) {
+        match listener::listen(SocketAddr::new(asked.ip(), port)) {
             Ok(listener) => return Ok((listener, taken)),
             Err(error) if error.kind() == io::ErrorKind::AddrInUse => {
                 taken.push(port);
@@ -278,21 +310,8 @@ async fn serve(
     fed: mpsc::Receiver<Fed>,
     shared: Arc<Shared>,
 ) {
-    let listener = match listener::Listening::new(listener, tls) {
-        Ok(listener) => listener,
-        Err(error) => {
-            tracing::error!(%error, "the page can't be served");
-            return;
-        }
-    };
-    let app = answers::router(Arc::clone(&shared));
     let pump = pump::pump(fed, Arc::clone(&shared));
-    let serving = async move {
-        if let Err(error) = axum::serve(listener, app).await {
-            tracing::error!(%error, "the page isn't served any more");
-        }
-    };
-    let serving = tokio::spawn(serving);
+    let serving = tokio::spawn(listener::accept(listener, tls, Arc::clone(&shared)));
     // Ends when the page is to.
     pump.await;
     drop(shared.fan().take());
@@ -306,3 +325,6 @@ async fn serve(
     }
     serving.abort();
 }
+
+#[cfg(test)]
+mod tests;

@@ -3,12 +3,11 @@
 use std::sync::Arc;
 
 use axum::extract::State;
-use axum::http::{HeaderMap, StatusCode, Uri, header};
+use axum::http::{HeaderValue, StatusCode, header};
 use axum::response::{IntoResponse, Response};
-use serde_json::Value;
+use serde_json::{Value, json};
 
 use super::Shared;
-use crate::access::Role;
 
 pub(super) type Here = State<Arc<Shared>>;
 
@@ -20,12 +19,18 @@ pub(super) fn json_answer(value: &Value) -> Response {
     ([(header::CONTENT_TYPE, "application/json")], value.to_string()).into_response()
 }
 
-/// The role of a request.
-///
-/// Errors: the answer where it has none.
-pub(super) fn admit(shared: &Shared, headers: &HeaderMap, uri: &Uri) -> Result<Role, Box<Response>> {
-    shared.access.role(headers, uri).ok_or_else(|| {
-        Shared::count(&shared.counts.unauthorised, 1);
-        Box::new(plain(StatusCode::UNAUTHORIZED, "a token is needed: open this server's page\n"))
-    })
+/// Refuses a command, and says why.
+pub(super) fn refused(shared: &Shared, status: StatusCode, why: &str) -> Response {
+    Shared::count(&shared.counts.refused, 1);
+    let mut answer = json_answer(&json!({"type": "refused", "why": why}));
+    *answer.status_mut() = status;
+    ask_to_wait(answer)
+}
+
+/// An answer that says when to try again, where the client has asked too often.
+pub(super) fn ask_to_wait(mut answer: Response) -> Response {
+    if answer.status() == StatusCode::TOO_MANY_REQUESTS {
+        answer.headers_mut().insert(header::RETRY_AFTER, HeaderValue::from_static("1"));
+    }
+    answer
 }

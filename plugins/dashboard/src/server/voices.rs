@@ -13,9 +13,10 @@ use serde_json::json;
 use tokio::sync::Semaphore;
 use tokio::time::timeout;
 
-use super::metrics::Budget;
-use super::reply::{Here, admit, json_answer, plain};
-use super::{Shared, Voices, feed};
+use super::budget::Budget;
+use super::client::{Admitted, Denied};
+use super::reply::{Here, json_answer, plain, refused};
+use super::{Voices, feed};
 use crate::access::query;
 
 /// Voice notes that were begun and whose recordings haven't come; the oldest is forgotten.
@@ -131,33 +132,33 @@ impl Desk {
 pub(super) async fn take(
     State(shared): Here,
     Path(id): Path<String>,
+    admitted: Result<Admitted, Denied>,
     headers: HeaderMap,
     uri: Uri,
     body: HttpBody,
 ) -> Response {
-    match receive(&shared, &id, &headers, &uri, body).await {
+    let admitted = match admitted {
+        Ok(admitted) => admitted,
+        Err(denied) => return denied.refusal(&shared),
+    };
+    let received = if feed::may(&shared, admitted.role).operate {
+        receive(&shared.voices, &id, &headers, &uri, body).await
+    } else {
+        Err((StatusCode::FORBIDDEN, "not in this dive, or the token is a viewer's".to_owned()))
+    };
+    match received {
         Ok(()) => json_answer(&json!({"type": "done", "do": "voice"})),
-        Err((status, why)) => {
-            Shared::count(&shared.counts.refused, 1);
-            let refused = json!({"type": "refused", "why": why}).to_string();
-            (status, [(header::CONTENT_TYPE, "application/json")], refused).into_response()
-        }
+        Err((status, why)) => refused(&shared, status, &why),
     }
 }
 
 async fn receive(
-    shared: &Shared,
+    desk: &Desk,
     id: &str,
     headers: &HeaderMap,
     uri: &Uri,
     body: HttpBody,
 ) -> Result<(), Refusal> {
-    let role =
-        shared.access.role(headers, uri).ok_or((StatusCode::UNAUTHORIZED, "a token is needed".to_owned()))?;
-    if !feed::may(shared, role).operate {
-        return Err((StatusCode::FORBIDDEN, "not in this dive, or the token is a viewer's".to_owned()));
-    }
-    let desk = &shared.voices;
     let too_many = || (StatusCode::TOO_MANY_REQUESTS, "too many voices at a time; send it again".to_owned());
     let _place = desk.coming.try_acquire().map_err(|_| too_many())?;
     let wrong = |why: String| (StatusCode::BAD_REQUEST, why);
@@ -190,15 +191,7 @@ fn refusal(error: &VoiceError) -> Refusal {
 }
 
 /// Plays the recording of a voice note to whoever sees the dive.
-pub(super) async fn play(
-    State(shared): Here,
-    Path(id): Path<String>,
-    headers: HeaderMap,
-    uri: Uri,
-) -> Response {
-    if let Err(answer) = admit(&shared, &headers, &uri) {
-        return *answer;
-    }
+pub(super) async fn play(State(shared): Here, Path(id): Path<String>, _: Admitted) -> Response {
     let spoken = id.parse().ok().and_then(|id| Some((id, shared.model().spoken_s(id)?)));
     let Some((id, at_s)) = spoken else {
         return plain(StatusCode::NOT_FOUND, "no voice note of this id has a recording\n");

@@ -1,0 +1,130 @@
+//! Budgets of requests: so many at once, and so many a second after that.
+
+use std::collections::BTreeMap;
+use std::sync::{Mutex, PoisonError};
+
+use tokio::time::Instant;
+
+use super::client::Client;
+
+/// Clients that a budget remembers. A table of this size takes about 200 KiB.
+const MOST_CLIENTS: usize = 4096;
+
+/// Size of a budget, and its refill.
+#[derive(Debug, Clone, Copy)]
+struct Rate {
+    most: f64,
+    per_s: f64,
+}
+
+/// What is left of a budget, and when that was.
+#[derive(Debug, Clone, Copy)]
+struct Left(f64, Instant);
+
+impl Left {
+    fn now(self, rate: Rate, now: Instant) -> f64 {
+        (self.0 + now.duration_since(self.1).as_secs_f64() * rate.per_s).min(rate.most)
+    }
+}
+
+/// A budget that all share.
+pub(crate) struct Budget {
+    rate: Rate,
+    left: Mutex<Option<Left>>,
+}
+
+impl Budget {
+    pub(crate) fn new(most: f64, per_s: f64) -> Self {
+        Self { rate: Rate { most, per_s }, left: Mutex::new(None) }
+    }
+
+    /// Takes one, if there is one left.
+    pub(crate) fn take(&self) -> bool {
+        let mut left = self.left.lock().unwrap_or_else(PoisonError::into_inner);
+        let now = Instant::now();
+        let budget = left.map_or(self.rate.most, |left| left.now(self.rate, now));
+        let has_one = budget >= 1.0;
+        *left = Some(Left(if has_one { budget - 1.0 } else { budget }, now));
+        has_one
+    }
+}
+
+/// A budget for each client.
+pub(crate) struct Budgets {
+    rate: Rate,
+    left: Mutex<BTreeMap<Client, Left>>,
+}
+
+impl Budgets {
+    pub(crate) fn new(most: f64, per_s: f64) -> Self {
+        Self { rate: Rate { most, per_s }, left: Mutex::default() }
+    }
+
+    /// Takes as many from a client's budget, if all of them are left; otherwise none.
+    pub(crate) fn take(&self, client: Client, count: usize) -> bool {
+        if count == 0 {
+            return true;
+        }
+        let (rate, count) = (self.rate, count as f64);
+        let now = Instant::now();
+        let mut left = self.left.lock().unwrap_or_else(PoisonError::into_inner);
+        let budget = left.get(&client).map_or(rate.most, |left| left.now(rate, now));
+        if budget < count {
+            return false;
+        }
+        if left.len() >= MOST_CLIENTS && !left.contains_key(&client) {
+            forget_one(&mut left, rate, now);
+        }
+        left.insert(client, Left(budget - count, now));
+        true
+    }
+
+    /// Gives back what a client didn't use.
+    pub(crate) fn give_back(&self, client: Client, count: usize) {
+        let mut left = self.left.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(left) = left.get_mut(&client) {
+            left.0 = (left.0 + count as f64).min(self.rate.most);
+        }
+    }
+}
+
+/// Makes room in a full table: forgets clients with a full budget, or else the one with the most left.
+fn forget_one(left: &mut BTreeMap<Client, Left>, rate: Rate, now: Instant) {
+    left.retain(|_, left| left.now(rate, now) < rate.most);
+    if left.len() >= MOST_CLIENTS {
+        let fullest = left.iter().max_by(|a, b| a.1.now(rate, now).total_cmp(&b.1.now(rate, now)));
+        if let Some(client) = fullest.map(|(client, _)| *client) {
+            left.remove(&client);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn client(number: u32) -> Client {
+        Client::of_address(std::net::Ipv4Addr::from(number).into())
+    }
+
+    #[test]
+    fn budget_of_one_client_leaves_others_theirs() {
+        let budgets = Budgets::new(20.0, 0.0);
+        assert!(budgets.take(client(1), 15) && !budgets.take(client(1), 6) && budgets.take(client(1), 5));
+        assert!(!budgets.take(client(1), 1) && budgets.take(client(2), 20));
+        budgets.give_back(client(1), 1);
+        assert!(budgets.take(client(1), 1) && !budgets.take(client(1), 1));
+        assert!(!budgets.take(client(3), 21), "more than a whole budget");
+    }
+
+    #[test]
+    fn full_table_keeps_spent_budgets() {
+        let budgets = Budgets::new(20.0, 0.0);
+        assert!(budgets.take(client(0), 20));
+        for number in 1..2 * u32::try_from(MOST_CLIENTS).unwrap() {
+            assert!(budgets.take(client(number), 1));
+        }
+        assert_eq!(budgets.left.lock().unwrap().len(), MOST_CLIENTS);
+        assert!(!budgets.take(client(0), 1));
+    }
+}

@@ -1,0 +1,173 @@
+//! Places for connections, in three classes: those that have shown no token, viewers', and operators'.
+//!
+//! Each class has a number of places of its own, so that none takes another's. Where a class is full, its oldest connection that
+//! carries no stream is closed for the newest: silence can't keep anybody out.
+
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+
+use tokio::sync::Notify;
+
+use super::client::Client;
+use crate::access::Role;
+
+/// Connections of a class at a time. A browser opens up to six.
+pub(super) const MOST_OF_CLASS: usize = 64;
+/// Streams of the feed at a time, of each token.
+pub(super) const MOST_STREAMS: usize = 32;
+/// Streams of an address that a declared proxy forwards for: Cockpit's three widgets and the page, twice.
+const MOST_STREAMS_FORWARDED: usize = 8;
+
+/// Connections, the oldest first.
+#[derive(Default)]
+pub(super) struct Places {
+    held: Mutex<Vec<Held>>,
+}
+
+struct Held {
+    key: Arc<Notify>,
+    peer: Client,
+    class: Option<Role>,
+    stream: Option<Client>,
+}
+
+/// A connection's place; it is free again once this is dropped.
+pub(super) struct Place {
+    /// Tells the connection that it must close, and is its identity among the places.
+    key: Arc<Notify>,
+    places: Arc<Places>,
+    shown: Mutex<Option<(Client, Role)>>,
+}
+
+impl Places {
+    /// A place for a new connection.
+    pub(super) fn enter(self: &Arc<Self>, peer: Client) -> Place {
+        let key = Arc::new(Notify::new());
+        let mut held = self.held();
+        make_room(&mut held, None);
+        held.push(Held { key: Arc::clone(&key), peer, class: None, stream: None });
+        Place { key, places: Arc::clone(self), shown: Mutex::new(None) }
+    }
+
+    fn held(&self) -> MutexGuard<'_, Vec<Held>> {
+        self.held.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+/// Closes a connection of a class that is full: of the address with the most, the oldest that carries no stream.
+fn make_room(held: &mut Vec<Held>, class: Option<Role>) {
+    if held.iter().filter(|one| one.class == class).count() < MOST_OF_CLASS {
+        return;
+    }
+    let of_class = |one: &Held| one.class == class && one.stream.is_none();
+    let count_of = |peer| held.iter().filter(|one| of_class(one) && one.peer == peer).count();
+    let most = held.iter().filter(|one| of_class(one)).map(|one| count_of(one.peer)).max();
+    let oldest = held.iter().position(|one| of_class(one) && Some(count_of(one.peer)) == most);
+    if let Some(oldest) = oldest {
+        held.remove(oldest).key.notify_one();
+    }
+}
+
+impl Place {
+    /// Ends once the place is another's.
+    pub(super) async fn closed(&self) {
+        self.key.notified().await;
+    }
+
+    /// The role whose token this client has shown on this connection.
+    pub(super) fn shown(&self, client: Client) -> Option<Role> {
+        let shown = self.shown.lock().unwrap_or_else(PoisonError::into_inner);
+        shown.filter(|(by, _)| *by == client).map(|(_, role)| role)
+    }
+
+    /// A client has shown a role's token: the connection is of that class from now on.
+    pub(super) fn promote(&self, client: Client, role: Role) {
+        *self.shown.lock().unwrap_or_else(PoisonError::into_inner) = Some((client, role));
+        let mut held = self.places.held();
+        let Some(at) = self.index(&held).filter(|at| held[*at].class < Some(role)) else { return };
+        let mut own = held.remove(at);
+        make_room(&mut held, Some(role));
+        own.class = Some(role);
+        held.push(own);
+    }
+
+    /// Whether the connection may carry a stream; it does so from now on.
+    pub(super) fn stream(&self, client: Client, is_forwarded: bool) -> bool {
+        let mut held = self.places.held();
+        let Some(at) = self.index(&held) else { return false };
+        let class = held[at].class;
+        let others = || held.iter().filter(|one| one.stream.is_some() && !Arc::ptr_eq(&one.key, &self.key));
+        let of_class = others().filter(|one| one.class == class).count();
+        let of_client = others().filter(|one| one.class == class && one.stream == Some(client)).count();
+        if of_class >= MOST_STREAMS || is_forwarded && of_client >= MOST_STREAMS_FORWARDED {
+            return false;
+        }
+        held[at].stream = Some(client);
+        true
+    }
+
+    fn index(&self, held: &[Held]) -> Option<usize> {
+        held.iter().position(|one| Arc::ptr_eq(&one.key, &self.key))
+    }
+}
+
+impl Drop for Place {
+    fn drop(&mut self) {
+        self.places.held().retain(|one| !Arc::ptr_eq(&one.key, &self.key));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn client(number: u32) -> Client {
+        Client::of_address(std::net::Ipv4Addr::from(number).into())
+    }
+
+    fn is_open(place: &Place) -> bool {
+        place.index(&place.places.held()).is_some()
+    }
+
+    #[test]
+    fn silent_connections_leave_viewers_and_operators_their_places() {
+        let places = Arc::new(Places::default());
+        let of = |role| {
+            let place = places.enter(client(1));
+            place.promote(client(1), role);
+            place
+        };
+        let (viewer, operator) = (of(Role::Viewer), of(Role::Operator));
+        let silent: Vec<_> = (0..1000).map(|_| places.enter(client(1))).collect();
+        assert_eq!(silent.iter().filter(|place| is_open(place)).count(), MOST_OF_CLASS);
+        assert!(silent.last().is_some_and(is_open), "the newest is served");
+        let idle: Vec<_> = (0..1000).map(|_| of(Role::Viewer)).collect();
+        assert_eq!(idle.iter().filter(|place| is_open(place)).count(), MOST_OF_CLASS);
+        assert!(!is_open(&viewer) && is_open(&operator));
+    }
+
+    #[test]
+    fn the_address_with_most_connections_loses_first() {
+        let places = Arc::new(Places::default());
+        let other = places.enter(client(2));
+        let _many: Vec<_> = (0..1000).map(|_| places.enter(client(1))).collect();
+        assert!(is_open(&other));
+    }
+
+    #[test]
+    fn streams_of_viewers_leave_operators_theirs() {
+        let places = Arc::new(Places::default());
+        let stream = |role, number, is_forwarded| {
+            let place = places.enter(client(9));
+            place.promote(client(number), role);
+            let is_taken = place.stream(client(number), is_forwarded);
+            (place, is_taken)
+        };
+        let viewers: Vec<_> = (0..40).map(|_| stream(Role::Viewer, 1, false)).collect();
+        assert_eq!(viewers.iter().filter(|(_, is_taken)| *is_taken).count(), MOST_STREAMS);
+        assert!(stream(Role::Operator, 1, false).1);
+        drop(viewers);
+        let forwarded: Vec<_> = (0..40).map(|_| stream(Role::Viewer, 1, true)).collect();
+        assert_eq!(forwarded.iter().filter(|(_, is_taken)| *is_taken).count(), MOST_STREAMS_FORWARDED);
+        assert!(stream(Role::Viewer, 2, true).1, "another address behind the proxy");
+    }
+}
