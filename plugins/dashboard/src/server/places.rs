@@ -3,6 +3,7 @@
 //! Each class has a number of places of its own, so that none takes another's. Where a class is full, its oldest connection that
 //! carries no stream is closed for the newest: silence can't keep anybody out.
 
+use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use tokio::sync::Notify;
@@ -59,9 +60,12 @@ fn make_room(held: &mut Vec<Held>, class: Option<Role>) {
         return;
     }
     let of_class = |one: &Held| one.class == class && one.stream.is_none();
-    let count_of = |peer| held.iter().filter(|one| of_class(one) && one.peer == peer).count();
-    let most = held.iter().filter(|one| of_class(one)).map(|one| count_of(one.peer)).max();
-    let oldest = held.iter().position(|one| of_class(one) && Some(count_of(one.peer)) == most);
+    let mut counts: BTreeMap<Client, usize> = BTreeMap::new();
+    for one in held.iter().filter(|one| of_class(one)) {
+        *counts.entry(one.peer).or_default() += 1;
+    }
+    let most = counts.values().max();
+    let oldest = held.iter().position(|one| of_class(one) && counts.get(&one.peer) == most);
     if let Some(oldest) = oldest {
         held.remove(oldest).key.notify_one();
     }

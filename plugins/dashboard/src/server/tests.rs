@@ -160,6 +160,42 @@ fn operator_is_served_within_1_s_among_1000_connections() {
 }
 
 #[test]
+fn operator_is_served_within_1_s_while_1000_connections_a_second_are_opened() {
+    let served = served(&[]);
+    let (has_ended, opened) = (AtomicBool::new(false), AtomicU32::new(0));
+    let flood = || {
+        let mut last = std::collections::VecDeque::new();
+        while !has_ended.load(Ordering::Relaxed) {
+            last.push_back(served.connect());
+            std::thread::sleep(Duration::from_millis(1));
+            opened.fetch_add(1, Ordering::Relaxed);
+            if last.len() > 200 {
+                last.pop_front();
+            }
+        }
+    };
+    std::thread::scope(|scope| {
+        scope.spawn(flood);
+        let (mut longest, mut refused) = (Duration::ZERO, 0);
+        for _ in 0..60 {
+            let began = Instant::now();
+            // A connection that was closed for a newer one is opened anew, as browsers do.
+            while served.ask("GET /state.json", OPERATOR, "").0 != 200 {
+                refused += 1;
+            }
+            longest = longest.max(began.elapsed());
+            std::thread::sleep(Duration::from_millis(50));
+        }
+        has_ended.store(true, Ordering::Relaxed);
+        let opened = opened.load(Ordering::Relaxed);
+        println!(
+            "while {opened} connections were opened an operator waited {longest:?} at most, {refused} times asked again"
+        );
+        assert!(longest < Duration::from_secs(1), "{longest:?}");
+    });
+}
+
+#[test]
 fn silent_half_sent_and_idle_connections_are_closed_after_10_s() {
     let served = served(&[]);
     let mut all: Vec<_> = (0..4).map(|_| served.connect()).collect();
