@@ -168,6 +168,7 @@ pub(super) enum Item {
     UnreadAttachment,
     Metadata,
     Statistics {
+        messages: u64,
         channels: u32,
     },
     DataEnd,
@@ -367,9 +368,9 @@ fn parse(opcode: u8, body: u64, bytes: &[u8]) -> Option<(Item, u64)> {
             return Some((Item::Attachment(place), len));
         }
         op::STATISTICS => {
-            let (_messages, _schemas, channels) = (fields.u64()?, fields.u16()?, fields.u32()?);
+            let (messages, _schemas, channels) = (fields.u64()?, fields.u16()?, fields.u32()?);
             let _other_counts_and_times = fields.take(28)?;
-            return with_list(fields, Item::Statistics { channels });
+            return with_list(fields, Item::Statistics { messages, channels });
         }
         op::CHUNK_INDEX => {
             let _times_and_place = fields.take(32)?;

@@ -59,6 +59,23 @@ pub enum LossKind {
     Attachment(String),
     /// A metadata record that fails its checksum, or is missing from a log of ours.
     Metadata(String),
+    /// Messages of a log of ours that aren't there, found by the gaps that they leave in the numbers of the others.
+    Missing {
+        /// Messages missing.
+        messages: u64,
+    },
+    /// Messages of a log of ours whose numbers occur before.
+    Repeated {
+        /// Messages delivered again.
+        messages: u64,
+    },
+    /// Messages of a log of ours that come after ones with higher numbers.
+    Disordered {
+        /// Messages delivered too late.
+        messages: u64,
+    },
+    /// A record within a chunk of a kind that no chunk may have, such as another chunk.
+    Misplaced,
     /// Messages of a channel whose definition isn't in the log.
     UnknownChannel {
         /// The channel's number.
@@ -184,6 +201,18 @@ impl fmt::Display for LossKind {
                 out,
                 "{messages} messages stamped {first} ns or later: the latest time that is taken is {} ns",
                 LATEST.0
+            ),
+            Self::Missing { messages } => {
+                write!(out, "{messages} messages are missing: the numbers of the messages skip them")
+            }
+            Self::Repeated { messages } => {
+                write!(out, "{messages} messages are there twice: their numbers have occurred before")
+            }
+            Self::Disordered { messages } => {
+                write!(out, "{messages} messages are out of order: they follow messages with higher numbers")
+            }
+            Self::Misplaced => out.write_str(
+                "a chunk with a record that no chunk may have, such as another chunk: that record is not read",
             ),
             Self::Attachment(name) => write!(out, "attachment {name:?} is damaged"),
             Self::Metadata(name) => write!(out, "metadata {name:?} is damaged"),

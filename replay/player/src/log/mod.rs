@@ -22,6 +22,9 @@
 //!
 //! Recordings of voice notes ([`voice`]) have chunks of their own.
 //!
+//! The numbers of a channel's messages have no gaps in a log and go on in the next part. Readers report where ours have:
+//! records were removed, repeated or moved. A log of ours that is closed without a summary has lost its end.
+//!
 //! The file is append-only: written bytes are never modified, so a power cut can't damage them. After an error of the medium a
 //! file is left as it is, without an end, and the recording goes on in another part, which repeats what wasn't synced: its
 //! [`PartHead`] says from which message of each channel on. Readers leave these out of the part before.
@@ -43,6 +46,7 @@ mod limits;
 mod loss;
 mod medium;
 mod merge;
+mod numbering;
 mod part;
 mod queue;
 mod reader;

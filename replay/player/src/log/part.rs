@@ -158,6 +158,11 @@ impl PartEnd {
 }
 
 impl Part {
+    /// Messages of this part alone, by the totals at its two ends.
+    pub(super) fn messages(&self) -> Option<u64> {
+        self.end.as_ref()?.after.messages.checked_sub(self.head.before.messages)
+    }
+
     /// Removes the part records from a log's metadata and parses them.
     pub(super) fn take(metadata: &mut BTreeMap<String, String>) -> Option<Self> {
         let (end, head) = (take_record(metadata, PART_END), take_record(metadata, PART));

@@ -17,10 +17,14 @@ use super::framing::{ChunkPlace, Definition, LogFile};
 use super::limits::{LATEST, MAX_HELD_BYTES, quoted};
 use super::loss::Losses;
 use super::merge::{Batch, Merge};
+use super::numbering::Numbering;
 use super::part::{Part, Progress};
 use super::scan::{FoundDefinitions, Piece, Span, beyond, date_losses, scan};
 use super::{LogError, Loss, LossKind, Many, SourceInfo};
 use crate::regular_file;
+
+/// First opcode of the records that other programs may define. Source: MCAP format specification, "Records".
+const PRIVATE: u8 = 0x80;
 
 /// A log's header.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
@@ -93,6 +97,8 @@ pub struct LogPlace {
     latest: u64,
     late: u64,
     losses: Vec<Loss>,
+    /// Message numbers of the pieces read so far.
+    numbering: Option<Numbering>,
     /// Channels defined among the messages so far.
     defined: Vec<Definition>,
 }
@@ -139,6 +145,8 @@ pub struct LogReader<R = File> {
     latest: u64,
     late: u64,
     finished: bool,
+    /// Message numbers of the pieces read so far, of a log of ours that is read from its beginning.
+    numbering: Option<Numbering>,
     /// By channel, the message number from which on another log repeats its messages.
     repeated: BTreeMap<u16, u32>,
 }
@@ -160,9 +168,10 @@ impl<R: Read + Seek> LogReader<R> {
     /// Errors: as for [`LogReader::open`].
     pub fn new(input: R, name: String) -> Result<Self, LogError> {
         let mut file = LogFile::new(input, name)?;
-        let (scan, channels) = scan(&mut file)?;
-        let mut metadata = scan.metadata;
+        let (mut scan, channels) = scan(&mut file)?;
+        let mut metadata = core::mem::take(&mut scan.metadata);
         let part = Part::take(&mut metadata);
+        let numbering = Numbering::of(&mut scan, part.as_ref(), &channels, file.len());
         let mut info = LogInfo {
             vehicle_toml: None,
             attachments: scan.attachments,
@@ -192,6 +201,7 @@ impl<R: Read + Seek> LogReader<R> {
             latest: 0,
             late: 0,
             finished: false,
+            numbering,
             repeated: BTreeMap::new(),
         })
     }
@@ -222,6 +232,9 @@ impl<R: Read + Seek> LogReader<R> {
             self.spans.get(*number as usize).is_none_or(|span| !span.is_dated() || span.to >= at.0)
         };
         self.read = self.plan.iter().position(is_due).unwrap_or(self.plan.len());
+        if self.read > 0 {
+            self.numbering = None;
+        }
     }
 
     /// The channels known before messages are read.
@@ -343,6 +356,7 @@ impl<R: Read + Seek> LogReader<R> {
             latest: self.latest,
             late: self.late,
             losses: self.losses.list().to_vec(),
+            numbering: self.numbering.clone(),
             defined: self.channels.later().to_vec(),
         }
     }
@@ -369,6 +383,7 @@ impl<R: Read + Seek> LogReader<R> {
         (self.read, self.latest, self.late) = (place.read, place.latest, place.late);
         // Damage after the position is found again when it is read.
         self.losses = Losses::of(place.losses.clone());
+        self.numbering.clone_from(&place.numbering);
         self.finished = false;
         Ok(())
     }
@@ -398,6 +413,9 @@ impl<R: Read + Seek> LogReader<R> {
             // Not all is covered by checksums.
             batch.clear();
             found = vec![LossKind::Unreadable(self.file.medium().error().to_owned())];
+        }
+        if let Some(numbering) = &mut self.numbering {
+            numbering.add(number, &batch.entries);
         }
         place_entries(&mut batch, &self.channels, &self.repeated, &mut found);
         for kind in found {
@@ -454,6 +472,9 @@ impl<R: Read + Seek> LogReader<R> {
         }
         self.finished = true;
         date_losses(&mut self.losses, &self.spans, true);
+        if let Some(numbering) = &self.numbering {
+            numbering.report(&self.spans, &mut self.losses);
+        }
         let unchunked = self.spans.iter().all(|span| matches!(span.piece, Piece::Run));
         if unchunked && self.losses.list().is_empty() && !data_section_holds(&mut self.file)? {
             self.losses.push(Loss {
@@ -485,10 +506,12 @@ fn read_chunk<R: Read + Seek>(
     found: &mut Vec<LossKind>,
 ) -> Result<(), LogError> {
     // Definitions count only once the chunk's checksum has been verified.
-    let (mut definitions, mut sound) = (FoundDefinitions::default(), true);
+    let (mut definitions, mut sound, mut misplaced) = (FoundDefinitions::default(), true, false);
     let unpacked = unpack(file, place, |opcode, body| match opcode {
         op::MESSAGE => sound &= batch.push(body),
-        opcode => definitions.take(opcode, body),
+        op::SCHEMA | op::CHANNEL => definitions.take(opcode, body),
+        // Readers pass over records of private kinds; all others have their place outside chunks.
+        opcode => misplaced |= opcode < PRIVATE,
     })?;
     if let Unpacked::Bad(kind) = unpacked {
         batch.clear();
@@ -500,6 +523,9 @@ fn read_chunk<R: Read + Seek>(
     }
     if !sound {
         found.push(LossKind::Contents);
+    }
+    if misplaced {
+        found.push(LossKind::Misplaced);
     }
     if definitions.beyond {
         found.push(beyond(Many::HeaderBytes));

@@ -56,10 +56,15 @@ pub(super) struct Scan {
     definitions: BTreeMap<u16, Definition>,
     /// Definitions in the summary, which count only if its checksum fits.
     summary: BTreeMap<u16, Definition>,
-    summary_channels: Option<u32>,
+    /// Messages and channels of the log according to its summary.
+    summary_counts: Option<(u64, u32)>,
+    /// Messages of the log according to a summary whose checksum fits.
+    pub(super) messages: Option<u64>,
     data_end: Option<core::ops::Range<u64>>,
-    /// Whether it is one of our logs, which have no messages outside chunks.
-    ours: bool,
+    /// Whether it is one of our logs, which have no messages outside chunks, numbered messages and a summary.
+    pub(super) ours: bool,
+    /// Whether it has its closing records.
+    pub(super) closed: bool,
     /// Whether it has the record that repeats its channels.
     has_list: bool,
     /// Attachments listed by a log of ours.
@@ -211,7 +216,7 @@ impl Scan {
                     frame.at..frame.end,
                 );
             }
-            Item::Statistics { channels } => self.summary_channels = Some(*channels),
+            Item::Statistics { messages, channels } => self.summary_counts = Some((*messages, *channels)),
             Item::DataEnd => self.data_end = Some(frame.at..frame.end),
             Item::Header { ours } => self.ours = *ours,
             Item::Footer { summary } => self.footer = Some((frame.at..frame.end, *summary)),
@@ -362,6 +367,11 @@ impl Scan {
             self.lose(LossKind::Truncated, at..at);
             return;
         };
+        self.closed = true;
+        if summary == 0 && self.ours {
+            // Our writer ends no log without a summary: it was removed, and the last messages with it.
+            self.lose(LossKind::Truncated, at..at);
+        }
         if summary != 0 && summary != data_end.end && self.losses.list().is_empty() {
             self.lose(LossKind::Displaced, 0..data_end.start);
         }
@@ -382,7 +392,8 @@ impl Scan {
         if self.summary.is_empty() || !summary_holds(file, data_end)? {
             return Ok(false);
         }
-        let all = self.summary_channels.is_some_and(|count| self.summary.len() as u64 >= u64::from(count));
+        self.messages = self.summary_counts.map(|(messages, _)| messages);
+        let all = self.summary_counts.is_some_and(|(_, count)| self.summary.len() as u64 >= u64::from(count));
         self.definitions.append(&mut self.summary);
         Ok(all)
     }

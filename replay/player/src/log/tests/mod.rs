@@ -2,6 +2,7 @@
 
 mod damage;
 mod foreign;
+mod numbering;
 mod parts;
 mod places;
 mod recorder;

@@ -1,0 +1,241 @@
+//! Finds missing, repeated and reordered messages of our logs by their numbers.
+//!
+//! Each channel counts its messages, and the count goes on from part to part. Checksums cover one record each: they don't show
+//! that a whole record was removed, repeated or moved. The numbers do.
+
+use std::collections::BTreeMap;
+
+use headrace_geometry::time::MonoNs;
+use serde::{Deserialize, Serialize};
+
+use super::channels::Channels;
+use super::loss::Losses;
+use super::merge::Entry;
+use super::part::{PART_END, Part};
+use super::scan::{Scan, Span};
+use super::{Loss, LossKind};
+
+/// Most runs that are kept of a channel. A whole log has one, and a few while pieces are read out of order.
+const MAX_RUNS: usize = 64;
+
+/// Successive numbers of a channel: pieces and numbers of the first and last.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+struct Run {
+    pieces: (usize, usize),
+    first: u64,
+    last: u64,
+}
+
+/// The numbers of a channel's messages read so far.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+struct Count {
+    /// Number of the channel's first message.
+    first: u64,
+    runs: Vec<Run>,
+}
+
+/// The numbers of all messages read so far.
+#[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize)]
+pub(super) struct Numbering {
+    channels: BTreeMap<u16, Count>,
+    /// Messages read.
+    messages: u64,
+    /// Messages of the log according to its closing records.
+    wanted: Option<u64>,
+}
+
+/// What is wrong with messages.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Fault {
+    Missing,
+    Repeated,
+    Disordered,
+}
+
+/// A place between pieces where numbers don't follow each other.
+#[derive(Debug)]
+struct Break {
+    fault: Fault,
+    messages: u64,
+    /// First and last piece before which it may lie; the number of pieces stands for the end of the log.
+    pieces: (usize, usize),
+}
+
+impl Numbering {
+    /// Of a log with these channels, which ends at `end`; `None` of other writers' logs, which may number as they like. Reports
+    /// a part that has no end record and yet is closed.
+    pub(super) fn of(scan: &mut Scan, part: Option<&Part>, channels: &Channels, end: u64) -> Option<Self> {
+        if scan.closed && part.is_some_and(|part| part.end.is_none()) && scan.losses.list().is_empty() {
+            let kind = LossKind::Metadata(PART_END.to_owned());
+            scan.losses.push(Loss { kind, offset: end, bytes: 0, from: None, to: None });
+        }
+        if !scan.ours {
+            return None;
+        }
+        let before = |topic: &str| part.and_then(|part| part.head.before.sequences.get(topic)).copied();
+        let count = |topic: &str| Count { first: before(topic).unwrap_or_default().into(), runs: Vec::new() };
+        let channels = channels.all().map(|channel| (channel.id, count(&channel.topic))).collect();
+        let wanted = scan.messages.or_else(|| part?.messages());
+        Some(Self { channels, messages: 0, wanted })
+    }
+
+    /// Adds the messages of a piece, in their order.
+    pub(super) fn add(&mut self, piece: usize, entries: &[Entry]) {
+        for head in entries.iter().map(|entry| entry.head) {
+            self.messages += 1;
+            // Messages of a channel that is defined nowhere are a loss of their own.
+            if let Some(count) = self.channels.get_mut(&head.channel) {
+                count.add(piece, head.sequence);
+            }
+        }
+    }
+
+    /// Adds the losses of a log that has been read to its end, apart from those at places with a known loss.
+    pub(super) fn report(&self, spans: &[Span], losses: &mut Losses) {
+        let known = losses.list();
+        let mut found: Vec<Break> = self.channels.values().flat_map(Count::breaks).collect();
+        let end = self.channels.values().flat_map(|count| &count.runs).map(|run| run.pieces.1 + 1).max();
+        let wanted = self.wanted.filter(|_| known.iter().all(is_elsewhere));
+        if let Some(messages @ 1..) = wanted.map(|wanted| self.missing(wanted, &found)) {
+            let pieces = (end.unwrap_or_default(), spans.len());
+            found.push(Break { fault: Fault::Missing, messages, pieces });
+        }
+        let mut breaks: Vec<Break> = Vec::new();
+        for one in found {
+            let place = one.place(spans);
+            if known.iter().any(|loss| explains(loss, place)) {
+                continue;
+            }
+            match breaks.iter_mut().find(|other| other.meets(&one)) {
+                Some(other) => other.add(&one),
+                None => breaks.push(one),
+            }
+        }
+        breaks.sort_by_key(|one| one.pieces);
+        for one in breaks {
+            losses.push(one.loss(spans));
+        }
+    }
+
+    /// How many of the messages that the log should have lack at its end, where no number skips them.
+    fn missing(&self, wanted: u64, found: &[Break]) -> u64 {
+        let sum = |fault| found.iter().filter(|one| one.fault == fault).map(|one| one.messages).sum::<u64>();
+        wanted.saturating_add(sum(Fault::Repeated)).saturating_sub(self.messages + sum(Fault::Missing))
+    }
+}
+
+/// Whether a loss has nothing to do with the number of messages before the closing records.
+fn is_elsewhere(known: &Loss) -> bool {
+    matches!(known.kind, LossKind::Stated(_) | LossKind::Misplaced | LossKind::Truncated)
+}
+
+/// Whether a known loss may be the reason for a break between two offsets.
+fn explains(known: &Loss, (from, to): (u64, u64)) -> bool {
+    match known.kind {
+        // A statement of the log's writer, which numbers only what it writes.
+        LossKind::Stated(_) => false,
+        // One loss stands for several places.
+        LossKind::Swells { .. } | LossKind::Beyond { .. } | LossKind::Unreadable(_) => true,
+        _ => known.offset <= to && from <= known.offset.saturating_add(known.bytes),
+    }
+}
+
+impl Break {
+    /// Whether both may be the same place, with messages of two channels.
+    fn meets(&self, other: &Self) -> bool {
+        let (first, last) = (self.pieces.0.max(other.pieces.0), self.pieces.1.min(other.pieces.1));
+        self.fault == other.fault && first <= last
+    }
+
+    /// Adds the messages of another channel. One with few messages leaves a wide gap, which the others narrow.
+    fn add(&mut self, other: &Self) {
+        self.messages += other.messages;
+        self.pieces = (self.pieces.0.max(other.pieces.0), self.pieces.1.min(other.pieces.1));
+    }
+
+    /// Offsets in the file between which it lies.
+    fn place(&self, spans: &[Span]) -> (u64, u64) {
+        let before = self.pieces.0.checked_sub(1).and_then(|piece| spans.get(piece));
+        let from = before.map_or(0, |span| span.end);
+        let to =
+            spans.get(self.pieces.1).map_or_else(|| spans.last().map_or(0, |span| span.end), |span| span.at);
+        (from, to.max(from))
+    }
+
+    fn loss(&self, spans: &[Span]) -> Loss {
+        let messages = self.messages;
+        let kind = match self.fault {
+            Fault::Missing => LossKind::Missing { messages },
+            Fault::Repeated => LossKind::Repeated { messages },
+            Fault::Disordered => LossKind::Disordered { messages },
+        };
+        let (offset, to) = self.place(spans);
+        let before = spans.iter().take(self.pieces.0).rev().find(|span| span.is_dated());
+        let after = spans.iter().skip(self.pieces.1).find(|span| span.is_dated());
+        let (from, until) = (before.map(|span| MonoNs(span.to)), after.map(|span| MonoNs(span.from)));
+        Loss { kind, offset, bytes: to - offset, from, to: until }
+    }
+}
+
+impl Count {
+    fn add(&mut self, piece: usize, number: u32) {
+        // Numbers wrap: this one is the nearest to the last.
+        let near = self.runs.last().map_or(self.first, |run| run.last);
+        let low = u64::from(number.wrapping_sub(low_word(near)));
+        let ahead = low <= u64::from(u32::MAX / 2);
+        let number = if ahead { near + low } else { (near + low).saturating_sub(1 << 32) };
+        let before =
+            self.runs.iter().rposition(|run| run.last + 1 == number && self.is_clear(run.pieces.1, piece));
+        let Some(run) = before.and_then(|at| self.runs.get_mut(at)) else {
+            if self.runs.len() < MAX_RUNS {
+                self.runs.push(Run { pieces: (piece, piece), first: number, last: number });
+            }
+            return;
+        };
+        (run.last, run.pieces.1) = (number, piece);
+        // Pieces may be read in another order than they have in the file: this one may close a gap.
+        let after = self.runs.iter().position(|run| run.first == number + 1 && piece < run.pieces.0);
+        let after =
+            after.filter(|at| self.runs.get(*at).is_some_and(|run| self.is_clear(piece, run.pieces.0 - 1)));
+        if let Some((before, after)) = before.zip(after) {
+            let next = self.runs.get(after).copied();
+            if let (Some(run), Some(next)) = (self.runs.get_mut(before), next) {
+                (run.last, run.pieces.1) = (next.last, next.pieces.1);
+            }
+            self.runs.remove(after);
+        }
+    }
+
+    /// Whether a run that ends in a piece may go on in another: it isn't before that, and no other run comes between.
+    fn is_clear(&self, from: usize, to: usize) -> bool {
+        from <= to && !self.runs.iter().any(|run| from < run.pieces.1 && run.pieces.0 <= to)
+    }
+
+    /// The places where the numbers don't follow each other, or do so elsewhere in the file.
+    fn breaks(&self) -> Vec<Break> {
+        let mut runs = self.runs.clone();
+        runs.sort_by_key(|run| (run.first, run.pieces));
+        let mut breaks: Vec<Break> = Vec::new();
+        let (mut next, mut piece) = (self.first, 0);
+        for run in runs {
+            let pieces = (piece.min(run.pieces.0), run.pieces.0);
+            let repeated = next.min(run.last + 1).saturating_sub(run.first);
+            let disordered = if run.pieces.0 + 1 < piece { run.last + 1 - run.first } else { 0 };
+            for (fault, messages) in [
+                (Fault::Missing, run.first.saturating_sub(next)),
+                (Fault::Repeated, repeated),
+                (Fault::Disordered, disordered),
+            ] {
+                breaks.push(Break { fault, messages, pieces });
+            }
+            (next, piece) = (next.max(run.last + 1), run.pieces.1 + 1);
+        }
+        breaks.retain(|one| one.messages > 0);
+        breaks
+    }
+}
+
+/// The lower 32 bits.
+fn low_word(number: u64) -> u32 {
+    u32::try_from(number & u64::from(u32::MAX)).unwrap_or_default()
+}
