@@ -1,10 +1,10 @@
-//! The tests that `docs/promises.md` names are there.
+//! The tests that `docs/promises.md` and `docs/recorder.md` name are there.
 
 use crate::workspace::root;
 
-#[test]
-fn every_promise_names_a_test_that_is_there() {
-    let page = std::fs::read_to_string(root().join("docs/promises.md")).unwrap();
+/// Checks each row of a page that names a test; returns how many there are.
+fn count_named_tests(page: &str) -> usize {
+    let page = std::fs::read_to_string(root().join(page)).unwrap();
     assert!(page.lines().count() < 150);
     let mut named = 0;
     for row in page.lines().filter(|line| line.starts_with("| ") && line.contains('`')) {
@@ -18,7 +18,15 @@ fn every_promise_names_a_test_that_is_there() {
         }
         named += 1;
     }
-    assert!(named > 20, "{named}");
+    named
+}
+
+#[test]
+fn every_promise_names_a_test_that_is_there() {
+    for page in ["docs/promises.md", "docs/recorder.md"] {
+        let named = count_named_tests(page);
+        assert!(named > 20, "{page}: {named}");
+    }
 }
 
 #[test]
