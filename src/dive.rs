@@ -1,6 +1,5 @@
 //! A dive from the assembled loop to the report: shared by `demo`, `run` and `replay`.
 
-use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::sync::Arc;
 
@@ -11,15 +10,13 @@ use headrace_monitor::console::{CONSOLE_ID, Command, ConsoleInput, ConsolePort};
 use headrace_monitor::entities::HeadSpecification;
 use headrace_monitor::head_words::HeadWords;
 use headrace_monitor::outlet::{NoticeOutlet, NoticeReceiver};
-use headrace_monitor::report::{LineReport, LogReport, Report};
+use headrace_monitor::report::{LineReport, Report};
 use headrace_monitor::run::Loop;
 use headrace_ports::Supervisor;
 use headrace_replay::drive::{DriveError, Pace, PacketSource, drive};
 use headrace_replay::log::{
-    DerivedChannels, Every, LeftOut, LinePort, LogHeader, Recorder, RecorderHandle, RecordingFault, Rotation,
-    SourceInfo, Summary, VoicePort, dive_name,
+    DerivedChannels, Every, LinePort, LogHeader, Recorder, Rotation, SourceInfo, VoicePort, dive_name,
 };
-use headrace_replay::player::seconds;
 use headrace_replay::record::{QUEUE_BYTES, QUEUE_OF_PORTS_BYTES, RecorderOutlet, result_channels};
 use headrace_replay::threads::drive_on;
 use headrace_replay::view::{Site, View};
@@ -32,7 +29,7 @@ use crate::memory;
 use crate::outputs::SIMULATED;
 use crate::phase::Phase;
 use crate::progress::Progress;
-use crate::report_output::files_report;
+use crate::recordings::Recordings;
 use crate::watch::Watch;
 
 /// Capacity of the queue of notices to the terminal; a tick of 20 ms has a handful. A slot takes some 400 bytes, allocated at
@@ -49,7 +46,7 @@ type AfterTick<'a> = &'a mut dyn FnMut(&Loop);
 pub(crate) struct Dive {
     pub(crate) armed: Loop,
     notices: NoticeReceiver,
-    recorders: Vec<(PathBuf, RecorderHandle)>,
+    recordings: Recordings,
     operator: Option<Operator>,
 }
 
@@ -57,8 +54,8 @@ pub(crate) struct Dive {
 struct Operator {
     input: ConsoleInput,
     port: ConsolePort,
-    /// Recordings that have failed, by number: whether they still do.
-    failed: BTreeMap<usize, bool>,
+    /// Whether it was told that a recording fails.
+    fails: bool,
 }
 
 /// A log to write.
@@ -129,12 +126,12 @@ impl<'a> Assembly<'a> {
         if self.keeps_results {
             app.keep_results();
         }
-        let recorders = match self.recording {
-            None => Vec::new(),
+        let recordings = match self.recording {
+            None => Recordings::default(),
             Some(recording) => record(&mut app, vehicle, self.text, recording)?,
         };
         let armed = arm(app, vehicle, self.navigation.unwrap_or_else(|| vehicle.navigation()))?;
-        Ok(Dive { armed, notices, recorders, operator: None })
+        Ok(Dive { armed, notices, recordings, operator: None })
     }
 }
 
@@ -144,7 +141,7 @@ fn record(
     vehicle: &VehicleConfig,
     vehicle_text: &str,
     Recording { paths, clock, rotate, scene }: Recording<'_>,
-) -> Result<Vec<(PathBuf, RecorderHandle)>, Failure> {
+) -> Result<Recordings, Failure> {
     let mut header = log_header(vehicle, vehicle_text, true);
     let is_live = clock == Clock::Ours;
     if is_live {
@@ -162,7 +159,7 @@ fn record(
     }
     let outlet = RecorderOutlet::new(ports);
     app.add_plugin(&if is_live { outlet.of_ports() } else { outlet })?;
-    Ok(recorders)
+    Ok(Recordings::of(recorders, is_live))
 }
 
 /// Arms the loop, which allocates all its memory.
@@ -273,7 +270,7 @@ impl Dive {
             Clock::Theirs => None,
         };
         let input = ConsoleInput::new(&mut self.armed, clock);
-        self.operator = input.map(|(input, port)| Operator { input, port, failed: BTreeMap::new() });
+        self.operator = input.map(|(input, port)| Operator { input, port, fails: false });
         self
     }
 
@@ -327,7 +324,7 @@ impl Dive {
             while let Some(notice) = notices.next() {
                 watch.notice(&notice, dive);
             }
-            tell_recordings(&self.recorders, watch, dive, self.operator.as_mut());
+            tell_recordings(&mut self.recordings, watch, dive, self.operator.as_mut());
             if let Some(operator) = &mut self.operator {
                 operator.input.take_in(dive.now());
             }
@@ -374,7 +371,7 @@ impl Dive {
             while let Some(notice) = notices.next() {
                 watch.notice(&notice, dive);
             }
-            tell_recordings(&self.recorders, watch, dive, self.operator.as_mut());
+            tell_recordings(&mut self.recordings, watch, dive, self.operator.as_mut());
             if let Some(operator) = &mut self.operator {
                 operator.input.take_in_live(dive, headrace_ports::now());
             }
@@ -401,12 +398,12 @@ impl Dive {
 
     /// The recorders' inputs for what goes on on devices' lines beside the loop.
     pub(crate) fn line_ports(&self) -> Vec<LinePort> {
-        self.recorders.iter().map(|(_, handle)| handle.line_port()).collect()
+        self.recordings.line_ports()
     }
 
     /// The recorders' inputs for recordings of voice notes.
     pub(crate) fn voice_ports(&self) -> Vec<VoicePort> {
-        self.recorders.iter().map(|(_, handle)| handle.voice_port()).collect()
+        self.recordings.voice_ports()
     }
 
     /// Ends the dive; returns the report.
@@ -421,94 +418,37 @@ impl Dive {
         // A long dive's report takes as much memory as its samples, which are no longer needed.
         self.armed.release_samples();
         let mut report = Report::of(&self.armed);
-        let recorders = core::mem::take(&mut self.recorders);
+        let recordings = core::mem::take(&mut self.recordings);
         drop(self.armed);
-        report.log = recorded(recorders, &report);
+        report.log = recordings.end(&report);
         report
     }
 }
 
 impl Operator {
-    fn recording(&mut self, number: usize, fails: bool) {
-        self.failed.insert(number, fails);
-        let fails = self.failed.values().any(|fails| *fails);
+    /// Tells the loop whether what comes now is recorded, so that it is in what is recorded later, or elsewhere.
+    fn recording(&mut self, fails: bool) {
+        if core::mem::replace(&mut self.fails, fails) == fails {
+            return;
+        }
         if let Err(error) = self.port.send(&Command::Recording { fails }) {
             tracing::error!(%error, fails, "a recording's state isn't in the log");
         }
     }
 }
 
-/// Tells what has happened to the recordings; the loop, too, so that it is in what is recorded later, or elsewhere.
+/// Tells what has happened to the recordings, the loop, too.
 fn tell_recordings(
-    recorders: &[(PathBuf, RecorderHandle)],
+    recordings: &mut Recordings,
     watch: &mut Watch,
     dive: &Loop,
-    mut operator: Option<&mut Operator>,
+    operator: Option<&mut Operator>,
 ) {
-    for (number, (_, handle)) in recorders.iter().enumerate() {
-        while let Some(event) = handle.next_event() {
-            watch.recording(number, &event, dive.now());
-            if let Some(operator) = &mut operator {
-                operator.recording(number, event.fails());
-            }
-        }
+    for event in recordings.news() {
+        watch.recording(&event, dive.now());
     }
-}
-
-/// Ends the recordings of a dive. The report has the first one's files and the losses of all; media that are gone keep nobody
-/// from it.
-fn recorded(recorders: Vec<(PathBuf, RecorderHandle)>, report: &Report) -> Option<LogReport> {
-    let (mut log, several): (Option<LogReport>, _) = (None, recorders.len() > 1);
-    for (path, handle) in recorders {
-        let written = handle.finish();
-        let mut losses = match &written {
-            Err(error) => vec![format!("recording failed: {error}")],
-            Ok(written) => unrecorded(written),
-        };
-        if several {
-            for loss in &mut losses {
-                *loss = format!("{}: {loss}", path.display());
-            }
-        }
-        if let Some(log) = &mut log {
-            log.notes.push(format!("also recorded to {}", path.display()));
-            log.losses.extend(losses);
-            continue;
-        }
-        let parts = written.map(|written| written.parts).unwrap_or_default();
-        let parts: Vec<_> = parts.iter().map(|part| (part.path.as_path(), part.raw_messages)).collect();
-        let mut files = files_report(&path, &parts);
-        let of_console = report.console.map_or(0, |console| console.packets);
-        files.messages = of_console + report.sources.iter().map(|source| source.packets).sum::<u64>();
-        files.losses.splice(0..0, losses);
-        log = Some(files);
+    watch.recorded(&recordings.state());
+    if let Some(operator) = operator {
+        operator.recording(recordings.is_alarm());
     }
-    log
-}
-
-/// Data missing in a recording, and errors while it was made, as text.
-fn unrecorded(written: &Summary) -> Vec<String> {
-    let mut losses: Vec<String> = written.faults.iter().map(fault).collect();
-    losses.extend(Some(written.left_out).filter(|left| left.messages > 0).map(left_out));
-    let counts = [
-        (written.sent_dropped, "messages to devices not recorded: the recorder's queue was full"),
-        (written.skipped, "packets not recorded: the recorder was behind"),
-        (written.results_missing, "ticks recorded without all their results: too many"),
-    ];
-    losses
-        .extend(counts.iter().filter(|(count, _)| *count > 0).map(|(count, what)| format!("{count} {what}")));
-    losses
-}
-
-/// An error of the recording, with times.
-fn fault(fault: &RecordingFault) -> String {
-    let from = fault.from.map(|from| format!(", after {}", seconds(from)));
-    let to = fault.to.map(|to| format!(", before {}", seconds(to)));
-    [fault.words(), from.unwrap_or_default(), to.unwrap_or_default()].concat()
-}
-
-/// Data that the recorder dropped, with times.
-fn left_out(left: LeftOut) -> String {
-    let span = left.span.map(|(from, to)| format!(", {} to {}", seconds(from), seconds(to)));
-    format!("{}{}", left.words(), span.unwrap_or_default())
 }

@@ -6,6 +6,8 @@ use headrace_monitor::run::Loop;
 use headrace_ports::Status;
 use headrace_replay::log::RecordingEvent;
 
+use crate::recordings::RecordingState;
+
 /// Follows a dive. Called on the loop's thread between ticks: it takes what it needs of the loop by value and hands it to a
 /// thread of its own; it waits for nothing, unless the dive is a replay, which may wait for it.
 pub(crate) trait Follower {
@@ -19,8 +21,10 @@ pub(crate) trait Follower {
     fn mode(&mut self, _paused: bool, _speed: Option<f64>) {}
     /// A sensor's connection has changed.
     fn sensor(&mut self, _id: &str, _status: &Status) {}
-    /// Something has happened to the recording of this number.
-    fn recording(&mut self, _number: usize, _event: &RecordingEvent, _at: MonoNs) {}
+    /// Something has happened to a recording.
+    fn recording(&mut self, _event: &RecordingEvent, _at: MonoNs) {}
+    /// What to show of the recordings from now on.
+    fn recorded(&mut self, _state: &RecordingState) {}
     /// A replay has paused, jumped or ended at `time` after its beginning: the loop's state may be another.
     fn stopped(&mut self, _dive: &Loop, _time: DurNs, _ended: bool) {}
     /// The dive has ended, and all is judged.

@@ -37,6 +37,7 @@ mod plan;
 mod play;
 mod printer;
 mod progress;
+mod recordings;
 mod recover;
 mod report_output;
 mod screen;

@@ -39,6 +39,7 @@ use crate::dive::CLOCK_ANCHOR;
 use crate::files;
 use crate::follower::Follower;
 use crate::logging::complain;
+use crate::recordings::RecordingState;
 use crate::report_output::exit_code;
 
 /// Interval at which an interruption is looked for while a replay stands still.
@@ -422,9 +423,13 @@ impl Follower for PageFollower {
         self.collector.sensor(id, status.phase.as_str(), &status.words, status.since);
     }
 
-    fn recording(&mut self, _number: usize, event: &RecordingEvent, at: MonoNs) {
+    fn recording(&mut self, event: &RecordingEvent, at: MonoNs) {
         let (fails, words) = (event.fails(), event.words());
         self.collector.recording(fails, &words, at);
+    }
+
+    fn recorded(&mut self, state: &RecordingState) {
+        self.collector.recorded(state.words());
     }
 
     fn stopped(&mut self, dive: &Loop, _time: DurNs, _ended: bool) {

@@ -1,7 +1,5 @@
 //! Output during a dive: the state, and each missed, unsure or cleared stretch once; as lines for people, or as JSON.
 
-use std::collections::BTreeMap;
-
 use headrace_config::plain::one_line;
 use headrace_geometry::time::{DurNs, MonoNs};
 use headrace_monitor::live_state::{Condition, Lamp, LiveState};
@@ -15,6 +13,7 @@ use serde_json::{Value, json};
 
 use crate::follower::Follower;
 use crate::printer::Printer;
+use crate::recordings::RecordingState;
 use crate::screen::Screen;
 use crate::terminal;
 
@@ -47,8 +46,7 @@ pub(crate) struct Watch {
     teller: Teller,
     /// When the state was shown last, and what it was.
     shown: Option<(MonoNs, Condition)>,
-    /// Recordings that have failed, by number: whether they still do. It stays in the state for the rest of the dive.
-    failed: BTreeMap<usize, bool>,
+    recorded: RecordingState,
 }
 
 impl Watch {
@@ -63,7 +61,7 @@ impl Watch {
             printer: matches!(show, Show::Lines | Show::JsonLines).then(|| Printer::start(false)),
             teller: Teller::default(),
             shown: None,
-            failed: BTreeMap::new(),
+            recorded: RecordingState::default(),
         }
     }
 
@@ -165,10 +163,9 @@ impl Watch {
     }
 
     /// Shows what has happened to a recording.
-    pub(crate) fn recording(&mut self, number: usize, event: &RecordingEvent, at: MonoNs) {
+    pub(crate) fn recording(&mut self, event: &RecordingEvent, at: MonoNs) {
         let fails = event.fails();
-        self.failed.insert(number, fails);
-        self.followers.iter_mut().for_each(|follower| follower.recording(number, event, at));
+        self.followers.iter_mut().for_each(|follower| follower.recording(event, at));
         let words = event.words();
         match self.show {
             Show::Nothing | Show::Followers => {}
@@ -186,11 +183,10 @@ impl Watch {
         self.shown = None;
     }
 
-    /// Words of the state for recordings that have failed, and whether one still does.
-    fn recordings(&self) -> Option<(&'static str, bool)> {
-        let fails = self.failed.values().any(|fails| *fails);
-        let words = if fails { "NOT RECORDED" } else { "recording had failed" };
-        (!self.failed.is_empty()).then_some((words, fails))
+    /// Takes what to show of the recordings from now on.
+    pub(crate) fn recorded(&mut self, state: &RecordingState) {
+        self.recorded = *state;
+        self.followers.iter_mut().for_each(|follower| follower.recorded(state));
     }
 
     /// Shows that a replay has paused, jumped or ended at `time` after its beginning.
@@ -246,9 +242,9 @@ impl Watch {
         let name =
             |source: usize| dive.sources().get(source).map_or_else(String::new, |info| info.id.clone());
         let mut line = status_line(state, &dive.mission().profile, dive.head_words(), &name);
-        if let Some((words, fails)) = self.recordings() {
-            line.what.insert(line.what.len().min(1), words.to_owned());
-            line.lamp = if fails { Some(Lamp::Red) } else { line.lamp };
+        if let Some((words, is_alarm)) = self.recorded.words() {
+            line.what.insert(line.what.len().min(1), words);
+            line.lamp = if is_alarm { Some(Lamp::Red) } else { line.lamp };
         }
         if self.show == Show::JsonLines {
             let mut value = match serde_json::to_value(dive.live_state_json()) {
@@ -258,8 +254,9 @@ impl Watch {
             if let Some(object) = value.as_object_mut() {
                 object.insert("type".to_owned(), "state".into());
                 object.insert("text".to_owned(), line.text().into());
-                object
-                    .extend(self.recordings().map(|(_, fails)| ("recording_fails".to_owned(), fails.into())));
+                object.extend(self.recorded.fails.map(|fails| ("recording_fails".to_owned(), fails.into())));
+                let unsafe_s = Some(self.recorded.unsafe_s).filter(|seconds| *seconds > 0);
+                object.extend(unsafe_s.map(|seconds| ("recording_unsafe_s".to_owned(), seconds.into())));
             }
             self.json(state.now, value);
         } else if self.screen.overwrites {

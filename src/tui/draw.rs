@@ -224,8 +224,8 @@ impl Page {
                 rows.to,
             );
         }
-        if let Some((words, fails)) = shot.recording {
-            let lamp = if fails { Lamp::Red } else { Lamp::Amber };
+        if let Some((words, is_alarm)) = &shot.recording {
+            let lamp = if *is_alarm { Lamp::Red } else { Lamp::Amber };
             rows.line(Line::styled(format!(" {} {words}", self.ink.shape(lamp)), self.ink.banner(lamp)));
         }
     }

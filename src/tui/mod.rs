@@ -33,6 +33,7 @@ use crate::failure::Failure;
 use crate::follower::Follower;
 use crate::interrupt;
 use crate::output::give_up;
+use crate::recordings::RecordingState;
 use alerts::Desk;
 use artist::Artist;
 use hold::Hold;
@@ -137,9 +138,12 @@ impl Follower for Tui {
         self.eye.tell(PilotLine { place: "SENSOR".to_owned(), what, lamp, ..PilotLine::default() });
     }
 
-    fn recording(&mut self, number: usize, event: &RecordingEvent, _: MonoNs) {
+    fn recorded(&mut self, state: &RecordingState) {
+        self.eye.recorded(state);
+    }
+
+    fn recording(&mut self, event: &RecordingEvent, _: MonoNs) {
         let (words, fails) = (event.words(), event.fails());
-        self.eye.recording(number, fails);
         let lamp = Some(if fails { Lamp::Red } else { Lamp::Amber });
         self.eye.tell(PilotLine {
             place: "RECORDING".to_owned(),

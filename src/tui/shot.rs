@@ -14,6 +14,8 @@ use headrace_monitor::telling::{Teller, Told};
 use headrace_ports::{Phase, Status};
 use headrace_sampling::advice::{Advice, Reason};
 
+use crate::recordings::RecordingState;
+
 use super::alerts::{self, AlertRow};
 use super::mode::Stop;
 use super::wall::{Cell, Clock, WallNews};
@@ -40,8 +42,8 @@ pub(super) struct Shot {
     pub(super) alerts: Vec<AlertRow>,
     /// Alerts beyond these.
     pub(super) alerts_hidden: usize,
-    /// Words, and whether it fails now.
-    pub(super) recording: Option<(&'static str, bool)>,
+    /// Words, and whether they are an alarm.
+    pub(super) recording: Option<(String, bool)>,
     pub(super) wall: WallNews,
     /// What was told since the last one, the oldest first.
     pub(super) told: Vec<PilotLine>,
@@ -67,7 +69,7 @@ pub(super) struct Eye {
     clock: Option<Clock>,
     /// Readings of each sensor at two times.
     counted: [Option<(MonoNs, Vec<u64>)>; 2],
-    failed: BTreeMap<usize, bool>,
+    recorded: RecordingState,
     ports: BTreeMap<usize, String>,
 }
 
@@ -80,7 +82,7 @@ impl Eye {
             changed: None,
             clock: None,
             counted: [None, None],
-            failed: BTreeMap::new(),
+            recorded: RecordingState::default(),
             ports: BTreeMap::new(),
         }
     }
@@ -119,9 +121,9 @@ impl Eye {
         self.ports.insert(status.source, words);
     }
 
-    /// Whether a recording fails.
-    pub(super) fn recording(&mut self, number: usize, fails: bool) {
-        self.failed.insert(number, fails);
+    /// What to show of the recordings.
+    pub(super) fn recorded(&mut self, state: &RecordingState) {
+        self.recorded = *state;
     }
 
     /// A picture got lost: the next one has all sections.
@@ -146,8 +148,6 @@ impl Eye {
             .as_ref()
             .map_or_else(String::new, |advice| reason_text(advice, &state, (profile, heads)));
         let (alerts, alerts_hidden) = alerts::rows(dive);
-        let fails = self.failed.values().any(|fails| *fails);
-        let words = if fails { "NOT RECORDED" } else { "recording had failed" };
         Shot {
             vehicle: self.vehicle.clone(),
             time: dive.tally().span.map_or(DurNs(0), |(begun, _)| DurNs(state.now.since(begun).0.max(0))),
@@ -157,7 +157,7 @@ impl Eye {
             sensors: self.sensors(&state, dive),
             alerts,
             alerts_hidden,
-            recording: (!self.failed.is_empty()).then_some((words, fails)),
+            recording: self.recorded.words(),
             wall: self.wall(&state, dive),
             told: self.told.drain(..).collect(),
             state,

@@ -127,7 +127,12 @@ impl Collector {
             back_due: false,
             notes_due: false,
             back_told: None,
-            recording: RecordingJson { on: recorded_to.is_some(), fails: false, path: recorded_to },
+            recording: RecordingJson {
+                on: recorded_to.is_some(),
+                fails: false,
+                words: None,
+                path: recorded_to,
+            },
             playback: None,
             compared: None,
         }
@@ -189,8 +194,13 @@ impl Collector {
 
     /// Takes what has happened to a recording.
     pub fn recording(&mut self, fails: bool, text: &str, at: MonoNs) {
-        self.recording.fails = fails;
         self.push_told(json!({"type": "recording", "t_s": at.as_secs_f64(), "fails": fails, "text": text}));
+    }
+
+    /// Takes what to show of the recordings, and whether that is an alarm; `None` while all is well.
+    pub fn recorded(&mut self, shown: Option<(String, bool)>) {
+        let (words, fails) = shown.unzip();
+        (self.recording.words, self.recording.fails) = (words, fails.unwrap_or_default());
     }
 
     /// Takes how a replay plays.

@@ -113,8 +113,10 @@ pub struct RateJson {
 pub struct RecordingJson {
     /// Whether the dive is recorded.
     pub on: bool,
-    /// Whether one fails now.
+    /// Whether what comes now is lost, or would be with the power.
     pub fails: bool,
+    /// What to show of it, as all screens say it; `None` while all is well.
+    pub words: Option<String>,
     /// Where to.
     pub path: Option<String>,
 }

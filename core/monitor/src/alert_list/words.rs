@@ -145,7 +145,7 @@ fn plain_text(kind: ListKind, name: &str, place: &str) -> String {
         ListKind::SensorDeaf => format!("{name} hears no wall"),
         ListKind::NoSonar => "NO SONAR: nothing is seen".to_owned(),
         ListKind::NoData => "NO DATA: nothing from any sensor".to_owned(),
-        ListKind::NotRecorded => "NOT RECORDED: the recording fails".to_owned(),
+        ListKind::NotRecorded => "NOT RECORDED: the recording fails, or its disk is too slow".to_owned(),
         ListKind::Missed => format!("MISSED {place}"),
         ListKind::TooFast => "TOO FAST".to_owned(),
         kind => kind.as_str().replace('_', " "),

@@ -28,7 +28,7 @@ export class World {
     this.playback = mode === "replay" ? { paused: false, speed: 1 } : null;
     this.numbers = 0;
     this.remedy = null;
-    this.recording = { on: true, fails: false, path: "dive.mcap" };
+    this.recording = { on: true, fails: false, words: null, path: "dive.mcap" };
     this.changes = [];
     this.seedAlerts();
   }

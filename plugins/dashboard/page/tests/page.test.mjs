@@ -81,7 +81,7 @@ describe("what it shows", () => {
   }));
 
   it("a recording that fails", () => on({}, async ({ mock, page }) => {
-    mock.control({ recording: { on: true, fails: true, path: "dive.mcap" } });
+    mock.control({ recording: { on: true, fails: true, words: "NOT RECORDED", path: "dive.mcap" } });
     await page.locator(".recording", { hasText: "NOT RECORDED" }).waitFor();
   }));
 

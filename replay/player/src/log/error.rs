@@ -135,7 +135,7 @@ pub enum LogError {
     },
     /// A medium that neither takes anything nor fails.
     #[error(
-        "the recording's medium hasn't answered for {waited_s} s; how much of the log is on it isn't known"
+        "the recording wasn't complete {waited_s} s after the dive's end: its medium is too slow or doesn't answer; how much of the log is on it isn't known"
     )]
     Stuck {
         /// How long it was waited for, s.

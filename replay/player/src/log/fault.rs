@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use headrace_geometry::time::MonoNs;
+use headrace_geometry::time::{DurNs, MonoNs};
 
 /// Most faults that are listed; later ones extend the last.
 const MAX_FAULTS: usize = 100;
@@ -62,12 +62,24 @@ pub enum RecordingEvent {
         /// Packets that weren't recorded.
         packets: u64,
     },
+    /// The medium takes long: a power cut would lose the last seconds.
+    Late {
+        /// The recording.
+        path: PathBuf,
+        /// Time of the dive that isn't on the medium yet.
+        by: DurNs,
+    },
+    /// It no longer does.
+    InTime {
+        /// The recording.
+        path: PathBuf,
+    },
 }
 
 impl RecordingEvent {
-    /// Whether nothing is recorded from now on.
+    /// Whether what comes now is lost, or would be with the power.
     pub fn fails(&self) -> bool {
-        matches!(self, Self::Failed { .. } | Self::Behind)
+        matches!(self, Self::Failed { .. } | Self::Behind | Self::Late { .. })
     }
 
     /// As text.
@@ -80,6 +92,14 @@ impl RecordingEvent {
             Self::Behind => "NOT RECORDED: the medium takes nothing, and gives no error".to_owned(),
             Self::CaughtUp { packets } => {
                 format!("recorded again; {packets} packets are missing from before")
+            }
+            Self::Late { path, by } => format!(
+                "the last {:.0} s are not on the disk yet: a power cut would lose them; {} is too slow",
+                by.as_secs_f64(),
+                path.display()
+            ),
+            Self::InTime { path } => {
+                format!("{} has caught up: all but the last moment is on the disk", path.display())
             }
         }
     }

@@ -4,7 +4,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 
 use crossbeam::queue::ArrayQueue;
-use headrace_geometry::time::MonoNs;
+use headrace_geometry::time::{DurNs, MonoNs};
 use headrace_monitor::byte_ring::{ByteConsumer, ByteProducer};
 use ringbuf::HeapRb;
 use ringbuf::wrap::{Cons, Prod};
@@ -35,6 +35,10 @@ pub(super) struct State {
     pub(super) failing: AtomicBool,
     /// Ticks that this recorder was too far behind to take.
     pub(super) gaps: ArrayQueue<Gap>,
+    /// Log times, ns: of the last tick that the loop has handed over or skipped, and up to which all is certain to be on the medium, or
+    /// given up. 0 before the first.
+    pub(super) handed_ns: AtomicU64,
+    pub(super) certain_ns: AtomicU64,
     /// Steps taken, by which a recorder that is stuck is told from one that is slow.
     pub(super) steps: AtomicU64,
     /// News for those who watch the dive; the oldest are dropped.
@@ -51,6 +55,22 @@ pub(super) struct State {
     /// Whether the recorder takes no further one: set before it takes the last.
     pub(super) voices_end: AtomicBool,
     pub(super) results_missing: AtomicU64,
+}
+
+impl State {
+    /// The loop has handed over, or skipped, a tick.
+    pub(super) fn hand(&self, now: MonoNs) {
+        // What came before the first tick is no time of the dive.
+        if self.handed_ns.swap(now.0, Ordering::Relaxed) == 0 {
+            self.certain_ns.fetch_max(now.0, Ordering::Relaxed);
+        }
+    }
+
+    /// Time of the dive that isn't certain to be on the medium yet.
+    pub(super) fn unsafe_for(&self) -> DurNs {
+        let certain = MonoNs(self.certain_ns.load(Ordering::Relaxed));
+        DurNs(MonoNs(self.handed_ns.load(Ordering::Relaxed)).since(certain).0.max(0))
+    }
 }
 
 /// Ticks skipped by a recorder.

@@ -11,7 +11,7 @@ use std::thread::{self, JoinHandle};
 use std::time::{Duration, Instant};
 
 use crossbeam::queue::ArrayQueue;
-use headrace_geometry::time::MonoNs;
+use headrace_geometry::time::{DurNs, MonoNs};
 use headrace_monitor::byte_ring::ByteProducer as _;
 use ringbuf::HeapRb;
 use ringbuf::traits::Observer as _;
@@ -62,6 +62,8 @@ pub struct RecorderHandle {
     state: Arc<State>,
     /// How long a medium that neither takes anything nor fails is waited for at the end.
     pub(super) patience: Duration,
+    /// When it was told to end, and whether it is waited for only so long in all.
+    ending: Option<(Instant, bool)>,
 }
 
 impl Recorder {
@@ -119,6 +121,8 @@ impl Recorder {
             closed: AtomicBool::new(false),
             failing: AtomicBool::new(false),
             gaps: ArrayQueue::new(EVENTS),
+            handed_ns: AtomicU64::new(0),
+            certain_ns: AtomicU64::new(0),
             steps: AtomicU64::new(0),
             events: ArrayQueue::new(EVENTS),
             sent: ArrayQueue::new(SENT_MESSAGES),
@@ -148,7 +152,7 @@ impl Recorder {
         let state = Arc::clone(&port.state);
         let thread = thread::Builder::new().name("recorder".to_owned());
         let thread = thread.spawn(move || run(worker)).map_err(|source| LogError::Thread { source })?;
-        Ok((port, RecorderHandle { thread: Some(thread), state, patience: PATIENCE }))
+        Ok((port, RecorderHandle { thread: Some(thread), state, patience: PATIENCE, ending: None }))
     }
 }
 
@@ -189,6 +193,7 @@ impl RecorderPort {
         // `begin` has reserved room for the whole entry, whose length is a u32, so the count fits as well.
         self.entries.put(&tick_head(index, now, u32::try_from(order.len()).unwrap_or(u32::MAX)));
         self.entries.ring.push_each(order_bytes(order));
+        self.state.hand(now);
         Ok(())
     }
 
@@ -206,6 +211,7 @@ impl RecorderPort {
 
     /// Skips a tick of so many packets, for which there is no room. The log states it; the first one is told.
     pub fn skip(&mut self, at: MonoNs, packets: u64) {
+        self.state.hand(at);
         if self.gap.is_none() {
             // Where nobody takes them there is no room, and nobody to tell.
             self.state.events.push(RecordingEvent::Behind).ok();
@@ -293,6 +299,12 @@ impl RecorderHandle {
         self.state.events.pop()
     }
 
+    /// Time of the dive that a power cut would lose now, as far as the loop has recorded it: from what is certain to be on the medium to
+    /// the last tick. What was given up after an error counts as certain.
+    pub fn unsafe_for(&self) -> DurNs {
+        self.state.unsafe_for()
+    }
+
     /// A port for what goes on on devices' lines beside the loop.
     pub fn line_port(&self) -> LinePort {
         LinePort { state: Arc::clone(&self.state) }
@@ -301,6 +313,17 @@ impl RecorderHandle {
     /// A port for the recordings of voice notes.
     pub fn voice_port(&self) -> VoicePort {
         VoicePort { state: Arc::clone(&self.state) }
+    }
+
+    /// Tells the thread to end, and doesn't wait for it: several recorders end in the time of the slowest. With `in_time` it is waited for
+    /// 30 s in all, and not as long as it makes progress.
+    #[expect(clippy::disallowed_methods, reason = "how long a medium is waited for is wall time")]
+    pub fn begin_to_end(&mut self, in_time: bool) {
+        self.ending.get_or_insert((Instant::now(), in_time));
+        self.state.stopping.store(true, Ordering::Release);
+        if let Some(thread) = &self.thread {
+            thread.thread().unpark();
+        }
     }
 
     /// Writes the rest of the queue and the summary, and ends the thread. Errors of writing are in [`Summary::faults`].
@@ -312,13 +335,13 @@ impl RecorderHandle {
 
     #[expect(clippy::disallowed_methods, reason = "how long a medium is waited for is wall time")]
     fn stop(&mut self) -> Option<Result<Summary, LogError>> {
-        self.state.stopping.store(true, Ordering::Release);
+        self.begin_to_end(false);
         let thread = self.thread.take()?;
-        thread.thread().unpark();
-        let (mut steps, mut since) = (0, Instant::now());
+        let (mut since, in_time) = self.ending?;
+        let mut steps = 0;
         while !thread.is_finished() {
             let now = self.state.steps.load(Ordering::Relaxed);
-            if now != steps {
+            if now != steps && !in_time {
                 (steps, since) = (now, Instant::now());
             } else if since.elapsed() > self.patience {
                 // Nothing ends a thread that waits for its medium; it ends with the program.

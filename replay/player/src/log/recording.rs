@@ -123,6 +123,11 @@ impl Recording {
         self.storage.free_bytes(&self.path)
     }
 
+    /// Log time of the last message that is certain, or given up.
+    pub(super) fn certain_to(&self) -> Option<MonoNs> {
+        self.settled.last
+    }
+
     /// Whether nothing is being recorded at present.
     pub(super) fn is_failing(&self) -> bool {
         self.open.is_none()

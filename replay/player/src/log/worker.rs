@@ -221,6 +221,9 @@ impl RecorderWorker {
         for event in self.recording.take_events() {
             self.state.events.force_push(event);
         }
+        if let Some(certain) = self.recording.certain_to() {
+            self.state.certain_ns.fetch_max(certain.0, Ordering::Relaxed);
+        }
         self.state.steps.fetch_add(1, Ordering::Relaxed);
         self.state.failing.store(self.recording.is_failing(), Ordering::Release);
     }

@@ -50,7 +50,7 @@ export interface State {
   pose?: { y_m: number; z_m: number; roll_deg: number; pitch_deg: number; yaw_deg: number } | null;
   echosounders?: Echosounder[];
   rates?: { id: string; hz: number }[];
-  recording?: { on: boolean; fails: boolean; path: string | null } | null;
+  recording?: { on: boolean; fails: boolean; words: string | null; path: string | null } | null;
   playback?: Playback | null;
 }
 

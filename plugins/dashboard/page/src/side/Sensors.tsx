@@ -45,8 +45,7 @@ function inOrder(sensors: Sensor[]): Sensor[] {
 function Recording() {
   const recording = store.state?.recording;
   if (!recording) return null;
-  const failed = store.state?.recording_fails !== undefined;
-  const lamp = recording.fails ? "red" : !recording.on ? "none" : failed ? "amber" : "green";
-  const words = recording.fails ? "NOT RECORDED" : !recording.on ? "not recorded" : failed ? "recording had failed" : "recording";
+  const lamp = recording.fails ? "red" : !recording.on ? "none" : recording.words ? "amber" : "green";
+  const words = recording.words ?? (recording.on ? "recording" : "not recorded");
   return <div class={`recording sensor ${lamp}`} title={recording.path ?? ""}><Shape lamp={lamp} size={18} /><span class="id">{words}</span></div>;
 }

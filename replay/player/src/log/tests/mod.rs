@@ -13,7 +13,7 @@ mod voice;
 
 use std::io::Cursor;
 
-use headrace_geometry::time::MonoNs;
+use headrace_geometry::time::{DurNs, MonoNs};
 
 use super::{LogHeader, LogReader, Loss, MessageKind, ResultChannel, SourceInfo};
 

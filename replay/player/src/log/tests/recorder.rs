@@ -68,6 +68,66 @@ fn a_loop_that_respects_the_queue_loses_nothing_to_a_slow_medium() {
     }
 }
 
+/// A medium whose flushes wait until they are let go, one by one; all of them once nobody holds them back.
+struct Held(mpsc::Receiver<()>);
+
+impl Write for Held {
+    fn write(&mut self, bytes: &[u8]) -> std::io::Result<usize> {
+        Ok(bytes.len())
+    }
+
+    fn flush(&mut self) -> std::io::Result<()> {
+        self.0.recv().ok();
+        Ok(())
+    }
+}
+
+/// From the first tick to the last, as long as no sync has returned; nothing, once one has that began after the last tick.
+#[test]
+fn time_that_is_not_on_the_medium_yet_is_known() {
+    let (go, held) = mpsc::channel();
+    go.send(()).unwrap();
+    let (mut port, mut handle) = Recorder::start(Held(held), &header(true), 0).unwrap();
+    assert_eq!(handle.unsafe_for(), DurNs(0));
+    for (index, at_s) in [(0, 75_000.0), (1, 75_003.0), (2, 75_007.5)] {
+        let now = MonoNs(0) + DurNs::from_secs_f64(at_s);
+        port.raw(1, now, now, b"range").unwrap();
+        port.tick(index, now, &[1]).unwrap();
+    }
+    std::thread::sleep(Duration::from_millis(700));
+    assert_eq!(handle.unsafe_for(), DurNs::from_secs_f64(7.5));
+    port.skip(MonoNs(0) + DurNs::from_secs_f64(75_009.0), 3);
+    assert_eq!(handle.unsafe_for(), DurNs::from_secs_f64(9.0), "a skipped tick isn't on the medium either");
+    port.tick(4, MonoNs(0) + DurNs::from_secs_f64(75_009.5), &[]).unwrap();
+    while handle.unsafe_for() > DurNs(0) {
+        go.send(()).unwrap();
+        std::thread::sleep(Duration::from_millis(10));
+    }
+    drop(go);
+    handle.begin_to_end(true);
+    assert_eq!(handle.finish().unwrap().messages, 7);
+}
+
+/// Seconds of work for a slow medium: a dive on ports waits for 0.6 s of it, another as long as it makes progress.
+#[test]
+fn a_dive_on_ports_ends_in_time_on_a_medium_that_takes_long() {
+    for in_time in [true, false] {
+        let (medium, _flushed) = slow(5);
+        let (mut port, mut handle) = Recorder::start(medium, &header(true), 16 << 20).unwrap();
+        for round in 0..20_000_u32 {
+            let now = MonoNs(round.into());
+            port.raw(1, now, now, &noise(round.into(), 300)).unwrap();
+            port.tick(round.into(), now, &[1]).unwrap();
+        }
+        handle.patience = Duration::from_millis(600);
+        handle.begin_to_end(in_time);
+        match handle.finish() {
+            Err(LogError::Stuck { .. }) => assert!(in_time, "it makes progress"),
+            ended => assert!(!in_time && ended.is_ok_and(|summary| summary.messages == 40_000)),
+        }
+    }
+}
+
 #[test]
 fn what_is_older_than_a_second_reads_without_an_end() {
     let (medium, flushed) = slow(0);

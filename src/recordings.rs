@@ -1,0 +1,176 @@
+//! The recordings of a dive: what has happened to them, and what all screens show of it.
+
+use std::path::PathBuf;
+
+use headrace_geometry::time::DurNs;
+use headrace_monitor::report::{LogReport, Report};
+use headrace_replay::log::{
+    LeftOut, LinePort, RecorderHandle, RecordingEvent, RecordingFault, Summary, VoicePort,
+};
+use headrace_replay::player::seconds;
+
+use crate::report_output::files_report;
+
+/// Time that isn't on the medium yet from which screens show it, and from which it is an alarm.
+const SHOWN_FROM: DurNs = DurNs(2_000_000_000);
+const ALARM_FROM: DurNs = DurNs(5_000_000_000);
+
+/// The recorders of a dive.
+#[derive(Default)]
+pub(crate) struct Recordings {
+    all: Vec<One>,
+    /// Whether its time is this machine's. What a replay has not synced yet is minutes of a dive, and no power cut loses it.
+    is_live: bool,
+    unsafe_for: DurNs,
+}
+
+struct One {
+    path: PathBuf,
+    handle: RecorderHandle,
+    /// Whether nothing goes into it at present; `None` as long as it has never failed.
+    fails: Option<bool>,
+    is_late: bool,
+}
+
+/// What screens show of all recordings together.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub(crate) struct RecordingState {
+    /// Whether nothing goes into one at present; `None` as long as none has failed.
+    pub(crate) fails: Option<bool>,
+    /// Whole seconds of the dive that a power cut would lose, of the recording that is furthest behind.
+    pub(crate) unsafe_s: u64,
+}
+
+impl RecordingState {
+    /// What to show, and whether it is an alarm; `None` while all is well.
+    pub(crate) fn words(&self) -> Option<(String, bool)> {
+        let unsafe_for = DurNs::from_secs_f64(self.unsafe_s as f64);
+        match self.fails {
+            Some(true) => Some(("NOT RECORDED".to_owned(), true)),
+            _ if unsafe_for >= ALARM_FROM => Some((format!("LAST {} s NOT ON DISK", self.unsafe_s), true)),
+            _ if unsafe_for >= SHOWN_FROM => {
+                Some((format!("last {} s not on disk yet", self.unsafe_s), false))
+            }
+            Some(false) => Some(("recording had failed".to_owned(), false)),
+            None => None,
+        }
+    }
+}
+
+impl Recordings {
+    pub(crate) fn of(recorders: Vec<(PathBuf, RecorderHandle)>, is_live: bool) -> Self {
+        let one = |(path, handle)| One { path, handle, fails: None, is_late: false };
+        Self { all: recorders.into_iter().map(one).collect(), is_live, unsafe_for: DurNs(0) }
+    }
+
+    /// What has happened since the last call. To be called after every tick.
+    pub(crate) fn news(&mut self) -> Vec<RecordingEvent> {
+        let mut news = Vec::new();
+        self.unsafe_for = DurNs(0);
+        for one in &mut self.all {
+            while let Some(event) = one.handle.next_event() {
+                one.fails = Some(event.fails());
+                news.push(event);
+            }
+            if self.is_live {
+                let unsafe_for = one.handle.unsafe_for();
+                self.unsafe_for = self.unsafe_for.max(unsafe_for);
+                news.extend(one.late(unsafe_for));
+            }
+        }
+        news
+    }
+
+    /// What to show.
+    pub(crate) fn state(&self) -> RecordingState {
+        let fails = self.all.iter().filter_map(|one| one.fails).reduce(|one, other| one | other);
+        RecordingState { fails, unsafe_s: self.unsafe_for.0.max(0).unsigned_abs() / 1_000_000_000 }
+    }
+
+    /// Whether the last seconds of the dive would be lost with the power, in one of them.
+    pub(crate) fn is_alarm(&self) -> bool {
+        self.all.iter().any(|one| one.is_late || one.fails == Some(true))
+    }
+
+    /// Inputs for what goes on on devices' lines beside the loop.
+    pub(crate) fn line_ports(&self) -> Vec<LinePort> {
+        self.all.iter().map(|one| one.handle.line_port()).collect()
+    }
+
+    /// Inputs for recordings of voice notes.
+    pub(crate) fn voice_ports(&self) -> Vec<VoicePort> {
+        self.all.iter().map(|one| one.handle.voice_port()).collect()
+    }
+
+    /// Ends them, all at a time. The report has the first one's files and the losses of all; media that are gone keep nobody
+    /// from it.
+    pub(crate) fn end(mut self, report: &Report) -> Option<LogReport> {
+        self.all.iter_mut().for_each(|one| one.handle.begin_to_end(self.is_live));
+        let (mut log, several): (Option<LogReport>, _) = (None, self.all.len() > 1);
+        for One { path, handle, .. } in self.all {
+            let written = handle.finish();
+            let mut losses = match &written {
+                Err(error) => vec![format!("recording failed: {error}")],
+                Ok(written) => unrecorded(written),
+            };
+            if several {
+                for loss in &mut losses {
+                    *loss = format!("{}: {loss}", path.display());
+                }
+            }
+            if let Some(log) = &mut log {
+                log.notes.push(format!("also recorded to {}", path.display()));
+                log.losses.extend(losses);
+                continue;
+            }
+            let parts = written.map(|written| written.parts).unwrap_or_default();
+            let parts: Vec<_> = parts.iter().map(|part| (part.path.as_path(), part.raw_messages)).collect();
+            let mut files = files_report(&path, &parts);
+            let of_console = report.console.map_or(0, |console| console.packets);
+            files.messages = of_console + report.sources.iter().map(|source| source.packets).sum::<u64>();
+            files.losses.splice(0..0, losses);
+            log = Some(files);
+        }
+        log
+    }
+}
+
+impl One {
+    /// Whether it falls behind, or has caught up.
+    fn late(&mut self, unsafe_for: DurNs) -> Option<RecordingEvent> {
+        let is_late = unsafe_for >= if self.is_late { SHOWN_FROM } else { ALARM_FROM };
+        let has_changed = core::mem::replace(&mut self.is_late, is_late) != is_late;
+        let path = || self.path.clone();
+        has_changed.then(|| match is_late {
+            true => RecordingEvent::Late { path: path(), by: unsafe_for },
+            false => RecordingEvent::InTime { path: path() },
+        })
+    }
+}
+
+/// Data missing in a recording, and errors while it was made, as text.
+fn unrecorded(written: &Summary) -> Vec<String> {
+    let mut losses: Vec<String> = written.faults.iter().map(fault).collect();
+    losses.extend(Some(written.left_out).filter(|left| left.messages > 0).map(left_out));
+    let counts = [
+        (written.sent_dropped, "messages to devices not recorded: the recorder's queue was full"),
+        (written.skipped, "packets not recorded: the recorder was behind"),
+        (written.results_missing, "ticks recorded without all their results: too many"),
+    ];
+    losses
+        .extend(counts.iter().filter(|(count, _)| *count > 0).map(|(count, what)| format!("{count} {what}")));
+    losses
+}
+
+/// An error of the recording, with times.
+fn fault(fault: &RecordingFault) -> String {
+    let from = fault.from.map(|from| format!(", after {}", seconds(from)));
+    let to = fault.to.map(|to| format!(", before {}", seconds(to)));
+    [fault.words(), from.unwrap_or_default(), to.unwrap_or_default()].concat()
+}
+
+/// Data that the recorder dropped, with times.
+fn left_out(left: LeftOut) -> String {
+    let span = left.span.map(|(from, to)| format!(", {} to {}", seconds(from), seconds(to)));
+    format!("{}{}", left.words(), span.unwrap_or_default())
+}
