@@ -74,7 +74,7 @@ impl Dive {
         sources[IMU] = Some(source(SensorKind::Imu, Rot::identity()));
         sources[TETHER] = Some(source(SensorKind::Tether { zero_at_m: 0.0, scale: 1.0 }, Rot::identity()));
         sources[DEPTH] = Some(source(SensorKind::Depth, Rot::identity()));
-        let length = TetherLength { length_m: state.position.x(), resolution_m: 0.001 };
+        let length = TetherLength { length_m: state.position.x(), resolution_m: 0.001, restart: None };
         readings[TETHER] = (TETHER, Reading::TetherLength(length));
         let pressure_pa = site.pressure_pa(site.surface_above_floor_m - z_m);
         let water = WaterPressure { pressure_pa, resolution_pa: 10.0, temperature_degc: 10.0 };

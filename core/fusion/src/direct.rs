@@ -49,9 +49,11 @@ struct TetherTrack {
     readings: [(MonoNs, f64); SPEED_READINGS],
     count: usize,
     resolution_m: f64,
+    /// Number of the counter's last restart before the first reading.
+    restarts: u32,
 }
 
-stateful!(TetherTrack { state: count, resolution_m; slots: readings; });
+stateful!(TetherTrack { state: count, resolution_m, restarts; slots: readings; });
 
 impl DirectNavigation {
     /// Without readings yet.
@@ -60,7 +62,12 @@ impl DirectNavigation {
             profile,
             site,
             attitude: None,
-            tether: TetherTrack { readings: [(MonoNs(0), 0.0); SPEED_READINGS], count: 0, resolution_m: 0.0 },
+            tether: TetherTrack {
+                readings: [(MonoNs(0), 0.0); SPEED_READINGS],
+                count: 0,
+                resolution_m: 0.0,
+                restarts: 0,
+            },
             echoes: [None; MAX_SOURCES],
             place: None,
             height_m: None,
@@ -112,6 +119,14 @@ impl DirectNavigation {
 
 impl TetherTrack {
     fn take(&mut self, at: MonoNs, zero_at_m: f64, scale: f64, reading: &TetherLength) {
+        let restarts = reading.restart.map_or(0, |restart| restart.number);
+        if self.count == 0 {
+            self.restarts = restarts;
+        }
+        // Nothing else here knows where the vehicle is when a count begins again from zero.
+        if restarts != self.restarts {
+            return;
+        }
         let chainage_m = zero_at_m + scale * reading.length_m;
         if let Some(slot) = self.readings.get_mut(self.count % SPEED_READINGS) {
             *slot = (at, chainage_m);
@@ -221,7 +236,8 @@ mod tests {
         assert_eq!(nav.fix(MonoNs(0)), Err(NoFix::Chainage));
         let tether = SensorInfo { kind: SensorKind::Tether { zero_at_m: 2.0, scale: 1.0 }, ..imu };
         for (at, length_m) in [(0, 9.9), (500_000_000, 10.0)] {
-            let reading = Reading::TetherLength(TetherLength { length_m, resolution_m: 0.001 });
+            let reading =
+                Reading::TetherLength(TetherLength { length_m, resolution_m: 0.001, restart: None });
             nav.update(1, &tether, at_once(MonoNs(at)), &reading);
         }
         assert_eq!(nav.fix(MonoNs(0)), Err(NoFix::Section));

@@ -120,6 +120,17 @@ pub struct TetherLength {
     pub length_m: f64,
     /// Quantum of the length, m.
     pub resolution_m: f64,
+    /// The last time that the count began again from zero; the length goes on from where it was.
+    pub restart: Option<CountRestart>,
+}
+
+/// A count that began again from zero.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+pub struct CountRestart {
+    /// Number of the restart, from 1.
+    pub number: u32,
+    /// Whether the counter was silent before it, as one is that is plugged in again.
+    pub was_away: bool,
 }
 
 /// A reading and its time of validity.

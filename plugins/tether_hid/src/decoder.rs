@@ -104,6 +104,7 @@ impl Decoder for HidDecoder {
             let length = TetherLength {
                 length_m: counts as f64 / counter.counts_per_metre,
                 resolution_m: counter.resolution_m(),
+                restart: tracker.restart(),
             };
             sink(Decoded {
                 valid_at: packet.received - counter.latency,
@@ -143,6 +144,7 @@ impl Decoder for LineDecoder {
             let length = TetherLength {
                 length_m: line.payout.value() * *metres_per_unit,
                 resolution_m: line.payout.quantum() * *metres_per_unit,
+                restart: None,
             };
             sink(Decoded { valid_at: received - *latency, reading: Reading::TetherLength(length) });
         });

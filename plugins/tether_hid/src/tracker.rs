@@ -3,12 +3,14 @@
 //! - A counter wraps: changes are taken the short way round.
 //! - A change faster than the winch is rejected and counted. Rejected reports are compared with each other: when
 //!   [`PERSIST`] in a row agree, the counter has moved and the reports weren't corrupt.
-//!   - If the first of them was near zero, the device was plugged in again and counts from zero: the length continues from
-//!     its last value. After a silence, too, a step back to zero is accepted directly only if the winch covers it in a second.
+//!   - If the first of them was near zero, the device counts from zero again: the length continues from its last value, and is
+//!     marked with the restart, which may be that of a device plugged in again. After a silence, too, a step back to zero is
+//!     accepted directly only if the winch covers it in a second.
 //!   - Otherwise the counter's new value is accepted.
 //! - In both cases, and whenever counts may have been lost, the length is no longer certain: `re_zero_needed` is set and stays.
 
-use headrace_sensor::geometry::time::MonoNs;
+use headrace_sensor::geometry::time::{DurNs, MonoNs};
+use headrace_sensor::reading::CountRestart;
 use headrace_sensor::stateful;
 use serde::{Deserialize, Serialize};
 
@@ -22,6 +24,9 @@ const SLACK_S: f64 = 0.1;
 
 /// Maximum counting time of a replugged device before its first report, s.
 const FRESH_S: f64 = 1.0;
+
+/// Least silence of a device that is plugged in again. Source: USB 2.0, 7.1.7.3, debounce interval.
+const AWAY: DurNs = DurNs::from_millis(100);
 
 /// Meaning of a report's count.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -54,9 +59,10 @@ pub struct CountTracker {
     sequence: Option<u8>,
     total: i64,
     health: TrackerHealth,
+    restart: Option<CountRestart>,
 }
 
-stateful!(CountTracker { state: accepted, jumped, sequence, total, health; fixed: counting, width, max_counts_per_s; });
+stateful!(CountTracker { state: accepted, jumped, sequence, total, health, restart; fixed: counting, width, max_counts_per_s; });
 
 /// A count with its receive time.
 #[derive(Debug, Clone, Copy, Serialize, Deserialize)]
@@ -69,6 +75,8 @@ struct Seen {
 #[derive(Debug, Clone, Copy, Serialize, Deserialize)]
 struct Jump {
     from_zero: bool,
+    /// Time of the first of them.
+    since: MonoNs,
     last: Seen,
     agreeing: u32,
 }
@@ -85,7 +93,13 @@ impl CountTracker {
             sequence: None,
             total: 0,
             health: TrackerHealth::default(),
+            restart: None,
         }
+    }
+
+    /// The last restart of the count from zero.
+    pub fn restart(&self) -> Option<CountRestart> {
+        self.restart
     }
 
     /// Health of the tracker.
@@ -144,7 +158,7 @@ impl CountTracker {
         let back_at_once = from_zero && !self.within(FRESH_S, change);
         if back_at_once || !self.reaches(before.at, now.at, change) {
             self.health.rejected += 1;
-            self.jumped = Some(Jump { from_zero, last: now, agreeing: 1 });
+            self.jumped = Some(Jump { from_zero, since: now.at, last: now, agreeing: 1 });
             return None;
         }
         // During a long silence the counter may have wrapped any number of times.
@@ -162,6 +176,13 @@ impl CountTracker {
             return None;
         }
         self.health.re_zero_needed = true;
+        if jump.from_zero {
+            let number = self.restart.map_or(0, |restart| restart.number).saturating_add(1);
+            let silence_ns = jump.since.since(before.at).0;
+            let period_ns = now.at.since(jump.since).0 / i64::from(PERSIST - 1);
+            let was_away = silence_ns >= AWAY.0 && silence_ns > period_ns.saturating_mul(2);
+            self.restart = Some(CountRestart { number, was_away });
+        }
         let reference = if jump.from_zero { 0 } else { before.count };
         self.accept(now, self.width.difference(reference, now.count))
     }
@@ -239,6 +260,22 @@ mod tests {
         let totals = (0..5).map(|i| tracker.take(at_ms(60_000 + 20 * i), &counted(300 + i as i64)));
         assert_eq!(totals.last(), Some(Some(120_304)));
         assert!(tracker.health().re_zero_needed);
+    }
+
+    #[test]
+    fn restart_from_zero_is_marked_and_says_whether_the_device_was_away() {
+        for (silence_ms, was_away) in [(20, false), (60_000, true)] {
+            let mut tracker = CountTracker::new(Counting::Absolute, Width::Bits32, FASTEST);
+            tracker.take(at_ms(0), &counted(120_000));
+            assert_eq!(tracker.restart(), None);
+            for (count, i) in [0, 2, 4, 6, 8].into_iter().zip(0..) {
+                tracker.take(at_ms(silence_ms + 20 * i), &counted(count));
+            }
+            assert_eq!(tracker.restart(), Some(CountRestart { number: 1, was_away }));
+        }
+        let mut tracker = CountTracker::new(Counting::Absolute, Width::Bits32, FASTEST);
+        take_all(&mut tracker, &[120_000, 90_000, 90_001, 90_002, 90_003, 90_004]);
+        assert_eq!(tracker.restart(), None, "a jump isn't a restart");
     }
 
     #[test]

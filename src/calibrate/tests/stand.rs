@@ -181,7 +181,7 @@ impl Stand {
             let axis = Rot::<Level, Tunnel>::from_roll_pitch_yaw(0.0, 0.0, self.site.axis_yaw_rad);
             say(IMU, Reading::Attitude(axis * self.pose(t).attitude * Self::filed(IMU).mount.rotation));
             let length_m = 38.0 + self.speed_mps * t;
-            say(TETHER, Reading::TetherLength(TetherLength { length_m, resolution_m: 0.001 }));
+            say(TETHER, Reading::TetherLength(TetherLength { length_m, resolution_m: 0.001, restart: None }));
             let height_m = self.pose(t).place(Self::filed(DEPTH).mount.position).z();
             let pressure_pa = self.site.pressure_pa(self.site.surface_above_floor_m - height_m);
             let (resolution_pa, temperature_degc) = (1.0, 10.0);

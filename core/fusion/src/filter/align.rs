@@ -291,7 +291,8 @@ mod tests {
         let mut listening = Listening::default();
         let at = MonoNs(1_000_000_000);
         let level = Reading::Attitude(Rot::<Level, Sensor>::identity());
-        let length = Reading::TetherLength(TetherLength { length_m: 100.0, resolution_m: 0.001 });
+        let length =
+            Reading::TetherLength(TetherLength { length_m: 100.0, resolution_m: 0.001, restart: None });
         listening.hear(&context, 0, &imu, MonoNs(0), &level);
         listening.hear(&context, 1, &tether, at, &length);
         let (state, mut factors) = listening.settle(at, &context).unwrap();

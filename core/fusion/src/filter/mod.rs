@@ -10,6 +10,7 @@ pub mod clones;
 pub mod context;
 pub mod corrections;
 pub mod count_step;
+pub mod counter_zero;
 pub mod eskf;
 mod evidence;
 pub mod factors;
@@ -38,6 +39,7 @@ mod tests;
 use self::align::{LISTENS, Listening};
 use self::cable::CableDoubt;
 use self::context::Context;
+use self::counter_zero::CounterZero;
 use self::eskf::{BIAS_KNOWN_RADPS, Eskf};
 use self::pose_sd::PoseSd;
 use self::raw_ways::RawWays;
@@ -89,6 +91,7 @@ pub struct FilterNavigation {
     listening: Listening,
     stillness: Stillness,
     raw_ways: RawWays,
+    zero: CounterZero,
     running: Eskf,
     is_running: bool,
     /// Epochs begin at this time, and at multiples of their length after it.
@@ -105,7 +108,7 @@ pub struct FilterNavigation {
     journal: Option<Journal>,
 }
 
-stateful!(FilterNavigation { state: context, window, unit, listening, stillness, raw_ways, running, is_running, epoch_zero, received, standing, revisit, restarts; lists: ahead; slots: sources; fixed: journal; });
+stateful!(FilterNavigation { state: context, window, unit, listening, stillness, raw_ways, zero, running, is_running, epoch_zero, received, standing, revisit, restarts; lists: ahead; slots: sources; fixed: journal; });
 
 impl FilterNavigation {
     /// Without readings yet.
@@ -118,6 +121,7 @@ impl FilterNavigation {
             listening: Listening::default(),
             stillness: Stillness::default(),
             raw_ways: RawWays::default(),
+            zero: CounterZero::default(),
             running: Eskf::default(),
             is_running: false,
             epoch_zero: MonoNs(0),
@@ -249,8 +253,11 @@ impl FilterNavigation {
     }
 
     /// Whether the chainage was reacquired since the heads last passed here: the cable has slipped, and the offset between
-    /// samples georeferenced before and now is unknown.
+    /// samples georeferenced before and now is unknown. It stays so after the counter's zero was lost.
     fn has_jumped(&self) -> bool {
+        if self.zero.is_lost() {
+            return true;
+        }
         let longest = self.between_passes(1.0);
         self.running.way_sought.is_some_and(|then| self.running.at.since(then).0 <= longest.0)
     }
@@ -374,6 +381,12 @@ impl Navigation for FilterNavigation {
         if !reading.is_finite() || times.valid.since(times.received) > CLOCK_JUMP {
             source.consistency.dropped += 1;
             return;
+        }
+        match reading {
+            Reading::TetherLength(length) if matches!(sensor.kind, SensorKind::Tether { .. }) => {
+                self.zero.hear(times.received, length, self.standing.is_ok());
+            }
+            _ => self.zero.hear_other(times.received),
         }
         self.raw_ways.hear(times.valid, number, sensor, reading, &self.context.site);
         if !self.is_running {

@@ -283,7 +283,7 @@ mod tests {
             (of(SensorKind::Tether { zero_at_m: 0.0, scale: 1.0 }), of(SensorKind::VelocityLog));
         for k in 1..rate_hz * lasts_s {
             let t = f64::from(k) / f64::from(rate_hz);
-            let length = TetherLength { length_m: cable_m(t), resolution_m: 0.01 };
+            let length = TetherLength { length_m: cable_m(t), resolution_m: 0.01, restart: None };
             ways.hear(at(t), TETHER, &tether, &Reading::TetherLength(length), &site);
             if let Some(along_mps) = log_mps(t).filter(|_| k.is_multiple_of(log_every)) {
                 let moved = Vec3::new(along_mps, 0.02, 0.0);

@@ -183,7 +183,7 @@ mod tests {
             stillness.take(
                 at,
                 tether,
-                &Reading::TetherLength(TetherLength { length_m, resolution_m: 0.001 }),
+                &Reading::TetherLength(TetherLength { length_m, resolution_m: 0.001, restart: None }),
             );
         }
         stillness.is_still()
@@ -217,7 +217,7 @@ mod tests {
             stillness.take(at, SensorKind::Imu, &Reading::SpecificForce(Vec3::new(0.0, 0.0, 9.8)));
             // A pull every 7 s until 63 s have gone.
             let length_m = pulled(0.5 / 7.0, t.min(63.5));
-            let length = TetherLength { length_m, resolution_m: 0.001 };
+            let length = TetherLength { length_m, resolution_m: 0.001, restart: None };
             stillness.take(
                 at,
                 SensorKind::Tether { zero_at_m: 0.0, scale: 1.0 },
@@ -239,7 +239,7 @@ mod tests {
             stillness.take(at, SensorKind::Imu, &Reading::AngularRate(Vec3::new(0.0, 0.0, rate(t))));
             stillness.take(at, SensorKind::Imu, &Reading::SpecificForce(Vec3::new(0.0, 0.0, 9.8)));
             let tether = SensorKind::Tether { zero_at_m: 0.0, scale: 1.0 };
-            let length = TetherLength { length_m: way_m(t), resolution_m: 0.001 };
+            let length = TetherLength { length_m: way_m(t), resolution_m: 0.001, restart: None };
             stillness.take(at, tether, &Reading::TetherLength(length));
             if stillness.is_still() {
                 stillness.take_mean_rate();

@@ -454,7 +454,7 @@ impl Dive {
         let resolution_m = if self.recipe.states_quantum { quantum_m } else { 5e-4 };
         // What a converter of fine steps makes of a wheel of coarse ones.
         let length_m = math::round_to_i64(whole as f64 * quantum_m / resolution_m) as f64 * resolution_m;
-        Some(Reading::TetherLength(TetherLength { length_m, resolution_m }))
+        Some(Reading::TetherLength(TetherLength { length_m, resolution_m, restart: None }))
     }
 
     fn pressure(&self, t: f64, draws: &mut Draws) -> Reading {

@@ -7,7 +7,7 @@ use crate::filter::state::CREEP;
 use crate::{Navigation as _, NoFix};
 use headrace_geometry::frames::{Point3, Pose, Rot, Vec3};
 use headrace_geometry::math;
-use headrace_sensor::reading::{EchoRange, Reading, SonarReturn, TetherLength, WaterPressure};
+use headrace_sensor::reading::{CountRestart, EchoRange, Reading, SonarReturn, TetherLength, WaterPressure};
 
 const ALL: [usize; 9] = [0, 1, 2, 3, 4, 5, 6, 7, 8];
 const NOT_UNIT: [usize; 8] = [1, 2, 3, 4, 5, 6, 7, 8];
@@ -235,6 +235,29 @@ fn a_sensor_that_jumps_and_comes_back_is_left_out() {
             tally.lacking <= lacking && consistency.gated >= 6,
             "source {source}: {tally:?} {consistency:?}"
         );
+    }
+}
+
+#[test]
+fn restart_of_the_counter_keeps_the_chainage_only_where_the_counter_alone_was_away() {
+    for (away_s, are_all_away, is_lost) in [(0.0, false, true), (1.0, true, true), (1.0, false, false)] {
+        let rig = Rig::new(cruise, 1);
+        let mut events = rig.events(0.0, 60.0);
+        events.retain(|event| {
+            let is_away = (FAULT_S..FAULT_S + away_s).contains(&seconds(event.valid));
+            !is_away || !are_all_away && event.source != TETHER
+        });
+        for event in events.iter_mut().filter(|event| seconds(event.valid) >= FAULT_S) {
+            if let Reading::TetherLength(length) = &mut event.reading {
+                length.restart = Some(CountRestart { number: 1, was_away: away_s > 0.0 });
+            }
+        }
+        let mut nav = rig.navigation();
+        for event in &events {
+            Rig::hear(&mut nav, event);
+        }
+        let fix = nav.fix(events.last().unwrap().received);
+        assert_eq!(fix.err(), is_lost.then_some(NoFix::Chainage), "{away_s} s, all {are_all_away}");
     }
 }
 

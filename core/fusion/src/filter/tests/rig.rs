@@ -285,7 +285,7 @@ impl Rig {
 
     pub(super) fn tether(&self, t: f64) -> Reading {
         let length_m = (self.way)(t).position.x() - 2.0 + self.noisy(t, 40, self.settings.tether_sd_m);
-        Reading::TetherLength(TetherLength { length_m, resolution_m: 0.001 })
+        Reading::TetherLength(TetherLength { length_m, resolution_m: 0.001, restart: None })
     }
 
     pub(super) fn pressure(&self, t: f64) -> Reading {

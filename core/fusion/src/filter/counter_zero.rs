@@ -1,0 +1,89 @@
+//! Whether the cable counter still counts from its first zero.
+//!
+//! A count that begins again from zero tells nothing about the vehicle: the counter was plugged in again, or another one took its
+//! place, or the log goes on with an earlier time of a dive. The chainage is kept only where the counter alone was away, while the
+//! other sensors carried the estimate. Derivation: `docs/fusion.md`, "When a counter begins again from zero".
+
+use headrace_geometry::time::{DurNs, MonoNs};
+use headrace_sensor::reading::TetherLength;
+use serde::{Deserialize, Serialize};
+
+/// See the module's description.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+pub struct CounterZero {
+    /// Number of the counter's last restart.
+    restarts: u32,
+    /// When the counter was last heard.
+    heard: Option<MonoNs>,
+    /// When any other sensor was last heard, and their longest silence since the counter was.
+    others: Option<MonoNs>,
+    silence: DurNs,
+    is_lost: bool,
+}
+
+impl CounterZero {
+    /// Whether the zero is unknown, and with it the chainage.
+    pub fn is_lost(&self) -> bool {
+        self.is_lost
+    }
+
+    /// Takes the receive time of any other sensor's reading.
+    pub fn hear_other(&mut self, received: MonoNs) {
+        let before = self.others.replace(received).unwrap_or(received);
+        self.silence = self.silence.max(received.since(before));
+    }
+
+    /// Takes a reading of the counter; `is_sure` where the chainage is known without it.
+    pub fn hear(&mut self, received: MonoNs, length: &TetherLength, is_sure: bool) {
+        let number = length.restart.map_or(0, |restart| restart.number);
+        let before = core::mem::replace(&mut self.restarts, number);
+        let others = received.since(self.others.unwrap_or(received)).max(self.silence);
+        self.silence = DurNs(0);
+        let Some(heard) = self.heard.replace(received) else { return };
+        let was_away = length.restart.is_some_and(|restart| restart.was_away);
+        // A stop of the whole vehicle, or of its log, silences all.
+        let is_alone = others.0.saturating_mul(2) < received.since(heard).0;
+        self.is_lost |= number != before && !(was_away && is_alone && is_sure);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use headrace_sensor::reading::CountRestart;
+
+    fn length(restart: Option<CountRestart>) -> TetherLength {
+        TetherLength { length_m: 30.0, resolution_m: 0.001, restart }
+    }
+
+    /// Whether the zero is lost when the counter is away for a time, ms, and the others for another.
+    fn is_lost(counter_ms: u64, others_ms: u64, was_away: bool, is_sure: bool) -> bool {
+        let at = |ms: u64| MonoNs(1_000_000_000 + 1_000_000 * ms);
+        let mut zero = CounterZero::default();
+        zero.hear_other(at(0));
+        zero.hear(at(0), &length(None), true);
+        for ms in (others_ms..=counter_ms).step_by(10) {
+            zero.hear_other(at(ms));
+        }
+        zero.hear(at(counter_ms), &length(Some(CountRestart { number: 1, was_away })), is_sure);
+        zero.is_lost()
+    }
+
+    #[test]
+    fn restart_keeps_the_zero_only_where_the_counter_alone_was_away() {
+        assert!(!is_lost(1000, 10, true, true));
+        assert!(is_lost(1000, 10, false, true), "it wasn't away");
+        assert!(is_lost(1000, 900, true, true), "all were silent");
+        assert!(is_lost(1000, 10, true, false), "nothing else knew the chainage");
+    }
+
+    #[test]
+    fn restarts_before_the_first_reading_change_nothing() {
+        let mut zero = CounterZero::default();
+        let restart = Some(CountRestart { number: 3, was_away: false });
+        for ms in 0..3 {
+            zero.hear(MonoNs(1_000_000 * ms), &length(restart), false);
+            assert!(!zero.is_lost());
+        }
+    }
+}
