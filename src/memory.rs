@@ -5,7 +5,7 @@ use std::hint::black_box;
 use crate::failure::Failure;
 
 /// Address space that a dive takes once it is assembled, beside the rings of its sensors: replays of a vehicle of two heads abort
-/// where less is left, measured in steps of 10 MB of `ulimit -v`. Most of it stays untouched.
+/// where less is left, in a tunnel of 100 m (longer ones take more), measured in steps of 10 MB of `ulimit -v`. Most of it stays untouched.
 const DIVE_BYTES: usize = 232 << 20;
 
 /// Checks that the system has the address space for a dive: an allocation that fails later ends the program.
