@@ -228,6 +228,17 @@ impl fmt::Display for LossKind {
             }
             Self::Stated(words) => out.write_str(words),
             Self::InPart { part, kind } => write!(out, "part {part}: {kind}"),
+            Self::PartsMissing { .. } | Self::PartUnlike { .. } | Self::PartUnreadable { .. } | Self::PartByName { .. } => {
+                self.write_of_part(out)
+            }
+        }
+    }
+}
+
+impl LossKind {
+    /// As text, of a part that is missing or not as it should be.
+    fn write_of_part(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
             Self::PartsMissing { first, last: None } => {
                 write!(out, "part {first} of the recording is missing, and any after it")
             }
@@ -248,11 +259,10 @@ impl fmt::Display for LossKind {
             Self::PartByName { part } => {
                 write!(out, "part {part} doesn't say which part it is; taken for that by its name")
             }
+            _ => Ok(()),
         }
     }
-}
 
-impl LossKind {
     /// Whether it has a byte range in a file.
     fn has_place(&self) -> bool {
         match self {
