@@ -5,10 +5,11 @@ use std::fs::{File, Metadata, OpenOptions};
 use std::io::{BufWriter, Error, ErrorKind, Result, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU32, Ordering};
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 /// How long a named pipe is waited for that no process reads.
 const READER_WITHIN: Duration = Duration::from_secs(2);
+const READER_TRIES: u32 = 100;
 
 /// A file that is being written. Dropping it before [`WholeFile::complete`] leaves what was there before, and nothing else.
 #[derive(Debug)]
@@ -135,7 +136,7 @@ pub fn is_pipe(_: &Path) -> bool {
 fn open_pipe(path: &Path) -> Result<File> {
     use rustix::fs::{Mode, OFlags, fcntl_setfl, open};
     use rustix::io::Errno;
-    let begun = Instant::now();
+    let mut tries = READER_TRIES;
     loop {
         match open(path, OFlags::WRONLY | OFlags::NONBLOCK | OFlags::CLOEXEC, Mode::empty()) {
             Ok(pipe) => {
@@ -143,7 +144,10 @@ fn open_pipe(path: &Path) -> Result<File> {
                 fcntl_setfl(&pipe, OFlags::empty())?;
                 return Ok(pipe.into());
             }
-            Err(Errno::NXIO) if begun.elapsed() < READER_WITHIN => std::thread::sleep(READER_WITHIN / 100),
+            Err(Errno::NXIO) if tries > 0 => {
+                tries -= 1;
+                std::thread::sleep(READER_WITHIN / READER_TRIES);
+            }
             Err(Errno::NXIO) => {
                 let words =
                     format!("it is a pipe that no process has read within {} s", READER_WITHIN.as_secs());

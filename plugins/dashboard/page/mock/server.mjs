@@ -17,7 +17,7 @@ const TICK_MS = 200;
 export async function serve(options = {}) {
   let world = new World(options);
   const clients = new Set();
-  let seq = 0, kept = [], sectionsTo = 0, mute = false, closed = false, token = options.token ?? null, refuses = null;
+  let seq = 0, kept = [], sectionsTo = 0, mute = false, closed = false, token = options.token ?? null, refuses = null, spent = false;
 
   const send = (message) => {
     seq += 1;
@@ -93,6 +93,7 @@ export async function serve(options = {}) {
     if (ask.mute !== undefined) mute = ask.mute;
     if (ask.closed !== undefined) { closed = ask.closed; if (closed) clients.forEach((client) => client.terminate()); }
     if (ask.token !== undefined) token = ask.token;
+    if (ask.spent !== undefined) spent = ask.spent;
     if (ask.restart) { world = new World({ ...options, instance: ask.restart }); kept = []; sectionsTo = 0; clients.forEach((client) => client.terminate()); }
     if (ask.world) Object.assign(world, ask.world);
     return { alerts: world.alerts, notes: world.notes, at_m: world.at_m, playback: world.playback, clients: clients.size, seq };
@@ -113,6 +114,7 @@ export async function serve(options = {}) {
     }
     if (closed) return request.socket.destroy();
     if (url.pathname === "/login") {
+      if (spent) return answer(429, "text/plain", "too many wrong tokens");
       const right = url.searchParams.get("token") === token;
       return answer(right ? 204 : 401, "text/plain", "", right ? { "set-cookie": `mock=${token}; Path=/; HttpOnly; SameSite=Strict` } : {});
     }

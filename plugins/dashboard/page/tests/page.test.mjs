@@ -342,11 +342,15 @@ describe("connection", () => {
     await condition(page, "good");
   }));
 
-  it("a token where one is wanted", () => on({ token: "right" }, async ({ page }) => {
+  it("a token where one is wanted", () => on({ token: "right" }, async ({ mock, page }) => {
     await word(page, "NO ACCESS");
     await page.getByLabel(/Token/).fill("wrong");
     await page.keyboard.press("Enter");
     await page.locator(".token p", { hasText: "isn't right" }).waitFor();
+    mock.control({ spent: true });
+    await page.keyboard.press("Enter");
+    await page.locator(".token p", { hasText: "Too many wrong tokens" }).waitFor();
+    mock.control({ spent: false });
     await page.getByLabel(/Token/).fill("right");
     await page.keyboard.press("Enter");
     await condition(page, "good");

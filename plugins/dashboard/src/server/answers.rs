@@ -16,7 +16,7 @@ use axum::{Extension, Router};
 use serde_json::{Value, json};
 use tokio::time::{Instant, timeout};
 
-use super::client::{Admitted, Caller, Denied};
+use super::admission::{Admitted, Caller, Denied};
 use super::reply::{Here, json_answer, plain, refused};
 use super::stall::STALLED_AFTER;
 use super::{Shared, feed, metrics, neighbours, voices};

@@ -13,7 +13,8 @@ use hyper_util::service::TowerToHyperService;
 use tokio::io::{AsyncRead, AsyncWrite};
 use tokio::net::{TcpListener, TcpSocket, TcpStream};
 
-use super::client::{Caller, Client};
+use super::admission::Caller;
+use super::client::Client;
 use super::stall::Stream;
 use super::{Shared, TlsFiles, answers};
 

@@ -2,6 +2,7 @@
 
 #![expect(clippy::disallowed_types, reason = "locks between the page's threads; the loop's takes none")]
 
+mod admission;
 mod answers;
 mod budget;
 mod client;
@@ -142,7 +143,7 @@ pub(crate) struct Shared {
     places: Arc<places::Places>,
     /// Wrong tokens of each client.
     guesses: budget::Budgets,
-    wrong_tokens: client::WrongTokens,
+    wrong_tokens: admission::WrongTokens,
     /// Actions of each operator by HTTP.
     actions: budget::Budgets,
     stop: Notify,
@@ -218,7 +219,7 @@ impl Page {
             proxies: proxies.iter().map(IpAddr::to_canonical).collect(),
             places: Arc::default(),
             guesses: budget::Budgets::new(MOST_GUESSES, GUESSES_PER_S),
-            wrong_tokens: client::WrongTokens::default(),
+            wrong_tokens: admission::WrongTokens::default(),
             actions: budget::Budgets::new(feed::MOST_PER_S, feed::MOST_PER_S),
             stop: Notify::new(),
             has_ended: AtomicBool::new(false),

@@ -13,8 +13,8 @@ use serde_json::json;
 use tokio::sync::Semaphore;
 use tokio::time::timeout;
 
+use super::admission::{Admitted, Denied};
 use super::budget::Budget;
-use super::client::{Admitted, Denied};
 use super::reply::{Here, json_answer, plain, refused};
 use super::{Voices, feed};
 use crate::access::query;

@@ -65,7 +65,8 @@ impl Numbering {
     /// Of a log with these channels, which ends at `end`; `None` of other writers' logs, which may number as they like. Reports
     /// a part that has no end record and yet is closed.
     pub(super) fn of(scan: &mut Scan, part: Option<&Part>, channels: &Channels, end: u64) -> Option<Self> {
-        if scan.closed && part.is_some_and(|part| part.end.is_none()) && scan.losses.list().is_empty() {
+        // One that wasn't closed has a loss already.
+        if part.is_some_and(|part| part.end.is_none()) && scan.losses.list().is_empty() {
             let kind = LossKind::Metadata(PART_END.to_owned());
             scan.losses.push(Loss { kind, offset: end, bytes: 0, from: None, to: None });
         }

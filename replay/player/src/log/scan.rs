@@ -63,8 +63,6 @@ pub(super) struct Scan {
     data_end: Option<core::ops::Range<u64>>,
     /// Whether it is one of our logs, which have no messages outside chunks, numbered messages and a summary.
     pub(super) ours: bool,
-    /// Whether it has its closing records.
-    pub(super) closed: bool,
     /// Whether it has the record that repeats its channels.
     has_list: bool,
     /// Attachments listed by a log of ours.
@@ -367,7 +365,6 @@ impl Scan {
             self.lose(LossKind::Truncated, at..at);
             return;
         };
-        self.closed = true;
         if summary == 0 && self.ours {
             // Our writer ends no log without a summary: it was removed, and the last messages with it.
             self.lose(LossKind::Truncated, at..at);

@@ -44,7 +44,7 @@ export function send(command: Command): boolean {
   return false;
 }
 
-export const login = (token: string): Promise<boolean> => feed?.login(token) ?? Promise.resolve(false);
+export const login = (token: string): Promise<string> => feed?.login(token) ?? Promise.resolve("There is no program to ask.");
 export const reconnect = (): void => feed?.again();
 export const acknowledge = (alert: number): boolean => send({ do: "acknowledge", alert, by: prefs.by });
 export const silence = (): boolean => send({ do: "silence", by: prefs.by });

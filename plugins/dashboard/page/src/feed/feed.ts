@@ -38,15 +38,16 @@ export class Feed {
     return true;
   }
 
-  /** Gives the token; whether it was taken. The server keeps it as a cookie. */
-  async login(token: string): Promise<boolean> {
+  /** Gives the token; why it wasn't taken, or nothing. The server keeps it as a cookie. */
+  async login(token: string): Promise<string> {
     const url = new URL("/login", this.base);
     url.searchParams.set("token", token);
     const response = await fetch(url, { redirect: "manual", credentials: "same-origin" });
-    if (response.status === 401 || response.status === 403) return false;
+    if (response.status === 429) return "Too many wrong tokens from here: wait some seconds and try again.";
+    if (response.status >= 400) return "That token isn't right.";
     this.store.link.phase = "connecting";
     this.again();
-    return true;
+    return "";
   }
 
   private connect(): void {

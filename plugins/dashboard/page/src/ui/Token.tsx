@@ -13,7 +13,7 @@ export function Token() {
     event.preventDefault();
     setWrong("");
     login(field.current?.value.trim() ?? "").then(
-      (taken) => setWrong(taken ? "" : "That token isn't right."),
+      (why) => setWrong(why),
       () => setWrong("The program doesn't answer."),
     );
   };

@@ -1,0 +1,165 @@
+//! Requests by the tokens that they show: what they may do.
+
+use std::collections::{BTreeSet, VecDeque};
+use std::hash::{DefaultHasher, Hash as _, Hasher as _};
+use std::net::IpAddr;
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+
+use axum::extract::FromRequestParts;
+use axum::http::request::Parts;
+use axum::http::{HeaderMap, StatusCode};
+use axum::response::{IntoResponse, Response};
+
+use super::Shared;
+use super::client::Client;
+use super::places::Place;
+use super::reply::{ask_to_wait, plain, refused};
+use crate::access::{Role, tokens_of};
+
+/// Wrong tokens that are remembered, in all and of a client.
+const MOST_WRONG: usize = 256;
+const MOST_WRONG_OF_CLIENT: usize = 4;
+
+/// The connection of a request.
+#[derive(Clone)]
+pub(super) struct Caller {
+    pub(super) peer: IpAddr,
+    pub(super) place: Arc<Place>,
+}
+
+/// A request that may see the dive.
+pub(super) struct Admitted {
+    pub(super) role: Role,
+    pub(super) client: Client,
+    place: Arc<Place>,
+    /// The address is one that a proxy forwards for.
+    is_forwarded: bool,
+}
+
+/// Why a request may not see the dive.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Denied {
+    /// No token, or none that is right.
+    NoToken,
+    /// Too many wrong tokens came from its address: it isn't compared.
+    Spent,
+}
+
+impl Denied {
+    fn status(self) -> StatusCode {
+        match self {
+            Self::NoToken => StatusCode::UNAUTHORIZED,
+            Self::Spent => StatusCode::TOO_MANY_REQUESTS,
+        }
+    }
+
+    /// The same as an answer to a command.
+    pub(super) fn refusal(self, shared: &Shared) -> Response {
+        refused(shared, self.status(), self.why().trim_end())
+    }
+
+    fn why(self) -> &'static str {
+        match self {
+            Self::NoToken => "a token is needed: open this server's page\n",
+            Self::Spent => "too many wrong tokens came from this address; try again in a second\n",
+        }
+    }
+}
+
+impl IntoResponse for Denied {
+    fn into_response(self) -> Response {
+        ask_to_wait(plain(self.status(), self.why()))
+    }
+}
+
+impl FromRequestParts<Arc<Shared>> for Admitted {
+    type Rejection = Denied;
+
+    async fn from_request_parts(parts: &mut Parts, shared: &Arc<Shared>) -> Result<Self, Denied> {
+        let caller = parts.extensions.get::<Caller>().ok_or(Denied::NoToken)?;
+        Self::of_tokens(shared, caller, &parts.headers, &tokens_of(&parts.headers, &parts.uri))
+    }
+}
+
+impl Admitted {
+    /// Admits a request by these of its tokens.
+    pub(super) fn of_tokens(
+        shared: &Shared,
+        caller: &Caller,
+        headers: &HeaderMap,
+        tokens: &BTreeSet<String>,
+    ) -> Result<Self, Denied> {
+        let client = Client::of_request(caller.peer, &shared.proxies, headers);
+        let role = shared.role(client, &caller.place, tokens);
+        let role = role.inspect_err(|_| Shared::count(&shared.counts.unauthorised, 1))?;
+        caller.place.promote(client, role);
+        let is_forwarded = client != Client::of_address(caller.peer);
+        Ok(Self { role, client, place: Arc::clone(&caller.place), is_forwarded })
+    }
+
+    /// Whether its connection may carry a stream of the feed; it does so from now on.
+    pub(super) fn may_stream(&self) -> bool {
+        self.place.stream(self.client, self.is_forwarded)
+    }
+}
+
+/// Wrong tokens of clients, the latest last, by their hashes. To show one of them again is no guess: old tokens in the tabs of a browser
+/// must not spend the budget of its address.
+#[derive(Default)]
+pub(super) struct WrongTokens(Mutex<VecDeque<(Client, u64)>>);
+
+impl WrongTokens {
+    fn list(&self) -> MutexGuard<'_, VecDeque<(Client, u64)>> {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    fn has(&self, client: Client, token: &str) -> bool {
+        self.list().contains(&(client, hash_of(token)))
+    }
+
+    fn add(&self, client: Client, token: &str) {
+        let mut list = self.list();
+        if list.iter().filter(|(of, _)| *of == client).count() >= MOST_WRONG_OF_CLIENT {
+            let oldest = list.iter().position(|(of, _)| *of == client);
+            oldest.and_then(|oldest| list.remove(oldest));
+        }
+        if list.len() >= MOST_WRONG {
+            list.pop_front();
+        }
+        list.push_back((client, hash_of(token)));
+    }
+}
+
+fn hash_of(token: &str) -> u64 {
+    let mut hasher = DefaultHasher::new();
+    token.hash(&mut hasher);
+    hasher.finish()
+}
+
+impl Shared {
+    /// The role of these tokens. Each wrong one costs a guess of the client's budget. Tokens cost none that the client has shown before:
+    /// a right one on this connection, or one of its last wrong ones.
+    fn role(&self, client: Client, place: &Place, tokens: &BTreeSet<String>) -> Result<Role, Denied> {
+        if self.access.tokens.is_none() {
+            return Ok(Role::Operator);
+        }
+        let shown = place.shown(client);
+        let is_shown = |token: &&String| shown.is_some_and(|role| self.access.is_token_of(role, token));
+        let known = shown.filter(|_| tokens.iter().any(|token| is_shown(&token)));
+        let is_new = |token: &&String| !is_shown(token) && !self.wrong_tokens.has(client, token);
+        let guesses: Vec<_> = tokens.iter().filter(is_new).collect();
+        if !self.guesses.take(client, guesses.len()) {
+            return known.ok_or(Denied::Spent);
+        }
+        let mut role = known;
+        for token in guesses {
+            if let Some(right) = self.access.role_of(token) {
+                self.guesses.give_back(client, 1);
+                role = role.max(Some(right));
+            } else {
+                self.wrong_tokens.add(client, token);
+            }
+        }
+        role.ok_or(Denied::NoToken)
+    }
+}
