@@ -31,8 +31,14 @@ pub(crate) struct Requests {
 }
 
 impl Requests {
+    /// Counts a request that comes now.
+    #[expect(clippy::disallowed_methods, reason = "how long somebody waits to ask again is wall time")]
+    pub(crate) fn is_second_now(&mut self) -> bool {
+        self.is_second(Instant::now())
+    }
+
     /// Counts a request at `now`; whether it is a second one, by which the program ends at once.
-    pub(crate) fn is_second(&mut self, now: Instant) -> bool {
+    fn is_second(&mut self, now: Instant) -> bool {
         now.duration_since(*self.first.get_or_insert(now)) >= ONE_REQUEST
     }
 }
@@ -114,6 +120,7 @@ mod tests {
     use super::*;
 
     #[test]
+    #[expect(clippy::disallowed_methods, reason = "any moment will do")]
     fn requests_within_a_second_count_as_one() {
         let (begun, mut requests) = (Instant::now(), Requests::default());
         let is_second = [0, 1, 300, 999, 1000, 1500]

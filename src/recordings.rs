@@ -141,9 +141,12 @@ impl One {
         let is_late = unsafe_for >= if self.is_late { SHOWN_FROM } else { ALARM_FROM };
         let has_changed = core::mem::replace(&mut self.is_late, is_late) != is_late;
         let path = || self.path.clone();
-        has_changed.then(|| match is_late {
-            true => RecordingEvent::Late { path: path(), by: unsafe_for },
-            false => RecordingEvent::InTime { path: path() },
+        has_changed.then(|| {
+            if is_late {
+                RecordingEvent::Late { path: path(), by: unsafe_for }
+            } else {
+                RecordingEvent::InTime { path: path() }
+            }
         })
     }
 }

@@ -4,7 +4,6 @@ use std::io;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread;
-use std::time::Instant;
 
 use crossbeam::channel::Sender;
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
@@ -38,10 +37,7 @@ pub(super) fn listen(to: Sender<Message>, interrupted: Arc<AtomicBool>) -> io::R
                 continue;
             }
             let [by_signal, by_key] = waiting.map(|one| !one.revents().is_empty());
-            if by_signal
-                && rustix::io::read(&signals, &mut bytes).is_ok()
-                && requests.is_second(Instant::now())
-            {
+            if by_signal && rustix::io::read(&signals, &mut bytes).is_ok() && requests.is_second_now() {
                 end_at_once();
             }
             if !by_key {
@@ -54,7 +50,7 @@ pub(super) fn listen(to: Sender<Message>, interrupted: Arc<AtomicBool>) -> io::R
                     for key in keys(bytes.get(..count).unwrap_or_default()) {
                         if key != Key::Character(INTERRUPT) {
                             to.try_send(Message::Key(key)).ok();
-                        } else if requests.is_second(Instant::now()) {
+                        } else if requests.is_second_now() {
                             end_at_once();
                         }
                         interrupted.store(true, Ordering::Relaxed);

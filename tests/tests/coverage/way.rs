@@ -211,13 +211,14 @@ fn metres_by_verdict_add_up_to_the_way_wherever_a_dive_begins_turns_and_ends() {
     for seed in 0..60 {
         let mut draw = Draw::new(seed);
         let start_m = draw.between(-2.0, 10.0);
-        let mut scene = format!("vehicle = \"vehicle.toml\"\n[trajectory]\nstart_m = {start_m}\n");
         let (legs, first) = (1 + seed % 3, seed / 3 % 2);
-        for leg in 0..legs {
+        let legs = (0..legs).map(|leg| {
             let speed_mps = if (leg + first) % 2 == 0 { 0.2 } else { -0.2 };
             let distance_m = draw.between(0.5, 2.5);
-            scene += &format!("[[trajectory.legs]]\ndistance_m = {distance_m}\nspeed_mps = {speed_mps}\n");
-        }
+            format!("[[trajectory.legs]]\ndistance_m = {distance_m}\nspeed_mps = {speed_mps}\n")
+        });
+        let head = format!("vehicle = \"vehicle.toml\"\n[trajectory]\nstart_m = {start_m}\n");
+        let scene = [head].into_iter().chain(legs).collect::<String>();
         let report = instrumented::dive(&vehicle, &scene).report;
         accounted_for(&format!("seed {seed}"), &report);
         let reason = report.not_inspected.as_ref().map(|why| why.reason);
