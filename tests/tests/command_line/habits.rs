@@ -117,7 +117,7 @@ fn report_is_whole_on_a_pipe_that_does_not_wait() {
     let (mut reader, mut writer) = std::io::pipe().unwrap();
     fcntl_setfl(&writer, OFlags::NONBLOCK).unwrap();
     // A pipe holds 64 KiB; spaces may precede JSON.
-    writer.write_all(&[b' '; 60_000]).unwrap();
+    writer.write_all(&vec![b' '; 60_000]).unwrap();
     let mut replay = program();
     replay.args(["replay", "dive.mcap", "--json"]).current_dir(folder.path(""));
     let mut replay = replay.stdout(writer).spawn().unwrap();
