@@ -50,7 +50,9 @@ pub(super) fn listen(to: Sender<Message>, interrupted: Arc<AtomicBool>) -> io::R
                     for key in keys(bytes.get(..count).unwrap_or_default()) {
                         if key != Key::Character(INTERRUPT) {
                             to.try_send(Message::Key(key)).ok();
-                        } else if requests.is_second_now() {
+                            continue;
+                        }
+                        if requests.is_second_now() {
                             end_at_once();
                         }
                         interrupted.store(true, Ordering::Relaxed);
