@@ -6,7 +6,7 @@ use headrace_monitor::run::Loop;
 use headrace_ports::Status;
 use headrace_replay::log::RecordingEvent;
 
-use crate::recordings::RecordingState;
+use crate::recording_state::RecordingState;
 
 /// Follows a dive. Called on the loop's thread between ticks: it takes what it needs of the loop by value and hands it to a
 /// thread of its own; it waits for nothing, unless the dive is a replay, which may wait for it.

@@ -37,6 +37,7 @@ mod plan;
 mod play;
 mod printer;
 mod progress;
+mod recording_state;
 mod recordings;
 mod recover;
 mod report_output;

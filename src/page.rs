@@ -39,7 +39,7 @@ use crate::dive::CLOCK_ANCHOR;
 use crate::files;
 use crate::follower::Follower;
 use crate::logging::complain;
-use crate::recordings::RecordingState;
+use crate::recording_state::RecordingState;
 use crate::report_output::exit_code;
 
 /// Interval at which an interruption is looked for while a replay stands still.

@@ -13,7 +13,7 @@ use serde_json::{Value, json};
 
 use crate::follower::Follower;
 use crate::printer::Printer;
-use crate::recordings::RecordingState;
+use crate::recording_state::RecordingState;
 use crate::screen::Screen;
 use crate::terminal;
 

@@ -33,7 +33,7 @@ use crate::failure::Failure;
 use crate::follower::Follower;
 use crate::interrupt;
 use crate::output::give_up;
-use crate::recordings::RecordingState;
+use crate::recording_state::RecordingState;
 use alerts::Desk;
 use artist::Artist;
 use hold::Hold;

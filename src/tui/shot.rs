@@ -14,7 +14,7 @@ use headrace_monitor::telling::{Teller, Told};
 use headrace_ports::{Phase, Status};
 use headrace_sampling::advice::{Advice, Reason};
 
-use crate::recordings::RecordingState;
+use crate::recording_state::RecordingState;
 
 use super::alerts::{self, AlertRow};
 use super::mode::Stop;

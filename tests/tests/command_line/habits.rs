@@ -118,9 +118,11 @@ fn report_is_whole_on_a_pipe_that_does_not_wait() {
     fcntl_setfl(&writer, OFlags::NONBLOCK).unwrap();
     // A pipe holds 64 KiB; spaces may precede JSON.
     writer.write_all(&vec![b' '; 60_000]).unwrap();
-    let mut replay = program();
-    replay.args(["replay", "dive.mcap", "--json"]).current_dir(folder.path(""));
-    let mut replay = replay.stdout(writer).spawn().unwrap();
+    let mut command = program();
+    command.args(["replay", "dive.mcap", "--json"]).current_dir(folder.path("")).stdout(writer);
+    let mut replay = command.spawn().unwrap();
+    // It has the pipe's end, too.
+    drop(command);
     std::thread::sleep(std::time::Duration::from_secs(2));
     let mut bytes = Vec::new();
     std::io::Read::read_to_end(&mut reader, &mut bytes).unwrap();

@@ -151,15 +151,17 @@ fn links(_: &Metadata) -> u64 {
 /// Bytes gathered before they are passed to the file.
 const BUFFER_BYTES: usize = 64 << 10;
 
-/// A stored file as a writer. Flushing syncs; dropping discards what hasn't been passed on.
+/// A stored file as a writer. Flushing syncs what was written since; dropping discards what hasn't been passed on.
 pub(super) struct Buffered {
     file: Box<dyn StoredFile>,
     buffer: Vec<u8>,
+    /// Whether nothing was written since the last sync: another would take as long for nothing.
+    is_synced: bool,
 }
 
 impl Buffered {
     pub(super) fn new(file: Box<dyn StoredFile>) -> Self {
-        Self { file, buffer: Vec::with_capacity(BUFFER_BYTES) }
+        Self { file, buffer: Vec::with_capacity(BUFFER_BYTES), is_synced: false }
     }
 
     fn pass_on(&mut self) -> io::Result<()> {
@@ -183,12 +185,17 @@ impl io::Write for Buffered {
             self.pass_on()?;
         }
         self.buffer.extend_from_slice(bytes);
+        self.is_synced = false;
         Ok(bytes.len())
     }
 
     fn flush(&mut self) -> io::Result<()> {
-        self.pass_on()?;
-        self.file.sync()
+        if !self.is_synced {
+            self.pass_on()?;
+            self.file.sync()?;
+            self.is_synced = true;
+        }
+        Ok(())
     }
 }
 

@@ -152,6 +152,8 @@ impl RecorderWorker {
     /// Writes the rest of the queue, and ends the log.
     pub fn finish(mut self, now: Duration) -> Summary {
         self.state.voices_end.store(true, Ordering::SeqCst);
+        // The end of the log syncs what is left.
+        self.flushed = now;
         while self.step(now) {}
         self.state_dropped(now, true);
         self.write_made(|derived, made| derived.end(made));
