@@ -320,7 +320,7 @@ mod tests {
     }
 
     #[test]
-    fn a_dispute_takes_back_the_corrections_and_what_a_standing_count_made_is_uncertain_before() {
+    fn standing_count_is_doubted_and_a_dispute_takes_back_its_last_second() {
         let mut cable = Cable::default();
         for k in 0..100_u32 {
             assert_eq!(cable.take(&reading(f64::from(k) / 10.0, 7.0, 0.0, 0.005)), Use::Fuse);

@@ -126,7 +126,7 @@ mod tests {
     }
 
     #[test]
-    fn of_a_count_that_changes_the_last_second_is_taken_back() {
+    fn dispute_takes_back_last_second_of_a_changing_count() {
         let mut corrections = stood(0, -0.002, [0.0; 2]);
         assert!(corrections.lost_m() == 0.0 && corrections.take_slipped_m2() == 0.0);
         let [way_m, speed_mps] = corrections.take_back();
@@ -136,14 +136,14 @@ mod tests {
 
     /// What has been wrong for long has been believed for long.
     #[test]
-    fn of_one_that_stands_the_last_second_is_taken_back_too() {
+    fn dispute_takes_back_last_second_of_a_standing_count() {
         let [way_m, speed_mps] = stood(50, -0.002, [0.0; 2]).take_back();
         assert!((way_m - 0.001 * lately()).abs() < 1e-6 && (speed_mps + 2.0 * way_m).abs() < 1e-6, "{way_m}");
     }
 
     /// The estimate as the counter has made it, less that without it: what the speed lost becomes way.
     #[test]
-    fn a_speed_that_was_corrected_is_missing_in_the_way() {
+    fn corrected_speed_adds_to_the_lost_distance() {
         let speeds = (0..50).map(|k| 0.002 * (lately() + f64::from(k)));
         let expected_m = 0.001 * (lately() + 49.0) + speeds.map(|speed| 0.1 * speed).sum::<f64>();
         let lost_m = stood(50, 0.002, [0.0; 2]).lost_m();
@@ -151,7 +151,7 @@ mod tests {
     }
 
     #[test]
-    fn a_tenth_of_its_square_is_uncertain_beyond_chance() {
+    fn corrections_beyond_chance_are_doubted_by_a_tenth_of_their_square() {
         let sure = stood(50, 0.0, [0.0; 2]);
         assert!((sure.lost_m() - 0.3e-3 * (lately() + 49.0)).abs() < 1e-6, "{}", sure.lost_m());
         // As much by chance as there is: half of it.
@@ -167,7 +167,7 @@ mod tests {
 
     /// Corrections of a vehicle that hovers go to and fro.
     #[test]
-    fn of_one_that_stands_for_long_the_first_part_counts() {
+    fn long_stop_counts_by_its_first_20_s() {
         let mut corrections = stood(190, 0.0, [0.0; 2]);
         let first_m = corrections.lost_m();
         assert!((first_m - 0.3e-3 * (lately() + 189.0)).abs() < 1e-4, "{first_m}");
@@ -180,7 +180,7 @@ mod tests {
 
     /// It counts for a head's turn between passes, and for good in the position; a slow vehicle's coarse steps are no stops.
     #[test]
-    fn what_may_be_lost_stays_when_the_count_changes_again() {
+    fn doubt_of_a_stop_stays_when_the_count_changes_again() {
         for (readings, slips) in [(15, false), (50, true)] {
             let mut corrections = stood(readings, 0.0, [0.0; 2]);
             let before_m = corrections.lost_m();

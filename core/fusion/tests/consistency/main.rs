@@ -135,7 +135,7 @@ fn a_velocity_log_that_is_wrong_makes_no_error_that_is_not_reported() {
 
 /// A count that stands for minutes is mostly that of a vehicle that hovers.
 #[test]
-fn a_vehicle_that_hovers_stays_sure_of_its_place() {
+fn hovering_vehicle_keeps_a_sure_position() {
     let all = dives(HOVERING, Recipe::hovering);
     table(&all);
     let unsure = share(&of(&all, &|_| true), |tally| [tally.unsure, tally.epochs]);

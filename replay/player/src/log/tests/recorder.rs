@@ -84,7 +84,7 @@ impl Write for Held {
 
 /// From the first tick to the last, as long as no sync has returned; nothing, once one has that began after the last tick.
 #[test]
-fn time_that_is_not_on_the_medium_yet_is_known() {
+fn unsynced_time_runs_from_last_sync_to_last_tick() {
     let (go, held) = mpsc::channel();
     go.send(()).unwrap();
     let (mut port, mut handle) = Recorder::start(Held(held), &header(true), 0).unwrap();
@@ -110,7 +110,7 @@ fn time_that_is_not_on_the_medium_yet_is_known() {
 
 /// Seconds of work for a slow medium: a dive on ports waits for 0.6 s of it, another as long as it makes progress.
 #[test]
-fn a_dive_on_ports_ends_in_time_on_a_medium_that_takes_long() {
+fn live_recording_ends_in_time_on_a_slow_medium() {
     for in_time in [true, false] {
         let (medium, _flushed) = slow(5);
         let (mut port, mut handle) = Recorder::start(medium, &header(true), 16 << 20).unwrap();
