@@ -106,7 +106,7 @@ pub(crate) enum Command {
     /// Write a recorded dive as one HTML page that opens from disk, without a network.
     ///
     /// The log is replayed through the same processing; the page is the one that shows a live dive, with the dive inside
-    /// (docs/page.md). Exit codes are those of replay.
+    /// (docs/how-to/read-the-page.md). Exit codes are those of replay.
     #[command(after_help = "Example:\n  headrace export dive.mcap --html dive.html")]
     Export(Export),
     /// List the notes of a recorded dive, and write the recordings of its voice notes as files.
@@ -452,7 +452,7 @@ pub(crate) struct Plan {
     /// Print the lines of the vehicle file that make the best answer the dive's: layout, planned speed and modes.
     #[arg(long, conflicts_with_all = ["json", "csv"])]
     pub(crate) write: bool,
-    /// Output folder for SVG charts: perimeter, pattern, speeds and hours (explained in docs/plan).
+    /// Output folder for SVG charts: perimeter, pattern, speeds and hours (explained in docs/how-to/plan).
     #[arg(long, value_name = "DIR")]
     pub(crate) svg: Option<PathBuf>,
     #[command(flatten)]
@@ -545,7 +545,7 @@ pub(crate) struct Output {
     pub(crate) json: bool,
     #[command(flatten)]
     pub(crate) overwrite: Overwrite,
-    /// Print a JSON object a line while the dive goes on: the state once a second, and what is told of it (docs/live-state.md).
+    /// Print a JSON object a line while the dive goes on: the state once a second, and what is told of it (docs/reference/live-state.md).
     #[arg(long, conflicts_with_all = ["json", "tui"])]
     pub(crate) json_lines: bool,
 }

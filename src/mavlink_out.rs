@@ -133,7 +133,7 @@ impl Drop for MavlinkOut {
     }
 }
 
-/// The figures, with their units: `docs/screens.md` has the table. NaN where there is none.
+/// The figures, with their units: `docs/reference/screens.md` has the table. NaN where there is none.
 #[expect(clippy::cast_possible_truncation, reason = "MAVLink's figures are of single precision")]
 fn figures(state: &LiveState, unacknowledged: u32) -> [(&'static str, f32); 12] {
     let known = |value: Option<f64>| value.map_or(f32::NAN, |value| value as f32);

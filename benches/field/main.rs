@@ -4,7 +4,7 @@
 //! `cargo bench -p headrace_tests --bench field` runs all cells in a quarter of an hour on two cores; `-- --quick` with a
 //! tenth of the dives. `--cell VEHICLE/CONDITION/PLACE/SPEED` runs those cells alone (any part may be `*`, parts at the end may be left
 //! out, a place may be any chainage), `--seeds N` so many dives each, `--from-seed N` begins with another,
-//! `--metres N` makes each so long, `--json FILE` says where to write (target/field.json), `--page docs/field.md` renews the table of
+//! `--metres N` makes each so long, `--json FILE` says where to write (target/field.json), `--page docs/why/field.md` renews the table of
 //! that page, which has the dives of all places together. Below the table are the sections that passed over the target, by dive.
 //! D_true is from `headrace_tests::truth`, which has nothing of the program's coverage. The figures are the report's.
 

@@ -1,7 +1,7 @@
 //! `headrace calibrate`: replays a log and estimates mounts, zeros and latencies of sensors, as values for the vehicle file.
 //!
 //! [`mod@collect`] runs a log through the loop and keeps its readings. Pure estimators process these after the dive: they
-//! allocate, and aren't for the loop. Where a log doesn't suffice they return the reason. Derivation: `docs/calibration.md`.
+//! allocate, and aren't for the loop. Where a log doesn't suffice they return the reason. Derivation: `docs/how-to/calibrate.md`.
 
 pub(crate) mod collect;
 mod estimate;

@@ -6,7 +6,7 @@ use std::path::PathBuf;
 use clap::Args;
 use headrace_dashboard::server::PORT;
 
-/// Where the page is served, and for whom (docs/page.md).
+/// Where the page is served, and for whom (docs/how-to/read-the-page.md).
 #[derive(Debug, Args)]
 #[command(next_help_heading = "Page")]
 pub(crate) struct PageArgs {

@@ -16,7 +16,7 @@ use crate::{Folder, program};
 /// Longest wait for anything that must come.
 const WITHIN: Duration = Duration::from_mins(2);
 
-const SCHEMA: &str = include_str!("../../docs/page-feed.schema.json");
+const SCHEMA: &str = include_str!("../../docs/reference/page-feed.schema.json");
 
 /// A running program with a page, killed when it goes out of scope.
 pub struct Serving {
@@ -166,7 +166,7 @@ pub struct Viewer {
     pub others: Vec<Value>,
     /// The last number.
     pub seq: u64,
-    /// What texts must be as: `docs/page-feed.schema.json`.
+    /// What texts must be as: `docs/reference/page-feed.schema.json`.
     schema: Value,
 }
 

@@ -1,4 +1,4 @@
-//! What tests of hard cases find: held to its bound, and to `docs/hard-cases.md`, which `tests/hard_cases/run` makes of it.
+//! What tests of hard cases find: held to its bound, and to `docs/why/hard-cases.md`, which `tests/hard_cases/run` makes of it.
 
 #![allow(clippy::panic, reason = "a test stops at what it can't do")]
 
@@ -41,7 +41,7 @@ fn tell(name: &str, error: f64, bound: f64, condition: Option<f64>) {
     let told: Vec<&str> = row.split('|').map(str::trim).skip(3).take(3).collect();
     assert_eq!(
         told, figures,
-        "docs/hard-cases.md tells other figures of {name}; tests/hard_cases/run makes it anew"
+        "docs/why/hard-cases.md tells other figures of {name}; tests/hard_cases/run makes it anew"
     );
 }
 
@@ -53,9 +53,9 @@ fn row(name: &str) -> String {
     let case = fields.find_map(|mut fields| (fields.next() == Some(name)).then(|| fields.next()).flatten());
     let case = case.unwrap_or_else(|| panic!("tests/hard_cases/list has no case {name}"));
     let start = format!("| {case} |");
-    let page = read("docs/hard-cases.md");
+    let page = read("docs/why/hard-cases.md");
     let row = page.lines().find(|line| line.starts_with(&start));
-    row.unwrap_or_else(|| panic!("docs/hard-cases.md has no row {case:?}; tests/hard_cases/run makes it"))
+    row.unwrap_or_else(|| panic!("docs/why/hard-cases.md has no row {case:?}; tests/hard_cases/run makes it"))
         .to_owned()
 }
 

@@ -4,7 +4,7 @@ use serde::{Deserialize, Serialize};
 
 use super::passage::Loss;
 
-/// Cause assigned to a fail. Source: docs/coverage.md, "Causes".
+/// Cause assigned to a fail. Source: docs/why/coverage.md, "Causes".
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Cause {

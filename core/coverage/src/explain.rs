@@ -2,7 +2,7 @@
 //!
 //! Each factor that was present is taken away from what was measured, by the geometry that makes the hole: samples that
 //! are lacking for it are put back, or the wall is drawn together by as much as passes or steps would have been closer.
-//! `docs/coverage.md` has the order and its reasons.
+//! `docs/why/coverage.md` has the order and its reasons.
 
 mod case;
 mod driven;

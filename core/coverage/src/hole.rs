@@ -1,6 +1,6 @@
 //! The largest hole of a section: the largest empty circle on the unrolled wall with its centre in the section.
 //!
-//! Let f(c) be the distance from a point c to the nearest sample. D = 2 max f over the section (docs/glossary.md), found by
+//! Let f(c) be the distance from a point c to the nearest sample. D = 2 max f over the section (docs/reference/glossary.md), found by
 //! branch and bound over tiles. A tile is divided among a few samples; each share is a convex polygon on which the
 //! distance to its sample is largest at a corner. The farthest corner bounds the tile, since further samples only lower
 //! f. The sample nearest to that corner either proves the bound, or gets a share and lowers it. Tiles whose bound can't

@@ -12,7 +12,7 @@ use headrace_geometry::math;
 use headrace_geometry::time::MonoNs;
 use headrace_geometry::tunnel::Profile;
 
-/// Coverage verdict of a section. Source: docs/coverage.md, "Verdicts".
+/// Coverage verdict of a section. Source: docs/why/coverage.md, "Verdicts".
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub enum Verdict {
     /// Undecided: samples may still land without the vehicle turning back, or not all heads have been there.

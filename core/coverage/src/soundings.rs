@@ -1,7 +1,7 @@
 //! Sounding density: samples per node of a square grid, as survey specifications require.
 //!
 //! A grid does not detect gaps: a helix can satisfy it and leave strips wider than the target. It complements the hole,
-//! never replaces it. Source: docs/coverage.md, "For surveyors".
+//! never replaces it. Source: docs/why/coverage.md, "For surveyors".
 
 use headrace_geometry::math;
 use headrace_geometry::snapshot::stateful;

@@ -258,7 +258,7 @@ pub struct Mount {
 
 /// Direction of a head's beam at `angle_rad`, in the sensor frame: 0 is down, growing clockwise seen along +x.
 ///
-/// Source: docs/glossary.md, "Sonar and samples".
+/// Source: docs/reference/glossary.md, "Sonar and samples".
 pub fn head_direction(angle_rad: f64) -> Vec3<Sensor> {
     let (sin, cos) = math::sin_cos(angle_rad);
     Vec3::new(0.0, sin, -cos)

@@ -3,7 +3,7 @@
 //!
 //! What holds is found at the beats, and missed stretches when they are judged; commands take effect where they were consumed. So
 //! the list is the same in a replay, however the stream was cut into ticks. It has figures, no words: [`words`] makes those when
-//! they are shown. `docs/alerts.md` has the table.
+//! they are shown. `docs/reference/alerts.md` has the table.
 
 use bevy_ecs::prelude::Resource;
 use serde::{Deserialize, Serialize};

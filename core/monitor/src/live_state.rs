@@ -1,5 +1,5 @@
 //! The live state: what the dive is like now, as one structure by value. Made at every beat, published with every tick;
-//! the terminal and the lines of `--json-lines` show it. `docs/live-state.md` describes it.
+//! the terminal and the lines of `--json-lines` show it. `docs/reference/live-state.md` describes it.
 //!
 //! All of it is as of the last beat, in data time, and so the same in a replay; only [`LiveState::now`] is the tick's own.
 //! What it says grows old by itself: a loop whose ports are silent goes on ticking, and ages are taken against `now`.

@@ -75,7 +75,7 @@ impl Sampled {
     /// returns are lost: the distance between passes that the target allows, over that which losses leave of it. From 1, where none
     /// are lost, to [`MOST_PASSES`]; continuous in all that is measured. The heads go by in turn, those that lose most come first.
     ///
-    /// Source: `docs/coverage.md`, "Lost returns".
+    /// Source: `docs/why/coverage.md`, "Lost returns".
     pub fn passes_needed(&self, rates: impl Iterator<Item = LossRate>) -> f64 {
         let mut heads = [LossRate::default(); MAX_HEADS];
         let mut count = 0;
@@ -100,7 +100,7 @@ impl Sampled {
     /// Whether a hole of this diameter, m, may have come by chance where passes are `along_m` apart and heads lose so much by chance. Where it
     /// can't, nothing comes back from that wall, and no speed helps.
     ///
-    /// Source: `docs/coverage.md`, "Lost returns".
+    /// Source: `docs/why/coverage.md`, "Lost returns".
     pub fn is_by_chance(&self, hole_m: f64, along_m: f64, rate: LossRate) -> bool {
         let rate = rate.clamped();
         if self.t_y_m <= 0.0 || along_m <= 0.0 {

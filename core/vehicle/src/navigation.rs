@@ -137,7 +137,7 @@ mod tests {
         assert_eq!(
             parsed("[navigation]\nepoch_s = 0.1\nwindow_s = 0.2\n").unwrap(),
             Settings::default(),
-            "the defaults are those of docs/vehicle-file.md"
+            "the defaults are those of docs/reference/vehicle-file.md"
         );
         let settings = parsed("[navigation]\nepoch_s = 0.02\nwindow_s = 1\n").unwrap();
         assert_eq!((settings.epoch, settings.window), (DurNs::from_millis(20), DurNs::from_millis(1000)));

@@ -5,7 +5,7 @@
 pub enum Effort {
     /// Under a minute of CPU: one or two seeds, short dives. Shows that all works, and orders of magnitude.
     Quick,
-    /// Under ten minutes on two cores: what `docs/cost` shows.
+    /// Under ten minutes on two cores: what `docs/why/cost` shows.
     Full,
 }
 

@@ -24,12 +24,12 @@ const TABLE: &str = "scene,method,knob,";
 /// Measure what accuracy costs in time: errors against independent values, setting by setting, beside CPU time or hours.
 ///
 /// Simulates dives, replays them with other settings, and prints a table and a sentence of advice for each trade; --out writes
-/// the page, JSON, CSV and pictures that docs/cost has. Times are CPU time of one thread.
+/// the page, JSON, CSV and pictures that docs/why/cost has. Times are CPU time of one thread.
 #[derive(Debug, Parser)]
 #[command(
     name = "headrace cost",
     version,
-    after_help = "Example:\n  headrace cost --quick\n  headrace cost --only survey --vehicle deploy/vehicles/vita2-4.toml\n  headrace cost --out docs/cost"
+    after_help = "Example:\n  headrace cost --quick\n  headrace cost --only survey --vehicle deploy/vehicles/vita2-4.toml\n  headrace cost --out docs/why/cost"
 )]
 struct Cost {
     /// Take under a minute: few settings and seeds, short dives.

@@ -53,10 +53,10 @@ fn a_planted_wrong_method_has_the_error_planted() {
     assert!(failed_m > 50.0, "{failed_m} m in 100");
 }
 
-/// `docs/cost` is what `headrace cost` makes of `cost.json`: nothing in it is by hand, or of an older form.
+/// `docs/why/cost` is what `headrace cost` makes of `cost.json`: nothing in it is by hand, or of an older form.
 #[test]
 fn the_page_in_docs_is_that_of_its_data() {
-    let folder = root().join("docs/cost");
+    let folder = root().join("docs/why/cost");
     let read =
         |name: &str| std::fs::read_to_string(folder.join(name)).unwrap_or_else(|why| panic!("{name}: {why}"));
     let results: Results = serde_json::from_str(&read("cost.json")).unwrap();
@@ -74,7 +74,7 @@ fn the_page_in_docs_is_that_of_its_data() {
         }
         assert!(
             read(name) == content,
-            "docs/cost/{name} isn't what headrace cost makes of docs/cost/cost.json; HEADRACE_RENEW_COST=1 renews it"
+            "docs/why/cost/{name} isn't what headrace cost makes of docs/why/cost/cost.json; HEADRACE_RENEW_COST=1 renews it"
         );
     }
     let mut known: Vec<&str> = files.iter().map(|(name, _)| name.as_str()).collect();
@@ -94,7 +94,7 @@ fn the_page_in_docs_is_that_of_its_data() {
 /// Of sections whose D_true is over the target, what shipped defaults pass.
 #[test]
 fn shipped_defaults_pass_few_of_those_over_the_target() {
-    let text = std::fs::read_to_string(root().join("docs/cost/cost.json")).unwrap();
+    let text = std::fs::read_to_string(root().join("docs/why/cost/cost.json")).unwrap();
     let results: Results = serde_json::from_str(&text).unwrap();
     let mut told = 0;
     for point in results.trades.iter().flat_map(|trade| &trade.points).filter(|point| point.is_default) {

@@ -1,4 +1,4 @@
-//! Campaigns: the dives of a folder or bucket, replayed once each and asked in SQL. `docs/campaign.md` is its manual.
+//! Campaigns: the dives of a folder or bucket, replayed once each and asked in SQL. `docs/how-to/replay-many-dives.md` is its manual.
 
 pub mod about;
 pub mod cache;

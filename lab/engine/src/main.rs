@@ -1,4 +1,4 @@
-//! `headrace-campaign`: see `docs/campaign.md`.
+//! `headrace-campaign`: see `docs/how-to/replay-many-dives.md`.
 
 mod cli;
 

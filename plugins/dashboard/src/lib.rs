@@ -2,7 +2,7 @@
 //!
 //! [`collector`] takes values of the loop between ticks and hands them, in a bounded queue, to the page's thread; in a live dive it
 //! never waits. There [`model`] holds what is shown, pure, and [`server`] gives each message, encoded once, to all viewers.
-//! `docs/page.md` is for who uses it, `docs/page-feed.md` for who builds his own.
+//! `docs/how-to/read-the-page.md` is for who uses it, `docs/reference/page-feed.md` for who builds his own.
 
 pub mod access;
 pub mod assets;

@@ -1,4 +1,4 @@
-//! Binary frames of the feed, little-endian: a head of 16 bytes, then records of one size. `docs/page-feed.md` is their contract.
+//! Binary frames of the feed, little-endian: a head of 16 bytes, then records of one size. `docs/reference/page-feed.md` is their contract.
 
 use headrace_coverage::{Cause, Section, Unsure, Verdict};
 

@@ -191,7 +191,7 @@ pub struct CellDive {
 /// Sources: `replay/simulator/src/calls/data_sheets.rs`.
 const DEPTH: &str = "depth_steps = {}\ndepth_noise = { noise_pa = 152 }\n";
 /// Noise and biases of the units, as the vehicle files say or leave to data sheets: `plugins/imu_can/src/noise.rs`, and the
-/// defaults of `[navigation]` in docs/vehicle-file.md.
+/// defaults of `[navigation]` in docs/reference/vehicle-file.md.
 const XSENS: &str = "imu_noise = { gyro_degps_rthz = 0.0077, accel_mps2_rthz = 0.0006, attitude_deg = 0.3 }\n\
      imu_bias = { gyro_degps = 0.0022, accel_mps2 = 0.002, tau_s = 300, gyro_constant_degps = 0.05, accel_constant_mps2 = 0.02 }\n";
 const AUTOPILOT: &str = "imu_noise = { gyro_degps_rthz = 0.01, accel_mps2_rthz = 0.003, attitude_deg = 0.3 }\n\

@@ -264,7 +264,7 @@ fn pictures_are_drawn_and_the_same_each_time() {
     }
 }
 
-/// The pages show what the command draws now: where a picture has changed on purpose, the command in docs/plan/README.md
+/// The pages show what the command draws now: where a picture has changed on purpose, the command in docs/how-to/plan/README.md
 /// makes it anew.
 #[test]
 fn the_pages_show_the_pictures_that_are_drawn() {
@@ -272,7 +272,7 @@ fn the_pages_show_the_pictures_that_are_drawn() {
     let args = ["--vehicle", VITA_2, "--target", "0.5", "--mode", "fast", "--svg", "pictures"];
     assert_eq!(plan(&folder, &args).code, Some(0));
     for name in ["perimeter", "pattern", "speeds", "hours"] {
-        let page = headrace_tests::root().join(format!("docs/plan/{name}.svg"));
+        let page = headrace_tests::root().join(format!("docs/how-to/plan/{name}.svg"));
         let shown = std::fs::read(&page).unwrap();
         assert!(
             shown == folder.read(&format!("pictures/{name}.svg")),

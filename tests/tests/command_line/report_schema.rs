@@ -1,4 +1,4 @@
-//! Reports are as docs/report.schema.json says: real ones of several kinds are held to it, and it describes each key
+//! Reports are as docs/reference/report.schema.json says: real ones of several kinds are held to it, and it describes each key
 //! with its unit.
 //!
 //! The schema uses a small part of JSON Schema (2020-12), which `headrace_tests::json_schema` checks.
@@ -8,7 +8,7 @@ use headrace_tests::json_schema::faults;
 use serde_json::Value;
 
 pub(crate) fn schema() -> Value {
-    let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../docs/report.schema.json");
+    let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../docs/reference/report.schema.json");
     serde_json::from_str(&std::fs::read_to_string(path).unwrap()).unwrap()
 }
 

@@ -96,7 +96,8 @@ fn json_lines_have_the_state_once_a_second_and_what_is_told_once() {
     let folder = dive();
     let answer = folder.headrace(&["replay", "dive.mcap", "--json-lines"]);
     let lines: Vec<Value> = answer.stdout.lines().map(|line| serde_json::from_str(line).unwrap()).collect();
-    let schema: Value = serde_json::from_str(include_str!("../../../docs/live-state.schema.json")).unwrap();
+    let schema: Value =
+        serde_json::from_str(include_str!("../../../docs/reference/live-state.schema.json")).unwrap();
     for line in &lines {
         let faults = headrace_tests::json_schema::faults(&schema, line);
         assert!(faults.is_empty(), "{line:#}: {faults:#?}");

@@ -236,7 +236,7 @@ fn the_first_pose_that_differs_is_named() {
 fn the_layout_names_topics_and_keys_that_are_there() {
     let (folder, _) = recorded();
     let topics = view(&folder.read("live.mcap"));
-    let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../docs/viewers/layout.json");
+    let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../docs/how-to/viewers/layout.json");
     let layout: Value = serde_json::from_str(&std::fs::read_to_string(path).unwrap()).unwrap();
     let mut named = Vec::new();
     texts(&layout["configById"], &mut named);

@@ -92,7 +92,7 @@ fn a_flag_is_raised_within_a_turn_of_its_moment_unless_the_vehicle_stands() {
     );
 }
 
-/// How far the heads may have gone on when a flag comes, m (`docs/coverage.md`, "Verdicts").
+/// How far the heads may have gone on when a flag comes, m (`docs/why/coverage.md`, "Verdicts").
 const LATE_M: f64 = 0.25;
 /// When the estimate has settled, seconds from the beginning: alignment, and 20 s.
 const SETTLED_S: f64 = 22.0;

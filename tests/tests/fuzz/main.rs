@@ -33,7 +33,7 @@ use headrace_tests::random::Random;
 use corpus::{Corpus, Kind};
 use targets::{Surroundings, try_one};
 
-/// The most that one file may take, whatever it claims (`docs/limits.md`).
+/// The most that one file may take, whatever it claims (`docs/reference/limits.md`).
 const MOST_MEMORY: usize = 200 << 20;
 /// The longest that one file may take; a hundredth is much already.
 const LONGEST: DurNs = DurNs::from_millis(20_000);

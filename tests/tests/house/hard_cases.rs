@@ -1,4 +1,4 @@
-//! `docs/hard-cases.md` has the rows of its list, and the tests that they name are there.
+//! `docs/why/hard-cases.md` has the rows of its list, and the tests that they name are there.
 
 use crate::workspace::root;
 
@@ -6,7 +6,7 @@ use crate::workspace::root;
 fn every_hard_case_has_its_row_and_its_test() {
     let read =
         |name: &str| std::fs::read_to_string(root().join(name)).unwrap_or_else(|why| panic!("{name}: {why}"));
-    let (list, page) = (read("tests/hard_cases/list"), read("docs/hard-cases.md"));
+    let (list, page) = (read("tests/hard_cases/list"), read("docs/why/hard-cases.md"));
     let rows: Vec<Vec<&str>> = page
         .lines()
         .filter(|line| line.starts_with("| ") && line.contains('`'))
@@ -17,7 +17,7 @@ fn every_hard_case_has_its_row_and_its_test() {
         .filter(|line| line.contains('|') && !line.starts_with("#!"))
         .map(|line| line.split('|').map(str::trim).collect())
         .collect();
-    assert_eq!(rows.len(), cases.len(), "tests/hard_cases/run makes docs/hard-cases.md anew");
+    assert_eq!(rows.len(), cases.len(), "tests/hard_cases/run makes docs/why/hard-cases.md anew");
     assert!(cases.len() > 80, "{}", cases.len());
     for (row, case) in rows.iter().zip(&cases) {
         let [name, what, oracle, bound, file, test] = case[..] else { panic!("{case:?}") };

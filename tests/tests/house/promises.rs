@@ -1,4 +1,4 @@
-//! The tests that `docs/promises.md` and `docs/recorder.md` name are there.
+//! The tests that `docs/why/promises.md` and `docs/reference/recorder.md` name are there.
 
 use crate::workspace::root;
 
@@ -23,7 +23,7 @@ fn count_named_tests(page: &str) -> usize {
 
 #[test]
 fn every_promise_names_a_test_that_is_there() {
-    for page in ["docs/promises.md", "docs/recorder.md"] {
+    for page in ["docs/why/promises.md", "docs/reference/recorder.md"] {
         let named = count_named_tests(page);
         assert!(named > 20, "{page}: {named}");
     }

@@ -95,7 +95,8 @@ fn a_recording_that_failed_is_told_live_and_stays_told() {
     let (first, last) = (states[0], states[states.len() - 1]);
     assert_eq!((&first["recording_fails"], &last["recording_fails"]), (&Value::Null, &Value::Bool(false)));
     assert!(last["text"].as_str().unwrap().contains("recording had failed"), "{}", last["text"]);
-    let schema: Value = serde_json::from_str(include_str!("../../../docs/live-state.schema.json")).unwrap();
+    let schema: Value =
+        serde_json::from_str(include_str!("../../../docs/reference/live-state.schema.json")).unwrap();
     for line in &lines {
         let faults = headrace_tests::json_schema::faults(&schema, line);
         assert!(faults.is_empty(), "{line:#}: {faults:#?}");

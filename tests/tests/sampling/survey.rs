@@ -1,4 +1,4 @@
-//! `docs/cost` prices surveys by what `headrace plan` says.
+//! `docs/why/cost` prices surveys by what `headrace plan` says.
 
 use headrace_tests::{program, root};
 use serde_json::Value;
@@ -26,7 +26,8 @@ fn planned(file: &str, target_m: &Value, mode: &str) -> [f64; 2] {
 #[test]
 fn the_survey_of_docs_cost_says_what_plan_says_to_the_bit() {
     let results: Value =
-        serde_json::from_str(&std::fs::read_to_string(root().join("docs/cost/cost.json")).unwrap()).unwrap();
+        serde_json::from_str(&std::fs::read_to_string(root().join("docs/why/cost/cost.json")).unwrap())
+            .unwrap();
     let trade = results["trades"].as_array().unwrap().iter().find(|trade| trade["name"] == "survey").unwrap();
     let mut compared = 0;
     for point in trade["points"].as_array().unwrap() {

@@ -46,7 +46,7 @@ impl SampleStore {
     /// brick had to be opened for it.
     ///
     /// A pass is a single step of a head from one sample to the next; where it crosses `arc_m` its chainage is
-    /// interpolated. Source: docs/glossary.md, "Spacing and holes", T_x.
+    /// interpolated. Source: docs/reference/glossary.md, "Spacing and holes", T_x.
     /// Allocates: never.
     pub fn nearest_pass_m(&mut self, x_m: f64, arc_m: f64, within_m: f64) -> Option<f64> {
         let perimeter_m = self.layout.perimeter_m;

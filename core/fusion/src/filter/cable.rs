@@ -1,7 +1,7 @@
 //! Whether the cable counter and the estimate agree.
 //!
 //! A counter sticks, slips or runs free; an estimate may drift. While they disagree both hypotheses are kept: readings are withheld, the
-//! inertial unit carries the chainage, and the chainage is as uncertain as the two differ. Derivation: `docs/fusion.md`, "When cable and
+//! inertial unit carries the chainage, and the chainage is as uncertain as the two differ. Derivation: `docs/why/navigation.md`, "When cable and
 //! estimate disagree".
 
 use serde::{Deserialize, Serialize};

@@ -3,7 +3,7 @@
 //!
 //! A sample stays where it was georeferenced; its error is that of the estimate then, and isn't corrected later. So each
 //! clone keeps the covariance of the errors at its time, and their transition from the clone before, through the
-//! filter's propagation and corrections. Derivation: `docs/fusion.md`, "Relative uncertainty".
+//! filter's propagation and corrections. Derivation: `docs/why/navigation.md`, "Relative uncertainty".
 
 use serde::{Deserialize, Serialize};
 

@@ -1,7 +1,7 @@
 //! What the cable counter has lately made of the estimate, and what of that is lost if its wheel has stuck.
 //!
 //! A count that stands says that the vehicle stands, or that the wheel does; a filter that believes it stops the vehicle either way. So the
-//! hypothesis of a stuck wheel is kept beside: the estimate without these corrections. Derivation: `docs/fusion.md`, "A count that stands".
+//! hypothesis of a stuck wheel is kept beside: the estimate without these corrections. Derivation: `docs/why/navigation.md`, "A count that stands".
 
 use serde::{Deserialize, Serialize};
 

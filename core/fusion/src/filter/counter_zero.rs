@@ -2,7 +2,7 @@
 //!
 //! A count that begins again from zero tells nothing about the vehicle: the counter was plugged in again, or another one took its
 //! place, or the log goes on with an earlier time of a dive. The chainage is kept only where the counter alone was away, while the
-//! other sensors carried the estimate. Derivation: `docs/fusion.md`, "When a counter begins again from zero".
+//! other sensors carried the estimate. Derivation: `docs/why/navigation.md`, "When a counter begins again from zero".
 
 use headrace_geometry::time::{DurNs, MonoNs};
 use headrace_sensor::reading::TetherLength;

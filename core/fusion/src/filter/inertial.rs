@@ -1,6 +1,6 @@
 //! Inertial propagation of the estimate and of its errors.
 //!
-//! Derivation: `docs/fusion.md`, "Propagation".
+//! Derivation: `docs/why/navigation.md`, "Propagation".
 
 use nalgebra::{Matrix3, Vector3};
 use serde::{Deserialize, Serialize};

@@ -1,6 +1,6 @@
 //! Measurement models: the value expected by the estimate, and its derivative with respect to each error.
 //!
-//! Derivation: `docs/fusion.md`, "Measurements".
+//! Derivation: `docs/why/navigation.md`, "Measurements".
 
 use super::state::{
     ATTITUDE, CREEP, DEPTH, ERRORS, Errors, HEADING, POSITION, RANGES, RATE_BIAS, SLACK, State, VELOCITY,

@@ -1,7 +1,7 @@
 //! Navigation by an error-state Kalman filter: inertial propagation, corrected by all other sensors.
 //!
 //! Readings wait in a window until all of their time have come, and are fused at their time of validity, epoch by epoch; a
-//! fix is the estimate of the last epoch, propagated by the inertial samples since. Derivation: `docs/fusion.md`.
+//! fix is the estimate of the last epoch, propagated by the inertial samples since. Derivation: `docs/why/navigation.md`.
 
 pub mod agreement;
 pub mod align;

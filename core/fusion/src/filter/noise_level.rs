@@ -1,7 +1,7 @@
 //! Level of a source's white noise relative to what is declared, learnt from its innovations.
 //!
 //! The innovations of a filter that is right are white: half the mean square of the difference of two is their variance. What
-//! drifts more slowly, an error of the estimate or a bias, cancels in it. Derivation: `docs/fusion.md`, "Noise that is learnt".
+//! drifts more slowly, an error of the estimate or a bias, cancels in it. Derivation: `docs/why/navigation.md`, "Noise that is learnt".
 
 use serde::{Deserialize, Serialize};
 

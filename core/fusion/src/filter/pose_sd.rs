@@ -73,7 +73,7 @@ impl PoseSd {
 mod tests {
     use super::*;
 
-    /// The limits of docs/fusion.md: at 4 m, 0.25 rad move a sample by a metre.
+    /// The limits of docs/why/navigation.md: at 4 m, 0.25 rad move a sample by a metre.
     #[test]
     fn what_is_known_too_badly_places_no_sample() {
         let sure = PoseSd { along_m: 0.1, place_m: 0.05, tilt_rad: 0.01, yaw_rad: 0.02 };

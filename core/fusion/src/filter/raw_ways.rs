@@ -3,7 +3,7 @@
 //!
 //! The check takes readings, and never the filter's covariance, gates or learnt noise: where the filter convinces itself of a wrong speed,
 //! this still tells. The inertial unit, which gives changes of speed only, is compared with the counter in `slack_level.rs`. Derivation:
-//! `docs/fusion.md`, "Ways in raw form".
+//! `docs/why/navigation.md`, "Ways in raw form".
 
 use super::cable::CableDoubt;
 use super::settings::Settings;

@@ -1,6 +1,6 @@
 //! How rough the wall is, learnt from echosounders that face each other: the sum of their ranges doesn't depend on where the vehicle is
 //! between them, so that what it has beyond their noise is the wall's. An echosounder sees one bump for seconds. Derivation:
-//! `docs/fusion.md`, "Bumps of the wall".
+//! `docs/why/navigation.md`, "Bumps of the wall".
 
 use serde::{Deserialize, Serialize};
 

@@ -1,5 +1,5 @@
 //! How much the returns of heads say that see bumps which heads have seen before. A vehicle that stands sees the same ones turn after turn:
-//! taken for news each time, they turn the estimate as surely as wrongly. Derivation: `docs/fusion.md`, "Bumps seen again".
+//! taken for news each time, they turn the estimate as surely as wrongly. Derivation: `docs/why/navigation.md`, "Bumps seen again".
 
 use serde::{Deserialize, Serialize};
 

@@ -131,7 +131,7 @@ impl Default for Settings {
             tilt_sd_rad: 2.0 * DEGREE,
             attitude_sd_rad: 1.0 * DEGREE,
             echo_sd_m: 0.03,
-            // Nobody sets it: two thirds of the 0.3 m over which the bumps of field dives follow one another (docs/field.md).
+            // Nobody sets it: two thirds of the 0.3 m over which the bumps of field dives follow one another (docs/why/field.md).
             bump_m: 0.2,
             // Nobody sets it: about what a vehicle drives while its heads turn half round.
             seen_again_m: 0.05,

@@ -4,7 +4,7 @@
 //! third differences show slack alone. They are compared, at several lags, with those of the slack model; where they are larger than
 //! declared, the slack is faster or reaches farther. A third difference that is far larger than usual shows that the counter or the
 //! inertial unit has gone wrong. No cable reading has changed what is compared here: of the estimate only its heading is used.
-//! Derivation: `docs/fusion.md`, "Slack".
+//! Derivation: `docs/why/navigation.md`, "Slack".
 
 use super::inertial::Felt;
 use super::settings::{Settings, Wander};

@@ -23,7 +23,7 @@ pub const TETHER_PERIOD: DurNs = DurNs(100_000_000);
 /// See [`ATTITUDE_PERIOD`].
 pub const DEPTH_PERIOD: DurNs = DurNs(500_000_000);
 /// See [`ATTITUDE_PERIOD`]; a velocity log's errors, of its scale, its mount and the bottom, last for 10 s: so many readings share one. With 3 s,
-/// a log that shows a fifth too much carries the estimate away (`docs/fusion.md`, "Seeded dives").
+/// a log that shows a fifth too much carries the estimate away (`docs/why/navigation.md`, "Seeded dives").
 pub const VELOCITY_PERIOD: DurNs = DurNs(500_000_000);
 /// See [`VELOCITY_PERIOD`].
 pub const VELOCITY_LOOKS: f64 = 20.0;

@@ -36,7 +36,7 @@ pub const RANGES: usize = 21;
 /// Number of values of a state.
 pub const STATE_NUMBERS: usize = ERRORS + 1;
 
-/// One number for each error. Errors that drive others come after them: see `docs/fusion.md`.
+/// One number for each error. Errors that drive others come after them: see `docs/why/navigation.md`.
 pub type Errors = [f64; ERRORS];
 
 /// The estimate.

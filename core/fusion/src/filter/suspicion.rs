@@ -2,7 +2,7 @@
 //!
 //! Within a spell of some seconds the vehicle's place and roll may be off by what explains the ranges best; what is left is
 //! fitted. Spells add up to blocks of way. Blocks are as independent as the wall lets them be, and their scatter says how sure
-//! a figure is. Derivation: `docs/fusion.md`, "Settings in doubt".
+//! a figure is. Derivation: `docs/why/navigation.md`, "Settings in doubt".
 
 use serde::{Deserialize, Serialize};
 

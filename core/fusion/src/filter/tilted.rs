@@ -2,7 +2,7 @@
 //!
 //! A beam that leans along the tunnel is longer whichever way it leans, by about the square of the lean. A head's own lean shows
 //! therefore as a share of the vehicle's: where that turns to one side its ranges are too long, and too short where it turns to the
-//! other. What they are too long all the time may as well be the wall's shape, and is left out. Derivation: `docs/fusion.md`,
+//! other. What they are too long all the time may as well be the wall's shape, and is left out. Derivation: `docs/why/navigation.md`,
 //! "Settings in doubt".
 
 use serde::{Deserialize, Serialize};

@@ -2,7 +2,7 @@
 //!
 //! A measurement corrects a bias by its gain times the innovation, whose mean square is the gain squared times the innovation's
 //! variance. Where corrections are larger than that, the bias moves more than the filter believes. Derivation:
-//! `docs/fusion.md`, "Noise that is learnt".
+//! `docs/why/navigation.md`, "Noise that is learnt".
 
 use serde::{Deserialize, Serialize};
 

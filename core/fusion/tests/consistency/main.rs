@@ -110,7 +110,7 @@ fn errors_are_within_their_standard_deviations_or_reported() {
         all.iter().filter(|(recipe, tally)| recipe.is_declared == is_declared && tally.silent > 0).count()
     };
     assert_eq!(silent(true), 0, "dives with an unreported error of over 5 sd");
-    // Two are silent, and should not be: slack that nobody declared, and a wheel that sticks at 0.05 m/s. See docs/fusion.md, "Seeded dives".
+    // Two are silent, and should not be: slack that nobody declared, and a wheel that sticks at 0.05 m/s. See docs/why/navigation.md, "Seeded dives".
     assert!(silent(false) <= 2, "{}", silent(false));
     let within = |pick: &dyn Fn(&Recipe) -> bool| share(&of(&all, pick), |tally| [tally.within, tally.fixes]);
     assert!((0.93..0.98).contains(&within(&|recipe| recipe.is_declared)));

@@ -1,4 +1,4 @@
-//! Alerts and notes as JSON. Field names are the contract; `docs/live-state.schema.json` is its schema. Allocates: for outlets.
+//! Alerts and notes as JSON. Field names are the contract; `docs/reference/live-state.schema.json` is its schema. Allocates: for outlets.
 
 use serde::Serialize;
 

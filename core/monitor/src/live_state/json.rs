@@ -1,5 +1,5 @@
 //! The live state as JSON: plain values with units in their names, ages against the tick, old marked as old.
-//! `docs/live-state.schema.json` is its schema. Allocates: for outlets' threads, not for the loop's.
+//! `docs/reference/live-state.schema.json` is its schema. Allocates: for outlets' threads, not for the loop's.
 
 use serde::Serialize;
 

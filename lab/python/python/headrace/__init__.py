@@ -8,7 +8,7 @@
     >>> polars.DataFrame(tables.sections)
 
 Units are in names: ``target_m`` are metres, ``log_time_ns`` nanoseconds of the log's clock. Terms are headrace's own
-(docs/glossary.md).
+(docs/reference/glossary.md).
 """
 
 from . import sampling

@@ -88,7 +88,7 @@ class Margins(TypedDict):
 
 
 class Answer(TypedDict):
-    """A plan's answer for one mode, as ``modes`` of ``headrace plan --json``; docs/coverage.md has the terms."""
+    """A plan's answer for one mode, as ``modes`` of ``headrace plan --json``; docs/why/coverage.md has the terms."""
 
     mode: str
     step_deg: float

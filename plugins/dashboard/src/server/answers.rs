@@ -231,7 +231,7 @@ async fn state(State(shared): Here, _: Admitted) -> Response {
 
 async fn schema() -> Response {
     let kind = [(header::CONTENT_TYPE, "application/schema+json")];
-    (kind, include_str!("../../../../docs/page-feed.schema.json")).into_response()
+    (kind, include_str!("../../../../docs/reference/page-feed.schema.json")).into_response()
 }
 
 async fn figures(State(shared): Here, _: Admitted) -> Response {

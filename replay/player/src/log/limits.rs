@@ -1,7 +1,7 @@
 //! Limits on what is read of a log, whatever its lengths and counts claim. Each is several times what logs of dives and of robots
 //! have; together they keep a reader under some 130 MiB. What lies beyond one is named as a loss, with the limit.
 //!
-//! The same table, with what is said, is in `docs/limits.md`.
+//! The same table, with what is said, is in `docs/reference/limits.md`.
 
 use headrace_geometry::time::MonoNs;
 

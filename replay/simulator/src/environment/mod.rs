@@ -299,7 +299,7 @@ impl Environment {
     /// Arc length of a point on the unrolled wall of the design profile, m: by the ray from its reference point, in the axis's
     /// chart.
     ///
-    /// Source: docs/glossary.md, "Tunnel and wall".
+    /// Source: docs/reference/glossary.md, "Tunnel and wall".
     pub fn arc_m(&self, point: Point3<Tunnel>) -> f64 {
         let [_, y, z] = self.axis().chart(point);
         self.design.arc_of([y, z])

@@ -247,7 +247,7 @@ fn verif_a_deviating_compass_is_expected() {
 }
 
 /// The turn rate is given, so that the gyro bias is no error of the row: see "What is left out" in
-/// `docs/fusion.md`.
+/// `docs/why/navigation.md`.
 #[test]
 fn verif_velocity_and_rest() {
     let mut draws = Draws::new(6);
