@@ -53,7 +53,9 @@ pub(crate) struct Cli {
 #[derive(Debug, Args)]
 #[command(next_help_heading = "Log messages, on stderr")]
 pub(crate) struct Verbosity {
-    /// Log ports, files, phases and durations (-vv: everything); RUST_LOG=debug,headrace_ports=trace sets levels by crate.
+    /// Add confidence, spacing and digest to the summary, and log ports, files, phases and durations (-vv: everything).
+    ///
+    /// RUST_LOG=debug,headrace_ports=trace sets the log level by crate.
     #[arg(short, long, action = ArgAction::Count, global = true)]
     verbose: u8,
     /// Show results and errors only: neither log messages nor progress, nor a dive while it goes on.
@@ -65,6 +67,11 @@ impl Verbosity {
     /// Whether only results and errors are shown.
     pub(crate) fn is_quiet(&self) -> bool {
         self.quiet
+    }
+
+    /// Whether the summary has an engineer's figures.
+    pub(crate) fn is_verbose(&self) -> bool {
+        self.verbose > 0
     }
 
     /// The level of this program's crates; `None` where nothing is asked for.

@@ -72,6 +72,7 @@ pub fn main() -> ExitCode {
         logging::never_wait();
     }
     terminal::be_quiet(cli.verbosity.is_quiet());
+    terminal::be_verbose(cli.verbosity.is_verbose());
     // A dive isn't failed for its output, nor anything for a terminal that is closed.
     let needs_output = !matches!(cli.command, Command::Run(_)) && !std::io::stdout().is_terminal();
     let result = match cli.command {

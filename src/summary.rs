@@ -10,6 +10,8 @@ use headrace_monitor::report::{DiveReport, NotInspectedReport, Report, RunReport
 use headrace_monitor::telling::UnsureStretch;
 use headrace_monitor::what_if::WhatIfReport;
 
+use crate::terminal;
+
 /// Silence of a sensor that is told, s.
 const SILENT_S: f64 = 5.0;
 /// Notes that are listed.
@@ -30,16 +32,14 @@ pub(crate) fn summary(report: &Report, columns: Option<usize>) -> String {
     }
     if let (Some(from_m), Some(to_m)) = (report.way.from_m, report.way.to_m) {
         line(format!(
-            "{} to {}: {:.2} m in {:.0} s, {} samples, target {} m, confidence {} sd",
+            "{} to {}: {:.2} m in {:.0} s, {} samples, target {} m",
             station(from_m),
             station(to_m),
             report.way.length_m,
             dive.duration_s,
             dive.samples_valid,
             report.target_m,
-            report.confidence_sd
         ));
-        let sum = &report.summary;
         line(format!("  {}", metres(&report.metres())));
         for stretch in stretches(report) {
             line(stretch);
@@ -48,13 +48,9 @@ pub(crate) fn summary(report: &Report, columns: Option<usize>) -> String {
             let WhatIfReport { target_m, section_m, .. } = other;
             line(format!("  with target {target_m} m in sections of {section_m} m: {}", metres(other)));
         }
-        let metres = |value: Option<f64>| value.map_or_else(|| "-".to_owned(), |v| format!("{v:.3}"));
-        line(format!(
-            "  largest hole {} m   T_x mean {} m   T_y max {} m",
-            metres(sum.hole.max_m),
-            metres(sum.t_x.mean_m),
-            metres(sum.t_y.max_m)
-        ));
+        if terminal::is_verbose() {
+            line(spacing(report));
+        }
     }
     for change in report.smoothing.iter().flat_map(smoothing) {
         line(change);
@@ -95,7 +91,7 @@ pub(crate) fn summary(report: &Report, columns: Option<usize>) -> String {
         line(format!("  and {} further notes in the report", report.notes.len() - MOST_NOTES));
     }
     if report.notes_dropped > 0 {
-        line(format!("  and {} notes in the log alone", report.notes_dropped));
+        line(format!("  {} more notes are in the log only", report.notes_dropped));
     }
     for loss in report.log.iter().flat_map(|log| &log.losses) {
         line(format!("  LOST: {loss}"));
@@ -103,15 +99,30 @@ pub(crate) fn summary(report: &Report, columns: Option<usize>) -> String {
     for note in report.log.iter().flat_map(|log| &log.notes) {
         line(format!("  note: {note}"));
     }
-    line(format!("digest {}", report.digest));
+    if terminal::is_verbose() {
+        line(format!("digest {}", report.digest));
+    }
     text
+}
+
+/// Figures for an engineer: the confidence, the largest hole and the spacing of samples.
+fn spacing(report: &Report) -> String {
+    let metres = |value: Option<f64>| value.map_or_else(|| "-".to_owned(), |v| format!("{v:.3}"));
+    let sum = &report.summary;
+    format!(
+        "  confidence {} sd   largest hole {} m   T_x mean {} m   T_y max {} m",
+        report.confidence_sd,
+        metres(sum.hole.max_m),
+        metres(sum.t_x.mean_m),
+        metres(sum.t_y.max_m)
+    )
 }
 
 /// What came for a sensor and was dropped unread.
 fn dropped(source: &SourceReport) -> Option<String> {
     let count = source.line.as_ref()?.dropped_packets;
     let line = format!(
-        "  LOST: {count} messages on the line of {} were dropped unread: the program, or the machine, stood",
+        "  LOST: {count} messages on the line of {} were dropped unread: the computer stalled",
         source.id
     );
     (count > 0).then_some(line)
@@ -144,7 +155,7 @@ fn not_inspected_text(why: &NotInspectedReport, dive: &DiveReport) -> String {
             format!("NOTHING WAS JUDGED: the vehicle never had a position, there was no {lacking}")
         }
         _ => format!(
-            "NO INSPECTION: {:.0} % of the pings had no position, mostly for want of a {lacking}",
+            "NO INSPECTION: {:.0} % of the pings had no position, mostly because of missing {lacking}",
             why.without_position_share * 100.0
         ),
     };

@@ -16,6 +16,7 @@ pub(crate) struct Terminal {
 pub(crate) const CLEAR: &str = "\r\x1b[K";
 
 static QUIET: AtomicBool = AtomicBool::new(false);
+static VERBOSE: AtomicBool = AtomicBool::new(false);
 
 /// What a stream can show.
 pub(crate) fn of(stream: &impl IsTerminal) -> Terminal {
@@ -50,6 +51,16 @@ pub(crate) fn be_quiet(quiet: bool) {
 /// Whether only results and errors are shown.
 pub(crate) fn is_quiet() -> bool {
     QUIET.load(Ordering::Relaxed)
+}
+
+/// With `-v` the summary has the figures of an engineer, too.
+pub(crate) fn be_verbose(verbose: bool) {
+    VERBOSE.store(verbose, Ordering::Relaxed);
+}
+
+/// Whether the summary has the figures of an engineer.
+pub(crate) fn is_verbose() -> bool {
+    VERBOSE.load(Ordering::Relaxed)
 }
 
 #[cfg(test)]

@@ -23,8 +23,8 @@ pub(crate) struct Arguments {
     pub(crate) metres: Option<f64>,
     /// File of the figures.
     pub(crate) json: PathBuf,
-    /// Page whose table is replaced.
-    pub(crate) page: Option<PathBuf>,
+    /// File for the table with the dives of all places together.
+    pub(crate) csv: Option<PathBuf>,
 }
 
 impl Arguments {
@@ -34,7 +34,7 @@ impl Arguments {
         let mut seeds = None;
         let json = headrace_tests::root().join("target/field.json");
         let mut all =
-            Self { quick: false, cell: Vec::new(), seeds: 0, from_seed: 1, metres: None, json, page: None };
+            Self { quick: false, cell: Vec::new(), seeds: 0, from_seed: 1, metres: None, json, csv: None };
         while let Some(word) = words.next() {
             if word == "--quick" {
                 all.quick = true;
@@ -53,11 +53,9 @@ impl Arguments {
                     all.metres = Some(metres);
                 }
                 "--json" => all.json = PathBuf::from(value),
-                "--page" => all.page = Some(headrace_tests::root().join(value)),
+                "--csv" => all.csv = Some(headrace_tests::root().join(value)),
                 _ => {
-                    panic!(
-                        "{word}: known are --quick, --cell, --seeds, --from-seed, --metres, --json, --page"
-                    )
+                    panic!("{word}: known are --quick, --cell, --seeds, --from-seed, --metres, --json, --csv")
                 }
             }
         }

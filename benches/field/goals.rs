@@ -69,20 +69,22 @@ impl Missed {
         }
     }
 
-    /// How many.
-    pub(crate) fn count(&self) -> usize {
+    /// Names of the missed goals, as the table's columns.
+    pub(crate) fn names(&self) -> Vec<String> {
         let single = [
-            self.passed_over,
-            self.passed_far,
-            self.failed_under,
-            self.cannot_say,
-            self.passed,
-            self.advice,
-            self.ratio,
-            self.within,
-            self.told,
+            ("passed", self.passed_over),
+            ("far", self.passed_far),
+            ("failed_under", self.failed_under),
+            ("cannot_say", self.cannot_say),
+            ("pass", self.passed),
+            ("advice", self.advice),
+            ("ratio", self.ratio),
+            ("within", self.within),
+            ("told_m", self.told),
         ];
-        single.iter().chain(&self.nis).filter(|missed| **missed).count()
+        let named = single.iter().filter(|(_, missed)| *missed).map(|(name, _)| (*name).to_owned());
+        let nis = KINDS_OF_SOURCES.iter().zip(&self.nis).filter(|(_, missed)| **missed);
+        named.chain(nis.map(|((name, _), _)| format!("nis_{}", name.replace(' ', "_")))).collect()
     }
 }
 

@@ -1,12 +1,15 @@
-//! The table of field dives: verdicts and sigmas of simulated dives against their truth, by vehicle, condition, place and
-//! speed. Prints Markdown, and writes the same figures as JSON.
+//! Verdicts and standard deviations of simulated field dives against their truth, by vehicle, condition, place and speed.
 //!
-//! `cargo bench -p headrace_tests --bench field` runs all cells in a quarter of an hour on two cores; `-- --quick` with a
-//! tenth of the dives. `--cell VEHICLE/CONDITION/PLACE/SPEED` runs those cells alone (any part may be `*`, parts at the end may be left
-//! out, a place may be any chainage), `--seeds N` so many dives each, `--from-seed N` begins with another,
-//! `--metres N` makes each so long, `--json FILE` says where to write (target/field.json), `--page docs/why/field.md` renews the table of
-//! that page, which has the dives of all places together. Below the table are the sections that passed over the target, by dive.
-//! D_true is from `headrace_tests::truth`, which has nothing of the program's coverage. The figures are the report's.
+//! `cargo bench -p headrace_tests --bench field` runs all cells in a quarter of an hour on two cores and prints them as CSV, followed by the
+//! sections that passed although their true hole is over the target. docs/why/field.md explains the columns. Arguments, after `--`:
+//! - `--quick`: a tenth of the dives
+//! - `--cell VEHICLE/CONDITION/PLACE/SPEED`: only these cells; any part may be `*`, parts at the end may be left out, a place may be any chainage
+//! - `--seeds N`, `--from-seed N`: dives of each cell, and the first seed
+//! - `--metres N`: length of each dive
+//! - `--json FILE`: where to write all figures (target/field.json)
+//! - `--csv docs/why/field.csv`: renews the table of the documents, which joins the dives of all places
+//!
+//! D_true comes from `headrace_tests::truth`, which shares no code with the program's coverage. All other figures are the report's.
 
 #![expect(clippy::unwrap_used, clippy::panic, reason = "a benchmark stops at what it can't do")]
 
@@ -26,12 +29,10 @@ fn main() {
     let cells = table::cells(&arguments);
     assert!(!cells.is_empty(), "--cell names none: vehicles, conditions, places and speeds are in the table");
     let figures = run(&cells, &arguments);
-    let text = table::markdown(&cells, &figures, &arguments);
-    println!("{text}");
-    print!("{}", table::falsely(&cells, &figures));
-    if let Some(page) = &arguments.page {
+    print!("{}\n{}", table::csv(&cells, &figures), table::falsely(&cells, &figures));
+    if let Some(file) = &arguments.csv {
         let (cells, figures) = table::pooled(&cells, &figures);
-        table::replace(page, &table::markdown(&cells, &figures, &arguments));
+        std::fs::write(file, table::csv(&cells, &figures)).unwrap();
     }
     table::write_json(&cells, &figures, &arguments);
 }

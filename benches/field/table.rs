@@ -1,6 +1,4 @@
-//! Cells, and their figures as Markdown and JSON.
-
-use std::path::Path;
+//! Cells, and their figures as CSV and JSON.
 
 use headrace_tests::field_table::{
     CONDITIONS, Cell, Condition, DRIVEN, Falsely, Figures, KINDS_OF_SOURCES, PLACES, Place, VEHICLES, Vehicle,
@@ -79,41 +77,17 @@ fn has(vehicle: &Vehicle, condition: Condition, arguments: &Arguments, [place, s
     common || asked || (place == "6900" && ["vita1", "vita2-4"].contains(&vehicle.name))
 }
 
-const LEGEND: &str = "\
-Over: sections with D_true > T; passed: of those, passed; far: passed with D_true > 1.1 T; failed under: failed with D_true < 0.9 T,
-of those with it. These count all sections. The following leave out the ends of dives, 2 m and the target: passable is
-the share of metres with D_true <= T, pass, fail, can't say and open are shares of metres; D is the rms error of D and sd the median of its sigma, m; ratio
-is the rms of the errors over their sigmas, within the share within two. NIS is the mean by kind of source. Told: metres of the way with a
-section, of the way. `!` marks what misses the goal; passes are held to the passable metres. Advised: by a pilot
-who follows the live advice within 5 % and 3 s; back: by one who is in a hurry, then goes back for all that was missed. Advice is the
-median speed advised over the largest one of Eq. 16 with what the vehicle hides and no other margin. Wrong and broken cells have no
-goals but those for false passes, the ratio and told metres; nor has the advice where the vehicle goes too fast or back. Stood: as
-planned, after the vehicle has stood for 30 s where it begins, the program running.
-
-Told is the data sheet's with vehicle files that say of each noise what is simulated: no allowance for rough walls, tilt and cable. Rough
-is the data sheet's on a wall with bumps of 2.8 cm (sd) that follow one another over 0.3 m, as-built on one that is up to 6 cm off the design, here in
-and there out, over 2 to 6 m. Conditions wrong-* each have one
-wrong setting; broken has one device that breaks, by the seed. Driven: let in at 60 m and driven to 6,900 at 0.3 m/s, once. Vehicle files say what acts: slack of 3 mm for a cable that is taut, 6 cm for one that hangs (poor), a MEMS unit's
-noise where it is one (poor); wrong-unit and wrong-slack are the same where the file says better.
-";
-
-/// The table, with its legend.
-pub(crate) fn markdown(cells: &[NamedCell], figures: &[Figures], arguments: &Arguments) -> String {
-    let mut text = format!("{} dives a cell.\n\n{LEGEND}\n", arguments.seeds);
-    let nis = KINDS_OF_SOURCES.map(|(name, _)| name).join(" / ");
-    let head = format!(
-        "| vehicle | condition | place | speed | over | passed | far | failed under | passable | pass | fail | can't say | open | \
-         advice | D | sd | ratio | within | NIS {nis} | told |\n|{}\n",
-        "---|".repeat(20)
+/// The table as CSV, a row for each cell; docs/why/field.md explains its columns.
+pub(crate) fn csv(cells: &[NamedCell], figures: &[Figures]) -> String {
+    let nis = KINDS_OF_SOURCES.map(|(name, _)| format!("nis_{}", name.replace(' ', "_"))).join(",");
+    let mut text = format!(
+        "vehicle,condition,place,speed,over,passed,far,failed_under,under,passable,pass,fail,cannot_say,open,\
+         advice,plan,d_error_m,d_sd_m,ratio,within,{nis},told_m,way_m,misses\n"
     );
-    text += &head;
-    let mut with_misses = 0;
     for (cell, figures, missed) in judged(cells, figures) {
-        with_misses += usize::from(missed.count() > 0);
         text += &row(cell, figures, &missed);
     }
-    text += &plans(cells);
-    text + &format!("\n{with_misses} of {} cells miss a goal.\n", cells.len())
+    text
 }
 
 /// A line for each section that passed although its true hole is over the target.
@@ -150,69 +124,35 @@ pub(crate) fn pooled(cells: &[NamedCell], figures: &[Figures]) -> (Vec<NamedCell
 }
 
 fn row(NamedCell { name, cell }: &NamedCell, figures: &Figures, missed: &Missed) -> String {
-    let nis: Vec<String> = (0..KINDS_OF_SOURCES.len())
-        .map(|kind| {
-            figures.nis(kind).map_or("-".to_owned(), |nis| marked(format!("{nis:.2}"), missed.nis[kind]))
-        })
-        .collect();
+    let shares = |number: f64| format!("{number:.2}");
+    let nis = (0..KINDS_OF_SOURCES.len()).map(|kind| figures.nis(kind).map_or(String::new(), shares));
     let row = [
-        name.join(" | "),
+        name.join(","),
         figures.over.to_string(),
-        marked(figures.passed_over.to_string(), missed.passed_over),
-        marked(figures.passed_far.to_string(), missed.passed_far),
-        marked(format!("{}/{}", figures.failed_under, figures.under), missed.failed_under),
-        format!("{:.2}", figures.passable()),
-        marked(format!("{:.2}", figures.share(0)), missed.passed),
-        format!("{:.2}", figures.share(1)),
-        marked(format!("{:.2}", figures.share(2)), missed.cannot_say),
-        format!("{:.2}", figures.share(3)),
-        marked(format!("{:.2}", advice_share(cell, figures)), missed.advice),
+        figures.passed_over.to_string(),
+        figures.passed_far.to_string(),
+        figures.failed_under.to_string(),
+        figures.under.to_string(),
+        shares(figures.passable()),
+        [0, 1, 2, 3].map(|verdict| shares(figures.share(verdict))).join(","),
+        shares(advice_share(cell, figures)),
+        shares(cell.plan_share()),
         format!("{:.3}", figures.error_m()),
         format!("{:.3}", figures.sd_m()),
-        marked(format!("{:.2}", figures.ratio_rms()), missed.ratio),
-        marked(format!("{:.2}", figures.within(2.0)), missed.within),
-        nis.join(" / "),
-        marked(format!("{:.2}/{:.2}", figures.way_m[1], figures.way_m[0]), missed.told),
+        shares(figures.ratio_rms()),
+        shares(figures.within(2.0)),
+        nis.collect::<Vec<_>>().join(","),
+        format!("{:.2},{:.2}", figures.way_m[1], figures.way_m[0]),
+        missed.names().join(" "),
     ];
-    format!("| {} |\n", row.join(" | "))
+    format!("{}\n", row.join(","))
 }
-
-/// Planned speeds over those of Eq. 16.
-fn plans(cells: &[NamedCell]) -> String {
-    let mut text = "\n| vehicle | plan over Eq. 16 (>= 0.95) |\n|---|---|\n".to_owned();
-    for vehicle in VEHICLES {
-        let graded = |cell: &&NamedCell| {
-            cell.cell.vehicle.name == vehicle.name && cell.cell.condition == Condition::DataSheet
-        };
-        if let Some(cell) = cells.iter().find(graded) {
-            let share = cell.cell.plan_share();
-            let row = format!("| {} | {} |\n", vehicle.name, marked(format!("{share:.2}"), share < 0.95));
-            text += &row;
-        }
-    }
-    text
-}
-
-/// Puts the table between the two marks of a page.
-pub(crate) fn replace(page: &Path, table: &str) {
-    let old = std::fs::read_to_string(page).unwrap();
-    let (before, rest) = old.split_once(MARKS[0]).unwrap();
-    let (_, after) = rest.split_once(MARKS[1]).unwrap();
-    std::fs::write(page, format!("{before}{}\n{table}{}{after}", MARKS[0], MARKS[1])).unwrap();
-}
-
-/// Between which a page has the table.
-const MARKS: [&str; 2] = ["<!-- table -->", "<!-- end of table -->"];
 
 fn judged<'a>(
     cells: &'a [NamedCell],
     figures: &'a [Figures],
 ) -> impl Iterator<Item = (&'a NamedCell, &'a Figures, Missed)> {
     cells.iter().zip(figures).map(|(cell, figures)| (cell, figures, Missed::of(&cell.cell, figures)))
-}
-
-fn marked(text: String, missed: bool) -> String {
-    if missed { text + "!" } else { text }
 }
 
 /// Writes the figures.
@@ -232,7 +172,7 @@ pub(crate) fn write_json(cells: &[NamedCell], figures: &[Figures], arguments: &A
                 "advice_of_eq16": advice_share(cell, figures),
                 "error_rms_m": figures.error_m(), "sd_median_m": figures.sd_m(), "ratio_rms": figures.ratio_rms(),
                 "within_two": figures.within(2.0), "nis": nis.collect::<serde_json::Map<_, _>>(),
-                "way_m": figures.way_m[0], "told_m": figures.way_m[1], "goals_missed": missed.count(),
+                "way_m": figures.way_m[0], "told_m": figures.way_m[1], "goals_missed": missed.names(),
             })
         })
         .collect();

@@ -183,7 +183,7 @@ impl Page {
         let style = self.ink.banner(lamp);
         let shape = self.ink.shape(lamp);
         let what = match self.late {
-            Some(late) => format!("OLD {:.0} s: the loop stands still", late.as_secs_f64()),
+            Some(late) => format!("OLD {:.0} s: the program has stalled", late.as_secs_f64()),
             None => shot.status.what.first().cloned().unwrap_or_default(),
         };
         let words =

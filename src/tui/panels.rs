@@ -117,7 +117,7 @@ pub(super) fn place(shot: &Shot, ink: Ink, rows: &mut Rows<'_>) {
     }
     rows.line(Line::from(spans));
     let style = if state.metres.fail_m > 0.0 { ink.style(Lamp::Red) } else { Style::default() };
-    rows.text(&format!("WAY    {}", metres_text(&state.metres, columns_after_label(rows))), style);
+    rows.text(&format!("METRES {}", metres_text(&state.metres, columns_after_label(rows))), style);
 }
 
 /// Metres by verdict, what isn't passed first; dots stand for what there is no room for.
@@ -271,7 +271,7 @@ fn sensor_words(sensor: &SensorRow, long: bool) -> (String, Lamp) {
         SensorState::Never => (format!("{id} never heard"), Lamp::Red),
         SensorState::Stalled => (format!("{id} STALLED"), Lamp::Red),
         SensorState::Hung => (format!("{id} hangs"), Lamp::Red),
-        SensorState::Deaf => (format!("{id} hears no wall"), Lamp::Red),
+        SensorState::Deaf => (format!("{id} detects no wall"), Lamp::Red),
         SensorState::Distrusted => (format!("{id} not believed"), Lamp::Amber),
     };
     let why = if long && !why.is_empty() { format!(": {why}") } else { String::new() };

@@ -3,7 +3,9 @@
 use super::alert_list::{AlertChange, ListedAlertJson};
 use super::head_words::HeadWords;
 use super::live_state::{Condition, Lamp, LiveMetres, LiveState, PositionDoubt, SensorState};
-use super::pilot_text::{AdviceFigures, actions_text, advice_text, cause_text, no_position_text, station};
+use super::pilot_text::{
+    AdviceFigures, actions_text, advice_text, cause_text, clock_text, no_position_text, station,
+};
 use super::telling::Told;
 pub use super::unsure_stretch::{helps_text, unsure_text};
 use headrace_geometry::time::DurNs;
@@ -110,7 +112,7 @@ pub fn status_line(
             let which = if state.chainage_m.is_some_and(|x_m| x_m < end_m) { "begins" } else { "ends" };
             (format!("OUTSIDE: the tunnel {which} at {}", station(end_m)), String::new())
         }
-        Condition::NoSonar => ("NO SONAR: nothing is seen".to_owned(), "stop".to_owned()),
+        Condition::NoSonar => ("NO SONAR: no returns".to_owned(), "stop".to_owned()),
         Condition::Passed => ("passed here".to_owned(), String::new()),
         Condition::GoingBack(to_m) => (format!("going back to {}", station(to_m)), String::new()),
         Condition::NoSpeed => (no_speed_text(state, profile, heads), String::new()),
@@ -145,7 +147,7 @@ pub fn status_line(
             some => parts.push(format!("{} of {} sensors silent", some.len(), state.sources)),
         }
         let deaf = state.sensors_that_are(SensorState::Deaf);
-        parts.extend(deaf.map(|source| format!("{} hears no wall", name(source))));
+        parts.extend(deaf.map(|source| format!("{} detects no wall", name(source))));
         let hung = state.sensors_that_are(SensorState::Hung);
         parts.extend(hung.map(|source| format!("{} hangs", name(source))));
         let forecast = losses_text(state).or_else(|| forecast_text(state));
@@ -211,7 +213,7 @@ fn losses_text(state: &LiveState) -> Option<String> {
 fn forecast_text(state: &LiveState) -> Option<String> {
     let advice = state.advice.as_ref().filter(|_| state.v_max_mps().is_some())?;
     Some(match advice.predicted_t_m {
-        Some(t_m) => format!("turn {t_m:.2} of {} m", state.target_m),
+        Some(t_m) => format!("turn {t_m:.2} m (limit {:.2})", state.target_m),
         None => "turn: unseen wall".to_owned(),
     })
 }
@@ -250,7 +252,7 @@ pub fn told_line(told: &Told, profile: &Profile, heads: &HeadWords) -> PilotLine
         Told::Flag { from_m, missed, .. } => {
             let at_most_mps = missed.figures.again_mps(missed.v_max_mps);
             let action = actions_text(&missed.figures.actions(), missed.back_to_m, at_most_mps, heads);
-            let clock = profile.clock(missed.hole_arc_m);
+            let clock = clock_text(profile, missed.hole_arc_m);
             let what = format!(
                 "MISSED: {}, holes over {} m at {clock}",
                 cause_text(&missed.figures, heads),
@@ -295,7 +297,7 @@ pub fn told_line(told: &Told, profile: &Profile, heads: &HeadWords) -> PilotLine
             line(place, format!("{}{by}", note.words()), String::new(), None)
         }
         Told::Way { from_m, to_m, metres } => {
-            line(to(*from_m, *to_m), format!("WAY: {}", metres_text(metres)), String::new(), None)
+            line(to(*from_m, *to_m), format!("Coverage: {}", metres_text(metres)), String::new(), None)
         }
     }
 }

@@ -23,6 +23,12 @@ pub fn station(chainage_m: f64) -> String {
     format!("{sign}{kilometres:.0}+{metres:06.2}")
 }
 
+/// Clock position of an arc length, in words: "3 o'clock", or "3:30" between two hours.
+pub fn clock_text(profile: &Profile, arc_m: f64) -> String {
+    let clock = profile.clock(arc_m);
+    clock.strip_suffix(":00").map_or(clock.clone(), |hour| format!("{hour} o'clock"))
+}
+
 /// Figures of a cause's evidence used in its text.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct CauseFigures {
@@ -127,12 +133,12 @@ fn one_cause_text(cause: Cause, figures: &CauseFigures, heads: &HeadWords) -> St
         Cause::AngularStep => format!("steps of {:.2} m along the wall", figures.t_y_m),
         Cause::MissingReturns => format!("{:.0} % of returns missing", figures.missing_share * 100.0),
         Cause::OutOfRange => "wall out of range".to_owned(),
-        Cause::Occluded => "the vehicle in the beams' way".to_owned(),
+        Cause::Occluded => "the vehicle blocks the beams".to_owned(),
         Cause::OffAxis if figures.swing_m > figures.t_y_m - figures.middle_t_y_m => {
             format!("beams swung {:.1} m between turns (yaw or pitch)", figures.swing_m)
         }
         Cause::OffAxis => format!("off the middle (steps of {:.2} m along the wall)", figures.t_y_m),
-        Cause::HeadStalled => "a head stood still".to_owned(),
+        Cause::HeadStalled => "a head stopped turning".to_owned(),
         Cause::HeadSilent => heads.silent(figures.silent_heads),
         Cause::Phase => format!("heads out of phase ({:.2} m/s)", figures.speed_mps),
         Cause::PositionLost => "position lost".to_owned(),
@@ -165,14 +171,14 @@ fn short_text(action: Action, heads: &HeadWords) -> String {
         Action::Slower => "slower",
         Action::FinerMode => return format!("in {}", heads.finer_mode()),
         Action::LongerRange => return format!("with {}", heads.longer_range()),
-        Action::OtherSide => "once rolled to each side",
+        Action::OtherSide => "again, rolled left, then right",
         Action::Middle => "in the middle and steady",
         Action::InPhase => "with the heads in phase",
         Action::Head => "with that head repaired",
-        Action::HeadBack => "with what is silent back",
+        Action::HeadBack => "with the silent sensor restored",
         Action::Position => "once the position is back",
         Action::HigherGain => "with a higher gain",
-        Action::Again => "from end to end",
+        Action::Again => "drive right through it",
     };
     text.to_owned()
 }
@@ -190,7 +196,7 @@ pub fn action_text(action: Action, back_to_m: f64, at_most_mps: f64, heads: &Hea
         Action::HigherGain => return "slower won't help, a higher gain may".to_owned(),
         Action::Slower if at_most_mps > 0.0 => format!("{back}, then"),
         Action::Slower => back,
-        Action::OtherSide => format!("{back}, then once rolled to each side,"),
+        Action::OtherSide => format!("{back}, then again, rolled left, then right,"),
         Action::Middle => format!("{back}, then in the middle and steady,"),
         // Slower, heads apart along the hull are out of phase again.
         Action::InPhase if at_most_mps > 0.0 => {
@@ -198,9 +204,9 @@ pub fn action_text(action: Action, back_to_m: f64, at_most_mps: f64, heads: &Hea
         }
         Action::InPhase => format!("{back}, then with the heads in phase,"),
         Action::Head => format!("{back}, then with that head repaired,"),
-        Action::HeadBack => format!("get what is silent back, then {back},"),
+        Action::HeadBack => format!("restore the silent sensor, then {back},"),
         Action::Position => format!("once the position is back, {back},"),
-        Action::Again => format!("{back}, then from end to end,"),
+        Action::Again => format!("{back}, then drive right through it,"),
     };
     if at_most_mps > 0.0 {
         format!("{text} at most {at_most_mps:.2} m/s")
@@ -212,7 +218,7 @@ pub fn action_text(action: Action, back_to_m: f64, at_most_mps: f64, heads: &Hea
 /// Remedy if lower speed does not help.
 fn remedy_text(remedy: Option<Remedy>) -> String {
     match remedy {
-        Some(Remedy::HoldHeading) => "hold the heading, the beams swing".to_owned(),
+        Some(Remedy::HoldHeading) => "hold the heading: the beams swing".to_owned(),
         Some(Remedy::Centre) => "go to the middle of the tunnel".to_owned(),
         Some(Remedy::Mode(mode)) => format!("set the heads to {}", mode.as_str().to_uppercase()),
         None => "no mode meets the target here".to_owned(),
@@ -222,9 +228,9 @@ fn remedy_text(remedy: Option<Remedy>) -> String {
 /// What is lacking for a position.
 pub(super) fn no_position_text(lacking: NoFix) -> &'static str {
     match lacking {
-        NoFix::Heading => "NO POSITION: no heading",
-        NoFix::Chainage => "NO POSITION: no chainage",
-        NoFix::Section => "NO POSITION: no place across",
+        NoFix::Heading => "NO POSITION: heading unknown",
+        NoFix::Chainage => "NO POSITION: chainage unknown",
+        NoFix::Section => "NO POSITION: lateral position unknown",
     }
 }
 
@@ -274,10 +280,10 @@ pub struct Missed {
 pub fn flag_text(missed: &Missed, profile: &Profile, heads: &HeadWords) -> String {
     let Missed { start_m, back_to_m, figures, hole_arc_m, target_m, v_max_mps } = missed;
     format!(
-        "ch {}  {}: holes over {target_m} m at {} o'clock; {}",
+        "ch {}  {}: holes over {target_m} m at {}; {}",
         station(*start_m),
         cause_text(figures, heads),
-        profile.clock(*hole_arc_m),
+        clock_text(profile, *hole_arc_m),
         actions_text(&figures.actions(), *back_to_m, figures.again_mps(*v_max_mps), heads),
     )
 }
@@ -292,7 +298,7 @@ pub fn alert_text(kind: AlertKind, head: &str, x_m: f64, off_m: f64) -> String {
     let x = station(x_m);
     match kind {
         AlertKind::OutsideTunnel => {
-            format!("ch {x}  samples {off_m:.2} m outside the tunnel: is the tether's zero right?")
+            format!("ch {x}  samples {off_m:.2} m outside the tunnel: check the tether's zero")
         }
         AlertKind::ProfileContradicted => format!(
             "ch {x}  the wall is {off_m:+.2} m off the design profile: wrong profile or position; nothing passes"
@@ -390,7 +396,7 @@ impl AdviceFigures {
 /// Text of advice, with its figures.
 pub fn advice_text(advice: &AdviceFigures, profile: &Profile, heads: &HeadWords) -> String {
     match advice.reason {
-        Reason::HelixPitch if advice.v_max_mps < LEAST_MPS => "no speed is slow enough here".to_owned(),
+        Reason::HelixPitch if advice.v_max_mps < LEAST_MPS => "no speed meets the target here".to_owned(),
         Reason::HelixPitch if advice.will_exceed && advice.speed_mps.abs() > advice.v_max_mps => {
             format!("TOO FAST: at most {:.2} m/s", advice.v_max_mps)
         }
@@ -406,7 +412,7 @@ pub fn advice_text(advice: &AdviceFigures, profile: &Profile, heads: &HeadWords)
             match (advice.remedy, advice.unseen_m) {
                 (Some(Remedy::HoldHeading), _) => format!("slower won't help: {remedy}"),
                 (_, Some([width_m, arc_m])) => {
-                    let clock = profile.clock(arc_m);
+                    let clock = clock_text(profile, arc_m);
                     format!("slower won't help: no head sees {width_m:.2} m of the wall at {clock}; {remedy}")
                 }
                 (_, None) => {
@@ -456,10 +462,10 @@ mod tests {
             at(Action::Middle, 0.25),
             "go back to 1+240.50, then in the middle and steady, at most 0.25 m/s"
         );
-        assert_eq!(at(Action::Again, 0.0), "go back to 1+240.50, then from end to end");
+        assert_eq!(at(Action::Again, 0.0), "go back to 1+240.50, then drive right through it");
         assert_eq!(
             actions_text(&[Action::Slower, Action::OtherSide, Action::Again], 1240.5, 0.25, &two()),
-            "go back to 1+240.50, then at most 0.25 m/s; and once rolled to each side"
+            "go back to 1+240.50, then at most 0.25 m/s; and again, rolled left, then right"
         );
         // Where a speed helps elsewhere in the stretch, it isn't said that slower won't.
         let lossy = [Action::HigherGain, Action::Slower];

@@ -57,13 +57,13 @@ pub fn unsure_text(stretch: &UnsureStretch) -> String {
     match stretch.why {
         Unsure::NotInspected => format!("{:.2} m not seen from both sides", stretch.metres_m),
         Unsure::Position => {
-            format!("hole {:.2} m, give or take {:.2} m", stretch.hole_m, stretch.hole_error_m)
+            format!("hole {:.2} ± {:.2} m", stretch.hole_m, stretch.hole_error_m)
         }
         Unsure::SeveralStretches => "position lost or doubted between passes".to_owned(),
-        Unsure::DoubtfulReturns => "more doubtful returns than wall".to_owned(),
-        Unsure::DistrustedHead => "seen by a head that isn't believed".to_owned(),
-        Unsure::ContradictedProfile => "the wall isn't where the design says".to_owned(),
-        Unsure::OtherSize => "the cross-section isn't the design's".to_owned(),
+        Unsure::DoubtfulReturns => "most returns doubtful".to_owned(),
+        Unsure::DistrustedHead => "seen by a head whose returns are rejected".to_owned(),
+        Unsure::ContradictedProfile => "the wall is not where the design has it".to_owned(),
+        Unsure::OtherSize => "the cross-section differs from the design".to_owned(),
         Unsure::NoWall => "a declared opening, no wall".to_owned(),
     }
 }
@@ -73,16 +73,16 @@ const AS_FITS: [f64; 2] = [0.98, 1.02];
 
 /// What would help; empty where nothing does.
 pub fn helps_text(stretch: &UnsureStretch) -> String {
-    let surer = "again with a surer position";
+    let surer = "pass it again with a more certain position";
     let helps = match stretch.why {
-        Unsure::NotInspected => "pass it whole to inspect it",
+        Unsure::NotInspected => "drive right through it",
         Unsure::Position => {
             let Driven { speed_mps, fits_mps, is_uneven, is_short } = stretch.driven;
             let [least_mps, most_mps] = AS_FITS.map(|share| share * fits_mps);
             return if stretch.is_mostly_error {
                 surer.to_owned()
             } else if is_short {
-                "again with the silent head back, or slower".to_owned()
+                "pass it again slower, or with the silent head restored".to_owned()
             } else if fits_mps > 0.0 && speed_mps > most_mps {
                 format!("at most {fits_mps:.2} m/s, or {surer}")
             } else if speed_mps > 0.0 && speed_mps < least_mps && is_uneven {

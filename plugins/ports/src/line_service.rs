@@ -395,7 +395,7 @@ impl LineService {
     fn count_dropped(&mut self, line: &mut dyn Line) {
         let dropped = line.dropped();
         if let Some(first) = self.devices.first_mut().filter(|_| dropped > 0) {
-            tracing::warn!(dropped, "messages were dropped unread: this program, or the machine, stood");
+            tracing::warn!(dropped, "messages were dropped unread: the computer stalled");
             first.history.dropped += dropped;
         }
     }

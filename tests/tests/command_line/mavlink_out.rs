@@ -71,8 +71,17 @@ fn heard(log: &str) -> (Vec<Said>, String) {
 fn replay(log: &str, to: &str) -> String {
     let folder = Folder::new();
     let log = root().join(format!("tests/golden/{log}.mcap"));
-    let arguments =
-        ["replay", log.to_str().unwrap(), "--speed", "40x", "--mavlink-out", to, "--mavlink-system", "7"];
+    let arguments = [
+        "replay",
+        "-v",
+        log.to_str().unwrap(),
+        "--speed",
+        "40x",
+        "--mavlink-out",
+        to,
+        "--mavlink-system",
+        "7",
+    ];
     let answer = folder.headrace(&arguments);
     answer
         .stdout

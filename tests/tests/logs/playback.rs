@@ -347,7 +347,7 @@ fn a_replay_that_was_left_is_not_judged_by_other_targets() {
 fn lines_on_standard_input_pause_step_and_seek() {
     let folder = logs();
     let lines = "pause\nseek 12s\nstep 3\nback 5s\nstop\nahead 0:02\nspeed max\ngo\n";
-    let answer = interactive(&folder, &["ticks.mcap", "--speed", "1x"], lines);
+    let answer = interactive(&folder, &["ticks.mcap", "-v", "--speed", "1x"], lines);
     let (stdout, stderr) = (String::from_utf8_lossy(&answer.stdout), String::from_utf8_lossy(&answer.stderr));
     assert_eq!(answer.status.code(), Some(0), "{stderr}");
     let stops: Vec<&str> = stdout

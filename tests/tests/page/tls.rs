@@ -161,6 +161,6 @@ fn files_that_cannot_be_used_are_named_and_the_dive_goes_on() {
         for words in told.into_iter().chain(["; the dive goes on without the page"]) {
             assert!(answer.stderr.contains(words), "{pair:?}: {words:?} isn't in {}", answer.stderr);
         }
-        assert!(answer.stdout.contains("digest "), "{}", answer.stdout);
+        assert!(answer.stdout.contains(" samples, target "), "{}", answer.stdout);
     }
 }

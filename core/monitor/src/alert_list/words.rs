@@ -4,7 +4,8 @@ use super::{AlertState, Figures, ListKind, ListedAlert};
 use crate::app::SourceInfo;
 use crate::head_words::HeadWords;
 use crate::pilot_text::{
-    actions_text, advice_text, alert_text, cause_text, no_position_text, setting_text, speed_text, station,
+    actions_text, advice_text, alert_text, cause_text, clock_text, no_position_text, setting_text,
+    speed_text, station,
 };
 use crate::unsure_stretch::{UnsureStretch, helps_text, unsure_text};
 use headrace_coverage::{Sections, Stretch};
@@ -75,7 +76,7 @@ impl ListedAlert {
         };
         match (self.kind, &self.figures) {
             (_, Figures::Missed(causes, arc_m, _)) => {
-                let clock = around.profile.clock(*arc_m);
+                let clock = clock_text(around.profile, *arc_m);
                 format!("MISSED {place}, at {clock}: {}", cause_text(causes, around.heads))
             }
             (_, Figures::CannotSay(stretch)) => {
@@ -128,7 +129,9 @@ impl ListedAlert {
             (ListKind::TurnFails, Figures::Advice(figures)) => speed_text("go", figures.v_max_mps),
             (ListKind::NoPosition, _) => "hold still".to_owned(),
             (ListKind::PositionDoubtful, Figures::Error(_, true)) => "stand still for 30 s".to_owned(),
-            (ListKind::PositionDoubtful, _) => "slower, or again with a surer position".to_owned(),
+            (ListKind::PositionDoubtful, _) => {
+                "go slower, or pass it again with a more certain position".to_owned()
+            }
             (ListKind::NoSonar | ListKind::NoData, _) => "stop".to_owned(),
             (ListKind::NotRecorded, _) => "free the disk, or change the medium".to_owned(),
             (ListKind::CableLeft | ListKind::TimeLeft | ListKind::BatteryLeft, _) => "turn back".to_owned(),
@@ -141,9 +144,9 @@ fn plain_text(kind: ListKind, name: &str, place: &str) -> String {
     match kind {
         ListKind::SensorSilent => format!("{name} silent"),
         ListKind::SensorStalled => format!("{name} doesn't turn"),
-        ListKind::SensorHung => format!("{name} hangs: it says the same again and again"),
-        ListKind::SensorDeaf => format!("{name} hears no wall"),
-        ListKind::NoSonar => "NO SONAR: nothing is seen".to_owned(),
+        ListKind::SensorHung => format!("{name} hangs: it repeats one reading"),
+        ListKind::SensorDeaf => format!("{name} detects no wall"),
+        ListKind::NoSonar => "NO SONAR: no returns".to_owned(),
         ListKind::NoData => "NO DATA: nothing from any sensor".to_owned(),
         ListKind::NotRecorded => "NOT RECORDED: the recording fails, or its disk is too slow".to_owned(),
         ListKind::Missed => format!("MISSED {place}"),

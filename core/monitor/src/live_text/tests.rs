@@ -93,7 +93,7 @@ fn what_helps_an_unsure_stretch_is_the_speed_that_fits() {
         let driven = Driven { speed_mps, fits_mps, is_uneven, is_short: false };
         helps_text(&UnsureStretch { driven, ..stretch(Unsure::Position) })
     };
-    let surer = "again with a surer position";
+    let surer = "pass it again with a more certain position";
     assert_eq!(helps(0.2, 0.1, false), format!("at most 0.10 m/s, or {surer}"));
     assert_eq!(helps(0.2, 0.1, true), format!("at most 0.10 m/s, or {surer}"));
     assert_eq!(helps(0.09, 0.1, true), format!("at 0.10 m/s, or {surer}"));
@@ -108,7 +108,7 @@ fn what_helps_an_unsure_stretch_is_the_speed_that_fits() {
     let silent = UnsureStretch { driven: short, ..stretch(Unsure::Position) };
     assert_eq!(
         helps_text(&silent),
-        "again with the silent head back, or slower",
+        "pass it again slower, or with the silent head restored",
         "the speeds are those of all heads"
     );
 }

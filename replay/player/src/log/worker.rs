@@ -208,13 +208,13 @@ impl RecorderWorker {
         {
             let id = self.ids.get(usize::from(source)).map_or("an unknown source", String::as_str);
             let words = format!(
-                "{packets} packets of {id} dropped before the program took them: it, or the machine, stood"
+                "{packets} packets of {id} dropped by the kernel or a full queue: the computer stalled"
             );
             self.recording.state(Some(from), Some(to), &words);
         }
         if besides > 0 {
             let words =
-                format!("{besides} packets dropped before the program took them: it, or the machine, stood");
+                format!("{besides} packets dropped by the kernel or a full queue: the computer stalled");
             self.recording.state(None, Some(self.last.unwrap_or_default()), &words);
         }
     }

@@ -32,8 +32,8 @@ export function Announcer() {
 
 /** Where nothing bounds the speed, and what there is to say of it. */
 const UNBOUNDED: Partial<Record<Condition, string>> = {
-  passed: "all wall here has passed",
-  going_back: "at most max, the way back counts, too",
+  passed: "the wall here has passed",
+  going_back: "the way back is judged, too: keep to the limit",
   outside: "no wall here is judged",
 };
 
@@ -53,7 +53,7 @@ export function Speed() {
       <Gauge speed={speed} most={most} />
       <div class="why">
         {state?.reason && bounded ? <span><b>limit</b> {lost === null ? (REASONS[state.reason] ?? state.reason) : `${figure(100 * lost, 0)} % of returns lost`}</span> : null}
-        {state?.remedy && bounded ? <span class="remedy"><b>to gain more</b> {state.remedy}</span> : null}
+        {state?.remedy && bounded ? <span class="remedy"><b>faster option</b> {state.remedy}</span> : null}
       </div>
       {bounded ? <Forecast /> : <div class="forecast">{unbounded}</div>}
     </div>
@@ -94,7 +94,7 @@ function Forecast() {
   const over = predicted_t_m === null || predicted_t_m > target_m;
   return (
     <div class={`forecast${over ? " over" : ""}`}>
-      <span>this turn: largest hole {predicted_t_m === null ? "unbounded" : `${figure(predicted_t_m, 2)} m`} of {figure(target_m, 2)} m{lost === null ? "" : ", had none been lost"} {over ? (will_exceed ? "▲ misses" : "▲") : "✓"}</span>
+      <span>this turn: largest hole {predicted_t_m === null ? "unbounded" : `${figure(predicted_t_m, 2)} m`} (limit {figure(target_m, 2)}){lost === null ? "" : " without losses"} {over ? (will_exceed ? "▲ misses" : "▲") : "✓"}</span>
       <svg viewBox="0 0 200 8" preserveAspectRatio="none" aria-hidden="true"><rect width="200" height="8" class="zone-none" /><rect width={share * 200} height="8" class={over ? "zone-red" : "zone-green"} /><path class="limit" d="M100 0V8" /></svg>
     </div>
   );

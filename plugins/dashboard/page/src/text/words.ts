@@ -6,18 +6,18 @@ import { figure, span } from "./format";
 export interface Shown { word: string; advice: string; lamp: Lamp; old: boolean }
 
 export const REASONS: Record<string, string> = {
-  helix_pitch: "passes would lie too far apart: slower helps",
-  angular_step: "steps round the wall are too wide: slower doesn't help",
-  no_heading_or_fix: "no heading or position to judge by",
+  helix_pitch: "turns too far apart: go slower",
+  angular_step: "samples too far apart along the wall: slower won't help",
+  no_heading_or_fix: "no heading or position",
   no_returns: "no returns from the wall",
 };
 
 export const POSITION_WHY: Record<string, string> = {
-  cable: "the cable's counter isn't believed",
-  spread: "passes aren't known well enough against each other",
+  cable: "cable counter doubted",
+  spread: "position drifts between passes",
   no_heading: "no heading",
   no_chainage: "no chainage",
-  no_place_in_section: "no place across the tunnel",
+  no_place_in_section: "lateral position unknown",
 };
 
 export const VERDICTS = {
@@ -25,7 +25,7 @@ export const VERDICTS = {
 } as const;
 
 export const SENSOR_STATES: Record<string, string> = {
-  ok: "ok", silent: "silent", never: "never heard", stalled: "doesn't turn", deaf: "hears no wall", hung: "hangs", distrusted: "not believed",
+  ok: "ok", silent: "silent", never: "never heard", stalled: "doesn't turn", deaf: "detects no wall", hung: "hangs", distrusted: "not believed",
 };
 
 /** Words for a cause or why of the wire: too_fast is "too fast". */
@@ -51,12 +51,12 @@ export function conditionWords(state: State): { word: string; advice: string } {
     outside: ["OUTSIDE", "no head is over the tunnel"],
     no_sonar: ["NO SONAR", "nothing is seen: stop"],
     passed: ["PASSED HERE", "any speed will do"],
-    going_back: ["GOING BACK", "for what was missed: any speed will do"],
+    going_back: ["GOING BACK", "to a missed section: any speed will do"],
     no_speed: ["SLOWER WON'T HELP", state.remedy ?? "no speed meets the target here"],
     too_fast: ["TOO FAST", slower],
     turn_fails: ["THIS TURN MISSES", go],
     turn_unsure: ["THIS TURN MAY MISS", go],
-    cannot_say: ["CAN'T SAY", `${POSITION_WHY[state.position.why ?? ""] ?? "position too unsure"}${stand === "" ? "" : `: ${stand}`}`],
+    cannot_say: ["CAN'T SAY", `${POSITION_WHY[state.position.why ?? ""] ?? "position too uncertain"}${stand === "" ? "" : `: ${stand}`}`],
     over: ["A LITTLE FAST", slower],
     good: ["GOOD", most === "" ? "" : `may go up to ${figure(state.v_max_mps, 2)} m/s`],
   };

@@ -173,7 +173,7 @@ class Painter {
     const own = held === "own" ? slot : -1, cause = hello.causes[sections.cause[own] ?? 255], why = hello.whys[sections.why[own] ?? 255];
     const words = [cause, why].filter((word) => word !== undefined).map((word) => word.replaceAll("_", " ")).join(", ");
     const d = sections.hole[slot] ?? NaN;
-    return `${station(x_m, 1)}: ${verdict}${words ? ` (${words})` : ""}${Number.isFinite(d) ? `, hole ${figure(d, 2)} of ${figure(target_m, 2)} m` : ""}`;
+    return `${station(x_m, 1)}: ${verdict}${words ? ` (${words})` : ""}${Number.isFinite(d) ? `, hole ${figure(d, 2)} m (limit ${figure(target_m, 2)})` : ""}`;
   }
 }
 

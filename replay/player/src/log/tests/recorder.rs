@@ -361,7 +361,7 @@ fn what_lines_drop_is_stated_by_source_every_few_seconds() {
     let s = Duration::from_secs;
     let words = |packets: u64, id: &str, from: u64, to: u64| {
         format!(
-            "{packets} packets of {id} dropped before the program took them: it, or the machine, stood (after {from}.000 s, \
+            "{packets} packets of {id} dropped by the kernel or a full queue: the computer stalled (after {from}.000 s, \
              before {to}.000 s)"
         )
     };
