@@ -166,7 +166,7 @@ fn vehicle(path: &Path) -> Result<(String, VehicleConfig), Failure> {
 /// Checks, before the work, that what stands where files will be written was written by this program.
 fn may_write(folder: &Path, force: bool) -> Result<(), Failure> {
     let names = TRADES.iter().flat_map(|(name, _)| [format!("{name}.csv"), format!("{name}.svg")]);
-    for name in names.chain(["README.md".to_owned(), "cost.json".to_owned()]) {
+    for name in names.chain(["README.md", "method.md", "cost.json"].map(str::to_owned)) {
         let path = folder.join(&name);
         match fs::read_to_string(&path) {
             Err(error) if error.kind() == io::ErrorKind::NotFound => {}

@@ -88,9 +88,9 @@ pub(crate) fn defaults(trade: &Trade) -> Vec<String> {
             .min_by(|a, b| a.cost.middle.total_cmp(&b.cost.middle));
         if let Some(better) = better {
             lines.push(format!(
-                "{scene}: {} is off its front; {} has no more error for less.",
-                whole(trade, default),
-                whole(trade, better)
+                "Cheaper with no more error ({scene}): {} instead of the shipped {}.",
+                whole(trade, better),
+                whole(trade, default)
             ));
         }
     }

@@ -224,6 +224,9 @@ fn the_page_has_every_column() {
         let page = format!("{before}<!-- tables -->\n{}<!-- end of tables -->{after}", described());
         std::fs::write(&path, page).unwrap();
     } else {
-        assert!(there == described(), "docs/how-to/replay-many-dives.md differs from the code: RENEW=1 writes it anew");
+        assert!(
+            there == described(),
+            "docs/how-to/replay-many-dives.md differs from the code: RENEW=1 writes it anew"
+        );
     }
 }

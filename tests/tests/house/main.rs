@@ -3,6 +3,7 @@
 #![allow(clippy::unwrap_used, clippy::panic, reason = "a test stops at what it can't do")]
 
 mod circles;
+mod english;
 mod hard_cases;
 mod image;
 mod imports;

@@ -30,9 +30,9 @@ impl Bars {
     /// What they are, in words.
     pub fn as_str(self) -> &'static str {
         match self {
-            Self::Quartiles => "median and quartiles of nine rounds in turns",
+            Self::Quartiles => "median of nine rounds measured in turns, with quartiles",
             Self::Median => {
-                "median of rounds in turns (nine; with `--quick` three) with its 95 % interval, by signs"
+                "median of rounds measured in turns (nine, or three with `--quick`), with its 95 % interval by the sign test"
             }
         }
     }
@@ -64,7 +64,8 @@ impl Results {
     /// Errors: figures that JSON can't hold.
     pub fn files(&self) -> Result<Vec<(String, String)>, serde_json::Error> {
         let mut files = vec![
-            ("README.md".to_owned(), markdown::page(self)),
+            ("README.md".to_owned(), markdown::advice(self)),
+            ("method.md".to_owned(), markdown::method(self)),
             ("cost.json".to_owned(), serde_json::to_string_pretty(self)? + "\n"),
         ];
         for trade in &self.trades {

@@ -104,8 +104,8 @@ pub fn measure(inputs: &Inputs<'_>, progress: &mut dyn FnMut(&str)) -> Result<Tr
     let (reasons, advice) = (reasons(&points), advice(&points));
     Ok(Trade {
         name: "holes".to_owned(),
-        title: "Holes: what the exact search costs (VITA 2, four heads, target 0.5 m)".to_owned(),
-        question: "What does it cost to know D of a section exactly, beside tolerances, the lattice's T and counts of cells?"
+        title: "Holes: the price of an exact search".to_owned(),
+        question: "What does it cost to find the largest hole of a section exactly (VITA 2, four heads, target 0.5 m)?"
             .to_owned(),
         error_axis: "|D - D_true| of sections, 95th percentile, m".to_owned(),
         cost_axis: "CPU time of a replay, ns a return".to_owned(),
@@ -376,9 +376,8 @@ fn reasons(points: &[Point]) -> Vec<String> {
         let coarse = find(points, scene, "tolerance", Some(0.05))?;
         let search = figure(exact, SEARCH);
         Some(format!(
-            "{scene}: the exact search stays. It takes {} of {} ns a return, so that no tolerance can save more than {} %; one of 0.05 m saves {} \
-             ns of search and leaves {} m in 100 unsaid in place of {}. Where positions are off by more than a tolerance (drop-outs, field), \
-             a coarser search may look nearer by chance: it reports the lower bound of D.",
+            "Scene {scene}: the search takes {} of {} ns per return, so a tolerance can save at most {} %. A tolerance of 0.05 m saves {} ns and \
+             leaves {} m in 100 unjudged instead of {}.",
             number(search),
             number(exact.cost.middle),
             number(100.0 * search / exact.cost.middle),
@@ -387,7 +386,10 @@ fn reasons(points: &[Point]) -> Vec<String> {
             number(figure(exact, "not said"))
         ))
     };
-    ["ideal", "drop-outs", "field"].into_iter().filter_map(of).collect()
+    let by_chance = "Where positions are off by more than the tolerance (drop-outs, field), a coarser search can look more accurate by \
+                     chance, because it reports a lower bound of D."
+        .to_owned();
+    ["ideal", "drop-outs", "field"].into_iter().filter_map(of).chain([by_chance]).collect()
 }
 
 fn advice(points: &[Point]) -> String {
@@ -398,10 +400,10 @@ fn advice(points: &[Point]) -> String {
     };
     let planned = find(points, "drop-outs", "of the plan", None);
     format!(
-        "Keep the exact search: of {} ns a return it takes {}, and is within {} m of D_true on an ideal dive, where cells of 0.1 m are {} m \
-         off; with drop-outs such cells pass {} m in 100 falsely, and the plan's T passes {}.",
-        number(exact.cost.middle),
+        "Keep the exact search. It takes {} of {} ns per return and is within {} m of D_true in an ideal dive. A grid of 0.1 m cells is {} m \
+         off; with drop-outs it passes {} m in 100 wrongly, and the spacing that the plan predicts passes {}.",
         number(figure(exact, SEARCH)),
+        number(exact.cost.middle),
         number(exact.error()),
         number(ideal.error()),
         number(figure(dropped, "falsely passed")),

@@ -71,7 +71,7 @@ pub fn measure(inputs: &Inputs<'_>, progress: &mut dyn FnMut(&str)) -> Result<Tr
     Ok(Trade {
         name: "live".to_owned(),
         title: "Live loop".to_owned(),
-        question: "What does a finer and more frequent look cost the live loop?".to_owned(),
+        question: "What do finer rays and more frequent updates of the advice cost the live loop?".to_owned(),
         error_axis: "advised speed off, rms, m/s".to_owned(),
         cost_axis: "loop, share of a core".to_owned(),
         cost_unit: "of a core".to_owned(),
@@ -400,9 +400,9 @@ fn reasons(points: &[Point]) -> Vec<String> {
     for scene in scenes {
         if let (Some((ring, coarse)), Some((tick, long))) = (pair(scene, "ring"), pair(scene, "tick")) {
             reasons.push(format!(
-                "{scene}: {} of ring stay although {} save {} % of the loop's time: the advised speed would be {} m/s off in place of {}, and \
-                 steps of heads are rounded up to the ring's, of which those of the finest mode are 0.3 degrees. Ticks of {} stay \
-                 although {} save {} %: a live operator waits for them; verdicts differ over {} m in 100.",
+                "Scene {scene}: rays every {} are the default. Rays every {} would save {} % of the loop's time, but the advised speed would be {} \
+                 m/s off instead of {}, and the finest mode of a head steps by 0.3 degrees. Ticks of {} are the default, so that an \
+                 operator does not wait; ticks of {} would save {} % and change the verdict of {} m in 100.",
                 ring.value,
                 coarse.value,
                 saved(ring, coarse),
@@ -428,14 +428,17 @@ fn advice(points: &[Point]) -> String {
     let most = points.iter().rfind(|point| point.method == "vertices");
     let ring = ring.map(|(usual, finest)| {
         format!(
-            "A ring of 0.1 degrees in place of 0.3 moves the advised speed by {:.2} mm/s and takes {:.2} times the loop's time.",
+            "Rays every 0.1 degrees instead of 0.3 change the advised speed by {:.2} mm/s and take {:.2} times the loop's time.",
             1e3 * (usual.error() - finest.error()).abs(),
             finest.cost.middle / usual.cost.middle,
         )
     });
     let vertices = arcs.zip(most).map(|(arcs, most)| {
         let times = most.cost.middle / arcs.cost.middle;
-        format!("A profile of {} vertices takes {times:.1} times the loop's time of its arcs.", most.value)
+        format!(
+            "A surveyed profile of {} vertices takes {times:.1} times the loop's time of a profile of arcs.",
+            most.value
+        )
     });
     [ring, vertices].into_iter().flatten().collect::<Vec<_>>().join(" ")
 }

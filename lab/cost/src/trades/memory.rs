@@ -38,8 +38,8 @@ pub fn tabulate(inputs: &Inputs<'_>, progress: &mut dyn FnMut(&str)) -> Result<G
     let columns = ["what", "lost", "ns with it", "ns without it"].map(str::to_owned).to_vec();
     Ok(Given {
         title: "What determinism and memory cost".to_owned(),
-        text: "These aren't choices: the same bytes must give the same results on every machine, in a bounded memory. Times are CPU time \
-               of a call, a distance or a sample, median of the rounds."
+        text: "The same bytes give the same results on every machine, in bounded memory. That has a price, which is no choice. Times are \
+               the CPU time of one call, distance or sample, as the median of the rounds."
             .to_owned(),
         columns,
         rows,

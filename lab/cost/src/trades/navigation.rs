@@ -107,7 +107,7 @@ pub fn measure(inputs: &Inputs<'_>, progress: &mut dyn FnMut(&str)) -> Result<Tr
     Ok(Trade {
         name: "navigation".to_owned(),
         title: "Navigation".to_owned(),
-        question: "What does surer navigation cost, near the portal and far from it?".to_owned(),
+        question: "What does more certain navigation cost, near the portal and far from it?".to_owned(),
         error_axis: "abs(D - D_true), 95th percentile of the sections, m".to_owned(),
         cost_axis: "navigation, ns of CPU a second of dive".to_owned(),
         cost_unit: "ns a second of dive".to_owned(),

@@ -76,7 +76,7 @@ pub fn measure(inputs: &Inputs<'_>, progress: &mut dyn FnMut(&str)) -> Result<Tr
     Ok(Trade {
         name: "simulation".to_owned(),
         title: "Simulation".to_owned(),
-        question: "What does each effect cost, and what does leaving it out do to the results?".to_owned(),
+        question: "What does each simulated effect cost, and what changes without it?".to_owned(),
         error_axis: "change of D, mean over a scene's sections, m".to_owned(),
         cost_axis: "simulation, ns of CPU a return".to_owned(),
         cost_unit: "ns a return".to_owned(),
@@ -448,9 +448,9 @@ fn reasons(points: &[Point]) -> Vec<String> {
     };
     let rays = of_rays(1).zip(of_rays(USUAL_RAYS)).map(|(one, usual)| {
         format!(
-            "{USUAL_RAYS} rays stay the default where fewer change D no more: in the {} scene one ray is {} m off the D of {MANY_RAYS} and \
-             {USUAL_RAYS} are {} m, for {} ns a return in place of {}. Where a boulder's edge cuts a beam its rays alone find it, and D \
-             doesn't show it.",
+            "A beam has {USUAL_RAYS} rays by default. In the scene {}, D with one ray is {} m off D with {MANY_RAYS} rays; with {USUAL_RAYS} rays \
+             it is {} m off. They cost {} ns per return instead of {}. Only several rays find the edge of a boulder that cuts a beam, and D \
+             does not show that.",
             usual.scene.trim_end_matches(", rays"),
             number(one.error()),
             number(usual.error()),
@@ -465,8 +465,8 @@ fn reasons(points: &[Point]) -> Vec<String> {
     };
     let effects = (!left_out.is_empty()).then(|| {
         format!(
-            "All effects of a scene stay on where leaving one out changes no D: what an effect does depends on the scene. Of {} that were \
-             left out of one scene each time, {} surely change D by more than {UNCHANGED_M} m.",
+            "The influence of an effect depends on the scene. Of {} cases in which one effect was left out of a scene, {} certainly change D by \
+             more than {UNCHANGED_M} m.",
             left_out.len(),
             left_out.iter().filter(surely).count()
         )
@@ -481,17 +481,19 @@ fn advice(points: &[Point]) -> String {
         let found = point.errors.iter().find(|error| error.name == name);
         found.map_or(f64::NAN, |error| error.interval.middle)
     };
-    let most = left_out().max_by(|a, b| a.error().total_cmp(&b.error()));
+    // Where a whole dive has no D, its change is no number.
+    let is_known = |point: &&Point| figure(point, "change of D").is_finite();
+    let most = left_out().filter(is_known).max_by(|a, b| a.error().total_cmp(&b.error()));
     let within = |point: &&Point| point.errors.first().is_some_and(|error| error.interval.high < UNCHANGED_M);
     let idle = left_out().filter(within).max_by(|a, b| figure(a, "saved").total_cmp(&figure(b, "saved")));
     let most = most.map(|point| {
         let by_m = figure(point, "change of D");
-        format!("Leaving out `{}` changes D most, by {by_m:+.3} m ({}).", point.value, point.scene)
+        format!("Leaving out `{}` changes D most: by {by_m:+.3} m in the scene {}.", point.value, point.scene)
     });
     let idle = idle.map(|point| {
         let saved_ns = figure(point, "saved");
         format!(
-            "Of those that change D by less than 1 cm, `{}` costs most: {saved_ns:.0} ns a return ({}).",
+            "Of the effects that change D by less than 1 cm, `{}` costs most: {saved_ns:.0} ns per return in the scene {}.",
             point.value, point.scene
         )
     });

@@ -61,8 +61,8 @@ pub fn measure(inputs: &Inputs<'_>, progress: &mut dyn FnMut(&str)) -> Result<Tr
     let (reasons, advice) = (reasons(&points), advice(&points, calm_m));
     Ok(Trade {
         name: "sureness".to_owned(),
-        title: "The price of sureness".to_owned(),
-        question: "What does a less sure position, or more confidence, cost in hours?".to_owned(),
+        title: "Confidence and position error".to_owned(),
+        question: "What do more confidence and a less certain position cost in hours?".to_owned(),
         error_axis: "sigma of the displacement between passes, m".to_owned(),
         cost_axis: "hours for 7 km".to_owned(),
         cost_unit: "h".to_owned(),
@@ -156,8 +156,8 @@ fn reasons(points: &[Point]) -> Vec<String> {
     };
     let (Some(one), Some(usual)) = (passed(1), passed(USUAL)) else { return Vec::new() };
     vec![format!(
-        "Two sigma stay the default although one is cheaper: of sections over the target one sigma passes {} % (worst dive {} %), two pass {} % \
-         ({} %), and no more than 2.5 % may.",
+        "Two standard deviations are the default although one is cheaper. Of the sections over the target, {} % pass with one (worst dive \
+         {} %) and {} % with two ({} %). At most 2.5 % may.",
         number(one.middle),
         number(one.high),
         number(usual.middle),
@@ -175,8 +175,8 @@ fn advice(points: &[Point], calm_m: f64) -> String {
     };
     let [fine_m, coarse_m] = [0.01, 0.02];
     format!(
-        "In a calm dive (sigma {calm_m:.4} m) the second sigma costs {:.1} h of 7 km and the third {:.1} h more; at two sigma, a \
-         displacement known to {fine_m} m in place of {coarse_m} m saves {:.1} h.",
+        "In a calm dive (displacement between passes known to {calm_m:.4} m), a confidence of two standard deviations instead of one costs \
+         {:.1} h over 7 km, and three cost {:.1} h more. At two, a displacement known to {fine_m} m instead of {coarse_m} m saves {:.1} h.",
         hours(2, calm_m) - hours(1, calm_m),
         hours(3, calm_m) - hours(2, calm_m),
         hours(2, coarse_m) - hours(2, fine_m),

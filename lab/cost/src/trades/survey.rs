@@ -77,7 +77,8 @@ pub fn measure(inputs: &Inputs<'_>, progress: &mut dyn FnMut(&str)) -> Result<Tr
     Ok(Trade {
         name: "survey".to_owned(),
         title: "Survey: hours for a target".to_owned(),
-        question: "How many hours does a finer T cost, by heads, mode, layout and drift?".to_owned(),
+        question: "How many hours does a finer target cost, by number of heads, mode, head layout and drift?"
+            .to_owned(),
         error_axis: "T promised, m".to_owned(),
         cost_axis: "hours: there, back and a tenth again".to_owned(),
         cost_unit: "h".to_owned(),
@@ -108,8 +109,8 @@ fn quick_left_out() -> LeftOut {
 
 fn reasons(points: &[Point]) -> Vec<String> {
     let mut reasons = vec![format!(
-        "The way back is at {WAY_BACK_MPS} m/s, and {:.0} % of the way is gone over again at the planned speed; both are told apart from the \
-         way there in the table. Where a vehicle is off the middle, D_true is the largest of its places, up to five on all sides.",
+        "The hours are for the whole tunnel: there at the planned speed, {:.0} % of it again at that speed, and back at {WAY_BACK_MPS} m/s. \
+         survey.csv lists the three parts. For a vehicle off the middle, D_true is the largest of up to five positions.",
         100.0 * AGAIN_SHARE
     )];
     let shipped = points.iter().find(|point| point.is_default && point.scene == HEADS);
@@ -122,14 +123,14 @@ fn reasons(points: &[Point]) -> Vec<String> {
         && best.cost.middle < shipped.cost.middle
     {
         reasons.push(format!(
-            "The shipped file stays in {}, the mode of the paper's survey, whose finer step allows for more drift: {} h where {} takes {} h in the \
-             middle of the tunnel, but 1.5 m off it only {} in {} h keeps the target. Who keeps to the middle changes the mode, as `headrace plan` \
-             says.",
+            "The shipped file uses {}, the mode of the paper's survey, because its finer step tolerates more drift. It takes {} h; in the middle \
+             of the tunnel, `{}` takes {} h. At 1.5 m off the middle, only `{}` keeps the target, in {} h. `headrace plan` shows what your \
+             vehicle gains by another mode.",
             SHIPPED_MODE.to_uppercase(),
             number(shipped.cost.middle),
-            best.value,
+            best.value.trim_start_matches("target "),
             number(best.cost.middle),
-            far.value,
+            far.value.trim_start_matches("target "),
             number(far.cost.middle)
         ));
     }
@@ -151,7 +152,7 @@ fn broken(points: &[Point]) -> Option<String> {
         })
         .collect();
     (!broken.is_empty())
-        .then(|| format!("Promises that a simulated dive doesn't keep: {}.", broken.join("; ")))
+        .then(|| format!("Settings whose simulated dive exceeds the promised T: {}.", broken.join("; ")))
 }
 
 struct Survey<'a> {
@@ -409,11 +410,11 @@ fn advice(points: &[Point]) -> String {
     };
     let mut said = Vec::new();
     if let (Some(two_h), Some(four_h)) = (hours("two heads", 0.5), hours("four heads", 0.5)) {
-        said.push(format!("Four heads in place of two save {} h at 0.5 m.", number(two_h - four_h)));
+        said.push(format!("At a target of 0.5 m, four heads save {} h over two.", number(two_h - four_h)));
     }
     if let (Some(coarse_h), Some(fine_h)) = (hours("four heads", 0.5), hours("four heads", 0.4)) {
         said.push(format!(
-            "With four heads the decimetre from 0.5 to 0.4 m costs {} h, a metre from 0.5 m to 1 m saves {} h.",
+            "With four heads, a target of 0.4 m instead of 0.5 m costs {} h more; a target of 1 m saves {} h.",
             number(fine_h - coarse_h),
             number(coarse_h - hours("four heads", 1.0).unwrap_or(coarse_h))
         ));
@@ -423,7 +424,7 @@ fn advice(points: &[Point]) -> String {
         of_targets.sort_by(|a, b| a.error().total_cmp(&b.error()));
         if let [finest, .., coarsest] = of_targets.as_slice() {
             said.push(format!(
-                "{} m in place of {} m costs {} h.",
+                "A target of {} m instead of {} m costs {} h more.",
                 number(finest.error()),
                 number(coarsest.error()),
                 number(finest.cost.middle - coarsest.cost.middle)

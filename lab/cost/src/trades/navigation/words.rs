@@ -31,9 +31,9 @@ pub(super) fn reasons(points: &[Point]) -> Vec<String> {
     {
         let [usual, cable, direct] = [usual, cable, direct].map(|worst| worst.map(number));
         reasons.push(format!(
-            "The filter with sonar returns stays the default where something cheaper has the same displacement: where each does worst, it \
-             knows the place across to {} m, the cable alone to {} m and `direct` to {} m, and of displacements {} % lie within two of \
-             the sigmas that it tells, in place of {} and {} %. Without such a sigma no section may pass.",
+            "The filter with sonar returns is the default, even where a cheaper method knows the displacement as well. In its worst scene it \
+             knows the lateral position to {} m; the cable alone knows it to {} m and `direct` to {} m. Its displacements lie within two of its \
+             standard deviations in {} %, instead of {} and {} %. No section may pass without such a standard deviation.",
             usual[0], cable[0], direct[0], usual[1], cable[1], direct[1]
         ));
     }
@@ -45,8 +45,8 @@ pub(super) fn reasons(points: &[Point]) -> Vec<String> {
         (costs(SMOOTHED), costs(USUAL), worst(points, SMOOTHED), worst(points, USUAL))
     {
         reasons.push(format!(
-            "The smoother isn't the default: it needs the whole dive, and verdicts are said during it. It takes {} times the filter's time \
-             and knows the place across to {} m where it does worst, the filter to {} m.",
+            "The smoother needs the whole dive, so it cannot judge during one. It takes {} times the filter's time. In its worst scene it knows \
+             the lateral position to {} m, the filter to {} m.",
             number(smoothed_ns / usual_ns),
             number(smoothed[0]),
             number(usual[0])
@@ -59,12 +59,12 @@ pub(super) fn reasons(points: &[Point]) -> Vec<String> {
 pub(super) fn advice(points: &[Point], scene: &str) -> String {
     let of = |value: &str| points.iter().find(|point| point.scene == scene && point.value == value);
     let (Some(cable), Some(usual)) = (of(CABLE), of(USUAL)) else {
-        return "Without points there is nothing to advise.".to_owned();
+        return "No setting was measured.".to_owned();
     };
     let figure = |point: &Point, name: &str| figure(point, name).unwrap_or(f64::NAN);
     format!(
-        "{scene}: the filter with sonar returns knows the place across to {:.3} m instead of {:.2} m by the cable alone, and D to \
-         {:.3} m instead of {:.3} m, for {:.1} ms of CPU more a second of dive.",
+        "Use the sonar returns for navigation. In {scene} they reduce the error of the lateral position to {:.3} m from {:.2} m by cable \
+         alone, and the error of D to {:.3} m from {:.3} m, for {:.1} ms more CPU time per second of dive.",
         figure(usual, "position across"),
         figure(cable, "position across"),
         figure(usual, "abs(D - D_true), 95th percentile"),
