@@ -34,7 +34,7 @@ const DATA_LOST: u8 = 3;
 #[derive(Debug, Parser)]
 #[command(name = "headrace-campaign", version = program_version(), after_help = "\
 Tables: dives, sections, holes, flags, runs, sources, alerts; the same of another version as before_dives, ...; and the table \
-function replay(log, parameters [, table]). docs/how-to/replay-many-dives.md has their columns.
+function replay(log, parameters [, table]). docs/reference/dive-tables.md has their columns.
 
 Examples:
   headrace campaign dives/ --question worst --picture worst.svg

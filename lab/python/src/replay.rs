@@ -18,7 +18,7 @@ use crate::vehicle;
 /// Ctrl-C is looked for this often while a dive is replayed.
 const LOOK_EVERY: Duration = Duration::from_millis(100);
 
-/// The tables of one dive; docs/how-to/replay-many-dives.md has their columns.
+/// The tables of one dive; docs/reference/dive-tables.md has their columns.
 #[pyclass(frozen, module = "headrace")]
 pub(crate) struct Tables {
     tables: headrace_tables::Tables,

@@ -1,5 +1,5 @@
 //! A table as a list of columns: what each holds, and how its values are taken from a row of the report. Schemas, record batches
-//! and the page of `docs/how-to/replay-many-dives.md` are made from the same list.
+//! and the page of `docs/reference/dive-tables.md` are made from the same list.
 
 use std::fmt::Write as _;
 use std::sync::Arc;

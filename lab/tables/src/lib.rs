@@ -9,7 +9,7 @@
 //! # Ok::<(), headrace_tables::Error>(())
 //! ```
 //!
-//! `docs/how-to/replay-many-dives.md` describes the tables. The same log with the same parameters gives the same tables, bit for bit, on any machine.
+//! `docs/reference/dive-tables.md` describes the tables. The same log with the same parameters gives the same tables, bit for bit, on any machine.
 
 mod column;
 mod error;
@@ -177,7 +177,7 @@ pub fn unread(log: &str, sha256: &str, parameters: &Parameters, error: &str) -> 
     })
 }
 
-/// The tables and their columns as Markdown, as `docs/how-to/replay-many-dives.md` has them.
+/// The tables and their columns as Markdown, as `docs/reference/dive-tables.md` has them.
 pub fn described() -> String {
     let mut page = String::new();
     let begin = |page: &mut String, name: &str, about: &str| {

@@ -216,7 +216,7 @@ fn losses_and_unreadable_logs_are_rows() {
 /// The page has the tables as the code has them; `RENEW=1 cargo test -p headrace_tables` writes them anew.
 #[test]
 fn the_page_has_every_column() {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs/how-to/replay-many-dives.md");
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs/reference/dive-tables.md");
     let page = std::fs::read_to_string(&path).unwrap();
     let (before, rest) = page.split_once("<!-- tables -->\n").unwrap();
     let (there, after) = rest.split_once("<!-- end of tables -->").unwrap();
@@ -226,7 +226,7 @@ fn the_page_has_every_column() {
     } else {
         assert!(
             there == described(),
-            "docs/how-to/replay-many-dives.md differs from the code: RENEW=1 writes it anew"
+            "docs/reference/dive-tables.md differs from the code: RENEW=1 writes it anew"
         );
     }
 }
