@@ -1,4 +1,5 @@
-//! A set of heads in evidence: the list of their numbers in text formats such as JSON, the set itself in snapshots.
+//! Serialises a set of heads in evidence: as a list of numbers in text formats such as JSON, as bits in
+//! snapshots.
 
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 

@@ -75,7 +75,7 @@ proptest! {
 
     /// The window's search against brute force.
     #[test]
-    fn the_nearest_is_the_nearest(
+    fn window_finds_the_nearest_sample(
         samples in proptest::collection::vec((-3.0f64..4.0, 0.0f64..PERIMETER_M), 0..60),
         place in (0.0f64..1.0, -8.0f64..16.0),
         within_m in 0.05f64..3.0,
@@ -116,7 +116,7 @@ proptest! {
         }
     }
 
-    /// The same with packed samples: the bounds include their displacement.
+    /// Bounds also hold with packed samples: they include the displacement.
     #[test]
     fn verif_bounds_after_packing_hold(
         samples in proptest::collection::vec((-2.0f64..3.0, 0.0f64..PERIMETER_M), 1..14),
@@ -134,7 +134,7 @@ proptest! {
         prop_assert!(width_m > 0.0 && width_m < 1e-4, "{:?}", hole);
     }
 
-    /// The same with a cell so full that samples were thinned.
+    /// Bounds also hold with a cell so full that samples were thinned.
     #[test]
     fn verif_bounds_after_thinning_hold(
         crowd in proptest::collection::vec((0.0f64..0.4, 4.0f64..4.4), 200..500),
@@ -160,7 +160,7 @@ proptest! {
         );
     }
 
-    /// A small pipe: holes wider than its perimeter.
+    /// In a small pipe holes are wider than its perimeter.
     #[test]
     fn verif_a_pipe_narrower_than_its_holes(
         samples in proptest::collection::vec((-2.0f64..3.0, 0.0f64..1.1), 1..10),
@@ -220,7 +220,7 @@ fn one_sample_is_antipodal_to_its_hole() {
 }
 
 #[test]
-fn samples_on_a_line_and_repeated_and_all_in_one_place() {
+fn collinear_repeated_and_coincident_samples_give_the_right_hole() {
     let line: Vec<_> = (0..90).map(|i| (0.1, f64::from(i) * 0.1)).collect();
     let expected = brute_force(PERIMETER_M, &line[..20], 0.0, 0.25);
     let hole = largest(PERIMETER_M, &line[..20], 0.0, 0.25);
@@ -234,19 +234,19 @@ fn samples_on_a_line_and_repeated_and_all_in_one_place() {
 }
 
 #[test]
-fn spacings_of_a_nanometre_and_of_metres_in_one_set() {
+fn nanometre_and_metre_spacings_in_one_set_give_the_right_hole() {
     let mut samples: Vec<_> = (0..20).map(|i| (f64::from(i) * 1e-9, 3.0 + f64::from(i % 3) * 1e-9)).collect();
     samples.extend([(0.3, 6.0), (-0.4, 0.5), (0.2, 8.0)]);
     let few = [(0.0, 3.0), (0.3, 6.0), (-0.4, 0.5), (0.2, 8.0)];
     let hole = largest(PERIMETER_M, &samples, 0.0, 0.25);
     let expected = brute_force(PERIMETER_M, &few, 0.0, 0.25);
-    // The samples of a nanometre apart are one in what is expected.
+    // Samples a nanometre apart count as one in the expected value.
     found("holes.spacings", (hole.diameter_m - expected).abs(), 1e-7);
 }
 
-/// Far along the tunnel D is the same, to double precision there.
+/// Far along the tunnel D is the same, within double precision there.
 #[test]
-fn chainage_of_seven_and_of_a_thousand_kilometres() {
+fn hole_is_the_same_at_7_km_and_at_1000_km() {
     let samples: Vec<_> =
         (0..60).map(|i| (f64::from(i) * 0.05 - 1.0, (f64::from(i) * 2.3) % PERIMETER_M)).collect();
     let near = largest(PERIMETER_M, &samples, 0.0, 0.25).diameter_m;
@@ -306,7 +306,7 @@ fn val_reference_holes_of_ideal_helices() {
 }
 
 #[test]
-fn samples_of_earlier_visits_fill_no_hole_of_a_later_one() {
+fn samples_of_earlier_visits_do_not_fill_later_holes() {
     let grid = |off_m: f64| {
         (0..60).flat_map(move |i| {
             (0..20).map(move |k| (f64::from(i) * 0.1 + off_m, f64::from(k) * PERIMETER_M / 20.0))
@@ -326,9 +326,9 @@ fn samples_of_earlier_visits_fill_no_hole_of_a_later_one() {
     assert!(!none.bounded);
 }
 
-/// A hole that has grown, moved along or around, or lost what bounded it is another one.
+/// A hole that has grown, moved along or around, or become unbounded is a different one.
 #[test]
-fn a_hole_is_like_another_within_a_centimetre_in_every_respect() {
+fn holes_are_alike_within_a_centimetre_in_every_respect() {
     let hole = Hole { diameter_m: 0.6, least_m: 0.6, most_m: 0.6, x_m: 7.0, arc_m: 3.0, bounded: true };
     let little = Hole { diameter_m: 0.609, x_m: 6.991, arc_m: 3.009, ..hole };
     assert!(hole.is_like(&little) && little.is_like(&hole));
