@@ -171,17 +171,17 @@ pub struct LiveState {
     pub unsure: Option<Stretch>,
     /// All wall that heads see here has passed: it follows from chainage and verdicts.
     pub passed: bool,
-    /// On the way back for a missed stretch: how far, m.
+    /// Place to go back to for a missed stretch, m, while the vehicle is on its way there.
     pub back_to_m: Option<f64>,
     /// Alerts that hold.
     pub alerts: ActiveAlerts,
-    /// Sources that are profiling heads, by number.
+    /// Bitmask of the sources that are profiling heads.
     pub heads: u64,
-    /// Sources of the heads that turn.
+    /// Bitmask of the sources of turning heads.
     pub turning: u64,
-    /// Bits of the heads that turn and ping, and hear no wall.
+    /// Bitmask of the sources of heads that turn and ping without detecting the wall.
     pub deaf: u64,
-    /// Bits of the sources that repeat a reading.
+    /// Bitmask of the sources that repeat a reading.
     pub hung: u64,
     /// Number of sources.
     pub sources: u16,
@@ -196,7 +196,7 @@ stateful!(LiveState {
 });
 
 impl LiveState {
-    /// Before the first beat, in a tunnel of any length.
+    /// State before the first update, in a tunnel of any length.
     pub(super) fn new(target_m: f64, confidence_sd: f64, heads: u64, sources: u16) -> Self {
         Self {
             now: MonoNs(0),
@@ -226,7 +226,7 @@ impl LiveState {
         }
     }
 
-    /// The end of the tunnel, m, that no head is inside of; `None` where one may be.
+    /// End of the tunnel that all heads are beyond, m; `None` if a head may be inside.
     pub fn outside_m(&self) -> Option<f64> {
         let x_m = self.chainage_m?;
         let beyond = x_m > self.length_m + self.heads_reach_m;
@@ -234,22 +234,22 @@ impl LiveState {
         if beyond { Some(self.length_m) } else { before.then_some(0.0) }
     }
 
-    /// Whether the pilot is told to stand still rather than a speed, for the gyros' bias.
+    /// Whether the pilot is advised to stand still, for the gyros' bias, instead of a speed.
     pub fn asks_to_stand(&self) -> bool {
         self.condition() == Condition::CannotSay(PositionDoubt::Spread) && self.stand_s > 0
     }
 
-    /// How old it is; `None` before the first beat.
+    /// Age of the state; `None` before the first update.
     pub fn age(&self) -> Option<DurNs> {
         self.at.map(|at| DurNs(self.now.since(at).0.max(0)))
     }
 
-    /// Whether it is shown as old.
+    /// Whether it is shown as stale.
     pub fn is_old(&self) -> bool {
         self.age().is_some_and(|age| age.0 > OLD_AFTER.0)
     }
 
-    /// How long ago a source's last reading came; `None` if none has.
+    /// Age of a source's last reading; `None` if there is none.
     pub fn age_of(&self, source: usize) -> Option<DurNs> {
         self.heard.get(source).copied().flatten().map(|heard| DurNs(self.now.since(heard).0.max(0)))
     }
@@ -271,7 +271,7 @@ impl LiveState {
         }
     }
 
-    /// Sensors that have spoken and are silent, or never have, in the order of sources.
+    /// Sensors that never delivered a reading or are silent, in the order of sources.
     pub fn silent(&self) -> impl Iterator<Item = usize> + '_ {
         let is_silent =
             |source: &usize| matches!(self.sensor(*source), SensorState::Never | SensorState::Silent);
@@ -283,34 +283,34 @@ impl LiveState {
         (0..usize::from(self.sources)).filter(move |source| self.sensor(*source) == state)
     }
 
-    /// Whether a profiling head gives readings.
+    /// Whether a profiling head delivers readings.
     pub fn has_sonar(&self) -> bool {
         let is_heard = |source: usize| self.age_of(source).is_some_and(|age| age.0 <= OLD_AFTER.0);
         (0..usize::from(self.sources)).any(|source| self.heads >> source & 1 == 1 && is_heard(source))
     }
 
-    /// The largest speed advised, m/s; `None` where none can be.
+    /// Largest speed advised, m/s; `None` if there is none.
     pub fn v_max_mps(&self) -> Option<f64> {
         let advice = self.advice.as_ref().filter(|advice| advice.reason == Reason::HelixPitch)?;
         Some(advice.v_max_mps).filter(|v_max_mps| *v_max_mps >= LEAST_MPS)
     }
 
-    /// Share of returns that are lost, where making up for them takes a fifth of the speed or more; else `None`.
+    /// Share of lost returns if compensating for them costs at least a fifth of the speed, otherwise `None`.
     pub fn lost_share(&self) -> Option<f64> {
-        /// Share of the speed that is left.
+        /// Share of the speed that remains.
         const LEFT: f64 = 0.8;
         let advice = self.advice.as_ref().filter(|_| self.v_max_mps().is_some())?;
         let margins = advice.margins?;
         (margins.losses_mps < LEFT * margins.position_mps).then_some(advice.lost_share)
     }
 
-    /// Bits of the kinds of alerts that hold.
+    /// Bitmask of the kinds of alerts that hold.
     pub(super) fn alert_bits(&self) -> u64 {
         self.alerts.iter().flatten().fold(0, |bits, alert| bits | 1 << alert.kind as u64)
     }
 }
 
-/// Bits of the heads' sources, of those of the heads in a set, by number.
+/// Bitmask of the sources of the heads in a set, which are given by number.
 pub(super) fn source_bits(sources: impl Iterator<Item = SourceId>, of: HeadSet) -> u64 {
     let numbered = sources.enumerate().filter(|(head, _)| of.has(*head));
     numbered.fold(0, |bits, (_, source)| bits | 1 << u64::from(source.0 % 64))

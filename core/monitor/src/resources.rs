@@ -1,4 +1,4 @@
-//! State of the dive not tied to one sensor: the tunnel, the target, the coverage of the wall, and counts.
+//! State of the dive that isn't tied to one sensor: tunnel, target, coverage of the wall, and counts.
 
 use bevy_ecs::entity::Entity;
 use bevy_ecs::prelude::Resource;
@@ -16,7 +16,7 @@ use headrace_geometry::tunnel::Profile;
 use headrace_sampling::layout::HeadLayout;
 use headrace_sensor::reading::SourceId;
 
-/// The tunnel as designed, and its water.
+/// Tunnel as designed, and its water.
 #[derive(Debug, Clone, Resource)]
 pub struct TunnelDesign {
     /// Design profile.
@@ -27,7 +27,7 @@ pub struct TunnelDesign {
     pub length_m: f64,
     /// Samples farther than this from the design profile contradict it, m.
     pub contradiction_m: f64,
-    /// What is taken for wall.
+    /// Limits for accepting returns as wall.
     pub limits: WallLimits,
 }
 
@@ -38,13 +38,13 @@ pub struct Target {
     pub target_m: f64,
     /// Arrangement of the heads: phase shift or sector offset.
     pub layout: HeadLayout,
-    /// Speed for which the heads are put in phase, m/s; zero if none is planned.
+    /// Speed for which the heads are set in phase, m/s; zero if none is planned.
     pub planned_speed_mps: f64,
-    /// What other settings of the heads would change.
+    /// Changes that other settings of the heads would bring.
     pub(super) other: OtherSettings,
 }
 
-/// The vehicle's entity, that of each sensor by source, and that of each head by number.
+/// Entities of the vehicle, of each sensor by source, and of each head by number.
 #[derive(Debug, Clone, Resource)]
 pub struct VehicleEntities {
     pub(super) vehicle: Entity,
@@ -58,7 +58,7 @@ impl VehicleEntities {
         core::iter::once(self.vehicle).chain(self.by_source.iter().copied())
     }
 
-    /// The sensor that a source's bytes come from.
+    /// Sensor that a source's bytes come from.
     pub fn of_source(&self, source: SourceId) -> Option<Entity> {
         self.by_source.get(source.index()).copied()
     }

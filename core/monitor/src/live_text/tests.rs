@@ -12,7 +12,7 @@ fn status(state: &LiveState) -> PilotLine {
     status_line(state, &profile, &two(), &|source| ["sonar_0", "sonar_1", "tether"][source].to_owned())
 }
 
-/// What there is to show, as states.
+/// States that cover everything shown.
 fn states() -> Vec<LiveState> {
     let good = test_state();
     let speed = |mps: f64| {
@@ -51,7 +51,7 @@ fn states() -> Vec<LiveState> {
 }
 
 #[test]
-fn the_status_at_sixty_columns_and_whole() {
+fn status_at_60_columns_and_in_full() {
     let lines = |columns: usize| states().iter().map(|state| status(state).cut(columns)).collect::<Vec<_>>();
     let narrow = lines(60);
     assert!(narrow.iter().all(|line| line.chars().count() <= 60));
@@ -77,18 +77,18 @@ fn stretch(why: Unsure) -> UnsureStretch {
     }
 }
 
-/// What is too fast doesn't read like what is told.
+/// A speed over the limit doesn't read like the limit.
 #[test]
-fn a_speed_that_is_over_another_reads_like_another() {
+fn speed_over_the_limit_reads_differently_from_it() {
     assert_eq!(speed_decimals(Some(0.104), Some(0.098)), 3);
     assert_eq!(speed_decimals(Some(0.098), Some(0.104)), 2, "it is within");
     assert_eq!(speed_decimals(Some(0.12), Some(0.098)), 2);
     assert_eq!(speed_decimals(None, Some(0.1)), 2);
 }
 
-/// Slower isn't always better: below the speed that the heads are in phase for, they are out of it.
+/// Slower isn't always better: below their planned speed the heads are out of phase.
 #[test]
-fn what_helps_an_unsure_stretch_is_the_speed_that_fits() {
+fn fitting_speed_helps_an_unsure_stretch() {
     let helps = |speed_mps: f64, fits_mps: f64, is_uneven: bool| {
         let driven = Driven { speed_mps, fits_mps, is_uneven, is_short: false };
         helps_text(&UnsureStretch { driven, ..stretch(Unsure::Position) })
@@ -114,7 +114,7 @@ fn what_helps_an_unsure_stretch_is_the_speed_that_fits() {
 }
 
 #[test]
-fn what_cannot_be_said_is_told_with_why_and_what_helps() {
+fn unsure_stretch_is_shown_with_reason_and_remedy() {
     let profile = shapes::circle(3.0).unwrap();
     let mut text = String::new();
     for why in Unsure::ALL {
@@ -132,7 +132,7 @@ fn what_cannot_be_said_is_told_with_why_and_what_helps() {
 }
 
 #[test]
-fn a_line_is_broken_between_words_and_what_to_do_begins_anew() {
+fn line_breaks_between_words_and_before_the_action() {
     let line = PilotLine {
         place: "0+014.25".to_owned(),
         speed: String::new(),
@@ -153,7 +153,7 @@ fn a_line_is_broken_between_words_and_what_to_do_begins_anew() {
 }
 
 #[test]
-fn on_a_narrow_screen_what_to_do_stays_and_why_goes() {
+fn narrow_screen_keeps_the_action_and_drops_the_reason() {
     let line = PilotLine {
         place: "0+039.06".to_owned(),
         speed: "0.09 m/s".to_owned(),
