@@ -129,7 +129,7 @@ mod tests {
         for _ in 0..40 {
             rock.add(&profile, (point, profile.arc_of(point)), None, 0.5);
         }
-        assert!(!rock.contradicts(), "a heap on the floor isn't another tunnel");
+        assert!(!rock.contradicts(), "a heap on the floor doesn't contradict the profile");
         assert!((rock.extremes_m().unwrap()[0] + 1.0).abs() < 1e-9);
     }
 

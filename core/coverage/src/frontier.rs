@@ -427,7 +427,7 @@ mod tests {
         frontier.advance(0, MonoNs(0), 1.7, 0.25, 0.25);
         assert_eq!([1.0, 1.7, 2.5].map(|x_m| clear(&frontier, x_m) > 0.5), [false, false, true]);
         let silent = clear_of(frontier.to_come(MonoNs(3_000_000_000)), 2.5);
-        assert!(silent > 0.5, "where nobody is alive all are waited for, where they were last");
+        assert!(silent > 0.5, "with no head alive, all are awaited at their last place");
     }
 
     #[test]
@@ -478,7 +478,7 @@ mod tests {
         );
         assert_eq!(frontier.frontier.way(), Some(Reach { from_m: 2.5, to_m: 5.5 }));
         assert!(moved.way_grown && !moved.is_nothing());
-        assert!(frontier.beat(13, 5.1).is_nothing(), "still in the same section");
+        assert!(frontier.beat(13, 5.1).is_nothing(), "the vehicle is still in the same section");
     }
 
     #[test]
@@ -486,12 +486,12 @@ mod tests {
         let mut frontier = Fixture::default();
         frontier.ping(0, 0, 3.5);
         frontier.ping(1, 0, 2.5);
-        assert!(frontier.beat(1, 3.5).left_behind.is_empty(), "it isn't known yet that they are silent");
+        assert!(frontier.beat(1, 3.5).left_behind.is_empty(), "their silence isn't known yet");
         // The rear head would be at 6: [5.5, 5.75) is behind it by a quarter of a metre.
         assert_eq!(frontier.beat(3, 6.5).left_behind, 9..23);
         let to_come = frontier.to_come(MonoNs(3_000_000_000));
         assert_eq!(to_come, Some(Reach { from_m: 6.0, to_m: f64::INFINITY }));
-        assert_eq!(frontier.beat(4, 5.5).left_ahead, 25..29, "going back it leaves what lies ahead");
+        assert_eq!(frontier.beat(4, 5.5).left_ahead, 25..29, "going back leaves sections ahead");
     }
 
     #[test]
@@ -500,7 +500,7 @@ mod tests {
         let at = |x_m: f64| Reach { from_m: x_m - 0.5, to_m: x_m + 0.5 };
         assert_eq!((frontier.through(), frontier.not_passed()), (None, None));
         frontier.pass(at(3.0));
-        assert_eq!(frontier.through(), None, "they are a metre apart");
+        assert_eq!(frontier.through(), None, "the heads are a metre apart");
         assert_eq!(frontier.not_passed(), Some(Reach { from_m: f64::NEG_INFINITY, to_m: 3.5 }));
         for x_m in [4.0, 9.0, 8.5] {
             frontier.pass(at(x_m));
@@ -522,6 +522,6 @@ mod tests {
         frontier.ping(0, 7, 4.5);
         frontier.ping(0, 8, 4.5);
         let moved = frontier.ping(0, 9, 4.5);
-        assert_eq!(moved.left_behind, 13..17, "the other one stays silent, and isn't waited for any more");
+        assert_eq!(moved.left_behind, 13..17, "the other one stays silent and is no longer awaited");
     }
 }

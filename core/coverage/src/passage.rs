@@ -245,11 +245,11 @@ mod tests {
         };
         let is_slow = |drive: Drive| drive.is_slow_out_of_phase(1.07);
         assert!(is_slow(slow));
-        assert!(!is_slow(Drive { planned_gap_s: 2.5, ..slow }), "heads were started wrongly");
-        assert!(!is_slow(Drive { planned_gap_s: 3.2, ..slow }), "slower, passes are no farther apart");
+        assert!(!is_slow(Drive { planned_gap_s: 2.5, ..slow }), "the heads were started wrongly");
+        assert!(!is_slow(Drive { planned_gap_s: 3.2, ..slow }), "passes are no farther apart when slower");
         assert!(!is_slow(Drive { speed_mps: 0.1, ..slow }), "as planned");
-        assert!(!is_slow(Drive { fits_mps: 0.06, ..slow }), "the planned speed doesn't meet the target");
-        assert!(!is_slow(Drive { planned_mps: 0.0, ..slow }), "nothing is planned");
+        assert!(!is_slow(Drive { fits_mps: 0.06, ..slow }), "the planned speed must meet the target");
+        assert!(!is_slow(Drive { planned_mps: 0.0, ..slow }), "no speed is planned");
     }
 
     #[test]

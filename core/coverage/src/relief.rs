@@ -266,6 +266,6 @@ mod tests {
         let mut relief = Relief::default();
         relief.believe(1, false);
         relief.believe(1, true);
-        assert_eq!(relief.distrusted, 0, "it is believed again");
+        assert_eq!(relief.distrusted, 0, "the head is trusted again");
     }
 }

@@ -106,7 +106,7 @@ pub enum Judgement {
 }
 
 /// One section.
-#[expect(clippy::struct_excessive_bools, reason = "they are independent of one another")]
+#[expect(clippy::struct_excessive_bools, reason = "the flags are independent of one another")]
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct Section {
     /// Current verdict.

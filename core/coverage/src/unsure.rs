@@ -177,7 +177,7 @@ mod tests {
     fn unsure_neighbours_within_2_m_are_one_stretch() {
         let mut stretch = one(Unsure::Position, 10, 0.4);
         assert!(stretch.join(&one(Unsure::Position, 11, 0.6), 0.25));
-        assert!(stretch.join(&one(Unsure::Position, 1, 0.5), 0.25), "eight sections lie between");
+        assert!(stretch.join(&one(Unsure::Position, 1, 0.5), 0.25), "eight sections lie between them");
         assert!(!stretch.join(&one(Unsure::Position, 21, 0.5), 0.25), "nine");
         assert!(!stretch.is_beyond(20..21, 0.25) && stretch.is_beyond(21..22, 0.25));
         assert!(!stretch.is_beyond(-8..-7, 0.25) && stretch.is_beyond(-9..-8, 0.25));
@@ -196,7 +196,10 @@ mod tests {
         assert!(stretch.is_mostly_error());
         let third =
             |hole_m: f64| Stretch::one(Unsure::Position, 0, [hole_m, 0.3 * hole_m, 0.1], Driven::default());
-        assert!(third(1.0).is_mostly_error() && third(0.2).is_mostly_error(), "whatever the hole's size");
+        assert!(
+            third(1.0).is_mostly_error() && third(0.2).is_mostly_error(),
+            "whatever the size of the hole"
+        );
         assert!(stretch.join(&one(Unsure::Position, 1, 0.5), 0.25));
         assert!(stretch.join(&one(Unsure::Position, 2, 0.49), 0.25));
         assert!(!stretch.is_mostly_error());

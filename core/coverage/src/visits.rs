@@ -147,8 +147,8 @@ mod tests {
         };
         assert_eq!(flags(&[]), (0, false, false));
         assert_eq!(flags(&[(3, 1, 0), (3, 1, 9)]), (3, false, false), "one visit");
-        assert_eq!(flags(&[(3, 1, 0), (4, 1, 60)]), (4, true, false), "it turned back");
-        assert_eq!(flags(&[(3, 1, 0), (4, 2, 60)]), (4, true, true), "navigation broke off");
+        assert_eq!(flags(&[(3, 1, 0), (4, 1, 60)]), (4, true, false), "the vehicle turned back");
+        assert_eq!(flags(&[(3, 1, 0), (4, 2, 60)]), (4, true, true), "navigation was interrupted");
         let mut visits = after(&[(3, 1, 0), (4, 2, 60)]);
         visits.keep_newest();
         assert_eq!((visits.first(), visits.are_several(), visits.are_unrelated()), (4, false, false));
@@ -159,7 +159,7 @@ mod tests {
     #[test]
     fn error_between_visits_grows_with_the_time_between() {
         let sd_m = |gap_s: u64| after(&[(3, 1, 0), (4, 1, gap_s)]).sd_m(0.0);
-        assert!(sd_m(20) > 0.0 && (sd_m(10) - sd_m(20)).abs() < 1e-12, "as of one pass");
+        assert!(sd_m(20) > 0.0 && (sd_m(10) - sd_m(20)).abs() < 1e-12, "equal to that of one pass");
         assert!(
             sd_m(30) > 1.5 * sd_m(20) && sd_m(40) > 1.2 * sd_m(30),
             "{} {} {}",
@@ -169,6 +169,6 @@ mod tests {
         );
         assert!((sd_m(40) / sd_m(20) - 10.0).abs() < 1e-9 && (sd_m(900) - sd_m(40)).abs() < 1e-12);
         assert!((after(&[(3, 1, 0), (3, 1, 900)]).sd_m(0.02) - 0.02).abs() < 1e-12, "one visit");
-        assert!((after(&[(3, 1, 0), (4, 1, 10)]).sd_m(0.5) - 0.5).abs() < 1e-12, "the newest is worse");
+        assert!((after(&[(3, 1, 0), (4, 1, 10)]).sd_m(0.5) - 0.5).abs() < 1e-12, "the newest visit is worse");
     }
 }

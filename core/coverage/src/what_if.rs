@@ -136,6 +136,6 @@ mod tests {
         }
         seen.sections.get_mut(15).unwrap().suspect = true;
         assert_eq!(of(&seen, 15, hole_m + 0.11), Verdict::CannotSay);
-        assert_eq!(of(&seen, 15, hole_m - 0.11), Verdict::Fail, "a fail is one");
+        assert_eq!(of(&seen, 15, hole_m - 0.11), Verdict::Fail, "a fail stays a fail");
     }
 }

@@ -103,7 +103,7 @@ mod tests {
         }
         assert_eq!(log.entries.capacity(), room);
         assert!(log.entries.len() > AdviceLog::CAPACITY / 2 - 1, "{}", log.entries.len());
-        assert!(log.dropped > 0, "what is left out is counted");
+        assert!(log.dropped > 0, "dropped entries are counted");
         let apart_s = log.entries.windows(2).map(|two| two[1].at.since(two[0].at).as_secs_f64());
         assert!(apart_s.fold(0.0, f64::max) < 12.0);
         assert_eq!(log.entries[0].at, MonoNs(0));

@@ -120,7 +120,7 @@ impl ConsoleInput {
     fn put(&mut self, at: MonoNs, command: &Command) {
         let text = command.to_json();
         if let Err(error) = self.port.send(at, text.as_bytes()) {
-            tracing::error!(%error, "a command could not be handed to the loop");
+            tracing::error!(%error, "sending a command to the loop failed; the command is lost");
         }
     }
 }

@@ -17,7 +17,9 @@ pub enum PluginError {
         id: String,
     },
     /// A required source is missing.
-    #[error("arming the loop: water.sound_speed_from = {id:?}: no source has that id; name one of the sources")]
+    #[error(
+        "arming the loop: water.sound_speed_from = {id:?}: no source has that id; name one of the sources"
+    )]
     MissingSource {
         /// The id.
         id: String,

@@ -161,10 +161,10 @@ mod tests {
             !elsewhere.is_deaf([does_not.elsewhere()].into_iter()),
             "the position or the design is wrong"
         );
-        assert!(!elsewhere.is_deaf(std::iter::empty()), "a single head");
+        assert!(!elsewhere.is_deaf(std::iter::empty()), "there is no other head");
         assert!(!hears.is_deaf([hears.elsewhere()].into_iter()));
         let begins = hearing(100, |_| Some(true));
-        assert!(!elsewhere.is_deaf([begins.elsewhere()].into_iter()), "nothing is known of the other yet");
+        assert!(!elsewhere.is_deaf([begins.elsewhere()].into_iter()), "the other head isn't known yet");
         // A rock and a niche of a third of the turn.
         let rock = hearing(4000, |ping| Some(ping % 400 >= 130));
         assert!(!rock.is_deaf([hears.elsewhere()].into_iter()));

@@ -206,7 +206,7 @@ mod tests {
         let found = [resources(world), components(world)].concat();
         let sorted = [&parts[..], &no_state, &bevys_own].concat();
         let unsorted = found.iter().filter(|id| !sorted.contains(id)).count();
-        assert_eq!(unsorted, 0, "of {}; the rest are saved, or no state", found.len());
+        assert_eq!(unsorted, 0, "unlisted of {}; the rest are saved, or listed as no state", found.len());
         assert!(parts.iter().all(|part| found.contains(part)));
     }
 

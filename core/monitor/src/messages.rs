@@ -153,7 +153,7 @@ pub struct PlacedPing {
 
 /// An output item of [`super::stage::Stage::Georeference`].
 #[derive(Debug, Clone, Copy, PartialEq)]
-#[expect(clippy::large_enum_variant, reason = "a list that is filled once and read once a tick")]
+#[expect(clippy::large_enum_variant, reason = "the list is filled once and read once per tick")]
 pub enum Placed {
     /// A ping.
     Ping(PlacedPing),
@@ -198,7 +198,7 @@ pub struct Requests(pub Vec<Request>);
 
 /// A result for the outlets.
 #[derive(Debug, Clone, Copy, PartialEq)]
-#[expect(clippy::large_enum_variant, reason = "copied into room that is there already; a box would allocate")]
+#[expect(clippy::large_enum_variant, reason = "copied into preallocated room; a box would allocate")]
 pub enum Notice {
     /// A section's verdict, hole or flag has changed.
     Section {

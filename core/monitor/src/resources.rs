@@ -63,7 +63,7 @@ impl VehicleEntities {
         self.by_source.get(source.index()).copied()
     }
 
-    /// The head of this number, from zero in the order of sources.
+    /// Head with this number, from zero in the order of sources.
     pub fn of_head(&self, head: usize) -> Option<Entity> {
         self.heads.get(head).copied()
     }
@@ -76,21 +76,21 @@ pub struct Coverage {
     pub store: SampleStore,
     /// Verdicts.
     pub sections: Sections,
-    /// Where samples may still land.
+    /// Stretch where samples may still land.
     pub frontier: Frontier,
     /// Samples by node of a square grid.
     pub soundings: Soundings,
-    /// Where the wall was found off the design near the vehicle.
+    /// Places near the vehicle where the wall was found off the design.
     pub relief: Relief,
-    /// The unsure stretch that was judged last.
+    /// Last judged unsure stretch.
     pub unsure: Option<Stretch>,
-    /// The latest samples that are lacking.
+    /// Latest missing samples.
     pub lacks: Lacks,
 }
 
 stateful!(Coverage { state: store, sections, frontier, soundings, relief, unsure, lacks; });
 
-/// The search for holes with its working memory.
+/// Search for holes, with its working memory.
 #[derive(Debug, Default, Resource)]
 pub struct Finder(pub HoleFinder);
 
@@ -104,10 +104,10 @@ impl Stateful for Finder {
     }
 }
 
-/// The result streams with their digests, which together give the dive's.
+/// Result streams with their digests, which together give the dive's digest.
 #[derive(Debug, Default, Resource)]
 pub struct Digests {
-    /// Poses at the beats.
+    /// Poses at the updates.
     pub poses: ResultStream,
     /// Placed pings.
     pub pings: ResultStream,
@@ -115,7 +115,7 @@ pub struct Digests {
     pub judgements: ResultStream,
     /// Advice.
     pub advice: ResultStream,
-    /// The live state at the beats.
+    /// Live states at the updates.
     pub states: ResultStream,
     /// Changes of alerts, and notes.
     pub alerts: ResultStream,
@@ -124,7 +124,7 @@ pub struct Digests {
 stateful!(Digests { state: poses, pings, judgements, advice, states, alerts; });
 
 impl Digests {
-    /// The streams by name, in log order.
+    /// Streams by name, in log order.
     pub fn streams(&self) -> [(&'static str, &ResultStream); 6] {
         [
             ("poses", &self.poses),
@@ -165,15 +165,15 @@ pub struct Tally {
     pub span: Option<(MonoNs, MonoNs)>,
     /// Samples on the wall.
     pub samples: u64,
-    /// Pings without a return where the wall was within range, or without a fix.
+    /// Pings without a return although the wall was within range, or without a fix.
     pub missing: u64,
-    /// Pings without a return where the wall was out of range.
+    /// Pings without a return because the wall was out of range.
     pub out_of_range: u64,
     /// Pings occluded by the vehicle.
     pub occluded: u64,
     /// Returns without a fix.
     pub unplaced: u64,
-    /// Of these, by reason, in the order of [`NoFix::ALL`].
+    /// Returns without a fix by reason, in the order of [`NoFix::ALL`].
     pub lacking: [u64; NoFix::ALL.len()],
     /// Pings without a fix, with or without a return.
     pub without_fix: u64,
@@ -181,15 +181,15 @@ pub struct Tally {
     pub outside: u64,
     /// Samples not stored for lack of room.
     pub not_stored: u64,
-    /// Returns not taken for wall.
+    /// Returns not accepted as wall.
     pub doubtful: u64,
 }
 
 /// The current tick.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Resource, Serialize, Deserialize)]
 pub struct TickTime {
-    /// Its number, from zero.
+    /// Number from zero.
     pub index: u64,
-    /// Its end.
+    /// End of its time.
     pub now: MonoNs,
 }

@@ -87,7 +87,7 @@ fn named(wall: &Wall) -> Vec<Cause> {
     }
     let mut finder = HoleFinder::default();
     let hole = finder.largest(&store, BOUNDS_M.0, BOUNDS_M.1);
-    assert!(hole.diameter_m > TARGET_M, "the section fails: {hole:?}");
+    assert!(hole.diameter_m > TARGET_M, "the section has to fail: {hole:?}");
     let case = Case {
         hole: &hole,
         bounds_m: BOUNDS_M,
@@ -244,7 +244,7 @@ fn speed_with_losses_fits_all_passes_needed() {
     assert!((drive.with_losses_mps(1.0) - 0.19).abs() < 1e-12);
     // 0.4 m over 1.5 passes of 2 s and a ping.
     assert!((drive.with_losses_mps(1.5) - 0.4 / 3.02).abs() < 1e-12);
-    assert!((drive.with_losses_mps(1.01) - 0.19).abs() < 1e-12, "no faster than without losses");
+    assert!((drive.with_losses_mps(1.01) - 0.19).abs() < 1e-12, "not faster than without losses");
 }
 
 /// The times between passes with factors removed lie between the measured ones: as scheduled, without stalls,
@@ -307,9 +307,15 @@ fn removing_too_fast_gives_the_largest_fitting_speed() {
     let slowed_mps = |drive: Drive| drive.without(Causes::of(Cause::TooFast), 0.5, true).speed_mps;
     // A pass takes 2 s, and a ping follows it.
     assert!((slowed_mps(drive) - 0.4 / 2.02).abs() < 1e-9, "{}", slowed_mps(drive));
-    assert!((slowed_mps(Drive { fits_mps: 0.1, ..drive }) - 0.1).abs() < 1e-9, "hidden wall takes more");
+    assert!(
+        (slowed_mps(Drive { fits_mps: 0.1, ..drive }) - 0.1).abs() < 1e-9,
+        "hidden wall needs a lower speed"
+    );
     assert!((slowed_mps(Drive { fits_mps: 0.35, ..drive }) - 0.4 / 2.02).abs() < 1e-9);
-    assert!((slowed_mps(Drive { speed_mps: 0.15, ..drive }) - 0.15).abs() < 1e-9, "it wasn't too fast");
+    assert!(
+        (slowed_mps(Drive { speed_mps: 0.15, ..drive }) - 0.15).abs() < 1e-9,
+        "the vehicle wasn't too fast"
+    );
     // If steps leave nothing, three tenths of the target remain.
     let coarse = Drive { t_y_m: 0.6, middle_t_y_m: 0.6, ..drive };
     assert!((slowed_mps(coarse) - 0.15 / 2.02).abs() < 1e-9, "{}", slowed_mps(coarse));

@@ -69,7 +69,7 @@ proptest! {
         let expected = brute_force(PERIMETER_M, &samples, 0.0, 0.5);
         prop_assert!((hole.diameter_m - expected).abs() < 1e-9, "{} and {}", hole.diameter_m, expected);
         let at_centre = 2.0 * nearest_m(PERIMETER_M, &samples, (hole.x_m, hole.arc_m));
-        prop_assert!((at_centre - hole.diameter_m).abs() < 1e-9, "its centre is where it says");
+        prop_assert!((at_centre - hole.diameter_m).abs() < 1e-9, "the stated centre has the stated distance");
         prop_assert!(hole.least_m <= hole.diameter_m && hole.most_m - hole.least_m < 1e-9, "{:?}", hole);
     }
 
@@ -90,7 +90,7 @@ proptest! {
                 prop_assert!((math::sqrt(found.distance2) - expected).abs() < 1e-12);
                 let image_m = found.arc_m + found.turns * PERIMETER_M - place.1;
                 let by_image_m = math::hypot(found.x_m - place.0, image_m);
-                prop_assert!((by_image_m - expected).abs() < 1e-12, "its image is the near one");
+                prop_assert!((by_image_m - expected).abs() < 1e-12, "the image must be the near one");
             }
             (found, expected) => prop_assert_eq!(found.is_some(), expected.is_some()),
         }

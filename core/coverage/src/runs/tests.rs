@@ -66,14 +66,17 @@ impl Rig {
             assert_eq!(run.cleared.is_some(), members.is_empty());
             let (Some(first), Some(last)) = (members.first(), members.last()) else { continue };
             assert_eq!((run.from, run.to), (*first, *last + 1));
-            assert!(members.windows(2).all(|pair| pair[1] - pair[0] <= 3), "run {number} has fallen apart");
+            assert!(
+                members.windows(2).all(|pair| pair[1] - pair[0] <= 3),
+                "run {number} has a gap that is too wide"
+            );
             let largest = members
                 .iter()
                 .map(|index| self.holes[usize::try_from(index + 5).unwrap()])
                 .fold(0.0, f64::max);
             assert!((run.worst.1.diameter_m - largest).abs() < 1e-12);
             for other in last + 1..=(last + 3).min(COUNT - 6) {
-                assert!(self.runs.of(other).is_none(), "run {number} and its neighbour");
+                assert!(self.runs.of(other).is_none(), "run {number} must include its neighbour");
             }
             let having =
                 |cause: Cause| members.iter().filter(|index| causes(**index).unwrap().has(cause)).count();
@@ -125,7 +128,7 @@ fn run_has_its_most_frequent_cause_and_names_the_next() {
     let run = |rig: &Rig| *rig.runs.get(RunId(0)).unwrap();
     rig.say(0, Some(Cause::Occluded), 1.0);
     rig.say(1, Some(Cause::TooFast), 1.0);
-    assert_eq!(run(&rig).cause, Cause::Occluded, "the first of two that are as frequent");
+    assert_eq!(run(&rig).cause, Cause::Occluded, "the first of two equally frequent causes");
     rig.say_all(2, Some(Causes::of(Cause::TooFast).with(Cause::Phase)), 1.0);
     assert_eq!(run(&rig).cause, Cause::TooFast);
     assert_eq!(run(&rig).causes(), [Cause::TooFast, Cause::Phase, Cause::Occluded]);
@@ -133,7 +136,7 @@ fn run_has_its_most_frequent_cause_and_names_the_next() {
     for section in 3..22 {
         rig.say(section, Some(Cause::TooFast), 1.0);
     }
-    assert_eq!(run(&rig).named(), Causes::of(Cause::TooFast), "one of 22 isn't named");
+    assert_eq!(run(&rig).named(), Causes::of(Cause::TooFast), "a cause of one section in 22 isn't named");
     // All sections are judged again.
     for section in 1..22 {
         rig.say(section, Some(Cause::HeadSilent), 1.0);

@@ -207,9 +207,9 @@ mod tests {
         };
         let way = Some(Reach { from_m: 0.1, to_m: 2.9 });
         assert_eq!(asked(None, way), [], "it moves");
-        assert_eq!(asked(Some(8..12), None), [], "it has been nowhere");
+        assert_eq!(asked(Some(8..12), None), [], "the vehicle has no coverage extent");
         assert_eq!(asked(Some(8..12), way), [(8, true), (9, true), (10, false)]);
-        assert_eq!(asked(Some(8..40), way), [(8, true), (9, true)], "nothing has come since");
+        assert_eq!(asked(Some(8..40), way), [(8, true), (9, true)], "no samples since");
     }
 
     /// Requests when the heads have left 2.5 to 3 m and samples may land from 3.25 m on: section index, and
@@ -260,11 +260,11 @@ mod tests {
         let mut expected: Vec<_> = (4..12).map(|index| (index, false)).collect();
         expected.extend([(12, true), (15, true)]);
         assert_eq!(found, expected);
-        assert_eq!(alone(10, |_| {}), [], "it has been judged, and nothing has come since");
+        assert_eq!(alone(10, |_| {}), [], "the section has been judged, and no samples came since");
         assert_eq!(alone(10, |section| section.stale = true)[0], (10, false));
         assert_eq!(alone(10, |section| section.not_inspected = true)[0], (10, false));
         assert_eq!(alone(10, |section| section.hole = None), [(10, false)]);
-        assert_eq!(alone(9, |section| section.stale = true), [], "it was left before");
+        assert_eq!(alone(9, |section| section.stale = true), [], "the section was left before");
     }
 
     /// The part of a large hole out of reach, twice as far as its centre, may already be too large. A hole
@@ -283,8 +283,8 @@ mod tests {
         assert_eq!(at(2.0, 2.9, 0.0, open, false), [(9, false)], "0.7 m of it");
         assert_eq!(at(2.0, 2.9, 0.15, open, false), [(9, true)], "0.4 m for certain");
         assert_eq!(at(2.0, 3.1, 0.0, open, false), [(9, true)], "0.3 m of it");
-        assert_eq!(at(2.0, 2.9, 0.0, Verdict::CannotSay, false), [], "nothing is open");
-        assert_eq!(at(2.0, 3.1, 0.0, open, true), [], "it is flagged already");
+        assert_eq!(at(2.0, 2.9, 0.0, Verdict::CannotSay, false), [], "no section is open");
+        assert_eq!(at(2.0, 3.1, 0.0, open, true), [], "the section is already flagged");
     }
 
     const PERIMETER_M: f64 = 6.0 * core::f64::consts::PI;
@@ -337,7 +337,7 @@ mod tests {
             tell: &mut |_, _| {},
         };
         let everywhere = Request { not_passed: None, ..request };
-        assert!(!sections.fails_already(&everywhere, &mut judging), "only where some heads haven't been");
+        assert!(!sections.fails_already(&everywhere, &mut judging), "only where some heads haven't passed");
         sections.fails_already(&request, &mut judging)
     }
 
@@ -347,7 +347,7 @@ mod tests {
     fn unfillable_circle_fails_by_the_errors_at_its_place() {
         for is_beside in [true, false] {
             let fails = |circle_m: f64, errors: [f64; 2]| fails(circle_m, is_beside, errors, 10.9);
-            assert!(!fails(0.245, [0.0; 2]) && fails(0.255, [0.0; 2]), "as large as the target");
+            assert!(!fails(0.245, [0.0; 2]) && fails(0.255, [0.0; 2]), "the circle must exceed the target");
             // 0.5 m plus three times 0.06 m.
             assert!(!fails(0.335, [0.05, 0.0]) && fails(0.345, [0.05, 0.0]));
         }
@@ -361,6 +361,6 @@ mod tests {
             // Elsewhere on the wall the circle would need to be far larger.
             assert!(fails(0.265, false, [0.0, yaw_rad], to_come_m), "{to_come_m} {yaw_rad}");
         }
-        assert!(!fails(0.3, true, [0.0; 2], 10.3), "a sample may still land in it");
+        assert!(!fails(0.3, true, [0.0; 2], 10.3), "samples may still land in it");
     }
 }

@@ -15,7 +15,7 @@ fn sections() -> Sections {
 fn stretch_contains_the_existing_sections_it_touches() {
     let of = |from_m: f64, to_m: f64| sections().sections_of(Some(Reach { from_m, to_m }));
     assert_eq!(of(1.1, 1.9), 4..8);
-    assert_eq!(of(1.0, 2.0), 4..9, "both at their beginning");
+    assert_eq!(of(1.0, 2.0), 4..9, "both ends at section boundaries");
     assert_eq!(of(3.3, 3.3), 13..14);
     assert_eq!((of(-20.0, -0.6), of(9.9, 40.0)), (-4..-2, 39..40));
     assert!(of(11.0, 12.0).is_empty() && sections().sections_of(None).is_empty());
@@ -59,7 +59,7 @@ fn section_without_pings_has_the_error_of_its_neighbours() {
     for (beside, expected) in [(18, 0.0), (19, 0.03), (21, 0.03), (22, 0.03), (23, 0.0)] {
         assert!(near(error_of(beside, 20), expected), "{beside}: {}", error_of(beside, 20));
     }
-    assert!(near(error_of(31, 30), 0.01), "its own, though there is a larger one beside it");
+    assert!(near(error_of(31, 30), 0.01), "its own error, although a neighbour has a larger one");
     assert!(near(error_of(29, 28), 0.03) && near(error_of(27, 28), 0.03));
 }
 
@@ -92,7 +92,7 @@ fn verdict_keeps_the_configured_standard_deviations() {
     ] {
         assert_eq!(verdict(&hole(diameter_m), confidence_sd * 0.1, 1.0, BEHIND), expected, "{diameter_m}");
     }
-    assert_eq!(verdict(&hole(1.0), 0.0, 1.0, BEHIND), Verdict::Pass, "as large as the target passes");
+    assert_eq!(verdict(&hole(1.0), 0.0, 1.0, BEHIND), Verdict::Pass, "a hole as large as the target passes");
 }
 
 #[test]
@@ -169,15 +169,15 @@ fn hole_is_of_all_visits_unless_the_newest_alone_passes() {
     let fine_m = 0.2 * math::sqrt(2.0);
     let (verdict, hole_m, first) = seen_twice([0.2, 0.34], true);
     assert!(hole_m < fine_m + 1e-3, "{hole_m}");
-    assert_eq!((verdict, first), (Verdict::Pass, 0), "each adds to what the other shows");
+    assert_eq!((verdict, first), (Verdict::Pass, 0), "each visit adds to the other");
     let (verdict, hole_m, first) = seen_twice([0.2, 0.34], false);
     assert!((hole_m - 0.34 * math::sqrt(2.0)).abs() < 0.01, "{hole_m}");
-    assert_eq!((verdict, first), (Verdict::Pass, 1), "nothing relates the first to it");
+    assert_eq!((verdict, first), (Verdict::Pass, 1), "the first visit has no relation to the second");
     let (verdict, hole_m, first) = seen_twice([0.2, 0.6], false);
     assert!(hole_m < fine_m + 1e-3, "{hole_m}");
-    assert_eq!((verdict, first), (Verdict::CannotSay, 0), "neither the newest alone, nor both");
+    assert_eq!((verdict, first), (Verdict::CannotSay, 0), "neither the newest visit alone nor both pass");
     let (verdict, hole_m, first) = seen_twice([0.6, 0.2], true);
     assert!(hole_m < fine_m + 1e-3, "{hole_m}");
     assert_eq!((verdict, first), (Verdict::Pass, 0));
-    assert_eq!(seen_twice([0.6, 0.62], true).0, Verdict::Fail, "both are too wide, even together");
+    assert_eq!(seen_twice([0.6, 0.62], true).0, Verdict::Fail, "both meshes are too wide, even together");
 }

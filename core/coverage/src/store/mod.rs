@@ -80,10 +80,10 @@ pub enum Kept {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 pub enum StoreError {
     /// Its chainage is outside the store's extent, or its coordinates aren't finite.
-    #[error("the sample lies outside the stretch of tunnel that the store covers")]
+    #[error("storing a sample: it lies outside the stretch of tunnel that the store covers")]
     Outside,
     /// The store is full.
-    #[error("the store is full")]
+    #[error("storing a sample: the store is full")]
     Full,
 }
 

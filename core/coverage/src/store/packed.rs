@@ -110,7 +110,7 @@ impl Stateful for Arena {
         let bytes = from.raw()?;
         let (blocks, rest) = bytes.as_chunks::<{ 4 * (ROOM + 1) }>();
         if !rest.is_empty() || blocks.len() > self.most {
-            return Err(from.unfit(format!("{} bytes of blocks, and room for {}", bytes.len(), self.most)));
+            return Err(from.unfit(format!("{} bytes of blocks; at most {} fit", bytes.len(), self.most)));
         }
         self.blocks.clear();
         self.blocks.extend(blocks.iter().map(|block| {

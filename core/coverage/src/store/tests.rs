@@ -36,7 +36,7 @@ fn pack_the_first_40_m(store: &mut SampleStore) {
     for k in 0..100 {
         store.insert(sample(210.0 - 1.2 * f64::from(k), 0.0)).unwrap();
     }
-    assert!(store.bricks.iter().take(30).all(|brick| brick.slot == 0), "all of them are packed");
+    assert!(store.bricks.iter().take(30).all(|brick| brick.slot == 0), "all bricks must be packed");
 }
 
 /// Kept samples of the first 40 m, sorted.
@@ -134,7 +134,7 @@ proptest! {
         let mut store = store(&samples);
         let mut expected = places.clone();
         expected.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.total_cmp(&b.1)));
-        prop_assert_eq!(kept(&store), expected, "open, nothing is moved");
+        prop_assert_eq!(kept(&store), expected, "no sample moves while open");
         prop_assert_eq!(store.fidelity(-1.0, 12.0), Fidelity::default());
         pack_the_first_40_m(&mut store);
         let once = kept(&store);
@@ -150,7 +150,7 @@ proptest! {
             }
             pack_the_first_40_m(&mut store);
         }
-        prop_assert_eq!(kept(&store), once, "a second time nothing is moved");
+        prop_assert_eq!(kept(&store), once, "no sample moves the second time");
     }
 
     /// Every dropped sample has a kept one within the stated distance.
@@ -167,7 +167,7 @@ proptest! {
             }
         }
         let (kept, fidelity) = (kept(&store), store.fidelity(0.0, 0.3));
-        prop_assert!(kept.len() < places.len(), "something is left out");
+        prop_assert!(kept.len() < places.len(), "some samples must be dropped");
         prop_assert_eq!(kept.len() + store.usage().thinned as usize, places.len());
         for place in &places {
             let nearest = kept.iter().map(|other| apart(*place, *other)).fold(f64::INFINITY, f64::min);
@@ -176,7 +176,7 @@ proptest! {
         let farthest = places.iter().map(|place| {
             kept.iter().map(|other| apart(*place, *other)).fold(f64::INFINITY, f64::min)
         }).fold(0.0, f64::max);
-        prop_assert!(farthest > 0.1 * fidelity.thinned_m, "the distance said is not out of all proportion");
+        prop_assert!(farthest > 0.1 * fidelity.thinned_m, "the stated distance is realistic");
     }
 }
 
@@ -249,7 +249,7 @@ fn stationary_vehicle_fills_its_cells_only() {
     assert_eq!(usage.kept + usage.thinned, 4 * pings as u64);
     assert!(usage.kept < 10_000, "{usage:?}");
     assert!(usage.bytes < 2_000_000, "{usage:?}");
-    assert!(usage.kept - after_half.kept < 300, "it hardly grows any more: {after_half:?} {usage:?}");
+    assert!(usage.kept - after_half.kept < 300, "it should hardly grow any more: {after_half:?} {usage:?}");
     assert!(store.fidelity(100.0, 100.0).thinned_m <= 0.02);
 }
 
@@ -266,7 +266,7 @@ fn step_is_dropped_only_for_one_in_its_direction() {
     };
     let ways: Vec<bool> = (0..400).map(|k| goes(0.05, k)).collect();
     assert!(ways[..100].iter().all(|dropped| !dropped) && ways[300..].iter().all(|dropped| *dropped));
-    assert!(!goes(-0.03, 17), "the first to go back is kept");
+    assert!(!goes(-0.03, 17), "the first step in the other direction is kept");
     assert!(goes(0.05, 17));
 }
 
@@ -289,7 +289,7 @@ fn hundred_passes_back_and_forth_do_not_grow_memory() {
         }
     }
     let (usage, (then, used)) = (store.usage(), after_seventy.unwrap());
-    assert!(usage.kept < used.kept + used.kept / 50, "full cells take no more: {used:?} {usage:?}");
+    assert!(usage.kept < used.kept + used.kept / 50, "full cells must take no more: {used:?} {usage:?}");
     assert!(usage.bytes < used.bytes + used.bytes / 50, "{used:?} {usage:?}");
     let now = kept(&store);
     let lost = then.iter().filter(|place| !now.iter().any(|other| apart(**place, *other) <= packed::MOVED_M));
@@ -329,7 +329,10 @@ fn stretch_that_fills_all_open_bricks_is_opened_again() {
         store.insert(WallSample { step_m, ..sample(1.0 + 0.01 * at, 2.0 + 0.1 * at) }).unwrap();
     }
     store.insert(sample(100.0, 0.0)).unwrap();
-    assert!(store.bricks.iter().take(30).all(|brick| brick.slot == 0), "it was packed for the one far away");
+    assert!(
+        store.bricks.iter().take(30).all(|brick| brick.slot == 0),
+        "it must be packed for the distant sample"
+    );
     // The step from 2.2 to 2.3 m crosses at its centre.
     let distance = store.nearest_pass_m(1.5, 2.25, 5.0).unwrap();
     assert!((distance - 0.475).abs() < 3e-5, "{distance}");

@@ -158,7 +158,11 @@ fn single_hit_is_doubtful_until_the_next_pass_confirms_it() {
         Some(if step == 70 && turn >= 2 { 3.0 } else { 6.0 })
     };
     let count = &turning.turn(6, post)[0];
-    assert_eq!((count.wall, count.doubtful), (6 * STEPS as usize - 1, 1), "of four hits the first");
+    assert_eq!(
+        (count.wall, count.doubtful),
+        (6 * STEPS as usize - 1, 1),
+        "only the first of four hits is doubtful"
+    );
 }
 
 #[test]
@@ -220,7 +224,7 @@ fn outvoted_head_is_distrusted_until_it_agrees() {
         // The chainage begins again, as if the vehicle had gone back.
         turning.turn(4, |_, _, _, _| Some(1.0));
         let counts = turning.turn(4, |_, _, _, _| Some(1.0));
-        assert_eq!(counts[wrong].doubtful, 0, "it is believed again");
+        assert_eq!(counts[wrong].doubtful, 0, "the head is trusted again");
     }
 }
 
@@ -282,7 +286,7 @@ fn stuck_head_is_distrusted_until_its_range_moves() {
             stuck_wall += usize::from(sticks && sorted.this == Taken::Wall);
             named.extend(sorted.distrusted);
             if step == 4 * STEPS {
-                assert_eq!(turning.heads[0].distrusted(), None, "it moves again");
+                assert_eq!(turning.heads[0].distrusted(), None, "the range moves again");
             }
         }
         let [(Distrust::Constant(_), [from_m, to_m])] = named[..] else { panic!("{named:?}") };
@@ -300,6 +304,6 @@ fn stuck_head_is_distrusted_until_its_range_moves() {
 fn tolerances_scale_with_the_cross_section() {
     let of = |radius_m: f64| WallLimits::new(TAU * radius_m, (0.2 * radius_m).min(0.5));
     assert!((of(1.0).tolerance_m - 0.1).abs() < 1e-12 && (of(1.0).contradiction_m - 0.2).abs() < 1e-12);
-    assert!((of(0.15).tolerance_m - 0.03).abs() < 1e-12, "no less than sonars are good for");
-    assert!((of(20.0).tolerance_m - 0.5).abs() < 1e-12, "no more than contradicts the design");
+    assert!((of(0.15).tolerance_m - 0.03).abs() < 1e-12, "not below the sonars' accuracy");
+    assert!((of(20.0).tolerance_m - 0.5).abs() < 1e-12, "not above the contradiction limit");
 }

@@ -256,7 +256,7 @@ fn only_existing_unacknowledged_alerts_are_acknowledged() {
     assert!(!acknowledge(&mut bench, 0) && !acknowledge(&mut bench, 1));
     bench.with(|list, to| list.observe(at, &Seen::of(ListKind::NotRecorded, true, Figures::None), to));
     bench.with(|list, to| list.observe(at, &Seen::of(ListKind::TurnFails, true, Figures::None), to));
-    assert!(!acknowledge(&mut bench, 2), "a caution needs none");
+    assert!(!acknowledge(&mut bench, 2), "a caution needs no acknowledgement");
     assert!(acknowledge(&mut bench, 1) && !acknowledge(&mut bench, 1) && !acknowledge(&mut bench, 0));
     assert_eq!(bench.list.get(1).unwrap().acknowledged, Some(Acknowledgement { by: Who::cut("AB"), at }));
 }
@@ -298,7 +298,7 @@ fn alert_spans_the_part_still_missed() {
     bench.run(0, RunChange::Raised, (40, 41), None);
     bench.run(0, RunChange::Changed, (40, 64), None);
     bench.run(0, RunChange::Changed, (40, 52), None);
-    assert_eq!(stretch(&bench), Some((40, 52)), "passed again from its far end");
+    assert_eq!(stretch(&bench), Some((40, 52)), "the far end was passed again");
     // The middle was passed again: two runs of one alert.
     bench.run(1, RunChange::Raised, (48, 52), None);
     bench.run(0, RunChange::Changed, (40, 44), None);
@@ -330,7 +330,7 @@ fn merged_runs_keep_the_lower_number_and_stay_unacknowledged() {
     bench.with(|list, to| list.acknowledge(0, Who::cut("AB"), MonoNs(9), to));
     assert_eq!(bench.list.get(1).unwrap().state, AlertState::Cleared);
     bench.run(3, RunChange::Raised, (10, 11), None);
-    assert_eq!(bench.list.raised(), 3, "what is over is over");
+    assert_eq!(bench.list.raised(), 3, "a cleared alert stays cleared");
 }
 
 proptest! {

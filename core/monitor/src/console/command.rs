@@ -18,7 +18,7 @@ pub type NoteText = ShortText<MAX_NOTE_BYTES>;
 
 /// A command.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-#[expect(clippy::large_enum_variant, reason = "copied into room that is there already; a box would allocate")]
+#[expect(clippy::large_enum_variant, reason = "copied into preallocated room; a box would allocate")]
 pub enum Command {
     /// Acknowledges the alert with this number; 0 acknowledges all that need it.
     Acknowledge {

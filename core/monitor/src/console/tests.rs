@@ -48,7 +48,7 @@ fn ports_take_as_many_notes_as_the_report_holds() {
     }
     assert_eq!(taken, MOST_NOTES);
     assert_eq!(port.send(&note), Err(ConsoleError::MostNotes));
-    assert_eq!(port.send(&Command::Silence { by: who("AB") }), Ok(()), "other commands go on");
+    assert_eq!(port.send(&Command::Silence { by: who("AB") }), Ok(()), "other commands are still accepted");
 }
 
 #[test]

@@ -81,7 +81,7 @@ fn stretch(why: Unsure) -> UnsureStretch {
 #[test]
 fn speed_over_the_limit_reads_differently_from_it() {
     assert_eq!(speed_decimals(Some(0.104), Some(0.098)), 3);
-    assert_eq!(speed_decimals(Some(0.098), Some(0.104)), 2, "it is within");
+    assert_eq!(speed_decimals(Some(0.098), Some(0.104)), 2, "it is within the limit");
     assert_eq!(speed_decimals(Some(0.12), Some(0.098)), 2);
     assert_eq!(speed_decimals(None, Some(0.1)), 2);
 }
@@ -98,18 +98,18 @@ fn fitting_speed_helps_an_unsure_stretch() {
     assert_eq!(helps(0.2, 0.1, true), format!("at most 0.10 m/s, or {surer}"));
     assert_eq!(helps(0.09, 0.1, true), format!("at 0.10 m/s, or {surer}"));
     assert_eq!(helps(0.09, 0.1, false), surer, "faster won't help");
-    assert_eq!(helps(0.1, 0.1, true), surer, "driven as told");
+    assert_eq!(helps(0.1, 0.1, true), surer, "driven as advised");
     assert_eq!(helps(0.1, 0.0, true), surer, "no speed is known");
     assert_eq!(helps(0.0, 0.1, true), surer, "never driven");
     let driven = Driven { speed_mps: 0.2, fits_mps: 0.1, is_uneven: false, is_short: false };
     let lost = UnsureStretch { is_mostly_error: true, driven, ..stretch(Unsure::Position) };
-    assert_eq!(helps_text(&lost), surer, "the error is what matters");
+    assert_eq!(helps_text(&lost), surer, "the error matters more");
     let short = Driven { is_short: true, ..driven };
     let silent = UnsureStretch { driven: short, ..stretch(Unsure::Position) };
     assert_eq!(
         helps_text(&silent),
         "again with the silent head back, or slower",
-        "the speeds are those of all heads"
+        "the speeds apply to all heads"
     );
 }
 
@@ -149,7 +149,7 @@ fn line_breaks_between_words_and_before_the_action() {
     let widths = |columns: usize| line.broken(columns).iter().map(|l| l.chars().count()).max().unwrap();
     assert!((40..130).all(|columns| widths(columns) <= columns));
     let words = |text: &str| text.split_whitespace().map(str::to_owned).collect::<Vec<_>>();
-    assert_eq!(words(&line.broken(40).join(" ")), words(&line.text()), "nothing is lost");
+    assert_eq!(words(&line.broken(40).join(" ")), words(&line.text()), "no word is lost");
 }
 
 #[test]
@@ -167,5 +167,5 @@ fn narrow_screen_keeps_the_action_and_drops_the_reason() {
     assert!(line.cut(200).contains("missed 1.00 m  -> go 0.10 m/s"));
     assert_eq!(line.cut(60), "0+039.06   THIS TURN MAY MISS  -> go 0.10 m/s");
     let remedy = PilotLine { action: String::new(), ..line };
-    assert!(remedy.cut(40).contains("THIS TURN MAY MISS: heads"), "what it says itself stays");
+    assert!(remedy.cut(40).contains("THIS TURN MAY MISS: heads"), "the instruction stays");
 }

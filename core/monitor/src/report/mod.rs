@@ -311,7 +311,10 @@ impl Report {
             smoothing: None,
         };
         let (sum_m, way_m) = (report.summary.way_m(), report.way.length_m);
-        debug_assert!((sum_m - way_m).abs() < 1e-6, "metres by verdict add up to {sum_m} m, not to the coverage extent of {way_m} m");
+        debug_assert!(
+            (sum_m - way_m).abs() < 1e-6,
+            "metres by verdict add up to {sum_m} m, not to the coverage extent of {way_m} m"
+        );
         report
     }
 

@@ -97,17 +97,13 @@ fn turn_within_position_error_of_the_target_is_not_good() {
     };
     assert_eq!(driven(forecast(true, false), 0.06), Condition::TurnUnsure);
     assert_eq!(driven(forecast(false, false), 0.06), Condition::Good);
-    assert_eq!(driven(forecast(true, true), 0.06), Condition::TurnFails, "the graver of the two");
+    assert_eq!(driven(forecast(true, true), 0.06), Condition::TurnFails, "the graver condition of the two");
     assert_eq!(
         driven(forecast(true, false), 0.07),
         Condition::Good,
-        "nothing better is known than what is driven"
+        "no better speed is known than the present one"
     );
-    assert_eq!(
-        driven(forecast(true, false), 0.072),
-        Condition::Over,
-        "that it is over what is allowed says why"
-    );
+    assert_eq!(driven(forecast(true, false), 0.072), Condition::Over, "exceeding the limit is the reason");
     assert_eq!(Condition::TurnUnsure.lamp(), Lamp::Amber);
 }
 
@@ -137,7 +133,7 @@ fn state_gets_stale_as_ticks_continue_without_data() {
         [SensorState::Ok, SensorState::Silent]
     );
     assert_eq!(after(30_000).age().map(DurNs::as_secs_f64), Some(30.0));
-    assert_eq!(LiveState { now: at(9), ..state() }.age(), Some(DurNs(0)), "a clock that was set back");
+    assert_eq!(LiveState { now: at(9), ..state() }.age(), Some(DurNs(0)), "the clock was set back");
 }
 
 #[test]
