@@ -9,7 +9,7 @@ use crate::failure::Failure;
 use crate::files;
 use crate::logging::complain;
 
-/// Assignment by the mapping file, or without one by unambiguous matches, which are listed on stderr.
+/// Assignment by the mapping file, or otherwise by unambiguous matches, which are listed on stderr.
 pub(super) fn feeds(
     args: &cli::Import,
     vehicle: Option<&VehicleConfig>,
