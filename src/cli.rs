@@ -141,8 +141,8 @@ pub(crate) enum Command {
     Trim(Trim),
     /// Simulate a scene and write the bytes that its devices would send as a log.
     ///
-    /// By default only the effects named in the scene are simulated; a scene may also request the effects
-    /// that its devices call for. --explain lists them.
+    /// By default only the effects named in the scene are simulated. With --take called, or the same setting in
+    /// the scene, those that the scene calls for are added. --explain lists them.
     #[command(after_help = SIMULATE_EXAMPLES)]
     Simulate(Simulate),
     /// Convert a log of another program: MAVLink telemetry, candump, Imagenex, Ping Viewer, CSV, ROS bags and
@@ -344,7 +344,7 @@ pub(crate) struct Replay {
 pub(crate) enum TakeWhat {
     /// Effects that the scene names.
     Only,
-    /// Effects that the scene names, and those that its devices call for.
+    /// Effects that the scene names, and those that it calls for.
     Called,
 }
 

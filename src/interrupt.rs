@@ -19,8 +19,9 @@ use crate::failure::Failure;
 /// signals. A write beyond the limit of file sizes is then an error like that of a full disk.
 const PASSED_OVER: [i32; 8] = [SIGHUP, SIGTSTP, SIGUSR1, SIGUSR2, SIGXFSZ, SIGXCPU, SIGALRM, SIGVTALRM];
 
-/// Requests to end within this time count as one: `timeout -s INT` signals the program and then its group,
-/// and a held key repeats.
+/// Time within which several requests to end count as one.
+///
+/// `timeout -s INT` signals the program and then its group, and a held key repeats.
 const ONE_REQUEST: Duration = Duration::from_secs(1);
 /// Stack of the thread that waits for signals. It calls nothing deep.
 const STACK_BYTES: usize = 64 << 10;

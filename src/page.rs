@@ -277,8 +277,9 @@ fn act(console: Option<ConsolePort>) -> Act {
     })
 }
 
-/// Hands recordings of voice notes to all logs, one of which must take it, and then informs the loop; or
-/// finds them in a log.
+/// Hands recordings of voice notes to all logs, or finds them in a log.
+///
+/// One log must take a recording; then the loop is informed.
 fn voices(of: &Of<'_>) -> Voices {
     match (&of.voices, &of.console) {
         (VoicesOf::Log(files), _) => {

@@ -14,8 +14,10 @@ use headrace_geometry::frames::{Body, Mount, Point3, Rot, Sensor, Tunnel, Vec3, 
 use headrace_geometry::math;
 use headrace_geometry::tunnel::Profile;
 
-/// Unknowns common to all heads: the vehicle's y and z, m; the rotation vector from the inertial unit's attitude to
-/// the true one, radians; the ratio by which ranges are too long.
+/// Number of unknowns common to all heads.
+///
+/// They are the vehicle's y and z, m; the rotation vector from the inertial unit's attitude to the true one,
+/// radians; and the relative excess of the ranges.
 pub(crate) const COMMON: usize = 6;
 /// Unknowns of each head: its angle about its axis, radians; its offsets left and up from the file's position, m.
 pub(crate) const OWN: usize = 3;

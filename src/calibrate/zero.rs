@@ -62,8 +62,9 @@ pub(crate) fn surface(material: &Material<'_>, from: MonoNs, to: MonoNs) -> Resu
     Ok(Zero { source, found: Estimate { value: mean, sd }, readings: pressures.len() })
 }
 
-/// Height of the water's surface above the tunnel's floor, m, by the first depth sensor and the height that
-/// the heads give.
+/// Height of the water's surface above the tunnel's floor, m.
+///
+/// It comes from the first depth sensor and the height that the heads give.
 ///
 /// `surface_pa` overrides the file's pressure at the surface.
 ///

@@ -20,8 +20,9 @@ pub(super) struct Cable {
 }
 
 impl Cable {
-    /// For the errors between passes that the sensors leave, and the largest speed, m/s; `None` without a
-    /// counter or without the filter.
+    /// Cable accuracy for the errors between passes, and for the largest speed, m/s.
+    ///
+    /// `None` without a counter or without the filter.
     pub(super) fn of(
         vehicle: &VehicleConfig,
         text: &str,

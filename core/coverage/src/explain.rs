@@ -1,5 +1,4 @@
-//! Explains why a section failed: finds the smallest set of factors without which its hole would have met the
-//! target.
+//! Explains a fail by the smallest set of factors without which the hole would have met the target.
 //!
 //! Each factor that was present is removed from the measurements by geometry. Either the samples missing
 //! because of it are put back, or the wall is compressed by the amount that passes or steps would have been
@@ -33,8 +32,9 @@ const WELL_OVER: f64 = 1.2;
 const OVER_PLAN: f64 = 1.15;
 /// Replaces both ratios without a position: the speed is then known from the inertial unit alone.
 const OVER_LOST: f64 = 1.4;
-/// Ratio of the speed to the largest that fits, or to the planned one if larger, above which speed counts:
-/// just over the speed's measurement error.
+/// Ratio of the speed to the fitting one above which speed counts: just over the speed's measurement error.
+///
+/// The planned speed replaces the fitting one if larger.
 const OVER_ALL: f64 = 1.03;
 /// Swing counts if the distance between passes without it is below this share. Even a steady vehicle sways.
 const SWINGS: f64 = 0.85;

@@ -72,8 +72,9 @@ pub struct Frontier {
     swept: Option<Reach>,
     /// Coverage extent: chainages of the vehicle and its heads, pinging or not, and those swept.
     way: Option<Reach>,
-    /// Stretch that the whole reach of all heads, pinging or not, has passed; empty (`from_m` beyond `to_m`)
-    /// until then.
+    /// Stretch that the whole reach of all heads, pinging or not, has passed.
+    ///
+    /// It is empty (`from_m` beyond `to_m`) until then.
     through: Option<Reach>,
     /// Index range of the sections within the reach of the awaited heads plus a margin.
     zone: Option<Range<i64>>,
@@ -431,7 +432,7 @@ mod tests {
     }
 
     #[test]
-    fn a_silent_head_is_not_waited_for() {
+    fn silent_head_is_not_awaited() {
         let mut frontier = Fixture::default();
         frontier.advance(1, MonoNs(0), 0.0, 0.25, 0.0);
         frontier.advance(0, MonoNs(0), 1.0, 0.25, 0.0);

@@ -78,8 +78,7 @@ pub struct Drive {
     pub fits_mps: f64,
     /// Distance along the tunnel between passes that the target leaves room for, m.
     pub fits_along_m: f64,
-    /// Number of passes needed over each place in place of one, given the lost returns: see
-    /// [`headrace_sampling::losses`].
+    /// Number of passes needed in place of one, given the lost returns: see [`headrace_sampling::losses`].
     pub passes_needed: f64,
     /// Loss rate of the head that loses most returns by chance.
     pub lost: LossRate,

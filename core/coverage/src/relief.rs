@@ -1,5 +1,4 @@
-//! Relief: where heads lately found the wall off the design, and which heads contradict the design where
-//! others agree with it.
+//! Relief: places where heads lately found the wall off the design, and heads that others outvote.
 
 use serde::{Deserialize, Serialize};
 
@@ -60,8 +59,7 @@ impl Ballot {
         self.between_m = Some([from_m.min(placed.x_m), to_m.max(placed.x_m)]);
     }
 
-    /// Mean deviation where the head was outvoted, m, and the chainages, if most of about a turn's bins speak
-    /// against it.
+    /// Mean deviation and chainages, m, of the outvoted bins; `None` unless they are most of a turn's bins.
     pub(super) fn verdict(&self) -> Option<(f64, [f64; 2])> {
         let lost = self.agreed + self.outvoted >= FULL_BALLOT && self.outvoted > self.agreed;
         lost.then(|| Some((self.off_sum_m / f64::from(self.outvoted), self.between_m?))).flatten()

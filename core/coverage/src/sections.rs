@@ -41,8 +41,9 @@ pub struct Request {
     pub not_passed: Option<Reach>,
     /// Set at the end of the dive: the stretch that all heads have passed.
     pub ended: Option<Ended>,
-    /// Judge only for a certain fail: a large enough empty circle, not necessarily the largest, can get no
-    /// more samples.
+    /// Judge only for a certain fail: a large enough empty circle that can get no more samples.
+    ///
+    /// The circle need not be the largest.
     pub only_fails: bool,
 }
 
@@ -444,8 +445,9 @@ impl Sections {
         explain(&case, passages, judging.store, judging.finder)
     }
 
-    /// Evidence for one cause of a run: that of the section with the largest hole if it has the cause, else
-    /// of the last that has it.
+    /// Evidence for one cause of a run, from the section with the largest hole if it has that cause.
+    ///
+    /// Otherwise from the last section with it.
     pub fn evidence_of(&self, run: &Run, cause: Cause) -> Option<Evidence> {
         let evidence = |index: i64| self.get(index)?.evidence.filter(|evidence| evidence.causes.has(cause));
         evidence(run.worst.0).or_else(|| (run.from..run.to).rev().find_map(evidence))

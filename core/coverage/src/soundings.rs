@@ -195,7 +195,7 @@ mod tests {
     }
 
     #[test]
-    fn a_helix_passes_the_grid_and_misses_a_strip() {
+    fn helix_fills_the_grid_but_misses_a_strip() {
         // Two passes run at the edges of each node's row. Every node has ten samples, yet 0.4 m between them
         // are unseen.
         let passes = (0..20).flat_map(|k| [0.05, 0.45].map(|x_m| f64::from(k) * 0.5 + x_m));

@@ -1,5 +1,4 @@
-//! Unsure stretches: sections that neither pass nor fail although no more samples will come, with reason and
-//! extent.
+//! Unsure stretches: sections that neither pass nor fail although no more samples will come.
 
 use core::ops::Range;
 use serde::{Deserialize, Serialize};

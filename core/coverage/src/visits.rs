@@ -10,8 +10,7 @@ use headrace_fusion::Fix;
 use headrace_geometry::time::{DurNs, MonoNs};
 use headrace_geometry::tunnel::Profile;
 
-/// Age of a sample up to which the error between passes applies, and age from which that of a much earlier
-/// visit does.
+/// Maximum age of a sample for the error between passes, and minimum age for that of a much earlier visit.
 const SAME_PASS: DurNs = DurNs(20_000_000_000);
 const LONG_BEFORE: DurNs = DurNs(40_000_000_000);
 
@@ -154,8 +153,7 @@ mod tests {
         assert_eq!((visits.first(), visits.are_several(), visits.are_unrelated()), (4, false, false));
     }
 
-    /// The error between visits grows with the time since the last sample, from 20 s to 40 s up to that of a
-    /// much earlier visit.
+    /// The error between visits grows with the time since the last sample, between 20 s and 40 s.
     #[test]
     fn error_between_visits_grows_with_the_time_between() {
         let sd_m = |gap_s: u64| after(&[(3, 1, 0), (4, 1, gap_s)]).sd_m(0.0);

@@ -98,8 +98,9 @@ pub struct Acknowledgement {
 pub enum Figures {
     /// None.
     None,
-    /// Missed stretch: causes, arc length of the largest hole, m, and the speed advised when it was raised,
-    /// m/s, zero if none.
+    /// Missed stretch: causes, arc length of the largest hole, m, and the speed advised when raised, m/s.
+    ///
+    /// The speed is zero if there was none.
     Missed(CauseFigures, f64, f64),
     /// Stretch without a verdict.
     CannotSay(Stretch),

@@ -77,8 +77,10 @@ pub struct Alert {
     pub since: MonoNs,
     /// Time at which its latest occurrence began.
     pub latest: MonoNs,
-    /// Number of occurrences: samples outside, judgements of contradicting sections, or times that a head or
-    /// the cable counter was distrusted.
+    /// Number of occurrences.
+    ///
+    /// They are samples outside, judgements of contradicting sections, or times that a head or the cable
+    /// counter was distrusted.
     pub count: u64,
     /// Chainage of its first occurrence, m.
     pub x_m: f64,

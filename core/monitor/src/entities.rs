@@ -143,8 +143,10 @@ pub struct HeadSpecification {
     pub spec: HeadSpec,
     /// Modes to which it can be set.
     pub modes: Vec<HeadMode>,
-    /// Shortest range setting, m, that reaches all wall from the centre, its own or longer, and the modes
-    /// there; `None` if none does.
+    /// Shortest range setting that reaches all wall from the centre, m, and the modes there; `None` if none
+    /// does.
+    ///
+    /// It is the head's own setting or a longer one.
     pub reaching: Option<(f64, Vec<HeadMode>)>,
 }
 

@@ -215,8 +215,7 @@ mod tests {
         assert!((track.step_rad().unwrap() - f64::to_radians(0.9)).abs() < 1e-9);
     }
 
-    /// After a restart or a turn by hand, earlier pings are no evidence of the motion, and the angle between
-    /// doesn't count as turned.
+    /// A restart or a turn by hand invalidates earlier pings, and the angle between doesn't count as turned.
     #[test]
     fn head_restarted_elsewhere_adds_no_turned_angle() {
         for gap_ms in [20, 60, 1500, 60_000] {

@@ -14,8 +14,9 @@ const ELSEWHERE_RAD: f64 = TAU / 2.0;
 /// meanwhile, m.
 const STUCK_RAD: f64 = TAU / 2.0;
 const STUCK_M: f64 = 0.3;
-/// Share of a head's returns off the design above which it detects no wall, and share of another head's below
-/// which that counts.
+/// Share of returns off the design above which a head detects no wall, and limit for another head's share.
+///
+/// The first applies only while another head's share is below the second.
 const ELSEWHERE: [f64; 2] = [0.85, 0.5];
 
 /// Health of a head; part of the loop's state.

@@ -150,8 +150,9 @@ pub struct LiveState {
     pub sd: Option<PoseSd>,
     /// Standard deviation of one pass against the next.
     pub pass_sd_m: f64,
-    /// Time for which the vehicle should stay stationary to find the gyros' bias, and so soon its heading, s;
-    /// 0 if unneeded.
+    /// Time for which the vehicle should stay stationary to find the gyros' bias, s; 0 if unneeded.
+    ///
+    /// The heading follows soon afterwards.
     pub stand_s: u32,
     /// Speed along the tunnel, positive inwards; `None` without a position.
     pub speed_mps: Option<f64>,

@@ -161,8 +161,9 @@ pub fn status_line(
     PilotLine { place, speed, what: parts, action, lamp: Some(condition.lamp()) }
 }
 
-/// Number of decimals at which the present speed and the limit differ: a speed isn't too fast if both read
-/// the same.
+/// Number of decimals at which the present speed and the limit differ.
+///
+/// A speed isn't too fast if both read the same.
 fn speed_decimals(speed_mps: Option<f64>, v_max_mps: Option<f64>) -> usize {
     let hundredths = |mps: f64| (mps * 100.0).round();
     let is_over = |(speed_mps, v_max_mps): (f64, f64)| {

@@ -159,8 +159,9 @@ mod tests {
         }
     }
 
-    /// A new resource or component must be listed, either as a part of the state or as made at arming and
-    /// constant or reset every tick.
+    /// Every resource or component must be listed.
+    ///
+    /// It is either a part of the state, or made at arming and constant or reset every tick.
     #[test]
     fn every_resource_and_component_is_saved_or_listed_as_no_state() {
         let profile = shapes::circle(3.0).unwrap();

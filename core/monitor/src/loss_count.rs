@@ -167,8 +167,9 @@ mod tests {
         assert!(!count.hearing().hears_nothing() && count.rate() == LossRate::default());
     }
 
-    /// Whether a ping is among `in_hundred` of a hundred that are lost: splitmix64, uncorrelated with turns
-    /// of 400 pings.
+    /// Whether a ping is among `in_hundred` of a hundred that are lost.
+    ///
+    /// Splitmix64 makes it uncorrelated with turns of 400 pings.
     fn chance(ping: u32, in_hundred: u64) -> bool {
         let mut z = u64::from(ping).wrapping_mul(0x9e37_79b9_7f4a_7c15);
         z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);

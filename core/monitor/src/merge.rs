@@ -141,7 +141,7 @@ mod tests {
     proptest! {
         /// The order doesn't depend on the receive times at which a stream is cut into ticks.
         #[test]
-        fn order_does_not_depend_on_the_ticks(
+        fn packet_order_does_not_depend_on_ticks(
             packets in proptest::collection::vec((0u64..200, 0u16..4), 1..80),
             tick in 1u64..60,
         ) {

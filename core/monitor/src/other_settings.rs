@@ -67,8 +67,9 @@ impl HeadSpecification {
     }
 }
 
-/// Shortest range setting, m, its own or longer, that reaches all wall from the tunnel's centre, and the
-/// modes there.
+/// Shortest range setting that reaches all wall from the tunnel's centre, m, and the modes there.
+///
+/// It is the head's own setting or a longer one.
 ///
 /// `None` if no setting does.
 fn reaching(device: &dyn Device, spec: &HeadSpec, mission: &Mission) -> Option<(f64, Vec<HeadMode>)> {

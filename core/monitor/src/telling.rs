@@ -339,8 +339,9 @@ impl Teller {
         self.close_unsure(sections, tell);
     }
 
-    /// Reports a run again once a metre of it fails for an unreported cause: following the earlier advice may
-    /// still miss the wall.
+    /// Reports a run again once a metre of it fails for an unreported cause.
+    ///
+    /// Following the earlier advice may still miss that wall.
     fn tell_other_cause(&mut self, id: RunId, run: &Run, dive: &Loop, tell: &mut dyn FnMut(Told)) {
         let sections = &dive.coverage().sections;
         let Some((_, told)) = self.run.as_mut().filter(|(last, _)| *last == id) else { return };

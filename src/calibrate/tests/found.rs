@@ -28,8 +28,9 @@ fn wrong(seed: u64) -> [Wrong; 2] {
     ]
 }
 
-/// Angles, relative positions and senses of rotation are within three of the stated standard deviations,
-/// which are as small as a survey needs.
+/// Angles, relative positions and senses of rotation are within three of the stated standard deviations.
+///
+/// Those are as small as a survey needs.
 #[test]
 fn injected_offsets_are_found() {
     let mut worst = (0.0_f64, 0.0_f64);

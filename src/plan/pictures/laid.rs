@@ -114,8 +114,9 @@ impl Laid {
         placed.filter(|(_, at)| near(at)).collect()
     }
 
-    /// Centre and diameter, m, of the largest gap: the largest circle without samples around an arc length,
-    /// within a turn's travel.
+    /// Centre and diameter, m, of the largest gap around an arc length.
+    ///
+    /// The gap is the largest circle without samples within a turn's travel.
     ///
     /// `None` without T.
     pub(super) fn emptiest(&self, arc_m: f64) -> Option<([f64; 2], f64)> {

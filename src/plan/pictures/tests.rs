@@ -119,8 +119,7 @@ fn pattern_shows_heads_circle_and_hidden_tracks() {
     silent(&draw(inspection(ONE), FAST, 0.058, TARGET, "pattern"), &["head 1", "hidden by"]);
 }
 
-/// Compares the circle drawn with the samples of the pattern: no circle of diameter T is empty, and no gap is
-/// larger than the one drawn.
+/// No circle of diameter T is empty in the pattern, and no gap is larger than the one drawn.
 #[test]
 fn no_circle_of_diameter_t_is_empty() {
     let plans = [

@@ -247,8 +247,9 @@ fn speed_with_losses_fits_all_passes_needed() {
     assert!((drive.with_losses_mps(1.01) - 0.19).abs() < 1e-12, "not faster than without losses");
 }
 
-/// The times between passes with factors removed lie between the measured ones: as scheduled, without stalls,
-/// at the planned speed.
+/// Times between passes with factors removed lie between the measured ones.
+///
+/// These are as scheduled, without stalls, and at the planned speed.
 #[test]
 fn removing_a_cause_keeps_the_passes_of_the_remaining_heads() {
     let drive = Drive {

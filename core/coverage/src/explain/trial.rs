@@ -200,8 +200,7 @@ impl<'a> Trial<'a> {
             || removed.has(Cause::HeadSilent) && is_dark(self.case, self.seen)
     }
 
-    /// Distance between neighbours that remains with some factors removed, by the movement of vehicle and
-    /// heads alone, m.
+    /// Distance between neighbours that remains with some factors removed, m, by movement alone.
     ///
     /// Infinite if much is missing for persistent reasons.
     fn stays_m(&self, removed: Causes) -> f64 {

@@ -1,5 +1,6 @@
-//! A tile divided into the Voronoi cells of its samples: each share is a convex polygon on which the distance to its
-//! sample is largest at a corner.
+//! A tile divided into the Voronoi cells of its samples.
+//!
+//! Each share is a convex polygon, on which the distance to its sample is largest at a corner.
 
 /// Maximum samples that a tile is divided among; with more it is halved instead.
 pub(super) const MAX_OWNERS: usize = 24;

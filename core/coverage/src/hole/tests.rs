@@ -27,8 +27,10 @@ fn nearest_m(perimeter_m: f64, samples: &[(f64, f64)], place: (f64, f64)) -> f64
     samples.iter().map(distance).fold(f64::INFINITY, f64::min)
 }
 
-/// D from all candidate maxima of f: circumcentres of three samples (or their images), and points on the two edges
-/// equidistant from two samples. Shares no code with the search.
+/// D from all candidate maxima of f, without any code of the search.
+///
+/// Candidates are the circumcentres of three samples (or their images), and the points on the two edges
+/// equidistant from two samples.
 fn brute_force(perimeter_m: f64, samples: &[(f64, f64)], from_m: f64, to_m: f64) -> f64 {
     let images: Vec<(f64, f64)> =
         samples.iter().flat_map(|s| [-perimeter_m, 0.0, perimeter_m].map(|turn| (s.0, s.1 + turn))).collect();
@@ -62,7 +64,7 @@ fn brute_force(perimeter_m: f64, samples: &[(f64, f64)], from_m: f64, to_m: f64)
 
 proptest! {
     #[test]
-    fn verif_scattered_samples_agree_with_brute_force(
+    fn scattered_samples_agree_with_brute_force(
         samples in proptest::collection::vec((-2.0f64..3.0, 0.0f64..PERIMETER_M), 1..14),
     ) {
         let hole = largest(PERIMETER_M, &samples, 0.0, 0.5);
@@ -99,7 +101,7 @@ proptest! {
     /// D lies within the bounds of a tolerant search, which are no farther apart than the tolerance. A verdict from them
     /// is the exact one, or undecided where T lies between them.
     #[test]
-    fn verif_bounds_of_a_tolerant_search_hold(
+    fn bounds_of_a_tolerant_search_contain_the_hole(
         samples in proptest::collection::vec((-2.0f64..3.0, 0.0f64..PERIMETER_M), 1..14),
         tolerance_m in 0.0f64..0.5,
         target_m in 0.1f64..6.0,
@@ -118,7 +120,7 @@ proptest! {
 
     /// Bounds also hold with packed samples: they include the displacement.
     #[test]
-    fn verif_bounds_after_packing_hold(
+    fn bounds_after_packing_contain_the_hole(
         samples in proptest::collection::vec((-2.0f64..3.0, 0.0f64..PERIMETER_M), 1..14),
     ) {
         let layout = StoreLayout { perimeter_m: PERIMETER_M, from_m: -20.0, to_m: 340.0, cell_m: 0.4, capacity: 1000 };
@@ -136,7 +138,7 @@ proptest! {
 
     /// Bounds also hold with a cell so full that samples were thinned.
     #[test]
-    fn verif_bounds_after_thinning_hold(
+    fn bounds_after_thinning_contain_the_hole(
         crowd in proptest::collection::vec((0.0f64..0.4, 4.0f64..4.4), 200..500),
     ) {
         let mut samples: Vec<_> = crowd.into_iter().filter(|s| s.1 < 4.15 || s.1 > 4.25).collect();
@@ -162,7 +164,7 @@ proptest! {
 
     /// In a small pipe holes are wider than its perimeter.
     #[test]
-    fn verif_a_pipe_narrower_than_its_holes(
+    fn pipe_narrower_than_its_holes_agrees_with_brute_force(
         samples in proptest::collection::vec((-2.0f64..3.0, 0.0f64..1.1), 1..10),
     ) {
         let hole = largest(1.1, &samples, 0.0, 0.5);
@@ -172,7 +174,7 @@ proptest! {
 
     /// On a lattice every local maximum is equidistant from four samples.
     #[test]
-    fn verif_a_perfect_lattice(dx in 0.11f64..0.7, around in 6u32..24, shift in 0.0f64..1.0) {
+    fn perfect_lattice_has_its_diagonal_as_hole(dx in 0.11f64..0.7, around in 6u32..24, shift in 0.0f64..1.0) {
         let darc = PERIMETER_M / f64::from(around);
         let mut samples = Vec::new();
         for i in -12..=12 {
@@ -188,7 +190,7 @@ proptest! {
 
     /// D does not depend on the order of the samples, the seam or the origin of the chainage.
     #[test]
-    fn meta_shifted_mirrored_reversed(
+    fn shifting_mirroring_and_reversing_keep_the_hole(
         samples in proptest::collection::vec((-2.0f64..3.0, 0.0f64..PERIMETER_M), 1..30),
         turn in 0.0f64..PERIMETER_M,
     ) {
@@ -271,7 +273,7 @@ fn hole_is_the_same_at_7_km_and_at_1000_km() {
 
 /// Reference values: `ceran`, 0.197 m/s, heads at the circle's centre in phase shift, as positions only.
 #[test]
-fn val_reference_holes_of_ideal_helices() {
+fn ideal_helices_have_the_reference_holes() {
     let profile = headrace_geometry::tunnel::shapes::ceran().unwrap();
     let perimeter_m = profile.perimeter_m();
     let modes = [

@@ -70,8 +70,9 @@ impl Default for Window {
 }
 
 impl Window {
-    /// Loads all samples between two chainages relative to `origin_m`, from visit `first_visit` on, into
-    /// cells of about `cell_m`.
+    /// Loads all samples between two chainages relative to `origin_m` into cells of about `cell_m`.
+    ///
+    /// Samples count from visit `first_visit` on.
     ///
     /// Allocates: never.
     pub(super) fn fill(

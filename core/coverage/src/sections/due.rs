@@ -212,8 +212,9 @@ mod tests {
         assert_eq!(asked(Some(8..40), way), [(8, true), (9, true)], "no samples since");
     }
 
-    /// Requests when the heads have left 2.5 to 3 m and samples may land from 3.25 m on: section index, and
-    /// whether it is only for a certain fail.
+    /// Requests when the heads have left 2.5 to 3 m and samples may land from 3.25 m on.
+    ///
+    /// Each has the section's index, and whether it is only for a certain fail.
     fn due(set: impl Fn(&mut Sections)) -> Vec<(i64, bool)> {
         let mut sections = Sections::new(0.25, 0.5, 1.0, 10.0);
         set(&mut sections);

@@ -38,8 +38,9 @@ pub struct WallSample {
     pub arc_m: f64,
     /// Number of the head, below [`MAX_HEADS`].
     pub head: usize,
-    /// Step from the same head's previous sample, along the tunnel and along the perimeter, m; `None` unless
-    /// it was a single step of one sweep.
+    /// Step from the same head's previous sample, along the tunnel and along the perimeter, m.
+    ///
+    /// `None` unless it was a single step of one sweep.
     pub step_m: Option<[f64; 2]>,
     /// Number of the visit in which it was measured, from zero. It never decreases.
     pub visit: u32,

@@ -181,7 +181,7 @@ proptest! {
 }
 
 #[test]
-fn a_pass_is_found_where_its_step_crosses() {
+fn pass_is_found_at_the_crossing_of_its_step() {
     let mut store = store(&[sample(1.0, 7.2), sample(1.1, 0.2), sample(3.0, 7.2)]);
     // From (1.0, 7.2) to (1.3, 0.1), crossing the seam at its centre.
     let step = WallSample { step_m: Some([0.3, 0.2]), ..sample(1.3, 0.1) };

@@ -229,7 +229,7 @@ fn outvoted_head_is_distrusted_until_it_agrees() {
 }
 
 #[test]
-fn a_cave_that_all_heads_see_is_wall() {
+fn cave_seen_by_all_heads_is_wall() {
     Turning::new(1.0, 3).all_wall(12, |x_m, _| if (0.6..1.2).contains(&x_m) { 1.45 } else { 1.0 });
 }
 

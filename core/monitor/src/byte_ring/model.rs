@@ -1,5 +1,4 @@
-//! A ring whose interleavings loom explores: all orders of its accesses, and all values that weaker memory
-//! lets a reader see.
+//! A ring for loom, which explores all orders of its accesses and all effects of weaker memory.
 //!
 //! The indices are loom's, with the orderings of ringbuf's. The bytes are visible as soon as they are stored.
 //! That is no weaker: the bytes that a reader may see follow from the indices alone, which ringbuf

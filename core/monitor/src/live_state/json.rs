@@ -64,8 +64,10 @@ pub struct LiveStateJson {
 pub struct PositionJson {
     /// `ok`, `doubtful` or `none`.
     pub state: &'static str,
-    /// Reason for a doubtful position (`cable`, `spread`) or for none (`no_heading`, `no_chainage`,
-    /// `no_place_in_section`).
+    /// Reason for the state.
+    ///
+    /// A doubtful position has `cable` or `spread`; a missing one `no_heading`, `no_chainage` or
+    /// `no_place_in_section`.
     pub why: Option<&'static str>,
     /// Chainage, m.
     pub chainage_m: Option<f64>,
@@ -90,8 +92,9 @@ pub struct MarginsJson {
     pub speed_mps: Option<f64>,
     /// Target less the T forecast for the present turn, m; negative if the turn fails.
     pub turn_m: Option<f64>,
-    /// Part of the target taken by position errors, m: confidence times the standard deviation of one pass
-    /// against the next.
+    /// Part of the target taken by position errors, m.
+    ///
+    /// It is the confidence times the standard deviation of one pass against the next.
     pub position_m: Option<f64>,
     /// Share of lost returns if they limit the speed, otherwise `None`.
     pub lost_share: Option<f64>,

@@ -25,8 +25,9 @@ pub struct WayReport {
 pub struct NotInspectedReport {
     /// `no_sonar`, `no_position`, `outside_tunnel` or `mostly_no_position`.
     pub reason: &'static str,
-    /// Most frequent missing requirement of returns without a position: `no_heading`, `no_chainage` or
-    /// `no_place_in_section`.
+    /// Most frequent missing requirement of returns without a position.
+    ///
+    /// One of `no_heading`, `no_chainage` and `no_place_in_section`.
     pub lacking: Option<&'static str>,
     /// Share of pings without a position.
     pub without_position_share: f64,

@@ -226,8 +226,9 @@ pub struct AlertReport {
     pub kind: &'static str,
     /// Time of its first occurrence, seconds on the log's clock.
     pub since_s: f64,
-    /// Number of occurrences: samples, judgements of sections, or times that a head or the cable counter was
-    /// distrusted.
+    /// Number of occurrences.
+    ///
+    /// They are samples, judgements of sections, or times that a head or the cable counter was distrusted.
     pub count: u64,
     /// Chainage of its first occurrence, m.
     pub x_m: f64,
@@ -264,8 +265,9 @@ pub struct SettingReport {
     pub other: Option<String>,
     /// Ratio of measured ranges to the design's; `None` for other settings.
     pub range_ratio: Option<f64>,
-    /// Angle to be added to that in the vehicle file, degrees, if the head is turned about its axis, pitched
-    /// or yawed; otherwise `None`.
+    /// Angle to be added to that in the vehicle file, degrees; `None` for other settings.
+    ///
+    /// The head is turned about its axis, pitched or yawed by it.
     pub angle_deg: Option<f64>,
     /// Number of standard deviations from the correct value.
     pub sure_ratio: f64,

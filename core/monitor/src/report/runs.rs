@@ -21,8 +21,8 @@ pub struct RunReport {
     /// Figures of the causes named in its text, each from a section that has it.
     #[serde(skip)]
     pub figures: Option<CauseFigures>,
-    /// Ids of the sources of heads that were silent in the section with its largest hole, or where silence
-    /// was the cause.
+    /// Ids of the sources of silent heads in the section with the largest hole, or where silence is the
+    /// cause.
     pub silent_sources: Vec<String>,
     /// Beginning, m.
     pub start_m: f64,
@@ -53,8 +53,9 @@ pub struct ReturnReport {
     pub from_m: f64,
     /// Chainage of its near end, m.
     pub to_m: f64,
-    /// Chainage for the vehicle's origin to go back to, so that all heads pass the stretch from its far end
-    /// on or back, m.
+    /// Chainage for the vehicle's origin to go back to, m.
+    ///
+    /// From there all heads pass the stretch from its far end on or back.
     pub back_to_m: f64,
     /// Action against the main cause.
     pub action: Action,

@@ -60,8 +60,10 @@ pub(crate) struct Driving {
     /// Class n has waits of at most 1 - n / 8 of the longest. Heads that turn continuously wait equally
     /// everywhere.
     steps_m: [f64; WAITS],
-    /// Inputs of the last computed fitting speed: time between passes, seconds, steps along the wall, m, and
-    /// target less its margin, m.
+    /// Inputs of the last computed fitting speed.
+    ///
+    /// They are the time between passes, seconds, the steps along the wall, m, and the target less its
+    /// margin, m.
     fitted: [f64; 3],
     looks: Looks,
     pub(super) lacking: Lacking,
@@ -289,7 +291,7 @@ mod tests {
         let mut driving = Driving::default();
         assert!(near(noted(&mut driving, EVEN, 0.2, 0.2).left_at_plan_s, 2.0), "none did");
         driving.lacking.stalled = HeadSet::default().with(1);
-        // An eighth of a quarter turn late.
+        // A sixteenth of a turn late.
         let late = noted(&mut driving, [0.0, 67.5, 180.0, 270.0], 0.2, 0.2);
         assert!(near(late.left_at_plan_s, 4.0) && near(late.gap_s, 2.5) && near(late.planned_gap_s, 2.0));
         assert!(near(late.even_gap_s, 2.0), "if they were evenly spread");

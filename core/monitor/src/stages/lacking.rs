@@ -22,8 +22,7 @@ use headrace_sampling::passes::Situation;
 
 /// Time without a ping at a new angle after which a head's samples count as missing.
 const LACKING_AFTER: DurNs = DurNs(400_000_000);
-/// Number of pings at hidden angles needed for a decision on occlusion, and share of them without a return
-/// above which it is real.
+/// Number of pings at hidden angles needed to decide on occlusion, and share of losses that confirms it.
 const HIDDEN_PINGS: u16 = 600;
 const HIDDEN_SHARE: f64 = 0.7;
 /// Capacity for pings without a fix: four heads for over two minutes.
@@ -212,8 +211,7 @@ fn note_deaf(lacking: &mut Lacking, deaf: HeadSet, coverage: &mut Coverage) {
     }
 }
 
-/// Records at an update the simulated pings of silent and stalled heads since the last one, and the places of
-/// pings without a fix.
+/// Records at an update simulated pings of silent and stalled heads, and places of pings without a fix.
 ///
 /// Allocates: never.
 pub(super) fn note_beat(

@@ -219,8 +219,9 @@ mod tests {
 
     const AT: MonoNs = MonoNs(9_000_000_000);
 
-    /// Live state after an update with this error between passes, for a target of half a metre and two
-    /// standard deviations.
+    /// Live state after an update with this error between passes.
+    ///
+    /// The target is half a metre, with two standard deviations.
     fn after(pass_error_m: f64, is_cable_doubted: bool, lacking: Option<NoFix>) -> LiveState {
         let pose = Pose { position: Point3::new(12.5, 0.0, 3.0), attitude: Rot::identity() };
         let relative = Relative::along(pass_error_m);
