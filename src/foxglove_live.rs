@@ -70,7 +70,8 @@ impl Foxglove {
         controlled: Option<Controlled>,
     ) -> Result<Self, Failure> {
         if !at.ip().is_loopback() {
-            let why = "everyone who reaches this address sees the dive without a token; use 127.0.0.1 and connect over ssh";
+            let why = "everyone who reaches this address sees the dive without a token; \
+                       use 127.0.0.1 and connect over ssh";
             return Err(Failure::Usage(format!("--foxglove {at}: {why}")));
         }
         let context = Context::new();

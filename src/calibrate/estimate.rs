@@ -29,8 +29,8 @@ pub(crate) enum Untold {
     },
     /// The vehicle never stood still for long enough.
     #[error(
-        "the vehicle moved: {what} varied by {span:.2} {unit}, at most {limit} counts as still; it never stood still for \
-         {least_s} s"
+        "the vehicle moved: {what} varied by {span:.2} {unit}, at most {limit} counts \
+         as still; it never stood still for {least_s} s"
     )]
     Moved {
         /// The quantity that moved.
@@ -46,7 +46,8 @@ pub(crate) enum Untold {
     },
     /// A head has covered too little of the wall.
     #[error(
-        "no full turn: the head has seen only {seen_deg:.0} degrees of wall; at least {least_deg:.0} are needed"
+        "no full turn: the head has seen only {seen_deg:.0} degrees of wall; at least {least_deg:.0} are \
+         needed"
     )]
     LittleWall {
         /// Sector covered, degrees.
@@ -56,8 +57,8 @@ pub(crate) enum Untold {
     },
     /// Turning the head about its axis changes nothing.
     #[error(
-        "the section looks the same at every angle of the head about its axis (a circle doesn't determine roll): \
-         the angle would be known only to {sd_deg:.1} degrees"
+        "the section looks the same at every angle of the head about its axis (a circle doesn't determine \
+         roll): the angle would be known only to {sd_deg:.1} degrees"
     )]
     Round {
         /// Remaining standard deviation, degrees.
@@ -65,7 +66,8 @@ pub(crate) enum Untold {
     },
     /// The offset of a single head can't be separated from the vehicle's position.
     #[error(
-        "the offset of a single head can't be distinguished from the vehicle's place; at least two heads are needed"
+        "the offset of a single head can't be distinguished from the vehicle's place; at least two heads \
+         are needed"
     )]
     OneHead,
     /// Another unknown has the same effect.
@@ -78,8 +80,8 @@ pub(crate) enum Untold {
     },
     /// A mirrored head would fit as well.
     #[error(
-        "the opposite sense of rotation fits nearly as well (difference {margin:.0}, needed {needed:.0}): the section is \
-         symmetric; stand well to one side of the centre, within range of the echosounders"
+        "the opposite sense of rotation fits nearly as well (difference {margin:.0}, needed {needed:.0}): the \
+         section is symmetric; stand well to one side of the centre, within range of the echosounders"
     )]
     Mirror {
         /// Cost difference of the other way, in squared standard deviations.
@@ -89,7 +91,8 @@ pub(crate) enum Untold {
     },
     /// The wall doesn't match the profile.
     #[error(
-        "the returns contradict the profile: half of them are over {median_m:.2} m off; at most {most_m} m is allowed"
+        "the returns contradict the profile: half of them are over {median_m:.2} m off; at most {most_m} m \
+         is allowed"
     )]
     Contradicted {
         /// Median of the absolute residuals, m.
@@ -99,7 +102,8 @@ pub(crate) enum Untold {
     },
     /// The pressure varied too much for one level.
     #[error(
-        "the vehicle wasn't at the surface all the time: the pressure varied by {span_pa:.0} Pa; at most {most_pa} is allowed"
+        "the vehicle wasn't at the surface all the time: the pressure varied by {span_pa:.0} Pa; at most \
+         {most_pa} is allowed"
     )]
     NotAtSurface {
         /// Its variation, Pa.
@@ -109,7 +113,8 @@ pub(crate) enum Untold {
     },
     /// The pressure was that under water.
     #[error(
-        "the depth sensor was under water: the pressure was {mean_pa:.0} Pa; that of air is {least_pa} to {most_pa}"
+        "the depth sensor was under water: the pressure was {mean_pa:.0} Pa; that of air is {least_pa} \
+         to {most_pa}"
     )]
     UnderWater {
         /// The pressure, Pa.
@@ -139,7 +144,8 @@ pub(crate) enum Untold {
     },
     /// The likelihood is still growing at the end of the search range.
     #[error(
-        "the latency exceeds the file's by {reach_ms:.0} ms or more; set latency_ms = {then_ms:.0}, and calibrate again"
+        "the latency exceeds the file's by {reach_ms:.0} ms or more; set latency_ms = {then_ms:.0}, and \
+         calibrate again"
     )]
     Later {
         /// Search range to either side, ms.
@@ -149,8 +155,8 @@ pub(crate) enum Untold {
     },
     /// The device answers before its next request, so it can't be that late.
     #[error(
-        "{found_ms:.0} ms fits best, but the device answers every {every_ms:.0} ms, so it can't be that late; look for a delay on its line, or \
-         another fault"
+        "{found_ms:.0} ms fits best, but the device answers every {every_ms:.0} ms, so it can't be \
+         that late; look for a delay on its line, or another fault"
     )]
     Slow {
         /// Most likely latency, ms.
@@ -160,8 +166,8 @@ pub(crate) enum Untold {
     },
     /// Ranges don't fit the size of the design profile.
     #[error(
-        "ranges are {long_pct:+.1} % long for this profile: set sound_speed_mps = {sound_mps:.0} in the vehicle file, or correct the profile there; \
-         other values can be estimated only afterwards"
+        "ranges are {long_pct:+.1} % long for this profile: set sound_speed_mps = {sound_mps:.0} \
+         in the vehicle file, or correct the profile there; other values can be estimated only afterwards"
     )]
     Scaled {
         /// Excess of the ranges, %.
@@ -171,8 +177,8 @@ pub(crate) enum Untold {
     },
     /// The filter disagrees with the measurements.
     #[error(
-        "the filter rejects {gated:.0} % of all measurements; at most {most:.0} % are allowed: mounts, beams or the profile \
-         of the vehicle file are wrong, or the vehicle turned too fast"
+        "the filter rejects {gated:.0} % of all measurements; at most {most:.0} % are allowed: \
+         mounts, beams or the profile of the vehicle file are wrong, or the vehicle turned too fast"
     )]
     Disagrees {
         /// Share of measurements it gates, %.
