@@ -115,7 +115,7 @@ fn start(args: &PageArgs, of: Of<'_>, lines: Option<&mut dyn FnMut(&str)>) -> Re
         proxies: args.page_proxy.clone(),
         tls: tls.map(|(certificate, key)| TlsFiles { certificate, key }),
     };
-    let instance = Token::random().map_err(|error| format!("the page has no random number: {error}"))?;
+    let instance = Token::random().map_err(|error| format!("getting a random number for the page: {error}"))?;
     let instance = instance.text().chars().take(12).collect();
     let (span, is_playback, waits) = (of.span, of.is_playback, of.mode != Mode::Live);
     let commands: Arc<Mutex<Option<Sender<PlaybackCommand>>>> = Arc::default();
@@ -141,10 +141,10 @@ fn tokens(args: &PageArgs, address: SocketAddr) -> Result<Option<Tokens>, String
     }
     if !std::io::stdout().is_terminal() {
         return Err(format!(
-            "a page on {address} is for others, too, and needs --page-token-file without a terminal"
+            "a page on {address} is open to other machines; without a terminal it needs --page-token-file"
         ));
     }
-    let random = || Token::random().map_err(|error| format!("the page has no tokens: {error}"));
+    let random = || Token::random().map_err(|error| format!("making tokens for the page: {error}"));
     Ok(Some(Tokens { viewer: random()?, operator: random()? }))
 }
 
@@ -322,7 +322,7 @@ fn direct(commands: &Arc<Mutex<Option<Sender<PlaybackCommand>>>>) -> Direct {
         if matches!(sent, Some(Ok(()))) {
             Ok(())
         } else {
-            Err("nothing is played that could be directed".to_owned())
+            Err("no playback is running that could be controlled".to_owned())
         }
     })
 }

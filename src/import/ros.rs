@@ -17,7 +17,7 @@ pub(super) fn feeds(
 ) -> Result<Feeds, Failure> {
     let Some(vehicle) = vehicle else {
         let what =
-            "import: recordings of ROS want --vehicle VEHICLE.toml, whose sensors' bytes their values become";
+            "import: ROS recordings need --vehicle VEHICLE.toml, to encode their values as that vehicle's sensors";
         return Err(Failure::Usage(what.to_owned()));
     };
     let Some(map) = &args.map else {

@@ -378,7 +378,7 @@ fn clock_mark(cell: Cell, hour: usize, ink: Ink) -> (char, Style) {
 }
 
 trait Ascii {
-    /// The same content in ASCII.
+    /// Replaces non-ASCII symbols if the terminal needs it.
     fn ascii(self, ink: Ink) -> Self;
 }
 

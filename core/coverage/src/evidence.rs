@@ -43,7 +43,7 @@ pub struct Evidence {
     pub lost_in_hole: u32,
     /// Largest step along the perimeter between neighbouring samples of one turn, m.
     pub t_y_m: f64,
-    /// The same step predicted for a level vehicle in the centre of the tunnel, m.
+    /// Largest step predicted for a level vehicle in the centre of the tunnel, m.
     pub middle_t_y_m: f64,
     /// Distance that the beams swung along the tunnel between two passes, m.
     pub swing_m: f64,

@@ -120,7 +120,7 @@ impl Course {
     }
 }
 
-/// Where samples have landed and may still land at a given time.
+/// Outlook: where samples have landed and may still land at a given time.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Outlook {
     /// Time of the outlook.
@@ -131,7 +131,7 @@ pub struct Outlook {
     pub swept_by_all: Option<Reach>,
     /// No head is alive.
     pub none_alive: bool,
-    /// Where samples may still land without the vehicle turning back.
+    /// Stretch where samples may still land without the vehicle turning back.
     pub to_come: Option<Reach>,
     /// Stretch behind the place where the vehicle began or turned back: not all heads have been there, nor
     /// will be.
@@ -152,7 +152,7 @@ pub struct Moved {
     pub left_ahead: Range<i64>,
     /// The coverage extent has grown by at least a section, perhaps outside the zone.
     pub way_grown: bool,
-    /// Where samples may still land without the vehicle turning back.
+    /// Stretch where samples may still land without the vehicle turning back.
     pub to_come: Option<Reach>,
 }
 
@@ -226,7 +226,8 @@ impl Frontier {
         self.awaited(heads, now).map(|head| head.latest).reduce(Reach::with)
     }
 
-    /// Where samples may still land without the vehicle turning back: the current reach and everything ahead.
+    /// Stretch where samples may still land without the vehicle turning back: the current reach and
+    /// everything ahead.
     fn to_come(&self, heads: impl Iterator<Item = HeadReach> + Clone, now: MonoNs) -> Option<Reach> {
         let reach = self.reach(heads, now)?;
         Some(match self.course {

@@ -31,7 +31,7 @@ pub struct Passage {
     pub silent: HeadSet,
     /// Driving figures at the moment of the largest T.
     pub drive: Drive,
-    /// More pings were made without a fix than are remembered.
+    /// More pings without a fix were made than are remembered.
     pub unseen: bool,
     /// A ping's place was so uncertain against the previous pass that its speed is no evidence.
     pub adrift: bool,

@@ -35,7 +35,7 @@ pub struct Request {
     pub swept_by_all: Option<Reach>,
     /// No head was alive then.
     pub none_alive: bool,
-    /// Where samples may still land without the vehicle turning back.
+    /// Stretch where samples may still land without the vehicle turning back.
     pub to_come: Option<Reach>,
     /// Stretch that not all heads have passed, nor will without the vehicle turning back.
     pub not_passed: Option<Reach>,

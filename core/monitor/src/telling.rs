@@ -367,7 +367,7 @@ fn as_it_is(told: &Stretch, sections: &Sections) -> Stretch {
     let Some(mut now) = each.next() else { return *told };
     (now.from, now.to) = (told.from, told.to);
     for here in each {
-        // All of them are within these bounds.
+        // All sections are within these bounds.
         if !now.join(&here, sections.section_m()) {
             break;
         }

@@ -30,7 +30,7 @@ pub struct UnsureStretch {
 }
 
 impl UnsureStretch {
-    /// From a stretch of sections.
+    /// Creates it from a stretch of sections.
     pub fn of(stretch: &Stretch, sections: &Sections) -> Self {
         Self::from_sections(stretch, sections.section_m(), sections.confidence_sd())
     }

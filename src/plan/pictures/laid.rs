@@ -61,7 +61,7 @@ pub(super) fn turns_shown(heads: usize) -> f64 {
     }
 }
 
-/// From the last head's start to the first head's end; the whole pattern if that is less than a turn.
+/// Stretch from the last head's start to the first head's end; the whole pattern if that is less than a turn.
 fn all_passed_m(samples: &[PatternSample], heads: usize, pitch_m: f64) -> [f64; 2] {
     let of = |head: usize| samples.iter().filter(move |sample| sample.head == head).map(|sample| sample.x_m);
     let firsts = (0..heads).map(|head| of(head).fold(f64::INFINITY, f64::min));

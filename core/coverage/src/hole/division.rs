@@ -17,7 +17,7 @@ pub(super) struct Share {
     len: usize,
     /// Squared distance of the farthest corner from the owner; zero when nothing is left.
     pub farthest2: f64,
-    /// That corner.
+    /// The farthest corner.
     pub farthest: (f64, f64),
 }
 
