@@ -115,7 +115,8 @@ fn start(args: &PageArgs, of: Of<'_>, lines: Option<&mut dyn FnMut(&str)>) -> Re
         proxies: args.page_proxy.clone(),
         tls: tls.map(|(certificate, key)| TlsFiles { certificate, key }),
     };
-    let instance = Token::random().map_err(|error| format!("getting a random number for the page: {error}"))?;
+    let instance =
+        Token::random().map_err(|error| format!("getting a random number for the page: {error}"))?;
     let instance = instance.text().chars().take(12).collect();
     let (span, is_playback, waits) = (of.span, of.is_playback, of.mode != Mode::Live);
     let commands: Arc<Mutex<Option<Sender<PlaybackCommand>>>> = Arc::default();

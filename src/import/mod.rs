@@ -138,7 +138,7 @@ fn format(
         return Ok(Box::new(Bag::new(ros::feeds(args, vehicle, &topics)?)));
     }
     let (Some(map), Some(vehicle)) = (&args.map, vehicle) else {
-        let what = "import: CSV needs --vehicle VEHICLE.toml, to encode its values as that vehicle's sensors";
+        let what = "import: CSV needs --vehicle VEHICLE.toml, to encode values for its sensors";
         return Err(Failure::Usage(what.to_owned()));
     };
     let (text, name) = (files::read(map)?, map.display().to_string());

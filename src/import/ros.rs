@@ -16,8 +16,7 @@ pub(super) fn feeds(
     topics: &[Topic],
 ) -> Result<Feeds, Failure> {
     let Some(vehicle) = vehicle else {
-        let what =
-            "import: ROS recordings need --vehicle VEHICLE.toml, to encode their values as that vehicle's sensors";
+        let what = "import: ROS recordings need --vehicle VEHICLE.toml, to encode values for its sensors";
         return Err(Failure::Usage(what.to_owned()));
     };
     let Some(map) = &args.map else {
