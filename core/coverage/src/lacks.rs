@@ -62,8 +62,8 @@ impl Lacks {
         self.extend(at, lack.x_m);
     }
 
-    /// Extends a block's extent by an entry at this position of the ring. The first entry of a rewritten
-    /// block resets the extent.
+    /// Extends a block's extent by an entry at this position of the ring. A block full of new entries gets
+    /// the extent of these alone.
     fn extend(&mut self, at: usize, x_m: f64) {
         let block = at / BLOCK;
         let wider_m = |[from_m, to_m]: [f64; 2], x_m: f64| [from_m.min(x_m), to_m.max(x_m)];

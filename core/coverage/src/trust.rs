@@ -96,7 +96,8 @@ const UNCHANGED: f64 = 0.2;
 const CONSTANT: f64 = 0.6;
 /// A constant range contradicts the design if the design's varies by this many tolerances.
 const VARIES: f64 = 2.0;
-/// Successive returns that make a run of unchanged range: neighbours on a wall differ more often.
+/// Successive returns that make a run of unchanged range. A few neighbours on a wall may have nearly the same
+/// range.
 const RUN: u32 = 8;
 /// Design variation, in tolerances, that an exactly constant range contradicts if another head's range
 /// changes.
