@@ -153,7 +153,7 @@ fn what_is_wrong_with_the_file_is_found_and_offered() {
     imu          latency                             0.0       73.4      6.6 ms  differs
 
     not told by this log
-      tether, latency: the vehicle hardly turned or moved for it: it would be known to 38 ms
+      tether, latency: the vehicle hardly turned or moved: the latency would be known only to 38 ms
 
     for the vehicle file
     [water]
@@ -184,7 +184,7 @@ fn a_late_head_is_found_and_nothing_else_is_late() {
         .as_str()
         .unwrap();
     let found_ms: f64 = why.split(' ').next().unwrap().parse().unwrap();
-    assert!((found_ms - 50.0).abs() < 30.0 && why.contains(" ms: it can't be as late"), "{why}");
+    assert!((found_ms - 50.0).abs() < 30.0 && why.contains(" ms, so it can't be that late"), "{why}");
     for of in ["aft", "imu", "ping_left", "ping_right", "ping_up", "ping_down"] {
         assert_latency(&report, of, 0.0, 30.0);
     }
