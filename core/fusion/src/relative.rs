@@ -39,7 +39,7 @@ impl Relative {
         math::sqrt((pitch + yaw).max(0.0))
     }
 
-    /// The covariance for another reference point of the vehicle, at `arm` from this one.
+    /// Returns the covariance for another reference point of the vehicle, at `arm` from this one.
     #[must_use]
     pub fn moved(&self, arm: Vec3<Tunnel>) -> Self {
         let sheared = |[x, pitch, yaw]: [f64; 3]| [x + arm.z() * pitch - arm.y() * yaw, pitch, yaw];

@@ -23,9 +23,9 @@ pub type Words = [u64; WORDS];
 pub enum Move {
     /// Propagation over a leg.
     Leg(Leg),
-    /// Variances added to those of the errors, which had been too small.
+    /// Variances added to those of the errors, which had been underestimated.
     Widened(Errors),
-    /// None: this was the last estimate of its piece.
+    /// No change: this is the last estimate of its piece.
     End,
 }
 
