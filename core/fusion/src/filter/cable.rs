@@ -350,7 +350,11 @@ mod tests {
             cable.take(&reading(t, 7.0, off_m, 0.005));
             assert!((cable.differs_m() + off_m).abs() < 1e-12, "{t}");
         }
-        assert_eq!(cable.doubt(START + DurNs::from_secs_f64(1.0)), None, "a dispute shorter than a second is no doubt");
+        assert_eq!(
+            cable.doubt(START + DurNs::from_secs_f64(1.0)),
+            None,
+            "a dispute shorter than a second is no doubt"
+        );
         let doubt = cable.doubt(START + DurNs::from_secs_f64(1.2)).unwrap();
         assert!((doubt.from_m - 7.02).abs() < 1e-12 && (doubt.differs_m - 0.5).abs() < 1e-12, "{doubt:?}");
     }

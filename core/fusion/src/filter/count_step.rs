@@ -141,7 +141,10 @@ mod tests {
             assert!((found_m - 0.0005).abs() < 1e-12, "{speed_mps}: {found_m}");
         }
         assert!((recognised_m(0.0005, 0.02, |t| 0.2 * t) - 0.02).abs() < 1e-12, "as stated");
-        assert!((recognised_m(0.01, 0.0005, |_| 3.0) - COMMON_STEP_M).abs() < 1e-12, "a stationary counter has the common step");
+        assert!(
+            (recognised_m(0.01, 0.0005, |_| 3.0) - COMMON_STEP_M).abs() < 1e-12,
+            "a stationary counter has the common step"
+        );
     }
 
     #[test]
