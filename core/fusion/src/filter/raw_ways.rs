@@ -22,7 +22,9 @@ const WINDOWS_S: [f64; 3] = [2.0, 10.0, 60.0];
 /// Time between two comparisons, and capacity for those of the longest window.
 const EVERY: DurNs = DurNs(200_000_000);
 const ROOM: usize = 320;
-/// Room for the last readings of a source, and the least time between those kept: the longest window of the filter and more, at any rate.
+/// Capacity for the last readings of a source, and the minimum time between kept readings.
+///
+/// At any rate, they span more than the filter's longest window.
 const READINGS: usize = 96;
 const NEAR: DurNs = DurNs(20_000_000);
 /// Silence after which a source is not compared; a velocity log may send a reading only every two seconds.

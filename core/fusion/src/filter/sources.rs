@@ -44,7 +44,7 @@ pub struct Consistency {
     pub gated: u64,
     /// Readings that arrived too late to be fused.
     pub late: u64,
-    /// Readings that were implausible or not finite, or for which there was no room.
+    /// Readings that were implausible or not finite, or that found no room.
     pub dropped: u64,
     /// Sum of the normalised innovations squared (NIS) of the measurements used.
     pub nis_sum: f64,

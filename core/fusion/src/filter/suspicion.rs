@@ -154,7 +154,7 @@ struct Block {
     tilted: [[[f64; 5]; 2]; FOLLOWED],
 }
 
-/// See the module's description.
+/// Sums for all settings that are judged.
 #[derive(Debug, Clone)]
 pub struct Suspicions {
     block: Block,
