@@ -1,5 +1,4 @@
-//! The general case by ray casting: where the beams of a head at rest meet the wall of any profile, from any position
-//! and attitude.
+//! The general case by ray casting: where beams of a head at rest meet the wall of any profile, from any pose.
 
 use serde::{Deserialize, Serialize};
 
@@ -9,7 +8,7 @@ use headrace_geometry::math::{self, TAU};
 use headrace_geometry::snapshot::stateful;
 use headrace_geometry::tunnel::{Profile, WallHit};
 
-/// A beam with a longer range than this runs along the tunnel, m.
+/// Range above which a beam counts as running along the tunnel, m.
 const ALONG_M: f64 = 1000.0;
 
 /// A head at rest in a straight tunnel.
@@ -130,11 +129,12 @@ impl Sounding {
 #[derive(Debug, Clone, Default)]
 pub struct Ring {
     soundings: Vec<Sounding>,
-    /// Signed arc length from the first sounding to each, m, and last that of the whole turn; negative where the head
-    /// turns against arc length.
+    /// Signed arc length from the first sounding to each, m; the last entry is that of the whole turn.
+    ///
+    /// Negative if the head turns against arc length.
     way_m: Vec<f64>,
     perimeter_m: f64,
-    /// Angles and beam directions of the soundings, kept from cast to cast.
+    /// Angles and beam directions of the soundings, cached between casts.
     beams: Vec<(f64, Vec3<Sensor>)>,
     /// Stride of the distances cached in `steps_m`; zero if there are none.
     stride: usize,
@@ -144,7 +144,7 @@ pub struct Ring {
 stateful!(Ring { state: perimeter_m, stride; lists: soundings, way_m, beams, steps_m; });
 
 impl Ring {
-    /// A ring of `count` soundings, the first at `start_rad`.
+    /// Casts a ring of `count` soundings, the first at `start_rad`.
     ///
     /// Errors: as for [`Standing::sounding`]; a count of zero.
     pub fn cast(standing: &Standing<'_>, start_rad: f64, count: u32) -> Result<Self, SamplingError> {
@@ -153,7 +153,7 @@ impl Ring {
         Ok(ring)
     }
 
-    /// Recasts in place; without soundings after an error.
+    /// Recasts in place; after an error there are no soundings.
     ///
     /// Errors: as for [`Ring::cast`].
     /// Allocates: not when the ring has had as many soundings before.

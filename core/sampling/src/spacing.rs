@@ -40,10 +40,13 @@ pub struct Spiral {
 }
 
 impl Spiral {
+    /// Creates the spiral.
+    ///
     /// `passes_per_turn` is the number of passes over a place in the time of one turn: 1 for a single head, s for s
     /// heads in phase shift, s / 2 for s heads in sectors.
     ///
-    /// Errors: a negative speed, passes that aren't above zero, or a value that isn't finite. A speed of zero is valid:
+    /// Errors: a negative speed, passes that are not positive, or a value that is not finite. A speed of zero is
+    /// valid:
     /// all distances along the tunnel are zero.
     pub fn new(speed_mps: f64, turn: Turn, passes_per_turn: f64) -> Result<Self, SamplingError> {
         not_negative("the speed in m/s", speed_mps)?;
@@ -126,7 +129,7 @@ mod tests {
     }
 
     #[test]
-    fn at_rest_all_distances_along_the_tunnel_are_zero() {
+    fn distances_along_the_tunnel_are_zero_at_rest() {
         let turn = Turn::new(f64::to_radians(0.9), 8.0).unwrap();
         let rest = Spiral::new(0.0, turn, 2.0).unwrap();
         assert_eq!((rest.advance_m(), rest.t_x_m(), rest.t_max_m(0.2)), (0.0, 0.0, 0.2));
@@ -138,7 +141,7 @@ mod tests {
     }
 
     #[test]
-    fn speed_and_target_are_each_other_s_inverse() {
+    fn speed_and_target_are_inverse() {
         let v = speed_for_target_mps(0.5, 0.12, 2.0, 0.02).unwrap();
         assert!((t_max_m(v * 2.0, v * 0.02, 0.12) - 0.5).abs() < 1e-12);
         assert_eq!(speed_for_target_mps(0.5, 0.5, 2.0, 0.02), None);

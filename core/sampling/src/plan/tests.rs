@@ -131,7 +131,7 @@ fn in_sectors_heads_look_outwards_and_leave_their_distance_at_floor_and_crown() 
     let answers = planner.answers(&speed(0.4), None).unwrap();
     let fastest = &answers[4];
     assert_eq!((fastest.reason, fastest.v_max_mps), (Some("angular_step"), None));
-    assert!(fastest.refused.as_ref().unwrap().contains("met at no speed"));
+    assert!(fastest.refused.as_ref().unwrap().contains("no speed meets a target"));
     let slow = planner.answers(&speed(0.25), None).unwrap();
     assert_eq!(slow[0].reason, Some("unseen_strip"), "{:?}", slow[0].refused);
     assert!(slow[0].refused.as_ref().unwrap().contains("no head sees 0.30 m of the wall"));
