@@ -96,9 +96,7 @@ pub enum SamplingError {
         arc_m: f64,
     },
     /// The vehicle's heading is too far off the axis, or it swings too fast.
-    #[error(
-        "no speed meets a target of {target_m} m: at this heading or swing, passes are farther apart"
-    )]
+    #[error("no speed meets a target of {target_m} m: at this heading or swing, passes are farther apart")]
     OffAxis {
         /// The target, m.
         target_m: f64,

@@ -151,15 +151,15 @@ mod tests {
 
     #[test]
     fn heads_that_look_the_same_way_share_a_patch_of_wall() {
-        // At 0.2 m spacing and half a turn's advance of 0.2 m, both heads are always at the same angle.
+        // Time that two heads `apart_m` apart along the hull share a patch, s.
         let shared = |apart_m: f64| {
             let found = found(&[[apart_m, 0.0, 0.0], [0.0, 0.0, 0.1]], HeadLayout::PhaseShift);
             found.iter().map(|exposure| exposure.same_patch_s).sum::<f64>()
         };
-        // 0.2 m/s, 8 s a turn: 0.8 m in half a turn; there the footprints are too far apart.
+        // At 0.2 m/s and 8 s per turn, the vehicle travels 0.8 m in half a turn. That far apart, footprints never overlap.
         assert!(shared(0.8) <= 0.0);
-        // A beam is 0.15 m wide at 6 m, and wider on the floor. At 0.1 m the patches are close, but the angles half a
-        // turn apart.
+        // A beam is 0.15 m wide at 6 m, and wider on the floor. Heads 0.1 m apart are near enough, but their angles are
+        // half a turn apart.
         assert!(shared(0.1) <= 0.0);
         let heads = heads(&[[0.1, 0.0, 0.0], [0.0, 0.0, 0.1]]);
         let profile = shapes::ceran().unwrap();

@@ -143,7 +143,7 @@ fn cylinder_entered(
     let (offset, direction) = ((from + -base).0, direction.0);
     let (height, climb) = (offset.dot(&axis), direction.dot(&axis));
     let (across, drift) = (offset - axis * height, direction - axis * climb);
-    // Interval of the ray inside the infinite cylinder, then between its ends.
+    // The ray's interval inside the infinite cylinder, which is then limited to the cylinder's ends.
     let (a, b) = (drift.dot(&drift), across.dot(&drift));
     let c = across.dot(&across) - radius_m * radius_m;
     let (mut enter, mut leave) = (f64::NEG_INFINITY, f64::INFINITY);
