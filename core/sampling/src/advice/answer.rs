@@ -128,7 +128,7 @@ pub struct Alternative {
 /// It corresponds to `planned_speed_mps` in `[heads]` of the vehicle file.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Anew {
-    /// The speed to start them for, which is the largest that meets the target then, m/s.
+    /// Speed to start them for, m/s: the largest that then meets the target.
     pub planned_speed_mps: f64,
 }
 

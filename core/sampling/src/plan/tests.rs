@@ -188,7 +188,7 @@ fn impossible_plan_names_the_cause() {
     for bad in [0.0, -1.0, f64::NAN] {
         assert!(planner.answers(&speed(bad), None).is_err() && planner.t_max_m(0, bad).is_err());
     }
-    // A target that a mode can't meet is an answer, not an error.
+    // A target that a mode cannot meet is an answer, not an error.
     let answers = planner.answers(&speed(0.1), None).unwrap();
     assert!(answers[0].v_max_mps.is_some() && answers[4].reason == Some("angular_step"));
 }
@@ -269,7 +269,7 @@ fn pattern_equals_the_samples_of_the_heads() {
     assert!((hidden - 15.33 / 360.0).abs() < 2e-3, "{hidden}");
     let sectors = inspection(vec![head([0.0; 3], false, 0.0); 2], HeadLayout::SectorOffset);
     let samples = Planner::new(sectors).unwrap().pattern(2, 0.1, 2.0).unwrap();
-    // Two turns are four sweeps of half a turn: three turning points within.
+    // Two turns are four sweeps of half a turn, with three turning points in between.
     assert_eq!(samples.iter().filter(|sample| sample.new_sweep).count(), 2 * 4);
 }
 
