@@ -217,7 +217,7 @@ fn what_cannot_be_planned_is_refused_with_its_reason() {
     --tunnel circle,radius=3 --target 0.5
         headrace: --tunnel:2: radius: is not a key here; did you mean radius_m?
     --tunnel bow.csv --target 0.5
-        headrace: --tunnel:2: file = "bow.csv": line 2 of it: the profile isn't star-shaped about (-1, 0): it runs backwards or crosses itself at vertex 0, counted from 0
+        headrace: --tunnel:2: file = "bow.csv": line 2: the profile isn't star-shaped about (-1, 0): it runs backwards or crosses itself at vertex 0, counted from 0
     --tunnel ceran --target 0.5 --layout sector_offset
         headrace: planning: sector offset divides a turn among heads: it needs at least 2, not 1
     --tunnel ceran --target 0.5 --drift 8

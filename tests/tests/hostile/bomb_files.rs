@@ -59,7 +59,7 @@ fn files() -> Vec<Bomb> {
             "a vehicle of 1 MiB",
             format!("{VEHICLE}#{}", "x".repeat(1 << 20)),
             check,
-            "the longest that is read has 1048576",
+            "the most allowed is 1048576",
         ),
         (
             "a vehicle of 17 MiB",

@@ -49,10 +49,10 @@ impl<F: Framing + Send, const N: usize> Driver for Listener<F, N> {
     }
 }
 
-/// Describes the fault of a message, if it has one.
+/// Returns the fault of a message, if it has one.
 pub type Judge = Box<dyn Fn(&[u8]) -> Option<String> + Send>;
 
-/// Listens to whole messages and delivers each.
+/// Listens to whole messages and delivers each one.
 pub struct MessageListener {
     judge: Judge,
     silence_timeout: DurNs,
