@@ -70,11 +70,11 @@ fn all_errors_are_found_in_one_pass() {
             water.finish()?;
             Ok(speed)
         })?;
-        assert_eq!(water, None, "wrong in part is wrong");
+        assert_eq!(water, None, "a table with an error is discarded");
         for part in root.sections("parts")? {
             root.part(|| {
                 let id = part.text("id")?;
-                // Neither follows from what is wrong already, nor is told for it.
+                // These errors may only follow from earlier ones, so they are not reported.
                 part.number("rate_hz", 1.0..=9.0)?.ok_or_else(|| part.invalid("rate_hz", "is needed"))?;
                 part.required("id", id)
             })?;

@@ -242,7 +242,7 @@ pub trait Decoder: Stateful + Send + Sync {
 /// Initial conditions of an emulated device.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct EmulatorSetup {
-    /// Power-on time; its first action may be then.
+    /// Power-on time, at which its first action may take place.
     pub start: MonoNs,
     /// For a head, its program.
     pub head: Option<HeadProgram>,

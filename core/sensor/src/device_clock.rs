@@ -190,7 +190,7 @@ impl DeviceClock {
         Some(epoch.begun + device + late)
     }
 
-    /// Statistics so far. The drift is that of the epoch with the smallest standard deviation.
+    /// Returns the statistics so far. The drift is that of the epoch with the smallest standard deviation.
     pub fn report(&self) -> ClockReport {
         let now = self.drift_now();
         let best =

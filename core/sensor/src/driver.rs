@@ -64,7 +64,7 @@ pub trait Wire {
 pub struct DeviceHealth {
     /// Valid messages received from it.
     pub good_frames: u64,
-    /// Identity reported by the device, once received.
+    /// Identity that the device has reported.
     pub identity: Option<String>,
     /// Description of a fault, with its remedy.
     pub complaint: Option<String>,

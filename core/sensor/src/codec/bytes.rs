@@ -35,7 +35,7 @@ impl<const N: usize> Bytes<N> {
 
     /// Appends `bytes`.
     ///
-    /// Errors: they don't fit; nothing is appended.
+    /// Errors: they do not fit; nothing is appended.
     pub fn extend(&mut self, bytes: &[u8]) -> Result<(), TooLong> {
         let len = self.len + bytes.len();
         let free = self.bytes.get_mut(self.len..len).ok_or(TooLong { len, max: N })?;

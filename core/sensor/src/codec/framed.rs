@@ -38,7 +38,7 @@ pub trait Framing: Copy {
     /// Verdict on the start of `front`, which has at least one byte. Depends on these bytes alone.
     fn judge(&self, front: &[u8]) -> Verdict;
 
-    /// Value of a frame accepted by [`Framing::judge`]; `None` if it carries nothing of use.
+    /// Returns the value of a frame accepted by [`Framing::judge`]; `None` if it carries nothing useful.
     fn read(&self, frame: &[u8]) -> Option<Self::Value>;
 }
 
