@@ -85,7 +85,12 @@ fn files() -> Vec<Bomb> {
             check,
             "tables; the most allowed is 2000",
         ),
-        ("20,000 sensors", VEHICLE.to_owned() + &many(20_000, sensor), check, "tables; the most allowed is 2000"),
+        (
+            "20,000 sensors",
+            VEHICLE.to_owned() + &many(20_000, sensor),
+            check,
+            "tables; the most allowed is 2000",
+        ),
         (
             "70,000 openings",
             VEHICLE.to_owned() + &"[[openings]]\n".repeat(70_000),
