@@ -98,7 +98,7 @@ pub fn wrap_signed(difference: f64, modulus: f64) -> f64 {
 /// The largest integer not above `x`; saturates, and NaN gives zero.
 #[expect(
     clippy::cast_possible_truncation,
-    reason = "float to integer casts saturate, which is what is wanted"
+    reason = "float to integer casts saturate, as intended"
 )]
 pub fn floor_to_i64(x: f64) -> i64 {
     // Avoids a library call, because several calls per sample look up cells and sections.
@@ -109,7 +109,7 @@ pub fn floor_to_i64(x: f64) -> i64 {
 /// The nearest integer to `x` (halves to even); saturates, and NaN gives zero.
 #[expect(
     clippy::cast_possible_truncation,
-    reason = "float to integer casts saturate, which is what is wanted"
+    reason = "float to integer casts saturate, as intended"
 )]
 pub fn round_to_i64(x: f64) -> i64 {
     /// 2^52: doubles of this size have no fraction, and adding it rounds to integer, halves to even.

@@ -19,7 +19,7 @@ pub struct Standing<'a> {
     turn: Rot<Tunnel, Sensor>,
 }
 
-/// Where a beam meets the wall.
+/// Point where a beam meets the wall.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Sounding {
     /// Head angle, radians in the sensor's frame.
@@ -58,7 +58,7 @@ impl<'a> Standing<'a> {
         self.profile.perimeter_m()
     }
 
-    /// Where the beam at `angle_rad` (sensor frame) meets the wall.
+    /// Returns the point where the beam at `angle_rad` (sensor frame) meets the wall.
     ///
     /// Errors: no wall within a kilometre along the beam.
     pub fn sounding(&self, angle_rad: f64) -> Result<Sounding, SamplingError> {

@@ -171,7 +171,7 @@ mod tests {
     }
 
     #[test]
-    fn verif_hand_computed_values() {
+    fn formulas_equal_hand_computed_values() {
         let step = f64::to_radians(0.9);
         // tan 0.9 deg = 0.015709; h = 4.571 m.
         assert!((t_y1_m(4.571, step).unwrap() - 0.071_807).abs() < 1e-6);

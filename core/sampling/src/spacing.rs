@@ -115,7 +115,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn verif_hand_computed_values() {
+    fn formulas_equal_hand_computed_values() {
         let fast = Turn::new(f64::to_radians(0.9), 8.0).unwrap();
         let one = Spiral::new(0.197, fast, 1.0).unwrap();
         assert!((one.advance_m() - 0.003_94).abs() < 1e-15);

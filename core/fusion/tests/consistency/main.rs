@@ -8,7 +8,7 @@
 #![expect(
     clippy::unwrap_used,
     clippy::cast_possible_truncation,
-    reason = "a test stops at what it can't do; times are small"
+    reason = "a test panics on failure; times are small"
 )]
 
 mod tally;
