@@ -96,10 +96,7 @@ pub fn wrap_signed(difference: f64, modulus: f64) -> f64 {
 }
 
 /// The largest integer not above `x`; saturates, and NaN gives zero.
-#[expect(
-    clippy::cast_possible_truncation,
-    reason = "float to integer casts saturate, as intended"
-)]
+#[expect(clippy::cast_possible_truncation, reason = "float to integer casts saturate, as intended")]
 pub fn floor_to_i64(x: f64) -> i64 {
     // Avoids a library call, because several calls per sample look up cells and sections.
     let towards_zero = x as i64;
@@ -107,10 +104,7 @@ pub fn floor_to_i64(x: f64) -> i64 {
 }
 
 /// The nearest integer to `x` (halves to even); saturates, and NaN gives zero.
-#[expect(
-    clippy::cast_possible_truncation,
-    reason = "float to integer casts saturate, as intended"
-)]
+#[expect(clippy::cast_possible_truncation, reason = "float to integer casts saturate, as intended")]
 pub fn round_to_i64(x: f64) -> i64 {
     /// 2^52: doubles of this size have no fraction, and adding it rounds to integer, halves to even.
     const WHOLE: f64 = 4_503_599_627_370_496.0;

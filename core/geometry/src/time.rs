@@ -31,10 +31,7 @@ impl DurNs {
     }
 
     /// Seconds rounded to the nearest nanosecond; NaN gives zero, and values beyond 292 years saturate.
-    #[expect(
-        clippy::cast_possible_truncation,
-        reason = "float to integer casts saturate, as intended"
-    )]
+    #[expect(clippy::cast_possible_truncation, reason = "float to integer casts saturate, as intended")]
     pub fn from_secs_f64(seconds: f64) -> Self {
         Self(libm::rint(seconds * NS_PER_S) as i64)
     }
