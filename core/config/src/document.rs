@@ -50,7 +50,9 @@ impl<'a> Document<'a> {
         }
     }
 
-    /// Returns the line of a key by its dotted path (`sensors[1].connect`), or of its table; else the first line.
+    /// Returns the line of a key by its dotted path (`sensors[1].connect`), or of its table.
+    ///
+    /// If neither exists, it is the first line.
     pub fn line_of(self, path: &str) -> usize {
         if self.is_short().is_err() {
             return 1;

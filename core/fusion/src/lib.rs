@@ -81,8 +81,9 @@ pub trait Navigation: Stateful + Send + Sync {
         0
     }
 
-    /// Returns the setting that the ranges contradict with certainty; `None` if there is none or settings are not
-    /// judged.
+    /// Returns the setting that the ranges contradict with certainty.
+    ///
+    /// `None` if there is none or settings are not judged.
     fn setting_doubt(&self) -> Option<SettingDoubt> {
         None
     }

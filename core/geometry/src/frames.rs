@@ -186,8 +186,9 @@ impl<To, From> Rot<To, From> {
         Self(UnitQuaternion::new_unchecked(q), PhantomData)
     }
 
-    /// Returns roll, pitch and yaw in radians, with pitch in [-pi/2, pi/2]; the inverse of
-    /// [`Rot::from_roll_pitch_yaw`].
+    /// Returns roll, pitch and yaw in radians, with pitch in [-pi/2, pi/2].
+    ///
+    /// It is the inverse of [`Rot::from_roll_pitch_yaw`].
     pub fn roll_pitch_yaw(&self) -> (f64, f64, f64) {
         let q = self.0.quaternion();
         let (w, x, y, z) = (q.w, q.i, q.j, q.k);

@@ -466,7 +466,9 @@ impl Advisor {
         });
     }
 
-    /// Largest speed in a mode, m/s; zero if none meets the target, `None` if a head does not have the mode.
+    /// Largest speed in a mode, m/s.
+    ///
+    /// Zero if none meets the target, `None` if a head does not have the mode.
     fn mode_speed_mps(&self, number: usize, heads: HeadSet, going: &Going, sure: SureTarget) -> Option<f64> {
         let name = self.heads.first()?.modes.get(number)?.name;
         let turn = |head: usize| self.heads.get(head)?.mode(name).map(|mode| mode.turn);

@@ -101,8 +101,9 @@ pub struct ExpectedErrors {
 }
 
 impl ExpectedErrors {
-    /// Returns the standard deviation after a time between passes, m; interpolated, and proportional to time beyond
-    /// the last.
+    /// Returns the standard deviation after a time between passes, m.
+    ///
+    /// It is interpolated, and proportional to time beyond the last entry.
     pub fn pass_error_m(&self, time_s: f64) -> f64 {
         let mut before = [0.0, 0.0];
         for &after in &self.by_time {
@@ -202,7 +203,9 @@ impl Margins {
         ]
     }
 
-    /// Returns the margin with the highest cost; [`Margin::Geometry`] if none takes a twentieth of the speed.
+    /// Returns the margin with the highest cost.
+    ///
+    /// [`Margin::Geometry`] if none takes a twentieth of the speed.
     pub fn costliest(&self) -> Margin {
         const NOTABLE: f64 = 0.05;
         let costly = self.prices_mps().into_iter().max_by(|a, b| a.1.total_cmp(&b.1));

@@ -169,7 +169,9 @@ fn cylinder_entered(
     (enter > 0.0 && enter < leave).then_some(enter)
 }
 
-/// Returns the angles at which obstacles hide the wall from a head, in ascending order; edges are exact to 1e-12 rad.
+/// Returns the angles at which obstacles hide the wall from a head, in ascending order.
+///
+/// Edges are exact to 1e-12 rad.
 ///
 /// The beam is taken as a ray; a real beam is weakened for another half of its width on either side.
 pub fn hidden_angles(mount: &Mount, obstacles: &[Obstacle]) -> Vec<AngleRange> {

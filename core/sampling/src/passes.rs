@@ -346,8 +346,9 @@ impl Passes {
         Ok(Self { heads, turns_s, pattern, parallax_s: 0.0, at_rest: false, lossy: false })
     }
 
-    /// Creates passes of heads in sectors, started by a schedule for this speed; `sweep_s` is the period there and
-    /// back, s.
+    /// Creates passes of heads in sectors, started by a schedule for this speed.
+    ///
+    /// `sweep_s` is the period there and back, s.
     ///
     /// Errors: no head.
     pub fn in_sectors(heads: HeadSet, sweep_s: f64) -> Result<Self, SamplingError> {
@@ -363,7 +364,9 @@ impl Passes {
         self.heads
     }
 
-    /// Returns the longest time between two passes over a place that these heads see, s; `None` if none sees it.
+    /// Returns the longest time between two passes over a place that these heads see, s.
+    ///
+    /// `None` if none sees it.
     pub fn gap_s(&self, seen_by: HeadSet) -> Option<f64> {
         let passing = || seen_by.iter().filter(|head| self.heads.has(*head));
         passing().next()?;

@@ -356,8 +356,9 @@ impl PlannedMode {
     }
 }
 
-/// Returns the more severe of two errors: any other error, then an unseen strip, then a step; within one kind, the
-/// larger.
+/// Returns the more severe of two errors: any other error, then an unseen strip, then a step.
+///
+/// Within one kind, the larger one counts.
 fn worse(known: Option<SamplingError>, other: SamplingError) -> Option<SamplingError> {
     let weight = |why: &SamplingError| match why {
         SamplingError::UnseenStrip { width_m, .. } => (1, *width_m),

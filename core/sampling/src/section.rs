@@ -16,8 +16,9 @@ pub fn t_y1_m(distance_m: f64, step_rad: f64) -> Result<f64, SamplingError> {
     t_y2_m(distance_m, step_rad, 1)
 }
 
-/// T_y2, m: the step along a flat wall from (m - 1) theta to m theta, for any m >= 1; the largest where m theta meets
-/// the corner.
+/// T_y2, m: the step along a flat wall from (m - 1) theta to m theta, for any m >= 1.
+///
+/// It is the largest where m theta meets the corner.
 ///
 /// `distance_m` > 0 is the distance h to the wall. h (tan(m theta) - tan((m - 1) theta)) is computed as h sin(theta) /
 /// (cos(m theta) cos((m - 1) theta)), which avoids cancellation. Multiples of theta are kept to twice double precision,

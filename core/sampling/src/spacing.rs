@@ -13,8 +13,9 @@ pub fn t_max_m(t_x_m: f64, advance_m: f64, t_y_m: f64) -> f64 {
     math::hypot(t_x_m + advance_m, t_y_m)
 }
 
-/// The speed at which T_max equals the target, m/s; `None` where `t_y_m` alone reaches the target, or the times aren't
-/// positive.
+/// The speed at which T_max equals the target, m/s.
+///
+/// `None` where `t_y_m` alone reaches the target, or the times aren't positive.
 ///
 /// `pass_gap_s` is the time between passes (T_rev / s for s evenly interleaved heads), `ping_period_s` that between
 /// pings (T_s).
@@ -24,8 +25,9 @@ pub fn speed_for_target_mps(target_m: f64, t_y_m: f64, pass_gap_s: f64, ping_per
     along_m(target_m, t_y_m).filter(|_| time_s > 0.0).map(|along_m| along_m / time_s)
 }
 
-/// Sum of pass distance and ping advance that the target T allows, m: sqrt(T^2 - T_y^2); `None` where `t_y_m` alone
-/// reaches the target.
+/// Sum of pass distance and ping advance that the target T allows, m: sqrt(T^2 - T_y^2).
+///
+/// `None` where `t_y_m` alone reaches the target.
 pub(super) fn along_m(target_m: f64, t_y_m: f64) -> Option<f64> {
     // (T - t)(T + t) avoids cancellation for t close to T.
     (t_y_m < target_m).then(|| math::sqrt((target_m - t_y_m) * (target_m + t_y_m)))

@@ -63,8 +63,9 @@ pub struct Bound {
 /// A strip that misses a target at a speed.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Unmet {
-    /// Longest time between two passes over it, s, without extra passes for lost returns; infinite if no head sees
-    /// it.
+    /// Longest time between two passes over it, s, without extra passes for lost returns.
+    ///
+    /// Infinite if no head sees it.
     pub gap_s: f64,
     /// The largest step on it, m.
     pub t_y_m: f64,
@@ -83,8 +84,9 @@ pub struct Strips {
     perimeter_m: f64,
     /// By setting and strip: largest step of the heads that see it, and of all heads, m.
     steps_m: Vec<[f64; 2]>,
-    /// By setting and strip: passes needed because of lost returns, within and across it; empty before the first
-    /// count.
+    /// By setting and strip: passes needed because of lost returns, within and across it.
+    ///
+    /// Empty before the first count.
     needed: Vec<[f64; 2]>,
     /// Strip of each sounding of the current ring, and the approximate distance to that strip's end, m.
     strip_of: Vec<(usize, f64)>,
@@ -231,7 +233,9 @@ impl Strips {
         of_setting.map(|steps| steps[0]).fold(0.0, f64::max)
     }
 
-    /// Returns T_max predicted at a speed, m: the largest of any strip; infinite if no head sees a wide strip.
+    /// Returns T_max predicted at a speed, m: the largest of any strip.
+    ///
+    /// Infinite if no head sees a wide strip.
     ///
     /// Passes are farther apart on a strip that some heads do not see. But the width of the strip also limits the
     /// distance between the samples on either side of it.
@@ -264,7 +268,9 @@ impl Strips {
         })
     }
 
-    /// Returns the largest speed for a target if every head saw all of the wall, m/s; `None` if none meets it.
+    /// Returns the largest speed for a target if every head saw all of the wall, m/s.
+    ///
+    /// `None` if none meets it.
     pub fn bound_if_all_seen_mps(
         &self,
         setting: usize,

@@ -7,10 +7,13 @@ use headrace_geometry::time::{DurNs, MonoNs};
 
 /// Number of stored headings: at 5 Hz, `WINDOW` plus one turn of a head in its slowest mode.
 const BEATS: usize = 320;
-/// History in which a swing counts; a swing with a period of up to a minute shows its full extent in half of it.
+/// History in which a swing counts.
+///
+/// A swing with a period of up to a minute shows its full extent in half of it.
 const WINDOW: DurNs = DurNs(30_000_000_000);
-/// Rotation between two passes below which it is attributed to navigation errors, radians; it counts fully from twice
-/// this.
+/// Rotation between two passes below which it is attributed to navigation errors, radians.
+///
+/// It counts fully from twice this.
 const DEAD_RAD: f64 = 0.0075;
 
 /// Swing of a vehicle.

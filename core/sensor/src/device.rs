@@ -248,8 +248,9 @@ pub struct EmulatorSetup {
     pub head: Option<HeadProgram>,
     /// Water and location of the tunnel, as the operator knows them.
     pub site: Site,
-    /// Whether the polling host is emulated as well; otherwise the device answers requests passed to
-    /// [`Emulator::hear`].
+    /// Whether the polling host is emulated as well.
+    ///
+    /// Otherwise the device answers requests passed to [`Emulator::hear`].
     pub polled: bool,
 }
 
@@ -272,7 +273,9 @@ pub trait Emulator<M>: Send + Sync {
     /// Times are on the device's clock.
     fn begin(&mut self, until: MonoNs, due: &mut Vec<M>);
 
-    /// Processes bytes from a host, at `at` on the device's clock; a device that is not polled ignores them.
+    /// Processes bytes from a host, at `at` on the device's clock.
+    ///
+    /// A device that is not polled ignores them.
     ///
     /// Responses without a measurement go to `line`.
     fn hear(&mut self, _at: MonoNs, _bytes: &[u8], _line: LineSink<'_>) {}

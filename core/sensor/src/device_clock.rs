@@ -22,10 +22,14 @@ const PLACES: usize = 128;
 /// Initial length of a stretch on the device's clock.
 const FIRST_SPAN_NS: i64 = 1_000_000_000;
 
-/// Minimum number of stretches for a drift estimate; the scatter of fewer is a poor measure of its error.
+/// Minimum number of stretches for a drift estimate.
+///
+/// The scatter of fewer is a poor measure of its error.
 const LEAST_STRETCHES: usize = 8;
 
-/// Largest deviation of a stamp from its prediction that is attributed to queues; beyond it a new epoch begins.
+/// Largest deviation of a stamp from its prediction that is attributed to queues.
+///
+/// Beyond it a new epoch begins.
 ///
 /// The prediction uses the last stamp and the receive times. For a clock that wraps sooner, the limit is a quarter of
 /// the wrap period.
@@ -133,7 +137,9 @@ enum Shift {
 }
 
 impl DeviceClock {
-    /// A clock of `bits` bits (1 to 64) whose ticks are `tick` long (1 ns to 15 minutes); values outside are clamped.
+    /// A clock of `bits` bits (1 to 64) whose ticks are `tick` long (1 ns to 15 minutes).
+    ///
+    /// Values outside are clamped.
     pub fn new(bits: u32, tick: DurNs) -> Self {
         Self {
             round: 1 << bits.clamp(1, 64),

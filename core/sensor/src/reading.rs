@@ -79,7 +79,9 @@ impl Reading {
 /// A ping of a profiling head.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct SonarReturn {
-    /// Head angle in the sensor's frame, radians: 0 down, increasing clockwise seen along +x; may exceed one turn.
+    /// Head angle in the sensor's frame, radians: 0 down, increasing clockwise seen along +x.
+    ///
+    /// May exceed one turn.
     pub angle_rad: f64,
     /// Slant range computed by the device, m; `None` if nothing exceeded its threshold.
     pub range_m: Option<f64>,

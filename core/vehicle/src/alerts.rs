@@ -55,7 +55,9 @@ pub struct AlertTiming([ClassTiming; AlertClass::ALL.len()]);
 const MOST_S: f64 = 600.0;
 
 impl Default for AlertTiming {
-    /// Speed and position fluctuate about their limits within seconds; the other classes have their own hysteresis.
+    /// Speed and position fluctuate about their limits within seconds.
+    ///
+    /// The other classes have their own hysteresis.
     fn default() -> Self {
         let timing = |hold_s: f64, off_s: f64| ClassTiming {
             hold: DurNs::from_secs_f64(hold_s),

@@ -12,7 +12,9 @@ use headrace_geometry::tunnel::Profile;
 pub struct CoverageConfig {
     /// Maximum width of a hole's bounds, m; zero for the exact search.
     pub hole_tolerance_m: f64,
-    /// Deviation from the design profile that contradicts it, m; sections whose samples mostly do cannot pass.
+    /// Deviation from the design profile that contradicts it, m.
+    ///
+    /// A section cannot pass if most of its samples contradict the profile.
     pub contradiction_m: f64,
     /// Node edge of the sounding grid, m.
     pub node_m: f64,

@@ -41,7 +41,9 @@ impl fmt::Display for Finding {
 
 /// Number of beams of a turn that are checked.
 const BEAMS: u32 = 720;
-/// Minimum share of the wall that a head must reach; otherwise its range setting or the tunnel is wrong.
+/// Minimum share of the wall that a head must reach.
+///
+/// Otherwise its range setting or the tunnel is wrong.
 const LEAST_SHARE: f64 = 0.5;
 /// Relative difference of turn durations below which heads stay in step for hours.
 const SAME_TURN: f64 = 1e-6;

@@ -174,7 +174,9 @@ impl Cable {
         if reading.agrees { Use::Fuse } else { Use::Withhold }
     }
 
-    /// Returns the first of the readings that show a disagreement between counter and estimate; `None` without one.
+    /// Returns the first of the readings that show a disagreement between counter and estimate.
+    ///
+    /// `None` without one.
     fn goes_wrong(&mut self, reading: &CableReading, is_apart: bool) -> Option<CableReading> {
         let lasts = |since: &CableReading, time: DurNs| reading.at.since(since.at).0 >= time.0;
         let changed = *self.changed.get_or_insert(*reading);

@@ -112,7 +112,9 @@ impl ErrorClones {
         self.compare();
     }
 
-    /// Returns the covariance at the newest clone relative to `lag` earlier; `None` with fewer than two clones.
+    /// Returns the covariance at the newest clone relative to `lag` earlier.
+    ///
+    /// `None` with fewer than two clones.
     ///
     /// Extrapolates beyond the oldest clone.
     pub fn relative(&self, lag: DurNs) -> Option<Relative> {
@@ -163,7 +165,9 @@ impl ErrorClones {
     }
 }
 
-/// Returns the covariance of the difference of errors; `depends` maps the earlier errors to the present ones.
+/// Returns the covariance of the difference of errors.
+///
+/// `depends` maps the earlier errors to the present ones.
 fn against(now: &[Errors; 3], then: &[Errors; 3], depends: &[Errors; 3]) -> Relative {
     let cross: [[f64; 3]; 3] = depends.map(|row| then.map(|column| sum(&row, &column)));
     let mut relative = [[0.0; 3]; 3];
@@ -199,8 +203,9 @@ mod tests {
 
     use super::*;
 
-    /// Soundings from before a silent cable returns stay uncertain; they do not become gradually more certain over
-    /// the last 2 s.
+    /// Soundings from before a silent cable returns stay uncertain.
+    ///
+    /// They do not become gradually more certain over the last 2 s.
     #[test]
     fn chainage_before_a_sudden_gain_in_certainty_stays_uncertain() {
         let mut clones = ErrorClones::default();

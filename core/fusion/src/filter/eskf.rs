@@ -99,8 +99,9 @@ pub struct Eskf {
     /// Roughness of the wall.
     roughness: Roughness,
     seen_again: SeenAgain,
-    /// Share of the declared variance applied to ranges of heads until the gyro bias is known; the largest among the
-    /// heads.
+    /// Share of the declared variance applied to ranges of heads until the gyro bias is known.
+    ///
+    /// It is the largest share among the heads.
     smoothness: f64,
     /// Whether the vehicle is known to be at rest; its heads then see the same bumps in every turn.
     pub is_at_rest: bool,
@@ -423,7 +424,9 @@ impl Eskf {
         }
     }
 
-    /// Variance that bumps of the wall give a range when many pings see the same bump, m^2; 0 for other measurements.
+    /// Variance that bumps of the wall give a range when many pings see the same bump, m^2.
+    ///
+    /// 0 for other measurements.
     fn bumps(&self, kind: SensorKind, settings: &Settings) -> f64 {
         let sees_one = settings.learns && matches!(kind, SensorKind::Echosounder { .. });
         if sees_one { self.roughness.variance_m2(settings) } else { 0.0 }
@@ -521,7 +524,9 @@ impl Eskf {
         PoseSd { along_m, ..PoseSd::of(&self.factors) }
     }
 
-    /// Standard deviation of the chainage that later samples share, m; excludes the counter's permanent losses.
+    /// Standard deviation of the chainage that later samples share, m.
+    ///
+    /// Excludes the counter's permanent losses.
     pub fn along_sd_m(&self) -> f64 {
         math::hypot(PoseSd::of(&self.factors).along_m, self.cable.differs_m())
     }
@@ -542,7 +547,9 @@ impl Eskf {
         self.apply(row, &gain, known, errors);
     }
 
-    /// Corrects by a range to the wall; applies only a share of the correction of the attitude and related errors.
+    /// Corrects by a range to the wall.
+    ///
+    /// Applies only a share of the correction of the attitude and related errors.
     ///
     /// Source: Brink, Partial-Update Schmidt-Kalman Filter, 2017. The covariance is Joseph's for the smaller gain,
     /// which equals the optimal one plus a dyad of the omitted gain.

@@ -164,8 +164,9 @@ impl Alternative {
         theirs / own.max(f64::MIN_POSITIVE)
     }
 
-    /// Returns by how many standard deviations the alternative fits better; `None` unless it certainly does and
-    /// leaves little.
+    /// Returns by how many standard deviations the alternative fits better.
+    ///
+    /// `None` unless it certainly does and leaves little.
     ///
     /// For two swapped sources, the limit applies to both.
     pub(super) fn certain(&self, share_left: f64) -> Option<f64> {

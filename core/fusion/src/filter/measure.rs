@@ -127,7 +127,9 @@ pub struct Beam {
     pub unsure_rad: f64,
 }
 
-/// Predicts the range of the first echo from the design wall; `None` if the beam misses or grazes the wall.
+/// Predicts the range of the first echo from the design wall.
+///
+/// `None` if the beam misses or grazes the wall.
 pub fn range(state: &State, profile: &Profile, beam: &Beam, range_m: f64, sd_m: f64) -> Option<ScalarUpdate> {
     let arm = state.attitude * beam.offset;
     let origin = state.position + arm;
@@ -208,8 +210,9 @@ pub fn attitude(
     ]
 }
 
-/// Predicts the velocity over ground in the frame of a sensor at `offset`, m/s; `rate_radps` is the turn rate of the
-/// body.
+/// Predicts the velocity over ground in the frame of a sensor at `offset`, m/s.
+///
+/// `rate_radps` is the turn rate of the body.
 pub fn velocity(
     state: &State,
     (offset, mounted): (Vec3<Body>, Rot<Body, Sensor>),

@@ -67,7 +67,9 @@ use headrace_sensor::reading::Reading;
 
 /// Longest extrapolation of a fix beyond the last inertial sample.
 pub(super) const CARRIES: DurNs = DurNs(2_000_000_000);
-/// A clock that goes back by more than this has been reset; readings stamped further in the future are rejected.
+/// A clock that goes back by more than this has been reset.
+///
+/// Readings stamped further in the future are rejected.
 pub(super) const CLOCK_JUMP: DurNs = DurNs(10_000_000_000);
 /// Standard deviations beyond which the estimate is restarted: linearised updates would not converge.
 const LOST_PLACE_M: f64 = 3.0;

@@ -27,7 +27,9 @@ const ROOM: usize = 320;
 /// At any rate, they span more than the filter's longest window.
 const READINGS: usize = 96;
 const NEAR: DurNs = DurNs(20_000_000);
-/// Silence after which a source is not compared; a velocity log may send a reading only every two seconds.
+/// Silence after which a source is not compared.
+///
+/// A velocity log may send a reading only every two seconds.
 const SILENT: DurNs = DurNs(3_000_000_000);
 /// Delay of the comparison, because readings arrive late.
 const BEHIND: DurNs = DurNs(500_000_000);
@@ -227,7 +229,9 @@ impl RawWays {
     }
 }
 
-/// Appends a reading unless it is close to the last one; an earlier or much later one restarts the list.
+/// Appends a reading unless it is close to the last one.
+///
+/// An earlier or much later one restarts the list.
 fn append(readings: &mut Vec<(MonoNs, [f64; 1])>, at: MonoNs, way_m: f64) {
     if readings.last().is_some_and(|(last, _)| (0..NEAR.0).contains(&at.since(*last).0)) {
         return;

@@ -90,7 +90,9 @@ impl Roughness {
         self.factor.clamp(0.0, ROUGHEST) * settings.echo_sd_m * settings.echo_sd_m
     }
 
-    /// Returns how many pings of this echosounder see the same bump at this speed, at least 1; 1 for the first ping.
+    /// Returns how many pings of this echosounder see the same bump at this speed, at least 1.
+    ///
+    /// 1 for the first ping.
     ///
     /// Together they give no more information on the position than a single ping.
     pub(super) fn looks_at_a_bump(&self, source: usize, at: MonoNs, speed_mps: f64, bump_m: f64) -> f64 {

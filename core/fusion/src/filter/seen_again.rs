@@ -37,8 +37,9 @@ impl SeenAgain {
         (0.5 + f64::from(self.returns) * settings.return_step_rad / math::TAU).clamp(1.0, MOST_PASSES)
     }
 
-    /// Counts a return and gives the variance with which to fuse it, m^2; `declared_m2` is its own variance, partly
-    /// from bumps.
+    /// Counts a return and gives the variance with which to fuse it, m^2.
+    ///
+    /// `declared_m2` is its own variance, partly from bumps.
     ///
     /// n looks at one bump together have the weight of their mean. Each gets the noise of its own contribution.
     pub(super) fn noise_m2(

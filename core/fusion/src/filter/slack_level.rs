@@ -29,8 +29,9 @@ const MARGIN_SDS: f64 = 1.5;
 /// Time constant with which inertial velocity decays, s. It keeps numbers small and hardly changes a third
 /// difference.
 const FORGETS_S: f64 = 1000.0;
-/// Time over which the attitude is levelled and aligned with the estimate's heading, s; only changes within a lag
-/// matter.
+/// Time over which the attitude is levelled and aligned with the estimate's heading, s.
+///
+/// Only changes within a lag matter.
 const LEVELS_S: f64 = 100.0;
 /// Largest difference from the estimate's attitude, rad; beyond it the track restarts.
 const MOST_OFF_RAD: f64 = 0.3;
@@ -151,7 +152,9 @@ impl SlackLevel {
         }
     }
 
-    /// Processes a counter reading in the current epoch; returns whether counter and inertial motion agree as usual.
+    /// Processes a counter reading in the current epoch.
+    ///
+    /// Returns whether counter and inertial motion agree as usual.
     ///
     /// Allocates: never.
     pub(super) fn hear(&mut self, at: MonoNs, shown_m: f64, noises: Noises, settings: &Settings) -> bool {
@@ -197,7 +200,9 @@ impl SlackLevel {
         Some([u0 - 3.0 * u1 + 3.0 * u2 - u3, most_m - least_m])
     }
 
-    /// Averages a third difference; returns whether it is usual, or explained by noise and late readings, m^2.
+    /// Averages a third difference.
+    ///
+    /// Returns whether it is usual, or explained by noise and late readings, m^2.
     fn note(&mut self, lag: usize, third_m: f64, dt_s: f64, [noise_m2, late_m2]: [f64; 2]) -> bool {
         let (Some(square_m2), Some(mean_m), Some(seen)) =
             (self.squares_m2.get_mut(lag), self.means_m.get_mut(lag), self.seen.get_mut(lag))
@@ -352,8 +357,9 @@ mod tests {
         }
     }
 
-    /// The fastest change of a sine is its amplitude times its angular frequency; that of the model is three standard
-    /// deviations of its rate.
+    /// The fastest change of a sine is its amplitude times its angular frequency.
+    ///
+    /// That of the model is three standard deviations of its rate.
     #[test]
     fn lively_cable_is_faster_and_reaches_farther_than_declared() {
         for (amplitude_m, period_s) in [(0.06, 8.0), (0.06, 3.0), (0.15, 4.0), (0.03, 2.0)] {

@@ -19,7 +19,9 @@ use headrace_sensor::sampling::head::SILENT_AFTER;
 const FEW_OF_ONE_RANGE: u32 = 3;
 const VARIES_M: f64 = 0.05;
 const SURE_M: f64 = 0.02;
-/// Update period of attitudes, because their errors are correlated over longer times; likewise for cables and depths.
+/// Update period of attitudes, because their errors are correlated over longer times.
+///
+/// The same applies to cables and depths.
 pub const ATTITUDE_PERIOD: DurNs = DurNs(100_000_000);
 /// See [`ATTITUDE_PERIOD`].
 pub const TETHER_PERIOD: DurNs = DurNs(100_000_000);
@@ -139,7 +141,9 @@ impl Source {
         self.noise_level.skip(number);
     }
 
-    /// Whether `period` has passed since its last reading in the window; if so, this reading becomes the last.
+    /// Whether `period` has passed since its last reading in the window.
+    ///
+    /// If so, this reading becomes the last.
     pub fn is_due(&mut self, at: MonoNs, period: DurNs) -> bool {
         let due = self.taken.is_none_or(|taken| at.since(taken).0.abs() >= period.0);
         if due {
@@ -171,7 +175,9 @@ pub fn smoothness(sources: &[Option<Source>]) -> f64 {
 }
 
 impl Turning {
-    /// Notes a ping; returns whether it has a range and points at least `step_rad` away from the last used one.
+    /// Notes a ping.
+    ///
+    /// Returns whether it has a range and points at least `step_rad` away from the last used one.
     pub fn ping(&mut self, at: MonoNs, sonar: &SonarReturn, step_rad: f64) -> bool {
         if let Some((before, angle_rad)) = self.last {
             let dt_s = at.since(before).as_secs_f64();

@@ -103,8 +103,9 @@ impl TiltFit {
         }
     }
 
-    /// Returns the tilt, radians, and its weight, without the constant part; `None` if the vehicle has not turned
-    /// enough.
+    /// Returns the tilt, radians, and its weight, without the constant part.
+    ///
+    /// `None` if the vehicle has not turned enough.
     fn estimate(&self) -> Option<(f64, f64)> {
         let [pattern_2, both, tilt_2, pattern_off, tilt_off] = self.sums;
         if self.blocks < FEWEST_BLOCKS || pattern_2 <= 0.0 {

@@ -81,7 +81,9 @@ impl Backward {
         Track::of_reversed(self.pieces, self.points, self.relatives, self.settings.epoch)
     }
 
-    /// Smooths the estimate at the step's beginning from the one at its end; `None` if the result is not finite.
+    /// Smooths the estimate at the step's beginning from the one at its end.
+    ///
+    /// `None` if the result is not finite.
     fn smooth(&mut self, step: &Step, after: &Estimate) -> Option<Estimate> {
         if matches!(step.by, Move::End) {
             return None;

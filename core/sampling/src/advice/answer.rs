@@ -119,7 +119,9 @@ impl Remedy {
 pub struct Alternative {
     /// The mode.
     pub mode: ModeName,
-    /// The largest speed at which the target is met with the heads started in phase, m/s; zero if there is none.
+    /// The largest speed at which the target is met with the heads started in phase, m/s.
+    ///
+    /// Zero if there is none.
     pub v_max_mps: f64,
 }
 
@@ -163,7 +165,9 @@ pub struct Advice {
     ///
     /// Below it, heads apart along the hull run out of phase.
     pub from_mps: f64,
-    /// Speed nearest to the present one that meets the target, m/s; `None` if the present one does, or none is near.
+    /// Speed nearest to the present one that meets the target, m/s.
+    ///
+    /// `None` if the present one does, or none is near.
     pub nearest_mps: Option<f64>,
     /// The limiting factor.
     pub reason: Reason,
@@ -185,7 +189,9 @@ pub struct Advice {
     pub t_y_m: f64,
     /// Time between two pings, seconds; the longest of any head.
     pub ping_period_s: f64,
-    /// Phase error of the head farthest out of phase, radians of its turn; `None` in sectors, or with one head.
+    /// Phase error of the head farthest out of phase, radians of its turn.
+    ///
+    /// `None` in sectors, or with one head.
     pub phase_error_rad: Option<f64>,
     /// Remaining tunnel and time.
     pub left: Left,

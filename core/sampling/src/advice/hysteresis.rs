@@ -10,7 +10,9 @@ const HOLD: DurNs = DurNs(1_000_000_000);
 /// A higher speed is displayed after it has been higher for this long, by the share below: 3 mm/s at 0.1 m/s.
 const RISES_AFTER: DurNs = DurNs(10_000_000_000);
 const RISES_BY: f64 = 0.03;
-/// A lower speed is displayed at once if it is lower by this share; less is within half of the speed margin.
+/// A lower speed is displayed at once if it is lower by this share.
+///
+/// Smaller differences are within half of the speed margin.
 const FALLS_BY: f64 = SPEED_MARGIN / 2.0;
 /// Number of stored advice updates: those within `HOLD` at 5 Hz.
 const HELD: usize = 6;

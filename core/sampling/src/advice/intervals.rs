@@ -132,8 +132,9 @@ impl Driving<'_> {
         (best.1 <= self.sure.at_m(best.0) * (1.0 + EASE)).then_some(best.0)
     }
 
-    /// Returns the lower end of the interval below a speed that meets the target, m/s; zero if all lower speeds meet
-    /// it.
+    /// Returns the lower end of the interval below a speed that meets the target, m/s.
+    ///
+    /// Zero if all lower speeds meet it.
     pub(super) fn lower_end_mps(&self, speed_mps: f64) -> f64 {
         const STEP: f64 = 0.99;
         /// Share of the speed below which the search stops, since no pilot would go that slowly.

@@ -3,7 +3,9 @@
 /// Share of the speed held back for errors of its measurement.
 pub const SPEED_MARGIN: f64 = 0.01;
 
-/// Returns the largest speed up to `bound_mps` that meets the target, if all slower ones do; zero if there is none.
+/// Returns the largest speed up to `bound_mps` that meets the target, if all slower ones do.
+///
+/// Zero if there is none.
 pub(super) fn highest_mps(bound_mps: f64, meets: impl Fn(f64) -> bool) -> f64 {
     const LEAST_SHARE: f64 = 1e-3;
     if meets(bound_mps) {
@@ -13,7 +15,9 @@ pub(super) fn highest_mps(bound_mps: f64, meets: impl Fn(f64) -> bool) -> f64 {
     if meets(least_mps) { edge_mps(least_mps, bound_mps, meets) } else { 0.0 }
 }
 
-/// Finds the largest speed up to `bound_mps` that meets the target, by stepping down; zero if there is none.
+/// Finds the largest speed up to `bound_mps` that meets the target, by stepping down.
+///
+/// Zero if there is none.
 ///
 /// `tries` returns, for a speed that misses the target, the speed below which it may be met again.
 pub(super) fn downwards_mps(bound_mps: f64, tries: impl Fn(f64) -> Result<(), f64>) -> f64 {

@@ -414,7 +414,9 @@ fn kept_speed_meets_the_target() {
     assert!(kept > 0, "some speeds are kept");
 }
 
-/// With 30 % lost returns, more than one pass is needed and the speed is lower; a zero rate costs nothing.
+/// With 30 % lost returns, more than one pass is needed and the speed is lower.
+///
+/// A zero rate costs nothing.
 #[test]
 fn lost_returns_lower_the_speed() {
     let v_mps = |share: f64| {

@@ -149,7 +149,9 @@ fn no_extra_passes_without_losses_or_without_a_speed() {
     assert!((passes(0.6, &[LossRate::independent(0.5)]) - 1.0).abs() <= 0.0);
 }
 
-/// Chance losses make small holes often and large ones never; without chance losses there are no chance holes.
+/// Chance losses make small holes often and large ones never.
+///
+/// Without chance losses there are no chance holes.
 #[test]
 fn hole_is_by_chance_if_enough_losses_can_coincide() {
     let hole = |hole_m: f64, rate: LossRate| sampled(0.1).is_by_chance(hole_m, 0.3, rate);

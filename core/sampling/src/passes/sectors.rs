@@ -20,8 +20,9 @@ pub(super) struct Leg {
 }
 
 impl Leg {
-    /// Creates it for a head that turns within `sector`, angles in its sensor frame; `None` for a sector without a
-    /// size.
+    /// Creates it for a head that turns within `sector`, angles in its sensor frame.
+    ///
+    /// `None` for a sector without a size.
     pub(super) fn of(motion: &HeadMotion, sector: &AngleRange) -> Option<Self> {
         let size_rad = Some(sector.size_rad).filter(|size_rad| *size_rad > 0.0)?;
         let along = math::wrap_signed(motion.angle_rad - sector.middle_rad(), TAU) / size_rad + 0.5;

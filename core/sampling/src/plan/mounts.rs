@@ -25,8 +25,9 @@ pub struct InLine {
 }
 
 impl Planner {
-    /// Returns the best speed with the heads in line; `None` if they already are, or if no mode meets the target
-    /// then.
+    /// Returns the best speed with the heads in line.
+    ///
+    /// `None` if they already are, or if no mode meets the target then.
     ///
     /// Errors: as for [`Planner::new`].
     pub fn in_line(&self, target_m: f64) -> Result<Option<InLine>, SamplingError> {

@@ -10,8 +10,9 @@ use crate::passes::Situation;
 use crate::swing::Swing;
 
 impl Planner {
-    /// Returns the largest speed in a mode for heads started for `planned_mps`, m/s; zero if no speed meets the
-    /// target.
+    /// Returns the largest speed in a mode for heads started for `planned_mps`, m/s.
+    ///
+    /// Zero if no speed meets the target.
     ///
     /// It equals the live advice, margins included, for a steady vehicle on the axis.
     ///

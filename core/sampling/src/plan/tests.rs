@@ -193,7 +193,9 @@ fn impossible_plan_names_the_cause() {
     assert!(answers[0].v_max_mps.is_some() && answers[4].reason == Some("angular_step"));
 }
 
-/// One head in the centre loses nothing to margins; four heads of a vehicle lose something to each of the first ones.
+/// One head in the centre loses nothing to margins.
+///
+/// Four heads of a vehicle lose something to each of the first ones.
 #[test]
 fn margins_go_from_the_geometry_alone_to_the_largest_speed() {
     for (inspection, loses) in [(ideal(1), false), (vita_2(HeadLayout::PhaseShift), true)] {

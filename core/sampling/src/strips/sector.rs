@@ -7,7 +7,9 @@ use crate::error::SamplingError;
 use crate::occlusion::AngleRange;
 use crate::ring::Standing;
 
-/// Number of equal angles in a sector; the waits at both ends of one differ by an eighth of a sweep there and back.
+/// Number of equal angles in a sector.
+///
+/// The waits at both ends of one differ by an eighth of a sweep there and back.
 pub const PARTS: usize = 8;
 
 /// Wall of a head's sector, in parts of equal angle from one turning point to the other.

@@ -32,7 +32,7 @@ struct Part {
 stateful!(LineClock { state: last, len; slots: parts; fixed: silence; });
 
 impl LineClock {
-    /// `silence` is the longest usual gap within a frame.
+    /// Creates a clock; `silence` is the longest usual gap within a frame.
     ///
     /// After a longer gap between two packets, it looks for a false start that holds frames back
     /// ([`Framed::settle_frames`]).

@@ -21,8 +21,9 @@ const RISES: f64 = 1e-3;
 const FALLS_TIMES: f64 = 9.0;
 /// Longest time between stamps that counts, s.
 const MOST_BETWEEN_S: f64 = 0.1;
-/// Minimum delay that is corrected; smaller ones come from ticks and from sending a sample's frames one after the
-/// other.
+/// Minimum delay that is corrected.
+///
+/// Smaller ones come from ticks and from sending a sample's frames one after the other.
 const LEAST: DurNs = DurNs(1_000_000);
 /// Maximum delay that is corrected. A stopped clock looks late, too, and navigation does not wait longer for samples.
 const MOST: DurNs = DurNs(150_000_000);
@@ -34,7 +35,9 @@ pub struct SampleTimes {
     delay: UsualDelay,
     stamped: Option<Stamped>,
     last_reading: Option<MonoNs>,
-    /// Count of readings just after a stamp, less stamps just after a reading; some units send the stamp last.
+    /// Count of readings just after a stamp, less stamps just after a reading.
+    ///
+    /// Some units send the stamp last.
     leads: i8,
 }
 

@@ -36,7 +36,7 @@ pub struct Piece<'a> {
 }
 
 impl<F: Framing, const N: usize> Cutter<F, N> {
-    /// `silence` is the longest usual gap within a frame.
+    /// Creates a cutter; `silence` is the longest usual gap within a frame.
     ///
     /// After a longer gap it looks for a false start that holds frames back ([`Framed::settle_frames`]).
     pub fn new(framing: F, silence: DurNs) -> Self {
@@ -70,8 +70,9 @@ impl<F: Framing, const N: usize> Cutter<F, N> {
         self.hand_on(&found, take);
     }
 
-    /// Returns when to push zero bytes to resolve an incomplete frame that holds others back; `None` if there is
-    /// none.
+    /// Returns when to push zero bytes to resolve an incomplete frame that holds others back.
+    ///
+    /// `None` if there is none.
     pub fn settles(&self) -> Option<MonoNs> {
         (!self.settled && !self.pending.is_empty()).then(|| self.last + self.silence + DurNs(1))
     }

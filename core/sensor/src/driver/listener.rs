@@ -11,7 +11,9 @@ pub struct Listener<F, const N: usize> {
 }
 
 impl<F: Framing, const N: usize> Listener<F, N> {
-    /// `silence` is the inter-frame timeout; `silence_timeout` is the longest time between messages of a healthy device.
+    /// Creates a listener.
+    ///
+    /// `silence` is the inter-frame timeout. `silence_timeout` is the longest time between messages of a healthy device.
     pub fn new(framing: F, silence: DurNs, silence_timeout: DurNs) -> Self {
         Self { cutter: Cutter::new(framing, silence), silence_timeout }
     }
@@ -61,7 +63,9 @@ pub struct MessageListener {
 }
 
 impl MessageListener {
-    /// `judge` identifies foreign messages; `silence_timeout` is the longest time between messages of a healthy device.
+    /// Creates a listener.
+    ///
+    /// `judge` identifies foreign messages. `silence_timeout` is the longest time between messages of a healthy device.
     pub fn new(judge: Judge, silence_timeout: DurNs) -> Self {
         Self { judge, silence_timeout, good_frames: 0, complaint: None }
     }

@@ -23,7 +23,9 @@ const GRAVITY_MPS2: f64 = 9.81;
 /// The truncation error is of the order of its square (1e-8 for numbers near one). Rounding is of the order of 1e-16
 /// / 1e-4 times the numbers, which reach some hundreds of metres: 1e-10.
 const STEP: f64 = 1e-4;
-/// Covers both errors with a margin; a wrong sign or missing term causes an error of at least a hundredth.
+/// Covers both errors with a margin.
+///
+/// A wrong sign or missing term causes an error of at least a hundredth.
 const TOLERANCE: f64 = 1e-6;
 
 /// Knuth's MMIX generator; returns the upper half of its state as a share of one.
@@ -98,7 +100,9 @@ fn moved(state: &State, error: usize, by: f64) -> State {
     state
 }
 
-/// Checks a row against the differences of its residual; the expected value is the measured one minus the residual.
+/// Checks a row against the differences of its residual.
+///
+/// The expected value is the measured one minus the residual.
 fn check_row(
     what: &str,
     state: &State,
@@ -244,7 +248,9 @@ fn attitude_rows() {
     }
 }
 
-/// A compass deviation rotates the measured attitude about the tunnel's z axis; the residual is then zero.
+/// A compass deviation rotates the measured attitude about the tunnel's z axis.
+///
+/// The residual is then zero.
 #[test]
 fn compass_deviation_gives_no_residual() {
     let mut draws = Draws::new(5);
@@ -296,7 +302,9 @@ fn velocity_of_a_sensor_on_a_lever_arm() {
     }
 }
 
-/// A tenth of a second earlier, the position is the present one less the displacement; exact for constant velocity.
+/// A tenth of a second earlier, the position is the present one less the displacement.
+///
+/// This is exact for constant velocity.
 #[test]
 fn row_seen_later() {
     const LATER_S: f64 = 0.07;

@@ -30,8 +30,9 @@ fn near(what: &str, is: f64, should: f64, share: f64) {
     assert!((is - should).abs() <= share * should.abs() + 1e-18, "{what}: {is}, not {should}");
 }
 
-/// Two lags in series, s' = -s / T + r, r' = -r / T + w, in steps of 1e-5 T; Euler's method has an error of that
-/// order.
+/// Two lags in series, s' = -s / T + r, r' = -r / T + w, in steps of 1e-5 T.
+///
+/// Euler's method has an error of that order.
 #[test]
 fn slack_noise_equals_an_integral_of_the_process() {
     let settings = Settings { slack: Wander { reach: 0.06, time_s: 10.0 }, ..Settings::default() };
@@ -141,7 +142,9 @@ fn blind_noise_applies_without_inertial_data() {
     }
 }
 
-/// A decaying error keeps its reach because the epoch's noise makes up for the decay; a random walk grows with time.
+/// A decaying error keeps its reach because the epoch's noise makes up for the decay.
+///
+/// A random walk grows with time.
 #[test]
 fn decaying_errors_keep_their_reach() {
     let settings = Settings::default();

@@ -26,7 +26,9 @@ fn reading(number: f64) -> Reading {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(64))]
 
-    /// Each reading leaves the window once, in order of validity; readings of the same time in order of arrival.
+    /// Each reading leaves the window once, in order of validity.
+    ///
+    /// Readings of the same time leave in order of arrival.
     #[test]
     fn readings_leave_the_window_in_order(times in proptest::collection::vec(0_u64..50, 1..200), cut in 0_u64..50) {
         let mut window = Window::default();
@@ -92,7 +94,9 @@ proptest! {
         prop_assert_eq!(pieces(&younger), whole);
     }
 
-    /// Echoes from a position in the section lead back to it from half a metre away; nonsense never leads outside.
+    /// Echoes from a position in the section lead back to it from half a metre away.
+    ///
+    /// Nonsense never leads outside.
     #[test]
     fn echoes_lead_to_their_position(
         (y, z) in (-2.5_f64..2.5, 1.5_f64..6.0),

@@ -53,7 +53,9 @@ fn rays_through_corners_and_an_ulp_beside() {
     found("geometry.corner", range_m.max(arc_m), 1e-14);
 }
 
-/// The value under the root is 0 or a few ulps; an error of one ulp there is an error of its square root.
+/// The value under the root is 0 or a few ulps.
+///
+/// An error of one ulp there is an error of its square root.
 #[test]
 fn rays_tangent_to_the_vault() {
     let (range_m, arc_m, count) = worst("tangent");
