@@ -24,7 +24,7 @@ const EVERY: DurNs = DurNs(200_000_000);
 const ROOM: usize = 320;
 /// Capacity for the last readings of a source, and the minimum time between kept readings.
 ///
-/// At any rate, they span more than the filter's longest window.
+/// At any reading rate, they span more than the filter's longest window.
 const READINGS: usize = 96;
 const NEAR: DurNs = DurNs(20_000_000);
 /// Silence after which a source is not compared.

@@ -92,9 +92,7 @@ impl Roughness {
 
     /// Returns how many pings of this echosounder see the same bump at this speed, at least 1.
     ///
-    /// 1 for the first ping.
-    ///
-    /// Together they give no more information on the position than a single ping.
+    /// Together they give no more information on the position than a single ping. The result is 1 for the first ping.
     pub(super) fn looks_at_a_bump(&self, source: usize, at: MonoNs, speed_mps: f64, bump_m: f64) -> f64 {
         let before = self.looks.iter().flatten().find(|look| look.source == source);
         before.map_or(1.0, |before| looks(at.since(before.at), speed_mps, bump_m))

@@ -31,8 +31,9 @@ impl SeenAgain {
         }
     }
 
-    /// Number of times a bump has been seen, including now, at least 1. Halfway through a turn, half of the bumps
-    /// count once more.
+    /// Mean number of times a bump has been seen, including now, at least 1.
+    ///
+    /// In the turn under way, half of the bumps have been seen once more.
     fn passes(&self, settings: &Settings) -> f64 {
         (0.5 + f64::from(self.returns) * settings.return_step_rad / math::TAU).clamp(1.0, MOST_PASSES)
     }

@@ -57,7 +57,7 @@ pub struct Settings {
     pub force_bias: Wander,
     /// Noise of a tether counter, its quantum excluded, m.
     pub tether_sd_m: f64,
-    /// Slack of the cable, m, a smooth process (two lags in series). The default swings within 16 s.
+    /// Slack of the cable, m, a smooth process (two lags in series). The default suits periods of 16 s.
     pub slack: Wander,
     /// Initial scale error of the cable, a ratio, and its random walk, per root of a second.
     pub scale_sd: f64,

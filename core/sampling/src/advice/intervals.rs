@@ -45,7 +45,7 @@ impl Driving<'_> {
         self.tries(speed_mps, more).is_ok()
     }
 
-    /// The same; on failure returns a lower speed, down to which no speed meets the target.
+    /// The same. The error is a speed at most as high; no speed between both meets the target.
     pub(super) fn tries(&self, speed_mps: f64, more: f64) -> Result<(), f64> {
         let most_m = self.most_m * (1.0 + more);
         let then = self.passes(speed_mps);

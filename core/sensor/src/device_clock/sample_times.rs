@@ -16,7 +16,7 @@ use headrace_geometry::time::{DurNs, MonoNs};
 /// Rate at which the usual delay follows later stamps, per second: faster than clocks drift apart.
 ///
 /// It follows earlier stamps faster by the factor below, and so settles at the delay that one stamp in ten undercuts.
-/// A garbled stamp moves it no further.
+/// A garbled stamp has no larger effect than any other.
 const RISES: f64 = 1e-3;
 const FALLS_TIMES: f64 = 9.0;
 /// Longest time between stamps that counts, s.
