@@ -28,8 +28,7 @@ impl OneRange {
         }
     }
 
-    /// Whether at least `fewest` returns have the same range although the design range varies by more than
-    /// `varies_m`.
+    /// Whether at least `fewest` returns have one range while the design range varies by `varies_m`.
     ///
     /// No real wall keeps a constant range to within 2 mm where its design does not.
     pub fn is_stuck(&self, fewest: u32, varies_m: f64) -> bool {

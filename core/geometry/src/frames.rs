@@ -258,7 +258,9 @@ pub struct Mount {
     pub rotation: Rot<Body, Sensor>,
 }
 
-/// Direction of a head's beam at `angle_rad`, in the sensor frame: 0 is down, growing clockwise seen along +x.
+/// Returns the direction of a head's beam at `angle_rad`, in the sensor frame.
+///
+/// 0 is down; the angle grows clockwise seen along +x.
 ///
 /// Source: docs/reference/glossary.md, "Sonar and samples".
 pub fn head_direction(angle_rad: f64) -> Vec3<Sensor> {

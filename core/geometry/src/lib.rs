@@ -1,4 +1,4 @@
-//! Units, integer time, frames, mathematics, the site, tunnel profiles and snapshots: the basis of every other crate.
+//! Basis of every other crate: units, time, frames, mathematics, site, tunnel profiles, snapshots.
 //!
 //! Vectors carry their frame as a type. A place on a tunnel's wall is given by chainage and arc length. The crate is
 //! pure: no I/O, no threads, no clock, no randomness. Transcendental functions come from [`math`] alone.

@@ -1,4 +1,6 @@
-//! The only access to transcendental functions: the `libm` crate, whose results are the same on every platform.
+//! The only access to transcendental functions: the `libm` crate.
+//!
+//! Its results are the same on every platform.
 //!
 //! The standard library's versions call the platform's C library and differ by an ulp between machines, enough for two
 //! replays to diverge. A lint (clippy.toml) bans them.

@@ -114,7 +114,9 @@ pub enum SamplingError {
 }
 
 impl SamplingError {
-    /// Returns the error for the configured target, m, after a smaller one was tried to leave a margin for errors.
+    /// Returns the error for the configured target, m.
+    ///
+    /// A smaller target was tried, to leave a margin for errors.
     #[must_use]
     pub(crate) fn of_target(mut self, asked_m: f64) -> Self {
         if let Self::UnseenStrip { target_m, .. }

@@ -1,4 +1,4 @@
-//! Interference of heads: how long two heads can hear each other, face to face or by the same patch of wall.
+//! Interference: how long two heads can hear each other, directly or by the same patch of wall.
 
 use super::error::SamplingError;
 use super::head::HeadSpec;

@@ -53,8 +53,9 @@ pub fn turned_over_rad(rate_radps: f64, x_m: f64, speed_mps: f64) -> Result<f64,
     turned.is_finite().then_some(turned).ok_or(SamplingError::NoPhaseAtRest { apart_m: x_m, speed_mps })
 }
 
-/// gamma: start angle of a head `x_m` behind the foremost, such that its phase is `phase_rad` where it passes the same
-/// place; in [0, 2 pi). Accurate to about 1e-16 of the angle turned meanwhile.
+/// gamma: start angle of a head `x_m` behind the foremost one, in [0, 2 pi).
+///
+/// Its phase is `phase_rad` where it passes the same place. Accurate to about 1e-16 of the angle turned meanwhile.
 ///
 /// Errors: as for [`turned_over_rad`]; a phase that isn't finite.
 /// Source: Jorge et al. 2021, Eq. 20 (gamma = phi(k) - omega x / v).
@@ -106,7 +107,9 @@ pub struct Sector {
     pub reversed: bool,
 }
 
-/// Returns the angle at which a head is at the same point of its sweep as the first one over the same place.
+/// Returns the angle at which a head is in step with the first one.
+///
+/// Both are at the same point of their sweep where they pass the same place.
 ///
 /// The first head, in sector 0, is at `lead`. `turn_s` is the turn period T; a sweep there and back in a sector takes
 /// 2 T / s. A `speed_mps` of zero means no delay: heads move in step, at right angles for four of them, regardless of
@@ -183,8 +186,7 @@ fn assign(gains: &[Vec<f64>], so_far: f64, taken: &mut Vec<usize>, best: &mut (f
     }
 }
 
-/// Returns the programs of a vehicle's heads, in the given order, such that their passes interleave evenly at
-/// `speed_mps`.
+/// Returns programs of the heads with evenly interleaved passes at `speed_mps`, in the given order.
 ///
 /// Head k of s starts at the body-frame angle gamma_k = 2 pi k / s - omega x_k / v, where x_k is its distance behind
 /// the foremost head (Eq. 20). A head that faces aft turns the other way, so its start is mirrored (Eq. 21). In
@@ -218,6 +220,8 @@ pub fn programs(
     }
 }
 
+/// Program for continuous rotation.
+///
 /// All heads turn in the same sense in the body frame, so one that faces aft steps downwards in its sensor frame.
 fn phase_shift(
     head: &HeadSpec,
@@ -302,7 +306,9 @@ pub fn alternating_m(pitch_m: f64, heads: usize, share: f64) -> Result<[f64; 2],
     Ok(divided_m(2.0 * pitch_m / heads as f64, share))
 }
 
-/// Distance travelled in a sweep there and back, `both_m`, divided at a position in the sector: the smaller part first.
+/// Divides `both_m` at a position in the sector, the smaller part first.
+///
+/// `both_m` is the distance travelled in a sweep there and back.
 pub(super) fn divided_m(both_m: f64, share: f64) -> [f64; 2] {
     let nearer = share.min(1.0 - share);
     [both_m * nearer, both_m * (1.0 - nearer)]

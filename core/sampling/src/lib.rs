@@ -1,4 +1,4 @@
-//! Sampling theory: the spacing of samples on the wall, layouts of several heads, and how fast the vehicle may go.
+//! Sampling theory: spacing of samples on the wall, layouts of heads, and the allowed speed.
 //!
 //! [`section`] and [`spacing`] contain the paper's closed forms, [`ring`] the general case by ray casting. [`layout`]
 //! and [`schedule`] define how several heads turn, [`passes`] how often they pass a place. [`swing`] adds the effect

@@ -72,8 +72,9 @@ pub struct Sampled {
 }
 
 impl Sampled {
-    /// Returns how many passes over each place replace one, so that 95 of 100 stretches of 0.25 m meet the target
-    /// despite losses.
+    /// Returns how many passes over each place replace one because of lost returns.
+    ///
+    /// With these, 95 of 100 stretches of 0.25 m meet the target.
     ///
     /// It is the distance between passes that the target allows, over the distance that losses leave. It ranges from
     /// 1 without losses to [`MOST_PASSES`], and is continuous in all inputs. Heads take turns, and those with the
@@ -101,8 +102,9 @@ impl Sampled {
         self.passes_for(places * once, along_m, heads)
     }
 
-    /// Whether a hole of this diameter, m, may have been caused by chance, with passes `along_m` apart and this loss
-    /// rate.
+    /// Whether a hole of this diameter, m, may have been caused by chance.
+    ///
+    /// Inputs: the distance between passes `along_m`, and the loss rate.
     ///
     /// If not, that wall gives no returns, and no speed helps.
     ///
@@ -143,7 +145,9 @@ impl Sampled {
         MOST_PASSES
     }
 
-    /// Distance between passes at which the largest circle equals the target while one pass misses a run of pings, m.
+    /// Distance between passes at which the largest circle equals the target, m.
+    ///
+    /// One of the passes misses a run of pings.
     ///
     /// With half a step h and half the gap g, the circle touches both ends of the gap and two neighbours of the
     /// previous pass. Its centre is (a^2 + h^2 - g^2) / (2 a) from the pass with the gap, where a is the distance

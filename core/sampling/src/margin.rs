@@ -8,7 +8,9 @@ use serde::{Deserialize, Serialize};
 
 /// Standard deviation without a margin, m: about that of navigation without error estimates.
 const NOTHING_M: f64 = 0.002;
-/// Minimum share of the distance between passes that a margin leaves, since no speed compensates for a lost position.
+/// Minimum share of the distance between passes that a margin leaves.
+///
+/// No speed compensates for a lost position.
 const LEFT_SHARE: f64 = 0.6;
 /// Maximum share of the target that a margin takes.
 const MOST_SHARE: f64 = 0.2;

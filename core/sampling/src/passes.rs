@@ -16,8 +16,9 @@ use sectors::{AT_ONCE, Leg};
 const AT_REST_MPS: f64 = 1e-3;
 /// Relative difference of turn periods above which heads run out of step.
 const SAME_TURN: f64 = 0.02;
-/// Cosine of the angle between a head's axis and the tunnel's, below which the scan plane meets no wall near the
-/// vehicle.
+/// Cosine of the angle between a head's axis and the tunnel's below which it is askew.
+///
+/// Its scan plane then meets no wall near the vehicle.
 const ASKEW: f64 = 0.1;
 
 /// Measured state of a vehicle and its heads at one epoch.
@@ -388,8 +389,9 @@ impl Passes {
         })
     }
 
-    /// Largest unevenness of neighbours at the end that their sectors share, as a share of the advance in a sweep
-    /// there and back.
+    /// Largest unevenness of neighbours at the end that their sectors share.
+    ///
+    /// It is a share of the advance in a sweep there and back.
     ///
     /// It ranges from 0 (one is half a sweep after the other) to 0.5 (both at the same place, or unknown). `None` for
     /// continuously rotating heads.
@@ -425,7 +427,9 @@ impl Passes {
         }
     }
 
-    /// Returns the phase error of each head relative to the first that turns, radians of its turn, in [-pi, pi).
+    /// Returns the phase error of each head relative to the first that turns, radians.
+    ///
+    /// It is an angle of the head's turn, in [-pi, pi).
     ///
     /// Positive: it passes a place later, farther ahead, than in the schedule for `scheduled` heads. `None` for an
     /// absent head, for heads that aren't phased with each other, and at rest.
@@ -445,7 +449,9 @@ impl Passes {
     }
 }
 
-/// Scheduled phase of head `head` of `heads` in a turn's advance: a head that is ahead in angle passes a place earlier.
+/// Scheduled phase of head `head` of `heads` in a turn's advance.
+///
+/// A head that is ahead in angle passes a place earlier.
 fn scheduled_phase(head: usize, heads: usize) -> f64 {
     -(head as f64) / heads.max(1) as f64
 }

@@ -77,8 +77,10 @@ struct Stance {
 pub struct PlannedMode {
     /// The mode of the first head; its name and step are those of all heads.
     pub mode: HeadMode,
-    /// Smallest, mean and largest straight-line distance between neighbours of one turn, of any head, with the vehicle
-    /// at its nominal pose and at rest, m. Source: the general case of Eq. 5, 6 and 10.
+    /// Smallest, mean and largest straight-line distance between neighbours of one turn, m.
+    ///
+    /// It covers all heads, with the vehicle at its nominal pose and at rest. Source: the general case of Eq. 5, 6
+    /// and 10.
     pub chords_m: [f64; 3],
     /// The largest distance between neighbours of one turn on the unrolled wall, at any tolerated pose, m.
     pub t_y2_m: f64,
@@ -292,8 +294,9 @@ impl Planner {
         (far().next().unwrap_or(0.0), far().fold(0.0, f64::max))
     }
 
-    /// Length of the first head's footprint on the wall in its scan plane, the shortest and the longest of a turn, m,
-    /// at the nominal pose.
+    /// Shortest and longest footprint of the first head on the wall in a turn, m.
+    ///
+    /// Footprints are measured in the scan plane, at the nominal pose.
     ///
     /// Errors: as for [`Standing::footprint`].
     /// Source: Jorge et al. 2021, Fig. 15.

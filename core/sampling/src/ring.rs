@@ -1,4 +1,6 @@
-//! The general case by ray casting: where beams of a head at rest meet the wall of any profile, from any pose.
+//! The general case by ray casting, for any profile and pose.
+//!
+//! It computes where the beams of a head at rest meet the wall.
 
 use serde::{Deserialize, Serialize};
 
@@ -112,8 +114,9 @@ impl Sounding {
         self.beam.norm()
     }
 
-    /// Distance to another sounding of the same head on the unrolled wall, the shortest way round, m: the measure for
-    /// holidays.
+    /// Distance to another sounding of the same head on the unrolled wall, m.
+    ///
+    /// It is the shortest way round, the measure for holidays.
     pub fn step_m(&self, other: &Self, perimeter_m: f64) -> f64 {
         let around_m = math::wrap_signed(other.arc_m - self.arc_m, perimeter_m);
         math::hypot(other.beam.x() - self.beam.x(), around_m)
@@ -239,23 +242,26 @@ impl Ring {
         &self.soundings
     }
 
-    /// Pairs of soundings `stride` apart, closing the turn: neighbours of a head that pings at every `stride`-th
-    /// sounding.
+    /// Pairs of soundings `stride` apart, closing the turn.
+    ///
+    /// They are neighbours of a head that pings at every `stride`-th sounding.
     pub fn pairs(&self, stride: usize) -> impl Iterator<Item = (&Sounding, &Sounding)> {
         let count = self.soundings.len().max(1);
         self.soundings.iter().zip(self.soundings.iter().cycle().skip(stride % count))
     }
 
-    /// T_y2 in general, m: the largest distance on the unrolled wall between soundings `stride` apart, for any angle of
-    /// the first ping; zero without soundings.
+    /// T_y2 in general, m: the largest distance on the unrolled wall between soundings `stride` apart.
+    ///
+    /// It covers any angle of the first ping. Zero without soundings.
     ///
     /// Source: Eq. 6 where the paper's assumptions hold.
     pub fn largest_step_m(&self, stride: usize) -> f64 {
         self.steps_m(stride).fold(0.0, f64::max)
     }
 
-    /// Distances on the unrolled wall from each sounding to the one `stride` further, m, in the direction of rotation:
-    /// with one ping per turn, the whole perimeter.
+    /// Distances on the unrolled wall from each sounding to the one `stride` further, m.
+    ///
+    /// They are in the direction of rotation. With one ping per turn it is the whole perimeter.
     pub fn steps_m(&self, stride: usize) -> impl Iterator<Item = f64> {
         let count = self.soundings.len().max(1);
         let whole_m = self.way_round_m();

@@ -29,8 +29,10 @@ impl Schedule {
         self.heads.iter().map(|(_, program)| program)
     }
 
-    /// Angle of a head at its last ping up to `since` the start, sensor frame, radians: in [0, 2 pi) for continuous
-    /// rotation, or within its sector; `None` for a head that doesn't exist, or before the start.
+    /// Angle of a head at its last ping up to `since` the start, sensor frame, radians.
+    ///
+    /// It is in [0, 2 pi) for continuous rotation, or within its sector. `None` for a head that does not exist, or
+    /// before the start.
     pub fn angle_rad(&self, head: usize, since: DurNs) -> Option<f64> {
         let (spec, program) = self.heads.get(head)?;
         let since = (since >= DurNs::ZERO).then_some(since)?;
@@ -44,7 +46,7 @@ impl Schedule {
         })
     }
 
-    /// Period of a sweep there and back of the heads in sectors, seconds: the longest, or `None` without sectors.
+    /// Longest period of a sweep there and back, seconds; `None` without sectors.
     pub fn sweep_s(&self) -> Option<f64> {
         let sweep = |(spec, program): &(HeadSpec, HeadProgram)| {
             let (_, size_rad) = program.sector?;

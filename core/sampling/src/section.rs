@@ -56,7 +56,9 @@ pub fn t_y2_mean_m(distance_m: f64, step_rad: f64, m: u32) -> Result<f64, Sampli
     Ok(distance_m * sine / cosine / f64::from(m))
 }
 
-/// T_yp, m: upper bound of the mean step of a whole turn, for any head position: perimeter / pings per turn.
+/// T_yp, m: upper bound of the mean step of a whole turn, perimeter / pings per turn.
+///
+/// It holds for any head position.
 ///
 /// Errors: a perimeter or a number that isn't above zero.
 /// Source: Jorge et al. 2021, Eq. 10.

@@ -62,8 +62,9 @@ impl Looks {
         recent.map(|(_, then)| (look + -*then).norm()).fold(0.0, f64::max)
     }
 
-    /// Returns the largest swing of the last half minute up to `now`, which stays valid while the vehicle swings to
-    /// and fro.
+    /// Returns the largest swing of the last half minute up to `now`.
+    ///
+    /// It stays valid while the vehicle swings to and fro.
     ///
     /// `gap_s` is the time between passes; heads pass a place within `apart_s`. Rotation within the navigation errors
     /// is excluded, with a continuous transition.

@@ -35,7 +35,9 @@ const LEAST_STRETCHES: usize = 8;
 /// the wrap period.
 const MOST_QUEUED_NS: i64 = 10_000_000_000;
 
-/// Largest difference between the minimum delays of two stretches: a constant, and a share of the time between them.
+/// Largest difference between the minimum delays of two stretches.
+///
+/// It is a constant plus a share of the time between them.
 ///
 /// No clock drifts by more than the share. A stretch with a larger delay was queued, and is not kept.
 const MOST_SHIFT_NS: f64 = 0.5e9;
@@ -184,7 +186,9 @@ impl DeviceClock {
         self.begin(raw, received)
     }
 
-    /// Returns the earliest receive time of a stamp made at device time `device`, as returned by [`Self::take`].
+    /// Returns the earliest receive time of a stamp made at device time `device`.
+    ///
+    /// `device` is as returned by [`Self::take`].
     ///
     /// `None` until the drift is known.
     pub fn earliest(&self, device: DurNs) -> Option<MonoNs> {
@@ -366,7 +370,9 @@ impl Line {
     }
 }
 
-/// Returns the elapsed ticks: `difference` plus the number of wraps that brings it nearest to the time `waited`.
+/// Returns the elapsed ticks for a raw `difference`.
+///
+/// It adds the number of wraps that brings the result nearest to the time `waited`.
 fn advance(difference: i128, round: i128, tick: DurNs, waited: DurNs) -> i128 {
     let expected = i128::from(waited.0).div_euclid(i128::from(tick.0));
     let rounds = (expected - difference + round / 2).div_euclid(round);

@@ -116,7 +116,9 @@ pub trait Driver: Send {
 ///
 /// Its requests are harmless to any other device there: nothing turns, and no setting persists.
 pub trait Probe: Send {
-    /// Returns the requests to send one after the other, each with time for a response, until there is an identity.
+    /// Returns the requests to send one after the other until there is an identity.
+    ///
+    /// Each has time for a response.
     fn questions(&self) -> Vec<Vec<u8>>;
 
     /// Processes received bytes, in pieces of any size.

@@ -1,4 +1,4 @@
-//! `[coverage]` and `[[openings]]` of a vehicle file: verdict parameters, and declared openings of the wall.
+//! `[coverage]` and `[[openings]]` of a vehicle file: verdict parameters and declared openings.
 
 use headrace_config::{ConfigError, Section};
 use headrace_coverage::CONFIDENCE_SD;
@@ -36,8 +36,9 @@ impl Default for CoverageConfig {
     }
 }
 
-/// Limits of the contradicting deviation: a share of the radius of a circle with the same perimeter, and a maximum,
-/// m.
+/// Limits of the contradicting deviation.
+///
+/// They are a share of the radius of a circle with the same perimeter, and a maximum, m.
 const CONTRADICTION_SHARE: f64 = 0.2;
 const MOST_CONTRADICTION_M: f64 = 0.5;
 /// Maximum number of samples that fill openings.
@@ -118,8 +119,9 @@ fn parse_opening(section: &Section<'_>, profile: Option<&Profile>) -> Result<Ope
     Ok(Opening { name, from_m, to_m, arc_m })
 }
 
-/// Arc length of a clock position, m, seen from the reference point along the tunnel: 6 is the floor, 9 the left
-/// wall.
+/// Arc length of a clock position, m, seen from the reference point along the tunnel.
+///
+/// 6 is the floor, 9 the left wall.
 fn arc_at_hour_m(profile: &Profile, hour: f64) -> f64 {
     let angle = (hour - 6.0) / 12.0 * TAU;
     let direction = [math::sin(angle), -math::cos(angle)];

@@ -1,4 +1,6 @@
-//! Checks of a readable vehicle file as a whole: lines that cannot be shared, walls out of reach, heads out of step.
+//! Checks of a readable vehicle file as a whole.
+//!
+//! They find lines that cannot be shared, walls out of reach, and heads out of step.
 
 use core::fmt;
 

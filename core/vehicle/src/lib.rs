@@ -1,4 +1,4 @@
-//! `VEHICLE.toml`: the vehicle, its sensors, the tunnel, the target, and the parameters of verdicts and navigation.
+//! `VEHICLE.toml`: vehicle, sensors, tunnel, target, and parameters of verdicts and navigation.
 //!
 //! All errors of a file are found at once. The caller supplies the kinds of device that a file may name.
 //! `docs/reference/vehicle-file.md` lists the keys.

@@ -296,7 +296,7 @@ fn check_sound(root: &Section<'_>, told_by: Option<&str>, sensors: &Sensors) -> 
     Err(root.invalid("water", &problem))
 }
 
-/// Checks that there are not too many heads, and that none is inside a hull box, which could not occlude it.
+/// Checks the number of heads, and that none is inside a hull box, which could not occlude it.
 fn check_heads(
     root: &Section<'_>,
     sensors: &[Box<dyn Device>],

@@ -12,7 +12,9 @@ use headrace_sensor::device::SensorKind;
 const MEMORY: u32 = 40;
 /// Minimum share of measurements within the gate. Below it, the measured quantity is lost and reacquired.
 const LEAST_AGREEING: f64 = 0.35;
-/// Standard deviations added when it is lost: across the tunnel, along it, and of the attitude; m, m/s, radians.
+/// Standard deviations added when a quantity is lost, m, m/s, radians.
+///
+/// They apply across the tunnel, along it, and to the attitude.
 const LOST_M: f64 = 1.5;
 const LOST_MPS: f64 = 1.0;
 const LOST_WAY_M: f64 = 100.0;

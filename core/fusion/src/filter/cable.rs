@@ -29,7 +29,7 @@ const SAME_COUNT_M: f64 = 1e-6;
 /// Time after which a dispute is reported, and time over which agreement ends it.
 const NOTICED_AFTER: DurNs = DurNs(1_000_000_000);
 const RETURNED_AFTER: DurNs = DurNs(500_000_000);
-/// Maximum standard deviation of the innovation at which an agreeing reading shows that no chainage was lost, m.
+/// Maximum sd of the innovation at which an agreeing reading rules out a loss, m.
 const SURE_M: f64 = 0.3;
 /// Tolerance of such a reading: a share of the vehicle's distance meanwhile, and a length, m.
 const MISSING_SHARE: f64 = 0.1;
@@ -94,8 +94,9 @@ pub enum Use {
     Fuse,
     /// Ignore it.
     Withhold,
-    /// Ignore readings from now on, and take back these corrections of chainage and speed, m and m/s, by the last
-    /// readings.
+    /// Ignore readings from now on, and revert the corrections by the last ones.
+    ///
+    /// The values are the corrections of chainage and speed, m and m/s.
     Dispute([f64; 2]),
     /// The counter runs correctly again and has lost or gained this length meanwhile, m: shown less expected.
     Slipped(f64),

@@ -19,8 +19,9 @@ use headrace_geometry::time::{DurNs, MonoNs};
 pub const STEP: DurNs = DurNs(2_000_000_000);
 /// Number of clones kept: over four turns of a head in its slowest mode (4 x 28 s).
 pub const CLONES: usize = 60;
-/// Share to which the variance of the chainage must fall to count as a sudden gain, for instance when a silent cable
-/// returns.
+/// Share to which the variance of the chainage must fall to count as a sudden gain.
+///
+/// This happens, for instance, when a silent cable returns.
 const SURE_SHARE: f64 = 0.1;
 /// Errors that move a sample along the tunnel: chainage, pitch and yaw.
 pub const MOVING: [usize; 3] = [POSITION, ATTITUDE + 1, ATTITUDE + 2];

@@ -8,8 +8,9 @@ use serde::{Deserialize, Serialize};
 
 use headrace_geometry::math;
 
-/// Time for which corrections by a changing count are remembered, s, since a counter fails before the failure is
-/// noticed.
+/// Time for which corrections by a changing count are remembered, s.
+///
+/// It is needed because a counter fails before the failure is noticed.
 const RECENT_S: f64 = 1.0;
 /// A count that is stationary for less than this may belong to a slow vehicle with coarse counter steps, s.
 const STANDS_S: f64 = 2.0;
@@ -47,8 +48,9 @@ pub struct Corrections {
 }
 
 impl Corrections {
-    /// Notes a fused reading: its corrections of chainage and speed, m and m/s, and the variances it removed, m^2 and
-    /// m^2/s^2.
+    /// Notes a fused reading.
+    ///
+    /// Inputs: its corrections of chainage and speed, m and m/s, and the variances it removed, m^2 and m^2/s^2.
     pub fn note(&mut self, by: [f64; 2], variances: [f64; 2]) {
         for sums in [&mut self.recent, &mut self.sums] {
             for (sum, by) in sums.iter_mut().zip(by) {

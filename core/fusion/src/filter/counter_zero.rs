@@ -16,7 +16,7 @@ pub struct CounterZero {
     restarts: u32,
     /// Time of the counter's last reading.
     heard: Option<MonoNs>,
-    /// Time of the last reading of any other sensor, and their longest silence since the counter's last reading.
+    /// Time of the last reading of any other sensor, and their longest silence since the counter's.
     others: Option<MonoNs>,
     silence: DurNs,
     is_lost: bool,

@@ -1,4 +1,6 @@
-//! The error-state Kalman filter: an epoch is one leg of propagation followed by the measurements of its time.
+//! The error-state Kalman filter.
+//!
+//! An epoch is one leg of propagation followed by the measurements of its time.
 
 use core::ops::Range;
 
@@ -42,7 +44,9 @@ const REST_SD_MPS: f64 = 0.02;
 const REST_SD_RADPS: f64 = 1e-3;
 /// Gate of the rest hypothesis; a valid one exceeds it once in ten thousand times.
 const REST_GATE: f64 = 15.1;
-/// Standard deviation of a range below which a wall counts as flat, m, unless ranges are more precise still.
+/// Standard deviation of a range below which a wall counts as flat, m.
+///
+/// More precise ranges have a lower limit.
 const NEAR_M: f64 = 0.03;
 /// Standard deviation of the speed prior, m/s.
 const SPEED_SD_MPS: f64 = 0.5;
@@ -432,8 +436,9 @@ impl Eskf {
         if sees_one { self.roughness.variance_m2(settings) } else { 0.0 }
     }
 
-    /// Returns the noise with which to fuse one of many pings that see the same bump, and notes the ping for the
-    /// roughness.
+    /// Returns the noise of one of many pings that see the same bump.
+    ///
+    /// It also notes the ping for the roughness.
     fn spread_over_looks(
         &mut self,
         row: &ScalarUpdate,
@@ -496,7 +501,9 @@ impl Eskf {
         Some(row)
     }
 
-    /// Moves an estimate that lies beyond the wall back into the tunnel, since no beam could be predicted from there.
+    /// Moves an estimate that lies beyond the wall back into the tunnel.
+    ///
+    /// No beam could be predicted from beyond the wall.
     fn stay_inside(&mut self, profile: &Profile) {
         let place = [self.state.position.y(), self.state.position.z()];
         if profile.contains(place) {

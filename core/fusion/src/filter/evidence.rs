@@ -15,13 +15,15 @@ pub(super) const FEWEST_BLOCKS: u32 = 8;
 /// For an alternative the limit is lower (`SURE_GAIN`), because its gain varies with the vehicle's position.
 pub(super) const SURE: f64 = 6.0;
 pub(super) const SURE_GAIN: f64 = 3.0;
-/// Minimum normalised square that a parameter must explain, per reading of all sources: a seventh of their noise.
+/// Minimum normalised square that a parameter must explain, per reading of all sources.
+///
+/// It is a seventh of their noise.
 const EXPLAINS: f64 = 0.02;
 /// Unknowns of the vehicle's pose within a spell: position across and up, roll, pitch and yaw.
 pub(super) const POSE: usize = 5;
 /// Largest residual that counts in a comparison, m, since some echoes come from other objects.
 const MOST_MISSED_M: f64 = 0.5;
-/// Minimum mean square residual of a source, m^2, and the largest share of it that an alternative may leave.
+/// Minimum mean square residual of a source, m^2, and the share that an alternative may leave.
 const MISSES_M2: f64 = 0.01;
 const LEAVES: f64 = 0.4;
 
@@ -51,8 +53,9 @@ pub(super) struct Alternative {
     pub(super) source: u16,
     pub(super) other: u16,
     pub(super) is_echo: bool,
-    /// Sums of the present block, and of all earlier blocks: own squares, squares of the alternative, number of
-    /// readings.
+    /// Sums of the present block, and of all earlier blocks.
+    ///
+    /// Each has own squares, squares of the alternative, and number of readings.
     pub(super) block: [f64; 3],
     pub(super) all: [f64; 3],
     pub(super) blocks: u32,
@@ -117,7 +120,7 @@ impl Fit {
         Some([estimate, math::sqrt((scatter * n / (n - 1.0)).max(0.0)) / self.weight])
     }
 
-    /// Returns the estimate if it is certainly beyond `least`, and its distance from zero in standard deviations.
+    /// Returns the estimate and its distance from zero in sd, if it is certainly beyond `least`.
     ///
     /// The standard deviation includes the scatter of blocks and the noise of ranges, because blocks alone may hardly
     /// scatter. `None` if the parameter hardly changes any range: an estimate from millimetres reflects model errors

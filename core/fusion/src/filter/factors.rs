@@ -135,8 +135,9 @@ impl<const N: usize> Factors<N> {
         rest
     }
 
-    /// Returns the factors of the covariance of a sum of independent errors, each transformed by a matrix given by
-    /// rows.
+    /// Returns the factors of the covariance of a sum of independent, transformed errors.
+    ///
+    /// Each part has a matrix, given by rows.
     ///
     /// Source: Thornton's modified weighted Gram-Schmidt, in Bierman 1977, VI.4.
     pub fn of_sum<const M: usize>(parts: [(&Self, &[[f64; N]; N]); M]) -> Self {

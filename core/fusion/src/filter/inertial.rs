@@ -179,7 +179,9 @@ impl Leg {
         Some(leg)
     }
 
-    /// Returns the leg with these factors for the process noise of gyro and accelerometer biases, and this slack.
+    /// Returns the leg with these noise factors and this slack.
+    ///
+    /// The factors are for the process noise of gyro and accelerometer biases.
     #[must_use]
     pub fn with_noise(self, unrest: [f64; 2], slack: Wander) -> Self {
         Self { unrest, slack: [slack.reach, slack.time_s], ..self }

@@ -26,7 +26,9 @@ pub struct ScalarUpdate {
     pub noise: f64,
     /// For a range, the beam's inclination along the tunnel.
     pub lean: Option<Lean>,
-    /// Second derivatives of the expected value, neglected by the update: by position, 1/m; by rotation, m; by both.
+    /// Second derivatives of the expected value, which the update neglects.
+    ///
+    /// They are by position, 1/m, by rotation, m, and by both.
     pub bends: [f64; 3],
 }
 
@@ -107,7 +109,9 @@ impl ScalarUpdate {
     }
 }
 
-/// Minimum cosine of the incidence: beams that graze the wall more measure its roughness rather than the position.
+/// Minimum cosine of the incidence.
+///
+/// Beams that graze the wall more measure its roughness rather than the position.
 const LEAST_COSINE: f64 = 0.5;
 /// Minimum distance assumed for the curvature of the wall, m.
 const LEAST_HEIGHT_M: f64 = 0.5;

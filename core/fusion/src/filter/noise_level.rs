@@ -90,7 +90,9 @@ impl NoiseLevel {
         nis / usual
     }
 
-    /// Notes the square of an innovation beyond the estimate's own uncertainty, as a share of the declared variance.
+    /// Notes the square of an innovation beyond the estimate's own uncertainty.
+    ///
+    /// It is given as a share of the declared variance.
     pub fn note_share(&mut self, share: f64, is_used: bool) {
         let most = if is_used { MOST } else { MOST_UNUSED };
         let share = share.clamp(-most, most);

@@ -1,5 +1,4 @@
-//! Comparison of distances along the tunnel: by the cable counter, by a velocity log in raw form, and by the
-//! estimate.
+//! Comparison of distances along the tunnel by cable counter, velocity log and estimate.
 //!
 //! It finds differences beyond the data sheets. It uses readings, and never the filter's covariance, gates or learnt
 //! noise. So it still works when the filter has settled on a wrong speed. The inertial unit measures changes of speed
@@ -204,7 +203,9 @@ impl RawWays {
         }
     }
 
-    /// Difference of the cable's distance from another one over the window, or over the shorter time with both, m.
+    /// Difference of the cable's distance from another one over the window, m.
+    ///
+    /// The time may be shorter if both are not available for the whole window.
     ///
     /// `None` if one is missing or the difference is within its tolerance.
     fn differs_m(&self, other: usize, window_s: f64, settings: &Settings) -> Option<f64> {

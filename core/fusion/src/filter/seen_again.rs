@@ -10,8 +10,9 @@ use headrace_geometry::math;
 
 /// Largest share of bumps in the noise of a return.
 const MOST_BUMPS: f64 = 0.9;
-/// Maximum number of passes that count, so that repeated bumps still hold an estimate that gyros alone would let
-/// drift.
+/// Maximum number of passes that count.
+///
+/// Repeated bumps must still hold an estimate that gyros alone would let drift.
 const MOST_PASSES: f64 = 10.0;
 
 /// Number of times the heads have passed the present bumps.

@@ -33,8 +33,9 @@ impl Wander {
         2.0 * self.reach * self.reach / self.time_s
     }
 
-    /// Standard deviation of the driving rate of a smooth process (two equal lags in series) with standard deviation
-    /// `reach`.
+    /// Standard deviation of the driving rate of a smooth process with standard deviation `reach`.
+    ///
+    /// A smooth process is two equal lags in series.
     pub fn drive(&self) -> f64 {
         core::f64::consts::SQRT_2 * self.reach / self.time_s
     }
@@ -87,7 +88,9 @@ pub struct Settings {
     pub seen_again_m: f64,
     /// Full width of an echosounder's beam, radians. It is uncertain which part of the wall within it echoes.
     pub echo_beam_rad: f64,
-    /// Initial scale error of all ranges against the design, a ratio, and its random walk, per root of a second.
+    /// Initial scale error of all ranges against the design, a ratio.
+    ///
+    /// With its random walk, per root of a second.
     pub range_scale_sd: f64,
     /// See `range_scale_sd`.
     pub range_scale_noise: f64,
@@ -109,8 +112,9 @@ pub struct Settings {
     pub epoch: DurNs,
     /// Whether noise levels of the sources are learnt. Likelihoods are comparable only without it.
     pub learns: bool,
-    /// Share of the correction by wall ranges that is applied to attitude and related errors: 0 to 1, the optimal
-    /// estimate.
+    /// Share of the correction of attitude and related errors by wall ranges that is applied.
+    ///
+    /// 0 is none and 1 the optimal estimate.
     ///
     /// Coverage depends on the attitude of one pass relative to the next. The gyros know that better than walls,
     /// whose shape differs from the design. A smoother needs 1: [`crate::smooth::beside`].

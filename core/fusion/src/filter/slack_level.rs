@@ -22,9 +22,13 @@ const ROOM: usize = 256;
 const KNOTS: usize = 256;
 /// Averaging time of the mean squares, s.
 const MEMORY_S: f64 = 40.0;
-/// Multiple of the rms at which a third difference is clipped, because faults are rare and large, and slack is not.
+/// Multiple of the rms at which a third difference is clipped.
+///
+/// Faults are rare and large; slack is not.
 const MOST_SDS: f64 = 3.0;
-/// Standard deviations by which a mean square may exceed the noise, since it comes from few independent differences.
+/// Standard deviations by which a mean square may exceed the noise.
+///
+/// A margin is needed because it comes from few independent differences.
 const MARGIN_SDS: f64 = 1.5;
 /// Time constant with which inertial velocity decays, s. It keeps numbers small and hardly changes a third
 /// difference.
@@ -35,7 +39,9 @@ const FORGETS_S: f64 = 1000.0;
 const LEVELS_S: f64 = 100.0;
 /// Largest difference from the estimate's attitude, rad; beyond it the track restarts.
 const MOST_OFF_RAD: f64 = 0.3;
-/// Standard deviations within which counter and inertial motion agree, and the number of differences needed to judge.
+/// Standard deviations within which counter and inertial motion agree.
+///
+/// The second constant is the number of differences needed to judge.
 const AGREES_SDS: f64 = 4.0;
 const FEW: u32 = 50;
 const ENOUGH: u32 = 200;
@@ -189,8 +195,9 @@ impl SlackLevel {
         self.differences.clear();
     }
 
-    /// Returns the third difference of counter less inertial position, and the spread of the counter's distances over
-    /// three lags, m.
+    /// Returns the third difference of counter less inertial position, m.
+    ///
+    /// The second value is the spread of the counter's distances over three lags, m.
     fn third_difference_m(&self, at: MonoNs, lag_s: f64) -> Option<[f64; 2]> {
         let then = |lags: f64| at_time(&self.differences, at - DurNs::from_secs_f64(lags * lag_s));
         let [[u0, z0], [u1, z1], [u2, z2], [u3, z3]] = [then(0.0)?, then(1.0)?, then(2.0)?, then(3.0)?];
@@ -223,8 +230,9 @@ impl SlackLevel {
         agrees
     }
 
-    /// Returns the slowest slack whose third differences are as large as observed, with the declared reach or a
-    /// larger one.
+    /// Returns the slowest slack whose third differences are as large as observed.
+    ///
+    /// It has the declared reach, or a larger one if necessary.
     fn shown(&self, noises: Noises, settings: &Settings) -> Wander {
         let declared = settings.slack;
         let seen_m2: [f64; LAGS_S.len()] = core::array::from_fn(|k| {
@@ -275,8 +283,9 @@ pub(super) struct Noises {
 }
 
 impl Noises {
-    /// Creates it from the counter's variance, m^2, the gyro bias variance, rad^2/s^2, and its random walk,
-    /// rad^2/s^3.
+    /// Creates it from the counter's variance, m^2, and the gyro bias.
+    ///
+    /// The bias is given by its variance, rad^2/s^2, and its random walk, rad^2/s^3.
     ///
     /// A constant bias error does not count, because it is part of the mean.
     pub(super) fn of(counter_m2: f64, known: f64, wander: f64) -> Self {

@@ -11,8 +11,9 @@ use headrace_sensor::device::{SensorInfo, SensorKind};
 use headrace_sensor::reading::{Reading, SonarReturn};
 use headrace_sensor::sampling::head::SILENT_AFTER;
 
-/// Limits for a stuck head: so many returns have one range although the expected range varies by more than a length,
-/// m.
+/// Limits for a stuck head: number of returns, and variation of the expected range, m.
+///
+/// So many returns have one range although the expected range varies by more.
 ///
 /// A reading that is dropped by mistake costs nothing. The expected ranges must be certain to within a standard
 /// deviation, m.

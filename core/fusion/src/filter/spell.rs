@@ -1,4 +1,6 @@
-//! Sums of a spell: all fitted parameters, next to the vehicle's pose, which takes priority in explaining residuals.
+//! Sums of a spell for all fitted parameters and the vehicle's pose.
+//!
+//! The pose takes priority in explaining residuals.
 
 use serde::{Deserialize, Serialize};
 

@@ -1,4 +1,6 @@
-//! Detection of wrong settings: each is one parameter, fitted to the residuals of ranges against the design.
+//! Detection of wrong settings by fits to the residuals of ranges against the design.
+//!
+//! Each setting is one parameter.
 //!
 //! Within a spell of a few seconds, the vehicle's position and attitude absorb what they can. The parameters are
 //! fitted to the rest. Spells add up to blocks of distance. Blocks are about as independent as the wall allows, and
@@ -51,7 +53,9 @@ pub enum Setting {
     ///
     /// The speed of sound is set too high, or the wall is wider than drawn by this share.
     RangeScale(f64),
-    /// A head is rotated about its axis from its configured mount by this angle, radians, to be added to its roll.
+    /// A head is rotated about its axis by this angle from its configured mount, radians.
+    ///
+    /// The angle is to be added to its roll.
     HeadTurned(f64),
     /// A head is pitched on its mount by this angle, radians, to be added to its pitch.
     HeadPitched(f64),
@@ -144,7 +148,9 @@ struct Look {
     sd_m: f64,
 }
 
-/// Start place and time of a block, its readings, and the sums of its spells after the vehicle's pose is eliminated.
+/// A block: its start, its readings, and the sums of its spells.
+///
+/// The vehicle's pose is eliminated from the sums.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 struct Block {
     begun: Option<(MonoNs, f64)>,
@@ -278,8 +284,9 @@ impl Suspicions {
         Some(place)
     }
 
-    /// Compares a reading with the predictions for the mounts of other sources of its kind, and for its own mount
-    /// turned round.
+    /// Compares a reading with the predictions for other mounts.
+    ///
+    /// These are the mounts of other sources of its kind, and its own mount turned round.
     fn compare(
         &mut self,
         state: &State,

@@ -10,7 +10,9 @@ use serde::{Deserialize, Serialize};
 use super::evidence::{FEWEST_BLOCKS, POSE, SURE, dot, solved};
 use headrace_geometry::math;
 
-/// Minimum share of the weight after the constant part is eliminated: the vehicle must have turned to and fro.
+/// Minimum share of the weight after the constant part is eliminated.
+///
+/// Less means that the vehicle has not turned to and fro enough.
 const LEAST_LEFT: f64 = 0.05;
 
 /// Minimum significance of the smallest reported tilt, in standard deviations by range noise.
@@ -18,7 +20,9 @@ const SHOWS: f64 = 3.0;
 /// Largest tilt for which the linear model holds, radians.
 const MOST_RAD: f64 = 0.3;
 
-/// Number of sums: pattern squared, pattern times derivative, derivative squared, and each with the residuals.
+/// Number of sums.
+///
+/// They are pattern squared, pattern times derivative, derivative squared, and each with the residuals.
 const SUMS: usize = 5;
 
 /// Sums of one head and axis within a spell, next to those of the vehicle's pose.

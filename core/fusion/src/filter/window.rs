@@ -1,5 +1,6 @@
-//! Reordering window: readings wait until all readings of their time have arrived, and are fused in order of
-//! validity.
+//! Reordering window that releases readings in order of validity.
+//!
+//! Readings wait until all readings of their time have arrived.
 
 use serde::{Deserialize, Serialize};
 
@@ -15,8 +16,9 @@ const MOST: usize = 1024;
 const MOST_FELT: usize = 1024;
 /// Longest interval for which an inertial sample is valid.
 const SPEAKS_FOR: DurNs = DurNs(100_000_000);
-/// Samples closer than this are merged into their mean: rate and force of one sample, or several samples of one
-/// burst.
+/// Time within which samples are merged into their mean.
+///
+/// They are rate and force of one sample, or several samples of one burst.
 ///
 /// The mean of a burst covers all the time since the sample before it.
 const SAME: DurNs = DurNs(500_000);

@@ -1,4 +1,6 @@
-//! Detection of zero velocity (ZUPT): a vehicle at rest on deck or on the ground, whose gyros then show their bias.
+//! Detection of zero velocity (ZUPT).
+//!
+//! The gyros of a vehicle at rest on deck or on the ground show their bias.
 
 use serde::{Deserialize, Serialize};
 
@@ -16,8 +18,9 @@ const ENOUGH: u32 = 25;
 const FLOATS: u32 = 15;
 /// Time after the first estimate during which the pilot is asked to keep the vehicle still.
 const ASKS_FOR: DurNs = DurNs(60_000_000_000);
-/// Number of remembered pauses of the cable, and the multiple of the longest pause after which the cable counts as at
-/// rest.
+/// Number of remembered pauses of the cable.
+///
+/// The cable counts as at rest after a multiple of the longest pause.
 ///
 /// A winch operator who winds by half metres leaves the cable stationary between pulls while the vehicle moves on.
 const PAUSES: usize = 4;

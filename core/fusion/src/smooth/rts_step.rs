@@ -1,4 +1,6 @@
-//! One step of the Rauch-Tung-Striebel smoother on factors, which keep the covariance symmetric and non-negative.
+//! One step of the Rauch-Tung-Striebel smoother on factors.
+//!
+//! Factors keep the covariance symmetric and non-negative.
 //!
 //! Source: H. E. Rauch, F. Tung, C. T. Striebel, Maximum likelihood estimates of linear dynamic systems, AIAA J. 3, 1965.
 

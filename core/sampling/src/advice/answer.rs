@@ -195,8 +195,9 @@ pub struct Advice {
     pub phase_error_rad: Option<f64>,
     /// Remaining tunnel and time.
     pub left: Left,
-    /// Width of a strip that no head sees, and the arc length of its middle, m, if a lower speed does not help
-    /// because of it.
+    /// Width of a strip that no head sees, and the arc length of its middle, m.
+    ///
+    /// `Some` only if a lower speed does not help because of it.
     pub unseen_m: Option<[f64; 2]>,
     /// Remedy if a lower speed does not help.
     pub remedy: Option<Remedy>,

@@ -7,7 +7,9 @@ use headrace_geometry::time::{DurNs, MonoNs};
 
 /// Less restrictive advice is displayed after no more restrictive one has come for this long.
 const HOLD: DurNs = DurNs(1_000_000_000);
-/// A higher speed is displayed after it has been higher for this long, by the share below: 3 mm/s at 0.1 m/s.
+/// Time for which a higher speed must last before it is displayed.
+///
+/// It must be higher by the share below: 3 mm/s at 0.1 m/s.
 const RISES_AFTER: DurNs = DurNs(10_000_000_000);
 const RISES_BY: f64 = 0.03;
 /// A lower speed is displayed at once if it is lower by this share.
@@ -23,7 +25,9 @@ const BEYOND: f64 = SPEED_MARGIN / 2.0;
 /// The same for the target less position errors; a pilot may exceed the advised speed by 1 or 2 %.
 const MAYBE_BEYOND: f64 = 0.03;
 
-/// Displays the most restrictive advice of the last second: the most severe reason and, within it, the lowest speed.
+/// Displays the most restrictive advice of the last second.
+///
+/// That is the most severe reason and, within it, the lowest speed.
 ///
 /// A more severe reason appears at once, a less severe one after it has lasted a second. A speed that is lower by 0.5
 /// % appears at once. A speed that is higher by 3 % appears after ten seconds, as the lowest of that time. Smaller

@@ -1,4 +1,6 @@
-//! Intervals of speed that meet a target, because heads apart along the hull are in phase only at some speeds.
+//! Intervals of speed that meet a target.
+//!
+//! They arise because heads apart along the hull are in phase only at some speeds.
 //!
 //! The advised speed depends on the measured heads and the vehicle's pose, not on the present speed. It is the upper
 //! end of the highest interval. If that interval vanishes while heads run out of phase, the next one may be far
@@ -65,8 +67,9 @@ impl Driving<'_> {
         Err(if stays { spacing::along_m(most_m, unmet.t_y_m).map_or(0.0, below_mps) } else { speed_mps })
     }
 
-    /// Returns the speed, m/s, down to which passes stay more than `most_m` apart, if they are `gap_s` apart at the
-    /// given speed.
+    /// Returns the speed, m/s, down to which passes stay more than `most_m` apart.
+    ///
+    /// At the given speed they are `gap_s` apart in time.
     ///
     /// At u < v, heads at most a apart along the hull shift by up to a (1 / u - 1 / v) in time against each other.
     /// Their longest gap is at least g less that shift, so its length is at least u g - a (1 - u / v).
@@ -108,7 +111,9 @@ impl Driving<'_> {
         top_mps
     }
 
-    /// Returns the speed after the margin [`SPEED_MARGIN`], or up to twice that where T grows faster than the speed.
+    /// Returns the speed after the margin [`SPEED_MARGIN`], or up to twice that margin.
+    ///
+    /// The larger margin applies where T grows faster than the speed.
     ///
     /// T does so where heads run out of phase: a speed error of 1 % then costs more than 1 % of T.
     pub(super) fn kept_back_mps(&self, fastest_mps: f64) -> f64 {

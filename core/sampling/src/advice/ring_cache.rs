@@ -65,8 +65,9 @@ pub(super) struct AdvisedHead {
 stateful!(AdvisedHead { state: ring, cast_at; fixed: spec, modes, hidden, sector; });
 
 impl AdvisedHead {
-    /// Whether the vehicle is within `still_m`, and [`TURN_PER_M`] times that, of the pose at which the ring was
-    /// cast.
+    /// Whether the vehicle is close to the pose at which the ring was cast.
+    ///
+    /// Limits: `still_m`, and [`TURN_PER_M`] times that.
     pub(super) fn is_near(&self, pose: &Pose, still_m: f64) -> bool {
         let Some(cast_at) = &self.cast_at else { return false };
         let near = |a: &[f64], b: &[f64], by: f64| a.iter().zip(b).all(|(a, b)| (a - b).abs() <= by);

@@ -43,8 +43,9 @@ impl Leg {
     }
 }
 
-/// Largest unevenness of neighbours at the end that their sectors share, as a share of the advance in a sweep there
-/// and back.
+/// Largest unevenness of neighbours at the end that their sectors share.
+///
+/// It is a share of the advance in a sweep there and back.
 ///
 /// 0 if one comes half a sweep after the other; [`AT_ONCE`] if both come at the same place or the timing is unknown.
 /// `ahead` is the position of each head along the hull, as a share of that advance.

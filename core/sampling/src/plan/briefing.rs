@@ -1,4 +1,4 @@
-//! Briefing of the crew in addition to a mode's figures: hidden angles, starts of the heads, and interference.
+//! Briefing of the crew: hidden angles, starts of the heads, and interference.
 
 use serde::Serialize;
 

@@ -74,8 +74,9 @@ impl Limit {
     }
 }
 
-/// Diameter of the largest circle between two rows of samples, m: `along_m` apart in each row, `across_m` between
-/// rows.
+/// Diameter of the largest circle between two rows of samples, m.
+///
+/// Samples are `along_m` apart in each row, and rows `across_m`.
 ///
 /// One row is shifted along by half of `along_m`, by the share `uneven` of it and by +-`moved_m`, but at most until
 /// it is level with the other.

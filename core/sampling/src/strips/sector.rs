@@ -37,7 +37,9 @@ impl Sector {
         self.parts.iter()
     }
 
-    /// Longest wait between two passes over the part with this place, as a share of a sweep there and back, 0.5 to 1.
+    /// Longest wait between two passes over the part with this place, 0.5 to 1.
+    ///
+    /// It is a share of a sweep there and back.
     ///
     /// `None` outside the sector. At a turning point two passes follow at once, and the next one comes a whole sweep
     /// later. In the middle, passes are evenly spaced. A circle between two legs of the zigzag is at most as wide as

@@ -94,7 +94,9 @@ fn attempts(len: usize) -> impl Iterator<Item = (usize, u8)> {
 /// Maximum frame length for this test. Longer frames have no checksum, and trying all values of two bytes takes long.
 const MOST_MATCHED: usize = 100;
 
-/// Returns wrong frames that pass: one byte of a good frame is changed, and its checksum, if any, matches by chance.
+/// Returns wrong frames that pass by chance.
+///
+/// One byte of a good frame is changed, and its checksum, if any, matches.
 pub fn matching_by_chance<C: Codec>(new: &impl Fn() -> C, frame: &[u8]) -> Vec<Vec<u8>> {
     let wrong = attempts(frame.len()).filter_map(|(at, turn)| {
         let mut wrong = frame.to_vec();
@@ -236,8 +238,7 @@ macro_rules! codec_contract {
                 assert!(tried > 0);
             }
 
-            /// A truncated frame whose checksum matches with the next bytes costs only the frame that these bytes
-            /// belong to.
+            /// A truncated frame with a chance match costs only the frame that the next bytes belong to.
             #[test]
             fn chance_match_into_the_next_frame_costs_only_that_frame() {
                 for frame in $frames {

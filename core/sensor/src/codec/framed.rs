@@ -99,8 +99,9 @@ impl<F, const N: usize> Stateful for Framed<F, N> {
 }
 
 impl<F: Framing, const N: usize> Framed<F, N> {
-    /// Like [`Codec::push`], but passes each frame's bytes to `take`, with the number of bytes from the frame's start
-    /// to the last received byte.
+    /// Like [`Codec::push`], but passes each frame's bytes to `take`.
+    ///
+    /// The second argument is the number of bytes from the frame's start to the last received byte.
     pub fn push_frames(&mut self, mut bytes: &[u8], mut take: impl FnMut(&[u8], usize)) {
         while !bytes.is_empty() && !self.astray {
             let (now, later) = bytes.split_at(bytes.len().min(N - self.len));

@@ -1,4 +1,6 @@
-//! Codecs between a device's bytes and its values, without I/O, and the contract that every codec is tested against.
+//! Codecs between a device's bytes and its values, without I/O, and their contract.
+//!
+//! Every codec is tested against the contract.
 //!
 //! A codec is a pure state machine. It takes bytes in any pieces that a port delivers and emits values. It reads no
 //! clock, does no I/O, and holds at most one frame of bytes. Ports are a separate layer.

@@ -1,4 +1,6 @@
-//! Splits a byte stream into the device's frames, so that each log message is one frame, stamped with its first byte.
+//! Splits a byte stream into the device's frames.
+//!
+//! Each log message is therefore one frame, stamped with its first byte.
 
 use std::collections::VecDeque;
 
