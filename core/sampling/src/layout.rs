@@ -109,11 +109,10 @@ pub struct Sector {
 
 /// Returns the angle at which a head is in step with the first one.
 ///
-/// Both are at the same point of their sweep where they pass the same place.
-///
-/// The first head, in sector 0, is at `lead`. `turn_s` is the turn period T; a sweep there and back in a sector takes
-/// 2 T / s. A `speed_mps` of zero means no delay: heads move in step, at right angles for four of them, regardless of
-/// their positions along the hull.
+/// Both are at the same point of their sweep where they pass the same place. The first head, in sector 0, is at
+/// `lead`. `turn_s` is the turn period T; a sweep there and back in a sector takes 2 T / s. A `speed_mps` of zero
+/// means no delay: heads move in step, at right angles for four of them, regardless of their positions along the
+/// hull.
 /// Errors: fewer than two sectors, a number that isn't one of them, a lead outside sector 0, a time that isn't above
 /// zero, a speed below zero.
 /// Source: Jorge et al. 2021, Algorithm 1, with one name for the sector's size and 2 T / s for its period.

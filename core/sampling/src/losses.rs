@@ -74,11 +74,9 @@ pub struct Sampled {
 impl Sampled {
     /// Returns how many passes over each place replace one because of lost returns.
     ///
-    /// With these, 95 of 100 stretches of 0.25 m meet the target.
-    ///
-    /// It is the distance between passes that the target allows, over the distance that losses leave. It ranges from
-    /// 1 without losses to [`MOST_PASSES`], and is continuous in all inputs. Heads take turns, and those with the
-    /// highest losses come first.
+    /// With these, 95 of 100 stretches of 0.25 m meet the target. It is the distance between passes that the target
+    /// allows, over the distance that losses leave. It ranges from 1 without losses to [`MOST_PASSES`], and is
+    /// continuous in all inputs. Heads take turns, and those with the highest losses come first.
     ///
     /// Source: `docs/why/coverage.md`, "Lost returns".
     pub fn passes_needed(&self, rates: impl Iterator<Item = LossRate>) -> f64 {
@@ -104,9 +102,8 @@ impl Sampled {
 
     /// Whether a hole of this diameter, m, may have been caused by chance.
     ///
-    /// Inputs: the distance between passes `along_m`, and the loss rate.
-    ///
-    /// If not, that wall gives no returns, and no speed helps.
+    /// Inputs: the distance between passes `along_m`, and the loss rate. If the hole is not by chance, that wall gives
+    /// no returns, and no speed helps.
     ///
     /// Source: `docs/why/coverage.md`, "Lost returns".
     pub fn is_by_chance(&self, hole_m: f64, along_m: f64, rate: LossRate) -> bool {
@@ -147,11 +144,9 @@ impl Sampled {
 
     /// Distance between passes at which the largest circle equals the target, m.
     ///
-    /// One of the passes misses a run of pings.
-    ///
-    /// With half a step h and half the gap g, the circle touches both ends of the gap and two neighbours of the
-    /// previous pass. Its centre is (a^2 + h^2 - g^2) / (2 a) from the pass with the gap, where a is the distance
-    /// between passes.
+    /// One of the passes misses a run of pings. With half a step h and half the gap g, the circle touches both ends
+    /// of the gap and two neighbours of the previous pass. Its centre is (a^2 + h^2 - g^2) / (2 a) from the pass with
+    /// the gap, where a is the distance between passes.
     fn along_with_run_m(&self, lost: f64) -> f64 {
         let half_m = self.t_y_m / 2.0;
         let gap_m = (half_m * (1.0 + lost)).min(self.target_m / 2.0).max(half_m);

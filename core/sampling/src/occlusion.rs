@@ -171,9 +171,8 @@ fn cylinder_entered(
 
 /// Returns the angles at which obstacles hide the wall from a head, in ascending order.
 ///
-/// Edges are exact to 1e-12 rad.
-///
-/// The beam is taken as a ray; a real beam is weakened for another half of its width on either side.
+/// Edges are exact to 1e-12 rad. The beam is taken as a ray; a real beam is weakened for another half of its width on
+/// either side.
 pub fn hidden_angles(mount: &Mount, obstacles: &[Obstacle]) -> Vec<AngleRange> {
     let hidden = |angle_rad: f64| {
         let direction = mount.rotation * head_direction(angle_rad);

@@ -255,9 +255,8 @@ fn phases(motions: &[Option<HeadMotion>; MAX_HEADS]) -> Option<[f64; MAX_HEADS]>
 /// Distance ahead of the vehicle's origin at which a head meets the wall, along the tunnel, m.
 ///
 /// It is the same all round the wall, except for a part common to all heads with parallel axes. `None` for a head
-/// whose scan plane lies along the tunnel.
-///
-/// Its samples lie in the plane through the head normal to its axis n: x n_x + y n_y + z n_z = (head) n.
+/// whose scan plane lies along the tunnel. Its samples lie in the plane through the head normal to its axis n: x n_x
+/// + y n_y + z n_z = (head) n.
 pub fn ahead_m(attitude: &Rot<Tunnel, headrace_geometry::frames::Body>, mount: &Mount) -> Option<f64> {
     let axis = *attitude * (mount.rotation * Vec3::new(1.0, 0.0, 0.0));
     let offset = *attitude * mount.position;
@@ -329,9 +328,7 @@ impl Passes {
     /// Creates passes of continuously rotating heads, evenly phased in order of their numbers.
     ///
     /// This is the result of a schedule for this speed if their turn periods are equal. If not, heads run out of
-    /// step, and no phase is reliable.
-    ///
-    /// `turn_s` gives the turn period of a head, seconds.
+    /// step, and no phase is reliable. `turn_s` gives the turn period of a head, seconds.
     /// Errors: no head.
     pub fn evenly_phased(heads: HeadSet, turn_s: impl Fn(usize) -> f64) -> Result<Self, SamplingError> {
         const IN_STEP: f64 = 1e-6;
@@ -391,10 +388,8 @@ impl Passes {
 
     /// Largest unevenness of neighbours at the end that their sectors share.
     ///
-    /// It is a share of the advance in a sweep there and back.
-    ///
-    /// It ranges from 0 (one is half a sweep after the other) to 0.5 (both at the same place, or unknown). `None` for
-    /// continuously rotating heads.
+    /// It is a share of the advance in a sweep there and back. It ranges from 0 (one is half a sweep after the other)
+    /// to 0.5 (both at the same place, or unknown). `None` for continuously rotating heads.
     pub fn uneven_ends(&self) -> Option<f64> {
         match self.pattern {
             Pattern::Sectors { uneven, .. } => Some(uneven),
@@ -429,10 +424,9 @@ impl Passes {
 
     /// Returns the phase error of each head relative to the first that turns, radians.
     ///
-    /// It is an angle of the head's turn, in [-pi, pi).
-    ///
-    /// Positive: it passes a place later, farther ahead, than in the schedule for `scheduled` heads. `None` for an
-    /// absent head, for heads that aren't phased with each other, and at rest.
+    /// It is an angle of the head's turn, in [-pi, pi). Positive: it passes a place later, farther ahead, than in the
+    /// schedule for `scheduled` heads. `None` for an absent head, for heads that aren't phased with each other, and
+    /// at rest.
     /// Source: Jorge et al. 2021, §5.1 (phi(k) = 2 pi k / s).
     pub fn phase_errors_rad(&self, scheduled: usize) -> [Option<f64>; MAX_HEADS] {
         let mut errors = [None; MAX_HEADS];

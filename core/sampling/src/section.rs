@@ -18,11 +18,10 @@ pub fn t_y1_m(distance_m: f64, step_rad: f64) -> Result<f64, SamplingError> {
 
 /// T_y2, m: the step along a flat wall from (m - 1) theta to m theta, for any m >= 1.
 ///
-/// It is the largest where m theta meets the corner.
-///
-/// `distance_m` > 0 is the distance h to the wall. h (tan(m theta) - tan((m - 1) theta)) is computed as h sin(theta) /
-/// (cos(m theta) cos((m - 1) theta)), which avoids cancellation. Multiples of theta are kept to twice double precision,
-/// so that a beam almost along the wall keeps its digits as well.
+/// It is the largest where m theta meets the corner. `distance_m` > 0 is the distance h to the wall. h (tan(m theta)
+/// - tan((m - 1) theta)) is computed as h sin(theta) / (cos(m theta) cos((m - 1) theta)), which avoids cancellation.
+/// Multiples of theta are kept to twice double precision, so that a beam almost along the wall keeps its digits as
+/// well.
 /// Errors: an argument out of range; m theta of 90 degrees or more.
 /// Source: Jorge et al. 2021, Eq. 6.
 pub fn t_y2_m(distance_m: f64, step_rad: f64, m: u32) -> Result<f64, SamplingError> {

@@ -15,10 +15,8 @@ pub fn t_max_m(t_x_m: f64, advance_m: f64, t_y_m: f64) -> f64 {
 
 /// The speed at which T_max equals the target, m/s.
 ///
-/// `None` where `t_y_m` alone reaches the target, or the times aren't positive.
-///
-/// `pass_gap_s` is the time between passes (T_rev / s for s evenly interleaved heads), `ping_period_s` that between
-/// pings (T_s).
+/// `None` where `t_y_m` alone reaches the target, or the times aren't positive. `pass_gap_s` is the time between
+/// passes (T_rev / s for s evenly interleaved heads), `ping_period_s` that between pings (T_s).
 /// Source: Eq. 16 solved for v (docs/decisions/0005-advice-and-plan.md).
 pub fn speed_for_target_mps(target_m: f64, t_y_m: f64, pass_gap_s: f64, ping_period_s: f64) -> Option<f64> {
     let time_s = pass_gap_s + ping_period_s;

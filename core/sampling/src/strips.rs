@@ -235,10 +235,8 @@ impl Strips {
 
     /// Returns T_max predicted at a speed, m: the largest of any strip.
     ///
-    /// Infinite if no head sees a wide strip.
-    ///
-    /// Passes are farther apart on a strip that some heads do not see. But the width of the strip also limits the
-    /// distance between the samples on either side of it.
+    /// Infinite if no head sees a wide strip. Passes are farther apart on a strip that some heads do not see. But the
+    /// width of the strip also limits the distance between the samples on either side of it.
     /// Source: Jorge et al. 2021, Eq. 16.
     pub fn t_max_m(&self, setting: usize, passes: &Passes, speed_mps: f64, going: &Going) -> f64 {
         self.ts_m(setting, passes, speed_mps, going).fold(0.0, f64::max)

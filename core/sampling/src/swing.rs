@@ -64,10 +64,8 @@ impl Looks {
 
     /// Returns the largest swing of the last half minute up to `now`.
     ///
-    /// It stays valid while the vehicle swings to and fro.
-    ///
-    /// `gap_s` is the time between passes; heads pass a place within `apart_s`. Rotation within the navigation errors
-    /// is excluded, with a continuous transition.
+    /// It stays valid while the vehicle swings to and fro. `gap_s` is the time between passes; heads pass a place
+    /// within `apart_s`. Rotation within the navigation errors is excluded, with a continuous transition.
     /// Allocates: never.
     pub fn swing(&self, now: MonoNs, gap_s: f64, apart_s: f64) -> Swing {
         let rate = |over_s: f64| {

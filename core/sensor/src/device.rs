@@ -275,9 +275,7 @@ pub trait Emulator<M>: Send + Sync {
 
     /// Processes bytes from a host, at `at` on the device's clock.
     ///
-    /// A device that is not polled ignores them.
-    ///
-    /// Responses without a measurement go to `line`.
+    /// A device that is not polled ignores them. Responses without a measurement go to `line`.
     fn hear(&mut self, _at: MonoNs, _bytes: &[u8], _line: LineSink<'_>) {}
 
     /// Encodes a measurement onto the line, each message with its time.

@@ -29,17 +29,14 @@ const LEAST_STRETCHES: usize = 8;
 
 /// Largest deviation of a stamp from its prediction that is attributed to queues.
 ///
-/// Beyond it a new epoch begins.
-///
-/// The prediction uses the last stamp and the receive times. For a clock that wraps sooner, the limit is a quarter of
-/// the wrap period.
+/// Beyond it a new epoch begins. The prediction uses the last stamp and the receive times. For a clock that wraps
+/// sooner, the limit is a quarter of the wrap period.
 const MOST_QUEUED_NS: i64 = 10_000_000_000;
 
 /// Largest difference between the minimum delays of two stretches.
 ///
-/// It is a constant plus a share of the time between them.
-///
-/// No clock drifts by more than the share. A stretch with a larger delay was queued, and is not kept.
+/// It is a constant plus a share of the time between them. No clock drifts by more than the share. A stretch with a
+/// larger delay was queued, and is not kept.
 const MOST_SHIFT_NS: f64 = 0.5e9;
 const MOST_DRIFT: f64 = 500e-6;
 
@@ -188,9 +185,7 @@ impl DeviceClock {
 
     /// Returns the earliest receive time of a stamp made at device time `device`.
     ///
-    /// `device` is as returned by [`Self::take`].
-    ///
-    /// `None` until the drift is known.
+    /// `device` is as returned by [`Self::take`]. `None` until the drift is known.
     pub fn earliest(&self, device: DurNs) -> Option<MonoNs> {
         let epoch = self.epoch.as_ref()?;
         let line = epoch.edge.line(self.tick)?;

@@ -115,9 +115,7 @@ impl ErrorClones {
 
     /// Returns the covariance at the newest clone relative to `lag` earlier.
     ///
-    /// `None` with fewer than two clones.
-    ///
-    /// Extrapolates beyond the oldest clone.
+    /// `None` with fewer than two clones. Extrapolates beyond the oldest clone.
     pub fn relative(&self, lag: DurNs) -> Option<Relative> {
         let newest = self.newest()?;
         let kept = self.clones.len();

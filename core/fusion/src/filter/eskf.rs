@@ -46,7 +46,7 @@ const REST_SD_RADPS: f64 = 1e-3;
 const REST_GATE: f64 = 15.1;
 /// Standard deviation of a range below which a wall counts as flat, m.
 ///
-/// More precise ranges have a lower limit.
+/// The limit is the range's own noise if that is smaller.
 const NEAR_M: f64 = 0.03;
 /// Standard deviation of the speed prior, m/s.
 const SPEED_SD_MPS: f64 = 0.5;

@@ -169,9 +169,7 @@ impl Alternative {
 
     /// Returns by how many standard deviations the alternative fits better.
     ///
-    /// `None` unless it certainly does and leaves little.
-    ///
-    /// For two swapped sources, the limit applies to both.
+    /// `None` unless it certainly does and leaves little. For two swapped sources, the limit applies to both.
     pub(super) fn certain(&self, share_left: f64) -> Option<f64> {
         let [own, _, readings] = self.all;
         let n = f64::from(self.blocks);

@@ -205,9 +205,8 @@ impl RawWays {
 
     /// Difference of the cable's distance from another one over the window, m.
     ///
-    /// The time may be shorter if both are not available for the whole window.
-    ///
-    /// `None` if one is missing or the difference is within its tolerance.
+    /// The time may be shorter if both are not available for the whole window. `None` if one is missing or the
+    /// difference is within its tolerance.
     fn differs_m(&self, other: usize, window_s: f64, settings: &Settings) -> Option<f64> {
         let (at, _) = self.rows.last()?;
         let both = |row: &[f64; 3]| {

@@ -41,9 +41,8 @@ impl SeenAgain {
 
     /// Counts a return and gives the variance with which to fuse it, m^2.
     ///
-    /// `declared_m2` is its own variance, partly from bumps.
-    ///
-    /// n looks at one bump together have the weight of their mean. Each gets the noise of its own contribution.
+    /// `declared_m2` is its own variance, partly from bumps. n looks at one bump together have the weight of their
+    /// mean. Each gets the noise of its own contribution.
     pub(super) fn noise_m2(
         &mut self,
         range_m: f64,

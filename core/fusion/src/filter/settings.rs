@@ -114,10 +114,9 @@ pub struct Settings {
     pub learns: bool,
     /// Share of the correction of attitude and related errors by wall ranges that is applied.
     ///
-    /// 0 is none and 1 the optimal estimate.
-    ///
-    /// Coverage depends on the attitude of one pass relative to the next. The gyros know that better than walls,
-    /// whose shape differs from the design. A smoother needs 1: [`crate::smooth::beside`].
+    /// 0 is none and 1 the optimal estimate. Coverage depends on the attitude of one pass relative to the next. The
+    /// gyros know that better than walls, whose shape differs from the design. A smoother needs 1:
+    /// [`crate::smooth::beside`].
     pub wall_share: f64,
 }
 

@@ -285,9 +285,8 @@ pub(super) struct Noises {
 impl Noises {
     /// Creates it from the counter's variance, m^2, and the gyro bias.
     ///
-    /// The bias is given by its variance, rad^2/s^2, and its random walk, rad^2/s^3.
-    ///
-    /// A constant bias error does not count, because it is part of the mean.
+    /// The bias is given by its variance, rad^2/s^2, and its random walk, rad^2/s^3. A constant bias error does not
+    /// count, because it is part of the mean.
     pub(super) fn of(counter_m2: f64, known: f64, wander: f64) -> Self {
         let renewed = 1.0 - math::exp(-MEMORY_S * wander / known.max(f64::MIN_POSITIVE));
         Self { counter_m2, rate_bias_rad2ps2: renewed * known }

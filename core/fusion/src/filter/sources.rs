@@ -13,10 +13,8 @@ use headrace_sensor::sampling::head::SILENT_AFTER;
 
 /// Limits for a stuck head: number of returns, and variation of the expected range, m.
 ///
-/// So many returns have one range although the expected range varies by more.
-///
-/// A reading that is dropped by mistake costs nothing. The expected ranges must be certain to within a standard
-/// deviation, m.
+/// So many returns have one range although the expected range varies by more. A reading that is dropped by mistake
+/// costs nothing. The expected ranges must be certain to within a standard deviation, m.
 const FEW_OF_ONE_RANGE: u32 = 3;
 const VARIES_M: f64 = 0.05;
 const SURE_M: f64 = 0.02;

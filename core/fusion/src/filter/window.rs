@@ -18,9 +18,8 @@ const MOST_FELT: usize = 1024;
 const SPEAKS_FOR: DurNs = DurNs(100_000_000);
 /// Time within which samples are merged into their mean.
 ///
-/// They are rate and force of one sample, or several samples of one burst.
-///
-/// The mean of a burst covers all the time since the sample before it.
+/// They are rate and force of one sample, or several samples of one burst. The mean of a burst covers all the time
+/// since the sample before it.
 const SAME: DurNs = DurNs(500_000);
 
 /// A waiting reading.

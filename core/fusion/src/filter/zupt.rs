@@ -20,9 +20,8 @@ const FLOATS: u32 = 15;
 const ASKS_FOR: DurNs = DurNs(60_000_000_000);
 /// Number of remembered pauses of the cable.
 ///
-/// The cable counts as at rest after a multiple of the longest pause.
-///
-/// A winch operator who winds by half metres leaves the cable stationary between pulls while the vehicle moves on.
+/// The cable counts as at rest after a multiple of the longest pause. A winch operator who winds by half metres
+/// leaves the cable stationary between pulls while the vehicle moves on.
 const PAUSES: usize = 4;
 const PAUSES_TO_REST: u64 = 2;
 /// Largest difference between means at rest: turn rate, rad/s, and specific force, m/s^2.

@@ -27,11 +27,10 @@ const MAYBE_BEYOND: f64 = 0.03;
 
 /// Displays the most restrictive advice of the last second.
 ///
-/// That is the most severe reason and, within it, the lowest speed.
-///
-/// A more severe reason appears at once, a less severe one after it has lasted a second. A speed that is lower by 0.5
-/// % appears at once. A speed that is higher by 3 % appears after ten seconds, as the lowest of that time. Smaller
-/// changes do not appear. Advice is unfiltered until the first speed, or the first reason against any speed.
+/// That is the most severe reason and, within it, the lowest speed. A more severe reason appears at once, a less
+/// severe one after it has lasted a second. A speed that is lower by 0.5 % appears at once. A speed that is higher by
+/// 3 % appears after ten seconds, as the lowest of that time. Smaller changes do not appear. Advice is unfiltered
+/// until the first speed, or the first reason against any speed.
 #[derive(Debug, Clone)]
 pub struct Hysteresis {
     target_m: f64,

@@ -69,10 +69,9 @@ impl Driving<'_> {
 
     /// Returns the speed, m/s, down to which passes stay more than `most_m` apart.
     ///
-    /// At the given speed they are `gap_s` apart in time.
-    ///
-    /// At u < v, heads at most a apart along the hull shift by up to a (1 / u - 1 / v) in time against each other.
-    /// Their longest gap is at least g less that shift, so its length is at least u g - a (1 - u / v).
+    /// At the given speed they are `gap_s` apart in time. At u < v, heads at most a apart along the hull shift by up
+    /// to a (1 / u - 1 / v) in time against each other. Their longest gap is at least g less that shift, so its
+    /// length is at least u g - a (1 - u / v).
     fn below_mps(&self, speed_mps: f64, gap_s: f64, most_m: f64) -> f64 {
         /// Allowance for rounding.
         const A_LITTLE: f64 = 1e-9;
@@ -113,9 +112,8 @@ impl Driving<'_> {
 
     /// Returns the speed after the margin [`SPEED_MARGIN`], or up to twice that margin.
     ///
-    /// The larger margin applies where T grows faster than the speed.
-    ///
-    /// T does so where heads run out of phase: a speed error of 1 % then costs more than 1 % of T.
+    /// The larger margin applies where T grows faster than the speed. T does so where heads run out of phase: a speed
+    /// error of 1 % then costs more than 1 % of T.
     pub(super) fn kept_back_mps(&self, fastest_mps: f64) -> f64 {
         const STEEP: f64 = 2.0 * SPEED_MARGIN;
         let meets = |speed_mps: f64| self.meets(speed_mps, 0.0);

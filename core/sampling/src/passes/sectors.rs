@@ -45,10 +45,9 @@ impl Leg {
 
 /// Largest unevenness of neighbours at the end that their sectors share.
 ///
-/// It is a share of the advance in a sweep there and back.
-///
-/// 0 if one comes half a sweep after the other; [`AT_ONCE`] if both come at the same place or the timing is unknown.
-/// `ahead` is the position of each head along the hull, as a share of that advance.
+/// It is a share of the advance in a sweep there and back. 0 if one comes half a sweep after the other; [`AT_ONCE`]
+/// if both come at the same place or the timing is unknown. `ahead` is the position of each head along the hull, as a
+/// share of that advance.
 pub(super) fn uneven(legs: &[Option<Leg>; MAX_HEADS], ahead: &[f64; MAX_HEADS]) -> f64 {
     let known = || legs.iter().zip(ahead).filter_map(|(leg, ahead)| Some(((*leg)?, *ahead)));
     let mut most: Option<f64> = None;

@@ -12,9 +12,8 @@ use crate::swing::Swing;
 impl Planner {
     /// Returns the largest speed in a mode for heads started for `planned_mps`, m/s.
     ///
-    /// Zero if no speed meets the target.
-    ///
-    /// It equals the live advice, margins included, for a steady vehicle on the axis.
+    /// Zero if no speed meets the target. It equals the live advice, margins included, for a steady vehicle on the
+    /// axis.
     ///
     /// Errors: no such mode; a target or a speed that isn't above zero; heads that the layout doesn't allow.
     pub fn as_started_mps(&self, mode: usize, target_m: f64, planned_mps: f64) -> Result<f64, SamplingError> {

@@ -76,10 +76,8 @@ impl Limit {
 
 /// Diameter of the largest circle between two rows of samples, m.
 ///
-/// Samples are `along_m` apart in each row, and rows `across_m`.
-///
-/// One row is shifted along by half of `along_m`, by the share `uneven` of it and by +-`moved_m`, but at most until
-/// it is level with the other.
+/// Samples are `along_m` apart in each row, and rows `across_m`. One row is shifted along by half of `along_m`, by
+/// the share `uneven` of it and by +-`moved_m`, but at most until it is level with the other.
 ///
 /// The circle passes through two samples of a row and the sample of the other row between them, at distances a and b
 /// along the tunnel: 2 R = sqrt((a^2 + c^2) (b^2 + c^2)) / c, with c = `across_m`. If c^2 < a b, its centre is not

@@ -39,11 +39,9 @@ impl Sector {
 
     /// Longest wait between two passes over the part with this place, 0.5 to 1.
     ///
-    /// It is a share of a sweep there and back.
-    ///
-    /// `None` outside the sector. At a turning point two passes follow at once, and the next one comes a whole sweep
-    /// later. In the middle, passes are evenly spaced. A circle between two legs of the zigzag is at most as wide as
-    /// their distance at its centre.
+    /// It is a share of a sweep there and back. `None` outside the sector. At a turning point two passes follow at
+    /// once, and the next one comes a whole sweep later. In the middle, passes are evenly spaced. A circle between
+    /// two legs of the zigzag is at most as wide as their distance at its centre.
     /// Source: Jorge et al. 2021, §5.2 (T_x1 + T_x2 = 2 T_x / s).
     pub(super) fn wait(&self, arc_m: f64, perimeter_m: f64) -> Option<f64> {
         let number = self.parts.iter().position(|part| part.has(arc_m, perimeter_m))?;

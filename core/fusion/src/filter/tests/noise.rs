@@ -91,11 +91,9 @@ fn add_slack(factors: &mut Factors<ERRORS>, noise: &Factors<ERRORS>) {
 /// Monte Carlo of white force and white turn rate through `State::go_on`: 4000 epochs of ten samples.
 ///
 /// The relative spread of a variance from n draws is sqrt(2 / n) = 2.2 %, so that the limit of 9 % is four of them.
-/// Displacement and velocity are correlated.
-///
-/// Turn rate noise also tilts the force, which the epoch neglects. So the unit is level, and only its own x axis is
-/// checked. Gravity has no first-order effect there when the unit tilts about x.
-/// gravity has no first-order effect when it is tilted about x.
+/// Displacement and velocity are correlated. Turn rate noise also tilts the force, which the epoch neglects. So the
+/// unit is level, and only its own x axis is checked. Gravity has no first-order effect there when the unit tilts
+/// about x.
 #[test]
 fn white_noise_equals_monte_carlo() {
     const DRAWS: u32 = 4000;
