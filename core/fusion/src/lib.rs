@@ -16,7 +16,7 @@
 //! let times = Times { received: now, valid: now };
 //! let imu = SensorInfo { kind: SensorKind::Imu, ..SensorInfo::other() };
 //! navigation.update(0, &imu, times, &Reading::Attitude(Rot::identity()));
-//! The attitude is known now. The next missing part is the chainage.
+//! // The attitude is known now. The next missing part is the chainage.
 //! assert_eq!(navigation.fix(now).unwrap_err(), NoFix::Chainage);
 //! # Ok::<(), headrace_geometry::tunnel::ProfileError>(())
 //! ```

@@ -10,7 +10,7 @@
 //! let tunnel = shapes::circle(3.0)?;
 //! let hit = tunnel.cast([0.0, 3.0], [1.0, 0.0]).unwrap();
 //! assert!((hit.range_m - 3.0).abs() < 1e-12);
-//! Arc length grows from the floor's centre via the left wall.
+//! // Arc length grows from the floor's centre via the left wall.
 //! assert!((hit.arc_m - tunnel.perimeter_m() / 4.0).abs() < 1e-12);
 //! assert_eq!(tunnel.clock(hit.arc_m), "9:00");
 //! # Ok::<(), headrace_geometry::tunnel::ProfileError>(())
