@@ -255,8 +255,9 @@ fn phases(motions: &[Option<HeadMotion>; MAX_HEADS]) -> Option<[f64; MAX_HEADS]>
 /// Distance ahead of the vehicle's origin at which a head meets the wall, along the tunnel, m.
 ///
 /// It is the same all round the wall, except for a part common to all heads with parallel axes. `None` for a head
-/// whose scan plane lies along the tunnel. Its samples lie in the plane through the head normal to its axis n: x n_x
-/// + y n_y + z n_z = (head) n.
+/// whose scan plane lies along the tunnel.
+///
+/// Its samples lie in the plane through the head normal to its axis n: `x n_x + y n_y + z n_z = (head) n`.
 pub fn ahead_m(attitude: &Rot<Tunnel, headrace_geometry::frames::Body>, mount: &Mount) -> Option<f64> {
     let axis = *attitude * (mount.rotation * Vec3::new(1.0, 0.0, 0.0));
     let offset = *attitude * mount.position;
