@@ -189,7 +189,7 @@ impl VehicleConfig {
         let places = if out.len() == walls.len() { "all around".to_owned() } else { clocks(&out, profile) };
         let problem = format!(
             "reaches {:.0} % of the wall around this head: it is {nearest_m:.2} to {farthest_m:.2} m away, and the setting \
-             hears {least_m:.2} to {most_m:.2} m; out of reach: {places}",
+             covers {least_m:.2} to {most_m:.2} m; out of reach: {places}",
             (share * 100.0).floor()
         );
         let grade = if share < LEAST_SHARE { Grade::Error } else { Grade::Warning };
@@ -210,8 +210,8 @@ impl VehicleConfig {
         let (first_m, length_m) = *short.first()?;
         let problem = format!(
             "is finer than a sonar resolves: {} of {edges} edges are shorter than {} mm, the finest step of a range here, the first of \
-             {:.3} mm at {first_m:.3} m round the wall ({}); which way so short an edge faces is the survey's error, points every \
-             {} mm say as much",
+             {:.3} mm at {first_m:.3} m round the wall ({}); the direction of such short edges is survey noise, and points every \
+             {} mm are enough",
             short.len(),
             FINEST_M * 1e3,
             length_m * 1e3,

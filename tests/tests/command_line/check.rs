@@ -190,16 +190,16 @@ fn walls_out_of_reach_and_heads_out_of_step_are_told() {
     as it is: 0
     headrace: warning: vehicle.toml:15: sensors: have no connect, so that `run` can't reach them: ping_left, ping_right, ping_up, ping_down, depth, imu, tether
     a range of 3 m in a tunnel of 6 m: 2
-    headrace: vehicle.toml:20: sensors[0].range_m: reaches 0 % of the wall around this head: it is 3.00 to 3.00 m away, and the setting hears 0.19 to 2.89 m; out of reach: all around
-    headrace: vehicle.toml:27: sensors[1].range_m: reaches 0 % of the wall around this head: it is 3.00 to 3.00 m away, and the setting hears 0.19 to 2.89 m; out of reach: all around
+    headrace: vehicle.toml:20: sensors[0].range_m: reaches 0 % of the wall around this head: it is 3.00 to 3.00 m away, and the setting covers 0.19 to 2.89 m; out of reach: all around
+    headrace: vehicle.toml:27: sensors[1].range_m: reaches 0 % of the wall around this head: it is 3.00 to 3.00 m away, and the setting covers 0.19 to 2.89 m; out of reach: all around
     headrace: warning: vehicle.toml:15: sensors: have no connect, so that `run` can't reach them: ping_left, ping_right, ping_up, ping_down, depth, imu, tether
     a range of 2 m there: 2
-    headrace: vehicle.toml:20: sensors[0].range_m: reaches 0 % of the wall around this head: it is 3.00 to 3.00 m away, and the setting hears 0.19 to 1.93 m; out of reach: all around
-    headrace: vehicle.toml:27: sensors[1].range_m: reaches 0 % of the wall around this head: it is 3.00 to 3.00 m away, and the setting hears 0.19 to 1.93 m; out of reach: all around
+    headrace: vehicle.toml:20: sensors[0].range_m: reaches 0 % of the wall around this head: it is 3.00 to 3.00 m away, and the setting covers 0.19 to 1.93 m; out of reach: all around
+    headrace: vehicle.toml:27: sensors[1].range_m: reaches 0 % of the wall around this head: it is 3.00 to 3.00 m away, and the setting covers 0.19 to 1.93 m; out of reach: all around
     headrace: warning: vehicle.toml:15: sensors: have no connect, so that `run` can't reach them: ping_left, ping_right, ping_up, ping_down, depth, imu, tether
     a tunnel of 14 m: 2
-    headrace: vehicle.toml:20: sensors[0].range_m: reaches 0 % of the wall around this head: it is 7.00 to 7.00 m away, and the setting hears 0.19 to 4.82 m; out of reach: all around
-    headrace: vehicle.toml:27: sensors[1].range_m: reaches 0 % of the wall around this head: it is 7.00 to 7.00 m away, and the setting hears 0.19 to 4.82 m; out of reach: all around
+    headrace: vehicle.toml:20: sensors[0].range_m: reaches 0 % of the wall around this head: it is 7.00 to 7.00 m away, and the setting covers 0.19 to 4.82 m; out of reach: all around
+    headrace: vehicle.toml:27: sensors[1].range_m: reaches 0 % of the wall around this head: it is 7.00 to 7.00 m away, and the setting covers 0.19 to 4.82 m; out of reach: all around
     headrace: warning: vehicle.toml:15: sensors: have no connect, so that `run` can't reach them: ping_left, ping_right, ping_up, ping_down, depth, imu, tether
     a small tunnel: 0
     headrace: warning: vehicle.toml:15: sensors: have no connect, so that `run` can't reach them: ping_left, ping_right, ping_up, ping_down, depth, imu, tether
@@ -308,7 +308,7 @@ fn a_profile_finer_than_a_sonar_tells_is_named() {
     }
     insta::assert_snapshot!(said, @"
     600 points: nothing
-    20000 points: headrace: warning: vehicle.toml:6: tunnel.file: is finer than a sonar resolves: 19999 of 20000 edges are shorter than 2 mm, the finest step of a range here, the first of 0.943 mm at 0.000 m round the wall (6:00); which way so short an edge faces is the survey's error, points every 10 mm say as much
+    20000 points: headrace: warning: vehicle.toml:6: tunnel.file: is finer than a sonar resolves: 19999 of 20000 edges are shorter than 2 mm, the finest step of a range here, the first of 0.943 mm at 0.000 m round the wall (6:00); the direction of such short edges is survey noise, and points every 10 mm are enough
     ");
 }
 
