@@ -373,7 +373,7 @@ fn the_first_autopilot_heard_is_believed_and_others_are_counted() {
         assert_eq!(health.strangers.messages(), 202, "{configured}");
         assert_eq!(health.identity.unwrap(), format!("MAVLink system {believed}"));
         let strangers = if believed == 7 { "255, system 9, system 3" } else { "255, system 9, system 7" };
-        assert_eq!(health.strangers.words().unwrap(), format!("not believed: system {strangers}"));
+        assert_eq!(health.strangers.words().unwrap(), format!("ignored: system {strangers}"));
     }
 }
 

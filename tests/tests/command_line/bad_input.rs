@@ -197,15 +197,15 @@ fn a_wrong_polyline_is_refused_with_its_line_or_vertex() {
     two points
         headrace: vehicle.toml:6: tunnel.file = "profile.csv": a profile needs at least 3 distinct points; this one has 2
     no number
-        headrace: vehicle.toml:6: tunnel.file = "profile.csv": line 3 of it is "2,zero"; wanted is y_m,z_m
+        headrace: vehicle.toml:6: tunnel.file = "profile.csv": line 3 is "2,zero"; allowed is y_m,z_m
     one number
-        headrace: vehicle.toml:6: tunnel.file = "profile.csv": line 3 of it is "2"; wanted is y_m,z_m
+        headrace: vehicle.toml:6: tunnel.file = "profile.csv": line 3 is "2"; allowed is y_m,z_m
     not finite
-        headrace: vehicle.toml:6: tunnel.file = "profile.csv": line 3 of it: vertex 2 has a coordinate that is no number within 1000 m
+        headrace: vehicle.toml:6: tunnel.file = "profile.csv": line 3: vertex 2 has a coordinate that is not a number within 1000 m
     not star-shaped
-        headrace: vehicle.toml:6: tunnel.file = "profile.csv": line 6 of it: the profile isn't star-shaped about (0.9523809523809526, 2.119047619047619): it runs backwards or crosses itself at vertex 5, counted from 0
+        headrace: vehicle.toml:6: tunnel.file = "profile.csv": line 6: the profile isn't star-shaped about (0.9523809523809526, 2.119047619047619): it runs backwards or crosses itself at vertex 5, counted from 0
     crosses itself
-        headrace: vehicle.toml:6: tunnel.file = "profile.csv": line 1 of it: the profile isn't star-shaped about (-2, 0): it runs backwards or crosses itself at vertex 0, counted from 0
+        headrace: vehicle.toml:6: tunnel.file = "profile.csv": line 1: the profile isn't star-shaped about (-2, 0): it runs backwards or crosses itself at vertex 0, counted from 0
     "#);
 }
 

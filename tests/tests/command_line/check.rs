@@ -129,28 +129,28 @@ fn lines_that_two_sensors_cannot_share_are_errors() {
     ];
     insta::assert_snapshot!(findings(&cases), @r#"
     two Pings on one serial port: 2
-    headrace: vehicle.toml:37: sensors[3].connect: is the serial port of sensor "ping_left", and nothing tells the bytes of two ping1d there apart; give each its own
+    headrace: vehicle.toml:37: sensors[3].connect: is the serial port of sensor "ping_left", and the bytes of two ping1d cannot be separated there; give each its own
     headrace: warning: vehicle.toml:15: sensors: have no connect, so that `run` can't reach them: ping_up, ping_down, depth, imu, tether
     one serial port at two rates: 2
-    headrace: vehicle.toml:37: sensors[3].connect: is the serial port of sensor "ping_left" with other settings; it can be opened once
+    headrace: vehicle.toml:37: sensors[3].connect: is the serial port of sensor "ping_left" with other settings; only one sensor can open it
     headrace: warning: vehicle.toml:15: sensors: have no connect, so that `run` can't reach them: ping_up, ping_down, depth, imu, tether
     two Pings on one UDP address: 2
-    headrace: vehicle.toml:37: sensors[3].connect: is the UDP address of sensor "ping_left", and nothing tells the bytes of two ping1d there apart; give each its own
+    headrace: vehicle.toml:37: sensors[3].connect: is the UDP address of sensor "ping_left", and the bytes of two ping1d cannot be separated there; give each its own
     headrace: warning: vehicle.toml:15: sensors: have no connect, so that `run` can't reach them: ping_up, ping_down, depth, imu, tether
     two Pings on two: 0
     headrace: warning: vehicle.toml:15: sensors: have no connect, so that `run` can't reach them: ping_up, ping_down, depth, imu, tether
     two heads on one TCP address: 2
-    headrace: vehicle.toml:25: sensors[1].connect: is the TCP address of sensor "sonar_0", and nothing tells the bytes of two imagenex881 there apart; give each its own
+    headrace: vehicle.toml:25: sensors[1].connect: is the TCP address of sensor "sonar_0", and the bytes of two imagenex881 cannot be separated there; give each its own
     headrace: warning: vehicle.toml:15: sensors: have no connect, so that `run` can't reach them: ping_left, ping_right, ping_up, ping_down, depth, imu, tether
     two heads of two ids there: 0
     headrace: warning: vehicle.toml:15: sensors: have no connect, so that `run` can't reach them: ping_left, ping_right, ping_up, ping_down, depth, imu, tether
     two units of one id on CAN: 2
-    headrace: vehicle.toml:63: sensors[8].connect: is the CAN interface of sensor "imu", and nothing tells the bytes of two imu_can there apart; give each its own
+    headrace: vehicle.toml:63: sensors[8].connect: is the CAN interface of sensor "imu", and the bytes of two imu_can cannot be separated there; give each its own
     headrace: warning: vehicle.toml:15: sensors: have no connect, so that `run` can't reach them: ping_left, ping_right, ping_up, ping_down, depth, tether
     two units of two ids there: 0
     headrace: warning: vehicle.toml:15: sensors: have no connect, so that `run` can't reach them: ping_left, ping_right, ping_up, ping_down, depth, tether
     no such way to connect: 2
-    headrace: vehicle.toml:25: sensors[1].connect: "usb" is no way to connect; allowed are serial:/dev/serial/by-id/NAME?baud=115200, serial:usb:VID:PID[:SERIAL]?baud=115200, tcp:HOST:PORT, udp:HOST:PORT, udp-listen:ADDRESS:PORT, can:INTERFACE, hid:VID:PID[:SERIAL], i2c:/dev/i2c-1:0x40
+    headrace: vehicle.toml:25: sensors[1].connect: unknown carrier "usb"; allowed are serial:/dev/serial/by-id/NAME?baud=115200, serial:usb:VID:PID[:SERIAL]?baud=115200, tcp:HOST:PORT, udp:HOST:PORT, udp-listen:ADDRESS:PORT, can:INTERFACE, hid:VID:PID[:SERIAL], i2c:/dev/i2c-1:0x40
     headrace: warning: vehicle.toml:15: sensors: have no connect, so that `run` can't reach them: ping_left, ping_right, ping_up, ping_down, depth, imu, tether
     "#);
 }
@@ -190,16 +190,16 @@ fn walls_out_of_reach_and_heads_out_of_step_are_told() {
     as it is: 0
     headrace: warning: vehicle.toml:15: sensors: have no connect, so that `run` can't reach them: ping_left, ping_right, ping_up, ping_down, depth, imu, tether
     a range of 3 m in a tunnel of 6 m: 2
-    headrace: vehicle.toml:20: sensors[0].range_m: reaches 0 % of the wall around this head: it is 3.00 to 3.00 m away, and the setting hears 0.19 to 2.89 m; out of reach: all around
-    headrace: vehicle.toml:27: sensors[1].range_m: reaches 0 % of the wall around this head: it is 3.00 to 3.00 m away, and the setting hears 0.19 to 2.89 m; out of reach: all around
+    headrace: vehicle.toml:20: sensors[0].range_m: reaches 0 % of the wall around this head: it is 3.00 to 3.00 m away, and the setting covers 0.19 to 2.89 m; out of reach: all around
+    headrace: vehicle.toml:27: sensors[1].range_m: reaches 0 % of the wall around this head: it is 3.00 to 3.00 m away, and the setting covers 0.19 to 2.89 m; out of reach: all around
     headrace: warning: vehicle.toml:15: sensors: have no connect, so that `run` can't reach them: ping_left, ping_right, ping_up, ping_down, depth, imu, tether
     a range of 2 m there: 2
-    headrace: vehicle.toml:20: sensors[0].range_m: reaches 0 % of the wall around this head: it is 3.00 to 3.00 m away, and the setting hears 0.19 to 1.93 m; out of reach: all around
-    headrace: vehicle.toml:27: sensors[1].range_m: reaches 0 % of the wall around this head: it is 3.00 to 3.00 m away, and the setting hears 0.19 to 1.93 m; out of reach: all around
+    headrace: vehicle.toml:20: sensors[0].range_m: reaches 0 % of the wall around this head: it is 3.00 to 3.00 m away, and the setting covers 0.19 to 1.93 m; out of reach: all around
+    headrace: vehicle.toml:27: sensors[1].range_m: reaches 0 % of the wall around this head: it is 3.00 to 3.00 m away, and the setting covers 0.19 to 1.93 m; out of reach: all around
     headrace: warning: vehicle.toml:15: sensors: have no connect, so that `run` can't reach them: ping_left, ping_right, ping_up, ping_down, depth, imu, tether
     a tunnel of 14 m: 2
-    headrace: vehicle.toml:20: sensors[0].range_m: reaches 0 % of the wall around this head: it is 7.00 to 7.00 m away, and the setting hears 0.19 to 4.82 m; out of reach: all around
-    headrace: vehicle.toml:27: sensors[1].range_m: reaches 0 % of the wall around this head: it is 7.00 to 7.00 m away, and the setting hears 0.19 to 4.82 m; out of reach: all around
+    headrace: vehicle.toml:20: sensors[0].range_m: reaches 0 % of the wall around this head: it is 7.00 to 7.00 m away, and the setting covers 0.19 to 4.82 m; out of reach: all around
+    headrace: vehicle.toml:27: sensors[1].range_m: reaches 0 % of the wall around this head: it is 7.00 to 7.00 m away, and the setting covers 0.19 to 4.82 m; out of reach: all around
     headrace: warning: vehicle.toml:15: sensors: have no connect, so that `run` can't reach them: ping_left, ping_right, ping_up, ping_down, depth, imu, tether
     a small tunnel: 0
     headrace: warning: vehicle.toml:15: sensors: have no connect, so that `run` can't reach them: ping_left, ping_right, ping_up, ping_down, depth, imu, tether
@@ -308,7 +308,7 @@ fn a_profile_finer_than_a_sonar_tells_is_named() {
     }
     insta::assert_snapshot!(said, @"
     600 points: nothing
-    20000 points: headrace: warning: vehicle.toml:6: tunnel.file: is finer than a sonar tells: 19999 of 20000 edges are shorter than 2 mm, the finest step of a range here, the first of 0.943 mm at 0.000 m round the wall (6:00); which way so short an edge faces is the survey's error, points every 10 mm say as much
+    20000 points: headrace: warning: vehicle.toml:6: tunnel.file: is finer than a sonar resolves: 19999 of 20000 edges are shorter than 2 mm, the finest step of a range here, the first of 0.943 mm at 0.000 m round the wall (6:00); the direction of such short edges is survey noise, and points every 10 mm are enough
     ");
 }
 

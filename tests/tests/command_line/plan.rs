@@ -66,7 +66,7 @@ fn a_plan_with_drift_yaw_and_a_deadline_in_words() {
     * faster    1.2 ~ 10.60     1.17  0.065  0.120  0.414   0.065  0.687     0.687   0.706   0.71     1.41   0.054    35.7
       fastest   2.4 ~  6.80     0.58  0.130  0.239  0.782   0.065  0.441     0.441   0.830   0.83     1.66    none
 
-    fastest: a target of 0.6 m is met at no speed: neighbours of one turn are 0.782 m apart, whatever the speed
+    fastest: no speed meets a target of 0.6 m: neighbours of one turn are 0.782 m apart, whatever the speed
     * finest at this speed: faster; it misses the target
     faster: 0.055 m/s by geometry
     ~ extrapolated from another range setting; measure the turn period and add it to the vehicle file
@@ -209,7 +209,7 @@ fn what_cannot_be_planned_is_refused_with_its_reason() {
     --vehicle sensors.toml
         headrace: plan: sensors.toml has no profiling head
     --tunnel ceran
-        headrace: planning: nothing is asked: give a target, a speed or a time
+        headrace: planning: no question: give a target, a speed or a time
     --tunnel egg --target 0.5
         headrace: --tunnel:1: profile = "egg": must be one of ceran, ceran-blueprint, rectangle, circle, arch, trimmed_circle, polyline
     --tunnel circle,radius_m=-3 --target 0.5
@@ -217,7 +217,7 @@ fn what_cannot_be_planned_is_refused_with_its_reason() {
     --tunnel circle,radius=3 --target 0.5
         headrace: --tunnel:2: radius: is not a key here; did you mean radius_m?
     --tunnel bow.csv --target 0.5
-        headrace: --tunnel:2: file = "bow.csv": line 2 of it: the profile isn't star-shaped about (-1, 0): it runs backwards or crosses itself at vertex 0, counted from 0
+        headrace: --tunnel:2: file = "bow.csv": line 2: the profile isn't star-shaped about (-1, 0): it runs backwards or crosses itself at vertex 0, counted from 0
     --tunnel ceran --target 0.5 --layout sector_offset
         headrace: planning: sector offset divides a turn among heads: it needs at least 2, not 1
     --tunnel ceran --target 0.5 --drift 8
@@ -243,7 +243,7 @@ fn a_target_that_no_mode_meets_is_an_answer_with_exit_code_1() {
     let args = ["--tunnel", "ceran", "--target", "0.02"];
     let answer = plan(&folder, &args);
     assert_eq!(answer.code, Some(1));
-    assert!(answer.stdout.contains("a target of 0.02 m is met at no speed"), "{}", answer.stdout);
+    assert!(answer.stdout.contains("no speed meets a target of 0.02 m"), "{}", answer.stdout);
     assert!(!answer.stdout.contains("NaN") && !answer.stdout.contains("inf"));
     let modes = &json(&folder, &args)["modes"];
     assert!(modes.as_array().unwrap().iter().all(|mode| mode["reason"] == "angular_step"));

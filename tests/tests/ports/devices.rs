@@ -203,7 +203,7 @@ fn a_vehicle_file_is_held_against_what_is_there() {
     assert_eq!(code, Some(1), "{told}");
     assert!(
         told.contains("no such device is plugged in")
-            && told.contains("a device of this kind isn't connected by can:"),
+            && told.contains("a device of this kind cannot use can:"),
         "{told}"
     );
 }

@@ -73,7 +73,7 @@ fn check_names_every_connect_that_is_wrong_with_what_is_right() {
     headrace: vehicle.toml:11: sensors[0].connect: there is no colon; allowed are serial:/dev/serial/by-id/NAME?baud=115200, serial:usb:VID:PID[:SERIAL]?baud=115200, tcp:HOST:PORT, udp:HOST:PORT, udp-listen:ADDRESS:PORT, can:INTERFACE, hid:VID:PID[:SERIAL], i2c:/dev/i2c-1:0x40
     headrace: vehicle.toml:18: sensors[1].connect: there is no port; allowed is tcp:192.168.0.5:4040
     headrace: vehicle.toml:25: sensors[2].connect: baud="fast" must be a whole number from 1 to 12000000; allowed is serial:/dev/serial/by-id/NAME?baud=115200 or serial:usb:0403:6001:A10K
-    headrace: vehicle.toml:32: sensors[3].connect: a device of this kind isn't connected by can:; it is by tcp:, serial: or udp:
+    headrace: vehicle.toml:32: sensors[3].connect: a device of this kind cannot use can:; it can use tcp:, serial: or udp:
     headrace: vehicle.toml:39: sensors[4].connect: there is no product id; allowed is hid:VID:PID[:SERIAL] with four hexadecimal digits each, hid:1209:0001
     headrace: vehicle.toml:46: sensors[5].connect: address "0x99" must be 0x08 to 0x77; allowed is i2c:/dev/i2c-1:0x40
     headrace: warning: vehicle.toml:9: sensors: have no connect, so that `run` can't reach them: empty
@@ -112,10 +112,10 @@ fn ports_that_are_wrong_or_not_there_are_named_while_the_dive_goes_on() {
     no_colon: closed: connect = "192.168.0.5": there is no colon; allowed are serial:/dev/serial/by-id/NAME?baud=115200, serial:usb:VID:PID[:SERIAL]?baud=115200, tcp:HOST:PORT, udp:HOST:PORT, udp-listen:ADDRESS:PORT, can:INTERFACE, hid:VID:PID[:SERIAL], i2c:/dev/i2c-1:0x40
     no_port: closed: connect = "tcp:192.168.0.5": there is no port; allowed is tcp:192.168.0.5:4040
     baud: closed: connect = "serial:/dev/ttyUSB0?baud=fast": baud="fast" must be a whole number from 1 to 12000000; allowed is serial:/dev/serial/by-id/NAME?baud=115200 or serial:usb:0403:6001:A10K
-    carrier: closed: connect = "can:can0": a device of this kind isn't connected by can:; it is by tcp:, serial: or udp:
+    carrier: closed: connect = "can:can0": a device of this kind cannot use can:; it can use tcp:, serial: or udp:
     product: closed: connect = "hid:1209": there is no product id; allowed is hid:VID:PID[:SERIAL] with four hexadecimal digits each, hid:1209:0001
     address: closed: connect = "i2c:/dev/i2c-1:0x99": address "0x99" must be 0x08 to 0x77; allowed is i2c:/dev/i2c-1:0x40
-    empty: closed: connect = "": nothing is said of where the sensor is; allowed are serial:/dev/serial/by-id/NAME?baud=115200, serial:usb:VID:PID[:SERIAL]?baud=115200, tcp:HOST:PORT, udp:HOST:PORT, udp-listen:ADDRESS:PORT, can:INTERFACE, hid:VID:PID[:SERIAL], i2c:/dev/i2c-1:0x40
+    empty: closed: connect = "": it is empty; allowed are serial:/dev/serial/by-id/NAME?baud=115200, serial:usb:VID:PID[:SERIAL]?baud=115200, tcp:HOST:PORT, udp:HOST:PORT, udp-listen:ADDRESS:PORT, can:INTERFACE, hid:VID:PID[:SERIAL], i2c:/dev/i2c-1:0x40
     "#);
     // A kernel without CAN says so.
     let absent = statuses(&absent).replace(

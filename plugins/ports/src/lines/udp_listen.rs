@@ -285,7 +285,7 @@ mod tests {
         assert_eq!(place.heard(WAIT).unwrap(), "in any way");
         let strangers = &place.senders.strangers;
         let name = stranger.local_addr().unwrap();
-        assert_eq!((strangers.messages(), strangers.words().unwrap()), (3, format!("not believed: {name}")));
+        assert_eq!((strangers.messages(), strangers.words().unwrap()), (3, format!("ignored: {name}")));
         stranger.set_read_timeout(Some(NONE)).unwrap();
         assert!(stranger.recv(&mut [0; 64]).is_err(), "something was sent to a stranger");
     }
