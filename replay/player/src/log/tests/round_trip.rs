@@ -6,7 +6,7 @@ use super::super::format::{Tick, seal};
 use super::super::{LogError, LogReader, LogWriter, LossKind, file_digest};
 use super::*;
 
-/// Ticks that consume packets out of time order, with results and sent bytes between.
+/// Writes ticks that consume packets out of time order, with results and sent bytes between.
 fn write<W: Write>(log: &mut LogWriter<W>, rounds: u32) -> Vec<Seen> {
     let mut written = Vec::new();
     for number in 0..rounds {
@@ -101,7 +101,7 @@ fn chunks_close_by_size() {
 }
 
 #[test]
-fn what_the_header_does_not_have_is_refused() {
+fn messages_for_undeclared_channels_are_refused() {
     let mut log = LogWriter::new(Vec::new(), &header(true)).unwrap();
     assert!(matches!(log.raw(3, MonoNs(0), MonoNs(0), &[]), Err(LogError::NoChannel { .. })));
     assert!(matches!(log.result(1, MonoNs(0), &[]), Err(LogError::NoChannel { .. })));
@@ -146,7 +146,7 @@ fn a_later_format_is_refused() {
 }
 
 #[test]
-fn a_writer_that_is_dropped_ends_no_log() {
+fn dropped_writer_leaves_the_log_without_an_end() {
     let mut bytes = Vec::new();
     let mut log = LogWriter::new(&mut bytes, &header(true)).unwrap();
     log.raw(0, MonoNs(1), MonoNs(1), b"one").unwrap();
