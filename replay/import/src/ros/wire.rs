@@ -145,7 +145,7 @@ mod tests {
     }
 
     #[test]
-    fn counts_that_lie_take_no_memory() {
+    fn wrong_counts_take_no_memory() {
         let bytes = [0xFF, 0xFF, 0xFF, 0xFF, 1, 2, 3, 4];
         assert_eq!(Wire::new(&bytes, Encoding::Ros1).unwrap().single_sequence(), None);
         assert_eq!(Wire::new(&bytes, Encoding::Ros1).unwrap().text(), None);
