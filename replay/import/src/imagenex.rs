@@ -8,7 +8,7 @@ use headrace_imagenex881::logfile::{LogFile, LogFileError};
 #[derive(Debug, Clone, Copy, Default)]
 pub struct ImagenexFormat;
 
-/// The line with all returns.
+/// Name of the line with all returns.
 pub const STREAM: &str = "imagenex";
 
 const DAY_NS: u64 = 86_400_000_000_000;

@@ -12,7 +12,7 @@ use crate::order::Order;
 use crate::{Clock, Entry, Format, ImportError, Input, Source as _, Step, Told};
 
 const MAGIC: &[u8] = b"#ROSBAG V2.0\n";
-/// More than the names and numbers of a header need, bytes.
+/// Upper bound on the length of a header, bytes.
 const MOST_HEADER: usize = 1 << 16;
 /// Most bytes of the definitions at the end of a bag, which are read at once.
 const MOST_INDEX: u64 = 64 << 20;
@@ -60,7 +60,7 @@ struct Record<'a> {
     len: usize,
 }
 
-/// Kind of a record.
+/// Kind of an accepted record.
 enum Accepted<'a> {
     /// A record without further content.
     Read,
@@ -68,7 +68,7 @@ enum Accepted<'a> {
     Chunk(&'a [u8]),
 }
 
-/// Why a record can't be read.
+/// Reason why a record can't be read.
 enum Stop<'a> {
     /// It is incomplete: its fields and the available part of its data, if the fields are complete.
     More(Option<(Fields<'a>, &'a [u8])>),
@@ -136,7 +136,7 @@ fn record(front: &[u8]) -> Result<Record<'_>, Stop<'_>> {
         len.map(|len| usize::try_from(len).unwrap_or(usize::MAX))
     };
     let header_len = length(front).ok_or(Stop::More(None))?;
-    // The shortest has only its kind: a length, `op=` and a byte.
+    // The shortest header has only its kind: a length, `op=` and a byte.
     if !(8..=MOST_HEADER).contains(&header_len) {
         return Err(Stop::Bad);
     }
@@ -223,14 +223,14 @@ impl Format for Bag {
 }
 
 impl Bag {
-    /// A bag whose messages go to `feeds`.
+    /// Creates a bag whose messages go to `feeds`.
     pub fn new(feeds: Feeds) -> Self {
         Self { feeds, ..Self::default() }
     }
 
-    /// The topics of a bag: from its index, or else by a scan of the whole bag.
+    /// Reads the topics of a bag from its index, or else by a scan of the whole bag.
     ///
-    /// Errors: the file can't be read, or is no bag.
+    /// Errors: the file can't be read, or isn't a bag.
     pub fn topics<R: Read + Seek>(name: &str, mut file: R) -> Result<Vec<Topic>, ImportError> {
         let failed = |source| ImportError::Read { name: name.to_owned(), offset: 0, source };
         let mut front = Vec::new();
@@ -292,7 +292,7 @@ impl Bag {
         })
     }
 
-    /// Processes a record. `None` if it lacks a required field of its kind.
+    /// Processes a record. `None` if a required field of its kind is missing.
     fn accept<'a>(&mut self, fields: Fields<'a>, data: &[u8], out: &mut Vec<Entry>) -> Option<Accepted<'a>> {
         match fields.u8(b"op")? {
             2 => self.message(fields.u32(b"conn")?, fields.time_ns(b"time")?, data, out),

@@ -1,23 +1,23 @@
-//! Header timestamps of messages compared with the record times.
+//! Compares the header timestamps of messages with the record times.
 
-/// Timestamps later than the record time by more than this are of another clock.
+/// A timestamp later than the record time by more than this comes from another clock.
 const AHEAD_NS: i64 = 5_000_000;
-/// Greatest recording delay of messages from a computer whose clock is synchronised to ours.
+/// Greatest recording delay of messages from a computer with a synchronised clock.
 const LATE_NS: i64 = 1_000_000_000;
 /// Greatest variation of that delay.
 const VARIES_NS: i64 = 500_000_000;
-/// From this offset on, the clock has another epoch rather than an error.
+/// Offset above which the clock has another epoch rather than an error.
 const OTHER_BASE_NS: i64 = 3_600_000_000_000;
-/// A followed timestamp that is off by more than this restarts the offset.
+/// Deviation of a followed timestamp above which the offset restarts.
 const ASTRAY_NS: i64 = 10_000_000_000;
 
 /// Source of the time of a message's values.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub(super) enum Base {
-    /// When it was recorded.
+    /// The time of recording.
     #[default]
     Record,
-    /// The stamp in its header.
+    /// The timestamp in its header.
     Header,
 }
 
@@ -42,7 +42,7 @@ impl Clocks {
         Self { base, ..Self::default() }
     }
 
-    /// The time of a message's values, and whether it is from the timestamp.
+    /// The time of a message's values, and whether it comes from the timestamp.
     pub(super) fn time(&mut self, record_ns: u64, stamp_ns: Option<u64>) -> (u64, bool) {
         self.messages += 1;
         let Some(stamp_ns) = stamp_ns.filter(|stamp_ns| *stamp_ns > 0) else {
@@ -125,7 +125,7 @@ impl Clocks {
 
 fn difference(one_ns: u64, other_ns: u64) -> i64 {
     let difference = i128::from(one_ns) - i128::from(other_ns);
-    // Half of what there is, so that two can be subtracted.
+    // Limited to half the range, so that two values can be subtracted.
     let most = i128::from(i64::MAX / 2);
     i64::try_from(difference.clamp(-most, most)).unwrap_or_default()
 }
@@ -152,7 +152,7 @@ mod tests {
     }
 
     #[test]
-    fn stamps_that_agree_need_no_words() {
+    fn agreeing_stamps_give_no_findings() {
         let (times, said) = words(Base::Record, &[(1000 * S, 1000 * S - 3), (1001 * S, 1001 * S - 900)]);
         assert_eq!((times, said.as_str()), (vec![1000 * S, 1001 * S], ""));
         assert_eq!(words(Base::Header, &[(1000 * S, 1000 * S - 3)]).0, [1000 * S - 3]);
@@ -171,7 +171,7 @@ mod tests {
     }
 
     #[test]
-    fn clocks_that_are_off_are_named() {
+    fn clock_offsets_are_named() {
         assert!(words(Base::Record, &[(10 * S, 11 * S)]).1.contains("up to 1.000 s later"));
         assert!(
             words(Base::Record, &[(10 * S, 8 * S)]).1.contains("2.000 s before the record: another clock")

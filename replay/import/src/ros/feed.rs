@@ -16,7 +16,7 @@ use crate::{Entry, Told};
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Manner {
     pub(super) base: Base,
-    /// For pressures and lengths: size of their unit in ours.
+    /// For pressures and lengths: factor of their unit to SI.
     pub(super) unit: f64,
     pub(super) plane: Plane,
 }
@@ -27,7 +27,7 @@ impl Default for Manner {
     }
 }
 
-/// Takes the messages of a topic.
+/// Converts the messages of a topic.
 pub(super) struct Feed {
     of: Type,
     sensor: EmulatedSensor,
@@ -115,7 +115,7 @@ impl Feed {
         self.say((at_ns, stamped), &value, out)
     }
 
-    /// Missing parts are omitted, as long as there is at least one.
+    /// Converts an inertial message. Missing parts are omitted, but at least one must be present.
     fn inertia(
         &mut self,
         wxyz: Option<[f64; 4]>,
@@ -150,7 +150,9 @@ impl Feed {
         Ok(Value::Inertia(attitude, rate.unwrap_or(unknown), force.unwrap_or(unknown)))
     }
 
-    /// A message's beams. It is recorded when the last of them is measured; its timestamp is that of the first.
+    /// Converts a message's beams.
+    ///
+    /// The message is recorded when the last beam has been measured; its timestamp is that of the first.
     fn beams(&mut self, beams: &Beams, at: (u64, bool), out: &mut Vec<Entry>) -> Result<(), &'static str> {
         let told = beams.told(self.manner.plane)?;
         for (count, what) in [(told.nowhere, "points that are nowhere: nothing heard, no angle known")] {
@@ -182,8 +184,9 @@ impl Feed {
         if unsaid > 0 { Err("with beams that the sensor can't say") } else { Ok(()) }
     }
 
-    /// Encodes a value. Values with a timestamp are received after the sensor's delays; those without when they
-    /// were recorded.
+    /// Encodes a value.
+    ///
+    /// Values with a timestamp are received after the sensor's delays; those without, at the time of recording.
     fn say(
         &mut self,
         (at_ns, stamped): (u64, bool),
@@ -235,7 +238,7 @@ impl Feed {
     }
 }
 
-/// The unit that a reason counts: messages, unless it begins with another.
+/// The unit counted by a reason: messages, unless the reason begins with another unit.
 fn messages(why: &str) -> &'static str {
     if why.starts_with("points") || why.starts_with("ranges") { "" } else { "messages " }
 }

@@ -1,4 +1,4 @@
-//! Assigns topics to sensors: by a mapping, or where the choice is unique.
+//! Assigns topics to sensors: by a mapping, or if the choice is unique.
 
 use headrace_config::{ConfigError, Section};
 use headrace_sensor::device::Sense;
@@ -12,7 +12,7 @@ use super::{Feeds, Topic};
 use crate::csv::{LENGTH, PRESSURE};
 use crate::emulated::EmulatedSensor;
 
-/// Why topics and sensors can't be matched.
+/// Topics and sensors can't be matched.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum MatchError {
@@ -24,7 +24,7 @@ pub enum MatchError {
         "which {sense} is which? topics {topics}, sensors {sensors}; --map MAPPING.toml says which topic is of which sensor"
     )]
     Several {
-        /// What they sense.
+        /// The kind of measurement.
         sense: &'static str,
         /// The topics.
         topics: String,
@@ -47,7 +47,9 @@ const SENSES: [Sense; 5] = [Sense::Head, Sense::Echosounder, Sense::Depth, Sense
 const MOST_SHOWN: usize = 20;
 
 impl Feeds {
-    /// Without a mapping: a sensor and a topic of a fitting type are matched where each is the only one of its kind.
+    /// Assigns topics without a mapping.
+    ///
+    /// A sensor and a topic of a fitting type are matched if each is the only one of its kind.
     ///
     /// Errors: several of a kind, or none.
     pub fn matching(vehicle: &VehicleConfig, topics: &[Topic]) -> Result<Self, MatchError> {
@@ -86,7 +88,7 @@ impl Feeds {
         Ok(feeds)
     }
 
-    /// By a mapping only.
+    /// Assigns topics by a mapping only.
     ///
     /// Errors: a key with an invalid value, an unknown sensor or topic, or a sensor and topic of different kinds.
     pub fn mapped(

@@ -2,7 +2,7 @@
 
 use std::io::Read;
 
-/// Largest unpacked size of a chunk, bytes; a recorder makes chunks of less than a megabyte plus one message.
+/// Largest unpacked size of a chunk, bytes. A recorder makes chunks of less than a megabyte plus one message.
 pub(super) const MOST_UNPACKED: usize = 64 << 20;
 
 /// An unpacked chunk.
@@ -10,7 +10,7 @@ pub(super) const MOST_UNPACKED: usize = 64 << 20;
 pub(super) enum Unpacked {
     /// All of it.
     Whole(Vec<u8>),
-    /// The available part of one truncated by the end of the file.
+    /// The available part of a chunk that the end of the file cuts off.
     Cut(Vec<u8>),
     /// Nothing, with the reason.
     Bad(&'static str),
@@ -36,7 +36,7 @@ pub(super) fn unpack(packing: &[u8], packed: &[u8], size: u32, cut: bool) -> Unp
 
 fn read(reader: impl Read, size: usize, cut: bool) -> Unpacked {
     let mut unpacked = Vec::new();
-    // One byte more shows that it is longer than stated.
+    // One byte more than stated shows that the chunk is longer.
     let result = reader.take(size as u64 + 1).read_to_end(&mut unpacked);
     judged(if result.is_ok() { Ok(unpacked) } else { Err(unpacked) }, size, cut)
 }
@@ -55,7 +55,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn lengths_are_held_to() {
+    fn stated_lengths_are_enforced() {
         assert_eq!(unpack(b"none", b"abc", 3, false), Unpacked::Whole(b"abc".to_vec()));
         assert!(matches!(unpack(b"none", b"abc", 4, false), Unpacked::Bad(_)));
         assert_eq!(unpack(b"none", b"abc", 4, true), Unpacked::Cut(b"abc".to_vec()));
