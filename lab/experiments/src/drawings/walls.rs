@@ -106,12 +106,12 @@ fn samples(chart: &Chart<'_>, panel: &Panel, length_m: f64) {
     }
 }
 
-/// One in this many samples is drawn.
+/// Interval between drawn samples.
 fn thinned(panel: &Panel) -> usize {
     panel.samples.len().div_ceil(MOST_DOTS).max(1)
 }
 
-/// Cells by colour; vertically adjacent cells of one colour are joined.
+/// Draws cells by colour; vertically adjacent cells of one colour are joined.
 fn surface(chart: &Chart<'_>, panel: &Panel, figure: &Walls) {
     let [along, round] = panel.cells.map(|cells| usize::try_from(cells).unwrap_or(1).max(1));
     let size_m = [figure.length_m / along as f64, figure.profile.perimeter_m() / round as f64];

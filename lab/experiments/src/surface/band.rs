@@ -1,7 +1,7 @@
 //! Quadratic B-splines on a row of cells: their values, and the banded matrices of their integrals.
 //!
 //! n cells have n + 2 functions; function i has its support on cells i - 2 to i. Lengths are in cells. Integrals cover
-//! only the existing cells, so that the boundary condition is the natural one (no flux).
+//! only the existing cells, so the boundary condition is the natural one (no flux).
 
 /// Integral of N_a N_b over a cell.
 const MASS: [[f64; 3]; 3] = [

@@ -1,5 +1,6 @@
-//! The zero surface of a field on a grid, by marching tetrahedra: six per cell, all sharing its long diagonal, so that
-//! neighbours share faces and no case is ambiguous.
+//! Extracts the zero surface of a field on a grid by marching tetrahedra.
+//!
+//! There are six per cell, all sharing its long diagonal, so that neighbours share faces and no case is ambiguous.
 
 use super::grid::Grid;
 use super::mesh::Mesh;
@@ -8,7 +9,7 @@ use super::{Xyz, along, dot, sub};
 /// Corners of a cell are numbered by bits: 1 along x, 2 along y, 4 along z. Each tetrahedron is a path from 0 to 7.
 const TETRAHEDRA: [[usize; 4]; 6] =
     [[0, 1, 3, 7], [0, 1, 5, 7], [0, 2, 3, 7], [0, 2, 6, 7], [0, 4, 5, 7], [0, 4, 6, 7]];
-/// Edges that begin at a node: to each other corner of the cell whose least corner it is.
+/// Number of edges that begin at a node: to each other corner of the cell whose least corner it is.
 const EDGES: usize = 7;
 const NONE: u32 = u32::MAX;
 /// Most steps of the search along an edge; each at least halves the interval.
@@ -107,7 +108,7 @@ impl<F: Fn(Xyz) -> f64> Extraction<'_, F> {
         self.on_edge[slot]
     }
 
-    /// By false position, with bisection where that converges slowly.
+    /// Finds the crossing by false position, with bisection if that converges slowly.
     fn crossing(&self, from: usize, to: usize) -> Xyz {
         let (start, way) = (self.place(from), sub(self.place(to), self.place(from)));
         let (mut low, mut high) = ((0.0, self.corners[from]), (1.0, self.corners[to]));
