@@ -45,7 +45,7 @@ pub struct RunRow {
 pub struct Pair {
     /// As printed.
     pub paper: f64,
-    /// Ours.
+    /// Recomputed.
     pub ours: f64,
 }
 
@@ -54,7 +54,7 @@ impl Pair {
         Self { paper: paper.value(), ours }
     }
 
-    /// Relative difference, positive where ours is larger.
+    /// Relative difference, positive if the recomputed figure is larger.
     pub fn difference(&self) -> f64 {
         self.ours / self.paper - 1.0
     }

@@ -1,4 +1,4 @@
-//! The page.
+//! The page in Markdown.
 
 use super::Results;
 use crate::point::{Given, Interval, Point, Trade};
@@ -84,7 +84,7 @@ fn row(point: &Point, names: &[String], is_counted: bool) -> Vec<String> {
     row
 }
 
-/// A figure with its bounds, where it has any.
+/// A figure with its bounds, if it has any.
 fn figure(Interval { low, middle, high }: Interval) -> String {
     if high <= low {
         number(middle)

@@ -12,7 +12,7 @@ use super::{Many, SourceInfo};
 /// Rank of the first channel that isn't raw; source numbers are u16.
 const OTHER_RANK: u32 = 1 << 16;
 
-/// What a channel carries.
+/// Content of a channel.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum ChannelKind {
     Raw(u16),

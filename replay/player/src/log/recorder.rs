@@ -63,7 +63,7 @@ pub struct RecorderHandle {
     state: Arc<State>,
     /// Time to wait at the end for a medium that neither accepts data nor fails.
     pub(super) patience: Duration,
-    /// Time at which it was told to end, and whether the waiting time is limited in total.
+    /// Time of the request to end, and whether the waiting time is limited in total.
     ending: Option<(Instant, bool)>,
 }
 

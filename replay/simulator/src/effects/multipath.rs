@@ -162,7 +162,7 @@ mod tests {
     fn verif_second_path_in_a_circle_is_a_chord_with_equal_incidence() {
         let (radius_m, out_m) = (4.0, 1.5);
         let pipe = Environment::straight(shapes::circle(radius_m).unwrap());
-        // The circle stands on the floor: its centre is a radius above it.
+        // The circle rests on the floor: its centre is a radius above it.
         for k in 0..720 {
             let angle_rad = (f64::from(k) + 0.37) * math::TAU / 720.0;
             let ray = cast(&pipe, [out_m, radius_m], angle_rad);
