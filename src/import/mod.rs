@@ -138,7 +138,7 @@ fn format(
         return Ok(Box::new(Bag::new(ros::feeds(args, vehicle, &topics)?)));
     }
     let (Some(map), Some(vehicle)) = (&args.map, vehicle) else {
-        let what = "import: CSV wants --vehicle VEHICLE.toml, whose sensors' bytes its values become";
+        let what = "import: CSV needs --vehicle VEHICLE.toml, whose sensors encode its values";
         return Err(Failure::Usage(what.to_owned()));
     };
     let (text, name) = (files::read(map)?, map.display().to_string());

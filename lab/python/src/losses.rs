@@ -32,7 +32,7 @@ impl Loss {
 
     /// Messages that are out of order by more than a reader can hold.
     pub(crate) fn of_order(late: u64) -> Self {
-        let what = format!("{late} messages out of order by more than can be held, taken where they stand");
+        let what = format!("{late} messages out of order by more than can be held, delivered in file order");
         Self { what, offset: 0, bytes: 0, from_ns: None, to_ns: None }
     }
 }

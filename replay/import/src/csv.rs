@@ -102,7 +102,8 @@ impl Csv {
             let missing: Vec<&str> = missing.map(|(name, ..)| *name).collect();
             if !missing.is_empty() {
                 let (id, missing) = (&target.sensor.id, missing.join(", "));
-                let problem = format!("have none for {missing} of sensor {id:?}; its bytes need all of them");
+                let problem =
+                    format!("have none for {missing} of sensor {id:?}; a sensor needs all of its quantities");
                 return Err(mapping.invalid("columns", &problem));
             }
         }
@@ -115,11 +116,11 @@ impl Csv {
         // A row may have more cells than the header if they are empty.
         if cells.get(self.cells..).is_none_or(|more| more.iter().any(|cell| !cell.is_empty())) {
             return Err(
-                "rows with other cells than the header: cut short, or numbers with the separator in them",
+                "rows with more or fewer cells than the header: cut short, or numbers contain the separator",
             );
         }
         let time = cells.get(self.time.0).copied().unwrap_or_default();
-        let stamp_ns = nanoseconds(time, self.time.1).ok_or("rows whose time is no number from 0 on")?;
+        let stamp_ns = nanoseconds(time, self.time.1).ok_or("rows whose time isn't a number from 0 on")?;
         let mut whole = Ok(());
         for target in &mut self.targets {
             whole = whole.and(target.tell(stamp_ns, &cells, out));
@@ -147,9 +148,9 @@ impl Format for Csv {
         }
         if !is_ended {
             // A truncated number still parses as a number.
-            return Step::Lost(used, "a last row without a line end: it may be cut short, and isn't taken");
+            return Step::Lost(used, "a last row without a line end: it may be cut short, and is skipped");
         }
-        let Ok(line) = str::from_utf8(line) else { return Step::Lost(used, "rows that are no text") };
+        let Ok(line) = str::from_utf8(line) else { return Step::Lost(used, "rows that aren't UTF-8 text") };
         match self.row(line, out) {
             Ok(()) => Step::Took(used),
             Err(why) => Step::Lost(used, why),
@@ -200,7 +201,7 @@ impl Target {
         }
         let empty = |slot: usize| self.columns.get(slot).is_none_or(|place| text(place).is_empty());
         let Some(value) = value(self.sensor.sense, values, empty(1)) else {
-            return Err("rows with a cell that is no number");
+            return Err("rows with a cell that isn't a number");
         };
         let (value, is_beyond) = self.sensor.within_reach(value);
         let stream = self.sensor.id.clone();
@@ -210,7 +211,7 @@ impl Target {
         match (told, is_beyond) {
             (true, true) => Err(BEYOND),
             (true, false) => Ok(()),
-            (false, _) => Err("rows with values that the sensor can't say"),
+            (false, _) => Err("rows with values that the sensor can't encode"),
         }
     }
 }

@@ -50,8 +50,7 @@ impl Value {
 }
 
 /// Reason text for ranges beyond a head's setting.
-pub(super) const BEYOND: &str =
-    "ranges that the head doesn't tell at its range setting: as if nothing was heard";
+pub(super) const BEYOND: &str = "ranges outside the head's range setting, imported as pings without an echo";
 
 /// A sensor of the vehicle file.
 pub(super) struct EmulatedSensor {
@@ -74,7 +73,7 @@ impl EmulatedSensor {
         Self::all(vehicle).find(|(config_id, _)| *config_id == id).map_or_else(
             || {
                 let ids: Vec<&str> = Self::all(vehicle).map(|(id, _)| id).collect();
-                let problem = format!("is no sensor of the vehicle file; there are {}", ids.join(", "));
+                let problem = format!("isn't a sensor of the vehicle file, which has {}", ids.join(", "));
                 Err(section.invalid("sensor", &problem))
             },
             |(id, device)| Ok(Self::new(id, device, vehicle)),

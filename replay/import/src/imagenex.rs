@@ -23,7 +23,7 @@ impl Format for ImagenexFormat {
         let mut shots = LogFile::new(front);
         let shot = match shots.next() {
             None | Some(Err(LogFileError::Short { .. })) => return Step::More,
-            Some(Err(_)) => return Step::Lost(1, "no shot where one must begin"),
+            Some(Err(_)) => return Step::Lost(1, "no shot where one is expected"),
             Some(Ok(shot)) => shot,
         };
         let total =

@@ -66,7 +66,7 @@ impl Losses {
         }
         if let Some((count, gap_ns, at)) = self.gaps {
             let (gap_s, at_s) = (gap_ns / 1_000_000_000, at.as_secs_f64());
-            all.push(format!("the file's clock goes on by over an hour {count} times, first by {gap_s} s to {at_s:.3} s of the log: set, or several recordings in one"));
+            all.push(format!("the file's clock jumps forward by over an hour {count} times, first by {gap_s} s to {at_s:.3} s of the log: the clock was set, or the file has several recordings"));
         }
         all
     }

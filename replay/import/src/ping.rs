@@ -43,7 +43,9 @@ impl Format for PingFormat {
             Ok(()) => Step::Took(front.len() - rest.len()),
             Err(Stop::More) => Step::More,
             // Records have no sync mark to find the next one by.
-            Err(Stop::Bad) if self.begun => Step::Lost(front.len(), "no time and message where one must be"),
+            Err(Stop::Bad) if self.begun => {
+                Step::Lost(front.len(), "no time and message where they are expected")
+            }
             Err(Stop::Bad) => Step::Lost(front.len(), "no preface of Ping Viewer"),
         }
     }

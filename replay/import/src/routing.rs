@@ -21,7 +21,7 @@ pub enum RoutingError {
         allowed: String,
     },
     /// No sensor of the vehicle file can receive such a file's data.
-    #[error("the vehicle file has no sensor {which} to take it; --source ID={line} names one")]
+    #[error("the vehicle file has no sensor {which} to receive the data; name one with --source ID={line}")]
     NoTaker {
         /// Sensors that could receive it.
         which: String,
@@ -29,7 +29,9 @@ pub enum RoutingError {
         line: &'static str,
     },
     /// Several sensors could be the file's only device.
-    #[error("the file is of one device, and {several} are of plugin {plugin}; --source ID={line} says which")]
+    #[error(
+        "the file comes from one device, but {several} have plugin {plugin}; choose one with --source ID={line}"
+    )]
     SeveralTakers {
         /// Their names.
         several: String,
@@ -39,13 +41,13 @@ pub enum RoutingError {
         line: &'static str,
     },
     /// A file of values is imported without a vehicle file, whose sensors must encode them.
-    #[error("{format} wants --vehicle VEHICLE.toml, whose sensors' bytes its values become")]
+    #[error("{format} needs --vehicle VEHICLE.toml, whose sensors encode its values")]
     NoVehicle {
         /// The kind of file.
         format: &'static str,
     },
     /// Neither a vehicle file nor an option names a sensor.
-    #[error("which sensors are the messages of? --vehicle VEHICLE.toml says so, or --source ID={line}")]
+    #[error("the sensors of the messages are unknown; give --vehicle VEHICLE.toml or --source ID={line}")]
     NoSensor {
         /// Form of a line's name.
         line: &'static str,

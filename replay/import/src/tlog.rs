@@ -54,6 +54,6 @@ impl Format for TlogFormat {
 impl TlogFormat {
     fn lost(&mut self) -> Step {
         self.astray = true;
-        Step::Lost(1, "no time and frame where one must be")
+        Step::Lost(1, "no time and frame where they are expected")
     }
 }

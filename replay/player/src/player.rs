@@ -149,14 +149,14 @@ impl Player {
         }
         if self.reader.late() > 0 {
             all.push(format!(
-                "{} messages out of order by more than can be held, taken where they stand",
+                "{} messages out of order by more than can be held, delivered in file order",
                 self.reader.late()
             ));
         }
         let clock = self.clock.iter().flat_map(|clock| self.astray.iter().map(move |found| (clock, found)));
         for (clock, (id, (count, first))) in clock {
             all.push(format!(
-                "{count} messages of source {id:?} left out: they are stamped by another clock, {} the one of most messages",
+                "{count} messages of source {id:?} left out: they are stamped by another clock, {} that of most messages",
                 clock.distance(*first)
             ));
         }

@@ -12,7 +12,7 @@ pub fn open(path: &Path) -> Result<File> {
     if !kind.is_file() && !kind.is_dir() {
         return Err(Error::new(
             ErrorKind::InvalidInput,
-            "it is a pipe, a device or a socket; a file is wanted",
+            "it is a pipe, a device or a socket; a file is required",
         ));
     }
     File::open(path)
@@ -48,7 +48,7 @@ mod tests {
         let words = |result: Result<Vec<u8>>| result.unwrap_err().to_string();
         assert_eq!(
             words(read(Path::new("/dev/zero"), 10)),
-            "it is a pipe, a device or a socket; a file is wanted"
+            "it is a pipe, a device or a socket; a file is required"
         );
         let own = Path::new(env!("CARGO_MANIFEST_DIR")).join("Cargo.toml");
         assert!(words(read(&own, 10)).starts_with("it is longer than 10 bytes"));

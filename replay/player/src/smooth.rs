@@ -44,7 +44,7 @@ pub enum SmoothError {
         source: std::io::Error,
     },
     /// The filter produced steps faster than they were stored.
-    #[error("keeping the filter's steps: {lost} of a tick were lost; there is room for {queued}")]
+    #[error("keeping the filter's steps: {lost} steps of a tick were lost; a tick may have up to {queued}")]
     Lost {
         /// Steps lost.
         lost: u64,

@@ -265,7 +265,7 @@ fn difference(live: Record<'_>, replayed: Record<'_>) -> Option<What> {
     let (Some(kind), true) =
         (live.kind, live.kind == replayed.kind && live.words.len() == replayed.words.len())
     else {
-        let name = |record: Record<'_>| record.kind.map_or("a kind that is not known", RecordKind::as_str);
+        let name = |record: Record<'_>| record.kind.map_or("an unknown kind", RecordKind::as_str);
         return Some(What::Kind { live: name(live), replayed: name(replayed) });
     };
     let place = live.words.iter().zip(replayed.words).position(|(live, replayed)| live != replayed)?;

@@ -107,7 +107,7 @@ impl Scene {
             root.invalid("vehicle", &problem)
         })?;
         let programs = vehicle.programs().map_err(|why| {
-            root.invalid("vehicle", &format!("describes heads that no program fits: {why}"))
+            root.invalid("vehicle", &format!("describes heads without a possible program: {why}"))
         })?;
         let (design, length_m) = (&vehicle.tunnel.profile, vehicle.tunnel.length_m);
         let environment = root.part(|| Environment::parse(tunnel, design, length_m, text, load))?;

@@ -212,10 +212,10 @@ impl Format for Bag {
         }
         if let Some(Stated { index_at, chunks, .. }) = self.stated {
             if index_at == 0 {
-                told.losses.push("the bag was not closed, so that its end may be missing".to_owned());
+                told.losses.push("the bag was not closed; its end may be missing".to_owned());
             } else if self.chunks != u64::from(chunks) {
                 let found = self.chunks;
-                told.losses.push(format!("the bag says that it has {chunks} chunks; there are {found}"));
+                told.losses.push(format!("the bag states {chunks} chunks; it has {found}"));
             }
         }
         told
@@ -310,12 +310,12 @@ impl Bag {
         let md5 = data.text(b"md5sum").unwrap_or_else(|| "*".to_owned());
         let known = match Type::named(&type_name) {
             Some(known) if known.is_defined_as(&md5) => Ok(known),
-            Some(_) => Err(format!("its {type_name} is defined otherwise (MD5 {md5}) than ROS has it")),
-            None => Err(format!("messages of type {type_name} aren't known")),
+            Some(_) => Err(format!("its definition of {type_name} (MD5 {md5}) differs from that of ROS")),
+            None => Err(format!("messages of type {type_name} aren't supported")),
         };
         let topic = Topic { name, type_name, known };
         if *self.connections.entry(number).or_insert_with(|| topic.clone()) != topic {
-            let what = "connections that are defined a second time, otherwise: the first holds";
+            let what = "connections with a second, different definition: the first is used";
             *self.lost.entry(what).or_default() += 1;
         }
         Some(())
@@ -323,8 +323,7 @@ impl Bag {
 
     fn message(&mut self, connection: u32, record_ns: u64, data: &[u8], out: &mut Vec<Entry>) {
         let Some(topic) = self.connections.get(&connection) else {
-            *self.lost.entry("messages of a connection that is defined nowhere before them").or_default() +=
-                1;
+            *self.lost.entry("messages of a connection without an earlier definition").or_default() += 1;
             return;
         };
         self.first_ns = Some(self.first_ns.map_or(record_ns, |first_ns| first_ns.min(record_ns)));
@@ -352,13 +351,13 @@ impl Bag {
                 // A chunk contains no chunks.
                 let taken = fields.u8(b"op") != Some(5) && self.accept(fields, data, out).is_some();
                 if !taken {
-                    *self.lost.entry("records in chunks that can't be there").or_default() += 1;
+                    *self.lost.entry("records in chunks that no chunk may contain").or_default() += 1;
                 }
                 chunk.at += len;
             }
             Err(Stop::More(_)) if chunk.step == Step::More => return Step::More,
             Err(_) => {
-                *self.lost.entry("chunks whose rest is no record").or_default() += 1;
+                *self.lost.entry("chunks that end in bytes that aren't a record").or_default() += 1;
                 return chunk.step;
             }
         }

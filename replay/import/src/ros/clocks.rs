@@ -77,33 +77,30 @@ impl Clocks {
         if self.unstamped > 0 && (followed || self.unstamped < self.messages) {
             let (unstamped, messages) = (self.unstamped, self.messages);
             all.push(format!(
-                "{unstamped} of {messages} messages have no header stamp; theirs is the time of the record"
+                "{unstamped} of {messages} messages have no header stamp; they get their time of recording"
             ));
         }
         let Some((least, most)) = self.lag_ns else { return all };
         let done = match self.moved_ns {
-            Some(0) => "they are followed as they are".to_owned(),
-            Some(moved) => format!("they are followed, moved by {} s", seconds(moved)),
-            None => "the times of the record are taken".to_owned(),
+            Some(0) => "they are used unchanged".to_owned(),
+            Some(moved) => format!("they are used, shifted by {} s", seconds(moved)),
+            None => "the times of recording are used".to_owned(),
         };
         let problem = if least.abs() > OTHER_BASE_NS || most.abs() > OTHER_BASE_NS {
-            Some(format!(
-                "header stamps are on another time base, {} s before the record",
-                range(least, most)
-            ))
+            Some(format!("header stamps are on another time base, {} s before recording", range(least, most)))
         } else if least < -AHEAD_NS {
             Some(format!(
-                "header stamps are up to {} s later than the record: another clock, not set by it",
+                "header stamps are up to {} s later than recording: they come from another clock",
                 seconds(-least)
             ))
         } else if most - least > VARIES_NS {
             Some(format!(
-                "header stamps are {} s before the record: messages came late, or the clock isn't set by it",
+                "header stamps are {} s before recording: messages came late, or from another clock",
                 range(least, most)
             ))
         } else if most > LATE_NS {
             Some(format!(
-                "header stamps are {} s before the record: another clock, not set by it",
+                "header stamps are {} s before recording: they come from another clock",
                 range(least, most)
             ))
         } else {
@@ -115,7 +112,7 @@ impl Clocks {
         }
         if self.anew > 0 {
             all.push(format!(
-                "header stamps jump by over 10 s against the record {} times, and are moved anew",
+                "header stamps jump by over 10 s against recording {} times, and get a new shift each time",
                 self.anew
             ));
         }
@@ -164,24 +161,26 @@ mod tests {
         let (times, said) = words(Base::Record, &pairs);
         assert_eq!(times, [50_000 * S, 50_001 * S]);
         assert!(said.contains("another time base, 49990.000 to 49990.100 s before"), "{said}");
-        assert!(said.contains("the times of the record are taken"), "{said}");
+        assert!(said.contains("the times of recording are used"), "{said}");
         let (times, said) = words(Base::Header, &pairs);
         assert_eq!(times, [50_000 * S, 50_000 * S + 900_000_000]);
-        assert!(said.contains("moved by 49990.000 s"), "{said}");
+        assert!(said.contains("shifted by 49990.000 s"), "{said}");
     }
 
     #[test]
     fn clock_offsets_are_named() {
         assert!(words(Base::Record, &[(10 * S, 11 * S)]).1.contains("up to 1.000 s later"));
         assert!(
-            words(Base::Record, &[(10 * S, 8 * S)]).1.contains("2.000 s before the record: another clock")
+            words(Base::Record, &[(10 * S, 8 * S)])
+                .1
+                .contains("2.000 s before recording: they come from another clock")
         );
         assert!(words(Base::Record, &[(10 * S, 10 * S), (20 * S, 19 * S)]).1.contains("came late"));
         assert!(words(Base::Record, &[(10 * S, 9 * S), (11 * S, 8 * S)]).1.contains("go back 1 times"));
         let (times, said) =
             words(Base::Header, &[(100 * S, 100 * S), (101 * S, 501 * S), (102 * S, 502 * S)]);
         assert_eq!(times, [100 * S, 101 * S, 102 * S]);
-        assert!(said.contains("jump by over 10 s against the record 1 times"), "{said}");
+        assert!(said.contains("jump by over 10 s against recording 1 times"), "{said}");
         let mut clocks = Clocks::new(Base::Header);
         assert_eq!(clocks.time(5, Some(0)), (5, false));
         assert!(clocks.words()[0].contains("no header stamp"));

@@ -100,7 +100,7 @@ impl Feed {
                 self.inertia(*wxyz, *rate_radps, *force_mps2)?
             }
             Values::Range(range_m) => Value::Range(*range_m),
-            Values::Scalar(value) if !value.is_finite() => return Err("whose value is no number"),
+            Values::Scalar(value) if !value.is_finite() => return Err("whose value isn't a number"),
             Values::Scalar(value) if self.of == Type::FluidPressure => {
                 let pressure_pa = value * self.manner.unit;
                 self.highest_pa = self.highest_pa.max(pressure_pa);
@@ -110,7 +110,7 @@ impl Feed {
             Values::Velocity(velocity) if velocity.iter().all(|part| part.is_finite()) => {
                 Value::Velocity(*velocity)
             }
-            Values::Velocity(_) => return Err("whose value is no number"),
+            Values::Velocity(_) => return Err("whose value isn't a number"),
         };
         self.say((at_ns, stamped), &value, out)
     }
@@ -132,7 +132,7 @@ impl Feed {
                 let [w, x, y, z] = wxyz;
                 Rot::from_wxyz(w, x, y, z).unwrap_or_else(nowhere)
             }
-            Some(_) => return Err("whose orientation is no unit quaternion"),
+            Some(_) => return Err("whose orientation isn't a unit quaternion"),
             None => nowhere(),
         };
         for (missing, what) in [
@@ -155,19 +155,20 @@ impl Feed {
     /// The message is recorded when the last beam has been measured; its timestamp is that of the first.
     fn beams(&mut self, beams: &Beams, at: (u64, bool), out: &mut Vec<Entry>) -> Result<(), &'static str> {
         let told = beams.told(self.manner.plane)?;
-        for (count, what) in [(told.nowhere, "points that are nowhere: nothing heard, no angle known")] {
+        for (count, what) in [(told.nowhere, "points without a position: no echo, at an unknown angle")] {
             if count > 0 {
                 *self.noted.entry(what).or_default() += count;
             }
         }
         if told.off_plane > 0 {
-            *self.lost.entry("points outside the plane that the beam turns in (`plane`)").or_default() +=
+            *self.lost.entry("points outside the beam's plane of rotation (`plane`)").or_default() +=
                 told.off_plane;
         }
         let last_s = told.beams.last().map_or(0.0, |beam| beam.after_s);
         let first_s = told.beams.first().map_or(0.0, |beam| beam.after_s);
         if told.beams.len() > 1 && last_s <= first_s {
-            *self.noted.entry("of several beams without times: all are given one").or_default() += 1;
+            *self.noted.entry("with several beams and no times: all beams get the same time").or_default() +=
+                1;
         }
         let mut unsaid = 0_u64;
         let mut beyond = 0_u64;
@@ -181,7 +182,7 @@ impl Feed {
         if beyond > 0 {
             *self.lost.entry(BEYOND).or_default() += beyond;
         }
-        if unsaid > 0 { Err("with beams that the sensor can't say") } else { Ok(()) }
+        if unsaid > 0 { Err("with beams that the sensor can't encode") } else { Ok(()) }
     }
 
     /// Encodes a value.
@@ -198,7 +199,7 @@ impl Feed {
             let stamp_ns = if stamped { received.0 } else { at_ns };
             out.push(Entry { stamp_ns, stream: stream.clone(), bytes: bytes.to_vec() });
         });
-        if said { Ok(()) } else { Err("with values that the sensor can't say") }
+        if said { Ok(()) } else { Err("with values that the sensor can't encode") }
     }
 
     /// Reports losses and remarks.
@@ -219,7 +220,7 @@ impl Feed {
             let (count, first) = (self.other_frames, self.frame_id.as_deref().unwrap_or_default());
             let first = String::from_utf8_lossy(first);
             remark(format!(
-                "{count} messages are of another frame than the first, {first:?}; the vehicle file has one mount for all"
+                "{count} messages have another frame than the first, {first:?}; the vehicle file has one mount for all"
             ));
         }
         let upward_mps2 = self.upward_mps2 / self.taken.max(1) as f64;
@@ -232,7 +233,7 @@ impl Feed {
         if self.of == Type::FluidPressure && self.taken > 0 && self.highest_pa < LEAST_PA {
             let highest_pa = self.highest_pa;
             remark(format!(
-                "no pressure is above {highest_pa:.1} Pa, less than that of the air; `unit` of a mapping says what they are in"
+                "no pressure is above {highest_pa:.1} Pa, which is less than air pressure; set `unit` in the mapping"
             ));
         }
     }

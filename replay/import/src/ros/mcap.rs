@@ -82,8 +82,8 @@ fn topic(channel: &ChannelInfo<'_>) -> (Topic, Encoding) {
     let (encoding, schema) = (channel.encoding, channel.schema.unwrap_or_default());
     let known = match (encoding, Type::named(schema)) {
         ("cdr" | "ros1", Some(known)) => Ok(known),
-        ("cdr" | "ros1", None) => Err(format!("messages of type {schema} aren't known")),
-        (encoding, _) => Err(format!("messages are encoded as {encoding:?}; cdr and ros1 are known")),
+        ("cdr" | "ros1", None) => Err(format!("messages of type {schema} aren't supported")),
+        (encoding, _) => Err(format!("messages are encoded as {encoding:?}; supported are cdr and ros1")),
     };
     let topic = Topic { name: channel.topic.to_owned(), type_name: schema.to_owned(), known };
     (topic, if encoding == "ros1" { Encoding::Ros1 } else { Encoding::Cdr })
@@ -136,7 +136,7 @@ impl<R: Read + Seek> Source for Mcap<R> {
         }
         if self.reader.late() > 0 {
             told.losses.push(format!(
-                "{} messages stand too late in the file to be put in order",
+                "{} messages come too late in the file to be put in order",
                 self.reader.late()
             ));
         }

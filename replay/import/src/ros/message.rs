@@ -111,9 +111,9 @@ pub(super) struct Read<'a> {
 pub(super) fn read(of: Type, encoding: Encoding, bytes: &[u8]) -> Result<Read<'_>, &'static str> {
     let mut wire = Wire::new(bytes, encoding).ok_or("in another encapsulation than plain CDR")?;
     let read =
-        fields(of, &mut wire).ok_or("shorter than their type says, or with a count that can't be")??;
+        fields(of, &mut wire).ok_or("shorter than their type requires, or with an impossible count")??;
     if !wire.is_done() {
-        return Err("longer than their type says");
+        return Err("longer than their type allows");
     }
     Ok(read)
 }

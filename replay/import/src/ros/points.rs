@@ -65,7 +65,7 @@ impl Beams {
         match self {
             Self::Turned(beams) => {
                 if beams.iter().any(|beam| !beam.angle_rad.is_finite() || beam.angle_rad.abs() > 1e3) {
-                    return Err("with angles that are none");
+                    return Err("with angles that aren't numbers");
                 }
                 told.beams.clone_from(beams);
             }

@@ -21,16 +21,16 @@ pub(super) enum Unpacked {
 /// Source: ROS wiki, "Bags/Format/2.0": none, bz2, and lz4 as roslz4 writes it, in frames of LZ4.
 pub(super) fn unpack(packing: &[u8], packed: &[u8], size: u32, cut: bool) -> Unpacked {
     let Some(size) = usize::try_from(size).ok().filter(|size| *size <= MOST_UNPACKED) else {
-        return Unpacked::Bad("chunks that would take more than 64 MiB");
+        return Unpacked::Bad("chunks that would unpack to more than 64 MiB");
     };
     match packing {
         b"none" => judged(Ok(packed.to_vec()), size, cut),
         b"bz2" => read(bzip2::read::BzDecoder::new(packed), size, cut),
         b"lz4" => match lz4::Decoder::new(packed) {
             Ok(decoder) => read(decoder, size, cut),
-            Err(_) => Unpacked::Bad("chunks that don't unpack"),
+            Err(_) => Unpacked::Bad("chunks that can't be unpacked"),
         },
-        _ => Unpacked::Bad("chunks packed in a way that isn't known; none, bz2 and lz4 are"),
+        _ => Unpacked::Bad("chunks with an unknown compression; supported are none, bz2 and lz4"),
     }
 }
 
@@ -45,8 +45,8 @@ fn judged(unpacked: Result<Vec<u8>, Vec<u8>>, size: usize, cut: bool) -> Unpacke
     match unpacked {
         Ok(bytes) | Err(bytes) if cut && bytes.len() <= size => Unpacked::Cut(bytes),
         Ok(bytes) if bytes.len() == size => Unpacked::Whole(bytes),
-        Ok(_) => Unpacked::Bad("chunks of another length than they say"),
-        Err(_) => Unpacked::Bad("chunks that don't unpack"),
+        Ok(_) => Unpacked::Bad("chunks of another length than stated"),
+        Err(_) => Unpacked::Bad("chunks that can't be unpacked"),
     }
 }
 

@@ -122,7 +122,7 @@ pub enum LogError {
         channel: String,
     },
     /// More packets in one tick than a tick message can count.
-    #[error("a tick of {packets} packets; a message holds up to {}", u32::MAX)]
+    #[error("a tick of {packets} packets can't be written; a message holds up to {}", u32::MAX)]
     TickTooLong {
         /// Packets in the tick.
         packets: usize,

@@ -177,10 +177,10 @@ impl fmt::Display for LossKind {
     fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Truncated => out.write_str("the file ends before its closing records"),
-            Self::Framing => out.write_str("bytes that are no records"),
+            Self::Framing => out.write_str("bytes that aren't records"),
             Self::Checksum => out.write_str("a chunk that fails its checksum"),
             Self::Contents => out.write_str("a chunk that does not unpack"),
-            Self::Unreadable(error) => write!(out, "the medium doesn't give them: {error}"),
+            Self::Unreadable(error) => write!(out, "the medium can't read them: {error}"),
             Self::Compression(name) => write!(out, "a chunk compressed as {name:?}; zstd and lz4 are known"),
             Self::TooLarge { limit } => {
                 write!(out, "larger than the {limit} bytes that are read into memory")
@@ -188,18 +188,18 @@ impl fmt::Display for LossKind {
             Self::Swells { limit } => {
                 write!(
                     out,
-                    "chunks that would unpack to over {limit} times the length of the log: they aren't"
+                    "chunks that would unpack to over {limit} times the length of the log: they are skipped"
                 )
             }
             Self::Window { limit } => {
                 write!(out, "a chunk whose unpacking would take more than {limit} bytes")
             }
             Self::Beyond { what, limit } => {
-                write!(out, "more than {limit} {}: those beyond aren't read", what.as_str())
+                write!(out, "more than {limit} {}: the rest isn't read", what.as_str())
             }
             Self::Stamped { messages, first } => write!(
                 out,
-                "{messages} messages stamped {first} ns or later: the latest time that is taken is {} ns",
+                "{messages} messages stamped {first} ns or later: the latest time allowed is {} ns",
                 LATEST.0
             ),
             Self::Missing { messages } => {
@@ -212,7 +212,7 @@ impl fmt::Display for LossKind {
                 write!(out, "{messages} messages are out of order: they follow messages with higher numbers")
             }
             Self::Misplaced => out.write_str(
-                "a chunk with a record that no chunk may have, such as another chunk: that record is not read",
+                "a chunk with a record that no chunk may contain, such as another chunk: that record is not read",
             ),
             Self::Attachment(name) => write!(out, "attachment {name:?} is damaged"),
             Self::Metadata(name) => write!(out, "metadata {name:?} is damaged"),
@@ -221,10 +221,10 @@ impl fmt::Display for LossKind {
             }
             Self::Conflict { channel } => write!(out, "channel {channel} is defined twice, differently"),
             Self::Displaced => out.write_str(
-                "whole records are missing or were put in: the summary begins elsewhere than the log says",
+                "whole records are missing or were inserted: the summary isn't where the log says",
             ),
             Self::DataSection => {
-                out.write_str("some byte has changed: the checksum over the whole log does not fit")
+                out.write_str("a byte has changed: the checksum over the whole log does not match")
             }
             Self::Stated(words) => out.write_str(words),
             Self::InPart { part, kind } => write!(out, "part {part}: {kind}"),
@@ -257,7 +257,7 @@ impl LossKind {
                 write!(out, "part {part} can't be read: it begins with [{found}], which no MCAP file does")
             }
             Self::PartByName { part } => {
-                write!(out, "part {part} doesn't say which part it is; taken for that by its name")
+                write!(out, "part {part} doesn't state its number, which was taken from its name")
             }
             _ => Ok(()),
         }

@@ -20,10 +20,10 @@ use super::{DiveLog, LogError, MessageKind};
 #[non_exhaustive]
 pub enum NotKept {
     /// The medium fails, or the recorder has ended.
-    #[error("the voice isn't kept: nothing is being recorded at present")]
+    #[error("the voice note isn't recorded: nothing is being recorded at present")]
     Failing,
     /// The queue of recordings is full.
-    #[error("the voice isn't kept: others are still being written; send it again")]
+    #[error("the voice note isn't recorded: others are still being written; send it again")]
     Full,
 }
 

@@ -128,11 +128,11 @@ impl Choice {
         let take = section.choice("take", &words)?.unwrap_or_default();
         let leave = section.texts("leave")?;
         if leave.is_some() && take == Take::Only {
-            return Err(section.invalid("leave", "is of use only with take = \"called\""));
+            return Err(section.invalid("leave", "has an effect only with take = \"called\""));
         }
         let leave = leave.unwrap_or_default();
         if let Some(unknown) = leave.iter().find(|name| crate::effects::named(name).is_none()) {
-            return Err(section.invalid("leave", &format!("names {unknown:?}, which is no effect")));
+            return Err(section.invalid("leave", &format!("names {unknown:?}, which isn't an effect")));
         }
         Ok(Self { take: instead.unwrap_or(take), leave })
     }

@@ -160,7 +160,7 @@ fn impossible_descriptions_are_refused() {
         ("[cable]\ntype = \"rope\"", "fathom"),
         ("[thrusters]\nrpm = 900", "accel_mps2: is missing"),
         ("[effects]\nleave = [\"occlusion\"]", "only with take = \"called\""),
-        ("[effects]\ntake = \"called\"\nleave = [\"fog\"]", "names \"fog\", which is no effect"),
+        ("[effects]\ntake = \"called\"\nleave = [\"fog\"]", "names \"fog\", which isn't an effect"),
         ("[effects]\ntake = \"all\"", "only"),
     ] {
         assert!(refusal(text).contains(words), "{text}: {}", refusal(text));

@@ -63,17 +63,14 @@ impl EffectKind for CurrentKind {
             keys::some_not_zero(&table, &[("speed_mps", speed_mps), ("gust_sd_mps", gust_sd_mps)])?;
             if gust_sd_mps > 0.0 {
                 if stretch != Stretch::ALL || current.gust_sd_mps > 0.0 {
-                    let problem =
-                        "can be said once, in a table without from_m and to_m: gusts are of all the water";
+                    let problem = "must be in one table without from_m and to_m: gusts affect all the water";
                     return Err(table.invalid("gust_sd_mps", problem));
                 }
                 (current.gust_sd_mps, current.gust_s) = (gust_sd_mps, gust_s.unwrap_or(current.gust_s));
             }
             table.finish()?;
             if speed_mps != 0.0 && !current.flow.add(stretch, speed_mps) {
-                return Err(
-                    table.invalid("from_m", "begins a stretch that an earlier table has a current for, too")
-                );
+                return Err(table.invalid("from_m", "begins a stretch that overlaps one of an earlier table"));
             }
         }
         Ok(Box::new(current))
@@ -206,7 +203,7 @@ mod tests {
         let strong = why(LEGS, "speed_mps = -0.3");
         assert!(strong.starts_with("simulating current: it carries the vehicle off: leg 0"), "{strong}");
         let strong = why(PILOT, "speed_mps = -0.5");
-        assert!(strong.contains("current: it carries the vehicle off: it has not come to 40 m"), "{strong}");
+        assert!(strong.contains("current: it carries the vehicle off: it has not reached 40 m"), "{strong}");
         let ground = why(WAYPOINTS, "speed_mps = 0.1");
         assert!(
             ground.contains("effects.current: changes nothing: the trajectory is given over ground"),

@@ -83,7 +83,7 @@ impl EffectKind for InterferenceKind {
             let mut sensors = targets(table, facts, &[Sense::Head])?;
             sensors.dedup();
             if sensors.len() < 2 {
-                return Err(table.invalid_itself("has one head, which has no other to hear"));
+                return Err(table.invalid_itself("has one head; at least two are needed"));
             }
             let share = table.number("share", 0.0..=1.0)?.unwrap_or(0.0);
             let margin_rad = table.number("margin_deg", 0.0..=45.0)?.map(f64::to_radians);

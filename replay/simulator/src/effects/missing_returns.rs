@@ -82,7 +82,7 @@ impl EffectKind for MissingReturnsKind {
                 far: ramp(table, ["far_from_m", "far_to_m"], 200.0)?,
             };
             if parameters == (Parameters { runs: None, grazing: None, far: None }) {
-                let problem = "must be above zero, or grazing_from_deg or far_from_m be there";
+                let problem = "must be above zero, or grazing_from_deg or far_from_m must be given";
                 return Err(table.invalid("share", problem));
             }
             Ok(parameters)

@@ -70,7 +70,7 @@ impl EffectKind for OcclusionKind {
             let parameters =
                 Parameters { heads: flag("heads", true)?, hull: flag("hull", true)?, tether: tether(table)? };
             if !parameters.heads && !parameters.hull && parameters.tether.is_none() {
-                return Err(table.invalid_itself("has neither heads, hull nor tether to stand in the way"));
+                return Err(table.invalid_itself("has neither heads, hull nor tether that occlude beams"));
             }
             Ok(parameters)
         })?))
@@ -88,7 +88,7 @@ fn tether(table: &Section<'_>) -> Result<Option<Obstacle>, ConfigError> {
         let given = [from.is_some(), towards.is_some(), length.is_some(), radius.is_some()];
         let idle = keys.iter().zip(given).find(|(_, given)| *given);
         return idle
-            .map_or(Ok(None), |(key, _)| Err(table.invalid(key, "is of use only with tether = true")));
+            .map_or(Ok(None), |(key, _)| Err(table.invalid(key, "has an effect only with tether = true")));
     }
     let vector = |[x, y, z]: [f64; 3]| Vec3::<Body>::new(x, y, z);
     let from = vector(table.required("tether_from_m", from)?);

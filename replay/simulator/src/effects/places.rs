@@ -43,7 +43,7 @@ impl<P: Clone> PerSensor<Places<P>> {
                 if places.0.iter().any(|(other, _)| other.meets(&stretch)) {
                     let id = facts.sensors.get(source).map_or("", |sensor| sensor.id.as_str());
                     let problem = format!(
-                        "names {id:?}, which an earlier table of this effect is for, too, in this place"
+                        "names {id:?}, which an earlier table of this effect names for this place already"
                     );
                     return Err(table.invalid("sensors", &problem));
                 }

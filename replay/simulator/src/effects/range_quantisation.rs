@@ -51,7 +51,9 @@ impl EffectKind for RangeQuantisationKind {
             let points = table.number("points", 50.0..=10_000.0)?;
             match (quantum_m, points) {
                 (Some(quantum_m), None) => return Ok(Step::QuantumM(quantum_m)),
-                (Some(_), Some(_)) => return Err(table.invalid("points", "and quantum_m both say the step")),
+                (Some(_), Some(_)) => {
+                    return Err(table.invalid("points", "and quantum_m both set the step; give one of them"));
+                }
                 _ => {}
             }
             let heads = targets(table, facts, &senses)?;
@@ -144,7 +146,7 @@ mod tests {
             |dive: &Dive, keys: &str| dive.refusal(&format!("[effects.range_quantisation]\n{keys}"));
         assert!(refusal(&Dive::with_sounder(), "").contains("no range setting"));
         assert!(refusal(&Dive::with_sounder(), "points = 200").contains("no range setting"));
-        assert!(refusal(&Dive::with_head(), "points = 200\nquantum_m = 0.1").contains("both say the step"));
+        assert!(refusal(&Dive::with_head(), "points = 200\nquantum_m = 0.1").contains("both set the step"));
         assert!(refusal(&Dive::with_head(), "quantum_m = 0").contains("from 0.0005 to 1"));
     }
 }

@@ -31,7 +31,7 @@ impl Runs {
         let mean = table.number("mean_run", 1.0..=LONGEST_RUN)?;
         if share == 0.0 {
             return match mean {
-                Some(_) => Err(table.invalid("mean_run", "is of use only with a share above zero")),
+                Some(_) => Err(table.invalid("mean_run", "has an effect only with a share above zero")),
                 None => Ok(None),
             };
         }

@@ -33,7 +33,8 @@ impl<P: Clone> PerSensor<P> {
             for source in sensors {
                 if found.iter().any(|(other, _)| *other == source) {
                     let id = facts.sensors.get(source).map_or("", |sensor| sensor.id.as_str());
-                    let problem = format!("names {id:?}, which an earlier table of this effect is for, too");
+                    let problem =
+                        format!("names {id:?}, which an earlier table of this effect names already");
                     return Err(table.invalid("sensors", &problem));
                 }
                 found.push((source, parameters.clone()));

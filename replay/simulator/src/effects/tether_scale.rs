@@ -51,7 +51,7 @@ impl EffectKind for TetherScaleKind {
             let stiffness_n = table.number("stiffness_n", 1e3..=1e9)?;
             let drag_npm = table.number("drag_npm", 0.0..=100.0)?;
             if drag_npm.is_some() && stiffness_n.is_none() {
-                return Err(table.invalid("drag_npm", "is of use only with stiffness_n"));
+                return Err(table.invalid("drag_npm", "has an effect only with stiffness_n"));
             }
             let strain_pm = stiffness_n.map_or(0.0, |stiff_n| drag_npm.unwrap_or(0.05) / (2.0 * stiff_n));
             keys::some_not_zero(table, &[("share", share), ("stiffness_n", strain_pm)])?;

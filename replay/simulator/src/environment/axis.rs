@@ -257,7 +257,7 @@ fn parse_piece(section: &Section<'_>, half_width_m: f64) -> Result<(f64, f64), C
         return Ok((section.required("length_m", length_m)?, 0.0));
     };
     if length_m.is_some() {
-        let problem = "stands beside radius_m; an arc's length follows from its radius and turn";
+        let problem = "excludes radius_m; an arc's length follows from its radius and turn";
         return Err(section.invalid("length_m", problem));
     }
     let turn_deg = section.required("turn_deg", turn_deg)?;

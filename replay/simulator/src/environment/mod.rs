@@ -407,7 +407,7 @@ impl Environment {
 
 fn parse_as_built(section: &Section<'_>, load: Loader<'_>) -> Result<Profile, ConfigError> {
     if section.keys().contains(&"length_m") {
-        return Err(section.invalid("length_m", "isn't wanted here; the vehicle file gives the length"));
+        return Err(section.invalid("length_m", "isn't allowed here; the vehicle file gives the length"));
     }
     Ok(TunnelConfig::from_section(section, load)?.profile)
 }

@@ -112,7 +112,7 @@ impl Trajectory {
                 self.duration_s = piloted.duration_s();
             }
             Base::Advised(advised) => advised.carry(flow),
-            Base::Knots(_) => return Err("is of no effect: the trajectory is given over ground".to_owned()),
+            Base::Knots(_) => return Err("has no effect: the trajectory is given over ground".to_owned()),
         }
         Ok(())
     }

@@ -141,7 +141,7 @@ fn waypoints(section: &Section<'_>, tunnel: Tunnel<'_>) -> Result<Trajectory, Co
     }
     let (knots, duration_s) = waypoints::knots(&points);
     if points.is_empty() || duration_s <= 0.0 {
-        let problem = "go nowhere; wanted are at least two places apart, or one with stay_s";
+        let problem = "don't move; give at least two different places, or one with stay_s";
         return Err(section.invalid("waypoints", problem));
     }
     Ok(Trajectory::of_knots(knots, duration_s))

@@ -68,7 +68,7 @@ impl Pilot {
                 break;
             }
             if step > most {
-                return Err(format!("has not come to {} m after {most} half seconds", self.to_m));
+                return Err(format!("has not reached {} m after {most} half seconds", self.to_m));
             }
             doing = self.decide(doing, stick, step as u64);
             if (x_m - self.from_m) * towards <= 0.0 && matches!(doing, Doing::Back { .. }) {

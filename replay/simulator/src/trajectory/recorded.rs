@@ -49,7 +49,7 @@ pub(super) fn parse(text: &str) -> Result<Vec<Timed>, String> {
     };
     let duration_s = last_s - first_s;
     if !(duration_s > 0.0 && duration_s <= MAX_S) {
-        return Err(format!("takes {duration_s} s; allowed are up to {MAX_S} s, and more than none"));
+        return Err(format!("takes {duration_s} s; it must be above 0 and at most {MAX_S} s"));
     }
     for (at_s, _) in &mut timed {
         *at_s -= first_s;

@@ -302,7 +302,7 @@ fn current_carries_only_motion_through_water() {
     let still_s = pilot.duration_s();
     pilot.carry(&everywhere(0.2)).unwrap();
     assert!(pilot.duration_s() < still_s && (pilot.place(pilot.duration_s()).chainage_m - 60.0).abs() < 0.4);
-    assert!(pilot.carry(&everywhere(-0.6)).unwrap_err().contains("has not come to 60 m"));
+    assert!(pilot.carry(&everywhere(-0.6)).unwrap_err().contains("has not reached 60 m"));
 
     let mut ground =
         Trajectory::of_knots(Knots::new(10.0, 1.0, |k| [k as f64, 0.0, 4.0, 0.0, 0.0, 0.0]), 10.0);
