@@ -69,7 +69,7 @@ mod tests {
     use headrace_geometry::tunnel::shapes;
 
     #[test]
-    fn hours_are_where_the_profile_says() {
+    fn hours_match_the_profile() {
         for profile in
             [shapes::ceran().unwrap(), shapes::rectangle(3.0, 4.0).unwrap(), shapes::circle(0.5).unwrap()]
         {

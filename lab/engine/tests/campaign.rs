@@ -246,7 +246,7 @@ fn broken_cache_entries_are_found_and_remade() {
 }
 
 #[test]
-fn a_changed_log_is_another_dive() {
+fn changed_log_is_a_new_dive() {
     let (folder, cache) = (dives(), tempfile::tempdir().unwrap());
     run(folder.path(), cache.path(), &[]);
     std::fs::copy(golden("echoes.mcap"), folder.path().join("ceran/murk.mcap")).unwrap();

@@ -43,7 +43,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn signs_are_dropped_and_numbers_kept() {
+    fn signs_and_non_finite_lengths_are_ignored() {
         let spread = Spread::of([1.0, -3.0, f64::NAN, f64::INFINITY]);
         assert_eq!(spread, Spread { count: 2, mean_m: 2.0, sd_m: 1.0, min_m: 1.0, max_m: 3.0 });
         assert_eq!(Spread::of([]), Spread::default());

@@ -215,7 +215,7 @@ fn losses_and_unreadable_logs_are_rows() {
 
 /// The page must have the tables as in the code. `RENEW=1 cargo test -p headrace_tables` rewrites them.
 #[test]
-fn the_page_has_every_column() {
+fn page_has_every_column() {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs/how-to/replay-many-dives.md");
     let page = std::fs::read_to_string(&path).unwrap();
     let (before, rest) = page.split_once("<!-- tables -->\n").unwrap();

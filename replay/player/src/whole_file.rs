@@ -292,7 +292,7 @@ mod tests {
 
     #[cfg(unix)]
     #[test]
-    fn links_and_permissions_stay_and_devices_are_written_to() {
+    fn links_and_permissions_are_kept_and_devices_written_in_place() {
         use std::os::unix::fs::{PermissionsExt as _, symlink};
         let folder = folder("links");
         let (path, link) = (folder.join("real.json"), folder.join("link.json"));

@@ -41,7 +41,7 @@ fn digits_come_from_rounding_or_truncation() {
 }
 
 #[test]
-fn val_table_1_matches_to_the_digit() {
+fn table_1_matches_to_the_digit() {
     let table = tables().table_1;
     let expected = [[8.0, 4.67], [4.0, 2.33], [2.67, 1.55], [2.0, 1.16], [1.0, 0.0]];
     let printed =
@@ -57,7 +57,7 @@ fn val_table_1_matches_to_the_digit() {
 }
 
 #[test]
-fn val_table_2_matches_to_the_digit() {
+fn table_2_matches_to_the_digit() {
     let table = tables().table_2;
     assert_eq!(table.rows.len(), 5);
     let cells = || table.rows.iter().flat_map(|row| [&row.samples_per_turn, &row.ping_rate_hz]);
@@ -66,7 +66,7 @@ fn val_table_2_matches_to_the_digit() {
 }
 
 #[test]
-fn val_baseline_t_x_match_except_fast() {
+fn baseline_t_x_match_except_fast() {
     let tables = tables();
     let one = tables.table_3.rows.iter().map(|row| (row.mode.to_owned(), &row.t_x_m));
     assert_eq!(apart(one), ["FAST"]);
@@ -85,7 +85,7 @@ fn val_baseline_t_x_match_except_fast() {
 }
 
 #[test]
-fn val_means_give_a_consistent_perimeter() {
+fn means_give_a_consistent_perimeter() {
     let tables = tables();
     let one = tables.table_3.rows.iter().map(|row| (row.mode.to_owned(), &row.t_y_mean_m));
     assert_eq!(apart(one), ["SLOW", "FAST", "FASTER", "FASTEST"]);
@@ -106,7 +106,7 @@ fn val_means_give_a_consistent_perimeter() {
 
 /// The head positions in the notes give each printed extreme by Eq. 5 and 6, except errata.
 #[test]
-fn val_fitting_places_give_the_printed_extremes() {
+fn fitting_places_give_the_printed_extremes() {
     let mut misses = Vec::new();
     for line in lines(3).into_iter().chain(lines(4)) {
         let (mode, heads) = (line.text("mode").unwrap(), line.heads().unwrap());
@@ -138,7 +138,7 @@ fn val_fitting_places_give_the_printed_extremes() {
 
 /// The worst chord by ray casting equals Eq. 6 with its last step in the farther corner, whose distance yaw increases.
 #[test]
-fn verif_the_largest_step_is_at_the_corner() {
+fn largest_step_is_at_the_corner() {
     let table = tables().table_3;
     // The blueprint's mid-height minus 1.65 m; half its base plus 1.5 m, seen at 15 degrees yaw.
     let aside_m = 6.449_655 / math::cos(15_f64.to_radians());
@@ -150,7 +150,7 @@ fn verif_the_largest_step_is_at_the_corner() {
 }
 
 #[test]
-fn val_table_5_follows_from_the_experiments_of_table_4() {
+fn table_5_follows_from_the_experiments_of_table_4() {
     let table = tables().table_5;
     let layouts = table.rows.iter().flat_map(|row| [row.phase_shift, row.sector_offset]);
     let cells: Vec<Cell> =

@@ -125,7 +125,7 @@ mod tests {
     }
 
     #[test]
-    fn spurs_go_and_rings_stay() {
+    fn spurs_are_removed_and_rings_remain() {
         let mut image = drawn(&[
             "...........",
             ".#.........",

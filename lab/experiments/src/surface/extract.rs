@@ -165,7 +165,7 @@ mod tests {
     }
 
     #[test]
-    fn a_surface_through_corners_is_whole() {
+    fn surface_through_grid_corners_is_meshed() {
         let plane = mesh(&GRID, |p| ((p[0] + 1.5) / 0.2).round() - 5.0);
         assert!(plane.triangles.len() >= 15 * 15 * 2);
         let none = mesh(&GRID, |_| 1.0);

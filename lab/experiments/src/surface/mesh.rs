@@ -219,7 +219,7 @@ mod tests {
     }
 
     #[test]
-    fn verif_nearest_of_by_a_dense_search() {
+    fn nearest_point_matches_a_dense_search() {
         let corners = [[0.0, 0.0, 0.0], [2.0, 0.1, 0.3], [0.4, 1.5, -0.2]];
         for k in 0..200 {
             let t = f64::from(k);

@@ -35,7 +35,7 @@ const ALPHAS: [f64; 4] = [0.10, 0.05, 0.02, 0.01];
 const NONE: usize = 99;
 
 #[test]
-fn val_critical_values_match_published_ones() {
+fn critical_values_match_published_ones() {
     for (n, row) in CRITICAL {
         for (critical, alpha) in row.into_iter().zip(ALPHAS) {
             let p = |w: usize| exact(n, w as f64)[0];
@@ -49,7 +49,7 @@ fn val_critical_values_match_published_ones() {
 }
 
 #[test]
-fn val_ten_pairs_with_a_rank_sum_of_eight() {
+fn ten_pairs_with_a_rank_sum_of_eight_match_the_table() {
     // 1 to 10 with the ranks 3 and 5 positive.
     let differences: Vec<f64> =
         (1..=10).map(|k| if k == 3 || k == 5 { f64::from(k) } else { -f64::from(k) }).collect();
@@ -67,7 +67,7 @@ fn all_choices(ranks: &[f64]) -> Vec<f64> {
 }
 
 #[test]
-fn verif_exact_p_matches_all_sign_choices() {
+fn exact_p_matches_all_sign_choices() {
     for n in 1..=12 {
         let ranks: Vec<f64> = (1..=n).map(f64::from).collect();
         let choices = all_choices(&ranks);
@@ -86,7 +86,7 @@ fn verif_exact_p_matches_all_sign_choices() {
 }
 
 #[test]
-fn verif_mean_and_variance_with_ties_and_zeros_match_all_sign_choices() {
+fn mean_and_variance_with_ties_and_zeros_match_all_sign_choices() {
     let values = [0.0, 0.0, 1.0, -1.0, 2.0, 2.0, -2.0, 3.0, 5.0, -5.0, 8.0];
     for (zeros, ranks) in [
         (Zeros::Wilcoxon, vec![1.5, 1.5, 4.0, 4.0, 4.0, 6.0, 7.5, 7.5, 9.0]),
@@ -106,7 +106,7 @@ fn verif_mean_and_variance_with_ties_and_zeros_match_all_sign_choices() {
 }
 
 #[test]
-fn verif_tie_correction_matches_the_textbook() {
+fn tie_correction_matches_the_textbook() {
     // n (n + 1) (2 n + 1) / 24 minus the sum of (t^3 - t) / 48.
     let values = [1.0, 1.0, 1.0, -2.0, 2.0, 4.0, -5.0, 5.0, 5.0, 5.0];
     let test = of_differences(&values, Options::default()).unwrap();
@@ -116,7 +116,7 @@ fn verif_tie_correction_matches_the_textbook() {
 }
 
 #[test]
-fn the_normal_distribution_takes_over_smoothly() {
+fn normal_approximation_starts_at_51_pairs_close_to_exact() {
     let differences = |n: i32| -> Vec<f64> {
         (1..=n).map(|k| if k % 3 == 0 { -f64::from(k) } else { f64::from(k) }).collect()
     };
@@ -132,7 +132,7 @@ fn the_normal_distribution_takes_over_smoothly() {
 }
 
 #[test]
-fn a_whole_of_2_to_the_50_is_counted_exactly() {
+fn sign_choices_of_50_pairs_are_counted_exactly() {
     let counts = sign_choices(50);
     assert_eq!(
         counts.iter().sum::<f64>().to_bits(),

@@ -156,7 +156,7 @@ mod tests {
     }
 
     #[test]
-    fn another_time_base_is_named_and_moved() {
+    fn another_time_base_is_named_and_shifted() {
         let pairs = [(50_000 * S, 10 * S), (50_001 * S, 10 * S + 900_000_000)];
         let (times, said) = words(Base::Record, &pairs);
         assert_eq!(times, [50_000 * S, 50_001 * S]);

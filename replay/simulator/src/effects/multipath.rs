@@ -131,7 +131,7 @@ mod tests {
 
     /// Unfolded at the walls that it meets, a reflected beam is a straight line through mirrored rooms.
     #[test]
-    fn verif_path_in_a_rectangle_leads_to_a_mirror_image() {
+    fn path_in_a_rectangle_leads_to_a_mirror_image() {
         let (half_width_m, height_m, [y, z]) = (3.0, 5.0, [0.7, 2.1]);
         let room = Environment::straight(shapes::rectangle(2.0 * half_width_m, height_m).unwrap());
         for k in 0..720 {
@@ -159,7 +159,7 @@ mod tests {
     }
 
     #[test]
-    fn verif_second_path_in_a_circle_is_a_chord_with_equal_incidence() {
+    fn second_path_in_a_circle_is_a_chord_with_equal_incidence() {
         let (radius_m, out_m) = (4.0, 1.5);
         let pipe = Environment::straight(shapes::circle(radius_m).unwrap());
         // The circle rests on the floor: its centre is a radius above it.

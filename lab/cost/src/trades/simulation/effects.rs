@@ -123,7 +123,7 @@ mod tests {
     }
 
     #[test]
-    fn rays_are_set_in_every_form_that_is_used() {
+    fn ray_count_is_set_in_every_form() {
         for (beam, with) in [
             ("beam_cone = {}", "beam_cone = { rays = 4 }"),
             ("beam_cone = { sensors = [\"a\"] }", "beam_cone = { rays = 4, sensors = [\"a\"] }"),

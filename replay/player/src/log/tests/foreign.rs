@@ -133,7 +133,7 @@ fn cut_logs_deliver_earlier_messages_and_report_the_cut() {
 }
 
 #[test]
-fn a_copy_of_our_log_with_other_channel_numbers_is_read() {
+fn renumbered_copy_of_an_own_log_is_read() {
     let mut log = LogWriter::new(Vec::new(), &header(true)).unwrap();
     for at in 0..30_u16 {
         let (source, at) = (at % 3, MonoNs(at.into()));
@@ -191,7 +191,7 @@ fn wrong_message_length_loses_at_most_two_messages() {
 }
 
 #[test]
-fn regress_loss_up_to_the_closing_bytes_is_noticed() {
+fn loss_up_to_the_closing_bytes_is_noticed() {
     let chunked = WriteOptions::new().chunk_size(Some(200)).compression(None);
     for (options, opcode) in [(chunked, op::CHUNK), (WriteOptions::new().use_chunks(false), op::MESSAGE)] {
         let whole = write(options);
@@ -204,7 +204,7 @@ fn regress_loss_up_to_the_closing_bytes_is_noticed() {
 }
 
 #[test]
-fn regress_message_that_looks_like_a_footer_is_noticed() {
+fn message_that_looks_like_a_footer_is_noticed() {
     let mut log = write(WriteOptions::new().use_chunks(false));
     let message = places(&log, op::MESSAGE)[7];
     log[message] = op::FOOTER;
@@ -214,7 +214,7 @@ fn regress_message_that_looks_like_a_footer_is_noticed() {
 }
 
 #[test]
-fn regress_missing_whole_records_are_noticed() {
+fn missing_whole_records_are_noticed() {
     let options = || WriteOptions::new().chunk_size(Some(200)).compression(None);
     let whole = write(options());
     let chunks = places(&whole, op::CHUNK);

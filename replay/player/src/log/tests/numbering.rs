@@ -227,7 +227,7 @@ fn messages_of_a_damaged_chunk_are_not_reported_twice() {
 }
 
 #[test]
-fn losses_after_a_return_to_a_place_are_those_of_a_log_read_through() {
+fn losses_after_going_back_equal_those_of_a_straight_read() {
     each(|what, records| {
         let mut records = without_summary(records);
         let places = chunks(&records);

@@ -156,7 +156,7 @@ fn missing_or_exchanged_part_is_named() {
 }
 
 #[test]
-fn parts_of_two_recordings_and_one_twice_are_refused() {
+fn mixed_recordings_and_duplicate_parts_are_refused() {
     let (one, other) = (Folder::new("one"), Folder::new("other"));
     let every = Every::Span(DurNs::from_millis(10_000));
     record(&one.0.join("dive.mcap"), Some(&rotation(every)));

@@ -381,7 +381,7 @@ fn packets_dropped_by_lines_are_stated_by_source_every_few_seconds() {
 
 /// No count is lost while the recorder takes none, although the source of some packets is then unknown.
 #[test]
-fn drops_for_which_there_is_no_room_are_counted() {
+fn drops_without_room_are_counted() {
     let (medium, flushed) = slow(0);
     let (mut port, handle) = Recorder::start(medium, &header(true), 0).unwrap();
     port.tick(1, MonoNs(1), &[]).unwrap();

@@ -36,7 +36,7 @@ fn unnumbered(seen: Vec<Seen>) -> Vec<Seen> {
 }
 
 #[test]
-fn a_whole_log_is_recovered_whole() {
+fn intact_log_is_recovered_completely() {
     for ticks in [true, false] {
         let bytes = log(ticks);
         let (output, done) = recovered(&bytes);

@@ -50,7 +50,7 @@ fn a_log_with_ticks_is_read_as_it_was_written() {
 }
 
 #[test]
-fn the_header_comes_back() {
+fn written_header_is_read_back() {
     let written = header(true);
     let (bytes, _) = LogWriter::new(Vec::new(), &written).unwrap().finish().unwrap();
     let reader = open(&bytes);
@@ -111,7 +111,7 @@ fn messages_for_undeclared_channels_are_refused() {
 }
 
 #[test]
-fn a_file_is_opened_by_its_path_and_digested() {
+fn file_is_opened_by_path_and_digested() {
     let path = std::env::temp_dir().join(format!("headrace-round-trip-{}.mcap", std::process::id()));
     let mut log = LogWriter::create(&path, &header(true)).unwrap();
     write(&mut log, 10);

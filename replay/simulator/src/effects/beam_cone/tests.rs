@@ -15,7 +15,7 @@ fn wide_tunnel() -> Environment {
 }
 
 #[test]
-fn verif_beam_rays_span_the_footprint_of_fig_15() {
+fn beam_rays_span_the_footprint_of_fig_15() {
     let tunnel = wide_tunnel();
     for (angle_deg, width_deg) in [(0.0, 2.4), (30.0, 2.4), (60.0, 1.4), (60.0, 20.0)] {
         let (angle_rad, width_rad) = (f64::to_radians(angle_deg), f64::to_radians(width_deg));

@@ -10,7 +10,7 @@ fn feature(kind: &str, keys: &str) -> String {
 }
 
 #[test]
-fn a_boulder_is_an_ellipsoid_that_is_sunk_into_the_floor() {
+fn boulder_is_an_ellipsoid_sunk_into_the_floor() {
     let text = feature("boulder", "chainage_m = 10\nsize_m = [2, 1, 0.8]\nsunk = 0.25");
     let environment = parse(&text, &CERAN.profile());
     let hit = cast(&environment, [10.0, 0.0, 5.0], [0.0, 0.0, -1.0]).unwrap();
