@@ -19,7 +19,7 @@ use headrace_pictures::polyline::Frame;
 
 use crate::error::Error;
 
-/// Most rows that are drawn; the number of further rows is stated below.
+/// Maximum number of rows that are drawn; the number of further rows is stated below.
 const MOST_ROWS: usize = 60;
 /// Widest label, pixels.
 const LABEL_PX: f64 = 260.0;

@@ -9,7 +9,7 @@
 
 use headrace_geometry::math;
 
-/// Most pairs for which the exact distribution is used.
+/// Maximum number of pairs for which the exact distribution is used.
 pub(crate) const EXACT_MAX: usize = 50;
 
 /// Treatment of zero differences.

@@ -18,7 +18,7 @@ const CELL_M: f64 = 0.25;
 ///
 /// With the surroundings within the search radius it is short enough that the store packs no sample.
 const STRETCH_M: f64 = 32.0;
-/// Most sections per call.
+/// Maximum number of sections per call.
 const MAX_SECTIONS: f64 = 4e6;
 
 /// The largest hole of each section, for points on the unrolled wall.

@@ -10,7 +10,7 @@ use pyo3::{Py, PyRef, Python, pyclass, pymethods};
 
 use crate::errors::Failure;
 
-/// Most messages that are read ahead without the interpreter's lock, and most of their bytes.
+/// Maximum number of messages that are read ahead without the interpreter's lock, and of their bytes.
 const AHEAD: usize = 512;
 const AHEAD_BYTES: usize = 1 << 20;
 

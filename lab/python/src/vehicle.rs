@@ -11,7 +11,7 @@ use headrace_vehicle::VehicleConfig;
 
 use crate::errors::Failure;
 
-/// Most bytes of a text file and of a data file that are read.
+/// Maximum number of bytes of a text file and of a data file that are read.
 const TEXT_BYTES: u64 = 16 << 20;
 const DATA_BYTES: u64 = 256 << 20;
 

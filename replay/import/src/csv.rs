@@ -13,7 +13,7 @@ use headrace_vehicle::VehicleConfig;
 use crate::emulated::{BEYOND, EmulatedSensor, Value};
 use crate::{Clock, Entry, Format, Step};
 
-/// Most values per sensor.
+/// Maximum number of values per sensor.
 const SLOTS: usize = 9;
 const LONGEST_LINE: usize = 1 << 16;
 

@@ -3,7 +3,7 @@
 use crate::entry::{Clock, Entry, Step, Told};
 use crate::order::WINDOW_NS;
 
-/// Most bytes of the file held in memory, more than the longest entry of any format.
+/// Maximum number of bytes of the file held in memory, more than the longest entry of any format.
 const MOST_HELD: usize = 1 << 20;
 
 /// Splits a kind of file into entries without I/O: it gets the front of the remaining file.

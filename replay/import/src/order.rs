@@ -6,10 +6,10 @@ use crate::Entry;
 
 /// Entries within this time of the latest one are held back, since older ones may follow.
 pub(super) const WINDOW_NS: u64 = 2_000_000_000;
-/// Most entries held, however close together they are.
+/// Maximum number of entries held, however close together they are.
 const MOST_ENTRIES: usize = 1 << 15;
 const MOST_BYTES: usize = 1 << 24;
-/// Most entries held for formats with longer delays.
+/// Maximum number of entries held for formats with longer delays.
 const MOST_REACHING: usize = 1 << 18;
 
 /// Returns entries in order of their timestamps, those with equal ones in order of arrival.

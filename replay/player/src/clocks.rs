@@ -11,7 +11,7 @@ use crate::log::{DiveLog, LogError, MessageKind};
 
 /// Smallest offset between two clocks: no dive lasts this long.
 const YEAR_NS: u64 = 365 * 24 * 3600 * 1_000_000_000;
-/// Most clocks that are distinguished; messages of further clocks are assigned to none.
+/// Maximum number of clocks that are distinguished; messages of further clocks are assigned to none.
 const MAX_CLOCKS: usize = 100;
 
 /// A clock, described by the range of its timestamps. It is more than a year from every other clock's range.

@@ -22,7 +22,7 @@ const LARGEST_TICK_BYTES: usize = MAX_TICK_BYTES + MAX_TICK_PACKETS * 64 + 4096;
 /// In a dive on ports, a tick may take the free room divided by this. Short packets take several times their length in
 /// the queue, together with their results.
 const SMALLER_TICK: usize = 8;
-/// Least room that a tick in a dive on ports may take: the longest packet of a port is some KiB.
+/// Minimum room that a tick in a dive on ports may take: the longest packet of a port is some KiB.
 const MIN_TICK_BYTES: usize = 8 * 1024;
 
 /// Buffer for one stream's results of a tick, bytes; results beyond it are recorded in part.

@@ -16,12 +16,12 @@ use headrace_sampling::advice::Advice;
 
 use crate::drive::{DriveError, Driver, Pace, PacketSource, drive, pause};
 
-/// Most threads on which a loop can be driven: placing, advising, and the rest.
+/// Maximum number of threads on which a loop can be driven: placing, advising, and the rest.
 pub const MOST_THREADS: usize = 3;
 
 /// Ticks per batch: a queue operation is then needed only once for some milliseconds of work.
 const BATCH_TICKS: usize = 32;
-/// Most batches waiting between two threads.
+/// Maximum number of batches waiting between two threads.
 const MOST_WAITING: usize = 4;
 /// Room for all batches that can come back: those in two queues and those being processed.
 const MOST_UNUSED: usize = 2 * MOST_WAITING + MOST_THREADS;

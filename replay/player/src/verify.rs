@@ -10,7 +10,7 @@ use crate::log::format::RESULT_PREFIX;
 use crate::log::{DiveLog, LogError, MessageKind};
 use crate::results::{STREAMS, read_results, stream_of};
 
-/// Most memory of one stream's results that wait for the replay, bytes. In an intact log they are one tick ahead.
+/// Maximum memory of one stream's results that wait for the replay, bytes. In an intact log they are one tick ahead.
 const MOST_WAITING: usize = 16 << 20;
 
 /// Streams that older logs don't have.

@@ -7,7 +7,7 @@ use headrace_sensor::measurement::{GroundVelocity, Inertia, Measurement, Payout,
 
 use crate::sensing::{Line, Samples, Source};
 
-/// Most figures of a measurement.
+/// Maximum number of figures of a measurement.
 const FIGURES: usize = 10;
 
 /// The figures of a measurement, by name.

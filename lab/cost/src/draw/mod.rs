@@ -18,7 +18,7 @@ const PANEL_PX: f64 = 470.0;
 /// Height of title and legend, pixels.
 const TOP_PX: f64 = 96.0;
 const LINE_PX: f64 = 17.0;
-/// Most lines for settings that are left out.
+/// Maximum number of lines for settings that are left out.
 const MOST_LEFT_OUT: usize = 6;
 
 /// Draws a trade as SVG.

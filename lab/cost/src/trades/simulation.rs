@@ -29,7 +29,7 @@ const DECIDES_M: f64 = 0.05;
 const RESOLUTION_M: f64 = 1e-4;
 /// Fewest seeds: differences need a spread.
 const LEAST_SEEDS: u32 = 2;
-/// Most seconds of a dive that are timed; a slice of the simulation is a second.
+/// Maximum number of seconds of a dive that are timed; a slice of the simulation is a second.
 const TIMED_S: u32 = 8;
 /// Number of seeds for rays, since [`MANY_RAYS`] take long.
 const RAYS_SEEDS: u32 = 2;

@@ -20,7 +20,7 @@ const APART_PX: f64 = 20.0;
 /// Height of the panels of samples and of surfaces, pixels.
 const SAMPLES_PX: [f64; 2] = [136.0, 446.0];
 const SURFACES_PX: [f64; 2] = [514.0, 790.0];
-/// Most dots in a panel.
+/// Maximum number of dots in a panel.
 const MOST_DOTS: usize = 3000;
 /// Strips with widely spaced passes or none.
 const WIDE: Colour = Colour(255, 244, 200);

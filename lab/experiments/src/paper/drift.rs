@@ -71,7 +71,7 @@ pub(super) fn across(rig: Rig, modes: &[Mode]) -> Result<Vec<Across>, PaperError
     modes.iter().zip(largest_m).map(of_mode).collect()
 }
 
-/// Least distance of the rig's heads from the floor, m.
+/// Minimum distance of the rig's heads from the floor, m.
 pub(super) fn floor_m(profile: &Profile, rig: Rig) -> Result<f64, PaperError> {
     let lowest_m = rig.offsets_m().iter().map(|[_, up_m]| *up_m).fold(0.0, f64::min);
     Ok(height_m(profile)? / 2.0 - DRIFT_M + lowest_m)

@@ -12,7 +12,7 @@ const TETRAHEDRA: [[usize; 4]; 6] =
 /// Number of edges that begin at a node: to each other corner of the cell whose least corner it is.
 const EDGES: usize = 7;
 const NONE: u32 = u32::MAX;
-/// Most steps of the search along an edge; each at least halves the interval.
+/// Maximum number of steps of the search along an edge; each at least halves the interval.
 const STEPS: usize = 24;
 /// Tolerance of an edge crossing, as a share of the edge.
 const CLOSE_ENOUGH: f64 = 1e-6;

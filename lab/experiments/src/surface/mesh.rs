@@ -25,7 +25,7 @@ pub(crate) struct MeshIndex<'a> {
     members: Vec<u32>,
 }
 
-/// Most bins of an index.
+/// Maximum number of bins of an index.
 const BINS_MAX: f64 = 4e6;
 
 impl MeshIndex<'_> {

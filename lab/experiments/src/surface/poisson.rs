@@ -17,7 +17,7 @@ use super::mesh::Mesh;
 use super::solver::{Screened, Solved, divergence};
 use super::{Sample, Xyz, extract};
 
-/// Most functions of a grid, which take about 1.5 GB.
+/// Maximum number of functions of a grid, which take about 1.5 GB.
 const NODES_MAX: usize = 16_000_000;
 /// Cells of the density grid are larger by this factor (2 levels, as in Kazhdan's program).
 const DENSITY_CELLS: usize = 4;
@@ -44,7 +44,7 @@ pub(crate) struct Settings {
     pub margin_cells: usize,
     /// Relative residual at which the solver stops.
     pub tolerance: f64,
-    /// Most steps of the solver.
+    /// Maximum number of steps of the solver.
     pub steps_max: usize,
 }
 

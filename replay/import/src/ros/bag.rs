@@ -14,7 +14,7 @@ use crate::{Clock, Entry, Format, ImportError, Input, Source as _, Step, Told};
 const MAGIC: &[u8] = b"#ROSBAG V2.0\n";
 /// Upper bound on the length of a header, bytes.
 const MOST_HEADER: usize = 1 << 16;
-/// Most bytes of the definitions at the end of a bag, which are read at once.
+/// Maximum number of bytes of the definitions at the end of a bag, which are read at once.
 const MOST_INDEX: u64 = 64 << 20;
 /// Times below this, in 2001, are not UTC.
 pub(super) const FIRST_UTC_NS: u64 = 1_000_000_000_000_000_000;

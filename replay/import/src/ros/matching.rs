@@ -43,7 +43,7 @@ pub enum MatchError {
 
 const SENSES: [Sense; 5] = [Sense::Head, Sense::Echosounder, Sense::Depth, Sense::Inertial, Sense::Velocity];
 
-/// Most topics listed in an error; a recording may have hundreds.
+/// Maximum number of topics listed in an error; a recording may have hundreds.
 const MOST_SHOWN: usize = 20;
 
 impl Feeds {

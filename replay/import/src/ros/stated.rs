@@ -11,7 +11,7 @@ const FOOTER_BYTES: u64 = 20;
 const HEAD_BYTES: u64 = 9;
 /// Length of the footer's record and the closing magic, bytes.
 const END_BYTES: u64 = HEAD_BYTES + FOOTER_BYTES + 8;
-/// Most records of a summary that are skipped; a recording of a day has some thousands of chunks.
+/// Maximum number of records of a summary that are skipped; a recording of a day has some thousands of chunks.
 const MOST_RECORDS: usize = 100_000;
 
 /// Number of messages in a file of `bytes` bytes; `None` without a summary, or without statistics in it.

@@ -12,7 +12,7 @@ pub enum Encoding {
     Cdr,
 }
 
-/// Most padding bytes after a message's last field.
+/// Maximum number of padding bytes after a message's last field.
 const MOST_PADDING: usize = 7;
 
 /// The rest of a message.

@@ -8,7 +8,7 @@ use super::format::{RAW_PREFIX, SENT_PREFIX, TICK_TOPIC, Tick, VOICE_TOPIC};
 use super::part::Progress;
 use super::writer::{Lane, LogHeader};
 
-/// Most bytes kept, enough for minutes of four heads.
+/// Maximum number of bytes kept, enough for minutes of four heads.
 const MAX_BYTES: usize = 16 << 20;
 
 /// A message without its bytes.

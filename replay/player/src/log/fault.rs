@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use headrace_geometry::time::{DurNs, MonoNs};
 
-/// Most faults that are listed; later ones extend the last entry.
+/// Maximum number of faults that are listed; later ones extend the last entry.
 const MAX_FAULTS: usize = 100;
 
 /// A part of a recording that could no longer be written.

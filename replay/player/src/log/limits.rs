@@ -10,7 +10,7 @@ use headrace_geometry::time::MonoNs;
 /// Latest timestamp, in 2262 if timestamps count from 1970. The sum of a time and a duration then still fits into 64
 /// bits.
 pub(super) const LATEST: MonoNs = MonoNs(i64::MAX as u64);
-/// Most bytes of a record outside chunks, and of all records of a chunk with [`RECORD_COST`] added to each.
+/// Maximum number of bytes of a record outside chunks, and of all records of a chunk with [`RECORD_COST`] added to each.
 pub(super) const MAX_UNPACKED_BYTES: u64 = 32 << 20;
 /// Memory of a message in addition to its bytes.
 pub(super) const RECORD_COST: u64 = 64;
@@ -22,24 +22,24 @@ pub(super) const MAX_UNPACKED_RATIO: u64 = 512;
 const UNPACKED_ANYWAY: u64 = 64 << 20;
 /// Largest window of a chunk packed by zstd, as a power of two: 16 MiB, more than levels up to 19 use.
 pub(super) const MAX_WINDOW_LOG: u32 = 24;
-/// Most bytes of overlapping pieces held in memory for merging; may be exceeded by one piece.
+/// Maximum number of bytes of overlapping pieces held in memory for merging; may be exceeded by one piece.
 pub(super) const MAX_HELD_BYTES: usize = 32 << 20;
-/// Most pieces: chunks, and runs of messages outside chunks. Enough for three days of half-second chunks.
+/// Maximum number of pieces: chunks, and runs of messages outside chunks. Enough for three days of half-second chunks.
 pub(super) const MAX_PIECES: usize = 1 << 19;
-/// Most channels.
+/// Maximum number of channels.
 pub(super) const MAX_CHANNELS: usize = 4096;
-/// Most sources: names after `/raw/` and `/sent/`.
+/// Maximum number of sources: names after `/raw/` and `/sent/`.
 pub(super) const MAX_SOURCES: usize = 1024;
-/// Most bytes of all definitions and metadata, with [`ENTRY_COST`] added for each entry of a map.
+/// Maximum number of bytes of all definitions and metadata, with [`ENTRY_COST`] added for each entry of a map.
 pub(super) const MAX_HEADER_BYTES: u64 = 8 << 20;
 /// Memory of an entry of a map in addition to its bytes.
 const ENTRY_COST: u64 = 128;
-/// Most bytes of all attachments together.
+/// Maximum number of bytes of all attachments together.
 pub(super) const MAX_ATTACHMENT_BYTES: u64 = 16 << 20;
 /// Longest text that a loss quotes of a log, bytes.
 const MAX_QUOTED_BYTES: usize = 100;
 
-/// Most bytes that the chunks in the first `packed` bytes of a log may unpack to.
+/// Maximum number of bytes that the chunks in the first `packed` bytes of a log may unpack to.
 pub(super) fn unpacked_limit(packed: u64) -> u64 {
     packed.saturating_mul(MAX_UNPACKED_RATIO).saturating_add(UNPACKED_ANYWAY)
 }

@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 
 use super::limits::LATEST;
 
-/// Most losses that are listed; later ones extend the last entry.
+/// Maximum number of losses that are listed; later ones extend the last entry.
 const MAX_LOSSES: usize = 1000;
 
 /// Kind of damage.

@@ -5,7 +5,7 @@ use std::ops::Range;
 
 /// Smallest unit treated as unreadable: a sector of a disk.
 const SECTOR_BYTES: u64 = 512;
-/// Most unreadable ranges kept apart; further ones are joined, including the bytes between them.
+/// Maximum number of unreadable ranges kept apart; further ones are joined, including the bytes between them.
 const MOST_RANGES: usize = 1024;
 
 /// Returns zeros for unreadable bytes and records their ranges; content elsewhere may be intact.

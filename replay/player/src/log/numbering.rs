@@ -15,7 +15,7 @@ use super::part::{PART_END, Part};
 use super::scan::{Scan, Span};
 use super::{Loss, LossKind};
 
-/// Most runs kept per channel. An intact log has one run, and a few while pieces are read out of order.
+/// Maximum number of runs kept per channel. An intact log has one run, and a few while pieces are read out of order.
 const MAX_RUNS: usize = 64;
 
 /// Consecutive message numbers of a channel: pieces and numbers of the first and last.

@@ -27,7 +27,7 @@ const FIRST_WAIT: Duration = Duration::from_millis(250);
 const LONGEST_WAIT: Duration = Duration::from_secs(8);
 /// Attempts to write the rest after the dive has ended.
 const LAST_ATTEMPTS: u32 = 3;
-/// Most statements kept for a part that can't be begun yet.
+/// Maximum number of statements kept for a part that can't be begun yet.
 const MAX_STATEMENTS: usize = 100;
 /// Number of names tried for a part if files with these names exist.
 const NAMES: u32 = 1000;

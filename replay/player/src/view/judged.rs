@@ -11,7 +11,8 @@ use super::site::Site;
 
 /// Interval at which the list of missed stretches is shown, if changed.
 const EVERY: DurNs = DurNs(2_000_000_000);
-/// Most stretches listed; the last ones along the tunnel are kept. A dive that misses everything still has a small log.
+/// Maximum number of stretches listed. The last ones along the tunnel are kept. A dive that misses everything still has a
+/// small log.
 const MOST_STRETCHES: usize = 40;
 
 /// A judgement of a section, as published.

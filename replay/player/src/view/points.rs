@@ -7,7 +7,7 @@ use super::site::TUNNEL;
 
 /// Time span of a cloud.
 const SPAN: DurNs = DurNs(500_000_000);
-/// Most points of a cloud.
+/// Maximum number of points of a cloud.
 const MOST_POINTS: usize = 4096;
 /// Bytes per point: three floats.
 ///

@@ -9,7 +9,7 @@ use headrace_geometry::frames::{Point3, Tunnel};
 use headrace_geometry::math::{self, PI};
 use headrace_geometry::tunnel::Yz;
 
-/// Least radius of a bend, in half-widths of the tunnel.
+/// Minimum radius of a bend, in half-widths of the tunnel.
 pub(super) const LEAST_RADIUS_HALF_WIDTHS: f64 = 2.0;
 /// Largest difference between two headings.
 const LARGEST_TURN_RAD: f64 = PI * (1.0 + 1e-12);

@@ -169,7 +169,7 @@ fn add(
     Ok(())
 }
 
-/// Least distance from the reference point to the wall of a patch, m.
+/// Minimum distance from the reference point to the wall of a patch, m.
 fn nearest_wall_m(bulge: &Bulge, site: &Site<'_>) -> f64 {
     let [ry, rz] = site.profile.reference();
     let distance_m = |k: u32| {

@@ -15,7 +15,7 @@ pub(super) struct Index {
 
 /// Length of a bucket, m: about the span of a boulder, and several times that of a profiler's ray.
 const BUCKET_M: f64 = 1.0;
-/// Most buckets; a longer tunnel has longer buckets.
+/// Maximum number of buckets; a longer tunnel has longer buckets.
 const MOST_BUCKETS: f64 = 65_536.0;
 
 impl Index {

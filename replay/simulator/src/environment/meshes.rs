@@ -21,7 +21,7 @@ use crate::mesh::{self, Mesh, Role};
 const CHAINAGE_M: core::ops::RangeInclusive<f64> = -1.0e5..=1.0e5;
 /// Allowed position of the origin across the tunnel, m.
 const ACROSS_M: core::ops::RangeInclusive<f64> = -1000.0..=1000.0;
-/// Least length of a wall, m.
+/// Minimum length of a wall, m.
 const SHORTEST_M: f64 = 0.01;
 
 /// Position of a mesh's origin.

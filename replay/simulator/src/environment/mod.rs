@@ -59,9 +59,9 @@ use vector::{Ray, V3};
 
 /// Largest length of a ray, m.
 const FARTHEST_M: f64 = 1.0e5;
-/// Least advance of a ray beyond the end of the last hollow, m.
+/// Minimum advance of a ray beyond the end of the last hollow, m.
 const PROGRESS_M: f64 = 1e-9;
-/// Most hollows and stretches of tube that a ray passes.
+/// Maximum number of hollows and stretches of tube that a ray passes.
 const MOST_PASSAGES: usize = 1_000;
 
 /// The environment of a scene.

@@ -18,7 +18,7 @@ use super::*;
 #[derive(Clone, Default)]
 struct Small(Arc<Mutex<Files>>);
 
-/// Most bytes of each file, and the files' contents.
+/// Maximum number of bytes of each file, and the files' contents.
 type Files = (usize, BTreeMap<PathBuf, Vec<u8>>);
 
 struct SmallFile(Small, PathBuf);

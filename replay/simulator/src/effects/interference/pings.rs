@@ -10,7 +10,7 @@ use crate::sensing::Ray;
 
 /// Directions that differ by less than this count as equal, radians.
 const SAME_RAD: f64 = 1e-9;
-/// Most pings that are extrapolated.
+/// Maximum number of pings that are extrapolated.
 const MOST_FORESEEN: u32 = 16;
 
 /// A ping: time, origin, direction, and the point where it meets the wall.
