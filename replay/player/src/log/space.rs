@@ -1,7 +1,7 @@
 //! Monitors free disk space during a recording, and decides which messages to drop when it runs low.
 //!
 //! Small irreplaceable data (position readings, ticks, judgements, advice) is kept to the last byte. Echoes, by far the
-//! largest share of a log, are dropped first, so that the dive doesn't outlast the disk.
+//! largest share of a log, are dropped first, so that the disk lasts for the whole dive.
 //!
 //! The recorder doesn't decode devices, so it recognises echoes by source and length; the log header lists the sonars.
 //! Packets of heads that send only ranges are short and kept: such a dive still replays to its digest.

@@ -24,7 +24,7 @@ pub trait Storage: Send {
 
 /// A file that is open for writing. Closing it by dropping writes nothing.
 pub trait StoredFile: Send {
-    /// Appends at least the first of these bytes, and returns the number of bytes appended.
+    /// Appends a prefix of these bytes, and returns its length.
     ///
     /// Errors: those of the system; `Interrupted` is retried.
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize>;
