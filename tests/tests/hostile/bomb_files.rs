@@ -104,13 +104,13 @@ fn files() -> Vec<Bomb> {
             "a profile that never ends",
             with_profile("/dev/zero"),
             check,
-            "it is a pipe, a device or a socket; a file is wanted",
+            "it is a pipe, a device or a socket; a file is required",
         ),
         (
             "a profile that is a pipe",
             with_profile("pipe"),
             check,
-            "it is a pipe, a device or a socket; a file is wanted",
+            "it is a pipe, a device or a socket; a file is required",
         ),
         ("a profile of 400,000 points", with_profile("points.csv"), check, "has more than 100000 points"),
         ("a profile of 30 MB", with_profile("long.csv"), check, "it is longer than 16777216 bytes"),
@@ -245,7 +245,7 @@ fn a_pipe_or_a_device_in_place_of_a_file_keeps_nobody_waiting() {
             let ran = run(&folder, arguments);
             assert_eq!(ran.code, Some(2), "{arguments:?}");
             assert!(
-                ran.stderr.contains("it is a pipe, a device or a socket; a file is wanted"),
+                ran.stderr.contains("it is a pipe, a device or a socket; a file is required"),
                 "{}",
                 ran.stderr
             );

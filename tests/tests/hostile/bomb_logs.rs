@@ -133,7 +133,7 @@ fn headers() -> Vec<Bomb> {
         bomb(
             "a channel with a million entries",
             &[channel(2, "/raw/depth", &map(numbered(1_000_000)))],
-            "bytes of definitions and metadata|bytes that are no records",
+            "bytes of definitions and metadata|bytes that aren't records",
         ),
         bomb("metadata of a million entries", &[depth(), metadata("m", numbered(500_000))], HEADERS),
         bomb(
@@ -204,7 +204,7 @@ fn pointers() -> Vec<Bomb> {
         .flat_map(|n| message(3, n, &[&n.to_le_bytes()[..], &n.to_le_bytes(), &[1; 2000]].concat()))
         .collect();
     vec![
-        bomb("an attachment of 2^64-1 bytes", some(&[record(9, &endless)]), "bytes that are no records"),
+        bomb("an attachment of 2^64-1 bytes", some(&[record(9, &endless)]), "bytes that aren't records"),
         bomb(
             "an attachment with a name of 3,000 letters",
             some(&[record(9, &nameless)]),
@@ -213,16 +213,16 @@ fn pointers() -> Vec<Bomb> {
         bomb(
             "a record of 2^64-1 bytes",
             some(&[record_head(6, u64::MAX), vec![0; 100]]),
-            "bytes that are no records|ends before",
+            "bytes that aren't records|ends before",
         ),
-        bomb("indexes of 2^32-1 entries", some(&[index(u32::MAX).repeat(1000)]), "bytes that are no records"),
+        bomb("indexes of 2^32-1 entries", some(&[index(u32::MAX).repeat(1000)]), "bytes that aren't records"),
         bomb("a summary that points at the beginning", circle, "begins elsewhere"),
         bomb(
             "an index of chunks beyond the end",
             some(&[record(8, &index_of_chunks).repeat(1000)]),
-            "bytes that are no records",
+            "bytes that aren't records",
         ),
-        bomb("statistics of 2^64-1 messages", some(&[record(11, &statistics)]), "bytes that are no records"),
+        bomb("statistics of 2^64-1 messages", some(&[record(11, &statistics)]), "bytes that aren't records"),
         bomb("ticks of 2^32-1 packets", log(&[depth(), channel(2, "/loop/tick", &[0; 4]), ticks]), ""),
         bomb(
             "40 MB of results of nothing",

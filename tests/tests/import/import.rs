@@ -251,7 +251,7 @@ fn a_table_becomes_the_bytes_that_its_sensors_would_have_sent() {
     let arguments = ["import", "table.csv", "--vehicle", "vehicle.toml", "-o", "out.mcap", "--map"];
     let answer = folder.headrace(&[&arguments[..], &["map.toml", "--json"]].concat());
     assert_eq!(answer.code, Some(3), "{}", answer.stderr);
-    assert!(answer.stderr.contains("rows with a cell that is no number: 1 times"), "{}", answer.stderr);
+    assert!(answer.stderr.contains("rows with a cell that isn't a number: 1 times"), "{}", answer.stderr);
     let shown = json(&answer);
     let counts = &shown["messages"];
     assert_eq!((&counts["imu"], &counts["ping_left"], &counts["tether"]), (&12.into(), &3.into(), &4.into()));
@@ -270,7 +270,7 @@ fn a_table_becomes_the_bytes_that_its_sensors_would_have_sent() {
         (&columns[..4], "rate_x, rate_y, rate_z, force_x, force_y, force_z"),
         (&[("deep", "depth", "pressure", "mbar")], "is no column; there are t_s, depth (mbar), roll"),
         (&[("along", "depth", "pressure", "m")], "must be one of Pa, hPa, mbar, kPa, bar"),
-        (&[("along", "dvl", "velocity_x", "m/s")], "is no sensor of the vehicle file"),
+        (&[("along", "dvl", "velocity_x", "m/s")], "isn't a sensor of the vehicle file"),
     ] {
         folder.write("wrong.toml", mapping(columns));
         refused(&folder, &[&arguments[1..], &["wrong.toml"]].concat(), &["wrong.toml:", words]);
@@ -294,8 +294,8 @@ fn rows_that_are_not_as_the_header_are_lost_and_told() {
     let (code, messages, _) = import("1,0.0,3.0\n1.1,2.4,3.1,\n1.2,4.8,\n");
     assert_eq!((code, messages), (Some(0), 3));
     for (rows, told, words) in [
-        ("1,0.0,3.0\n1.1,2,4,3,1\n1.2,4.8,3.0\n", 2, "rows with other cells than the header"),
-        ("1,0.0,3.0\n1.1,2.4,3.1\n1.2,4\n", 2, "rows with other cells than the header"),
+        ("1,0.0,3.0\n1.1,2,4,3,1\n1.2,4.8,3.0\n", 2, "rows with more or fewer cells than the header"),
+        ("1,0.0,3.0\n1.1,2.4,3.1\n1.2,4\n", 2, "rows with more or fewer cells than the header"),
         ("1,0.0,3.0\n1.1,2.4,3.1\n1.2,4.8,2", 2, "a last row without a line end: it may be cut short"),
         ("1,0.0,3.0\n1.1,2.4,30\n1.2,4.8,3.0\n", 3, "at its range setting: as if nothing was heard"),
     ] {

@@ -135,7 +135,7 @@ fn stamps_of_another_time_base_are_named_and_may_be_followed() {
     assert_eq!(import(&folder, "boot_time.mcap", "header.toml").code, Some(0));
     let followed = heard(&folder);
     let answer = import(&folder, "boot_time.mcap", "topics.toml");
-    let words = "/imu/data: header stamps are on another time base, 1699999980.000 s before the record; the times of the record";
+    let words = "/imu/data: header stamps are on another time base, 1699999980.000 s before recording; the times of recording";
     assert!(answer.stderr.contains(words), "{}", answer.stderr);
     assert!(!answer.stderr.contains("/cable"), "{}", answer.stderr);
     let recorded = heard(&folder);
@@ -144,7 +144,7 @@ fn stamps_of_another_time_base_are_named_and_may_be_followed() {
     assert_eq!(import(&folder, "humble.mcap", "header.toml").code, Some(0));
     assert_eq!(of(&heard(&folder), "/raw/sonar_0"), of(&recorded, "/raw/sonar_0"));
     let answer = import(&folder, "boot_time.mcap", "header.toml");
-    assert!(answer.stderr.contains("they are followed, moved by 1699999980.000 s"), "{}", answer.stderr);
+    assert!(answer.stderr.contains("they are used, shifted by 1699999980.000 s"), "{}", answer.stderr);
 }
 
 #[track_caller]
@@ -162,8 +162,13 @@ fn refused(folder: &Folder, file: &str, map: Option<&str>, words: &[&str]) {
 #[test]
 fn what_has_no_choice_is_matched_aloud_and_what_has_is_asked_for() {
     let folder = folder("");
-    let words =
-        ["which profiling head is which?", "/sonar/points", "/sonar/scan", "sonar_0, sonar_1", "--map"];
+    let words = [
+        "which profiling head sends which topic",
+        "/sonar/points",
+        "/sonar/scan",
+        "sonar_0, sonar_1",
+        "--map",
+    ];
     refused(&folder, "none.bag", None, &words);
     let (head, _) = VEHICLE.split_once("[[sensors]]").unwrap();
     let one = "[[sensors]]\nid = \"imu\"\nplugin = \"imu_can\"\npreset = \"xsens_mti600\"\n";
@@ -180,9 +185,9 @@ fn what_has_no_choice_is_matched_aloud_and_what_has_is_asked_for() {
         &folder,
         "none.bag",
         None,
-        &["no topic is of a sensor", "/chatter (std_msgs/", "dvl (velocity log)"],
+        &["no topic belongs to a sensor", "/chatter (std_msgs/", "dvl (velocity log)"],
     );
-    refused(&folder, "humble.mcap", None, &["no topic is of a sensor"]);
+    refused(&folder, "humble.mcap", None, &["no topic belongs to a sensor"]);
 }
 
 #[test]
@@ -194,9 +199,9 @@ fn wrong_mappings_are_named() {
     let imu = table("/imu/data", "imu", "");
     for (text, words) in [
         (String::new(), "topics"),
-        (table("/imu", "imu", ""), "is no topic of the file; there are"),
-        (table("/chatter", "imu", ""), "messages of type std_msgs/msg/String aren't known"),
-        (table("/imu/data", "gyro", ""), "is no sensor of the vehicle file"),
+        (table("/imu", "imu", ""), "isn't a topic of the file, which has"),
+        (table("/chatter", "imu", ""), "messages of type std_msgs/msg/String aren't supported"),
+        (table("/imu/data", "gyro", ""), "isn't a sensor of the vehicle file"),
         (
             table("/imu/data", "depth", ""),
             "is a depth sensor, and a topic of sensor_msgs/msg/Imu is that of a inertial unit",
@@ -271,7 +276,9 @@ fn what_is_wrong_with_a_recording_is_named() {
         assert!(said.contains(words), "{name}: {said}");
         assert!(!heard(&folder).is_empty());
     }
-    for (name, words) in [("lz4.bag", "chunks that don't unpack"), ("bz2.bag", "chunks that don't unpack")] {
+    for (name, words) in
+        [("lz4.bag", "chunks that can't be unpacked"), ("bz2.bag", "chunks that can't be unpacked")]
+    {
         let (code, said) = changed(&folder, name, |bytes| {
             let at = find(bytes, b"compression=", 0);
             bytes[at + 200..at + 240].fill(0);
@@ -290,7 +297,7 @@ fn what_is_wrong_with_a_recording_is_named() {
         bytes[at + 12] += 1;
     };
     let (code, said) = changed(&folder, "none.bag", longer);
-    assert!(code == Some(3) && said.contains("the bag says that it has"), "{said}");
+    assert!(code == Some(3) && said.contains("the bag states "), "{said}");
     let undefined = |bytes: &mut Vec<u8>| {
         // The first definition in a chunk gets another number; the one at the end stays.
         let chunk = find(bytes, b"compression=", 0);
@@ -298,7 +305,7 @@ fn what_is_wrong_with_a_recording_is_named() {
         bytes[at + 5] = 99;
     };
     let (code, said) = changed(&folder, "none.bag", undefined);
-    assert!(code == Some(3) && said.contains("connection that is defined nowhere before"), "{said}");
+    assert!(code == Some(3) && said.contains("connection without an earlier definition"), "{said}");
     let twice = |bytes: &mut Vec<u8>| {
         // The second gets the number of the first.
         let chunk = find(bytes, b"op=\x05", 0);
@@ -308,14 +315,14 @@ fn what_is_wrong_with_a_recording_is_named() {
         bytes[second + 5] = bytes[first + 5];
     };
     let (code, said) = changed(&folder, "none.bag", twice);
-    assert!(code == Some(3) && said.contains("defined a second time, otherwise"), "{said}");
+    assert!(code == Some(3) && said.contains("connections with a second, different definition"), "{said}");
     let other = |bytes: &mut Vec<u8>| {
         while let Some(at) = bytes.windows(8).position(|window| window == b"6a62c6da") {
             bytes[at] = b'7';
         }
     };
     let (code, said) = changed(&folder, "none.bag", other);
-    assert!(code == Some(2) && said.contains("is defined otherwise (MD5 7a62c6da"), "{said}");
+    assert!(code == Some(2) && said.contains("(MD5 7a62c6da"), "{said}");
 }
 
 #[test]
@@ -410,13 +417,13 @@ fn values_that_are_none_or_strange_are_named() {
     for words in [
         "note: /imu/data: 3 messages without orientation",
         "note: /imu/data: 1 messages without specific force",
-        "note: /imu/data: 1 messages are of another frame than the first, \"abc\"",
+        "note: /imu/data: 1 messages have another frame than the first, \"abc\"",
         "so that z is down; `angles_deg` of imu must say so",
-        "lost: /imu/data: 1 messages whose orientation is no unit quaternion",
+        "lost: /imu/data: 1 messages whose orientation isn't a unit quaternion",
         "note: /pressure: no pressure is above 150.0 Pa",
-        "lost: /pressure: 1 messages whose value is no number",
-        "lost: /pressure: 1 messages with values that the sensor can't say",
-        "lost: /pressure: 1 messages shorter than their type says",
+        "lost: /pressure: 1 messages whose value isn't a number",
+        "lost: /pressure: 1 messages with values that the sensor can't encode",
+        "lost: /pressure: 1 messages shorter than their type requires",
         "lost: /pressure: 1 messages in another encapsulation than plain CDR",
     ] {
         assert!(answer.stderr.contains(words), "{words:?} is not in {}", answer.stderr);

@@ -153,11 +153,11 @@ describe("voice notes", () => {
   }));
 
   it("that can't be kept is told, and is sent again", () => spoken(async ({ mock, page }) => {
-    mock.control({ refuses: "the voice isn't kept: nothing is being recorded at present" });
+    mock.control({ refuses: "the voice note isn't recorded: nothing is being recorded at present" });
     await voice(page).click();
     await page.locator(".notes .voice.recording").waitFor();
     await voice(page).click();
-    await page.locator(".notes .voice-words", { hasText: "the voice isn't kept: nothing is being recorded" }).waitFor();
+    await page.locator(".notes .voice-words", { hasText: "the voice note isn't recorded: nothing is being recorded" }).waitFor();
     mock.control({ refuses: null });
     await page.locator(".notes .voice.unsent", { hasText: "Send again" }).click();
     await page.locator(".notes li", { hasText: "voice, 1 s" }).waitFor();
