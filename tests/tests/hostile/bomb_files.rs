@@ -1,4 +1,4 @@
-//! Files that people write, and foreign logs, which never end or hold far more than such a file has.
+//! Text files and foreign logs that never end or are far larger than such files should be.
 
 use std::fmt::Write as _;
 
@@ -23,7 +23,7 @@ fn with_profile(file: &str) -> String {
     vehicle
 }
 
-/// A file with its content, the command, and what it says.
+/// A file name with content, the command, and the expected message.
 type Bomb = (&'static str, String, &'static [&'static str], &'static str);
 
 /// All of them.
@@ -164,7 +164,7 @@ fn change(text: &str, from: &str, to: &str) -> String {
 }
 
 #[test]
-fn files_that_are_bombs_are_refused_with_the_limit() {
+fn oversized_files_are_refused_with_the_limit() {
     let folder = Folder::new();
     folder.write("vehicle.toml", VEHICLE);
     folder.write("map.toml", "time_column = \"t\"\n[[columns]]\ncolumn = \"depth\"\nsensor = \"depth\"\nquantity = \"pressure\"\nunit = \"Pa\"\n");
@@ -194,9 +194,9 @@ fn files_that_are_bombs_are_refused_with_the_limit() {
     assert!(wrong.is_empty(), "{}", wrong.join("\n"));
 }
 
-/// Lists of one-letter names take the most memory for each byte.
+/// Lists of one-letter names take the most memory per byte.
 #[test]
-fn dbc_files_of_any_length_stay_within_the_memory() {
+fn dbc_files_of_any_length_stay_within_the_memory_limit() {
     let folder = Folder::new();
     let signals = "[sensors.signals]\nrate = [\"GyroX\", \"GyroY\", \"GyroZ\"]\nforce = [\"AccX\", \"AccY\", \"AccZ\"]\n\
         quaternion = [\"QuatW\", \"QuatX\", \"QuatY\", \"QuatZ\"]\n";
@@ -223,7 +223,7 @@ fn dbc_files_of_any_length_stay_within_the_memory() {
 }
 
 #[test]
-fn a_pipe_or_a_device_in_place_of_a_file_keeps_nobody_waiting() {
+fn pipe_or_device_instead_of_a_file_does_not_block() {
     let folder = Folder::new();
     rustix::fs::mknodat(
         rustix::fs::CWD,

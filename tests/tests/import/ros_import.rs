@@ -1,5 +1,7 @@
-//! val: recordings that Python's `rosbags` has written (tests/ros/make.py) give the same messages as tables of the same values;
-//! and what is wrong with a recording is named.
+//! Validation: recordings written by Python's `rosbags` (tests/ros/make.py) give the same messages as tables of the
+//! same values.
+//!
+//! Faults of a recording are reported.
 
 use headrace_tests::{Answer, Folder, VEHICLE, raw_messages};
 use serde_json::Value;
@@ -19,7 +21,7 @@ fn fixture(name: &str) -> Vec<u8> {
     std::fs::read(headrace_tests::root().join("tests/ros").join(name)).unwrap()
 }
 
-/// A folder with the recordings and tables, the vehicle file and a mapping with this in each of its tables.
+/// A folder with recordings, tables and the vehicle file, and a mapping with `further` in each of its tables.
 fn folder(further: &str) -> Folder {
     let folder = Folder::new();
     folder.write("vehicle.toml", VEHICLE);
@@ -42,7 +44,7 @@ fn import(folder: &Folder, file: &str, map: &str) -> Answer {
     folder.headrace(&["import", file, "--vehicle", "vehicle.toml", "--map", map, "-o", "out.mcap", "--json"])
 }
 
-/// A message: its topic, nanoseconds after 1970 by the log's anchor, its bytes.
+/// A message: topic, nanoseconds after 1970 by the log's anchor, and bytes.
 type Heard = (String, u64, Vec<u8>);
 
 fn heard(folder: &Folder) -> Vec<Heard> {
@@ -63,7 +65,7 @@ fn of<'a>(all: &'a [Heard], topic: &str) -> Vec<&'a Heard> {
 }
 
 #[test]
-fn recordings_of_all_kinds_give_the_messages_of_the_tables() {
+fn recordings_of_all_kinds_match_the_tables() {
     let folder = folder("");
     let columns = |columns: &[(&str, &str, &str, &str)]| {
         let head = "time_column = \"t\"\nutc = true\n".to_owned();
@@ -98,7 +100,7 @@ fn recordings_of_all_kinds_give_the_messages_of_the_tables() {
         let answer = import(&folder, name, "topics.toml");
         assert_eq!(answer.code, Some(0), "{name}: {}", answer.stderr);
         let shown: Value = serde_json::from_str(&answer.stdout).unwrap();
-        assert_eq!(shown["passed_over"], 1, "{name}: what nobody wants");
+        assert_eq!(shown["passed_over"], 1, "{name}: unused topics");
         let got = heard(&folder);
         for id in ["imu", "depth", "tether", "sonar_0"] {
             let topic = format!("/raw/{id}");
@@ -107,11 +109,11 @@ fn recordings_of_all_kinds_give_the_messages_of_the_tables() {
                 "{name}: {topic}"
             );
         }
-        // Angles of points are computed anew, and what heard nothing has no point.
+        // Angles of points are computed anew, and a beam without a return has no point.
         let wanted: Vec<_> =
             of(&tables, "/raw/sonar_1").into_iter().filter(|(_, _, bytes)| bytes[8..10] != [0, 0]).collect();
         assert_eq!(of(&got, "/raw/sonar_1"), wanted, "{name}");
-        // A table can't say that nothing was heard, so that pings have other numbers: distance and confidence alone.
+        // A table can't state a missing return, so ping numbers differ. Only distance and confidence are compared.
         let distances = |all: &[Heard]| -> Vec<_> {
             let pings = of(all, "/raw/ping_left").into_iter();
             pings.map(|(_, at_ns, bytes)| (*at_ns, bytes[8..14].to_vec())).collect()
@@ -129,7 +131,7 @@ fn recordings_of_all_kinds_give_the_messages_of_the_tables() {
 }
 
 #[test]
-fn stamps_of_another_time_base_are_named_and_may_be_followed() {
+fn stamps_of_another_time_base_are_reported_and_can_be_used() {
     let folder = folder("");
     folder.write("header.toml", mapping("time = \"header\""));
     assert_eq!(import(&folder, "boot_time.mcap", "header.toml").code, Some(0));
@@ -140,7 +142,7 @@ fn stamps_of_another_time_base_are_named_and_may_be_followed() {
     assert!(!answer.stderr.contains("/cable"), "{}", answer.stderr);
     let recorded = heard(&folder);
     assert_eq!(of(&followed, "/raw/imu"), of(&recorded, "/raw/imu"));
-    // A scan's stamp is that of its first beam, and it is recorded with its last.
+    // A scan's stamp is that of its first beam; it is recorded with its last.
     assert_eq!(import(&folder, "humble.mcap", "header.toml").code, Some(0));
     assert_eq!(of(&heard(&folder), "/raw/sonar_0"), of(&recorded, "/raw/sonar_0"));
     let answer = import(&folder, "boot_time.mcap", "header.toml");
@@ -160,7 +162,7 @@ fn refused(folder: &Folder, file: &str, map: Option<&str>, words: &[&str]) {
 }
 
 #[test]
-fn what_has_no_choice_is_matched_aloud_and_what_has_is_asked_for() {
+fn unambiguous_topics_are_matched_and_ambiguous_ones_need_a_mapping() {
     let folder = folder("");
     let words = [
         "which profiling head sends which topic",
@@ -191,7 +193,7 @@ fn what_has_no_choice_is_matched_aloud_and_what_has_is_asked_for() {
 }
 
 #[test]
-fn wrong_mappings_are_named() {
+fn wrong_mappings_are_refused() {
     let folder = folder("");
     let table = |topic: &str, sensor: &str, further: &str| {
         format!("[[topics]]\ntopic = \"{topic}\"\nsensor = \"{sensor}\"\n{further}\n")
@@ -228,7 +230,7 @@ fn wrong_mappings_are_named() {
     );
 }
 
-/// Imports what `change` makes of a file: exit code and what is said.
+/// Imports a file after `change`; returns exit code and output.
 fn changed(folder: &Folder, name: &str, change: impl FnOnce(&mut Vec<u8>)) -> (Option<i32>, String) {
     let mut bytes = fixture(name);
     change(&mut bytes);
@@ -238,10 +240,10 @@ fn changed(folder: &Folder, name: &str, change: impl FnOnce(&mut Vec<u8>)) -> (O
     (answer.code, answer.stderr)
 }
 
-/// States three more messages than the recording has.
+/// Raises the stated number of messages by three.
 fn state_three_more(bytes: &mut [u8]) {
     let number = |bytes: &[u8], at: usize| u64::from_le_bytes(bytes[at..at + 8].try_into().unwrap());
-    // The closing magic has 8 bytes, and the footer before it 20, of which the first 8 say where the summary begins.
+    // The closing magic has 8 bytes. The footer before it has 20, and their first 8 give the start of the summary.
     let mut at = usize::try_from(number(bytes, bytes.len() - 28)).unwrap();
     while bytes[at] != mcap::records::op::STATISTICS {
         at += 9 + usize::try_from(number(bytes, at + 1)).unwrap();
@@ -251,7 +253,7 @@ fn state_three_more(bytes: &mut [u8]) {
 }
 
 #[test]
-fn messages_missing_from_a_stated_count_are_told() {
+fn messages_below_the_stated_count_are_reported() {
     let folder = folder("");
     let (code, said) = changed(&folder, "humble.mcap", |bytes| state_three_more(bytes));
     assert_eq!(code, Some(3), "{said}");
@@ -266,7 +268,7 @@ fn find(bytes: &[u8], what: &[u8], after: usize) -> usize {
 }
 
 #[test]
-fn what_is_wrong_with_a_recording_is_named() {
+fn damage_of_a_recording_is_reported() {
     let folder = folder("");
     for name in ["none.bag", "bz2.bag", "lz4.bag", "humble.mcap"] {
         let (code, said) = changed(&folder, name, |bytes| bytes.truncate(bytes.len() * 3 / 5));
@@ -299,7 +301,7 @@ fn what_is_wrong_with_a_recording_is_named() {
     let (code, said) = changed(&folder, "none.bag", longer);
     assert!(code == Some(3) && said.contains("the bag states "), "{said}");
     let undefined = |bytes: &mut Vec<u8>| {
-        // The first definition in a chunk gets another number; the one at the end stays.
+        // Changes the number of the first definition in a chunk; the one at the end stays.
         let chunk = find(bytes, b"compression=", 0);
         let at = find(bytes, b"conn=", chunk);
         bytes[at + 5] = 99;
@@ -307,7 +309,7 @@ fn what_is_wrong_with_a_recording_is_named() {
     let (code, said) = changed(&folder, "none.bag", undefined);
     assert!(code == Some(3) && said.contains("connection without an earlier definition"), "{said}");
     let twice = |bytes: &mut Vec<u8>| {
-        // The second gets the number of the first.
+        // Gives the second definition the number of the first.
         let chunk = find(bytes, b"op=\x05", 0);
         let first = find(bytes, b"conn=", chunk);
         let second = find(bytes, b"op=\x07", find(bytes, b"op=\x07", first) + 1);
@@ -326,7 +328,7 @@ fn what_is_wrong_with_a_recording_is_named() {
 }
 
 #[test]
-fn other_files_are_named() {
+fn other_file_kinds_are_refused() {
     let folder = folder("");
     folder.write("old.bag", b"#ROSBAG V1.2\nmuch more");
     folder.write("text.bag", b"hello");
@@ -342,7 +344,7 @@ fn other_files_are_named() {
     refused(&folder, "dive.mcap", None, &["is a dive log already"]);
 }
 
-/// A recording by the test's own hand: messages in plain CDR, each with its topic, type and time in seconds.
+/// A hand-made recording: messages in plain CDR, each with topic, type and time in seconds.
 fn recording(messages: &[(&str, &str, u64, Vec<u8>)]) -> Vec<u8> {
     let mut file = std::io::Cursor::new(Vec::new());
     let mut writer = mcap::WriteOptions::new().profile("ros2").create(&mut file).unwrap();
@@ -358,7 +360,7 @@ fn recording(messages: &[(&str, &str, u64, Vec<u8>)]) -> Vec<u8> {
     file.into_inner()
 }
 
-/// Encapsulation, a stamp of the record's time, a frame of three letters, and doubles behind it.
+/// Encapsulation, a stamp with the record's time, a frame name of three letters, and doubles.
 fn stamped(seconds: u32, frame: &str, values: &[f64]) -> Vec<u8> {
     let head = [&[0, 1, 0, 0][..], &(1_700_000_000 + seconds).to_le_bytes(), &[0; 4], &[4, 0, 0, 0]].concat();
     let values: Vec<u8> = values.iter().flat_map(|value| value.to_le_bytes()).collect();
@@ -374,7 +376,7 @@ fn imu(wxyz: [f64; 4], without: bool, force_z: f64) -> Vec<f64> {
 }
 
 #[test]
-fn values_that_are_none_or_strange_are_named() {
+fn missing_and_odd_values_are_reported() {
     let folder = folder("");
     let of_imu = |seconds: u32, frame, values: &[f64]| {
         ("/imu/data", "sensor_msgs/msg/Imu", u64::from(seconds), stamped(seconds, frame, values))
@@ -429,7 +431,7 @@ fn values_that_are_none_or_strange_are_named() {
         assert!(answer.stderr.contains(words), "{words:?} is not in {}", answer.stderr);
     }
     let shown: Value = serde_json::from_str(&answer.stdout).unwrap();
-    // Of four samples: times, orientation of the first, four rates, three forces.
+    // Four samples: times, orientation of the first, four rates, three forces.
     assert_eq!(shown["messages"]["imu"], 4 + 1 + 4 + 3);
     let (_, report) = folder.replay("out.mcap", &[]);
     assert!(report["sources"].as_array().unwrap().iter().all(|source| source["bad_frames"] == 0));
