@@ -11,7 +11,7 @@
 
 use std::sync::atomic::{AtomicU64, Ordering};
 
-use headrace_tests::interventions::{Judged, Knowing, Matrix, intervene, kinds, remedies};
+use headrace_tests::interventions::{Judged, Matrix, UpperBound, intervene, kinds, remedies};
 
 /// Median and largest hole of a stretch without each cause alone, over the target.
 fn over_target(sections: &[Judged], target_m: f64) -> String {
@@ -39,7 +39,7 @@ fn main() {
         let dive = |seed: u64| {
             let dive = intervene(seed, &kinds(seed));
             let done = if remedy { remedies(&dive) } else { Vec::new() };
-            let mut knowing = Knowing::default();
+            let mut knowing = UpperBound::default();
             if is_knowing {
                 knowing.add(&dive);
             }
@@ -111,7 +111,8 @@ fn main() {
         println!("runs cleared by the displayed remedy: {clear} of {runs}");
     }
     if is_knowing {
-        let Knowing { stretches, pairs } = dives.iter().fold(Knowing::default(), |sum, dive| sum.and(dive.3));
+        let UpperBound { stretches, pairs } =
+            dives.iter().fold(UpperBound::default(), |sum, dive| sum.and(dive.3));
         println!("reference that knows all but the noise: stretches, two causes: {}", stretches.text());
         println!("of these, stretches with a true set of two causes: {}", pairs.text());
     }

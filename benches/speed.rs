@@ -367,7 +367,7 @@ fn cover(samples: &[(f64, f64, usize)], length_m: f64) -> Coverage {
         }),
         relief: headrace_coverage::Relief::default(),
         unsure: None,
-        lacks: headrace_coverage::Lacks::default(),
+        lacks: headrace_coverage::MissingSamples::default(),
     };
     let mut last = [None; 8];
     let profile = shapes::ceran().unwrap();

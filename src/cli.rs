@@ -1,7 +1,7 @@
 //! The command line.
 
-mod elsewhere;
-mod habits;
+mod common_options;
+mod external_commands;
 mod logs;
 mod page;
 mod value_parsers;
@@ -16,8 +16,8 @@ use headrace_sensor::connect::Connect;
 use tracing::level_filters::LevelFilter;
 
 use crate::watch::Show;
-pub(crate) use elsewhere::Elsewhere;
-pub(crate) use habits::{Completions, Man, Overwrite, Threads};
+pub(crate) use common_options::{Completions, Man, Overwrite, Threads};
+pub(crate) use external_commands::ExternalArguments;
 pub(crate) use logs::{Export, Import, Notes, Recover, Trim, Verify};
 pub(crate) use page::PageArgs;
 pub(crate) use value_parsers::{Speed, speed, time};
@@ -166,8 +166,8 @@ pub(crate) enum Command {
     Plan(Plan),
     /// Measure the cost of accuracy: errors against independent values, setting by setting, next to CPU time
     /// or hours.
-    #[command(disable_help_flag = true, after_help = elsewhere::COST)]
-    Cost(Elsewhere),
+    #[command(disable_help_flag = true, after_help = external_commands::COST)]
+    Cost(ExternalArguments),
     /// Estimate mounts, zeros and latencies of the sensors from a log, as values for the vehicle file.
     ///
     /// Mounts of heads need a full turn while the vehicle stands still off the tunnel's axis. The surface
@@ -201,12 +201,12 @@ pub(crate) enum Command {
     )]
     Check(Check),
     /// Query hundreds of dives in SQL, each replayed once.
-    #[command(disable_help_flag = true, after_help = elsewhere::CAMPAIGN)]
-    Campaign(Elsewhere),
+    #[command(disable_help_flag = true, after_help = external_commands::CAMPAIGN)]
+    Campaign(ExternalArguments),
     /// Replay a share of a folder's dives and keep their tables as Parquet, for Slurm, Nextflow or CI
     /// matrices.
-    #[command(disable_help_flag = true, after_help = elsewhere::CAMPAIGN)]
-    Batch(Elsewhere),
+    #[command(disable_help_flag = true, after_help = external_commands::CAMPAIGN)]
+    Batch(ExternalArguments),
     /// Write the shell completions of this command line to stdout.
     #[command(
         after_help = "Example:\n  headrace completions bash > ~/.local/share/bash-completion/completions/headrace\n  headrace completions zsh > \"${fpath[1]}/_headrace\""
@@ -360,7 +360,7 @@ pub(crate) enum Explain {
     /// The effects that would be simulated, with their reasons.
     List,
     /// The list, and the worth of each effect.
-    Worth,
+    EffectInfluence,
 }
 
 #[derive(Debug, Args)]

@@ -25,6 +25,7 @@ use crate::files;
 use crate::followers::{Followers, Joining};
 use crate::interrupt;
 use crate::live;
+use crate::other_targets;
 use crate::output::{put_line, say, show};
 use crate::outputs::{self, Claims, Kind};
 use crate::page::{self, Of, Served, VoicesOf};
@@ -37,7 +38,6 @@ use crate::terminal;
 use crate::tui;
 use crate::vehicle_file::{self, Given};
 use crate::watch::{Show, Watch};
-use crate::what_if;
 
 /// `headrace demo`.
 pub(crate) fn demo(args: &Demo) -> Result<u8, Failure> {
@@ -221,8 +221,8 @@ pub(crate) fn replay(args: &Replay) -> Result<u8, Failure> {
     }
     note_losses(&mut report, log, &player);
     if player.coming()?.is_none() {
-        report.what_if = what_if::reports(args, &files, (vehicle, &text), &report)?;
-    } else if what_if::is_asked(args) {
+        report.what_if = other_targets::reports(args, &files, (vehicle, &text), &report)?;
+    } else if other_targets::is_asked(args) {
         tracing::warn!(
             "other targets and sections aren't judged: the replay was stopped before the end of the log"
         );

@@ -8,7 +8,7 @@ use headrace_geometry::time::MonoNs;
 use headrace_monitor::App;
 use headrace_monitor::console::{CONSOLE_ID, Command, ConsoleInput, ConsolePort};
 use headrace_monitor::entities::HeadSpecification;
-use headrace_monitor::head_words::HeadWords;
+use headrace_monitor::head_descriptions::HeadDescriptions;
 use headrace_monitor::outlet::{NoticeOutlet, NoticeReceiver};
 use headrace_monitor::report::{LineReport, Report};
 use headrace_monitor::run::Loop;
@@ -201,7 +201,7 @@ pub(crate) fn view_site(vehicle: &VehicleConfig) -> Site {
         let head = HeadSpecification::of(device, spec, &mission);
         Some(head.settings(&sensor.specification().sensor.id, &mission.profile, mission.target_m))
     });
-    let head_words = HeadWords::of(specified);
+    let head_words = HeadDescriptions::of(specified);
     let reaches = heads.clone().map(|(_, sensor)| sensor.specification().sensor.mount.position.x().abs());
     Site {
         profile: vehicle.tunnel.profile.clone(),

@@ -1,6 +1,8 @@
 //! `headrace simulate --explain`: lists the simulated effects, their reasons, and their worth.
 
-use headrace_replay::worth::{HOLE_LIMIT_M, LeftOut, Mean, PASSED_LIMIT, Worth, measure};
+use headrace_replay::effect_influence::{
+    EffectInfluence, HOLE_LIMIT_M, LeftOut, Mean, PASSED_LIMIT, measure,
+};
 use headrace_simulator::effects::KINDS as EFFECTS;
 use headrace_simulator::{Added, Called, Scene, Simulation, Stage};
 use serde_json::{Value, json};
@@ -14,7 +16,7 @@ use crate::progress::Progress;
 const COLUMN: usize = 20;
 
 /// Measures the worth of a scene's effects. The scene has been read with several seeds.
-pub(crate) fn worth_of(scenes: &mut [Scene]) -> Result<Worth, Failure> {
+pub(crate) fn worth_of(scenes: &mut [Scene]) -> Result<EffectInfluence, Failure> {
     let _phase = Phase::start("worth");
     let mut progress = Progress::start();
     Ok(measure(scenes, &mut |dived, most| progress.step(&format!("{dived} of at most {most} dives")))?)
@@ -22,7 +24,7 @@ pub(crate) fn worth_of(scenes: &mut [Scene]) -> Result<Worth, Failure> {
 
 /// Lists a scene's systems, components and random streams, the used and unused effects, and their worth if
 /// measured.
-pub(crate) fn explain(scene: &Scene, worth: Option<&Worth>, as_json: bool) -> Result<u8, Failure> {
+pub(crate) fn explain(scene: &Scene, worth: Option<&EffectInfluence>, as_json: bool) -> Result<u8, Failure> {
     let simulation = Simulation::new(scene)?;
     if as_json {
         deliver(&serde_json::to_string_pretty(&in_json(scene, &simulation, worth))?)?;
@@ -66,7 +68,7 @@ fn summary(effect: &str) -> &'static str {
     EFFECTS.iter().find(|kind| kind.name() == effect).map_or("", |kind| kind.summary())
 }
 
-fn in_json(scene: &Scene, simulation: &Simulation, worth: Option<&Worth>) -> Value {
+fn in_json(scene: &Scene, simulation: &Simulation, worth: Option<&EffectInfluence>) -> Value {
     let system = |(stage, name): &(Stage, String)| json!({"stage": stage.as_str(), "system": name});
     let effect = |effect: &Added| {
         json!({
@@ -88,7 +90,7 @@ fn in_json(scene: &Scene, simulation: &Simulation, worth: Option<&Worth>) -> Val
     })
 }
 
-fn worth_in_json(worth: &Worth) -> Value {
+fn worth_in_json(worth: &EffectInfluence) -> Value {
     let mean = |mean: &Mean| json!({"mean": mean.mean, "half": mean.half.is_finite().then_some(mean.half)});
     let left_out = |out: &LeftOut| {
         json!({
@@ -104,7 +106,7 @@ fn worth_in_json(worth: &Worth) -> Value {
 }
 
 /// Text on the worth of the effects: the cheapest sufficient set, then each effect, the most expensive first.
-fn worth_in_words(worth: &Worth) -> String {
+fn worth_in_words(worth: &EffectInfluence) -> String {
     let kept =
         worth.each.iter().flat_map(|out| &out.effects).filter(|name| !worth.spared.effects.contains(name));
     let names = |names: Vec<&str>| if names.is_empty() { "none".to_owned() } else { names.join(", ") };

@@ -10,10 +10,10 @@ use headrace_import::routing::RoutingError;
 use headrace_monitor::PluginError;
 use headrace_replay::SimulationError;
 use headrace_replay::drive::DriveError;
+use headrace_replay::effect_influence::EffectInfluenceError;
 use headrace_replay::log::LogError;
 use headrace_replay::playback::PlaybackError;
 use headrace_replay::smooth::SmoothError;
-use headrace_replay::worth::WorthError;
 use headrace_sampling::SamplingError;
 use headrace_simulator::SceneError;
 
@@ -58,7 +58,7 @@ pub(crate) enum Failure {
     #[error(transparent)]
     Drive(#[from] DriveError),
     #[error(transparent)]
-    Worth(#[from] WorthError),
+    EffectInfluence(#[from] EffectInfluenceError),
     #[error(transparent)]
     Playback(#[from] PlaybackError),
     #[error(transparent)]

@@ -6,8 +6,8 @@ use std::io::Write as _;
 use std::path::{Path, PathBuf};
 
 use headrace_monitor::report::Report;
+use headrace_replay::atomic_file::{self, AtomicFile};
 use headrace_replay::regular_file;
-use headrace_replay::whole_file::{self, WholeFile};
 
 use crate::failure::Failure;
 
@@ -53,7 +53,7 @@ pub(crate) fn bytes(files: &[PathBuf]) -> u64 {
 
 /// Writes a file atomically.
 pub(crate) fn write(path: &Path, content: &[u8]) -> Result<(), Failure> {
-    whole_file::write(path, content).map_err(|source| Failure::Write { path: path.to_owned(), source })
+    atomic_file::write(path, content).map_err(|source| Failure::Write { path: path.to_owned(), source })
 }
 
 /// Writes a report as JSON, atomically and without holding all of it in memory.
@@ -61,7 +61,7 @@ pub(crate) fn write(path: &Path, content: &[u8]) -> Result<(), Failure> {
 /// The JSON of a long dive would take more memory than the dive.
 pub(crate) fn write_json(path: &Path, report: &Report) -> Result<(), Failure> {
     let failed = |source| Failure::Write { path: path.to_owned(), source };
-    let mut file = WholeFile::create(path).map_err(failed)?;
+    let mut file = AtomicFile::create(path).map_err(failed)?;
     serde_json::to_writer_pretty(&mut file, report).map_err(|error| failed(error.into()))?;
     file.flush().and_then(|()| file.complete()).map_err(failed)
 }

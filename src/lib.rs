@@ -7,11 +7,11 @@ mod cli;
 mod commands;
 pub mod devices;
 mod dive;
-mod elsewhere;
 mod emulate;
 mod expect;
 mod explain;
 mod export;
+mod external_commands;
 mod failure;
 mod feeds;
 mod files;
@@ -29,6 +29,7 @@ mod manual;
 mod mavlink_out;
 mod memory;
 mod notes;
+mod other_targets;
 mod output;
 mod outputs;
 mod page;
@@ -52,7 +53,6 @@ mod tui;
 mod vehicle_file;
 mod verify;
 mod watch;
-mod what_if;
 
 use std::io::IsTerminal as _;
 use std::process::ExitCode;
@@ -86,14 +86,14 @@ pub fn main() -> ExitCode {
         Command::Trim(args) => trim::trim(&args),
         Command::Simulate(simulate) => simulate::simulate(&simulate),
         Command::Import(args) => import::import(&args),
-        Command::Cost(args) => elsewhere::run(&elsewhere::COST, None, &args),
+        Command::Cost(args) => external_commands::run(&external_commands::COST, None, &args),
         Command::Plan(args) => plan::plan(&args),
         Command::Calibrate(args) => calibrate::calibrate(&args),
         Command::Emulate(args) => emulate::emulate(&args),
         Command::Devices(args) => inventory::devices(&args),
         Command::Check(args) => check::check(&args),
-        Command::Campaign(args) => elsewhere::run(&elsewhere::CAMPAIGN, None, &args),
-        Command::Batch(args) => elsewhere::run(&elsewhere::CAMPAIGN, Some("--batch"), &args),
+        Command::Campaign(args) => external_commands::run(&external_commands::CAMPAIGN, None, &args),
+        Command::Batch(args) => external_commands::run(&external_commands::CAMPAIGN, Some("--batch"), &args),
         Command::Completions(args) => manual::completions(&args),
         Command::Man(args) => manual::man(&args),
     };

@@ -6,8 +6,8 @@ use std::fs::OpenOptions;
 use std::io::{ErrorKind, Read, Seek as _, SeekFrom};
 use std::path::Path;
 
+use headrace_replay::atomic_file::is_pipe;
 use headrace_replay::log::{DiveLog, RECOVERED_FROM, TRIMMED};
-use headrace_replay::whole_file::is_pipe;
 
 use crate::failure::Failure;
 use crate::files;

@@ -3,9 +3,9 @@
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
 
+use headrace_replay::atomic_file::AtomicFile;
 use headrace_replay::log::{DiveLog, Recovered, files_digest, files_of, recover as rewrite};
 use headrace_replay::record::result_channels;
-use headrace_replay::whole_file::WholeFile;
 use serde_json::json;
 
 use crate::cli::Recover;
@@ -31,7 +31,7 @@ fn write(files: &[PathBuf], output: &Path) -> Result<Recovered, Failure> {
     let failed = |source| Failure::Write { path: output.to_owned(), source };
     let names: Vec<String> = files.iter().map(|file| file.display().to_string()).collect();
     let from = format!("{} (sha256 {})", names.join(", "), files_digest(files)?);
-    let mut file = WholeFile::create(output).map_err(failed)?;
+    let mut file = AtomicFile::create(output).map_err(failed)?;
     let mut writer = Writing::new(&mut file, files::bytes(files));
     let recovered = rewrite(&mut || DiveLog::open(files), &mut writer, &result_channels(), &from)
         .map_err(Failure::writing(output))?;

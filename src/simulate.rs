@@ -5,9 +5,9 @@ use std::path::{Path, PathBuf};
 
 use headrace_config::Document;
 use headrace_geometry::time::MonoNs;
+use headrace_replay::atomic_file::AtomicFile;
 use headrace_replay::log::LogWriter;
 use headrace_replay::simulation;
-use headrace_replay::whole_file::WholeFile;
 use headrace_sensor::device::Direction;
 use headrace_simulator::environment::What;
 use headrace_simulator::{START, Scene, Simulation, SoundingTruth, Take, TruthRow};
@@ -38,7 +38,7 @@ pub(crate) fn simulate(args: &Simulate) -> Result<u8, Failure> {
     let scene = read(args.seed)?;
     match args.explain {
         Some(Explain::List) => return explain(&scene, None, args.json),
-        Some(Explain::Worth) => {
+        Some(Explain::EffectInfluence) => {
             let seeds = (scene.seed..).take(usize::from(args.seeds));
             let mut scenes = seeds.map(|seed| read(Some(seed))).collect::<Result<Vec<_>, _>>()?;
             let worth = worth_of(&mut scenes)?;
@@ -60,7 +60,7 @@ pub(crate) fn simulate(args: &Simulate) -> Result<u8, Failure> {
     let mut header = log_header(&scene.vehicle, &scene.vehicle_text, false);
     header.metadata.insert(SIMULATED.to_owned(), scene.name.clone());
     let failed = |source| Failure::Write { path: output.clone(), source };
-    let mut writer = LogWriter::new(WholeFile::create(output).map_err(failed)?, &header)
+    let mut writer = LogWriter::new(AtomicFile::create(output).map_err(failed)?, &header)
         .map_err(Failure::writing(output))?;
     let _phase = Phase::start("simulate");
     let mut progress = Progress::start();
@@ -109,7 +109,7 @@ pub(crate) fn simulate(args: &Simulate) -> Result<u8, Failure> {
 /// Ground truth as CSV, with a row per measurement.
 struct Truth {
     path: PathBuf,
-    file: WholeFile,
+    file: AtomicFile,
     effects: Vec<&'static str>,
     features: Vec<String>,
     rows: u64,
@@ -121,7 +121,7 @@ const COLUMNS: &str = "time_s,source,sense,number,chainage_m,x_m,y_m,z_m,roll_de
 impl Truth {
     fn create(path: &Path, scene: &Scene, simulation: &Simulation) -> Result<Self, Failure> {
         let failed = |source| Failure::Write { path: path.to_owned(), source };
-        let file = WholeFile::create(path).map_err(failed)?;
+        let file = AtomicFile::create(path).map_err(failed)?;
         let effects = simulation.added().iter().map(|added| added.effect).collect();
         let features =
             simulation.scenery().map(|scenery| scenery.environment.features().to_vec()).unwrap_or_default();

@@ -2,13 +2,13 @@
 
 use headrace_config::plain::one_line;
 use headrace_coverage::Unsure;
+use headrace_monitor::live_messages::UnsureStretch;
 use headrace_monitor::live_state::LiveMetres;
 use headrace_monitor::live_text::{helps_text, metres_text, of_it_text, unsure_text};
+use headrace_monitor::other_targets::OtherTargetReport;
 use headrace_monitor::pilot_text::{actions_text, cause_text, station};
 use headrace_monitor::report::{ChangeReport, JudgedReport, SmoothingReport};
 use headrace_monitor::report::{DiveReport, NotInspectedReport, Report, RunReport, SourceReport};
-use headrace_monitor::telling::UnsureStretch;
-use headrace_monitor::what_if::WhatIfReport;
 
 use crate::terminal;
 
@@ -45,7 +45,7 @@ pub(crate) fn summary(report: &Report, columns: Option<usize>) -> String {
             line(stretch);
         }
         for other in &report.what_if {
-            let WhatIfReport { target_m, section_m, .. } = other;
+            let OtherTargetReport { target_m, section_m, .. } = other;
             line(format!("  with target {target_m} m in sections of {section_m} m: {}", metres(other)));
         }
         if terminal::is_verbose() {
@@ -178,8 +178,8 @@ fn outside_text(dive: &DiveReport) -> String {
 }
 
 /// Metres by verdict.
-fn metres(judged: &WhatIfReport) -> String {
-    let WhatIfReport { pass_m, fail_m, cannot_say_m, open_m, not_inspected_m, .. } = *judged;
+fn metres(judged: &OtherTargetReport) -> String {
+    let OtherTargetReport { pass_m, fail_m, cannot_say_m, open_m, not_inspected_m, .. } = *judged;
     metres_text(&LiveMetres { pass_m, fail_m, cannot_say_m, open_m, not_inspected_m })
 }
 

@@ -2,11 +2,11 @@
 
 use headrace_config::plain::one_line;
 use headrace_geometry::time::{DurNs, MonoNs};
+use headrace_monitor::live_messages::{LiveMessage, LiveMessages};
 use headrace_monitor::live_state::{Condition, Lamp, LiveState};
 use headrace_monitor::live_text::{PilotLine, status_line, told_line};
 use headrace_monitor::messages::Notice;
 use headrace_monitor::run::Loop;
-use headrace_monitor::telling::{Teller, Told};
 use headrace_ports::{Phase, Status};
 use headrace_replay::log::RecordingEvent;
 use serde_json::{Value, json};
@@ -43,7 +43,7 @@ pub(crate) struct Watch {
     show: Show,
     screen: Screen,
     printer: Option<Printer>,
-    teller: Teller,
+    teller: LiveMessages,
     /// Time and condition of the last state shown.
     shown: Option<(MonoNs, Condition)>,
     recorded: RecordingState,
@@ -59,7 +59,7 @@ impl Watch {
             show,
             screen: Screen::of_stdout(),
             printer: matches!(show, Show::Lines | Show::JsonLines).then(|| Printer::start(false)),
-            teller: Teller::default(),
+            teller: LiveMessages::default(),
             shown: None,
             recorded: RecordingState::default(),
         }
@@ -270,7 +270,7 @@ impl Watch {
         }
     }
 
-    fn tell(&mut self, at: MonoNs, told: &[Told], dive: &Loop) {
+    fn tell(&mut self, at: MonoNs, told: &[LiveMessage], dive: &Loop) {
         for one in told {
             let line = told_line(one, &dive.mission().profile, dive.head_words());
             if self.show == Show::Lines {
@@ -283,7 +283,7 @@ impl Watch {
                 Ok(value) => value,
                 Err(error) => json!({"error": error.to_string()}),
             };
-            if let Some(object) = value.as_object_mut().filter(|_| !matches!(one, Told::Note(_))) {
+            if let Some(object) = value.as_object_mut().filter(|_| !matches!(one, LiveMessage::Note(_))) {
                 object.insert("text".to_owned(), line.text().into());
             }
             self.json(at, value);

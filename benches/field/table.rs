@@ -1,7 +1,8 @@
 //! Cells, and their figures as CSV and JSON.
 
 use headrace_tests::field_table::{
-    CONDITIONS, Cell, Condition, DRIVEN, Falsely, Figures, KINDS_OF_SOURCES, PLACES, Place, VEHICLES, Vehicle,
+    CONDITIONS, Cell, Condition, DRIVEN, FalsePass, Figures, KINDS_OF_SOURCES, PLACES, Place, VEHICLES,
+    Vehicle,
 };
 use serde_json::json;
 
@@ -93,7 +94,7 @@ pub(crate) fn csv(cells: &[NamedCell], figures: &[Figures]) -> String {
 
 /// A line for each section that passed although its true hole is over the target.
 pub(crate) fn falsely(cells: &[NamedCell], figures: &[Figures]) -> String {
-    let line = |name: &[String; 4], section: &Falsely| {
+    let line = |name: &[String; 4], section: &FalsePass| {
         let [told_m, sd_m, true_m] = section.hole_m;
         let (x_m, clock) = &section.at;
         format!(

@@ -4,7 +4,7 @@ use headrace_fusion::filter::clones::ErrorClones;
 use headrace_fusion::filter::context::Context;
 use headrace_fusion::filter::eskf::Eskf;
 use headrace_fusion::filter::factors::Factors;
-use headrace_fusion::filter::inertial::{Felt, Leg};
+use headrace_fusion::filter::inertial::{InertialSample, Leg};
 use headrace_fusion::filter::settings::Settings;
 use headrace_fusion::filter::sources::Source;
 use headrace_fusion::filter::state::{ERRORS, State};
@@ -113,9 +113,9 @@ impl Dive {
         }
     }
 
-    fn felt() -> Felt {
+    fn felt() -> InertialSample {
         let (rate, force) = (Vec3::zero(), Vec3::<Body>::new(0.0, 0.0, GRAVITY_MPS2));
-        Felt { rate_radps: Some(rate), force_mps2: Some(force) }
+        InertialSample { rate_radps: Some(rate), force_mps2: Some(force) }
     }
 
     pub(crate) fn state(&self) -> State {

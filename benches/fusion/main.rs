@@ -15,7 +15,7 @@ use std::time::Instant;
 
 use ahrs::{Ahrs as _, Madgwick};
 use headrace_fusion::filter::factors::Factors;
-use headrace_fusion::filter::inertial::{Felt, Leg};
+use headrace_fusion::filter::inertial::{InertialSample, Leg};
 use headrace_fusion::filter::measure;
 use headrace_fusion::filter::settings::Settings;
 use headrace_geometry::frames::Vec3;
@@ -162,7 +162,8 @@ fn update() {
 fn sample() {
     let state = Dive::under_way().state();
     let (rate, force) = ([0.02, -0.01, 0.03], [0.3, 0.2, 9.8]);
-    let felt = Felt { rate_radps: Some(Vec3::of(rate.into())), force_mps2: Some(Vec3::of(force.into())) };
+    let felt =
+        InertialSample { rate_radps: Some(Vec3::of(rate.into())), force_mps2: Some(Vec3::of(force.into())) };
     let madgwick = Madgwick::new(SAMPLE_S, 0.1);
     let (rate, force) = (peers::Vector3::from(rate), peers::Vector3::from(force));
     let [ours, peer] = in_turns([

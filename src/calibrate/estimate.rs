@@ -20,7 +20,7 @@ impl Estimate {
 /// Reason for which a quantity can't be estimated from this log.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 #[non_exhaustive]
-pub(crate) enum Untold {
+pub(crate) enum NotEstimated {
     /// No readings of a required kind.
     #[error("the log has no readings of {what}")]
     Missing {

@@ -6,7 +6,7 @@ use headrace_sensor::device::{SensorInfo, SensorKind};
 use headrace_vehicle::{NavigationConfig, VehicleConfig};
 
 use crate::calibrate::collect::Collected;
-use crate::calibrate::estimate::Untold;
+use crate::calibrate::estimate::NotEstimated;
 use crate::calibrate::heads::{Heads, heads};
 use crate::calibrate::material::Material;
 use crate::calibrate::still::longest;
@@ -17,15 +17,15 @@ use crate::calibrate::zero::{self, Zero};
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Findings {
     /// Mounts of the heads.
-    pub(crate) heads: Result<Heads, Untold>,
+    pub(crate) heads: Result<Heads, NotEstimated>,
     /// Pressure at the surface, Pa.
-    pub(crate) surface: Result<Zero, Untold>,
+    pub(crate) surface: Result<Zero, NotEstimated>,
     /// Height of the water's surface above the floor, m.
-    pub(crate) level: Result<Zero, Untold>,
+    pub(crate) level: Result<Zero, NotEstimated>,
     /// Chainage at which each cable counter reads zero, m, with the file's value.
-    pub(crate) tethers: Result<Vec<(Zero, f64)>, Untold>,
+    pub(crate) tethers: Result<Vec<(Zero, f64)>, NotEstimated>,
     /// Time offsets.
-    pub(crate) lags: Result<Vec<Lag>, Untold>,
+    pub(crate) lags: Result<Vec<Lag>, NotEstimated>,
 }
 
 impl Findings {
@@ -56,14 +56,14 @@ impl Findings {
         let heads = heads(&in_time);
         let surface = match collected.at_surface {
             Some([from, to]) => zero::surface(&all, from, to),
-            None => Err(Untold::NoSurface),
+            None => Err(NotEstimated::NoSurface),
         };
         let surface_pa = surface.as_ref().ok().map(|zero| zero.found.value);
         let level = heads
             .as_ref()
             .map_err(|why| *why)
             .and_then(|heads| zero::water_level(&in_time, heads, surface_pa));
-        let tethers = chainage_m.ok_or(Untold::NoChainage).and_then(|chainage_m| {
+        let tethers = chainage_m.ok_or(NotEstimated::NoChainage).and_then(|chainage_m| {
             let zeros = zero::tethers(&in_time, &longest(&in_time)?, chainage_m)?;
             let filed_m = |zero: &Zero| match collected.sensors.get(zero.source).map(|sensor| sensor.kind) {
                 Some(SensorKind::Tether { zero_at_m, .. }) => zero_at_m,

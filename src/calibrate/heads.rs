@@ -1,6 +1,6 @@
 //! Mounts of the heads, from their turns while the vehicle stands still in a tunnel of known profile.
 
-use crate::calibrate::estimate::{Estimate, Untold, median};
+use crate::calibrate::estimate::{Estimate, NotEstimated, median};
 use crate::calibrate::fit::{ANGLE_SD_RAD, COMMON, Fit, OFFSET_SD_M, OWN, Problem, is_outlier, moved, own};
 use crate::calibrate::material::Material;
 use crate::calibrate::scan::{HeadScan, Scan, gather};
@@ -43,13 +43,13 @@ pub(crate) struct Head {
     /// Root mean square residual of the returns used, m.
     pub(crate) rms_m: f64,
     /// Angle about its axis to be added to the file's, radians, in the estimated sense of rotation.
-    pub(crate) angle_rad: Result<Estimate, Untold>,
+    pub(crate) angle_rad: Result<Estimate, NotEstimated>,
     /// Offset to the left of the file's position, relative to the other heads, m.
-    pub(crate) left_m: Result<Estimate, Untold>,
+    pub(crate) left_m: Result<Estimate, NotEstimated>,
     /// Offset upwards from the file's position, relative to the other heads, m.
-    pub(crate) up_m: Result<Estimate, Untold>,
+    pub(crate) up_m: Result<Estimate, NotEstimated>,
     /// Whether it turns the opposite way (faces aft where the file has forward).
-    pub(crate) is_mirrored: Result<bool, Untold>,
+    pub(crate) is_mirrored: Result<bool, NotEstimated>,
 }
 
 /// All heads, and the vehicle's position.
@@ -70,14 +70,14 @@ pub(crate) struct Heads {
 /// Calibrates the heads from the longest time in which the vehicle stood still.
 ///
 /// Errors: there is no such time, or the wall doesn't match the profile.
-pub(crate) fn heads(material: &Material<'_>) -> Result<Heads, Untold> {
+pub(crate) fn heads(material: &Material<'_>) -> Result<Heads, NotEstimated> {
     let still = longest(material)?;
     let scan = gather(material, &still)?;
     let (scans, little): (Vec<HeadScan>, Vec<HeadScan>) =
         scan.heads.iter().cloned().partition(|head| head.seen_rad().to_degrees() >= LEAST_SEEN_DEG);
     if scans.is_empty() {
         let seen_deg = little.iter().map(|head| head.seen_rad().to_degrees()).fold(0.0, f64::max);
-        return Err(Untold::LittleWall { seen_deg, least_deg: LEAST_SEEN_DEG });
+        return Err(NotEstimated::LittleWall { seen_deg, least_deg: LEAST_SEEN_DEG });
     }
     let scan = Scan { heads: scans, ..scan };
     let mut found = match scan.heads.len() {
@@ -94,7 +94,7 @@ pub(crate) fn heads(material: &Material<'_>) -> Result<Heads, Untold> {
 /// A head that has seen too little of the wall.
 fn unseen(head: &HeadScan) -> Head {
     let seen_deg = head.seen_rad().to_degrees();
-    let why = Untold::LittleWall { seen_deg, least_deg: LEAST_SEEN_DEG };
+    let why = NotEstimated::LittleWall { seen_deg, least_deg: LEAST_SEEN_DEG };
     Head {
         source: head.source,
         filed: head.mount,
@@ -110,7 +110,7 @@ fn unseen(head: &HeadScan) -> Head {
     }
 }
 
-fn solve<const N: usize>(material: &Material<'_>, scan: &Scan, still: Still) -> Result<Heads, Untold> {
+fn solve<const N: usize>(material: &Material<'_>, scan: &Scan, still: Still) -> Result<Heads, NotEstimated> {
     let place = first_place(material, scan);
     let guesses: Vec<[Guess; 2]> = scan
         .heads
@@ -125,7 +125,7 @@ fn solve<const N: usize>(material: &Material<'_>, scan: &Scan, still: Still) -> 
         residuals.iter().filter_map(|one| one.row.map(|(_, off_m)| off_m.abs())).collect();
     let median_m = median(&mut sizes).unwrap_or(f64::INFINITY);
     if median_m > MOST_MEDIAN_M {
-        return Err(Untold::Contradicted { median_m, most_m: MOST_MEDIAN_M });
+        return Err(NotEstimated::Contradicted { median_m, most_m: MOST_MEDIAN_M });
     }
     let count = scan.heads.len();
     let heads = scan.heads.iter().enumerate().map(|(number, head)| {
@@ -138,7 +138,7 @@ fn solve<const N: usize>(material: &Material<'_>, scan: &Scan, still: Still) -> 
         let is_mirrored = senses.of(number);
         let angle_rad = angle(&fit, number);
         let [left_m, up_m] = [1, 2].map(|i| offset(&fit, number, i, count));
-        let value = |of: &Result<Estimate, Untold>| of.as_ref().map_or(0.0, |of| of.value);
+        let value = |of: &Result<Estimate, NotEstimated>| of.as_ref().map_or(0.0, |of| of.value);
         let turned = senses.mirrored.get(number).copied().unwrap_or(false);
         Head {
             source: head.source,
@@ -284,10 +284,10 @@ impl Senses {
         Self { mirrored: best, margins }
     }
 
-    fn of(&self, head: usize) -> Result<bool, Untold> {
+    fn of(&self, head: usize) -> Result<bool, NotEstimated> {
         let margin = self.margins.get(head).copied().unwrap_or(0.0);
         if margin < CLEAR {
-            return Err(Untold::Mirror { margin: margin.max(0.0), needed: CLEAR });
+            return Err(NotEstimated::Mirror { margin: margin.max(0.0), needed: CLEAR });
         }
         Ok(self.mirrored.get(head).copied().unwrap_or(false))
     }
@@ -306,24 +306,29 @@ fn estimate<const N: usize>(fit: &Fit<N>, parts: &[(usize, f64)]) -> Estimate {
     Estimate { value, sd: math::sqrt(fit.factors.variance_along(&h)) }
 }
 
-fn angle<const N: usize>(fit: &Fit<N>, head: usize) -> Result<Estimate, Untold> {
+fn angle<const N: usize>(fit: &Fit<N>, head: usize) -> Result<Estimate, NotEstimated> {
     let angle = estimate(fit, &[(own(head, 0), 1.0)]);
     if angle.sd > TOLD * ANGLE_SD_RAD {
-        return Err(Untold::Round { sd_deg: angle.sd.to_degrees() });
+        return Err(NotEstimated::Round { sd_deg: angle.sd.to_degrees() });
     }
     Ok(angle)
 }
 
 /// Offset of a head from the file's position, relative to the mean of all heads.
-fn offset<const N: usize>(fit: &Fit<N>, head: usize, i: usize, count: usize) -> Result<Estimate, Untold> {
+fn offset<const N: usize>(
+    fit: &Fit<N>,
+    head: usize,
+    i: usize,
+    count: usize,
+) -> Result<Estimate, NotEstimated> {
     if count < 2 {
-        return Err(Untold::OneHead);
+        return Err(NotEstimated::OneHead);
     }
     let share = |other: usize| f64::from(u8::from(other == head)) - 1.0 / count as f64;
     let parts: Vec<(usize, f64)> = (0..count).map(|other| (own(other, i), share(other))).collect();
     let apart = estimate(fit, &parts);
     if apart.sd > TOLD * OFFSET_SD_M {
-        return Err(Untold::LikePlace { sd_m: apart.sd });
+        return Err(NotEstimated::LikePlace { sd_m: apart.sd });
     }
     Ok(apart)
 }

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use crate::calibrate::estimate::{Untold, median};
+use crate::calibrate::estimate::{NotEstimated, median};
 use crate::calibrate::material::Material;
 use crate::calibrate::still::Still;
 use headrace_fusion::filter::updates::in_tunnel;
@@ -112,13 +112,13 @@ fn sector(angle_rad: f64) -> usize {
 /// Gathers the ranges of a time at rest.
 ///
 /// Errors: there is no attitude, or no head detected the wall.
-pub(crate) fn gather(material: &Material<'_>, still: &Still) -> Result<Scan, Untold> {
+pub(crate) fn gather(material: &Material<'_>, still: &Still) -> Result<Scan, NotEstimated> {
     let attitudes = attitudes(material, still);
     let middle = attitudes.get(attitudes.len() / 2);
-    let (_, attitude) = *middle.ok_or(Untold::Missing { what: "an inertial unit's attitude" })?;
+    let (_, attitude) = *middle.ok_or(NotEstimated::Missing { what: "an inertial unit's attitude" })?;
     let heads = heads(material, still, &attitudes);
     if heads.is_empty() {
-        return Err(Untold::Missing { what: "any profiling head" });
+        return Err(NotEstimated::Missing { what: "any profiling head" });
     }
     Ok(Scan { attitude, heads, echoes: echoes(material, still) })
 }

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use crate::calibrate::estimate::{Untold, median};
+use crate::calibrate::estimate::{NotEstimated, median};
 use crate::calibrate::material::Material;
 use headrace_fusion::filter::state::rotation_vector;
 use headrace_geometry::frames::{Rot, Sensor};
@@ -67,19 +67,19 @@ struct Channel {
 /// Longest part in which the vehicle stood still; the first of equally long ones.
 ///
 /// Errors: there is no attitude or no return, or the vehicle moved all the time.
-pub(crate) fn longest(material: &Material<'_>) -> Result<Still, Untold> {
+pub(crate) fn longest(material: &Material<'_>) -> Result<Still, NotEstimated> {
     let (first, last) = match (material.events.first(), material.events.last()) {
         (Some(first), Some(last)) => (first.received, last.received),
-        _ => return Err(Untold::Missing { what: "any sensor" }),
+        _ => return Err(NotEstimated::Missing { what: "any sensor" }),
     };
     let bins = bin_of(last, first) + 1;
     let channels = channels(material, first, bins);
     let heard = heard(material, first, bins);
     if !channels.iter().any(|channel| channel.sign == Sign::Attitude) {
-        return Err(Untold::Missing { what: "an inertial unit's attitude" });
+        return Err(NotEstimated::Missing { what: "an inertial unit's attitude" });
     }
     if !heard.contains(&true) {
-        return Err(Untold::Missing { what: "any profiling head" });
+        return Err(NotEstimated::Missing { what: "any profiling head" });
     }
     let mut best = (0, 0);
     for from in 0..bins {
@@ -130,7 +130,7 @@ fn widened(span: Option<(f64, f64)>, value: f64) -> (f64, f64) {
 }
 
 /// Reason with the quantity that moved most, relative to its limit.
-fn moved(channels: &[Channel]) -> Untold {
+fn moved(channels: &[Channel]) -> NotEstimated {
     let mut worst = (Sign::Attitude, 0.0);
     for channel in channels {
         let span = channel.by_bin.iter().flatten().fold(None, |span, value| Some(widened(span, *value)));
@@ -141,7 +141,7 @@ fn moved(channels: &[Channel]) -> Untold {
     }
     let (sign, span) = worst;
     let (limit, unit) = sign.limit();
-    Untold::Moved { what: sign.what(), span, unit, limit, least_s: LEAST }
+    NotEstimated::Moved { what: sign.what(), span, unit, limit, least_s: LEAST }
 }
 
 fn heard(material: &Material<'_>, first: MonoNs, bins: usize) -> Vec<bool> {

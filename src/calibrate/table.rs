@@ -3,7 +3,7 @@
 use headrace_sampling::head::faces_aft;
 use headrace_vehicle::VehicleConfig;
 
-use crate::calibrate::estimate::{Estimate, Untold};
+use crate::calibrate::estimate::{Estimate, NotEstimated};
 use crate::calibrate::findings::Findings;
 use crate::calibrate::heads::Head;
 use crate::calibrate::zero::Zero;
@@ -54,7 +54,7 @@ pub(crate) struct Open {
     /// Quantity.
     pub(crate) what: &'static str,
     /// Reason.
-    pub(crate) why: Untold,
+    pub(crate) why: NotEstimated,
 }
 
 /// All estimates against a vehicle file.
@@ -101,18 +101,22 @@ impl Table {
         if value.abs() > MOST_SCALE && value.abs() > 3.0 * sd {
             self.lines.clear();
             let sound_mps = vehicle.site.sound_speed_mps / (1.0 + value);
-            self.open("water", "speed of sound", Untold::Scaled { long_pct: value * 100.0, sound_mps });
+            self.open("water", "speed of sound", NotEstimated::Scaled { long_pct: value * 100.0, sound_mps });
         }
     }
 
     /// Whether there is an error that no line of the vehicle file corrects.
     pub(crate) fn is_amiss(&self) -> bool {
-        let amiss =
-            |why: &Untold| matches!(why, Untold::Later { .. } | Untold::Slow { .. } | Untold::Scaled { .. });
+        let amiss = |why: &NotEstimated| {
+            matches!(
+                why,
+                NotEstimated::Later { .. } | NotEstimated::Slow { .. } | NotEstimated::Scaled { .. }
+            )
+        };
         self.open.iter().any(|open| amiss(&open.why))
     }
 
-    fn open(&mut self, of: &str, what: &'static str, why: Untold) {
+    fn open(&mut self, of: &str, what: &'static str, why: NotEstimated) {
         self.open.push(Open { of: of.to_owned(), what, why });
     }
 
@@ -122,7 +126,7 @@ impl Table {
         of: &str,
         (what, unit, decimals): (&'static str, &'static str, usize),
         file: f64,
-        found: Result<Estimate, Untold>,
+        found: Result<Estimate, NotEstimated>,
     ) -> bool {
         match found {
             Ok(found) => {
@@ -147,7 +151,8 @@ impl Table {
     }
 
     fn water(&mut self, vehicle: &VehicleConfig, findings: &Findings) {
-        let found = |zero: &Result<Zero, Untold>| zero.as_ref().map(|zero| zero.found).map_err(|why| *why);
+        let found =
+            |zero: &Result<Zero, NotEstimated>| zero.as_ref().map(|zero| zero.found).map_err(|why| *why);
         let surface = found(&findings.surface);
         let form = ("pressure at the surface", "Pa", 0);
         if self.number("water", form, vehicle.site.surface_pressure_pa, surface) {

@@ -3,7 +3,7 @@
 //! The filter runs with the timestamps of one source shifted, to find the shift that makes all innovations
 //! together most likely.
 
-use crate::calibrate::estimate::{Estimate, Untold};
+use crate::calibrate::estimate::{Estimate, NotEstimated};
 use crate::calibrate::material::Material;
 use headrace_fusion::filter::FilterNavigation;
 use headrace_fusion::{Navigation, Times};
@@ -37,7 +37,7 @@ pub(crate) struct Lag {
     /// Source.
     pub(crate) source: usize,
     /// Offset to be added to its latency, s.
-    pub(crate) offset_s: Result<Estimate, Untold>,
+    pub(crate) offset_s: Result<Estimate, NotEstimated>,
 }
 
 /// Estimates the lag of each source that navigation uses.
@@ -52,12 +52,12 @@ pub(crate) fn lags(
     material: &Material<'_>,
     latencies: &[DurNs],
     progress: &mut dyn FnMut(),
-) -> Result<Vec<Lag>, Untold> {
+) -> Result<Vec<Lag>, NotEstimated> {
     let mut runs = Runs::new(material, progress);
     let sources = runs.sources();
-    let mut base = runs.surprise().ok_or(Untold::NoFilter)?;
+    let mut base = runs.surprise().ok_or(NotEstimated::NoFilter)?;
     if runs.gated > MOST_GATED {
-        return Err(Untold::Disagrees { gated: runs.gated * 100.0, most: MOST_GATED * 100.0 });
+        return Err(NotEstimated::Disagrees { gated: runs.gated * 100.0, most: MOST_GATED * 100.0 });
     }
     let mut coarse: Vec<Option<Curve>> = Vec::new();
     for _ in 0..sources.len() {
@@ -91,9 +91,9 @@ pub(crate) fn lags(
     for lag in &mut lags {
         let latency_s = latencies.get(lag.source).map_or(0.0, |latency| latency.as_secs_f64());
         lag.offset_s = lag.offset_s.and_then(|offset| runs.possible(lag.source, latency_s, offset));
-        if let (Err(Untold::NoBest { .. }), true) = (lag.offset_s, runs.is_later(lag.source)) {
+        if let (Err(NotEstimated::NoBest { .. }), true) = (lag.offset_s, runs.is_later(lag.source)) {
             let reach_ms = REACH_S * 1e3;
-            lag.offset_s = Err(Untold::Later { reach_ms, then_ms: latency_s * 1e3 + reach_ms });
+            lag.offset_s = Err(NotEstimated::Later { reach_ms, then_ms: latency_s * 1e3 + reach_ms });
         }
     }
     Ok(lags)
@@ -172,7 +172,7 @@ impl<'a, 'b> Runs<'a, 'b> {
     }
 
     /// An offset, unless a device would then answer after its next request.
-    fn possible(&self, source: usize, latency_s: f64, offset: Estimate) -> Result<Estimate, Untold> {
+    fn possible(&self, source: usize, latency_s: f64, offset: Estimate) -> Result<Estimate, NotEstimated> {
         let answers = |kind: SensorKind| matches!(kind, SensorKind::Head | SensorKind::Echosounder { .. });
         let is_asked = self.material.sensors.get(source).is_some_and(|sensor| answers(sensor.kind));
         let of_source = || self.events.iter().filter(|event| event.source.index() == source);
@@ -181,7 +181,7 @@ impl<'a, 'b> Runs<'a, 'b> {
         let span_s = ends.map_or(0.0, |(first, last)| last.received.since(first.received).as_secs_f64());
         let every_s = span_s / count.saturating_sub(1).max(1) as f64;
         if is_asked && late_s >= every_s && every_s > 0.0 {
-            return Err(Untold::Slow { found_ms: late_s * 1e3, every_ms: every_s * 1e3 });
+            return Err(NotEstimated::Slow { found_ms: late_s * 1e3, every_ms: every_s * 1e3 });
         }
         Ok(offset)
     }
@@ -259,11 +259,11 @@ impl<'a, 'b> Runs<'a, 'b> {
         parabola(&points, base)
     }
 
-    fn lag(&mut self, source: usize, coarse: Option<&Curve>) -> Result<Estimate, Untold> {
-        let none = Untold::NoBest { reach_ms: REACH_S * 1e3 };
+    fn lag(&mut self, source: usize, coarse: Option<&Curve>) -> Result<Estimate, NotEstimated> {
+        let none = NotEstimated::NoBest { reach_ms: REACH_S * 1e3 };
         let coarse = coarse.ok_or(none)?;
         if coarse.sd_s > 2.0 * TOLD_S {
-            return Err(Untold::Flat { sd_ms: coarse.sd_s * 1e3 });
+            return Err(NotEstimated::Flat { sd_ms: coarse.sd_s * 1e3 });
         }
         let was_s = self.shift_s(source);
         let near = coarse.best_s.clamp(-REACH_S, REACH_S);
@@ -272,7 +272,7 @@ impl<'a, 'b> Runs<'a, 'b> {
         self.shift(source, was_s);
         let fine = fine.ok_or(none)?;
         if fine.sd_s > TOLD_S {
-            return Err(Untold::Flat { sd_ms: fine.sd_s * 1e3 });
+            return Err(NotEstimated::Flat { sd_ms: fine.sd_s * 1e3 });
         }
         if fine.best_s.abs() > COARSE_S {
             return Err(none);

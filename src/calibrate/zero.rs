@@ -1,6 +1,6 @@
 //! Zeros of depth sensors and cable counters.
 
-use crate::calibrate::estimate::{Estimate, Untold, median};
+use crate::calibrate::estimate::{Estimate, NotEstimated, median};
 use crate::calibrate::heads::Heads;
 use crate::calibrate::material::Material;
 use crate::calibrate::still::Still;
@@ -32,7 +32,7 @@ pub(crate) struct Zero {
 /// Its standard deviation is that of one reading, since waves and drift don't average out.
 ///
 /// Errors: the pressure is missing, varied too much, or isn't that of air.
-pub(crate) fn surface(material: &Material<'_>, from: MonoNs, to: MonoNs) -> Result<Zero, Untold> {
+pub(crate) fn surface(material: &Material<'_>, from: MonoNs, to: MonoNs) -> Result<Zero, NotEstimated> {
     let mut source = None;
     let mut quantum_pa = 0.0;
     let mut pressures = Vec::new();
@@ -45,17 +45,17 @@ pub(crate) fn surface(material: &Material<'_>, from: MonoNs, to: MonoNs) -> Resu
             quantum_pa = water.resolution_pa;
         }
     }
-    let source = source.ok_or(Untold::Missing { what: "a depth sensor at that time" })?;
+    let source = source.ok_or(NotEstimated::Missing { what: "a depth sensor at that time" })?;
     let least = pressures.iter().copied().fold(f64::INFINITY, f64::min);
     let most = pressures.iter().copied().fold(f64::NEG_INFINITY, f64::max);
     if most - least > MOST_SPAN_PA {
-        return Err(Untold::NotAtSurface { span_pa: most - least, most_pa: MOST_SPAN_PA });
+        return Err(NotEstimated::NotAtSurface { span_pa: most - least, most_pa: MOST_SPAN_PA });
     }
     let count = pressures.len().max(1) as f64;
     let mean = pressures.iter().sum::<f64>() / count;
     if !Site::SURFACE_PRESSURE_PA.contains(&mean) {
         let (least_pa, most_pa) = (*Site::SURFACE_PRESSURE_PA.start(), *Site::SURFACE_PRESSURE_PA.end());
-        return Err(Untold::UnderWater { mean_pa: mean, least_pa, most_pa });
+        return Err(NotEstimated::UnderWater { mean_pa: mean, least_pa, most_pa });
     }
     let variance = pressures.iter().map(|pa| (pa - mean) * (pa - mean)).sum::<f64>() / count;
     let sd = with_quantum(math::sqrt(variance), quantum_pa);
@@ -73,7 +73,7 @@ pub(crate) fn water_level(
     material: &Material<'_>,
     heads: &Heads,
     surface_pa: Option<f64>,
-) -> Result<Zero, Untold> {
+) -> Result<Zero, NotEstimated> {
     let mut site = material.site;
     site.surface_pressure_pa = surface_pa.unwrap_or(site.surface_pressure_pa);
     let mut attitude = Rot::identity();
@@ -97,7 +97,7 @@ pub(crate) fn water_level(
         }
     }
     let readings = levels.len();
-    let source = of.ok_or(Untold::Missing { what: "a depth sensor during the stand" })?;
+    let source = of.ok_or(NotEstimated::Missing { what: "a depth sensor during the stand" })?;
     let value = median(&mut levels).unwrap_or(f64::NAN);
     let [_, z] = heads.place_m;
     let sd = with_quantum(math::hypot(z.sd, material.settings.depth_sd_m), quantum_m);
@@ -107,7 +107,11 @@ pub(crate) fn water_level(
 /// Chainage at which each cable counter reads zero, m, from a time at rest at `chainage_m`.
 ///
 /// Errors: there is no cable counter.
-pub(crate) fn tethers(material: &Material<'_>, still: &Still, chainage_m: f64) -> Result<Vec<Zero>, Untold> {
+pub(crate) fn tethers(
+    material: &Material<'_>,
+    still: &Still,
+    chainage_m: f64,
+) -> Result<Vec<Zero>, NotEstimated> {
     let mut found: Vec<(usize, f64, Vec<f64>)> = Vec::new();
     for (event, sensor) in material.during(still.from, still.to) {
         let (SensorKind::Tether { scale, .. }, Reading::TetherLength(length)) = (sensor.kind, event.reading)
@@ -121,7 +125,7 @@ pub(crate) fn tethers(material: &Material<'_>, still: &Still, chainage_m: f64) -
         }
     }
     if found.is_empty() {
-        return Err(Untold::Missing { what: "a cable counter" });
+        return Err(NotEstimated::Missing { what: "a cable counter" });
     }
     let settings = &material.settings;
     // Slack is constant at rest, so it doesn't average out.

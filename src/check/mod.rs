@@ -5,7 +5,7 @@ mod outlook;
 
 use headrace_config::{ConfigErrors, Document};
 use headrace_sensor::reading::MAX_SOURCES;
-use headrace_simulator::{Scene, SceneError, Simulation, calm};
+use headrace_simulator::{Scene, SceneError, Simulation, position_error_model};
 use headrace_vehicle::{Finding, Grade, VehicleConfig};
 use serde_json::{Value, json};
 
@@ -121,7 +121,7 @@ impl Readable {
         // The files that it names have been read with it.
         let named = |file: &str| vehicle.attachments.iter().find(|(attached, _)| attached == file);
         let own = |file: &str| Ok(named(file).map_or(text, |(_, text)| text.as_str()).as_bytes().to_vec());
-        let errors = calm::expected_errors(&vehicle, "vehicle.toml", &KINDS, &own);
+        let errors = position_error_model::expected_errors(&vehicle, "vehicle.toml", &KINDS, &own);
         let errors = errors.map_err(|why| why.to_string());
         let outlook =
             errors.clone().and_then(|errors| Outlook::of(&vehicle, errors).map_err(|why| why.to_string()));

@@ -6,7 +6,7 @@ use clap::Args;
 use headrace_geometry::time::DurNs;
 use headrace_import::FileKind;
 
-use super::habits::{Overwrite, Threads};
+use super::common_options::{Overwrite, Threads};
 use super::value_parsers::{chainage_range, file_kind, source_line, time};
 
 #[derive(Debug, Args)]

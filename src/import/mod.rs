@@ -16,8 +16,8 @@ use headrace_import::ros::mcap::Mcap;
 use headrace_import::{
     BEGIN, FileKind, Format, Import, ImportError, Imported, Input, Source, Taker, detect, routing,
 };
+use headrace_replay::atomic_file::AtomicFile;
 use headrace_replay::log::{LogError, LogHeader, LogWriter};
-use headrace_replay::whole_file::WholeFile;
 use headrace_vehicle::VehicleConfig;
 use serde_json::json;
 
@@ -105,7 +105,7 @@ fn write<S: Source>(
     header.metadata.insert("import_file".to_owned(), file_name.unwrap_or_default());
     let ids: Vec<String> = header.sources.iter().map(|source| source.id.clone()).collect();
     let failed = |source| Failure::Write { path: args.output.clone(), source };
-    let mut log = LogWriter::new(WholeFile::create(&args.output).map_err(failed)?, &header)
+    let mut log = LogWriter::new(AtomicFile::create(&args.output).map_err(failed)?, &header)
         .map_err(Failure::writing(&args.output))?;
     let mut progress = Progress::start();
     let imported = import.write(&mut log, takers, &mut |entries| {

@@ -2,8 +2,8 @@
 
 use std::path::{Path, PathBuf};
 
+use headrace_replay::atomic_file::number_of;
 use headrace_replay::log::{in_the_way, named_part, part_path};
-use headrace_replay::whole_file::number_of;
 
 use super::{Kind, may_write};
 use crate::cli::Overwrite;

@@ -14,7 +14,7 @@ use headrace_sampling::occlusion::Obstacle;
 use headrace_sampling::plan::{Inspection, Question};
 use headrace_sensor::SensorConfig;
 use headrace_sensor::device::Device;
-use headrace_simulator::calm;
+use headrace_simulator::position_error_model;
 use headrace_vehicle::TunnelConfig;
 
 use crate::cli::Plan;
@@ -84,7 +84,8 @@ impl Case {
         let layout = args.layout.unwrap_or(vehicle.layout);
         let sound_speed_mps = vehicle.site.sound_speed_mps;
         let name = path.file_name().map(|name| name.to_string_lossy()).unwrap_or_default();
-        let errors = calm::expected_errors(&vehicle, &name, &KINDS, &files::bytes_beside(path));
+        let errors =
+            position_error_model::expected_errors(&vehicle, &name, &KINDS, &files::bytes_beside(path));
         let errors = errors.map_err(|why| Failure::Usage(format!("plan: {why}")))?;
         let mut inputs = vehicle_file::files(path, &vehicle);
         let case = Self::new(

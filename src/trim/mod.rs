@@ -7,14 +7,14 @@ use std::path::PathBuf;
 
 use headrace_geometry::time::{DurNs, MonoNs};
 use headrace_monitor::console::{CONSOLE_ID, Command};
+use headrace_replay::atomic_file::AtomicFile;
 use headrace_replay::drive::Pace;
 use headrace_replay::log::{
     DiveLog, LogHeader, LogInfo, Trim as Work, Trimmed, files_digest, files_of, trim as rewrite,
 };
 use headrace_replay::player::{Player, seconds};
 use headrace_replay::record::result_channels;
-use headrace_replay::whole_file::WholeFile;
-use headrace_sensor::device::Needless;
+use headrace_sensor::device::OptionalPayload;
 use headrace_vehicle::VehicleConfig;
 use serde_json::json;
 
@@ -170,7 +170,7 @@ fn write(
         let configs = vehicle?.sensor_configs.iter().zip(&vehicle?.sensors);
         configs.into_iter().find(|(config, _)| config.id == *id).map(|(_, device)| device)
     };
-    let wanted = [(args.drop_echoes, Needless::Echoes), (args.anonymise, Needless::Identity)];
+    let wanted = [(args.drop_echoes, OptionalPayload::Echoes), (args.anonymise, OptionalPayload::Identity)];
     let mut between = Vec::new();
     let mut change = |source: u16, bytes: &[u8], shorter: &mut Vec<u8>| {
         if args.anonymise && sources.get(usize::from(source)).is_some_and(|source| source.id == CONSOLE_ID) {
@@ -203,7 +203,7 @@ fn write(
         // Alerts and notes name people.
         results: &|topic| !args.anonymise || !topic.ends_with("/alerts"),
     };
-    let mut file = WholeFile::create(&args.output).map_err(failed)?;
+    let mut file = AtomicFile::create(&args.output).map_err(failed)?;
     let mut writer = Writing::new(&mut file, files::bytes(files));
     let trimmed = rewrite(&mut || DiveLog::open(files), &mut writer, &mut work, &result_channels())
         .map_err(Failure::writing(&args.output))?;

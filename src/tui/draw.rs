@@ -11,10 +11,10 @@ use ratatui::layout::Rect;
 use ratatui::style::{Modifier, Style};
 use ratatui::text::{Line, Span};
 
+use super::frame::ScreenFrame;
 use super::mode::Stop;
 use super::panels::{self, CLOCK_ROWS};
-use super::paper::{Ink, Rows};
-use super::shot::Shot;
+use super::screen_buffer::{Palette, Rows};
 use super::wall::{Extent, Wall};
 use crate::cli::KEYS;
 
@@ -36,8 +36,8 @@ pub(super) struct Playing {
 /// Content of the screen.
 pub(super) struct Page {
     mode: &'static str,
-    pub(super) ink: Ink,
-    pub(super) shot: Option<Shot>,
+    pub(super) ink: Palette,
+    pub(super) shot: Option<ScreenFrame>,
     pub(super) wall: Wall,
     told: VecDeque<PilotLine>,
     /// Time for which the loop has been stalled.
@@ -51,7 +51,7 @@ pub(super) struct Page {
 }
 
 impl Page {
-    pub(super) fn new(mode: &'static str, ink: Ink) -> Self {
+    pub(super) fn new(mode: &'static str, ink: Palette) -> Self {
         Self {
             mode,
             ink,
@@ -68,7 +68,7 @@ impl Page {
     }
 
     /// Takes a frame.
-    pub(super) fn take(&mut self, mut shot: Shot) {
+    pub(super) fn take(&mut self, mut shot: ScreenFrame) {
         self.wall.take(&shot.wall);
         for line in shot.told.drain(..) {
             self.tell(line);
@@ -125,7 +125,7 @@ impl Page {
     }
 
     /// Draws the panels within the available room.
-    fn panels(&self, shot: &Shot, rows: &mut Rows<'_>) {
+    fn panels(&self, shot: &ScreenFrame, rows: &mut Rows<'_>) {
         // Alerts and messages have at least two rows, the wall its two strips. Each panel except the last has
         // a title.
         let left = usize::from(rows.left()).saturating_sub(3 + 3 + 1 + 2);
@@ -171,14 +171,14 @@ impl Page {
             .collect();
         let gap = width.saturating_sub(left.chars().count() + right.chars().count());
         rows.line(Line::from(vec![
-            Span::styled(left, Ink::dim()),
+            Span::styled(left, Palette::dim()),
             Span::raw(" ".repeat(gap)),
             Span::styled(right, Style::default().add_modifier(Modifier::BOLD)),
         ]));
     }
 
     /// Draws the condition across the whole width, with the allowed speed in large digits if there is room.
-    fn banner(&self, shot: &Shot, area: Rect, rows: &mut Rows<'_>) {
+    fn banner(&self, shot: &ScreenFrame, area: Rect, rows: &mut Rows<'_>) {
         let condition = shot.state.condition();
         let lamp = if self.late.is_some() { Lamp::Red } else { condition.lamp() };
         let style = self.ink.banner(lamp);

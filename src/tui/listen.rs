@@ -8,9 +8,9 @@ use std::thread;
 use crossbeam::channel::Sender;
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
 
-use super::hold;
 use super::keys::{INTERRUPT, Key, keys};
 use super::message::Message;
+use super::terminal_guard;
 use crate::interrupt::{self, Requests};
 
 /// Longest wait for a key before the end is noticed.
@@ -69,7 +69,7 @@ pub(super) fn listen(to: Sender<Message>, interrupted: Arc<AtomicBool>) -> io::R
 }
 
 fn end_at_once() {
-    hold::restore_from_elsewhere();
+    terminal_guard::restore_from_elsewhere();
     crate::logging::release();
     std::process::exit(1);
 }

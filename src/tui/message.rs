@@ -1,11 +1,11 @@
 //! Messages to the renderer's thread.
 
+use super::frame::ScreenFrame;
 use super::keys::Key;
-use super::shot::Shot;
 
 /// A frame, a key, or the end.
 pub(super) enum Message {
-    Shot(Box<Shot>),
+    ScreenFrame(Box<ScreenFrame>),
     Key(Key),
     /// Ctrl-C.
     Interrupted,

@@ -4,16 +4,16 @@
 //! waits for the terminal.
 
 mod alerts;
-mod artist;
 mod draw;
-mod hold;
+mod frame;
 mod keys;
 mod listen;
 mod message;
 mod mode;
 mod panels;
-mod paper;
-mod shot;
+mod renderer;
+mod screen_buffer;
+mod terminal_guard;
 mod wall;
 
 use std::sync::Arc;
@@ -37,12 +37,12 @@ use crate::interrupt;
 use crate::output::give_up;
 use crate::recording_state::RecordingState;
 use alerts::Desk;
-use artist::Artist;
-use hold::Hold;
+use frame::FrameBuilder;
 use message::Message;
 pub(crate) use mode::Mode;
 use mode::Stop;
-use shot::Eye;
+use renderer::Renderer;
+use terminal_guard::TerminalGuard;
 
 /// Longest wait of a live dive for its terminal at the end.
 const ENDS_WITHIN: Duration = Duration::from_secs(2);
@@ -62,7 +62,7 @@ pub(crate) struct Start<'a> {
 
 /// Follower that shows a dive on the whole terminal.
 pub(crate) struct Tui {
-    eye: Eye,
+    eye: FrameBuilder,
     wanted: Arc<AtomicBool>,
     sender: Option<Sender<Message>>,
     thread: Option<JoinHandle<()>>,
@@ -78,7 +78,7 @@ impl Tui {
     ///
     /// Errors: stdin or stdout is no terminal.
     pub(crate) fn prepare() -> Result<(), Failure> {
-        hold::check()?;
+        terminal_guard::check()?;
         interrupt::leave_second_to_keys();
         Ok(())
     }
@@ -88,19 +88,20 @@ impl Tui {
     /// Errors: the terminal's settings can't be changed, or a thread can't be started.
     pub(crate) fn start(start: Start<'_>) -> Result<Self, Failure> {
         let failed = |source| Failure::System { what: "taking the terminal", source };
-        let hold = Hold::take().map_err(failed)?;
+        let hold = TerminalGuard::take().map_err(failed)?;
         let (sender, messages) = bounded(64);
         let wanted = Arc::new(AtomicBool::new(true));
         let is_live = matches!(start.mode, Mode::Live);
         let ended = listen::listen(sender.clone(), Arc::clone(&start.interrupted)).map_err(failed)?;
-        let artist = Artist::new(hold, start.mode, Desk::new(start.console), Arc::clone(&wanted), ended);
+        let artist = Renderer::new(hold, start.mode, Desk::new(start.console), Arc::clone(&wanted), ended);
         let (drawing, done) = bounded(0);
         let draw = move || {
             artist.draw_until_the_end(&messages);
             drop::<Sender<()>>(drawing);
         };
-        let thread = thread::Builder::new().name(hold::ARTIST.to_owned()).spawn(draw).map_err(failed)?;
-        let mut eye = Eye::new(start.vehicle);
+        let thread =
+            thread::Builder::new().name(terminal_guard::ARTIST.to_owned()).spawn(draw).map_err(failed)?;
+        let mut eye = FrameBuilder::new(start.vehicle);
         if let Some(first) = start.first {
             eye.tell(PilotLine { place: "BEGUN".to_owned(), what: vec![first], ..PilotLine::default() });
         }
@@ -113,7 +114,7 @@ impl Tui {
         if self.is_live && sender.is_full() {
             return;
         }
-        let shot = Message::Shot(Box::new(self.eye.shot(dive, stopped)));
+        let shot = Message::ScreenFrame(Box::new(self.eye.shot(dive, stopped)));
         // A thread that has stopped shows nothing more; it has logged the reason.
         let is_taken = if self.is_live { sender.try_send(shot).is_ok() } else { sender.send(shot).is_ok() };
         if !is_taken {
@@ -170,14 +171,14 @@ impl Tui {
     /// Releases the terminal; in a live dive within [`ENDS_WITHIN`].
     fn close(&mut self) {
         let Some(sender) = self.sender.take() else { return };
-        hold::leave();
+        terminal_guard::leave();
         sender.try_send(Message::End).ok();
         drop(sender);
         let stuck = self.done.recv_timeout(ENDS_WITHIN) == Err(RecvTimeoutError::Timeout);
         if stuck {
             self.thread = None;
             give_up();
-            hold::restore_settings();
+            terminal_guard::restore_settings();
         }
         if let Some(thread) = self.thread.take()
             && thread.join().is_err()

@@ -10,8 +10,8 @@ use ratatui::style::{Color, Modifier, Style};
 use ratatui::text::{Line, Span};
 
 use super::alerts::AlertRow;
-use super::paper::{Ink, Rows};
-use super::shot::{SensorRow, Shot};
+use super::frame::{ScreenFrame, SensorRow};
+use super::screen_buffer::{Palette, Rows};
 use super::wall::{Cell, Extent, HOURS, Known, Strip, Wall};
 use crate::output::append;
 
@@ -23,7 +23,7 @@ const LAMP_COLUMNS: [usize; 2] = [24, 19];
 const LABEL: usize = 6;
 
 /// Draws the speed against v_max as a band, with the reason below.
-pub(super) fn speed(shot: &Shot, ink: Ink, rows: &mut Rows<'_>) {
+pub(super) fn speed(shot: &ScreenFrame, ink: Palette, rows: &mut Rows<'_>) {
     let state = &shot.state;
     let is_known = is_now(shot);
     let (speed_mps, v_max_mps) =
@@ -46,7 +46,7 @@ pub(super) fn speed(shot: &Shot, ink: Ink, rows: &mut Rows<'_>) {
             let (letter, style) = match column {
                 column if column == mark => (limit, Style::default().add_modifier(Modifier::BOLD)),
                 column if column < filled => (full, style),
-                _ => (empty, Ink::dim()),
+                _ => (empty, Palette::dim()),
             };
             spans.push(Span::styled(letter.to_string(), style));
         }
@@ -82,12 +82,12 @@ fn fitted(parts: &[&str], columns: usize) -> String {
 }
 
 /// Whether the state is current.
-pub(super) fn is_now(shot: &Shot) -> bool {
+pub(super) fn is_now(shot: &ScreenFrame) -> bool {
     !matches!(shot.state.condition(), Condition::Old(_) | Condition::NoData)
 }
 
 /// Draws position, its error, and the metres by verdict.
-pub(super) fn place(shot: &Shot, ink: Ink, rows: &mut Rows<'_>) {
+pub(super) fn place(shot: &ScreenFrame, ink: Palette, rows: &mut Rows<'_>) {
     let state = &shot.state;
     let has_position = !matches!(state.position, PositionState::None(_));
     let place = state.chainage_m.map_or_else(|| "-+---.--".to_owned(), station);
@@ -144,7 +144,7 @@ fn metres_text(metres: &LiveMetres, columns: usize) -> String {
 }
 
 /// Lines of an alert. The action goes below the problem if there is no room next to it.
-fn alert_lines(alert: &AlertRow, ink: Ink, columns: usize) -> Vec<String> {
+fn alert_lines(alert: &AlertRow, ink: Palette, columns: usize) -> Vec<String> {
     let AlertRow { number, priority, state, lamp, text, advice, .. } = alert;
     let first = format!("{} {number} {priority} {state}: {text}", ink.shape(*lamp));
     if advice.is_empty() {
@@ -180,12 +180,12 @@ fn wrapped(text: &str, columns: usize) -> Vec<String> {
 }
 
 /// Number of rows for all alerts.
-pub(super) fn alert_rows(shot: &Shot, ink: Ink, columns: usize) -> usize {
+pub(super) fn alert_rows(shot: &ScreenFrame, ink: Palette, columns: usize) -> usize {
     shot.alerts.iter().map(|alert| alert_lines(alert, ink, columns).len()).sum()
 }
 
 /// Draws alerts in `room` rows below a title with their numbers.
-pub(super) fn alerts(shot: &Shot, ink: Ink, room: usize, rows: &mut Rows<'_>) {
+pub(super) fn alerts(shot: &ScreenFrame, ink: Palette, room: usize, rows: &mut Rows<'_>) {
     let columns = usize::from(rows.width());
     let (mut lines, mut shown) = (Vec::new(), 0);
     for alert in &shot.alerts {
@@ -227,7 +227,7 @@ pub(super) fn sensor_rows(sensors: usize, columns: usize) -> usize {
 /// Draws sensor lamps with rate and age.
 ///
 /// Faulty sensors come first, with a reason and in a row each while there is room.
-pub(super) fn sensors(shot: &Shot, ink: Ink, room: usize, rows: &mut Rows<'_>) {
+pub(super) fn sensors(shot: &ScreenFrame, ink: Palette, room: usize, rows: &mut Rows<'_>) {
     let unwell = shot.sensors.iter().filter(|sensor| sensor.state != SensorState::Ok).count();
     let columns = usize::from(rows.width());
     let has_room = sensor_rows(shot.sensors.len() - unwell, columns) + unwell <= room;
@@ -291,7 +291,13 @@ fn age_text(age: DurNs) -> String {
 
 /// Draws the wall by section: holes against the target, verdicts, optionally a ruler and coverage by clock
 /// position.
-pub(super) fn wall(wall: &Wall, extent: Extent, ink: Ink, (clock, ruler): (bool, bool), rows: &mut Rows<'_>) {
+pub(super) fn wall(
+    wall: &Wall,
+    extent: Extent,
+    ink: Palette,
+    (clock, ruler): (bool, bool),
+    rows: &mut Rows<'_>,
+) {
     let columns = usize::from(rows.width()).saturating_sub(LABEL);
     let strip = wall.strip(extent, columns);
     let each = strip.column_m;
@@ -317,12 +323,12 @@ pub(super) fn wall(wall: &Wall, extent: Extent, ink: Ink, (clock, ruler): (bool,
         rows.to.set_stringn(x, y, mark, 1, style);
     }
     if ruler {
-        rows.text(&ruler_text(&strip), Ink::dim());
+        rows.text(&ruler_text(&strip), Palette::dim());
     }
 }
 
 fn strip_row(label: &str, strip: &Strip, rows: &mut Rows<'_>, mark: impl Fn(Cell) -> (char, Style)) {
-    let mut spans = vec![Span::styled(label.to_owned(), Ink::dim())];
+    let mut spans = vec![Span::styled(label.to_owned(), Palette::dim())];
     for column in &strip.columns {
         let (letter, style) = column.map_or((' ', Style::default()), &mark);
         spans.push(Span::styled(letter.to_string(), style));
@@ -330,9 +336,9 @@ fn strip_row(label: &str, strip: &Strip, rows: &mut Rows<'_>, mark: impl Fn(Cell
     rows.line(Line::from(spans));
 }
 
-fn known_style(known: Known, ink: Ink) -> Style {
+fn known_style(known: Known, ink: Palette) -> Style {
     match known {
-        Known::Unseen => Ink::dim(),
+        Known::Unseen => Palette::dim(),
         Known::Pass => ink.style(Lamp::Green),
         Known::Open if ink.colour => Style::default().fg(Color::Cyan),
         Known::Open | Known::NotInspected => Style::default(),
@@ -342,9 +348,9 @@ fn known_style(known: Known, ink: Ink) -> Style {
 }
 
 /// The hole in eighths of twice the target: half a column high is the target.
-fn hole_mark(cell: Cell, ink: Ink) -> (char, Style) {
+fn hole_mark(cell: Cell, ink: Palette) -> (char, Style) {
     let Some(share) = cell.share else {
-        return (if cell.known == Known::Unseen { '·' } else { ' ' }, Ink::dim()).ascii(ink);
+        return (if cell.known == Known::Unseen { '·' } else { ' ' }, Palette::dim()).ascii(ink);
     };
     let style = ink.style(if share > 1.0 { Lamp::Red } else { Lamp::Green });
     let step = usize::try_from(math::floor_to_i64((share * 4.0).clamp(0.0, 7.0))).unwrap_or(0);
@@ -356,7 +362,7 @@ fn hole_mark(cell: Cell, ink: Ink) -> (char, Style) {
     (bars.get(step).copied().unwrap_or(' '), style)
 }
 
-fn verdict_mark(cell: Cell, ink: Ink) -> (char, Style) {
+fn verdict_mark(cell: Cell, ink: Palette) -> (char, Style) {
     let mark = match cell.known {
         Known::Unseen => '·',
         Known::Pass => '=',
@@ -368,7 +374,7 @@ fn verdict_mark(cell: Cell, ink: Ink) -> (char, Style) {
     (mark, known_style(cell.known, ink)).ascii(ink)
 }
 
-fn clock_mark(cell: Cell, hour: usize, ink: Ink) -> (char, Style) {
+fn clock_mark(cell: Cell, hour: usize, ink: Palette) -> (char, Style) {
     let seen = cell.seen >> hour & 1 == 1;
     match (cell.known, seen) {
         (Known::Unseen, false) => (' ', Style::default()),
@@ -379,11 +385,11 @@ fn clock_mark(cell: Cell, hour: usize, ink: Ink) -> (char, Style) {
 
 trait Ascii {
     /// Replaces non-ASCII symbols if the terminal needs it.
-    fn ascii(self, ink: Ink) -> Self;
+    fn ascii(self, ink: Palette) -> Self;
 }
 
 impl Ascii for (char, Style) {
-    fn ascii(self, ink: Ink) -> Self {
+    fn ascii(self, ink: Palette) -> Self {
         let letter = match self.0 {
             letter if ink.unicode => letter,
             '·' => '.',
@@ -427,7 +433,7 @@ pub(super) fn large_digits(
     unit: &str,
     (width, top): (u16, u16),
     style: Style,
-    ink: Ink,
+    ink: Palette,
     to: &mut Buffer,
 ) {
     let letter_columns = |letter: char| if letter == '.' { 4 } else { 8 };

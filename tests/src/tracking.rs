@@ -125,7 +125,7 @@ pub fn true_dive(scene: &Scene) -> Track {
     dive(scene, Truth(simulation.scenery().unwrap().clone()), Silence::default())
 }
 
-struct Overheard<N> {
+struct RecordedNavigation<N> {
     inner: N,
     silence: Silence,
     last: Option<MonoNs>,
@@ -134,7 +134,7 @@ struct Overheard<N> {
 }
 
 /// Records aren't part of the state.
-impl<N: Transparent> Stateful for Overheard<N> {
+impl<N: Transparent> Stateful for RecordedNavigation<N> {
     fn save(&self, to: &mut Saver) {
         self.inner.save(to);
     }
@@ -144,7 +144,7 @@ impl<N: Transparent> Stateful for Overheard<N> {
     }
 }
 
-impl<N: Transparent> Navigation for Overheard<N> {
+impl<N: Transparent> Navigation for RecordedNavigation<N> {
     fn update(&mut self, source: usize, sensor: &SensorInfo, times: Times, reading: &Reading) {
         let at_s = times.received.since(START).as_secs_f64();
         let silent = self.silence.from_s..self.silence.to_s;
@@ -194,7 +194,7 @@ pub fn dive(scene: &Scene, inner: impl Transparent, silence: Silence) -> Track {
     }
     let (said, heard) = sync_channel(MOST_SAID);
     let told = vec![Consistency::default(); vehicle.sensors.len()];
-    let mut dive = app.arm(Box::new(Overheard { inner, silence, last: None, told, said })).unwrap();
+    let mut dive = app.arm(Box::new(RecordedNavigation { inner, silence, last: None, told, said })).unwrap();
     let simulation = Simulation::new(scene).unwrap();
     drive(&mut dive, &mut SimulationFeed::new(simulation), Pace::default(), &mut |_| {}).unwrap();
     dive.finish(&mut |_, _| {});

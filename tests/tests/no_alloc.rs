@@ -15,8 +15,8 @@ use std::cell::Cell;
 
 use headrace_a50::decoder::{self as a50, A50Decoder};
 use headrace_a50::report::{Against, Velocity};
-use headrace_fusion::smooth::beside::BesideNavigation;
 use headrace_fusion::smooth::journal::Journal;
+use headrace_fusion::smooth::two_filters::TwoFilterNavigation;
 use headrace_geometry::time::DurNs;
 use headrace_mavlink::MavHeader;
 use headrace_mavlink::decoder::{self as mavlink, MavlinkDecoder, Part};
@@ -126,7 +126,7 @@ fn million_packets_need_no_allocation() {
     let (journal, steps) = Journal::new(1000);
     let NavigationConfig::Filter(settings) = vehicle.navigation else { panic!("no filter") };
     let profile = vehicle.tunnel.profile.clone();
-    let filters = BesideNavigation::new(profile, vehicle.site, settings, journal);
+    let filters = TwoFilterNavigation::new(profile, vehicle.site, settings, journal);
     let mut dive = app.arm(Box::new(filters)).unwrap();
     let mut ports: Vec<_> =
         (0..vehicle.sensors.len()).map(|source| dive.take_port(source).unwrap()).collect();
@@ -199,9 +199,10 @@ fn decoders_of_other_vehicles_allocate_nothing() {
         })
         .collect();
     let part = Part::Imu { message: Some(ImuMessage::Raw) };
-    let meaning = mavlink::Meaning { part, system_id: None, component_id: None, latency: DurNs(0) };
+    let meaning = mavlink::DecoderSettings { part, system_id: None, component_id: None, latency: DurNs(0) };
     let mut autopilot = MavlinkDecoder::new(meaning);
-    let mut log = A50Decoder::new(a50::Meaning { fom_max_mps: 0.4, max_speed_mps: 3.0, latency: DurNs(0) });
+    let mut log =
+        A50Decoder::new(a50::DecoderSettings { fom_max_mps: 0.4, max_speed_mps: 3.0, latency: DurNs(0) });
     let devices: [(&mut dyn Decoder, Vec<u8>); 2] = [(&mut autopilot, frames), (&mut log, reports)];
     for (decoder, mut bytes) in devices {
         bytes.iter_mut().step_by(3001).for_each(|byte| *byte ^= 0x55);

@@ -7,7 +7,7 @@ use std::collections::BTreeMap;
 use headrace_tests::Folder;
 use headrace_tests::world::invariants::broken;
 use headrace_tests::world::plan::Plan;
-use headrace_tests::world::{Lived, Sabotage, World};
+use headrace_tests::world::{DiveResult, Sabotage, World};
 
 /// Default seeds; the environment can give others: `HEADRACE_WORLD_SEEDS=1000..2000`.
 const SEEDS: std::ops::Range<u64> = 0..300;
@@ -21,7 +21,7 @@ fn seeds() -> std::ops::Range<u64> {
 }
 
 /// Runs a world; returns its broken invariants and its results.
-fn lived(folder: &Folder, seed: u64, sabotage: Option<Sabotage>) -> (Vec<String>, Lived) {
+fn lived(folder: &Folder, seed: u64, sabotage: Option<Sabotage>) -> (Vec<String>, DiveResult) {
     let lived = World::sabotaged(seed, sabotage).live();
     let replayed = lived.replay(folder);
     (broken(&lived, &replayed), lived)
@@ -62,7 +62,7 @@ fn seed_repeats_its_world() {
         let [first, second] = [0, 1].map(|_| World::new(seed).live());
         assert_eq!((first.digest, &first.consumed), (second.digest, &second.consumed));
         assert_eq!((first.disk_failures, first.certain), (second.disk_failures, second.certain));
-        let bytes = |lived: &Lived| {
+        let bytes = |lived: &DiveResult| {
             lived.left.iter().map(|file| (file.path.clone(), file.bytes.clone())).collect::<Vec<_>>()
         };
         assert_eq!(bytes(&first), bytes(&second));
@@ -87,7 +87,7 @@ fn blocked_terminal_does_not_change_results() {
     for seed in 0..20 {
         let [taken, stood] = [false, true].map(|stands| World::new(seed).with_terminal(stands).live());
         assert_eq!((taken.digest, &taken.consumed), (stood.digest, &stood.consumed), "seed {seed}");
-        let bytes = |lived: &Lived| lived.left.iter().map(|file| file.bytes.len()).sum::<usize>();
+        let bytes = |lived: &DiveResult| lived.left.iter().map(|file| file.bytes.len()).sum::<usize>();
         assert_eq!(bytes(&taken), bytes(&stood), "seed {seed}");
     }
 }

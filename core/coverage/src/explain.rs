@@ -14,7 +14,7 @@ use super::cause::Cause;
 use super::causes::Causes;
 use super::evidence::Evidence;
 use super::hole::HoleFinder;
-use super::lacks::Lack;
+use super::missing_samples::MissingSample;
 use super::passage::{Drive, Passage};
 use super::store::SampleStore;
 use headrace_geometry::math;
@@ -55,7 +55,7 @@ pub fn explain<'a>(
     let present = present(case, &seen, store.perimeter_m());
     let mut trial = Trial::new(case, &seen, store, finder, present);
     let causes = trial.smallest();
-    let in_hole = |lack: &&Lack| is_in(case.hole, case.target_m, store.perimeter_m(), lack);
+    let in_hole = |lack: &&MissingSample| is_in(case.hole, case.target_m, store.perimeter_m(), lack);
     let radius_m = case.target_m;
     let sampled =
         Sampled { target_m: case.target_m, t_y_m: drive.middle_t_y_m, perimeter_m: store.perimeter_m() };
@@ -94,7 +94,7 @@ fn present(case: &Case<'_>, seen: &Seen, perimeter_m: f64) -> Causes {
     let Case { hole, bounds_m: (from_m, to_m), target_m, .. } = *case;
     let around_m = f64::midpoint(hole.diameter_m.min(WIDEST * target_m), target_m);
     let lacking = case.lacks.between(from_m - around_m, to_m + around_m);
-    let near = |lack: &&Lack| {
+    let near = |lack: &&MissingSample| {
         // A hole all round the wall takes everything that is missing round the wall.
         let off_m = math::wrap_signed(lack.arc_m - hole.arc_m, perimeter_m).abs();
         off_m < hole.diameter_m + target_m

@@ -23,11 +23,11 @@ use headrace_geometry::snapshot::stateful;
 
 mod certain;
 mod division;
+mod hypothetical;
 mod window;
-mod without;
 
 pub use certain::Needed;
-pub use without::Otherwise;
+pub use hypothetical::WallChanges;
 
 /// Maximum search radius, m: wall farther than this from any sample counts as not passed.
 pub const FARTHEST_M: f64 = 12.0;

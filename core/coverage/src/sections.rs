@@ -10,8 +10,8 @@ use super::evidence::Evidence;
 use super::explain::{Case, explain};
 use super::frontier::{Outlook, Reach, clear_of};
 use super::hole::{Hole, HoleFinder};
-use super::lacks::Lacks;
 use super::metres::Metres;
+use super::missing_samples::MissingSamples;
 use super::openings::Opening;
 use super::passage::PassError;
 use super::runs::{Run, RunChange, RunId, Runs, Telling};
@@ -93,7 +93,7 @@ pub struct Judging<'a> {
     /// All samples.
     pub store: &'a SampleStore,
     /// Latest missing samples, for the causes of fails.
-    pub lacks: &'a Lacks,
+    pub lacks: &'a MissingSamples,
     /// Hole search with its working memory.
     pub finder: &'a mut HoleFinder,
     /// Design profile.

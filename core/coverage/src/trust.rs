@@ -4,7 +4,7 @@ use serde::{Deserialize, Serialize};
 
 use super::relief::Ballot;
 use super::wall_limits::{PlacedReturn, WallLimits};
-use headrace_fusion::one_range::OneRange;
+use headrace_fusion::constant_range::ConstantRange;
 use headrace_geometry::math;
 
 /// Reason for distrusting a head, with the figure that shows it, m.
@@ -141,7 +141,7 @@ pub(super) struct HeadTrust {
     halves: [HalfTurn; 3],
     angle_rad: Option<f64>,
     unchanged: Unchanged,
-    one_range: OneRange,
+    one_range: ConstantRange,
     /// Chainages of the returns with that one range, m, and the angle turned since.
     one_range_at_m: [f64; 2],
     one_range_rad: f64,
@@ -225,7 +225,7 @@ impl HeadTrust {
     /// design.
     fn note_range(&mut self, placed: &PlacedReturn, beam: &Beam<'_>, turned_rad: f64, limits: &WallLimits) {
         if self.one_range_rad > math::TAU / 2.0 && !self.is_stuck(limits) {
-            self.one_range = OneRange::default();
+            self.one_range = ConstantRange::default();
         }
         let off_m = (beam.design_range_m)().map_or(0.0, |design_m| beam.range_m - design_m);
         self.one_range.note(beam.range_m, off_m);

@@ -24,10 +24,10 @@
 #![cfg_attr(not(test), warn(clippy::cast_possible_truncation))]
 #![cfg_attr(test, allow(clippy::cast_possible_truncation))]
 
+pub mod constant_range;
 pub mod direct;
 pub mod filter;
 pub mod fix;
-pub mod one_range;
 pub mod relative;
 pub mod section;
 pub mod smooth;
@@ -35,8 +35,8 @@ pub mod stuck_sensor;
 
 use self::filter::cable::CableDoubt;
 use self::filter::pose_sd::PoseSd;
+use self::filter::setting_check::SettingDoubt;
 use self::filter::sources::Consistency;
-use self::filter::suspicion::SettingDoubt;
 use headrace_geometry::snapshot::Stateful;
 use headrace_geometry::time::MonoNs;
 use headrace_sensor::device::SensorInfo;

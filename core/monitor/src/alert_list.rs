@@ -12,27 +12,27 @@ use super::console::Who;
 use super::pilot_text::{AdviceFigures, CauseFigures};
 use headrace_coverage::Stretch;
 use headrace_fusion::NoFix;
-use headrace_fusion::filter::suspicion::SettingDoubt;
+use headrace_fusion::filter::setting_check::SettingDoubt;
 use headrace_geometry::snapshot::stateful;
 use headrace_geometry::time::{DurNs, MonoNs};
 use headrace_sensor::reading::SourceId;
 use headrace_vehicle::{AlertTiming, LimitsConfig};
 
+mod conditions;
 pub mod json;
 mod kind;
-mod life;
-mod observed;
+mod life_cycle;
 mod runs;
+pub mod texts;
 mod timer;
-pub mod words;
 
+pub(super) use conditions::Beat;
 pub use json::{AlertCountsJson, LeftJson, ListedAlertJson, NoteJson, SpokenJson};
 pub use kind::{AlertClass, ListKind, Priority};
-pub(super) use life::Telling;
-pub(super) use observed::Beat;
+pub(super) use life_cycle::Telling;
 pub(super) use runs::RunInput;
+pub use texts::TextContext;
 use timer::Timer;
-pub use words::Surroundings;
 
 /// Maximum number of alerts kept. Beyond it the oldest cleared ones are dropped, and neighbouring missed
 /// stretches share an alert.
@@ -107,7 +107,7 @@ pub enum Figures {
     /// Speed and advice.
     Advice(AdviceFigures),
     /// Missing requirements for a position.
-    Lacking(NoFix),
+    MissingSampleFinder(NoFix),
     /// Position error, m, and whether standing still would help.
     Error(f64, bool),
     /// Alert about the dive as a whole: place and largest deviation, m.
@@ -203,7 +203,7 @@ pub struct AlertList {
     /// Time of the first update.
     begun: Option<MonoNs>,
     /// Conditions seen at least once, for [`observed`].
-    had: observed::Had,
+    had: conditions::Had,
     /// Largest speed advised at the last update, m/s; zero if none.
     v_max_mps: f64,
     /// Place of the vehicle at the last update, m.
@@ -233,7 +233,7 @@ impl AlertList {
             by_run: Vec::with_capacity(sections),
             timers: vec![Timer::default(); timer::COUNT],
             begun: None,
-            had: observed::Had::default(),
+            had: conditions::Had::default(),
             v_max_mps: 0.0,
             x_m: None,
             recording_fails: false,

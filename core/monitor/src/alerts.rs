@@ -4,7 +4,7 @@ use bevy_ecs::prelude::Resource;
 use serde::{Deserialize, Serialize};
 
 use headrace_coverage::Distrust;
-use headrace_fusion::filter::suspicion::SettingDoubt;
+use headrace_fusion::filter::setting_check::SettingDoubt;
 use headrace_geometry::time::MonoNs;
 use headrace_sampling::head::MAX_HEADS;
 use headrace_sensor::reading::SourceId;

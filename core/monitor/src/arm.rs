@@ -14,11 +14,11 @@ use super::entities::{
     Navigator, VehicleState,
 };
 use super::error::PluginError;
-use super::head_words::HeadWords;
+use super::head_descriptions::HeadDescriptions;
 use super::live_state::{LiveState, source_bits};
 use super::merge::{Inbox, MAX_TICK_BYTES, MAX_TICK_PACKETS};
 use super::messages::{
-    AdviceList, Events, Notices, PlacedEvents, PlacedList, PositionedList, Requests, Standings,
+    AdviceList, Events, JudgedStates, Notices, PlacedEvents, PlacedList, PositionedList, Requests,
 };
 use super::notes::Notes;
 use super::other_settings;
@@ -28,7 +28,7 @@ use super::ring;
 use super::run::Loop;
 use super::stages::{Advisor, Driving, RunInputs, SoundSpeed};
 use headrace_coverage::{
-    Frontier, GridLayout, HoleFinder, Lacks, Relief, SampleStore, Sections, Soundings, StoreLayout,
+    Frontier, GridLayout, HoleFinder, MissingSamples, Relief, SampleStore, Sections, Soundings, StoreLayout,
     WallLimits,
 };
 use headrace_fusion::Navigation;
@@ -183,7 +183,7 @@ impl App {
         world.insert_resource(PlacedEvents(Vec::with_capacity(2 * MAX_TICK_READINGS)));
         world.insert_resource(AdviceList(Vec::with_capacity(MAX_TICK_PACKETS)));
         world.insert_resource(RunInputs(Vec::with_capacity(RUNS_EACH * most)));
-        world.insert_resource(Standings(Vec::with_capacity(MAX_TICK_PACKETS)));
+        world.insert_resource(JudgedStates(Vec::with_capacity(MAX_TICK_PACKETS)));
         world.insert_resource(Requests(Vec::with_capacity(most)));
         world.insert_resource(Notices(Vec::with_capacity(
             NOTICES_EACH * most + MAX_TICK_PACKETS + NOTICES_OF_ALERTS,
@@ -221,12 +221,12 @@ fn sound_source(mission: &Mission, sources: &[SourceInfo]) -> Result<Option<Sour
 }
 
 /// Names of the heads and their alternative settings.
-fn head_words(world: &mut World, mission: &Mission, sources: &[SourceInfo]) -> HeadWords {
+fn head_words(world: &mut World, mission: &Mission, sources: &[SourceInfo]) -> HeadDescriptions {
     let mut heads = world.query::<(&Head, &Mounted, &HeadSpecification)>();
     let mut heads: Vec<_> = heads.iter(world).collect();
     heads.sort_by_key(|(head, ..)| head.0);
     let name = |mounted: &Mounted| sources.get(mounted.source.index()).map_or("", |source| &source.id);
-    HeadWords::of(
+    HeadDescriptions::of(
         heads
             .into_iter()
             .map(|(_, mounted, head)| head.settings(name(mounted), &mission.profile, mission.target_m)),
@@ -267,6 +267,6 @@ fn coverage(mission: &Mission, heads_reach_m: f64) -> Result<Coverage, PluginErr
         to_m: mission.length_m,
         node_m: mission.coverage.node_m,
     });
-    let (frontier, relief, lacks) = (Frontier::default(), Relief::default(), Lacks::default());
+    let (frontier, relief, lacks) = (Frontier::default(), Relief::default(), MissingSamples::default());
     Ok(Coverage { store, sections, frontier, soundings, relief, unsure: None, lacks })
 }

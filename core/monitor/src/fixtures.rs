@@ -3,7 +3,8 @@
 use crate::messages::{Hidden, Outcome, PlacedPing};
 use crate::resources::{Coverage, TunnelDesign};
 use headrace_coverage::{
-    Frontier, GridLayout, Lacks, Reach, Relief, SampleStore, Sections, Soundings, StoreLayout, WallLimits,
+    Frontier, GridLayout, MissingSamples, Reach, Relief, SampleStore, Sections, Soundings, StoreLayout,
+    WallLimits,
 };
 use headrace_fusion::Fix;
 use headrace_fusion::relative::Relative;
@@ -42,7 +43,7 @@ pub(crate) fn coverage() -> Coverage {
         soundings: Soundings::new(GridLayout { perimeter_m, from_m, to_m, node_m: 0.5 }),
         relief: Relief::default(),
         unsure: None,
-        lacks: Lacks::default(),
+        lacks: MissingSamples::default(),
     }
 }
 

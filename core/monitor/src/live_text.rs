@@ -1,12 +1,12 @@
 //! Live texts: place first, then problem, then action. Terminals break them to their width.
 
 use super::alert_list::{AlertChange, ListedAlertJson};
-use super::head_words::HeadWords;
+use super::head_descriptions::HeadDescriptions;
+use super::live_messages::LiveMessage;
 use super::live_state::{Condition, Lamp, LiveMetres, LiveState, PositionDoubt, SensorState};
 use super::pilot_text::{
     AdviceFigures, actions_text, advice_text, cause_text, clock_text, no_position_text, station,
 };
-use super::telling::Told;
 pub use super::unsure_stretch::{helps_text, unsure_text};
 use headrace_geometry::time::DurNs;
 use headrace_geometry::tunnel::Profile;
@@ -99,7 +99,7 @@ impl PilotLine {
 pub fn status_line(
     state: &LiveState,
     profile: &Profile,
-    heads: &HeadWords,
+    heads: &HeadDescriptions,
     name: &dyn Fn(usize) -> String,
 ) -> PilotLine {
     let condition = state.condition();
@@ -188,7 +188,7 @@ fn figures(state: &LiveState) -> Option<AdviceFigures> {
     state.advice.as_ref().map(|advice| AdviceFigures::of(advice, state.speed_mps.unwrap_or(0.0)))
 }
 
-fn no_speed_text(state: &LiveState, profile: &Profile, heads: &HeadWords) -> String {
+fn no_speed_text(state: &LiveState, profile: &Profile, heads: &HeadDescriptions) -> String {
     figures(state).map_or_else(String::new, |figures| advice_text(&figures, profile, heads))
 }
 
@@ -245,7 +245,7 @@ pub fn of_it_text(part_m: f64, whole_m: f64) -> String {
 }
 
 /// Line for a live message.
-pub fn told_line(told: &Told, profile: &Profile, heads: &HeadWords) -> PilotLine {
+pub fn told_line(told: &LiveMessage, profile: &Profile, heads: &HeadDescriptions) -> PilotLine {
     let line = |place: String, what: String, action: String, lamp: Option<Lamp>| PilotLine {
         place,
         speed: String::new(),
@@ -255,7 +255,7 @@ pub fn told_line(told: &Told, profile: &Profile, heads: &HeadWords) -> PilotLine
     };
     let to = |from_m: f64, to_m: f64| format!("{} to {}", station(from_m), station(to_m));
     match told {
-        Told::Flag { from_m, missed, .. } => {
+        LiveMessage::Flag { from_m, missed, .. } => {
             let at_most_mps = missed.figures.again_mps(missed.v_max_mps);
             let action = actions_text(&missed.figures.actions(), missed.back_to_m, at_most_mps, heads);
             let clock = clock_text(profile, missed.hole_arc_m);
@@ -266,43 +266,43 @@ pub fn told_line(told: &Told, profile: &Profile, heads: &HeadWords) -> PilotLine
             );
             line(station(*from_m), what, action, Some(Lamp::Red))
         }
-        Told::FlagEnds { from_m, to_m, failed_m, .. } => {
+        LiveMessage::FlagEnds { from_m, to_m, failed_m, .. } => {
             let of_it = of_it_text(*failed_m, to_m - from_m);
             line(station(*from_m), format!("missed until {}{of_it}", station(*to_m)), String::new(), None)
         }
-        Told::Cleared { from_m, to_m, .. } => line(
+        LiveMessage::Cleared { from_m, to_m, .. } => line(
             station(*from_m),
             format!("CLEARED until {}", station(*to_m)),
             String::new(),
             Some(Lamp::Green),
         ),
-        Told::CannotSay(stretch) => {
+        LiveMessage::CannotSay(stretch) => {
             let what = format!("CAN'T SAY: {}", unsure_text(stretch));
             line(station(stretch.from_m), what, helps_text(stretch), Some(Lamp::Amber))
         }
-        Told::CannotSayEnds(stretch) => {
+        LiveMessage::CannotSayEnds(stretch) => {
             let of_it = of_it_text(stretch.metres_m, stretch.to_m - stretch.from_m);
             let what = format!("can't say until {}{of_it}", station(stretch.to_m));
             line(station(stretch.from_m), what, String::new(), None)
         }
-        Told::NotInspected(stretch) => {
+        LiveMessage::NotInspected(stretch) => {
             let what = format!("NOT INSPECTED: {}", unsure_text(stretch));
             let place = to(stretch.from_m, stretch.to_m);
             line(place, what, helps_text(stretch), Some(Lamp::Amber))
         }
         // Its text begins with the place.
-        Told::Alert { x_m, text, .. } => {
+        LiveMessage::Alert { x_m, text, .. } => {
             let place = station(*x_m);
             let said = text.strip_prefix(&format!("ch {place}")).unwrap_or(text).trim_start();
             line(place, format!("ALERT: {said}"), String::new(), Some(Lamp::Red))
         }
-        Told::AlertChange { change, alert } => alert_line(*change, alert),
-        Told::Note(note) => {
+        LiveMessage::AlertChange { change, alert } => alert_line(*change, alert),
+        LiveMessage::Note(note) => {
             let by = if note.by.is_empty() { String::new() } else { format!(" ({})", note.by) };
             let place = note.station.clone().unwrap_or_else(|| "-+---.--".to_owned());
             line(place, format!("{}{by}", note.words()), String::new(), None)
         }
-        Told::Way { from_m, to_m, metres } => {
+        LiveMessage::Way { from_m, to_m, metres } => {
             line(to(*from_m, *to_m), format!("Coverage: {}", metres_text(metres)), String::new(), None)
         }
     }
@@ -324,7 +324,7 @@ fn alert_line(change: AlertChange, alert: &ListedAlertJson) -> PilotLine {
     }
 }
 
-impl Told {
+impl LiveMessage {
     /// Whether its line adds something to the status and the other lines.
     ///
     /// Lines for alerts show an acknowledgement, an end that no other line shows, and remaining resources.

@@ -130,10 +130,10 @@ mod tests {
     use super::*;
     use crate::console::Commands;
     use crate::entities::{Head, HeadSpecification, HiddenAngles, Mounted};
-    use crate::head_words::HeadWords;
+    use crate::head_descriptions::HeadDescriptions;
     use crate::merge::Inbox;
     use crate::messages::{
-        AdviceList, Events, Notices, PlacedEvents, PlacedList, PositionedList, Requests, Standings,
+        AdviceList, Events, JudgedStates, Notices, PlacedEvents, PlacedList, PositionedList, Requests,
     };
     use crate::resources::{Target, TunnelDesign};
     use crate::stages::RunInputs;
@@ -188,7 +188,7 @@ mod tests {
             TypeId::of::<PositionedList>(),
             TypeId::of::<PlacedList>(),
             TypeId::of::<Requests>(),
-            TypeId::of::<Standings>(),
+            TypeId::of::<JudgedStates>(),
             TypeId::of::<PlacedEvents>(),
             TypeId::of::<AdviceList>(),
             TypeId::of::<RunInputs>(),
@@ -196,7 +196,7 @@ mod tests {
             TypeId::of::<Notices>(),
             TypeId::of::<TunnelDesign>(),
             TypeId::of::<Target>(),
-            TypeId::of::<HeadWords>(),
+            TypeId::of::<HeadDescriptions>(),
             TypeId::of::<Mounted>(),
             TypeId::of::<Head>(),
             TypeId::of::<HeadSpecification>(),

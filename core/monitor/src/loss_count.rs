@@ -3,7 +3,7 @@
 use bevy_ecs::prelude::Component;
 use serde::{Deserialize, Serialize};
 
-use super::hearing::{Heard, Hearing};
+use super::head_health::{HeadHealth, Heard};
 use headrace_geometry::math::{self, TAU};
 use headrace_sampling::losses::LossRate;
 
@@ -78,7 +78,7 @@ pub struct LossCount {
     /// The last ping was lost.
     was_lost: bool,
     /// Health of the head.
-    hearing: Hearing,
+    hearing: HeadHealth,
 }
 
 impl LossCount {
@@ -116,7 +116,7 @@ impl LossCount {
     }
 
     /// Health of the head.
-    pub fn hearing(&self) -> &Hearing {
+    pub fn hearing(&self) -> &HeadHealth {
         &self.hearing
     }
 

@@ -15,7 +15,7 @@ use super::notes::Note;
 use headrace_coverage::{Judgement, Loss, Reach, Request, RunChange, RunId, Stretch};
 use headrace_fusion::filter::cable::CableDoubt;
 use headrace_fusion::filter::pose_sd::PoseSd;
-use headrace_fusion::filter::suspicion::SettingDoubt;
+use headrace_fusion::filter::setting_check::SettingDoubt;
 use headrace_fusion::{Fix, NoFix};
 use headrace_geometry::frames::{Point3, Tunnel};
 use headrace_geometry::time::MonoNs;
@@ -186,7 +186,7 @@ pub struct Standing {
 
 /// Judged metres and alerts at each update of this tick, in order.
 #[derive(Debug, Resource)]
-pub struct Standings(pub Vec<Standing>);
+pub struct JudgedStates(pub Vec<Standing>);
 
 /// Advice at each update of this tick, in order.
 #[derive(Debug, Resource)]

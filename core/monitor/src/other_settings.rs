@@ -5,7 +5,7 @@
 use bevy_ecs::prelude::World;
 
 use super::entities::HeadSpecification;
-use super::head_words::HeadSettings;
+use super::head_descriptions::HeadSettings;
 use headrace_coverage::OtherSettings;
 use headrace_geometry::frames::{Point3, Pose, Rot};
 use headrace_geometry::tunnel::Profile;

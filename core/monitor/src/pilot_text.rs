@@ -5,13 +5,13 @@
 
 use super::advice_log::AdviceEntry;
 use super::alerts::AlertKind;
-use super::head_words::HeadWords;
+use super::head_descriptions::HeadDescriptions;
 use super::live_state::LEAST_MPS;
 use serde::{Deserialize, Serialize};
 
 use headrace_coverage::{Action, Again, Cause, Causes, Evidence, Run, Sections};
 use headrace_fusion::NoFix;
-use headrace_fusion::filter::suspicion::{Setting, SettingDoubt};
+use headrace_fusion::filter::setting_check::{Setting, SettingDoubt};
 use headrace_geometry::tunnel::Profile;
 use headrace_sampling::advice::{Advice, Reason, Remedy};
 use headrace_sampling::head::HeadSet;
@@ -124,13 +124,13 @@ impl CauseFigures {
 const NAMED: usize = 2;
 
 /// Text of a fail's causes with their figures; the first two if there are several.
-pub fn cause_text(figures: &CauseFigures, heads: &HeadWords) -> String {
+pub fn cause_text(figures: &CauseFigures, heads: &HeadDescriptions) -> String {
     let texts: Vec<String> =
         figures.causes.iter().take(NAMED).map(|cause| one_cause_text(cause, figures, heads)).collect();
     if texts.is_empty() { one_cause_text(Cause::Unknown, figures, heads) } else { texts.join(" and ") }
 }
 
-fn one_cause_text(cause: Cause, figures: &CauseFigures, heads: &HeadWords) -> String {
+fn one_cause_text(cause: Cause, figures: &CauseFigures, heads: &HeadDescriptions) -> String {
     match cause {
         Cause::TooFast => format!("too fast ({:.2} m/s)", figures.speed_mps),
         Cause::AngularStep => format!("steps of {:.2} m along the wall", figures.t_y_m),
@@ -153,7 +153,12 @@ fn one_cause_text(cause: Cause, figures: &CauseFigures, heads: &HeadWords) -> St
 /// Text of the actions for a missed stretch, as in [`action_text`]; the first two if there are several.
 ///
 /// An action needed before the vehicle goes back comes first. Slower is part of the speed.
-pub fn actions_text(actions: &[Action], back_to_m: f64, at_most_mps: f64, heads: &HeadWords) -> String {
+pub fn actions_text(
+    actions: &[Action],
+    back_to_m: f64,
+    at_most_mps: f64,
+    heads: &HeadDescriptions,
+) -> String {
     let mut two: Vec<Action> = actions.iter().copied().take(NAMED).collect();
     if let [_, Action::Position | Action::HeadBack] = two.as_slice() {
         two.reverse();
@@ -170,7 +175,7 @@ pub fn actions_text(actions: &[Action], back_to_m: f64, at_most_mps: f64, heads:
 }
 
 /// Text of an action next to another one.
-fn short_text(action: Action, heads: &HeadWords) -> String {
+fn short_text(action: Action, heads: &HeadDescriptions) -> String {
     let text = match action {
         Action::Slower => "slower",
         Action::FinerMode => return format!("in {}", heads.finer_mode()),
@@ -190,7 +195,7 @@ fn short_text(action: Action, heads: &HeadWords) -> String {
 /// Text of an action for a missed stretch: go back to a chainage, m, with a maximum speed, m/s.
 ///
 /// The speed is zero if no known speed meets the target.
-pub fn action_text(action: Action, back_to_m: f64, at_most_mps: f64, heads: &HeadWords) -> String {
+pub fn action_text(action: Action, back_to_m: f64, at_most_mps: f64, heads: &HeadDescriptions) -> String {
     let back = format!("go back to {}", station(back_to_m));
     let text = match action {
         // The speed would be for the present mode and range setting.
@@ -243,7 +248,7 @@ pub(super) fn no_position_text(lacking: NoFix) -> &'static str {
 ///
 /// It is the remedy if slower doesn't help, otherwise a mode that all heads have and that allows a higher
 /// speed.
-pub fn gain_text(advice: &Advice, heads: &HeadWords) -> Option<String> {
+pub fn gain_text(advice: &Advice, heads: &HeadDescriptions) -> Option<String> {
     if advice.remedy.is_some() {
         return Some(remedy_text(advice.remedy));
     }
@@ -285,7 +290,7 @@ pub struct Missed {
 }
 
 /// Text of a flag: location, cause and action.
-pub fn flag_text(missed: &Missed, profile: &Profile, heads: &HeadWords) -> String {
+pub fn flag_text(missed: &Missed, profile: &Profile, heads: &HeadDescriptions) -> String {
     let Missed { start_m, back_to_m, figures, hole_arc_m, target_m, v_max_mps } = missed;
     format!(
         "ch {}  {}: holes over {target_m} m at {}; {}",
@@ -402,7 +407,7 @@ impl AdviceFigures {
 }
 
 /// Text of advice, with its figures.
-pub fn advice_text(advice: &AdviceFigures, profile: &Profile, heads: &HeadWords) -> String {
+pub fn advice_text(advice: &AdviceFigures, profile: &Profile, heads: &HeadDescriptions) -> String {
     match advice.reason {
         Reason::HelixPitch if advice.v_max_mps < LEAST_MPS => "no speed meets the target here".to_owned(),
         Reason::HelixPitch if advice.will_exceed && advice.speed_mps.abs() > advice.v_max_mps => {
@@ -436,7 +441,7 @@ pub fn advice_text(advice: &AdviceFigures, profile: &Profile, heads: &HeadWords)
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::head_words::tests::two;
+    use crate::head_descriptions::tests::two;
 
     #[test]
     fn stationing_has_kilometres_and_metres() {

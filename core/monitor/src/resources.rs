@@ -6,7 +6,8 @@ use serde::{Deserialize, Serialize};
 
 use super::result_stream::ResultStream;
 use headrace_coverage::{
-    Frontier, HoleFinder, Lacks, OtherSettings, Relief, SampleStore, Sections, Soundings, Stretch, WallLimits,
+    Frontier, HoleFinder, MissingSamples, OtherSettings, Relief, SampleStore, Sections, Soundings, Stretch,
+    WallLimits,
 };
 use headrace_fusion::NoFix;
 use headrace_geometry::site::Site;
@@ -85,7 +86,7 @@ pub struct Coverage {
     /// Last judged unsure stretch.
     pub unsure: Option<Stretch>,
     /// Latest missing samples.
-    pub lacks: Lacks,
+    pub lacks: MissingSamples,
 }
 
 stateful!(Coverage { state: store, sections, frontier, soundings, relief, unsure, lacks; });

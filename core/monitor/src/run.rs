@@ -7,13 +7,13 @@ use bevy_ecs::system::SystemState;
 use bevy_ecs::world::World;
 
 use super::advice_log::AdviceLog;
-use super::alert_list::{AlertList, Surroundings, Telling};
+use super::alert_list::{AlertList, Telling, TextContext};
 use super::alerts::Alerts;
 use super::app::{App, SourceInfo};
 use super::console::{Console, ConsoleCounts};
 use super::digest::Digest;
 use super::entities::{HeadFrontier, Mounted, Navigator, SensorDecoder, SensorHealth, VehicleState};
-use super::head_words::HeadWords;
+use super::head_descriptions::HeadDescriptions;
 use super::live_state::LiveState;
 use super::live_state::json::LiveStateJson;
 use super::loop_snapshot;
@@ -127,8 +127,8 @@ impl Loop {
     }
 
     /// Names of the heads and their alternative settings.
-    pub fn head_words(&self) -> &HeadWords {
-        self.world.resource::<HeadWords>()
+    pub fn head_words(&self) -> &HeadDescriptions {
+        self.world.resource::<HeadDescriptions>()
     }
 
     /// Number of ticks run so far.
@@ -204,8 +204,8 @@ impl Loop {
     }
 
     /// Properties of the dive that texts of alerts need.
-    pub fn surroundings(&self) -> Surroundings<'_> {
-        Surroundings::of(&self.sources, &self.mission.profile, &self.coverage().sections, self.head_words())
+    pub fn surroundings(&self) -> TextContext<'_> {
+        TextContext::of(&self.sources, &self.mission.profile, &self.coverage().sections, self.head_words())
     }
 
     /// Live state with the alerts, as JSON.

@@ -10,7 +10,7 @@ use super::error::SamplingError;
 use super::head::{HeadMode, HeadMotion, HeadSet, HeadSpec, MAX_HEADS};
 use super::layout::{self, HeadLayout};
 use super::losses::LossRate;
-use super::margin::{self, APART_SHARE, Margins, SureTarget};
+use super::margin::{self, APART_SHARE, Margins, RemainingTarget};
 use super::occlusion::{self, AngleRange, Obstacle};
 use super::passes::{self, Passes, Phasing, Situation};
 use super::ring::Ring;
@@ -327,7 +327,7 @@ impl Advisor {
         phasing: &'a Phasing,
         passes: &Passes,
         going: &'a Going,
-        sure: SureTarget,
+        sure: RemainingTarget,
     ) -> Driving<'a> {
         Driving {
             strips: &self.now,
@@ -351,7 +351,7 @@ impl Advisor {
         phasing: &Phasing,
         passes: &Passes,
         going: &Going,
-        sure: SureTarget,
+        sure: RemainingTarget,
         last_mps: Option<f64>,
     ) -> Result<Fastest, SamplingError> {
         let bound = self.now.bound_for_target(0, passes, sure.most_m(), going);
@@ -393,7 +393,7 @@ impl Advisor {
         passes: &Passes,
         going: &Going,
         situation: &Situation,
-        sure: SureTarget,
+        sure: RemainingTarget,
     ) {
         if let Some(left) = self.until_alternatives.checked_sub(1) {
             self.until_alternatives = left;
@@ -433,14 +433,14 @@ impl Advisor {
     }
 
     /// Returns the largest speeds with margins added one after the other.
-    fn margins(&self, phasing: &Phasing, passes: &Passes, going: &Going, sure: SureTarget) -> Margins {
+    fn margins(&self, phasing: &Phasing, passes: &Passes, going: &Going, sure: RemainingTarget) -> Margins {
         let target_m = self.task.target_m;
-        let known = SureTarget { pass_error_m: 0.0, ..sure };
+        let known = RemainingTarget { pass_error_m: 0.0, ..sure };
         let steady = Going { ping_period_s: going.ping_period_s, ..Going::default() };
         let (lossy, passes) = (passes, &passes.lossy(false));
         let even = passes.evened();
         let hidden = self.now.bound_for_target(0, &even, target_m, &steady);
-        let fastest = |passes: &Passes, going: &Going, sure: SureTarget| {
+        let fastest = |passes: &Passes, going: &Going, sure: RemainingTarget| {
             self.fastest(phasing, passes, going, sure, self.last_mps).map_or(0.0, |fastest| fastest.speed_mps)
         };
         let speeds = [
@@ -469,7 +469,13 @@ impl Advisor {
     /// Largest speed in a mode, m/s.
     ///
     /// Zero if none meets the target, `None` if a head does not have the mode.
-    fn mode_speed_mps(&self, number: usize, heads: HeadSet, going: &Going, sure: SureTarget) -> Option<f64> {
+    fn mode_speed_mps(
+        &self,
+        number: usize,
+        heads: HeadSet,
+        going: &Going,
+        sure: RemainingTarget,
+    ) -> Option<f64> {
         let name = self.heads.first()?.modes.get(number)?.name;
         let turn = |head: usize| self.heads.get(head)?.mode(name).map(|mode| mode.turn);
         let (mut longest_s, mut ping_period_s) = (0.0_f64, 0.0_f64);
@@ -489,7 +495,7 @@ impl Advisor {
         let passes = passes.ok()?.beside(self.parallax_rad);
         let going = Going { ping_period_s, ..*going };
         let passes = passes.lossy(true);
-        let sure = SureTarget { even_gap_s: passes.even_gap_s(), ..self.sure_in(number, sure) };
+        let sure = RemainingTarget { even_gap_s: passes.even_gap_s(), ..self.sure_in(number, sure) };
         let bound_mps = |target_m: f64| {
             self.modes
                 .bound_for_target(number, &passes, target_m, &going)
@@ -500,9 +506,9 @@ impl Advisor {
     }
 
     /// Returns the target less position errors, for the heads as they turn now.
-    fn sure(&self, phasing: &Phasing, passes: &Passes, situation: &Situation) -> SureTarget {
+    fn sure(&self, phasing: &Phasing, passes: &Passes, situation: &Situation) -> RemainingTarget {
         let (even_gap_s, apart_m) = (passes.even_gap_s(), phasing.apart_m());
-        SureTarget {
+        RemainingTarget {
             target_m: self.task.target_m,
             confidence_sd: self.task.confidence_sd,
             pass_error_m: situation.pass_error_m,
@@ -514,8 +520,8 @@ impl Advisor {
     }
 
     /// The same with the steps of another mode.
-    fn sure_in(&self, mode: usize, sure: SureTarget) -> SureTarget {
-        SureTarget { t_y_m: self.modes.largest_step_m(mode), ..sure }
+    fn sure_in(&self, mode: usize, sure: RemainingTarget) -> RemainingTarget {
+        RemainingTarget { t_y_m: self.modes.largest_step_m(mode), ..sure }
     }
 
     /// Returns the remedy that is enough by itself.

@@ -59,7 +59,7 @@ const GROWTH: f64 = 0.7;
 /// The errors are known at the present speed. At half of it, heads apart along the hull pass a place twice as far
 /// apart in time, and the margin is larger.
 #[derive(Debug, Clone, Copy)]
-pub struct SureTarget {
+pub struct RemainingTarget {
     /// Target T, m.
     pub target_m: f64,
     /// Standard deviations of a hole that a verdict of pass keeps below the target.
@@ -76,7 +76,7 @@ pub struct SureTarget {
     pub t_y_m: f64,
 }
 
-impl SureTarget {
+impl RemainingTarget {
     /// Returns the remaining target at a speed, m; grows continuously with speed.
     pub fn at_m(&self, speed_mps: f64) -> f64 {
         let time_s = error_time_s(1.0 / self.even_gap_s, self.apart_m, speed_mps, APART_SHARE);
@@ -257,7 +257,7 @@ mod tests {
     /// Errors measured at one speed give the same margin at another speed as errors measured there.
     #[test]
     fn margin_is_independent_of_the_speed_of_measurement() {
-        let sure = SureTarget {
+        let sure = RemainingTarget {
             target_m: 0.5,
             confidence_sd: 2.0,
             pass_error_m: 0.012,
@@ -273,16 +273,16 @@ mod tests {
         let at = [0.05, 0.1, f64::INFINITY].map(|speed_mps| sure.at_m(speed_mps));
         let expected = times_s.map(|time_s| 0.5 - 2.0 * (error_m(time_s) - NOTHING_M));
         assert!(at.iter().zip(expected).all(|(a, b)| (a - b).abs() < 1e-9), "{at:?} {expected:?}");
-        let elsewhere = SureTarget {
+        let elsewhere = RemainingTarget {
             pass_error_m: error_m(times_s[0]),
             measured_s: error_time_s(0.25, 0.8, -0.05, APART_SHARE),
             ..sure
         };
         let speeds_mps = (1..100).map(|k| 0.003 * f64::from(k));
         assert!({ speeds_mps }.all(|v_mps| (elsewhere.at_m(v_mps) - sure.at_m(v_mps)).abs() < 1e-12));
-        let side_by_side = SureTarget { apart_m: 0.0, measured_s: 4.0, ..sure };
+        let side_by_side = RemainingTarget { apart_m: 0.0, measured_s: 4.0, ..sure };
         assert!((side_by_side.at_m(0.02) - side_by_side.most_m()).abs() <= 0.0);
-        let without_heads = SureTarget { even_gap_s: 0.0, measured_s: 0.0, apart_m: 0.0, ..sure };
+        let without_heads = RemainingTarget { even_gap_s: 0.0, measured_s: 0.0, apart_m: 0.0, ..sure };
         assert!((without_heads.at_m(0.1) - (0.5 - 2.0 * 0.01)).abs() < 1e-12);
     }
 

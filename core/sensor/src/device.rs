@@ -179,7 +179,7 @@ pub trait Device: Send + Sync {
     /// Writes the packet without optional payload to `shorter` and returns `true`.
     ///
     /// Returns `false` if it has none, or if these bytes alone do not show that.
-    fn without(&self, _what: Needless, _packet: &[u8], _shorter: &mut Vec<u8>) -> bool {
+    fn without(&self, _what: OptionalPayload, _packet: &[u8], _shorter: &mut Vec<u8>) -> bool {
         false
     }
 
@@ -204,7 +204,7 @@ pub trait Device: Send + Sync {
 
 /// Payload that a log may omit; the readings stay bit-identical.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Needless {
+pub enum OptionalPayload {
     /// Echo strengths, if the range is sent as well.
     Echoes,
     /// Geographic positions, and identifiers unique to one machine.

@@ -11,7 +11,7 @@ mod strangers;
 
 pub use cutter::{Cutter, Piece};
 pub use listener::{Judge, Listener, MessageListener};
-pub use strangers::Strangers;
+pub use strangers::IgnoredSenders;
 
 use headrace_geometry::time::{DurNs, MonoNs};
 use headrace_sampling::head::HeadProgram;
@@ -69,7 +69,7 @@ pub struct DeviceHealth {
     /// Description of a fault, with its remedy.
     pub complaint: Option<String>,
     /// Messages on its line from other senders that look like its own.
-    pub strangers: Strangers,
+    pub strangers: IgnoredSenders,
 }
 
 /// Host side of one device's line.

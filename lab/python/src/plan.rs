@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use headrace_sampling::plan::{Planner, Question};
-use headrace_simulator::calm;
+use headrace_simulator::position_error_model;
 use headrace_tables::KINDS;
 use pyo3::{Python, pyfunction};
 
@@ -34,7 +34,8 @@ pub(crate) fn plan_json(
         let wrong = |why: String| Failure::Vehicle { file: file.clone(), why };
         let (_, config) = vehicle::read(&vehicle)?;
         let name = vehicle.file_name().map(|name| name.to_string_lossy()).unwrap_or_default();
-        let errors = calm::expected_errors(&config, &name, &KINDS, &vehicle::bytes_beside(&vehicle));
+        let errors =
+            position_error_model::expected_errors(&config, &name, &KINDS, &vehicle::bytes_beside(&vehicle));
         let errors = errors.map_err(|error| Failure::of_scene(&file, error))?;
         let mut inspection = config.inspection().map_err(wrong)?;
         (inspection.drift_m, inspection.yaw_rad) = (drift_m, yaw_rad);

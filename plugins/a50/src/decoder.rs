@@ -26,7 +26,7 @@ const MOST_DELAY_US: i64 = 2_000_000;
 
 /// Decoding settings.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Meaning {
+pub struct DecoderSettings {
     /// Largest accepted figure of merit, m/s.
     pub fom_max_mps: f64,
     /// Largest accepted speed, m/s.
@@ -78,7 +78,7 @@ stateful!(A50Decoder { state: codec, clock, state; });
 
 #[derive(Debug, Clone)]
 struct State {
-    meaning: Meaning,
+    meaning: DecoderSettings,
     last: Option<Velocity>,
     withheld: Withheld,
 }
@@ -92,7 +92,7 @@ pub fn to_ours([x, y, z]: [f64; 3]) -> Vec3<Sensor> {
 
 impl A50Decoder {
     /// New decoder.
-    pub fn new(meaning: Meaning) -> Self {
+    pub fn new(meaning: DecoderSettings) -> Self {
         let state = State { meaning, last: None, withheld: Withheld::default() };
         Self { codec: LineCodec::default(), clock: LineClock::new(SILENCE), state }
     }

@@ -5,7 +5,7 @@ use headrace_sensor::config::{ConfigError, Section};
 use headrace_sensor::device::{Device, DeviceKind, Emulated, EmulatorSetup, Sense, SensorKind, SensorSpec};
 use headrace_sensor::driver::{Carrier, Driver, DriverSetup};
 
-use crate::decoder::{A50Decoder, Meaning};
+use crate::decoder::{A50Decoder, DecoderSettings};
 use crate::driver;
 use crate::emulator::{A50Emulator, Simulated};
 
@@ -23,7 +23,7 @@ pub struct A50Kind;
 #[derive(Debug, Clone)]
 pub struct A50 {
     sensor: SensorConfig,
-    meaning: Meaning,
+    meaning: DecoderSettings,
     emulated: Simulated,
 }
 
@@ -34,7 +34,7 @@ impl DeviceKind for A50Kind {
 
     fn configure(&self, sensor: &SensorConfig, own: &Section<'_>) -> Result<Box<dyn Device>, ConfigError> {
         let latency = sensor.latency;
-        let meaning = Meaning {
+        let meaning = DecoderSettings {
             fom_max_mps: own.number("fom_max_mps", 0.001..=10.0)?.unwrap_or(0.4),
             max_speed_mps: own.number("max_speed_mps", 0.1..=10.0)?.unwrap_or(3.0),
             latency,

@@ -13,7 +13,7 @@ use headrace_sensor::measurement::GroundVelocity;
 use headrace_sensor::reading::{Decoded, Packet, Reading};
 
 use crate::A50Kind;
-use crate::decoder::{A50Decoder, Meaning, Withheld};
+use crate::decoder::{A50Decoder, DecoderSettings, Withheld};
 use crate::driver::A50Driver;
 use crate::report::tests::EXAMPLE;
 use crate::report::{Against, Velocity};
@@ -37,7 +37,7 @@ fn configured(own: &str) -> Result<Box<dyn Device>, String> {
 }
 
 fn decoder() -> A50Decoder {
-    A50Decoder::new(Meaning { fom_max_mps: 0.4, max_speed_mps: 3.0, latency: LATENCY })
+    A50Decoder::new(DecoderSettings { fom_max_mps: 0.4, max_speed_mps: 3.0, latency: LATENCY })
 }
 
 fn decode(decoder: &mut A50Decoder, received: MonoNs, bytes: &[u8]) -> Vec<Decoded> {

@@ -11,7 +11,7 @@ use crate::codec::{Bar100Codec, Measurement, Transaction};
 
 /// Decoding settings.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Meaning {
+pub struct DecoderSettings {
     /// Values that override the sensor's memory.
     pub overrides: Overrides,
     /// Ambient air pressure, bar; used for a vented sensor only.
@@ -26,7 +26,7 @@ pub struct Meaning {
 #[derive(Debug, Clone)]
 pub struct Bar100Decoder {
     codec: Bar100Codec,
-    meaning: Meaning,
+    meaning: DecoderSettings,
     cells: CalibrationCells,
     calibration: Result<Option<Calibration>, CalibrationError>,
     withheld: u64,
@@ -48,7 +48,7 @@ impl Stateful for Bar100Decoder {
 
 impl Bar100Decoder {
     /// New decoder without calibration.
-    pub fn new(meaning: Meaning) -> Self {
+    pub fn new(meaning: DecoderSettings) -> Self {
         let cells = CalibrationCells::default();
         let calibration = cells.calibration(&meaning.overrides);
         Self { codec: Bar100Codec::default(), meaning, cells, calibration, withheld: 0 }

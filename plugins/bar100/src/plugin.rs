@@ -6,7 +6,7 @@ use headrace_sensor::device::{Device, DeviceKind, Emulated, EmulatorSetup, Sense
 use headrace_sensor::driver::{Carrier, Driver, DriverSetup};
 
 use crate::calibration::{Calibration, Overrides, PressureMode, STANDARD_ATMOSPHERE_BAR};
-use crate::decoder::{Bar100Decoder, Meaning};
+use crate::decoder::{Bar100Decoder, DecoderSettings};
 use crate::driver::{Bar100Driver, CARRIERS};
 use crate::emulator::{Bar100Emulator, Simulated};
 
@@ -27,7 +27,7 @@ pub struct Bar100Kind;
 #[derive(Debug, Clone)]
 pub struct Bar100 {
     sensor: SensorConfig,
-    meaning: Meaning,
+    meaning: DecoderSettings,
     emulated: Simulated,
 }
 
@@ -56,7 +56,7 @@ impl DeviceKind for Bar100Kind {
         let latency = sensor.latency;
         Ok(Box::new(Bar100 {
             sensor: sensor.clone(),
-            meaning: Meaning { overrides, ambient_bar, reject_busy, latency },
+            meaning: DecoderSettings { overrides, ambient_bar, reject_busy, latency },
             emulated: Simulated { calibration, ambient_bar, rate_hz, latency },
         }))
     }

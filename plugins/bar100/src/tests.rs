@@ -13,7 +13,7 @@ use headrace_sensor::reading::{Decoded, Packet, Reading, WaterPressure};
 
 use crate::Bar100Kind;
 use crate::calibration::{Overrides, STANDARD_ATMOSPHERE_BAR};
-use crate::decoder::{Bar100Decoder, Meaning};
+use crate::decoder::{Bar100Decoder, DecoderSettings};
 
 fn sensor() -> SensorConfig {
     SensorConfig {
@@ -32,8 +32,8 @@ fn configured(own: &str) -> Result<Box<dyn Device>, String> {
     Ok(device)
 }
 
-fn meaning(overrides: Overrides) -> Meaning {
-    Meaning {
+fn meaning(overrides: Overrides) -> DecoderSettings {
+    DecoderSettings {
         overrides,
         ambient_bar: STANDARD_ATMOSPHERE_BAR,
         reject_busy: false,
@@ -85,7 +85,7 @@ fn log_without_calibration_uses_the_vehicle_file() {
     let mut decoder = Bar100Decoder::new(meaning(overrides));
     let readings = decode(&mut decoder, MonoNs(0), &[0xAC, 0x60, 0x46, 0x46, 0x4F, 0xA0]);
     assert!((pressure(&readings[0]).pressure_pa - 490_112.0).abs() < 1.0);
-    let mut strict = Bar100Decoder::new(Meaning { reject_busy: true, ..meaning(overrides) });
+    let mut strict = Bar100Decoder::new(DecoderSettings { reject_busy: true, ..meaning(overrides) });
     assert!(decode(&mut strict, MonoNs(0), &[0xAC, 0x60, 0x46, 0x46, 0x4F, 0xA0]).is_empty());
     assert_eq!(strict.withheld(), 1);
 }

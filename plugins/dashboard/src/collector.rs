@@ -9,12 +9,12 @@ use std::collections::BTreeSet;
 use headrace_geometry::frames::{Mount, Point3, Vec3};
 use headrace_geometry::time::{DurNs, MonoNs};
 use headrace_monitor::alert_list::NoteJson;
+use headrace_monitor::live_messages::{LiveMessage, LiveMessages};
 use headrace_monitor::live_text::{status_line, told_line};
 use headrace_monitor::messages::{Notice, Outcome as Placing, Placed, PlacedList};
 use headrace_monitor::report::way_home;
 use headrace_monitor::result_stream::{RecordKind, first_record};
 use headrace_monitor::run::Loop;
-use headrace_monitor::telling::{Teller, Told};
 use headrace_sensor::device::{SensorInfo, SensorKind};
 use headrace_sensor::reading::Reading;
 use serde_json::{Value, json};
@@ -68,7 +68,7 @@ pub struct Collector {
     /// Whether it waits for the page: a replay does, a live dive doesn't.
     waits: bool,
     is_playback: bool,
-    teller: Teller,
+    teller: LiveMessages,
     sensors: Vec<Followed>,
     rates_from: Option<MonoNs>,
     begun: Option<MonoNs>,
@@ -113,7 +113,7 @@ impl Collector {
             to,
             waits,
             is_playback,
-            teller: Teller::default(),
+            teller: LiveMessages::default(),
             sensors: dive.sources().iter().zip(dive.sensors()).map(followed).collect(),
             rates_from: None,
             begun: None,
@@ -331,7 +331,7 @@ impl Collector {
         self.lacking_m = Some([from_m.min(x_m), to_m.max(x_m)]);
     }
 
-    fn tell(&mut self, told: &[Told], dive: &Loop) {
+    fn tell(&mut self, told: &[LiveMessage], dive: &Loop) {
         for one in told {
             let mut value =
                 serde_json::to_value(one).unwrap_or_else(|error| json!({"error": error.to_string()}));

@@ -25,7 +25,7 @@ pub enum AxisOrder {
 
 /// Decoding settings.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Meaning {
+pub struct DecoderSettings {
     /// The maker's set.
     pub set: MessageSet,
     /// Axis order; used for the J1939 set.
@@ -49,7 +49,7 @@ stateful!(ImuDecoder { state: codec, state, passed_over; });
 /// State updated by messages.
 #[derive(Debug, Clone)]
 struct State {
-    meaning: Meaning,
+    meaning: DecoderSettings,
     invalid: Invalid,
     /// True after the first quaternion. Euler angles are ignored from then on, so that the attitude isn't used twice.
     sends_quaternions: bool,
@@ -88,7 +88,7 @@ impl AxisOrder {
 
 impl ImuDecoder {
     /// New decoder.
-    pub fn new(meaning: Meaning) -> Self {
+    pub fn new(meaning: DecoderSettings) -> Self {
         let state = State {
             meaning,
             invalid: Invalid::default(),

@@ -6,7 +6,7 @@ use headrace_sensor::geometry::time::{DurNs, MonoNs};
 use headrace_sensor::measurement::Inertia;
 
 use crate::codec::{Message, MessageSet};
-use crate::decoder::Meaning;
+use crate::decoder::DecoderSettings;
 use crate::sets::{bosch, j1939, sbg, xsens};
 
 /// Temperature of an emulated unit: 10 degrees Celsius.
@@ -15,7 +15,7 @@ const SBG_TEMPERATURE: i16 = 1000;
 /// Ideal unit: no noise, bias or added delay, but whole counts.
 #[derive(Debug, Clone)]
 pub struct ImuEmulator {
-    meaning: Meaning,
+    meaning: DecoderSettings,
     rate_hz: f64,
     start: MonoNs,
     begun: u64,
@@ -24,7 +24,7 @@ pub struct ImuEmulator {
 
 impl ImuEmulator {
     /// A unit that is switched on, and first samples, at `start`.
-    pub fn new(meaning: Meaning, rate_hz: f64, start: MonoNs) -> Self {
+    pub fn new(meaning: DecoderSettings, rate_hz: f64, start: MonoNs) -> Self {
         Self { meaning, rate_hz, start, begun: 0, told: 0 }
     }
 

@@ -13,7 +13,7 @@ use crate::dbc::decoder::DbcDecoder;
 use crate::dbc::emulator::DbcEmulator;
 use crate::dbc::keys;
 use crate::dbc::mapping::Mapping;
-use crate::decoder::{AxisOrder, ImuDecoder, Meaning};
+use crate::decoder::{AxisOrder, DecoderSettings, ImuDecoder};
 use crate::driver;
 use crate::emulator::ImuEmulator;
 use crate::noise;
@@ -42,7 +42,7 @@ pub struct CanImu {
 /// Source of the frame definitions: preset or DBC.
 #[derive(Debug, Clone)]
 enum Known {
-    Preset(Meaning),
+    Preset(DecoderSettings),
     Dbc(Box<Mapping>),
 }
 
@@ -72,7 +72,7 @@ impl DeviceKind for ImuCanKind {
     }
 }
 
-fn preset(sensor: &SensorConfig, own: &Section<'_>) -> Result<Meaning, ConfigError> {
+fn preset(sensor: &SensorConfig, own: &Section<'_>) -> Result<DecoderSettings, ConfigError> {
     let presets = [
         ("xsens_mti600", Preset::Xsens),
         ("sbg_ellipse", Preset::Sbg),
@@ -97,7 +97,7 @@ fn preset(sensor: &SensorConfig, own: &Section<'_>) -> Result<Meaning, ConfigErr
         }
         Preset::Bosch => MessageSet::Bosch,
     };
-    Ok(Meaning {
+    Ok(DecoderSettings {
         set,
         axis_order,
         sample_time_tick: DurNs(tick_us.saturating_mul(1000)),

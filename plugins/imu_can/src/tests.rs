@@ -12,7 +12,7 @@ use headrace_sensor::reading::{Decoded, Level, Packet, Reading};
 
 use crate::ImuCanKind;
 use crate::codec::{Message, MessageSet};
-use crate::decoder::{AxisOrder, ImuDecoder, Meaning};
+use crate::decoder::{AxisOrder, DecoderSettings, ImuDecoder};
 use crate::sets::{bosch, j1939, sbg, xsens};
 
 /// A vehicle rotating at constant rates about its x axis and about the vertical.
@@ -73,8 +73,8 @@ fn configured(own: &str) -> Result<Box<dyn Device>, String> {
     Ok(device)
 }
 
-fn meaning(set: MessageSet) -> Meaning {
-    Meaning {
+fn meaning(set: MessageSet) -> DecoderSettings {
+    DecoderSettings {
         set,
         axis_order: AxisOrder::Yxz,
         sample_time_tick: DurNs(100_000),
@@ -182,7 +182,7 @@ fn emulated_sbg_round_trips_in_headrace_axes() {
 fn emulated_j1939_unit_round_trips_in_either_axis_order() {
     for (key, axis_order) in [("yxz", AxisOrder::Yxz), ("xyz", AxisOrder::Xyz)] {
         let truth = Going::new(0.0, 0.0);
-        let mut decoder = ImuDecoder::new(Meaning { axis_order, ..meaning(J1939) });
+        let mut decoder = ImuDecoder::new(DecoderSettings { axis_order, ..meaning(J1939) });
         let own = format!("preset = \"j1939\"\naxis_order = \"{key}\"\n");
         let readings = emulated(&own, &mut decoder, &truth, 100);
         assert_eq!(readings.len(), 200);

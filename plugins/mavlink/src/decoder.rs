@@ -27,7 +27,7 @@ const QUALITY_INVALID_PERCENT: u8 = 1;
 
 /// Decoding settings of a part.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Meaning {
+pub struct DecoderSettings {
     /// Part of the vehicle.
     pub part: Part,
     /// Accepted system id; `None` for that of the first autopilot received.
@@ -82,7 +82,7 @@ stateful!(MavlinkDecoder { state: codec, clock, state; });
 
 #[derive(Debug, Clone)]
 struct State {
-    meaning: Meaning,
+    meaning: DecoderSettings,
     boot: BootClock,
     /// Accepted system id, once it is known.
     system_id: Option<u8>,
@@ -112,7 +112,7 @@ impl BootClock {
 
 impl MavlinkDecoder {
     /// New decoder.
-    pub fn new(meaning: Meaning) -> Self {
+    pub fn new(meaning: DecoderSettings) -> Self {
         let system_id = meaning.system_id;
         let state = State { meaning, boot: BootClock::default(), system_id, passed_over: 0, withheld: 0 };
         Self { codec: MavlinkCodec::default(), clock: LineClock::new(SILENCE), state }
@@ -177,7 +177,7 @@ impl State {
     }
 
     fn take_own(&mut self, frame: &Frame, sink: &mut dyn FnMut(Reading)) {
-        let Meaning { part, component_id, .. } = self.meaning;
+        let DecoderSettings { part, component_id, .. } = self.meaning;
         let is_component = component_id.is_none_or(|id| id == frame.header.component_id);
         match (part, Message::of(frame).filter(|_| is_component)) {
             (Part::Imu { message }, Some(Message::Attitude(attitude))) => {

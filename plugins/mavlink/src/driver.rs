@@ -2,13 +2,13 @@
 
 use headrace_sensor::codec::Framing as _;
 use headrace_sensor::device::Decoder as _;
-use headrace_sensor::driver::{Carrier, Cutter, DeviceHealth, Driver, Strangers, Wire};
+use headrace_sensor::driver::{Carrier, Cutter, DeviceHealth, Driver, IgnoredSenders, Wire};
 use headrace_sensor::geometry::time::{DurNs, MonoNs};
 use headrace_sensor::reading::Packet;
 
 use mavlink::{MAVLinkV2MessageRaw, MavHeader};
 
-use crate::decoder::{MavlinkDecoder, Meaning};
+use crate::decoder::{DecoderSettings, MavlinkDecoder};
 use crate::dialect::{HEARTBEAT_DATA, MavAutopilot, MavComponent, MavModeFlag, MavState, MavType};
 use crate::frame::{Frames, MAX_FRAME_BYTES, encode, is_autopilots_heartbeat, system_of};
 
@@ -35,12 +35,12 @@ pub struct MavlinkDriver {
     sequence: u8,
     /// Accepted system: the configured one, or that of the first autopilot's heartbeat.
     system_id: Option<u8>,
-    strangers: Strangers,
+    strangers: IgnoredSenders,
 }
 
 impl MavlinkDriver {
     /// Driver of a part of the vehicle.
-    pub fn new(meaning: Meaning) -> Self {
+    pub fn new(meaning: DecoderSettings) -> Self {
         Self {
             cutter: Cutter::new(Frames, SILENCE),
             decoder: MavlinkDecoder::new(meaning),
@@ -48,7 +48,7 @@ impl MavlinkDriver {
             next_at: MonoNs(0),
             sequence: 0,
             system_id: meaning.system_id,
-            strangers: Strangers::default(),
+            strangers: IgnoredSenders::default(),
         }
     }
 

@@ -3,11 +3,11 @@
 use headrace_sensor::device::{Direction, Emulator, EmulatorSetup, LineSink};
 use headrace_sensor::geometry::math;
 use headrace_sensor::geometry::time::{DurNs, MonoNs};
-use headrace_sensor::measurement::{Inertia, Measurement, Pressure as Felt, Sounding};
+use headrace_sensor::measurement::{Inertia, Measurement, Pressure as InertialSample, Sounding};
 
 use mavlink::{MAVLinkV2MessageRaw, MavHeader};
 
-use crate::decoder::{DistancePart, Meaning, Part};
+use crate::decoder::{DecoderSettings, DistancePart, Part};
 use crate::dialect::{ATTITUDE_DATA, HEARTBEAT_DATA, MavAutopilot, MavModeFlag, MavState, MavType};
 use crate::frame::encode;
 use crate::message::{Distance, HECTOPASCAL, Imu, MILLI_G_MPS2, MILLIRADPS, Message, Pressure, to_ours};
@@ -26,7 +26,7 @@ const TEMPERATURE_CDEGC: i16 = 1000;
 /// Ideal autopilot: no noise and no added delay, but whole wire units.
 #[derive(Debug, Clone)]
 pub struct AutopilotEmulator {
-    meaning: Meaning,
+    meaning: DecoderSettings,
     rate_hz: f64,
     start: MonoNs,
     /// Metres measured by the distance sensor per true metre at the site.
@@ -39,7 +39,7 @@ pub struct AutopilotEmulator {
 
 impl AutopilotEmulator {
     /// An autopilot that is switched on, and first sends, at the setup's start.
-    pub fn new(meaning: Meaning, rate_hz: f64, setup: &EmulatorSetup) -> Self {
+    pub fn new(meaning: DecoderSettings, rate_hz: f64, setup: &EmulatorSetup) -> Self {
         let device_per_site = match meaning.part {
             Part::Distance(part) => part.sound_speed_mps / setup.site.sound_speed_mps,
             _ => 1.0,
@@ -122,12 +122,12 @@ impl Emulator<Inertia> for AutopilotEmulator {
     }
 }
 
-impl Emulator<Felt> for AutopilotEmulator {
-    fn begin(&mut self, until: MonoNs, due: &mut Vec<Felt>) {
-        self.begin_each(until, due, Felt::due);
+impl Emulator<InertialSample> for AutopilotEmulator {
+    fn begin(&mut self, until: MonoNs, due: &mut Vec<InertialSample>) {
+        self.begin_each(until, due, InertialSample::due);
     }
 
-    fn tell(&mut self, felt: &Felt, line: LineSink<'_>) {
+    fn tell(&mut self, felt: &InertialSample, line: LineSink<'_>) {
         let Part::Pressure { message, resolution_pa } = self.meaning.part else { return };
         let steps = math::round_to_i64(felt.pressure_pa / resolution_pa);
         let pressure = Pressure {

@@ -3,11 +3,11 @@
 use headrace_sensor::SensorConfig;
 use headrace_sensor::config::{ConfigError, Section};
 use headrace_sensor::device::{
-    Device, DeviceKind, Emulated, EmulatorSetup, Needless, Sense, SensorKind, SensorSpec,
+    Device, DeviceKind, Emulated, EmulatorSetup, OptionalPayload, Sense, SensorKind, SensorSpec,
 };
 use headrace_sensor::driver::{Carrier, Driver, DriverSetup};
 
-use crate::decoder::{DistancePart, MavlinkDecoder, Meaning, Part};
+use crate::decoder::{DecoderSettings, DistancePart, MavlinkDecoder, Part};
 use crate::driver::{self, MavlinkDriver};
 use crate::emulator::AutopilotEmulator;
 use crate::frame::without_identity;
@@ -30,7 +30,7 @@ pub struct MavlinkKind;
 #[derive(Debug, Clone)]
 pub struct Autopilot {
     sensor: SensorConfig,
-    meaning: Meaning,
+    meaning: DecoderSettings,
     rate_hz: f64,
     min_confidence: f64,
 }
@@ -61,7 +61,7 @@ impl DeviceKind for MavlinkKind {
             }
         };
         let usual_rate_hz = if matches!(name, PartName::Imu) { 50.0 } else { 10.0 };
-        let meaning = Meaning {
+        let meaning = DecoderSettings {
             part,
             system_id: byte(own, "system_id", 1)?,
             component_id: byte(own, "component_id", 1)?,
@@ -140,13 +140,13 @@ impl Device for Autopilot {
         }
     }
 
-    fn without(&self, what: Needless, packet: &[u8], shorter: &mut Vec<u8>) -> bool {
+    fn without(&self, what: OptionalPayload, packet: &[u8], shorter: &mut Vec<u8>) -> bool {
         shorter.clear();
-        what == Needless::Identity && without_identity(packet, shorter).is_some()
+        what == OptionalPayload::Identity && without_identity(packet, shorter).is_some()
     }
 
     fn line_address(&self) -> Option<String> {
-        let Meaning { part, system_id, component_id, .. } = self.meaning;
+        let DecoderSettings { part, system_id, component_id, .. } = self.meaning;
         let part = match part {
             Part::Imu { message } => format!("{message:?}"),
             Part::Pressure { message, .. } => format!("{message:?}"),

@@ -14,7 +14,7 @@ use headrace_sensor::geometry::time::{DurNs, MonoNs};
 use headrace_sensor::measurement::{Inertia, Measurement, Pressure, Sounding};
 use headrace_sensor::reading::{Decoded, Level, Packet, Reading};
 
-use crate::decoder::{DistancePart, MavlinkDecoder, Meaning, Part};
+use crate::decoder::{DecoderSettings, DistancePart, MavlinkDecoder, Part};
 use crate::dialect::{ATTITUDE_DATA, HEARTBEAT_DATA, MavAutopilot, MavType};
 use crate::frame::{encode, without_identity};
 use crate::message::{Distance, ImuMessage, Message, Pressure as Told, PressureMessage};
@@ -55,7 +55,7 @@ fn configured(own: &str) -> Result<Box<dyn Device>, String> {
 }
 
 fn decoder(part: Part) -> MavlinkDecoder {
-    MavlinkDecoder::new(Meaning { part, system_id: None, component_id: None, latency: LATENCY })
+    MavlinkDecoder::new(DecoderSettings { part, system_id: None, component_id: None, latency: LATENCY })
 }
 
 const RAW_IMU: Part = Part::Imu { message: Some(ImuMessage::Raw) };
@@ -243,8 +243,12 @@ fn only_the_configured_sender_is_used() {
     for (system_id, component_id, readings) in
         [(Some(1), Some(1), 1), (Some(2), None, 0), (None, Some(2), 0), (None, None, 1)]
     {
-        let mut decoder =
-            MavlinkDecoder::new(Meaning { part: PRESSURE, system_id, component_id, latency: LATENCY });
+        let mut decoder = MavlinkDecoder::new(DecoderSettings {
+            part: PRESSURE,
+            system_id,
+            component_id,
+            latency: LATENCY,
+        });
         assert_eq!(decode(&mut decoder, START, RECORDED_PRESSURE).len(), readings);
     }
 }

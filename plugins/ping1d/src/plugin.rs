@@ -4,7 +4,7 @@ use headrace_sensor::SensorConfig;
 use headrace_sensor::codec::{Codec as _, CodecCounts, Framing as _, LineClock};
 use headrace_sensor::config::{ConfigError, Section};
 use headrace_sensor::device::{
-    Decoder, Device, DeviceKind, Emulated, EmulatorSetup, Needless, Sense, SensorKind, SensorSpec,
+    Decoder, Device, DeviceKind, Emulated, EmulatorSetup, OptionalPayload, Sense, SensorKind, SensorSpec,
 };
 use headrace_sensor::driver::{Carrier, Driver, DriverSetup, Probe};
 use headrace_sensor::geometry::time::DurNs;
@@ -72,9 +72,9 @@ impl Device for Ping1d {
     }
 
     /// Replaces a profile by a distance message, without the echo strengths.
-    fn without(&self, what: Needless, packet: &[u8], shorter: &mut Vec<u8>) -> bool {
+    fn without(&self, what: OptionalPayload, packet: &[u8], shorter: &mut Vec<u8>) -> bool {
         shorter.clear();
-        what == Needless::Echoes && without_strengths(packet, shorter).is_some()
+        what == OptionalPayload::Echoes && without_strengths(packet, shorter).is_some()
     }
 
     fn line_address(&self) -> Option<String> {

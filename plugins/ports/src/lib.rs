@@ -29,6 +29,6 @@ pub use lines::{IsValid, Line, READ_BYTES, Senders};
 pub use open_error::{OpenError, OpenErrorKind};
 #[cfg(target_os = "linux")]
 pub use probe::{Answer, probe};
-pub use status::{Board, LineHistory, Phase, Status};
+pub use status::{LineHistory, Phase, Status, StatusQueue};
 pub use supervisor::{Connection, Supervisor};
 pub use wake::{System, Threads, Waker};

@@ -20,7 +20,7 @@ use crate::diagnosis;
 use crate::host::Host;
 use crate::lines::{self, Line, READ_BYTES, Senders};
 use crate::open_error::OpenError;
-use crate::status::{Board, LineHistory, Phase, Status};
+use crate::status::{LineHistory, Phase, Status, StatusQueue};
 use crate::wake::Waker;
 
 /// Reconnect backoff: initial and maximum pause; shorter for local ports, which are cheap to retry.
@@ -65,7 +65,7 @@ pub struct Common {
     /// Flag that ends all services.
     pub stopping: Arc<AtomicBool>,
     /// Board for changes of status.
-    pub board: Board,
+    pub board: StatusQueue,
     /// Wakes the loop when packets have arrived.
     pub waker: Waker,
     /// Receives all messages sent to devices, and their losses.
@@ -548,7 +548,7 @@ impl AttachedState {
     }
 
     /// Posts a status to the board if it has changed.
-    fn say(&mut self, board: &Board, since: MonoNs, phase: Phase, words: &str) {
+    fn say(&mut self, board: &StatusQueue, since: MonoNs, phase: Phase, words: &str) {
         if self.status.as_ref().is_some_and(|(last, said)| *last == phase && said == words) {
             return;
         }

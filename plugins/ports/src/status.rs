@@ -72,7 +72,7 @@ pub struct LineHistory {
 
 /// Bounded queue of statuses. When it is full, the oldest ones are dropped and counted.
 #[derive(Clone)]
-pub struct Board {
+pub struct StatusQueue {
     shared: Arc<Shared>,
 }
 
@@ -81,7 +81,7 @@ struct Shared {
     dropped: AtomicU64,
 }
 
-impl Board {
+impl StatusQueue {
     /// Creates a board for `capacity` statuses.
     pub fn new(capacity: usize) -> Self {
         let statuses = ArrayQueue::new(capacity.max(1));

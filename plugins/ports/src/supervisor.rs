@@ -18,7 +18,7 @@ use headrace_sensor::driver::Driver;
 use crate::clock;
 use crate::host::RealHost;
 use crate::line_service::{Attached, Common, LineRecord, LineService};
-use crate::status::{Board, LineHistory, Status};
+use crate::status::{LineHistory, Status, StatusQueue};
 use crate::wake::{self, Waker};
 
 /// Capacity of the status board.
@@ -46,7 +46,7 @@ pub struct Supervisor {
     sensors: usize,
     threads: Vec<JoinHandle<Vec<(usize, LineHistory)>>>,
     stopping: Arc<AtomicBool>,
-    board: Board,
+    board: StatusQueue,
     /// Makes the type not `Send`, because the loop must run on the thread that its wakers know.
     on_this_thread: PhantomData<*const ()>,
 }
@@ -57,7 +57,7 @@ impl Supervisor {
     /// Errors: a thread can't be started.
     pub fn start(connections: Vec<Connection>, record: Option<Arc<dyn LineRecord>>) -> io::Result<Self> {
         let stopping = Arc::new(AtomicBool::new(false));
-        let board = Board::new(BOARD);
+        let board = StatusQueue::new(BOARD);
         let waker = Waker::of_this_thread();
         let host = Arc::new(RealHost);
         let common = Common { host, stopping: Arc::clone(&stopping), board: board.clone(), waker, record };

@@ -18,7 +18,7 @@ const LINE_PLACES: u8 = 3;
 
 /// Emulation settings.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Reeling {
+pub struct CounterSettings {
     /// Chainage at which the counter reads zero, m.
     pub zero_at_m: f64,
     /// Metres of chainage per metre of cable.
@@ -32,7 +32,7 @@ pub struct Reeling {
 /// Ideal HID counter: no noise and no added delay, but whole counts.
 #[derive(Debug, Clone)]
 pub struct HidEmulator {
-    reeling: Reeling,
+    reeling: CounterSettings,
     counter: Counter,
     start: MonoNs,
     begun: u64,
@@ -43,14 +43,14 @@ pub struct HidEmulator {
 /// Ideal LCI-90: no noise and no added delay, but whole millimetres.
 #[derive(Debug, Clone)]
 pub struct LineEmulator {
-    reeling: Reeling,
+    reeling: CounterSettings,
     metres_per_unit: f64,
     start: MonoNs,
     begun: u64,
     before: Option<(MonoNs, f64)>,
 }
 
-impl Reeling {
+impl CounterSettings {
     /// Time from the start to a report on the counter's clock.
     fn elapsed(&self, report: u64) -> DurNs {
         DurNs::from_secs_f64(report as f64 / self.rate_hz)
@@ -72,7 +72,7 @@ impl Reeling {
 
 impl HidEmulator {
     /// A counter that is switched on, and first reports, at `start`.
-    pub fn new(reeling: Reeling, counter: Counter, start: MonoNs) -> Self {
+    pub fn new(reeling: CounterSettings, counter: Counter, start: MonoNs) -> Self {
         Self { reeling, counter, start, begun: 0, told: 0, told_counts: 0 }
     }
 
@@ -112,7 +112,7 @@ impl Emulator<Payout> for HidEmulator {
 
 impl LineEmulator {
     /// A monitor that is switched on, and first sends a line, at `start`.
-    pub fn new(reeling: Reeling, metres_per_unit: f64, start: MonoNs) -> Self {
+    pub fn new(reeling: CounterSettings, metres_per_unit: f64, start: MonoNs) -> Self {
         Self { reeling, metres_per_unit, start, begun: 0, before: None }
     }
 }

@@ -9,7 +9,7 @@ use headrace_sensor::driver::{Carrier, Driver, DriverSetup};
 
 use crate::decoder::{Counter, HidDecoder, LineDecoder};
 use crate::driver;
-use crate::emulator::{HidEmulator, LineEmulator, Reeling};
+use crate::emulator::{CounterSettings, HidEmulator, LineEmulator};
 use crate::report::{Endian, MAX_REPORT_BYTES, ReportLayout, Width};
 use crate::tracker::Counting;
 
@@ -29,7 +29,7 @@ pub struct TetherHidKind;
 #[derive(Debug, Clone)]
 pub struct CableCounter {
     sensor: SensorConfig,
-    reeling: Reeling,
+    reeling: CounterSettings,
     wire: Wire,
 }
 
@@ -81,7 +81,7 @@ impl DeviceKind for TetherHidKind {
             return Err(own.invalid("scale", "must be at least 0.01 away from zero"));
         }
         let zero_at_m = own.number("zero_at_m", -1.0e6..=1.0e6)?.unwrap_or(0.0);
-        let reeling = Reeling {
+        let reeling = CounterSettings {
             zero_at_m,
             scale,
             rate_hz: own.number("rate_hz", 0.1..=1000.0)?.unwrap_or(usual_rate_hz),
@@ -98,7 +98,7 @@ impl DeviceKind for TetherHidKind {
     }
 }
 
-fn hid(reeling: &Reeling, own: &Section<'_>) -> Result<Wire, ConfigError> {
+fn hid(reeling: &CounterSettings, own: &Section<'_>) -> Result<Wire, ConfigError> {
     let mut layout = report_layout(own)?;
     let clock_offset = own.integer("clock_ms_offset", 0..=MAX_REPORT_BYTES as i64)?;
     let clock_offset = clock_offset.and_then(|offset| usize::try_from(offset).ok());

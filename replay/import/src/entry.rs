@@ -26,7 +26,7 @@ pub enum Step {
 
 /// A format's report at the end, as text.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
-pub struct Told {
+pub struct ImportReport {
     /// Losses.
     pub losses: Vec<String>,
     /// Remarks that aren't losses.

@@ -1,6 +1,6 @@
 //! The interface of file formats, which split a file into entries.
 
-use crate::entry::{Clock, Entry, Step, Told};
+use crate::entry::{Clock, Entry, ImportReport, Step};
 use crate::order::WINDOW_NS;
 
 /// Maximum number of bytes of the file held in memory, more than the longest entry of any format.
@@ -22,8 +22,8 @@ pub trait Format {
     }
 
     /// Its report at the end.
-    fn told(&self) -> Told {
-        Told::default()
+    fn told(&self) -> ImportReport {
+        ImportReport::default()
     }
 
     /// Parses the front; entries go to `out`. `end` means that nothing follows.
@@ -43,7 +43,7 @@ impl Format for Box<dyn Format> {
         (**self).reach_ns()
     }
 
-    fn told(&self) -> Told {
+    fn told(&self) -> ImportReport {
         (**self).told()
     }
 

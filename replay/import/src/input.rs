@@ -2,7 +2,7 @@
 
 use std::io::Read;
 
-use crate::entry::{Clock, Entry, Step, Told};
+use crate::entry::{Clock, Entry, ImportReport, Step};
 use crate::error::ImportError;
 use crate::format::Format;
 use crate::losses::Losses;
@@ -31,7 +31,7 @@ pub trait Source {
     fn bytes(&self) -> u64;
 
     /// Losses and remarks so far.
-    fn told(&self) -> Told;
+    fn told(&self) -> ImportReport;
 }
 
 /// A file and the format that splits it.
@@ -66,9 +66,9 @@ impl<R: Read, F: Format> Source for Input<R, F> {
         self.offset + self.done as u64
     }
 
-    fn told(&self) -> Told {
-        let Told { losses, remarks } = self.format.told();
-        Told { losses: [self.losses.words(), losses].concat(), remarks }
+    fn told(&self) -> ImportReport {
+        let ImportReport { losses, remarks } = self.format.told();
+        ImportReport { losses: [self.losses.words(), losses].concat(), remarks }
     }
 
     fn more(&mut self, order: &mut Order) -> Result<bool, ImportError> {

@@ -28,7 +28,7 @@ mod taker;
 mod tests;
 pub mod tlog;
 
-pub use entry::{Clock, Entry, Step, Told};
+pub use entry::{Clock, Entry, ImportReport, Step};
 pub use error::ImportError;
 pub use format::Format;
 pub use import::{BEGIN, Import, Imported};

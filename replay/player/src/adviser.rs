@@ -9,7 +9,7 @@ use headrace_monitor::run::Loop;
 use headrace_monitor::{App, PluginError};
 use headrace_sampling::advice::Reason;
 use headrace_sensor::device::Direction;
-use headrace_simulator::{Adviser, Message, Scene, SceneError, Simulation, Told};
+use headrace_simulator::{Adviser, Message, PilotAdvice, Scene, SceneError, Simulation};
 use headrace_vehicle::VehicleConfig;
 
 /// Length of a tick.
@@ -58,7 +58,7 @@ struct LoopAdviser {
     ports: Vec<Option<Port>>,
     /// End of the current tick.
     until: MonoNs,
-    told: Vec<Told>,
+    told: Vec<PilotAdvice>,
 }
 
 impl LoopAdviser {
@@ -79,7 +79,7 @@ impl LoopAdviser {
 }
 
 /// Advice of the last tick, if any.
-fn told_by(dive: &Loop) -> Option<Told> {
+fn told_by(dive: &Loop) -> Option<PilotAdvice> {
     let last = dive.notices().iter().rev().find_map(|notice| match notice {
         Notice::Advice(entry) => Some(entry),
         _ => None,
@@ -90,7 +90,7 @@ fn told_by(dive: &Loop) -> Option<Told> {
     let known = matches!(last.advice.reason, Reason::HelixPitch | Reason::AngularStep);
     let state = dive.live_state();
     let stand = state.asks_to_stand() || matches!(state.condition(), Condition::NoPosition(_));
-    Some(Told { at: last.at, v_max_mps: known.then_some(last.advice.v_max_mps), stand, missed_m })
+    Some(PilotAdvice { at: last.at, v_max_mps: known.then_some(last.advice.v_max_mps), stand, missed_m })
 }
 
 impl Adviser for LoopAdviser {
@@ -121,7 +121,7 @@ impl Adviser for LoopAdviser {
         }
     }
 
-    fn told(&mut self) -> Vec<Told> {
+    fn told(&mut self) -> Vec<PilotAdvice> {
         std::mem::take(&mut self.told)
     }
 }

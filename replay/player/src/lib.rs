@@ -4,8 +4,10 @@
 //! verification, smoothing and viewer output of a recorded dive.
 
 mod adviser;
+pub mod atomic_file;
 mod clocks;
 pub mod drive;
+pub mod effect_influence;
 pub mod log;
 pub mod notes;
 pub mod playback;
@@ -19,8 +21,6 @@ pub mod snapshot_store;
 pub mod threads;
 pub mod verify;
 pub mod view;
-pub mod whole_file;
-pub mod worth;
 
 pub use adviser::{SimulationError, simulation, simulation_believing};
 pub use simulation_feed::SimulationFeed;

@@ -10,10 +10,10 @@ use headrace_fusion::Navigation;
 use headrace_fusion::filter::settings::Settings;
 use headrace_fusion::filter::sources::Consistency;
 use headrace_fusion::smooth::backward::Backward;
-use headrace_fusion::smooth::beside::BesideNavigation;
 use headrace_fusion::smooth::journal::{Journal, JournalReader};
 use headrace_fusion::smooth::step::{Placed, WORDS, Words};
 use headrace_fusion::smooth::track::{Track, TrackNavigation};
+use headrace_fusion::smooth::two_filters::TwoFilterNavigation;
 use headrace_monitor::report::{Report, smoothing_changes};
 use headrace_monitor::run::Loop;
 use headrace_sensor::reading::MAX_SOURCES;
@@ -78,7 +78,7 @@ impl FirstPass {
         let (journal, reader) = Journal::new(QUEUED);
         let steps = Steps::new(reader)?;
         let profile = vehicle.tunnel.profile.clone();
-        let navigation = BesideNavigation::new(profile, vehicle.site, settings, journal);
+        let navigation = TwoFilterNavigation::new(profile, vehicle.site, settings, journal);
         Ok((Self { settings, steps, consistency: [None; MAX_SOURCES] }, Box::new(navigation)))
     }
 

@@ -1,7 +1,7 @@
 //! The adviser of a simulated pilot: a monitor that receives the messages of the vehicle's devices.
 
 use crate::outbox::Message;
-use crate::told::Told;
+use crate::pilot_advice::PilotAdvice;
 
 /// An on-board monitor whose advice the pilot gets.
 pub trait Adviser: Send {
@@ -9,5 +9,5 @@ pub trait Adviser: Send {
     fn hear(&mut self, message: &Message<'_>);
 
     /// The advice since the last call, in order of time.
-    fn told(&mut self) -> Vec<Told>;
+    fn told(&mut self) -> Vec<PilotAdvice>;
 }

@@ -5,19 +5,20 @@
 
 mod adviser;
 mod builder;
-mod calls;
-pub mod calm;
 mod clock;
 pub mod effects;
 pub mod environment;
 mod error;
 mod facts;
 mod files;
+mod implied_effects;
 #[cfg(feature = "mesh")]
 pub mod mesh;
 mod motion;
 mod notes;
 mod outbox;
+mod pilot_advice;
+pub mod position_error_model;
 mod random;
 mod scene;
 mod sensing;
@@ -28,22 +29,21 @@ mod stretch;
 mod testing;
 #[cfg(test)]
 mod testing_motion;
-mod told;
 pub mod trajectory;
 mod truth;
 
 pub use adviser::Adviser;
 pub use builder::Added;
-pub use calls::{Called, Fate, Take};
 pub use clock::START;
 pub use error::SceneError;
 pub use facts::{Facts, SensorFacts};
 pub use files::FileLoader;
+pub use implied_effects::{Called, Fate, Take};
 pub use outbox::Message;
+pub use pilot_advice::PilotAdvice;
 pub use scene::Scene;
 pub use sensing::Scenery;
 pub use simulation::Simulation;
 pub use stages::Stage;
-pub use told::Told;
 pub use trajectory::{Leg, Trajectory};
 pub use truth::{Cause, SoundingTruth, TruthRow};

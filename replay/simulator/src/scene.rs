@@ -6,12 +6,12 @@ use headrace_sampling::head::HeadProgram;
 use headrace_sensor::device::DeviceKind;
 use headrace_vehicle::VehicleConfig;
 
-use crate::calls::{self, Called, Choice, Described, Tables, Take};
 use crate::effects::{self, Effect, EffectKind, Named};
 use crate::environment::Environment;
 use crate::error::SceneError;
 use crate::facts::Facts;
 use crate::files::FileLoader;
+use crate::implied_effects::{self, Called, Choice, Described, Tables, Take};
 use crate::trajectory::{self, Ground, Trajectory};
 
 /// Upper bound of a dive's duration, s.
@@ -123,9 +123,9 @@ impl Scene {
         let environment = root.required("tunnel", environment)?;
         let effects = root.required("effects", effects)?;
         let (described, choice) = (root.required("water", described)?, root.required("effects", choice)?);
-        let mut called = calls::called(&described, &vehicle, &facts, &environment);
+        let mut called = implied_effects::called(&described, &vehicle, &facts, &environment);
         choice.decide(&mut called, |name| effects.has(name));
-        let effects = effects.and(&calls::taken(&called), &facts)?;
+        let effects = effects.and(&implied_effects::taken(&called), &facts)?;
         let without = Vec::new();
         Ok(Self {
             name,

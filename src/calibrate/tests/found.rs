@@ -1,6 +1,6 @@
 //! Compares estimates with the simulated errors.
 
-use super::super::estimate::Untold;
+use super::super::estimate::NotEstimated;
 use super::super::heads::{Heads, heads};
 use super::super::scan::gather;
 use super::super::still::longest;
@@ -138,7 +138,7 @@ fn zeros_are_exact() {
         assert!((higher.found.value - level.found.value - 0.102).abs() < 1e-3);
         assert_eq!(
             zero::surface(material, to, to),
-            Err(Untold::Missing { what: "a depth sensor at that time" })
+            Err(NotEstimated::Missing { what: "a depth sensor at that time" })
         );
     });
 }

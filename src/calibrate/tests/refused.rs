@@ -1,11 +1,11 @@
 //! Quantities that can't be estimated, and the reasons.
 
-use super::super::estimate::Untold;
+use super::super::estimate::NotEstimated;
 use super::super::heads::heads;
 use super::stand::{Stand, Wrong, profiles};
 use headrace_geometry::tunnel::shapes;
 
-fn why(stand: &Stand) -> Untold {
+fn why(stand: &Stand) -> NotEstimated {
     stand.ask(|material| heads(material).unwrap_err())
 }
 
@@ -15,7 +15,7 @@ fn circle_does_not_determine_roll() {
     let stand = Stand { at: [0.05, 3.0], ..Stand::new(shapes::circle(3.0).unwrap(), &wrong, 1) };
     let found = stand.ask(|material| heads(material).unwrap());
     for head in &found.heads {
-        assert!(matches!(head.angle_rad, Err(Untold::Round { .. })), "{head:?}");
+        assert!(matches!(head.angle_rad, Err(NotEstimated::Round { .. })), "{head:?}");
         assert_eq!(head.found.rotation, head.filed.rotation, "a value that isn't estimated stays the file's");
     }
 }
@@ -25,7 +25,7 @@ fn moving_vehicle_is_refused() {
     for (_, profile) in profiles() {
         let stand = Stand { speed_mps: 0.1, ..Stand::new(profile, &[Wrong::default(); 2], 1) };
         let why = why(&stand);
-        assert!(matches!(why, Untold::Moved { what: "the cable", unit: "m", .. }), "{why}");
+        assert!(matches!(why, NotEstimated::Moved { what: "the cable", unit: "m", .. }), "{why}");
         assert!(why.to_string().starts_with("the vehicle moved: the cable varied by 1."), "{why}");
     }
 }
@@ -53,7 +53,7 @@ fn sense_of_rotation_in_a_symmetric_section_needs_the_side() {
             let of = found.heads[0].is_mirrored;
             assert_eq!(of.is_ok(), told, "{name}, {at:?}, {has_echoes}: {of:?}");
             assert!(!of.unwrap_or(false));
-            assert!(matches!(found.heads[0].left_m, Err(Untold::OneHead)));
+            assert!(matches!(found.heads[0].left_m, Err(NotEstimated::OneHead)));
         }
     }
 }
@@ -65,13 +65,13 @@ fn other_wall_contradicts_the_profile() {
     let why = stand.ask(|material| {
         heads(&super::super::material::Material { profile: &other, ..*material }).unwrap_err()
     });
-    assert!(matches!(why, Untold::Contradicted { median_m, .. } if median_m > 0.15), "{why}");
+    assert!(matches!(why, NotEstimated::Contradicted { median_m, .. } if median_m > 0.15), "{why}");
 }
 
 #[test]
 fn missing_reading_is_named() {
     let stand = Stand::new(shapes::ceran().unwrap(), &[], 1);
-    assert_eq!(why(&stand), Untold::Missing { what: "any profiling head" });
+    assert_eq!(why(&stand), NotEstimated::Missing { what: "any profiling head" });
     let nothing = Stand { seconds: 0, ..stand };
-    assert_eq!(why(&nothing), Untold::Missing { what: "any sensor" });
+    assert_eq!(why(&nothing), NotEstimated::Missing { what: "any sensor" });
 }

@@ -14,7 +14,7 @@ pub const SENSES: [Sense; 5] =
 
 /// A device and its fault.
 #[derive(Debug, Clone)]
-pub struct Breakage {
+pub struct DeviceFault {
     /// Sense of the device.
     pub sense: Sense,
     /// Its name.
@@ -29,7 +29,7 @@ pub struct Breakage {
     pub size: f64,
 }
 
-impl Breakage {
+impl DeviceFault {
     /// The fault of a seed in a dive of this duration: senses and faults in rotation, the rest drawn.
     pub fn of(seed: u64, plain: &Scene, duration_s: f64) -> Self {
         let mut draw = Draw::new(seed ^ 0xb4ea_4a6e);

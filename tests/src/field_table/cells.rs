@@ -8,7 +8,7 @@ use headrace_sensor::device::Sense;
 use headrace_simulator::Scene;
 use headrace_vehicle::VehicleConfig;
 
-use super::breaking::Breakage;
+use super::breaking::DeviceFault;
 use crate::planned::planned_mps;
 use crate::random_dives::Draw;
 use crate::scenes;
@@ -188,7 +188,7 @@ pub struct CellDive {
 }
 
 /// Noise and resolution of the depth sensor, and scatter of a compass; heads and echosounders have tables of their
-/// own. Source: `replay/simulator/src/calls/data_sheets.rs`.
+/// own. Source: `replay/simulator/src/implied_effects/data_sheets.rs`.
 const DEPTH: &str = "depth_steps = {}\ndepth_noise = { noise_pa = 152 }\n";
 /// Noise and biases of the units. Source: `plugins/imu_can/src/noise.rs`, and the defaults of `[navigation]` in
 /// docs/reference/vehicle-file.md.
@@ -245,10 +245,10 @@ impl Cell {
     }
 
     /// The broken device in the dive of a seed with this length.
-    pub fn broken(&self, seed: u64, length_m: f64) -> Breakage {
+    pub fn broken(&self, seed: u64, length_m: f64) -> DeviceFault {
         let plain = self.plain(seed, length_m);
         let [_, speed_mps] = self.speeds_mps(&plain.vehicle);
-        Breakage::of(seed, &plain, length_m / speed_mps)
+        DeviceFault::of(seed, &plain, length_m / speed_mps)
     }
 
     /// The scene without effects, at any speed.
@@ -465,7 +465,7 @@ impl Cell {
                 let late = quoted(&of_sense(plain, sense));
                 format!("[effects.line_delay]\nlatency_ms = 300\nsensors = {late}\n")
             }
-            Condition::Broken => Breakage::of(seed, plain, duration_s).effect(),
+            Condition::Broken => DeviceFault::of(seed, plain, duration_s).effect(),
             _ => String::new(),
         }
     }

@@ -27,7 +27,7 @@ const TOUCH_M: f64 = 0.02;
 
 /// A section that passed although its true hole exceeds the target.
 #[derive(Debug, Clone)]
-pub struct Falsely {
+pub struct FalsePass {
     /// Seed of the dive.
     pub seed: u64,
     /// Chainage of the section's start, m.
@@ -54,7 +54,7 @@ pub struct Figures {
     /// Passed sections with D_true over 1.1 times the target.
     pub passed_far: u32,
     /// Every passed section with D_true over the target.
-    pub falsely: Vec<Falsely>,
+    pub falsely: Vec<FalsePass>,
     /// Sections with D_true below 0.9 times the target.
     pub under: u32,
     /// Failed sections with D_true below 0.9 times the target.
@@ -134,7 +134,7 @@ impl Figures {
         self.passed_far += is(passed && share > 1.1);
         if passed && share > 1.0 {
             let report = &section.report;
-            self.falsely.push(Falsely {
+            self.falsely.push(FalsePass {
                 seed,
                 start_m: report.start_m,
                 hole_m: [report.hole_m.unwrap_or(f64::NAN), report.hole_sd_m, section.true_hole_m],

@@ -5,7 +5,7 @@ mod cells;
 mod figures;
 
 pub use cells::{CONDITIONS, Cell, Condition, DRIVEN, Driven, PLACES, Place, VEHICLES, Vehicle};
-pub use figures::{Falsely, Figures, KINDS_OF_SOURCES};
+pub use figures::{FalsePass, Figures, KINDS_OF_SOURCES};
 
 use crate::truth;
 

@@ -8,23 +8,23 @@ use std::collections::BTreeMap;
 use headrace_coverage::Cause;
 
 use super::matrix::Count;
-use super::{Intervened, Right, hole_at_m, report, right};
+use super::{InterventionDive, Right, hole_at_m, report, right};
 
 /// Number of noises that the reference tries.
 const NOISES: u64 = 3;
 
 /// Right answers of the reference for dives with two causes; it knows everything but the noise.
 #[derive(Debug, Default, Clone, Copy)]
-pub struct Knowing {
+pub struct UpperBound {
     /// All stretches.
     pub stretches: Count,
     /// Stretches whose true set has two causes.
     pub pairs: Count,
 }
 
-impl Knowing {
+impl UpperBound {
     /// Adds a dive; dives with a single cause are ignored.
-    pub fn add(&mut self, dive: &Intervened) {
+    pub fn add(&mut self, dive: &InterventionDive) {
         if dive.drawn.injected.len() < 2 {
             return;
         }
@@ -55,7 +55,7 @@ impl Knowing {
     }
 }
 
-impl Intervened {
+impl InterventionDive {
     /// Right sets of causes of each section, simulated with another noise.
     fn with_noise(&self, noise: u64) -> Vec<Right> {
         let drawn = self.drawn.with_noise(noise);

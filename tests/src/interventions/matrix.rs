@@ -5,7 +5,7 @@ use std::fmt::Write as _;
 
 use headrace_coverage::Cause;
 
-use super::{Intervened, Right};
+use super::{InterventionDive, Right};
 
 /// Counts of answers.
 #[derive(Debug, Default, Clone, Copy)]
@@ -70,7 +70,7 @@ fn any_words(right: &Right) -> String {
 
 impl Matrix {
     /// Adds a dive.
-    pub fn add(&mut self, dive: &Intervened) {
+    pub fn add(&mut self, dive: &InterventionDive) {
         let several = dive.drawn.injected.len() - 1;
         self.idle += u32::from(dive.sections.is_empty());
         for section in &dive.sections {

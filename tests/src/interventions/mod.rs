@@ -14,7 +14,7 @@ use headrace_monitor::report::{Report, SectionReport};
 
 use crate::scenes;
 pub use draw::{Drawn, Injected, KINDS};
-pub use knowing::Knowing;
+pub use knowing::UpperBound;
 pub use matrix::Matrix;
 pub use remedy::remedies;
 
@@ -62,7 +62,7 @@ impl Judged {
 }
 
 /// A dive with its failed sections.
-pub struct Intervened {
+pub struct InterventionDive {
     /// The drawn dive, with its final target.
     pub drawn: Drawn,
     /// Report with all injected causes.
@@ -107,7 +107,7 @@ pub fn report(drawn: &Drawn, is_in: &dyn Fn(usize) -> bool) -> Report {
 }
 
 /// Draws a dive and simulates it with and without each of its injected causes.
-pub fn intervene(seed: u64, kinds: &[usize]) -> Intervened {
+pub fn intervene(seed: u64, kinds: &[usize]) -> InterventionDive {
     let mut drawn = Drawn::of(seed, kinds);
     let without_all = report(&drawn, &|_| false);
     let inner_m = [draw::START_M + END_M, drawn.end_m - 0.25];
@@ -151,7 +151,7 @@ pub fn intervene(seed: u64, kinds: &[usize]) -> Intervened {
             evidence: *evidence,
         });
     }
-    Intervened { drawn, report: all, sections }
+    InterventionDive { drawn, report: all, sections }
 }
 
 /// Diameter of the hole in the section that begins at `start_m`, m; infinite if it can't be measured.
@@ -181,7 +181,7 @@ fn right(drawn: &Drawn, alone: &[bool], together: bool) -> Option<Right> {
     Some(vec![both])
 }
 
-impl Intervened {
+impl InterventionDive {
     /// Stretches of the failed sections.
     pub fn stretches(&self) -> Vec<Stretch<'_>> {
         let mut stretches: Vec<Stretch<'_>> = Vec::new();

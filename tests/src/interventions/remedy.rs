@@ -3,7 +3,7 @@
 use headrace_coverage::Action;
 use headrace_monitor::report::ReturnReport;
 
-use super::{Injected, Intervened, Judged, hole_at_m, report};
+use super::{Injected, InterventionDive, Judged, hole_at_m, report};
 
 /// Length added at either end of a stretch that is passed otherwise, m: heads sit apart along the hull.
 const ROOM_M: f64 = 2.0;
@@ -38,7 +38,7 @@ fn mends(action: Action, injected: &Injected) -> bool {
 }
 
 /// Simulates the displayed remedy of each run that contains explained failed sections.
-pub fn remedies(dive: &Intervened) -> Vec<Remedied> {
+pub fn remedies(dive: &InterventionDive) -> Vec<Remedied> {
     let of_run = |told: &ReturnReport| -> Vec<Judged> {
         dive.sections.iter().filter(|section| section.run == Some(told.run)).cloned().collect()
     };
@@ -48,7 +48,7 @@ pub fn remedies(dive: &Intervened) -> Vec<Remedied> {
         .collect()
 }
 
-fn remedy(dive: &Intervened, told: &ReturnReport, sections: &[Judged]) -> Remedied {
+fn remedy(dive: &InterventionDive, told: &ReturnReport, sections: &[Judged]) -> Remedied {
     let has = |action: Action| told.actions.contains(&action);
     let over_m = [told.to_m - ROOM_M, told.from_m + ROOM_M];
     let mended = |injected: &Injected| told.actions.iter().any(|action| mends(*action, injected));

@@ -1,14 +1,14 @@
 //! Invariants of every dive in a simulated world, whatever fails.
 
 use super::plan::{Ending, MachineFault};
-use super::{Line, Lived, Replayed};
+use super::{DiveResult, Line, Replayed};
 use crate::drops;
 
 /// Longest time for which a running loop may leave packets waiting, recorded or not.
 const LONGEST_WAIT_NS: i64 = 500_000_000;
 
 /// Broken invariants, as text.
-pub fn broken(lived: &Lived, replayed: &Result<Replayed, String>) -> Vec<String> {
+pub fn broken(lived: &DiveResult, replayed: &Result<Replayed, String>) -> Vec<String> {
     let mut broken: Vec<String> =
         lived.lines.iter().enumerate().filter_map(|(number, line)| of_line(lived, number, line)).collect();
     match replayed {
@@ -22,7 +22,7 @@ pub fn broken(lived: &Lived, replayed: &Result<Replayed, String>) -> Vec<String>
 }
 
 /// No fault affects another device, no delay loses a frame, and every device runs again after all faults.
-fn of_line(lived: &Lived, number: usize, line: &Line) -> Option<String> {
+fn of_line(lived: &DiveResult, number: usize, line: &Line) -> Option<String> {
     let finished = lived.plan.ending == Ending::Finished;
     let is_of = |fault: MachineFault| matches!(fault, MachineFault::LoopStalls | MachineFault::PortsStall);
     let stalled = lived.plan.machine.iter().any(|window| is_of(window.what));
@@ -45,7 +45,7 @@ fn of_line(lived: &Lived, number: usize, line: &Line) -> Option<String> {
 
 /// Checks a log against the dive. It contains every packet that the loop took, in that order. Recorder and reader
 /// report every missing packet, and no other. Drops on a line before the loop are recorded.
-fn of_log(lived: &Lived, replayed: &Replayed) -> Vec<String> {
+fn of_log(lived: &DiveResult, replayed: &Replayed) -> Vec<String> {
     let finished = lived.plan.ending == Ending::Finished;
     let (ours, theirs) = (&lived.consumed, &replayed.consumed);
     let mut rest = ours.iter();

@@ -25,7 +25,7 @@ use headrace_monitor::App;
 use headrace_monitor::merge::Inbox;
 use headrace_monitor::outlet::{NoticeOutlet, NoticeReceiver};
 use headrace_monitor::run::Loop;
-use headrace_ports::{Attached, Board, Common, LineHistory, LineRecord, LineService, Waker};
+use headrace_ports::{Attached, Common, LineHistory, LineRecord, LineService, StatusQueue, Waker};
 use headrace_replay::drive::{Pace, drive};
 use headrace_replay::log::{
     LogHeader, Recorder, RecorderWorker, RecordingEvent, Rotation, SourceInfo, Summary,
@@ -110,7 +110,7 @@ pub struct World {
     plan: Plan,
     devices: Vec<Device>,
     services: Vec<LineService>,
-    board: Board,
+    board: StatusQueue,
     dive: Loop,
     consumed: Vec<Consumed>,
     disk: SimulatedDisk,
@@ -129,7 +129,7 @@ pub struct World {
 }
 
 /// Result of a dive.
-pub struct Lived {
+pub struct DiveResult {
     /// Planned faults.
     pub plan: Plan,
     /// Packets taken by the loop, in order.
@@ -196,7 +196,7 @@ impl World {
         let plan = Plan::draw(&mut random, &streams);
         let disk = SimulatedDisk::new(Arc::clone(&clock), &plan.disk, sabotage);
         let (mut dive, recorder, notices) = assemble(&vehicle, &text, &disk);
-        let board = Board::new(1 << 16);
+        let board = StatusQueue::new(1 << 16);
         let common = Common {
             host: Arc::new(Machine { clock: Arc::clone(&clock), cables: cables.clone() }),
             stopping: Arc::new(AtomicBool::new(false)),
@@ -254,7 +254,7 @@ impl World {
     }
 
     /// Runs the dive.
-    pub fn live(mut self) -> Lived {
+    pub fn live(mut self) -> DiveResult {
         while self.clock.now() < self.plan.end {
             self.step(false);
         }
@@ -292,7 +292,7 @@ impl World {
             history,
         });
         let power_cut = (plan.ending == Ending::PowerCut).then_some(&mut random);
-        Lived {
+        DiveResult {
             lines: lines.collect(),
             digest: dive.digest(),
             summary,
@@ -372,7 +372,7 @@ impl World {
     }
 }
 
-impl Lived {
+impl DiveResult {
     /// Replays the files that are left, from `folder`; `None` without files.
     ///
     /// Errors: the reason why the files can't be read as a log.

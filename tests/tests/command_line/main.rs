@@ -5,7 +5,8 @@
 mod bad_input;
 mod check;
 #[cfg(unix)]
-mod habits;
+mod conventions;
+mod go_back_advice;
 mod logging;
 mod mavlink_out;
 mod overwriting;
@@ -19,4 +20,3 @@ mod screens;
 #[cfg(unix)]
 mod tui;
 mod viewers;
-mod way_back;

@@ -4,7 +4,7 @@
 
 use std::collections::BTreeMap;
 
-use headrace_tests::field_table::breaking::Breakage;
+use headrace_tests::field_table::breaking::DeviceFault;
 use headrace_tests::field_table::{self, Cell, Condition, Driven, Figures, VEHICLES};
 use headrace_tests::random_dives::Draw;
 
@@ -43,7 +43,7 @@ fn broken_devices_pass_no_section_far_over_the_target() {
     let mut groups: BTreeMap<(&str, &str), Vec<&Figures>> = BTreeMap::new();
     let mut far = Vec::new();
     for (seed, figures) in &all {
-        let broken: Breakage = cell(*seed).broken(*seed, LENGTH_M);
+        let broken: DeviceFault = cell(*seed).broken(*seed, LENGTH_M);
         groups.entry((broken.sense.as_str(), broken.fault)).or_default().push(figures);
         if figures.passed_over > 0 {
             println!(

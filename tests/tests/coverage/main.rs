@@ -2,24 +2,24 @@
 
 #![allow(clippy::unwrap_used, clippy::panic, reason = "a failed step ends the test")]
 
-mod bad;
 mod cable;
 mod causes;
 mod confidence;
 mod counters;
+mod coverage_extent;
 mod dives;
-mod far_and_long;
 mod faults;
 mod field;
 mod flags;
-mod hung;
+mod impossible_walls;
 mod interventions;
+mod long_dives;
 mod memory;
 mod metamorphic;
 mod oracle;
 mod settings;
+mod stuck_sensors;
 mod true_holes;
 mod truth;
 mod visits;
 mod wall_samples;
-mod way;

@@ -6,7 +6,7 @@ mod bomb_files;
 mod bomb_logs;
 mod bombs;
 mod escapes;
-mod jumps;
 mod records;
 mod run;
+mod seeks;
 mod times;

@@ -2,12 +2,12 @@
 
 #![allow(clippy::unwrap_used, clippy::panic, reason = "a failed step ends the test")]
 
-mod circles;
+mod dependencies;
 mod english;
 mod hard_cases;
 mod image;
+mod import_cycles;
 mod imports;
+mod layers;
 mod promises;
-mod supply;
-mod tidy;
 mod workspace;

@@ -11,7 +11,7 @@ use std::path::Path;
 
 use ahrs::{Ahrs as _, Madgwick, Mahony};
 use headrace_fusion::filter::factors::Factors;
-use headrace_fusion::filter::inertial::{Felt, Leg};
+use headrace_fusion::filter::inertial::{InertialSample, Leg};
 use headrace_fusion::filter::measure::{self, ScalarUpdate};
 use headrace_fusion::filter::settings::Settings;
 use headrace_fusion::filter::state::{
@@ -155,7 +155,8 @@ impl Alone {
     }
 
     fn take(&mut self, sample: &Sample) -> Rot<Tunnel, Body> {
-        let felt = Felt { rate_radps: Some(sample.rate_radps), force_mps2: Some(sample.force_mps2) };
+        let felt =
+            InertialSample { rate_radps: Some(sample.rate_radps), force_mps2: Some(sample.force_mps2) };
         self.state.go_on(&felt, SAMPLE_S, GRAVITY_MPS2, &mut self.leg);
         self.second.push(*sample);
         if self.second.len().is_multiple_of(EPOCH) || self.second.len() == SECOND {

@@ -2,10 +2,10 @@
 
 use headrace_fusion::filter::state::State;
 use headrace_fusion::smooth::backward::Backward;
-use headrace_fusion::smooth::beside::smoothable;
 use headrace_fusion::smooth::journal::Journal;
 use headrace_fusion::smooth::step::Placed;
 use headrace_fusion::smooth::track::TrackNavigation;
+use headrace_fusion::smooth::two_filters::smoothable;
 use headrace_geometry::frames::Pose;
 use headrace_geometry::math;
 use headrace_geometry::time::MonoNs;

@@ -9,6 +9,8 @@ mod devices;
 #[cfg(unix)]
 mod faults;
 #[cfg(unix)]
+mod foreign_senders;
+#[cfg(unix)]
 mod full_ring;
 #[cfg(target_os = "linux")]
 mod kernel_can_hid;
@@ -23,5 +25,3 @@ mod soak;
 mod splits;
 #[cfg(target_os = "linux")]
 mod syscalls;
-#[cfg(unix)]
-mod who_speaks;

@@ -2,7 +2,7 @@
 
 use headrace::devices::KINDS;
 use headrace_sampling::margin::{APART_SHARE, error_time_s};
-use headrace_simulator::calm;
+use headrace_simulator::position_error_model;
 use headrace_tests::field_table::VEHICLES;
 use headrace_tests::passable::Outing;
 
@@ -16,7 +16,9 @@ fn plan_and_live_position_errors_agree() {
         let scene = outing.scene(speed_mps, speed_mps, 1.0);
         let text = scene.vehicle_text.clone();
         let load = |_: &str| Ok(text.clone().into_bytes());
-        let errors = calm::expected_errors(&scene.vehicle, "vehicle.toml", &KINDS, &load).unwrap().unwrap();
+        let errors = position_error_model::expected_errors(&scene.vehicle, "vehicle.toml", &KINDS, &load)
+            .unwrap()
+            .unwrap();
         let heads = scene.vehicle.heads();
         let turn_s = heads[0].ping_period_s * std::f64::consts::TAU / heads[0].step_rad;
         let x_m = || heads.iter().map(|head| head.mount.position.x());

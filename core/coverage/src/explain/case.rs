@@ -4,7 +4,7 @@ use crate::cause::Cause;
 use crate::causes::Causes;
 use crate::frontier::Reach;
 use crate::hole::Hole;
-use crate::lacks::{Lack, Lacks};
+use crate::missing_samples::{MissingSample, MissingSamples};
 use crate::passage::{Drive, Passage};
 use headrace_geometry::math;
 use headrace_sampling::head::HeadSet;
@@ -38,7 +38,7 @@ pub struct Case<'a> {
     /// Causes named for the neighbouring sections. They are preferred among equally small sets.
     pub beside: [Causes; 2],
     /// Latest missing samples.
-    pub lacks: &'a Lacks,
+    pub lacks: &'a MissingSamples,
 }
 
 /// Counts over the sections, and the driving figures at the largest T as driven.
@@ -110,7 +110,7 @@ pub(super) fn is_remembered(case: &Case<'_>) -> bool {
 
 /// Whether a missing sample lies in a hole, up to the size of the target: the hole may still shrink from
 /// ahead.
-pub(super) fn is_in(hole: &Hole, target_m: f64, perimeter_m: f64, lack: &Lack) -> bool {
+pub(super) fn is_in(hole: &Hole, target_m: f64, perimeter_m: f64, lack: &MissingSample) -> bool {
     let around_m = math::wrap_signed(lack.arc_m - hole.arc_m, perimeter_m);
     math::hypot(lack.x_m - hole.x_m, around_m) < hole.diameter_m.min(target_m) / 2.0
 }

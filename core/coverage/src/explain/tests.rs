@@ -1,6 +1,6 @@
 use super::*;
 use crate::frontier::Reach;
-use crate::lacks::Lacks;
+use crate::missing_samples::MissingSamples;
 use crate::passage::OtherSettings;
 use crate::store::{StoreLayout, WallSample};
 
@@ -67,7 +67,7 @@ const BARE: Option<[[f64; 2]; 2]> = Some([[9.7, 10.5], [3.0, 4.5]]);
 fn named(wall: &Wall) -> Vec<Cause> {
     let layout =
         StoreLayout { perimeter_m: PERIMETER_M, from_m: 0.0, to_m: 20.0, cell_m: 0.25, capacity: 40_000 };
-    let (mut store, mut lacks) = (SampleStore::new(layout), Lacks::default());
+    let (mut store, mut lacks) = (SampleStore::new(layout), MissingSamples::default());
     let count = |length_m: f64, step_m: f64| math::floor_to_i64(length_m / step_m + 1e-9);
     // The centre between two passes lies in the centre of the section.
     let rows = count(4.0, wall.along_m);
@@ -81,7 +81,7 @@ fn named(wall: &Wall) -> Vec<Cause> {
             if !is_bare {
                 store.insert(WallSample { x_m, arc_m, head: 0, step_m: None, visit: 0 }).unwrap();
             } else if !wall.why.is_empty() {
-                lacks.add(Lack { x_m, arc_m, head: 0, why: wall.why });
+                lacks.add(MissingSample { x_m, arc_m, head: 0, why: wall.why });
             }
         }
     }

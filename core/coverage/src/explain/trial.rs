@@ -4,8 +4,8 @@ use super::case::{Case, HELPS, Seen, WIDEST, is_dark, is_in, is_passed, is_unhea
 use crate::cause::Cause;
 use crate::causes::Causes;
 use crate::frontier::Reach;
-use crate::hole::{HoleFinder, Otherwise};
-use crate::lacks::Lack;
+use crate::hole::{HoleFinder, WallChanges};
+use crate::missing_samples::MissingSample;
 use crate::passage::Drive;
 use crate::store::SampleStore;
 use headrace_geometry::math;
@@ -66,7 +66,7 @@ impl<'a> Trial<'a> {
         let most_m = case.hole.diameter_m.min(WIDEST * case.target_m);
         let [from_m, to_m] = [-0.5, 0.5].map(|side| case.hole.x_m + side * case.hole.diameter_m);
         // Samples put back outside the hole don't shrink it.
-        let fills = |lack: &Lack| {
+        let fills = |lack: &MissingSample| {
             lack.why.is_within(lacking) && is_in(case.hole, case.hole.diameter_m, store.perimeter_m(), lack)
         };
         let is_whole = most_m <= case.target_m || !case.lacks.between(from_m, to_m).any(fills);
@@ -181,7 +181,7 @@ impl<'a> Trial<'a> {
     }
 
     /// Lays out the wall with some factors removed.
-    fn lay(&mut self, removed: Causes, radius_m: f64, otherwise: &Otherwise) {
+    fn lay(&mut self, removed: Causes, radius_m: f64, otherwise: &WallChanges) {
         let Case { bounds_m, first_visit, target_m, lacks, .. } = *self.case;
         let reach_m = (target_m.max(2.0 * radius_m) + bounds_m.1 - bounds_m.0) / otherwise.along;
         let put_back = lacks
@@ -250,7 +250,7 @@ impl<'a> Trial<'a> {
     fn full_m(&mut self, [least_m, most_m]: [f64; 2]) -> f64 {
         let matters = |[smaller_m, larger_m]: [f64; 2]| smaller_m < most_m && larger_m > least_m;
         if least_m < most_m && self.halvings > 0 && matters(self.full_m) {
-            let otherwise = Otherwise { to_come: self.to_come(), ..Otherwise::NOTHING };
+            let otherwise = WallChanges { to_come: self.to_come(), ..WallChanges::NOTHING };
             let [mut smaller_m, mut larger_m] = self.full_m;
             self.lay(self.lacking, larger_m / 2.0, &otherwise);
             while self.halvings > 0 && matters([smaller_m, larger_m]) {
@@ -273,7 +273,7 @@ impl<'a> Trial<'a> {
     }
 
     /// How the wall would have been sampled with some factors removed.
-    fn otherwise(&mut self, removed: Causes) -> Otherwise {
+    fn otherwise(&mut self, removed: Causes) -> WallChanges {
         let all = Some(Reach { from_m: f64::NEG_INFINITY, to_m: f64::INFINITY });
         let swept = self.case.swept_by_all;
         let mut covered = [None; 4];
@@ -296,7 +296,7 @@ impl<'a> Trial<'a> {
         // Figures of one moment don't explain more than the hole.
         let [now_m, then_m] = [now.along_m(), then.along_m()];
         let hole_m = if is_drawn { self.full_m([then_m, now_m]) } else { self.case.hole.diameter_m };
-        Otherwise {
+        WallChanges {
             along: ratio(then_m, now_m.min(hole_m.max(then_m))),
             around: ratio(then.t_y_m, now.t_y_m),
             covered,

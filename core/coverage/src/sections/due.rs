@@ -155,7 +155,7 @@ impl Sections {
 mod tests {
     use super::*;
     use crate::hole::{Hole, HoleFinder};
-    use crate::lacks::Lacks;
+    use crate::missing_samples::MissingSamples;
     use crate::passage::PassError;
     use crate::section::Section;
     use crate::store::{SampleStore, StoreLayout, WallSample};
@@ -332,7 +332,7 @@ mod tests {
         };
         let mut judging = Judging {
             store: &store,
-            lacks: &Lacks::default(),
+            lacks: &MissingSamples::default(),
             finder: &mut HoleFinder::default(),
             profile: &profile,
             tell: &mut |_, _| {},

@@ -143,7 +143,7 @@ fn seen_twice(meshes_m: [f64; 2], is_related: bool) -> (Verdict, f64, u32) {
     }
     let mut judging = Judging {
         store: &store,
-        lacks: &Lacks::default(),
+        lacks: &MissingSamples::default(),
         finder: &mut HoleFinder::default(),
         profile: &profile,
         tell: &mut |_, _| {},

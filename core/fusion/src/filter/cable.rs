@@ -6,7 +6,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::corrections::Corrections;
+use super::corrections::CounterCorrections;
 use headrace_geometry::math;
 use headrace_geometry::time::{DurNs, MonoNs};
 use headrace_sensor::reading::SourceId;
@@ -114,7 +114,7 @@ pub struct Cable {
     /// The first of successive readings beyond the gate.
     left: Option<CableReading>,
     /// Recent effect of the counter's readings on the estimate.
-    pub corrections: Corrections,
+    pub corrections: CounterCorrections,
     /// Running mean of the innovations, in standard deviations.
     mean_sds: f64,
     dispute: Option<Dispute>,

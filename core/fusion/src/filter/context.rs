@@ -1,7 +1,7 @@
 //! Configuration of the filter for one dive.
 
+use super::setting_check::Design;
 use super::settings::Settings;
-use super::suspicion::Design;
 use headrace_geometry::frames::{Body, Vec3};
 use headrace_geometry::site::Site;
 use headrace_geometry::snapshot::stateful;

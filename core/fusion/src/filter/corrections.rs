@@ -31,7 +31,7 @@ const PASSES_S: f64 = 20.0;
 
 /// Corrections by the cable counter, and the loss they imply if its wheel has stuck.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
-pub struct Corrections {
+pub struct CounterCorrections {
     /// Corrections of chainage and speed in the last second, m and m/s.
     recent: [f64; 2],
     /// Corrections since the count changed, including those; the speed corrections are integrated.
@@ -47,7 +47,7 @@ pub struct Corrections {
     slipped_m2: f64,
 }
 
-impl Corrections {
+impl CounterCorrections {
     /// Notes a fused reading.
     ///
     /// Inputs: its corrections of chainage and speed, m and m/s, and the variances it removed, m^2 and m^2/s^2.
@@ -124,8 +124,8 @@ mod tests {
 
     /// Corrections of 1 mm and `speed_mps` at each of ten readings a second: the count changes for 10 s, then is
     /// stationary.
-    fn stood(readings: u32, speed_mps: f64, variances: [f64; 2]) -> Corrections {
-        let mut corrections = Corrections::default();
+    fn stood(readings: u32, speed_mps: f64, variances: [f64; 2]) -> CounterCorrections {
+        let mut corrections = CounterCorrections::default();
         for k in 0..100 + readings {
             corrections.pass(0.1, k >= 100);
             corrections.note([0.001, speed_mps], variances);
@@ -144,7 +144,7 @@ mod tests {
         assert!(corrections.lost_m() == 0.0 && corrections.take_slipped_m2() == 0.0);
         let [way_m, speed_mps] = corrections.take_back();
         assert!((way_m - 0.001 * lately()).abs() < 1e-6 && (speed_mps + 2.0 * way_m).abs() < 1e-6, "{way_m}");
-        assert_eq!(corrections, Corrections::default());
+        assert_eq!(corrections, CounterCorrections::default());
     }
 
     /// A long-standing error has also been trusted for long.

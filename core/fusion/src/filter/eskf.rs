@@ -5,6 +5,7 @@
 use core::ops::Range;
 
 use super::agreement::Agreement;
+use super::bias_drift::BiasDrift;
 use super::cable::Cable;
 use super::clones::ErrorClones;
 use super::context::Context;
@@ -12,17 +13,16 @@ use super::factors::{Factors, Gain};
 use super::inertial::Leg;
 use super::measure::{self, ScalarUpdate};
 use super::pose_sd::PoseSd;
+use super::repeated_bumps::RepeatedBumps;
 use super::roughness::{Look, Roughness};
-use super::seen_again::SeenAgain;
+use super::setting_check::SettingChecks;
 use super::settings::Settings;
-use super::slack_level::SlackLevel;
+use super::slack_level::SlackEstimate;
 use super::sources::{self, Source, TETHER_PERIOD, VELOCITY_LOOKS};
 use super::state::{
     self, ATTITUDE, ERRORS, Errors, FORCE_BIAS, HEADING, POSITION, RANGES, RATE_BIAS, State, VELOCITY,
     add_to, put,
 };
-use super::suspicion::Suspicions;
-use super::unrest::Unrest;
 use super::updates::rows;
 use super::window::{Waiting, Window};
 use crate::smooth::step::{Move, Step};
@@ -98,11 +98,11 @@ pub struct Eskf {
     agreement: Agreement,
     /// Comparison of the cable counter with the estimate.
     pub cable: Cable,
-    unrest: Unrest,
-    slack_level: SlackLevel,
+    unrest: BiasDrift,
+    slack_level: SlackEstimate,
     /// Roughness of the wall.
     roughness: Roughness,
-    seen_again: SeenAgain,
+    seen_again: RepeatedBumps,
     /// Share of the declared variance applied to ranges of heads until the gyro bias is known.
     ///
     /// It is the largest share among the heads.
@@ -113,7 +113,7 @@ pub struct Eskf {
     /// noise is learnt.
     is_blind: bool,
     /// Settings that the ranges contradict.
-    pub suspicions: Suspicions,
+    pub suspicions: SettingChecks,
     /// Variances to add at the end of the epoch.
     doubts: Errors,
     /// Steps of the last epoch, for smoothing; empty unless they are kept.
@@ -139,14 +139,14 @@ impl Default for Eskf {
             knots: Vec::with_capacity(KNOTS),
             agreement: Agreement::default(),
             cable: Cable::default(),
-            unrest: Unrest::default(),
-            slack_level: SlackLevel::default(),
+            unrest: BiasDrift::default(),
+            slack_level: SlackEstimate::default(),
             roughness: Roughness::default(),
-            seen_again: SeenAgain::default(),
+            seen_again: RepeatedBumps::default(),
             smoothness: 1.0,
             is_at_rest: false,
             is_blind: false,
-            suspicions: Suspicions::default(),
+            suspicions: SettingChecks::default(),
             doubts: [0.0; ERRORS],
             steps: Vec::new(),
             keeps_steps: false,

@@ -6,7 +6,7 @@ use nalgebra::{Matrix3, Vector3};
 use serde::{Deserialize, Serialize};
 
 use super::factors::{Factors, Noise};
-use super::settings::{Settings, Wander};
+use super::settings::{GaussMarkov, Settings};
 use super::state::{
     ATTITUDE, CREEP, DEPTH, ERRORS, Errors, FORCE_BIAS, HEADING, POSITION, RANGES, RATE_BIAS, SCALE, SLACK,
     SLACK_RATE, State, VELOCITY, cross, matrix, rotation,
@@ -16,7 +16,7 @@ use headrace_geometry::math;
 
 /// Mean of an inertial unit's samples over an interval, in the body frame.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub struct Felt {
+pub struct InertialSample {
     /// Turn rate, rad/s; `None` without gyro data. The attitude is then unchanged, and its error grows fast.
     pub rate_radps: Option<Vec3<Body>>,
     /// Specific force, m/s^2; `None` without accelerometer data. The velocity is then unchanged, and its error grows
@@ -73,7 +73,7 @@ impl Default for Leg {
 
 impl State {
     /// Propagates the estimate over `dt_s`, and accumulates the effect on its errors in `leg`.
-    pub fn go_on(&mut self, felt: &Felt, dt_s: f64, gravity_mps2: f64, leg: &mut Leg) {
+    pub fn go_on(&mut self, felt: &InertialSample, dt_s: f64, gravity_mps2: f64, leg: &mut Leg) {
         let from_m = self.position.x();
         let (turn, force) = self.move_on(felt, dt_s, gravity_mps2);
         leg.creeping = [leg.creeping[0] + self.position.x() - from_m, self.scale];
@@ -85,7 +85,7 @@ impl State {
     /// Returns the attitude in the middle of the interval, and the specific force in the tunnel frame.
     pub fn move_on(
         &mut self,
-        felt: &Felt,
+        felt: &InertialSample,
         dt_s: f64,
         gravity_mps2: f64,
     ) -> (Matrix3<f64>, Option<Vector3<f64>>) {
@@ -145,9 +145,9 @@ impl Leg {
         ]
     }
 
-    fn slack(&self) -> Wander {
+    fn slack(&self) -> GaussMarkov {
         let [reach, time_s] = self.slack;
-        Wander { reach, time_s }
+        GaussMarkov { reach, time_s }
     }
 
     /// Returns its values for a record.
@@ -183,7 +183,7 @@ impl Leg {
     ///
     /// The factors are for the process noise of gyro and accelerometer biases.
     #[must_use]
-    pub fn with_noise(self, unrest: [f64; 2], slack: Wander) -> Self {
+    pub fn with_noise(self, unrest: [f64; 2], slack: GaussMarkov) -> Self {
         Self { unrest, slack: [slack.reach, slack.time_s], ..self }
     }
 
@@ -246,7 +246,7 @@ impl Leg {
 
     /// Returns the process noise of the sensor errors.
     fn wandering(&self, settings: &Settings, transition: &Transition) -> [Noise; 12] {
-        let fading = |i: usize, wander: Wander| {
+        let fading = |i: usize, wander: GaussMarkov| {
             let left = transition.left_of(i);
             Noise::of_one(i, wander.reach * wander.reach * (1.0 - left * left))
         };

@@ -6,30 +6,30 @@
 
 pub mod agreement;
 pub mod align;
+pub mod bias_drift;
 pub mod cable;
 pub mod clones;
 pub mod context;
 pub mod corrections;
 pub mod count_step;
 pub mod counter_zero;
+mod distance_comparison;
 pub mod eskf;
 mod evidence;
 pub mod factors;
+mod head_tilt;
 pub mod inertial;
 pub mod measure;
 pub mod noise_level;
 pub mod pose_sd;
-mod raw_ways;
+mod pose_window;
+mod repeated_bumps;
 mod roughness;
-mod seen_again;
+pub mod setting_check;
 pub mod settings;
 mod slack_level;
 pub mod sources;
-mod spell;
 pub mod state;
-pub mod suspicion;
-mod tilted;
-pub mod unrest;
 pub mod updates;
 pub mod window;
 pub mod zupt;
@@ -41,15 +41,15 @@ use self::align::{LISTENS, Listening};
 use self::cable::CableDoubt;
 use self::context::Context;
 use self::counter_zero::CounterZero;
+use self::distance_comparison::DistanceComparison;
 use self::eskf::{BIAS_KNOWN_RADPS, Eskf};
 use self::pose_sd::PoseSd;
-use self::raw_ways::RawWays;
+use self::setting_check::SettingDoubt;
 use self::settings::Settings;
 use self::sources::{ATTITUDE_PERIOD, Consistency, DEPTH_PERIOD, Source, VELOCITY_PERIOD};
 use self::state::{RANGES, RATE_BIAS, State, rotation};
-use self::suspicion::SettingDoubt;
 use self::window::{Waiting, Window};
-use self::zupt::Stillness;
+use self::zupt::RestDetector;
 use super::relative::Relative;
 use super::smooth::journal::Journal;
 use super::smooth::relative_backward::UNTIED;
@@ -93,8 +93,8 @@ pub struct FilterNavigation {
     /// position.
     unit: Option<usize>,
     listening: Listening,
-    stillness: Stillness,
-    raw_ways: RawWays,
+    stillness: RestDetector,
+    raw_ways: DistanceComparison,
     zero: CounterZero,
     running: Eskf,
     is_running: bool,
@@ -123,8 +123,8 @@ impl FilterNavigation {
             window: Window::default(),
             sources: vec![None; MAX_SOURCES],
             listening: Listening::default(),
-            stillness: Stillness::default(),
-            raw_ways: RawWays::default(),
+            stillness: RestDetector::default(),
+            raw_ways: DistanceComparison::default(),
             zero: CounterZero::default(),
             running: Eskf::default(),
             is_running: false,

@@ -12,14 +12,14 @@ use headrace_sensor::device::{BiasSpec, InertialNoise, SensorKind};
 const DEGREE: f64 = core::f64::consts::PI / 180.0;
 /// A Gauss-Markov process about zero.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub struct Wander {
+pub struct GaussMarkov {
     /// Standard deviation, in the unit of the process.
     pub reach: f64,
     /// Correlation time, s.
     pub time_s: f64,
 }
 
-impl Wander {
+impl GaussMarkov {
     /// Creates the process of a bias with a constant and a wandering part.
     ///
     /// Its variance is the sum of both, and its correlation time is that of the wandering part.
@@ -53,13 +53,13 @@ pub struct Settings {
     /// See `blind_rate_noise`.
     pub blind_force_noise: f64,
     /// Bias of the gyros, rad/s.
-    pub rate_bias: Wander,
+    pub rate_bias: GaussMarkov,
     /// Bias of the accelerometers, m/s^2.
-    pub force_bias: Wander,
+    pub force_bias: GaussMarkov,
     /// Noise of a tether counter, its quantum excluded, m.
     pub tether_sd_m: f64,
     /// Slack of the cable, m, a smooth process (two lags in series). The default suits periods of 16 s.
-    pub slack: Wander,
+    pub slack: GaussMarkov,
     /// Initial scale error of the cable, a ratio, and its random walk, per root of a second.
     pub scale_sd: f64,
     /// See `scale_sd`.
@@ -75,7 +75,7 @@ pub struct Settings {
     /// Noise of an attitude about the vertical axis, radians.
     pub heading_sd_rad: f64,
     /// Deviation of a compass, radians.
-    pub heading: Wander,
+    pub heading: GaussMarkov,
     /// Noise of an attitude about horizontal axes, radians, with gyro and accelerometer data.
     pub tilt_sd_rad: f64,
     /// The same without gyro or accelerometer data, radians.
@@ -116,7 +116,7 @@ pub struct Settings {
     ///
     /// 0 is none and 1 the optimal estimate. Coverage depends on the attitude of one pass relative to the next. The
     /// gyros know that better than walls, whose shape differs from the design. A smoother needs 1:
-    /// [`crate::smooth::beside`].
+    /// [`crate::smooth::two_filters`].
     pub wall_share: f64,
 }
 
@@ -127,10 +127,10 @@ impl Default for Settings {
             force_noise: 0.003,
             blind_rate_noise: 2.0 * DEGREE,
             blind_force_noise: 0.1,
-            rate_bias: Wander { reach: 0.2 * DEGREE, time_s: 1000.0 },
-            force_bias: Wander { reach: 0.03, time_s: 300.0 },
+            rate_bias: GaussMarkov { reach: 0.2 * DEGREE, time_s: 1000.0 },
+            force_bias: GaussMarkov { reach: 0.03, time_s: 300.0 },
             tether_sd_m: 0.005,
-            slack: Wander { reach: 0.06, time_s: 2.5 },
+            slack: GaussMarkov { reach: 0.06, time_s: 2.5 },
             scale_sd: 0.002,
             // Not configurable: a wheel's scale does not change within a dive. It keeps the variance above zero.
             scale_noise: 1e-9,
@@ -138,7 +138,7 @@ impl Default for Settings {
             depth_offset_sd_m: 0.5,
             depth_noise: 0.001,
             heading_sd_rad: 1.0 * DEGREE,
-            heading: Wander { reach: 4.0 * DEGREE, time_s: 30.0 },
+            heading: GaussMarkov { reach: 4.0 * DEGREE, time_s: 30.0 },
             tilt_sd_rad: 2.0 * DEGREE,
             attitude_sd_rad: 1.0 * DEGREE,
             echo_sd_m: 0.03,
@@ -172,8 +172,8 @@ impl Settings {
         Self {
             rate_noise: noise.rate_noise,
             force_noise: noise.force_noise,
-            rate_bias: Wander::of_bias(&noise.rate_bias),
-            force_bias: Wander::of_bias(&noise.force_bias),
+            rate_bias: GaussMarkov::of_bias(&noise.rate_bias),
+            force_bias: GaussMarkov::of_bias(&noise.force_bias),
             ..self
         }
     }

@@ -6,8 +6,8 @@
 //! above the usual means that the counter or the inertial unit has failed. The comparison does not depend on earlier
 //! cable readings: it uses only the heading of the estimate. Derivation: `docs/why/navigation.md`, "Slack".
 
-use super::inertial::Felt;
-use super::settings::{Settings, Wander};
+use super::inertial::InertialSample;
+use super::settings::{GaussMarkov, Settings};
 use super::state::{State, matrix, rotation, rotation_vector};
 use headrace_geometry::frames::{Body, Rot, Tunnel, Vec3};
 use headrace_geometry::math;
@@ -64,7 +64,7 @@ pub(super) const MOST_REACH_M: f64 = 0.15;
 
 /// Level of the slack, from third differences.
 #[derive(Debug, Clone)]
-pub(super) struct SlackLevel {
+pub(super) struct SlackEstimate {
     attitude: Option<Rot<Tunnel, Body>>,
     /// Inertial position and velocity along the tunnel, up to their constants.
     way_m: f64,
@@ -79,12 +79,12 @@ pub(super) struct SlackLevel {
     seen: [u32; LAGS_S.len()],
     /// Time of the last comparison with the model.
     compared: MonoNs,
-    slack: Option<Wander>,
+    slack: Option<GaussMarkov>,
 }
 
-stateful!(SlackLevel { state: attitude, way_m, speed_mps, squares_m2, means_m, seen, compared, slack; lists: knots, differences; });
+stateful!(SlackEstimate { state: attitude, way_m, speed_mps, squares_m2, means_m, seen, compared, slack; lists: knots, differences; });
 
-impl Default for SlackLevel {
+impl Default for SlackEstimate {
     /// Allocates the buffers, without readings.
     fn default() -> Self {
         Self {
@@ -102,11 +102,11 @@ impl Default for SlackLevel {
     }
 }
 
-impl SlackLevel {
+impl SlackEstimate {
     /// Returns the slack's reach and time constant: the declared ones, or larger and faster ones if observed.
-    pub(super) fn slack(&self, settings: &Settings) -> Wander {
+    pub(super) fn slack(&self, settings: &Settings) -> GaussMarkov {
         let declared = settings.slack;
-        self.slack.unwrap_or(Wander { time_s: declared.time_s / AT_FIRST, ..declared })
+        self.slack.unwrap_or(GaussMarkov { time_s: declared.time_s / AT_FIRST, ..declared })
     }
 
     /// Whether slack moves a counter with this step, m, all the time.
@@ -128,7 +128,7 @@ impl SlackLevel {
     /// Without inertial data nothing is compared.
     ///
     /// Allocates: never.
-    pub(super) fn go_on(&mut self, felt: &Felt, until: MonoNs, about: &State, gravity_mps2: f64) {
+    pub(super) fn go_on(&mut self, felt: &InertialSample, until: MonoNs, about: &State, gravity_mps2: f64) {
         let Some((from, _)) = self.knots.last().copied() else { return };
         let dt_s = until.since(from).as_secs_f64();
         let (Some(rate), Some(force)) = (felt.rate_radps, felt.force_mps2) else {
@@ -233,7 +233,7 @@ impl SlackLevel {
     /// Returns the slowest slack whose third differences are as large as observed.
     ///
     /// It has the declared reach, or a larger one if necessary.
-    fn shown(&self, noises: Noises, settings: &Settings) -> Wander {
+    fn shown(&self, noises: Noises, settings: &Settings) -> GaussMarkov {
         let declared = settings.slack;
         let seen_m2: [f64; LAGS_S.len()] = core::array::from_fn(|k| {
             let (lag_s, square_m2) = (LAGS_S[k], self.squares_m2[k]);
@@ -246,9 +246,9 @@ impl SlackLevel {
         // A faster slack gets a larger reach, because a sine lies above a broad spectrum of the same variance.
         let model = |time_s: f64| {
             let reach = declared.reach * math::sqrt(math::sqrt(math::sqrt(declared.time_s / time_s)));
-            Wander { reach: reach.max(least_reach).min(most_reach), time_s }
+            GaussMarkov { reach: reach.max(least_reach).min(most_reach), time_s }
         };
-        let is_enough = |slack: Wander| {
+        let is_enough = |slack: GaussMarkov| {
             let shares = LAGS_S.iter().map(|lag_s| third_square(lag_s / slack.time_s));
             let seen = seen_m2.iter().map(|seen| seen / (slack.reach * slack.reach));
             shares.zip(seen).all(|(share, seen)| share >= seen)
@@ -334,8 +334,8 @@ mod tests {
 
     /// Level after two minutes of a known motion and tilt, with a counter that shows `slack_m` too much at each time,
     /// s.
-    fn level_after(slack_m: impl Fn(f64) -> f64) -> (SlackLevel, u32) {
-        let (mut level, mut unusual) = (SlackLevel::default(), 0);
+    fn level_after(slack_m: impl Fn(f64) -> f64) -> (SlackEstimate, u32) {
+        let (mut level, mut unusual) = (SlackEstimate::default(), 0);
         let at = |t: f64| MonoNs(7_000_000_000) + DurNs::from_secs_f64(t);
         let way_m = |t: f64| 0.2 * t + 0.3 * math::sin(t / 6.0);
         for epoch in 1..1200_u32 {
@@ -346,7 +346,8 @@ mod tests {
                 // A unit tilted by a degree, with gyro and accelerometer errors.
                 let force_mps2 = -0.3 / 36.0 * math::sin((t - 0.005) / 6.0);
                 let force = Vec3::new(force_mps2 + 0.17 + 0.02, 0.01, GRAVITY_MPS2);
-                let felt = Felt { rate_radps: Some(Vec3::new(1e-4, 2e-4, 0.0)), force_mps2: Some(force) };
+                let felt =
+                    InertialSample { rate_radps: Some(Vec3::new(1e-4, 2e-4, 0.0)), force_mps2: Some(force) };
                 level.go_on(&felt, at(t), &still(), GRAVITY_MPS2);
             }
             let is_usual =
@@ -373,7 +374,7 @@ mod tests {
         for (amplitude_m, period_s) in [(0.06, 8.0), (0.06, 3.0), (0.15, 4.0), (0.03, 2.0)] {
             let omega = math::TAU / period_s;
             let (level, _) = level_after(|t| amplitude_m * math::sin(omega * t));
-            let Wander { reach, time_s } = level.slack(&Settings::default());
+            let GaussMarkov { reach, time_s } = level.slack(&Settings::default());
             let (rate_mps, needed_mps) = (reach / time_s, amplitude_m * omega);
             assert!(3.0 * rate_mps > needed_mps, "{amplitude_m} {period_s}: {rate_mps} for {needed_mps}");
             assert!(3.0 * reach > amplitude_m && reach <= MOST_REACH_M, "{reach}");
@@ -403,7 +404,7 @@ mod tests {
         let (mut level, _) = level_after(|_| 0.0);
         level.begin(MonoNs(127_000_000_000));
         level.go_on(
-            &Felt { rate_radps: None, force_mps2: None },
+            &InertialSample { rate_radps: None, force_mps2: None },
             MonoNs(127_100_000_000),
             &still(),
             GRAVITY_MPS2,

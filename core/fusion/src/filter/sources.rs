@@ -4,7 +4,7 @@ use serde::{Deserialize, Serialize};
 
 use super::count_step::CountStep;
 use super::noise_level::NoiseLevel;
-use crate::one_range::OneRange;
+use crate::constant_range::ConstantRange;
 use headrace_geometry::math;
 use headrace_geometry::time::{DurNs, MonoNs};
 use headrace_sensor::device::{SensorInfo, SensorKind};
@@ -90,7 +90,7 @@ pub struct Source {
     /// For a tether counter, its step.
     pub count_step: CountStep,
     /// For a head, whether its range follows the wall.
-    pub one_range: OneRange,
+    pub one_range: ConstantRange,
 }
 
 /// Rotation of a head.
@@ -111,7 +111,7 @@ impl Source {
             turning: Turning::default(),
             noise_level: NoiseLevel::default(),
             count_step: CountStep::default(),
-            one_range: OneRange::default(),
+            one_range: ConstantRange::default(),
         }
     }
 
@@ -122,7 +122,7 @@ impl Source {
     pub fn says_one_range(&mut self, reading: &Reading, residual_m: f64, estimate_sd_m: f64) -> bool {
         let Reading::Sonar(SonarReturn { range_m: Some(range_m), .. }) = reading else { return false };
         if estimate_sd_m > SURE_M {
-            self.one_range = OneRange::default();
+            self.one_range = ConstantRange::default();
         } else {
             self.one_range.note(*range_m, residual_m);
         }

@@ -4,7 +4,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::filter::inertial::Felt;
+use crate::filter::inertial::InertialSample;
 use headrace_geometry::frames::{Body, Vec3};
 use headrace_geometry::snapshot::stateful;
 use headrace_geometry::time::{DurNs, MonoNs};
@@ -37,7 +37,7 @@ pub struct Waiting {
 #[derive(Debug, Clone, Copy, Serialize, Deserialize)]
 struct FeltAt {
     at: MonoNs,
-    felt: Felt,
+    felt: InertialSample,
     counts: [u32; 2],
 }
 
@@ -108,7 +108,7 @@ impl Window {
             if self.felt.len() == MOST_FELT {
                 return None;
             }
-            let felt = Felt { rate_radps: None, force_mps2: None };
+            let felt = InertialSample { rate_radps: None, force_mps2: None };
             self.felt.insert(place, FeltAt { at, felt, counts: [0; 2] });
         }
         self.felt.get_mut(place)
@@ -117,7 +117,7 @@ impl Window {
     /// Returns the inertial data valid from `from` on, and the end of their validity, at most `until`.
     ///
     /// A sample is the mean over the time before it.
-    pub fn felt(&self, from: MonoNs, until: MonoNs) -> (Felt, MonoNs) {
+    pub fn felt(&self, from: MonoNs, until: MonoNs) -> (InertialSample, MonoNs) {
         let next = self.felt.partition_point(|felt| felt.at <= from);
         let speaking = |number: Option<usize>| {
             let sample = number.and_then(|number| self.felt.get(number));
@@ -128,18 +128,23 @@ impl Window {
             (None, Some(last)) => ((last.at + SPEAKS_FOR).min(until), last.felt),
             (None, None) => {
                 let later = self.felt.get(next).map_or(until, |next| next.at - SPEAKS_FOR);
-                return (Felt { rate_radps: None, force_mps2: None }, later.clamp(from + DurNs(1), until));
+                return (
+                    InertialSample { rate_radps: None, force_mps2: None },
+                    later.clamp(from + DurNs(1), until),
+                );
             }
         };
         // A unit may send rates and forces alternately; the nearest of each is used.
-        let near = |pick: fn(&Felt) -> Option<Vec3<Body>>| {
+        let near = |pick: fn(&InertialSample) -> Option<Vec3<Body>>| {
             pick(&sample).or_else(|| {
                 let around = [Some(next + 1), next.checked_sub(1), next.checked_sub(2)];
                 around.into_iter().find_map(|number| speaking(number).and_then(|sample| pick(&sample.felt)))
             })
         };
-        let felt =
-            Felt { rate_radps: near(|felt| felt.rate_radps), force_mps2: near(|felt| felt.force_mps2) };
+        let felt = InertialSample {
+            rate_radps: near(|felt| felt.rate_radps),
+            force_mps2: near(|felt| felt.force_mps2),
+        };
         (felt, at.max(from + DurNs(1)).min(until))
     }
 

@@ -30,7 +30,7 @@ const SAME_FORCE: f64 = 0.02;
 
 /// Detector of a vehicle at rest.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
-pub struct Stillness {
+pub struct RestDetector {
     rate: Means,
     force: Means,
     cable_m: Option<f64>,
@@ -83,7 +83,7 @@ impl Means {
     }
 }
 
-impl Stillness {
+impl RestDetector {
     /// Processes a reading.
     pub fn take(&mut self, at: MonoNs, kind: SensorKind, reading: &Reading) {
         match (kind, reading) {
@@ -177,7 +177,7 @@ mod tests {
 
     /// Whether it is at rest after twenty seconds with this turn rate and cable length.
     fn still(rate: impl Fn(f64) -> f64, way_m: impl Fn(f64) -> Option<f64>) -> bool {
-        let mut stillness = Stillness::default();
+        let mut stillness = RestDetector::default();
         for k in 0..2000_u32 {
             let (at, t) = (MonoNs(u64::from(k) * 10_000_000), f64::from(k) / 100.0);
             let noise = 0.001 * f64::from(k % 7) - 0.003;
@@ -212,7 +212,7 @@ mod tests {
     #[test]
     fn cable_wound_in_by_pulls_is_not_at_rest() {
         let pulled = |speed_mps: f64, t: f64| 0.5 * math::floor_to_i64(2.0 * speed_mps * t) as f64;
-        let mut stillness = Stillness::default();
+        let mut stillness = RestDetector::default();
         let mut rested_s = 0_u32;
         for k in 0..9000_u32 {
             let (at, t) = (MonoNs(u64::from(k) * 10_000_000), f64::from(k) / 100.0);
@@ -235,7 +235,7 @@ mod tests {
 
     /// Seconds still required at `end_s`, with this turn rate and cable length.
     fn lacking_s(rate: impl Fn(f64) -> f64, way_m: impl Fn(f64) -> f64, end_s: u32) -> u32 {
-        let mut stillness = Stillness::default();
+        let mut stillness = RestDetector::default();
         stillness.ask_from(MonoNs(0));
         for k in 0..100 * end_s {
             let (at, t) = (MonoNs(u64::from(k) * 10_000_000), f64::from(k) / 100.0);
@@ -265,7 +265,7 @@ mod tests {
         // A slow vehicle moves on, with a coarse counter that pauses between its steps.
         assert_eq!(lacking_s(sways, |t| math::floor_to_i64(2.0 * t) as f64 * 0.01, 55), 30);
         assert_eq!(lacking_s(|_| 0.0, |t| 0.1 * t, 61), 0, "the dive is under way");
-        let mut set_back = Stillness::default();
+        let mut set_back = RestDetector::default();
         set_back.ask_from(MonoNs(3_600_000_000_000));
         assert_eq!(set_back.lacking_s(MonoNs(0)), 0, "the clock was set back by an hour");
     }

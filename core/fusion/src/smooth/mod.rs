@@ -5,12 +5,12 @@
 //! `docs/why/navigation.md`, "Smoothing".
 
 pub mod backward;
-pub mod beside;
 pub mod journal;
 pub mod relative_backward;
 pub mod rts_step;
 pub mod step;
 pub mod track;
+pub mod two_filters;
 
 #[cfg(test)]
 mod tests;

@@ -7,7 +7,7 @@ use nalgebra::{SMatrix, SVector};
 use super::rts_step::Gain;
 use super::step::{Move, Placed, Step};
 use crate::filter::factors::Factors;
-use crate::filter::inertial::{Felt, Leg};
+use crate::filter::inertial::{InertialSample, Leg};
 use crate::filter::settings::Settings;
 use crate::filter::state::{ERRORS, State};
 use headrace_geometry::frames::{Point3, Rot, Vec3};
@@ -199,11 +199,13 @@ fn smoothed_variances_stay_positive_and_never_grow() {
 fn steps_survive_a_round_trip_through_records() {
     let mut state = State::at_rest(Point3::new(1.0, -2.0, 3.0), Rot::from_roll_pitch_yaw(0.1, 0.2, 0.3));
     let mut leg = Leg::default();
-    let felt =
-        Felt { rate_radps: Some(Vec3::new(0.1, -0.2, 0.3)), force_mps2: Some(Vec3::new(0.5, 0.1, 9.7)) };
+    let felt = InertialSample {
+        rate_radps: Some(Vec3::new(0.1, -0.2, 0.3)),
+        force_mps2: Some(Vec3::new(0.5, 0.1, 9.7)),
+    };
     let before = state;
     state.go_on(&felt, 0.07, 9.81, &mut leg);
-    state.go_on(&Felt { rate_radps: None, force_mps2: None }, 0.03, 9.81, &mut leg);
+    state.go_on(&InertialSample { rate_radps: None, force_mps2: None }, 0.03, 9.81, &mut leg);
     let by = Move::Leg(leg);
     let settings = Settings::default();
     let factors = by.predict(&settings, &Factors::independent(core::array::from_fn(|i| 0.1 + i as f64)));

@@ -5,7 +5,7 @@
 
 use serde::Serialize;
 
-use super::words::Surroundings;
+use super::texts::TextContext;
 use super::{AlertList, AlertState, Figures, ListedAlert, Priority};
 use crate::live_state::LiveState;
 use crate::notes::{Note, Spoken};
@@ -160,7 +160,7 @@ impl From<&Note> for NoteJson {
 
 impl ListedAlert {
     /// The alert in JSON, at `now`.
-    pub fn json(&self, around: &Surroundings<'_>, now: MonoNs) -> ListedAlertJson {
+    pub fn json(&self, around: &TextContext<'_>, now: MonoNs) -> ListedAlertJson {
         let (from_m, to_m) = self.bounds_m(around.section_m);
         let seconds = |at: Option<MonoNs>| at.map(MonoNs::as_secs_f64);
         let at_most_mps = match self.figures {

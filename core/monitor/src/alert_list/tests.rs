@@ -1,4 +1,4 @@
-use super::observed::Seen;
+use super::conditions::Seen;
 use super::*;
 use crate::messages::Notices;
 use crate::result_stream::ResultStream;

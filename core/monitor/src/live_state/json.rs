@@ -6,7 +6,7 @@
 use serde::Serialize;
 
 use super::{LIVE_STATE_VERSION, Lamp, LiveMetres, LiveState, PositionState, SensorState};
-use crate::alert_list::{AlertCountsJson, AlertList, LeftJson, ListedAlertJson, Surroundings};
+use crate::alert_list::{AlertCountsJson, AlertList, LeftJson, ListedAlertJson, TextContext};
 use crate::pilot_text::{gain_text, station};
 use headrace_geometry::time::{DurNs, MonoNs};
 
@@ -166,8 +166,8 @@ pub struct AlertJson {
 impl LiveState {
     /// The state in JSON, with the alerts of the same dive: see
     /// [`Loop::live_state_json`](crate::run::Loop::live_state_json).
-    pub fn json(&self, around: &Surroundings<'_>, alerts: &AlertList) -> LiveStateJson {
-        let Surroundings { sources, section_m, .. } = *around;
+    pub fn json(&self, around: &TextContext<'_>, alerts: &AlertList) -> LiveStateJson {
+        let TextContext { sources, section_m, .. } = *around;
         let (shown, alerts_hidden) = alerts.shown();
         let condition = self.condition();
         let advice = self.advice.as_ref();

@@ -1,5 +1,5 @@
 use super::*;
-use crate::head_words::tests::two;
+use crate::head_descriptions::tests::two;
 use crate::live_state::{PositionState, test_state};
 use crate::unsure_stretch::UnsureStretch;
 use headrace_coverage::{Driven, Unsure};
@@ -119,9 +119,9 @@ fn unsure_stretch_is_shown_with_reason_and_remedy() {
     let mut text = String::new();
     for why in Unsure::ALL {
         let told = if why == Unsure::NotInspected {
-            Told::NotInspected(stretch(why))
+            LiveMessage::NotInspected(stretch(why))
         } else {
-            Told::CannotSay(stretch(why))
+            LiveMessage::CannotSay(stretch(why))
         };
         let lines = told_line(&told, &profile, &two()).broken(60);
         assert!(lines.iter().all(|line| line.chars().count() <= 60), "{lines:#?}");

@@ -11,7 +11,7 @@ const MOST: f64 = 0.5;
 
 /// Coverage extent: whole sections of tunnel in which the vehicle or its heads, pinging or not, have been.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct WayReport {
+pub struct CoverageExtentReport {
     /// Beginning of its first section, m; `None` without a position.
     pub from_m: Option<f64>,
     /// End of its last section, m.
@@ -35,14 +35,14 @@ pub struct NotInspectedReport {
     pub silent_sources: Vec<String>,
 }
 
-pub(super) fn way_report(coverage: &Coverage) -> WayReport {
+pub(super) fn way_report(coverage: &Coverage) -> CoverageExtentReport {
     let sections = &coverage.sections;
     let way = sections.sections_of(coverage.frontier.way());
     if way.is_empty() {
-        return WayReport { from_m: None, to_m: None, length_m: 0.0 };
+        return CoverageExtentReport { from_m: None, to_m: None, length_m: 0.0 };
     }
     let (from_m, to_m) = (sections.bounds_m(way.start).0, sections.bounds_m(way.end).0);
-    WayReport { from_m: Some(from_m), to_m: Some(to_m), length_m: to_m - from_m }
+    CoverageExtentReport { from_m: Some(from_m), to_m: Some(to_m), length_m: to_m - from_m }
 }
 
 pub(super) fn not_inspected(dive: &Loop) -> Option<NotInspectedReport> {

@@ -6,13 +6,13 @@ use serde::Serialize;
 use super::alert_list::{ListedAlertJson, NoteJson};
 use super::alerts::Alert;
 use super::console::ConsoleCounts;
-use super::head_words::HeadWords;
+use super::head_descriptions::HeadDescriptions;
+use super::other_targets::OtherTargetReport;
 use super::resources::{Coverage, Tally};
 use super::run::Loop;
-use super::what_if::WhatIfReport;
 use headrace_coverage::openings::Opening;
 use headrace_coverage::{Section, Spread, Verdict};
-use headrace_fusion::filter::suspicion::{Setting, SettingDoubt};
+use headrace_fusion::filter::setting_check::{Setting, SettingDoubt};
 use headrace_geometry::time::MonoNs;
 
 mod advice;
@@ -27,7 +27,7 @@ mod survey;
 mod unsure;
 
 pub use advice::{AdviceReport, AlternativeReport};
-pub use inspected::{NotInspectedReport, WayReport};
+pub use inspected::{CoverageExtentReport, NotInspectedReport};
 pub use runs::{ReturnReport, RunReport, way_home};
 pub use sections::{DeviationReport, SectionReport};
 pub use smoothing::{ChangeReport, JudgedReport, MetresReport, SmoothingReport};
@@ -58,7 +58,7 @@ pub struct Report {
     /// Confidence: standard deviations of the hole by which a pass or a fail must clear the target.
     pub confidence_sd: u32,
     /// Coverage extent: the metres that the verdicts cover.
-    pub way: WayReport,
+    pub way: CoverageExtentReport,
     /// The dive as a whole.
     pub dive: DiveReport,
     /// Metres by verdict, and the spacings over all sections.
@@ -74,10 +74,10 @@ pub struct Report {
     /// Samples by node of a square grid, as in survey specifications.
     pub survey: SurveyReport,
     /// Metres by verdict for the additional targets and section lengths requested.
-    pub what_if: Vec<WhatIfReport>,
+    pub what_if: Vec<OtherTargetReport>,
     /// Names of the heads and their alternative settings, for its text.
     #[serde(skip)]
-    pub heads: HeadWords,
+    pub heads: HeadDescriptions,
     /// Declared openings of the wall, excluded from verdicts.
     pub openings: Vec<OpeningReport>,
     /// Alerts about the dive as a whole.
@@ -321,9 +321,9 @@ impl Report {
     }
 
     /// Metres by verdict for the dive's own target and sections.
-    pub fn metres(&self) -> WhatIfReport {
+    pub fn metres(&self) -> OtherTargetReport {
         let sum = &self.summary;
-        WhatIfReport {
+        OtherTargetReport {
             target_m: self.target_m,
             section_m: self.section_m,
             pass_m: sum.pass_m,

@@ -2,8 +2,8 @@
 
 use serde::Serialize;
 
+use crate::live_messages::UnsureStretch;
 use crate::resources::Coverage;
-use crate::telling::UnsureStretch;
 
 /// Neighbouring sections that neither pass nor fail for the same reason although no more samples will come.
 #[derive(Debug, Clone, PartialEq, Serialize)]

@@ -164,7 +164,8 @@ fn digest_note(stream: &mut ResultStream, note: &Note) {
 mod tests {
     use super::*;
     use headrace_coverage::{
-        HoleFinder, Judging, Lacks, Reach, Request, RunChange, RunId, SampleStore, Sections, StoreLayout,
+        HoleFinder, Judging, MissingSamples, Reach, Request, RunChange, RunId, SampleStore, Sections,
+        StoreLayout,
     };
     use headrace_geometry::time::MonoNs;
     use headrace_geometry::tunnel::shapes;
@@ -193,7 +194,7 @@ mod tests {
         };
         let mut judging = Judging {
             store: &SampleStore::new(layout),
-            lacks: &Lacks::default(),
+            lacks: &MissingSamples::default(),
             finder: &mut HoleFinder::default(),
             profile: &profile,
             tell: &mut |id, change| told = Some((id, change)),

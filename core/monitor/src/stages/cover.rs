@@ -6,17 +6,17 @@
 use bevy_ecs::prelude::{Res, ResMut, Single};
 
 use super::alerting::RunInputs;
-use super::doubt;
+use super::coverage_extent::{Heads, note_beat};
 use super::driving::{Driving, Plan};
 use super::judge::{Results, judge_one};
-use super::lacking;
 use super::live::standing;
-use super::walls::{self, Sorting};
-use super::way::{Heads, note_beat};
+use super::missing_samples;
+use super::navigation_alerts;
+use super::outlier_filter::{self, FilterContext};
 use crate::alerts::Alerts;
 use crate::entities::HeadFrontier;
 use crate::messages::{
-    Notices, Outcome, Placed, PlacedEvents, PlacedList, PlacedPing, Requests, Standing, Standings,
+    JudgedStates, Notices, Outcome, Placed, PlacedEvents, PlacedList, PlacedPing, Requests, Standing,
 };
 use crate::resources::{Coverage, Digests, Finder, Tally, Target, TunnelDesign, VehicleEntities};
 use headrace_coverage::{Drive, HeadReach, Loss, PassError, Sections, Verdict, Visit};
@@ -49,7 +49,7 @@ pub(super) fn cover(
     mut notices: ResMut<'_, Notices>,
     mut digests: ResMut<'_, Digests>,
     mut alerts: ResMut<'_, Alerts>,
-    mut standings: ResMut<'_, Standings>,
+    mut standings: ResMut<'_, JudgedStates>,
     mut runs: ResMut<'_, RunInputs>,
 ) {
     notices.0.clear();
@@ -58,7 +58,7 @@ pub(super) fn cover(
     for (item, event) in placed.0.iter().zip(&of_events.0) {
         match item {
             Placed::Situation(at, situation, doubts) => {
-                doubt::note(*at, situation, doubts, (&mut alerts, &mut notices, &mut digests));
+                navigation_alerts::note(*at, situation, doubts, (&mut alerts, &mut notices, &mut digests));
                 let driving = &mut **driving;
                 let healthy = driving.lacking.healthy(*at, situation, &heads);
                 let plan = Plan {
@@ -68,7 +68,7 @@ pub(super) fn cover(
                     other: target.other,
                 };
                 driving.note(*at, [situation, &healthy], &tunnel.profile, &plan);
-                lacking::note_beat(
+                missing_samples::note_beat(
                     &mut driving.lacking,
                     driving.now,
                     &heads,
@@ -89,7 +89,7 @@ pub(super) fn cover(
                 if let Some(fix) = &ping.fix {
                     let now = (ping.valid_at, fix.pose);
                     let driving = &mut **driving;
-                    lacking::note_away(
+                    missing_samples::note_away(
                         &mut driving.lacking,
                         driving.now,
                         &heads,
@@ -101,9 +101,9 @@ pub(super) fn cover(
                 let head = entities.of_head(ping.head).and_then(|entity| heads.get_mut(entity).ok());
                 let Some((.., mut sweep, mut frontier)) = head else { continue };
                 let driving = &mut **driving;
-                lacking::note_ping(&mut driving.lacking, ping, &mut coverage.lacks);
+                missing_samples::note_ping(&mut driving.lacking, ping, &mut coverage.lacks);
                 note_passage(&mut coverage, &frontier, &driving.now, (ping, &tunnel.profile));
-                let mut sorting = Sorting {
+                let mut sorting = FilterContext {
                     coverage: &mut coverage,
                     tunnel: &tunnel,
                     tally: &mut tally,
@@ -111,12 +111,12 @@ pub(super) fn cover(
                     digests: &mut digests,
                     alerts: &mut alerts,
                 };
-                let suspected_m = walls::note_ping(&mut sorting, &mut sweep, ping);
+                let suspected_m = outlier_filter::note_ping(&mut sorting, &mut sweep, ping);
                 note_reach(&mut frontier, ping);
                 if let Some(between_m) = suspected_m {
                     let reaches = heads.iter().filter_map(|(.., frontier)| frontier.0);
                     let outlook = coverage.frontier.outlook(reaches, ping.received);
-                    walls::suspect(&mut coverage, between_m, &outlook, &mut requests);
+                    outlier_filter::suspect(&mut coverage, between_m, &outlook, &mut requests);
                 }
                 let reaches = heads.iter().filter_map(|(.., frontier)| frontier.0);
                 note_frontier(&mut coverage, reaches, ping, &mut requests);
@@ -254,7 +254,7 @@ mod tests {
     use crate::fixtures::{coverage, fix, heard, mount, pinged, pipe, situation};
     use bevy_ecs::system::SystemState;
     use bevy_ecs::world::World;
-    use headrace_coverage::{HoleFinder, Judging, Lacks, Reach, Request};
+    use headrace_coverage::{HoleFinder, Judging, MissingSamples, Reach, Request};
     use headrace_fusion::{Fix, NoFix};
     use headrace_geometry::time::MonoNs;
     use headrace_sensor::device::{SensorInfo, SensorKind};
@@ -265,7 +265,7 @@ mod tests {
         let (Coverage { store, mut sections, .. }, profile) = (coverage(), pipe());
         let mut judging = Judging {
             store: &store,
-            lacks: &Lacks::default(),
+            lacks: &MissingSamples::default(),
             finder: &mut HoleFinder::default(),
             profile: &profile,
             tell: &mut |_, _| {},

@@ -2,7 +2,7 @@
 
 use bevy_ecs::prelude::Component;
 
-use super::lacking::Lacking;
+use super::missing_samples::MissingSampleFinder;
 use headrace_coverage::{Drive, OtherSettings};
 use headrace_geometry::frames::Vec3;
 use headrace_geometry::math;
@@ -66,7 +66,7 @@ pub(crate) struct Driving {
     /// margin, m.
     fitted: [f64; 3],
     looks: Looks,
-    pub(super) lacking: Lacking,
+    pub(super) lacking: MissingSampleFinder,
 }
 
 stateful!(Driving { state: now, step_rad, place_m, steps_m, fitted, looks, lacking; });

@@ -3,7 +3,7 @@
 use bevy_ecs::prelude::{Query, Res, ResMut};
 
 use crate::entities::{Head, HiddenAngles, LossCount, MeasuredMotion, Mounted};
-use crate::hearing::Heard;
+use crate::head_health::Heard;
 use crate::messages::{
     Aim, Events, Hidden, Outcome, Placed, PlacedEvents, PlacedList, PlacedPing, Positioned, PositionedList,
 };

@@ -11,7 +11,8 @@ use crate::live_state::{
     ActiveAlert, ActiveAlerts, LiveMetres, LiveState, PositionDoubt, PositionState, source_bits,
 };
 use crate::messages::{
-    AdviceList, Doubts, Events, Notices, Placed, PlacedList, Positioned, PositionedList, Standing, Standings,
+    AdviceList, Doubts, Events, JudgedStates, Notices, Placed, PlacedList, Positioned, PositionedList,
+    Standing,
 };
 use crate::notes::Notes;
 use crate::resources::{Coverage, Digests, TickTime, VehicleEntities};
@@ -104,7 +105,7 @@ pub(super) fn live(
     events: Res<'_, Events>,
     positioned: Res<'_, PositionedList>,
     placed: Res<'_, PlacedList>,
-    standings: Res<'_, Standings>,
+    standings: Res<'_, JudgedStates>,
     (advice, runs, commands): (Res<'_, AdviceList>, Res<'_, RunInputs>, Res<'_, Commands>),
     mut alerted: (ResMut<'_, AlertList>, ResMut<'_, Notes>, ResMut<'_, Console>),
     mut notices: ResMut<'_, Notices>,
@@ -251,7 +252,7 @@ mod tests {
             before: 0,
         }]));
         world.insert_resource(PlacedList(vec![Placed::Situation(AT, situation, doubts)]));
-        world.insert_resource(Standings(vec![standing]));
+        world.insert_resource(JudgedStates(vec![standing]));
         world.insert_resource(AdviceList(vec![advice(&situation)]));
         world.insert_resource(RunInputs(Vec::new()));
         world.insert_resource(Commands::new());

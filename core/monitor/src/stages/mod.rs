@@ -5,18 +5,18 @@
 mod advise;
 mod alerting;
 mod cover;
+mod coverage_extent;
 mod decode;
-mod doubt;
 mod driving;
 mod georeference;
 mod judge;
-mod lacking;
 mod live;
+mod missing_samples;
 mod navigate;
+mod navigation_alerts;
+mod outlier_filter;
 mod samples;
 mod sound_speed;
-mod walls;
-mod way;
 
 use bevy_ecs::schedule::{IntoScheduleConfigs, Schedule};
 
@@ -26,8 +26,8 @@ pub(super) use advise::Advisor;
 pub(super) use alerting::RunInputs;
 pub(super) use driving::Driving;
 pub(super) use judge::{Results, judge_one};
+pub(super) use outlier_filter::end_returns;
 pub(super) use sound_speed::SoundSpeed;
-pub(super) use walls::end_returns;
 
 /// Adds the core's systems to their stages.
 pub(super) fn add(schedule: &mut Schedule) {

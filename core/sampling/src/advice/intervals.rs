@@ -7,7 +7,7 @@
 //! below, and the advice jumps. In both directions [`EASE`] provides hysteresis.
 
 use super::search::{self, SPEED_MARGIN};
-use crate::margin::SureTarget;
+use crate::margin::RemainingTarget;
 use crate::passes::{Passes, Phasing};
 use crate::spacing;
 use crate::strips::{Going, Strips};
@@ -33,7 +33,7 @@ pub(super) struct Driving<'a> {
     /// Whether lost returns count.
     pub(super) lossy: bool,
     pub(super) astern: bool,
-    pub(super) sure: SureTarget,
+    pub(super) sure: RemainingTarget,
     /// Largest remaining target, and the heads' distance along the hull, m.
     pub(super) most_m: f64,
     pub(super) apart_m: f64,

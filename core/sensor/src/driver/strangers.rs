@@ -5,13 +5,13 @@ const NAMED: usize = 4;
 
 /// Count of messages from senders other than the device, and their names; bounded for any input.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
-pub struct Strangers {
+pub struct IgnoredSenders {
     messages: u64,
     who: Vec<String>,
     more: bool,
 }
 
-impl Strangers {
+impl IgnoredSenders {
     /// Counts messages of one sender; returns true if this call names it for the first time.
     pub fn note(&mut self, messages: u64, who: &str) -> bool {
         self.messages = self.messages.saturating_add(messages);
@@ -44,7 +44,7 @@ mod tests {
 
     #[test]
     fn all_senders_are_counted_and_the_first_few_named() {
-        let mut strangers = Strangers::default();
+        let mut strangers = IgnoredSenders::default();
         assert_eq!(strangers.words(), None);
         for number in 0..1000 {
             assert_eq!(strangers.note(1, &format!("system {}", number % 5)), number < NAMED as u64);

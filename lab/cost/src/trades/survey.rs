@@ -5,7 +5,7 @@
 
 use headrace_sampling::layout::HeadLayout;
 use headrace_sampling::plan::{Planner, Question};
-use headrace_simulator::{Simulation, calm};
+use headrace_simulator::{Simulation, position_error_model};
 
 use crate::error::CostError;
 use crate::measure::side_by_side;
@@ -360,7 +360,7 @@ pub fn planner(
 ) -> Result<Planner, CostError> {
     let vehicle = inputs.vehicle(text)?;
     let load = |_: &str| Ok(text.as_bytes().to_vec());
-    let errors = calm::expected_errors(&vehicle, "vehicle.toml", inputs.kinds, &load)?;
+    let errors = position_error_model::expected_errors(&vehicle, "vehicle.toml", inputs.kinds, &load)?;
     let why = |why| CostError::Figure { what: "the modes of a vehicle's heads".to_owned(), why };
     let mut inspection = vehicle.inspection().map_err(why)?;
     (inspection.layout, inspection.drift_m) = (layout, drift_m);

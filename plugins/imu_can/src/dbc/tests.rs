@@ -18,7 +18,7 @@ use super::keys;
 use super::mapping::Mapping;
 use crate::ImuCanKind;
 use crate::codec::MessageSet;
-use crate::decoder::{AxisOrder, ImuDecoder, Meaning};
+use crate::decoder::{AxisOrder, DecoderSettings, ImuDecoder};
 use crate::frame::{CanFrame, CanId, FrameKind};
 use crate::sets::xsens;
 
@@ -77,7 +77,12 @@ fn with_euler(own: &str) -> String {
 
 fn preset(set: MessageSet) -> ImuDecoder {
     let tick = DurNs(100_000);
-    ImuDecoder::new(Meaning { set, axis_order: AxisOrder::Yxz, sample_time_tick: tick, latency: LATENCY })
+    ImuDecoder::new(DecoderSettings {
+        set,
+        axis_order: AxisOrder::Yxz,
+        sample_time_tick: tick,
+        latency: LATENCY,
+    })
 }
 
 fn frame(id: u16, data: &[u8]) -> [u8; 16] {

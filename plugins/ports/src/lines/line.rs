@@ -6,7 +6,7 @@ use std::time::Duration;
 use std::net::SocketAddr;
 
 use headrace_geometry::time::{DurNs, MonoNs};
-use headrace_sensor::driver::Strangers;
+use headrace_sensor::driver::IgnoredSenders;
 
 /// Maximum bytes of one read.
 pub const READ_BYTES: usize = 2048;
@@ -17,7 +17,7 @@ pub struct Senders {
     /// Accepted sender, which is the device.
     pub believed: Option<SocketAddr>,
     /// Rejected senders.
-    pub strangers: Strangers,
+    pub strangers: IgnoredSenders,
 }
 
 /// Returns whether bytes hold a message of a device on the line.

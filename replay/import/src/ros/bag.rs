@@ -9,7 +9,7 @@ use std::io::{Read, Seek, SeekFrom};
 use super::unpack::{MOST_UNPACKED, Unpacked, unpack};
 use super::{Encoding, Feeds, Topic, Type};
 use crate::order::Order;
-use crate::{Clock, Entry, Format, ImportError, Input, Source as _, Step, Told};
+use crate::{Clock, Entry, Format, ImportError, ImportReport, Input, Source as _, Step};
 
 const MAGIC: &[u8] = b"#ROSBAG V2.0\n";
 /// Upper bound on the length of a header, bytes.
@@ -204,7 +204,7 @@ impl Format for Bag {
         }
     }
 
-    fn told(&self) -> Told {
+    fn told(&self) -> ImportReport {
         let mut told = self.feeds.told();
         told.losses.extend(self.lost.iter().map(|(why, count)| format!("{count} {why}")));
         if self.begun && self.stated.is_none() {

@@ -10,7 +10,7 @@ use super::message::{Read, Type, Values, read};
 use super::points::{Beam, Beams, Plane};
 use super::wire::Encoding;
 use crate::emulated::{BEYOND, EmulatedSensor, Value};
-use crate::{Entry, Told};
+use crate::{Entry, ImportReport};
 
 /// A mapping's settings for a topic, apart from its sensor.
 #[derive(Debug, Clone, Copy)]
@@ -203,7 +203,7 @@ impl Feed {
     }
 
     /// Reports losses and remarks.
-    pub(super) fn tell(&self, topic: &str, told: &mut Told) {
+    pub(super) fn tell(&self, topic: &str, told: &mut ImportReport) {
         let counted = |counts: &BTreeMap<&'static str, u64>| -> Vec<String> {
             counts.iter().map(|(why, count)| format!("{topic}: {count} {}{why}", messages(why))).collect()
         };

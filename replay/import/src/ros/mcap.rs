@@ -126,7 +126,7 @@ impl<R: Read + Seek> Source for Mcap<R> {
         self.bytes
     }
 
-    fn told(&self) -> crate::Told {
+    fn told(&self) -> crate::ImportReport {
         let mut told = self.feeds.told();
         told.losses.extend(self.reader.losses().iter().map(ToString::to_string));
         if let Some(stated) = self.stated.filter(|stated| self.is_at_end && *stated > self.read) {

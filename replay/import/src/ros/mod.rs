@@ -17,7 +17,7 @@ mod wire;
 
 use std::collections::BTreeMap;
 
-use crate::entry::{Entry, Told};
+use crate::entry::{Entry, ImportReport};
 use crate::order::WINDOW_NS;
 
 pub use matching::MatchError;
@@ -73,8 +73,8 @@ impl Feeds {
         }
     }
 
-    pub(super) fn told(&self) -> Told {
-        let mut told = Told::default();
+    pub(super) fn told(&self) -> ImportReport {
+        let mut told = ImportReport::default();
         for (topic, feed) in &self.by_topic {
             feed.tell(topic, &mut told);
         }

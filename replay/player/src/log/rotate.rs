@@ -11,7 +11,7 @@ use super::fields::Fields;
 use super::format::unseal;
 use super::framing::{Found, Item, LogFile, look};
 use super::part::{PART, PartHead, named_part};
-use crate::whole_file::folder_of;
+use crate::atomic_file::folder_of;
 
 /// Condition under which a part of a recording ends.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

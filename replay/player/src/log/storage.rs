@@ -4,7 +4,7 @@ use std::fs::{File, Metadata, OpenOptions};
 use std::io;
 use std::path::{Path, PathBuf};
 
-use crate::whole_file::{folder_of, number_of};
+use crate::atomic_file::{folder_of, number_of};
 
 /// Storage for files that are created once and only grow.
 pub trait Storage: Send {

@@ -74,13 +74,13 @@ pub struct View {
     /// Chainage and speed of the last known position.
     last: Option<(f64, f64)>,
     v_max_mps: f64,
-    told: Option<Told>,
+    told: Option<LastAdvice>,
     at: MonoNs,
 }
 
 /// The advice last shown.
 #[derive(Debug)]
-struct Told {
+struct LastAdvice {
     at: MonoNs,
     v_max_mps: f64,
     reason: Reason,
@@ -253,7 +253,7 @@ impl View {
         let speed_mps = self.last.map(|(_, speed_mps)| speed_mps);
         let told = self.told.as_ref();
         let turned = told.is_none_or(|told| told.reason != reason || told.will_exceed != will_exceed);
-        let same = |told: &Told| {
+        let same = |told: &LastAdvice| {
             (told.v_max_mps - v_max_mps).abs() < SAME_MPS
                 && (0..ADVICE_EVERY.0).contains(&at.since(told.at).0)
         };
@@ -287,7 +287,7 @@ impl View {
                 words: said,
             },
         );
-        self.told = Some(Told { at, v_max_mps, reason, will_exceed });
+        self.told = Some(LastAdvice { at, v_max_mps, reason, will_exceed });
         Some(())
     }
 

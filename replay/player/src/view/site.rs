@@ -1,7 +1,7 @@
 //! The site shown, and its frames.
 
 use headrace_geometry::tunnel::Profile;
-use headrace_monitor::head_words::HeadWords;
+use headrace_monitor::head_descriptions::HeadDescriptions;
 
 /// Frame names.
 pub(super) const TUNNEL: &str = "tunnel";
@@ -22,7 +22,7 @@ pub struct Site {
     /// Length of the tunnel, m.
     pub length_m: f64,
     /// Names and possible settings of the heads.
-    pub head_words: HeadWords,
+    pub head_words: HeadDescriptions,
     /// Numbers of the sources that are heads.
     pub heads: Vec<u64>,
 }

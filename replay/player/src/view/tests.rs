@@ -2,7 +2,7 @@ use std::collections::BTreeMap;
 
 use headrace_coverage::{Judgement, RunChange};
 use headrace_geometry::tunnel::shapes;
-use headrace_monitor::head_words::HeadWords;
+use headrace_monitor::head_descriptions::HeadDescriptions;
 use serde_json::Value;
 
 use super::*;
@@ -14,7 +14,7 @@ fn view() -> View {
         section_m: 0.25,
         run_up_m: 0.5,
         length_m: 100.0,
-        head_words: HeadWords::default(),
+        head_words: HeadDescriptions::default(),
         heads: vec![2, 5],
     })
 }

@@ -7,8 +7,8 @@ use super::flow::Flow;
 use super::knots::{Knots, Offsets, wandering};
 use super::place::Place;
 use crate::clock::START;
+use crate::pilot_advice::PilotAdvice;
 use crate::random::Stream;
-use crate::told::Told;
 
 /// Time between two decisions, s.
 const STEP_S: f64 = 0.5;
@@ -82,7 +82,7 @@ pub(super) struct Advised {
     beside: Knots,
     hold: Knots,
     flow: Flow,
-    heard: Vec<Told>,
+    heard: Vec<PilotAdvice>,
     doing: Doing,
     x_m: f64,
     speed_mps: f64,
@@ -141,7 +141,7 @@ impl Advised {
     }
 
     /// Processes advice and decides the motion up to `until_s` after the start, s.
-    pub(super) fn lead(&mut self, told: Vec<Told>, until_s: f64) {
+    pub(super) fn lead(&mut self, told: Vec<PilotAdvice>, until_s: f64) {
         self.heard.extend(told);
         let last = math::floor_to_i64(until_s / STEP_S) + KNOTS_AHEAD;
         while self.next <= last {
@@ -190,15 +190,15 @@ impl Advised {
     }
 
     /// The last advice at least one lag before `at_s`, if any.
-    fn told_at(&self, at_s: f64) -> Option<Told> {
+    fn told_at(&self, at_s: f64) -> Option<PilotAdvice> {
         let by = START + DurNs::from_secs_f64((at_s - self.pilot.lag_s).max(0.0));
-        let heard = |told: &&Told| told.at <= by && by > MonoNs(START.0);
+        let heard = |told: &&PilotAdvice| told.at <= by && by > MonoNs(START.0);
         self.heard.iter().rev().find(heard).cloned()
     }
 
     /// The farthest missed stretch that lies behind and hasn't been passed again. While the pilot waits at the end, it
     /// may lie at any distance behind.
-    fn to_go_back_for(&self, told: &Told) -> Option<[f64; 2]> {
+    fn to_go_back_for(&self, told: &PilotAdvice) -> Option<[f64; 2]> {
         let behind_m = if matches!(self.doing, Doing::Waiting { .. }) { 0.0 } else { BEHIND_M };
         let missed = told.missed_m.iter().filter(|[from_m, to_m]| {
             let tried = |[first_m, last_m]: &[f64; 2]| from_m < last_m && to_m > first_m;
@@ -209,13 +209,13 @@ impl Advised {
     }
 
     /// Whether the pilot keeps stationary. He does so until the first advice, but not for ever.
-    fn stands(&mut self, told: Option<&Told>) -> bool {
+    fn stands(&mut self, told: Option<&PilotAdvice>) -> bool {
         let stands = self.pilot.stands && self.stood_s < MOST_STOOD_S && told.is_none_or(|told| told.stand);
         self.stood_s += if stands { STEP_S } else { 0.0 };
         stands
     }
 
-    fn wanted_mps(&mut self, at_s: f64, told: Option<&Told>) -> f64 {
+    fn wanted_mps(&mut self, at_s: f64, told: Option<&PilotAdvice>) -> f64 {
         let pilot = &self.pilot;
         let anew = self.x_m > self.farthest_m - 0.5;
         let hurry = pilot.hurries.iter().find(|hurry| (hurry.from_m..hurry.to_m).contains(&self.x_m));

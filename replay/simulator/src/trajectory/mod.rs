@@ -14,7 +14,7 @@ use advised::Advised;
 use legs::Legs;
 use pilot::Piloted;
 
-use crate::told::Told;
+use crate::pilot_advice::PilotAdvice;
 
 pub use flow::Flow;
 pub use knots::{Knots, Offsets, wandering};
@@ -67,7 +67,7 @@ impl Trajectory {
 
     /// Passes advice to the pilot and decides the motion up to `until_s` seconds after the start. Other trajectories
     /// don't change.
-    pub(crate) fn lead(&mut self, told: Vec<Told>, until_s: f64) {
+    pub(crate) fn lead(&mut self, told: Vec<PilotAdvice>, until_s: f64) {
         if let Base::Advised(advised) = &mut self.base {
             advised.lead(told, until_s);
             self.duration_s = advised.duration_s();

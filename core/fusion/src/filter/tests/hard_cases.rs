@@ -2,7 +2,7 @@
 //! missing part.
 
 use super::super::factors::Factors;
-use super::super::inertial::{Felt, Leg};
+use super::super::inertial::{InertialSample, Leg};
 use super::super::settings::Settings;
 use super::super::state::{ERRORS, State, rotation_vector};
 use super::rig::{
@@ -94,10 +94,12 @@ fn noise_of_any_scale_keeps_the_covariance_sound() {
 #[test]
 fn leg_of_any_length_adds_the_expected_variance() {
     let settings = Settings::default();
-    let felt =
-        Felt { rate_radps: Some(Vec3::new(0.1, 0.2, -0.1)), force_mps2: Some(Vec3::new(0.1, 0.0, 9.8)) };
+    let felt = InertialSample {
+        rate_radps: Some(Vec3::new(0.1, 0.2, -0.1)),
+        force_mps2: Some(Vec3::new(0.1, 0.0, 9.8)),
+    };
     for (dt_s, times) in [(0.0, 10), (1e-9, 1000), (0.01, 100), (30.0, 3), (36_000.0, 2)] {
-        for felt in [felt, Felt { rate_radps: None, force_mps2: None }] {
+        for felt in [felt, InertialSample { rate_radps: None, force_mps2: None }] {
             let mut state = State::at_rest(Point3::new(1.0, 0.0, 3.0), Rot::identity());
             let mut factors = Factors::independent([1e-4; ERRORS]);
             let mut leg = Leg::default().with_noise([1.0; 2], Settings::default().slack);

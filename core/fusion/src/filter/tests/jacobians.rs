@@ -5,7 +5,7 @@
 //! States are drawn at random: attitudes all over the sphere, sensors anywhere on the vehicle, biases and offsets of
 //! either sign.
 
-use crate::filter::inertial::{Felt, Leg, Transition};
+use crate::filter::inertial::{InertialSample, Leg, Transition};
 use crate::filter::measure::{self, Beam, ScalarUpdate};
 use crate::filter::settings::Settings;
 use crate::filter::state::{
@@ -320,7 +320,7 @@ fn row_seen_later() {
 }
 
 /// An epoch of ten samples; `None` for missing data.
-fn go_on(start: &State, felt: &[Felt]) -> (State, Transition) {
+fn go_on(start: &State, felt: &[InertialSample]) -> (State, Transition) {
     let (mut state, mut leg) = (*start, Leg::default());
     for felt in felt {
         state.go_on(felt, 0.01, GRAVITY_MPS2, &mut leg);
@@ -348,7 +348,7 @@ fn transition_equals_differences_of_the_model() {
         // Some rounds miss gyro or accelerometer data, for part or all of the epoch.
         let blind = |k: u64, part: u64| round % 4 == part && k >= round % 3 * 4;
         let felt: Vec<_> = (0..10)
-            .map(|k| Felt {
+            .map(|k| InertialSample {
                 rate_radps: (!blind(k, 1)).then(|| rate + draws.vector(0.3)),
                 force_mps2: (!blind(k, 2)).then(|| force + draws.vector(1.0)),
             })
@@ -390,7 +390,9 @@ fn transition_propagates_factors() {
     let mut draws = Draws::new(10);
     for _ in 0..20 {
         let start = draws.state();
-        let felt = [Felt { rate_radps: Some(draws.vector(0.6)), force_mps2: Some(draws.vector(10.0)) }; 10];
+        let felt =
+            [InertialSample { rate_radps: Some(draws.vector(0.6)), force_mps2: Some(draws.vector(10.0)) };
+                10];
         let (_, transition) = go_on(&start, &felt);
         let mut factors = Factors::independent([0.01; ERRORS]);
         for i in 0..ERRORS {

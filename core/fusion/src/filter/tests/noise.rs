@@ -2,8 +2,8 @@
 
 use super::jacobians::Draws;
 use crate::filter::factors::Factors;
-use crate::filter::inertial::{Felt, Leg, Transition};
-use crate::filter::settings::{Settings, Wander};
+use crate::filter::inertial::{InertialSample, Leg, Transition};
+use crate::filter::settings::{GaussMarkov, Settings};
 use crate::filter::state::{
     ATTITUDE, DEPTH, ERRORS, FORCE_BIAS, HEADING, POSITION, RATE_BIAS, SCALE, SLACK, SLACK_RATE, State,
     VELOCITY,
@@ -12,7 +12,7 @@ use headrace_geometry::frames::Vec3;
 use headrace_geometry::math;
 
 /// A leg of a vehicle at rest, and the covariance it adds to zero.
-fn leg(settings: &Settings, dt_s: f64, felt: Felt) -> (Transition, Factors<ERRORS>) {
+fn leg(settings: &Settings, dt_s: f64, felt: InertialSample) -> (Transition, Factors<ERRORS>) {
     let mut state = Draws::new(1).state();
     let mut leg = Leg::default().with_noise([1.0; 2], settings.slack);
     state.go_on(&felt, dt_s, 9.81, &mut leg);
@@ -22,8 +22,8 @@ fn leg(settings: &Settings, dt_s: f64, felt: Felt) -> (Transition, Factors<ERROR
     (transition, factors)
 }
 
-fn still() -> Felt {
-    Felt { rate_radps: Some(Vec3::zero()), force_mps2: Some(Vec3::new(0.0, 0.0, 9.81)) }
+fn still() -> InertialSample {
+    InertialSample { rate_radps: Some(Vec3::zero()), force_mps2: Some(Vec3::new(0.0, 0.0, 9.81)) }
 }
 
 fn near(what: &str, is: f64, should: f64, share: f64) {
@@ -35,7 +35,7 @@ fn near(what: &str, is: f64, should: f64, share: f64) {
 /// Euler's method has an error of that order.
 #[test]
 fn slack_noise_equals_an_integral_of_the_process() {
-    let settings = Settings { slack: Wander { reach: 0.06, time_s: 10.0 }, ..Settings::default() };
+    let settings = Settings { slack: GaussMarkov { reach: 0.06, time_s: 10.0 }, ..Settings::default() };
     // Density of w that gives s a variance of reach^2: 4 reach^2 / T^3.
     let density = 4.0 * 0.06 * 0.06 / 1e3;
     for lags in [0.01, 0.3, 1.0, 4.0] {
@@ -61,7 +61,7 @@ fn slack_noise_equals_an_integral_of_the_process() {
 /// In the steady state the slack has its reach, and its autocorrelation at x lags is (1 + x) e^-x.
 #[test]
 fn slack_variance_settles_at_its_reach() {
-    let settings = Settings { slack: Wander { reach: 0.3, time_s: 7.0 }, ..Settings::default() };
+    let settings = Settings { slack: GaussMarkov { reach: 0.3, time_s: 7.0 }, ..Settings::default() };
     let mut factors = Factors::independent([0.0; ERRORS]);
     // Epochs of uneven length, because the steady state must not depend on them.
     for k in 0..3000 {
@@ -108,7 +108,7 @@ fn white_noise_equals_monte_carlo() {
         );
         let (mut state, mut leg) = (start, Leg::default());
         for _ in 0..10 {
-            let felt = Felt {
+            let felt = InertialSample {
                 rate_radps: Some(Vec3::new(draws.normal() * 0.004 / math::sqrt(0.01), 0.0, 0.0)),
                 force_mps2: Some(Vec3::new(draws.normal() * 0.02 / math::sqrt(0.01), 0.0, 9.81)),
             };
@@ -132,7 +132,7 @@ fn white_noise_equals_monte_carlo() {
 #[test]
 fn blind_noise_applies_without_inertial_data() {
     let settings = Settings { blind_rate_noise: 0.03, blind_force_noise: 0.5, ..Settings::default() };
-    let (_, blind) = leg(&settings, 0.4, Felt { rate_radps: None, force_mps2: None });
+    let (_, blind) = leg(&settings, 0.4, InertialSample { rate_radps: None, force_mps2: None });
     for axis in 0..3 {
         near("velocity", blind.variance(VELOCITY + axis), 0.25 * 0.4, 1e-12);
         near("way", blind.variance(POSITION + axis), 0.25 * 0.064 / 3.0, 1e-12);

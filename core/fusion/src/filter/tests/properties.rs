@@ -4,7 +4,7 @@ use proptest::prelude::*;
 
 use super::super::clones::ErrorClones;
 use super::super::factors::Factors;
-use super::super::inertial::{Felt, Leg, Transition};
+use super::super::inertial::{InertialSample, Leg, Transition};
 use super::super::settings::Settings;
 use super::super::sources::{Source, Turning};
 use super::super::state::{ATTITUDE, ERRORS, Errors, POSITION, State};
@@ -279,7 +279,7 @@ fn clones_equal_an_augmented_filter() {
         for clone in 0..times {
             for leg_number in 0..legs {
                 let salt = f64::from(clone * legs + leg_number);
-                let felt = Felt {
+                let felt = InertialSample {
                     rate_radps: Some(rig.noisy_vector(salt, 1, 0.2)),
                     force_mps2: Some(rig.noisy_vector::<Body>(salt, 4, 0.5) + Vec3::new(0.0, 0.0, 9.8)),
                 };

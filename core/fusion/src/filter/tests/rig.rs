@@ -1,7 +1,7 @@
 //! A vehicle of known trajectory and its sensors' readings, for tests that drive the filter by hand.
 
 use super::super::FilterNavigation;
-use super::super::settings::{Settings, Wander};
+use super::super::settings::{GaussMarkov, Settings};
 use super::super::state::{ATTITUDE, ERRORS, POSITION, VELOCITY, rotation, rotation_vector};
 use crate::{Fix, Navigation as _, NoFix, Times};
 use headrace_geometry::frames::{Body, Mount, Point3, Pose, Rot, Sensor, Tunnel, Vec3, head_direction};
@@ -82,7 +82,7 @@ pub(super) fn rest(_: f64) -> Pose {
 impl Rig {
     pub(super) fn new(way: Way, seed: u64) -> Self {
         // Narrow beams, equivalent to rays, and a cable whose slack changes slowly.
-        let slack = Wander { reach: 0.06, time_s: 10.0 };
+        let slack = GaussMarkov { reach: 0.06, time_s: 10.0 };
         let settings = Settings { slack, return_beam_rad: 1e-6, echo_beam_rad: 1e-6, ..Settings::default() };
         let site = Site { axis_yaw_rad: 0.7, ..Site::default() };
         Self { profile: shapes::ceran().unwrap(), site, settings, way, noise: 1.0, imu_s: 0.02, seed }

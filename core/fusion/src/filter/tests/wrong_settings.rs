@@ -1,7 +1,7 @@
 //! Detection of wrong settings by the filter alone, in a dive of some minutes.
 
 use super::super::FilterNavigation;
-use super::super::suspicion::{Setting, SettingDoubt};
+use super::super::setting_check::{Setting, SettingDoubt};
 use super::rig::{HEADS, Rig, cruise};
 use crate::Navigation as _;
 use headrace_sensor::reading::{Reading, SonarReturn};

@@ -2,10 +2,10 @@
 
 use headrace_fusion::filter::settings::Settings;
 use headrace_fusion::smooth::backward::Backward;
-use headrace_fusion::smooth::beside::smoothable;
 use headrace_fusion::smooth::journal::Journal;
 use headrace_fusion::smooth::step::{Placed, Words};
 use headrace_fusion::smooth::track::TrackNavigation;
+use headrace_fusion::smooth::two_filters::smoothable;
 use headrace_fusion::{Fix, Navigation, NoFix, Times};
 use headrace_geometry::time::MonoNs;
 use headrace_monitor::messages::Events;

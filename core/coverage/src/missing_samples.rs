@@ -1,0 +1,160 @@
+//! Missing samples: places on the wall where a ping would have left a sample, and the causes of each loss.
+//!
+//! If the samples missing for a factor are put back, the hole becomes what it would have been without that
+//! factor. Only the latest are kept, because fails are explained soon after the vehicle has left their place.
+
+use serde::{Deserialize, Serialize};
+
+use super::cause::Cause;
+use super::causes::Causes;
+use headrace_geometry::snapshot::stateful;
+
+/// Capacity: five minutes of four heads that get no return at all.
+const ROOM: usize = 1 << 16;
+/// Missing samples per block with a common extent, so that a search over a few metres skips other blocks.
+/// Divides the capacity.
+const BLOCK: usize = 1 << 8;
+
+/// A missing sample.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct MissingSample {
+    /// Chainage at which it would lie, m.
+    pub x_m: f64,
+    /// Arc length, m.
+    pub arc_m: f64,
+    /// Number of its head.
+    pub head: u8,
+    /// All causes that would have to be absent for the sample to exist.
+    pub why: Causes,
+}
+
+/// Latest missing samples.
+#[derive(Debug)]
+pub struct MissingSamples {
+    ring: Vec<MissingSample>,
+    /// Least and greatest chainage in each block of the ring, m.
+    extents_m: Vec<[f64; 2]>,
+    /// Position of the next entry once the ring is full.
+    next: u32,
+}
+
+stateful!(MissingSamples { state: next; lists: ring, extents_m; });
+
+impl Default for MissingSamples {
+    /// Allocates: at startup, all that it will ever use.
+    fn default() -> Self {
+        Self { ring: Vec::with_capacity(ROOM), extents_m: Vec::with_capacity(ROOM / BLOCK), next: 0 }
+    }
+}
+
+impl MissingSamples {
+    /// Adds a missing sample. It replaces the oldest if there is no room.
+    ///
+    /// Allocates: never.
+    pub fn add(&mut self, lack: MissingSample) {
+        let at = if self.ring.len() < ROOM { self.ring.len() } else { self.next as usize };
+        if let Some(oldest) = self.ring.get_mut(at) {
+            *oldest = lack;
+            self.next = if at + 1 >= ROOM { 0 } else { self.next + 1 };
+        } else {
+            self.ring.push(lack);
+        }
+        self.extend(at, lack.x_m);
+    }
+
+    /// Extends a block's extent by an entry at this position of the ring. A block full of new entries gets
+    /// the extent of these alone.
+    fn extend(&mut self, at: usize, x_m: f64) {
+        let block = at / BLOCK;
+        let wider_m = |[from_m, to_m]: [f64; 2], x_m: f64| [from_m.min(x_m), to_m.max(x_m)];
+        let Some(extent_m) = self.extents_m.get_mut(block) else {
+            self.extents_m.push([x_m; 2]);
+            return;
+        };
+        *extent_m = wider_m(*extent_m, x_m);
+        if (at + 1).is_multiple_of(BLOCK) {
+            let latest = self.ring.get(block * BLOCK..=at).unwrap_or_default();
+            *extent_m = latest.iter().fold([x_m; 2], |extent_m, lack| wider_m(extent_m, lack.x_m));
+        }
+    }
+
+    /// Reassigns up to `count` of a head's latest missing samples from one cause to another.
+    ///
+    /// Returns the chainages between which these samples lie, m, if there are any.
+    ///
+    /// Allocates: never.
+    pub fn revise(&mut self, head: u8, count: usize, [from, to]: [Cause; 2]) -> Option<[f64; 2]> {
+        let at = if self.ring.len() < ROOM { self.ring.len() } else { self.next as usize };
+        let (newer, older) = self.ring.split_at_mut(at);
+        let latest = newer.iter_mut().rev().chain(older.iter_mut().rev());
+        let of_head = latest.filter(|lack| lack.head == head && lack.why == Causes::of(from)).take(count);
+        of_head.fold(None, |between_m: Option<[f64; 2]>, lack| {
+            lack.why = Causes::of(to);
+            let [least_m, most_m] = between_m.unwrap_or([lack.x_m; 2]);
+            Some([least_m.min(lack.x_m), most_m.max(lack.x_m)])
+        })
+    }
+
+    /// Missing samples between two chainages, in no particular order.
+    pub fn between(&self, from_m: f64, to_m: f64) -> impl Iterator<Item = &MissingSample> {
+        let meets = move |extent_m: &[f64; 2]| extent_m[0] <= to_m && extent_m[1] >= from_m;
+        let blocks =
+            self.ring.chunks(BLOCK).zip(&self.extents_m).filter(move |(_, extent_m)| meets(extent_m));
+        let lacks = blocks.flat_map(|(block, _)| block);
+        lacks.filter(move |lack| (from_m..=to_m).contains(&lack.x_m))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn latest_missing_samples_are_kept() {
+        let mut lacks = MissingSamples::default();
+        let lack = |x_m: f64| MissingSample { x_m, arc_m: 1.0, head: 0, why: Causes::of(Cause::HeadSilent) };
+        for k in 0..2 * ROOM + 10 {
+            lacks.add(lack(k as f64));
+        }
+        assert_eq!(lacks.between(0.0, f64::INFINITY).count(), ROOM);
+        let first = (ROOM + 10) as f64;
+        assert_eq!(lacks.between(0.0, first - 1.0).count(), 0);
+        assert_eq!(lacks.between(first, first + 4.0).count(), 5);
+    }
+
+    #[test]
+    fn latest_samples_of_one_head_change_their_cause() {
+        let mut lacks = MissingSamples::default();
+        let (missing, silent) = (Cause::MissingReturns, Cause::HeadSilent);
+        for k in 0..ROOM + 100 {
+            let (head, why) = (u8::from(k % 2 == 1), if k % 5 == 0 { Cause::Occluded } else { missing });
+            lacks.add(MissingSample { x_m: k as f64, arc_m: 0.0, head, why: Causes::of(why) });
+        }
+        let last = (ROOM + 99) as f64;
+        // Of ten in a row head 1 has five. The very last is occluded.
+        assert_eq!(lacks.revise(1, 8, [missing, silent]), Some([last - 18.0, last - 2.0]));
+        let revised = |lack: &&MissingSample| lack.why == Causes::of(silent);
+        let revised: Vec<MissingSample> =
+            lacks.between(0.0, f64::INFINITY).filter(revised).copied().collect();
+        assert!(revised.len() == 8 && revised.iter().all(|lack| lack.head == 1 && lack.x_m >= last - 18.0));
+        assert_eq!(lacks.revise(2, 8, [missing, silent]), None);
+    }
+
+    /// Block search finds the same as a full search while the ring fills and is overwritten, on a drive there
+    /// and back.
+    #[test]
+    fn block_search_finds_every_missing_sample() {
+        let mut lacks = MissingSamples::default();
+        for k in 0..ROOM + 5 * BLOCK + 77 {
+            let along_m = (k % 9000) as f64 * 0.01;
+            let x_m = if (k / 9000).is_multiple_of(2) { along_m } else { 90.0 - along_m };
+            lacks.add(MissingSample { x_m, arc_m: k as f64, head: 0, why: Causes::of(Cause::HeadSilent) });
+            if k % 977 == 0 || k >= ROOM && k % 101 == 0 {
+                let [from_m, to_m] = [x_m - 0.3, x_m + 0.1 * (k % 7) as f64];
+                let all = lacks.ring.iter().filter(|lack| (from_m..=to_m).contains(&lack.x_m));
+                assert!(lacks.between(from_m, to_m).eq(all), "after {k}");
+            }
+        }
+        assert!(lacks.between(90.1, 100.0).next().is_none());
+    }
+}

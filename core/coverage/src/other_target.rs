@@ -1,0 +1,141 @@
+//! Alternative targets: verdicts on the same holes for another target.
+
+use super::frontier::{Outlook, clear_of};
+use super::hole::Hole;
+use super::section::{Section, Verdict};
+use super::sections::{Sections, verdict};
+
+/// A section's hole, independent of the target.
+#[derive(Debug, Clone, Copy)]
+struct Measured {
+    hole: Hole,
+    sd_m: f64,
+    /// The profile is wrong there, or there is no wall.
+    doubtful: bool,
+}
+
+impl Measured {
+    /// Figures of a section whose hole has been measured.
+    fn of(section: &Section) -> Option<Self> {
+        Some(Self { hole: section.hole?, sd_m: section.hole_sd_m, doubtful: section.doubt().is_some() })
+    }
+}
+
+impl Sections {
+    /// Verdicts for another target of all sections whose hole has been measured, by index.
+    ///
+    /// Counted visits and settled sections stay those of the dive's own target. A replay with the other
+    /// target gives what the dive would have reported.
+    pub fn verdicts_at(&self, target_m: f64, outlook: &Outlook) -> impl Iterator<Item = (i64, Verdict)> {
+        self.sections_of(outlook.way).filter_map(move |index| {
+            Some((index, self.verdict_of(&Measured::of(self.get(index)?)?, target_m, outlook)))
+        })
+    }
+
+    fn verdict_of(
+        &self,
+        Measured { hole, sd_m, doubtful }: &Measured,
+        target_m: f64,
+        outlook: &Outlook,
+    ) -> Verdict {
+        let error_m = self.confidence_sd() * sd_m;
+        let clear_m = clear_of(outlook.to_come, hole.x_m).min(clear_of(outlook.not_passed, hole.x_m));
+        match verdict(hole, error_m, target_m, clear_m) {
+            Verdict::Pass if *doubtful => Verdict::CannotSay,
+            said => said,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::frontier::Reach;
+    use crate::hole::HoleFinder;
+    use crate::missing_samples::MissingSamples;
+    use crate::sections::{Judging, Request};
+    use crate::store::{SampleStore, StoreLayout, WallSample};
+    use headrace_geometry::time::MonoNs;
+    use headrace_geometry::tunnel::shapes;
+
+    /// A pipe with samples every 0.2 m except for 0.6 m from 5 m on.
+    ///
+    /// The coverage extent is 3 m to 7 m, judged in sections of a quarter of a metre.
+    struct Seen {
+        sections: Sections,
+        outlook: Outlook,
+    }
+
+    impl Seen {
+        fn new() -> Self {
+            let profile = shapes::circle(3.0).unwrap();
+            let perimeter_m = profile.perimeter_m();
+            let layout = StoreLayout { perimeter_m, from_m: 0.0, to_m: 10.0, cell_m: 0.25, capacity: 20_000 };
+            let mut store = SampleStore::new(layout);
+            for (i, k) in
+                (10..=41).filter(|i| !(27..29).contains(i)).flat_map(|i| (0..94).map(move |k| (i, k)))
+            {
+                let (x_m, arc_m) = (0.2 * f64::from(i) - 0.2, perimeter_m / 94.0 * f64::from(k));
+                store.insert(WallSample { x_m, arc_m, head: 0, step_m: None, visit: 0 }).unwrap();
+            }
+            let outlook = Outlook {
+                at: MonoNs(0),
+                way: Some(Reach { from_m: 3.0, to_m: 7.0 }),
+                swept_by_all: None,
+                none_alive: false,
+                to_come: None,
+                not_passed: None,
+                through: None,
+                still_zone: None,
+            };
+            let mut finder = HoleFinder::default();
+            let mut seen = Self { sections: Sections::new(0.25, 0.5, 0.0, 10.0), outlook };
+            for index in seen.sections.sections_of(seen.outlook.way) {
+                let mut judging = Judging {
+                    store: &store,
+                    lacks: &MissingSamples::default(),
+                    finder: &mut finder,
+                    profile: &profile,
+                    tell: &mut |_, _| {},
+                };
+                seen.sections.judge(&Request::at(&seen.outlook)(index), &mut judging);
+            }
+            seen
+        }
+    }
+
+    /// The largest circle from 5 m to 5.6 m measures 0.63 m. Centred within a quarter of a metre of 5 m, it
+    /// measures 0.54 m.
+    #[test]
+    fn another_target_uses_the_measured_holes() {
+        let seen = Seen::new();
+        for (target_m, failing) in [(0.5, 20..22), (0.6, 21..22), (0.7, 0..0), (0.2, 12..29)] {
+            let verdicts: Vec<_> = seen.sections.verdicts_at(target_m, &seen.outlook).collect();
+            let verdict = |index: &i64| if failing.contains(index) { Verdict::Fail } else { Verdict::Pass };
+            let expected: Vec<_> = (12..29).map(|index| (index, verdict(&index))).collect();
+            assert_eq!(verdicts, expected, "{target_m}");
+        }
+    }
+
+    /// The error is two standard deviations of 0.05 m.
+    #[test]
+    fn alternative_target_keeps_errors_and_doubts_of_the_section() {
+        let mut seen = Seen::new();
+        let of = |seen: &Seen, index: i64, target_m: f64| {
+            seen.sections.verdicts_at(target_m, &seen.outlook).find(|(at, _)| *at == index).unwrap().1
+        };
+        let hole_m = seen.sections.get(15).unwrap().hole.unwrap().diameter_m;
+        seen.sections.get_mut(15).unwrap().hole_sd_m = 0.05;
+        for (more_m, expected) in [
+            (-0.11, Verdict::Fail),
+            (-0.09, Verdict::CannotSay),
+            (0.09, Verdict::CannotSay),
+            (0.11, Verdict::Pass),
+        ] {
+            assert_eq!(of(&seen, 15, hole_m + more_m), expected, "{more_m}");
+        }
+        seen.sections.get_mut(15).unwrap().suspect = true;
+        assert_eq!(of(&seen, 15, hole_m + 0.11), Verdict::CannotSay);
+        assert_eq!(of(&seen, 15, hole_m - 0.11), Verdict::Fail, "a fail stays a fail");
+    }
+}

@@ -1,0 +1,85 @@
+//! Excess drift of inertial biases over the declared one, learnt from their corrections.
+//!
+//! A measurement corrects a bias by its gain times the innovation. The expected square of that is the gain squared
+//! times the innovation's variance. If corrections are larger, the bias drifts more than the filter assumes.
+//! Derivation: `docs/why/navigation.md`, "Noise that is learnt".
+
+use serde::{Deserialize, Serialize};
+
+use super::settings::{GaussMarkov, Settings};
+use headrace_geometry::math;
+
+/// Averaging time of the ratio, s.
+const MEMORY_S: f64 = 10.0;
+/// Mean ratio above which the noise is raised, and the power of the ratio by which it rises per second.
+const TOO_LARGE: f64 = 1.1;
+const RAISES_PER_S: f64 = 2.0;
+/// Mean ratio below which a raised noise decays, and the time constant of the decay, s.
+const SMALL: f64 = 0.7;
+const FALLS_OVER_S: f64 = 20.0;
+/// Initial factor: a unit counts as restless until its readings show otherwise.
+const AT_FIRST: f64 = 1e3;
+/// Random walk of the worst unit allowed for, per root of a second: 0.3 degrees/s and 50 mm/s^2 in 300 s.
+const MOST_RATE: f64 = 4.3e-4;
+const MOST_FORCE: f64 = 4.1e-3;
+
+/// Factors for gyros and accelerometers.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct BiasDrift([Ratio; 2]);
+
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+struct Ratio {
+    /// Decaying sums of squared corrections and of their expected values.
+    corrected: f64,
+    expected: f64,
+    factor: f64,
+}
+
+impl Default for BiasDrift {
+    fn default() -> Self {
+        Self([Ratio { corrected: 0.0, expected: 0.0, factor: AT_FIRST }; 2])
+    }
+}
+
+/// Largest factor for a process, which makes it as restless as the worst unit.
+fn most(wander: GaussMarkov, worst: f64) -> f64 {
+    let density = wander.density();
+    (worst * worst / density).max(1.0)
+}
+
+impl BiasDrift {
+    /// Notes a correction.
+    ///
+    /// Inputs: the covariances of gyro and accelerometer biases with the innovation, the innovation's variance, and
+    /// its normalised square.
+    pub fn note(&mut self, covariances: [[f64; 3]; 2], variance: f64, nis: f64) {
+        for (ratio, covariances) in self.0.iter_mut().zip(covariances) {
+            // (P h / s)^2 s, summed over the axes.
+            let expected = covariances.iter().map(|c| c * c).sum::<f64>() / variance;
+            ratio.expected += expected;
+            ratio.corrected += expected * nis;
+        }
+    }
+
+    /// Adapts the factors after an epoch of `dt_s`.
+    pub fn pass(&mut self, dt_s: f64, settings: &Settings) {
+        let limits = [most(settings.rate_bias, MOST_RATE), most(settings.force_bias, MOST_FORCE)];
+        for (ratio, most) in self.0.iter_mut().zip(limits) {
+            let mean = if ratio.expected > 0.0 { ratio.corrected / ratio.expected } else { 1.0 };
+            if mean > TOO_LARGE {
+                ratio.factor *= math::exp(RAISES_PER_S * dt_s * math::ln(mean));
+            } else if mean < SMALL {
+                ratio.factor *= math::exp(-dt_s / FALLS_OVER_S);
+            }
+            ratio.factor = ratio.factor.clamp(1.0, most);
+            let left = math::exp(-dt_s / MEMORY_S);
+            ratio.corrected *= left;
+            ratio.expected *= left;
+        }
+    }
+
+    /// Factors of the process noise of gyro and accelerometer biases, at least 1.
+    pub fn factors(&self) -> [f64; 2] {
+        self.0.map(|ratio| ratio.factor)
+    }
+}

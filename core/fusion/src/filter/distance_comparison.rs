@@ -1,0 +1,370 @@
+//! Comparison of distances along the tunnel by cable counter, velocity log and estimate.
+//!
+//! It finds differences beyond the data sheets. It uses readings, and never the filter's covariance, gates or learnt
+//! noise. So it still works when the filter has settled on a wrong speed. The inertial unit measures changes of speed
+//! only; `slack_level.rs` compares it with the counter. Derivation: `docs/why/navigation.md`, "Ways in raw form".
+
+use super::cable::CableDoubt;
+use super::settings::Settings;
+use super::slack_level::{MOST_REACH_M, at_time};
+use super::updates::in_tunnel;
+use headrace_geometry::frames::{Body, Rot, Tunnel};
+use headrace_geometry::math;
+use headrace_geometry::site::Site;
+use headrace_geometry::snapshot::stateful;
+use headrace_geometry::time::{DurNs, MonoNs};
+use headrace_sensor::device::{SensorInfo, SensorKind};
+use headrace_sensor::reading::{Reading, SourceId};
+
+/// Time windows over which distances are compared, s.
+const WINDOWS_S: [f64; 3] = [2.0, 10.0, 60.0];
+/// Time between two comparisons, and capacity for those of the longest window.
+const EVERY: DurNs = DurNs(200_000_000);
+const ROOM: usize = 320;
+/// Capacity for the last readings of a source, and the minimum time between kept readings.
+///
+/// At any reading rate, they span more than the filter's longest window.
+const READINGS: usize = 96;
+const NEAR: DurNs = DurNs(20_000_000);
+/// Silence after which a source is not compared.
+///
+/// A velocity log may send a reading only every two seconds.
+const SILENT: DurNs = DurNs(3_000_000_000);
+/// Delay of the comparison, because readings arrive late.
+const BEHIND: DurNs = DurNs(500_000_000);
+/// Maximum difference in standard deviations, and how long the difference must exceed it.
+const MOST_SDS: f64 = 5.0;
+const LASTS: DurNs = DurNs(1_000_000_000);
+/// Scale error of a velocity log, a ratio: 1 % on the data sheet of the A50, and its mount.
+const LOG_SCALE: f64 = 0.015;
+/// Correlation time of its noise, s.
+const LOG_TIME_S: f64 = 0.25;
+
+/// Columns of a row: distances by the cable counter, by the log, and by the estimate.
+const CABLE: usize = 0;
+const LOG: usize = 1;
+const ESTIMATE: usize = 2;
+
+/// Recent distances by each source, and the doubt that they cause.
+#[derive(Debug, Clone)]
+pub(super) struct DistanceComparison {
+    /// Last readings of the counter as chainages, distance by the velocity log, and last estimates, m.
+    cable: Vec<(MonoNs, [f64; 1])>,
+    log: Vec<(MonoNs, [f64; 1])>,
+    estimate: Vec<(MonoNs, [f64; 1])>,
+    /// The velocity log in the comparison.
+    log_source: Option<usize>,
+    /// Last attitude from an inertial unit.
+    attitude: Option<(MonoNs, Rot<Tunnel, Body>)>,
+    /// Distances by column, m; NaN for a missing one.
+    rows: Vec<(MonoNs, [f64; 3])>,
+    /// Time since which the cable has differed from log and estimate.
+    since: [Option<MonoNs>; 2],
+    doubt: Option<CableDoubt>,
+    /// [`super::eskf::Eskf::ties`] of the estimate at the last comparison.
+    ties: u32,
+}
+
+stateful!(DistanceComparison { state: log_source, attitude, since, doubt, ties; lists: cable, log, estimate, rows; });
+
+impl Default for DistanceComparison {
+    /// Allocates the buffers, without readings.
+    fn default() -> Self {
+        let readings = || Vec::with_capacity(READINGS);
+        let rows = Vec::with_capacity(ROOM);
+        Self {
+            cable: readings(),
+            log: readings(),
+            estimate: readings(),
+            log_source: None,
+            attitude: None,
+            rows,
+            since: [None; 2],
+            doubt: None,
+            ties: 0,
+        }
+    }
+}
+
+impl DistanceComparison {
+    /// Processes a reading.
+    ///
+    /// Allocates: never.
+    pub(super) fn hear(
+        &mut self,
+        at: MonoNs,
+        source: usize,
+        sensor: &SensorInfo,
+        reading: &Reading,
+        site: &Site,
+    ) {
+        match (sensor.kind, reading) {
+            (SensorKind::Tether { zero_at_m, scale }, Reading::TetherLength(length)) => {
+                append(&mut self.cable, at, zero_at_m + scale * length.length_m);
+            }
+            (SensorKind::Imu, Reading::Attitude(level)) => {
+                self.attitude = Some((at, in_tunnel(site, *level) * sensor.mount.rotation.inverse()));
+            }
+            (SensorKind::VelocityLog, Reading::VelocityOverGround(moved))
+                if *self.log_source.get_or_insert(source) == source =>
+            {
+                let moved = sensor.mount.rotation * *moved;
+                let attitude = self.attitude.filter(|(told, _)| at.since(*told).0 < SILENT.0);
+                let along_mps = attitude.map_or(moved.x(), |(_, attitude)| (attitude * moved).x());
+                let is_near = |then: MonoNs| (0..SILENT.0).contains(&at.since(then).0);
+                let before = self.log.last().copied().filter(|(then, _)| is_near(*then));
+                let way_m =
+                    before.map_or(0.0, |(then, [way_m])| way_m + along_mps * at.since(then).as_secs_f64());
+                if before.is_none() {
+                    self.log.clear();
+                    self.forget(LOG);
+                }
+                append(&mut self.log, at, way_m);
+            }
+            _ => {}
+        }
+    }
+
+    /// Compares the distances up to an epoch's end.
+    ///
+    /// `estimate_m` is the estimate's chainage there, m; `None` while the filter itself reports a dispute with the
+    /// cable. A change of `ties` means that earlier chainages are unrelated to later ones.
+    ///
+    /// Allocates: never.
+    pub(super) fn compare(&mut self, at: MonoNs, estimate_m: Option<f64>, ties: u32, settings: &Settings) {
+        // While the filter reports a dispute, this comparison stays silent.
+        if core::mem::replace(&mut self.ties, ties) != ties || estimate_m.is_none() {
+            self.estimate.clear();
+            self.forget(ESTIMATE);
+        }
+        if let Some(estimate_m) = estimate_m {
+            append(&mut self.estimate, at, estimate_m);
+        }
+        let at = at - BEHIND;
+        let since = self.rows.last().map(|(last, _)| at.since(*last));
+        if since.is_some_and(|since| (0..EVERY.0).contains(&since.0)) {
+            return;
+        }
+        if since.is_some_and(|since| !(0..SILENT.0).contains(&since.0)) {
+            self.rows.clear();
+        }
+        if self.rows.len() == ROOM {
+            self.rows.remove(0);
+        }
+        let way = |readings| at_time(readings, at).map_or(f64::NAN, |[way_m]| way_m);
+        self.rows.push((at, [way(&self.cable), way(&self.log), way(&self.estimate)]));
+        self.judge(at, settings);
+    }
+
+    /// Updates since when the cable differs from the others, and the largest lasting difference.
+    fn judge(&mut self, at: MonoNs, settings: &Settings) {
+        let mut doubt: Option<CableDoubt> = None;
+        for (k, other) in [LOG, ESTIMATE].into_iter().enumerate() {
+            let windows = WINDOWS_S.into_iter();
+            let differs_m = windows.filter_map(|window_s| self.differs_m(other, window_s, settings));
+            let differs_m = differs_m.fold(0.0, f64::max);
+            let Some(since) = self.since.get_mut(k) else { continue };
+            if differs_m <= 0.0 {
+                *since = None;
+                continue;
+            }
+            let since = *since.get_or_insert(at);
+            if at.since(since).0 >= LASTS.0 && doubt.is_none_or(|known| known.differs_m < differs_m) {
+                let log = self.log_source.filter(|_| other == LOG);
+                let log = log.and_then(|number| u16::try_from(number).ok()).map(SourceId);
+                doubt = Some(CableDoubt { since, from_m: self.cable_m(), differs_m, log });
+            }
+        }
+        self.doubt = doubt.map(|doubt| match self.doubt {
+            Some(known) if known.since == doubt.since && known.log == doubt.log => {
+                let differs_m = known.differs_m.max(doubt.differs_m);
+                CableDoubt { differs_m, ..known }
+            }
+            _ => doubt,
+        });
+    }
+
+    /// Chainage that the cable shows, m.
+    fn cable_m(&self) -> f64 {
+        self.cable.last().map_or(0.0, |(_, [shown_m])| *shown_m)
+    }
+
+    /// Returns the difference that has lasted.
+    pub(super) fn doubt(&self) -> Option<CableDoubt> {
+        self.doubt
+    }
+
+    /// Removes the distances of a column.
+    fn forget(&mut self, column: usize) {
+        for (_, row) in &mut self.rows {
+            if let Some(way_m) = row.get_mut(column) {
+                *way_m = f64::NAN;
+            }
+        }
+    }
+
+    /// Difference of the cable's distance from another one over the window, m.
+    ///
+    /// The time may be shorter if both are not available for the whole window. `None` if one is missing or the
+    /// difference is within its tolerance.
+    fn differs_m(&self, other: usize, window_s: f64, settings: &Settings) -> Option<f64> {
+        let (at, _) = self.rows.last()?;
+        let both = |row: &[f64; 3]| {
+            Some([*row.get(CABLE)?, *row.get(other)?]).filter(|ways| ways.iter().all(|way| way.is_finite()))
+        };
+        let mut recent = self.rows.iter().rev().take_while(|(then, _)| at.since(*then).0 < SILENT.0);
+        let now = recent.find_map(|(_, row)| both(row))?;
+        let from = self.rows.partition_point(|(then, _)| at.since(*then).as_secs_f64() > window_s);
+        let then = self.rows.get(from..)?.iter().find_map(|(_, row)| both(row))?;
+        let (cable_m, other_m) = (now[0] - then[0], now[1] - then[1]);
+        let differs_m = (cable_m - other_m).abs();
+        let [log_scale, log_mps] =
+            if other == LOG { [LOG_SCALE, settings.velocity_sd_mps] } else { [0.0; 2] };
+        let of_scale_m = math::hypot(settings.scale_sd, log_scale) * f64::max(cable_m.abs(), other_m.abs());
+        let counter_m2 = 2.0 * settings.tether_sd_m * settings.tether_sd_m;
+        let variance_m2 = counter_m2 + of_scale_m * of_scale_m + log_mps * log_mps * LOG_TIME_S * window_s;
+        // Slack is limited in both directions.
+        let slack_m = 2.0 * MOST_REACH_M.max(3.0 * settings.slack.reach);
+        (differs_m > slack_m + MOST_SDS * math::sqrt(variance_m2)).then_some(differs_m)
+    }
+}
+
+/// Appends a reading unless it is close to the last one.
+///
+/// An earlier or much later one restarts the list.
+fn append(readings: &mut Vec<(MonoNs, [f64; 1])>, at: MonoNs, way_m: f64) {
+    if readings.last().is_some_and(|(last, _)| (0..NEAR.0).contains(&at.since(*last).0)) {
+        return;
+    }
+    if readings.last().is_some_and(|(last, _)| !(1..SILENT.0).contains(&at.since(*last).0)) {
+        readings.clear();
+    }
+    if readings.len() == READINGS {
+        readings.remove(0);
+    }
+    readings.push((at, [way_m]));
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use headrace_geometry::frames::Vec3;
+    use headrace_sensor::reading::TetherLength;
+
+    const TETHER: usize = 1;
+    const DVL: usize = 4;
+
+    /// Position of a vehicle that moves to and fro, m, at a time in s.
+    fn way_m(t: f64) -> f64 {
+        3000.0 + 0.2 * t + 2.0 * math::sin(t / 20.0)
+    }
+
+    fn speed_mps(t: f64) -> f64 {
+        0.2 + 0.1 * math::cos(t / 20.0)
+    }
+
+    /// Compares for `lasts_s`; returns when a doubt first appeared, s, and the last doubt.
+    ///
+    /// Each function gives the value that a source shows at a time.
+    fn compared(
+        lasts_s: u32,
+        cable_m: impl Fn(f64) -> f64,
+        log_mps: impl Fn(f64) -> Option<f64>,
+        estimate_m: impl Fn(f64) -> Option<f64>,
+    ) -> (Option<f64>, Option<CableDoubt>) {
+        compared_at(10, 1, lasts_s, (cable_m, log_mps, estimate_m))
+    }
+
+    /// The same with a counter of `rate_hz` readings a second and a log with one reading for several of them.
+    fn compared_at(
+        rate_hz: u32,
+        log_every: u32,
+        lasts_s: u32,
+        (cable_m, log_mps, estimate_m): (
+            impl Fn(f64) -> f64,
+            impl Fn(f64) -> Option<f64>,
+            impl Fn(f64) -> Option<f64>,
+        ),
+    ) -> (Option<f64>, Option<CableDoubt>) {
+        let (mut ways, mut first) = (DistanceComparison::default(), None);
+        let (site, settings) = (Site::default(), Settings::default());
+        let at = |t: f64| MonoNs(9_000_000_000) + DurNs::from_secs_f64(t);
+        let of = |kind: SensorKind| SensorInfo { kind, ..SensorInfo::other() };
+        let (tether, log) =
+            (of(SensorKind::Tether { zero_at_m: 0.0, scale: 1.0 }), of(SensorKind::VelocityLog));
+        for k in 1..rate_hz * lasts_s {
+            let t = f64::from(k) / f64::from(rate_hz);
+            let length = TetherLength { length_m: cable_m(t), resolution_m: 0.01, restart: None };
+            ways.hear(at(t), TETHER, &tether, &Reading::TetherLength(length), &site);
+            if let Some(along_mps) = log_mps(t).filter(|_| k.is_multiple_of(log_every)) {
+                let moved = Vec3::new(along_mps, 0.02, 0.0);
+                ways.hear(at(t), DVL, &log, &Reading::VelocityOverGround(moved), &site);
+            }
+            // An epoch is a tenth of a second.
+            if k.is_multiple_of(rate_hz / 10) {
+                ways.compare(at(t - 0.2), estimate_m(t - 0.2), 1, &settings);
+            }
+            if ways.doubt().is_some() {
+                first = first.or(Some(t));
+            }
+        }
+        (first, ways.doubt())
+    }
+
+    #[test]
+    fn sources_within_their_data_sheets_agree() {
+        for period_s in [3.0, 20.0, 60.0] {
+            let cable_m = |t: f64| 1.002 * way_m(t) + 0.15 * math::sin(t * math::TAU / period_s);
+            let none = compared(300, cable_m, |t| Some(1.01 * speed_mps(t) + 0.002), |t| Some(way_m(t)));
+            assert_eq!(none, (None, None), "{period_s}");
+        }
+    }
+
+    #[test]
+    fn velocity_log_off_by_a_fifth_is_named_with_the_difference() {
+        let (first_s, doubt) = compared(120, way_m, |t| Some(1.2 * speed_mps(t)), |t| Some(way_m(t)));
+        let doubt = doubt.unwrap();
+        // A fifth of the last minute's 12 m, or less if the vehicle is slow.
+        assert!((0.5..3.6).contains(&doubt.differs_m) && doubt.log == Some(SourceId(4)), "{doubt:?}");
+        assert!((5.0..20.0).contains(&first_s.unwrap()), "{first_s:?}");
+    }
+
+    #[test]
+    fn stationary_counter_differs_from_the_log_within_seconds() {
+        let stands = |t: f64| way_m(t.min(60.0));
+        let (first_s, doubt) = compared(70, stands, |t| Some(speed_mps(t)), |t| Some(way_m(t.min(60.0))));
+        assert!((61.0..68.0).contains(&first_s.unwrap()), "{first_s:?}");
+        assert_eq!(doubt.unwrap().log, Some(SourceId(4)));
+    }
+
+    #[test]
+    fn diverging_estimate_is_reported_unless_the_filter_reports_it() {
+        let runs = |t: f64| Some(way_m(t) + 0.5 * (t - 60.0).max(0.0));
+        let (first_s, doubt) = compared(70, way_m, |_| None, runs);
+        assert!((61.0..63.0).contains(&first_s.unwrap()), "{first_s:?}");
+        let doubt = doubt.unwrap();
+        assert!(doubt.log.is_none() && (4.0..5.0).contains(&doubt.differs_m), "{doubt:?}");
+        let told = |t: f64| runs(t).filter(|_| t < 60.0);
+        assert_eq!(compared(70, way_m, |_| None, told), (None, None));
+    }
+
+    #[test]
+    fn counters_and_logs_of_any_rate_are_compared() {
+        for (rate_hz, log_every) in [(10, 1), (10, 10), (10, 20), (50, 5), (200, 50), (1000, 125)] {
+            let log_mps = |t: f64| Some(1.2 * speed_mps(t));
+            let compare = |share: f64| {
+                let log_mps = move |t: f64| log_mps(t).map(|mps| share * mps);
+                compared_at(rate_hz, log_every, 60, (way_m, log_mps, |t: f64| Some(way_m(t))))
+            };
+            let (first_s, doubt) = compare(1.0);
+            assert!((5.0..25.0).contains(&first_s.unwrap()) && doubt.is_some(), "{rate_hz}: {first_s:?}");
+            assert_eq!(compare(1.0 / 1.2), (None, None), "{rate_hz}");
+        }
+    }
+
+    #[test]
+    fn silent_log_is_compared_once_it_returns() {
+        let log_mps = |t: f64| (!(30.0..50.0).contains(&t)).then(|| speed_mps(t));
+        assert_eq!(compared(120, way_m, log_mps, |t| Some(way_m(t))), (None, None));
+    }
+}

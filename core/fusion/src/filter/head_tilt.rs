@@ -1,0 +1,236 @@
+//! Sums that detect a head with a tilted axis: one that is yawed or pitched on its mount.
+//!
+//! A beam that leans along the tunnel is longer in either direction, by about the square of the lean. So a head's own
+//! lean shows as an asymmetry. Its ranges are too long while the vehicle turns to one side, and too short while it
+//! turns to the other. A constant excess may as well be the wall's shape, and is eliminated. Derivation:
+//! `docs/why/navigation.md`, "Settings in doubt".
+
+use serde::{Deserialize, Serialize};
+
+use super::evidence::{FEWEST_BLOCKS, POSE, SURE, dot, solved};
+use headrace_geometry::math;
+
+/// Minimum share of the weight after the constant part is eliminated.
+///
+/// Less means that the vehicle has not turned to and fro enough.
+const LEAST_LEFT: f64 = 0.05;
+
+/// Minimum significance of the smallest reported tilt, in standard deviations by range noise.
+const SHOWS: f64 = 3.0;
+/// Largest tilt for which the linear model holds, radians.
+const MOST_RAD: f64 = 0.3;
+
+/// Number of sums.
+///
+/// They are pattern squared, pattern times derivative, derivative squared, and each with the residuals.
+const SUMS: usize = 5;
+
+/// Sums of one head and axis within a spell, next to those of the vehicle's pose.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+pub(super) struct TiltSums {
+    pattern_by_pose: [f64; POSE],
+    tilt_by_pose: [f64; POSE],
+    sums: [f64; SUMS],
+}
+
+/// The same over blocks after the vehicle's pose is eliminated, with their second moments.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+pub(super) struct TiltFit {
+    blocks: u32,
+    sums: [f64; SUMS],
+    squares: [[f64; SUMS]; SUMS],
+}
+
+impl TiltSums {
+    /// Adds a reading: its derivatives by pose, by the tilt, and by half of the tilt's square at zero lean.
+    pub(super) fn add(
+        &mut self,
+        by_pose: [f64; POSE],
+        by_tilt: f64,
+        pattern: f64,
+        residual_m: f64,
+        weight: f64,
+    ) {
+        for ((pattern_sum, tilt_sum), by) in
+            self.pattern_by_pose.iter_mut().zip(&mut self.tilt_by_pose).zip(by_pose)
+        {
+            *pattern_sum += weight * pattern * by;
+            *tilt_sum += weight * by_tilt * by;
+        }
+        let parts = [
+            pattern * pattern,
+            pattern * by_tilt,
+            by_tilt * by_tilt,
+            pattern * residual_m,
+            by_tilt * residual_m,
+        ];
+        for (sum, part) in self.sums.iter_mut().zip(parts) {
+            *sum += weight * part;
+        }
+    }
+
+    /// Returns the sums after the pose is eliminated.
+    ///
+    /// `residuals` are the sums of residuals by pose, and `factor` is the factor of the pose information.
+    pub(super) fn freed(&self, residuals: [f64; POSE], factor: &[[f64; POSE]; POSE]) -> [f64; SUMS] {
+        let [pattern, tilt, residuals] =
+            [self.pattern_by_pose, self.tilt_by_pose, residuals].map(|sums| solved(factor, sums));
+        let by_pose = [
+            dot(&pattern, &pattern),
+            dot(&pattern, &tilt),
+            dot(&tilt, &tilt),
+            dot(&pattern, &residuals),
+            dot(&tilt, &residuals),
+        ];
+        let mut freed = self.sums;
+        for (sum, part) in freed.iter_mut().zip(by_pose) {
+            *sum -= part;
+        }
+        freed
+    }
+}
+
+impl TiltFit {
+    /// Adds the sums of a block.
+    pub(super) fn add(&mut self, block: [f64; SUMS]) {
+        if block[0] <= 0.0 {
+            return;
+        }
+        self.blocks += 1;
+        for (sum, part) in self.sums.iter_mut().zip(block) {
+            *sum += part;
+        }
+        for (line, a) in self.squares.iter_mut().zip(block) {
+            for (sum, b) in line.iter_mut().zip(block) {
+                *sum += a * b;
+            }
+        }
+    }
+
+    /// Returns the tilt, radians, and its weight, without the constant part.
+    ///
+    /// `None` if the vehicle has not turned enough.
+    fn estimate(&self) -> Option<(f64, f64)> {
+        let [pattern_2, both, tilt_2, pattern_off, tilt_off] = self.sums;
+        if self.blocks < FEWEST_BLOCKS || pattern_2 <= 0.0 {
+            return None;
+        }
+        let share = both / pattern_2;
+        let weight = tilt_2 - share * both;
+        (weight > LEAST_LEFT * tilt_2).then(|| ((tilt_off - share * pattern_off) / weight, weight))
+    }
+
+    /// Returns the tilt if it certainly exceeds `least_rad`, and its distance from zero in standard deviations.
+    ///
+    /// The standard deviation is the scatter of blocks, at least that of range noise at the observed `level` of the
+    /// declared variance. `None` if declared noise would hide such a tilt, or if the residuals show more than a tilt.
+    pub(super) fn certain(&self, least_rad: f64, level: f64) -> Option<(f64, f64)> {
+        let (tilt_rad, weight) = self.estimate()?;
+        if weight * least_rad * least_rad < SHOWS * SHOWS {
+            return None;
+        }
+        let [pattern_2, both, _, pattern_off, _] = self.sums;
+        let share = both / pattern_2;
+        let steady = (pattern_off - tilt_rad * both) / pattern_2;
+        // Remainder of a block's sums, linear in them.
+        let left = [share * steady, share * tilt_rad - steady, -tilt_rad, -share, 1.0];
+        let scatter = self.squares.iter().zip(left).map(|(line, a)| a * dot(line, &left)).sum::<f64>();
+        let n = f64::from(self.blocks);
+        let sd_rad = math::sqrt((scatter * n / (n - 2.0)).max(0.0)) / weight;
+        let sure_sd = tilt_rad.abs() / sd_rad.max(math::sqrt(level / weight));
+        ((least_rad..MOST_RAD).contains(&tilt_rad.abs()) && sure_sd >= SURE).then_some((tilt_rad, sure_sd))
+    }
+
+    /// Sum of normalised squares that the tilt explains.
+    pub(super) fn explains(&self) -> f64 {
+        self.estimate().map_or(0.0, |(tilt_rad, weight)| tilt_rad * tilt_rad * weight)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const NOISE_M: f64 = 0.01;
+
+    /// Readings of a head with `tilt_rad` on a wall that is off by `steady` of the pattern: pattern, derivative,
+    /// residual, by block.
+    fn blocks(tilt_rad: f64, steady: f64) -> Vec<Vec<[f64; 3]>> {
+        let mut seed = 5_u64;
+        let mut draw = || {
+            seed = seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            (seed >> 11) as f64 / (1_u64 << 52) as f64 - 1.0
+        };
+        let block = |number: u32| {
+            let reading = |k: u32| {
+                let turned = math::sin(0.7 * f64::from(number) + 0.1 * f64::from(k));
+                let (pattern, by_tilt) = (2.0 + 0.5 * draw(), 1.5 * turned + 0.3 * draw());
+                [pattern, by_tilt, tilt_rad * by_tilt + steady * pattern + 0.02 * draw()]
+            };
+            (0..30).map(reading).collect()
+        };
+        { 0..FEWEST_BLOCKS + 12 }.map(block).collect()
+    }
+
+    fn fit(blocks: &[Vec<[f64; 3]>]) -> TiltFit {
+        let mut fit = TiltFit::default();
+        let unit = core::array::from_fn(|row| core::array::from_fn(|k| f64::from(u8::from(k == row))));
+        for block in blocks {
+            let mut line = TiltSums::default();
+            for [pattern, by_tilt, residual_m] in block {
+                line.add([0.0; POSE], *by_tilt, *pattern, *residual_m, 1.0 / (NOISE_M * NOISE_M));
+            }
+            fit.add(line.freed([0.0; POSE], &unit));
+        }
+        fit
+    }
+
+    /// Comparison with least squares over the readings themselves, for two unknowns by Cramer's rule.
+    #[test]
+    fn tilt_equals_least_squares_with_the_certainty_of_its_blocks() {
+        let weight = 1.0 / (NOISE_M * NOISE_M);
+        let square = |x: f64| x * x;
+        for (tilt_rad, steady) in [(0.05, 0.02), (-0.08, -0.1), (0.2, 0.3)] {
+            let blocks = blocks(tilt_rad, steady);
+            let sum = |of: &dyn Fn(&[f64; 3]) -> f64| blocks.iter().flatten().map(of).sum::<f64>() * weight;
+            let [pp, pt, tt] = [sum(&|r| r[0] * r[0]), sum(&|r| r[0] * r[1]), sum(&|r| r[1] * r[1])];
+            let [po, to] = [sum(&|r| r[0] * r[2]), sum(&|r| r[1] * r[2])];
+            let whole = pp * tt - pt * pt;
+            let (found_rad, found_steady) = ((pp * to - pt * po) / whole, (tt * po - pt * to) / whole);
+            let fit = fit(&blocks);
+            // The tilt explains the difference between the squares left without it and with it.
+            let left = |tilt: f64, steady: f64| sum(&|r| square(r[2] - tilt * r[1] - steady * r[0]));
+            let explained = left(0.0, po / pp) - left(found_rad, found_steady);
+            assert!((fit.explains() / explained - 1.0).abs() < 1e-6, "{} {explained}", fit.explains());
+            let pull = |block: &Vec<[f64; 3]>| {
+                let pulls = |r: &[f64; 3]| {
+                    weight * (r[1] - pt / pp * r[0]) * (r[2] - found_rad * r[1] - found_steady * r[0])
+                };
+                square(block.iter().map(pulls).sum::<f64>())
+            };
+            let n = blocks.len() as f64;
+            let scatter = blocks.iter().map(pull).sum::<f64>() * n / (n - 2.0);
+            let sd_rad = (math::sqrt(scatter) / (whole / pp)).max(math::sqrt(pp / whole));
+            let (told_rad, sure_sd) = fit.certain(0.01, 1.0).unwrap();
+            assert!((told_rad - found_rad).abs() < 1e-9 && (told_rad - tilt_rad).abs() < 0.01);
+            assert!(
+                (sure_sd / (found_rad.abs() / sd_rad) - 1.0).abs() < 1e-6,
+                "{sure_sd} {found_rad} {sd_rad}"
+            );
+        }
+        assert_eq!(
+            fit(&blocks(0.005, 0.02)).certain(0.01, 1.0),
+            None,
+            "a tilt below the limit is not reported"
+        );
+        // Certainty follows the scatter of ranges if that is below the declared one, but is limited by their noise.
+        let sure_sd = |level: f64| fit(&blocks(0.05, 0.0)).certain(0.01, level).unwrap().1;
+        assert!(
+            (sure_sd(100.0) / sure_sd(400.0) - 2.0).abs() < 1e-9,
+            "{} {}",
+            sure_sd(100.0),
+            sure_sd(400.0)
+        );
+        assert!((sure_sd(0.01) / sure_sd(0.02) - 1.0).abs() < 1e-9);
+    }
+}

@@ -1,0 +1,91 @@
+//! Sums of a spell for all fitted parameters and the vehicle's pose.
+//!
+//! The pose takes priority in explaining residuals.
+
+use serde::{Deserialize, Serialize};
+
+use super::evidence::{FOLLOWED, Line, POSE, dot, solved};
+use super::head_tilt::TiltSums;
+use headrace_geometry::math;
+use headrace_geometry::time::MonoNs;
+
+/// Standard deviations of the pose within a spell, m and radians.
+const POSE_SD: [f64; POSE] = [0.3, 0.3, 0.005, 0.01, 0.02];
+
+/// Sums of a spell.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+pub(super) struct PoseWindow {
+    pub(super) begun: Option<MonoNs>,
+    /// Information on the pose, and its right-hand side.
+    pub(super) pose: [[f64; POSE]; POSE],
+    pub(super) residuals: [f64; POSE],
+    pub(super) scale: Line,
+    pub(super) turned: [Line; FOLLOWED],
+    /// Sums for pitch and yaw of each head on its mount.
+    pub(super) tilted: [[TiltSums; 2]; FOLLOWED],
+}
+
+impl PoseWindow {
+    /// Adds a reading's information on the vehicle's pose.
+    pub(super) fn add(&mut self, by_pose: [f64; POSE], residual_m: f64, weight: f64) {
+        for ((by, line), sum) in by_pose.iter().zip(&mut self.pose).zip(&mut self.residuals) {
+            for (part, other) in line.iter_mut().zip(&by_pose) {
+                *part += weight * by * other;
+            }
+            *sum += weight * by * residual_m;
+        }
+    }
+
+    /// Returns the lower Cholesky factor of the information on the pose, priors included.
+    pub(super) fn factor(&self) -> Option<[[f64; POSE]; POSE]> {
+        let mut factor = [[0.0; POSE]; POSE];
+        for (i, (line, sd)) in self.pose.iter().zip(POSE_SD).enumerate() {
+            let mut row = [0.0; POSE];
+            for (j, sum) in line.iter().enumerate().take(i + 1) {
+                let before = factor.get(j).map_or(0.0, |above| dot(&row, above));
+                let left = sum - if i == j { dot(&row, &row) - 1.0 / (sd * sd) } else { before };
+                let slot = row.get_mut(j)?;
+                *slot = if i == j { math::sqrt(left.max(0.0)) } else { left / *factor.get(j)?.get(j)? };
+            }
+            *factor.get_mut(i)? = row;
+        }
+        let is_sound = factor.iter().flatten().all(|x| x.is_finite());
+        (is_sound && factor.iter().enumerate().all(|(i, row)| row.get(i).is_some_and(|x| *x > 0.0)))
+            .then_some(factor)
+    }
+
+    /// Returns weight and weighted value of a parameter after the pose is eliminated.
+    pub(super) fn freed(&self, line: &Line, factor: &[[f64; POSE]; POSE]) -> [f64; 2] {
+        let (by, residuals) = (solved(factor, line.by_pose), solved(factor, self.residuals));
+        [line.squares - dot(&by, &by), line.residuals - dot(&by, &residuals)]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Three readings have residuals of 1, 2 and 3 m from a parameter. The pose explains some of it, or all of it if
+    /// it acts alone.
+    #[test]
+    fn residuals_that_the_pose_explains_are_removed() {
+        let line = |by_pose: [f64; POSE]| Line { squares: 3.0, residuals: 6.0, by_pose };
+        let spell = |weight: f64| {
+            let mut spell = PoseWindow::default();
+            for residual_m in [1.0, 2.0, 3.0] {
+                spell.add([1.0, 0.0, 0.0, 0.0, 0.0], residual_m, weight);
+            }
+            spell
+        };
+        let freed = |spell: &PoseWindow, line: &Line| spell.freed(line, &spell.factor().unwrap());
+        let alone = freed(&spell(1.0), &line([0.0; POSE]));
+        assert!((alone[0] - 3.0).abs() < 1e-12 && (alone[1] - 6.0).abs() < 1e-12, "{alone:?}");
+        // The prior of the pose is 0.3 m: 3 readings against 11.1 of the prior leave a share of 1 - 3 / 14.1.
+        let like_it = freed(&spell(1.0), &line([3.0, 0.0, 0.0, 0.0, 0.0]));
+        let left = 1.0 - 3.0 / (3.0 + 1.0 / 0.09);
+        assert!(
+            (like_it[0] - 3.0 * left).abs() < 1e-9 && (like_it[1] - 6.0 * left).abs() < 1e-9,
+            "{like_it:?}"
+        );
+    }
+}

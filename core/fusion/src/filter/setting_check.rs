@@ -1,0 +1,493 @@
+//! Detection of wrong settings by fits to the residuals of ranges against the design.
+//!
+//! Each setting is one parameter.
+//!
+//! Within a spell of a few seconds, the vehicle's position and attitude absorb what they can. The parameters are
+//! fitted to the rest. Spells add up to blocks of distance. Blocks are about as independent as the wall allows, and
+//! their scatter gives the uncertainty of a figure. Derivation: `docs/why/navigation.md`, "Settings in doubt".
+
+use serde::{Deserialize, Serialize};
+
+use super::evidence::{Alternative, COMPARED, FOLLOWED, Fit, Line, SURE};
+use super::head_tilt::TiltFit;
+use super::measure::{self, Beam, ScalarUpdate, with_quantum};
+use super::pose_window::PoseWindow;
+use super::settings::Settings;
+use super::sources::Source;
+use super::state::{ATTITUDE, POSITION, State, vec};
+use super::window::Waiting;
+use headrace_geometry::frames::{Body, Rot, Sensor, Tunnel, Vec3, head_direction};
+use headrace_geometry::math;
+use headrace_geometry::site::Site;
+use headrace_geometry::snapshot::stateful;
+use headrace_geometry::time::{DurNs, MonoNs};
+use headrace_geometry::tunnel::Profile;
+use headrace_sensor::device::{SensorInfo, SensorKind};
+use headrace_sensor::reading::Reading;
+
+/// Length of a spell: about as long as a filter with wrong ranges keeps its position.
+const SPELL: DurNs = DurNs(2_000_000_000);
+/// Minimum length of a block, in time and distance. A block with hardly any motion is dropped after the maximum time.
+const BLOCK: DurNs = DurNs(20_000_000_000);
+const BLOCK_M: f64 = 3.0;
+const LONGEST: DurNs = DurNs(120_000_000_000);
+/// Minimum number of readings in a block.
+const FEWEST_READINGS: u32 = 100;
+/// Smallest reported figures: a share of the range, and an angle.
+const LEAST_SCALE: f64 = 0.015;
+const LEAST_ANGLE_RAD: f64 = 0.03;
+/// Residual above which a range loses weight, and above which it does not count, m.
+const FAR_M: f64 = 0.5;
+const BEYOND_M: f64 = 2.0;
+/// Number of alternatives for the followed sources.
+const ALTERNATIVES: usize = FOLLOWED * FOLLOWED;
+/// Mean square residual of an echosounder that does not fit at all, m^2.
+///
+/// It pulls the estimate away and makes heads look turned.
+const ASTRAY_M2: f64 = 0.04;
+
+/// A setting that is likely wrong.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub enum Setting {
+    /// Ranges are too long by this share.
+    ///
+    /// The speed of sound is set too high, or the wall is wider than drawn by this share.
+    RangeScale(f64),
+    /// A head is rotated about its axis by this angle from its configured mount, radians.
+    ///
+    /// The angle is to be added to its roll.
+    HeadTurned(f64),
+    /// A head is pitched on its mount by this angle, radians, to be added to its pitch.
+    HeadPitched(f64),
+    /// A head is yawed on its mount by this angle, radians, to be added to its yaw.
+    HeadYawed(f64),
+    /// A source faces the opposite way.
+    WrongWayRound,
+    /// Two sources are swapped; the value is the number of the other one.
+    Swapped(u16),
+}
+
+/// A setting in doubt.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct SettingDoubt {
+    /// The setting that is likely wrong.
+    pub setting: Setting,
+    /// Number of the source, if the setting belongs to one source.
+    pub source: Option<u16>,
+    /// Standard deviations from the configured value.
+    pub sure_sd: f64,
+}
+
+impl Setting {
+    /// The word for it in reports and logs.
+    pub fn as_str(self) -> &'static str {
+        match self {
+            Self::RangeScale(_) => "range_scale",
+            Self::HeadTurned(_) => "head_turned",
+            Self::HeadPitched(_) => "head_pitched",
+            Self::HeadYawed(_) => "head_yawed",
+            Self::WrongWayRound => "wrong_way_round",
+            Self::Swapped(_) => "swapped",
+        }
+    }
+
+    /// Returns the share or the angle, radians; 0 if there is none.
+    pub fn figure(self) -> f64 {
+        match self {
+            Self::RangeScale(figure)
+            | Self::HeadTurned(figure)
+            | Self::HeadPitched(figure)
+            | Self::HeadYawed(figure) => figure,
+            Self::WrongWayRound | Self::Swapped(_) => 0.0,
+        }
+    }
+
+    /// Returns the angle by which a head differs from its configured mount, radians.
+    pub fn angle_rad(self) -> Option<f64> {
+        match self {
+            Self::HeadTurned(by_rad) | Self::HeadPitched(by_rad) | Self::HeadYawed(by_rad) => Some(by_rad),
+            Self::RangeScale(_) | Self::WrongWayRound | Self::Swapped(_) => None,
+        }
+    }
+
+    /// Returns the other one of two swapped sources.
+    pub fn other(self) -> Option<u16> {
+        match self {
+            Self::Swapped(other) => Some(other),
+            _ => None,
+        }
+    }
+}
+
+impl SettingDoubt {
+    /// Whether it concerns the same setting, whatever the figure.
+    pub fn is_of_same(&self, other: &Self) -> bool {
+        self.source == other.source
+            && self.setting.as_str() == other.setting.as_str()
+            && self.setting.other() == other.setting.other()
+    }
+}
+
+/// Reference for ranges.
+#[derive(Debug, Clone, Copy)]
+pub struct Design<'a> {
+    /// Design profile.
+    pub profile: &'a Profile,
+    /// Water.
+    pub site: &'a Site,
+    /// Noise settings of the sensors.
+    pub settings: &'a Settings,
+    /// Position of the inertial unit on the vehicle.
+    pub unit_at: Vec3<Body>,
+}
+
+/// A range reading compared with the design.
+struct Look {
+    beam: Beam,
+    range_m: f64,
+    sd_m: f64,
+}
+
+/// A block: its start, its readings, and the sums of its spells.
+///
+/// The vehicle's pose is eliminated from the sums.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+struct Block {
+    begun: Option<(MonoNs, f64)>,
+    readings: u32,
+    scale: [f64; 2],
+    turned: [[f64; 2]; FOLLOWED],
+    tilted: [[[f64; 5]; 2]; FOLLOWED],
+}
+
+/// Sums for all settings that are judged.
+#[derive(Debug, Clone)]
+pub struct SettingChecks {
+    block: Block,
+    spell: PoseWindow,
+    followed: [Option<u16>; FOLLOWED],
+    scale: Fit,
+    turned: [Fit; FOLLOWED],
+    tilted: [[TiltFit; 2]; FOLLOWED],
+    alternatives: Vec<Alternative>,
+    /// Number of readings of each followed source, and its observed share of the declared variance, at most 1.
+    heard: [u32; FOLLOWED],
+    levels: [f64; FOLLOWED],
+    doubt: Option<SettingDoubt>,
+}
+
+stateful!(SettingChecks { state: block, spell, followed, scale, turned, tilted, heard, levels, doubt; lists: alternatives; });
+
+impl Default for SettingChecks {
+    /// Allocates the buffers, without readings.
+    fn default() -> Self {
+        Self {
+            block: Block::default(),
+            spell: PoseWindow::default(),
+            followed: [None; FOLLOWED],
+            scale: Fit::default(),
+            turned: [Fit::default(); FOLLOWED],
+            tilted: [[TiltFit::default(); 2]; FOLLOWED],
+            alternatives: Vec::with_capacity(ALTERNATIVES),
+            heard: [0; FOLLOWED],
+            levels: [1.0; FOLLOWED],
+            doubt: None,
+        }
+    }
+}
+
+impl SettingChecks {
+    /// Returns the most likely of the settings that are certainly wrong.
+    ///
+    /// Inputs: the estimate's scale of all ranges and its standard deviation, whose effect is no longer part of the
+    /// residuals.
+    pub fn doubt(&self, [share, sd]: [f64; 2]) -> Option<SettingDoubt> {
+        let sure_sd = share.abs() / sd.max(f64::MIN_POSITIVE);
+        let is_scaled = self.scale.is_settled() && share.abs() >= LEAST_SCALE && sure_sd >= SURE;
+        let setting = Setting::RangeScale(share);
+        self.doubt.or_else(|| is_scaled.then_some(SettingDoubt { setting, source: None, sure_sd }))
+    }
+
+    /// Processes a reading before it is fused, with the estimate at its time.
+    ///
+    /// Allocates: never.
+    pub fn hear(
+        &mut self,
+        state: &State,
+        design: &Design<'_>,
+        sources: &[Option<Source>],
+        waiting: &Waiting,
+    ) {
+        let Some(info) = info(sources, waiting.source) else { return };
+        let Some(look) = look(info, design, &waiting.reading) else { return };
+        let Some(slot) = self.slot(waiting.source) else { return };
+        let x_m = state.position.x();
+        let spell_begun = *self.spell.begun.get_or_insert(waiting.at);
+        if !(0..SPELL.0).contains(&waiting.at.since(spell_begun).0) {
+            self.end_spell();
+        }
+        let (begun, from_m) = *self.block.begun.get_or_insert((waiting.at, x_m));
+        let (lasted, moved_m) = (waiting.at.since(begun).0, (x_m - from_m).abs());
+        if lasted >= BLOCK.0 && moved_m >= BLOCK_M {
+            self.close();
+        } else if !(0..LONGEST.0).contains(&lasted) {
+            self.give_up();
+        }
+        let Some(row) = expect(state, design, &look) else { return };
+        if let (Some(level), Some(Some(source))) = (self.levels.get_mut(slot), sources.get(waiting.source)) {
+            *level = source.noise_level.smoothness().unwrap_or(1.0);
+        }
+        if let Some(heard) = self.heard.get_mut(slot) {
+            *heard = heard.wrapping_add(1);
+            if heard.is_multiple_of(COMPARED) {
+                self.compare(state, design, sources, waiting, row.residual);
+            }
+        }
+        if row.residual.abs() > BEYOND_M {
+            return;
+        }
+        let place = vec::<Tunnel>(&row.h, POSITION);
+        let arm = state.attitude * look.beam.offset;
+        let turn = vec::<Tunnel>(&row.h, ATTITUDE);
+        let own_turn = turn + -arm.cross(&place);
+        let expected_m = look.range_m - row.residual;
+        let by_pose = [place.y(), place.z(), turn.x(), turn.y(), turn.z()];
+        // A known scale error makes no range an outlier.
+        let scale = self.scale.estimate().map_or(0.0, |[scale, _]| scale);
+        let off_m = row.residual.abs().min((row.residual - scale * expected_m).abs());
+        let weight = (FAR_M / off_m.max(FAR_M)) / row.noise;
+        self.block.readings += 1;
+        self.spell.add(by_pose, row.residual, weight);
+        self.spell.scale.add(by_pose, expected_m, row.residual, weight);
+        if info.kind != SensorKind::Head {
+            return;
+        }
+        let axis = state.attitude * (info.mount.rotation * Vec3::<Sensor>::new(1.0, 0.0, 0.0));
+        if let Some(line) = self.spell.turned.get_mut(slot) {
+            line.add(by_pose, own_turn.dot(&axis), row.residual, weight);
+        }
+        let along = state.attitude * look.beam.along;
+        for (line, axis) in
+            self.spell.tilted.get_mut(slot).into_iter().flatten().zip(tilt_axes(&info.mount.rotation))
+        {
+            let axis = state.attitude * axis;
+            let leans = axis.cross(&along).x();
+            line.add(by_pose, own_turn.dot(&axis), expected_m * leans * leans, row.residual, weight);
+        }
+    }
+
+    /// Index of a source among the followed ones.
+    fn slot(&mut self, source: usize) -> Option<usize> {
+        let source = u16::try_from(source).ok()?;
+        let place = self.followed.iter().position(|known| known.is_none_or(|known| known == source))?;
+        *self.followed.get_mut(place)? = Some(source);
+        Some(place)
+    }
+
+    /// Compares a reading with the predictions for other mounts.
+    ///
+    /// These are the mounts of other sources of its kind, and its own mount turned round.
+    fn compare(
+        &mut self,
+        state: &State,
+        design: &Design<'_>,
+        sources: &[Option<Source>],
+        waiting: &Waiting,
+        missed_m: f64,
+    ) {
+        let Some(own) = info(sources, waiting.source) else { return };
+        for other in self.followed.iter().flatten() {
+            let Some(theirs) = info(sources, usize::from(*other)) else { continue };
+            let is_own = usize::from(*other) == waiting.source;
+            if core::mem::discriminant(&theirs.kind) != core::mem::discriminant(&own.kind) {
+                continue;
+            }
+            let Some(mut look) = look(&SensorInfo { mount: theirs.mount, ..*own }, design, &waiting.reading)
+            else {
+                continue;
+            };
+            if is_own {
+                look.beam.along =
+                    own.mount.rotation * (round() * (own.mount.rotation.inverse() * look.beam.along));
+            }
+            let Some(row) = expect(state, design, &look) else { continue };
+            let Ok(source) = u16::try_from(waiting.source) else { continue };
+            let is_echo = own.kind != SensorKind::Head;
+            note(&mut self.alternatives, (source, *other, is_echo), [missed_m, row.residual]);
+        }
+    }
+
+    fn end_spell(&mut self) {
+        let spell = core::mem::take(&mut self.spell);
+        let Some(factor) = spell.factor() else { return };
+        let add = |sums: &mut [f64; 2], line: &Line| {
+            for (sum, part) in sums.iter_mut().zip(spell.freed(line, &factor)) {
+                *sum += part;
+            }
+        };
+        add(&mut self.block.scale, &spell.scale);
+        for (sums, line) in self.block.turned.iter_mut().zip(&spell.turned) {
+            add(sums, line);
+        }
+        for (sums, line) in self.block.tilted.iter_mut().flatten().zip(spell.tilted.iter().flatten()) {
+            for (sum, part) in sums.iter_mut().zip(line.freed(spell.residuals, &factor)) {
+                *sum += part;
+            }
+        }
+    }
+
+    fn give_up(&mut self) {
+        self.spell = PoseWindow::default();
+        self.block = Block::default();
+        for alternative in &mut self.alternatives {
+            alternative.block = [0.0; 3];
+        }
+    }
+
+    /// Ends a block.
+    fn close(&mut self) {
+        self.end_spell();
+        if self.block.readings >= FEWEST_READINGS {
+            let readings = self.block.readings;
+            self.scale.add(self.block.scale, readings);
+            for (fit, sums) in self.turned.iter_mut().zip(self.block.turned) {
+                fit.add(sums, readings);
+            }
+            for (fit, sums) in self.tilted.iter_mut().flatten().zip(self.block.tilted.iter().flatten()) {
+                fit.add(*sums);
+            }
+            for alternative in &mut self.alternatives {
+                alternative.close();
+            }
+            self.doubt = self.likeliest();
+        }
+        self.give_up();
+    }
+
+    fn likeliest(&self) -> Option<SettingDoubt> {
+        let mut best: Option<(f64, SettingDoubt)> = None;
+        let mut propose = |explains: f64, doubt: SettingDoubt| {
+            if best.is_none_or(|(before, _)| explains > before) {
+                best = Some((explains, doubt));
+            }
+        };
+        if let Some((share, sure_sd)) = self.scale.certain(LEAST_SCALE) {
+            let setting = Setting::RangeScale(share);
+            propose(self.scale.explains(), SettingDoubt { setting, source: None, sure_sd });
+        }
+        let is_astray = self.alternatives.iter().any(|of| of.is_echo && of.all[0] > ASTRAY_M2 * of.all[2]);
+        for (source, fit) in self.followed.iter().zip(&self.turned) {
+            if let Some((by_rad, sure_sd)) = fit.certain(LEAST_ANGLE_RAD).filter(|_| !is_astray) {
+                let setting = Setting::HeadTurned(by_rad);
+                propose(fit.explains(), SettingDoubt { setting, source: *source, sure_sd });
+            }
+        }
+        for ((source, fits), level) in self.followed.iter().zip(&self.tilted).zip(self.levels) {
+            for (fit, setting) in fits.iter().zip([Setting::HeadPitched, Setting::HeadYawed]) {
+                if let Some((by_rad, sure_sd)) = fit.certain(LEAST_ANGLE_RAD, level).filter(|_| !is_astray) {
+                    propose(
+                        fit.explains(),
+                        SettingDoubt { setting: setting(by_rad), source: *source, sure_sd },
+                    );
+                }
+            }
+        }
+        for own in &self.alternatives {
+            let source = Some(own.source);
+            if own.source == own.other {
+                if let Some(sure_sd) = own.certain(own.share_left()) {
+                    let setting = Setting::WrongWayRound;
+                    propose(own.explains(), SettingDoubt { setting, source, sure_sd });
+                }
+                continue;
+            }
+            let is_return = |other: &&Alternative| (other.source, other.other) == (own.other, own.source);
+            let Some(other) = self.alternatives.iter().find(is_return) else { continue };
+            let left = (own.all[1] + other.all[1]) / (own.all[0] + other.all[0]).max(f64::MIN_POSITIVE);
+            let sure_sd = own.certain(left).zip(other.certain(left));
+            if let Some((own_sd, other_sd)) = sure_sd.filter(|_| own.source < own.other) {
+                let (setting, sure_sd) = (Setting::Swapped(own.other), own_sd.min(other_sd));
+                propose(own.explains() + other.explains(), SettingDoubt { setting, source, sure_sd });
+            }
+        }
+        best.map(|(_, doubt)| doubt)
+    }
+}
+
+fn info(sources: &[Option<Source>], number: usize) -> Option<&SensorInfo> {
+    sources.get(number)?.as_ref().map(|source| &source.sensor)
+}
+
+/// Axes about which a mount is pitched and yawed, in the body frame.
+fn tilt_axes(mount: &Rot<Body, Sensor>) -> [Vec3<Body>; 2] {
+    let ahead = *mount * Vec3::<Sensor>::new(1.0, 0.0, 0.0);
+    let level = math::hypot(ahead.x(), ahead.y()).max(f64::MIN_POSITIVE);
+    [Vec3::new(-ahead.y() / level, ahead.x() / level, 0.0), Vec3::new(0.0, 0.0, 1.0)]
+}
+
+/// Half a turn about the sensor's own vertical axis.
+fn round() -> Rot<Sensor, Sensor> {
+    Rot::from_roll_pitch_yaw(0.0, 0.0, math::PI)
+}
+
+/// Interprets a reading of a source with this mount; `None` without a range.
+fn look(info: &SensorInfo, design: &Design<'_>, reading: &Reading) -> Option<Look> {
+    let Design { site, settings, unit_at, .. } = design;
+    let (along, range_m, first_rad, unsure_rad, sd_m) = match (info.kind, reading) {
+        (SensorKind::Head, Reading::Sonar(sonar)) => (
+            head_direction(sonar.angle_rad),
+            site.rescaled_range_m(sonar.range_m?, sonar.sound_speed_mps),
+            settings.return_beam_rad / 2.0,
+            0.0,
+            with_quantum(settings.return_sd_m, sonar.resolution_m),
+        ),
+        (SensorKind::Echosounder { .. }, Reading::Echo(echo)) => (
+            Vec3::new(1.0, 0.0, 0.0),
+            site.rescaled_range_m(echo.range_m?, echo.sound_speed_mps),
+            0.0,
+            settings.echo_beam_rad / 2.0,
+            settings.echo_sd_m,
+        ),
+        _ => return None,
+    };
+    let offset = info.mount.position + -*unit_at;
+    let beam = Beam { offset, along: info.mount.rotation * along, first_rad, unsure_rad };
+    Some(Look { beam, range_m, sd_m })
+}
+
+fn expect(state: &State, design: &Design<'_>, look: &Look) -> Option<ScalarUpdate> {
+    measure::range(state, design.profile, &look.beam, look.range_m, look.sd_m)
+}
+
+fn note(alternatives: &mut Vec<Alternative>, (source, other, is_echo): (u16, u16, bool), missed_m: [f64; 2]) {
+    let known = alternatives.iter().position(|known| (known.source, known.other) == (source, other));
+    let place = known.unwrap_or(alternatives.len());
+    if known.is_none() {
+        if alternatives.len() >= ALTERNATIVES {
+            return;
+        }
+        alternatives.push(Alternative { source, other, is_echo, ..Alternative::default() });
+    }
+    if let Some(alternative) = alternatives.get_mut(place) {
+        alternative.note(missed_m);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn only_misaligned_heads_have_an_angle() {
+        for by_rad in [0.05, -0.02] {
+            for setting in
+                [Setting::HeadTurned(by_rad), Setting::HeadPitched(by_rad), Setting::HeadYawed(by_rad)]
+            {
+                assert_eq!((setting.angle_rad(), setting.figure()), (Some(by_rad), by_rad));
+            }
+        }
+        for setting in [Setting::RangeScale(0.03), Setting::WrongWayRound, Setting::Swapped(3)] {
+            assert_eq!(setting.angle_rad(), None, "{setting:?}");
+        }
+    }
+}

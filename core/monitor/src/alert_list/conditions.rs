@@ -1,0 +1,355 @@
+//! Conditions checked at each update, by situation.
+
+use serde::{Deserialize, Serialize};
+
+use super::timer::{self, Due};
+use super::{AlertList, AlertState, Figures, ListKind, Priority, Telling};
+use crate::live_state::{Condition, LiveState, OLD_AFTER, PositionDoubt, PositionState, SensorState};
+use crate::pilot_text::AdviceFigures;
+use headrace_coverage::{Stretch, Unsure};
+use headrace_fusion::filter::setting_check::SettingDoubt;
+use headrace_geometry::time::{DurNs, MonoNs};
+use headrace_sensor::reading::SourceId;
+
+/// Time after the first update before data or positions that never arrived count as missing.
+const GRACE: DurNs = DurNs(30_000_000_000);
+/// Time for which `CannotSay` stays active after such a stretch has last grown.
+const GROWS: DurNs = DurNs(10_000_000_000);
+/// Remaining shares, percent, for warning, alarm and emergency alarm.
+const CABLE_PCT: [f64; 3] = [10.0, 5.0, -1.0];
+const TIME_PCT: [f64; 3] = [10.0, 0.0, -1.0];
+const BATTERY_PCT: [f64; 3] = [20.0, 10.0, 5.0];
+/// Dead band: a remainder must rise by this much, percent, to leave its priority.
+const MORE_PCT: f64 = 2.0;
+
+/// Data and positions seen at least once.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+pub(super) struct Had {
+    position: bool,
+    sure_position: bool,
+    sonar: bool,
+    turning: u64,
+    /// The last stretch without a verdict, and the time at which it last grew.
+    unsure: Option<(Stretch, MonoNs)>,
+}
+
+/// An update, with the state as of that time.
+pub(crate) struct Beat<'a> {
+    pub(crate) at: MonoNs,
+    /// State with `now` equal to the time of the update.
+    pub(crate) state: &'a LiveState,
+    pub(crate) setting: Option<SettingDoubt>,
+}
+
+/// A condition that may hold.
+pub(super) struct Seen {
+    pub(super) kind: ListKind,
+    pub(super) source: Option<SourceId>,
+    pub(super) holds: bool,
+    pub(super) figures: Figures,
+}
+
+impl Seen {
+    pub(super) fn of(kind: ListKind, holds: bool, figures: Figures) -> Self {
+        Self { kind, source: None, holds, figures }
+    }
+}
+
+impl AlertList {
+    /// Checks all conditions at an update.
+    pub(crate) fn beat(&mut self, beat: &Beat<'_>, to: &mut Telling<'_>) {
+        let Beat { at, state, .. } = *beat;
+        let begun = *self.begun.get_or_insert(at);
+        self.v_max_mps = state.v_max_mps().unwrap_or(0.0);
+        self.x_m = state.chainage_m;
+        self.had.position |= !matches!(state.position, PositionState::None(_));
+        self.had.sure_position |= state.position == PositionState::Ok;
+        self.had.turning |= state.turning;
+        self.had.sonar |= state.has_sonar() && state.turning != 0;
+        self.take_speed(beat, to);
+        self.take_position(beat, begun, to);
+        self.take_unsure(beat, to);
+        self.take_dive(beat, to);
+        self.take_sensors(at, state, to);
+        self.take_left(at, state, begun, to);
+        self.take_recording(at, to);
+    }
+
+    /// Checks sensors and remainders while no sensor delivers data.
+    ///
+    /// `state` is that of the last update, except that its `now` is `at`.
+    pub(crate) fn time(&mut self, at: MonoNs, state: &LiveState, to: &mut Telling<'_>) {
+        let Some(begun) = self.begun else { return };
+        self.take_sensors(at, state, to);
+        self.take_left(at, state, begun, to);
+        self.take_recording(at, to);
+    }
+
+    /// Records whether a recording fails.
+    pub(crate) fn set_recording(&mut self, fails: bool, at: MonoNs, to: &mut Telling<'_>) {
+        self.recording_fails = fails;
+        self.take_recording(at, to);
+    }
+
+    /// Records the charge of the vehicle's battery, percent.
+    pub(crate) fn set_battery(&mut self, battery_pct: f64) {
+        self.battery_pct = Some(battery_pct);
+    }
+
+    fn take_recording(&mut self, at: MonoNs, to: &mut Telling<'_>) {
+        let seen = Seen::of(ListKind::NotRecorded, self.recording_fails, Figures::None);
+        self.observe(at, &seen, to);
+    }
+
+    /// Whether data or positions that never arrived are overdue.
+    fn is_late(&self, at: MonoNs) -> bool {
+        self.begun.is_some_and(|begun| at.since(begun).0 >= GRACE.0)
+    }
+
+    fn take_speed(&mut self, beat: &Beat<'_>, to: &mut Telling<'_>) {
+        let Beat { at, state, .. } = *beat;
+        let condition = state.condition();
+        let speed_mps = state.speed_mps.unwrap_or(0.0);
+        let figures = state
+            .advice
+            .as_ref()
+            .map_or(Figures::None, |advice| Figures::Advice(AdviceFigures::of(advice, speed_mps)));
+        // The dead band of the speed lies between slightly over and too fast.
+        let is_over = condition == Condition::Over && self.is_active(ListKind::TooFast, None);
+        let too_fast = condition == Condition::TooFast || is_over;
+        self.observe(at, &Seen::of(ListKind::TooFast, too_fast, figures), to);
+        self.observe(at, &Seen::of(ListKind::NoSpeed, condition == Condition::NoSpeed, figures), to);
+        self.observe(at, &Seen::of(ListKind::TurnFails, condition == Condition::TurnFails, figures), to);
+    }
+
+    fn take_position(&mut self, beat: &Beat<'_>, begun: MonoNs, to: &mut Telling<'_>) {
+        let Beat { at, state, .. } = *beat;
+        let (lacks, figures) = match state.position {
+            PositionState::None(lacking) => (true, Figures::MissingSampleFinder(lacking)),
+            _ => (false, Figures::None),
+        };
+        // An alignment takes its time.
+        let is_late = at.since(begun).0 >= GRACE.0;
+        let lacks = lacks && (self.had.position || is_late);
+        self.observe(at, &Seen::of(ListKind::NoPosition, lacks, figures), to);
+        let is_spread = state.position == PositionState::Doubtful(PositionDoubt::Spread)
+            && (self.had.sure_position || is_late);
+        let error = Figures::Error(state.confidence_sd * state.pass_sd_m, state.stand_s > 0);
+        self.observe(at, &Seen::of(ListKind::PositionDoubtful, is_spread, error), to);
+    }
+
+    fn take_unsure(&mut self, beat: &Beat<'_>, to: &mut Telling<'_>) {
+        let Beat { at, state, .. } = *beat;
+        // The ends of the coverage extent are reported when they are left.
+        let now = state.unsure.filter(|stretch| stretch.why != Unsure::NotInspected);
+        let before = self.had.unsure;
+        if now.is_some() && now != before.map(|(stretch, _)| stretch) {
+            self.had.unsure = now.map(|stretch| (stretch, at));
+        }
+        let Some((stretch, grown)) = self.had.unsure else { return };
+        let grows = at.since(grown).0 < GROWS.0;
+        self.observe(at, &Seen::of(ListKind::CannotSay, grows, Figures::CannotSay(stretch)), to);
+    }
+
+    /// Checks alerts about the dive as a whole.
+    fn take_dive(&mut self, beat: &Beat<'_>, to: &mut Telling<'_>) {
+        let Beat { at, state, setting } = *beat;
+        let active = |kind: ListKind, source: Option<SourceId>| {
+            let is_it = |alert: &&crate::live_state::ActiveAlert| {
+                ListKind::from(alert.kind) == kind && alert.source == source
+            };
+            state.alerts.iter().flatten().find(is_it).copied()
+        };
+        for kind in crate::alerts::AlertKind::ALL.map(ListKind::from) {
+            let of_none = (!kind.is_of_sensor()).then_some(None);
+            let sources = if kind.may_name_a_sensor() { usize::from(state.sources) } else { 0 };
+            let of_sensors = (0..).take(sources).map(|number| Some(SourceId(number)));
+            for source in of_none.into_iter().chain(of_sensors) {
+                let found = active(kind, source);
+                let figures = match (found, setting) {
+                    (Some(alert), Some(doubt)) if kind == ListKind::SettingDoubted => {
+                        Figures::Setting(doubt, alert.x_m)
+                    }
+                    (Some(alert), _) => Figures::Deviation(alert.x_m, alert.worst_m),
+                    (None, _) => Figures::None,
+                };
+                self.observe(at, &Seen { kind, source, holds: found.is_some(), figures }, to);
+            }
+        }
+    }
+
+    fn take_sensors(&mut self, at: MonoNs, state: &LiveState, to: &mut Telling<'_>) {
+        let is_late = self.is_late(at);
+        let sources = || (0_u16..).take(usize::from(state.sources));
+        let heard = |source: u16| state.heard.get(usize::from(source)).copied().flatten();
+        let is_silent =
+            |source: u16| matches!(state.sensor(source.into()), SensorState::Never | SensorState::Silent);
+        // If no sensor delivers data, that is one situation, not one for each sensor.
+        let all_silent = state.sources > 0 && sources().all(is_silent);
+        self.observe(at, &Seen::of(ListKind::NoData, all_silent, Figures::None), to);
+        // A sensor is silent if it delivers nothing while another one does.
+        let newest = sources().filter_map(heard).max();
+        for source in sources() {
+            let holds = match (heard(source), newest) {
+                (Some(heard), Some(newest)) => newest.since(heard).0 > OLD_AFTER.0,
+                (None, _) => is_late && !all_silent,
+                (Some(_), None) => false,
+            };
+            let (kind, source) = (ListKind::SensorSilent, Some(SourceId(source)));
+            self.observe(at, &Seen { kind, source, holds, figures: Figures::None }, to);
+        }
+        let is_head = |source: &u16| state.heads.checked_shr((*source).into()).unwrap_or(0) & 1 == 1;
+        for number in sources().filter(is_head) {
+            let has_turned = self.had.turning.checked_shr(number.into()).unwrap_or(0) & 1 == 1;
+            let stalled = state.sensor(number.into()) == SensorState::Stalled && (has_turned || is_late);
+            let (kind, source) = (ListKind::SensorStalled, Some(SourceId(number)));
+            self.observe(at, &Seen { kind, source, holds: stalled, figures: Figures::None }, to);
+        }
+        for number in sources() {
+            for (kind, of) in
+                [(ListKind::SensorDeaf, SensorState::Deaf), (ListKind::SensorHung, SensorState::Hung)]
+            {
+                let (source, holds) = (Some(SourceId(number)), state.sensor(number.into()) == of);
+                self.observe(at, &Seen { kind, source, holds, figures: Figures::None }, to);
+            }
+        }
+        let no_sonar = state.heads != 0
+            && (!state.has_sonar() || state.turning == 0)
+            && !all_silent
+            && (self.had.sonar || is_late);
+        self.observe(at, &Seen::of(ListKind::NoSonar, no_sonar, Figures::None), to);
+    }
+
+    /// Checks the remaining cable, time and charge.
+    fn take_left(&mut self, at: MonoNs, state: &LiveState, begun: MonoNs, to: &mut Telling<'_>) {
+        let cable = self.cable_left_m(state.chainage_m).zip(self.limits.cable_m);
+        let time = self.limits.dive_time.map(DurNs::as_secs_f64);
+        let time = time.map(|all_s| (all_s - at.since(begun).as_secs_f64(), all_s));
+        let battery = self.battery_pct.map(|pct| (pct, 100.0));
+        self.observe_left(at, ListKind::CableLeft, cable, CABLE_PCT, to);
+        self.observe_left(at, ListKind::TimeLeft, time, TIME_PCT, to);
+        self.observe_left(at, ListKind::BatteryLeft, battery, BATTERY_PCT, to);
+    }
+
+    fn observe_left(
+        &mut self,
+        at: MonoNs,
+        kind: ListKind,
+        left: Option<(f64, f64)>,
+        little_pct: [f64; 3],
+        to: &mut Telling<'_>,
+    ) {
+        let Some((left, all)) = left else { return };
+        let share_pct = 100.0 * left / all;
+        let [warning, alarm, emergency] = little_pct;
+        let more_pct = if self.is_active(kind, None) { MORE_PCT } else { 0.0 };
+        self.observe(at, &Seen::of(kind, share_pct <= warning + more_pct, Figures::Left(left)), to);
+        let number = self.timers.get(timer::place(kind, None)).map_or(0, |timer| timer.number);
+        for (limit, priority) in [(emergency, Priority::EmergencyAlarm), (alarm, Priority::Alarm)] {
+            if share_pct <= limit {
+                self.set_priority(number, priority, at, to);
+                return;
+            }
+        }
+    }
+
+    /// Cable left beyond the vehicle's place, m; `None` if its length is unknown.
+    pub(super) fn cable_left_m(&self, x_m: Option<f64>) -> Option<f64> {
+        self.limits.cable_m.zip(x_m).map(|(cable_m, x_m)| cable_m - x_m.max(0.0))
+    }
+
+    /// Time left, seconds; `None` if the dive's duration is unlimited.
+    pub(super) fn time_left_s(&self, at: MonoNs) -> Option<f64> {
+        let all = self.limits.dive_time?;
+        Some((all - self.begun.map_or(DurNs(0), |begun| at.since(begun))).as_secs_f64())
+    }
+
+    fn is_active(&self, kind: ListKind, source: Option<SourceId>) -> bool {
+        self.timers.get(timer::place(kind, source)).is_some_and(|timer| timer.number != 0)
+    }
+
+    /// Applies an observed condition to its situation, and raises or ends its alert when due.
+    pub(super) fn observe(&mut self, at: MonoNs, seen: &Seen, to: &mut Telling<'_>) {
+        let Seen { kind, source, holds, figures } = *seen;
+        let place = timer::place(kind, source);
+        let timing = self.timing.of(kind.class());
+        let Some(timer) = self.timers.get_mut(place) else { return };
+        let number = timer.number;
+        match timer.take(at, holds, timing.hold, timing.off) {
+            Due::Raise => {
+                let number = self.raise_or_hold_again(kind, source, (at, figures), to);
+                if let Some(timer) = self.timers.get_mut(place) {
+                    timer.number = number;
+                }
+            }
+            Due::End => {
+                if let Some(timer) = self.timers.get_mut(place) {
+                    timer.number = 0;
+                }
+                self.rectify(number, at, to);
+            }
+            Due::GoesOn => self.update(number, figures, to, at),
+            Due::Nothing => {}
+        }
+    }
+
+    /// Raises an alert, or reactivates the one that nobody has acknowledged yet: each situation has one
+    /// alert.
+    fn raise_or_hold_again(
+        &mut self,
+        kind: ListKind,
+        source: Option<SourceId>,
+        (at, figures): (MonoNs, Figures),
+        to: &mut Telling<'_>,
+    ) -> u32 {
+        let stretch = figures.stretch();
+        let waits =
+            self.alerts.iter().rev().find(|alert| {
+                (alert.kind, alert.source, alert.state) == (kind, source, AlertState::Rectified)
+            });
+        let Some(number) = waits.map(|alert| alert.number) else {
+            return self.raise(kind, source, (at, figures), stretch, to);
+        };
+        if let Some(alert) = self.get_mut(number) {
+            alert.figures = alert.figures.and_then(figures, kind);
+            alert.stretch = stretch;
+        }
+        self.hold_again(number, at, to);
+        number
+    }
+
+    /// Updates the figures of a continuing alert. A change of place is published.
+    fn update(&mut self, number: u32, figures: Figures, to: &mut Telling<'_>, at: MonoNs) {
+        let Some(alert) = self.get_mut(number) else { return };
+        alert.figures = alert.figures.and_then(figures, alert.kind);
+        let stretch = figures.stretch();
+        if alert.stretch != stretch {
+            alert.stretch = stretch;
+            let alert = *alert;
+            to.tell(&alert, super::AlertChange::Changed, at);
+        }
+    }
+}
+
+impl Figures {
+    /// Figures of a continuing situation: the present ones, except that the highest speed is kept.
+    ///
+    /// Once the pilot has slowed down, the present speed would be one that is allowed.
+    fn and_then(self, now: Self, kind: ListKind) -> Self {
+        match (self, now) {
+            (Self::Advice(before), Self::Advice(figures))
+                if kind == ListKind::TooFast && before.speed_mps.abs() > figures.speed_mps.abs() =>
+            {
+                Self::Advice(AdviceFigures { speed_mps: before.speed_mps, ..figures })
+            }
+            _ => now,
+        }
+    }
+
+    fn stretch(&self) -> Option<(i64, i64)> {
+        match self {
+            Self::CannotSay(stretch) => Some((stretch.from, stretch.to)),
+            _ => None,
+        }
+    }
+}

@@ -1,0 +1,163 @@
+//! Texts of alerts, from the table used for the pilot's other lines. Allocates: for outlets, not for a tick.
+
+use super::{AlertState, Figures, ListKind, ListedAlert};
+use crate::app::SourceInfo;
+use crate::head_descriptions::HeadDescriptions;
+use crate::pilot_text::{
+    actions_text, advice_text, alert_text, cause_text, clock_text, no_position_text, setting_text,
+    speed_text, station,
+};
+use crate::unsure_stretch::{UnsureStretch, helps_text, unsure_text};
+use headrace_coverage::{Sections, Stretch};
+use headrace_geometry::tunnel::Profile;
+
+/// Properties of the dive that the texts need.
+#[derive(Debug, Clone, Copy)]
+pub struct TextContext<'a> {
+    /// Sources, for their ids.
+    pub sources: &'a [SourceInfo],
+    /// Tunnel profile, for clock positions.
+    pub profile: &'a Profile,
+    /// Length of a section, m.
+    pub section_m: f64,
+    /// Target T, m.
+    pub target_m: f64,
+    /// Confidence: standard deviations of a hole by which a verdict must clear the target.
+    pub confidence_sd: f64,
+    /// Sections, for the place to go back to.
+    pub sections: &'a Sections,
+    /// Names and other settings of the heads.
+    pub heads: &'a HeadDescriptions,
+}
+
+impl<'a> TextContext<'a> {
+    /// Surroundings of a dive.
+    pub(crate) fn of(
+        sources: &'a [SourceInfo],
+        profile: &'a Profile,
+        sections: &'a Sections,
+        heads: &'a HeadDescriptions,
+    ) -> Self {
+        Self {
+            sources,
+            profile,
+            section_m: sections.section_m(),
+            target_m: sections.target_m(),
+            confidence_sd: sections.confidence_sd(),
+            sections,
+            heads,
+        }
+    }
+
+    fn unsure(&self, stretch: &Stretch) -> UnsureStretch {
+        UnsureStretch::from_sections(stretch, self.section_m, self.confidence_sd)
+    }
+
+    fn name(&self, source: usize) -> String {
+        self.sources.get(source).map_or_else(String::new, |source| source.id.clone())
+    }
+}
+
+impl ListedAlert {
+    /// Beginning and end of its stretch, m.
+    pub fn bounds_m(&self, section_m: f64) -> (Option<f64>, Option<f64>) {
+        match self.stretch {
+            Some((from, to)) => (Some(from as f64 * section_m), Some(to as f64 * section_m)),
+            None => (self.x_m, None),
+        }
+    }
+
+    /// Text of the problem.
+    pub fn text(&self, around: &TextContext<'_>) -> String {
+        let name = self.source.map(|source| around.name(source.index())).unwrap_or_default();
+        let place = match self.bounds_m(around.section_m) {
+            (Some(from_m), Some(to_m)) => format!("{} to {}", station(from_m), station(to_m)),
+            _ => String::new(),
+        };
+        match (self.kind, &self.figures) {
+            (_, Figures::Missed(causes, arc_m, _)) => {
+                let clock = clock_text(around.profile, *arc_m);
+                format!("MISSED {place}, at {clock}: {}", cause_text(causes, around.heads))
+            }
+            (_, Figures::CannotSay(stretch)) => {
+                format!("CAN'T SAY {place}: {}", unsure_text(&around.unsure(stretch)))
+            }
+            (ListKind::TooFast, Figures::Advice(figures)) => {
+                // The present speed is on every screen.
+                format!("TOO FAST: up to {:.2} m/s", figures.speed_mps.abs())
+            }
+            (ListKind::TurnFails, Figures::Advice(figures)) => {
+                format!(
+                    "THIS TURN MISSES: heads {:.0} degrees out of phase",
+                    figures.phase_error_rad.to_degrees().abs()
+                )
+            }
+            (_, Figures::Advice(figures)) => advice_text(figures, around.profile, around.heads),
+            (_, Figures::MissingSampleFinder(lacking)) => no_position_text(*lacking).to_owned(),
+            (_, Figures::Error(error_m, _)) => format!("CAN'T SAY: position ±{error_m:.2} m"),
+            (kind, Figures::Deviation(x_m, off_m)) => match kind.of_dive() {
+                Some(of_dive) => place_first(&alert_text(of_dive, &name, *x_m, *off_m), *x_m),
+                None => String::new(),
+            },
+            (_, Figures::Setting(doubt, x_m)) => {
+                let name = |source: u16| around.name(source.into());
+                place_first(&setting_text(doubt, *x_m, &name), *x_m)
+            }
+            (ListKind::CableLeft, Figures::Left(left_m)) => format!("{left_m:.0} m of cable left"),
+            (ListKind::TimeLeft, Figures::Left(left_s)) => match left_s / 60.0 {
+                min if min < 0.0 => format!("{:.0} min over the dive's time", -min),
+                min => format!("{min:.0} min of the dive left"),
+            },
+            (_, Figures::Left(left_pct)) => format!("battery at {left_pct:.0} %"),
+            (kind, Figures::None) => plain_text(kind, &name, &place),
+        }
+    }
+
+    /// Text of the action; empty if there is none, and once the alert has ended.
+    pub fn advice(&self, around: &TextContext<'_>) -> String {
+        if self.state != AlertState::Active {
+            return String::new();
+        }
+        match (self.kind, &self.figures) {
+            (_, Figures::Missed(causes, _, v_max_mps)) => {
+                let from_m = self.bounds_m(around.section_m).0.unwrap_or(0.0);
+                let back_to_m = around.sections.back_to_m(from_m);
+                actions_text(&causes.actions(), back_to_m, causes.again_mps(*v_max_mps), around.heads)
+            }
+            (_, Figures::CannotSay(stretch)) => helps_text(&around.unsure(stretch)),
+            (ListKind::TooFast, Figures::Advice(figures)) => speed_text("at most", figures.v_max_mps),
+            (ListKind::TurnFails, Figures::Advice(figures)) => speed_text("go", figures.v_max_mps),
+            (ListKind::NoPosition, _) => "hold still".to_owned(),
+            (ListKind::PositionDoubtful, Figures::Error(_, true)) => "stand still for 30 s".to_owned(),
+            (ListKind::PositionDoubtful, _) => {
+                "go slower, or pass it again with a more certain position".to_owned()
+            }
+            (ListKind::NoSonar | ListKind::NoData, _) => "stop".to_owned(),
+            (ListKind::NotRecorded, _) => "free the disk, or change the medium".to_owned(),
+            (ListKind::CableLeft | ListKind::TimeLeft | ListKind::BatteryLeft, _) => "turn back".to_owned(),
+            _ => String::new(),
+        }
+    }
+}
+
+fn plain_text(kind: ListKind, name: &str, place: &str) -> String {
+    match kind {
+        ListKind::SensorSilent => format!("{name} silent"),
+        ListKind::SensorStalled => format!("{name} doesn't turn"),
+        ListKind::SensorHung => format!("{name} hangs: it repeats one reading"),
+        ListKind::SensorDeaf => format!("{name} detects no wall"),
+        ListKind::NoSonar => "NO SONAR: no returns".to_owned(),
+        ListKind::NoData => "NO DATA: nothing from any sensor".to_owned(),
+        ListKind::NotRecorded => "NOT RECORDED: the recording fails, or its disk is too slow".to_owned(),
+        ListKind::Missed => format!("MISSED {place}"),
+        ListKind::TooFast => "TOO FAST".to_owned(),
+        kind => kind.as_str().replace('_', " "),
+    }
+}
+
+/// Text of a line that begins with `ch` and its place.
+fn place_first(text: &str, x_m: f64) -> String {
+    let place = station(x_m);
+    let said = text.strip_prefix(&format!("ch {place}")).unwrap_or(text).trim_start();
+    format!("{place}: {said}")
+}

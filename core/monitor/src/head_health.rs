@@ -1,0 +1,189 @@
+//! Head health: whether a turning head detects the wall at all, judged by its returns.
+
+use serde::{Deserialize, Serialize};
+
+use headrace_geometry::math::{self, TAU};
+
+/// Angle without a return after which a head is deaf, radians: a whole turn.
+///
+/// Absorbing walls and side tunnels cover less than that.
+const DEAF_RAD: f64 = TAU;
+/// Averaging angle for the share of returns that aren't from the wall, radians.
+const ELSEWHERE_RAD: f64 = TAU / 2.0;
+/// Angle with one range after which a head is stuck at it, radians, and the design's variation needed
+/// meanwhile, m.
+const STUCK_RAD: f64 = TAU / 2.0;
+const STUCK_M: f64 = 0.3;
+/// Share of returns off the design above which a head detects no wall, and limit for another head's share.
+///
+/// The first applies only while another head's share is below the second.
+const ELSEWHERE: [f64; 2] = [0.85, 0.5];
+
+/// Health of a head; part of the loop's state.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+pub struct HeadHealth {
+    /// Angle of the last ping, radians.
+    last_rad: f64,
+    /// Angle turned since the last return, radians.
+    unheard_rad: f64,
+    /// Angle with returns, radians, up to a turn.
+    heard_rad: f64,
+    /// Share of its latest returns that are off the design.
+    elsewhere: f64,
+    /// Successive returns of one range.
+    same: SameRange,
+}
+
+/// Successive returns of one range, identical to the last bit.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+struct SameRange {
+    range_m: f64,
+    /// Angle turned meanwhile, radians.
+    turned_rad: f64,
+    /// Least and largest deviation from the design meanwhile, m.
+    off_m: [f64; 2],
+}
+
+impl SameRange {
+    fn add(&mut self, heard: Heard, turned_rad: f64) {
+        let Heard { range_m, off_m, .. } = heard;
+        let is_same = self.range_m.to_bits() == range_m.to_bits();
+        let [least_m, most_m] = self.off_m;
+        *self = if is_same {
+            let turned_rad = self.turned_rad + turned_rad;
+            Self { range_m, turned_rad, off_m: [least_m.min(off_m), most_m.max(off_m)] }
+        } else {
+            Self { range_m, turned_rad: 0.0, off_m: [off_m; 2] }
+        };
+    }
+
+    /// Whether half a turn has one range although the wall's distance varies.
+    fn is_stuck(&self) -> bool {
+        self.turned_rad >= STUCK_RAD && self.off_m[1] - self.off_m[0] > STUCK_M
+    }
+}
+
+/// A return of a head.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Heard {
+    /// Range that the head reports, m.
+    pub range_m: f64,
+    /// Deviation of its place from the design, m.
+    pub off_m: f64,
+    /// It agrees with the design.
+    pub is_wall: bool,
+}
+
+impl HeadHealth {
+    /// Adds a ping at an angle, with its return if any.
+    ///
+    /// Allocates: never.
+    pub fn add(&mut self, angle_rad: f64, heard: Option<Heard>) {
+        let turned_rad = math::wrap_signed(angle_rad - self.last_rad, TAU).abs();
+        self.last_rad = angle_rad;
+        let Some(heard) = heard else {
+            self.unheard_rad += turned_rad;
+            return;
+        };
+        if self.hears_nothing() {
+            // The measurement restarts.
+            *self = Self { last_rad: angle_rad, ..Self::default() };
+        }
+        self.unheard_rad = 0.0;
+        self.heard_rad = (self.heard_rad + turned_rad).min(TAU);
+        let weight = (turned_rad / ELSEWHERE_RAD).min(1.0);
+        self.elsewhere += weight * (f64::from(u8::from(!heard.is_wall)) - self.elsewhere);
+        self.same.add(heard, turned_rad);
+    }
+
+    /// Whether a whole turn gave no return.
+    pub fn hears_nothing(&self) -> bool {
+        self.unheard_rad >= DEAF_RAD
+    }
+
+    /// Whether the head detects no wall at all.
+    ///
+    /// It is deaf if a whole turn gave no return, or half a turn gave one range although the wall's distance
+    /// varies. It is also deaf if nearly all its returns are off the design while another head detects the
+    /// wall, by their [`HeadHealth::elsewhere`]. If all heads see something else, the position or the design is
+    /// wrong.
+    pub fn is_deaf(&self, mut others: impl Iterator<Item = f64>) -> bool {
+        let [most, least] = ELSEWHERE;
+        self.hears_nothing()
+            || self.same.is_stuck()
+            || self.elsewhere > most && others.any(|elsewhere| elsewhere < least)
+    }
+
+    /// Share of its latest returns that are off the design, from 0 to 1.
+    ///
+    /// It is 1 before a whole turn with returns, and after a whole turn without any.
+    pub fn elsewhere(&self) -> f64 {
+        let is_known = self.heard_rad >= TAU && !self.hears_nothing();
+        if is_known { self.elsewhere } else { 1.0 }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const STEP_RAD: f64 = 0.9 * TAU / 360.0;
+
+    /// A head that turns for this many pings and detects the wall, something else, or nothing.
+    fn hearing(pings: u32, is_wall: impl Fn(u32) -> Option<bool>) -> HeadHealth {
+        let mut hearing = HeadHealth::default();
+        for ping in 0..pings {
+            let heard =
+                is_wall(ping).map(|is_wall| Heard { range_m: 5.0 + f64::from(ping), off_m: 0.0, is_wall });
+            hearing.add(f64::from(ping) * STEP_RAD, heard);
+        }
+        hearing
+    }
+
+    #[test]
+    fn head_is_deaf_after_a_turn_without_returns() {
+        let from_500 = |pings| hearing(pings, |ping| (ping < 500).then_some(true));
+        assert!(!from_500(890).is_deaf(std::iter::empty()));
+        assert!(from_500(901).is_deaf(std::iter::empty()));
+        // A single return ends it.
+        let heard_again = hearing(902, |ping| (ping < 500 || ping == 901).then_some(true));
+        assert!(!heard_again.is_deaf(std::iter::empty()));
+        // If three quarters of each turn give no return, that is a side tunnel or an absorbing wall.
+        let side = hearing(4000, |ping| (ping % 400 < 100).then_some(true));
+        assert!(!side.is_deaf(std::iter::empty()));
+    }
+
+    #[test]
+    fn head_off_the_design_is_deaf_if_another_detects_the_wall() {
+        let elsewhere = hearing(1200, |ping| Some(ping < 400));
+        let [hears, does_not] = [hearing(1200, |_| Some(true)), hearing(1200, |_| Some(false))];
+        assert!(elsewhere.is_deaf([does_not.elsewhere(), hears.elsewhere()].into_iter()));
+        assert!(
+            !elsewhere.is_deaf([does_not.elsewhere()].into_iter()),
+            "the position or the design is wrong"
+        );
+        assert!(!elsewhere.is_deaf(std::iter::empty()), "there is no other head");
+        assert!(!hears.is_deaf([hears.elsewhere()].into_iter()));
+        let begins = hearing(100, |_| Some(true));
+        assert!(!elsewhere.is_deaf([begins.elsewhere()].into_iter()), "the other head isn't known yet");
+        // A rock and a niche of a third of the turn.
+        let rock = hearing(4000, |ping| Some(ping % 400 >= 130));
+        assert!(!rock.is_deaf([hears.elsewhere()].into_iter()));
+    }
+
+    #[test]
+    fn constant_range_is_stuck_if_the_wall_distance_varies() {
+        let stuck = |pings: u32, spread_m: f64| {
+            let mut hearing = HeadHealth::default();
+            for ping in 0..pings {
+                let angle_rad = f64::from(ping) * STEP_RAD;
+                let off_m = spread_m / 2.0 * math::cos(angle_rad);
+                hearing.add(angle_rad, Some(Heard { range_m: 5.0, off_m, is_wall: true }));
+            }
+            hearing.is_deaf(std::iter::empty())
+        };
+        assert!(stuck(202, 0.4) && !stuck(199, 0.4));
+        // In the centre of a round pipe, and nearly there.
+        assert!(!stuck(4000, 0.0) && !stuck(4000, 0.2));
+    }
+}

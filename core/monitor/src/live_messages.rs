@@ -1,0 +1,396 @@
+//! Live messages about a dive: each situation once, neighbours as one stretch, and its end once that is
+//! known.
+//!
+//! The terminal's lines and those of `--json-lines` are made from them. Allocates: for outlets, not for a
+//! tick.
+
+use serde::Serialize;
+
+use super::alert_list::{AlertChange, ListedAlertJson, NoteJson};
+use super::live_state::{LiveMetres, LiveState};
+use super::messages::Notice;
+use super::pilot_text::{Missed, alert_text, setting_text};
+use super::run::Loop;
+pub use super::unsure_stretch::UnsureStretch;
+use headrace_coverage::{
+    Cause, Causes, Evidence, Run, RunChange, RunId, Section, Sections, Stretch, Unsure, Verdict,
+};
+use headrace_geometry::math::TAU;
+use headrace_geometry::time::{DurNs, MonoNs};
+
+/// Interval of the messages on coverage extent and metres by verdict, in data time.
+const WAY_EVERY: DurNs = DurNs(60_000_000_000);
+
+/// Length of a run with an unreported cause from which that cause is reported, m.
+const LASTS_M: f64 = 1.0;
+
+/// A live message. The field names are the contract of `--json-lines`. Lengths are in m.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+#[serde(tag = "type", rename_all = "snake_case")]
+pub enum LiveMessage {
+    /// Sections were missed. It is repeated if a run continues for another cause, from where that cause
+    /// begins.
+    Flag {
+        /// Number of the run.
+        run: u32,
+        /// Beginning.
+        from_m: f64,
+        /// Main cause.
+        cause: Cause,
+        /// All causes.
+        causes: Causes,
+        /// Figures for its text.
+        #[serde(skip)]
+        missed: Missed,
+    },
+    /// Ends of the last flagged run.
+    FlagEnds {
+        /// Number of the run.
+        run: u32,
+        /// Beginning.
+        from_m: f64,
+        /// End.
+        to_m: f64,
+        /// Metres of it that fail.
+        failed_m: f64,
+    },
+    /// A missed stretch was passed again, and none of it fails any more.
+    Cleared {
+        /// Number of the run that was flagged.
+        run: u32,
+        /// Beginning.
+        from_m: f64,
+        /// End.
+        to_m: f64,
+    },
+    /// A stretch without a verdict has begun.
+    CannotSay(UnsureStretch),
+    /// Ends of a stretch without a verdict.
+    CannotSayEnds(UnsureStretch),
+    /// Not all heads have passed the place where the vehicle began or turned back, and the vehicle is well
+    /// beyond it.
+    NotInspected(UnsureStretch),
+    /// An alert about the dive as a whole.
+    Alert {
+        /// Kind.
+        kind: &'static str,
+        /// Distrusted head.
+        head: Option<String>,
+        /// Place.
+        x_m: f64,
+        /// Text.
+        text: String,
+    },
+    /// An alert of the list has changed.
+    AlertChange {
+        /// Kind of change.
+        change: AlertChange,
+        /// The alert as it was at that time.
+        alert: Box<ListedAlertJson>,
+    },
+    /// A note was added.
+    Note(NoteJson),
+    /// Present coverage extent.
+    Way {
+        /// Beginning.
+        from_m: f64,
+        /// End.
+        to_m: f64,
+        /// Metres by verdict.
+        metres: LiveMetres,
+    },
+}
+
+/// Converts the loop's notices to live messages.
+#[derive(Debug, Default)]
+pub struct LiveMessages {
+    /// Last flagged run with its reported causes, until its end is reported.
+    run: Option<(RunId, Causes)>,
+    /// Stretches reported as missed, until none of them fails any more.
+    missed: Vec<ReportedMiss>,
+    /// Last reported unsure stretch, until its end is reported.
+    unsure: Option<Stretch>,
+    /// It was reported as one in which the error matters most.
+    told_as_error: bool,
+    /// Stretches with reported ends.
+    told: Vec<Stretch>,
+    /// Sections at an end of the coverage extent, until the vehicle is well beyond.
+    at_ends: Option<Stretch>,
+    way_told: Option<MonoNs>,
+}
+
+/// Sections reported as missed, from the first to before the last that ever failed.
+#[derive(Debug, Clone, Copy)]
+struct ReportedMiss {
+    run: RunId,
+    from: i64,
+    to: i64,
+}
+
+impl ReportedMiss {
+    fn meets(&self, run: &Run) -> bool {
+        run.from < self.to && run.to > self.from
+    }
+}
+
+impl LiveMessages {
+    /// Resets all state after a jump of the playback.
+    pub fn forget(&mut self) {
+        *self = Self::default();
+    }
+
+    /// Processes a notice, and calls `tell` with the messages that follow from it.
+    pub fn hear(&mut self, notice: &Notice, dive: &Loop, tell: &mut dyn FnMut(LiveMessage)) {
+        match notice {
+            Notice::Advice(_) => {}
+            Notice::Listed { change, at, alert } => {
+                let alert = Box::new(alert.json(&dive.surroundings(), *at));
+                tell(LiveMessage::AlertChange { change: *change, alert });
+            }
+            Notice::Note(note) => tell(LiveMessage::Note(note.into())),
+            Notice::Section { section, .. } => {
+                let sections = &dive.coverage().sections;
+                self.close_run_at(*section, sections, tell);
+                self.note_unsure(*section, sections, tell);
+            }
+            Notice::Run { id, change, .. } => self.run(*id, *change, dive, tell),
+            Notice::Alert(kind, source) => {
+                let Some(alert) = dive.alerts().get(*kind, *source) else { return };
+                let name = |source: u16| {
+                    dive.sources().get(usize::from(source)).map_or_else(String::new, |info| info.id.clone())
+                };
+                let head = source.map(|source| name(source.0));
+                let text = if let Some(doubt) = &alert.setting {
+                    setting_text(doubt, alert.x_m, &name)
+                } else {
+                    let head = head.clone().unwrap_or_default();
+                    alert_text(alert.kind, &head, alert.x_m, alert.worst_m)
+                };
+                tell(LiveMessage::Alert { kind: alert.kind.as_str(), head, x_m: alert.x_m, text });
+            }
+        }
+    }
+
+    /// Reports what is due by the live state, after every tick.
+    pub fn tick(&mut self, state: &LiveState, dive: &Loop, tell: &mut dyn FnMut(LiveMessage)) {
+        let Some(at) = state.at else { return };
+        let sections = &dive.coverage().sections;
+        // Counted from the first update, when there is nothing to report.
+        let since = *self.way_told.get_or_insert(at);
+        if at.since(since).0.abs() >= WAY_EVERY.0 && state.metres.way_m() > 0.0 {
+            self.way_told = Some(at);
+            let range = sections.sections_of(dive.coverage().frontier.way());
+            let (from_m, to_m) = (sections.bounds_m(range.start).0, sections.bounds_m(range.end).0);
+            tell(LiveMessage::Way { from_m, to_m, metres: state.metres });
+        }
+        // Diameter of a circle with the same perimeter.
+        let width_m = 2.0 * dive.mission().profile.perimeter_m() / TAU;
+        if let (Some(ends), Some(x_m)) = (self.at_ends, state.chainage_m) {
+            let off_m = (sections.bounds_m(ends.from).0 - x_m).max(x_m - sections.bounds_m(ends.to).0);
+            if off_m > width_m {
+                self.tell_ends(sections, tell);
+            }
+        }
+    }
+
+    /// Reports the ends of open stretches at the end of a dive.
+    pub fn end(&mut self, sections: &Sections, tell: &mut dyn FnMut(LiveMessage)) {
+        self.close_run(sections, tell);
+        self.close_unsure(sections, tell);
+    }
+
+    fn tell_ends(&mut self, sections: &Sections, tell: &mut dyn FnMut(LiveMessage)) {
+        let Some(ends) = self.at_ends.take() else { return };
+        // Some sections may have been inspected since.
+        let still = (ends.from..ends.to).filter_map(|index| sections.unsure(index));
+        let mut still = still.filter(|here| here.why == Unsure::NotInspected);
+        let Some(mut all) = still.next() else { return };
+        for here in still {
+            if !all.join(&here, sections.section_m()) {
+                break;
+            }
+        }
+        self.told.push(all);
+        tell(LiveMessage::NotInspected(UnsureStretch::of(&all, sections)));
+    }
+
+    fn note_unsure(&mut self, section: i64, sections: &Sections, tell: &mut dyn FnMut(LiveMessage)) {
+        let section_m = sections.section_m();
+        // A section at an end of the extent is reported later, if it remains unsure.
+        let is_settled = sections.get(section).is_some_and(|section| section.settled);
+        let lasts = |here: &Stretch| is_settled || here.why == Unsure::NotInspected;
+        let Some(here) = sections.unsure(section).filter(lasts) else {
+            let is_judged = sections.get(section).is_some_and(|section| section.verdict != Verdict::Open);
+            let is_over = |last: &Stretch| last.is_beyond(section..section + 1, section_m);
+            if is_judged && self.unsure.as_ref().is_some_and(is_over) {
+                self.close_unsure(sections, tell);
+            }
+            return;
+        };
+        let is_told = |told: &Stretch| told.why == here.why && (told.from..told.to).contains(&section);
+        // The pilot is on the way back to a missed stretch, so an intermediate result of half a pass is not
+        // reported.
+        let is_missed =
+            |told: &ReportedMiss| here.why != Unsure::NotInspected && (told.from..told.to).contains(&section);
+        if self.told.iter().any(is_told) || self.missed.iter().any(is_missed) {
+            return;
+        }
+        if here.why == Unsure::NotInspected {
+            if !self.at_ends.as_mut().is_some_and(|ends| ends.join(&here, section_m)) {
+                self.tell_ends(sections, tell);
+                self.at_ends = Some(here);
+            }
+            return;
+        }
+        if let Some(last) = &mut self.unsure
+            && (is_told(last) || last.join(&here, section_m))
+        {
+            // The reason of the first sections may differ from that of most.
+            if self.told_as_error && !last.is_mostly_error() {
+                self.told_as_error = false;
+                tell(LiveMessage::CannotSay(UnsureStretch::of(last, sections)));
+            }
+            return;
+        }
+        self.close_unsure(sections, tell);
+        (self.unsure, self.told_as_error) = (Some(here), here.is_mostly_error());
+        tell(LiveMessage::CannotSay(UnsureStretch::of(&here, sections)));
+    }
+
+    fn close_unsure(&mut self, sections: &Sections, tell: &mut dyn FnMut(LiveMessage)) {
+        if let Some(stretch) = self.unsure.take() {
+            self.told.push(stretch);
+            tell(LiveMessage::CannotSayEnds(UnsureStretch::of(&as_it_is(&stretch, sections), sections)));
+        }
+    }
+
+    /// Reports the end of the last flagged run once a section beyond it doesn't fail.
+    fn close_run_at(&mut self, section: i64, sections: &Sections, tell: &mut dyn FnMut(LiveMessage)) {
+        // An open section may still join the run.
+        let other = |section: &Section| !section.is_flagged() && section.verdict != Verdict::Open;
+        let ends = sections.get(section).is_some_and(other);
+        let run = self.run.and_then(|(id, _)| sections.runs().get(id));
+        if ends && run.is_some_and(|run| sections.runs().is_beyond(run, section)) {
+            self.close_run(sections, tell);
+        }
+    }
+
+    fn close_run(&mut self, sections: &Sections, tell: &mut dyn FnMut(LiveMessage)) {
+        let Some((id, _)) = self.run.take() else { return };
+        let Some(run) = sections.runs().get(id) else { return };
+        let (from_m, to_m) = bounds_m(run, sections);
+        let failed_m = f64::from(run.failed) * sections.section_m();
+        tell(LiveMessage::FlagEnds { run: id.0, from_m, to_m, failed_m });
+    }
+
+    fn run(&mut self, id: RunId, change: RunChange, dive: &Loop, tell: &mut dyn FnMut(LiveMessage)) {
+        let sections = &dive.coverage().sections;
+        let Some(run) = sections.runs().get(id) else { return };
+        match change {
+            // A part of a reported stretch is no new stretch.
+            RunChange::Raised if self.missed.iter().any(|told| told.meets(run)) => {}
+            RunChange::Raised => {
+                self.close_run(sections, tell);
+                let Some(evidence) = sections.evidence_of(run, run.cause) else { return };
+                self.run = Some((id, evidence.causes));
+                self.missed.push(ReportedMiss { run: id, from: run.from, to: run.to });
+                tell(flag(id, run, run.from, &evidence, dive));
+            }
+            RunChange::Changed => {
+                self.widen(run);
+                self.tell_other_cause(id, run, dive, tell);
+            }
+            RunChange::Cleared => self.clear(run, sections, tell),
+            RunChange::Merged => {
+                if let (Some((last, _)), Some(kept)) = (self.run.as_mut(), run.merged_into)
+                    && *last == id
+                {
+                    *last = kept;
+                }
+            }
+        }
+    }
+
+    /// Merges a grown run into the reported stretches that it meets.
+    fn widen(&mut self, run: &Run) {
+        let mut met = self.missed.iter().filter(|told| told.meets(run));
+        let Some(mut whole) = met.next().copied() else { return };
+        (whole.from, whole.to) = (whole.from.min(run.from), whole.to.max(run.to));
+        for other in met {
+            (whole.from, whole.to) = (whole.from.min(other.from), whole.to.max(other.to));
+        }
+        self.missed.retain(|told| !told.meets(run));
+        self.missed.push(whole);
+    }
+
+    /// Reports the end of a missed stretch with its reported ends, and then its parts without a verdict.
+    fn clear(&mut self, run: &Run, sections: &Sections, tell: &mut dyn FnMut(LiveMessage)) {
+        let Some(at) = self.missed.iter().position(|told| told.meets(run)) else { return };
+        let Some(told) = self.missed.get(at).copied() else { return };
+        if sections.runs().all().iter().any(|other| other.is_open() && told.meets(other)) {
+            return;
+        }
+        self.missed.swap_remove(at);
+        let (from_m, to_m) = (sections.bounds_m(told.from).0, sections.bounds_m(told.to).0);
+        tell(LiveMessage::Cleared { run: told.run.0, from_m, to_m });
+        for section in told.from..told.to {
+            self.note_unsure(section, sections, tell);
+        }
+        self.close_unsure(sections, tell);
+    }
+
+    /// Reports a run again once a metre of it fails for an unreported cause.
+    ///
+    /// Following the earlier advice may still miss that wall.
+    fn tell_other_cause(&mut self, id: RunId, run: &Run, dive: &Loop, tell: &mut dyn FnMut(LiveMessage)) {
+        let sections = &dive.coverage().sections;
+        let Some((_, told)) = self.run.as_mut().filter(|(last, _)| *last == id) else { return };
+        let lasts = |cause: &Cause| f64::from(run.count(*cause)) * sections.section_m() >= LASTS_M;
+        let Some(cause) = Cause::ALL.into_iter().find(|cause| !told.has(*cause) && lasts(cause)) else {
+            return;
+        };
+        let has = |index: i64| {
+            let evidence = sections.get(index).filter(|section| section.is_flagged())?.evidence?;
+            evidence.causes.has(cause).then_some((index, evidence))
+        };
+        let Some((index, evidence)) = (run.from..run.to).find_map(has) else { return };
+        *told = told.union(evidence.causes);
+        tell(flag(id, run, index, &evidence, dive));
+    }
+}
+
+/// A stretch by the present state of its sections, with its reported ends; as reported if none is unsure any
+/// more.
+fn as_it_is(told: &Stretch, sections: &Sections) -> Stretch {
+    let each = (told.from..told.to).filter_map(|index| sections.unsure(index));
+    let mut each = each.filter(|here| here.why == told.why);
+    let Some(mut now) = each.next() else { return *told };
+    (now.from, now.to) = (told.from, told.to);
+    for here in each {
+        // All sections are within these bounds.
+        if !now.join(&here, sections.section_m()) {
+            break;
+        }
+    }
+    now
+}
+
+/// Message for a run from one of its sections on.
+fn flag(id: RunId, run: &Run, section: i64, evidence: &Evidence, dive: &Loop) -> LiveMessage {
+    let sections = &dive.coverage().sections;
+    let from_m = sections.bounds_m(section).0;
+    let hole = sections.get(section).and_then(|section| section.hole).unwrap_or(run.worst.1);
+    let missed = Missed {
+        start_m: from_m,
+        back_to_m: sections.back_to_m(from_m),
+        figures: evidence.into(),
+        hole_arc_m: hole.arc_m,
+        target_m: sections.target_m(),
+        v_max_mps: dive.live_state().v_max_mps().unwrap_or(0.0),
+    };
+    LiveMessage::Flag { run: id.0, from_m, cause: evidence.cause, causes: evidence.causes, missed }
+}
+
+fn bounds_m(run: &Run, sections: &Sections) -> (f64, f64) {
+    (sections.bounds_m(run.from).0, sections.bounds_m(run.to - 1).1)
+}

@@ -1,0 +1,32 @@
+//! Alternatives: verdicts on a dive's samples for other targets and section lengths.
+
+use headrace_coverage::Verdict;
+use serde::Serialize;
+
+use super::run::Loop;
+
+/// Metres by verdict for another target, or in sections of another length.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct OtherTargetReport {
+    /// Target T, m.
+    pub target_m: f64,
+    /// Length of a section, m.
+    pub section_m: f64,
+    /// Metres of sections that would pass.
+    pub pass_m: f64,
+    /// Metres that would fail.
+    pub fail_m: f64,
+    /// Metres undecided within the error of the hole.
+    pub cannot_say_m: f64,
+    /// Metres that would still be open.
+    pub open_m: f64,
+    /// Metres that not all heads would have passed.
+    pub not_inspected_m: f64,
+}
+
+impl Loop {
+    /// Present verdicts for another target, by section, of those whose hole has been measured.
+    pub fn verdicts_at(&self, target_m: f64) -> Vec<(i64, Verdict)> {
+        self.coverage().sections.verdicts_at(target_m, &self.outlook()).collect()
+    }
+}

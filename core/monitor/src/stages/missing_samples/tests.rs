@@ -1,0 +1,314 @@
+use super::*;
+use crate::entities::{Head, HeadFrontier, HeadSweep, HiddenAngles, Mounted};
+use crate::fixtures::{coverage, mount, pipe};
+use bevy_ecs::system::SystemState;
+use bevy_ecs::world::World;
+use headrace_geometry::frames::{Point3, Rot};
+use headrace_geometry::math;
+use headrace_sampling::layout::HeadLayout;
+use headrace_sensor::device::{SensorInfo, SensorKind};
+use headrace_sensor::reading::SourceId;
+
+/// A ping made without a fix, with or without a return.
+fn away(at_ms: u64, outcome: Outcome) -> PlacedPing {
+    let at = MonoNs(at_ms * 1_000_000);
+    PlacedPing {
+        head: 1,
+        received: at,
+        valid_at: at,
+        fix: None,
+        reach: None,
+        single_step: true,
+        new_sweep: false,
+        standing: false,
+        outcome,
+        angle_rad: 0.1,
+        hidden: Hidden::No,
+        longest_m: 5.0,
+        source: SourceId(3),
+        origin: None,
+    }
+}
+
+/// An angle counts as hidden once seven in ten of its pings get no return. Only the latest hundreds of pings
+/// count.
+#[test]
+fn angle_is_hidden_if_most_pings_get_no_return() {
+    let hides = |pings: [u32; 2]| {
+        let mut turning = Turning::default();
+        for (count, is_lost) in pings.into_iter().zip([true, false]) {
+            (0..count).for_each(|_| turning.note_hidden(true, is_lost));
+        }
+        turning.note_hidden(false, false);
+        turning.is_hidden()
+    };
+    assert!(hides([0, 0]), "hidden until there is evidence");
+    assert!(hides([70, 30]) && !hides([69, 31]));
+    assert!(!hides([0, 3]) && hides([1, 0]));
+    assert!(!hides([10_000, 400]), "the last hundreds of pings got returns");
+}
+
+/// A simulated head loses as often, and in runs as long, as while it was heard. The same pings give the same
+/// losses.
+#[test]
+fn simulated_losses_match_rate_and_run_length() {
+    let lost = |rate: LossRate| {
+        let mut turning = Turning::default();
+        (0..40_000).map(|k| turning.would_lose(MonoNs(k * 20_000_000), rate)).collect::<Vec<bool>>()
+    };
+    for (share, after_lost) in [(0.4, 0.4), (0.4, 0.95), (0.02, 0.5)] {
+        let rate = LossRate { share, after_lost };
+        let pings = lost(rate);
+        let count = pings.iter().filter(|lost| **lost).count() as f64;
+        let again = pings.windows(2).filter(|pair| pair[0] && pair[1]).count() as f64;
+        assert!((count / 40_000.0 - share).abs() < 0.1 * share + 0.01, "{rate:?}: {count}");
+        assert!((again / count - after_lost).abs() < 0.05, "{rate:?}: {again} of {count}");
+        assert_eq!(pings, lost(rate));
+    }
+    assert!(lost(LossRate::default()).iter().all(|lost| !lost));
+    assert!(lost(LossRate::independent(1.0)).iter().all(|lost| *lost));
+}
+
+#[test]
+fn pings_without_a_fix_are_kept_up_to_capacity_and_overflow_is_recorded() {
+    let (mut lacking, mut lacks) = (MissingSampleFinder::default(), MissingSamples::default());
+    let unplaced = Outcome::Unplaced(headrace_fusion::NoFix::Chainage);
+    let missing = Outcome::Lost(Loss::Missing, None);
+    for (k, outcome) in (0..ROOM).zip([unplaced, missing].into_iter().cycle()) {
+        note_ping(&mut lacking, &away(k as u64, outcome), &mut lacks);
+    }
+    assert_eq!((lacking.away.len(), lacking.forgot), (ROOM, false));
+    let [first, second] = [lacking.away[0], lacking.away[1]];
+    assert_eq!((first.is_lost, second.is_lost), (false, true), "a return without a fix isn't lost");
+    assert!([first, second].iter().all(|ping| ping.why == Causes::of(Cause::PositionLost) && ping.head == 1));
+    note_ping(&mut lacking, &away(ROOM as u64, unplaced), &mut lacks);
+    assert_eq!((lacking.away.len(), lacking.forgot), (ROOM, true), "a forgotten stretch is recorded");
+}
+
+fn lacks_of(lacks: &MissingSamples) -> Vec<MissingSample> {
+    lacks.between(f64::NEG_INFINITY, f64::INFINITY).copied().collect()
+}
+
+fn all_of(causes: &[Cause]) -> Causes {
+    causes.iter().fold(Causes::default(), |all, cause| all.with(*cause))
+}
+
+/// Losses at angles assumed to be hidden are due to occlusion, unless the wall is detected there after all.
+#[test]
+fn loss_at_hidden_angle_is_missing_once_others_return() {
+    let (mut lacking, mut lacks) = (MissingSampleFinder::default(), MissingSamples::default());
+    let aim = Some(Aim { x_m: 3.0, arc_m: 2.0 });
+    let lost = |loss: Loss| away(5, Outcome::Lost(loss, aim));
+    let mut causes = |pings: &[PlacedPing]| {
+        for ping in pings {
+            note_ping(&mut lacking, ping, &mut lacks);
+        }
+        lacks_of(&lacks).last().map(|lack| lack.why)
+    };
+    assert_eq!(causes(&[lost(Loss::Missing)]), Some(Causes::of(Cause::MissingReturns)));
+    assert_eq!(causes(&[lost(Loss::OutOfRange)]), Some(Causes::of(Cause::OutOfRange)));
+    assert_eq!(causes(&[lost(Loss::Occluded); 10]), Some(Causes::of(Cause::Occluded)));
+    let point = Point3::new(3.0, 3.0, 3.0);
+    let heard = PlacedPing { hidden: Hidden::Yes, ..away(5, Outcome::Sample { point, arc_m: 2.0 }) };
+    causes(&[heard; 40]);
+    assert_eq!(causes(&[lost(Loss::Occluded)]), Some(Causes::of(Cause::MissingReturns)));
+    assert_eq!(causes(&[lost(Loss::OutOfRange)]), Some(Causes::of(Cause::OutOfRange)));
+    let before = lacks_of(&lacks).len();
+    assert_eq!(before, 14, "samples are not missing");
+    note_ping(&mut lacking, &PlacedPing { standing: true, ..lost(Loss::Missing) }, &mut lacks);
+    assert_eq!(lacks_of(&lacks).len(), before, "a stalled head misses nothing at its own angle");
+    assert!(lacking.stalled.has(1) && !lacking.stalled.has(0));
+}
+
+/// To the left, with the wall 3 m away and the vehicle turned to the left by 0.1 rad, the beam meets it 3 tan
+/// 0.1 m astern.
+#[test]
+fn lost_ping_is_missing_at_its_aim_with_all_causes() {
+    let profile = pipe();
+    let [y_m, z_m] = profile.reference();
+    let attitude = Rot::from_roll_pitch_yaw(0.0, 0.0, 0.1);
+    let pose = Pose { position: Point3::new(10.0, y_m, z_m), attitude };
+    let drive = Drive { speed_mps: 0.3, healthy_gap_s: 2.0, ..Drive::default() };
+    let lack = |why: &[Cause], is_lost: bool, longest_m: f64, hidden: [u16; 2], hides: bool| {
+        let mut coverage = coverage();
+        let turning = Turning { longest_m, hidden, ..Turning::default() };
+        let hides = |_| hides;
+        let placing = Placing { mount: &mount(), turning: &turning, profile: &profile, hidden: &hides };
+        let ping = Away { at: MonoNs(0), head: 0, angle_rad: math::FRAC_PI_2, why: all_of(why), is_lost };
+        placing.lack(&pose, &ping, drive, &mut coverage);
+        let found = lacks_of(&coverage.lacks);
+        let x_m = 10.0 - 3.0 * math::sin(0.1) / math::cos(0.1);
+        let arc_m = profile.arc_of([y_m + 3.0, z_m]);
+        assert!((found[0].x_m - x_m).abs() < 1e-9 && (found[0].arc_m - arc_m).abs() < 1e-9, "{found:?}");
+        let section = coverage.sections.get(coverage.sections.index_of(x_m)).unwrap();
+        assert_eq!((found.len(), section.passage.drive), (1, drive));
+        found[0].why
+    };
+    let (position, silent) = (Cause::PositionLost, Cause::HeadSilent);
+    let (missing, far, occluded) = (Cause::MissingReturns, Cause::OutOfRange, Cause::Occluded);
+    let (seen_through, hidden) = ([1, 100], [99, 100]);
+    for (why, is_lost, longest_m, counts, hides, expected) in [
+        (&[position][..], false, 5.0, hidden, true, &[position][..]),
+        (&[position], true, 5.0, hidden, false, &[position, missing]),
+        (&[position], true, 2.9, hidden, false, &[position, far]),
+        (&[position], true, 5.0, hidden, true, &[position, occluded]),
+        (&[position], true, 5.0, seen_through, true, &[position, missing]),
+        (&[silent], true, 5.0, hidden, false, &[silent]),
+        (&[silent, missing], true, 5.0, hidden, false, &[silent, missing]),
+        (&[silent, missing], true, 2.9, hidden, true, &[silent, far, occluded]),
+        (&[silent, missing], true, 2.9, hidden, false, &[silent, far]),
+        (&[silent, missing], true, 5.0, hidden, true, &[silent, occluded]),
+        (&[silent, missing], true, 5.0, seen_through, true, &[silent, missing]),
+    ] {
+        assert_eq!(
+            lack(why, is_lost, longest_m, counts, hides),
+            all_of(expected),
+            "{why:?} {longest_m} {hides}"
+        );
+    }
+}
+
+/// A dive at 0.1 m/s from chainage 1 m. Its only head turned at 50 pings a second until 10 s.
+struct Dive {
+    world: World,
+    profile: Profile,
+    coverage: Coverage,
+    lacking: MissingSampleFinder,
+}
+
+const STEP_RAD: f64 = 0.0157;
+
+fn at(seconds: f64) -> MonoNs {
+    MonoNs(0) + DurNs::from_secs_f64(seconds)
+}
+
+impl Dive {
+    fn new() -> Self {
+        let profile = pipe();
+        let mut world = World::new();
+        let mounted =
+            Mounted { source: SourceId(0), info: SensorInfo { mount: mount(), kind: SensorKind::Head } };
+        let (sweep, frontier) = (HeadSweep::default(), HeadFrontier::default());
+        world.spawn((Head(0), mounted, HiddenAngles(Vec::new()), sweep, frontier));
+        let mut lacking = MissingSampleFinder::default();
+        let (seen, last) = (Some((at(10.0), 1.0, STEP_RAD / 0.02, STEP_RAD)), Some(at(10.0)));
+        lacking.heads[0] = Turning { seen, pinged: last, moved: last, longest_m: 5.0, ..Turning::default() };
+        Self { world, coverage: coverage(), profile, lacking }
+    }
+
+    /// Missing samples after an update with or without a fix.
+    fn beat(&mut self, seconds: f64, has_fix: bool) -> Vec<MissingSample> {
+        let [y_m, z_m] = self.profile.reference();
+        let position = Point3::new(1.0 + 0.1 * seconds, y_m, z_m);
+        let situation = Situation {
+            pose: has_fix.then_some(Pose { position, attitude: Rot::identity() }),
+            speed_mps: 0.1,
+            pass_error_m: 0.0,
+            layout: HeadLayout::PhaseShift,
+            configured: 1,
+            heads: [None; MAX_HEADS],
+            deaf: headrace_sampling::head::HeadSet::default(),
+            losses: [LossRate::default(); MAX_HEADS],
+            lost_at_most: LossRate::default(),
+        };
+        let mut state = SystemState::<Heads<'_, '_>>::new(&mut self.world);
+        let heads = state.get_mut(&mut self.world).unwrap();
+        let beat = (at(seconds), &situation);
+        let now = Drive { healthy_gap_s: 2.0, ..Drive::default() };
+        note_beat(&mut self.lacking, now, &heads, beat, &self.profile, &mut self.coverage);
+        lacks_of(&self.coverage.lacks)
+    }
+
+    /// Whether missing samples are those of the pings after 10 s, in order, each at the head's expected
+    /// place.
+    fn are_pings_after_10_s(&self, lacks: &[MissingSample], why: &[Cause]) -> bool {
+        let [y_m, z_m] = self.profile.reference();
+        (1_u32..).zip(lacks).all(|(ping, lack)| {
+            let after_s = 0.02 * f64::from(ping);
+            let (sin, cos) = math::sin_cos(1.0 + STEP_RAD * f64::from(ping));
+            let arc_m = self.profile.arc_of([y_m + 3.0 * sin, z_m - 3.0 * cos]);
+            let off_m = math::wrap_signed(lack.arc_m - arc_m, self.profile.perimeter_m());
+            let x_m = 1.0 + 0.1 * (10.0 + after_s);
+            (lack.x_m - x_m).abs() < 1e-6 && off_m.abs() < 1e-6 && lack.why == all_of(why)
+        })
+    }
+}
+
+#[test]
+fn silent_head_is_missing_at_its_extrapolated_angles() {
+    let mut dive = Dive::new();
+    assert_eq!(dive.beat(10.2, true).len(), 0, "the head may still ping");
+    // One second of pings, and another.
+    let first = dive.beat(11.0, true);
+    assert!(first.len() == 50 && dive.are_pings_after_10_s(&first, &[Cause::HeadSilent]), "{first:?}");
+    let second = dive.beat(12.0, true);
+    assert!(second.len() == 100 && dive.are_pings_after_10_s(&second, &[Cause::HeadSilent]));
+    // A head that pings but is stalled.
+    let mut dive = Dive::new();
+    dive.lacking.heads[0].pinged = Some(at(10.9));
+    let first = dive.beat(11.0, true);
+    assert!(first.len() == 50 && dive.are_pings_after_10_s(&first, &[Cause::HeadStalled]));
+}
+
+/// Without a fix, pings are missing for that reason, too. They are placed along the track once there is a fix
+/// again.
+#[test]
+fn simulated_pings_without_a_fix_are_placed_later() {
+    let mut dive = Dive::new();
+    dive.beat(10.0, true);
+    assert_eq!((dive.beat(11.0, false).len(), dive.lacking.away.len()), (0, 50));
+    let all = dive.beat(12.0, true);
+    assert_eq!((all.len(), dive.lacking.away.len(), dive.lacking.forgot), (100, 0, false));
+    assert!(dive.are_pings_after_10_s(&all[..50], &[Cause::HeadSilent, Cause::PositionLost]), "{all:?}");
+    assert!(all[50..].iter().all(|lack| lack.why == Causes::of(Cause::HeadSilent)));
+    // Their speed is that between the two fixes.
+    let section = dive.coverage.sections.get(8).unwrap();
+    assert!((section.passage.drive.speed_mps - 0.1).abs() < 1e-9, "{:?}", section.passage.drive);
+    // If there are more than fit, the first ones are kept.
+    let mut dive = Dive::new();
+    dive.beat(10.0, true);
+    dive.beat(10.0 + 0.02 * (ROOM as f64 + 500.0), false);
+    assert_eq!((dive.lacking.away.len(), dive.lacking.forgot), (ROOM, true));
+    assert_eq!(dive.lacking.away[ROOM - 1].at, at(10.0 + 0.02 * ROOM as f64));
+    let seen = |dive: &Dive| dive.coverage.sections.get(10).map(|section| section.passage.unseen);
+    assert_eq!(seen(&dive), Some(false));
+    dive.beat(700.0, true);
+    assert_eq!(
+        (seen(&dive), dive.lacking.forgot),
+        (Some(true), false),
+        "the missing samples there are unknown"
+    );
+}
+
+/// After a gap in a log the work of an update is bounded, and the omission is recorded.
+#[test]
+fn overdue_pings_keep_the_latest() {
+    for (owed, is_forgotten) in [(ROOM, false), (ROOM + 1, true)] {
+        let mut dive = Dive::new();
+        dive.beat(10.0, true);
+        let lacks = dive.beat(10.0 + 0.02 * owed as f64, true);
+        assert_eq!((lacks.len(), dive.lacking.forgot), (ROOM, is_forgotten));
+        let last_m = lacks.last().unwrap().x_m;
+        assert!((last_m - (2.0 + 0.002 * owed as f64)).abs() < 1e-6, "{last_m}");
+    }
+}
+
+/// Draws by time are as even as random draws, whatever the time between pings, and no two are equal.
+#[test]
+fn draws_by_time_are_evenly_spread() {
+    for period_ns in [1_u64, 18_000_000, 20_000_000, 1 << 30, 1_000_000_000] {
+        let draws: Vec<f64> = (0..16_384).map(|k| unit_of(3_600_000_000_000 + k * period_ns)).collect();
+        let mut counts = [0_i32; 16];
+        for draw in &draws {
+            counts[usize::try_from(math::floor_to_i64(16.0 * draw)).unwrap()] += 1;
+        }
+        // 1024 each, within five standard deviations.
+        assert!(counts.iter().all(|count| (count - 1024).abs() < 160), "{period_ns}: {counts:?}");
+        // Draws after one in the lower half are as even: neighbours are independent.
+        let after_low = draws.windows(2).filter(|pair| pair[0] < 0.5 && pair[1] < 0.5).count();
+        assert!(after_low.abs_diff(4096) < 300, "{period_ns}: {after_low}");
+        let mut sorted = draws;
+        sorted.sort_by(f64::total_cmp);
+        assert!(sorted.windows(2).all(|pair| pair[0] < pair[1]), "{period_ns}");
+    }
+}

@@ -1,0 +1,466 @@
+//! Outlier filter: returns accepted as wall become samples, doubtful ones are counted and recorded.
+
+use bevy_ecs::prelude::{Query, Res, ResMut};
+use bevy_ecs::system::SystemState;
+use bevy_ecs::world::World;
+
+use super::judge::digest_alert;
+use super::missing_samples::number_of;
+use super::samples::note_sample;
+use crate::alerts::{AlertKind, Alerts};
+use crate::entities::{HeadSweep, Waiting};
+use crate::messages::{Aim, Hidden, Notice, Notices, Outcome, PlacedPing, Requests};
+use crate::resources::{Coverage, Digests, Tally, TunnelDesign, VehicleEntities};
+use crate::result_stream::RecordKind;
+use headrace_coverage::deviation::off_m;
+use headrace_coverage::{
+    Beam, Cause, Causes, Loss, MissingSample, Outlook, PlacedReturn, Request, StoreError, Taken,
+};
+use headrace_geometry::frames::{Point3, Tunnel};
+use headrace_geometry::math;
+
+/// Distance beyond either end of the tunnel at which samples raise an alert, m.
+const WELL_BEYOND_M: f64 = 1.0;
+
+/// Inputs and outputs of the filter, apart from the head.
+pub(super) struct FilterContext<'a> {
+    pub(super) coverage: &'a mut Coverage,
+    pub(super) tunnel: &'a TunnelDesign,
+    pub(super) tally: &'a mut Tally,
+    pub(super) notices: &'a mut Notices,
+    pub(super) digests: &'a mut Digests,
+    pub(super) alerts: &'a mut Alerts,
+}
+
+/// Filters a ping's return, and those that waited for it. A ping without a return breaks the sweep.
+///
+/// Returns the chainages of the samples of a head that has just become distrusted, m.
+pub(super) fn note_ping(
+    sorting: &mut FilterContext<'_>,
+    sweep: &mut HeadSweep,
+    ping: &PlacedPing,
+) -> Option<[f64; 2]> {
+    let (Outcome::Sample { point, arc_m }, Some(origin)) = (ping.outcome, ping.origin) else {
+        digest(sorting.digests, ping, RecordKind::NoSample);
+        if let Some(waiting) = sweep.waiting.last_mut() {
+            waiting.broken = true;
+            waiting.new_sweep |= ping.new_sweep;
+        } else {
+            store(sorting, sweep, ping);
+        }
+        return None;
+    };
+    let profile = &sorting.tunnel.profile;
+    let (from, to) = ([origin.y(), origin.z()], [point.y(), point.z()]);
+    let beam = [to[0] - from[0], to[1] - from[1]];
+    let range_m = math::hypot(beam[0], beam[1]);
+    let placed = PlacedReturn { x_m: point.x(), arc_m, off_m: off_m(profile, to, arc_m) };
+    let had = Beam {
+        range_m,
+        angle_rad: math::atan2(beam[0], -beam[1]),
+        standing: ping.standing,
+        design_range_m: &|| {
+            let beam = (range_m > 0.0).then(|| beam.map(|of| of / range_m))?;
+            Some(profile.cast(from, beam)?.range_m)
+        },
+    };
+    let relief = &mut sorting.coverage.relief;
+    let sorted = sweep.wall.sort(ping.head, placed, &had, &sorting.tunnel.limits, relief);
+    if let Some(taken) = sorted.waiting {
+        for waiting in sweep.waiting.take() {
+            settle(sorting, sweep, &waiting, taken == Taken::Wall);
+        }
+    }
+    match sorted.this {
+        Taken::Wall => wall(sorting, sweep, ping),
+        Taken::Waits if sweep.waiting.add(ping) => {}
+        Taken::Waits | Taken::Doubtful => doubtful(sorting, sweep, ping),
+    }
+    let (why, between_m) = sorted.distrusted?;
+    let (kind, figure_m) = AlertKind::of_distrust(why);
+    let source = Some(ping.source);
+    if sorting.alerts.note_of(source, kind, ping.received, point.x(), figure_m) {
+        sorting.notices.0.push(Notice::Alert(kind, source));
+        digest_alert(sorting.digests, kind, source, ping.received, (point.x(), figure_m));
+    }
+    Some(between_m)
+}
+
+/// Inputs and outputs of the filter at the end of a dive.
+type End<'w, 's> = (
+    Query<'w, 's, &'static mut HeadSweep>,
+    ResMut<'w, Coverage>,
+    Res<'w, TunnelDesign>,
+    ResMut<'w, Tally>,
+    ResMut<'w, Notices>,
+    ResMut<'w, Digests>,
+    ResMut<'w, Alerts>,
+);
+
+/// Classifies the waiting returns at the end of a dive, when no more returns will come. Allocates: not within
+/// a tick.
+pub(crate) fn end_returns(world: &mut World) {
+    let heads = world.resource::<VehicleEntities>().heads.clone();
+    let mut state = SystemState::<End<'_, '_>>::new(world);
+    let Ok((mut sweeps, mut coverage, tunnel, mut tally, mut notices, mut digests, mut alerts)) =
+        state.get_mut(world)
+    else {
+        return;
+    };
+    let mut sorting = FilterContext {
+        coverage: &mut coverage,
+        tunnel: &tunnel,
+        tally: &mut tally,
+        notices: &mut notices,
+        digests: &mut digests,
+        alerts: &mut alerts,
+    };
+    for head in heads {
+        let Ok(mut sweep) = sweeps.get_mut(head) else { continue };
+        for waiting in sweep.waiting.take() {
+            settle(&mut sorting, &mut sweep, &waiting, false);
+        }
+    }
+}
+
+/// Marks the sections that hold samples of a distrusted head, and requests judging of those that have passed.
+pub(super) fn suspect(
+    coverage: &mut Coverage,
+    [from_m, to_m]: [f64; 2],
+    outlook: &Outlook,
+    requests: &mut Requests,
+) {
+    let sections = &mut coverage.sections;
+    for index in sections.index_of(from_m)..=sections.index_of(to_m) {
+        let Some(section) = sections.get_mut(index) else { continue };
+        section.suspect();
+        if section.hole.is_some() {
+            requests.0.push(Request::at(outlook)(index));
+        }
+    }
+}
+
+/// Applies a waiting return, and the pings since.
+fn settle(sorting: &mut FilterContext<'_>, sweep: &mut HeadSweep, waiting: &Waiting, is_wall: bool) {
+    if is_wall {
+        wall(sorting, sweep, &waiting.ping);
+    } else {
+        doubtful(sorting, sweep, &waiting.ping);
+    }
+    if let Some(last) = &mut sweep.last {
+        last.unbroken &= !waiting.broken;
+    }
+    if waiting.new_sweep {
+        sweep.last = None;
+    }
+}
+
+fn wall(sorting: &mut FilterContext<'_>, sweep: &mut HeadSweep, ping: &PlacedPing) {
+    sorting.tally.samples += 1;
+    digest(sorting.digests, ping, RecordKind::Sample);
+    if let Some(beyond_m) = beyond_end_m(ping, sorting.tunnel.length_m)
+        && sorting.alerts.note(AlertKind::OutsideTunnel, ping.received, beyond_m.0, beyond_m.1)
+    {
+        sorting.notices.0.push(Notice::Alert(AlertKind::OutsideTunnel, None));
+        digest_alert(sorting.digests, AlertKind::OutsideTunnel, None, ping.received, beyond_m);
+    }
+    store(sorting, sweep, ping);
+}
+
+/// Stores a sample, or breaks the sweep if there is none.
+fn store(sorting: &mut FilterContext<'_>, sweep: &mut HeadSweep, ping: &PlacedPing) {
+    match note_sample(sorting.coverage, sweep, sorting.tunnel, ping) {
+        Ok(()) => {}
+        Err(StoreError::Outside) => sorting.tally.outside += 1,
+        Err(StoreError::Full) => sorting.tally.not_stored += 1,
+    }
+}
+
+/// Counts a doubtful return. For holes and causes it is a missing one, aimed where its beam meets the design.
+fn doubtful(sorting: &mut FilterContext<'_>, sweep: &mut HeadSweep, ping: &PlacedPing) {
+    sorting.tally.doubtful += 1;
+    digest(sorting.digests, ping, RecordKind::Doubtful);
+    let Outcome::Sample { point, .. } = ping.outcome else { return };
+    let aim = ping.origin.and_then(|origin| aim(sorting.tunnel, &origin, &point));
+    let lost = PlacedPing { outcome: Outcome::Lost(Loss::Missing, aim), ..*ping };
+    store(sorting, sweep, &lost);
+    let Coverage { lacks, sections, .. } = &mut *sorting.coverage;
+    // A head whose returns are all rejected counts as silent.
+    let is_distrusted = sweep.wall.distrusted().is_some();
+    if let Some(reach) = ping.reach
+        && let Some(section) = sections.get_mut(sections.index_of(reach.middle_m()))
+    {
+        section.passage.missing += 1;
+        if is_distrusted {
+            section.passage.silent = section.passage.silent.with(ping.head);
+        }
+    }
+    let Some(Aim { x_m, arc_m }) = aim else { return };
+    // An echo beside the vehicle's outline that isn't wall comes from the vehicle.
+    let cause = match ping.hidden {
+        Hidden::No if is_distrusted => Cause::HeadSilent,
+        Hidden::No => Cause::MissingReturns,
+        Hidden::Yes | Hidden::Beside => Cause::Occluded,
+    };
+    lacks.add(MissingSample { x_m, arc_m, head: number_of(ping.head), why: Causes::of(cause) });
+    if let Some(section) = sections.get_mut(sections.index_of(x_m)) {
+        section.doubtful += 1;
+    }
+}
+
+/// Point where a beam would have met the design profile.
+fn aim(tunnel: &TunnelDesign, origin: &Point3<Tunnel>, point: &Point3<Tunnel>) -> Option<Aim> {
+    let beam = *point - *origin;
+    let length_m = Some(beam.norm()).filter(|length_m| *length_m > 0.0)?;
+    let across = [beam.y() / length_m, beam.z() / length_m];
+    let wall = tunnel.profile.cast([origin.y(), origin.z()], across)?;
+    Some(Aim { x_m: origin.x() + wall.range_m * beam.x() / length_m, arc_m: wall.arc_m })
+}
+
+/// Chainage of a sample well beyond either end of the tunnel, and its distance from the end, m.
+///
+/// Heads of a vehicle that turns at an end reach slightly beyond it.
+fn beyond_end_m(ping: &PlacedPing, length_m: f64) -> Option<(f64, f64)> {
+    let Outcome::Sample { point, .. } = ping.outcome else { return None };
+    let x_m = point.x();
+    let beyond_m = (-x_m).max(x_m - length_m);
+    (beyond_m > WELL_BEYOND_M).then_some((x_m, beyond_m))
+}
+
+fn digest(digests: &mut Digests, ping: &PlacedPing, kind: RecordKind) {
+    let digest = digests.pings.record(kind).integer(ping.received.0).integer(u64::from(ping.source.0));
+    match ping.outcome {
+        Outcome::Sample { point, arc_m } => {
+            let outcome = if kind == RecordKind::Sample { 0 } else { 3 };
+            digest.integer(outcome).number(point.x()).number(point.y()).number(point.z()).number(arc_m);
+        }
+        Outcome::Lost(loss, _) => {
+            digest.integer(1).integer(loss as u64);
+        }
+        Outcome::Unplaced(lacking) => {
+            digest.integer(2).integer(lacking as u64);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::fixtures::{coverage, heard, pinged, tunnel};
+    use bevy_ecs::world::World;
+    use headrace_coverage::{Frontier, SampleStore, StoreLayout};
+    use headrace_geometry::time::MonoNs;
+
+    struct Bench {
+        coverage: Coverage,
+        tunnel: TunnelDesign,
+        tally: Tally,
+        notices: Notices,
+        alerts: Alerts,
+        sweep: HeadSweep,
+    }
+
+    impl Bench {
+        fn new() -> Self {
+            Self {
+                coverage: coverage(),
+                tunnel: tunnel(),
+                tally: Tally::default(),
+                notices: Notices(Vec::new()),
+                alerts: Alerts::default(),
+                sweep: HeadSweep::default(),
+            }
+        }
+
+        /// Filters a ping. Returns the number of samples and of doubtful returns then.
+        fn note(&mut self, ping: &PlacedPing) -> (u64, u64) {
+            let mut sorting = FilterContext {
+                coverage: &mut self.coverage,
+                tunnel: &self.tunnel,
+                tally: &mut self.tally,
+                notices: &mut self.notices,
+                digests: &mut Digests::default(),
+                alerts: &mut self.alerts,
+            };
+            assert_eq!(note_ping(&mut sorting, &mut self.sweep, ping), None);
+            (self.tally.samples, self.tally.doubtful)
+        }
+
+        fn lacks(&self) -> Vec<MissingSample> {
+            self.coverage.lacks.between(f64::NEG_INFINITY, f64::INFINITY).copied().collect()
+        }
+    }
+
+    const STEP_RAD: f64 = 0.0157;
+
+    /// Return with this number in the turn, from the wall at its range or from before it.
+    fn at(number: u32, range_m: f64) -> PlacedPing {
+        heard(5.1, 1.0 + STEP_RAD * f64::from(number), range_m)
+    }
+
+    /// An isolated echo from before the wall waits for the next return. It then counts as missing in holes
+    /// and causes.
+    #[test]
+    fn isolated_return_is_missing_at_its_aim() {
+        for (hidden, cause) in [(Hidden::No, Cause::MissingReturns), (Hidden::Beside, Cause::Occluded)] {
+            let mut bench = Bench::new();
+            assert_eq!(bench.note(&at(0, 3.0)), (1, 0));
+            assert_eq!(bench.note(&PlacedPing { hidden, ..at(1, 1.5) }), (1, 0), "it waits");
+            assert_eq!((bench.note(&at(2, 3.0)), bench.lacks().len()), ((2, 1), 1));
+            let lack = bench.lacks()[0];
+            let Outcome::Sample { arc_m, .. } = at(1, 3.0).outcome else { panic!() };
+            assert!((lack.x_m - 5.1).abs() < 1e-9 && (lack.arc_m - arc_m).abs() < 1e-9, "{lack:?}");
+            assert_eq!(lack.why, Causes::of(cause));
+            let section = bench.coverage.sections.get(20).unwrap();
+            assert_eq!((section.samples, section.doubtful, section.passage.missing), (2, 1, 1));
+            assert!(section.t_y_m.count == 1 && section.deviation.mean_m().is_some());
+        }
+    }
+
+    /// A rock of 0.6 m, wide enough for its height, is wall from its first return on.
+    #[test]
+    fn waiting_return_is_wall_once_others_agree() {
+        let mut bench = Bench::new();
+        bench.note(&at(0, 3.0));
+        let mut found = Vec::new();
+        for number in 1..20 {
+            found.push(bench.note(&at(number, 2.4)));
+        }
+        assert_eq!(found[0], (1, 0), "the first return waits");
+        assert_eq!(found.last(), Some(&(20, 0)), "{found:?}");
+        assert!(bench.lacks().is_empty() && bench.sweep.waiting.last_mut().is_none());
+        // All are single steps: a pass crosses each.
+        let crossed = |number: f64| {
+            let Outcome::Sample { arc_m, .. } = heard(5.1, 1.0 + STEP_RAD * number, 2.4).outcome else {
+                panic!()
+            };
+            bench.coverage.store.clone().nearest_pass_m(5.1, arc_m, 0.5).is_some()
+        };
+        assert!((1..18).all(|number| crossed(f64::from(number) + 0.5)));
+    }
+
+    #[test]
+    fn samples_without_room_are_counted() {
+        let mut bench = Bench::new();
+        let perimeter_m = bench.tunnel.profile.perimeter_m();
+        let layout = StoreLayout { perimeter_m, from_m: 0.0, to_m: 32.0, cell_m: 0.25, capacity: 2 };
+        bench.coverage.store = SampleStore::new(layout);
+        for number in 0..5 {
+            bench.note(&at(number, 3.0));
+        }
+        assert_eq!((bench.tally.samples, bench.tally.not_stored, bench.tally.outside), (5, 3, 0));
+    }
+
+    /// A rock's first two returns. Pings while the first one waited count once it is classified.
+    #[test]
+    fn loss_after_a_waiting_return_breaks_the_sweep() {
+        let is_stepped = |between: Option<PlacedPing>| {
+            let mut bench = Bench::new();
+            bench.note(&at(0, 3.0));
+            bench.note(&at(1, 2.4));
+            if let Some(between) = between {
+                bench.note(&between);
+            }
+            assert_eq!(bench.note(&at(4, 2.4)), (3, 0));
+            let Outcome::Sample { arc_m, .. } = heard(5.1, 1.0 + 2.5 * STEP_RAD, 2.4).outcome else {
+                panic!()
+            };
+            let is_crossed = bench.coverage.store.nearest_pass_m(5.1, arc_m, 0.5).is_some();
+            (is_crossed, bench.coverage.sections.get(20).unwrap().t_y_m.count)
+        };
+        let lost = pinged(5.1, 1.0 + 2.0 * STEP_RAD);
+        assert_eq!(is_stepped(None), (true, 2));
+        assert_eq!(is_stepped(Some(lost)), (false, 2));
+        assert_eq!(
+            is_stepped(Some(PlacedPing { new_sweep: true, ..lost })),
+            (false, 1),
+            "it has no previous sample"
+        );
+    }
+
+    /// The digest of results depends on the place of each sample.
+    #[test]
+    fn digest_includes_the_place_of_a_sample() {
+        let digest = |x_m: f64| {
+            let (mut bench, mut digests) = (Bench::new(), Digests::default());
+            let mut sorting = FilterContext {
+                coverage: &mut bench.coverage,
+                tunnel: &bench.tunnel,
+                tally: &mut bench.tally,
+                notices: &mut bench.notices,
+                digests: &mut digests,
+                alerts: &mut bench.alerts,
+            };
+            note_ping(&mut sorting, &mut bench.sweep, &heard(x_m, 1.0, 3.0));
+            assert_eq!(bench.tally.samples, 1);
+            digests.pings.value()
+        };
+        let none = Digests::default().pings.value();
+        assert!(digest(5.1) != none && digest(5.1) == digest(5.1) && digest(5.1) != digest(5.2));
+    }
+
+    #[test]
+    fn return_beyond_the_tunnel_is_reported_once_with_its_distance() {
+        let mut bench = Bench::new();
+        let mut note = |x_m: f64| {
+            bench.note(&PlacedPing { new_sweep: true, ..heard(x_m, 1.0, 3.0) });
+            let alert = bench.alerts.get(AlertKind::OutsideTunnel, None).copied();
+            (alert.map(|alert| alert.worst_m), bench.notices.0.len())
+        };
+        assert_eq!(note(29.9), (None, 0));
+        assert_eq!(note(30.9), (None, 0), "heads reach beyond the end");
+        let (worst_m, told) = note(31.1);
+        assert!((worst_m.unwrap() - 1.1).abs() < 1e-9 && told == 1, "{worst_m:?} {told}");
+        let (worst_m, told) = note(31.5);
+        assert!((worst_m.unwrap() - 1.5).abs() < 1e-9 && told == 1, "{worst_m:?} {told}");
+        assert_eq!((bench.tally.samples, bench.tally.outside), (4, 0));
+        bench.note(&PlacedPing { new_sweep: true, ..heard(33.0, 1.0, 3.0) });
+        assert_eq!((bench.tally.samples, bench.tally.outside), (5, 1), "beyond the store");
+    }
+
+    /// Sections with samples of a distrusted head are judged again if they have been judged.
+    #[test]
+    fn sections_seen_by_a_distrusted_head_are_judged_again() {
+        let mut coverage = coverage();
+        let hole = headrace_coverage::Hole {
+            diameter_m: 0.3,
+            least_m: 0.3,
+            most_m: 0.3,
+            x_m: 5.1,
+            arc_m: 1.0,
+            bounded: true,
+        };
+        for index in [19, 21, 23] {
+            coverage.sections.get_mut(index).unwrap().hole = Some(hole);
+        }
+        let outlook = Frontier::default().outlook(core::iter::empty(), MonoNs(7));
+        let mut requests = Requests(Vec::new());
+        suspect(&mut coverage, [5.1, 5.8], &outlook, &mut requests);
+        let suspects = (0..40).filter(|index| coverage.sections.get(*index).unwrap().suspect);
+        assert_eq!(suspects.collect::<Vec<_>>(), [20, 21, 22, 23]);
+        let asked = requests.0.iter().map(|request| (request.section, request.at, request.only_fails));
+        assert_eq!(asked.collect::<Vec<_>>(), [(21, MonoNs(7), false), (23, MonoNs(7), false)]);
+    }
+
+    #[test]
+    fn waiting_return_at_the_end_of_a_dive_is_doubtful() {
+        let mut bench = Bench::new();
+        bench.note(&at(0, 3.0));
+        bench.note(&at(1, 1.5));
+        let mut world = World::new();
+        let head = world.spawn(bench.sweep).id();
+        let vehicle = world.spawn_empty().id();
+        world.insert_resource(VehicleEntities { vehicle, by_source: vec![head], heads: vec![head] });
+        world.insert_resource(bench.coverage);
+        world.insert_resource(bench.tunnel);
+        world.insert_resource(bench.tally);
+        world.insert_resource(bench.notices);
+        world.insert_resource(Digests::default());
+        world.insert_resource(bench.alerts);
+        end_returns(&mut world);
+        let tally = *world.resource::<Tally>();
+        assert_eq!((tally.samples, tally.doubtful), (1, 1));
+        let lacks = &world.resource::<Coverage>().lacks;
+        assert_eq!(lacks.between(5.0, 5.2).count(), 1);
+    }
+}

@@ -1,0 +1,45 @@
+//! Commands that programs of `lab/` provide, like git's subcommands. This program thus needs no SQL engine
+//! and no oracles.
+
+use std::ffi::OsStr;
+use std::io::ErrorKind;
+use std::path::PathBuf;
+use std::process::Command;
+
+use crate::cli::ExternalArguments;
+use crate::failure::{self, Failure};
+
+/// A program of `lab/`, and its package.
+pub(crate) struct Program {
+    name: &'static str,
+    package: &'static str,
+}
+
+/// `headrace campaign` and `headrace batch`.
+pub(crate) const CAMPAIGN: Program = Program { name: "headrace-campaign", package: "headrace_campaign" };
+/// `headrace cost`.
+pub(crate) const COST: Program = Program { name: "headrace-cost", package: "headrace_cost" };
+
+/// Runs a program of `lab/` with these arguments after `first`; returns its exit code.
+///
+/// It searches next to this program, where `lab/` of the same clone builds it, and on PATH.
+///
+/// Errors: there is no such program (the text has the command that builds it), or it can't be started.
+pub(crate) fn run(program: &Program, first: Option<&str>, args: &ExternalArguments) -> Result<u8, Failure> {
+    let Program { name, package } = program;
+    let own = std::env::current_exe().ok();
+    let folder = own.as_deref().and_then(|own| own.parent());
+    let built = folder.map(|folder| folder.join("../../lab/target/release").join(name));
+    let places = [folder.map(|folder| folder.join(name)), built];
+    let found = places.into_iter().flatten().find(|path| path.is_file());
+    let arguments = first.map(OsStr::new).into_iter().chain(args.arguments.iter().map(OsStr::new));
+    match Command::new(found.unwrap_or_else(|| PathBuf::from(name))).args(arguments).status() {
+        // A signal ended it.
+        Ok(status) => Ok(status.code().and_then(|code| u8::try_from(code).ok()).unwrap_or(failure::FAILED)),
+        Err(error) if error.kind() == ErrorKind::NotFound => Err(Failure::Usage(format!(
+            "{name} is neither beside this program, nor in lab/target/release, nor on PATH; build it with: \
+             cargo build --release --manifest-path lab/Cargo.toml -p {package}"
+        ))),
+        Err(source) => Err(Failure::System { what: "starting a program of lab/", source }),
+    }
+}

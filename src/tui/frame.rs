@@ -1,0 +1,236 @@
+//! A frame: a snapshot of the dive by value, made on the loop's thread between ticks.
+
+use std::collections::{BTreeMap, BTreeSet, VecDeque};
+
+use headrace_geometry::time::{DurNs, MonoNs};
+use headrace_geometry::tunnel::Profile;
+use headrace_monitor::head_descriptions::HeadDescriptions;
+use headrace_monitor::live_messages::{LiveMessage, LiveMessages};
+use headrace_monitor::live_state::{Condition, LiveState, SensorState};
+use headrace_monitor::live_text::{PilotLine, status_line, told_line};
+use headrace_monitor::messages::Notice;
+use headrace_monitor::pilot_text::{AdviceFigures, advice_text};
+use headrace_monitor::run::Loop;
+use headrace_ports::{Phase, Status};
+use headrace_sampling::advice::{Advice, Reason};
+
+use crate::recording_state::RecordingState;
+
+use super::alerts::{self, AlertRow};
+use super::mode::Stop;
+use super::wall::{Cell, Clock, WallNews};
+
+/// Averaging window for a sensor's rate, in data time.
+const RATE_OVER: DurNs = DurNs(2_000_000_000);
+/// Maximum number of messages kept between two frames.
+const MOST_TOLD: usize = 64;
+/// Number of sections on either side of the vehicle that every frame updates.
+const NEAR: i64 = 8;
+
+/// A frame.
+pub(super) struct ScreenFrame {
+    pub(super) vehicle: String,
+    pub(super) state: LiveState,
+    /// Time since the dive's first packet.
+    pub(super) time: DurNs,
+    pub(super) stopped: Option<Stop>,
+    /// Place, speed, condition and action.
+    pub(super) status: PilotLine,
+    /// Limiting factor of the speed.
+    pub(super) reason: String,
+    pub(super) sensors: Vec<SensorRow>,
+    pub(super) alerts: Vec<AlertRow>,
+    /// Number of further alerts.
+    pub(super) alerts_hidden: usize,
+    /// Text, and whether it is an alarm.
+    pub(super) recording: Option<(String, bool)>,
+    pub(super) wall: WallNews,
+    /// Messages since the last frame, oldest first.
+    pub(super) told: Vec<PilotLine>,
+}
+
+/// A sensor on the screen.
+pub(super) struct SensorRow {
+    pub(super) id: String,
+    pub(super) state: SensorState,
+    pub(super) age: Option<DurNs>,
+    pub(super) rate_hz: Option<f64>,
+    /// Status of its port, unless it runs.
+    pub(super) why: String,
+}
+
+/// State kept between frames.
+pub(super) struct FrameBuilder {
+    vehicle: String,
+    teller: LiveMessages,
+    told: VecDeque<PilotLine>,
+    /// Sections that have changed since the last frame; `None` for all.
+    changed: Option<BTreeSet<i64>>,
+    clock: Option<Clock>,
+    /// Reading counts of each sensor at two times.
+    counted: [Option<(MonoNs, Vec<u64>)>; 2],
+    recorded: RecordingState,
+    ports: BTreeMap<usize, String>,
+}
+
+impl FrameBuilder {
+    pub(super) fn new(vehicle: &str) -> Self {
+        Self {
+            vehicle: vehicle.to_owned(),
+            teller: LiveMessages::default(),
+            told: VecDeque::new(),
+            changed: None,
+            clock: None,
+            counted: [None, None],
+            recorded: RecordingState::default(),
+            ports: BTreeMap::new(),
+        }
+    }
+
+    /// Adds a line to the messages.
+    pub(super) fn tell(&mut self, line: PilotLine) {
+        if self.told.len() == MOST_TOLD {
+            self.told.pop_front();
+        }
+        self.told.push_back(line);
+    }
+
+    pub(super) fn hear(&mut self, notice: &Notice, dive: &Loop) {
+        if let (Notice::Section { section, .. }, Some(changed)) = (notice, &mut self.changed) {
+            changed.insert(*section);
+        }
+        let mut told = Vec::new();
+        self.teller.hear(notice, dive, &mut |one| tell(&one, dive, &mut told));
+        for line in told {
+            self.tell(line);
+        }
+    }
+
+    pub(super) fn tick(&mut self, dive: &Loop) {
+        let mut told = Vec::new();
+        let state = dive.live_state();
+        self.teller.tick(state, dive, &mut |one| tell(&one, dive, &mut told));
+        for line in told {
+            self.tell(line);
+        }
+    }
+
+    /// Sets the state of a sensor's port.
+    pub(super) fn sensor(&mut self, status: &Status) {
+        let words = if status.phase == Phase::Running { String::new() } else { status.to_string() };
+        self.ports.insert(status.source, words);
+    }
+
+    /// Sets the state of the recordings.
+    pub(super) fn recorded(&mut self, state: &RecordingState) {
+        self.recorded = *state;
+    }
+
+    /// Makes the next frame contain all sections, after a lost frame.
+    pub(super) fn show_all_again(&mut self) {
+        self.changed = None;
+    }
+
+    /// Resets the state after a jump of the playback.
+    pub(super) fn forget(&mut self) {
+        self.teller.forget();
+        self.changed = None;
+        self.counted = [None, None];
+    }
+
+    pub(super) fn shot(&mut self, dive: &Loop, stopped: Option<Stop>) -> ScreenFrame {
+        let state = *dive.live_state();
+        let (profile, heads) = (&dive.mission().profile, dive.head_words());
+        let name =
+            |source: usize| dive.sources().get(source).map_or_else(String::new, |info| info.id.clone());
+        let reason = state
+            .advice
+            .as_ref()
+            .map_or_else(String::new, |advice| reason_text(advice, &state, (profile, heads)));
+        let (alerts, alerts_hidden) = alerts::rows(dive);
+        ScreenFrame {
+            vehicle: self.vehicle.clone(),
+            time: dive.tally().span.map_or(DurNs(0), |(begun, _)| DurNs(state.now.since(begun).0.max(0))),
+            stopped,
+            status: status_line(&state, profile, heads, &name),
+            reason,
+            sensors: self.sensors(&state, dive),
+            alerts,
+            alerts_hidden,
+            recording: self.recorded.words(),
+            wall: self.wall(&state, dive),
+            told: self.told.drain(..).collect(),
+            state,
+        }
+    }
+
+    fn sensors(&mut self, state: &LiveState, dive: &Loop) -> Vec<SensorRow> {
+        let counts: Vec<u64> = dive.health().map(|health| health.readings).collect();
+        let [before, last] = &mut self.counted;
+        let is_due = last.as_ref().is_none_or(|(at, _)| state.now.since(*at).0 >= RATE_OVER.0);
+        let from = before.as_ref().or(last.as_ref());
+        let rate = |source: usize| {
+            let (at, readings) = from?;
+            let seconds = state.now.since(*at).as_secs_f64();
+            let more = counts.get(source)?.checked_sub(*readings.get(source)?)?;
+            (seconds > 0.5).then(|| more as f64 / seconds)
+        };
+        let row = |(source, info): (usize, &headrace_monitor::SourceInfo)| SensorRow {
+            id: info.id.clone(),
+            state: state.sensor(source),
+            age: state.age_of(source),
+            rate_hz: rate(source),
+            why: self.ports.get(&source).cloned().unwrap_or_default(),
+        };
+        let rows = dive.sources().iter().enumerate().map(row).collect();
+        if is_due {
+            *before = last.take();
+            *last = Some((state.now, counts));
+        }
+        rows
+    }
+
+    fn wall(&mut self, state: &LiveState, dive: &Loop) -> WallNews {
+        let sections = &dive.coverage().sections;
+        let clock = self.clock.get_or_insert_with(|| Clock::of(&dive.mission().profile));
+        let indexes: Vec<i64> = match self.changed.take() {
+            None => (0..).take(sections.len()).collect(),
+            Some(mut changed) => {
+                if let Some(x_m) = state.chainage_m {
+                    let here = sections.index_of(x_m);
+                    changed.extend(here - NEAR..=here + NEAR);
+                }
+                changed.into_iter().collect()
+            }
+        };
+        self.changed = Some(BTreeSet::new());
+        let cell = |index: i64| Some((index, Cell::of(index, dive, clock)?));
+        WallNews {
+            section_m: sections.section_m(),
+            count: sections.len(),
+            at_m: state.chainage_m,
+            inwards: state.speed_mps.is_none_or(|speed_mps| speed_mps >= 0.0),
+            cells: indexes.into_iter().filter_map(cell).collect(),
+        }
+    }
+}
+
+/// Text on the limiting factor of the speed, unless the condition already states it.
+fn reason_text(
+    advice: &Advice,
+    state: &LiveState,
+    (profile, heads): (&Profile, &HeadDescriptions),
+) -> String {
+    let is_told = matches!(state.condition(), Condition::TurnFails | Condition::NoSpeed);
+    if advice.reason == Reason::HelixPitch && !is_told {
+        return "the distance between turns limits the speed".to_owned();
+    }
+    advice_text(&AdviceFigures::of(advice, state.speed_mps.unwrap_or(0.0)), profile, heads)
+}
+
+/// Adds the line of a message if it adds something to the list of alerts.
+fn tell(one: &LiveMessage, dive: &Loop, to: &mut Vec<PilotLine>) {
+    if one.adds_line() {
+        to.push(told_line(one, &dive.mission().profile, dive.head_words()));
+    }
+}
