@@ -13,7 +13,7 @@ use crate::Error;
 
 /// The first column of every table.
 pub(crate) const DIVE: &str = "dive";
-const DIVE_ABOUT: &str = "The dive: the first 16 digits of its log's SHA-256; the key between tables";
+const DIVE_ABOUT: &str = "The dive: first 16 digits of its log's SHA-256; the key between tables";
 
 /// How a column's value is taken from a row; `None` is null.
 pub(crate) enum Get<R> {
