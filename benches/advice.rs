@@ -1,20 +1,23 @@
-//! The advice against the largest speeds that truly pass, found by simulated dives. Prints Markdown.
+//! Compares the advised speed with the largest speed that truly passes, found by simulated dives. Prints Markdown.
 //!
-//! `cargo bench -p headrace_tests --bench advice` runs all; `-- truth`, `-- sweep` or `-- planned` one of them:
-//! - truth: `--dives N` (100) steady and swaying dives from `--from-seed N`, or `--seeds A,B,...`: advice over the largest speed that passes;
-//! - sweep: four heads started for 0.1 m/s, driven at speeds 1 mm/s apart; and started for each of these;
-//! - planned: each shipped vehicle in each mode at 0.95 of the plan's speed.
+//! `cargo bench -p headrace_tests --bench advice` runs all parts; `-- truth`, `-- sweep` or `-- planned` runs one:
+//! - truth: `--dives N` (100) steady and swaying dives from `--from-seed N`, or `--seeds A,B,...`: advice over the
+//!   largest speed that passes;
+//! - sweep: four heads started for 0.1 m/s and driven at speeds 1 mm/s apart, and heads started for each of these
+//!   speeds;
+//! - planned: each shipped vehicle in each mode at 0.95 of the planned speed.
 //!
-//! D_true is from `headrace_tests::truth`, which has nothing of the program's coverage.
+//! D_true comes from `headrace_tests::truth`, which shares nothing with the program's coverage.
 
-#![expect(clippy::unwrap_used, clippy::panic, reason = "a benchmark stops at what it can't do")]
+#![expect(clippy::unwrap_used, clippy::panic, reason = "a failed step ends the benchmark")]
 
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use headrace_tests::field_table::VEHICLES;
 use headrace_tests::passable::{Compared, Outcome, Outing};
 
-/// Between a tenth too slow and not too fast, as far as rounding goes: true speeds are found in steps of 2 %.
+/// Range of advice over truth that counts as right: at most a tenth too slow, and not too fast. The limits allow for
+/// rounding, because true speeds are found in steps of 2 %.
 const LEAST: f64 = 0.899;
 const MOST: f64 = 1.005;
 
@@ -45,7 +48,7 @@ fn main() {
     }
 }
 
-/// Results of all, in their order, on all cores.
+/// Results of all items, in their order, computed on all cores.
 fn all<T: Sync, R: Send>(of: &[T], run: impl Fn(&T) -> R + Sync) -> Vec<R> {
     let next = AtomicUsize::new(0);
     let work = || {

@@ -1,15 +1,19 @@
-//! Causes told against true ones, over random dives with one or two injected causes: `cargo bench -p headrace_tests
-//! --bench causes [-- FROM TO [wrong]]`, by numbers of dives, 0 to 500 unless given; `wrong` lists the stretches told
-//! wrongly, `sections` all sections; `remedies` does what was told about each run, too; `knowing` tells how often one is right who knows all of a dive
-//! but its noise.
+//! Compares displayed causes with true ones, over random dives with one or two injected causes.
+//!
+//! `cargo bench -p headrace_tests --bench causes [-- FROM TO [OPTION]]` runs the dives with numbers FROM to TO
+//! (default 0 to 500). OPTION is one of:
+//! - `wrong`: lists the stretches with a wrong cause;
+//! - `sections`: lists all sections;
+//! - `remedies`: also simulates the displayed remedy of each run;
+//! - `knowing`: prints how often a reference is right that knows everything about a dive except its noise.
 
-#![allow(clippy::unwrap_used, clippy::panic, reason = "a bench stops at what it can't do")]
+#![allow(clippy::unwrap_used, clippy::panic, reason = "a failed step ends the benchmark")]
 
 use std::sync::atomic::{AtomicU64, Ordering};
 
 use headrace_tests::interventions::{Judged, Knowing, Matrix, intervene, kinds, remedies};
 
-/// Holes without each of the causes alone, over the target: the median and the largest of a stretch.
+/// Median and largest hole of a stretch without each cause alone, over the target.
 fn over_target(sections: &[Judged], target_m: f64) -> String {
     let of_cause = |k: usize| {
         let mut over: Vec<f64> =
@@ -68,7 +72,7 @@ fn main() {
         for section in dive.sections.iter().filter(|_| sections) {
             let e = &section.evidence;
             println!(
-                "{seed} {:.2} D {:.3} {:?} told {:?} run {:?}: v {:.3} gaps {:.2} {:.2} {:.2} steps {:.3} {:.3} swing {:.3} lost {}",
+                "{seed} {:.2} D {:.3} {:?} displayed {:?} run {:?}: v {:.3} gaps {:.2} {:.2} {:.2} steps {:.3} {:.3} swing {:.3} lost {}",
                 section.ends_m[0],
                 section.hole_m,
                 section.right,
@@ -89,7 +93,7 @@ fn main() {
             if wrong && (!is_right || stretch.runs() > 1) {
                 let [first, last] = [stretch.sections.first().unwrap(), stretch.sections.last().unwrap()];
                 println!(
-                    "dive {seed}: {:.2} to {:.2}, T {:.3}, right {:?}, told {:?}, {} runs, over T without each {}; {:?}",
+                    "dive {seed}: {:.2} to {:.2}, T {:.3}, right {:?}, displayed {:?}, {} runs, over T without each {}; {:?}",
                     first.ends_m[0],
                     last.ends_m[1],
                     dive.drawn.target_m,
@@ -104,11 +108,11 @@ fn main() {
     }
     print!("{}", matrix.text());
     if remedy {
-        println!("runs cleared by what was told to do: {clear} of {runs}");
+        println!("runs cleared by the displayed remedy: {clear} of {runs}");
     }
     if is_knowing {
         let Knowing { stretches, pairs } = dives.iter().fold(Knowing::default(), |sum, dive| sum.and(dive.3));
-        println!("who knows all but the noise: stretches, two causes: {}", stretches.text());
-        println!("of these stretches whose true set is two: {}", pairs.text());
+        println!("reference that knows all but the noise: stretches, two causes: {}", stretches.text());
+        println!("of these, stretches with a true set of two causes: {}", pairs.text());
     }
 }

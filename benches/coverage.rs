@@ -1,15 +1,15 @@
-//! Covering samples and finding holes, compared with other methods on the same samples in the same process, and the memory
-//! that samples take. Prints Markdown.
+//! Compares covering samples and finding holes with other methods on the same samples, and measures the samples'
+//! memory. Prints Markdown.
 //!
-//! `cargo bench -p headrace_tests --bench coverage` takes about a minute; `-- FAST` runs one mode alone, `-- memory` no
-//! mode. Absolute times drift on shared machines; the ratios hold.
-//! kiddo's tree and the hash map answer only for given points: on a grid of them D is accurate to some centimetres, where
-//! ours and the triangulation are exact. kiddo before version 6 panicked if more than 32 samples share a coordinate; ideal
-//! heads lay no more than a few.
+//! `cargo bench -p headrace_tests --bench coverage` takes about a minute; `-- FAST` runs one mode alone, `-- memory`
+//! no mode. Absolute times drift on shared machines, but the ratios hold. kiddo's tree and the hash map answer
+//! queries at given points only. On a grid of points their D is accurate to some centimetres, while headrace and the
+//! triangulation are exact. kiddo before version 6 panicked if more than 32 samples shared a coordinate; ideal heads
+//! produce only a few.
 
 #![expect(clippy::disallowed_methods, reason = "a benchmark reads the clock")]
-#![expect(clippy::disallowed_types, reason = "std's hash map is a yardstick here")]
-#![expect(clippy::unwrap_used, reason = "a benchmark stops at what it can't do")]
+#![expect(clippy::disallowed_types, reason = "std's hash map is a reference here")]
+#![expect(clippy::unwrap_used, reason = "a failed step ends the benchmark")]
 
 use std::collections::HashMap;
 use std::hint::black_box;
@@ -143,7 +143,7 @@ fn holes(what: &str, samples: &[WallSample]) {
     let (to_a_centimetre, _) =
         best(|| sections().map(|x| tolerant.largest(&store, x, x + SECTION_M).most_m).sum::<f64>());
     row(&what, per_sample(ours), "ours, to 1 cm", per_sample(to_a_centimetre));
-    // The other methods are given their search radius.
+    // The other methods get this search radius.
     let reach_m = exact.iter().copied().fold(0.0, f64::max) / 2.0 + 0.05;
     let around = |x: f64| {
         let window = (x - reach_m)..(x + SECTION_M + reach_m);
@@ -177,7 +177,10 @@ fn holes(what: &str, samples: &[WallSample]) {
     );
 }
 
-/// Largest hole by the corners of the Voronoi diagram in a section, and the crossings of its edges with the section's ends.
+/// Largest hole of a section, from Voronoi corners and edges.
+///
+/// Candidates are the corners of the Voronoi diagram in the section, and the crossings of its edges with the
+/// section's ends.
 fn by_triangulation(from_m: f64, near: &[[f64; 2]]) -> f64 {
     let points = near.iter().map(|[x, sigma]| Point2::new(*x, *sigma)).collect();
     let triangulation = DelaunayTriangulation::<Point2<f64>>::bulk_load(points).unwrap();
@@ -231,7 +234,7 @@ fn by_hash_map(from_m: f64, near: &[[f64; 2]]) -> f64 {
         let [row, column] = cell_of(&place);
         let mut best2 = f64::INFINITY;
         for ring in 0_i64.. {
-            // Cells of a ring are no nearer than the width of the rings within it.
+            // Cells of a ring are at least as far as the width of the rings inside it.
             let inner_m = (ring - 1) as f64 * CELL_M;
             if ring > 0 && inner_m > 0.0 && inner_m * inner_m > best2 {
                 break;

@@ -1,13 +1,14 @@
-//! What the page and its viewers cost the loop: the same dive of four heads at real time without a page, with a page that nobody
-//! sees, and with ten viewers, of which one never reads and one floods; and, as a yardstick, without a page beside two busy
-//! threads, since a flood and its server keep two cores busy. Prints Markdown.
+//! Cost of the page and its viewers for the loop, measured in the same dive of four heads in real time. Prints
+//! Markdown.
 //!
-//! `cargo bench -p headrace_tests --bench page` takes about four minutes; `-- 20` lets each dive last twenty seconds. Ticks
-//! come every 20 ms by the clock; the viewers are threads of this process and take time of the same cores. Absolute times drift
-//! on shared machines, tails most. It panics if the dives' results differ.
+//! It compares four cases: without a page, with a page and no viewer, with ten viewers (one never reads and one
+//! floods), and without a page beside two busy threads. The last one is the reference, because a flood and its server
+//! keep two cores busy. `cargo bench -p headrace_tests --bench page` takes about four minutes; `-- 20` makes each
+//! dive last twenty seconds. Ticks come every 20 ms by the clock. The viewers are threads of this process on the same
+//! cores. Absolute times drift on shared machines, mostly in the tails. It panics if the dives' results differ.
 
 #![expect(clippy::disallowed_methods, reason = "a benchmark reads the clock")]
-#![expect(clippy::unwrap_used, reason = "a benchmark stops at what it can't do")]
+#![expect(clippy::unwrap_used, reason = "a failed step ends the benchmark")]
 #![expect(clippy::panic, reason = "the same")]
 
 use std::net::Ipv4Addr;
@@ -35,11 +36,11 @@ const TICK: DurNs = DurNs(20_000_000);
 const TICKS_PER_S: u64 = 50;
 /// Default duration of each dive, s.
 const MEASURED_S: u64 = 60;
-/// Viewers that read all they get.
+/// Number of viewers that read everything.
 const READING: usize = 8;
-/// As many as the program's.
+/// Size of the notice queue, as in the program.
 const NOTICES: usize = 1 << 10;
-/// A flood's next connection after one that was refused.
+/// Delay before a refused flood connects again.
 const AGAIN_AFTER: Duration = Duration::from_millis(10);
 
 fn main() {
@@ -67,7 +68,7 @@ fn main() {
     }
 }
 
-/// What goes on beside a dive.
+/// Load beside a dive.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Beside {
     Nothing,
@@ -119,7 +120,7 @@ fn row(dive: &str, what: &str, times: &[Duration]) {
 }
 
 fn scene(seconds: u64) -> Scene {
-    // Somewhat farther than is measured.
+    // The path is slightly longer than the measurement.
     let distance_m = (seconds + 10) as f64 * SPEED_MPS;
     scenes::scene(&format!(
         "vehicle = \"vita2-4.toml\"\n[vehicle_changes]\nheads.planned_speed_mps = {SPEED_MPS}\n[trajectory]\n\
@@ -127,14 +128,14 @@ fn scene(seconds: u64) -> Scene {
     ))
 }
 
-/// A message of a simulation, to be fed to the loop.
+/// A message of a simulation for the loop.
 struct Kept {
     at: MonoNs,
     source: u16,
     bytes: Vec<u8>,
 }
 
-/// All messages of a scene's first seconds that the loop gets.
+/// The loop's messages in the first seconds of a scene.
 fn messages_of(scene: &Scene, seconds: u64) -> Vec<Kept> {
     let mut simulation = Simulation::new(scene).unwrap();
     let until = tick_end(seconds * TICKS_PER_S);
@@ -155,18 +156,18 @@ fn tick_end(number: u64) -> MonoNs {
     START + DurNs(TICK.0 * i64::try_from(number).unwrap())
 }
 
-/// What was seen of a dive.
+/// Measurements of a dive.
 struct Measured {
-    /// Durations of the ticks, including the filling of their rings.
+    /// Durations of the ticks, with the filling of their rings.
     ticks: Vec<Duration>,
     /// Durations of the collector's work after each tick.
     collecting: Vec<Duration>,
-    /// From when a tick was due until it and the collector's work had ended.
+    /// Times from a tick's due time to the end of the tick and the collector's work.
     ends: Vec<Duration>,
     samples: u64,
     digest: u64,
     notices_dropped: u64,
-    /// The page's counts, as text.
+    /// Counters of the page, as text.
     page: String,
 }
 
@@ -193,7 +194,7 @@ fn dive(scene: &Scene, messages: &[Kept], seconds: u64, beside: Beside) -> Measu
     }
     is_over.store(true, Ordering::Relaxed);
     if let Some(page) = page {
-        // As the feed's schema has it, without a report.
+        // As in the feed's schema, without a report.
         let digest = format!("{:016x}", armed.digest());
         page.end(Some(json!({"type": "end", "digest": digest, "exit": 0, "summary": {}, "way": null})));
     }
@@ -205,7 +206,7 @@ fn dive(scene: &Scene, messages: &[Kept], seconds: u64, beside: Beside) -> Measu
     measured
 }
 
-/// A loop of the scene's vehicle, as the program has it.
+/// A loop of the scene's vehicle, configured as in the program.
 fn armed(scene: &Scene, is_followed: bool) -> (Loop, NoticeReceiver) {
     let vehicle = &scene.vehicle;
     let mut app = App::new(vehicle.mission());
@@ -248,7 +249,7 @@ fn run(dive: &mut Loop, messages: &[Kept], seconds: u64, mut beside: impl FnMut(
     Measured { ticks, collecting, ends, samples: 0, digest: 0, notices_dropped: 0, page: String::new() }
 }
 
-/// What the program does after each tick; without a page the notices are only taken.
+/// Work of the program after each tick; without a page it only takes the notices.
 fn follow(mut collector: Option<&mut Collector>, notices: &NoticeReceiver, dive: &Loop) {
     while let Some(notice) = notices.next() {
         if let Some(collector) = &mut collector {
@@ -305,7 +306,7 @@ fn site(scene: &Scene) -> Site {
     }
 }
 
-/// What the page has counted when the last tick has ended.
+/// Counters of the page after the last tick.
 fn counts(page: &Page) -> String {
     let (status, text) = ask(&page.address().to_string(), "GET", "/metrics", &[], "");
     assert_eq!(status, 200, "{text}");
@@ -331,10 +332,10 @@ fn counts(page: &Page) -> String {
 
 /// Ten viewers.
 struct Viewers {
-    /// Samples that each has got, and whether it has got the end.
+    /// Number of samples that each viewer received, and whether it received the end.
     reading: Vec<JoinHandle<(u64, bool)>>,
     _never_reads: Viewer,
-    /// Messages sent.
+    /// Number of messages sent.
     flooding: JoinHandle<u64>,
 }
 
@@ -372,7 +373,7 @@ impl Viewers {
     }
 }
 
-/// Sends as fast as it can, and connects anew whenever it is thrown out; returns the number of messages sent.
+/// Sends as fast as possible and reconnects after each disconnection; returns the number of messages sent.
 fn flood(address: &str, is_over: &AtomicBool) -> u64 {
     let mut sent = 0;
     let message = Message::Text(json!({"do": "mark", "by": "flood"}).to_string().into());

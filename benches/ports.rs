@@ -1,13 +1,13 @@
-//! Delay of bytes from the device's end of a port to the loop's ring, and the cost of serving ports, each figure compared with
-//! a bare read loop on another port of the same kind in the same run. Prints Markdown.
+//! Delay of bytes from a device to the loop's ring, and the cost of serving ports. Prints Markdown.
 //!
-//! `cargo bench -p headrace_tests --bench ports` takes about two minutes; `-- 20` measures for twenty seconds a part,
-//! `-- latency`, `-- flag` (last byte of a return to the end of its tick, in which its flag is out, idle and with all cores busy)
-//! and `-- cpu` are its parts. The devices are emulated at their own rates by a thread of this process. CAN
-//! (vcan0, up) and HID (`/dev/uhid`) are measured only where available: in `tests/vm`, for one. Absolute times drift on
-//! shared machines, tails most.
+//! Each figure is compared with a bare read loop on another port of the same kind in the same run.
+//! `cargo bench -p headrace_tests --bench ports` takes about two minutes; `-- 20` measures for twenty seconds a part. The parts are
+//! `-- latency`, `-- flag` and `-- cpu`. `flag` is the time from the last byte of a return to the end of its tick,
+//! when its flag is displayed, on idle and on busy cores. A thread of this process emulates the devices at their own
+//! rates. CAN (vcan0, up) and HID (`/dev/uhid`) are measured only where available, for instance in `tests/vm`.
+//! Absolute times drift on shared machines, mostly in the tails.
 
-#![expect(clippy::unwrap_used, reason = "a benchmark stops at what it can't do")]
+#![expect(clippy::unwrap_used, reason = "a failed step ends the benchmark")]
 #![expect(clippy::panic, reason = "the same")]
 
 use std::collections::VecDeque;
@@ -106,12 +106,12 @@ fn answer(program: &str, arguments: &[&str]) -> String {
     said.ok().filter(|said| !said.is_empty()).unwrap_or_else(|| format!("unknown ({program} doesn't say)"))
 }
 
-/// Messages under way with their times of sending, and the delays measured.
+/// Messages in transit with their send times, and the measured delays.
 #[derive(Clone, Default)]
 struct Course {
     sent: Arc<SegQueue<(MonoNs, Vec<u8>)>>,
     delays: Arc<SegQueue<DurNs>>,
-    /// Times of sending of messages that the loop hasn't consumed yet, and the delays until the ends of their ticks.
+    /// Send times of messages that the loop hasn't consumed yet, and the delays to the ends of their ticks.
     to_consume: Arc<SegQueue<MonoNs>>,
     ends: Arc<SegQueue<DurNs>>,
 }
@@ -127,7 +127,7 @@ impl Finish {
         Self { course: course.clone(), waiting: VecDeque::new() }
     }
 
-    /// Time of sending of a received message; those sent before it count as lost.
+    /// Send time of a received message; messages sent before it count as lost.
     fn sent(&mut self, bytes: &[u8]) -> Option<MonoNs> {
         self.look();
         let position = self.waiting.iter().position(|(_, message)| message == bytes)?;
@@ -168,7 +168,8 @@ impl Wire for TimedWire<'_> {
 
     fn deliver(&mut self, received: MonoNs, bytes: &[u8]) {
         let sent = self.finish.sent(bytes);
-        // Before the loop can see it. What isn't of the devices (none on sound lines) has the time of its delivery.
+        // Recorded before the loop can see it. Foreign data (none on sound lines) gets its delivery time as send
+        // time.
         self.finish.course.to_consume.push(sent.unwrap_or_else(now));
         self.wire.deliver(received, bytes);
         if let Some(sent) = sent {
@@ -217,7 +218,7 @@ impl Driver for Timed {
     }
 }
 
-/// The yardstick: reads data as it arrives, and records the delay.
+/// The reference: reads data as it arrives and records the delay.
 fn bare(connect: &Connect, finish: Finish) {
     match connect {
         Connect::Serial { port: SerialPort::Path(path), .. } => {
@@ -275,7 +276,7 @@ fn bare_reads(mut finish: Finish, mut read: impl FnMut(&mut [u8]) -> usize) {
     }
 }
 
-/// A loop that is woken as ours is, and does nothing.
+/// A loop that is woken like the program's, and does nothing.
 fn empty_loop(course: &Course) -> thread::Thread {
     let course = course.clone();
     let empty = named("empty", move || {
@@ -289,7 +290,7 @@ fn empty_loop(course: &Course) -> thread::Thread {
     empty.thread().clone()
 }
 
-/// The ends of one sensor's two ports: the driver's and the yardstick's; on a bus both receive from the same one.
+/// The ends of one sensor's two ports: the driver's and the reference's. On a bus both receive from the same port.
 struct Ends {
     ours: EmulatedPort,
     twin: Option<EmulatedPort>,
@@ -346,11 +347,11 @@ impl Ends {
 
 /// Results of a part.
 struct Measured {
-    /// For each sensor the driver's delays and the yardstick's.
+    /// Delays of the driver and of the reference, for each sensor.
     delays: Vec<[Vec<DurNs>; 2]>,
-    /// The same until the end of the tick, and in an empty loop.
+    /// The same delays to the end of the tick, and in an empty loop.
     ends: Vec<[Vec<DurNs>; 2]>,
-    /// CPU time, s, of the threads, by name prefix.
+    /// CPU time of the threads by name prefix, s.
     ports_s: f64,
     loop_s: f64,
     bare_s: f64,
@@ -428,7 +429,7 @@ fn named<T: Send + 'static>(name: &str, work: impl FnOnce() -> T + Send + 'stati
     thread::Builder::new().name(name.to_owned()).spawn(work).unwrap()
 }
 
-/// CPU time, s, of this process's threads with this name prefix. Source: Linux, /proc/PID/task/TID/schedstat.
+/// CPU time of this process's threads with this name prefix, s. Source: Linux, /proc/PID/task/TID/schedstat.
 fn run_s(beginning: &str) -> f64 {
     let Ok(tasks) = std::fs::read_dir("/proc/self/task") else { return f64::NAN };
     let of = |task: std::fs::DirEntry| {
@@ -439,7 +440,7 @@ fn run_s(beginning: &str) -> f64 {
     tasks.flatten().map(of).sum()
 }
 
-/// The devices: requests from hosts go to the simulation, its messages to both ends.
+/// The devices: hosts' requests go to the simulation, and its messages to both ends.
 fn emulate(mut simulation: Simulation, mut ends: Vec<Ends>, ending: &AtomicBool) {
     let origin = now();
     let mut is_ours_first = false;
@@ -511,7 +512,7 @@ fn latency(measured: Duration) {
     println!();
 }
 
-/// Last byte of a return to the end of its tick, in which its flag is out.
+/// Measures the time from a return's last byte to the end of its tick, when its flag is displayed.
 fn flags(measured: Duration) {
     println!("Last byte of a head's return written to the end of its tick, us: p50, p99, p99.9, max\n");
     println!("| cores | returns | ours | an empty loop | ours above it |\n|---|---|---|---|---|");

@@ -1,11 +1,12 @@
-//! A long dive replayed by the binary, on one thread and on several, compared with reading its log with `mcap` alone. Prints Markdown.
+//! Replay of a long dive by the program, on one thread and on several, compared with reading its log with `mcap`
+//! alone. Prints Markdown.
 //!
-//! `cargo bench -p headrace_tests --bench replay` takes the first kilometre of `deploy/scenes/seven-kilometres.toml`,
-//! about a minute; `cargo bench -p headrace_tests --bench replay -- 7` all of it; `-- DIVE.mcap ...` logs that are there. A log that it
-//! makes goes to the system's folder for temporary files, 145 MB per kilometre, and is removed at the end.
+//! `cargo bench -p headrace_tests --bench replay` uses the first kilometre of `deploy/scenes/seven-kilometres.toml`
+//! and takes about a minute; `-- 7` uses all of it, and `-- DIVE.mcap ...` existing logs. The log that it makes is in
+//! the system's temporary folder (145 MB per kilometre) and is removed at the end.
 
 #![expect(clippy::disallowed_methods, reason = "a benchmark reads the clock")]
-#![expect(clippy::unwrap_used, reason = "a benchmark stops at what it can't do")]
+#![expect(clippy::unwrap_used, reason = "a failed step ends the benchmark")]
 
 use std::io::Read;
 use std::path::{Path, PathBuf};
@@ -65,7 +66,7 @@ fn compare(log: &Path, name: &str, folder: &Path) {
     }
 }
 
-/// The log of the scene's first kilometres.
+/// Simulates a log of the scene's first kilometres.
 fn simulated(folder: &Path, km: u32) -> PathBuf {
     let root = headrace_tests::root();
     let text = std::fs::read_to_string(root.join("deploy/scenes/seven-kilometres.toml")).unwrap();

@@ -1,11 +1,11 @@
-//! Speed of the loop, each figure compared with a yardstick measured in the same run. Prints Markdown.
+//! Speed of the loop, each figure compared with a reference measured in the same run. Prints Markdown.
 //!
-//! `cargo bench -p headrace_tests` runs it on one core for about a minute. Absolute times drift on shared machines; the
-//! ratios hold.
+//! `cargo bench -p headrace_tests` runs on one core for about a minute. Absolute times drift on shared machines, but
+//! the ratios hold.
 
 #![expect(clippy::disallowed_methods, reason = "a benchmark reads the clock")]
-#![expect(clippy::disallowed_types, reason = "std's hash map is a yardstick here")]
-#![expect(clippy::unwrap_used, reason = "a benchmark stops at what it can't do")]
+#![expect(clippy::disallowed_types, reason = "std's hash map is a reference here")]
+#![expect(clippy::unwrap_used, reason = "a failed step ends the benchmark")]
 
 use std::collections::HashMap;
 use std::hint::black_box;
@@ -99,7 +99,7 @@ impl Decoder for Nothing {
     }
 }
 
-/// When each stage of the present tick ended, and before the first of them.
+/// Start of the first stage and end of each stage in the present tick.
 #[derive(Resource, Default)]
 struct Ends(Vec<Instant>);
 
@@ -107,7 +107,7 @@ fn note(mut ends: ResMut<'_, Ends>) {
     ends.0.push(Instant::now());
 }
 
-/// A loop that notes when each stage ends.
+/// A loop that records the end of each stage.
 fn noting(scene: &Scene, ticks: usize) -> Loop {
     let mut app = app(scene, true);
     app.insert_resource(Ends(Vec::with_capacity(ticks * Stage::ALL.len())));
@@ -143,7 +143,7 @@ fn app(scene: &Scene, decoding: bool) -> App {
     app
 }
 
-/// A message of a simulation, to be fed to the loop.
+/// A message of a simulation for the loop.
 struct Kept {
     at: MonoNs,
     source: u16,
@@ -155,7 +155,7 @@ fn run(dive: &mut Loop, messages: &[Kept]) -> Vec<Duration> {
     run_noting(dive, messages, &mut Vec::new())
 }
 
-/// The same; notes when each tick begins.
+/// As [`run`], and records the start of each tick.
 fn run_noting(dive: &mut Loop, messages: &[Kept], begins: &mut Vec<Instant>) -> Vec<Duration> {
     let mut ports: Vec<_> = (0..dive.sources().len()).map(|source| dive.take_port(source).unwrap()).collect();
     let mut ticks = Vec::new();
@@ -216,7 +216,7 @@ fn whole_loop() {
     );
 }
 
-/// All messages of a scene that the loop gets.
+/// Duration of a scene, and its messages for the loop.
 fn messages_of(scene: &Scene) -> (f64, Vec<Kept>) {
     let mut simulation = Simulation::new(scene).unwrap();
     let data_s = simulation.duration_s();
@@ -229,13 +229,14 @@ fn messages_of(scene: &Scene) -> (f64, Vec<Kept>) {
     (data_s, messages)
 }
 
-/// How long each stage takes in each tick of a dive, us, with what precedes the first: rings, merge, the schedule's start; and the loop
-/// at the end.
+/// Duration of each stage in each tick of a dive, us; and the loop at the end.
+///
+/// The first duration is the work before the first stage: rings, merge, start of the schedule.
 fn spans(scene: &Scene) -> (Loop, Vec<Vec<f64>>) {
     let (_, messages) = messages_of(scene);
     let last = messages.last().map_or(START, |message| message.at);
     let mut dive = noting(scene, usize::try_from(last.since(START).0 / TICK.0).unwrap() + 2);
-    // The tick at arming has noted itself.
+    // The tick at arming has been recorded, too.
     let armed = dive.resource::<Ends>().unwrap().0.len();
     let mut begins = Vec::new();
     run_noting(&mut dive, &messages, &mut begins);
@@ -269,7 +270,7 @@ fn by_stage() {
     }
 }
 
-/// The stage that keeps the list of alerts, in a dive with a missed stretch every four metres, beside one without any.
+/// Cost of the alert list stage in a dive with a missed stretch every four metres, compared with a dive without any.
 fn alerts() {
     const PAIRS: usize = 40;
     const WAY: &str =

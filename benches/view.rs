@@ -1,8 +1,10 @@
-//! Cost of the viewers' data: building the view of a recorded demonstration, compared with all other work of the recorder's
-//! thread for that dive, and the bytes that it adds to the log. Prints Markdown.
+//! Cost of the viewers' data in a recorded demonstration. Prints Markdown.
+//!
+//! It compares building the view with all other work of the recorder's thread, and measures the bytes added to the
+//! log.
 
 #![expect(clippy::disallowed_methods, reason = "a benchmark reads the clock")]
-#![expect(clippy::unwrap_used, reason = "a benchmark stops at what it can't do")]
+#![expect(clippy::unwrap_used, reason = "a failed step ends the benchmark")]
 
 use std::path::Path;
 use std::process::Command;
@@ -15,7 +17,7 @@ use headrace_replay::record::result_channels;
 use headrace_replay::view::{Site, View};
 
 const HEADRACE: &str = env!("CARGO_BIN_EXE_headrace_under_test");
-/// Number of passes, of which the fastest counts.
+/// Number of passes; the fastest counts.
 const PASSES: u32 = 5;
 
 /// A message from the recorder's queue.
@@ -76,7 +78,7 @@ fn fastest(mut work: impl FnMut() -> u64) -> (Duration, u64) {
     least
 }
 
-/// The log's messages, except those for viewers.
+/// The log's messages, without those for viewers.
 fn read(log: &Path) -> (LogHeader, Vec<Entry>) {
     let mut reader = LogReader::open(log).unwrap();
     let info = reader.header();
@@ -104,7 +106,7 @@ fn read(log: &Path) -> (LogHeader, Vec<Entry>) {
 }
 
 fn view() -> View {
-    // The demonstration's tunnel and heads.
+    // Tunnel and heads of the demonstration.
     View::new(Site {
         profile: shapes::ceran().unwrap(),
         target_m: 0.5,
@@ -134,7 +136,7 @@ fn written(header: &LogHeader, entries: &[Entry], with_view: bool) -> u64 {
     for entry in entries {
         match entry.lane {
             Lane::Raw(source) => log.raw(source, entry.at, entry.at, &entry.data).unwrap(),
-            // The order of a tick is that of the message.
+            // The order of a tick is that of its message.
             Lane::Tick => {
                 let tick = headrace_replay::log::format::Tick::decode(&entry.data).unwrap();
                 log.tick(tick.index, tick.now, &tick.order().collect::<Vec<_>>()).unwrap();

@@ -1,6 +1,7 @@
-//! An outlet of one's own: a plugin whose system puts flagged sections into a bounded queue, which another thread prints.
+//! A custom outlet: a plugin whose system puts flagged sections into a bounded queue, which another thread prints.
 //!
-//! Run: `cargo run --example own_outlet [LOG.mcap]`; without a log, a golden one that goes too fast.
+//! Run: `cargo run --example own_outlet [LOG.mcap]`. Without a log it uses a golden log of a vehicle that goes too
+//! fast.
 
 use std::error::Error;
 use std::path::PathBuf;
@@ -27,7 +28,7 @@ use headrace_vehicle::VehicleConfig;
 const GOLDEN: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/golden/too-fast.mcap");
 const CAPACITY: usize = 256;
 
-/// What the thread is told of a flagged section.
+/// A flagged section, as passed to the thread.
 struct Flag {
     at: MonoNs,
     from_m: f64,
@@ -53,7 +54,9 @@ impl Plugin for FlagOutlet {
     }
 }
 
-/// Runs at the end of each tick. The loop never waits: what finds no room is dropped and counted.
+/// Queues new flags; runs at the end of each tick.
+///
+/// The loop never waits: flags that don't fit in the queue are dropped and counted.
 #[expect(clippy::needless_pass_by_value, reason = "bevy hands systems their arguments by value")]
 fn publish(notices: Res<'_, Notices>, coverage: Res<'_, Coverage>, outlet: Res<'_, FlagOutlet>) {
     let sections = &coverage.sections;
@@ -75,7 +78,7 @@ fn publish(notices: Res<'_, Notices>, coverage: Res<'_, Coverage>, outlet: Res<'
 /// Prints flags until the dive has ended and the queue is empty.
 fn print(queue: &Queue) {
     loop {
-        // Asked first: what is pushed before the end is then surely seen.
+        // Read before the queue, so that flags pushed before the end are printed.
         let ended = queue.ended.load(Ordering::Acquire);
         while let Some(Flag { at, from_m, hole_m, cause }) = queue.flags.pop() {
             let cause = cause.map_or("unknown", Cause::as_str);

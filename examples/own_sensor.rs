@@ -1,5 +1,6 @@
-//! A sensor of one's own: a depth sensor that sends lines of text ("P 590000 10.5", Pa and degrees Celsius), in a loop
-//! that is fed three packets.
+//! A custom sensor: a depth sensor that sends lines of text, in a loop that is fed three packets.
+//!
+//! A line is "P 590000 10.5": pressure in Pa and temperature in degrees Celsius.
 //!
 //! Run: `cargo run --example own_sensor`. A device of the product also has a `DeviceKind`, which reads its table in the
 //! vehicle file, and runs `codec_contract!`: CONTRIBUTING.md, "Adding a device".
@@ -23,7 +24,7 @@ use headrace_vehicle::Mission;
 
 const LONGEST_LINE: usize = 32;
 const PERIOD: DurNs = DurNs::from_millis(100);
-/// A line's bytes follow one another without a longer pause.
+/// Longest pause between the bytes of a line.
 const SILENCE: DurNs = DurNs::from_millis(200);
 
 /// The format of a line.
@@ -50,8 +51,9 @@ impl Framing for Lines {
     }
 }
 
-/// Bytes to readings, each line received with its first byte. What is held of a line is state, so that a dive can be restored
-/// within one; settings aren't.
+/// Decodes bytes to readings; each line is received with its first byte.
+///
+/// A partial line is part of the state, so that a dive can be restored in the middle of a line. Settings aren't.
 struct LineDecoder {
     codec: Framed<Lines, LONGEST_LINE>,
     clock: LineClock,
@@ -75,7 +77,7 @@ impl Decoder for LineDecoder {
     }
 }
 
-/// The device's side of the line, for simulations: a line every [`PERIOD`] from `next` on.
+/// The device's side of the line, for simulations: sends a line every [`PERIOD`] from `next` on.
 struct LineEmulator {
     next: MonoNs,
     latency: DurNs,
@@ -137,7 +139,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let mut dive = app.arm(Box::new(navigation))?;
     let mut port = dive.take_port(0).ok_or("the port is taken")?;
 
-    // Packets needn't be lines: the second ends within one.
+    // Packets needn't be lines: the second one ends within a line.
     for (number, bytes) in (1..).zip(["P 590000 10.5\n", "P 591250 10.5\nP 5925", "00 10.6\n"]) {
         let received = MonoNs(number * 100_000_000);
         port.send(received, bytes.as_bytes())?;

@@ -1,4 +1,4 @@
-//! Replays a dive log through the loop and prints each section of the wall that was judged.
+//! Replays a dive log through the loop and prints each judged section of the wall.
 //!
 //! Run: `cargo run --example read_log [LOG.mcap]`; without a log, one of the golden logs.
 
@@ -37,7 +37,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let mut dive = app.arm(vehicle.navigation())?;
     player.connect(dive.sources());
     drive(&mut dive, &mut player, Pace::default(), &mut |_| ())?;
-    // Sections that later samples could still have changed are judged by what there is.
+    // Judges the last sections, which later samples could still have changed.
     dive.finish(&mut |_, _| ());
 
     println!("{}, target {} m", vehicle.name, vehicle.target_m);
@@ -48,7 +48,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         let Some(section) = sections.get(index) else { continue };
         let Some(hole) = section.hole else { continue };
         let from = station(sections.bounds_m(index).0);
-        // Without samples all around it, a hole is at least so large.
+        // Without samples all around it, a hole has at least this diameter.
         let diameter = format!("{}{:.3}", if hole.bounded { "" } else { ">" }, hole.diameter_m);
         println!("{from:>10}  {diameter:>8}  {:>6.3}  {}", section.hole_sd_m, section.verdict.as_str());
     }

@@ -1,7 +1,6 @@
-//! Sampling theory alone: the spacing of samples in the paper's tunnel for one to four heads in FAST mode, and the speed
-//! that a target of 0.5 m allows.
+//! Sampling theory alone: sample spacing in the paper's tunnel, and the speed that a target of 0.5 m allows.
 //!
-//! Run: `cargo run --example sampling_theory`
+//! It prints both for one to four heads in FAST mode. Run: `cargo run --example sampling_theory`
 
 use std::error::Error;
 
@@ -15,15 +14,15 @@ use headrace_sampling::spacing::{Spiral, speed_for_target_mps};
 /// The paper's speed, m/s.
 const SPEED_MPS: f64 = 0.197;
 const TARGET_M: f64 = 0.5;
-/// Soundings of a ring for each step, so that the largest step is found wherever in the turn the pings fall.
+/// Soundings of a ring per step. They find the largest step wherever in the turn the pings fall.
 const PER_STEP: u32 = 10;
 
 fn main() -> Result<(), Box<dyn Error>> {
     let tunnel = shapes::ceran()?;
-    // FAST: steps of 0.9 degrees, 8 s a turn.
+    // FAST: steps of 0.9 degrees, 8 s per turn.
     let fast = Turn::new(0.9_f64.to_radians(), 8.0)?;
 
-    // Half way between floor and crown, looking along the tunnel.
+    // Halfway between floor and crown, looking along the tunnel.
     let at = |z_m| {
         let pose = Pose { position: Point3::new(0.0, 0.0, z_m), attitude: Rot::identity() };
         Standing::new(&tunnel, &pose, &Mount { position: Vec3::zero(), rotation: Rot::identity() })
@@ -37,7 +36,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     println!("FAST at {SPEED_MPS} m/s: {} pings a turn of {} s", fast.steps(), fast.period_s());
     println!("heads  T_x m  T_y m    T m  speed for T = {TARGET_M} m");
     for heads in 1_u8..=4 {
-        // In phase shift, each place is passed once a turn by each head.
+        // With phase-shifted heads, each head passes each place once per turn.
         let passes = f64::from(heads);
         let spiral = Spiral::new(SPEED_MPS, fast, passes)?;
         let (t_x_m, t_y_m, t_m) = (spiral.t_x_m(), spiral.t_y_max_m(t_y2_m), spiral.t_max_m(t_y2_m));

@@ -30,7 +30,7 @@ use value_parsers::{
 /// Commands of `replay --interactive`.
 pub(crate) const COMMANDS: &str =
     "pause, go, step [TICKS], seek TIME, ahead TIME, back TIME, speed N|max, end or quit";
-/// Its keys.
+/// Keys of `replay --interactive`.
 pub(crate) const KEYS: &str =
     "space pause or go, left and right 10 s, up and down 1 min, + - speed, . one tick, q leave";
 
@@ -40,7 +40,7 @@ fn interactive_help() -> String {
 
 /// On-board coverage monitor for sonar inspection of flooded hydroelectric tunnels.
 #[derive(Debug, Parser)]
-// Help names the program, whatever file it runs from.
+// Help uses the program's name, whatever its file is called.
 #[command(bin_name = "headrace", version, arg_required_else_help = true)]
 pub(crate) struct Cli {
     #[command(subcommand)]
@@ -58,7 +58,7 @@ pub(crate) struct Verbosity {
     /// RUST_LOG=debug,headrace_ports=trace sets the log level by crate.
     #[arg(short, long, action = ArgAction::Count, global = true)]
     verbose: u8,
-    /// Show results and errors only: neither log messages nor progress, nor a dive while it goes on.
+    /// Show only results and errors: no log messages, no progress, and nothing of a dive while it runs.
     #[arg(short, long, global = true, conflicts_with = "verbose")]
     quiet: bool,
 }
@@ -74,7 +74,7 @@ impl Verbosity {
         self.verbose > 0
     }
 
-    /// The level of this program's crates; `None` where nothing is asked for.
+    /// Level for this program's crates; `None` by default.
     pub(crate) fn level(&self) -> Option<LevelFilter> {
         match (self.quiet, self.verbose) {
             (true, _) => Some(LevelFilter::ERROR),
@@ -87,123 +87,132 @@ impl Verbosity {
 
 #[derive(Debug, Subcommand)]
 pub(crate) enum Command {
-    /// Run a simulated dive; needs no hardware and no arguments.
+    /// Run a simulated dive, without hardware or arguments.
     ///
-    /// VITA 2 with four heads in the Ceran tunnel, mostly at a suitable speed and for one stretch too fast.
+    /// VITA 2 with four heads inspects the Ceran tunnel, mostly at a suitable speed and for one stretch too
+    /// fast.
     #[command(after_help = "Example:\n  headrace demo --speed max --out /tmp/demo")]
     Demo(Demo),
     /// Run a dive on the vehicle's ports and record it, until interrupted (Ctrl-C).
     ///
-    /// Missing sensors are retried indefinitely while the dive goes on with the others; --require ends the dive if a sensor
-    /// is missing. --source feeds the dive from a log instead of the ports. The exit code is 0 whatever the verdicts: metres that
-    /// are missed, or of which nothing can be said, are in the summary and in the report. It is 3 if data was lost or the
-    /// recording failed, even if it went on. SIGINT and SIGTERM end the dive with its report; closing the terminal doesn't.
+    /// Missing sensors are retried indefinitely while the dive continues with the others. --require ends the
+    /// dive if a sensor is missing. --source takes the packets of a log instead of the ports. The exit code
+    /// doesn't depend on the verdicts: the summary and the report list metres that were missed or have no
+    /// verdict. It is 3 if data was lost or the recording failed, even if it resumed. SIGINT and SIGTERM end
+    /// the dive with its report; closing the terminal doesn't.
     #[command(
         after_help = "Example:\n  headrace run vehicle.toml --record dive.mcap --require imu,sonar_0\n  headrace run vehicle.toml --record dive.mcap --record /media/stick/dive.mcap\n  headrace run vehicle.toml --record dive.mcap --rotate 1GiB\n  headrace run vehicle.toml --source dive.mcap --record again.mcap"
     )]
     Run(Run),
     /// Replay a recorded dive through the same processing as a live one.
     ///
-    /// With --smooth it is replayed twice: once with the filter, and once along the smoothed trajectory. The exit code is 0
-    /// whatever the verdicts: metres that are missed, or of which nothing can be said, are in the summary and in the report.
+    /// With --smooth it is replayed twice: once with the filter, and once along the smoothed trajectory. The
+    /// exit code doesn't depend on the verdicts: the summary and the report list metres that were missed or
+    /// have no verdict.
     #[command(
         after_help = "Example:\n  headrace replay dive.mcap --target 0.6 --report report.json\n  headrace replay dive.mcap --target 0.3,0.6,1.0 --section 0.25,1\n  headrace replay dive.mcap --smooth --report certificate.json\n  headrace replay dive.part*.mcap\n  headrace replay dive.mcap --expect golden.json --bless"
     )]
     Replay(Replay),
     /// Write a recorded dive as one HTML page that opens from disk, without a network.
     ///
-    /// The log is replayed through the same processing; the page is the one that shows a live dive, with the dive inside
-    /// (docs/how-to/read-the-page.md). Exit codes are those of replay.
+    /// The log is replayed through the same processing. The page is that of a live dive, with the whole dive
+    /// inside (docs/how-to/read-the-page.md). Exit codes are those of replay.
     #[command(after_help = "Example:\n  headrace export dive.mcap --html dive.html")]
     Export(Export),
     /// List the notes of a recorded dive, and write the recordings of its voice notes as files.
     ///
-    /// The log isn't replayed: places are those that the dive published. Exit code 3 if the log, or a recording, has been lost in part.
+    /// The log isn't replayed: places are those that the dive published. Exit code 3 if a part of the log or
+    /// of a recording is lost.
     #[command(after_help = "Example:\n  headrace notes dive.mcap\n  headrace notes dive.mcap --out voices")]
     Notes(Notes),
     /// Compare a replay with the results that the dive published live.
     ///
-    /// Reports the first difference of each result stream: tick, sensor, field and both values with their bits. Exit code 4
-    /// if they differ; 3 if they don't, but the log has lost data.
+    /// Reports the first difference of each result stream: tick, sensor, field and both values with their
+    /// bits. Exit code 4 if they differ; 3 if they don't differ but the log has lost data.
     #[command(after_help = "Example:\n  headrace verify dive.mcap")]
     Verify(Verify),
-    /// Write the readable part of a damaged log as a valid log, and list what is lost.
+    /// Write the readable part of a damaged log as a valid log, and list the losses.
     ///
-    /// The new log replays to the same digest. It states what is missing, and so do its reports. Exit code 3 if data is
-    /// missing.
+    /// The new log replays to the same digest. It and its reports state the missing parts. Exit code 3 if
+    /// data is missing.
     #[command(after_help = "Example:\n  headrace recover dive.mcap -o recovered.mcap")]
     Recover(Recover),
     /// Extract part of a log: a time span, a range of chainage, without echo data, or anonymised.
     ///
-    /// The new log states what was cut as a loss, and then contains no live results; with nothing cut it replays to the same
-    /// digest. Exit code 3 if the source log has lost data.
+    /// The new log states the removed parts as losses and then contains no live results. If nothing is
+    /// removed, it replays to the same digest. Exit code 3 if the source log has lost data.
     #[command(
         after_help = "Example:\n  headrace trim dive.mcap -o part.mcap --from 10min --to 20min\n  headrace trim dive.mcap -o bend.mcap --chainage 120..340 --drop-echoes\n  headrace trim dive.mcap -o public.mcap --anonymise"
     )]
     Trim(Trim),
     /// Simulate a scene and write the bytes that its devices would send as a log.
     ///
-    /// Only the effects named in the scene are simulated, or, as the scene wishes, those that it calls for; --explain lists them.
+    /// By default only the effects named in the scene are simulated. With --take called, or the same setting in
+    /// the scene, those that the scene calls for are added. --explain lists them.
     #[command(after_help = SIMULATE_EXAMPLES)]
     Simulate(Simulate),
-    /// Convert a log of another program: MAVLink telemetry, candump, Imagenex, Ping Viewer, CSV, ROS bags and MCAP.
+    /// Convert a log of another program: MAVLink telemetry, candump, Imagenex, Ping Viewer, CSV, ROS bags and
+    /// MCAP.
     ///
-    /// Each message is given to the sensors of the vehicle file that would have received it; the vehicle file is attached to
-    /// the log. Exit code 3 if part of the file was lost, 1 if no sensor takes any message.
+    /// Each message goes to the sensors of the vehicle file that would have received it. The vehicle file is
+    /// attached to the log. Exit code 3 if part of the file was lost, 1 if no sensor receives any message.
     #[command(after_help = IMPORT_EXAMPLES)]
     Import(Import),
     /// Plan an inspection: sample spacing, speed and hours by mode, for a tunnel, heads, layout and target.
     ///
-    /// With --target it computes the largest speed; with --speed or --hours the spacing that they allow. Exit code 1 if no
-    /// mode meets the request.
+    /// With --target it computes the largest speed; with --speed or --hours the resulting spacing. Exit code
+    /// 1 if no mode meets the request.
     #[command(after_help = PLAN_EXAMPLES)]
     Plan(Plan),
-    /// Measure what accuracy costs in time: errors against independent values, setting by setting, beside CPU time or hours.
+    /// Measure the cost of accuracy: errors against independent values, setting by setting, next to CPU time
+    /// or hours.
     #[command(disable_help_flag = true, after_help = elsewhere::COST)]
     Cost(Elsewhere),
     /// Estimate mounts, zeros and latencies of the sensors from a log, as values for the vehicle file.
     ///
-    /// Mounts of heads need a full turn while the vehicle stands still off the tunnel's axis; the surface pressure needs
-    /// --at-surface; zeros of cable counters need --chainage; latencies need a dive with yaw and roll. What can't be
-    /// estimated is listed with the reason. Exit code 1 if nothing can be estimated.
+    /// Mounts of heads need a full turn while the vehicle stands still off the tunnel's axis. The surface
+    /// pressure needs --at-surface. Zeros of cable counters need --chainage. Latencies need a dive with yaw
+    /// and roll. Values that can't be estimated are listed with the reason. Exit code 1 if no value can be
+    /// estimated.
     #[command(after_help = CALIBRATE_EXAMPLES)]
     Calibrate(Calibrate),
     /// Emulate a scene's devices on real ports in real time, to rehearse a dive.
     ///
-    /// Writes a vehicle file for `headrace run`. The vehicle waits until all its sensors are connected, and --stand seconds
-    /// more; the command ends at the end of the trajectory.
+    /// Writes a vehicle file for `headrace run`. The vehicle waits until all its sensors are connected, and
+    /// --stand seconds more. The command ends at the end of the trajectory.
     #[command(
         after_help = "Example:\n  headrace emulate deploy/scenes/rehearsal.toml --out /tmp/rehearsal\n  headrace run /tmp/rehearsal/vehicle.toml"
     )]
     Emulate(Emulate),
-    /// List attached devices, permissions and missing ports, with the command that fixes each.
+    /// List attached devices, permissions and missing ports, with the command that fixes each problem.
     ///
-    /// No port is opened without --probe or --address. Probing identifies 881 heads and Ping devices with one short ping and
-    /// no movement. Don't probe during a dive; other devices on serial ports receive the probes, too. With --vehicle, exit
-    /// code 1 if a sensor's port is missing or may not be opened.
+    /// No port is opened without --probe or --address. Probing identifies 881 heads and Ping devices with one
+    /// short ping and no movement. Don't probe during a dive: other devices on serial ports receive the
+    /// probes, too. With --vehicle, the exit code is 1 if a sensor's port is missing or may not be opened.
     #[command(
         after_help = "Example:\n  headrace devices\n  headrace devices --probe --address tcp:192.168.0.5:4040\n  headrace devices --vehicle vehicle.toml"
     )]
     Devices(Devices),
-    /// Check a vehicle or scene file: all errors, warnings, and what a plan makes of it.
+    /// Check a vehicle or scene file: list all errors and warnings, and the resulting plan.
     ///
-    /// Exit code 2 with errors; warnings are for people and change nothing.
+    /// Exit code 2 with errors. Warnings don't affect it.
     #[command(
         after_help = "Example:\n  headrace check deploy/vehicles/vita2-4.toml\n  headrace check deploy/scenes/demo.toml"
     )]
     Check(Check),
-    /// Ask hundreds of dives in SQL, each replayed once.
+    /// Query hundreds of dives in SQL, each replayed once.
     #[command(disable_help_flag = true, after_help = elsewhere::CAMPAIGN)]
     Campaign(Elsewhere),
-    /// Replay a share of a folder's dives, and keep their tables as Parquet: for Slurm, Nextflow, CI matrices.
+    /// Replay a share of a folder's dives and keep their tables as Parquet, for Slurm, Nextflow or CI
+    /// matrices.
     #[command(disable_help_flag = true, after_help = elsewhere::CAMPAIGN)]
     Batch(Elsewhere),
-    /// Write a shell's completions of this command line to stdout.
+    /// Write the shell completions of this command line to stdout.
     #[command(
         after_help = "Example:\n  headrace completions bash > ~/.local/share/bash-completion/completions/headrace\n  headrace completions zsh > \"${fpath[1]}/_headrace\""
     )]
     Completions(Completions),
-    /// Write manual pages: the program's to stdout, or all into a folder.
+    /// Write manual pages: the program's page to stdout, or all pages into a folder.
     #[command(after_help = "Example:\n  headrace man | man -l -\n  headrace man ~/.local/share/man/man1")]
     Man(Man),
 }
@@ -219,7 +228,7 @@ pub(crate) struct Demo {
     pub(crate) following: Following,
     #[command(flatten)]
     pub(crate) overwrite: Overwrite,
-    /// Open no browser.
+    /// Don't open a browser.
     #[arg(long, help_heading = "Page")]
     pub(crate) no_open: bool,
     #[command(flatten)]
@@ -230,22 +239,22 @@ pub(crate) struct Demo {
 pub(crate) struct Run {
     /// Vehicle file.
     pub(crate) vehicle: PathBuf,
-    /// Log, or folder of a recording in parts, to use instead of the ports.
+    /// Log, or folder of a recording in parts, that replaces the ports.
     #[arg(long, value_name = "LOG.mcap", conflicts_with_all = ["require", "require_within", "duration", "no_record"])]
     pub(crate) source: Option<PathBuf>,
-    /// Log to write; by default, on ports, dive-SECONDS.mcap in the current folder. Given twice, the dive is recorded twice, best
-    /// on two media: an error of one doesn't touch the other. After an error a recording goes on in a further part
-    /// (dive.part002.mcap).
+    /// Log to write. On ports the default is dive-SECONDS.mcap in the current folder. Given twice, the dive
+    /// is recorded twice, best on two media: an error of one doesn't affect the other. After an error a
+    /// recording resumes in a new part (dive.part002.mcap).
     #[arg(long, value_name = "LOG.mcap")]
     pub(crate) record: Vec<PathBuf>,
-    /// Record in parts (dive.part001.mcap, ... for dive.mcap), each a complete log, of this size (1GiB, 500MB) or duration
-    /// (30min, 2h).
+    /// Record in parts (dive.part001.mcap, ... for dive.mcap). Each part is a complete log of this size
+    /// (1GiB, 500MB) or duration (30min, 2h).
     #[arg(long, value_name = "1GiB|30min", value_parser = rotation, conflicts_with = "no_record")]
     pub(crate) rotate: Option<Every>,
     /// Don't record.
     #[arg(long, conflicts_with = "record")]
     pub(crate) no_record: bool,
-    /// Ids of the sensors without which the dive ends, or all.
+    /// Ids of the required sensors, or all. The dive ends if one is missing.
     #[arg(long, value_name = "ID,..", value_delimiter = ',')]
     pub(crate) require: Vec<String>,
     /// Timeout for required sensors to start, seconds.
@@ -277,7 +286,8 @@ pub(crate) struct Emulate {
     /// Address on which network devices listen.
     #[arg(long, value_name = "ADDRESS", default_value = "127.0.0.1")]
     pub(crate) listen: std::net::IpAddr,
-    /// Time for which the vehicle stands still once all sensors are connected, seconds: heads reach their start angles.
+    /// Time for which the vehicle stands still once all sensors are connected, seconds. Heads reach their
+    /// start angles in it.
     #[arg(long, value_name = "SECONDS", default_value = "8", value_parser = seconds)]
     pub(crate) stand: f64,
     /// Time for which the devices keep sending after the end of the trajectory, seconds.
@@ -295,32 +305,33 @@ pub(crate) struct Replay {
     /// Vehicle file, overriding the one attached to the log.
     #[arg(long, value_name = "FILE")]
     pub(crate) vehicle: Option<PathBuf>,
-    /// Target T, metres, overriding the vehicle file's; each further one is judged by a replay of its own.
+    /// Target T, metres, overriding the vehicle file's. Each further target is judged in a replay of its own.
     #[arg(long, value_name = "METRES,..", value_parser = target, value_delimiter = ',')]
     pub(crate) target: Vec<f64>,
-    /// Section length, metres, overriding the vehicle file's; each further one is judged by a replay of its own.
+    /// Section length, metres, overriding the vehicle file's. Each further length is judged in a replay of
+    /// its own.
     #[arg(long, value_name = "METRES,..", value_parser = section, value_delimiter = ',')]
     pub(crate) section: Vec<f64>,
     /// Speed of sound in the water, m/s, overriding the vehicle file's.
     #[arg(long, value_name = "M/S", value_parser = sound_speed)]
     pub(crate) sound_speed: Option<f64>,
-    /// Playback speed relative to real time, or max; by default max, and 1x with keys in a terminal.
+    /// Playback speed relative to real time, or max. The default is max, or 1x with keys in a terminal.
     #[arg(long, value_name = "max|Nx", value_parser = speed)]
     pub(crate) speed: Option<Speed>,
-    /// Tick length, milliseconds; results don't depend on it.
+    /// Tick length, milliseconds. Results don't depend on it.
     #[arg(long, value_name = "MS", default_value = "20", value_parser = clap::value_parser!(u32).range(1..=60_000))]
     pub(crate) tick_ms: u32,
     #[command(flatten)]
     pub(crate) threads: Threads,
-    /// Start at this time of the dive (90s, 1h20min, 1:23:45); the part before is processed, too.
+    /// Start at this time of the dive (90s, 1h20min, 1:23:45). The part before it is processed, too.
     #[arg(long, value_name = "TIME", value_parser = time, conflicts_with = "smooth")]
     pub(crate) from: Option<DurNs>,
     #[arg(short, long, conflicts_with = "smooth", help = interactive_help())]
     pub(crate) interactive: bool,
-    /// Use the smoothed trajectory, and report what it changes.
+    /// Use the smoothed trajectory, and report its changes.
     #[arg(long, conflicts_with_all = ["speed", "tui", "foxglove"])]
     pub(crate) smooth: bool,
-    /// Report to compare with; exit code 1 if verdicts, holes or the digest differ.
+    /// Report to compare with. Exit code 1 if verdicts, holes or the digest differ.
     #[arg(long, value_name = "GOLDEN.json")]
     pub(crate) expect: Option<PathBuf>,
     /// Show the differences to the golden report, and replace it.
@@ -334,21 +345,21 @@ pub(crate) struct Replay {
     pub(crate) page: PageArgs,
 }
 
-/// What --take takes.
+/// Effects for --take.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub(crate) enum TakeWhat {
-    /// What the scene names.
+    /// Effects that the scene names.
     Only,
-    /// What the scene calls for, and what it names.
+    /// Effects that the scene names, and those that it calls for.
     Called,
 }
 
-/// What --explain tells.
+/// Output of --explain.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub(crate) enum Explain {
-    /// What would be simulated, and what calls for it.
+    /// The effects that would be simulated, with their reasons.
     List,
-    /// That, and what each effect is worth.
+    /// The list, and the worth of each effect.
     Worth,
 }
 
@@ -362,18 +373,19 @@ pub(crate) struct Simulate {
     /// Random seed, overriding the scene's.
     #[arg(long, value_name = "N")]
     pub(crate) seed: Option<u64>,
-    /// CSV file for the ground truth: a row per measurement with the vehicle's pose, the point on the wall, and what each
-    /// effect contributed.
+    /// CSV file for the ground truth. Each measurement has a row with the vehicle's pose, the point on the
+    /// wall, and the contribution of each effect.
     #[arg(long, value_name = "TRUTH.csv")]
     pub(crate) truth: Option<PathBuf>,
-    /// Effects to simulate, overriding the scene's: those alone that it names, or those that it calls for, too.
+    /// Effects to simulate, overriding the scene's choice: only the named ones, or also those that the scene
+    /// calls for.
     #[arg(long, value_enum, value_name = "WHAT")]
     pub(crate) take: Option<TakeWhat>,
-    /// List what would be simulated and why, without simulating; with =worth, also measure what each effect costs and what
-    /// leaving it out changes in this scene's results, over several seeds.
+    /// List the effects that would be simulated, with their reasons, without simulating. With =worth, also
+    /// measure over several seeds the cost of each effect, and how this scene's results change without it.
     #[arg(long, value_enum, num_args = 0..=1, require_equals = true, default_missing_value = "list", value_name = "WHAT")]
     pub(crate) explain: Option<Explain>,
-    /// Seeds that --explain=worth dives, from the scene's on.
+    /// Number of seeds that --explain=worth simulates, beginning with the scene's.
     #[arg(long, value_name = "N", default_value_t = 5, value_parser = clap::value_parser!(u16).range(2..=1000))]
     pub(crate) seeds: u16,
     /// Print a summary as JSON.
@@ -408,10 +420,11 @@ const PLAN_EXAMPLES: &str = "Example:
 
 #[derive(Debug, Args)]
 pub(crate) struct Plan {
-    /// Vehicle file for heads, layout, tunnel and target; other options override it.
+    /// Vehicle file for heads, layout, tunnel and target. Other options override it.
     #[arg(long, value_name = "FILE")]
     pub(crate) vehicle: Option<PathBuf>,
-    /// Tunnel profile by name with dimensions as in a vehicle file (circle,radius_m=3), or a polyline file (.csv).
+    /// Tunnel profile by name with dimensions as in a vehicle file (circle,radius_m=3), or a polyline file
+    /// (.csv).
     #[arg(long, value_name = "TUNNEL")]
     pub(crate) tunnel: Option<String>,
     /// Length to inspect, metres.
@@ -447,7 +460,7 @@ pub(crate) struct Plan {
     /// Largest constant yaw from the tunnel's axis, degrees.
     #[arg(long, value_name = "DEGREES", default_value = "0", value_parser = yaw)]
     pub(crate) yaw: f64,
-    /// Largest yaw rate, degrees/s; it swings the beams along the wall.
+    /// Largest yaw rate, degrees/s. Yaw swings the beams along the wall.
     #[arg(long, value_name = "DEGREES", default_value = "0", value_parser = yaw)]
     pub(crate) yaw_rate: f64,
     /// Print JSON.
@@ -456,7 +469,7 @@ pub(crate) struct Plan {
     /// Print the modes as CSV.
     #[arg(long)]
     pub(crate) csv: bool,
-    /// Print the lines of the vehicle file that make the best answer the dive's: layout, planned speed and modes.
+    /// Print the lines of the vehicle file for the plan's best answer: layout, planned speed and modes.
     #[arg(long, conflicts_with_all = ["json", "csv"])]
     pub(crate) write: bool,
     /// Output folder for SVG charts: perimeter, pattern, speeds and hours (explained in docs/how-to/plan).
@@ -476,7 +489,8 @@ pub(crate) struct Calibrate {
     /// Start time, seconds from the log's first message.
     #[arg(long, value_name = "SECONDS", value_parser = seconds, default_value = "0")]
     pub(crate) from: f64,
-    /// End time, seconds from the log's first message; at most 1200 s after the start, which is the default.
+    /// End time, seconds from the log's first message. The default is 1200 s after the start, which is also
+    /// the most.
     #[arg(long, value_name = "SECONDS", value_parser = seconds)]
     pub(crate) to: Option<f64>,
     /// Time span in which the depth sensor was at or above the water surface, seconds from the log's first message.
@@ -495,7 +509,7 @@ pub(crate) struct Devices {
     /// Probe every serial port that may be opened, at 115200 baud, and the addresses in the vehicle file.
     #[arg(long)]
     pub(crate) probe: bool,
-    /// Address to probe; may be given several times.
+    /// Address to probe. May be given several times.
     #[arg(long, value_name = "tcp:HOST:PORT|udp:HOST:PORT", value_parser = address)]
     pub(crate) address: Vec<Connect>,
     /// Vehicle file whose sensors' ports are checked.
@@ -517,26 +531,27 @@ pub(crate) struct Check {
 
 /// Screens and programs that follow a dive.
 #[derive(Debug, Args)]
-#[command(next_help_heading = "Who follows the dive")]
+#[command(next_help_heading = "Screens and programs that follow the dive")]
 pub(crate) struct Following {
-    /// Show the dive on the whole terminal, for a session over ssh; ? lists the keys.
+    /// Show the dive on the whole terminal, for a session over ssh. The key ? lists the keys.
     #[arg(long)]
     pub(crate) tui: bool,
-    /// Send heartbeats, figures and alerts over MAVLink to this UDP address, as an onboard computer (component 191): to
-    /// QGroundControl, or under BlueOS to its MAVLink server, 127.0.0.1:14550.
+    /// Send heartbeats, figures and alerts over MAVLink to this UDP address, as an onboard computer
+    /// (component 191). Use QGroundControl's address, or under BlueOS that of its MAVLink server,
+    /// 127.0.0.1:14550.
     #[arg(long, value_name = "HOST:PORT", value_parser = udp_address)]
     pub(crate) mavlink_out: Option<String>,
     /// MAVLink system id of the vehicle.
     #[arg(long, value_name = "ID", default_value = "1", value_parser = clap::value_parser!(u8).range(1..), requires = "mavlink_out")]
     pub(crate) mavlink_system: u8,
-    /// Serve the dive to Foxglove or Lichtblick on this machine, by default at 127.0.0.1:8765; a replay takes its playback
-    /// controls. In a program built with --features foxglove.
+    /// Serve the dive to Foxglove or Lichtblick on this machine, by default at 127.0.0.1:8765. They can
+    /// control the playback of a replay. Needs a program built with --features foxglove.
     #[arg(long, value_name = "ADDRESS:PORT", num_args = 0..=1, default_missing_value = "127.0.0.1:8765")]
     pub(crate) foxglove: Option<std::net::SocketAddr>,
 }
 
 impl Following {
-    /// Whether somebody may want to command a replay.
+    /// Whether a follower may want to control a replay.
     pub(crate) fn may_command(&self) -> bool {
         self.tui || self.foxglove.is_some()
     }
@@ -552,13 +567,14 @@ pub(crate) struct Output {
     pub(crate) json: bool,
     #[command(flatten)]
     pub(crate) overwrite: Overwrite,
-    /// Print a JSON object a line while the dive goes on: the state once a second, and what is told of it (docs/reference/live-state.md).
+    /// Print JSON objects, one per line, while the dive runs: the state once a second, and the live messages
+    /// (docs/reference/live-state.md).
     #[arg(long, conflicts_with_all = ["json", "tui"])]
     pub(crate) json_lines: bool,
 }
 
 impl Output {
-    /// How the dive is shown while it goes on.
+    /// Kind of display while the dive runs.
     pub(crate) fn show(&self) -> Show {
         match self {
             Self { json_lines: true, .. } => Show::JsonLines,

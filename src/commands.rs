@@ -48,7 +48,7 @@ pub(crate) fn demo(args: &Demo) -> Result<u8, Failure> {
     let mut claims = Claims::reading(args.page.files(), &args.overwrite);
     claims.claim("--out", &log, Kind::Simulation)?;
     claims.claim("--out", &report_file, Kind::Report)?;
-    // The recorder writes new logs only.
+    // The recorder writes only new logs.
     outputs::make_way(&log)?;
     let followers = Followers::of(&args.following)?;
     let interrupted = interrupt::flag()?;
@@ -85,7 +85,7 @@ pub(crate) fn demo(args: &Demo) -> Result<u8, Failure> {
     Ok(exit_code(&report))
 }
 
-/// The page of a demo, and a browser that shows it.
+/// Page of a demo, and a browser that shows it.
 fn demo_page(args: &Demo, scene: &Scene, log: &Path, dive: &Dive, in_lines: bool) -> Option<Served> {
     let of = Of {
         vehicle: &scene.vehicle,
@@ -223,7 +223,9 @@ pub(crate) fn replay(args: &Replay) -> Result<u8, Failure> {
     if player.coming()?.is_none() {
         report.what_if = what_if::reports(args, &files, (vehicle, &text), &report)?;
     } else if what_if::is_asked(args) {
-        tracing::warn!("other targets and sections aren't judged: the replay was ended before its log");
+        tracing::warn!(
+            "other targets and sections aren't judged: the replay was stopped before the end of the log"
+        );
     }
     let code = finish(&report, &args.output)?;
     if let Some(path) = args.expect.as_deref().filter(|_| args.bless) {
@@ -233,12 +235,12 @@ pub(crate) fn replay(args: &Replay) -> Result<u8, Failure> {
     Ok(if differs { failure::FAILED } else { code })
 }
 
-/// The files that a player plays.
+/// Files that a player plays.
 fn files_of_player(player: &Player) -> Vec<PathBuf> {
     player.files().iter().map(|file| file.path.clone()).collect()
 }
 
-/// The page of a replay.
+/// Page of a replay.
 fn replay_page(
     args: &Replay,
     vehicle: &VehicleConfig,
@@ -266,7 +268,7 @@ fn claim_report(output: &Output, claims: &mut Claims) -> Result<(), Failure> {
     output.report.as_ref().map_or(Ok(()), |report| claims.claim("--report", report, Kind::Report))
 }
 
-/// Checks that what a replay writes can be written. The golden report is read, or with --bless written.
+/// Checks that a replay's outputs can be written. The golden report is read, or with --bless written.
 fn claim_of_replay(args: &Replay, logs: &[PathBuf], given: &Given) -> Result<(), Failure> {
     let read = args.expect.iter().filter(|_| !args.bless);
     let inputs = logs.iter().chain(&given.files).chain(read).cloned().chain(args.page.files());
@@ -276,7 +278,8 @@ fn claim_of_replay(args: &Replay, logs: &[PathBuf], given: &Given) -> Result<(),
     blessed.map_or(Ok(()), |golden| claims.claim("--expect", golden, Kind::Report))
 }
 
-/// Overrides the vehicle's settings by the options: of several targets and section lengths the first is the dive's own.
+/// Overrides the vehicle's settings by the options. The first of several targets or section lengths is the
+/// dive's own.
 fn set(args: &Replay, vehicle: &mut VehicleConfig) {
     vehicle.target_m = args.target.first().copied().unwrap_or(vehicle.target_m);
     vehicle.section_m = args.section.first().copied().unwrap_or(vehicle.section_m);

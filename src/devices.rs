@@ -1,4 +1,4 @@
-//! The device kinds of this build. Adding a device adds a line here.
+//! Device kinds of this build. A new device adds a line here.
 
 use headrace_sensor::device::DeviceKind;
 

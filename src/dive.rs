@@ -32,14 +32,14 @@ use crate::progress::Progress;
 use crate::recordings::Recordings;
 use crate::watch::Watch;
 
-/// Capacity of the queue of notices to the terminal; a tick of 20 ms has a handful. A slot takes some 400 bytes, allocated at
-/// arming.
+/// Capacity of the queue of notices to the terminal. A tick of 20 ms has a handful. A slot takes some 400
+/// bytes, allocated at arming.
 const NOTICES: usize = 1 << 10;
 
-/// Keys of a log's metadata: one moment on its clock, and in UTC, nanoseconds.
+/// Keys of a log's metadata: one moment on its clock and in UTC, nanoseconds.
 pub(crate) const CLOCK_ANCHOR: [&str; 2] = ["clock_anchor_monotonic_ns", "clock_anchor_utc_ns"];
 
-/// What is called after every tick.
+/// Callback after every tick.
 type AfterTick<'a> = &'a mut dyn FnMut(&Loop);
 
 /// An armed loop with the vehicle's sensors, and the consumers of its results.
@@ -50,43 +50,43 @@ pub(crate) struct Dive {
     operator: Option<Operator>,
 }
 
-/// The operator's input of a dive that goes on now.
+/// Operator's input of a live dive.
 struct Operator {
     input: ConsoleInput,
     port: ConsolePort,
-    /// Whether it was told that a recording fails.
+    /// Whether the loop was informed of a failed recording.
     fails: bool,
 }
 
 /// A log to write.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Recording<'a> {
-    /// Where to; several are recordings of their own.
+    /// Paths. Several paths are separate recordings.
     pub(crate) paths: &'a [PathBuf],
     pub(crate) clock: Clock,
     /// Size or duration of its parts; `None` for a single file.
     pub(crate) rotate: Option<Every>,
-    /// Name of the scene of which it is a simulation.
+    /// Name of the scene, for a simulation.
     pub(crate) scene: Option<&'a str>,
 }
 
 impl<'a> Recording<'a> {
-    /// A simulated dive's log.
+    /// Log of a simulated dive.
     pub(crate) fn simulated(path: &'a PathBuf, scene: &'a str) -> Self {
         Self { paths: std::slice::from_ref(path), clock: Clock::Theirs, rotate: None, scene: Some(scene) }
     }
 }
 
-/// The clock of the timestamps.
+/// Clock of the timestamps.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Clock {
     /// This machine's monotonic clock.
     Ours,
-    /// That of a recorded or simulated dive.
+    /// Clock of a recorded or simulated dive.
     Theirs,
 }
 
-/// What a dive is assembled from: a vehicle, and what else is asked for.
+/// Inputs for assembling a dive: a vehicle and options.
 pub(crate) struct Assembly<'a> {
     vehicle: &'a VehicleConfig,
     text: &'a str,
@@ -96,29 +96,29 @@ pub(crate) struct Assembly<'a> {
 }
 
 impl<'a> Assembly<'a> {
-    /// A vehicle, and the text of its file, with the navigation that the file states.
+    /// A vehicle and the text of its file, with the navigation that the file states.
     pub(crate) fn of(vehicle: &'a VehicleConfig, text: &'a str) -> Self {
         Self { vehicle, text, recording: None, keeps_results: false, navigation: None }
     }
 
-    /// Records the dive, if this is a recording.
+    /// Records the dive, if there is a recording.
     pub(crate) fn recorded(self, recording: Option<Recording<'a>>) -> Self {
         Self { recording, ..self }
     }
 
-    /// Keeps its results for each tick, if it is followed or compared.
+    /// Keeps results for each tick, if the dive is followed or compared.
     pub(crate) fn kept(self, keeps_results: bool) -> Self {
         Self { keeps_results, ..self }
     }
 
-    /// Navigates otherwise than the vehicle file states.
+    /// Uses a navigation other than the vehicle file's.
     pub(crate) fn navigated(self, navigation: Box<dyn Navigation>) -> Self {
         Self { navigation: Some(navigation), ..self }
     }
 
     /// Starts the recorders, and arms the loop.
     ///
-    /// Errors: too little memory; a device or plugin that doesn't fit; a recording that can't be made.
+    /// Errors: too little memory; a device or plugin that doesn't fit; a recording that can't be created.
     pub(crate) fn assemble(self) -> Result<Dive, Failure> {
         let vehicle = self.vehicle;
         memory::check_room(ring_bytes(vehicle))?;
@@ -228,7 +228,7 @@ fn new_dive() -> String {
     dive_name(&[monotonic.0, utc.0.cast_unsigned(), std::process::id().into()])
 }
 
-/// The header of this vehicle's log.
+/// Header of this vehicle's log.
 pub(crate) fn log_header(vehicle: &VehicleConfig, vehicle_text: &str, ticks: bool) -> LogHeader {
     let sources = vehicle.sensor_configs.iter().map(|sensor| SourceInfo {
         id: sensor.id.clone(),
@@ -263,7 +263,7 @@ fn sonars(vehicle: &VehicleConfig) -> Vec<u16> {
 }
 
 impl Dive {
-    /// Takes commands of an operator from now on: a dive that goes on now, and no replay.
+    /// Accepts commands of an operator from now on; for live dives only, not replays.
     pub(crate) fn operated(mut self, clock: Clock) -> Self {
         let clock: Option<Arc<dyn Fn() -> MonoNs + Send + Sync>> = match clock {
             Clock::Ours => Some(Arc::new(headrace_ports::now)),
@@ -274,12 +274,13 @@ impl Dive {
         self
     }
 
-    /// Takes commands for the loop, from any thread; `None` for a dive without an operator.
+    /// Port that takes commands for the loop from any thread; `None` for a dive without an operator.
     pub(crate) fn console(&self) -> Option<ConsolePort> {
         self.operator.as_ref().map(|operator| operator.port.clone())
     }
 
-    /// Runs the loop until the feed ends; returns the report. `beside` is called after every tick and at the end.
+    /// Runs the loop until the feed ends; returns the report. `beside` is called after every tick and at the
+    /// end.
     pub(crate) fn run(
         self,
         feed: &mut dyn PacketSource,
@@ -291,7 +292,7 @@ impl Dive {
         self.run_driven(span, watch, beside, &mut |dive, after_tick| drive(dive, feed, pace, after_tick))
     }
 
-    /// The same on up to `threads` threads; on one at a speed.
+    /// Runs the loop on up to `threads` threads; on one if a speed is set.
     pub(crate) fn run_on(
         self,
         threads: usize,
@@ -334,7 +335,7 @@ impl Dive {
         drop(progress);
         drop(phase);
         if let Err(error @ DriveError::Panicked { .. }) = driven {
-            // The loop isn't whole any more.
+            // Parts of the loop are missing now.
             return Err(error.into());
         }
         let report = self.end(watch, beside);
@@ -396,12 +397,12 @@ impl Dive {
         report
     }
 
-    /// The recorders' inputs for what goes on on devices' lines beside the loop.
+    /// Inputs of the recorders for traffic on devices' lines outside the loop.
     pub(crate) fn line_ports(&self) -> Vec<LinePort> {
         self.recordings.line_ports()
     }
 
-    /// The recorders' inputs for recordings of voice notes.
+    /// Inputs of the recorders for recordings of voice notes.
     pub(crate) fn voice_ports(&self) -> Vec<VoicePort> {
         self.recordings.voice_ports()
     }
@@ -415,7 +416,7 @@ impl Dive {
         // Records the last judgements, too.
         let now = self.armed.now();
         self.armed.tick(now);
-        // A long dive's report takes as much memory as its samples, which are no longer needed.
+        // The report of a long dive takes as much memory as its samples, which are no longer needed.
         self.armed.release_samples();
         let mut report = Report::of(&self.armed);
         let recordings = core::mem::take(&mut self.recordings);
@@ -426,18 +427,18 @@ impl Dive {
 }
 
 impl Operator {
-    /// Tells the loop whether what comes now is recorded, so that it is in what is recorded later, or elsewhere.
+    /// Informs the loop whether data is being recorded, so that later or other recordings contain it.
     fn recording(&mut self, fails: bool) {
         if core::mem::replace(&mut self.fails, fails) == fails {
             return;
         }
         if let Err(error) = self.port.send(&Command::Recording { fails }) {
-            tracing::error!(%error, fails, "a recording's state isn't in the log");
+            tracing::error!(%error, fails, "writing a recording's state to the log failed");
         }
     }
 }
 
-/// Tells what has happened to the recordings, the loop, too.
+/// Reports events of the recordings, also to the loop.
 fn tell_recordings(
     recordings: &mut Recordings,
     watch: &mut Watch,

@@ -1,4 +1,5 @@
-//! Commands that programs of `lab/` do, as git's subcommands are done: so this one stays without an engine for SQL and without oracles.
+//! Commands that programs of `lab/` provide, like git's subcommands. This program thus needs no SQL engine
+//! and no oracles.
 
 use std::ffi::OsStr;
 use std::io::ErrorKind;
@@ -8,7 +9,7 @@ use std::process::Command;
 use crate::cli::Elsewhere;
 use crate::failure::{self, Failure};
 
-/// A program of `lab/`, and the package that has it.
+/// A program of `lab/`, and its package.
 pub(crate) struct Program {
     name: &'static str,
     package: &'static str,
@@ -19,10 +20,11 @@ pub(crate) const CAMPAIGN: Program = Program { name: "headrace-campaign", packag
 /// `headrace cost`.
 pub(crate) const COST: Program = Program { name: "headrace-cost", package: "headrace_cost" };
 
-/// Runs a program of `lab/` with these arguments after `first`; returns its exit code. It is looked for beside this program, where `lab/` of
-/// the same clone builds it, and on PATH.
+/// Runs a program of `lab/` with these arguments after `first`; returns its exit code.
 ///
-/// Errors: there is none, with the command that builds it; it can't be started.
+/// It searches next to this program, where `lab/` of the same clone builds it, and on PATH.
+///
+/// Errors: there is no such program (the text has the command that builds it), or it can't be started.
 pub(crate) fn run(program: &Program, first: Option<&str>, args: &Elsewhere) -> Result<u8, Failure> {
     let Program { name, package } = program;
     let own = std::env::current_exe().ok();
@@ -32,7 +34,7 @@ pub(crate) fn run(program: &Program, first: Option<&str>, args: &Elsewhere) -> R
     let found = places.into_iter().flatten().find(|path| path.is_file());
     let arguments = first.map(OsStr::new).into_iter().chain(args.arguments.iter().map(OsStr::new));
     match Command::new(found.unwrap_or_else(|| PathBuf::from(name))).args(arguments).status() {
-        // Ended by a signal.
+        // A signal ended it.
         Ok(status) => Ok(status.code().and_then(|code| u8::try_from(code).ok()).unwrap_or(failure::FAILED)),
         Err(error) if error.kind() == ErrorKind::NotFound => Err(Failure::Usage(format!(
             "{name} is neither beside this program, nor in lab/target/release, nor on PATH; build it with: \

@@ -20,7 +20,7 @@ use crate::logging::complain;
 use crate::output::say;
 use crate::outputs::{self, Claims, Kind, REHEARSAL};
 
-/// Longest wait for a host, ns; bounds the delay of a measurement.
+/// Longest wait for a host, ns. It bounds the delay of a measurement.
 const WAIT_NS: u32 = 1_000_000;
 
 /// `headrace emulate`.
@@ -31,7 +31,7 @@ pub(crate) fn emulate(args: &Emulate) -> Result<u8, Failure> {
     let scene = Scene::parse(Document::new(&name, &text), &KINDS, &load, args.seed)?;
     if scene.is_advised() {
         return Err(Failure::Usage(format!(
-            "emulate: {name} has a pilot who heeds advice, which hosts don't send; simulate it instead"
+            "emulate: {name} has a pilot who follows advice, which hosts don't send; simulate it instead"
         )));
     }
     let vehicle_file = args.out.join("vehicle.toml");
@@ -65,12 +65,12 @@ fn claim(scene: &Scene, args: &Emulate, vehicle_file: &Path, beside: &Beside) ->
     Ok(())
 }
 
-/// Whether a file is the same as one of an earlier rehearsal, which is no other one.
+/// Whether a file equals that of an earlier rehearsal, which may be overwritten.
 fn holds(path: &Path, content: &str) -> bool {
     std::fs::read(path).is_ok_and(|there| there == content.as_bytes())
 }
 
-/// A port for each sensor, of its `connect`'s carrier, or UDP if this machine lacks it.
+/// Opens a port for each sensor, on its `connect`'s carrier, or UDP if this machine lacks it.
 fn stands(scene: &Scene, args: &Emulate) -> Result<Vec<EmulatedPort>, Failure> {
     let mut stands = Vec::new();
     for ((id, asked), device) in connections(&scene.vehicle).into_iter().zip(&scene.vehicle.sensors) {
@@ -113,7 +113,8 @@ fn write_vehicle(scene: &Scene, stands: &[EmulatedPort], folder: &Path, file: &P
     files::write(file, text.as_bytes())
 }
 
-/// The scene's vehicle file with a `connect` in each sensor's table; simulations don't need one, so some may lack it.
+/// The scene's vehicle file with a `connect` in each sensor's table. Simulations don't need it, so it may be
+/// missing.
 fn with_connects(scene: &Scene) -> String {
     let missing: Vec<String> = scene
         .vehicle

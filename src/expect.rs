@@ -9,7 +9,7 @@ use crate::failure::Failure;
 use crate::files;
 use crate::logging::complain;
 
-/// Most differences listed.
+/// Maximum number of differences listed.
 const SHOWN: usize = 20;
 
 /// A golden report, without the log's name and hash and the history of ports.
@@ -19,7 +19,7 @@ pub(crate) struct Golden {
 }
 
 impl Golden {
-    /// Reads it.
+    /// Reads a golden report.
     ///
     /// Errors: it can't be read, or isn't a report.
     pub(crate) fn read(path: &Path) -> Result<Self, Failure> {
@@ -33,8 +33,8 @@ impl Golden {
         Ok(Self { expected, allowed })
     }
 
-    /// Whether a report differs from it by more than its tolerances, apart from the log and the ports. Lists the differences on
-    /// stderr.
+    /// Whether a report differs by more than the tolerances, apart from the log and the ports. Lists the
+    /// differences on stderr.
     pub(crate) fn differs(&self, report: &Report) -> Result<bool, Failure> {
         Ok(tell(&self.expected, &without_log(report)?, &self.allowed))
     }
@@ -55,7 +55,7 @@ pub(crate) fn bless(report: &Report, golden: &Path) -> Result<(), Failure> {
             if let (Some(stated), Some(report)) = (stated, got.as_object_mut()) {
                 report.insert(TOLERANCES.to_owned(), stated);
             }
-            // One that lacks keys, as earlier versions wrote it, is completed.
+            // A golden report of an earlier version, with keys missing, is completed.
             let lacks = |key: &String| before.get(key).is_none();
             if !differs && !got.as_object().is_some_and(|got| got.keys().any(lacks)) {
                 complain(&format!("{}: unchanged", golden.display()));
@@ -69,8 +69,10 @@ pub(crate) fn bless(report: &Report, golden: &Path) -> Result<(), Failure> {
     files::write(golden, text.as_bytes())
 }
 
-/// Key of a golden report for its tolerances: by path, in which `*` stands for any one name or index, the largest difference
-/// of two numbers, or `"any"`.
+/// Key of a golden report for its tolerances, by path.
+///
+/// In a path, `*` matches any one name or index. The value is the largest difference of two numbers, or
+/// `"any"`.
 const TOLERANCES: &str = "tolerances";
 
 /// Tolerances by path; `None` allows any difference.
@@ -78,7 +80,7 @@ const TOLERANCES: &str = "tolerances";
 struct Allowed(Vec<(Vec<String>, Option<f64>)>);
 
 impl Allowed {
-    /// Removes them from a golden report.
+    /// Removes the tolerances from a golden report.
     fn take(golden: &mut Value) -> Result<Self, String> {
         let stated = golden.as_object_mut().and_then(|golden| golden.remove(TOLERANCES));
         let Some(stated) = stated else { return Ok(Self::default()) };
@@ -121,7 +123,7 @@ fn without_log(report: &Report) -> Result<Value, Failure> {
     Ok(value)
 }
 
-/// Without a log and ports, as of a dive that had neither: a replay has no ports.
+/// Removes log and ports: a replay has no ports.
 fn drop_log(report: &mut Value) {
     if let Some(object) = report.as_object_mut() {
         object.insert("log".to_owned(), Value::Null);
@@ -157,7 +159,7 @@ fn rank(difference: &str) -> u8 {
     }
 }
 
-/// Name of a list's entry: its index, for a section with its bounds.
+/// Name of a list's entry: its index, or for a section its bounds.
 fn entry_name(index: usize, entry: &Value) -> String {
     let metres = |key: &str| entry.get(key).and_then(Value::as_f64);
     match (metres("start_m"), metres("end_m")) {

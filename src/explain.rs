@@ -1,4 +1,4 @@
-//! `headrace simulate --explain`: what would be simulated, what calls for it, and what it is worth.
+//! `headrace simulate --explain`: lists the simulated effects, their reasons, and their worth.
 
 use headrace_replay::worth::{HOLE_LIMIT_M, LeftOut, Mean, PASSED_LIMIT, Worth, measure};
 use headrace_simulator::effects::KINDS as EFFECTS;
@@ -13,15 +13,15 @@ use crate::progress::Progress;
 /// Width of a column with a figure and its interval.
 const COLUMN: usize = 20;
 
-/// Measures what a scene's effects are worth, the scene having been read with several seeds.
+/// Measures the worth of a scene's effects. The scene has been read with several seeds.
 pub(crate) fn worth_of(scenes: &mut [Scene]) -> Result<Worth, Failure> {
     let _phase = Phase::start("worth");
     let mut progress = Progress::start();
     Ok(measure(scenes, &mut |dived, most| progress.step(&format!("{dived} of at most {most} dives")))?)
 }
 
-/// Lists a scene's systems, components and random streams, the effects that it calls for and those it doesn't use, and their worth
-/// if it was measured.
+/// Lists a scene's systems, components and random streams, the used and unused effects, and their worth if
+/// measured.
 pub(crate) fn explain(scene: &Scene, worth: Option<&Worth>, as_json: bool) -> Result<u8, Failure> {
     let simulation = Simulation::new(scene)?;
     if as_json {
@@ -103,7 +103,7 @@ fn worth_in_json(worth: &Worth) -> Value {
     })
 }
 
-/// What the effects are worth: the cheapest set that suffices, then each effect, the dearest first.
+/// Text on the worth of the effects: the cheapest sufficient set, then each effect, the most expensive first.
 fn worth_in_words(worth: &Worth) -> String {
     let kept =
         worth.each.iter().flat_map(|out| &out.effects).filter(|name| !worth.spared.effects.contains(name));
@@ -163,7 +163,7 @@ fn called_in_words(called: &[Called]) -> String {
     text
 }
 
-/// What calls for an effect; of the same from many sensors the first.
+/// Callers of an effect: the first one if many sensors call for it.
 fn by(callers: &[String]) -> String {
     const SHOWN: usize = 3;
     let shown = callers.iter().take(SHOWN).map(String::as_str).collect::<Vec<_>>().join("; ");

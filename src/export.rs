@@ -25,7 +25,7 @@ use crate::report_output::{exit_code, note_losses};
 use crate::vehicle_file::Given;
 use crate::watch::Watch;
 
-/// Bytes of voices in a page: two hours.
+/// Maximum total size of recordings in a page, bytes: two hours.
 const MOST_VOICE_BYTES: usize = 24 << 20;
 
 /// `headrace export`.
@@ -63,18 +63,20 @@ pub(crate) fn export(args: &Export) -> Result<u8, Failure> {
     files::write(&args.html, &page)?;
     say(&format!("page   {} ({} kB)", args.html.display(), page.len() / 1000));
     if left_out > 0 {
-        say(&format!("{left_out} recordings of voice notes left out: headrace notes --out writes them"));
+        say(&format!(
+            "{left_out} recordings of voice notes don't fit into the page; headrace notes --out writes them"
+        ));
     }
     Ok(exit_code(&report))
 }
 
-/// The recordings of a dive's voice notes, as many as a page takes, and how many it doesn't.
+/// Recordings of a dive's voice notes that fit into a page, and the number left out.
 fn voices(files: &[PathBuf], report: &Report) -> Result<(Vec<Voice>, u64), Failure> {
     let (mut voices, mut bytes, mut left_out): (Vec<Voice>, _, _) = (Vec::new(), 0, 0);
-    // Most dives have none, and needn't be read once more.
+    // Most dives have no voice notes, and then the log needn't be read again.
     if report.notes.iter().any(|note| note.voice.is_some()) {
         each_voice(files, |voice| {
-            // Sent twice, where the first answer was lost.
+            // A recording is sent twice if the first answer was lost.
             if voices.iter().any(|other| other.id == voice.id) {
                 return Ok::<_, Failure>(());
             }

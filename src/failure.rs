@@ -17,7 +17,7 @@ use headrace_replay::worth::WorthError;
 use headrace_sampling::SamplingError;
 use headrace_simulator::SceneError;
 
-/// Exit code: success, on all the data.
+/// Exit code: success, with all data.
 pub(crate) const OK: u8 = 0;
 /// Exit code: failed, or the result differs from the expected one.
 pub(crate) const FAILED: u8 = 1;
@@ -28,7 +28,7 @@ pub(crate) const DATA_LOST: u8 = 3;
 /// Exit code: the replay differs from the dive.
 pub(crate) const DIVERGED: u8 = 4;
 
-/// Why a command failed.
+/// Reason for which a command failed.
 #[derive(Debug, thiserror::Error)]
 pub(crate) enum Failure {
     #[error("reading {}: {source}", path.display())]
@@ -86,7 +86,7 @@ impl From<ConfigError> for Failure {
 }
 
 impl Failure {
-    /// What it says: all errors of a file, a line each; else one line.
+    /// Text of the error: one line per error of a file, otherwise one line.
     pub(crate) fn lines(&self) -> Vec<String> {
         let words = self.to_string();
         match self {
@@ -97,7 +97,7 @@ impl Failure {
         }
     }
 
-    /// The error of a log that is written to `path`, which it names.
+    /// Error for a log that is being written to `path`, which the text names.
     pub(crate) fn writing(path: &Path) -> impl Fn(LogError) -> Self {
         move |error| match error {
             LogError::Write { source, .. } => Self::Write { path: path.to_owned(), source },
@@ -105,7 +105,7 @@ impl Failure {
         }
     }
 
-    /// Its exit code.
+    /// Exit code.
     pub(crate) fn exit_code(&self) -> u8 {
         match self {
             Self::Config(_)
@@ -118,14 +118,14 @@ impl Failure {
             | Self::Routing(_)
             | Self::Collect(CollectError::Backwards { .. } | CollectError::TooLong { .. }) => USAGE,
             Self::Log(error) if is_wrong_file(error) => USAGE,
-            // Of the vehicle file; how the systems are ordered isn't in it.
+            // Errors of the vehicle file, which doesn't contain the order of systems.
             Self::Plugin(error) if !matches!(error, PluginError::Schedule { .. }) => USAGE,
             _ => FAILED,
         }
     }
 }
 
-/// Whether it is the wrong file that was named, or one that may not be written, rather than a medium that fails.
+/// Whether the wrong or an unwritable file was named, and not a medium failed.
 fn is_wrong_file(error: &LogError) -> bool {
     matches!(
         error,

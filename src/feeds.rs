@@ -1,4 +1,4 @@
-//! Feeds of a dive that end early, and that tell how far they are.
+//! Feeds of a dive that can end early, and that report their progress.
 
 use std::cell::Cell;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -28,7 +28,7 @@ impl PacketSource for Interruptible<'_> {
     }
 }
 
-/// A feed that tells the time of its next packet.
+/// A feed that reports the time of its next packet.
 pub(crate) struct Followed<'a> {
     pub(crate) feed: &'a mut dyn PacketSource,
     pub(crate) at: &'a Cell<MonoNs>,
@@ -52,7 +52,7 @@ impl PacketSource for Followed<'_> {
     }
 }
 
-/// How much of a span of time has passed, 0 to 1; `None` where there is none.
+/// Share of a span of time that has passed, 0 to 1; `None` if there is no span.
 pub(crate) fn share(span: Option<(MonoNs, MonoNs)>, at: MonoNs) -> Option<f64> {
     let (from, to) = span?;
     let whole_s = to.since(from).as_secs_f64();

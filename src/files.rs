@@ -17,17 +17,17 @@ pub(crate) const DEMO_SCENE: (&str, &str) =
 const DEMO_VEHICLE: (&str, &str) =
     ("../vehicles/vita2-4.toml", include_str!("../deploy/vehicles/vita2-4.toml"));
 
-/// The first of the logs named on the command line; messages name it for all of them.
+/// First of the logs named on the command line. Messages name it for all of them.
 pub(crate) fn first_named(logs: &[PathBuf]) -> &Path {
     logs.first().map_or(Path::new(""), PathBuf::as_path)
 }
 
-/// Longest vehicle file, scene, mapping or file of text that one of these names, bytes.
+/// Maximum size of a vehicle file, scene, mapping or text file that one of these names, bytes.
 const TEXT_BYTES: u64 = 16 << 20;
-/// Longest mesh or trajectory that a scene names, and longest report, bytes.
+/// Maximum size of a mesh or trajectory that a scene names, and of a report, bytes.
 const DATA_BYTES: u64 = 256 << 20;
 
-/// Reads a text file that people write.
+/// Reads a hand-written text file.
 pub(crate) fn read(path: &Path) -> Result<String, Failure> {
     read_up_to(path, TEXT_BYTES)
 }
@@ -46,18 +46,19 @@ pub(crate) fn open(path: &Path) -> Result<File, Failure> {
     regular_file::open(path).map_err(|source| Failure::Read { path: path.to_owned(), source })
 }
 
-/// Size of some files together, bytes; what can't be read counts nothing.
+/// Total size of some files, bytes. Unreadable files count as zero.
 pub(crate) fn bytes(files: &[PathBuf]) -> u64 {
     files.iter().filter_map(|file| file.metadata().ok()).map(|metadata| metadata.len()).sum()
 }
 
-/// Writes a file, whole or not at all.
+/// Writes a file atomically.
 pub(crate) fn write(path: &Path, content: &[u8]) -> Result<(), Failure> {
     whole_file::write(path, content).map_err(|source| Failure::Write { path: path.to_owned(), source })
 }
 
-/// Writes a report as JSON, whole or not at all, and without holding all of it in memory: a long dive's would take more than the
-/// dive.
+/// Writes a report as JSON, atomically and without holding all of it in memory.
+///
+/// The JSON of a long dive would take more memory than the dive.
 pub(crate) fn write_json(path: &Path, report: &Report) -> Result<(), Failure> {
     let failed = |source| Failure::Write { path: path.to_owned(), source };
     let mut file = WholeFile::create(path).map_err(failed)?;
@@ -81,7 +82,7 @@ pub(crate) fn bytes_beside(file: &Path) -> impl Fn(&str) -> Result<Vec<u8>, Stri
     move |name| beside.load(name)
 }
 
-/// Loads the files that a file refers to, and remembers which.
+/// Loads the files that a file refers to, and remembers their paths.
 pub(crate) struct Beside {
     folder: PathBuf,
     read: RefCell<Vec<PathBuf>>,
@@ -93,7 +94,7 @@ impl Beside {
         Self { folder, read: RefCell::new(vec![file.to_owned()]) }
     }
 
-    /// Loads one of them.
+    /// Loads one of these files.
     pub(crate) fn load(&self, name: &str) -> Result<Vec<u8>, String> {
         let path = self.folder.join(name);
         self.read.borrow_mut().push(path.clone());
@@ -101,7 +102,7 @@ impl Beside {
             .map_err(|error| format!("can't be read at {}: {error}", path.display()))
     }
 
-    /// The file, and those that it refers to as far as they have been loaded.
+    /// The file, and those referenced files that have been loaded.
     pub(crate) fn files(&self) -> Vec<PathBuf> {
         self.read.borrow().clone()
     }

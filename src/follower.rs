@@ -1,4 +1,4 @@
-//! Who follows a dive besides the terminal: a page, another program.
+//! Interface of followers of a dive besides the terminal: a page, another program.
 
 use headrace_geometry::time::{DurNs, MonoNs};
 use headrace_monitor::messages::Notice;
@@ -8,25 +8,28 @@ use headrace_replay::log::RecordingEvent;
 
 use crate::recording_state::RecordingState;
 
-/// Follows a dive. Called on the loop's thread between ticks: it takes what it needs of the loop by value and hands it to a
-/// thread of its own; it waits for nothing, unless the dive is a replay, which may wait for it.
+/// Follows a dive. It is called on the loop's thread between ticks.
+///
+/// It takes values from the loop and hands them to a thread of its own. It never waits, except in a replay,
+/// which may wait for it.
 pub(crate) trait Follower {
     /// A result of the last tick.
     fn notice(&mut self, _notice: &Notice, _dive: &Loop) {}
-    /// After every tick, also where nothing has come.
+    /// Called after every tick, even without packets.
     fn tick(&mut self, dive: &Loop);
-    /// After a tick on the way of a jump, whose notices aren't shown.
+    /// Called after a tick during a jump, whose notices aren't shown.
     fn skipped(&mut self, _dive: &Loop) {}
-    /// A replay begins to stand still or to play, or its speed changes.
+    /// Called when a replay pauses or resumes, or its speed changes.
     fn mode(&mut self, _paused: bool, _speed: Option<f64>) {}
-    /// A sensor's connection has changed.
+    /// Called when a sensor's connection has changed.
     fn sensor(&mut self, _id: &str, _status: &Status) {}
-    /// Something has happened to a recording.
+    /// Called for an event of a recording.
     fn recording(&mut self, _event: &RecordingEvent, _at: MonoNs) {}
-    /// What to show of the recordings from now on.
+    /// Called with the state of the recordings to show from now on.
     fn recorded(&mut self, _state: &RecordingState) {}
-    /// A replay has paused, jumped or ended at `time` after its beginning: the loop's state may be another.
+    /// Called when a replay has paused, jumped or ended at `time` after its beginning. The loop's state may
+    /// differ.
     fn stopped(&mut self, _dive: &Loop, _time: DurNs, _ended: bool) {}
-    /// The dive has ended, and all is judged.
+    /// Called when the dive has ended, and all is judged.
     fn end(&mut self, dive: &Loop);
 }

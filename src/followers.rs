@@ -1,4 +1,4 @@
-//! Who follows a dive, as the command line asks.
+//! Followers of a dive requested on the command line.
 
 use std::net::SocketAddr;
 use std::sync::Arc;
@@ -14,7 +14,7 @@ use crate::mavlink_out::MavlinkOut;
 use crate::tui::{Mode, Start, Tui};
 use crate::watch::{Show, Watch};
 
-/// Those that were asked for.
+/// Requested followers.
 pub(crate) struct Followers {
     tui: bool,
     /// Address and system id.
@@ -22,7 +22,7 @@ pub(crate) struct Followers {
     foxglove: Option<SocketAddr>,
 }
 
-/// What they follow.
+/// The dive for the followers.
 pub(crate) struct Joining<'a> {
     vehicle: &'a VehicleConfig,
     mode: Mode,
@@ -40,26 +40,26 @@ impl<'a> Joining<'a> {
         Self { vehicle, mode, interrupted, first: None, console: None, span: None }
     }
 
-    /// Takes an operator's commands; `None` for a dive that is over.
+    /// Accepts an operator's commands; `None` for a recorded dive.
     pub(crate) fn operated(self, console: Option<ConsolePort>) -> Self {
         Self { console, ..self }
     }
 
-    /// The first and the last time of a log.
+    /// Sets the first and the last time of a log.
     pub(crate) fn over(self, span: Option<(MonoNs, MonoNs)>) -> Self {
         Self { span, ..self }
     }
 
-    /// What is said of it before anything else.
+    /// Sets the line shown before anything else.
     pub(crate) fn saying(self, first: String) -> Self {
         Self { first: Some(first), ..self }
     }
 }
 
 impl Followers {
-    /// To be called before signals are handled.
+    /// Creates the requested followers. Call it before signals are handled.
     ///
-    /// Errors: a follower that can't be had here.
+    /// Errors: a follower isn't available here.
     pub(crate) fn of(asked: &Following) -> Result<Self, Failure> {
         if asked.foxglove.is_some() && !cfg!(feature = "foxglove") {
             let why = "--foxglove: this program was built without it; cargo build --features foxglove";
@@ -72,14 +72,14 @@ impl Followers {
         Ok(Self { tui: asked.tui, mavlink_out, foxglove: asked.foxglove })
     }
 
-    /// How the dive is shown on stdout, where otherwise it would be so.
+    /// Display of the dive on stdout; `otherwise` is the default.
     pub(crate) fn show(&self, otherwise: Show) -> Show {
         if self.tui { Show::Followers } else { otherwise }
     }
 
-    /// Adds them.
+    /// Adds the followers.
     ///
-    /// Errors: one can't be started.
+    /// Errors: a follower can't be started.
     pub(crate) fn join(self, mut watch: Watch, joining: Joining<'_>) -> Result<Watch, Failure> {
         if let Some((to, system_id)) = &self.mavlink_out {
             watch = watch.followed_by(Box::new(MavlinkOut::start(to, *system_id)?));
@@ -116,6 +116,6 @@ fn foxglove(watch: Watch, at: SocketAddr, joining: &Joining<'_>) -> Result<Watch
 #[cfg(not(feature = "foxglove"))]
 #[expect(clippy::unnecessary_wraps, reason = "with the feature it may fail")]
 fn foxglove(watch: Watch, _: SocketAddr, _: &Joining<'_>) -> Result<Watch, Failure> {
-    // Refused before.
+    // This was refused earlier.
     Ok(watch)
 }

@@ -1,5 +1,7 @@
-//! `--foxglove`: the messages that a recording has for viewers, live, by Foxglove's own server. They are made on a thread of
-//! their own, as the recorder's are on its; the loop's thread copies the words of a tick's results and no more.
+//! `--foxglove`: sends the viewer messages of a recording live, with Foxglove's own server.
+//!
+//! A separate thread builds the messages, as the recorder's does. The loop's thread only copies the words of
+//! a tick's results.
 
 use std::net::SocketAddr;
 use std::sync::Arc;
@@ -24,11 +26,11 @@ use headrace_replay::view::{Site, View};
 use crate::failure::Failure;
 use crate::follower::Follower;
 
-/// Ticks' results that may wait: at 50 ticks a second some ten seconds.
+/// Number of ticks whose results may wait: some ten seconds at 50 ticks a second.
 const WAITING: usize = 512;
-/// How long the server is given to say goodbye.
+/// Time for the server to close its connections.
 const ENDS_WITHIN: Duration = Duration::from_millis(500);
-/// Interval at which an interruption is noticed.
+/// Interval at which an interruption is checked.
 const WAIT: Duration = Duration::from_millis(200);
 
 /// A replay that Foxglove may control.
@@ -44,7 +46,7 @@ pub(crate) struct Controlled {
 enum Message {
     /// A tick's results: channel and message, and the tick's time.
     Results(MonoNs, Vec<(u16, Vec<u8>)>),
-    /// A replay stands still, has jumped, or has ended.
+    /// A replay has paused, jumped, or ended.
     Stopped(MonoNs, bool),
 }
 
@@ -59,7 +61,7 @@ pub(crate) struct Foxglove {
 impl Foxglove {
     /// Starts serving at an address of this machine.
     ///
-    /// Errors: the address is another machine's, or taken; no thread is to be had.
+    /// Errors: the address belongs to another machine, or is taken; a thread can't be started.
     pub(crate) fn start(
         at: SocketAddr,
         vehicle: &str,
@@ -68,7 +70,8 @@ impl Foxglove {
         controlled: Option<Controlled>,
     ) -> Result<Self, Failure> {
         if !at.ip().is_loopback() {
-            let why = "whoever can reach it sees the dive, without a token; serve it on 127.0.0.1, and reach that over ssh";
+            let why = "everyone who reaches this address sees the dive without a token; \
+                       use 127.0.0.1 and connect over ssh";
             return Err(Failure::Usage(format!("--foxglove {at}: {why}")));
         }
         let context = Context::new();
@@ -83,7 +86,9 @@ impl Foxglove {
                 .listener(Arc::new(listener));
         }
         let failed = |error: &dyn core::fmt::Display| {
-            Failure::Usage(format!("--foxglove {at}: {error}; is another program there?"))
+            Failure::Usage(format!(
+                "--foxglove {at}: {error}; another program may use the port, choose another one"
+            ))
         };
         let handle = server.start_blocking().map_err(|error| failed(&error))?;
         let channels = channels(&context).map_err(|error| failed(&error))?;
@@ -107,7 +112,7 @@ impl Foxglove {
         Ok(Self { results: Some(sender), thread: Some(thread), is_live, dropped: 0 })
     }
 
-    /// A live dive doesn't wait: what finds no room is dropped, and counted.
+    /// A live dive doesn't wait: messages without room are dropped and counted.
     fn send(&mut self, message: Message) {
         let Some(results) = &self.results else { return };
         if self.is_live {
@@ -125,7 +130,7 @@ impl Foxglove {
             tracing::error!("Foxglove's thread has ended early");
         }
         if core::mem::take(&mut self.dropped) > 0 {
-            tracing::warn!("Foxglove was behind: some of the dive wasn't shown there");
+            tracing::warn!("Foxglove couldn't keep up: parts of the dive were not sent");
         }
     }
 }
@@ -167,7 +172,7 @@ impl Drop for Foxglove {
     }
 }
 
-/// The thread's own.
+/// State of the thread.
 struct Server {
     handle: WebSocketServerHandle,
     channels: Vec<Option<Arc<RawChannel>>>,
@@ -200,7 +205,7 @@ impl Server {
         }
         self.view.end(&mut self.made);
         self.show();
-        // What is on its way gets a moment.
+        // Messages in transit get a moment.
         thread::sleep(ENDS_WITHIN);
         drop(self.handle.stop());
     }
@@ -215,7 +220,7 @@ impl Server {
 
     #[expect(clippy::cast_possible_truncation, reason = "Foxglove's speeds are of single precision")]
     fn stopped(&mut self, at: MonoNs, ended: bool) {
-        // What was placed before a jump is no longer so.
+        // Samples placed before a jump are no longer valid.
         self.view = View::new(self.site.clone());
         let Some(controlled) = &self.controlled else { return };
         self.handle.broadcast_playback_state(PlaybackState {

@@ -1,4 +1,4 @@
-//! Signals: a dive ends in good order, and nothing else ends it.
+//! Signals: a dive ends in an orderly way, and only on request.
 
 use std::io::Read as _;
 use std::os::unix::net::UnixStream;
@@ -13,18 +13,20 @@ use signal_hook::consts::{
 
 use crate::failure::Failure;
 
-/// What would end or stop the program by default and says nothing about a dive: a terminal that was closed (whoever loses his
-/// connection must not lose the dive), Ctrl-Z, limits, timers and signals of one's own. A write beyond the limit of file sizes
-/// is then an error like that of a full disk.
+/// Signals that would end or stop the program by default, but don't concern a dive.
+///
+/// They are a closed terminal (a lost connection must not end the dive), Ctrl-Z, limits, timers and user
+/// signals. A write beyond the limit of file sizes is then an error like that of a full disk.
 const PASSED_OVER: [i32; 8] = [SIGHUP, SIGTSTP, SIGUSR1, SIGUSR2, SIGXFSZ, SIGXCPU, SIGALRM, SIGVTALRM];
 
-/// Requests to end within this time count as one: `timeout -s INT` signals the program, then its group, and a key that is held
-/// repeats.
+/// Time within which several requests to end count as one.
+///
+/// `timeout -s INT` signals the program and then its group, and a held key repeats.
 const ONE_REQUEST: Duration = Duration::from_secs(1);
-/// Stack of the thread that waits for signals: it calls nothing deep.
+/// Stack of the thread that waits for signals. It calls nothing deep.
 const STACK_BYTES: usize = 64 << 10;
 
-/// Tells a second request to end from a repetition of the first.
+/// Distinguishes a second request to end from a repetition of the first.
 #[derive(Debug, Default)]
 pub(crate) struct Requests {
     first: Option<Instant>,
@@ -37,22 +39,24 @@ impl Requests {
         self.is_second(Instant::now())
     }
 
-    /// Counts a request at `now`; whether it is a second one, by which the program ends at once.
+    /// Counts a request at `now`. Returns whether it is a second one, which ends the program at once.
     fn is_second(&mut self, now: Instant) -> bool {
         now.duration_since(*self.first.get_or_insert(now)) >= ONE_REQUEST
     }
 }
 
-/// A flag set by SIGINT, SIGTERM or a closed terminal; a second SIGINT or SIGTERM, over a second later, ends the program at once.
+/// Flag set by SIGINT, SIGTERM or a closed terminal.
+///
+/// A second SIGINT or SIGTERM, over a second later, ends the program at once.
 pub(crate) fn flag() -> Result<Arc<AtomicBool>, Failure> {
     let flag = ending()?;
     on(SIGHUP, &flag)?;
-    // For what is recorded from a log or a simulation.
+    // Needed when recording from a log or a simulation.
     on(SIGXFSZ, &Arc::default())?;
     Ok(flag)
 }
 
-/// The same for a dive on ports, which goes on without a terminal.
+/// Flag for a dive on ports, which continues without a terminal.
 pub(crate) fn flag_of_a_dive() -> Result<Arc<AtomicBool>, Failure> {
     let flag = ending()?;
     for signal in PASSED_OVER {
@@ -61,15 +65,15 @@ pub(crate) fn flag_of_a_dive() -> Result<Arc<AtomicBool>, Failure> {
     Ok(flag)
 }
 
-/// Who puts the terminal in order before a second signal ends the program.
+/// Whether the reader of keys restores the terminal before a second signal ends the program.
 static LEFT_TO_KEYS: AtomicBool = AtomicBool::new(false);
 
-/// From now on a second SIGINT or SIGTERM doesn't end the program: whoever reads [`seconds`] does.
+/// From now on a second SIGINT or SIGTERM doesn't end the program; the reader of [`seconds`] does.
 pub(crate) fn leave_second_to_keys() {
     LEFT_TO_KEYS.store(true, Ordering::Relaxed);
 }
 
-/// A byte for every SIGINT and SIGTERM.
+/// Stream with a byte for every SIGINT and SIGTERM.
 pub(crate) fn seconds() -> std::io::Result<UnixStream> {
     let (read, write) = UnixStream::pair()?;
     signal_hook::low_level::pipe::register(SIGINT, write.try_clone()?)?;

@@ -1,5 +1,5 @@
-//! The `headrace` command as a library: command line, configuration, list of device kinds. The work is done in the other
-//! crates; a binary of its own only calls [`main`].
+//! The `headrace` command as a library: command line, configuration and list of device kinds. Other crates do
+//! the work. A custom binary only calls [`main`].
 
 mod calibrate;
 mod check;
@@ -63,8 +63,8 @@ use cli::{Cli, Command};
 
 /// Parses the command line and runs the command.
 ///
-/// Returns the exit code: 0 success, 1 failed or differs, 2 wrong file or argument, 3 finished but data was lost, 4 the
-/// replay differs from the dive.
+/// Returns the exit code: 0 success, 1 failed or differs, 2 wrong file or argument, 3 finished but data was
+/// lost, 4 the replay differs from the dive.
 pub fn main() -> ExitCode {
     let cli = parse();
     logging::start(&cli.verbosity);
@@ -73,7 +73,7 @@ pub fn main() -> ExitCode {
     }
     terminal::be_quiet(cli.verbosity.is_quiet());
     terminal::be_verbose(cli.verbosity.is_verbose());
-    // A dive isn't failed for its output, nor anything for a terminal that is closed.
+    // A dive doesn't fail because of its output, and no command fails because a terminal was closed.
     let needs_output = !matches!(cli.command, Command::Run(_)) && !std::io::stdout().is_terminal();
     let result = match cli.command {
         Command::Demo(demo) => commands::demo(&demo),
@@ -109,21 +109,21 @@ pub fn main() -> ExitCode {
     ExitCode::from(code)
 }
 
-/// The exit code of a command whose output matters: 1 in place of 0 if some of it couldn't be written.
+/// Exit code of a command with essential output: 1 in place of 0 if some of it couldn't be written.
 fn with_output(code: u8) -> u8 {
     let Some(why) = output::lost() else { return code };
     logging::complain(&format!("headrace: {why}"));
     if code == failure::OK { failure::FAILED } else { code }
 }
 
-/// The command line, or the end of the program with help or an error.
+/// Parses the command line. Help or an error ends the program.
 fn parse() -> Cli {
     let colour = if terminal::allows_colour() { ColorChoice::Auto } else { ColorChoice::Never };
     let matches = Cli::command().color(colour).try_get_matches();
     matches.and_then(|matches| Cli::from_arg_matches(&matches)).unwrap_or_else(|error| end_with(&error))
 }
 
-/// Ends the program with an error of the command line, or with the help that was asked for.
+/// Ends the program with an error of the command line, or with the requested help.
 fn end_with(answer: &clap::Error) -> ! {
     if answer.use_stderr() {
         answer.exit();

@@ -1,4 +1,4 @@
-//! What goes on on devices' lines beside the loop, in a dive's recordings.
+//! Records traffic on devices' lines outside the loop.
 
 use headrace_geometry::time::MonoNs;
 use headrace_ports::LineRecord;
@@ -17,7 +17,7 @@ impl LineRecord for InRecordings {
     }
 }
 
-/// The log's number of a sensor.
+/// Number of a sensor in the log.
 fn source(sensor: usize) -> u16 {
     u16::try_from(sensor).unwrap_or(u16::MAX)
 }

@@ -29,7 +29,8 @@ use crate::summary::broken;
 use crate::tui;
 use crate::watch::{Show, Watch};
 
-/// What `headrace check` refuses in the vehicle file: a dive goes on with it, but not without a word.
+/// Texts of the errors that `headrace check` finds in the vehicle file. A dive continues with them, but they
+/// are shown.
 fn wrong_texts(vehicle: &VehicleConfig) -> Vec<String> {
     let errors = vehicle.findings().into_iter().filter(|finding| finding.grade == Grade::Error);
     errors.map(|finding| format!("WRONG in the vehicle file: {finding}")).collect()
@@ -105,7 +106,7 @@ pub(crate) fn run(args: &Run, text: &str, vehicle: &VehicleConfig, claims: Claim
     }
 }
 
-/// The page of a dive on ports.
+/// Page of a dive on ports.
 fn live_page(
     args: &Run,
     vehicle: &VehicleConfig,
@@ -132,7 +133,7 @@ fn live_page(
     page::serve(&args.page, of, if shows_lines { Some(&mut say) } else { None })
 }
 
-/// What is said of a dive that begins.
+/// Text at the beginning of a dive.
 fn begun_text(args: &Run, logs: &[PathBuf], vehicle: &VehicleConfig) -> String {
     let first = |log: &PathBuf| if args.rotate.is_some() { part_path(log, 1) } else { log.clone() };
     let firsts: Vec<String> = logs.iter().map(|log| first(log).display().to_string()).collect();
@@ -145,14 +146,15 @@ fn begun_text(args: &Run, logs: &[PathBuf], vehicle: &VehicleConfig) -> String {
     format!("{}, target {} m: {where_to}; Ctrl-C ends the dive", vehicle.name, vehicle.target_m)
 }
 
-/// Checks that a dive can be recorded to these files; with `--force` removes those that are there, the last of what may be refused.
+/// Checks that a dive can be recorded to these files. With `--force` removes existing ones, as the last step
+/// that may fail.
 pub(crate) fn make_room(logs: &[PathBuf], args: &Run, mut claims: Claims) -> Result<(), Failure> {
     let first = |log: &PathBuf| claims.claim_recording("--record", log, args.rotate.is_some());
     let firsts = logs.iter().map(first).collect::<Result<Vec<_>, _>>()?;
     firsts.iter().try_for_each(|first| outputs::make_way(first))
 }
 
-/// Each sensor's id and its connection, or why its `connect` is invalid.
+/// Each sensor's id and its connection, or the reason for which its `connect` is invalid.
 pub(crate) fn connections(vehicle: &VehicleConfig) -> Vec<(&str, Result<Connect, ConnectError>)> {
     let sensors = vehicle.sensor_configs.iter().zip(&vehicle.sensors);
     let connect = sensors.map(|(config, device)| {
@@ -164,7 +166,7 @@ pub(crate) fn connections(vehicle: &VehicleConfig) -> Vec<(&str, Result<Connect,
 
 /// Numbers of the required sensors.
 ///
-/// Errors: an id that the vehicle doesn't have; a required sensor with an invalid `connect`.
+/// Errors: the vehicle has no sensor with that id, or a required sensor has an invalid `connect`.
 fn required(args: &Run, vehicle: &VehicleConfig) -> Result<Vec<usize>, Failure> {
     let connections = connections(vehicle);
     let all = args.require.iter().any(|id| id == "all");
@@ -185,7 +187,7 @@ fn required(args: &Run, vehicle: &VehicleConfig) -> Result<Vec<usize>, Failure> 
     Ok(required)
 }
 
-/// A thread per connection, with the drivers of the sensors on it.
+/// Starts a thread per connection, with the drivers of its sensors.
 fn supervisor(dive: &mut Dive, vehicle: &VehicleConfig, begun: MonoNs) -> Result<Supervisor, Failure> {
     let mut programs = vehicle.programs().map_err(Failure::Plan)?.into_iter();
     let excluded = vehicle.excluded_from_lines();
@@ -228,7 +230,7 @@ struct SensorStates {
     words: Vec<String>,
     /// Numbers of required sensors that aren't running yet.
     required: Vec<usize>,
-    /// Deadline for these.
+    /// Deadline for the required sensors.
     required_by: MonoNs,
     begun: MonoNs,
 }

@@ -18,12 +18,12 @@ use crate::cli::Verbosity;
 use crate::terminal;
 use crate::transient;
 
-/// The variable that filters by crate or module.
+/// Environment variable that filters by crate or module.
 const VARIABLE: &str = "RUST_LOG";
 /// Prefix of the targets of this program's crates.
 const OURS: &str = "headrace";
 
-/// Starts writing log messages to stderr. A caller of this library that has its own subscriber keeps it.
+/// Starts writing log messages to stderr. If a caller of this library has its own subscriber, that one stays.
 pub(crate) fn start(verbosity: &Verbosity) {
     let (filter, error) = filter(verbosity.level(), std::env::var(VARIABLE).ok().as_deref());
     let layer = fmt::layer().with_ansi(terminal::of(&io::stderr()).colour).with_writer(|| Stderr);
@@ -35,8 +35,10 @@ pub(crate) fn start(verbosity: &Verbosity) {
     }
 }
 
-/// The filter: warnings of all crates, `level` for this program's, and the targets that `RUST_LOG` names at its levels. Returns
-/// an error text, too, if `RUST_LOG` is invalid and ignored.
+/// Filter for log messages, and an error text if `RUST_LOG` is invalid and thus ignored.
+///
+/// It passes warnings of all crates, `level` for this program's crates, and the targets named in `RUST_LOG`
+/// at their levels.
 fn filter(level: Option<LevelFilter>, variable: Option<&str>) -> (Targets, Option<String>) {
     let parsed = match variable.filter(|text| !text.trim().is_empty()) {
         Some(text) => text.parse::<Targets>().map_err(|error| {
@@ -59,31 +61,32 @@ fn filter(level: Option<LevelFilter>, variable: Option<&str>) -> (Targets, Optio
     (filter, error)
 }
 
-/// Lines that may wait for a stderr that doesn't read, in a dive.
+/// Maximum number of lines that wait for an unread stderr during a dive.
 const WAITING: usize = 1 << 10;
-/// How long a dive waits for it at the end.
+/// Longest wait for them at the end of a dive.
 const ENDS_WITHIN: Duration = Duration::from_secs(2);
 
-/// Stderr on a thread of its own.
+/// Stderr on a separate thread.
 struct Background {
     lines: Sender<Line>,
-    /// Lines for which there was no room.
+    /// Number of lines dropped for lack of room.
     dropped: AtomicU64,
 }
 
 enum Line {
     Text(Vec<u8>),
-    /// Disconnected once all before it has been written.
+    /// Its channel is disconnected once all earlier lines have been written.
     Mark(Sender<()>),
 }
 
 static BACKGROUND: OnceLock<Background> = OnceLock::new();
 
-/// From now on nothing waits for stderr: neither a dive nor its recorder stands still because nobody reads it. What finds no
-/// room is dropped and counted.
+/// From now on no thread waits for stderr, so an unread stderr can't block a dive or its recorder.
+///
+/// Lines without room are dropped and counted.
 pub(crate) fn never_wait() {
     let (lines, queue) = bounded(WAITING);
-    // Without a thread everything is dropped once the queue is full.
+    // Without the thread, all lines are dropped once the queue is full.
     let thread = thread::Builder::new().name("stderr".to_owned()).spawn(move || {
         for line in queue {
             match line {
@@ -97,13 +100,13 @@ pub(crate) fn never_wait() {
     }
 }
 
-/// Lines that are kept while the terminal is taken; the oldest are dropped, and counted.
+/// Lines kept while the terminal is in use. The oldest are dropped and counted.
 struct Held {
     is_on: AtomicBool,
-    /// For stderr, once the terminal is back.
+    /// Lines for stderr, once the terminal is released.
     kept: ArrayQueue<Vec<u8>>,
     dropped: AtomicU64,
-    /// For the screen.
+    /// Lines for the screen.
     shown: ArrayQueue<String>,
 }
 
@@ -121,39 +124,40 @@ fn held() -> &'static Held {
     })
 }
 
-/// From now on nothing is written to stderr if that is a terminal: the screen is another's. Lines are kept, and shown there.
+/// From now on nothing is written to stderr if that is a terminal, since a screen uses it. Lines are kept,
+/// and shown there.
 pub(crate) fn hold() {
     held().is_on.store(true, Ordering::Relaxed);
 }
 
-/// The next line for the screen.
+/// Next line for the screen.
 pub(crate) fn next_held() -> Option<String> {
     HELD.get().and_then(|held| held.shown.pop())
 }
 
-/// Writes what was kept: the terminal is back.
+/// Writes the kept lines once the terminal is released.
 pub(crate) fn release() {
     let Some(held) = HELD.get().filter(|held| held.is_on.swap(false, Ordering::Relaxed)) else { return };
     let dropped = held.dropped.swap(0, Ordering::Relaxed);
     if dropped > 0 {
-        complain(&format!("headrace: {dropped} earlier lines not kept"));
+        complain(&format!("headrace: {dropped} earlier lines dropped"));
     }
     while let Some(bytes) = held.kept.pop() {
         pass(&bytes);
     }
 }
 
-/// Writes a line that may hold text from outside to stderr, after those that wait.
+/// Writes a line that may hold external text to stderr, after the waiting ones.
 pub(crate) fn complain(text: &str) {
     pass(format!("{}\n", one_line(text)).as_bytes());
 }
 
-/// Waits for what is to be written to stderr, in a dive for 2 s at most.
+/// Waits until all lines for stderr are written; in a dive for at most 2 s.
 pub(crate) fn end() {
     let Some(background) = BACKGROUND.get() else { return };
     let dropped = background.dropped.swap(0, Ordering::Relaxed);
     if dropped > 0 {
-        complain(&format!("headrace: {dropped} lines not shown here: nobody read them"));
+        complain(&format!("headrace: {dropped} lines dropped because stderr was not read"));
     }
     let (mark, written) = bounded::<()>(0);
     if background.lines.send_timeout(Line::Mark(mark), ENDS_WITHIN).is_ok() {
@@ -168,7 +172,8 @@ fn pass(bytes: &[u8]) {
     }
 }
 
-/// Stderr is shared with self-overwriting lines. Failed writes are dropped: a closed stderr must not end a dive.
+/// Stderr is shared with self-overwriting lines. Failed writes are dropped: a closed stderr must not end a
+/// dive.
 fn write_now(bytes: &[u8]) {
     if let Some(held) = HELD.get().filter(|held| held.is_on.load(Ordering::Relaxed)) {
         held.shown.force_push(plain(bytes));
@@ -187,7 +192,7 @@ fn write_now(bytes: &[u8]) {
     cleared.and_then(|()| stderr.write_all(bytes)).ok();
 }
 
-/// A line without colours and its end.
+/// A line without colours and line end.
 fn plain(bytes: &[u8]) -> String {
     let text = String::from_utf8_lossy(bytes);
     let mut parts = text.trim_end().split("\x1b[");
@@ -195,7 +200,7 @@ fn plain(bytes: &[u8]) -> String {
     parts.fold(first, |line, part| line + part.split_once('m').map_or(part, |(_, rest)| rest))
 }
 
-/// An event as one line, whatever names are in it. The colours are the formatter's, which escapes those of others.
+/// An event as one line, with external text escaped. The colours are the formatter's.
 fn event(bytes: &[u8]) -> String {
     let text = String::from_utf8_lossy(bytes);
     let (line, end) = text.strip_suffix('\n').map_or((&*text, ""), |line| (line, "\n"));
@@ -237,14 +242,14 @@ mod tests {
     }
 
     #[test]
-    fn an_event_is_a_line_with_no_codes_but_colours() {
+    fn event_is_one_line_without_codes_except_colours() {
         let text = "\x1b[33mWARN\x1b[0m opened a\nb\x1b[2J\x1b]0;t\x07\u{202e}\n";
         let line = "\x1b[33mWARN\x1b[0m opened a\\nb\\u001b[2J\\u001b]0;t\\u0007\\u202e\n";
         assert_eq!(event(text.as_bytes()), line);
     }
 
     #[test]
-    fn only_warnings_without_flags() {
+    fn without_flags_only_warnings_are_shown() {
         let shows = enabled(None, None);
         assert!(shows("headrace_replay::log", Level::WARN) && shows("other", Level::WARN));
         assert!(!shows("headrace", Level::INFO) && !shows("other", Level::INFO));
@@ -252,7 +257,7 @@ mod tests {
     }
 
     #[test]
-    fn flags_are_for_all_crates_of_this_program() {
+    fn flags_apply_to_all_crates_of_this_program() {
         let shows = enabled(Some(LevelFilter::DEBUG), None);
         assert!(shows("headrace_ports::service", Level::DEBUG) && shows("headrace", Level::DEBUG));
         assert!(!shows("headrace", Level::TRACE) && !shows("other", Level::INFO));
@@ -260,7 +265,7 @@ mod tests {
     }
 
     #[test]
-    fn the_variable_is_for_the_crates_that_it_names() {
+    fn variable_sets_the_levels_of_named_crates() {
         let shows = enabled(None, Some("headrace_ports=debug"));
         assert!(shows("headrace_ports::service", Level::DEBUG) && shows("headrace_replay", Level::WARN));
         assert!(!shows("headrace_replay", Level::INFO));
@@ -270,7 +275,7 @@ mod tests {
     }
 
     #[test]
-    fn a_variable_that_cannot_be_read_is_named_and_ignored() {
+    fn invalid_variable_is_named_and_ignored() {
         let (filter, error) = filter(None, Some("headrace=loud"));
         assert!(error.unwrap().starts_with("RUST_LOG = \"headrace=loud\": "));
         assert!(

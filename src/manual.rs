@@ -1,4 +1,4 @@
-//! `headrace completions` and `headrace man`: what shells and `man` know of the command line.
+//! `headrace completions` and `headrace man`: the command line for shells and `man`.
 
 use std::io::Write as _;
 

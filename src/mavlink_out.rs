@@ -1,6 +1,7 @@
-//! `--mavlink-out`: what the dive is like, for ground stations such as QGroundControl and, by BlueOS, Cockpit.
+//! `--mavlink-out`: sends the state of the dive to ground stations such as QGroundControl and, through
+//! BlueOS, Cockpit.
 //!
-//! Heartbeats come of the loop's ticks: when the loop stands still, there are none. Each alert is a text once.
+//! Heartbeats follow the loop's ticks: when the loop stops, so do they. Each alert is sent once as a text.
 
 use std::collections::BTreeSet;
 use std::net::UdpSocket;
@@ -21,24 +22,24 @@ use crate::follower::Follower;
 const HEARTBEAT_EVERY: DurNs = DurNs(1_000_000_000);
 /// Interval of figures.
 const FIGURES_EVERY: DurNs = DurNs(500_000_000);
-/// Frames that may wait: some ten seconds.
+/// Maximum number of waiting frames: some ten seconds.
 const WAITING: usize = 256;
 
-/// Says what the dive is like.
+/// Sends the state of the dive.
 pub(crate) struct MavlinkOut {
     speaker: Speaker,
     frames: Option<Sender<Vec<u8>>>,
     thread: Option<JoinHandle<()>>,
     heartbeat: Option<MonoNs>,
     figures: Option<MonoNs>,
-    /// Alerts whose text has been sent.
+    /// Alerts with texts already sent.
     told: BTreeSet<u32>,
 }
 
 impl MavlinkOut {
     /// Starts sending to an address, as a part of the vehicle with this system id.
     ///
-    /// Errors: no socket or thread is to be had. An address where nobody listens is none.
+    /// Errors: a socket or thread can't be created. An address without a listener is no error.
     pub(crate) fn start(to: &str, system_id: u8) -> Result<Self, Failure> {
         let failed = |source| Failure::System { what: "starting MAVLink's output", source };
         let socket =
@@ -57,7 +58,7 @@ impl MavlinkOut {
         })
     }
 
-    /// What finds no room is dropped: a newer one follows.
+    /// Frames without room are dropped: a newer one follows.
     fn send(&self, frame: Vec<u8>) {
         if let Some(frames) = &self.frames {
             frames.try_send(frame).ok();
@@ -74,7 +75,7 @@ impl MavlinkOut {
     }
 }
 
-/// Whether a time has come; time may go back in a replay.
+/// Whether a time is due. Time may go back in a replay.
 fn is_due(last: &mut Option<MonoNs>, now: MonoNs, every: DurNs) -> bool {
     let due = last.is_none_or(|last| !(0..every.0).contains(&now.since(last).0));
     if due {
@@ -111,7 +112,7 @@ impl Follower for MavlinkOut {
             self.send(frame);
         }
         if is_due(&mut self.figures, now, FIGURES_EVERY) {
-            // Milliseconds wrap after 49 days, as those of any MAVLink clock.
+            // Milliseconds wrap after 49 days, like those of any MAVLink clock.
             let time_ms = u32::try_from(now.0 / 1_000_000 % (1 << 32)).unwrap_or(0);
             let unacknowledged = dive.alert_list().counts().unacknowledged;
             for (name, value) in figures(state, unacknowledged) {
@@ -133,7 +134,7 @@ impl Drop for MavlinkOut {
     }
 }
 
-/// The figures, with their units: `docs/reference/screens.md` has the table. NaN where there is none.
+/// Figures with their units: `docs/reference/screens.md` has the table. NaN if there is none.
 #[expect(clippy::cast_possible_truncation, reason = "MAVLink's figures are of single precision")]
 fn figures(state: &LiveState, unacknowledged: u32) -> [(&'static str, f32); 12] {
     let known = |value: Option<f64>| value.map_or(f32::NAN, |value| value as f32);
@@ -157,12 +158,12 @@ fn figures(state: &LiveState, unacknowledged: u32) -> [(&'static str, f32); 12] 
     ]
 }
 
-/// Sends what comes; the rest of a dive is sent before it ends.
+/// Sends frames as they come. The rest of a dive is sent before it ends.
 fn send_all(socket: &UdpSocket, to: &str, frames: &Receiver<Vec<u8>>) {
     let mut failed: u64 = 0;
     for frame in frames {
         if let Err(error) = socket.send_to(&frame, to) {
-            // Nobody listens, or there is no way there: that costs the dive nothing, and may pass.
+            // There is no listener, or no route. That doesn't affect the dive, and may pass.
             if failed == 0 {
                 tracing::warn!(%error, to, "MAVLink isn't sent; it is tried again");
             }

@@ -1,4 +1,4 @@
-//! `headrace notes`: the notes of a dive, and the files of its voice notes.
+//! `headrace notes`: lists the notes of a dive, and writes the files of its voice notes.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -38,7 +38,7 @@ pub(crate) fn notes(args: &Notes) -> Result<u8, Failure> {
     Ok(if is_whole { failure::OK } else { failure::DATA_LOST })
 }
 
-/// The files of the voices by id: by their notes' numbers, and those that no note names by their ids.
+/// Files of the recordings by id: named after their notes' numbers, or after their ids without a note.
 fn named(found: &LoggedNotes, folder: &Path) -> BTreeMap<u32, PathBuf> {
     let name = |(id, (_, container, _)): (&u32, &(u32, Container, usize))| {
         let is_it = |note: &&NoteJson| note.voice.as_ref().is_some_and(|voice| voice.id == *id);
@@ -51,7 +51,7 @@ fn named(found: &LoggedNotes, folder: &Path) -> BTreeMap<u32, PathBuf> {
     found.voices.iter().map(name).collect()
 }
 
-/// Voice notes whose recordings were in the log and aren't: what is said of each.
+/// Texts on voice notes that should have a recording in the log but don't.
 fn missing(found: &LoggedNotes) -> Vec<String> {
     let lacks = |note: &NoteJson| {
         let voice = note.voice.as_ref().filter(|voice| voice.seconds.is_some())?;

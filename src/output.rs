@@ -16,30 +16,31 @@ use crate::failure::Failure;
 use crate::terminal;
 use crate::transient;
 
-/// How long a live dive waits for a stdout of which nothing is read.
+/// Time for which a live dive waits for an unread stdout.
 pub(crate) const UNREAD_FOR: Duration = Duration::from_secs(2);
-/// Bytes that are taken within that time from whoever reads at all.
+/// Number of bytes that every reader takes within that time.
 const PIECE: usize = 1 << 10;
 
-/// Whether stdout has been given up: nothing is written to it any more.
+/// Whether stdout has been given up: nothing more is written to it.
 static GIVEN_UP: AtomicBool = AtomicBool::new(false);
-/// Whether stdout is given up where nobody reads it.
+/// Whether an unread stdout is given up.
 static NEVER_WAITS: AtomicBool = AtomicBool::new(false);
 
-/// Why output is lost: the first error.
+/// Reason for which output is lost: the first error.
 static LOST: OnceLock<io::Error> = OnceLock::new();
 
-/// From now on stdout is left alone: a terminal that doesn't read must not keep a program from its end.
+/// Stops writing to stdout: an unread terminal must not keep the program from ending.
 pub(crate) fn give_up() {
     GIVEN_UP.store(true, Ordering::Relaxed);
 }
 
-/// From now on stdout is given up once nothing of it has been read for [`UNREAD_FOR`]: a live dive ends whoever reads.
+/// From now on stdout is given up once it hasn't been read for [`UNREAD_FOR`], so a live dive ends without a
+/// reader.
 pub(crate) fn never_wait() {
     NEVER_WAITS.store(true, Ordering::Relaxed);
 }
 
-/// Stdout for what a thread of its own doesn't write: flushed once, at its end.
+/// Stdout for output that isn't written by a separate thread; flushed once, at its end.
 ///
 /// Errors: it has been given up.
 fn stdout() -> io::Result<Box<dyn Write>> {
@@ -50,7 +51,8 @@ fn stdout() -> io::Result<Box<dyn Write>> {
     }
 }
 
-/// Stdout that waits until it takes more, also where its pipe was set not to wait by another process that shares it.
+/// Stdout that waits until it takes more, even if another process that shares its pipe has set it to
+/// non-blocking.
 struct Waiting(StdoutLock<'static>);
 
 impl Waiting {
@@ -86,10 +88,10 @@ impl Write for Waiting {
 }
 
 fn unread() -> io::Error {
-    io::Error::new(io::ErrorKind::TimedOut, "nobody reads it")
+    io::Error::new(io::ErrorKind::TimedOut, "it is not read")
 }
 
-/// Stdout on a thread of its own, which holds up nobody longer than [`UNREAD_FOR`].
+/// Stdout on a separate thread, which blocks no caller longer than [`UNREAD_FOR`].
 struct Unheld {
     pieces: Option<Sender<Vec<u8>>>,
     done: Receiver<io::Result<()>>,
@@ -97,21 +99,21 @@ struct Unheld {
 
 impl Unheld {
     fn start() -> io::Result<Self> {
-        // A piece is handed over when the one before has been taken.
+        // A piece is handed over once the previous one has been taken.
         let (pieces, queue) = bounded::<Vec<u8>>(0);
         let (ended, done) = bounded(1);
         let write = move || {
             let mut stdout = Waiting::start();
             let result = queue.iter().try_for_each(|piece| stdout.write_all(&piece));
             drop(queue);
-            // Nobody may wait for it any more.
+            // The receiver may be gone.
             ended.send(result.and_then(|()| stdout.flush())).ok();
         };
         thread::Builder::new().name("stdout".to_owned()).spawn(write)?;
         Ok(Self { pieces: Some(pieces), done })
     }
 
-    /// How the writing has ended.
+    /// Result of the writing.
     fn end(&mut self) -> io::Result<()> {
         self.pieces = None;
         match self.done.recv_timeout(UNREAD_FOR) {
@@ -145,7 +147,8 @@ impl Write for Unheld {
     }
 }
 
-/// Writes `text` as it is at once, however long that takes: for a thread that holds up nobody. As [`put`] otherwise.
+/// Writes `text` unchanged, however long that takes: for a thread that blocks no other. Otherwise like
+/// [`put`].
 pub(crate) fn put_waiting(text: &str) {
     if GIVEN_UP.load(Ordering::Relaxed) {
         return;
@@ -156,8 +159,10 @@ pub(crate) fn put_waiting(text: &str) {
     }
 }
 
-/// Writes `text` as it is: lines made fit already, and codes for the terminal. Errors are only logged and remembered (see [`lost`]):
-/// a closed pipe or a lost session doesn't end a dive. Nothing is written once the terminal has been given up.
+/// Writes `text` unchanged: lines already made printable, and codes for the terminal.
+///
+/// Errors are only logged and remembered (see [`lost`]): a closed pipe or a lost session doesn't end a dive.
+/// Nothing is written once the terminal has been given up.
 pub(crate) fn put(text: &str) {
     if GIVEN_UP.load(Ordering::Relaxed) {
         return;
@@ -168,14 +173,14 @@ pub(crate) fn put(text: &str) {
     });
     match written {
         Err(error) if error.kind() == io::ErrorKind::TimedOut => {
-            tracing::warn!("the terminal doesn't read: not all is shown");
+            tracing::warn!("the terminal doesn't read its input; some output is dropped");
         }
         Err(error) => note(error),
         Ok(()) => {}
     }
 }
 
-/// Remembers that output is lost. Whoever closes a pipe wants no more of it.
+/// Remembers that output is lost. A closed pipe is no loss: its reader wants no more.
 fn note(error: io::Error) {
     tracing::debug!(%error, "stdout takes nothing");
     if error.kind() != io::ErrorKind::BrokenPipe {
@@ -183,22 +188,22 @@ fn note(error: io::Error) {
     }
 }
 
-/// Why output that no error told of is lost, if some is.
+/// Reason for which output was lost without an earlier error, if any was.
 pub(crate) fn lost() -> Option<String> {
     LOST.get().map(|error| format!("writing standard output: {error}"))
 }
 
-/// The same with a line end.
+/// Writes `text` unchanged, with a line end.
 pub(crate) fn put_line(text: &str) {
     put(&format!("{text}\n"));
 }
 
-/// Writes lines that may hold text from outside.
+/// Writes lines that may hold external text.
 pub(crate) fn show(text: &str) {
     put(&lines(text));
 }
 
-/// Writes a line that may hold text from outside.
+/// Writes a line that may hold external text.
 pub(crate) fn say(text: &str) {
     put(&format!("{}\n", one_line(text)));
 }
@@ -211,14 +216,14 @@ pub(crate) fn aside(text: &str) {
 
 /// Writes output for another program, and a line end.
 ///
-/// Errors: the write is short, or a live dive's is read by nobody; not that a pipe is closed.
+/// Errors: the write is incomplete, or a live dive's output isn't read. A closed pipe is no error.
 pub(crate) fn deliver(text: &str) -> Result<(), Failure> {
     deliver_bytes(format!("{}\n", lines(text)).as_bytes())
 }
 
-/// Writes output for another program as it is.
+/// Writes output for another program unchanged.
 ///
-/// Errors: as of [`deliver`].
+/// Errors: see [`deliver`].
 pub(crate) fn deliver_bytes(bytes: &[u8]) -> Result<(), Failure> {
     let write = |mut stdout: Box<dyn Write>| {
         stdout.write_all(bytes)?;
@@ -227,14 +232,14 @@ pub(crate) fn deliver_bytes(bytes: &[u8]) -> Result<(), Failure> {
     taken(stdout().and_then(write))
 }
 
-/// Writes help, which clap makes for a terminal or a file.
+/// Writes clap's help to a terminal or a file.
 ///
-/// Errors: as of [`deliver`].
+/// Errors: see [`deliver`].
 pub(crate) fn deliver_help(help: &clap::Error) -> Result<(), Failure> {
     taken(help.print().and_then(|()| io::stdout().flush()))
 }
 
-/// What became of output: whoever closes a pipe wants no more of it.
+/// Result of a write. A closed pipe is no error: its reader wants no more.
 fn taken(written: io::Result<()>) -> Result<(), Failure> {
     match written {
         Err(error) if error.kind() == io::ErrorKind::BrokenPipe => Ok(()),
@@ -244,7 +249,7 @@ fn taken(written: io::Result<()>) -> Result<(), Failure> {
 
 /// Writes a report as JSON, without holding all of it in memory.
 ///
-/// Errors: as of [`deliver`].
+/// Errors: see [`deliver`].
 pub(crate) fn deliver_json(report: &Report) -> Result<(), Failure> {
     let mut stdout = BufWriter::new(Plain(stdout().map_err(failed)?));
     let written = serde_json::to_writer_pretty(&mut stdout, report).map_err(io::Error::from);
@@ -255,12 +260,12 @@ fn failed(source: io::Error) -> Failure {
     Failure::Write { path: "standard output".into(), source }
 }
 
-/// Writes text made fit, whatever pieces it comes in.
+/// Makes text printable, in whatever pieces it comes.
 struct Plain<W>(W);
 
 impl<W: Write> Write for Plain<W> {
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
-        // A character that isn't whole yet comes again with the next bytes.
+        // An incomplete character comes again with the next bytes.
         let whole = match str::from_utf8(bytes) {
             Ok(text) => text,
             Err(error) if error.valid_up_to() > 0 => bytes

@@ -1,4 +1,4 @@
-//! Files that commands write: what they may write over, and whether they can be written, found out before the work.
+//! Checks before the work that a command's output files may be overwritten and can be written.
 
 mod claims;
 
@@ -13,28 +13,28 @@ use crate::failure::Failure;
 use crate::files;
 pub(crate) use claims::Claims;
 
-/// Key of a log's metadata: the scene of which it is a simulation.
+/// Key of a log's metadata: the simulated scene.
 pub(crate) const SIMULATED: &str = "simulated";
 /// Key of a log's metadata: the format that it was imported from.
 pub(crate) const IMPORTED: &str = "import_format";
-/// Begins the vehicle file of a rehearsal.
+/// First line of a rehearsal's vehicle file.
 pub(crate) const REHEARSAL: &str = "# Rehearsal by headrace emulate: ";
-/// Ends a picture of a plan.
+/// Last line of a plan's picture.
 pub(crate) const PICTURE: &str = "<!-- headrace plan -->\n";
-/// Begins a manual page.
+/// First line of a manual page.
 pub(crate) const MANUAL: &str = ".\\\" Written by headrace man.\n";
-/// Ends a page with a dive.
+/// Last line of a page with a dive.
 pub(crate) const EXPORTED: &str = "<!-- headrace export -->\n";
-/// Begins a table of true values.
+/// First line of a table of true values.
 pub(crate) const TRUTH: &str = "# true values: ";
-/// A key of each report.
+/// A key of every report.
 const REPORT: &str = "\"report_version\":";
 
 /// A kind of output. A file of the same kind is overwritten, any other only with `--force`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Kind {
     Report,
-    /// A dive recorded live is never overwritten unasked.
+    /// A dive recorded live, which is never overwritten without `--force`.
     Dive,
     Simulation,
     Import,
@@ -45,12 +45,12 @@ pub(crate) enum Kind {
     Picture,
     Manual,
     Page,
-    /// The recording of a voice note can't be told from any other.
+    /// The recording of a voice note, which can't be distinguished from another one.
     Voice,
 }
 
 impl Kind {
-    /// Why another file isn't overwritten.
+    /// Reason for not overwriting another file.
     fn refusal(self) -> &'static str {
         match self {
             Self::Report => "isn't a report",
@@ -102,7 +102,7 @@ fn begins(path: &Path, mark: &str) -> bool {
     begin(path).is_some_and(|text| text.starts_with(mark))
 }
 
-/// Whether a file, of any size, ends with this.
+/// Whether a file, of any size, ends with this mark.
 fn ends(path: &Path, mark: &str) -> bool {
     let end = || {
         let mut file = std::fs::File::open(path)?;
@@ -115,20 +115,20 @@ fn ends(path: &Path, mark: &str) -> bool {
     end().unwrap_or(false)
 }
 
-/// Checks, before the work, that a file may and can be written. Nothing is changed.
+/// Checks, before the work, that a file may and can be written, without changing anything.
 ///
-/// Errors: a file is there that isn't of this kind, without `--force`; it can't be written or created.
+/// Errors: the existing file isn't of this kind and there is no `--force`; or it can't be written or created.
 fn may_write(path: &Path, kind: Kind, force: bool) -> Result<(), Failure> {
     let failed = |source| Failure::Unwritable { path: path.to_owned(), source };
     if path.symlink_metadata().is_err() {
-        // Creating it is the only sure test.
+        // Only creating it is a certain test.
         OpenOptions::new().write(true).create_new(true).open(path).map_err(failed)?;
         return std::fs::remove_file(path).map_err(failed);
     }
     if path.is_dir() {
         return Err(failed(ErrorKind::IsADirectory.into()));
     }
-    // Terminals, pipes and /dev/null have nothing to lose.
+    // Terminals, pipes and /dev/null have no content to lose.
     if path.is_file() && !force && !kind.is(path) {
         return Err(Failure::Usage(format!(
             "writing {}: it exists, and {}; give another name, or overwrite it with --force",
@@ -137,13 +137,14 @@ fn may_write(path: &Path, kind: Kind, force: bool) -> Result<(), Failure> {
         )));
     }
     if is_pipe(path) {
-        // Opening it waits for a reader, and closing it again ends the reader's input.
+        // Opening it would wait for a reader, and closing it would end the reader's input.
         return rustix::fs::access(path, rustix::fs::Access::WRITE_OK).map_err(|error| failed(error.into()));
     }
     OpenOptions::new().write(true).open(path).map(|_| ()).map_err(failed)
 }
 
-/// Removes a file that may be overwritten, for what creates new files only. Terminals, pipes and devices stay.
+/// Removes a file that may be overwritten, for writers that create only new files. Terminals, pipes and
+/// devices remain.
 pub(crate) fn make_way(path: &Path) -> Result<(), Failure> {
     if !path.is_file() {
         return Ok(());

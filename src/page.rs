@@ -1,4 +1,4 @@
-//! The operator's page of a dive: started, fed and ended.
+//! The operator's page of a dive: starting, feeding and ending it.
 
 #![expect(clippy::disallowed_types, reason = "locks between the page's threads; the loop's takes none")]
 
@@ -42,41 +42,41 @@ use crate::logging::complain;
 use crate::recording_state::RecordingState;
 use crate::report_output::exit_code;
 
-/// Interval at which an interruption is looked for while a replay stands still.
+/// Interval at which an interruption is checked while a replay is paused.
 const LOOK_EVERY: Duration = Duration::from_millis(100);
-/// Names by which BlueOS' machine is reached.
+/// Name of a BlueOS machine.
 const BLUEOS: &str = "blueos.local";
 
-/// What a page is of.
+/// The dive that a page shows.
 pub(crate) struct Of<'a> {
     pub(crate) vehicle: &'a VehicleConfig,
     pub(crate) mode: Mode,
-    /// The log's or scene's name.
+    /// Name of the log or scene.
     pub(crate) dive: String,
     pub(crate) recorded_to: Option<String>,
-    /// Another target that the dive is held to as well, m.
+    /// Second target that the dive is compared with, m.
     pub(crate) compared_m: Option<f64>,
-    /// UTC of the clock's zero, where the clock is this machine's.
+    /// UTC of the clock's zero, if the clock is this machine's.
     pub(crate) utc_of_zero_s: Option<f64>,
     /// First and last time of a log.
     pub(crate) span: Option<(MonoNs, MonoNs)>,
-    /// Whether it can be paused and jump.
+    /// Whether it can be paused and can jump.
     pub(crate) is_playback: bool,
-    /// What takes the operator's commands; none in a replay.
+    /// Receiver of the operator's commands; `None` in a replay.
     pub(crate) console: Option<ConsolePort>,
-    /// Where recordings of voice notes go to or come from.
+    /// Storage for recordings of voice notes.
     pub(crate) voices: VoicesOf,
 }
 
-/// Where recordings of voice notes go to or come from.
+/// Storage for recordings of voice notes.
 pub(crate) enum VoicesOf {
-    /// The logs of a dive that goes on now; without any it isn't recorded.
+    /// Logs of a live dive; empty if it isn't recorded.
     Dive(Vec<VoicePort>),
-    /// The files of a log.
+    /// Files of a log.
     Log(Vec<PathBuf>),
 }
 
-/// A page that is served.
+/// A served page.
 pub(crate) struct Served {
     page: Page,
     span: Option<(MonoNs, MonoNs)>,
@@ -85,13 +85,14 @@ pub(crate) struct Served {
     commands: Arc<Mutex<Option<Sender<PlaybackCommand>>>>,
 }
 
-/// Whether a page is to be served: asked for, or a person watches.
+/// Whether to serve a page: it was requested, or a person watches.
 pub(crate) fn is_wanted(args: &PageArgs, is_watched: bool) -> bool {
     !args.no_page && (args.page.is_some() || is_watched && std::io::stdout().is_terminal())
 }
 
-/// Serves the page of a dive. What is in its way is told on stderr, and the dive goes on without it. `lines` takes the address
-/// among the dive's lines.
+/// Serves the page of a dive. A failure is reported on stderr, and the dive continues without the page.
+///
+/// `lines` takes the address among the dive's lines.
 pub(crate) fn serve(args: &PageArgs, of: Of<'_>, lines: Option<&mut dyn FnMut(&str)>) -> Option<Served> {
     match start(args, of, lines) {
         Ok(served) => Some(served),
@@ -114,7 +115,8 @@ fn start(args: &PageArgs, of: Of<'_>, lines: Option<&mut dyn FnMut(&str)>) -> Re
         proxies: args.page_proxy.clone(),
         tls: tls.map(|(certificate, key)| TlsFiles { certificate, key }),
     };
-    let instance = Token::random().map_err(|error| format!("the page has no random number: {error}"))?;
+    let instance =
+        Token::random().map_err(|error| format!("getting a random number for the page: {error}"))?;
     let instance = instance.text().chars().take(12).collect();
     let (span, is_playback, waits) = (of.span, of.is_playback, of.mode != Mode::Live);
     let commands: Arc<Mutex<Option<Sender<PlaybackCommand>>>> = Arc::default();
@@ -130,7 +132,7 @@ fn start(args: &PageArgs, of: Of<'_>, lines: Option<&mut dyn FnMut(&str)>) -> Re
     Ok(Served { page, span, is_playback, waits, commands })
 }
 
-/// Tokens where the page is for others than this machine.
+/// Tokens, if other machines can reach the page.
 fn tokens(args: &PageArgs, address: SocketAddr) -> Result<Option<Tokens>, String> {
     if let Some(path) = &args.page_token_file {
         return read_tokens(path).map(Some);
@@ -140,10 +142,10 @@ fn tokens(args: &PageArgs, address: SocketAddr) -> Result<Option<Tokens>, String
     }
     if !std::io::stdout().is_terminal() {
         return Err(format!(
-            "a page on {address} is for others, too, and needs --page-token-file without a terminal"
+            "a page on {address} is open to other machines; without a terminal it needs --page-token-file"
         ));
     }
-    let random = || Token::random().map_err(|error| format!("the page has no tokens: {error}"));
+    let random = || Token::random().map_err(|error| format!("making tokens for the page: {error}"));
     Ok(Some(Tokens { viewer: random()?, operator: random()? }))
 }
 
@@ -170,7 +172,7 @@ fn hosts(args: &PageArgs) -> Vec<String> {
     own.chain([BLUEOS.to_owned()]).chain(args.page_host.iter().cloned()).collect()
 }
 
-/// Where the page is; its tokens only for a terminal, and never for the log.
+/// Address of the page. Its tokens are shown only on a terminal, and never logged.
 fn told(page: &Page, tokens: Option<&Tokens>) -> String {
     let (scheme, at) = (page.scheme(), page.address());
     let host = if at.ip().is_unspecified() { own_address(at.ip()) } else { at.ip() };
@@ -186,7 +188,7 @@ fn told(page: &Page, tokens: Option<&Tokens>) -> String {
     lines
 }
 
-/// The address by which others reach this machine. Nothing is sent.
+/// Address by which other machines reach this one. Nothing is sent.
 fn own_address(unspecified: IpAddr) -> IpAddr {
     let (any, beyond) =
         if unspecified.is_ipv4() { ("0.0.0.0:0", "192.0.2.1:9") } else { ("[::]:0", "[2001:db8::1]:9") };
@@ -250,7 +252,7 @@ fn kind_text(kind: Sense) -> &'static str {
     }
 }
 
-/// UTC of the zero of a log's clock, seconds, where the log says so.
+/// UTC of the zero of a log's clock, seconds, if the log states it.
 pub(crate) fn utc_of_zero_s(metadata: &BTreeMap<String, String>) -> Option<f64> {
     let number = |key: &str| metadata.get(key)?.parse::<i64>().ok();
     let [monotonic, utc] = CLOCK_ANCHOR.map(number);
@@ -276,7 +278,9 @@ fn act(console: Option<ConsolePort>) -> Act {
     })
 }
 
-/// Hands recordings of voice notes to all logs, of which one must take it, and then tells the loop; or finds them in a log.
+/// Hands recordings of voice notes to all logs, or finds them in a log.
+///
+/// One log must take a recording; then the loop is informed.
 fn voices(of: &Of<'_>) -> Voices {
     match (&of.voices, &of.console) {
         (VoicesOf::Log(files), _) => {
@@ -301,7 +305,7 @@ fn voices(of: &Of<'_>) -> Voices {
     }
 }
 
-/// Hands the page's commands to playback, as long as there is one.
+/// Hands the page's commands to playback while there is one.
 fn direct(commands: &Arc<Mutex<Option<Sender<PlaybackCommand>>>>) -> Direct {
     let commands = Arc::clone(commands);
     Arc::new(move |play| {
@@ -319,20 +323,22 @@ fn direct(commands: &Arc<Mutex<Option<Sender<PlaybackCommand>>>>) -> Direct {
         if matches!(sent, Some(Ok(()))) {
             Ok(())
         } else {
-            Err("nothing is played that could be directed".to_owned())
+            Err("no playback is running that could be controlled".to_owned())
         }
     })
 }
 
 impl Served {
-    /// What feeds it.
+    /// Follower that feeds the page.
     pub(crate) fn follower(&self, dive: &Loop) -> Box<dyn Follower> {
         let span = self.span.filter(|_| self.is_playback);
         Box::new(PageFollower { collector: self.page.collector(dive, self.waits), span, now: MonoNs(0) })
     }
 
-    /// Directs a replay by commands from the page. It `stays` at the end of the log, until `interrupted`; else what is returned takes
-    /// its hands off.
+    /// Lets the page control a replay.
+    ///
+    /// With `stays` the replay remains at the end of the log until `interrupted`. Otherwise the returned
+    /// value releases control.
     pub(crate) fn direct(
         &self,
         to: &Sender<PlaybackCommand>,
@@ -357,7 +363,7 @@ impl Served {
         None
     }
 
-    /// Opens a browser, where there is one and a person to see it.
+    /// Opens a browser, if there is one and a person to see it.
     pub(crate) fn open(&self) {
         let has_screen = ["DISPLAY", "WAYLAND_DISPLAY"]
             .iter()
@@ -374,19 +380,19 @@ impl Served {
         }
     }
 
-    /// Ends it with the dive's report.
+    /// Ends the page with the dive's report.
     pub(crate) fn end(self, report: &Report) {
         self.page.end(Some(end_message(report)));
     }
 }
 
-/// The last message of a dive.
+/// Last message of a dive.
 pub(crate) fn end_message(report: &Report) -> Value {
     json!({"type": "end", "digest": report.digest, "summary": report.summary, "way": report.way,
         "exit": exit_code(report)})
 }
 
-/// A follower that hands all to a collector.
+/// A follower that passes everything to a collector.
 pub(crate) fn following(collector: Collector) -> Box<dyn Follower> {
     Box::new(PageFollower { collector, span: None, now: MonoNs(0) })
 }

@@ -1,4 +1,5 @@
-//! `replay --from` and `replay --interactive`: playback, with keys in a terminal, or commands by lines on standard input.
+//! `replay --from` and `replay --interactive`: playback, with keys in a terminal, or commands in lines on
+//! standard input.
 
 mod keys;
 
@@ -26,16 +27,18 @@ use crate::watch::Watch;
 use keys::Keyboard;
 pub(crate) use keys::{Hand, Key};
 
-/// Work between two snapshots: with the time to restore one, a jump takes well under a second.
+/// Work between two snapshots. Including the time to restore one, a jump takes well under a second.
 const SNAPSHOT_INTERVAL: Duration = Duration::from_millis(300);
 /// Memory for snapshots. When it is full, every other one is dropped and the interval doubled.
 const SNAPSHOT_BYTES: usize = 256 << 20;
 
-/// Those besides standard input who direct playback; each has a sender of commands, and playback goes on as long as there is one.
+/// Controllers of playback besides standard input.
+///
+/// Each has a sender of commands, and playback continues while there is one.
 pub(crate) struct Directors {
     /// Whether one of them takes the terminal's keys.
     pub(crate) takes_keys: bool,
-    /// Drops the sender of one that doesn't stay at the end of the log.
+    /// Drops the sender of a controller that doesn't stay at the end of the log.
     pub(crate) close: Option<Box<dyn Fn()>>,
 }
 
@@ -45,7 +48,7 @@ pub(crate) struct Playing {
     pub(crate) interactive: bool,
     pub(crate) pace: Pace,
     pub(crate) commands: (Sender<PlaybackCommand>, Receiver<PlaybackCommand>),
-    /// Who else directs it.
+    /// Other controllers.
     pub(crate) others: Option<Directors>,
 }
 
@@ -53,7 +56,7 @@ impl Playing {
     /// Plays a dive; returns the report.
     pub(crate) fn play(self, dive: Dive, player: &mut Player, watch: &mut Watch) -> Result<Report, Failure> {
         let Self { from, interactive, pace, commands: (sender, commands), others } = self;
-        // Without commands nothing jumps back.
+        // Without commands, no jump goes back.
         let interval = if interactive || others.is_some() { SNAPSHOT_INTERVAL } else { Duration::MAX };
         dive.play(watch, |armed, notices, watch| {
             let interactive = interactive && !others.as_ref().is_some_and(|others| others.takes_keys);
@@ -68,7 +71,7 @@ impl Playing {
                 playback.seek(screen.begun + from, &mut screen)?;
             }
             screen.watch.mode(false, pace.speed);
-            // Keys where they are typed, words from a pipe or a file.
+            // Keys come from a terminal, lines from a pipe or a file.
             let keyboard = match interactive {
                 true if has_keys => Some(keyboard(sender, pace)?),
                 true => {
@@ -87,12 +90,12 @@ impl Playing {
     }
 }
 
-/// Whether single keys are taken: standard input is a terminal.
+/// Whether single keys are read: standard input is a terminal.
 pub(crate) fn has_keys() -> bool {
     std::io::stdin().is_terminal()
 }
 
-/// The keys of the terminal, until it is dropped.
+/// Reads keys of the terminal until it is dropped.
 fn keyboard(to: Sender<PlaybackCommand>, pace: Pace) -> Result<Keyboard, Failure> {
     let failed = |source| Failure::System { what: "reading keys from the terminal", source };
     Keyboard::listen(to, pace.speed, interrupt::flag()?).map_err(failed)
@@ -152,7 +155,7 @@ fn listen(to: Sender<PlaybackCommand>, begun: MonoNs) {
     });
 }
 
-/// Parses a command; `begun` is the log's first time.
+/// Parses a command. `begun` is the log's first time.
 fn command(line: &str, begun: MonoNs) -> Result<PlaybackCommand, String> {
     let mut words = line.split_whitespace();
     let (word, argument) = (words.next().unwrap_or_default(), words.next());
@@ -178,7 +181,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn lines_are_commands_or_refused_with_what_there_is() {
+    fn unknown_line_is_refused_with_the_list_of_commands() {
         let command = |line| command(line, MonoNs(5));
         assert_eq!(command(" step 12 "), Ok(PlaybackCommand::Step(12)));
         assert_eq!(command("seek 10s"), Ok(PlaybackCommand::Seek(MonoNs(10_000_000_005))));

@@ -1,4 +1,4 @@
-//! Writes a dive's lines to stdout on a thread of its own: a terminal that doesn't read holds up no live dive.
+//! Writes a dive's lines to stdout on a thread of its own, so an unread terminal doesn't block a live dive.
 
 use std::thread::{self, JoinHandle};
 
@@ -7,7 +7,7 @@ use crossbeam::channel::{Receiver, RecvTimeoutError, Sender, TrySendError, bound
 use crate::output::{UNREAD_FOR, give_up, put_waiting};
 use crate::{terminal, transient};
 
-/// Lines that may wait. A dive has a line a second, and some for each stretch.
+/// Maximum number of waiting lines. A dive has a line a second, and some for each stretch.
 const WAITING: usize = 1 << 10;
 
 enum Message {
@@ -20,18 +20,18 @@ enum Message {
 pub(crate) struct Printer {
     sender: Option<Sender<Message>>,
     thread: Option<JoinHandle<()>>,
-    /// Disconnected once the thread has written all.
+    /// Disconnected once the thread has written all lines.
     done: Receiver<()>,
-    /// Drops what finds no room, instead of waiting for it.
+    /// Drops lines without room instead of waiting.
     lossy: bool,
     dropped: u64,
 }
 
 impl Printer {
-    /// Starts the thread. A `lossy` printer never waits: what finds no room is dropped and counted.
+    /// Starts the thread. A `lossy` printer never waits: lines without room are dropped and counted.
     pub(crate) fn start(lossy: bool) -> Self {
         let (sender, messages) = bounded(WAITING);
-        // Without a thread everything is dropped, and said so at the end.
+        // Without the thread all lines are dropped, which the end reports.
         let (writing, done) = bounded(0);
         let write = move || {
             print(&messages);
@@ -41,12 +41,12 @@ impl Printer {
         Self { sender: Some(sender), thread, done, lossy, dropped: 0 }
     }
 
-    /// From now on nothing waits for the terminal.
+    /// From now on no caller waits for the terminal.
     pub(crate) fn drop_rather_than_wait(&mut self) {
         self.lossy = true;
     }
 
-    /// Writes a line, which is fit for it.
+    /// Writes a printable line.
     pub(crate) fn line(&mut self, text: String) {
         self.send(Message::Line(text));
     }
@@ -66,8 +66,9 @@ impl Printer {
         self.dropped += u64::from(full);
     }
 
-    /// Waits until all has been written; a lossy one for [`UNREAD_FOR`] at most, since a terminal that doesn't read must not keep a
-    /// dive from its log's end.
+    /// Waits until all lines are written; if lossy for at most [`UNREAD_FOR`].
+    ///
+    /// An unread terminal must not keep a dive from completing its log.
     pub(crate) fn end(&mut self) {
         drop(self.sender.take());
         let stuck = self.thread.is_some()
@@ -76,7 +77,7 @@ impl Printer {
         if stuck {
             self.thread = None;
             give_up();
-            tracing::warn!("the terminal doesn't read: its last lines aren't shown");
+            tracing::warn!("the terminal doesn't read its input; its last lines are dropped");
         }
         if let Some(thread) = self.thread.take()
             && thread.join().is_err()
@@ -84,7 +85,7 @@ impl Printer {
             tracing::error!("the terminal's thread has ended early");
         }
         if self.dropped > 0 {
-            tracing::warn!(lines = self.dropped, "not shown: the terminal was behind");
+            tracing::warn!(lines = self.dropped, "lines dropped: the terminal couldn't keep up");
             self.dropped = 0;
         }
     }
@@ -99,7 +100,7 @@ impl Drop for Printer {
 fn print(messages: &Receiver<Message>) {
     let mut has_status = false;
     let close = |has_status: &mut bool| {
-        // A log message has already cleared it. What it said is no longer so.
+        // A log message has already cleared it, so its content is gone.
         if core::mem::take(has_status) && transient::take() {
             put_waiting(terminal::CLEAR);
         }

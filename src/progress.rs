@@ -1,4 +1,6 @@
-//! Progress of a command on stderr, with the time left, if that is a terminal and the command takes over two seconds.
+//! Progress of a command on stderr, with the time left.
+//!
+//! It is shown if stderr is a terminal and the command takes over two seconds.
 
 use std::io::{self, Write};
 use std::time::{Duration, Instant};
@@ -10,15 +12,15 @@ use crate::transient;
 
 const AFTER: Duration = Duration::from_secs(2);
 const EVERY: Duration = Duration::from_millis(200);
-/// Calls between two reads of the clock.
+/// Number of calls between two reads of the clock.
 const CALLS: u32 = 1000;
-/// Share of the work from which the time left is told.
+/// Share of the work done from which the time left is shown.
 const TELLING: f64 = 0.01;
 
-/// Progress is logged at this interval at most.
+/// Minimum interval between log messages on progress.
 const LOG_EVERY: Duration = Duration::from_secs(5);
 
-/// Shows progress as a line that overwrites itself, and removes it at the end; and logs it.
+/// Shows progress as a line that overwrites itself and is removed at the end, and logs it.
 pub(crate) struct Progress {
     terminal: bool,
     started: Instant,
@@ -39,7 +41,8 @@ impl Progress {
         }
     }
 
-    /// Shows progress when an update is due; only then is `state` called, for what is done in words and as a share.
+    /// Shows progress if an update is due. Only then it calls `state`, for the work done as text and as a
+    /// share.
     pub(crate) fn at(&mut self, state: impl FnOnce() -> (String, Option<f64>)) {
         self.calls += 1;
         if !self.calls.is_multiple_of(CALLS) {
@@ -95,7 +98,7 @@ impl Drop for Progress {
     }
 }
 
-/// Shows how much of a file of `of_bytes` has been written.
+/// Shows how many of a file's `of_bytes` have been written.
 pub(crate) struct Writing<W> {
     to: W,
     progress: Progress,
@@ -127,12 +130,12 @@ impl<W: Write> Write for Writing<W> {
     }
 }
 
-/// Seconds left of work of which this share is done; `None` if it is too early to tell, or done.
+/// Seconds left of work with this share done; `None` if it is too early to estimate, or done.
 fn left_s(elapsed_s: f64, share: f64) -> Option<f64> {
     (TELLING..1.0).contains(&share).then(|| elapsed_s * (1.0 - share) / share)
 }
 
-/// A duration to two figures or so.
+/// A duration to about two digits.
 fn duration_text(seconds: f64) -> String {
     let minutes = seconds / 60.0;
     match seconds {
@@ -147,7 +150,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn time_left_is_that_of_the_rest_at_the_speed_so_far() {
+    fn time_left_extrapolates_the_speed_so_far() {
         assert_eq!(left_s(3.0, 0.25), Some(9.0));
         assert_eq!((left_s(3.0, 0.0), left_s(3.0, 1.0), left_s(3.0, f64::NAN)), (None, None, None));
         let texts = [0.2, 59.0, 99.0, 100.0, 3600.0, 7200.0].map(duration_text);

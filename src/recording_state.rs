@@ -1,22 +1,22 @@
-//! What all screens show of the recordings of a dive.
+//! State of a dive's recordings, as shown on all screens.
 
 use headrace_geometry::time::DurNs;
 
-/// Time that isn't on the medium yet from which screens show it, and from which it is an alarm.
+/// Unsynced time from which screens show it.
 pub(crate) const SHOWN_FROM: DurNs = DurNs(2_000_000_000);
 pub(crate) const ALARM_FROM: DurNs = DurNs(5_000_000_000);
 
-/// What screens show of all recordings together.
+/// State of all recordings together.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub(crate) struct RecordingState {
-    /// Whether nothing goes into one at present; `None` as long as none has failed.
+    /// Whether a recording is failing at present; `None` if none has ever failed.
     pub(crate) fails: Option<bool>,
-    /// Whole seconds of the dive that a power cut would lose, of the recording that is furthest behind.
+    /// Whole seconds of the dive that a power cut would lose, for the recording that is furthest behind.
     pub(crate) unsafe_s: u64,
 }
 
 impl RecordingState {
-    /// What to show, and whether it is an alarm; `None` while all is well.
+    /// Text to show, and whether it is an alarm; `None` if all is well.
     pub(crate) fn words(&self) -> Option<(String, bool)> {
         let unsafe_for = DurNs::from_secs_f64(self.unsafe_s as f64);
         match self.fails {

@@ -1,4 +1,4 @@
-//! The recordings of a dive: what has happened to them, and what all screens show of it.
+//! The recordings of a dive: their events and their state for all screens.
 
 use std::path::PathBuf;
 
@@ -16,7 +16,8 @@ use crate::report_output::files_report;
 #[derive(Default)]
 pub(crate) struct Recordings {
     all: Vec<One>,
-    /// Whether its time is this machine's. What a replay has not synced yet is minutes of a dive, and no power cut loses it.
+    /// Whether its time is this machine's. Unsynced data of a replay may be minutes of a dive, but a power
+    /// cut doesn't lose it.
     is_live: bool,
     unsafe_for: DurNs,
 }
@@ -24,7 +25,7 @@ pub(crate) struct Recordings {
 struct One {
     path: PathBuf,
     handle: RecorderHandle,
-    /// Whether nothing goes into it at present; `None` as long as it has never failed.
+    /// Whether it is failing at present; `None` if it has never failed.
     fails: Option<bool>,
     is_late: bool,
 }
@@ -35,7 +36,7 @@ impl Recordings {
         Self { all: recorders.into_iter().map(one).collect(), is_live, unsafe_for: DurNs(0) }
     }
 
-    /// What has happened since the last call. To be called after every tick.
+    /// Events since the last call. Call it after every tick.
     pub(crate) fn news(&mut self) -> Vec<RecordingEvent> {
         let mut news = Vec::new();
         self.unsafe_for = DurNs(0);
@@ -53,18 +54,18 @@ impl Recordings {
         news
     }
 
-    /// What to show.
+    /// State to show.
     pub(crate) fn state(&self) -> RecordingState {
         let fails = self.all.iter().filter_map(|one| one.fails).reduce(|one, other| one | other);
         RecordingState { fails, unsafe_s: self.unsafe_for.0.max(0).unsigned_abs() / 1_000_000_000 }
     }
 
-    /// Whether the last seconds of the dive would be lost with the power, in one of them.
+    /// Whether a power cut would lose the last seconds of the dive in one of them.
     pub(crate) fn is_alarm(&self) -> bool {
         self.all.iter().any(|one| one.is_late || one.fails == Some(true))
     }
 
-    /// Inputs for what goes on on devices' lines beside the loop.
+    /// Inputs for traffic on devices' lines outside the loop.
     pub(crate) fn line_ports(&self) -> Vec<LinePort> {
         self.all.iter().map(|one| one.handle.line_port()).collect()
     }
@@ -74,8 +75,10 @@ impl Recordings {
         self.all.iter().map(|one| one.handle.voice_port()).collect()
     }
 
-    /// Ends them, all at a time. The report has the first one's files and the losses of all; media that are gone keep nobody
-    /// from it.
+    /// Ends all recordings at the same time.
+    ///
+    /// The report has the first one's files and the losses of all. Missing media don't keep the others from
+    /// ending.
     pub(crate) fn end(mut self, report: &Report) -> Option<LogReport> {
         self.all.iter_mut().for_each(|one| one.handle.begin_to_end(self.is_live));
         let (mut log, several): (Option<LogReport>, _) = (None, self.all.len() > 1);
@@ -108,7 +111,7 @@ impl Recordings {
 }
 
 impl One {
-    /// Whether it falls behind, or has caught up.
+    /// Event if it has fallen behind or caught up.
     fn late(&mut self, unsafe_for: DurNs) -> Option<RecordingEvent> {
         let is_late = unsafe_for >= if self.is_late { SHOWN_FROM } else { ALARM_FROM };
         let has_changed = core::mem::replace(&mut self.is_late, is_late) != is_late;
@@ -123,7 +126,7 @@ impl One {
     }
 }
 
-/// Data missing in a recording, and errors while it was made, as text.
+/// Text on data missing in a recording, and on errors during it.
 fn unrecorded(written: &Summary) -> Vec<String> {
     let mut losses: Vec<String> = written.faults.iter().map(fault).collect();
     losses.extend(Some(written.left_out).filter(|left| left.messages > 0).map(left_out));
@@ -137,14 +140,14 @@ fn unrecorded(written: &Summary) -> Vec<String> {
     losses
 }
 
-/// An error of the recording, with times.
+/// Text on an error of the recording, with times.
 fn fault(fault: &RecordingFault) -> String {
     let from = fault.from.map(|from| format!(", after {}", seconds(from)));
     let to = fault.to.map(|to| format!(", before {}", seconds(to)));
     [fault.words(), from.unwrap_or_default(), to.unwrap_or_default()].concat()
 }
 
-/// Data that the recorder dropped, with times.
+/// Text on data that the recorder dropped, with times.
 fn left_out(left: LeftOut) -> String {
     let span = left.span.map(|(from, to)| format!(", {} to {}", seconds(from), seconds(to)));
     format!("{}{}", left.words(), span.unwrap_or_default())

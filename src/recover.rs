@@ -1,4 +1,4 @@
-//! `headrace recover`: the readable part of a damaged log as a valid one.
+//! `headrace recover`: writes the readable part of a damaged log as a valid one.
 
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
@@ -26,7 +26,7 @@ pub(crate) fn recover(args: &Recover) -> Result<u8, Failure> {
     Ok(if recovered.losses.is_empty() { failure::OK } else { failure::DATA_LOST })
 }
 
-/// Writes the new log, whole or not at all.
+/// Writes the new log atomically.
 fn write(files: &[PathBuf], output: &Path) -> Result<Recovered, Failure> {
     let failed = |source| Failure::Write { path: output.to_owned(), source };
     let names: Vec<String> = files.iter().map(|file| file.display().to_string()).collect();

@@ -1,4 +1,4 @@
-//! A finished dive's report: its log's entry, output, and the exit code.
+//! Report of a finished dive: the entry on its log, its output, and the exit code.
 
 use std::path::Path;
 
@@ -26,8 +26,8 @@ pub(crate) fn note_losses(report: &mut Report, path: &Path, player: &Player) {
     report.log = Some(log);
 }
 
-/// A log's files as the report has them. What can't be read back, as where the medium is gone, is a loss, and costs its
-/// digest alone.
+/// Files of a log for the report. A file that can't be read back counts as a loss, and only its digest is
+/// missing.
 pub(crate) fn files_report(named: &Path, files: &[(&Path, u64)]) -> LogReport {
     let paths: Vec<&Path> =
         if files.is_empty() { vec![named] } else { files.iter().map(|(path, _)| *path).collect() };
@@ -39,7 +39,7 @@ pub(crate) fn files_report(named: &Path, files: &[(&Path, u64)]) -> LogReport {
         })
     };
     let sha256 = digest(files_digest(&paths));
-    // Empty where it is only the file named.
+    // The list is empty if the only file is the named one.
     let named_alone = matches!(files, [(only, _)] if *only == named);
     let parts = files.iter().filter(|_| !named_alone).map(|(path, messages)| PartReport {
         path: path.display().to_string(),
@@ -55,7 +55,7 @@ pub(crate) fn files_report(named: &Path, files: &[(&Path, u64)]) -> LogReport {
 }
 
 pub(crate) fn finish(report: &Report, output: &Output) -> Result<u8, Failure> {
-    // A report that can't be written keeps nobody from the summary.
+    // A report that can't be written doesn't suppress the summary.
     let written = output.report.as_ref().map_or(Ok(()), |path| files::write_json(path, report));
     if output.json_lines {
         let end = json!({"type": "end", "digest": report.digest, "way": report.way, "summary": report.summary,

@@ -1,4 +1,4 @@
-//! What stdout can show: whether lines may be overwritten and coloured, and how wide it is.
+//! Capabilities of stdout: overwriting, colours, and width.
 
 use std::io::IsTerminal;
 
@@ -7,12 +7,12 @@ use headrace_monitor::live_state::Lamp;
 
 use crate::terminal::{self, Terminal};
 
-/// Width of a terminal that doesn't say its own.
+/// Width assumed for a terminal that doesn't report its own.
 const COLUMNS: usize = 80;
-/// Narrower ones are taken to be this wide.
+/// Minimum width assumed for narrower terminals.
 const LEAST_COLUMNS: usize = 40;
 
-/// What stdout can show.
+/// Capabilities of stdout.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Screen {
     /// Lines can be overwritten.
@@ -21,14 +21,15 @@ pub(crate) struct Screen {
 }
 
 impl Screen {
-    /// Of stdout.
+    /// Detects the capabilities of stdout.
     pub(crate) fn of_stdout() -> Self {
         let Terminal { overwrites, colour } = terminal::of(&std::io::stdout());
         Self { overwrites, colours: colour }
     }
 
-    /// Columns that a line may fill, which may change; `None` where it may have any length: in a pipe or file. A full last
-    /// column would wrap on some terminals.
+    /// Columns that a line may fill, which may change; `None` in a pipe or file, without a limit.
+    ///
+    /// The last column stays empty, since a full one would wrap on some terminals.
     pub(crate) fn columns() -> Option<usize> {
         let stdout = std::io::stdout();
         if !stdout.is_terminal() {
@@ -38,7 +39,7 @@ impl Screen {
         Some(if columns == 0 { COLUMNS } else { columns.max(LEAST_COLUMNS) } - 1)
     }
 
-    /// A line, made fit, in the colour of a lamp.
+    /// A printable line in the colour of a lamp.
     pub(crate) fn coloured(self, text: &str, lamp: Option<Lamp>) -> String {
         let text = one_line(text);
         let code = match lamp.filter(|_| self.colours) {

@@ -1,4 +1,4 @@
-//! `headrace simulate`: a scene as a log, with its ground truth.
+//! `headrace simulate`: writes a scene as a log, with its ground truth.
 
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
@@ -77,7 +77,7 @@ pub(crate) fn simulate(args: &Simulate) -> Result<u8, Failure> {
             truth.write(&scene, &simulation.take_truth())?;
         }
     }
-    // An advised pilot's dive is as long as he needs.
+    // The length of an advised pilot's dive depends on the advice.
     let duration_s = simulation.duration_s();
     let (file, written) = writer.finish().map_err(Failure::writing(output))?;
     file.complete().map_err(failed)?;
@@ -106,7 +106,7 @@ pub(crate) fn simulate(args: &Simulate) -> Result<u8, Failure> {
     Ok(failure::OK)
 }
 
-/// The ground truth: CSV, a row per measurement.
+/// Ground truth as CSV, with a row per measurement.
 struct Truth {
     path: PathBuf,
     file: WholeFile,
@@ -140,7 +140,7 @@ impl Truth {
         Ok(())
     }
 
-    /// Puts it in its place; returns its number of rows.
+    /// Moves the file into place; returns its number of rows.
     fn finish(self) -> Result<u64, Failure> {
         let Self { path, file, rows, .. } = self;
         file.complete().map_err(|source| Failure::Write { path, source })?;
@@ -181,7 +181,7 @@ impl Truth {
         text
     }
 
-    /// The columns of a sounding's row.
+    /// Columns of a sounding's row.
     fn sounding(&self, sounding: &SoundingTruth) -> String {
         let mut text = format!(",{}", sounding.measured.angle_rad.to_degrees());
         match &sounding.wall {

@@ -14,7 +14,8 @@ use crate::failure::Failure;
 use crate::phase::Phase;
 use crate::watch::Watch;
 
-/// The report of a dive judged along its smoothed trajectory. `player` plays the log from its beginning, for its losses.
+/// Report of a dive judged along its smoothed trajectory. `player` plays the log from its beginning, for its
+/// losses.
 pub(crate) fn smoothed(
     files: &[PathBuf],
     player: &mut Player,

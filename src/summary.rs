@@ -12,12 +12,12 @@ use headrace_monitor::what_if::WhatIfReport;
 
 use crate::terminal;
 
-/// Silence of a sensor that is told, s.
+/// Silence of a sensor from which it is reported, s.
 const SILENT_S: f64 = 5.0;
-/// Notes that are listed.
+/// Maximum number of notes listed.
 const MOST_NOTES: usize = 20;
 
-/// The summary text, in lines of at most so many columns, if that is said.
+/// Summary text, in lines of at most `columns` columns if given.
 pub(crate) fn summary(report: &Report, columns: Option<usize>) -> String {
     let mut text = String::new();
     let mut line = |words: String| {
@@ -118,7 +118,7 @@ fn spacing(report: &Report) -> String {
     )
 }
 
-/// What came for a sensor and was dropped unread.
+/// Text on packets for a sensor that were dropped unread.
 fn dropped(source: &SourceReport) -> Option<String> {
     let count = source.line.as_ref()?.dropped_packets;
     let line = format!(
@@ -128,7 +128,8 @@ fn dropped(source: &SourceReport) -> Option<String> {
     (count > 0).then_some(line)
 }
 
-/// How long a sensor was silent, if that is worth a line; a dive without a position or sonar says by itself what it never heard.
+/// Text on a sensor's silence, if it is worth a line. A dive without position or sonar already names its
+/// silent sensors.
 fn silence(source: &SourceReport) -> Option<String> {
     let id = &source.id;
     match source.silent_at_end_s {
@@ -141,7 +142,7 @@ fn silence(source: &SourceReport) -> Option<String> {
     }
 }
 
-/// Why a dive is no inspection.
+/// Reason for which a dive is no inspection.
 fn not_inspected_text(why: &NotInspectedReport, dive: &DiveReport) -> String {
     let lacking = why
         .lacking
@@ -165,7 +166,7 @@ fn not_inspected_text(why: &NotInspectedReport, dive: &DiveReport) -> String {
     }
 }
 
-/// Where the heads of a dive that was never within the tunnel were, and what to check.
+/// Text on a dive that was never within the tunnel: places of the heads, and settings to check.
 fn outside_text(dive: &DiveReport) -> String {
     let place = match (dive.from_m, dive.to_m) {
         (Some(from_m), Some(to_m)) => format!(" from {} to {}", station(from_m), station(to_m)),
@@ -182,14 +183,14 @@ fn metres(judged: &WhatIfReport) -> String {
     metres_text(&LiveMetres { pass_m, fail_m, cannot_say_m, open_m, not_inspected_m })
 }
 
-/// The stretches that are missed or of which nothing can be said, along the tunnel, a line each: where, what, what to do.
+/// Lines on the missed and the unsure stretches, along the tunnel: place, problem, action.
 fn stretches(report: &Report) -> Vec<String> {
     let fails = |run: &&RunReport| {
         let mut within =
             report.sections.iter().filter(|section| (run.start_m..run.end_m).contains(&section.start_m));
         within.any(|section| section.verdict == "fail")
     };
-    // What was passed again and can't be said is among the unsure.
+    // Sections passed again without a verdict are listed as unsure.
     let open = report.runs.iter().filter(|run| run.cleared_s.is_none()).filter(fails);
     let mut all: Vec<(f64, String)> = open.map(|run| (run.start_m, missed(run, report))).collect();
     all.extend(report.unsure.iter().map(|stretch| (stretch.start_m, unsure(&stretch.stretch))));
@@ -204,7 +205,7 @@ fn missed(run: &RunReport, report: &Report) -> String {
     let back = report.way_home.iter().find(|back| back.run == run.id);
     let action = back
         .map(|back| format!("  -> {}", actions_text(&back.actions, back.back_to_m, back.at_most_mps, heads)));
-    // The rest passes, or nothing can be said of it since.
+    // The rest passes, or no longer has a verdict.
     let of_it = of_it_text(run.failed_m, run.end_m - run.start_m);
     format!(
         "  {} to {}{of_it}  MISSED: {cause}, holes up to {:.2} m{}",
@@ -226,7 +227,7 @@ fn unsure(stretch: &UnsureStretch) -> String {
     format!("  {from} to {to}{of_it}  {what}: {}{helps}", unsure_text(stretch))
 }
 
-/// A line broken to so many columns, if that is said; what is carried over is indented.
+/// A line broken to `columns` columns if given. Continuation lines are indented.
 pub(crate) fn broken(line: &str, columns: Option<usize>) -> Vec<String> {
     let Some(columns) = columns.filter(|columns| line.chars().count() > *columns) else {
         return vec![line.to_owned()];
@@ -295,7 +296,7 @@ fn verdict_text(judged: Option<JudgedReport>) -> &'static str {
     }
 }
 
-/// The largest hole of a run with its standard deviation, m.
+/// Largest hole of a run with its standard deviation, m.
 fn holes(run: impl Iterator<Item = JudgedReport>) -> String {
     let measured = run.filter_map(|judged| Some((judged.hole_m?, judged.hole_sd_m)));
     let largest = measured.max_by(|a, b| a.0.total_cmp(&b.0));

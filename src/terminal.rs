@@ -1,9 +1,9 @@
-//! What the terminal behind an output can do. Nothing else reads `NO_COLOR`, `TERM` and the locale.
+//! Capabilities of the terminal behind an output. No other module reads `NO_COLOR`, `TERM` and the locale.
 
 use std::io::IsTerminal;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-/// What an output stream can show.
+/// Capabilities of an output stream.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct Terminal {
     /// Colours: a terminal, and neither `NO_COLOR` nor `TERM=dumb`.
@@ -12,13 +12,13 @@ pub(crate) struct Terminal {
     pub(crate) overwrites: bool,
 }
 
-/// Goes to the beginning of the line and clears it.
+/// Sequence that returns to the beginning of the line and clears it.
 pub(crate) const CLEAR: &str = "\r\x1b[K";
 
 static QUIET: AtomicBool = AtomicBool::new(false);
 static VERBOSE: AtomicBool = AtomicBool::new(false);
 
-/// What a stream can show.
+/// Detects the capabilities of a stream.
 pub(crate) fn of(stream: &impl IsTerminal) -> Terminal {
     let variable = |name: &str| std::env::var(name).ok();
     able(stream.is_terminal(), variable("NO_COLOR").as_deref(), variable("TERM").as_deref())
@@ -30,7 +30,7 @@ pub(crate) fn allows_colour() -> bool {
     able(true, variable("NO_COLOR").as_deref(), variable("TERM").as_deref()).colour
 }
 
-/// Whether the locale says that the terminal shows more than ASCII. Source: POSIX, the order of `LC_ALL`, `LC_CTYPE`, `LANG`.
+/// Whether the locale indicates more than ASCII. Source: POSIX, the order of `LC_ALL`, `LC_CTYPE`, `LANG`.
 pub(crate) fn has_unicode() -> bool {
     let set = |name: &str| std::env::var(name).ok().filter(|value| !value.is_empty());
     let locale = ["LC_ALL", "LC_CTYPE", "LANG"].into_iter().find_map(set).unwrap_or_default().to_lowercase();
@@ -43,7 +43,7 @@ fn able(is_terminal: bool, no_color: Option<&str>, term: Option<&str>) -> Termin
     Terminal { colour: overwrites && no_color.is_none_or(str::is_empty), overwrites }
 }
 
-/// With `-q` only results and errors are shown.
+/// Sets whether only results and errors are shown, as with `-q`.
 pub(crate) fn be_quiet(quiet: bool) {
     QUIET.store(quiet, Ordering::Relaxed);
 }
@@ -68,7 +68,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn colours_are_for_terminals_that_want_them() {
+    fn colours_need_a_terminal_that_allows_them() {
         let shows = |is_terminal, no_color, term| {
             let Terminal { colour, overwrites } = able(is_terminal, no_color, term);
             (colour, overwrites)

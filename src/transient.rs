@@ -1,11 +1,12 @@
-//! Flag for a transient last line of the terminal, one without a line end: progress, or the dive's state. Log messages,
-//! from any thread, clear it first.
+//! Flag for a transient last line of the terminal without a line end: progress, or the dive's state.
+//!
+//! Log messages of any thread clear it first.
 
 use std::sync::atomic::{AtomicBool, Ordering};
 
 static SHOWN: AtomicBool = AtomicBool::new(false);
 
-/// A transient line was written.
+/// Sets the flag after a transient line was written.
 pub(crate) fn shown() {
     SHOWN.store(true, Ordering::Relaxed);
 }

@@ -11,31 +11,31 @@ use crate::devices::KINDS;
 use crate::failure::Failure;
 use crate::files;
 
-/// Reads and parses a vehicle file; returns its text, too.
+/// Reads and parses a vehicle file. Also returns its text.
 pub(crate) fn read(path: &Path) -> Result<(String, VehicleConfig), Failure> {
     let text = files::read(path)?;
     let vehicle = parse(&path.display().to_string(), &text, &files::beside(path))?;
     Ok((text, vehicle))
 }
 
-/// The vehicle file that an option names, if it is given, and what it was read from.
+/// Vehicle file named by an option, if given, and its source files.
 #[derive(Default)]
 pub(crate) struct Given {
-    /// Its text, and the vehicle.
+    /// Text and vehicle.
     vehicle: Option<(String, VehicleConfig)>,
-    /// It and the files that it refers to.
+    /// The file itself, and the files that it refers to.
     pub(crate) files: Vec<PathBuf>,
 }
 
 impl Given {
-    /// Reads it.
+    /// Reads the file.
     pub(crate) fn read(path: Option<&Path>) -> Result<Self, Failure> {
         let Some(path) = path else { return Ok(Self::default()) };
         let (text, vehicle) = read(path)?;
         Ok(Self { files: files(path, &vehicle), vehicle: Some((text, vehicle)) })
     }
 
-    /// It, where it is given, or else the one attached to a log; see [`attached`].
+    /// The given file, or else the one attached to a log; see [`attached`].
     pub(crate) fn or_attached(
         self,
         info: &LogInfo,
@@ -53,9 +53,9 @@ pub(crate) fn files(path: &Path, vehicle: &VehicleConfig) -> Vec<PathBuf> {
     std::iter::once(path.to_owned()).chain(others).collect()
 }
 
-/// Parses the vehicle file attached to a log; returns its text, too.
+/// Parses the vehicle file attached to a log. Also returns its text.
 ///
-/// Errors: none is attached or it can't be read (`losses` are the log's); it is invalid.
+/// Errors: none is attached, it can't be read (`losses` are the log's), or it is invalid.
 pub(crate) fn attached(
     info: &LogInfo,
     losses: &[String],
@@ -66,7 +66,7 @@ pub(crate) fn attached(
         let which = damage.unwrap_or_else(|| " is attached to this log".to_owned());
         Failure::Usage(format!("reading {}: no vehicle file{which}; give one with --vehicle", log.display()))
     })?;
-    // As if the log were a folder.
+    // The path is as if the log were a folder.
     let vehicle =
         parse(&format!("{}/{VEHICLE_FILE}", log.display()), &text, &files::attached(&info.attachments))?;
     Ok((text, vehicle))

@@ -1,4 +1,4 @@
-//! `headrace verify`: a replay compared with the results published live.
+//! `headrace verify`: compares a replay with the results published live.
 
 use std::path::PathBuf;
 
@@ -33,7 +33,7 @@ pub(crate) fn verify(args: &Verify) -> Result<u8, Failure> {
     tell(args, &verified, (&player.losses(), trimmed.as_deref()), &sources)
 }
 
-/// Replays a log, and compares.
+/// Replays a log, and compares the results.
 fn compared(args: &Verify, files: &[PathBuf], player: &mut Player, dive: Dive) -> Result<Verified, Failure> {
     let tick = DurNs::from_millis(i64::from(args.tick_ms));
     let mut verifier = Verifier::open(files)?;

@@ -1,4 +1,4 @@
-//! Output during a dive: the state, and each missed, unsure or cleared stretch once; as lines for people, or as JSON.
+//! Output during a dive: its state, and each missed, unsure or cleared stretch once, as lines or as JSON.
 
 use headrace_config::plain::one_line;
 use headrace_geometry::time::{DurNs, MonoNs};
@@ -17,40 +17,40 @@ use crate::recording_state::RecordingState;
 use crate::screen::Screen;
 use crate::terminal;
 
-/// Interval of state lines where they can't be overwritten.
+/// Interval of state lines that can't be overwritten.
 const LINE_EVERY: DurNs = DurNs(10_000_000_000);
 /// Interval of state lines that are overwritten, and of those in JSON.
 const REFRESH_EVERY: DurNs = DurNs(1_000_000_000);
-/// A lamp that changes is shown this long after the last state line at the earliest, where lines can't be overwritten.
+/// Minimum time between the last state line and one for a changed lamp, if lines can't be overwritten.
 const CHANGE_EVERY: DurNs = DurNs(2_000_000_000);
 
-/// How a dive is shown.
+/// Display of a dive.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Show {
-    /// Not at all.
+    /// No display.
     Nothing,
-    /// To its followers alone, which have the terminal.
+    /// Only by its followers, which use the terminal.
     Followers,
-    /// As lines for people.
+    /// Lines for people.
     Lines,
-    /// As a JSON object a line.
+    /// JSON objects, one per line.
     JsonLines,
 }
 
-/// Shows a dive on stdout, and to the followers that were added.
+/// Shows a dive on stdout, and to the added followers.
 pub(crate) struct Watch {
     followers: Vec<Box<dyn Follower>>,
     show: Show,
     screen: Screen,
     printer: Option<Printer>,
     teller: Teller,
-    /// When the state was shown last, and what it was.
+    /// Time and condition of the last state shown.
     shown: Option<(MonoNs, Condition)>,
     recorded: RecordingState,
 }
 
 impl Watch {
-    /// Shows the dive in this way; not at all with `-q`.
+    /// Shows the dive in this way; with `-q` not at all.
     pub(crate) fn new(show: Show) -> Self {
         let quiet = terminal::is_quiet() && show != Show::Followers;
         let show = if quiet { Show::Nothing } else { show };
@@ -70,7 +70,7 @@ impl Watch {
         Self::new(Show::Nothing)
     }
 
-    /// Shows the dive to this one, too.
+    /// Adds a follower.
     #[must_use]
     pub(crate) fn followed_by(mut self, follower: Box<dyn Follower>) -> Self {
         self.followers.push(follower);
@@ -82,17 +82,17 @@ impl Watch {
         self.show == Show::Nothing
     }
 
-    /// Whether it is shown in lines for people.
+    /// Whether the dive is shown in lines for people.
     pub(crate) fn shows_lines(&self) -> bool {
         self.show == Show::Lines
     }
 
-    /// Says a line in its turn.
+    /// Writes a line in order with the others.
     pub(crate) fn say(&mut self, line: &str) {
         self.print(one_line(line).into_owned());
     }
 
-    /// A dive that can't wait: what the terminal has no room for is dropped.
+    /// Makes the output lossy for a dive that can't wait: lines without room on the terminal are dropped.
     pub(crate) fn live(mut self) -> Self {
         if let Some(printer) = &mut self.printer {
             printer.drop_rather_than_wait();
@@ -117,7 +117,7 @@ impl Watch {
         self.tell(at, &told, dive);
     }
 
-    /// Shows the state, after every tick: also where nothing has come.
+    /// Shows the state. Called after every tick, even without packets.
     pub(crate) fn tick(&mut self, dive: &Loop) {
         self.followers.iter_mut().for_each(|follower| follower.tick(dive));
         if self.printer.is_none() {
@@ -134,12 +134,12 @@ impl Watch {
         }
     }
 
-    /// Passes over a tick on the way of a jump.
+    /// Skips the display of a tick during a jump.
     pub(crate) fn skipped(&mut self, dive: &Loop) {
         self.followers.iter_mut().for_each(|follower| follower.skipped(dive));
     }
 
-    /// A replay begins to stand still or to play, or its speed changes.
+    /// Shows that a replay pauses or resumes, or that its speed changes.
     pub(crate) fn mode(&mut self, paused: bool, speed: Option<f64>) {
         self.followers.iter_mut().for_each(|follower| follower.mode(paused, speed));
     }
@@ -162,7 +162,7 @@ impl Watch {
         }
     }
 
-    /// Shows what has happened to a recording.
+    /// Shows an event of a recording.
     pub(crate) fn recording(&mut self, event: &RecordingEvent, at: MonoNs) {
         let fails = event.fails();
         self.followers.iter_mut().for_each(|follower| follower.recording(event, at));
@@ -183,7 +183,7 @@ impl Watch {
         self.shown = None;
     }
 
-    /// Takes what to show of the recordings from now on.
+    /// Sets the state of the recordings to show from now on.
     pub(crate) fn recorded(&mut self, state: &RecordingState) {
         self.recorded = *state;
         self.followers.iter_mut().for_each(|follower| follower.recorded(state));
@@ -304,7 +304,7 @@ impl Watch {
         self.print(one_line(&value.to_string()).into_owned());
     }
 
-    /// Writes a line that is fit for it.
+    /// Writes a printable line.
     fn print(&mut self, text: String) {
         if let Some(printer) = &mut self.printer {
             printer.line(text);
@@ -312,8 +312,9 @@ impl Watch {
     }
 }
 
-/// The time of what a state shows: its beat, wherever the tick ended that brought it, so that the same dive has the same lines; where no
-/// beats come, the time of the tick.
+/// Time shown for a state: that of its update, so that the same dive gives the same lines wherever ticks end.
+///
+/// Without updates it is the time of the tick.
 fn as_of(state: &LiveState) -> MonoNs {
     state.at.filter(|_| !state.is_old()).unwrap_or(state.now)
 }

@@ -1,4 +1,4 @@
-//! `replay` with several targets or section lengths: what else the dive would have been told.
+//! `replay` with several targets or section lengths: alternative verdicts.
 
 use std::path::PathBuf;
 
@@ -16,8 +16,10 @@ use crate::phase::Phase;
 use crate::smooth;
 use crate::watch::Watch;
 
-/// The dive judged by each of several targets in sections of each of several lengths; nothing where there is one of each. Which visits count and
-/// what was flagged when depends on the target, so that each is a replay of its own, but for the one that has been played.
+/// Judges the dive by each of several targets in sections of each of several lengths; empty for one of each.
+///
+/// Counted visits and the times of flags depend on the target, so each combination is a replay of its own,
+/// except the one already played.
 pub(crate) fn reports(
     args: &Replay,
     files: &[PathBuf],

@@ -13,7 +13,7 @@ use headrace_tests::scenes;
 
 use crate::{SPEED_MPS, best, text, timed};
 
-/// Many rounds, as the figure is the small difference of two times.
+/// Many rounds, because the figure is a small difference of two times.
 const ROUNDS: usize = 40;
 const LENGTH_M: f64 = 80.0;
 const SECOND: DurNs = DurNs(1_000_000_000);
@@ -62,7 +62,7 @@ pub(crate) fn bare() {
     println!("\n| a scene without effects | ns a head's return |\n|---|---|");
     println!("| by hand: all heads' rays and bytes, in order of time | {:.0} |", ns(hand_s));
     println!("| the simulation: the same | {:.0} |", ns(whole_s));
-    println!("| over what is by hand, percent | {:+.1} |", 100.0 * (whole_s / hand_s - 1.0));
+    println!("| over the hand-written program, percent | {:+.1} |", 100.0 * (whole_s / hand_s - 1.0));
 }
 
 /// A vehicle file reduced to its heads, which come first in it.
@@ -90,7 +90,7 @@ struct ByHand<'a> {
     heads: Vec<(Head, Mount)>,
     end: MonoNs,
     due: Vec<Sounding>,
-    /// Time, source, and begin and end of the bytes.
+    /// Time, source, and start and end of the bytes.
     waiting: Vec<(MonoNs, usize, usize, usize)>,
     bytes: Vec<u8>,
 }

@@ -1,5 +1,6 @@
-//! What is saved by simulating what a scene calls for against simulating every effect there is. What effects change is measured by
-//! `headrace simulate --explain=worth`.
+//! Measures the time saved by simulating only the effects that a scene calls for, instead of every effect.
+//!
+//! `headrace simulate --explain=worth` measures the influence of effects.
 
 use headrace_simulator::{Scene, Simulation};
 use headrace_tests::scenes;
@@ -8,7 +9,7 @@ use crate::{EFFECTS, best, simulate};
 
 /// The scenes, each of some minutes.
 const SCENES: [&str; 6] = ["rehearsal", "steel", "collapse", "drop-outs", "leak-current", "small-pipe"];
-/// Effects that stand for devices that break: no scene has them all.
+/// Effects for broken devices; no scene has them all.
 const FAULTS: [&str; 2] = ["stuck_range", "device_faults"];
 
 /// Prints a row for each scene.
@@ -22,7 +23,7 @@ pub(crate) fn called() {
     }
 }
 
-/// A shipped scene that takes what it calls for.
+/// A shipped scene with the effects that it calls for.
 fn text(name: &str) -> String {
     let path = headrace_tests::root().join(format!("deploy/scenes/{name}.toml"));
     let text = std::fs::read_to_string(&path).unwrap();
@@ -36,18 +37,17 @@ fn scene(text: &str, seed: Option<u64>) -> Scene {
     scenes::seeded(text, &load, seed)
 }
 
-/// Time to simulate what the scene calls for against every effect there is, those that it doesn't call for with the parameters of
-/// this bench.
+/// Time to simulate the called effects and every effect; the additional ones have this bench's parameters.
 fn against_all(name: &str, text: &str, called: &Scene) {
     let mut all = text.to_owned();
     let mut count = called.simulated().len();
     let others =
         EFFECTS.iter().filter(|(name, _)| !FAULTS.contains(name) && !called.simulated().contains(name));
     for (name, keys) in others {
-        // Keys that name sensors of another vehicle are dropped: the effect then acts on all that it can.
+        // Keys that name sensors of another vehicle are dropped; the effect then acts on all possible sensors.
         let keys: Vec<&str> = keys.lines().filter(|line| !line.starts_with("sensors")).collect();
         let with = format!("{all}\n[effects.{name}]\n{}\n", keys.join("\n"));
-        // An effect that this scene can't have isn't among all.
+        // Effects that are impossible in this scene are left out.
         if Scene::parse(
             headrace_config::Document::new("scene.toml", &with),
             &headrace::devices::KINDS,

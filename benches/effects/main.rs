@@ -1,10 +1,11 @@
-//! Cost of each effect of the simulator, and what is saved by what a scene calls for. Prints Markdown.
+//! Cost of each effect of the simulator, and the time saved by simulating only the effects that a scene calls for.
+//! Prints Markdown.
 //!
-//! `cargo bench -p headrace_tests --bench effects` runs all; `-- bare`, `-- cost`, `-- called`, `-- seven` one part
-//! alone, and in a build with `--features mesh` `-- mesh`.
-//! Times are this thread's CPU time, the least of several rounds in turns: what else the machine does tells in them hardly at all.
+//! `cargo bench -p headrace_tests --bench effects` runs all parts; `-- bare`, `-- cost`, `-- called` or `-- seven`
+//! runs one, and so does `-- mesh` in a build with `--features mesh`. Times are this thread's CPU time, the least of
+//! several alternating rounds. Other load on the machine hardly affects them.
 
-#![expect(clippy::unwrap_used, clippy::panic, reason = "a benchmark stops at what it can't do")]
+#![expect(clippy::unwrap_used, clippy::panic, reason = "a failed step ends the benchmark")]
 
 mod bare;
 mod called;

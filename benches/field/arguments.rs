@@ -4,22 +4,22 @@ use std::path::PathBuf;
 
 use headrace_tests::field_table::PLACES;
 
-/// Dives of a cell, all and of `--quick`: all take a quarter of an hour on two cores.
+/// Dives of a cell, in a full run and with `--quick`. A full run takes a quarter of an hour on two cores.
 const SEEDS: [u64; 2] = [2, 1];
-/// `--quick` leaves out every second place and most vehicles.
+/// Vehicles of `--quick`, which also leaves out every second place.
 const QUICK_VEHICLES: [&str; 2] = ["vita1", "vita2-4"];
 
-/// What to run.
+/// Arguments of a run.
 pub(crate) struct Arguments {
     /// A tenth of everything.
     pub(crate) quick: bool,
-    /// Parts of a cell's name; an asterisk is any.
+    /// Parts of a cell's name; an asterisk matches any.
     pub(crate) cell: Vec<String>,
     /// Dives of each cell.
     pub(crate) seeds: u64,
     /// The first seed.
     pub(crate) from_seed: u64,
-    /// Metres of each dive, where not each vehicle's own.
+    /// Length of each dive, m, instead of the vehicle's own.
     pub(crate) metres: Option<f64>,
     /// File of the figures.
     pub(crate) json: PathBuf,
@@ -63,7 +63,7 @@ impl Arguments {
         all
     }
 
-    /// Whether to run a cell of this name.
+    /// Whether a cell of this name is selected.
     pub(crate) fn wants(&self, name: &[&str]) -> bool {
         let named = |(part, wanted): (&&str, &String)| wanted == "*" || wanted == part;
         let skipped = self.quick && self.cell.is_empty() && {
@@ -73,7 +73,7 @@ impl Arguments {
         !skipped && name.iter().zip(&self.cell).all(named)
     }
 
-    /// The place that a cell's name asks for, where it is none of the table's.
+    /// Place of the selection, if it isn't one of the table's.
     pub(crate) fn own_place_m(&self) -> Option<(&str, f64)> {
         let place = self.cell.get(2).filter(|place| PLACES.iter().all(|(known, _)| known != place))?;
         Some((place, place.parse().ok()?))

@@ -1,18 +1,18 @@
-//! What the figures of a cell must be.
+//! Goals for the figures of a cell.
 
 use headrace_tests::field_table::{Cell, Condition, Driven, Figures, KINDS_OF_SOURCES};
 
-/// Few false fails, as a share of the sections with D_true below 0.9 T, few that can't be said, and as many passed as could,
-/// as shares of the metres.
+/// Largest share of false fails among the sections with D_true below 0.9 T. As shares of the length: largest
+/// undecided part, and smallest passed part of what could pass.
 struct Bounds {
     false_fails: f64,
     cannot_say: f64,
     passed: f64,
-    /// The speed advised over that of Eq. 16 with what the vehicle hides, at least.
+    /// Least advised speed, over the speed of Eq. 16 with the vehicle's own occlusion.
     advice: f64,
 }
 
-/// The goals that a cell misses.
+/// Goals that a cell misses.
 #[derive(Debug, Clone, Copy, Default)]
 #[expect(clippy::struct_excessive_bools, reason = "one for each goal")]
 pub(crate) struct Missed {
@@ -41,7 +41,7 @@ impl Missed {
         };
         let first_go = matches!(cell.driven, Driven::Planned | Driven::Stood | Driven::Advised);
         let ratios = if bounds.is_some() { 0.7..=1.3 } else { 0.0..=1.5 };
-        // D of several visits is the best of them, D_true that of all together: a lively pilot goes back, too.
+        // D is the best of several visits, but D_true is that of all visits together. A lively pilot goes back, too.
         let once = match cell.driven {
             Driven::Back => false,
             Driven::Planned | Driven::Stood | Driven::Times(_) => cell.condition != Condition::Lively,
@@ -88,7 +88,7 @@ impl Missed {
     }
 }
 
-/// The speed advised over that of Eq. 16.
+/// Advised speed over that of Eq. 16.
 pub(crate) fn advice_share(cell: &Cell, figures: &Figures) -> f64 {
     figures.advised_mps() / cell.vehicle.edge_mps
 }

@@ -11,7 +11,7 @@
 //!
 //! D_true comes from `headrace_tests::truth`, which shares no code with the program's coverage. All other figures are the report's.
 
-#![expect(clippy::unwrap_used, clippy::panic, reason = "a benchmark stops at what it can't do")]
+#![expect(clippy::unwrap_used, clippy::panic, reason = "a failed step ends the benchmark")]
 
 mod arguments;
 mod goals;
@@ -37,7 +37,7 @@ fn main() {
     table::write_json(&cells, &figures, &arguments);
 }
 
-/// Figures of all cells, on all cores.
+/// Figures of all cells, computed on all cores.
 fn run(cells: &[NamedCell], arguments: &Arguments) -> Vec<Figures> {
     let next = AtomicUsize::new(0);
     let cores = std::thread::available_parallelism().map_or(1, usize::from);
@@ -46,7 +46,7 @@ fn run(cells: &[NamedCell], arguments: &Arguments) -> Vec<Figures> {
         loop {
             let number = next.fetch_add(1, Ordering::Relaxed);
             let Some(NamedCell { cell, .. }) = cells.get(number) else { return done };
-            // Hours of way are driven once.
+            // Dives of several hours run once.
             let count = if cell.let_in_m.is_some() { 1 } else { arguments.seeds };
             let seeds = arguments.from_seed..arguments.from_seed + count;
             let length_m = arguments.metres.unwrap_or(cell.vehicle.length_m);

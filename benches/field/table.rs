@@ -8,7 +8,7 @@ use serde_json::json;
 use crate::arguments::Arguments;
 use crate::goals::{Missed, advice_share};
 
-/// Where one vehicle goes that is let in near the portal, m.
+/// Place that one vehicle reaches from a launch near the portal, m.
 const DRIVEN_THERE: Place = ("driven", 6900.0);
 const LET_IN_M: f64 = 60.0;
 /// Places up to this chainage are the same in all tunnels, m.
@@ -21,7 +21,7 @@ pub(crate) struct NamedCell {
     pub(crate) cell: Cell,
 }
 
-/// The cells that are wanted.
+/// The selected cells.
 pub(crate) fn cells(arguments: &Arguments) -> Vec<NamedCell> {
     let mut cells = Vec::new();
     for vehicle in VEHICLES {
@@ -40,12 +40,13 @@ pub(crate) fn cells(arguments: &Arguments) -> Vec<NamedCell> {
             }
         }
     }
-    // The longest first, which would otherwise keep one core waiting for the other.
+    // The longest dives come first; at the end they would leave one core idle.
     cells.sort_by_key(|named| named.cell.let_in_m.is_none());
     cells
 }
 
-/// Whether the table has a cell: what is wrong or breaks is tried at one place, unless asked for; one vehicle is driven far.
+/// Whether the table has a cell. Wrong settings and broken devices are tried at one place, unless selected; one
+/// vehicle is driven far.
 fn has(vehicle: &Vehicle, condition: Condition, arguments: &Arguments, [place, speed]: [&str; 2]) -> bool {
     if place == DRIVEN_THERE.0 {
         return vehicle.name == "vita2-4" && condition == Condition::DataSheet && speed == "planned";
@@ -55,13 +56,13 @@ fn has(vehicle: &Vehicle, condition: Condition, arguments: &Arguments, [place, s
     if speed == "stood" && !stands && arguments.cell.is_empty() {
         return false;
     }
-    // Between the ends nothing is told apart from them but that it is the same.
+    // The middle place only shows that results don't depend on the place.
     let told_apart = place != "3000"
         || ["vita1", "vita2-4"].contains(&vehicle.name) && ["planned", "advised"].contains(&speed);
     if !told_apart && arguments.cell.is_empty() {
         return false;
     }
-    // Of these it is the same everywhere.
+    // Results of these conditions don't depend on the place.
     if [Condition::Told, Condition::AsBuilt].contains(&condition) && arguments.cell.is_empty() {
         return place == "portal" && ["planned", "stood"].contains(&speed);
     }
@@ -109,7 +110,7 @@ pub(crate) fn falsely(cells: &[NamedCell], figures: &[Figures]) -> String {
     cells.iter().zip(figures).map(of_cell).collect()
 }
 
-/// The same with the dives of all places together, for a page: one vehicle's places beside each other are printed.
+/// Cells with the dives of all places pooled, for a page; the printed table has the places separately.
 pub(crate) fn pooled(cells: &[NamedCell], figures: &[Figures]) -> (Vec<NamedCell>, Vec<Figures>) {
     let mut pools: Vec<(NamedCell, Figures)> = Vec::new();
     for (NamedCell { name: [vehicle, condition, _, speed], cell }, figures) in cells.iter().zip(figures) {

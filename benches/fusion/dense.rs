@@ -1,4 +1,4 @@
-//! Yardsticks: filters with the covariance as a dense matrix.
+//! Reference filters with the covariance as a dense matrix.
 
 use std::hint::black_box;
 
@@ -12,7 +12,7 @@ use nalgebra_of_peers as peers;
 
 use crate::dive::Dive;
 
-/// Indices of the measured errors: the attitude's.
+/// Indices of the measured errors, which are the attitude's.
 const MEASURED: [usize; 3] = [6, 7, 8];
 const NOISE: f64 = 1e-3;
 const INNOVATION: f64 = 1e-3;
@@ -21,14 +21,14 @@ const INNOVATION: f64 = 1e-3;
 pub(crate) fn factors<const N: usize>() -> Factors<N> {
     let mut factors = Factors::independent([0.01; N]);
     for k in 0..N {
-        // Directions that aren't parallel to each other.
+        // No two directions are parallel.
         let a = core::array::from_fn(|i| ((3 * i + 5 * k + i * k) % 11) as f64 / 11.0 - 0.4);
         factors.add(0.001, a, N);
     }
     factors
 }
 
-/// Element (i, j) of an epoch's transition matrix, of which filters with fewer states use a corner.
+/// Element (i, j) of an epoch's transition matrix; filters with fewer states use its upper left part.
 fn transition() -> [[f64; ERRORS]; ERRORS] {
     let transition = Dive::under_way().leg().transition(&Settings::default());
     let columns: [[f64; ERRORS]; ERRORS] = core::array::from_fn(|j| {

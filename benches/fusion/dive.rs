@@ -1,4 +1,4 @@
-//! A vehicle at rest in the middle of a tunnel: all sensors have ideal readings, so that nothing is gated.
+//! A stationary vehicle in the middle of a tunnel; all sensors have ideal readings, so that nothing is gated.
 
 use headrace_fusion::filter::clones::ErrorClones;
 use headrace_fusion::filter::context::Context;
@@ -126,7 +126,7 @@ impl Dive {
         self.running.factors
     }
 
-    /// The clones, and the time of the last epoch, which bounds that of the last clone.
+    /// The clones, and the time of the last epoch, which bounds the time of the last clone.
     pub(crate) fn clones(&self) -> (ErrorClones, MonoNs) {
         (self.running.clones.clone(), self.running.at)
     }

@@ -1,11 +1,11 @@
-//! Speed of the navigation filter's parts, each compared with a dense filter of as many states in the same run. Prints
-//! Markdown.
+//! Speed of the navigation filter's parts, each compared with a dense filter of as many states in the same run.
+//! Prints Markdown.
 //!
-//! `cargo bench -p headrace_tests --bench fusion` runs it on one core in some seconds. Rounds are taken in turns and the
-//! best of each counts: absolute times drift on shared machines; the ratios hold.
+//! `cargo bench -p headrace_tests --bench fusion` runs on one core in some seconds. Rounds alternate and the best one
+//! counts. Absolute times drift on shared machines, but the ratios hold.
 
 #![expect(clippy::disallowed_methods, reason = "a benchmark reads the clock")]
-#![expect(clippy::unwrap_used, reason = "a benchmark stops at what it can't do")]
+#![expect(clippy::unwrap_used, reason = "a failed step ends the benchmark")]
 
 mod dense;
 mod dive;
@@ -26,7 +26,8 @@ use dense::{Dense, Published};
 use dive::{Dive, GRAVITY_MPS2, SAMPLE_S};
 
 const ROUNDS: usize = 200;
-/// Runs per round: long against the clock's resolution, and short against disturbances on a shared machine.
+/// Runs per round: long enough for the clock's resolution, and short enough to avoid disturbances on a shared
+/// machine.
 const RUNS: u32 = 500;
 /// Runs before restarting from the initial state, so that repetition doesn't make the state diverge.
 const RUNS_FROM_ONE_START: u32 = 20;
@@ -58,7 +59,7 @@ fn cpu() -> String {
     model.trim_start_matches(['\t', ' ', ':']).to_owned()
 }
 
-/// Work to be timed: repeats itself this many times.
+/// Work to be timed; the argument is its number of repetitions.
 type Work<'a> = &'a mut dyn FnMut(u32);
 
 /// Best time of each for one run, ns.
@@ -74,7 +75,7 @@ fn in_turns<const K: usize>(mut works: [Work<'_>; K]) -> [f64; K] {
     best
 }
 
-/// Runs `step` on a copy of `start`, which is replaced now and then.
+/// Runs `step` on a copy of `start`, which is renewed at intervals.
 fn from_a_start<T: Clone>(start: &T, runs: u32, mut step: impl FnMut(&mut T)) {
     for _ in 0..runs / RUNS_FROM_ONE_START {
         let mut value = start.clone();

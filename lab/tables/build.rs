@@ -1,4 +1,5 @@
-//! The program's version for caches: the package's, and a digest of the sources that decide a dive's results.
+//! Computes the program's version for caches: the package's version, and a digest of the sources that decide a dive's
+//! results.
 
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
@@ -38,7 +39,7 @@ fn main() -> std::io::Result<()> {
 fn collect(path: &Path, files: &mut Vec<PathBuf>) -> std::io::Result<()> {
     if path.is_dir() {
         let name = path.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
-        // Tests and the page decide nothing.
+        // Tests and the page don't influence results.
         if matches!(name.as_str(), "tests" | "node_modules" | "page" | "target") {
             return Ok(());
         }

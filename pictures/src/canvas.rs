@@ -12,7 +12,7 @@ use super::polyline::{self, Px};
 
 /// Usual width and height of a sheet, pixels.
 pub const SIZE_PX: [u32; 2] = [900, 560];
-/// Mean width of a letter of the usual fonts, plain and bold, as a share of their size; a slight overestimate.
+/// Mean width of a letter of the usual fonts, plain and bold, as a share of their size; slightly overestimated.
 const LETTER: [f64; 2] = [0.56, 0.65];
 
 /// Horizontal alignment of a text at its position.
@@ -35,7 +35,7 @@ pub struct Letters {
     pub colour: Colour,
     /// Bold rather than plain.
     pub bold: bool,
-    /// Upwards instead of to the right.
+    /// Rotated to run upwards instead of to the right.
     pub upright: bool,
 }
 
@@ -89,7 +89,7 @@ impl Canvas {
         Self::of_size(SIZE_PX, title, subtitle)
     }
 
-    /// The same with a given width and height, pixels.
+    /// A sheet like [`Canvas::new`] with a given width and height, pixels.
     pub fn of_size([width, height]: [u32; 2], title: &str, subtitle: &str) -> Self {
         let document = Document::new()
             .set("width", width)
@@ -120,7 +120,8 @@ impl Canvas {
             Side::Left => "end",
             Side::Middle => "middle",
         };
-        // Not every viewer supports vertical centring: the middle of letters is about a third of their size above the baseline.
+        // Not every viewer supports vertical centring. The middle of letters is about a third of their size above the
+        // baseline.
         let mut node = element::Text::new(text)
             .set("x", number(x))
             .set("y", number(y + 0.35 * letters.size_px))
@@ -136,7 +137,7 @@ impl Canvas {
         self.put(node);
     }
 
-    /// The same on a white background, for positions crossed by lines.
+    /// A line of text on a white background, for positions crossed by lines.
     pub fn text_on_white(&self, place: Px, text: &str, side: Side, letters: Letters) {
         let width = width_px(text, letters);
         let left = match side {
@@ -205,7 +206,7 @@ impl Canvas {
         self.put(element::Polygon::new().set("points", points(corners)).set("fill", hex(colour)));
     }
 
-    /// A line through these positions, in the given look.
+    /// A line through these positions with the given look.
     pub fn line(&self, places: &[Px], look: &Look) {
         let mut node = element::Polyline::new()
             .set("points", points(&polyline::thinned(places)))

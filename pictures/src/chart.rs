@@ -8,13 +8,13 @@ use super::look::{AXIS, GRID, Look};
 use super::polyline::Frame;
 use super::polyline::Px;
 
-/// Ratio of its ends below which a logarithmic axis has plain steps.
+/// Ratio of its ends below which a logarithmic axis has linear steps.
 const SHORT: f64 = 4.0;
 /// Length of a tick mark, pixels.
 const TICK_PX: f64 = 4.0;
 const NUMBER: Letters = Letters { colour: BLACK, ..SMALL };
 
-/// The range of an axis, and whether equal ratios or equal differences are equally long.
+/// The range of an axis, and whether it is logarithmic.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Scale {
     from: f64,
@@ -23,7 +23,7 @@ struct Scale {
 }
 
 impl Scale {
-    /// Place of a value: 0 at the beginning, 1 at the end.
+    /// Position of a value: 0 at the beginning, 1 at the end.
     fn share(&self, value: f64) -> f64 {
         if self.logarithmic {
             math::ln(value / self.from) / math::ln(self.to / self.from)
@@ -38,10 +38,10 @@ impl Scale {
 #[must_use]
 pub struct Axis {
     scale: Scale,
-    /// Places with their numbers.
+    /// Positions of ticks, with their numbers.
     ticks: Vec<(f64, String)>,
     name: String,
-    /// Distance of its name from it, pixels.
+    /// Distance of the axis's name from it, pixels.
     name_px: f64,
     numbered: bool,
 }
@@ -55,8 +55,10 @@ impl Axis {
         Self { scale, ticks, name: name.to_owned(), name_px: 36.0, numbered: true }
     }
 
-    /// A logarithmic axis, from above zero, with at most `most_ticks` ticks: powers of ten, with 2 and 5 between them if they fit, or
-    /// plain steps where it is too short for these.
+    /// A logarithmic axis, from above zero, with at most `most_ticks` ticks.
+    ///
+    /// Ticks are powers of ten, with 2 and 5 between them if they fit. On an axis too short for these, the steps are
+    /// linear.
     pub fn logarithmic(name: &str, from: f64, to: f64, most_ticks: u32) -> Self {
         let scale = Scale { from, to, logarithmic: true };
         if to / from < SHORT {
@@ -66,18 +68,18 @@ impl Axis {
         Self { scale, ticks, name: name.to_owned(), name_px: 36.0, numbered: true }
     }
 
-    /// With its name at a given distance, pixels.
+    /// The axis with its name at a given distance, pixels.
     pub fn with_name_at(self, name_px: f64) -> Self {
         Self { name_px, ..self }
     }
 
-    /// Without name and numbers, where the adjacent chart has them.
+    /// The axis without name and numbers, if the adjacent chart has them.
     pub fn bare(self) -> Self {
         Self { name: String::new(), numbered: false, ..self }
     }
 }
 
-/// Round numbers within a range, and the decimals that they need.
+/// Round numbers within a range, and the number of decimals that they need.
 fn ticks(from: f64, to: f64, most: u32) -> (Vec<f64>, usize) {
     const DECADES: [(f64, usize); 10] = [
         (1e-4, 4),
@@ -122,7 +124,7 @@ fn ten_to(power: i32) -> f64 {
     (0..power).map(|_| 10.0).product()
 }
 
-/// The number of a tick of a logarithmic axis: as short as may be.
+/// The number of a tick of a logarithmic axis, as short as possible.
 fn tidy(tick: f64) -> String {
     if (1e-4..1e6).contains(&tick) {
         let text = format!("{tick:.4}");
@@ -233,7 +235,7 @@ impl<'c> Chart<'c> {
         }
     }
 
-    /// Text in the middle of the frame, in place of a curve that can't be drawn.
+    /// Text in the middle of the frame, instead of a curve that can't be drawn.
     pub fn instead(&self, lines: &[String]) {
         let Frame { left, top, right, bottom } = self.frame;
         let first = f64::midpoint(top, bottom) - 10.0 * (lines.len() as f64 - 1.0);

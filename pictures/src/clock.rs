@@ -12,20 +12,21 @@ use super::look::AXIS;
 pub struct Hour {
     /// Arc length, m.
     pub arc_m: f64,
-    /// The hour alone.
+    /// The clock hour alone.
     pub clock: String,
     /// Name of the place; empty between floor, walls and crown.
     pub place: &'static str,
 }
 
 impl Hour {
-    /// The hour, and the name of the place.
+    /// The clock hour and the name of the place.
     pub fn words(&self) -> String {
         format!("{} {}", self.clock, self.place).trim_end().to_owned()
     }
 }
 
-/// Every hour and a half from floor to floor, seen looking along the tunnel from the profile's reference point.
+/// The positions at every hour and a half from floor to floor, seen along the tunnel from the profile's reference
+/// point.
 pub fn hours(profile: &Profile) -> Vec<Hour> {
     const NAMES: [(&str, &str); 9] = [
         ("6:00", "floor"),
@@ -52,7 +53,7 @@ pub fn hours(profile: &Profile) -> Vec<Hour> {
     (0..).zip(NAMES).map(hour).collect()
 }
 
-/// Hours to the right of a chart with arc length as its y axis.
+/// Draws clock hours to the right of a chart that has arc length on its y axis.
 pub fn at_right(chart: &Chart<'_>, profile: &Profile) {
     for hour in hours(profile) {
         let y = chart.px([0.0, hour.arc_m])[1];
@@ -68,7 +69,7 @@ mod tests {
     use headrace_geometry::tunnel::shapes;
 
     #[test]
-    fn hours_are_where_the_profile_says() {
+    fn hours_match_the_profile() {
         for profile in
             [shapes::ceran().unwrap(), shapes::rectangle(3.0, 4.0).unwrap(), shapes::circle(0.5).unwrap()]
         {

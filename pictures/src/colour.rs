@@ -10,5 +10,5 @@ pub const BLACK: Colour = Colour(0, 0, 0);
 pub const DIM: Colour = Colour(85, 85, 85);
 /// Label leaders, hidden parts.
 pub const PALE: Colour = Colour(150, 150, 150);
-/// The paper.
+/// Background of the sheet.
 pub const WHITE: Colour = Colour(255, 255, 255);

@@ -13,7 +13,7 @@ const APART_PX: f64 = 12.0;
 /// The label at the end of a curve.
 #[derive(Debug, Clone)]
 pub struct Label {
-    /// The end.
+    /// Position of the curve's end.
     pub place: Px,
     /// Its text, line by line.
     pub lines: Vec<String>,
@@ -63,7 +63,9 @@ pub fn above(canvas: &Canvas, frame: &Frame, labels: &[Label]) {
     }
 }
 
-/// Middles of intervals as near to the wanted positions, in order, as their lengths allow, within bounds if they fit.
+/// Moves intervals apart and returns their middles, as near to the wanted positions as their lengths allow.
+///
+/// The order is kept, and the intervals lie within the bounds if they fit.
 fn moved_apart(wanted: &[(f64, f64)], from: f64, to: f64) -> Vec<f64> {
     let mut middles: Vec<f64> = Vec::with_capacity(wanted.len());
     let mut free = from;
@@ -85,7 +87,7 @@ mod tests {
     use super::moved_apart;
 
     #[test]
-    fn labels_keep_their_places_or_move_as_little_as_they_must() {
+    fn labels_move_only_as_far_as_needed() {
         assert_eq!(moved_apart(&[(10.0, 4.0), (20.0, 4.0)], 0.0, 30.0), [10.0, 20.0]);
         assert_eq!(moved_apart(&[(10.0, 4.0), (11.0, 4.0), (12.0, 4.0)], 0.0, 30.0), [10.0, 14.0, 18.0]);
         assert_eq!(moved_apart(&[(28.0, 4.0), (30.0, 4.0)], 0.0, 30.0), [24.0, 28.0]);

@@ -1,7 +1,7 @@
-//! Drawing of figures: sheet, charts, looks of lines and markers, labels; as SVG text.
+//! Draws figures as SVG text: sheet, charts, looks of lines and markers, and labels.
 //!
-//! Drawn for white paper: every line has its own dash pattern and label as well as its colour. The same input gives
-//! the same bytes.
+//! Figures are made for white paper: every line has its own dash pattern and label as well as its colour. The same
+//! input gives the same bytes.
 
 pub mod canvas;
 pub mod chart;

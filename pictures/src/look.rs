@@ -2,7 +2,8 @@
 
 use super::colour::{BLACK, Colour, DIM, PALE};
 
-/// The palette of Okabe and Ito, which most colour-blind people can distinguish, without the colours too pale for lines.
+/// The palette of Okabe and Ito, which most colour-blind people can distinguish, without the colours too pale for
+/// lines.
 const BLUE: Colour = Colour(0, 114, 178);
 const VERMILION: Colour = Colour(213, 94, 0);
 const GREEN: Colour = Colour(0, 158, 115);
@@ -65,7 +66,7 @@ const SEVERAL: [Look; 8] = [
     look(GREEN, &[5.0, 7.0], Marker::Diamond),
 ];
 
-/// The look of curve `number` of several.
+/// The look of curve number `number` among several.
 pub fn of_several(number: usize) -> Look {
     SEVERAL.get(number % SEVERAL.len()).copied().unwrap_or(T)
 }
@@ -78,7 +79,7 @@ pub const T_X: Look = look(BLUE, &[10.0, 4.0], Marker::Square);
 pub const T_Y: Look = look(VERMILION, &[3.0, 3.0], Marker::Triangle);
 /// The target.
 pub const TARGET: Look = Look { width_px: 1.6, ..look(DIM, &[6.0, 5.0], Marker::Circle) };
-/// The queried value.
+/// The requested value.
 pub const ASKED: Look = Look { width_px: 1.4, ..look(DIM, &[2.0, 4.0], Marker::Circle) };
 /// Parts occluded by the vehicle.
 pub const HIDDEN: Look = Look { width_px: 1.2, ..look(PALE, &[1.5, 3.5], Marker::Circle) };
@@ -86,5 +87,5 @@ pub const HIDDEN: Look = Look { width_px: 1.2, ..look(PALE, &[1.5, 3.5], Marker:
 pub const GRID: Look = Look { width_px: 0.8, ..look(Colour(228, 228, 228), &[], Marker::Circle) };
 /// The axes.
 pub const AXIS: Look = Look { width_px: 1.0, ..look(DIM, &[], Marker::Circle) };
-/// From a label to its item.
+/// A line from a label to its item.
 pub const LEADER: Look = Look { width_px: 0.8, ..look(PALE, &[], Marker::Circle) };

@@ -68,8 +68,9 @@ impl Frame {
     }
 }
 
-/// A step over a wall that is unrolled at its seam, from (x, arc length) to (x, arc length), m: as one segment, or, where
-/// the way over the seam is shorter, as two that meet there.
+/// A step across a wall unrolled at its seam, from (x, arc length) to (x, arc length), m.
+///
+/// It is one segment or, if the path over the seam is shorter, two segments that meet at the seam.
 pub fn over_seam(perimeter_m: f64, from: [f64; 2], to: [f64; 2]) -> Vec<[[f64; 2]; 2]> {
     let around_m = math::wrap_signed(to[1] - from[1], perimeter_m);
     if (to[1] - from[1] - around_m).abs() < 1e-9 {
@@ -136,7 +137,7 @@ mod tests {
     }
 
     #[test]
-    fn thinning_keeps_corners_and_drops_what_lies_between() {
+    fn thinning_keeps_corners_and_drops_points_between() {
         let line: Vec<Px> = (0..=100).map(|k| [f64::from(k), f64::from((k - 50_i32).abs())]).collect();
         assert_eq!(thinned(&line), [[0.0, 50.0], [50.0, 0.0], [100.0, 50.0]]);
         assert!(thinned(&[]).is_empty());

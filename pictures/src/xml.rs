@@ -1,6 +1,6 @@
-//! Whether a text is well-formed XML, for tests of figures.
+//! Checks whether a text is well-formed XML, for tests of figures.
 
-/// Whether tags are closed in order, attributes quoted, and all else escaped.
+/// Checks that tags are closed in order, attributes quoted, and everything else escaped.
 ///
 /// Errors: the first fault, as text.
 pub fn well_formed(svg: &str) -> Result<(), String> {
@@ -50,7 +50,7 @@ mod tests {
     use super::well_formed;
 
     #[test]
-    fn the_check_of_xml_finds_what_is_wrong() {
+    fn xml_check_finds_faults() {
         well_formed("<a b=\"c\"><d/>x &amp; y</a>\n").unwrap();
         for wrong in ["<a>", "<a></b>", "<a b=c/>", "<a b=\"c/>", "<a>&</a>", "<a>&nbsp;</a>", "</a>", "text"]
         {

@@ -1,4 +1,4 @@
-//! Lists the files of the built page, to be held in the binary.
+//! Lists the files of the built page, which are embedded in the binary.
 
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};

@@ -1,4 +1,4 @@
-//! The readings of a part of a log, as decoded by the loop.
+//! Readings of a part of a log, as decoded by the loop.
 
 use headrace_geometry::time::{DurNs, MonoNs};
 use headrace_monitor::messages::Event;
@@ -22,12 +22,12 @@ pub(crate) struct Window {
     pub(crate) at_surface_s: Option<[f64; 2]>,
 }
 
-/// Why readings can't be collected.
+/// Reason for which readings can't be collected.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub(crate) enum CollectError {
     /// The window ends before it begins.
-    #[error("calibrating: --to {to_s} is not after --from {from_s}")]
+    #[error("calibrating: --to {to_s} must be after --from {from_s}")]
     Backwards {
         /// Its beginning, s.
         from_s: f64,
@@ -35,9 +35,7 @@ pub(crate) enum CollectError {
         to_s: f64,
     },
     /// The window is too long to be held.
-    #[error(
-        "calibrating from {from_s} to {to_s} s: that is more than can be looked at; the most is {MOST_S} s"
-    )]
+    #[error("calibrating from {from_s} to {to_s} s: at most {MOST_S} s are allowed; give a shorter window")]
     TooLong {
         /// Its beginning, s.
         from_s: f64,
@@ -59,18 +57,18 @@ pub(crate) struct Collected {
     pub(crate) first: MonoNs,
     /// Start of the requested part.
     pub(crate) from: MonoNs,
-    /// Its end.
+    /// End of the requested part.
     pub(crate) to: MonoNs,
     /// Time of the vehicle at the surface, from and to.
     pub(crate) at_surface: Option<[MonoNs; 2]>,
-    /// The sensors of the vehicle file, by source.
+    /// Sensors of the vehicle file, by source.
     pub(crate) sensors: Vec<SensorInfo>,
     /// Readings of that part and of the time at the surface, in order.
     pub(crate) events: Vec<Event>,
 }
 
 impl Collected {
-    /// The readings of the requested part.
+    /// Readings of the requested part.
     pub(crate) fn within(&self) -> impl Iterator<Item = &Event> {
         self.events.iter().filter(|event| event.received >= self.from && event.received < self.to)
     }
@@ -97,10 +95,10 @@ impl PacketSource for Until<'_> {
     }
 }
 
-/// Runs a log through the loop up to the end of the window, and keeps the readings within. `progress` is given the number
-/// kept so far.
+/// Runs a log through the loop up to the end of the window, and keeps the readings within.
 ///
-/// What comes before the window is run as well: the decoders' state depends on it.
+/// `progress` receives the number kept so far. The part before the window runs as well, because the decoders'
+/// state depends on it.
 ///
 /// Errors: see [`CollectError`].
 pub(crate) fn collect(

@@ -13,7 +13,7 @@ use crate::calibrate::still::longest;
 use crate::calibrate::timing::{Lag, lags};
 use crate::calibrate::zero::{self, Zero};
 
-/// Result of each estimator, or the reason why there is none.
+/// Result of each estimator, or the reason for having none.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Findings {
     /// Mounts of the heads.
@@ -29,8 +29,10 @@ pub(crate) struct Findings {
 }
 
 impl Findings {
-    /// Runs all estimators on the collected part of a log. `chainage_m` is the true chainage at which the vehicle stood still;
-    /// `progress` is given the name of each long step.
+    /// Runs all estimators on the collected part of a log.
+    ///
+    /// `chainage_m` is the true chainage at which the vehicle stood still. `progress` receives the name of
+    /// each long step.
     pub(crate) fn of(
         vehicle: &VehicleConfig,
         collected: &Collected,
@@ -82,7 +84,7 @@ impl Findings {
     }
 }
 
-/// The sensors, with the mounts found for the heads.
+/// Sensors with the mounts found for the heads.
 fn sitting(sensors: &[SensorInfo], heads: Option<&Heads>) -> Vec<SensorInfo> {
     let mut sensors = sensors.to_vec();
     for head in heads.iter().flat_map(|heads| &heads.heads) {

@@ -1,7 +1,8 @@
 //! Robust least squares fit of the vehicle's position and the mounts of its heads to the design profile.
 //!
-//! Gauss-Newton, each round a recursive fit: [`Factors`] start with the prior and take one return after the other, so that
-//! unknowns not determined by the returns keep the vehicle file's value and uncertainty.
+//! Gauss-Newton, in which each round is a recursive fit: [`Factors`] start with the prior and take one return
+//! after the other. Unknowns that the returns don't determine thus keep the vehicle file's value and
+//! uncertainty.
 
 use crate::calibrate::estimate::median;
 use crate::calibrate::scan::{EchoScan, HeadScan, Return};
@@ -13,8 +14,10 @@ use headrace_geometry::frames::{Body, Mount, Point3, Rot, Sensor, Tunnel, Vec3, 
 use headrace_geometry::math;
 use headrace_geometry::tunnel::Profile;
 
-/// Unknowns common to all heads: the vehicle's y and z, m; the rotation vector from the inertial unit's attitude to
-/// the true one, radians; the ratio by which ranges are too long.
+/// Number of unknowns common to all heads.
+///
+/// They are the vehicle's y and z, m; the rotation vector from the inertial unit's attitude to the true one,
+/// radians; and the relative excess of the ranges.
 pub(crate) const COMMON: usize = 6;
 /// Unknowns of each head: its angle about its axis, radians; its offsets left and up from the file's position, m.
 pub(crate) const OWN: usize = 3;
@@ -31,9 +34,10 @@ pub(crate) const ANGLE_SD_RAD: f64 = 10.0 * DEGREE;
 pub(crate) const OFFSET_SD_M: f64 = 0.05;
 const DEGREE: f64 = core::f64::consts::PI / 180.0;
 
-/// Least standard deviation assumed for returns, m: walls are rough.
+/// Minimum standard deviation assumed for returns, m: walls are rough.
 const LEAST_SCALE_M: f64 = 0.01;
-/// Residuals beyond these many scales are downweighted, or rejected. Source: the usual constants of Huber and Tukey.
+/// Residuals beyond this many scales are downweighted, or rejected. Source: the usual constants of Huber and
+/// Tukey.
 const HUBER: f64 = 1.5;
 const TUKEY: f64 = 4.685;
 /// Rounds before Tukey's weights: they need a good start.
@@ -65,12 +69,12 @@ pub(crate) struct Problem<'a> {
     pub(crate) stride: usize,
 }
 
-/// Result of a fit. Unknowns are [`COMMON`] and then, for each head, [`OWN`].
+/// Result of a fit. The unknowns are [`COMMON`], followed by [`OWN`] for each head.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Fit<const N: usize> {
-    /// The unknowns.
+    /// Unknowns.
     pub(crate) x: [f64; N],
-    /// Their covariance.
+    /// Covariance of the unknowns.
     pub(crate) factors: Factors<N>,
     /// Misfit of returns, echoes and prior, in squared standard deviations.
     pub(crate) cost: f64,
@@ -104,7 +108,8 @@ fn add<const N: usize>(x: &mut [f64; N], i: usize, value: f64) {
     }
 }
 
-/// The mount of a head with errors of the angle about its axis and of its position, perhaps turning the opposite way.
+/// Mount of a head with errors of the angle about its axis and of its position, optionally turning the
+/// opposite way.
 pub(crate) fn moved(mount: &Mount, [angle_rad, left_m, up_m]: [f64; 3], is_mirrored: bool) -> Mount {
     let turned: Rot<Body, Sensor> = mount.rotation * about_x(angle_rad);
     // Seen from the other side, angles increase in the opposite sense.
@@ -129,11 +134,11 @@ impl Problem<'_> {
         core::array::from_fn(|_| all.next().unwrap_or(1.0))
     }
 
-    /// Fits from `start`, in at most so many rounds.
+    /// Fits from `start`, in at most `rounds` rounds.
     pub(crate) fn fit<const N: usize>(&self, start: [f64; N], rounds: usize) -> Fit<N> {
         let known = self.known::<N>();
         let mut prior = start;
-        // The prior of the position is the start; all else is as in the file.
+        // The prior of the position is the start. All other priors are the file's values.
         prior.iter_mut().skip(2).for_each(|slot| *slot = 0.0);
         let mut x = start;
         let mut factors = Factors::independent(known.map(|sd| sd * sd));
@@ -295,7 +300,7 @@ fn state<const N: usize>(x: &[f64; N], attitude: Rot<Tunnel, Body>) -> State {
 fn scale<const N: usize>(residuals: &[Residual<N>]) -> f64 {
     let mut sizes: Vec<f64> =
         residuals.iter().filter_map(|residual| residual.row.map(|(_, off_m)| off_m.abs())).collect();
-    // Of normal numbers half are within 0.6745 standard deviations.
+    // Half of normally distributed numbers lie within 0.6745 standard deviations.
     (median(&mut sizes).unwrap_or(0.0) / 0.6745).max(LEAST_SCALE_M)
 }
 

@@ -12,11 +12,12 @@ use headrace_sampling::head::MAX_HEADS;
 
 /// Minimum sector of wall seen by a head to be calibrated, degrees.
 const LEAST_SEEN_DEG: f64 = 120.0;
-/// Largest median residual; beyond it the wall doesn't match the profile, m.
+/// Largest median residual, m. Beyond it the wall doesn't match the profile.
 const MOST_MEDIAN_M: f64 = 0.15;
 /// Largest remaining share of the file's uncertainty for an unknown to count as estimated.
 const TOLD: f64 = 0.3;
-/// Cost difference for a clear sense of rotation, in squared standard deviations: once in 10,000 by chance.
+/// Cost difference for a clear sense of rotation, in squared standard deviations. Chance exceeds it once in
+/// 10,000.
 const CLEAR: f64 = 15.0;
 /// Search of a head's angle: number of starts, rounds from each, and stride of the returns.
 const STARTS: usize = 24;
@@ -24,14 +25,14 @@ const START_ROUNDS: usize = 2;
 const START_STRIDE: usize = 5;
 const ROUNDS: usize = 12;
 
-/// One head, against the vehicle file.
+/// Estimates for one head, against the vehicle file.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Head {
-    /// Its source.
+    /// Source.
     pub(crate) source: usize,
     /// Mount in the vehicle file.
     pub(crate) filed: Mount,
-    /// Estimated mount; where there is no estimate, that of the file.
+    /// Estimated mount; the file's if there is no estimate.
     pub(crate) found: Mount,
     /// Sector in which it received returns, degrees.
     pub(crate) seen_deg: f64,
@@ -45,7 +46,7 @@ pub(crate) struct Head {
     pub(crate) angle_rad: Result<Estimate, Untold>,
     /// Offset to the left of the file's position, relative to the other heads, m.
     pub(crate) left_m: Result<Estimate, Untold>,
-    /// Offset upwards, likewise, m.
+    /// Offset upwards from the file's position, relative to the other heads, m.
     pub(crate) up_m: Result<Estimate, Untold>,
     /// Whether it turns the opposite way (faces aft where the file has forward).
     pub(crate) is_mirrored: Result<bool, Untold>,
@@ -54,7 +55,7 @@ pub(crate) struct Head {
 /// All heads, and the vehicle's position.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Heads {
-    /// The time at rest.
+    /// Time at rest.
     pub(crate) still: Still,
     /// y and z of the body's origin, m.
     pub(crate) place_m: [Estimate; 2],
@@ -158,7 +159,7 @@ fn solve<const N: usize>(material: &Material<'_>, scan: &Scan, still: Still) -> 
     Ok(Heads { still, place_m: [y, z], scale, median_m, heads })
 }
 
-/// Position of the vehicle by the echosounders, or the middle of the section.
+/// Position of the vehicle by the echosounders, or else the centre of the section.
 fn first_place(material: &Material<'_>, scan: &Scan) -> [f64; 2] {
     let start = material.profile.reference();
     let echoes = scan.echoes.iter().map(|echo| Echo { mount: echo.mount, range_m: echo.range_m });
@@ -248,10 +249,11 @@ struct Senses {
 }
 
 impl Senses {
-    /// The senses that fit best, searched one head at a time; the file's, where none is clearly better.
+    /// Chooses the senses of rotation that fit best, one head at a time; the file's if none is clearly
+    /// better.
     ///
-    /// A symmetric section with the vehicle on the other side looks the same when all heads turn the opposite way: that is
-    /// tried, too.
+    /// In a symmetric section, a vehicle on the other side with all heads turning the opposite way looks the
+    /// same. That case is tried, too.
     fn choose<const N: usize>(material: &Material<'_>, scan: &Scan, guesses: &[[Guess; 2]]) -> Self {
         let count = scan.heads.len();
         let cost = |mirrored: &[bool]| joint::<N>(material, scan, guesses, mirrored).cost;

@@ -1,7 +1,9 @@
-//! `headrace calibrate`: replays a log and estimates mounts, zeros and latencies of sensors, as values for the vehicle file.
+//! `headrace calibrate`: replays a log and estimates sensors' mounts, zeros and latencies for the vehicle
+//! file.
 //!
-//! [`mod@collect`] runs a log through the loop and keeps its readings. Pure estimators process these after the dive: they
-//! allocate, and aren't for the loop. Where a log doesn't suffice they return the reason. Derivation: `docs/how-to/calibrate.md`.
+//! [`mod@collect`] runs a log through the loop and keeps its readings. Pure estimators process these after
+//! the dive; they allocate, so the loop doesn't use them. If a log is insufficient, they return the reason.
+//! Derivation: `docs/how-to/calibrate.md`.
 
 pub(crate) mod collect;
 mod estimate;
@@ -73,9 +75,9 @@ pub(crate) fn calibrate(args: &Calibrate) -> Result<u8, Failure> {
     })
 }
 
-/// What is said of the log has to be of it.
+/// Checks that the options match the log.
 ///
-/// Errors: a chainage that isn't in the tunnel, a part that the log hasn't.
+/// Errors: the chainage isn't in the tunnel, or the window isn't in the log.
 fn check(args: &Calibrate, vehicle: &VehicleConfig, player: &Player) -> Result<(), Failure> {
     let length_m = vehicle.tunnel.length_m;
     if let Some(chainage_m) = args.chainage.filter(|chainage_m| !(0.0..=length_m).contains(chainage_m)) {

@@ -13,10 +13,10 @@ use headrace_monitor::messages::Event;
 use headrace_sensor::device::{SensorInfo, SensorKind};
 use headrace_sensor::reading::Reading;
 
-/// Returns within this angle see the same roughness of the wall: together they count as one.
+/// Returns within this angle see the same roughness of the wall, so together they count as one.
 pub(super) const SAME_WALL_RAD: f64 = TAU / SECTORS as f64;
 const SECTORS: usize = 120;
-/// Most returns used of one piece of wall: more add no information.
+/// Maximum number of returns used per piece of wall. More add no information.
 const MOST_OF_A_SECTOR: usize = 8;
 
 /// A return of a head.
@@ -52,19 +52,19 @@ pub(crate) struct EchoScan {
     pub(crate) range_m: f64,
 }
 
-/// See the module's description.
+/// Ranges at rest; see the module's description.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Scan {
     /// Attitude of the vehicle in the middle of the time at rest.
     pub(crate) attitude: Rot<Tunnel, Body>,
-    /// The heads that heard the wall.
+    /// Heads that detected the wall.
     pub(crate) heads: Vec<HeadScan>,
-    /// The echosounders that heard it.
+    /// Echosounders that detected it.
     pub(crate) echoes: Vec<EchoScan>,
 }
 
 impl HeadScan {
-    /// Sector of wall it has seen, radians of its turn.
+    /// Sector of wall that it has seen, radians of its turn.
     pub(crate) fn seen_rad(&self) -> f64 {
         let mut seen = [false; SECTORS];
         for one in &self.returns {
@@ -111,7 +111,7 @@ fn sector(angle_rad: f64) -> usize {
 
 /// Gathers the ranges of a time at rest.
 ///
-/// Errors: no attitude, or no head that heard the wall.
+/// Errors: there is no attitude, or no head detected the wall.
 pub(crate) fn gather(material: &Material<'_>, still: &Still) -> Result<Scan, Untold> {
     let attitudes = attitudes(material, still);
     let middle = attitudes.get(attitudes.len() / 2);
@@ -135,7 +135,7 @@ fn attitudes(material: &Material<'_>, still: &Still) -> Vec<(MonoNs, Rot<Tunnel,
     material.during(still.from, still.to).filter_map(attitude).collect()
 }
 
-/// The heads that heard the wall, by source.
+/// Heads that detected the wall, by source.
 fn heads(material: &Material<'_>, still: &Still, attitudes: &[(MonoNs, Rot<Tunnel, Body>)]) -> Vec<HeadScan> {
     let mut heads: BTreeMap<usize, HeadScan> = BTreeMap::new();
     for (event, sensor) in material.during(still.from, still.to) {
@@ -159,7 +159,7 @@ fn heads(material: &Material<'_>, still: &Still, attitudes: &[(MonoNs, Rot<Tunne
     heads.into_values().collect()
 }
 
-/// The echosounders that heard the wall, by source.
+/// Echosounders that detected the wall, by source.
 fn echoes(material: &Material<'_>, still: &Still) -> Vec<EchoScan> {
     let mut heard: BTreeMap<usize, (Mount, Vec<f64>)> = BTreeMap::new();
     for (event, sensor) in material.during(still.from, still.to) {

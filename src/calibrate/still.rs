@@ -1,4 +1,4 @@
-//! Detects when the vehicle stood still: by its attitude, cable, depth and echosounders, second by second.
+//! Detects when the vehicle stood still, second by second: by its attitude, cable, depth and echosounders.
 
 use std::collections::BTreeMap;
 
@@ -11,9 +11,9 @@ use headrace_monitor::messages::Event;
 use headrace_sensor::device::{SensorInfo, SensorKind};
 use headrace_sensor::reading::{Level, Reading};
 
-/// Averaging time of the medians: noise and outliers aren't motion.
+/// Averaging time of the medians, so that noise and outliers don't count as motion.
 const BIN: DurNs = DurNs(1_000_000_000);
-/// Minimum length of a time at rest, and the longest part used (the rest adds no information), in bins.
+/// Minimum length of a time at rest, and longest part used, in bins. More adds no information.
 const LEAST: usize = 3;
 const MOST: usize = 120;
 
@@ -36,7 +36,7 @@ impl Sign {
         }
     }
 
-    /// Largest range of it at rest, and its unit.
+    /// Largest range of the quantity at rest, and its unit.
     fn limit(self) -> (f64, &'static str) {
         match self {
             Self::Cable => (0.05, "m"),
@@ -46,27 +46,27 @@ impl Sign {
     }
 }
 
-/// A part of a log in which the vehicle stood still and its heads heard the wall.
+/// A part of a log in which the vehicle stood still and its heads detected the wall.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct Still {
-    /// From this receive time,
+    /// First receive time.
     pub(crate) from: MonoNs,
-    /// to before this one.
+    /// End of the receive times, exclusive.
     pub(crate) to: MonoNs,
 }
 
 /// Values of one source, by bin.
 type Raw = (Sign, Vec<Vec<f64>>);
 
-/// Medians of these.
+/// Medians of these values.
 struct Channel {
     sign: Sign,
     by_bin: Vec<Option<f64>>,
 }
 
-/// The longest part in which the vehicle stood still, the first of those.
+/// Longest part in which the vehicle stood still; the first of equally long ones.
 ///
-/// Errors: no attitude, no returns, or it moved all the time.
+/// Errors: there is no attitude or no return, or the vehicle moved all the time.
 pub(crate) fn longest(material: &Material<'_>) -> Result<Still, Untold> {
     let (first, last) = match (material.events.first(), material.events.last()) {
         (Some(first), Some(last)) => (first.received, last.received),
@@ -106,7 +106,7 @@ fn bins_long(bins: usize) -> DurNs {
     DurNs(BIN.0.saturating_mul(i64::try_from(bins).unwrap_or(i64::MAX)))
 }
 
-/// Number of bins from this one on in which nothing moves and the wall is heard.
+/// Number of bins from this one on in which nothing moves and the wall is detected.
 fn length_from(from: usize, channels: &[Channel], heard: &[bool]) -> usize {
     let mut spans: Vec<Option<(f64, f64)>> = vec![None; channels.len()];
     let mut length = 0;
@@ -129,7 +129,7 @@ fn widened(span: Option<(f64, f64)>, value: f64) -> (f64, f64) {
     span.map_or((value, value), |(least, most)| (least.min(value), most.max(value)))
 }
 
-/// The quantity that moved most, relative to its limit.
+/// Reason with the quantity that moved most, relative to its limit.
 fn moved(channels: &[Channel]) -> Untold {
     let mut worst = (Sign::Attitude, 0.0);
     for channel in channels {
@@ -179,7 +179,7 @@ fn channels(material: &Material<'_>, first: MonoNs, bins: usize) -> Vec<Channel>
     raw.into_values().map(channel).collect()
 }
 
-/// Motion values of a reading: up to three numbers, the others not finite.
+/// Motion values of a reading: up to three numbers; unused ones are not finite.
 fn shows(
     material: &Material<'_>,
     sensor: &SensorInfo,

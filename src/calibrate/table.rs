@@ -1,4 +1,4 @@
-//! Estimates against the vehicle file's values, and the lines to change in it.
+//! Compares estimates with the vehicle file's values, and lists the lines to change.
 
 use headrace_sampling::head::faces_aft;
 use headrace_vehicle::VehicleConfig;
@@ -8,7 +8,8 @@ use crate::calibrate::findings::Findings;
 use crate::calibrate::heads::Head;
 use crate::calibrate::zero::Zero;
 
-/// Share by which ranges may be long or short for the profile: three times what tables of the speed of sound are off.
+/// Largest relative scale error of ranges accepted for the profile: three times the error of tabulated speeds
+/// of sound.
 const MOST_SCALE: f64 = 0.01;
 
 /// A value in the unit of its row.
@@ -21,7 +22,7 @@ pub(crate) enum Value {
         /// Estimate.
         found: Estimate,
     },
-    /// Which way a head faces.
+    /// Direction in which a head faces.
     Facing {
         /// Value in the file.
         file: &'static str,
@@ -33,26 +34,26 @@ pub(crate) enum Value {
 /// An estimated quantity.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Found {
-    /// The sensor's id, or the file's table.
+    /// Id of the sensor, or table of the file.
     pub(crate) of: String,
-    /// The quantity.
+    /// Quantity.
     pub(crate) what: &'static str,
-    /// Its unit; empty where it has none.
+    /// Unit; empty if there is none.
     pub(crate) unit: &'static str,
     /// Decimals shown.
     pub(crate) decimals: usize,
-    /// The file's value and the estimate.
+    /// Value in the file, and estimate.
     pub(crate) value: Value,
 }
 
 /// A quantity that the log doesn't determine.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Open {
-    /// The sensor's id, or the file's table.
+    /// Id of the sensor, or table of the file.
     pub(crate) of: String,
-    /// The quantity.
+    /// Quantity.
     pub(crate) what: &'static str,
-    /// The reason.
+    /// Reason.
     pub(crate) why: Untold,
 }
 
@@ -92,7 +93,8 @@ impl Table {
         table
     }
 
-    /// Where ranges don't fit the profile's size nothing else is to be changed: all other values are fitted to walls that aren't there.
+    /// Lists the speed of sound if ranges don't fit the profile's size. All other values were then fitted to
+    /// a wrong wall, and must not be changed.
     fn scale(&mut self, vehicle: &VehicleConfig, findings: &Findings) {
         let Ok(heads) = &findings.heads else { return };
         let Estimate { value, sd } = heads.scale;
@@ -103,7 +105,7 @@ impl Table {
         }
     }
 
-    /// Whether something is amiss for which there is no line.
+    /// Whether there is an error that no line of the vehicle file corrects.
     pub(crate) fn is_amiss(&self) -> bool {
         let amiss =
             |why: &Untold| matches!(why, Untold::Later { .. } | Untold::Slow { .. } | Untold::Scaled { .. });
@@ -114,7 +116,7 @@ impl Table {
         self.open.push(Open { of: of.to_owned(), what, why });
     }
 
-    /// Adds a number, or the reason for its absence; returns whether the file should be changed.
+    /// Adds a number, or the reason for its absence. Returns whether the file should be changed.
     fn number(
         &mut self,
         of: &str,
@@ -244,7 +246,7 @@ fn sensor(id: &str) -> String {
     format!("sensors.{id}")
 }
 
-/// A number with no more decimals than it needs, and no negative zero.
+/// A number with only the decimals it needs, and no negative zero.
 fn number(value: f64, decimals: usize) -> String {
     let text = format!("{value:.decimals$}");
     let text = if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.') } else { &text };

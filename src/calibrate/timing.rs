@@ -1,5 +1,7 @@
-//! Latency of each source, by the likelihood of the whole log: the filter is run with the timestamps of one source
-//! shifted, to find the shift at which all innovations together are likeliest.
+//! Latency of each source, by the likelihood of the whole log.
+//!
+//! The filter runs with the timestamps of one source shifted, to find the shift that makes all innovations
+//! together most likely.
 
 use crate::calibrate::estimate::{Estimate, Untold};
 use crate::calibrate::material::Material;
@@ -13,9 +15,11 @@ use headrace_sensor::device::SensorKind;
 /// Search range of offsets to either side, and its step, s.
 const REACH_S: f64 = 0.2;
 const COARSE_S: f64 = 0.1;
-/// Steps around the best offset, s: within two standard deviations, except where the curve is nearly flat or rough.
+/// Range of steps around the best offset, s: within two standard deviations, unless the curve is nearly flat
+/// or rough.
 const FINE_S: core::ops::RangeInclusive<f64> = 0.01..=0.05;
-/// Gain for a source to be shifted before the others are examined: five standard deviations.
+/// Likelihood gain above which a source is corrected before the others are examined: five standard
+/// deviations.
 const CLEAR: f64 = 25.0;
 /// Largest standard deviation of an offset to be reported, s.
 const TOLD_S: f64 = 0.03;
@@ -23,24 +27,25 @@ const TOLD_S: f64 = 0.03;
 const EARLY_S: f64 = 0.01;
 /// Largest share of gated measurements of a filter that follows the vehicle.
 const MOST_GATED: f64 = 0.2;
-/// Minimum readings of a source, and the longest part of a log used: its beginning suffices.
+/// Minimum number of readings of a source, and longest part of a log used; its beginning is enough.
 const LEAST_READINGS: usize = 50;
 const MOST: DurNs = DurNs(600_000_000_000);
 
 /// Delay of a source's values beyond the vehicle file's latency.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Lag {
-    /// The source.
+    /// Source.
     pub(crate) source: usize,
-    /// To be added to its latency, s.
+    /// Offset to be added to its latency, s.
     pub(crate) offset_s: Result<Estimate, Untold>,
 }
 
-/// The lag of each source used by navigation. `latencies` are those of the vehicle file, by source, already included in
-/// the events' times of validity; `progress` is called before each run of the filter.
+/// Estimates the lag of each source that navigation uses.
 ///
-/// Sources that are clearly late are corrected first, the clearest first: as long as one is wrong the others seem early. A
-/// source can't be early by more than its latency.
+/// `latencies` are those of the vehicle file, by source, which the events' times of validity already include.
+/// `progress` is called before each run of the filter. Sources that are clearly late are corrected first, the
+/// clearest first: while one is wrong, the others seem early. No source can be early by more than its
+/// latency.
 ///
 /// Errors: the filter never gave a fix.
 pub(crate) fn lags(
@@ -94,8 +99,10 @@ pub(crate) fn lags(
     Ok(lags)
 }
 
-/// No source is early. Where one seems to be by several of its standard deviations, the cause isn't a time offset (but a
-/// beam narrower than assumed, or a mount), and the standard deviations of all are increased.
+/// Widens the standard deviations if a source seems early by several of its own.
+///
+/// No source is early, so the cause is something other than a time offset: a beam narrower than assumed, or a
+/// mount.
 fn own_up(lags: &mut [Lag], latencies: &[DurNs]) {
     let early = |lag: &Lag| {
         let latency_s = latencies.get(lag.source).map_or(0.0, |latency| latency.as_secs_f64());
@@ -110,9 +117,9 @@ fn own_up(lags: &mut [Lag], latencies: &[DurNs]) {
 /// A parabola fitted to the likelihood over a source's shift, relative to its current one.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Curve {
-    /// Likeliest shift, s.
+    /// Most likely shift, s.
     best_s: f64,
-    /// Its standard deviation, s.
+    /// Standard deviation, s.
     sd_s: f64,
     /// Gain in likelihood there, as counted by [`headrace_fusion::filter::sources::Consistency::surprise`].
     gain: f64,
@@ -123,7 +130,7 @@ struct Runs<'a, 'b> {
     material: &'a Material<'a>,
     events: &'a [Event],
     shifts_s: Vec<f64>,
-    /// By source: whether the likelihood was clearly best at the late end of the range.
+    /// For each source: whether the likelihood was clearly best at the late end of the range.
     later: Vec<bool>,
     /// Share of measurements gated in the last run.
     gated: f64,
@@ -164,7 +171,7 @@ impl<'a, 'b> Runs<'a, 'b> {
         self.later.get(source).copied().unwrap_or(false)
     }
 
-    /// An offset, unless a device that answers before it is asked again would then be later than that.
+    /// An offset, unless a device would then answer after its next request.
     fn possible(&self, source: usize, latency_s: f64, offset: Estimate) -> Result<Estimate, Untold> {
         let answers = |kind: SensorKind| matches!(kind, SensorKind::Head | SensorKind::Echosounder { .. });
         let is_asked = self.material.sensors.get(source).is_some_and(|sensor| answers(sensor.kind));
@@ -189,11 +196,11 @@ impl<'a, 'b> Runs<'a, 'b> {
         }
     }
 
-    /// Runs the filter; `None` where it has no estimate at the end, or a likelihood that isn't finite.
+    /// Runs the filter; `None` if it has no estimate at the end, or the likelihood isn't finite.
     fn surprise(&mut self) -> Option<f64> {
         (self.progress)();
         let Material { profile, site, mut settings, sensors, .. } = *self.material;
-        // Readings shifted back in time mustn't be too late for the window.
+        // Readings shifted back in time must not be too late for the window.
         settings.learns = false;
         settings.window = settings.window + DurNs::from_secs_f64(REACH_S + COARSE_S);
         let mut filter = FilterNavigation::new(profile.clone(), site, settings);
@@ -274,8 +281,9 @@ impl<'a, 'b> Runs<'a, 'b> {
     }
 }
 
-/// Least-squares parabola; `None` where it has no minimum. Twice the log-likelihood falls by 1 in one standard deviation,
-/// so that its second derivative is 2 / sd^2.
+/// Least-squares parabola; `None` if it has no minimum.
+///
+/// Twice the log-likelihood falls by 1 in one standard deviation, so its second derivative is 2 / sd^2.
 fn parabola(points: &[(f64, f64)], base: f64) -> Option<Curve> {
     // In units of the farthest point, so that the sums are of similar size.
     let unit = points.iter().map(|(x, _)| x.abs()).fold(0.0, f64::max);
@@ -300,7 +308,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_source_that_seems_early_makes_all_less_sure() {
+    fn early_source_widens_all_standard_deviations() {
         let lag = |source, value, sd| Lag { source, offset_s: Ok(Estimate { value, sd }) };
         let latencies = [DurNs::from_secs_f64(0.01); 2];
         let sds = |mut lags: [Lag; 2]| {

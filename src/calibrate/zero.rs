@@ -19,18 +19,19 @@ const MOST_SPAN_PA: f64 = 500.0;
 /// A zero of one source.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Zero {
-    /// The source.
+    /// Source.
     pub(crate) source: usize,
-    /// The estimate.
+    /// Estimate.
     pub(crate) found: Estimate,
     /// Number of readings used.
     pub(crate) readings: usize,
 }
 
-/// Pressure at the surface, Pa, by the first depth sensor: its mean from `from` to before `to`. Its standard deviation is
-/// that of one reading, since waves and drift don't average out.
+/// Pressure at the surface, Pa: mean of the first depth sensor from `from` to before `to`.
 ///
-/// Errors: no pressure, one that varied too much, or one outside that of air.
+/// Its standard deviation is that of one reading, since waves and drift don't average out.
+///
+/// Errors: the pressure is missing, varied too much, or isn't that of air.
 pub(crate) fn surface(material: &Material<'_>, from: MonoNs, to: MonoNs) -> Result<Zero, Untold> {
     let mut source = None;
     let mut quantum_pa = 0.0;
@@ -61,10 +62,13 @@ pub(crate) fn surface(material: &Material<'_>, from: MonoNs, to: MonoNs) -> Resu
     Ok(Zero { source, found: Estimate { value: mean, sd }, readings: pressures.len() })
 }
 
-/// Height of the water's surface above the tunnel's floor, m, by the first depth sensor and the vehicle's height by the
-/// heads. `surface_pa` overrides the file's pressure at the surface.
+/// Height of the water's surface above the tunnel's floor, m.
 ///
-/// Errors: no pressure, or no attitude.
+/// It comes from the first depth sensor and the height that the heads give.
+///
+/// `surface_pa` overrides the file's pressure at the surface.
+///
+/// Errors: there is no pressure, or no attitude.
 pub(crate) fn water_level(
     material: &Material<'_>,
     heads: &Heads,
@@ -100,9 +104,9 @@ pub(crate) fn water_level(
     Ok(Zero { source, found: Estimate { value, sd }, readings })
 }
 
-/// Chainage at which each cable counter reads zero, m, when the vehicle stood at `chainage_m` for a while.
+/// Chainage at which each cable counter reads zero, m, from a time at rest at `chainage_m`.
 ///
-/// Errors: no cable counter.
+/// Errors: there is no cable counter.
 pub(crate) fn tethers(material: &Material<'_>, still: &Still, chainage_m: f64) -> Result<Vec<Zero>, Untold> {
     let mut found: Vec<(usize, f64, Vec<f64>)> = Vec::new();
     for (event, sensor) in material.during(still.from, still.to) {
@@ -120,7 +124,7 @@ pub(crate) fn tethers(material: &Material<'_>, still: &Still, chainage_m: f64) -
         return Err(Untold::Missing { what: "a cable counter" });
     }
     let settings = &material.settings;
-    // Slack is constant at rest, and doesn't average out.
+    // Slack is constant at rest, so it doesn't average out.
     let sd_m = math::hypot(settings.tether_sd_m, settings.slack.reach);
     let zero = |(source, quantum_m, mut lengths): (usize, f64, Vec<f64>)| Zero {
         source,

@@ -1,4 +1,4 @@
-//! Accuracy that counter steps, slack and speed allow together.
+//! Cable accuracy that results from counter steps, slack and speed.
 
 use headrace_config::Document;
 use headrace_sampling::margin::ExpectedErrors;
@@ -8,18 +8,21 @@ use serde_json::{Value, json};
 
 /// Cable accuracy of a vehicle with a counter and the filter.
 pub(super) struct Cable {
-    /// Smallest change of the chainage, m; `None` if each reading carries it.
+    /// Smallest change of the chainage, m; `None` if each reading states it.
     step_m: Option<f64>,
     /// Standard deviation of the slack, m, and its time constant, s.
     slack: [f64; 2],
-    /// The planned speed, or else the largest one, m/s; the standard deviation of a hole at it, and the largest hole that passes, m.
+    /// Planned speed, or else the largest one, m/s; standard deviation of a hole at that speed, and largest
+    /// hole that passes, m.
     at_speed: Option<[f64; 3]>,
-    /// Keys that the file lacks.
+    /// Keys missing from the file.
     missing: Vec<String>,
 }
 
 impl Cable {
-    /// For the errors between passes that the sensors leave, and the largest speed, m/s. `None` without a counter or without the filter.
+    /// Cable accuracy for the errors between passes, and for the largest speed, m/s.
+    ///
+    /// `None` without a counter or without the filter.
     pub(super) fn of(
         vehicle: &VehicleConfig,
         text: &str,
@@ -30,7 +33,7 @@ impl Cable {
         let step_m = vehicle.counter?.step_m;
         let planned_mps = Some(vehicle.planned_speed_mps).filter(|planned| *planned > 0.0);
         let at_speed = errors.zip(planned_mps.or(v_max_mps)).map(|(errors, speed_mps)| {
-            // Passes over a hole of the target's size are that far apart.
+            // Passes over a hole of the target's size are this far apart.
             let sd_m = errors.pass_error_m(vehicle.target_m / speed_mps);
             [speed_mps, sd_m, (vehicle.target_m - errors.confidence_sd * sd_m).max(0.0)]
         });
@@ -38,7 +41,7 @@ impl Cable {
         Some(Self { step_m, slack, at_speed, missing: missing(vehicle, text) })
     }
 
-    /// Words for the summary.
+    /// Text for the summary.
     pub(super) fn line(&self) -> String {
         let step = self.step_m.map_or("steps given by each reading".to_owned(), |step_m| {
             format!("steps of {} mm", (step_m * 1e4).round() / 10.0)
@@ -56,7 +59,7 @@ impl Cable {
         parts.join("; ")
     }
 
-    /// The same for programs.
+    /// JSON for programs.
     pub(super) fn json(&self) -> Value {
         let [slack_m, time_s] = self.slack;
         let [speed_mps, sd_m, most_m] = [0, 1, 2].map(|k| self.at_speed.and_then(|at| at.get(k).copied()));
@@ -67,7 +70,7 @@ impl Cable {
     }
 }
 
-/// Keys of the cable that the file lacks. Defaults apply instead.
+/// Cable keys missing from the file. Defaults apply instead.
 fn missing(vehicle: &VehicleConfig, text: &str) -> Vec<String> {
     let Ok(root) = Document::new("", text).root() else { return Vec::new() };
     let navigation = root.section("navigation").ok().flatten();

@@ -1,4 +1,4 @@
-//! `headrace check`: all that is wrong with a vehicle or scene file, and what a plan makes of it.
+//! `headrace check`: reports all errors in a vehicle or scene file, and the plan that follows from it.
 
 mod cable;
 mod outlook;
@@ -19,7 +19,7 @@ use crate::vehicle_file;
 use cable::Cable;
 use outlook::Outlook;
 
-/// Something found, with its place.
+/// A finding with its place.
 struct Found {
     grade: Grade,
     file: String,
@@ -28,10 +28,10 @@ struct Found {
     problem: String,
 }
 
-/// A file that could be read.
+/// A readable file.
 struct Readable {
     vehicle: VehicleConfig,
-    /// The scene and its duration, s, if it is one.
+    /// Name and duration of the scene, s, if the file is one.
     scene: Option<(String, f64)>,
     outlook: Option<Outlook>,
     cable: Option<Cable>,
@@ -116,7 +116,7 @@ fn all(errors: &ConfigErrors) -> Vec<Found> {
 }
 
 impl Readable {
-    /// With the findings of a vehicle whose file has this name and text.
+    /// Adds the findings of a vehicle with this file name and text.
     fn new(vehicle: VehicleConfig, (name, text): (&str, &str), found: &mut Vec<Found>) -> Self {
         // The files that it names have been read with it.
         let named = |file: &str| vehicle.attachments.iter().find(|(attached, _)| attached == file);
@@ -129,7 +129,7 @@ impl Readable {
             Ok(outlook) => outlook,
             Err(why) => {
                 let key = "heads".to_owned();
-                let problem = format!("can't be planned with: {why}");
+                let problem = format!("can't be used for a plan: {why}");
                 let finding = Finding { grade: Grade::Error, key, problem };
                 found.push(placed(finding, name, text));
                 None
@@ -138,7 +138,7 @@ impl Readable {
         vehicle_file::log(name, &vehicle);
         let mut findings = vehicle.findings();
         findings.extend(too_many(&vehicle));
-        // What a plan finds of a vehicle that can't work follows from that.
+        // If the vehicle has errors, findings of its plan would only follow from them.
         if findings.iter().all(|finding| finding.grade != Grade::Error) {
             findings.extend(outlook.iter().flat_map(|outlook| outlook.findings(&vehicle)));
         }
@@ -176,7 +176,7 @@ impl Readable {
     }
 }
 
-/// Sensors beyond those that a dive has room for.
+/// Finding on sensors beyond the limit.
 fn too_many(vehicle: &VehicleConfig) -> Option<Finding> {
     let count = vehicle.sensor_configs.len();
     let problem =
@@ -188,7 +188,7 @@ fn too_many(vehicle: &VehicleConfig) -> Option<Finding> {
     })
 }
 
-/// A finding with its line; its key with the value that is there.
+/// Adds a finding's line, and the present value to its key.
 fn placed(finding: Finding, name: &str, text: &str) -> Found {
     let Finding { grade, key, problem } = finding;
     let line = Document::new(name, text).line_of(&key);

@@ -1,4 +1,4 @@
-//! What a plan makes of a vehicle file: speed, hours, and the wall that the vehicle hides.
+//! Outlook: speed, hours and hidden wall that a plan derives from a vehicle file.
 
 use headrace_sampling::SamplingError;
 use headrace_sampling::head::HeadMode;
@@ -7,13 +7,14 @@ use headrace_sampling::plan::{Answer, HELD_SHARE, Inspection, Planner, Question,
 use headrace_vehicle::{Finding, Grade, VehicleConfig};
 use serde_json::{Value, json};
 
-/// The plan for a file as it is, with the vehicle on the tunnel's axis.
+/// Plan for a file as it is, with the vehicle on the tunnel's axis.
 pub(super) struct Outlook {
-    /// The answer for the heads' own mode; `None` if they aren't all in one.
+    /// Answer for the heads' own mode; `None` if their modes differ.
     own: Option<Answer>,
-    /// The answer with the largest speed.
+    /// Answer with the largest speed.
     best: Option<Answer>,
-    /// The largest speed with the heads started for the planned speed, m/s; `None` if none is planned, or they aren't all in one mode.
+    /// Largest speed with the heads started for the planned speed, m/s; `None` if none is planned, or their
+    /// modes differ.
     as_started_mps: Option<f64>,
     planned_mps: f64,
     /// Strips that the vehicle hides from some heads.
@@ -24,15 +25,16 @@ pub(super) struct Outlook {
     length_m: f64,
 }
 
-/// Speeds that differ by less than this share are told as one: what the advice keeps back for measuring the speed.
+/// Relative difference below which speeds are reported as one: the advice's margin for measuring the speed.
 const TOLD_APART: f64 = 0.02;
-/// Turns that differ by less than this share are the same.
+/// Relative difference below which turns are equal.
 const SAME: f64 = 1e-6;
 
 impl Outlook {
-    /// For the vehicle's heads and the errors between passes that its sensors leave; `None` if it has no heads.
+    /// Outlook for the vehicle's heads and the errors between passes that its sensors leave; `None` without
+    /// heads.
     ///
-    /// Errors: what the heads can't be planned for.
+    /// Errors: the heads can't be planned for.
     pub(super) fn of(
         vehicle: &VehicleConfig,
         errors: Option<ExpectedErrors>,
@@ -83,12 +85,12 @@ impl Outlook {
         }))
     }
 
-    /// The largest speed in the heads' own mode, m/s.
+    /// Largest speed in the heads' own mode, m/s.
     pub(super) fn v_max_mps(&self) -> Option<f64> {
         self.own.as_ref().and_then(|own| own.v_max_mps)
     }
 
-    /// What the plan finds wrong.
+    /// Problems that the plan reveals.
     pub(super) fn findings(&self, vehicle: &VehicleConfig) -> Vec<Finding> {
         let warning = |key: &str, problem| Finding { grade: Grade::Warning, key: key.to_owned(), problem };
         let mut found = Vec::new();
@@ -114,7 +116,7 @@ impl Outlook {
         found
     }
 
-    /// Words for the summary.
+    /// Text for the summary.
     pub(super) fn lines(&self) -> Vec<String> {
         let speed = |answer: &Answer| match (answer.v_max_mps, answer.needed_h, &answer.refused) {
             (Some(v_max_mps), Some(hours), _) => {
@@ -147,7 +149,7 @@ impl Outlook {
         lines
     }
 
-    /// Wall that the vehicle hides from some heads, or from all.
+    /// Text on the wall that the vehicle hides from some heads, or from all.
     fn hidden_line(&self) -> String {
         if self.hidden.is_empty() {
             return "every head sees all of the wall".to_owned();
@@ -175,7 +177,7 @@ impl Outlook {
         }
     }
 
-    /// The same for programs.
+    /// JSON for programs.
     pub(super) fn json(&self) -> Value {
         let answer = |answer: &Answer| {
             json!({
@@ -198,15 +200,15 @@ impl Outlook {
     }
 }
 
-/// Speed for what doesn't depend on it, m/s.
+/// Speed for results that don't depend on it, m/s.
 const ANY_SPEED_MPS: f64 = 0.1;
 
-/// Rounded down to 1 mm/s, so that the printed speed meets the target, too.
+/// A speed rounded down to 1 mm/s, so that the printed one meets the target, too.
 fn down(speed_mps: f64) -> f64 {
     (speed_mps * 1000.0 + 1e-6).floor() / 1000.0
 }
 
-/// The mode that all heads are in.
+/// Common mode of all heads, if there is one.
 fn own_mode(heads: &[(headrace_sampling::head::HeadSpec, Vec<HeadMode>)]) -> Option<&'static str> {
     let same = |a: f64, b: f64| (a / b - 1.0).abs() < SAME;
     let modes = heads.iter().map(|(spec, modes)| {

@@ -1,4 +1,4 @@
-//! Options and commands that any program of its kind has.
+//! Options and commands that most command-line programs have.
 
 use std::path::PathBuf;
 
@@ -6,19 +6,20 @@ use clap::Args;
 use clap_complete::Shell;
 use headrace_replay::threads::MOST_THREADS;
 
-/// What happens to files that are there already.
+/// Handling of existing files.
 #[derive(Debug, Args)]
 pub(crate) struct Overwrite {
-    /// Overwrite files that aren't earlier outputs of the same kind.
+    /// Overwrite existing files even if they aren't earlier outputs of the same kind.
     #[arg(long)]
     pub(crate) force: bool,
 }
 
-/// On how many threads a log is replayed.
+/// Number of threads of a replay.
 #[derive(Debug, Args)]
 pub(crate) struct Threads {
-    /// Threads to replay on: 2 read and navigate on one of them, 3 and more advise on another. Results don't depend on it. By
-    /// default 3, or 1 on a machine with one core; at another speed than max always 1.
+    /// Threads of the replay. With 2, reading and navigation run on one of them; with 3 or more, advice runs
+    /// on another. Results don't depend on it. The default is 3, or 1 on a machine with one core. At a speed
+    /// other than max it is always 1.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u8).range(1..=64))]
     threads: Option<u8>,
 }
@@ -43,7 +44,7 @@ pub(crate) struct Completions {
 
 #[derive(Debug, Args)]
 pub(crate) struct Man {
-    /// Output folder for all pages; without one the program's own page goes to stdout.
+    /// Output folder for all pages. Without it the program's own page goes to stdout.
     #[arg(value_name = "DIR")]
     pub(crate) folder: Option<PathBuf>,
     #[command(flatten)]

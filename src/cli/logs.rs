@@ -1,4 +1,4 @@
-//! Options of commands that take logs to pieces, and make them of others'.
+//! Options of commands that split or convert logs.
 
 use std::path::PathBuf;
 
@@ -29,7 +29,7 @@ pub(crate) struct Notes {
     /// Log to read, or the parts of a recording.
     #[arg(required = true, value_name = "LOG")]
     pub(crate) logs: Vec<PathBuf>,
-    /// Folder for the recordings of voice notes: note-3.webm, as the browser made it (.webm, .ogg or .m4a).
+    /// Folder for the recordings of voice notes: note-3.webm, in the browser's format (.webm, .ogg or .m4a).
     #[arg(long, value_name = "DIR")]
     pub(crate) out: Option<PathBuf>,
     /// Print JSON.
@@ -47,7 +47,7 @@ pub(crate) struct Verify {
     /// Vehicle file, overriding the one attached to the log.
     #[arg(long, value_name = "FILE")]
     pub(crate) vehicle: Option<PathBuf>,
-    /// Tick length, milliseconds; results don't depend on it.
+    /// Tick length, milliseconds. Results don't depend on it.
     #[arg(long, value_name = "MS", default_value = "20", value_parser = clap::value_parser!(u32).range(1..=60_000))]
     pub(crate) tick_ms: u32,
     #[command(flatten)]
@@ -59,7 +59,7 @@ pub(crate) struct Verify {
 
 #[derive(Debug, Args)]
 pub(crate) struct Recover {
-    /// Log to recover, or the parts of a recording, which become one log; not modified.
+    /// Log to recover, or the parts of a recording, which become one log. The input isn't modified.
     #[arg(required = true, value_name = "LOG")]
     pub(crate) logs: Vec<PathBuf>,
     /// Log to write.
@@ -74,7 +74,7 @@ pub(crate) struct Recover {
 
 #[derive(Debug, Args)]
 pub(crate) struct Trim {
-    /// Log to trim, or the parts of a recording; not modified.
+    /// Log to trim, or the parts of a recording. The input isn't modified.
     #[arg(required = true, value_name = "LOG")]
     pub(crate) logs: Vec<PathBuf>,
     /// Log to write.
@@ -86,13 +86,15 @@ pub(crate) struct Trim {
     /// End time, from the log's first message.
     #[arg(long, value_name = "TIME", value_parser = time, conflicts_with = "chainage")]
     pub(crate) to: Option<DurNs>,
-    /// Keep the times at which the vehicle was in this range of chainage, metres; the log is replayed to find them.
+    /// Keep the times at which the vehicle was in this range of chainage, metres. The log is replayed to find
+    /// them.
     #[arg(long, value_name = "FROM..TO", value_parser = chainage_range, allow_hyphen_values = true)]
     pub(crate) chainage: Option<[f64; 2]>,
-    /// Drop echo data where a device's messages also contain the range; replays give the same results.
+    /// Drop echo data if a device's messages also contain the range. Replays give the same results.
     #[arg(long)]
     pub(crate) drop_echoes: bool,
-    /// Remove names, comments, addresses, serial numbers, time of day and geographic positions; lists what can't be removed.
+    /// Remove names, comments, addresses, serial numbers, time of day and geographic positions. Lists items
+    /// that can't be removed.
     #[arg(long)]
     pub(crate) anonymise: bool,
     /// Vehicle file for --chainage and --drop-echoes, overriding the one attached to the log.
@@ -112,17 +114,18 @@ pub(crate) struct Import {
     /// Log to write.
     #[arg(short, long, value_name = "LOG.mcap")]
     pub(crate) output: PathBuf,
-    /// Vehicle file with the sensors that the messages are from.
+    /// Vehicle file with the sensors that the messages come from.
     #[arg(long, value_name = "VEHICLE.toml")]
     pub(crate) vehicle: Option<PathBuf>,
-    /// Sensor and the stream of the log that it receives (mavlink, imagenex, ping, or a CAN interface), once per sensor;
-    /// replaces the assignment by the vehicle file.
+    /// Sensor, and the stream of the log that it receives (mavlink, imagenex, ping, or a CAN interface). Give
+    /// it once per sensor; it replaces the assignment by the vehicle file.
     #[arg(long, value_name = "ID=STREAM", value_parser = source_line)]
     pub(crate) source: Vec<(String, String)>,
-    /// Mapping file: for CSV, columns to quantities of sensors; for ROS, topics to sensors, where it is ambiguous.
+    /// Mapping file. For CSV it maps columns to quantities of sensors; for ROS, topics to sensors if they are
+    /// ambiguous.
     #[arg(long, value_name = "MAPPING.toml")]
     pub(crate) map: Option<PathBuf>,
-    /// Format of the file, if its extension doesn't tell.
+    /// Format of the file, if its extension doesn't show it.
     #[arg(long, value_parser = file_kind())]
     pub(crate) format: Option<FileKind>,
     /// Print a summary as JSON.

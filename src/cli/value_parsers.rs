@@ -102,7 +102,7 @@ pub(super) fn address(text: &str) -> Result<Connect, String> {
     }
 }
 
-/// Where MAVLink is sent: `udpout:` as other programs write it may stand before it.
+/// Address for MAVLink. It may begin with `udpout:`, as other programs write it.
 pub(super) fn udp_address(text: &str) -> Result<String, String> {
     let text = text.strip_prefix("udpout:").unwrap_or(text);
     let host = text.rsplit_once(':').map_or("", |(host, _)| host);
@@ -189,7 +189,7 @@ pub(super) fn layout(text: &str) -> Result<HeadLayout, String> {
 pub(crate) fn file_kind() -> impl TypedValueParser<Value = FileKind> {
     let value = |kind: FileKind| PossibleValue::new(kind.name()).help(kind.summary());
     PossibleValuesParser::new(FileKind::ALL.map(value))
-        .try_map(|name| FileKind::named(&name).ok_or("is no kind of foreign log"))
+        .try_map(|name| FileKind::named(&name).ok_or("isn't a known kind of log"))
 }
 
 #[cfg(test)]
@@ -197,7 +197,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn times_are_read_as_people_write_them() {
+    fn times_are_accepted_in_common_notations() {
         let seconds = |text: &str| time(text).map(DurNs::as_secs_f64);
         for (text, wanted) in [
             ("90", 90.0),

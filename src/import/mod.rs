@@ -138,7 +138,7 @@ fn format(
         return Ok(Box::new(Bag::new(ros::feeds(args, vehicle, &topics)?)));
     }
     let (Some(map), Some(vehicle)) = (&args.map, vehicle) else {
-        let what = "import: CSV wants --vehicle VEHICLE.toml, whose sensors' bytes its values become";
+        let what = "import: CSV needs --vehicle VEHICLE.toml, to encode values for its sensors";
         return Err(Failure::Usage(what.to_owned()));
     };
     let (text, name) = (files::read(map)?, map.display().to_string());
@@ -190,13 +190,15 @@ fn tell(args: &cli::Import, kind: FileKind, ids: &[String], imported: &Imported)
         complain(&format!("headrace: lost: {loss}"));
     }
     if heard == 0 {
-        complain("headrace: no sensor of the vehicle file takes anything of this file");
+        complain("headrace: no sensor of the vehicle file takes any message of this file");
         return Ok(failure::FAILED);
     }
     Ok(if imported.losses.is_empty() { failure::OK } else { failure::DATA_LOST })
 }
 
-/// Kind of a file by its extension. A log of an autopilot's memory has that of Ping Viewer's, and is refused before anything is asked of it.
+/// Kind of a file by its extension.
+///
+/// Autopilots' dataflash logs share Ping Viewer's extension. They are refused before any other check.
 fn kind_of(path: &Path) -> Result<FileKind, Failure> {
     let kind = FileKind::of(path);
     if kind == Some(FileKind::Ping) && front_of(path)?.starts_with(&detect::DATAFLASH) {
@@ -213,7 +215,7 @@ fn kind_of(path: &Path) -> Result<FileKind, Failure> {
     )
 }
 
-/// Error for a file that can't be imported, with its apparent kind if that is another.
+/// Error for a file that can't be imported, with its apparent kind if that differs.
 fn unusable(path: &Path, error: ImportError) -> Failure {
     match error {
         ImportError::Nothing { .. }

@@ -9,15 +9,14 @@ use crate::failure::Failure;
 use crate::files;
 use crate::logging::complain;
 
-/// Assignment by the mapping file, or without one by unambiguous matches, which are listed on stderr.
+/// Assignment by the mapping file, or otherwise by unambiguous matches, which are listed on stderr.
 pub(super) fn feeds(
     args: &cli::Import,
     vehicle: Option<&VehicleConfig>,
     topics: &[Topic],
 ) -> Result<Feeds, Failure> {
     let Some(vehicle) = vehicle else {
-        let what =
-            "import: recordings of ROS want --vehicle VEHICLE.toml, whose sensors' bytes their values become";
+        let what = "import: ROS recordings need --vehicle VEHICLE.toml, to encode values for its sensors";
         return Err(Failure::Usage(what.to_owned()));
     };
     let Some(map) = &args.map else {

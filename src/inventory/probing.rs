@@ -1,4 +1,4 @@
-//! Probes of the device kinds, and the ports and addresses that they are sent to.
+//! Probes of the device kinds, and the ports and addresses that receive them.
 
 use headrace_ports::{Found, probe};
 use headrace_sensor::connect::Connect;
@@ -7,12 +7,12 @@ use headrace_sensor::driver::{Carrier, Probe};
 use super::state::Probed;
 use crate::devices::KINDS;
 
-/// Probes of all kinds that have one, in the order in which they are sent.
+/// All probes, in the order in which they are sent.
 fn all() -> Vec<Box<dyn Probe>> {
     KINDS.iter().filter_map(|kind| kind.probe()).collect()
 }
 
-/// The probe of a device kind by its name in vehicle files; `None` where it has none.
+/// Probe of a device kind by its name in vehicle files; `None` if it has none.
 pub(super) fn kind(name: &str) -> Option<Box<dyn Probe>> {
     KINDS.iter().find(|kind| kind.name() == name)?.probe()
 }

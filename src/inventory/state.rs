@@ -12,11 +12,11 @@ pub(super) type Probed = Result<Answer, OpenError>;
 /// All results.
 #[derive(Debug, Default)]
 pub(super) struct Inventory {
-    /// Attached devices, with the probe's result where one was made.
+    /// Attached devices, with the probe's result if there was one.
     pub(super) found: Vec<(Found, Option<Probed>)>,
     /// Addresses given by `--address`.
     pub(super) addresses: Vec<(Connect, Probed)>,
-    /// The sensors of the vehicle file, where one was given.
+    /// Sensors of the vehicle file, if one was given.
     pub(super) sensors: Option<Vec<Sensor>>,
 }
 
@@ -31,16 +31,16 @@ pub(super) struct Sensor {
 /// State of a sensor's port without errors.
 #[derive(Debug, PartialEq, Eq)]
 pub(super) enum State {
-    /// Present and may be opened, under this name.
+    /// It is present under this name and may be opened.
     Present(String),
-    /// Probed.
+    /// It was probed.
     Answered(Answer),
-    /// A network address that wasn't probed.
+    /// It is a network address that was not probed.
     NotProbed,
 }
 
 impl Inventory {
-    /// 1 when a sensor's port is missing, may not be opened, or was probed and didn't answer.
+    /// Returns 1 if a sensor's port is missing, may not be opened, or was probed and didn't answer.
     pub(super) fn exit_code(&self) -> u8 {
         let mut sensors = self.sensors.iter().flatten();
         if sensors.any(|sensor| !sensor.is_ready()) { failure::FAILED } else { failure::OK }

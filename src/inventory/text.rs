@@ -1,4 +1,4 @@
-//! Text of `headrace devices`: a block for each device, with its errors and what fixes them.
+//! Text of `headrace devices`: a block for each device, with its problems and their fixes.
 
 use headrace_config::plain::one_line;
 use headrace_ports::{Answer, Found, OpenError};

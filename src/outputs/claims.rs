@@ -1,4 +1,4 @@
-//! The files of one command: what it writes is nothing that it reads, and no two of its outputs are one file.
+//! Claims of one command: its outputs differ from its inputs and from one another.
 
 use std::path::{Path, PathBuf};
 
@@ -9,7 +9,7 @@ use super::{Kind, may_write};
 use crate::cli::Overwrite;
 use crate::failure::Failure;
 
-/// What a command reads, and what it is going to write.
+/// Files that a command reads, and files that it is going to write.
 pub(crate) struct Claims {
     force: bool,
     inputs: Vec<PathBuf>,
@@ -18,31 +18,32 @@ pub(crate) struct Claims {
 
 /// An output.
 struct Claimed {
-    /// The option or argument that names it.
+    /// Option or argument that names it.
     option: &'static str,
     path: PathBuf,
-    /// Whether its parts are written, too.
+    /// Whether its parts are also written.
     is_recording: bool,
 }
 
 impl Claims {
-    /// The claims of a command that reads these files.
+    /// Claims of a command that reads these files.
     pub(crate) fn reading(inputs: impl IntoIterator<Item = PathBuf>, overwrite: &Overwrite) -> Self {
         Self { force: overwrite.force, inputs: inputs.into_iter().collect(), outputs: Vec::new() }
     }
 
-    /// Checks, before the work, that a file may and can be written. Nothing is changed.
+    /// Checks, before the work, that a file may and can be written, without changing anything.
     ///
-    /// Errors: the command reads it, or writes it already; a file is there that isn't of this kind, without `--force`; it can't
-    /// be written or created.
+    /// Errors: the command reads it, or already writes it; the existing file isn't of this kind and there is
+    /// no `--force`; or it can't be written or created.
     pub(crate) fn claim(&mut self, option: &'static str, path: &Path, kind: Kind) -> Result<(), Failure> {
         self.add(Claimed { option, path: path.to_owned(), is_recording: false })?;
         may_write(path, kind, self.force)
     }
 
-    /// The same for a recording that makes its first file itself, in parts if it is `rotated`; returns the path of that file.
+    /// Claims a recording, which creates its first file itself, in parts if `rotated`. Returns the path of
+    /// that file.
     ///
-    /// Errors: the same; a file is there that would be taken for another part of it.
+    /// Errors: see [`claim`](Self::claim); also an existing file that would be taken for another part of it.
     pub(crate) fn claim_recording(
         &mut self,
         option: &'static str,
@@ -102,7 +103,7 @@ impl Claimed {
     }
 }
 
-/// Whether two paths lead to one file, or will. What is neither a file nor nothing yet, as `/dev/null`, has nothing to lose.
+/// Whether two paths lead to one file, or will. Special files such as `/dev/null` have no content to lose.
 fn is_same(one: &Path, other: &Path) -> bool {
     let is_special = |path: &Path| path.metadata().is_ok_and(|there| !there.is_file() && !there.is_dir());
     if is_special(one) || is_special(other) {
@@ -112,7 +113,7 @@ fn is_same(one: &Path, other: &Path) -> bool {
     place(one) == place(other) || number(one).is_some_and(|one| number(other) == Some(one))
 }
 
-/// Where a path leads, also where no file is there yet.
+/// Target of a path, even if no file exists there yet.
 fn place(path: &Path) -> PathBuf {
     let beside = || {
         let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty());

@@ -23,9 +23,9 @@ use crate::failure::Failure;
 use crate::files;
 use crate::vehicle_file;
 
-/// Kind of the heads if no vehicle file is given.
+/// Kind of the heads without a vehicle file.
 const USUAL_HEAD: &str = "imagenex881";
-/// Their range setting, m, as in the maker's table of modes.
+/// Range setting of these heads, m, as in the maker's table of modes.
 const USUAL_RANGE_M: f64 = 10.0;
 
 /// An inspection with its names.
@@ -35,16 +35,16 @@ pub(super) struct Case {
     pub(super) tunnel: String,
     pub(super) range_m: f64,
     pub(super) question: Question,
-    /// Errors of position to expect; `None` without a vehicle file.
+    /// Expected position errors; `None` without a vehicle file.
     pub(super) errors: Option<ExpectedErrors>,
-    /// The files that it was read from.
+    /// Files that it was read from.
     pub(super) inputs: Vec<PathBuf>,
 }
 
 type Head = (HeadSpec, Vec<HeadMode>);
 
 impl Case {
-    /// From the options, which override the vehicle file.
+    /// Creates it from the options, which override the vehicle file.
     pub(super) fn of(args: &Plan) -> Result<Self, Failure> {
         let question = Question {
             target_m: args.target,
@@ -140,7 +140,7 @@ fn is_file(name: &str) -> bool {
     Path::new(name).extension().is_some_and(|extension| extension == "csv")
 }
 
-/// The file that the tunnel is read from, if it is read from one.
+/// File of the tunnel, if it is read from one.
 fn tunnel_file(args: &Plan) -> Vec<PathBuf> {
     let name = args.tunnel.as_deref().and_then(|tunnel| tunnel.split(',').next()).map(str::trim);
     name.filter(|name| is_file(name)).map(PathBuf::from).into_iter().collect()
@@ -197,7 +197,7 @@ fn ideal_heads(args: &Plan) -> Result<Vec<(String, Head)>, Failure> {
             mount: Mount { position: Vec3::zero(), rotation: Rot::identity() },
             latency: DurNs::ZERO,
         };
-        // Any mode will do: all of them are planned.
+        // All modes are planned, so any will do here.
         let own = Document::new("plan", "mode = \"slow\"").root()?;
         let device = kind.configure(&config, &own)?;
         let mut heads = heads_of(Path::new("plan"), &[device], Some(range_m))?;

@@ -1,4 +1,4 @@
-//! `headrace plan --write`: what to put into the vehicle file.
+//! `headrace plan --write`: prints lines for the vehicle file.
 
 use crate::cli::Plan;
 use crate::failure::Failure;
@@ -7,13 +7,13 @@ use headrace_sampling::plan::HELD_SHARE;
 
 use super::findings::Findings;
 
-/// The keys of a vehicle file that make the plan's best answer the dive's: layout, planned speed and modes. Start angles follow
+/// Keys of a vehicle file for the plan's best answer: layout, planned speed and modes. Start angles follow
 /// from them.
 ///
-/// Errors: no vehicle file to write lines for; no mode meets the target.
+/// Errors: there is no vehicle file, or no mode meets the target.
 pub(super) fn lines(findings: &Findings, args: &Plan) -> Result<String, Failure> {
     let Some(vehicle) = &args.vehicle else {
-        return Err(Failure::Usage("--write: needs --vehicle, whose lines it gives".to_owned()));
+        return Err(Failure::Usage("--write: needs --vehicle, to print lines for that file".to_owned()));
     };
     let Some((number, speed_mps)) = findings.shown else {
         return Err(Failure::Usage("--write: no mode meets the target at any speed".to_owned()));

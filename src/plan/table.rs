@@ -80,7 +80,7 @@ fn question_line(findings: &Findings) -> String {
     asked.join(", ")
 }
 
-/// Warning where the wall is out of range.
+/// Warning if the wall is out of range.
 fn range_warning(findings: &Findings) -> Option<String> {
     let ((here_m, allowed_m), reach_m) = (findings.planner.farthest_m(), findings.planner.reach_m());
     (allowed_m > reach_m).then(|| {
@@ -97,7 +97,7 @@ const HEADINGS: [&str; 2] = [
 fn row(answer: &Answer) -> String {
     let mark = if answer.best { '*' } else { ' ' };
     let estimated = if answer.turn_basis == Basis::Estimated.as_str() { '~' } else { ' ' };
-    // No spacing where no head sees the wall.
+    // There is no spacing if no head sees the wall.
     let worst = if answer.t_y2_m > 0.0 { format!("{:.3}", answer.t_y2_m) } else { "-".to_owned() };
     let known = format!(
         "{mark} {:<8} {:>4.1} {estimated}{:>6.2} {:>8.2}  {:>5.3}  {:>5.3}  {worst:>5}",
@@ -181,9 +181,9 @@ fn best_words(best: &Answer) -> String {
     }
 }
 
-/// The price of each margin that costs anything.
+/// Text on the price of each margin that costs speed.
 fn margin_words(mode: &str, margins: &Margins) -> String {
-    /// Less than the printed speeds show.
+    /// Difference below what the printed speeds show, m/s.
     const NOTHING_MPS: f64 = 5e-4;
     let mut words = vec![format!("{mode}: {:.3} m/s by geometry", margins.geometry_mps)];
     let after = margins.speeds_mps().into_iter().skip(1);
@@ -195,7 +195,7 @@ fn margin_words(mode: &str, margins: &Margins) -> String {
             Margin::Position => {
                 format!("with the distance between passes known to {:.1} cm", 100.0 * margins.pass_error_m)
             }
-            // A plan knows of none.
+            // A plan has no losses.
             Margin::Geometry | Margin::Losses => continue,
         };
         if price_mps >= NOTHING_MPS {
@@ -205,7 +205,7 @@ fn margin_words(mode: &str, margins: &Margins) -> String {
     words.join(", ")
 }
 
-/// What the heads would gain in line.
+/// Text on the gain of heads in line.
 fn in_line_words(findings: &Findings, in_line: &InLine) -> String {
     let InLine { positions_m, mode, v_max_mps, .. } = in_line;
     let hours = findings.planner.inspection().length_m / v_max_mps / 3600.0;

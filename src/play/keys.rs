@@ -13,10 +13,10 @@ use rustix::termios::{LocalModes, OptionalActions, SpecialCodeIndex, Termios, tc
 use crate::cli::KEYS;
 use crate::output::aside;
 
-/// Jumps by the arrow keys.
+/// Length of a jump by an arrow key.
 const STEP: DurNs = DurNs::from_millis(10_000);
 const FAR: DurNs = DurNs::from_millis(60_000);
-/// Speeds lie between these; beyond the fastest is as fast as possible.
+/// Range of speeds. Beyond the fastest, playback is as fast as possible.
 const SLOWEST: f64 = 0.125;
 const FASTEST: f64 = 1024.0;
 /// Longest wait for a key before the end of playback is noticed.
@@ -37,14 +37,15 @@ pub(crate) enum Key {
     Help,
 }
 
-/// Standard input without lines and echo, until it is dropped.
+/// Standard input without line buffering and echo, until it is dropped.
 pub(super) struct Keyboard {
     before: Termios,
     ended: Arc<AtomicBool>,
 }
 
 impl Keyboard {
-    /// Takes the terminal's keys and sends their commands to `to` from a thread of its own. `speed` is that of playback.
+    /// Reads the terminal's keys and sends their commands to `to` from a thread of its own. `speed` is that
+    /// of playback.
     ///
     /// Errors: the terminal's settings can't be read or changed.
     pub(super) fn listen(
@@ -54,7 +55,7 @@ impl Keyboard {
     ) -> io::Result<Self> {
         let before = tcgetattr(io::stdin())?;
         let mut raw = before.clone();
-        // Ctrl-C is a key, too: the terminal is put back in order before the program ends.
+        // Ctrl-C is also read as a key, so that the terminal is restored before the program ends.
         raw.local_modes.remove(LocalModes::ICANON | LocalModes::ECHO | LocalModes::ISIG);
         raw.special_codes[SpecialCodeIndex::VMIN] = 1;
         raw.special_codes[SpecialCodeIndex::VTIME] = 0;
@@ -91,7 +92,7 @@ impl Drop for Keyboard {
     }
 }
 
-/// Bytes typed; none after some time without.
+/// Reads typed bytes; returns none after some time without any.
 ///
 /// Errors: standard input is closed.
 fn read(bytes: &mut [u8]) -> io::Result<usize> {
@@ -107,7 +108,7 @@ fn read(bytes: &mut [u8]) -> io::Result<usize> {
     }
 }
 
-/// Speed and state as the keys have left them.
+/// Speed and state as set by the keys.
 pub(crate) struct Hand {
     speed: Option<f64>,
     paused: bool,
@@ -125,12 +126,12 @@ impl Hand {
         self.speed
     }
 
-    /// Whether the keys have paused it.
+    /// Whether the keys have paused playback.
     pub(crate) fn is_paused(&self) -> bool {
         self.paused
     }
 
-    /// The command of a key; some have none.
+    /// Command of a key, if it has one.
     pub(crate) fn command(&mut self, key: Key) -> Option<PlaybackCommand> {
         Some(match key {
             Key::Space => {
@@ -162,7 +163,7 @@ impl Hand {
     }
 }
 
-/// The keys of some bytes; others are ignored. A terminal sends all bytes of a key at once.
+/// Keys of some bytes; unknown ones are ignored. A terminal sends all bytes of a key at once.
 fn keys(mut bytes: &[u8]) -> Vec<Key> {
     let arrows = [(b'A', Key::Up), (b'B', Key::Down), (b'C', Key::Right), (b'D', Key::Left)];
     let mut keys = Vec::new();
@@ -177,7 +178,7 @@ fn keys(mut bytes: &[u8]) -> Vec<Key> {
             (b'+' | b'=', _) => keys.push(Key::Faster),
             (b'-' | b'_', _) => keys.push(Key::Slower),
             (b'.', _) => keys.push(Key::Tick),
-            // Ctrl-C and Ctrl-D leave as well.
+            // Ctrl-C and Ctrl-D also end playback.
             (b'q' | b'Q' | 0x03 | 0x04, _) => keys.push(Key::Leave),
             (b'?' | b'h', _) => keys.push(Key::Help),
             _ => {}

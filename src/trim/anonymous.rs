@@ -13,15 +13,15 @@ use crate::files;
 
 /// Metadata keys that are kept, as they don't identify anyone.
 const KEPT_KEYS: [&str; 4] = [FORMAT_KEY, "version", "import_format", TRIMMED];
-/// Log times later than this, the beginning of the year 2000, are UTC, not those of a monotonic clock.
+/// Log times later than this (the beginning of the year 2000) are UTC, and not those of a monotonic clock.
 const UTC_FROM_NS: u64 = 946_684_800_000_000_000;
 
-/// The anonymised header.
+/// Header without identifying data.
 pub(crate) struct Anonymous {
     vehicle_toml: String,
-    /// Names of attachments, before and after.
+    /// Old and new names of attachments.
     names: Vec<(String, String)>,
-    /// What couldn't be removed, as text.
+    /// Text on items that couldn't be removed.
     pub(crate) left: Vec<String>,
 }
 
@@ -47,7 +47,7 @@ impl Anonymous {
         Ok(Self { vehicle_toml, names, left: left(log, vehicle) })
     }
 
-    /// The header of the new log.
+    /// Header of the new log.
     pub(crate) fn header(&self, mut header: LogHeader) -> LogHeader {
         header.vehicle_toml.clone_from(&self.vehicle_toml);
         for (name, _) in &mut header.attachments {
@@ -63,7 +63,7 @@ impl Anonymous {
     }
 }
 
-/// What can't be removed, as text.
+/// Text on items that can't be removed.
 fn left(log: &DiveLog, vehicle: &VehicleConfig) -> Vec<String> {
     let info = log.header();
     let ids = |sources: &[SourceInfo]| {
@@ -155,7 +155,7 @@ fn string_len(text: &str, quote: char) -> usize {
     text.len()
 }
 
-/// The key whose value begins at the end of `text`, without the tables before it.
+/// Key whose value begins at the end of `text`, without the tables before it.
 fn key_before(text: &str) -> &str {
     let line = text.rsplit(['\n', ',', '{', '[']).next().unwrap_or_default();
     let key = line.split_once('=').map_or("", |(key, _)| key);
@@ -186,7 +186,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn comments_names_addresses_and_files_go_and_the_rest_stays() {
+    fn anonymising_removes_comments_names_addresses_and_files_only() {
         let text = r##"# Gate 3 of the Upper Plant
 name = "VITA # 7" # Anna's
 target_m = 1.2
@@ -234,7 +234,7 @@ inner."name" = "name 6"
     }
 
     #[test]
-    fn the_shipped_vehicles_still_read_and_are_the_same_but_for_names() {
+    fn anonymised_shipped_vehicles_differ_only_in_names() {
         for name in ["vita1.toml", "vita2-2.toml", "vita2-3.toml", "vita2-4.toml"] {
             let file = format!("{}/deploy/vehicles/{name}", env!("CARGO_MANIFEST_DIR"));
             let text = std::fs::read_to_string(file).unwrap();
@@ -256,7 +256,7 @@ inner."name" = "name 6"
     }
 
     #[test]
-    fn strings_without_an_end_are_gone_through() {
+    fn unterminated_strings_are_processed() {
         for text in ["name = \"", "'", "\"\"\"", "\"\\", "#", "name = 'é", "\u{e9}#"] {
             anonymised(text, &[]);
         }

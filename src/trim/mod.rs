@@ -1,4 +1,4 @@
-//! `headrace trim`: part of a log.
+//! `headrace trim`: extracts part of a log.
 
 mod anonymous;
 
@@ -31,7 +31,7 @@ use anonymous::Anonymous;
 
 /// Tick length of the replay that finds the vehicle's chainage over time.
 const TICK: DurNs = DurNs::from_millis(20);
-/// Gaps outside the range of chainage, or without a fix, that are not cut out.
+/// Longest gap outside the range of chainage, or without a fix, that is not cut out.
 const BRIDGED: DurNs = DurNs::from_millis(2000);
 
 /// `headrace trim`.
@@ -131,7 +131,7 @@ fn when_within(
     Ok(spans)
 }
 
-/// The changes, as text.
+/// Text on the changes.
 fn what_is_done(args: &Trim, files: &[PathBuf], spans: &[(MonoNs, MonoNs)]) -> Result<Vec<String>, Failure> {
     let mut said = Vec::new();
     if args.anonymise {
@@ -154,7 +154,7 @@ fn what_is_done(args: &Trim, files: &[PathBuf], spans: &[(MonoNs, MonoNs)]) -> R
     Ok(said)
 }
 
-/// Writes the new log, whole or not at all.
+/// Writes the new log atomically.
 fn write(
     args: &Trim,
     files: &[PathBuf],
@@ -215,7 +215,7 @@ fn write(
     Ok(trimmed)
 }
 
-/// Why nothing is written: no sensor's message is within the times or the chainage asked for.
+/// Error if no sensor's message is within the requested times or chainage.
 fn nothing_kept(args: &Trim, files: &[PathBuf]) -> Result<Failure, Failure> {
     let mut log = DiveLog::open(files)?;
     let last = log.times().map_or(MonoNs(0), |times| times.1);

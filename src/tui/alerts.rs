@@ -1,28 +1,28 @@
-//! Alerts as the screen lists them, and the operator's commands.
+//! Alerts as listed on the screen, and the operator's commands.
 
 use headrace_monitor::alert_list::{AlertState, ListedAlert, Priority};
 use headrace_monitor::console::{Command, ConsolePort, NoteText, Who};
 use headrace_monitor::live_state::Lamp;
 use headrace_monitor::run::Loop;
 
-/// Who commands from here.
+/// Author of commands from this screen.
 const BY: &str = "terminal";
 
-/// An alert.
+/// An alert on the screen.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct AlertRow {
     pub(super) number: u32,
     pub(super) priority: &'static str,
-    /// Whether it holds, and whether somebody knows.
+    /// Whether its condition holds, and whether it is acknowledged.
     pub(super) state: &'static str,
     pub(super) lamp: Lamp,
-    /// Flashes until somebody acknowledges it.
+    /// Flashes until it is acknowledged.
     pub(super) needs_acknowledgement: bool,
     pub(super) text: String,
     pub(super) advice: String,
 }
 
-/// The alerts that aren't over, the most urgent first, and how many more there are.
+/// Live alerts, most urgent first, and the number of further ones.
 pub(super) fn rows(dive: &Loop) -> (Vec<AlertRow>, usize) {
     let around = dive.surroundings();
     let (shown, hidden) = dive.alert_list().shown();
@@ -55,23 +55,23 @@ pub(super) fn rows(dive: &Loop) -> (Vec<AlertRow>, usize) {
 pub(super) struct Desk(Option<ConsolePort>);
 
 impl Desk {
-    /// Of a dive that is over without a console.
+    /// Creates the desk; without a console for a recorded dive.
     pub(super) fn new(console: Option<ConsolePort>) -> Self {
         Self(console)
     }
 
-    /// Acknowledges the alert of a number, or with 0 all; returns what is said of it.
+    /// Acknowledges the alert with this number, or all with 0; returns the answer to show.
     pub(super) fn acknowledge(&self, alert: u32) -> String {
         let done = if alert == 0 { "all acknowledged".to_owned() } else { format!("{alert} acknowledged") };
         self.send(&Command::Acknowledge { alert, by: Who::cut(BY) }, done)
     }
 
-    /// Silences all that sound.
+    /// Silences all sounding alerts; returns the answer to show.
     pub(super) fn silence(&self) -> String {
         self.send(&Command::Silence { by: Who::cut(BY) }, "silent for 30 s".to_owned())
     }
 
-    /// Puts down a note at the present place.
+    /// Adds a note at the present place; returns the answer to show.
     pub(super) fn note(&self, text: &str) -> String {
         self.send(&Command::Note { text: NoteText::cut(text), by: Who::cut(BY) }, format!("noted: {text}"))
     }
@@ -84,7 +84,7 @@ impl Desk {
         }
     }
 
-    /// Whether anybody can command.
+    /// Whether commands are possible.
     pub(super) fn is_open(&self) -> bool {
         self.0.is_some()
     }

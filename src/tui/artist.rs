@@ -1,4 +1,4 @@
-//! The thread that draws: takes pictures and keys, and asks for the next picture once it has drawn one.
+//! The renderer's thread: receives frames and keys, and requests the next frame once it has drawn one.
 
 use std::fs::File;
 use std::io::{BufWriter, Write as _};
@@ -23,23 +23,23 @@ use super::paper::Ink;
 use crate::logging;
 use crate::play::{Hand, Key as PlaybackKey};
 
-/// Interval at which it is drawn.
+/// Interval between two draws.
 const EVERY: Duration = Duration::from_millis(100);
-/// A live dive's picture that is this much older than it should be is shown as old. Source: `OLD_AFTER` of the live state.
+/// Delay after which a live dive's frame is shown as stale. Source: `OLD_AFTER` of the live state.
 const OLD_AFTER: Duration = Duration::from_secs(2);
 
-/// Draws, and answers keys.
+/// Draws frames and handles keys.
 pub(super) struct Artist {
     hold: Hold,
     desk: Desk,
     page: Page,
     hand: Option<Hand>,
-    /// Takes a playback's commands.
+    /// Sender of playback commands.
     commands: Option<crossbeam::channel::Sender<headrace_replay::playback::PlaybackCommand>>,
     is_live: bool,
     wanted: Arc<AtomicBool>,
     keys_end: Arc<AtomicBool>,
-    /// When the last picture came.
+    /// Time of the last frame.
     came: Option<Instant>,
 }
 
@@ -67,7 +67,7 @@ impl Artist {
         Self { hold, desk, page, hand, commands, is_live, wanted, keys_end, came: None }
     }
 
-    /// Draws until the end, then gives the terminal back.
+    /// Draws until the end, then releases the terminal.
     pub(super) fn draw_until_the_end(mut self, messages: &Receiver<Message>) {
         let mut screen: Option<(Screen, (u16, u16))> = None;
         let mut drawn: Option<Instant> = None;
@@ -75,7 +75,7 @@ impl Artist {
             let waiting = drawn.map_or(Duration::ZERO, |drawn| EVERY.saturating_sub(drawn.elapsed()));
             match messages.recv_timeout(waiting) {
                 Ok(Message::End) | Err(RecvTimeoutError::Disconnected) => break,
-                // Nothing is to be answered late: a key is drawn at once.
+                // A key is handled and drawn at once, so its answer isn't delayed.
                 Ok(Message::Key(key)) => {
                     self.key(key);
                     drawn = None;
@@ -88,7 +88,7 @@ impl Artist {
                 Err(RecvTimeoutError::Timeout) => {}
             }
             self.refresh();
-            // A terminal that is gone, or wasn't able to, is tried again.
+            // A closed or failing terminal is tried again.
             if let Err(error) = self.draw(&mut screen) {
                 tracing::debug!(%error, "the screen isn't drawn");
                 screen = None;
@@ -177,7 +177,7 @@ impl Artist {
         }
     }
 
-    /// Writes a note.
+    /// Handles a key while a note is being written.
     fn write(&mut self, key: Key) {
         let Some(note) = &mut self.page.note else { return };
         match key {

@@ -1,4 +1,4 @@
-//! What is on the screen: rows from the most important down, each panel as high as there is room for.
+//! Layout of the screen: rows in order of importance, each panel as high as there is room for.
 
 use std::collections::VecDeque;
 
@@ -18,32 +18,32 @@ use super::shot::Shot;
 use super::wall::{Extent, Wall};
 use crate::cli::KEYS;
 
-/// Told lines that are kept.
+/// Maximum number of message lines kept.
 const MOST_TOLD: usize = 100;
-/// Least screen.
+/// Minimum size of the screen.
 const LEAST: (u16, u16) = (40, 10);
-/// From this height on the speed allowed is also written in large digits.
+/// Size from which the allowed speed is also written in large digits.
 const LARGE: (u16, u16) = (90, 34);
 
-/// How a replay is played.
+/// State of a replay's playback.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Playing {
-    /// `None`: as fast as possible.
+    /// `None` is as fast as possible.
     pub(super) speed: Option<f64>,
     pub(super) paused: bool,
 }
 
-/// All that is shown.
+/// Content of the screen.
 pub(super) struct Page {
     mode: &'static str,
     pub(super) ink: Ink,
     pub(super) shot: Option<Shot>,
     pub(super) wall: Wall,
     told: VecDeque<PilotLine>,
-    /// The loop stands still for so long.
+    /// Time for which the loop has been stalled.
     pub(super) late: Option<DurNs>,
     pub(super) playing: Option<Playing>,
-    /// A note that is being written.
+    /// A note being written.
     pub(super) note: Option<String>,
     pub(super) help: bool,
     pub(super) extent: Extent,
@@ -67,7 +67,7 @@ impl Page {
         }
     }
 
-    /// Takes a picture.
+    /// Takes a frame.
     pub(super) fn take(&mut self, mut shot: Shot) {
         self.wall.take(&shot.wall);
         for line in shot.told.drain(..) {
@@ -76,7 +76,7 @@ impl Page {
         self.shot = Some(shot);
     }
 
-    /// Shows a log message among the told lines.
+    /// Shows a log message among the message lines.
     pub(super) fn log(&mut self, text: String) {
         self.tell(PilotLine { place: "LOG".to_owned(), what: vec![text], ..PilotLine::default() });
     }
@@ -88,7 +88,7 @@ impl Page {
         self.told.push_back(line);
     }
 
-    /// Answers a key, in the last row.
+    /// Shows an answer to a key in the last row.
     pub(super) fn say(&mut self, text: impl Into<String>) {
         self.said = Some(text.into());
     }
@@ -97,7 +97,7 @@ impl Page {
         self.said = None;
     }
 
-    /// Draws all of it.
+    /// Draws everything.
     pub(super) fn draw(&self, to: &mut Buffer) {
         let area = to.area;
         if area.width < LEAST.0 || area.height < LEAST.1 {
@@ -124,9 +124,10 @@ impl Page {
         }
     }
 
-    /// The panels, by the room that there is.
+    /// Draws the panels within the available room.
     fn panels(&self, shot: &Shot, rows: &mut Rows<'_>) {
-        // Of alerts and told lines there are two rows at least, of the wall its two strips, each panel but the last with a title.
+        // Alerts and messages have at least two rows, the wall its two strips. Each panel except the last has
+        // a title.
         let left = usize::from(rows.left()).saturating_sub(3 + 3 + 1 + 2);
         let well = shot.sensors.iter().filter(|sensor| sensor.state == SensorState::Ok).count();
         let wanted = shot.sensors.len() - well + panels::sensor_rows(well, usize::from(rows.width()));
@@ -176,7 +177,7 @@ impl Page {
         ]));
     }
 
-    /// What holds, across the whole width; from some size on with the speed allowed in large digits.
+    /// Draws the condition across the whole width, with the allowed speed in large digits if there is room.
     fn banner(&self, shot: &Shot, area: Rect, rows: &mut Rows<'_>) {
         let condition = shot.state.condition();
         let lamp = if self.late.is_some() { Lamp::Red } else { condition.lamp() };
@@ -230,7 +231,7 @@ impl Page {
         }
     }
 
-    /// The last told lines, the newest at the bottom.
+    /// Draws the last messages, newest at the bottom.
     fn told(&self, rows: &mut Rows<'_>) {
         let room = usize::from(rows.left());
         if room == 0 {
@@ -249,7 +250,7 @@ impl Page {
                 break;
             }
             let broken = line.broken(columns);
-            // A line is shown whole or, where there is no room for more, its beginning.
+            // If a line doesn't fit whole, its beginning is shown.
             let fits = broken.len().min(room - lines.len());
             broken.into_iter().take(fits).rev().for_each(|text| lines.push_front((text, line.lamp)));
         }
@@ -270,7 +271,7 @@ impl Page {
                     if self.playing.is_some() { &["space pause", "arrows go", "q leave"] } else { &[] };
                 let ours = ["a acknowledge", "s silence", "n note", "w wall", "Ctrl-C ends the dive"];
                 let mut text = " ? keys".to_owned();
-                // As many as there is room for.
+                // As many keys as fit.
                 for key in play.iter().chain(&ours) {
                     if text.len() + 2 + key.len() < usize::from(rows.to.area.width) {
                         text = format!("{text}  {key}");
@@ -322,7 +323,7 @@ impl Page {
     }
 }
 
-/// What came with words from elsewhere. A plus alone would say something else than plus or minus.
+/// Replaces non-ASCII characters of external text. A plain plus would not mean plus or minus.
 fn in_ascii(cell: &mut Cell) {
     if !cell.symbol().is_ascii() {
         let plain = if cell.symbol() == "±" { "~" } else { "?" };

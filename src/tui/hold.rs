@@ -1,4 +1,4 @@
-//! The terminal while it is taken: without lines and echo, on its second page, and back on every way out.
+//! Takes over the terminal: raw mode on the alternate screen, restored on every exit.
 
 use std::fs::File;
 use std::io::{self, IsTerminal as _, Write as _};
@@ -15,27 +15,27 @@ use rustix::termios::{
 use crate::failure::Failure;
 use crate::logging;
 
-/// Name of the thread that draws.
+/// Name of the renderer's thread.
 pub(super) const ARTIST: &str = "screen";
-/// To the second page, without a cursor.
+/// Switches to the alternate screen and hides the cursor.
 const ENTER: &[u8] = b"\x1b[?1049h\x1b[?25l\x1b[2J";
-/// Back to the first, as it was.
+/// Restores the main screen.
 const LEAVE: &[u8] = b"\x1b[0m\x1b[?25h\x1b[?1049l";
-/// Steps in which another thread waits for the one that draws to leave by itself.
+/// Polling interval of another thread that waits for the renderer to release the terminal.
 const STEP: Duration = Duration::from_millis(25);
 const STEPS: u32 = 20;
 
-/// Settings before the terminal was taken.
+/// Settings before the terminal was taken over.
 static BEFORE: OnceLock<Termios> = OnceLock::new();
-/// Whether the terminal is taken.
+/// Whether the terminal is taken over.
 static TAKEN: AtomicBool = AtomicBool::new(false);
-/// Whether it is to be given back.
+/// Whether the terminal has to be released.
 static LEAVING: AtomicBool = AtomicBool::new(false);
 
-/// The terminal that is drawn on. Writing goes past stdout's lock: a terminal that doesn't read holds up nobody else.
+/// The terminal for drawing. Writing bypasses stdout's lock, so an unread terminal blocks no other writer.
 pub(super) struct Hold(File);
 
-/// Errors: stdin or stdout is no terminal, or one without a second page.
+/// Checks the terminal. Errors: stdin or stdout is no terminal, or one without an alternate screen.
 pub(super) fn check() -> Result<(), Failure> {
     let able = crate::terminal::of(&io::stdout()).overwrites && io::stdin().is_terminal();
     let why = "--tui needs a terminal on stdin and stdout (and TERM other than dumb); over ssh: ssh -t";
@@ -43,12 +43,12 @@ pub(super) fn check() -> Result<(), Failure> {
 }
 
 impl Hold {
-    /// Takes the terminal.
+    /// Takes over the terminal.
     pub(super) fn take() -> io::Result<Self> {
         let out = File::from(io::stdout().as_fd().try_clone_to_owned()?);
         let before = tcgetattr(io::stdin())?;
         let mut raw = before.clone();
-        // Ctrl-C, Ctrl-Z and Ctrl-\ are keys. Ctrl-S and Ctrl-Q go on to stop and start the terminal.
+        // Ctrl-C, Ctrl-Z and Ctrl-\ become keys. Ctrl-S and Ctrl-Q still stop and start the terminal.
         raw.local_modes.remove(LocalModes::ICANON | LocalModes::ECHO | LocalModes::ISIG | LocalModes::IEXTEN);
         raw.special_codes[SpecialCodeIndex::VMIN] = 1;
         raw.special_codes[SpecialCodeIndex::VTIME] = 0;
@@ -62,12 +62,12 @@ impl Hold {
         Ok(Self(out))
     }
 
-    /// What is written to.
+    /// File for writing to the terminal.
     pub(super) fn out(&self) -> io::Result<File> {
         self.0.try_clone()
     }
 
-    /// Columns and rows.
+    /// Number of columns and rows.
     pub(super) fn size(&self) -> (u16, u16) {
         match tcgetwinsize(&self.0) {
             Ok(size) if size.ws_col > 0 && size.ws_row > 0 => (size.ws_col, size.ws_row),
@@ -82,17 +82,17 @@ impl Drop for Hold {
     }
 }
 
-/// Asks the thread that draws to give the terminal back.
+/// Requests that the renderer's thread releases the terminal.
 pub(super) fn leave() {
     LEAVING.store(true, Ordering::Relaxed);
 }
 
-/// Whether the terminal is to be given back.
+/// Whether the terminal has to be released.
 pub(super) fn is_leaving() -> bool {
     LEAVING.load(Ordering::Relaxed)
 }
 
-/// Settings as they were: takes no time, whatever the terminal does.
+/// Restores the settings, which takes no time whatever the terminal does.
 pub(super) fn restore_settings() {
     if let Some(before) = BEFORE.get()
         && let Err(error) = tcsetattr(io::stdin(), OptionalActions::Now, before)
@@ -101,17 +101,17 @@ pub(super) fn restore_settings() {
     }
 }
 
-/// The terminal as it was. Does nothing the second time.
+/// Restores the terminal. A second call does nothing.
 pub(super) fn restore() {
     if TAKEN.swap(false, Ordering::Relaxed) {
         restore_settings();
         let mut out = io::stdout().lock();
-        // A terminal that is gone needs nothing.
+        // A closed terminal needs no restoring.
         out.write_all(LEAVE).and_then(|()| out.flush()).ok();
     }
 }
 
-/// The same from another thread than the one that draws, within half a second.
+/// Restores the terminal from a thread other than the renderer's, within half a second.
 pub(super) fn restore_from_elsewhere() {
     leave();
     for _ in 0..STEPS {
@@ -121,7 +121,7 @@ pub(super) fn restore_from_elsewhere() {
         thread::sleep(STEP);
     }
     restore_settings();
-    // The terminal may not read: it is waited for no longer.
+    // The terminal may not read its input, so the wait is limited.
     let writing = thread::spawn(restore);
     for _ in 0..STEPS {
         if writing.is_finished() {
@@ -131,7 +131,9 @@ pub(super) fn restore_from_elsewhere() {
     }
 }
 
-/// A panic that ends the program leaves the terminal in order before it says why; one of another thread is a line on the screen.
+/// Installs a panic hook that restores the terminal before a fatal panic is printed.
+///
+/// A panic of another thread becomes a line on the screen.
 fn mind_panics() {
     let usual = std::panic::take_hook();
     std::panic::set_hook(Box::new(move |panic| {
@@ -157,11 +159,11 @@ mod tests {
 
     use super::*;
 
-    /// Name of the thread that panics in [`panics_with_the_terminal_taken`].
+    /// Environment variable with the name of the thread that panics in [`panics_with_the_terminal_taken`].
     const THREAD: &str = "HEADRACE_TEST_THREAD";
     const WORDS: &str = "a panic on purpose";
 
-    /// Run by [`a_panic_leaves_the_terminal_as_it_was`] in a process with a terminal of its own.
+    /// Run by [`panic_restores_the_terminal`] in a process with its own terminal.
     #[test]
     #[ignore = "takes the terminal, and panics"]
     fn panics_with_the_terminal_taken() {
@@ -172,8 +174,9 @@ mod tests {
         assert!(tcgetwinsize(&hold.0).is_ok());
     }
 
-    /// All that a process writes which panics on a thread of that name with the terminal taken, the terminal's settings while it is
-    /// taken, and whether they are afterwards as they were.
+    /// Output of a process whose thread of that name panics with the terminal taken over.
+    ///
+    /// Also returns whether the terminal's settings are as before.
     fn written(thread: &str) -> (String, bool) {
         let master = openpt(OpenptFlags::RDWR | OpenptFlags::NOCTTY).unwrap();
         grantpt(&master).unwrap();
@@ -196,7 +199,7 @@ mod tests {
         let mut master = File::from(master);
         let reading = thread::spawn(move || {
             let (mut all, mut bytes) = (Vec::new(), [0; 4096]);
-            // The end of a terminal that nobody holds open is an error.
+            // The end of a terminal without an open handle is an error.
             while let Ok(count @ 1..) = master.read(&mut bytes) {
                 all.extend_from_slice(&bytes[..count]);
             }
@@ -211,12 +214,12 @@ mod tests {
     }
 
     #[test]
-    fn a_panic_leaves_the_terminal_as_it_was() {
+    fn panic_restores_the_terminal() {
         let at = |written: &str, text: &str| {
             written.find(text).unwrap_or_else(|| panic!("{text:?} in {written:?}"))
         };
         let [enter, leave] = [ENTER, LEAVE].map(|bytes| std::str::from_utf8(bytes).unwrap());
-        // What draws, and the loop: the words stand on the first page, after the way back to it.
+        // A panic of the renderer or the loop: its text is on the main screen, after the switch back to it.
         for thread in [ARTIST, "main"] {
             let (written, same) = written(thread);
             assert!(same, "{thread}: the settings are others");
@@ -224,7 +227,8 @@ mod tests {
             assert!(at(&written, leave) < at(&written, WORDS), "{thread}: {written:?}");
             assert_eq!(written.matches(leave).count(), 1, "{thread}: {written:?}");
         }
-        // Another thread's panic is a line of the log, and the terminal stays taken until its owner gives it back.
+        // A panic of another thread is a line of the log. The terminal stays taken over until its owner
+        // releases it.
         let (written, same) = written("line 0");
         assert!(same && at(&written, enter) < at(&written, leave), "{written:?}");
         assert!(!written.contains(WORDS), "{written:?}");

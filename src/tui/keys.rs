@@ -19,7 +19,7 @@ pub(super) enum Key {
 }
 
 impl Key {
-    /// The key of playback that it is.
+    /// Corresponding key of playback, if any.
     pub(super) fn of_playback(self) -> Option<Playing> {
         Some(match self {
             Self::Up => Playing::Up,
@@ -36,7 +36,7 @@ impl Key {
     }
 }
 
-/// The keys of some bytes. A terminal sends all bytes of a key at once.
+/// Keys of some bytes. A terminal sends all bytes of a key at once.
 pub(super) fn keys(bytes: &[u8]) -> Vec<Key> {
     let text = String::from_utf8_lossy(bytes);
     let mut rest = text.as_ref();

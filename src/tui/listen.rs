@@ -1,4 +1,4 @@
-//! Hears keys of the terminal, and signals, on a thread of its own.
+//! Reads the terminal's keys and counts signals on a thread of its own.
 
 use std::io;
 use std::sync::Arc;
@@ -16,10 +16,12 @@ use crate::interrupt::{self, Requests};
 /// Longest wait for a key before the end is noticed.
 const WAIT: Timespec = Timespec { tv_sec: 0, tv_nsec: 100_000_000 };
 
-/// Sends keys until what it returns is set. Ctrl-C sets the flag as SIGINT does; a second one, over a second later, ends the
-/// program at once, the terminal in order.
+/// Sends keys until the returned flag is set.
 ///
-/// Errors: signals can't be counted, or the thread not started.
+/// Ctrl-C sets `interrupted` as SIGINT does. A second one, over a second later, restores the terminal and
+/// ends the program at once.
+///
+/// Errors: signals can't be counted, or the thread can't be started.
 pub(super) fn listen(to: Sender<Message>, interrupted: Arc<AtomicBool>) -> io::Result<Arc<AtomicBool>> {
     let ended = Arc::new(AtomicBool::new(false));
     let until = Arc::clone(&ended);
@@ -44,7 +46,7 @@ pub(super) fn listen(to: Sender<Message>, interrupted: Arc<AtomicBool>) -> io::R
                 continue;
             }
             match rustix::io::read(&stdin, &mut bytes) {
-                // The terminal is gone; the dive goes on.
+                // The terminal is closed; the dive continues.
                 Ok(0) | Err(rustix::io::Errno::IO) => return,
                 Ok(count) => {
                     for key in keys(bytes.get(..count).unwrap_or_default()) {

@@ -1,9 +1,9 @@
-//! What comes to the thread that draws.
+//! Messages to the renderer's thread.
 
 use super::keys::Key;
 use super::shot::Shot;
 
-/// A picture, a key, or the end.
+/// A frame, a key, or the end.
 pub(super) enum Message {
     Shot(Box<Shot>),
     Key(Key),

@@ -1,5 +1,7 @@
-//! `--tui`: the dive on a terminal's whole screen, for a session over ssh. The loop's thread hands over a picture of the dive by
-//! value when the artist's thread wants one; it never waits for the terminal in a live dive.
+//! `--tui`: shows the dive on a terminal's whole screen, for a session over ssh.
+//!
+//! The loop's thread passes frames by value when the renderer's thread requests one. In a live dive it never
+//! waits for the terminal.
 
 mod alerts;
 mod artist;
@@ -42,36 +44,37 @@ pub(crate) use mode::Mode;
 use mode::Stop;
 use shot::Eye;
 
-/// How long a live dive waits for its terminal at the end.
+/// Longest wait of a live dive for its terminal at the end.
 const ENDS_WITHIN: Duration = Duration::from_secs(2);
 
-/// What to show, and who ends it.
+/// Parameters of the screen.
 pub(crate) struct Start<'a> {
-    /// The vehicle's name.
+    /// Name of the vehicle.
     pub(crate) vehicle: &'a str,
-    /// What is said before anything else.
+    /// First message.
     pub(crate) first: Option<String>,
     pub(crate) mode: Mode,
     /// Set by Ctrl-C.
     pub(crate) interrupted: Arc<AtomicBool>,
-    /// Takes an operator's commands; `None` for a dive that is over.
+    /// Port for an operator's commands; `None` for a recorded dive.
     pub(crate) console: Option<ConsolePort>,
 }
 
-/// The follower that shows a dive on the whole terminal.
+/// Follower that shows a dive on the whole terminal.
 pub(crate) struct Tui {
     eye: Eye,
     wanted: Arc<AtomicBool>,
     sender: Option<Sender<Message>>,
     thread: Option<JoinHandle<()>>,
-    /// Disconnected once the terminal is as it was.
+    /// Disconnected once the terminal is restored.
     done: Receiver<()>,
     is_live: bool,
 }
 
 impl Tui {
-    /// To be called before the handlers of signals are installed: a second Ctrl-C ends the program at once, and the terminal is put
-    /// in order before.
+    /// Prepares the handling of a second Ctrl-C, which restores the terminal and ends the program at once.
+    ///
+    /// Call it before the signal handlers are installed.
     ///
     /// Errors: stdin or stdout is no terminal.
     pub(crate) fn prepare() -> Result<(), Failure> {
@@ -80,9 +83,9 @@ impl Tui {
         Ok(())
     }
 
-    /// Takes the terminal, and starts the threads that draw and read keys.
+    /// Takes over the terminal, and starts the threads that draw and read keys.
     ///
-    /// Errors: the terminal's settings can't be changed, or a thread not started.
+    /// Errors: the terminal's settings can't be changed, or a thread can't be started.
     pub(crate) fn start(start: Start<'_>) -> Result<Self, Failure> {
         let failed = |source| Failure::System { what: "taking the terminal", source };
         let hold = Hold::take().map_err(failed)?;
@@ -104,14 +107,14 @@ impl Tui {
         Ok(Self { eye, wanted, sender: Some(sender), thread: Some(thread), done, is_live })
     }
 
-    /// Hands a picture over. What finds no room in a live dive is in the next one.
+    /// Passes a frame on. In a live dive, content without room is in the next one.
     fn show(&mut self, dive: &Loop, stopped: Option<Stop>) {
         let Some(sender) = &self.sender else { return };
         if self.is_live && sender.is_full() {
             return;
         }
         let shot = Message::Shot(Box::new(self.eye.shot(dive, stopped)));
-        // A thread that has ended shows nothing more, and said why.
+        // A thread that has stopped shows nothing more; it has logged the reason.
         let is_taken = if self.is_live { sender.try_send(shot).is_ok() } else { sender.send(shot).is_ok() };
         if !is_taken {
             self.eye.show_all_again();
@@ -164,7 +167,7 @@ impl Follower for Tui {
 }
 
 impl Tui {
-    /// Gives the terminal back; of a live dive within [`ENDS_WITHIN`].
+    /// Releases the terminal; in a live dive within [`ENDS_WITHIN`].
     fn close(&mut self) {
         let Some(sender) = self.sender.take() else { return };
         hold::leave();
@@ -179,11 +182,11 @@ impl Tui {
         if let Some(thread) = self.thread.take()
             && thread.join().is_err()
         {
-            tracing::error!("the screen's thread has ended early");
+            tracing::error!("the screen's thread has stopped early");
         }
         crate::logging::release();
         if stuck {
-            tracing::warn!("the terminal doesn't read: it may be left without its first page");
+            tracing::warn!("the terminal doesn't read its input; it may keep showing the alternate screen");
         }
     }
 }

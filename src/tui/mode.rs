@@ -1,21 +1,21 @@
-//! What kind of dive is shown, and whether it goes on.
+//! Kind of dive shown, and its state.
 
 use crossbeam::channel::Sender;
 use headrace_replay::playback::PlaybackCommand;
 
-/// What kind of dive is shown.
+/// Kind of dive shown.
 pub(crate) enum Mode {
-    /// On ports: nothing may wait.
+    /// A dive on ports: no thread may wait.
     Live,
-    /// A simulated one.
+    /// A simulated dive.
     Demo,
-    /// From a log, as fast as it is played.
+    /// A dive from a log, at the speed of its playback.
     Source,
-    /// A replay, which takes commands; its speed at the beginning.
+    /// A replay that takes commands, and its initial speed.
     Replay(Sender<PlaybackCommand>, Option<f64>),
 }
 
-/// Why a replay stands still.
+/// Reason for which a replay is stopped.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Stop {
     Paused,

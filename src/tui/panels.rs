@@ -1,4 +1,4 @@
-//! The panels of the screen.
+//! Panels of the screen.
 
 use headrace_config::plain::one_line;
 use headrace_geometry::math;
@@ -15,14 +15,14 @@ use super::shot::{SensorRow, Shot};
 use super::wall::{Cell, Extent, HOURS, Known, Strip, Wall};
 use crate::output::append;
 
-/// Rows of the clock strips.
+/// Number of rows of the clock strips.
 pub(super) const CLOCK_ROWS: usize = HOURS;
 /// Width of a sensor's lamp with its age, and without.
 const LAMP_COLUMNS: [usize; 2] = [24, 19];
 /// Width of the strips' labels.
 const LABEL: usize = 6;
 
-/// Speed against v_max as a band, with the reason below.
+/// Draws the speed against v_max as a band, with the reason below.
 pub(super) fn speed(shot: &Shot, ink: Ink, rows: &mut Rows<'_>) {
     let state = &shot.state;
     let is_known = is_now(shot);
@@ -54,7 +54,7 @@ pub(super) fn speed(shot: &Shot, ink: Ink, rows: &mut Rows<'_>) {
     }
     rows.line(Line::from(spans));
     let mut parts: Vec<&str> = Vec::new();
-    // What is lost is among the status' own parts.
+    // Losses are part of the status.
     if is_known && !shot.reason.is_empty() && state.lost_share().is_none() {
         parts.push(&shot.reason);
     }
@@ -68,7 +68,7 @@ fn columns_after_label(rows: &Rows<'_>) -> usize {
     usize::from(rows.width()).saturating_sub(LABEL + 1)
 }
 
-/// As many of the parts as fit whole, the first ones.
+/// As many of the first parts as fit whole.
 fn fitted(parts: &[&str], columns: usize) -> String {
     let mut text = String::new();
     for part in parts {
@@ -81,12 +81,12 @@ fn fitted(parts: &[&str], columns: usize) -> String {
     text
 }
 
-/// Whether the state is of now.
+/// Whether the state is current.
 pub(super) fn is_now(shot: &Shot) -> bool {
     !matches!(shot.state.condition(), Condition::Old(_) | Condition::NoData)
 }
 
-/// Where, how sure, and the metres by verdict.
+/// Draws position, its error, and the metres by verdict.
 pub(super) fn place(shot: &Shot, ink: Ink, rows: &mut Rows<'_>) {
     let state = &shot.state;
     let has_position = !matches!(state.position, PositionState::None(_));
@@ -108,7 +108,7 @@ pub(super) fn place(shot: &Shot, ink: Ink, rows: &mut Rows<'_>) {
     if let Some(sd) = state.sd.filter(|_| has_position) {
         let errors = format!("  {pm}{:.2} m along, {pm}{:.2} across", sd.along_m, sd.place_m);
         let used: usize = spans.iter().map(Span::width).sum();
-        // Whole, or not at all.
+        // The errors are shown completely or not at all.
         spans.extend(
             Some(errors)
                 .filter(|text| used + text.chars().count() <= usize::from(rows.width()))
@@ -120,7 +120,7 @@ pub(super) fn place(shot: &Shot, ink: Ink, rows: &mut Rows<'_>) {
     rows.text(&format!("METRES {}", metres_text(&state.metres, columns_after_label(rows))), style);
 }
 
-/// Metres by verdict, what isn't passed first; dots stand for what there is no room for.
+/// Metres by verdict, those not passed first. Dots mark omitted ones.
 fn metres_text(metres: &LiveMetres, columns: usize) -> String {
     let LiveMetres { pass_m, fail_m, cannot_say_m, open_m, not_inspected_m } = *metres;
     let all = [
@@ -133,7 +133,7 @@ fn metres_text(metres: &LiveMetres, columns: usize) -> String {
     let mut text = format!("{:.2} m:", metres.way_m());
     for (part_m, what) in all.iter().filter(|(part_m, _)| *part_m > 0.0) {
         let part = format!(" {part_m:.2} {what},");
-        // Room for the dots is kept.
+        // Leaves room for the dots.
         if text.len() + part.len() + 3 > columns {
             text += " ..";
             break;
@@ -143,7 +143,7 @@ fn metres_text(metres: &LiveMetres, columns: usize) -> String {
     text.trim_end_matches([',', ':']).to_owned()
 }
 
-/// An alert's lines: what to do goes below what holds where there is no room beside it.
+/// Lines of an alert. The action goes below the problem if there is no room next to it.
 fn alert_lines(alert: &AlertRow, ink: Ink, columns: usize) -> Vec<String> {
     let AlertRow { number, priority, state, lamp, text, advice, .. } = alert;
     let first = format!("{} {number} {priority} {state}: {text}", ink.shape(*lamp));
@@ -155,13 +155,13 @@ fn alert_lines(alert: &AlertRow, ink: Ink, columns: usize) -> Vec<String> {
     if whole.chars().count() <= columns {
         return vec![whole];
     }
-    // What to do has its place before the last words of what holds.
+    // The action takes precedence over the last words of the problem.
     let mut lines = vec![wrapped(&first, columns).swap_remove(0)];
     lines.extend(wrapped(&format!("    {arrow} {advice}"), columns));
     lines
 }
 
-/// A text in lines of at most so many columns, broken at blanks, the later ones indented.
+/// A text wrapped at blanks to lines of at most `columns` columns. Continuation lines are indented.
 fn wrapped(text: &str, columns: usize) -> Vec<String> {
     let mut lines = vec![String::new()];
     for word in text.split(' ') {
@@ -179,18 +179,18 @@ fn wrapped(text: &str, columns: usize) -> Vec<String> {
     lines
 }
 
-/// Rows that the alerts would take.
+/// Number of rows for all alerts.
 pub(super) fn alert_rows(shot: &Shot, ink: Ink, columns: usize) -> usize {
     shot.alerts.iter().map(|alert| alert_lines(alert, ink, columns).len()).sum()
 }
 
-/// Alerts: `room` rows below a title with their numbers.
+/// Draws alerts in `room` rows below a title with their numbers.
 pub(super) fn alerts(shot: &Shot, ink: Ink, room: usize, rows: &mut Rows<'_>) {
     let columns = usize::from(rows.width());
     let (mut lines, mut shown) = (Vec::new(), 0);
     for alert in &shot.alerts {
         let of_it = alert_lines(alert, ink, columns);
-        // What holds is more than what to do about it.
+        // The problem takes precedence over the action.
         if lines.len() == room {
             break;
         }
@@ -219,18 +219,20 @@ pub(super) fn alerts(shot: &Shot, ink: Ink, room: usize, rows: &mut Rows<'_>) {
     }
 }
 
-/// Rows that so many sensors take.
+/// Number of rows for this many sensors.
 pub(super) fn sensor_rows(sensors: usize, columns: usize) -> usize {
     sensors.div_ceil((columns / LAMP_COLUMNS[0]).max(1))
 }
 
-/// Sensor lamps with rate and age; with a reason, those that aren't well come first and take a row each while there is room.
+/// Draws sensor lamps with rate and age.
+///
+/// Faulty sensors come first, with a reason and in a row each while there is room.
 pub(super) fn sensors(shot: &Shot, ink: Ink, room: usize, rows: &mut Rows<'_>) {
     let unwell = shot.sensors.iter().filter(|sensor| sensor.state != SensorState::Ok).count();
     let columns = usize::from(rows.width());
     let has_room = sensor_rows(shot.sensors.len() - unwell, columns) + unwell <= room;
     let across = (columns / LAMP_COLUMNS[usize::from(!has_room)]).max(1);
-    // One row is for those that are well.
+    // One row is reserved for healthy sensors.
     let rows_of_ill = unwell.min(room.saturating_sub(usize::from(unwell < shot.sensors.len())));
     let hidden = shot.sensors.len().saturating_sub(rows_of_ill + (room - rows_of_ill) * across);
     let more = if hidden > 0 { format!(", {hidden} not shown") } else { String::new() };
@@ -287,7 +289,8 @@ fn age_text(age: DurNs) -> String {
     }
 }
 
-/// The wall by section: holes against the target, verdicts, perhaps a ruler, and perhaps what is seen by clock position.
+/// Draws the wall by section: holes against the target, verdicts, optionally a ruler and coverage by clock
+/// position.
 pub(super) fn wall(wall: &Wall, extent: Extent, ink: Ink, (clock, ruler): (bool, bool), rows: &mut Rows<'_>) {
     let columns = usize::from(rows.width()).saturating_sub(LABEL);
     let strip = wall.strip(extent, columns);
@@ -375,7 +378,7 @@ fn clock_mark(cell: Cell, hour: usize, ink: Ink) -> (char, Style) {
 }
 
 trait Ascii {
-    /// In letters that any terminal has.
+    /// Replaces non-ASCII symbols if the terminal needs it.
     fn ascii(self, ink: Ink) -> Self;
 }
 
@@ -404,7 +407,7 @@ fn ruler_text(strip: &Strip) -> String {
     text
 }
 
-/// Digits of five rows: three columns each, from the most significant bit.
+/// Digits of five rows with three columns each, from the most significant bit.
 const DIGITS: [[u8; 5]; 10] = [
     [7, 5, 5, 5, 7],
     [2, 6, 2, 2, 7],
@@ -418,7 +421,7 @@ const DIGITS: [[u8; 5]; 10] = [
     [7, 5, 7, 1, 7],
 ];
 
-/// A figure in large digits at the right of a banner of seven rows, with its unit below.
+/// Draws a number in large digits at the right of a banner of seven rows, with its unit below.
 pub(super) fn large_digits(
     figure: &str,
     unit: &str,

@@ -1,4 +1,4 @@
-//! What is drawn with and on: colours and shapes, and rows of the screen.
+//! Screen buffer: colours and shapes, and rows of the screen.
 
 use headrace_monitor::live_state::Lamp;
 use ratatui::buffer::Buffer;
@@ -7,7 +7,7 @@ use ratatui::text::{Line, Span};
 
 use crate::terminal;
 
-/// What the terminal can show.
+/// Capabilities of the terminal.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Ink {
     pub(super) colour: bool,
@@ -19,7 +19,7 @@ impl Ink {
         Self { colour: terminal::of(&std::io::stdout()).colour, unicode: terminal::has_unicode() }
     }
 
-    /// A lamp's shape: told apart without its colour.
+    /// Shape of a lamp, which distinguishes it without colour.
     pub(super) fn shape(self, lamp: Lamp) -> &'static str {
         match (lamp, self.unicode) {
             (Lamp::Green, true) => "●",
@@ -42,7 +42,7 @@ impl Ink {
         }
     }
 
-    /// Of a whole area.
+    /// Style of a whole area.
     pub(super) fn banner(self, lamp: Lamp) -> Style {
         let style = Style::default().add_modifier(Modifier::BOLD);
         match (lamp, self.colour) {
@@ -75,7 +75,7 @@ impl Rows<'_> {
         self.to.area.width
     }
 
-    #[expect(clippy::needless_pass_by_value, reason = "lines are made where they are drawn")]
+    #[expect(clippy::needless_pass_by_value, reason = "lines are built where they are drawn")]
     pub(super) fn line(&mut self, line: Line<'_>) {
         if self.left() > 0 {
             self.to.set_line(0, self.top, &line, self.to.area.width);
@@ -87,7 +87,7 @@ impl Rows<'_> {
         self.line(Line::styled(text.to_owned(), style));
     }
 
-    /// A panel's title with a rule behind it.
+    /// Draws a panel's title, followed by a rule.
     pub(super) fn title(&mut self, title: &str, ink: Ink) {
         let rule = if ink.unicode { "─" } else { "-" };
         let behind = usize::from(self.width()).saturating_sub(title.chars().count() + 1);

@@ -1,4 +1,4 @@
-//! A picture of the dive by value, made on the loop's thread between ticks.
+//! A frame: a snapshot of the dive by value, made on the loop's thread between ticks.
 
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
 
@@ -20,54 +20,54 @@ use super::alerts::{self, AlertRow};
 use super::mode::Stop;
 use super::wall::{Cell, Clock, WallNews};
 
-/// Time over which a sensor's rate is taken, in data time.
+/// Averaging window for a sensor's rate, in data time.
 const RATE_OVER: DurNs = DurNs(2_000_000_000);
-/// Lines told between two pictures that are kept.
+/// Maximum number of messages kept between two frames.
 const MOST_TOLD: usize = 64;
-/// Sections on either side of the vehicle that are looked at for every picture.
+/// Number of sections on either side of the vehicle that every frame updates.
 const NEAR: i64 = 8;
 
-/// A picture.
+/// A frame.
 pub(super) struct Shot {
     pub(super) vehicle: String,
     pub(super) state: LiveState,
-    /// Since the dive's first packet.
+    /// Time since the dive's first packet.
     pub(super) time: DurNs,
     pub(super) stopped: Option<Stop>,
-    /// Place, speed, what holds and what to do about it.
+    /// Place, speed, condition and action.
     pub(super) status: PilotLine,
-    /// What limits the speed.
+    /// Limiting factor of the speed.
     pub(super) reason: String,
     pub(super) sensors: Vec<SensorRow>,
     pub(super) alerts: Vec<AlertRow>,
-    /// Alerts beyond these.
+    /// Number of further alerts.
     pub(super) alerts_hidden: usize,
-    /// Words, and whether they are an alarm.
+    /// Text, and whether it is an alarm.
     pub(super) recording: Option<(String, bool)>,
     pub(super) wall: WallNews,
-    /// What was told since the last one, the oldest first.
+    /// Messages since the last frame, oldest first.
     pub(super) told: Vec<PilotLine>,
 }
 
-/// A sensor.
+/// A sensor on the screen.
 pub(super) struct SensorRow {
     pub(super) id: String,
     pub(super) state: SensorState,
     pub(super) age: Option<DurNs>,
     pub(super) rate_hz: Option<f64>,
-    /// What its port says, unless it runs.
+    /// Status of its port, unless it runs.
     pub(super) why: String,
 }
 
-/// What is remembered between pictures.
+/// State kept between frames.
 pub(super) struct Eye {
     vehicle: String,
     teller: Teller,
     told: VecDeque<PilotLine>,
-    /// Sections that have changed since the last picture; all of them if `None`.
+    /// Sections that have changed since the last frame; `None` for all.
     changed: Option<BTreeSet<i64>>,
     clock: Option<Clock>,
-    /// Readings of each sensor at two times.
+    /// Reading counts of each sensor at two times.
     counted: [Option<(MonoNs, Vec<u64>)>; 2],
     recorded: RecordingState,
     ports: BTreeMap<usize, String>,
@@ -87,7 +87,7 @@ impl Eye {
         }
     }
 
-    /// Puts a line among those that are told.
+    /// Adds a line to the messages.
     pub(super) fn tell(&mut self, line: PilotLine) {
         if self.told.len() == MOST_TOLD {
             self.told.pop_front();
@@ -115,23 +115,23 @@ impl Eye {
         }
     }
 
-    /// The state of a sensor's port.
+    /// Sets the state of a sensor's port.
     pub(super) fn sensor(&mut self, status: &Status) {
         let words = if status.phase == Phase::Running { String::new() } else { status.to_string() };
         self.ports.insert(status.source, words);
     }
 
-    /// What to show of the recordings.
+    /// Sets the state of the recordings.
     pub(super) fn recorded(&mut self, state: &RecordingState) {
         self.recorded = *state;
     }
 
-    /// A picture got lost: the next one has all sections.
+    /// Makes the next frame contain all sections, after a lost frame.
     pub(super) fn show_all_again(&mut self) {
         self.changed = None;
     }
 
-    /// Playback has jumped: all may be otherwise.
+    /// Resets the state after a jump of the playback.
     pub(super) fn forget(&mut self) {
         self.teller.forget();
         self.changed = None;
@@ -215,7 +215,7 @@ impl Eye {
     }
 }
 
-/// What limits the speed. What the condition says isn't said again.
+/// Text on the limiting factor of the speed, unless the condition already states it.
 fn reason_text(advice: &Advice, state: &LiveState, (profile, heads): (&Profile, &HeadWords)) -> String {
     let is_told = matches!(state.condition(), Condition::TurnFails | Condition::NoSpeed);
     if advice.reason == Reason::HelixPitch && !is_told {
@@ -224,7 +224,7 @@ fn reason_text(advice: &Advice, state: &LiveState, (profile, heads): (&Profile, 
     advice_text(&AdviceFigures::of(advice, state.speed_mps.unwrap_or(0.0)), profile, heads)
 }
 
-/// The line of what is told, where it adds something to the list of alerts.
+/// Adds the line of a message if it adds something to the list of alerts.
 fn tell(one: &Told, dive: &Loop, to: &mut Vec<PilotLine>) {
     if one.adds_line() {
         to.push(told_line(one, &dive.mission().profile, dive.head_words()));

@@ -1,11 +1,11 @@
-//! The wall by section: what a picture brings of it, and the strips that are drawn of it.
+//! The wall by section: its data in a frame, and the strips drawn from it.
 
 use headrace_coverage::Verdict;
 use headrace_geometry::math;
 use headrace_geometry::tunnel::Profile;
 use headrace_monitor::run::Loop;
 
-/// Parts of the perimeter of which the clock position is looked up.
+/// Number of parts of the perimeter with a known clock position.
 const PARTS: usize = 96;
 /// Hours of the clock.
 pub(super) const HOURS: usize = 12;
@@ -13,7 +13,7 @@ pub(super) const HOURS: usize = 12;
 /// Clock positions by arc length.
 pub(super) struct Clock {
     part_m: f64,
-    /// Bit of the hour, of each part.
+    /// Bit of the hour, for each part.
     bits: [u16; PARTS],
 }
 
@@ -33,14 +33,14 @@ impl Clock {
     }
 }
 
-/// What is known of a section; a later one of these outweighs an earlier one where a column stands for several.
+/// Knowledge of a section. If a column represents several sections, the later variant wins.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Default)]
 pub(super) enum Known {
     /// No sample.
     #[default]
     Unseen,
     Pass,
-    /// Going on may still fill it.
+    /// Further driving may still fill it.
     Open,
     NotInspected,
     CannotSay,
@@ -52,14 +52,14 @@ pub(super) enum Known {
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub(super) struct Cell {
     pub(super) known: Known,
-    /// Its hole, in parts of the target.
+    /// Hole as a share of the target.
     pub(super) share: Option<f64>,
-    /// Hours of the clock at which there are samples, within half the target: bit 0 is 12 o'clock.
+    /// Clock hours with samples within half the target: bit 0 is 12 o'clock.
     pub(super) seen: u16,
 }
 
 impl Cell {
-    /// The section of this index; `None` if there is none.
+    /// Section with this index; `None` if there is none.
     pub(super) fn of(index: i64, dive: &Loop, clock: &Clock) -> Option<Self> {
         let coverage = dive.coverage();
         let sections = &coverage.sections;
@@ -75,7 +75,8 @@ impl Cell {
         };
         let mut seen = 0;
         if section.samples > 0 {
-            // A hole that passes is no wider than the target: what is nearer than half of it is covered.
+            // A hole that passes is no wider than the target, so wall within half the target of a sample is
+            // covered.
             let (from_m, to_m) = sections.bounds_m(index);
             let (from_m, to_m) = (from_m - sections.target_m() / 2.0, to_m + sections.target_m() / 2.0);
             coverage.store.each_between(from_m, to_m, |x_m, arc_m, _| {
@@ -84,7 +85,7 @@ impl Cell {
                 }
             });
         }
-        // Around a hole that is too large, samples or not, the hour isn't covered.
+        // Around a hole that is too large, the hour isn't covered, with or without samples.
         if let Some(hole) = section.hole.filter(|_| matches!(known, Known::Missed | Known::CannotSay)) {
             seen &= !clock.bit(hole.arc_m);
         }
@@ -101,24 +102,24 @@ impl Cell {
     }
 }
 
-/// What a picture brings.
+/// Data on the wall in a frame.
 pub(super) struct WallNews {
     pub(super) section_m: f64,
     pub(super) count: usize,
-    /// Where the vehicle is.
+    /// Place of the vehicle.
     pub(super) at_m: Option<f64>,
-    /// Whether it goes inwards.
+    /// Whether it moves inwards.
     pub(super) inwards: bool,
     pub(super) cells: Vec<(i64, Cell)>,
 }
 
-/// How much of the wall is shown.
+/// Part of the wall that is shown.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub(super) enum Extent {
-    /// A section a column, about the vehicle.
+    /// One section per column, around the vehicle.
     #[default]
     Near,
-    /// All that has been seen.
+    /// Whole coverage extent.
     Way,
     Tunnel,
 }
@@ -146,7 +147,7 @@ impl Extent {
 pub(super) struct Wall {
     section_m: f64,
     at_m: Option<f64>,
-    /// Where the vehicle was last, about which the wall is shown.
+    /// Last place of the vehicle, around which the wall is shown.
     middle_m: f64,
     inwards: bool,
     cells: Vec<Cell>,
@@ -175,7 +176,7 @@ impl Wall {
         }
     }
 
-    /// A strip of so many columns.
+    /// A strip of `columns` columns.
     pub(super) fn strip(&self, extent: Extent, columns: usize) -> Strip {
         let columns = columns.max(1);
         let section_of = |x_m: f64| math::floor_to_i64(x_m / self.section_m.max(1e-9));
@@ -185,7 +186,7 @@ impl Wall {
                 let seen = |cell: &Cell| cell.known != Known::Unseen;
                 let first = self.cells.iter().position(seen).unwrap_or(0);
                 let last = self.cells.iter().rposition(seen).map_or(1, |last| last + 1);
-                // Never finer than a section a column.
+                // Never finer than a section per column.
                 let each = (last.saturating_sub(first)).div_ceil(columns).max(1);
                 (first as i64, each)
             }
@@ -207,7 +208,8 @@ impl Wall {
         }
     }
 
-    /// First section of a strip about the vehicle, which moves by quarters so that the wall stands still meanwhile.
+    /// First section of a strip around the vehicle. It moves in quarters, so the wall is stationary in
+    /// between.
     fn near(&self, here: i64, columns: usize) -> i64 {
         let step = (columns as i64 / 4).max(1);
         let from = here.div_euclid(step) * step - 2 * step + if self.inwards { 0 } else { step };
@@ -231,7 +233,7 @@ mod tests {
     }
 
     #[test]
-    fn the_clock_has_twelve_hours_with_six_at_the_floor() {
+    fn clock_has_12_hours_with_6_at_the_floor() {
         let profile = shapes::circle(3.0).unwrap();
         let clock = Clock::of(&profile);
         assert_eq!(clock.bits.iter().fold(0, |all, bit| all | bit), 0xfff);
@@ -240,7 +242,7 @@ mod tests {
     }
 
     #[test]
-    fn a_column_is_as_bad_as_its_worst_section_and_seen_where_all_are() {
+    fn column_shows_its_worst_section_and_common_coverage() {
         let strip = wall(100, 2.0).strip(Extent::Tunnel, 50);
         assert_eq!((strip.columns.len(), strip.column_m), (50, 1.0));
         let first = strip.columns[0].unwrap();
@@ -251,7 +253,7 @@ mod tests {
     }
 
     #[test]
-    fn a_strip_about_the_vehicle_has_it_inside_and_ends_with_the_tunnel() {
+    fn strip_contains_the_vehicle_and_ends_with_the_tunnel() {
         for (at_m, count) in [(0.0, 400), (47.3, 400), (199.9, 400), (3.0, 20)] {
             let strip = wall(count, at_m).strip(Extent::Near, 60);
             let (column, _) = strip.vehicle.unwrap();

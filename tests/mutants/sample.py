@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Runs mutants drawn from those that cargo-mutants makes, in the copy of the sources that tests/mutants/run has made.
+"""Runs a sample of cargo-mutants' mutants, in the copy of the sources made by tests/mutants/run.
 
 sample.py N SEED MINUTES [PART]: cargo-mutants lists and words the mutants; N of those whose name matches PART are drawn. `switch` puts all of
 them behind a switch, so that they are built once. Each is then judged by its crate's own tests, and where these pass by tests of dives
@@ -23,9 +23,9 @@ import time
 CRATES = ["geometry", "sampling", "fusion", "coverage", "monitor"]
 DIVES = ["coverage", "sampling", "navigation"]
 AT_A_TIME = 2
-# A set of tests is given this many times its usual time, and so many seconds besides: what takes longer runs for ever.
+# A set of tests gets this multiple of its usual time plus some seconds. A set that takes longer counts as endless.
 PATIENCE, PATIENCE_S = 4, 60
-# Tests of dives are run in sets of about so many seconds, each with slower tests than the one before; those slower than a limit aren't.
+# Dive tests run in sets of about this many seconds, from quick to slow tests. Tests slower than a limit aren't run.
 SETS_S = [10, 40, 100_000]
 SLOWEST_S = 6.0
 SWITCH = """use std::sync::LazyLock;
@@ -40,10 +40,10 @@ pub(crate) fn on(mutant: u32) -> bool {
 
 
 def drawn(count, seed, part):
-    """The mutants drawn, each with a number from 1, and of how many."""
+    """The sampled mutants, each with a number from 1, and the number of all mutants."""
     listing = ["cargo", "mutants", "--workspace", "--config", "tests/mutants/mutants.toml", "--list", "--json"]
     listed = json.loads(subprocess.run(listing, stdout=subprocess.PIPE, check=True).stdout)
-    # Fields left to their defaults are mostly those that tests build from parts.
+    # Fields left to their defaults mostly belong to values built in tests.
     mutants = [mutant for mutant in listed if "delete field" not in mutant["name"] and re.search(part, mutant["name"])]
     chosen = random.Random(seed).sample(mutants, min(count, len(mutants)))
     for number, mutant in enumerate(chosen, 1):
@@ -52,13 +52,13 @@ def drawn(count, seed, part):
 
 
 def switched(mutants):
-    """Puts mutants behind a switch. Returns those that were, without those that don't compile."""
+    """Put mutants behind a switch. Returns the switched ones, without those that don't compile."""
     subprocess.run(["cargo", "build", "--quiet", "--release", "--manifest-path", "tests/mutants/switch/Cargo.toml"], check=True)
     program = pathlib.Path(os.environ.get("CARGO_TARGET_DIR", "tests/mutants/switch/target"), "release", "switch")
     for crate in CRATES:
         pathlib.Path("core", crate, "src", "switched.rs").write_text(SWITCH)
         library = pathlib.Path("core", crate, "src", "lib.rs")
-        # What can be seen to panic when it is compiled panics when it runs.
+        # A panic that the compiler can predict is only a warning here, so that it happens at run time.
         library.write_text(f"#![allow(arithmetic_overflow, unconditional_panic)]\n{library.read_text()}\nmod switched;\n")
     files = {mutant["file"] for mutant in mutants}
     for file in files:
@@ -77,7 +77,7 @@ def switched(mutants):
 
 
 def uncompiled():
-    """The mutants that the compiler has errors of: each is the last named before its error."""
+    """Mutants with compiler errors: each is the last one named before its error."""
     packages = [word for crate in CRATES for word in ("-p", f"headrace_{crate}")]
     check = ["cargo", "check", "--quiet", "--keep-going", *packages, "--lib", "--message-format", "json"]
     told = subprocess.run(check, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, check=False)
@@ -97,7 +97,7 @@ def uncompiled():
 
 
 def built():
-    """The test programs by the names of their targets."""
+    """Test programs by the names of their targets."""
     packages = [word for crate in CRATES for word in ("-p", f"headrace_{crate}")]
     own = ["cargo", "test", "--quiet", "--no-run", *packages, "--lib", "--message-format", "json"]
     dives = ["cargo", "test", "--quiet", "--no-run", "-p", "headrace_tests", "--message-format", "json"]
@@ -113,7 +113,7 @@ def built():
 
 
 def run(program, words, mutant, seconds):
-    """Runs a test program up to the first test that fails. Returns that test's name, "" where all pass, None where it takes too long."""
+    """Run a test program up to its first failing test. Returns the test's name, "" if all pass, None on a timeout."""
     executable, folder = program
     environment = {**os.environ, "HEADRACE_MUTANT": str(mutant), "CARGO_MANIFEST_DIR": str(folder)}
     command = [executable, "--test-threads", "1", *words]
@@ -142,7 +142,7 @@ def run(program, words, mutant, seconds):
 
 
 def timed(program):
-    """How long each test of a program takes, s, without a mutant. Exits where one fails."""
+    """Time of each test of a program without a mutant, s. Exits if one fails."""
     executable, folder = program
     environment = {**os.environ, "HEADRACE_MUTANT": "0", "CARGO_MANIFEST_DIR": str(folder)}
     times = {}
@@ -158,7 +158,7 @@ def timed(program):
 
 
 def times_of(programs):
-    """The times of all tests of several programs, by program; kept for the next run in the same folder."""
+    """Times of all tests of several programs, by program; cached for the next run in the same folder."""
     kept = pathlib.Path("..", "times.json")
     if kept.exists():
         return json.loads(kept.read_text())
@@ -169,7 +169,7 @@ def times_of(programs):
 
 
 def sets(times):
-    """Words for each set of tests of dives, and its time, s: the quick ones first."""
+    """Arguments for each set of dive tests, with its time, s; quick sets first."""
     each = [(seconds, program, name) for program, all_of in times.items() for name, seconds in all_of.items()]
     result, left = [], sorted(test for test in each if test[0] <= SLOWEST_S)
     print(f"{len(left)} of {len(each)} tests of dives, {sum(test[0] for test in left):.0f} s of {sum(test[0] for test in each):.0f}")
@@ -185,7 +185,7 @@ def sets(times):
 
 
 def judge(mutant, programs, own_s, dives):
-    """What became of a mutant, and by which test."""
+    """Result of a mutant, and the test that decided it."""
     package = mutant["package"]
     failed = run(programs[package], [], mutant["id"], own_s[package] * PATIENCE + PATIENCE_S)
     if failed is None:
@@ -202,7 +202,7 @@ def judge(mutant, programs, own_s, dives):
 
 
 def all_judged(mutants, judge_one, end):
-    """The results by number, of as many as there is time for, AT_A_TIME at a time."""
+    """Results by number, of as many mutants as time allows, AT_A_TIME in parallel."""
     waiting, results, printing = queue.SimpleQueue(), {}, threading.Lock()
     for mutant in mutants:
         waiting.put(mutant)

@@ -1,13 +1,13 @@
 # Reference values for the factored covariance, at 100 digits: python3 tests/oracles/fusion.py > tests/oracles/fusion.csv
 #
-# Each case is a sequence of steps on a covariance P of n errors, by the textbook's formulas: no factors. They
-# lose digits in plenty, up to 60 of these (hence not 50), so that the same at 200 digits must give the same 20.
+# Each case is a sequence of steps on a covariance P of n errors, computed by the textbook's formulas without factors. They lose
+# up to 60 digits, so 50 would be too few. A run with 200 digits must give the same 20.
 #   start     n variances                  P = diag
 #   measure   noise, h (n)                 P - P h h^T P / s,  s = h^T P h + noise
 #   add       variance, a (n)              P + variance a a^T
 #   shear     n (n - 1) / 2 above the diagonal of F, by rows; 1 on it       F P F^T
 #   scale     number of the error, factor  the same with a diagonal F
-# and what must come of them:
+# and the expected results:
 #   gain      s and P h / s (n) of the last measurement, with P as before it
 #   distance  e (n), and e^T P^-1 e
 #   is        n (n + 1) / 2 of P, by rows from the diagonal on
@@ -21,7 +21,7 @@ rng = random.Random(19770301)
 
 
 def short(x):
-    """A double of few digits, so that the file stays small."""
+    """A double with few digits, which keeps the file small."""
     return float(f"{x:.4g}")
 
 
@@ -37,7 +37,7 @@ def above(n, spread):
 
 
 def mixed(n, start, noises, variances, spread, count):
-    """Everything in any order."""
+    """Steps of all kinds in random order."""
     steps = [("start", *start)]
     for _ in range(count):
         kind = rng.choice(["measure", "measure", "add", "shear", "scale"])
@@ -54,7 +54,7 @@ def mixed(n, start, noises, variances, spread, count):
 
 
 def chain(n, dt):
-    """Each error drives the one before it: place, velocity, acceleration, ..."""
+    """Each error drives the one before it: position, velocity, acceleration, ..."""
     entries = []
     for i in range(n):
         term = 1.0
@@ -69,7 +69,7 @@ def one(n, i, value=1.0):
 
 
 def drift(n, dt, times, noise):
-    """A long drift, and precise fixes of the place after it, some way apart."""
+    """A long drift, followed by precise fixes of the position at intervals."""
     steps = [("start", *[10.0 ** -(2 * k) for k in range(n)])]
     for _ in range(times):
         steps += [chain(n, dt), ("add", 1e-6, *one(n, n - 1))]
@@ -80,7 +80,7 @@ def drift(n, dt, times, noise):
 
 
 def unknown_then_known(n, prior, noise):
-    """Nothing known, then all of it: a row for each error, and each again."""
+    """Nothing known, then everything: a row for each error, and each again."""
     rows = [row(n) for _ in range(n)]
     steps = [("start", *[prior] * n)]
     for h in rows + rows:
@@ -89,7 +89,7 @@ def unknown_then_known(n, prior, noise):
 
 
 def nearly_parallel(n, prior, noise, apart):
-    """Rows whose difference alone tells the errors from each other."""
+    """Rows of which only the difference separates the errors."""
     steps = [("start", *[prior] * n), ("measure", noise, *[1.0] * n), ("is",)]
     for i in range(n):
         h = [1.0 + (apart if k == i else 0.0) for k in range(n)]
@@ -98,7 +98,7 @@ def nearly_parallel(n, prior, noise, apart):
 
 
 def swinging(n):
-    """Noise of 1e-10 and 1e10 by turns, on errors of all sizes that a shear has tied together."""
+    """Noise of 1e-10 and 1e10 in turn, on errors of all sizes that a shear has coupled."""
     steps = [("start", *[10.0 ** (14 - 6 * k) for k in range(n)]), ("shear", *above(n, 1e3))]
     for k in range(3 * n):
         steps += [("measure", 1e-10 if k % 2 == 0 else 1e10, *row(n)), ("gain",)]
@@ -141,7 +141,7 @@ def column(values):
 
 
 def follow(n, steps):
-    """The steps, with what must come of them."""
+    """The steps with their expected results."""
     p, gain = None, None
     for kind, *inputs in steps:
         outputs = []

@@ -1,11 +1,13 @@
 # Reference values for hard rays in cross-sections, at 50 digits: python3 tests/oracles/geometry.py > tests/oracles/geometry.csv
 #
-#   case, shape, dimensions (3, m), origin y and z, direction y and z, the ray's parameter where it leaves, arc length there (m)
+# case, shape, dimensions (3, m), origin y and z, direction y and z, ray parameter at the wall, arc length there (m)
 #
 # Shapes by their definition (y left, z up, arc length from the floor's centre counter-clockwise with y to the right): rectangle
 # (width, height), circle (radius), arch (width, height, radius of the vault), trimmed_circle (radius, base). Every line and
-# circle is met by the plain formula, and the nearest meeting ahead is taken. Needs mpmath. Inputs are doubles and count as
-# exact; values are rounded to 25 digits.
+# circle is
+# intersected by the plain formula, and the nearest intersection ahead is used. Needs mpmath. Inputs are doubles and count as
+# exact;
+# values are rounded to 25 digits.
 
 from math import inf, nextafter
 
@@ -53,7 +55,7 @@ def cross(a, b):
 
 
 def leaves(shape, origin, direction):
-    """Parameter and arc length where the ray first meets the wall from inside."""
+    """Ray parameter and arc length of the ray's first intersection with the wall from inside."""
     y, z, v, w = map(mpf, (*origin, *direction))
     best, before, slack = None, mpf(0), mpf(10) ** -40
     for piece in pieces(*shape):
@@ -91,7 +93,7 @@ def leaves(shape, origin, direction):
 
 
 def walls(shape, count):
-    """Places on the wall with the normal that points inwards, as doubles."""
+    """Places on the wall with their inward normals, as doubles."""
     name, a, b, c = shape
     middle = {"circle": a, "trimmed_circle": sqrt(mpf(a) ** 2 - mpf(b) ** 2 / 4)}.get(name, mpf(b) / 2)
     for k in range(count):
@@ -130,14 +132,14 @@ for shape in SHAPES:
             ray = (out[0] * cos(turn) - out[1] * sin(turn), out[0] * sin(turn) + out[1] * cos(turn))
             tell("grazing" if "89" in degrees else "millimetre", shape, off, ray)
 
-# Through a corner, and as the direction's first component grows or shrinks by an ulp.
+# Through a corner, and with the direction's first component larger or smaller by an ulp.
 for corner in ((2.0, 0.0), (2.0, 3.0), (-2.0, 3.0), (-2.0, 0.0)):
     for origin in ((0.0, 1.5), (0.25, 1.0), (-1.75, 2.875)):
         ray = tuple(c - o for c, o in zip(corner, origin))
         for first in (ray[0], nextafter(ray[0], inf), nextafter(ray[0], -inf)):
             tell("corner", SHAPES[0], origin, (first, ray[1]))
 
-# Up along a wall that becomes the vault without a corner: the discriminant is 0, or a little above. Half a width is exact.
+# Up along a wall that merges into the vault without a corner: the discriminant is 0, or slightly above. Half a width is exact.
 for shape in (("arch", 6.0, 5.0, 3.0), ("arch", 2.2, 2.3, 1.1)):
     half = shape[1] / 2
     for ulps in (0, 1, 2, 7, 100, 10**6, 10**9):

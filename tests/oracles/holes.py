@@ -1,11 +1,13 @@
-# D of sections from places where beams met the wall, by Voronoi vertices and edges of scipy: python3 tests/oracles/holes.py
+# D of sections from true wall samples, by Voronoi vertices and edges of scipy: python3 tests/oracles/holes.py
 #
-# Reads tests/oracles/holes_truth.csv (chainage and arc length of places, m; its first line has the wall's perimeter) and prints the
-# table that tests/oracles/holes.csv is: of each section its bounds and D, m.
-# D of a section is twice the largest distance to the nearest place, over centres in the section; arc length is cyclic. The largest
-# lies at a vertex of the Voronoi diagram, or where one of its edges crosses an end of the section.
-# With --trim TRUTH.csv PERIMETER it prints the places of such a file instead, from what `headrace simulate --truth` writes.
-# Needs numpy and scipy.
+# Reads tests/oracles/holes_truth.csv (chainage and arc length of samples, m; the first line has the wall's perimeter). Prints
+# the
+# table stored as tests/oracles/holes.csv: bounds and D of each section, m.
+# D of a section is twice the largest distance to the nearest sample, over centres in the section; arc length is cyclic. The
+# maximum
+# lies at a vertex of the Voronoi diagram, or at the crossing of one of its edges with an end of the section. With --trim
+# TRUTH.csv PERIMETER
+# it prints the samples of a file written by `headrace simulate --truth` instead. Needs numpy and scipy.
 
 import csv
 import sys
@@ -16,7 +18,7 @@ SECTION = 0.25
 
 
 def trim(name, perimeter):
-    """The places of the heads' returns of a truth file."""
+    """The wall samples of a truth file."""
     print(f"# perimeter_m = {perimeter}")
     print("x_m,arc_m")
     with open(name) as file:
@@ -33,7 +35,7 @@ def places():
 
 
 def sections(found):
-    """Bounds of the sections that have places on both sides, well away from the ends."""
+    """Bounds of the sections with samples on both sides, well away from the ends."""
     xs = [x for x, _ in found]
     first, last = int((min(xs) + 1) / SECTION) + 1, int((max(xs) - 1) / SECTION)
     return [(k * SECTION, (k + 1) * SECTION) for k in range(first, last)]

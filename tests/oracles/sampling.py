@@ -2,8 +2,9 @@
 #
 # Source: Jorge et al., Sensors 2021, 21, 1900, equations as printed, on the definitions of frames and of the unrolled
 # wall (x ahead, y left, z up; alpha 0 down, growing to the left; sigma from the floor's centre via the left wall).
-# Needs mpmath. Angles in radians, lengths in metres. Inputs are doubles and count as exact, so a value's only error is
-# its rounding to 25 digits, or 1e-45 near 0; formulas are the plain ones, since 50 digits outlast the cancellations.
+# Needs mpmath. Angles in radians, lengths in metres. Inputs are doubles and count as exact, so a value's only error is its
+# rounding to
+# 25 digits, or 1e-45 near 0. Formulas are the plain ones, because 50 digits survive the cancellations.
 
 import random
 from itertools import product
@@ -13,7 +14,7 @@ from mpmath import asin, atan2, cos, floor, hypot, mp, mpf, nstr, pi, radians, s
 
 mp.dps = 50
 TURN = 2 * pi
-INPUTS = 8  # columns; Algorithm 1 takes the most
+INPUTS = 8  # columns; Algorithm 1 needs the most
 rng = random.Random(20210309)
 
 # Table 2: step in degrees, steps a turn, seconds a turn.
@@ -21,7 +22,7 @@ MODES = [(0.3, 1200, 21.6), (0.6, 600, 10.8), (0.9, 400, 8.0), (1.2, 300, 6.6), 
 
 
 def wrap(angle, period=TURN):
-    """Into [0, period)."""
+    """Wrap into [0, period)."""
     return angle - period * floor(angle / period)
 
 
@@ -34,7 +35,7 @@ def eq6(h, theta, m):
 
 
 def eq8(h, theta, m):
-    # The sum itself, not the h tan(m theta) / m that it telescopes to.
+    # The sum itself, not its closed form h tan(m theta) / m.
     return sum(eq6(h, theta, mpf(k)) for k in range(1, int(m) + 1)) / m
 
 
@@ -58,12 +59,12 @@ def algorithm1(k, s, t_turn, x, v, alpha0, growing, is_reversed):
     return wrap(TURN - alpha if is_reversed else alpha)
 
 
-# ---- Straight tunnels: where a beam meets the wall ----
+# ---- Straight tunnels: wall hits of beams ----
 
 RECTANGLE, CIRCLE, TRIMMED = 0, 1, 2
 HALF_WIDTH, HEIGHT = mpf(2), mpf(3)
 RADIUS = {CIRCLE: mpf(3), TRIMMED: mpf(6.05)}
-HALF_FLOOR = {CIRCLE: mpf(0), TRIMMED: mpf(10.4) / 2}  # a circle is one trimmed of nothing
+HALF_FLOOR = {CIRCLE: mpf(0), TRIMMED: mpf(10.4) / 2}  # a circle is a trimmed one without a floor
 CENTRE = {shape: sqrt(RADIUS[shape] ** 2 - HALF_FLOOR[shape] ** 2) for shape in RADIUS}
 FLOOR_ANGLE = {shape: asin(HALF_FLOOR[shape] / RADIUS[shape]) for shape in RADIUS}  # of the left corner, from below
 
@@ -88,7 +89,7 @@ def direction(yaw, pitch, alpha):
 
 
 def cast(shape, y, z, yaw, pitch, alpha):
-    """x, y, z and sigma of the hit. The sections are convex: of all walls that the beam nears, the first is hit."""
+    """x, y, z and sigma of the hit. The sections are convex, so the first wall ahead is the one that is hit."""
     assert inside(shape, y, z)
     dx, dy, dz = direction(yaw, pitch, alpha)
     walls = []  # distance, and sigma of a point on that wall
@@ -116,7 +117,7 @@ def cast(shape, y, z, yaw, pitch, alpha):
 
 
 def step(shape, y, z, yaw, pitch, alpha, theta):
-    """Between the hits at alpha and alpha + theta, on the unrolled wall."""
+    """Distance between the hits at alpha and alpha + theta, on the unrolled wall."""
     here, there = cast(shape, y, z, yaw, pitch, alpha), cast(shape, y, z, yaw, pitch, alpha + theta)
     around = abs(there[3] - here[3])
     return hypot(there[0] - here[0], min(around, perimeter(shape) - around))
@@ -130,15 +131,15 @@ def rad(degrees):
 
 
 def span(low, high):
-    """Of any magnitude between the two: lengths and speeds here differ by factors, not by amounts."""
-    return float(low * (mpf(high) / low) ** rng.random())  # mp, since powers of doubles differ between machines
+    """Log-uniform between low and high: lengths and speeds differ by factors, not by amounts."""
+    return float(low * (mpf(high) / low) ** rng.random())  # mp, because powers of doubles differ between machines
 
 
 STEPS = [rad(mode[0]) for mode in MODES]
 LAPS = [mode[2] for mode in MODES]
 BEAMS = [rad(2.4), rad(1.4)]
 SPEEDS = [1e-9, 1e-6, 1e-3, 0.05, 0.197, 0.5, 1.0, 3.0]
-NEAR_RIGHT_ANGLE = [1e-6, 1e-9, 5e-10, 1e-12]  # what is left to 90 degrees
+NEAR_RIGHT_ANGLE = [1e-6, 1e-9, 5e-10, 1e-12]  # remainder to 90 degrees
 HEIGHTS = [1e-3, 0.5, 1.5, 3.0, 3.092, 10.0]
 
 
@@ -151,7 +152,7 @@ def height():
 
 
 def legs(*first):
-    """Travel d and spacing ty, d often small, next to nothing or nothing; before them what an equation takes first."""
+    """Travel d and spacing ty, with d often small, tiny or zero; `before` holds the equation's first arguments."""
     travels = [span(1e-6, 0.1) for _ in range(20)] + [0.0, 0.0, 1e-11, 1e-11, 0.3, 3.0]
     return [(*(draw() for draw in first), d, span(1e-3, 3.0)) for d in travels]
 
@@ -175,7 +176,7 @@ def eq6_inputs():
         last = next(m for m in range(steps // 4, 0, -1) if m * 360 < steps * 90)
         for m in (1, 2, last // 2, last - 1, last):
             yield height(), theta, m
-    for m in (1, 2, 7, 64, 300):  # exact products m theta among them (powers of 2), and inexact ones
+    for m in (1, 2, 7, 64, 300):  # some products m theta are exact (powers of 2), some aren't
         yield height(), float(radians(mpf("89.99")) / m), m
         for left in NEAR_RIGHT_ANGLE:
             yield height(), float((pi / 2 - left) / m), m
@@ -214,7 +215,7 @@ def phase_inputs():
         yield float(TURN * rng.randrange(s) / s), float(TURN / rng.choice(LAPS)), x, v
     for s, lap in zip((2, 3, 4, 5, 6), LAPS):
         omega = float(TURN / lap)
-        # Heads a whole turn's travel apart, and so far apart that nothing remains of the shift.
+        # Heads a whole turn's travel apart, and so far apart that rounding absorbs the shift.
         yield float(TURN / s), omega, 0.197 * lap, 0.197
         yield float(TURN / s), omega, 0.197 * lap / s, 0.197
         yield float(TURN / s), -omega, 1.102, 0.197
@@ -247,17 +248,17 @@ def algorithm1_inputs():
         alpha0 = float(TURN / s * rng.random())
         yield k, s, rng.choice(LAPS), x, v, alpha0, rng.choice((1, -1)), number % 3 == 0
     for s in range(2, 7):
-        # Where the wave turns: at the sector's start, coming and going, and at its end.
+        # Turning points of the wave: at the sector's start, before and after, and at its end.
         end = float(TURN / s)
         yield 1, s, 8.0, 0.0, 0.197, 0.0, 1, 0
         yield 1, s, 8.0, 0.0, 0.197, 0.0, -1, 0
         yield s - 1, s, 8.0, 0.0, 0.197, end, 1, 0
         yield s - 1, s, 8.0, 0.0, 0.197, end, -1, 1
-        # The delay a hair beyond the start: t is just below 0, and Ts when rounded.
+        # A delay slightly beyond the start: t is just below 0, and Ts when rounded.
         yield s - 1, s, 10.8, 1e-18, 1.0, 0.0, 1, 0
 
 
-BOXES = {RECTANGLE: (1.9, 0.1, 2.9), CIRCLE: (1.9, 1.0, 5.0), TRIMMED: (3.5, 0.2, 7.0)}  # well inside: |y|, z from, to
+BOXES = {RECTANGLE: (1.9, 0.1, 2.9), CIRCLE: (1.9, 1.0, 5.0), TRIMMED: (3.5, 0.2, 7.0)}  # well inside: |y|, and z from, to
 
 
 def off_wall(shape, angle, gap):
@@ -267,7 +268,7 @@ def off_wall(shape, angle, gap):
 
 
 def towards(head, yaw, pitch, point):
-    """The alpha whose beam passes a point of the section: dy / dz of `direction` solved for it."""
+    """The alpha whose beam passes through a point of the section: dy / dz of `direction` solved for it."""
     ahead, up = mpf(point[0]) - head[0], mpf(point[1]) - head[1]
     across = ahead * cos(pitch) - up * sin(pitch) * sin(yaw)
     return atan2(across, -up * cos(yaw))
@@ -286,7 +287,7 @@ def rays():
             tilt = float(radians(rng.uniform(-30, 30))), float(radians(rng.uniform(-20, 20)))
             yield shape, rng.uniform(-y, y), rng.uniform(low, high), *tilt, rng.uniform(0, float(TURN))
         yield shape, 0.5, 2.0, rad(30), rad(-20), rad(77)
-        # sigma's seam: on it and to either side.
+        # On the seam of sigma and to either side.
         for alpha in (0.0, -1e-12, 1e-12, float(TURN)):
             yield shape, 0.0, 1.5, 0.0, 0.0, alpha
     # 1 mm off a wall, looking at it, away from it and along it.
@@ -299,7 +300,7 @@ def rays():
         yield shape, *head, 0.0, 0.0, angle
         yield shape, *head, 0.2, -0.1, angle + float(pi / 2)
     yield TRIMMED, 5.198, 0.001, 0.1, 0.1, rad(269.9)
-    # 89.99 degrees and more off the normal of the wall that is hit: a section this small needs the head nearer still.
+    # 89.99 degrees and more off the normal of the wall that is hit: in a section this small, only with the head even nearer.
     yield RECTANGLE, 0.2, 1e-4, 0.0, 0.0, rad(89.99)
     yield RECTANGLE, 1.9999, 1.0, 0.0, 0.0, rad(0.01)
     yield RECTANGLE, -1.9999, 1.0, 0.3, 0.0, rad(180.01)
@@ -320,7 +321,7 @@ def step_inputs():
         tilt = float(radians(rng.uniform(-30, 30))), float(radians(rng.uniform(-20, 20)))
         yield shape, rng.uniform(-y, y), rng.uniform(low, high), *tilt, rng.uniform(0, float(TURN)), theta
     for shape, theta in product(BOXES, (rad(2.4), rad(-2.4), 1e-9)):
-        yield shape, 0.1, 1.4, 0.0, 0.0, -theta / 3 - float(atan2(mpf(0.1), mpf(1.4))), theta  # over the seam
+        yield shape, 0.1, 1.4, 0.0, 0.0, -theta / 3 - float(atan2(mpf(0.1), mpf(1.4))), theta  # across the seam
     left = float(HALF_FLOOR[TRIMMED])
     for shape, head, yaw, pitch, corner in (
         (RECTANGLE, (0.0, 1.5), 0.0, 0.0, (-2.0, 0.0)),
@@ -330,7 +331,7 @@ def step_inputs():
     ):
         for theta in (rad(0.3), rad(2.4)):
             yield shape, *head, yaw, pitch, float(towards(head, yaw, pitch, corner)) - theta / 3, theta
-    yield RECTANGLE, 1.999, 1.5, 0.0, 0.0, rad(88), rad(2.4)  # 1 mm off the wall that is swept
+    yield RECTANGLE, 1.999, 1.5, 0.0, 0.0, rad(88), rad(2.4)  # 1 mm off the wall under the beam
     yield RECTANGLE, 0.0, 0.001, 0.0, 0.1, rad(88), rad(0.3)
     yield CIRCLE, *off_wall(CIRCLE, 2.0, 1e-3), 0.0, 0.0, 2.0 + rad(88), rad(1.2)
     yield TRIMMED, *off_wall(TRIMMED, 3.0, 1e-3), 0.1, 0.1, 3.0, rad(2.4)

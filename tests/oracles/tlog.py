@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""What a log of MAVLink telemetry holds, for tests/tests/import/recordings.rs: python3 tests/oracles/tlog.py FILE
+"""Content of a MAVLink telemetry log, for tests/tests/import/recordings.rs: python3 tests/oracles/tlog.py FILE
 
 Written from MAVLink's definitions, without any code of ours: frames, and of the autopilot's ATTITUDE, RAW_IMU,
 SCALED_PRESSURE and SCALED_PRESSURE2 the counts and ranges, in the units and senses of the wire.
@@ -10,7 +10,7 @@ import math
 import struct
 import sys
 
-# Number, byte that a definition adds to its checksum, layout on the wire.
+# Message number, extra byte of the checksum, layout on the wire.
 MESSAGES = {
     "ATTITUDE": (30, 39, "<Iffffff"),
     "RAW_IMU": (27, 144, "<Qhhhhhhhhh"),
@@ -20,7 +20,7 @@ MESSAGES = {
 
 
 def checksum(content, crc=0xFFFF):
-    """CRC-16/MCRF4XX, bit by bit; of what follows where crc is that of what was before."""
+    """CRC-16/MCRF4XX, bit by bit; `crc` continues an earlier checksum."""
     for byte in content:
         crc ^= byte
         for _ in range(8):
@@ -29,7 +29,7 @@ def checksum(content, crc=0xFFFF):
 
 
 def frames(log):
-    """System, component, message, payload, what the checksum is over, and the checksum; of each frame in turn."""
+    """For each frame: system, component, message, payload, bytes under the checksum, and the checksum."""
     at = 0
     while at < len(log):
         at += 8
@@ -47,7 +47,7 @@ def main():
     with open(sys.argv[1], "rb") as file:
         found = list(frames(file.read()))
     print(f"frames {len(found)}")
-    # Without all definitions: the added byte that fits a frame must be one, and the same in all frames of its number.
+    # Definitions may be missing: then one extra byte must match all frames of the message number.
     fits = collections.defaultdict(list)
     for _, component, number, _, content, crc in found:
         before = checksum(content)

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Trims recordings of others to the fixtures in this folder: python3 tests/recordings/make.py FOLDER
+"""Trims recordings made by others to the fixtures in this folder: python3 tests/recordings/make.py FOLDER
 
 FOLDER holds the recordings at full length with their licences, each in a folder named as here; the README there says
 where they are from. The Ping360 frames are made up by this script.
@@ -15,24 +15,24 @@ HERE = pathlib.Path(__file__).resolve().parent
 
 
 def bluerov2(full):
-    """The first 40 s: whole messages, unchanged, and with them all messages of the camera that nobody defines."""
+    """Keep the first 40 s as unchanged whole messages, and all camera messages with unknown definitions."""
     log = (full / "small.tlog").read_bytes()
     first_us, end = struct.unpack_from(">Q", log)[0], 0
     while struct.unpack_from(">Q", log, end)[0] - first_us < 40_000_000:
-        # A time, then a frame of MAVLink 1 or 2, the latter perhaps with a signature.
+        # A time, then a MAVLink 1 or 2 frame, the latter possibly signed.
         version, payload, flags = log[end + 8 : end + 11]
         end += 8 + payload + (8 if version == 0xFE else 12 + 13 * (flags & 1))
     return {"small.tlog": log[:end]}
 
 
 def imagenex852(full):
-    """The first shots, unchanged: 640 bytes each."""
+    """Keep the first shots unchanged, 640 bytes each."""
     shots = {"19_26_51-2016_11_18-sonar.852": 300, "hydroball.852": 50}
     return {name: (full / name).read_bytes()[: 640 * count] for name, count in shots.items()}
 
 
 def broad(full):
-    """The first 105 s, 35.5 of them at rest, and of the columns those that the test takes; numbers unchanged."""
+    """Keep the first 105 s (35.5 s of them at rest) and the columns that the test uses; numbers are unchanged."""
     name = "derived_12_undisturbed_slow_translation_C_95Hz.csv.gz"
     rows = [line.split(",") for line in gzip.decompress((full / name).read_bytes()).decode().splitlines()]
     columns = [rows[0].index(column) for column in "gx gy gz ax ay az qw qx qy qz movement".split()]
@@ -41,11 +41,11 @@ def broad(full):
 
 
 def ping360():
-    """Frames of message 2300 (device 2, 14 bytes of settings, 1200 strengths) such as a Ping360 sends turning."""
+    """Make frames of message 2300 (device 2, 14 bytes of settings, 1200 strengths) as a rotating Ping360 sends them."""
     frames = b""
     for number in range(20):
         settings = struct.pack("<BBHHHHHH", 1, 1, number * 20, 20, 888, 740, 1200, 1200)
-        # The echo of something near the transducer, one of something far, noise; and what could begin a frame.
+        # An echo near the transducer, a far one, noise, and bytes that could begin a frame.
         echo = bytearray((number * 37 + at * at * 11) % 23 for at in range(1200))
         echo[:60] = bytes(255 - 4 * at for at in range(60))
         echo[500 + number : 520 + number] = bytes(range(100, 200, 5))

@@ -26,12 +26,12 @@ MS = 1_000_000
 
 
 def single(value):
-    """As single precision has it."""
+    """Rounded to single precision."""
     return struct.unpack("<f", struct.pack("<f", value))[0]
 
 
 def values():
-    """What the sensors say, by name and time: a slow roll, a head that turns, a cable that is paid out."""
+    """Values of the sensors by name and time: a slow roll, a rotating head, a cable that is paid out."""
     for i in range(60):
         at = FIRST_NS + i * 50 * MS
         angles = (0.02 * math.sin(i / 7), 0.015 * math.cos(i / 9), 0.3 + 0.002 * i)
@@ -40,7 +40,7 @@ def values():
         if i % 2 == 0:
             yield at + 7 * MS, "depth", (151_325.0 + 50 * i,)
             yield at + 9 * MS, "tether", (3 + 0.01 * i,)
-        # Every fifth hears nothing.
+        # Every fifth has no return.
         yield at + 11 * MS, "ping_left", (None if i % 5 == 4 else single(2.5 + 0.01 * i),)
 
 
@@ -128,7 +128,7 @@ def messages(store, ros1, stamped=lambda ns: ns):
             ranges=numpy.array(ranges, dtype=numpy.float32), intensities=numpy.zeros(0, dtype=numpy.float32),
         )
         found.append((rows[-1][2], "/sonar/scan", kind, message))
-        # The same as a cloud, in the head's own frame; what heard nothing has no place.
+        # The same as a cloud in the head's own frame; beams without a return have no point.
         kind = "sensor_msgs/msg/PointCloud2"
         field = types["sensor_msgs/msg/PointField"]
         points = b"".join(
@@ -147,7 +147,7 @@ def messages(store, ros1, stamped=lambda ns: ns):
             data=numpy.frombuffer(points, dtype=numpy.uint8), is_dense=False,
         )
         found.append((rows[-1][2], "/sonar/points", kind, message))
-    # A topic that nobody wants.
+    # An unused topic.
     found.append((FIRST_NS + 500 * MS, "/chatter", "std_msgs/msg/String", types["std_msgs/msg/String"](data="hello")))
     return sorted(found, key=lambda row: row[0])
 
@@ -159,7 +159,7 @@ def bag(path, compression=None, **further):
     if compression:
         writer.set_compression(compression)
     with writer:
-        # Small chunks, so that there are several.
+        # Small chunks, to get several.
         writer.chunk_threshold = 8192
         connections = {}
         for at, topic, kind, message in messages(store, True, **further):
@@ -182,7 +182,7 @@ def recording(path, release, **further):
 
 
 def tables():
-    """Times are in seconds, to the nanosecond; sensors that say nothing in a row have empty cells."""
+    """Times are in seconds, to the nanosecond; cells of sensors without a value in a row are empty."""
 
     def time(ns):
         return f"{ns // 10**9}.{ns % 10**9:09}"
@@ -190,7 +190,7 @@ def tables():
     columns = {"imu": 9, "depth": 1, "tether": 1, "ping_left": 1}
     lines = ["t,roll,pitch,yaw,p,q,r,ax,ay,az,depth,tether,left"]
     for at, name, row in values():
-        # A table can't say that an echosounder heard nothing.
+        # A table can't state that an echosounder had no return.
         if row == (None,):
             continue
         cells = [repr(v) if n == name else "" for n, size in columns.items() for v in (row if n == name else [0] * size)]
@@ -207,6 +207,6 @@ if __name__ == "__main__":
         bag(HERE / f"{name}.bag", compression)
     recording(HERE / "humble.mcap", Stores.ROS2_HUMBLE)
     recording(HERE / "jazzy.mcap", Stores.ROS2_JAZZY)
-    # Its computer counts from when it was switched on, 20 s before.
+    # Its computer's clock starts when it was switched on, 20 s before.
     recording(HERE / "boot_time.mcap", Stores.ROS2_HUMBLE, stamped=lambda ns: ns - FIRST_NS + 20 * 10**9)
     tables()

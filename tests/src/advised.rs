@@ -1,4 +1,4 @@
-//! Dives whose advice is read beat by beat, as a pilot sees it, and followed.
+//! Dives whose advice is recorded at each update, as a pilot sees it, and followed.
 
 use headrace_geometry::time::DurNs;
 use headrace_monitor::App;
@@ -12,7 +12,7 @@ use headrace_sensor::device::Direction;
 use headrace_sensor::reading::SourceId;
 use headrace_simulator::{Scene, Simulation};
 
-/// A simulated dive one of whose sources may be dumb.
+/// A simulated dive in which one source may stay silent.
 struct Partly {
     simulation: Simulation,
     dumb: Option<usize>,
@@ -40,9 +40,9 @@ impl PacketSource for Partly {
     }
 }
 
-/// What was advised at each beat, and what came of the dive.
+/// Advice at each update, and the result of the dive.
 pub struct Advised {
-    /// Advice at each beat.
+    /// Advice at each update.
     pub beats: Vec<AdviceEntry>,
     /// Report of the dive.
     pub report: Report,
@@ -50,7 +50,7 @@ pub struct Advised {
     pub digest: u64,
 }
 
-/// Dives a scene in ticks of a length; the source of this id says nothing.
+/// Simulates and replays a scene with this tick length; the source with the id `dumb` sends nothing.
 pub fn dive(scene: &Scene, dumb: Option<&str>, tick: DurNs) -> Advised {
     let vehicle = &scene.vehicle;
     let mut app = App::new(vehicle.mission());
@@ -74,12 +74,12 @@ pub fn dive(scene: &Scene, dumb: Option<&str>, tick: DurNs) -> Advised {
 }
 
 impl Advised {
-    /// The beats of the second half of the dive.
+    /// Updates in the second half of the dive.
     pub fn settled(&self) -> &[AdviceEntry] {
         &self.beats[self.beats.len() / 2..]
     }
 
-    /// The median of a figure over the second half of the dive.
+    /// Median of a value over the second half of the dive.
     pub fn median(&self, of: impl Fn(&AdviceEntry) -> f64) -> f64 {
         let mut values: Vec<f64> = self.settled().iter().map(of).collect();
         values.sort_by(f64::total_cmp);

@@ -1,6 +1,6 @@
-//! What a log says was dropped before the loop could take it.
+//! Separates drops before the loop from a log's other losses.
 
-/// A log's losses as two: how many packets lines dropped, and the other losses.
+/// Splits a log's losses into the number of packets dropped by lines, and all others.
 pub(crate) fn apart(losses: &[String]) -> (u64, Vec<&String>) {
     let (dropped, others): (Vec<&String>, Vec<&String>) =
         losses.iter().partition(|loss| loss.contains(" dropped before the program took them"));

@@ -1,4 +1,4 @@
-//! Emulated devices on real ports, and faults of their lines.
+//! Emulated devices on real ports, with faults of their lines.
 
 use std::net::{IpAddr, Ipv4Addr};
 use std::os::unix::fs::symlink;
@@ -19,20 +19,20 @@ const LOCAL: IpAddr = IpAddr::V4(Ipv4Addr::LOCALHOST);
 const WAIT_NS: u32 = 1_000_000;
 const BAUD: u32 = 115_200;
 
-/// What becomes of what crosses a line.
+/// A fault of a line: it changes the data that cross the line.
 pub trait Fault: Send {
-    /// A frame of the device, the `number`th.
+    /// Sends a frame of the device, the `number`th, to the host.
     fn to_host(&mut self, number: u64, frame: &[u8], line: &mut Wire) {
         let _ = number;
         line.whole(frame);
     }
 
-    /// Bytes of the host, and what of them the device hears.
+    /// Takes bytes from the host and returns those that reach the device.
     fn to_device(&mut self, bytes: Vec<u8>) -> Vec<u8> {
         bytes
     }
 
-    /// Called all the time.
+    /// Runs between frames, in every cycle.
     fn meanwhile(&mut self, line: &mut Wire) {
         let _ = line;
     }
@@ -46,15 +46,15 @@ impl Fault for Healthy {}
 /// A device's end that can be unplugged and plugged in again where it was.
 pub struct End {
     connect: Connect,
-    /// Of a serial port: the stable name of whatever the system calls it.
+    /// For a serial port: its stable name, which links to the system's name.
     link: Option<PathBuf>,
     stand: Option<EmulatedPort>,
-    /// Whether it is on the line of the sensor before it.
+    /// Whether it shares the line of the sensor before it.
     beside: bool,
 }
 
 impl End {
-    /// A serial port with a name in `folder` that stays, as udev's links by identity do.
+    /// A serial port with a stable name in `folder`, as udev's links by identity.
     pub fn serial(folder: &std::path::Path, name: &str) -> Self {
         let link = folder.join(name);
         let port = SerialPort::Path(link.display().to_string());
@@ -83,22 +83,22 @@ impl End {
         Self { connect: stand.connect().clone(), link: None, stand: Some(stand), beside: false }
     }
 
-    /// On the same line as the sensor before, whose end this is.
+    /// The line of the sensor before, whose end is `other`.
     pub fn beside(other: &Self) -> Self {
         Self { connect: other.connect.clone(), link: None, stand: None, beside: true }
     }
 
-    /// True if it shares the line of the sensor before it.
+    /// Whether it shares the line of the sensor before it.
     pub fn is_beside(&self) -> bool {
         self.beside
     }
 
-    /// True of a serial port.
+    /// Whether it is a serial port.
     pub fn is_pseudoterminal(&self) -> bool {
         self.link.is_some()
     }
 
-    /// The same, not plugged in yet.
+    /// The same end, not plugged in yet.
     #[must_use]
     pub fn absent(mut self) -> Self {
         self.unplug();
@@ -129,12 +129,12 @@ impl End {
     }
 }
 
-/// What a test says to a device, and hears of it.
+/// Controls of a device under test, and its counters.
 #[derive(Default)]
 pub struct Control {
     unplugged: AtomicBool,
     silent: AtomicBool,
-    /// It has fallen silent.
+    /// Whether it is silent.
     quiet: AtomicBool,
     gone: AtomicBool,
     healed: AtomicBool,
@@ -142,7 +142,7 @@ pub struct Control {
 }
 
 impl Control {
-    /// Unplugs the device as soon as it has been asked something.
+    /// Unplugs the device at its next request.
     pub fn unplug(&self) {
         self.unplugged.store(true, Ordering::SeqCst);
     }
@@ -152,7 +152,7 @@ impl Control {
         self.unplugged.store(false, Ordering::SeqCst);
     }
 
-    /// From now on the device says nothing.
+    /// Makes the device silent from now on.
     pub fn fall_silent(&self) {
         self.silent.store(true, Ordering::SeqCst);
         while !self.quiet.load(Ordering::SeqCst) {
@@ -160,18 +160,18 @@ impl Control {
         }
     }
 
-    /// It speaks again.
+    /// Ends the silence.
     pub fn speak(&self) {
         self.quiet.store(false, Ordering::SeqCst);
         self.silent.store(false, Ordering::SeqCst);
     }
 
-    /// From now on its line is sound.
+    /// Ends the fault of its line.
     pub fn heal(&self) {
         self.healed.store(true, Ordering::SeqCst);
     }
 
-    /// Frames that it has sent whole.
+    /// Number of frames sent whole.
     pub fn whole(&self) -> u64 {
         self.whole.load(Ordering::SeqCst)
     }
@@ -191,25 +191,25 @@ impl Wire {
         self.control.whole.fetch_add(u64::from(called), Ordering::SeqCst);
     }
 
-    /// Sends what is no whole frame.
+    /// Sends bytes that aren't a whole frame.
     pub fn part(&mut self, bytes: &[u8]) {
         if let Some(stand) = &mut self.end.stand {
             stand.write(bytes).unwrap();
         }
     }
 
-    /// Counts frames that were sent whole in other ways.
+    /// Counts frames that were sent whole by other means.
     pub fn count(&self, frames: u64) {
         self.control.whole.fetch_add(frames, Ordering::SeqCst);
     }
 
-    /// Lets time pass.
+    /// Waits.
     pub fn pause(ms: u64) {
         thread::sleep(Duration::from_millis(ms));
     }
 }
 
-/// A device on a line that may fail, in a thread of its own.
+/// A device on a line that may fail, in its own thread.
 pub struct Faulty {
     control: Arc<Control>,
     thread: Option<JoinHandle<()>>,
@@ -268,7 +268,7 @@ impl Life {
         }
     }
 
-    /// What the host says goes to the device, and what the device says by now onto the line.
+    /// Passes the host's bytes to the device, and the device's bytes onto the line.
     fn serve(&mut self, silent: bool, unplugging: bool) {
         if let Some(stand) = &self.wire.end.stand {
             wait_for_any(std::slice::from_ref(stand), WAIT_NS);
@@ -285,7 +285,7 @@ impl Life {
         self.step(None);
         let out = std::mem::take(&mut self.out);
         if unplugging && asked {
-            // Since the host has asked again, it has read all earlier answers; of this one it gets half.
+            // A new request shows that the host has read all earlier answers. It gets half of this one.
             if let Some(frame) = out.first() {
                 self.wire.part(&frame[..frame.len() / 2]);
             }
@@ -316,7 +316,7 @@ impl Life {
     }
 }
 
-/// Lets a device hear and measure, always the same.
+/// Lets a device receive and measure, always the same values.
 fn feel(device: &mut Emulated, heard: Option<&[u8]>, now: MonoNs, out: &mut Vec<Vec<u8>>) {
     match device {
         Emulated::Head(device) | Emulated::Echosounder(device) => {
@@ -333,7 +333,7 @@ fn feel(device: &mut Emulated, heard: Option<&[u8]>, now: MonoNs, out: &mut Vec<
     }
 }
 
-/// Lets a device hear, and measure what `feel` fills in.
+/// Lets a device receive, and measure the values that `feel` fills in.
 pub(crate) fn step<M: Measurement>(
     device: &mut dyn Emulator<M>,
     heard: Option<&[u8]>,

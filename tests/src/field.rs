@@ -1,4 +1,4 @@
-//! The field scene with settings that suit it, and figures of how well dives are tracked.
+//! The field scene with suitable settings, and error figures of its trajectory.
 
 use headrace_fusion::Fix;
 use headrace_geometry::frames::{Tunnel, Vec3};
@@ -10,7 +10,7 @@ use nalgebra::{SMatrix, SVector};
 use crate::scenes;
 use crate::tracking::{self, Track};
 
-/// A turn of a head in mode SLOW.
+/// Time of a head's turn in mode SLOW, s.
 pub const TURN_S: f64 = 21.6;
 
 /// Root mean squares of a dive's errors.
@@ -24,7 +24,7 @@ pub struct Figures {
     pub along_m: f64,
     /// Displacement over a turn of a head, m.
     pub turn_m: f64,
-    /// Standard deviation that was given for that displacement, m.
+    /// Reported standard deviation of that displacement, m.
     pub turn_arc_m: f64,
     /// Heading, degrees.
     pub yaw_deg: f64,
@@ -34,7 +34,7 @@ pub struct Figures {
     pub fixed: f64,
 }
 
-/// Root mean square; 0 of nothing.
+/// Root mean square; 0 without values.
 pub fn rms(values: impl IntoIterator<Item = f64>) -> f64 {
     let (mut n, mut sum) = (0.0, 0.0);
     for value in values {
@@ -65,7 +65,7 @@ pub fn figures(track: &Track) -> Figures {
     }
 }
 
-/// Error of the displacement over a turn, and the standard deviation that was given.
+/// Errors of the displacement over a turn, with their reported standard deviations.
 pub fn turns(known: &[(MonoNs, Fix, f64)]) -> Vec<(f64, f64)> {
     let mut before = 0;
     let mut turns = Vec::new();
@@ -82,8 +82,9 @@ pub fn turns(known: &[(MonoNs, Fix, f64)]) -> Vec<(f64, f64)> {
     turns
 }
 
-/// What the field scene does to the sensors: rays instead of cones for the echosounders, rounding of cable and depth as
-/// noise.
+/// Settings that match the field scene's sensor effects.
+///
+/// These are rays instead of cones for the echosounders, and rounding of cable and depth as noise.
 pub const SETTINGS: &str = "[navigation]
 gyro_noise_degps_rthz = 0.007
 accel_noise_mps2_rthz = 0.001
@@ -105,12 +106,12 @@ return_sd_m = 0.011
 
 [heads]";
 
-/// The field scene over so many metres.
+/// The field scene with this length.
 pub fn field(seed: u64, length_m: f64) -> Scene {
     field_with(seed, length_m, SETTINGS, "")
 }
 
-/// The same with other settings, and without a line of it.
+/// The field scene with other settings, and with the line `without` removed.
 pub fn field_with(seed: u64, length_m: f64, settings: &str, without: &str) -> Scene {
     let scene = include_str!("../../deploy/scenes/vita1-field.toml");
     let length = format!("distance_m = {length_m}");
@@ -120,7 +121,7 @@ pub fn field_with(seed: u64, length_m: f64, settings: &str, without: &str) -> Sc
     assert!(shorter.contains(&length) && planned != scene && scene.contains(without));
     let load = |name: &str| {
         let text = String::from_utf8(scenes::vehicle_file(name)?).map_err(|error| error.to_string())?;
-        // Settings stand in the place of the vehicle's own.
+        // Settings replace the vehicle's own.
         let own = text.find("[navigation]").filter(|_| settings.starts_with("[navigation]"));
         let (before, heads) = text.split_at(text.find("[heads]").ok_or("no heads")?);
         let before = own.map_or(before, |from| &before[..from]);
@@ -139,7 +140,7 @@ pub fn nees(epoch: &tracking::Epoch) -> f64 {
     error.dot(&covariance.cholesky().unwrap().solve(&error))
 }
 
-/// Share of values that are true, 0 to 1; 0 of nothing.
+/// Share of true values, 0 to 1; 0 without values.
 pub fn share(of: impl Iterator<Item = bool>) -> f64 {
     let (mut n, mut yes) = (0.0, 0.0);
     for is in of {

@@ -1,8 +1,9 @@
-//! When a fail can no longer be undone by going on forward: from the poses of a dive and all its samples.
+//! Finds when a failed section can no longer be recovered by going on forward, from the poses and samples of a dive.
 //!
-//! A place fails for good at the first moment at which a circle about it, larger than the target by what position errors
-//! may make of it, is empty, and no head that goes on forward can lay a sample into it: all that any head reaches lies
-//! beyond the circle. A head's reach is what rays in its plane meet at its present attitude.
+//! A place fails for good when two things hold for the first time. A circle about it is empty that is larger than the
+//! target plus an allowance for position errors. And no head that goes on forward can lay a sample into that circle:
+//! everything in reach lies beyond it. A head's reach is the wall that rays in its plane meet at its present
+//! attitude.
 
 use std::ops::Range;
 
@@ -14,35 +15,35 @@ use headrace_monitor::report::SectionReport;
 use crate::instrumented::{Dive, Ping};
 use headrace_oracle::wall::Wall;
 
-/// Poses are looked at so often.
+/// Interval at which poses are evaluated.
 pub const EVERY: DurNs = DurNs(100_000_000);
-/// Rays round a head.
+/// Number of rays round a head.
 const RAYS: u32 = 48;
-/// Parts of a section in which its earliest fail is looked for.
+/// Number of parts of a section that are searched for the earliest fail.
 pub const PARTS: u32 = 16;
-/// The program looks where all heads have been five times a second, and goes by the farthest wall for a tilted head's
-/// reach: its place is known to this, m.
+/// Tolerance of the chainage that all heads have passed, m. The program checks it five times a second, and takes the
+/// farthest wall for the reach of a tilted head.
 pub const NEAR_M: f64 = 0.12;
-/// Shorter ways back are wobbling.
+/// Shorter backward motion counts as wobbling, m.
 const WAY_BACK_M: f64 = 0.05;
 
-/// What heads reach at a moment, and whether the vehicle goes forward.
+/// Reach of the heads at a moment.
 #[derive(Debug, Clone, Copy)]
 pub struct Reached {
-    /// When.
+    /// Time.
     pub at: MonoNs,
-    /// The least chainage on which a head can lay a sample, m.
+    /// Least chainage at which a head can lay a sample, m.
     pub rear_m: f64,
-    /// The greatest, m.
+    /// Greatest chainage at which a head can lay a sample, m.
     pub front_m: f64,
 }
 
-/// What was within reach during a dive.
+/// Reach of the heads during a dive.
 pub fn reached(dive: &Dive) -> Vec<Reached> {
     let mut all: Vec<Reached> = Vec::new();
     for (index, ping) in dive.pings.iter().enumerate() {
         let due = all.last().is_none_or(|last| ping.received.since(last.at).0 >= EVERY.0);
-        // The last one too: it is where the dive ends.
+        // The last ping counts too, because the dive ends there.
         let due = due || index + 1 == dive.pings.len();
         if let Some(pose) = ping.pose.filter(|_| due) {
             let [rear_m, front_m] = ends_m(dive, &pose);
@@ -52,7 +53,7 @@ pub fn reached(dive: &Dive) -> Vec<Reached> {
     all
 }
 
-/// From where on all heads have been, wherever they were at first, m.
+/// Chainage from which on all heads have passed, wherever they started, m.
 pub fn all_passed_from_m(reached: &[Reached]) -> f64 {
     reached.iter().map(|reached| reached.front_m).fold(f64::INFINITY, f64::min)
 }
@@ -74,8 +75,8 @@ fn ends_m(dive: &Dive, pose: &Pose) -> [f64; 2] {
     [rear_m, front_m]
 }
 
-/// The least chainage in a section about which a circle of this radius is empty and lies where all heads have been, from
-/// `passed_m` on; to a part of the section in [`PARTS`], and never too small.
+/// Least chainage in a section about which a circle of this radius is empty and lies beyond `passed_m`. The
+/// resolution is a part of the section ([`PARTS`]); the result is never too small.
 pub fn first_failing_m(wall: &Wall, [from_m, to_m]: [f64; 2], radius_m: f64, passed_m: f64) -> Option<f64> {
     let from_m = from_m.max(passed_m + radius_m);
     if from_m >= to_m { None } else { first_in_m(wall, [from_m, to_m], radius_m, PARTS) }
@@ -91,57 +92,57 @@ fn first_in_m(wall: &Wall, [from_m, to_m]: [f64; 2], radius_m: f64, parts: u32) 
     half([from_m, middle_m]).or_else(|| half([middle_m, to_m]))
 }
 
-/// The first moment, among these, at which all that is in reach lies beyond a chainage.
+/// First moment at which everything in reach lies beyond a chainage.
 pub fn left_behind(reached: &[Reached], chainage_m: f64) -> Option<MonoNs> {
     reached.iter().find(|reached| reached.rear_m >= chainage_m).map(|reached| reached.at)
 }
 
-/// The wall as sampled until a moment.
+/// The wall as sampled up to a moment.
 pub fn wall_until(dive: &Dive, until: MonoNs) -> Wall {
     let before = |ping: &&Ping| ping.received <= until;
     let samples = dive.pings.iter().filter(before).filter_map(|ping| ping.sample);
     Wall::new(samples.map(|sample| sample.place), dive.profile.perimeter_m()).unwrap()
 }
 
-/// What a section's flag should have been, and what it was.
+/// The flag of a section as it should be, and as the loop raised it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Flag {
-    /// Chainage at which the section begins, m.
+    /// Chainage of the section's start, m.
     pub start_m: f64,
-    /// The first moment from which going on forward couldn't undo the fail, seconds.
+    /// First moment from which going on forward can't undo the fail, seconds.
     pub due_s: Option<f64>,
-    /// The same, were it as early as the parts of the section leave open.
+    /// The same moment, at the earliest that the resolution of the parts allows, seconds.
     pub may_s: Option<f64>,
-    /// When the dive ended.
+    /// End of the dive, seconds.
     pub end_s: f64,
-    /// When the loop raised it, seconds.
+    /// Time at which the loop raised the flag, seconds.
     pub raised_s: Option<f64>,
-    /// When the loop cleared it, seconds.
+    /// Time at which the loop cleared the flag, seconds.
     pub cleared_s: Option<f64>,
-    /// How far all that is in reach had gone beyond that moment's when it was raised, m.
+    /// Distance that the reach had moved since the due moment when the flag was raised, m.
     pub late_m: Option<f64>,
-    /// Whether the section fails, all samples counted.
+    /// Whether the section fails with all samples counted.
     pub fails: bool,
 }
 
 impl Flag {
-    /// Raised by the end of the dive alone.
+    /// Whether only the end of the dive raised it.
     pub fn raised_at_the_end(&self) -> bool {
         self.may_s.is_none() && self.raised_s.is_some_and(|at_s| at_s >= self.end_s - 1e-6)
     }
 
-    /// How long after its moment, seconds.
+    /// Delay after the due moment, seconds.
     pub fn late_s(&self) -> Option<f64> {
         Some(self.raised_s? - self.due_s?)
     }
 }
 
-/// A dive's way, out and on again, with what has been sampled.
+/// Trajectory of a dive, out and on again, with its samples.
 pub struct Journey {
     reached: Vec<Reached>,
-    /// From which to which of these moments the vehicle goes back the longest way; empty at the end where it doesn't.
+    /// Range of moments of the longest way back; empty at the end without one.
     back: Range<usize>,
-    /// All that has been sampled in the end, and when the vehicle turned back.
+    /// The wall at the end of the dive, and when the vehicle turned back.
     whole: Wall,
     turned: Option<Wall>,
     end_s: f64,
@@ -166,24 +167,24 @@ impl Journey {
         Self { reached, back, whole: wall_until(dive, MonoNs(u64::MAX)), turned, end_s }
     }
 
-    /// When the vehicle turned back, seconds; never is infinite.
+    /// Time at which the vehicle turned back, seconds; infinite if never.
     pub fn turned_back_s(&self) -> f64 {
         self.reached.get(self.back.start).map_or(f64::INFINITY, |reached| reached.at.as_secs_f64())
     }
 
-    /// When it went forward again.
+    /// Time at which it went forward again, seconds; infinite if never.
     pub fn turned_on_s(&self) -> f64 {
         self.reached.get(self.back.end).map_or(f64::INFINITY, |reached| reached.at.as_secs_f64())
     }
 
-    /// Whether a section that was flagged failed for good just then, by what had been sampled: later samples that an empty
-    /// circle gets because the vehicle swings back don't count.
+    /// Whether a flagged section had failed for good at that moment, by the samples so far. Later samples that fill
+    /// the circle because the vehicle swings back don't count.
     pub fn was_due(&self, dive: &Dive, flag: &Flag, sd: f64) -> bool {
         let report = &dive.report;
         let section = report.sections.iter().find(|section| section.start_m >= flag.start_m);
         let Some((section, raised_s)) = section.zip(flag.raised_s) else { return false };
         let raised = MonoNs(math::round_to_i64(raised_s * 1e9).unsigned_abs());
-        // Of some pings: places and attitudes are as noisy as navigation is.
+        // Several pings, because places and attitudes carry navigation noise.
         let near = |ping: &&Ping| raised.since(ping.received).0.abs() <= EVERY.0;
         let poses = dive.pings.iter().filter(near).filter_map(|ping| ping.pose);
         let rear_m = poses.map(|pose| ends_m(dive, &pose)[0]).fold(f64::MIN, f64::max);
@@ -195,7 +196,7 @@ impl Journey {
         first_m.is_some_and(|first_m| first_m + radius_m - line_m <= rear_m)
     }
 
-    /// The flags of a dive. A fail is a hole larger than the target by `sd` of its standard deviation.
+    /// The flags of a dive. A fail is a hole that exceeds the target by `sd` standard deviations.
     pub fn flags(&self, dive: &Dive, sd: f64) -> Vec<Flag> {
         let target_m = dive.report.target_m;
         dive.report.sections.iter().map(|section| self.flag(target_m, section, sd)).collect()
@@ -205,7 +206,7 @@ impl Journey {
         let ends = [section.start_m, section.end_m];
         let radius_m = 0.5 * (target_m + sd * section.hole_sd_m);
         let due_m = |wall: &Wall, early_m: f64| {
-            // What is early for a flag is late for its moment.
+            // A tolerance that makes the flag earlier makes its due moment later.
             let near_m = if early_m > 0.0 { -NEAR_M } else { NEAR_M };
             let passed_m = all_passed_from_m(&self.reached) + near_m;
             Some(first_failing_m(wall, ends, radius_m, passed_m)? + radius_m - early_m)
@@ -222,7 +223,7 @@ impl Journey {
         let late_m = || {
             let raised_s = section.flagged_s?;
             let before = |reached: &&Reached| reached.at.as_secs_f64() <= raised_s;
-            // Where reach or deviation have just jumped, the tick is what counts.
+            // Right after a jump of reach or deviation, the tick limits how soon the flag can be raised.
             let soon_s = 2.0 * EVERY.as_secs_f64();
             first(0.0).filter(|due_s| raised_s > due_s + soon_s)?;
             Some(self.reached.iter().take_while(before).last()?.rear_m - due_m(&self.whole, 0.0)?)

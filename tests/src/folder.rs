@@ -1,4 +1,4 @@
-//! The program under test, and a folder for it that goes away by itself.
+//! The program under test, and a temporary folder for it that is removed after use.
 
 use std::path::PathBuf;
 use std::process::Command;
@@ -8,12 +8,13 @@ use serde_json::Value;
 
 use crate::short_dive::{SCENE, VEHICLE};
 
-/// Time after which a dive is given up that doesn't show what is waited for, s.
+/// Longest wait for the expected report of a dive, s.
 const LONG_S: u32 = 100;
 
-/// The program under test, to be given arguments.
+/// The program under test, ready for arguments.
 pub fn program() -> Command {
-    // Cargo tells the tests that it runs. A test that is run by itself, as in `tests/vm`, looks where cargo puts programs.
+    // Cargo passes the path to tests that it runs. A test that runs alone, as in `tests/vm`, looks in cargo's target
+    // folder.
     Command::new(std::env::var_os("CARGO_BIN_EXE_headrace_under_test").map_or_else(built, PathBuf::from))
 }
 
@@ -23,10 +24,10 @@ fn built() -> PathBuf {
     folder.join(format!("headrace_under_test{}", std::env::consts::EXE_SUFFIX))
 }
 
-/// A new folder for one test, removed with all that is in it. Commands run in it, so that messages name files alone.
+/// A new folder for one test, removed with its content. Commands run in it, so that messages contain bare file names.
 pub struct Folder(PathBuf);
 
-/// What the program answered.
+/// Result of a command.
 pub struct Answer {
     /// Exit code; `None` if a signal ended the program.
     pub code: Option<i32>,
@@ -37,7 +38,7 @@ pub struct Answer {
 }
 
 impl Folder {
-    /// An empty folder below the system's folder for temporary files.
+    /// Creates an empty folder in the system's temporary folder.
     pub fn new() -> Self {
         static COUNT: AtomicU32 = AtomicU32::new(0);
         let name = format!("headrace-test-{}-{}", std::process::id(), COUNT.fetch_add(1, Ordering::Relaxed));
@@ -77,8 +78,8 @@ impl Folder {
         Answer { code: output.status.code(), stdout: text(output.stdout), stderr: text(output.stderr) }
     }
 
-    /// Dives with these arguments of `run` until the report holds what is waited for: for 3 s, and longer where the machine is too busy
-    /// for that. A log is `dive.mcap`. Gives the last dive's answer and report.
+    /// Repeats a live dive with these arguments of `run` until its report satisfies `is_enough`. A dive takes 3 s,
+    /// and longer on a busy machine. The log is `dive.mcap`. Returns the last dive's answer and report.
     pub fn dive_until(&self, arguments: &[&str], is_enough: impl Fn(&Value) -> bool) -> (Answer, Value) {
         let mut seconds = 3;
         loop {
@@ -94,13 +95,13 @@ impl Folder {
         }
     }
 
-    /// Simulates a scene; the command must succeed.
+    /// Simulates a scene and checks that the command succeeds.
     pub fn simulate(&self, scene: &str, log: &str) {
         let answer = self.headrace(&["simulate", scene, "-o", log]);
         assert_eq!(answer.code, Some(0), "{}", answer.stderr);
     }
 
-    /// Dives a log of `vehicle.toml` as if it came from ports, as fast as it can, and records it; what the program answered.
+    /// Records a replayed log of `vehicle.toml` as a live dive, as fast as possible. Returns the answer.
     #[track_caller]
     pub fn record(&self, from: &str, to: &str, further: &[&str]) -> Answer {
         let arguments = ["run", "vehicle.toml", "--source", from, "--record", to, "--speed", "max"];
@@ -109,7 +110,7 @@ impl Folder {
         answer
     }
 
-    /// `scene.toml` is refused: exit code 2, these words, and no log.
+    /// Checks that `scene.toml` is refused: exit code 2, these words, and no log.
     #[track_caller]
     pub fn refuses_scene(&self, words: &[&str]) {
         let answer = self.headrace(&["simulate", "scene.toml", "-o", "dive.mcap"]);
@@ -128,7 +129,7 @@ impl Folder {
         (answer.code, report)
     }
 
-    /// The digest of a replay that must find nothing amiss.
+    /// Digest of a replay without findings.
     pub fn digest(&self, log: &str, further: &[&str]) -> String {
         let (code, report) = self.replay(log, further);
         assert_eq!(code, Some(0), "{log} {further:?}: {:?}", report["log"]["losses"]);

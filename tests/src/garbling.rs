@@ -1,4 +1,4 @@
-//! What becomes of bytes on bad lines, the same each time.
+//! Deterministic damage to bytes on bad lines.
 
 use headrace_imagenex881::codec::{Model, ReturnCodec, Returns};
 use headrace_ping1d::codec::PingCodec;
@@ -7,7 +7,7 @@ use headrace_sensor::codec::Codec;
 use crate::faulty::{Fault, Wire};
 use crate::random::Random;
 
-/// How many good frames a codec finds in bytes that stand alone.
+/// Counts the good frames that a codec finds in a separate piece of bytes.
 pub type Count = fn(&[u8]) -> u64;
 
 /// Good frames of an echosounder.
@@ -26,7 +26,7 @@ fn counted(codec: &mut impl Codec, bytes: &[u8]) -> u64 {
     codec.counts().good_frames
 }
 
-/// Bytes are changed on their way. Not each change can be told: a head's returns have no checksum.
+/// A fault that changes bytes in transit. Not every change is detectable, because a head's returns have no checksum.
 pub struct Garbled {
     random: Random,
     change: fn(&mut Random, &[u8]) -> Vec<u8>,
@@ -67,7 +67,7 @@ pub fn thinned(random: &mut Random, bytes: &[u8]) -> Vec<u8> {
     bytes.iter().copied().filter(|_| !random.one_in(100)).collect()
 }
 
-/// What is done with each frame, by its number.
+/// A fault from a function that is called with each frame and its number.
 pub struct EachFrame<F>(pub F);
 
 impl<F: FnMut(u64, &[u8], &mut Wire) + Send> Fault for EachFrame<F> {

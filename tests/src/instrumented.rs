@@ -1,4 +1,4 @@
-//! Dives whose placed pings are copied out of the loop: all that an oracle of coverage may know.
+//! Dives whose placed pings are copied out of the loop, as input for coverage oracles.
 
 use bevy_ecs::prelude::{Res, ResMut, Resource};
 use headrace_geometry::frames::{Mount, Pose};
@@ -26,7 +26,7 @@ use crate::scenes;
 pub struct Sample {
     /// Chainage and arc length, m.
     pub place: [f64; 2],
-    /// The same in space: the tunnel's frame, m.
+    /// The same place in the tunnel's frame, m.
     pub point: [f64; 3],
 }
 
@@ -37,29 +37,29 @@ pub struct Ping {
     pub head: usize,
     /// Receive time of the ping.
     pub received: MonoNs,
-    /// The head has turned round since its last ping.
+    /// Whether the head has started a new turn since its last ping.
     pub new_sweep: bool,
-    /// The head has come here from its last ping in one step.
+    /// Whether the head has moved here from its last ping in one step.
     pub single_step: bool,
-    /// The vehicle then, where it was known.
+    /// Pose of the vehicle, if known.
     pub pose: Option<Pose>,
-    /// Return that was taken for wall, if there was one that could be placed.
+    /// Return accepted as wall and placed, if there is one.
     pub sample: Option<Sample>,
-    /// Return that wasn't.
+    /// Return not accepted as wall, if there is one.
     pub doubtful: Option<Sample>,
 }
 
-/// What a dive has shown, and what it was made from.
+/// Pings and report of a dive, and its configuration.
 pub struct Dive {
-    /// In the order in which the loop placed them.
+    /// Pings in the order in which the loop placed them.
     pub pings: Vec<Ping>,
     /// Report of the dive.
     pub report: Report,
     /// Cross-section as the loop knows it.
     pub profile: Profile,
-    /// How each head sits, by number.
+    /// Mounts of the heads, by number.
     pub mounts: Vec<Mount>,
-    /// How far each head hears in the site's water, m.
+    /// Range of each head in the site's water, m.
     pub ranges_m: Vec<f64>,
     /// Longest time of a turn of any head, seconds.
     pub turn_s: f64,
@@ -71,7 +71,7 @@ impl Dive {
         self.pings.iter().filter_map(|ping| ping.sample.as_ref())
     }
 
-    /// Where the samples of some heads lie: chainage and arc length, m.
+    /// Samples of some heads: chainage and arc length, m.
     pub fn samples_of(&self, is_one: impl Fn(usize) -> bool) -> impl Iterator<Item = [f64; 2]> {
         self.pings.iter().filter(move |ping| is_one(ping.head)).filter_map(|ping| Some(ping.sample?.place))
     }
@@ -80,11 +80,11 @@ impl Dive {
 #[derive(Resource, Default)]
 struct Seen {
     pings: Vec<Ping>,
-    /// Where each one's return was placed: wall or doubtful, which the loop may say later.
+    /// Place of each return, wall or doubtful; the loop may decide later which.
     placed: Vec<Option<[f64; 3]>>,
 }
 
-/// Copies what has been placed, and touches nothing.
+/// Observer that copies placed pings and changes nothing.
 struct Watch;
 
 impl Plugin for Watch {
@@ -142,24 +142,25 @@ fn watch(
     }
 }
 
-/// Dives a scene of these two files, in ticks of 20 ms.
+/// Simulates and replays a scene of these two files, in ticks of 20 ms.
 pub fn dive(vehicle: &str, scene: &str) -> Dive {
     dive_in_ticks(vehicle, scene, Pace::default().tick)
 }
 
-/// Dives a scene in ticks of another length.
+/// As [`dive`], in ticks of another length.
 pub fn dive_in_ticks(vehicle: &str, scene: &str, tick: DurNs) -> Dive {
     let scene = parse(vehicle, "", scene);
     watched(&scene, &scene.vehicle, scene.vehicle.mission(), Pace { tick, ..Pace::default() })
 }
 
-/// Dives a scene, the loop being told that the wall's arc length begins elsewhere.
+/// As [`dive`], with a loop whose profile starts its arc length elsewhere.
 pub fn dive_with_profile(vehicle: &str, scene: &str, profile: Profile) -> Dive {
     let scene = parse(vehicle, "", scene);
     watched(&scene, &scene.vehicle, Mission { profile, ..scene.vehicle.mission() }, Pace::default())
 }
 
-/// Dives a scene in a polygon, whose corners are `y_m,z_m` a line, while the loop believes in another vehicle and polygon.
+/// Simulates a scene in one polygon with one vehicle; the loop uses another vehicle and polygon. Polygons have a
+/// corner `y_m,z_m` on each line.
 pub fn dive_believing(vehicle: [&str; 2], polygon: [&str; 2], scene: &str) -> Dive {
     let [true_scene, believed] = [0, 1].map(|k| parse(vehicle[k], polygon[k], scene));
     watched(&true_scene, &believed.vehicle, believed.vehicle.mission(), Pace::default())

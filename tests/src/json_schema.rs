@@ -1,9 +1,10 @@
-//! A small part of JSON Schema (2020-12), enough for the schemas of this tree: a keyword that it doesn't know is an error.
+//! A checker for the part of JSON Schema (2020-12) that this repository's schemas use; unknown keywords are errors.
+//!
 //! A crate for it would add a third to the packages that the workspace builds.
 
 use serde_json::{Map, Value};
 
-/// Where `value` differs from what the root schema says.
+/// Differences between `value` and the root schema.
 pub fn faults(schema: &Value, value: &Value) -> Vec<String> {
     let mut faults = Vec::new();
     Checker { root: schema, faults: &mut faults }.check("", schema, value);
@@ -38,7 +39,7 @@ impl Checker<'_> {
                     let fits = |one: &&Value| faults(one, value).is_empty();
                     wanted.as_array().unwrap().iter().filter(fits).count() == 1
                 }
-                // What it holds is for the test to look into.
+                // The decoded content is left to the test.
                 "contentEncoding" => wanted == "base64" && base64(value.as_str().unwrap()).is_some(),
                 "const" => value == wanted,
                 "enum" => wanted.as_array().unwrap().contains(value),
@@ -93,7 +94,7 @@ fn is_a(kind: &str, value: &Value) -> bool {
     }
 }
 
-/// Bytes of a text in base64 (RFC 4648, with padding); `None` where it is none.
+/// Decodes base64 (RFC 4648, with padding); `None` if the text is invalid.
 pub fn base64(text: &str) -> Option<Vec<u8>> {
     const DIGITS: &str = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
     let (groups, rest) = text.as_bytes().as_chunks::<4>();

@@ -1,7 +1,7 @@
-//! Fixtures of the tests and benches: the program under test in a folder of its own, scenes, dives that are watched from
-//! inside, oracles, and devices on real ports.
+//! Fixtures of tests and benches: the program in its own folder, scenes, instrumented dives, oracles, and devices on
+//! real ports.
 
-#![allow(clippy::unwrap_used, clippy::panic, reason = "a test stops at what it can't do")]
+#![allow(clippy::unwrap_used, clippy::panic, reason = "a failed step ends the test")]
 
 pub mod advised;
 #[cfg(unix)]

@@ -1,4 +1,4 @@
-//! Dive logs read and written with the `mcap` crate alone, as other programs do.
+//! Reads and writes dive logs with the `mcap` crate alone, as other programs do.
 
 use std::fs::File;
 use std::io::BufWriter;
@@ -6,13 +6,13 @@ use std::path::Path;
 
 use mcap::{Attachment, Message, MessageStream, WriteOptions};
 
-/// What the devices sent, in the order of the file.
+/// Messages of the devices, in the order of the file.
 pub fn raw_messages(log: &[u8]) -> Vec<Message<'_>> {
     let all = MessageStream::new(log).unwrap().map(Result::unwrap);
     all.filter(|message| message.channel.topic.starts_with("/raw/")).collect()
 }
 
-/// Writes a log with the `mcap` crate's own writer: these messages in this order, and perhaps a vehicle file.
+/// Writes these messages in this order with the `mcap` crate's own writer, with an optional vehicle file.
 pub fn write_log(path: &Path, options: WriteOptions, vehicle: Option<&str>, messages: &[Message<'_>]) {
     let mut writer = options.create(BufWriter::new(File::create(path).unwrap())).unwrap();
     if let Some(vehicle) = vehicle {

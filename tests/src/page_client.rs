@@ -1,4 +1,4 @@
-//! A viewer of the page over real sockets, and what it has understood; its decoding shares no code with the server's.
+//! A client of the page over real sockets, with its decoded state. Its decoder shares no code with the server.
 
 use std::collections::BTreeMap;
 use std::io::{BufRead, BufReader, Read, Write};
@@ -13,7 +13,7 @@ use tungstenite::{Message, WebSocket};
 
 use crate::{Folder, program};
 
-/// Longest wait for anything that must come.
+/// Longest wait for an expected message.
 const WITHIN: Duration = Duration::from_mins(2);
 
 const SCHEMA: &str = include_str!("../../docs/reference/page-feed.schema.json");
@@ -29,7 +29,7 @@ pub struct Serving {
 }
 
 impl Serving {
-    /// Starts the program in this folder; it must tell where its page is.
+    /// Starts the program in this folder and waits until it prints the page's address.
     pub fn start(folder: &Folder, arguments: &[&str]) -> Self {
         let mut command = program();
         command.args(arguments).current_dir(folder.path(""));
@@ -69,18 +69,18 @@ impl Serving {
         rustix::process::kill_process(pid, signal).unwrap();
     }
 
-    /// Waits for its end: exit code and what it told.
+    /// Waits for its end; returns exit code and output.
     pub fn end(mut self) -> (Option<i32>, String) {
         let code = self.child.wait().unwrap().code();
         (code, self.rest.iter().collect::<Vec<_>>().join("\n"))
     }
 
-    /// Answer to a request: status, and all of it.
+    /// Sends a request; returns status and full response.
     pub fn ask(&self, method: &str, path: &str, headers: &[&str], body: impl AsRef<[u8]>) -> (u16, String) {
         ask(&self.address, method, path, headers, body)
     }
 
-    /// Body of the answer to a request, which must be 200.
+    /// Body of the response to a request, which must have status 200.
     pub fn get(&self, path: &str) -> Vec<u8> {
         let bytes = answer_of(&self.address, "GET", path, &[], &[]);
         assert!(bytes.starts_with(b"HTTP/1.1 200"), "{path}: {}", String::from_utf8_lossy(&bytes));
@@ -96,7 +96,7 @@ impl Drop for Serving {
     }
 }
 
-/// Answer of a server at this host and port: status, and all of it.
+/// Sends a request to a server at this host and port; returns status and full response.
 pub fn ask(
     address: &str,
     method: &str,
@@ -119,7 +119,7 @@ fn answer_of(address: &str, method: &str, path: &str, headers: &[&str], body: &[
         format!("Host: {address}\r\n")
     };
     let further = headers.iter().fold(String::new(), |all, header| all + header + "\r\n");
-    // What is stated in the headers may be less, or more, than what is sent.
+    // A test may state a length in the headers that differs from the body's.
     let states =
         headers.iter().any(|header| header.starts_with("Content-Length:") || header.contains("chunked"));
     let length = if states { String::new() } else { format!("Content-Length: {}\r\n", body.len()) };
@@ -130,47 +130,47 @@ fn answer_of(address: &str, method: &str, path: &str, headers: &[&str], body: &[
     bytes
 }
 
-/// A section as it was sent.
+/// A section as received.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SeenSection {
     /// 0 open, 1 pass, 2 fail, 3 cannot say, 4 not inspected.
     pub verdict: u8,
-    /// The same for another target; none where there is none.
+    /// Verdict for another target; `None` without one.
     pub compared: Option<u8>,
     /// Number of the cause.
     pub cause: u8,
     /// Diameter of the hole, m.
     pub hole_m: f32,
-    /// Where samples are.
+    /// Bit set of the covered parts.
     pub seen: u64,
 }
 
-/// A viewer.
+/// A connected client.
 pub struct Viewer {
     socket: WebSocket<TcpStream>,
-    /// The first message.
+    /// First message.
     pub hello: Value,
     /// Sections by number.
     pub sections: BTreeMap<i32, SeenSection>,
-    /// Samples that were sent.
+    /// Number of samples received.
     pub samples: u64,
-    /// Frames of sections that were sent, and the sections in them.
+    /// Number of section frames received, and of sections in them.
     pub section_frames: (u64, u64),
-    /// The last state.
+    /// Last state.
     pub state: Value,
-    /// The last list of alerts, with the changes since.
+    /// Last list of alerts, with all later changes.
     pub alerts: BTreeMap<u64, Value>,
     /// Notes.
     pub notes: Vec<Value>,
-    /// The other messages, newest last.
+    /// Other messages, newest last.
     pub others: Vec<Value>,
-    /// The last number.
+    /// Last sequence number.
     pub seq: u64,
-    /// What texts must be as: `docs/reference/page-feed.schema.json`.
+    /// Schema of text messages: `docs/reference/page-feed.schema.json`.
     schema: Value,
 }
 
-/// Where a text isn't as the definition of its type says.
+/// Differences between a text message and the definition of its type.
 fn faults(schema: &Value, text: &Value) -> Vec<String> {
     let of_type = schema["anyOf"].as_array().unwrap().iter().find(|one| {
         let definition = one["$ref"].as_str().unwrap().strip_prefix('#').unwrap();
@@ -192,7 +192,7 @@ impl Viewer {
         Self::connect_to(&serving.address, query, headers)
     }
 
-    /// The same by host and port.
+    /// As [`Viewer::connect`], by host and port.
     pub fn connect_to(
         address: &str,
         query: &str,
@@ -225,8 +225,8 @@ impl Viewer {
         })
     }
 
-    /// Reads on until this holds; it must before the connection ends.
-    #[expect(clippy::disallowed_methods, reason = "a wait that would never end")]
+    /// Reads until `holds` returns true, which must happen before the connection ends.
+    #[expect(clippy::disallowed_methods, reason = "the wait would never end")]
     pub fn until(&mut self, what: &str, mut holds: impl FnMut(&Self) -> bool) {
         let began = std::time::Instant::now();
         while !holds(self) {
@@ -237,14 +237,14 @@ impl Viewer {
         }
     }
 
-    /// Reads on until a message of this type.
+    /// Reads until a message of this type.
     pub fn until_type(&mut self, kind: &str) -> Value {
         let before = self.others.len();
         self.until(kind, |viewer| viewer.others[before..].iter().any(|other| other["type"] == kind));
         self.others[before..].iter().find(|other| other["type"] == kind).unwrap().clone()
     }
 
-    /// Reads to the end of the connection: the code and reason of its close.
+    /// Reads to the end of the connection; returns code and reason of its close.
     pub fn until_closed(&mut self) -> Option<(u16, String)> {
         loop {
             match self.socket.read() {
@@ -257,7 +257,7 @@ impl Viewer {
         }
     }
 
-    /// Reads on until the dive has begun: from then on a replay is directed.
+    /// Reads until the dive has begun; a replay can be controlled only from then on.
     pub fn until_begun(&mut self) {
         self.until("a state", |viewer| !viewer.state.is_null());
     }
@@ -274,12 +274,12 @@ impl Viewer {
         self.send_raw(Message::Text(command.to_string().into())).unwrap();
     }
 
-    /// Sends anything.
+    /// Sends any message.
     pub fn send_raw(&mut self, message: Message) -> Result<(), tungstenite::Error> {
         self.socket.send(message)
     }
 
-    /// Where it may go on after it was lost.
+    /// Query with which a lost connection resumes.
     pub fn resume(&self) -> String {
         format!("?instance={}&since={}", self.hello["instance"].as_str().unwrap(), self.seq)
     }
@@ -350,7 +350,7 @@ impl Viewer {
     }
 }
 
-/// An acknowledgement of all alerts that need it.
+/// An acknowledgement of all alerts that require one.
 pub fn acknowledge_all(by: &str) -> Value {
     json!({"do": "acknowledge", "alert": 0, "by": by})
 }

@@ -1,7 +1,8 @@
-//! The largest speed at which a vehicle's sections truly pass, by simulated dives, beside what is advised and planned.
+//! Finds the largest speed at which a vehicle's sections truly pass, to compare it with the advised and planned
+//! speeds.
 //!
-//! A dive passes where nearly all of its sections have the verdict pass, and no circle without a true sample is larger than the
-//! target in one of these: by `truth`, which has nothing of the program's coverage or advice.
+//! A dive passes if nearly all of its sections have the verdict pass, and no circle without a true sample in them
+//! exceeds the target. The comparison uses `truth`, which shares nothing with the program's coverage or advice.
 
 use headrace_monitor::advice_log::AdviceEntry;
 use headrace_monitor::messages::Notice;
@@ -14,19 +15,19 @@ use crate::random_dives::Draw;
 use crate::scenes;
 use crate::truth;
 
-/// Seconds at the beginning of a dive that aren't judged: the filter learns an inertial unit's biases.
+/// Start of a dive that isn't judged, s: the filter learns an inertial unit's biases.
 const SETTLES_S: f64 = 100.0;
-/// Metres that are judged.
+/// Length that is judged, m.
 const JUDGED_M: f64 = 8.0;
-/// Share of sections that pass in a dive that passes, as of one that is driven as planned. None of them may pass falsely.
+/// Share of sections that must pass, as for a dive at the planned speed. None of them may pass falsely.
 const PASSING: f64 = 0.95;
-/// One section in so many doesn't.
+/// One section in this many may fail.
 const FAILING: usize = 20;
-/// Shares of a speed that are tried above it and below it.
+/// Speeds that are tried, as shares above and below a speed.
 const ABOVE: [f64; 9] = [1.02, 1.04, 1.06, 1.08, 1.1, 1.125, 1.15, 1.2, 1.25];
 const BELOW: [f64; 8] = [0.98, 0.96, 0.94, 0.92, 0.9, 0.87, 0.83, 0.75];
 
-/// A vehicle on its way.
+/// A vehicle on a dive.
 #[derive(Debug, Clone)]
 pub struct Outing {
     /// Vehicle, layout and file.
@@ -35,39 +36,39 @@ pub struct Outing {
     pub mode: &'static str,
     /// Target T, m.
     pub target_m: f64,
-    /// Effects besides those of data sheets.
+    /// Effects in addition to those of data sheets.
     pub effects: String,
     /// Seed of the dive.
     pub seed: u64,
-    /// Where it begins, m.
+    /// Chainage of the start, m.
     pub start_m: f64,
-    /// Shares of the plan's speed for which the heads are started, and at which it goes until it is told another.
+    /// Shares of the planned speed: for the phases of the heads, and for driving before advice.
     pub planned_share: f64,
 }
 
-/// What came of a dive.
+/// Result of a dive.
 #[derive(Debug, Clone)]
 pub struct Outcome {
     /// Share of the judged sections that pass, 0 to 1.
     pub passing: f64,
-    /// The same of sections that can't be said, and those that fail.
+    /// Shares of the judged sections with the verdict can't say, and of those that fail.
     pub unsure: f64,
-    /// Judged sections that pass with a true hole over the target.
+    /// Number of judged sections that pass with a true hole over the target.
     pub falsely: usize,
-    /// D_true over T, the largest of the judged sections.
+    /// Largest D_true over T of the judged sections.
     pub true_share: f64,
-    /// The beats in the judged part.
+    /// Advice updates in the judged part.
     pub beats: Vec<AdviceEntry>,
 }
 
-/// A speed that was advised, and what is true.
+/// An advised speed and the true largest speed.
 #[derive(Debug, Clone)]
 pub struct Compared {
-    /// What plan says, m/s.
+    /// Planned speed, m/s.
     pub plan_mps: f64,
-    /// What live says on its way at the planned speed, m/s.
+    /// Advised speed while driving at the planned speed, m/s.
     pub advised_mps: f64,
-    /// The largest speed near it at which sections truly pass, m/s; `None` where none does.
+    /// Largest speed near it at which sections truly pass, m/s; `None` if there is none.
     pub true_mps: Option<f64>,
     /// The dive at the planned speed.
     pub planned: Outcome,
@@ -76,12 +77,12 @@ pub struct Compared {
 }
 
 impl Compared {
-    /// The advice over the truth: what is heard at the planned speed.
+    /// Speed advised at the planned speed, over the true largest speed.
     pub fn ratio(&self) -> f64 {
         self.over_true(self.advised_mps)
     }
 
-    /// The same of what is heard by one who has followed it.
+    /// Speed advised while following the advice, over the true largest speed.
     pub fn followed_ratio(&self) -> f64 {
         self.over_true(self.followed.told_mps())
     }
@@ -92,27 +93,28 @@ impl Compared {
 }
 
 impl Outcome {
-    /// Whether it passes.
+    /// Whether the dive passes.
     pub fn passes(&self) -> bool {
         self.passing >= PASSING && self.falsely == 0
     }
 
-    /// Median of a figure over the beats.
+    /// Median of a value over the updates.
     pub fn median(&self, of: impl Fn(&AdviceEntry) -> f64) -> f64 {
         let mut all: Vec<f64> = self.beats.iter().map(of).collect();
         all.sort_by(f64::total_cmp);
         all.get(all.len() / 2).copied().unwrap_or(f64::NAN)
     }
 
-    /// The speed that is within what is told at as many of the beats as sections have to pass at a speed that passes, m/s: who sways is told less at
-    /// times, and who keeps one speed all the way can't keep more.
+    /// Speed that stays within the advice at the share of updates that equals the share of sections that must pass,
+    /// m/s. A swaying vehicle gets lower advice at times, and a vehicle at constant speed can't follow that.
     pub fn told_mps(&self) -> f64 {
         let mut all: Vec<f64> = self.beats.iter().map(|beat| beat.advice.v_max_mps).collect();
         all.sort_by(f64::total_cmp);
         all.get(all.len() / FAILING).copied().unwrap_or(f64::NAN)
     }
 
-    /// Changes of the speed shown, a minute; what is shorter than half a minute counts as that, so that one change isn't many.
+    /// Changes of the displayed speed per minute. Durations below half a minute count as half a minute, so that a
+    /// single change doesn't count as many.
     pub fn changes_a_minute(&self) -> f64 {
         let changed = |pair: &[AdviceEntry]| {
             (pair[0].advice.v_max_mps - pair[1].advice.v_max_mps).abs() > 1e-6
@@ -124,7 +126,7 @@ impl Outcome {
 }
 
 impl Outing {
-    /// A vehicle of the field table, steady, its heads in phase for 0.95 of the plan's speed.
+    /// A steady vehicle of the field table, with heads in phase for 0.95 of the planned speed.
     pub fn steady(vehicle: Vehicle, seed: u64) -> Self {
         Self {
             vehicle,
@@ -137,7 +139,7 @@ impl Outing {
         }
     }
 
-    /// The outing of a seed: vehicles in turns, every other one swaying, the rest drawn.
+    /// The outing of a seed: vehicles in rotation, every other one swaying, the rest drawn.
     pub fn drawn(seed: u64) -> Self {
         let mut draw = Draw::new(seed ^ 0x5eed_ad71);
         let turn = usize::try_from(seed).unwrap();
@@ -164,7 +166,7 @@ impl Outing {
         }
     }
 
-    /// The dive at `speed_mps`, the heads in phase for `planned_mps`.
+    /// Result of a dive at `speed_mps` with heads in phase for `planned_mps`.
     pub fn dive(&self, planned_mps: f64, speed_mps: f64) -> Outcome {
         let ends_m = 1.2 * self.target_m + 2.0;
         let settles_m = (SETTLES_S * speed_mps).max(ends_m);
@@ -207,12 +209,12 @@ impl Outing {
         JUDGED_M.max(2.0 * self.target_m)
     }
 
-    /// The speed of `plan` for it, m/s.
+    /// Speed from `plan`, m/s.
     pub fn plan_mps(&self) -> f64 {
         planned_mps(&self.scene(0.1, 0.1, 1.0).vehicle, &self.vehicle_text(0.1), self.mode)
     }
 
-    /// What is planned, advised under way, and true.
+    /// Compares the planned, the advised and the true speed.
     pub fn compare(&self) -> Compared {
         let plan_mps = self.plan_mps();
         let planned_mps = self.planned_share * plan_mps;
@@ -256,7 +258,7 @@ impl Outing {
         lines.collect::<Vec<_>>().join("\n")
     }
 
-    /// So many metres at `speed_mps`, the heads in phase for `planned_mps`.
+    /// A scene of `length_m` at `speed_mps`, with heads in phase for `planned_mps`.
     pub fn scene(&self, planned_mps: f64, speed_mps: f64, length_m: f64) -> Scene {
         let vehicle = self.vehicle_text(planned_mps);
         let load = |_: &str| Ok(vehicle.clone().into_bytes());

@@ -1,13 +1,15 @@
-//! A driver that waits longer for a device on a pseudoterminal. Bytes on one are passed on by a thread of the kernel that a busy machine
-//! leaves standing: with four busy loops on two cores it was seen ready and not running for up to 16 s.
+//! A driver with a longer silence timeout, for devices on a pseudoterminal.
+//!
+//! A kernel thread moves the bytes of a pseudoterminal. On a busy machine it was seen ready but not running for up to
+//! 16 s, with four busy loops on two cores.
 
 use headrace_geometry::time::{DurNs, MonoNs};
 use headrace_sensor::driver::{DeviceHealth, Driver, Wire};
 
-/// Longer than a pseudoterminal stands still.
+/// Longer than any stall of a pseudoterminal.
 const SILENCE_TIMEOUT: DurNs = DurNs::from_millis(120_000);
 
-/// All as the driver within but for the time after which silence means a dead line.
+/// A driver equal to the one inside, except for its silence timeout.
 pub(crate) struct Patient(pub(crate) Box<dyn Driver>);
 
 impl Driver for Patient {

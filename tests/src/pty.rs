@@ -1,4 +1,4 @@
-//! A program on a pseudoterminal of some width, and what it wrote there.
+//! A program on a pseudoterminal of a given width, with its output.
 
 use std::fs::{File, OpenOptions};
 use std::io::{Read, Write as _};
@@ -12,14 +12,14 @@ use rustix::fs::{Mode, OFlags};
 use rustix::pty::{OpenptFlags, grantpt, openpt, ptsname, unlockpt};
 use rustix::termios::{Winsize, tcgetwinsize, tcsetwinsize};
 
-/// A terminal of which only a test reads.
+/// A terminal that only the test reads.
 pub struct Terminal {
     reader: File,
     end: File,
 }
 
 impl Terminal {
-    /// Opens one of 40 lines and so many columns.
+    /// Opens a terminal of 40 lines and `columns` columns.
     pub fn open(columns: u16) -> Self {
         let master = openpt(OpenptFlags::RDWR | OpenptFlags::NOCTTY).unwrap();
         grantpt(&master).unwrap();
@@ -35,7 +35,7 @@ impl Terminal {
         self.end.try_clone().unwrap()
     }
 
-    /// Reads until a text comes. Panics after a minute in which nothing comes.
+    /// Reads until `text` arrives. Panics after a minute without output.
     pub fn read_until(&mut self, text: &str) {
         let (mut read, mut bytes) = (Vec::new(), [0; 4096]);
         while !String::from_utf8_lossy(&read).contains(text) {
@@ -47,9 +47,9 @@ impl Terminal {
         }
     }
 
-    /// Writes to its end until it takes nothing more: from then on who writes there waits.
+    /// Writes to the program's end until the terminal accepts no more. Later writes block.
     pub fn fill(&self) {
-        // A file of its own: whether it waits is the open file's, not the terminal's.
+        // A separate open file: non-blocking mode belongs to the open file, not to the terminal.
         let name = format!("/proc/self/fd/{}", self.end.as_raw_fd());
         let flags = OFlags::RDWR | OFlags::NOCTTY | OFlags::NONBLOCK;
         let mut end = File::from(rustix::fs::open(name, flags, Mode::empty()).unwrap());
@@ -57,7 +57,7 @@ impl Terminal {
     }
 }
 
-/// A program that runs on a pseudoterminal; ended with it.
+/// A program on a pseudoterminal, killed when it goes out of scope.
 pub struct OnTerminal {
     child: Child,
     pieces: Receiver<Vec<u8>>,
@@ -65,7 +65,7 @@ pub struct OnTerminal {
 }
 
 impl OnTerminal {
-    /// Starts a program on a terminal of so many columns.
+    /// Starts a program on a terminal of `columns` columns.
     pub fn start(mut command: Command, columns: u16) -> Self {
         let master = openpt(OpenptFlags::RDWR | OpenptFlags::NOCTTY).unwrap();
         grantpt(&master).unwrap();
@@ -77,13 +77,13 @@ impl OnTerminal {
         command.env("TERM", "xterm").env_remove("NO_COLOR");
         command.stdin(slave.try_clone().unwrap()).stderr(slave.try_clone().unwrap()).stdout(slave);
         let child = command.spawn().unwrap();
-        // Its own copies of the terminal's end.
+        // The command holds copies of the terminal's end.
         drop(command);
         let (sender, pieces) = sync_channel(1 << 10);
         let mut master = File::from(master);
         std::thread::spawn(move || {
             let mut bytes = [0; 4096];
-            // The end of a terminal that nobody holds open is an error.
+            // Reading fails once nobody holds the other end open.
             while let Ok(read) = master.read(&mut bytes) {
                 if read == 0 || sender.send(bytes[..read].to_vec()).is_err() {
                     return;
@@ -93,8 +93,8 @@ impl OnTerminal {
         Self { child, pieces, written: Vec::new() }
     }
 
-    /// Waits until it has written a text since `from`, an index into all that it has written; returns the index after it.
-    /// Panics after a minute without.
+    /// Waits until the output contains `text` after index `from`; returns the index behind it. Panics after a minute
+    /// without output.
     pub fn wait_for(&mut self, text: &str, from: usize) -> usize {
         loop {
             let written = String::from_utf8_lossy(&self.written[from..]).into_owned();
@@ -108,7 +108,7 @@ impl OnTerminal {
         }
     }
 
-    /// Waits for its end; returns all that it has written.
+    /// Waits for its end; returns all output.
     pub fn all(mut self) -> String {
         while let Ok(piece) = self.pieces.recv_timeout(Duration::from_mins(2)) {
             self.written.extend(piece);
@@ -116,12 +116,12 @@ impl OnTerminal {
         String::from_utf8_lossy(&self.written).into_owned()
     }
 
-    /// All that it has written so far.
+    /// All output so far.
     pub fn so_far(&self) -> String {
         String::from_utf8_lossy(&self.written).into_owned()
     }
 
-    /// Its process.
+    /// Its process id.
     pub fn id(&self) -> u32 {
         self.child.id()
     }
@@ -134,7 +134,7 @@ impl Drop for OnTerminal {
     }
 }
 
-/// The lines as shown: without colours, and of a line that was overwritten each version.
+/// The lines as displayed: without colours, with every version of an overwritten line.
 pub fn shown_lines(written: &str) -> Vec<String> {
     let mut plain = String::new();
     let mut rest = written;

@@ -1,6 +1,6 @@
-//! Numbers by chance, the same each time.
+//! Pseudorandom numbers with a fixed sequence.
 
-/// Numbers that look random and are the same each time (Weyl sequence, mixed).
+/// Generator of pseudorandom numbers (mixed Weyl sequence).
 pub struct Random(pub u64);
 
 impl Random {

@@ -1,27 +1,27 @@
-//! Short dives of all kinds, each from a number.
+//! Short dives of all kinds, each drawn from a seed.
 
 use std::fmt::Write as _;
 
 use headrace_geometry::math;
 
-/// What is the matter with a dive.
+/// Kind of a dive.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Kind {
-    /// Nothing.
+    /// No errors.
     Ideal,
     /// Noise on everything, a drifting pilot, missing and false returns.
     Noisy,
     /// Heads that go back and forth in sectors.
     Sectors,
-    /// Heads that stand in each other's way, and a hull.
+    /// Heads that hide the wall from each other, and a hull.
     Occluded,
     /// Forward, back, forward.
     Reversing,
-    /// Stands for a while.
+    /// A vehicle that is stationary for a while.
     Parked,
     /// Fast, with long gaps in the returns and heads that stall.
     Sparse,
-    /// A cavern whose ends no head hears.
+    /// A cavern whose ends lie beyond the range of every head.
     Wide,
 }
 
@@ -36,11 +36,11 @@ const KINDS: [Kind; 8] = [
     Kind::Wide,
 ];
 
-/// Numbers from a seed (SplitMix64).
+/// Random numbers from a seed (SplitMix64).
 pub struct Draw(u64);
 
 impl Draw {
-    /// A stream of its own for each seed.
+    /// Creates the stream of a seed.
     pub fn new(seed: u64) -> Self {
         Self(seed.wrapping_mul(0x9e37_79b9_7f4a_7c15))
     }
@@ -73,9 +73,9 @@ impl Draw {
 /// The files of a dive.
 #[derive(Debug, Clone)]
 pub struct Seeded {
-    /// Number that the dive was made from.
+    /// Seed.
     pub seed: u64,
-    /// What is special about the dive.
+    /// Kind of the dive.
     pub kind: Kind,
     /// Vehicle file, TOML.
     pub vehicle: String,
@@ -83,7 +83,8 @@ pub struct Seeded {
     pub scene: String,
 }
 
-/// The tunnel's table, a range that reaches its walls, and how far from the middle a vehicle may be, m.
+/// Table of the tunnel, a range setting that reaches its walls, and the largest offset of a vehicle from the centre
+/// line, m.
 fn tunnel(kind: Kind, draw: &mut Draw) -> (String, u32, f64) {
     if kind == Kind::Wide {
         let width_m = draw.between(30.0, 36.0);
@@ -124,7 +125,7 @@ fn vehicle(kind: Kind, draw: &mut Draw, speed_mps: f64) -> (String, f64) {
         Kind::Sparse => draw.one_of(&["slow", "medium"]),
         _ => draw.one_of(&["medium", "fast", "faster", "fastest", "fastest"]),
     };
-    // Together, one behind the other, or side by side and some of them facing aft.
+    // Heads together, one behind the other, or side by side with some of them facing aft.
     let places = if kind == Kind::Occluded { 2 } else { draw.below(3) };
     for head in 0..heads {
         let place = match places {
@@ -147,7 +148,7 @@ fn vehicle(kind: Kind, draw: &mut Draw, speed_mps: f64) -> (String, f64) {
     (text, aside_m)
 }
 
-/// What gives a position.
+/// Sensors that give a position.
 pub const SENSORS: &str = r#"[[sensors]]
 id = "left"
 plugin = "ping1d"

@@ -1,5 +1,4 @@
-//! A dive on real ports in one process: the loop and its supervisor on one side, and on the other emulated devices whose lines
-//! can be made to fail.
+//! A dive on real ports in one process: the loop with its supervisor, and emulated devices whose lines can fail.
 
 use std::cell::{Cell, RefCell};
 use std::collections::BTreeMap;
@@ -28,10 +27,10 @@ use crate::drops;
 use crate::faulty::{Control, End, Fault, Faulty};
 use crate::patient::Patient;
 
-/// Nothing that is waited for takes as long, on a machine that is busy with other things, too: by then the test hangs.
+/// Longest wait before a test counts as hung, also on a busy machine.
 const LONG: DurNs = DurNs::from_millis(300_000);
 
-/// Vehicle file up to its sensors.
+/// Vehicle file without its sensors.
 pub const HEADING: &str = r#"name = "faults"
 target_m = 1.2
 
@@ -43,14 +42,14 @@ length_m = 20
 
 /// A head whose turn takes some seconds.
 pub const HEAD: &str = "plugin = \"imagenex881\"\nmode = \"fastest\"\nrange_m = 5\n";
-/// An echosounder that is asked twenty times a second.
+/// An echosounder that is polled twenty times a second.
 pub const PING: &str = "plugin = \"ping1d\"\ninterval_ms = 50\n";
-/// A counter whose reports go by UDP.
+/// A counter that reports by UDP.
 pub const COUNTER: &str = "plugin = \"tether_hid\"\ncounts_per_metre = 2000\nrate_hz = 50\n";
 /// A depth sensor on a bus.
 pub const DEPTH: &str = "plugin = \"bar100\"\n";
 
-/// A sensor of a rig: its part of the vehicle file, where its device is, and what becomes of what crosses its line.
+/// A sensor of a rig: its table in the vehicle file, its device, and the fault of its line.
 pub struct Sensor {
     /// Table of the sensor, without id and connect.
     pub text: &'static str,
@@ -60,16 +59,16 @@ pub struct Sensor {
     pub fault: Box<dyn Fault>,
 }
 
-/// What is known of a dive at a moment.
+/// State of a dive at a moment.
 #[derive(Debug, Clone, Default)]
 pub struct View {
-    /// Good frames that each sensor's decoder has found.
+    /// Number of good frames found by each sensor's decoder.
     pub good: Vec<u64>,
-    /// Frames that each device has sent whole.
+    /// Number of frames that each device sent whole.
     pub whole: Vec<u64>,
-    /// The last status of each.
+    /// Last status of each sensor.
     pub phases: Vec<Option<Phase>>,
-    /// All that has been said of each, in order, each status once.
+    /// Status texts of each sensor, in order and without repetition.
     pub said: Vec<Vec<String>>,
 }
 
@@ -78,14 +77,14 @@ pub struct Rig {
     dive: Loop,
     supervisor: Supervisor,
     devices: Vec<Faulty>,
-    /// Which of them each sensor is on.
+    /// Line of each sensor.
     on: Vec<usize>,
     view: View,
     places: Vec<String>,
     recorded: Option<(PathBuf, RecorderHandle, String)>,
 }
 
-/// What a dive has come to.
+/// Result of a dive.
 pub struct Ended {
     /// View at the end.
     pub view: View,
@@ -96,12 +95,12 @@ pub struct Ended {
 }
 
 impl Rig {
-    /// With all devices plugged in but those whose end says otherwise.
+    /// Starts a rig. All devices are plugged in except those whose end is absent.
     pub fn new(sensors: Vec<Sensor>) -> Self {
         Self::recorded(sensors, None)
     }
 
-    /// The same, recorded to a new file.
+    /// As [`Rig::new`], recorded to a new file.
     pub fn recorded(sensors: Vec<Sensor>, log: Option<&Path>) -> Self {
         let places: Vec<String> = sensors.iter().map(|sensor| sensor.end.connect().to_string()).collect();
         let mut text = HEADING.to_owned();
@@ -147,17 +146,17 @@ impl Rig {
         Self { dive, supervisor, devices, on, view, places, recorded }
     }
 
-    /// Unplugs and plugs a device, and the like.
+    /// Controls of a device, for instance to unplug it.
     pub fn control(&self, number: usize) -> &Control {
         self.devices[self.on[number]].control()
     }
 
-    /// View when the dive was last looked at.
+    /// View of the dive at the last update.
     pub fn view(&self) -> &View {
         &self.view
     }
 
-    /// Lets the dive go on until `condition` holds; gives the view then.
+    /// Runs the dive until `condition` holds; returns the view.
     #[track_caller]
     pub fn until(&mut self, what: &str, condition: impl Fn(&View) -> bool) -> View {
         let Self { dive, supervisor, devices, on, view, places, .. } = self;
@@ -173,14 +172,14 @@ impl Rig {
         view.clone()
     }
 
-    /// Waits until a sensor has `more` good frames.
+    /// Runs until a sensor has `more` additional good frames.
     #[track_caller]
     pub fn more(&mut self, number: usize, more: u64) -> View {
         let from = self.view.good[number];
         self.until(&format!("{more} more of {number}"), |view| view.good[number] >= from + more)
     }
 
-    /// Waits until something has been said of a sensor that begins so or contains it, from now on.
+    /// Runs until a new status text of a sensor contains `words`.
     #[track_caller]
     pub fn says(&mut self, number: usize, words: &str) -> View {
         self.until(&format!("{number} says {words:?}"), |view| {
@@ -188,13 +187,13 @@ impl Rig {
         })
     }
 
-    /// Lets all devices fall silent, waits until every frame that they have sent whole has come, and ends the dive.
+    /// Silences all devices, waits until every whole frame has arrived, and ends the dive.
     #[track_caller]
     pub fn end(self) -> Ended {
         self.end_but(None)
     }
 
-    /// The same without a wait for one sensor, of whose frames some may have met a full ring.
+    /// As [`Rig::end`], without waiting for one sensor that may have lost frames at a full ring.
     #[track_caller]
     pub fn end_but(mut self, overrun: Option<usize>) -> Ended {
         for device in &self.devices {
@@ -222,7 +221,7 @@ impl Rig {
 }
 
 impl Ended {
-    /// Every frame that was sent whole was used, by every sensor, and nothing that wasn't.
+    /// Checks that every sensor used every frame that was sent whole, and nothing else.
     #[track_caller]
     pub fn all_used(&self) {
         let Self { view, lines, .. } = self;
@@ -230,7 +229,7 @@ impl Ended {
         assert!(lines.iter().all(|line| line.dropped == 0), "{lines:#?}");
     }
 
-    /// This sensor was never troubled.
+    /// Checks that this sensor had no trouble.
     #[track_caller]
     pub fn untroubled(&self, number: usize) {
         let (line, said) = (&self.lines[number], &self.view.said[number]);
@@ -253,7 +252,7 @@ impl View {
         places: &[String],
     ) {
         let (devices, on) = devices;
-        // First what has been sent: what comes of it is counted later.
+        // Count sent frames first: received frames are counted later, so they can't be fewer by chance.
         self.whole = on.iter().map(|line| devices[*line].control().whole()).collect();
         self.good = dive.decoder_counts().iter().map(|counts| counts.good_frames).collect();
         while let Some(status) = supervisor.next_status() {
@@ -263,7 +262,7 @@ impl View {
     }
 }
 
-/// Words without the places that the system has chosen.
+/// Replaces addresses chosen by the system with neutral words.
 fn neutral(words: &str, places: &[String]) -> String {
     let mut words = words.to_owned();
     for place in places {
@@ -313,7 +312,7 @@ pub fn emulated(text: &str) -> Emulated {
     vehicle.sensors[0].emulator(&EmulatorSetup { start, head, site: vehicle.site, polled: false })
 }
 
-/// The digest of a replay of this log, which says that so many packets were dropped, and of no other loss.
+/// Digest of a replay of this log, which must report this number of dropped packets and no other loss.
 fn replayed(log: &Path, text: &str, dropped: u64) -> u64 {
     let document = Document::new("vehicle.toml", text);
     let vehicle = VehicleConfig::parse(document, &KINDS, &|_| unreachable!("no file is named")).unwrap();

@@ -1,4 +1,4 @@
-//! Scenes of the vehicles that are shipped, for tests and benches within one process.
+//! Scenes of the shipped vehicles, for tests and benches within one process.
 
 use headrace_config::Document;
 use headrace_monitor::App;
@@ -13,23 +13,23 @@ pub fn vehicle_file(name: &str) -> Result<Vec<u8>, String> {
     std::fs::read(folder.join(name)).map_err(|error| error.to_string())
 }
 
-/// A scene of a vehicle that is shipped.
+/// A scene of a shipped vehicle.
 pub fn scene(text: &str) -> Scene {
     scene_from(text, &vehicle_file)
 }
 
-/// A scene whose files are had from `load`.
+/// A scene whose files come from `load`.
 pub fn scene_from(text: &str, load: FileLoader<'_>) -> Scene {
     seeded(text, load, None)
 }
 
-/// A scene with another seed than its own.
+/// A scene with another seed, if given.
 pub fn seeded(text: &str, load: FileLoader<'_>, seed: Option<u64>) -> Scene {
     let scene = Scene::parse(Document::new("scene.toml", text), &headrace::devices::KINDS, load, seed);
     scene.unwrap_or_else(|why| panic!("{why}"))
 }
 
-/// What the loop reports of a scene's dive.
+/// Report of the loop for a scene's dive.
 pub fn report(scene: &Scene) -> Report {
     let vehicle = &scene.vehicle;
     let mut app = App::new(vehicle.mission());

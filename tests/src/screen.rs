@@ -1,4 +1,4 @@
-//! The program under test on a pseudoterminal, with somebody at the keys.
+//! The program under test on a pseudoterminal, with simulated key presses.
 
 use std::cell::RefCell;
 use std::fs::File;
@@ -17,7 +17,7 @@ use rustix::termios::{Winsize, tcsetwinsize};
 
 use crate::{Folder, program};
 
-/// Longest wait for what must come, in steps.
+/// Longest wait for expected output, in steps.
 const STEPS: u32 = 1200;
 const STEP: Duration = Duration::from_millis(100);
 
@@ -27,17 +27,17 @@ pub struct Screen {
     keys: File,
     coming: Receiver<Vec<u8>>,
     seen: RefCell<Vec<u8>>,
-    /// Lines and columns.
+    /// Size in columns and lines.
     size: (u16, u16),
 }
 
 impl Screen {
-    /// Runs the program in a folder on a terminal that is so wide, with these variables beside `TERM=xterm`.
+    /// Runs the program in a folder on a terminal of `columns` columns, with these variables and `TERM=xterm`.
     pub fn run(folder: &Folder, arguments: &[&str], columns: u16, variables: &[(&str, &str)]) -> Self {
         Self::sized(folder, arguments, (columns, 24), variables)
     }
 
-    /// The same on a terminal of so many columns and lines.
+    /// As [`Screen::run`], with the number of lines given.
     pub fn sized(
         folder: &Folder,
         arguments: &[&str],
@@ -56,13 +56,13 @@ impl Screen {
         command.envs(variables.iter().copied());
         command.stdin(end()).stdout(end()).stderr(end());
         let child = command.spawn().unwrap();
-        // Else the terminal would stay open when the program has ended.
+        // The command would keep the terminal open after the program has ended.
         drop(command);
         let mut reading = clone(&master);
         let (to, coming) = channel();
         thread::spawn(move || {
             let mut bytes = [0; 4096];
-            // A terminal that nobody has open any more is an error on Linux.
+            // On Linux, reading from a terminal that nobody has open is an error.
             while let Ok(count @ 1..) = reading.read(&mut bytes) {
                 if to.send(bytes[..count].to_vec()).is_err() {
                     return;
@@ -72,14 +72,14 @@ impl Screen {
         Self { child, keys: File::from(master), coming, seen: RefCell::default(), size: (lines, columns) }
     }
 
-    /// All that was shown so far, with its escape sequences.
+    /// All output so far, with its escape sequences.
     pub fn shown(&self) -> String {
         let mut seen = self.seen.borrow_mut();
         seen.extend(self.coming.try_iter().flatten());
         String::from_utf8_lossy(&seen).into_owned()
     }
 
-    /// Waits for a text; what was shown until then.
+    /// Waits for a text; returns the output up to it.
     #[track_caller]
     pub fn until(&self, text: &str) -> String {
         for _ in 0..STEPS {
@@ -89,10 +89,10 @@ impl Screen {
             }
             thread::sleep(STEP);
         }
-        panic!("{text:?} doesn't come: {:?}", self.shown());
+        panic!("{text:?} doesn't appear: {:?}", self.shown());
     }
 
-    /// The terminal as it looks now, in another program's eyes.
+    /// The terminal's present content, as interpreted by another terminal emulator.
     pub fn terminal(&self) -> vt100::Parser {
         self.shown();
         let [lines, columns] = [self.size.0, self.size.1].map(|size| NonZero::new(size).unwrap());
@@ -101,13 +101,13 @@ impl Screen {
         terminal
     }
 
-    /// The page as text, without spaces at the ends of lines: whether they were written depends on what was there before.
+    /// The page as text without trailing spaces: whether the program writes them depends on the earlier content.
     pub fn page(&self) -> String {
         let page = self.terminal().screen().contents();
         page.lines().map(str::trim_end).collect::<Vec<_>>().join("\n")
     }
 
-    /// Waits until the page has a text, and stands still; the page.
+    /// Waits until the page contains a text and no longer changes; returns the page.
     #[track_caller]
     pub fn until_page(&self, text: &str) -> String {
         let mut before = String::new();
@@ -119,7 +119,7 @@ impl Screen {
             before = page;
             thread::sleep(STEP);
         }
-        panic!("{text:?} doesn't come: {before}");
+        panic!("{text:?} doesn't appear: {before}");
     }
 
     /// Changes the terminal's size, to columns and lines.
@@ -139,31 +139,31 @@ impl Screen {
         kill_process(Pid::from_child(&self.child), signal).unwrap();
     }
 
-    /// Whether the terminal echoes and takes lines, as a shell leaves it.
+    /// Whether the terminal has echo and line mode on, as a shell leaves it.
     pub fn is_in_order(&self) -> bool {
         use rustix::termios::{LocalModes, tcgetattr};
         let all = LocalModes::ICANON | LocalModes::ECHO | LocalModes::ISIG;
         tcgetattr(&self.keys).unwrap().local_modes.contains(all)
     }
 
-    /// Waits for the end of the program; its exit code, and all that was shown.
+    /// Waits for the program's end; returns exit code and all output.
     #[track_caller]
     pub fn end(&mut self) -> (Option<i32>, String) {
         for _ in 0..STEPS {
             if let Some(status) = self.child.try_wait().unwrap() {
-                // What it wrote last may still be on the way.
+                // The last output may still be in transit.
                 thread::sleep(STEP);
                 return (status.code(), self.shown());
             }
             thread::sleep(STEP);
         }
-        panic!("it doesn't end: {:?}", self.shown());
+        panic!("the program doesn't end: {:?}", self.shown());
     }
 }
 
 impl Drop for Screen {
     fn drop(&mut self) {
-        // One that has ended can't be killed.
+        // A process that has ended can't be killed.
         self.child.kill().ok();
         self.child.wait().ok();
     }

@@ -1,6 +1,6 @@
 //! A small vehicle and a short dive.
 
-/// Two heads in a circular tunnel, with all that gives a position.
+/// Two heads in a circular tunnel, with all sensors that give a position.
 pub const VEHICLE: &str = r#"name = "test vehicle"
 target_m = 1.2
 
@@ -64,7 +64,7 @@ plugin = "tether_hid"
 counts_per_metre = 2000
 "#;
 
-/// Six tables for one line, and a velocity log.
+/// Six tables that share one line, and a velocity log.
 const OTHER_SENSORS: &str = r#"
 [[sensors]]
 id = "imu"
@@ -124,13 +124,13 @@ plugin = "tether_hid"
 counts_per_metre = 2000
 "#;
 
-/// The two heads on a vehicle whose autopilot owns the other sensors.
+/// The two heads on a vehicle whose other sensors belong to an autopilot.
 pub fn other_vehicle() -> String {
     let heads = VEHICLE.split("[[sensors]]\nid = \"ping_left\"").next().unwrap();
     format!("{heads}{OTHER_SENSORS}")
 }
 
-/// Twenty seconds: four metres, some of the last one never seen from both sides.
+/// A dive of 20 s and 4 m. Parts of the last metre are never seen from both sides.
 pub const SCENE: &str = r#"name = "short dive"
 vehicle = "vehicle.toml"
 

@@ -1,15 +1,16 @@
-//! T_x, T_y and T of every sample of a dive as the definitions say, each sample against all before it.
+//! T_x, T_y and T of every sample of a dive by their definitions, each sample against all samples before it.
 //!
-//! A *pass* over a place of the perimeter is one step of a head, between two pings of which both returned, whose arc (the
-//! shorter way round) holds that place; where it passed is linear between the two on the unrolled wall. A step over
-//! pings without a return has not sampled what lies between. A step is earlier than a sample when both its ends are.
-//! Whether the very end of a row of steps belongs to it is left open: such samples have two values.
+//! A *pass* over a place of the perimeter is one step of a head. The pings at both ends of the step have a return,
+//! and the arc between them (the shorter way round) contains that place. The position of the pass is interpolated
+//! linearly on the unrolled wall. A step over pings without a return has not sampled the places between. A step is
+//! earlier than a sample if both its ends are. Whether the end point of a row of steps belongs to the row is left
+//! open, so such samples have two values.
 
 use headrace_geometry::math;
 
 use crate::instrumented::{Ping, Sample};
 
-/// Shares of a step so near to its ends may be rounding.
+/// Positions this close to the ends of a step, as a share of it, may be due to rounding.
 const ROUNDING: f64 = 1e-9;
 
 /// A sample's spacings, m.
@@ -17,11 +18,11 @@ const ROUNDING: f64 = 1e-9;
 pub struct Spacing {
     /// Chainage, m.
     pub x_m: f64,
-    /// T_x: chainage to the nearest earlier pass; without ends of rows, and with them.
+    /// T_x: chainage to the nearest earlier pass, without and with the end points of rows.
     pub t_x_m: [Option<f64>; 2],
     /// T_y: distance to the last sample of the same head.
     pub t_y_m: Option<f64>,
-    /// T of both; without ends of rows, and with them.
+    /// T of both, without and with the end points of rows.
     pub t_m: [Option<f64>; 2],
 }
 
@@ -29,12 +30,12 @@ struct Step {
     from: [f64; 2],
     /// Chainage and arc length from there, the shorter way round.
     by: [f64; 2],
-    /// Whether steps the same way join it at its beginning and its end.
+    /// Whether a step in the same direction adjoins its beginning and its end.
     joined: [bool; 2],
 }
 
 impl Step {
-    /// Where it passed over an arc length.
+    /// Chainage at which the step passes over an arc length.
     fn x_at(&self, arc_m: f64, perimeter_m: f64, with_ends: bool) -> Option<f64> {
         let along_m = math::wrap_signed(arc_m - self.from[1], perimeter_m);
         let share = along_m / self.by[1];
@@ -104,7 +105,7 @@ fn distance_m(a: [f64; 3], b: [f64; 3]) -> f64 {
     math::hypot(math::hypot(a[0] - b[0], a[1] - b[1]), a[2] - b[2])
 }
 
-/// Least, mean, greatest value and variance; `None` without values.
+/// Least, mean and greatest value, and variance; `None` without values.
 pub fn spread(values: &[f64]) -> Option<[f64; 4]> {
     let n = values.len() as f64;
     let mean = values.iter().sum::<f64>() / n;

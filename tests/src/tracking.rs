@@ -1,4 +1,4 @@
-//! Dives whose navigation is looked over its shoulder: where it says the vehicle is, and where that truly is.
+//! Dives that record the navigation's estimates beside the true poses.
 
 use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
 
@@ -21,42 +21,42 @@ use headrace_sensor::reading::Reading;
 use headrace_simulator::{START, Scene, Scenery, Simulation};
 use headrace_vehicle::NavigationConfig;
 
-/// More than a dive of an hour says.
+/// More than the number of records in a dive of an hour.
 const MOST_SAID: usize = 1 << 20;
 
-/// A fix that was asked for, and the truth.
+/// A requested fix, with the true pose.
 pub struct Tracked {
-    /// When it was asked for.
+    /// Time of the request.
     pub at: MonoNs,
-    /// Fix, or why there is none.
+    /// Fix, or the reason why there is none.
     pub fix: Result<Fix, NoFix>,
     /// True pose.
     pub truth: Pose,
 }
 
-/// The filter at the end of an epoch.
+/// State of the filter at the end of an epoch.
 pub struct Epoch {
     /// Time of the estimate.
     pub at: MonoNs,
     /// Factors of its covariance.
     pub factors: Box<Factors<ERRORS>>,
-    /// What takes the estimate to the truth; of pose alone, other errors aren't known.
+    /// Errors that take the estimate to the truth; only those of the pose are known.
     pub errors: Errors,
 }
 
-/// What a dive's navigation said.
+/// Records of a dive's navigation.
 pub struct Track {
-    /// Fixes in the order in which they were asked for.
+    /// Fixes in the order of their requests.
     pub fixes: Vec<Tracked>,
     /// Estimates in order of time.
     pub epochs: Vec<Epoch>,
-    /// How well sources agree, whenever one has been fused: time of the last epoch, source, and all so far.
+    /// Agreement of sources after each fused measurement: time of the last epoch, source, and statistics so far.
     pub consistency: Vec<(MonoNs, usize, Consistency)>,
     /// Report of the dive.
     pub report: Report,
 }
 
-/// Sources that fall silent, by their numbers, from and to seconds of the dive.
+/// Silence of some sources during a time.
 #[derive(Debug, Clone, Default)]
 pub struct Silence {
     /// Numbers of the sources.
@@ -73,9 +73,9 @@ enum Said {
     Consistency(usize, Consistency),
 }
 
-/// What there is to see in a way of navigating.
+/// A navigation whose estimates can be observed.
 pub trait Transparent: Navigation + 'static {
-    /// Estimate with its time, from those that have one.
+    /// Estimate and its time, if the navigation has one.
     fn estimate(&self) -> Option<(MonoNs, State, Factors<ERRORS>)> {
         None
     }
@@ -91,7 +91,7 @@ impl Transparent for FilterNavigation {
     }
 }
 
-/// Navigation that knows the truth.
+/// A navigation that returns the true pose.
 struct Truth(Scenery);
 
 impl Stateful for Truth {
@@ -119,7 +119,7 @@ impl Navigation for Truth {
 
 impl Transparent for Truth {}
 
-/// Dives a scene, the samples placed where they truly are.
+/// Simulates and replays a scene with samples at their true places.
 pub fn true_dive(scene: &Scene) -> Track {
     let simulation = Simulation::new(scene).unwrap();
     dive(scene, Truth(simulation.scenery().unwrap().clone()), Silence::default())
@@ -133,7 +133,7 @@ struct Overheard<N> {
     said: SyncSender<Said>,
 }
 
-/// What was overheard is no state.
+/// Records aren't part of the state.
 impl<N: Transparent> Stateful for Overheard<N> {
     fn save(&self, to: &mut Saver) {
         self.inner.save(to);
@@ -175,7 +175,7 @@ impl<N: Transparent> Navigation for Overheard<N> {
     }
 }
 
-/// The filter with a scene's settings.
+/// The filter with the settings of a scene.
 pub fn filter(scene: &Scene) -> FilterNavigation {
     let vehicle = &scene.vehicle;
     let settings = match vehicle.navigation {
@@ -185,7 +185,7 @@ pub fn filter(scene: &Scene) -> FilterNavigation {
     FilterNavigation::new(vehicle.tunnel.profile.clone(), vehicle.site, settings)
 }
 
-/// Dives a scene with a way of navigating.
+/// Simulates and replays a scene with this navigation.
 pub fn dive(scene: &Scene, inner: impl Transparent, silence: Silence) -> Track {
     let vehicle = &scene.vehicle;
     let mut app = App::new(vehicle.mission());

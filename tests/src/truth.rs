@@ -1,4 +1,4 @@
-//! Dives whose verdicts can be judged by D_true: those of `headrace_oracle`, for tests.
+//! Dives with D_true for each section: wrappers of `headrace_oracle` for tests.
 
 use headrace_monitor::run::Loop;
 use headrace_simulator::Scene;
@@ -7,17 +7,17 @@ use headrace_vehicle::VehicleConfig;
 pub use headrace_oracle::dive::{JudgedDive, JudgedSection, Recorded};
 pub use headrace_oracle::truth::{REPLACING, TrueSample, Truth};
 
-/// Dives a scene; the loop is told the scene's vehicle file.
+/// Simulates a scene and replays it with its own vehicle file.
 pub fn dive(scene: &Scene) -> JudgedDive {
     dive_believing(scene, &scene.vehicle)
 }
 
-/// Dives a scene, the loop being told another vehicle file, whose sensors must send the same bytes.
+/// Simulates a scene and replays it with another vehicle file, whose sensors must send the same bytes.
 pub fn dive_believing(scene: &Scene, believed: &VehicleConfig) -> JudgedDive {
     dive_noting(scene, believed, &mut |_| {})
 }
 
-/// The same; `note` sees the loop after each tick.
+/// As [`dive_believing`]; `note` sees the loop after each tick.
 pub fn dive_noting(scene: &Scene, believed: &VehicleConfig, note: &mut dyn FnMut(&Loop)) -> JudgedDive {
     let recorded = Recorded::of(scene, believed).unwrap_or_else(|why| panic!("{why}"));
     recorded.judged_with(believed, believed.navigation(), note).unwrap()

@@ -1,23 +1,25 @@
-//! What tests of hard cases find: held to its bound, and to `docs/why/hard-cases.md`, which `tests/hard_cases/run` makes of it.
+//! Checks the errors of hard cases against their bounds and against `docs/why/hard-cases.md`.
+//!
+//! `tests/hard_cases/run` generates that page.
 
-#![allow(clippy::panic, reason = "a test stops at what it can't do")]
+#![allow(clippy::panic, reason = "a failed step ends the test")]
 
 use std::fs::OpenOptions;
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
 
-/// Where to collect what is found, in place of holding it to the page.
+/// Variable that names a file. If it is set, results are collected there instead of being compared with the page.
 const COLLECT: &str = "HEADRACE_HARD_CASES";
 
-/// The error of a case of `tests/hard_cases/list`, by its name there, in the unit that the list gives.
+/// Checks the error of a case, named as in `tests/hard_cases/list`, in the unit of that list.
 ///
-/// Panics: over its bound or no number, or another than the page tells.
+/// Panics: the error is over its bound, is no number, or differs from the page.
 #[track_caller]
 pub fn found(name: &str, error: f64, bound: f64) {
     tell(name, error, bound, None);
 }
 
-/// The same of a problem with a condition number: how many times it magnifies errors of what is given.
+/// As [`found`], for a problem with a condition number: the factor by which it magnifies input errors.
 ///
 /// Panics: as [`found`].
 #[track_caller]
@@ -45,7 +47,7 @@ fn tell(name: &str, error: f64, bound: f64, condition: Option<f64>) {
     );
 }
 
-/// The page's row of a case.
+/// Row of a case on the page.
 #[track_caller]
 fn row(name: &str) -> String {
     let list = read("tests/hard_cases/list");
@@ -65,7 +67,7 @@ fn read(name: &str) -> String {
     std::fs::read_to_string(&path).unwrap_or_else(|why| panic!("{}: {why}", path.display()))
 }
 
-/// One digit, so that other processors and profiles tell the same.
+/// One significant digit, so that other processors and profiles print the same.
 fn rounded(value: f64) -> String {
     if value == 0.0 { "0".to_owned() } else { format!("{value:.0e}") }
 }

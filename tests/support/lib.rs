@@ -1,15 +1,15 @@
-//! What tests of any crate need: recordings of others, the page of hard cases, and a word for what is skipped.
+//! Support for tests of any crate: public recordings, the page of hard cases, and a notice for skipped tests.
 
 pub mod hard_cases;
 pub mod recordings;
 
 use std::io::Write as _;
 
-/// Says that something isn't tested here, and why. `.ci/count-skipped` counts these lines at the end of a run.
+/// Prints that a test is skipped, and why. `.ci/count-skipped` counts these lines at the end of a run.
 ///
-/// Straight to standard error, because cargo shows what `eprintln!` prints of failed tests alone; in one piece, because
-/// tests run side by side.
-#[expect(clippy::unwrap_used, reason = "a test that can't say what it skips fails")]
+/// It writes straight to standard error, because cargo shows `eprintln!` output of failed tests only. It writes in
+/// one piece, because tests run in parallel.
+#[expect(clippy::unwrap_used, reason = "a test that can't report a skip fails")]
 pub fn skipped(why: &str) {
     std::io::stderr().write_all(format!("skipped: {why}\n").as_bytes()).unwrap();
 }

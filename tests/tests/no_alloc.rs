@@ -1,12 +1,13 @@
-//! The armed loop allocates nothing: a million packets of a four-head dive, with recorder and notice outlet, under an
-//! allocator that counts on the loop's thread.
+//! The armed loop allocates nothing, tested with a million packets of a four-head dive, with recorder and notice
+//! outlet.
 //!
-//! That it takes no lock is kept by clippy.toml, which bars the lock types from the whole workspace.
+//! The allocator counts calls on the loop's thread. The absence of locks is checked by clippy.toml, which bars lock
+//! types from the whole workspace.
 
-#![expect(clippy::unwrap_used, reason = "a test stops at what it can't do")]
+#![expect(clippy::unwrap_used, reason = "a failed step ends the test")]
 #![expect(
     unsafe_code,
-    reason = "a global allocator is an unsafe trait; this one counts and hands on to the system's"
+    reason = "a global allocator is an unsafe trait; this one counts and calls the system's"
 )]
 
 use std::alloc::{GlobalAlloc, Layout, System};
@@ -38,15 +39,15 @@ thread_local! {
 }
 
 fn count() {
-    // Const-initialised and without a destructor: looking at it allocates nothing.
+    // Const-initialised and without a destructor, so reading it allocates nothing.
     COUNTED.with(|counted| counted.set(counted.get().map(|n| n + 1)));
 }
 
-// SAFETY: every call is handed on to the system's allocator unchanged.
+// SAFETY: every call is passed to the system's allocator unchanged.
 unsafe impl GlobalAlloc for Counting {
     unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
         count();
-        // SAFETY: the caller's promises are passed on.
+        // SAFETY: the caller upholds the allocator's contract.
         unsafe { System.alloc(layout) }
     }
 
@@ -66,15 +67,15 @@ unsafe impl GlobalAlloc for Counting {
 #[global_allocator]
 static ALLOCATOR: Counting = Counting;
 
-/// Allocator calls made on this thread while `work` runs.
+/// Number of allocator calls on this thread while `work` runs.
 fn allocations(work: impl FnOnce()) -> u64 {
     COUNTED.with(|counted| counted.set(Some(0)));
     work();
     COUNTED.with(|counted| counted.replace(None)).unwrap()
 }
 
-/// Forth, too fast for a stretch, back over it, and forth again, so that flags are raised and cleared; all heads silent for
-/// a while.
+/// Forward, too fast over a stretch, back over it, and forward again, so that flags are raised and cleared. All heads
+/// are silent for a while.
 const SCENE: &str = "vehicle = \"vita2-4.toml\"\n[trajectory]\n
 [[trajectory.legs]]\ndistance_m = 120\nspeed_mps = 0.197\n
 [[trajectory.legs]]\ndistance_m = 40\nspeed_mps = 0.4\n
@@ -82,7 +83,7 @@ const SCENE: &str = "vehicle = \"vita2-4.toml\"\n[trajectory]\n
 [[trajectory.legs]]\ndistance_m = 200\nspeed_mps = 0.35\n
 [[effects.device_faults]]\nkind = \"die\"\nsensors = [\"sonar_0\", \"sonar_1\", \"sonar_2\", \"sonar_3\"]\nfrom_s = 820\nfor_s = 40\n";
 
-/// What an operator does, one thing a second; the last is no command.
+/// Operator actions, one each second; the last is no valid command.
 const COMMANDS: [&str; 9] = [
     r#"{"do":"silence","by":"AB"}"#,
     r#"{"do":"note","text":"rubble \u006ceft","by":"AB"}"#,
@@ -96,7 +97,7 @@ const COMMANDS: [&str; 9] = [
 ];
 
 #[test]
-fn a_million_packets_without_one_allocation() {
+fn million_packets_need_no_allocation() {
     assert!(allocations(|| drop(vec![1])) > 0, "the counter counts");
 
     let scene = scenes::scene(SCENE);
@@ -105,7 +106,7 @@ fn a_million_packets_without_one_allocation() {
     for sensor in &vehicle.sensors {
         app.add_device(sensor.as_ref()).unwrap();
     }
-    // Nobody empties this one: dropping the oldest must not allocate either.
+    // Nobody empties this outlet: dropping the oldest notice must not allocate either.
     let (outlet, notices) = NoticeOutlet::new(1000);
     app.add_plugin(&outlet).unwrap();
     let header = LogHeader {
@@ -121,7 +122,7 @@ fn a_million_packets_without_one_allocation() {
     };
     let (port, recorder) = Recorder::start(std::io::sink(), &header, QUEUE_BYTES).unwrap();
     app.add_plugin(&RecorderOutlet::new([port])).unwrap();
-    // Nor does anybody empty the journal of the filter's steps.
+    // Nobody empties the journal of the filter's steps either.
     let (journal, steps) = Journal::new(1000);
     let NavigationConfig::Filter(settings) = vehicle.navigation else { panic!("no filter") };
     let profile = vehicle.tunnel.profile.clone();
@@ -170,7 +171,7 @@ fn a_million_packets_without_one_allocation() {
     assert!(written.messages >= packets as u64, "recorded input is never dropped");
 }
 
-/// Lines as these devices send them, damaged here and there, in pieces.
+/// Lines of these devices, with some damage, in pieces.
 #[test]
 fn decoders_of_other_vehicles_allocate_nothing() {
     let header = MavHeader { system_id: 1, component_id: 1, sequence: 0 };

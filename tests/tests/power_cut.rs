@@ -1,7 +1,9 @@
-//! `kill -9` at random moments: every log reads, what the pilot was told more than a second before is in it, and its replay
-//! is the dive, bit for bit, up to there.
+//! `kill -9` at random moments: every log is readable and loses at most the last second.
+//!
+//! Everything displayed more than a second before the kill is in the log, and its replay is the dive up to there, bit
+//! for bit.
 
-#![allow(clippy::unwrap_used, clippy::panic, reason = "a test stops at what it can't do")]
+#![allow(clippy::unwrap_used, clippy::panic, reason = "a failed step ends the test")]
 
 use std::io::{BufRead, BufReader, Write};
 use std::process::Stdio;
@@ -11,16 +13,16 @@ use std::time::{Duration, Instant};
 use headrace_tests::{Folder, VEHICLE};
 use serde_json::Value;
 
-/// How often a dive is killed.
+/// Number of dives that are killed.
 const KILLS: usize = 200;
-/// How many dives there are at a time.
+/// Number of dives that run at a time.
 const AT_ONCE: usize = 6;
-/// A dive lives so long at most, milliseconds.
+/// Longest life of a dive, ms.
 const LONGEST_MS: u64 = 2200;
-/// What a power cut may cost.
+/// Largest loss in a power cut.
 const MAY_COST: Duration = Duration::from_secs(1);
 
-/// A minute and a half, part of it too fast, so that there are flags to lose.
+/// A dive of a minute and a half, partly too fast, so that there are flags to lose.
 const SCENE: &str = r#"name = "a dive to kill"
 vehicle = "vehicle.toml"
 
@@ -42,28 +44,29 @@ speed_mps = 0.2
 
 #[expect(
     clippy::disallowed_methods,
-    reason = "what a power cut costs is wall time, and no result depends on it"
+    reason = "the loss in a power cut is wall time, and no result depends on it"
 )]
 fn wall_clock() -> Instant {
     Instant::now()
 }
 
-/// What came of the kills.
+/// Results of the kills.
 #[derive(Default)]
 struct Count {
-    /// Before the log had a beginning.
+    /// Kills before the log had a beginning.
     before: AtomicUsize,
-    /// After the dive had ended by itself.
+    /// Kills after the dive had ended by itself.
     after: AtomicUsize,
-    /// Lines that pilots had read a second before.
+    /// Lines displayed more than a second before the kill.
     lines: AtomicUsize,
-    /// Results that were the same, bit for bit.
+    /// Results that were identical, bit for bit.
     same: AtomicU64,
-    /// How late this machine's disk, or its processor, gave a thread what it waited for, ns: tests may share both with anything.
+    /// Longest delay with which this machine's disk or processor served a thread, ns. Tests may share both with other
+    /// work.
     late_ns: AtomicU64,
 }
 
-/// The `n`th of a row of random numbers.
+/// The `n`th of a sequence of random numbers.
 fn random(n: u64) -> u64 {
     let mut word = (n + 1).wrapping_mul(0x9E37_79B9_7F4A_7C15);
     word = (word ^ (word >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
@@ -71,7 +74,7 @@ fn random(n: u64) -> u64 {
     word ^ (word >> 31)
 }
 
-/// Lets a dive begin and kills it; gives what it had said a second before, and whether it had ended by itself.
+/// Starts a dive and kills it. Returns its lines from more than a second before, and whether it had ended by itself.
 fn killed(folder: &Folder, arguments: &[&str], after: Duration, count: &Count) -> (Vec<String>, bool) {
     let mut dive = headrace_tests::program()
         .args(arguments)
@@ -85,7 +88,7 @@ fn killed(folder: &Folder, arguments: &[&str], after: Duration, count: &Count) -
         out.lines().map_while(Result::ok).map(|line| (wall_clock(), line)).collect::<Vec<_>>()
     });
     std::thread::sleep(after);
-    // Not a second before the kill, but a second before it can have been felt.
+    // The limit is a second before the kill could take effect, not before it was sent.
     let moment = wall_clock();
     let ended = dive.try_wait().unwrap().is_some();
     dive.kill().ok();
@@ -95,7 +98,7 @@ fn killed(folder: &Folder, arguments: &[&str], after: Duration, count: &Count) -
     (known.map(|(_, line)| line).collect(), ended)
 }
 
-/// Whether all lines are among the others, in their order.
+/// Whether all lines occur among the others, in order.
 fn is_subsequence(lines: &[String], others: &str) -> bool {
     let mut rest = others.lines();
     lines.iter().all(|line| rest.any(|other| other == line))
@@ -115,7 +118,7 @@ fn kill(folder: &Folder, number: usize, count: &Count) {
         )
     };
     let (mut lines, ended) = killed(folder, &arguments, after, count);
-    // The demonstration's first line names it.
+    // The demonstration's first line is its title.
     lines.retain(|line| !line.ends_with("a simulated dive"));
     count.after.fetch_add(usize::from(ended), Ordering::Relaxed);
     count.lines.fetch_add(lines.len(), Ordering::Relaxed);
@@ -123,7 +126,7 @@ fn kill(folder: &Folder, number: usize, count: &Count) {
 
     let answer = folder.headrace(&["verify", "--json", &log]);
     let Ok(told) = serde_json::from_str::<Value>(&answer.stdout) else {
-        // The file wasn't there yet, or not yet its header; then there was no dive either.
+        // The file or its header didn't exist yet, so there was no dive either.
         assert!(lines.is_empty(), "{which}: {}, and the pilot had read {lines:?}", answer.stderr);
         let early = ["could not open", "is not an MCAP file", "no vehicle file can be read"];
         assert!(early.iter().any(|words| answer.stderr.contains(words)), "{which}: {}", answer.stderr);
@@ -133,7 +136,7 @@ fn kill(folder: &Folder, number: usize, count: &Count) {
     let same = told["same_records"].as_u64().unwrap();
     assert_eq!(told["differences"], Value::Array(Vec::new()), "{which}: {told}");
     match answer.code {
-        Some(0) => assert!(ended, "{which}: nothing is said to be lost: {told}"),
+        Some(0) => assert!(ended, "{which}: no loss is reported: {told}"),
         Some(3) => assert!(same > 0 && told["losses"][0].is_string(), "{which}: {told}"),
         // Nothing had been published yet.
         code => assert!(code == Some(1) && same == 0 && lines.is_empty(), "{which}: {code:?}, {told}"),
@@ -149,7 +152,7 @@ fn kill(folder: &Folder, number: usize, count: &Count) {
 }
 
 #[test]
-fn two_hundred_kills_cost_no_more_than_their_last_second() {
+fn two_hundred_kills_lose_at_most_the_last_second() {
     let folder = Folder::new();
     folder.write("vehicle.toml", VEHICLE);
     folder.write("scene.toml", SCENE);

@@ -1,6 +1,6 @@
-//! Dives in the simulated world of faults: what must hold does, for every seed.
+//! Dives in the simulated world of faults satisfy all invariants, for every seed.
 
-#![allow(clippy::unwrap_used, clippy::panic, reason = "a test stops at what it can't do")]
+#![allow(clippy::unwrap_used, clippy::panic, reason = "a failed step ends the test")]
 
 use std::collections::BTreeMap;
 
@@ -9,9 +9,9 @@ use headrace_tests::world::invariants::broken;
 use headrace_tests::world::plan::Plan;
 use headrace_tests::world::{Lived, Sabotage, World};
 
-/// Worlds lived through; more, and others, by the environment: `HEADRACE_WORLD_SEEDS=1000..2000`.
+/// Default seeds; the environment can give others: `HEADRACE_WORLD_SEEDS=1000..2000`.
 const SEEDS: std::ops::Range<u64> = 0..300;
-/// Worlds in which sabotage must show.
+/// Number of worlds in which a sabotage must show.
 const ENOUGH: u64 = 100;
 
 fn seeds() -> std::ops::Range<u64> {
@@ -20,7 +20,7 @@ fn seeds() -> std::ops::Range<u64> {
     from.parse().unwrap()..to.parse().unwrap()
 }
 
-/// Lives through a world; gives what doesn't hold, and what was planned.
+/// Runs a world; returns its broken invariants and its results.
 fn lived(folder: &Folder, seed: u64, sabotage: Option<Sabotage>) -> (Vec<String>, Lived) {
     let lived = World::sabotaged(seed, sabotage).live();
     let replayed = lived.replay(folder);
@@ -37,7 +37,7 @@ fn count(plan: &Plan, faults: &mut BTreeMap<String, usize>) {
 }
 
 #[test]
-fn whatever_goes_wrong_nothing_is_lost_silently() {
+fn faults_lose_nothing_silently() {
     let folder = Folder::new();
     let (mut faults, mut failures, mut skipping) = (BTreeMap::new(), 0, 0);
     for seed in seeds() {
@@ -57,7 +57,7 @@ fn whatever_goes_wrong_nothing_is_lost_silently() {
 }
 
 #[test]
-fn a_seed_repeats_its_world() {
+fn seed_repeats_its_world() {
     for seed in 0..5 {
         let [first, second] = [0, 1].map(|_| World::new(seed).live());
         assert_eq!((first.digest, &first.consumed), (second.digest, &second.consumed));
@@ -83,7 +83,7 @@ fn sabotage_is_found() {
 }
 
 #[test]
-fn a_terminal_that_stands_changes_nothing() {
+fn blocked_terminal_does_not_change_results() {
     for seed in 0..20 {
         let [taken, stood] = [false, true].map(|stands| World::new(seed).with_terminal(stands).live());
         assert_eq!((taken.digest, &taken.consumed), (stood.digest, &stood.consumed), "seed {seed}");

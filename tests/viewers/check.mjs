@@ -1,10 +1,11 @@
-// Reads a dive log with npm's @mcap/core, which Foxglove and Lichtblick read logs with, and compares its summary and indexes
-// with the file read from end to end, and its schemas with those that Foxglove publishes (@foxglove/schemas).
+// Reads a dive log with npm's @mcap/core, which Foxglove and Lichtblick use. Compares its summary and indexes with a full read
+// of the file,
+// and its schemas with those that Foxglove publishes (@foxglove/schemas).
 //
-//     node check.mjs LOG.mcap               prints what differs, and exits with 1 when anything does
-//     node check.mjs --self-test LOG.mcap   spoils copies of the log, one thing each, and wants every one found out
+//     node check.mjs LOG.mcap               prints differences, and exits with 1 if there are any
+//     node check.mjs --self-test LOG.mcap   damages copies of the log in one way each, and checks that each is found
 //
-// It is to be run where the packages are installed; says "skipped" and exits with 0 where they aren't.
+// Run it in a folder with the packages. Without them it prints "skipped" and exits with 0.
 
 import { readFile } from "node:fs/promises";
 import { createRequire } from "node:module";
@@ -21,7 +22,7 @@ const arguments_ = process.argv.slice(2);
 const log = new Uint8Array(await readFile(arguments_.at(-1)));
 process.exit(arguments_[0] === "--self-test" ? await selfTest(log) : await tell(log));
 
-// The packages of the folder that this is run in.
+// Packages of the current folder.
 async function load() {
   try {
     const require = createRequire(pathToFileURL(join(process.cwd(), "package.json")));
@@ -34,7 +35,7 @@ async function load() {
   }
 }
 
-// What is found by looking at nothing but the data, from the first byte to the last.
+// Summary computed by reading the data alone, from the first byte to the last.
 function readThrough(bytes) {
   const reader = new McapStreamReader({ decompressHandlers, includeChunks: true });
   reader.append(bytes);
@@ -66,7 +67,7 @@ function readThrough(bytes) {
   return found;
 }
 
-// A message for viewers that isn't as its schema says, or has data of another length than it tells.
+// A viewer message that violates its schema, or whose data has another length than stated.
 function messageFaults(message, { channels, schemas }) {
   const channel = channels.get(message.channelId);
   if (channel.messageEncoding !== "json") {
@@ -103,10 +104,10 @@ function valueFaults(place, schema, value) {
   return lacking.concat(Object.keys(value).flatMap(of));
 }
 
-// Where a schema of ours under Foxglove's name has other keys or types than theirs.
+// Differences between our schemas under Foxglove's names and Foxglove's own, in keys or types.
 function schemaFaults(place, ours, theirs) {
   const faults = [];
-  // Theirs give enumerations without a type.
+  // Foxglove's schemas give enumerations without a type.
   if (theirs.type != undefined && ours.type !== theirs.type) {
     faults.push(`${place}: type ${ours.type}, and Foxglove's is ${theirs.type}`);
   }
@@ -210,7 +211,7 @@ async function selfTest(bytes) {
     const opcode = bytes[at];
     first.set(opcode, first.get(opcode) ?? at + 9);
   }
-  // Opcodes and places of fields: MCAP's specification, mcap.dev/spec. The summary's checksum is taken away (footer, byte 16).
+  // Opcodes and field positions: MCAP's specification, mcap.dev/spec. The summary's checksum is cleared (footer, byte 16).
   const spoil = (change) => {
     const copy = bytes.slice();
     const field = new DataView(copy.buffer);

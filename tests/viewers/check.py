@@ -27,7 +27,7 @@ MAGIC = 8
 
 
 def records(log):
-    """Opcode, place and content of each record at the file's own level."""
+    """Opcode, position and content of each record at the file's own level."""
     at = MAGIC
     while at + 9 <= len(log) - MAGIC:
         opcode, length = struct.unpack_from("<BQ", log, at)
@@ -36,7 +36,7 @@ def records(log):
 
 
 class Linear:
-    """What a reader finds that looks at nothing but the data, from the first byte to the last."""
+    """Summary computed by reading the data alone, from the first byte to the last."""
 
     def __init__(self, log):
         self.messages = Counter()
@@ -73,7 +73,7 @@ class Linear:
 
 
 def check(log, deep=True):
-    """What differs, in words; deep: by index and message by message, too."""
+    """Differences, in words. `deep` also checks the indexes and reads message by message."""
     wrong = []
 
     def same(what, told, found):
@@ -119,16 +119,16 @@ def check(log, deep=True):
 
 
 def by_index(reader, linear):
-    """What a reader that goes by the indexes finds otherwise; that of Python does when messages are wanted by time."""
+    """Differences seen by a reader that uses the indexes; Python's does so when messages are requested by time."""
     try:
         found = Counter(channel.id for _, channel, _ in reader.iter_messages())
-    except Exception as error:  # whatever a spoilt index makes of it
+    except Exception as error:  # any error that a damaged index causes
         return [f"reading by index: {error!r}"]
     return [] if found == linear.messages else ["reading by index: other messages than from end to end"]
 
 
 def view(reader):
-    """Messages for viewers that aren't what their topic says."""
+    """Viewer messages that don't match the schema of their topic."""
     wrong = []
     try:
         for schema, channel, message in reader.iter_messages():
@@ -145,10 +145,10 @@ def view(reader):
 
 
 def spoilt(log):
-    """Copies of the log with one thing wrong each, and the words by which it should be found."""
+    """Copies of the log with one fault each, and the words that must report it."""
     first = {}
     for opcode, place, content in records(log):
-        # The first chunk holds definitions alone.
+        # The first chunk holds definitions only.
         if opcode == CHUNK_INDEX and struct.unpack_from("<Q", content)[0] == 0:
             continue
         first.setdefault(opcode, (place + 9, content))

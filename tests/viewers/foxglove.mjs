@@ -1,8 +1,8 @@
-// Subscribes to a served replay with Foxglove's own client library, and wants every topic with its schema and messages of it.
+// Subscribes to a served replay with Foxglove's own client library, and checks that every topic has its schema and messages.
 //
 //     node foxglove.mjs HEADRACE LOG.mcap      in a folder with node_modules/@foxglove/ws-protocol
 //
-// Exits with 1 when anything is missing.
+// Exits with 1 if anything is missing.
 
 import { spawn } from "node:child_process";
 import { createRequire } from "node:module";
@@ -11,12 +11,12 @@ const require = createRequire(`${process.cwd()}/`);
 const { FoxgloveClient } = require("@foxglove/ws-protocol");
 const { WebSocket } = require("ws");
 
-// The topics of docs/log-format.md.
+// The topics that docs/how-to/viewers/README.md describes.
 const TOPICS = {
   transforms: "foxglove.FrameTransforms", pose: "foxglove.PoseInFrame", vehicle: "headrace.Vehicle", points: "foxglove.PointCloud",
   wall: "foxglove.Grid", sections: "headrace.Section", missed: "headrace.Missed", advice: "headrace.Advice", alerts: "foxglove.Log",
 };
-// The library's own name of the protocol is that of an older server; the messages are the same.
+// The library's protocol name is that of an older server; the messages are the same.
 const PROTOCOL = "foxglove.sdk.v1";
 FoxgloveClient.SUPPORTED_SUBPROTOCOL = PROTOCOL;
 
@@ -51,7 +51,7 @@ const socket = new WebSocket(`ws://127.0.0.1:${port}`, [PROTOCOL]);
 socket.binaryType = "arraybuffer";
 const client = new FoxgloveClient({ ws: socket });
 client.on("error", (error) => {
-  // The state of playback: newer than this version of the library.
+  // Playback state is newer than this version of the library.
   const words = `${error.message ?? error}`;
   if (!words.endsWith("opcode in binary message: 5")) faults.push(words);
 });
@@ -76,7 +76,7 @@ socket.addEventListener("message", ({ data }) => {
   const view = typeof data === "string" ? undefined : new DataView(data);
   if (view?.getUint8(0) === 5) state = { status: view.getUint8(1), at: view.getBigUint64(2, true) };
 });
-// The first stretch is missed after some twenty seconds of it.
+// The first stretch is missed after about twenty seconds of it.
 const complete = () => Object.keys(TOPICS).every((name) => counts.has(`/result/view/${name}`));
 for (const until = Date.now() + 60_000; Date.now() < until && !complete();) await pause(100);
 for (const [name, schema] of Object.entries(TOPICS)) {
@@ -90,7 +90,7 @@ for (const [name, schema] of Object.entries(TOPICS)) {
   if (count === 0) faults.push(`${topic}: no message`);
 }
 if (!info?.capabilities?.includes("playbackControl")) faults.push(`capabilities: ${info?.capabilities}`);
-// A jump to the beginning, paused: opcode 3 of the client's binary messages.
+// A seek to the beginning, paused: opcode 3 of the client's binary messages.
 const id = new TextEncoder().encode("back");
 const request = new DataView(new ArrayBuffer(1 + 1 + 4 + 1 + 8 + 4 + id.length));
 request.setUint8(0, 3);

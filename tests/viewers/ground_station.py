@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Hears a dive as QGroundControl would, with Python's `pymavlink`, and checks what it hears.
+"""Receives a dive as QGroundControl would, with Python's `pymavlink`, and checks the messages.
 
     ground_station.py HEADRACE LOG.mcap      replays the log with --mavlink-out
 
@@ -17,9 +17,9 @@ except ImportError as error:
     print(f"skipped: Python's package pymavlink is not there ({error})")
     sys.exit(0)
 
-# Names that QGroundControl takes for the autopilot's.
+# Names that QGroundControl interprets as the autopilot's.
 RESERVED = {"TetherTrn", "RFTarget", "CamTilt", "Lights1", "Lights2", "PilotGain", "InputHold", "RollPitch"}
-# What a ground station would take for the autopilot's.
+# Messages that a ground station would interpret as the autopilot's.
 NEVER = {"DISTANCE_SENSOR", "OBSTACLE_DISTANCE"}
 
 

@@ -1,4 +1,4 @@
-//! Overrides of values in a TOML text: a scene's changes to the vehicle file that it uses.
+//! Overrides of values in a TOML text, as in a scene's changes to its vehicle file.
 
 use core::ops::Range;
 
@@ -13,11 +13,14 @@ const ALL: &str = "all";
 /// Key that identifies a table of an array.
 const ID: &str = "id";
 
-/// `text` with the values of the keys in `changes` replaced. `heads.layout = "x"` changes a key of a table,
-/// `sensors.ID.key` that of the array's table with this id, `sensors.all.key` that of every table that has the key. An array that isn't
-/// there, `openings = [{ .. }]`, is added before all else.
+/// Returns `text` with the values of the keys in `changes` replaced.
 ///
-/// Errors: another key that isn't in the text; a text that isn't TOML.
+/// - `heads.layout = "x"` changes a key of a table.
+/// - `sensors.ID.key` changes a key in the array's table with this id.
+/// - `sensors.all.key` changes it in every table that has the key.
+/// - A missing array, `openings = [{ .. }]`, is added at the start.
+///
+/// Errors: any other key that is not in the text; a text that is not TOML.
 pub fn changed(text: &str, changes: &Section<'_>) -> Result<String, ConfigError> {
     let table = Document::new(changes.file(), text).table()?;
     let mut changed = String::new();
@@ -46,7 +49,7 @@ pub fn changed(text: &str, changes: &Section<'_>) -> Result<String, ConfigError>
     Ok(changed)
 }
 
-/// Whether a value is an array on its own: tables under `[[headers]]` are none that could be moved.
+/// Whether a value is an inline array. Tables under `[[headers]]` are not, and cannot be moved.
 fn is_array(value: &str) -> bool {
     value.starts_with('[') && !value.starts_with("[[")
 }
@@ -84,7 +87,7 @@ mod tests {
     }
 
     #[test]
-    fn values_are_changed_and_the_rest_stays_to_the_byte() {
+    fn changes_leave_all_other_bytes() {
         let expected = TEXT
             .replace("a = 1", "a = [2, 3]")
             .replace("\"phase_shift\"", "\"sector_offset\"")
@@ -104,14 +107,14 @@ mod tests {
     }
 
     #[test]
-    fn an_array_that_is_not_there_is_added() {
+    fn missing_array_is_added() {
         let opening = "openings = [{ name = \"gate\", from_m = 1, to_m = 2 }]\n";
         let added = change(&format!("{opening}heads.layout = \"x\"\n")).unwrap();
         assert_eq!(added, format!("{opening}{}", TEXT.replace("phase_shift", "x")));
     }
 
     #[test]
-    fn what_is_not_there_is_refused() {
+    fn missing_key_is_rejected() {
         let missing = "is not in the vehicle file, so that it can't be changed";
         let tables = "\n[[openings]]\nname = \"gate\"";
         assert_eq!(change(tables).unwrap_err(), format!("s.toml:2: openings = [[openings]]: {missing}"));

@@ -5,7 +5,7 @@ use toml::de::{DeTable, DeValue};
 
 use super::error::ConfigError;
 
-/// Longest text that is parsed, bytes: some hundred times a long one. Parsed, it takes many times its length.
+/// Maximum length of a text, bytes: about a hundred times a long one. Parsing takes many times its length in memory.
 const MAX_TEXT_BYTES: usize = 1 << 20;
 
 /// A text and its file name.
@@ -16,25 +16,24 @@ pub struct Document<'a> {
 }
 
 impl<'a> Document<'a> {
-    /// `file` is the name used in errors.
+    /// Creates a document; `file` is its name in errors.
     pub fn new(file: &'a str, text: &'a str) -> Self {
         Self { file, text }
     }
 
-    /// The root table as parsed.
+    /// Parses the root table.
     pub(super) fn table(self) -> Result<DeTable<'a>, ConfigError> {
         self.is_short()?;
         DeTable::parse(self.text).map(Spanned::into_inner).map_err(|error| self.broken(&error))
     }
 
-    /// Refuses a text that is too long to be parsed.
+    /// Rejects a text that is too long to parse.
     pub(super) fn is_short(self) -> Result<(), ConfigError> {
         if self.text.len() <= MAX_TEXT_BYTES {
             return Ok(());
         }
         let len = self.text.len();
-        Err(self
-            .broken_as(&format!("a text of {len} bytes; the longest that is read has {MAX_TEXT_BYTES}"), 0))
+        Err(self.broken_as(&format!("a text of {len} bytes; the most allowed is {MAX_TEXT_BYTES}"), 0))
     }
 
     pub(super) fn broken(self, error: &toml::de::Error) -> ConfigError {
@@ -51,8 +50,9 @@ impl<'a> Document<'a> {
         }
     }
 
-    /// Line of a key by its dotted path (`sensors[1].connect`), or of the table that it would be in; the first line if there
-    /// is neither.
+    /// Returns the line of a key by its dotted path (`sensors[1].connect`), or of its table.
+    ///
+    /// If neither exists, it is the first line.
     pub fn line_of(self, path: &str) -> usize {
         if self.is_short().is_err() {
             return 1;

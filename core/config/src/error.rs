@@ -23,7 +23,7 @@ pub struct ConfigError {
 }
 
 impl ConfigError {
-    /// As the parts have it, whatever they hold.
+    /// Formats the parts without any escaping.
     fn text(&self) -> String {
         let Self { file, line, key, value, problem } = self;
         let value = value.as_ref().map(|value| format!(" = {value}")).unwrap_or_default();
@@ -36,9 +36,9 @@ impl ConfigError {
 pub struct ConfigErrors(Vec<ConfigError>);
 
 impl ConfigErrors {
-    /// In the order of lines, each once; `None` without any.
+    /// Sorts the errors by line, each once; `None` without any.
     pub(super) fn of(mut errors: Vec<ConfigError>) -> Option<Self> {
-        // Stable: of one line, in the order in which they were found. Other files' errors are where they were found.
+        // A stable sort: errors of one line stay in the order of discovery, and errors of other files stay in place.
         let file = errors.first()?.file.clone();
         if errors.iter().all(|error| error.file == file) {
             errors.sort_by_key(|error| error.line);
@@ -59,7 +59,7 @@ impl ConfigErrors {
         Some(Self(each))
     }
 
-    /// These, and then those of a file that the first names.
+    /// Appends errors of a file that the first one refers to.
     #[must_use]
     pub fn and(mut self, others: Self) -> Self {
         self.0.extend(others.0);
@@ -78,7 +78,7 @@ impl From<ConfigError> for ConfigErrors {
     }
 }
 
-/// One error a line.
+/// One error per line.
 impl fmt::Display for ConfigErrors {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         for (number, error) in self.0.iter().enumerate() {
@@ -91,7 +91,8 @@ impl fmt::Display for ConfigErrors {
 
 impl std::error::Error for ConfigErrors {}
 
-/// Most errors of a file that are told: nobody reads more, and what is no such file may have one in each line.
+/// Maximum number of reported errors of a file. Nobody reads more, and a file of another kind may have one in each
+/// line.
 pub(super) const MOST_ERRORS: usize = 100;
 
 /// Errors of the tables of one document, if they are collected.
@@ -104,7 +105,7 @@ impl Notes {
         Self(Some(Rc::default()))
     }
 
-    /// Whether errors are collected, so that reading goes on after one.
+    /// Whether errors are collected, so that reading continues after one.
     pub(super) fn are_kept(&self) -> bool {
         self.0.is_some()
     }
@@ -117,12 +118,12 @@ impl Notes {
         }
     }
 
-    /// The first error that is so.
+    /// Returns the first error that satisfies `is_so`.
     pub(super) fn find(&self, is_so: impl Fn(&ConfigError) -> bool) -> Option<ConfigError> {
         self.0.as_ref()?.borrow().iter().find(|error| is_so(error)).cloned()
     }
 
-    /// Whether there are more than are told.
+    /// Whether there are more errors than will be reported.
     pub(super) fn are_enough(&self) -> bool {
         self.count() > MOST_ERRORS
     }

@@ -1,11 +1,11 @@
-//! The word that somebody may have meant.
+//! Search for the word that the author may have intended.
 
-/// Most changes for which a word may have been meant: one for short words, two from six letters on.
+/// Maximum number of edits to an intended word: one for short words, two from six letters on.
 const FEW: usize = 1;
 const MORE: usize = 2;
 const LONG: usize = 6;
 
-/// The known word nearest to `word`; `None` if none is near. Of several the first.
+/// Returns the known word nearest to `word`, the first of several; `None` if none is near.
 pub(super) fn nearest<'w>(word: &str, known: impl IntoIterator<Item = &'w str>) -> Option<&'w str> {
     let near = |candidate: &&str| {
         if stem(word) == stem(candidate) {
@@ -26,13 +26,13 @@ pub(super) fn nearest<'w>(word: &str, known: impl IntoIterator<Item = &'w str>) 
     best.map(|(_, candidate)| candidate)
 }
 
-/// A key without its unit: `start` of `start_m`.
+/// Returns a key without its unit: `start` for `start_m`.
 fn stem(word: &str) -> &str {
     let units = ["m", "s", "ms", "deg", "hz", "mps", "degps", "h", "pa"];
     word.rsplit_once('_').filter(|(_, unit)| units.contains(unit)).map_or(word, |(stem, _)| stem)
 }
 
-/// Letters to insert, remove, replace, or swap with their neighbour, without regard to case.
+/// Number of letters to insert, remove, replace, or swap with their neighbour, ignoring case.
 ///
 /// Source: the optimal string alignment distance; Boytsov, "Indexing methods for approximate dictionary searching", 2011.
 fn changes(from: &str, to: &str) -> usize {
@@ -60,7 +60,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn changes_are_counted() {
+    fn edits_are_counted() {
         let cases = [
             ("", "abc", 3),
             ("plugn", "plugin", 1),
@@ -75,7 +75,7 @@ mod tests {
     }
 
     #[test]
-    fn the_nearest_word_is_meant_if_it_is_near() {
+    fn nearest_word_is_found_if_it_is_near() {
         let known = ["target_m", "section_m", "id", "heads", "hull"];
         for (word, meant) in [
             ("target_cm", Some("target_m")),

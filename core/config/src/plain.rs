@@ -1,27 +1,31 @@
-//! Text from outside, made fit to be shown: names in files, on devices and on command lines may hold codes that a terminal obeys.
+//! Sanitising of external text for display, since names may contain terminal control codes.
+//!
+//! Such text comes from files, devices and command lines.
 
 use core::fmt::Write as _;
 use std::borrow::Cow;
 
-/// A text as one line that shows what it holds: control characters (line ends and escape codes among them) and characters that
-/// turn or hide others become escapes as in JSON, so that JSON stays what it is.
+/// Returns a text as one visible line; JSON remains valid.
+///
+/// Control characters (line ends and escape codes included), and characters that turn or hide others, become escapes
+/// as in JSON.
 pub fn one_line(text: &str) -> Cow<'_, str> {
     escaped(text, acts)
 }
 
-/// A text of several lines, each made fit as by [`one_line`]: for what has line ends of our own making.
+/// Returns a text of several lines, each sanitised by [`one_line`], for text with line ends of our own.
 pub fn lines(text: &str) -> Cow<'_, str> {
     escaped(text, |c| c != '\n' && acts(c))
 }
 
-/// Whether a text is shown as it is by [`one_line`].
+/// Whether [`one_line`] shows a text unchanged.
 pub fn is_plain(text: &str) -> bool {
     !text.contains(acts)
 }
 
-/// Whether a terminal, or the layout of text, does something at a character other than showing it.
+/// Whether a terminal or text layout acts on a character instead of displaying it.
 ///
-/// Source: Unicode 16, categories Cc, Zl and Zp; Bidi_Control; and of Cf those that are shown as nothing.
+/// Source: Unicode 16, categories Cc, Zl and Zp; Bidi_Control; and the invisible characters of Cf.
 fn acts(c: char) -> bool {
     c.is_control()
         || matches!(c,
@@ -42,7 +46,7 @@ fn escaped(text: &str, is_unfit: impl Fn(char) -> bool) -> Cow<'_, str> {
             '\t' => fit.push_str("\\t"),
             _ => {
                 for unit in c.encode_utf16(&mut [0; 2]) {
-                    // Writing to a String can't fail.
+                    // Writing to a String cannot fail.
                     let _written = write!(fit, "\\u{unit:04x}");
                 }
             }
@@ -56,7 +60,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_a_terminal_obeys_is_shown_instead() {
+    fn control_characters_are_escaped() {
         let cases = [
             ("\x1b[2J\x1b]0;title\x07", "\\u001b[2J\\u001b]0;title\\u0007"),
             ("one\r\ntwo\tthree", "one\\r\\ntwo\\tthree"),
@@ -71,7 +75,7 @@ mod tests {
     }
 
     #[test]
-    fn letters_of_all_scripts_stay() {
+    fn letters_of_all_scripts_are_unchanged() {
         for text in ["Stollen Süd, 12 °C, \"x\\y\"", "隧道", "נהר", "e\u{301}", "⚠ 🚇"] {
             assert_eq!(one_line(text), text);
         }

@@ -11,10 +11,10 @@ use super::error::{ConfigError, ConfigErrors, MOST_ERRORS, Notes};
 use super::nearest::nearest;
 use super::plain::is_plain;
 
-/// Reads a file referenced by another one (a polyline profile, a device's definitions), by the name given there.
+/// Reads a file referenced by another one (a polyline profile, a device's definitions), by its name there.
 pub type Loader<'a> = &'a dyn Fn(&str) -> Result<String, String>;
 
-/// Most tables of an array of tables; each is compared with the others.
+/// Maximum number of tables in an array of tables, because each is compared with the others.
 const MOST_TABLES: usize = 2000;
 
 /// A file referenced by a key.
@@ -54,22 +54,24 @@ pub struct Section<'a> {
 impl<'a> Document<'a> {
     /// Parses the text to its root table, whose readers fail at the first error.
     ///
-    /// Errors: the text isn't TOML.
+    /// Errors: the text is not TOML.
     pub fn root(self) -> Result<Section<'a>, ConfigError> {
         Ok(Section::of_root(self, self.table()?, Notes::default()))
     }
 
-    /// Reads the whole text with `read`, and finds all of its errors: one that a reader of the table or of one below finds is
-    /// noted, and reading goes on as if the key were absent. Keys that weren't read are errors, too.
+    /// Reads the whole text with `read`, and finds all of its errors.
     ///
-    /// Errors: all that were noted, and the one that `read` returned.
+    /// An error in the table or below is noted, and reading continues as if the key were absent. Unread keys are
+    /// errors, too.
+    ///
+    /// Errors: all noted errors, and the one that `read` returned.
     pub fn read<T>(
         self,
         read: impl FnOnce(&Section<'a>) -> Result<T, ConfigError>,
     ) -> Result<T, ConfigErrors> {
         self.is_short()?;
         let (table, broken) = DeTable::parse_recoverable(self.text);
-        // Of a line the first: the others follow from it.
+        // Only the first error of a line counts, since the others follow from it.
         let told = broken.iter().take(2 * MOST_ERRORS);
         let mut broken: Vec<ConfigError> = told.map(|error| self.broken(error)).collect();
         broken.dedup_by_key(|error| error.line);
@@ -85,7 +87,7 @@ impl<'a> Document<'a> {
         match (result, ConfigErrors::of(notes.take())) {
             (Some(result), None) => Ok(result),
             (_, Some(errors)) => Err(errors),
-            // Not reached: an error was noted wherever there is no result.
+            // Unreachable: every missing result has a noted error.
             (None, None) => Err(self.broken_as("couldn't be read", 0).into()),
         }
     }
@@ -98,15 +100,15 @@ impl<'a> Section<'a> {
         Self { document, path, at: 0, table, asked, files: Files(None), notes }
     }
 
-    /// Lets keys of this table and its subtables reference files, which `load` reads.
+    /// Lets keys of this table and its subtables refer to files, which `load` reads.
     #[must_use]
     pub fn with_files(self, load: Loader<'a>) -> Self {
         Self { files: Files(Some(load)), ..self }
     }
 
-    /// The file referenced by a key. Files referenced by a vehicle file are also attached to logs.
+    /// Returns the file referenced by a key. Files referenced by a vehicle file are also attached to logs.
     ///
-    /// Errors: not a string, or a file that can't be read.
+    /// Errors: not a string, or a file that cannot be read.
     pub fn named_file(&self, key: &'static str) -> Result<Option<NamedFile>, ConfigError> {
         let Some(name) = self.text(key)? else { return Ok(None) };
         let Files(load) = self.files;
@@ -117,7 +119,7 @@ impl<'a> Section<'a> {
         }
     }
 
-    /// A number within `allowed`, in the unit of the key's suffix.
+    /// Reads a number within `allowed`, in the unit of the key's suffix.
     ///
     /// Errors: not a finite number, or outside `allowed`.
     pub fn number(
@@ -133,7 +135,7 @@ impl<'a> Section<'a> {
         }
     }
 
-    /// A whole number within `allowed`; hexadecimal (0x...) is accepted too.
+    /// Reads a whole number within `allowed`; hexadecimal (0x...) is accepted, too.
     ///
     /// Errors: not a whole number, or outside `allowed`.
     pub fn integer(
@@ -149,7 +151,7 @@ impl<'a> Section<'a> {
         }
     }
 
-    /// A string.
+    /// Reads a string.
     ///
     /// Errors: not a string.
     pub fn text(&self, key: &'static str) -> Result<Option<String>, ConfigError> {
@@ -161,7 +163,7 @@ impl<'a> Section<'a> {
         }
     }
 
-    /// True or false.
+    /// Reads true or false.
     ///
     /// Errors: anything else.
     pub fn boolean(&self, key: &'static str) -> Result<Option<bool>, ConfigError> {
@@ -172,7 +174,7 @@ impl<'a> Section<'a> {
         }
     }
 
-    /// One of the given words; returns its associated value.
+    /// Reads one of the given words; returns its associated value.
     ///
     /// Errors: another word; the message lists those allowed.
     pub fn choice<T: Copy>(&self, key: &'static str, among: &[(&str, T)]) -> Result<Option<T>, ConfigError> {
@@ -187,7 +189,7 @@ impl<'a> Section<'a> {
         self.wrong(key, Some(value), format!("must be one of {}{meant}", words.join(", ")))
     }
 
-    /// Three numbers, each within `allowed`.
+    /// Reads three numbers, each within `allowed`.
     ///
     /// Errors: not an array of three, or one of them outside.
     pub fn triple(
@@ -204,7 +206,7 @@ impl<'a> Section<'a> {
         }
     }
 
-    /// An array of numbers of any length, each within `allowed`.
+    /// Reads an array of numbers of any length, each within `allowed`.
     ///
     /// Errors: not an array of numbers, or one of them outside.
     pub fn numbers(
@@ -221,7 +223,7 @@ impl<'a> Section<'a> {
         }
     }
 
-    /// A number, or an array of numbers, each within `allowed`; `wanted` says what is.
+    /// Reads a number or an array of numbers, each within `allowed`; `wanted` describes them in errors.
     ///
     /// Errors: anything else, or one of them outside.
     pub fn number_or_numbers(
@@ -238,7 +240,7 @@ impl<'a> Section<'a> {
         }
     }
 
-    /// A table within this one.
+    /// Reads a table within this one.
     ///
     /// Errors: the key holds something else.
     pub fn section(&self, key: &'static str) -> Result<Option<Section<'a>>, ConfigError> {
@@ -249,7 +251,7 @@ impl<'a> Section<'a> {
         }
     }
 
-    /// The tables of an array of tables; none when the key is absent.
+    /// Reads the tables of an array of tables; empty if the key is absent.
     ///
     /// Errors: the key holds something else.
     pub fn sections(&self, key: &'static str) -> Result<Vec<Section<'a>>, ConfigError> {
@@ -262,7 +264,7 @@ impl<'a> Section<'a> {
         };
         let count = value.get_ref().as_array().map_or(0, |array| array.iter().count());
         if count > MOST_TABLES {
-            let problem = format!("{count} tables; up to {MOST_TABLES} are read");
+            let problem = format!("{count} tables; the most allowed is {MOST_TABLES}");
             return Ok(self.wrong(key, Some(value), problem)?.unwrap_or_default());
         }
         let items = value.get_ref().as_array().map(|array| array.iter().enumerate().map(table));
@@ -273,7 +275,7 @@ impl<'a> Section<'a> {
         Ok(self.wrong(key, Some(value), problem)?.unwrap_or_default())
     }
 
-    /// One table, or the tables of an array of tables; none when the key is absent.
+    /// Reads one table, or the tables of an array of tables; empty if the key is absent.
     ///
     /// Errors: the key holds something else.
     pub fn tables(&self, key: &'static str) -> Result<Vec<Section<'a>>, ConfigError> {
@@ -281,7 +283,7 @@ impl<'a> Section<'a> {
         if one { Ok(self.section(key)?.into_iter().collect()) } else { self.sections(key) }
     }
 
-    /// An array of strings.
+    /// Reads an array of strings.
     ///
     /// Errors: the key holds something else.
     pub fn texts(&self, key: &'static str) -> Result<Option<Vec<String>>, ConfigError> {
@@ -293,7 +295,7 @@ impl<'a> Section<'a> {
         }
     }
 
-    /// `value`, or an error that the key is missing; a key nearly so called is named instead.
+    /// Returns `value`, or an error that the key is missing; the error names a similar key if there is one.
     ///
     /// Errors: `value` is `None`.
     pub fn required<T>(&self, key: &'static str, value: Option<T>) -> Result<T, ConfigError> {
@@ -305,7 +307,7 @@ impl<'a> Section<'a> {
         let is_below = |error: &ConfigError| {
             error.key.strip_prefix(&name).is_some_and(|rest| rest.is_empty() || rest.starts_with(['.', '[']))
         };
-        // It is there, and wrong.
+        // The key is present, and its value is wrong.
         if let Some(wrong) = self.noted(|error| self.table.contains_key(key) && is_below(error)) {
             return wrong;
         }
@@ -313,7 +315,7 @@ impl<'a> Section<'a> {
         misnamed.unwrap_or_else(|| self.told(self.error(key, None, "is missing".to_owned())))
     }
 
-    /// An error about a key of this table that nobody has asked for and that is nearly called `key`, if there is one.
+    /// Returns an error about an unread key of this table with a name similar to `key`, if there is one.
     fn misnamed(&self, key: &str) -> Option<ConfigError> {
         let asked = self.asked.borrow();
         let mut others: Vec<_> =
@@ -324,16 +326,16 @@ impl<'a> Section<'a> {
         Some(self.told(self.unknown(other, &[key])))
     }
 
-    /// Reads a part of the file; `None` where that finds errors, which are noted, so that reading goes on.
+    /// Reads a part of the file; `None` if the part has errors, which are noted so that reading continues.
     ///
-    /// Errors: that of the part, if errors aren't collected.
+    /// Errors: that of the part, if errors are not collected.
     pub fn part<T>(&self, read: impl FnOnce() -> Result<T, ConfigError>) -> Result<Option<T>, ConfigError> {
         let before = self.notes.count();
         let part = self.go_on(read())?;
         Ok(part.filter(|_| self.notes.count() == before))
     }
 
-    /// The result, or a note of its error.
+    /// Returns the result, or notes its error.
     fn go_on<T>(&self, result: Result<T, ConfigError>) -> Result<Option<T>, ConfigError> {
         match result {
             Ok(result) => Ok(Some(result)),
@@ -347,7 +349,7 @@ impl<'a> Section<'a> {
 
     /// Checks that every key of this table was read.
     ///
-    /// Errors: the first key that wasn't; the message names the nearest of the known ones, or lists them.
+    /// Errors: the first unread key; the message names the nearest known key, or lists the known ones.
     pub fn finish(&self) -> Result<(), ConfigError> {
         let asked = self.asked.borrow();
         let mut unknown: Vec<_> =
@@ -358,7 +360,7 @@ impl<'a> Section<'a> {
                 break;
             }
             let name = self.full(key.get_ref());
-            // One that was found near a missing key has been told.
+            // A key found near a missing one has already been reported.
             if self.noted(|error| error.key == name).is_none() {
                 self.go_on::<()>(Err(self.unknown(key, &asked)))?;
             }
@@ -380,9 +382,11 @@ impl<'a> Section<'a> {
         }
     }
 
-    /// An error about `key` in this table, for checks that only the caller can make. Where an error of the key has been noted,
-    /// or the key is absent from a table below the root and one of that table has, it is that one: this may only follow from it. A
-    /// key nearly so called is named instead of an absent one.
+    /// Returns an error about `key` in this table, for checks that only the caller can make.
+    ///
+    /// If an error of the key has already been noted, it returns that one, since this error may only follow from it.
+    /// The same holds if the key is absent from a table below the root that has an error. For an absent key, it names
+    /// a similar key if there is one.
     pub fn invalid(&self, key: &str, problem: &str) -> ConfigError {
         let (name, value) = (self.full(key), self.table.get(key));
         let is_below = value.is_none() && !self.path.is_empty();
@@ -391,7 +395,7 @@ impl<'a> Section<'a> {
         follows.or_else(misnamed).unwrap_or_else(|| self.told(self.error(key, value, problem.to_owned())))
     }
 
-    /// An error about this table as a whole; one of its keys', if one has been noted.
+    /// Returns an error about this table as a whole, or a noted error of one of its keys.
     pub fn invalid_itself(&self, problem: &str) -> ConfigError {
         let error = || ConfigError {
             file: self.document.file.to_owned(),
@@ -413,7 +417,7 @@ impl<'a> Section<'a> {
         key.is_some_and(|key| !key.contains(['.', '[']))
     }
 
-    /// The first error of this file noted that is so.
+    /// Returns the first noted error of this file that satisfies `is_so`.
     fn noted(&self, is_so: impl Fn(&ConfigError) -> bool) -> Option<ConfigError> {
         self.notes.find(|error| error.file == self.document.file && is_so(error))
     }
@@ -424,7 +428,7 @@ impl<'a> Section<'a> {
         error
     }
 
-    /// A value that is wrong: noted, and then as if it were absent.
+    /// Notes a wrong value, and treats it as absent.
     fn wrong<T>(
         &self,
         key: &str,

@@ -6,7 +6,7 @@ use super::reader::NamedFile;
 const TEXT: &str = "target_m = 0.5\n[water]\nsound_speed_mps = 14470\nsalt = 1\n";
 
 #[test]
-fn an_error_names_file_line_key_value_and_what_is_allowed() {
+fn error_names_file_line_key_value_and_allowed_values() {
     let root = Document::new("v.toml", TEXT).root().unwrap();
     assert_eq!(root.number("target_m", 0.0..=1.0).unwrap(), Some(0.5));
     let water = root.section("water").unwrap().unwrap();
@@ -20,7 +20,7 @@ fn an_error_names_file_line_key_value_and_what_is_allowed() {
 }
 
 #[test]
-fn a_missing_key_and_a_broken_text_have_their_line() {
+fn missing_key_and_invalid_toml_have_their_line() {
     let root = Document::new("v.toml", "\n[water]\n").root().unwrap();
     let water = root.section("water").unwrap().unwrap();
     let error =
@@ -30,7 +30,7 @@ fn a_missing_key_and_a_broken_text_have_their_line() {
 }
 
 #[test]
-fn a_key_names_a_file() {
+fn key_refers_to_a_file() {
     let files = |name: &str| match name {
         "a.dbc" => Ok("text".to_owned()),
         _ => Err("isn't there".to_owned()),
@@ -50,7 +50,7 @@ fn a_key_names_a_file() {
 }
 
 #[test]
-fn not_a_number_is_refused() {
+fn value_that_is_not_a_number_is_rejected() {
     let root = Document::new("v.toml", "a = nan\nb = inf\nc = \"1\"\nd = [1, 2]\n").root().unwrap();
     for key in ["a", "b", "c"] {
         assert!(root.number(key, f64::MIN..=f64::MAX).is_err(), "{key}");
@@ -59,7 +59,7 @@ fn not_a_number_is_refused() {
 }
 
 #[test]
-fn all_errors_of_a_text_are_found_in_one_pass() {
+fn all_errors_are_found_in_one_pass() {
     let text = "taget_m = 3\ncolour = 1\n[water]\nsound_speed_mps = 14470\nsalt = 1\n[[parts]]\nid = 7\nrate_hz = 2\n\
                 [[parts]]\nid = \"b\"\nrate_hz = 0\n";
     let errors = Document::new("v.toml", text).read(|root| {
@@ -70,11 +70,11 @@ fn all_errors_of_a_text_are_found_in_one_pass() {
             water.finish()?;
             Ok(speed)
         })?;
-        assert_eq!(water, None, "wrong in part is wrong");
+        assert_eq!(water, None, "a table with an error is discarded");
         for part in root.sections("parts")? {
             root.part(|| {
                 let id = part.text("id")?;
-                // Neither follows from what is wrong already, nor is told for it.
+                // These errors may only follow from earlier ones, so they are not reported.
                 part.number("rate_hz", 1.0..=9.0)?.ok_or_else(|| part.invalid("rate_hz", "is needed"))?;
                 part.required("id", id)
             })?;
@@ -93,7 +93,7 @@ fn all_errors_of_a_text_are_found_in_one_pass() {
 }
 
 #[test]
-fn a_text_without_errors_is_read() {
+fn valid_text_is_read() {
     let read = Document::new("v.toml", "a = 1\n").read(|root| root.number("a", 0.0..=1.0));
     assert_eq!(read, Ok(Some(1.0)));
     let unread = Document::new("v.toml", "a = 1\nb = 2\n").read(|root| root.number("a", 0.0..=1.0));
@@ -101,7 +101,7 @@ fn a_text_without_errors_is_read() {
 }
 
 #[test]
-fn a_word_that_is_nearly_right_is_named() {
+fn similar_word_is_suggested() {
     let root = Document::new("v.toml", "profile = \"cercle\"\n").root().unwrap();
     let error = root.choice("profile", &[("arch", 1), ("circle", 2)]).unwrap_err();
     assert_eq!(
@@ -111,14 +111,14 @@ fn a_word_that_is_nearly_right_is_named() {
 }
 
 #[test]
-fn all_that_is_no_toml_is_found() {
+fn all_invalid_toml_is_found() {
     let errors = Document::new("v.toml", "a = = 1\nb = 2\nc = \"x\n[d\n").read(|_| Ok(())).unwrap_err();
     let lines: Vec<usize> = errors.errors().iter().map(|error| error.line).collect();
     assert_eq!(lines, [1, 3, 4], "{errors}");
 }
 
 #[test]
-fn the_line_of_a_key_is_found_by_its_path() {
+fn line_of_a_key_is_found_by_its_path() {
     let text = "a = 1\n[b]\nc = 2\n[[d]]\ne = 3\n[[d]]\ne = 4\nf = { g = 5 }\n";
     let line = |path: &str| Document::new("v.toml", text).line_of(path);
     for (path, expected) in [

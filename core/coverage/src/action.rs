@@ -7,32 +7,33 @@ use super::cause::Cause;
 /// Change to make when a failed stretch is passed again.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Action {
-    /// Slower.
+    /// Drive slower.
     Slower,
-    /// A mode with a finer angular step: lower speed does not help.
+    /// Use a mode with a finer angular step: lower speed does not help.
     FinerMode,
-    /// A longer range setting.
+    /// Set a longer range.
     LongerRange,
-    /// Rolled, so that the vehicle occludes another part of the wall: turned round it hides the same.
+    /// Roll the vehicle so that it occludes another part of the wall. Turning round would occlude the same
+    /// part.
     OtherSide,
-    /// Centred in the tunnel and steady.
+    /// Stay centred in the tunnel, with a steady heading.
     Middle,
-    /// Heads in phase.
+    /// Restart the heads in phase.
     InPhase,
-    /// The stalled head repaired, or slower without it.
+    /// Repair the stalled head, or drive slower without it.
     Head,
-    /// The silent heads pinging again.
+    /// Get the silent heads pinging again.
     HeadBack,
-    /// With the position fix restored.
+    /// Restore the position fix first.
     Position,
-    /// A higher gain: so much is lost, or always of the same wall, that lower speed does not help.
+    /// Raise the gain: losses are so many, or so persistent on the same wall, that lower speed does not help.
     HigherGain,
-    /// No change: pass again, from end to end.
+    /// Change nothing: pass the stretch again from end to end.
     Again,
 }
 
 impl Action {
-    /// All of them.
+    /// All actions, in order of declaration.
     pub const ALL: [Self; 11] = [
         Self::Slower,
         Self::FinerMode,
@@ -47,7 +48,9 @@ impl Action {
         Self::Again,
     ];
 
-    /// The actions against several causes, in their order; `is_beyond_speed`: no speed makes up for the returns that are missing.
+    /// Actions against several causes, in the order of the causes and without duplicates.
+    ///
+    /// With `is_beyond_speed`, no speed makes up for the missing returns.
     pub fn against(causes: impl IntoIterator<Item = Cause>, is_beyond_speed: bool) -> Vec<Self> {
         let mut actions: Vec<Self> = Vec::new();
         for cause in causes {
@@ -62,7 +65,7 @@ impl Action {
         actions
     }
 
-    /// The action against a cause.
+    /// Action against one cause.
     fn of(cause: Cause) -> Self {
         match cause {
             Cause::TooFast => Self::Slower,
@@ -78,7 +81,7 @@ impl Action {
         }
     }
 
-    /// The word used in reports.
+    /// Word used in reports.
     pub fn as_str(self) -> &'static str {
         match self {
             Self::Slower => "slower",

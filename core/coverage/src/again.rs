@@ -1,43 +1,43 @@
-//! How a missed stretch is to be passed again.
+//! Speed and prospects for passing a missed stretch again.
 
 use serde::{Deserialize, Serialize};
 
 use super::cause::Cause;
 use super::causes::Causes;
 
-/// How fast to pass again what was missed, and whether that helps.
+/// Speed for passing a missed stretch again, and whether speed helps at all.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct Again {
-    /// Largest speed that meets the target in all that a speed mends, m/s; zero where most is mended by none.
+    /// Largest speed that meets the target wherever a speed can, m/s. Zero if no speed helps most sections.
     pub at_most_mps: f64,
-    /// Returns are missing for which no speed makes up, in a tenth of it or more.
+    /// No speed makes up for the missing returns in at least a tenth of the sections.
     pub is_beyond_speed: bool,
 }
 
-/// Of failed sections, one of so many is named.
+/// A remedy is named if at least one failed section in this many needs it.
 pub(super) const NAMED_OF: u32 = 10;
 
 /// A failed section.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct Failing {
-    /// What it was put down to.
+    /// Causes assigned to it.
     pub causes: Causes,
-    /// The speed that meets the target there, m/s; zero where none does.
+    /// Speed that meets the target there, m/s. Zero if no speed does.
     pub again_mps: f64,
 }
 
-/// Failed sections, counted by how they are to be passed again.
+/// Counts of failed sections by remedy.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub(super) struct Tally {
-    /// Those that a speed mends, and the lowest such speed, m/s.
+    /// Sections that a speed can mend, and the lowest such speed, m/s.
     mended: u32,
     least_mps: f64,
-    /// Those that lack returns for which no speed makes up.
+    /// Sections whose missing returns no speed makes up for.
     beyond: u32,
 }
 
 impl Again {
-    /// Of a single section.
+    /// Advice for a single section.
     pub fn of(section: &Failing) -> Self {
         let mut tally = Tally::default();
         tally.add(section);
@@ -65,14 +65,15 @@ impl Tally {
         self.beyond += u32::from(section.is_beyond());
     }
 
-    /// Takes one out; true if it may have been the only one with the lowest speed, which has to be found anew.
+    /// Removes a section. Returns true if it may have been the only one with the lowest speed, which must
+    /// then be found again.
     pub(super) fn remove(&mut self, section: &Failing) -> bool {
         self.mended = self.mended.saturating_sub(u32::from(section.is_mended()));
         self.beyond = self.beyond.saturating_sub(u32::from(section.is_beyond()));
         section.is_mended() && section.again_mps <= self.least_mps
     }
 
-    /// Whether a section's speed is the lowest.
+    /// Whether the section's speed is the lowest counted.
     pub(super) fn is_least(&self, section: &Failing) -> bool {
         section.is_mended() && section.again_mps <= self.least_mps
     }
@@ -87,7 +88,7 @@ impl Tally {
         self.beyond += other.beyond;
     }
 
-    /// How to pass again so many sections that were counted.
+    /// Advice for all counted sections, `failed` in number.
     pub(super) fn again(&self, failed: u32) -> Again {
         Again {
             at_most_mps: if self.mended > 0 && 2 * self.mended >= failed { self.least_mps } else { 0.0 },
@@ -113,16 +114,16 @@ mod tests {
     }
 
     #[test]
-    fn the_slowest_of_what_a_speed_mends_is_told_where_that_is_half_of_it() {
+    fn lowest_mending_speed_is_advised_if_speed_mends_half_of_the_sections() {
         let fast = [section(Cause::TooFast, 0.12), section(Cause::TooFast, 0.1)];
         assert_eq!(again(&fast), Again { at_most_mps: 0.1, is_beyond_speed: false });
         let lost = section(Cause::MissingReturns, 0.0);
         assert_eq!(again(&[fast[0], lost]), Again { at_most_mps: 0.12, is_beyond_speed: true });
         assert_eq!(again(&[fast[0], lost, lost]), Again { at_most_mps: 0.0, is_beyond_speed: true });
-        // In a mode in which no speed meets the target it isn't for want of returns.
+        // In a mode in which no speed meets the target, missing returns are not the cause.
         let coarse = section(Cause::AngularStep, 0.0);
         assert_eq!(again(&[coarse; 3]), Again::default());
-        // One of twelve isn't what is the matter.
+        // One section of twelve is below the naming threshold.
         let mut many = [fast[1]; 12];
         many[3] = lost;
         assert_eq!(again(&many), Again { at_most_mps: 0.1, is_beyond_speed: false });

@@ -10,19 +10,19 @@ use super::passage::Loss;
 pub enum Cause {
     /// The distance between passes was too large at the speed driven.
     TooFast,
-    /// The angular step alone leaves such holes; lower speed does not help.
+    /// The angular step alone leaves holes of this size. Lower speed does not help.
     AngularStep,
     /// The wall was farther than the heads' range setting.
     OutOfRange,
     /// The vehicle was off-centre, or turned so that its beams swung along the tunnel.
     OffAxis,
-    /// The heads' passes were unevenly spread; as scheduled they would have met the target.
+    /// The heads' passes were unevenly spread. As scheduled they would have met the target.
     Phase,
-    /// The hole reaches beyond the stretch that was passed.
+    /// The hole extends beyond the stretch that all live heads have swept.
     NotPassed,
-    /// A head went by without a ping.
+    /// A head passed without pinging.
     HeadSilent,
-    /// A head was stalled, or has been out of step since.
+    /// A head was stalled, or has been out of phase since a stall.
     HeadStalled,
     /// Returns came without a valid position.
     PositionLost,
@@ -35,7 +35,8 @@ pub enum Cause {
 }
 
 impl Cause {
-    /// All of them, what the pilot can change first: of two that explain a hole alike, the first is named.
+    /// All causes. The causes that the pilot can change come first: of two that explain a hole equally well,
+    /// the first is named.
     pub const ALL: [Self; 12] = [
         Self::TooFast,
         Self::AngularStep,
@@ -51,7 +52,7 @@ impl Cause {
         Self::Unknown,
     ];
 
-    /// The word used in reports and logs.
+    /// Word used in reports and logs.
     pub fn as_str(self) -> &'static str {
         match self {
             Self::TooFast => "too_fast",
@@ -69,7 +70,7 @@ impl Cause {
         }
     }
 
-    /// The cause that a lost ping is put down to.
+    /// Cause of a ping lost for this reason.
     pub fn of_loss(loss: Loss) -> Self {
         match loss {
             Loss::Missing => Self::MissingReturns,

@@ -4,29 +4,29 @@ use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
 use super::cause::Cause;
 
-/// A set of causes. Its order is that of [`Cause::ALL`]: what the pilot can change comes first.
+/// Set of causes in the order of [`Cause::ALL`]: causes that the pilot can change come first.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Causes(u16);
 
 impl Causes {
-    /// The set of one cause.
+    /// Set of one cause.
     pub fn of(cause: Cause) -> Self {
         Self(1 << cause as u16)
     }
 
-    /// This set plus a cause.
+    /// This set with a cause added.
     #[must_use]
     pub fn with(self, cause: Cause) -> Self {
         self.union(Self::of(cause))
     }
 
-    /// This set less a cause.
+    /// This set with a cause removed.
     #[must_use]
     pub fn without(self, cause: Cause) -> Self {
         self.less(Self::of(cause))
     }
 
-    /// This set less the causes of another.
+    /// This set with another set's causes removed.
     #[must_use]
     pub fn less(self, other: Self) -> Self {
         Self(self.0 & !other.0)
@@ -43,7 +43,7 @@ impl Causes {
         Self::of(cause).is_within(self)
     }
 
-    /// Whether all of it is in another set.
+    /// Whether this set is a subset of another.
     pub fn is_within(self, other: Self) -> bool {
         self.0 & !other.0 == 0
     }
@@ -53,7 +53,7 @@ impl Causes {
         self.0.count_ones()
     }
 
-    /// Whether there is none.
+    /// Whether the set is empty.
     pub fn is_empty(self) -> bool {
         self.0 == 0
     }
@@ -63,12 +63,12 @@ impl Causes {
         Cause::ALL.into_iter().filter(move |cause| self.has(*cause))
     }
 
-    /// The set as a number: bit k for the cause numbered k.
+    /// The set as a number: bit k is set for the cause numbered k.
     pub fn bits(self) -> u16 {
         self.0
     }
 
-    /// The set of these bits; bits of no cause are ignored.
+    /// Set of the causes with these bits. Unknown bits are ignored.
     pub fn from_bits(bits: u16) -> Self {
         Cause::ALL.into_iter().filter(|cause| bits & (1 << *cause as u16) != 0).collect()
     }
@@ -80,7 +80,7 @@ impl FromIterator<Cause> for Causes {
     }
 }
 
-/// A list of words in text formats such as JSON, the bits in snapshots.
+/// Serialises as a list of words in text formats such as JSON, and as bits in snapshots.
 impl Serialize for Causes {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         if serializer.is_human_readable() {
@@ -106,7 +106,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_set_is_a_list_of_words_the_main_one_first() {
+    fn cause_set_serialises_as_words_main_cause_first() {
         let set = Causes::of(Cause::Occluded).with(Cause::TooFast);
         assert_eq!(serde_json::to_value(set).unwrap(), serde_json::json!(["too_fast", "occluded"]));
         assert_eq!((set.len(), Causes::from_bits(set.bits())), (2, set));

@@ -4,27 +4,28 @@ use serde::{Deserialize, Serialize};
 
 use headrace_geometry::tunnel::{Profile, Yz};
 
-/// Deviation of a section's samples from the design profile; outward is positive.
+/// Deviation of a section's samples from the design profile. Outward is positive.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct Deviation {
     samples: u32,
     /// Samples that deviate by more than the contradiction limit.
     contradicting: u32,
     sum_m: f64,
-    /// Largest inward deviation, m, at most zero.
+    /// Largest inward deviation, m; never above zero.
     inmost_m: f64,
-    /// Largest outward deviation, m, at least zero.
+    /// Largest outward deviation, m; never below zero.
     outmost_m: f64,
-    /// Area swept from the reference point between neighbouring samples of a sweep, and the same of the design, m2.
+    /// Area swept from the reference point between neighbouring samples of a sweep, and the design's area
+    /// there, m2.
     swept_m2: f64,
     design_m2: f64,
 }
 
 impl Deviation {
-    /// Adds a sample at `point` with arc length `arc_m`; `before` is the same head's sample a single step earlier, with
-    /// its arc length. Returns the outward deviation, m.
+    /// Adds a sample at `point` with arc length `arc_m`, and returns its outward deviation, m.
     ///
-    /// Source: the distance along the ray from the profile's reference point, as arc length is measured.
+    /// `before` is the same head's previous sample, one step earlier, with its arc length. The deviation is
+    /// measured along the ray from the profile's reference point, as arc length is.
     pub fn add(
         &mut self,
         profile: &Profile,
@@ -57,18 +58,22 @@ impl Deviation {
         (self.samples > 0).then_some([self.inmost_m, self.outmost_m])
     }
 
-    /// Cross-section area over that of the design, where swept; `None` without sweeps.
+    /// Ratio of the swept cross-section area to the design's; `None` without sweeps.
     pub fn area_ratio(&self) -> Option<f64> {
         (self.design_m2 > 0.0).then(|| self.swept_m2 / self.design_m2)
     }
 
-    /// True if most samples, and so their median, exceed the contradiction limit: wrong profile or wrong position.
+    /// Whether most samples, and so their median, exceed the contradiction limit.
+    ///
+    /// Either the profile or the position is wrong then.
     pub fn contradicts(&self) -> bool {
         2 * self.contradicting > self.samples
     }
 }
 
-/// Outward deviation of a point with this arc length from the design, along the ray from the reference point, m.
+/// Outward deviation of a point from the design along the ray from the reference point, m.
+///
+/// `arc_m` is the point's arc length.
 pub fn off_m(profile: &Profile, point: Yz, arc_m: f64) -> f64 {
     let centre = profile.reference();
     distance_m(centre, point) - distance_m(centre, profile.point_at(arc_m))
@@ -89,7 +94,7 @@ mod tests {
     use headrace_geometry::math::{self, TAU};
     use headrace_geometry::tunnel::shapes;
 
-    /// One turn of samples at radius `true_m` about the reference point of a circle of 3 m radius.
+    /// One turn of `samples` samples at radius `true_m` about the reference point of a circle of 3 m radius.
     fn turned(true_m: f64, samples: u32) -> Deviation {
         let profile = shapes::circle(3.0).unwrap();
         let [y, z] = profile.reference();
@@ -106,7 +111,7 @@ mod tests {
     }
 
     #[test]
-    fn a_wider_tunnel_is_beyond_its_design_by_as_much_all_round() {
+    fn wider_circle_deviates_equally_all_round() {
         let deviation = turned(3.2, 400);
         assert!((deviation.mean_m().unwrap() - 0.2).abs() < 1e-9);
         let [inmost_m, outmost_m] = deviation.extremes_m().unwrap();
@@ -116,7 +121,7 @@ mod tests {
     }
 
     #[test]
-    fn a_profile_that_most_samples_contradict_is_said_to_be_wrong() {
+    fn profile_contradicts_if_most_samples_exceed_the_limit() {
         assert!(turned(3.6, 100).contradicts() && turned(2.4, 100).contradicts());
         let mut rock = turned(3.0, 100);
         let profile = shapes::circle(3.0).unwrap();
@@ -124,12 +129,12 @@ mod tests {
         for _ in 0..40 {
             rock.add(&profile, (point, profile.arc_of(point)), None, 0.5);
         }
-        assert!(!rock.contradicts(), "a heap on the floor isn't another tunnel");
+        assert!(!rock.contradicts(), "a heap on the floor doesn't contradict the profile");
         assert!((rock.extremes_m().unwrap()[0] + 1.0).abs() < 1e-9);
     }
 
     #[test]
-    fn nothing_is_said_of_a_wall_without_samples() {
+    fn deviation_without_samples_is_none() {
         let deviation = Deviation::default();
         assert_eq!((deviation.mean_m(), deviation.extremes_m(), deviation.area_ratio()), (None, None, None));
         assert!(!deviation.contradicts());

@@ -1,8 +1,8 @@
-//! Why a section failed: the smallest set of factors without which its hole would have met the target.
+//! Explains a fail by the smallest set of factors without which the hole would have met the target.
 //!
-//! Each factor that was present is taken away from what was measured, by the geometry that makes the hole: samples that
-//! are lacking for it are put back, or the wall is drawn together by as much as passes or steps would have been closer.
-//! `docs/why/coverage.md` has the order and its reasons.
+//! Each factor that was present is removed from the measurements by geometry. Either the samples missing
+//! because of it are put back, or the wall is compressed by the amount that passes or steps would have been
+//! closer together. `docs/why/coverage.md` states the order of the factors and its reasons.
 
 mod case;
 mod driven;
@@ -25,17 +25,20 @@ use trial::Trial;
 pub use case::Case;
 use case::{HELPS, Seen, WIDEST, is_dark, is_in, is_passed};
 
-/// T as driven over the target from which speed counts although it was the planned one: T is an upper bound of D.
+/// Ratio of T as driven to the target above which speed counts as a factor even at the planned speed. T is an
+/// upper bound of D.
 const WELL_OVER: f64 = 1.2;
-/// Speed over the planned one from which it wasn't kept to.
+/// Ratio of the speed to the planned one above which the plan was not kept.
 const OVER_PLAN: f64 = 1.15;
-/// The same of both without a position, when the speed is known by the inertial unit alone.
+/// Replaces both ratios without a position: the speed is then known from the inertial unit alone.
 const OVER_LOST: f64 = 1.4;
-/// The same where it is over every speed that fits, too: no more than what measuring it may be off.
+/// Ratio of the speed to the fitting one above which speed counts: just over the speed's measurement error.
+///
+/// The planned speed replaces the fitting one if larger.
 const OVER_ALL: f64 = 1.03;
-/// The same of the swing between passes: even a steady vehicle sways.
+/// Swing counts if the distance between passes without it is below this share. Even a steady vehicle sways.
 const SWINGS: f64 = 0.85;
-/// Share of the target from which steps from the middle count.
+/// Ratio of the angular step, seen from the centre, to the target above which the step counts.
 const COARSE: f64 = 0.75;
 
 /// Determines the causes of a section's hole from the sections within T of it.
@@ -60,7 +63,7 @@ pub fn explain<'a>(
     let is_lossy = causes.has(Cause::MissingReturns);
     let here =
         if is_lossy { sampled.passes_needed(iter::once(LossRate::independent(missing_share))) } else { 1.0 };
-    // Where something else has made it, too, losses have to be as wide as the target alone.
+    // Combined with other causes, losses need to be only as wide as the target.
     let times = if causes.len() > 1 { 1.0 } else { WIDEST };
     let hole_m = case.hole.diameter_m.min(times * case.target_m);
     let is_by_chance = !is_lossy || sampled.is_by_chance(hole_m, drive.along_m(), drive.lost);
@@ -86,13 +89,13 @@ pub fn explain<'a>(
     }
 }
 
-/// The factors that were present.
+/// Factors that were present.
 fn present(case: &Case<'_>, seen: &Seen, perimeter_m: f64) -> Causes {
     let Case { hole, bounds_m: (from_m, to_m), target_m, .. } = *case;
     let around_m = f64::midpoint(hole.diameter_m.min(WIDEST * target_m), target_m);
     let lacking = case.lacks.between(from_m - around_m, to_m + around_m);
     let near = |lack: &&Lack| {
-        // Whatever is lacking round the wall where the hole is all round.
+        // A hole all round the wall takes everything that is missing round the wall.
         let off_m = math::wrap_signed(lack.arc_m - hole.arc_m, perimeter_m).abs();
         off_m < hole.diameter_m + target_m
     };
@@ -112,7 +115,7 @@ fn present(case: &Case<'_>, seen: &Seen, perimeter_m: f64) -> Causes {
     add(drive.middle_t_y_m > COARSE * target_m, Cause::AngularStep);
     let as_planned = spacing::t_max_m(drive.planned_along_m(), drive.advance_m(), drive.middle_t_y_m);
     let over = if coarse { drive.planned_along_m() } else { as_planned } / target_m;
-    // Without a position the speed isn't known so well.
+    // Without a position the speed is less certain.
     let well_over = if is_lost { OVER_LOST } else { WELL_OVER };
     let over_planned = if is_lost { OVER_LOST } else { OVER_PLAN };
     let is_over_all = !is_lost
@@ -123,7 +126,7 @@ fn present(case: &Case<'_>, seen: &Seen, perimeter_m: f64) -> Causes {
     add(over > well_over || is_over_plan || is_over_all, Cause::TooFast);
     let is_slow = drive.is_slow_out_of_phase(1.0 / HELPS);
     let is_uneven = drive.planned_gap_s < HELPS * drive.healthy_gap_s;
-    // At another speed heads apart along the hull may happen to be even.
+    // At another speed, heads apart along the hull may happen to pass evenly.
     let is_fast = drive.speed_mps > OVER_PLAN * drive.planned_mps;
     add(is_slow || is_uneven || is_fast && drive.all_gap_s < HELPS * drive.healthy_at_plan_s, Cause::Phase);
     let steady = Drive { swing_m: 0.0, ..*drive };

@@ -1,4 +1,5 @@
-//! Where samples may still land: decides when a section is open and when it is judged.
+//! Frontier: the stretch where samples may still land. It decides when a section is open and when it is
+//! judged.
 
 use core::ops::Range;
 
@@ -17,14 +18,14 @@ pub struct Reach {
     pub to_m: f64,
 }
 
-/// Reach of one head: the current stretch, and all chainages swept so far.
+/// Reach of one head: its current stretch, and all chainages swept so far.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct HeadReach {
     /// Receive time of the head's last ping, with or without a fix; `None` before the first.
     heard: Option<MonoNs>,
-    /// Reach at its last ping with a fix; of a silent head, where it would be at the last beat with a fix.
+    /// Reach at its last ping with a fix. For a silent head, its reach at the last update with a fix.
     latest: Reach,
-    /// Chainages that its reach has covered; `None` before its first ping with a fix.
+    /// Chainages that its reach has covered; `None` before the first ping with a fix.
     swept: Option<Reach>,
 }
 
@@ -43,12 +44,12 @@ impl HeadReach {
         })
     }
 
-    /// Records a ping without a fix: the head is alive, its reach stays where it was at the last fix.
+    /// Records a ping without a fix: the head is alive, and its reach stays as it was at the last fix.
     pub fn heard(&mut self, now: MonoNs) {
         self.heard = Some(now);
     }
 
-    /// Where the head was last known to be.
+    /// Reach last known.
     pub fn latest(&self) -> Reach {
         self.latest
     }
@@ -62,45 +63,50 @@ fn is_within_silence(since: MonoNs, now: MonoNs) -> bool {
     now.since(since).0.abs() <= SILENT_AFTER.0
 }
 
-/// Tracks the reach of all heads along the tunnel, and the way. The reach of each head is stored with the head and passed
-/// in.
+/// Tracks the reach of all heads along the tunnel, and the coverage extent.
+///
+/// The caller stores each head's reach and passes it in.
 #[derive(Debug, Clone, Default, Serialize, Deserialize)]
 pub struct Frontier {
     /// Chainages that any head's reach has covered.
     swept: Option<Reach>,
-    /// Chainages at which the vehicle and its heads, pinging or not, have been, and those swept.
+    /// Coverage extent: chainages of the vehicle and its heads, pinging or not, and those swept.
     way: Option<Reach>,
-    /// Where all heads, pinging or not, have been with the whole of their reach; empty (from beyond to) until they have.
+    /// Stretch that the whole reach of all heads, pinging or not, has passed.
+    ///
+    /// It is empty (`from_m` beyond `to_m`) until then.
     through: Option<Reach>,
     /// Index range of the sections within the reach of the awaited heads plus a margin.
     zone: Option<Range<i64>>,
-    /// Time of its last change.
+    /// Time of the zone's last change.
     zone_moved: Option<MonoNs>,
     /// Time of the last ping of any head.
     heard: Option<MonoNs>,
-    /// Time of the first ping, and of each that ended a silence of all heads; before it, of the first beat.
+    /// Time of the first ping, and of each ping that ended a silence of all heads. Before it, time of the
+    /// first update.
     woken: Option<MonoNs>,
     course: Option<Course>,
-    /// How often the course has been reversed.
+    /// Number of course reversals.
     turns: u32,
 }
 
 /// Direction of travel along the tunnel.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 struct Course {
-    /// Farthest chainage on this course, m: the middle of the heads' combined reach.
+    /// Farthest chainage on this course, m: the centre of the heads' combined reach.
     farthest_m: f64,
     astern: bool,
     /// Number of heads in that reach.
     heads: usize,
 }
 
-/// Hysteresis for a reversal of the course, m: yaw and tether slack look like a smaller one.
+/// Hysteresis for a reversal of the course, m: yaw and tether slack cause smaller ones.
 const TURNED_M: f64 = 0.25;
 
 impl Course {
-    /// Updates the course with the middle of the current reach of so many heads. Other heads have another middle, which
-    /// says nothing of the direction.
+    /// Updates the course with the centre of the current reach of `heads` heads.
+    ///
+    /// A change in the number of heads moves the centre without any movement of the vehicle.
     fn to(self, middle_m: f64, heads: usize) -> Self {
         if heads != self.heads {
             return Self { farthest_m: middle_m, heads, ..self };
@@ -114,37 +120,39 @@ impl Course {
     }
 }
 
-/// Where samples have landed and may still land at a given time.
+/// Outlook: where samples have landed and may still land at a given time.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Outlook {
-    /// The time.
+    /// Time of the outlook.
     pub at: MonoNs,
-    /// The way: chainages at which the vehicle and its heads, pinging or not, have been.
+    /// Coverage extent: chainages at which the vehicle and its heads, pinging or not, have been.
     pub way: Option<Reach>,
     /// Stretch covered by every awaited head that has pinged; `None` if empty.
     pub swept_by_all: Option<Reach>,
     /// No head is alive.
     pub none_alive: bool,
-    /// Where samples may still land without the vehicle turning back.
+    /// Stretch where samples may still land without the vehicle turning back.
     pub to_come: Option<Reach>,
-    /// What lies behind where the vehicle began, or turned back: not all of its heads have been there, nor will be.
+    /// Stretch behind the place where the vehicle began or turned back: not all heads have been there, nor
+    /// will be.
     pub not_passed: Option<Reach>,
-    /// Where all heads, pinging or not, have been; `None` until they have.
+    /// Stretch that all heads, pinging or not, have passed; `None` until they have.
     pub through: Option<Reach>,
-    /// The zone of sections in reach, once unchanged for longer than [`SILENT_AFTER`]: the vehicle is (nearly) stationary.
+    /// Zone of sections in reach, once unchanged for longer than [`SILENT_AFTER`]: the vehicle is nearly
+    /// stationary.
     pub still_zone: Option<Range<i64>>,
 }
 
-/// Change of the frontier by one ping or beat.
+/// Change of the frontier by one ping or update.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Moved {
     /// Sections newly behind the zone.
     pub left_behind: Range<i64>,
     /// Sections newly ahead of the zone: the vehicle is backing up.
     pub left_ahead: Range<i64>,
-    /// The way has grown by at least a section, perhaps outside the zone.
+    /// The coverage extent has grown by at least a section, perhaps outside the zone.
     pub way_grown: bool,
-    /// Where samples may still land without the vehicle turning back.
+    /// Stretch where samples may still land without the vehicle turning back.
     pub to_come: Option<Reach>,
 }
 
@@ -154,12 +162,12 @@ impl Frontier {
         self.swept
     }
 
-    /// The way: chainages at which the vehicle and its heads, pinging or not, have been.
+    /// Coverage extent: chainages at which the vehicle and its heads, pinging or not, have been.
     pub fn way(&self) -> Option<Reach> {
         self.way
     }
 
-    /// How often the vehicle has turned back so far.
+    /// Number of times the vehicle has turned back so far.
     pub fn turns(&self) -> u32 {
         self.turns
     }
@@ -186,7 +194,7 @@ impl Frontier {
         self.zone.clone().filter(|_| over(self.woken) && over(self.zone_moved))
     }
 
-    /// Whether a head has been silent for so long that it isn't waited for while others ping.
+    /// Whether a head has been silent so long that it isn't waited for while others ping.
     pub fn is_silent(&self, head: Option<&HeadReach>, now: MonoNs) -> bool {
         match head.and_then(|head| head.heard) {
             Some(heard) => !is_within_silence(heard, now),
@@ -194,14 +202,16 @@ impl Frontier {
         }
     }
 
-    /// Whether it isn't known yet which heads are alive: [`SILENT_AFTER`] after the first ping, or after one that ended a
-    /// silence of all.
+    /// Whether it isn't known yet which heads are alive.
+    ///
+    /// True for [`SILENT_AFTER`] after the first ping, and after one that ended a silence of all heads.
     fn is_waking(&self, now: MonoNs) -> bool {
         self.woken.is_none_or(|woken| is_within_silence(woken, now))
     }
 
-    /// The heads whose samples decide what may still come: the live ones, and all where none is alive, or while it isn't
-    /// known yet which are.
+    /// Heads whose samples decide what may still come: the live ones.
+    ///
+    /// All heads count if none is alive, or while it isn't known yet which are.
     fn awaited(
         &self,
         heads: impl Iterator<Item = HeadReach> + Clone,
@@ -216,7 +226,8 @@ impl Frontier {
         self.awaited(heads, now).map(|head| head.latest).reduce(Reach::with)
     }
 
-    /// Where samples may still land without the vehicle turning back: the current reach and everything ahead.
+    /// Stretch where samples may still land without the vehicle turning back: the current reach and
+    /// everything ahead.
     fn to_come(&self, heads: impl Iterator<Item = HeadReach> + Clone, now: MonoNs) -> Option<Reach> {
         let reach = self.reach(heads, now)?;
         Some(match self.course {
@@ -225,14 +236,14 @@ impl Frontier {
         })
     }
 
-    /// Records the combined reach of all heads at a beat, pinging or not.
+    /// Records the combined reach of all heads, pinging or not, at an update.
     pub fn pass(&mut self, all: Reach) {
         let through = self.through.unwrap_or(Reach { from_m: all.to_m, to_m: all.from_m });
         self.through =
             Some(Reach { from_m: through.from_m.min(all.to_m), to_m: through.to_m.max(all.from_m) });
     }
 
-    /// Where all heads, pinging or not, have been; `None` until they have.
+    /// Stretch that all heads, pinging or not, have passed; `None` until they have.
     pub fn through(&self) -> Option<Reach> {
         self.through.filter(|through| through.from_m <= through.to_m)
     }
@@ -253,8 +264,10 @@ impl Frontier {
         self.heard = Some(now);
     }
 
-    /// Updates the frontier for a ping at `now` with reach `pinged`; `heads` are the reaches of all heads, that one
-    /// included. A section leaves the zone when it is farther than `margin_m` from the reach of every awaited head.
+    /// Updates the frontier for a ping at `now` with reach `pinged`.
+    ///
+    /// `heads` are the reaches of all heads, including this one. A section leaves the zone once it is farther
+    /// than `margin_m` from the reach of every awaited head.
     pub fn advance(
         &mut self,
         pinged: Reach,
@@ -269,8 +282,10 @@ impl Frontier {
         self.move_zone(heads, now, section_m, margin_m)
     }
 
-    /// Updates the frontier for a beat at `now` at which vehicle and heads, pinging or not, span `span`; `heads` are the
-    /// reaches of all heads, silent ones where they would be. While a head is alive pings alone move the zone.
+    /// Updates the frontier at `now` when vehicle and heads, pinging or not, span `span`.
+    ///
+    /// `heads` are the reaches of all heads, with silent ones where they would be. While a head is alive,
+    /// only pings move the zone.
     pub fn beat(
         &mut self,
         span: Reach,
@@ -334,7 +349,7 @@ impl Moved {
         self.left_behind.contains(&section) || self.left_ahead.contains(&section)
     }
 
-    /// True if no section left the zone or joined the way, or no head's place is known.
+    /// Whether no section left the zone or joined the coverage extent, or no head's place is known.
     pub fn is_nothing(&self) -> bool {
         let stayed = self.left_behind.is_empty() && self.left_ahead.is_empty() && !self.way_grown;
         stayed || self.to_come.is_none()
@@ -342,19 +357,19 @@ impl Moved {
 }
 
 impl Reach {
-    /// The middle of the stretch, m.
+    /// Centre of the stretch, m.
     pub fn middle_m(&self) -> f64 {
         f64::midpoint(self.from_m, self.to_m)
     }
 
-    /// The stretch that covers both.
+    /// Smallest stretch that covers both.
     #[must_use]
     pub fn with(self, other: Self) -> Self {
         Self { from_m: self.from_m.min(other.from_m), to_m: self.to_m.max(other.to_m) }
     }
 }
 
-/// Distance of a chainage from where samples may still land, m; infinite if none may.
+/// Distance of a chainage from the stretch where samples may still land, m; infinite if there is none.
 pub fn clear_of(to_come: Option<Reach>, x_m: f64) -> f64 {
     to_come.map_or(f64::INFINITY, |reach| (reach.from_m - x_m).max(x_m - reach.to_m).max(0.0))
 }
@@ -384,7 +399,7 @@ mod tests {
     }
 
     #[test]
-    fn a_section_is_left_when_the_last_head_is_a_margin_past_it() {
+    fn section_is_left_when_the_last_head_is_a_margin_past_it() {
         let mut frontier = Fixture::default();
         frontier.advance(0, MonoNs(0), 1.0, 0.25, 0.25);
         frontier.advance(1, MonoNs(0), 0.5, 0.25, 0.25);
@@ -404,7 +419,7 @@ mod tests {
     }
 
     #[test]
-    fn what_lies_ahead_may_still_come_until_the_vehicle_has_turned_back() {
+    fn samples_may_land_ahead_until_the_vehicle_turns_back() {
         let mut frontier = Fixture::default();
         for x_m in [1.0, 2.0, 1.8] {
             frontier.advance(0, MonoNs(0), x_m, 0.25, 0.25);
@@ -414,11 +429,11 @@ mod tests {
         frontier.advance(0, MonoNs(0), 1.7, 0.25, 0.25);
         assert_eq!([1.0, 1.7, 2.5].map(|x_m| clear(&frontier, x_m) > 0.5), [false, false, true]);
         let silent = clear_of(frontier.to_come(MonoNs(3_000_000_000)), 2.5);
-        assert!(silent > 0.5, "where nobody is alive all are waited for, where they were last");
+        assert!(silent > 0.5, "with no head alive, all are awaited at their last place");
     }
 
     #[test]
-    fn a_silent_head_is_not_waited_for() {
+    fn silent_head_is_not_awaited() {
         let mut frontier = Fixture::default();
         frontier.advance(1, MonoNs(0), 0.0, 0.25, 0.0);
         frontier.advance(0, MonoNs(0), 1.0, 0.25, 0.0);
@@ -428,7 +443,8 @@ mod tests {
     }
 
     impl Fixture {
-        /// A beat at `now`, seconds, with the heads, alive or not, half a metre before and behind the vehicle.
+        /// An update at `now`, seconds, with the heads, alive or not, half a metre before and behind the
+        /// vehicle.
         fn beat(&mut self, now_s: u64, x_m: f64) -> Moved {
             let now = MonoNs(now_s * 1_000_000_000);
             let places = [x_m + 0.5, x_m - 0.5].map(|x_m| Reach { from_m: x_m, to_m: x_m });
@@ -447,7 +463,7 @@ mod tests {
     }
 
     #[test]
-    fn while_a_head_is_alive_beats_extend_the_way_and_nothing_else() {
+    fn updates_extend_only_the_coverage_extent_while_a_head_is_alive() {
         let mut frontier = Fixture::default();
         frontier.ping(0, 10, 3.5);
         frontier.ping(1, 10, 2.5);
@@ -464,29 +480,29 @@ mod tests {
         );
         assert_eq!(frontier.frontier.way(), Some(Reach { from_m: 2.5, to_m: 5.5 }));
         assert!(moved.way_grown && !moved.is_nothing());
-        assert!(frontier.beat(13, 5.1).is_nothing(), "still in the same section");
+        assert!(frontier.beat(13, 5.1).is_nothing(), "the vehicle is still in the same section");
     }
 
     #[test]
-    fn where_no_head_is_alive_sections_are_left_as_the_vehicle_leaves_them() {
+    fn sections_are_left_with_the_vehicle_if_no_head_is_alive() {
         let mut frontier = Fixture::default();
         frontier.ping(0, 0, 3.5);
         frontier.ping(1, 0, 2.5);
-        assert!(frontier.beat(1, 3.5).left_behind.is_empty(), "it isn't known yet that they are silent");
+        assert!(frontier.beat(1, 3.5).left_behind.is_empty(), "their silence isn't known yet");
         // The rear head would be at 6: [5.5, 5.75) is behind it by a quarter of a metre.
         assert_eq!(frontier.beat(3, 6.5).left_behind, 9..23);
         let to_come = frontier.to_come(MonoNs(3_000_000_000));
         assert_eq!(to_come, Some(Reach { from_m: 6.0, to_m: f64::INFINITY }));
-        assert_eq!(frontier.beat(4, 5.5).left_ahead, 25..29, "going back it leaves what lies ahead");
+        assert_eq!(frontier.beat(4, 5.5).left_ahead, 25..29, "going back leaves sections ahead");
     }
 
     #[test]
-    fn all_heads_have_been_from_where_the_foremost_began_to_where_the_rearmost_is() {
+    fn passed_stretch_spans_foremost_start_to_rearmost_position() {
         let mut frontier = Frontier::default();
         let at = |x_m: f64| Reach { from_m: x_m - 0.5, to_m: x_m + 0.5 };
         assert_eq!((frontier.through(), frontier.not_passed()), (None, None));
         frontier.pass(at(3.0));
-        assert_eq!(frontier.through(), None, "they are a metre apart");
+        assert_eq!(frontier.through(), None, "the heads are a metre apart");
         assert_eq!(frontier.not_passed(), Some(Reach { from_m: f64::NEG_INFINITY, to_m: 3.5 }));
         for x_m in [4.0, 9.0, 8.5] {
             frontier.pass(at(x_m));
@@ -499,7 +515,7 @@ mod tests {
     }
 
     #[test]
-    fn heads_that_come_back_one_after_the_other_are_all_waited_for() {
+    fn returning_heads_are_all_awaited() {
         let mut frontier = Fixture::default();
         frontier.beat(0, 3.0);
         frontier.beat(5, 4.0);
@@ -508,6 +524,6 @@ mod tests {
         frontier.ping(0, 7, 4.5);
         frontier.ping(0, 8, 4.5);
         let moved = frontier.ping(0, 9, 4.5);
-        assert_eq!(moved.left_behind, 13..17, "the other one stays silent, and isn't waited for any more");
+        assert_eq!(moved.left_behind, 13..17, "the other one stays silent and is no longer awaited");
     }
 }

@@ -1,11 +1,17 @@
 //! The largest hole of a section: the largest empty circle on the unrolled wall with its centre in the section.
 //!
-//! Let f(c) be the distance from a point c to the nearest sample. D = 2 max f over the section (docs/reference/glossary.md), found by
-//! branch and bound over tiles. A tile is divided among a few samples; each share is a convex polygon on which the
-//! distance to its sample is largest at a corner. The farthest corner bounds the tile, since further samples only lower
-//! f. The sample nearest to that corner either proves the bound, or gets a share and lowers it. Tiles whose bound can't
-//! beat the best point found are dropped, so that only the worst areas are divided finely. Clipping is exact but for
-//! rounding. There is no triangulation, so lattices, lines and duplicate samples need no special handling.
+//! Let f(c) be the distance from a point c to the nearest sample. D = 2 max f over the section
+//! (docs/reference/glossary.md). Branch and bound over tiles finds it:
+//!
+//! 1. A tile is divided among a few samples. Each share is a convex polygon, on which the distance to its
+//!    sample is largest at a corner.
+//! 2. The farthest corner bounds the tile, since further samples only lower f.
+//! 3. The sample nearest to that corner either proves the bound, or gets a share and lowers it.
+//! 4. Tiles whose bound can't exceed the best point found are dropped, so only the worst areas are divided
+//!    finely.
+//!
+//! Clipping is exact except for rounding. Without a triangulation, lattices, lines and duplicate samples need
+//! no special handling.
 
 use serde::{Deserialize, Serialize};
 
@@ -27,9 +33,9 @@ pub use without::Otherwise;
 pub const FARTHEST_M: f64 = 12.0;
 /// Half diagonal below which a tile isn't halved, m: its bound is within 2e-10 m of the exact value.
 const NO_FINER_M: f64 = 1e-10;
-/// More than any rounding error of a distance, m.
+/// Upper limit of the rounding error of a distance, m.
 const ROUNDING_M: f64 = 1e-9;
-/// The owner of a tile of which no sample is known.
+/// Owner of a tile without a known sample.
 const NO_OWNER: (f64, f64) = (f64::INFINITY, f64::INFINITY);
 /// Rounding tolerance for accepting a corner's bound as proven, m.
 const PROVEN_M: f64 = 1e-11;
@@ -52,7 +58,7 @@ pub struct Hole {
 }
 
 impl Hole {
-    /// Whether another one is the same but for a centimetre.
+    /// Whether two holes differ by less than a centimetre in every respect.
     pub fn is_like(&self, other: &Self) -> bool {
         const LITTLE_M: f64 = 0.01;
         let grown_m = (self.diameter_m - other.diameter_m).abs();
@@ -68,7 +74,8 @@ struct Tile {
     arc_m: f64,
     half_x_m: f64,
     half_arc_m: f64,
-    /// Sample nearest to the centre, relative to it, m; in searches for any circle a sample near by, from the start of the section.
+    /// Sample nearest to the centre, relative to it, m. In searches for any circle: a nearby sample, from the
+    /// start of the section.
     owner: (f64, f64),
     /// Upper bound of f in the tile, m.
     bound_m: f64,
@@ -90,18 +97,18 @@ struct Beyond {
     arc_m: f64,
 }
 
-/// What is near the centre of a tile.
+/// Search result near the centre of a tile.
 enum Near {
     /// A sample so near that every point of the tile has it within the radius.
     Settled,
-    /// The nearest, or one as near as that.
+    /// The nearest sample, or one equally near.
     Sample(Nearest),
-    /// None within reach.
+    /// No sample within reach.
     Nothing,
 }
 
 impl Near {
-    /// The sample, and its distance, m; `None` where the tile is settled.
+    /// The sample and its distance, m; `None` if the tile is settled.
     fn unsettled(self) -> Option<(Option<Nearest>, f64)> {
         match self {
             Self::Settled => None,
@@ -130,10 +137,12 @@ impl Tile {
         })
     }
 
-    /// What is near its centre. Where the owner, a sample's chainage and arc length, is near enough to settle the tile, nothing
-    /// is looked for; and any sample that is near enough will do.
+    /// Searches near the tile's centre.
+    ///
+    /// If the owner (chainage and arc length) is near enough to settle the tile, there is no search.
+    /// Otherwise any sample near enough will do.
     fn near(&self, window: &Window, radius_m: f64, within_m: f64) -> Near {
-        // Less and more by over the rounding of the distances.
+        // The margins exceed the rounding of the distances.
         let enough_m = radius_m - self.half_m() - ROUNDING_M;
         let (dx, darc) = (self.owner.0 - self.x_m, self.owner.1 - self.arc_m);
         let owner_m = math::sqrt(dx * dx + darc * darc);
@@ -144,7 +153,7 @@ impl Tile {
         window.near_enough(self.x_m, self.arc_m, within_m, enough_m).map_or(Near::Nothing, Near::Sample)
     }
 
-    /// The halves of a tile whose nearest sample, if there is one within reach, is their owner.
+    /// Halves of a tile, owned by its nearest sample if there is one within reach.
     fn halves_of(mut self, nearest: Option<&Nearest>, perimeter_m: f64) -> [Self; 2] {
         if let Some(found) = nearest {
             self.owner = (found.x_m, found.arc_m + found.turns * perimeter_m);
@@ -152,7 +161,7 @@ impl Tile {
         self.halves()
     }
 
-    /// Sample position relative to the centre: bit-identical whichever point it was found from.
+    /// Sample position relative to the centre: bit-identical from whichever point the sample was found.
     fn relative(&self, found: &Nearest, perimeter_m: f64) -> (f64, f64) {
         (found.x_m - self.x_m, (found.arc_m - self.arc_m) + found.turns * perimeter_m)
     }
@@ -173,11 +182,11 @@ fn first_tiles(perimeter_m: f64, length_m: f64) -> impl Iterator<Item = Tile> {
     })
 }
 
-/// Finds the largest hole of a stretch of wall; reuses its working memory between searches.
+/// Finds the largest hole of a stretch of wall. It reuses its working memory between searches.
 #[derive(Debug)]
 pub struct HoleFinder {
     tolerance_m: f64,
-    /// Radius of the last hole, m: first guess for the next.
+    /// Radius of the last hole, m: first guess for the next search.
     last_m: f64,
     window: Window,
     tiles: Vec<Tile>,
@@ -193,9 +202,9 @@ impl Default for HoleFinder {
 stateful!(HoleFinder { state: last_m; fixed: tolerance_m, window, tiles, division; });
 
 impl HoleFinder {
-    /// A search that finds D to within a tolerance, m; zero is exact.
+    /// Search that finds D to within a tolerance, m; zero is exact.
     ///
-    /// Allocates: startup only; all that it will ever use.
+    /// Allocates: at startup, all that it will ever use.
     pub fn new(tolerance_m: f64) -> Self {
         Self {
             tolerance_m,
@@ -213,8 +222,9 @@ impl HoleFinder {
         self.largest_since(store, from_m, to_m, 0)
     }
 
-    /// The same among the samples of the visits from `first_visit` on. Its `least_m` isn't a bound: full cells leave out
-    /// samples near those of earlier visits.
+    /// Largest hole among the samples of visits from `first_visit` on.
+    ///
+    /// Its `least_m` is no bound: full cells leave out samples near those of earlier visits.
     ///
     /// Allocates: never, unless a section is over 4,000 cells large.
     pub fn largest_since(&mut self, store: &SampleStore, from_m: f64, to_m: f64, first_visit: u32) -> Hole {
@@ -262,7 +272,8 @@ impl HoleFinder {
         Ok(best)
     }
 
-    /// Divides a tile until it can't beat the best point, which may lie in it. False if the tile must be halved first.
+    /// Divides a tile until its bound can't exceed the best point, which may lie in it. False if the tile
+    /// must be halved first.
     fn is_settled(&mut self, tile: &Tile, reach_m: f64, best: &mut Best) -> Result<bool, Beyond> {
         let enough = |best: &Best| best.distance_m + self.tolerance_m / 2.0;
         if tile.bound_m <= enough(best) || tile.half_m() < NO_FINER_M {
@@ -282,7 +293,7 @@ impl HoleFinder {
                 if bound_m > reach_m {
                     return Err(Beyond { x_m, arc_m });
                 }
-                // The share's owner is nearest, but for rounding.
+                // The share's owner is the nearest sample, except for rounding.
                 best.take(bound_m, x_m, arc_m);
                 return Ok(true);
             };
@@ -304,7 +315,7 @@ impl HoleFinder {
         let from_m = self.window.chainage_m(-radius_m);
         let fidelity = store.fidelity(from_m, self.window.chainage_m(length_m + radius_m));
         let diameter_m = 2.0 * best.distance_m;
-        // Samples for which the window had no room could only have made it smaller.
+        // Samples dropped because the window was full could only have reduced D.
         let least_m = diameter_m - 2.0 * (fidelity.thinned_m + fidelity.moved_m);
         Hole {
             diameter_m,

@@ -1,7 +1,7 @@
-//! Lacks: places on the wall where a ping would have laid a sample, and why it didn't.
+//! Missing samples: places on the wall where a ping would have left a sample, and the causes of each loss.
 //!
-//! With the lacks of a factor put back among the samples, a hole is what it would have been without that factor. The
-//! latest are kept: fails are explained soon after their place has been left.
+//! If the samples missing for a factor are put back, the hole becomes what it would have been without that
+//! factor. Only the latest are kept, because fails are explained soon after the vehicle has left their place.
 
 use serde::{Deserialize, Serialize};
 
@@ -9,45 +9,46 @@ use super::cause::Cause;
 use super::causes::Causes;
 use headrace_geometry::snapshot::stateful;
 
-/// Capacity: five minutes of four heads that all get nothing.
+/// Capacity: five minutes of four heads that get no return at all.
 const ROOM: usize = 1 << 16;
-/// Lacks whose extent is known as a whole: a look for a few metres' passes over the others. Divides the capacity.
+/// Missing samples per block with a common extent, so that a search over a few metres skips other blocks.
+/// Divides the capacity.
 const BLOCK: usize = 1 << 8;
 
-/// A sample that is lacking.
+/// A missing sample.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Lack {
     /// Chainage at which it would lie, m.
     pub x_m: f64,
     /// Arc length, m.
     pub arc_m: f64,
-    /// The head that it is of, by number.
+    /// Number of its head.
     pub head: u8,
-    /// All that would have to be otherwise for it to be there.
+    /// All causes that would have to be absent for the sample to exist.
     pub why: Causes,
 }
 
-/// The latest lacks.
+/// Latest missing samples.
 #[derive(Debug)]
 pub struct Lacks {
     ring: Vec<Lack>,
-    /// Of each block of the ring, chainages between which all its lacks are, m.
+    /// Least and greatest chainage in each block of the ring, m.
     extents_m: Vec<[f64; 2]>,
-    /// Where the next one goes once the ring is full.
+    /// Position of the next entry once the ring is full.
     next: u32,
 }
 
 stateful!(Lacks { state: next; lists: ring, extents_m; });
 
 impl Default for Lacks {
-    /// Allocates: startup only; all that it will ever use.
+    /// Allocates: at startup, all that it will ever use.
     fn default() -> Self {
         Self { ring: Vec::with_capacity(ROOM), extents_m: Vec::with_capacity(ROOM / BLOCK), next: 0 }
     }
 }
 
 impl Lacks {
-    /// Adds a lack, in place of the oldest where there is no room.
+    /// Adds a missing sample. It replaces the oldest if there is no room.
     ///
     /// Allocates: never.
     pub fn add(&mut self, lack: Lack) {
@@ -61,7 +62,8 @@ impl Lacks {
         self.extend(at, lack.x_m);
     }
 
-    /// Takes a lack at a place of the ring into its block's extent, which is that of the latest alone once they fill the block.
+    /// Extends a block's extent by an entry at this position of the ring. A block full of new entries gets
+    /// the extent of these alone.
     fn extend(&mut self, at: usize, x_m: f64) {
         let block = at / BLOCK;
         let wider_m = |[from_m, to_m]: [f64; 2], x_m: f64| [from_m.min(x_m), to_m.max(x_m)];
@@ -76,8 +78,9 @@ impl Lacks {
         }
     }
 
-    /// Puts the latest lacks of a head that are put down to one cause down to another, as many as that; the chainages between which they
-    /// are, m, if there are any.
+    /// Reassigns up to `count` of a head's latest missing samples from one cause to another.
+    ///
+    /// Returns the chainages between which these samples lie, m, if there are any.
     ///
     /// Allocates: never.
     pub fn revise(&mut self, head: u8, count: usize, [from, to]: [Cause; 2]) -> Option<[f64; 2]> {
@@ -92,7 +95,7 @@ impl Lacks {
         })
     }
 
-    /// Those between two chainages, in no particular order.
+    /// Missing samples between two chainages, in no particular order.
     pub fn between(&self, from_m: f64, to_m: f64) -> impl Iterator<Item = &Lack> {
         let meets = move |extent_m: &[f64; 2]| extent_m[0] <= to_m && extent_m[1] >= from_m;
         let blocks =
@@ -107,7 +110,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_latest_are_kept() {
+    fn latest_missing_samples_are_kept() {
         let mut lacks = Lacks::default();
         let lack = |x_m: f64| Lack { x_m, arc_m: 1.0, head: 0, why: Causes::of(Cause::HeadSilent) };
         for k in 0..2 * ROOM + 10 {
@@ -120,7 +123,7 @@ mod tests {
     }
 
     #[test]
-    fn the_latest_of_one_head_are_put_down_to_something_else() {
+    fn latest_samples_of_one_head_change_their_cause() {
         let mut lacks = Lacks::default();
         let (missing, silent) = (Cause::MissingReturns, Cause::HeadSilent);
         for k in 0..ROOM + 100 {
@@ -128,7 +131,7 @@ mod tests {
             lacks.add(Lack { x_m: k as f64, arc_m: 0.0, head, why: Causes::of(why) });
         }
         let last = (ROOM + 99) as f64;
-        // Of ten in a row head 1 has five, one of them occluded: the very last.
+        // Of ten in a row head 1 has five. The very last is occluded.
         assert_eq!(lacks.revise(1, 8, [missing, silent]), Some([last - 18.0, last - 2.0]));
         let revised = |lack: &&Lack| lack.why == Causes::of(silent);
         let revised: Vec<Lack> = lacks.between(0.0, f64::INFINITY).filter(revised).copied().collect();
@@ -136,9 +139,10 @@ mod tests {
         assert_eq!(lacks.revise(2, 8, [missing, silent]), None);
     }
 
-    /// Whatever was looked for in blocks is what is there without them, while the ring fills and is written over, on a way there and back.
+    /// Block search finds the same as a full search while the ring fills and is overwritten, on a drive there
+    /// and back.
     #[test]
-    fn none_is_passed_over() {
+    fn block_search_finds_every_missing_sample() {
         let mut lacks = Lacks::default();
         for k in 0..ROOM + 5 * BLOCK + 77 {
             let along_m = (k % 9000) as f64 * 0.01;

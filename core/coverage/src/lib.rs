@@ -13,7 +13,7 @@
 //!     let (x_m, arc_m) = (0.5 * f64::from(number / 20), 0.5 * f64::from(number % 20));
 //!     store.insert(WallSample { x_m, arc_m, head: 0, step_m: None, visit: 0 })?;
 //! }
-//! // The largest empty circle between them has the diagonal for its diameter.
+//! // The diameter of the largest empty circle between them equals the diagonal.
 //! let hole = HoleFinder::default().largest(&store, 1.0, 1.5);
 //! assert!(hole.bounded && (hole.diameter_m - 0.5 * 2.0_f64.sqrt()).abs() < 1e-6);
 //! # Ok::<(), headrace_coverage::StoreError>(())

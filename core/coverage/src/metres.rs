@@ -2,7 +2,7 @@
 
 use super::section::Verdict;
 
-/// Metres of tunnel by verdict; each metre is counted once.
+/// Metres of tunnel by verdict. Each metre is counted once.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Metres {
     /// Metres that pass.
@@ -11,9 +11,10 @@ pub struct Metres {
     pub fail_m: f64,
     /// Metres undecided within the error of D.
     pub cannot_say_m: f64,
-    /// Metres that going on may still fill.
+    /// Metres that further driving may still fill.
     pub open_m: f64,
-    /// Metres at the ends of the way that not all heads have passed: going on won't change them.
+    /// Metres at the ends of the coverage extent that not all heads have passed. Further driving won't change
+    /// them.
     pub not_inspected_m: f64,
 }
 

@@ -1,5 +1,5 @@
-//! Declared openings of the wall, such as side tunnels and gates. They are excluded from holes and listed in the
-//! report; never passed silently.
+//! Declared openings of the wall, such as side tunnels and gates. They are excluded from holes and listed in
+//! the report.
 
 use super::store::{SampleStore, StoreError, WallSample};
 use headrace_geometry::math;
@@ -10,15 +10,15 @@ use headrace_geometry::tunnel::Profile;
 pub struct Opening {
     /// Display name.
     pub name: String,
-    /// Chainage at which it begins, m.
+    /// Chainage of its beginning, m.
     pub from_m: f64,
-    /// Chainage at which it ends, m.
+    /// Chainage of its end, m.
     pub to_m: f64,
-    /// Arc length at which it begins, and its length along the perimeter, m; `None` for the whole perimeter.
+    /// Arc length of its beginning, and its length along the perimeter, m; `None` for the whole perimeter.
     pub arc_m: Option<(f64, f64)>,
 }
 
-/// Maximum spacing of the samples that fill an opening, m; a tenth of the target if that is less.
+/// Maximum spacing of the samples that fill an opening, m. A tenth of the target replaces it if smaller.
 const SPACING_M: f64 = 0.05;
 
 impl Opening {
@@ -56,7 +56,7 @@ impl Opening {
         Ok(())
     }
 
-    /// Share of a section's wall that it covers, 0 to 1.
+    /// Share of a section's wall that the opening covers, 0 to 1.
     pub fn share_of(&self, from_m: f64, to_m: f64, profile: &Profile) -> f64 {
         let along_m = (to_m.min(self.to_m) - from_m.max(self.from_m)).max(0.0);
         let perimeter_m = profile.perimeter_m();
@@ -106,7 +106,7 @@ mod tests {
     }
 
     #[test]
-    fn a_declared_opening_is_no_hole_and_an_undeclared_one_is() {
+    fn declared_opening_is_no_hole_and_undeclared_one_is() {
         let profile = shapes::circle(3.0).unwrap();
         let hole = |with: bool, from_m: f64| {
             let store = store(&profile, with);
@@ -121,7 +121,7 @@ mod tests {
     }
 
     #[test]
-    fn its_share_of_a_section_is_that_of_its_area() {
+    fn opening_share_of_a_section_is_its_area_share() {
         let profile = shapes::circle(3.0).unwrap();
         let share = |from_m: f64| gate().share_of(from_m, from_m + 0.25, &profile);
         assert!((share(5.0) - 4.0 / profile.perimeter_m()).abs() < 1e-12);
@@ -131,9 +131,9 @@ mod tests {
         assert!((all_round.share_of(5.0, 5.25, &profile) - 1.0).abs() < 1e-12);
     }
 
-    /// 2 m by 4 m: every 5 cm, or every 2 cm where the target is 0.2 m.
+    /// 2 m by 4 m: every 5 cm, or every 2 cm if the target is 0.2 m.
     #[test]
-    fn it_takes_as_much_room_as_is_counted_for_it() {
+    fn opening_fills_as_many_samples_as_counted() {
         let profile = shapes::circle(3.0).unwrap();
         for (target_m, expected) in [(0.8, 41 * 81), (0.2, 101 * 201)] {
             let layout = StoreLayout {

@@ -1,4 +1,4 @@
-//! Ping statistics of a section's passage: evidence for the cause of a fail.
+//! Ping statistics of the passage through a section: evidence for the cause of a fail.
 
 use serde::{Deserialize, Serialize};
 
@@ -17,7 +17,7 @@ pub struct Passage {
     pub pings: u32,
     /// Pings with a fix.
     pub placed: u32,
-    /// Pings without a return where the wall was within range, or without a fix.
+    /// Pings without a return although the wall was within range, or without a fix.
     pub missing: u32,
     /// Pings without a return where the wall was farther than the range setting.
     pub out_of_range: u32,
@@ -29,121 +29,129 @@ pub struct Passage {
     pub standing: u32,
     /// Heads that went through without a ping.
     pub silent: HeadSet,
-    /// Driving at the moment of the largest T.
+    /// Driving figures at the moment of the largest T.
     pub drive: Drive,
-    /// More pings went by without a fix than are remembered.
+    /// More pings without a fix were made than are remembered.
     pub unseen: bool,
-    /// A ping's place was so unsure against the pass before that its speed says nothing.
+    /// A ping's place was so uncertain against the previous pass that its speed is no evidence.
     pub adrift: bool,
-    /// Relative error between passes, of the newest visit with a ping here.
+    /// Relative error between passes in the newest visit with a ping here.
     pub pass_error: PassError,
 }
 
-/// How vehicle and heads moved at a moment.
+/// Movement of the vehicle and its heads at a moment.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct Drive {
-    /// Speed along the tunnel, m/s, without its sign.
+    /// Absolute speed along the tunnel, m/s.
     pub speed_mps: f64,
-    /// Speed for which the heads are put in phase, m/s; zero if none is planned.
+    /// Speed for which the heads are set in phase, m/s; zero if none is planned.
     pub planned_mps: f64,
-    /// The longest time between two passes of the heads that turned, seconds.
+    /// Longest time between two passes of the heads that turned, seconds.
     pub gap_s: f64,
-    /// The same with these heads evenly spread.
+    /// `gap_s` if these heads were evenly spread.
     pub even_gap_s: f64,
-    /// The same with all heads turning as if none had been silent or stood still.
+    /// `gap_s` if all heads were turning, with none silent or stalled.
     pub healthy_gap_s: f64,
-    /// The same with all heads' angles as scheduled, at this speed.
+    /// `gap_s` if all heads' angles were as scheduled, at this speed.
     pub planned_gap_s: f64,
-    /// The same with all heads evenly spread.
+    /// `gap_s` if all heads were evenly spread.
     pub all_gap_s: f64,
-    /// `gap_s` at the planned speed; at this one where none is planned.
+    /// `gap_s` at the planned speed, or at this speed if none is planned.
     pub gap_at_plan_s: f64,
-    /// `healthy_gap_s` at that speed.
+    /// `healthy_gap_s` at the planned speed.
     pub healthy_at_plan_s: f64,
-    /// The same of the heads that turn and never stood still, with their angles as scheduled.
+    /// `gap_s` at the planned speed for the heads that turn and never stalled, with their angles as
+    /// scheduled.
     pub left_at_plan_s: f64,
     /// Time between two pings, seconds.
     pub ping_period_s: f64,
-    /// How far the beams have swung along the tunnel since the neighbouring passes, where they reach farthest, m.
+    /// Distance that the beams have swung along the tunnel since the neighbouring passes, at their farthest,
+    /// m.
     pub swing_m: f64,
-    /// Largest step along the perimeter between two pings where the vehicle was, by its geometry, m.
+    /// Largest step along the perimeter between two pings from the vehicle's place, by geometry, m.
     pub t_y_m: f64,
-    /// The same from the middle of the tunnel.
+    /// Largest step from the tunnel's centre, m.
     pub middle_t_y_m: f64,
-    /// Largest speed that meets the target from the middle, all heads turning as scheduled; the planned one where that does;
-    /// zero where none does, m/s.
+    /// Largest speed that meets the target from the tunnel's centre with all heads turning as scheduled, m/s.
+    ///
+    /// It is the planned speed if that meets the target, and zero if no speed does.
     pub fits_mps: f64,
-    /// The distance along the tunnel between passes that it leaves room for, m.
+    /// Distance along the tunnel between passes that the target leaves room for, m.
     pub fits_along_m: f64,
-    /// Passes over each place that it takes for one, as the heads lose returns: see [`headrace_sampling::losses`].
+    /// Number of passes needed in place of one, given the lost returns: see [`headrace_sampling::losses`].
     pub passes_needed: f64,
-    /// How often the head loses returns by chance that loses most.
+    /// Loss rate of the head that loses most returns by chance.
     pub lost: LossRate,
-    /// Heads go back and forth in sectors.
+    /// Heads sweep back and forth in sectors.
     pub is_in_sectors: bool,
-    /// A head hasn't been heard since the dive began.
+    /// A head has not been heard since the dive began.
     pub is_unheard: bool,
-    /// What other settings of the heads would change.
+    /// Changes that other settings of the heads would bring.
     pub other: OtherSettings,
 }
 
-/// How other settings of the heads compare to the present ones: ratios. A finer step takes longer to go round, and so does a longer range.
+/// Ratios of other head settings to the present ones. A turn takes longer with a finer step or a longer
+/// range.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct OtherSettings {
-    /// Step of the coarsest mode that leaves room for a target, to the present one.
+    /// Step of the coarsest mode that leaves room for the target, relative to the present step.
     pub finer_step: f64,
-    /// Turn period of that mode to the present one.
+    /// Turn period of that mode, relative to the present one.
     pub finer_turn: f64,
-    /// Turn period at the shortest range setting that reaches all wall from the middle to the present one.
+    /// Turn period at the shortest range setting that reaches all wall from the centre, relative to the
+    /// present one.
     pub longer_turn: f64,
 }
 
 impl Default for OtherSettings {
-    /// Of heads whose settings aren't known: two modes finer, in the same time.
+    /// Ratios for heads with unknown settings: two modes finer, with the same turn period.
     fn default() -> Self {
         Self { finer_step: 0.375, finer_turn: 1.0, longer_turn: 1.0 }
     }
 }
 
-/// Share of the planned speed below which another one is driven.
+/// Ratio to the planned speed below which the vehicle counts as slower than planned.
 const SLOWER: f64 = 0.97;
 
 impl Drive {
-    /// The distance between passes with the swing added, had no head been silent or stood still, m.
+    /// Distance between passes with the swing added, if no head had been silent or stalled, m.
     pub fn along_m(&self) -> f64 {
         self.speed_mps * self.healthy_gap_s + self.swing_m + self.advance_m()
     }
 
-    /// The distance between passes with all heads turning as scheduled, m.
+    /// Distance between passes with all heads turning as scheduled, m.
     pub fn planned_along_m(&self) -> f64 {
         self.speed_mps * self.planned_gap_s
     }
 
-    /// The distance travelled between two pings, m.
+    /// Distance travelled between two pings, m.
     pub fn advance_m(&self) -> f64 {
         self.speed_mps * self.ping_period_s
     }
 
-    /// Whether it went slower than planned, and passes of heads at their scheduled angles were farther apart for it than at the planned speed,
-    /// by a factor over `over`: heads apart along the hull are in phase about that speed only. Only where that speed meets the target;
-    /// heads that were started wrongly aren't mended by any speed.
+    /// Whether driving slower than planned put the heads out of phase: passes are farther apart by a factor
+    /// above `over`.
+    ///
+    /// The comparison is with passes at the planned speed, with the heads at their scheduled angles. Heads
+    /// apart along the hull are in phase only near that speed. It counts only if that speed meets the target:
+    /// no speed mends heads that were started wrongly.
     pub fn is_slow_out_of_phase(&self, over: f64) -> bool {
         let is_slower = self.planned_mps > 0.0 && self.speed_mps < SLOWER * self.planned_mps;
         let fits = self.fits_mps >= self.planned_mps;
         is_slower && fits && self.planned_along_m() > over * self.planned_mps * self.all_gap_s
     }
 
-    /// The one with the larger distance between passes.
+    /// The drive with the larger distance between passes.
     #[must_use]
     pub fn or_worse(self, other: Self) -> Self {
         if other.along_m() > self.along_m() { other } else { self }
     }
 }
 
-/// Reason a ping gave no sample.
+/// Reason for a ping without a sample.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Loss {
-    /// No return, though the wall was within range.
+    /// No return, although the wall was within range.
     Missing,
     /// The wall was farther than the range setting.
     OutOfRange,
@@ -152,25 +160,27 @@ pub enum Loss {
 }
 
 impl Loss {
-    /// All of them.
+    /// All reasons.
     pub const ALL: [Self; 3] = [Self::Missing, Self::OutOfRange, Self::Occluded];
 }
 
-/// Ratio of the error of a section's largest hole to that of the distance between two passes at one point: the maximum
-/// favours holes that errors have enlarged. Measured over the field dives of `tests/tests/navigation/fusion.rs`.
+/// Ratio of the error of a section's largest hole to that of the distance between two passes at one point.
+///
+/// The maximum favours holes that errors have enlarged. Measured over the field dives of
+/// `tests/tests/navigation/fusion.rs`.
 const LARGEST_OF_MANY: f64 = 1.2;
 
-/// Error along the tunnel of a pass's samples relative to those of the pass before.
+/// Error along the tunnel of a pass's samples relative to the previous pass.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct PassError {
-    /// Covariance of the relative errors that move them.
+    /// Covariance of the relative errors that move the samples.
     pub relative: Relative,
     /// Vehicle position in the cross-section, [y, z], m.
     pub from_m: [f64; 2],
 }
 
 impl PassError {
-    /// From a fix.
+    /// Error of the pass at a fix.
     pub fn of(fix: &Fix) -> Self {
         Self { relative: fix.relative, from_m: [fix.pose.position.y(), fix.pose.position.z()] }
     }
@@ -182,14 +192,16 @@ impl PassError {
         }
     }
 
-    /// The largest standard deviation of a hole's diameter round the profile, m.
+    /// Largest standard deviation of a hole's diameter anywhere round the profile, m.
     pub fn worst_m(&self, profile: &Profile) -> f64 {
         profile.places().iter().map(|place| self.sd_m(*place)).fold(0.0, f64::max)
     }
 
-    /// Whether that is over a limit, m: most passes aren't by far, which is known without looking round the profile.
+    /// Whether `worst_m` exceeds a limit, m.
+    ///
+    /// Most passes are far below it, which shows without a search round the profile.
     pub fn exceeds(&self, limit_m: f64, profile: &Profile) -> bool {
-        // No wall is farther from the reference point, which is within the profile, than half of the way round.
+        // The reference point lies within the profile, so no wall is farther from it than half the perimeter.
         let [y_m, z_m] = profile.reference();
         let off_m = math::hypot(self.from_m[0] - y_m, self.from_m[1] - z_m);
         let here_m = LARGEST_OF_MANY * self.relative.sd_m(Vec3::zero());
@@ -197,12 +209,13 @@ impl PassError {
         at_most_m > limit_m && self.worst_m(profile) > limit_m
     }
 
-    /// The largest change of that with a metre of wall, m/m.
+    /// Largest change of that standard deviation per metre of wall, m/m.
     pub fn slope(&self) -> f64 {
         LARGEST_OF_MANY * self.relative.turn_sd_rad()
     }
 
-    /// Standard deviation of the diameter of a hole at a point on the wall, m: its edges are consecutive passes.
+    /// Standard deviation of the diameter of a hole at a point on the wall, m. Its edges are consecutive
+    /// passes.
     pub fn sd_m(&self, wall_m: [f64; 2]) -> f64 {
         LARGEST_OF_MANY
             * self.relative.sd_m(Vec3::new(0.0, wall_m[0] - self.from_m[0], wall_m[1] - self.from_m[1]))
@@ -219,7 +232,7 @@ mod tests {
     }
 
     #[test]
-    fn only_what_the_planned_speed_would_mend_is_slow_out_of_phase() {
+    fn slow_out_of_phase_needs_a_planned_speed_that_mends_it() {
         let slow = Drive {
             speed_mps: 0.08,
             planned_mps: 0.1,
@@ -231,15 +244,15 @@ mod tests {
         };
         let is_slow = |drive: Drive| drive.is_slow_out_of_phase(1.07);
         assert!(is_slow(slow));
-        assert!(!is_slow(Drive { planned_gap_s: 2.5, ..slow }), "heads were started wrongly");
-        assert!(!is_slow(Drive { planned_gap_s: 3.2, ..slow }), "slower, passes are no farther apart");
+        assert!(!is_slow(Drive { planned_gap_s: 2.5, ..slow }), "the heads were started wrongly");
+        assert!(!is_slow(Drive { planned_gap_s: 3.2, ..slow }), "passes are no farther apart when slower");
         assert!(!is_slow(Drive { speed_mps: 0.1, ..slow }), "as planned");
-        assert!(!is_slow(Drive { fits_mps: 0.06, ..slow }), "the planned speed doesn't meet the target");
-        assert!(!is_slow(Drive { planned_mps: 0.0, ..slow }), "nothing is planned");
+        assert!(!is_slow(Drive { fits_mps: 0.06, ..slow }), "the planned speed must meet the target");
+        assert!(!is_slow(Drive { planned_mps: 0.0, ..slow }), "no speed is planned");
     }
 
     #[test]
-    fn of_several_errors_the_worst_is_kept_whichever_comes_last() {
+    fn worst_error_is_kept_in_any_order() {
         for order in [[0.01, 0.05, 0.02], [0.05, 0.02, 0.01], [0.01, 0.02, 0.05]] {
             let mut worst = PassError::default();
             for sd_m in order {
@@ -250,14 +263,14 @@ mod tests {
     }
 
     #[test]
-    fn where_a_section_is_passed_at_its_worst_decides_how_sure_its_holes_are() {
+    fn worst_pass_decides_the_hole_error() {
         let drive = |speed_mps: f64| Drive { speed_mps, healthy_gap_s: 2.0, ..Drive::default() };
         assert_eq!(drive(0.3).or_worse(drive(0.1)), drive(0.3));
         assert_eq!(drive(0.1).or_worse(drive(0.3)), drive(0.3));
     }
 
     #[test]
-    fn a_yaw_moves_what_is_beside_the_vehicle_and_nothing_above_it() {
+    fn yaw_moves_wall_beside_the_vehicle_not_above_it() {
         let yaw = Relative::new([[0.0; 3], [0.0; 3], [0.0, 0.0, 1e-4]]);
         let error = PassError { relative: yaw, from_m: [0.5, 1.0] };
         let profile = shapes::circle(3.0).unwrap();
@@ -268,7 +281,7 @@ mod tests {
         let worst_m = LARGEST_OF_MANY * 0.01 * (3.0 + (y_m - 0.5).abs());
         assert!((error.worst_m(&profile) - worst_m).abs() < 1e-4, "{}", error.worst_m(&profile));
         assert!((error.slope() - LARGEST_OF_MANY * 0.01).abs() < 1e-12);
-        // From within, and from where an estimate that is lost may be.
+        // The vehicle's estimated place is inside, and far outside as a lost estimate may be.
         for from_m in [error.from_m, [40.0, -30.0]] {
             let error = PassError { from_m, ..error };
             let worst_m = error.worst_m(&profile);

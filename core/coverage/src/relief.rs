@@ -1,4 +1,4 @@
-//! Where the wall was found off the design lately, by any head, and which heads contradict the design where others don't.
+//! Relief: places where heads lately found the wall off the design, and heads that others outvote.
 
 use serde::{Deserialize, Serialize};
 
@@ -9,34 +9,35 @@ use headrace_sampling::head::MAX_HEADS;
 
 /// Bins around the perimeter: about a step of a head.
 const BINS: i64 = 128;
-/// Bins along the tunnel that are remembered, each half a reach long: 9 m in a tunnel of 6 m radius, more than heads are apart.
+/// Bins along the tunnel, each half a reach long: 9 m in a tunnel of 6 m radius, more than heads are apart.
 const SLABS: i64 = 32;
 
-/// What was found in a bin.
+/// Findings in a bin.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 struct Cell {
-    /// Number of the slab since chainage zero; bins of another one are stale.
+    /// Number of the slab since chainage zero. A bin of another slab is stale.
     slab: i64,
     /// The latest return off the design, and whether it was wall.
     off: Option<(PlacedReturn, bool)>,
-    /// Heads, a bit each, whose returns agree with the design here, and those whose returns contradict it.
+    /// Bitmasks of the heads whose returns agree with the design here, and of those whose returns contradict
+    /// it.
     as_designed: u8,
     contradicting: u8,
 }
 
-/// Votes on a head, in bins that others have seen, too.
+/// Votes on a head, counted in bins that other heads have seen, too.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct Ballot {
-    /// It agrees with the design as others do.
+    /// Bins in which it agrees with the design as others do.
     agreed: u32,
-    /// It contradicts the design where others agree with it.
+    /// Bins in which it contradicts the design where others agree with it.
     outvoted: u32,
-    /// Sum of the deviations where it was outvoted, m, and their chainages.
+    /// Sum of the deviations in the outvoted bins, m, and the range of their chainages.
     off_sum_m: f64,
     between_m: Option<[f64; 2]>,
 }
 
-/// About a turn of bins.
+/// Votes needed: about a turn of bins.
 const FULL_BALLOT: u32 = 128;
 
 impl Ballot {
@@ -58,13 +59,13 @@ impl Ballot {
         self.between_m = Some([from_m.min(placed.x_m), to_m.max(placed.x_m)]);
     }
 
-    /// Whether most of about a turn's bins speak against the head: its mean deviation there, m, and their chainages.
+    /// Mean deviation and chainages, m, of the outvoted bins; `None` unless they are most of a turn's bins.
     pub(super) fn verdict(&self) -> Option<(f64, [f64; 2])> {
         let lost = self.agreed + self.outvoted >= FULL_BALLOT && self.outvoted > self.agreed;
         lost.then(|| Some((self.off_sum_m / f64::from(self.outvoted), self.between_m?))).flatten()
     }
 
-    /// Whether a quarter of its bins or more speak against the head.
+    /// Whether at least a quarter of its bins speak against the head.
     pub(super) fn is_lost(&self) -> bool {
         4 * self.outvoted > self.agreed + self.outvoted
     }
@@ -75,16 +76,16 @@ impl Ballot {
 pub struct Relief {
     cells: Vec<Cell>,
     ballots: [Ballot; MAX_HEADS],
-    /// Heads that aren't believed, a bit each.
+    /// Bitmask of heads that aren't trusted.
     distrusted: u8,
-    /// Heads whose ranges change as the design's do, a bit each.
+    /// Bitmask of heads whose ranges change as the design's do.
     changing: u8,
 }
 
 stateful!(Relief { state: ballots, distrusted, changing; slots: cells; });
 
 impl Default for Relief {
-    /// Nothing is known. Allocates: all that it will ever use.
+    /// An empty relief. Allocates: all that it will ever use.
     fn default() -> Self {
         let nowhere = Cell { slab: i64::MIN, ..Cell::default() };
         let count = usize::try_from(BINS * SLABS).unwrap_or(0);
@@ -106,8 +107,9 @@ fn set(bits: &mut u8, head: usize, on: bool) {
 }
 
 impl Relief {
-    /// Whether the wall was found as far off the design nearby: by a return that was wall within reach along the tunnel, or by
-    /// a doubtful one at half the distances.
+    /// Whether nearby wall was found with the same deviation from the design.
+    ///
+    /// An earlier wall return counts within the reach along the tunnel, a doubtful one at half the distances.
     pub(super) fn supports(&self, placed: &PlacedReturn, limits: &WallLimits) -> bool {
         let (slab, bin) = place(placed, limits);
         (slab - 2..=slab + 2).any(|slab| {
@@ -133,10 +135,10 @@ impl Relief {
         }
     }
 
-    /// Counts what a head says of its bin, and what that says of other heads.
+    /// Counts a head's vote in its bin, and its effect on the votes of other heads.
     pub(super) fn vote(&mut self, head: usize, placed: &PlacedReturn, limits: &WallLimits) {
         let (slab, bin) = place(placed, limits);
-        // Between the two nobody votes: noise would make heads disagree at the limit.
+        // Returns between the two limits don't vote: noise would make heads disagree at the limit.
         let as_designed = placed.off_m.abs() <= limits.contradiction_m / 2.0;
         if !as_designed && placed.off_m.abs() <= limits.contradiction_m {
             return;
@@ -144,7 +146,7 @@ impl Relief {
         let (me, distrusted) = (bit(head), self.distrusted);
         let Some(cell) = self.cell_mut(slab, bin) else { return };
         if as_designed && cell.off.is_some_and(|(_, is_wall)| !is_wall) {
-            // What was met once isn't there any more.
+            // A head sees the design here, so an object met once is gone.
             cell.off = None;
         }
         let seen = if as_designed { &mut cell.as_designed } else { &mut cell.contradicting };
@@ -187,17 +189,18 @@ impl Relief {
         self.ballots.get(head).copied().unwrap_or_default()
     }
 
-    /// Whether a head's votes count.
+    /// Sets whether a head's votes count.
     pub(super) fn believe(&mut self, head: usize, believed: bool) {
         set(&mut self.distrusted, head, !believed);
     }
 
-    /// Whether a head's range changes as the design's does.
+    /// Records whether a head's range changes as the design's does.
     pub(super) fn note_changing(&mut self, head: usize, changes: bool) {
         set(&mut self.changing, head, changes);
     }
 
-    /// Whether another head's range changes as the design's does: no error of the estimate makes this one's stay.
+    /// Whether another head's range changes as the design's does. Then no error of the estimate explains this
+    /// head's constant range.
     pub(super) fn others_change(&self, head: usize) -> bool {
         self.changing & !bit(head) != 0
     }
@@ -206,7 +209,7 @@ impl Relief {
         self.cells.get(index(slab, bin)?).filter(|cell| cell.slab == slab)
     }
 
-    /// The cell of a bin; emptied if it was of another slab.
+    /// Cell of a bin, emptied if it belonged to another slab.
     fn cell_mut(&mut self, slab: i64, bin: i64) -> Option<&mut Cell> {
         let cell = self.cells.get_mut(index(slab, bin)?)?;
         if cell.slab != slab {
@@ -230,10 +233,10 @@ fn index(slab: i64, bin: i64) -> Option<usize> {
 mod tests {
     use super::*;
 
-    /// Of what was long ago half is forgotten at a time, so that a head that goes wrong late is outvoted within about a turn or two, and
-    /// not by a few bins.
+    /// Old votes are forgotten by halves. A head that fails late is therefore outvoted within about a turn or
+    /// two, and not by a few bins.
     #[test]
-    fn a_ballot_forgets_by_halves() {
+    fn ballot_forgets_by_halves() {
         let wrong = PlacedReturn { x_m: 7.0, arc_m: 0.0, off_m: -0.5 };
         let mut ballot = Ballot::default();
         (0..1027).for_each(|_| ballot.add(None));
@@ -245,9 +248,9 @@ mod tests {
         assert!(between_m.iter().all(|x_m| (x_m - 7.0).abs() < 1e-12), "{between_m:?}");
     }
 
-    /// Where a head sees what another one contradicts, it is outvoted, unless the other isn't believed itself.
+    /// A head that contradicts another one is outvoted, unless the other one isn't trusted itself.
     #[test]
-    fn a_head_that_is_not_believed_outvotes_nobody() {
+    fn distrusted_head_outvotes_no_other_head() {
         let limits = WallLimits::new(20.0, 0.3);
         let of = |off_m: f64| PlacedReturn { x_m: 7.0, arc_m: 3.0, off_m };
         let outvoted = |believed: bool| {
@@ -261,6 +264,6 @@ mod tests {
         let mut relief = Relief::default();
         relief.believe(1, false);
         relief.believe(1, true);
-        assert_eq!(relief.distrusted, 0, "it is believed again");
+        assert_eq!(relief.distrusted, 0, "the head is trusted again");
     }
 }

@@ -9,53 +9,54 @@ use super::hole::Hole;
 use headrace_geometry::snapshot::stateful;
 use headrace_geometry::time::MonoNs;
 
-/// Maximum gap between neighbouring failed sections of one run, m: over longer ones the speed that one section asks for says nothing of the
-/// next.
+/// Maximum gap between neighbouring failed sections of one run, m.
+///
+/// Over a longer gap the speed that one section needs is no evidence for the next.
 const JOIN_M: f64 = 0.5;
 
-/// Number of a run; never reused.
+/// Number of a run. It is never reused.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 pub struct RunId(pub u32);
 
-/// Neighbouring failed sections.
+/// A run of neighbouring failed sections.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Run {
-    /// Why most of them failed; of two that are as frequent, the one that was so first.
+    /// Cause of most of its sections; of two equally frequent causes the one that was in the lead first.
     pub cause: Cause,
-    /// How many of them have each cause, in the order of [`Cause::ALL`].
+    /// Number of its sections with each cause, in the order of [`Cause::ALL`].
     counts: [u32; Cause::ALL.len()],
-    /// How they are to be passed again.
+    /// Counts for the advice on passing it again.
     tally: Tally,
     /// Index of the first section.
     pub from: i64,
     /// Index after the last.
     pub to: i64,
-    /// How many of them fail.
+    /// Number of its sections that fail.
     pub failed: u32,
-    /// Section with the largest hole, and that hole; once cleared, the last one before that.
+    /// Section with the largest hole, and that hole. Once cleared, the last one before that.
     pub worst: (i64, Hole),
     /// Time of its first flag.
     pub raised: MonoNs,
     /// Time of its last change.
     pub changed: MonoNs,
-    /// Time since which none of its sections fails.
+    /// Time from which none of its sections fails.
     pub cleared: Option<MonoNs>,
-    /// Merged into another run.
+    /// Run into which it was merged.
     pub merged_into: Option<RunId>,
 }
 
 impl Run {
-    /// Whether some of it still fails.
+    /// Whether part of it still fails.
     pub fn is_open(&self) -> bool {
         self.failed > 0
     }
 
-    /// How many of its sections have a cause.
+    /// Number of its sections with a cause.
     pub fn count(&self, cause: Cause) -> u32 {
         self.counts.get(cause as usize).copied().unwrap_or(0)
     }
 
-    /// What its words name: the main cause, and the next where a tenth of its sections have it.
+    /// Causes named in texts: the main one, and the next if a tenth of the sections have it.
     pub fn named(&self) -> Causes {
         let others = Cause::ALL.into_iter().filter(|cause| *cause != self.cause);
         let next = others.rev().max_by_key(|cause| self.count(*cause));
@@ -63,7 +64,7 @@ impl Run {
         next.map_or(Causes::of(self.cause), |next| Causes::of(self.cause).with(next))
     }
 
-    /// All causes that its sections have: the main one, then the others as they are frequent. Allocates: for outlets.
+    /// All causes of its sections: the main one, then the others by frequency. Allocates: for outlets.
     pub fn causes(&self) -> Vec<Cause> {
         let mut causes: Vec<Cause> =
             Cause::ALL.into_iter().filter(|cause| *cause == self.cause || self.count(*cause) > 0).collect();
@@ -71,7 +72,7 @@ impl Run {
         causes
     }
 
-    /// How to pass it again.
+    /// Advice for passing it again.
     pub fn again(&self) -> Again {
         self.tally.again(self.failed)
     }
@@ -86,7 +87,7 @@ impl Run {
         }
     }
 
-    /// Takes a section from what was counted; true if the lowest speed has to be found anew.
+    /// Removes a section from the counts. True if the lowest speed must be found again.
     fn count_out(&mut self, section: &Failing) -> bool {
         for cause in section.causes.iter() {
             if let Some(count) = self.counts.get_mut(cause as usize) {
@@ -96,7 +97,7 @@ impl Run {
         self.tally.remove(section)
     }
 
-    /// Counts none.
+    /// Resets the counts.
     fn count_none(&mut self) {
         self.counts.fill(0);
         self.tally = Tally::default();
@@ -116,7 +117,7 @@ pub enum RunChange {
     Raised,
     /// Its ends, worst hole or extent have changed.
     Changed,
-    /// None of its sections fails any more: filled by a later pass.
+    /// None of its sections fails any more: a later pass filled them.
     Cleared,
     /// Merged into another run.
     Merged,
@@ -128,9 +129,9 @@ pub struct Runs {
     first: i64,
     join: i64,
     runs: Vec<Run>,
-    /// Per section: the number of its run plus one, or zero.
+    /// For each section: the number of its run plus one, or zero.
     member: Vec<u32>,
-    /// Per section of a run: why it fails.
+    /// For each section of a run: its causes.
     failing: Vec<Failing>,
 }
 
@@ -147,9 +148,9 @@ pub struct Telling<'a> {
 }
 
 impl Runs {
-    /// No runs yet, for `count` sections of length `section_m` from index `first`.
+    /// An empty set of runs for `count` sections of length `section_m` from index `first`.
     ///
-    /// Allocates: startup only; all that it will ever use.
+    /// Allocates: at startup, all that it will ever use.
     pub fn new(first: i64, count: usize, section_m: f64) -> Self {
         let join = headrace_geometry::math::floor_to_i64(JOIN_M / section_m + 1e-9).max(0) + 1;
         let (member, failing) = (vec![0; count], vec![Failing::default(); count]);
@@ -171,12 +172,12 @@ impl Runs {
         self.member.get(self.slot(section)?).copied()?.checked_sub(1).map(RunId)
     }
 
-    /// Whether a section is too far from a run to be of it.
+    /// Whether a section is too far from a run to belong to it.
     pub fn is_beyond(&self, run: &Run, section: i64) -> bool {
         section - run.to >= self.join || run.from - section > self.join
     }
 
-    /// Updates the state of a section: it fails, or doesn't (`None`).
+    /// Sets the state of a section: it fails for these causes, or doesn't fail (`None`).
     ///
     /// Allocates: never.
     pub fn set(&mut self, section: i64, failing: Option<Failing>, telling: &mut Telling<'_>) {
@@ -194,7 +195,7 @@ impl Runs {
         }
     }
 
-    /// Counts a section of a run otherwise than before.
+    /// Replaces a section's entry in the counts of its run.
     fn count_again(&mut self, id: RunId, [before, now]: [&Failing; 2]) {
         let Some(mut run) = self.get(id).copied() else { return };
         let was_least = run.count_out(before);
@@ -211,7 +212,7 @@ impl Runs {
         }
     }
 
-    /// Why a section fails.
+    /// Causes for which a section fails.
     fn failing_at(&self, section: i64) -> Failing {
         self.slot(section).and_then(|slot| self.failing.get(slot)).copied().unwrap_or_default()
     }
@@ -222,7 +223,7 @@ impl Runs {
         }
     }
 
-    /// Adds a failed section to the runs beside it, merging them, or starts a run.
+    /// Adds a failed section to the neighbouring runs and merges them, or starts a run.
     fn join(&mut self, section: i64, failing: Failing, telling: &mut Telling<'_>) {
         let near = |side: i64| (1..=self.join).find_map(|step| self.of(section + side * step));
         let (kept, other) = match (near(-1), near(1)) {
@@ -271,7 +272,7 @@ impl Runs {
 
     fn begin(&mut self, section: i64, failing: Failing, telling: &Telling<'_>) -> Option<RunId> {
         if self.runs.len() == self.runs.capacity() {
-            // More runs than sections so far: this section is still flagged, but in no run.
+            // There were more runs than sections: this section remains flagged, but in no run.
             return None;
         }
         let id = RunId(u32::try_from(self.runs.len()).ok()?);
@@ -381,7 +382,7 @@ impl Runs {
     }
 }
 
-/// The section with the larger hole; of equal ones the first.
+/// Section with the larger hole; the first if both are equal.
 fn larger(a: (i64, Hole), b: (i64, Hole)) -> (i64, Hole) {
     if b.1.diameter_m > a.1.diameter_m { b } else { a }
 }

@@ -1,4 +1,4 @@
-//! One section: what was measured in it, its hole, its verdict, and its flag.
+//! One section: its statistics, hole, verdict and flag.
 
 use serde::{Deserialize, Serialize};
 
@@ -18,7 +18,7 @@ pub enum Verdict {
     /// Undecided: samples may still land without the vehicle turning back, or not all heads have been there.
     #[default]
     Open,
-    /// D + k sd <= T, k being the confidence.
+    /// D + k sd <= T, where k is the confidence.
     Pass,
     /// D - k sd > T.
     Fail,
@@ -27,10 +27,10 @@ pub enum Verdict {
 }
 
 impl Verdict {
-    /// All of them.
+    /// All verdicts.
     pub const ALL: [Self; 4] = [Self::Open, Self::Pass, Self::Fail, Self::CannotSay];
 
-    /// The word used in reports and logs.
+    /// Word used in reports and logs.
     pub fn as_str(self) -> &'static str {
         match self {
             Self::Open => "open",
@@ -46,12 +46,12 @@ impl Verdict {
 pub struct Spread {
     /// Number of values.
     pub count: u32,
-    /// The smallest.
+    /// Smallest value.
     pub min: f64,
-    /// The largest.
+    /// Largest value.
     pub max: f64,
     mean: f64,
-    /// Sum of the squares of their distances from the mean.
+    /// Sum of the squared distances from the mean.
     scatter: f64,
 }
 
@@ -106,27 +106,28 @@ pub enum Judgement {
 }
 
 /// One section.
-#[expect(clippy::struct_excessive_bools, reason = "they are independent of one another")]
+#[expect(clippy::struct_excessive_bools, reason = "the flags are independent of one another")]
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct Section {
-    /// The verdict so far.
+    /// Current verdict.
     pub verdict: Verdict,
-    /// The hole as last measured.
+    /// Hole as last measured.
     pub hole: Option<Hole>,
     /// Standard deviation of the hole's diameter, m.
     pub hole_sd_m: f64,
     /// No further sample on the present course can change the verdict, nor the hole of a fail.
     pub settled: bool,
-    /// Open, though no sample will change it without turning back: where the vehicle began, or turned back, not all heads have
-    /// been.
+    /// Open, although no sample will change it without turning back.
+    ///
+    /// The vehicle began or turned back here, so not all heads have passed.
     pub not_inspected: bool,
-    /// When the fail was flagged.
+    /// Time at which the fail was flagged.
     pub flagged: Option<MonoNs>,
-    /// When a later pass filled the hole.
+    /// Time at which a later pass filled the hole.
     pub cleared: Option<MonoNs>,
-    /// Why it failed.
+    /// Causes of the fail.
     pub evidence: Option<Evidence>,
-    /// That was found when it was left in part only.
+    /// The causes were found when the heads had left only a part of the section.
     pub(super) explained_in_part: bool,
     /// Ping statistics of its passage.
     pub passage: Passage,
@@ -144,15 +145,15 @@ pub struct Section {
     pub masked_share: f64,
     /// Samples have landed within T of it since it was last judged.
     pub(super) stale: bool,
-    /// Returns on its wall that weren't taken for wall.
+    /// Returns on its wall that were not accepted as wall.
     pub doubtful: u32,
-    /// It holds samples of a head that wasn't believed soon after.
+    /// It holds samples of a head that was distrusted soon after.
     pub suspect: bool,
-    /// Number of the newest visit when that became known.
+    /// Number of the newest visit at the time of that distrust.
     suspected_in: u32,
     /// Visits with samples within T of it.
     pub(super) visits: Visits,
-    /// Number of the visit whose passes' error is in `passage`.
+    /// Number of the visit that the pass error in `passage` belongs to.
     passed_in: u32,
 }
 
@@ -160,7 +161,8 @@ pub struct Section {
 const FEW: u32 = 20;
 /// Masked share above which a section counts as having no wall.
 const ALL_MASKED: f64 = 0.999;
-/// Cross-section area over the design's that no tunnel of this design has: a tenth of the radius is 0.8 to 1.2.
+/// Plausible ratios of the cross-section area to the design's. A deviation of a tenth of the radius gives 0.8
+/// to 1.2.
 const AREA_RATIO: core::ops::RangeInclusive<f64> = 0.6..=1.6;
 
 impl Section {
@@ -169,12 +171,12 @@ impl Section {
         self.flagged.is_some() && self.cleared.is_none()
     }
 
-    /// Whether its samples contradict the design profile, on which everything else is measured.
+    /// Whether its samples contradict the design profile, on which all other measurements rely.
     pub fn contradicts(&self) -> bool {
         self.samples >= FEW && self.deviation.contradicts()
     }
 
-    /// Notes a ping with a fix in the section: how far passes are off one another.
+    /// Records the error between passes at a ping with a fix in the section.
     pub fn note_pass(&mut self, visit: &Visit, profile: &Profile) {
         if self.passed_in != visit.number {
             self.visits.note_earlier(self.passage.pass_error.worst_m(profile));
@@ -184,26 +186,27 @@ impl Section {
         self.passage.pass_error.add(&pass);
     }
 
-    /// Whether there were visits before its newest one, which is free of what makes those doubtful.
+    /// Whether it had earlier visits, and its newest visit has only samples of trusted heads.
     pub(super) fn is_visited_anew(&self) -> bool {
         self.visits.are_several() && !(self.suspect && self.visits.newest() <= self.suspected_in)
     }
 
-    /// Dismisses the samples of all visits but the newest.
+    /// Discards the samples of all visits except the newest.
     pub(super) fn keep_newest_visit(&mut self) {
         self.visits.keep_newest();
         self.suspect = false;
     }
 
-    /// Why a small hole is no evidence of coverage: what was taken for wall may be none, or samples may not lie beside one
-    /// another; `None` where it is evidence.
+    /// Reason for which a small hole is no evidence of coverage; `None` if it is evidence.
+    ///
+    /// The returns accepted as wall may be something else, or the samples may not lie beside one another.
     pub(super) fn doubt(&self) -> Option<Unsure> {
         let of_heads = self.suspect.then_some(Unsure::DistrustedHead);
         let of_places = self.visits.are_unrelated().then_some(Unsure::SeveralStretches);
         self.wall_doubt().or(of_heads).or(of_places)
     }
 
-    /// Why most of what was taken for wall may be none.
+    /// Reason for which most returns accepted as wall may be something else.
     pub(super) fn wall_doubt(&self) -> Option<Unsure> {
         Some(match self {
             _ if self.contradicts() => Unsure::ContradictedProfile,
@@ -214,7 +217,7 @@ impl Section {
         })
     }
 
-    /// Why neither a pass nor a fail can be told though nothing more will come; `None` elsewhere.
+    /// Reason for which it neither passes nor fails although no more samples will come; `None` otherwise.
     pub fn unsure(&self) -> Option<Unsure> {
         match self.verdict {
             Verdict::Open if self.not_inspected => Some(Unsure::NotInspected),
@@ -223,13 +226,13 @@ impl Section {
         }
     }
 
-    /// Whether its cross-section can't be the design's.
+    /// Whether its cross-section area is implausible for the design.
     fn is_of_another_size(&self) -> bool {
         let ratio = self.deviation.area_ratio().filter(|_| self.samples >= FEW);
         ratio.is_some_and(|ratio| !AREA_RATIO.contains(&ratio))
     }
 
-    /// Marks that it holds samples of a head that isn't believed any more: it can't pass, and is due for judging.
+    /// Marks that it holds samples of a distrusted head: it can't pass, and is due for judging.
     pub fn suspect(&mut self) {
         (self.suspect, self.stale, self.settled) = (true, true, false);
         self.suspected_in = self.visits.newest();
@@ -256,14 +259,14 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_section_is_flagged_from_its_flag_until_it_is_cleared() {
+    fn section_is_flagged_from_flag_to_clearing() {
         let at = |seconds: u64| Some(MonoNs(seconds * 1_000_000_000));
         let flagged = |flagged, cleared| Section { flagged, cleared, ..Section::default() }.is_flagged();
         assert_eq!([flagged(None, None), flagged(at(3), None), flagged(at(3), at(9))], [false, true, false]);
     }
 
     #[test]
-    fn a_flag_is_raised_by_a_fail_cleared_by_a_pass_and_raised_anew() {
+    fn fail_raises_the_flag_pass_clears_it_and_fail_raises_it_again() {
         let mut section = Section::default();
         for (at, verdict, expected, is_flagged) in [
             (1, Verdict::Open, Judgement::Updated, false),
@@ -292,7 +295,7 @@ mod tests {
     }
 
     #[test]
-    fn a_spread_keeps_its_digits_far_from_zero_and_whatever_is_merged() {
+    fn spread_is_exact_far_from_zero_and_after_merging() {
         let values = [1e8 + 1.0, 1e8 + 2.0, 1e8 + 4.0, 1e8 + 9.0];
         let (mut whole, mut first, mut second) = (Spread::default(), Spread::default(), Spread::default());
         for (k, value) in values.into_iter().enumerate() {
@@ -307,9 +310,9 @@ mod tests {
         assert_eq!((Spread::default().mean(), Spread::default().sd()), (None, None));
     }
 
-    /// What isn't judged yet is unsure at an end of the way alone.
+    /// An open section is unsure only at an end of the coverage extent.
     #[test]
-    fn an_open_section_is_unsure_at_an_end_of_the_way_alone() {
+    fn open_section_is_unsure_only_at_an_end_of_the_coverage_extent() {
         let unsure = |not_inspected| Section { not_inspected, ..Section::default() }.unsure();
         assert_eq!([unsure(true), unsure(false)], [Some(Unsure::NotInspected), None]);
     }

@@ -1,4 +1,4 @@
-//! Sections of the tunnel: what was measured in each, its hole, its verdict, and its flag.
+//! All sections of the tunnel: statistics, hole, verdict and flag of each.
 
 mod due;
 
@@ -29,40 +29,41 @@ use headrace_geometry::tunnel::Profile;
 pub struct Request {
     /// Index of the section, from chainage zero.
     pub section: i64,
-    /// Timestamp.
+    /// Time of the request.
     pub at: MonoNs,
     /// Stretch that every awaited head had swept by then.
     pub swept_by_all: Option<Reach>,
     /// No head was alive then.
     pub none_alive: bool,
-    /// Where samples may still land without the vehicle turning back.
+    /// Stretch where samples may still land without the vehicle turning back.
     pub to_come: Option<Reach>,
-    /// Where not all heads have been, nor will be without the vehicle turning back.
+    /// Stretch that not all heads have passed, nor will without the vehicle turning back.
     pub not_passed: Option<Reach>,
-    /// The dive has ended: where all heads have been.
+    /// Set at the end of the dive: the stretch that all heads have passed.
     pub ended: Option<Ended>,
-    /// Judged only if it certainly fails: if a large enough empty circle, not necessarily the largest, can get no more
-    /// samples.
+    /// Judge only for a certain fail: a large enough empty circle that can get no more samples.
+    ///
+    /// The circle need not be the largest.
     pub only_fails: bool,
 }
 
-/// Where all heads had been when a dive ended; `None` if nowhere.
+/// Stretch that all heads had passed when the dive ended; `None` if there is none.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Ended(pub Option<Reach>);
 
 impl Ended {
-    /// Whether a hole reaches to where not all heads had been.
+    /// Whether a hole extends to where not all heads have passed.
     fn is_beyond(self, hole: &Hole) -> bool {
         let radius_m = hole.diameter_m / 2.0;
         self.0.is_none_or(|all| hole.x_m - radius_m < all.from_m || hole.x_m + radius_m > all.to_m)
     }
 }
 
-/// Standard deviations of D between hole and target for a verdict of pass or fail, unless configured.
+/// Default confidence: standard deviations of D between hole and target for a verdict of pass or fail.
 pub const CONFIDENCE_SD: f64 = 2.0;
 
 impl Request {
-    /// Builds requests as of the outlook's time.
+    /// Returns a builder of requests with the outlook's time and stretches.
     pub fn at(outlook: &Outlook) -> impl Fn(i64) -> Self + use<> {
         let Outlook { at, swept_by_all, none_alive, to_come, not_passed, .. } = *outlook;
         move |section| Self {
@@ -83,19 +84,19 @@ struct Measured {
     hole: Hole,
     /// Standard deviation of the hole's diameter, m.
     sd_m: f64,
-    /// The newest visit alone shows that it passes.
+    /// The newest visit alone shows that the section passes.
     by_newest: bool,
 }
 
 /// Inputs of judging, and the callback for changed runs.
 pub struct Judging<'a> {
-    /// The samples.
+    /// All samples.
     pub store: &'a SampleStore,
-    /// The latest samples that are lacking, for the causes of fails.
+    /// Latest missing samples, for the causes of fails.
     pub lacks: &'a Lacks,
     /// Hole search with its working memory.
     pub finder: &'a mut HoleFinder,
-    /// The design profile.
+    /// Design profile.
     pub profile: &'a Profile,
     /// Called for every run that changes.
     pub tell: &'a mut dyn FnMut(RunId, RunChange),
@@ -106,16 +107,18 @@ pub struct Judging<'a> {
 pub struct Sections {
     section_m: f64,
     target_m: f64,
-    /// Standard deviations of D that a verdict of pass or fail keeps clear of the target.
+    /// Standard deviations of D by which a pass or a fail must clear the target.
     confidence_sd: f64,
-    /// How far before a missed stretch the vehicle's origin is to turn round, m.
+    /// Distance before a missed stretch at which the vehicle's origin is to turn round, m.
     run_up_m: f64,
     first: i64,
-    /// Judged sections by verdict, in the order of [`Verdict::ALL`]; last, open ones that weren't inspected.
+    /// Judged sections by verdict, in the order of [`Verdict::ALL`]. The last entry counts open sections that
+    /// were not inspected.
     judged: [u32; Verdict::ALL.len() + 1],
     sections: Vec<Section>,
     runs: Runs,
-    /// Where what the heads leave behind, and ahead, is looked at next: least and greatest chainage of their reach, m.
+    /// Least and greatest chainage of the heads' reach at which sections behind and ahead are next checked,
+    /// m.
     next_look_m: [f64; 2],
 }
 
@@ -124,7 +127,7 @@ stateful!(Sections { state: runs, judged, next_look_m; slots: sections; fixed: s
 impl Sections {
     /// Sections of `section_m` over [`from_m`, `to_m`].
     ///
-    /// Allocates: startup only; all that it will ever use.
+    /// Allocates: at startup, all that it will ever use.
     pub fn new(section_m: f64, target_m: f64, from_m: f64, to_m: f64) -> Self {
         let first = math::floor_to_i64(from_m / section_m);
         let end = -math::floor_to_i64(-to_m / section_m);
@@ -143,20 +146,21 @@ impl Sections {
         }
     }
 
-    /// Judges with this many standard deviations of D between hole and target, [`CONFIDENCE_SD`] unless set.
+    /// Sets the confidence; the default is [`CONFIDENCE_SD`].
     #[must_use]
     pub fn with_confidence_sd(self, confidence_sd: f64) -> Self {
         Self { confidence_sd, ..self }
     }
 
-    /// Of a vehicle whose heads reach so far before or behind its origin, m.
+    /// Sets how far the heads reach before or behind the vehicle's origin.
     #[must_use]
     pub fn with_heads_reach_m(self, reach_m: f64) -> Self {
         Self { run_up_m: reach_m + self.target_m, ..self }
     }
 
-    /// Chainage that the vehicle's origin is to go back to, so that all its heads pass a stretch from its beginning on, m: to a
-    /// decimetre.
+    /// Chainage to which the vehicle's origin has to go back, m, rounded to a decimetre.
+    ///
+    /// From there all heads pass a stretch from its beginning.
     pub fn back_to_m(&self, start_m: f64) -> f64 {
         back_to_m(start_m, self.run_up_m)
     }
@@ -182,7 +186,7 @@ impl Sections {
         self.sections.len()
     }
 
-    /// Whether there is none.
+    /// Whether there are no sections.
     pub fn is_empty(&self) -> bool {
         self.sections.is_empty()
     }
@@ -197,12 +201,13 @@ impl Sections {
         self.target_m
     }
 
-    /// Standard deviations of D that a verdict of pass or fail keeps clear of the target.
+    /// Standard deviations of D by which a pass or a fail must clear the target.
     pub fn confidence_sd(&self) -> f64 {
         self.confidence_sd
     }
 
-    /// Distance of the heads' reach at which a section is left, m: samples farther away don't change a pass.
+    /// Distance from the heads' reach at which a section is left, m. Samples farther away don't change a
+    /// pass.
     pub fn left_m(&self) -> f64 {
         self.target_m / 2.0
     }
@@ -212,7 +217,7 @@ impl Sections {
         math::floor_to_i64(x_m / self.section_m)
     }
 
-    /// Chainages at which a section begins and ends, m.
+    /// Chainages of a section's two ends, m.
     pub fn bounds_m(&self, index: i64) -> (f64, f64) {
         (index as f64 * self.section_m, (index + 1) as f64 * self.section_m)
     }
@@ -246,7 +251,7 @@ impl Sections {
         let (target_m, confidence_sd) = (self.target_m, self.confidence_sd);
         let section = self.get(request.section)?;
         if section.verdict == Verdict::Pass && section.visits.are_several() && section.doubt().is_none() {
-            // What one visit has shown, a later one doesn't take back.
+            // A later visit doesn't take back a pass of an earlier one.
             return None;
         }
         let asks = request.only_fails || request.ended.is_some() || section.is_flagged();
@@ -273,12 +278,13 @@ impl Sections {
             section.verdict = Verdict::Pass;
             section.keep_newest_visit();
         }
-        // More samples leave a pass a pass; those outside a hole's radius leave the hole as it is.
+        // More samples don't change a pass. Samples outside a hole's radius don't change the hole.
         section.settled = section.verdict == Verdict::Pass || clear_m >= hole.diameter_m / 2.0;
         let alone = verdict(&hole, error_m, target_m, clear_m);
         section.not_inspected = section.verdict == Verdict::Open && alone != Verdict::Open;
         if section.not_inspected {
-            // The largest hole reaches to where not all heads have been; another one may fail for itself.
+            // The largest hole extends to where not all heads have passed. Another hole may still fail by
+            // itself.
             let radius_m = f64::midpoint(target_m, error_m);
             section.settled &=
                 clear_of(request.to_come, from_m).min(clear_of(request.to_come, to_m)) >= radius_m;
@@ -288,14 +294,14 @@ impl Sections {
             }
         }
         let section = self.get_mut(request.section)?;
-        // Nothing will come any more.
+        // No more samples will come.
         section.not_inspected |=
             section.verdict == Verdict::Open && request.ended.is_some_and(|ended| ended.is_beyond(&hole));
         if request.ended.is_some() && section.verdict == Verdict::Open && section.is_flagged() {
-            // Missed, and the dive ended on the way back over it.
+            // The section was missed, and the dive ended on the way back over it.
             (section.verdict, section.not_inspected) = (Verdict::Fail, false);
         }
-        // What is lacking in a hole that hasn't changed may have been forgotten since.
+        // The missing samples of an unchanged hole may have been dropped since, so its evidence is kept.
         if section.verdict == Verdict::Fail && !is_same {
             let evidence = self.explain(&hole, request, judging);
             let evidence = self.as_beside(request.section, evidence);
@@ -309,8 +315,9 @@ impl Sections {
         Some(judgement)
     }
 
-    /// Evidence of a section. Where nothing that was present explains it, it has the causes of a flagged section beside it: an edge
-    /// belongs to its stretch.
+    /// Evidence of a section; if its cause is unknown, that of a flagged neighbour.
+    ///
+    /// The edge of a stretch has the causes of the stretch.
     fn as_beside(&self, index: i64, evidence: Evidence) -> Evidence {
         if evidence.cause != Cause::Unknown {
             return evidence;
@@ -322,13 +329,13 @@ impl Sections {
         }
     }
 
-    /// Where a section that has been judged is counted.
+    /// Slot in which a judged section is counted.
     fn counted(section: &Section) -> Option<usize> {
         section.hole?;
         Some(if section.not_inspected { Verdict::ALL.len() } else { section.verdict as usize })
     }
 
-    /// The hole of a section that counts: that of all visits together, unless only the newest shows by itself that it passes.
+    /// The hole that counts: that of all visits, unless the newest visit alone shows that the section passes.
     fn measure(&self, index: i64, judging: &mut Judging<'_>) -> Option<Measured> {
         let Judging { store, finder, profile, .. } = judging;
         let ((from_m, to_m), pass_error) = (self.bounds_m(index), self.pass_error(index));
@@ -350,7 +357,7 @@ impl Sections {
         Some(Measured { hole, sd_m, by_newest: false })
     }
 
-    /// Counts a section that has been judged, by where it was counted before and is now.
+    /// Moves a judged section from its previous slot in the counts to its present one.
     fn count(&mut self, before: Option<usize>, now: Option<usize>) {
         if let Some(count) = before.and_then(|before| self.judged.get_mut(before)) {
             *count -= 1;
@@ -360,7 +367,7 @@ impl Sections {
         }
     }
 
-    /// Metres of the way by verdict; together they are the sections of the way.
+    /// Metres of the coverage extent by verdict. Their sum is the length of its sections.
     pub fn metres(&self, way: Option<Reach>) -> Metres {
         let mut metres = Metres::default();
         let (mut all, section_m) = (self.sections_of(way).count(), self.section_m);
@@ -375,7 +382,7 @@ impl Sections {
         metres
     }
 
-    /// The error of a section's passes; of one in which no head pinged, the largest of those within T / 2.
+    /// Error of a section's passes. If no head pinged in it, the largest of those within T / 2.
     fn pass_error(&self, index: i64) -> PassError {
         if let Some(section) = self.get(index).filter(|section| section.passage.placed > 0) {
             return section.passage.pass_error;
@@ -399,8 +406,9 @@ impl Sections {
         runs.set(request.section, failing, &mut Telling { at: request.at, hole: &hole, tell: judging.tell });
     }
 
-    /// The causes of a hole, from the passages of the sections within T. Of a section that isn't left yet, those of the
-    /// largest hole in the part that is.
+    /// Causes of a hole, from the passages of the sections within T.
+    ///
+    /// If the heads haven't left the whole section yet, the largest hole in the part left counts.
     fn explain(&self, whole: &Hole, request: &Request, judging: &mut Judging<'_>) -> Evidence {
         let mut bounds_m = self.bounds_m(request.section);
         let near = self.index_of(bounds_m.0 - self.target_m)..=self.index_of(bounds_m.1 + self.target_m);
@@ -437,14 +445,15 @@ impl Sections {
         explain(&case, passages, judging.store, judging.finder)
     }
 
-    /// The evidence that speaks for a cause of a run: that of the section with the largest hole, or of the last with this cause where
-    /// that one fails for something else.
+    /// Evidence for one cause of a run, from the section with the largest hole if it has that cause.
+    ///
+    /// Otherwise from the last section with it.
     pub fn evidence_of(&self, run: &Run, cause: Cause) -> Option<Evidence> {
         let evidence = |index: i64| self.get(index)?.evidence.filter(|evidence| evidence.causes.has(cause));
         evidence(run.worst.0).or_else(|| (run.from..run.to).rev().find_map(evidence))
     }
 
-    /// Index range of the sections in the table that a stretch, such as the way, touches.
+    /// Index range of the existing sections that a stretch, such as the coverage extent, touches.
     pub fn sections_of(&self, stretch: Option<Reach>) -> Range<i64> {
         let Some(reach) = stretch else { return 0..0 };
         let end = self.first + i64::try_from(self.sections.len()).unwrap_or(i64::MAX);
@@ -453,7 +462,7 @@ impl Sections {
 }
 
 impl Sections {
-    /// A section as a stretch of its own; `None` where it isn't unsure.
+    /// Unsure stretch of a single section; `None` if the section isn't unsure.
     pub fn unsure(&self, index: i64) -> Option<Stretch> {
         let section = self.get(index)?;
         let hole_m = section.hole.map_or(0.0, |hole| hole.diameter_m);
@@ -462,7 +471,8 @@ impl Sections {
         Some(Stretch::one(section.unsure()?, index, [hole_m, error_m, section.hole_sd_m], driven))
     }
 
-    /// The unsure stretches of the way, in order. Allocates: for the end of a dive.
+    /// Unsure stretches within a stretch such as the coverage extent, in order. Allocates: for the end of a
+    /// dive.
     pub fn unsure_stretches(&self, way: Option<Reach>) -> Vec<Stretch> {
         let mut all: Vec<Stretch> = Vec::new();
         for stretch in self.sections_of(way).filter_map(|index| self.unsure(index)) {
@@ -474,10 +484,15 @@ impl Sections {
     }
 }
 
-/// Verdict on a hole whose centre is `clear_m` from where samples may still land; `error_m` is k sd of its diameter, k being
-/// the confidence. `pass` if D + k sd <= T: more samples won't enlarge it. `fail` if D - k sd > T for any final D: samples
-/// come no nearer than `clear_m`. Otherwise `open` while D may change, then `cannot_say`. A verdict holds for both bounds of
-/// D. Wall without samples around it fails.
+/// Verdict on a hole whose centre is `clear_m` from where samples may still land.
+///
+/// `error_m` is k sd of its diameter, where k is the confidence.
+/// - `pass` if D + k sd <= T: more samples won't enlarge D.
+/// - `fail` if D - k sd > T for any final D: samples come no nearer than `clear_m`. Wall without samples
+///   around it fails, too.
+/// - `open` otherwise while D may change, and `cannot_say` afterwards.
+///
+/// A verdict holds for both bounds of D.
 pub(super) fn verdict(hole: &Hole, error_m: f64, target_m: f64, clear_m: f64) -> Verdict {
     let is_left = 2.0 * clear_m >= hole.diameter_m;
     if hole.bounded && hole.most_m + error_m <= target_m {
@@ -491,7 +506,7 @@ pub(super) fn verdict(hole: &Hole, error_m: f64, target_m: f64, clear_m: f64) ->
     }
 }
 
-/// Chainage to go back to, so many metres before a stretch begins, m: to a decimetre.
+/// Chainage `run_up_m` before a stretch begins, m, rounded down to a decimetre.
 pub fn back_to_m(start_m: f64, run_up_m: f64) -> f64 {
     math::floor_to_i64((start_m - run_up_m) * 10.0 + 1e-6) as f64 / 10.0
 }

@@ -1,7 +1,7 @@
 //! Sounding density: samples per node of a square grid, as survey specifications require.
 //!
-//! A grid does not detect gaps: a helix can satisfy it and leave strips wider than the target. It complements the hole,
-//! never replaces it. Source: docs/why/coverage.md, "For surveyors".
+//! A grid does not detect gaps: a helix can satisfy it and leave strips wider than the target. It complements
+//! the hole, and never replaces it. Source: docs/why/coverage.md, "For surveyors".
 
 use headrace_geometry::math;
 use headrace_geometry::snapshot::stateful;
@@ -40,9 +40,9 @@ stateful!(Soundings { slots: counts; fixed: layout, first_row, columns; });
 pub struct GridSummary {
     /// Nodes centred in the stretch.
     pub nodes: u32,
-    /// Those with at least [`ENOUGH`] samples.
+    /// Nodes with at least [`ENOUGH`] samples.
     pub enough: u32,
-    /// Those without any (holidays).
+    /// Nodes without any sample (holidays).
     pub empty: u32,
 }
 
@@ -67,7 +67,7 @@ impl GridSummary {
 impl Soundings {
     /// An empty grid.
     ///
-    /// Allocates: startup only, two bytes per node; the OS maps a page on its first sample.
+    /// Allocates: at startup, two bytes per node; the OS maps a page on its first sample.
     pub fn new(layout: GridLayout) -> Self {
         let first_row = math::floor_to_i64(layout.from_m / layout.node_m);
         let rows = (math::floor_to_i64(layout.to_m / layout.node_m) - first_row).max(0) + 1;
@@ -155,9 +155,9 @@ mod tests {
     }
 
     proptest! {
-        /// Against counting the samples within each node's edges.
+        /// The expected counts come from the samples within each node's edges.
         #[test]
-        fn each_node_has_what_fell_within_its_edges(
+        fn each_node_counts_the_samples_within_its_edges(
             samples in proptest::collection::vec((-3.0f64..19.0, 0.0f64..7.3), 0..400),
             from_m in -3.0f64..10.0,
             length_m in 0.0f64..8.0,
@@ -185,7 +185,7 @@ mod tests {
 
         /// Consecutive stretches contain each node exactly once.
         #[test]
-        fn sections_share_the_nodes_out(section_m in 0.1f64..3.0) {
+        fn each_node_belongs_to_one_section(section_m in 0.1f64..3.0) {
             let soundings = soundings(&[]);
             let parts: u32 = (0..6)
                 .map(|k| soundings.summary(section_m * f64::from(k), section_m * f64::from(k + 1)).nodes)
@@ -195,8 +195,9 @@ mod tests {
     }
 
     #[test]
-    fn a_helix_passes_the_grid_and_misses_a_strip() {
-        // Two passes at the edges of each node's row: every node has ten samples, yet 0.4 m between them are unseen.
+    fn helix_fills_the_grid_but_misses_a_strip() {
+        // Two passes run at the edges of each node's row. Every node has ten samples, yet 0.4 m between them
+        // are unseen.
         let passes = (0..20).flat_map(|k| [0.05, 0.45].map(|x_m| f64::from(k) * 0.5 + x_m));
         let samples: Vec<_> =
             passes.flat_map(|x_m| (0..73).map(move |i| (x_m, f64::from(i) * 0.1))).collect();
@@ -206,7 +207,7 @@ mod tests {
     }
 
     #[test]
-    fn what_lies_outside_is_not_counted_and_counts_saturate() {
+    fn outside_samples_are_not_counted_and_counts_saturate() {
         let mut soundings = soundings(&[]);
         for (x_m, arc_m) in [(-3.3, 0.0), (20.1, 0.0), (f64::NAN, 0.0), (0.0, f64::NAN), (0.0, f64::INFINITY)]
         {

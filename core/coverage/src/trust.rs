@@ -1,4 +1,4 @@
-//! Heads whose returns don't follow the walls: noise, a range that never changes, a wall that other heads don't see.
+//! Trust in heads: detects noise, a range that never changes, and wall that other heads don't see.
 
 use serde::{Deserialize, Serialize};
 
@@ -7,34 +7,34 @@ use super::wall_limits::{PlacedReturn, WallLimits};
 use headrace_fusion::one_range::OneRange;
 use headrace_geometry::math;
 
-/// Why a head isn't believed, with the figure that says so, m.
+/// Reason for distrusting a head, with the figure that shows it, m.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub enum Distrust {
-    /// Most of its successive returns disagree: by how far in the mean.
+    /// Most of its successive returns disagree; their mean difference.
     Scattered(f64),
-    /// Its range doesn't change, though that to the design does: the range.
+    /// Its range doesn't change although the range to the design does; the range.
     Constant(f64),
-    /// It contradicts the design where other heads agree with it: its mean deviation there.
+    /// It contradicts the design where other heads agree with it; its mean deviation there.
     Outvoted(f64),
 }
 
-/// How a return was had.
+/// The beam that a return came from.
 pub struct Beam<'a> {
     /// Range, m.
     pub range_m: f64,
     /// Direction of the beam across the tunnel, rad.
     pub angle_rad: f64,
-    /// The head stands still.
+    /// The head is not turning.
     pub standing: bool,
-    /// Range to the design profile, m; `None` where the beam meets none.
+    /// Range to the design profile, m; `None` if the beam doesn't meet it.
     pub design_range_m: &'a dyn Fn() -> Option<f64>,
 }
 
-/// What the vehicle's other heads say of one.
+/// Evidence of the vehicle's other heads on one head.
 pub(super) struct Others {
     /// Votes on it.
     pub(super) ballot: Ballot,
-    /// The range of one of them changes as the design's does.
+    /// Another head's range changes as the design's does.
     pub(super) change: bool,
 }
 
@@ -43,13 +43,13 @@ pub(super) struct Others {
 struct HalfTurn {
     returns: u32,
     doubtful: u32,
-    /// Returns that disagree with the one before, and the sum of how far, m.
+    /// Returns that disagree with the previous one, and the sum of the differences, m.
     jumps: u32,
     jump_sum_m: f64,
     turned_rad: f64,
-    /// Chainages of the returns, m.
+    /// Least and greatest chainage of the returns, m.
     between_m: Option<[f64; 2]>,
-    /// Returns within runs of one range, their least and most range, and the same of the design there, m.
+    /// Returns within runs of one range; least and greatest range of these, and of the design there, m.
     unchanged: u32,
     unchanged_m: Option<[f64; 2]>,
     design_m: Option<[f64; 2]>,
@@ -74,7 +74,7 @@ impl HalfTurn {
         self.turned_rad >= math::TAU / 2.0 && self.returns >= FEW
     }
 
-    /// Whether more than one return in `parts` is of one range, though the design varies by much where they are.
+    /// Whether more than one return in `parts` has the same range although the design's varies widely there.
     fn is_constant(&self, parts: u32, limits: &WallLimits) -> bool {
         let span_m = |of: Option<[f64; 2]>| of.map_or(0.0, |[least_m, most_m]| most_m - least_m);
         parts * self.unchanged > self.returns
@@ -88,18 +88,21 @@ impl HalfTurn {
     }
 }
 
-/// The least returns of half a turn.
+/// Minimum returns of half a turn.
 const FEW: u32 = 20;
 /// A range counts as unchanged within this share of the tolerance: some quanta of a profiling sonar.
 const UNCHANGED: f64 = 0.2;
-/// Runs of unchanged range are of one range within this share of the tolerance.
+/// Runs of unchanged range have the same range within this share of the tolerance.
 const CONSTANT: f64 = 0.6;
-/// One range contradicts the design where that varies by this many tolerances.
+/// A constant range contradicts the design if the design's varies by this many tolerances.
 const VARIES: f64 = 2.0;
-/// Returns in a row that make a run of unchanged range: neighbours on a wall differ less.
+/// Successive returns that make a run of unchanged range. A few neighbours on a wall may have nearly the same
+/// range.
 const RUN: u32 = 8;
-/// A run of exactly one range contradicts a design that varies by this many tolerances there, if another head's range changes: in a round
-/// tunnel the design varies where the vehicle is beside its estimate.
+/// Design variation, in tolerances, that an exactly constant range contradicts if another head's range
+/// changes.
+///
+/// In a round tunnel the design's range varies if the vehicle is beside its estimated place.
 const STUCK_VARIES: f64 = 1.0;
 
 fn joined(a: Option<[f64; 2]>, b: Option<[f64; 2]>) -> Option<[f64; 2]> {
@@ -109,16 +112,16 @@ fn joined(a: Option<[f64; 2]>, b: Option<[f64; 2]>) -> Option<[f64; 2]> {
     }
 }
 
-/// Returns in a row of one range.
+/// Successive returns of one range.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 struct Unchanged {
     returns: u32,
-    /// Least and most range, m.
+    /// Least and greatest range, m.
     range_m: [f64; 2],
 }
 
 impl Unchanged {
-    /// Adds a return; true if it is within a run of one range.
+    /// Adds a return. True if it is within a run of one range.
     fn add(&mut self, range_m: f64, limits: &WallLimits) -> bool {
         let [least_m, most_m] = self.range_m;
         let span_m = [least_m.min(range_m), most_m.max(range_m)];
@@ -131,15 +134,15 @@ impl Unchanged {
     }
 }
 
-/// Whether a head is believed.
+/// Trust in one head.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub(super) struct HeadTrust {
-    /// The present half turn, and the two before.
+    /// The present half turn, and the two before it.
     halves: [HalfTurn; 3],
     angle_rad: Option<f64>,
     unchanged: Unchanged,
     one_range: OneRange,
-    /// Chainages of the returns of that one range, m, and how far the head turned since.
+    /// Chainages of the returns with that one range, m, and the angle turned since.
     one_range_at_m: [f64; 2],
     one_range_rad: f64,
     distrusted: Option<Distrust>,
@@ -150,8 +153,11 @@ impl HeadTrust {
         self.distrusted
     }
 
-    /// Adds a return: by how far it disagrees with the one before, m, if it does, and the returns found doubtful by it.
-    /// Returns why the head isn't believed from now on, and the chainages of its late returns.
+    /// Adds a return. Returns the reason if the head is distrusted from now on, with the chainages of its
+    /// recent returns.
+    ///
+    /// The inputs include the difference from the previous return, m, if they disagree, and the returns that
+    /// it made doubtful.
     pub(super) fn note(
         &mut self,
         placed: &PlacedReturn,
@@ -161,7 +167,7 @@ impl HeadTrust {
         limits: &WallLimits,
         others: &Others,
     ) -> Option<(Distrust, [f64; 2])> {
-        // A head that stands still looks at one place only, which may well be off the design.
+        // A stalled head sees one place only, which may well be off the design.
         if beam.standing {
             return None;
         }
@@ -215,7 +221,8 @@ impl HeadTrust {
         Some((why, between_m))
     }
 
-    /// Notes a return for its range. Of what doesn't contradict the design half a turn is kept.
+    /// Records a return for the check of a constant range. Half a turn is kept unless it contradicts the
+    /// design.
     fn note_range(&mut self, placed: &PlacedReturn, beam: &Beam<'_>, turned_rad: f64, limits: &WallLimits) {
         if self.one_range_rad > math::TAU / 2.0 && !self.is_stuck(limits) {
             self.one_range = OneRange::default();
@@ -230,7 +237,7 @@ impl HeadTrust {
         self.one_range_rad += turned_rad;
     }
 
-    /// Whether the last returns are of one range where the design's vary.
+    /// Whether the last returns have one range although the design's varies.
     pub(super) fn is_stuck(&self, limits: &WallLimits) -> bool {
         self.one_range.is_stuck(RUN, STUCK_VARIES * limits.tolerance_m)
     }

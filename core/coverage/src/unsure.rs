@@ -1,34 +1,35 @@
-//! Stretches of which neither a pass nor a fail can be told, though nothing more will come: why, and how far they go.
+//! Unsure stretches: sections that neither pass nor fail although no more samples will come.
 
 use core::ops::Range;
 use serde::{Deserialize, Serialize};
 
 use super::passage::{Drive, Passage};
 
-/// Why a section has neither passed nor failed, though no more samples will come without turning back.
+/// Reason for which a section neither passes nor fails although no more samples will come without turning
+/// back.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Unsure {
-    /// Where the way begins or turns back: not all heads have been there.
+    /// The coverage extent begins here, or the vehicle turned back here: not all heads have passed.
     NotInspected,
     /// The hole is within its error of the target: position isn't known well enough.
     Position,
     /// It holds samples of several stretches of navigation.
     SeveralStretches,
-    /// More returns are doubtful than were taken for wall.
+    /// More returns are doubtful than were accepted as wall.
     DoubtfulReturns,
-    /// It holds samples of a head that wasn't believed soon after.
+    /// It holds samples of a head that was distrusted soon after.
     DistrustedHead,
     /// Its samples contradict the design profile.
     ContradictedProfile,
-    /// Its cross-section can't be the design's.
+    /// Its cross-section is implausible for the design.
     OtherSize,
     /// All of its wall is a declared opening.
     NoWall,
 }
 
 impl Unsure {
-    /// All of them.
+    /// All reasons.
     pub const ALL: [Self; 8] = [
         Self::NotInspected,
         Self::Position,
@@ -40,7 +41,7 @@ impl Unsure {
         Self::NoWall,
     ];
 
-    /// The word used in reports and logs.
+    /// Word used in reports and logs.
     pub fn as_str(self) -> &'static str {
         match self {
             Self::NotInspected => "not_inspected",
@@ -55,48 +56,49 @@ impl Unsure {
     }
 }
 
-/// Neighbouring sections that are unsure for one reason.
+/// Neighbouring sections that are unsure for the same reason.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Stretch {
-    /// Why.
+    /// Reason.
     pub why: Unsure,
     /// Index of the first section.
     pub from: i64,
     /// Index after the last.
     pub to: i64,
-    /// Those of the sections between that are unsure for this reason, and where more than the hole its error matters.
+    /// Its unsure sections: those in which the hole matters more, and those in which its error does.
     of: [Largest; 2],
 }
 
-/// Unsure sections, and the one of them with the largest hole.
+/// Number of unsure sections, and the figures of the one with the largest hole.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct Largest {
-    /// How many.
+    /// Number of sections.
     pub sections: u32,
-    /// Largest hole, and the standard deviation of that hole, m.
+    /// Largest hole, and its standard deviation, m.
     pub hole_m: [f64; 2],
-    /// How that section was driven.
+    /// Driving figures of that section.
     pub driven: Driven,
 }
 
-/// How a section was driven, and how it should be.
+/// Speed at which a section was driven, and the speed that fits.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct Driven {
-    /// Speed along the tunnel, m/s; zero where nothing passed.
+    /// Speed along the tunnel, m/s; zero if nothing passed.
     pub speed_mps: f64,
-    /// The largest speed that meets the target, all heads turning as scheduled, m/s; zero where none does.
+    /// Largest speed that meets the target with all heads turning as scheduled, m/s; zero if no speed does.
     pub fits_mps: f64,
-    /// At this speed heads at their scheduled angles pass unevenly: those apart along the hull are out of phase.
+    /// At this speed heads at their scheduled angles pass unevenly: heads apart along the hull are out of
+    /// phase.
     pub is_uneven: bool,
-    /// Heads were silent, or heard no wall: speeds are those of all heads.
+    /// Heads were silent, or heard no wall. The speeds are those for all heads.
     pub is_short: bool,
 }
 
-/// Time between passes over that of evenly spread ones from which they are uneven.
+/// Ratio of the time between passes to that of evenly spread ones above which passes are uneven.
 const UNEVEN: f64 = 1.05;
 
 impl Driven {
-    /// From a section's passage.
+    /// Figures of a section's passage.
     pub fn of(passage: &Passage) -> Self {
         let Drive { speed_mps, passes_needed, planned_gap_s, all_gap_s, .. } = passage.drive;
         Self {
@@ -108,13 +110,13 @@ impl Driven {
     }
 }
 
-/// Share of the hole from which its error is what matters.
+/// Ratio of error to hole above which the error matters more.
 const MOSTLY_ERROR: f64 = 0.2;
-/// Sections farther apart than this are of different stretches, m: who goes over one again passes the other, too.
+/// Maximum gap within a stretch, m: a vehicle that repeats one section passes the other, too.
 const JOIN_M: f64 = 2.0;
 
 impl Stretch {
-    /// Of one section: its hole and by how much that may be larger or smaller, m, with the standard deviation.
+    /// Stretch of one section: its hole, the error of that hole, and the hole's standard deviation, m.
     pub fn one(why: Unsure, index: i64, [hole_m, error_m, sd_m]: [f64; 3], driven: Driven) -> Self {
         let section = Largest { sections: 1, hole_m: [hole_m, sd_m], driven };
         let is_error = error_m > MOSTLY_ERROR * hole_m;
@@ -122,28 +124,28 @@ impl Stretch {
         Self { why, from: index, to: index + 1, of }
     }
 
-    /// How many of its sections are unsure for this reason.
+    /// Number of its sections that are unsure for this reason.
     pub fn sections(&self) -> u32 {
         self.of.iter().map(|of| of.sections).sum()
     }
 
-    /// Whether in most of its sections the error matters more than the hole.
+    /// Whether the error matters more than the hole in most of its sections.
     pub fn is_mostly_error(&self) -> bool {
         self.of[1].sections > self.of[0].sections
     }
 
-    /// What speaks for it: the largest hole of those sections that are most of it.
+    /// Evidence for the stretch: the largest hole in the larger group of its sections.
     pub fn largest(&self) -> &Largest {
         &self.of[usize::from(self.is_mostly_error())]
     }
 
-    /// Whether sections are too far away to be of it.
+    /// Whether sections are too far away to belong to it.
     pub fn is_beyond(&self, sections: Range<i64>, section_m: f64) -> bool {
         let apart = (sections.start - self.to).max(self.from - sections.end);
         apart as f64 * section_m > JOIN_M + 1e-9
     }
 
-    /// Adds a section; false if it is unsure for another reason, or too far away.
+    /// Adds a section. False if it is unsure for another reason, or too far away.
     #[must_use]
     pub fn join(&mut self, other: &Self, section_m: f64) -> bool {
         if self.why != other.why || self.is_beyond(other.from..other.to, section_m) {
@@ -171,10 +173,10 @@ mod tests {
     }
 
     #[test]
-    fn neighbours_within_two_metres_are_one_stretch() {
+    fn unsure_neighbours_within_2_m_are_one_stretch() {
         let mut stretch = one(Unsure::Position, 10, 0.4);
         assert!(stretch.join(&one(Unsure::Position, 11, 0.6), 0.25));
-        assert!(stretch.join(&one(Unsure::Position, 1, 0.5), 0.25), "eight sections lie between");
+        assert!(stretch.join(&one(Unsure::Position, 1, 0.5), 0.25), "eight sections lie between them");
         assert!(!stretch.join(&one(Unsure::Position, 21, 0.5), 0.25), "nine");
         assert!(!stretch.is_beyond(20..21, 0.25) && stretch.is_beyond(21..22, 0.25));
         assert!(!stretch.is_beyond(-8..-7, 0.25) && stretch.is_beyond(-9..-8, 0.25));
@@ -184,15 +186,19 @@ mod tests {
         assert_eq!(*stretch.largest(), largest);
     }
 
-    /// One section that nearly nothing is known of says nothing of the others, whatever the size of its hole.
+    /// A section about which nearly nothing is known doesn't represent the others, whatever the size of its
+    /// hole.
     #[test]
-    fn most_of_a_stretch_speaks_for_it() {
+    fn majority_of_a_stretch_represents_it() {
         let lost = |section| Stretch::one(Unsure::Position, section, [0.9, 1.4, 0.7], Driven::default());
         let mut stretch = lost(0);
         assert!(stretch.is_mostly_error());
         let third =
             |hole_m: f64| Stretch::one(Unsure::Position, 0, [hole_m, 0.3 * hole_m, 0.1], Driven::default());
-        assert!(third(1.0).is_mostly_error() && third(0.2).is_mostly_error(), "whatever the hole's size");
+        assert!(
+            third(1.0).is_mostly_error() && third(0.2).is_mostly_error(),
+            "whatever the size of the hole"
+        );
         assert!(stretch.join(&one(Unsure::Position, 1, 0.5), 0.25));
         assert!(stretch.join(&one(Unsure::Position, 2, 0.49), 0.25));
         assert!(!stretch.is_mostly_error());

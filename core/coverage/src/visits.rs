@@ -1,4 +1,4 @@
-//! Visits of a place: of samples of one visit it is known how far passes are off one another; those of different visits may be
+//! Visits of a place. The error between passes of one visit is known; passes of different visits may be
 //! further apart.
 //!
 //! A visit ends where the vehicle turns back, and where navigation breaks off.
@@ -10,25 +10,25 @@ use headrace_fusion::Fix;
 use headrace_geometry::time::{DurNs, MonoNs};
 use headrace_geometry::tunnel::Profile;
 
-/// Age of a sample to which the error between passes applies, and from which on it is that of a visit long before.
+/// Maximum age of a sample for the error between passes, and minimum age for that of a much earlier visit.
 const SAME_PASS: DurNs = DurNs(20_000_000_000);
 const LONG_BEFORE: DurNs = DurNs(40_000_000_000);
 
-/// The visit that a sample is of.
+/// The visit that a sample belongs to.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Visit {
-    /// Number from zero, never falling.
+    /// Number from zero. It never decreases.
     pub number: u32,
     /// Number of the stretch of navigation.
     pub tie: u32,
     /// Time of the sample.
     pub at: MonoNs,
-    /// Error relative to the pass before, and relative to a visit long before.
+    /// Error relative to the previous pass, and relative to a much earlier visit.
     pub errors: [PassError; 2],
 }
 
 impl Visit {
-    /// Of a fix at `at`, when the vehicle had turned back `turns` times.
+    /// Visit of a fix at `at`, after the vehicle has turned back `turns` times.
     pub fn of(fix: &Fix, at: MonoNs, turns: u32) -> Self {
         let [pass, long_before] =
             [fix.relative, fix.revisit].map(|relative| PassError { relative, ..PassError::of(fix) });
@@ -40,7 +40,7 @@ impl Visit {
         }
     }
 
-    /// The largest standard deviation of a hole's diameter between samples of now and of then, m.
+    /// Largest standard deviation of a hole's diameter between samples of now and of `then`, m.
     fn apart_sd_m(&self, then: MonoNs, profile: &Profile) -> f64 {
         let over = (self.at.since(then) + DurNs(-SAME_PASS.0)).as_secs_f64();
         let share = (over / (LONG_BEFORE.0 - SAME_PASS.0) as f64 * 1e9).clamp(0.0, 1.0);
@@ -53,20 +53,21 @@ impl Visit {
 /// The visits of a section: those with samples within T of it.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct Visits {
-    /// Number of the newest, its stretch of navigation, and the time of its last sample; `None` before the first.
+    /// Number of the newest visit, its stretch of navigation, and the time of its last sample; `None` before
+    /// the first.
     newest: Option<(u32, u32, MonoNs)>,
-    /// Number of the first whose samples count.
+    /// Number of the first visit whose samples count.
     first: u32,
-    /// Several have samples that count.
+    /// Samples of several visits count.
     several: bool,
-    /// Of several stretches of navigation.
+    /// The visits belong to several stretches of navigation.
     unrelated: bool,
     /// The largest standard deviation of a hole's diameter between samples of different visits, m.
     apart_sd_m: f64,
 }
 
 impl Visits {
-    /// Notes a sample's visit.
+    /// Records a sample's visit.
     pub(super) fn note(&mut self, visit: &Visit, profile: &Profile) {
         if let Some((number, tie, last)) = self.newest.filter(|(number, ..)| *number != visit.number) {
             self.several |= number >= self.first;
@@ -76,7 +77,8 @@ impl Visits {
         self.newest = Some((visit.number, visit.tie, visit.at));
     }
 
-    /// Notes the error between the passes of an earlier visit, a standard deviation of a hole's diameter, m.
+    /// Records the error between the passes of an earlier visit, as standard deviation of a hole's diameter,
+    /// m.
     pub(super) fn note_earlier(&mut self, sd_m: f64) {
         self.apart_sd_m = self.apart_sd_m.max(sd_m);
     }
@@ -96,18 +98,19 @@ impl Visits {
         self.several
     }
 
-    /// Whether nothing sure relates the samples of one to those of another, so that one may only seem to fill the holes of
+    /// Whether the relation between the visits is uncertain, so that one may only seem to fill the holes of
     /// another.
     pub(super) fn are_unrelated(&self) -> bool {
         self.unrelated
     }
 
-    /// Leaves only the newest: it shows all of the section by itself.
+    /// Keeps only the newest visit, which shows the whole section by itself.
     pub(super) fn keep_newest(&mut self) {
         (self.first, self.several, self.unrelated, self.apart_sd_m) = (self.newest(), false, false, 0.0);
     }
 
-    /// Standard deviation of a hole among the samples of all visits, m, where that of the newest is `pass_sd_m`.
+    /// Standard deviation of a hole among the samples of all visits, m. `pass_sd_m` is that of the newest
+    /// visit.
     pub(super) fn sd_m(&self, pass_sd_m: f64) -> f64 {
         if self.several { pass_sd_m.max(self.apart_sd_m) } else { pass_sd_m }
     }
@@ -119,7 +122,8 @@ mod tests {
     use headrace_fusion::relative::Relative;
     use headrace_geometry::tunnel::shapes;
 
-    /// A visit of this number and stretch of navigation, whose passes are off one another by a centimetre, and off those of long before by ten.
+    /// A visit with this number and stretch of navigation. Its passes differ by a centimetre, and by ten from
+    /// those of a much earlier visit.
     fn visit(number: u32, tie: u32, at_s: u64) -> Visit {
         let error = |sd_m: f64| PassError { relative: Relative::along(sd_m), from_m: [0.0; 2] };
         Visit { number, tie, at: MonoNs(at_s * 1_000_000_000), errors: [error(0.01), error(0.1)] }
@@ -135,25 +139,25 @@ mod tests {
     }
 
     #[test]
-    fn samples_of_several_visits_are_related_where_navigation_went_on() {
+    fn visits_of_one_navigation_stretch_are_related() {
         let flags = |noted: &[(u32, u32, u64)]| {
             let visits = after(noted);
             (visits.newest(), visits.are_several(), visits.are_unrelated())
         };
         assert_eq!(flags(&[]), (0, false, false));
         assert_eq!(flags(&[(3, 1, 0), (3, 1, 9)]), (3, false, false), "one visit");
-        assert_eq!(flags(&[(3, 1, 0), (4, 1, 60)]), (4, true, false), "it turned back");
-        assert_eq!(flags(&[(3, 1, 0), (4, 2, 60)]), (4, true, true), "navigation broke off");
+        assert_eq!(flags(&[(3, 1, 0), (4, 1, 60)]), (4, true, false), "the vehicle turned back");
+        assert_eq!(flags(&[(3, 1, 0), (4, 2, 60)]), (4, true, true), "navigation was interrupted");
         let mut visits = after(&[(3, 1, 0), (4, 2, 60)]);
         visits.keep_newest();
         assert_eq!((visits.first(), visits.are_several(), visits.are_unrelated()), (4, false, false));
     }
 
-    /// The longer ago the last sample, the more passes of different visits are off one another: from 20 to 40 s on as those of long before.
+    /// The error between visits grows with the time since the last sample, between 20 s and 40 s.
     #[test]
-    fn passes_of_different_visits_are_off_one_another_by_the_time_between() {
+    fn error_between_visits_grows_with_the_time_between() {
         let sd_m = |gap_s: u64| after(&[(3, 1, 0), (4, 1, gap_s)]).sd_m(0.0);
-        assert!(sd_m(20) > 0.0 && (sd_m(10) - sd_m(20)).abs() < 1e-12, "as of one pass");
+        assert!(sd_m(20) > 0.0 && (sd_m(10) - sd_m(20)).abs() < 1e-12, "equal to that of one pass");
         assert!(
             sd_m(30) > 1.5 * sd_m(20) && sd_m(40) > 1.2 * sd_m(30),
             "{} {} {}",
@@ -163,6 +167,6 @@ mod tests {
         );
         assert!((sd_m(40) / sd_m(20) - 10.0).abs() < 1e-9 && (sd_m(900) - sd_m(40)).abs() < 1e-12);
         assert!((after(&[(3, 1, 0), (3, 1, 900)]).sd_m(0.02) - 0.02).abs() < 1e-12, "one visit");
-        assert!((after(&[(3, 1, 0), (4, 1, 10)]).sd_m(0.5) - 0.5).abs() < 1e-12, "the newest is worse");
+        assert!((after(&[(3, 1, 0), (4, 1, 10)]).sd_m(0.5) - 0.5).abs() < 1e-12, "the newest visit is worse");
     }
 }

@@ -1,10 +1,11 @@
-//! Which returns are taken for wall: those where the design says, and those that others agree with.
+//! Decides which returns are wall: those near the design, and those that others agree with.
 //!
-//! A return within the tolerance of the design is wall. Another one needs a neighbour along the turn that is wall, or an earlier
-//! pass nearby, that found the wall as far off the design. Successive returns that agree with one another alone are a *run*: it is wall
-//! once it is broad for how far it is off the design, or where it ends in a slope to the wall. What nobody agrees with, and
-//! what hangs before the wall, is *doubtful*: a fish, a cloud of bubbles, an echo by way of two walls. It waits for the head's
-//! next returns before it is called so, since a boulder begins with one return.
+//! A return within the tolerance of the design is wall. Another return needs a neighbour along the turn that
+//! is wall, or an earlier pass nearby that found the same deviation from the design. Successive returns that
+//! agree only with one another are a *run*. A run is wall once it is broad for its distance from the design,
+//! or if it ends in a slope to the wall. An isolated return is *doubtful*, and so is a run that hangs in
+//! front of the wall: a fish, a cloud of bubbles, an echo off two walls. A return waits for the head's next
+//! returns before it counts as doubtful, since a boulder begins with one return.
 
 use serde::{Deserialize, Serialize};
 
@@ -17,45 +18,45 @@ mod run;
 pub use run::MOST_WAITING;
 use run::Run;
 
-/// What a return is taken for.
+/// Classification of a return.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Taken {
     /// Wall.
     Wall,
-    /// Not settled: wall, or something in the water.
+    /// Uncertain: wall, or something in the water.
     Doubtful,
-    /// The head's next returns decide.
+    /// Pending: the head's next returns decide.
     Waits,
 }
 
-/// What a return has decided.
+/// Decisions made by a return.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Sorted {
-    /// What the returns that waited are taken for, all of them; `None` if none did, or they go on waiting.
+    /// Classification of all returns that waited; `None` if there were none, or they keep waiting.
     pub waiting: Option<Taken>,
-    /// What this one is taken for.
+    /// Classification of this return.
     pub this: Taken,
-    /// The head isn't believed any more: why, and the chainages of its late returns, m.
+    /// Set when the head becomes distrusted: reason, and the chainages of its recent returns, m.
     pub distrusted: Option<(Distrust, [f64; 2])>,
 }
 
-/// A head's last returns, and whether it is believed.
+/// A head's last returns, and whether it is trusted.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct HeadWall {
-    /// The last return and the one before, and what they are taken for.
+    /// The last two returns, latest first, and their classification.
     last: [Option<(PlacedReturn, Taken)>; 2],
-    /// The returns that wait.
+    /// Returns that wait.
     run: Run,
     trust: HeadTrust,
 }
 
 impl HeadWall {
-    /// Why the head isn't believed; `None` if it is.
+    /// Reason for distrusting the head; `None` if it is trusted.
     pub fn distrusted(&self) -> Option<Distrust> {
         self.trust.distrusted()
     }
 
-    /// Sorts the head's next return, and those that waited for it. `beam` says how it was had.
+    /// Classifies the head's next return, and those that waited for it. `beam` describes its beam.
     ///
     /// Allocates: never.
     pub fn sort(
@@ -99,7 +100,8 @@ impl HeadWall {
         Sorted { waiting, this, distrusted }
     }
 
-    /// What a return and those that waited are taken for, and those. `agrees` with the last one.
+    /// Classification of a return, of those that waited, and their number. `agrees`: it agrees with the last
+    /// one.
     fn decide(
         &mut self,
         placed: &PlacedReturn,
@@ -117,7 +119,7 @@ impl HeadWall {
         let this = if is_wall || is_broad { Taken::Wall } else { Taken::Waits };
         let waiting = match waited.count() {
             0 => None,
-            // Ended in a slope to the wall, or wide enough.
+            // The run ended in a slope to the wall, or is wide enough.
             _ if is_wall && agrees || is_broad && goes_on => Some(Taken::Wall),
             _ if !goes_on => Some(Taken::Doubtful),
             _ if run.is_full() => Some(Taken::Doubtful),

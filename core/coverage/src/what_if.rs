@@ -1,4 +1,4 @@
-//! Verdicts of the same holes for another target.
+//! Alternative targets: verdicts on the same holes for another target.
 
 use super::frontier::{Outlook, clear_of};
 use super::hole::Hole;
@@ -15,15 +15,17 @@ struct Measured {
 }
 
 impl Measured {
-    /// Of a section whose hole has been measured.
+    /// Figures of a section whose hole has been measured.
     fn of(section: &Section) -> Option<Self> {
         Some(Self { hole: section.hole?, sd_m: section.hole_sd_m, doubtful: section.doubt().is_some() })
     }
 }
 
 impl Sections {
-    /// Verdicts for another target, by section, of all whose hole has been measured. Which visits count, and what was settled when, is as for the
-    /// dive's own target: who wants to know what another one would have been told plays the dive again with it.
+    /// Verdicts for another target of all sections whose hole has been measured, by index.
+    ///
+    /// Counted visits and settled sections stay those of the dive's own target. A replay with the other
+    /// target gives what the dive would have reported.
     pub fn verdicts_at(&self, target_m: f64, outlook: &Outlook) -> impl Iterator<Item = (i64, Verdict)> {
         self.sections_of(outlook.way).filter_map(move |index| {
             Some((index, self.verdict_of(&Measured::of(self.get(index)?)?, target_m, outlook)))
@@ -56,7 +58,9 @@ mod tests {
     use headrace_geometry::time::MonoNs;
     use headrace_geometry::tunnel::shapes;
 
-    /// A pipe with samples every 0.2 m but for 0.6 m from 5 m on, of which 3 m to 7 m are the way, judged in sections of a quarter of a metre.
+    /// A pipe with samples every 0.2 m except for 0.6 m from 5 m on.
+    ///
+    /// The coverage extent is 3 m to 7 m, judged in sections of a quarter of a metre.
     struct Seen {
         sections: Sections,
         outlook: Outlook,
@@ -100,9 +104,10 @@ mod tests {
         }
     }
 
-    /// From 5 m to 5.6 m a circle has 0.63 m; centred at most a quarter of a metre beyond 5 m, 0.54 m.
+    /// The largest circle from 5 m to 5.6 m measures 0.63 m. Centred within a quarter of a metre of 5 m, it
+    /// measures 0.54 m.
     #[test]
-    fn another_target_has_the_holes_that_there_are() {
+    fn another_target_uses_the_measured_holes() {
         let seen = Seen::new();
         for (target_m, failing) in [(0.5, 20..22), (0.6, 21..22), (0.7, 0..0), (0.2, 12..29)] {
             let verdicts: Vec<_> = seen.sections.verdicts_at(target_m, &seen.outlook).collect();
@@ -112,9 +117,9 @@ mod tests {
         }
     }
 
-    /// Two standard deviations of 0.05 m, and a doubt.
+    /// The error is two standard deviations of 0.05 m.
     #[test]
-    fn errors_and_doubts_are_those_of_the_section() {
+    fn alternative_target_keeps_errors_and_doubts_of_the_section() {
         let mut seen = Seen::new();
         let of = |seen: &Seen, index: i64, target_m: f64| {
             seen.sections.verdicts_at(target_m, &seen.outlook).find(|(at, _)| *at == index).unwrap().1
@@ -131,6 +136,6 @@ mod tests {
         }
         seen.sections.get_mut(15).unwrap().suspect = true;
         assert_eq!(of(&seen, 15, hole_m + 0.11), Verdict::CannotSay);
-        assert_eq!(of(&seen, 15, hole_m - 0.11), Verdict::Fail, "a fail is one");
+        assert_eq!(of(&seen, 15, hole_m - 0.11), Verdict::Fail, "a fail stays a fail");
     }
 }

@@ -1,7 +1,8 @@
-//! Navigation without a filter, after the paper's §9.2: attitude from the IMU, chainage from the tether, position in
-//! the cross-section from the echosounders' ranges to the design profile, height from depth where they are silent.
+//! Navigation without a filter, after §9.2 of the paper; the baseline for the filter.
 //!
-//! Good for low-noise data, and the baseline for the filter.
+//! Attitude comes from the IMU and chainage from the tether. The position in the cross-section comes from fitting the
+//! echosounders' ranges to the design profile. Height comes from depth while the echosounders are silent. It suits
+//! low-noise data.
 
 use super::relative::Relative;
 use super::section::{Echo, settle};
@@ -20,7 +21,7 @@ use headrace_sensor::reading::{EchoRange, Level, Reading, TetherLength};
 const ECHO_AGE: DurNs = DurNs(500_000_000);
 /// Maximum age of an attitude, a chainage or a position used in a fix.
 const STALE: DurNs = DurNs(2_000_000_000);
-/// The speed is taken over the tether readings of the last second, at most so many.
+/// Window of tether readings for the speed, and the maximum number of readings in it.
 const SPEED_WINDOW: DurNs = DurNs(1_000_000_000);
 const SPEED_READINGS: usize = 64;
 /// Standard deviation of an echo's range, m.
@@ -28,7 +29,7 @@ const ECHO_SD_M: f64 = 0.01;
 /// Standard deviation of the prior position, across and up, m.
 const PRIOR_SD_M: [f64; 2] = [10.0, 1.0];
 
-/// See the module's description.
+/// Navigation without a filter.
 pub struct DirectNavigation {
     profile: Profile,
     site: Site,
@@ -36,7 +37,7 @@ pub struct DirectNavigation {
     tether: TetherTrack,
     echoes: [Option<(MonoNs, Echo)>; MAX_SOURCES],
     place: Option<(MonoNs, [f64; 2])>,
-    /// Height by pressure, and its offset as measured by the echoes, m.
+    /// Height by pressure, and its offset relative to the echoes, m.
     height_m: Option<f64>,
     height_offset_m: f64,
 }
@@ -56,7 +57,7 @@ struct TetherTrack {
 stateful!(TetherTrack { state: count, resolution_m, restarts; slots: readings; });
 
 impl DirectNavigation {
-    /// Without readings yet.
+    /// Creates it without readings.
     pub fn new(profile: Profile, site: Site) -> Self {
         Self {
             profile,
@@ -123,7 +124,7 @@ impl TetherTrack {
         if self.count == 0 {
             self.restarts = restarts;
         }
-        // Nothing else here knows where the vehicle is when a count begins again from zero.
+        // After a restart the count begins again at zero, and this method cannot restore the chainage.
         if restarts != self.restarts {
             return;
         }
@@ -183,7 +184,7 @@ impl Navigation for DirectNavigation {
         let (_, [y_m, z_m]) = self.place.filter(|(since, _)| fresh(*since)).ok_or(NoFix::Section)?;
         let speed_mps = self.tether.speed_mps();
         let x_m = chainage_m + speed_mps * at.since(since).as_secs_f64();
-        // Two independent roundings to the counter's quantum.
+        // The difference contains two independent roundings to the counter's quantum.
         let relative = Relative::along(self.tether.resolution_m * math::sqrt(2.0 / 12.0));
         Ok(Fix {
             pose: Pose { position: Point3::new(x_m, y_m, z_m), attitude },
@@ -217,7 +218,7 @@ mod tests {
     }
 
     #[test]
-    fn four_echoes_find_the_place_in_the_section() {
+    fn four_echoes_determine_the_position_in_the_section() {
         let profile = shapes::ceran().unwrap();
         let site = Site { axis_yaw_rad: 0.3, ..Site::default() };
         let truth = Pose {
@@ -256,14 +257,14 @@ mod tests {
         let off = fix.pose.position - truth.position;
         assert!(off.norm() < 2e-3, "{:?}", fix.pose);
         assert!((fix.speed_mps - 0.2).abs() < 1e-12);
-        // Between the cable's readings it goes on.
+        // Between readings of the cable the chainage is extrapolated.
         let later = nav.fix(now + headrace_geometry::time::DurNs::from_millis(100)).unwrap();
         assert!((later.pose.position.x() - fix.pose.position.x() - 0.02).abs() < 1e-9, "{:?}", later.pose);
         assert_eq!(nav.fix(MonoNs(3_000_000_000)), Err(NoFix::Heading));
     }
 
     #[test]
-    fn depth_carries_the_height_on_when_the_echoes_fall_silent() {
+    fn depth_updates_the_height_while_echoes_are_silent() {
         let profile = shapes::ceran().unwrap();
         let site = Site::default();
         let mut nav = DirectNavigation::new(profile, site);
@@ -280,7 +281,7 @@ mod tests {
             })
         };
         let depth = SensorInfo { kind: SensorKind::Depth, ..imu };
-        // The sensor is 0.4 m off; the echoes measure 3.0 m.
+        // The sensor is off by 0.4 m; the echoes measure 3.0 m.
         nav.update(1, &depth, at_once(MonoNs(0)), &pressure(3.4));
         let down = SensorInfo {
             mount: Mount {

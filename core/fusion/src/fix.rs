@@ -1,4 +1,4 @@
-//! A navigation fix, the reason for a missing one, and the timestamps of a reading.
+//! Navigation fix, the missing part if there is none, and the timestamps of a reading.
 
 use serde::{Deserialize, Serialize};
 
@@ -13,14 +13,15 @@ pub struct Fix {
     pub pose: Pose,
     /// Speed along the tunnel, m/s, positive inwards.
     pub speed_mps: f64,
-    /// Error covariance relative to the heads' previous pass of this place.
+    /// Error covariance relative to the previous pass of the heads over this place.
     pub relative: Relative,
-    /// Error covariance relative to a visit of this place long before, of the same stretch of navigation.
+    /// Error covariance relative to a much earlier visit to this place in the same stretch of navigation.
     pub revisit: Relative,
-    /// Number of the stretch of navigation. Nothing sure relates positions of different stretches.
+    /// Number of the stretch of navigation. The relative error between positions of different stretches is unknown.
     pub tie: u32,
-    /// How often the estimate has become much surer while it settled. What was placed before is related to what is placed now by the
-    /// errors of then, which `relative` doesn't have.
+    /// Number of times the estimate has become much more certain while it settled.
+    ///
+    /// Soundings from before such a change carry the larger errors of that time, which `relative` does not include.
     pub settled: u32,
 }
 
@@ -36,10 +37,10 @@ pub enum NoFix {
 }
 
 impl NoFix {
-    /// All of them.
+    /// All variants.
     pub const ALL: [Self; 3] = [Self::Heading, Self::Chainage, Self::Section];
 
-    /// The word used in reports and logs.
+    /// The word for it in reports and logs.
     pub fn as_str(self) -> &'static str {
         match self {
             Self::Heading => "no_heading",

@@ -1,7 +1,7 @@
 //! Navigation: the vehicle's position and attitude from its sensors' readings.
 //!
-//! [`Navigation`] is the interface that the loop knows. [`filter`] is the error-state Kalman filter over all sensors,
-//! [`direct`] a plain reference without uncertainty, [`smooth`] the smoother after the dive.
+//! [`Navigation`] is the interface that the loop uses. [`filter`] is the error-state Kalman filter over all sensors.
+//! [`direct`] is a plain reference method without uncertainty. [`smooth`] is the smoother, which runs after the dive.
 //!
 //! ```
 //! use headrace_fusion::direct::DirectNavigation;
@@ -16,7 +16,7 @@
 //! let times = Times { received: now, valid: now };
 //! let imu = SensorInfo { kind: SensorKind::Imu, ..SensorInfo::other() };
 //! navigation.update(0, &imu, times, &Reading::Attitude(Rot::identity()));
-//! // Attitude is known now; the next thing missing is the chainage.
+//! // The attitude is known now. The next missing part is the chainage.
 //! assert_eq!(navigation.fix(now).unwrap_err(), NoFix::Chainage);
 //! # Ok::<(), headrace_geometry::tunnel::ProfileError>(())
 //! ```
@@ -44,46 +44,52 @@ use headrace_sensor::reading::Reading;
 
 pub use self::fix::{Fix, NoFix, Times};
 
-/// A navigation method. Readings arrive in order of receive time; a fix uses the readings so far. Its state is all that
-/// a fix depends on, so that it can be resumed from a snapshot.
+/// A navigation method: readings in, fixes out.
+///
+/// Readings arrive in order of receive time, and a fix uses all readings so far. The state contains everything that a
+/// fix depends on, so that a snapshot can resume it.
 pub trait Navigation: Stateful + Send + Sync {
-    /// Takes a reading. `source` is the same for all readings of one sensor.
+    /// Processes a reading. `source` is the same for all readings of one sensor.
     ///
     /// Allocates: never.
     fn update(&mut self, source: usize, sensor: &SensorInfo, times: Times, reading: &Reading);
 
-    /// Called after the last reading.
+    /// Ends the run after the last reading.
     fn end(&mut self) {}
 
-    /// Innovation statistics of a source; `None` where there are none.
+    /// Returns the innovation statistics of a source; `None` if there are none.
     fn consistency(&self, _source: usize) -> Option<Consistency> {
         None
     }
 
-    /// Standard deviations of the estimate; `None` where they aren't known.
+    /// Returns the standard deviations of the estimate; `None` if they are unknown.
     fn pose_sd(&self) -> Option<PoseSd> {
         None
     }
 
-    /// Whether the cable's counter isn't believed, once that has lasted for a second; `None` while it is, and where it isn't
-    /// judged.
+    /// Returns the doubt about the cable counter once it has lasted for a second.
+    ///
+    /// `None` while the counter is trusted, and for methods that do not judge it.
     fn cable_doubt(&self) -> Option<CableDoubt> {
         None
     }
 
-    /// How much longer the vehicle should stand still for its gyros' bias to be known, s; 0 once it is known, and where standing
-    /// shows nothing.
+    /// Returns how much longer the vehicle should stand still for the gyro bias to be known, s.
+    ///
+    /// 0 once the bias is known, and for methods that learn nothing from standing still.
     fn stand_s(&self) -> u32 {
         0
     }
 
-    /// The setting that ranges contradict, if one certainly is wrong; `None`, too, where settings aren't judged.
+    /// Returns the setting that the ranges contradict with certainty.
+    ///
+    /// `None` if there is none or settings are not judged.
     fn setting_doubt(&self) -> Option<SettingDoubt> {
         None
     }
 
-    /// Fix at `at`, which may be a little before or after the last reading.
+    /// Returns the fix at `at`, which may be a little before or after the last reading.
     ///
-    /// Errors: the missing part.
+    /// Errors: the part of the fix that is missing.
     fn fix(&self, at: MonoNs) -> Result<Fix, NoFix>;
 }

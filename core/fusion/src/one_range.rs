@@ -1,21 +1,23 @@
-//! A sonar that says one range wherever it looks: what it heard last, or its own frame.
+//! Detection of a sonar that reports one range in every direction: its last echo, or its own frame.
 
 use serde::{Deserialize, Serialize};
 
-/// Ranges are the same within this, m: finer than a profiling sonar's resolution, so that noise alone parts those of a wall.
+/// Ranges within this count as equal, m.
+///
+/// It is finer than a profiling sonar's resolution, so that noise alone separates the ranges of a wall.
 const SAME_M: f64 = 0.002;
 
-/// Successive returns of one range, and how the wall's distance by design varies where they are.
+/// A run of returns with one range, and the spread of the design ranges along it.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct OneRange {
     returns: u32,
     range_m: f64,
-    /// Least and most deviation of the range from the design's, m.
+    /// Minimum and maximum of range less design range, m.
     off_m: [f64; 2],
 }
 
 impl OneRange {
-    /// Takes a return: its range, and by how much that is longer than the design's, m.
+    /// Adds a return: its range, and its excess over the design range, m.
     pub fn note(&mut self, range_m: f64, off_m: f64) {
         if self.returns == 0 || (range_m - self.range_m).abs() > SAME_M {
             *self = Self { returns: 1, range_m, off_m: [off_m; 2] };
@@ -26,18 +28,19 @@ impl OneRange {
         }
     }
 
-    /// Whether so many returns or more have the same range although the design's varies by more than a length, m: no wall is
-    /// round about a head to within 2 mm where the design isn't.
+    /// Whether at least `fewest` returns have one range while the design range varies by `varies_m`.
+    ///
+    /// No real wall keeps a constant range to within 2 mm where its design does not.
     pub fn is_stuck(&self, fewest: u32, varies_m: f64) -> bool {
         self.returns >= fewest && self.off_m[1] - self.off_m[0] > varies_m
     }
 
-    /// Whether there is a return.
+    /// Whether there has been a return.
     pub fn is_heard(&self) -> bool {
         self.returns > 0
     }
 
-    /// Whether the last return was the first of its range.
+    /// Whether the last return was the first with its range.
     pub fn is_new(&self) -> bool {
         self.returns == 1
     }
@@ -54,7 +57,7 @@ mod tests {
     }
 
     #[test]
-    fn one_range_along_a_wall_that_recedes_is_stuck_and_until_it_changes() {
+    fn constant_range_along_a_receding_wall_is_stuck_until_it_changes() {
         let wall_m = |k: u32| 5.0 + 0.02 * f64::from(k);
         let mut stuck = after((0..8).map(|k| (5.0, wall_m(k))));
         assert!(stuck.is_stuck(8, 0.1) && !stuck.is_stuck(9, 0.1) && !stuck.is_stuck(8, 0.2));
@@ -63,7 +66,7 @@ mod tests {
     }
 
     #[test]
-    fn a_round_wall_and_one_that_is_followed_are_not() {
+    fn round_wall_and_followed_wall_are_not_stuck() {
         assert!(!after((0..1000).map(|_| (1.0, 1.0))).is_stuck(8, 0.05));
         assert!(!after((0..1000).map(|k| (1.0 + 0.003 * f64::from(k), 1.0))).is_stuck(2, 0.05));
     }

@@ -5,17 +5,19 @@ use serde::{Deserialize, Serialize};
 use headrace_geometry::frames::{Tunnel, Vec3};
 use headrace_geometry::math;
 
-/// Relative covariance of the errors that move a sample along the tunnel, one time against another: chainage, pitch, yaw.
+/// Relative covariance of the errors that move a sample along the tunnel: chainage, pitch and yaw.
+///
+/// It is the covariance of the difference between the errors at two times.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct Relative([[f64; 3]; 3]);
 
 impl Relative {
-    /// From the covariance of chainage, m, and of pitch and yaw, radians.
+    /// Creates it from the covariance of chainage, m, pitch and yaw, radians.
     pub fn new(covariance: [[f64; 3]; 3]) -> Self {
         Self(covariance)
     }
 
-    /// An error of chainage alone, of this standard deviation, m.
+    /// Creates the covariance of a pure chainage error with this standard deviation, m.
     pub fn along(sd_m: f64) -> Self {
         Self([[sd_m * sd_m, 0.0, 0.0], [0.0; 3], [0.0; 3]])
     }
@@ -29,23 +31,25 @@ impl Relative {
         math::sqrt(sum.max(0.0))
     }
 
-    /// Standard deviation of pitch and yaw together, radians: [`Relative::sd_m`] changes by no more with a metre of the arm.
+    /// Standard deviation of pitch and yaw together, radians.
+    ///
+    /// It bounds the change of [`Relative::sd_m`] per metre of the arm.
     pub fn turn_sd_rad(&self) -> f64 {
         let [_, [_, pitch, _], [.., yaw]] = self.0;
         math::sqrt((pitch + yaw).max(0.0))
     }
 
-    /// The covariance for another reference point of the vehicle, at `arm` from this one.
+    /// Returns the covariance for another reference point of the vehicle, at `arm` from this one.
     #[must_use]
     pub fn moved(&self, arm: Vec3<Tunnel>) -> Self {
         let sheared = |[x, pitch, yaw]: [f64; 3]| [x + arm.z() * pitch - arm.y() * yaw, pitch, yaw];
-        // Symmetric: rows, then columns.
+        // The matrix is symmetric: the shear acts on the rows, then on the columns.
         let once = self.0.map(sheared);
         let columns = [0, 1, 2].map(|c| sheared(once.map(|row| row.get(c).copied().unwrap_or(0.0))));
         Self(columns)
     }
 
-    /// Weighted sum of two covariances.
+    /// Returns the weighted sum of two covariances.
     #[must_use]
     pub fn weighted(&self, share: f64, other: &Self, other_share: f64) -> Self {
         let mut sum = [[0.0; 3]; 3];
@@ -63,7 +67,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_place_is_as_uncertain_from_wherever_its_arm_begins() {
+    fn moving_the_reference_point_keeps_the_sd_of_a_place() {
         let relative = Relative::new([[0.04, 0.003, -0.002], [0.003, 0.01, 0.001], [-0.002, 0.001, 0.02]]);
         let (whole, part) = (Vec3::new(0.3, 2.0, -1.5), Vec3::new(-0.1, 0.4, 0.7));
         let moved = relative.moved(part).sd_m(whole + -part);
@@ -71,7 +75,7 @@ mod tests {
     }
 
     #[test]
-    fn no_metre_of_an_arm_adds_more_than_the_turns_do() {
+    fn sd_grows_per_metre_of_arm_by_at_most_the_turn_sd() {
         let relative = Relative::new([[0.04, 0.003, -0.002], [0.003, 0.01, 0.001], [-0.002, 0.001, 0.02]]);
         let arm = |k: u32| Vec3::new(0.0, math::sin(f64::from(k)), math::cos(f64::from(k)));
         let adds_m = |k: u32| relative.sd_m(arm(k).scaled(51.0)) - relative.sd_m(arm(k).scaled(50.0));

@@ -5,13 +5,13 @@ use serde::{Deserialize, Serialize};
 use headrace_geometry::frames::{Body, Mount, Rot, Sensor, Tunnel, Vec3};
 use headrace_geometry::tunnel::Profile;
 
-/// Minimum cosine of the incidence; beams that graze the wall more aren't used.
+/// Minimum cosine of the angle of incidence; beams that graze the wall more are ignored.
 const LEAST_COSINE: f64 = 0.1;
-/// Minimum change of range with height, m/m, of a beam that determines the height.
+/// Minimum change of range with height, m/m, for a beam to count as determining the height.
 const STEEP: f64 = 0.7;
 const ROUNDS: usize = 3;
 
-/// A range to the wall, along the x of its sensor.
+/// A range to the wall along the sensor's x axis.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Echo {
     /// Mount of the sonar.
@@ -20,7 +20,7 @@ pub struct Echo {
     pub range_m: f64,
 }
 
-/// A position in the section, and whether the echoes determine its height.
+/// A position in the cross-section, and whether the echoes determine its height.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Place {
     /// y and z, m.
@@ -29,8 +29,10 @@ pub struct Place {
     pub is_height_seen: bool,
 }
 
-/// Gauss-Newton from `start` on sum((measured - predicted)^2 / sd^2) with a prior (position and standard deviations),
-/// d range / d position = -n / (n . beam). Stops where a step would leave the section.
+/// Fits the position to the echoes by Gauss-Newton, starting at `start`.
+///
+/// Minimises sum((measured - predicted)^2 / sd^2) plus a prior (position and standard deviations, m). The derivative
+/// d range / d position is -n / (n . beam). Stops before a step that would leave the cross-section.
 pub fn settle(
     profile: &Profile,
     attitude: Rot<Tunnel, Body>,
@@ -66,7 +68,7 @@ pub fn settle(
             gy += weight * slope[0] * residual;
             gz += weight * slope[1] * residual;
         }
-        // The prior keeps the determinant above zero.
+        // The prior keeps the determinant positive.
         let determinant = hyy * hzz - hyz * hyz;
         let moved =
             [at[0] + (hzz * gy - hyz * gz) / determinant, at[1] + (hyy * gz - hyz * gy) / determinant];
@@ -78,7 +80,7 @@ pub fn settle(
     place
 }
 
-/// Weight of an observation of this standard deviation.
+/// Weight of an observation with this standard deviation.
 fn weight(sd_m: f64) -> f64 {
     1.0 / (sd_m * sd_m)
 }

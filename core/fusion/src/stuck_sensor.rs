@@ -1,8 +1,7 @@
-//! Inertial units that say the same again and again: a device that hangs repeats its last reading, which a turning vehicle contradicts only
-//! after it has been placed wrongly.
+//! Detection of a stuck inertial unit: a device that hangs repeats its last reading.
 //!
-//! A reading with noise hardly ever equals the one before to the last bit. Readings without noise do whenever the vehicle moves steadily:
-//! those of ideal dives, of which a repetition says nothing.
+//! A reading with noise hardly ever equals the one before to the last bit. Readings without noise, as in ideal dives,
+//! repeat whenever the vehicle moves steadily. For those, a repetition is no evidence.
 
 use serde::{Deserialize, Serialize};
 
@@ -10,32 +9,34 @@ use headrace_geometry::frames::{Sensor, Vec3};
 use headrace_geometry::math;
 use headrace_geometry::time::{DurNs, MonoNs};
 
-/// Time for which readings are the same, at least, before they are taken for repetitions.
+/// Minimum duration of identical readings before the unit counts as stuck.
 const HANGS_AFTER: DurNs = DurNs(500_000_000);
-/// Chance with which noise alone may be the same for so long, as its logarithm: one in a billion.
+/// Maximum probability that noise alone causes the repetition, as its logarithm: one in a billion.
 const BY_CHANCE_LN: f64 = -20.7;
-/// Weight of the latest difference, and of the latest run, among those before.
+/// Weight of the latest difference, and of the latest run, in their running means.
 const LATEST: f64 = 1.0 / 64.0;
-/// Share of differences that go against the one before from which a reading has noise. White noise: two thirds; a motion: hardly any.
+/// Minimum share of sign reversals between successive differences for a reading to count as noisy.
+///
+/// White noise reverses two thirds of them, a motion hardly any.
 const NOISY: f64 = 0.3;
 
-/// What is known of one source's repetitions; part of the loop's state.
+/// Repetition statistics of one source; part of the loop's state.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct StuckSensor {
     last: Option<[f64; 3]>,
-    /// The last differences that weren't zero, by axis.
+    /// Last differences other than zero, by axis.
     steps: [f64; 3],
-    /// Share of differences that went against the one before, from 0 to 1.
+    /// Share of differences whose sign reversed, from 0 to 1.
     to_and_fro: f64,
-    /// Readings in a row that were the same, as a mean, and of the present run.
+    /// Mean length of runs of identical readings, and length of the present run.
     usual_run: f64,
     run: u32,
-    /// When the present run began.
+    /// Start time of the present run.
     since: MonoNs,
 }
 
 impl StuckSensor {
-    /// Takes a turn rate; whether the unit has hung by then.
+    /// Processes a turn rate; returns whether the unit is stuck by now.
     ///
     /// Allocates: never.
     pub fn hangs(&mut self, at: MonoNs, rate_radps: Vec3<Sensor>) -> bool {
@@ -44,7 +45,7 @@ impl StuckSensor {
             (self.since, self.run) = (at, 1);
             return false;
         };
-        // To the last bit: a unit that hangs repeats its bytes.
+        // Compared to the last bit, since a unit that hangs repeats its bytes.
         if now.map(f64::to_bits) == before.map(f64::to_bits) {
             self.run = self.run.saturating_add(1);
             return self.has_hung(at);
@@ -65,7 +66,7 @@ impl StuckSensor {
 
     fn has_hung(&self, at: MonoNs) -> bool {
         let is_long = at.since(self.since).0 >= HANGS_AFTER.0;
-        // The mean run of readings that equal the one before with a chance p is 1 / (1 - p).
+        // If each reading equals the one before with probability p, the mean run length is 1 / (1 - p).
         let repeats = 1.0 - 1.0 / self.usual_run.max(1.01);
         is_long && self.to_and_fro > NOISY && f64::from(self.run) * math::ln(repeats) < BY_CHANCE_LN
     }
@@ -75,7 +76,7 @@ impl StuckSensor {
 mod tests {
     use super::*;
 
-    /// Readings at 400 Hz; whether the unit has hung after each.
+    /// Feeds readings at 400 Hz; returns after each whether the unit counts as stuck.
     fn hangs(readings: impl IntoIterator<Item = [f64; 3]>) -> Vec<bool> {
         let mut repeats = StuckSensor::default();
         let mut of =
@@ -83,7 +84,7 @@ mod tests {
         (0..).zip(readings).map(&mut of).collect()
     }
 
-    /// A number from -1 to 1 that seems random: splitmix64.
+    /// Pseudorandom number from -1 to 1 (splitmix64).
     fn noise(k: u64) -> f64 {
         let mut z = k.wrapping_mul(0x9e37_79b9_7f4a_7c15);
         z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
@@ -96,7 +97,7 @@ mod tests {
     }
 
     #[test]
-    fn a_unit_with_noise_that_repeats_itself_hangs_after_half_a_second_until_it_says_something_else() {
+    fn repeating_noisy_unit_is_stuck_after_half_a_second_until_it_changes() {
         let frozen = noisy(999);
         let all = hangs(
             (0..1000).map(noisy).chain(std::iter::repeat_n(frozen, 1000)).chain((2000..2100).map(noisy)),
@@ -106,9 +107,10 @@ mod tests {
         assert!(all[first..2000].iter().all(|hangs| *hangs) && all[2000..].iter().all(|hangs| !hangs));
     }
 
-    /// The simulator's ideal units say the same as long as the vehicle moves the same way, and others after every change.
+    /// The simulator's ideal units repeat a reading while the motion is steady, and change it with every change of
+    /// motion.
     #[test]
-    fn a_unit_without_noise_never_does() {
+    fn noise_free_unit_is_never_stuck() {
         let swaying = |k: u64| [1e-2 * math::sin(k as f64 / 800.0), 0.0, 2e-2 * math::cos(k as f64 / 1700.0)];
         let still = [0.0; 3];
         let all = (0..4000)
@@ -119,10 +121,10 @@ mod tests {
         assert!(hangs(all).iter().all(|hangs| !hangs));
     }
 
-    /// A coarse unit at rest says the same for a while: the coarser, the longer it takes to tell that from a repetition.
+    /// A coarse unit at rest repeats a reading for a while. The coarser it is, the longer the detection takes.
     #[test]
-    fn a_coarse_unit_at_rest_does_not() {
-        // One reading in two hundred differs: three in a row that don't are nothing, nor are two thousand.
+    fn coarse_unit_at_rest_is_not_stuck() {
+        // One reading in two hundred differs, so runs of three and even of two thousand are no evidence.
         let coarse = |k: u64| {
             let step = if noise(k) > 0.99 { 1e-3 * noise(7 * k).signum() } else { 0.0 };
             [step, 0.0, 0.0]

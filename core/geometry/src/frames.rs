@@ -160,7 +160,7 @@ impl<To, From> Rot<To, From> {
         Self(UnitQuaternion::identity(), PhantomData)
     }
 
-    /// From a quaternion w, x, y, z of any non-zero length.
+    /// Creates a rotation from a quaternion w, x, y, z of any non-zero length.
     ///
     /// Errors: `None` for a length that isn't finite or isn't above 1e-6.
     pub fn from_wxyz(w: f64, x: f64, y: f64, z: f64) -> Option<Self> {
@@ -172,7 +172,7 @@ impl<To, From> Rot<To, From> {
         Some(Self(UnitQuaternion::new_unchecked(q), PhantomData))
     }
 
-    /// From roll about x, then pitch about y, then yaw about z (fixed axes), radians.
+    /// Creates a rotation from roll about x, then pitch about y, then yaw about z (fixed axes), radians.
     pub fn from_roll_pitch_yaw(roll_rad: f64, pitch_rad: f64, yaw_rad: f64) -> Self {
         let (sr, cr) = math::sin_cos(roll_rad / 2.0);
         let (sp, cp) = math::sin_cos(pitch_rad / 2.0);
@@ -186,7 +186,9 @@ impl<To, From> Rot<To, From> {
         Self(UnitQuaternion::new_unchecked(q), PhantomData)
     }
 
-    /// Roll, pitch and yaw in radians, the inverse of [`Rot::from_roll_pitch_yaw`]; pitch in [-pi/2, pi/2].
+    /// Returns roll, pitch and yaw in radians, with pitch in [-pi/2, pi/2].
+    ///
+    /// It is the inverse of [`Rot::from_roll_pitch_yaw`].
     pub fn roll_pitch_yaw(&self) -> (f64, f64, f64) {
         let q = self.0.quaternion();
         let (w, x, y, z) = (q.w, q.i, q.j, q.k);
@@ -241,7 +243,7 @@ pub struct Pose {
 }
 
 impl Pose {
-    /// Tunnel-frame position of a body-frame point.
+    /// Returns the tunnel-frame position of a body-frame point.
     pub fn place(&self, offset: Vec3<Body>) -> Point3<Tunnel> {
         self.position + self.attitude * offset
     }
@@ -256,7 +258,9 @@ pub struct Mount {
     pub rotation: Rot<Body, Sensor>,
 }
 
-/// Direction of a head's beam at `angle_rad`, in the sensor frame: 0 is down, growing clockwise seen along +x.
+/// Returns the direction of a head's beam at `angle_rad`, in the sensor frame.
+///
+/// 0 is down; the angle grows clockwise seen along +x.
 ///
 /// Source: docs/reference/glossary.md, "Sonar and samples".
 pub fn head_direction(angle_rad: f64) -> Vec3<Sensor> {
@@ -275,14 +279,14 @@ mod tests {
     }
 
     #[test]
-    fn a_head_that_faces_aft_turns_the_other_way() {
+    fn aft_facing_head_turns_the_other_way() {
         let aft = Rot::<Body, Sensor>::from_roll_pitch_yaw(0.0, 0.0, math::PI);
         near(aft * head_direction(0.0), [0.0, 0.0, -1.0]);
         near(aft * head_direction(math::FRAC_PI_2), [0.0, -1.0, 0.0]);
     }
 
     #[test]
-    fn an_echosounder_looks_where_its_yaw_and_pitch_say() {
+    fn echosounder_looks_along_its_yaw_and_pitch() {
         let ahead = Vec3::<Sensor>::new(1.0, 0.0, 0.0);
         let left = Rot::<Body, Sensor>::from_roll_pitch_yaw(0.0, 0.0, math::FRAC_PI_2);
         near(left * ahead, [0.0, 1.0, 0.0]);
@@ -291,7 +295,7 @@ mod tests {
     }
 
     #[test]
-    fn roll_pitch_yaw_comes_back() {
+    fn roll_pitch_yaw_survives_a_round_trip() {
         for (roll, pitch, yaw) in [(0.1, -0.2, 3.0), (-3.0, 1.5, -1.0), (0.0, 0.0, 0.0)] {
             let (r, p, y) = Rot::<Tunnel, Body>::from_roll_pitch_yaw(roll, pitch, yaw).roll_pitch_yaw();
             assert!((r - roll).abs() < 1e-12 && (p - pitch).abs() < 1e-12 && (y - yaw).abs() < 1e-12);
@@ -299,7 +303,7 @@ mod tests {
     }
 
     #[test]
-    fn a_quaternion_without_length_is_refused() {
+    fn quaternion_of_zero_length_is_rejected() {
         assert!(Rot::<Tunnel, Body>::from_wxyz(0.0, 0.0, 0.0, 0.0).is_none());
         assert!(Rot::<Tunnel, Body>::from_wxyz(f64::NAN, 0.0, 0.0, 1.0).is_none());
     }

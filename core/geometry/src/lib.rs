@@ -1,7 +1,7 @@
-//! Units, integer time, frames, mathematics, the site, tunnel profiles, and state as bytes: the base of every other crate.
+//! Basis of every other crate: units, time, frames, mathematics, site, tunnel profiles, snapshots.
 //!
-//! Vectors carry their frame as a type, and a tunnel's wall is addressed by chainage and arc length. Pure: no I/O, no
-//! threads, no clock, no randomness. Transcendental functions come from [`math`] alone.
+//! Vectors carry their frame as a type. A place on a tunnel's wall is given by chainage and arc length. The crate is
+//! pure: no I/O, no threads, no clock, no randomness. Transcendental functions come from [`math`] alone.
 //!
 //! ```
 //! use headrace_geometry::tunnel::shapes;
@@ -10,7 +10,7 @@
 //! let tunnel = shapes::circle(3.0)?;
 //! let hit = tunnel.cast([0.0, 3.0], [1.0, 0.0]).unwrap();
 //! assert!((hit.range_m - 3.0).abs() < 1e-12);
-//! // Arc length grows from the floor's centre by way of the left wall.
+//! // Arc length grows from the floor's centre via the left wall.
 //! assert!((hit.arc_m - tunnel.perimeter_m() / 4.0).abs() < 1e-12);
 //! assert_eq!(tunnel.clock(hit.arc_m), "9:00");
 //! # Ok::<(), headrace_geometry::tunnel::ProfileError>(())

@@ -1,4 +1,6 @@
-//! The only access to transcendental functions: the `libm` crate, whose results are the same on every platform.
+//! The only access to transcendental functions: the `libm` crate.
+//!
+//! Its results are the same on every platform.
 //!
 //! The standard library's versions call the platform's C library and differ by an ulp between machines, enough for two
 //! replays to diverge. A lint (clippy.toml) bans them.
@@ -40,7 +42,7 @@ pub fn atan2(y: f64, x: f64) -> f64 {
     libm::atan2(y, x)
 }
 
-/// Square root; IEEE 754 requires correct rounding, so the platform's instruction is used.
+/// Square root by the platform's instruction, since IEEE 754 requires correct rounding.
 pub fn sqrt(x: f64) -> f64 {
     x.sqrt()
 }
@@ -67,7 +69,7 @@ pub fn erfc(x: f64) -> f64 {
 
 /// `value` wrapped to [0, `modulus`). `modulus` must be positive and finite.
 pub fn wrap(value: f64, modulus: f64) -> f64 {
-    // Nearly all values are off by less than one modulus; these branches give the same bits as the quotient below.
+    // Nearly all values are off by less than one modulus. These branches give the same bits as the quotient below.
     if (0.0..modulus).contains(&value) {
         // -0.0 becomes 0.0.
         return value + 0.0;
@@ -77,13 +79,13 @@ pub fn wrap(value: f64, modulus: f64) -> f64 {
         return if r >= modulus { 0.0 } else { r };
     }
     let r = value - modulus * libm::floor(value / modulus);
-    // Rounding can leave r at the modulus itself, or slightly below zero.
+    // Rounding can make r equal to the modulus, or slightly negative.
     if r >= modulus || r < 0.0 { 0.0 } else { r }
 }
 
-/// `difference` wrapped to [-`modulus`/2, `modulus`/2): the shortest way round.
+/// `difference` wrapped to [-`modulus`/2, `modulus`/2), the shorter way round.
 pub fn wrap_signed(difference: f64, modulus: f64) -> f64 {
-    // As in `wrap`; near half a modulus, where rounding decides, the quotient is used.
+    // As in `wrap`. Near half a modulus rounding decides, so the quotient is used.
     let size = difference.abs();
     if size < 0.499 * modulus {
         return difference;
@@ -96,21 +98,15 @@ pub fn wrap_signed(difference: f64, modulus: f64) -> f64 {
 }
 
 /// The largest integer not above `x`; saturates, and NaN gives zero.
-#[expect(
-    clippy::cast_possible_truncation,
-    reason = "float to integer casts saturate, which is what is wanted"
-)]
+#[expect(clippy::cast_possible_truncation, reason = "float to integer casts saturate, as intended")]
 pub fn floor_to_i64(x: f64) -> i64 {
-    // Avoids a library call: used several times per sample to look up cells and sections.
+    // Avoids a library call, because several calls per sample look up cells and sections.
     let towards_zero = x as i64;
     if towards_zero as f64 > x { towards_zero.saturating_sub(1) } else { towards_zero }
 }
 
 /// The nearest integer to `x` (halves to even); saturates, and NaN gives zero.
-#[expect(
-    clippy::cast_possible_truncation,
-    reason = "float to integer casts saturate, which is what is wanted"
-)]
+#[expect(clippy::cast_possible_truncation, reason = "float to integer casts saturate, as intended")]
 pub fn round_to_i64(x: f64) -> i64 {
     /// 2^52: doubles of this size have no fraction, and adding it rounds to integer, halves to even.
     const WHOLE: f64 = 4_503_599_627_370_496.0;
@@ -124,7 +120,7 @@ mod tests {
 
     /// The shortcuts give the same bits as the quotient.
     #[test]
-    fn the_short_ways_give_the_same_bits() {
+    fn shortcuts_give_the_same_bits() {
         let by_quotient = |value: f64, modulus: f64| {
             let r = value - modulus * libm::floor(value / modulus);
             if r >= modulus || r < 0.0 { 0.0 } else { r }
@@ -155,7 +151,7 @@ mod tests {
 
     #[test]
     #[expect(clippy::cast_possible_truncation, reason = "as in the functions under test")]
-    fn whole_numbers_are_those_of_the_library() {
+    fn rounding_equals_the_library() {
         let whole = [0.0, 0.5, 1.0, 1.5, 2.5, 4.4e15, 4.6e15, 9.1e15, 9.2e18, 9.3e18, 1e300];
         let about = whole.into_iter().flat_map(|x: f64| [x, x.next_up(), x.next_down()]);
         let special = [f64::NAN, f64::INFINITY, 1e-310];

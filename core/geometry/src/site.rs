@@ -71,7 +71,7 @@ mod tests {
 
     /// Reference values: Del Grosso and Mader 1972, tables for pure water.
     #[test]
-    fn sound_goes_as_fast_as_tables_say() {
+    fn sound_speed_equals_reference_tables() {
         for (degc, mps) in [(0.0, 1402.39), (5.0, 1426.16), (10.0, 1447.27), (20.0, 1482.34), (30.0, 1509.13)]
         {
             let ours = fresh_water_sound_speed_mps(degc, 101_325.0);
@@ -82,7 +82,7 @@ mod tests {
     }
 
     #[test]
-    fn pressure_is_the_weight_of_the_site_s_water_and_air() {
+    fn pressure_is_the_weight_of_water_and_air() {
         // 10 m of sea water at 9.8 m/s^2 under 900 hPa.
         let sea = Site {
             density_kgpm3: 1025.0,
@@ -92,7 +92,7 @@ mod tests {
         };
         assert!((sea.pressure_pa(10.0) - 190_450.0).abs() < 1e-9, "{}", sea.pressure_pa(10.0));
         assert!((sea.depth_m(190_450.0) - 10.0).abs() < 1e-12, "{}", sea.depth_m(190_450.0));
-        // A change of density by 2.5 per cent moves 50 m by 1.2 m.
+        // A density change of 2.5 % moves 50 m by 1.2 m.
         let deep_pa = 101_325.0 + 50.0 * 999.7 * 9.806_65;
         let salty = Site { density_kgpm3: 1025.0, ..Site::default() };
         assert!((Site::default().depth_m(deep_pa) - 50.0).abs() < 1e-9);
@@ -100,7 +100,7 @@ mod tests {
     }
 
     #[test]
-    fn a_range_is_as_long_as_sound_is_fast_here() {
+    fn range_is_rescaled_to_the_local_sound_speed() {
         let site = Site { sound_speed_mps: 1450.0, ..Site::default() };
         assert!((site.rescaled_range_m(5.0, 1500.0) - 5.0 * 29.0 / 30.0).abs() < 1e-12);
     }

@@ -1,8 +1,8 @@
-//! State as bytes: saved after a tick, and restored into a loop of the same vehicle and the same program.
+//! Snapshots: the state after a tick as bytes, restored into a loop of the same vehicle and program.
 //!
-//! Values (numbers, enums, small records) are written by serde. Types that own preallocated memory, or settings that
-//! aren't state, are restored in place: [`stateful!`](crate::stateful) sorts every field of such a type by what it is,
-//! so that a new field can't be forgotten.
+//! Serde writes values (numbers, enums, small records). Types that own preallocated memory, or settings that are not
+//! state, are restored in place. [`stateful!`](crate::stateful) classifies every field of such a type, so that a new
+//! field cannot be forgotten.
 //!
 //! ```
 //! use headrace_geometry::snapshot::{Restorer, Saver, Stateful as _, stateful};
@@ -23,7 +23,7 @@
 //! # Ok::<(), headrace_geometry::snapshot::SnapshotError>(())
 //! ```
 //!
-//! Snapshots are for the program that wrote them: no version reads another's.
+//! Only the program that wrote a snapshot can read it; other versions cannot.
 
 use serde::Serialize;
 use serde::de::DeserializeOwned;
@@ -37,16 +37,16 @@ pub trait Stateful {
 
     /// Restores the state from a snapshot, in the order it was saved. Settings and buffer capacities are unchanged.
     ///
-    /// Errors: the snapshot doesn't fit; `self` may then be partly restored and must not be used.
+    /// Errors: the snapshot does not fit. `self` may then be partly restored and must not be used.
     fn restore(&mut self, from: &mut Restorer<'_>) -> Result<(), SnapshotError>;
 }
 
-/// Why a snapshot can't be written or restored.
+/// Reason why a snapshot cannot be written or restored.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum SnapshotError {
     /// The bytes aren't a snapshot of this loop.
-    #[error("restoring {part} from a snapshot: {why}; it is of another vehicle, another version, or damaged")]
+    #[error("restoring {part} from a snapshot: {why}; it is from another vehicle or version, or damaged")]
     Unfit {
         /// Part of the state that was being restored.
         part: String,
@@ -97,7 +97,7 @@ impl Saver {
         }
     }
 
-    /// Adds stateful elements without a count: their number is a setting.
+    /// Adds stateful elements without a count, because their number is a setting.
     pub fn each<'a, T: Stateful + ?Sized + 'a>(&mut self, each: impl Iterator<Item = &'a T>) {
         each.for_each(|one| one.save(self));
     }
@@ -152,7 +152,7 @@ impl<'a> Restorer<'a> {
         Ok(value)
     }
 
-    /// Fills a list, within its capacity where that suffices.
+    /// Fills a list, within its capacity if that is enough.
     ///
     /// Errors: the snapshot is too short, or an element can't be read.
     pub fn list<T: DeserializeOwned>(&mut self, list: &mut Vec<T>) -> Result<(), SnapshotError> {
@@ -179,7 +179,7 @@ impl<'a> Restorer<'a> {
         slots.iter_mut().try_for_each(|slot| self.value().map(|value| *slot = value))
     }
 
-    /// Restores stateful elements, whose number is a setting.
+    /// Restores stateful elements; their number is a setting.
     ///
     /// Errors: as for each element.
     pub fn each<'t, T: Stateful + ?Sized + 't>(
@@ -200,7 +200,7 @@ impl<'a> Restorer<'a> {
         Ok(bytes)
     }
 
-    /// An error about the part that is being restored.
+    /// Creates an error about the part that is being restored.
     pub fn unfit(&self, why: String) -> SnapshotError {
         SnapshotError::Unfit { part: self.part.to_owned(), why }
     }
@@ -222,7 +222,7 @@ impl<T: Serialize + DeserializeOwned> Stateful for T {
     }
 }
 
-/// For serde's `with`: arrays longer than serde supports.
+/// Serde `with` module for arrays longer than serde supports.
 pub mod array {
     use serde::de::{Deserialize, Deserializer, Error};
     use serde::ser::{Serialize, Serializer};
@@ -245,10 +245,15 @@ pub mod array {
     }
 }
 
-/// Implements [`Stateful`](crate::snapshot::Stateful) for a type, given its fields by kind: `state` (values, or stateful fields),
-/// `lists` (a `Vec` of values that keeps its capacity), `slots` (arrays or slices of fixed length), `each` (stateful
-/// elements whose number is a setting) and `fixed` (settings and working memory: not saved). A type with an unlisted
-/// field doesn't compile.
+/// Implements [`Stateful`](crate::snapshot::Stateful) for a type, given its fields by kind.
+///
+/// - `state`: values, or stateful fields
+/// - `lists`: a `Vec` of values that keeps its capacity
+/// - `slots`: arrays or slices of fixed length
+/// - `each`: stateful elements whose number is a setting
+/// - `fixed`: settings and working memory, which are not saved
+///
+/// A type with an unlisted field does not compile.
 #[macro_export]
 macro_rules! stateful {
     ($type:ty {
@@ -310,7 +315,7 @@ mod tests {
     }
 
     #[test]
-    fn state_comes_back_bit_for_bit_and_settings_stay() {
+    fn state_is_restored_bit_for_bit_and_settings_stay() {
         let bytes = saved(&machine("a", &[1, 2, 3]));
         let mut other = machine("b", &[]);
         (other.turned, other.places) = (0.0, [None; 40]);
@@ -323,13 +328,13 @@ mod tests {
     }
 
     #[test]
-    fn another_s_bytes_are_refused_and_the_part_is_named() {
+    fn foreign_snapshot_is_rejected_with_the_part_named() {
         let bytes = saved(&machine("a", &[1, 2, 3]));
         let mut from = Restorer::new(&bytes);
         from.part("machine").unwrap();
         from.value::<f64>().unwrap();
         let words = from.slots(&mut [0_u16; 2]).unwrap_err().to_string();
-        insta::assert_snapshot!(words, @"restoring machine from a snapshot: 3 elements in place of 2; it is of another vehicle, another version, or damaged");
+        insta::assert_snapshot!(words, @"restoring machine from a snapshot: 3 elements in place of 2; it is from another vehicle or version, or damaged");
         assert!(Restorer::new(&bytes).part("engine").is_err());
         for cut in 0..bytes.len() {
             let mut from = Restorer::new(&bytes[..cut]);

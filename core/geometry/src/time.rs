@@ -1,7 +1,7 @@
 //! Time as integer nanoseconds, in three types that can't be mixed up.
 //!
-//! The loop uses [`MonoNs`] only: the host's monotonic clock, as stamped by the thread that received the bytes, or as
-//! given by a log or a simulation. UTC appears at the edges only.
+//! The loop uses only [`MonoNs`], the host's monotonic clock. The thread that received the bytes, a log or a
+//! simulation sets it. UTC appears at the edges only.
 
 use serde::{Deserialize, Serialize};
 
@@ -31,10 +31,7 @@ impl DurNs {
     }
 
     /// Seconds rounded to the nearest nanosecond; NaN gives zero, and values beyond 292 years saturate.
-    #[expect(
-        clippy::cast_possible_truncation,
-        reason = "float to integer casts saturate, which is what is wanted"
-    )]
+    #[expect(clippy::cast_possible_truncation, reason = "float to integer casts saturate, as intended")]
     pub fn from_secs_f64(seconds: f64) -> Self {
         Self(libm::rint(seconds * NS_PER_S) as i64)
     }
@@ -104,7 +101,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_span_is_signed_and_never_wraps() {
+    fn span_is_signed_and_saturates() {
         assert_eq!(MonoNs(5).since(MonoNs(8)), DurNs(-3));
         assert_eq!(MonoNs(u64::MAX).since(MonoNs(0)), DurNs(i64::MAX));
         assert_eq!(MonoNs(0).since(MonoNs(u64::MAX)), DurNs(i64::MIN));

@@ -13,20 +13,20 @@ pub const ADVICE_PERIOD: DurNs = DurNs(200_000_000);
 /// One entry of the advice history.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct AdviceEntry {
-    /// Timestamp, in data time.
+    /// Time of the entry, in data time.
     pub at: MonoNs,
-    /// Chainage then, m; `None` without a fix.
+    /// Chainage at that time, m; `None` without a fix.
     pub chainage_m: Option<f64>,
-    /// Speed then, m/s.
+    /// Speed at that time, m/s.
     pub speed_mps: f64,
     /// The advice.
     pub advice: Advice,
 }
 
-/// Advice history: an entry whenever the advice has changed significantly, or after ten seconds.
+/// Advice history: gets an entry whenever the advice has changed significantly, or after ten seconds.
 ///
-/// When it is full, every other entry is dropped and the minimum time between entries is doubled: a longer dive is
-/// logged more coarsely, from its beginning to its end.
+/// When it is full, every other entry is dropped and the minimum time between entries is doubled. A longer
+/// dive is thus logged more coarsely from beginning to end.
 #[derive(Debug, Clone, Resource)]
 pub struct AdviceLog {
     /// The entries, in order.
@@ -46,7 +46,7 @@ impl Default for AdviceLog {
 }
 
 impl AdviceLog {
-    /// An entry has some 400 bytes.
+    /// An entry takes some 400 bytes.
     const CAPACITY: usize = 1 << 13;
     const EVERY: DurNs = DurNs(10_000_000_000);
     const CHANGE_MPS: f64 = 0.01;
@@ -89,9 +89,9 @@ mod tests {
     use super::*;
     use crate::fixtures::{advice, situation};
 
-    /// Advice that changes at every beat for ten hours is logged from beginning to end within the capacity.
+    /// Advice that changes at every update for ten hours is logged from beginning to end within the capacity.
     #[test]
-    fn the_advice_s_history_does_not_grow_with_hours() {
+    fn ten_hours_of_advice_fit_into_the_history() {
         let advice = advice(&situation(None));
         let mut log = AdviceLog::default();
         let room = log.entries.capacity();
@@ -103,7 +103,7 @@ mod tests {
         }
         assert_eq!(log.entries.capacity(), room);
         assert!(log.entries.len() > AdviceLog::CAPACITY / 2 - 1, "{}", log.entries.len());
-        assert!(log.dropped > 0, "what is left out is counted");
+        assert!(log.dropped > 0, "dropped entries are counted");
         let apart_s = log.entries.windows(2).map(|two| two[1].at.since(two[0].at).as_secs_f64());
         assert!(apart_s.fold(0.0, f64::max) < 12.0);
         assert_eq!(log.entries[0].at, MonoNs(0));

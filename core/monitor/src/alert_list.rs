@@ -1,9 +1,9 @@
-//! Alerts with a life, as at sea (IMO MSC.302(87)): raised, acknowledged, silenced, rectified, cleared. One alert per situation,
-//! by a number that stays.
+//! List of alerts with the life cycle of IMO MSC.302(87): raised, acknowledged, silenced, rectified, cleared.
 //!
-//! What holds is found at the beats, and missed stretches when they are judged; commands take effect where they were consumed. So
-//! the list is the same in a replay, however the stream was cut into ticks. It has figures, no words: [`words`] makes those when
-//! they are shown. `docs/reference/alerts.md` has the table.
+//! Each situation has one alert, whose number never changes. Conditions are checked at each update, missed
+//! stretches when they are judged, and commands take effect where they were consumed. The list is therefore
+//! the same in a replay, however the stream was cut into ticks. It holds figures, no texts: [`words`] makes
+//! the texts for display. `docs/reference/alerts.md` has the table.
 
 use bevy_ecs::prelude::Resource;
 use serde::{Deserialize, Serialize};
@@ -34,43 +34,44 @@ pub(super) use runs::RunInput;
 use timer::Timer;
 pub use words::Surroundings;
 
-/// Alerts that are kept. Beyond, the oldest cleared ones are dropped, and missed stretches share an alert with their neighbours.
+/// Maximum number of alerts kept. Beyond it the oldest cleared ones are dropped, and neighbouring missed
+/// stretches share an alert.
 pub const MOST_LISTED: usize = 256;
-/// How long a sound is silenced. Source: MSC.302(87).
+/// Time for which a sound is silenced. Source: MSC.302(87).
 pub const SILENCE: DurNs = DurNs(30_000_000_000);
 
-/// Where an alert is in its life.
+/// State of an alert in its life cycle.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum AlertState {
-    /// What it tells of holds.
+    /// Its condition holds.
     Active,
-    /// It holds no longer, and nobody has acknowledged it yet.
+    /// Its condition no longer holds, but nobody has acknowledged the alert yet.
     Rectified,
-    /// It is over.
+    /// The alert has ended.
     Cleared,
 }
 
-/// What has happened to an alert.
+/// Change of an alert.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum AlertChange {
-    /// It is new, or holds again.
+    /// It is new, or its condition holds again.
     Raised,
-    /// Somebody knows of it.
+    /// Somebody has acknowledged it.
     Acknowledged,
-    /// Its sound is off for a while.
+    /// Its sound is silenced for a while.
     Silenced,
-    /// It holds no longer, and waits to be acknowledged.
+    /// Its condition no longer holds, and it waits for acknowledgement.
     Rectified,
-    /// It is over.
+    /// It has ended.
     Cleared,
     /// Its place, extent, figures or priority have changed.
     Changed,
 }
 
 impl AlertChange {
-    /// The word used in JSON.
+    /// Word used in JSON.
     pub fn as_str(self) -> &'static str {
         match self {
             Self::Raised => "raised",
@@ -83,78 +84,79 @@ impl AlertChange {
     }
 }
 
-/// Who has acknowledged an alert, and when.
+/// Person who acknowledged an alert, and the time.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Acknowledgement {
-    /// By whom.
+    /// Person or device.
     pub by: Who,
-    /// When.
+    /// Time.
     pub at: MonoNs,
 }
 
-/// What the words of an alert need.
+/// Figures for an alert's texts.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub enum Figures {
-    /// Nothing.
+    /// None.
     None,
-    /// Of a missed stretch: causes, arc length of the largest hole, m, and the speed advised when it was raised, m/s, zero
-    /// if none.
+    /// Missed stretch: causes, arc length of the largest hole, m, and the speed advised when raised, m/s.
+    ///
+    /// The speed is zero if there was none.
     Missed(CauseFigures, f64, f64),
-    /// Of a stretch of which nothing can be said.
+    /// Stretch without a verdict.
     CannotSay(Stretch),
     /// Speed and advice.
     Advice(AdviceFigures),
-    /// What is lacking for a position.
+    /// Missing requirements for a position.
     Lacking(NoFix),
-    /// By how much the position may be off, m, and whether standing still would help.
+    /// Position error, m, and whether standing still would help.
     Error(f64, bool),
-    /// Of an alert about the dive as a whole: place and largest deviation, m.
+    /// Alert about the dive as a whole: place and largest deviation, m.
     Deviation(f64, f64),
-    /// A setting in doubt, and the place where it was found, m.
+    /// A doubtful setting, and the place where the doubt arose, m.
     Setting(SettingDoubt, f64),
-    /// What is left: m, seconds or percent.
+    /// Remaining amount: m, seconds or percent.
     Left(f64),
 }
 
 /// An alert of the list.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct ListedAlert {
-    /// Its number, from 1; never given again.
+    /// Number from 1. It is never reused.
     pub number: u32,
-    /// Its kind.
+    /// Kind.
     pub kind: ListKind,
-    /// Its priority.
+    /// Priority.
     pub priority: Priority,
-    /// Where it is in its life.
+    /// State in its life cycle.
     pub state: AlertState,
-    /// When it was raised first.
+    /// Time of its first raising.
     pub since: MonoNs,
-    /// Since when it holds no longer.
+    /// Time from which its condition no longer holds.
     pub rectified: Option<MonoNs>,
-    /// Since when it is over.
+    /// Time at which it ended.
     pub cleared: Option<MonoNs>,
-    /// Who knows of it.
+    /// Acknowledgement, if any.
     pub acknowledged: Option<Acknowledgement>,
-    /// Until when its sound is off.
+    /// Time until which its sound is silenced.
     pub silenced_until: Option<MonoNs>,
-    /// The sensor that it names.
+    /// Sensor that it names.
     pub source: Option<SourceId>,
-    /// Sections from which and before which it holds.
+    /// Index of its first section, and index after its last.
     pub stretch: Option<(i64, i64)>,
-    /// Where the vehicle was when it was raised, m; of an alert with a stretch, `None`.
+    /// Place of the vehicle when it was raised, m; `None` for an alert with a stretch.
     pub x_m: Option<f64>,
-    /// Times that it was raised; of missed stretches, those that it stands for.
+    /// Number of times that it was raised; for missed stretches, number of stretches that it represents.
     pub count: u32,
-    /// Runs of flagged sections that are open in it.
+    /// Number of open runs of flagged sections in it.
     pub(super) open_runs: u32,
-    /// The alert that stands for it now.
+    /// Alert that it was merged into.
     pub merged_into: Option<u32>,
-    /// What its words need.
+    /// Figures for its texts.
     pub figures: Figures,
 }
 
 impl ListedAlert {
-    /// Whether it isn't over.
+    /// Whether it has not ended.
     pub fn is_live(&self) -> bool {
         self.state != AlertState::Cleared
     }
@@ -164,13 +166,13 @@ impl ListedAlert {
         self.is_live() && self.priority != Priority::Caution && self.acknowledged.is_none()
     }
 
-    /// Whether it sounds at `now`: it holds, nobody has acknowledged it, and it isn't silenced.
+    /// Whether it sounds at `now`: its condition holds, and it is neither acknowledged nor silenced.
     pub fn sounds(&self, now: MonoNs) -> bool {
         let is_silenced = self.silenced_until.is_some_and(|until| now < until);
         self.state == AlertState::Active && self.needs_acknowledgement() && !is_silenced
     }
 
-    /// Its place in a list: what is most urgent first, and of those the newest.
+    /// Sort key for a list: most urgent first, newest first among equals.
     pub fn rank(&self) -> (u8, core::cmp::Reverse<u32>) {
         let rank = match (self.state, self.needs_acknowledgement(), self.priority) {
             (AlertState::Cleared, ..) => 6,
@@ -185,26 +187,26 @@ impl ListedAlert {
     }
 }
 
-/// All alerts.
+/// All alerts of a dive.
 #[derive(Debug, Resource)]
 pub struct AlertList {
-    /// By number.
+    /// Alerts in order of their numbers.
     alerts: Vec<ListedAlert>,
-    /// Alerts raised so far.
+    /// Number of alerts raised so far.
     raised: u32,
-    /// Cleared ones that are no longer kept.
+    /// Number of cleared alerts no longer kept.
     dropped: u64,
-    /// By run of flagged sections: the number of its alert, or zero.
+    /// For each run of flagged sections: the number of its alert, or zero.
     by_run: Vec<u32>,
-    /// By situation.
+    /// Timers, by situation.
     timers: Vec<Timer>,
-    /// Since when there are beats.
+    /// Time of the first update.
     begun: Option<MonoNs>,
-    /// What has been there once, of [`observed`].
+    /// Conditions seen at least once, for [`observed`].
     had: observed::Had,
-    /// The largest speed advised at the last beat, m/s; zero if none.
+    /// Largest speed advised at the last update, m/s; zero if none.
     v_max_mps: f64,
-    /// The vehicle's place at the last beat, m.
+    /// Place of the vehicle at the last update, m.
     x_m: Option<f64>,
     recording_fails: bool,
     battery_pct: Option<f64>,
@@ -220,9 +222,9 @@ stateful!(AlertList {
 });
 
 impl AlertList {
-    /// None yet. `sections` is the number of sections, the most runs that there can be.
+    /// An empty list. `sections` is the number of sections, and so the largest possible number of runs.
     ///
-    /// Allocates: startup only; all that it will ever use.
+    /// Allocates: at startup, all that it will ever use.
     pub(super) fn new(timing: AlertTiming, limits: LimitsConfig, sections: usize) -> Self {
         Self {
             alerts: Vec::with_capacity(MOST_LISTED),
@@ -241,32 +243,32 @@ impl AlertList {
         }
     }
 
-    /// All that are kept, by number.
+    /// All alerts kept, in order of their numbers.
     pub fn iter(&self) -> impl DoubleEndedIterator<Item = &ListedAlert> + Clone {
         self.alerts.iter()
     }
 
-    /// The alert of a number.
+    /// Alert with a number.
     pub fn get(&self, number: u32) -> Option<&ListedAlert> {
         self.alerts.get(self.place_of(number)?)
     }
 
-    /// Alerts raised so far.
+    /// Number of alerts raised so far.
     pub fn raised(&self) -> u32 {
         self.raised
     }
 
-    /// Cleared alerts that are no longer kept.
+    /// Number of cleared alerts no longer kept.
     pub fn dropped(&self) -> u64 {
         self.dropped
     }
 
-    /// Charge of the vehicle's battery as last told, percent.
+    /// Last reported charge of the vehicle's battery, percent.
     pub fn battery_pct(&self) -> Option<f64> {
         self.battery_pct
     }
 
-    /// The vehicle's place at the last beat, m.
+    /// Place of the vehicle at the last update, m.
     pub(super) fn x_m(&self) -> Option<f64> {
         self.x_m
     }

@@ -18,23 +18,23 @@ pub enum AlertKind {
     ProfileContradicted,
     /// Successive returns of a head disagree: noise.
     HeadScattered,
-    /// A head's range doesn't change while the vehicle's place says it must.
+    /// A head's range doesn't change although the vehicle's place says it must.
     HeadConstant,
     /// A head contradicts the design where other heads agree with it.
     HeadOutvoted,
-    /// The cable's counter differs from the inertial unit or from a velocity log: one of them has gone wrong.
+    /// The cable counter differs from the inertial unit or from a velocity log: one of them is wrong.
     CableDoubted,
     /// Ranges contradict a setting of the vehicle file.
     SettingDoubted,
 }
 
-/// Kinds of alerts that name a head.
+/// Number of kinds that name a head.
 const HEAD_KINDS: usize = 3;
-/// Most alerts: one of each kind, or of each kind and head, and one of the cable and a velocity log.
+/// Maximum number of alerts: one per kind, or per kind and head, and one for the cable and a velocity log.
 pub const MOST_ALERTS: usize = AlertKind::ALL.len() + 1 - HEAD_KINDS + HEAD_KINDS * MAX_HEADS;
 
 impl AlertKind {
-    /// All of them.
+    /// All kinds.
     pub const ALL: [Self; 7] = [
         Self::OutsideTunnel,
         Self::ProfileContradicted,
@@ -45,7 +45,7 @@ impl AlertKind {
         Self::SettingDoubted,
     ];
 
-    /// The alert that a head isn't believed, and its figure, m.
+    /// Alert for a distrusted head, and its figure, m.
     pub(super) fn of_distrust(why: Distrust) -> (Self, f64) {
         match why {
             Distrust::Scattered(jump_m) => (Self::HeadScattered, jump_m),
@@ -54,7 +54,7 @@ impl AlertKind {
         }
     }
 
-    /// The word used in reports and logs.
+    /// Word used in reports and logs.
     pub fn as_str(self) -> &'static str {
         match self {
             Self::OutsideTunnel => "outside_tunnel",
@@ -77,32 +77,36 @@ pub struct Alert {
     pub since: MonoNs,
     /// Time at which its latest occurrence began.
     pub latest: MonoNs,
-    /// Occurrences: samples outside, judgements of sections that contradict the profile, times a head was distrusted, or times
-    /// that the cable's counter wasn't believed.
+    /// Number of occurrences.
+    ///
+    /// They are samples outside, judgements of contradicting sections, or times that a head or the cable
+    /// counter was distrusted.
     pub count: u64,
     /// Chainage of its first occurrence, m.
     pub x_m: f64,
-    /// Largest deviation, m: beyond the end, or a section's mean from the design profile. Of a head, the mean between
-    /// successive returns, its constant range, or its mean deviation from the design. Of the cable's counter, the largest difference
-    /// from the other source.
+    /// Largest deviation, m: beyond the end of the tunnel, or a section's mean from the design profile.
+    ///
+    /// For a head: the mean between successive returns, its constant range, or its mean deviation from the
+    /// design. For the cable counter: the largest difference from the other source.
     pub worst_m: f64,
-    /// The head that isn't believed, or the velocity log that the cable's counter differs from.
+    /// The distrusted head, or the velocity log that the cable counter differs from.
     pub source: Option<SourceId>,
-    /// The setting in doubt, as last judged.
+    /// Doubtful setting, as last judged.
     pub setting: Option<SettingDoubt>,
 }
 
-/// All alerts.
+/// All alerts about a dive.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Resource, Serialize, Deserialize)]
 pub struct Alerts([Option<Alert>; MOST_ALERTS]);
 
 impl Alerts {
-    /// Records an alert at a chainage with its deviation, m; true on its first occurrence.
+    /// Records an alert at a chainage with its deviation, m. True on its first occurrence.
     pub fn note(&mut self, kind: AlertKind, at: MonoNs, x_m: f64, off_m: f64) -> bool {
         self.note_of(None, kind, at, x_m, off_m)
     }
 
-    /// The same of a head, or of the velocity log that the cable differs from.
+    /// Records an alert about a head, or about the velocity log that the cable differs from. True on its
+    /// first occurrence.
     pub fn note_of(
         &mut self,
         source: Option<SourceId>,
@@ -132,7 +136,8 @@ impl Alerts {
         is_first
     }
 
-    /// Records an occurrence that lasts and began at `since`, and is counted once; true when the first one is recorded first.
+    /// Records an occurrence that began at `since` and lasts. It is counted once. True when the first one is
+    /// first recorded.
     pub fn note_lasting(
         &mut self,
         source: Option<SourceId>,
@@ -150,7 +155,8 @@ impl Alerts {
         }
     }
 
-    /// Records a setting in doubt, found at a chainage, m; counted where another one becomes the likeliest, and true then.
+    /// Records a doubtful setting, found at a chainage, m. Counts it, and returns true, if another setting
+    /// becomes the likeliest.
     pub fn note_setting(&mut self, at: MonoNs, x_m: f64, doubt: &SettingDoubt) -> bool {
         let kind = AlertKind::SettingDoubted;
         let is_new = self
@@ -165,7 +171,7 @@ impl Alerts {
         is_new
     }
 
-    /// The alert of a kind, of a head where it names one.
+    /// Alert of a kind, and of a head if the kind names one.
     pub fn get(&self, kind: AlertKind, source: Option<SourceId>) -> Option<&Alert> {
         self.iter().find(|alert| alert.kind == kind && alert.source == source)
     }

@@ -21,13 +21,13 @@ use headrace_vehicle::{CONSOLE_ID, Mission};
 
 /// A source of bytes, as a plugin registers it.
 pub struct SourceSpec {
-    /// Name, also of its channel in the log.
+    /// Name, also that of its channel in the log.
     pub id: String,
     /// Kind of device.
     pub plugin: String,
-    /// Where it is connected, as written in the vehicle file.
+    /// Connection as written in the vehicle file.
     pub connect: String,
-    /// Bytes to readings.
+    /// Decoder from bytes to readings.
     pub decoder: Box<dyn Decoder>,
     /// Capacity of the ring before the loop, bytes.
     pub ring_bytes: usize,
@@ -40,11 +40,11 @@ pub struct SourceInfo {
     pub id: String,
     /// Kind of device.
     pub plugin: String,
-    /// Where it is connected.
+    /// Connection.
     pub connect: String,
 }
 
-/// Something that can be added to the loop: an outlet, a stage.
+/// An addition to the loop, such as an outlet or a stage.
 pub trait Plugin {
     /// Registers sources, components, systems in a named stage, outlets.
     ///
@@ -58,11 +58,11 @@ pub struct App {
     pub(super) world: World,
     pub(super) schedule: Schedule,
     pub(super) sources: Vec<SourceInfo>,
-    /// The entity of each source.
+    /// Entity of each source.
     pub(super) entities: Vec<Entity>,
     pub(super) ports: Vec<Port>,
     pub(super) readers: Vec<PortReader>,
-    /// Whether a plugin has systems among those that place pings.
+    /// Whether a plugin has systems in the stages that place pings.
     pub(super) has_own_placing: bool,
 }
 
@@ -93,9 +93,9 @@ impl App {
         Ok(self)
     }
 
-    /// Registers a source; its port fills the ring that the loop reads.
+    /// Registers a source. Its port fills the ring that the loop reads.
     ///
-    /// Errors: an id that is there already or is the console's, or more than [`MAX_SOURCES`].
+    /// Errors: the id exists already or is the console's, or there are more than [`MAX_SOURCES`].
     pub fn add_source(&mut self, spec: SourceSpec) -> Result<SourceId, PluginError> {
         if spec.id == CONSOLE_ID {
             return Err(PluginError::ReservedSource { id: spec.id });
@@ -121,7 +121,7 @@ impl App {
 
     /// Adds a sensor: its source, and an entity with its mount and kind.
     ///
-    /// Errors: as for [`App::add_source`].
+    /// Errors: see [`App::add_source`].
     pub fn add_device(&mut self, device: &dyn Device) -> Result<SourceId, PluginError> {
         let SensorSpec { sensor, kind, decoder, ring_bytes } = device.specification();
         let source = self.add_source(SourceSpec {
@@ -145,7 +145,7 @@ impl App {
         self.world.insert_resource(resource);
     }
 
-    /// Adds a resource that results depend on: snapshots store it as the part of this name.
+    /// Adds a resource that affects results. Snapshots store it as a part with this name.
     pub fn insert_state(
         &mut self,
         name: &'static str,
@@ -155,20 +155,21 @@ impl App {
         self.world.insert_resource(resource);
     }
 
-    /// Keeps the words of all results, tick by tick, for recording or comparison.
+    /// Keeps the result words of every tick, for recording or comparison.
     pub fn keep_results(&mut self) {
         let mut digests = Digests::default();
         digests.keep();
         self.world.insert_resource(digests);
     }
 
-    /// Adds systems to a stage. Systems of one stage that share data must be ordered by the caller.
+    /// Adds systems to a stage. The caller must order systems of one stage that share data.
     pub fn add_systems<M>(&mut self, stage: Stage, systems: impl IntoScheduleConfigs<ScheduleSystem, M>) {
         self.has_own_placing |= stage.is_placing();
         self.schedule.add_systems(systems.in_set(stage));
     }
 
-    /// Adds systems between a stage and the next, for what looks at a stage as a whole, such as a measurement.
+    /// Adds systems between a stage and the next, for systems such as measurements that need the finished
+    /// stage.
     pub fn add_systems_after<M>(
         &mut self,
         stage: Stage,
@@ -181,7 +182,7 @@ impl App {
         };
     }
 
-    /// The sources so far, in the order of their ids.
+    /// Sources so far, in the order of their ids.
     pub fn sources(&self) -> &[SourceInfo] {
         &self.sources
     }

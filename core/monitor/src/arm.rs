@@ -39,25 +39,25 @@ use headrace_sensor::device::SensorKind;
 use headrace_sensor::reading::{MAX_SOURCES, SourceId};
 use headrace_vehicle::Mission;
 
-/// Capacity for the readings of one tick: the shortest frame of any device has over ten bytes.
+/// Capacity for the readings of one tick. The shortest frame of any device has over ten bytes.
 const MAX_TICK_READINGS: usize = MAX_TICK_BYTES / 8;
 
 /// Margin beyond both ends of the tunnel for heads mounted ahead of or behind the vehicle's origin, m.
 const ROOM_BEYOND_M: f64 = 25.0;
-/// Sample capacity per metre of tunnel, and its limits. Four heads at 0.2 m/s give 1,000 per metre.
+/// Sample capacity per metre of tunnel. Four heads at 0.2 m/s give 1,000 per metre.
 const SAMPLES_PER_M: f64 = 4_000.0;
 const MIN_SAMPLES: f64 = 4_000_000.0;
 const MAX_SAMPLES: f64 = 40_000_000.0;
 
-/// Runs that a judged section may change: its own and two others.
+/// Maximum number of runs that judging one section may change: its own and two others.
 const RUNS_EACH: usize = 3;
-/// Notices per judged section: its own, those of its runs and of their alerts, and an alert.
+/// Notices per judged section: its own, those of its runs and their alerts, and an alert.
 const NOTICES_EACH: usize = 2 + 3 * RUNS_EACH;
-/// Notices of alerts per tick beside those.
+/// Additional notices of alerts per tick.
 const NOTICES_OF_ALERTS: usize = 4 * MOST_LISTED;
 
 impl App {
-    /// Allocates all memory of the loop and makes it ready to run. From here on no tick allocates or locks.
+    /// Allocates all memory of the loop and makes it ready to run. No tick allocates or locks afterwards.
     ///
     /// Errors: too many heads, a missing source, an invalid opening, or an ambiguous order of systems.
     pub fn arm(mut self, navigation: Box<dyn Navigation>) -> Result<Loop, PluginError> {
@@ -82,19 +82,19 @@ impl App {
         Ok(Loop::new(self))
     }
 
-    /// The operator's input, after all sensors.
+    /// Adds the operator's input after all sensors.
     fn add_console(&mut self) {
         let (port, reader) = ring::ring(0);
         self.ports.push(port);
         self.readers.push(reader);
-        // At most as many as there are sensors.
+        // The number is at most that of the sensors.
         let number = u16::try_from(self.sources.len()).unwrap_or(u16::MAX);
         self.world.insert_resource(Console::new(SourceId(number)));
         self.world.insert_resource(Commands::new());
         self.world.insert_resource(Notes::default());
     }
 
-    /// The vehicle, and the heads' remaining components.
+    /// Spawns the vehicle, and adds the heads' remaining components.
     fn spawn_entities(
         &mut self,
         navigation: Box<dyn Navigation>,
@@ -191,7 +191,7 @@ impl App {
     }
 }
 
-/// Numbers the heads in the order of sources; returns their specifications and modes.
+/// Numbers the heads in the order of sources. Returns their specifications and modes.
 fn number_heads(
     world: &mut World,
     sensors: &[Entity],
@@ -212,7 +212,7 @@ fn number_heads(
     Ok(specs)
 }
 
-/// The source that supplies the speed of sound.
+/// Source that supplies the speed of sound.
 fn sound_source(mission: &Mission, sources: &[SourceInfo]) -> Result<Option<SourceId>, PluginError> {
     let Some(id) = &mission.sound_speed_from else { return Ok(None) };
     let place =
@@ -220,7 +220,7 @@ fn sound_source(mission: &Mission, sources: &[SourceInfo]) -> Result<Option<Sour
     place.map(|place| Some(SourceId(place))).ok_or_else(|| PluginError::MissingSource { id: id.clone() })
 }
 
-/// What the heads are called and could be set to.
+/// Names of the heads and their alternative settings.
 fn head_words(world: &mut World, mission: &Mission, sources: &[SourceInfo]) -> HeadWords {
     let mut heads = world.query::<(&Head, &Mounted, &HeadSpecification)>();
     let mut heads: Vec<_> = heads.iter(world).collect();
@@ -233,7 +233,7 @@ fn head_words(world: &mut World, mission: &Mission, sources: &[SourceInfo]) -> H
     )
 }
 
-/// How far heads sit before or behind the vehicle's origin at most, m.
+/// Largest distance of a head before or behind the vehicle's origin, m.
 fn heads_reach_m(world: &mut World) -> f64 {
     let mut heads = world.query_filtered::<&Mounted, With<Head>>();
     heads.iter(world).map(|mounted| mounted.info.mount.position.x().abs()).fold(0.0, f64::max)

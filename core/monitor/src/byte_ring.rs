@@ -1,7 +1,7 @@
-//! What the protocols on lock-free rings of bytes need of a ring: one writer, one reader, each push published whole.
+//! Traits of a byte ring: one writer, one reader, each push published whole.
 //!
-//! The rings are ringbuf's. The protocols on them are ours, and written against these traits, so that the same code runs on
-//! a ring whose every interleaving can be tried (feature `model`).
+//! The rings are ringbuf's. The protocols on them use only these traits, so the same code runs on a ring
+//! whose every interleaving can be explored (feature `model`).
 
 use ringbuf::traits::{Consumer, Producer};
 
@@ -10,28 +10,28 @@ pub mod model;
 
 /// Writing end of a ring of bytes. Never blocks.
 pub trait ByteProducer {
-    /// Free bytes, at least: the reader may free more meanwhile.
+    /// Number of free bytes, at least: the reader may free more meanwhile.
     fn vacant(&self) -> usize;
 
-    /// Publishes bytes, all at once; what doesn't fit is left out.
+    /// Publishes bytes all at once. Bytes that don't fit are left out.
     fn push(&mut self, bytes: &[u8]);
 
-    /// The same of bytes that aren't in one place.
+    /// Publishes bytes that aren't contiguous, all at once.
     fn push_each(&mut self, bytes: impl Iterator<Item = u8>);
 }
 
 /// Reading end of a ring of bytes. Never blocks.
 pub trait ByteConsumer {
-    /// Bytes waiting, at least: the writer may add more meanwhile.
+    /// Number of waiting bytes, at least: the writer may add more meanwhile.
     fn occupied(&self) -> usize;
 
-    /// Copies waiting bytes, which stay; their number.
+    /// Copies waiting bytes without removing them. Returns their number.
     fn peek(&self, into: &mut [u8]) -> usize;
 
     /// Discards waiting bytes.
     fn skip(&mut self, count: usize);
 
-    /// Takes waiting bytes; their number.
+    /// Removes waiting bytes. Returns their number.
     fn pop(&mut self, into: &mut [u8]) -> usize;
 }
 

@@ -1,7 +1,8 @@
-//! The operator's input, and what the program itself reports: a source of packets after all sensors.
+//! The console: a packet source after all sensors, for the operator's input and the program's own reports.
 //!
-//! A packet is one JSON object, a [`Command`]. It goes through a ring and the merge like a sensor's bytes and is recorded as
-//! `/raw/console`, so that a replay has it where it was. It is no sensor: it has no lamp, no readings, and no place in navigation.
+//! A packet is one JSON object, a [`Command`]. It passes a ring and the merge like a sensor's bytes and is
+//! recorded as `/raw/console`, so a replay has it at the same place. The console is no sensor: it has no
+//! lamp, no readings, and no part in navigation.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -23,41 +24,41 @@ pub(super) use packets::{Commands, Console, ReceivedCommand};
 pub use text::ShortText;
 
 pub use headrace_vehicle::CONSOLE_ID;
-/// Commands that wait for the loop at most.
+/// Maximum number of commands that wait for the loop.
 const MOST_WAITING: usize = 256;
-/// While no sensor speaks, the time is told this often, so that what grows old is found.
+/// Period of time commands while no sensor delivers data, so that stale data is noticed.
 const TIME_EVERY: DurNs = DurNs(500_000_000);
 
-/// Why a command isn't taken.
+/// Reason for refusing a command.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum ConsoleError {
-    /// Too many wait.
+    /// Too many commands wait.
     #[error("sending a command to the loop: {MOST_WAITING} are waiting already; send it again")]
     Full,
-    /// The dive has all notes that its report holds.
+    /// The dive has as many notes as its report holds.
     #[error(
         "sending a note to the loop: the dive has {MOST_NOTES} notes, and its report holds no more; none is taken from now on"
     )]
     MostNotes,
 }
 
-/// Takes commands from any thread; never blocks.
+/// Takes commands from any thread without blocking.
 #[derive(Clone)]
 pub struct ConsolePort {
     waiting: Arc<ArrayQueue<(Option<MonoNs>, Command)>>,
     clock: Option<Arc<DiveClock>>,
-    /// Notes that all ports have taken.
+    /// Number of notes that all ports have taken.
     notes: Arc<AtomicUsize>,
 }
 
-/// The clock of a dive's timestamps.
+/// Clock of a dive's timestamps.
 type DiveClock = dyn Fn() -> MonoNs + Send + Sync;
 
 impl ConsolePort {
     /// Hands a command to the loop, stamped with the dive's clock. The loop takes it at its next tick.
     ///
-    /// Errors: too many wait, or the report has no room for a further note; the command was not taken.
+    /// Errors: too many commands wait, or the report has no room for another note. The command was not taken.
     pub fn send(&self, command: &Command) -> Result<(), ConsoleError> {
         let is_note = matches!(command, Command::Note { .. } | Command::Voice { .. });
         let one_more = |notes| (notes < MOST_NOTES).then_some(notes + 1);
@@ -78,7 +79,7 @@ impl core::fmt::Debug for ConsolePort {
     }
 }
 
-/// The loop's side of [`ConsolePort`]s: moves what waits into the source's ring, between ticks.
+/// The loop's side of [`ConsolePort`]s: moves waiting commands into the source's ring between ticks.
 pub struct ConsoleInput {
     waiting: Arc<ArrayQueue<(Option<MonoNs>, Command)>>,
     port: Port,
@@ -86,8 +87,9 @@ pub struct ConsoleInput {
 }
 
 impl ConsoleInput {
-    /// For a dive whose clock is `clock`; without one, commands are stamped with the time at which they are taken. `None` if the
-    /// loop's port has been taken already.
+    /// Input of a dive with this clock; `None` if the loop's port has been taken already.
+    ///
+    /// Without a clock, commands are stamped with the time at which they are taken.
     pub fn new(dive: &mut Loop, clock: Option<Arc<DiveClock>>) -> Option<(Self, ConsolePort)> {
         let port = dive.take_console()?;
         let waiting = Arc::new(ArrayQueue::new(MOST_WAITING));
@@ -95,7 +97,7 @@ impl ConsoleInput {
         Some((input, ConsolePort { waiting, clock, notes: Arc::default() }))
     }
 
-    /// Moves what waits into the ring, for the next tick, at `now`; what finds no room goes on waiting.
+    /// Moves waiting commands into the ring at `now`, for the next tick. Commands without room keep waiting.
     pub fn take_in(&mut self, now: MonoNs) {
         while self.port.has_room(MAX_COMMAND_BYTES) {
             let Some((at, command)) = self.waiting.pop() else { return };
@@ -103,7 +105,8 @@ impl ConsoleInput {
         }
     }
 
-    /// The same, in a dive on ports: while no sensor speaks, tells the loop what time it is now.
+    /// Moves waiting commands in a dive on ports. While no sensor delivers data, it also sends the time to
+    /// the loop.
     pub fn take_in_live(&mut self, dive: &Loop, now: MonoNs) {
         self.take_in(now);
         let Some((_, last)) = dive.tally().span else { return };
@@ -117,7 +120,7 @@ impl ConsoleInput {
     fn put(&mut self, at: MonoNs, command: &Command) {
         let text = command.to_json();
         if let Err(error) = self.port.send(at, text.as_bytes()) {
-            tracing::error!(%error, "a command could not be handed to the loop");
+            tracing::error!(%error, "sending a command to the loop failed; the command is lost");
         }
     }
 }

@@ -1,11 +1,11 @@
-//! A digest of results, identical on all platforms.
+//! Digest of results, identical on all platforms.
 
 use serde::{Deserialize, Serialize};
 use xxhash_rust::xxh64::xxh64;
 
 /// Hashes numbers by their bits, little-endian, each seeded with the hash so far.
 ///
-/// Not a cryptographic digest: it detects a dive computed differently, not a forged one.
+/// It is not cryptographic: it detects a dive computed differently, not a forged one.
 #[derive(Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub struct Digest(u64);
 

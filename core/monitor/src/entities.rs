@@ -29,11 +29,11 @@ use headrace_sensor::reading::SourceId;
 pub struct Navigator {
     /// Navigation method.
     pub navigation: Box<dyn Navigation>,
-    /// The next multiple of the advice period; `None` before the first packet.
+    /// Next multiple of the advice period; `None` before the first packet.
     pub next_beat: Option<MonoNs>,
-    /// Repetitions, by source.
+    /// Detectors of stuck sensors, by source.
     pub repeats: Vec<StuckSensor>,
-    /// Bits of the sources that hang.
+    /// Bitmask of the sources that are stuck.
     pub hung: u64,
 }
 
@@ -52,16 +52,16 @@ impl Stateful for Navigator {
     }
 }
 
-/// Fix of the vehicle at the last beat, and its standard deviations.
+/// Fix of the vehicle at the last update, and its standard deviations.
 #[derive(Debug, Clone, Copy, PartialEq, Component, Serialize, Deserialize)]
 pub struct VehicleState {
-    /// The beat; `None` before the first.
+    /// Time of the update; `None` before the first.
     pub at: Option<MonoNs>,
-    /// Pose and speed, or the reason there is no fix.
+    /// Pose and speed, or the reason for having no fix.
     pub fix: Result<Fix, NoFix>,
     /// Standard deviations of the pose, from its covariance; `None` if the navigation method provides none.
     pub sd: Option<PoseSd>,
-    /// The cable's counter while it isn't believed.
+    /// Doubt about the cable counter while it isn't trusted.
     pub cable_doubt: Option<CableDoubt>,
 }
 
@@ -74,7 +74,7 @@ impl Default for VehicleState {
 /// Source, mount and kind of a sensor.
 #[derive(Debug, Clone, Copy, PartialEq, Component)]
 pub struct Mounted {
-    /// The source.
+    /// Source of the sensor.
     pub source: SourceId,
     /// Mount and kind.
     pub info: SensorInfo,
@@ -121,13 +121,13 @@ impl SensorHealth {
         self.span = Some(widened(self.span, received));
     }
 
-    /// How long the sensor has been silent at `now`; `None` if it was never heard.
+    /// Time for which the sensor has been silent at `now`; `None` if it was never heard.
     pub fn silent_for(&self, now: MonoNs) -> Option<DurNs> {
         self.span.map(|(_, last)| now.since(last))
     }
 }
 
-/// A span of time that includes `at`.
+/// The span of time extended to `at`.
 pub(super) fn widened(span: Option<(MonoNs, MonoNs)>, at: MonoNs) -> (MonoNs, MonoNs) {
     span.map_or((at, at), |(first, last)| (first.min(at), last.max(at)))
 }
@@ -141,9 +141,12 @@ pub struct Head(pub usize);
 pub struct HeadSpecification {
     /// Mount and scan parameters.
     pub spec: HeadSpec,
-    /// Modes that it can be set to.
+    /// Modes to which it can be set.
     pub modes: Vec<HeadMode>,
-    /// The shortest range setting, m, its own or a longer one, that reaches all wall from the middle, and the modes there; none if none does.
+    /// Shortest range setting that reaches all wall from the centre, m, and the modes there; `None` if none
+    /// does.
+    ///
+    /// It is the head's own setting or a longer one.
     pub reaching: Option<(f64, Vec<HeadMode>)>,
 }
 
@@ -161,11 +164,11 @@ impl HiddenAngles {
 /// Sweep state of a head.
 #[derive(Debug, Clone, Copy, Default, Component, Serialize, Deserialize)]
 pub struct HeadSweep {
-    /// The last valid sample in the present sweep.
+    /// Last valid sample in the present sweep.
     pub(super) last: Option<LastSample>,
-    /// What its returns are taken for.
+    /// Classification of its returns.
     pub(super) wall: HeadWall,
-    /// Its last returns, while its next ones are to say what they are.
+    /// Its last returns, while they wait for the next ones to decide their classification.
     pub(super) waiting: WaitingReturns,
 }
 
@@ -173,44 +176,44 @@ pub struct HeadSweep {
 #[derive(Debug, Clone, Copy, Serialize, Deserialize)]
 pub(super) struct Waiting {
     pub(super) ping: PlacedPing,
-    /// The ping after it gave no return.
+    /// The next ping gave no return.
     pub(super) broken: bool,
     /// A new sweep has begun since.
     pub(super) new_sweep: bool,
 }
 
-/// Returns that wait, in order.
+/// Waiting returns, in order.
 #[derive(Debug, Clone, Copy, Default, Serialize, Deserialize)]
 pub(super) struct WaitingReturns([Option<Waiting>; MOST_WAITING]);
 
 impl WaitingReturns {
-    /// Adds a return; false if there is no room.
+    /// Adds a return. False if there is no room.
     pub(super) fn add(&mut self, ping: &PlacedPing) -> bool {
         let slot = self.0.iter_mut().find(|slot| slot.is_none());
         slot.map(|slot| *slot = Some(Waiting { ping: *ping, broken: false, new_sweep: false })).is_some()
     }
 
-    /// The last one.
+    /// Last waiting return.
     pub(super) fn last_mut(&mut self) -> Option<&mut Waiting> {
         self.0.iter_mut().flatten().next_back()
     }
 
-    /// All of them; none waits any more.
+    /// Removes and returns all waiting returns.
     pub(super) fn take(&mut self) -> impl Iterator<Item = Waiting> + use<> {
         core::mem::take(&mut self.0).into_iter().flatten()
     }
 }
 
-/// The last valid sample of a head in its present sweep.
+/// Last valid sample of a head in its present sweep.
 #[derive(Debug, Clone, Copy, Serialize, Deserialize)]
 pub(super) struct LastSample {
     pub(super) point: Point3<Tunnel>,
-    /// Its arc length, m.
+    /// Arc length, m.
     pub(super) arc_m: f64,
-    /// Every ping since has been a single step with a return.
+    /// Every later ping has been a single step with a return.
     pub(super) unbroken: bool,
 }
 
-/// Where a head lands samples; `None` before its first ping with a fix.
+/// Reach of a head; `None` before its first ping with a fix.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Component, Serialize, Deserialize)]
 pub struct HeadFrontier(pub Option<HeadReach>);

@@ -1,29 +1,31 @@
 //! Errors of building a loop.
 
-/// Why a plugin could not be added.
+/// Reason for which a plugin could not be added.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum PluginError {
-    /// Two sources have one id.
+    /// Two sources have the same id.
     #[error("adding source {id:?}: a source of that id is registered already; ids must differ")]
     DuplicateSource {
         /// The id.
         id: String,
     },
-    /// The id of the operator's input.
+    /// The id is that of the operator's input.
     #[error("adding source {id:?}: that is the id of the operator's input; choose another one")]
     ReservedSource {
         /// The id.
         id: String,
     },
     /// A required source is missing.
-    #[error("arming the loop: water.sound_speed_from = {id:?}: there is no such source")]
+    #[error(
+        "arming the loop: water.sound_speed_from = {id:?}: no source has that id; name one of the sources"
+    )]
     MissingSource {
         /// The id.
         id: String,
     },
     /// More sources than the loop's tables hold.
-    #[error("adding source {id:?}: there are {max} sources already, which is the most")]
+    #[error("adding source {id:?}: at most {max} sources are allowed; remove one")]
     TooManySources {
         /// The id.
         id: String,
@@ -31,19 +33,19 @@ pub enum PluginError {
         max: usize,
     },
     /// More heads than the loop's tables hold.
-    #[error("arming the loop: {count} heads; the most is {max}")]
+    #[error("arming the loop: {count} heads; at most {max} are allowed; remove some")]
     TooManyHeads {
         /// Heads registered.
         count: usize,
         /// The limit.
         max: usize,
     },
-    /// A declared opening can't be laid out.
+    /// A declared opening can't be added to the sample store.
     #[error("arming the loop: opening {name:?}: {why}")]
     Opening {
         /// The opening.
         name: String,
-        /// What is wrong with it.
+        /// Problem with the opening.
         why: String,
     },
     /// The schedule of systems can't be built.

@@ -1,4 +1,4 @@
-//! Runs an armed loop, the same way for ports, logs and the simulator, which differ only in their [`Feed`].
+//! Runs an armed loop. Ports, logs and the simulator differ only in their [`Feed`].
 
 use super::run::Loop;
 use headrace_geometry::time::MonoNs;
@@ -8,21 +8,23 @@ pub trait Feed {
     /// Error that ends the feed.
     type Error;
 
-    /// Waits for the next tick, fills the rings for it, and returns the end of its time; `None` at the end of the feed. A
-    /// full ring is drained by [`work_off`].
+    /// Waits for the next tick, fills the rings for it, and returns the end of its time; `None` at the end of
+    /// the feed.
     ///
-    /// Errors: the feed can't continue; packets fed until then have been processed.
+    /// A full ring is drained by [`work_off`].
+    ///
+    /// Errors: the feed can't continue. Packets fed until then have been processed.
     fn fill(
         &mut self,
         dive: &mut Loop,
         after_tick: &mut dyn FnMut(&Loop),
     ) -> Result<Option<MonoNs>, Self::Error>;
 
-    /// Waits briefly, so that an outlet that is behind can catch up.
+    /// Waits briefly, so that a lagging outlet can catch up.
     fn pause(&mut self);
 }
 
-/// Runs the loop until the feed ends; `after_tick` is called with it after every tick.
+/// Runs the loop until the feed ends, and calls `after_tick` with it after every tick.
 ///
 /// Errors: those of the feed.
 pub fn drive<F: Feed>(
@@ -36,7 +38,8 @@ pub fn drive<F: Feed>(
     Ok(())
 }
 
-/// Ticks until the rings are empty, at least once. An outlet that is behind holds packets back; `pause` gives it time.
+/// Ticks at least once, until the rings are empty. A lagging outlet holds packets back, and `pause` gives it
+/// time.
 pub fn work_off(dive: &mut Loop, now: MonoNs, after_tick: &mut dyn FnMut(&Loop), pause: &mut dyn FnMut()) {
     loop {
         let consumed = dive.tick(now);

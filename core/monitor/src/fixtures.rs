@@ -1,4 +1,4 @@
-//! A pipe, its coverage and the advice in it, for tests.
+//! A pipe, its coverage and its advice, for tests.
 
 use crate::messages::{Hidden, Outcome, PlacedPing};
 use crate::resources::{Coverage, TunnelDesign};
@@ -20,7 +20,7 @@ use headrace_sampling::passes::Situation;
 use headrace_sampling::swing::Swing;
 use headrace_sensor::reading::SourceId;
 
-/// Of 3 m radius.
+/// A pipe of 3 m radius.
 pub(crate) fn pipe() -> Profile {
     shapes::circle(3.0).unwrap()
 }
@@ -32,7 +32,7 @@ pub(crate) fn tunnel() -> TunnelDesign {
     TunnelDesign { profile, site: Site::default(), length_m: 30.0, contradiction_m: 1.0, limits }
 }
 
-/// Nothing of it seen yet, for a target of half a metre.
+/// Empty coverage for a target of half a metre.
 pub(crate) fn coverage() -> Coverage {
     let (perimeter_m, from_m, to_m) = (pipe().perimeter_m(), 0.0, 32.0);
     Coverage {
@@ -46,24 +46,24 @@ pub(crate) fn coverage() -> Coverage {
     }
 }
 
-/// At the vehicle's origin, facing forward.
+/// A mount at the vehicle's origin, facing forward.
 pub(crate) fn mount() -> Mount {
     Mount { position: Vec3::zero(), rotation: Rot::identity() }
 }
 
-/// Level in the middle of the pipe.
+/// A level pose in the centre of the pipe.
 pub(crate) fn pose(x_m: f64) -> Pose {
     let [y_m, z_m] = pipe().reference();
     Pose { position: Point3::new(x_m, y_m, z_m), attitude: Rot::identity() }
 }
 
-/// There, at 0.1 m/s, with an error of chainage between passes, m.
+/// A fix there, at 0.1 m/s, with an error of chainage between passes, m.
 pub(crate) fn fix(x_m: f64, pass_error_m: f64) -> Fix {
     let relative = Relative::along(pass_error_m);
     Fix { pose: pose(x_m), speed_mps: 0.1, relative, revisit: relative, tie: 0, settled: 0 }
 }
 
-/// A vehicle without heads there, at 0.1 m/s; nowhere without a chainage.
+/// A vehicle without heads there, at 0.1 m/s. Without a chainage it has no pose.
 pub(crate) fn situation(x_m: Option<f64>) -> Situation {
     Situation {
         pose: x_m.map(pose),
@@ -78,7 +78,7 @@ pub(crate) fn situation(x_m: Option<f64>) -> Situation {
     }
 }
 
-/// Half a metre with two standard deviations, in 100 m.
+/// A target of half a metre with two standard deviations, in 100 m.
 pub(crate) fn task() -> Task {
     Task {
         target_m: 0.5,
@@ -90,12 +90,12 @@ pub(crate) fn task() -> Task {
     }
 }
 
-/// The advice of a vehicle without heads.
+/// Advice for a vehicle without heads.
 pub(crate) fn advice(of: &Situation) -> Advice {
     Advisor::new(&pipe(), task(), &[], &[]).advise(of, Swing::default(), None)
 }
 
-/// A return from a wall at this range, at an angle from the pipe's floor, of a head in its middle, in a single step.
+/// A return at this range and angle from the pipe's floor, from a head in its centre, after a single step.
 pub(crate) fn heard(x_m: f64, angle_rad: f64, range_m: f64) -> PlacedPing {
     let origin = pose(x_m).position;
     let (sin, cos) = math::sin_cos(angle_rad);
@@ -104,7 +104,7 @@ pub(crate) fn heard(x_m: f64, angle_rad: f64, range_m: f64) -> PlacedPing {
     PlacedPing { outcome: Outcome::Sample { point, arc_m }, ..pinged(x_m, angle_rad) }
 }
 
-/// A ping there that got nothing within range.
+/// A ping there without a return within range.
 pub(crate) fn pinged(x_m: f64, angle_rad: f64) -> PlacedPing {
     PlacedPing {
         head: 0,

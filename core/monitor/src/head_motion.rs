@@ -6,27 +6,30 @@ use serde::{Deserialize, Serialize};
 use headrace_geometry::math::{self, TAU};
 use headrace_geometry::time::{DurNs, MonoNs};
 
-/// Angles closer together than this are equal, radians: well under the finest head's step (0.3 degrees).
+/// Angles closer together than this are equal, radians. It is well below the finest head's step (0.3
+/// degrees).
 const SAME_ANGLE_RAD: f64 = 1e-6;
 /// Minimum angle over which the turn rate is measured, radians, once the head has turned that far.
 const RATE_SPAN_RAD: f64 = TAU / 2.0;
-/// Ratio to the usual step from which a step isn't a single one: pings were skipped.
+/// Ratio to the usual step above which a step isn't a single one: pings were skipped.
 const LONG_STEP: f64 = 1.5;
 
-/// A head that has gone farther than this many usual steps, and than this many times what its rate gives, hasn't turned there: it has
-/// started anew. A head that catches up with its program takes steps eight times its own at most.
+/// Multiple of the usual step, and of the angle at its turn rate, beyond which a head has restarted
+/// elsewhere.
+///
+/// A head that catches up with its program takes steps of at most eight times its own.
 const ELSEWHERE_STEPS: f64 = 10.0;
 const ELSEWHERE_RATES: f64 = 4.0;
 
-/// Standstill or silence after which the measurement of the turn rate restarts.
+/// Stall or silence after which the measurement of the turn rate restarts.
 const STANDING: DurNs = DurNs(1_000_000_000);
 
-/// A ping classified within the head's motion.
+/// Classification of a ping within the head's motion.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Turned {
-    /// The head has moved a single step since the ping before.
+    /// The head has moved a single step since the previous ping.
     pub single_step: bool,
-    /// The head has reversed, or its motion isn't known: a new sweep begins.
+    /// The head has reversed, or its motion is unknown: a new sweep begins.
     pub new_sweep: bool,
     /// The head is stalled: at the same angle for longer than any normal ping interval.
     pub standing: bool,
@@ -40,11 +43,11 @@ pub struct MeasuredMotion {
     last_step_rad: f64,
     /// Unsigned angle turned through since the last turning point or start, radians.
     since_turning_rad: f64,
-    /// Size of the last whole sweep between two turning points, radians.
+    /// Size of the last complete sweep between two turning points, radians.
     sector_rad: Option<f64>,
     /// Whether the present sweep began at a turning point.
     from_turning_point: bool,
-    /// Total unsigned angle turned through, radians, and the epochs from which the rate is measured.
+    /// Total unsigned angle turned through, radians, and the anchors from which the rate is measured.
     turned_rad: f64,
     anchors: [Option<(MonoNs, f64)>; 2],
     step_rad: Option<f64>,
@@ -61,7 +64,7 @@ impl MeasuredMotion {
         self.step_rad
     }
 
-    /// Signed turn rate, rad/s; `None` until it has turned four steps.
+    /// Signed turn rate, rad/s; `None` until the head has turned four steps.
     pub fn rate_radps(&self) -> Option<f64> {
         let (now, _) = self.last?;
         let (then, turned_then) = self.anchors.iter().flatten().next()?;
@@ -71,7 +74,8 @@ impl MeasuredMotion {
         (enough && span_s > 0.0).then(|| turned / span_s * self.last_step_rad.signum())
     }
 
-    /// Size of the sector, radians, once the head has reversed twice; `None` again once it turns beyond a full circle.
+    /// Size of the sector, radians, once the head has reversed twice; `None` again once it turns beyond a
+    /// full circle.
     pub fn sector_rad(&self) -> Option<f64> {
         self.sector_rad
     }
@@ -86,12 +90,12 @@ impl MeasuredMotion {
         let step = math::wrap_signed(angle_rad - before, TAU);
         let size = step.abs();
         if size < SAME_ANGLE_RAD {
-            // The head has not turned: `last` and the rate stay as they were.
+            // The head has not turned, so `last` and the rate are unchanged.
             let standing = at.since(last).as_secs_f64() > self.stands_after_s();
             return Turned { single_step: false, new_sweep: false, standing };
         }
         if self.is_elsewhere(at.since(last), size) {
-            // What lies between wasn't turned through, and whether it goes on the same way isn't known.
+            // The head didn't turn through the angle between, and its direction is unknown.
             self.last = Some((at, angle_rad));
             self.anchors = [Some((at, self.turned_rad)), None];
             (self.last_step_rad, self.since_turning_rad, self.from_turning_point) = (0.0, 0.0, false);
@@ -123,7 +127,7 @@ impl MeasuredMotion {
         Turned { single_step, new_sweep: reversed, standing: false }
     }
 
-    /// Whether the head may have started anew at an angle so far from the one before: a stalled head goes on by a step.
+    /// Whether the head may have restarted at a distant angle. A stalled head resumes with a step.
     fn is_elsewhere(&self, silence: DurNs, size_rad: f64) -> bool {
         let by_far = self.step_rad.zip(self.rate_radps()).is_some_and(|(step_rad, rate_radps)| {
             let turned_rad = (rate_radps * silence.as_secs_f64()).abs();
@@ -139,7 +143,8 @@ impl MeasuredMotion {
         ping_period_s.map_or(STANDING.as_secs_f64(), |period_s| 4.0 * period_s)
     }
 
-    /// Keeps two anchors half a turn apart, so that the older is always between a half and a whole turn back.
+    /// Keeps two anchors half a turn apart, so that the older one is always between half a turn and a whole
+    /// turn back.
     fn move_anchors(&mut self, at: MonoNs) {
         match self.anchors {
             [Some((_, older)), None] if self.turned_rad - older >= RATE_SPAN_RAD => {
@@ -167,7 +172,7 @@ mod tests {
     }
 
     #[test]
-    fn a_turning_head_has_its_rate_step_and_no_sector() {
+    fn turning_head_has_rate_and_step_but_no_sector() {
         let (track, turned) = run((0..1000).map(|k| f64::from(k) * 0.9 - 170.0));
         assert!((track.rate_radps().unwrap() - f64::to_radians(45.0)).abs() < 1e-9);
         assert!((track.step_rad().unwrap() - f64::to_radians(0.9)).abs() < 1e-9);
@@ -176,7 +181,7 @@ mod tests {
     }
 
     #[test]
-    fn a_head_in_a_sector_turns_round_at_its_ends() {
+    fn head_in_a_sector_reverses_at_its_ends() {
         let (track, turned) = run((0..500).map(|k| {
             let phase = f64::from(k % 200);
             if phase <= 100.0 { phase * 0.9 } else { (200.0 - phase) * 0.9 }
@@ -187,7 +192,7 @@ mod tests {
     }
 
     #[test]
-    fn a_stalled_head_grows_old_and_starts_with_a_fresh_rate() {
+    fn stalled_head_restarts_with_a_fresh_rate() {
         let mut track = MeasuredMotion::default();
         for k in 0..100 {
             track.ping(MonoNs(k * 20_000_000), f64::to_radians(0.9 * k as f64));
@@ -204,15 +209,15 @@ mod tests {
     }
 
     #[test]
-    fn a_step_over_missing_pings_is_not_a_single_one() {
+    fn step_over_missing_pings_is_not_single() {
         let (track, turned) = run([0.0, 0.9, 1.8, 2.7, 4.5, 5.4].into_iter());
         assert!(!turned[4].single_step && turned[5].single_step);
         assert!((track.step_rad().unwrap() - f64::to_radians(0.9)).abs() < 1e-9);
     }
 
-    /// Switched off and on, or turned by hand: what came before says nothing of how it moves, and the angle between isn't turned.
+    /// A restart or a turn by hand invalidates earlier pings, and the angle between doesn't count as turned.
     #[test]
-    fn a_head_that_restarts_elsewhere_has_turned_nowhere() {
+    fn head_restarted_elsewhere_adds_no_turned_angle() {
         for gap_ms in [20, 60, 1500, 60_000] {
             for jump_deg in [-170, -60, -20, 20, 60, 170] {
                 for way in [0.9, -0.9] {

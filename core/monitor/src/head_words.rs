@@ -1,4 +1,4 @@
-//! What the pilot's words call the heads, and what these could be set to.
+//! Head descriptions: names of the heads and their alternative settings, for the pilot's texts.
 
 use bevy_ecs::prelude::Resource;
 use headrace_sampling::advice::ModeName;
@@ -9,25 +9,25 @@ use headrace_sampling::head::HeadSet;
 pub struct HeadWords {
     /// Ids of the heads' sources, by number of the head.
     names: Vec<String>,
-    /// Finer mode to set all of them to, if there is one.
+    /// Finer mode for all heads, if there is one.
     finer: Option<ModeName>,
-    /// Range setting, m, at which all wall is in reach from the middle of the tunnel, where the present one is shorter.
+    /// Range setting that reaches all wall from the tunnel's centre, if longer than the present one, m.
     longer_m: Option<f64>,
 }
 
-/// A head's name, and what it could be set to.
+/// A head's name and alternative settings.
 #[derive(Debug, Clone, PartialEq)]
 pub struct HeadSettings {
     /// Id of its source.
     pub name: String,
-    /// The finer mode to set it to, if there is one.
+    /// Finer mode, if there is one.
     pub finer: Option<ModeName>,
-    /// Range setting, m, at which it reaches all wall from the middle of the tunnel, where its own is shorter.
+    /// Range setting that reaches all wall from the tunnel's centre, if longer than its own, m.
     pub longer_m: Option<f64>,
 }
 
 impl HeadWords {
-    /// Of all heads, in the order of sources.
+    /// Descriptions of all heads, in the order of sources.
     pub fn of(heads: impl Iterator<Item = HeadSettings>) -> Self {
         let heads: Vec<HeadSettings> = heads.collect();
         let first = heads.first().and_then(|head| head.finer);
@@ -39,7 +39,7 @@ impl HeadWords {
         }
     }
 
-    /// Text of the heads that were silent, heard nothing or weren't believed.
+    /// Text for heads that were silent, detected no wall or were distrusted.
     pub(super) fn silent(&self, heads: HeadSet) -> String {
         let names: Vec<&str> =
             heads.iter().map(|head| self.names.get(head).map_or("a head", String::as_str)).collect();
@@ -51,23 +51,23 @@ impl HeadWords {
         }
     }
 
-    /// The finer mode, to be put after "in".
+    /// Name of the finer mode, to follow "in".
     pub(super) fn finer_mode(&self) -> String {
         self.finer.map_or_else(|| "a finer mode".to_owned(), |mode| mode.as_str().to_uppercase())
     }
 
-    /// To set it.
+    /// Instruction to set the finer mode.
     pub(super) fn set_finer(&self) -> String {
         let heads = if self.finer.is_some() { "set the heads to" } else { "set" };
         format!("{heads} {}", self.finer_mode())
     }
 
-    /// To set the range at which more wall is seen, where one is known.
+    /// Instruction to set the range that shows more wall, if one is known.
     pub(super) fn seeing_more(&self) -> Option<String> {
         self.longer_m.map(|_| format!("set {}", self.longer_range()))
     }
 
-    /// The longer range, to be put after a verb or "with".
+    /// Name of the longer range, to follow a verb or "with".
     pub(super) fn longer_range(&self) -> String {
         self.longer_m.map_or_else(|| "a longer range".to_owned(), |range_m| format!("a range of {range_m} m"))
     }
@@ -87,7 +87,7 @@ pub(crate) mod tests {
     }
 
     #[test]
-    fn heads_have_the_names_of_their_sources() {
+    fn heads_are_named_after_their_sources() {
         let text = |heads: &[usize]| {
             two().silent(heads.iter().fold(HeadSet::default(), |set, head| set.with(*head)))
         };
@@ -97,9 +97,9 @@ pub(crate) mod tests {
         assert_eq!(text(&[]), "no wall from the heads");
     }
 
-    /// A mode is named where it is one that all heads have, a range where it is one that is enough for all.
+    /// A mode is named if all heads have it, a range if it is enough for all heads.
     #[test]
-    fn settings_are_named_that_help_all_heads() {
+    fn only_settings_that_help_all_heads_are_named() {
         let head = |finer: &str, longer_m: f64| HeadSettings {
             name: String::new(),
             finer: Some(ModeName::new(finer)),

@@ -1,40 +1,44 @@
-//! Whether a head that turns hears the wall at all, from its returns.
+//! Head health: whether a turning head detects the wall at all, judged by its returns.
 
 use serde::{Deserialize, Serialize};
 
 use headrace_geometry::math::{self, TAU};
 
-/// Angle turned through without a return from which a head is deaf, radians: a whole turn. Walls that swallow what meets them flatly, and
-/// side tunnels, are less than that.
+/// Angle without a return after which a head is deaf, radians: a whole turn.
+///
+/// Absorbing walls and side tunnels cover less than that.
 const DEAF_RAD: f64 = TAU;
-/// Angle over which the share of returns that aren't of the wall counts, radians.
+/// Averaging angle for the share of returns that aren't from the wall, radians.
 const ELSEWHERE_RAD: f64 = TAU / 2.0;
-/// Angle turned through with one range from which a head is stuck at it, radians, and how far the design has to differ meanwhile, m.
+/// Angle with one range after which a head is stuck at it, radians, and the design's variation needed
+/// meanwhile, m.
 const STUCK_RAD: f64 = TAU / 2.0;
 const STUCK_M: f64 = 0.3;
-/// Share of a head's returns off the design from which it hears no wall, where another one's share is below the second.
+/// Share of returns off the design above which a head detects no wall, and limit for another head's share.
+///
+/// The first applies only while another head's share is below the second.
 const ELSEWHERE: [f64; 2] = [0.85, 0.5];
 
-/// What a head hears; part of the loop's state.
+/// Health of a head; part of the loop's state.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct Hearing {
     /// Angle of the last ping, radians.
     last_rad: f64,
-    /// Angle turned through since the last return, radians.
+    /// Angle turned since the last return, radians.
     unheard_rad: f64,
-    /// Angle over which returns have been heard, radians, up to a turn.
+    /// Angle with returns, radians, up to a turn.
     heard_rad: f64,
-    /// Share of its latest returns that aren't where the design has its wall.
+    /// Share of its latest returns that are off the design.
     elsewhere: f64,
-    /// Returns of one range.
+    /// Successive returns of one range.
     same: SameRange,
 }
 
-/// Returns in a row of one range, to the last bit.
+/// Successive returns of one range, identical to the last bit.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 struct SameRange {
     range_m: f64,
-    /// Angle turned through meanwhile, radians.
+    /// Angle turned meanwhile, radians.
     turned_rad: f64,
     /// Least and largest deviation from the design meanwhile, m.
     off_m: [f64; 2],
@@ -53,7 +57,7 @@ impl SameRange {
         };
     }
 
-    /// Half a turn of one range, where the wall isn't one distance away.
+    /// Whether half a turn has one range although the wall's distance varies.
     fn is_stuck(&self) -> bool {
         self.turned_rad >= STUCK_RAD && self.off_m[1] - self.off_m[0] > STUCK_M
     }
@@ -62,16 +66,16 @@ impl SameRange {
 /// A return of a head.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Heard {
-    /// As the head says, m.
+    /// Range that the head reports, m.
     pub range_m: f64,
     /// Deviation of its place from the design, m.
     pub off_m: f64,
-    /// It is where the design has its wall.
+    /// It agrees with the design.
     pub is_wall: bool,
 }
 
 impl Hearing {
-    /// Adds a ping at an angle with what was heard.
+    /// Adds a ping at an angle, with its return if any.
     ///
     /// Allocates: never.
     pub fn add(&mut self, angle_rad: f64, heard: Option<Heard>) {
@@ -82,7 +86,7 @@ impl Hearing {
             return;
         };
         if self.hears_nothing() {
-            // It begins anew.
+            // The measurement restarts.
             *self = Self { last_rad: angle_rad, ..Self::default() };
         }
         self.unheard_rad = 0.0;
@@ -92,14 +96,17 @@ impl Hearing {
         self.same.add(heard, turned_rad);
     }
 
-    /// Whether a whole turn gave nothing.
+    /// Whether a whole turn gave no return.
     pub fn hears_nothing(&self) -> bool {
         self.unheard_rad >= DEAF_RAD
     }
 
-    /// Whether it hears no wall at all: a whole turn gave nothing, half a turn one range that the wall doesn't have, or nearly all that it hears
-    /// is elsewhere while one of the others hears the wall, by their [`Hearing::elsewhere`]. Where all hear something else, that is a matter of
-    /// the position or of the design.
+    /// Whether the head detects no wall at all.
+    ///
+    /// It is deaf if a whole turn gave no return, or half a turn gave one range although the wall's distance
+    /// varies. It is also deaf if nearly all its returns are off the design while another head detects the
+    /// wall, by their [`Hearing::elsewhere`]. If all heads see something else, the position or the design is
+    /// wrong.
     pub fn is_deaf(&self, mut others: impl Iterator<Item = f64>) -> bool {
         let [most, least] = ELSEWHERE;
         self.hears_nothing()
@@ -107,8 +114,9 @@ impl Hearing {
             || self.elsewhere > most && others.any(|elsewhere| elsewhere < least)
     }
 
-    /// Share of its latest returns that aren't where the design has its wall, from 0 to 1; 1 before it has heard a whole turn, and where nothing was
-    /// heard for one.
+    /// Share of its latest returns that are off the design, from 0 to 1.
+    ///
+    /// It is 1 before a whole turn with returns, and after a whole turn without any.
     pub fn elsewhere(&self) -> f64 {
         let is_known = self.heard_rad >= TAU && !self.hears_nothing();
         if is_known { self.elsewhere } else { 1.0 }
@@ -121,7 +129,7 @@ mod tests {
 
     const STEP_RAD: f64 = 0.9 * TAU / 360.0;
 
-    /// A head that turns for so many pings and hears the wall, something else, or nothing.
+    /// A head that turns for this many pings and detects the wall, something else, or nothing.
     fn hearing(pings: u32, is_wall: impl Fn(u32) -> Option<bool>) -> Hearing {
         let mut hearing = Hearing::default();
         for ping in 0..pings {
@@ -133,20 +141,20 @@ mod tests {
     }
 
     #[test]
-    fn a_head_is_deaf_once_it_has_turned_round_and_heard_nothing() {
+    fn head_is_deaf_after_a_turn_without_returns() {
         let from_500 = |pings| hearing(pings, |ping| (ping < 500).then_some(true));
         assert!(!from_500(890).is_deaf(std::iter::empty()));
         assert!(from_500(901).is_deaf(std::iter::empty()));
         // A single return ends it.
         let heard_again = hearing(902, |ping| (ping < 500 || ping == 901).then_some(true));
         assert!(!heard_again.is_deaf(std::iter::empty()));
-        // Three quarters of each turn that nothing comes back from are a side tunnel, or a wall that swallows.
+        // If three quarters of each turn give no return, that is a side tunnel or an absorbing wall.
         let side = hearing(4000, |ping| (ping % 400 < 100).then_some(true));
         assert!(!side.is_deaf(std::iter::empty()));
     }
 
     #[test]
-    fn a_head_that_hears_something_else_is_deaf_where_another_one_hears_the_wall() {
+    fn head_off_the_design_is_deaf_if_another_detects_the_wall() {
         let elsewhere = hearing(1200, |ping| Some(ping < 400));
         let [hears, does_not] = [hearing(1200, |_| Some(true)), hearing(1200, |_| Some(false))];
         assert!(elsewhere.is_deaf([does_not.elsewhere(), hears.elsewhere()].into_iter()));
@@ -154,17 +162,17 @@ mod tests {
             !elsewhere.is_deaf([does_not.elsewhere()].into_iter()),
             "the position or the design is wrong"
         );
-        assert!(!elsewhere.is_deaf(std::iter::empty()), "a single head");
+        assert!(!elsewhere.is_deaf(std::iter::empty()), "there is no other head");
         assert!(!hears.is_deaf([hears.elsewhere()].into_iter()));
         let begins = hearing(100, |_| Some(true));
-        assert!(!elsewhere.is_deaf([begins.elsewhere()].into_iter()), "nothing is known of the other yet");
+        assert!(!elsewhere.is_deaf([begins.elsewhere()].into_iter()), "the other head isn't known yet");
         // A rock and a niche of a third of the turn.
         let rock = hearing(4000, |ping| Some(ping % 400 >= 130));
         assert!(!rock.is_deaf([hears.elsewhere()].into_iter()));
     }
 
     #[test]
-    fn a_head_is_stuck_at_one_range_where_the_wall_is_not_one_distance_away() {
+    fn constant_range_is_stuck_if_the_wall_distance_varies() {
         let stuck = |pings: u32, spread_m: f64| {
             let mut hearing = Hearing::default();
             for ping in 0..pings {
@@ -175,7 +183,7 @@ mod tests {
             hearing.is_deaf(std::iter::empty())
         };
         assert!(stuck(202, 0.4) && !stuck(199, 0.4));
-        // In the middle of a round pipe, and nearly there.
+        // In the centre of a round pipe, and nearly there.
         assert!(!stuck(4000, 0.0) && !stuck(4000, 0.2));
     }
 }

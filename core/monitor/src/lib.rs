@@ -1,7 +1,9 @@
-//! The loop: the state of a dive as entities and resources, the stages that a tick runs, and what outlets are told.
+//! The loop: the state of a dive as entities and resources, the stages of a tick, and the messages to
+//! outlets.
 //!
-//! [`App`] is assembled from a vehicle's devices and from plugins; armed, it is a [`run::Loop`] that turns packets into
-//! positions, samples, verdicts and advice. Pure: no I/O, no thread, no clock; time comes in with the packets.
+//! [`App`] is assembled from a vehicle's devices and from plugins. Arming turns it into a [`run::Loop`],
+//! which converts packets to positions, samples, verdicts and advice. It has no I/O, no thread and no clock:
+//! time comes in with the packets.
 //!
 //! ```
 //! use headrace_fusion::direct::DirectNavigation;

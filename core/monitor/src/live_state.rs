@@ -1,8 +1,10 @@
-//! The live state: what the dive is like now, as one structure by value. Made at every beat, published with every tick;
-//! the terminal and the lines of `--json-lines` show it. `docs/reference/live-state.md` describes it.
+//! The live state: the present state of the dive, as one structure by value. `docs/reference/live-state.md`
+//! describes it.
 //!
-//! All of it is as of the last beat, in data time, and so the same in a replay; only [`LiveState::now`] is the tick's own.
-//! What it says grows old by itself: a loop whose ports are silent goes on ticking, and ages are taken against `now`.
+//! It is made at every update and published with every tick. The terminal and the lines of `--json-lines`
+//! show it. All fields are as of the last update, in data time, and so the same in a replay. Only
+//! [`LiveState::now`] belongs to the tick. A loop whose ports are silent keeps ticking, and ages are taken
+//! against `now`.
 
 use bevy_ecs::prelude::Resource;
 use serde::{Deserialize, Serialize};
@@ -26,32 +28,32 @@ pub use condition::{Condition, Lamp};
 
 /// Version of the live state and of its JSON.
 pub const LIVE_STATE_VERSION: u32 = 1;
-/// What is older is shown as old. Source: as long as a head may be silent.
+/// Age above which data is shown as stale. It equals the time for which a head may be silent.
 pub const OLD_AFTER: DurNs = DurNs(2_000_000_000);
 
-/// Why a position is doubtful, though there is one.
+/// Reason for which an existing position is doubtful.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum PositionDoubt {
-    /// The cable's counter isn't believed.
+    /// The cable counter isn't trusted.
     Cable,
-    /// Passes are known against each other less well than the advice allows for.
+    /// The error between passes is larger than the advice allows for.
     Spread,
 }
 
-/// Whether there is a position.
+/// Availability of a position.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub enum PositionState {
-    /// There is none, for want of this.
+    /// No position, for this reason.
     None(NoFix),
-    /// There is one, and what is placed by it is doubtful.
+    /// A position that makes samples placed by it doubtful.
     Doubtful(PositionDoubt),
-    /// There is one.
+    /// A valid position.
     Ok,
 }
 
 impl PositionState {
-    /// The word used in JSON: `none`, `doubtful` or `ok`.
+    /// Word used in JSON: `none`, `doubtful` or `ok`.
     pub fn as_str(self) -> &'static str {
         match self {
             Self::None(_) => "none",
@@ -60,7 +62,7 @@ impl PositionState {
         }
     }
 
-    /// Its number in published data.
+    /// Number used in published data.
     pub(super) fn number(self) -> u64 {
         match self {
             Self::Ok => 0,
@@ -70,23 +72,23 @@ impl PositionState {
     }
 }
 
-/// Metres of the way; together they are the way.
+/// Metres of the coverage extent by verdict. Their sum is the extent.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct LiveMetres {
     /// Metres that pass.
     pub pass_m: f64,
     /// Metres that fail.
     pub fail_m: f64,
-    /// Metres of which neither can be said.
+    /// Metres without a verdict of pass or fail.
     pub cannot_say_m: f64,
-    /// Metres that going on may still fill.
+    /// Metres that further driving may still fill.
     pub open_m: f64,
-    /// Metres where the way begins or turns back that not all heads have passed.
+    /// Metres that not all heads have passed, where the vehicle began or turned back.
     pub not_inspected_m: f64,
 }
 
 impl LiveMetres {
-    /// The way, m.
+    /// Length of the coverage extent, m.
     pub fn way_m(&self) -> f64 {
         self.pass_m + self.fail_m + self.cannot_say_m + self.open_m + self.not_inspected_m
     }
@@ -95,11 +97,11 @@ impl LiveMetres {
 /// An alert that holds now.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct ActiveAlert {
-    /// Its kind.
+    /// Kind.
     pub kind: AlertKind,
-    /// The head that isn't believed.
+    /// The distrusted head.
     pub source: Option<SourceId>,
-    /// When its present occurrence began.
+    /// Time at which its present occurrence began.
     pub since: MonoNs,
     /// Chainage of its first occurrence, m.
     pub x_m: f64,
@@ -107,10 +109,10 @@ pub struct ActiveAlert {
     pub worst_m: f64,
 }
 
-/// The alerts that hold now.
+/// All alerts that hold now.
 pub type ActiveAlerts = [Option<ActiveAlert>; MOST_ALERTS];
 
-/// No pilot drives slower, m/s: a largest speed below it is none.
+/// Slowest practical speed, m/s: a smaller limit counts as none.
 pub const LEAST_MPS: f64 = 0.005;
 
 /// State of a sensor.
@@ -121,26 +123,26 @@ pub enum SensorState {
     Never,
     /// No reading for longer than [`OLD_AFTER`].
     Silent,
-    /// A head whose readings come from one angle.
+    /// A head whose readings all come from one angle.
     Stalled,
-    /// A head that turns and pings, and hears no wall.
+    /// A head that turns and pings without detecting the wall.
     Deaf,
     /// It repeats its last reading.
     Hung,
-    /// A head that isn't believed.
+    /// A head that is distrusted.
     Distrusted,
-    /// Readings come.
+    /// Readings arrive.
     Ok,
 }
 
 /// The live state. Speeds m/s, lengths m.
 #[derive(Debug, Clone, Copy, PartialEq, Resource)]
 pub struct LiveState {
-    /// The end of the tick that published it: ages are taken against this.
+    /// End of the tick that published it. Ages are taken against this.
     pub now: MonoNs,
-    /// The beat that it is as of; `None` before the first.
+    /// Time of the update that made it; `None` before the first.
     pub at: Option<MonoNs>,
-    /// Whether there is a position.
+    /// Availability of a position.
     pub position: PositionState,
     /// Chainage; `None` without a position.
     pub chainage_m: Option<f64>,
@@ -148,7 +150,9 @@ pub struct LiveState {
     pub sd: Option<PoseSd>,
     /// Standard deviation of one pass against the next.
     pub pass_sd_m: f64,
-    /// How much longer the vehicle should stand still for its gyros' bias, and so soon its heading, to be known, s; 0 if it needn't.
+    /// Time for which the vehicle should stay stationary to find the gyros' bias, s; 0 if unneeded.
+    ///
+    /// The heading follows soon afterwards.
     pub stand_s: u32,
     /// Speed along the tunnel, positive inwards; `None` without a position.
     pub speed_mps: Option<f64>,
@@ -156,29 +160,29 @@ pub struct LiveState {
     pub advice: Option<Advice>,
     /// Target T.
     pub target_m: f64,
-    /// Standard deviations of a hole that a pass keeps clear of the target.
+    /// Confidence: standard deviations of a hole by which a pass must clear the target.
     pub confidence_sd: f64,
     /// Length of the tunnel, m.
     pub length_m: f64,
-    /// How far heads sit before or behind the vehicle's origin at most, m.
+    /// Largest distance of a head before or behind the vehicle's origin, m.
     pub heads_reach_m: f64,
-    /// Metres of the way.
+    /// Metres of the coverage extent by verdict.
     pub metres: LiveMetres,
-    /// The stretch of which nothing could be said that was judged last.
+    /// Last judged stretch without a verdict.
     pub unsure: Option<Stretch>,
     /// All wall that heads see here has passed: it follows from chainage and verdicts.
     pub passed: bool,
-    /// On the way back for a missed stretch: how far, m.
+    /// Place to go back to for a missed stretch, m, while the vehicle is on its way there.
     pub back_to_m: Option<f64>,
     /// Alerts that hold.
     pub alerts: ActiveAlerts,
-    /// Sources that are profiling heads, by number.
+    /// Bitmask of the sources that are profiling heads.
     pub heads: u64,
-    /// Sources of the heads that turn.
+    /// Bitmask of the sources of turning heads.
     pub turning: u64,
-    /// Bits of the heads that turn and ping, and hear no wall.
+    /// Bitmask of the sources of heads that turn and ping without detecting the wall.
     pub deaf: u64,
-    /// Bits of the sources that repeat a reading.
+    /// Bitmask of the sources that repeat a reading.
     pub hung: u64,
     /// Number of sources.
     pub sources: u16,
@@ -193,7 +197,7 @@ stateful!(LiveState {
 });
 
 impl LiveState {
-    /// Before the first beat, in a tunnel of any length.
+    /// State before the first update, in a tunnel of any length.
     pub(super) fn new(target_m: f64, confidence_sd: f64, heads: u64, sources: u16) -> Self {
         Self {
             now: MonoNs(0),
@@ -223,7 +227,7 @@ impl LiveState {
         }
     }
 
-    /// The end of the tunnel, m, that no head is inside of; `None` where one may be.
+    /// End of the tunnel that all heads are beyond, m; `None` if a head may be inside.
     pub fn outside_m(&self) -> Option<f64> {
         let x_m = self.chainage_m?;
         let beyond = x_m > self.length_m + self.heads_reach_m;
@@ -231,22 +235,22 @@ impl LiveState {
         if beyond { Some(self.length_m) } else { before.then_some(0.0) }
     }
 
-    /// Whether the pilot is told to stand still rather than a speed, for the gyros' bias.
+    /// Whether the pilot is advised to stand still, for the gyros' bias, instead of a speed.
     pub fn asks_to_stand(&self) -> bool {
         self.condition() == Condition::CannotSay(PositionDoubt::Spread) && self.stand_s > 0
     }
 
-    /// How old it is; `None` before the first beat.
+    /// Age of the state; `None` before the first update.
     pub fn age(&self) -> Option<DurNs> {
         self.at.map(|at| DurNs(self.now.since(at).0.max(0)))
     }
 
-    /// Whether it is shown as old.
+    /// Whether it is shown as stale.
     pub fn is_old(&self) -> bool {
         self.age().is_some_and(|age| age.0 > OLD_AFTER.0)
     }
 
-    /// How long ago a source's last reading came; `None` if none has.
+    /// Age of a source's last reading; `None` if there is none.
     pub fn age_of(&self, source: usize) -> Option<DurNs> {
         self.heard.get(source).copied().flatten().map(|heard| DurNs(self.now.since(heard).0.max(0)))
     }
@@ -268,7 +272,7 @@ impl LiveState {
         }
     }
 
-    /// Sensors that have spoken and are silent, or never have, in the order of sources.
+    /// Sensors that never delivered a reading or are silent, in the order of sources.
     pub fn silent(&self) -> impl Iterator<Item = usize> + '_ {
         let is_silent =
             |source: &usize| matches!(self.sensor(*source), SensorState::Never | SensorState::Silent);
@@ -280,34 +284,34 @@ impl LiveState {
         (0..usize::from(self.sources)).filter(move |source| self.sensor(*source) == state)
     }
 
-    /// Whether a profiling head gives readings.
+    /// Whether a profiling head delivers readings.
     pub fn has_sonar(&self) -> bool {
         let is_heard = |source: usize| self.age_of(source).is_some_and(|age| age.0 <= OLD_AFTER.0);
         (0..usize::from(self.sources)).any(|source| self.heads >> source & 1 == 1 && is_heard(source))
     }
 
-    /// The largest speed advised, m/s; `None` where none can be.
+    /// Largest speed advised, m/s; `None` if there is none.
     pub fn v_max_mps(&self) -> Option<f64> {
         let advice = self.advice.as_ref().filter(|advice| advice.reason == Reason::HelixPitch)?;
         Some(advice.v_max_mps).filter(|v_max_mps| *v_max_mps >= LEAST_MPS)
     }
 
-    /// Share of returns that are lost, where making up for them takes a fifth of the speed or more; else `None`.
+    /// Share of lost returns if compensating for them costs at least a fifth of the speed, otherwise `None`.
     pub fn lost_share(&self) -> Option<f64> {
-        /// Share of the speed that is left.
+        /// Share of the speed that remains.
         const LEFT: f64 = 0.8;
         let advice = self.advice.as_ref().filter(|_| self.v_max_mps().is_some())?;
         let margins = advice.margins?;
         (margins.losses_mps < LEFT * margins.position_mps).then_some(advice.lost_share)
     }
 
-    /// Bits of the kinds of alerts that hold.
+    /// Bitmask of the kinds of alerts that hold.
     pub(super) fn alert_bits(&self) -> u64 {
         self.alerts.iter().flatten().fold(0, |bits, alert| bits | 1 << alert.kind as u64)
     }
 }
 
-/// Bits of the heads' sources, of those of the heads in a set, by number.
+/// Bitmask of the sources of the heads in a set, which are given by number.
 pub(super) fn source_bits(sources: impl Iterator<Item = SourceId>, of: HeadSet) -> u64 {
     let numbered = sources.enumerate().filter(|(head, _)| of.has(*head));
     numbered.fold(0, |bits, (_, source)| bits | 1 << u64::from(source.0 % 64))

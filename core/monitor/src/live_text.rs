@@ -1,4 +1,4 @@
-//! Words for what is told live: the place first, then what, then what to do. Terminals break them to their width.
+//! Live texts: place first, then problem, then action. Terminals break them to their width.
 
 use super::alert_list::{AlertChange, ListedAlertJson};
 use super::head_words::HeadWords;
@@ -14,20 +14,20 @@ use headrace_geometry::tunnel::Profile;
 /// A line for the pilot.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct PilotLine {
-    /// Where: a stationing, or two.
+    /// Place: one stationing, or two.
     pub place: String,
-    /// How fast; empty where that isn't said.
+    /// Speed; empty if it isn't shown.
     pub speed: String,
-    /// What, the most important part first; a narrow screen leaves the last parts out.
+    /// Problem, most important part first. A narrow screen leaves the last parts out.
     pub what: Vec<String>,
-    /// What to do; empty where there is nothing.
+    /// Action to take; empty if there is none.
     pub action: String,
-    /// Its colour; `None` where it has none.
+    /// Colour, if any.
     pub lamp: Option<Lamp>,
 }
 
 impl PilotLine {
-    /// All of it in one line.
+    /// The whole line.
     pub fn text(&self) -> String {
         let mut text = format!("{:<9}  ", self.place);
         if !self.speed.is_empty() {
@@ -42,7 +42,7 @@ impl PilotLine {
         text
     }
 
-    /// Broken into lines of at most `columns`, the later ones indented below the first one's words.
+    /// The line broken to at most `columns`. Continuation lines are indented below the first one's text.
     pub fn broken(&self, columns: usize) -> Vec<String> {
         let whole = self.text();
         if whole.chars().count() <= columns {
@@ -66,19 +66,21 @@ impl PilotLine {
         lines
     }
 
-    /// As much of a status as fits into `columns`: the last parts are left out, then the speed, then why where it says what to do, and what
-    /// still doesn't fit is cut off.
+    /// As much of a status as fits into `columns`.
+    ///
+    /// It leaves out the last parts first, then the speed, then the reason if there is an action. The rest is
+    /// cut off.
     pub fn cut(&self, columns: usize) -> String {
         let mut line = self.clone();
         let is_wide = |line: &Self| line.text().chars().count() > columns;
         while is_wide(&line) && line.what.len() > 1 {
             line.what.pop();
         }
-        // What holds is more than how fast it goes.
+        // The condition matters more than the speed.
         if is_wide(&line) {
             line.speed.clear();
         }
-        // And what to do is more than why.
+        // The action matters more than the reason.
         if is_wide(&line)
             && !line.action.is_empty()
             && let Some(what) = line.what.first_mut()
@@ -90,8 +92,10 @@ impl PilotLine {
     }
 }
 
-/// The status: where, how fast, what holds and what to do about it; then the turn's forecast, silent sensors, and failed
-/// metres. `name` gives a source's id.
+/// Status line: place, speed, condition and action, then the turn's forecast, silent sensors, and failed
+/// metres.
+///
+/// `name` returns a source's id.
 pub fn status_line(
     state: &LiveState,
     profile: &Profile,
@@ -100,7 +104,7 @@ pub fn status_line(
 ) -> PilotLine {
     let condition = state.condition();
     let place = state.chainage_m.map_or_else(|| "-+---.--".to_owned(), station);
-    // What is within the errors of measuring a speed is called ok though it is a little over.
+    // A speed within the measurement error of the limit is called ok although it is slightly over.
     let is_over = matches!(condition, Condition::TooFast | Condition::Over | Condition::TurnUnsure);
     let decimals = if is_over { speed_decimals(state.speed_mps, state.v_max_mps()) } else { 2 };
     let v_max = state.v_max_mps().map_or_else(String::new, |mps| format!("{mps:.decimals$} m/s"));
@@ -128,14 +132,14 @@ pub fn status_line(
     };
     let is_old = matches!(condition, Condition::Old(_) | Condition::NoData);
     let speed = match state.speed_mps {
-        // No minus before a zero.
+        // A zero gets no minus sign.
         Some(speed_mps) if !is_old => {
             format!("{:.decimals$} m/s", if speed_mps.abs() < 0.005 { 0.0 } else { speed_mps })
         }
         _ => String::new(),
     };
     let mut parts = vec![what];
-    // What is lost goes before what may be: a narrow screen leaves the last parts out.
+    // Losses come before possible losses: a narrow screen leaves the last parts out.
     if state.metres.fail_m > 0.0 {
         parts.push(format!("missed {:.2} m", state.metres.fail_m));
     }
@@ -159,7 +163,9 @@ pub fn status_line(
     PilotLine { place, speed, what: parts, action, lamp: Some(condition.lamp()) }
 }
 
-/// Decimals with which the present speed and the one that is told are two figures: a speed isn't too fast for what reads the same.
+/// Number of decimals at which the present speed and the limit differ.
+///
+/// A speed isn't too fast if both read the same.
 fn speed_decimals(speed_mps: Option<f64>, v_max_mps: Option<f64>) -> usize {
     let hundredths = |mps: f64| (mps * 100.0).round();
     let is_over = |(speed_mps, v_max_mps): (f64, f64)| {
@@ -204,12 +210,12 @@ fn doubt_text(doubt: PositionDoubt, state: &LiveState) -> String {
     }
 }
 
-/// How much is lost, where that bounds the speed: the forecast of a turn that lost nothing says little then.
+/// Share of lost returns if it limits the speed. The forecast of a turn without losses means little then.
 fn losses_text(state: &LiveState) -> Option<String> {
     state.lost_share().map(|share| format!("{:.0} % of returns lost", 100.0 * share))
 }
 
-/// The T forecast for the present turn, against the target.
+/// Forecast T of the present turn, against the target.
 fn forecast_text(state: &LiveState) -> Option<String> {
     let advice = state.advice.as_ref().filter(|_| state.v_max_mps().is_some())?;
     Some(match advice.predicted_t_m {
@@ -218,7 +224,7 @@ fn forecast_text(state: &LiveState) -> Option<String> {
     })
 }
 
-/// Metres of the way by state; nothing of what there is none.
+/// Metres of the coverage extent by verdict, without those that are zero.
 pub fn metres_text(metres: &LiveMetres) -> String {
     let LiveMetres { pass_m, fail_m, cannot_say_m, open_m, not_inspected_m } = *metres;
     let all = [
@@ -233,12 +239,12 @@ pub fn metres_text(metres: &LiveMetres) -> String {
     core::iter::once(passed).chain(parts).collect::<Vec<_>>().join(", ")
 }
 
-/// How much of a stretch it is, m; empty where it is all of it, or none any more.
+/// Length of a part of a stretch, m; empty if it is the whole stretch or nothing.
 pub fn of_it_text(part_m: f64, whole_m: f64) -> String {
     if part_m <= 0.0 || part_m > whole_m - 1e-6 { String::new() } else { format!(", {part_m:.2} m of it") }
 }
 
-/// Line of something to tell.
+/// Line for a live message.
 pub fn told_line(told: &Told, profile: &Profile, heads: &HeadWords) -> PilotLine {
     let line = |place: String, what: String, action: String, lamp: Option<Lamp>| PilotLine {
         place,
@@ -302,7 +308,7 @@ pub fn told_line(told: &Told, profile: &Profile, heads: &HeadWords) -> PilotLine
     }
 }
 
-/// Line of a change of an alert.
+/// Line for a change of an alert.
 fn alert_line(change: AlertChange, alert: &ListedAlertJson) -> PilotLine {
     let by = match (&alert.acknowledged, change) {
         (Some(by), AlertChange::Acknowledged) if !by.by.is_empty() => format!(" by {}", by.by),
@@ -319,8 +325,9 @@ fn alert_line(change: AlertChange, alert: &ListedAlertJson) -> PilotLine {
 }
 
 impl Told {
-    /// Whether a line of it adds something to the status and the other lines: of an alert that somebody has acknowledged it, that
-    /// it is over where nothing else tells that, and what is left.
+    /// Whether its line adds something to the status and the other lines.
+    ///
+    /// Lines for alerts show an acknowledgement, an end that no other line shows, and remaining resources.
     pub fn adds_line(&self) -> bool {
         let Self::AlertChange { change, alert } = self else { return true };
         let is_left = matches!(alert.kind, "cable_left" | "time_left" | "battery_left");
@@ -335,7 +342,7 @@ impl Told {
             AlertChange::Acknowledged => true,
             AlertChange::Raised => is_left || is_sensor,
             AlertChange::Changed => is_left,
-            // Of what nobody has acknowledged the end is told when it comes, not when it is acknowledged.
+            // The end of an unacknowledged alert is shown when it comes, not when it is acknowledged.
             AlertChange::Rectified => is_told_once,
             AlertChange::Cleared => is_told_once && alert.rectified_s == alert.cleared_s,
             AlertChange::Silenced => false,

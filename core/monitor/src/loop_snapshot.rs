@@ -1,4 +1,4 @@
-//! The loop's state as a whole: the parts of a snapshot.
+//! Snapshot of the loop's whole state, and its parts.
 
 use core::any::TypeId;
 
@@ -20,7 +20,7 @@ use super::resources::{Coverage, Digests, Finder, Tally, TickTime, VehicleEntiti
 use super::stages::{Advisor, Driving, SoundSpeed};
 use headrace_geometry::snapshot::{Restorer, Saver, SnapshotError, Stateful};
 
-/// A part of the state: its name, resource or component type, and save and restore functions.
+/// A part of the state: name, resource or component type, and functions to save and restore it.
 struct Part {
     kind: TypeId,
     name: &'static str,
@@ -33,7 +33,7 @@ struct Part {
 pub(super) struct StateParts(Vec<Part>);
 
 impl StateParts {
-    /// The parts of the loop itself.
+    /// Parts of the loop itself.
     pub(super) fn of_the_loop() -> Self {
         let mut parts = Self(Vec::new());
         parts.add_component::<Navigator>("navigation");
@@ -70,7 +70,7 @@ impl StateParts {
         self.add::<T>(name);
     }
 
-    /// Adds a resource, unless already added.
+    /// Adds a resource, unless it was added already.
     fn add<T: Resource<Mutability = Mutable> + Stateful>(&mut self, name: &'static str) {
         self.add_part(Part {
             kind: TypeId::of::<T>(),
@@ -80,7 +80,7 @@ impl StateParts {
         });
     }
 
-    /// Adds a component, wherever the vehicle or a sensor has it.
+    /// Adds a component of the vehicle and its sensors.
     fn add_component<T: Component<Mutability = Mutable> + Stateful>(&mut self, name: &'static str) {
         self.add_part(Part {
             kind: TypeId::of::<T>(),
@@ -147,7 +147,7 @@ mod tests {
     use headrace_vehicle::Mission;
     use serde::{Deserialize, Serialize};
 
-    /// A decoder that gives no readings.
+    /// A decoder without readings.
     #[derive(Serialize, Deserialize)]
     struct Silent;
 
@@ -159,10 +159,11 @@ mod tests {
         }
     }
 
-    /// A new resource or component must be listed: as a part of the state; or as made at arming, and constant or reset at
-    /// every tick.
+    /// Every resource or component must be listed.
+    ///
+    /// It is either a part of the state, or made at arming and constant or reset every tick.
     #[test]
-    fn every_resource_and_component_is_saved_or_known_to_be_no_state() {
+    fn every_resource_and_component_is_saved_or_listed_as_no_state() {
         let profile = shapes::circle(3.0).unwrap();
         let navigation = DirectNavigation::new(profile.clone(), Site::default());
         let mut app = App::new(Mission::new(profile, 1.0));
@@ -206,7 +207,7 @@ mod tests {
         let found = [resources(world), components(world)].concat();
         let sorted = [&parts[..], &no_state, &bevys_own].concat();
         let unsorted = found.iter().filter(|id| !sorted.contains(id)).count();
-        assert_eq!(unsorted, 0, "of {}; the rest are saved, or no state", found.len());
+        assert_eq!(unsorted, 0, "unlisted of {}; the rest are saved, or listed as no state", found.len());
         assert!(parts.iter().all(|part| found.contains(part)));
     }
 

@@ -7,19 +7,20 @@ use super::hearing::{Heard, Hearing};
 use headrace_geometry::math::{self, TAU};
 use headrace_sampling::losses::LossRate;
 
-/// Angles told apart: finer than the steps of heads.
+/// Number of angle bins: finer than the steps of heads.
 const BINS: usize = 2048;
 const WORDS: usize = BINS / 64;
-/// Pings over which shares are counted: once there are so many, they count half.
+/// Number of pings at which the counts are halved.
 const WINDOW: u32 = 4096;
-/// Fewer pings count as so many: one lost at the beginning isn't a share.
+/// Minimum number of pings for a share: one loss at the beginning isn't a share.
 const LEAST: u32 = 100;
-/// Pings as which the share of all is taken for those after a lost one, as long as these are few.
+/// Weight, in pings, of the overall share in that after a lost ping, while those are few.
 const USUAL: f64 = 50.0;
-/// Share of a head's pings from which on it is nearly deaf: hardly an angle is heard in one turn and the next but one.
+/// Share of lost pings above which a head is nearly deaf: hardly an angle gives a return in both of two
+/// turns.
 const NEARLY_ALL: f64 = 0.75;
 
-/// Pings, and how many of them were lost.
+/// Number of pings, and of lost ones.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 struct Count {
     all: u32,
@@ -40,7 +41,7 @@ impl Count {
     }
 }
 
-/// A bit for each angle.
+/// One bit per angle.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 struct Angles([u64; WORDS]);
 
@@ -59,22 +60,24 @@ impl Angles {
 
 /// Losses of one head; part of the loop's state.
 ///
-/// Counted are pings at angles at which the head heard the wall a turn before and a turn after: what is silent turn after turn, such as a
-/// side tunnel or wall that is met too flatly, isn't lost by chance, neither where it begins nor where it ends.
+/// It counts pings at angles at which the head detected the wall a turn before and a turn after. Wall that is
+/// silent turn after turn, such as a side tunnel or wall met too flatly, isn't lost by chance, neither at its
+/// beginning nor at its end.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Component, Serialize, Deserialize)]
 pub struct LossCount {
-    /// By angle: whether the wall was heard there a turn ago, and the turn before.
+    /// Whether the wall was detected at each angle a turn ago, and in the turn before.
     heard: Angles,
     heard_before: Angles,
     /// The ping before the one a turn ago was lost.
     followed_lost: Angles,
-    /// Of all pings at wall within range, and of those counted: all, and after a lost one.
+    /// Counts of all pings at wall within range, and of the counted ones; each in total and after a lost
+    /// ping.
     any: Count,
     by_chance: Count,
     after_lost: Count,
     /// The last ping was lost.
     was_lost: bool,
-    /// Whether it hears anything.
+    /// Health of the head.
     hearing: Hearing,
 }
 
@@ -87,7 +90,7 @@ impl LossCount {
         let bin = usize::try_from(bin).unwrap_or(0) % BINS;
         self.any.add(is_lost);
         if !is_lost && self.heard_before.has(bin) {
-            // The ping between is the one that is told of.
+            // The count concerns the ping a turn ago, between the two.
             let was_lost = !self.heard.has(bin);
             self.by_chance.add(was_lost);
             if self.followed_lost.has(bin) {
@@ -100,24 +103,24 @@ impl LossCount {
         self.was_lost = is_lost;
     }
 
-    /// Takes what a ping says of the head itself: a return, or that it heard nothing.
+    /// Updates the head's health with a ping: its return, or none.
     ///
     /// Allocates: never.
     pub fn hear(&mut self, angle_rad: f64, heard: Option<Heard>) {
         let was_deaf = self.hearing.hears_nothing();
         self.hearing.add(angle_rad, heard);
         if was_deaf && heard.is_some() {
-            // What it lost while it heard nothing says nothing of how it loses now.
+            // Losses during deafness are no evidence for the present ones.
             *self = Self { hearing: self.hearing, ..Self::default() };
         }
     }
 
-    /// Whether it hears anything.
+    /// Health of the head.
     pub fn hearing(&self) -> &Hearing {
         &self.hearing
     }
 
-    /// The most that may be lost by chance: all that is lost, as long as too few pings have been counted to tell.
+    /// Upper bound of the random losses: all losses, while too few pings have been counted.
     pub fn at_most(&self) -> LossRate {
         if self.by_chance.all >= LEAST {
             self.rate()
@@ -126,7 +129,7 @@ impl LossCount {
         }
     }
 
-    /// Shares lost by chance; of a head that hears hardly anything, all.
+    /// Shares lost by chance; all returns for a nearly deaf head.
     pub fn rate(&self) -> LossRate {
         let deaf = ((self.any.share() - NEARLY_ALL) / (1.0 - NEARLY_ALL)).max(0.0);
         let share = self.by_chance.share();
@@ -142,7 +145,7 @@ mod tests {
 
     const STEP_RAD: f64 = 0.9 * TAU / 360.0;
 
-    /// A head that turns for so many pings and loses those for which it is said.
+    /// A head that turns for this many pings and loses those for which `is_lost` holds.
     fn turned(pings: u32, is_lost: impl Fn(u32) -> bool) -> LossRate {
         let mut count = LossCount::default();
         for ping in 0..pings {
@@ -152,7 +155,7 @@ mod tests {
     }
 
     #[test]
-    fn who_hears_again_has_lost_nothing() {
+    fn head_that_hears_again_has_lost_nothing() {
         let wall = Heard { range_m: 5.0, off_m: 0.0, is_wall: true };
         let mut count = LossCount::default();
         for ping in 0..4000 {
@@ -164,7 +167,9 @@ mod tests {
         assert!(!count.hearing().hears_nothing() && count.rate() == LossRate::default());
     }
 
-    /// Whether a ping is one of so many in a hundred that are lost: splitmix64, without an order in turns of 400 pings.
+    /// Whether a ping is among `in_hundred` of a hundred that are lost.
+    ///
+    /// Splitmix64 makes it uncorrelated with turns of 400 pings.
     fn chance(ping: u32, in_hundred: u64) -> bool {
         let mut z = u64::from(ping).wrapping_mul(0x9e37_79b9_7f4a_7c15);
         z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
@@ -173,20 +178,21 @@ mod tests {
     }
 
     #[test]
-    fn losses_by_chance_are_counted_as_they_are() {
+    fn random_losses_are_counted_exactly() {
         for in_hundred in [2_u32, 10, 40, 70] {
             let LossRate { share, after_lost } = turned(24_000, |ping| chance(ping, in_hundred.into()));
             let expected = f64::from(in_hundred) / 100.0;
             assert!((share - expected).abs() < 0.03, "{in_hundred}: {share}");
             assert!((after_lost - expected).abs() < 0.08, "{in_hundred}: {after_lost}");
         }
-        // In pairs: after the first of two the second is lost, after the second it is as it was.
+        // Losses in pairs: after the first of two the second is lost, and after the second the rate is as
+        // before.
         let pairs = turned(24_000, |ping| chance(ping / 2, 10));
         assert!((pairs.share - 0.1).abs() < 0.03 && (pairs.after_lost - 0.55).abs() < 0.1, "{pairs:?}");
     }
 
     #[test]
-    fn until_enough_is_counted_all_may_be_lost_by_chance() {
+    fn all_losses_count_until_enough_pings_are_counted() {
         let mut count = LossCount::default();
         let mut at_most = |pings: std::ops::Range<u32>| {
             for ping in pings {
@@ -194,28 +200,28 @@ mod tests {
             }
             count.at_most()
         };
-        // 280 of a turn of 400 are heard, and count once they are heard for the third time.
+        // 280 pings of a turn of 400 are detected, and count once they are detected for the third time.
         let early = at_most(0..1000);
         assert!(early.share > 0.3 && early.after_lost >= 1.0, "{early:?}");
         assert_eq!(at_most(1000..1100), LossRate::default());
     }
 
     #[test]
-    fn wall_that_is_never_heard_is_not_lost_by_chance() {
+    fn undetected_wall_is_not_lost_by_chance() {
         let grazing = turned(8000, |ping| ping % 400 < 120);
         assert!(grazing.share <= 0.0, "{grazing:?}");
         let both = turned(8000, |ping| ping % 400 < 120 || chance(ping, 5));
         assert!((both.share - 0.05).abs() < 0.02, "{both:?}");
-        // Side tunnels, passed by for three turns each.
+        // Side tunnels, passed for three turns each.
         let tunnels = turned(24_000, |ping| ping / 400 % 6 > 2 && ping % 400 < 60);
         assert!(tunnels.share <= 0.0, "{tunnels:?}");
     }
 
     #[test]
-    fn a_head_that_becomes_deaf_has_lost_all_within_some_turns() {
+    fn deaf_head_has_lost_all_within_some_turns() {
         let deaf = turned(24_000, |ping| ping >= 4000);
         assert!(deaf.share > 0.9 && deaf.after_lost > 0.9, "{deaf:?}");
-        // A few lost at the beginning say little.
+        // A few losses at the beginning count little.
         assert!(turned(410, |ping| ping >= 405).share < 0.03);
         assert_eq!(turned(300, |_| false), LossRate::default());
     }

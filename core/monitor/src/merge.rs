@@ -6,19 +6,19 @@ use super::ring::{PacketHeader, PortReader};
 use headrace_geometry::time::MonoNs;
 use headrace_sensor::reading::{MAX_SOURCES, Packet, SourceId};
 
-/// Maximum packets per tick; the rest waits for the next.
+/// Maximum packets per tick. The rest waits for the next tick.
 pub const MAX_TICK_PACKETS: usize = 4096;
 /// Maximum bytes per tick.
 pub const MAX_TICK_BYTES: usize = 256 * 1024;
 
-/// The packets of this tick, in the order in which they are consumed.
+/// Packets of this tick, in the order of consumption.
 #[derive(Debug, Resource)]
 pub struct Inbox {
     packets: Vec<Received>,
     bytes: Vec<u8>,
     /// Header of the next packet in each source's ring.
     heads: Vec<Option<PacketHeader>>,
-    /// Bytes that the next tick may take: a lossless outlet lowers it while it is behind.
+    /// Bytes that the next tick may take. A lagging lossless outlet lowers it.
     pub allowance_bytes: usize,
 }
 
@@ -43,7 +43,7 @@ impl Default for Inbox {
 }
 
 impl Inbox {
-    /// One whose lists grow as needed, for a replay's threads.
+    /// An inbox whose lists grow as needed, for a replay's threads.
     pub(super) fn growing() -> Self {
         Self { packets: Vec::new(), bytes: Vec::new(), heads: Vec::new(), allowance_bytes: MAX_TICK_BYTES }
     }
@@ -54,7 +54,8 @@ impl Inbox {
         core::mem::swap(&mut self.bytes, &mut other.bytes);
     }
 
-    /// Takes another's packets in place of its own; none, and false, if they are more than is allowed.
+    /// Replaces the packets by another inbox's. If those are more than allowed, it takes none and returns
+    /// false.
     pub(super) fn take_packets(&mut self, other: &Self) -> bool {
         self.packets.clear();
         self.bytes.clear();
@@ -66,7 +67,7 @@ impl Inbox {
         is_allowed
     }
 
-    /// The packets, in order.
+    /// Packets in order.
     pub fn iter(&self) -> impl Iterator<Item = (SourceId, Packet<'_>)> {
         self.packets.iter().map(|packet| {
             let bytes = self.bytes.get(packet.from..packet.to).unwrap_or_default();
@@ -84,14 +85,14 @@ impl Inbox {
         self.packets.is_empty()
     }
 
-    /// Takes the waiting packets, least (recorded order, receive time, source, sequence) first.
+    /// Takes the waiting packets in ascending order of recorded order, receive time, source and sequence.
     ///
     /// Packets of one source stay in order of arrival, whatever their timestamps. Allocates: never.
     pub(super) fn fill(&mut self, readers: &mut [PortReader]) {
         self.packets.clear();
         self.bytes.clear();
         self.heads.clear();
-        // A ring is looked at again only once its first packet has been taken.
+        // A ring is read again only once its first packet has been taken.
         self.heads.extend(readers.iter().map(PortReader::peek));
         let limit = self.allowance_bytes.min(MAX_TICK_BYTES);
         while self.packets.len() < MAX_TICK_PACKETS {
@@ -114,7 +115,7 @@ impl Inbox {
     }
 }
 
-/// The source whose next packet comes first.
+/// Source with the earliest next packet.
 fn first(heads: &[Option<PacketHeader>]) -> Option<(u16, PacketHeader)> {
     (0_u16..)
         .zip(heads)
@@ -140,7 +141,7 @@ mod tests {
     proptest! {
         /// The order doesn't depend on the receive times at which a stream is cut into ticks.
         #[test]
-        fn order_does_not_depend_on_the_ticks(
+        fn packet_order_does_not_depend_on_ticks(
             packets in proptest::collection::vec((0u64..200, 0u16..4), 1..80),
             tick in 1u64..60,
         ) {
@@ -169,7 +170,7 @@ mod tests {
     }
 
     #[test]
-    fn a_recorded_order_is_kept_against_the_stamps() {
+    fn recorded_order_takes_precedence_over_timestamps() {
         let (mut to, mut readers) = ports(2);
         to[0].send_in_order(MonoNs(5), 1, &[1]).unwrap();
         to[1].send_in_order(MonoNs(9), 0, &[2]).unwrap();
@@ -178,7 +179,7 @@ mod tests {
     }
 
     #[test]
-    fn an_outlet_that_is_behind_holds_packets_back_and_loses_none() {
+    fn lagging_outlet_delays_packets_and_loses_none() {
         let (mut to, mut readers) = ports(1);
         for i in 0..10 {
             to[0].send(MonoNs(i), &[i as u8; 10]).unwrap();

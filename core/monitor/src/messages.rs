@@ -1,7 +1,8 @@
 //! Messages between the stages of a tick.
 //!
-//! Each stage processes the lists that earlier stages have filled for this tick in order, without looking ahead. A result
-//! therefore depends only on the packets before it, not on where the stream was cut into ticks.
+//! Each stage processes, in order and without looking ahead, the lists that earlier stages have filled for
+//! this tick. A result therefore depends only on the packets before it, not on where the stream was cut into
+//! ticks.
 
 use bevy_ecs::prelude::Resource;
 use serde::{Deserialize, Serialize};
@@ -31,7 +32,7 @@ pub struct Event {
     pub received: MonoNs,
     /// Time of validity.
     pub valid_at: MonoNs,
-    /// The value.
+    /// Value.
     pub reading: Reading,
 }
 
@@ -39,52 +40,52 @@ pub struct Event {
 #[derive(Debug, Resource)]
 pub struct Events(pub Vec<Event>);
 
-/// What navigation doubts at a beat.
+/// Doubts of navigation at an update.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Doubts {
-    /// The cable's counter while it isn't believed.
+    /// Doubt about the cable counter while it isn't trusted.
     pub cable: Option<CableDoubt>,
-    /// The setting that is likely wrong.
+    /// Setting that is likely wrong.
     pub setting: Option<SettingDoubt>,
-    /// How much longer the vehicle should stand still for its gyros' bias to be known, s.
+    /// Time for which the vehicle should stay stationary to find the gyros' bias, s.
     pub stand_s: u32,
-    /// Bits of the sources that hang: they repeat a reading, and count as silent.
+    /// Bitmask of the stuck sources: they repeat a reading, and count as silent.
     pub hung: u64,
 }
 
 /// An epoch with its fix: a multiple of [`ADVICE_PERIOD`](super::advice_log::ADVICE_PERIOD), or a sonar ping.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Positioned {
-    /// The event of this index is a sonar ping; the fix is for its time of validity.
+    /// The event with this index is a sonar ping. The fix is for its time of validity.
     Ping {
         /// Index into [`Events`].
         event: usize,
-        /// Fix at the ping, or the reason there is none.
+        /// Fix at the ping, or the reason for having none.
         fix: Result<Fix, NoFix>,
     },
     /// A multiple of the advice period has passed.
     Beat {
-        /// Its timestamp.
+        /// Timestamp.
         at: MonoNs,
-        /// Fix at the beat, or the reason there is none.
+        /// Fix at the update, or the reason for having none.
         fix: Result<Fix, NoFix>,
-        /// What navigation doubts.
+        /// Doubts of navigation.
         doubts: Doubts,
-        /// Standard deviations of the pose then.
+        /// Standard deviations of the pose at that time.
         sd: Option<PoseSd>,
-        /// Index into [`Events`] of the event that it precedes.
+        /// Index into [`Events`] of the next event.
         before: usize,
     },
 }
 
-/// Pings and beats of this tick with their fixes, in order.
+/// Pings and updates of this tick with their fixes, in order.
 #[derive(Debug, Resource)]
 pub struct PositionedList(pub Vec<Positioned>);
 
 /// Outcome of a ping.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub enum Outcome {
-    /// A return that could be placed: a sample, if it is taken for wall.
+    /// A return that could be placed. It becomes a sample if it is accepted as wall.
     Sample {
         /// End point of the beam.
         point: Point3<Tunnel>,
@@ -97,14 +98,14 @@ pub enum Outcome {
     Unplaced(NoFix),
 }
 
-/// Whether the vehicle is in a beam's way, by its geometry.
+/// Whether the vehicle occludes a beam, by its geometry.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Hidden {
-    /// It isn't.
+    /// Not occluded.
     No,
-    /// Nearly: it may be heard all the same.
+    /// Nearly occluded: a return is possible.
     Beside,
-    /// It is.
+    /// Occluded.
     Yes,
 }
 
@@ -130,7 +131,7 @@ pub struct PlacedPing {
     pub fix: Option<Fix>,
     /// Chainages on which the head lands samples at this attitude; `None` without a fix.
     pub reach: Option<Reach>,
-    /// The head has moved a single step since its last ping.
+    /// The head has moved a single step since its previous ping.
     pub single_step: bool,
     /// A new sweep has begun.
     pub new_sweep: bool,
@@ -140,23 +141,23 @@ pub struct PlacedPing {
     pub outcome: Outcome,
     /// Angle of the head, in the sensor frame, radians.
     pub angle_rad: f64,
-    /// Whether the vehicle is in the way at this angle.
+    /// Whether the vehicle occludes the beam at this angle.
     pub hidden: Hidden,
     /// Longest range at the head's setting, m.
     pub longest_m: f64,
     /// Source of the packet.
     pub source: SourceId,
-    /// Where the head was; `None` without a fix.
+    /// Position of the head; `None` without a fix.
     pub origin: Option<Point3<Tunnel>>,
 }
 
-/// An item of the output of [`super::stage::Stage::Georeference`].
+/// An output item of [`super::stage::Stage::Georeference`].
 #[derive(Debug, Clone, Copy, PartialEq)]
-#[expect(clippy::large_enum_variant, reason = "a list that is filled once and read once a tick")]
+#[expect(clippy::large_enum_variant, reason = "the list is filled once and read once per tick")]
 pub enum Placed {
     /// A ping.
     Ping(PlacedPing),
-    /// The situation at a beat, and what navigation doubts.
+    /// The situation at an update, and the doubts of navigation.
     Situation(MonoNs, Situation, Doubts),
 }
 
@@ -164,40 +165,40 @@ pub enum Placed {
 #[derive(Debug, Resource)]
 pub struct PlacedList(pub Vec<Placed>);
 
-/// For each item of [`PlacedList`] the index into [`Events`]: of the ping, or of the event that a situation precedes.
+/// Index into [`Events`] for each item of [`PlacedList`]: of the ping, or of the event after a situation.
 #[derive(Debug, Resource)]
 pub struct PlacedEvents(pub Vec<usize>);
 
-/// What has been judged, and the alerts that hold, at a beat.
+/// Judged metres and active alerts at an update.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Standing {
-    /// Metres of the way.
+    /// Metres of the coverage extent by verdict.
     pub metres: LiveMetres,
-    /// The unsure stretch that was judged last.
+    /// Last judged unsure stretch.
     pub unsure: Option<Stretch>,
     /// All wall that heads see here has passed.
     pub passed: bool,
-    /// On the way back for a missed stretch: how far, m.
+    /// Place to go back to for a missed stretch, m, while the vehicle is on its way there.
     pub back_to_m: Option<f64>,
     /// Alerts that hold.
     pub alerts: ActiveAlerts,
 }
 
-/// Standing at each beat of this tick, in order.
+/// Judged metres and alerts at each update of this tick, in order.
 #[derive(Debug, Resource)]
 pub struct Standings(pub Vec<Standing>);
 
-/// Advice at each beat of this tick, in order.
+/// Advice at each update of this tick, in order.
 #[derive(Debug, Resource)]
 pub struct AdviceList(pub Vec<Advice>);
 
-/// Sections to be judged after a ping, in order; a reused buffer.
+/// Sections to be judged after a ping, in order. The buffer is reused.
 #[derive(Debug, Resource)]
 pub struct Requests(pub Vec<Request>);
 
 /// A result for the outlets.
 #[derive(Debug, Clone, Copy, PartialEq)]
-#[expect(clippy::large_enum_variant, reason = "copied into room that is there already; a box would allocate")]
+#[expect(clippy::large_enum_variant, reason = "copied into preallocated room; a box would allocate")]
 pub enum Notice {
     /// A section's verdict, hole or flag has changed.
     Section {
@@ -217,7 +218,7 @@ pub enum Notice {
         /// Kind of change.
         change: RunChange,
     },
-    /// First occurrence of an alert; of a head's, for this head.
+    /// First occurrence of an alert, and the head if it names one.
     Alert(AlertKind, Option<SourceId>),
     /// Speed advice.
     Advice(AdviceEntry),
@@ -227,10 +228,10 @@ pub enum Notice {
         change: AlertChange,
         /// Timestamp, in data time.
         at: MonoNs,
-        /// The alert, as it was then.
+        /// The alert as it was at that time.
         alert: ListedAlert,
     },
-    /// Somebody has put down a note.
+    /// A note was added.
     Note(Note),
 }
 

@@ -1,5 +1,6 @@
-//! What other settings of the heads would change: a finer step, a longer range. Both take longer to go round, which counts where a section's
-//! hole is to be told as it would have been with them.
+//! Effect of other head settings: a finer step or a longer range.
+//!
+//! Both take longer to turn, which counts when a section's hole is predicted for them.
 
 use bevy_ecs::prelude::World;
 
@@ -15,23 +16,23 @@ use headrace_sampling::spacing::speed_for_target_mps;
 use headrace_sensor::device::Device;
 use headrace_vehicle::Mission;
 
-/// Range settings that are asked for, whole metres up to this one.
+/// Range settings tried: whole metres up to this one.
 const LONGEST_M: u32 = 200;
 /// Steps closer together than this are equal, radians.
 const SAME_STEP_RAD: f64 = 1e-6;
 
 impl HeadSpecification {
-    /// Of a device that is a head, for a mission.
+    /// Specification of a head device for a mission.
     pub fn of(device: &dyn Device, spec: HeadSpec, mission: &Mission) -> Self {
         let modes = device.modes(None).unwrap_or_default();
         Self { spec, modes, reaching: reaching(device, &spec, mission) }
     }
 
-    /// With its source's id: what it could be set to in a tunnel that is inspected with a target T, m.
+    /// Alternative settings in a tunnel inspected with target T, m. `name` is the id of its source.
     pub fn settings(&self, name: &str, profile: &Profile, target_m: f64) -> HeadSettings {
         let [_, own_m] = self.spec.range_m;
         let range_m = self.reaching.as_ref().map(|(range_m, _)| *range_m);
-        // As many as live advice looks at the wall with, whose mode is on the same screen.
+        // As many rays as live advice uses: its mode is on the same screen.
         let rays = Looks::default().ring;
         let ring = self.ring_in_the_middle(profile, rays).unwrap_or_default();
         let finer = self.finer(target_m, |step_rad| ring.largest_step_m(Ring::stride(step_rad, rays)));
@@ -42,8 +43,9 @@ impl HeadSpecification {
         }
     }
 
-    /// Of the modes with a finer step, the one that lets the vehicle go fastest; where none meets the target, the finest. `t_y_m` is the step
-    /// along the wall, m, of a step of the head, radians.
+    /// Mode with a finer step that allows the fastest speed; the finest one if none meets the target.
+    ///
+    /// `t_y_m` converts a step of the head, radians, to the step along the wall, m.
     fn finer(&self, target_m: f64, t_y_m: impl Fn(f64) -> f64) -> Option<&HeadMode> {
         let step_rad = |mode: &HeadMode| mode.turn.step_rad();
         let finer = || self.modes.iter().filter(|mode| step_rad(mode) < self.spec.step_rad - SAME_STEP_RAD);
@@ -57,7 +59,7 @@ impl HeadSpecification {
         fastest.map(|(mode, _)| mode).or_else(finest)
     }
 
-    /// The wall as it sees it where the vehicle is level in the middle; none where it is outside then.
+    /// Wall as seen with the vehicle level in the tunnel's centre; `None` if the head is outside then.
     fn ring_in_the_middle(&self, profile: &Profile, rays: u32) -> Option<Ring> {
         let [y, z] = profile.reference();
         let pose = Pose { position: Point3::new(0.0, y, z), attitude: Rot::identity() };
@@ -65,8 +67,11 @@ impl HeadSpecification {
     }
 }
 
-/// The shortest range setting of a head, m, its own or a longer one, that reaches all wall from the middle of the tunnel, with the modes
-/// there; none where no setting does.
+/// Shortest range setting that reaches all wall from the tunnel's centre, m, and the modes there.
+///
+/// It is the head's own setting or a longer one.
+///
+/// `None` if no setting does.
 fn reaching(device: &dyn Device, spec: &HeadSpec, mission: &Mission) -> Option<(f64, Vec<HeadMode>)> {
     let profile = &mission.profile;
     let wall_m = profile.farthest_m(profile.reference());
@@ -79,7 +84,7 @@ fn reaching(device: &dyn Device, spec: &HeadSpec, mission: &Mission) -> Option<(
     longer_m.into_iter().find_map(|range_m| Some((range_m, device.modes(Some(range_m)).ok()?)))
 }
 
-/// Of all heads of a world, those that change most: what holds for the vehicle is what its slowest head does.
+/// Ratios of the head that changes most: the slowest head decides for the vehicle.
 pub(super) fn of_heads(world: &mut World, profile: &Profile, target_m: f64) -> OtherSettings {
     let mut heads = world.query::<&HeadSpecification>();
     let farthest_m = profile.farthest_m(profile.reference());
@@ -99,7 +104,8 @@ fn of_head(head: &HeadSpecification, farthest_m: f64, target_m: f64) -> OtherSet
         modes.iter().find(same).map(|mode| mode.turn.period_s())
     };
     let Some(now_s) = turn_s(modes) else { return OtherSettings::default() };
-    // By steps that beams meet squarely: whether a mode would do in corners, too, the trial's samples say.
+    // The steps are those of perpendicular beams. The samples of the trial show whether a mode would also be
+    // enough in corners.
     let chosen = head.finer(target_m, |step_rad| step_rad * farthest_m);
     OtherSettings {
         finer_step: chosen.map_or(1.0, |mode| mode.turn.step_rad() / spec.step_rad),
@@ -137,22 +143,22 @@ mod tests {
     }
 
     #[test]
-    fn the_mode_in_which_it_goes_fastest_is_taken_and_takes_longer() {
-        // 0.9 degrees are 0.094 m on wall 6 m away, 0.6 degrees 0.063 m.
+    fn fastest_mode_is_chosen_with_its_longer_turn() {
+        // On wall 6 m away, 0.9 degrees make 0.094 m, and 0.6 degrees 0.063 m.
         let at = |target_m: f64| of_head(&head(2.4, None), 6.0, target_m);
         let roomy = at(0.2);
         assert!((roomy.finer_step - 0.375).abs() < 1e-9 && (roomy.finer_turn - 8.0 / 4.8).abs() < 1e-9);
         let close = at(0.1);
         assert!((close.finer_step - 0.25).abs() < 1e-9 && (close.finer_turn - 10.8 / 4.8).abs() < 1e-9);
-        // None meets the target: the finest.
+        // None meets the target: the finest one is taken.
         assert_eq!(at(0.01), close);
         let finest = of_head(&head(0.6, None), 6.0, 0.2);
         assert_eq!((finest.finer_step, finest.finer_turn, finest.longer_turn), (1.0, 1.0, 1.0));
     }
 
-    /// In a corner, or where beams graze the wall, a step is longer than where they meet it squarely: what would do there isn't named.
+    /// In a corner, or where beams graze the wall, a step is longer than for perpendicular beams.
     #[test]
-    fn the_wall_as_it_is_decides() {
+    fn oblique_wall_needs_a_finer_mode() {
         let ceran = shapes::ceran().unwrap();
         let named = |target_m: f64| head(2.4, None).settings("", &ceran, target_m).finer;
         let farthest_m = ceran.farthest_m(ceran.reference());
@@ -162,7 +168,7 @@ mod tests {
     }
 
     #[test]
-    fn a_longer_range_takes_as_long_as_its_own_mode_does_there() {
+    fn longer_range_has_the_turn_period_of_its_mode() {
         let far = vec![mode("fast", 0.9, 10.0), mode("fastest", 2.4, 6.0)];
         assert!((of_head(&head(2.4, Some((12.0, far.clone()))), 6.0, 0.2).longer_turn - 1.25).abs() < 1e-9);
         assert!((of_head(&head(0.9, Some((12.0, far))), 6.0, 0.2).longer_turn - 1.25).abs() < 1e-9);

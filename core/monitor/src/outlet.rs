@@ -31,7 +31,7 @@ struct Shared {
 struct Outlet(Arc<Shared>);
 
 impl NoticeOutlet {
-    /// A queue for `capacity` notices, and its receiving end.
+    /// A queue for `capacity` notices, with its receiving end.
     pub fn new(capacity: usize) -> (Self, NoticeReceiver) {
         let queue =
             Arc::new(Shared { notices: ArrayQueue::new(capacity.max(1)), dropped: AtomicU64::new(0) });
@@ -57,7 +57,7 @@ fn publish(notices: Res<'_, Notices>, outlet: Res<'_, Outlet>) {
 }
 
 impl NoticeReceiver {
-    /// The oldest notice that is waiting.
+    /// Oldest waiting notice.
     pub fn next(&self) -> Option<Notice> {
         self.queue.notices.pop()
     }

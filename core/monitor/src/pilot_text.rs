@@ -1,5 +1,7 @@
-//! Texts for the pilot, with figures and units: causes, remedies and advice in plain text. The terminal, the log for viewers and the summary
-//! of a report use them; the words in JSON are the enums' `as_str`, and the page's labels are in `plugins/dashboard/page/src/text`.
+//! Texts for the pilot, with figures and units: causes, remedies and advice.
+//!
+//! The terminal, the log for viewers and the summary of a report use them. The words in JSON are the enums'
+//! `as_str`, and the page's labels are in `plugins/dashboard/page/src/text`.
 
 use super::advice_log::AdviceEntry;
 use super::alerts::AlertKind;
@@ -14,7 +16,7 @@ use headrace_geometry::tunnel::Profile;
 use headrace_sampling::advice::{Advice, Reason, Remedy};
 use headrace_sampling::head::HeadSet;
 
-/// Chainage as engineers write it, kilometres, then metres with two decimals: 1+240.50 for 1240.5 m.
+/// Chainage as stationing, kilometres, then metres with two decimals: 1+240.50 for 1240.5 m.
 pub fn station(chainage_m: f64) -> String {
     let sign = if chainage_m < -0.005 { "-" } else { "" };
     let centimetres = (chainage_m.abs() * 100.0).round();
@@ -29,24 +31,24 @@ pub fn clock_text(profile: &Profile, arc_m: f64) -> String {
     clock.strip_suffix(":00").map_or(clock.clone(), |hour| format!("{hour} o'clock"))
 }
 
-/// Figures of a cause's evidence used in its text.
+/// Figures of a cause's evidence for its text.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct CauseFigures {
-    /// The causes, which only together explain the fail.
+    /// Causes, which only together explain the fail.
     pub causes: Causes,
     /// Speed along the tunnel, m/s.
     pub speed_mps: f64,
     /// Largest step along the perimeter between neighbouring samples of one turn, m.
     pub t_y_m: f64,
-    /// The same predicted from the middle of the tunnel, m.
+    /// Largest step predicted from the tunnel's centre, m.
     pub middle_t_y_m: f64,
     /// Share of pings without a return.
     pub missing_share: f64,
-    /// How to pass again, with the heads as scheduled.
+    /// Advice for passing again, with the heads as scheduled.
     pub again: Again,
-    /// How far the beams swung along the tunnel between two passes, m.
+    /// Distance that the beams swung along the tunnel between two passes, m.
     pub swing_m: f64,
-    /// Heads that went by without a ping.
+    /// Heads that passed without pinging.
     pub silent_heads: HeadSet,
 }
 
@@ -60,7 +62,7 @@ impl From<&Evidence> for CauseFigures {
 }
 
 impl CauseFigures {
-    /// Those of a run: of each cause that is named, the figures of the section that speaks for it.
+    /// Figures of a run: for each named cause, those of the section that represents it.
     pub fn of_run(sections: &Sections, run: &Run) -> Option<Self> {
         let causes = run.named();
         let main = Self::from(&sections.evidence_of(run, run.cause)?);
@@ -73,7 +75,7 @@ impl CauseFigures {
         Some(figures)
     }
 
-    /// Takes the figures of a cause's text from the evidence for it.
+    /// Takes the figures that a cause's text needs from its evidence.
     fn take(&mut self, cause: Cause, from: &Evidence) {
         match cause {
             Cause::TooFast | Cause::Phase => self.speed_mps = from.speed_mps,
@@ -91,8 +93,9 @@ impl CauseFigures {
         }
     }
 
-    /// The speed at which to pass again, m/s, beside the one that is advised now: that of the heads as scheduled where these are to be mended
-    /// first, else the lower of the two.
+    /// Speed for passing again, m/s, given the speed advised now.
+    ///
+    /// It is that of the heads as scheduled if these have to be mended first, otherwise the lower of the two.
     pub fn again_mps(&self, v_max_mps: f64) -> f64 {
         let mended =
             [Cause::HeadSilent, Cause::HeadStalled, Cause::Phase, Cause::AngularStep, Cause::OutOfRange];
@@ -106,21 +109,21 @@ impl CauseFigures {
         }
     }
 
-    /// What to change, for each of the causes.
+    /// Actions against the causes.
     pub fn actions(&self) -> Vec<Action> {
         Action::against(self.causes.iter(), self.again.is_beyond_speed)
     }
 
-    /// The main cause.
+    /// Main cause.
     pub fn cause(&self) -> Cause {
         self.causes.iter().next().unwrap_or(Cause::Unknown)
     }
 }
 
-/// Most causes that a text names.
+/// Maximum number of causes named in a text.
 const NAMED: usize = 2;
 
-/// Text of a fail's causes, with their figures; of several, the first two.
+/// Text of a fail's causes with their figures; the first two if there are several.
 pub fn cause_text(figures: &CauseFigures, heads: &HeadWords) -> String {
     let texts: Vec<String> =
         figures.causes.iter().take(NAMED).map(|cause| one_cause_text(cause, figures, heads)).collect();
@@ -147,14 +150,15 @@ fn one_cause_text(cause: Cause, figures: &CauseFigures, heads: &HeadWords) -> St
     }
 }
 
-/// Text of the actions for a missed stretch, as of [`action_text`]; of several, the first two: what has to be there before the vehicle goes
-/// back comes first, and slower is in the speed.
+/// Text of the actions for a missed stretch, as in [`action_text`]; the first two if there are several.
+///
+/// An action needed before the vehicle goes back comes first. Slower is part of the speed.
 pub fn actions_text(actions: &[Action], back_to_m: f64, at_most_mps: f64, heads: &HeadWords) -> String {
     let mut two: Vec<Action> = actions.iter().copied().take(NAMED).collect();
     if let [_, Action::Position | Action::HeadBack] = two.as_slice() {
         two.reverse();
     }
-    // It is in the speed, or what comes first says that it won't help.
+    // The speed covers it, or the first action states that slower won't help.
     if let [first, Action::Slower] = two.as_slice()
         && (at_most_mps > 0.0 || matches!(first, Action::FinerMode | Action::HigherGain))
     {
@@ -165,7 +169,7 @@ pub fn actions_text(actions: &[Action], back_to_m: f64, at_most_mps: f64, heads:
     others.first().map_or(text.clone(), |second| format!("{text}; and {}", short_text(*second, heads)))
 }
 
-/// Text of an action beside another one.
+/// Text of an action next to another one.
 fn short_text(action: Action, heads: &HeadWords) -> String {
     let text = match action {
         Action::Slower => "slower",
@@ -183,12 +187,13 @@ fn short_text(action: Action, heads: &HeadWords) -> String {
     text.to_owned()
 }
 
-/// Text of the action for a missed stretch that the vehicle is to go back for to a chainage, m, with the maximum speed, m/s; zero if
-/// no speed is known to meet the target.
+/// Text of an action for a missed stretch: go back to a chainage, m, with a maximum speed, m/s.
+///
+/// The speed is zero if no known speed meets the target.
 pub fn action_text(action: Action, back_to_m: f64, at_most_mps: f64, heads: &HeadWords) -> String {
     let back = format!("go back to {}", station(back_to_m));
     let text = match action {
-        // The speed is for the present mode and range setting.
+        // The speed would be for the present mode and range setting.
         Action::FinerMode => return format!("slower won't help: {}, then {back}", heads.set_finer()),
         Action::LongerRange => return format!("set {}, then {back}", heads.longer_range()),
         // Elsewhere in the stretch a speed helps.
@@ -198,7 +203,7 @@ pub fn action_text(action: Action, back_to_m: f64, at_most_mps: f64, heads: &Hea
         Action::Slower => back,
         Action::OtherSide => format!("{back}, then again, rolled left, then right,"),
         Action::Middle => format!("{back}, then in the middle and steady,"),
-        // Slower, heads apart along the hull are out of phase again.
+        // Slower than that, heads apart along the hull are out of phase again.
         Action::InPhase if at_most_mps > 0.0 => {
             return format!("{back}, then with the heads in phase, at {at_most_mps:.2} m/s");
         }
@@ -225,7 +230,7 @@ fn remedy_text(remedy: Option<Remedy>) -> String {
     }
 }
 
-/// What is lacking for a position.
+/// Text of the missing requirement for a position.
 pub(super) fn no_position_text(lacking: NoFix) -> &'static str {
     match lacking {
         NoFix::Heading => "NO POSITION: heading unknown",
@@ -234,7 +239,10 @@ pub(super) fn no_position_text(lacking: NoFix) -> &'static str {
     }
 }
 
-/// What would gain speed: the remedy where slower doesn't help, else a mode that all heads have and that allows more.
+/// Text of the setting that allows more speed.
+///
+/// It is the remedy if slower doesn't help, otherwise a mode that all heads have and that allows a higher
+/// speed.
 pub fn gain_text(advice: &Advice, heads: &HeadWords) -> Option<String> {
     if advice.remedy.is_some() {
         return Some(remedy_text(advice.remedy));
@@ -251,20 +259,20 @@ pub fn gain_text(advice: &Advice, heads: &HeadWords) -> Option<String> {
         .then(|| format!("set the heads to {}: {:.2} m/s", best.mode.as_str().to_uppercase(), best.v_max_mps))
 }
 
-/// A speed to keep; empty where there is none.
+/// Text of a speed to keep; empty if there is none.
 pub(super) fn speed_text(what: &str, mps: f64) -> String {
     if mps > 0.0 { format!("{what} {mps:.2} m/s") } else { String::new() }
 }
 
-/// A mode that allows so many times the speed gains something.
+/// Ratio of speeds above which another mode is worth mentioning.
 const GAIN: f64 = 1.1;
 
-/// A stretch that was missed.
+/// A missed stretch.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Missed {
-    /// Where it begins, m.
+    /// Its beginning, m.
     pub start_m: f64,
-    /// Where the vehicle is to go back to for it, m.
+    /// Place for the vehicle to go back to, m.
     pub back_to_m: f64,
     /// Cause with its figures.
     pub figures: CauseFigures,
@@ -293,7 +301,7 @@ pub fn cleared_text(from_m: f64, to_m: f64) -> String {
     format!("cleared  ch {} to {}", station(from_m), station(to_m))
 }
 
-/// Text of an alert at a chainage, m, with the deviation, m, and the head or velocity log where it names one.
+/// Text of an alert at a chainage, m, with the deviation, m, and the head or velocity log if it names one.
 pub fn alert_text(kind: AlertKind, head: &str, x_m: f64, off_m: f64) -> String {
     let x = station(x_m);
     match kind {
@@ -325,7 +333,7 @@ pub fn alert_text(kind: AlertKind, head: &str, x_m: f64, off_m: f64) -> String {
     }
 }
 
-/// Text of a setting in doubt, found at a chainage, m; `name` gives a source's.
+/// Text of a doubtful setting, found at a chainage, m. `name` returns a source's id.
 pub fn setting_text(doubt: &SettingDoubt, x_m: f64, name: &dyn Fn(u16) -> String) -> String {
     let source = doubt.source.map(name).unwrap_or_default();
     let what = match doubt.setting {
@@ -353,9 +361,9 @@ pub fn setting_text(doubt: &SettingDoubt, x_m: f64, name: &dyn Fn(u16) -> String
 /// Figures of advice used in its text.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct AdviceFigures {
-    /// Speed now, m/s.
+    /// Present speed, m/s.
     pub speed_mps: f64,
-    /// The largest speed at which the target is met, m/s; zero where none is.
+    /// Largest speed that meets the target, m/s; zero if there is none.
     pub v_max_mps: f64,
     /// Limiting factor.
     pub reason: Reason,
@@ -365,7 +373,7 @@ pub struct AdviceFigures {
     pub phase_error_rad: f64,
     /// Largest step along the perimeter between neighbouring samples of one turn, m.
     pub t_y_m: f64,
-    /// A strip that no head sees: its width and the arc length of its middle, m.
+    /// Strip that no head sees: its width, and the arc length of its centre, m.
     pub unseen_m: Option<[f64; 2]>,
     /// Remedy if lower speed does not help.
     pub remedy: Option<Remedy>,
@@ -378,7 +386,7 @@ impl From<&AdviceEntry> for AdviceFigures {
 }
 
 impl AdviceFigures {
-    /// Those of advice at a speed, m/s.
+    /// Figures of advice at a speed, m/s.
     pub fn of(advice: &Advice, speed_mps: f64) -> Self {
         Self {
             speed_mps,
@@ -431,7 +439,7 @@ mod tests {
     use crate::head_words::tests::two;
 
     #[test]
-    fn stationing_as_engineers_write_it() {
+    fn stationing_has_kilometres_and_metres() {
         for (chainage_m, text) in [
             (0.0, "0+000.00"),
             (1240.5, "1+240.50"),
@@ -444,7 +452,7 @@ mod tests {
     }
 
     #[test]
-    fn every_action_says_what_to_do_and_a_speed_where_it_holds() {
+    fn action_text_has_an_instruction_and_its_speed() {
         let at = |action, at_most_mps| action_text(action, 1240.5, at_most_mps, &two());
         for action in Action::ALL {
             let without = at(action, 0.0);
@@ -467,7 +475,7 @@ mod tests {
             actions_text(&[Action::Slower, Action::OtherSide, Action::Again], 1240.5, 0.25, &two()),
             "go back to 1+240.50, then at most 0.25 m/s; and again, rolled left, then right"
         );
-        // Where a speed helps elsewhere in the stretch, it isn't said that slower won't.
+        // If a speed helps elsewhere in the stretch, the text doesn't state that slower won't.
         let lossy = [Action::HigherGain, Action::Slower];
         assert_eq!(
             actions_text(&lossy, 1240.5, 0.25, &two()),

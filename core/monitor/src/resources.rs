@@ -1,4 +1,4 @@
-//! State of the dive not tied to one sensor: the tunnel, the target, the coverage of the wall, and counts.
+//! State of the dive that isn't tied to one sensor: tunnel, target, coverage of the wall, and counts.
 
 use bevy_ecs::entity::Entity;
 use bevy_ecs::prelude::Resource;
@@ -16,7 +16,7 @@ use headrace_geometry::tunnel::Profile;
 use headrace_sampling::layout::HeadLayout;
 use headrace_sensor::reading::SourceId;
 
-/// The tunnel as designed, and its water.
+/// Tunnel as designed, and its water.
 #[derive(Debug, Clone, Resource)]
 pub struct TunnelDesign {
     /// Design profile.
@@ -27,7 +27,7 @@ pub struct TunnelDesign {
     pub length_m: f64,
     /// Samples farther than this from the design profile contradict it, m.
     pub contradiction_m: f64,
-    /// What is taken for wall.
+    /// Limits for accepting returns as wall.
     pub limits: WallLimits,
 }
 
@@ -38,13 +38,13 @@ pub struct Target {
     pub target_m: f64,
     /// Arrangement of the heads: phase shift or sector offset.
     pub layout: HeadLayout,
-    /// Speed for which the heads are put in phase, m/s; zero if none is planned.
+    /// Speed for which the heads are set in phase, m/s; zero if none is planned.
     pub planned_speed_mps: f64,
-    /// What other settings of the heads would change.
+    /// Changes that other settings of the heads would bring.
     pub(super) other: OtherSettings,
 }
 
-/// The vehicle's entity, that of each sensor by source, and that of each head by number.
+/// Entities of the vehicle, of each sensor by source, and of each head by number.
 #[derive(Debug, Clone, Resource)]
 pub struct VehicleEntities {
     pub(super) vehicle: Entity,
@@ -58,12 +58,12 @@ impl VehicleEntities {
         core::iter::once(self.vehicle).chain(self.by_source.iter().copied())
     }
 
-    /// The sensor that a source's bytes come from.
+    /// Sensor that a source's bytes come from.
     pub fn of_source(&self, source: SourceId) -> Option<Entity> {
         self.by_source.get(source.index()).copied()
     }
 
-    /// The head of this number, from zero in the order of sources.
+    /// Head with this number, from zero in the order of sources.
     pub fn of_head(&self, head: usize) -> Option<Entity> {
         self.heads.get(head).copied()
     }
@@ -76,21 +76,21 @@ pub struct Coverage {
     pub store: SampleStore,
     /// Verdicts.
     pub sections: Sections,
-    /// Where samples may still land.
+    /// Stretch where samples may still land.
     pub frontier: Frontier,
     /// Samples by node of a square grid.
     pub soundings: Soundings,
-    /// Where the wall was found off the design near the vehicle.
+    /// Places near the vehicle where the wall was found off the design.
     pub relief: Relief,
-    /// The unsure stretch that was judged last.
+    /// Last judged unsure stretch.
     pub unsure: Option<Stretch>,
-    /// The latest samples that are lacking.
+    /// Latest missing samples.
     pub lacks: Lacks,
 }
 
 stateful!(Coverage { state: store, sections, frontier, soundings, relief, unsure, lacks; });
 
-/// The search for holes with its working memory.
+/// Search for holes, with its working memory.
 #[derive(Debug, Default, Resource)]
 pub struct Finder(pub HoleFinder);
 
@@ -104,10 +104,10 @@ impl Stateful for Finder {
     }
 }
 
-/// The result streams with their digests, which together give the dive's.
+/// Result streams with their digests, which together give the dive's digest.
 #[derive(Debug, Default, Resource)]
 pub struct Digests {
-    /// Poses at the beats.
+    /// Poses at the updates.
     pub poses: ResultStream,
     /// Placed pings.
     pub pings: ResultStream,
@@ -115,7 +115,7 @@ pub struct Digests {
     pub judgements: ResultStream,
     /// Advice.
     pub advice: ResultStream,
-    /// The live state at the beats.
+    /// Live states at the updates.
     pub states: ResultStream,
     /// Changes of alerts, and notes.
     pub alerts: ResultStream,
@@ -124,7 +124,7 @@ pub struct Digests {
 stateful!(Digests { state: poses, pings, judgements, advice, states, alerts; });
 
 impl Digests {
-    /// The streams by name, in log order.
+    /// Streams by name, in log order.
     pub fn streams(&self) -> [(&'static str, &ResultStream); 6] {
         [
             ("poses", &self.poses),
@@ -165,15 +165,15 @@ pub struct Tally {
     pub span: Option<(MonoNs, MonoNs)>,
     /// Samples on the wall.
     pub samples: u64,
-    /// Pings without a return where the wall was within range, or without a fix.
+    /// Pings without a return although the wall was within range, or without a fix.
     pub missing: u64,
-    /// Pings without a return where the wall was out of range.
+    /// Pings without a return because the wall was out of range.
     pub out_of_range: u64,
     /// Pings occluded by the vehicle.
     pub occluded: u64,
     /// Returns without a fix.
     pub unplaced: u64,
-    /// Of these, by reason, in the order of [`NoFix::ALL`].
+    /// Returns without a fix by reason, in the order of [`NoFix::ALL`].
     pub lacking: [u64; NoFix::ALL.len()],
     /// Pings without a fix, with or without a return.
     pub without_fix: u64,
@@ -181,15 +181,15 @@ pub struct Tally {
     pub outside: u64,
     /// Samples not stored for lack of room.
     pub not_stored: u64,
-    /// Returns not taken for wall.
+    /// Returns not accepted as wall.
     pub doubtful: u64,
 }
 
 /// The current tick.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Resource, Serialize, Deserialize)]
 pub struct TickTime {
-    /// Its number, from zero.
+    /// Number from zero.
     pub index: u64,
-    /// Its end.
+    /// End of its time.
     pub now: MonoNs,
 }

@@ -1,12 +1,13 @@
 //! Published results: hashed, and kept word by word for recording or comparison.
 //!
-//! A stream is a sequence of records. A record is a header and then its words: integers, or the bits of floating-point
-//! numbers. The header has the record's kind in its lowest byte and the number of words above it. Only words are hashed.
+//! A stream is a sequence of records. A record is a header followed by its words: integers, or the bits of
+//! floating-point numbers. The header has the record's kind in its lowest byte and the number of words above
+//! it. Only words are hashed.
 
 use super::digest::Digest;
 use headrace_geometry::snapshot::stateful;
 
-/// Capacity of a stream per tick, words; those beyond are hashed, but not kept, and counted as lost.
+/// Capacity of a stream per tick, words. Further words are hashed, but not kept, and counted as lost.
 const MAX_TICK_WORDS: usize = 1 << 16;
 
 /// Kind of a record.
@@ -16,19 +17,19 @@ pub enum RecordKind {
     Sample = 1,
     /// A ping without a sample.
     NoSample = 2,
-    /// A section that was judged.
+    /// A judged section.
     Section = 3,
-    /// A run of sections that has changed.
+    /// A changed run of sections.
     Run = 4,
     /// Advice.
     Advice = 5,
     /// Pose of the vehicle.
     Pose = 6,
-    /// No fix.
+    /// A pose without a fix.
     NoPose = 7,
     /// An alert about the dive as a whole.
     Alert = 8,
-    /// A ping whose return wasn't taken for wall.
+    /// A ping with a return that was not accepted as wall.
     Doubtful = 9,
     /// The live state.
     State = 10,
@@ -36,7 +37,7 @@ pub enum RecordKind {
     AlertChange = 11,
     /// A note.
     Note = 12,
-    /// A voice note, and the same once its recording is in the log.
+    /// A voice note; repeated once its recording is in the log.
     Voice = 13,
 }
 
@@ -49,7 +50,7 @@ pub enum WordKind {
     Number,
 }
 
-/// Of a section.
+/// Words of a section.
 const SECTION: [(&str, WordKind); 17] = [
     ("at_ns", WordKind::Integer),
     ("section", WordKind::Integer),
@@ -60,7 +61,7 @@ const SECTION: [(&str, WordKind); 17] = [
     ("cause", WordKind::Integer),
     ("hole_x_m", WordKind::Number),
     ("hole_arc_m", WordKind::Number),
-    // Only with a cause.
+    // Words from here on are present only with a cause.
     ("speed_mps", WordKind::Number),
     ("t_y_m", WordKind::Number),
     ("middle_t_y_m", WordKind::Number),
@@ -68,7 +69,7 @@ const SECTION: [(&str, WordKind); 17] = [
     ("swing_m", WordKind::Number),
     ("silent_heads", WordKind::Integer),
     ("causes", WordKind::Integer),
-    // Only where lost returns take a lower speed.
+    // Present only if lost returns need a lower speed.
     ("with_losses_mps", WordKind::Number),
 ];
 
@@ -101,7 +102,7 @@ const VOICE: [(&str, WordKind); 7] = [
     ("id", WordKind::Integer),
     ("seconds", WordKind::Integer),
 ];
-/// Words of a note; its text follows.
+/// Words of a note. Its text follows.
 const NOTE: [(&str, WordKind); 5] = [
     ("at_ns", WordKind::Integer),
     ("number", WordKind::Integer),
@@ -127,7 +128,7 @@ impl RecordKind {
         Self::Voice,
     ];
 
-    /// The kind with this number.
+    /// Kind with this number.
     pub fn of(number: u8) -> Option<Self> {
         Self::ALL.into_iter().find(|kind| *kind as u8 == number)
     }
@@ -151,7 +152,7 @@ impl RecordKind {
         }
     }
 
-    /// Name and type of its word at `place`.
+    /// Name and type of the word at `place`.
     pub fn field(self, place: usize) -> (&'static str, WordKind) {
         use WordKind::{Integer, Number};
         let fields: &[(&str, WordKind)] = match self {
@@ -192,7 +193,7 @@ impl RecordKind {
                 ("j", Number),
                 ("k", Number),
                 ("speed_mps", Number),
-                // Only if navigation provides them.
+                // Present only if navigation provides them.
                 ("along_sd_m", Number),
                 ("place_sd_m", Number),
                 ("tilt_sd_rad", Number),
@@ -225,15 +226,15 @@ impl RecordKind {
                 ("kind", Integer),
                 ("x_m", Number),
                 ("off_m", Number),
-                // Only of a head.
+                // Present only for a head.
                 ("source", Integer),
             ],
             Self::AlertChange => &ALERT_CHANGE,
             Self::Note => &NOTE,
             Self::Voice => &VOICE,
         };
-        // Advice continues with the speeds that other modes would allow, the live state with each source's last reading, a
-        // note with its text.
+        // Further words follow: for advice the speeds that other modes allow, for the live state each
+        // source's last reading, for a note its text.
         let beyond = match self {
             Self::Advice => ("alternative_v_max_mps", Number),
             Self::State => ("heard_ns", Integer),
@@ -292,22 +293,22 @@ impl ResultStream {
         self.digest.value()
     }
 
-    /// The words of the last tick, headers included.
+    /// Words of the last tick, including headers.
     pub fn words(&self) -> &[u64] {
         &self.words
     }
 
-    /// Records so far, those of the last tick included.
+    /// Number of records so far, including those of the last tick.
     pub fn records(&self) -> u64 {
         self.records
     }
 
-    /// Words not kept because they exceeded a tick's capacity.
+    /// Number of words not kept because they exceeded a tick's capacity.
     pub fn lost(&self) -> u64 {
         self.lost
     }
 
-    /// Adds a short text: its first 16 bytes, as two integers.
+    /// Adds the first 16 bytes of a text, as two integers.
     pub(super) fn text(&mut self, text: &str) -> &mut Self {
         let mut bytes = [0; 16];
         bytes.iter_mut().zip(text.bytes()).for_each(|(byte, of)| *byte = of);
@@ -318,7 +319,7 @@ impl ResultStream {
         self
     }
 
-    /// Becomes as another is, with the words that its last tick has kept.
+    /// Copies the state of another stream, with the words that its last tick has kept.
     pub(super) fn follow(&mut self, other: &Self) {
         (self.digest, self.records, self.lost) = (other.digest, other.records, other.lost);
         self.words.clear();
@@ -349,23 +350,23 @@ impl ResultStream {
     }
 }
 
-/// A record of a stream.
+/// One record of a stream.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Record<'a> {
-    /// Its kind; `None` if unknown to this version.
+    /// Kind; `None` if unknown to this version.
     pub kind: Option<RecordKind>,
-    /// Its words.
+    /// Words.
     pub words: &'a [u64],
 }
 
-/// The text that two words of a record hold.
+/// Text held by two words of a record.
 pub fn text_of(words: [u64; 2]) -> String {
     let bytes = words.map(u64::to_le_bytes);
     let text = bytes.as_flattened().iter().copied().take_while(|byte| *byte != 0).collect::<Vec<_>>();
     String::from_utf8_lossy(&text).into_owned()
 }
 
-/// The first of a sequence of records, and the rest. `None` at the end, or if a record is incomplete.
+/// First of a sequence of records, and the rest; `None` at the end, or if a record is incomplete.
 pub fn first_record(words: &[u64]) -> Option<(Record<'_>, &[u64])> {
     let (head, rest) = words.split_first()?;
     let [kind, ..] = head.to_le_bytes();
@@ -386,7 +387,7 @@ mod tests {
     }
 
     #[test]
-    fn records_come_out_as_they_went_in() {
+    fn records_are_read_as_written() {
         let stream = filled();
         let (first, rest) = first_record(stream.words()).unwrap();
         assert_eq!(first, Record { kind: Some(RecordKind::Run), words: &[7, 1] });
@@ -400,7 +401,7 @@ mod tests {
     }
 
     #[test]
-    fn a_short_text_comes_back_and_a_long_one_is_cut() {
+    fn short_text_is_kept_and_long_one_is_cut() {
         for (text, back) in [("", ""), ("0.3 deg", "0.3 deg"), ("a mode's long name", "a mode's long na")] {
             let mut stream = ResultStream::default();
             stream.keep();
@@ -412,7 +413,7 @@ mod tests {
 
     /// Neither keeping words nor running out of room changes a digest.
     #[test]
-    fn the_digest_is_of_the_words_alone() {
+    fn digest_depends_only_on_the_words() {
         let mut plain = ResultStream::default();
         plain.record(RecordKind::Run).integer(7).integer(1);
         plain.record(RecordKind::Advice).integer(5).number(0.25).integer(0).integer(1).number(0.0);

@@ -12,15 +12,15 @@ const HEADER_BYTES: usize = 20;
 /// Maximum packet length, bytes.
 pub const MAX_PACKET_BYTES: usize = 4096;
 
-/// Order of live packets; replayed ones have the order of consumption recorded in the log.
+/// Order of live packets. Replayed packets have the order of consumption recorded in the log.
 pub const NO_ORDER: u64 = u64::MAX;
 
-/// A packet that did not fit.
+/// Reason for which a packet was not written.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum RingError {
-    /// The ring is full; try again after a tick, or count the packet as dropped.
-    #[error("ring has room for {free} bytes and a packet needs {needed}")]
+    /// The ring is full. Try again after a tick, or count the packet as dropped.
+    #[error("a packet needs {needed} bytes and the ring has {free} free; try again after a tick")]
     Full {
         /// Free bytes.
         free: usize,
@@ -28,19 +28,19 @@ pub enum RingError {
         needed: usize,
     },
     /// The packet is longer than [`MAX_PACKET_BYTES`].
-    #[error("packet of {len} bytes; the longest allowed is {MAX_PACKET_BYTES}")]
+    #[error("writing a packet of {len} bytes: at most {MAX_PACKET_BYTES} bytes are allowed")]
     TooLong {
         /// Its length.
         len: usize,
     },
 }
 
-/// The writing end: a port's thread, a player or a simulator.
+/// Writing end: for a port's thread, a player or a simulator.
 pub struct Port<R: ByteProducer = HeapProd<u8>> {
     ring: R,
 }
 
-/// The reading end, in the loop.
+/// Reading end, in the loop.
 pub(super) struct PortReader<R: ByteConsumer = HeapCons<u8>> {
     ring: R,
 }
@@ -60,21 +60,21 @@ pub(super) fn ring(capacity_bytes: usize) -> (Port, PortReader) {
 }
 
 impl<R: ByteProducer> Port<R> {
-    /// Writes packets to this ring.
+    /// Creates the writing end of a ring.
     pub(super) fn on(ring: R) -> Self {
         Self { ring }
     }
 
-    /// Hands over a packet received at `received`. Never blocks.
+    /// Writes a packet received at `received`. Never blocks.
     ///
-    /// Errors: the ring is full, or the packet too long; nothing was written.
+    /// Errors: the ring is full, or the packet is too long. Nothing was written.
     pub fn send(&mut self, received: MonoNs, bytes: &[u8]) -> Result<(), RingError> {
         self.send_in_order(received, NO_ORDER, bytes)
     }
 
-    /// Like [`Port::send`], with the packet's recorded order of consumption.
+    /// Writes a packet like [`Port::send`], with its recorded order of consumption.
     ///
-    /// Errors: as for [`Port::send`].
+    /// Errors: see [`Port::send`].
     pub fn send_in_order(&mut self, received: MonoNs, order: u64, bytes: &[u8]) -> Result<(), RingError> {
         let len = u32::try_from(bytes.len()).ok().filter(|_| bytes.len() <= MAX_PACKET_BYTES);
         let len = len.ok_or(RingError::TooLong { len: bytes.len() })?;
@@ -102,12 +102,12 @@ impl<R: ByteProducer> Port<R> {
 }
 
 impl<R: ByteConsumer> PortReader<R> {
-    /// Reads packets of this ring.
+    /// Creates the reading end of a ring.
     pub(super) fn on(ring: R) -> Self {
         Self { ring }
     }
 
-    /// The next packet's header, when the whole packet is there.
+    /// Header of the next packet, once the whole packet is present.
     pub(super) fn peek(&self) -> Option<PacketHeader> {
         let mut header = [0; HEADER_BYTES];
         if self.ring.peek(&mut header) < HEADER_BYTES {
@@ -128,7 +128,7 @@ impl<R: ByteConsumer> PortReader<R> {
         self.ring.skip(usize::MAX);
     }
 
-    /// Reads the packet shown by [`PortReader::peek`] into `into`, whose length must be the packet's.
+    /// Reads the packet that [`PortReader::peek`] returned into `into`, which must have the packet's length.
     pub(super) fn take(&mut self, into: &mut [u8]) {
         self.ring.skip(HEADER_BYTES);
         self.ring.pop(into);
@@ -140,7 +140,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn packets_come_out_as_they_went_in() {
+    fn packets_are_read_as_written() {
         let (mut port, mut reader) = ring(8192);
         for round in 0..1000_u64 {
             let bytes: Vec<u8> = (0..round % 97).map(|i| (i ^ round) as u8).collect();
@@ -155,7 +155,7 @@ mod tests {
     }
 
     #[test]
-    fn a_full_ring_refuses_and_keeps_what_it_has() {
+    fn full_ring_refuses_packets_and_keeps_its_contents() {
         let (mut port, reader) = ring(0);
         port.send(MonoNs(1), &[0; MAX_PACKET_BYTES]).unwrap();
         assert!(matches!(port.send(MonoNs(2), &[1]), Err(RingError::Full { free: 0, .. })));
@@ -169,7 +169,7 @@ mod model_tests {
     use super::*;
     use crate::byte_ring::model::{Hasty, ModelConsumer, explore, packets_by};
 
-    /// Packets of different length and content; a ring that holds one of them, and the header of the next.
+    /// Packets of different length and content, for a ring that holds one of them and the header of the next.
     const LENGTHS: [usize; 2] = [3, 5];
     const CAPACITY: usize = 2 * HEADER_BYTES + 5;
 
@@ -177,7 +177,7 @@ mod model_tests {
         (0..LENGTHS[number]).map(|at| (16 * number + at + 1) as u8).collect()
     }
 
-    /// A writer and a reader of two packets, however they interleave.
+    /// Explores all interleavings of a writer and a reader of two packets.
     fn explored<R: ByteConsumer + 'static>(name: &str, reading: fn(ModelConsumer) -> R) -> usize {
         explore(name, Some(4), move || {
             let (mut port, mut reader) = packets_by(CAPACITY, reading);
@@ -193,7 +193,7 @@ mod model_tests {
         })
     }
 
-    /// However writer and reader interleave, packets come out whole and in order, and each is either taken or refused.
+    /// In every interleaving packets are read whole and in order, and each is either taken or refused.
     #[test]
     fn packets_are_taken_whole_or_not_at_all() {
         let executions = explored("header then body in the loop's ring", |consumer| consumer);
@@ -202,7 +202,7 @@ mod model_tests {
 
     #[test]
     #[should_panic = "assertion `left == right` failed"]
-    fn a_reader_that_takes_the_header_for_the_packet_is_found() {
+    fn model_detects_a_reader_that_ignores_missing_bytes() {
         explored("the loop's ring, a body not waited for", Hasty);
     }
 }

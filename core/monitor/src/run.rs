@@ -33,10 +33,10 @@ use headrace_sensor::device::SensorInfo;
 use headrace_sensor::device_clock::ClockReport;
 use headrace_vehicle::Mission;
 
-/// Sections judged per batch at the end of a dive, before their notices are delivered.
+/// Number of sections judged per batch at the end of a dive, before their notices are delivered.
 const FINISHED_AT_ONCE: usize = 256;
 
-/// What is judged at the end of a dive, and what comes of it.
+/// Data for judging at the end of a dive.
 type AtEnd<'w> = (
     ResMut<'w, Coverage>,
     ResMut<'w, Finder>,
@@ -47,7 +47,7 @@ type AtEnd<'w> = (
     ResMut<'w, AlertList>,
 );
 
-/// A loop that runs. All memory is allocated; a tick takes no lock, makes no system call and formats nothing.
+/// A running loop. All memory is allocated; a tick takes no lock, makes no system call and formats nothing.
 pub struct Loop {
     pub(super) world: World,
     schedule: Schedule,
@@ -57,19 +57,19 @@ pub struct Loop {
     mission: Mission,
     ticks: u64,
     finished: bool,
-    /// Whether a plugin has systems among those that place pings.
+    /// Whether a plugin has systems in the stages that place pings.
     pub(super) has_own_placing: bool,
 }
 
 impl Loop {
-    /// From an app whose world has everything that the stages need.
+    /// Creates the loop from an app whose world has everything that the stages need.
     pub(super) fn new(app: App) -> Self {
         let App { mission, world, schedule, sources, ports, readers, has_own_placing, .. } = app;
         let ports = ports.into_iter().map(Some).collect();
         let (ticks, finished) = (0, false);
         let mut armed =
             Self { world, schedule, readers, ports, sources, mission, ticks, finished, has_own_placing };
-        // The first run of a schedule allocates; with nothing to do it has no other effect.
+        // The first run of a schedule allocates. Without packets it has no other effect.
         armed.tick(MonoNs(0));
         armed.ticks = 0;
         armed
@@ -77,13 +77,14 @@ impl Loop {
 
     /// Processes the waiting packets. Returns the number of packets consumed.
     ///
-    /// `now` is the end of the tick's time, only recorded; no result depends on it.
+    /// `now` is the end of the tick's time. It is only recorded; no result depends on it.
+    ///
     /// Allocates: never.
     pub fn tick(&mut self, now: MonoNs) -> usize {
         if let Some(mut time) = self.world.get_resource_mut::<TickTime>() {
             *time = TickTime { index: self.ticks, now };
         }
-        // Judgements at the end of a dive are still to be published.
+        // Judgements at the end of a dive must not be cleared before they are published.
         if !self.finished {
             self.world.resource_mut::<Digests>().next_tick();
         }
@@ -100,42 +101,42 @@ impl Loop {
         self.ticks += 1;
     }
 
-    /// The world, and the readers of the rings, to be split or joined.
+    /// The world and the readers of the rings, for splitting or joining.
     pub(super) fn split_world(&mut self) -> (&mut World, &mut Vec<PortReader>) {
         (&mut self.world, &mut self.readers)
     }
 
-    /// The writing end of a source's ring, once: for a port's thread, a player or a simulator.
+    /// Writing end of a source's ring, for a port's thread, a player or a simulator; `None` once taken.
     pub fn take_port(&mut self, source: usize) -> Option<Port> {
         self.ports.get_mut(source)?.take()
     }
 
-    /// The writing end of the operator's input, once.
+    /// Writing end of the operator's input; `None` once taken.
     pub fn take_console(&mut self) -> Option<Port> {
         self.take_port(self.sources.len())
     }
 
-    /// The sensors' sources, in the order of their ids. The operator's input comes after them.
+    /// Sources of the sensors, in the order of their ids. The operator's input comes after them.
     pub fn sources(&self) -> &[SourceInfo] {
         &self.sources
     }
 
-    /// The tunnel and the target.
+    /// Tunnel and target.
     pub fn mission(&self) -> &Mission {
         &self.mission
     }
 
-    /// What the heads are called and could be set to.
+    /// Names of the heads and their alternative settings.
     pub fn head_words(&self) -> &HeadWords {
         self.world.resource::<HeadWords>()
     }
 
-    /// Ticks run so far.
+    /// Number of ticks run so far.
     pub fn ticks(&self) -> u64 {
         self.ticks
     }
 
-    /// The end of the last tick's time.
+    /// End of the last tick's time.
     pub fn now(&self) -> MonoNs {
         self.world.resource::<TickTime>().now
     }
@@ -145,14 +146,14 @@ impl Loop {
         self.world.get_resource::<T>()
     }
 
-    /// Fix of the vehicle at the last beat, and its standard deviations.
+    /// Fix of the vehicle at the last update, and its standard deviations.
     pub fn vehicle(&self) -> &VehicleState {
         self.of_vehicle()
     }
 
-    /// Fix at `at`, which may be a little before or after the last reading.
+    /// Fix at `at`, which may be slightly before or after the last reading.
     ///
-    /// Errors: the reason there is no fix.
+    /// Errors: the reason for having no fix.
     pub fn fix(&self, at: MonoNs) -> Result<Fix, NoFix> {
         self.of_vehicle::<Navigator>().navigation.fix(at)
     }
@@ -162,12 +163,12 @@ impl Loop {
         self.of_vehicle::<Navigator>().navigation.consistency(source)
     }
 
-    /// The readings of the last tick, in order.
+    /// Readings of the last tick, in order.
     pub fn readings(&self) -> &[Event] {
         &self.world.resource::<Events>().0
     }
 
-    /// The notices of the last tick, in order.
+    /// Notices of the last tick, in order.
     pub fn notices(&self) -> &[Notice] {
         &self.world.resource::<Notices>().0
     }
@@ -187,12 +188,12 @@ impl Loop {
         self.world.resource()
     }
 
-    /// The alerts with their lives.
+    /// Alerts with their life cycle.
     pub fn alert_list(&self) -> &AlertList {
         self.world.resource()
     }
 
-    /// The notes.
+    /// All notes.
     pub fn notes(&self) -> &Notes {
         self.world.resource()
     }
@@ -202,17 +203,17 @@ impl Loop {
         self.world.resource::<Console>().counts
     }
 
-    /// What words of alerts need.
+    /// Properties of the dive that texts of alerts need.
     pub fn surroundings(&self) -> Surroundings<'_> {
         Surroundings::of(&self.sources, &self.mission.profile, &self.coverage().sections, self.head_words())
     }
 
-    /// The live state with the alerts, as JSON.
+    /// Live state with the alerts, as JSON.
     pub fn live_state_json(&self) -> LiveStateJson {
         self.live_state().json(&self.surroundings(), self.alert_list())
     }
 
-    /// The live state, as of the last beat and published with the last tick.
+    /// Live state as of the last update, published with the last tick.
     pub fn live_state(&self) -> &LiveState {
         self.world.resource()
     }
@@ -248,21 +249,23 @@ impl Loop {
         entities.by_source.iter().filter_map(|entity| self.world.get(*entity))
     }
 
-    /// A component of the vehicle, present from arming on.
+    /// A component of the vehicle, present since arming.
     fn of_vehicle<T: Component>(&self) -> &T {
         let vehicle = self.world.entity(self.world.resource::<VehicleEntities>().vehicle);
-        #[expect(clippy::expect_used, reason = "arming has put it there, and nothing takes it away")]
-        vehicle.get().expect("the vehicle's components are there from arming on")
+        #[expect(clippy::expect_used, reason = "arming adds it, and nothing removes it")]
+        vehicle.get().expect("the vehicle's components exist since arming")
     }
 
-    /// Where samples have landed and may still land, as of the last packet.
+    /// Outlook as of the last packet: where samples have landed and may still land.
     pub(super) fn outlook(&self) -> Outlook {
         let at = self.tally().span.map_or(MonoNs(0), |(_, last)| last);
         self.coverage().frontier.outlook(self.of_sensors().filter_map(|reach: &HeadFrontier| reach.0), at)
     }
 
-    /// Judges the unsettled sections: the dive has ended, and no sample will come. `hear` gets their notices in batches,
-    /// with the loop's state at that point: those of a long dive at once would take more memory than its samples.
+    /// Judges the unsettled sections at the end of a dive, when no more samples will come.
+    ///
+    /// `hear` gets their notices in batches, with the loop's state at that point. All notices of a long dive
+    /// at once would take more memory than its samples.
     pub fn finish(&mut self, hear: &mut dyn FnMut(&Notice, &Self)) {
         let vehicle = self.world.resource::<VehicleEntities>().vehicle;
         if let Some(mut navigator) = self.world.get_mut::<Navigator>(vehicle) {
@@ -283,7 +286,7 @@ impl Loop {
         }
     }
 
-    /// The sections to be judged at the end, and the fields their requests share.
+    /// Sections to be judged at the end, and the fields that their requests share.
     fn open_requests(&mut self) -> (Vec<i64>, Option<Request>) {
         let outlook = self.outlook();
         let (mut open, mut common) = (Vec::new(), None);
@@ -320,13 +323,16 @@ impl Loop {
         }
     }
 
-    /// Snapshot of the state after the last tick; a loop of the same vehicle restored from it gives the same results.
-    /// Excludes packets waiting in the rings and plugins' private state.
+    /// Snapshot of the state after the last tick. A loop of the same vehicle restored from it gives the same
+    /// results.
+    ///
+    /// It excludes packets waiting in the rings and plugins' private state.
     ///
     /// Errors: a part can't be serialised.
     pub fn save(&self) -> Result<Vec<u8>, SnapshotError> {
         if self.is_split() {
-            let (part, why) = ("the loop".to_owned(), "parts of it are on other threads".to_owned());
+            let (part, why) =
+                ("the loop".to_owned(), "parts of it are on other threads; join first".to_owned());
             return Err(SnapshotError::Unsaved { part, why });
         }
         let mut to = Saver::default();
@@ -336,22 +342,23 @@ impl Loop {
         to.finish()
     }
 
-    /// Restores a snapshot saved by a loop of the same vehicle and program. Packets waiting in the rings are dropped.
+    /// Restores a snapshot saved by a loop of the same vehicle and program. Packets waiting in the rings are
+    /// dropped.
     ///
     /// Errors: the snapshot doesn't fit this loop, which must not be used afterwards.
     pub fn restore(&mut self, snapshot: &[u8]) -> Result<(), SnapshotError> {
         let mut from = Restorer::new(snapshot);
         if self.is_split() {
-            return Err(from.unfit("parts of the loop are on other threads".to_owned()));
+            return Err(from.unfit("parts of the loop are on other threads; join them first".to_owned()));
         }
         from.part("ticks")?;
         self.ticks = from.value()?;
         loop_snapshot::restore(&mut self.world, &mut from)?;
         self.readers.iter_mut().for_each(PortReader::clear);
-        if from.is_empty() { Ok(()) } else { Err(from.unfit("there is more of it".to_owned())) }
+        if from.is_empty() { Ok(()) } else { Err(from.unfit("it has extra bytes at its end".to_owned())) }
     }
 
-    /// Frees the samples' memory: after the end of a dive a report needs only the sections.
+    /// Frees the samples' memory: after the end of a dive the report needs only the sections.
     pub fn release_samples(&mut self) {
         self.world.resource_mut::<Coverage>().store.release();
     }
@@ -366,7 +373,7 @@ impl Loop {
         self.of_sensors::<SensorDecoder>().map(|decoder| decoder.0.counts()).collect()
     }
 
-    /// Readings that each source's decoder understood but did not hand on, in the order of the sources.
+    /// Number of readings that each source's decoder understood but withheld, in the order of the sources.
     pub fn decoder_withheld(&self) -> Vec<u64> {
         self.of_sensors::<SensorDecoder>().map(|decoder| decoder.0.withheld()).collect()
     }

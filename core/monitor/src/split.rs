@@ -1,9 +1,10 @@
-//! A loop in three parts, for the threads of a replay: what places pings, what advises, and the rest.
+//! Splits a loop into three parts for the threads of a replay: placing pings, advising, and the rest.
 //!
-//! Nothing that is found on the wall reaches navigation, and the advice is made of situations alone, so values go one way:
-//! [`Placer::tick`] fills a [`PlacedTick`], [`Advising::advise`] makes its advice, and [`Loop::tick_placed`] does the rest of the
-//! tick. In the order of the ticks that gives what [`Loop::tick`] gives, bit for bit, wherever each part runs; and several loops
-//! that differ in what they ask of the wall alone can share one placer.
+//! Results on the wall don't affect navigation, and the advice depends on situations only, so data flows in
+//! one direction. [`Placer::tick`] fills a [`PlacedTick`], [`Advising::advise`] makes its advice, and
+//! [`Loop::tick_placed`] does the rest of the tick. In the order of the ticks the results equal those of
+//! [`Loop::tick`] bit for bit, wherever each part runs. Several loops that differ only in target or sections
+//! can share one placer.
 
 use bevy_ecs::component::{Component, Mutable};
 use bevy_ecs::entity::Entity;
@@ -30,26 +31,28 @@ use headrace_geometry::snapshot::{Restorer, Saver, SnapshotError, Stateful};
 use headrace_geometry::time::MonoNs;
 use headrace_sampling::advice::Advice;
 
-/// The lists with which a split loop was armed: they have room for any tick's, and wait until it is whole again.
+/// Lists with which a split loop was armed. They have room for any tick, and are kept until the loop is
+/// joined.
 #[derive(Debug, Resource)]
 struct KeptLists {
     lists: Lists,
     advice: Vec<Advice>,
 }
 
-/// The part from packets to placed pings: decoders, navigation, and how the heads move.
+/// Part from packets to placed pings: decoders, navigation, and motion of the heads.
 pub struct Placer {
     world: World,
     schedule: Schedule,
     readers: Vec<PortReader>,
 }
 
-/// The part that advises.
+/// Part that advises.
 pub struct Advising {
     advisor: Advisor,
 }
 
-/// What a tick's later stages need of the earlier ones. Its lists are reused from tick to tick, and grow as needed.
+/// Data of a tick that later stages need from earlier ones. Its lists are reused from tick to tick, and grow
+/// as needed.
 #[derive(Debug)]
 pub struct PlacedTick {
     now: MonoNs,
@@ -63,7 +66,7 @@ pub struct PlacedTick {
     health: Vec<SensorHealth>,
 }
 
-/// Lists that stages fill and later ones read.
+/// Lists that stages fill and later stages read.
 #[derive(Debug, Default)]
 struct Lists {
     events: Vec<Event>,
@@ -107,7 +110,7 @@ impl Default for PlacedTick {
 }
 
 impl Placer {
-    /// Processes the waiting packets up to placed pings; `now` is the end of the tick's time.
+    /// Processes the waiting packets up to placed pings. `now` is the end of the tick's time.
     pub fn tick(&mut self, now: MonoNs, into: &mut PlacedTick) {
         let Self { world, schedule, readers } = self;
         world.resource_mut::<Digests>().next_tick();
@@ -119,7 +122,7 @@ impl Placer {
         core::mem::swap(&mut world.resource_mut::<PositionedList>().0, &mut into.lists.positioned);
         core::mem::swap(&mut world.resource_mut::<PlacedList>().0, &mut into.lists.placed);
         core::mem::swap(&mut world.resource_mut::<PlacedEvents>().0, &mut into.lists.of_events);
-        // A tick's commands are limited by the room of this list, which therefore stays.
+        // The capacity of this list limits a tick's commands, so it is kept.
         into.commands.clone_from(&world.resource::<Commands>().0);
         into.tally = *world.resource::<Tally>();
         let counts = world.resource::<Console>().counts;
@@ -136,9 +139,10 @@ impl Placer {
         self.readers.iter().any(|reader| reader.peek().is_some())
     }
 
-    /// Takes over the state of another loop's placer, of the same sensors and navigation.
+    /// Copies the state of another loop's placer, with the same sensors and navigation.
     ///
-    /// Errors: the other has other sensors or another navigation; this one must not be used afterwards.
+    /// Errors: the other placer has other sensors or another navigation. This one must not be used
+    /// afterwards.
     pub fn take_over(&mut self, other: &Self) -> Result<(), SnapshotError> {
         let mut to = Saver::default();
         to.part("placer");
@@ -149,7 +153,7 @@ impl Placer {
         let mut from = Restorer::new(&bytes);
         from.part("placer")?;
         STATE.iter().try_for_each(|kind| (kind.restore)(&mut self.world, &mut from))?;
-        if from.is_empty() { Ok(()) } else { Err(from.unfit("there is more of it".to_owned())) }
+        if from.is_empty() { Ok(()) } else { Err(from.unfit("it has extra bytes at its end".to_owned())) }
     }
 
     fn state_of<T: Component + Stateful>(world: &World, to: &mut Saver) {
@@ -169,13 +173,13 @@ impl Placer {
     }
 }
 
-/// How a kind of component of a [`Placer`] is saved and restored.
+/// Functions that save and restore a kind of component of a [`Placer`].
 struct PlacerState {
     save: fn(&World, &mut Saver),
     restore: fn(&mut World, &mut Restorer<'_>) -> Result<(), SnapshotError>,
 }
 
-/// The state that [`Loop::join`] takes back, but for the readings' speed of sound.
+/// State that [`Loop::join`] takes back, except the readings' speed of sound.
 const STATE: [PlacerState; 6] = [
     PlacerState { save: Placer::state_of::<Navigator>, restore: Placer::restore_of::<Navigator> },
     PlacerState { save: Placer::state_of::<SensorDecoder>, restore: Placer::restore_of::<SensorDecoder> },
@@ -189,7 +193,7 @@ const STATE: [PlacerState; 6] = [
 ];
 
 impl Advising {
-    /// The advice of a tick; of every tick once and in order.
+    /// Advice for a tick. Every tick must be passed once and in order.
     pub fn advise(&mut self, tick: &PlacedTick, into: &mut Vec<Advice>) {
         let begun = tick.tally.span.map(|(first, _)| first);
         self.advisor.fill(&tick.lists.placed, begun, into);
@@ -197,11 +201,12 @@ impl Advising {
 }
 
 impl Loop {
-    /// Parts of this loop for other threads, until they are put back by [`Loop::join`]; `None` if a plugin has systems in a stage
-    /// that places pings, or the loop is split already.
+    /// Splits off parts of this loop for other threads, until [`Loop::join`] puts them back.
     ///
-    /// Until then [`Loop::tick_placed`] takes the place of [`Loop::tick`], the loop can't be saved, and what decoders and
-    /// navigation have beyond the last tick's results isn't there: [`Loop::fix`] and [`Loop::consistency`] panic.
+    /// `None` if a plugin has systems in a stage that places pings, or if the loop is already split. While it
+    /// is split, [`Loop::tick_placed`] replaces [`Loop::tick`] and the loop can't be saved. The state of
+    /// decoders and navigation beyond the last tick's results is elsewhere: [`Loop::fix`] and
+    /// [`Loop::consistency`] panic.
     pub fn split(&mut self) -> Option<(Placer, Advising)> {
         if self.is_split() || self.has_own_placing {
             return None;
@@ -219,18 +224,21 @@ impl Loop {
         Some((Placer { world: placing, schedule, readers: core::mem::take(readers) }, Advising { advisor }))
     }
 
-    /// Whether parts of the loop are elsewhere.
+    /// Whether parts of the loop are split off.
     pub fn is_split(&self) -> bool {
         self.resource::<PlacedElsewhere>().is_some()
     }
 
-    /// Runs the later stages of a tick, with its advice. False if an outlet that is behind holds its packets back: then this was
-    /// a tick of no packets, and the same is to be tried again a little later.
+    /// Runs the later stages of a tick with its advice.
+    ///
+    /// Returns false if a lagging outlet holds the tick's packets back. This call was then a tick without
+    /// packets; try the same tick again a little later.
     pub fn tick_placed(&mut self, tick: &PlacedTick, advice: &[Advice]) -> bool {
         self.tick_with(tick, &mut |world| tick.lists.copy_to(world, advice))
     }
 
-    /// The same for a tick that no other loop needs: its lists are exchanged with those of the last.
+    /// Runs the later stages of a tick that no other loop needs: its lists are swapped with those of the last
+    /// tick.
     pub fn tick_taken(&mut self, tick: &mut PlacedTick, advice: &mut Vec<Advice>) -> bool {
         let mut lists = core::mem::take(&mut tick.lists);
         let is_taken = self.tick_with(tick, &mut |world| lists.swap(world, advice));
@@ -259,7 +267,7 @@ impl Loop {
         is_taken
     }
 
-    /// Puts the parts back, after the last tick that they have worked on.
+    /// Puts the parts back after the last tick that they have processed.
     pub fn join(&mut self, placer: Placer, advising: Advising) {
         let Placer { world: mut placing, readers, .. } = placer;
         let (world, own) = self.split_world();
@@ -283,7 +291,7 @@ impl Loop {
     }
 }
 
-/// The world of a loop's [`Placer`].
+/// World of a loop's [`Placer`].
 fn placing_world(world: &mut World) -> World {
     let mut placing = World::new();
     let of = world.resource::<VehicleEntities>().clone();
@@ -323,7 +331,7 @@ fn placing_world(world: &mut World) -> World {
     placing
 }
 
-/// The counts of a tick's earlier stages, and what else is small.
+/// Copies the counts and other small data of a tick's earlier stages.
 fn hand_over(world: &mut World, tick: &PlacedTick) {
     refill(&mut world.resource_mut::<Commands>().0, &tick.commands);
     let mut tally = world.resource_mut::<Tally>();

@@ -5,27 +5,27 @@ use bevy_ecs::schedule::{
     IntoScheduleConfigs, LogLevel, Schedule, ScheduleBuildSettings, SingleThreadedExecutor, SystemSet,
 };
 
-/// A stage of the tick. Systems of one stage see what all earlier stages have done with the tick's packets.
+/// A stage of the tick. Systems of one stage see all results of earlier stages for the tick's packets.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, SystemSet)]
 pub enum Stage {
-    /// Bytes to readings.
+    /// Converts bytes to readings.
     Decode,
-    /// Readings to fixes.
+    /// Converts readings to fixes.
     Navigate,
-    /// Returns to points on the wall.
+    /// Converts returns to points on the wall.
     Georeference,
-    /// Georeferenced pings to samples, passes and sections; judges sections as soon as they are due.
+    /// Converts georeferenced pings to samples, passes and sections. Judges sections as soon as they are due.
     Cover,
-    /// For plugins that read the verdicts before the advice.
+    /// Reserved for plugins that read the verdicts before the advice.
     Judge,
-    /// Speed advice.
+    /// Computes the speed advice.
     Advise,
-    /// Results to the outlets.
+    /// Publishes results to the outlets.
     Publish,
 }
 
 impl Stage {
-    /// All of them, in their order.
+    /// All stages, in order.
     pub const ALL: [Self; 7] = [
         Self::Decode,
         Self::Navigate,
@@ -36,26 +36,26 @@ impl Stage {
         Self::Publish,
     ];
 
-    /// Whether it belongs to those that place pings, which a replay may run on a thread of their own.
+    /// Whether it is one of the stages that place pings, which a replay may run on another thread.
     pub(super) fn is_placing(self) -> bool {
         matches!(self, Self::Decode | Self::Navigate | Self::Georeference)
     }
 
-    /// The stage after this one.
+    /// Next stage.
     pub fn next(self) -> Option<Self> {
         Self::ALL.into_iter().skip_while(|stage| *stage != self).nth(1)
     }
 }
 
-/// The stages that place pings run elsewhere: their lists come with the tick.
+/// Marks that the stages that place pings run elsewhere: their lists come with the tick.
 #[derive(Debug, Resource)]
 pub(super) struct PlacedElsewhere;
 
-/// The stages that place pings.
+/// Set of the stages that place pings.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, SystemSet)]
 struct Placing;
 
-/// An empty schedule of the chained stages: single-threaded; an ambiguous order of systems is an error.
+/// Empty schedule of the chained stages: single-threaded, with an ambiguous order of systems as an error.
 pub(super) fn schedule() -> Schedule {
     let mut schedule = Schedule::default();
     schedule.set_executor(SingleThreadedExecutor::new());

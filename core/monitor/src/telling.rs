@@ -1,5 +1,8 @@
-//! What is told of a dive as it happens: each situation once, neighbours as one stretch, with its end when that is known.
-//! The terminal's lines and those of `--json-lines` are made of it. Allocates: for outlets, not for a tick.
+//! Live messages about a dive: each situation once, neighbours as one stretch, and its end once that is
+//! known.
+//!
+//! The terminal's lines and those of `--json-lines` are made from them. Allocates: for outlets, not for a
+//! tick.
 
 use serde::Serialize;
 
@@ -15,106 +18,108 @@ use headrace_coverage::{
 use headrace_geometry::math::TAU;
 use headrace_geometry::time::{DurNs, MonoNs};
 
-/// Interval of the way and its metres by verdict, in data time.
+/// Interval of the messages on coverage extent and metres by verdict, in data time.
 const WAY_EVERY: DurNs = DurNs(60_000_000_000);
 
-/// Length of a run that fails for what wasn't told of it from which that is told, m.
+/// Length of a run with an unreported cause from which that cause is reported, m.
 const LASTS_M: f64 = 1.0;
 
-/// Something to tell. Field names are the contract of `--json-lines`; lengths in m.
+/// A live message. The field names are the contract of `--json-lines`. Lengths are in m.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 #[serde(tag = "type", rename_all = "snake_case")]
 pub enum Told {
-    /// Sections were missed: where they begin. Of a run that goes on for another cause, again: where that one begins.
+    /// Sections were missed. It is repeated if a run continues for another cause, from where that cause
+    /// begins.
     Flag {
         /// Number of the run.
         run: u32,
-        /// Where it begins.
+        /// Beginning.
         from_m: f64,
-        /// Why, the main cause.
+        /// Main cause.
         cause: Cause,
         /// All causes.
         causes: Causes,
-        /// What its text needs.
+        /// Figures for its text.
         #[serde(skip)]
         missed: Missed,
     },
-    /// The bounds of the run flagged last.
+    /// Ends of the last flagged run.
     FlagEnds {
         /// Number of the run.
         run: u32,
-        /// Where it begins.
+        /// Beginning.
         from_m: f64,
-        /// Where it ends.
+        /// End.
         to_m: f64,
         /// Metres of it that fail.
         failed_m: f64,
     },
-    /// A stretch that was missed was passed again, and none of it fails any more.
+    /// A missed stretch was passed again, and none of it fails any more.
     Cleared {
         /// Number of the run that was flagged.
         run: u32,
-        /// Where it began.
+        /// Beginning.
         from_m: f64,
-        /// Where it ended.
+        /// End.
         to_m: f64,
     },
-    /// Nothing can be said of a stretch, which goes on.
+    /// A stretch without a verdict has begun.
     CannotSay(UnsureStretch),
-    /// The bounds of the stretch of which nothing could be said.
+    /// Ends of a stretch without a verdict.
     CannotSayEnds(UnsureStretch),
-    /// Not all heads have been here, where the way begins or turns back, and the vehicle is well beyond.
+    /// Not all heads have passed the place where the vehicle began or turned back, and the vehicle is well
+    /// beyond it.
     NotInspected(UnsureStretch),
     /// An alert about the dive as a whole.
     Alert {
-        /// Its kind.
+        /// Kind.
         kind: &'static str,
-        /// The head that isn't believed.
+        /// Distrusted head.
         head: Option<String>,
-        /// Where.
+        /// Place.
         x_m: f64,
-        /// Its text.
+        /// Text.
         text: String,
     },
     /// An alert of the list has changed.
     AlertChange {
         /// Kind of change.
         change: AlertChange,
-        /// The alert, as it was then.
+        /// The alert as it was at that time.
         alert: Box<ListedAlertJson>,
     },
-    /// Somebody has put down a note.
+    /// A note was added.
     Note(NoteJson),
-    /// The way so far.
+    /// Present coverage extent.
     Way {
-        /// Where it begins.
+        /// Beginning.
         from_m: f64,
-        /// Where it ends.
+        /// End.
         to_m: f64,
-        /// Metres by state.
+        /// Metres by verdict.
         metres: LiveMetres,
     },
 }
 
-/// Makes what is told of the loop's notices.
+/// Converts the loop's notices to live messages.
 #[derive(Debug, Default)]
 pub struct Teller {
-    /// The run that was flagged last, with the causes that were told of it, until its end is told.
+    /// Last flagged run with its reported causes, until its end is reported.
     run: Option<(RunId, Causes)>,
-    /// The stretches that were told as missed, until none of them fails any more.
+    /// Stretches reported as missed, until none of them fails any more.
     missed: Vec<ToldMissed>,
-    /// The stretch that was told last, until its end is.
+    /// Last reported unsure stretch, until its end is reported.
     unsure: Option<Stretch>,
-    /// It was told as one whose errors matter most.
+    /// It was reported as one in which the error matters most.
     told_as_error: bool,
-    /// The stretches whose ends have been told.
+    /// Stretches with reported ends.
     told: Vec<Stretch>,
-    /// Sections at an end of the way, until the vehicle is well beyond.
+    /// Sections at an end of the coverage extent, until the vehicle is well beyond.
     at_ends: Option<Stretch>,
     way_told: Option<MonoNs>,
 }
 
-/// Sections that were told as missed, from the first to before the last that ever failed.
+/// Sections reported as missed, from the first to before the last that ever failed.
 #[derive(Debug, Clone, Copy)]
 struct ToldMissed {
     run: RunId,
@@ -129,12 +134,12 @@ impl ToldMissed {
 }
 
 impl Teller {
-    /// Forgets what goes on: playback has jumped.
+    /// Resets all state after a jump of the playback.
     pub fn forget(&mut self) {
         *self = Self::default();
     }
 
-    /// Takes a notice; `tell` gets what it means.
+    /// Processes a notice, and calls `tell` with the messages that follow from it.
     pub fn hear(&mut self, notice: &Notice, dive: &Loop, tell: &mut dyn FnMut(Told)) {
         match notice {
             Notice::Advice(_) => {}
@@ -166,11 +171,11 @@ impl Teller {
         }
     }
 
-    /// Tells what is due by the live state, after every tick.
+    /// Reports what is due by the live state, after every tick.
     pub fn tick(&mut self, state: &LiveState, dive: &Loop, tell: &mut dyn FnMut(Told)) {
         let Some(at) = state.at else { return };
         let sections = &dive.coverage().sections;
-        // Counted from the first beat, as there is nothing to tell then.
+        // Counted from the first update, when there is nothing to report.
         let since = *self.way_told.get_or_insert(at);
         if at.since(since).0.abs() >= WAY_EVERY.0 && state.metres.way_m() > 0.0 {
             self.way_told = Some(at);
@@ -178,7 +183,7 @@ impl Teller {
             let (from_m, to_m) = (sections.bounds_m(range.start).0, sections.bounds_m(range.end).0);
             tell(Told::Way { from_m, to_m, metres: state.metres });
         }
-        // That of a circle with the same perimeter.
+        // Diameter of a circle with the same perimeter.
         let width_m = 2.0 * dive.mission().profile.perimeter_m() / TAU;
         if let (Some(ends), Some(x_m)) = (self.at_ends, state.chainage_m) {
             let off_m = (sections.bounds_m(ends.from).0 - x_m).max(x_m - sections.bounds_m(ends.to).0);
@@ -188,7 +193,7 @@ impl Teller {
         }
     }
 
-    /// Tells the ends of what goes on, at the end of a dive.
+    /// Reports the ends of open stretches at the end of a dive.
     pub fn end(&mut self, sections: &Sections, tell: &mut dyn FnMut(Told)) {
         self.close_run(sections, tell);
         self.close_unsure(sections, tell);
@@ -196,7 +201,7 @@ impl Teller {
 
     fn tell_ends(&mut self, sections: &Sections, tell: &mut dyn FnMut(Told)) {
         let Some(ends) = self.at_ends.take() else { return };
-        // Some may have been seen since.
+        // Some sections may have been inspected since.
         let still = (ends.from..ends.to).filter_map(|index| sections.unsure(index));
         let mut still = still.filter(|here| here.why == Unsure::NotInspected);
         let Some(mut all) = still.next() else { return };
@@ -211,7 +216,7 @@ impl Teller {
 
     fn note_unsure(&mut self, section: i64, sections: &Sections, tell: &mut dyn FnMut(Told)) {
         let section_m = sections.section_m();
-        // That at an end is told later, if it still is so.
+        // A section at an end of the extent is reported later, if it remains unsure.
         let is_settled = sections.get(section).is_some_and(|section| section.settled);
         let lasts = |here: &Stretch| is_settled || here.why == Unsure::NotInspected;
         let Some(here) = sections.unsure(section).filter(lasts) else {
@@ -223,7 +228,8 @@ impl Teller {
             return;
         };
         let is_told = |told: &Stretch| told.why == here.why && (told.from..told.to).contains(&section);
-        // Who was told that it is missed is on his way back: what half of a pass makes of it is no news.
+        // The pilot is on the way back to a missed stretch, so an intermediate result of half a pass is not
+        // reported.
         let is_missed =
             |told: &ToldMissed| here.why != Unsure::NotInspected && (told.from..told.to).contains(&section);
         if self.told.iter().any(is_told) || self.missed.iter().any(is_missed) {
@@ -239,7 +245,7 @@ impl Teller {
         if let Some(last) = &mut self.unsure
             && (is_told(last) || last.join(&here, section_m))
         {
-            // What the first sections wait for isn't what most of it does.
+            // The reason of the first sections may differ from that of most.
             if self.told_as_error && !last.is_mostly_error() {
                 self.told_as_error = false;
                 tell(Told::CannotSay(UnsureStretch::of(last, sections)));
@@ -258,7 +264,7 @@ impl Teller {
         }
     }
 
-    /// Tells the end of the run flagged last once a section that is too far away to be of it doesn't fail.
+    /// Reports the end of the last flagged run once a section beyond it doesn't fail.
     fn close_run_at(&mut self, section: i64, sections: &Sections, tell: &mut dyn FnMut(Told)) {
         // An open section may still join the run.
         let other = |section: &Section| !section.is_flagged() && section.verdict != Verdict::Open;
@@ -281,7 +287,7 @@ impl Teller {
         let sections = &dive.coverage().sections;
         let Some(run) = sections.runs().get(id) else { return };
         match change {
-            // A part of what was told is no other stretch.
+            // A part of a reported stretch is no new stretch.
             RunChange::Raised if self.missed.iter().any(|told| told.meets(run)) => {}
             RunChange::Raised => {
                 self.close_run(sections, tell);
@@ -305,7 +311,7 @@ impl Teller {
         }
     }
 
-    /// Takes a run that has grown into what was told of it; stretches that have met are one.
+    /// Merges a grown run into the reported stretches that it meets.
     fn widen(&mut self, run: &Run) {
         let mut met = self.missed.iter().filter(|told| told.meets(run));
         let Some(mut whole) = met.next().copied() else { return };
@@ -317,7 +323,7 @@ impl Teller {
         self.missed.push(whole);
     }
 
-    /// Tells the end of a stretch that was missed, as it was told, and then what can't be said of it.
+    /// Reports the end of a missed stretch with its reported ends, and then its parts without a verdict.
     fn clear(&mut self, run: &Run, sections: &Sections, tell: &mut dyn FnMut(Told)) {
         let Some(at) = self.missed.iter().position(|told| told.meets(run)) else { return };
         let Some(told) = self.missed.get(at).copied() else { return };
@@ -333,7 +339,9 @@ impl Teller {
         self.close_unsure(sections, tell);
     }
 
-    /// Tells a run anew once a metre of it fails for what wasn't told: who has done what was told may still miss the wall.
+    /// Reports a run again once a metre of it fails for an unreported cause.
+    ///
+    /// Following the earlier advice may still miss that wall.
     fn tell_other_cause(&mut self, id: RunId, run: &Run, dive: &Loop, tell: &mut dyn FnMut(Told)) {
         let sections = &dive.coverage().sections;
         let Some((_, told)) = self.run.as_mut().filter(|(last, _)| *last == id) else { return };
@@ -351,14 +359,15 @@ impl Teller {
     }
 }
 
-/// A stretch by what its sections are now, each once, with the bounds that it was told with; as it was where none is unsure any more.
+/// A stretch by the present state of its sections, with its reported ends; as reported if none is unsure any
+/// more.
 fn as_it_is(told: &Stretch, sections: &Sections) -> Stretch {
     let each = (told.from..told.to).filter_map(|index| sections.unsure(index));
     let mut each = each.filter(|here| here.why == told.why);
     let Some(mut now) = each.next() else { return *told };
     (now.from, now.to) = (told.from, told.to);
     for here in each {
-        // All of them are within these bounds.
+        // All sections are within these bounds.
         if !now.join(&here, sections.section_m()) {
             break;
         }
@@ -366,7 +375,7 @@ fn as_it_is(told: &Stretch, sections: &Sections) -> Stretch {
     now
 }
 
-/// What is told of a run from one of its sections on.
+/// Message for a run from one of its sections on.
 fn flag(id: RunId, run: &Run, section: i64, evidence: &Evidence, dive: &Loop) -> Told {
     let sections = &dive.coverage().sections;
     let from_m = sections.bounds_m(section).0;

@@ -1,41 +1,41 @@
-//! A stretch of which neither a pass nor a fail can be told, and its words. Allocates: for outlets, not for a tick.
+//! An unsure stretch and its texts. Allocates: for outlets, not for a tick.
 
 use serde::Serialize;
 
 use headrace_coverage::{Driven, Sections, Stretch, Unsure};
 
-/// A stretch of which neither a pass nor a fail can be told.
+/// A stretch that neither passes nor fails.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct UnsureStretch {
-    /// Why.
+    /// Reason.
     pub why: Unsure,
-    /// Where it begins, m.
+    /// Beginning, m.
     pub from_m: f64,
-    /// Where it ends, m.
+    /// End, m.
     pub to_m: f64,
-    /// Its metres that are unsure.
+    /// Metres of it that are unsure.
     pub metres_m: f64,
-    /// Its largest hole, m.
+    /// Largest hole, m.
     pub hole_m: f64,
     /// Standard deviation of that hole, m.
     pub hole_sd_m: f64,
-    /// By how much the hole may be larger or smaller: the confidence times its standard deviation, m.
+    /// Error of that hole: the confidence times its standard deviation, m.
     pub hole_error_m: f64,
-    /// How the section with that hole was driven.
+    /// Driving figures of the section with that hole.
     #[serde(skip)]
     pub driven: Driven,
-    /// In most of its sections the error matters more than the hole.
+    /// The error matters more than the hole in most of its sections.
     #[serde(skip)]
     pub is_mostly_error: bool,
 }
 
 impl UnsureStretch {
-    /// From a stretch of sections.
+    /// Creates it from a stretch of sections.
     pub fn of(stretch: &Stretch, sections: &Sections) -> Self {
         Self::from_sections(stretch, sections.section_m(), sections.confidence_sd())
     }
 
-    /// The same with the length of a section, m, and the confidence, standard deviations.
+    /// Creates it with the length of a section, m, and the confidence, standard deviations.
     pub(super) fn from_sections(stretch: &Stretch, section_m: f64, confidence_sd: f64) -> Self {
         let [hole_m, hole_sd_m] = stretch.largest().hole_m;
         Self {
@@ -52,7 +52,7 @@ impl UnsureStretch {
     }
 }
 
-/// Why nothing can be said of a stretch, with its figures.
+/// Reason for which a stretch has no verdict, with its figures.
 pub fn unsure_text(stretch: &UnsureStretch) -> String {
     match stretch.why {
         Unsure::NotInspected => format!("{:.2} m not seen from both sides", stretch.metres_m),
@@ -68,10 +68,10 @@ pub fn unsure_text(stretch: &UnsureStretch) -> String {
     }
 }
 
-/// Shares of the speed that fits within which a speed is that one.
+/// Ratios to the fitting speed between which a speed counts as equal to it.
 const AS_FITS: [f64; 2] = [0.98, 1.02];
 
-/// What would help; empty where nothing does.
+/// Text of the remedy; empty if there is none.
 pub fn helps_text(stretch: &UnsureStretch) -> String {
     let surer = "pass it again with a more certain position";
     let helps = match stretch.why {

@@ -1,11 +1,12 @@
-//! Recordings of voice notes: what one may be. The loop has the notes alone; recordings go from the page to the log beside it.
+//! Recordings of voice notes: limits and formats. The loop has only the notes; recordings go from the page
+//! straight to the log.
 
 /// Longest recording, seconds.
 pub const MAX_VOICE_S: u32 = 60;
-/// Longest recording, bytes: at 24 kbit/s a minute has 180 kB.
+/// Longest recording, bytes. At 24 kbit/s a minute takes 180 kB.
 pub const MAX_VOICE_BYTES: usize = 512 << 10;
 
-/// The container of a recording. What browsers record is Opus in WebM or Ogg, or AAC in MP4.
+/// Container of a recording. Browsers record Opus in WebM or Ogg, or AAC in MP4.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Container {
     /// WebM.
@@ -17,16 +18,17 @@ pub enum Container {
 }
 
 impl Container {
-    /// All, in order.
+    /// All containers, in order.
     pub const ALL: [Self; 3] = [Self::Webm, Self::Ogg, Self::Mp4];
 
-    /// Of a media type, with or without parameters: `audio/webm;codecs=opus`. `None` for any that isn't allowed.
+    /// Container of a media type, with or without parameters: `audio/webm;codecs=opus`. `None` if the type
+    /// isn't allowed.
     pub fn of_media_type(text: &str) -> Option<Self> {
         let essence = text.split(';').next().unwrap_or_default().trim();
         Self::ALL.into_iter().find(|container| container.media_type().eq_ignore_ascii_case(essence))
     }
 
-    /// Its media type.
+    /// Media type.
     pub fn media_type(self) -> &'static str {
         match self {
             Self::Webm => "audio/webm",
@@ -35,7 +37,7 @@ impl Container {
         }
     }
 
-    /// What the names of its files end with.
+    /// Extension of its files.
     pub fn extension(self) -> &'static str {
         match self {
             Self::Webm => "webm",
@@ -44,7 +46,7 @@ impl Container {
         }
     }
 
-    /// Whether bytes begin as such a file does.
+    /// Whether bytes begin like such a file.
     ///
     /// Source: RFC 8794 section 11.2 (EBML), RFC 3533 section 6, ISO/IEC 14496-12 section 4.3.
     pub fn holds(self, bytes: &[u8]) -> bool {
@@ -59,41 +61,41 @@ impl Container {
 /// The recording of a voice note.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Voice {
-    /// The note's; not 0.
+    /// Id of the note; not 0.
     pub id: u32,
-    /// How long it is, seconds.
+    /// Length, seconds.
     pub seconds: u32,
-    /// What its bytes are.
+    /// Container of the audio.
     pub container: Container,
-    /// The file.
+    /// Contents of the file.
     pub audio: Vec<u8>,
 }
 
-/// Why something is no recording of a voice note.
+/// Reason for refusing a recording of a voice note.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum VoiceError {
-    /// No id.
-    #[error("a voice note's id is 0; expected 1 to 4294967295")]
+    /// The id is 0.
+    #[error("a voice note has the id 0; expected 1 to 4294967295")]
     Id,
-    /// Too long or too short.
+    /// It is too long or too short.
     #[error("a voice note of {0} s; expected 1 to {MAX_VOICE_S} s")]
     Seconds(u32),
-    /// Too large.
-    #[error("a voice note of {0} bytes; at most {MAX_VOICE_BYTES}")]
+    /// It is too large.
+    #[error("a voice note of {0} bytes; at most {MAX_VOICE_BYTES} bytes are allowed")]
     Bytes(usize),
-    /// Of another type.
+    /// The media type isn't allowed.
     #[error("a voice note of type {0:?}; expected audio/webm, audio/ogg or audio/mp4")]
     Type(String),
-    /// Of another type than it says.
-    #[error("a voice note's bytes aren't {0}, as its type says")]
+    /// The contents don't match the stated type.
+    #[error("a voice note's bytes aren't {0} as its type states; send the file with its own type")]
     Contents(&'static str),
 }
 
 impl Voice {
-    /// Holds it to what a recording may be.
+    /// Checks it against the limits of a recording.
     ///
-    /// Errors: the first that isn't so.
+    /// Errors: the first violation.
     pub fn checked(self) -> Result<Self, VoiceError> {
         if self.id == 0 {
             return Err(VoiceError::Id);
@@ -120,7 +122,7 @@ mod tests {
     }
 
     #[test]
-    fn only_what_browsers_record_is_a_voice() {
+    fn only_browser_recordings_are_accepted() {
         for (text, container) in [
             ("audio/webm;codecs=opus", Some(Container::Webm)),
             (" Audio/OGG ; codecs=opus", Some(Container::Ogg)),
@@ -137,7 +139,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_out_of_bounds_is_named() {
+    fn violated_limit_is_named() {
         assert!(voice(b"OggS and so on").checked().is_ok());
         assert_eq!(Voice { id: 0, ..voice(b"OggS") }.checked(), Err(VoiceError::Id));
         assert_eq!(Voice { seconds: 61, ..voice(b"OggS") }.checked(), Err(VoiceError::Seconds(61)));

@@ -1,4 +1,4 @@
-//! Verdicts of a dive's samples for other targets and section lengths.
+//! Alternatives: verdicts on a dive's samples for other targets and section lengths.
 
 use headrace_coverage::Verdict;
 use serde::Serialize;
@@ -20,12 +20,12 @@ pub struct WhatIfReport {
     pub cannot_say_m: f64,
     /// Metres that would still be open.
     pub open_m: f64,
-    /// Metres that wouldn't have been seen from both sides.
+    /// Metres that not all heads would have passed.
     pub not_inspected_m: f64,
 }
 
 impl Loop {
-    /// Verdicts for another target as of now, by section, of those whose hole has been measured.
+    /// Present verdicts for another target, by section, of those whose hole has been measured.
     pub fn verdicts_at(&self, target_m: f64) -> Vec<(i64, Verdict)> {
         self.coverage().sections.verdicts_at(target_m, &self.outlook()).collect()
     }

@@ -31,11 +31,11 @@ pub use search::SPEED_MARGIN;
 /// Maximum number of modes per head with alternatives.
 pub const MAX_MODES: usize = 8;
 
-/// Advice updates per recomputation of the alternatives.
+/// Number of advice updates per recomputation of the alternatives.
 const ALTERNATIVES_EVERY: u32 = 25;
-/// Times that a speed and what it leaves to errors of position are computed from each other.
+/// Number of times that a speed and its position margin are computed from each other.
 const FALLS: u32 = 3;
-/// Below this speed, m/s, the last direction of travel is kept.
+/// Speed below which the last direction of travel is kept, m/s.
 const UNDER_WAY_MPS: f64 = 0.02;
 /// Capacity for stretches of wall out of a head's reach.
 const OUT_OF_REACH: usize = 16;
@@ -44,13 +44,13 @@ const OUT_OF_REACH: usize = 16;
 struct Fastest {
     /// The speed, m/s.
     speed_mps: f64,
-    /// The advised speed, with the margin taken off, m/s.
+    /// Advised speed after the margin for speed errors, m/s.
     advised_mps: f64,
-    /// T_y where it limits the speed, m.
+    /// T_y at the place that limits the speed, m.
     t_y_m: f64,
 }
 
-/// The inspection task that the advice is given for.
+/// The inspection task that the advice is for.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Task {
     /// Target T, m.
@@ -63,11 +63,11 @@ pub struct Task {
     pub layout: HeadLayout,
     /// Speed of sound in the tunnel's water, m/s.
     pub sound_speed_mps: f64,
-    /// How finely the advice looks at the wall, and how often anew.
+    /// Resolution and update rate of the advice's view of the wall.
     pub looks: Looks,
 }
 
-/// Computes speed advice; caches the rings of the heads until the vehicle has moved.
+/// Computes speed advice; caches the rings of the heads until the vehicle moves.
 #[derive(Debug, Clone)]
 pub struct Advisor {
     profile: Profile,
@@ -80,26 +80,26 @@ pub struct Advisor {
     /// Largest step in each mode at the centre of the tunnel, m.
     centred_m: Vec<f64>,
     parallax_rad: f64,
-    /// Ring stride of one step of each head that turns.
+    /// Ring stride of one step, for each head that turns.
     strides: [Option<usize>; MAX_HEADS],
     /// The head whose ring is checked first.
     next: usize,
-    /// Advice updates until the alternatives are recomputed, and the current alternatives.
+    /// Remaining advice updates until the alternatives are recomputed, and the current alternatives.
     until_alternatives: u32,
     alternatives: [Option<Alternative>; MAX_MODES],
     anew: Option<Anew>,
     margins: Option<Margins>,
     astern: bool,
-    /// The largest speed found last.
+    /// Largest speed found last.
     last_mps: Option<f64>,
-    /// How far the vehicle may move before rings are recast, m.
+    /// Distance that the vehicle may move before rings are recast, m.
     still_m: f64,
 }
 
 stateful!(Advisor { state: now, parallax_rad, next, until_alternatives, alternatives, anew, margins, astern, last_mps, still_m; slots: strides; each: heads, views; fixed: profile, task, modes, centred_m; });
 
 impl Advisor {
-    /// For heads with their modes, and the parts of the hull that may occlude them.
+    /// Creates it for heads with their modes, and for parts of the hull that may occlude them.
     ///
     /// Allocates: startup only.
     pub fn new(
@@ -151,7 +151,7 @@ impl Advisor {
         advisor
     }
 
-    /// A first cast allocates the buffers that later casts use; the rings are then marked as outdated.
+    /// A first cast allocates the buffers of later casts; the rings are then marked as outdated.
     fn look_from_the_middle(&mut self) {
         let [y, z] = self.profile.reference();
         let centre = Pose { position: Point3::new(0.0, y, z), attitude: Rot::identity() };
@@ -168,27 +168,29 @@ impl Advisor {
         }
     }
 
-    /// Whether it went backwards when it was last under way.
+    /// Whether the vehicle moved backwards when it last moved.
     pub fn is_astern(&self) -> bool {
         self.astern
     }
 
-    /// The angles that the vehicle hides from each head, in its sensor frame.
+    /// Angles that the vehicle hides from each head, in its sensor frame.
     pub fn hidden_angles(&self) -> impl Iterator<Item = &[AngleRange]> {
         self.heads.iter().map(|head| head.hidden.as_slice())
     }
 
-    /// Soundings of a ring per step of a head.
+    /// Number of ring soundings per step of a head.
     fn stride(&self, step_rad: f64) -> usize {
         Ring::stride(step_rad, self.task.looks.ring)
     }
 
-    /// The largest speed at which the predicted T_max stays within the target, by inverting Eq. 16 with measured
-    /// values: turn period, step, number and phases of the heads (propagated to that speed), the wall hidden by the
-    /// vehicle or out of reach, position, attitude and swing. `left_s` is the remaining time, if known.
+    /// Returns the largest speed at which the predicted T_max stays within the target.
     ///
-    /// Heads apart along the hull keep their phases in some intervals of speed only: the result is the upper end of the
-    /// highest, whatever the present speed; see [`Advice::from_mps`] and [`Advice::nearest_mps`].
+    /// It inverts Eq. 16 with measured values. These are the turn period, step, number and phases of the heads
+    /// (propagated to that speed), the wall hidden by the vehicle or out of reach, position, attitude and swing.
+    /// `left_s` is the remaining time, if known.
+    ///
+    /// Heads apart along the hull keep their phases only in some intervals of speed. The result is the upper end of
+    /// the highest interval, whatever the present speed; see [`Advice::from_mps`] and [`Advice::nearest_mps`].
     /// Source: docs/decisions/0005-advice-and-plan.md.
     /// Allocates: never.
     pub fn advise(&mut self, situation: &Situation, swing: Swing, left_s: Option<f64>) -> Advice {
@@ -267,10 +269,10 @@ impl Advisor {
         }
     }
 
-    /// Updates the heads' rings for the vehicle's pose; `false` when no head that turns has a ring.
+    /// Updates the heads' rings for the vehicle's pose; returns `false` if no turning head has a ring.
     ///
-    /// A head's ring is recast when the vehicle has moved. Of several outdated rings, one is recast per call, since the
-    /// vehicle moves little between calls.
+    /// A head's ring is recast once the vehicle has moved. If several rings are outdated, one is recast per call,
+    /// since the vehicle moves little between calls.
     fn look(&mut self, situation: &Situation, pose: &Pose) -> bool {
         let count = self.heads.len().max(1);
         let present = |number: usize| situation.heads.get(number).is_some_and(Option::is_some);
@@ -319,7 +321,7 @@ impl Advisor {
         self.now.measure(1, rings, |_, head| self.strides.get(head).copied().flatten());
     }
 
-    /// What decides whether a speed meets a target with the phases measured now.
+    /// Returns the inputs that decide whether a speed meets a target with the present phases.
     fn driving<'a>(
         &'a self,
         phasing: &'a Phasing,
@@ -341,9 +343,9 @@ impl Advisor {
         }
     }
 
-    /// The largest speed at which the phases measured now meet a target, and the speed to advise.
+    /// Returns the largest speed at which the present phases meet a target, and the speed to advise.
     ///
-    /// Errors: no speed meets it, however the heads are phased.
+    /// Errors: no speed meets it, in any phase.
     fn fastest(
         &self,
         phasing: &Phasing,
@@ -356,7 +358,7 @@ impl Advisor {
         let driving = self.driving(phasing, passes, going, sure);
         let t_y_m = match &bound {
             Ok(bound) => bound.t_y_m,
-            // At another speed heads are phased otherwise, and the swing between them is less.
+            // At another speed, heads are phased differently, and the swing between them is smaller.
             Err(SamplingError::OffAxis { .. }) => self.now.largest_step_m(0),
             Err(why) => return Err(*why),
         };
@@ -367,14 +369,14 @@ impl Advisor {
         Ok(Fastest { speed_mps, advised_mps: driving.kept_back_mps(speed_mps), t_y_m })
     }
 
-    /// How far the vehicle may move before rings are recast, m.
+    /// Distance that the vehicle may move before rings are recast, m.
     fn still_m_for(&self, fastest: &Result<Fastest, SamplingError>, going: &Going) -> f64 {
         if let Some(anew_m) = self.task.looks.anew_m {
             return anew_m;
         }
         let (t_y_m, swing_share) = match fastest {
             Ok(fastest) => (fastest.t_y_m, going.swing_mps / fastest.speed_mps.max(UNDER_WAY_MPS)),
-            // A swing too wide for any speed is also too wide from slightly aside.
+            // A swing too wide for any speed is also too wide at a slightly different position.
             Err(SamplingError::OffAxis { .. }) => (self.now.largest_step_m(0), 0.0),
             // Any step may be the limiting one.
             Err(_) => (self.task.target_m, 0.0),
@@ -382,8 +384,9 @@ impl Advisor {
         ring_cache::still_m(self.task.target_m, t_y_m, self.profile.perimeter_m() / math::TAU, swing_share)
     }
 
-    /// Computes the speed that each mode common to all heads would allow, with the heads that turn now started in
-    /// phase, and what each margin costs.
+    /// Computes the largest speed in each mode common to all heads, and the cost of each margin.
+    ///
+    /// It assumes that the heads turning now are started in phase.
     fn think_over(
         &mut self,
         phasing: &Phasing,
@@ -411,7 +414,7 @@ impl Advisor {
             };
             let v_max_mps = v_mps * (1.0 - SPEED_MARGIN);
             *slot = Some(Alternative { mode: ModeName::new(mode.name), v_max_mps });
-            // The mode in which the heads are: all that would change is where they start.
+            // In the present mode, only the start of the heads would change.
             if v_max_mps > 0.0 && phasing.fits_some_speeds() && self.is_now(mode, passes) {
                 anew = Some(Anew { planned_speed_mps: v_max_mps });
             }
@@ -420,7 +423,7 @@ impl Advisor {
         self.margins = Some(self.margins(phasing, passes, going, sure));
     }
 
-    /// Whether the heads turn in a mode.
+    /// Whether the heads turn in this mode.
     fn is_now(&self, mode: &HeadMode, passes: &Passes) -> bool {
         const SAME: f64 = 0.02;
         let stride = self.strides.iter().flatten().next().copied();
@@ -429,7 +432,7 @@ impl Advisor {
             && (passes.turn_s() - period_s).abs() < SAME * period_s
     }
 
-    /// The largest speeds with margins added one after the other.
+    /// Returns the largest speeds with margins added one after the other.
     fn margins(&self, phasing: &Phasing, passes: &Passes, going: &Going, sure: SureTarget) -> Margins {
         let target_m = self.task.target_m;
         let known = SureTarget { pass_error_m: 0.0, ..sure };
@@ -463,7 +466,9 @@ impl Advisor {
         });
     }
 
-    /// The largest speed in a mode, zero where none meets the target; `None` when a head lacks the mode.
+    /// Largest speed in a mode, m/s.
+    ///
+    /// Zero if none meets the target, `None` if a head does not have the mode.
     fn mode_speed_mps(&self, number: usize, heads: HeadSet, going: &Going, sure: SureTarget) -> Option<f64> {
         let name = self.heads.first()?.modes.get(number)?.name;
         let turn = |head: usize| self.heads.get(head)?.mode(name).map(|mode| mode.turn);
@@ -473,7 +478,7 @@ impl Advisor {
             ping_period_s = ping_period_s.max(turn(head)?.ping_period_s());
         }
         let passes = match self.task.layout {
-            // Sectors keep their size, however many heads are left.
+            // Sectors keep their size, whatever number of heads remains.
             HeadLayout::SectorOffset => {
                 Passes::in_sectors(heads, 2.0 * longest_s / self.heads.len().max(1) as f64)
             }
@@ -490,11 +495,11 @@ impl Advisor {
                 .bound_for_target(number, &passes, target_m, &going)
                 .map_or(0.0, |bound| bound.speed_mps)
         };
-        // Each speed leaves more to errors than the faster one before, until it leads to itself.
+        // Each speed has a larger position margin than the faster one before, so the iteration converges downwards.
         Some((0..FALLS).fold(bound_mps(sure.most_m()), |speed_mps, _| bound_mps(sure.at_m(speed_mps))))
     }
 
-    /// What errors of position leave of the target, with the heads as they turn now.
+    /// Returns the target less position errors, for the heads as they turn now.
     fn sure(&self, phasing: &Phasing, passes: &Passes, situation: &Situation) -> SureTarget {
         let (even_gap_s, apart_m) = (passes.even_gap_s(), phasing.apart_m());
         SureTarget {
@@ -508,13 +513,14 @@ impl Advisor {
         }
     }
 
-    /// The same with the steps of a mode.
+    /// The same with the steps of another mode.
     fn sure_in(&self, mode: usize, sure: SureTarget) -> SureTarget {
         SureTarget { t_y_m: self.modes.largest_step_m(mode), ..sure }
     }
 
-    /// The remedy: a steady heading, where that alone is enough; the centre, where the same steps are short enough
-    /// there; or the fastest mode.
+    /// Returns the remedy that is enough by itself.
+    ///
+    /// A steady heading comes first, then the centre, if its steps are short enough, then the fastest mode.
     fn remedy(&self, situation: &Situation, passes: &Passes, going: &Going, unseen: bool) -> Option<Remedy> {
         let target_m = self.task.target_m;
         let steady = Going { ping_period_s: going.ping_period_s, ..Going::default() };
@@ -538,7 +544,7 @@ impl Advisor {
     }
 }
 
-/// What each head that turns loses, by number.
+/// Chance losses of each turning head, by number.
 fn rates_of(situation: &Situation) -> [Option<LossRate>; MAX_HEADS] {
     let mut rates = [None; MAX_HEADS];
     for ((slot, motion), rate) in rates.iter_mut().zip(&situation.heads).zip(situation.losses) {

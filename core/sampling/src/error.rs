@@ -1,12 +1,12 @@
-//! Errors of sampling theory, each with its reason.
+//! Errors of sampling theory.
 
 use super::head_set::MAX_HEADS;
 
-/// Why no result can be given.
+/// Reason for a missing result.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum SamplingError {
-    /// A quantity that must be above zero isn't.
+    /// A quantity that must be positive is not.
     #[error("{what} is {value}; it must be a finite number above zero")]
     NotPositive {
         /// The quantity, with its unit.
@@ -14,7 +14,7 @@ pub enum SamplingError {
         /// Its value.
         value: f64,
     },
-    /// A quantity that must not be below zero is, or is no number.
+    /// A quantity that must not be negative is negative or not finite.
     #[error("{what} is {value}; it must be a finite number, zero or above")]
     Negative {
         /// The quantity, with its unit.
@@ -22,7 +22,7 @@ pub enum SamplingError {
         /// Its value.
         value: f64,
     },
-    /// A step that doesn't divide a turn.
+    /// The step does not divide a turn.
     #[error("a step of {step_deg} degrees doesn't divide a turn: 360 degrees are {steps} of them")]
     StepDoesNotDivide {
         /// The step, degrees.
@@ -38,14 +38,14 @@ pub enum SamplingError {
         /// Angle from the perpendicular, degrees.
         angle_deg: f64,
     },
-    /// A beam that runs along the tunnel meets no wall within a kilometre.
+    /// The beam runs along the tunnel and meets no wall within a kilometre.
     #[error("the beam at a head angle of {angle_deg} degrees runs along the tunnel and meets no wall")]
     BeamAlongTunnel {
         /// Head angle, degrees.
         angle_deg: f64,
     },
-    /// A head whose scan plane lies along the tunnel.
-    #[error("a head's axis stands across the tunnel: its beams run along it")]
+    /// The scan plane of a head lies along the tunnel.
+    #[error("a head's axis lies across the tunnel, so its beams run along it")]
     HeadAskew,
     /// A head outside the tunnel's profile.
     #[error("a head at y = {y_m:.3} m, z = {z_m:.3} m is outside the tunnel's profile")]
@@ -67,13 +67,13 @@ pub enum SamplingError {
         /// Number of heads.
         heads: usize,
     },
-    /// Heads without a common mode.
+    /// The heads have no common mode.
     #[error("the heads have no mode in common, or none at all")]
     NoCommonMode,
     /// A plan without a target, speed or time.
-    #[error("nothing is asked: give a target, a speed or a time")]
+    #[error("no question: give a target, a speed or a time")]
     NothingAsked,
-    /// Heads apart along the hull can't be phased for a vehicle that stands still.
+    /// Heads apart along the hull have no phase for a stationary vehicle.
     #[error(
         "heads {apart_m} m apart along the hull have no phase at {speed_mps} m/s; it takes a speed above zero"
     )]
@@ -85,7 +85,7 @@ pub enum SamplingError {
     },
     /// A strip of the wall that no head sees is as wide as the target.
     #[error(
-        "a target of {target_m} m is met at no speed: no head sees {width_m:.2} m of the wall, {arc_m:.2} m from the floor's centre"
+        "no speed meets a target of {target_m} m: no head sees {width_m:.2} m of the wall, {arc_m:.2} m from the floor's centre"
     )]
     UnseenStrip {
         /// The target, m.
@@ -96,16 +96,14 @@ pub enum SamplingError {
         arc_m: f64,
     },
     /// The vehicle's heading is too far off the axis, or it swings too fast.
-    #[error(
-        "a target of {target_m} m is met at no speed: so askew, or swinging so fast, passes are farther apart"
-    )]
+    #[error("no speed meets a target of {target_m} m: at this heading or swing, passes are farther apart")]
     OffAxis {
         /// The target, m.
         target_m: f64,
     },
     /// Neighbours of one turn are as far apart as the target.
     #[error(
-        "a target of {target_m} m is met at no speed: neighbours of one turn are {t_y_m:.3} m apart, whatever the speed"
+        "no speed meets a target of {target_m} m: neighbours of one turn are {t_y_m:.3} m apart, whatever the speed"
     )]
     AngularStep {
         /// The target, m.
@@ -116,7 +114,9 @@ pub enum SamplingError {
 }
 
 impl SamplingError {
-    /// The same for the target that was asked for, m, where a smaller one was tried, to leave room for errors.
+    /// Returns the error for the configured target, m.
+    ///
+    /// A smaller target was tried, to leave a margin for errors.
     #[must_use]
     pub(crate) fn of_target(mut self, asked_m: f64) -> Self {
         if let Self::UnseenStrip { target_m, .. }
@@ -129,14 +129,14 @@ impl SamplingError {
     }
 }
 
-/// `value` if it is finite and above zero.
+/// Returns `value` if it is finite and positive.
 ///
 /// Errors: [`SamplingError::NotPositive`].
 pub(crate) fn positive(what: &'static str, value: f64) -> Result<f64, SamplingError> {
     if value.is_finite() && value > 0.0 { Ok(value) } else { Err(SamplingError::NotPositive { what, value }) }
 }
 
-/// `value` if it is finite and not below zero.
+/// Returns `value` if it is finite and not negative.
 ///
 /// Errors: [`SamplingError::Negative`].
 pub(crate) fn not_negative(what: &'static str, value: f64) -> Result<f64, SamplingError> {

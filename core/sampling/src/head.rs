@@ -23,7 +23,7 @@ pub struct Turn {
 }
 
 impl Turn {
-    /// A turn of `period_s` seconds in steps of `step_rad`, from one step a turn to 100,000.
+    /// Creates a turn of `period_s` seconds in steps of `step_rad`, from 1 to 100,000 steps.
     ///
     /// Errors: a step or period that isn't above zero; a step that doesn't divide a turn.
     /// Source: Jorge et al. 2021, Eq. 3 (n = 2 pi / theta).
@@ -66,14 +66,14 @@ impl Turn {
     }
 }
 
-/// Source of a mode's period.
+/// Source of a mode's turn period.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Basis {
     /// Measured on this head at this range setting, from the vehicle file.
     Measured,
     /// The manufacturer's table, at its range setting.
     Table,
-    /// Carried over from another range setting.
+    /// Estimated from another range setting.
     Estimated,
 }
 
@@ -184,7 +184,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_turn_has_a_whole_number_of_steps() {
+    fn turn_has_a_whole_number_of_steps() {
         for (step_deg, steps) in [(0.3, 1200), (0.6, 600), (0.9, 400), (1.2, 300), (2.4, 150), (360.0, 1)] {
             let turn = Turn::new(f64::to_radians(step_deg), 8.0).unwrap();
             assert_eq!(turn.steps(), steps);
@@ -194,7 +194,7 @@ mod tests {
     }
 
     #[test]
-    fn what_makes_no_turn_is_named() {
+    fn invalid_turn_names_the_cause() {
         let why =
             |step_deg: f64, period_s| Turn::new(step_deg.to_radians(), period_s).unwrap_err().to_string();
         assert!(why(0.7, 8.0).starts_with("a step of 0.7"), "{}", why(0.7, 8.0));

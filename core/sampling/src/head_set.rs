@@ -1,4 +1,4 @@
-//! Sets of a vehicle's heads.
+//! Sets of heads of a vehicle.
 
 use serde::{Deserialize, Serialize};
 
@@ -73,7 +73,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_set_of_heads_counts_and_lists_them() {
+    fn head_set_counts_and_lists_its_heads() {
         let set = HeadSet::first(4).without(1).with(7).with(99);
         assert_eq!(set.iter().collect::<Vec<_>>(), [0, 2, 3, 7]);
         assert_eq!(HeadSet::from_bits(set.bits()), set);

@@ -1,4 +1,4 @@
-//! Interference of heads: how long they can hear each other, face to face or on the same patch of wall.
+//! Interference: how long two heads can hear each other, directly or by the same patch of wall.
 
 use super::error::SamplingError;
 use super::head::HeadSpec;
@@ -22,9 +22,9 @@ pub struct Exposure {
     pub of_s: f64,
 }
 
-/// Exposure of each pair of heads that follow a schedule, with the vehicle at `pose`; pairs without any are left out.
+/// Returns the exposure of each pair of heads that follow a schedule, with the vehicle at `pose`.
 ///
-/// Heads at one position are idealised ones, and have none.
+/// Pairs without exposure are omitted. Heads at the same position are idealised and have none.
 /// Errors: a head outside the profile, or a beam along the tunnel.
 pub fn exposures(
     heads: &[HeadSpec],
@@ -65,7 +65,7 @@ pub fn exposures(
 struct Pair<'a> {
     specs: [&'a HeadSpec; 2],
     standing: [Standing<'a>; 2],
-    /// From the first head to the second, in the body's frame and in the tunnel's.
+    /// Vector from the first head to the second, in the body frame and in the tunnel frame.
     apart: Vec3<Body>,
     apart_in_tunnel: Vec3<Tunnel>,
 }
@@ -128,37 +128,38 @@ mod tests {
     }
 
     #[test]
-    fn heads_side_by_side_half_a_turn_apart_always_face_each_other() {
+    fn side_by_side_heads_half_a_turn_apart_face_each_other() {
         let found = found(&[[0.0, 0.15, 0.0], [0.0, -0.15, 0.0]], HeadLayout::PhaseShift);
         assert_eq!(found.len(), 1);
-        // Each looks at the other for 2 (0.7 + asin(0.04 / 0.3)) degrees = 16.7 of a turn of 8 s, once.
+        // Each looks at the other once per turn of 8 s, for 2 (0.7 + asin(0.04 / 0.3)) degrees = 16.7.
         assert!((found[0].facing_s - 8.0 * 16.73 / 360.0).abs() < 0.025, "{:?}", found[0]);
         assert_eq!((found[0].same_patch_s, found[0].of_s), (0.0, 8.0));
     }
 
     #[test]
-    fn a_quarter_turn_apart_they_never_do() {
+    fn side_by_side_heads_a_quarter_turn_apart_never_face_each_other() {
         let places = [[0.0, 0.15, 0.0], [0.0, -0.15, 0.0], [1.0, 0.0, 0.0], [1.0, 0.5, 0.0]];
         let pair = |exposure: &Exposure| exposure.heads == (0, 1);
         assert!(!found(&places, HeadLayout::PhaseShift).iter().any(pair));
     }
 
     #[test]
-    fn heads_in_neighbouring_sectors_meet_at_no_place_at_one_time() {
+    fn heads_in_neighbouring_sectors_never_share_a_patch() {
         let found = found(&[[0.0, 0.15, 0.0], [0.0, -0.15, 0.0]], HeadLayout::SectorOffset);
         assert!(found.is_empty(), "{found:?}");
     }
 
     #[test]
-    fn heads_that_look_the_same_way_share_a_patch() {
-        // A fifth of a metre apart along the hull and going as far in half a turn, both are at one angle always.
+    fn heads_that_look_the_same_way_share_a_patch_of_wall() {
+        // Time that two heads `apart_m` apart along the hull share a patch, s.
         let shared = |apart_m: f64| {
             let found = found(&[[apart_m, 0.0, 0.0], [0.0, 0.0, 0.1]], HeadLayout::PhaseShift);
             found.iter().map(|exposure| exposure.same_patch_s).sum::<f64>()
         };
-        // 0.2 m/s, 8 s a turn: 0.8 m in half a turn; there the footprints are too far apart.
+        // At 0.2 m/s and 8 s per turn, the vehicle travels 0.8 m in half a turn. That far apart, footprints never overlap.
         assert!(shared(0.8) <= 0.0);
-        // A beam is 0.15 m wide at 6 m, and wider on the floor: 0.1 m apart, near but for half a turn of angle.
+        // A beam is 0.15 m wide at 6 m, and wider on the floor. Heads 0.1 m apart are near enough, but their angles are
+        // half a turn apart.
         assert!(shared(0.1) <= 0.0);
         let heads = heads(&[[0.1, 0.0, 0.0], [0.0, 0.0, 0.1]]);
         let profile = shapes::ceran().unwrap();

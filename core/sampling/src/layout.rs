@@ -26,7 +26,7 @@ impl HeadLayout {
         }
     }
 
-    /// Checks that this number of heads can have this layout.
+    /// Checks whether this number of heads can have this layout.
     ///
     /// Errors: no head, more than [`MAX_HEADS`], or sectors for fewer than two.
     pub fn check(self, heads: usize) -> Result<(), SamplingError> {
@@ -53,8 +53,9 @@ pub fn turned_over_rad(rate_radps: f64, x_m: f64, speed_mps: f64) -> Result<f64,
     turned.is_finite().then_some(turned).ok_or(SamplingError::NoPhaseAtRest { apart_m: x_m, speed_mps })
 }
 
-/// gamma: start angle of a head `x_m` behind the foremost, such that its phase is `phase_rad` where it passes the same
-/// place; in [0, 2 pi). Accurate to about 1e-16 of the angle turned meanwhile.
+/// gamma: start angle of a head `x_m` behind the foremost one, in [0, 2 pi).
+///
+/// Its phase is `phase_rad` where it passes the same place. Accurate to about 1e-16 of the angle turned meanwhile.
 ///
 /// Errors: as for [`turned_over_rad`]; a phase that isn't finite.
 /// Source: Jorge et al. 2021, Eq. 20 (gamma = phi(k) - omega x / v).
@@ -79,7 +80,7 @@ pub fn start_reversed_rad(
 /// Angles closer together than this are equal, radians.
 const ROUNDING_RAD: f64 = 1e-9;
 
-/// Number of steps to cover `far_rad`, the last one being shorter where they don't divide it.
+/// Number of steps to cover `far_rad`; the last one is shorter if they do not divide it.
 pub(super) fn steps_over(far_rad: f64, step_rad: f64) -> i64 {
     -math::floor_to_i64(-(far_rad / step_rad - 1e-6))
 }
@@ -106,11 +107,12 @@ pub struct Sector {
     pub reversed: bool,
 }
 
-/// The angle of a head when the first, in sector 0, is at `lead`, such that both are at the same point of their sweep
-/// where they pass the same place.
+/// Returns the angle at which a head is in step with the first one.
 ///
-/// `turn_s` is the turn period T; a sector's sweep there and back takes 2 T / s. `speed_mps` of zero stands for a delay
-/// of zero: heads move in step, at right angles for four of them, regardless of their positions along the hull.
+/// Both are at the same point of their sweep where they pass the same place. The first head, in sector 0, is at
+/// `lead`. `turn_s` is the turn period T; a sweep there and back in a sector takes 2 T / s. A `speed_mps` of zero
+/// means no delay: heads move in step, at right angles for four of them, regardless of their positions along the
+/// hull.
 /// Errors: fewer than two sectors, a number that isn't one of them, a lead outside sector 0, a time that isn't above
 /// zero, a speed below zero.
 /// Source: Jorge et al. 2021, Algorithm 1, with one name for the sector's size and 2 T / s for its period.
@@ -146,10 +148,10 @@ pub fn in_step(
     Ok(InSector { angle_rad: math::wrap(angle_rad, TAU), growing: growing != sector.reversed })
 }
 
-/// Sector of each head, chosen so that heads look outwards, away from their neighbours.
+/// Assigns a sector to each head such that heads look outwards, away from their neighbours.
 ///
-/// Maximizes the sum over the heads of offset across the hull times direction of the sector's middle; of equal
-/// assignments, that with head k in sector k comes first.
+/// It maximises the sum over heads of the offset across the hull times the direction of the sector's middle. Among
+/// equal assignments it prefers head k in sector k.
 pub fn sectors(heads: &[HeadSpec]) -> Vec<usize> {
     let count = heads.len().min(MAX_HEADS);
     let share = TAU / count.max(1) as f64;
@@ -183,11 +185,11 @@ fn assign(gains: &[Vec<f64>], so_far: f64, taken: &mut Vec<usize>, best: &mut (f
     }
 }
 
-/// Programs for the heads of a vehicle, in the order given, such that at `speed_mps` their passes interleave evenly.
+/// Returns programs of the heads with evenly interleaved passes at `speed_mps`, in the given order.
 ///
 /// Head k of s starts at the body-frame angle gamma_k = 2 pi k / s - omega x_k / v, where x_k is its distance behind
-/// the foremost head (Eq. 20); a head that faces aft turns the other way, so that its start is mirrored (Eq. 21). In
-/// sectors, the foremost head is at the start of its sector when the others are where Algorithm 1 has them.
+/// the foremost head (Eq. 20). A head that faces aft turns the other way, so its start is mirrored (Eq. 21). In
+/// sectors, the foremost head is at the start of its sector when the others are at the angles of Algorithm 1.
 /// At zero speed the offsets along the hull have no meaning and are ignored.
 /// Errors: a number of heads that the layout doesn't allow; a speed, step or ping period out of range.
 /// Source: Jorge et al. 2021, Eq. 19 to 21, §5.2 and Algorithm 1.
@@ -217,7 +219,9 @@ pub fn programs(
     }
 }
 
-/// All heads turn in one sense in the body frame: one that faces aft must then step downwards in its sensor frame.
+/// Program for continuous rotation.
+///
+/// All heads turn in the same sense in the body frame, so one that faces aft steps downwards in its sensor frame.
 fn phase_shift(
     head: &HeadSpec,
     phase_rad: f64,
@@ -236,8 +240,7 @@ fn phase_shift(
 fn sector_offset(head: &HeadSpec, sector: &Sector, speed_mps: f64) -> Result<HeadProgram, SamplingError> {
     let size_rad = TAU / sector.of as f64;
     let step_rad = positive("the step in radians", head.step_rad)?;
-    // A sweep takes a whole number of pings: where steps don't divide the sector, the turn period is rounded up to
-    // match.
+    // A sweep takes a whole number of pings. If steps do not divide the sector, the turn period is rounded up.
     let turn_s = head.ping_period_s * steps_over(size_rad, step_rad) as f64 * sector.of as f64;
     let least_rad = size_rad * sector.number as f64;
     let least_rad = if sector.reversed { math::wrap(TAU - least_rad - size_rad, TAU) } else { least_rad };
@@ -252,8 +255,10 @@ fn sector_offset(head: &HeadSpec, sector: &Sector, speed_mps: f64) -> Result<Hea
     })
 }
 
-/// Spacing rule: distance along the hull, speed and turn period for which heads at multiples of 1/s turn from each
-/// other interleave, the angles at which they interfere least.
+/// Spacing rule for heads apart along the hull, started at multiples of 1/s turn from each other.
+///
+/// It relates distance, speed and turn period such that their passes interleave. At these angles heads interfere
+/// least.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct HullRule {
     /// q: s-ths of a turn in which the vehicle travels the distance, to the nearest.
@@ -300,7 +305,9 @@ pub fn alternating_m(pitch_m: f64, heads: usize, share: f64) -> Result<[f64; 2],
     Ok(divided_m(2.0 * pitch_m / heads as f64, share))
 }
 
-/// Distance travelled in a sweep there and back, `both_m`, divided at a position in the sector: the smaller part first.
+/// Divides `both_m` at a position in the sector, the smaller part first.
+///
+/// `both_m` is the distance travelled in a sweep there and back.
 pub(super) fn divided_m(both_m: f64, share: f64) -> [f64; 2] {
     let nearer = share.min(1.0 - share);
     [both_m * nearer, both_m * (1.0 - nearer)]
@@ -310,9 +317,9 @@ pub(super) fn divided_m(both_m: f64, share: f64) -> [f64; 2] {
 mod tests {
     use super::*;
 
-    /// Each of the three figures meets the rule x = q v T / s with the other two as they are, and the nearest whole q is taken.
+    /// Each of the three figures meets the rule x = q v T / s with the other two, and q is the nearest whole number.
     #[test]
-    fn each_figure_of_the_hull_rule_meets_it_with_the_others() {
+    fn each_hull_rule_figure_fits_the_other_two() {
         for (apart_m, heads, speed_mps, turn_s, q) in
             [(0.6, 4, 0.1, 8.0, 3), (1.1, 2, 0.14, 7.3, 2), (0.05, 3, 0.2, 28.0, 1), (2.0, 3, 0.09, 5.5, 12)]
         {
@@ -328,7 +335,7 @@ mod tests {
     }
 
     #[test]
-    fn the_first_head_of_sectors_is_in_its_own() {
+    fn first_head_in_sectors_is_within_its_own_sector() {
         let sector = Sector { number: 1, of: 4, behind_m: 0.5, reversed: false };
         let at = |angle_rad: f64| in_step(InSector { angle_rad, growing: true }, &sector, 8.0, 0.1);
         assert!(at(0.0).is_ok() && at(TAU / 4.0).is_ok());

@@ -1,29 +1,29 @@
-//! Returns that are lost by chance, and how many passes over a place make up for them.
+//! Returns lost by chance, and the number of passes over a place that makes up for them.
 //!
-//! The model: along a turn, a head's pings are lost in runs (Gilbert 1960: a share, and a share after a lost one), passes lose
-//! independently of each other. A run that is lost widens the circle that fits between two passes; a run as wide as the target
-//! takes the pass away there. What is lost at the same angle turn after turn isn't lost by chance, and going slower doesn't bring
-//! it back: who counts losses leaves it out.
+//! The model: along a turn, a head loses pings in runs (Gilbert 1960: a share, and a share after a lost ping). Passes
+//! lose pings independently of each other. A lost run widens the circle that fits between two passes. A run as wide
+//! as the target removes the pass at that place. A return that is lost at the same angle in every turn is not lost by
+//! chance, and a slower speed does not restore it. The caller excludes such losses.
 
 use serde::{Deserialize, Serialize};
 
 use super::head::MAX_HEADS;
 use headrace_geometry::math;
 
-/// Length of wall, m, of which the share [`MAY_FAIL`] may fail for lost returns.
+/// Length of wall, m; a share [`MAY_FAIL`] of such stretches may fail because of lost returns.
 const STRETCH_M: f64 = 0.25;
-/// Share of stretches that may fail, so that the others, 95 in 100, pass.
+/// Share of stretches that may fail, so that 95 in 100 pass.
 const MAY_FAIL: f64 = 0.05;
-/// Most passes that are asked for: beyond, nobody waits, and the returns have to come back.
+/// Maximum number of passes. Beyond that, waiting is impractical, and the returns themselves must improve.
 pub const MOST_PASSES: f64 = 10.0;
-/// Chance below which a hole isn't taken to have come by chance.
+/// Probability below which a hole does not count as caused by chance.
 const HARDLY: f64 = 1e-3;
-/// Share of a hole's diameter, along and around, that the passes through it and their lost pings have to be wide.
+/// Share of a hole's diameter, along and around, that lost passes and pings must cover.
 const INNER: f64 = 0.7;
-/// Shares of lost returns count at most as this: a head that hears one ping in a thousand hears nothing.
+/// Upper limit of the share of lost returns: a head that receives one ping in a thousand receives nothing.
 const MOST_SHARE: f64 = 0.999;
 
-/// How often a head's pings get no return by chance.
+/// Rate at which a head's pings lose their returns by chance.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct LossRate {
     /// Share of its pings, from 0 to 1.
@@ -33,7 +33,7 @@ pub struct LossRate {
 }
 
 impl LossRate {
-    /// Of pings lost independently of each other.
+    /// Creates the rate of pings that are lost independently of each other.
     pub fn independent(share: f64) -> Self {
         Self { share, after_lost: share }
     }
@@ -42,13 +42,14 @@ impl LossRate {
         Self { share: self.share.clamp(0.0, MOST_SHARE), after_lost: self.after_lost.clamp(0.0, MOST_SHARE) }
     }
 
-    /// Chance that so many pings in a row are lost, one at least.
+    /// Probability that this many pings in a row are lost, at least one.
     fn chance_of_run(self, pings: f64) -> f64 {
         self.share * power(self.after_lost, (pings - 1.0).max(0.0))
     }
 
-    /// Pings of the longest run to be reckoned with at so many places of the wall: it is lost at one of them with the chance
-    /// [`MAY_FAIL`]; zero where even a single ping is rarer.
+    /// Length in pings of the longest run to expect at this many places of the wall.
+    ///
+    /// It occurs at one of them with the probability [`MAY_FAIL`]. Zero if even a single lost ping is rarer.
     fn longest_run(self, places: f64) -> f64 {
         let expected = places * self.share / MAY_FAIL;
         if expected <= 0.0 {
@@ -59,7 +60,7 @@ impl LossRate {
     }
 }
 
-/// Wall as it is sampled, and what is asked of it.
+/// Sampling of a wall, and the target.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Sampled {
     /// Target T, m.
@@ -71,9 +72,11 @@ pub struct Sampled {
 }
 
 impl Sampled {
-    /// How many passes over each place it takes, in place of one, that 95 of 100 stretches of a quarter metre meet the target although
-    /// returns are lost: the distance between passes that the target allows, over that which losses leave of it. From 1, where none
-    /// are lost, to [`MOST_PASSES`]; continuous in all that is measured. The heads go by in turn, those that lose most come first.
+    /// Returns how many passes over each place replace one because of lost returns.
+    ///
+    /// With these, 95 of 100 stretches of 0.25 m meet the target. It is the distance between passes that the target
+    /// allows, over the distance that losses leave. It ranges from 1 without losses to [`MOST_PASSES`], and is
+    /// continuous in all inputs. Heads take turns, and those with the highest losses come first.
     ///
     /// Source: `docs/why/coverage.md`, "Lost returns".
     pub fn passes_needed(&self, rates: impl Iterator<Item = LossRate>) -> f64 {
@@ -92,13 +95,15 @@ impl Sampled {
         heads.sort_unstable_by(|a, b| b.chance_of_run(pings).total_cmp(&a.chance_of_run(pings)));
         let along_m = math::sqrt(lattice_m2);
         let places = self.perimeter_m / self.t_y_m * STRETCH_M / along_m;
-        // The more passes, the more places at which they may fail together.
+        // With more passes, there are more places at which they may fail together.
         let once = self.passes_for(places, along_m, heads);
         self.passes_for(places * once, along_m, heads)
     }
 
-    /// Whether a hole of this diameter, m, may have come by chance where passes are `along_m` apart and heads lose so much by chance. Where it
-    /// can't, nothing comes back from that wall, and no speed helps.
+    /// Whether a hole of this diameter, m, may have been caused by chance.
+    ///
+    /// Inputs: the distance between passes `along_m`, and the loss rate. If the hole is not by chance, that wall gives
+    /// no returns, and no speed helps.
     ///
     /// Source: `docs/why/coverage.md`, "Lost returns".
     pub fn is_by_chance(&self, hole_m: f64, along_m: f64, rate: LossRate) -> bool {
@@ -112,13 +117,14 @@ impl Sampled {
         places.max(1.0) * power(chance, (inner_m / along_m).max(1.0)) >= HARDLY
     }
 
-    /// Pings that must be lost for a pass to be lost as wide as the target, one at least.
+    /// Number of pings, at least one, whose loss makes a gap as wide as the target.
     fn pings_across(&self) -> f64 {
         (self.target_m / self.t_y_m - 1.0).max(1.0)
     }
 
-    /// [`Sampled::passes_needed`] for a number of places at which passes may be lost together, where those without losses may be
-    /// `along_m` apart.
+    /// [`Sampled::passes_needed`] for a number of places at which passes may fail together.
+    ///
+    /// `along_m` is the allowed distance between passes without losses.
     fn passes_for(&self, places: f64, along_m: f64, heads: &[LossRate]) -> f64 {
         let pings = self.pings_across();
         let mut left = places;
@@ -136,10 +142,11 @@ impl Sampled {
         MOST_PASSES
     }
 
-    /// Distance between passes at which the largest circle is the target where one pass lacks a run of pings, m.
+    /// Distance between passes at which the largest circle equals the target, m.
     ///
-    /// With half a step h and half the gap g, the circle touches the two ends of the gap and two neighbours of the pass before; its
-    /// centre lies (a^2 + h^2 - g^2) / (2 a) off the pass with the gap, a the distance between passes.
+    /// One of the passes misses a run of pings. With half a step h and half the gap g, the circle touches both ends
+    /// of the gap and two neighbours of the previous pass. Its centre is (a^2 + h^2 - g^2) / (2 a) from the pass with
+    /// the gap, where a is the distance between passes.
     fn along_with_run_m(&self, lost: f64) -> f64 {
         let half_m = self.t_y_m / 2.0;
         let gap_m = (half_m * (1.0 + lost)).min(self.target_m / 2.0).max(half_m);

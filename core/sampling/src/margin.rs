@@ -1,42 +1,46 @@
-//! What position errors take from a target, and what each margin costs in speed.
+//! Margins of a target for position errors, and the speed that each margin costs.
 //!
-//! Plan, live advice and report use the same functions, so that a speed that is planned is the speed that is advised.
+//! Plan, live advice and report use the same functions, so that the planned speed equals the advised speed.
 //! Source: docs/decisions/0005-advice-and-plan.md.
 
 use headrace_geometry::math;
 use serde::{Deserialize, Serialize};
 
-/// Standard deviation that needs no margin, m: about what a navigation without error estimates reports.
+/// Standard deviation without a margin, m: about that of navigation without error estimates.
 const NOTHING_M: f64 = 0.002;
-/// The least share of the distance between passes that a margin leaves: no speed makes up for a lost position.
+/// Minimum share of the distance between passes that a margin leaves.
+///
+/// No speed compensates for a lost position.
 const LEFT_SHARE: f64 = 0.6;
-/// The largest share of the target that a margin takes.
+/// Maximum share of the target that a margin takes.
 const MOST_SHARE: f64 = 0.2;
-/// Share of the time between heads apart along the hull that counts towards the time between passes: only some
-/// neighbouring passes are by heads apart, and holidays between these grow by less than the heads' separation. With this
-/// share, D is within two of its standard deviations 93 % of the time over the dives of
-/// `tests/tests/navigation/fusion.rs` with four heads; over dives like them, 80 % with none of it and 99 % with all.
+/// Share of the time between heads apart along the hull that counts towards the time between passes.
+///
+/// Only some neighbouring passes are by heads apart, and holes between these grow by less than the heads' separation.
+/// With this share, D is within two of its standard deviations 93 % of the time, over the dives of
+/// `tests/tests/navigation/fusion.rs` with four heads. Over similar dives it is 80 % with a share of 0, and 99 % with
+/// 1.
 pub const APART_SHARE: f64 = 0.4;
-/// Speed below which a vehicle counts as standing still, m/s.
+/// Speed below which a vehicle counts as stationary, m/s.
 const SLOW_MPS: f64 = 0.01;
 /// The longest time between heads apart along the hull, seconds.
 const LONGEST_APART_S: f64 = 20.0;
 
-/// Time over which position errors accumulate between neighbouring passes of a place, seconds: that between two passes
-/// of evenly spread heads, plus a share of the time until the rearmost head is where the foremost was.
+/// Time over which position errors accumulate between neighbouring passes of a place, s.
 ///
-/// `passes_per_s` is the sum of the heads' turns a second, above zero; `apart_m` the length of hull between them.
+/// It is the time between two passes of evenly spread heads, plus a share of the time until the rearmost head reaches
+/// the position of the foremost. `passes_per_s` is the sum of the heads' turns per second, above zero; `apart_m` is
+/// the length of hull between them.
 pub fn error_time_s(passes_per_s: f64, apart_m: f64, speed_mps: f64, apart_share: f64) -> f64 {
     let apart_s = (apart_m / speed_mps.abs().max(SLOW_MPS)).min(LONGEST_APART_S);
     1.0 / passes_per_s + apart_share * apart_s
 }
 
-/// Part of a target that is left to errors of position, m: as many standard deviations of a hole's size as a verdict of
-/// pass keeps (`confidence_sd`), where `pass_error_m` is the standard deviation and `t_y_m` the largest distance between
-/// neighbours of one turn. Continuous in all of them.
+/// Part of a target reserved for position errors, m.
 ///
-/// At most a fifth of the target, and what leaves three fifths of the distance between passes: beyond that, going slower
-/// costs more than it gains.
+/// It is `confidence_sd` times the standard deviation `pass_error_m` of a hole's size. `t_y_m` is the largest
+/// distance between neighbours of one turn. It is continuous in all inputs. It is at most a fifth of the target, and
+/// leaves at least three fifths of the distance between passes. Beyond that, a slower speed costs more than it gains.
 pub fn position_margin_m(target_m: f64, confidence_sd: f64, pass_error_m: f64, t_y_m: f64) -> f64 {
     let along_m2 = (target_m * target_m - t_y_m * t_y_m).max(0.0);
     let least_m = math::sqrt(LEFT_SHARE * LEFT_SHARE * along_m2 + t_y_m * t_y_m);
@@ -44,14 +48,16 @@ pub fn position_margin_m(target_m: f64, confidence_sd: f64, pass_error_m: f64, t
     (confidence_sd * (pass_error_m - NOTHING_M).max(0.0)).min(most_m)
 }
 
-/// How errors of position grow with the time between two passes: between that of noise that is independent from second to
-/// second, 0.5, and of speeds that drift, 1. VITA 2 with two heads, swaying, has 21 mm after 8.5 s and 23 to 26 after 11.2.
+/// Exponent with which position errors grow with the time between two passes.
+///
+/// It is between that of independent noise, 0.5, and that of drifting speeds, 1. VITA 2 with two heads, swaying, has
+/// 21 mm after 8.5 s and 23 to 26 mm after 11.2 s.
 const GROWTH: f64 = 0.7;
 
-/// What errors of position leave of a target, at each speed.
+/// Target less the margin for position errors, as a function of speed.
 ///
-/// They are known at the speed that the vehicle has. At half of it, heads apart along the hull pass a place twice as far
-/// apart in time, and more has to be left to them.
+/// The errors are known at the present speed. At half of it, heads apart along the hull pass a place twice as far
+/// apart in time, and the margin is larger.
 #[derive(Debug, Clone, Copy)]
 pub struct SureTarget {
     /// Target T, m.
@@ -71,33 +77,35 @@ pub struct SureTarget {
 }
 
 impl SureTarget {
-    /// At a speed, m: the faster, the more, by steps nowhere.
+    /// Returns the remaining target at a speed, m; grows continuously with speed.
     pub fn at_m(&self, speed_mps: f64) -> f64 {
         let time_s = error_time_s(1.0 / self.even_gap_s, self.apart_m, speed_mps, APART_SHARE);
-        // Without heads that turn, nothing is known of the time.
+        // Without turning heads, the time is unknown.
         let same = self.measured_s <= 0.0 || (time_s - self.measured_s).abs() <= f64::EPSILON * time_s;
         let growth = if same { 1.0 } else { math::exp(GROWTH * math::ln(time_s / self.measured_s)) };
         let error_m = self.pass_error_m * growth;
         self.target_m - position_margin_m(self.target_m, self.confidence_sd, error_m, self.t_y_m)
     }
 
-    /// What is left of it however fast the vehicle goes, m.
+    /// Returns the remaining target at unlimited speed, m.
     pub fn most_m(&self) -> f64 {
         self.at_m(f64::INFINITY)
     }
 }
 
-/// Errors of position between two passes as expected before a dive.
+/// Expected position errors between two passes, before a dive.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ExpectedErrors {
     /// Standard deviations of a hole that a verdict of pass keeps below the target.
     pub confidence_sd: f64,
-    /// Time between two passes, seconds, growing, and the standard deviation of a hole's size after it, m.
+    /// Ascending times between two passes, s, and the standard deviation of a hole's size after each, m.
     pub by_time: Vec<[f64; 2]>,
 }
 
 impl ExpectedErrors {
-    /// The standard deviation after a time between passes, m: interpolated, and beyond the last in proportion to time.
+    /// Returns the standard deviation after a time between passes, m.
+    ///
+    /// It is interpolated, and proportional to time beyond the last entry.
     pub fn pass_error_m(&self, time_s: f64) -> f64 {
         let mut before = [0.0, 0.0];
         for &after in &self.by_time {
@@ -111,10 +119,10 @@ impl ExpectedErrors {
     }
 }
 
-/// A reason for going slower than the plain geometry allows.
+/// A cause that lowers the speed below that of the ideal geometry.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Margin {
-    /// None: the distance between turns.
+    /// No cause: the distance between turns.
     Geometry,
     /// Wall that the vehicle hides from some of its heads, or that is out of their reach.
     Hidden,
@@ -129,7 +137,7 @@ pub enum Margin {
 }
 
 impl Margin {
-    /// All of them, in the order in which they are added.
+    /// All causes in the order in which they are added.
     pub const ALL: [Self; 6] =
         [Self::Geometry, Self::Hidden, Self::Phase, Self::Swing, Self::Position, Self::Losses];
 
@@ -146,29 +154,29 @@ impl Margin {
     }
 }
 
-/// The largest speeds with the margins added one after the other, m/s; none is above the one before.
+/// Largest speeds with the margins added one after the other, m/s; each is at most the one before.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct Margins {
-    /// Heads evenly phased and side by side nowhere, nothing hidden, no swing, a position that is known.
+    /// Speed for evenly phased heads at one place, without hidden wall, swing and position errors.
     pub geometry_mps: f64,
-    /// With what the vehicle hides.
+    /// Including wall that the vehicle hides.
     pub hidden_mps: f64,
-    /// With the heads' phases and places.
+    /// Including phases and positions of the heads.
     pub phase_mps: f64,
-    /// With the beams' swing.
+    /// Including the swing of beams.
     pub swing_mps: f64,
-    /// With errors of position.
+    /// Including position errors.
     pub position_mps: f64,
-    /// With passes for returns that are lost: the largest speed.
+    /// Including passes for lost returns: the largest speed.
     pub losses_mps: f64,
-    /// Standard deviation of a hole's size between two passes that `position_mps` is for, m.
+    /// Standard deviation of a hole's size between two passes assumed for `position_mps`, m.
     pub pass_error_m: f64,
 }
 
 impl Margins {
-    /// From speeds in the order of [`Margin::ALL`], m/s: each counts at most as the one before.
+    /// Creates margins from speeds in the order of [`Margin::ALL`], m/s; each is limited to the one before.
     pub fn of(speeds_mps: [f64; 6], pass_error_m: f64) -> Self {
-        // From the last: a margin that seems to cost less than nothing costs nothing.
+        // It works backwards, so that a margin with a negative cost counts as zero.
         let mut most = 0.0_f64;
         let mut speeds = speeds_mps;
         for speed in speeds.iter_mut().rev() {
@@ -179,13 +187,13 @@ impl Margins {
         Self { geometry_mps, hidden_mps, phase_mps, swing_mps, position_mps, losses_mps, pass_error_m }
     }
 
-    /// The speeds in the order of [`Margin::ALL`], m/s.
+    /// Returns the speeds in the order of [`Margin::ALL`], m/s.
     pub fn speeds_mps(&self) -> [f64; 6] {
         let Self { geometry_mps, hidden_mps, phase_mps, swing_mps, position_mps, losses_mps, .. } = *self;
         [geometry_mps, hidden_mps, phase_mps, swing_mps, position_mps, losses_mps]
     }
 
-    /// What each margin takes from the one before, m/s, in the order of [`Margin::ALL`] from the second on.
+    /// Returns the cost of each margin, m/s, in the order of [`Margin::ALL`] from the second on.
     pub fn prices_mps(&self) -> [(Margin, f64); 5] {
         let [geometry, hidden, phase, swing, position, losses] = self.speeds_mps();
         [
@@ -197,7 +205,9 @@ impl Margins {
         ]
     }
 
-    /// The margin that costs most; [`Margin::Geometry`] where none takes a twentieth of the speed.
+    /// Returns the margin with the highest cost.
+    ///
+    /// [`Margin::Geometry`] if none takes a twentieth of the speed.
     pub fn costliest(&self) -> Margin {
         const NOTABLE: f64 = 0.05;
         let costly = self.prices_mps().into_iter().max_by(|a, b| a.1.total_cmp(&b.1));
@@ -212,19 +222,19 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_margin_is_so_many_sigmas_and_leaves_something_to_drive_with() {
+    fn margin_is_a_multiple_of_the_sd_with_limits() {
         let margin_m = |pass_error_m: f64, t_y_m: f64| position_margin_m(0.5, 2.0, pass_error_m, t_y_m);
         assert!((margin_m(0.017, 0.1) - 0.03).abs() < 1e-12);
         assert!(margin_m(0.002, 0.1).abs() <= 0.0 && margin_m(0.0, 0.1).abs() <= 0.0);
-        assert!((margin_m(1.0, 0.1) - 0.1).abs() < 1e-12, "a fifth of the target");
-        // Steps that nearly reach the target: three fifths of what is left along the tunnel stay.
+        assert!((margin_m(1.0, 0.1) - 0.1).abs() < 1e-12, "at most a fifth of the target");
+        // Steps nearly reach the target: three fifths of the rest along the tunnel remain.
         let sure_m = 0.5 - margin_m(1.0, 0.48);
         assert!((math::sqrt(sure_m * sure_m - 0.48 * 0.48) / 0.14 - 0.6).abs() < 1e-9);
         assert!(margin_m(0.1, 0.5).abs() <= 0.0 && margin_m(0.1, 0.6).abs() <= 0.0);
     }
 
     #[test]
-    fn it_has_no_steps() {
+    fn margin_is_continuous() {
         let mut before = position_margin_m(0.5, 2.0, 0.0, 0.3);
         for k in 1..=2000 {
             let now = position_margin_m(0.5, 2.0, 1e-4 * f64::from(k), 0.3);
@@ -234,7 +244,7 @@ mod tests {
     }
 
     #[test]
-    fn errors_grow_with_the_time_between_passes() {
+    fn error_time_grows_with_the_time_between_passes() {
         let errors = ExpectedErrors { confidence_sd: 2.0, by_time: vec![[2.0, 0.006], [4.0, 0.01]] };
         let all = [1.0, 2.0, 3.0, 4.0, 8.0].map(|time_s| errors.pass_error_m(time_s));
         assert!(all.iter().zip([0.003, 0.006, 0.008, 0.01, 0.02]).all(|(a, b)| (a - b).abs() < 1e-12));
@@ -244,9 +254,9 @@ mod tests {
         assert!((error_time_s(0.5, 1.0, 0.0, 0.4) - 10.0).abs() < 1e-12, "at rest");
     }
 
-    /// What is measured at one speed tells the same of all others as what is measured there.
+    /// Errors measured at one speed give the same margin at another speed as errors measured there.
     #[test]
-    fn a_margin_is_that_of_the_speed_it_is_for() {
+    fn margin_is_independent_of_the_speed_of_measurement() {
         let sure = SureTarget {
             target_m: 0.5,
             confidence_sd: 2.0,
@@ -257,7 +267,7 @@ mod tests {
             t_y_m: 0.1,
         };
         assert!((sure.at_m(0.1) - (0.5 - 2.0 * 0.01)).abs() < 1e-9);
-        // 4 s and 0.4 of 16 s, of 8 s and of no time at all.
+        // 4 s plus 0.4 of 16 s, of 8 s and of 0 s.
         let times_s = [10.4, 7.2, 4.0];
         let error_m = |time_s: f64| 0.012 * math::exp(GROWTH * math::ln(time_s / times_s[1]));
         let at = [0.05, 0.1, f64::INFINITY].map(|speed_mps| sure.at_m(speed_mps));
@@ -277,9 +287,9 @@ mod tests {
     }
 
     #[test]
-    fn prices_add_up_and_the_costliest_is_named() {
+    fn margin_costs_add_up_and_the_costliest_is_named() {
         let margins = Margins::of([0.23, 0.118, 0.117, 0.118, 0.108, 0.1], 0.02);
-        // Swing can't give back what phase took.
+        // Swing cannot give back the cost of phase.
         let expected = [0.23, 0.118, 0.118, 0.118, 0.108, 0.1];
         assert!(margins.speeds_mps().iter().zip(expected).all(|(a, b)| (a - b).abs() < 1e-12));
         let sum: f64 = margins.prices_mps().iter().map(|(_, price)| price).sum();

@@ -4,7 +4,7 @@ use super::head::{HeadSpec, MAX_HEADS};
 use headrace_geometry::frames::{Body, Mount, Vec3, head_direction};
 use headrace_geometry::math::{self, TAU};
 
-/// Angular spacing of the search, radians (0.05 degrees); narrower obstructions may be missed.
+/// Angular spacing of the search, radians (0.05 degrees). It may miss narrower obstructions.
 const SEARCH_STEP_RAD: f64 = TAU / 7200.0;
 
 /// A solid part of the vehicle.
@@ -31,14 +31,14 @@ pub enum Obstacle {
 /// A range of angles of a head, in the sensor's frame.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct AngleRange {
-    /// Where it begins, radians, in [0, 2 pi).
+    /// Start angle, radians, in [0, 2 pi).
     pub from_rad: f64,
     /// Its size, radians, up to 2 pi.
     pub size_rad: f64,
 }
 
 impl AngleRange {
-    /// Whether it contains an angle, its ends included.
+    /// Whether it contains an angle; the ends count.
     pub fn has(&self, angle_rad: f64) -> bool {
         math::wrap(angle_rad - self.from_rad, TAU) <= self.size_rad
     }
@@ -48,8 +48,9 @@ impl AngleRange {
         self.from_rad + self.size_rad / 2.0
     }
 
-    /// The same directions in the vehicle's cross-section, as angles of a head that is mounted straight: 0 is down, growing to the
-    /// vehicle's left. A head that faces aft turns the other way round. For pictures.
+    /// Returns the same directions as angles of a straight-mounted head, for pictures.
+    ///
+    /// 0 is down, growing to the vehicle's left. A head that faces aft turns the other way.
     #[must_use]
     pub fn across_body(&self, mount: &Mount) -> Self {
         let across = |angle_rad: f64| {
@@ -79,7 +80,7 @@ impl Obstacle {
         }
     }
 
-    /// Whether a point is inside a box; cylinders are heads, which may share a position.
+    /// Whether a point is inside a box. Always false for cylinders, since they are heads and may share a position.
     pub fn holds(&self, place: Vec3<Body>) -> bool {
         match self {
             Self::Box { least, most } => {
@@ -90,14 +91,16 @@ impl Obstacle {
         }
     }
 
-    /// Whether a ray from outside meets it; a ray from inside doesn't, so that a head isn't hidden by an obstacle
-    /// around it.
+    /// Whether a ray from outside meets it.
+    ///
+    /// A ray from inside does not, so that an obstacle around a head does not hide the wall from it.
     pub fn stops(&self, from: Vec3<Body>, direction: Vec3<Body>) -> bool {
         self.enters_m(from, direction).is_some()
     }
 
-    /// Where a ray from outside meets it, in lengths of `direction`: metres along a unit vector. `None` for a ray that
-    /// misses it or begins inside.
+    /// Distance at which a ray from outside meets it, in lengths of `direction`; metres for a unit vector.
+    ///
+    /// `None` for a ray that misses it or begins inside.
     pub fn enters_m(&self, from: Vec3<Body>, direction: Vec3<Body>) -> Option<f64> {
         match self {
             Self::Box { least, most } => box_entered(*least, *most, from, direction),
@@ -140,7 +143,7 @@ fn cylinder_entered(
     let (offset, direction) = ((from + -base).0, direction.0);
     let (height, climb) = (offset.dot(&axis), direction.dot(&axis));
     let (across, drift) = (offset - axis * height, direction - axis * climb);
-    // Interval of the ray inside the infinite cylinder, then between its ends.
+    // The ray's interval inside the infinite cylinder, which is then limited to the cylinder's ends.
     let (a, b) = (drift.dot(&drift), across.dot(&drift));
     let c = across.dot(&across) - radius_m * radius_m;
     let (mut enter, mut leave) = (f64::NEG_INFINITY, f64::INFINITY);
@@ -166,9 +169,10 @@ fn cylinder_entered(
     (enter > 0.0 && enter < leave).then_some(enter)
 }
 
-/// The angles at which obstacles hide the wall from a head, in order of angle; edges are good to 1e-12 rad.
+/// Returns the angles at which obstacles hide the wall from a head, in ascending order.
 ///
-/// The beam is taken as a ray; a real beam is weakened for another half of its width on either side.
+/// Edges are exact to 1e-12 rad. The beam is taken as a ray; a real beam is weakened for another half of its width on
+/// either side.
 pub fn hidden_angles(mount: &Mount, obstacles: &[Obstacle]) -> Vec<AngleRange> {
     let hidden = |angle_rad: f64| {
         let direction = mount.rotation * head_direction(angle_rad);
@@ -199,7 +203,7 @@ pub fn hidden_angles(mount: &Mount, obstacles: &[Obstacle]) -> Vec<AngleRange> {
     found
 }
 
-/// Angle between two others at which the beam becomes or ceases to be hidden, by bisection.
+/// Finds the edge of a hidden range between two angles by bisection.
 fn edge_rad(hidden: &impl Fn(f64) -> bool, from_rad: f64, to_rad: f64) -> f64 {
     let (mut low, mut high) = (from_rad, to_rad);
     let at_low = hidden(low);
@@ -214,9 +218,9 @@ fn edge_rad(hidden: &impl Fn(f64) -> bool, from_rad: f64, to_rad: f64) -> f64 {
     f64::midpoint(low, high)
 }
 
-/// For each head, the angles that the other heads' bodies and the hull hide.
+/// Returns for each head the angles that other heads and the hull hide.
 ///
-/// A neighbour whose axis runs through the head is no obstacle to it: such heads are idealised ones at one position.
+/// A neighbour whose axis runs through the head does not hide anything: such heads are idealised as one position.
 pub fn hidden_by_vehicle(heads: &[HeadSpec], hull: &[Obstacle]) -> Vec<Vec<AngleRange>> {
     heads
         .iter()
@@ -240,9 +244,9 @@ mod tests {
         fixtures::head(position, aft, 0.04)
     }
 
-    /// A point on a side isn't in it, nor one that is inside by two of three coordinates; heads hold nothing.
+    /// A point on a side is outside, and so is one inside in two of three coordinates. Cylinders contain nothing.
     #[test]
-    fn a_box_holds_what_is_inside_all_its_sides() {
+    fn box_contains_points_inside_all_its_sides() {
         let hull = Obstacle::Box { least: Vec3::new(-1.0, -0.3, -0.2), most: Vec3::new(0.5, 0.3, 0.2) };
         let holds = |at: [f64; 3]| hull.holds(Vec3::new(at[0], at[1], at[2]));
         assert!(holds([0.0, 0.0, 0.0]) && holds([0.49, -0.29, 0.19]));
@@ -257,7 +261,7 @@ mod tests {
     }
 
     #[test]
-    fn heads_side_by_side_hide_an_angle_from_each_other() {
+    fn side_by_side_heads_hide_an_angle_from_each_other() {
         let pair = [head([0.5, 0.15, 0.0], false), head([0.5, -0.15, 0.0], false)];
         let hidden = hidden_by_vehicle(&pair, &[]);
         for (ranges, middle_deg) in hidden.iter().zip([270.0, 90.0]) {
@@ -271,10 +275,10 @@ mod tests {
     }
 
     #[test]
-    fn what_two_heads_hide_lies_towards_each_other_however_they_face() {
+    fn heads_hide_angles_towards_each_other_in_any_orientation() {
         for aft in [false, true] {
             let pair = [head([0.5, 0.15, 0.0], aft), head([0.5, -0.15, 0.0], aft)];
-            // The left one's lies to the right, 270 degrees; the right one's to the left.
+            // The left head's hidden range lies to the right, at 270 degrees, and the right head's to the left.
             for ((ranges, spec), middle_deg) in
                 hidden_by_vehicle(&pair, &[]).iter().zip(&pair).zip([270.0, 90.0])
             {
@@ -284,25 +288,25 @@ mod tests {
             }
         }
         let mount = head([0.0; 3], true).mount;
-        // A quarter from 10 degrees on is for a head that faces aft the quarter up to -10 degrees.
+        // For a head that faces aft, a quarter turn from 10 degrees on is the quarter turn up to -10 degrees.
         let quarter = AngleRange { from_rad: 10_f64.to_radians(), size_rad: TAU / 4.0 }.across_body(&mount);
         assert!((quarter.from_rad.to_degrees() - 260.0).abs() < 1e-9, "{quarter:?}");
         assert!(quarter.has(300_f64.to_radians()) && !quarter.has(355_f64.to_radians()));
     }
 
     #[test]
-    fn heads_apart_along_the_hull_and_heads_in_one_place_hide_nothing() {
+    fn heads_in_line_or_at_one_position_hide_nothing() {
         let apart = [head([0.551, 0.1, 0.0], false), head([-0.551, -0.1, 0.0], true)];
         assert!(hidden_by_vehicle(&apart, &[]).iter().all(Vec::is_empty));
         let together = [head([0.0; 3], false), head([0.0; 3], false)];
         assert!(hidden_by_vehicle(&together, &[]).iter().all(Vec::is_empty));
-        // Back to back, the one's body ends where the other's begins: it reaches 0.2 m behind each beam.
+        // Back to back, one body ends where the other begins; it extends 0.2 m behind each beam.
         let near = [head([0.1, 0.1, 0.0], false), head([-0.05, -0.1, 0.0], true)];
         assert!(hidden_by_vehicle(&near, &[]).iter().all(|ranges| ranges.len() == 1));
     }
 
     #[test]
-    fn a_hull_below_hides_the_floor_about_the_seam_of_angles() {
+    fn hull_below_hides_the_floor_across_the_angle_seam() {
         let hull = Obstacle::Box { least: Vec3::new(-1.0, -0.2, -0.5), most: Vec3::new(1.0, 0.2, -0.1) };
         let hidden = hidden_angles(&head([0.0; 3], false).mount, &[hull]);
         assert_eq!(hidden.len(), 1);
@@ -312,7 +316,7 @@ mod tests {
     }
 
     #[test]
-    fn a_ray_enters_where_it_first_touches() {
+    fn ray_enters_at_its_first_contact() {
         let x = Vec3::new(1.0, 0.0, 0.0);
         let hull = Obstacle::Box { least: Vec3::new(2.0, -1.0, -1.0), most: Vec3::new(3.0, 1.0, 1.0) };
         assert_eq!(hull.enters_m(Vec3::zero(), x), Some(2.0));
@@ -329,7 +333,7 @@ mod tests {
     }
 
     #[test]
-    fn a_head_inside_the_hull_s_box_sees_all_and_one_in_a_tube_nothing() {
+    fn head_inside_a_box_sees_all_and_head_in_a_tube_sees_nothing() {
         let around = Obstacle::Box { least: Vec3::new(-1.0, -1.0, -1.0), most: Vec3::new(1.0, 1.0, 1.0) };
         assert!(hidden_angles(&head([0.0; 3], false).mount, &[around]).is_empty());
         let ring: Vec<Obstacle> = (0..4)
@@ -349,7 +353,7 @@ mod tests {
     }
 
     #[test]
-    fn oracle_rays_against_cylinders_agree_with_points_along_the_ray() {
+    fn cylinder_hits_agree_with_points_along_the_ray() {
         let cylinder = Obstacle::Cylinder {
             from: Vec3::new(0.3, 0.2, -0.4),
             along: Vec3::new(0.2, -0.1, 0.5),
@@ -372,7 +376,7 @@ mod tests {
                 assert!(!inside(direction.scaled(enters_m - 1e-9)), "direction {direction:?}");
                 assert!(inside(direction.scaled(enters_m + 1e-9)) || !marched, "direction {direction:?}");
             }
-            // Marching may step over a ray that only grazes.
+            // Marching may miss a ray that only grazes.
             assert!(stops || !marched, "direction {direction:?}");
             met += i32::from(stops && marched) - i32::from(stops && !marched);
         }

@@ -1,4 +1,4 @@
-//! Times at which a vehicle's heads pass a place of the wall, and the longest time between two passes.
+//! Times at which a vehicle's heads pass a place on the wall, and the longest time between two passes.
 
 mod sectors;
 
@@ -12,12 +12,13 @@ use headrace_geometry::math::{self, TAU};
 use headrace_geometry::tunnel::{Profile, Yz};
 use sectors::{AT_ONCE, Leg};
 
-/// Below this speed a vehicle is at rest, m/s: its heads' offsets along the hull have no phase.
+/// Speed below which a vehicle is at rest, m/s; its heads' offsets along the hull then have no phase.
 const AT_REST_MPS: f64 = 1e-3;
 /// Relative difference of turn periods above which heads run out of step.
 const SAME_TURN: f64 = 0.02;
-/// Cosine of the angle between a head's axis and the tunnel's below which its scan plane meets the wall nowhere near
-/// the vehicle.
+/// Cosine of the angle between a head's axis and the tunnel's below which it is askew.
+///
+/// Its scan plane then meets no wall near the vehicle.
 const ASKEW: f64 = 0.1;
 
 /// Measured state of a vehicle and its heads at one epoch.
@@ -27,24 +28,24 @@ pub struct Situation {
     pub pose: Option<Pose>,
     /// Speed along the tunnel, m/s; negative on the way back.
     pub speed_mps: f64,
-    /// Standard deviation of the distance between two passes, the largest round the wall, m.
+    /// Standard deviation of the distance between two passes, the largest around the wall, m.
     pub pass_error_m: f64,
     /// Layout of the heads, from the vehicle file.
     pub layout: HeadLayout,
     /// Number of heads of the vehicle.
     pub configured: usize,
-    /// The heads that turn, ping and hear the wall, by number.
+    /// Heads that turn, ping and get returns from the wall, by number.
     pub heads: [Option<HeadMotion>; MAX_HEADS],
-    /// The heads that turn and ping, but hear no wall.
+    /// Heads that turn and ping, but get no returns from the wall.
     pub deaf: HeadSet,
-    /// What each head loses by chance, by number.
+    /// Chance losses of each head, by number.
     pub losses: [LossRate; MAX_HEADS],
-    /// The most that any of them may lose by chance: all that it lacks, as long as too few pings have been counted to tell.
+    /// Upper bound of the chance losses of any head: all missing returns, until enough pings have been counted.
     pub lost_at_most: LossRate,
 }
 
 impl Situation {
-    /// What the heads that turn lose by chance.
+    /// Returns the chance losses of the heads that turn.
     pub fn losses_of_turning(&self) -> impl Iterator<Item = LossRate> {
         self.heads.iter().zip(self.losses).filter_map(|(motion, rate)| motion.is_some().then_some(rate))
     }
@@ -59,16 +60,17 @@ pub struct Passes {
     pattern: Pattern,
     /// Largest parallax of heads side by side, as an error of their pass times, seconds.
     parallax_s: f64,
-    /// Too slow for phases along the tunnel to have a meaning.
+    /// The vehicle is too slow for phases along the tunnel to have a meaning.
     at_rest: bool,
-    /// Whether more passes are counted on where returns are lost.
+    /// Whether extra passes are required for lost returns.
     lossy: bool,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Pattern {
-    /// All rotate continuously, in one sense and at one rate: by head, phase of its passes in a turn's advance,
-    /// in [0, 1).
+    /// All rotate continuously, in one sense and at one rate.
+    ///
+    /// By head, the phase of its passes in a turn's advance, in [0, 1).
     Turning([f64; MAX_HEADS]),
     /// Each sweeps back and forth.
     Sectors {
@@ -77,7 +79,7 @@ enum Pattern {
         /// See [`Passes::uneven_ends`].
         uneven: f64,
     },
-    /// Opposite senses, or out of step: passes come at uneven times, and only one head can be relied on.
+    /// Opposite senses or different rates: passes come at uneven times, and only one head is reliable.
     Loose,
 }
 
@@ -88,12 +90,12 @@ pub struct Phasing {
     turns_s: [f64; MAX_HEADS],
     pattern: Pattern,
     ahead_m: [f64; MAX_HEADS],
-    /// Of heads in sectors, where each is on its sweep.
+    /// For heads in sectors, the position of each in its sweep.
     legs: [Option<Leg>; MAX_HEADS],
 }
 
 impl Phasing {
-    /// From the measured situation. Without a fix, the vehicle is assumed to lie along the tunnel.
+    /// Creates it from the measured situation. Without a fix, the vehicle is assumed to lie along the tunnel.
     pub fn of(situation: &Situation) -> Self {
         let motions = &situation.heads;
         let present = motions.iter().enumerate().filter(|(_, motion)| motion.is_some());
@@ -122,7 +124,7 @@ impl Phasing {
         }
     }
 
-    /// The same, where the heads' sectors are known: angles in each one's sensor frame, by number.
+    /// The same if the heads' sectors are known; angles are in each sensor frame, by number.
     #[must_use]
     pub fn in_sectors_of<'a>(
         self,
@@ -136,8 +138,9 @@ impl Phasing {
         Self { legs, ..self }
     }
 
-    /// Whether heads come to a place evenly after one another in some intervals of speed only: they are apart along the hull, and
-    /// phased with each other.
+    /// Whether the heads interleave evenly in some intervals of speed only.
+    ///
+    /// This is so if they are apart along the hull and phased with each other.
     pub fn fits_some_speeds(&self) -> bool {
         let is_phased = match self.pattern {
             Pattern::Turning(_) => true,
@@ -147,21 +150,24 @@ impl Phasing {
         is_phased && self.spread_m() > 0.0
     }
 
-    /// Largest distance along the tunnel between the planes in which the heads meet the wall, m; zero for heads that
-    /// aren't phased with each other.
+    /// Largest distance along the tunnel between the planes in which the heads meet the wall, m.
+    ///
+    /// Zero for heads that are not phased with each other.
     pub fn apart_m(&self) -> f64 {
         let Pattern::Turning(_) = self.pattern else { return 0.0 };
         self.spread_m()
     }
 
-    /// The same of any heads.
+    /// The same for any heads.
     fn spread_m(&self) -> f64 {
         let ahead_m = || self.heads.iter().filter_map(|head| self.ahead_m.get(head)).copied();
         (ahead_m().fold(f64::MIN, f64::max) - ahead_m().fold(f64::MAX, f64::min)).max(0.0)
     }
 
-    /// How far apart along the hull heads are that follow one another in a schedule, on average, as a share of [`Phasing::apart_m`]: 1 of two
-    /// heads, a half of four of which neighbours are two and two together; zero where none are apart.
+    /// Mean distance along the hull between successive heads in a schedule, as a share of [`Phasing::apart_m`].
+    ///
+    /// It is 1 for two heads, and a half for four heads whose neighbours are pairwise together. Zero if none are
+    /// apart.
     pub fn neighbours_apart(&self) -> f64 {
         let apart_m = self.apart_m();
         if apart_m <= 0.0 {
@@ -177,8 +183,10 @@ impl Phasing {
         sum_m / (apart_m * self.heads.len() as f64)
     }
 
-    /// The same heads with the phases of a schedule of `scheduled` heads for `planned_mps`; zero for a schedule that
-    /// ignores where they sit along the hull. Heads in sectors, or out of step, stay as they are.
+    /// Returns the heads with the phases of a schedule of `scheduled` heads for `planned_mps`.
+    ///
+    /// A speed of zero means a schedule that ignores positions along the hull. Heads in sectors or out of step are
+    /// unchanged.
     /// Source: Jorge et al. 2021, Eq. 20.
     #[must_use]
     pub fn as_scheduled(&self, scheduled: usize, planned_mps: f64) -> Self {
@@ -194,11 +202,12 @@ impl Phasing {
         then
     }
 
-    /// The passes at a speed of `speed_mps`.
+    /// Returns the passes at a speed of `speed_mps`.
     ///
     /// Continuous rotation: head k passes the vertical at the times t_k + i T; as it sits x_k ahead of the vehicle's
     /// origin, it meets the wall at chainages x_k + v (t_k + i T). Divided by v T, these are phases on a circle.
-    /// Sectors: a place near a sector's end waits for a whole sweep there and back; when neighbours come to it depends on the speed.
+    /// Sectors: a place near a sector's end waits for a whole sweep there and back. The timing of neighbours depends
+    /// on the speed.
     /// Source: Jorge et al. 2021, §5.1 and §5.2.
     pub fn at(&self, speed_mps: f64) -> Passes {
         let Self { heads, turns_s, mut pattern, ahead_m, legs } = *self;
@@ -220,8 +229,9 @@ impl Phasing {
     }
 }
 
-/// Time until each head next passes the vertical, as a share of a turn; `None` for heads with opposite senses or
-/// different rates.
+/// Time until each head next passes the vertical, as a share of a turn.
+///
+/// `None` for heads with opposite senses or different rates.
 fn phases(motions: &[Option<HeadMotion>; MAX_HEADS]) -> Option<[f64; MAX_HEADS]> {
     let turning = || motions.iter().flatten();
     let turns_s = || turning().map(HeadMotion::turn_period_s);
@@ -229,7 +239,7 @@ fn phases(motions: &[Option<HeadMotion>; MAX_HEADS]) -> Option<[f64; MAX_HEADS]>
     if longest_s - shortest_s > SAME_TURN * shortest_s {
         return None;
     }
-    // Mirrored, heads that all turn in the opposite sense turn in this one.
+    // Heads that all turn in the opposite sense are mirrored into this one.
     let mirror = if turning().all(|motion| body_rate(motion) < 0.0) { -1.0 } else { 1.0 };
     let mut phases = [0.0; MAX_HEADS];
     for (motion, phase) in motions.iter().zip(&mut phases) {
@@ -242,17 +252,19 @@ fn phases(motions: &[Option<HeadMotion>; MAX_HEADS]) -> Option<[f64; MAX_HEADS]>
     Some(phases)
 }
 
-/// How far ahead of the vehicle's origin a head meets the wall, along the tunnel, m: the same all round the wall,
-/// except for a part common to all heads with parallel axes. `None` for a head whose scan plane lies along the tunnel.
+/// Distance ahead of the vehicle's origin at which a head meets the wall, along the tunnel, m.
 ///
-/// Its samples lie in the plane through the head normal to its axis n: x n_x + y n_y + z n_z = (head) n.
+/// It is the same all round the wall, except for a part common to all heads with parallel axes. `None` for a head
+/// whose scan plane lies along the tunnel.
+///
+/// Its samples lie in the plane through the head normal to its axis n: `x n_x + y n_y + z n_z = (head) n`.
 pub fn ahead_m(attitude: &Rot<Tunnel, headrace_geometry::frames::Body>, mount: &Mount) -> Option<f64> {
     let axis = *attitude * (mount.rotation * Vec3::new(1.0, 0.0, 0.0));
     let offset = *attitude * mount.position;
     (axis.x().abs() > ASKEW).then(|| offset.0.dot(&axis.0) / axis.x())
 }
 
-/// Largest difference of the angles at which heads side by side see one place of the wall, radians.
+/// Largest difference between the angles at which side-by-side heads see one place on the wall, radians.
 pub fn parallax_rad(profile: &Profile, heads: &[Yz]) -> f64 {
     const PLACES: u32 = 72;
     let angle = |head: &Yz, place: Yz| math::atan2(place[0] - head[0], head[1] - place[1]);
@@ -272,14 +284,14 @@ pub fn parallax_rad(profile: &Profile, heads: &[Yz]) -> f64 {
 }
 
 impl Passes {
-    /// These passes for heads side by side, whose angles at one place differ by up to `parallax_rad`.
+    /// Returns these passes for side-by-side heads, whose angles at one place differ by up to `parallax_rad`.
     #[must_use]
     pub fn beside(self, parallax_rad: f64) -> Self {
         let turn_s = self.turns_s.into_iter().fold(0.0, f64::max);
         Self { parallax_s: parallax_rad / TAU * turn_s, ..self }
     }
 
-    /// These passes, to be counted as returns are lost or as if none were: see [`super::losses`].
+    /// Returns these passes with or without extra passes for lost returns; see [`super::losses`].
     #[must_use]
     pub fn lossy(self, lossy: bool) -> Self {
         Self { lossy, ..self }
@@ -290,14 +302,16 @@ impl Passes {
         self.lossy
     }
 
-    /// The longest time that `needed` neighbouring passes of these heads over a place take, seconds, where `gap_s` is the longest
-    /// between two: the other passes of a turn share what that leaves of it. Continuous; `gap_s` up to one pass.
+    /// Returns the longest time that `needed` neighbouring passes of these heads over a place take, s.
+    ///
+    /// `gap_s` is the longest time between two; the other passes of a turn share the rest. Continuous; equals `gap_s`
+    /// up to one pass.
     pub fn time_for_s(&self, seen_by: HeadSet, gap_s: f64, needed: f64) -> f64 {
         let (passing, turn_s) = match self.pattern {
             Pattern::Turning(_) => {
                 (seen_by.iter().filter(|head| self.heads.has(*head)).count(), self.turn_s())
             }
-            // There and back: at a sector's end one right after the other.
+            // There and back: at a sector's end two passes follow at once.
             Pattern::Sectors { sweep_s, .. } => (2, sweep_s),
             Pattern::Loose => (1, gap_s),
         };
@@ -312,10 +326,10 @@ impl Passes {
         turns * (gap_s + (count - 1.0) * others_s) + rest_s
     }
 
-    /// Continuously rotating heads, evenly phased in order of their numbers: the result of a schedule for this speed if
-    /// their turn periods are equal. If not, heads run out of step, and no phase can be relied on.
+    /// Creates passes of continuously rotating heads, evenly phased in order of their numbers.
     ///
-    /// `turn_s` gives the turn period of a head, seconds.
+    /// This is the result of a schedule for this speed if their turn periods are equal. If not, heads run out of
+    /// step, and no phase is reliable. `turn_s` gives the turn period of a head, seconds.
     /// Errors: no head.
     pub fn evenly_phased(heads: HeadSet, turn_s: impl Fn(usize) -> f64) -> Result<Self, SamplingError> {
         const IN_STEP: f64 = 1e-6;
@@ -331,7 +345,9 @@ impl Passes {
         Ok(Self { heads, turns_s, pattern, parallax_s: 0.0, at_rest: false, lossy: false })
     }
 
-    /// Heads in sectors with a sweep period (there and back) of `sweep_s`, seconds, as a schedule for this speed starts them.
+    /// Creates passes of heads in sectors, started by a schedule for this speed.
+    ///
+    /// `sweep_s` is the period there and back, s.
     ///
     /// Errors: no head.
     pub fn in_sectors(heads: HeadSet, sweep_s: f64) -> Result<Self, SamplingError> {
@@ -342,12 +358,14 @@ impl Passes {
         Ok(Self { heads, turns_s: [0.0; MAX_HEADS], pattern, parallax_s: 0.0, at_rest: false, lossy: false })
     }
 
-    /// The heads that pass.
+    /// Returns the heads that pass.
     pub fn heads(&self) -> HeadSet {
         self.heads
     }
 
-    /// The longest time between two passes over a place that these heads see, seconds; `None` where none does.
+    /// Returns the longest time between two passes over a place that these heads see, s.
+    ///
+    /// `None` if none sees it.
     pub fn gap_s(&self, seen_by: HeadSet) -> Option<f64> {
         let passing = || seen_by.iter().filter(|head| self.heads.has(*head));
         passing().next()?;
@@ -369,8 +387,10 @@ impl Passes {
         })
     }
 
-    /// How far from evenly after one another neighbours come to the end that their sectors share: the largest, as a share of the advance in a
-    /// sweep there and back, from 0 (one half a sweep after the other) to 0.5 (both at one place, or not known). `None` for heads that turn on.
+    /// Largest unevenness of neighbours at the end that their sectors share.
+    ///
+    /// It is a share of the advance in a sweep there and back. It ranges from 0 (one is half a sweep after the other)
+    /// to 0.5 (both at the same place, or unknown). `None` for continuously rotating heads.
     pub fn uneven_ends(&self) -> Option<f64> {
         match self.pattern {
             Pattern::Sectors { uneven, .. } => Some(uneven),
@@ -378,12 +398,12 @@ impl Passes {
         }
     }
 
-    /// The longest turn period of a head, seconds.
+    /// Returns the longest turn period of a head, seconds.
     pub fn turn_s(&self) -> f64 {
         self.turns_s.into_iter().fold(0.0, f64::max)
     }
 
-    /// The same heads evenly phased, and without parallax; heads out of step as they are.
+    /// Returns the heads evenly phased and without parallax; heads out of step are unchanged.
     #[must_use]
     pub fn evened(&self) -> Self {
         let even = match self.pattern {
@@ -394,7 +414,7 @@ impl Passes {
         even.map_or(Self { parallax_s: 0.0, ..*self }, |even| even.lossy(self.lossy))
     }
 
-    /// [`Passes::gap_s`] of all heads if they were evenly phased, seconds; zero without a head.
+    /// Returns [`Passes::gap_s`] of all heads if they were evenly phased, seconds; zero without a head.
     pub fn even_gap_s(&self) -> f64 {
         let turn_s = self.turns_s.into_iter().fold(0.0, f64::max);
         match self.pattern {
@@ -403,10 +423,11 @@ impl Passes {
         }
     }
 
-    /// Phase error of each head relative to the first that turns, radians of its turn, in [-pi, pi).
+    /// Returns the phase error of each head relative to the first that turns, radians.
     ///
-    /// Positive: it passes a place later, farther ahead, than in the schedule for `scheduled` heads. `None` for an
-    /// absent head, for heads that aren't phased with each other, and at rest.
+    /// It is an angle of the head's turn, in [-pi, pi). Positive: it passes a place later, farther ahead, than in the
+    /// schedule for `scheduled` heads. `None` for an absent head, for heads that aren't phased with each other, and
+    /// at rest.
     /// Source: Jorge et al. 2021, §5.1 (phi(k) = 2 pi k / s).
     pub fn phase_errors_rad(&self, scheduled: usize) -> [Option<f64>; MAX_HEADS] {
         let mut errors = [None; MAX_HEADS];
@@ -423,12 +444,14 @@ impl Passes {
     }
 }
 
-/// Scheduled phase of head `head` of `heads` in a turn's advance: a head that is ahead in angle passes a place earlier.
+/// Scheduled phase of head `head` of `heads` in a turn's advance.
+///
+/// A head that is ahead in angle passes a place earlier.
 fn scheduled_phase(head: usize, heads: usize) -> f64 {
     -(head as f64) / heads.max(1) as f64
 }
 
-/// The largest gap between neighbours on a circle of circumference 1; sorts the phases.
+/// Largest gap between neighbours on a circle of circumference 1; sorts the phases.
 fn largest_gap(phases: &mut [f64]) -> f64 {
     phases.sort_unstable_by(f64::total_cmp);
     let wrapped = phases.first().zip(phases.last()).map_or(1.0, |(first, last)| first + 1.0 - last);
@@ -439,7 +462,7 @@ fn largest_gap(phases: &mut [f64]) -> f64 {
     between.fold(wrapped, f64::max)
 }
 
-/// 1 where the head's angles grow in the body's sense, -1 where they grow in the opposite sense.
+/// 1 if the head's angles grow in the body's sense, -1 if they grow in the opposite sense.
 fn body_sign(motion: &HeadMotion) -> f64 {
     if faces_aft(motion.mount.rotation) { -1.0 } else { 1.0 }
 }

@@ -1,4 +1,4 @@
-//! Planning before a dive: the result of heads, modes, layout and speed in a tunnel, without measurements.
+//! Planning before a dive: coverage by heads, modes, layout and speed in a tunnel, without measurements.
 
 mod answer;
 mod briefing;
@@ -24,13 +24,15 @@ pub use briefing::{Briefing, Heard, Hidden, HullAdvice, Start, ThinStrip};
 pub use mounts::InLine;
 pub use wall::{PatternSample, WallPlace};
 
-/// Share of the largest speed that meets the target for which heads are to be started: a pilot holds a speed within 5 %, and heads apart
-/// along the hull are in phase about the planned one only. Source: field.md, "Driven".
+/// Share of the largest speed for which heads should be started.
+///
+/// A pilot keeps a speed within 5 %, and heads apart along the hull are in phase only near the planned one. Source:
+/// field.md, "Driven".
 pub const HELD_SHARE: f64 = 0.95;
 /// Soundings per ring: 0.1 degrees apart, so that a step is evaluated from many start angles.
 const RING: u32 = 3600;
 
-/// Steps down to the speed that leads to itself: each is a fraction of the one before.
+/// Maximum number of steps down to the converged speed; each step is a fraction of the one before.
 const FALLS: u32 = 12;
 
 /// A tunnel, a vehicle and the tolerances to plan for.
@@ -42,7 +44,7 @@ pub struct Inspection {
     pub length_m: f64,
     /// Nominal position of the vehicle in the cross-section.
     pub place: Yz,
-    /// Its heads with the modes of each; all heads are set to the same one.
+    /// Its heads, with the modes of each; all heads use the same mode.
     pub heads: Vec<(HeadSpec, Vec<HeadMode>)>,
     /// Parts of the vehicle that may occlude a head.
     pub hull: Vec<Obstacle>,
@@ -75,8 +77,10 @@ struct Stance {
 pub struct PlannedMode {
     /// The mode of the first head; its name and step are those of all heads.
     pub mode: HeadMode,
-    /// Smallest, mean and largest straight-line distance between neighbours of one turn, of any head, with the vehicle
-    /// at its nominal pose and at rest, m. Source: the general case of Eq. 5, 6 and 10.
+    /// Smallest, mean and largest straight-line distance between neighbours of one turn, m.
+    ///
+    /// It covers all heads, with the vehicle at its nominal pose and at rest. Source: the general case of Eq. 5, 6
+    /// and 10.
     pub chords_m: [f64; 3],
     /// The largest distance between neighbours of one turn on the unrolled wall, at any tolerated pose, m.
     pub t_y2_m: f64,
@@ -84,7 +88,7 @@ pub struct PlannedMode {
     ping_period_s: f64,
 }
 
-/// Answers questions about an inspection.
+/// Answers planning questions about an inspection.
 #[derive(Debug, Clone)]
 pub struct Planner {
     inspection: Inspection,
@@ -130,24 +134,25 @@ impl Planner {
         Ok(Self { inspection, hidden, stances, modes, errors: None })
     }
 
-    /// The same, with a margin for errors of position.
+    /// Returns the planner with a margin for position errors.
     #[must_use]
     pub fn with_errors(self, errors: Option<ExpectedErrors>) -> Self {
         Self { errors, ..self }
     }
 
-    /// The inspection that is planned.
+    /// Returns the planned inspection.
     pub fn inspection(&self) -> &Inspection {
         &self.inspection
     }
 
-    /// The modes that all heads have, in the order of the first head's.
+    /// Returns the modes that all heads have, in the order of the first head's.
     pub fn modes(&self) -> &[PlannedMode] {
         &self.modes
     }
 
-    /// T_max at a speed with the heads phased for it, m: the largest over all tolerated poses, including the strips
-    /// that the vehicle hides from some of its heads; infinite where a strip is seen by no head.
+    /// Returns T_max at a speed with the heads phased for it, m: the largest over all tolerated poses.
+    ///
+    /// It includes strips that the vehicle hides from some of its heads. Infinite if no head sees a strip.
     ///
     /// Errors: a speed that isn't above zero.
     /// Source: Jorge et al. 2021, Eq. 16.
@@ -159,15 +164,16 @@ impl Planner {
         Ok(self.over_stances(mode, t_m).fold(0.0, f64::max))
     }
 
-    /// The largest speed at which sections will pass, with the heads phased for it, m/s: at which T_max and the margin for
-    /// errors of position are the target.
+    /// Returns the largest speed at which sections will pass, with the heads phased for it, m/s.
+    ///
+    /// At that speed, T_max plus the margin for position errors equals the target.
     ///
     /// Errors: a target that isn't above zero, or that no speed meets.
     pub fn v_max_mps(&self, mode: usize, target_m: f64) -> Result<f64, SamplingError> {
         let known_mps = self.known_v_max_mps(mode, target_m)?;
         let Some(planned) = self.modes.get(mode) else { return Ok(known_mps) };
-        // The slower, the longer between heads apart along the hull, and the larger the margin: down from above, each
-        // speed leads to a lower one until it leads to itself.
+        // A slower vehicle takes longer between heads apart along the hull, so the margin grows. Starting from above,
+        // each speed leads to a lower one until it converges.
         let mut speed_mps = known_mps;
         for _ in 0..FALLS {
             let margin_m = self.margin_m(planned, target_m, speed_mps);
@@ -178,14 +184,14 @@ impl Planner {
         Ok(speed_mps)
     }
 
-    /// Margin for errors of position in a mode at a speed, m.
+    /// Returns the margin for position errors in a mode at a speed, m.
     fn margin_m(&self, planned: &PlannedMode, target_m: f64, speed_mps: f64) -> f64 {
         let confidence_sd = self.errors.as_ref().map_or(0.0, |errors| errors.confidence_sd);
         let pass_error_m = self.pass_error_m(planned, speed_mps);
         margin::position_margin_m(target_m, confidence_sd, pass_error_m, planned.t_y2_m)
     }
 
-    /// Standard deviation of a hole's size between two passes in a mode at a speed, m; zero where nothing is known of it.
+    /// Standard deviation of a hole's size between two passes in a mode at a speed, m; zero if unknown.
     fn pass_error_m(&self, planned: &PlannedMode, speed_mps: f64) -> f64 {
         let Some(errors) = &self.errors else { return 0.0 };
         let passes_per_s = self.inspection.heads.len() as f64 / planned.mode.turn.period_s();
@@ -193,7 +199,7 @@ impl Planner {
         errors.pass_error_m(margin::error_time_s(passes_per_s, apart_m, speed_mps, APART_SHARE))
     }
 
-    /// The largest speeds in a mode for a target, margin by margin.
+    /// Returns the largest speeds in a mode for a target, margin by margin.
     ///
     /// Errors: as for [`Planner::v_max_mps`].
     pub fn margins(&self, mode: usize, target_m: f64) -> Result<Margins, SamplingError> {
@@ -219,8 +225,9 @@ impl Planner {
         ))
     }
 
-    /// The largest speed at which T_max is the target, with the heads phased for it, m/s: the inverse of
-    /// [`Planner::t_max_m`], for a position that is known.
+    /// Returns the largest speed at which T_max equals the target, with the heads phased for it, m/s.
+    ///
+    /// It is the inverse of [`Planner::t_max_m`], without position errors.
     ///
     /// Errors: a target that isn't above zero, or that no speed meets.
     pub fn known_v_max_mps(&self, mode: usize, target_m: f64) -> Result<f64, SamplingError> {
@@ -258,15 +265,16 @@ impl Planner {
                 shift_m: stance.shift_m,
                 apart_m: stance.apart_m,
                 apart_swing_mps: swing_mps,
-                // From one tolerated yaw to the other; a rate alone may go on for as long as it takes.
+                // From one tolerated yaw to the other; without a yaw tolerance, a yaw rate may last indefinitely.
                 swing_most_m: (yaw_rad > 0.0).then_some(2.0 * yaw_rad * stance.farthest_m),
             };
             Some(of(stance, &planned.passes.beside(stance.parallax_rad), &going))
         })
     }
 
-    /// Longest time between passes over a place that all heads see, and over any place that some head sees, seconds, at
-    /// the nominal pose.
+    /// Returns the longest times between passes at the nominal pose, s.
+    ///
+    /// The first is over a place that all heads see, the second over any place that some head sees.
     pub fn gaps_s(&self, mode: usize) -> Option<(f64, f64)> {
         let planned = self.modes.get(mode)?;
         let gap_s = |seen_by| planned.passes.gap_s(seen_by);
@@ -286,8 +294,9 @@ impl Planner {
         (far().next().unwrap_or(0.0), far().fold(0.0, f64::max))
     }
 
-    /// Length of the first head's footprint on the wall in its scan plane, the shortest and the longest of a turn, m,
-    /// at the nominal pose.
+    /// Shortest and longest footprint of the first head on the wall in a turn, m.
+    ///
+    /// Footprints are measured in the scan plane, at the nominal pose.
     ///
     /// Errors: as for [`Standing::footprint`].
     /// Source: Jorge et al. 2021, Fig. 15.
@@ -350,7 +359,9 @@ impl PlannedMode {
     }
 }
 
-/// The graver of two errors: an unseen strip before a step, any other error before both; of one kind, the larger.
+/// Returns the more severe of two errors: any other error, then an unseen strip, then a step.
+///
+/// Within one kind, the larger one counts.
 fn worse(known: Option<SamplingError>, other: SamplingError) -> Option<SamplingError> {
     let weight = |why: &SamplingError| match why {
         SamplingError::UnseenStrip { width_m, .. } => (1, *width_m),
@@ -448,7 +459,7 @@ fn spread(values: impl Iterator<Item = f64> + Clone) -> f64 {
     (values.clone().fold(f64::MIN, f64::max) - values.fold(f64::MAX, f64::min)).max(0.0)
 }
 
-/// The parts of the wall that each head sees.
+/// Returns the parts of the wall that each head sees.
 fn views(
     inspection: &Inspection,
     specs: &[HeadSpec],

@@ -1,5 +1,6 @@
-//! The general case by ray casting: where the beams of a head at rest meet the wall of any profile, from any position
-//! and attitude.
+//! The general case by ray casting, for any profile and pose.
+//!
+//! It computes where the beams of a head at rest meet the wall.
 
 use serde::{Deserialize, Serialize};
 
@@ -9,7 +10,7 @@ use headrace_geometry::math::{self, TAU};
 use headrace_geometry::snapshot::stateful;
 use headrace_geometry::tunnel::{Profile, WallHit};
 
-/// A beam with a longer range than this runs along the tunnel, m.
+/// Range above which a beam counts as running along the tunnel, m.
 const ALONG_M: f64 = 1000.0;
 
 /// A head at rest in a straight tunnel.
@@ -20,7 +21,7 @@ pub struct Standing<'a> {
     turn: Rot<Tunnel, Sensor>,
 }
 
-/// Where a beam meets the wall.
+/// Point where a beam meets the wall.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Sounding {
     /// Head angle, radians in the sensor's frame.
@@ -59,7 +60,7 @@ impl<'a> Standing<'a> {
         self.profile.perimeter_m()
     }
 
-    /// Where the beam at `angle_rad` (sensor frame) meets the wall.
+    /// Returns the point where the beam at `angle_rad` (sensor frame) meets the wall.
     ///
     /// Errors: no wall within a kilometre along the beam.
     pub fn sounding(&self, angle_rad: f64) -> Result<Sounding, SamplingError> {
@@ -113,8 +114,9 @@ impl Sounding {
         self.beam.norm()
     }
 
-    /// Distance to another sounding of the same head on the unrolled wall, the shortest way round, m: the measure for
-    /// holidays.
+    /// Distance to another sounding of the same head on the unrolled wall, m.
+    ///
+    /// It is the shortest way round, the measure for holidays.
     pub fn step_m(&self, other: &Self, perimeter_m: f64) -> f64 {
         let around_m = math::wrap_signed(other.arc_m - self.arc_m, perimeter_m);
         math::hypot(other.beam.x() - self.beam.x(), around_m)
@@ -130,11 +132,12 @@ impl Sounding {
 #[derive(Debug, Clone, Default)]
 pub struct Ring {
     soundings: Vec<Sounding>,
-    /// Signed arc length from the first sounding to each, m, and last that of the whole turn; negative where the head
-    /// turns against arc length.
+    /// Signed arc length from the first sounding to each, m; the last entry is that of the whole turn.
+    ///
+    /// Negative if the head turns against arc length.
     way_m: Vec<f64>,
     perimeter_m: f64,
-    /// Angles and beam directions of the soundings, kept from cast to cast.
+    /// Angles and beam directions of the soundings, cached between casts.
     beams: Vec<(f64, Vec3<Sensor>)>,
     /// Stride of the distances cached in `steps_m`; zero if there are none.
     stride: usize,
@@ -144,7 +147,7 @@ pub struct Ring {
 stateful!(Ring { state: perimeter_m, stride; lists: soundings, way_m, beams, steps_m; });
 
 impl Ring {
-    /// A ring of `count` soundings, the first at `start_rad`.
+    /// Casts a ring of `count` soundings, the first at `start_rad`.
     ///
     /// Errors: as for [`Standing::sounding`]; a count of zero.
     pub fn cast(standing: &Standing<'_>, start_rad: f64, count: u32) -> Result<Self, SamplingError> {
@@ -153,7 +156,7 @@ impl Ring {
         Ok(ring)
     }
 
-    /// Recasts in place; without soundings after an error.
+    /// Recasts in place; after an error there are no soundings.
     ///
     /// Errors: as for [`Ring::cast`].
     /// Allocates: not when the ring has had as many soundings before.
@@ -239,23 +242,26 @@ impl Ring {
         &self.soundings
     }
 
-    /// Pairs of soundings `stride` apart, closing the turn: neighbours of a head that pings at every `stride`-th
-    /// sounding.
+    /// Pairs of soundings `stride` apart, closing the turn.
+    ///
+    /// They are neighbours of a head that pings at every `stride`-th sounding.
     pub fn pairs(&self, stride: usize) -> impl Iterator<Item = (&Sounding, &Sounding)> {
         let count = self.soundings.len().max(1);
         self.soundings.iter().zip(self.soundings.iter().cycle().skip(stride % count))
     }
 
-    /// T_y2 in general, m: the largest distance on the unrolled wall between soundings `stride` apart, for any angle of
-    /// the first ping; zero without soundings.
+    /// T_y2 in general, m: the largest distance on the unrolled wall between soundings `stride` apart.
+    ///
+    /// It covers any angle of the first ping. Zero without soundings.
     ///
     /// Source: Eq. 6 where the paper's assumptions hold.
     pub fn largest_step_m(&self, stride: usize) -> f64 {
         self.steps_m(stride).fold(0.0, f64::max)
     }
 
-    /// Distances on the unrolled wall from each sounding to the one `stride` further, m, in the direction of rotation:
-    /// with one ping per turn, the whole perimeter.
+    /// Distances on the unrolled wall from each sounding to the one `stride` further, m.
+    ///
+    /// They are in the direction of rotation. With one ping per turn it is the whole perimeter.
     pub fn steps_m(&self, stride: usize) -> impl Iterator<Item = f64> {
         let count = self.soundings.len().max(1);
         let whole_m = self.way_round_m();

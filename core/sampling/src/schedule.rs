@@ -6,15 +6,17 @@ use super::layout::{self, HeadLayout, steps_over};
 use headrace_geometry::math;
 use headrace_geometry::time::DurNs;
 
-/// Programs of real heads and the resulting angles: heads step, ping at each step, and reverse at a sector's ends, the
-/// last step being shorter where the sector isn't a whole number of steps.
+/// Programs of real heads and the resulting angles.
+///
+/// Heads step, ping at each step, and reverse at the ends of a sector. The last step is shorter if the sector is not
+/// a whole number of steps.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Schedule {
     heads: Vec<(HeadSpec, HeadProgram)>,
 }
 
 impl Schedule {
-    /// For heads in the order given, laid out for a speed; see [`layout::programs`].
+    /// Creates the schedule of heads in the given order for a speed; see [`layout::programs`].
     ///
     /// Errors: as for [`layout::programs`].
     pub fn new(heads: &[HeadSpec], layout: HeadLayout, speed_mps: f64) -> Result<Self, SamplingError> {
@@ -27,8 +29,10 @@ impl Schedule {
         self.heads.iter().map(|(_, program)| program)
     }
 
-    /// Angle of a head at its last ping up to `since` the start, sensor frame, radians: in [0, 2 pi) for continuous
-    /// rotation, or within its sector; `None` for a head that doesn't exist, or before the start.
+    /// Angle of a head at its last ping up to `since` the start, sensor frame, radians.
+    ///
+    /// It is in [0, 2 pi) for continuous rotation, or within its sector. `None` for a head that does not exist, or
+    /// before the start.
     pub fn angle_rad(&self, head: usize, since: DurNs) -> Option<f64> {
         let (spec, program) = self.heads.get(head)?;
         let since = (since >= DurNs::ZERO).then_some(since)?;
@@ -42,7 +46,7 @@ impl Schedule {
         })
     }
 
-    /// Period of a sweep there and back of the heads in sectors, seconds: the longest, or `None` without sectors.
+    /// Longest period of a sweep there and back, seconds; `None` without sectors.
     pub fn sweep_s(&self) -> Option<f64> {
         let sweep = |(spec, program): &(HeadSpec, HeadProgram)| {
             let (_, size_rad) = program.sector?;
@@ -87,7 +91,7 @@ mod tests {
     }
 
     #[test]
-    fn a_head_that_turns_on_steps_with_its_pings() {
+    fn rotating_head_steps_with_each_ping() {
         let schedule = Schedule::new(&[head(120.0), head(120.0)], HeadLayout::PhaseShift, 0.0).unwrap();
         assert_eq!(angles_deg(&schedule, 0, 4), [0.0, 120.0, 240.0, 0.0]);
         assert_eq!(angles_deg(&schedule, 1, 3), [180.0, 300.0, 60.0]);
@@ -99,7 +103,7 @@ mod tests {
     }
 
     #[test]
-    fn a_sector_that_is_no_whole_number_of_steps_ends_with_a_short_one() {
+    fn sector_with_a_partial_step_ends_with_a_short_one() {
         let schedule = Schedule::new(&[head(75.0), head(75.0)], HeadLayout::SectorOffset, 0.0).unwrap();
         let there_and_back = [0.0, 75.0, 150.0, 180.0, 105.0, 30.0, 0.0, 75.0, 150.0, 180.0, 105.0];
         assert_eq!(angles_deg(&schedule, 0, 11), there_and_back);
@@ -108,7 +112,7 @@ mod tests {
     }
 
     #[test]
-    fn each_head_begins_where_its_program_does() {
+    fn each_head_starts_at_its_program_angle() {
         let heads = [head(30.0), head(30.0), head(30.0)];
         for layout in [HeadLayout::PhaseShift, HeadLayout::SectorOffset] {
             let schedule = Schedule::new(&heads, layout, 0.1).unwrap();

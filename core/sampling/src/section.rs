@@ -16,12 +16,12 @@ pub fn t_y1_m(distance_m: f64, step_rad: f64) -> Result<f64, SamplingError> {
     t_y2_m(distance_m, step_rad, 1)
 }
 
-/// T_y2, m: the step along a flat wall from (m - 1) theta to m theta, for any m >= 1; the largest where m theta meets
-/// the corner.
+/// T_y2, m: the step along a flat wall from (m - 1) theta to m theta, for any m >= 1.
 ///
-/// `distance_m` > 0 is the distance h to the wall. h (tan(m theta) - tan((m - 1) theta)) is computed as h sin(theta) /
-/// (cos(m theta) cos((m - 1) theta)), which avoids cancellation. Multiples of theta are kept to twice double precision,
-/// so that a beam almost along the wall keeps its digits as well.
+/// It is the largest where m theta meets the corner. `distance_m` > 0 is the distance h to the wall. h (tan(m theta)
+/// - tan((m - 1) theta)) is computed as h sin(theta) / (cos(m theta) cos((m - 1) theta)), which avoids cancellation.
+/// Multiples of theta are kept to twice double precision, so that a beam almost along the wall keeps its digits as
+/// well.
 /// Errors: an argument out of range; m theta of 90 degrees or more.
 /// Source: Jorge et al. 2021, Eq. 6.
 pub fn t_y2_m(distance_m: f64, step_rad: f64, m: u32) -> Result<f64, SamplingError> {
@@ -55,7 +55,9 @@ pub fn t_y2_mean_m(distance_m: f64, step_rad: f64, m: u32) -> Result<f64, Sampli
     Ok(distance_m * sine / cosine / f64::from(m))
 }
 
-/// T_yp, m: upper bound of the mean step of a whole turn, for any head position: perimeter / pings per turn.
+/// T_yp, m: upper bound of the mean step of a whole turn, perimeter / pings per turn.
+///
+/// It holds for any head position.
 ///
 /// Errors: a perimeter or a number that isn't above zero.
 /// Source: Jorge et al. 2021, Eq. 10.
@@ -152,10 +154,11 @@ mod tests {
     use super::*;
     use headrace_geometry::math::{FRAC_PI_2, tan};
 
-    /// Near a right angle a cosine is as exact as the sum itself, which a double isn't: against the sine of what is left of a right angle,
-    /// in two parts, taken exactly.
+    /// Near a right angle the cosine is as exact as the sum, which a double cannot represent.
+    ///
+    /// The reference is the sine of the remainder to a right angle, in two exact parts.
     #[test]
-    fn the_cosine_of_a_sum_is_exact_up_to_a_grazing_beam() {
+    fn cosine_of_a_sum_is_exact_up_to_a_grazing_beam() {
         const REST: f64 = 6.123_233_995_736_766e-17;
         for k in 35..60 {
             // The difference from a right angle is exact from half of one on.
@@ -170,7 +173,7 @@ mod tests {
     }
 
     #[test]
-    fn verif_hand_computed_values() {
+    fn formulas_equal_hand_computed_values() {
         let step = f64::to_radians(0.9);
         // tan 0.9 deg = 0.015709; h = 4.571 m.
         assert!((t_y1_m(4.571, step).unwrap() - 0.071_807).abs() < 1e-6);
@@ -184,7 +187,7 @@ mod tests {
     }
 
     #[test]
-    fn a_beam_along_the_wall_is_named() {
+    fn beam_along_the_wall_is_an_error() {
         let step = f64::to_radians(0.9);
         assert!(t_y2_m(3.0, step, 99).is_ok());
         for m in [101, 150, 399] {
@@ -200,7 +203,7 @@ mod tests {
     }
 
     #[test]
-    fn arguments_out_of_range_are_named() {
+    fn arguments_out_of_range_are_errors() {
         for bad in [0.0, -1.0, f64::NAN, f64::INFINITY] {
             assert!(t_y1_m(bad, 0.01).is_err() && t_y1_m(3.0, bad).is_err(), "{bad}");
             assert!(t_c_m(bad, 0.01).is_err() && t_yp_m(bad, 400).is_err(), "{bad}");
@@ -213,7 +216,7 @@ mod tests {
     proptest! {
         /// Theorem 1: steps along a flat wall grow with the distance from the perpendicular's foot.
         #[test]
-        fn verif_theorem_1(h in 0.01..100.0f64, step in 1e-4..0.3f64, share in 0.0..1.0f64) {
+        fn flat_wall_steps_grow_with_distance(h in 0.01..100.0f64, step in 1e-4..0.3f64, share in 0.0..1.0f64) {
             let last = headrace_geometry::math::floor_to_i64(FRAC_PI_2 / step) - 1;
             prop_assume!(last >= 2);
             let m = 1 + headrace_geometry::math::floor_to_i64(share * (last - 1) as f64);
@@ -223,13 +226,13 @@ mod tests {
 
         /// T_c < T_y1: a circular crown is sampled more densely than a floor at the same distance.
         #[test]
-        fn verif_the_crown_is_closer_than_the_floor(h in 0.01..100.0f64, step in 1e-3..1.5f64) {
+        fn crown_is_sampled_more_densely_than_the_floor(h in 0.01..100.0f64, step in 1e-3..1.5f64) {
             prop_assert!(t_c_m(h, step).unwrap() < t_y1_m(h, step).unwrap());
         }
 
         /// The mean of Eq. 8 equals the mean of its terms.
         #[test]
-        fn verif_the_mean_of_the_steps(h in 0.01..100.0f64, step in 1e-3..0.3f64) {
+        fn mean_step_equals_the_mean_of_its_terms(h in 0.01..100.0f64, step in 1e-3..0.3f64) {
             let m = u32::try_from(headrace_geometry::math::floor_to_i64(FRAC_PI_2 / step) - 1).unwrap_or(0);
             prop_assume!(m >= 1);
             let sum: f64 = (1..=m).map(|k| t_y2_m(h, step, k).unwrap()).sum();

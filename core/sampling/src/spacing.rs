@@ -13,19 +13,19 @@ pub fn t_max_m(t_x_m: f64, advance_m: f64, t_y_m: f64) -> f64 {
     math::hypot(t_x_m + advance_m, t_y_m)
 }
 
-/// The speed at which T_max equals the target, m/s; `None` where `t_y_m` alone reaches the target, or the times aren't
-/// positive.
+/// The speed at which T_max equals the target, m/s.
 ///
-/// `pass_gap_s` is the time between passes (T_rev / s for s evenly interleaved heads), `ping_period_s` that between
-/// pings (T_s).
+/// `None` where `t_y_m` alone reaches the target, or the times aren't positive. `pass_gap_s` is the time between
+/// passes (T_rev / s for s evenly interleaved heads), `ping_period_s` that between pings (T_s).
 /// Source: Eq. 16 solved for v (docs/decisions/0005-advice-and-plan.md).
 pub fn speed_for_target_mps(target_m: f64, t_y_m: f64, pass_gap_s: f64, ping_period_s: f64) -> Option<f64> {
     let time_s = pass_gap_s + ping_period_s;
     along_m(target_m, t_y_m).filter(|_| time_s > 0.0).map(|along_m| along_m / time_s)
 }
 
-/// Sum of pass distance and ping advance that the target T allows, m: sqrt(T^2 - T_y^2); `None` where `t_y_m` alone
-/// reaches the target.
+/// Sum of pass distance and ping advance that the target T allows, m: sqrt(T^2 - T_y^2).
+///
+/// `None` where `t_y_m` alone reaches the target.
 pub(super) fn along_m(target_m: f64, t_y_m: f64) -> Option<f64> {
     // (T - t)(T + t) avoids cancellation for t close to T.
     (t_y_m < target_m).then(|| math::sqrt((target_m - t_y_m) * (target_m + t_y_m)))
@@ -40,10 +40,13 @@ pub struct Spiral {
 }
 
 impl Spiral {
+    /// Creates the spiral.
+    ///
     /// `passes_per_turn` is the number of passes over a place in the time of one turn: 1 for a single head, s for s
     /// heads in phase shift, s / 2 for s heads in sectors.
     ///
-    /// Errors: a negative speed, passes that aren't above zero, or a value that isn't finite. A speed of zero is valid:
+    /// Errors: a negative speed, passes that are not positive, or a value that is not finite. A speed of zero is
+    /// valid:
     /// all distances along the tunnel are zero.
     pub fn new(speed_mps: f64, turn: Turn, passes_per_turn: f64) -> Result<Self, SamplingError> {
         not_negative("the speed in m/s", speed_mps)?;
@@ -112,7 +115,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn verif_hand_computed_values() {
+    fn formulas_equal_hand_computed_values() {
         let fast = Turn::new(f64::to_radians(0.9), 8.0).unwrap();
         let one = Spiral::new(0.197, fast, 1.0).unwrap();
         assert!((one.advance_m() - 0.003_94).abs() < 1e-15);
@@ -126,7 +129,7 @@ mod tests {
     }
 
     #[test]
-    fn at_rest_all_distances_along_the_tunnel_are_zero() {
+    fn distances_along_the_tunnel_are_zero_at_rest() {
         let turn = Turn::new(f64::to_radians(0.9), 8.0).unwrap();
         let rest = Spiral::new(0.0, turn, 2.0).unwrap();
         assert_eq!((rest.advance_m(), rest.t_x_m(), rest.t_max_m(0.2)), (0.0, 0.0, 0.2));
@@ -138,7 +141,7 @@ mod tests {
     }
 
     #[test]
-    fn speed_and_target_are_each_other_s_inverse() {
+    fn speed_and_target_are_inverse() {
         let v = speed_for_target_mps(0.5, 0.12, 2.0, 0.02).unwrap();
         assert!((t_max_m(v * 2.0, v * 0.02, 0.12) - 0.5).abs() < 1e-12);
         assert_eq!(speed_for_target_mps(0.5, 0.5, 2.0, 0.02), None);

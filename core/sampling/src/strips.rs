@@ -1,4 +1,4 @@
-//! The wall around a vehicle as strips, each seen by the same heads, and the spacing on them.
+//! Wall around a vehicle as strips seen by the same heads, and the spacing on them.
 
 use serde::{Deserialize, Serialize};
 
@@ -34,61 +34,68 @@ pub struct Strip {
     pub arc: Arc,
     /// The heads that see it.
     pub seen_by: HeadSet,
-    /// All or part of it is hidden from a head that would ping it: pings stop up to a step before its edge. Where it is only
-    /// outside a sector, they stop at its edge.
+    /// Whether any part of it is hidden from a head that would ping it.
+    ///
+    /// Pings then stop up to a step before its edge. If it is merely outside a sector, they stop at its edge.
     pub hidden: bool,
-    /// The longest wait between two passes, as a share of the longest anywhere, which is at the ends of a sector: 0.5 to 1.
+    /// Longest wait between two passes, as a share of the longest anywhere: 0.5 to 1. The longest is at the ends of a
+    /// sector.
     pub wait: f64,
 }
 
 impl Strip {
-    /// Whether another one differs in its place alone.
+    /// Whether another strip differs only in its place.
     fn is_like(&self, other: &Self) -> bool {
         let same_wait = (self.wait - other.wait).abs() <= 0.0;
         self.seen_by == other.seen_by && self.hidden == other.hidden && same_wait
     }
 }
 
-/// The largest speed for a target, and T_y where it limits that speed.
+/// Largest speed for a target, and T_y at the place that limits it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Bound {
-    /// The speed, m/s; infinite where nothing bounds it.
+    /// The speed, m/s; infinite if nothing limits it.
     pub speed_mps: f64,
     /// T_y of the limiting strip, m.
     pub t_y_m: f64,
 }
 
-/// A strip that doesn't meet a target at a speed.
+/// A strip that misses a target at a speed.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Unmet {
-    /// The longest time between two passes over it, seconds, without any for returns that are lost; infinite where no head sees it.
+    /// Longest time between two passes over it, s, without extra passes for lost returns.
+    ///
+    /// Infinite if no head sees it.
     pub gap_s: f64,
     /// The largest step on it, m.
     pub t_y_m: f64,
-    /// Its length round the wall, m: at least so far apart are the samples on either side of it.
+    /// Its length around the wall, m: the minimum distance between the samples on either side of it.
     pub width_m: f64,
 }
 
-/// Strips of the wall, in order of arc length, neighbours seen by different heads or after different waits; one strip where all heads
-/// see all.
-/// Holds the largest steps on each strip for each of several settings of the heads.
+/// Strips of the wall in order of arc length; one strip if all heads see everything.
+///
+/// Neighbouring strips are seen by different heads or after different waits. Holds the largest steps on each strip
+/// for several settings of the heads.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Strips {
     strips: Vec<Strip>,
     edges_m: Vec<f64>,
     perimeter_m: f64,
-    /// By setting and strip: the largest step of the heads that see it, and of all heads, m.
+    /// By setting and strip: largest step of the heads that see it, and of all heads, m.
     steps_m: Vec<[f64; 2]>,
-    /// By setting and strip: passes needed for one within it, and across it, as returns are lost; empty before the first count.
+    /// By setting and strip: passes needed because of lost returns, within and across it.
+    ///
+    /// Empty before the first count.
     needed: Vec<[f64; 2]>,
-    /// Strip of each sounding of the current ring, and the approximate distance to the strip's end, m.
+    /// Strip of each sounding of the current ring, and the approximate distance to that strip's end, m.
     strip_of: Vec<(usize, f64)>,
 }
 
 stateful!(Strips { state: perimeter_m; lists: strips, edges_m, steps_m, needed, strip_of; });
 
 impl Strips {
-    /// Without strips, with capacity for those of `arcs` arcs in `settings` settings.
+    /// Creates it without strips, with capacity for those of `arcs` arcs in `settings` settings.
     pub fn with_room(arcs: usize, settings: usize, soundings: u32) -> Self {
         let strips = 2 * arcs + 1;
         Self {
@@ -136,7 +143,7 @@ impl Strips {
         self.join_at_the_seam();
     }
 
-    /// Joins the last strip and the first across the seam where they are alike.
+    /// Joins the last strip and the first across the seam if they are alike.
     fn join_at_the_seam(&mut self) {
         let first = self.strips.first().copied();
         if self.strips.len() > 1
@@ -148,8 +155,9 @@ impl Strips {
         }
     }
 
-    /// Measures the largest steps on each strip in `settings` settings of the heads: `stride` gives the ring stride of
-    /// a head's step by setting and head, `None` for a head that is absent.
+    /// Measures the largest steps on each strip in `settings` settings of the heads.
+    ///
+    /// `stride` returns the ring stride of a head's step by setting and head, `None` for an absent head.
     ///
     /// Allocates: not with capacity for the settings.
     pub fn measure<'a>(
@@ -202,12 +210,12 @@ impl Strips {
         &self.strips
     }
 
-    /// The strip at an arc length.
+    /// Returns the strip at an arc length.
     pub fn at(&self, arc_m: f64) -> Option<&Strip> {
         self.strips.get(number_at(&self.strips, arc_m, self.perimeter_m))
     }
 
-    /// A strip with those beside it that the same heads see after other waits.
+    /// Returns a strip joined with its neighbours that the same heads see after other waits.
     fn seen_alike(&self, k: usize) -> Arc {
         let count = self.strips.len();
         let Some(strip) = self.strips.get(k) else { return Arc { from_m: 0.0, length_m: 0.0 } };
@@ -218,23 +226,23 @@ impl Strips {
         Arc { from_m: strip.arc.from_m - back_m, length_m: (forward_m + back_m).min(self.perimeter_m) }
     }
 
-    /// The largest step of any head on the strips that it sees, in a setting, m.
+    /// Returns the largest step of any head on the strips that it sees, in a setting, m.
     pub fn largest_step_m(&self, setting: usize) -> f64 {
         let count = self.strips.len();
         let of_setting = self.steps_m.iter().skip(setting * count).take(count);
         of_setting.map(|steps| steps[0]).fold(0.0, f64::max)
     }
 
-    /// T_max predicted at a speed, m: the largest of any strip; infinite where a wide strip is seen by no head.
+    /// Returns T_max predicted at a speed, m: the largest of any strip.
     ///
-    /// On a strip that some heads don't see, passes are farther apart; but the strip's width also bounds the distance
-    /// between the samples on either side of it.
+    /// Infinite if no head sees a wide strip. Passes are farther apart on a strip that some heads do not see. But the
+    /// width of the strip also limits the distance between the samples on either side of it.
     /// Source: Jorge et al. 2021, Eq. 16.
     pub fn t_max_m(&self, setting: usize, passes: &Passes, speed_mps: f64, going: &Going) -> f64 {
         self.ts_m(setting, passes, speed_mps, going).fold(0.0, f64::max)
     }
 
-    /// The first strip that doesn't meet a target at a speed; `None` where [`Strips::t_max_m`] is within it.
+    /// Returns the first strip that misses a target at a speed; `None` if [`Strips::t_max_m`] is within it.
     pub fn unmet(
         &self,
         setting: usize,
@@ -245,7 +253,7 @@ impl Strips {
     ) -> Option<Unmet> {
         let thin = Thin::of(passes, self.strips.iter().map(|strip| strip.seen_by));
         let is_met = |limit: Limit| limit.t_m(speed_mps, going) <= target_m;
-        // What is across a strip is only looked at where the strip itself doesn't meet it.
+        // The samples across a strip matter only if the strip itself misses the target.
         let is_unmet = |(k, strip): &(usize, &Strip)| {
             !(self.within(setting, (*k, strip), &thin).is_some_and(is_met)
                 || self.across(setting, (*k, strip), &thin).is_some_and(is_met))
@@ -258,7 +266,9 @@ impl Strips {
         })
     }
 
-    /// The largest speed for a target if every head saw all of the wall, m/s; `None` where none meets it.
+    /// Returns the largest speed for a target if every head saw all of the wall, m/s.
+    ///
+    /// `None` if none meets it.
     pub fn bound_if_all_seen_mps(
         &self,
         setting: usize,
@@ -280,7 +290,7 @@ impl Strips {
         Some(slowest_mps)
     }
 
-    /// T predicted on each strip at a speed, m.
+    /// Returns T predicted on each strip at a speed, m.
     fn ts_m(
         &self,
         setting: usize,
@@ -294,8 +304,9 @@ impl Strips {
         })
     }
 
-    /// The largest speed at which [`Strips::t_max_m`] meets a target, for passes that are the same at any speed, and
-    /// its limiting T_y.
+    /// Returns the largest speed at which [`Strips::t_max_m`] meets a target, and its limiting T_y.
+    ///
+    /// The passes must be the same at any speed.
     ///
     /// Errors: a strip on which no speed meets the target.
     pub fn bound_for_target(
@@ -331,7 +342,7 @@ impl Strips {
         Ok(slowest)
     }
 
-    /// For each strip, the limits of T within it, where any head sees it, and across it, where not all do.
+    /// Returns the limits of T for each strip: within it if any head sees it, and across it if not all do.
     fn limits(
         &self,
         setting: usize,
@@ -363,8 +374,9 @@ impl Strips {
             .filter(|limit| limit.t_y_m < self.perimeter_m)
     }
 
-    /// Distance between the samples on either side of the strips around strip `k` that are thin, m, and whether they are no more than
-    /// what sectors leave out.
+    /// Returns the distance between the samples on either side of the thin strips around strip `k`, m.
+    ///
+    /// Also returns whether these strips are merely the part that sectors leave out.
     fn across_m(&self, setting: usize, k: usize, gaps: &Thin<'_>) -> (f64, bool) {
         let count = self.strips.len();
         let thin = |number: usize| {
@@ -381,7 +393,7 @@ impl Strips {
             is_left_out &= strip.seen_by.is_empty() && !strip.hidden;
             step_m = step_m.max(self.steps_m.get(setting * count + number).map_or(0.0, |steps| steps[1]));
         }
-        // Pings end at a sector's edge, but up to a step before a hidden arc.
+        // Pings end at the edge of a sector, but up to a step before a hidden arc.
         (width_m.min(self.perimeter_m) + if hidden { 2.0 * step_m } else { 0.0 }, is_left_out)
     }
 }
@@ -456,7 +468,7 @@ fn strip(views: &[View], arc: Arc, perimeter_m: f64) -> Strip {
     }
 }
 
-/// As [`number_at`], with a guess that is mostly right: soundings follow each other round the wall.
+/// [`number_at`] with a guess that is mostly right, because soundings are in order around the wall.
 fn number_near(strips: &[Strip], arc_m: f64, perimeter_m: f64, guess: usize) -> usize {
     let first_m = strips.first().map_or(0.0, |strip| strip.arc.from_m);
     let from_first_m = math::wrap(arc_m - first_m, perimeter_m);
@@ -467,7 +479,7 @@ fn number_near(strips: &[Strip], arc_m: f64, perimeter_m: f64, guess: usize) -> 
     strips.iter().rposition(|strip| strip.arc.from_m - first_m <= from_first_m).unwrap_or(0)
 }
 
-/// The number of the strip at an arc length: the last that begins at or before it.
+/// Returns the number of the strip at an arc length: the last that begins at or before it.
 fn number_at(strips: &[Strip], arc_m: f64, perimeter_m: f64) -> usize {
     number_near(strips, arc_m, perimeter_m, strips.len())
 }

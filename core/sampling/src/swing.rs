@@ -1,16 +1,19 @@
-//! Vehicle swing: yaw and pitch sweep the beams along the tunnel between two passes over a place.
+//! Vehicle swing: yaw and pitch that sweep the beams along the tunnel between two passes over a place.
 
 use headrace_geometry::frames::{Tunnel, Vec3};
 use headrace_geometry::math;
 use headrace_geometry::snapshot::stateful;
 use headrace_geometry::time::{DurNs, MonoNs};
 
-/// Number of headings kept: at 5 Hz, `WINDOW` plus a turn of a head in its slowest mode.
+/// Number of stored headings: at 5 Hz, `WINDOW` plus one turn of a head in its slowest mode.
 const BEATS: usize = 320;
-/// How far back a swing counts: a swing with a period of up to a minute shows its full extent in half of it.
+/// History in which a swing counts.
+///
+/// A swing with a period of up to a minute shows its full extent in half of it.
 const WINDOW: DurNs = DurNs(30_000_000_000);
-/// Rotation between two passes below this is attributed to navigation errors, radians; from twice this it counts in
-/// full.
+/// Rotation between two passes below which it is attributed to navigation errors, radians.
+///
+/// It counts fully from twice this.
 const DEAD_RAD: f64 = 0.0075;
 
 /// Swing of a vehicle.
@@ -20,7 +23,7 @@ pub struct Swing {
     pub rate_radps: f64,
     /// Largest rotation over any time, radians.
     pub most_rad: f64,
-    /// Largest rotation until the rearmost head is where the foremost was, per second, rad/s.
+    /// Largest rotation until the rearmost head reaches the position of the foremost, per second, rad/s.
     pub apart_rate_radps: f64,
 }
 
@@ -53,16 +56,16 @@ impl Looks {
         self.count += 1;
     }
 
-    /// Largest rotation from `look` to any direction stored since a time, radians.
+    /// Returns the largest rotation from `look` to any direction stored since a time, radians.
     pub fn turned_since(&self, look: Vec3<Tunnel>, since: MonoNs) -> f64 {
         let recent = self.newest_first().take_while(|(then, _)| *then >= since);
         recent.map(|(_, then)| (look + -*then).norm()).fold(0.0, f64::max)
     }
 
-    /// Swing within the last half minute up to `now`, for passes `gap_s` apart and heads that pass a place within `apart_s`: the
-    /// largest in that time, so that it holds while the vehicle swings to and fro.
+    /// Returns the largest swing of the last half minute up to `now`.
     ///
-    /// Rotation within the navigation errors is excluded, with a continuous transition.
+    /// It stays valid while the vehicle swings to and fro. `gap_s` is the time between passes; heads pass a place
+    /// within `apart_s`. Rotation within the navigation errors is excluded, with a continuous transition.
     /// Allocates: never.
     pub fn swing(&self, now: MonoNs, gap_s: f64, apart_s: f64) -> Swing {
         let rate = |over_s: f64| {
@@ -80,18 +83,18 @@ impl Looks {
         Swing { rate_radps, most_rad: counted(largest_rad) * most_rad, apart_rate_radps }
     }
 
-    /// The largest rotation over a time within the last half minute, radians.
+    /// Returns the largest rotation over a time within the last half minute, radians.
     fn turned_over(&self, now: MonoNs, over_s: f64) -> f64 {
         let over = DurNs::from_secs_f64(over_s.min(1e3));
         let oldest = self.newest_first().last().map(|(_, look)| *look);
         let mut turned_rad = 0.0_f64;
         let mut earlier = self.newest_first().peekable();
         for (at, look) in self.recent(now) {
-            // Both go back in time, so that `earlier` never has to be rewound.
+            // Both move back in time, so that `earlier` never has to be rewound.
             while earlier.peek().is_some_and(|(then, _)| at.since(*then).0 < over.0) {
                 earlier.next();
             }
-            // Where the time reaches back beyond the history, the oldest direction is used.
+            // If the time extends beyond the history, the oldest direction is used.
             let before = earlier.peek().map(|(_, before)| *before).or(oldest);
             turned_rad = turned_rad.max(before.map_or(0.0, |before| (*look + -before).norm()));
         }
@@ -107,7 +110,7 @@ impl Looks {
     }
 }
 
-/// The share of a rotation that isn't attributed to navigation errors.
+/// Returns the share of a rotation that is not attributed to navigation errors.
 fn counted(turned_rad: f64) -> f64 {
     (2.0 - 2.0 * DEAD_RAD / turned_rad.max(DEAD_RAD)).min(1.0)
 }
@@ -119,7 +122,7 @@ mod tests {
 
     const BEAT: i64 = 200_000_000;
 
-    /// Directions of a vehicle with this yaw and pitch, radians, as functions of time in seconds.
+    /// Directions of a vehicle with this yaw and pitch, radians, as functions of time in s.
     fn looks(seconds: f64, yaw_pitch: impl Fn(f64) -> [f64; 2]) -> (Looks, MonoNs) {
         let mut looks = Looks::default();
         let mut at = MonoNs(7 * BEAT as u64);
@@ -132,12 +135,12 @@ mod tests {
     }
 
     #[test]
-    fn a_steady_swing_is_measured_and_stays_while_it_goes_to_and_fro() {
+    fn steady_swing_is_measured_and_persists_between_reversals() {
         let swinging = |t: f64| [0.1 * math::sin(TAU * t / 20.0), 0.0];
         for seconds in [60.0, 63.0, 65.0, 68.4, 200.0] {
             let (looks, now) = looks(seconds, swinging);
             let swing = looks.swing(now, 2.0, 0.0);
-            // Between two passes a sine turns by 2 A sin(omega t / 2) at most.
+            // Between two passes a sine turns by at most 2 A sin(omega t / 2).
             let expected = 0.2 * math::sin(TAU * 2.0 / 40.0) / 2.0;
             assert!((swing.rate_radps / expected - 1.0).abs() < 0.01, "{seconds}: {swing:?}, {expected}");
             assert!((swing.most_rad / 0.2 - 1.0).abs() < 0.01, "{swing:?}");
@@ -145,8 +148,8 @@ mod tests {
     }
 
     #[test]
-    fn between_heads_apart_along_the_hull_slow_swings_count() {
-        // From pass to pass within the dead band; over ten seconds, not.
+    fn slow_swing_counts_between_heads_apart_along_the_hull() {
+        // The rotation is within the dead band between passes, but not over ten seconds.
         let (looks, now) = looks(80.0, |t| [0.02 * math::sin(TAU * t / 50.0), 0.0]);
         let swing = looks.swing(now, 2.0, 10.0);
         let expected = 0.04 * math::sin(TAU * 10.0 / 100.0) / 10.0;
@@ -156,7 +159,7 @@ mod tests {
     }
 
     #[test]
-    fn it_is_forgotten_half_a_minute_after_it_has_ended() {
+    fn swing_expires_half_a_minute_after_its_end() {
         let ended = |t: f64| [if t < 50.0 { 0.1 * math::sin(TAU * t / 10.0) } else { 0.0 }, 0.0];
         let (now, still) = (looks(75.0, ended), looks(90.0, ended));
         assert!(now.0.swing(now.1, 2.0, 0.0).rate_radps > 0.02);
@@ -164,7 +167,7 @@ mod tests {
     }
 
     #[test]
-    fn a_steady_heading_and_navigation_s_wandering_are_no_swing() {
+    fn steady_heading_and_navigation_drift_are_no_swing() {
         assert_eq!(Looks::default().swing(MonoNs(0), 2.0, 0.0), Swing::default());
         let (askew, now) = looks(40.0, |_| [0.3, -0.1]);
         assert_eq!(askew.swing(now, 8.0, 0.0), Swing::default());
@@ -174,7 +177,7 @@ mod tests {
     }
 
     #[test]
-    fn it_comes_in_without_a_step_and_counts_in_full() {
+    fn swing_sets_in_continuously_and_counts_fully() {
         let ramp = |rad: f64| {
             let (looks, now) = looks(40.0, move |t| [rad * math::sin(TAU * t / 4.0), 0.0]);
             looks.swing(now, 2.0, 0.0).rate_radps * 2.0
@@ -190,7 +193,7 @@ mod tests {
     }
 
     #[test]
-    fn pitch_counts_as_yaw_does_and_of_a_long_gap_what_is_known() {
+    fn pitch_counts_like_yaw_and_long_gaps_use_the_available_history() {
         let (looks, now) = looks(10.0, |t| [0.0, 0.1 * math::sin(TAU * t / 20.0)]);
         assert!(looks.swing(now, 2.0, 0.0).rate_radps > 0.02);
         // From the oldest stored direction to the one farthest from it.

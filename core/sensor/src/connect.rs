@@ -40,22 +40,23 @@ pub enum Connect {
         /// Bits per second; 8 data bits, no parity, 1 stop bit.
         baud: u32,
     },
-    /// `tcp:HOST:PORT`, which the host connects to.
+    /// `tcp:HOST:PORT`; the host connects to it.
     Tcp {
         /// Host name or address, and port.
         address: String,
     },
-    /// `udp:HOST:PORT`: packets are sent there, and its answers received.
+    /// `udp:HOST:PORT`; packets are sent there, and its answers are received.
     Udp {
         /// Host name or address, and port.
         address: String,
     },
-    /// `udp-listen:ADDRESS:PORT[?from=HOST[:PORT]]`: a local port that the device sends to. Only one sender is heard: the one
-    /// of `from`, or the first whose message the device's driver accepts.
+    /// `udp-listen:ADDRESS:PORT[?from=HOST[:PORT]]`: a local port that the device sends to.
+    ///
+    /// Only one sender is accepted: that of `from`, or the first whose message the device's driver accepts.
     UdpListen {
         /// Local address and port.
         address: String,
-        /// Host of the device, perhaps with its port; of any host if there is none.
+        /// Host of the device, optionally with its port; any host if `None`.
         from: Option<String>,
     },
     /// `can:INTERFACE`.
@@ -78,7 +79,7 @@ pub enum Connect {
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("connect = {text:?}: {problem}; {allowed}")]
 pub struct ConnectError {
-    /// As written.
+    /// The text as written.
     pub text: String,
     /// The fault.
     pub problem: String,
@@ -86,14 +87,14 @@ pub struct ConnectError {
     pub allowed: String,
 }
 
-/// All forms, for the error of an unknown one.
+/// All forms, for the error about an unknown one.
 const FORMS: &str = "allowed are serial:/dev/serial/by-id/NAME?baud=115200, serial:usb:VID:PID[:SERIAL]?baud=115200, \
      tcp:HOST:PORT, udp:HOST:PORT, udp-listen:ADDRESS:PORT, can:INTERFACE, hid:VID:PID[:SERIAL], i2c:/dev/i2c-1:0x40";
 
 impl Connect {
-    /// Parses a `connect` of a vehicle file.
+    /// Parses the `connect` of a sensor in a vehicle file.
     ///
-    /// Errors: none of the forms of [`Connect`]; the message names the allowed ones.
+    /// Errors: the text has none of the forms of [`Connect`]; the message lists the allowed ones.
     pub fn parse(text: &str) -> Result<Self, ConnectError> {
         let refused = |problem: &str, allowed: &str| ConnectError {
             text: text.to_owned(),
@@ -101,7 +102,7 @@ impl Connect {
             allowed: allowed.to_owned(),
         };
         if text.is_empty() {
-            return Err(refused("nothing is said of where the sensor is", FORMS));
+            return Err(refused("it is empty", FORMS));
         }
         let (scheme, rest) = text.split_once(':').ok_or_else(|| refused("there is no colon", FORMS))?;
         match scheme {
@@ -133,7 +134,7 @@ impl Connect {
                 )
             }),
             "i2c" => i2c(rest).map_err(|problem| refused(&problem, "allowed is i2c:/dev/i2c-1:0x40")),
-            _ => Err(refused(&format!("{scheme:?} is no way to connect"), FORMS)),
+            _ => Err(refused(&format!("unknown carrier {scheme:?}"), FORMS)),
         }
     }
 
@@ -149,9 +150,9 @@ impl Connect {
         }
     }
 
-    /// The same connection, checked against the carriers supported by a device.
+    /// Returns the connection if its carrier is one of those that a device supports.
     ///
-    /// Errors: its carrier isn't among them.
+    /// Errors: its carrier is not among them.
     pub fn among(self, carriers: &[Carrier]) -> Result<Self, ConnectError> {
         if carriers.contains(&self.carrier()) {
             return Ok(self);
@@ -164,8 +165,8 @@ impl Connect {
         };
         Err(ConnectError {
             text: self.to_string(),
-            problem: format!("a device of this kind isn't connected by {}", self.carrier().as_str()),
-            allowed: format!("it is by {names}"),
+            problem: format!("a device of this kind cannot use {}", self.carrier().as_str()),
+            allowed: format!("it can use {names}"),
         })
     }
 }
@@ -221,13 +222,13 @@ fn serial(rest: &str) -> Result<Connect, String> {
                         format!("baud={rate:?} must be a whole number from 1 to {MAX_BAUD}")
                     })?;
             }
-            _ => return Err(format!("{option:?} is no option; there is baud=RATE")),
+            _ => return Err(format!("unknown option {option:?}; allowed is baud=RATE")),
         }
     }
     let port = match place.strip_prefix("usb:") {
         Some(identity) => SerialPort::Usb(usb(identity)?),
         None if place.starts_with('/') => SerialPort::Path(place.to_owned()),
-        None => return Err(format!("{place:?} is no path; it must begin with /")),
+        None => return Err(format!("{place:?} is not a path; it must begin with /")),
     };
     Ok(Connect::Serial { port, baud })
 }
@@ -252,12 +253,13 @@ fn udp_listen(rest: &str) -> Result<Connect, String> {
     let Some((address, option)) = rest.split_once('?') else {
         return host_and_port(rest).map(|address| Connect::UdpListen { address, from: None });
     };
-    let from =
-        option.strip_prefix("from=").ok_or_else(|| format!("{option:?} is no option; there is from=HOST"))?;
+    let from = option
+        .strip_prefix("from=")
+        .ok_or_else(|| format!("unknown option {option:?}; allowed is from=HOST"))?;
     if from.is_empty() {
         return Err("from= names no host; leave it out for the first valid sender".to_owned());
     }
-    // A bare IPv6 address has colons, and no port.
+    // A bare IPv6 address has several colons and no port.
     if from.matches(':').count() == 1 {
         host_and_port(from).map_err(|problem| format!("from={from:?}: {problem}"))?;
     }
@@ -279,7 +281,7 @@ fn host_and_port(rest: &str) -> Result<String, String> {
 fn can_interface(rest: &str) -> Result<String, String> {
     let allowed = |c: char| c.is_ascii_graphic() && c != '/' && c != ':';
     if rest.is_empty() || rest.len() > 15 || !rest.chars().all(allowed) {
-        return Err(format!("{rest:?} is no name of an interface"));
+        return Err(format!("{rest:?} is not an interface name"));
     }
     Ok(rest.to_owned())
 }
@@ -287,7 +289,7 @@ fn can_interface(rest: &str) -> Result<String, String> {
 fn i2c(rest: &str) -> Result<Connect, String> {
     let (bus, address) = rest.rsplit_once(':').ok_or_else(|| "there is no address".to_owned())?;
     if !bus.starts_with('/') {
-        return Err(format!("bus {bus:?} is no path; it must begin with /"));
+        return Err(format!("bus {bus:?} is not a path; it must begin with /"));
     }
     let digits = address.strip_prefix("0x");
     let number = digits.and_then(|digits| u8::from_str_radix(digits, 16).ok());
@@ -307,7 +309,7 @@ mod tests {
     }
 
     #[test]
-    fn every_form_is_read_and_written_alike() {
+    fn every_form_survives_a_round_trip() {
         for text in [
             "serial:/dev/serial/by-id/usb-FTDI_A10K-if00?baud=115200",
             "serial:usb:0403:6001?baud=9600",
@@ -330,24 +332,24 @@ mod tests {
     }
 
     #[test]
-    fn what_is_wrong_is_named_with_what_would_be_right() {
+    fn error_names_the_fault_and_the_allowed_form() {
         for (text, named, right) in [
-            ("", "nothing is said", "tcp:HOST:PORT"),
+            ("", "it is empty", "tcp:HOST:PORT"),
             ("/dev/ttyUSB0", "no colon", "serial:/dev"),
-            ("usb:1", "\"usb\" is no way to connect", "can:INTERFACE"),
-            ("serial:ttyUSB0", "\"ttyUSB0\" is no path", "serial:/dev"),
+            ("usb:1", "unknown carrier \"usb\"", "can:INTERFACE"),
+            ("serial:ttyUSB0", "\"ttyUSB0\" is not a path", "serial:/dev"),
             ("serial:/dev/a?baud=fast", "baud=\"fast\"", "serial:/dev"),
-            ("serial:/dev/a?speed=9600", "\"speed=9600\" is no option", "serial:/dev"),
+            ("serial:/dev/a?speed=9600", "unknown option \"speed=9600\"", "serial:/dev"),
             ("tcp:192.168.0.5", "no port", "tcp:192.168.0.5:4040"),
             ("tcp::80", "no host", "tcp:192.168.0.5:4040"),
             ("udp:host:0", "port \"0\"", "udp:192.168.2.2:9090"),
             ("udp:host:70000", "port \"70000\"", "udp:192.168.2.2:9090"),
-            ("udp-listen:0.0.0.0:14550?to=a", "\"to=a\" is no option", "?from=192.168.2.2"),
+            ("udp-listen:0.0.0.0:14550?to=a", "unknown option \"to=a\"", "?from=192.168.2.2"),
             ("udp-listen:0.0.0.0:14550?from=", "names no host", "?from=192.168.2.2"),
             ("udp-listen:0.0.0.0:14550?from=a:b", "port \"b\"", "?from=192.168.2.2"),
             ("udp-listen:0.0.0.0?from=a", "no port", "?from=192.168.2.2"),
-            ("can:", "\"\" is no name", "can:can0"),
-            ("can:an interface", "is no name", "can:can0"),
+            ("can:", "\"\" is not an interface name", "can:can0"),
+            ("can:an interface", "is not an interface name", "can:can0"),
             ("hid:1209", "no product id", "hid:1209:0001"),
             ("hid:1209:xyz", "product id \"xyz\"", "hid:1209:0001"),
             ("hid:1209:0001:", "serial number is empty", "hid:1209:0001"),
@@ -361,11 +363,11 @@ mod tests {
     }
 
     #[test]
-    fn a_device_on_another_carrier_is_refused() {
+    fn unsupported_carrier_is_rejected() {
         let error = Connect::parse("can:can0").unwrap().among(&[Carrier::Serial, Carrier::Tcp]).unwrap_err();
         assert_eq!(
             error.to_string(),
-            "connect = \"can:can0\": a device of this kind isn't connected by can:; it is by serial: or tcp:"
+            "connect = \"can:can0\": a device of this kind cannot use can:; it can use serial: or tcp:"
         );
     }
 }

@@ -1,8 +1,9 @@
-//! Interface of a device's crate: a kind that parses its part of a vehicle file, and for each configured sensor a driver,
-//! a decoder and an emulator.
+//! Interface of a device's crate.
 //!
-//! Discovering and opening the port, decoding (pure) and applying (in the loop) are three separate things; this file
-//! has the second, and the device's side of the wire for simulations.
+//! A kind parses its part of a vehicle file. Each configured sensor has a driver, a decoder and an emulator.
+//!
+//! Finding and opening the port, decoding (pure) and applying (in the loop) are separate concerns. This file covers
+//! decoding, and the device's side of the wire for simulations.
 
 use super::driver::{Carrier, Driver, DriverSetup, Probe};
 use super::measurement::{GroundVelocity, Inertia, Payout, Pressure, Sounding};
@@ -32,7 +33,7 @@ pub struct SensorConfig {
     pub latency: DurNs,
 }
 
-/// A sensor as seen by navigation.
+/// A sensor as navigation uses it.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct SensorInfo {
     /// Mount on the vehicle.
@@ -42,7 +43,7 @@ pub struct SensorInfo {
 }
 
 impl SensorInfo {
-    /// A sensor at the vehicle's origin, unused by navigation.
+    /// Creates a sensor at the vehicle's origin that navigation does not use.
     pub fn other() -> Self {
         Self { mount: Mount { position: Vec3::zero(), rotation: Rot::identity() }, kind: SensorKind::Other }
     }
@@ -53,7 +54,7 @@ impl SensorInfo {
 pub enum SensorKind {
     /// A profiling head.
     Head,
-    /// An echosounder; readings below `min_confidence` aren't used.
+    /// An echosounder; readings below `min_confidence` are ignored.
     Echosounder {
         /// Minimum confidence, 0 to 1.
         min_confidence: f64,
@@ -71,11 +72,11 @@ pub enum SensorKind {
         /// Metres of chainage per metre of cable.
         scale: f64,
     },
-    /// A source unused by navigation.
+    /// A source that navigation does not use.
     Other,
 }
 
-/// Noise of an inertial unit by its maker's data sheet.
+/// Noise of an inertial unit according to its data sheet.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct InertialNoise {
     /// White noise of the gyros, quantisation included, rad/s/sqrt(Hz).
@@ -93,9 +94,9 @@ pub struct InertialNoise {
 pub struct BiasSpec {
     /// Standard deviation at power-on, constant from then on.
     pub turn_on: f64,
-    /// Standard deviation of its wandering while it runs.
+    /// Standard deviation of its drift during operation.
     pub in_run: f64,
-    /// Correlation time of the wandering, s.
+    /// Correlation time of the drift, s.
     pub time_s: f64,
 }
 
@@ -108,29 +109,29 @@ pub struct CounterSpec {
     pub sd_m: Option<f64>,
 }
 
-/// One kind of device, by its name in vehicle files: `plugin = "imagenex881"`.
+/// One kind of device, named in vehicle files as in `plugin = "imagenex881"`.
 pub trait DeviceKind: Sync {
     /// The name in vehicle files and in the logs' channel metadata.
     fn name(&self) -> &'static str;
 
-    /// Parses this kind's keys of a sensor's table. The common ones are in `sensor` already.
+    /// Parses this kind's keys of a sensor's table. `sensor` already contains the common ones.
     ///
-    /// Errors: a key with a value that isn't allowed.
+    /// Errors: a key with a value that is not allowed.
     fn configure(&self, sensor: &SensorConfig, own: &Section<'_>) -> Result<Box<dyn Device>, ConfigError>;
 
-    /// Probe for devices of this kind on a byte stream. `None` if they can't be queried.
+    /// Returns a probe for devices of this kind on a byte stream; `None` if they cannot be queried.
     fn probe(&self) -> Option<Box<dyn Probe>> {
         None
     }
 }
 
-/// The parts of a configured sensor used by the loop.
+/// Parts of a configured sensor that the loop uses.
 pub struct SensorSpec {
     /// The common part of its table in the vehicle file.
     pub sensor: SensorConfig,
     /// Kind of sensor, for navigation.
     pub kind: SensorKind,
-    /// Bytes to readings.
+    /// Decoder from bytes to readings.
     pub decoder: Box<dyn Decoder>,
     /// Size of the ring buffer ahead of the loop, bytes.
     pub ring_bytes: usize,
@@ -138,80 +139,83 @@ pub struct SensorSpec {
 
 /// A configured sensor.
 pub trait Device: Send + Sync {
-    /// The parts used by the loop, with a decoder in its initial state.
+    /// Returns the parts for the loop, with a decoder in its initial state.
     fn specification(&self) -> SensorSpec;
 
-    /// For a profiling head, its specification for scheduling.
+    /// Returns the specification for scheduling; `None` unless it is a profiling head.
     fn head(&self) -> Option<HeadSpec> {
         None
     }
 
-    /// For a profiling head, the modes available at `range_m`, or at its configured range.
+    /// Returns the modes at `range_m`, or at the configured range; only for a profiling head.
     ///
-    /// Errors: a message for a range that isn't a setting of it.
+    /// Errors: a message about a range that the head does not have.
     fn modes(&self, range_m: Option<f64>) -> Result<Vec<HeadMode>, String> {
         let _ = range_m;
         Ok(Vec::new())
     }
 
-    /// Quantity measured, for simulations.
+    /// Returns the measured quantity, for simulations.
     fn sense(&self) -> Sense;
 
-    /// The device's side of the wire, for simulations.
+    /// Returns the device's side of the wire, for simulations.
     fn emulator(&self, setup: &EmulatorSetup) -> Emulated;
 
-    /// For an inertial unit whose noise is known, that noise: navigation goes by it unless the vehicle file says otherwise.
+    /// Returns the noise of an inertial unit if known. Navigation uses it unless the vehicle file overrides it.
     fn inertial_noise(&self) -> Option<InertialNoise> {
         None
     }
 
-    /// Step and noise of a cable counter; `[navigation]` overrides the noise.
+    /// Returns step and noise of a cable counter; `[navigation]` overrides the noise.
     fn counter(&self) -> Option<CounterSpec> {
         None
     }
 
-    /// For a HID device, the report descriptor that a rehearsal registers with the kernel.
+    /// Returns the report descriptor of a HID device, which a rehearsal registers with the kernel.
     fn report_descriptor(&self) -> Option<Vec<u8>> {
         None
     }
 
-    /// Writes the packet to `shorter` with optional payload stripped and returns `true`; `false` if it has none, or if that
-    /// can't be determined from these bytes alone.
+    /// Writes the packet without optional payload to `shorter` and returns `true`.
+    ///
+    /// Returns `false` if it has none, or if these bytes alone do not show that.
     fn without(&self, _what: Needless, _packet: &[u8], _shorter: &mut Vec<u8>) -> bool {
         false
     }
 
-    /// What tells its bytes from those of others of its kind on one line; devices for which it is equal, or `None`, can't share
-    /// one.
+    /// Returns what distinguishes its bytes from those of other devices of its kind on one line.
+    ///
+    /// Devices with equal values, or with `None`, cannot share a line.
     fn line_address(&self) -> Option<String> {
         None
     }
 
-    /// Values of its keys that are allowed and seldom meant: each key with what its value does.
+    /// Returns allowed but seldom intended values of its keys: each key with the effect of its value.
     fn remarks(&self) -> Vec<(&'static str, String)> {
         Vec::new()
     }
 
-    /// Supported carriers. UDP may replace any of them, one message per datagram.
+    /// Returns the supported carriers. UDP may replace any of them, one message per datagram.
     fn carriers(&self) -> &'static [Carrier];
 
-    /// Host side of its line.
+    /// Returns the host's side of its line.
     fn driver(&self, setup: &DriverSetup) -> Box<dyn Driver>;
 }
 
-/// Payload that a log may omit: the readings stay the same, bit for bit.
+/// Payload that a log may omit; the readings stay bit-identical.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Needless {
-    /// Echo strengths, where the range is sent beside them.
+    /// Echo strengths, if the range is sent as well.
     Echoes,
     /// Geographic positions, and identifiers unique to one machine.
     Identity,
 }
 
-/// Bytes to readings: a codec with the device's configuration. Pure, runs in the loop. Its state depends on the bytes
-/// decoded so far; the configuration isn't part of it.
+/// Converts bytes to readings: a codec with the device's configuration.
+///
+/// Pure; runs in the loop. Its state depends on the decoded bytes; the configuration is not part of it.
 pub trait Decoder: Stateful + Send + Sync {
-    /// Takes a packet and calls `sink` for every reading completed by it.
+    /// Decodes a packet and calls `sink` for each completed reading.
     ///
     /// Allocates: never.
     fn decode(&mut self, packet: Packet<'_>, sink: &mut dyn FnMut(Decoded));
@@ -219,14 +223,17 @@ pub trait Decoder: Stateful + Send + Sync {
     /// Counters of the codec.
     fn counts(&self) -> CodecCounts;
 
-    /// Readings decoded but not passed on: a bad status, a range setting other than the configured one, an unknown
-    /// calibration, a jump, an orientation marked invalid by the device.
+    /// Number of decoded but withheld readings.
+    ///
+    /// Reasons: a bad status, a range setting other than the configured one, an unknown calibration, a jump, or an
+    /// orientation that the device marks as invalid.
     fn withheld(&self) -> u64 {
         0
     }
 
-    /// Statistics of the device's clock against the host's, if it sends its time. For reports only: readings are valid by the
-    /// receive time.
+    /// Returns statistics of the device's clock against the host's, if it sends its time.
+    ///
+    /// They are for reports only, because readings are valid by the receive time.
     fn clock(&self) -> Option<ClockReport> {
         None
     }
@@ -235,13 +242,15 @@ pub trait Decoder: Stateful + Send + Sync {
 /// Initial conditions of an emulated device.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct EmulatorSetup {
-    /// Power-on time; its first action may be then.
+    /// Power-on time, at which its first action may take place.
     pub start: MonoNs,
     /// For a head, its program.
     pub head: Option<HeadProgram>,
-    /// Water and location of the tunnel, as known to the operator.
+    /// Water and location of the tunnel, as the operator knows them.
     pub site: Site,
-    /// Whether the host that polls it is emulated too; otherwise it answers requests passed to [`Emulator::hear`].
+    /// Whether the polling host is emulated as well.
+    ///
+    /// Otherwise the device answers requests passed to [`Emulator::hear`].
     pub polled: bool,
 }
 
@@ -254,22 +263,26 @@ pub enum Direction {
     Sent,
 }
 
-/// Takes the traffic on a line: direction, time of the first byte, bytes.
+/// Receives the traffic on a line: direction, time of the first byte, bytes.
 pub type LineSink<'a> = &'a mut dyn FnMut(Direction, MonoNs, &[u8]);
 
-/// Device side of the wire, together with the host's polling of it; `M` is its measurement.
+/// Device side of the wire, with the host's polling of it; `M` is its measurement.
 pub trait Emulator<M>: Send + Sync {
-    /// Adds the measurements that the device makes before `until` and that haven't been returned yet, in order of time, on
-    /// the device's clock.
+    /// Adds the device's measurements before `until` that have not been returned yet, in order of time.
+    ///
+    /// Times are on the device's clock.
     fn begin(&mut self, until: MonoNs, due: &mut Vec<M>);
 
-    /// Bytes sent by a host, at `at` on the device's clock; a device that isn't polled ignores them. Responses without a
-    /// measurement go to `line`.
+    /// Processes bytes from a host, at `at` on the device's clock.
+    ///
+    /// A device that is not polled ignores them. Responses without a measurement go to `line`.
     fn hear(&mut self, _at: MonoNs, _bytes: &[u8], _line: LineSink<'_>) {}
 
-    /// Encodes a measurement onto the line, each message with its time: once for each measurement begun, in the same order.
-    /// An emulator with an emulated host that has begun none encodes measurements from elsewhere, those of an import; there,
-    /// values that aren't finite weren't measured and no message carries them.
+    /// Encodes a measurement onto the line, each message with its time.
+    ///
+    /// It is called once for each measurement begun, in the same order. An emulator with an emulated host and no
+    /// begun measurement encodes imported ones. In those, values that are not finite were not measured, and no
+    /// message carries them.
     fn tell(&mut self, measured: &M, line: LineSink<'_>);
 }
 

@@ -1,9 +1,9 @@
-//! A device's clock against the host's: unwraps its ticks and estimates its drift.
+//! Model of a device's clock against the host's: unwraps its ticks and estimates its drift.
 //!
-//! A stamp arrives after a delay that has a minimum: buses and queues only add to it. The receive time less the device
-//! time therefore has a lower envelope, whose slope is the drift. The least delayed stamp of each stretch of time is kept,
-//! and a straight line is fitted to these by least squares: a constant delay shifts all of them alike, which changes the
-//! offset and not the slope. When all slots are taken, stretches are merged in pairs, so that ten hours need no more
+//! A stamp arrives after a delay with a minimum, because buses and queues only add to it. The receive time less the
+//! device time therefore has a lower envelope, whose slope is the drift. The least delayed stamp of each stretch of
+//! time is kept, and a least-squares line is fitted to these. A constant delay shifts them all equally, which changes
+//! the offset but not the slope. If all slots are full, stretches are merged in pairs, so that ten hours need no more
 //! memory than two minutes.
 
 use serde::{Deserialize, Serialize};
@@ -22,19 +22,25 @@ const PLACES: usize = 128;
 /// Initial length of a stretch on the device's clock.
 const FIRST_SPAN_NS: i64 = 1_000_000_000;
 
-/// Fewest stretches for a drift estimate: the scatter of fewer is a poor measure of its error.
+/// Minimum number of stretches for a drift estimate.
+///
+/// The scatter of fewer is a poor measure of its error.
 const LEAST_STRETCHES: usize = 8;
 
-/// Largest deviation of a stamp from the prediction by the last one and the receive times that is attributed to queues;
-/// beyond it a new epoch begins. For a clock that wraps sooner, it is a quarter of the wrap period.
+/// Largest deviation of a stamp from its prediction that is attributed to queues.
+///
+/// Beyond it a new epoch begins. The prediction uses the last stamp and the receive times. For a clock that wraps
+/// sooner, the limit is a quarter of the wrap period.
 const MOST_QUEUED_NS: i64 = 10_000_000_000;
 
-/// Largest difference between the minimum delays of two stretches: a constant, and a share of the time between them (no
-/// clock drifts by more). A stretch delayed by more was spent in a queue, and isn't kept.
+/// Largest difference between the minimum delays of two stretches.
+///
+/// It is a constant plus a share of the time between them. No clock drifts by more than the share. A stretch with a
+/// larger delay was queued, and is not kept.
 const MOST_SHIFT_NS: f64 = 0.5e9;
 const MOST_DRIFT: f64 = 500e-6;
 
-/// Longest queueing delay: stretches that stay shifted for longer belong to a new epoch.
+/// Longest queueing delay; stretches that stay shifted for longer belong to a new epoch.
 const LONGEST_QUEUE_NS: i64 = 30_000_000_000;
 
 const LONGEST_TICK_NS: i64 = 900_000_000_000;
@@ -46,9 +52,9 @@ const PPM: f64 = 1e6;
 pub struct ClockReport {
     /// Stamps received.
     pub stamps: u64,
-    /// Number of times it restarted, or fell behind by more than queues explain.
+    /// Number of times it restarted, or fell behind by more than queues can explain.
     pub restarts: u64,
-    /// Number of times it ran ahead by more than queues explain.
+    /// Number of times it ran ahead by more than queues can explain.
     pub jumps: u64,
     /// Length of the epoch used for the drift, on the device's clock.
     pub span: DurNs,
@@ -68,14 +74,14 @@ pub struct Drift {
 /// Tracks a device's clock. Allocates: never.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct DeviceClock {
-    /// The clock wraps after this many ticks.
+    /// Number of ticks after which the clock wraps.
     round: i128,
     tick: DurNs,
     stamps: u64,
     restarts: u64,
     jumps: u64,
     epoch: Option<Epoch>,
-    /// Best drift of the epochs before, and the span of its epoch.
+    /// Best drift of earlier epochs, and the span of that epoch.
     before: Option<(Drift, DurNs)>,
 }
 
@@ -130,7 +136,9 @@ enum Shift {
 }
 
 impl DeviceClock {
-    /// A clock of `bits` bits (1 to 64) whose ticks are `tick` long (1 ns to 15 minutes); values outside are clamped.
+    /// A clock of `bits` bits (1 to 64) whose ticks are `tick` long (1 ns to 15 minutes).
+    ///
+    /// Values outside are clamped.
     pub fn new(bits: u32, tick: DurNs) -> Self {
         Self {
             round: 1 << bits.clamp(1, 64),
@@ -143,8 +151,9 @@ impl DeviceClock {
         }
     }
 
-    /// Takes a stamp received at `received`; bits beyond the clock's width are ignored. Returns the unwrapped time on the
-    /// device's clock since the epoch's first stamp.
+    /// Processes a stamp received at `received`; bits beyond the clock's width are ignored.
+    ///
+    /// Returns the unwrapped time on the device's clock since the epoch's first stamp.
     pub fn take(&mut self, ticks: u64, received: MonoNs) -> DurNs {
         self.stamps += 1;
         let raw = i128::from(ticks).rem_euclid(self.round);
@@ -174,8 +183,9 @@ impl DeviceClock {
         self.begin(raw, received)
     }
 
-    /// Earliest receive time of a stamp made at device time `device`, as returned by [`Self::take`]; `None` before there is
-    /// a drift.
+    /// Returns the earliest receive time of a stamp made at device time `device`.
+    ///
+    /// `device` is as returned by [`Self::take`]. `None` until the drift is known.
     pub fn earliest(&self, device: DurNs) -> Option<MonoNs> {
         let epoch = self.epoch.as_ref()?;
         let line = epoch.edge.line(self.tick)?;
@@ -185,7 +195,7 @@ impl DeviceClock {
         Some(epoch.begun + device + late)
     }
 
-    /// Statistics so far. The drift is that of the epoch with the smallest standard deviation.
+    /// Returns the statistics so far. The drift is that of the epoch with the smallest standard deviation.
     pub fn report(&self) -> ClockReport {
         let now = self.drift_now();
         let best =
@@ -222,7 +232,7 @@ impl DeviceClock {
 }
 
 impl Edge {
-    /// An envelope of the epoch's first stamp, the reference of the others.
+    /// Creates an envelope with the epoch's first stamp as reference.
     fn new() -> Self {
         Self {
             kept: [Stamp::default(); PLACES],
@@ -254,13 +264,13 @@ impl Edge {
         self.kept.get(..self.len).unwrap_or_default()
     }
 
-    /// Ends the current stretch and keeps its stamp, unless it was spent in a queue.
+    /// Ends the current stretch and keeps its stamp, unless it was queued.
     fn close(&mut self) -> Shift {
         let Some((_, stamp)) = self.open.take() else { return Shift::None };
         let shift = self.shift(stamp);
         if shift != Shift::None {
             if shift == Shift::Ahead && stamp.device_ns < LONGEST_QUEUE_NS {
-                // Rather, the earlier ones were delayed: the epoch began within a queue.
+                // The earlier stretches were delayed instead: the epoch began within a queue.
                 self.len = 0;
             } else {
                 let since = *self.shifted_since_ns.get_or_insert(stamp.device_ns);
@@ -276,13 +286,13 @@ impl Edge {
         Shift::None
     }
 
-    /// Shift of a stamp against the last one kept.
+    /// Returns the shift of a stamp against the last kept one.
     fn shift(&self, stamp: Stamp) -> Shift {
         let Some(last) = self.kept().last() else { return Shift::None };
         let between_ns = stamp.device_ns.saturating_sub(last.device_ns) as f64;
         let late_ns = stamp.late_ns.saturating_sub(last.late_ns) as f64 - self.slope * between_ns;
         let most_ns = MOST_SHIFT_NS + MOST_DRIFT * between_ns;
-        // A clock that falls behind makes its stamps appear delayed.
+        // If a clock falls behind, its stamps look delayed.
         if late_ns > most_ns {
             Shift::Behind
         } else if late_ns < -most_ns {
@@ -305,7 +315,7 @@ impl Edge {
         }
     }
 
-    /// Doubles the length of stretches, merging them in pairs.
+    /// Doubles the length of stretches by merging them in pairs.
     fn join(&mut self) {
         self.span_ns = self.span_ns.saturating_mul(2);
         let mut joined = [Stamp::default(); PLACES];
@@ -323,7 +333,7 @@ impl Edge {
         (self.kept, self.len) = (joined, len);
     }
 
-    /// The line fitted to the stamps kept, for a clock quantized to whole ticks.
+    /// Fits a line to the kept stamps, for a clock with a resolution of one tick.
     fn line(&self, tick: DurNs) -> Option<Line> {
         let kept = self.kept();
         if kept.len() < LEAST_STRETCHES {
@@ -342,7 +352,7 @@ impl Edge {
         let slope = xy / xx;
         let left = |(x, y): (f64, f64)| (y - slope * x) * (y - slope * x);
         let scatter = kept.iter().map(about).map(left).sum::<f64>() / (n - 2.0);
-        // Without scatter, the quantization to a tick remains.
+        // Without scatter, the quantisation to a tick remains.
         let quantum = tick.0 as f64 * tick.0 as f64 / 12.0;
         let slope_sd = math::sqrt((scatter + quantum) / xx);
         (xx > 0.0).then_some(Line { slope, slope_sd, mean_device_ns, mean_late_ns })
@@ -355,14 +365,16 @@ impl Line {
     }
 }
 
-/// Ticks elapsed: `difference` plus the number of wraps that brings it nearest to the time `waited`.
+/// Returns the elapsed ticks for a raw `difference`.
+///
+/// It adds the number of wraps that brings the result nearest to the time `waited`.
 fn advance(difference: i128, round: i128, tick: DurNs, waited: DurNs) -> i128 {
     let expected = i128::from(waited.0).div_euclid(i128::from(tick.0));
     let rounds = (expected - difference + round / 2).div_euclid(round);
     difference + rounds * round
 }
 
-/// The less delayed of the two, for a line of this slope.
+/// Returns the less delayed stamp of the two, for a line of this slope.
 fn earlier(a: Stamp, b: Stamp, slope: f64) -> Stamp {
     let allowed = slope * b.device_ns.saturating_sub(a.device_ns) as f64;
     if (b.late_ns.saturating_sub(a.late_ns) as f64) < allowed { b } else { a }

@@ -1,6 +1,8 @@
-//! Host side of a device's line, without I/O: what to send and when, which bytes go to the loop, and the device's health.
+//! Host side of a device's line, without I/O.
 //!
-//! A driver is a state machine run by a port's thread. It gets the time with every call, so that tests can run it against
+//! It decides what to send and when, which bytes go to the loop, and how healthy the device is.
+//!
+//! A driver is a state machine run by a port's thread. Every call passes the time, so that tests can run it against
 //! an emulated device without a port, a thread or a clock.
 
 mod cutter;
@@ -34,84 +36,94 @@ pub enum Carrier {
 /// Parameters of a new driver.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct DriverSetup {
-    /// Start of the dive: each head runs its program from then on, or joins it at the position due, so that the heads keep
-    /// their relative phase without communication between their drivers.
+    /// Start of the dive.
+    ///
+    /// Each head runs its program from then on, or joins it at the due position. So the heads keep their relative
+    /// phase without communication between their drivers.
     pub begun: MonoNs,
     /// For a head, its program.
     pub head: Option<HeadProgram>,
 }
 
-/// I/O operations available to a driver.
+/// I/O operations that a driver can use.
 pub trait Wire {
     /// Sends bytes; on a message-based carrier, as one message.
     fn send(&mut self, bytes: &[u8]);
 
-    /// On a bus that is polled: writes, waits `settle` for the device, and reads `read_bytes`. The bytes written followed by
-    /// those read come back through [`Driver::heard`].
+    /// Writes on a polled bus, waits `settle` for the device, and reads `read_bytes`.
+    ///
+    /// The bytes written, followed by those read, come back through [`Driver::heard`].
     fn exchange(&mut self, write: &[u8], settle: DurNs, read_bytes: usize);
 
     /// Passes bytes on to the loop; `received` is the receive time of the first.
     fn deliver(&mut self, received: MonoNs, bytes: &[u8]);
 }
 
-/// Health of a device as inferred from its traffic.
+/// Health of a device, inferred from its traffic.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct DeviceHealth {
     /// Valid messages received from it.
     pub good_frames: u64,
-    /// Identity reported by the device, once received.
+    /// Identity that the device has reported.
     pub identity: Option<String>,
     /// Description of a fault, with its remedy.
     pub complaint: Option<String>,
-    /// Messages on its line by others that pass for it.
+    /// Messages on its line from other senders that look like its own.
     pub strangers: Strangers,
 }
 
 /// Host side of one device's line.
 pub trait Driver: Send {
-    /// The line has been opened or reopened: the device may have been replaced or switched off meanwhile.
+    /// Notes that the line has been opened or reopened. The device may have been replaced or switched off meanwhile.
     fn opened(&mut self, now: MonoNs, wire: &mut dyn Wire);
 
-    /// The line has been closed: the bytes of an incomplete frame are delivered as they are, for they may contain a complete
-    /// one. Bytes sent are discarded.
+    /// Notes that the line has been closed. Bytes sent are discarded.
+    ///
+    /// The bytes of an incomplete frame are delivered as they are, since they may contain a complete one.
     fn closed(&mut self, _wire: &mut dyn Wire) {}
 
-    /// Received bytes, the first of them at `received`. Bytes that aren't delivered are lost to the loop and to the log.
+    /// Processes received bytes, the first of them at `received`. Undelivered bytes are lost to the loop and to the
+    /// log.
     fn heard(&mut self, received: MonoNs, bytes: &[u8], wire: &mut dyn Wire);
 
-    /// Whether these bytes, on their own, hold a message that this device could have sent. On a line that anybody may send
-    /// to, the sender of the first such bytes is the device from then on, and others aren't heard.
+    /// Whether these bytes alone contain a message that this device could have sent.
+    ///
+    /// On a line that anybody may send to, the sender of the first such bytes counts as the device from then on.
+    /// Others are ignored.
     fn accepts(&self, bytes: &[u8]) -> bool;
 
-    /// Time of the next [`Driver::wake`], if any.
+    /// Returns the time of the next [`Driver::wake`], if any.
     fn due(&self) -> Option<MonoNs>;
 
-    /// Called at the time given by [`Driver::due`].
+    /// Acts at the time given by [`Driver::due`].
     fn wake(&mut self, now: MonoNs, wire: &mut dyn Wire);
 
-    /// Whether a response is pending, so that others on the same line must not transmit.
+    /// Whether a response is pending, so that other drivers on the line must not transmit.
     fn awaits(&self) -> bool {
         false
     }
 
-    /// Silence timeout after which the connection is reopened.
+    /// Returns the silence timeout after which the connection is reopened.
     fn silence_timeout(&self) -> DurNs {
         DurNs::from_millis(5_000)
     }
 
-    /// Health of the device.
+    /// Returns the health of the device.
     fn health(&self) -> DeviceHealth;
 }
 
-/// Identifies a device of one kind on a line. What it sends is harmless to any other device there: nothing turns, and no
-/// setting persists.
+/// Identifies a device of one kind on a line.
+///
+/// Its requests are harmless to any other device there: nothing turns, and no setting persists.
 pub trait Probe: Send {
-    /// Requests to send one after the other, each with time for a response, until there is an identity.
+    /// Returns the requests to send one after the other until there is an identity.
+    ///
+    /// Each has time for a response.
     fn questions(&self) -> Vec<Vec<u8>>;
 
-    /// Received bytes, in pieces of any size.
+    /// Processes received bytes, in pieces of any size.
     fn heard(&mut self, bytes: &[u8]);
 
-    /// Identity reported by the device, once received.
+    /// Returns the identity that the device has reported.
     fn identity(&self) -> Option<String>;
 }

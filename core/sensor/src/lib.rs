@@ -1,8 +1,9 @@
-//! What a device's crate needs, and all that the rest of the program knows about a device.
+//! Interface between a device's crate and the rest of the program.
 //!
-//! A device has three separate parts: a codec and decoder (bytes to [`reading::Reading`]s, pure), a driver (the host's
-//! side of its line, without I/O) and an emulator (the device's side, for simulations). A device's crate depends on
-//! this crate alone; the lower ones are re-exported. A codec is a [`codec::Framing`] in [`codec::Framed`]:
+//! A device has three separate parts. A codec with decoder turns bytes into [`reading::Reading`]s (pure). A driver is
+//! the host's side of its line (without I/O). An emulator is the device's side, for simulations. A device's crate
+//! depends on this crate alone, which re-exports the lower ones. A codec is a [`codec::Framing`] in
+//! [`codec::Framed`]:
 //!
 //! ```
 //! use headrace_sensor::codec::{Codec as _, Framed, Framing, Verdict};

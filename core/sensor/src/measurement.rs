@@ -1,5 +1,6 @@
-//! Measurements of simulated devices, between the water and the wire: an emulated device sets the time and angle of each,
-//! the simulation fills in the value, and the device encodes it.
+//! Measurements of simulated devices, between the water and the wire.
+//!
+//! An emulated device sets the time and angle of each, the simulation fills in the value, and the device encodes it.
 
 use super::reading::Level;
 use headrace_geometry::frames::{Rot, Sensor, Vec3};
@@ -86,21 +87,21 @@ macro_rules! measurement {
 measurement!(Sounding, Pressure, Inertia, GroundVelocity, Payout);
 
 impl Sounding {
-    /// A scheduled ping, without its echo.
+    /// Creates a scheduled ping without its echo.
     pub fn due(at: MonoNs, angle_rad: f64) -> Self {
         Self { at, angle_rad, reported_rad: angle_rad, range_m: None }
     }
 }
 
 impl Pressure {
-    /// A scheduled measurement, without its value.
+    /// Creates a scheduled measurement without its value.
     pub fn due(at: MonoNs) -> Self {
         Self { at, pressure_pa: 0.0 }
     }
 }
 
 impl Inertia {
-    /// A scheduled sample, without its values.
+    /// Creates a scheduled sample without its values.
     pub fn due(at: MonoNs, period: DurNs) -> Self {
         let (attitude, rate_radps, force_mps2) = (Rot::identity(), Vec3::zero(), Vec3::zero());
         Self { at, period, attitude, rate_radps, force_mps2 }
@@ -108,14 +109,14 @@ impl Inertia {
 }
 
 impl GroundVelocity {
-    /// A scheduled measurement, without its value.
+    /// Creates a scheduled measurement without its value.
     pub fn due(at: MonoNs) -> Self {
         Self { at, velocity_mps: Vec3::zero() }
     }
 }
 
 impl Payout {
-    /// A scheduled count, without its value.
+    /// Creates a scheduled count without its value.
     pub fn due(at: MonoNs) -> Self {
         Self { at, chainage_m: 0.0 }
     }

@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 use headrace_geometry::frames::{Rot, Sensor, Vec3};
 use headrace_geometry::time::MonoNs;
 
-/// An IMU's own level reference: z up, x where its yaw is zero (magnetic or arbitrary north).
+/// Level reference frame of an IMU: z up, x at its yaw of zero (magnetic or arbitrary north).
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Level {}
 
@@ -23,7 +23,7 @@ impl SourceId {
     }
 }
 
-/// Bytes as received from a device, or read from a log of it.
+/// Bytes received from a device, or read from a log.
 #[derive(Debug, Clone, Copy)]
 pub struct Packet<'a> {
     /// Receive time of the first byte.
@@ -54,7 +54,7 @@ pub enum Reading {
 }
 
 impl Reading {
-    /// Whether every number of it is finite.
+    /// Whether all its numbers are finite.
     pub fn is_finite(&self) -> bool {
         let all = |numbers: &[f64]| numbers.iter().all(|number| number.is_finite());
         match self {
@@ -79,7 +79,9 @@ impl Reading {
 /// A ping of a profiling head.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct SonarReturn {
-    /// Head angle in the sensor's frame, radians: 0 down, increasing clockwise seen along +x; may exceed one turn.
+    /// Head angle in the sensor's frame, radians: 0 down, increasing clockwise seen along +x.
+    ///
+    /// May exceed one turn.
     pub angle_rad: f64,
     /// Slant range computed by the device, m; `None` if nothing exceeded its threshold.
     pub range_m: Option<f64>,
@@ -120,16 +122,16 @@ pub struct TetherLength {
     pub length_m: f64,
     /// Quantum of the length, m.
     pub resolution_m: f64,
-    /// The last time that the count began again from zero; the length goes on from where it was.
+    /// Last restart of the count from zero; `length_m` continues without a step.
     pub restart: Option<CountRestart>,
 }
 
-/// A count that began again from zero.
+/// A restart of the count from zero.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub struct CountRestart {
     /// Number of the restart, from 1.
     pub number: u32,
-    /// Whether the counter was silent before it, as one is that is plugged in again.
+    /// Whether the counter was silent before it, as after being unplugged.
     pub was_away: bool,
 }
 

@@ -1,4 +1,4 @@
-//! `[advice]` of a vehicle file: how finely the advice of speed looks at the wall, and how often anew.
+//! `[advice]` of a vehicle file: resolution and update rate of the advice's view of the wall.
 
 use core::ops::RangeInclusive;
 
@@ -6,10 +6,11 @@ use headrace_config::{ConfigError, Section};
 use headrace_geometry::math;
 use headrace_sampling::advice::Looks;
 
-/// Angle between the rays of a ring, degrees: the finest as `plan` has it; beyond the coarsest every mode's steps would be
-/// rounded.
+/// Allowed angles between the rays of a ring, degrees.
+///
+/// The finest is that of `plan`. Beyond the coarsest, every mode's steps would be rounded.
 const RING_DEG: RangeInclusive<f64> = 0.1..=1.0;
-/// Movement across the tunnel after which a ring is cast anew, m.
+/// Allowed movement across the tunnel before a ring is recast, m.
 const LOOK_M: RangeInclusive<f64> = 0.001..=0.1;
 
 /// Reads the table.
@@ -19,7 +20,7 @@ pub(super) fn parse_looks(section: &Section<'_>) -> Result<Looks, ConfigError> {
     let mut looks = Looks::default();
     if let Some(ring_deg) = section.number("ring_deg", RING_DEG)? {
         let rays = math::round_to_i64(360.0 / ring_deg);
-        looks.ring = u32::try_from(rays).map_err(|_| section.invalid("ring_deg", "makes no ring"))?;
+        looks.ring = u32::try_from(rays).map_err(|_| section.invalid("ring_deg", "gives no valid ring"))?;
     }
     looks.anew_m = section.number("look_m", LOOK_M)?;
     section.finish()?;
@@ -38,7 +39,7 @@ mod tests {
     }
 
     #[test]
-    fn rays_follow_from_the_angle_between_them() {
+    fn ray_angle_sets_the_number_of_rays() {
         assert_eq!(parsed("[advice]\n").unwrap(), Looks::default());
         assert_eq!(
             parsed("[advice]\nring_deg = 0.3\n").unwrap(),
@@ -52,7 +53,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_out_of_range_is_told_with_line_key_value_and_range() {
+    fn value_out_of_range_names_line_key_value_and_range() {
         let why = parsed("[advice]\nring_deg = 0.05\n").unwrap_err().to_string();
         assert!(
             why.contains("vehicle.toml:2: advice.ring_deg = 0.05: must be a number from 0.1 to 1"),

@@ -1,9 +1,9 @@
-//! `[alerts]` and `[limits]` of a vehicle file: hold times and dead bands by class, and what there is of cable and time.
+//! `[alerts]` and `[limits]` of a vehicle file: timing of alerts by class, and limits of cable and time.
 
 use headrace_config::{ConfigError, Section};
 use headrace_geometry::time::DurNs;
 
-/// What an alert is about.
+/// Subject of an alert.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum AlertClass {
     /// The wall.
@@ -21,11 +21,11 @@ pub enum AlertClass {
 }
 
 impl AlertClass {
-    /// All of them.
+    /// All classes.
     pub const ALL: [Self; 6] =
         [Self::Coverage, Self::Speed, Self::Position, Self::Sensor, Self::Recording, Self::Setting];
 
-    /// The word used in files and JSON.
+    /// The word for it in files and JSON.
     pub fn as_str(self) -> &'static str {
         match self {
             Self::Coverage => "coverage",
@@ -38,12 +38,12 @@ impl AlertClass {
     }
 }
 
-/// When what holds is told, and when it is over.
+/// Delays before an alert becomes active and before it clears.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct ClassTiming {
-    /// How long it must hold before it is told.
+    /// Time that the situation must last before the alert becomes active.
     pub hold: DurNs,
-    /// How long it must not hold before it is over.
+    /// Time that the situation must be absent before the alert clears.
     pub off: DurNs,
 }
 
@@ -55,7 +55,9 @@ pub struct AlertTiming([ClassTiming; AlertClass::ALL.len()]);
 const MOST_S: f64 = 600.0;
 
 impl Default for AlertTiming {
-    /// Speed and position flicker about their limits within seconds; the others have limits of their own.
+    /// Speed and position fluctuate about their limits within seconds.
+    ///
+    /// The other classes have their own hysteresis.
     fn default() -> Self {
         let timing = |hold_s: f64, off_s: f64| ClassTiming {
             hold: DurNs::from_secs_f64(hold_s),
@@ -71,7 +73,7 @@ impl Default for AlertTiming {
 }
 
 impl AlertTiming {
-    /// That of a class.
+    /// Returns the timing of a class.
     pub fn of(&self, class: AlertClass) -> ClassTiming {
         let [coverage, speed, position, sensor, recording, setting] = self.0;
         match class {
@@ -84,7 +86,7 @@ impl AlertTiming {
         }
     }
 
-    /// The same with another timing of a class.
+    /// Returns the timing with that of one class replaced.
     #[must_use]
     pub fn with(mut self, class: AlertClass, timing: ClassTiming) -> Self {
         if let Some(slot) = self.0.get_mut(class as usize) {
@@ -113,7 +115,7 @@ impl AlertTiming {
     }
 }
 
-/// What there is of cable and time.
+/// Limits of cable and time.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct LimitsConfig {
     /// Length of the cable, m from the portal.
@@ -145,7 +147,7 @@ mod tests {
     }
 
     #[test]
-    fn a_class_is_set_by_its_name_and_the_others_stay() {
+    fn class_timing_is_set_by_name_and_others_keep_defaults() {
         let all = timing("speed.hold_s = 2.5\n[position]\noff_s = 0\n").unwrap();
         let usual = AlertTiming::default();
         let speed = ClassTiming { hold: DurNs(2_500_000_000), ..usual.of(AlertClass::Speed) };
@@ -163,7 +165,7 @@ mod tests {
     }
 
     #[test]
-    fn limits_are_metres_and_minutes() {
+    fn limits_are_in_metres_and_minutes() {
         let limits = |text: &str| {
             let section = Document::new("vehicle.toml", text).root().unwrap();
             LimitsConfig::parse(&section).map_err(|error| error.to_string())

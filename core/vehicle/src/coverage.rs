@@ -1,4 +1,4 @@
-//! `[coverage]` and `[[openings]]` of a vehicle file: judging parameters and declared openings of the wall.
+//! `[coverage]` and `[[openings]]` of a vehicle file: verdict parameters and declared openings.
 
 use headrace_config::{ConfigError, Section};
 use headrace_coverage::CONFIDENCE_SD;
@@ -7,12 +7,14 @@ use headrace_coverage::soundings::NODE_M;
 use headrace_geometry::math::{self, TAU};
 use headrace_geometry::tunnel::Profile;
 
-/// Judging parameters of the wall.
+/// Parameters for the verdicts on the wall.
 #[derive(Debug, Clone, PartialEq)]
 pub struct CoverageConfig {
     /// Maximum width of a hole's bounds, m; zero for the exact search.
     pub hole_tolerance_m: f64,
-    /// Deviation from the design profile beyond which a sample contradicts it, m; sections where most do can't pass.
+    /// Deviation from the design profile that contradicts it, m.
+    ///
+    /// A section cannot pass if most of its samples contradict the profile.
     pub contradiction_m: f64,
     /// Node edge of the sounding grid, m.
     pub node_m: f64,
@@ -34,21 +36,25 @@ impl Default for CoverageConfig {
     }
 }
 
-/// Deviation that contradicts the profile: a share of the radius of a circle of its perimeter, and the most of it, m.
+/// Limits of the contradicting deviation.
+///
+/// They are a share of the radius of a circle with the same perimeter, and a maximum, m.
 const CONTRADICTION_SHARE: f64 = 0.2;
 const MOST_CONTRADICTION_M: f64 = 0.5;
 /// Maximum number of samples that fill openings.
 const MAX_PLACES: i64 = 1_000_000;
 
 impl CoverageConfig {
-    /// Deviation that contradicts a profile of this perimeter unless the file says otherwise, m: more than a lining or a
-    /// design that is 6 % out, less than another tunnel.
+    /// Returns the default deviation that contradicts a profile of this perimeter, m.
+    ///
+    /// It exceeds a lining, or a design that is 6 % off, and is less than the difference to another tunnel.
     pub fn usual_contradiction_m(perimeter_m: f64) -> f64 {
         (CONTRADICTION_SHARE * perimeter_m / TAU).min(MOST_CONTRADICTION_M)
     }
 
-    /// Reads both tables from the root of a vehicle file. Without a profile or a target, which are wrong in the file then, the
-    /// tables are checked as far as that goes.
+    /// Reads both tables from the root of a vehicle file.
+    ///
+    /// Profile or target are `None` if they are wrong in the file; the tables are then checked as far as possible.
     ///
     /// Errors: a key that is missing, unknown or out of range.
     pub(super) fn of_root(
@@ -86,7 +92,7 @@ fn parse_tolerance_m(section: &Section<'_>, target_m: f64) -> Result<f64, Config
     let exact = section.choice("hole", &[("exact", true), ("grid", false)])?.unwrap_or(true);
     let tolerance_m = section.number("tolerance_m", 1e-6..=1.0)?;
     if exact && tolerance_m.is_some() {
-        return Err(section.invalid("tolerance_m", "is for hole = \"grid\" alone"));
+        return Err(section.invalid("tolerance_m", "applies to hole = \"grid\" only"));
     }
     Ok(if exact { 0.0 } else { tolerance_m.unwrap_or(target_m / 50.0) })
 }
@@ -113,7 +119,9 @@ fn parse_opening(section: &Section<'_>, profile: Option<&Profile>) -> Result<Ope
     Ok(Opening { name, from_m, to_m, arc_m })
 }
 
-/// Arc length at a clock hour seen along the tunnel from the reference point, m: 6 is the floor, 9 the left wall.
+/// Arc length of a clock position, m, seen from the reference point along the tunnel.
+///
+/// 6 is the floor, 9 the left wall.
 fn arc_at_hour_m(profile: &Profile, hour: f64) -> f64 {
     let angle = (hour - 6.0) / 12.0 * TAU;
     let direction = [math::sin(angle), -math::cos(angle)];
@@ -132,7 +140,7 @@ mod tests {
     }
 
     #[test]
-    fn the_confidence_is_one_two_or_three_standard_deviations() {
+    fn confidence_is_1_2_or_3_sd() {
         let confidence_sd = |text: &str| parsed(text).unwrap().confidence_sd;
         let whole = |value: f64| headrace_geometry::math::round_to_i64(value);
         assert_eq!(whole(confidence_sd("")), 2);

@@ -1,4 +1,6 @@
-//! What a readable vehicle file gets wrong as a whole: lines that can't be shared, walls out of reach, heads out of step.
+//! Checks of a readable vehicle file as a whole.
+//!
+//! They find lines that cannot be shared, walls out of reach, and heads out of step.
 
 use core::fmt;
 
@@ -13,16 +15,16 @@ use headrace_sensor::connect::Connect;
 
 use crate::VehicleConfig;
 
-/// How grave a finding is.
+/// Severity of a finding.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Grade {
-    /// It can't work as written.
+    /// It cannot work as written.
     Error,
-    /// It works, at a price or if it is meant.
+    /// It works, but at a cost, or only if it is intended.
     Warning,
 }
 
-/// Something wrong with a file whose keys are all right by themselves.
+/// A problem in a file whose keys are valid individually.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Finding {
     /// Whether it is an error.
@@ -39,23 +41,27 @@ impl fmt::Display for Finding {
     }
 }
 
-/// Beams of a turn that are looked along.
+/// Number of beams of a turn that are checked.
 const BEAMS: u32 = 720;
-/// A head that reaches less than this share of the wall around it has the wrong range setting, or is in the wrong tunnel.
+/// Minimum share of the wall that a head must reach.
+///
+/// Otherwise its range setting or the tunnel is wrong.
 const LEAST_SHARE: f64 = 0.5;
-/// Turns whose durations differ by less than this share stay in step for hours.
+/// Relative difference of turn durations below which heads stay in step for hours.
 const SAME_TURN: f64 = 1e-6;
-/// Finest step in which a sonar counts ranges, m: that of an 881L set to 5 m or less (Imagenex 881L data sheet). What a wall does
-/// within it, no return tells.
+/// Finest range step of a sonar, m: that of an 881L set to 5 m or less (Imagenex 881L data sheet).
+///
+/// No return resolves finer detail of a wall.
 const FINEST_M: f64 = 0.002;
-/// Edges of this length, m, leave less of a wall's curve out than [`FINEST_M`], whatever its radius: the sagitta e^2 / (8 r) is
-/// 0.1 mm in the narrowest pipe, of 0.1 m.
+/// Edge length that approximates a wall's curve to within [`FINEST_M`] at any radius, m.
+///
+/// The sagitta e^2 / (8 r) is 0.1 mm in the narrowest pipe, of 0.1 m.
 const ENOUGH_M: f64 = 0.01;
 /// Distance along the hull below which heads are side by side, m.
 const APART_M: f64 = 0.01;
 
 impl VehicleConfig {
-    /// All findings, sensor by sensor, then those of the heads together and of the tunnel.
+    /// Returns all findings: by sensor, then on the heads together, then on the tunnel.
     pub fn findings(&self) -> Vec<Finding> {
         let mut found = self.connections();
         found.extend(self.remarks());
@@ -65,7 +71,7 @@ impl VehicleConfig {
         found
     }
 
-    /// Sensors that can't have the line of one before them, with the reason.
+    /// Returns sensors that cannot share the line of an earlier one, with the reason.
     pub fn excluded_from_lines(&self) -> Vec<(usize, String)> {
         let mut found = Vec::new();
         let mut before: Vec<(usize, Connect)> = Vec::new();
@@ -81,7 +87,7 @@ impl VehicleConfig {
         found
     }
 
-    /// Each sensor's connection that doesn't parse, or that another one's excludes.
+    /// Returns connections that do not parse, or that another one excludes.
     fn connections(&self) -> Vec<Finding> {
         let mut found = Vec::new();
         let mut before: Vec<(usize, Connect)> = Vec::new();
@@ -104,7 +110,7 @@ impl VehicleConfig {
                 }
             }
         }
-        // Without any the vehicle is only simulated or replayed.
+        // A vehicle without any connection is only simulated or replayed.
         if silent.len() < self.sensors.len() {
             let problem = format!("have no connect, so that `run` can't reach them: {}", silent.join(", "));
             found.extend((!silent.is_empty()).then(|| warning("sensors".to_owned(), problem)));
@@ -112,18 +118,20 @@ impl VehicleConfig {
         found
     }
 
-    /// Why two sensors can't be connected so, if they can't.
+    /// Returns why two sensors cannot have these connections; `None` if they can.
     fn exclude(&self, a: usize, of_a: &Connect, b: usize, of_b: &Connect) -> Option<(Grade, String)> {
         let other = self.sensor_configs.get(a)?;
         let own = self.sensor_configs.get(b)?;
         let end = same_end(of_a, of_b)?;
         if of_a != of_b {
-            let problem =
-                format!("is the {end} of sensor {:?} with other settings; it can be opened once", other.id);
+            let problem = format!(
+                "is the {end} of sensor {:?} with other settings; only one sensor can open it",
+                other.id
+            );
             return Some((Grade::Error, problem));
         }
         if other.plugin != own.plugin {
-            // Frames on CAN have identifiers.
+            // Frames on CAN have identifiers, so devices can share the bus.
             let shared = matches!(of_a, Connect::Can { .. });
             let problem = format!(
                 "is the {end} of sensor {:?}, a {}; each gets the other's bytes, too, and skips them",
@@ -136,7 +144,7 @@ impl VehicleConfig {
             return None;
         }
         let problem = format!(
-            "is the {end} of sensor {:?}, and nothing tells the bytes of two {} there apart; give each its own",
+            "is the {end} of sensor {:?}, and the bytes of two {} cannot be separated there; give each its own",
             other.id, own.plugin
         );
         Some((Grade::Error, problem))
@@ -149,7 +157,7 @@ impl VehicleConfig {
         })
     }
 
-    /// Heads that don't reach the wall from the middle of the tunnel.
+    /// Returns heads that do not reach the wall from the centre of the tunnel.
     fn reaches(&self) -> Vec<Finding> {
         let heads = self.heads();
         let hidden = occlusion::hidden_by_vehicle(&heads, &self.hull);
@@ -181,29 +189,29 @@ impl VehicleConfig {
         let places = if out.len() == walls.len() { "all around".to_owned() } else { clocks(&out, profile) };
         let problem = format!(
             "reaches {:.0} % of the wall around this head: it is {nearest_m:.2} to {farthest_m:.2} m away, and the setting \
-             hears {least_m:.2} to {most_m:.2} m; out of reach: {places}",
+             covers {least_m:.2} to {most_m:.2} m; out of reach: {places}",
             (share * 100.0).floor()
         );
         let grade = if share < LEAST_SHARE { Grade::Error } else { Grade::Warning };
         Some(Finding { grade, key: format!("sensors[{number}].range_m"), problem })
     }
 
-    /// Points of a profile that lie closer together than any sonar tells.
+    /// Returns profile points that are closer together than any sonar resolves.
     fn too_fine(&self) -> Option<Finding> {
         let tunnel = &self.tunnel;
         if tunnel.name != "polyline" {
             return None;
         }
-        // The first and the last piece are what the floor's centre makes of one edge.
+        // The first and the last piece are one edge, split at the floor's centre.
         let pieces = tunnel.profile.pieces_m();
         let edges = pieces.len().saturating_sub(1);
         let whole = pieces.take(edges).skip(1);
         let short: Vec<(f64, f64)> = whole.filter(|(_, length_m)| *length_m < FINEST_M).collect();
         let (first_m, length_m) = *short.first()?;
         let problem = format!(
-            "is finer than a sonar tells: {} of {edges} edges are shorter than {} mm, the finest step of a range here, the first of \
-             {:.3} mm at {first_m:.3} m round the wall ({}); which way so short an edge faces is the survey's error, points every \
-             {} mm say as much",
+            "is finer than a sonar resolves: {} of {edges} edges are shorter than {} mm, the finest step of a range here, the first of \
+             {:.3} mm at {first_m:.3} m round the wall ({}); the direction of such short edges is survey noise, and points every \
+             {} mm are enough",
             short.len(),
             FINEST_M * 1e3,
             length_m * 1e3,
@@ -213,7 +221,7 @@ impl VehicleConfig {
         Some(warning("tunnel.file".to_owned(), problem))
     }
 
-    /// Heads whose passes can't interleave.
+    /// Returns heads whose passes cannot interleave.
     fn interleaving(&self) -> Vec<Finding> {
         let heads = self.heads();
         let mut found = Vec::new();
@@ -253,7 +261,7 @@ fn warning(key: String, problem: String) -> Finding {
     Finding { grade: Grade::Warning, key, problem }
 }
 
-/// What both connections lead to, if it is the same.
+/// Names the common end of both connections; `None` if they lead to different ends.
 fn same_end(a: &Connect, b: &Connect) -> Option<&'static str> {
     match (a, b) {
         (Connect::Serial { port: a, .. }, Connect::Serial { port: b, .. }) => {
@@ -271,27 +279,27 @@ fn same_end(a: &Connect, b: &Connect) -> Option<&'static str> {
     }
 }
 
-/// Where a beam meets the wall.
+/// Point where a beam meets the wall.
 struct Wall {
     range_m: f64,
     arc_m: f64,
 }
 
 impl Wall {
-    /// `None` where the beam runs along the tunnel.
+    /// Returns `None` if the beam runs along the tunnel.
     fn at(standing: &Standing<'_>, angle_rad: f64) -> Option<Self> {
         let sounding = standing.sounding(angle_rad).ok()?;
         Some(Self { range_m: sounding.range_m(), arc_m: sounding.arc_m })
     }
 }
 
-/// Clock positions of places on the wall, each once, from the floor on.
+/// Lists the clock positions of places on the wall, each once, starting at the floor.
 fn clocks(walls: &[&Wall], profile: &Profile) -> String {
     let mut arcs: Vec<f64> = walls.iter().map(|wall| wall.arc_m).collect();
     arcs.sort_by(f64::total_cmp);
     let mut clocks: Vec<String> = arcs.into_iter().map(|arc_m| profile.clock(arc_m)).collect();
     clocks.dedup();
-    // The floor is where arc lengths begin and end.
+    // Arc lengths begin and end at the floor.
     if clocks.len() > 1 && clocks.first() == clocks.last() {
         clocks.pop();
     }
@@ -303,7 +311,7 @@ fn clocks(walls: &[&Wall], profile: &Profile) -> String {
     }
 }
 
-/// More clock positions than this aren't listed.
+/// Maximum number of listed clock positions.
 const MANY: usize = 8;
 
 #[cfg(test)]
@@ -311,7 +319,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn only_the_same_end_is_the_same() {
+    fn same_end_is_recognised_in_any_notation() {
         let parse = |text: &str| Connect::parse(text).unwrap();
         for (a, b, expected) in [
             ("serial:/dev/a?baud=9600", "serial:/dev/a", Some("serial port")),

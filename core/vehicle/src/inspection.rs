@@ -1,13 +1,13 @@
-//! What a plan makes of a vehicle file.
+//! Planning input from a vehicle file.
 
 use headrace_sampling::plan::Inspection;
 
 use crate::VehicleConfig;
 
 impl VehicleConfig {
-    /// The inspection of its tunnel by its heads as they are set, steady in the middle.
+    /// Returns the inspection of its tunnel by its heads as configured, steady in the centre.
     ///
-    /// Errors: a head's range setting that has no modes, in words.
+    /// Errors: a message about a head's range setting without modes.
     pub fn inspection(&self) -> Result<Inspection, String> {
         let heads = self.sensors.iter().filter_map(|sensor| Some((sensor.head()?, sensor.modes(None))));
         let heads = heads.map(|(spec, modes)| Ok((spec, modes?))).collect::<Result<_, String>>()?;

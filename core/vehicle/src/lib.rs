@@ -1,6 +1,7 @@
-//! `VEHICLE.toml`: the vehicle, its sensors, the tunnel, the target, and how the dive is judged and navigated.
+//! `VEHICLE.toml`: vehicle, sensors, tunnel, target, and parameters of verdicts and navigation.
 //!
-//! All errors of a file are found at once. The kinds of device that a file may name are the caller's; `docs/reference/vehicle-file.md` lists the keys.
+//! All errors of a file are found at once. The caller supplies the kinds of device that a file may name.
+//! `docs/reference/vehicle-file.md` lists the keys.
 //!
 //! ```
 //! use headrace_config::Document;

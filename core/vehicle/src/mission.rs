@@ -1,4 +1,4 @@
-//! Mission of a dive: the tunnel, the target and the judging parameters.
+//! Mission of a dive: the tunnel, the target and the verdict parameters.
 
 use headrace_geometry::site::Site;
 use headrace_geometry::time::DurNs;
@@ -23,7 +23,7 @@ pub struct Mission {
     pub target_m: f64,
     /// Length of a section, m.
     pub section_m: f64,
-    /// Length of the tunnel, m; samples beyond are counted, not kept.
+    /// Length of the tunnel, m; samples beyond are counted but not kept.
     pub length_m: f64,
     /// Arrangement of the heads: phase shift or sector offset.
     pub layout: HeadLayout,
@@ -31,20 +31,22 @@ pub struct Mission {
     pub planned_speed_mps: f64,
     /// Parts of the vehicle that may occlude a head, other than the other heads.
     pub hull: Vec<Obstacle>,
-    /// Judging parameters and openings of the wall.
+    /// Verdict parameters and openings of the wall.
     pub coverage: CoverageConfig,
-    /// How finely the advice of speed looks at the wall, and how often anew.
+    /// Resolution and update rate of the advice's view of the wall.
     pub looks: Looks,
     /// Time limit of the dive from its first packet; `None` if not set.
     pub dive_time: Option<DurNs>,
-    /// Hold times and dead bands of alerts.
+    /// Timing of alerts by class.
     pub alerts: AlertTiming,
-    /// What there is of cable and time.
+    /// Limits of cable and time.
     pub limits: LimitsConfig,
 }
 
 impl Mission {
-    /// A tunnel 100 m long with sections of 0.25 m, at the default site; phase shift, no hull, exact holes, no time limit.
+    /// Creates a mission with defaults.
+    ///
+    /// Tunnel of 100 m with sections of 0.25 m at the default site; phase shift, no hull, exact holes, no time limit.
     pub fn new(profile: Profile, target_m: f64) -> Self {
         let contradiction_m = CoverageConfig::usual_contradiction_m(profile.perimeter_m());
         Self {
@@ -65,7 +67,7 @@ impl Mission {
         }
     }
 
-    /// Whether pings land on the wall as in another mission: the same tunnel, water, layout and hull, whatever is asked of them.
+    /// Whether pings land on the same wall places as in another mission: same tunnel, water, layout and hull.
     pub fn places_as(&self, other: &Self) -> bool {
         self.profile == other.profile
             && self.site == other.site

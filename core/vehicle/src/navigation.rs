@@ -14,13 +14,15 @@ use headrace_sensor::device::{CounterSpec, InertialNoise};
 
 /// One degree, radians.
 const DEGREE: f64 = core::f64::consts::PI / 180.0;
-/// Valid ranges of noise settings: zero would make the filter trust one sensor over all others.
+/// Allowed noise settings. Zero is excluded, because the filter would trust one sensor over all others.
 const DEGREES: RangeInclusive<f64> = 1e-4..=90.0;
 const METRES: RangeInclusive<f64> = 1e-4..=100.0;
 const SMALL: RangeInclusive<f64> = 1e-9..=10.0;
 const SECONDS: RangeInclusive<f64> = 0.1..=1e9;
-/// Lengths of an epoch: at 0.5 s the estimate of a field dive was off by metres, and at 0.2 s by no more than at 0.1 (the trade
-/// Navigation of `headrace cost`); and of a window for which the filter's buffers have room, s.
+/// Allowed lengths of an epoch, and of a window within the filter's buffers, s.
+///
+/// With epochs of 0.5 s the estimate of a field dive was off by metres; with 0.2 s by no more than with 0.1 s
+/// (Navigation trade of `headrace cost`).
 const EPOCH_S: RangeInclusive<f64> = 0.02..=0.2;
 const WINDOW_S: RangeInclusive<f64> = 0.1..=1.0;
 
@@ -28,15 +30,17 @@ const WINDOW_S: RangeInclusive<f64> = 0.1..=1.0;
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[expect(clippy::large_enum_variant, reason = "there is one of it")]
 pub enum NavigationConfig {
-    /// With the filter.
+    /// The filter.
     Filter(Settings),
-    /// Without a filter.
+    /// The method without a filter.
     Direct,
 }
 
 impl NavigationConfig {
-    /// Reads the table; without one, a filter. What the table doesn't say is the inertial unit's `noise` and the cable `counter`'s where they
-    /// are known, and a default otherwise.
+    /// Reads the table; without a table, it is the filter.
+    ///
+    /// For missing keys it uses the inertial unit's `noise` and the cable `counter` if they are known, and defaults
+    /// otherwise.
     ///
     /// Errors: the first key that is unknown or out of range.
     pub fn parse(
@@ -54,7 +58,7 @@ impl NavigationConfig {
         Ok(if by_filter { Self::Filter(settings) } else { Self::Direct })
     }
 
-    /// Navigation in its initial state.
+    /// Creates the navigation in its initial state.
     pub fn begin(&self, profile: &Profile, site: Site) -> Box<dyn Navigation> {
         match self {
             Self::Filter(settings) => Box::new(FilterNavigation::new(profile.clone(), site, *settings)),
@@ -63,7 +67,7 @@ impl NavigationConfig {
     }
 }
 
-/// Reads a vehicle file's `[navigation]` table; missing keys keep what is `usual`.
+/// Reads a vehicle file's `[navigation]` table; missing keys keep the values of `usual`.
 ///
 /// Errors: the first key whose value is out of range.
 fn settings(section: &Section<'_>, usual: &Settings) -> Result<Settings, ConfigError> {
@@ -132,7 +136,7 @@ mod tests {
     }
 
     #[test]
-    fn the_filter_s_epoch_and_window_are_those_of_the_file() {
+    fn epoch_and_window_come_from_the_file() {
         assert_eq!(parsed("[navigation]\n").unwrap(), Settings::default());
         assert_eq!(
             parsed("[navigation]\nepoch_s = 0.1\nwindow_s = 0.2\n").unwrap(),

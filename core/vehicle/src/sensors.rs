@@ -1,4 +1,4 @@
-//! `[[sensors]]` of a vehicle file: the keys that all devices have, and those of each one's kind.
+//! `[[sensors]]` of a vehicle file: the keys common to all devices, and those of each kind.
 
 use core::ops::RangeInclusive;
 
@@ -13,16 +13,16 @@ pub(super) const SENSOR_DISTANCE_M: RangeInclusive<f64> = -20.0..=20.0;
 /// Allowed angles.
 pub(super) const DEGREES: RangeInclusive<f64> = -360.0..=360.0;
 
-/// The sensors of a file, in its order.
+/// Sensors of a file, in its order.
 #[derive(Default)]
 pub(super) struct Sensors {
     pub(super) devices: Vec<Box<dyn Device>>,
     pub(super) configs: Vec<SensorConfig>,
 }
 
-/// Reads all tables of sensors; `None` if one of them has an error.
+/// Reads all sensor tables; `None` if one of them has an error.
 ///
-/// Errors: no table; the first wrong one, if errors aren't collected.
+/// Errors: there is no table, or the first wrong one if errors are not collected.
 pub(super) fn parse(
     root: &Section<'_>,
     tables: Vec<Section<'_>>,
@@ -45,7 +45,7 @@ pub(super) fn parse(
     Ok(complete.then_some(sensors))
 }
 
-/// Reads a sensor's table; `ids` are those of earlier ones.
+/// Reads a sensor's table; `ids` are those of earlier sensors.
 fn parse_sensor(
     section: &Section<'_>,
     ids: &mut Vec<String>,
@@ -84,14 +84,14 @@ fn parse_sensor(
 /// Id of the operator's input, which is recorded like a sensor.
 pub const CONSOLE_ID: &str = "console";
 
-/// What is wrong with an id.
+/// Returns the problem of an id, if any.
 fn id_problem(id: &str, ids: &[String]) -> Option<&'static str> {
     let simple = |c: char| c.is_ascii_alphanumeric() || c == '_' || c == '-';
     if id.is_empty() || id.len() > 32 || !id.chars().all(simple) {
         return Some("must be 1 to 32 letters, digits, _ or -");
     }
     if id == CONSOLE_ID {
-        return Some("is kept for the operator's input; choose another id");
+        return Some("is reserved for the operator's input; choose another id");
     }
     ids.iter().any(|other| other == id).then_some("is the id of an earlier sensor; ids must differ")
 }

@@ -11,14 +11,14 @@ pub struct TunnelConfig {
     pub name: String,
     /// Design profile of the cross-section.
     pub profile: Profile,
-    /// Length along the axis, m: chainage 0 at the portal to this.
+    /// Length along the axis from the portal at chainage 0, m.
     pub length_m: f64,
 }
 
 impl TunnelConfig {
     /// Reads a tunnel's table, without the keys that concern the site.
     ///
-    /// Errors: a key that is missing, unknown or out of range, or dimensions that make no profile.
+    /// Errors: a key that is missing, unknown or out of range, or dimensions without a valid profile.
     pub fn from_section(section: &Section<'_>, load: Loader<'_>) -> Result<Self, ConfigError> {
         let length_m = section.number("length_m", 0.1..=1.0e5)?.unwrap_or(10_000.0);
         let shape = section.required("profile", section.choice("profile", &SHAPES)?)?;
@@ -54,7 +54,7 @@ const DIMENSION_M: core::ops::RangeInclusive<f64> = 0.1..=200.0;
 
 /// Reads the dimensions of a profile from a `[tunnel]` table.
 ///
-/// Errors: a key missing or out of range, or dimensions that make no profile.
+/// Errors: a key that is missing or out of range, or dimensions without a valid profile.
 fn parse(section: &Section<'_>, shape: Shape, load: Loader<'_>) -> Result<Profile, ConfigError> {
     let dimension = |key| section.required(key, section.number(key, DIMENSION_M)?);
     let profile = match shape {
@@ -94,7 +94,7 @@ fn parse(section: &Section<'_>, shape: Shape, load: Loader<'_>) -> Result<Profil
             let (points, lines) = parse_points(&text).map_err(|why| section.invalid("file", &why))?;
             let profile = Profile::polygon(&points, reference);
             return profile.map_err(|why| match why.vertex().and_then(|vertex| lines.get(vertex)) {
-                Some(line) => section.invalid("file", &format!("line {line} of it: {why}")),
+                Some(line) => section.invalid("file", &format!("line {line}: {why}")),
                 None => section.invalid("file", &why.to_string()),
             });
         }
@@ -102,11 +102,12 @@ fn parse(section: &Section<'_>, shape: Shape, load: Loader<'_>) -> Result<Profil
     profile.map_err(|why| section.invalid("profile", &why.to_string()))
 }
 
-/// Most points of a profile: one each millimetre of a wall of 100 m.
+/// Maximum number of points of a profile: one per millimetre of a wall of 100 m.
 const MOST_POINTS: usize = 100_000;
 
-/// Reads a polyline: one line `y_m,z_m` per vertex; a first line of other text and lines starting with # are skipped. With the
-/// vertices the numbers of their lines.
+/// Reads a polyline: one line `y_m,z_m` per vertex. Returns the vertices with their line numbers.
+///
+/// It skips a first line of other text, and lines that start with #.
 fn parse_points(text: &str) -> Result<(Vec<Yz>, Vec<usize>), String> {
     let (mut points, mut lines) = (Vec::new(), Vec::new());
     for (number, line) in text.lines().enumerate() {
@@ -126,7 +127,7 @@ fn parse_points(text: &str) -> Result<(Vec<Yz>, Vec<usize>), String> {
             _ if number == 0 => {}
             _ => {
                 let start: String = line.chars().take(60).collect();
-                return Err(format!("line {} of it is {start:?}; wanted is y_m,z_m", number + 1));
+                return Err(format!("line {} is {start:?}; allowed is y_m,z_m", number + 1));
             }
         }
     }
@@ -138,13 +139,13 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_polyline_file_says_which_line_is_wrong() {
+    fn polyline_error_names_the_line() {
         let read = parse_points("y_m,z_m\n1, 2\n# floor\n-1,2\n").unwrap();
         assert_eq!(read, (vec![[1.0, 2.0], [-1.0, 2.0]], vec![2, 4]));
         assert_eq!(parse_points(&"1,2\n".repeat(MOST_POINTS)).unwrap().0.len(), MOST_POINTS);
         let words = parse_points(&"1,2\n".repeat(MOST_POINTS + 1)).unwrap_err();
         assert!(words.starts_with("has more than 100000 points"), "{words}");
         assert!(parse_points(&format!("1,2\n{}", "3".repeat(1 << 20))).unwrap_err().len() < 200);
-        assert_eq!(parse_points("1,2\n3;4\n").unwrap_err(), "line 2 of it is \"3;4\"; wanted is y_m,z_m");
+        assert_eq!(parse_points("1,2\n3;4\n").unwrap_err(), "line 2 is \"3;4\"; allowed is y_m,z_m");
     }
 }

@@ -39,21 +39,21 @@ pub struct VehicleConfig {
     pub tunnel: TunnelConfig,
     /// Arrangement of the heads: phase shift or sector offset.
     pub layout: HeadLayout,
-    /// Speed that the heads' phases are planned for, m/s; zero ignores their positions along the hull.
+    /// Speed for which the heads' phases are planned, m/s; zero ignores their positions along the hull.
     pub planned_speed_mps: f64,
     /// Parts of the vehicle that may occlude a head.
     pub hull: Vec<Obstacle>,
-    /// Judging parameters and openings of the wall.
+    /// Verdict parameters and openings of the wall.
     pub coverage: CoverageConfig,
     /// Navigation method and settings.
     pub navigation: NavigationConfig,
-    /// How finely the advice of speed looks at the wall, and how often anew.
+    /// Resolution and update rate of the advice's view of the wall.
     pub looks: Looks,
     /// Time limit of the dive.
     pub dive_time: Option<DurNs>,
-    /// Hold times and dead bands of alerts.
+    /// Timing of alerts by class.
     pub alerts: AlertTiming,
-    /// What there is of cable and time.
+    /// Limits of cable and time.
     pub limits: LimitsConfig,
     /// The sensors, in the order of the file, which is the order of their sources.
     pub sensors: Vec<Box<dyn Device>>,
@@ -75,14 +75,14 @@ pub(super) const TARGET_M: core::ops::RangeInclusive<f64> = 0.01..=20.0;
 const MAX_SECTIONS: f64 = 400_000.0;
 const MAX_CELLS: f64 = 2e8;
 
-/// Number of wall cells that the sample store will have.
+/// Number of wall cells in the sample store.
 fn wall_cells(tunnel: &TunnelConfig, target_m: f64) -> f64 {
     let cell_m = StoreLayout::cell_for_target_m(target_m);
     tunnel.length_m * tunnel.profile.perimeter_m() / (cell_m * cell_m)
 }
 
 impl VehicleConfig {
-    /// Parses and checks a vehicle file against the device kinds that this build has.
+    /// Parses and checks a vehicle file against the device kinds in this build.
     ///
     /// Errors: every key that is missing, unknown or out of range, with its line.
     pub fn parse(
@@ -103,7 +103,7 @@ impl VehicleConfig {
         Ok(Self { attachments: attachments.into_inner(), ..vehicle })
     }
 
-    /// All but the attachments. What depends on a part that is wrong isn't checked.
+    /// Reads everything except the attachments. Checks that depend on a wrong part are skipped.
     fn from_root(
         root: &Section<'_>,
         kinds: &[&dyn DeviceKind],
@@ -186,7 +186,7 @@ impl VehicleConfig {
 }
 
 impl VehicleConfig {
-    /// Mission parameters of this vehicle.
+    /// Returns the mission parameters of this vehicle.
     pub fn mission(&self) -> Mission {
         Mission {
             profile: self.tunnel.profile.clone(),
@@ -206,7 +206,7 @@ impl VehicleConfig {
         }
     }
 
-    /// Navigation at the start of a dive.
+    /// Returns the navigation at the start of a dive.
     pub fn navigation(&self) -> Box<dyn Navigation> {
         self.navigation.begin(&self.tunnel.profile, self.site)
     }
@@ -228,7 +228,7 @@ impl VehicleConfig {
     }
 }
 
-/// The tunnel, if it is there and right, and the yaw of its axis, radians.
+/// Reads the tunnel, if present and valid, and the yaw of its axis, radians.
 fn parse_tunnel(root: &Section<'_>, load: Loader<'_>) -> Result<(Option<TunnelConfig>, f64), ConfigError> {
     let Some(section) = root.section("tunnel")? else { return Ok((None, 0.0)) };
     let axis_yaw_rad = section.number("axis_yaw_deg", DEGREES)?.unwrap_or(0.0).to_radians();
@@ -296,7 +296,7 @@ fn check_sound(root: &Section<'_>, told_by: Option<&str>, sensors: &Sensors) -> 
     Err(root.invalid("water", &problem))
 }
 
-/// Checks that there aren't too many heads, and that none is inside a hull box, which could not occlude it.
+/// Checks the number of heads, and that none is inside a hull box, which could not occlude it.
 fn check_heads(
     root: &Section<'_>,
     sensors: &[Box<dyn Device>],
@@ -317,7 +317,7 @@ fn check_heads(
     Ok(())
 }
 
-/// Layout and planned speed, m/s; `sensors` are known if all of them are right.
+/// Reads layout and planned speed, m/s; `sensors` is `None` unless all of them are valid.
 fn parse_heads(
     section: &Section<'_>,
     sensors: Option<&[Box<dyn Device>]>,

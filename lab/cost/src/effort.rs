@@ -1,16 +1,16 @@
-//! How much is measured.
+//! Amount of measurement.
 
-/// How much is measured.
+/// Amount of measurement.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Effort {
-    /// Under a minute of CPU: one or two seeds, short dives. Shows that all works, and orders of magnitude.
+    /// Under a minute of CPU: one or two seeds, short dives. It shows that everything works, and orders of magnitude.
     Quick,
-    /// Under ten minutes on two cores: what `docs/why/cost` shows.
+    /// Under ten minutes on two cores, as shown in `docs/why/cost`.
     Full,
 }
 
 impl Effort {
-    /// One of two values.
+    /// Picks one of two values.
     pub fn pick<T>(self, quick: T, full: T) -> T {
         match self {
             Self::Quick => quick,
@@ -23,8 +23,10 @@ impl Effort {
         self.pick(1, 5)
     }
 
-    /// Times that every setting is measured, in turns. Six are the fewest of which a median has an interval of 95 %; of three it has their
-    /// least and largest.
+    /// Number of times that every setting is measured, in turns.
+    ///
+    /// Six is the fewest values whose median has a 95 % interval. With three values the interval is the least and the
+    /// largest.
     pub fn rounds(self) -> u32 {
         self.pick(3, 9)
     }

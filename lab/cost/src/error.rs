@@ -1,40 +1,40 @@
-//! Why a trade can't be measured.
+//! Errors of measuring a trade.
 
 use headrace_config::ConfigErrors;
 use headrace_oracle::TruthError;
 use headrace_sampling::SamplingError;
 use headrace_simulator::SceneError;
 
-/// Why a trade can't be measured.
+/// A trade can't be measured.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum CostError {
-    /// A scene is wrong.
+    /// A scene is invalid.
     #[error("measuring a scene: {0}")]
     Scene(#[from] SceneError),
-    /// A vehicle file is wrong.
+    /// A vehicle file is invalid.
     #[error("measuring a vehicle: {0}")]
     Vehicle(#[from] ConfigErrors),
     /// A plan can't be made.
     #[error("planning a survey to price: {0}")]
     Planning(#[from] SamplingError),
-    /// A dive can't be held against its truth.
+    /// A dive can't be compared with its truth.
     #[error(transparent)]
     Truth(#[from] TruthError),
-    /// A file that comes with the program isn't there.
+    /// A file isn't among those built into the program.
     #[error("reading {name:?}: no such file comes with the program; it has {known}")]
     NoFile {
         /// Its name.
         name: String,
-        /// Those that do.
+        /// Names of the built-in files.
         known: String,
     },
-    /// A figure that a trade needs can't be had.
+    /// A figure that a trade needs isn't available.
     #[error("measuring {what}: {why}")]
     Figure {
-        /// Of what.
+        /// The figure.
         what: String,
-        /// Why not.
+        /// The reason.
         why: String,
     },
 }

@@ -1,8 +1,9 @@
-//! What accuracy costs: headrace's errors against its time, setting by setting.
+//! The cost of accuracy: headrace's errors against its time, setting by setting.
 //!
-//! A trade is a question ("what does a finer target cost?"), answered by points: a setting, its error against independent values, and
-//! its cost. Errors are told in what is decided by: the hole D of a section, and metres falsely passed. `trades/` has a file for each.
-//! The independent values, and the simulated dives that both are found on, are those of `headrace_oracle`.
+//! A trade is a question ("what does a finer target cost?") answered by points. A point is a setting with its error
+//! against independent values and its cost. Errors are stated in the quantities that decide: the hole D of a section,
+//! and metres falsely passed. `trades/` has a file for each trade. `headrace_oracle` provides the independent values
+//! and the simulated dives for both.
 
 pub mod draw;
 pub mod effort;

@@ -16,9 +16,9 @@ use headrace_cost::scene::Inputs;
 use headrace_cost::trades::{GIVEN, TRADES};
 use headrace_vehicle::VehicleConfig;
 
-/// Ends a picture.
+/// Last line of a picture, which marks it as written by this program.
 const MARK: &str = "<!-- headrace cost -->\n";
-/// Begins a table.
+/// First text of a table.
 const TABLE: &str = "scene,method,knob,";
 
 /// Measure what accuracy costs in time: errors against independent values, setting by setting, beside CPU time or hours.
@@ -51,7 +51,7 @@ struct Cost {
     verbosity: Verbosity,
 }
 
-/// What is told beside the results.
+/// Amount of output besides the results.
 #[derive(Debug, Args)]
 struct Verbosity {
     /// Tell on stderr what is being measured.
@@ -62,7 +62,7 @@ struct Verbosity {
     quiet: bool,
 }
 
-/// Why there are no figures.
+/// There are no results.
 #[derive(Debug, thiserror::Error)]
 enum Failure {
     #[error(transparent)]
@@ -86,7 +86,7 @@ fn main() -> ExitCode {
         Ok(()) => ExitCode::SUCCESS,
         Err(failure) => {
             eprintln!("headrace-cost: {failure}");
-            // As of headrace: 2 for what was asked, 1 for what went wrong.
+            // Exit codes as in headrace: 2 for a wrong request, 1 for a failure.
             let is_asked =
                 matches!(failure, Failure::Vehicle { .. } | Failure::Invalid(_) | Failure::InTheWay { .. });
             ExitCode::from(if is_asked { 2 } else { 1 })
@@ -142,7 +142,7 @@ fn cost(args: &Cost) -> Result<(), Failure> {
     Ok(())
 }
 
-/// Writes lines to stdout; one that is closed, as below `head`, ends nothing.
+/// Writes lines to stdout; a closed stdout, as with `head`, isn't an error.
 fn say(text: &str) -> Result<(), Failure> {
     match writeln!(io::stdout(), "{text}") {
         Err(error) if error.kind() != io::ErrorKind::BrokenPipe => Err(Failure::Stdout(error)),
@@ -150,11 +150,11 @@ fn say(text: &str) -> Result<(), Failure> {
     }
 }
 
-/// A vehicle file's text, and the vehicle.
+/// Reads a vehicle file: its text, and the parsed vehicle.
 fn vehicle(path: &Path) -> Result<(String, VehicleConfig), Failure> {
     let text =
         fs::read_to_string(path).map_err(|source| Failure::Vehicle { path: path.to_owned(), source })?;
-    // Definitions of CAN messages lie beside the vehicle file.
+    // Definitions of CAN messages are beside the vehicle file.
     let beside =
         |name: &str| fs::read_to_string(path.with_file_name(name)).map_err(|error| error.to_string());
     let name = path.display().to_string();
@@ -163,7 +163,7 @@ fn vehicle(path: &Path) -> Result<(String, VehicleConfig), Failure> {
     Ok((text, vehicle))
 }
 
-/// Checks, before the work, that what stands where files will be written was written by this program.
+/// Checks before the measurement that existing files in the folder were written by this program.
 fn may_write(folder: &Path, force: bool) -> Result<(), Failure> {
     let names = TRADES.iter().flat_map(|(name, _)| [format!("{name}.csv"), format!("{name}.svg")]);
     for name in names.chain(["README.md", "method.md", "cost.json"].map(str::to_owned)) {
@@ -182,7 +182,7 @@ fn is_picture(name: &str) -> bool {
     Path::new(name).extension().is_some_and(|extension| extension == "svg")
 }
 
-/// The command that was given, but for where its files go.
+/// The command line, without the folder of results.
 fn command(args: &Cost) -> String {
     let quick = if args.quick { " --quick" } else { "" };
     let only = if args.only.is_empty() { String::new() } else { format!(" --only {}", args.only.join(",")) };
@@ -191,7 +191,7 @@ fn command(args: &Cost) -> String {
     format!("headrace cost{quick}{only}{vehicle}")
 }
 
-/// The processor and how the program was built, as the system tells it.
+/// The processor and how the program was built, as reported by the system.
 fn machine() -> String {
     let known = fs::read_to_string("/proc/cpuinfo").unwrap_or_default();
     let model = known.lines().find_map(|line| line.strip_prefix("model name")?.split_once(':'));

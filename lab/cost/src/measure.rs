@@ -1,4 +1,4 @@
-//! What settings cost, measured in turns; and work side by side, for what isn't timed.
+//! Measures the costs of settings in turns, and runs untimed work in parallel.
 
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::thread;
@@ -6,9 +6,9 @@ use std::thread;
 use crate::error::CostError;
 use crate::point::Interval;
 
-/// What some work gives for each item, in the items' order, for as many at once as there are processors: for what isn't timed.
+/// Runs untimed work for each item on as many threads as there are processors; results are in the order of the items.
 ///
-/// Errors: that of the first item that has one.
+/// Errors: that of the first item that fails.
 pub fn side_by_side<T: Sync, R: Send>(
     items: &[T],
     work: impl Fn(&T) -> Result<R, CostError> + Sync,
@@ -35,8 +35,10 @@ pub fn side_by_side<T: Sync, R: Send>(
     done.into_iter().map(|(_, result)| result).collect()
 }
 
-/// Median of each setting's costs with its interval of 95 %, measured so many rounds in turns, so that what the machine does besides falls upon
-/// all of them alike. `run` measures a setting once and returns its cost.
+/// Median of each setting's costs with its 95 % interval, measured in `rounds` turns.
+///
+/// Measuring in turns spreads other load on the machine evenly over the settings. `run` measures a setting once and
+/// returns its cost.
 ///
 /// Errors: those of `run`; no rounds.
 pub fn in_turns<T>(
@@ -62,7 +64,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn work_side_by_side_comes_in_the_items_order_with_the_first_ones_error() {
+    fn parallel_work_keeps_the_order_and_returns_the_first_error() {
         let items: Vec<u32> = (0..100).collect();
         let halves = side_by_side(&items, |item| Ok(item / 2));
         assert_eq!(halves.unwrap(), items.iter().map(|item| item / 2).collect::<Vec<_>>());

@@ -1,4 +1,4 @@
-//! What is measured: a setting's error beside its cost, and which settings nothing else beats.
+//! Measured points: a setting's error and cost, and the settings that no other beats.
 
 use headrace_geometry::math;
 use serde::{Deserialize, Serialize};
@@ -20,14 +20,16 @@ impl Interval {
         Self { low: value, middle: value, high: value }
     }
 
-    /// Median with its interval of 95 %, by signs: the innermost two values, as far from the least as from the largest, between which
-    /// the median of all values that there might have been lies with that probability. Of fewer than six values their least and largest,
-    /// which hold it less surely; `None` of nothing.
+    /// Median with its 95 % interval by the sign test; `None` without values.
+    ///
+    /// The interval lies between two values equally far from the least and the largest rank, the innermost with that
+    /// probability of covering the true median. For fewer than six values it is the least and the largest, which cover
+    /// the median with less probability.
     pub fn median(values: &[f64]) -> Option<Self> {
         let mut sorted = values.to_vec();
         sorted.sort_unstable_by(f64::total_cmp);
         let count = i32::try_from(sorted.len()).ok()?;
-        // Probability that no more than so many of all values lie below the median: of a fair coin.
+        // Probability that at most `below` of all values lie under the median: that of a fair coin.
         let (mut ways, mut below, mut cut) = (1.0, 1.0, 0_usize);
         let all = (0..count).fold(1.0, |all, _| all * 2.0);
         for k in 1..=count / 2 {
@@ -46,7 +48,7 @@ impl Interval {
         })
     }
 
-    /// Median and quartiles; `None` of nothing. Values between two ranks are interpolated.
+    /// Median and quartiles, interpolated between ranks; `None` without values.
     pub fn quartiles(values: &[f64]) -> Option<Self> {
         Some(Self {
             low: quantile(values, 0.25)?,
@@ -55,7 +57,7 @@ impl Interval {
         })
     }
 
-    /// Mean with its 95 % confidence interval by Student's t; `None` of fewer than two values.
+    /// Mean with its 95 % confidence interval by Student's t; `None` for fewer than two values.
     pub fn mean(values: &[f64]) -> Option<Self> {
         if values.len() < 2 {
             return None;
@@ -68,21 +70,21 @@ impl Interval {
         Some(Self { low: middle - half, middle, high: middle + half })
     }
 
-    /// The same in another unit: `factor` new units to an old one.
+    /// Converts to another unit; `factor` is the number of new units per old unit.
     #[must_use]
     pub fn scaled(self, factor: f64) -> Self {
         Self { low: self.low * factor, middle: self.middle * factor, high: self.high * factor }
     }
 }
 
-/// A quantile, `share` from 0 to 1, interpolated between two ranks; `None` of nothing.
+/// Interpolated quantile, with `share` from 0 to 1; `None` without values.
 pub fn quantile(values: &[f64], share: f64) -> Option<f64> {
     let mut sorted = values.to_vec();
     sorted.sort_unstable_by(f64::total_cmp);
     let rank = share.clamp(0.0, 1.0) * (sorted.len().checked_sub(1)? as f64);
     let below = usize::try_from(math::floor_to_i64(rank)).ok()?;
     let (from, part) = (*sorted.get(below)?, rank - below as f64);
-    // Of equal or infinite neighbours no difference is formed.
+    // Equal or infinite neighbours are not subtracted.
     match sorted.get(below + 1) {
         Some(to) if part > 0.0 && *to > from => Some(from + part * (to - from)),
         _ => Some(from),
@@ -99,41 +101,41 @@ fn student(freedom: usize) -> f64 {
     UP_TO_30.get(freedom.max(1) - 1).copied().unwrap_or(1.96)
 }
 
-/// One of a point's errors; finite.
+/// One of a point's errors; always finite.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Error {
-    /// What is wrong by it, as a heading of a table.
+    /// Name of the wrong quantity, as a table heading.
     pub name: String,
     /// Its unit.
     pub unit: String,
-    /// How large it is.
+    /// Size of the error.
     pub interval: Interval,
 }
 
-/// A setting, measured.
+/// A measured setting.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Point {
-    /// The line that it is a marker of.
+    /// Method: the line in the chart that this marker belongs to.
     pub method: String,
     /// The setting's name.
     pub knob: String,
     /// Its value, with its unit.
     pub value: String,
-    /// The same as a number, where it is one.
+    /// The value as a number, if it is one.
     pub number: Option<f64>,
-    /// Whether headrace is shipped so.
+    /// Whether this is the shipped setting of headrace.
     pub is_default: bool,
-    /// What was dived; points of different scenes aren't compared, and each scene has its own chart.
+    /// The dived scene. Points of different scenes aren't compared, and each scene has its own chart.
     pub scene: String,
-    /// Number of seeds, each a dive of its own.
+    /// Number of seeds; each gives one dive.
     pub seeds: u32,
-    /// Its errors; the first is the axis's.
+    /// Its errors; the first one is shown on the axis.
     pub errors: Vec<Error>,
-    /// Its cost, in the unit of the trade's axis: median, and bounds as `Results::bars` says.
+    /// Its cost in the unit of the trade's axis: median, with the bounds that `Results::bars` explains.
     pub cost: Interval,
-    /// Instructions, counted, per unit of what `cost` is for; `None` where nothing counts them.
+    /// Counted instructions per unit of `cost`; `None` if they can't be counted.
     pub instructions: Option<f64>,
-    /// Whether nothing beats it ([`front`]).
+    /// Whether no other point beats it ([`front`]).
     pub on_front: bool,
 }
 
@@ -150,7 +152,7 @@ impl Error {
 }
 
 impl Point {
-    /// The error on the axis: the middle of the first one, infinite without any.
+    /// The error shown on the axis: the middle of the first one, infinite without any.
     pub fn error(&self) -> f64 {
         self.errors.first().map_or(f64::INFINITY, |error| error.interval.middle)
     }
@@ -161,32 +163,32 @@ impl Point {
     }
 }
 
-/// A setting that isn't among the points.
+/// A setting that isn't measured.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct LeftOut {
     /// The setting.
     pub what: String,
-    /// Why.
+    /// The reason.
     pub why: String,
 }
 
-/// How far the reference itself may be off.
+/// Error of the reference itself.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct OracleError {
-    /// How it was found: which two references were held against each other, where.
+    /// How it was found: the two references compared, and the place.
     pub how: String,
     /// Largest difference, in the unit of the trade's first error.
     pub size: f64,
 }
 
-/// A question of the kind "what does more of this cost", answered.
+/// An answered question of the kind "what does more of this cost".
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Trade {
     /// Its name in `--only` and in names of files.
     pub name: String,
     /// Its heading.
     pub title: String,
-    /// What is asked.
+    /// The question.
     pub question: String,
     /// Name and unit of the axis to the right.
     pub error_axis: String,
@@ -196,17 +198,17 @@ pub struct Trade {
     pub cost_unit: String,
     /// Whether cost is computed rather than measured, so that it doesn't differ from run to run.
     pub cost_is_computed: bool,
-    /// The error below which accuracy decides nothing: a tenth of the target, or what the advice keeps back of a speed.
+    /// The error below which accuracy decides nothing: a tenth of the target, or the speed margin of the advice.
     pub decides: Option<f64>,
-    /// What was measured.
+    /// Measured points.
     pub points: Vec<Point>,
-    /// What wasn't, or failed.
+    /// Settings that weren't measured, or failed.
     pub left_out: Vec<LeftOut>,
     /// The reference's own error.
     pub oracle: OracleError,
-    /// Of defaults that something beats, in a sentence each, why they stay.
+    /// For each default that another setting beats, a sentence that explains why it stays.
     pub reasons: Vec<String>,
-    /// What follows, with a number.
+    /// The conclusion, with a number.
     pub advice: String,
 }
 
@@ -216,13 +218,14 @@ impl Trade {
         self.error_axis.rsplit(", ").next().unwrap_or_default()
     }
 
-    /// Differences of the error below this decide nothing, in its unit: a tenth of what decides anything, and no less than the reference
-    /// may be off itself.
+    /// Largest difference of the error that decides nothing, in the unit of the error.
+    ///
+    /// It is a tenth of the deciding error, and at least the reference's own error.
     pub fn resolution(&self) -> f64 {
         self.oracle.size.max(self.decides.map_or(0.0, |decides| decides / 10.0))
     }
 
-    /// Names of all figures of its points with their units, in the order of the first ones.
+    /// Names and units of all figures of its points, in the order of first appearance.
     pub(crate) fn figures(&self) -> Vec<String> {
         let mut figures: Vec<String> = Vec::new();
         for heading in self.points.iter().flat_map(|point| &point.errors).map(Error::heading) {
@@ -245,12 +248,12 @@ impl Trade {
     }
 }
 
-/// A table beside the trades: what isn't a choice, and what it costs.
+/// A table beside the trades: costs of things that aren't a choice.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Given {
     /// Its heading.
     pub title: String,
-    /// What it says, in a paragraph.
+    /// Explanation, one paragraph.
     pub text: String,
     /// Headings of its columns.
     pub columns: Vec<String>,
@@ -258,10 +261,11 @@ pub struct Given {
     pub rows: Vec<Vec<String>>,
 }
 
-/// Marks the points that no other one of their scene beats.
+/// Marks the points that no other point of their scene beats.
 ///
-/// One beats another if it is no worse in either, and clearly better in one: its error is smaller by more than `resolution`, or its
-/// cost's upper bound is below the other's lower bound. So noise in the costs of equal settings beats neither.
+/// A point beats another if it is no worse in error and cost, and clearly better in one. Clearly better means an error
+/// smaller by more than `resolution`, or a cost whose upper bound is below the other's lower bound. Noise in the costs
+/// of equal settings therefore beats neither.
 pub fn front(points: &mut [Point], resolution: f64) {
     let beats = |one: &Point, other: &Point| {
         let (error, others) = (one.error(), other.error());
@@ -278,9 +282,11 @@ pub fn front(points: &mut [Point], resolution: f64) {
     }
 }
 
-/// The knee of a scene's front: the point farthest below the straight line between the front's ends, both axes logarithmic. Errors up
-/// to `resolution` count as that, and of those only the cheapest is on the front. `None` with fewer than three points left on it, or
-/// where none lies below the line.
+/// The knee of a scene's front: the point farthest below the straight line between the front's ends, on logarithmic
+/// axes.
+///
+/// Errors below `resolution` count as `resolution`, and of those only the cheapest is on the front. `None` if fewer
+/// than three points remain, or none lies below the line.
 pub fn knee<'a>(points: &'a [Point], scene: &str, resolution: f64) -> Option<&'a Point> {
     let told = |point: &Point| point.error().max(resolution);
     let mut on_front: Vec<(&Point, [f64; 2])> = points
@@ -326,7 +332,7 @@ mod tests {
     }
 
     #[test]
-    fn a_planted_slow_method_is_off_the_front() {
+    fn slow_method_is_off_the_front() {
         let mut points = [
             point("fine", 0.01, [9.0, 10.0, 11.0]),
             point("fine but slow", 0.01, [90.0, 100.0, 110.0]),
@@ -360,13 +366,13 @@ mod tests {
         front(&mut points, 0.0);
         assert_eq!(knee(&points, "s", 0.0).map(|point| point.value.as_str()), Some("knee"));
         assert!(knee(&points[..2], "s", 0.0).is_none() && knee(&points, "another", 0.0).is_none());
-        // Finest and knee are the same then, and the cheaper one is an end of the front.
+        // Finest and knee then have the same error, and the cheaper one becomes an end of the front.
         assert_eq!(knee(&points, "s", 0.02).map(|point| point.value.as_str()), Some("near the line"));
         assert!(knee(&points, "s", 0.2).is_none());
     }
 
     #[test]
-    fn spreads_are_those_of_tables() {
+    fn spreads_match_published_tables() {
         let values = [4.0, 1.0, 3.0, 2.0, 5.0];
         assert_eq!(Interval::quartiles(&values), Some(Interval { low: 2.0, middle: 3.0, high: 4.0 }));
         // Mean 3, variance 2.5; t of four degrees of freedom is 2.776.
@@ -376,10 +382,10 @@ mod tests {
         assert_eq!(quantile(&[], 0.5), None);
     }
 
-    /// Ranks of the sign test at 5 %, from tables (Conover, "Practical nonparametric statistics", A3): the first and the last of 6 to 8
-    /// values, the second of 9 to 11, the third of 12 to 14, the sixth of 20.
+    /// Ranks of the sign test at 5 %, from tables (Conover, "Practical nonparametric statistics", A3): the first and
+    /// the last of 6 to 8 values, the second of 9 to 11, the third of 12 to 14, the sixth of 20.
     #[test]
-    fn intervals_of_medians_are_those_of_tables() {
+    fn median_intervals_match_published_tables() {
         for (count, rank) in [(1, 1), (5, 1), (6, 1), (8, 1), (9, 2), (11, 2), (12, 3), (14, 3), (20, 6)] {
             let values: Vec<f64> = (1..=count).map(f64::from).rev().collect();
             let found = Interval::median(&values).unwrap();

@@ -1,4 +1,4 @@
-//! Scenes to measure on: text, with the vehicle and scene files that come with the program.
+//! Scenes for measurements, built from text and the vehicle and scene files built into the program.
 
 use headrace_config::Document;
 use headrace_sensor::device::DeviceKind;
@@ -8,7 +8,7 @@ use headrace_vehicle::VehicleConfig;
 use crate::effort::Effort;
 use crate::error::CostError;
 
-/// Files that come with the program, by name.
+/// Files built into the program, by name.
 pub const FILES: [(&str, &str); 11] = [
     ("vita1.toml", include_str!("../../../deploy/vehicles/vita1.toml")),
     ("vita2-2.toml", include_str!("../../../deploy/vehicles/vita2-2.toml")),
@@ -23,9 +23,9 @@ pub const FILES: [(&str, &str); 11] = [
     ("vita1-field.toml", include_str!("../../../deploy/scenes/vita1-field.toml")),
 ];
 
-/// A file that comes with the program, by its name without folders.
+/// The content of a built-in file, by its name without folders.
 ///
-/// Errors: there is none of that name.
+/// Errors: there is no file of that name.
 pub fn file(name: &str) -> Result<&'static str, CostError> {
     let plain = name.rsplit('/').next().unwrap_or(name);
     let found = FILES.iter().find(|(known, _)| *known == plain).map(|(_, text)| *text);
@@ -35,10 +35,10 @@ pub fn file(name: &str) -> Result<&'static str, CostError> {
     })
 }
 
-/// What is measured with.
+/// Inputs of a measurement.
 #[derive(Clone, Copy)]
 pub struct Inputs<'a> {
-    /// How much is measured.
+    /// Amount of measurement.
     pub effort: Effort,
     /// The kinds of devices that vehicle files may name.
     pub kinds: &'a [&'a dyn DeviceKind],
@@ -47,9 +47,9 @@ pub struct Inputs<'a> {
 }
 
 impl Inputs<'_> {
-    /// A scene with a seed. Its vehicle, and files that this one names, are those that come with the program.
+    /// Parses a scene with a seed; vehicle files and the files that they name are the built-in ones.
     ///
-    /// Errors: a scene that is wrong.
+    /// Errors: the scene is invalid.
     pub fn scene(&self, text: &str, seed: u32) -> Result<Scene, CostError> {
         let load =
             |name: &str| file(name).map(|text| text.as_bytes().to_vec()).map_err(|why| why.to_string());
@@ -57,18 +57,18 @@ impl Inputs<'_> {
         Ok(Scene::parse(document, self.kinds, &load, Some(u64::from(seed)))?)
     }
 
-    /// A scene whose vehicle file is this text, whatever name the scene calls it by.
+    /// Parses a scene with this text as its vehicle file, whatever name the scene gives it.
     ///
-    /// Errors: a scene or a vehicle that is wrong.
+    /// Errors: the scene or the vehicle is invalid.
     pub fn scene_of(&self, text: &str, vehicle: &str, seed: u32) -> Result<Scene, CostError> {
         let load = |_: &str| Ok(vehicle.as_bytes().to_vec());
         let document = Document::new("a scene to measure", text);
         Ok(Scene::parse(document, self.kinds, &load, Some(u64::from(seed)))?)
     }
 
-    /// A vehicle file's text, understood.
+    /// Parses a vehicle file's text.
     ///
-    /// Errors: a vehicle that is wrong.
+    /// Errors: the vehicle is invalid.
     pub fn vehicle(&self, text: &str) -> Result<VehicleConfig, CostError> {
         let load = |name: &str| Err(format!("{name:?} isn't known here"));
         Ok(VehicleConfig::parse(Document::new("a vehicle to measure", text), self.kinds, &load)?)

@@ -1,27 +1,29 @@
-//! What a way of judging gets wrong, in what is decided by: the hole, and metres falsely passed, falsely failed, not said.
+//! Errors of a judging method, in the quantities that decide: the hole, and metres falsely passed, falsely failed, or
+//! not judged.
 
 use crate::point::{Error, Interval, quantile};
 use headrace_oracle::dive::{JudgedDive, JudgedSection};
 
-/// Beyond the target, sections at the ends of a dive have no neighbours on one side over so many metres: the length of the
-/// hull, and the way to the next pass.
+/// Length at the ends of a dive, beyond the target, in which sections have neighbours on one side only, m.
+///
+/// It is the length of the hull and the distance to the next pass.
 pub const END_M: f64 = 2.0;
 
-/// A section as some way of judging has it, beside the truth.
+/// A section as judged by some method, with its truth.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Judged {
     /// Its length, m.
     pub length_m: f64,
-    /// D as it is judged, m; `None` where there is none, or only a lower bound.
+    /// D as judged, m; `None` if there is none, or only a lower bound.
     pub hole_m: Option<f64>,
-    /// Whether it is within the target; `None` where that isn't said.
+    /// Whether it is within the target; `None` if undecided.
     pub passes: Option<bool>,
     /// D_true, m.
     pub true_hole_m: f64,
 }
 
 impl Judged {
-    /// As the report has it.
+    /// The section as in the report.
     pub fn of(section: &JudgedSection) -> Self {
         Self {
             length_m: section.report.end_m - section.report.start_m,
@@ -46,9 +48,11 @@ pub fn inner(dive: &JudgedDive) -> impl Iterator<Item = &JudgedSection> {
     })
 }
 
-/// The errors of a setting from the sections of each of its dives: |D - D_true|, 95th percentile and median; of 100 m, those falsely
-/// passed, falsely failed and not said; of sections whose D_true is over the target, the share that passes. Each is the median over
-/// the dives with the least and the most; dives without such sections are left out.
+/// The errors of a setting, from the sections of each of its dives.
+///
+/// They are |D - D_true|, 95th percentile and median; metres per 100 m falsely passed, falsely failed and undecided;
+/// and the share of sections over the target that passes. Each is the median over the dives with the least and the
+/// most. Dives without such sections are left out.
 pub fn errors(dives: &[Vec<Judged>], target_m: f64) -> Vec<Error> {
     let off_m = |dive: &Vec<Judged>| -> Vec<f64> {
         let off = |judged: &Judged| Some((judged.hole_m? - judged.true_hole_m).abs());
@@ -93,7 +97,7 @@ mod tests {
     }
 
     #[test]
-    fn errors_are_those_planted() {
+    fn errors_equal_the_planted_ones() {
         let dive = vec![
             judged(0.4, Some(true), 0.4),
             judged(0.4, Some(true), 0.6),
@@ -103,12 +107,12 @@ mod tests {
         let found = errors(&[dive], 0.5);
         let middle: Vec<f64> =
             found.iter().map(|error| (error.interval.middle * 1e9).round() * 1e-9).collect();
-        // Off by 0, 0.2, 0.1, 0.1 m; a metre holds all four.
+        // Off by 0, 0.2, 0.1 and 0.1 m; a metre holds all four.
         assert_eq!(middle, [0.185, 0.1, 25.0, 25.0, 25.0, 50.0]);
     }
 
     #[test]
-    fn a_dive_without_sections_says_nothing() {
+    fn dive_without_sections_gives_no_errors() {
         assert!(errors(&[Vec::new()], 0.5).is_empty());
     }
 }

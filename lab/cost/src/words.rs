@@ -1,4 +1,4 @@
-//! Figures and settings as words, alike in pictures, page and terminal.
+//! Figures and settings as text, for pictures, page and terminal alike.
 
 use std::fmt::{self, Write as _};
 
@@ -39,7 +39,7 @@ fn whole(trade: &Trade, point: &Point) -> String {
     )
 }
 
-/// Of a scene: the default, the knee, and the price of the next step to less error from the default.
+/// For a scene: the default, the knee, and the price of the next step from the default to less error.
 pub(crate) fn steps(trade: &Trade, scene: &str) -> Vec<String> {
     let points = || trade.points.iter().filter(|point| point.scene == scene);
     let Some(default) = points().find(|point| point.is_default) else {
@@ -63,7 +63,7 @@ pub(crate) fn steps(trade: &Trade, scene: &str) -> Vec<String> {
     lines
 }
 
-/// That no setting has less error than the default, or none by what decides anything.
+/// Text if no setting has less error than the default, or none by a deciding amount.
 fn no_step(default: &Point, resolution: f64) -> String {
     let by = default.errors.first().filter(|_| resolution > 0.0);
     let by =
@@ -75,7 +75,7 @@ fn signed(value: f64) -> String {
     if value >= 0.0 { format!("{} more", number(value)) } else { format!("{} less", number(-value)) }
 }
 
-/// Of each scene whose default something beats: by what, or that it is on the front.
+/// For each scene with a beaten default: the setting that beats it, or a statement that the default is on the front.
 pub(crate) fn defaults(trade: &Trade) -> Vec<String> {
     let mut lines = Vec::new();
     for scene in trade.scenes() {

@@ -1,4 +1,4 @@
-//! What `headrace cost` shows of errors: planted ones are found, and the page is its data's.
+//! Tests that `headrace cost` finds planted errors, and that the page matches its data.
 
 #![allow(clippy::unwrap_used, clippy::panic, reason = "a test stops at what it can't do")]
 
@@ -26,7 +26,7 @@ fn ideal() -> JudgedDive {
     dive(&scene).unwrap()
 }
 
-/// Ideal but for what moves within a turn and what hides wall.
+/// Ideal except for motion within a turn and occlusion.
 const SCENE: &str = "vehicle = \"vita2-4.toml\"\n[trajectory]\nstart_m = 5\n[[trajectory.legs]]\ndistance_m = 8\nspeed_mps = 0.1\n\
          [effects]\nmotion_within_turn = {}\nocclusion = {}\n";
 
@@ -40,7 +40,7 @@ fn wrong(dive: &JudgedDive, judged: impl Fn(Judged) -> Judged) -> [f64; 2] {
 }
 
 #[test]
-fn a_planted_wrong_method_has_the_error_planted() {
+fn planted_wrong_method_has_the_planted_error() {
     const PLANTED_M: f64 = 0.1;
     let dive = ideal();
     let [right_m, _] = wrong(&dive, |judged| judged);
@@ -53,9 +53,9 @@ fn a_planted_wrong_method_has_the_error_planted() {
     assert!(failed_m > 50.0, "{failed_m} m in 100");
 }
 
-/// `docs/why/cost` is what `headrace cost` makes of `cost.json`: nothing in it is by hand, or of an older form.
+/// `docs/why/cost` must be generated from `cost.json` by the current program, without manual changes.
 #[test]
-fn the_page_in_docs_is_that_of_its_data() {
+fn page_in_docs_matches_its_data() {
     let folder = root().join("docs/why/cost");
     let read =
         |name: &str| std::fs::read_to_string(folder.join(name)).unwrap_or_else(|why| panic!("{name}: {why}"));
@@ -68,7 +68,7 @@ fn the_page_in_docs_is_that_of_its_data() {
             ""
         };
         let content = format!("{content}{end}");
-        // Form alone: times stay as old as they are.
+        // Renews the form only; the measured times stay.
         if std::env::var_os("HEADRACE_RENEW_COST").is_some() {
             std::fs::write(folder.join(name), &content).unwrap();
         }
@@ -91,9 +91,9 @@ fn the_page_in_docs_is_that_of_its_data() {
     }
 }
 
-/// Of sections whose D_true is over the target, what shipped defaults pass.
+/// Limits the share that shipped defaults pass among sections whose D_true is over the target.
 #[test]
-fn shipped_defaults_pass_few_of_those_over_the_target() {
+fn shipped_defaults_pass_few_sections_over_the_target() {
     let text = std::fs::read_to_string(root().join("docs/why/cost/cost.json")).unwrap();
     let results: Results = serde_json::from_str(&text).unwrap();
     let mut told = 0;

@@ -1,4 +1,5 @@
-//! The trade Survey keeps what it promises. That it shows what `headrace plan` says is tested with the program: `tests/tests/sampling/survey.rs`.
+//! Tests that the trade Survey keeps its plans. `tests/tests/sampling/survey.rs` tests that it agrees with `headrace
+//! plan`.
 
 #![allow(clippy::unwrap_used, clippy::panic, reason = "a test stops at what it can't do")]
 
@@ -8,7 +9,7 @@ use headrace_cost::scene::{Inputs, file};
 use headrace_cost::trades::survey;
 
 #[test]
-fn hours_add_up_and_no_true_hole_is_over_the_target_promised() {
+fn hours_add_up_and_true_holes_stay_within_the_planned_target() {
     let text = file("vita1.toml").unwrap();
     let inputs = Inputs { effort: Effort::Quick, kinds: &KINDS, vehicle: Some(("VITA 1", text)) };
     let trade = survey::measure(&inputs, &mut |_| {}).unwrap();
@@ -23,7 +24,7 @@ fn hours_add_up_and_no_true_hole_is_over_the_target_promised() {
             |name: &str| point.errors.iter().find(|error| error.name == name).unwrap().interval.middle;
         let hours = figure("there") + figure("back") + figure("again");
         assert!((point.cost.middle - hours).abs() < 1e-9, "{point:?}");
-        // Promised and kept.
+        // The plan is kept.
         let hole_m = point.errors.iter().find(|error| error.name.starts_with("largest D_true"));
         if let Some(hole_m) = hole_m.filter(|_| !point.method.contains(" m off")) {
             assert!(hole_m.interval.middle <= point.error(), "{point:?}");

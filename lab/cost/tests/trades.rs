@@ -1,4 +1,5 @@
-//! What the trades of `headrace cost` must find, whatever the machine: planted differences, and that what is the same is.
+//! Results that the trades of `headrace cost` must give on any machine: planted differences are found, and equal
+//! settings are equal.
 
 #![allow(clippy::unwrap_used, clippy::panic, reason = "a test stops at what it can't do")]
 
@@ -16,7 +17,7 @@ fn measured(measure: Measure) -> Trade {
     measure(&inputs(), &mut |_| {}).unwrap_or_else(|why| panic!("{why}"))
 }
 
-/// A figure of the one point with this scene, method and value.
+/// A figure of the only point with this scene, method and value.
 fn figure(trade: &Trade, [scene, method, value]: [&str; 3], name: &str) -> f64 {
     let is = |point: &&Point| point.scene.contains(scene) && point.method == method && point.value == value;
     let found: Vec<&Point> = trade.points.iter().filter(is).collect();
@@ -25,7 +26,7 @@ fn figure(trade: &Trade, [scene, method, value]: [&str; 3], name: &str) -> f64 {
     error.unwrap_or_else(|| panic!("{name} of {scene}, {method}, {value}")).interval.middle
 }
 
-/// Each line that has a default has one, and each trade says something.
+/// Asserts that each line with a default has one, and that each trade has advice.
 fn is_whole(trade: &Trade) {
     let defaults = trade.points.iter().filter(|point| point.is_default).count();
     assert!(defaults > 0, "{}: no default", trade.name);
@@ -38,7 +39,7 @@ fn is_whole(trade: &Trade) {
 }
 
 #[test]
-fn the_filter_knows_what_the_cable_does_not_and_each_knob_reaches_it() {
+fn filter_beats_the_cable_and_each_knob_has_an_effect() {
     let trade = measured(navigation::measure);
     is_whole(&trade);
     let of = |scene: &str, value: &str, name: &str| figure(&trade, [scene, "method", value], name);
@@ -50,7 +51,7 @@ fn the_filter_knows_what_the_cable_does_not_and_each_knob_reaches_it() {
     assert!(within("slack cable", "filter, sonar returns") < 60.0, "a cable looser than told shows");
     let slack = |scene: &str| of(scene, "cable only", "displacement between passes");
     assert!(slack("VITA 1, slack") > 2.0 * slack("VITA 1, field"), "a slack three times as large");
-    // What a knob doesn't reach would be the default to the last bit.
+    // A setting without effect would give the default to the last bit.
     let field = |method: &str, value: &str| {
         figure(&trade, ["VITA 1, field", method, value], "position across").to_bits()
     };
@@ -67,7 +68,7 @@ fn the_filter_knows_what_the_cable_does_not_and_each_knob_reaches_it() {
 }
 
 #[test]
-fn ticks_change_no_verdict_and_a_coarse_profile_does_change_the_advice() {
+fn ticks_change_no_verdict_but_coarse_profiles_change_the_advice() {
     let trade = measured(live::measure);
     is_whole(&trade);
     for value in ["1 ms", "5 ms", "20 ms", "50 ms", "100 ms"] {
@@ -88,7 +89,7 @@ fn ticks_change_no_verdict_and_a_coarse_profile_does_change_the_advice() {
 }
 
 #[test]
-fn nothing_left_out_changes_nothing_and_rays_converge() {
+fn leaving_nothing_out_changes_nothing_and_rays_converge() {
     let trade = measured(simulation::measure);
     is_whole(&trade);
     for scene in ["boulders", "small pipe"] {
@@ -116,9 +117,9 @@ fn nothing_left_out_changes_nothing_and_rays_converge() {
     );
 }
 
-/// Sureness has a price: with k standard deviations a hole of T - k (sigma - 2 mm) is planned for.
+/// Confidence has a price: at k standard deviations the plan is for a hole of T - k (sigma - 2 mm).
 #[test]
-fn hours_of_sureness_are_those_of_a_target_that_much_smaller() {
+fn hours_of_confidence_equal_those_of_a_smaller_target() {
     let trade = measured(sureness::measure);
     is_whole(&trade);
     let inputs = inputs();

@@ -1,35 +1,37 @@
-//! What is known of a dive beside its log: plant, pilot, day. From `dives.csv` of the campaign's folder; without one the plant is the
-//! first folder on the log's path, and the day that of the log's clock.
+//! Facts about a dive that aren't in its log: plant, pilot, day.
+//!
+//! They come from `dives.csv` in the campaign's folder. Without that file, the plant is the first folder on the log's
+//! path, and the day that of the log's clock.
 
 use std::collections::BTreeMap;
 
 use crate::error::Error;
 use crate::place::Place;
 
-/// The file's name.
+/// Name of the file.
 pub const FILE: &str = "dives.csv";
 /// Its columns; all but `log` may be missing or empty.
 const COLUMNS: [&str; 4] = ["log", "plant", "pilot", "day"];
 
-/// What is known of a dive beside its log.
+/// Facts about a dive that aren't in its log.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct About {
     /// The plant.
     pub plant: Option<String>,
-    /// Who flew the vehicle.
+    /// The pilot's name.
     pub pilot: Option<String>,
     /// The day, in days since 1970-01-01.
     pub day: Option<i32>,
 }
 
-/// What is known of all dives, by log.
+/// Facts about all dives, by log.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct Abouts(BTreeMap<String, About>);
 
 impl Abouts {
     /// Reads `dives.csv` of a place.
     ///
-    /// Errors: it can't be read; a column or a day is wrong.
+    /// Errors: it can't be read; a column or a day is invalid.
     pub async fn read(place: &Place) -> Result<Self, Error> {
         match place.text(FILE).await? {
             Some(text) => Self::parse(&format!("{}{FILE}", place.url()), &text),
@@ -66,7 +68,7 @@ impl Abouts {
         Ok(Self(all))
     }
 
-    /// What is known of a log; `started_us` is when it began, microseconds of UTC.
+    /// The facts about a log. `started_us` is the log's start, microseconds of UTC.
     pub fn of(&self, log: &str, started_us: Option<i64>) -> About {
         let mut about = self.0.get(log).cloned().unwrap_or_default();
         let folder = log.split_once('/').map(|(folder, _)| folder.to_owned());
@@ -76,13 +78,13 @@ impl Abouts {
         about
     }
 
-    /// Logs of the file that aren't among these.
+    /// Logs named in the file that aren't among `logs`.
     pub fn beyond<'a>(&'a self, logs: &[String]) -> Vec<&'a str> {
         self.0.keys().filter(|log| !logs.contains(log)).map(String::as_str).collect()
     }
 }
 
-/// A day, from ISO 8601.
+/// Parses a day in ISO 8601.
 fn day(text: &str) -> Option<i32> {
     use datafusion::arrow::compute::kernels::cast_utils::Parser as _;
     datafusion::arrow::datatypes::Date32Type::parse(text)
@@ -93,7 +95,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_file_says_more_than_the_path() {
+    fn file_overrides_the_path() {
         let all =
             Abouts::parse("dives.csv", "log, pilot,day\na/x.mcap,Ada,1970-01-03\n\"b,c.mcap\",,\n").unwrap();
         let of = |log: &str, us| all.of(log, us);

@@ -1,8 +1,9 @@
-//! Tables of dives as Parquet files, by program version, parameters and the log's digest.
+//! Caches tables of dives as Parquet files, by program version, parameters and the log's digest.
 //!
-//! `CACHE/VERSION/PARAMETERS/DIVE/sections.parquet`, ... A dive's folder is made beside and renamed, so that it is there as a whole
-//! or not at all, whoever is killed when. Its `whole.json` has the length and digest of each file: what differs is made anew.
-//! `CACHE/known` remembers the digests of logs by path, length and time of writing.
+//! The files are `CACHE/VERSION/PARAMETERS/DIVE/sections.parquet` and so on. A dive's folder is built elsewhere and
+//! then renamed, so it exists completely or not at all, even if a process is killed. Its `whole.json` has the length
+//! and digest of each file; a dive with a differing file is made again. `CACHE/known` stores the digests of logs by
+//! path, length and modification time.
 
 use std::collections::BTreeMap;
 use std::fs::{self, File};
@@ -22,12 +23,12 @@ use crate::place::DiveLog;
 
 /// The list of a dive's files.
 const WHOLE: &str = "whole.json";
-/// Folder for what isn't finished.
+/// Folder for unfinished work.
 const SCRATCH: &str = "unfinished";
 /// Folder of logs' digests.
 const KNOWN: &str = "known";
 
-/// A folder of finished dives. Several processes may use it at a time.
+/// A folder of finished dives. Several processes may use it at the same time.
 #[derive(Debug, Clone)]
 pub struct Cache {
     folder: PathBuf,
@@ -40,21 +41,21 @@ struct Written {
     sha256: String,
 }
 
-/// What is there of a dive.
+/// State of a dive in the cache.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Found {
-    /// All of it, unchanged.
+    /// Complete and unchanged.
     Whole,
-    /// Nothing.
+    /// Not in the cache.
     Nothing,
-    /// Something else than was written: what is wrong.
+    /// Changed since it was written, with the reason.
     Broken(String),
 }
 
 impl Cache {
-    /// A cache in a folder, which is made if it isn't there.
+    /// Opens a cache in a folder, which is created if it doesn't exist.
     ///
-    /// Errors: it can't be made.
+    /// Errors: it can't be created.
     pub fn open(folder: &Path) -> Result<Self, Error> {
         for name in [SCRATCH, KNOWN] {
             let path = folder.join(name);
@@ -69,12 +70,12 @@ impl Cache {
         &self.folder
     }
 
-    /// Where unfinished things go.
+    /// Folder for unfinished work.
     pub fn scratch(&self) -> PathBuf {
         self.folder.join(SCRATCH)
     }
 
-    /// The folder of a dive as replayed by this program.
+    /// The folder of a dive replayed by this program version.
     pub fn dive(&self, parameters: &str, sha256: &str) -> PathBuf {
         self.folder.join(program_version()).join(parameters).join(dive_key(sha256))
     }
@@ -84,7 +85,7 @@ impl Cache {
         dive.join(format!("{table}.parquet"))
     }
 
-    /// Looks at a dive's folder, and reads all of it.
+    /// Checks a dive's folder; reads all of it.
     pub fn look(dive: &Path) -> Found {
         let whole = match fs::read_to_string(dive.join(WHOLE)) {
             Ok(text) => text,
@@ -107,7 +108,7 @@ impl Cache {
         Found::Whole
     }
 
-    /// Keeps a dive's tables; one that is there already stays, whoever has made it.
+    /// Stores a dive's tables, unless another process has already stored them.
     ///
     /// Errors: they can't be written.
     pub fn keep(&self, dive: &Path, tables: &Tables) -> Result<(), Error> {
@@ -130,7 +131,7 @@ impl Cache {
         }
         match fs::rename(beside.path(), dive) {
             Ok(()) => {
-                // It is no longer where it would be removed from.
+                // After the rename, the temporary folder must not be removed any more.
                 let _gone = beside.keep();
                 Ok(())
             }
@@ -139,7 +140,7 @@ impl Cache {
         }
     }
 
-    /// Moves a broken dive's folder out of the way and removes it.
+    /// Moves a broken dive's folder away and removes it.
     ///
     /// Errors: it can't be moved.
     pub fn discard(&self, dive: &Path) -> Result<(), Error> {
@@ -153,13 +154,13 @@ impl Cache {
         }
     }
 
-    /// The digest of a log that was read before and hasn't changed since.
+    /// The stored digest of a log that hasn't changed since.
     pub fn known(&self, place: &str, dive: &DiveLog) -> Option<String> {
         let text = fs::read_to_string(self.known_path(place, dive)).ok()?;
         Some(text).filter(|text| text.len() == 64 && text.bytes().all(|byte| byte.is_ascii_hexdigit()))
     }
 
-    /// Remembers the digest of a log.
+    /// Stores the digest of a log.
     ///
     /// Errors: it can't be written.
     pub fn remember(&self, place: &str, dive: &DiveLog, sha256: &str) -> Result<(), Error> {

@@ -1,4 +1,4 @@
-//! A campaign: the dives of a place, their tables, and a session to ask them in.
+//! A campaign: the dives of a place, their tables, and a session for queries.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -38,13 +38,13 @@ pub struct Campaign {
     pub dives: Vec<DiveLog>,
     /// Parameters of their replays.
     pub parameters: Parameters,
-    /// Makes their tables.
+    /// Makes the tables.
     pub maker: Arc<Maker>,
     threads: usize,
     elsewhere: Option<Elsewhere>,
 }
 
-/// A session that other processes replay and answer for, and a folder that they see, too.
+/// A session that runs in other processes, and a folder that they can access too.
 struct Elsewhere {
     session: SessionContext,
     folder: TempDir,
@@ -56,21 +56,21 @@ impl std::fmt::Debug for Elsewhere {
     }
 }
 
-/// A campaign's dives as made.
+/// The dives of a campaign with their tables.
 #[derive(Debug)]
 pub struct Finished {
-    /// Each dive with its tables; of copies of a log, the first.
+    /// Each dive with its tables. Of several copies of a log only the first is included.
     pub dives: Vec<(DiveLog, Made)>,
-    /// Logs that are copies of another: both paths.
+    /// Logs that are copies of another log: both paths.
     pub copies: Vec<(String, String)>,
-    /// Logs that `dives.csv` names and that aren't among the dives.
+    /// Logs named in `dives.csv` that aren't among the dives.
     pub unknown: Vec<String>,
     /// The table `dives`.
     pub table: RecordBatch,
 }
 
 impl Campaign {
-    /// The dives of a place.
+    /// Opens the dives of a place.
     ///
     /// Errors: a parameter is out of its range; the place can't be listed, or has no logs.
     pub async fn open(
@@ -87,7 +87,7 @@ impl Campaign {
         Ok(Self { place, dives, parameters, maker, threads: threads.max(1), elsewhere: None })
     }
 
-    /// Replays and answers in a session of other processes, which have the same cache.
+    /// Runs replays and queries in a session of other processes, which use the same cache.
     ///
     /// Errors: the cache can't be written.
     pub fn send_to(&mut self, session: SessionContext) -> Result<(), Error> {
@@ -97,7 +97,7 @@ impl Campaign {
         Ok(())
     }
 
-    /// Every `of`-th dive, beginning with number `shard`, from 1.
+    /// Keeps only every `of`-th dive, beginning with number `shard`, from 1.
     pub fn keep_shard(&mut self, shard: usize, of: usize) {
         let mut number = 0;
         self.dives.retain(|_| {
@@ -106,9 +106,9 @@ impl Campaign {
         });
     }
 
-    /// Makes the tables of all dives. `note` hears each that is done.
+    /// Makes the tables of all dives; `note` is called for each finished dive.
     ///
-    /// Errors: the cache can't be written, or `dives.csv` is wrong. A dive that can't be replayed is no error.
+    /// Errors: the cache can't be written, or `dives.csv` is invalid. A dive that can't be replayed isn't an error.
     pub async fn make(&self, note: &mut dyn FnMut(&DiveLog, &Made)) -> Result<Finished, Error> {
         let about = Abouts::read(&self.place).await?;
         let logs: Vec<String> = self.dives.iter().map(|dive| dive.log.clone()).collect();
@@ -153,8 +153,10 @@ impl Campaign {
         Ok(all)
     }
 
-    /// The dives that a session's processes have made, by log: those that the cache hasn't yet. Where a process ends and takes its answers
-    /// with it, what it finished is in the cache; the others are sent again, as long as they become fewer.
+    /// Has a session's processes make the dives that the cache doesn't contain; returns them by log.
+    ///
+    /// If a process ends and loses its answers, its finished dives are in the cache. The others are sent again, as long
+    /// as their number decreases.
     async fn made_by(&self, session: &SessionContext) -> Result<BTreeMap<String, Made>, Error> {
         let (mut made, mut wanted) = self.looked_for(self.dives.clone()).await?;
         self.maker.counts().add(wanted.len(), made.len());
@@ -179,7 +181,7 @@ impl Campaign {
         Ok(made)
     }
 
-    /// What the cache has of these dives, by log, and the others.
+    /// Splits dives into those in the cache, by log, and the others.
     async fn looked_for(&self, dives: Vec<DiveLog>) -> Result<(BTreeMap<String, Made>, Vec<DiveLog>), Error> {
         let looking = dives.into_iter().map(|dive| async move {
             let kept = self.maker.kept(&self.place, &dive, &self.parameters).await?;
@@ -227,7 +229,7 @@ impl Campaign {
         Ok(made)
     }
 
-    /// A dive that others say they have made.
+    /// A dive that another process reports as made.
     ///
     /// Errors: it isn't in this cache.
     fn seen(&self, sha256: &str) -> Result<Made, Error> {
@@ -240,12 +242,12 @@ impl Campaign {
         Ok(Made::Kept { sha256: sha256.to_owned(), folder })
     }
 
-    /// Replays at a time.
+    /// Number of simultaneous replays.
     pub fn threads(&self) -> usize {
         self.threads
     }
 
-    /// What a table of all dives is of.
+    /// Source of a table of all dives.
     pub fn replayed(&self, table: &str) -> Replayed {
         Replayed {
             place: self.place.url().to_string(),
@@ -255,7 +257,7 @@ impl Campaign {
         }
     }
 
-    /// A session with the tables of these dives, those of `before`, and `replay`.
+    /// Creates a session with the tables of these dives, those of version `before`, and `replay`.
     ///
     /// Errors: a table can't be registered.
     pub fn session(&self, finished: &Finished, before: Option<&str>) -> Result<SessionContext, Error> {
@@ -295,7 +297,7 @@ impl Campaign {
         Ok(())
     }
 
-    /// Registers a table of Parquet files, one of each dive's folder.
+    /// Registers a table of Parquet files, one from each dive's folder.
     fn register_files(
         &self,
         session: &SessionContext,
@@ -310,7 +312,8 @@ impl Campaign {
         register_listed(session, name, schema, folders.iter().map(|folder| Cache::table(folder, table)))
     }
 
-    /// Registers rows as a table: those in memory have no meaning to other processes, which take them from a file.
+    /// Registers rows as a table. Other processes can't read this process's memory, so for them the rows are written to
+    /// a file.
     fn register_batch(&self, session: &SessionContext, name: &str, rows: RecordBatch) -> Result<(), Error> {
         let Some(elsewhere) = &self.elsewhere else {
             let table = MemTable::try_new(rows.schema(), vec![vec![rows]])?;
@@ -322,7 +325,7 @@ impl Campaign {
         register_listed(session, name, rows.schema(), std::iter::once(path))
     }
 
-    /// The program version, other than this, by which most dives of these parameters are in the cache.
+    /// The other program version with most dives of these parameters in the cache.
     fn other_version(&self) -> Option<String> {
         let versions = std::fs::read_dir(self.maker.cache().folder()).ok()?.filter_map(Result::ok);
         let counted = versions.filter_map(|entry| {
@@ -333,7 +336,7 @@ impl Campaign {
         counted.max().map(|(_, name)| name)
     }
 
-    /// Folders of the dives as replayed by another version, where the cache has them whole.
+    /// Folders of the dives as replayed by another version, if complete in the cache.
     fn earlier(&self, version: &str, finished: &Finished) -> Vec<PathBuf> {
         let folder = self.maker.cache().folder().join(version).join(self.parameters.digest());
         let kept = finished.dives.iter().filter_map(|(_, made)| match made {
@@ -345,7 +348,7 @@ impl Campaign {
 }
 
 impl Finished {
-    /// Numbers of dives that couldn't be replayed, and that lost data.
+    /// Number of dives that couldn't be replayed, and number that lost data.
     pub fn failures(&self) -> (usize, usize) {
         let codes = self.table.column_by_name("exit_code");
         let codes = codes.and_then(|codes| codes.as_primitive_opt::<Int64Type>());

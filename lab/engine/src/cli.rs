@@ -16,25 +16,25 @@ use headrace_tables::{Parameters, program_version};
 #[cfg(feature = "cluster")]
 mod cluster;
 
-/// What does without a folder.
+/// Options that need no folder.
 #[cfg(feature = "cluster")]
 const NO_FOLDER: [&str; 3] = ["questions", "schedule", "executor"];
 #[cfg(not(feature = "cluster"))]
 const NO_FOLDER: [&str; 1] = ["questions"];
-/// Exit code: success, on all the data.
+/// Exit code: success on all the data.
 const OK: u8 = 0;
-/// Exit code: a question can't be answered.
+/// Exit code: a query can't be answered.
 const FAILED: u8 = 1;
-/// Exit code: a file or an argument is wrong.
+/// Exit code: a file or an argument is invalid.
 const USAGE: u8 = 2;
-/// Exit code: finished, but logs couldn't be replayed, or lost data.
+/// Exit code: finished, but some logs couldn't be replayed, or lost data.
 const DATA_LOST: u8 = 3;
 
 /// Asks the dives of a folder or bucket in SQL. Each is replayed once, and its tables kept.
 #[derive(Debug, Parser)]
 #[command(name = "headrace-campaign", version = program_version(), after_help = "\
 Tables: dives, sections, holes, flags, runs, sources, alerts; the same of another version as before_dives, ...; and the table \
-function replay(log, parameters [, table]). docs/reference/dive-tables.md has their columns.
+function replay(log, parameters [, table]). docs/reference/dive-tables.csv has their columns.
 
 Examples:
   headrace campaign dives/ --question worst --picture worst.svg
@@ -92,7 +92,7 @@ pub(crate) struct Arguments {
     #[cfg(feature = "cluster")]
     #[command(flatten)]
     cluster: cluster::Arguments,
-    /// `headrace batch`: as --shard 1/1 unless that is given.
+    /// Set for `headrace batch`, which acts as --shard 1/1 unless a shard is given.
     #[arg(long, hide = true, requires = "out")]
     batch: bool,
 }
@@ -114,7 +114,7 @@ pub(crate) fn exit_code(error: &Error) -> u8 {
     }
 }
 
-/// Does what is asked; returns the exit code.
+/// Runs the command; returns the exit code.
 pub(crate) fn run(arguments: &Arguments) -> Result<u8, Error> {
     if arguments.questions {
         for question in QUESTIONS {
@@ -126,7 +126,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<u8, Error> {
     let threads = arguments.threads.map_or(cores, usize::from);
     let mut runtime = tokio::runtime::Builder::new_multi_thread();
     runtime.worker_threads(threads).enable_all();
-    // A scheduler goes through plans by recursion.
+    // The scheduler traverses plans recursively.
     #[cfg(feature = "cluster")]
     let runtime = runtime.thread_stack_size(32 << 20);
     let runtime = runtime.build();
@@ -161,7 +161,7 @@ async fn work(arguments: &Arguments, threads: usize) -> Result<u8, Error> {
     here(&campaign, arguments, sql.as_deref()).await
 }
 
-/// On this machine.
+/// Runs on this machine.
 async fn here(campaign: &Campaign, arguments: &Arguments, sql: Option<&str>) -> Result<u8, Error> {
     let finished = make(campaign).await?;
     if let Some(sql) = sql {
@@ -181,7 +181,7 @@ async fn answer(
     let frame = session.sql(sql).await?;
     let schema = Arc::new(frame.schema().as_arrow().clone());
     let batches = frame.collect().await?;
-    // As the batches have it, where there are any: views of texts, and what may be null.
+    // The schema of the batches, if any: it has string views, and which columns may be null.
     let schema = batches.first().map_or(schema, datafusion::arrow::array::RecordBatch::schema);
     if let Some(path) = &arguments.picture {
         let svg = picture::draw(sql, &schema, &batches)?;

@@ -1,5 +1,6 @@
-//! Replays and questions on many machines, by Ballista: its scheduler, its executors and its client, each with a codec that knows
-//! [`ReplayTable`] and [`ReplayExec`]. Nothing here shares out, retries or gathers.
+//! Runs replays and queries on many machines, with Ballista's scheduler, executors and client.
+//!
+//! Each has a codec for [`ReplayTable`] and [`ReplayExec`]. Ballista does the distribution, retries and collection.
 
 use std::net::SocketAddr;
 use std::sync::Arc;
@@ -30,13 +31,13 @@ use crate::error::Error;
 use crate::maker::Maker;
 use crate::provider::{Asked, ReplayExec, ReplayTable, Replayed};
 
-/// What our nodes begin with among those of Ballista.
+/// Prefix of this program's nodes among those of Ballista.
 const OURS: &[u8] = b"headrace ";
-/// An executor that hasn't been heard of for so long is lost, s. One that is busy is heard of every 5 s.
+/// Time after which an executor without a heartbeat is lost, s. A busy executor sends one every 5 s.
 const LOST_AFTER_S: u64 = 15;
-/// How often the scheduler looks for lost executors, s.
+/// Interval at which the scheduler looks for lost executors, s.
 const LOOK_EVERY_S: u64 = 1;
-/// Longest message, bytes: a plan lists all dives, some 300 bytes each.
+/// Longest message, bytes. A plan lists all dives, at about 300 bytes each.
 const MESSAGE_BYTES: u32 = 256 << 20;
 
 /// Runs Ballista's scheduler until it ends.
@@ -63,8 +64,10 @@ pub async fn schedule(address: SocketAddr, maker: Arc<Maker>) -> Result<(), Erro
     start_server(cluster, address, Arc::new(config)).await.map_err(failed)
 }
 
-/// Runs an executor until it is stopped: `threads` tasks at a time for the scheduler at `host`:`port`, which is waited for. Others fetch
-/// results from `address`.
+/// Runs an executor until it is stopped.
+///
+/// It runs `threads` tasks at a time for the scheduler at `host`:`port`, for which it waits. Others fetch results from
+/// `address`.
 ///
 /// Errors: the address can't be listened on, or the scheduler is gone.
 pub async fn execute(
@@ -81,7 +84,7 @@ pub async fn execute(
         port: address.port(),
         scheduler_host: host.to_owned(),
         scheduler_port: port,
-        // Any but 0: it is waited for.
+        // Any value except 0 makes it wait for the scheduler.
         scheduler_connect_timeout_seconds: 60,
         vcores: threads,
         task_scheduling_policy: TaskSchedulingPolicy::PullStaged,
@@ -95,12 +98,12 @@ pub async fn execute(
     start_executor_process(Arc::new(config)).await.map_err(|error| failed(error.to_string()))
 }
 
-/// A session whose plans are run by the executors of a scheduler.
+/// Creates a session whose plans are run by the executors of a scheduler.
 ///
-/// Errors: none but of the engine itself; a scheduler that isn't there is an error of the first question.
+/// Errors: only those of the engine itself. A missing scheduler becomes an error of the first query.
 pub fn session(scheduler: &str, maker: Arc<Maker>) -> Result<SessionContext, Error> {
     let config = SessionConfig::new_with_ballista()
-        // Dives take different times: a task of several would wait for the longest.
+        // Dives take different times: a task of several dives would wait for the longest.
         .set_usize(BALLISTA_SCHEDULER_MAX_PARTITIONS_PER_TASK, 1)
         .with_ballista_grpc_client_max_message_size(MESSAGE_BYTES as usize)
         .with_ballista_logical_extension_codec(Arc::new(Codec::new(maker)));
@@ -108,7 +111,7 @@ pub fn session(scheduler: &str, maker: Arc<Maker>) -> Result<SessionContext, Err
     Ok(SessionContext::new_with_state(state.upgrade_for_ballista(format!("http://{scheduler}"))?))
 }
 
-/// Our table and our plan node as bytes, and Ballista's own.
+/// Encodes this program's table and plan node, and delegates the rest to Ballista.
 #[derive(Debug)]
 struct Codec {
     maker: Arc<Maker>,
@@ -126,14 +129,14 @@ impl Codec {
     }
 }
 
-/// Appends one of our own, with this program's version.
+/// Appends one of this program's nodes, with the program's version.
 fn encode(what: &impl Serialize, bytes: &mut Vec<u8>) -> Result<()> {
     bytes.extend_from_slice(OURS);
     let with_version = (program_version(), what);
     serde_json::to_writer(bytes, &with_version).map_err(|error| DataFusionError::External(Box::new(error)))
 }
 
-/// One of our own, if it is; tables of another version are others.
+/// Decodes one of this program's nodes, if it is one. A node of another version is an error.
 fn decode<T: DeserializeOwned>(bytes: &[u8]) -> Result<Option<T>> {
     let Some(text) = bytes.strip_prefix(OURS) else { return Ok(None) };
     let external = |error| DataFusionError::External(Box::new(error));

@@ -1,4 +1,5 @@
-//! The table `dives` of a campaign: what each dive says, under the path that its log has here, and what else is known of it.
+//! The table `dives` of a campaign: each dive's own row, with its path in this place and the facts from outside the
+//! log.
 
 use std::sync::Arc;
 
@@ -33,7 +34,7 @@ pub fn dives_schema() -> SchemaRef {
     Arc::new(Schema::new(all))
 }
 
-/// The table `dives`: what each dive says, under the path that its log has here, and what else is known of it.
+/// Makes the table `dives`: each dive's own row, with its path in this place and the facts from outside the log.
 pub(crate) async fn dives_table(dives: &[(DiveLog, Made)], about: &Abouts) -> Result<RecordBatch, Error> {
     let Some(own) = schema("dives") else {
         return Err(DataFusionError::Internal("no dives".to_owned()).into());

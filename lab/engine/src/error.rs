@@ -1,30 +1,30 @@
-//! Why a campaign can't go on. A log that can't be replayed is no such reason: it is a row of `dives`.
+//! Errors that stop a campaign. A log that can't be replayed isn't one: it is a row of `dives`.
 
 use std::path::{Path, PathBuf};
 
 use datafusion::error::DataFusionError;
 
-/// Why a campaign can't go on.
+/// An error that stops a campaign.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
-    /// The folder or URL isn't one.
+    /// Not a valid folder or URL.
     #[error("opening {place}: {why}")]
     Place {
         /// As given.
         place: String,
-        /// Why not.
+        /// The reason.
         why: String,
     },
-    /// There is no log in it.
+    /// The place contains no log.
     #[error("looking for logs (*.mcap) in {0}: there are none")]
     NoLogs(String),
     /// A store can't be listed or read.
     #[error("reading {what}: {source}")]
     Store {
-        /// What of it.
+        /// The item read.
         what: String,
-        /// What the store says.
+        /// Error of the store.
         source: object_store::Error,
     },
     /// A file can't be read or written.
@@ -37,20 +37,20 @@ pub enum Error {
         /// Cause.
         source: std::io::Error,
     },
-    /// `dives.csv` of the folder is wrong.
+    /// `dives.csv` of the folder is invalid.
     #[error("{file}:{line}: {why}")]
     About {
         /// The file.
         file: String,
         /// The line, from 1.
         line: usize,
-        /// What is wrong, and what is allowed.
+        /// The problem, and the allowed values.
         why: String,
     },
-    /// A parameter is wrong, or a table can't be made.
+    /// A parameter is invalid, or a table can't be made.
     #[error(transparent)]
     Tables(#[from] headrace_tables::Error),
-    /// A question can't be answered.
+    /// A query can't be answered.
     #[error("{0}")]
     Query(#[from] DataFusionError),
     /// A Parquet file can't be written or read.
@@ -60,10 +60,10 @@ pub enum Error {
         doing: &'static str,
         /// The file.
         path: PathBuf,
-        /// What Parquet says.
+        /// Error of Parquet.
         source: datafusion::parquet::errors::ParquetError,
     },
-    /// An argument is wrong.
+    /// An argument is invalid.
     #[error("{0}")]
     Usage(String),
 }

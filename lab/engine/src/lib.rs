@@ -1,4 +1,6 @@
-//! Campaigns: the dives of a folder or bucket, replayed once each and asked in SQL. `docs/how-to/replay-many-dives.md` is its manual.
+//! Campaigns: the dives of a folder or bucket, replayed once each and queried in SQL.
+//!
+//! The manual is `docs/how-to/replay-many-dives.md`.
 
 pub mod about;
 pub mod cache;

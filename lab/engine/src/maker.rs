@@ -1,4 +1,4 @@
-//! Makes a dive's tables: takes them from the cache, or replays the log and keeps them.
+//! Makes a dive's tables: takes them from the cache, or replays the log and stores them.
 
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -13,7 +13,7 @@ use crate::cache::{Cache, Found};
 use crate::error::{Error, of_file};
 use crate::place::{DiveLog, Place};
 
-/// Makes tables, at most so many dives at a time.
+/// Makes tables, with a limited number of simultaneous replays.
 #[derive(Debug)]
 pub struct Maker {
     cache: Cache,
@@ -21,7 +21,7 @@ pub struct Maker {
     counts: Arc<Counts>,
 }
 
-/// What a maker has done so far.
+/// Counts of a maker's work.
 #[derive(Debug, Default)]
 pub struct Counts {
     replayed: AtomicU64,
@@ -35,7 +35,7 @@ impl Counts {
         self.replayed.load(Ordering::Relaxed)
     }
 
-    /// Counts dives that others have replayed into the same cache, and that were found there.
+    /// Counts dives found in the cache after other processes replayed them.
     pub fn add(&self, replayed: usize, cached: usize) {
         self.replayed.fetch_add(replayed as u64, Ordering::Relaxed);
         self.cached.fetch_add(cached as u64, Ordering::Relaxed);
@@ -46,7 +46,7 @@ impl Counts {
         self.cached.load(Ordering::Relaxed)
     }
 
-    /// Dives that the cache had broken, and that were made anew.
+    /// Dives that were broken in the cache and were made again.
     pub fn broken(&self) -> u64 {
         self.broken.load(Ordering::Relaxed)
     }
@@ -55,19 +55,19 @@ impl Counts {
 /// A dive's tables.
 #[derive(Debug, Clone)]
 pub enum Made {
-    /// In the cache: the log's SHA-256, and the folder.
+    /// In the cache.
     Kept {
         /// SHA-256 of the log.
         sha256: String,
         /// Folder of its Parquet files.
         folder: PathBuf,
     },
-    /// None: the log can't be read or replayed. A row of `dives` says why.
+    /// No tables, since the log can't be read or replayed. The row of `dives` gives the reason.
     Unread(Arc<Tables>),
 }
 
 impl Maker {
-    /// With a cache, for `threads` replays at a time.
+    /// Creates a maker with a cache, for `threads` simultaneous replays.
     pub fn new(cache: Cache, threads: usize) -> Self {
         Self { cache, threads: Arc::new(Semaphore::new(threads.max(1))), counts: Arc::default() }
     }
@@ -77,14 +77,15 @@ impl Maker {
         &self.cache
     }
 
-    /// What it has done so far.
+    /// Counts of its work so far.
     pub fn counts(&self) -> &Counts {
         &self.counts
     }
 
-    /// Makes a dive's tables, or finds them in the cache. Waits for one of the threads.
+    /// Makes a dive's tables, or finds them in the cache; waits for a free thread.
     ///
-    /// Errors: the cache can't be written, or the store not be read. A log that can't be replayed is [`Made::Unread`].
+    /// Errors: the cache can't be written, or the store can't be read. A log that can't be replayed is
+    /// [`Made::Unread`].
     pub async fn make(&self, place: &Place, dive: &DiveLog, parameters: &Parameters) -> Result<Made, Error> {
         let _turn = self.turn().await?;
         let url = place.url().to_string();
@@ -136,9 +137,11 @@ impl Maker {
         Ok(Made::Kept { sha256, folder })
     }
 
-    /// A dive's tables, if its log was read before and the cache has them; not counted. Waits for one of the threads.
+    /// A dive's tables, if its log's digest is known and the cache has them.
     ///
-    /// Errors: what is broken there can't be removed.
+    /// Waits for a free thread. The dive isn't counted.
+    ///
+    /// Errors: a broken dive in the cache can't be removed.
     pub async fn kept(
         &self,
         place: &Place,
@@ -156,7 +159,7 @@ impl Maker {
         self.threads.acquire().await.map_err(|error| Error::Usage(error.to_string()))
     }
 
-    /// A dive that the cache has; one that it has broken is removed.
+    /// Finds a dive in the cache; removes a broken one.
     async fn find(&self, sha256: String, parameters: &Parameters) -> Result<Option<Made>, Error> {
         let folder = self.cache.dive(&parameters.digest(), &sha256);
         let looked = folder.clone();
@@ -174,7 +177,7 @@ impl Maker {
 }
 
 impl Made {
-    /// A table, read from the cache.
+    /// Reads a table from the cache.
     ///
     /// Errors: it can't be read.
     pub async fn table(&self, table: &'static str) -> Result<Vec<RecordBatch>, Error> {
@@ -195,7 +198,7 @@ impl Made {
     }
 }
 
-/// A dive that can't be read or replayed.
+/// The tables of a dive that can't be read or replayed.
 ///
 /// Errors: its row can't be made.
 pub(crate) fn unread_dive(
@@ -207,7 +210,7 @@ pub(crate) fn unread_dive(
     Ok(Made::Unread(Arc::new(unread(&dive.log, sha256, parameters, error)?)))
 }
 
-/// Runs what takes long on a thread of its own; a panic there is an error here.
+/// Runs long work on its own thread; a panic there becomes an error.
 async fn blocking<T: Send + 'static>(work: impl FnOnce() -> T + Send + 'static) -> Result<T, Error> {
     tokio::task::spawn_blocking(work)
         .await

@@ -1,4 +1,4 @@
-//! Answers: on the terminal, or as a file by its ending.
+//! Writes answers: to the terminal, or to a file in the format of its extension.
 
 use std::fs::File;
 use std::io::Write as _;
@@ -15,10 +15,10 @@ use datafusion::parquet::arrow::ArrowWriter;
 
 use crate::error::{Error, of_file};
 
-/// Endings that [`write`] knows.
+/// File extensions that [`write`] supports.
 pub const ENDINGS: [&str; 3] = ["csv", "json", "parquet"];
 
-/// An answer as people read it.
+/// Formats an answer as a text table.
 ///
 /// Errors: a value can't be shown.
 pub fn pretty(answer: &[RecordBatch]) -> Result<String, Error> {
@@ -26,7 +26,7 @@ pub fn pretty(answer: &[RecordBatch]) -> Result<String, Error> {
     Ok(shown.to_string())
 }
 
-/// Whether [`write`] knows a path's ending.
+/// Checks that [`write`] supports a path's extension.
 ///
 /// Errors: it doesn't.
 pub fn check(path: &Path) -> Result<(), Error> {
@@ -37,9 +37,9 @@ pub fn check(path: &Path) -> Result<(), Error> {
     Err(Error::Usage(format!("--out {}: expected an ending of .{}", path.display(), ENDINGS.join(", ."))))
 }
 
-/// Writes an answer: CSV, JSON in lines, or Parquet, by the path's ending.
+/// Writes an answer as CSV, JSON lines or Parquet, by the path's extension.
 ///
-/// Errors: the ending is another, or the file can't be written.
+/// Errors: the extension isn't supported, or the file can't be written.
 pub fn write(path: &Path, schema: &SchemaRef, answer: &[RecordBatch]) -> Result<(), Error> {
     check(path)?;
     let mut file = File::create(path).map_err(of_file("writing", path))?;
@@ -68,14 +68,14 @@ pub fn write(path: &Path, schema: &SchemaRef, answer: &[RecordBatch]) -> Result<
     file.flush().map_err(of_file("writing", path))
 }
 
-/// The text of a column's first row.
+/// The text in a column's first row.
 pub fn only_text(array: &datafusion::arrow::array::ArrayRef) -> Option<String> {
     use datafusion::arrow::array::{Array as _, cast::AsArray as _};
     let texts = array.as_string_opt::<i32>()?;
     (!texts.is_empty() && texts.is_valid(0)).then(|| texts.value(0).to_owned())
 }
 
-/// The count of a column's first row.
+/// The integer in a column's first row.
 pub fn only_count(array: &datafusion::arrow::array::ArrayRef) -> Option<i64> {
     use datafusion::arrow::array::{Array as _, cast::AsArray as _, types::Int64Type};
     let counts = array.as_primitive_opt::<Int64Type>()?;

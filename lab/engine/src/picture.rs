@@ -1,4 +1,6 @@
-//! Pictures of answers. A question's comment `-- picture: KIND key=column ...` says what is drawn:
+//! Draws answers.
+//!
+//! A question's comment `-- picture: KIND key=column ...` selects the drawing:
 //!
 //! - `bars label=L NAME=COLUMN ...`: a bar for each row and column;
 //! - `strips x=FROM to=TO row=R colour=C`: stretches of chainage, a row for each value of `R`, coloured by verdict.
@@ -17,7 +19,7 @@ use headrace_pictures::polyline::Frame;
 
 use crate::error::Error;
 
-/// Rows that are drawn at most; the rest is counted below.
+/// Maximum number of rows that are drawn; the number of further rows is stated below.
 const MOST_ROWS: usize = 60;
 /// Widest label, pixels.
 const LABEL_PX: f64 = 260.0;
@@ -32,7 +34,7 @@ const VERDICTS: [(&str, Colour); 4] = [
 
 /// Draws an answer as the SQL's comment says.
 ///
-/// Errors: the comment is wrong, names a column that isn't there, or there is none.
+/// Errors: there is no such comment, it is invalid, or it names a column that doesn't exist.
 pub fn draw(sql: &str, schema: &SchemaRef, answer: &[RecordBatch]) -> Result<String, Error> {
     let title = sql.lines().next().unwrap_or_default().trim_start_matches("--").trim();
     let rest = sql.lines().find_map(|line| line.trim().strip_prefix("-- picture:"));
@@ -55,7 +57,7 @@ pub fn draw(sql: &str, schema: &SchemaRef, answer: &[RecordBatch]) -> Result<Str
     }
 }
 
-/// An answer and the columns that play a part.
+/// An answer and the columns used for the drawing.
 struct Answer<'a> {
     table: RecordBatch,
     keys: Vec<(&'a str, &'a str)>,
@@ -78,7 +80,7 @@ impl Answer<'_> {
         Ok(array.as_string::<i32>().iter().map(|text| text.unwrap_or("-").to_owned()).collect())
     }
 
-    /// Numbers; null is not a number.
+    /// Numbers of a column; null becomes NaN.
     fn numbers(array: &ArrayRef) -> Result<Vec<f64>, Error> {
         let array = cast(array, &DataType::Float64).map_err(DataFusionError::from)?;
         let numbers = array.as_primitive::<Float64Type>();
@@ -88,7 +90,7 @@ impl Answer<'_> {
     }
 }
 
-/// A label that fits.
+/// A label shortened to fit.
 fn fitting(text: &str) -> String {
     let mut text = text.to_owned();
     while width_px(&text, NORMAL) > LABEL_PX && text.pop().is_some() {}

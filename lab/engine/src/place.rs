@@ -1,4 +1,4 @@
-//! Where the logs are: a folder, or a bucket of an object store.
+//! The location of the logs: a folder, or a bucket of an object store.
 
 use std::collections::BTreeMap;
 use std::io::Write as _;
@@ -15,43 +15,43 @@ use url::Url;
 
 use crate::error::{Error, of_file};
 
-/// Highest number that a part of a recording is looked for by.
+/// Highest part number that is recognised in a file name.
 const MOST_PARTS: u32 = 999;
 
-/// A folder of logs, here or in an object store.
+/// A folder of logs, on this machine or in an object store.
 #[derive(Debug, Clone)]
 pub struct Place {
-    /// As a URL, ending in `/`.
+    /// Its URL, ending in `/`.
     url: Url,
     store: Arc<dyn ObjectStore>,
     prefix: StorePath,
-    /// The folder, where it is one of this machine.
+    /// The folder, if it is on this machine.
     folder: Option<PathBuf>,
 }
 
 /// A dive of a campaign: a log, or the parts of a recording in order.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct DiveLog {
-    /// Path of the log below the place; of a recording in parts, of the recording.
+    /// Path of the log below the place; for a recording in parts, that of the recording.
     pub log: String,
     /// Its files.
     pub parts: Vec<Part>,
 }
 
-/// A file of a dive, and what changes when its content does.
+/// A file of a dive, with attributes that change with its content.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Part {
-    /// Path below the place, as its store has it.
+    /// Path below the place, as in its store.
     pub path: String,
     /// Its length.
     pub bytes: u64,
-    /// When it was last written, microseconds of UTC.
+    /// Time of the last modification, microseconds of UTC.
     pub modified_us: i64,
-    /// The store's own mark of its content.
+    /// The store's own tag of its content.
     pub e_tag: Option<String>,
 }
 
-/// The files of a dive on this machine, and their copy's folder, which goes with this.
+/// The files of a dive on this machine. Dropping this removes copied files.
 pub struct Fetched {
     /// The files in order.
     pub files: Vec<PathBuf>,
@@ -59,9 +59,11 @@ pub struct Fetched {
 }
 
 impl Place {
-    /// A folder, or `s3://BUCKET/PREFIX`, whose keys and endpoint are those of the environment (`AWS_ACCESS_KEY_ID`, ...).
+    /// Opens a folder, or `s3://BUCKET/PREFIX`.
     ///
-    /// Errors: the folder isn't there; the URL isn't one, or of no store that is known.
+    /// Keys and endpoint of a bucket come from the environment (`AWS_ACCESS_KEY_ID`, ...).
+    ///
+    /// Errors: the folder doesn't exist; the URL is invalid, or its store isn't supported.
     pub fn open(text: &str) -> Result<Self, Error> {
         let failed = |why: String| Error::Place { place: text.to_owned(), why };
         let mut folder = None;
@@ -117,7 +119,7 @@ impl Place {
         Ok(grouped(parts))
     }
 
-    /// A small text file below it; `None` if it isn't there.
+    /// A small text file below the place; `None` if it doesn't exist.
     ///
     /// Errors: it can't be read.
     pub async fn text(&self, name: &str) -> Result<Option<String>, Error> {
@@ -134,9 +136,11 @@ impl Place {
         text.map(Some).map_err(|_| Error::Place { place: what, why: "isn't UTF-8 text".to_owned() })
     }
 
-    /// The files of a dive on this machine: themselves, or copies in a folder of `scratch` that lives as long as the answer.
+    /// Gets the files of a dive on this machine: the files themselves, or copies in a folder of `scratch`.
     ///
-    /// Errors: they can't be read, or the copy not be written.
+    /// Copies last as long as the returned value.
+    ///
+    /// Errors: they can't be read, or the copy can't be written.
     pub async fn fetch(&self, dive: &DiveLog, scratch: &Path) -> Result<Fetched, Error> {
         if let Some(folder) = &self.folder {
             let files = dive.parts.iter().map(|part| folder.join(plain(&part.path)));
@@ -146,7 +150,7 @@ impl Place {
         let mut files = Vec::new();
         for (number, part) in dive.parts.iter().enumerate() {
             let failed = |source| Error::Store { what: format!("{}{}", self.url, part.path), source };
-            // Names of parts matter to nobody here, and paths of a store may be none of this machine's.
+            // The names of parts don't matter here, and paths of a store may not be valid on this machine.
             let path = copy.path().join(format!("{number:03}.mcap"));
             let mut file = std::fs::File::create(&path).map_err(of_file("writing", &path))?;
             let location = self.location(&part.path).map_err(failed)?;
@@ -159,19 +163,21 @@ impl Place {
         Ok(Fetched { files, _copy: Some(copy) })
     }
 
-    /// Errors: none for a path that was listed.
+    /// Path in the store.
+    ///
+    /// Errors: none for a listed path.
     fn location(&self, below: &str) -> Result<StorePath, object_store::Error> {
         let slash = if self.prefix.as_ref().is_empty() { "" } else { "/" };
         Ok(StorePath::parse(format!("{}{slash}{below}", self.prefix))?)
     }
 }
 
-/// A path as people write it: stores encode some characters.
+/// A path as people write it; stores encode some characters.
 fn plain(path: &str) -> String {
     percent_decode_str(path).decode_utf8_lossy().into_owned()
 }
 
-/// Files as dives: the parts of a recording are one.
+/// Groups files into dives; the parts of a recording are one dive.
 fn grouped(parts: BTreeMap<String, Part>) -> Vec<DiveLog> {
     let mut dives: BTreeMap<String, Vec<(u32, Part)>> = BTreeMap::new();
     for (path, part) in parts {

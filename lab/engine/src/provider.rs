@@ -25,7 +25,7 @@ use serde::{Deserialize, Serialize};
 use crate::maker::Maker;
 use crate::place::{DiveLog, Place};
 
-/// What a table is of; can be sent to another process.
+/// The content of a replay table; can be sent to another process.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Replayed {
     /// URL of the place.
@@ -34,7 +34,7 @@ pub struct Replayed {
     pub dives: Vec<DiveLog>,
     /// Parameters of their replays.
     pub parameters: Parameters,
-    /// The table of [`TABLES`].
+    /// Name of the table, one of [`TABLES`].
     pub table: String,
 }
 
@@ -50,7 +50,7 @@ impl Replayed {
         Ok(found)
     }
 
-    /// A plan that lists the dives, one in each partition.
+    /// A plan that lists the dives, one per partition.
     fn listed(&self) -> Result<Arc<dyn ExecutionPlan>> {
         let schema = Arc::new(Schema::new(vec![Field::new("dive", DataType::Utf8, false)]));
         let partition = |dive: &DiveLog| {
@@ -63,7 +63,7 @@ impl Replayed {
     }
 }
 
-/// A table of dives that are replayed, or taken from the cache, when it is read.
+/// A table whose dives are replayed, or taken from the cache, when it is read.
 #[derive(Debug)]
 pub struct ReplayTable {
     maker: Arc<Maker>,
@@ -72,7 +72,7 @@ pub struct ReplayTable {
 }
 
 impl ReplayTable {
-    /// Over these dives.
+    /// Creates the table of these dives.
     ///
     /// Errors: there is no such table.
     pub fn new(maker: Arc<Maker>, replayed: Replayed) -> Result<Self> {
@@ -80,7 +80,7 @@ impl ReplayTable {
         Ok(Self { maker, replayed, schema })
     }
 
-    /// What it is of.
+    /// The content of the table.
     pub fn replayed(&self) -> &Replayed {
         &self.replayed
     }
@@ -111,17 +111,19 @@ impl TableProvider for ReplayTable {
     }
 }
 
-/// What is asked of each dive that a plan lists; can be sent to another process.
+/// The request for each dive that a plan lists; can be sent to another process.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Asked {
-    /// Table and parameters; its list of dives is empty, they come from below.
+    /// Table and parameters. Its list of dives is empty, since the dives come from the input plan.
     pub replayed: Replayed,
-    /// The columns that are wanted, all without them.
+    /// The requested columns; `None` means all.
     pub projection: Option<Vec<usize>>,
 }
 
-/// Replays the dives that the plan below lists, in the partition that lists them. A node with one below rather than a leaf: an engine
-/// that shares the partitions of a plan out among machines knows how to divide a list, and nothing of replays.
+/// Replays the dives that its input plan lists, partition by partition.
+///
+/// It has an input instead of being a leaf, because a distributing engine knows how to divide a list but nothing of
+/// replays.
 #[derive(Debug)]
 pub struct ReplayExec {
     maker: Arc<Maker>,
@@ -132,7 +134,7 @@ pub struct ReplayExec {
 }
 
 impl ReplayExec {
-    /// Of the dives that `listed` has as JSON texts.
+    /// Creates the node for the dives that `listed` has as JSON texts.
     ///
     /// Errors: there is no such table or column.
     pub fn new(
@@ -155,7 +157,7 @@ impl ReplayExec {
         Ok(Self { maker, asked, table, listed, properties: Arc::new(properties) })
     }
 
-    /// What is asked of each dive.
+    /// The request for each dive.
     pub fn asked(&self) -> &Asked {
         &self.asked
     }
@@ -180,7 +182,7 @@ impl ExecutionPlan for ReplayExec {
         vec![&self.listed]
     }
 
-    /// The list is divided as it is to be.
+    /// The list is already divided as required.
     fn benefits_from_input_partitioning(&self) -> Vec<bool> {
         vec![false]
     }
@@ -214,7 +216,7 @@ impl ExecutionPlan for ReplayExec {
                 let batches = made.map_err(|error| external(error.into()))?.table(table).await;
                 let batches = batches.map_err(|error| external(error.into()))?.into_iter();
                 let wanted = batches.map(|batch| {
-                    // A copy's tables have the path of the log that was replayed.
+                    // The tables of a copy contain the path of the replayed log.
                     let batch = if table == "dives" { under_path(&batch, &dive.log)? } else { batch };
                     match &asked.projection {
                         None => Ok(batch),
@@ -228,7 +230,7 @@ impl ExecutionPlan for ReplayExec {
     }
 }
 
-/// The dives that a batch of [`Replayed::listed`] has.
+/// The dives in a batch of [`Replayed::listed`].
 fn listed_dives(batch: &RecordBatch) -> Vec<Result<DiveLog>> {
     let texts = batch.columns().first().and_then(|column| column.as_string_opt::<i32>());
     let parsed = texts.into_iter().flatten().flatten().map(serde_json::from_str);
@@ -252,13 +254,15 @@ fn external(error: Box<dyn std::error::Error + Send + Sync>) -> DataFusionError 
     DataFusionError::External(error)
 }
 
-/// The table function `replay(log, parameters [, table])`: `log` as the column `log` of `dives` has it, or `*` for all of them;
-/// `parameters` as JSON, or as `target_m=0.3`; `table` is `sections` if it isn't given.
+/// The table function `replay(log, parameters [, table])`.
+///
+/// `log` is a value of the column `log` of `dives`, or `*` for all. `parameters` is JSON, or `target_m=0.3`. `table`
+/// defaults to `sections`.
 #[derive(Debug)]
 pub struct ReplayFunction {
     /// Makes the tables.
     pub maker: Arc<Maker>,
-    /// The dives of the campaign, and the parameters that hold where none are given.
+    /// The dives of the campaign, and the default parameters.
     pub all: Replayed,
 }
 
@@ -297,7 +301,7 @@ impl TableFunctionImpl for ReplayFunction {
     }
 }
 
-/// Parameters with some of them replaced: a JSON object, or `key=value` with commas.
+/// Overrides some parameters: a JSON object, or `key=value` separated by commas.
 fn overridden(base: &Parameters, text: &str) -> Result<Parameters> {
     let external = |error: serde_json::Error| DataFusionError::Plan(format!("parameters {text:?}: {error}"));
     let mut all = serde_json::to_value(base).map_err(external)?;
@@ -327,7 +331,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn parameters_are_taken_as_json_and_as_pairs() {
+    fn parameters_are_read_from_json_and_from_pairs() {
         let base = Parameters { target_m: Some(1.0), ..Parameters::default() };
         assert_eq!(overridden(&base, "").unwrap(), base);
         let both = Parameters { target_m: Some(0.3), section_m: Some(0.5), ..Parameters::default() };

@@ -1,6 +1,6 @@
-//! Questions ready to ask.
+//! Ready-made questions.
 
-/// A question: its name, and its SQL, whose first comments say what it asks.
+/// A question: its name, and its SQL, whose first comments describe it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Question {
     /// Its name.
@@ -9,7 +9,7 @@ pub struct Question {
     pub sql: &'static str,
 }
 
-/// All of them, of `campaign/questions`.
+/// All questions of `lab/questions`.
 pub const QUESTIONS: [Question; 5] = [
     Question { name: "years", sql: include_str!("../../questions/years.sql") },
     Question { name: "target", sql: include_str!("../../questions/target.sql") },
@@ -19,12 +19,12 @@ pub const QUESTIONS: [Question; 5] = [
 ];
 
 impl Question {
-    /// The question of a name.
+    /// Finds a question by its name.
     pub fn find(name: &str) -> Option<Self> {
         QUESTIONS.into_iter().find(|question| question.name == name)
     }
 
-    /// What it asks: the first line.
+    /// Its description: the first line of the SQL.
     pub fn about(&self) -> &'static str {
         self.sql.lines().next().unwrap_or_default().trim_start_matches("--").trim()
     }

@@ -1,4 +1,4 @@
-//! The program over small simulated dives: the golden logs.
+//! Tests the program on small simulated dives: the golden logs.
 
 #![allow(clippy::unwrap_used, clippy::panic, reason = "a test fails by them")]
 
@@ -80,7 +80,7 @@ fn finished(cache: &Path) -> usize {
 }
 
 #[test]
-fn threads_shards_and_asking_again_give_the_same_tables() {
+fn threads_shards_and_repeated_runs_give_the_same_tables() {
     let (folder, scratch) = (dives(), tempfile::tempdir().unwrap());
     let cache = |name: &str| scratch.path().join(name);
     let one = run(folder.path(), &cache("one"), &["--threads", "1"]);
@@ -105,7 +105,7 @@ fn threads_shards_and_asking_again_give_the_same_tables() {
         }
     }
     assert!(union == all, "the shards aren't the whole");
-    // Shards put together are a cache.
+    // Shards merged together form a cache.
     let moved = cache("1-2").join(headrace_tables::program_version());
     let copied = Command::new("cp").arg("-r").arg(&moved).arg(cache("2-2")).status().unwrap();
     assert!(copied.success());
@@ -114,7 +114,7 @@ fn threads_shards_and_asking_again_give_the_same_tables() {
 }
 
 #[test]
-fn sql_says_what_reports_say() {
+fn sql_matches_reports() {
     let (folder, cache) = (dives(), tempfile::tempdir().unwrap());
     let sql = "SELECT d.log, d.plant, d.digest, s.chainage_m, s.verdict, s.d_m FROM sections s JOIN dives d ON s.dive = d.dive \
                ORDER BY d.log, s.chainage_m";
@@ -184,7 +184,7 @@ fn a_log_that_cannot_be_read_is_a_row() {
     let sql = "SELECT log, exit_code, losses, error FROM dives ORDER BY log";
     let (rows, last) = ask(folder.path(), cache.path(), sql, &[]);
     assert_eq!(rows.len(), 7);
-    // What can't be replayed is tried again.
+    // A log that can't be replayed is tried again.
     assert!(last.starts_with("7 dives: 1 replayed, 7 from the cache; 1 unreadable, 1 with"), "{last}");
     let of = |log: &str| rows.iter().find(|row| row["log"] == log).unwrap();
     assert_eq!(of("no-log.mcap")["exit_code"], 2);
@@ -192,14 +192,14 @@ fn a_log_that_cannot_be_read_is_a_row() {
     assert_eq!(of("rosone/cut.mcap")["exit_code"], 3);
     assert!(of("rosone/cut.mcap")["losses"].as_i64().unwrap() > 0);
     assert_eq!(of("rosone/stalls.mcap")["exit_code"], 0);
-    // Of a copy, too, the table function has the path.
+    // The table function also gives the path of a copy.
     let (logs, _) =
         ask(folder.path(), cache.path(), "SELECT DISTINCT log FROM replay('*', '', 'dives')", &[]);
     assert_eq!(logs.len(), 8);
 }
 
 #[test]
-fn kill_9_loses_no_finished_dive() {
+fn sigkill_loses_no_finished_dive() {
     let (folder, cache) = (dives(), tempfile::tempdir().unwrap());
     let mut running = program(folder.path(), cache.path(), &["--threads", "1"]).spawn().unwrap();
     while finished(cache.path()) == 0 {
@@ -220,13 +220,13 @@ fn kill_9_loses_no_finished_dive() {
 }
 
 #[test]
-fn a_broken_cache_is_found_and_made_anew() {
+fn broken_cache_entries_are_found_and_remade() {
     let (folder, cache) = (dives(), tempfile::tempdir().unwrap());
     run(folder.path(), cache.path(), &[]);
     let all = files(cache.path());
     let below = |path: &Path| cache.path().join(headrace_tables::program_version()).join(path);
     let sections: Vec<&PathBuf> = all.keys().filter(|path| path.ends_with("sections.parquet")).collect();
-    // A bit in the middle, a file cut short, a file that is gone.
+    // A changed bit, a truncated file, and a deleted file.
     let mut flipped = all[sections[0]].clone();
     let middle = flipped.len() / 2;
     flipped[middle] ^= 1;
@@ -246,7 +246,7 @@ fn a_broken_cache_is_found_and_made_anew() {
 }
 
 #[test]
-fn a_changed_log_is_another_dive() {
+fn changed_log_is_a_new_dive() {
     let (folder, cache) = (dives(), tempfile::tempdir().unwrap());
     run(folder.path(), cache.path(), &[]);
     std::fs::copy(golden("echoes.mcap"), folder.path().join("ceran/murk.mcap")).unwrap();
@@ -259,7 +259,7 @@ fn every_question_has_an_answer_and_a_picture() {
     let (folder, cache) = (dives(), tempfile::tempdir().unwrap());
     let about = "log,plant,pilot,day\nceran/murk.mcap,Ceran,Ada,2020-05-01\nrosone/stalls.mcap,Ceran,Ben,2024-06-02\n";
     std::fs::write(folder.path().join("dives.csv"), about).unwrap();
-    // As if another program had replayed them: one of them otherwise.
+    // Imitates another program version that replayed the dives, one of them with another result.
     run(folder.path(), cache.path(), &[]);
     let now = cache.path().join(headrace_tables::program_version());
     let before = cache.path().join("0.0.1+earlier");
@@ -301,7 +301,7 @@ fn every_question_has_an_answer_and_a_picture() {
 }
 
 #[test]
-fn what_is_wrong_is_named() {
+fn invalid_requests_are_named() {
     let (folder, cache) = (dives(), tempfile::tempdir().unwrap());
     let refused = |folder: &Path, arguments: &[&str], code: i32, why: &str| {
         let output = run(folder, cache.path(), arguments);

@@ -1,4 +1,4 @@
-//! A campaign whose replays are sent to a session of others.
+//! A campaign whose replays are sent to a session of other processes.
 
 #![allow(clippy::unwrap_used, clippy::panic, reason = "a test fails by them")]
 
@@ -20,7 +20,7 @@ use headrace_campaign::maker::Maker;
 use headrace_campaign::place::Place;
 use headrace_tables::Parameters;
 
-/// Replays so many dives at each of its first plans, and then says that it is lost.
+/// Replays `at_each` dives at each of its first two plans, and then fails as lost.
 #[derive(Debug)]
 struct Lost {
     maker: Arc<Maker>,
@@ -47,7 +47,9 @@ impl QueryPlanner for Lost {
     }
 }
 
-/// A campaign of five dives that is lost twice, with so many dives finished each time; how often it was sent, and what came of it.
+/// Runs a campaign of five dives whose session is lost twice.
+///
+/// `at_each` dives are finished each time. Returns the number of plans sent, and the result.
 async fn sent(at_each: usize) -> (usize, std::result::Result<usize, String>) {
     let (folder, scratch) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
     for log in ["adrift", "murk", "sectors", "stalls", "steel"] {
@@ -67,7 +69,7 @@ async fn sent(at_each: usize) -> (usize, std::result::Result<usize, String>) {
 }
 
 #[tokio::test]
-async fn what_was_lost_is_sent_again_while_it_becomes_less() {
+async fn lost_dives_are_sent_again_while_their_number_decreases() {
     assert_eq!(sent(2).await, (3, Ok(5)));
     let (plans, made) = sent(0).await;
     assert_eq!(plans, 1);

@@ -1,4 +1,4 @@
-//! Tables 3 to 5: our simulated runs beside the paper's, and the Wilcoxon tests of §8.1.
+//! Tables 3 to 5: simulated runs beside the paper's, and the Wilcoxon tests of §8.1.
 
 use crate::paper::{Measured, PaperError, Printed, Spacings, Tables, measured, tables};
 use headrace_sampling::layout::HeadLayout;
@@ -9,11 +9,11 @@ use crate::spacing::{Spacing, spacing};
 use crate::wilcoxon::{self, Options};
 use crate::{ExperimentError, Progress};
 
-/// Share by which T_x may differ from the paper's experiment.
+/// Relative tolerance of T_x against the paper's experiment.
 const T_X_SHARE: f64 = 0.02;
 /// The same for the means of T_y and T.
 const MEAN_SHARE: f64 = 0.03;
-/// Length of a run, m: as in the paper.
+/// Length of a run, m, as in the paper.
 const LENGTH_M: f64 = 130.0;
 /// Effects of the paper's simulator: a sonar with 1 cm range noise, a pilot who drifts.
 const EFFECTS: &str = "range_noise = { sd_m = 0.01, sensors = [SONARS] }\n\
@@ -40,12 +40,12 @@ pub struct RunRow {
     pub misses: Vec<String>,
 }
 
-/// A figure of the paper and ours.
+/// A figure of the paper and the recomputed one.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Pair {
     /// As printed.
     pub paper: f64,
-    /// Ours.
+    /// Recomputed.
     pub ours: f64,
 }
 
@@ -54,7 +54,7 @@ impl Pair {
         Self { paper: paper.value(), ours }
     }
 
-    /// Relative difference, positive where ours is larger.
+    /// Relative difference, positive if the recomputed figure is larger.
     pub fn difference(&self) -> f64 {
         self.ours / self.paper - 1.0
     }
@@ -77,7 +77,7 @@ pub struct SignedRankRow {
     pub p_ours: Option<f64>,
 }
 
-/// All runs of Tables 3 and 4.
+/// Simulates all runs of Tables 3 and 4.
 ///
 /// Errors: none with the built-in vehicles.
 pub(crate) fn runs(progress: Progress<'_>) -> Result<Vec<RunRow>, ExperimentError> {
@@ -140,7 +140,7 @@ fn row(run: &Measured, layout: HeadLayout, paper: &Spacings, ours: &Spacing, tur
     row
 }
 
-/// The misses, with reasons.
+/// The quantities that miss their targets, with reasons.
 fn misses(row: &RunRow, seconds: f64) -> Vec<String> {
     let mut misses = Vec::new();
     let percent = |pair: &Pair| 100.0 * pair.difference();

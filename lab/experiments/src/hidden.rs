@@ -26,17 +26,19 @@ pub struct HiddenRow {
     pub gap_m: f64,
     /// T_x / s without occlusion, m.
     pub t_x_m: f64,
-    /// The largest distance between passes anywhere, as a multiple of it.
+    /// The largest distance between passes anywhere, as a multiple of `t_x_m`.
     pub times: f64,
-    /// The same for lines in the middle of the shadow, mean of each line's largest.
+    /// The same for lines in the middle of the shadow: mean of each line's largest distance.
     pub times_in_shadow: f64,
 }
 
-/// Three heads; four with neighbours a quarter turn apart (on either wall the occluded forward and aft heads
-/// follow each other at half a turn, or at a quarter); four with neighbours half a turn apart.
+/// The layouts: three heads; four with neighbours a quarter turn apart; four with neighbours half a turn apart.
+///
+/// With a quarter turn, the occluded forward and aft heads follow each other on either wall at half a turn, or at a
+/// quarter turn.
 const ARRANGEMENTS: [(u8, &str); 4] = [(3, ""), (4, ""), (4, "[0, 0, -90, 90]"), (4, "[0, 90, 90, 0]")];
 
-/// All arrangements, MEDIUM as in Figure 13.
+/// Simulates all layouts in MEDIUM, as in Figure 13.
 ///
 /// Errors: none with the built-in vehicles.
 pub(crate) fn rows(progress: Progress<'_>) -> Result<Vec<HiddenRow>, ExperimentError> {

@@ -1,8 +1,11 @@
-//! Recomputes the paper's tables (`paper`), and repeats its §8 and §9: simulated dives, their spacings (Tables 3 to
-//! 5), occlusion between heads, and analyses beyond a dive: surfaces through samples and their distance
-//! from the wall (§8.2, 8.3), the perimeter as a wide beam sees it (§9.2), and the Wilcoxon signed-rank test (§8.1).
+//! Recomputes the paper's tables (`paper`), and repeats its experiments of §8 and §9.
 //!
-//! Deterministic: one thread, no clock, no randomness, no hash containers; mathematics through `headrace_geometry::math`.
+//! Experiments are simulated dives with their spacings (Tables 3 to 5) and occlusion between heads. Further analyses
+//! are surfaces through samples and their distance from the wall (§8.2, 8.3), the perimeter as seen by a wide beam
+//! (§9.2), and the Wilcoxon signed-rank test (§8.1).
+//!
+//! Results are deterministic: one thread, no clock, no randomness, no hash containers; mathematics through
+//! `headrace_geometry::math`.
 
 mod compared;
 pub mod drawings;
@@ -36,7 +39,7 @@ pub use stationary::Perimeter;
 /// Receives status messages.
 pub type Progress<'a> = &'a dyn Fn(&str);
 
-/// Why an experiment can't be run.
+/// An experiment can't be run.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum ExperimentError {

@@ -1,4 +1,4 @@
-//! The paper's tables and experiments on the terminal, ours beside theirs: command line, output, exit codes.
+//! The paper's tables and experiments on the terminal, beside recomputed ones: command line, output, exit codes.
 
 use std::io::{IsTerminal, Write};
 use std::path::{Path, PathBuf};
@@ -38,7 +38,7 @@ enum Command {
     },
 }
 
-/// Why a command failed.
+/// A failure of a command.
 #[derive(Debug, thiserror::Error)]
 enum Failure {
     #[error(transparent)]
@@ -96,7 +96,7 @@ fn put(text: &str) -> Result<(), Failure> {
     written.map_err(|source| Failure::Write { path: "standard output".into(), source })
 }
 
-/// Shows the status on a line that the next one overwrites, if on a terminal.
+/// Shows the status on a line that the next status overwrites, if stderr is a terminal.
 fn progress(what: &str) {
     if std::io::stderr().is_terminal() {
         eprint!("\r\x1b[K{what}");

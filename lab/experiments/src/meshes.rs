@@ -11,11 +11,11 @@ use crate::surface::wall::{self, Stretch};
 use crate::surface::{Mesh, MeshIndex, Xyz, normals};
 use crate::{ExperimentError, Progress};
 
-/// Length of a run, m: as in the paper.
+/// Length of a run, m, as in the paper.
 pub(crate) const LENGTH_M: f64 = 130.0;
 /// The part of the surface compared, away from its ends.
 const INNER: Stretch = Stretch { from_m: 20.0, to_m: 120.0, step_m: 0.1 };
-/// The paper's simulator's noise.
+/// Noise of the paper's simulator.
 const EFFECTS: &str = "range_noise = { sd_m = 0.01, sensors = [SONARS] }\n";
 /// Repetitions of an unaligned dive, each with other phases.
 const SEEDS: u64 = 5;
@@ -37,7 +37,7 @@ pub struct MeshRow {
     pub poisson_m: [f64; 2],
     /// From the wall to the plain interpolation in (x, arc length), m.
     pub plain_m: [f64; 2],
-    /// The mean distance of each seed, m.
+    /// Mean distance for each seed, m.
     pub seeds_m: Vec<f64>,
 }
 
@@ -60,7 +60,7 @@ const PAPER: [Configuration; 10] = [
     (4, "medium", true, true, Some([0.020, 0.036])),
 ];
 
-/// All of them.
+/// Computes all configurations.
 ///
 /// Errors: no surface can be made; none with the built-in vehicles.
 pub(crate) fn rows(progress: Progress<'_>) -> Result<Vec<MeshRow>, ExperimentError> {

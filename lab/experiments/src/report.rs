@@ -1,4 +1,4 @@
-//! All of the paper's experiments, and whether its findings hold.
+//! All of the paper's experiments, and whether its findings are confirmed.
 
 use serde::Serialize;
 
@@ -9,7 +9,7 @@ use crate::runs::SPEED_MPS;
 use crate::stationary::{self, Perimeter};
 use crate::{ExperimentError, Progress};
 
-/// Our results beside the paper's.
+/// Recomputed results beside the paper's.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Experiments {
     /// Speed of the runs, m/s.
@@ -24,7 +24,7 @@ pub struct Experiments {
     pub hidden: Vec<HiddenRow>,
     /// §9.2.
     pub perimeter: Perimeter,
-    /// The paper's findings, and whether they hold.
+    /// The paper's findings, and whether they are confirmed.
     pub findings: Vec<Finding>,
 }
 
@@ -33,13 +33,13 @@ pub struct Experiments {
 pub struct Finding {
     /// The paper's statement.
     pub says: &'static str,
-    /// Whether our runs confirm it.
+    /// Whether the simulated runs confirm it.
     pub holds: bool,
-    /// Our result.
+    /// The simulated result.
     pub evidence: String,
 }
 
-/// Runs all of them. `progress` gets status messages.
+/// Runs all experiments; `progress` gets status messages.
 ///
 /// Errors: none with the built-in vehicles.
 pub fn run(progress: Progress<'_>) -> Result<Experiments, ExperimentError> {
@@ -96,7 +96,7 @@ fn findings(meshes: &[MeshRow], hidden: &[HiddenRow]) -> Vec<Finding> {
     findings
 }
 
-/// §8.3: distance between passes where neighbours occlude the wall.
+/// §8.3: distance between passes in places where neighbours occlude the wall.
 fn of_hidden(row: &HiddenRow) -> Finding {
     let twice = (1.9..2.15).contains(&row.times_in_shadow);
     let (says, holds) = match (row.heads, row.side_by_side_deg > 135.0) {

@@ -1,5 +1,5 @@
-//! Simulated dives for the experiments: the paper's vehicle, a straight stretch, and the effects of the
-//! paper's own simulation.
+//! Simulated dives for the experiments: the paper's vehicle, a straight stretch, and the effects of the paper's
+//! simulation.
 
 use headrace_config::Document;
 use headrace_geometry::frames::{Point3, Tunnel};
@@ -26,7 +26,7 @@ pub(crate) struct Setting {
     pub occlusion: bool,
     /// Distance travelled, m.
     pub length_m: f64,
-    /// Further lines of the scene's effects; SONARS stands for the ids of the heads.
+    /// Further lines of the scene's effects; SONARS is a placeholder for the ids of the heads.
     pub effects: String,
     /// Random seed.
     pub seed: u64,
@@ -129,7 +129,7 @@ fn scene_text(setting: &Setting) -> String {
     };
     let layout =
         HeadLayout::NAMES.iter().find(|(_, layout)| *layout == setting.layout).map_or("", |(name, _)| name);
-    // A planned speed of zero leaves the heads' positions along the hull out of their phases.
+    // With a planned speed of zero, the phases ignore the heads' positions along the hull.
     let planned_mps = if setting.aligned { SPEED_MPS } else { 0.0 };
     let layout = if setting.heads == 1 { String::new() } else { format!("heads.layout = \"{layout}\"\n") };
     let occlusion = if setting.occlusion { "occlusion = {}\n" } else { "" };

@@ -15,8 +15,9 @@ const STEP_SHARE: f64 = 0.25;
 /// The quantities of the paper's Tables 3 to 5 for a run.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub(crate) struct Spacing {
-    /// Along the tunnel, from pass to pass: mean over the lines along the wall; for sectors, on lines at the sector
-    /// ends, which is twice the mean.
+    /// Along the tunnel, from pass to pass: the mean over the lines along the wall.
+    ///
+    /// In sectors, it is taken on lines at the sector ends and is twice the mean.
     pub t_x_m: f64,
     /// Across it, from ping to ping in the cross-section.
     pub t_y: Spread,
@@ -54,7 +55,7 @@ fn steps_m(samples: &[Sample], step_rad: f64) -> impl Iterator<Item = f64> {
 /// For each line along the wall, the chainages at which a head passed it, ascending.
 pub(crate) fn passes(dive: &Dive, count: usize) -> Vec<Vec<f64>> {
     let perimeter_m = dive.profile.perimeter_m();
-    // Where only some of the heads have arrived, or are still to arrive, passes are farther apart.
+    // While only some of the heads have arrived, passes are farther apart.
     let ends = |pick: fn(&[Sample]) -> Option<&Sample>| {
         dive.heads.iter().filter_map(move |samples| pick(samples)).map(|s| s.at.x())
     };

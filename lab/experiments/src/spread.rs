@@ -19,11 +19,11 @@ pub(crate) struct Spread {
 }
 
 impl Spread {
-    /// Of the absolute values of `lengths_m`, summed in the order given; non-finite ones are ignored.
+    /// Statistics of the absolute values of `lengths_m`, summed in the given order; non-finite values are ignored.
     pub(crate) fn of(lengths_m: impl IntoIterator<Item = f64>) -> Self {
         let (mut mean, mut squares) = (0.0, 0.0);
         let mut spread = Self { min_m: f64::INFINITY, ..Self::default() };
-        // Welford's updates: a sum of squares would lose the spread of lengths that are nearly equal.
+        // Welford's updates: a sum of squares would lose the spread of nearly equal lengths.
         for length in lengths_m.into_iter().map(f64::abs).filter(|length| length.is_finite()) {
             spread.count += 1;
             let step = length - mean;
@@ -43,7 +43,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn signs_are_dropped_and_numbers_kept() {
+    fn signs_and_non_finite_lengths_are_ignored() {
         let spread = Spread::of([1.0, -3.0, f64::NAN, f64::INFINITY]);
         assert_eq!(spread, Spread { count: 2, mean_m: 2.0, sd_m: 1.0, min_m: 1.0, max_m: 3.0 });
         assert_eq!(Spread::of([]), Spread::default());

@@ -19,23 +19,23 @@ const PAPER_M: f64 = 33.09;
 /// The perimeter by several methods, m.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Perimeter {
-    /// The blueprint's.
+    /// The blueprint's perimeter.
     pub nominal_m: f64,
     /// The paper's measurement.
     pub paper_m: f64,
-    /// The paper's method: skeleton of the echo image, each step of it counted as 1 or sqrt 2 pixels.
+    /// By the paper's method: the skeleton of the echo image, with steps of 1 or sqrt 2 pixels.
     pub skeleton_m: f64,
-    /// The same skeleton, measured without the staircase's excess.
+    /// By the same skeleton, without the excess of the staircase.
     pub skeleton_smooth_m: f64,
-    /// A polygon through the first returns.
+    /// By a polygon through the first returns.
     pub first_returns_m: f64,
-    /// A polygon through the mean ranges of each beam.
+    /// By a polygon through the mean ranges of each beam.
     pub mean_ranges_m: f64,
-    /// A polygon through ideal rays.
+    /// By a polygon through ideal rays.
     pub rays_m: f64,
 }
 
-/// Computes it on the blueprint's profile.
+/// Computes the perimeter on the blueprint's profile.
 ///
 /// Errors: none in practice.
 pub(crate) fn perimeter() -> Result<Perimeter, ExperimentError> {
@@ -45,7 +45,7 @@ pub(crate) fn perimeter() -> Result<Perimeter, ExperimentError> {
         let (sin, cos) = math::sin_cos(angle_rad);
         profile.cast_from_inside(centre, [sin, -cos]).map_or(0.0, |hit| hit.range_m)
     };
-    // Rays evenly over the beam's disc; those tilted ahead and astern have longer ranges to the same wall.
+    // Rays are spread evenly over the beam's disc; those tilted ahead and astern have longer ranges to the same wall.
     let golden_rad = PI * (3.0 - math::sqrt(5.0));
     let cone = |angle_rad: f64| -> Vec<f64> {
         let ray = |number: i32| {

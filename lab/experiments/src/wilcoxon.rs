@@ -1,15 +1,15 @@
 //! The paired Wilcoxon signed-rank test.
 //!
-//! Differences are ranked by size, ties sharing their mean rank; W+ is the sum of the ranks of positive differences.
-//! Zero differences are dropped before ranking (Wilcoxon) or ranked and then dropped (Pratt); Pratt's method preserves
-//! the effect of zeros on the other ranks. Without ties and zeros, and for up to 50 pairs, p is exact; otherwise it is that
-//! of a normal distribution with the mean and variance of W+ given the ranks.
+//! Differences are ranked by size, and ties share their mean rank. W+ is the sum of the ranks of positive differences.
+//! Zero differences are dropped before ranking (Wilcoxon), or ranked and then dropped (Pratt). Pratt's method preserves
+//! the effect of zeros on the other ranks. Without ties and zeros, and for up to 50 pairs, p is exact. Otherwise it is
+//! that of a normal distribution with the mean and variance of W+ given the ranks.
 //!
-//! Source: Wilcoxon 1945; Pratt 1959. The paper's §8.1 doesn't give its treatment of zeros.
+//! Source: Wilcoxon 1945; Pratt 1959. The paper's §8.1 doesn't state its treatment of zeros.
 
 use headrace_geometry::math;
 
-/// Most pairs for which the exact distribution is taken.
+/// Maximum number of pairs for which the exact distribution is used.
 pub(crate) const EXACT_MAX: usize = 50;
 
 /// Treatment of zero differences.
@@ -40,7 +40,7 @@ pub(crate) enum Method {
     Normal,
 }
 
-/// The test's outcome. The p values are under the hypothesis that differences are symmetric about zero.
+/// Result of the test. The p values are under the hypothesis that differences are symmetric about zero.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct SignedRank {
     /// Sum of the ranks of positive differences.
@@ -53,7 +53,7 @@ pub(crate) struct SignedRank {
     pub zeros: usize,
     /// Probability of a W+ at least as far from its mean, on either side.
     pub p_two_sided: f64,
-    /// Probability of a W+ at least as large: small where differences tend to be positive.
+    /// Probability of a W+ at least as large; small if differences tend to be positive.
     pub p_greater: f64,
     /// Probability of a W+ at most as large.
     pub p_less: f64,
@@ -61,7 +61,7 @@ pub(crate) struct SignedRank {
     pub method: Method,
 }
 
-/// Why the test can't be made.
+/// The test can't be made.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub(crate) enum WilcoxonError {
@@ -84,7 +84,7 @@ pub(crate) enum WilcoxonError {
     NoDifference,
 }
 
-/// For the pairwise differences `left` minus `right`.
+/// Tests the pairwise differences `left` minus `right`.
 ///
 /// Errors: see [`WilcoxonError`].
 pub(crate) fn of_pairs(left: &[f64], right: &[f64], options: Options) -> Result<SignedRank, WilcoxonError> {
@@ -95,7 +95,9 @@ pub(crate) fn of_pairs(left: &[f64], right: &[f64], options: Options) -> Result<
     of_differences(&differences, options)
 }
 
-/// For differences. Sizes that are equal but for rounding aren't ties: round them first if they should be.
+/// Tests differences.
+///
+/// Sizes that are equal except for rounding aren't ties; round them first if they should be.
 ///
 /// Errors: see [`WilcoxonError`].
 pub(crate) fn of_differences(differences: &[f64], options: Options) -> Result<SignedRank, WilcoxonError> {
@@ -163,7 +165,7 @@ fn sign_choices(n: usize) -> Vec<f64> {
     counts
 }
 
-/// As [`exact`], by the normal distribution; W+ is a sum of ranks, each included with even odds.
+/// The p values by the normal distribution. W+ is a sum of ranks, each included with even odds.
 fn normal(ranks: impl Iterator<Item = f64>, w_plus: f64, continuity: bool) -> [f64; 3] {
     let (sum, squares) = ranks.fold((0.0, 0.0), |(sum, squares), rank| (sum + rank, squares + rank * rank));
     let (off, sd) = (w_plus - sum / 2.0, math::sqrt(squares / 4.0));

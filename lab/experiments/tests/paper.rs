@@ -1,4 +1,4 @@
-//! `headrace_experiments tables`: the paper's Tables 1 to 5 beside ours, as text and as JSON.
+//! `headrace_experiments tables`: the paper's Tables 1 to 5 beside recomputed ones, as text and as JSON.
 
 #![allow(
     clippy::unwrap_used,
@@ -39,7 +39,7 @@ fn cells(path: &str, value: &Value, found: &mut Vec<(String, Value)>) {
     }
 }
 
-/// The text on the given tables; 0 is the text before the first.
+/// The text about the given tables; 0 is the text before the first.
 fn said(tables: &[usize]) -> String {
     let shown = shown(&[]);
     let parts: Vec<&str> = shown.split("\n\n").collect();
@@ -55,7 +55,7 @@ fn no_line_is_wider_than_a_terminal() {
 }
 
 #[test]
-fn the_modes_in_words() {
+fn modes_are_formatted_as_text() {
     insta::assert_snapshot!(said(&[0, 1, 2]), @"
     As printed in Jorge et al., Sensors 2021, 21, 1900 (CC BY 4.0), and ours; % is by how much ours is larger.
     = the printed digits are ours rounded and ours truncated, r rounded only, t truncated only.
@@ -85,7 +85,7 @@ fn the_modes_in_words() {
 }
 
 #[test]
-fn one_head_in_words() {
+fn one_head_is_formatted_as_text() {
     insta::assert_snapshot!(said(&[3]), @"
     Table 3. VITA 1, one head: the baseline at 0.197 m/s, metres
                 T_x                     mean T_y                T_ymin                  T_ymax
@@ -113,7 +113,7 @@ fn one_head_in_words() {
 }
 
 #[test]
-fn several_heads_in_words() {
+fn several_heads_are_formatted_as_text() {
     insta::assert_snapshot!(said(&[4]), @"
     Table 4. VITA 2, two to four heads: the baseline, metres
                  T_x / s, phase shift                     2 T_x / s, sector offset
@@ -165,7 +165,7 @@ fn several_heads_in_words() {
 }
 
 #[test]
-fn the_distances_put_together_in_words() {
+fn combined_distances_are_formatted_as_text() {
     insta::assert_snapshot!(said(&[5]), @"
     Table 5. T = sqrt(T_x^2 + T_y^2) of Table 4's experiments, and as predicted at 0.197 m/s, metres
       phase shift; pred.: predicted by the baseline
@@ -212,7 +212,7 @@ fn the_distances_put_together_in_words() {
 }
 
 #[test]
-fn tables_as_json() {
+fn tables_are_written_as_json() {
     let tables: Value = serde_json::from_str(&shown(&["--json"])).unwrap();
     let rows = |number: usize| tables[format!("table_{number}")]["rows"].as_array().unwrap().len();
     assert_eq!([1, 2, 3, 4, 5].map(rows), [5, 5, 5, 15, 15]);
@@ -242,7 +242,7 @@ fn tables_as_json() {
 }
 
 #[test]
-fn without_a_command_it_says_what_there_is() {
+fn missing_command_prints_the_available_ones() {
     let Output { status, stdout, stderr } = answer(&[]);
     assert_eq!((status.code(), stdout.as_slice()), (Some(2), &[][..]));
     insta::assert_snapshot!(String::from_utf8(stderr).unwrap(), @"

@@ -1,7 +1,7 @@
-//! What callers give and get: names of logs, and coordinates of many points as numpy arrays.
+//! Arguments and results of Python functions: names of logs, and coordinates of many points as numpy arrays.
 //!
-//! Arrays cross as bytes, by numpy's own `tobytes` and `frombuffer`: one copy, no crate, and no place where a type could be taken
-//! for another. The buffer protocol itself isn't in the stable interface of Python before 3.11.
+//! Arrays cross as bytes, by numpy's own `tobytes` and `frombuffer`. That takes one copy and no extra crate, and types
+//! can't be confused. The buffer protocol isn't in Python's stable interface before 3.11.
 
 use std::path::PathBuf;
 
@@ -26,7 +26,7 @@ impl Named {
     }
 }
 
-/// Coordinates of points, m: an array of float64, or whatever numpy makes one of.
+/// Coordinates of points, m: an array of float64, or anything that numpy converts to one.
 pub(crate) struct Coordinates(Vec<f64>);
 
 impl<'py> FromPyObject<'_, 'py> for Coordinates {
@@ -54,7 +54,7 @@ pub(crate) fn array<'py>(py: Python<'py>, values: &[f64]) -> PyResult<Bound<'py,
     py.import("numpy")?.call_method1("frombuffer", (PyByteArray::new(py, &bytes), "<f8"))
 }
 
-/// The points of two lists of coordinates.
+/// The points given by two lists of coordinates.
 ///
 /// Errors: lists of different lengths; a coordinate that isn't finite, with its index.
 pub(crate) fn points(
@@ -81,7 +81,7 @@ pub(crate) fn points(
     }
 }
 
-/// `value` if it is finite and above zero.
+/// Returns `value` if it is finite and above zero.
 ///
 /// Errors: it isn't; `what` names it with its unit.
 pub(crate) fn positive(what: &str, value: f64) -> Result<f64, Failure> {

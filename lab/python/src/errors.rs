@@ -19,20 +19,20 @@ mod python {
     pyo3::import_exception!(headrace._errors, SamplingError);
 }
 
-/// Why a call failed.
+/// A failure of a call.
 #[derive(Debug, thiserror::Error)]
 pub(crate) enum Failure {
     /// A log as a whole can't be read.
     #[error(transparent)]
     Log(#[from] LogError),
-    /// A source that the log doesn't have.
+    /// The log doesn't have the requested source.
     #[error("reading messages of source {source_id:?} of {file}: the log has no such source; it has {known}")]
     NoSource {
-        /// As asked for.
+        /// The requested source.
         source_id: String,
         /// The log.
         file: String,
-        /// The sources that it has.
+        /// The sources in the log.
         known: String,
     },
     /// A log without a vehicle file.
@@ -41,10 +41,10 @@ pub(crate) enum Failure {
         /// The log.
         file: String,
     },
-    /// A vehicle file's keys.
+    /// Invalid keys of a vehicle file.
     #[error(transparent)]
     Config(#[from] ConfigErrors),
-    /// A file that can't be read.
+    /// A file can't be read.
     #[error("reading {}: {source}", path.display())]
     File {
         /// The file.
@@ -52,7 +52,7 @@ pub(crate) enum Failure {
         /// Cause.
         source: io::Error,
     },
-    /// What a vehicle file asks for doesn't go together.
+    /// Settings of a vehicle file are inconsistent.
     #[error("planning with {file}: {why}")]
     Vehicle {
         /// The vehicle file.
@@ -63,18 +63,18 @@ pub(crate) enum Failure {
     /// A dive can't be replayed.
     #[error(transparent)]
     Replay(headrace_tables::Error),
-    /// Sampling theory has no answer.
+    /// Sampling theory has no solution.
     #[error(transparent)]
     Sampling(#[from] SamplingError),
-    /// Dimensions that give no profile.
+    /// Dimensions don't give a profile.
     #[error("making a tunnel's profile: {0}")]
     Profile(#[from] ProfileError),
-    /// An argument out of range.
+    /// An argument is out of range.
     #[error("{0}")]
     Argument(String),
 }
 
-/// What is a log's, a vehicle file's or an argument's error keeps its kind.
+/// Errors of a log, a vehicle file or an argument keep their kind.
 impl From<headrace_tables::Error> for Failure {
     fn from(error: headrace_tables::Error) -> Self {
         use headrace_tables::Error;
@@ -88,7 +88,7 @@ impl From<headrace_tables::Error> for Failure {
 }
 
 impl Failure {
-    /// A vehicle that can't be simulated for its errors of position.
+    /// A vehicle can't be simulated to compute its position errors.
     pub(crate) fn of_scene(file: &str, error: SceneError) -> Self {
         match error {
             SceneError::Config(errors) => Self::Config(errors),
@@ -117,7 +117,7 @@ impl Failure {
     }
 }
 
-/// The log that an error is about, and the byte.
+/// The log that an error concerns, and the byte.
 fn place_in_log(error: &LogError) -> (Option<String>, Option<String>) {
     match error {
         LogError::Open { path, .. } | LogError::NotAPart { path } => (Some(path.display().to_string()), None),

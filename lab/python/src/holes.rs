@@ -1,4 +1,4 @@
-//! The largest hole of each section of a point cloud on the unrolled wall, by the search that a dive is judged with.
+//! The largest hole of each section of a point cloud on the unrolled wall, by the search used for dives.
 
 use std::sync::Arc;
 
@@ -12,23 +12,27 @@ use crate::arguments::{Coordinates, points, positive};
 use crate::errors::Failure;
 use crate::table::Table;
 
-/// Edge of a cell of the store, m: a dive's for a target of half a metre.
+/// Edge of a cell of the store, m, as in a dive with a target of half a metre.
 const CELL_M: f64 = 0.25;
-/// Stretch that is searched with one store, m: with what lies within the search radius, no more than a store keeps open, so
-/// that no sample is packed.
+/// Length of the stretch searched with one store, m.
+///
+/// With the surroundings within the search radius it is short enough that the store packs no sample.
 const STRETCH_M: f64 = 32.0;
-/// Most sections of a call.
+/// Maximum number of sections per call.
 const MAX_SECTIONS: f64 = 4e6;
 
-/// The largest hole of each section, for points on the unrolled wall: twice the largest distance from a place in the section to
-/// the nearest point. Arc lengths are cyclic in `perimeter_m`. Sections are [k L, (k + 1) L) with L = `section_m`, from the one
-/// with `from_m` to the one with `to_m`: the points' first and last chainage if not given.
+/// The largest hole of each section, for points on the unrolled wall.
 ///
-/// Columns: chainage_m and end_m of the section; d_m, the diameter D; d_least_m and d_most_m, between which D lies where the
-/// points are too dense to keep every one; d_bounded, false where a place has no point within 12 m: D is then at least d_m, and
+/// A hole's diameter is twice the largest distance from a place in the section to the nearest point. Arc lengths are
+/// cyclic in `perimeter_m`. Sections are [k L, (k + 1) L) with L = `section_m`, from the one with `from_m` to the one
+/// with `to_m`; these default to the points' first and last chainage.
+///
+/// Columns: chainage_m and end_m of the section; d_m, the diameter D; d_least_m and d_most_m, bounds of D if the points
+/// are too dense to keep every one; d_bounded, false if a place has no point within 12 m: D is then at least d_m, and
 /// d_most_m is null; d_x_m and d_arc_m, the hole's centre.
-/// Raises ValueError for lists of different lengths, a coordinate that isn't finite, no points without bounds, or more than
-/// 4,000,000 sections.
+///
+/// Raises ValueError for lists of different lengths, a coordinate that isn't finite, no points without bounds, or more
+/// than 4,000,000 sections.
 #[pyfunction]
 #[pyo3(signature = (x_m, arc_m, *, perimeter_m, section_m=0.25, from_m=None, to_m=None))]
 #[expect(clippy::needless_pass_by_value, reason = "made for this call")]

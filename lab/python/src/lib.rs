@@ -1,7 +1,8 @@
-//! headrace as a Python package: reading logs, replaying them as Arrow tables, sampling theory, and holes of a point cloud.
+//! headrace as a Python package: reads logs, replays them as Arrow tables, and computes sampling theory and holes of
+//! point clouds.
 //!
-//! What Python sees is typed in `python/headrace/_headrace.pyi`; a test holds it to what is here. The interpreter's lock is
-//! released wherever a log is read or a wall searched.
+//! `python/headrace/_headrace.pyi` has the types for Python; a test compares it with this code. The interpreter's lock
+//! is released while a log is read or a wall searched.
 
 mod arguments;
 mod errors;

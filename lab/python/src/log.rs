@@ -1,4 +1,4 @@
-//! A dive's log: its header, and what is found in it.
+//! A dive's log: its header and its content.
 
 use std::collections::BTreeMap;
 use std::path::PathBuf;
@@ -21,9 +21,9 @@ use crate::vehicle;
 pub(crate) struct Source {
     /// Its name.
     id: String,
-    /// Kind of device; empty where unknown.
+    /// Kind of device; empty if unknown.
     plugin: String,
-    /// Connection of the device; empty where unknown.
+    /// Connection of the device; empty if unknown.
     connect: String,
 }
 
@@ -41,10 +41,11 @@ impl Source {
     }
 }
 
-/// A dive's log: an MCAP file, the parts of a recording, or a folder with these. Opening it scans it once, without unpacking.
+/// A dive's log: an MCAP file, the parts of a recording, or a folder with these. Opening it scans it once, without
+/// unpacking.
 ///
-/// Raises LogError where a file can't be read, isn't MCAP, or has a later format; or for several files that aren't parts of
-/// one recording. Damage isn't an error: see `losses`.
+/// Raises LogError if a file can't be read, isn't MCAP, or has a later format, or if several files aren't parts of one
+/// recording. Damage isn't an error: see `losses`.
 #[pyclass(frozen, module = "headrace")]
 pub(crate) struct Log {
     files: Vec<PathBuf>,
@@ -54,7 +55,7 @@ pub(crate) struct Log {
     found: OnceLock<Found>,
 }
 
-/// What is known of a log when it has been read to its end.
+/// Facts about a log that has been read to its end.
 struct Found {
     losses: Vec<Loss>,
     notes: Vec<String>,
@@ -92,31 +93,31 @@ impl Log {
         })
     }
 
-    /// Its files, in the order of reading.
+    /// Its files, in reading order.
     #[getter]
     fn files(&self) -> Vec<PathBuf> {
         self.files.clone()
     }
 
-    /// First and last time, ns of the log's clock, by the chunks' headers; None without messages.
+    /// First and last time, ns of the log's clock, from the chunks' headers; None without messages.
     #[getter]
     fn span_ns(&self) -> Option<(u64, u64)> {
         self.span.map(|(from, to)| (from.0, to.0))
     }
 
-    /// Whether it has the ticks of the loop that wrote it: a log of headrace's own.
+    /// Whether it has the ticks of the loop that wrote it, as logs of headrace do.
     #[getter]
     fn has_ticks(&self) -> bool {
         self.has_ticks
     }
 
-    /// Metadata: of headrace's own record by key, of others as "record/key".
+    /// Metadata: entries of headrace's own record by key, of others by "record/key".
     #[getter]
     fn metadata(&self) -> BTreeMap<String, String> {
         self.info.metadata.clone()
     }
 
-    /// The vehicle file attached to it, TOML; None where there is none that can be read.
+    /// The attached vehicle file, TOML; None if there is none that can be read.
     #[getter]
     fn vehicle_toml(&self) -> Option<&str> {
         self.info.vehicle_toml.as_deref()
@@ -129,39 +130,40 @@ impl Log {
         self.info.attachments.iter().map(content).collect()
     }
 
-    /// The tunnel's design profile, by the vehicle file attached.
+    /// The tunnel's design profile from the attached vehicle file.
     ///
-    /// Raises LogError without a vehicle file, ConfigError where that is wrong.
+    /// Raises LogError without a vehicle file, ConfigError if it is invalid.
     fn profile(&self) -> Result<Profile, Failure> {
         let name = self.name();
         let vehicle = vehicle::attached(&self.info, &name)?;
         Ok(Profile::of(vehicle.tunnel.profile))
     }
 
-    /// Its sources, by their numbers. Reads the log to its end, once: a log may define channels late.
+    /// Its sources, in order of their numbers. Reads the log to its end, once, since a log may define channels late.
     ///
     /// Raises LogError on an I/O error.
     fn sources(&self, py: Python<'_>) -> Result<Vec<Source>, Failure> {
         Ok(self.found(py)?.sources.iter().map(Source::of).collect())
     }
 
-    /// What is missing: damage, gaps, and what the recorder left out. Empty for a whole log. Reads the log to its end, once.
+    /// Losses: damage, gaps, and messages that the recorder left out. Empty for a complete log. Reads the log to its
+    /// end, once.
     ///
     /// Raises LogError on an I/O error.
     fn losses(&self, py: Python<'_>) -> Result<Vec<Loss>, Failure> {
         Ok(self.found(py)?.losses.clone())
     }
 
-    /// Oddities, and how they were taken; nothing was lost by them. Reads the log to its end, once.
+    /// Anomalies, and how they were handled; nothing was lost because of them. Reads the log to its end, once.
     ///
     /// Raises LogError on an I/O error.
     fn notes(&self, py: Python<'_>) -> Result<Vec<String>, Failure> {
         Ok(self.found(py)?.notes.clone())
     }
 
-    /// Its messages in the order of reading: of all channels, or those from and to one source.
+    /// Its messages in reading order: those of all channels, or those from and to one source.
     ///
-    /// Raises LogError on an I/O error; or, at the end, where the log has no such source.
+    /// Raises LogError on an I/O error or, at the end, if the log has no such source.
     #[pyo3(signature = (source=None))]
     fn messages(&self, py: Python<'_>, source: Option<String>) -> Result<Messages, Failure> {
         py.detach(|| Messages::open(&self.files, source))

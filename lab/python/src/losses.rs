@@ -1,21 +1,21 @@
-//! What is missing from a log.
+//! Losses of a log.
 
 use headrace_replay::log;
 use pyo3::{pyclass, pymethods};
 
-/// Something that is missing from a log: damage, a gap, or what the recorder had to leave out.
+/// A loss of a log: damage, a gap, or messages that the recorder had to leave out.
 #[pyclass(frozen, get_all, module = "headrace")]
 #[derive(Clone)]
 pub(crate) struct Loss {
-    /// What is missing, and where, in words.
+    /// Description of the loss and its place.
     what: String,
-    /// Where it begins in its file, bytes; 0 where it has no place.
+    /// Start in its file, bytes; 0 if it has no place.
     offset: u64,
-    /// How long it is in the file, bytes; 0 where it has no place.
+    /// Length in the file, bytes; 0 if it has no place.
     bytes: u64,
-    /// The last time before it that is in the log, ns of the log's clock; None where there is none.
+    /// The last time before it that is in the log, ns of the log's clock; None if there is none.
     from_ns: Option<u64>,
-    /// The first time after it, ns of the log's clock; None where there is none.
+    /// The first time after it, ns of the log's clock; None if there is none.
     to_ns: Option<u64>,
 }
 
@@ -30,9 +30,9 @@ impl Loss {
         }
     }
 
-    /// Messages out of order by more than a reader holds.
+    /// Messages that are out of order by more than a reader can hold.
     pub(crate) fn of_order(late: u64) -> Self {
-        let what = format!("{late} messages out of order by more than can be held, taken where they stand");
+        let what = format!("{late} messages out of order by more than can be held, delivered in file order");
         Self { what, offset: 0, bytes: 0, from_ns: None, to_ns: None }
     }
 }

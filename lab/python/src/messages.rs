@@ -10,18 +10,19 @@ use pyo3::{Py, PyRef, Python, pyclass, pymethods};
 
 use crate::errors::Failure;
 
-/// Messages read ahead without the interpreter's lock at most, and their bytes.
+/// Maximum number of messages that are read ahead without the interpreter's lock, and of their bytes.
 const AHEAD: usize = 512;
 const AHEAD_BYTES: usize = 1 << 20;
 
 /// A message of a log.
 #[pyclass(frozen, get_all, module = "headrace")]
 pub(crate) struct Message {
-    /// "raw" (bytes from a source), "sent" (bytes sent to one), "tick", "result", or "other" (not of headrace's channels).
+    /// "raw" (bytes from a source), "sent" (bytes sent to a source), "tick", "result", or "other" (a channel that
+    /// headrace doesn't define).
     kind: &'static str,
-    /// The source's name, of raw and sent messages.
+    /// The source's name, for raw and sent messages.
     source: Option<String>,
-    /// The topic, of results.
+    /// The topic, for results.
     topic: Option<String>,
     /// Time of receipt, ns of the log's clock.
     log_time_ns: u64,
@@ -42,9 +43,10 @@ impl Message {
     }
 }
 
-/// The messages of a log in the order of reading: an iterator.
+/// The messages of a log in reading order: an iterator.
 ///
-/// The log is read as the iterator goes on, about a thousand messages ahead at most, without the interpreter's lock.
+/// The log is read while the iterator advances, at most about a thousand messages ahead, without the interpreter's
+/// lock.
 #[pyclass(frozen, module = "headrace")]
 pub(crate) struct Messages {
     /// Threads may share an iterator.
@@ -52,7 +54,7 @@ pub(crate) struct Messages {
 }
 
 impl Messages {
-    /// Of one source, or of all channels.
+    /// Opens the messages of one source, or of all channels.
     ///
     /// Errors: the log can't be opened.
     pub(crate) fn open(files: &[PathBuf], source: Option<String>) -> Result<Self, Failure> {
@@ -95,7 +97,7 @@ struct Held {
 
 struct Reading {
     log: DiveLog,
-    /// The only source wanted.
+    /// The only source requested.
     source: Option<String>,
     ahead: VecDeque<Held>,
     ended: bool,
@@ -130,7 +132,7 @@ impl Reading {
         Ok(())
     }
 
-    /// That the log has the source asked for: all of its sources are known at its end.
+    /// Checks that the log has the requested source. All of its sources are known only at its end.
     fn check_source(&self) -> Result<(), Failure> {
         let sources = &self.log.header().sources;
         let Some(wanted) = &self.source else { return Ok(()) };

@@ -1,4 +1,4 @@
-//! Tunnel profiles: the wall unrolled, and a head at rest in front of it.
+//! Tunnel profiles: the unrolled wall, and a stationary head in front of it.
 
 use std::path::PathBuf;
 
@@ -12,11 +12,12 @@ use crate::errors::Failure;
 use crate::spacing::Turn;
 use crate::vehicle;
 
-/// Soundings of a ring for each step, so that the largest step is found wherever in the turn the pings fall.
+/// Soundings of a ring per step. They find the largest step wherever in the turn the pings fall.
 const PER_STEP: u32 = 10;
 
-/// A tunnel's design profile: a closed cross-section in y (left) and z (up from the floor's centre), m. Arc length runs round
-/// it from the floor's centre via the left wall, crown and right wall.
+/// A tunnel's design profile: a closed cross-section in y (left) and z (up from the floor's centre), m.
+///
+/// Arc length runs around it from the floor's centre via the left wall, crown and right wall.
 #[pyclass(frozen, module = "headrace")]
 pub(crate) struct Profile {
     profile: tunnel::Profile,
@@ -32,7 +33,7 @@ impl Profile {
 impl Profile {
     /// A rectangle on the floor.
     ///
-    /// Raises SamplingError for dimensions that give no profile.
+    /// Raises SamplingError for dimensions that don't give a profile.
     #[staticmethod]
     fn rectangle(width_m: f64, height_m: f64) -> Result<Self, Failure> {
         Ok(Self::of(shapes::rectangle(width_m, height_m)?))
@@ -40,7 +41,7 @@ impl Profile {
 
     /// A circle.
     ///
-    /// Raises SamplingError for dimensions that give no profile.
+    /// Raises SamplingError for dimensions that don't give a profile.
     #[staticmethod]
     fn circle(radius_m: f64) -> Result<Self, Failure> {
         Ok(Self::of(shapes::circle(radius_m)?))
@@ -48,21 +49,21 @@ impl Profile {
 
     /// Vertical walls under an arc; `height_m` is that of the crown (Jorge et al. 2021, Fig. 2).
     ///
-    /// Raises SamplingError for dimensions that give no profile.
+    /// Raises SamplingError for dimensions that don't give a profile.
     #[staticmethod]
     fn arch(width_m: f64, height_m: f64, arch_radius_m: f64) -> Result<Self, Failure> {
         Ok(Self::of(shapes::arch(width_m, height_m, arch_radius_m)?))
     }
 
-    /// A circle whose lower part a floor of width `base_m` cuts off.
+    /// A circle whose lower part is cut off by a floor of width `base_m`.
     ///
-    /// Raises SamplingError for dimensions that give no profile.
+    /// Raises SamplingError for dimensions that don't give a profile.
     #[staticmethod]
     fn trimmed_circle(radius_m: f64, base_m: f64) -> Result<Self, Failure> {
         Ok(Self::of(shapes::trimmed_circle(radius_m, base_m)?))
     }
 
-    /// The paper's tunnel by its stated dimensions: perimeter 35.90 m.
+    /// The paper's tunnel with its stated dimensions: perimeter 35.90 m.
     #[staticmethod]
     fn ceran() -> Result<Self, Failure> {
         Ok(Self::of(shapes::ceran()?))
@@ -74,9 +75,9 @@ impl Profile {
         Ok(Self::of(shapes::ceran_blueprint()?))
     }
 
-    /// That of a vehicle file.
+    /// The profile of a vehicle file.
     ///
-    /// Raises ConfigError where that can't be read or is wrong.
+    /// Raises ConfigError if the file can't be read or is invalid.
     #[staticmethod]
     #[expect(clippy::needless_pass_by_value, reason = "made for this call")]
     fn of_vehicle(vehicle: PathBuf) -> Result<Self, Failure> {
@@ -90,7 +91,7 @@ impl Profile {
         self.profile.perimeter_m()
     }
 
-    /// y and z of the point from which all of the wall is seen, m.
+    /// y and z of the point from which the whole wall is visible, m.
     #[getter]
     fn reference_m(&self) -> (f64, f64) {
         let [y_m, z_m] = self.profile.reference();

@@ -15,10 +15,10 @@ use crate::errors::Failure;
 use crate::table::Table;
 use crate::vehicle;
 
-/// Ctrl-C is looked for this often while a dive is replayed.
+/// Interval of checks for Ctrl-C while a dive is replayed.
 const LOOK_EVERY: Duration = Duration::from_millis(100);
 
-/// The tables of one dive; docs/reference/dive-tables.md has their columns.
+/// The tables of one dive. docs/reference/dive-tables.csv describes their columns.
 #[pyclass(frozen, module = "headrace")]
 pub(crate) struct Tables {
     tables: headrace_tables::Tables,
@@ -26,13 +26,15 @@ pub(crate) struct Tables {
 
 #[pymethods]
 impl Tables {
-    /// The dive, one row: what it is, its result, and `losses`, `lost` and `exit_code`, which say what its log lacks.
+    /// The dive, one row: its facts and result.
+    ///
+    /// `losses`, `lost` and `exit_code` state what is missing from its log.
     #[getter]
     fn dives(&self) -> Table {
         Table::of(self.tables.dives.clone())
     }
 
-    /// A row for each section of the way: its verdict, hole, cause, and spacings.
+    /// A row for each section of the coverage extent: its verdict, hole, cause, and spacings.
     #[getter]
     fn sections(&self) -> Table {
         Table::of(self.tables.sections.clone())
@@ -73,14 +75,16 @@ impl Tables {
     }
 }
 
-/// Replays a dive and returns its tables, as `headrace replay` would judge it; takes one core, without the interpreter's lock.
+/// Replays a dive and returns its tables, with the judgements of `headrace replay`; takes one core, without the
+/// interpreter's lock.
 ///
-/// `log` is an MCAP file, the parts of a recording, or a folder with these. What isn't given is as in the vehicle file attached to
-/// the log: `target_m` (0.01 to 20) is the largest hole that passes, `section_m` (0.05 to 10) the length of a section,
-/// `sound_speed_mps` (1300 to 1700) the speed of sound; `vehicle` is the path of another vehicle file. `smooth` judges along the
-/// smoothed trajectory.
-/// Raises LogError where the log can't be read, ConfigError for a wrong vehicle file, ValueError for a parameter out of range,
-/// ReplayError where the replay fails; Ctrl-C ends it. Losses aren't errors: see `dives`.
+/// `log` is an MCAP file, the parts of a recording, or a folder with these. Parameters default to those of the vehicle
+/// file attached to the log: `target_m` (0.01 to 20) is the largest hole that passes, `section_m` (0.05 to 10) the
+/// length of a section, `sound_speed_mps` (1300 to 1700) the speed of sound; `vehicle` is the path of another vehicle
+/// file. `smooth` judges along the smoothed trajectory.
+///
+/// Raises LogError if the log can't be read, ConfigError for an invalid vehicle file, ValueError for a parameter out of
+/// range, ReplayError if the replay fails; Ctrl-C ends it. Losses aren't errors: see `dives`.
 #[pyfunction]
 #[pyo3(signature = (log, *, target_m=None, section_m=None, sound_speed_mps=None, vehicle=None, smooth=false))]
 pub(crate) fn replay(
@@ -112,7 +116,7 @@ pub(crate) fn replay(
                 Ok(replay_until(&files, &parameters, &stop).map_err(Failure::from)?)
             };
             threads.spawn(move || {
-                // After an interrupt nobody waits for it.
+                // Ignored: after an interrupt nobody waits for the result.
                 done.send(work()).ok();
             });
             loop {
@@ -124,7 +128,7 @@ pub(crate) fn replay(
                             return Err(interrupt);
                         }
                     }
-                    // Its panic goes on when the scope ends.
+                    // The thread's panic continues when the scope ends.
                     Err(RecvTimeoutError::Disconnected) => {
                         return Err(PyRuntimeError::new_err("replaying a dive: its thread ended early"));
                     }

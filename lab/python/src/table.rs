@@ -1,4 +1,4 @@
-//! Arrow tables for pandas, polars and pyarrow, by the Arrow PyCapsule interface: none of them is needed here.
+//! Arrow tables for pandas, polars and pyarrow, by the Arrow PyCapsule interface. None of these packages is required.
 
 use std::sync::Arc;
 
@@ -9,8 +9,10 @@ use pyo3::exceptions::PyRuntimeError;
 use pyo3::types::PyCapsule;
 use pyo3::{Bound, PyAny, PyResult, Python, pyclass, pymethods};
 
-/// A table as Arrow data. `polars.DataFrame(table)`, `pyarrow.table(table)` and `pandas.DataFrame.from_arrow(table)` take it
-/// without copying; other libraries by `__arrow_c_stream__`.
+/// A table as Arrow data.
+///
+/// `polars.DataFrame(table)`, `pyarrow.table(table)` and `pandas.DataFrame.from_arrow(table)` accept it without
+/// copying; other libraries use `__arrow_c_stream__`.
 #[pyclass(frozen, module = "headrace")]
 pub(crate) struct Table {
     batch: RecordBatch,
@@ -30,7 +32,7 @@ impl Table {
         self.batch.schema_ref().fields().iter().map(|field| field.name().clone()).collect()
     }
 
-    /// The table as an Arrow stream, in the schema that it has whatever is requested.
+    /// The table as an Arrow stream, always in its own schema, whatever is requested.
     #[pyo3(signature = (requested_schema=None))]
     fn __arrow_c_stream__<'py>(
         &self,

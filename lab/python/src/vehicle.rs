@@ -11,13 +11,13 @@ use headrace_vehicle::VehicleConfig;
 
 use crate::errors::Failure;
 
-/// Longest text and longest data that are read, bytes.
+/// Maximum number of bytes of a text file and of a data file that are read.
 const TEXT_BYTES: u64 = 16 << 20;
 const DATA_BYTES: u64 = 256 << 20;
 
-/// Reads a vehicle file: its text, and what it says.
+/// Reads a vehicle file: its text, and the parsed vehicle.
 ///
-/// Errors: it can't be read; its keys are wrong.
+/// Errors: it can't be read; its keys are invalid.
 pub(crate) fn read(path: &Path) -> Result<(String, VehicleConfig), Failure> {
     let failed = |source| Failure::File { path: path.to_owned(), source };
     let text = regular_file::read_text(path, TEXT_BYTES).map_err(failed)?;
@@ -33,7 +33,7 @@ pub(crate) fn read(path: &Path) -> Result<(String, VehicleConfig), Failure> {
 
 /// The vehicle file attached to the log of that name.
 ///
-/// Errors: none is attached; its keys are wrong.
+/// Errors: none is attached; its keys are invalid.
 pub(crate) fn attached(info: &LogInfo, log: &str) -> Result<VehicleConfig, Failure> {
     let text = info.vehicle_toml.as_deref().ok_or_else(|| Failure::NoVehicleFile { file: log.to_owned() })?;
     let load = |name: &str| {
@@ -45,7 +45,7 @@ pub(crate) fn attached(info: &LogInfo, log: &str) -> Result<VehicleConfig, Failu
     Ok(VehicleConfig::parse(Document::new(&format!("{log}/{VEHICLE_FILE}"), text), &KINDS, &load)?)
 }
 
-/// Loads the files that a vehicle file's simulation needs, beside it.
+/// Loads files that the simulation of a vehicle file needs, from the vehicle file's folder.
 pub(crate) fn bytes_beside(path: &Path) -> impl Fn(&str) -> Result<Vec<u8>, String> {
     let folder = folder_of(path);
     move |name| {

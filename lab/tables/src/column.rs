@@ -1,5 +1,6 @@
-//! A table as a list of columns: what each holds, and how its values are taken from a row of the report. Schemas, record batches
-//! and the page of `docs/reference/dive-tables.md` are made from the same list.
+//! A table as a list of columns: the content of each, and how its value is taken from a row of the report.
+//!
+//! The same list gives the schemas, the record batches and the page `docs/reference/dive-tables.csv`.
 
 use std::fmt::Write as _;
 use std::sync::Arc;
@@ -15,7 +16,7 @@ use crate::Error;
 pub(crate) const DIVE: &str = "dive";
 const DIVE_ABOUT: &str = "The dive: first 16 digits of its log's SHA-256; the key between tables";
 
-/// How a column's value is taken from a row; `None` is null.
+/// Takes a column's value from a row; `None` is null.
 pub(crate) enum Get<R> {
     Text(fn(&R) -> Option<String>),
     Number(fn(&R) -> Option<f64>),
@@ -49,13 +50,13 @@ impl<R> Get<R> {
     }
 }
 
-/// A column: name, with its unit; what it holds; how to take it.
+/// A column: its name with the unit, its description, and how to take its value.
 pub(crate) struct Column<R>(pub(crate) &'static str, pub(crate) &'static str, pub(crate) Get<R>);
 
 /// A table of rows `R`.
 pub(crate) struct Table<R> {
     pub(crate) name: &'static str,
-    /// What a row is.
+    /// Description of a row.
     pub(crate) about: &'static str,
     pub(crate) columns: Vec<Column<R>>,
 }
@@ -75,12 +76,14 @@ impl<R> Table<R> {
             .map_err(|source| Error::Table { table: self.name, source })
     }
 
-    /// The table as a section of Markdown.
+    /// Formats the table as a section of Markdown.
     pub(crate) fn describe(&self, page: &mut String) {
         let mut row = |name: &str, kind: &str, about: &str| {
             // Writing to a string can't fail.
-            writeln!(page, "| `{name}` | {kind} | {about} |").unwrap_or_default();
+            writeln!(page, "{},{name},{kind},\"{}\"", self.name, about.replace('"', "\"\""))
+                .unwrap_or_default();
         };
+        row("", "", self.about);
         row(DIVE, "text", DIVE_ABOUT);
         for Column(name, about, get) in &self.columns {
             let kind = match get {
@@ -95,7 +98,7 @@ impl<R> Table<R> {
     }
 }
 
-/// A count as Arrow's widest signed integer, which SQL adds up without surprises.
+/// A count as Arrow's widest signed integer, which SQL sums without surprises.
 #[expect(clippy::unnecessary_wraps, reason = "as columns want it")]
 pub(crate) fn count(value: impl TryInto<i64>) -> Option<i64> {
     Some(value.try_into().unwrap_or(i64::MAX))

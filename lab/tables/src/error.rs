@@ -1,4 +1,4 @@
-//! Why a dive has no tables.
+//! Errors of making a dive's tables.
 
 use std::path::PathBuf;
 
@@ -9,7 +9,7 @@ use headrace_replay::drive::DriveError;
 use headrace_replay::log::LogError;
 use headrace_replay::smooth::SmoothError;
 
-/// Why a dive has no tables.
+/// A dive's tables can't be made.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
@@ -50,7 +50,7 @@ pub enum Error {
         /// The first of its losses.
         loss: Option<String>,
     },
-    /// The vehicle file is wrong.
+    /// The vehicle file is invalid.
     #[error(transparent)]
     Vehicle(#[from] ConfigErrors),
     /// The loop can't be armed.
@@ -59,27 +59,27 @@ pub enum Error {
     /// The replay stopped early.
     #[error(transparent)]
     Drive(#[from] DriveError),
-    /// It was told to stop before the log's end.
+    /// The replay was stopped before the log's end.
     #[error("replaying {}: stopped before its end", log.display())]
     Stopped {
         /// The log.
         log: PathBuf,
     },
-    /// Smoothing was asked for of a vehicle without a filter.
+    /// Smoothing was requested for a vehicle without a filter.
     #[error("replaying {}: smooth needs [navigation] way = \"filter\"; the vehicle file has way = \"direct\"", log.display())]
     NoFilter {
         /// The log.
         log: PathBuf,
     },
-    /// Smoothing fails.
+    /// Smoothing failed.
     #[error("smoothing: {0}")]
     Smooth(#[from] SmoothError),
-    /// Columns don't make a table: a defect of this library.
+    /// Columns don't form a table: a defect of this library.
     #[error("making table {table}: {source}")]
     Table {
         /// The table.
         table: &'static str,
-        /// What Arrow says.
+        /// Error of Arrow.
         source: ArrowError,
     },
 }

@@ -1,4 +1,4 @@
-//! The device kinds that a vehicle file may name; the same as of the `headrace` command, which a test holds.
+//! The device kinds that a vehicle file may name. A test checks that they equal those of the `headrace` command.
 
 use headrace_sensor::device::DeviceKind;
 
@@ -15,9 +15,9 @@ pub const KINDS: [&dyn DeviceKind; 7] = [
 
 #[cfg(test)]
 mod tests {
-    /// The lists can't be one: the command's crate would bring its terminal, page and ports along.
+    /// The lists can't be shared: the command's crate would add its terminal, page and ports as dependencies.
     #[test]
-    fn the_list_is_the_commands() {
+    fn list_equals_that_of_the_command() {
         let lines = |text: &str| -> Vec<String> {
             let kinds = text.lines().map(str::trim).filter(|line| line.starts_with("&headrace_"));
             kinds.map(str::to_owned).collect()

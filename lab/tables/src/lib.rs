@@ -9,7 +9,7 @@
 //! # Ok::<(), headrace_tables::Error>(())
 //! ```
 //!
-//! `docs/reference/dive-tables.md` describes the tables. The same log with the same parameters gives the same tables, bit for bit, on any machine.
+//! `docs/reference/dive-tables.csv` describes the tables. The same log with the same parameters gives the same tables, bit for bit, on any machine.
 
 mod column;
 mod error;
@@ -19,7 +19,6 @@ mod replay;
 mod stoppable;
 mod tables;
 
-use std::fmt::Write as _;
 use std::path::PathBuf;
 use std::sync::atomic::AtomicBool;
 
@@ -41,7 +40,7 @@ use tables::sources::{alerts, sources};
 /// Names of the tables, `dives` first.
 pub const TABLES: [&str; 7] = ["dives", "sections", "holes", "flags", "runs", "sources", "alerts"];
 
-/// The program: its version, and a digest of the sources that decide a dive's results. Tables of two versions may differ.
+/// The program's version, and a digest of the sources that decide a dive's results. Tables of two versions may differ.
 pub fn program_version() -> &'static str {
     concat!(env!("CARGO_PKG_VERSION"), "+", env!("HEADRACE_SOURCES"))
 }
@@ -51,7 +50,7 @@ pub fn program_version() -> &'static str {
 pub struct Tables {
     /// One row.
     pub dives: RecordBatch,
-    /// A row for each section of the way.
+    /// A row for each section of the coverage extent.
     pub sections: RecordBatch,
     /// A row for each hole that is the largest of a section.
     pub holes: RecordBatch,
@@ -66,7 +65,7 @@ pub struct Tables {
 }
 
 impl Tables {
-    /// The table of a name of [`TABLES`].
+    /// The table with a name of [`TABLES`].
     pub fn get(&self, name: &str) -> Option<&RecordBatch> {
         Some(match name {
             "dives" => &self.dives,
@@ -81,7 +80,7 @@ impl Tables {
     }
 }
 
-/// Schema of the table of a name of [`TABLES`].
+/// Schema of the table with a name of [`TABLES`].
 pub fn schema(name: &str) -> Option<SchemaRef> {
     Some(match name {
         "dives" => dives().schema(),
@@ -95,24 +94,24 @@ pub fn schema(name: &str) -> Option<SchemaRef> {
     })
 }
 
-/// Key of a dive between the tables: the first 16 digits of its log's SHA-256.
+/// Key that identifies a dive in all tables: the first 16 digits of its log's SHA-256.
 pub fn dive_key(log_sha256: &str) -> &str {
     log_sha256.get(..16).unwrap_or(log_sha256)
 }
 
 /// Replays a dive and makes its tables.
 ///
-/// `log` are the files of one dive: a log, or the parts of a recording in order. Takes one thread, and about as long as
-/// `headrace replay`.
+/// `log` has the files of one dive: a log, or the parts of a recording in order. The replay takes one thread, and about
+/// as long as `headrace replay`.
 ///
-/// Errors: see [`Error`]. Data that were lost are no error: `dives.losses` counts them, `dives.lost` names them and
+/// Errors: see [`Error`]. Lost data isn't an error: `dives.losses` counts the losses, `dives.lost` names them and
 /// `dives.exit_code` is 3.
 pub fn replay(log: &[PathBuf], parameters: &Parameters) -> Result<Tables, Error> {
     let first = log.first().ok_or(Error::NoLog)?.display().to_string();
     replay_digested(log, &first, &log_digest(log)?, parameters)
 }
 
-/// The same, until another thread sets `stop`.
+/// Replays a dive like [`replay`], until another thread sets `stop`.
 ///
 /// Errors: see [`replay`]; [`Error::Stopped`].
 pub fn replay_until(log: &[PathBuf], parameters: &Parameters, stop: &AtomicBool) -> Result<Tables, Error> {
@@ -120,7 +119,7 @@ pub fn replay_until(log: &[PathBuf], parameters: &Parameters, stop: &AtomicBool)
     tables_of(log, &first, &log_digest(log)?, parameters, stop)
 }
 
-/// The same for a log whose [`log_digest`] is known, and that `dives.log` names otherwise.
+/// Replays a log whose [`log_digest`] is known, under another name in `dives.log`.
 ///
 /// Errors: see [`replay`].
 pub fn replay_digested(
@@ -159,10 +158,11 @@ fn tables_of(
     })
 }
 
-/// The tables of a log that couldn't be replayed: a row of `dives` with the error, and nothing else. `sha256` is the log's
-/// [`log_digest`], empty where that can't be read either; `log` is its path.
+/// The tables of a log that couldn't be replayed: only a row of `dives` with the error.
 ///
-/// Errors: none of the caller's making, see [`Error::Table`].
+/// `sha256` is the log's [`log_digest`], empty if that can't be computed; `log` is its path.
+///
+/// Errors: [`Error::Table`], which the caller can't cause.
 pub fn unread(log: &str, sha256: &str, parameters: &Parameters, error: &str) -> Result<Tables, Error> {
     let row =
         Row { log, sha256, parameters: &parameters.digest(), version: program_version(), dive: Err(error) };
@@ -177,15 +177,11 @@ pub fn unread(log: &str, sha256: &str, parameters: &Parameters, error: &str) -> 
     })
 }
 
-/// The tables and their columns as Markdown, as `docs/reference/dive-tables.md` has them.
+/// The tables and their columns as CSV, for `docs/reference/dive-tables.csv`. A row without a column describes the table.
 pub fn described() -> String {
-    let mut page = String::new();
-    let begin = |page: &mut String, name: &str, about: &str| {
-        // Writing to a string can't fail.
-        write!(page, "\n### {name}\n{about}\n\n| column | type | |\n|---|---|---|\n").unwrap_or_default();
-    };
+    let mut page = "table,column,type,description\n".to_owned();
     macro_rules! describe {
-        ($($table:expr),*) => { $( let table = $table; begin(&mut page, table.name, table.about); table.describe(&mut page); )* };
+        ($($table:expr),*) => { $( $table.describe(&mut page); )* };
     }
     describe!(dives(), sections(), holes_table(), flags_table(), runs_table(), sources(), alerts());
     page

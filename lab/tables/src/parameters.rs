@@ -1,4 +1,4 @@
-//! What a replay may be asked for beyond what its log says.
+//! Parameters of a replay that override those of its log.
 
 use std::collections::BTreeMap;
 use std::ops::RangeInclusive;
@@ -9,16 +9,16 @@ use sha2::{Digest, Sha256};
 
 use crate::Error;
 
-/// Targets that may be asked for, m; the same as of `headrace replay --target`.
+/// Allowed targets, m; the same as for `headrace replay --target`.
 const TARGET_M: RangeInclusive<f64> = 0.01..=20.0;
-/// Section lengths, m.
+/// Allowed section lengths, m.
 const SECTION_M: RangeInclusive<f64> = 0.05..=10.0;
-/// Speeds of sound, m/s.
+/// Allowed speeds of sound, m/s.
 const SOUND_SPEED_MPS: RangeInclusive<f64> = 1300.0..=1700.0;
 
-/// Parameters of a replay. Whatever isn't given is as in the vehicle file that is attached to the log.
+/// Parameters of a replay; each defaults to the setting of the vehicle file attached to the log.
 ///
-/// The length of a tick isn't among them: no result depends on it.
+/// The length of a tick isn't a parameter, since no result depends on it.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Parameters {
@@ -28,9 +28,9 @@ pub struct Parameters {
     pub section_m: Option<f64>,
     /// Speed of sound in the water, m/s, 1300 to 1700.
     pub sound_speed_mps: Option<f64>,
-    /// Text of a vehicle file in place of the log's.
+    /// Text of a vehicle file that replaces the log's.
     pub vehicle: Option<String>,
-    /// Text of the files that `vehicle` names, by the name it gives them; others are looked for in the log.
+    /// Text of the files that `vehicle` names, by name. Files not listed here are taken from the log.
     pub vehicle_files: BTreeMap<String, String>,
     /// Judge along the smoothed trajectory.
     pub smooth: bool,
@@ -73,7 +73,7 @@ impl Parameters {
         Ok(())
     }
 
-    /// Whether every value is in its range; for callers that would rather know before the first log.
+    /// Checks that every value is in its range, for callers that need to know before the first log.
     ///
     /// Errors: a value out of its range.
     pub fn check(&self) -> Result<(), Error> {
@@ -101,7 +101,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn every_parameter_moves_the_digest_and_out_of_range_is_refused() {
+    fn every_parameter_changes_the_digest_and_range_errors_are_refused() {
         let of = |change: fn(&mut Parameters)| {
             let mut parameters = Parameters::default();
             change(&mut parameters);

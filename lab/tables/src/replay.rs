@@ -1,4 +1,4 @@
-//! One dive, from its log to its report, in-process and on the calling thread.
+//! Replays one dive from its log to its report, in-process and on the calling thread.
 
 use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
@@ -20,33 +20,33 @@ use crate::kinds::KINDS;
 use crate::stoppable::Stoppable;
 use crate::{Error, Parameters};
 
-/// Longest vehicle file, or file that it names, bytes.
+/// Longest vehicle file, or file named by it, bytes.
 const TEXT_BYTES: u64 = 16 << 20;
 
-/// A dive as replayed.
+/// A replayed dive.
 pub(crate) struct Dive {
     pub(crate) report: Report,
     pub(crate) vehicle: String,
     pub(crate) about: About,
 }
 
-/// What a log says of itself.
+/// Facts that a log states about itself.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct About {
     /// The program that wrote it.
     pub(crate) recorded_version: Option<String>,
-    /// The scene that it is a simulation of.
+    /// The simulated scene, if the log is a simulation.
     pub(crate) scene: Option<String>,
-    /// UTC of the zero of its clock, nanoseconds.
+    /// UTC at the zero of its clock, nanoseconds.
     pub(crate) utc_of_zero_ns: Option<i64>,
 }
 
-/// Keys of a log's metadata, as `headrace run` and `headrace simulate` write them.
+/// Keys of a log's metadata, as written by `headrace run` and `headrace simulate`.
 const VERSION: &str = "version";
 const SCENE: &str = "simulated";
 const ANCHOR: [&str; 2] = ["clock_anchor_monotonic_ns", "clock_anchor_utc_ns"];
 
-/// SHA-256 of a dive's log, of its parts' concatenated bytes, hexadecimal.
+/// SHA-256 over the concatenated bytes of a dive's files, hexadecimal.
 ///
 /// Errors: a file can't be read.
 pub fn log_digest(log: &[PathBuf]) -> Result<String, Error> {
@@ -106,7 +106,7 @@ fn vehicle(log: &Path, player: &Player, parameters: &Parameters) -> Result<Vehic
     Ok(VehicleConfig::parse(Document::new(&name, text), &KINDS, &load)?)
 }
 
-/// A replay from the beginning to the end.
+/// Replays from the beginning to the end.
 fn straight(
     mut player: Stoppable<'_>,
     vehicle: &VehicleConfig,
@@ -129,7 +129,7 @@ fn straight(
     Ok(Report::of(&armed))
 }
 
-/// A replay with the filter, smoothing, and a replay along the smoothed trajectory, as of `headrace replay --smooth`.
+/// Replays with the filter, smooths, and replays along the smoothed trajectory, like `headrace replay --smooth`.
 fn smoothed(
     log: &[PathBuf],
     player: &mut Player,
@@ -160,9 +160,9 @@ fn about(player: &Player) -> About {
 }
 
 impl Parameters {
-    /// Takes a vehicle file, and the files that it names, into the parameters.
+    /// Reads a vehicle file, and the files that it names, into the parameters.
     ///
-    /// Errors: it can't be read, or is wrong.
+    /// Errors: it can't be read, or is invalid.
     pub fn read_vehicle(&mut self, path: &Path) -> Result<(), Error> {
         let failed = |source| Error::Read { path: path.to_owned(), source };
         let text = regular_file::read_text(path, TEXT_BYTES).map_err(failed)?;

@@ -1,4 +1,4 @@
-//! A log that ends early when another thread says so.
+//! A log that ends early when another thread requests it.
 
 use std::sync::atomic::{AtomicBool, Ordering};
 
@@ -24,7 +24,9 @@ impl<'a> Stoppable<'a> {
         self.player.connect(sources);
     }
 
-    /// Errors: it was stopped.
+    /// Checks whether a stop was requested.
+    ///
+    /// Errors: it was.
     pub(crate) fn check(&self) -> Result<(), Error> {
         if !self.stop.load(Ordering::Relaxed) {
             return Ok(());

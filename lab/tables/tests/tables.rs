@@ -1,4 +1,4 @@
-//! Tables against the reports that `headrace replay` made of the same logs, and against their page.
+//! Compares tables with the reports that `headrace replay` made of the same logs, and with their page.
 
 #![allow(clippy::unwrap_used, clippy::panic, reason = "a test fails by them")]
 
@@ -40,7 +40,7 @@ fn value(batch: &RecordBatch, column: &str, row: usize) -> Value {
     json!(array.as_string::<i32>().value(row))
 }
 
-/// Rows of a table against objects of a report: (column, path in the object).
+/// Compares rows of a table with objects of a report: (column, path in the object).
 fn same(batch: &RecordBatch, objects: &Value, pairs: &[(&str, &str)]) {
     let objects = objects.as_array().unwrap();
     assert_eq!(batch.num_rows(), objects.len());
@@ -80,7 +80,7 @@ const SECTIONS: [(&str, &str); 24] = [
 ];
 
 #[test]
-fn tables_say_what_reports_say() {
+fn tables_match_reports() {
     for name in ["too-fast", "stalls", "slipping-cable", "wrong-bytes", "murk"] {
         let (tables, report) = (tables(name), report(name));
         same(&tables.sections, &report["sections"], &SECTIONS);
@@ -141,7 +141,7 @@ fn tables_say_what_reports_say() {
             &Value::Array(flagged),
             &[("chainage_m", "/start_m"), ("raised_s", "/flagged_s")],
         );
-        // Every section's hole is in `holes`, and no other.
+        // `holes` contains every section's hole, and no other.
         let mut places: Vec<(u64, u64)> = Vec::new();
         for section in report["sections"].as_array().unwrap().iter().filter(|of| !of["hole_m"].is_null()) {
             let bits = |key: &str| section[key].as_f64().unwrap().to_bits();
@@ -213,20 +213,16 @@ fn losses_and_unreadable_logs_are_rows() {
     assert_eq!(tables.sections.num_rows(), 0);
 }
 
-/// The page has the tables as the code has them; `RENEW=1 cargo test -p headrace_tables` writes them anew.
+/// The page must have the tables as in the code. `RENEW=1 cargo test -p headrace_tables` rewrites them.
 #[test]
-fn the_page_has_every_column() {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs/reference/dive-tables.md");
-    let page = std::fs::read_to_string(&path).unwrap();
-    let (before, rest) = page.split_once("<!-- tables -->\n").unwrap();
-    let (there, after) = rest.split_once("<!-- end of tables -->").unwrap();
+fn page_has_every_column() {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs/reference/dive-tables.csv");
     if std::env::var_os("RENEW").is_some() {
-        let page = format!("{before}<!-- tables -->\n{}<!-- end of tables -->{after}", described());
-        std::fs::write(&path, page).unwrap();
-    } else {
-        assert!(
-            there == described(),
-            "docs/reference/dive-tables.md differs from the code: RENEW=1 writes it anew"
-        );
+        std::fs::write(&path, described()).unwrap();
     }
+    let there = std::fs::read_to_string(&path).unwrap();
+    assert!(
+        there == described(),
+        "docs/reference/dive-tables.csv differs from the code: RENEW=1 writes it anew"
+    );
 }

@@ -1,7 +1,7 @@
-//! Velocity reports to readings of velocity over ground.
+//! Decodes velocity reports into readings of velocity over ground.
 //!
-//! Device axes are x forward, y right, z down; ours are x forward, y left, z up: y and z change sign.
-//! In air and close to surfaces the device is known to send wrong velocities as valid and to repeat reports; both are
+//! Device axes are x forward, y right, z down; headrace's are x forward, y left, z up, so y and z change sign. In air
+//! and close to surfaces the device is known to send wrong velocities as valid and to repeat reports. Both are
 //! withheld and counted by reason.
 
 use headrace_sensor::codec::{Codec as _, CodecCounts, Framing as _, LineClock};
@@ -14,10 +14,10 @@ use serde::{Deserialize, Serialize};
 
 use crate::report::{Against, LineCodec, Lines, Velocity};
 
-/// Longest usual gap within a line: covers a TCP retransmission, whose timer is at least 200 ms.
+/// Longest usual gap within a line. It covers a TCP retransmission, whose timer is at least 200 ms.
 const SILENCE: DurNs = DurNs::from_millis(1000);
 
-/// Least number of beams: a velocity has three components.
+/// Least number of beams, because a velocity has three components.
 const LEAST_BEAMS: u8 = 3;
 /// Altitude range of an A50, m.
 const ALTITUDES_M: core::ops::RangeInclusive<f64> = 0.05..=50.0;
@@ -159,7 +159,7 @@ impl State {
     }
 }
 
-/// True if a report has the same timestamp as the last, or is identical to the last bit, which no new report is.
+/// True if a report repeats the last: it has the same timestamp, or is bit-identical, which no new report is.
 fn repeats(report: &Velocity, last: &Velocity) -> bool {
     let [now, before] = [report, last].map(|report| report.times_us.map(|[validity, _]| validity));
     let values = |of: &Velocity| {

@@ -11,14 +11,16 @@ pub const CARRIERS: [Carrier; 2] = [Carrier::Tcp, Carrier::Udp];
 
 /// Longest usual gap within a line.
 const SILENCE: DurNs = DurNs::from_millis(200);
-/// Lines in a row without a velocity from which the device is said not to be understood; it reports several times a second.
+/// Number of consecutive lines without a velocity after which the format counts as unknown.
+///
+/// The device reports several times a second.
 const NOT_UNDERSTOOD_FROM: u32 = 20;
 
 /// Driver of an A50.
 pub struct A50Driver {
     cutter: Cutter<Lines, MAX_LINE_BYTES>,
     velocities: u64,
-    /// Lines since the last velocity, and their format, if they name one.
+    /// Lines since the last velocity, and their format, if it is named.
     others: u32,
     format: Option<String>,
 }
@@ -53,7 +55,7 @@ impl Driver for A50Driver {
                 *velocities += 1;
                 *others = 0;
             } else if let Some(named) = format_of(piece.bytes) {
-                // A report that lacks a field is no frame; what it calls itself is still to be read.
+                // A report with a missing field is no frame, but its format name can still be read.
                 *others = others.saturating_add(1);
                 *format = Some(named);
             } else if piece.is_frame {

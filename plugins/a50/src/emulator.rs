@@ -10,9 +10,9 @@ use crate::report::{Against, Velocity};
 const DELAY_US: i64 = 100_000;
 /// Device clock at power-on, microseconds since 1970.
 const BEGINS_US: i64 = 1_638_191_471_000_000;
-/// Altitude, m: the emulator has no model of the surface that the beams meet.
+/// Altitude, m. It is constant, because the emulator has no model of the surface that the beams meet.
 const ALTITUDE_M: f64 = 1.0;
-/// Alternating figures of merit: the decoder withholds identical reports as repeats.
+/// Alternating figures of merit, because the decoder withholds identical reports as repeats.
 const FOMS_MPS: [f64; 2] = [0.001, 0.001_1];
 
 /// Emulation settings.

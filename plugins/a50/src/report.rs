@@ -75,7 +75,7 @@ impl Velocity {
     }
 }
 
-/// A line that is a JSON object.
+/// Kind of a line that is a JSON object.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Line {
     Velocity(Velocity),
@@ -125,7 +125,7 @@ impl Found {
         Ok(())
     }
 
-    /// The report, if it is complete.
+    /// The report, if no field is missing.
     fn whole(self) -> Option<Velocity> {
         let [x, y, z] = self.velocity_mps;
         let [validity, transmission] = self.times_us;
@@ -172,7 +172,7 @@ fn is_velocity(line: &str) -> Result<bool, Error> {
     Ok(is_velocity)
 }
 
-/// Parses a line; `None` if it is no object, or a velocity report that lacks a field.
+/// Parses a line; `None` if it is no object, or is a velocity report with a missing field.
 fn line(line: &[u8]) -> Option<Line> {
     let line = core::str::from_utf8(line).ok()?;
     if !is_velocity(line).ok()? {
@@ -233,11 +233,11 @@ fn skip(next: u8, lexer: &mut SliceLexer<'_>, depth: usize) -> Result<(), Error>
     }
 }
 
-/// Longest name of a format that is told.
+/// Longest displayed name of a format.
 const MAX_FORMAT_BYTES: usize = 24;
 
-/// What a line, or a part of one, names as its format, whether it is understood or not. Letters, digits, `_` and `.` only:
-/// it is shown to people.
+/// Format named by a line or a part of one, understood or not. Only letters, digits, `_` and `.` are accepted,
+/// because the name is displayed.
 pub(crate) fn format_of(bytes: &[u8]) -> Option<String> {
     const KEY: &[u8] = b"\"format\"";
     let at = bytes.windows(KEY.len()).position(|window| window == KEY)?;
@@ -248,7 +248,7 @@ pub(crate) fn format_of(bytes: &[u8]) -> Option<String> {
     (!name.is_empty() && name.iter().all(is_plain)).then(|| String::from_utf8_lossy(&name).into_owned())
 }
 
-/// Framing of lines in a byte stream. A velocity report that lacks a field is a bad line.
+/// Framing of lines in a byte stream. A velocity report with a missing field is a bad line.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Lines;
 
@@ -314,7 +314,7 @@ pub(crate) mod tests {
     );
 
     #[test]
-    fn the_makers_example_is_read() {
+    fn maker_example_is_read() {
         let got = decode_all(&mut LineCodec::default(), EXAMPLE.as_bytes());
         let velocity = Velocity {
             against: Against::Bottom,
@@ -330,7 +330,7 @@ pub(crate) mod tests {
     }
 
     #[test]
-    fn other_lines_are_good_and_say_nothing() {
+    fn other_lines_are_good_without_a_reading() {
         let mut codec = LineCodec::default();
         let lines = [POSITION, RESPONSE, "{}\n", EXAMPLE].concat();
         assert_eq!(decode_all(&mut codec, lines.as_bytes()).len(), 1);
@@ -338,7 +338,7 @@ pub(crate) mod tests {
     }
 
     #[test]
-    fn a_report_that_lacks_something_is_no_good_line() {
+    fn report_with_a_missing_field_is_a_bad_line() {
         for (what, instead) in [
             ("\"vx\": -3.713480691658333e-05, ", ""),
             ("\"vy\": 5.703703573090024e-05", "\"vy\": null"),
@@ -362,7 +362,7 @@ pub(crate) mod tests {
     }
 
     #[test]
-    fn a_line_without_end_holds_no_more_than_its_room() {
+    fn endless_line_stays_within_the_buffer() {
         let endless = [b"{\"".to_vec(), vec![b'a'; 3 * MAX_LINE_BYTES]].concat();
         let mut codec = LineCodec::default();
         let got = decode_all(&mut codec, &[&endless, EXAMPLE.as_bytes()].concat());
@@ -383,7 +383,7 @@ pub(crate) mod tests {
     }
 
     #[test]
-    fn what_is_no_json_is_refused() {
+    fn invalid_json_is_refused() {
         for value in [
             "",
             "{",
@@ -450,13 +450,13 @@ pub(crate) mod tests {
         #![proptest_config(headrace_sensor::codec::contract::config())]
 
         #[test]
-        fn what_another_writer_writes_is_json(value in any_value(), pretty in any::<bool>()) {
+        fn json_of_another_writer_is_accepted(value in any_value(), pretty in any::<bool>()) {
             let text = if pretty { serde_json::to_string_pretty(&value) } else { serde_json::to_string(&value) };
             prop_assert!(is_good(&text.unwrap()));
         }
 
         #[test]
-        fn what_is_json_here_is_json_to_another_reader(
+        fn accepted_json_is_valid_for_another_reader(
             value in any_value(),
             at in any::<prop::sample::Index>(),
             byte in any::<u8>(),
@@ -470,7 +470,7 @@ pub(crate) mod tests {
         }
 
         #[test]
-        fn fields_are_those_that_another_reader_finds(velocity in any_velocity()) {
+        fn fields_match_another_reader(velocity in any_velocity()) {
             let line = velocity.encode();
             let value: Value = serde_json::from_slice(&line).unwrap();
             let got = decode_all(&mut LineCodec::default(), &line)[0];

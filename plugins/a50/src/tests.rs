@@ -61,7 +61,7 @@ fn good() -> Velocity {
 }
 
 #[test]
-fn velocities_come_back_at_their_own_times() {
+fn velocities_round_trip_with_their_times() {
     let setup = EmulatorSetup { start: START, head: None, site: Site::default(), polled: true };
     let device = configured("rate_hz = 12.5\n").unwrap();
     assert_eq!(device.sense(), Sense::Velocity);
@@ -87,7 +87,7 @@ fn velocities_come_back_at_their_own_times() {
 }
 
 #[test]
-fn a_vehicle_that_stands_is_heard_each_time() {
+fn reports_of_a_stationary_vehicle_are_no_repeats() {
     let setup = EmulatorSetup { start: START, head: None, site: Site::default(), polled: true };
     let Emulated::VelocityLog(mut emulator) = configured("").unwrap().emulator(&setup) else { panic!() };
     let (mut due, mut heard, mut decoder) = (Vec::new(), 0, decoder());
@@ -99,7 +99,7 @@ fn a_vehicle_that_stands_is_heard_each_time() {
 }
 
 #[test]
-fn axes_that_point_right_and_down_are_turned_and_the_devices_delay_is_taken_off() {
+fn device_axes_are_converted_and_the_device_delay_is_subtracted() {
     let got = decode(&mut decoder(), START, &good().encode());
     let valid_at = START - DurNs::from_millis(124);
     assert_eq!(
@@ -109,13 +109,13 @@ fn axes_that_point_right_and_down_are_turned_and_the_devices_delay_is_taken_off(
 }
 
 #[test]
-fn without_times_only_the_latency_is_known() {
+fn report_without_times_uses_the_latency_alone() {
     let report = Velocity { times_us: None, ..good() };
     assert_eq!(decode(&mut decoder(), START, &report.encode())[0].valid_at, START - LATENCY);
 }
 
 #[test]
-fn a_line_in_pieces_came_with_its_first_byte() {
+fn split_line_has_the_time_of_its_first_byte() {
     let mut decoder = decoder();
     let (first, rest) = EXAMPLE.as_bytes().split_at(700);
     assert_eq!(decode(&mut decoder, START, first), []);
@@ -124,7 +124,7 @@ fn a_line_in_pieces_came_with_its_first_byte() {
 }
 
 #[test]
-fn what_is_not_fit_for_use_is_withheld_by_reason() {
+fn unusable_reports_are_withheld_by_reason() {
     let none = Withheld::default();
     for (report, wanted) in [
         (Velocity { is_valid: false, ..good() }, Withheld { invalid: 1, ..none }),
@@ -149,7 +149,7 @@ fn what_is_not_fit_for_use_is_withheld_by_reason() {
 }
 
 #[test]
-fn repeats_are_heard_once() {
+fn repeated_reports_count_once() {
     let mut decoder = decoder();
     let later = Some([1_100_000, 1_220_000]);
     let reports = [
@@ -187,7 +187,7 @@ impl Wire for Nowhere {
 }
 
 #[test]
-fn a_format_that_is_not_understood_is_named_until_a_velocity_comes() {
+fn unknown_format_is_reported_until_a_velocity_arrives() {
     // Reports of older firmware have no type; a later one might call its fields something else.
     let older = EXAMPLE.replace("json_v3.2", "json_v1").replace("\"type\": \"velocity\", ", "");
     let renamed = EXAMPLE.replace("json_v3.2", "json_v9").replace("\"vx\"", "\"v_x\"");
@@ -208,7 +208,7 @@ fn a_format_that_is_not_understood_is_named_until_a_velocity_comes() {
 }
 
 #[test]
-fn a_device_that_sends_no_velocity_at_all_is_said_to() {
+fn device_without_velocities_is_reported() {
     let mut driver = A50Driver::new();
     driver.heard(START, "{\"a\":1}\n".repeat(20).as_bytes(), &mut Nowhere);
     assert!(driver.health().complaint.unwrap().contains("without a velocity, and without their format"));

@@ -24,11 +24,11 @@ const PA_PER_BAR: f64 = 1.0e5;
 /// Reference of a sensor's pressure.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum PressureMode {
-    /// PR: ambient air, through a vent.
+    /// PR: relative to ambient air, through a vent.
     Vented,
-    /// PA: one bar, sealed in.
+    /// PA: relative to one bar, sealed in.
     Sealed,
-    /// PAA: vacuum.
+    /// PAA: relative to vacuum.
     Absolute,
 }
 
@@ -73,7 +73,7 @@ pub enum CalibrationError {
 }
 
 impl PressureMode {
-    /// From the two bits of cell 0x12.
+    /// Converts the two bits of cell 0x12.
     ///
     /// Errors: 3 or more; a wrong mode would shift the depth by ten metres.
     pub fn from_wire(mode: u8) -> Result<Self, CalibrationError> {
@@ -85,7 +85,7 @@ impl PressureMode {
         }
     }
 
-    /// The two bits of cell 0x12.
+    /// Returns the two bits of cell 0x12.
     pub fn to_wire(self) -> u8 {
         match self {
             Self::Vented => 0,
@@ -174,7 +174,7 @@ impl Calibration {
     }
 }
 
-/// Values of the vehicle file that override the sensor's memory, for logs that begin in mid-dive.
+/// Values of the vehicle file that override the sensor's memory, for logs that begin during a dive.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Overrides {
     /// Lower limit, bar.
@@ -281,7 +281,7 @@ mod tests {
     }
 
     #[test]
-    fn the_kind_of_pressure_shifts_it() {
+    fn pressure_mode_shifts_the_pressure() {
         let pa = |mode| Calibration::new(mode, 0.0, 100.0).unwrap().pressure_pa(16_384, 0.95);
         assert!((pa(PressureMode::Vented) - 95_000.0).abs() < 1e-9);
         assert!((pa(PressureMode::Sealed) - 100_000.0).abs() < 1e-9);
@@ -289,7 +289,7 @@ mod tests {
     }
 
     #[test]
-    fn an_undefined_mode_and_impossible_limits_are_refused() {
+    fn undefined_mode_and_impossible_limits_are_refused() {
         let mut read = READ;
         read[0][3] = 0x3F;
         let cells = noted(&read);
@@ -304,7 +304,7 @@ mod tests {
     }
 
     #[test]
-    fn words_come_back() {
+    fn memory_words_round_trip() {
         let calibration = Calibration::new(PressureMode::Absolute, -1.0, 350.5).unwrap();
         let mut cells = CalibrationCells::default();
         for (cell, word) in calibration.to_words(Scaling0::from_word(0x5B3D)) {

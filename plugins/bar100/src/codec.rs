@@ -64,7 +64,7 @@ pub enum TransactionError {
     #[error("reading the status: 0x00, the sensor isn't ready; a good one is 0x40")]
     NotReady,
     /// No device answered.
-    #[error("reading the status: 0xFF, the bus is held high or nobody answers; a good one is 0x40")]
+    #[error("reading the status: 0xFF, the bus is held high or no device answers; a good one is 0x40")]
     BusHigh,
     /// Bits 7 and 6 are not 01.
     #[error("reading the status: {0:#04X}, bits 7 and 6 must be 01")]
@@ -87,7 +87,7 @@ pub enum TransactionError {
     },
     /// The first byte is neither the measure command nor a memory cell, or the length doesn't fit it.
     #[error(
-        "reading a transaction of {len} bytes that begins with {first:#04X}: known are AC with 6 bytes and 00 to 7F with 4"
+        "reading a transaction of {len} bytes that begins with {first:#04X}: allowed are AC with 6 bytes, and 00 to 7F with 4"
     )]
     Unknown {
         /// First byte; 0 if there is none.
@@ -240,7 +240,7 @@ mod tests {
     }
 
     #[test]
-    fn worked_example_5_is_refused_each_for_its_reason() {
+    fn worked_example_5_is_refused_with_each_reason() {
         let measure = |status| Transaction::decode(&[MEASURE, status, 0x46, 0x46, 0x4F, 0xA0]);
         assert_eq!(Transaction::decode(&[MEASURE, 0, 0, 0, 0, 0]), Err(TransactionError::NotReady));
         let high = [MEASURE, 0xFF, 0xFF, 0xFF, 0xFF, 0xFF];
@@ -251,7 +251,7 @@ mod tests {
     }
 
     #[test]
-    fn busy_passes_and_zeros_do_not() {
+    fn busy_status_is_accepted_and_zero_counts_are_refused() {
         assert!(measured([0x60, 0x46, 0x46, 0x4F, 0xA0]).status.is_busy());
         assert!(matches!(
             Transaction::decode(&[MEASURE, 0x40, 0, 0, 0x4F, 0xA0]),
@@ -260,7 +260,7 @@ mod tests {
     }
 
     #[test]
-    fn a_memory_read_inside_a_refused_message_is_not_taken() {
+    fn memory_read_inside_a_refused_message_is_ignored() {
         let mut codec = Bar100Codec::default();
         let mut none = |transaction| panic!("{transaction:?}");
         codec.push(&[MEASURE, 0x44, 0x12, 0x40, 0x5B, 0x3D], &mut none);

@@ -1,4 +1,4 @@
-//! Transactions to readings of absolute pressure.
+//! Decodes transactions into readings of absolute pressure.
 
 use headrace_sensor::codec::{Codec as _, CodecCounts};
 use headrace_sensor::device::Decoder;

@@ -32,7 +32,7 @@ pub struct Bar100Driver {
 }
 
 impl Bar100Driver {
-    /// For `rate_hz` measurements a second.
+    /// Creates a driver that measures `rate_hz` times a second.
     pub fn new(rate_hz: f64) -> Self {
         let period = DurNs::from_secs_f64(1.0 / rate_hz);
         Self { period, next_at: MonoNs(0), cell: 0, bad_in_a_row: 0, good_frames: 0, complaint: None }
@@ -44,7 +44,7 @@ impl Bar100Driver {
                 self.good_frames += 1;
                 self.complaint = None;
                 self.bad_in_a_row = 0;
-                // A second answer to the same request must not stand for the next cell.
+                // A second answer to the same request must not count for the next cell.
                 let asked = CALIBRATION_CELLS.get(self.cell);
                 if matches!(&transaction, Transaction::Memory(read) if Some(&read.cell) == asked) {
                     self.cell += 1;
@@ -114,7 +114,7 @@ mod tests {
 
     impl Wire for Bus {
         fn send(&mut self, _: &[u8]) {
-            panic!("all is asked by transactions");
+            panic!("every request is a transaction");
         }
 
         fn exchange(&mut self, write: &[u8], _: DurNs, _: usize) {
@@ -124,10 +124,10 @@ mod tests {
         fn deliver(&mut self, _: MonoNs, _: &[u8]) {}
     }
 
-    /// A late answer makes the driver request the first cell twice; the second answer doesn't answer the next request, which is
-    /// lost and repeated.
+    /// After a late answer the driver requests the first cell twice. The second answer doesn't answer the next
+    /// request, which is lost and repeated.
     #[test]
-    fn a_late_answer_stands_for_no_other_cell() {
+    fn late_answer_counts_for_no_other_cell() {
         let (mut driver, mut bus) = (Bar100Driver::new(10.0), Bus::default());
         driver.opened(MonoNs(0), &mut bus);
         let answer = |cell| MemoryWord { cell, status: Status::IDLE, word: 7 }.encode();

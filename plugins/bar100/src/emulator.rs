@@ -1,5 +1,6 @@
-//! Sensor side of the bus: answers requests for calibration and measurements, from an emulated host at a fixed rate or from
-//! a real one.
+//! Sensor side of the bus: answers requests for calibration and measurements.
+//!
+//! Requests come from an emulated host at a fixed rate, or from a real host.
 
 use headrace_sensor::device::{Direction, Emulator, EmulatorSetup, LineSink};
 use headrace_sensor::geometry::time::{DurNs, MonoNs};

@@ -74,7 +74,7 @@ fn readings_are_withheld_until_the_calibration_is_known() {
 }
 
 #[test]
-fn a_log_that_begins_in_the_middle_is_read_with_the_files_calibration() {
+fn log_without_calibration_uses_the_vehicle_file() {
     let device = configured("p_min_bar = 0\np_max_bar = 100\np_mode = \"paa\"\n").unwrap();
     assert_eq!(device.specification().kind, SensorKind::Depth);
     let overrides = Overrides {
@@ -91,7 +91,7 @@ fn a_log_that_begins_in_the_middle_is_read_with_the_files_calibration() {
 }
 
 #[test]
-fn what_the_emulated_sensor_says_decodes_to_the_true_pressure() {
+fn emulated_sensor_decodes_to_the_true_pressure() {
     let start = MonoNs(5_000_000_000);
     let device = configured("rate_hz = 30\n").unwrap();
     let setup = EmulatorSetup { start, head: None, site: Site::default(), polled: true };

@@ -1,4 +1,4 @@
-//! Who may see and do what: tokens, hosts, origins.
+//! Access rights by tokens, hosts and origins.
 
 use std::collections::BTreeSet;
 use std::fmt;
@@ -11,16 +11,16 @@ pub(crate) const COOKIE: &str = "headrace_token";
 /// Bytes of entropy of a token.
 const TOKEN_BYTES: usize = 16;
 
-/// What a viewer may do.
+/// Rights of a viewer.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Role {
-    /// See.
+    /// May watch.
     Viewer,
-    /// See, acknowledge, note, control a replay.
+    /// May watch, acknowledge, take notes, and control a replay.
     Operator,
 }
 
-/// A secret. It isn't shown by `Debug`.
+/// A secret. `Debug` doesn't show it.
 #[derive(Clone)]
 pub struct Token(String);
 
@@ -31,18 +31,18 @@ impl fmt::Debug for Token {
 }
 
 impl Token {
-    /// A new one of the system's entropy.
+    /// Creates a random token from the system's entropy.
     ///
-    /// Errors: the system gives none.
+    /// Errors: the system provides no entropy.
     pub fn random() -> Result<Self, getrandom::Error> {
         let mut bytes = [0; TOKEN_BYTES];
         getrandom::fill(&mut bytes)?;
         Ok(Self(format!("{:032x}", u128::from_be_bytes(bytes))))
     }
 
-    /// One that was chosen: 16 to 128 letters, digits, `-` and `_`.
+    /// Accepts a chosen token: 16 to 128 letters, digits, `-` and `_`.
     ///
-    /// Errors: what is wrong with it, without its text.
+    /// Errors: the fault, without the token's text.
     pub fn chosen(text: &str) -> Result<Self, String> {
         let is_fit = |byte: u8| byte.is_ascii_alphanumeric() || b"-_".contains(&byte);
         if !(16..=128).contains(&text.len()) {
@@ -55,12 +55,12 @@ impl Token {
         }
     }
 
-    /// Its text, for who starts the program.
+    /// Its text, for the person who starts the program.
     pub fn text(&self) -> &str {
         &self.0
     }
 
-    /// Whether it is this one. Takes as long wherever they differ.
+    /// Compares in constant time.
     fn is(&self, other: &str) -> bool {
         let (own, other) = (self.0.as_bytes(), other.as_bytes());
         let differs =
@@ -69,38 +69,38 @@ impl Token {
     }
 }
 
-/// The tokens of those who see, and of those who act.
+/// Tokens of viewers and operators.
 #[derive(Debug, Clone)]
 pub struct Tokens {
-    /// The viewers'.
+    /// Token of viewers.
     pub viewer: Token,
-    /// The operators'.
+    /// Token of operators.
     pub operator: Token,
 }
 
-/// Who is let in.
+/// Rules of access.
 #[derive(Debug, Clone)]
 pub(crate) struct Access {
-    /// None on loopback: whoever is on this machine may act.
+    /// Tokens; `None` on loopback, where every local user may act.
     pub(crate) tokens: Option<Tokens>,
     /// Names of this machine besides addresses and `localhost`.
     pub(crate) hosts: Vec<String>,
-    /// Origins of other pages that may frame this one and send actions, `http://host`.
+    /// Origins (`http://host`) of other pages that may frame this one and send actions.
     pub(crate) origins: Vec<String>,
-    /// Only `localhost` and loopback addresses are this machine.
+    /// Whether only `localhost` and loopback addresses count as this machine.
     pub(crate) is_loopback: bool,
 }
 
 impl Access {
-    /// The role of a token.
+    /// Role of a token.
     pub(crate) fn role_of(&self, token: &str) -> Option<Role> {
         let tokens = self.tokens.as_ref()?;
-        // Both are compared, whichever it is.
+        // Both are always compared, so that the time doesn't show which one matched.
         let (operates, sees) = (tokens.operator.is(token), tokens.viewer.is(token));
         if operates { Some(Role::Operator) } else { sees.then_some(Role::Viewer) }
     }
 
-    /// Whether this is the token of a role. Others aren't compared.
+    /// Whether this is the token of a role. Other roles' tokens aren't compared.
     pub(crate) fn is_token_of(&self, role: Role, token: &str) -> bool {
         self.tokens.as_ref().is_some_and(|tokens| match role {
             Role::Viewer => tokens.viewer.is(token),
@@ -108,7 +108,7 @@ impl Access {
         })
     }
 
-    /// Whether the request names this machine: another name that leads here is DNS rebinding.
+    /// Whether the request names this machine. Another name that resolves to it is DNS rebinding.
     pub(crate) fn is_host(&self, headers: &HeaderMap) -> bool {
         let Some(host) = headers.get(header::HOST).and_then(|value| value.to_str().ok()) else {
             return false;
@@ -121,7 +121,7 @@ impl Access {
             || self.hosts.iter().any(|known| known.eq_ignore_ascii_case(name))
     }
 
-    /// Whether a request comes from our own page, from one that is told of, or from no page at all.
+    /// Whether a request comes from this page, from a declared origin, or from no page.
     pub(crate) fn is_origin(&self, headers: &HeaderMap) -> bool {
         let Some(origin) = headers.get(header::ORIGIN) else { return true };
         let (Ok(origin), Some(Ok(host))) =
@@ -134,7 +134,7 @@ impl Access {
     }
 }
 
-/// All tokens of a request, each once: of cookies, of `Authorization: Bearer`, and of the query.
+/// All distinct tokens of a request: from cookies, `Authorization: Bearer`, and the query.
 pub(crate) fn tokens_of(headers: &HeaderMap, uri: &Uri) -> BTreeSet<String> {
     let values = |name| headers.get_all(name).iter().filter_map(|value| value.to_str().ok());
     let cookies = values(header::COOKIE).flat_map(|line| line.split(';'));
@@ -152,7 +152,7 @@ pub(crate) fn name_of(host: &str) -> &str {
     }
 }
 
-/// A value of the query, its escapes resolved.
+/// A decoded value of the query.
 pub(crate) fn query(uri: &Uri, key: &str) -> Option<String> {
     let pairs = uri.query()?.split('&').filter_map(|pair| pair.split_once('='));
     pairs.into_iter().find(|(name, _)| *name == key).map(|(_, value)| unescaped(value))
@@ -220,7 +220,7 @@ mod tests {
     }
 
     #[test]
-    fn other_names_than_this_machines_are_refused() {
+    fn other_host_names_are_refused() {
         let is_host = |is_loopback, host| access(is_loopback).is_host(&headers(&[(header::HOST, host)]));
         for host in ["localhost:8881", "127.0.0.1:8881", "[::1]:8881", "rov.local"] {
             assert!(is_host(true, host) && is_host(false, host), "{host}");
@@ -233,7 +233,7 @@ mod tests {
     }
 
     #[test]
-    fn other_pages_are_refused_but_those_told_of() {
+    fn other_pages_are_refused_except_declared_ones() {
         let is_origin = |origin| {
             access(false).is_origin(&headers(&[(header::HOST, "127.0.0.1:8881"), (header::ORIGIN, origin)]))
         };

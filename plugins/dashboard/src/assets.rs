@@ -1,4 +1,4 @@
-//! The built page: `plugins/dashboard/page/dist`, listed by `build.rs` and held in the binary.
+//! The built page: `plugins/dashboard/page/dist`, listed by `build.rs` and embedded in the binary.
 
 include!(concat!(env!("OUT_DIR"), "/assets.rs"));
 
@@ -13,7 +13,7 @@ pub fn index() -> &'static [u8] {
         .unwrap_or(b"<!doctype html><title>headrace</title><p>This program was built without its page.")
 }
 
-/// The page as one file, its scripts and styles in it; `None` where the program was built without.
+/// The page as one file with its scripts and styles inline; `None` if the program was built without it.
 pub fn single() -> Option<&'static str> {
     core::str::from_utf8(asset("single.html")?).ok()
 }
@@ -42,7 +42,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_page_and_all_that_it_refers_to_are_there() {
+    fn page_and_all_its_files_are_embedded() {
         let page = core::str::from_utf8(index()).unwrap();
         assert!(page.to_lowercase().contains("<!doctype html>"));
         let referred = page

@@ -1,7 +1,8 @@
-//! Takes of the loop, on its thread, what the page shows, and hands it over without waiting.
+//! Collects the page's data on the loop's thread, and hands it over without waiting.
 //!
-//! What finds no room stays here and goes with the next: sections by their numbers, the newest state, and a bounded number of
-//! samples and lines. Samples beyond are counted, and those of wall are taken again from the loop's own store, where it has them.
+//! Data without room in the queue stays here and goes with the next message: section numbers, the newest state, and a
+//! bounded number of samples and lines. Further samples are counted. Wall samples among them are read again from the
+//! loop's own store, if it has them.
 
 use std::collections::BTreeSet;
 
@@ -24,19 +25,19 @@ use crate::compared::Compared;
 use crate::fed::{Beside, Dropped, EchoJson, Fed, News, PlaybackState, PoseJson, RateJson, RecordingJson};
 use crate::wire::{NONE, Outcome, SampleRecord, SectionRecord};
 
-/// Messages that may wait for the page's thread.
+/// Number of messages that may wait for the page's thread.
 pub(crate) const WAITING: usize = 64;
-/// Samples that wait here while there is no room: ten seconds of four heads.
+/// Samples held here while there is no room: ten seconds of four heads.
 const MOST_SAMPLES: usize = 20_000;
-/// Lines that wait here.
+/// Lines held here.
 const MOST_TOLD: usize = 256;
-/// Sections sent at once.
+/// Largest number of sections in one message.
 const SECTIONS_AT_ONCE: usize = 4096;
-/// Interval of states where there is no beat, and of rates.
+/// Interval of states without an update, and of rates.
 const EVERY: DurNs = DurNs(200_000_000);
-/// Time over which rates are taken.
+/// Averaging time of rates.
 const RATES_OVER: DurNs = DurNs(2_000_000_000);
-/// Interval of the order of going back.
+/// Interval of the list of stretches to go back for.
 const BACK_EVERY: DurNs = DurNs(1_000_000_000);
 
 /// The last ping of an echosounder.
@@ -46,7 +47,7 @@ struct Ping {
     range_m: Option<f64>,
 }
 
-/// A sensor as it is followed.
+/// State of a sensor for its rate.
 #[derive(Debug)]
 struct Followed {
     id: String,
@@ -56,15 +57,15 @@ struct Followed {
     head: u8,
     ping: Option<Ping>,
     hz: f64,
-    /// Readings when the present interval began.
+    /// Number of readings at the start of the present interval.
     readings: u64,
 }
 
-/// Collects what the page shows. It must be fed after every tick, of a loop that keeps its results.
-#[expect(clippy::struct_excessive_bools, reason = "each says what is due, apart from the others")]
+/// Collects the page's data. It must be called after every tick, with a loop that keeps its results.
+#[expect(clippy::struct_excessive_bools, reason = "independent flags for what is due")]
 pub struct Collector {
     to: Sender<Fed>,
-    /// A replay waits for the page, a live dive doesn't.
+    /// Whether it waits for the page: a replay does, a live dive doesn't.
     waits: bool,
     is_playback: bool,
     teller: Teller,
@@ -72,7 +73,7 @@ pub struct Collector {
     rates_from: Option<MonoNs>,
     begun: Option<MonoNs>,
     sent: Option<MonoNs>,
-    /// The tick that was played last, other than on the way of a jump.
+    /// Last tick that was played rather than skipped by a seek.
     played: Option<MonoNs>,
     changed: BTreeSet<i64>,
     samples: Vec<SampleRecord>,
@@ -90,7 +91,7 @@ pub struct Collector {
 }
 
 impl Collector {
-    /// For a loop; `waits` for a replay.
+    /// Creates a collector for a loop; `waits` is for a replay.
     pub(crate) fn new(
         to: Sender<Fed>,
         dive: &Loop,
@@ -138,12 +139,12 @@ impl Collector {
         }
     }
 
-    /// Holds all sections to another target, m, as well.
+    /// Also judges all sections by another target, m.
     pub(crate) fn compared_with(self, target_m: Option<f64>) -> Self {
         Self { compared: target_m.map(Compared::with), ..self }
     }
 
-    /// Takes a result of the last tick.
+    /// Collects a result of the last tick.
     pub fn notice(&mut self, notice: &Notice, dive: &Loop) {
         match notice {
             Notice::Section { section, .. } => {
@@ -158,7 +159,7 @@ impl Collector {
         self.tell(&told, dive);
     }
 
-    /// Takes the results of the last tick, and sends what is due.
+    /// Collects the results of the last tick, and sends what is due.
     pub fn tick(&mut self, dive: &Loop) {
         self.gather(dive);
         let mut told = Vec::new();
@@ -167,7 +168,7 @@ impl Collector {
         let now = dive.now();
         self.played = Some(now);
         let is_due = self.sent.is_none_or(|sent| now.since(sent).0.abs() >= EVERY.0);
-        // Playback needs to know of each tick what came with it, to jump back to there.
+        // Playback needs the data of each tick to seek back to it.
         if is_due
             || !self.told.is_empty()
             || !self.changed.is_empty()
@@ -177,7 +178,7 @@ impl Collector {
         }
     }
 
-    /// Takes the results of a tick on the way of a jump.
+    /// Collects the results of a tick that a seek skips over.
     pub fn skipped(&mut self, dive: &Loop) {
         self.gather(dive);
         self.skips = true;
@@ -185,31 +186,31 @@ impl Collector {
         self.skips = false;
     }
 
-    /// Takes a change of a sensor's connection.
+    /// Collects a change of a sensor's connection.
     pub fn sensor(&mut self, id: &str, phase: &str, text: &str, at: MonoNs) {
         self.push_told(
             json!({"type": "sensor", "t_s": at.as_secs_f64(), "id": id, "phase": phase, "text": text}),
         );
     }
 
-    /// Takes what has happened to a recording.
+    /// Collects a change of a recording.
     pub fn recording(&mut self, fails: bool, text: &str, at: MonoNs) {
         self.push_told(json!({"type": "recording", "t_s": at.as_secs_f64(), "fails": fails, "text": text}));
     }
 
-    /// Takes what to show of the recordings, and whether that is an alarm; `None` while all is well.
+    /// Collects the displayed text on the recordings, and whether it is an alarm; `None` while all is well.
     pub fn recorded(&mut self, shown: Option<(String, bool)>) {
         let (words, fails) = shown.unzip();
         (self.recording.words, self.recording.fails) = (words, fails.unwrap_or_default());
     }
 
-    /// Takes how a replay plays.
+    /// Collects the state of playback.
     pub fn playback(&mut self, state: PlaybackState) {
         self.playback = Some(state);
         self.hand(Fed::Playback(state));
     }
 
-    /// Playback has jumped, or stands still: the loop's state may be another.
+    /// Handles a seek or pause of playback, after which the loop's state may differ.
     pub fn stopped(&mut self, dive: &Loop) {
         if self.played == Some(dive.now()) {
             self.send(dive);
@@ -231,7 +232,7 @@ impl Collector {
         self.send(dive);
     }
 
-    /// Takes the end of the dive, when all is judged.
+    /// Sends the end of the dive, once everything is judged.
     pub fn end(&mut self, dive: &Loop) {
         let mut told = Vec::new();
         self.teller.end(&dive.coverage().sections, &mut |one| told.push(one));
@@ -242,12 +243,12 @@ impl Collector {
         }
         self.back_due = true;
         self.back_told = None;
-        // At its end also a live dive has the time.
+        // At its end a live dive has time to wait, too.
         self.waits = true;
         while !self.changed.is_empty() && self.send(dive) {}
     }
 
-    /// Marks all sections of the way: what has no notice of its own is sent, too.
+    /// Marks all sections of the dive as changed, so that sections without a notice are sent, too.
     fn change_all(&mut self, dive: &Loop) {
         let (sections, way) = (&dive.coverage().sections, dive.coverage().frontier.way());
         self.changed.extend(sections.sections_of(way));
@@ -266,7 +267,7 @@ impl Collector {
         self.aims_of(dive);
     }
 
-    /// Samples and doubtful returns of the last tick.
+    /// Collects samples and doubtful returns of the last tick.
     #[expect(clippy::cast_possible_truncation, reason = "shown to a fraction of a millimetre")]
     fn samples_of(&mut self, dive: &Loop) {
         let perimeter_m = dive.mission().profile.perimeter_m();
@@ -287,7 +288,7 @@ impl Collector {
         }
     }
 
-    /// Where pings without a return were aimed.
+    /// Collects the aims of pings without a return.
     #[expect(clippy::cast_possible_truncation, reason = "shown to a fraction of a millimetre")]
     fn aims_of(&mut self, dive: &Loop) {
         let perimeter_m = dive.mission().profile.perimeter_m();
@@ -351,7 +352,7 @@ impl Collector {
         }
     }
 
-    /// Sends what there is; `false` where there is no room or nobody to take it.
+    /// Sends collected data; `false` without room or without a receiver.
     fn send(&mut self, dive: &Loop) -> bool {
         if self.to.is_closed() || !self.waits && self.to.capacity() == 0 {
             return false;
@@ -390,17 +391,17 @@ impl Collector {
         true
     }
 
-    /// Hands a message over: a replay waits for room, a live dive only where there is some.
+    /// Hands a message over: a replay waits for room, a live dive sends only if there is room.
     fn hand(&self, message: Fed) {
         if self.waits {
-            // Nobody is there to take it once the page has ended.
+            // There is no receiver once the page has ended.
             let _gone = self.to.blocking_send(message);
         } else if let Err(TrySendError::Full(_)) = self.to.try_send(message) {
             tracing::debug!("the page is behind");
         }
     }
 
-    /// Samples of wall where some were dropped, from the loop's store; it has neither times nor heads.
+    /// Reads wall samples from the loop's store in place of dropped ones; the store has neither times nor heads.
     #[expect(clippy::cast_possible_truncation, reason = "shown to a fraction of a millimetre")]
     fn mended(&mut self, dive: &Loop) -> Vec<SampleRecord> {
         let Some([from_m, to_m]) = self.lacking_m.take() else { return Vec::new() };
@@ -477,7 +478,7 @@ impl Collector {
         }
     }
 
-    /// What to go back for, from the far end to the portal, if that has changed and is due.
+    /// Stretches to go back for, from the far end to the portal, if they have changed and are due.
     fn back(&mut self, dive: &Loop) -> Option<Value> {
         let now = dive.now();
         let waits =

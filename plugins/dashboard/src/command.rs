@@ -1,4 +1,4 @@
-//! What viewers send.
+//! Messages from viewers.
 
 use serde::{Deserialize, Serialize};
 
@@ -6,38 +6,38 @@ use serde::{Deserialize, Serialize};
 pub(crate) const LONGEST: usize = 4096;
 /// Longest text of a note, bytes.
 const LONGEST_NOTE: usize = 240;
-/// Longest name of who sends, bytes.
+/// Longest name of a sender, bytes.
 const LONGEST_NAME: usize = 16;
-/// States a second that a viewer may ask for.
+/// Allowed rates of states, Hz.
 const RATES_HZ: core::ops::RangeInclusive<f64> = 0.1..=5.0;
 
-/// A request as it comes.
+/// A request as received.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 #[serde(tag = "do", rename_all = "snake_case", deny_unknown_fields)]
 pub(crate) enum Request {
-    /// Acknowledges an alert; 0 all.
+    /// Acknowledges an alert; 0 acknowledges all.
     Acknowledge {
         alert: u32,
         #[serde(default)]
         by: String,
     },
-    /// Silences what sounds.
+    /// Silences alerts that sound.
     Silence {
         #[serde(default)]
         by: String,
     },
-    /// Notes a text at the present place.
+    /// Notes a text at the present position.
     Note {
         text: String,
         #[serde(default)]
         by: String,
     },
-    /// Marks the present place.
+    /// Marks the present position.
     Mark {
         #[serde(default)]
         by: String,
     },
-    /// Begins a voice note at the present place.
+    /// Begins a voice note at the present position.
     Voice {
         id: u32,
         #[serde(default)]
@@ -51,49 +51,49 @@ pub(crate) enum Request {
         #[serde(default)]
         to_s: Option<f64>,
     },
-    /// Asks for so many states a second.
+    /// Requests a rate of states.
     Rate { hz: f64 },
 }
 
-/// What an operator does. Serialised as the operator's input of the loop.
+/// An operator's action, serialised as operator input of the loop.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 #[serde(tag = "do", rename_all = "snake_case")]
 pub enum Command {
-    /// Acknowledges an alert; 0 all that need it.
+    /// Acknowledges an alert; 0 acknowledges all that require it.
     Acknowledge {
-        /// Its number.
+        /// Number of the alert.
         alert: u32,
-        /// Who, at most 16 bytes.
+        /// Sender, at most 16 bytes.
         by: String,
     },
-    /// Silences all that sound, for a while.
+    /// Silences all alerts that sound, for a while.
     Silence {
-        /// Who.
+        /// Sender.
         by: String,
     },
-    /// Notes a text at the present place.
+    /// Notes a text at the present position.
     Note {
         /// At most 240 bytes.
         text: String,
-        /// Who.
+        /// Sender.
         by: String,
     },
-    /// Marks the present place.
+    /// Marks the present position.
     Mark {
-        /// Who.
+        /// Sender.
         by: String,
     },
-    /// Begins a voice note at the present place; its recording follows by `/voice/ID`.
+    /// Begins a voice note at the present position; its recording follows by `/voice/ID`.
     Voice {
-        /// Ties it to its recording; made on the page, not 0.
+        /// Id that links it to its recording; chosen by the page, not 0.
         id: u32,
-        /// Who.
+        /// Sender.
         by: String,
     },
 }
 
 impl Command {
-    /// Its word.
+    /// Keyword of the command.
     pub fn word(&self) -> &'static str {
         match self {
             Self::Acknowledge { .. } => "acknowledge",
@@ -105,38 +105,38 @@ impl Command {
     }
 }
 
-/// What is asked of a replay.
+/// A command of playback.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Play {
-    /// Stand still.
+    /// Pause.
     Pause,
-    /// Go on.
+    /// Resume.
     Go,
-    /// One tick, then stand still.
+    /// Play one tick, then pause.
     Step,
-    /// On until a section is judged, then stand still.
+    /// Play until a section is judged, then pause.
     StepSection,
     /// End.
     End,
-    /// So many seconds of the dive a second; `None` is as fast as possible.
+    /// Speed as a multiple of real time; `None` is as fast as possible.
     Speed(Option<f64>),
-    /// Jump to this time, seconds on the log's clock.
+    /// Seek to this time, seconds on the log's clock.
     Seek(f64),
 }
 
-/// A request that is valid.
+/// A valid request.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) enum Asked {
     Command(Command),
     Play(Play),
-    /// States a second.
+    /// Rate of states, Hz.
     Rate(f64),
 }
 
 impl Asked {
-    /// Of a message's text.
+    /// Parses the text of a message.
     ///
-    /// Errors: what is wrong with it.
+    /// Errors: the reason why it is invalid.
     pub(crate) fn parse(text: &str) -> Result<Self, String> {
         let request: Request =
             serde_json::from_str(text).map_err(|error| format!("no valid command: {error}"))?;
@@ -193,9 +193,9 @@ fn play(command: &str, speed: Option<f64>, to_s: Option<f64>) -> Result<Play, St
     })
 }
 
-/// The operator's command in a message as viewers send it; `None` of requests that concern a replay or the page alone.
+/// Parses a viewer's message into an operator's command; `None` for requests that concern a replay or the page alone.
 ///
-/// Errors: what is wrong with it, as the page's refusal says.
+/// Errors: the reason why it is invalid, as in the page's refusal.
 pub fn command_of(message: &str) -> Result<Option<Command>, String> {
     Ok(match Asked::parse(message)? {
         Asked::Command(command) => Some(command),
@@ -208,7 +208,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn commands_are_taken_or_refused_with_what_is_wrong() {
+    fn commands_are_accepted_or_refused_with_the_reason() {
         let command = |text| Asked::parse(text);
         assert_eq!(
             command(r#"{"do":"acknowledge","alert":12,"by":"AB"}"#),

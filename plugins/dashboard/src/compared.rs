@@ -1,4 +1,4 @@
-//! The same dive held to another target, for a replay that was asked for two.
+//! Verdicts of the same dive for a second target, in a replay with two targets.
 
 use std::collections::BTreeMap;
 
@@ -7,25 +7,25 @@ use headrace_geometry::time::{DurNs, MonoNs};
 use headrace_monitor::run::Loop;
 use serde::Serialize;
 
-/// Interval at which all sections are compared anew: also those change of which nothing is told, as what is to come passes them.
+/// Interval of comparing all sections. Sections also change without a notice, when the vehicle passes them.
 const EVERY: DurNs = DurNs(1_000_000_000);
 
-/// Metres by verdict for the other target, of sections whose hole has been measured.
+/// Lengths by verdict for the second target, of sections with a measured hole.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
 pub struct ComparedJson {
-    /// The other target, m.
+    /// Second target, m.
     pub target_m: f64,
-    /// Metres that pass.
+    /// Length that passes, m.
     pub pass_m: f64,
-    /// Metres that fail.
+    /// Length that fails, m.
     pub fail_m: f64,
-    /// Metres of which nothing can be said.
+    /// Length with the verdict can't say, m.
     pub cannot_say_m: f64,
-    /// Metres still open.
+    /// Open length, m.
     pub open_m: f64,
 }
 
-/// Verdicts for another target, as of the last comparison.
+/// Verdicts for a second target, as of the last comparison.
 #[derive(Debug)]
 pub(crate) struct Compared {
     target_m: f64,
@@ -40,7 +40,7 @@ impl Compared {
         Self { target_m, verdicts: BTreeMap::new(), at: None, json }
     }
 
-    /// Compares where it is due; calls `changed` with the sections whose verdict is another than before.
+    /// Compares if due, and calls `changed` with each section whose verdict changed.
     pub(crate) fn refresh(&mut self, dive: &Loop, changed: impl FnMut(i64)) {
         let now = dive.now();
         if self.at.is_some_and(|at| (0..EVERY.0).contains(&now.since(at).0)) {
@@ -62,7 +62,7 @@ impl Compared {
         self.verdicts = verdicts;
     }
 
-    /// The loop's state may be another: the next is compared at once.
+    /// Forces a comparison at the next call, because the loop's state may have changed.
     pub(crate) fn forget(&mut self) {
         self.at = None;
         self.verdicts.clear();

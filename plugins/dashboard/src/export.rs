@@ -1,4 +1,4 @@
-//! A dive in one file: the page, and in it all that it would get of a server.
+//! Exports a dive as one file: the page with all data that a server would send.
 
 use std::io::{self, Write as _};
 use std::thread::JoinHandle;
@@ -20,56 +20,56 @@ use crate::model::Model;
 use crate::site::{May, Site};
 use crate::wire::sample_frame;
 
-/// Samples in a file; of more, one in several.
+/// Largest number of samples in a file; beyond it samples are thinned.
 const MOST_SAMPLES: usize = 500_000;
-/// States in a file: one a second of two hours. Of a longer dive every other one, and so on.
+/// Largest number of states in a file: one a second for two hours. Longer dives keep every second state, and so on.
 const MOST_STATES: usize = 7200;
-/// Begins a page with a dive, after its first line.
+/// Marks a page that contains a dive, after its first line.
 pub const MARK: &str = "id=\"dive\"";
-/// What of a state isn't in a file: it is there once, or means nothing there.
+/// Parts of a state that a file omits, because they are there once or have no meaning.
 const LEFT_OUT: [&str; 9] =
     ["type", "seq", "alert_list", "alerts", "playback", "ended", "page_dropped", "rates", "recording"];
 
-/// Why there is no file.
+/// Reason why there is no file.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum ExportError {
-    /// No thread.
+    /// The thread can't be started.
     #[error("exporting a dive: its thread can't be started: {0}")]
     Thread(io::Error),
     /// The thread has ended early.
     #[error("exporting a dive: its thread has ended early")]
     Ended,
-    /// The program has no page.
+    /// The program was built without the page.
     #[error("exporting a dive: this program was built without its page")]
     NoPage,
-    /// Packing fails.
+    /// Compression fails.
     #[error("exporting a dive: {0}")]
     Pack(#[from] io::Error),
 }
 
-/// Takes a dive for a file.
+/// Collects a dive for a file.
 pub struct Export {
     sender: mpsc::Sender<Fed>,
     thread: JoinHandle<Taken>,
 }
 
-/// What was taken.
+/// Collected data.
 struct Taken {
     model: Model,
     states: States,
 }
 
-/// States, one a second or less often.
+/// States, one a second or fewer.
 struct States {
     every_s: f64,
     all: Vec<(f64, Map<String, Value>)>,
 }
 
 impl Export {
-    /// Starts to take a dive.
+    /// Starts collecting a dive.
     ///
-    /// Errors: no thread.
+    /// Errors: the thread can't be started.
     pub fn start(site: Site) -> Result<Self, ExportError> {
         let (sender, mut fed) = mpsc::channel(WAITING);
         let take = move || {
@@ -88,13 +88,13 @@ impl Export {
         Ok(Self { sender, thread: thread.map_err(ExportError::Thread)? })
     }
 
-    /// What takes results of a loop for it, and waits where it must.
+    /// Collector for a loop's results; it waits if necessary.
     pub fn collector(&self, dive: &Loop) -> Collector {
         Collector::new(self.sender.clone(), dive, true, false, None)
     }
 
-    /// The page with the dive; `alerts` are all of the dive, `voices` the recordings of its notes, `end` its last message. All
-    /// collectors must be gone.
+    /// The page with the dive. `alerts` are all of the dive, `voices` the recordings of its notes, `end` its last
+    /// message. All collectors must have been dropped.
     ///
     /// Errors: see [`ExportError`].
     pub fn page(self, alerts: &Value, voices: &[Voice], end: &Value) -> Result<Vec<u8>, ExportError> {
@@ -112,13 +112,14 @@ impl Export {
     }
 }
 
-/// The page with a policy that lets only its own script run, and reach nothing: what a dive holds came from others.
+/// Adds a policy to the page that allows only its own script and no network access, because a dive contains foreign
+/// data.
 fn with_policy(page: &str) -> Option<String> {
     let (head, rest) = page.split_at(page.find("<head>")? + "<head>".len());
     let hashes =
         scripts_of(page).map(|script| format!(" 'sha256-{}'", STANDARD.encode(Sha256::digest(script))));
     let hashes: String = hashes.collect();
-    // Styles are inline, also those that the charts set; recordings of voice notes play from blobs.
+    // Styles are inline, including those set by the charts; voice notes play from blobs.
     Some(format!(
         "{head}\n<meta http-equiv=\"Content-Security-Policy\" content=\"default-src 'none'; script-src{hashes}; \
          style-src 'unsafe-inline'; img-src data: blob:; media-src data: blob:; connect-src 'none'; base-uri 'none'; \
@@ -134,7 +135,7 @@ fn scripts_of(page: &str) -> impl Iterator<Item = &str> {
 }
 
 impl Taken {
-    /// All frames, packed.
+    /// All frames, compressed.
     fn frames(&self, alerts: &Value, voices: &[Voice], end: &Value) -> io::Result<Vec<u8>> {
         let model = &self.model;
         let mut packed = DeflateEncoder::new(Vec::new(), Compression::default());
@@ -188,7 +189,7 @@ impl States {
         }
     }
 
-    /// The first state whole, of the others what differs from it.
+    /// The first state completely, and of the others the differences from it.
     fn timeline(&self) -> Value {
         let first = self.all.first().map(|(_, first)| first);
         let differs = |state: &Map<String, Value>| -> Map<String, Value> {
@@ -203,7 +204,7 @@ impl States {
     }
 }
 
-/// Numbers to four places.
+/// Rounds numbers to four decimal places.
 fn short(value: &mut Value) {
     match value {
         Value::Number(number) if number.is_f64() => {
@@ -222,7 +223,7 @@ mod tests {
 
     #[test]
     fn exported_page_runs_only_its_own_script_and_reaches_nothing() {
-        // The hash is that of an empty text: `printf '' | openssl dgst -sha256 -binary | base64`.
+        // The hash of an empty text: `printf '' | openssl dgst -sha256 -binary | base64`.
         let page = with_policy("<html><head><title>t</title></head><script type=\"module\"></script></html>")
             .unwrap();
         let (before, after) = page.split_once("<title>").unwrap();
@@ -235,11 +236,11 @@ mod tests {
     }
 
     #[test]
-    fn built_page_has_scripts_whose_hash_a_browser_agrees_with() {
+    fn built_page_scripts_have_no_carriage_return() {
         let Some(page) = assets::single() else { return };
         let scripts: Vec<_> = scripts_of(page).collect();
         assert!(!scripts.is_empty());
-        // A browser takes the hash after it has turned these into line feeds.
+        // A browser computes the hash after converting these to line feeds.
         assert!(scripts.iter().all(|script| !script.contains('\r')));
         assert!(!page.contains(" src=") && !page.contains("javascript:"), "nothing that the policy forbids");
     }

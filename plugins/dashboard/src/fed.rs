@@ -1,4 +1,4 @@
-//! What the loop's thread hands to the page's: values, in a bounded queue.
+//! Messages from the loop's thread to the page's, in a bounded queue.
 
 use headrace_geometry::time::MonoNs;
 use headrace_monitor::alert_list::NoteJson;
@@ -12,64 +12,64 @@ use crate::wire::{SampleRecord, SectionRecord};
 /// A message to the page's thread.
 #[derive(Debug)]
 pub enum Fed {
-    /// What is new since the last one.
+    /// New data since the last message.
     News(Box<News>),
-    /// Playback has jumped: all that follows is as of then.
+    /// Playback has jumped; later messages refer to the new time.
     Jump(MonoNs),
-    /// How a replay plays.
+    /// State of playback.
     Playback(PlaybackState),
     /// The dive has ended.
     End(Box<Value>),
 }
 
-/// What is new.
+/// New data.
 #[derive(Debug)]
 pub struct News {
-    /// The end of the tick.
+    /// End of the tick.
     pub now: MonoNs,
-    /// Of a tick on the way of a jump: only its samples count, the rest comes with the jump.
+    /// Whether a seek skips this tick: only its samples count, and the rest comes with the jump.
     pub is_skipped: bool,
-    /// The first time of the dive, once there is one.
+    /// First time of the dive, once known.
     pub begun: Option<MonoNs>,
     /// The live state, as of the tick.
     pub state: Box<LiveStateJson>,
-    /// What is shown of it besides.
+    /// Displayed data besides the live state.
     pub beside: Beside,
     /// New samples.
     pub samples: Vec<SampleRecord>,
-    /// Samples that are sent anew: those of these chainages, m, were dropped.
+    /// Samples sent again for these chainages, m, in place of dropped ones.
     pub mended: Vec<SampleRecord>,
-    /// Sections that have changed.
+    /// Changed sections.
     pub sections: Vec<SectionRecord>,
-    /// What was told: JSON objects with a type.
+    /// Events, as JSON objects with a type.
     pub told: Vec<Value>,
     /// All notes, if there is a new one.
     pub notes: Option<Vec<NoteJson>>,
-    /// What to go back for, if that has changed.
+    /// Stretches to go back for, if they have changed.
     pub back: Option<Value>,
-    /// What has found no room so far.
+    /// Data dropped so far.
     pub dropped: Dropped,
 }
 
-/// What of the state comes from elsewhere than the live state.
+/// Displayed data that isn't in the live state.
 #[derive(Debug, Clone, Default, Serialize)]
 pub struct Beside {
-    /// The vehicle in the cross-section.
+    /// Pose of the vehicle in the cross-section.
     pub pose: Option<PoseJson>,
     /// The echosounders.
     pub echosounders: Vec<EchoJson>,
-    /// Readings a second of each sensor.
+    /// Rate of readings of each sensor.
     pub rates: Vec<RateJson>,
     /// The recording.
     pub recording: RecordingJson,
-    /// The same dive held to another target.
+    /// Verdicts of the same dive for a second target.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub compared: Option<ComparedJson>,
-    /// The status in a line.
+    /// Status as one line of text.
     pub text: String,
 }
 
-/// The vehicle in the cross-section.
+/// Pose of the vehicle in the cross-section.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct PoseJson {
     /// Left of the axis, m.
@@ -89,17 +89,17 @@ pub struct PoseJson {
 pub struct EchoJson {
     /// Its id.
     pub id: String,
-    /// Its last range, m; `None` where there was no echo.
+    /// Last range, m; `None` without an echo.
     pub range_m: Option<f64>,
-    /// How long ago that was, seconds.
+    /// Age of that range, seconds.
     pub age_s: f64,
-    /// Where it is in the cross-section, m.
+    /// Position of the echosounder in the cross-section, m.
     pub from: [f64; 2],
-    /// Where the echo is, m.
+    /// Position of the echo, m.
     pub to: Option<[f64; 2]>,
 }
 
-/// Readings a second of a sensor.
+/// Rate of a sensor's readings.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct RateJson {
     /// Its id.
@@ -113,34 +113,34 @@ pub struct RateJson {
 pub struct RecordingJson {
     /// Whether the dive is recorded.
     pub on: bool,
-    /// Whether what comes now is lost, or would be with the power.
+    /// Whether present data is lost, or would be lost in a power cut.
     pub fails: bool,
-    /// What to show of it, as all screens say it; `None` while all is well.
+    /// Displayed text, the same on all screens; `None` while all is well.
     pub words: Option<String>,
-    /// Where to.
+    /// Path of the recording.
     pub path: Option<String>,
 }
 
-/// What has found no room in the queue.
+/// Data dropped because the queue was full.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize)]
 pub struct Dropped {
-    /// Samples; those of wall are sent anew.
+    /// Samples; wall samples are sent again.
     pub samples: u64,
     /// Lines.
     pub told: u64,
 }
 
-/// How a replay plays.
+/// State of playback.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct PlaybackState {
-    /// Whether it stands still.
+    /// Whether it is paused.
     pub paused: bool,
-    /// Seconds of the dive a second; `None` is as fast as possible.
+    /// Speed as a multiple of real time; `None` is as fast as possible.
     pub speed: Option<f64>,
-    /// Where it is, seconds on the log's clock.
+    /// Present position, seconds on the log's clock.
     pub at_s: f64,
-    /// Where the log begins, seconds.
+    /// Start of the log, seconds.
     pub from_s: f64,
-    /// Where it ends, seconds.
+    /// End of the log, seconds.
     pub to_s: f64,
 }

@@ -1,11 +1,11 @@
-//! Speed, allowed speed and forecast T of the last half hour, a value a second.
+//! History of speed, allowed speed and forecast T over the last half hour, one value a second.
 
 use std::collections::VecDeque;
 
 use headrace_monitor::live_state::json::LiveStateJson;
 use serde_json::{Value, json};
 
-/// Values kept: half an hour.
+/// Number of values kept: half an hour.
 const MOST: usize = 1800;
 
 /// The history.
@@ -13,12 +13,12 @@ const MOST: usize = 1800;
 pub struct History {
     /// Time, speed, allowed speed, T; seconds, m/s, m.
     values: VecDeque<(f64, [Option<f64>; 3])>,
-    /// Keeps all of a dive.
+    /// Whether the history of the whole dive is kept.
     pub(crate) whole: bool,
 }
 
 impl History {
-    /// Takes a state, once a second.
+    /// Adds a state, once a second.
     pub(crate) fn take(&mut self, state: &LiveStateJson) {
         let Some(at_s) = state.at_s else { return };
         let second = at_s.floor();
@@ -32,12 +32,12 @@ impl History {
         }
     }
 
-    /// Forgets what is later than a time, seconds.
+    /// Removes values later than a time, seconds.
     pub(crate) fn jump(&mut self, at_s: f64) {
         self.values.retain(|(second, _)| *second <= at_s);
     }
 
-    /// As a message.
+    /// The history as a message.
     pub(crate) fn message(&self, seq: u64) -> Value {
         let column = |place: usize| -> Vec<Value> {
             let of = |(_, values): &(f64, [Option<f64>; 3])| {

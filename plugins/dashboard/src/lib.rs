@@ -1,8 +1,9 @@
-//! The operator's page: a model of the dive, and the server that shows it to browsers.
+//! The operator's page: a model of the dive, and the server that sends it to browsers.
 //!
-//! [`collector`] takes values of the loop between ticks and hands them, in a bounded queue, to the page's thread; in a live dive it
-//! never waits. There [`model`] holds what is shown, pure, and [`server`] gives each message, encoded once, to all viewers.
-//! `docs/how-to/read-the-page.md` is for who uses it, `docs/reference/page-feed.md` for who builds his own.
+//! [`collector`] takes values from the loop between ticks and hands them to the page's thread in a bounded queue. In
+//! a live dive it never waits. On the page's thread [`model`] holds the displayed data, without I/O, and [`server`]
+//! sends each message, encoded once, to all viewers. `docs/how-to/read-the-page.md` is for users,
+//! `docs/reference/page-feed.md` for authors of other clients.
 
 pub mod access;
 pub mod assets;

@@ -1,7 +1,7 @@
-//! What the page shows, as of the last that was fed: pure, without sockets and clocks.
+//! Displayed data of the page, as of the last message from the loop; without sockets and clocks.
 //!
-//! Each message has a number, each section the number of the message that had it last; so a viewer that was away gets what has
-//! changed since, and a new one all.
+//! Each message has a number, and each section stores the number of the last message that contained it. So a viewer
+//! that reconnects gets the changes since then, and a new viewer gets everything.
 
 use std::collections::{BTreeMap, VecDeque};
 
@@ -18,34 +18,35 @@ use crate::samples::Samples;
 use crate::site::{Greeting, May, Site};
 use crate::wire::{SectionRecord, sample_frame, section_frame};
 
-/// Lines kept for viewers that were away.
+/// Number of events kept for viewers that reconnect.
 const MOST_TOLD: usize = 256;
-/// Samples sent at once as they come: 100 kB/s at five times a second. Of more one in several is sent; `/samples` has all.
+/// Largest number of samples in one message: 100 kB/s at five messages a second. Beyond it samples are thinned;
+/// `/samples` has all.
 const MOST_AT_ONCE: usize = 1000;
-/// Samples for a viewer that comes, or was away.
+/// Largest number of samples for a viewer that connects or reconnects.
 const MOST_BACK: usize = 10_000;
-/// Places of samples by message that are kept: five minutes of them.
+/// Number of messages whose sample positions are kept: five minutes of them.
 const MOST_PLACES: usize = 1500;
-/// Samples of the answer to a range of chainage.
+/// Largest number of samples in the answer to a range of chainage.
 pub const MOST_IN_RANGE: usize = 200_000;
 
-/// What a message is, for viewers that don't want all.
+/// Kind of a message, for viewers that don't want all.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Sort {
-    /// The state: the next replaces it.
+    /// The state, which the next one replaces.
     State,
-    /// Samples as they come.
+    /// New samples.
     Samples,
-    /// Anything else.
+    /// Any other message.
     Other,
 }
 
 /// A message, encoded once for all viewers.
 #[derive(Debug, Clone)]
 pub struct Message {
-    /// Its number.
+    /// Sequence number.
     pub seq: u64,
-    /// What it is.
+    /// Kind.
     pub sort: Sort,
     /// Its bytes.
     pub body: Body,
@@ -60,7 +61,7 @@ pub enum Body {
     Binary(Bytes),
 }
 
-/// A section with where it has been seen, and the message that had it last.
+/// A section with the parts where it has samples, and the last message that contained it.
 #[derive(Debug, Clone, Copy)]
 struct Shown {
     record: SectionRecord,
@@ -79,9 +80,9 @@ pub struct Model {
     sections: BTreeMap<i32, Shown>,
     changed: Vec<i32>,
     samples: Samples,
-    /// Samples that have been sent.
+    /// Number of samples sent.
     sent_samples: usize,
-    /// Messages and how many samples there were with them.
+    /// Number of samples at each message.
     places: VecDeque<(u64, usize)>,
     state: Option<Box<(Box<LiveStateJson>, Beside)>>,
     state_is_new: bool,
@@ -98,7 +99,7 @@ pub struct Model {
 }
 
 impl Model {
-    /// Before anything has been fed. `instance` is unique to it.
+    /// Creates an empty model. `instance` is its unique name.
     pub fn new(site: Site, instance: String) -> Self {
         Self {
             site,
@@ -131,7 +132,7 @@ impl Model {
         self.history.whole = true;
     }
 
-    /// Takes what was fed; whether it is to be shown at once.
+    /// Applies a message from the loop; returns whether it must be displayed at once.
     pub fn take(&mut self, fed: Fed) -> bool {
         match fed {
             Fed::News(news) => return self.news(*news),
@@ -223,12 +224,12 @@ impl Model {
         u32::try_from(since).unwrap_or(u32::MAX)
     }
 
-    /// Unique to this dive and, of a replay, to what follows its last jump.
+    /// Unique name of this dive and, in a replay, of the part after its last seek.
     pub fn instance(&self) -> String {
         if self.jumps == 0 { self.instance.clone() } else { format!("{}.{}", self.instance, self.jumps) }
     }
 
-    /// What has changed since the last time, for all viewers.
+    /// Changes since the last call, for all viewers.
     pub fn flush(&mut self) -> Vec<Message> {
         let mut messages = Vec::new();
         for value in core::mem::take(&mut self.told_new) {
@@ -261,7 +262,7 @@ impl Model {
         messages
     }
 
-    /// The state again, for viewers of a dive that stands still.
+    /// The state again, for viewers of a paused dive.
     pub fn again(&mut self) -> Option<Message> {
         let state = self.state()?;
         Some(self.text(state, Sort::State))
@@ -313,10 +314,11 @@ impl Model {
         Message { seq: self.seq, sort, body: Body::Binary(bytes.into()) }
     }
 
-    /// For a viewer that comes: all, or what has changed since message `since`. What is new must have been flushed.
+    /// Messages for a viewer that connects: everything, or the changes since message `since`. New data must have been
+    /// flushed.
     pub fn catch_up(&self, since: Option<u64>, may: May, tokens_needed: bool) -> Vec<Message> {
         let since = since.filter(|since| *since <= self.seq);
-        // Who is lost half way through asks from where he was.
+        // A viewer that loses its connection on the way resumes from its own number.
         let low = since.unwrap_or(0);
         let text = |value: &Value| {
             let body = Body::Text(numbered(value, low).to_string().into());
@@ -354,13 +356,14 @@ impl Model {
         messages
     }
 
-    /// How many samples a viewer has that has had this message; `None` where that isn't known any more.
+    /// Number of samples that a viewer had received with this message; `None` if no longer known.
     fn samples_until(&self, since: u64) -> Option<usize> {
         let place = self.places.partition_point(|(seq, _)| *seq <= since).checked_sub(1)?;
         self.places.get(place).map(|(_, count)| *count)
     }
 
-    /// When the voice note of an id was begun, seconds on the log's clock; `None` where there is none, or none with a recording.
+    /// Start of the voice note with an id, seconds on the log's clock; `None` without such a note or without a
+    /// recording.
     pub(crate) fn spoken_s(&self, id: u32) -> Option<f64> {
         let is_it = |note: &&NoteJson| {
             note.voice.as_ref().is_some_and(|voice| voice.id == id && voice.seconds.is_some())
@@ -368,7 +371,7 @@ impl Model {
         self.notes.iter().find(is_it).map(|note| note.at_s)
     }
 
-    /// Alerts and notes, whole.
+    /// All alerts and notes.
     fn lists(&self) -> Vec<Value> {
         let state = self.state.as_ref().map(|shown| &shown.0);
         let (list, hidden) =
@@ -409,7 +412,7 @@ impl Model {
         self.state.as_ref().map(|shown| shown.0.now_s)
     }
 
-    /// Samples between two chainages, m, in a frame: at most [`MOST_IN_RANGE`], and of how many one.
+    /// Samples between two chainages, m, in a frame, at most [`MOST_IN_RANGE`]; and the thinning step.
     pub fn samples_frame(&self, from_m: f32, to_m: f32) -> (Vec<u8>, usize) {
         let (samples, step) = self.samples.between(from_m, to_m, MOST_IN_RANGE);
         (sample_frame(self.seq, &samples), step)
@@ -420,17 +423,17 @@ impl Model {
         &self.samples
     }
 
-    /// What found no room on its way here.
+    /// Data dropped on the way to the page.
     pub fn dropped(&self) -> Dropped {
         self.dropped
     }
 
-    /// The number of the last message.
+    /// Number of the last message.
     pub fn seq(&self) -> u64 {
         self.seq
     }
 
-    /// How many sections there are.
+    /// Number of sections.
     pub fn sections(&self) -> usize {
         self.sections.len()
     }
@@ -454,13 +457,13 @@ impl Model {
         all
     }
 
-    /// The end of the dive, once it has ended.
+    /// End of the dive, once it has ended.
     pub fn end(&self) -> Option<&Value> {
         self.end.as_ref()
     }
 }
 
-/// A message with its number.
+/// Adds a number to a message.
 fn numbered(value: &Value, seq: u64) -> Value {
     let mut value = value.clone();
     if let Some(object) = value.as_object_mut() {

@@ -1,10 +1,11 @@
-//! The samples of a dive, in the order in which they came: 20 bytes each, in chunks, found by chainage.
+//! Samples of a dive in order of arrival: 20 bytes each, in chunks, searched by chainage.
 
 use crate::wire::SampleRecord;
 
-/// Samples of a chunk: 1.25 MiB.
+/// Number of samples in a chunk: 1.25 MiB.
 const CHUNK: usize = 1 << 16;
-/// Samples kept: 160 MB, more than 7 km with four heads in ten hours give. Those beyond are counted and not kept.
+/// Largest number of samples kept: 160 MB, more than 7 km with four heads in ten hours need. Further samples are only
+/// counted.
 pub const MOST_SAMPLES: usize = 8_000_000;
 
 /// A chunk with the chainages that it spans.
@@ -15,19 +16,19 @@ struct Chunk {
     to_m: f32,
 }
 
-/// Samples, of which the first ones are visible: a replay that has jumped back knows more than it shows.
+/// Samples, of which the first ones are visible: a replay that has jumped back stores more than it shows.
 #[derive(Debug, Default)]
 pub struct Samples {
     chunks: Vec<Chunk>,
     kept: usize,
     visible: usize,
-    /// Time of a tick, and how many samples there were with it; in time's order. Kept for jumps.
+    /// Time of each tick with the number of samples up to it, in order of time. Kept for seeks.
     marks: Vec<(u32, u32)>,
     not_kept: u64,
 }
 
 impl Samples {
-    /// How many are visible.
+    /// Number of visible samples.
     pub fn len(&self) -> usize {
         self.visible
     }
@@ -37,13 +38,13 @@ impl Samples {
         self.visible == 0
     }
 
-    /// How many weren't kept, as there was no room.
+    /// Number of samples that weren't kept for lack of room.
     pub fn not_kept(&self) -> u64 {
         self.not_kept
     }
 
-    /// Takes those of a tick that ended `at_ms` after the beginning. Those of a tick that has been before a jump back become
-    /// visible again. `marked` is for dives that may jump.
+    /// Adds the samples of a tick that ended `at_ms` after the beginning. After a seek back, samples of known ticks
+    /// become visible again. `marked` is for dives that may be sought.
     pub fn take(&mut self, at_ms: u32, new: &[SampleRecord], marked: bool) {
         if marked && self.marks.last().is_some_and(|(last, _)| at_ms <= *last) {
             self.visible = self.visible.max(self.count_at(at_ms));
@@ -58,7 +59,7 @@ impl Samples {
         }
     }
 
-    /// Shows what there was at a time.
+    /// Shows the samples up to a time.
     pub fn jump(&mut self, at_ms: u32) {
         self.visible = self.count_at(at_ms);
     }
@@ -85,14 +86,14 @@ impl Samples {
         }
     }
 
-    /// The visible ones from this number on.
+    /// Visible samples from this number on.
     pub fn since(&self, first: usize) -> impl Iterator<Item = &SampleRecord> {
         let (whole, part) = (first / CHUNK, first % CHUNK);
         let chunks = self.chunks.iter().skip(whole).flat_map(|chunk| chunk.samples.iter());
         chunks.skip(part).take(self.visible.saturating_sub(first))
     }
 
-    /// The visible ones between two chainages, every so many-th: at most `most`. Returns them and the step.
+    /// Visible samples between two chainages, thinned to at most `most`. Returns them and the thinning step.
     pub fn between(&self, from_m: f32, to_m: f32, most: usize) -> (Vec<SampleRecord>, usize) {
         let count = self.each(from_m, to_m).count();
         let step = count.div_ceil(most.max(1)).max(1);
@@ -138,7 +139,7 @@ mod tests {
     }
 
     #[test]
-    fn a_jump_back_hides_and_what_comes_again_isnt_kept_twice() {
+    fn jump_back_hides_samples_and_keeps_none_twice() {
         let mut samples = filled(1000);
         samples.jump(49);
         assert_eq!((samples.len(), samples.between(0.0, 9.0, 9999).0.len()), (500, 500));

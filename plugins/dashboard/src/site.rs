@@ -1,24 +1,24 @@
-//! What doesn't change during a dive: tunnel, heads, sensors. The page gets it first.
+//! Constants of a dive: tunnel, heads, sensors. The page receives them first.
 
 use headrace_coverage::{Cause, Unsure};
 use headrace_geometry::math::{self, TAU};
 use headrace_geometry::tunnel::Profile;
 use serde::Serialize;
 
-/// Points of the profile as sent, at equal steps of arc length.
+/// Number of profile points sent, at equal steps of arc length.
 const POINTS: u32 = 128;
 
-/// How a dive is fed.
+/// Source of a dive's data.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Mode {
-    /// By ports.
+    /// Ports.
     Live,
-    /// By a simulation.
+    /// A simulation.
     Demo,
-    /// By a log.
+    /// A log.
     Replay,
-    /// Not at all: a page in a file.
+    /// None: a page in a file.
     File,
 }
 
@@ -29,8 +29,8 @@ pub struct HeadSite {
     pub id: String,
     /// Number of its source.
     pub source: u16,
-    /// Angles in the vehicle's cross-section that it hides from the head: from and to, degrees, 0 down, growing to the left; `to` may be
-    /// over 360.
+    /// Angles in the vehicle's cross-section that it hides from the head: from and to, degrees, 0 down, growing to
+    /// the left; `to` may exceed 360.
     pub hidden_deg: Vec<[f64; 2]>,
 }
 
@@ -48,7 +48,7 @@ pub struct SensorSite {
 /// Tunnel, vehicle and dive.
 #[derive(Debug, Clone)]
 pub struct Site {
-    /// How the dive is fed.
+    /// Source of the dive's data.
     pub mode: Mode,
     /// Name of the dive: its log or scene.
     pub dive: String,
@@ -56,11 +56,11 @@ pub struct Site {
     pub vehicle: String,
     /// Target T, m.
     pub target_m: f64,
-    /// Another target that all sections are held to as well, m.
+    /// Second target for all sections, m.
     pub compared_m: Option<f64>,
     /// Length of a section, m.
     pub section_m: f64,
-    /// Standard deviations of a hole that a pass keeps clear of the target.
+    /// Margin of a pass between hole and target, standard deviations.
     pub confidence_sd: f64,
     /// Length of the tunnel, m.
     pub length_m: f64,
@@ -70,15 +70,15 @@ pub struct Site {
     pub heads: Vec<HeadSite>,
     /// All sensors, in the order of sources.
     pub sensors: Vec<SensorSite>,
-    /// UTC of the clock's zero, seconds; `None` where it isn't known.
+    /// UTC of the clock's zero, seconds; `None` if unknown.
     pub utc_of_zero_s: Option<f64>,
     /// First and last time of a log, seconds.
     pub span_s: Option<[f64; 2]>,
-    /// Whether the dive takes what an operator sends.
+    /// Whether the dive accepts operator commands.
     pub takes_commands: bool,
-    /// Whether it can be paused and jump.
+    /// Whether it can be paused and sought.
     pub is_playback: bool,
-    /// Where the dive is recorded.
+    /// Path of the recording.
     pub recorded_to: Option<String>,
 }
 
@@ -116,16 +116,16 @@ pub(crate) struct Hello<'a> {
     thinned: Option<usize>,
 }
 
-/// What a viewer may do.
+/// Rights of a viewer.
 #[derive(Debug, Clone, Copy, Serialize)]
 pub struct May {
     /// Acknowledge, silence, note.
     pub operate: bool,
-    /// Pause, seek and the like.
+    /// Pause, seek and so on.
     pub playback: bool,
 }
 
-/// What of the first message depends on the viewer and the moment.
+/// Part of the first message that depends on the viewer and the moment.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Greeting<'a> {
     pub(crate) seq: u64,
@@ -133,7 +133,7 @@ pub(crate) struct Greeting<'a> {
     pub(crate) may: May,
     pub(crate) begun_s: f64,
     pub(crate) tokens_needed: bool,
-    /// Of so many samples one is in the file; `None` where all are.
+    /// Thinning step of the samples in a file; `None` if all are there.
     pub(crate) thinned: Option<usize>,
 }
 
@@ -171,7 +171,7 @@ impl Site {
         }
     }
 
-    /// Arc length at an hour of the clock seen inwards: 0 stands for 12, the crown.
+    /// Arc length at an hour of the clock, looking inwards: 0 is 12 o'clock, the crown.
     fn arc_at_hour_m(&self, hour: u32) -> f64 {
         // 9 is the left wall: y grows to the left.
         let (sin, cos) = math::sin_cos(f64::from(hour) / 12.0 * TAU);

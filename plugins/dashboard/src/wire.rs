@@ -1,4 +1,6 @@
-//! Binary frames of the feed, little-endian: a head of 16 bytes, then records of one size. `docs/reference/page-feed.md` is their contract.
+//! Binary frames of the feed, little-endian: a header of 16 bytes, then records of fixed size.
+//!
+//! `docs/reference/page-feed.md` defines them.
 
 use headrace_coverage::{Cause, Section, Unsure, Verdict};
 
@@ -8,20 +10,20 @@ pub const SECTIONS: u8 = 1;
 pub const SAMPLES: u8 = 2;
 /// Version of both.
 const VERSION: u8 = 1;
-/// Bytes of a frame's head.
+/// Length of a frame's header.
 const HEAD_BYTES: usize = 16;
 /// Bytes of a section.
 const SECTION_BYTES: usize = 32;
 /// Bytes of a sample.
 const SAMPLE_BYTES: usize = 20;
-/// What stands for none in a byte.
+/// Byte value for none.
 pub(crate) const NONE: u8 = 255;
-/// Parts of the perimeter that an arc length is rounded down to.
+/// Resolution of arc lengths: parts of the perimeter, rounded down.
 const ARC_PARTS: f64 = 65_536.0;
 /// Verdict of an open section that going on won't change.
 const NOT_INSPECTED: u8 = 4;
 
-/// A section as it is shown, but for where samples have been seen on it.
+/// A section as displayed, without the parts where it has samples.
 #[derive(Debug, Clone, Copy)]
 pub struct SectionRecord {
     /// Its chainage in lengths of a section.
@@ -30,16 +32,16 @@ pub struct SectionRecord {
     pub verdict: u8,
     /// Number of the main cause; 255 for none.
     pub cause: u8,
-    /// Number of why it can't be said; 255 for none.
+    /// Number of the reason for can't say; 255 for none.
     pub why: u8,
-    /// Bit 0 flagged, bit 1 settled, bits 2 to 4 the verdict for another target and 1, or 0 where there is none.
+    /// Bit 0 flagged, bit 1 settled, bits 2 to 4 the verdict for a second target plus 1, or 0 without one.
     pub flags: u8,
     /// Diameter of the hole, its standard deviation, chainage and arc length of its centre, m; NaN for none.
     pub hole: [f32; 4],
 }
 
 impl PartialEq for SectionRecord {
-    /// Bit for bit.
+    /// Compares bit for bit.
     fn eq(&self, other: &Self) -> bool {
         let bytes = |of: &Self| [of.verdict, of.cause, of.why, of.flags];
         self.index == other.index
@@ -48,7 +50,7 @@ impl PartialEq for SectionRecord {
     }
 }
 
-/// The number of one of several, as a byte.
+/// Index of a value in a list, as a byte.
 fn number<T: PartialEq>(all: &[T], one: Option<T>) -> u8 {
     let place = one.and_then(|one| all.iter().position(|other| *other == one));
     place.and_then(|place| u8::try_from(place).ok()).unwrap_or(NONE)
@@ -64,7 +66,7 @@ fn byte(verdict: Verdict) -> u8 {
 }
 
 impl SectionRecord {
-    /// A section that nothing is known of.
+    /// A section without data.
     pub fn blank(index: i32) -> Self {
         Self {
             index,
@@ -76,7 +78,7 @@ impl SectionRecord {
         }
     }
 
-    /// A section of the loop; `None` where the index is out of range.
+    /// Converts a section of the loop; `None` if the index is out of range.
     #[expect(clippy::cast_possible_truncation, reason = "shown to a fraction of a millimetre")]
     pub fn of(index: i64, section: &Section) -> Option<Self> {
         let verdict = match section.verdict {
@@ -93,7 +95,7 @@ impl SectionRecord {
         Some(Self { index: i32::try_from(index).ok()?, verdict, cause, why, flags, hole })
     }
 
-    /// With the verdict for another target.
+    /// Adds the verdict for a second target.
     #[must_use]
     pub fn compared(self, other: Option<Verdict>) -> Self {
         let bits = other.map_or(0, |verdict| byte(verdict) + 1);
@@ -110,18 +112,18 @@ impl SectionRecord {
     }
 }
 
-/// What has become of a ping.
+/// Outcome of a ping.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Outcome {
-    /// Taken for wall.
+    /// Accepted as wall.
     Wall = 0,
-    /// A return that isn't taken for wall.
+    /// A return that isn't accepted as wall.
     Doubtful = 1,
-    /// None: where it was aimed.
+    /// No return; the position is the aim.
     NoReturn = 2,
 }
 
-/// A sample, as it is kept and sent: 20 bytes.
+/// A sample as stored and sent: 20 bytes.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SampleRecord {
     /// Milliseconds since the dive began.
@@ -141,13 +143,13 @@ pub struct SampleRecord {
 }
 
 impl SampleRecord {
-    /// Arc length as it is sent, of one in metres.
-    #[expect(clippy::cast_possible_truncation, reason = "held to the range before")]
+    /// Converts an arc length from metres to wire units.
+    #[expect(clippy::cast_possible_truncation, reason = "clamped to the range before")]
     pub fn arc_of(arc_m: f64, perimeter_m: f64) -> u16 {
         (arc_m / perimeter_m * ARC_PARTS).clamp(0.0, ARC_PARTS - 1.0) as u16
     }
 
-    /// The bit that it sets of its section's `seen`; none where it is no wall.
+    /// Bit that it sets in its section's `seen`; none if it isn't wall.
     pub(crate) fn seen(&self) -> u64 {
         if self.outcome == Outcome::Wall as u8 { 1 << (self.arc >> 10) } else { 0 }
     }
@@ -170,7 +172,7 @@ fn frame(kind: u8, count: usize, seq: u64, record_bytes: usize) -> Vec<u8> {
     bytes
 }
 
-/// A frame of sections, each with where it has been seen.
+/// A frame of sections, each with the parts where it has samples.
 pub fn section_frame(seq: u64, sections: &[(SectionRecord, u64)]) -> Vec<u8> {
     let mut bytes = frame(SECTIONS, sections.len(), seq, SECTION_BYTES);
     for (section, seen) in sections {

@@ -1,8 +1,8 @@
-//! Host side of a head's line: one command in flight, and the head kept to its program.
+//! Host side of a head's line: keeps one command in flight, and the head on its program.
 //!
-//! The driver first locates the head, homes it the short way to its program's current position, and then requests the
-//! program's pings, each when due. A late or lost answer puts the head behind; it catches up by being polled as soon as it
-//! has answered. A head far off its program (power-cycled, or turned elsewhere) is homed again.
+//! The driver first locates the head. It homes it the short way to its program's current position, and then requests
+//! each ping of the program when due. A late or lost answer puts the head behind. It catches up by being polled as
+//! soon as it has answered. A head far off its program (power-cycled, or turned away) is homed again.
 
 use std::collections::VecDeque;
 
@@ -25,13 +25,13 @@ const LEISURE: DurNs = DurNs::from_millis(60);
 /// Lower bounds of sound speed (m/s) and line rate (bit/s) for the answer timeout.
 const SLOWEST_SOUND_MPS: f64 = 1300.0;
 const LINE_BAUD: f64 = 115_200.0;
-/// Unanswered commands after which the head is polled less often. Source: LSTS DUNE asks again after a second.
+/// Number of unanswered commands after which the head is polled less often. Source: LSTS DUNE retries after a second.
 const ASK_SELDOM_AFTER: u32 = 10;
 const SELDOM: DurNs = DurNs::from_millis(1_000);
-/// A lag beyond 1/n of the program makes the driver home the head, as does a lead of more than a few pings.
+/// The driver homes a head that lags by more than 1/n of the program, or leads by more than a few pings.
 const BEHIND_SHARE: u64 = 4;
 const AHEAD_PINGS: u64 = 10;
-/// A lag beyond 1/n of the program is reported, if the head answers, as too slow for its settings.
+/// If the head answers but lags by more than 1/n of the program, it is reported as too slow for its settings.
 const TOO_SLOW_SHARE: u64 = 8;
 
 /// Unanswered commands among the last 32 from which the line, not the head, is blamed for the lag.
@@ -111,7 +111,7 @@ impl HeadDriver {
         self.asked = Some((self.aim, now));
     }
 
-    /// A ping at the dive's settings, so that it counts, without a step.
+    /// A ping at the dive's settings without a step, so that its return counts.
     fn standing_still(&self) -> Option<[u8; COMMAND_BYTES]> {
         Command { step_deg: 0.0, reverse: false, ..self.settings.command }.encode().ok()
     }
@@ -179,7 +179,8 @@ impl HeadDriver {
         let from = homing::Standing { angle_rad: self.settings.sensor_rad(position), growing };
         let current = self.timetable.first_at(now);
         self.joins_at = current;
-        // Fixed-point iteration: the way home depends on the program's position on arrival, and that on the length of the way.
+        // Fixed-point iteration: the homing distance depends on the program's position on arrival, which depends on
+        // that distance.
         for _ in 0..3 {
             let Some(Planned { position, clockwise, .. }) = self.timetable.ping(self.joins_at).copied()
             else {
@@ -295,8 +296,10 @@ impl Driver for HeadDriver {
     }
 }
 
-/// Answer timeout: twice the sum of two-way travel time at the range setting, command and longest return on a serial line,
-/// and processing allowance.
+/// Answer timeout of a command.
+///
+/// It is twice the sum of three times: two-way travel time at the range setting, command and longest return on a
+/// serial line, and processing allowance.
 fn answer_time(command: &Command) -> DurNs {
     let sound_s = 2.0 * f64::from(command.range_m) / SLOWEST_SOUND_MPS;
     let line_s = (COMMAND_BYTES + MAX_RETURN_BYTES) as f64 * 10.0 / LINE_BAUD;

@@ -145,7 +145,7 @@ impl Emulator<Sounding> for HeadEmulator {
     }
 
     fn tell(&mut self, sounding: &Sounding, line: LineSink<'_>) {
-        // An import tells soundings without `begin`: the emulated host requests them here.
+        // An import gives soundings without `begin`, so the emulated host requests them here.
         let Some(Asked { command, ping }) = self.asked.pop_front().or_else(|| self.asked_now()) else {
             return;
         };

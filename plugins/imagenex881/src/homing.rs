@@ -5,7 +5,7 @@ use headrace_sensor::sampling::head::HeadProgram;
 use crate::codec::{COUNTS_PER_TURN, Command, step_at_most, step_deg};
 use crate::settings::{Settings, usual_pulse_us};
 
-/// Range setting while homing, m: gives the shortest pings, and none at the configured setting.
+/// Range setting while homing, m: the shortest pings, and never the configured setting.
 const RANGE_M: u8 = 1;
 
 /// Position and stepping direction of a head.
@@ -19,8 +19,8 @@ pub struct Standing {
 
 /// Commands that move a head the short way to its program's start and leave it stepping in the program's direction.
 ///
-/// A head pings with every command; while homing it does so at another range setting than the configured one, so that these
-/// returns aren't taken for samples. If only the direction is wrong, a last command reverses it without a step.
+/// A head pings with every command. While homing it uses another range setting than the configured one, so that these
+/// returns don't count as samples. If only the direction is wrong, a last command reverses it without a step.
 pub fn commands(settings: &Settings, now: Standing, program: &HeadProgram) -> Vec<Command> {
     let normal = settings.angle_sign > 0.0;
     let half = COUNTS_PER_TURN / 2;
@@ -62,7 +62,7 @@ mod tests {
 
     /// An emulated head executes the homing commands, then its program's first one.
     #[test]
-    fn a_head_arrives_and_steps_as_its_program_begins() {
+    fn homed_head_continues_with_its_program() {
         for text in ["mode = \"fast\"", "mode = \"slow\"\nangle_sign = \"inverted\"\nangle_offset_deg = 40"] {
             let settings = settings(text).unwrap();
             for (from, start) in [(0.3, 5.0), (5.0, 0.3), (1.0, 1.0), (1.0, 1.0052), (0.0, 3.1), (6.2, 0.01)]

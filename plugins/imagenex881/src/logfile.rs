@@ -58,7 +58,7 @@ pub enum LogFileError {
     },
     /// The return is longer than the shot.
     #[error(
-        "log file: shot at byte {offset} takes {total} bytes; a header of 100 and a return of {raw} need more"
+        "log file: shot at byte {offset} has {total} bytes, but it needs more: a header of 100 and a return of {raw}"
     )]
     Lengths {
         /// Offset in the file.
@@ -178,8 +178,8 @@ mod tests {
     }
 
     #[test]
-    fn a_real_sounder_log_reads() {
-        // Numbers of shots, and of those with an echo.
+    fn real_sounder_log_is_read() {
+        // Number of shots, and of shots with an echo.
         let counts = [(300, 203), (917, 452)];
         let name = "imagenex852_cidco/19_26_51-2016_11_18-sonar.852";
         for (path, (shots, echoes)) in headrace_support::recordings::both(name, counts[0], counts[1]) {
@@ -199,7 +199,7 @@ mod tests {
     }
 
     #[test]
-    fn a_real_log_whose_time_field_holds_sonar_bytes_reads() {
+    fn log_with_sonar_bytes_in_the_time_field_is_read() {
         for (path, shots) in headrace_support::recordings::both("imagenex852_cidco/hydroball.852", 50, 177) {
             let file = std::fs::read(path).unwrap();
             let returns = returns(&file);
@@ -215,7 +215,7 @@ mod tests {
     }
 
     #[test]
-    fn a_file_cut_anywhere_gives_what_is_whole_and_then_says_where_it_ends() {
+    fn truncated_file_gives_whole_shots_and_then_an_error_with_offset() {
         let mut shot = [0; 128];
         shot[..8].copy_from_slice(b"81A\0\0\x80\0\x0D");
         let file = [shot; 3].concat();
@@ -228,7 +228,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_log_is_named() {
+    fn file_that_is_no_log_is_identified() {
         let error = LogFile::new(&[0x41; 200]).next().unwrap().unwrap_err();
         assert_eq!(error, LogFileError::Magic { offset: 0, got: [0x41; 3] });
         let mut lying = [0; 200];

@@ -25,7 +25,7 @@ const NAME: &str = "imagenex881";
 /// Room for several seconds of the longest returns.
 const RING_BYTES: usize = 1 << 17;
 
-/// Longest usual gap within a return, after which an unfinished one is dropped.
+/// Longest usual gap within a return; after it an unfinished return is dropped.
 const SILENCE: DurNs = DurNs::from_millis(100);
 
 /// The Imagenex 881 device kind.
@@ -135,7 +135,7 @@ fn without_echoes(packet: &[u8], shorter: &mut Vec<u8>) -> Option<()> {
     (shorter.len() < packet.len()).then_some(())
 }
 
-/// Numbers of whole returns without a reading, by reason.
+/// Number of whole returns without a reading, by reason.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub struct Rejected {
     /// The head rejected the command, or lost characters of it.
@@ -184,7 +184,7 @@ impl HeadDecoder {
         Self { codec, clock: LineClock::new(SILENCE), reader }
     }
 
-    /// Numbers of whole returns without a reading so far.
+    /// Number of whole returns without a reading so far, by reason.
     pub fn rejected(&self) -> Rejected {
         self.reader.rejected
     }

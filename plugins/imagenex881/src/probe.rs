@@ -1,17 +1,17 @@
-//! Probe for a head: requests one short ping without a step.
+//! Probes for a head with one short ping without a step.
 
 use headrace_sensor::codec::Codec as _;
 use headrace_sensor::driver::Probe;
 
 use crate::codec::{Command, Header, Model, Points, ReturnCodec, ZERO_COUNT};
 
-/// Head ids probed: the default, and the first ones usually given to further heads on an RS-485 line.
+/// Probed head ids: the default, and the usual ids of further heads on an RS-485 line.
 const HEAD_IDS: [u8; 4] = [0x10, 0x11, 0x12, 0x13];
 
 /// Degrees per position count.
 const DEGREES_A_COUNT: f64 = 0.3;
 
-/// Polls the head ids and takes the first whole return as the answer.
+/// Polls the head ids and accepts the first whole return as the answer.
 #[derive(Debug, Clone, Default)]
 pub struct HeadProbe {
     codec: ReturnCodec,
@@ -77,7 +77,7 @@ mod tests {
     use crate::settings::tests::settings;
     use crate::stepping::Head;
 
-    /// Answers of a head with these keys to all probe questions, in order.
+    /// Answers of a head with these keys to all probe requests, in order.
     fn answers(keys: &str) -> Vec<Vec<u8>> {
         let setup = EmulatorSetup { start: MonoNs(0), head: None, site: Site::default(), polled: false };
         let mut head = HeadEmulator::new(settings(keys).unwrap(), DurNs(0), &setup);
@@ -97,7 +97,7 @@ mod tests {
     }
 
     #[test]
-    fn a_head_says_which_it_is_and_where() {
+    fn probe_reports_head_id_and_position() {
         let mut probe = HeadProbe::default();
         assert_eq!(probe.identity(), None);
         let answers = answers("mode = \"slow\"");
@@ -111,7 +111,7 @@ mod tests {
     }
 
     #[test]
-    fn heads_with_other_ids_are_found_too() {
+    fn probe_finds_heads_with_other_ids() {
         let mut probe = HeadProbe::default();
         for answer in answers("mode = \"slow\"\nhead_id = 0x13") {
             probe.heard(&answer);
@@ -120,7 +120,7 @@ mod tests {
     }
 
     #[test]
-    fn no_question_moves_a_head() {
+    fn probe_never_moves_a_head() {
         let mut head = Head::new(700, true);
         let mut asked = 0;
         let mut codec = CommandCodec::default();

@@ -9,9 +9,9 @@ use crate::stepping::Head;
 
 /// Host side: generates the commands that keep a head on its program.
 ///
-/// Sectors are swept with steps and reversals, not with the head's own sector switches, which allow multiples of 3 degrees
-/// only. Both ends of a sector are pinged; if the step doesn't divide it, the last step before an end is shorter. An end's
-/// ping isn't repeated.
+/// Sectors are swept with steps and reversals. The head's own sector settings aren't used, because they allow
+/// multiples of 3 degrees only. Both ends of a sector are pinged, each once per sweep. If the step doesn't divide the
+/// sector, the last step before an end is shorter.
 #[derive(Debug, Clone)]
 pub struct Host {
     command: Command,

@@ -39,7 +39,8 @@ struct MeasuredTurn {
     period: DurNs,
 }
 
-/// Default housing of the family's heads about the beam. Source: radius from Jorge et al. 2021, §8.3; the lengths are estimates.
+/// Default housing of the family's heads about the beam. Source: radius from Jorge et al. 2021, §8.3; the lengths are
+/// estimates.
 const USUAL_BODY: HeadBody = HeadBody { radius_m: 0.04, ahead_m: 0.03, behind_m: 0.2 };
 
 /// Checked settings of a head: every command built from them can be encoded.
@@ -67,7 +68,7 @@ impl Settings {
     pub fn read(sensor: &SensorConfig, own: &Section<'_>) -> Result<Self, ConfigError> {
         let choices = MODES.map(|mode| (mode.name, mode));
         let known = own.required("mode", own.choice("mode", &choices)?);
-        // Without a mode the other keys are checked as in any.
+        // Without a mode, the other keys are checked with any mode.
         let mode = *known.as_ref().unwrap_or(&MODES[0]);
         let command = command(mode, own)?;
         let measured = measured_turns(mode, command.range_m, own)?;
@@ -175,9 +176,9 @@ fn pings_a_turn(mode: Mode) -> i32 {
 
 /// Turn period at a range setting.
 ///
-/// Taken from the periods measured in this mode and the maker's table: at a known range the known value, between two ranges
-/// linear interpolation, beyond them extrapolation by the two-way travel time per ping. The rest of the ping period
-/// (stepping, line) doesn't depend on range.
+/// It comes from the maker's table and the periods measured in this mode. At a known range it is the known value.
+/// Between two ranges it is interpolated linearly. Beyond them it is extrapolated by the two-way travel time per
+/// ping. The rest of the ping period (stepping, line) doesn't depend on range.
 fn turn_period(mode: Mode, range_m: u8, measured: &[MeasuredTurn]) -> (DurNs, Basis) {
     let table = MeasuredTurn {
         step_counts: mode.step_counts,
@@ -290,7 +291,7 @@ fn command(mode: Mode, own: &Section<'_>) -> Result<Command, ConfigError> {
         switch_delay_ms: 0.0,
         frequency_khz: frequency_khz as f64,
     };
-    // All settings but the range are within their keys' limits.
+    // All settings except the range are within their keys' limits.
     command.encode().map_err(|error| own.invalid("range_m", &error.to_string()))?;
     Ok(command)
 }
@@ -340,7 +341,7 @@ pub(crate) mod tests {
     }
 
     #[test]
-    fn angles_go_through_sign_and_offset() {
+    fn angles_use_sign_and_offset() {
         let settings = settings("mode = \"slow\"\nangle_sign = \"inverted\"\nangle_offset_deg = 90").unwrap();
         assert!((settings.sensor_rad(750) - math::PI / 4.0).abs() < 1e-12);
         for position in 0..1200u16 {
@@ -378,7 +379,7 @@ pub(crate) mod tests {
     }
 
     #[test]
-    fn what_is_not_allowed_is_named_with_its_line() {
+    fn invalid_keys_are_refused_with_their_line() {
         let error = |text: &str| settings(text).unwrap_err().to_string();
         assert_eq!(error("range_m = 10"), "v.toml:1: mode: is missing");
         assert_eq!(
@@ -395,7 +396,7 @@ pub(crate) mod tests {
     }
 
     #[test]
-    fn a_latency_of_a_ping_period_is_refused() {
+    fn latency_of_a_ping_period_is_refused() {
         let root = Document::new("v.toml", "mode = \"slow\"\nlatency_ms = 18").root().unwrap();
         let late = SensorConfig { latency: DurNs::from_millis(18), ..sensor() };
         let error = Settings::read(&late, &root).unwrap_err().to_string();

@@ -21,13 +21,13 @@ pub enum MessageSet {
 /// A message of any set.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Message {
-    /// Of the Xsens set.
+    /// Message of the Xsens set.
     Xsens(xsens::Message),
-    /// Of the SBG set.
+    /// Message of the SBG set.
     Sbg(sbg::Message),
-    /// Of the J1939 set.
+    /// Message of the J1939 set.
     J1939(j1939::Message),
-    /// Of the Bosch set.
+    /// Message of the Bosch set.
     Bosch(bosch::Message),
 }
 

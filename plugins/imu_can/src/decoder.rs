@@ -51,7 +51,7 @@ stateful!(ImuDecoder { state: codec, state, passed_over; });
 struct State {
     meaning: Meaning,
     invalid: Invalid,
-    /// True once a quaternion has come; Euler angles are then ignored, lest the attitude be used twice.
+    /// True after the first quaternion. Euler angles are ignored from then on, so that the attitude isn't used twice.
     sends_quaternions: bool,
     sample_time_ticks: Option<u32>,
     clock: Option<SampleTimes>,
@@ -215,7 +215,7 @@ impl State {
     fn take_j1939(&mut self, message: &j1939::Message) -> Told {
         let order = self.meaning.axis_order;
         let (triple, told) = match message {
-            // Pitch and roll without yaw are no full attitude; the filter has them from gravity.
+            // Pitch and roll without yaw are no full attitude; the filter gets them from gravity.
             j1939::Message::Slope(_) => return None,
             j1939::Message::AngularRate(triple) => {
                 let rates = triple.rates_degps().map(|degps| degps.map(f64::to_radians));
@@ -234,8 +234,8 @@ impl State {
         Some((reading, DurNs::from_secs_f64(delay_ms / 1000.0)))
     }
 
-    /// The unit has no turn rate about its pitch axis, so no turn rate is reported; the acceleration is reported once all
-    /// three components have come.
+    /// The unit has no turn rate about its pitch axis, so no turn rate is reported. Acceleration is reported once all
+    /// three components have arrived.
     fn take_bosch(&mut self, message: bosch::Message) -> Told {
         let [x, y, z] = &mut self.acceleration_mps2;
         match message {
@@ -248,8 +248,9 @@ impl State {
         force(complete)
     }
 
-    /// The unit stamps samples and filter solutions with one clock but at different times: only the kind that came first is
-    /// followed.
+    /// Handles a timestamp of an SBG unit; only the kind that arrived first is followed.
+    ///
+    /// The unit stamps samples and filter solutions with one clock but at different times.
     fn sbg_stamp(&mut self, time_us: u32, of_filter: bool) {
         if *self.stamped_by_filter.get_or_insert(of_filter) == of_filter {
             self.stamp(time_us, MICROSECOND);
@@ -291,12 +292,12 @@ impl State {
     }
 }
 
-#[expect(clippy::unnecessary_wraps, reason = "the callers hand it on")]
+#[expect(clippy::unnecessary_wraps, reason = "the callers pass it on")]
 fn rate([x, y, z]: [f64; 3]) -> Told {
     Some((Reading::AngularRate(Vec3::new(x, y, z)), DurNs::ZERO))
 }
 
-#[expect(clippy::unnecessary_wraps, reason = "the callers hand it on")]
+#[expect(clippy::unnecessary_wraps, reason = "the callers pass it on")]
 fn force([x, y, z]: [f64; 3]) -> Told {
     Some((Reading::SpecificForce(Vec3::new(x, y, z)), DurNs::ZERO))
 }

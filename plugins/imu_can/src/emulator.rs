@@ -123,7 +123,7 @@ fn bosch(motion: &Inertia) -> [Option<Message>; 3] {
     .map(|message| message.map(Message::Bosch))
 }
 
-/// The values, if all are finite; values that weren't measured aren't finite, and aren't sent.
+/// Returns the values if all are finite. Values that weren't measured aren't finite, and aren't sent.
 fn all_finite<const N: usize>(values: [f64; N]) -> Option<[f64; N]> {
     values.iter().all(|value| value.is_finite()).then_some(values)
 }

@@ -27,7 +27,7 @@ pub enum CanId {
     Extended(u32),
 }
 
-/// ImuCanKind of a frame.
+/// Kind of a frame.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum FrameKind {
     /// Data from a device.
@@ -55,7 +55,7 @@ pub enum FrameError {
     Length(usize),
     /// An identifier with too many bits.
     #[error(
-        "reading a CAN frame: identifier {0:#X}; standard ones reach to 0x7FF, extended ones to 0x1FFFFFFF"
+        "reading a CAN frame: identifier {0:#X}; allowed are up to 0x7FF, or 0x1FFFFFFF for an extended one"
     )]
     Id(u32),
 }
@@ -127,7 +127,7 @@ impl CanFrame {
         Ok(Self { kind, len, data })
     }
 
-    /// ImuCanKind of the frame.
+    /// Kind of the frame.
     pub fn kind(&self) -> FrameKind {
         self.kind
     }
@@ -180,7 +180,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn flags_tell_what_a_frame_is() {
+    fn flags_give_the_kind_of_a_frame() {
         let kind = |id: [u8; 4]| {
             let mut bytes = [0; FRAME_BYTES];
             bytes[..4].copy_from_slice(&id);
@@ -212,7 +212,7 @@ mod tests {
 
     proptest::proptest! {
         #[test]
-        fn every_frame_comes_back(frame in any_frame()) {
+        fn every_frame_round_trips(frame in any_frame()) {
             proptest::prop_assert_eq!(CanFrame::decode(&frame.encode()), Ok(frame));
         }
     }

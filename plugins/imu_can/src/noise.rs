@@ -1,4 +1,4 @@
-//! Noise of the units that presets are named after, by their makers' data sheets.
+//! Noise of the units that presets are named after, from their makers' data sheets.
 
 use headrace_sensor::device::{BiasSpec, InertialNoise};
 
@@ -10,22 +10,23 @@ const DEGREE: f64 = core::f64::consts::PI / 180.0;
 const DEGREE_AN_HOUR: f64 = DEGREE / 3600.0;
 /// A millionth of standard gravity, m/s^2.
 const MICRO_G: f64 = 9.806_65e-6;
-/// Time over which biases wander, s: the usual place of the minimum of an Allan deviation, where data sheets read the
-/// in-run stability.
+/// Time constant of bias wander, s: the usual minimum of an Allan deviation, at which data sheets state the in-run
+/// stability.
 const WANDERS_OVER_S: f64 = 300.0;
-/// Bias that stays after power-on, of a unit calibrated at the factory. Data sheets bound it by a year's worst case
+/// Constant bias after power-on of a factory-calibrated unit, rad/s. Data sheets bound it by the worst case of a year
 /// (0.2 degrees/s, 30 mm/s^2); a unit at rest on deck shows it.
 const GYRO_TURN_ON: f64 = 0.05 * DEGREE;
 const ACCEL_TURN_ON_MPS2: f64 = 0.02;
-/// What mounting, temperature and the floor of a count add to the in-run stability of accelerometers, m/s^2.
+/// Increase of accelerometer in-run instability by mounting, temperature and resolution, m/s^2.
 const ACCEL_IN_RUN_MPS2: f64 = 2e-3;
 
-/// The noise of the unit that a message set is named after; `None` where the set is of many units.
+/// Noise of the unit that a message set is named after; `None` if the set covers many units.
 pub(crate) fn of(set: MessageSet) -> Option<InertialNoise> {
     match set {
-        // MT1603P: 0.007 degrees/s/sqrt(Hz), 8 degrees/h, 60 ug/sqrt(Hz). Counts of 2^-9 rad/s at 100 Hz add 0.003.
+        // MT1603P: 0.007 degrees/s/sqrt(Hz), 8 degrees/h, 60 ug/sqrt(Hz). A resolution of 2^-9 rad/s at 100 Hz adds
+        // 0.003.
         MessageSet::Xsens(_) => Some(unit(0.0077 * DEGREE, 8.0 * DEGREE_AN_HOUR, 60.0 * MICRO_G)),
-        // Ellipse: 0.15 degrees/sqrt(h), 7 degrees/h, 57 ug/sqrt(Hz). Counts of 1e-3 rad/s and 1e-2 m/s^2.
+        // Ellipse: 0.15 degrees/sqrt(h), 7 degrees/h, 57 ug/sqrt(Hz). The resolution is 1e-3 rad/s and 1e-2 m/s^2.
         MessageSet::Sbg => Some(unit(0.003 * DEGREE, 7.0 * DEGREE_AN_HOUR, 65.0 * MICRO_G)),
         MessageSet::J1939(_) | MessageSet::Bosch => None,
     }

@@ -63,9 +63,7 @@ impl DeviceKind for ImuCanKind {
         let rate_hz = own.number("rate_hz", 1.0..=1000.0)?.unwrap_or(100.0);
         let known = match own.named_file("dbc")? {
             Some(_) if own.text("preset")?.is_some() => {
-                return Err(
-                    own.invalid("dbc", "is there beside preset; one of them says how frames are read")
-                );
+                return Err(own.invalid("dbc", "is given beside preset; give only one of them"));
             }
             Some(file) => Known::Dbc(Box::new(keys::mapping(&file, own, sensor.latency)?)),
             None => Known::Preset(preset(sensor, own)?),

@@ -144,7 +144,7 @@ fn check(readings: &[Decoded], truth: &Going, rate_quantum: f64, force_quantum: 
 }
 
 #[test]
-fn an_emulated_xsens_comes_back() {
+fn emulated_xsens_round_trips() {
     for (roll, yaw) in [(0.0, 0.0), (0.0, 0.2), (0.3, 0.0)] {
         let truth = Going::new(roll, yaw);
         let mut decoder = ImuDecoder::new(meaning(XSENS));
@@ -157,7 +157,7 @@ fn an_emulated_xsens_comes_back() {
 }
 
 #[test]
-fn at_constant_attitude_and_velocity_rate_is_zero_and_force_is_gravity() {
+fn constant_motion_gives_zero_rate_and_gravity() {
     let truth = Going::new(0.0, 0.0);
     let mut decoder = ImuDecoder::new(meaning(XSENS));
     let readings = emulated("preset = \"xsens_mti600\"\n", &mut decoder, &truth, 500);
@@ -170,7 +170,7 @@ fn at_constant_attitude_and_velocity_rate_is_zero_and_force_is_gravity() {
 }
 
 #[test]
-fn an_emulated_sbg_comes_back_in_our_axes() {
+fn emulated_sbg_round_trips_in_headrace_axes() {
     let truth = Going::new(0.1, 0.0);
     let mut decoder = ImuDecoder::new(meaning(MessageSet::Sbg));
     let readings = emulated("preset = \"sbg_ellipse\"\nrate_hz = 50\n", &mut decoder, &truth, 200);
@@ -179,7 +179,7 @@ fn an_emulated_sbg_comes_back_in_our_axes() {
 }
 
 #[test]
-fn an_emulated_j1939_unit_comes_back_in_either_order() {
+fn emulated_j1939_unit_round_trips_in_either_axis_order() {
     for (key, axis_order) in [("yxz", AxisOrder::Yxz), ("xyz", AxisOrder::Xyz)] {
         let truth = Going::new(0.0, 0.0);
         let mut decoder = ImuDecoder::new(Meaning { axis_order, ..meaning(J1939) });
@@ -191,7 +191,7 @@ fn an_emulated_j1939_unit_comes_back_in_either_order() {
 }
 
 #[test]
-fn an_emulated_bosch_unit_comes_back_with_its_force_alone() {
+fn emulated_bosch_unit_gives_force_only() {
     let truth = Going::new(0.0, 0.0);
     let mut decoder = ImuDecoder::new(meaning(MessageSet::Bosch));
     let readings = emulated("preset = \"bosch_mm5\"\n", &mut decoder, &truth, 100);
@@ -200,7 +200,7 @@ fn an_emulated_bosch_unit_comes_back_with_its_force_alone() {
 }
 
 #[test]
-fn an_attitude_that_the_unit_calls_invalid_is_withheld() {
+fn invalid_attitude_is_withheld() {
     let mut decoder = ImuDecoder::new(meaning(XSENS));
     let quaternion = xsens::Message::Quaternion([32_767, 0, 0, 0]);
     let rate = xsens::Message::RateOfTurn([512, 0, 0]);
@@ -226,7 +226,7 @@ fn an_attitude_that_the_unit_calls_invalid_is_withheld() {
 }
 
 #[test]
-fn frames_of_other_devices_are_passed_over() {
+fn frames_of_other_devices_are_ignored() {
     let mut decoder = ImuDecoder::new(meaning(XSENS));
     let other = Message::Sbg(sbg::Message::Rate([0; 3]));
     assert_eq!(readings(&mut decoder, MessageSet::Sbg, &[other, other]), []);
@@ -234,7 +234,7 @@ fn frames_of_other_devices_are_passed_over() {
 }
 
 #[test]
-fn euler_angles_are_heard_unless_there_are_quaternions() {
+fn euler_angles_are_used_only_without_quaternions() {
     let mut decoder = ImuDecoder::new(meaning(XSENS));
     let euler = Message::Xsens(xsens::Message::EulerAngles([1600, -416, -11_520]));
     let quaternion = Message::Xsens(xsens::Message::Quaternion([32_767, 0, 0, 0]));
@@ -249,7 +249,7 @@ fn euler_angles_are_heard_unless_there_are_quaternions() {
 }
 
 #[test]
-fn an_sbg_at_rest_feels_gravity_upwards_and_its_yaw_grows_to_the_left() {
+fn sbg_at_rest_has_upward_force_and_yaw_grows_to_the_left() {
     let mut decoder = ImuDecoder::new(meaning(MessageSet::Sbg));
     // At rest the device's z axis, which points down, reads -9.81; a heading of -1.5 is nearly west, to the left of north.
     let messages = [sbg::Message::Acceleration([0, 0, -981]), sbg::Message::Euler([0, 1000, -15_000])];
@@ -262,7 +262,7 @@ fn an_sbg_at_rest_feels_gravity_upwards_and_its_yaw_grows_to_the_left() {
 }
 
 #[test]
-fn values_that_a_j1939_unit_calls_wrong_are_withheld_and_its_latency_counts() {
+fn invalid_j1939_values_are_withheld_and_latency_is_subtracted() {
     let mut decoder = ImuDecoder::new(meaning(J1939));
     let triple = |raw, figures, latency| j1939::Triple { raw, figures, latency };
     let level = [32_000, 32_000, 32_981];
@@ -282,7 +282,7 @@ fn values_that_a_j1939_unit_calls_wrong_are_withheld_and_its_latency_counts() {
 }
 
 #[test]
-fn a_bosch_unit_tells_its_force_when_all_of_it_has_come() {
+fn bosch_force_is_reported_once_complete() {
     let mut decoder = ImuDecoder::new(meaning(MessageSet::Bosch));
     let (rate, force) = (bosch::RawRate::nearest(0.0), bosch::RawAcceleration::nearest(1.0));
     let messages = [
@@ -308,7 +308,7 @@ fn wrong_keys_are_named() {
 }
 
 #[test]
-fn what_an_sbg_calls_unfit_is_withheld() {
+fn sbg_values_with_bad_status_are_withheld() {
     let mut decoder = ImuDecoder::new(meaning(MessageSet::Sbg));
     let info = |status| sbg::Message::ImuInfo { time_us: 0, status: sbg::ImuStatus(status), temperature: 0 };
     let samples = [sbg::Message::Acceleration([0; 3]), sbg::Message::Rate([0; 3])];
@@ -322,7 +322,7 @@ fn what_an_sbg_calls_unfit_is_withheld() {
 }
 
 #[test]
-fn the_kind_of_time_that_came_first_is_followed() {
+fn first_kind_of_sbg_time_is_followed() {
     let mut decoder = ImuDecoder::new(meaning(MessageSet::Sbg));
     assert_eq!(decoder.clock(), None);
     let info = |time_us| sbg::Message::ImuInfo { time_us, status: sbg::ALL_WELL, temperature: 0 };
@@ -333,7 +333,7 @@ fn the_kind_of_time_that_came_first_is_followed() {
 }
 
 #[test]
-fn what_was_not_measured_is_told_by_no_frame() {
+fn unmeasured_values_are_sent_in_no_frame() {
     let setup = EmulatorSetup { start: MonoNs(0), head: None, site: Site::default(), polled: true };
     for (own, set, whole, without) in [
         ("preset = \"xsens_mti600\"", XSENS, 4, 3),

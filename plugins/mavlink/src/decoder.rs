@@ -30,7 +30,7 @@ const QUALITY_INVALID_PERCENT: u8 = 1;
 pub struct Meaning {
     /// Part of the vehicle.
     pub part: Part,
-    /// Accepted system id; `None` for that of the first autopilot heard.
+    /// Accepted system id; `None` for that of the first autopilot received.
     pub system_id: Option<u8>,
     /// Accepted component id; `None` for any.
     pub component_id: Option<u8>,
@@ -100,7 +100,7 @@ struct BootClock {
 }
 
 impl BootClock {
-    /// Processes a timestamp. Small backward steps are real, not wraps: messages may be sent out of order.
+    /// Processes a timestamp. Small backward steps are real and no wraps, because messages may be sent out of order.
     fn note(&mut self, time_ms: u32) {
         self.since_boot_ms = match self.last_ms {
             None => i64::from(time_ms),
@@ -143,7 +143,10 @@ impl Decoder for MavlinkDecoder {
         self.codec.counts()
     }
 
-    /// Messages of the part from other systems. Invalid values: angles beyond their range, non-finite numbers, pressure not above zero, contradictory limits.
+    /// Number of withheld messages of the part.
+    ///
+    /// These are messages from other systems, and invalid values: angles beyond their range, non-finite numbers,
+    /// pressure not above zero, contradictory limits.
     fn withheld(&self) -> u64 {
         self.state.withheld
     }
@@ -160,13 +163,13 @@ impl State {
         } else {
             self.passed_over += 1;
         }
-        // The driver delivers one system's messages only; in a log of another's the heartbeat may be missing.
+        // The driver delivers messages of one system only; in a foreign log the heartbeat may be missing.
         if is_ours && (is_autopilots_heartbeat(frame) || self.passed_over == before) {
             self.system_id = Some(system_of(frame));
         }
     }
 
-    /// Whether a frame would be this part's, whoever sends it.
+    /// Whether a frame belongs to this part, from any sender.
     fn is_of_part(&self, frame: &Frame) -> bool {
         let mut same = Self { system_id: None, passed_over: 0, ..self.clone() };
         same.take_own(frame, &mut |_| ());
@@ -272,7 +275,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_autopilots_clock_goes_on_when_it_wraps_and_may_step_back() {
+    fn autopilot_clock_unwraps_and_may_step_back() {
         let mut clock = BootClock::default();
         for (time_ms, since_boot_ms) in
             [(4_294_967_000, 4_294_967_000), (4_294_966_990, 4_294_966_990), (4, 4_294_967_300_i64)]

@@ -23,8 +23,9 @@ const HEARTBEAT_PERIOD: DurNs = DurNs::from_millis(1_000);
 const COMPONENT_ID: u8 = MavComponent::MAV_COMP_ID_ONBOARD_COMPUTER as u8;
 const SYSTEM_ID: u8 = 1;
 
-/// Driver of a part. Other parts' messages aren't delivered: on a shared line each message is recorded once. Nor are those of
-/// other systems, or any before it is known which system is believed.
+/// Driver of a part. It delivers only messages of its part, so that each message on a shared line is recorded once.
+///
+/// Messages of other systems are dropped, and so are all messages before the accepted system is known.
 pub struct MavlinkDriver {
     cutter: Cutter<Frames, MAX_FRAME_BYTES>,
     /// Separates the part's messages from others.
@@ -32,7 +33,7 @@ pub struct MavlinkDriver {
     own_frames: u64,
     next_at: MonoNs,
     sequence: u8,
-    /// The system that is believed: the configured one, or that of the first autopilot's heartbeat.
+    /// Accepted system: the configured one, or that of the first autopilot's heartbeat.
     system_id: Option<u8>,
     strangers: Strangers,
 }

@@ -33,7 +33,7 @@ pub struct AutopilotEmulator {
     device_per_site: f64,
     begun: u64,
     sequence: u8,
-    /// Time of the next heartbeat; `None` if no host hears them.
+    /// Time of the next heartbeat; `None` without a host that receives them.
     heartbeat_at: Option<MonoNs>,
 }
 
@@ -44,7 +44,7 @@ impl AutopilotEmulator {
             Part::Distance(part) => part.sound_speed_mps / setup.site.sound_speed_mps,
             _ => 1.0,
         };
-        // A log has none: a part's driver records its own messages.
+        // A log has no heartbeats, because a part's driver records its own messages only.
         let heartbeat_at = (!setup.polled).then_some(setup.start);
         Self { meaning, rate_hz, start: setup.start, device_per_site, begun: 0, sequence: 0, heartbeat_at }
     }

@@ -4,10 +4,10 @@
 //!   FE length sequence system component id                     payload CRC16              first version
 //!   FD length incompatible compatible sequence system component id id id payload CRC16 [signature 13]
 //! ```
-//! Definitions, checksum and packing come from the mavlink crate. Its reader isn't used: it doesn't report the start of a
-//! frame, needed for the receive time, has no counters, and accepts version 1 frames of any length.
-//! Version 2 truncates trailing zeros of a payload. Signatures aren't verified: access to the vehicle's own network is the
-//! network's responsibility. A frame cut off in its signature therefore takes the following bytes for the rest of it.
+//! Definitions, checksum and packing come from the mavlink crate. Its reader isn't used for three reasons. It doesn't
+//! report the start of a frame, which the receive time needs. It has no counters. It accepts version 1 frames of any
+//! length. Version 2 truncates trailing zeros of a payload. Signatures aren't verified, because access to the
+//! vehicle's own network is controlled elsewhere. So a frame cut off in its signature swallows the following bytes.
 //! Source: MAVLink guide, "Packet Serialization" and "Message Signing".
 
 use headrace_sensor::codec::{Bytes, Framed, Framing, Verdict};
@@ -130,8 +130,8 @@ pub(crate) fn announced_bytes(front: &[u8]) -> Option<usize> {
 
 /// Framing in a byte stream.
 ///
-/// A frame with an unknown message, or with an incompatibility flag other than signing, can't be told from noise, and its
-/// bytes are skipped.
+/// A frame with an unknown message, or with an incompatibility flag other than signing, can't be distinguished from
+/// noise, and its bytes are skipped.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Frames;
 
@@ -192,7 +192,8 @@ const IDENTITY: [u32; 16] = [
     dialect::OPEN_DRONE_ID_BASIC_ID_DATA::ID,
 ];
 
-/// Writes a packet of whole frames without those of [`IDENTITY`]; `None` if the packet holds anything else, or none of those.
+/// Writes a packet of whole frames without those of [`IDENTITY`]; `None` if there are none of those, or anything but
+/// frames.
 pub(crate) fn without_identity(packet: &[u8], shorter: &mut Vec<u8>) -> Option<()> {
     let mut rest = packet;
     while !rest.is_empty() {
@@ -253,7 +254,7 @@ mod tests {
     }
 
     #[test]
-    fn messages_are_known_by_their_definitions_without_extensions() {
+    fn every_message_has_its_definition_and_v1_length() {
         assert!(MavMessage::all_ids().is_sorted());
         for id in MavMessage::all_ids() {
             assert!(v1_payload_bytes(*id).is_some(), "{id}");
@@ -275,7 +276,7 @@ mod tests {
     }
 
     #[test]
-    fn a_recorded_frame_is_read_and_written() {
+    fn recorded_frame_round_trips() {
         let got = decode_all(&mut MavlinkCodec::default(), RECORDED_PRESSURE);
         let frame = got[0];
         assert_eq!((frame.version, frame.message_id), (MavlinkVersion::V2, 137));
@@ -285,7 +286,7 @@ mod tests {
     }
 
     #[test]
-    fn a_wrong_bit_anywhere_is_no_frame() {
+    fn frame_with_a_wrong_bit_is_refused() {
         for at in 0..RECORDED_ATTITUDE.len() * 8 {
             let mut bytes = RECORDED_ATTITUDE.to_vec();
             bytes[at / 8] ^= 1 << (at % 8);
@@ -294,7 +295,7 @@ mod tests {
     }
 
     #[test]
-    fn a_signed_frame_is_taken_whole() {
+    fn signed_frame_is_read_with_its_signature() {
         let bytes = signed(RECORDED_ATTITUDE, [0xFE; v2::SIGNATURE_SIZE]);
         assert_eq!(bytes.len(), RECORDED_ATTITUDE.len() + v2::SIGNATURE_SIZE);
         let mut codec = MavlinkCodec::default();
@@ -303,7 +304,7 @@ mod tests {
     }
 
     #[test]
-    fn what_cannot_be_checked_is_skipped_and_hides_nothing() {
+    fn uncheckable_frame_is_skipped_without_hiding_others() {
         let mut unknown = RECORDED_ATTITUDE.to_vec();
         unknown[7] = 0xFF;
         unknown[8] = 0xFF;
@@ -319,14 +320,14 @@ mod tests {
     }
 
     #[test]
-    fn a_frame_of_the_first_version_has_its_one_length() {
+    fn v1_frame_needs_its_exact_length() {
         let mut frame = first_version();
         assert_eq!(decode_all(&mut MavlinkCodec::default(), &encoded(&frame)), [frame]);
         frame.payload = Bytes::new(&[1; 25]).unwrap();
         assert_eq!(decode_all(&mut MavlinkCodec::default(), &encoded(&frame)), []);
     }
 
-    /// Without signatures: a truncated signature can't be told from the following frame.
+    /// Frames without signatures: a truncated signature can't be distinguished from the following frame.
     fn any_frame() -> impl Strategy<Value = Frame> {
         let ids = proptest::sample::select(vec![0_u32, 26, 27, 29, 30, 116, 132, 137, 143, 253, 11_032]);
         let payload = proptest::collection::vec(any::<u8>(), 255);

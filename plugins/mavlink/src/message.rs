@@ -217,8 +217,8 @@ pressure_messages! {
 const TYPE_AT: usize = 10;
 const ORIENTATION_AT: usize = 12;
 
-/// The crate rejects types and orientations missing from its definitions. The sensor type isn't used here and the orientation
-/// is a plain number in the vehicle file, so neither is parsed as an enumeration.
+/// The crate rejects types and orientations missing from its definitions. Neither is parsed as an enumeration here:
+/// the sensor type isn't used, and the orientation is a plain number in the vehicle file.
 impl MessageData for Distance {
     type Message = MavMessage;
 
@@ -281,7 +281,7 @@ mod tests {
     }
 
     #[test]
-    fn recorded_messages_say_what_another_reader_finds() {
+    fn recorded_messages_match_another_reader() {
         let Message::Attitude(attitude) = recorded(RECORDED_ATTITUDE) else { panic!() };
         assert_eq!(attitude.time_boot_ms, 689_235);
         let near = |got: f32, wanted: f32| assert!((got - wanted).abs() < 1e-6, "{got} is not {wanted}");
@@ -347,7 +347,7 @@ mod tests {
         #![proptest_config(headrace_sensor::codec::contract::config())]
 
         #[test]
-        fn a_message_comes_back_though_its_last_zeros_are_not_sent(message in any_message()) {
+        fn message_with_truncated_zeros_round_trips(message in any_message()) {
             let frame = message.to_frame(SENDER);
             let got = decode_all(&mut MavlinkCodec::default(), frame.raw_bytes());
             prop_assert_eq!(got.len(), 1);
@@ -356,7 +356,7 @@ mod tests {
     }
 
     #[test]
-    fn zeros_at_the_end_are_not_sent() {
+    fn trailing_zeros_are_not_sent() {
         let pressure = Message::Pressure(Pressure {
             message: PressureMessage::Third,
             time_boot_ms: 0x0102,

@@ -1,7 +1,8 @@
-//! What the program itself says over MAVLink, as an onboard computer beside the autopilot: heartbeats, figures and texts.
+//! The program's own MAVLink messages, sent as an onboard computer beside the autopilot: heartbeats, values and
+//! texts.
 //!
-//! Neither DISTANCE_SENSOR nor OBSTACLE_DISTANCE is ever sent: ground stations would take them for the autopilot's, and an
-//! autopilot for what it is to avoid.
+//! DISTANCE_SENSOR and OBSTACLE_DISTANCE are never sent. Ground stations would attribute them to the autopilot, and
+//! an autopilot would try to avoid them.
 
 use mavlink::MavHeader;
 use mavlink::types::CharArray;
@@ -16,13 +17,13 @@ use crate::frame::encode;
 pub const COMPONENT_ID: u8 = 191;
 /// Longest text of a STATUSTEXT; longer ones are sent in parts. Source: MAVLink, STATUSTEXT.
 pub const TEXT_BYTES: usize = 50;
-/// Longest name of a figure. Source: MAVLink, NAMED_VALUE_FLOAT.
+/// Longest name of a value. Source: MAVLink, NAMED_VALUE_FLOAT.
 pub const NAME_BYTES: usize = 10;
-/// Names that QGroundControl takes for the autopilot's, whoever sends them. Source: its ArduSub plugin, August 2026.
+/// Names that QGroundControl attributes to the autopilot from any sender. Source: its ArduSub plugin, August 2026.
 pub const RESERVED: [&str; 8] =
     ["TetherTrn", "RFTarget", "CamTilt", "Lights1", "Lights2", "PilotGain", "InputHold", "RollPitch"];
 
-/// How grave a text is.
+/// Severity of a text.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Gravity {
     /// Act at once.
@@ -31,7 +32,7 @@ pub enum Gravity {
     Alarm,
     /// Take care.
     Warning,
-    /// Know of it.
+    /// Be informed.
     Caution,
 }
 
@@ -46,12 +47,12 @@ impl From<Gravity> for MavSeverity {
     }
 }
 
-/// Encodes what is said, in order.
+/// Encodes messages, in order.
 #[derive(Debug)]
 pub struct Speaker {
     system_id: u8,
     sequence: u8,
-    /// Number of the last text in parts.
+    /// Number of the last text that was sent in parts.
     text: u16,
 }
 
@@ -75,7 +76,7 @@ impl Speaker {
         encode(header, &heartbeat).raw_bytes().to_vec()
     }
 
-    /// A figure; NaN where it isn't known. `None` for a name that is too long or [`RESERVED`].
+    /// Encodes a named value; NaN if unknown. `None` for a name that is too long or [`RESERVED`].
     pub fn figure(&mut self, name: &str, time_ms: u32, value: f32) -> Option<Vec<u8>> {
         if name.len() > NAME_BYTES || !name.is_ascii() || RESERVED.contains(&name) {
             return None;
@@ -85,12 +86,13 @@ impl Speaker {
         Some(encode(header, &figure).raw_bytes().to_vec())
     }
 
-    /// A text, in as many parts as it takes. Ground stations decode each part by itself: what isn't ASCII is written with it.
+    /// Encodes a text in as many parts as needed. Ground stations decode each part separately, so the text is
+    /// converted to ASCII.
     pub fn text(&mut self, gravity: Gravity, text: &str) -> Vec<Vec<u8>> {
         let text = ascii(text);
         let is_whole = text.len() <= TEXT_BYTES;
         let id = if is_whole { 0 } else { self.next_text() };
-        // A part that is full doesn't say that it is the last: an empty one follows it.
+        // A full part doesn't state that it is the last, so an empty one follows it.
         let parts = if is_whole { 1 } else { text.len() / TEXT_BYTES + 1 };
         let part = |part: usize| {
             let from = part * TEXT_BYTES;
@@ -103,7 +105,7 @@ impl Speaker {
                 severity: gravity.into(),
                 text: CharArray::from(part),
                 id,
-                // 50 bytes each: no text of ours has 255 parts.
+                // Parts have 50 bytes; no text of this program needs 255 parts.
                 chunk_seq: u8::try_from(number).unwrap_or(u8::MAX),
             };
             frames.push(encode(header, &said).raw_bytes().to_vec());
@@ -117,14 +119,14 @@ impl Speaker {
         MavHeader { system_id: u32::from(self.system_id), component_id: COMPONENT_ID, sequence }
     }
 
-    /// Zero is for texts of one part.
+    /// Number of the next text. Zero is reserved for texts of one part.
     fn next_text(&mut self) -> u16 {
         self.text = self.text.checked_add(1).unwrap_or(1);
         self.text
     }
 }
 
-/// A text in ASCII.
+/// Converts a text to ASCII.
 fn ascii(text: &str) -> String {
     let mut plain = String::with_capacity(text.len());
     for letter in text.chars() {
@@ -142,7 +144,7 @@ fn ascii(text: &str) -> String {
 mod tests {
     use super::*;
 
-    /// Header and payload by the guide's "Packet Serialization", with zeros for what the sender cut off.
+    /// Header and payload by the guide's "Packet Serialization", with the zeros that the sender truncated.
     fn parts(frame: &[u8]) -> ([u8; 3], u32, Vec<u8>) {
         assert_eq!((frame[0], frame[2]), (0xfd, 0));
         let length = usize::from(frame[1]);
@@ -167,7 +169,7 @@ mod tests {
     }
 
     #[test]
-    fn a_heartbeat_is_an_onboard_computers() {
+    fn heartbeat_is_that_of_an_onboard_computer() {
         let mut speaker = Speaker::new(7);
         let (header, id, payload) = parts(&speaker.heartbeat(true));
         assert_eq!((header, id), ([0, 7, 191], 0));
@@ -177,7 +179,7 @@ mod tests {
     }
 
     #[test]
-    fn a_figure_has_its_name_and_never_a_reserved_one() {
+    fn named_value_has_its_name_and_never_a_reserved_one() {
         let mut speaker = Speaker::new(1);
         let (_, id, payload) = parts(&speaker.figure("HR_VMAX", 1234, 0.25).unwrap());
         assert_eq!(id, 251);
@@ -190,7 +192,7 @@ mod tests {
     }
 
     #[test]
-    fn texts_of_any_length_are_joined_to_what_they_were() {
+    fn texts_of_any_length_round_trip() {
         let mut speaker = Speaker::new(1);
         for length in 0..=260 {
             let text: String = ('a'..='z').cycle().take(length).collect();

@@ -108,7 +108,7 @@ fn setup() -> EmulatorSetup {
     }
 }
 
-/// A vehicle yawing to the left, nose down and heeling, without acceleration.
+/// A vehicle that yaws to the left, nose down and heeling, without acceleration.
 fn felt(inertia: Inertia) -> Inertia {
     let t = inertia.at.since(START).as_secs_f64();
     let attitude: Rot<Level, Sensor> = Rot::from_roll_pitch_yaw(0.1, 0.3, 0.5 + 0.2 * t);
@@ -121,7 +121,7 @@ fn felt(inertia: Inertia) -> Inertia {
 }
 
 #[test]
-fn attitude_rates_and_forces_come_back() {
+fn attitude_rates_and_forces_round_trip() {
     for (own, part, each) in [
         ("part = \"imu\"\n", RAW_IMU, 3),
         ("part = \"imu\"\nmessage = \"scaled_imu2\"\n", Part::Imu { message: Some(ImuMessage::Scaled2) }, 3),
@@ -151,7 +151,7 @@ fn attitude_rates_and_forces_come_back() {
 }
 
 #[test]
-fn pressures_come_back_to_half_a_quantum() {
+fn pressures_round_trip_to_half_a_quantum() {
     for (own, message) in
         [("", PressureMessage::Second), ("message = \"scaled_pressure\"\n", PressureMessage::First)]
     {
@@ -174,7 +174,7 @@ fn pressures_come_back_to_half_a_quantum() {
 }
 
 #[test]
-fn distances_come_back_and_none_where_nothing_is_heard() {
+fn distances_round_trip_and_no_echo_gives_none() {
     let own = "part = \"distance\"\norientation = 25\nsensor_id = 3\nsound_speed_mps = 1500\n";
     let device = configured(own).unwrap();
     assert_eq!(device.sense(), Sense::Echosounder);
@@ -201,7 +201,7 @@ fn distances_come_back_and_none_where_nothing_is_heard() {
 }
 
 #[test]
-fn axes_that_point_down_and_right_are_turned() {
+fn wire_axes_are_converted() {
     let attitude = ATTITUDE_DATA {
         time_boot_ms: 1,
         roll: 0.1,
@@ -223,7 +223,7 @@ fn axes_that_point_down_and_right_are_turned() {
 }
 
 #[test]
-fn each_part_takes_its_own_and_passes_over_the_rest() {
+fn each_part_uses_only_its_own_messages() {
     let line = [RECORDED_ATTITUDE, RECORDED_RAW_IMU, RECORDED_PRESSURE].concat();
     for (part, readings, passed_over) in [
         (RAW_IMU, 3, 1),
@@ -239,7 +239,7 @@ fn each_part_takes_its_own_and_passes_over_the_rest() {
 }
 
 #[test]
-fn only_the_wanted_sender_is_heard() {
+fn only_the_configured_sender_is_used() {
     for (system_id, component_id, readings) in
         [(Some(1), Some(1), 1), (Some(2), None, 0), (None, Some(2), 0), (None, None, 1)]
     {
@@ -250,7 +250,7 @@ fn only_the_wanted_sender_is_heard() {
 }
 
 #[test]
-fn values_that_cannot_be_are_withheld() {
+fn impossible_values_are_withheld() {
     let attitude = |[roll, pitch, yaw]: [f32; 3]| {
         Message::Attitude(ATTITUDE_DATA { roll, pitch, yaw, ..ATTITUDE_DATA::DEFAULT })
     };
@@ -272,7 +272,7 @@ fn values_that_cannot_be_are_withheld() {
 }
 
 #[test]
-fn a_distance_is_as_sure_as_its_sensor_says() {
+fn distance_confidence_follows_the_sensor_quality() {
     let distance = Distance {
         time_boot_ms: 1,
         least_cm: 20,
@@ -308,7 +308,7 @@ fn wrong_keys_are_named() {
 }
 
 #[test]
-fn places_and_machine_numbers_go_and_readings_stay() {
+fn anonymising_removes_positions_and_ids_and_keeps_readings() {
     // GLOBAL_POSITION_INT of both versions, version 2 signed.
     let first = [&[0xFE, 28, 0, 1, 1, 33][..], &[7; 28], &[0, 0]].concat();
     let second = [&[0xFD, 20, 1, 0, 0, 1, 1, 33, 0, 0][..], &[7; 20], &[0, 0], &[9; 13]].concat();
@@ -323,7 +323,7 @@ fn places_and_machine_numbers_go_and_readings_stay() {
     assert_eq!((without_identity(&first, &mut nothing), nothing), (Some(()), Vec::new()));
 }
 
-/// Collects what the driver delivers.
+/// Collects the messages that the driver delivers.
 #[derive(Default)]
 struct Delivered(Vec<u8>);
 
@@ -349,7 +349,7 @@ fn heartbeat_of(system_id: u32, mavtype: MavType, autopilot: MavAutopilot) -> Ve
 }
 
 #[test]
-fn the_first_autopilot_heard_is_believed_and_others_are_counted() {
+fn first_autopilot_is_used_and_others_are_counted() {
     let autopilot = heartbeat_of(7, MavType::MAV_TYPE_SUBMARINE, MavAutopilot::MAV_AUTOPILOT_ARDUPILOTMEGA);
     let station = heartbeat_of(255, MavType::MAV_TYPE_GCS, MavAutopilot::MAV_AUTOPILOT_INVALID);
     let other = heartbeat_of(3, MavType::MAV_TYPE_SUBMARINE, MavAutopilot::MAV_AUTOPILOT_ARDUPILOTMEGA);
@@ -362,7 +362,7 @@ fn the_first_autopilot_heard_is_believed_and_others_are_counted() {
         assert_eq!(driver.accepts(&autopilot), believed == 7);
         assert!(driver.accepts(&other));
         driver.heard(START, &[station.clone(), pressure_of(9, 900.0)].concat(), &mut wire);
-        assert_eq!(wire.0, [], "nobody is known yet");
+        assert_eq!(wire.0, [], "no system is accepted yet");
         for _ in 0..100 {
             let all = [autopilot.clone(), pressure_of(3, 800.0), pressure_of(7, 1100.0), other.clone()];
             driver.heard(START, &all.concat(), &mut wire);
@@ -373,12 +373,12 @@ fn the_first_autopilot_heard_is_believed_and_others_are_counted() {
         assert_eq!(health.strangers.messages(), 202, "{configured}");
         assert_eq!(health.identity.unwrap(), format!("MAVLink system {believed}"));
         let strangers = if believed == 7 { "255, system 9, system 3" } else { "255, system 9, system 7" };
-        assert_eq!(health.strangers.words().unwrap(), format!("not believed: system {strangers}"));
+        assert_eq!(health.strangers.words().unwrap(), format!("ignored: system {strangers}"));
     }
 }
 
 #[test]
-fn a_log_of_many_systems_gives_the_readings_of_one() {
+fn log_of_many_systems_gives_the_readings_of_one() {
     let autopilot = heartbeat_of(7, MavType::MAV_TYPE_SUBMARINE, MavAutopilot::MAV_AUTOPILOT_ARDUPILOTMEGA);
     for (first, believed) in [(autopilot, 1100.0), (Vec::new(), 800.0)] {
         let mut decoder = decoder(PRESSURE);
@@ -396,7 +396,7 @@ fn a_log_of_many_systems_gives_the_readings_of_one() {
 }
 
 #[test]
-fn without_an_autopilots_heartbeat_or_of_another_system_it_is_said_what_is_missing() {
+fn missing_heartbeat_or_wrong_system_is_reported() {
     for (configured, words) in
         [("", "no autopilot's heartbeat"), ("system_id = 3\n", "nothing comes of system 3")]
     {

@@ -93,7 +93,7 @@ mod tests {
     }
 
     #[test]
-    fn each_frame_comes_with_its_time() {
+    fn tlog_frames_have_their_times() {
         let entries: Vec<_> =
             Tlog::new(&log()).map(|entry| entry.map(|it| (it.utc_us, it.frame.len()))).collect();
         let frames = [RECORDED_ATTITUDE.len(), RECORDED_PRESSURE.len()];
@@ -101,7 +101,7 @@ mod tests {
     }
 
     #[test]
-    fn a_log_cut_anywhere_gives_what_is_whole() {
+    fn truncated_tlog_gives_whole_entries() {
         let (log, first) = (log(), STAMP_BYTES + RECORDED_ATTITUDE.len());
         for len in 0..=log.len() {
             let entries: Vec<_> = Tlog::new(&log[..len]).collect();
@@ -112,7 +112,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_log_is_named() {
+    fn file_that_is_no_log_is_identified() {
         let error = Tlog::new(&[0; 20]).next().unwrap().unwrap_err();
         assert_eq!(error, TlogError::Start { offset: 0, got: 0 });
         assert!(error.to_string().ends_with("has 0x00 for a frame's start; 0xFE and 0xFD are allowed"));

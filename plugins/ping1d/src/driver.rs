@@ -1,5 +1,6 @@
-//! Host side of an echosounder's line: settings first, each acknowledged, then a distance each interval, requested or sent
-//! continuously.
+//! Host side of an echosounder's line: settings first, then a distance each interval.
+//!
+//! Each setting must be acknowledged. Distances are requested, or sent continuously.
 
 use std::collections::VecDeque;
 
@@ -18,9 +19,9 @@ const SILENCE: DurNs = DurNs::from_millis(50);
 const ANSWER_TIME: DurNs = DurNs::from_millis(150);
 /// Allowance for a ping beyond the interval.
 const PING_TIME: DurNs = DurNs::from_millis(250);
-/// Attempts to send a setting before moving on to the next.
+/// Number of attempts to send a setting before the next.
 const TRIES: u32 = 4;
-/// Interval of checking the speed of sound: other clients of a bridge can change it.
+/// Interval of checks of the speed of sound, which other clients of a bridge can change.
 const LOOK_PERIOD: DurNs = DurNs::from_millis(10_000);
 
 const ECHOSOUNDER: u8 = 1;
@@ -119,7 +120,7 @@ impl PingDriver {
         }
     }
 
-    /// Handles a timeout. Settings are retried: a device that missed one would measure differently.
+    /// Handles a timeout. Settings are retried, because a device that missed one would measure differently.
     fn give_up(&mut self, asked: Asked, now: MonoNs, wire: &mut dyn Wire) {
         self.asked = None;
         let Some((bytes, tries)) = self.again.take().filter(|(_, tries)| *tries > 0) else { return };

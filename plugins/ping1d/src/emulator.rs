@@ -61,7 +61,7 @@ pub struct PingEmulator {
     /// Message ids of their answers.
     asked: VecDeque<u16>,
     polled: bool,
-    /// What is said last.
+    /// Last frame sent.
     frame: Bytes<MAX_FRAME_BYTES>,
 }
 

@@ -23,8 +23,8 @@ const NAME: &str = "ping1d";
 /// Room for several of the longest frames.
 const RING_BYTES: usize = 1 << 16;
 
-/// Longest usual gap within a frame, after which an unfinished one is dropped. Below the usual interval, so that a false start
-/// can hold back one reading at most.
+/// Longest usual gap within a frame; after it an unfinished frame is dropped. It is below the usual interval, so that
+/// a false start can hold back one reading at most.
 const SILENCE: DurNs = DurNs::from_millis(50);
 
 /// The Ping echosounder device kind.

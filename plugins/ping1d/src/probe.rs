@@ -1,4 +1,4 @@
-//! Probe for a Ping device: requests version and identity from any device id.
+//! Probes for a Ping device: requests version and identity from any device id.
 
 use headrace_sensor::codec::Codec as _;
 use headrace_sensor::driver::Probe;
@@ -8,7 +8,7 @@ use crate::codec::{Addressed, DeviceInformation, Message, PingCodec, ProtocolVer
 /// Broadcast device id. Source: Ping protocol, device ids.
 const EVERYONE: u8 = 255;
 
-/// Requests the identity by broadcast and takes the first answer.
+/// Requests the identity by broadcast and accepts the first answer.
 #[derive(Debug, Clone, Default)]
 pub struct PingProbe {
     codec: PingCodec,
@@ -66,7 +66,7 @@ mod tests {
     use crate::settings::tests::settings;
 
     #[test]
-    fn an_echosounder_says_which_it_is_whatever_its_id() {
+    fn probe_identifies_an_echosounder_with_any_id() {
         let setup = EmulatorSetup { start: MonoNs(0), head: None, site: Site::default(), polled: false };
         let mut device = PingEmulator::new(settings("device_id = 7").unwrap(), DurNs(0), &setup);
         let mut probe = PingProbe::default();
@@ -85,7 +85,7 @@ mod tests {
     }
 
     #[test]
-    fn a_ping360_is_told_from_an_echosounder() {
+    fn probe_distinguishes_a_ping360() {
         let device = DeviceInformation {
             device_type: 2,
             revision: 1,

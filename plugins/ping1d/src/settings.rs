@@ -96,7 +96,7 @@ pub(crate) mod tests {
     }
 
     #[test]
-    fn an_empty_table_gives_the_usual_settings_and_every_key_is_read() {
+    fn empty_table_gives_the_defaults_and_every_key_is_read() {
         let usual = Settings {
             min_confidence: 0.5,
             interval: DurNs::from_millis(66),
@@ -122,7 +122,7 @@ pub(crate) mod tests {
     }
 
     #[test]
-    fn what_is_not_allowed_is_named_with_its_line() {
+    fn invalid_keys_are_refused_with_their_line() {
         let error = |text: &str| settings(text).unwrap_err().to_string();
         assert_eq!(error("device_id = 0"), "v.toml:1: device_id = 0: must be a whole number from 1 to 254");
         assert!(error("\nmin_confidence = 50").starts_with("v.toml:2: min_confidence = 50: must be"));

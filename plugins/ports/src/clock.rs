@@ -22,10 +22,7 @@ pub fn of_wall(stamped: SystemTime) -> MonoNs {
     now - DurNs(i64::try_from(ago.as_nanos()).unwrap_or(0))
 }
 
-#[expect(
-    clippy::disallowed_methods,
-    reason = "the kernel stamps with the time of day, and this is where it is left behind"
-)]
+#[expect(clippy::disallowed_methods, reason = "the kernel stamps with wall time, which is converted here")]
 fn wall() -> SystemTime {
     SystemTime::now()
 }
@@ -37,7 +34,7 @@ pub fn clock_anchor() -> (MonoNs, UtcNs) {
     (mono, UtcNs(i64::try_from(since.as_nanos()).unwrap_or(0)))
 }
 
-/// `wait` as a `Duration`; zero if negative.
+/// Converts `wait` to a `Duration`; zero if negative.
 pub(crate) fn duration(wait: DurNs) -> Duration {
     Duration::from_nanos(u64::try_from(wait.0).unwrap_or(0))
 }
@@ -47,7 +44,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_clock_goes_on_and_stamps_of_the_day_are_carried_over() {
+    fn clock_is_monotonic_and_wall_stamps_keep_their_age() {
         let (first, stamped) = (now(), wall());
         let second = now();
         assert!(second.0 >= first.0 && first.0 > 0);

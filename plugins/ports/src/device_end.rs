@@ -83,7 +83,7 @@ impl EmulatedPort {
 
     /// Creates a HID device of this identity through the kernel's uhid.
     ///
-    /// Errors: the kernel lacks uhid, or this user may not open it.
+    /// Errors: the kernel has no uhid, or this user may not open it.
     pub fn hid(identity: &UsbIdentity, descriptor: &[u8]) -> io::Result<Self> {
         let kernel = File::options().read(true).write(true).open(uhid::PATH)?;
         let serial = identity.serial.as_deref().unwrap_or_default();
@@ -130,7 +130,7 @@ impl EmulatedPort {
 
     /// Next message from the host, if any; an empty message is a keep-alive. Never blocks.
     ///
-    /// Errors: the end itself has failed; a disconnected host is no error.
+    /// Errors: this end has failed; a disconnected host is no error.
     pub fn read(&mut self) -> io::Result<Option<Vec<u8>>> {
         let mut buffer = [0; READ_BYTES];
         let read = match &mut self.end {
@@ -170,7 +170,7 @@ impl EmulatedPort {
 
     /// Sends a device message. It is lost if no host is connected or reading.
     ///
-    /// Errors: the end itself has failed.
+    /// Errors: this end has failed.
     pub fn write(&mut self, bytes: &[u8]) -> io::Result<()> {
         let written = match &mut self.end {
             End::Pty { master } => master.write_all(bytes),

@@ -10,8 +10,8 @@ use crate::open_error::{OpenError, OpenErrorKind};
 pub(crate) fn probing(what: &str, error: &io::Error) -> OpenError {
     let OpenError { kind, remedy, .. } = opening(what, error);
     let why = match kind {
-        OpenErrorKind::Absent => format!("asking at {what}: nobody answers there ({error})"),
-        _ => format!("asking at {what}: {error}"),
+        OpenErrorKind::Absent => format!("probing {what}: no device answers there ({error})"),
+        _ => format!("probing {what}: {error}"),
     };
     OpenError { kind, why, remedy }
 }
@@ -23,14 +23,18 @@ pub(crate) fn opening(what: &str, error: &io::Error) -> OpenError {
     match error.kind() {
         E::NotFound => OpenError::not_there(what),
         E::PermissionDenied => OpenError::denied(what, &remedy_for(what)),
-        E::ConnectionRefused => {
-            OpenError::new(OpenErrorKind::Absent, why("nobody listens there"), Some(fix_hint::NOBODY_LISTENS))
-        }
-        E::TimedOut | E::HostUnreachable | E::NetworkUnreachable => {
-            OpenError::new(OpenErrorKind::Absent, why("nobody answers there"), Some(fix_hint::NOBODY_ANSWERS))
-        }
+        E::ConnectionRefused => OpenError::new(
+            OpenErrorKind::Absent,
+            why("no device listens there"),
+            Some(fix_hint::NOBODY_LISTENS),
+        ),
+        E::TimedOut | E::HostUnreachable | E::NetworkUnreachable => OpenError::new(
+            OpenErrorKind::Absent,
+            why("no device answers there"),
+            Some(fix_hint::NOBODY_ANSWERS),
+        ),
         E::ResourceBusy | E::AddrInUse => {
-            OpenError::new(OpenErrorKind::Busy, why("another program has it"), Some("close that one"))
+            OpenError::new(OpenErrorKind::Busy, why("another program uses it"), Some("close that program"))
         }
         _ => OpenError::new(OpenErrorKind::Other, why(&error.to_string()), None),
     }
@@ -57,12 +61,12 @@ pub(crate) fn losing(error: &io::Error) -> String {
         return "the port is gone".to_owned();
     }
     match error.kind() {
-        E::ConnectionRefused => "nobody listens there".to_owned(),
+        E::ConnectionRefused => "no device listens there".to_owned(),
         E::ConnectionReset | E::ConnectionAborted => "the device has closed the connection".to_owned(),
         // The serial library's own `BrokenPipe` has neither an errno nor a message.
         E::BrokenPipe if error.raw_os_error().is_some() => "the device has closed the connection".to_owned(),
         E::BrokenPipe if error.get_ref().is_none() => "the port is gone".to_owned(),
-        E::TimedOut | E::WouldBlock => "it doesn't take what is sent to it".to_owned(),
+        E::TimedOut | E::WouldBlock => "the device accepts no data".to_owned(),
         _ => error.to_string(),
     }
 }

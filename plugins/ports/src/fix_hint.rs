@@ -10,7 +10,7 @@ pub(crate) fn join(group: &str) -> String {
 
 /// The user was added to the group after this session began.
 pub(crate) fn log_in_again(group: &str) -> String {
-    format!("log in again: this user has been put into the group {group} since")
+    format!("log in again: this user joined the group {group} after the login")
 }
 
 /// The device's group has no access, or is root's.
@@ -36,7 +36,7 @@ pub(crate) fn set_up(interface: &str, has_bitrate: bool) -> String {
 
 /// A CAN interface is up but bus-off.
 pub(crate) fn back_on_bus(interface: &str) -> String {
-    format!("see to bit rate, wiring and termination: ip -details link show {interface}")
+    format!("check bit rate, wiring and termination: ip -details link show {interface}")
 }
 
 /// No such CAN interface.
@@ -44,19 +44,19 @@ pub(crate) fn no_interface(interface: &str) -> String {
     if interface.starts_with("vcan") {
         format!("sudo modprobe vcan; sudo ip link add {interface} type vcan; {}", set_up(interface, false))
     } else {
-        "plug the adapter in; ip link shows what there is".into()
+        "plug the adapter in; ip link lists the interfaces".into()
     }
 }
 
-/// The kernel lacks raw CAN sockets.
+/// The kernel has no raw CAN sockets.
 pub(crate) const CAN_RAW: &str = "sudo modprobe can-raw";
 
-/// I2C buses lack device files.
+/// I2C buses have no device files.
 pub(crate) const I2C_DEV: &str =
     "sudo modprobe i2c-dev; to have it at each start: echo i2c-dev | sudo tee /etc/modules-load.d/i2c.conf";
 
 /// No answer from an address.
-pub(crate) const NOBODY_ANSWERS: &str = "see that it is switched on, that its port is right, and that this computer is in its network: ip address";
+pub(crate) const NOBODY_ANSWERS: &str = "check that it is switched on, that its port is right, and that this computer is in its network: ip address";
 
 /// Connection refused: no server at the port.
-pub(crate) const NOBODY_LISTENS: &str = "is the device switched on, and the port's number right?";
+pub(crate) const NOBODY_LISTENS: &str = "check that the device is switched on and the port number is right";

@@ -1,4 +1,4 @@
-//! What a line needs of the machine that it is on, so that tests can give it another.
+//! Interface of a line to its machine, so that tests can replace the machine.
 
 use headrace_geometry::time::MonoNs;
 use headrace_sensor::connect::Connect;

@@ -1,7 +1,8 @@
-//! I/O shared by all device drivers: clock, lines of every carrier, and the service that opens, reads, timestamps and
-//! reopens a line. Also device discovery, diagnosis and probing.
+//! I/O shared by all device drivers.
 //!
-//! The drivers themselves are in the device crates and do no I/O; see [`headrace_sensor::driver`].
+//! It has the clock, the lines of every carrier, and the service that opens, reads, timestamps and reopens a line. It
+//! also has device discovery, diagnosis and probing. The drivers are in the device crates and do no I/O; see
+//! [`headrace_sensor::driver`].
 
 mod clock;
 mod device_end;

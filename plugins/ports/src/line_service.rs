@@ -1,5 +1,7 @@
-//! Service of one line: opens it, serves its drivers and reopens it after a failure, indefinitely, one step at a time. On ports
-//! each runs on a thread of its own.
+//! Service of one line: opens it, serves its drivers and reopens it after a failure, indefinitely, one step at a
+//! time.
+//!
+//! On real ports each service runs on its own thread.
 
 use std::collections::VecDeque;
 use std::io;
@@ -34,12 +36,14 @@ const LONG_ENOUGH: DurNs = DurNs::from_millis(2_000);
 /// Keep-alive interval on an idle connection.
 const KNOCK_PERIOD: DurNs = DurNs::from_millis(1_000);
 
-/// Records what goes on on the lines beside the loop. Called by their threads; sensors are numbered as in the vehicle file.
+/// Records line events outside the loop. Line threads call it; sensors are numbered as in the vehicle file.
 pub trait LineRecord: Send + Sync {
     /// Bytes sent to a sensor.
     fn sent(&self, sensor: usize, at: MonoNs, bytes: &[u8]);
 
-    /// Packets of a sensor that were dropped between two times: there was no room for them, or the carrier gave them up unread.
+    /// Reports packets of a sensor that were dropped between two times.
+    ///
+    /// The reason is a full ring, or a carrier that dropped them unread.
     fn lost(&self, sensor: usize, from: MonoNs, to: MonoNs, packets: u64);
 }
 
@@ -56,22 +60,22 @@ pub struct Attached {
 /// State shared by all lines.
 #[derive(Clone)]
 pub struct Common {
-    /// Clock, and what opens lines.
+    /// Clock of the host, and its ports.
     pub host: Arc<dyn Host>,
-    /// Set to end all.
+    /// Flag that ends all services.
     pub stopping: Arc<AtomicBool>,
-    /// Where changes of status are posted.
+    /// Board for changes of status.
     pub board: Board,
-    /// Wakes the loop when packets have come.
+    /// Wakes the loop when packets have arrived.
     pub waker: Waker,
-    /// Gets all messages sent to devices, and what was lost of theirs.
+    /// Receives all messages sent to devices, and their losses.
     pub record: Option<Arc<dyn LineRecord>>,
 }
 
 /// A line and the devices on it.
 pub struct LineService {
     connect: Result<Connect, ConnectError>,
-    /// Those of the lines before this one, in the order of the vehicle file.
+    /// Addresses of the lines before this one, in the order of the vehicle file.
     before: Vec<Connect>,
     devices: Vec<AttachedState>,
     senders: Senders,
@@ -82,7 +86,7 @@ pub struct LineService {
 }
 
 enum LineState {
-    /// Not tried before that time.
+    /// Closed, with the time before which it isn't tried again.
     Closed {
         until: MonoNs,
     },
@@ -92,7 +96,7 @@ enum LineState {
 struct OpenLine {
     line: Box<dyn Line>,
     opened: MonoNs,
-    /// Times of the next look at the devices' health, and of the next keep-alive.
+    /// Times of the next health check of the devices, and of the next keep-alive.
     look_at: MonoNs,
     knock_at: MonoNs,
 }
@@ -101,21 +105,22 @@ struct OpenLine {
 struct AttachedState {
     attached: Attached,
     history: LineHistory,
-    /// Dropped packets that the record knows of, and until when.
+    /// Number of dropped packets already recorded, and the end time of that record.
     dropped_told: u64,
     dropped_until: MonoNs,
     status: Option<(Phase, String)>,
-    /// Good frames so far, their number when the line was opened, and the times of the last bytes and last good frame.
+    /// Number of good frames so far and at the line's opening, and the times of the last bytes and of the last good
+    /// frame.
     frames: u64,
     frames_before: u64,
     last_bytes: MonoNs,
     last_frame: MonoNs,
 }
 
-/// What becomes of an open line after a step.
+/// State of an open line after a step.
 enum Served {
     Open,
-    /// All devices exceeded their silence timeout: the line is reopened.
+    /// All devices exceeded their silence timeout, so the line is reopened.
     InSilence,
 }
 
@@ -150,7 +155,8 @@ impl Wire for Ends<'_> {
 }
 
 impl LineService {
-    /// A line that isn't open yet. `before` are those of the lines before it: of two that lead to one device this one isn't opened.
+    /// Creates a closed line. `before` are the addresses of earlier lines; if one leads to the same device, this line
+    /// isn't opened.
     pub fn new(
         connect: Result<Connect, ConnectError>,
         before: Vec<Connect>,
@@ -197,7 +203,7 @@ impl LineService {
         }
     }
 
-    /// Time at which an open line is to be stepped, whether bytes have come or not; `None` if it is closed.
+    /// Time at which an open line must be stepped even without new bytes; `None` if it is closed.
     pub fn due(&self) -> Option<MonoNs> {
         match &self.state {
             LineState::Closed { .. } => None,
@@ -223,7 +229,7 @@ impl LineService {
         };
     }
 
-    /// Delivers what the drivers still hold; returns each sensor's line history.
+    /// Delivers the bytes that the drivers still hold; returns each sensor's line history.
     pub fn end(mut self) -> Vec<(usize, LineHistory)> {
         let closed = LineState::Closed { until: self.common.host.now() };
         if let LineState::Open(mut open) = core::mem::replace(&mut self.state, closed) {
@@ -240,7 +246,7 @@ impl LineService {
         self.devices.into_iter().map(history).collect()
     }
 
-    /// Opens the line, unless its device is that of a line before it.
+    /// Opens the line, unless an earlier line has its device.
     fn open_line(&self, connect: &Connect) -> Result<Box<dyn Line>, OpenError> {
         match self.before.iter().find(|before| lines::same_device(before, connect)) {
             Some(other) => Err(OpenError::same_device(connect, other)),
@@ -291,7 +297,7 @@ impl LineService {
         Ok(())
     }
 
-    /// Closes a line that was opened at that time, in silence or after an error.
+    /// Closes a line that was opened at `opened`, after a silence or an error.
     fn ended(&mut self, opened: MonoNs, ended: io::Result<()>) -> LineState {
         self.closed();
         self.tell_dropped();
@@ -301,14 +307,14 @@ impl LineService {
         }
         self.count_lost();
         match ended {
-            // The silent status already shown stays until the device answers.
+            // The displayed silent status stays until the device answers.
             Ok(()) => tracing::info!("no data, reopening the port"),
             Err(error) => self.lost(&error),
         }
         self.rest()
     }
 
-    /// Closed for a while, longer each time.
+    /// Keeps the line closed for a while, longer each time.
     fn rest(&mut self) -> LineState {
         tracing::debug!(backoff_s = self.pause.as_secs_f64(), "waiting before the next attempt");
         let until = self.common.host.now() + self.pause;
@@ -379,7 +385,7 @@ impl LineService {
         Ok(Served::Open)
     }
 
-    /// Has the record state what was dropped since it did so last.
+    /// Reports drops since the last report to the record.
     fn tell_dropped(&mut self) {
         let now = self.common.host.now();
         for AttachedState { attached, history, dropped_told, dropped_until, .. } in &mut self.devices {
@@ -391,7 +397,8 @@ impl LineService {
         }
     }
 
-    /// Counts what the carrier dropped unread, as lost by the line's first device: whose it was isn't known.
+    /// Counts datagrams dropped by the carrier as losses of the line's first device, because their device isn't
+    /// known.
     fn count_dropped(&mut self, line: &mut dyn Line) {
         let dropped = line.dropped();
         if let Some(first) = self.devices.first_mut().filter(|_| dropped > 0) {
@@ -417,8 +424,10 @@ impl LineService {
         Ok(())
     }
 
-    /// Wakes drivers that are due, unless another on the line awaits an answer. Of several that await one (e.g. just after
-    /// opening), the first times out first; else each would wait for the others indefinitely.
+    /// Wakes drivers that are due, unless another driver on the line awaits an answer.
+    ///
+    /// If several await one (e.g. just after opening), the first times out first. Otherwise each would wait for the
+    /// others indefinitely.
     fn wake(&mut self, line: &mut dyn Line) -> io::Result<()> {
         for number in 0..self.devices.len() {
             let now = self.common.host.now();
@@ -477,7 +486,7 @@ impl LineService {
             let (phase, words) = device.judge(now);
             let judged = (phase, with_senders(words, phase, &self.senders, device.attached.driver.as_ref()));
             if complaint.is_some() {
-                // The fault is the line's: restart the device's silence timeout.
+                // The fault is the line's, so the device's silence timeout restarts.
                 (device.last_bytes, device.last_frame) = (now, now);
             }
             let (phase, words) = complaint.map_or(judged, |words| (Phase::Closed, words.to_owned()));
@@ -486,7 +495,7 @@ impl LineService {
     }
 }
 
-/// A status with who is heard, where that isn't a matter of course, and who isn't.
+/// Adds the accepted sender and the rejected ones to a status, if they need to be stated.
 fn with_senders(words: String, phase: Phase, senders: &Senders, driver: &dyn Driver) -> String {
     let from = senders.believed.filter(|_| phase == Phase::Running).map(|sender| format!("from {sender}"));
     let parts = [(!words.is_empty()).then_some(words), from, senders.strangers.words()];
@@ -513,7 +522,7 @@ impl AttachedState {
         let DeviceHealth { good_frames, identity, complaint, .. } = self.attached.driver.health();
         if good_frames != self.frames {
             self.frames = good_frames;
-            // Not `now`: the silence counts from the last bytes.
+            // Not `now`, because the silence counts from the last bytes.
             self.last_frame = self.last_bytes;
         }
         if let Some(complaint) = complaint {

@@ -46,8 +46,8 @@ impl OpenError {
 
     /// No such device file or host.
     pub(crate) fn not_there(what: &str) -> Self {
-        let why = format!("opening {what}: it isn't there");
-        Self::new(OpenErrorKind::Absent, why, Some("plug it in, or see headrace devices"))
+        let why = format!("opening {what}: there is no such port");
+        Self::new(OpenErrorKind::Absent, why, Some("plug it in, or run headrace devices"))
     }
 
     /// Access to a device file is denied.
@@ -61,7 +61,7 @@ impl OpenError {
         Self::new(OpenErrorKind::Absent, why, Some(&fix_hint::no_interface(interface)))
     }
 
-    /// The kernel lacks CAN sockets.
+    /// The kernel has no CAN sockets.
     pub(crate) fn no_can(interface: &str) -> Self {
         let why = format!("opening {interface}: this kernel has no CAN sockets");
         Self::new(OpenErrorKind::Absent, why, Some(fix_hint::CAN_RAW))
@@ -73,20 +73,20 @@ impl OpenError {
         Self::new(OpenErrorKind::Other, format!("connect = {text:?}: {problem}"), Some(allowed))
     }
 
-    /// A device that another line of the vehicle has.
+    /// A device that belongs to another line of the vehicle.
     pub(crate) fn same_device(connect: &Connect, other: &Connect) -> Self {
         let why =
-            format!("opening {connect}: it leads to the same device as {other}, which another sensor has");
+            format!("opening {connect}: it leads to the same device as {other}, which another sensor uses");
         Self::new(
             OpenErrorKind::Busy,
             why,
-            Some("give each its own, or the same connect to those that share a line"),
+            Some("give each sensor its own device, or the same connect to sensors that share a line"),
         )
     }
 
     pub(crate) fn not_plugged_in(what: &str) -> Self {
         let why = format!("looking for {what}: no such device is plugged in");
-        Self::new(OpenErrorKind::Absent, why, Some("headrace devices shows what is"))
+        Self::new(OpenErrorKind::Absent, why, Some("headrace devices lists those that are"))
     }
 
     pub(crate) fn ambiguous(what: &str, paths: &[String]) -> Self {
@@ -96,6 +96,10 @@ impl OpenError {
 
     #[cfg(not(target_os = "linux"))]
     pub(crate) fn unsupported(what: &str) -> Self {
-        Self::new(OpenErrorKind::Other, format!("opening {what}: this system has no such ports for us"), None)
+        Self::new(
+            OpenErrorKind::Other,
+            format!("opening {what}: headrace doesn't support such ports on this system"),
+            None,
+        )
     }
 }

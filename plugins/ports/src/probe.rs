@@ -26,7 +26,8 @@ pub enum Answer {
     Silence,
 }
 
-/// Opens a line and asks each kind of device in turn until one identifies itself. A question without an answer costs 0.4 s.
+/// Opens a line and queries each kind of device in turn until one identifies itself. A query without an answer takes
+/// 0.4 s.
 ///
 /// Errors: the line can't be opened, or fails; with the fix.
 pub fn probe(connect: &Connect, probes: &mut [Box<dyn Probe>]) -> Result<Answer, OpenError> {

@@ -58,19 +58,19 @@ impl fmt::Display for Status {
 /// History of a line during a dive.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct LineHistory {
-    /// Times the line was opened.
+    /// Number of times the line was opened.
     pub opened: u64,
-    /// Times the line was lost, or reopened for silence.
+    /// Number of times the line was lost, or reopened because of silence.
     pub lost: u64,
-    /// Packets for which the loop's ring had no room, and messages that the carrier dropped unread.
+    /// Packets without room in the loop's ring, and messages that the carrier dropped unread.
     pub dropped: u64,
-    /// Messages of senders that weren't believed.
+    /// Messages of rejected senders.
     pub strangers: u64,
     /// Last status, as text.
     pub last: String,
 }
 
-/// Bounded queue of statuses. When it is full the oldest are dropped and counted.
+/// Bounded queue of statuses. When it is full, the oldest ones are dropped and counted.
 #[derive(Clone)]
 pub struct Board {
     shared: Arc<Shared>,

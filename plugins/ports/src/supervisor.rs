@@ -1,4 +1,4 @@
-//! Supervisor of all line threads, and the loop they feed.
+//! Supervisor of all line threads and of the loop that they feed.
 
 use std::convert::Infallible;
 use std::io;
@@ -47,12 +47,12 @@ pub struct Supervisor {
     threads: Vec<JoinHandle<Vec<(usize, LineHistory)>>>,
     stopping: Arc<AtomicBool>,
     board: Board,
-    /// Not `Send`: the loop runs on the thread that its wakers know.
+    /// Makes the type not `Send`, because the loop must run on the thread that its wakers know.
     on_this_thread: PhantomData<*const ()>,
 }
 
 impl Supervisor {
-    /// Starts the threads, which wake this one for the loop. `record` gets what goes on on the lines beside the loop.
+    /// Starts the threads, which wake this thread for the loop. `record` receives line events outside the loop.
     ///
     /// Errors: a thread can't be started.
     pub fn start(connections: Vec<Connection>, record: Option<Arc<dyn LineRecord>>) -> io::Result<Self> {
@@ -79,7 +79,7 @@ impl Supervisor {
         self.board.next()
     }
 
-    /// Runs the loop until `ended` returns true: a tick as soon as packets have come, or a period has passed.
+    /// Runs the loop until `ended` returns true. A tick runs as soon as packets have arrived, or after a period.
     pub fn run(&self, dive: &mut Loop, ended: &dyn Fn() -> bool, after_tick: &mut dyn FnMut(&Loop)) {
         let Ok(()) = feed::drive(dive, &mut LiveFeed { ended }, after_tick);
     }
@@ -107,8 +107,9 @@ impl Supervisor {
     }
 }
 
-/// Ends threads that fill rings: they are told, then waited for, and only then is taken what they have left, which a thread still adds
-/// to after it was told. The flag orders nothing; that a thread has ended does.
+/// Ends threads that fill rings, in three steps: notify them, wait for them, and drain the rings. Draining comes
+/// last, because a thread still adds to its ring after the notification. Memory order comes from the end of the
+/// thread, not from the flag.
 fn wind_up<H>(tell: impl FnOnce(), wait: impl FnOnce() -> H, drain: impl FnOnce()) -> H {
     tell();
     let handed_back = wait();
@@ -116,7 +117,7 @@ fn wind_up<H>(tell: impl FnOnce(), wait: impl FnOnce() -> H, drain: impl FnOnce(
     handed_back
 }
 
-/// The ports as the feed of a loop: their threads fill the rings.
+/// The ports as feed of a loop: their threads fill the rings.
 struct LiveFeed<'a> {
     ended: &'a dyn Fn() -> bool,
 }
@@ -170,10 +171,12 @@ mod tests {
 
     use super::wind_up;
 
-    /// How the loop ends a line, by what tells it, what waits for it, and what drains its ring.
+    /// Ways in which the loop ends a line: functions that notify it, wait for it, and drain its ring.
     type Ends = fn(&dyn Fn(), &mut dyn FnMut(), &mut dyn FnMut());
 
-    /// A line's thread as `LineService::run`: looks at the flag before each step, and hands over what its driver still holds at the end.
+    /// Model of a line's thread, as `LineService::run`.
+    ///
+    /// It checks the flag before each step, and at the end delivers the bytes that its driver still holds.
     fn line_and_stop(name: &str, ends: Ends) -> usize {
         explore(name, Some(4), move || {
             let (mut port, mut reader) = packets(96);
@@ -200,14 +203,14 @@ mod tests {
     }
 
     #[test]
-    fn nothing_that_a_line_has_handed_over_is_left_at_the_stop() {
+    fn stop_drains_every_delivered_packet() {
         let executions = line_and_stop("the lines' stop", |tell, wait, drain| wind_up(tell, wait, drain));
         assert!(executions > 5, "{executions}");
     }
 
     #[test]
     #[should_panic = "assertion `left == right` failed"]
-    fn a_stop_that_drains_before_it_waits_is_found() {
+    fn model_detects_a_stop_that_drains_too_early() {
         line_and_stop("the lines' stop, drained first", |tell, wait, drain| wind_up(tell, drain, wait));
     }
 }

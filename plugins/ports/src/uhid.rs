@@ -1,7 +1,8 @@
-//! Device side of the kernel's `/dev/uhid`: a HID device made by a program, for rehearsals and tests.
+//! Device side of the kernel's `/dev/uhid`: a HID device created by a program, for rehearsals and tests.
 //!
-//! A process that opens `/dev/uhid` (normally root) and writes these events makes the kernel plug in a virtual device, which
-//! gets its own `/dev/hidrawN`. Layout: `struct uhid_event` of Linux' `<linux/uhid.h>`, packed, native byte order:
+//! A process that opens `/dev/uhid` (normally root) and writes these events makes the kernel plug in a virtual
+//! device, which gets its own `/dev/hidrawN`. Layout: `struct uhid_event` of Linux' `<linux/uhid.h>`, packed, native
+//! byte order:
 //! ```text
 //!   CREATE2   0 type u32 = 11, 4 name[128], 132 phys[64], 196 serial ("uniq")[64], 260 descriptor's size u16, 262 bus u16,
 //!             264 vendor u32, 268 product u32, 272 version u32, 276 country u32, 280 descriptor, at most 4096
@@ -68,7 +69,7 @@ pub enum UhidError {
         /// The kernel's error.
         source: std::io::Error,
     },
-    /// The kernel took only part of an event, which it never does.
+    /// The kernel accepted only part of an event, which it never does.
     #[error("uhid: {event}: {taken} of {bytes} bytes were taken")]
     Cut {
         /// Name of the event.
@@ -87,8 +88,10 @@ pub struct VirtualDevice<W> {
 }
 
 impl<W: Write> VirtualDevice<W> {
-    /// Plugs a USB device in. `kernel` is `/dev/uhid`, opened for writing; one write there is one event, so it must not be
-    /// buffered. The kernel makes the `/dev/hidrawN` some time after this returns. Errors: see [`UhidError`].
+    /// Plugs in a USB device. `kernel` is `/dev/uhid`, opened for writing and unbuffered, because each write is one
+    /// event.
+    ///
+    /// The kernel creates `/dev/hidrawN` some time after this returns. Errors: see [`UhidError`].
     pub fn plug(mut kernel: W, identity: &Identity<'_>) -> Result<Self, UhidError> {
         send(&mut kernel, "create a device", &create(identity)?)?;
         Ok(Self { kernel })
@@ -196,7 +199,7 @@ mod tests {
     }
 
     #[test]
-    fn each_thing_stands_where_the_kernel_looks_for_it() {
+    fn event_fields_are_at_the_kernel_offsets() {
         let event = created(&COUNTER);
         assert_eq!(event.len(), 280 + DESCRIPTOR.len());
         assert_eq!(event[0..4], 11_u32.to_ne_bytes());
@@ -216,7 +219,7 @@ mod tests {
 
     #[test]
     #[cfg(target_endian = "little")]
-    fn a_report_is_as_in_the_worked_example() {
+    fn report_matches_the_worked_example() {
         let report = [0x01, 0x2A, 0x01, 0xC0, 0x1D, 0xFE, 0xFF, 0xDC, 0x05, 0x00, 0x00];
         let mut expected = vec![0x0C, 0x00, 0x00, 0x00, 0x0B, 0x00];
         expected.extend(report);
@@ -224,7 +227,7 @@ mod tests {
     }
 
     #[test]
-    fn every_event_is_one_write_and_the_kernel_is_given_back() {
+    fn every_event_is_one_write_and_unplug_returns_the_writer() {
         let mut events = Events { taken: Vec::new(), most: usize::MAX };
         let mut device = VirtualDevice::plug(&mut events, &COUNTER).unwrap();
         device.report(&[1; 11]).unwrap();
@@ -237,7 +240,7 @@ mod tests {
     }
 
     #[test]
-    fn what_does_not_fit_is_refused() {
+    fn oversized_fields_are_refused() {
         let said = |identity| VirtualDevice::plug(Vec::new(), &identity).unwrap_err().to_string();
         let long = "x".repeat(128);
         let name = Identity { name: &long, ..COUNTER };
@@ -258,7 +261,7 @@ mod tests {
     }
 
     #[test]
-    fn a_cut_event_is_said() {
+    fn partial_event_write_is_an_error() {
         let mut events = Events { taken: Vec::new(), most: 100 };
         let said = VirtualDevice::plug(&mut events, &COUNTER).unwrap_err().to_string();
         assert_eq!(said, "uhid: create a device: 100 of 301 bytes were taken");

@@ -1,12 +1,12 @@
-//! How the threads of the lines wake the loop.
+//! Wakes the loop from the threads of the lines.
 //!
-//! The loop parks on its thread's token, one atomic word: a waker swaps it and makes one system call only if the loop sleeps
-//! on it. Neither side takes a lock or waits for the other. Packets are in their ring before the token is set, and the loop
-//! looks at the rings after it has taken the token, so that no packet is slept over.
+//! The loop parks on its thread's token, one atomic word. A waker swaps it and makes one system call only if the loop
+//! sleeps. Neither side takes a lock or waits for the other. Packets are in their ring before the token is set, and
+//! the loop reads the rings after it has taken the token. So no packet is missed by a sleep.
 
 use std::time::Duration;
 
-/// Threads that can be parked: the system's, or a model's.
+/// Threads that can be parked: the system's, or those of a model.
 pub trait Threads {
     /// Handle of a thread.
     type Thread: Clone;
@@ -17,7 +17,7 @@ pub trait Threads {
     /// Sets a thread's token.
     fn unpark(thread: &Self::Thread);
 
-    /// Waits for this thread's token, for some time at most, and takes it.
+    /// Waits at most this long for this thread's token, and takes it.
     fn park(at_most: Duration);
 }
 
@@ -40,7 +40,7 @@ impl Threads for System {
     }
 }
 
-/// Wakes the thread that has made it.
+/// Wakes the thread that created it.
 pub struct Waker<T: Threads = System>(T::Thread);
 
 impl<T: Threads> Clone for Waker<T> {
@@ -50,12 +50,12 @@ impl<T: Threads> Clone for Waker<T> {
 }
 
 impl<T: Threads> Waker<T> {
-    /// Wakes this thread.
+    /// Creates a waker of this thread.
     pub fn of_this_thread() -> Self {
         Self(T::current())
     }
 
-    /// Ends the current sleep, or the next one. What was written before is seen after it.
+    /// Ends the current sleep, or the next one. Earlier writes are visible after it.
     pub fn wake(&self) {
         T::unpark(&self.0);
     }
@@ -75,7 +75,8 @@ mod tests {
 
     use super::*;
 
-    /// Threads of a model, whose sleeps have no end but being woken: one that is slept over is a deadlock, which loom tells.
+    /// Threads of a loom model, whose sleeps end only by being woken. A missed wake is a deadlock, which loom
+    /// reports.
     struct Modelled;
 
     impl Threads for Modelled {
@@ -94,8 +95,8 @@ mod tests {
         }
     }
 
-    /// A line's thread sends and wakes, as `LineService` does; the loop looks at its rings and sleeps, as `LiveFeed` does. What loom would
-    /// look into when it is dropped isn't dropped where it has found a deadlock: that would be a second panic.
+    /// A line's thread sends and wakes as `LineService` does; the loop reads its rings and sleeps as `LiveFeed` does.
+    /// After a deadlock, values that loom checks on drop aren't dropped, because that would cause a second panic.
     fn line_and_loop(packets_sent: u8, wakes_first: bool) {
         let (mut port, reader) = packets(64);
         let mut reader = ManuallyDrop::new(reader);
@@ -126,14 +127,14 @@ mod tests {
     }
 
     #[test]
-    fn no_packet_is_slept_over() {
+    fn no_packet_is_missed_by_a_sleep() {
         let executions = explore("wake-up of the loop", Some(4), || line_and_loop(2, false));
         assert!(executions > 50, "{executions}");
     }
 
     #[test]
     #[should_panic = "deadlock"]
-    fn a_line_that_wakes_before_it_sends_is_found() {
+    fn model_detects_a_wake_before_the_send() {
         explore("wake-up before the packet", Some(4), || line_and_loop(2, true));
     }
 }

@@ -11,7 +11,7 @@ use crate::line::{LineCodec, Lines};
 use crate::report::{LayoutError, Report, ReportCodec, ReportLayout};
 use crate::tracker::{CountTracker, Counting, TrackerHealth};
 
-/// Longest usual gap within a line, after which an unfinished one is dropped.
+/// Longest usual gap within a line; after it an unfinished line is dropped.
 const SILENCE: DurNs = DurNs::from_millis(100);
 
 const MILLISECOND: DurNs = DurNs::from_millis(1);
@@ -36,7 +36,7 @@ pub struct Counter {
 }
 
 impl Counter {
-    /// Smallest change of the length that it shows, m.
+    /// Smallest change of the displayed length, m.
     pub fn resolution_m(&self) -> f64 {
         self.step_m.max(1.0 / self.counts_per_metre.abs())
     }
@@ -81,7 +81,7 @@ impl HidDecoder {
         })
     }
 
-    /// Numbers of rejected and lost reports, and whether the counter must be re-zeroed.
+    /// Number of rejected and lost reports, and whether the counter must be re-zeroed.
     pub fn health(&self) -> TrackerHealth {
         self.tracker.health()
     }

@@ -263,7 +263,7 @@ mod tests {
     }
 
     #[test]
-    fn a_wrong_sum_and_a_wrong_number_are_refused() {
+    fn wrong_checksum_and_wrong_number_are_refused() {
         for line in
             [&b"RD,00000125,000012.4,0152.304,1505\r\n"[..], b"RD,00000125,0000-2.4,0152.304,1501\r\n"]
         {
@@ -274,7 +274,7 @@ mod tests {
     }
 
     #[test]
-    fn junk_before_a_line_may_even_look_like_a_winch_number() {
+    fn junk_before_a_line_may_resemble_a_winch_number() {
         for junk in [&b"12"[..], b"\xFF\0RD,RD", b"03RD,2022-05-14T", b"1234567890"] {
             let got = decode_all(&mut LineCodec::default(), &[junk, PROTOCOL_1].concat());
             assert_eq!(got.len(), 1, "{junk:?}");

@@ -40,7 +40,7 @@ enum Wire {
     Line { metres_per_unit: f64 },
 }
 
-/// Counters as they are commonly built.
+/// A common type of counter.
 #[derive(Clone, Copy)]
 struct Preset {
     counts_per_metre: f64,
@@ -48,14 +48,14 @@ struct Preset {
     sd_m: f64,
 }
 
-/// Typical builds: an encoder of 1,000 counts a turn on a wheel of 0.5 m, and a wheel with a magnet every centimetre. The noise is assumed, not
-/// from a datasheet.
+/// Common types: an encoder of 1,000 counts a turn on a wheel of 0.5 m, and a wheel with a magnet every centimetre.
+/// The noise is assumed, not from a datasheet.
 const PRESETS: [(&str, Preset); 2] = [
     ("encoder_wheel", Preset { counts_per_metre: 2000.0, sd_m: 0.005 }),
     ("magnet_wheel", Preset { counts_per_metre: 100.0, sd_m: 0.01 }),
 ];
 
-/// Steps of wheels, m.
+/// Allowed steps of wheels, m.
 const STEP_M: core::ops::RangeInclusive<f64> = 1e-5..=1.0;
 
 #[derive(Clone, Copy)]

@@ -1,4 +1,4 @@
-//! HID reports with the layout given in the vehicle file: no cable counter with a published report is known.
+//! HID reports with the layout given in the vehicle file, because no cable counter with a published report is known.
 //!
 //! The reference layout is defined by this project, for emulated counters:
 //! ```text
@@ -289,7 +289,7 @@ mod tests {
     const EXAMPLE: [u8; 11] = [0x01, 0x2A, 0x01, 0xC0, 0x1D, 0xFE, 0xFF, 0xDC, 0x05, 0x00, 0x00];
 
     #[test]
-    fn regress_no_count_is_too_large_to_wrap() {
+    fn any_count_can_be_wrapped() {
         for width in [Width::Bits8, Width::Bits16, Width::Bits32] {
             assert_eq!([i64::MAX, i64::MIN].map(|count| width.wrapped(count, true)), [-1, 0]);
             let most = (1 << width.bits()) - 1;
@@ -331,7 +331,7 @@ mod tests {
     }
 
     #[test]
-    fn the_reference_descriptor_announces_the_reference_report() {
+    fn reference_descriptor_matches_the_reference_report() {
         let (mut size, mut count, mut bits, mut at) = (0, 0, 0, 0);
         while at < REFERENCE_DESCRIPTOR.len() {
             let prefix = REFERENCE_DESCRIPTOR[at];
@@ -365,7 +365,7 @@ mod tests {
     }
 
     #[test]
-    fn a_report_with_another_id_is_left_out_whole() {
+    fn report_with_another_id_is_skipped_completely() {
         let mut codec = ReportCodec::new(ReportLayout::REFERENCE);
         let mut message = vec![0x02];
         message.extend_from_slice(&EXAMPLE);
@@ -388,7 +388,7 @@ mod tests {
     };
 
     #[test]
-    fn byte_order_and_sign_are_the_layouts() {
+    fn byte_order_and_sign_follow_the_layout() {
         let report = PLAIN.decode(&[7, 0, 0xFF, 0xFA, 0]).unwrap();
         assert_eq!((report.count, report.status), (65_530, Some(7)));
         let signed = ReportLayout { signed: true, endian: Endian::Little, ..PLAIN };

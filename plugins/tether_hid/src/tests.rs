@@ -98,14 +98,14 @@ fn worked_example_1_is_61_728_m_below_zero() {
 }
 
 #[test]
-fn the_reference_counter_comes_back() {
+fn reference_counter_round_trips() {
     let mut decoder = HidDecoder::new(reference_counter()).unwrap();
     round_trip("counts_per_metre = 2000\nzero_at_m = 12.5\nscale = 0.98\n", &mut decoder, 12.5, 0.98, 2000);
     assert_eq!(decoder.health(), crate::tracker::TrackerHealth::default());
 }
 
 #[test]
-fn a_narrow_falling_big_endian_counter_comes_back() {
+fn narrow_falling_big_endian_counter_round_trips() {
     let layout = ReportLayout {
         report_id: None,
         report_bytes: 4,
@@ -125,7 +125,7 @@ fn a_narrow_falling_big_endian_counter_comes_back() {
 }
 
 #[test]
-fn a_counter_of_changes_comes_back() {
+fn delta_counter_round_trips() {
     let layout = ReportLayout { width: Width::Bits8, ..ReportLayout::REFERENCE };
     let layout =
         ReportLayout { sequence_offset: None, status_offset: None, auxiliary_offset: None, ..layout };
@@ -135,7 +135,7 @@ fn a_counter_of_changes_comes_back() {
 }
 
 #[test]
-fn a_counter_s_own_clock_is_followed_where_the_file_says_where_it_is() {
+fn counter_clock_is_followed_if_configured() {
     let mut decoder = HidDecoder::new(reference_counter()).unwrap();
     round_trip("counts_per_metre = 2000\n", &mut decoder, 0.0, 1.0, 200);
     assert_eq!(decoder.clock(), None);
@@ -156,7 +156,7 @@ fn a_counter_s_own_clock_is_followed_where_the_file_says_where_it_is() {
 }
 
 #[test]
-fn an_emulated_line_monitor_comes_back() {
+fn emulated_line_monitor_round_trips() {
     let mut decoder = LineDecoder::new(1.0, DurNs::from_millis(4));
     round_trip("kind = \"lci90\"\nzero_at_m = 30.0\n", &mut decoder, 30.0, 1.0, 500);
     let mut decoder = LineDecoder::new(0.3048, DurNs::from_millis(4));
@@ -164,7 +164,7 @@ fn an_emulated_line_monitor_comes_back() {
 }
 
 #[test]
-fn a_line_is_valid_when_its_first_byte_came() {
+fn line_has_the_time_of_its_first_byte() {
     let mut decoder = LineDecoder::new(1.0, DurNs::ZERO);
     let line = b"RD,00000125,000012.4,0152.304,1504\r\n";
     assert!(decode(&mut decoder, MonoNs(100), &line[..10]).is_empty());
@@ -190,7 +190,7 @@ fn wrong_keys_are_named() {
 }
 
 #[test]
-fn presets_carry_step_and_noise_and_keys_override_them() {
+fn presets_set_step_and_noise_and_keys_override_them() {
     for (own, resolution_m, sd_m) in [
         ("preset = \"encoder_wheel\"\n", 0.0005, Some(0.005)),
         ("preset = \"magnet_wheel\"\n", 0.01, Some(0.01)),

@@ -1,13 +1,14 @@
-//! Tracks a counter that wraps, jumps and restarts as a continuous count of cable paid out.
+//! Converts a counter that wraps, jumps and restarts into a continuous count of cable paid out.
 //!
 //! - A counter wraps: changes are taken the short way round.
 //! - A change faster than the winch is rejected and counted. Rejected reports are compared with each other: when
 //!   [`PERSIST`] in a row agree, the counter has moved and the reports weren't corrupt.
-//!   - If the first of them was near zero, the device counts from zero again: the length continues from its last value, and is
-//!     marked with the restart, which may be that of a device plugged in again. After a silence, too, a step back to zero is
-//!     accepted directly only if the winch covers it in a second.
+//!   - If the first of them was near zero, the device counts from zero again. The length continues from its last
+//!     value and is marked with the restart, which may be that of a replugged device. After a silence, too, a step
+//!     back to zero is accepted directly only if the winch covers it in a second.
 //!   - Otherwise the counter's new value is accepted.
-//! - In both cases, and whenever counts may have been lost, the length is no longer certain: `re_zero_needed` is set and stays.
+//! - In both cases, and whenever counts may have been lost, the length is no longer certain: `re_zero_needed` is set
+//!   and stays.
 
 use headrace_sensor::geometry::time::{DurNs, MonoNs};
 use headrace_sensor::reading::CountRestart;
@@ -25,7 +26,7 @@ const SLACK_S: f64 = 0.1;
 /// Maximum counting time of a replugged device before its first report, s.
 const FRESH_S: f64 = 1.0;
 
-/// Least silence of a device that is plugged in again. Source: USB 2.0, 7.1.7.3, debounce interval.
+/// Least silence of a replugged device. Source: USB 2.0, 7.1.7.3, debounce interval.
 const AWAY: DurNs = DurNs::from_millis(100);
 
 /// Meaning of a report's count.
@@ -82,7 +83,7 @@ struct Jump {
 }
 
 impl CountTracker {
-    /// `max_counts_per_s` is the maximum speed of the winch or the vehicle.
+    /// Creates a tracker; `max_counts_per_s` is the maximum speed of the winch or the vehicle.
     pub fn new(counting: Counting, width: Width, max_counts_per_s: f64) -> Self {
         Self {
             counting,
@@ -112,7 +113,7 @@ impl CountTracker {
         let repeated = self.note_sequence(report.sequence);
         let now = Seen { count: report.count, at };
         match self.counting {
-            // Adding a change twice would be wrong; seeing a count twice is harmless.
+            // Adding a change twice would be wrong, while reading a count twice is harmless.
             Counting::Delta if repeated => None,
             Counting::Delta => self.take_delta(now),
             Counting::Absolute => self.take_absolute(now),
@@ -187,7 +188,7 @@ impl CountTracker {
         self.accept(now, self.width.difference(reference, now.count))
     }
 
-    #[expect(clippy::unnecessary_wraps, reason = "the callers hand it on")]
+    #[expect(clippy::unnecessary_wraps, reason = "the callers pass it on")]
     fn accept(&mut self, now: Seen, change: i64) -> Option<i64> {
         self.jumped = None;
         self.accepted = Some(now);
@@ -227,7 +228,7 @@ mod tests {
     }
 
     #[test]
-    fn a_narrow_counter_wraps_without_a_trace() {
+    fn narrow_counter_wraps_without_a_trace() {
         let mut tracker = CountTracker::new(Counting::Absolute, Width::Bits8, FASTEST);
         let totals = take_all(&mut tracker, &[250, 6, 20, 250, 6]);
         assert_eq!(totals, [250, 262, 276, 250, 262].map(Some));
@@ -237,7 +238,7 @@ mod tests {
     }
 
     #[test]
-    fn a_garbled_report_is_rejected_and_leaves_no_trace_in_the_length() {
+    fn garbled_report_is_rejected_without_changing_the_length() {
         let mut tracker = CountTracker::new(Counting::Absolute, Width::Bits32, FASTEST);
         let totals = take_all(&mut tracker, &[120_000, 0, 120_010, -9_000_000, 120_020]);
         assert_eq!(totals, [Some(120_000), None, Some(120_010), None, Some(120_020)]);
@@ -245,7 +246,7 @@ mod tests {
     }
 
     #[test]
-    fn a_device_plugged_in_again_goes_on_from_the_length_held() {
+    fn replugged_device_continues_from_the_last_length() {
         let mut tracker = CountTracker::new(Counting::Absolute, Width::Bits32, FASTEST);
         let totals = take_all(&mut tracker, &[120_000, 0, 2, 4, 6, 8, 10]);
         assert_eq!(totals, [Some(120_000), None, None, None, None, Some(120_008), Some(120_010)]);
@@ -254,7 +255,7 @@ mod tests {
     }
 
     #[test]
-    fn a_device_away_for_long_is_not_taken_for_a_journey_back() {
+    fn long_absence_is_no_way_back() {
         let mut tracker = CountTracker::new(Counting::Absolute, Width::Bits32, FASTEST);
         tracker.take(at_ms(0), &counted(120_000));
         let totals = (0..5).map(|i| tracker.take(at_ms(60_000 + 20 * i), &counted(300 + i as i64)));
@@ -263,7 +264,7 @@ mod tests {
     }
 
     #[test]
-    fn restart_from_zero_is_marked_and_says_whether_the_device_was_away() {
+    fn restart_from_zero_is_marked_with_or_without_absence() {
         for (silence_ms, was_away) in [(20, false), (60_000, true)] {
             let mut tracker = CountTracker::new(Counting::Absolute, Width::Bits32, FASTEST);
             tracker.take(at_ms(0), &counted(120_000));
@@ -279,7 +280,7 @@ mod tests {
     }
 
     #[test]
-    fn a_slow_device_plugged_in_again_is_not_taken_for_a_journey_back() {
+    fn slow_replugged_device_is_no_way_back() {
         let mut tracker = CountTracker::new(Counting::Absolute, Width::Bits32, FASTEST);
         let counts = [20_000, 0, 100, 200, 300, 400];
         let totals = counts.iter().zip(0..).map(|(count, s)| tracker.take(at_ms(1000 * s), &counted(*count)));
@@ -287,7 +288,7 @@ mod tests {
     }
 
     #[test]
-    fn a_jump_that_stays_is_believed() {
+    fn persistent_jump_is_accepted() {
         let mut tracker = CountTracker::new(Counting::Absolute, Width::Bits32, FASTEST);
         let totals = take_all(&mut tracker, &[120_000, 90_000, 90_001, 90_002, 90_003, 90_004]);
         assert_eq!(totals, [Some(120_000), None, None, None, None, Some(90_004)]);
@@ -304,7 +305,7 @@ mod tests {
     }
 
     #[test]
-    fn a_silence_in_which_the_counter_may_have_gone_round_marks_the_length() {
+    fn silence_long_enough_to_wrap_marks_the_length_uncertain() {
         let mut tracker = CountTracker::new(Counting::Absolute, Width::Bits16, FASTEST);
         tracker.take(at_ms(0), &counted(0));
         assert_eq!(tracker.take(at_ms(5000), &counted(100)), Some(100));
@@ -314,7 +315,7 @@ mod tests {
     }
 
     #[test]
-    fn changes_are_added_up_once_each_and_lost_ones_are_told() {
+    fn changes_are_added_once_and_lost_ones_reported() {
         let mut tracker = CountTracker::new(Counting::Delta, Width::Bits8, FASTEST);
         let mut take = |ms, sequence, count| {
             let report = Report { sequence: Some(sequence), ..counted(count) };
@@ -330,7 +331,7 @@ mod tests {
     }
 
     #[test]
-    fn a_change_faster_than_the_winch_is_left_out_and_told() {
+    fn change_faster_than_the_winch_is_skipped_and_reported() {
         let mut tracker = CountTracker::new(Counting::Delta, Width::Bits32, FASTEST);
         let totals = take_all(&mut tracker, &[5, 5, 800_000, 5]);
         assert_eq!(totals, [Some(5), Some(10), None, Some(15)]);

@@ -49,7 +49,7 @@ impl Format for Candump {
 
 const NO_LINE: &str = "no line of candump";
 
-/// The frame of a line; `None` for a frame that the logging machine sent itself.
+/// Parses the frame of a line; `None` for a frame that the logging machine sent itself.
 fn entry(line: &[u8]) -> Result<Option<Entry>, &'static str> {
     let line = str::from_utf8(line).map_err(|_| NO_LINE)?;
     let mut fields = line.split_ascii_whitespace();
@@ -65,7 +65,7 @@ fn entry(line: &[u8]) -> Result<Option<Entry>, &'static str> {
     Ok(Some(Entry { stamp_ns, stream: stream.to_owned(), bytes: can_frame(frame)?.to_vec() }))
 }
 
-/// Seconds with a fraction of up to nine places.
+/// Parses seconds with a fraction of up to nine places.
 fn nanoseconds(text: &str) -> Option<u64> {
     let (seconds, fraction) = text.split_once('.')?;
     let digits = |text: &str| !text.is_empty() && text.bytes().all(|byte| byte.is_ascii_digit());
@@ -77,7 +77,7 @@ fn nanoseconds(text: &str) -> Option<u64> {
     whole.checked_add(fraction.parse::<u64>().ok()? * scale)
 }
 
-/// `044#2A366C2B`, `12345678#R`; eight digits are an extended identifier.
+/// Parses `044#2A366C2B` or `12345678#R`; eight digits are an extended identifier.
 fn can_frame(text: &str) -> Result<[u8; FRAME_BYTES], &'static str> {
     let (id_text, data_text) = text.split_once('#').ok_or(NO_LINE)?;
     if data_text.starts_with('#') {
@@ -105,7 +105,7 @@ fn can_frame(text: &str) -> Result<[u8; FRAME_BYTES], &'static str> {
     Ok(frame)
 }
 
-/// Pairs of digits, optionally separated by points; `_E` after eight pairs is the raw length, which is ignored.
+/// Parses pairs of digits, optionally separated by points; `_E` after eight pairs is the raw length, which is ignored.
 fn data_bytes(text: &str, data: &mut [u8; 8]) -> Result<u8, &'static str> {
     let text = text.split_once('_').map_or(text, |(data, _)| data);
     let digits: Vec<u8> = text.bytes().filter(|byte| *byte != b'.').collect();
@@ -145,7 +145,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_line_is_refused() {
+    fn invalid_lines_are_refused() {
         for line in [
             "can0 123 [2] 11 22",
             "(1.0) can0",

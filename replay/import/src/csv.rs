@@ -1,5 +1,7 @@
-//! Tables of values (CSV), one timestamp per row: each sensor's emulator encodes them as the bytes that the sensor would have
-//! sent, so that its ordinary decoder reads them.
+//! Tables of values (CSV), one timestamp per row.
+//!
+//! Each sensor's emulator encodes the values as the bytes that the sensor would have sent, so that its ordinary decoder
+//! reads them.
 
 use headrace_config::{ConfigError, Section};
 use headrace_geometry::frames::Rot;
@@ -11,11 +13,11 @@ use headrace_vehicle::VehicleConfig;
 use crate::emulated::{BEYOND, EmulatedSensor, Value};
 use crate::{Clock, Entry, Format, Step};
 
-/// Most values per sensor.
+/// Maximum number of values per sensor.
 const SLOTS: usize = 9;
 const LONGEST_LINE: usize = 1 << 16;
 
-/// A quantity: its name, its index among the sensor's values, and the allowed units with their size in ours.
+/// A quantity: its name, its index among the sensor's values, and the allowed units with their factors to SI units.
 type Quantity = (&'static str, usize, &'static [(&'static str, f64)]);
 
 const ANGLE: &[(&str, f64)] = &[("rad", 1.0), ("deg", PI / 180.0)];
@@ -62,15 +64,14 @@ pub struct Csv {
 /// A sensor and its columns.
 struct Target {
     sensor: EmulatedSensor,
-    /// For each value, the column and the size of its unit.
+    /// For each value, the column and the factor of its unit.
     columns: [Option<(usize, f64)>; SLOTS],
 }
 
 impl Csv {
-    /// From a mapping, the sensors of a vehicle, and the table's first line.
+    /// Creates the format from a mapping, the sensors of a vehicle, and the table's first line.
     ///
-    /// Errors: a key with an invalid value, an unknown sensor or column, a sensor with some of its quantities
-    /// missing.
+    /// Errors: a key with an invalid value, an unknown sensor or column, a sensor with some of its quantities missing.
     pub fn new(mapping: &Section<'_>, vehicle: &VehicleConfig, header: &str) -> Result<Self, ConfigError> {
         let separators = [(",", ','), (";", ';'), ("\t", '\t')];
         let separator = mapping.choice("separator", &separators)?.unwrap_or(',');
@@ -101,7 +102,8 @@ impl Csv {
             let missing: Vec<&str> = missing.map(|(name, ..)| *name).collect();
             if !missing.is_empty() {
                 let (id, missing) = (&target.sensor.id, missing.join(", "));
-                let problem = format!("have none for {missing} of sensor {id:?}; its bytes need all of them");
+                let problem =
+                    format!("have none for {missing} of sensor {id:?}; a sensor needs all of its quantities");
                 return Err(mapping.invalid("columns", &problem));
             }
         }
@@ -111,14 +113,14 @@ impl Csv {
 
     fn row(&mut self, line: &str, out: &mut Vec<Entry>) -> Result<(), &'static str> {
         let cells: Vec<&str> = line.split(self.separator).map(cell).collect();
-        // Cells beyond the header's may be there as long as they are empty.
+        // A row may have more cells than the header if they are empty.
         if cells.get(self.cells..).is_none_or(|more| more.iter().any(|cell| !cell.is_empty())) {
             return Err(
-                "rows with other cells than the header: cut short, or numbers with the separator in them",
+                "rows with more or fewer cells than the header: cut short, or numbers contain the separator",
             );
         }
         let time = cells.get(self.time.0).copied().unwrap_or_default();
-        let stamp_ns = nanoseconds(time, self.time.1).ok_or("rows whose time is no number from 0 on")?;
+        let stamp_ns = nanoseconds(time, self.time.1).ok_or("rows whose time isn't a number from 0 on")?;
         let mut whole = Ok(());
         for target in &mut self.targets {
             whole = whole.and(target.tell(stamp_ns, &cells, out));
@@ -145,10 +147,10 @@ impl Format for Csv {
             return Step::Took(used);
         }
         if !is_ended {
-            // Half a number is a number, too.
-            return Step::Lost(used, "a last row without a line end: it may be cut short, and isn't taken");
+            // A truncated number still parses as a number.
+            return Step::Lost(used, "a last row without a line end: it may be cut short, and is skipped");
         }
-        let Ok(line) = str::from_utf8(line) else { return Step::Lost(used, "rows that are no text") };
+        let Ok(line) = str::from_utf8(line) else { return Step::Lost(used, "rows that aren't UTF-8 text") };
         match self.row(line, out) {
             Ok(()) => Step::Took(used),
             Err(why) => Step::Lost(used, why),
@@ -181,7 +183,7 @@ impl Target {
         Ok(())
     }
 
-    /// Encodes a row's values. A row with all cells empty gives no bytes.
+    /// Encodes a row's values. A row with only empty cells gives no bytes.
     ///
     /// Errors: as text, for cells that can't be parsed or encoded.
     fn tell(&mut self, stamp_ns: u64, cells: &[&str], out: &mut Vec<Entry>) -> Result<(), &'static str> {
@@ -199,7 +201,7 @@ impl Target {
         }
         let empty = |slot: usize| self.columns.get(slot).is_none_or(|place| text(place).is_empty());
         let Some(value) = value(self.sensor.sense, values, empty(1)) else {
-            return Err("rows with a cell that is no number");
+            return Err("rows with a cell that isn't a number");
         };
         let (value, is_beyond) = self.sensor.within_reach(value);
         let stream = self.sensor.id.clone();
@@ -209,12 +211,12 @@ impl Target {
         match (told, is_beyond) {
             (true, true) => Err(BEYOND),
             (true, false) => Ok(()),
-            (false, _) => Err("rows with values that the sensor can't say"),
+            (false, _) => Err("rows with values that the sensor can't encode"),
         }
     }
 }
 
-/// `None` where a value is missing. A head with an angle and no range had no echo.
+/// Assembles a value; `None` if a part is missing. A head with an angle and no range had no echo.
 fn value(sense: Sense, values: [Option<f64>; SLOTS], no_range: bool) -> Option<Value> {
     let [a, b, c, d, e, f, g, h, i] = values;
     Some(match sense {
@@ -227,7 +229,7 @@ fn value(sense: Sense, values: [Option<f64>; SLOTS], no_range: bool) -> Option<V
     })
 }
 
-/// A decimal number of units as nanoseconds, exact and truncated.
+/// Parses a decimal number of units as nanoseconds, exact and truncated.
 fn nanoseconds(text: &str, unit_ns: u128) -> Option<u64> {
     let (whole, fraction) = text.split_once('.').unwrap_or((text, ""));
     if whole.is_empty() || !whole.bytes().chain(fraction.bytes()).all(|byte| byte.is_ascii_digit()) {
@@ -237,7 +239,7 @@ fn nanoseconds(text: &str, unit_ns: u128) -> Option<u64> {
     let scale = 10_u128.checked_pow(u32::try_from(fraction.len()).ok()?)?;
     let part = if fraction.is_empty() { 0 } else { fraction.parse::<u128>().ok()? };
     let ns = whole.parse::<u128>().ok()?.checked_mul(unit_ns)?.checked_add(part * unit_ns / scale)?;
-    // Leaves headroom for times added by devices.
+    // Leaves headroom for delays that devices add.
     u64::try_from(ns).ok().filter(|ns| *ns < 1 << 62)
 }
 

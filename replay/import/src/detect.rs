@@ -1,6 +1,6 @@
 //! Recognises kinds of files by their first bytes.
 
-/// What a dataflash log of ArduPilot begins with.
+/// First bytes of an ArduPilot dataflash log.
 pub const DATAFLASH: [u8; 2] = *b"\xA3\x95";
 /// Bytes sufficient for recognition.
 pub const ENOUGH_BYTES: usize = 64;

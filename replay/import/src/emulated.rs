@@ -1,4 +1,4 @@
-//! A vehicle file's sensor as an emulator, which encodes foreign values as the bytes that the sensor would have sent.
+//! A sensor of the vehicle file as an emulator. It encodes foreign values as the bytes that the sensor would have sent.
 
 use headrace_config::{ConfigError, Section};
 use headrace_geometry::frames::{Rot, Sensor, Vec3};
@@ -30,8 +30,9 @@ pub(super) enum Value {
 }
 
 impl Value {
-    /// Whether the value is possible, with limits far beyond those of tunnels: wire formats wrap or clamp larger values into
-    /// plausible ones.
+    /// Whether the value is possible. Limits are far beyond those of tunnels.
+    ///
+    /// Wire formats wrap or clamp larger values into plausible ones.
     fn is_possible(&self) -> bool {
         let within = |values: &[f64], most: f64| values.iter().all(|value| value.abs() <= most);
         // Values not measured are NaN.
@@ -48,9 +49,8 @@ impl Value {
     }
 }
 
-/// What ranges beyond a head's setting are lost as.
-pub(super) const BEYOND: &str =
-    "ranges that the head doesn't tell at its range setting: as if nothing was heard";
+/// Reason text for ranges beyond a head's setting.
+pub(super) const BEYOND: &str = "ranges outside the head's range setting, imported as pings without an echo";
 
 /// A sensor of the vehicle file.
 pub(super) struct EmulatedSensor {
@@ -62,7 +62,7 @@ pub(super) struct EmulatedSensor {
 }
 
 impl EmulatedSensor {
-    /// By the id given under `sensor` in a mapping's table.
+    /// Finds the sensor with the id given under `sensor` in a mapping's table.
     ///
     /// Errors: the vehicle file has no such sensor.
     pub(super) fn named(
@@ -73,7 +73,7 @@ impl EmulatedSensor {
         Self::all(vehicle).find(|(config_id, _)| *config_id == id).map_or_else(
             || {
                 let ids: Vec<&str> = Self::all(vehicle).map(|(id, _)| id).collect();
-                let problem = format!("is no sensor of the vehicle file; there are {}", ids.join(", "));
+                let problem = format!("isn't a sensor of the vehicle file, which has {}", ids.join(", "));
                 Err(section.invalid("sensor", &problem))
             },
             |(id, device)| Ok(Self::new(id, device, vehicle)),
@@ -104,8 +104,9 @@ impl EmulatedSensor {
         self.reach_m.is_some()
     }
 
-    /// A value as the sensor can tell it: of a beam whose range a head doesn't measure at its range setting, that nothing was heard; and whether
-    /// that is so.
+    /// A value as the sensor can report it, and whether it had to be changed.
+    ///
+    /// A beam whose range is outside a head's range setting becomes a beam without an echo.
     pub(super) fn within_reach(&self, value: Value) -> (Value, bool) {
         match (value, self.reach_m) {
             (Value::Beam(angle_rad, Some(range_m)), Some([least_m, most_m]))
@@ -117,8 +118,9 @@ impl EmulatedSensor {
         }
     }
 
-    /// Emits the bytes that the sensor would have sent, each with its receive time. `false` if it can't encode the value, or the
-    /// value is impossible.
+    /// Emits the bytes that the sensor would have sent, each with its receive time.
+    ///
+    /// `false` if the sensor can't encode the value, or the value is impossible.
     pub(super) fn tell(&mut self, at: MonoNs, value: &Value, sink: &mut dyn FnMut(MonoNs, &[u8])) -> bool {
         if !value.is_possible() {
             return false;

@@ -5,7 +5,7 @@
 pub struct Entry {
     /// Timestamp, nanoseconds of the file's clock.
     pub stamp_ns: u64,
-    /// The line, by the name that the format gives it: a CAN interface, for instance.
+    /// The line, by its name in the format: a CAN interface, for instance.
     pub stream: String,
     /// The bytes as the device sent them.
     pub bytes: Vec<u8>,
@@ -14,13 +14,13 @@ pub struct Entry {
 /// Result of parsing the front of the remaining file.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Step {
-    /// This many bytes parsed; they gave entries or carry none.
+    /// This many bytes were parsed, with or without entries.
     Took(usize),
-    /// This many bytes lost, and why.
+    /// This many bytes were lost, for this reason.
     Lost(usize, &'static str),
-    /// More bytes are needed; at the end of the file, a truncated entry.
+    /// More bytes are needed. At the end of the file the entry is truncated.
     More,
-    /// The front has further entries: none of its bytes is consumed yet.
+    /// The front has further entries; none of its bytes is consumed yet.
     Held,
 }
 
@@ -40,7 +40,7 @@ pub enum Clock {
     Utc,
     /// 1970, in the unknown time zone of the machine that wrote the file.
     Local,
-    /// An epoch of the format's own.
+    /// An epoch specific to the format.
     Own,
 }
 

@@ -1,8 +1,8 @@
-//! Why a file can't be imported.
+//! Errors of an import.
 
 use headrace_replay::log::LogError;
 
-/// Why a file can't be imported.
+/// A file can't be imported.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum ImportError {
@@ -16,7 +16,7 @@ pub enum ImportError {
         /// Cause.
         source: std::io::Error,
     },
-    /// Nothing importable in the file.
+    /// The file has nothing to import.
     #[error("importing {name}: there is no {what} in its {bytes} bytes{why}")]
     Nothing {
         /// The file.
@@ -28,7 +28,7 @@ pub enum ImportError {
         /// The content found instead, or empty.
         why: String,
     },
-    /// Not a known kind of bag.
+    /// The file isn't a known kind of bag.
     #[error("importing {name}: a ROS bag begins with \"#ROSBAG V2.0\", this file with {found:?}")]
     NoBag {
         /// The file.
@@ -36,13 +36,13 @@ pub enum ImportError {
         /// Its first bytes.
         found: String,
     },
-    /// A log of ours.
+    /// The file is a dive log of this program.
     #[error("importing {name}: it is a dive log already; `headrace replay` reads it as it is")]
     DiveLog {
         /// The file.
         name: String,
     },
-    /// The log can't be written, or the recording not read.
+    /// The log can't be written, or the recording can't be read.
     #[error(transparent)]
     Log(#[from] LogError),
 }

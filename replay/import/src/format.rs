@@ -1,12 +1,12 @@
-//! How a kind of file is split into entries.
+//! The interface of file formats, which split a file into entries.
 
 use crate::entry::{Clock, Entry, Step, Told};
 use crate::order::WINDOW_NS;
 
-/// Most bytes of the file held in memory: more than the longest entry of any format.
+/// Maximum number of bytes of the file held in memory, more than the longest entry of any format.
 const MOST_HELD: usize = 1 << 20;
 
-/// Splits a kind of file into entries. Sans-I/O: it gets the front of the remaining file.
+/// Splits a kind of file into entries without I/O: it gets the front of the remaining file.
 pub trait Format {
     /// Epoch of its timestamps, as far as known from the bytes read.
     fn clock(&self) -> Clock;
@@ -16,7 +16,7 @@ pub trait Format {
         MOST_HELD
     }
 
-    /// Greatest delay of an entry after a later-stamped one, ns.
+    /// Longest time by which an entry may follow entries with later timestamps, ns.
     fn reach_ns(&self) -> u64 {
         WINDOW_NS
     }

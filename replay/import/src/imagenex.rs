@@ -8,7 +8,7 @@ use headrace_imagenex881::logfile::{LogFile, LogFileError};
 #[derive(Debug, Clone, Copy, Default)]
 pub struct ImagenexFormat;
 
-/// The line with all returns.
+/// Name of the line with all returns.
 pub const STREAM: &str = "imagenex";
 
 const DAY_NS: u64 = 86_400_000_000_000;
@@ -23,7 +23,7 @@ impl Format for ImagenexFormat {
         let mut shots = LogFile::new(front);
         let shot = match shots.next() {
             None | Some(Err(LogFileError::Short { .. })) => return Step::More,
-            Some(Err(_)) => return Step::Lost(1, "no shot where one must begin"),
+            Some(Err(_)) => return Step::Lost(1, "no shot where one is expected"),
             Some(Ok(shot)) => shot,
         };
         let total =

@@ -1,4 +1,5 @@
-//! An import: entries in time order, moved to the log's clock and routed to the sensors that would have received them.
+//! An import: entries are put in time order, moved to the log's clock and routed to the sensors that would have
+//! received them.
 
 use std::io::{Read, Write};
 
@@ -16,7 +17,7 @@ use crate::taker::Taker;
 /// Log time of a file's first entry, the same as in a simulation.
 pub const BEGIN: MonoNs = MonoNs(1_000_000_000);
 
-/// A greater gap between timestamps means several recordings, or that the clock was set.
+/// Longest plausible gap between timestamps. A longer one means several recordings, or that the clock was set.
 const LONGEST_GAP: DurNs = DurNs(3_600_000_000_000);
 
 /// A file being imported.
@@ -33,7 +34,7 @@ pub struct Import<S> {
 pub struct Imported {
     /// Entries of the file.
     pub entries: u64,
-    /// Entries for none of the sensors: other parts, other lines.
+    /// Entries that belong to no sensor: other parts, other lines.
     pub passed_over: u64,
     /// Messages written, for each source of the log.
     pub messages: Vec<u64>,
@@ -79,7 +80,7 @@ impl<S: Source> Import<S> {
         Ok(Self { input, order, first_ns, clock })
     }
 
-    /// The log's clock metadata: origin of the clock and, where known, the time of day.
+    /// Clock metadata for the log: origin of the clock and, if known, the time of day.
     pub fn clock_metadata(&self) -> Vec<(String, String)> {
         let mut all = vec![("import_clock".to_owned(), self.clock.as_str().to_owned())];
         if self.clock == Clock::Utc {
@@ -91,7 +92,9 @@ impl<S: Source> Import<S> {
         all
     }
 
-    /// Writes everything the sensors would have received. `beside` is given the number of entries so far.
+    /// Writes everything that the sensors would have received.
+    ///
+    /// `beside` gets the number of entries so far.
     ///
     /// Errors: reading the file or writing the log fails.
     pub fn write<W: Write>(

@@ -11,7 +11,7 @@ use crate::order::Order;
 /// Read size, bytes.
 pub(crate) const READ_BYTES: usize = 1 << 16;
 
-/// A source of entries: a file split by a [`Format`], or one with a reader of its own.
+/// A source of entries: a file split by a [`Format`], or one with its own reader.
 pub trait Source {
     /// File name.
     fn name(&self) -> &str;
@@ -24,7 +24,7 @@ pub trait Source {
     /// Epoch of its timestamps, as far as known from the bytes read.
     fn clock(&self) -> Clock;
 
-    /// Greatest delay of an entry after a later-stamped one, ns.
+    /// Longest time by which an entry may follow entries with later timestamps, ns.
     fn reach_ns(&self) -> u64;
 
     /// Bytes read.
@@ -93,7 +93,7 @@ impl<R: Read, F: Format> Source for Input<R, F> {
             }
             Step::Held => (),
             Step::More if left >= self.format.most_held() => {
-                self.losses.lost(at, left, "no end of an entry within what can be held");
+                self.losses.lost(at, left, "an entry longer than the most that is held in memory");
                 self.done += left;
             }
             Step::More => self.read()?,

@@ -35,7 +35,7 @@ impl FileKind {
     pub const ALL: [Self; 7] =
         [Self::Tlog, Self::Candump, Self::Imagenex, Self::Ping, Self::Csv, Self::Rosbag, Self::Mcap];
 
-    /// By the extension of a file's name, whatever its case.
+    /// Recognises a kind by the extension of a file's name, in upper or lower case.
     pub fn of(path: &Path) -> Option<Self> {
         let extension = path.extension()?.to_string_lossy().to_ascii_lowercase();
         match extension.as_str() {
@@ -63,12 +63,12 @@ impl FileKind {
         }
     }
 
-    /// By its name.
+    /// Finds a kind by its name.
     pub fn named(name: &str) -> Option<Self> {
         Self::ALL.into_iter().find(|kind| kind.name() == name)
     }
 
-    /// What such a file is, in a line.
+    /// One-line description of such files.
     pub fn summary(self) -> &'static str {
         match self {
             Self::Tlog => "Telemetry log of MAVLink",
@@ -81,7 +81,7 @@ impl FileKind {
         }
     }
 
-    /// What one of its entries is called.
+    /// Name of one of its entries.
     pub fn entries(self) -> &'static str {
         match self {
             Self::Tlog | Self::Candump => "frame",
@@ -90,7 +90,7 @@ impl FileKind {
         }
     }
 
-    /// Its format, where that needs neither a vehicle file nor a mapping.
+    /// Its format, if it needs neither a vehicle file nor a mapping.
     pub fn format(self) -> Option<Box<dyn Format>> {
         match self {
             Self::Tlog => Some(Box::<TlogFormat>::default()),
@@ -101,17 +101,17 @@ impl FileKind {
         }
     }
 
-    /// Whether such files have values, of which emulators make bytes.
+    /// Whether such files contain values, which emulators turn into bytes.
     pub fn has_values(self) -> bool {
         matches!(self, Self::Csv | Self::Rosbag | Self::Mcap)
     }
 
-    /// Whether such a file is of one device.
+    /// Whether such a file comes from a single device.
     pub(crate) fn has_one_device(self) -> bool {
         matches!(self, Self::Imagenex | Self::Ping)
     }
 
-    /// The plugin of the sensors whose bytes such files have; empty where they have values.
+    /// The plugin of the sensors whose bytes such files contain; empty if they contain values.
     pub(crate) fn plugin(self) -> &'static str {
         match self {
             Self::Tlog => headrace_mavlink::MavlinkKind.name(),
@@ -122,7 +122,7 @@ impl FileKind {
         }
     }
 
-    /// The line that a sensor listens to that is connected like this.
+    /// The line that a sensor with this connection listens to.
     pub(crate) fn usual_line(self, connect: &str) -> Option<String> {
         match self {
             Self::Candump => match Connect::parse(connect) {
@@ -133,7 +133,7 @@ impl FileKind {
         }
     }
 
-    /// How a line is named.
+    /// Form of a line's name.
     pub(crate) fn line_form(self) -> &'static str {
         match self {
             Self::Tlog => tlog::STREAM,

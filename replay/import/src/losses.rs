@@ -8,11 +8,11 @@ use headrace_geometry::time::MonoNs;
 #[derive(Debug, Clone, Default)]
 pub(super) struct Losses {
     kinds: BTreeMap<&'static str, Kind>,
-    /// End and kind of the last loss: a byte that follows directly belongs to the same loss.
+    /// End and kind of the last loss. A lost byte that follows directly belongs to the same loss.
     last: Option<(u64, &'static str)>,
     cut_off: Option<(u64, usize)>,
     late: u64,
-    /// Number of gaps, and length and time of the first.
+    /// Number of gaps, and length and time of the first one.
     gaps: Option<(u64, u64, MonoNs)>,
 }
 
@@ -24,7 +24,7 @@ struct Kind {
 }
 
 impl Losses {
-    /// Bytes lost at an offset in the file.
+    /// Counts bytes lost at an offset in the file.
     pub(super) fn lost(&mut self, at: u64, bytes: usize, why: &'static str) {
         let kind = self.kinds.entry(why).or_insert(Kind { places: 0, bytes: 0, first: at });
         kind.places += u64::from(bytes > 1 || self.last != Some((at, why)));
@@ -32,17 +32,17 @@ impl Losses {
         self.last = Some((at + bytes as u64, why));
     }
 
-    /// The file ends within an entry.
+    /// Records that the file ends within an entry.
     pub(super) fn cut_off(&mut self, at: u64, bytes: usize) {
         self.cut_off = Some((at, bytes));
     }
 
-    /// Entries dropped because they came too late to be put in order.
+    /// Counts entries dropped because they came too late to be put in order.
     pub(super) fn late(&mut self, count: u64) {
         self.late = count;
     }
 
-    /// A gap of hours between two timestamps of the file.
+    /// Counts a gap of hours between two timestamps of the file.
     pub(super) fn gap(&mut self, gap_ns: u64, at: MonoNs) {
         let (count, first_ns, first_at) = self.gaps.unwrap_or((0, gap_ns, at));
         self.gaps = Some((count + 1, first_ns, first_at));
@@ -66,7 +66,7 @@ impl Losses {
         }
         if let Some((count, gap_ns, at)) = self.gaps {
             let (gap_s, at_s) = (gap_ns / 1_000_000_000, at.as_secs_f64());
-            all.push(format!("the file's clock goes on by over an hour {count} times, first by {gap_s} s to {at_s:.3} s of the log: set, or several recordings in one"));
+            all.push(format!("the file's clock jumps forward by over an hour {count} times, first by {gap_s} s to {at_s:.3} s of the log: the clock was set, or the file has several recordings"));
         }
         all
     }

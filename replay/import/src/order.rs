@@ -4,12 +4,12 @@ use std::collections::BTreeMap;
 
 use crate::Entry;
 
-/// Entries within this of the latest one are held back, since older ones may follow.
+/// Entries within this time of the latest one are held back, since older ones may follow.
 pub(super) const WINDOW_NS: u64 = 2_000_000_000;
-/// Most entries held, however close together.
+/// Maximum number of entries held, however close together they are.
 const MOST_ENTRIES: usize = 1 << 15;
 const MOST_BYTES: usize = 1 << 24;
-/// The same for formats with longer delays.
+/// Maximum number of entries held for formats with longer delays.
 const MOST_REACHING: usize = 1 << 18;
 
 /// Returns entries in order of their timestamps, those with equal ones in order of arrival.
@@ -66,7 +66,7 @@ impl Order {
         self.held.first_key_value().map(|((stamp_ns, _), _)| *stamp_ns)
     }
 
-    /// Entries dropped because they came too late.
+    /// Number of entries dropped because they came too late.
     pub(super) fn late(&self) -> u64 {
         self.late
     }

@@ -8,24 +8,24 @@ use crate::{Clock, Entry, Format, Step};
 #[derive(Debug, Default)]
 pub struct PingFormat {
     begun: bool,
-    /// Whole days since the first one.
+    /// Number of whole days since the first one.
     days: u64,
     last_of_day_ns: u64,
 }
 
-/// The line with all messages.
+/// Name of the line with all messages.
 pub const STREAM: &str = "ping";
 
-/// Texts before the two numbers that end the preface; the four-byte version follows the first text.
+/// Number of texts before the two numbers that end the preface; the four-byte version follows the first text.
 const TEXTS: usize = 5;
 const TITLE: &str = "PingViewer sensor log file";
 const DAY_NS: u64 = 86_400_000_000_000;
-/// A time earlier by more than this is of the next day; by less, it is out of order.
+/// A time earlier by more than this belongs to the next day; one earlier by less is out of order.
 const MIDNIGHT_NS: u64 = DAY_NS / 2;
-/// Longer than any text or message of such a log.
+/// Upper bound on the length of any text or message of such a log.
 const MOST_BYTES: usize = 1 << 16;
 
-/// Why a field can't be read.
+/// Reason why a field can't be read.
 enum Stop {
     More,
     Bad,
@@ -43,7 +43,9 @@ impl Format for PingFormat {
             Ok(()) => Step::Took(front.len() - rest.len()),
             Err(Stop::More) => Step::More,
             // Records have no sync mark to find the next one by.
-            Err(Stop::Bad) if self.begun => Step::Lost(front.len(), "no time and message where one must be"),
+            Err(Stop::Bad) if self.begun => {
+                Step::Lost(front.len(), "no time and message where they are expected")
+            }
             Err(Stop::Bad) => Step::Lost(front.len(), "no preface of Ping Viewer"),
         }
     }

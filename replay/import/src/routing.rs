@@ -8,28 +8,30 @@ use headrace_vehicle::VehicleConfig;
 use crate::kind::FileKind;
 use crate::taker::Taker;
 
-/// Why the lines of a file can't be routed to sensors. Messages name the options of `headrace import`.
+/// The lines of a file can't be routed to sensors. Messages name the options of `headrace import`.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum RoutingError {
-    /// A sensor is named that the vehicle file doesn't have.
+    /// An option names a sensor that the vehicle file doesn't have.
     #[error("--source {id}: the vehicle file has no such sensor; allowed are {allowed}")]
     NoSuchSensor {
         /// Its name.
         id: String,
-        /// The existing ones.
+        /// The ids of existing sensors.
         allowed: String,
     },
-    /// No sensor of the vehicle file could have received such a file's data.
-    #[error("the vehicle file has no sensor {which} to take it; --source ID={line} names one")]
+    /// No sensor of the vehicle file can receive such a file's data.
+    #[error("the vehicle file has no sensor {which} to receive the data; name one with --source ID={line}")]
     NoTaker {
-        /// Sensors that could.
+        /// Sensors that could receive it.
         which: String,
         /// Form of a line's name.
         line: &'static str,
     },
     /// Several sensors could be the file's only device.
-    #[error("the file is of one device, and {several} are of plugin {plugin}; --source ID={line} says which")]
+    #[error(
+        "the file comes from one device, but {several} have plugin {plugin}; choose one with --source ID={line}"
+    )]
     SeveralTakers {
         /// Their names.
         several: String,
@@ -38,25 +40,25 @@ pub enum RoutingError {
         /// Form of the line's name.
         line: &'static str,
     },
-    /// A file of values needs a vehicle file, whose sensors encode them, and there is none.
-    #[error("{format} wants --vehicle VEHICLE.toml, whose sensors' bytes its values become")]
+    /// A file of values is imported without a vehicle file, whose sensors must encode them.
+    #[error("{format} needs --vehicle VEHICLE.toml, whose sensors encode its values")]
     NoVehicle {
         /// The kind of file.
         format: &'static str,
     },
     /// Neither a vehicle file nor an option names a sensor.
-    #[error("which sensors are the messages of? --vehicle VEHICLE.toml says so, or --source ID={line}")]
+    #[error("the sensors of the messages are unknown; give --vehicle VEHICLE.toml or --source ID={line}")]
     NoSensor {
         /// Form of a line's name.
         line: &'static str,
     },
-    /// Lines are named, but the file has values.
+    /// An option names lines, but the file contains values.
     #[error("--source isn't for {format}; a mapping file names the sensors")]
     NoLines {
         /// The kind of file.
         format: &'static str,
     },
-    /// A line that the file doesn't have.
+    /// An option names a line that the file doesn't have.
     #[error("--source {id}={line}: such a file has one line, {only}")]
     NoSuchLine {
         /// The sensor.
@@ -66,7 +68,7 @@ pub enum RoutingError {
         /// The line that it has.
         only: &'static str,
     },
-    /// A sensor is named twice.
+    /// Options name a sensor twice.
     #[error("--source {id}: named twice; a sensor listens to one line")]
     Twice {
         /// Its name.
@@ -74,8 +76,9 @@ pub enum RoutingError {
     },
 }
 
-/// The sensors that receive lines: those of the vehicle file, or of `explicit`, pairs of a sensor's id and its line, which
-/// override the vehicle file's.
+/// The sensors that receive lines: those of the vehicle file, or those of `explicit`.
+///
+/// `explicit` has pairs of a sensor's id and its line, which override the vehicle file's.
 ///
 /// Errors: see [`RoutingError`].
 pub fn takers(
@@ -99,7 +102,7 @@ pub fn takers(
         let is_of_kind = kind == FileKind::Candump || config.plugin == kind.plugin();
         let usual = kind.usual_line(&config.connect).filter(|_| is_of_kind);
         let Some(stream) = own.or(usual.filter(|_| explicit.is_empty())) else { continue };
-        // All of a telemetry link is on one line; each device's driver picks out its own messages.
+        // One line carries the whole telemetry link; each device's driver picks out its own messages.
         let setup = DriverSetup { begun: MonoNs(0), head: None };
         let has_driver = kind == FileKind::Tlog && config.plugin == kind.plugin();
         takers.push(Taker { source, stream, driver: has_driver.then(|| device.driver(&setup)) });
@@ -120,7 +123,7 @@ pub fn takers(
     Ok(takers)
 }
 
-/// The log's sources where there is no vehicle file.
+/// The log's sources if there is no vehicle file.
 pub fn sources(kind: FileKind, explicit: &[(String, String)]) -> Vec<SourceInfo> {
     let source = |(id, _): &(String, String)| SourceInfo {
         id: id.clone(),

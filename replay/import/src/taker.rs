@@ -9,7 +9,7 @@ pub struct Taker {
     pub source: u16,
     /// The line that it receives.
     pub stream: String,
-    /// Picks the sensor's data from a shared line; without one, all of the line is the sensor's.
+    /// Picks the sensor's data from a shared line; without a driver, the whole line belongs to the sensor.
     pub driver: Option<Box<dyn Driver>>,
 }
 
@@ -32,7 +32,7 @@ impl Taker {
         self.stream == stream
     }
 
-    /// The sensor's packets from an entry.
+    /// Extracts the sensor's packets from an entry.
     pub(super) fn take(&mut self, at: MonoNs, bytes: &[u8]) -> Vec<(MonoNs, Vec<u8>)> {
         let mut heard = Heard(Vec::new());
         match &mut self.driver {

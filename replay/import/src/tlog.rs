@@ -13,10 +13,10 @@ pub struct TlogFormat {
     last_us: u64,
 }
 
-/// The line with all frames.
+/// Name of the line with all frames.
 pub const STREAM: &str = "mavlink";
 
-/// When resynchronising, an entry's time must be within a day of the last one's.
+/// Window for resynchronising: an entry's time must be within a day of the last one's.
 const DAY_US: u64 = 86_400_000_000;
 /// Times beyond 2106 are invalid, µs.
 const LATEST_US: u64 = 4_294_967_296_000_000;
@@ -54,6 +54,6 @@ impl Format for TlogFormat {
 impl TlogFormat {
     fn lost(&mut self) -> Step {
         self.astray = true;
-        Step::Lost(1, "no time and frame where one must be")
+        Step::Lost(1, "no time and frame where they are expected")
     }
 }

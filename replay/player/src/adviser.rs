@@ -1,4 +1,4 @@
-//! A loop as the adviser of a simulated pilot: the same one that the dive is then run through.
+//! Provides a loop as the adviser of a simulated pilot. The recorded dive is later run through the same loop.
 
 use headrace_geometry::time::{DurNs, MonoNs};
 use headrace_monitor::feed::work_off;
@@ -18,7 +18,7 @@ const TICK: DurNs = DurNs(20_000_000);
 /// Why a scene can't be simulated.
 #[derive(Debug, thiserror::Error)]
 pub enum SimulationError {
-    /// The scene contradicts itself.
+    /// The scene is inconsistent.
     #[error(transparent)]
     Scene(#[from] SceneError),
     /// The loop that advises the pilot can't be armed.
@@ -26,15 +26,18 @@ pub enum SimulationError {
     Adviser(#[from] PluginError),
 }
 
-/// A scene's simulation, with ground truth if `noting`. A pilot who heeds advice hears a loop of his own, armed by the scene's
-/// vehicle file.
+/// Simulates a scene, with ground truth if `noting`.
+///
+/// A pilot who follows advice gets a loop of his own, armed with the scene's vehicle file.
 ///
 /// Errors: see [`SimulationError`].
 pub fn simulation(scene: &Scene, noting: bool) -> Result<Simulation, SimulationError> {
     simulation_believing(scene, &scene.vehicle, noting)
 }
 
-/// The same; the pilot's loop believes another vehicle file, whose sensors must send the same bytes.
+/// Simulates a scene like [`simulation`], but arms the pilot's loop with another vehicle file.
+///
+/// The sensors of that file must send the same bytes.
 ///
 /// Errors: see [`SimulationError`].
 pub fn simulation_believing(
@@ -51,9 +54,9 @@ pub fn simulation_believing(
 
 struct LoopAdviser {
     dive: Loop,
-    /// None of a source whose port is in use elsewhere.
+    /// Ports by source; `None` where the port is in use elsewhere.
     ports: Vec<Option<Port>>,
-    /// End of the present tick.
+    /// End of the current tick.
     until: MonoNs,
     told: Vec<Told>,
 }
@@ -75,7 +78,7 @@ impl LoopAdviser {
     }
 }
 
-/// What a tick has told, if anything.
+/// Advice of the last tick, if any.
 fn told_by(dive: &Loop) -> Option<Told> {
     let last = dive.notices().iter().rev().find_map(|notice| match notice {
         Notice::Advice(entry) => Some(entry),

@@ -9,12 +9,12 @@ use headrace_geometry::time::MonoNs;
 
 use crate::log::{DiveLog, LogError, MessageKind};
 
-/// Least offset between two clocks; no dive lasts as long.
+/// Smallest offset between two clocks: no dive lasts this long.
 const YEAR_NS: u64 = 365 * 24 * 3600 * 1_000_000_000;
-/// Most clocks that are told apart; messages of others are no clock's.
+/// Maximum number of clocks that are distinguished; messages of further clocks are assigned to none.
 const MAX_CLOCKS: usize = 100;
 
-/// A clock, as the range of its timestamps; more than a year from any other clock's range.
+/// A clock, described by the range of its timestamps. It is more than a year from every other clock's range.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct Clock {
     from: MonoNs,
@@ -23,7 +23,7 @@ pub(crate) struct Clock {
 }
 
 impl Clock {
-    /// Whether a timestamp may be of this clock.
+    /// Whether a timestamp may come from this clock.
     pub(crate) fn is_of(&self, at: MonoNs) -> bool {
         (self.from.0.saturating_sub(YEAR_NS)..=self.to.0.saturating_add(YEAR_NS)).contains(&at.0)
     }
@@ -39,8 +39,9 @@ impl Clock {
     }
 }
 
-/// The clock of most source messages; `None` where there is only one clock. The log is read only if its chunk headers span
-/// more than a year.
+/// The clock with the most source messages; `None` if the log has only one clock.
+///
+/// The messages are read only if the chunk headers span more than a year.
 ///
 /// Errors: the log can't be read.
 pub(crate) fn of(files: &[PathBuf], times: Option<(MonoNs, MonoNs)>) -> Result<Option<Clock>, LogError> {
@@ -61,7 +62,7 @@ pub(crate) fn of(files: &[PathBuf], times: Option<(MonoNs, MonoNs)>) -> Result<O
     Ok(most.filter(|_| several))
 }
 
-/// Counts a message with its clock; `false` if that is one too many.
+/// Counts a message for its clock; `false` if there are too many clocks.
 fn count(clocks: &mut Vec<Clock>, at: MonoNs) -> bool {
     if let Some(clock) = clocks.iter_mut().find(|clock| clock.is_of(at)) {
         (clock.from, clock.to) = (clock.from.min(at), clock.to.max(at));
@@ -80,7 +81,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn times_years_apart_are_of_different_clocks() {
+    fn times_years_apart_belong_to_different_clocks() {
         let mut clocks = Vec::new();
         for at in [5, YEAR_NS * 50, 7, YEAR_NS * 50 + 9, YEAR_NS / 2, YEAR_NS * 4] {
             count(&mut clocks, MonoNs(at));
@@ -94,7 +95,7 @@ mod tests {
             count(&mut clocks, MonoNs(at * 3 * YEAR_NS));
         }
         assert_eq!(clocks.len(), MAX_CLOCKS);
-        // One too many doesn't stretch another over all time between them.
+        // A clock beyond the limit doesn't extend the range of another.
         assert!(!count(&mut clocks, MonoNs(YEAR_NS * 580)) && count(&mut clocks, MonoNs(8)));
         assert!(clocks.iter().all(|clock| clock.to.0 - clock.from.0 <= YEAR_NS));
     }

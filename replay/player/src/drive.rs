@@ -13,9 +13,9 @@ use crate::log::LogError;
 /// The next packet of a feed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Coming {
-    /// Receive time.
+    /// Time of receipt.
     pub at: MonoNs,
-    /// Source in the loop.
+    /// Number of the source in the loop.
     pub source: SourceId,
     /// Length, bytes.
     pub len: usize,
@@ -28,14 +28,14 @@ pub trait PacketSource {
     /// Errors: reading the log fails.
     fn coming(&mut self) -> Result<Option<Coming>, LogError>;
 
-    /// The first and the last time of its packets, where these are known.
+    /// First and last time of the packets, where known.
     fn span(&self) -> Option<(MonoNs, MonoNs)> {
         None
     }
 
-    /// Puts the next packet into its source's ring.
+    /// Puts the next packet into the ring of its source.
     ///
-    /// Errors: it doesn't fit and stays the next packet.
+    /// Errors: the packet doesn't fit; it remains the next packet.
     fn send(&mut self, port: &mut Port) -> Result<(), RingError>;
 }
 
@@ -68,7 +68,7 @@ pub enum DriveError {
         /// The source.
         source_id: String,
     },
-    /// Of loops that are to share one navigation.
+    /// The loops differ in more than their sections, and therefore can't share one navigation.
     #[error(
         "driving several loops with one navigation: loop {number}, counted from 0, has other sensors, another tunnel or layout than \
          loop 0, or systems of its own that place pings"
@@ -80,9 +80,9 @@ pub enum DriveError {
     /// A thread of the replay has panicked: a bug. The loop must not be used afterwards.
     #[error("driving the loop: the thread that {what} has panicked: {message}; please report it")]
     Panicked {
-        /// What the thread was for.
+        /// Task of the thread.
         what: &'static str,
-        /// What it said.
+        /// Panic message.
         message: String,
     },
 }
@@ -131,7 +131,7 @@ impl Feed for PacedFeed<'_> {
     }
 }
 
-/// Gives an outlet that is behind some time.
+/// Waits briefly so that a slow outlet can catch up.
 pub(crate) fn pause() {
     std::thread::sleep(Duration::from_millis(1));
 }
@@ -152,7 +152,8 @@ impl Driver {
         Ok(Self { ports: take_ports(dive)?, tick, until: None })
     }
 
-    /// End of the next tick; `None` at the end of the feed. After a gap in the feed the tick ends just after the next packet.
+    /// End of the next tick; `None` at the end of the feed. After a gap in the feed the tick ends just after the next
+    /// packet.
     ///
     /// Errors: reading the feed fails.
     pub fn due(&self, feed: &mut dyn PacketSource) -> Result<Option<MonoNs>, DriveError> {
@@ -177,7 +178,8 @@ impl Driver {
         Ok(())
     }
 
-    /// Feeds packets received before `until`; `work_off` runs a tick. On an error what has been fed is processed.
+    /// Feeds packets received before `until`; `work_off` runs a tick. On an error the packets fed so far have been
+    /// processed.
     pub(crate) fn fill(
         &mut self,
         feed: &mut dyn PacketSource,
@@ -192,13 +194,13 @@ impl Driver {
         sent
     }
 
-    /// Continues after a tick that ended at `until`, when feed and loop have jumped there.
+    /// Continues at `until` after feed and loop have both jumped there.
     pub fn jump_to(&mut self, until: MonoNs) {
         self.until = Some(until);
     }
 }
 
-/// The ports of the sensors, and of the operator's input unless an operator has it.
+/// Takes the ports of the sensors, and that of the operator's input unless an operator is connected.
 fn take_ports(dive: &mut Loop) -> Result<Vec<Port>, DriveError> {
     let ids: Vec<String> = dive.sources().iter().map(|source| source.id.clone()).collect();
     let sensors = ids.into_iter().enumerate();
@@ -216,7 +218,7 @@ fn send_until(
     until: MonoNs,
     work_off: &mut dyn FnMut(MonoNs),
 ) -> Result<(), DriveError> {
-    // Nothing is after the last moment of the clock: what comes at it belongs to the last tick.
+    // A packet stamped with the clock's last value belongs to the last tick, since nothing can follow it.
     let is_due = |coming: &Coming| coming.at < until || until == MonoNs(u64::MAX);
     while let Some(coming) = feed.coming()?.filter(is_due) {
         let Some(port) = ports.get_mut(coming.source.index()) else { continue };

@@ -1,5 +1,7 @@
-//! headrace's dive logs: the recorder and the reader, the driver that feeds a loop from a log or a simulation, playback,
-//! and verification, smoothing and viewer output of a recorded dive.
+//! Recording, reading and replaying dive logs.
+//!
+//! Contains the recorder and the log reader, the driver that feeds a loop from a log or a simulation, playback, and
+//! verification, smoothing and viewer output of a recorded dive.
 
 mod adviser;
 mod clocks;

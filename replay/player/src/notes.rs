@@ -1,4 +1,4 @@
-//! Notes and voices in a log, read without a replay.
+//! Reads notes and voice notes from a log without a replay.
 
 use std::collections::BTreeMap;
 use std::path::PathBuf;
@@ -14,16 +14,17 @@ use crate::log::voice::decode;
 use crate::log::{DiveLog, LogError, LogMessage, MessageKind};
 use crate::results::{read_results, stream_of};
 
-/// What a log has of notes.
+/// The notes and voice notes in a log.
 #[derive(Debug, Default)]
 pub struct LoggedNotes {
-    /// The notes, as a replay would number them. Their places are those that the dive published: none in a log without results.
+    /// The notes, numbered as in a replay. Their chainages come from the dive's results; a log without results has
+    /// none.
     pub notes: Vec<NoteJson>,
     /// Seconds, container and bytes of the recordings, by id.
     pub voices: BTreeMap<u32, (u32, Container, usize)>,
-    /// Messages that should be recordings and aren't: what is wrong with each.
+    /// For each voice message that can't be decoded, its error.
     pub wrong: Vec<String>,
-    /// What of the log is lost, as text.
+    /// Losses of the log, as text.
     pub losses: Vec<String>,
 }
 
@@ -55,9 +56,9 @@ pub fn notes_of(files: &[PathBuf]) -> Result<LoggedNotes, LogError> {
     Ok(found)
 }
 
-/// Hands over all recordings in a log, in order.
+/// Passes every voice recording in a log to `take`, in order.
 ///
-/// Errors: the log can't be read; those of `take`.
+/// Errors: the log can't be read; errors of `take`.
 pub fn each_voice<E: From<LogError>>(
     files: &[PathBuf],
     mut take: impl FnMut(Voice) -> Result<(), E>,
@@ -74,7 +75,7 @@ pub fn each_voice<E: From<LogError>>(
 }
 
 impl LoggedNotes {
-    /// Takes a command of the operator.
+    /// Processes a command of the operator.
     fn hear(&mut self, message: &LogMessage<'_>) {
         let (by, text, voice) = match Command::parse(message.data) {
             Ok(Command::Note { text, by }) => (by, text.as_str().to_owned(), None),
@@ -112,7 +113,7 @@ impl LoggedNotes {
     }
 }
 
-/// Takes the places of notes from a message of results.
+/// Reads the chainages of notes from a message of results.
 fn place(message: &[u8], places: &mut BTreeMap<u32, f64>) {
     let Some((_, _, words)) = read_results(message) else { return };
     let mut rest = words.as_slice();
@@ -121,7 +122,7 @@ fn place(message: &[u8], places: &mut BTreeMap<u32, f64>) {
         if let (Some(RecordKind::Note | RecordKind::Voice), [_, number, chainage, ..]) =
             (record.kind, record.words)
         {
-            // 0 stands for none.
+            // 0 means that the chainage is unknown.
             let chainage_m = Some(f64::from_bits(*chainage)).filter(|chainage_m| *chainage_m != 0.0);
             if let (Ok(number), Some(chainage_m)) = (u32::try_from(*number), chainage_m) {
                 places.insert(number, chainage_m);

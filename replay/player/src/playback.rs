@@ -13,7 +13,7 @@ use crate::log::LogError;
 use crate::player::Player;
 use crate::snapshot_store::SnapshotStore;
 
-/// Parts of a snapshot: the player's place in the log, then the loop's state.
+/// Names of the two parts of a snapshot: the player's place in the log, and the loop's state.
 const PLACE_PART: &str = "place in the log";
 
 /// A command to playback; commands are executed in order.
@@ -21,15 +21,15 @@ const PLACE_PART: &str = "place in the log";
 pub enum PlaybackCommand {
     /// Pauses between two ticks.
     Pause,
-    /// Plays on.
+    /// Resumes playing.
     Go,
     /// Runs this many ticks, then pauses.
     Step(u32),
-    /// Plays on until a section is judged, then pauses.
+    /// Plays until a section is judged, then pauses.
     StepSection,
     /// Sets the speed: seconds of the dive per second of wall time, or `None` for as fast as possible.
     Speed(Option<f64>),
-    /// Jumps to a time on the log's clock, forwards or back; stays playing or paused.
+    /// Jumps to a time on the log's clock, forward or back, and stays playing or paused.
     Seek(MonoNs),
     /// Jumps by a duration, back if negative.
     Skip(DurNs),
@@ -54,16 +54,16 @@ pub enum PlaybackError {
 
 /// Shows playback to its user.
 pub trait PlaybackObserver {
-    /// After a tick that is played.
+    /// Called after each tick that is played.
     fn after_tick(&mut self, dive: &Loop);
 
-    /// After a tick on the way of a jump: its notices aren't shown.
+    /// Called after a tick that a jump skips; its notices aren't shown.
     fn after_skipped_tick(&mut self, dive: &Loop);
 
     /// Called when paused, after a jump, or with `ended` at the end of the log; `at` is the end of the last tick.
     fn stopped(&mut self, dive: &Loop, at: MonoNs, ended: bool);
 
-    /// Called when it begins to stand still or to play, and when the speed changes.
+    /// Called when playback pauses or resumes, and when its speed changes.
     fn mode(&mut self, _paused: bool, _speed: Option<f64>) {}
 }
 
@@ -90,15 +90,17 @@ enum Mode {
     Paused,
     /// Ticks left to run before it pauses.
     Stepping(u32),
-    /// Until a section is judged.
+    /// Plays until a section is judged.
     SteppingSection,
 }
 
 impl<'a> Playback<'a> {
-    /// Playback of a log from its beginning; the player is connected with the loop. A snapshot goes into the store
-    /// whenever its interval of work has passed since the last one, so that no jump takes much longer than that.
+    /// Creates a playback that starts at the beginning of the log; the player is already connected to the loop.
     ///
-    /// Errors: the log can't be read, or the first snapshot not taken.
+    /// A snapshot is stored whenever its interval of work has passed since the last one. No jump therefore takes much
+    /// longer than that interval.
+    ///
+    /// Errors: the log can't be read, or the first snapshot can't be taken.
     pub fn new(
         dive: &'a mut Loop,
         player: &'a mut Player,
@@ -129,7 +131,7 @@ impl<'a> Playback<'a> {
         self.begun
     }
 
-    /// Plays until [`PlaybackCommand::End`], or until the log has ended and no command can come any more.
+    /// Plays until [`PlaybackCommand::End`], or until the log has ended and the command channel is closed.
     ///
     /// Errors: see [`PlaybackError`].
     pub fn play(
@@ -141,7 +143,7 @@ impl<'a> Playback<'a> {
             let due = self.driver.due(self.player)?;
             let command = match due {
                 None => {
-                    // Steps left over at the end are discarded, also for a jump back.
+                    // Steps left over at the end are discarded, so that a jump back doesn't run them.
                     if let Mode::Stepping(_) | Mode::SteppingSection = self.mode {
                         self.mode = Mode::Paused;
                     }
@@ -162,11 +164,11 @@ impl<'a> Playback<'a> {
         }
     }
 
-    /// Waits until a tick is due, or while paused; returns a command that arrives before.
+    /// Waits until a tick is due or, if paused, for a command. Returns a command that arrives earlier.
     fn wait(&mut self, until: MonoNs, commands: &Receiver<PlaybackCommand>) -> Option<PlaybackCommand> {
         match self.mode {
             Mode::Paused => {
-                // When no command can come any more, it plays on to the end.
+                // With the command channel closed, it plays to the end.
                 let command = commands.recv().ok();
                 if command.is_none() {
                     (self.mode, self.clock) = (Mode::Playing, Clock::start(self.now, self.speed));
@@ -174,7 +176,7 @@ impl<'a> Playback<'a> {
                 command
             }
             Mode::Stepping(_) => None,
-            // It may take long.
+            // The next judged section may be far away, so commands are checked without waiting.
             Mode::SteppingSection => commands.try_recv().ok(),
             Mode::Playing => match self.clock.left(until) {
                 None => commands.try_recv().ok(),
@@ -274,8 +276,7 @@ impl<'a> Playback<'a> {
         Ok(())
     }
 
-    /// Jumps to the last tick that ends at or before `to`: from here, or from the latest snapshot before it where that is
-    /// nearer.
+    /// Jumps to the last tick that ends at or before `to`, from here or from the nearest earlier snapshot.
     ///
     /// Errors: see [`PlaybackError`].
     pub fn seek(&mut self, to: MonoNs, observer: &mut dyn PlaybackObserver) -> Result<(), PlaybackError> {

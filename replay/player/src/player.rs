@@ -17,21 +17,21 @@ use crate::log::{DiveLog, DivePlace, LogError, LogInfo, Loss, MessageKind, PartF
 /// Plays the source messages of a log.
 pub struct Player {
     reader: DiveLog,
-    /// For each source of the log, the loop's source of that name.
+    /// For each source of the log, the loop's source with that name.
     sources: Vec<Option<SourceId>>,
     ids: Vec<String>,
     next: Option<Coming>,
     bytes: Vec<u8>,
     order: u64,
     played: u64,
-    /// Messages of sources that the vehicle file doesn't have, by the source's name.
+    /// Number of messages by source id, for sources that the vehicle file doesn't have.
     unmatched: BTreeMap<String, u64>,
     too_long: u64,
-    /// The clock of most messages, where the log has several.
+    /// The clock with the most messages, if the log has several clocks.
     clock: Option<Clock>,
-    /// Messages stamped by another clock, by the source's name: count and first timestamp.
+    /// Messages stamped by another clock, by source id: count and first timestamp.
     astray: BTreeMap<String, (u64, MonoNs)>,
-    /// The farthest place that was left by a jump, in messages, and the losses up to there.
+    /// The farthest place from which a jump started, in messages, and the losses up to there.
     farthest: (u64, Vec<String>),
 }
 
@@ -76,8 +76,9 @@ impl Player {
         self.reader.header()
     }
 
-    /// Matches the log's sources with the loop's, by name; the operator's input comes after the sensors. Until then every message
-    /// counts as unmatched.
+    /// Matches the log's sources with the loop's by name; the operator's input comes after the sensors.
+    ///
+    /// Before this call every message counts as unmatched.
     pub fn connect(&mut self, sources: &[SourceInfo]) {
         let find = |id: &String| {
             let sensor = sources.iter().position(|source| source.id == *id);
@@ -100,8 +101,10 @@ impl Player {
         }
     }
 
-    /// Continues from a position of this or another player of the same log and vehicle. Losses are counted as if
-    /// the log had been played straight through; those found behind the place stay told until it is passed again.
+    /// Continues from a position of this or another player of the same log and vehicle.
+    ///
+    /// Losses are counted as if the log had been played straight through. Losses found beyond the place remain reported
+    /// until playback passes them again.
     ///
     /// Errors: the log can't be read there.
     pub fn go_to(&mut self, place: &PlayerPlace) -> Result<(), LogError> {
@@ -129,13 +132,13 @@ impl Player {
         self.played
     }
 
-    /// Losses and omissions so far, as text: who goes back to before damage knows of it all the same.
+    /// Losses and omissions so far, as text, including those found before a jump back.
     pub fn losses(&self) -> Vec<String> {
         let (order, losses) = &self.farthest;
         if *order > self.order { losses.clone() } else { self.losses_here() }
     }
 
-    /// Losses and omissions from the beginning to here.
+    /// Losses and omissions from the beginning to the current place.
     fn losses_here(&self) -> Vec<String> {
         let mut all: Vec<String> = self.reader.losses().iter().map(Loss::to_string).collect();
         for (id, count) in &self.unmatched {
@@ -146,21 +149,21 @@ impl Player {
         }
         if self.reader.late() > 0 {
             all.push(format!(
-                "{} messages out of order by more than can be held, taken where they stand",
+                "{} messages out of order by more than can be held, delivered in file order",
                 self.reader.late()
             ));
         }
         let clock = self.clock.iter().flat_map(|clock| self.astray.iter().map(move |found| (clock, found)));
         for (clock, (id, (count, first))) in clock {
             all.push(format!(
-                "{count} messages of source {id:?} left out: they are stamped by another clock, {} the one of most messages",
+                "{count} messages of source {id:?} left out: they are stamped by another clock, {} that of most messages",
                 clock.distance(*first)
             ));
         }
         all
     }
 
-    /// Oddities found so far and how they were handled, as text; nothing was lost by them.
+    /// Anomalies found so far and how they were handled, as text. Nothing was lost because of them.
     pub fn notes(&self) -> Vec<String> {
         let note = |(topic, ids): (String, Vec<u16>)| {
             let ids: Vec<String> = ids.iter().map(u16::to_string).collect();
@@ -210,7 +213,7 @@ impl PacketSource for Player {
 
     fn send(&mut self, port: &mut Port) -> Result<(), RingError> {
         let Some(coming) = self.next else { return Ok(()) };
-        // Our own logs are in the order of consumption by the loop, others' in time order.
+        // The program's own logs are in the loop's order of consumption, those of other writers in time order.
         let order = if self.reader.has_ticks() { self.order } else { NO_ORDER };
         port.send_in_order(coming.at, order, &self.bytes)?;
         self.order += 1;

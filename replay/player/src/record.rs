@@ -16,30 +16,30 @@ use crate::log::{RecorderPort, ResultChannel};
 use crate::results::{HEAD_WORDS, STREAMS};
 use crate::view;
 
-/// Free bytes that the recorder's queue needs for the largest tick: packets, their headers, and their order.
+/// Free bytes that the recorder's queue needs for the largest tick: packets, packet headers, and packet order.
 const LARGEST_TICK_BYTES: usize = MAX_TICK_BYTES + MAX_TICK_PACKETS * 64 + 4096;
 
-/// In a dive on ports a tick takes this part of the room that there is: packets of some ten bytes take a few times as much in the
-/// queue, with their results.
+/// In a dive on ports, a tick may take the free room divided by this. Short packets take several times their length in
+/// the queue, together with their results.
 const SMALLER_TICK: usize = 8;
-/// ... but not less: the longest packet of a port is some KiB.
+/// Minimum room that a tick in a dive on ports may take: the longest packet of a port is some KiB.
 const MIN_TICK_BYTES: usize = 8 * 1024;
 
-/// Buffer for a tick's results of one stream, bytes; beyond it they are recorded in part.
+/// Buffer for one stream's results of a tick, bytes; results beyond it are recorded in part.
 const MAX_RESULT_BYTES: usize = 1 << 19;
 
 /// Size of a recorder's queue, bytes.
 pub const QUEUE_BYTES: usize = 4 * LARGEST_TICK_BYTES;
 
-/// Size of a recorder's queue in a dive on ports, bytes: some minutes of four heads and all else, for a medium that takes nothing
-/// for so long.
+/// Size of a recorder's queue in a dive on ports, bytes. It holds some minutes of a vehicle with four heads while the
+/// medium takes nothing.
 pub const QUEUE_OF_PORTS_BYTES: usize = 16 * LARGEST_TICK_BYTES;
 
 /// The stream with a record per echo.
 const ECHOES: &str = "pings";
 /// Message encoding of a stream: see [`crate::results`].
 const ENCODING: &str = "headrace-trail";
-/// The channels of a loop's results: the streams, then those of the viewers.
+/// The channels of a loop's results: the streams first, then those of the viewers.
 pub fn result_channels() -> Vec<ResultChannel> {
     let channel = |name: &&str| ResultChannel {
         topic: format!("{RESULT_PREFIX}{name}"),
@@ -52,8 +52,9 @@ pub fn result_channels() -> Vec<ResultChannel> {
     STREAMS.iter().map(channel).chain(view::channels()).collect()
 }
 
-/// The results of a loop's last tick as messages of the channels, by number, for a [`crate::log::DerivedChannels`]; of a loop
-/// that keeps its results. Allocates: for outlets, between ticks.
+/// The results of a loop's last tick as messages with channel numbers, for a [`crate::log::DerivedChannels`].
+///
+/// The loop must keep its results. Allocates, so it is only for outlets between ticks.
 pub fn result_messages(dive: &Loop) -> Vec<(u16, Vec<u8>)> {
     let streams = (0..).zip(dive.digests().streams());
     let filled = streams.filter(|(_, (_, trail))| !trail.words().is_empty());
@@ -65,26 +66,30 @@ pub fn result_messages(dive: &Loop) -> Vec<(u16, Vec<u8>)> {
     filled.map(message).collect()
 }
 
-/// Records every packet that the loop consumes, in the order of consumption, every tick, and every result, with one recorder or
-/// several.
+/// Records every packet that the loop consumes, every tick and every result, with one or several recorders.
 ///
-/// When a recorder's queue has no room for another largest tick the loop consumes nothing until it has: recorded input is never
-/// dropped. A dive on ports doesn't wait ([`RecorderOutlet::of_ports`]). If the recorders' threads have ended the dive
-/// goes on unrecorded; their handles return the errors.
+/// Packets are recorded in the order of consumption. If a recorder's queue has no room for another largest tick, the
+/// loop consumes nothing until there is room: recorded input is never dropped. A dive on ports doesn't wait
+/// ([`RecorderOutlet::of_ports`]). If the recorders' threads have ended, the dive continues unrecorded; their handles
+/// return the errors.
 pub struct RecorderOutlet {
     ports: Cell<Vec<RecorderPort>>,
     is_of_ports: bool,
 }
 
 impl RecorderOutlet {
-    /// With the loop's ends of recorders, whose queues have [`QUEUE_BYTES`]. The outlet can be added to one loop.
+    /// Creates the outlet from the loop's ends of recorders, whose queues have [`QUEUE_BYTES`].
+    ///
+    /// The outlet can be added to one loop.
     pub fn new(ports: impl IntoIterator<Item = RecorderPort>) -> Self {
         Self { ports: Cell::new(ports.into_iter().collect()), is_of_ports: false }
     }
 
-    /// For a dive on ports, whose pilot must not be left without advice because a medium takes nothing: waits for no recorder.
-    /// One whose queue is full skips ticks, tells it ([`RecordingEvent::Behind`](crate::log::RecordingEvent)), and states them in
-    /// its log.
+    /// Makes the outlet never wait for a recorder, for a dive on ports: a blocked medium must not cost the pilot
+    /// advice.
+    ///
+    /// A recorder whose queue is full skips ticks, reports it ([`RecordingEvent::Behind`](crate::log::RecordingEvent)),
+    /// and states them in its log.
     #[must_use]
     pub fn of_ports(self) -> Self {
         Self { is_of_ports: true, ..self }
@@ -98,7 +103,7 @@ struct Recording {
     order: Vec<u16>,
     /// Buffer for a stream's message.
     message: Vec<u8>,
-    /// Records of each stream up to the previous tick.
+    /// Number of records of each stream up to the previous tick.
     records: [u64; STREAMS.len()],
 }
 
@@ -132,10 +137,10 @@ fn record(
     let (count, bytes) = packets.fold((0, 0), |(count, sum), bytes| (count + 1, sum + bytes));
     let needed = bytes + RecorderPort::tick_entry_bytes(count);
     for port in ports.iter_mut().filter(|port| !port.is_closed()) {
-        // One that is behind begins again with some room, not with each small tick that would fit.
+        // A recorder that is behind resumes once there is ample room, rather than with each small tick that would fit.
         let needed = if port.is_behind() { needed.max(port.capacity_bytes() / 4) } else { needed };
         if count > 0 && port.vacant_bytes() < needed {
-            // Only in a dive on ports: else the allowance has reserved it.
+            // Only happens in a dive on ports; otherwise the allowance has reserved the room.
             port.skip(time.now, count as u64);
             continue;
         }
@@ -149,14 +154,14 @@ fn record(
     inbox.allowance_bytes = allowance_bytes(open, *is_of_ports);
 }
 
-/// How much the next tick may take.
+/// Bytes that the next tick may take.
 fn allowance_bytes<'a>(open: impl Iterator<Item = &'a RecorderPort>, is_of_ports: bool) -> usize {
     let rooms = open.filter(|port| !is_of_ports || !port.is_behind()).map(RecorderPort::vacant_bytes);
     let room = if is_of_ports { rooms.max() } else { rooms.min() };
     match room {
         Some(room) if room < LARGEST_TICK_BYTES && is_of_ports => (room / SMALLER_TICK).max(MIN_TICK_BYTES),
         Some(room) if room < LARGEST_TICK_BYTES => 0,
-        // Nothing is recorded, or all is skipped.
+        // There is no open recorder, or all of them skip ticks.
         Some(_) | None => MAX_TICK_BYTES,
     }
 }
@@ -165,7 +170,7 @@ fn allowance_bytes<'a>(open: impl Iterator<Item = &'a RecorderPort>, is_of_ports
 fn record_tick(port: &mut RecorderPort, inbox: &Inbox, time: &TickTime, order: &mut Vec<u16>) {
     order.clear();
     for (source, packet) in inbox.iter() {
-        // There is room for all of this.
+        // The room for all of these entries has been checked above.
         if port.raw(source.0, packet.received, packet.received, packet.bytes).is_ok() {
             order.push(source.0);
         }
@@ -175,7 +180,9 @@ fn record_tick(port: &mut RecorderPort, inbox: &Inbox, time: &TickTime, order: &
     }
 }
 
-/// Records a tick's results. Those that don't fit are omitted, which their record numbers show; the input has priority.
+/// Records a tick's results.
+///
+/// Results that don't fit are omitted, since input has priority; gaps in the record numbers show the omission.
 fn record_results(
     port: &mut RecorderPort,
     results: &Digests,

@@ -1,26 +1,26 @@
-//! Opens files for reading, and nothing else: a pipe without a writer would wait for ever, a device may never end.
+//! Opens and reads regular files only. A pipe without a writer would block for ever, and a device may never end.
 
 use std::fs::File;
 use std::io::{Error, ErrorKind, Read, Result};
 use std::path::Path;
 
-/// Opens a file.
+/// Opens a regular file for reading.
 ///
-/// Errors: the system's; or it is a pipe, a device or a socket.
+/// Errors: those of the system; or the path is a pipe, a device or a socket.
 pub fn open(path: &Path) -> Result<File> {
     let kind = std::fs::metadata(path)?.file_type();
     if !kind.is_file() && !kind.is_dir() {
         return Err(Error::new(
             ErrorKind::InvalidInput,
-            "it is a pipe, a device or a socket; a file is wanted",
+            "it is a pipe, a device or a socket; a file is required",
         ));
     }
     File::open(path)
 }
 
-/// Reads a file of up to so many bytes.
+/// Reads a regular file of at most `most_bytes`.
 ///
-/// Errors: as for [`open`]; or it is longer.
+/// Errors: as for [`open`]; or the file is longer.
 pub fn read(path: &Path, most_bytes: u64) -> Result<Vec<u8>> {
     let mut bytes = Vec::new();
     open(path)?.take(most_bytes.saturating_add(1)).read_to_end(&mut bytes)?;
@@ -31,7 +31,7 @@ pub fn read(path: &Path, most_bytes: u64) -> Result<Vec<u8>> {
     Ok(bytes)
 }
 
-/// Reads a text of up to so many bytes.
+/// Reads a regular UTF-8 text file of at most `most_bytes`.
 ///
 /// Errors: as for [`read`]; or it isn't UTF-8.
 pub fn read_text(path: &Path, most_bytes: u64) -> Result<String> {
@@ -48,7 +48,7 @@ mod tests {
         let words = |result: Result<Vec<u8>>| result.unwrap_err().to_string();
         assert_eq!(
             words(read(Path::new("/dev/zero"), 10)),
-            "it is a pipe, a device or a socket; a file is wanted"
+            "it is a pipe, a device or a socket; a file is required"
         );
         let own = Path::new(env!("CARGO_MANIFEST_DIR")).join("Cargo.toml");
         assert!(words(read(&own, 10)).starts_with("it is longer than 10 bytes"));

@@ -8,13 +8,13 @@ pub(crate) const STREAMS: [&str; 6] = ["poses", "pings", "judgements", "advice",
 /// Words before a message's records.
 pub(crate) const HEAD_WORDS: usize = 2;
 
-/// The stream of results with that topic.
+/// Index of the stream with that topic.
 pub(crate) fn stream_of(topic: &str) -> Option<usize> {
     let name = topic.strip_prefix(RESULT_PREFIX)?;
     STREAMS.iter().position(|stream| *stream == name)
 }
 
-/// A message of a stream: the tick's index, the number of the first record, the words.
+/// Decodes a message of a stream: the tick's index, the number of the first record, and the words.
 pub(crate) fn read_results(message: &[u8]) -> Option<(u64, u64, Vec<u64>)> {
     let (words, rest) = message.as_chunks::<8>();
     let mut words = words.iter().map(|word| u64::from_le_bytes(*word));

@@ -11,7 +11,7 @@ use crate::log::LogError;
 
 /// A simulated dive as a source of packets; bytes sent to the devices are omitted.
 pub struct SimulationFeed {
-    /// The dive, as far as it has come.
+    /// The simulation, at its current point.
     pub simulation: Simulation,
 }
 

@@ -1,6 +1,6 @@
-//! Keeps the filter's steps on disk during a first replay, and smooths them from last to first for a second one.
+//! Stores the navigation filter's steps on disk during a first replay, then smooths them backwards for a second replay.
 //!
-//! They are too many for memory: an unlinked file holds them and disappears with the process.
+//! The steps don't fit in memory. An unlinked file holds them and disappears with the process.
 
 use std::fs::{File, OpenOptions};
 use std::io::{BufWriter, Read, Seek, SeekFrom, Write};
@@ -19,13 +19,14 @@ use headrace_monitor::run::Loop;
 use headrace_sensor::reading::MAX_SOURCES;
 use headrace_vehicle::VehicleConfig;
 
-/// Capacity of the queue of filter steps: a tick has a minute at most, with ten epochs a second and up to three steps each.
+/// Capacity of the queue of filter steps. A tick spans at most a minute, with ten epochs per second and up to three
+/// steps per epoch.
 const QUEUED: usize = 4096;
 /// Bytes per record.
 const RECORD: usize = 8 * WORDS;
 /// Records per read.
 const BLOCK: u64 = 256;
-/// File names to try.
+/// Number of file names to try.
 const NAMES: u32 = 1000;
 
 /// Why a dive could not be smoothed.
@@ -42,12 +43,12 @@ pub enum SmoothError {
         /// Cause.
         source: std::io::Error,
     },
-    /// The filter made steps faster than they were taken.
-    #[error("keeping the filter's steps: {lost} of a tick were lost; there is room for {queued}")]
+    /// The filter produced steps faster than they were stored.
+    #[error("keeping the filter's steps: {lost} steps of a tick were lost; a tick may have up to {queued}")]
     Lost {
         /// Steps lost.
         lost: u64,
-        /// Steps that a tick may have.
+        /// Queue capacity, steps.
         queued: usize,
     },
     /// A record read back isn't the one written.
@@ -58,7 +59,7 @@ pub enum SmoothError {
     },
 }
 
-/// The first of two replays: it navigates with the filter, and keeps the steps of the one that is smoothed.
+/// The first of two replays, which runs the filter and stores its steps for smoothing.
 pub struct FirstPass {
     settings: Settings,
     steps: Steps,
@@ -66,9 +67,10 @@ pub struct FirstPass {
 }
 
 impl FirstPass {
-    /// With the navigation that the replay is armed with. The file of steps is in the system's temporary folder.
+    /// Creates the first pass from the navigation that the replay is armed with. The file of steps is in the system's
+    /// temporary folder.
     ///
-    /// Errors: it can't be created.
+    /// Errors: the file can't be created.
     pub fn new(
         vehicle: &VehicleConfig,
         settings: Settings,
@@ -80,13 +82,13 @@ impl FirstPass {
         Ok((Self { settings, steps, consistency: [None; MAX_SOURCES] }, Box::new(navigation)))
     }
 
-    /// Takes what a tick brought; to be called after every tick.
+    /// Stores the steps of the last tick; must be called after every tick.
     pub fn after_tick(&mut self, dive: &Loop) {
         self.steps.take();
         self.consistency = core::array::from_fn(|source| dive.consistency(source));
     }
 
-    /// Smooths from the last step to the first; the second replay navigates along the result.
+    /// Smooths from the last step to the first. The second replay uses the returned navigation.
     ///
     /// Errors: a step was lost, or the file of steps couldn't be written or read.
     pub fn smooth(self) -> Result<(Box<dyn Navigation>, Changes), SmoothError> {
@@ -101,7 +103,7 @@ impl FirstPass {
     }
 }
 
-/// How much was smoothed.
+/// Size of the changes made by smoothing.
 #[derive(Debug, Clone, Copy)]
 pub struct Changes {
     estimates: u64,
@@ -109,14 +111,14 @@ pub struct Changes {
 }
 
 impl Changes {
-    /// Writes into the second replay's report what has changed since the first.
+    /// Adds the changes since the first replay to the second replay's report.
     pub fn complete(self, first: &Report, second: &mut Report) {
         let changes = smoothing_changes::compare(first, second, self.estimates, self.pieces);
         second.smoothing = Some(changes);
     }
 }
 
-/// Filter steps of a replay in progress.
+/// The stored filter steps of a replay in progress.
 struct Steps {
     journal: JournalReader,
     folder: PathBuf,
@@ -176,7 +178,7 @@ impl Steps {
     }
 }
 
-/// A new file in a folder, unlinked.
+/// Creates a new unlinked file in a folder.
 fn nameless(folder: &std::path::Path) -> std::io::Result<File> {
     let mut last = std::io::Error::other("no name is free");
     for number in 0..NAMES {

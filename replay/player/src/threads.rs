@@ -1,8 +1,8 @@
-//! Drives a loop from a log on several threads, or several loops with one navigation.
+//! Drives a loop from a log on several threads, or several loops that share one navigation.
 //!
-//! A thread reads, decodes, navigates and places pings, one advises, and the caller's does the rest; what one has done of some
-//! ticks goes to the next through a bounded queue. Each part works through the ticks in order and alone, so results are the same
-//! bit for bit on any number of threads: see [`headrace_monitor::split`].
+//! One thread reads, decodes, navigates and places pings, one advises, and the caller's thread does the rest. Bounded
+//! queues pass batches of ticks between them. Each stage processes all ticks in order, so results are identical bit for
+//! bit on any number of threads: see [`headrace_monitor::split`].
 
 use std::any::Any;
 use std::sync::Arc;
@@ -16,27 +16,27 @@ use headrace_sampling::advice::Advice;
 
 use crate::drive::{DriveError, Driver, Pace, PacketSource, drive, pause};
 
-/// Threads on which a loop can be driven: one places, one advises, one does the rest.
+/// Maximum number of threads on which a loop can be driven: placing, advising, and the rest.
 pub const MOST_THREADS: usize = 3;
 
-/// Ticks handed over at once: what a queue costs is paid once for some milliseconds of work.
+/// Ticks per batch: a queue operation is then needed only once for some milliseconds of work.
 const BATCH_TICKS: usize = 32;
-/// Batches that wait between two threads at most.
+/// Maximum number of batches waiting between two threads.
 const MOST_WAITING: usize = 4;
-/// Room for all batches that come back: those in two queues and in work.
+/// Room for all batches that can come back: those in two queues and those being processed.
 const MOST_UNUSED: usize = 2 * MOST_WAITING + MOST_THREADS;
 
-/// Ticks with their pings placed, and the advice at their beats.
+/// Ticks with their pings placed, and the advice at their updates.
 #[derive(Default)]
 struct Batch {
     ticks: Vec<PlacedTick>,
     advice: Vec<Vec<Advice>>,
-    /// How many ticks there are; the rest is room that is used again.
+    /// Number of ticks in use; the remaining elements are kept for reuse.
     len: usize,
 }
 
 impl Batch {
-    /// Room for the next tick.
+    /// An element for the next tick.
     fn next(&mut self) -> &mut PlacedTick {
         if self.len == self.ticks.len() {
             self.ticks.push(PlacedTick::default());
@@ -54,10 +54,10 @@ impl Batch {
     }
 }
 
-/// Runs the loop until the source ends, as fast as possible and on up to `threads` threads, of which one is the caller's;
-/// `after_tick` is called on that one after every tick. The results are those of [`drive`].
+/// Runs the loop until the source ends, as fast as possible, on up to `threads` threads including the caller's.
 ///
-/// On one thread, or with a plugin that has systems among those that place pings, it is [`drive`].
+/// `after_tick` is called on the caller's thread after every tick. The results equal those of [`drive`]. It calls
+/// [`drive`] for one thread, or if a plugin adds systems to those that place pings.
 ///
 /// Errors: see [`DriveError`]. Packets fed before the error have been processed, unless a thread has panicked.
 pub fn drive_on(
@@ -115,7 +115,7 @@ fn drive_parts(
             for (tick, advice) in batch.ticks.iter_mut().zip(&mut batch.advice).take(batch.len) {
                 run_tick(dive, &mut |dive| dive.tick_taken(tick, advice), after_tick);
             }
-            // The placer may have ended.
+            // Ignored: the placing thread may have ended.
             used.try_send(batch).ok();
         }
         beside.map_or(Ok(()), |beside| joined(beside, "advises"))?;
@@ -123,7 +123,7 @@ fn drive_parts(
     })
 }
 
-/// Runs the later stages of a tick; an outlet that is behind is given time.
+/// Runs the later stages of a tick; gives a slow outlet time.
 fn run_tick(dive: &mut Loop, tick: &mut dyn FnMut(&mut Loop) -> bool, after_tick: &mut dyn FnMut(&Loop)) {
     while !tick(dive) {
         after_tick(dive);
@@ -132,7 +132,7 @@ fn run_tick(dive: &mut Loop, tick: &mut dyn FnMut(&mut Loop) -> bool, after_tick
     after_tick(dive);
 }
 
-/// Places the pings of a source until it ends, or until nobody takes a batch any more; `unused` has batches to be filled anew.
+/// Places the pings of a source until it ends, or until the receiver is gone; `unused` returns batches for reuse.
 fn place(
     placer: &mut Placer,
     mut driver: Driver,
@@ -171,11 +171,12 @@ fn place(
     placed
 }
 
-/// Runs several loops until the source ends, as [`drive_on`] runs one, with the navigation of the first: packets are decoded and
-/// pings placed once. Each ends as it would have alone.
+/// Runs several loops until the source ends, with the navigation of the first loop.
 ///
-/// Errors: see [`DriveError`]; also loops that differ in anything but the target, the sections and what is asked of them. The
-/// navigation they were armed with, which can't be compared, must be the same.
+/// Packets are decoded and pings placed once. Each loop gives the results it would give alone.
+///
+/// Errors: see [`DriveError`]; also if loops differ in anything except the target, the sections and the requirements on
+/// them. They must be armed with the same navigation, which can't be checked.
 pub fn drive_together(
     threads: usize,
     dives: &mut [Loop],
@@ -232,7 +233,7 @@ fn drive_all(
             covering.push(scope.spawn(move || {
                 for batch in placed {
                     cover_all(&mut some, &batch);
-                    // The last one gives it back; the placer may have ended.
+                    // The last loop returns the batch. Ignored: the placing thread may have ended.
                     if let Some(batch) = Arc::into_inner(batch) {
                         used.try_send(batch).ok();
                     }
@@ -262,7 +263,7 @@ fn cover_all(dives: &mut [(&mut Loop, &mut Advising)], batch: &Batch) {
     }
 }
 
-/// What a thread has returned; its panic is an error.
+/// Returns the result of a thread; a panic becomes an error.
 pub(crate) fn joined<T>(thread: ScopedJoinHandle<'_, T>, what: &'static str) -> Result<T, DriveError> {
     thread.join().map_err(|panic| DriveError::Panicked { what, message: words_of(panic.as_ref()) })
 }

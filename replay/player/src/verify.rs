@@ -1,4 +1,4 @@
-//! Compares a live dive's published results with a replay of it, record by record and bit for bit.
+//! Compares a live dive's published results with those of its replay, record by record and bit for bit.
 
 use std::collections::VecDeque;
 use std::path::PathBuf;
@@ -10,7 +10,7 @@ use crate::log::format::RESULT_PREFIX;
 use crate::log::{DiveLog, LogError, MessageKind};
 use crate::results::{STREAMS, read_results, stream_of};
 
-/// Most memory of a stream's results that wait for the replay, bytes; a true log's are a tick ahead.
+/// Maximum memory of one stream's results that wait for the replay, bytes. In an intact log they are one tick ahead.
 const MOST_WAITING: usize = 16 << 20;
 
 /// Streams that older logs don't have.
@@ -25,7 +25,7 @@ pub struct Difference {
     pub stream: &'static str,
     /// Number of the record in its stream, from zero.
     pub record: u64,
-    /// The difference.
+    /// Kind of difference.
     pub what: What,
 }
 
@@ -36,7 +36,7 @@ pub enum What {
     Field {
         /// The kind of record.
         kind: RecordKind,
-        /// For a ping, the number of its source.
+        /// Number of the source, if the record is a ping.
         source: Option<u64>,
         /// The field.
         field: &'static str,
@@ -74,7 +74,7 @@ pub struct Verifier {
 #[derive(Default)]
 struct Stream {
     waiting: VecDeque<Batch>,
-    /// Memory of those.
+    /// Memory of the waiting batches, bytes.
     waiting_bytes: usize,
     /// Number of the replay's next record.
     next: u64,
@@ -128,9 +128,9 @@ impl Stream {
         }
     }
 
-    /// Adds a tick's results. When too many wait, the dive published what the replay doesn't have.
+    /// Adds a tick's results. If too many wait, the dive published results that the replay doesn't have.
     fn wait(&mut self, batch: Batch, name: &'static str) {
-        // Nothing is compared after a difference.
+        // Nothing is compared after the first difference.
         if self.difference.is_some() {
             return;
         }
@@ -159,12 +159,14 @@ pub struct Verified {
     pub unrecorded: u64,
     /// The first difference of each stream that has one, the earliest tick first.
     pub differences: Vec<Difference>,
-    /// Whether the log contains results to compare with.
+    /// Whether the log contains results to compare.
     pub has_results: bool,
 }
 
 impl Verifier {
-    /// For a log; reads it along with the replay, and holds in memory only the records between the two positions.
+    /// Opens a log for comparison.
+    ///
+    /// The log is read along with the replay; only the records between the two positions are held in memory.
     ///
     /// Errors: the log can't be read.
     pub fn open(log: &[PathBuf]) -> Result<Self, LogError> {
@@ -202,8 +204,8 @@ impl Verifier {
             if let Some(tick) = left {
                 stream.part(tick, name, What::Missing);
             }
-            // Logs of before the live state or the list of alerts was recorded have no channel for them; a log without any results isn't
-            // one of a live dive.
+            // Older logs have no channel for the live state or the alerts. A log without any results isn't the log of a
+            // live dive.
             let is_told = has_results && (has_channel(name) || !LATER.contains(&name));
             verified.same += stream.same;
             verified.unrecorded += stream.unrecorded;
@@ -213,7 +215,7 @@ impl Verifier {
         Ok(verified)
     }
 
-    /// Compares a record of the replay with the live dive's of the same number.
+    /// Compares a record of the replay with the live dive's record of the same number.
     fn compare(&mut self, number: usize, name: &'static str, record: Record<'_>) -> Result<(), LogError> {
         while self.streams.get(number).is_some_and(|stream| stream.waiting.is_empty()) && self.read()? {}
         // A truncated log ends before its dive did.
@@ -263,7 +265,7 @@ fn difference(live: Record<'_>, replayed: Record<'_>) -> Option<What> {
     let (Some(kind), true) =
         (live.kind, live.kind == replayed.kind && live.words.len() == replayed.words.len())
     else {
-        let name = |record: Record<'_>| record.kind.map_or("a kind that is not known", RecordKind::as_str);
+        let name = |record: Record<'_>| record.kind.map_or("an unknown kind", RecordKind::as_str);
         return Some(What::Kind { live: name(live), replayed: name(replayed) });
     };
     let place = live.words.iter().zip(replayed.words).position(|(live, replayed)| live != replayed)?;
@@ -312,7 +314,7 @@ mod tests {
     }
 
     #[test]
-    fn what_a_log_lacks_is_passed_over_by_its_number() {
+    fn records_missing_from_a_log_are_skipped_by_number() {
         let mut stream = Stream::default();
         let head = RecordKind::Run as u64 | (1 << 8);
         stream.wait(Batch { tick: 4, next: 0, words: vec![head, 7], at: 0 }, "poses");
@@ -327,7 +329,7 @@ mod tests {
     }
 
     #[test]
-    fn results_far_ahead_of_the_replay_are_a_difference_and_take_no_more_memory() {
+    fn results_far_ahead_of_the_replay_are_a_difference_in_bounded_memory() {
         let mut stream = Stream::default();
         let batch =
             |tick| Batch { tick, next: tick, words: vec![RecordKind::Run as u64 | 2047 << 8; 4096], at: 0 };

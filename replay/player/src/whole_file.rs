@@ -1,5 +1,6 @@
-//! Files that are there whole or not at all: written beside their place, and put there once they are complete and synced. What
-//! was there before stays until then, and for good where the writing fails.
+//! Writes files atomically: a file is complete at its path, or the previous file is unchanged.
+//!
+//! The content is written beside the destination and moved there once it is complete and synced.
 
 use std::fs::{File, Metadata, OpenOptions};
 use std::io::{BufWriter, Error, ErrorKind, Result, Seek, SeekFrom, Write};
@@ -7,32 +8,34 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU32, Ordering};
 use std::time::Duration;
 
-/// How long a named pipe is waited for that no process reads.
+/// How long to wait for a reader of a named pipe.
 const READER_WITHIN: Duration = Duration::from_secs(2);
 const READER_TRIES: u32 = 100;
 
-/// A file that is being written. Dropping it before [`WholeFile::complete`] leaves what was there before, and nothing else.
+/// A file that is being written. Dropping it before [`WholeFile::complete`] leaves the previous file unchanged.
 #[derive(Debug)]
 pub struct WholeFile {
     file: BufWriter<File>,
-    /// Where it belongs, and its name until then; `None` for what is written in its place.
+    /// Destination, and where the file is kept until then; `None` if the file is written in place.
     beside: Option<(PathBuf, Beside)>,
 }
 
-/// How a file is kept beside its place.
+/// How a file is kept beside its destination.
 #[derive(Debug)]
 enum Beside {
-    /// Under a name of its own.
+    /// Under a temporary name.
     Named(PathBuf),
-    /// Without a name: nothing is left behind, whatever ends the program.
+    /// Without a name, so that nothing is left behind however the program ends.
     Nameless,
 }
 
 impl WholeFile {
-    /// Begins a file that is to be at `path`, or where a link there leads. What can't be replaced is written in its place:
-    /// pipes, terminals and devices, and a file whose folder takes no other one.
+    /// Begins a file at `path`, or at the target of a link there.
     ///
-    /// Errors: the system's.
+    /// Pipes, terminals, devices, and files in a folder that accepts no new file can't be replaced; they are written in
+    /// place.
+    ///
+    /// Errors: those of the system.
     pub fn create(path: &Path) -> Result<Self> {
         let there = std::fs::metadata(path);
         if there.as_ref().is_ok_and(|there| !there.is_file()) {
@@ -56,15 +59,15 @@ impl WholeFile {
         Ok(Self { file: BufWriter::new(file), beside: None })
     }
 
-    /// Puts the file in its place. Once this returns it survives a power cut.
+    /// Moves the file to its destination. Once this returns, the file survives a power cut.
     ///
-    /// Errors: the system's; what was there before is there still.
+    /// Errors: those of the system; the previous file is then unchanged.
     pub fn complete(mut self) -> Result<()> {
         self.file.flush()?;
         let Some((place, beside)) = &mut self.beside else { return Ok(()) };
         self.file.get_ref().sync_all()?;
         if matches!(beside, Beside::Nameless) {
-            // What has no name can't replace a file at once.
+            // A file without a name can't replace another atomically.
             let name = name_beside(place);
             give_name(self.file.get_ref(), &name)?;
             *beside = Beside::Named(name);
@@ -74,7 +77,7 @@ impl WholeFile {
         }
         let folder = folder_of(place).to_owned();
         self.beside = None;
-        // Other systems don't open folders, and not every file system syncs them.
+        // Folders can't be opened on other systems, and not every file system can sync them.
         if cfg!(unix) {
             File::open(folder).and_then(|folder| folder.sync_all()).ok();
         }
@@ -82,9 +85,9 @@ impl WholeFile {
     }
 }
 
-/// Writes a whole file.
+/// Writes a file atomically.
 ///
-/// Errors: the system's; what was there before is there still.
+/// Errors: those of the system; the previous file is then unchanged.
 pub fn write(path: &Path, content: &[u8]) -> Result<()> {
     let mut file = WholeFile::create(path)?;
     file.write_all(content)?;
@@ -116,22 +119,22 @@ impl Drop for WholeFile {
     }
 }
 
-/// Whether a path is a named pipe, which opens only once somebody reads it.
+/// Whether a path is a named pipe. Opening one blocks until a process reads it.
 #[cfg(unix)]
 pub fn is_pipe(path: &Path) -> bool {
     use std::os::unix::fs::FileTypeExt as _;
     std::fs::metadata(path).is_ok_and(|there| there.file_type().is_fifo())
 }
 
-/// Whether a path is a named pipe: this system has none among its files.
+/// Whether a path is a named pipe; always false on this system.
 #[cfg(not(unix))]
 pub fn is_pipe(_: &Path) -> bool {
     false
 }
 
-/// Opens a named pipe for writing, once a process reads it.
+/// Opens a named pipe for writing once a process reads it.
 ///
-/// Errors: the system's; or nobody reads it within [`READER_WITHIN`].
+/// Errors: those of the system; or no process reads it within [`READER_WITHIN`].
 #[cfg(unix)]
 fn open_pipe(path: &Path) -> Result<File> {
     use rustix::fs::{Mode, OFlags, fcntl_setfl, open};
@@ -140,7 +143,7 @@ fn open_pipe(path: &Path) -> Result<File> {
     loop {
         match open(path, OFlags::WRONLY | OFlags::NONBLOCK | OFlags::CLOEXEC, Mode::empty()) {
             Ok(pipe) => {
-                // A slow reader is waited for.
+                // Writes block from here on, so that a slow reader gets everything.
                 fcntl_setfl(&pipe, OFlags::empty())?;
                 return Ok(pipe.into());
             }
@@ -164,7 +167,7 @@ fn open_pipe(path: &Path) -> Result<File> {
     File::create(path)
 }
 
-/// Begins a file beside its place: without a name where the system knows such files.
+/// Begins a file beside its destination, without a name where the system supports it.
 fn beside(place: &Path) -> Result<(File, Beside)> {
     if let Some(file) = nameless(folder_of(place)) {
         return Ok((file, Beside::Nameless));
@@ -173,7 +176,9 @@ fn beside(place: &Path) -> Result<(File, Beside)> {
     Ok((OpenOptions::new().write(true).create_new(true).open(&name)?, Beside::Named(name)))
 }
 
-/// A file without a name, which can be given one; `None` where file system or kernel have none, or `/proc` isn't there.
+/// Creates an unlinked file that can be given a name later.
+///
+/// `None` if the file system, the kernel or a missing `/proc` doesn't allow it.
 #[cfg(target_os = "linux")]
 fn nameless(folder: &Path) -> Option<File> {
     use rustix::fs::{CWD, Mode, OFlags, openat};
@@ -182,26 +187,26 @@ fn nameless(folder: &Path) -> Option<File> {
     path_of(&file).exists().then_some(file)
 }
 
-/// A file without a name; `None`, since this system has none.
+/// Creates an unlinked file; `None` on this system.
 #[cfg(not(target_os = "linux"))]
 fn nameless(_: &Path) -> Option<File> {
     None
 }
 
-/// Gives a file without a name one.
+/// Gives an unlinked file a name.
 #[cfg(target_os = "linux")]
 fn give_name(file: &File, name: &Path) -> Result<()> {
     use rustix::fs::{AtFlags, CWD, linkat};
     Ok(linkat(CWD, path_of(file), CWD, name, AtFlags::SYMLINK_FOLLOW)?)
 }
 
-/// Gives a file without a name one: there is none.
+/// Gives an unlinked file a name; never called on this system.
 #[cfg(not(target_os = "linux"))]
 fn give_name(_: &File, _: &Path) -> Result<()> {
     Err(ErrorKind::Unsupported.into())
 }
 
-/// An open file among the process's own.
+/// Path of an open file among the process's file descriptors.
 #[cfg(target_os = "linux")]
 fn path_of(file: &File) -> PathBuf {
     use std::os::fd::AsRawFd as _;
@@ -213,20 +218,20 @@ pub(crate) fn folder_of(path: &Path) -> &Path {
     path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."))
 }
 
-/// What a file is besides its names: its device and its number there; `None` where the system has none.
+/// Identity of a file: device number and inode number; `None` where the system has none.
 #[cfg(unix)]
 pub fn number_of(file: &Metadata) -> Option<(u64, u64)> {
     use std::os::unix::fs::MetadataExt as _;
     Some((file.dev(), file.ino()))
 }
 
-/// What a file is besides its names: its device and its number there; `None` where the system has none.
+/// Identity of a file: device number and inode number; `None` on this system.
 #[cfg(not(unix))]
 pub fn number_of(_: &Metadata) -> Option<(u64, u64)> {
     None
 }
 
-/// A new name beside a file's, that no folder of logs is read with.
+/// A temporary name beside a file. Readers of log folders ignore it.
 fn name_beside(place: &Path) -> PathBuf {
     static COUNT: AtomicU32 = AtomicU32::new(0);
     let mut name = place.file_name().unwrap_or_default().to_owned();
@@ -235,7 +240,7 @@ fn name_beside(place: &Path) -> PathBuf {
     place.with_file_name(name)
 }
 
-/// Whether a folder takes no further file, while one that is in it may still be written.
+/// Whether an error means that a folder accepts no new file, although an existing file may still be writable.
 fn is_refused(kind: ErrorKind) -> bool {
     use ErrorKind::{InvalidFilename, PermissionDenied, ReadOnlyFilesystem};
     matches!(kind, InvalidFilename | PermissionDenied | ReadOnlyFilesystem)
@@ -260,7 +265,7 @@ mod tests {
     }
 
     #[test]
-    fn what_was_there_stays_until_the_new_file_is_complete() {
+    fn previous_file_remains_until_the_new_one_is_complete() {
         let folder = folder("stays");
         let path = folder.join("report.json");
         write(&path, b"old").unwrap();
@@ -268,7 +273,7 @@ mod tests {
         file.write_all(b"new").unwrap();
         file.flush().unwrap();
         assert_eq!(std::fs::read(&path).unwrap(), b"old");
-        // A program that is killed now leaves nothing behind.
+        // With an unlinked file, a killed program leaves nothing behind.
         if nameless(&folder).is_some() {
             assert_eq!(names(&folder), ["report.json"]);
         }
@@ -287,7 +292,7 @@ mod tests {
 
     #[cfg(unix)]
     #[test]
-    fn links_and_permissions_stay_and_devices_are_written_to() {
+    fn links_and_permissions_are_kept_and_devices_written_in_place() {
         use std::os::unix::fs::{PermissionsExt as _, symlink};
         let folder = folder("links");
         let (path, link) = (folder.join("real.json"), folder.join("link.json"));
@@ -311,7 +316,7 @@ mod tests {
         mknodat(CWD, &pipe, FileType::Fifo, Mode::RUSR | Mode::WUSR, 0).unwrap();
         let error = write(&pipe, b"new").unwrap_err();
         assert_eq!(error.to_string(), "it is a pipe that no process has read within 2 s");
-        // More than a pipe holds, to a reader that comes later and is slow.
+        // The content exceeds a pipe's capacity, and the reader starts late and reads slowly.
         let content: Vec<u8> = (0..=255).cycle().take(200_000).collect();
         let read = {
             let pipe = pipe.clone();

@@ -1,8 +1,8 @@
-//! What each effect of a scene is worth: what it costs, and what leaving it out changes in the loop's results.
+//! Measures for each effect of a scene its computing cost, and the change in the loop's results if it is left out.
 //!
-//! The same dives are dived with and without an effect, seed by seed. Effects draw each from its own random numbers, so that the
-//! two dives of a seed differ by what the effect does and by nothing else; the mean difference over seeds has a confidence
-//! interval of 95 %, by Student's t.
+//! The same dives are simulated with and without an effect, seed by seed. Each effect draws from its own random
+//! numbers, so the two dives of a seed differ only by the effect. The mean difference over seeds has a 95 % confidence
+//! interval by Student's t.
 
 mod error;
 mod figures;
@@ -15,57 +15,58 @@ pub use error::WorthError;
 use figures::Figures;
 pub use mean::Mean;
 
-/// An effect matters unless the whole interval of what leaving it out changes in D is within this, m.
+/// Largest change of D, m, that counts as negligible; the whole confidence interval must be within it.
 pub const HOLE_LIMIT_M: f64 = 0.01;
-/// The same for the metres passed, as a share of the way.
+/// Largest change of the passed length that counts as negligible, as a share of the coverage extent.
 pub const PASSED_LIMIT: f64 = 0.01;
 
-/// What leaving effects out does to a scene.
+/// Result of leaving effects out of a scene.
 #[derive(Debug, Clone, PartialEq)]
 pub struct LeftOut {
     /// The effects left out.
     pub effects: Vec<&'static str>,
-    /// What they cost, ns of the processor for each return of a head.
+    /// Their cost, ns of processor time per sonar return.
     pub price_ns: Mean,
-    /// D without them less D with them, mean of the sections, m.
+    /// D without them minus D with them, mean over the sections, m.
     pub hole_m: Mean,
-    /// Metres passed without them less those with them, as a share of the way.
+    /// Metres passed without them minus metres passed with them, as a share of the coverage extent.
     pub passed: Mean,
 }
 
-/// Worth of a scene's effects.
+/// Cost and influence of a scene's effects.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Worth {
-    /// Seeds that were dived.
+    /// Number of seeds.
     pub seeds: usize,
-    /// Length of the way that was judged, m, and what was passed of it with all effects, a share.
+    /// Length of the tunnel that was judged, m.
     pub way_m: f64,
-    /// Metres passed with all effects, as a share of the way.
+    /// Metres passed with all effects, as a share of the coverage extent.
     pub passed: Mean,
-    /// D with all effects, mean of the sections, m.
+    /// D with all effects, mean over the sections, m.
     pub hole_m: Mean,
-    /// What simulating costs with all effects, ns for each return of a head.
+    /// Cost of the simulation with all effects, ns per sonar return.
     pub all_ns: Mean,
-    /// Each effect left out alone, the dearest first.
+    /// Each effect left out alone, the most expensive first.
     pub each: Vec<LeftOut>,
-    /// All effects left out together that can be without anything changing by more than the limits.
+    /// All effects that can be left out together without a change beyond the limits.
     pub spared: LeftOut,
 }
 
 impl LeftOut {
-    /// Whether leaving them out is sure to change nothing by more than [`HOLE_LIMIT_M`] and [`PASSED_LIMIT`].
+    /// Whether leaving them out certainly changes nothing by more than [`HOLE_LIMIT_M`] and [`PASSED_LIMIT`].
     pub fn is_free(&self) -> bool {
         self.excess() <= 1.0
     }
 
-    /// The largest change that the intervals allow, in limits.
+    /// Largest change within the confidence intervals, in units of the limits.
     fn excess(&self) -> f64 {
         (self.hole_m.farthest() / HOLE_LIMIT_M).max(self.passed.farthest() / PASSED_LIMIT)
     }
 }
 
-/// Measures the worth of a scene's effects, the same scene having been read with several seeds. `note` hears how many dives of how
-/// many, at most, have been dived.
+/// Measures the effects of a scene, which has been read once per seed.
+///
+/// `note` is called with the number of finished dives and the maximum number of dives.
 ///
 /// Errors: see [`WorthError`].
 pub fn measure(scenes: &mut [Scene], note: &mut dyn FnMut(usize, usize)) -> Result<Worth, WorthError> {
@@ -73,7 +74,7 @@ pub fn measure(scenes: &mut [Scene], note: &mut dyn FnMut(usize, usize)) -> Resu
         return Err(WorthError::Seeds(scenes.len()));
     }
     let effects = scenes.first().map(Scene::simulated).unwrap_or_default();
-    // Sparing all that are free together takes one measurement, and one more for each that has to be put back.
+    // Leaving out all negligible effects takes one measurement, and one more for each that must be restored.
     let most = scenes.len() * (2 * effects.len() + 2);
     let mut paired = Paired { with: Vec::new(), scenes, dived: 0, most, note };
     paired.with = paired.dive(&[])?;
@@ -95,7 +96,7 @@ pub fn measure(scenes: &mut [Scene], note: &mut dyn FnMut(usize, usize)) -> Resu
     })
 }
 
-/// The scene whose price is measured.
+/// The scene used to measure the cost.
 fn first(scenes: &mut [Scene]) -> Result<&mut Scene, WorthError> {
     scenes.first_mut().ok_or(WorthError::Seeds(0))
 }
@@ -103,7 +104,7 @@ fn first(scenes: &mut [Scene]) -> Result<&mut Scene, WorthError> {
 /// The same dives with and without effects.
 struct Paired<'a> {
     scenes: &'a mut [Scene],
-    /// Figures with all effects, seed by seed.
+    /// Results with all effects, seed by seed.
     with: Vec<Figures>,
     dived: usize,
     most: usize,
@@ -138,7 +139,8 @@ impl Paired<'_> {
         })
     }
 
-    /// All together that are free alone, less, one after the other, those that matter most where together they aren't free.
+    /// Leaves out all effects that are negligible alone. If their joint change exceeds the limits, restores the one
+    /// with the largest change and repeats.
     fn spared(&mut self, each: &[LeftOut]) -> Result<LeftOut, WorthError> {
         let mut free: Vec<&LeftOut> = each.iter().filter(|alone| alone.is_free()).collect();
         free.sort_by(|a, b| a.excess().total_cmp(&b.excess()));

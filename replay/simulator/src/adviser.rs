@@ -1,13 +1,13 @@
-//! Who advises a simulated pilot: a monitor that hears what the vehicle's devices send.
+//! The adviser of a simulated pilot: a monitor that receives the messages of the vehicle's devices.
 
 use crate::outbox::Message;
 use crate::told::Told;
 
-/// A monitor on board, heard by the pilot.
+/// An on-board monitor whose advice the pilot gets.
 pub trait Adviser: Send {
-    /// Takes a message that has crossed its line; messages come in order.
+    /// Processes a message that has crossed its line. Messages come in order.
     fn hear(&mut self, message: &Message<'_>);
 
-    /// What has been told since the last call, in order of time.
+    /// The advice since the last call, in order of time.
     fn told(&mut self) -> Vec<Told>;
 }

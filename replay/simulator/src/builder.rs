@@ -1,4 +1,4 @@
-//! Assembly of a simulation: effects add systems, components and random streams here, and nowhere else.
+//! Assembles a simulation. Effects add systems, components and random streams only here.
 
 use bevy_ecs::entity::Entity;
 use bevy_ecs::prelude::{Component, IntoScheduleConfigs, SystemSet, World};
@@ -111,14 +111,14 @@ impl<'a> Builder<'a> {
         Stream::new(seed, effect, what)
     }
 
-    /// Records sources for which the effect drew random numbers before it was built.
+    /// Records the sources for which the effect drew random numbers before it was built.
     pub(crate) fn has_drawn(&mut self, sources: impl Iterator<Item = String>) {
         if let Some(now) = self.now() {
             now.streams.extend(sources);
         }
     }
 
-    /// A sensor's mount, as the effects so far have left it.
+    /// A sensor's mount as changed by the effects so far.
     pub fn mount(&self, source: usize) -> Option<Mount> {
         self.world.get::<Mounted>(*self.entities.get(source)?).map(|mounted| mounted.0)
     }
@@ -136,7 +136,7 @@ impl<'a> Builder<'a> {
         }
     }
 
-    /// Adds a system to a stage, after those that are there.
+    /// Adds a system to a stage, after the existing ones.
     pub fn system<Marker>(
         &mut self,
         stage: Stage,
@@ -164,7 +164,7 @@ impl<'a> Builder<'a> {
         self.world.get_resource::<Scenery>().map_or(0.0, |scenery| scenery.trajectory.duration_s())
     }
 
-    /// Replaces a base system, which then isn't added.
+    /// Replaces a base system, which is then not added.
     pub fn replace(&mut self, base: &'static str) {
         if let Some(now) = self.now() {
             now.replaces.push(base);

@@ -1,8 +1,8 @@
-//! Errors of position to expect in a calm dive, by a run of the filter itself.
+//! Expected position errors of a calm dive, computed by running the filter.
 //!
-//! A vehicle goes straight through its tunnel, its devices ideal but for their wire formats. The filter's covariance doesn't
-//! depend on what they read, so that its errors between two passes are those that it says in any calm dive: of simulated
-//! dives by data sheet within a tenth (`tests/tests/sampling/calm.rs`).
+//! A vehicle goes straight through its tunnel. Its devices are ideal except for their wire formats. The filter's
+//! covariance doesn't depend on the readings, so its errors between two passes apply to any calm dive. They agree
+//! within a tenth with simulated dives by data sheet (`tests/tests/sampling/calm.rs`).
 
 use headrace_config::Document;
 use headrace_coverage::PassError;
@@ -21,18 +21,20 @@ use crate::files::FileLoader;
 use crate::scene::Scene;
 use crate::simulation::Simulation;
 
-/// Duration of the dive, s: by then the filter knows the biases of an inertial unit as well as it ever will but for some
-/// per cent.
+/// Duration of the dive, s. After it the filter knows an inertial unit's biases as well as it ever will, to a few per
+/// cent.
 const CALM_S: f64 = 180.0;
-/// Its speed, m/s, and the largest share of the tunnel that it goes through.
+/// Speed of the dive, m/s, and the largest share of the tunnel that it covers.
 const CALM_MPS: f64 = 0.1;
 const MOST_SHARE: f64 = 0.5;
-/// Times between two passes that are looked at, s.
+/// Number of times between two passes that are evaluated, one per second.
 const TIMES_S: u32 = 110;
 
-/// The errors to expect of a vehicle, whose file `load` gives by its `name`; `None` where navigation tells none.
+/// The expected errors of a vehicle, whose file `load` returns for its `name`.
 ///
-/// Errors: a vehicle that can't be simulated.
+/// `None` if navigation gives no errors.
+///
+/// Errors: the vehicle can't be simulated.
 pub fn expected_errors(
     vehicle: &VehicleConfig,
     name: &str,
@@ -55,7 +57,7 @@ pub fn expected_errors(
     }))
 }
 
-/// The filter at the end of a scene.
+/// Runs a scene and returns the filter at its end.
 fn navigated(scene: &Scene, settings: &Settings) -> Result<FilterNavigation, SceneError> {
     let vehicle = &scene.vehicle;
     let mut navigation = FilterNavigation::new(vehicle.tunnel.profile.clone(), vehicle.site, *settings);
@@ -78,7 +80,7 @@ fn navigated(scene: &Scene, settings: &Settings) -> Result<FilterNavigation, Sce
     Ok(navigation)
 }
 
-/// The largest standard deviation of a hole's size round the wall, by the time between two passes.
+/// Largest standard deviation of a hole's size around the wall, by the time between two passes.
 fn by_time(navigation: &FilterNavigation, vehicle: &VehicleConfig) -> Vec<[f64; 2]> {
     let Some(running) = navigation.running() else { return Vec::new() };
     let profile = &vehicle.tunnel.profile;

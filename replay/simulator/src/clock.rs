@@ -7,10 +7,10 @@ use headrace_geometry::time::{DurNs, MonoNs};
 /// Start time of simulated dives.
 pub const START: MonoNs = MonoNs(1_000_000_000);
 
-/// Resolution of a rate: drift is a whole number of these parts, so that no sum depends on rounding.
+/// Resolution of a rate. Drift is a whole number of these parts, so that no sum depends on rounding.
 const PARTS: i128 = 1_000_000_000_000;
 
-/// A clock that is right at the start and drifts at a constant rate.
+/// A clock that is correct at the start and drifts at a constant rate.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Component)]
 pub(crate) struct Clock {
     /// Excess of true time over shown time, in 1 / [`PARTS`] of shown time.
@@ -18,7 +18,7 @@ pub(crate) struct Clock {
 }
 
 impl Clock {
-    /// A clock whose seconds are `ppm` millionths longer than true ones, so that its device samples late. Range: +/-10^5.
+    /// A clock whose seconds are `ppm` millionths too long, so that its device samples late. Range: +/-10^5.
     pub(crate) fn slow_by_ppm(ppm: f64) -> Self {
         let per_ppm = (PARTS / 1_000_000) as f64;
         Self { longer: i128::from(math::round_to_i64(ppm.clamp(-1e5, 1e5) * per_ppm)) }
@@ -31,7 +31,7 @@ impl Clock {
         START + DurNs(i64::try_from(true_span).unwrap_or(i64::MAX))
     }
 
-    /// First time shown by the clock whose true time is `at` or later.
+    /// First time shown by the clock whose true time is at or after `at`.
     pub(crate) fn shows(&self, at: MonoNs) -> MonoNs {
         let true_span = i128::from(at.since(START).0);
         let near = (true_span * PARTS).div_euclid(PARTS + self.longer);
@@ -51,7 +51,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_a_clock_shows_and_when_that_is_belong_together() {
+    fn shown_and_true_times_are_inverse() {
         for ppm in [-1000.0, -3.7, 0.0, 1e-6, 20.0, 999.9] {
             let clock = Clock::slow_by_ppm(ppm);
             for after in [0, 1, 17, 999_999_999, 1_000_000_007, 36_000_000_000_000] {

@@ -6,7 +6,7 @@ use headrace_config::ConfigErrors;
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum SceneError {
-    /// Keys of the scene or of its vehicle file.
+    /// Error in keys of the scene or of its vehicle file.
     #[error(transparent)]
     Config(#[from] ConfigErrors),
     /// The trajectory leads through an obstacle.
@@ -26,12 +26,12 @@ pub enum SceneError {
         /// The obstacle.
         what: String,
     },
-    /// An effect that contradicts the scene.
+    /// An effect that is inconsistent with the scene.
     #[error("simulating {effect}: it {problem}")]
     Effect {
         /// Its name.
         effect: &'static str,
-        /// The contradiction, as text.
+        /// The inconsistency, as text.
         problem: String,
     },
 }

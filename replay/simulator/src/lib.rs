@@ -1,6 +1,7 @@
-//! The simulator: a scene becomes the bytes that its devices would send.
+//! The simulator turns a scene into the bytes that its devices would send.
 //!
-//! Only the effects that a scene names are simulated. Without effects a device is ideal but for its wire format's resolution.
+//! Only the effects that a scene names or implies are simulated. Without effects a device is ideal except for its wire
+//! format's resolution.
 
 mod adviser;
 mod builder;

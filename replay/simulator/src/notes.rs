@@ -1,12 +1,13 @@
-//! Changes of each measurement by each effect, found by comparison, so that effects needn't report them. Only present in a
-//! simulation with ground truth.
+//! Finds the changes of each measurement by each effect, by comparison.
+//!
+//! Effects needn't report their changes. This module is only active in a simulation with ground truth.
 
 use bevy_ecs::prelude::{Component, Query, ResMut, Resource};
 use headrace_sensor::measurement::{GroundVelocity, Inertia, Measurement, Payout, Pressure, Sounding};
 
 use crate::sensing::{Line, Samples, Source};
 
-/// Most figures of a measurement.
+/// Maximum number of figures of a measurement.
 const FIGURES: usize = 10;
 
 /// The figures of a measurement, by name.
@@ -14,7 +15,7 @@ pub(crate) trait Figures: Measurement {
     /// Their names, with units.
     const NAMES: &'static [&'static str];
 
-    /// Their values, NaN where there is none.
+    /// Their values; NaN for missing ones.
     fn figures(&self) -> [f64; FIGURES];
 }
 
@@ -116,7 +117,7 @@ impl<M: Measurement> Default for Before<M> {
     }
 }
 
-/// The effect whose system has just run; `None` for a base system, whose changes are the measurement itself.
+/// The effect whose system has just run; `None` for a base system, whose output is the measurement itself.
 #[derive(Debug, Clone, Copy)]
 struct After(Option<u16>);
 
@@ -124,7 +125,7 @@ type Noted<'a, M> = (&'a Source, &'a Samples<M>, &'a mut Before<M>);
 
 type AllNoted<'w, 's, M> = Query<'w, 's, Noted<'static, M>>;
 
-/// Records the changes since it last ran.
+/// Records the changes since its last run.
 #[expect(clippy::type_complexity, reason = "a system's signature is what it needs")]
 pub(crate) fn note(
     effect: Option<u16>,

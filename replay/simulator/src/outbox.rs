@@ -20,7 +20,9 @@ pub struct Message<'a> {
 
 const NEVER: MonoNs = MonoNs(u64::MAX);
 
-/// Messages waiting for earlier ones of other lines: merged on demand, with their bytes left in the devices' buffers.
+/// Messages waiting for earlier ones of other lines.
+///
+/// They are merged on demand, and their bytes stay in the devices' buffers.
 #[derive(Debug, Default)]
 pub(crate) struct Outbox {
     /// One for each source, in order.
@@ -47,7 +49,7 @@ impl Lane {
         self.line.messages.get(self.next).map_or(NEVER, |message| message.at)
     }
 
-    /// Swaps in a slice's messages. Those still waiting, which are few, are put before them.
+    /// Swaps in a slice's messages. The few that are still waiting are put before them.
     fn take(&mut self, line: &mut Line) {
         std::mem::swap(&mut self.line, line);
         self.line.put_first(line, self.next);
@@ -69,7 +71,7 @@ impl Outbox {
         Self { lanes, due: vec![NEVER; sources], ..Self::default() }
     }
 
-    /// Whether [`Outbox::next`] gives a message.
+    /// Whether [`Outbox::next`] returns a message.
     pub(crate) fn has_next(&self) -> bool {
         self.front.is_some()
     }
@@ -85,7 +87,7 @@ impl Outbox {
         self.message(front, sent)
     }
 
-    /// The message that [`Outbox::next`] would give.
+    /// The message that [`Outbox::next`] would return.
     pub(crate) fn peek(&self) -> Option<Message<'_>> {
         let front = self.front?;
         self.message(front, self.lanes.get(front)?.next)
@@ -98,7 +100,7 @@ impl Outbox {
         Some(Message { at: message.at, source, direction: message.direction, bytes: line.bytes_of(message) })
     }
 
-    /// Takes a slice's messages of a source's line, and leaves the line empty.
+    /// Takes a slice's messages from the line of `source`, and leaves the line empty.
     pub(crate) fn take(&mut self, source: usize, line: &mut Line) {
         if let Some(lane) = self.lanes.get_mut(source) {
             lane.take(line);
@@ -111,7 +113,7 @@ impl Outbox {
         self.look();
     }
 
-    /// Releases everything; false if that was already done, and no messages remain.
+    /// Releases everything; false if that was already done and no messages remain.
     pub(crate) fn finish(&mut self) -> bool {
         let more = self.until < NEVER;
         self.release(NEVER);
@@ -127,7 +129,7 @@ impl Outbox {
         self.look();
     }
 
-    /// Updates the time at which each lane is due.
+    /// Updates the due time of each lane.
     fn look(&mut self) {
         for (due, lane) in self.due.iter_mut().zip(&self.lanes) {
             *due = lane.due();
@@ -169,7 +171,7 @@ mod tests {
     }
 
     #[test]
-    fn messages_go_by_time_then_source_then_place_and_late_ones_wait() {
+    fn messages_are_ordered_by_time_source_and_index() {
         let mut outbox = Outbox::new(2);
         outbox.take(0, &mut line(&[1, 5, 5, 12]));
         outbox.take(1, &mut line(&[0, 11, 5, 1]));
@@ -184,7 +186,7 @@ mod tests {
     }
 
     #[test]
-    fn a_message_without_bytes_is_none_and_what_is_skipped_is_gone() {
+    fn empty_and_skipped_messages_are_dropped() {
         let mut outbox = Outbox::new(1);
         let mut with_empty = line(&[1, 3]);
         with_empty.send(MonoNs(2), SENT, &[], 2);

@@ -1,5 +1,6 @@
-//! Counter-based random numbers: each effect draws for each source and step at its own counter, so that naming an effect,
-//! or adding a sensor, changes no other effect's draws.
+//! Counter-based random numbers: each effect has its own counter for each source and step.
+//!
+//! Naming an effect, or adding a sensor, therefore changes no other effect's draws.
 //!
 //! Source: Salmon et al., "Parallel Random Numbers: As Easy as 1, 2, 3", SC 2011 (Philox4x32-10); Wichura, "Algorithm
 //! AS 241", Applied Statistics 37, 1988 (normal quantiles).
@@ -64,7 +65,7 @@ impl Draw {
         [number(a, b), number(c, d)]
     }
 
-    /// Two numbers of the standard normal distribution.
+    /// Two numbers from the standard normal distribution.
     pub fn normal(&self) -> [f64; 2] {
         self.uniform().map(normal_quantile)
     }
@@ -197,7 +198,7 @@ mod tests {
 
     /// Values to 16 digits, from mpmath at 50 digits.
     #[test]
-    fn normal_quantiles_are_right_in_the_middle_and_in_the_tails() {
+    fn normal_quantiles_are_accurate_in_the_middle_and_tails() {
         for (p, x) in [
             (0.5, 0.0),
             (0.6, 0.253_347_103_135_799_8),
@@ -214,7 +215,7 @@ mod tests {
     }
 
     #[test]
-    fn numbers_are_those_of_their_distribution() {
+    fn numbers_follow_their_distribution() {
         let stream = Stream::new(7, "some_effect", "head");
         let count = 100_000_u64;
         let (mut sum, mut squares, mut fourth, mut below) = (0.0, 0.0, 0.0, 0_u64);
@@ -233,7 +234,7 @@ mod tests {
     }
 
     #[test]
-    fn another_seed_effect_source_step_or_block_draws_other_numbers() {
+    fn draws_differ_by_seed_effect_source_step_and_block() {
         let here = Stream::new(1, "a", "b").at(5);
         let others = [
             Stream::new(2, "a", "b").at(5),

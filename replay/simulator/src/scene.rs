@@ -14,7 +14,7 @@ use crate::facts::Facts;
 use crate::files::FileLoader;
 use crate::trajectory::{self, Ground, Trajectory};
 
-/// Longer than any dive, s.
+/// Upper bound of a dive's duration, s.
 const LONGEST_S: f64 = 1e9;
 
 /// A parsed and checked scene.
@@ -34,15 +34,17 @@ pub struct Scene {
     pub(crate) facts: Facts,
     pub(crate) effects: Named,
     called: Vec<Called>,
-    /// Effects that are left out for the time being.
+    /// Effects that are currently left out.
     without: Vec<String>,
 }
 
 impl Scene {
-    /// Parses and checks a scene. `load` loads files that the scene or its vehicle file names; `seed` overrides the scene's.
+    /// Parses and checks a scene.
     ///
-    /// Errors: every key that is missing, unknown or out of range, in the scene and in its vehicle file; a trajectory that leaves
-    /// the tunnel; an effect that applies to nothing.
+    /// `load` loads files that the scene or its vehicle file names; `seed` overrides the scene's.
+    ///
+    /// Errors: every key that is missing, unknown or out of range, in the scene and in its vehicle file; a trajectory
+    /// that leaves the tunnel; an effect that applies to nothing.
     pub fn parse(
         document: Document<'_>,
         kinds: &[&dyn DeviceKind],
@@ -52,7 +54,7 @@ impl Scene {
         Self::parse_taking(document, kinds, load, seed, None)
     }
 
-    /// The same; `take` overrides the scene's.
+    /// Parses a scene like [`Scene::parse`]; `take` overrides the scene's.
     ///
     /// Errors: see [`Scene::parse`].
     pub fn parse_taking(
@@ -70,7 +72,7 @@ impl Scene {
         }
     }
 
-    /// Errors of the vehicle file go into `of_vehicle`.
+    /// Parses the scene's tables; errors of the vehicle file go into `of_vehicle`.
     fn from_root(
         root: &Section<'_>,
         kinds: &[&dyn DeviceKind],
@@ -105,12 +107,12 @@ impl Scene {
             root.invalid("vehicle", &problem)
         })?;
         let programs = vehicle.programs().map_err(|why| {
-            root.invalid("vehicle", &format!("describes heads that no program fits: {why}"))
+            root.invalid("vehicle", &format!("describes heads without a possible program: {why}"))
         })?;
         let (design, length_m) = (&vehicle.tunnel.profile, vehicle.tunnel.length_m);
         let environment = root.part(|| Environment::parse(tunnel, design, length_m, text, load))?;
         let trajectory = root.part(|| trajectory::parse(&trajectory?, (design, length_m), seed, text))?;
-        // Effects of a scene whose trajectory is wrong are checked without it.
+        // If the trajectory is wrong, effects are checked without it.
         let known = trajectory.as_ref().map(|(trajectory, ground)| (*ground, trajectory.duration_s()));
         let (ground, duration_s) = known.unwrap_or((Ground::Water, LONGEST_S));
         let facts = Facts::new(&vehicle, &programs, ground, duration_s);
@@ -140,12 +142,12 @@ impl Scene {
         })
     }
 
-    /// Whether the pilot hears a monitor's advice ([`crate::Simulation::advised_by`]).
+    /// Whether the pilot gets a monitor's advice ([`crate::Simulation::advised_by`]).
     pub fn is_advised(&self) -> bool {
         self.trajectory.is_advised()
     }
 
-    /// Effects that the scene calls for, with what becomes of each.
+    /// Effects that the scene implies, and whether each is simulated.
     pub fn called(&self) -> &[Called] {
         &self.called
     }
@@ -155,7 +157,7 @@ impl Scene {
         self.active().map(|(kind, _)| kind.name()).collect()
     }
 
-    /// Leaves these of its effects out from now on, and takes back those left out before.
+    /// Leaves these effects out from now on, and restores those left out before.
     pub fn leave_out(&mut self, names: &[&str]) {
         self.without = names.iter().map(|name| (*name).to_owned()).collect();
     }

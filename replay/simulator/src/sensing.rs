@@ -1,6 +1,6 @@
 //! State of a simulation: an entity for each sensor, and shared resources.
 //!
-//! A simulation runs slice by slice; within one, each system processes all measurements of its kind at once.
+//! A simulation runs slice by slice. Within a slice, each system processes all measurements of its kind at once.
 
 use bevy_ecs::prelude::{Component, Resource};
 use headrace_geometry::frames::{Mount, Point3, Pose, Rot, Tunnel, Vec3};
@@ -64,7 +64,7 @@ pub(crate) struct Echosounder;
 /// The slice's measurements, in order of time.
 #[derive(Debug, Clone, Component)]
 pub(crate) struct Samples<M: Measurement> {
-    /// Number of the first one, counted through the dive: the step for effects' random draws.
+    /// Number of the first sample, counted through the dive: the step for effects' random draws.
     pub first: u64,
     /// The measurements.
     pub list: Vec<M>,
@@ -105,7 +105,7 @@ pub(crate) struct LineMessage {
     pub at: MonoNs,
     /// Direction.
     pub direction: Direction,
-    /// Begin and end of its bytes in the line's.
+    /// Start and end of its bytes in those of the line.
     pub bytes: (usize, usize),
     /// The sample that it reports, counted within the slice.
     pub sample: usize,
@@ -188,7 +188,7 @@ impl Line {
         self.bytes.get(from..to).unwrap_or_default()
     }
 
-    /// Inserts another line's messages, from its `first` on, before its own.
+    /// Inserts another line's messages, from number `first`, before its own.
     pub(crate) fn put_first(&mut self, other: &Self, first: usize) {
         let bytes = &mut self.bytes;
         let moved = other.messages.iter().skip(first).map(|message| {

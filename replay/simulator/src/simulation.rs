@@ -1,6 +1,7 @@
-//! A simulated dive: an ECS world with an entity for each sensor, base systems for the stages from polling the devices to
-//! encoding their messages, and between them the systems of the scene's effects. Its schedule runs once per slice of the
-//! dive.
+//! A simulated dive.
+//!
+//! An ECS world has an entity for each sensor. Base systems implement the stages from polling the devices to encoding
+//! their messages; systems of the scene's effects run between them. The schedule runs once per slice of the dive.
 
 use bevy_ecs::entity::Entity;
 use bevy_ecs::prelude::World;
@@ -26,7 +27,7 @@ use crate::truth::{self, TruthRow};
 
 /// Length of a slice: long enough that the schedule's overhead is negligible.
 const SLICE: DurNs = DurNs(1_000_000_000);
-/// Walls are computed up to this multiple of a sonar's reach, for effects that bring them nearer.
+/// Factor on a sonar's reach up to which walls are computed, for effects that shorten ranges.
 const REACH_SHARE: f64 = 1.25;
 /// Reach of an echosounder, m.
 const ECHOSOUNDER_REACH_M: f64 = 100.0;
@@ -67,8 +68,10 @@ impl Simulation {
         Self::assemble(scene, Asker::Itself)
     }
 
-    /// A simulation whose devices serve hosts through [`Simulation::hear`], and whose time is advanced by
-    /// [`Simulation::go_on`]. The vehicle stands until [`Simulation::set_out`].
+    /// Creates a simulation whose devices serve hosts.
+    ///
+    /// Hosts send bytes through [`Simulation::hear`], and [`Simulation::go_on`] advances the time. The vehicle is
+    /// stationary until [`Simulation::set_out`].
     ///
     /// Errors: as for [`Simulation::new`].
     pub fn for_hosts(scene: &Scene) -> Result<Self, SceneError> {
@@ -77,7 +80,7 @@ impl Simulation {
         Ok(simulation)
     }
 
-    /// A simulation that keeps its ground truth for [`Simulation::take_truth`].
+    /// Creates a simulation that keeps its ground truth for [`Simulation::take_truth`].
     ///
     /// Errors: as for [`Simulation::new`].
     pub fn with_truth(scene: &Scene) -> Result<Self, SceneError> {
@@ -121,8 +124,10 @@ impl Simulation {
         Ok(Self { world, schedule, entities, end, slice: SLICE, outbox, added, base, truth, adviser: None })
     }
 
-    /// The same dive with a pilot who hears this adviser; of use where the trajectory is an advised pilot's
-    /// ([`Scene::is_advised`]), who otherwise hears nothing.
+    /// Gives the pilot this adviser.
+    ///
+    /// It only has an effect if the trajectory is that of an advised pilot ([`Scene::is_advised`]). Without an adviser
+    /// such a pilot gets no advice.
     #[must_use]
     pub fn advised_by(self, adviser: Box<dyn Adviser>) -> Self {
         Self { adviser: Some(adviser), ..self }
@@ -190,7 +195,7 @@ impl Simulation {
         self.truth.as_mut().map(std::mem::take).unwrap_or_default()
     }
 
-    /// Simulates a second of the dive and discards the messages, for use of the ground truth alone; false at the end.
+    /// Simulates a second of the dive and discards the messages, to get only the ground truth; false at the end.
     pub fn advance(&mut self) -> bool {
         let more = self.next_slice();
         if let Some(adviser) = &mut self.adviser {
@@ -202,8 +207,9 @@ impl Simulation {
         more
     }
 
-    /// Passes on bytes that a host has sent to a device, by its number in the vehicle file, at `at`, which must not be before
-    /// the time simulated so far.
+    /// Passes bytes from a host to device number `source` of the vehicle file.
+    ///
+    /// `at` must not be before the time simulated so far.
     pub fn hear(&mut self, source: usize, at: MonoNs, bytes: &[u8]) {
         let Some(entity) = self.entities.get(source).copied() else { return };
         hear::<Sounding>(&mut self.world, entity, at, bytes);
@@ -213,7 +219,7 @@ impl Simulation {
         hear::<GroundVelocity>(&mut self.world, entity, at, bytes);
     }
 
-    /// Starts the vehicle's movement at `at`; the dive ends with the trajectory.
+    /// Starts the vehicle's movement at `at`. The dive ends with the trajectory.
     pub fn set_out(&mut self, at: MonoNs) {
         if let Some(mut scenery) = self.world.get_resource_mut::<Scenery>() {
             scenery.sets_out = Some(at);
@@ -222,7 +228,8 @@ impl Simulation {
         }
     }
 
-    /// Simulates to `until`, for hosts; [`Simulation::next_message`] then gives the messages that crossed the lines before it.
+    /// Simulates up to `until`, for hosts. [`Simulation::next_message`] then returns the messages that crossed the
+    /// lines before it.
     pub fn go_on(&mut self, until: MonoNs) {
         let Some(slice) = self.world.get_resource::<Slice>() else { return };
         if until > slice.until {
@@ -277,7 +284,7 @@ impl Simulation {
 
 #[cfg(test)]
 impl Simulation {
-    /// The same in slices of another length, which must not change anything.
+    /// Sets another length of slices, which must not change any result.
     pub(crate) fn in_slices(self, slice: DurNs) -> Self {
         Self { slice, ..self }
     }
@@ -305,7 +312,7 @@ impl Simulation {
     }
 }
 
-/// Passes bytes from a host to a device that measures `M`; an immediate reply goes on its line.
+/// Passes bytes from a host to a device that measures `M`; an immediate reply goes to its line.
 fn hear<M: Measurement>(world: &mut World, entity: Entity, at: MonoNs, bytes: &[u8]) {
     let mut entity = world.entity_mut(entity);
     let Ok((mut device, mut line)) = entity.get_components_mut::<(&mut Device<M>, &mut Line)>() else {
@@ -314,7 +321,7 @@ fn hear<M: Measurement>(world: &mut World, entity: Entity, at: MonoNs, bytes: &[
     device.0.hear(at, bytes, &mut |direction, at, bytes| line.send(at, direction, bytes, 0));
 }
 
-/// The scene's facts with the heads' programs as changed by effects, and the effects' draws for that.
+/// The scene's facts with the heads' programs as changed by effects, and the draws that this took.
 fn programmed(scene: &Scene) -> (Facts, Vec<(&'static str, String)>) {
     let (mut facts, mut drawn) = (scene.facts.clone(), Vec::new());
     for (kind, effect) in scene.active() {

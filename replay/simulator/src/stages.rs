@@ -1,4 +1,4 @@
-//! Stages of every simulation, from polling the devices to encoding their messages, and the base systems in them.
+//! The stages of every simulation, from polling the devices to encoding their messages, with their base systems.
 
 #![allow(clippy::needless_pass_by_value, reason = "bevy hands systems their arguments by value")]
 
@@ -54,7 +54,7 @@ impl Stage {
     }
 }
 
-/// For a head whose turn is one picture: the pose of that picture, and the head's rotation since.
+/// For a head whose turn is a single picture: the pose of that picture, and the head's rotation since.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Component)]
 pub(crate) struct Held {
     pose: Option<Pose>,
@@ -66,7 +66,7 @@ pub(crate) struct Held {
 impl Held {
     /// Whether a new turn, or sweep, begins with a ping at this angle.
     fn begins(&mut self, angle_rad: f64) -> bool {
-        // The first ping has no step.
+        // The first ping has no previous angle.
         let came_rad = if self.pose.is_some() { angle_rad - self.last_rad } else { 0.0 };
         let step_rad = math::wrap_signed(came_rad, TAU);
         self.turned_rad += step_rad.abs();
@@ -82,8 +82,10 @@ impl Held {
 
 type Beginning<'a, M> = (&'a mut Device<M>, &'a mut Samples<M>, Option<&'a Clock>);
 
-/// Polls the devices for the slice's measurements. A device with a drifting clock is polled up to that clock's time at the
-/// slice's end; the drift effect then sets the true times.
+/// Polls the devices for the slice's measurements.
+///
+/// A device with a drifting clock is polled up to that clock's time at the slice's end; the drift effect then sets the
+/// true times.
 pub(crate) fn begin<M: Measurement>(slice: Res<'_, Slice>, mut devices: Query<'_, '_, Beginning<'_, M>>) {
     for (mut device, mut samples, clock) in &mut devices {
         let samples = &mut *samples;
@@ -102,7 +104,7 @@ pub(crate) fn head_ray(pose: &Pose, mount: &Mount, angle_rad: f64) -> Ray {
 
 type Aimed<'a, Kind> = (&'a Samples<Sounding>, &'a Mounted, &'a mut Rays, Kind);
 
-/// Heads look from the vehicle's pose at the beginning of their turn: one picture per turn.
+/// Aims heads from the vehicle's pose at the beginning of their turn: one picture per turn.
 pub(crate) fn aim_held(
     scenery: Res<'_, Scenery>,
     mut heads: Query<'_, '_, Aimed<'_, &mut Held>, With<Head>>,
@@ -120,7 +122,7 @@ pub(crate) fn aim_held(
     }
 }
 
-/// Heads look from the vehicle's pose at each ping.
+/// Aims heads from the vehicle's pose at each ping.
 pub(crate) fn aim_moving(
     scenery: Res<'_, Scenery>,
     mut heads: Query<'_, '_, (&Samples<Sounding>, &Mounted, &mut Rays), With<Head>>,
@@ -133,7 +135,7 @@ pub(crate) fn aim_moving(
     }
 }
 
-/// Echosounders look along their own x from the vehicle's pose.
+/// Aims echosounders along their own x from the vehicle's pose.
 pub(crate) fn aim_echosounders(
     scenery: Res<'_, Scenery>,
     mut sounders: Query<'_, '_, (&Samples<Sounding>, &Mounted, &mut Rays), With<Echosounder>>,
@@ -150,11 +152,11 @@ pub(crate) fn aim_echosounders(
 
 type Looking<'a> = (&'a mut Samples<Sounding>, &'a mut Rays, &'a Reach);
 
-/// Beams whose rays an effect casts instead of the base system.
+/// Marks beams whose rays an effect casts instead of the base system.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Component)]
 pub(crate) struct OwnBeam;
 
-/// Each beam is a ray; the range is that of its first hit.
+/// Casts each beam as a ray; the range is that of its first hit.
 pub(crate) fn look(scenery: Res<'_, Scenery>, mut sonars: Query<'_, '_, Looking<'_>, Without<OwnBeam>>) {
     for (mut samples, mut rays, reach) in &mut sonars {
         for (sounding, ray) in samples.list.iter_mut().zip(&mut rays.0) {

@@ -5,9 +5,9 @@ use headrace_config::{ConfigError, Section};
 /// A stretch of the tunnel: chainages from `from_m` up to `to_m`, which is excluded.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Stretch {
-    /// Its begin, m; minus infinity for all before it.
+    /// Start, m; minus infinity if it has none.
     pub from_m: f64,
-    /// Its end, m; infinity for all behind it.
+    /// End, m; infinity if it has none.
     pub to_m: f64,
 }
 
@@ -15,9 +15,9 @@ impl Stretch {
     /// The whole tunnel.
     pub(crate) const ALL: Self = Self { from_m: f64::NEG_INFINITY, to_m: f64::INFINITY };
 
-    /// Reads `from_m` and `to_m`, each of which may be absent: then the stretch has no end there.
+    /// Reads `from_m` and `to_m`; without one of them the stretch has no limit on that side.
     ///
-    /// Errors: outside the tunnel, or the end isn't behind the begin.
+    /// Errors: outside the tunnel, or the end isn't beyond the start.
     pub(crate) fn read(table: &Section<'_>, length_m: f64) -> Result<Self, ConfigError> {
         let from_m = table.number("from_m", 0.0..=length_m)?;
         let to_m = table.number("to_m", 0.0..=length_m)?;

@@ -52,12 +52,12 @@ pub(crate) struct Dived {
 }
 
 impl Dive {
-    /// One head in MEDIUM at 10 m in a tunnel 6 m wide and 5 m high, on its axis, at 0.2 m/s, for ten seconds.
+    /// One head in MEDIUM at 10 m, on the axis of a tunnel 6 m wide and 5 m high, at 0.2 m/s for ten seconds.
     pub(crate) fn with_head() -> Self {
         Self::with_heads(&[[0.0; 3]])
     }
 
-    /// Heads `sonar_0` and on at these positions, all facing forward.
+    /// Heads `sonar_0`, `sonar_1`, ... at these positions, all facing forward.
     pub(crate) fn with_heads(places: &[[f64; 3]]) -> Self {
         let ids = ["sonar_0", "sonar_1", "sonar_2", "sonar_3"];
         let head = |(place, id): (&[f64; 3], &'static str)| {
@@ -139,7 +139,7 @@ impl Dive {
             assert!(usual.messages == other.messages, "slices of {slice_ms} ms: {effects}");
             assert_eq!(usual.rows.len(), other.rows.len(), "slices of {slice_ms} ms: {effects}");
             for (a, b) in usual.rows.iter().zip(&other.rows) {
-                // As text, in which NaN equals NaN.
+                // Compared as text, in which NaN equals NaN.
                 assert_eq!(format!("{a:?}"), format!("{b:?}"), "slices of {slice_ms} ms: {effects}");
             }
         }

@@ -59,7 +59,7 @@ connect = "hid:1209:0001"
 counts_per_metre = 2000
 "#;
 
-/// Forwards, and a little way back: 35 s.
+/// Forwards, then back a little: 35 s.
 pub(crate) const LEGS: &str = "start_m = 2.0\n[[trajectory.legs]]\ndistance_m = 6\nspeed_mps = 0.2\n\
                                [[trajectory.legs]]\ndistance_m = 1\nspeed_mps = -0.2\n";
 /// A long leg: 640 s.
@@ -78,7 +78,7 @@ pub(crate) type OnLine = (MonoNs, Direction, Vec<u8>);
 pub(crate) struct Bench {
     layout: &'static str,
     scene: String,
-    /// What the inertial unit is called.
+    /// Name of the inertial unit.
     unit: &'static str,
 }
 
@@ -104,12 +104,12 @@ impl Bench {
         Self { layout: "phase_shift", scene, unit: "imu" }
     }
 
-    /// The same with another seed.
+    /// The same bench with another seed.
     pub(crate) fn seeded(self, seed: u64) -> Self {
         Self { scene: self.scene.replace("seed = 11", &format!("seed = {seed}")), ..self }
     }
 
-    /// The same with the inertial unit called by another name, so that it draws other random numbers of its own.
+    /// The same bench with another name for the inertial unit, which then draws other random numbers.
     pub(crate) fn with_unit(self, unit: &'static str) -> Self {
         Self { unit, ..self }
     }

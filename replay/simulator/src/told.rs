@@ -1,16 +1,16 @@
-//! What a simulated pilot is told.
+//! Advice to a simulated pilot.
 
 use headrace_geometry::time::MonoNs;
 
-/// What a pilot is told at one time.
+/// The advice at one time.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Told {
-    /// When.
+    /// Time of the advice.
     pub at: MonoNs,
-    /// The largest speed that meets the target, m/s; zero if none does, `None` if nothing can be said.
+    /// The largest speed that meets the target, m/s; zero if no speed does, `None` if unknown.
     pub v_max_mps: Option<f64>,
-    /// To stand still for a while.
+    /// Whether to keep the vehicle stationary for a while.
     pub stand: bool,
-    /// Stretches that were missed and not made good yet, first and last chainage, m.
+    /// Missed stretches that haven't been cleared yet, first and last chainage, m.
     pub missed_m: Vec<[f64; 2]>,
 }

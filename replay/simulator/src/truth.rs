@@ -32,7 +32,7 @@ pub struct TruthRow {
     pub causes: Vec<Cause>,
 }
 
-/// A ping as it truly was, and its measurement.
+/// A true ping and its measurement.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SoundingTruth {
     /// The measurement.
@@ -53,7 +53,7 @@ impl TruthRow {
 }
 
 impl SoundingTruth {
-    /// The point of the measured range on the true beam axis.
+    /// The point at the measured range on the true beam axis.
     pub fn measured_point(&self) -> Option<Point3<Tunnel>> {
         self.measured.range_m.map(|range_m| self.origin + self.direction.scaled(range_m))
     }

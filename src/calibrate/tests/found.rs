@@ -1,4 +1,4 @@
-//! Estimates against the simulated errors.
+//! Compares estimates with the simulated errors.
 
 use super::super::estimate::Untold;
 use super::super::heads::{Heads, heads};
@@ -14,7 +14,7 @@ fn found(stand: &Stand) -> Heads {
     stand.ask(|material| heads(material).unwrap())
 }
 
-/// Two heads: one turned and moved against the file, and now and then mirrored.
+/// Two heads, of which one is turned and moved against the file, and sometimes mirrored.
 fn wrong(seed: u64) -> [Wrong; 2] {
     let swing = math::sin(seed as f64);
     [
@@ -28,10 +28,11 @@ fn wrong(seed: u64) -> [Wrong; 2] {
     ]
 }
 
-/// Angles, relative positions and senses of rotation are within three of the stated standard deviations; and these
-/// are as small as a survey needs.
+/// Angles, relative positions and senses of rotation are within three of the stated standard deviations.
+///
+/// Those are as small as a survey needs.
 #[test]
-fn verif_offsets_that_were_put_in_are_found() {
+fn injected_offsets_are_found() {
     let mut worst = (0.0_f64, 0.0_f64);
     for (name, profile) in profiles() {
         for seed in 1..=20 {
@@ -67,9 +68,9 @@ fn verif_offsets_that_were_put_in_are_found() {
     println!("worst error {:.2} sigma, widest sigma {:.2} of what a survey needs", worst.0, worst.1);
 }
 
-/// The estimated mount points where the head does.
+/// The estimated mount points where the head points.
 #[test]
-fn the_mount_that_is_found_looks_where_the_head_does() {
+fn estimated_mount_points_like_the_true_head() {
     let (_, profile) = profiles().into_iter().next().unwrap();
     let wrong = [Wrong { angle_deg: 7.0, is_mirrored: true, ..Wrong::default() }, Wrong::default()];
     let head = found(&Stand::new(profile, &wrong, 3)).heads[0];
@@ -82,13 +83,13 @@ fn the_mount_that_is_found_looks_where_the_head_does() {
 }
 
 #[test]
-fn a_mirrored_world_gives_mirrored_offsets() {
+fn mirrored_world_gives_mirrored_offsets() {
     for (name, profile) in profiles() {
         // Without noise, which isn't mirrored.
         let wrong =
             [Wrong { angle_deg: 3.0, left_m: 0.02, up_m: 0.01, is_mirrored: false }, Wrong::default()];
         let stand = Stand { noise_m: 0.0, ..Stand::new(profile, &wrong, 5) };
-        // The second head is to the left of the first: in the mirror it would be to the right.
+        // The second head is to the left of the first one. In the mirror it would be to the right.
         let stand = Stand { wrong: stand.wrong[..1].to_vec(), ..stand };
         let (here, there) = (found(&stand), found(&mirrored(&stand)));
         let [a, b] = [&here, &there].map(|found| found.heads[0].angle_rad.unwrap());
@@ -100,7 +101,7 @@ fn a_mirrored_world_gives_mirrored_offsets() {
 }
 
 #[test]
-fn upside_down_heads_are_found_by_the_echosounders() {
+fn echosounders_reveal_upside_down_heads() {
     let wrong = [Wrong { angle_deg: 180.0, ..Wrong::default() }, Wrong::default()];
     for (name, profile) in profiles() {
         let found = found(&Stand { at: [0.6, 1.8], ..Stand::new(profile, &wrong, 2) });
@@ -110,11 +111,12 @@ fn upside_down_heads_are_found_by_the_echosounders() {
     }
 }
 
-/// The zeros of the cable counter, the surface and the water level: exact but for quantization and the height by the heads.
+/// The zeros of cable counter, surface and water level are exact except for quantisation and the height by
+/// the heads.
 #[test]
 fn zeros_are_exact() {
     let mut stand = Stand { noise_m: 0.0, ..Stand::new(shapes::ceran().unwrap(), &[Wrong::default(); 2], 1) };
-    // The sensor is a little under water.
+    // The sensor is slightly under water.
     stand.site.surface_above_floor_m = 2.6;
     stand.ask(|material| {
         let still = longest(material).unwrap();
@@ -141,9 +143,9 @@ fn zeros_are_exact() {
     });
 }
 
-/// More turns see the same roughness: their weights are shared, and no piece of wall counts for more than one.
+/// More turns see the same roughness. Their weights are shared, so no piece of wall counts more than once.
 #[test]
-fn a_piece_of_wall_counts_once() {
+fn each_piece_of_wall_counts_once() {
     let stand = Stand { seconds: 100, ..Stand::new(shapes::ceran().unwrap(), &[Wrong::default()], 1) };
     stand.ask(|material| {
         let still = longest(material).unwrap();

@@ -1,4 +1,4 @@
-//! Rows of returns against central differences.
+//! Compares derivatives of returns with central differences.
 
 use super::super::fit::{COMMON, OWN, Problem};
 use super::super::scan::gather;
@@ -9,10 +9,10 @@ use headrace_fusion::filter::settings::Settings;
 const N: usize = COMMON + 2 * OWN;
 const STEP: f64 = 1e-6;
 
-/// With a narrow beam rows are exact except at a wall's edges, where a ray of a difference may be on the other side.
-/// Derivatives by rotations hold at zero rotation, as these are taken for small.
+/// With a narrow beam, derivatives are exact except at a wall's edges, where the ray of a difference may hit
+/// the other side. Derivatives by rotations are exact only at zero rotation, since rotations count as small.
 #[test]
-fn verif_every_derivative() {
+fn every_derivative_matches_central_differences() {
     for (name, profile) in profiles() {
         let wrong = [Wrong::default(), Wrong { is_mirrored: true, ..Wrong::default() }];
         let stand = Stand::new(profile, &wrong, 1);
@@ -49,7 +49,8 @@ fn verif_every_derivative() {
                         edges += 1;
                         continue;
                     }
-                    // For the scale a row has the expected range in place of the measured one, which is the same at convergence.
+                    // For the scale, a row has the expected range in place of the measured one. Both are
+                    // equal at convergence.
                     let expected = if i == 5 { (h[5] + off) / (1.0 + x[5]) } else { h[i] };
                     assert!(
                         (difference - expected).abs() < 1e-4,

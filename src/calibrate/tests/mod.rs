@@ -1,4 +1,4 @@
-//! Simulated vehicles at rest in tunnels, with heads mounted otherwise than in their file, and the estimates.
+//! Tests with simulated vehicles at rest, whose heads are mounted differently from their file.
 
 mod found;
 mod jacobian;

@@ -10,43 +10,44 @@ fn why(stand: &Stand) -> Untold {
 }
 
 #[test]
-fn a_circle_does_not_tell_roll() {
+fn circle_does_not_determine_roll() {
     let wrong = [Wrong { angle_deg: 5.0, ..Wrong::default() }; 2];
     let stand = Stand { at: [0.05, 3.0], ..Stand::new(shapes::circle(3.0).unwrap(), &wrong, 1) };
     let found = stand.ask(|material| heads(material).unwrap());
     for head in &found.heads {
         assert!(matches!(head.angle_rad, Err(Untold::Round { .. })), "{head:?}");
-        assert_eq!(head.found.rotation, head.filed.rotation, "what isn't told stays the file's");
+        assert_eq!(head.found.rotation, head.filed.rotation, "a value that isn't estimated stays the file's");
     }
 }
 
 #[test]
-fn a_vehicle_that_moves_is_refused() {
+fn moving_vehicle_is_refused() {
     for (_, profile) in profiles() {
         let stand = Stand { speed_mps: 0.1, ..Stand::new(profile, &[Wrong::default(); 2], 1) };
         let why = why(&stand);
         assert!(matches!(why, Untold::Moved { what: "the cable", unit: "m", .. }), "{why}");
-        assert!(why.to_string().starts_with("the vehicle moved: the cable went by 1."), "{why}");
+        assert!(why.to_string().starts_with("the vehicle moved: the cable varied by 1."), "{why}");
     }
 }
 
 #[test]
-fn a_head_that_sees_little_wall_is_refused() {
+fn head_that_sees_little_wall_is_refused() {
     let stand = Stand { sector_deg: 90.0, ..Stand::new(shapes::ceran().unwrap(), &[Wrong::default()], 1) };
     let why = why(&stand).to_string();
     assert!(why.starts_with("no full turn: the head has seen only 9"), "{why}");
 }
 
-/// The section and the returns are symmetric: without echosounders, or in the middle, the sides can't be distinguished.
+/// Section and returns are symmetric. Without echosounders, or from the centre, the sides can't be
+/// distinguished.
 #[test]
-fn in_a_symmetric_section_the_sense_of_rotation_needs_to_know_the_side() {
+fn sense_of_rotation_in_a_symmetric_section_needs_the_side() {
     let wrong = [Wrong::default(); 2];
     for (at, has_echoes, told) in
         [([0.6, 2.3], true, true), ([0.6, 2.3], false, false), ([0.0, 2.3], true, false)]
     {
         for (name, profile) in profiles() {
             let stand = Stand::new(profile, &wrong, 4);
-            // One head alone: two side by side would suffice without echosounders.
+            // A single head; two side by side would be enough without echosounders.
             let stand = Stand { at, has_echoes, wrong: vec![Wrong::default()], ..stand };
             let found = stand.ask(|material| heads(material).unwrap());
             let of = found.heads[0].is_mirrored;
@@ -58,7 +59,7 @@ fn in_a_symmetric_section_the_sense_of_rotation_needs_to_know_the_side() {
 }
 
 #[test]
-fn a_wall_that_is_not_the_profile_contradicts_it() {
+fn other_wall_contradicts_the_profile() {
     let stand = Stand::new(shapes::rectangle(6.0, 5.0).unwrap(), &[Wrong::default(); 2], 1);
     let other = shapes::circle(3.6).unwrap();
     let why = stand.ask(|material| {
@@ -68,7 +69,7 @@ fn a_wall_that_is_not_the_profile_contradicts_it() {
 }
 
 #[test]
-fn what_is_missing_is_named() {
+fn missing_reading_is_named() {
     let stand = Stand::new(shapes::ceran().unwrap(), &[], 1);
     assert_eq!(why(&stand), Untold::Missing { what: "any profiling head" });
     let nothing = Stand { seconds: 0, ..stand };

@@ -1,4 +1,4 @@
-//! A simulated vehicle at rest in a tunnel, and its sensors' readings, from rays of the profile alone.
+//! A simulated vehicle at rest in a tunnel, and its sensors' readings, computed from rays of the profile.
 
 use super::super::material::Material;
 use headrace_fusion::filter::settings::Settings;
@@ -29,7 +29,7 @@ pub(super) struct Wrong {
     pub(super) is_mirrored: bool,
 }
 
-/// See the module's description.
+/// A stand; see the module's description.
 pub(super) struct Stand {
     pub(super) profile: Profile,
     pub(super) site: Site,

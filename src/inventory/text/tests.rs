@@ -170,7 +170,7 @@ fn each_device_is_listed_with_its_errors_and_their_fixes() {
 }
 
 #[test]
-fn a_machine_without_anything_says_so() {
+fn empty_machine_is_reported_as_empty() {
     assert_snapshot!(text(&Inventory::default()), @r"
     Serial ports: none
     HID devices: none
@@ -180,7 +180,7 @@ fn a_machine_without_anything_says_so() {
 }
 
 #[test]
-fn a_sensor_whose_port_is_not_ready_fails_the_command() {
+fn sensor_without_a_ready_port_fails_the_command() {
     let mut inventory = inventory();
     assert_eq!(inventory.exit_code(), 1);
     let shown = inventory.json();
@@ -198,6 +198,6 @@ fn a_sensor_whose_port_is_not_ready_fails_the_command() {
     sensors.retain(|sensor| sensor.state.is_ok());
     assert_eq!((sensors.len(), inventory.exit_code()), (2, 0));
     inventory.sensors = None;
-    assert_eq!(inventory.exit_code(), 0, "without a vehicle file nothing is wanting");
+    assert_eq!(inventory.exit_code(), 0, "nothing can be missing without a vehicle file");
     assert_eq!(inventory.json()["sensors"], json!(null));
 }

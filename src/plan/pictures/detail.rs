@@ -1,4 +1,4 @@
-//! A piece of the pattern to scale, about its largest gap.
+//! Detail of the pattern, to scale, around its largest gap.
 
 use headrace_pictures::canvas::{Canvas, NORMAL, SMALL, Side};
 use headrace_pictures::chart::{Axis, Chart, short};
@@ -9,14 +9,14 @@ use headrace_pictures::polyline::Px;
 
 use super::laid::Laid;
 
-/// The inside of the circle.
+/// Colour inside the circle.
 pub(super) const CIRCLE: Colour = Colour(255, 240, 190);
 const FRAME: Frame = Frame { left: 676.0, top: 92.0, right: 886.0, bottom: 302.0 };
 /// Position of the caption, pixels.
 const WORDS: Px = [634.0, 348.0];
-/// Samples closer together than this are shown by one marker, pixels.
+/// Distance below which samples share one marker, pixels.
 const APART_PX: f64 = 4.0;
-/// With more samples than this, single ones can't be distinguished.
+/// Number of samples above which single ones can't be distinguished.
 const MOST: usize = 450;
 /// Half the width of the detail as a multiple of T.
 const HALF: f64 = 1.5;
@@ -42,7 +42,7 @@ pub(super) fn draw(canvas: &Canvas, laid: &Laid, centre: [f64; 2], from_m: f64, 
     chart.ellipse(chart.px([x_m, arc_m]), [radius_px; 2], CIRCLE, &outline);
     let detail = Detail { chart, laid, centre, from_m, half_m };
     let samples = detail.samples();
-    // Too many samples to distinguish: only the heads' tracks are drawn.
+    // With too many samples to distinguish, only the heads' tracks are drawn.
     let dense = samples.len() > MOST;
     detail.lines(dense);
     for (head, place) in samples.iter().filter(|_| !dense) {

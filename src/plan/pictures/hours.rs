@@ -14,15 +14,15 @@ use super::modes::{self, Mode};
 const FRAME: Frame = Frame { left: 66.0, top: 92.0, right: 752.0, bottom: 482.0 };
 /// Ratio of successive speeds on a curve.
 const FASTER: f64 = 1.02;
-/// Points at which the fastest mode is looked up.
+/// Number of points at which the fastest mode is found.
 const LEAST: u32 = 300;
-/// Band under the mode that takes least time.
+/// Band under the mode that takes the least time.
 const BAND: Look = Look { colour: Colour(222, 222, 222), width_px: 9.0, ..look::T };
 
-/// The T to look up, with the hours that every mode takes for it.
+/// The T of interest, with the hours that every mode takes for it.
 struct Sought {
     t_m: f64,
-    /// By mode.
+    /// Hours, by mode.
     hours: Vec<Option<f64>>,
 }
 
@@ -73,7 +73,7 @@ fn sought(shown: &Shown<'_>, modes: &[Mode]) -> Result<Sought, SamplingError> {
         Some(target_m) => target_m,
         None => shown.planner.t_max_m(shown.mode, shown.asked_mps().unwrap_or(shown.speed_mps))?,
     };
-    // A dummy axis, for text in place of curves.
+    // Dummy axis, for text in place of curves.
     let t_m = if t_m.is_finite() { t_m } else { 1.0 };
     let hours = |mode: &Mode| Some(length_m / shown.planner.v_max_mps(mode.number, t_m).ok()? / 3600.0);
     Ok(Sought { t_m, hours: modes.iter().map(hours).collect() })
@@ -89,7 +89,7 @@ fn ends(shown: &Shown<'_>, modes: &[Mode], sought: &Sought) -> Result<[f64; 2], 
     if most_h > 0.0 {
         return Ok([2.2 * sought.t_m, (1.15 * most_h).min(4.0 * least_h).max(1.3 * asked_h)]);
     }
-    // No mode meets it: the largest T of any mode at the speed shown.
+    // No mode meets the target: the largest T of any mode at the speed shown.
     let mut reached_m = 0.0_f64;
     for mode in modes.iter().filter(|mode| !mode.blind) {
         reached_m = reached_m.max(shown.planner.t_max_m(mode.number, shown.speed_mps)?);
@@ -105,7 +105,7 @@ fn legend(chart: &Chart<'_>) {
 }
 
 fn curve(shown: &Shown<'_>, mode: &Mode, [most_m, most_h]: [f64; 2]) -> Result<Vec<[f64; 2]>, SamplingError> {
-    /// Points of a curve: enough for a speed to grow a thousandfold.
+    /// Number of points of a curve: enough for a speed to grow a thousandfold.
     const POINTS: u32 = 400;
     let length_m = shown.planner.inspection().length_m;
     let mut v_mps = length_m / (1.02 * most_h * 3600.0);
@@ -121,7 +121,7 @@ fn curve(shown: &Shown<'_>, mode: &Mode, [most_m, most_h]: [f64; 2]) -> Result<V
     Ok(points)
 }
 
-/// Least hours of any mode for each T.
+/// Fewest hours of any mode for each T.
 fn least(shown: &Shown<'_>, modes: &[Mode], most_m: f64) -> Vec<[f64; 2]> {
     let length_m = shown.planner.inspection().length_m;
     let point = |k: u32| {
@@ -133,7 +133,8 @@ fn least(shown: &Shown<'_>, modes: &[Mode], most_m: f64) -> Vec<[f64; 2]> {
     (1..=LEAST).filter_map(point).collect()
 }
 
-/// The target, or the T found, as a vertical line; the requested time as a horizontal one, with its label.
+/// Draws the target, or the T found, as a vertical line, and the requested time as a horizontal one. Returns
+/// its label.
 fn asked(chart: &Chart<'_>, shown: &Shown<'_>, sought: &Sought) -> Option<Label> {
     chart.upright(sought.t_m, &look::TARGET);
     if let Some(asked_mps) = shown.asked_mps() {
@@ -163,7 +164,7 @@ fn label(chart: &Chart<'_>, mode: &Mode, end: Option<[f64; 2]>, hours: Option<f6
     Label { place, lines: vec![words], look: mode.look, bold: true }
 }
 
-/// Markers where curves meet the target; that of the fastest mode filled, with its hours and speed.
+/// Draws markers where curves meet the target; that of the fastest mode filled, with its hours and speed.
 fn marks(chart: &Chart<'_>, shown: &Shown<'_>, modes: &[Mode], sought: &Sought) {
     let Sought { t_m, hours } = sought;
     let found = modes.iter().filter_map(|mode| Some((mode, (*hours.get(mode.number)?)?)));

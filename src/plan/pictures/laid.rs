@@ -7,7 +7,7 @@ use headrace_sampling::plan::PatternSample;
 
 use super::Shown;
 
-/// Most samples computed for a chart.
+/// Maximum number of samples computed for a chart.
 const MOST_SAMPLES: f64 = 400_000.0;
 
 /// A sampling pattern.
@@ -17,7 +17,7 @@ pub(super) struct Laid {
     pub(super) perimeter_m: f64,
     /// Travel per turn, m.
     pub(super) pitch_m: f64,
-    /// T at this speed, m; `None` if a strip is seen by no head.
+    /// T at this speed, m; `None` if no head sees some strip.
     pub(super) t_m: Option<f64>,
     /// Start of the chainage that all heads have passed, m.
     pub(super) from_m: f64,
@@ -41,7 +41,7 @@ pub(super) fn lay(shown: &Shown<'_>) -> Result<Laid, SamplingError> {
     let t_m = Some(planner.t_max_m(shown.mode, shown.speed_mps)?).filter(|t_m| t_m.is_finite());
     let places = || specs.iter().map(|spec| spec.mount.position.x());
     let apart_m = places().fold(f64::NEG_INFINITY, f64::max) - places().fold(f64::INFINITY, f64::min);
-    // A turn in which to search for the largest gap, and the detail about it.
+    // A turn in which to search for the largest gap, and the detail around it.
     let wanted_m = (turns_shown(specs.len()) * pitch_m).max(pitch_m + 3.2 * t_m.unwrap_or(0.0));
     let steps = turn.map_or(1.0, |turn| f64::from(turn.steps())) * specs.len().max(1) as f64;
     let turns = ((wanted_m + apart_m.max(0.0)) / pitch_m + 1.0).min(MOST_SAMPLES / steps).max(2.0);
@@ -61,7 +61,7 @@ pub(super) fn turns_shown(heads: usize) -> f64 {
     }
 }
 
-/// From the last head's start to the first head's end; the whole pattern if that is less than a turn.
+/// Stretch from the last head's start to the first head's end; the whole pattern if that is less than a turn.
 fn all_passed_m(samples: &[PatternSample], heads: usize, pitch_m: f64) -> [f64; 2] {
     let of = |head: usize| samples.iter().filter(move |sample| sample.head == head).map(|sample| sample.x_m);
     let firsts = (0..heads).map(|head| of(head).fold(f64::INFINITY, f64::min));
@@ -75,7 +75,7 @@ fn all_passed_m(samples: &[PatternSample], heads: usize, pitch_m: f64) -> [f64; 
 }
 
 impl Laid {
-    /// The heads' tracks, split where they turn round, cross the seam, or begin or cease to be hidden.
+    /// The heads' tracks, split where they reverse, cross the seam, or become hidden or visible.
     pub(super) fn passes(&self) -> Vec<Pass> {
         let mut passes: Vec<Pass> = Vec::new();
         for pair in self.samples.windows(2) {
@@ -83,7 +83,7 @@ impl Laid {
             if here.new_sweep || here.head != before.head {
                 continue;
             }
-            // A step to or from a hidden sample passes over wall that isn't sampled.
+            // A step to or from a hidden sample crosses wall that isn't sampled.
             let hidden = here.hidden || before.hidden;
             let (from, to) = ([before.x_m, before.arc_m], [here.x_m, here.arc_m]);
             for [begin, end] in polyline::over_seam(self.perimeter_m, from, to) {
@@ -114,8 +114,11 @@ impl Laid {
         placed.filter(|(_, at)| near(at)).collect()
     }
 
-    /// Centre and diameter, m, of the largest circle without samples about an arc length, within a turn's travel: the largest
-    /// gap. `None` without T.
+    /// Centre and diameter, m, of the largest gap around an arc length.
+    ///
+    /// The gap is the largest circle without samples within a turn's travel.
+    ///
+    /// `None` without T.
     pub(super) fn emptiest(&self, arc_m: f64) -> Option<([f64; 2], f64)> {
         /// Grid points along and around.
         const TRIED: [u32; 2] = [120, 40];

@@ -19,9 +19,9 @@ pub(crate) use speeds::speeds;
 /// Content of the charts.
 pub(crate) struct Shown<'a> {
     pub(crate) planner: &'a Planner,
-    /// The mode shown by perimeter and pattern.
+    /// Mode of the charts of perimeter and pattern.
     pub(crate) mode: usize,
-    /// The speed at which they show it, m/s.
+    /// Speed of these charts, m/s.
     pub(crate) speed_mps: f64,
     pub(crate) question: Question,
     /// Tunnel, heads and layout as text.
@@ -29,7 +29,7 @@ pub(crate) struct Shown<'a> {
 }
 
 impl Shown<'_> {
-    /// The requested speed, given directly or as a time.
+    /// Requested speed, given directly or as a time.
     fn asked_mps(&self) -> Option<f64> {
         let needed = |time_s: f64| self.planner.inspection().length_m / time_s;
         self.question.speed_mps.or(self.question.time_s.map(needed))

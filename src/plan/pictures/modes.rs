@@ -12,9 +12,9 @@ pub(super) struct Mode {
     pub(super) number: usize,
     pub(super) name: String,
     pub(super) look: Look,
-    /// The largest speed that meets the target, m/s.
+    /// Largest speed that meets the target, m/s.
     pub(super) v_max_mps: Option<f64>,
-    /// No T at any speed: a strip is seen by no head.
+    /// There is no T at any speed: no head sees some strip.
     pub(super) blind: bool,
 }
 
@@ -35,17 +35,18 @@ pub(super) fn all(shown: &Shown<'_>) -> Result<Vec<Mode>, SamplingError> {
     (0..count).map(mode).collect()
 }
 
-/// A mode's name, in capitals as on the head's own panel.
+/// Name of a mode, in capitals as on the head's own panel.
 pub(super) fn name(planner: &Planner, mode: usize) -> String {
     planner.modes().get(mode).map(|planned| planned.mode.name.to_uppercase()).unwrap_or_default()
 }
 
-/// The mode and speed shown, as text.
+/// Mode and speed shown, as text.
 pub(super) fn at_speed(shown: &Shown<'_>) -> String {
     format!("{} at {} m/s", name(shown.planner, shown.mode), speed(shown.speed_mps))
 }
 
-/// A speed as printed: whole millimetres per second, rounded down, so that the printed speed meets the target, too.
+/// A speed as printed: whole millimetres per second, rounded down, so that the printed one meets the target,
+/// too.
 pub(super) fn speed(speed_mps: f64) -> String {
     let down = (speed_mps * 1000.0 + 1e-6).floor() / 1000.0;
     if down > 0.0 { format!("{down:.3}") } else { format!("{speed_mps:.5}") }
@@ -60,13 +61,13 @@ pub(super) fn hours(hours: f64) -> String {
     }
 }
 
-/// The fastest of the modes that meet the target.
+/// Fastest of the modes that meet the target.
 pub(super) fn fastest(modes: &[Mode]) -> Option<&Mode> {
     let met = modes.iter().filter(|mode| mode.v_max_mps.is_some());
     met.max_by(|a, b| a.v_max_mps.unwrap_or(0.0).total_cmp(&b.v_max_mps.unwrap_or(0.0)))
 }
 
-/// Text on modes in which a strip is seen by no head.
+/// Text on modes in which no head sees some strip.
 pub(super) fn blind_words(modes: &[Mode]) -> Vec<String> {
     let blind: Vec<&str> = modes.iter().filter(|mode| mode.blind).map(|mode| mode.name.as_str()).collect();
     match blind.len() {

@@ -20,7 +20,7 @@ const LEGEND: Px = [634.0, 412.0];
 /// Points around the wall at which spacing is compared.
 const PLACES: usize = 360;
 
-/// The samples of some turns on the unrolled wall, with a circle of diameter T at the largest gap.
+/// Draws the samples of some turns on the unrolled wall, with a circle of diameter T at the largest gap.
 pub(crate) fn pattern(shown: &Shown<'_>) -> Result<String, SamplingError> {
     let laid = laid::lay(shown)?;
     let places = shown.planner.perimeter(shown.mode, shown.speed_mps, PLACES)?;
@@ -53,7 +53,7 @@ fn chart<'c>(canvas: &'c Canvas, laid: &Laid, length_m: f64) -> Chart<'c> {
     Chart::new(canvas, FRAME, &x, &y)
 }
 
-/// The circle of diameter T: an ellipse, as the axes differ in scale; clipped to the chart.
+/// Draws the circle of diameter T: an ellipse, since the axes differ in scale, clipped to the chart.
 fn circle(chart: &Chart<'_>, centre: [f64; 2], t_m: f64) {
     let (middle, corner) = (chart.px(centre), chart.px([centre[0] + t_m / 2.0, centre[1] + t_m / 2.0]));
     chart.ellipse(middle, [corner[0] - middle[0], middle[1] - corner[1]], CIRCLE, &look::T);
@@ -64,7 +64,7 @@ fn circle(chart: &Chart<'_>, centre: [f64; 2], t_m: f64) {
 /// Pieces of a head's track, in sheet coordinates.
 type Ways = Vec<(usize, Vec<Px>)>;
 
-/// Draws the heads' tracks; returns those that aren't hidden.
+/// Draws the heads' tracks. Returns the visible ones.
 fn passes(chart: &Chart<'_>, laid: &Laid, from_m: f64) -> Ways {
     let mut ways = Vec::new();
     for pass in laid.passes() {
@@ -76,9 +76,9 @@ fn passes(chart: &Chart<'_>, laid: &Laid, from_m: f64) -> Ways {
     ways
 }
 
-/// The heads' numbers: where their tracks reach the top, or else on the longest piece.
+/// Draws the heads' numbers where their tracks reach the top, or else on the longest piece.
 fn numbers(chart: &Chart<'_>, heads: usize, ways: &Ways) {
-    /// Numbers closer together than this overlap, pixels.
+    /// Distance below which numbers overlap, pixels.
     const APART_PX: f64 = 9.0;
     let mut taken: Vec<(usize, f64)> = Vec::new();
     for (head, piece) in ways {

@@ -24,15 +24,16 @@ const BAND: Colour = Colour(205, 226, 240);
 /// Spacing around the wall.
 struct Around {
     places: Vec<WallPlace>,
-    /// The point of largest T.
+    /// Point of largest T.
     worst: Option<WallPlace>,
-    /// The plan's T, m.
+    /// T of the plan, m.
     counted_m: Option<f64>,
-    /// The middle of the widest strip that no head sees, m.
+    /// Centre of the widest strip that no head sees, m.
     unseen_m: Option<f64>,
 }
 
-/// Spacing along the perimeter: T_y, T_x, the combined T, the target, and the strips that not all heads see.
+/// Draws the spacing along the perimeter: T_y, T_x, the combined T, the target, and the strips that some
+/// heads don't see.
 pub(crate) fn perimeter(shown: &Shown<'_>) -> Result<String, SamplingError> {
     let places = shown.planner.perimeter(shown.mode, shown.speed_mps, PLACES)?;
     let around = Around {
@@ -70,14 +71,14 @@ impl Around {
         self.places.iter().filter_map(|place| place.t_m).fold(0.0, f64::max)
     }
 
-    /// Position of the widest strip that no head sees, and its T, unless that would dwarf everything else.
+    /// Position of the widest strip that no head sees, and its T, unless that would dwarf all other values.
     fn across_m(&self) -> Option<[f64; 2]> {
         let t_m = self.counted_m.filter(|t_m| *t_m > self.most_m() && *t_m < 3.0 * self.most_m())?;
         Some([self.unseen_m?, t_m])
     }
 }
 
-/// The T across the widest strip that no head sees.
+/// Draws the T across the widest strip that no head sees.
 fn across(chart: &Chart<'_>, around: &Around) {
     let Some(point) = around.across_m() else { return };
     let place = chart.px(point);
@@ -88,7 +89,7 @@ fn across(chart: &Chart<'_>, around: &Around) {
     chart.canvas.text_on_white([x, place[1] + 16.0], &format!("{} m across", short(point[1])), side, NORMAL);
 }
 
-/// Text on the plan's T where it differs from the largest one shown; else empty.
+/// Text on the plan's T if it differs from the largest one shown; otherwise empty.
 fn note(shown: &Shown<'_>, around: &Around) -> String {
     let (Some(counted_m), Some(here_m)) = (around.counted_m, around.worst.and_then(|place| place.t_m)) else {
         return String::new();
@@ -107,7 +108,7 @@ fn note(shown: &Shown<'_>, around: &Around) -> String {
     format!("The plan counts with T = {} m: {why}{allowed}.", short(counted_m))
 }
 
-/// Text on the tolerances allowed for.
+/// Text on the tolerances that the plan allows for.
 fn allowed(shown: &Shown<'_>) -> String {
     let inspection = shown.planner.inspection();
     let drift = (inspection.drift_m > 0.0).then(|| format!("{} m of drift", inspection.drift_m));
@@ -151,7 +152,7 @@ fn shade(chart: &Chart<'_>, stretch: &Thin) {
 fn clocks(chart: &Chart<'_>, hours: &[Hour]) {
     let y = chart.frame.bottom + 34.0;
     let mut taken: Vec<[f64; 2]> = Vec::new();
-    // Floor, walls and crown first; those between where there is room.
+    // Floor, walls and crown come first, then the hours between them if there is room.
     let (named, between): (Vec<&Hour>, Vec<&Hour>) = hours.iter().partition(|hour| !hour.place.is_empty());
     for hour in named.into_iter().chain(between) {
         let x = chart.px([hour.arc_m, 0.0])[0];

@@ -11,7 +11,7 @@ use super::Shown;
 use super::modes::{self, Mode};
 
 const FRAME: Frame = Frame { left: 66.0, top: 92.0, right: 708.0, bottom: 482.0 };
-/// Speeds at which T is computed.
+/// Number of speeds at which T is computed.
 const SPEEDS: u32 = 400;
 
 /// T of every mode against speed, with the target and the requested speed.
@@ -84,7 +84,7 @@ fn curve(shown: &Shown<'_>, mode: &Mode, most_mps: f64) -> Result<Vec<[f64; 2]>,
     (0..=SPEEDS).map(point).collect()
 }
 
-/// The requested speed as a line; returns its x position and label.
+/// Draws the requested speed as a line. Returns its x position and label.
 fn asked(chart: &Chart<'_>, shown: &Shown<'_>) -> Option<(f64, String)> {
     let asked_mps = shown.asked_mps()?;
     chart.upright(asked_mps, &look::ASKED);
@@ -138,7 +138,7 @@ fn label(place: [f64; 2], mode: &Mode, words: String) -> Label {
     Label { place, lines: vec![words], look: mode.look, bold: true }
 }
 
-/// Markers where curves meet the target; the fastest filled, with its speed.
+/// Draws markers where curves meet the target; the fastest is filled, with its speed.
 fn marks(chart: &Chart<'_>, shown: &Shown<'_>, modes: &[Mode]) {
     let Some(target_m) = shown.question.target_m else { return };
     let fastest = modes::fastest(modes).map(|mode| mode.number);

@@ -1,4 +1,4 @@
-//! Every chart of every kind of plan: well-formed, reproducible, and with the right content.
+//! Checks that every chart of every kind of plan is well-formed, reproducible, and has the right content.
 
 use clap::Parser;
 use headrace_geometry::frames::Vec3;
@@ -16,7 +16,7 @@ const TARGET: Question = Question { target_m: Some(0.5), speed_mps: None, time_s
 const SPEED: Question = Question { target_m: None, speed_mps: Some(0.1), time_s: None };
 /// VITA 2 with four heads in phase shift: two side by side in front, two aft.
 const VITA_2: &str = "--vehicle deploy/vehicles/vita2-4.toml";
-/// The same heads in sectors: with their distances along the hull, a strip is seen by none.
+/// The same heads in sectors. Because of their distances along the hull, no head sees some strip.
 const SECTORS: &str = "--vehicle deploy/vehicles/vita2-4.toml --layout sector_offset";
 const ONE: &str = "--tunnel ceran --length 7000";
 
@@ -80,18 +80,18 @@ fn check(name: &str, svg: &str) {
 
 fn says(svg: &str, all: &[&str]) {
     for words in all {
-        assert!(svg.contains(words), "{words:?} isn't said");
+        assert!(svg.contains(words), "{words:?} is missing");
     }
 }
 
 fn silent(svg: &str, none: &[&str]) {
     for words in none {
-        assert!(!svg.contains(words), "{words:?} is said");
+        assert!(!svg.contains(words), "{words:?} must not appear");
     }
 }
 
 #[test]
-fn perimeter_names_its_curves_and_who_sees_what() {
+fn perimeter_names_its_curves_and_the_seeing_heads() {
     let svg = draw(inspection(VITA_2), FAST, 0.115, TARGET, "perimeter");
     says(&svg, &["Spacing around the wall: FAST at 0.115 m/s", "target 0.5 m", "T, both together:"]);
     says(&svg, &["T_x, between passes", "T_y, neighbours", "2 of 4", "9:00 left", "12:00 crown", "m, 9:00"]);
@@ -100,7 +100,7 @@ fn perimeter_names_its_curves_and_who_sees_what() {
 }
 
 #[test]
-fn perimeter_of_sectors_shows_two_distances_and_strips_that_no_head_sees() {
+fn perimeter_of_sectors_shows_two_distances_and_unseen_strips() {
     let svg = draw(inspection(SECTORS), 1, 0.048, TARGET, "perimeter");
     says(
         &svg,
@@ -109,7 +109,7 @@ fn perimeter_of_sectors_shows_two_distances_and_strips_that_no_head_sees() {
 }
 
 #[test]
-fn pattern_shows_every_head_the_circle_and_what_is_hidden() {
+fn pattern_shows_heads_circle_and_hidden_tracks() {
     let svg = draw(inspection(VITA_2), FAST, 0.115, TARGET, "pattern");
     says(
         &svg,
@@ -119,10 +119,9 @@ fn pattern_shows_every_head_the_circle_and_what_is_hidden() {
     silent(&draw(inspection(ONE), FAST, 0.058, TARGET, "pattern"), &["head 1", "hidden by"]);
 }
 
-/// The circle drawn, against the samples of the pattern: no circle of diameter T is empty, and no gap is larger than the
-/// one drawn.
+/// No circle of diameter T is empty in the pattern, and no gap is larger than the one drawn.
 #[test]
-fn verif_no_circle_of_diameter_t_is_empty() {
+fn no_circle_of_diameter_t_is_empty() {
     let plans = [
         (ONE, 0.058),
         ("--tunnel ceran --heads 4", 0.2),
@@ -149,7 +148,7 @@ fn verif_no_circle_of_diameter_t_is_empty() {
     }
 }
 
-/// The names of the modes that meet a target, each with `words` of its speed.
+/// Names of the modes that meet a target, each with `words` on its speed.
 fn met(inspection: Inspection, target_m: f64, words: impl Fn(f64) -> String) -> Vec<String> {
     let planner = Planner::new(inspection).unwrap();
     let speed = |mode| Some((modes::name(&planner, mode), planner.v_max_mps(mode, target_m).ok()?));
@@ -158,7 +157,7 @@ fn met(inspection: Inspection, target_m: f64, words: impl Fn(f64) -> String) -> 
 }
 
 #[test]
-fn speeds_name_every_mode_with_what_it_may_go() {
+fn speeds_name_every_mode_with_its_speed() {
     let svg = draw(inspection(VITA_2), FAST, 0.115, TARGET, "speeds");
     let modes = met(inspection(VITA_2), 0.5, |v_mps| format!("{} m/s", modes::speed(v_mps)));
     assert_eq!(modes.len(), 5);
@@ -173,7 +172,7 @@ fn speeds_name_every_mode_with_what_it_may_go() {
 }
 
 #[test]
-fn hours_mark_the_best_mode_and_the_time_there_is() {
+fn hours_mark_the_best_mode_and_the_available_time() {
     let svg = draw(inspection(VITA_2), FAST, 0.115, TARGET, "hours");
     let modes = met(inspection(VITA_2), 0.5, |v_mps| format!("{} h", modes::hours(7000.0 / v_mps / 3600.0)));
     for mode in &modes {
@@ -191,7 +190,7 @@ fn hours_mark_the_best_mode_and_the_time_there_is() {
 }
 
 #[test]
-fn without_a_target_hours_are_for_the_t_that_the_speed_gives() {
+fn hours_without_a_target_use_the_t_of_the_speed() {
     let planner = Planner::new(inspection(VITA_2)).unwrap();
     let finest = planner.answers(&SPEED, None).unwrap().iter().position(|answer| answer.best).unwrap();
     let svg = draw(inspection(VITA_2), finest, 0.1, SPEED, "hours");
@@ -200,7 +199,7 @@ fn without_a_target_hours_are_for_the_t_that_the_speed_gives() {
 }
 
 #[test]
-fn modes_that_never_meet_the_target_are_drawn_and_said_so() {
+fn modes_that_miss_the_target_are_drawn_and_named() {
     // At the corners FASTEST exceeds this by its step alone.
     let coarse = Question { target_m: Some(0.4), ..TARGET };
     for name in ["speeds", "hours"] {
@@ -215,7 +214,7 @@ fn modes_that_never_meet_the_target_are_drawn_and_said_so() {
 }
 
 #[test]
-fn where_no_head_sees_there_are_words_in_place_of_curves() {
+fn unseen_wall_has_text_in_place_of_curves() {
     let words = [
         "No head sees the wall anywhere",
         "No head sees part of the wall",
@@ -231,7 +230,7 @@ fn where_no_head_sees_there_are_words_in_place_of_curves() {
 }
 
 #[test]
-fn small_pipes_large_tunnels_and_many_heads_have_pictures() {
+fn small_pipes_large_tunnels_and_many_heads_can_be_drawn() {
     let asked = Question { speed_mps: Some(0.3), ..TARGET };
     for (name, _) in PICTURES {
         for heads in [1, 8] {
@@ -248,7 +247,7 @@ fn small_pipes_large_tunnels_and_many_heads_have_pictures() {
 }
 
 #[test]
-fn speeds_near_rest_and_far_beyond_sense_have_pictures() {
+fn extreme_speeds_can_be_drawn() {
     for speed_mps in [0.002, 5.0] {
         for (name, _) in PICTURES {
             let asked = Question { speed_mps: Some(speed_mps), ..Question::default() };

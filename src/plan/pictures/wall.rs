@@ -1,12 +1,13 @@
-//! The point of largest spacing, and the strips that not all heads see.
+//! Finds the point of largest spacing, and the strips that some heads don't see.
 
 use headrace_geometry::math;
 use headrace_sampling::plan::{Planner, WallPlace};
 use headrace_sampling::strips::Strips;
 
-/// The point of largest T; among nearly equal ones the one nearest to the left wall.
+/// Point of largest T; among nearly equal ones the one nearest to the left wall.
 pub(super) fn worst(planner: &Planner, places: &[WallPlace]) -> Option<WallPlace> {
-    /// Steps from a strip's edge make T there slightly larger than within.
+    /// Ratio above which two T count as equal: steps from a strip's edge make T slightly larger there than
+    /// within.
     const EQUAL: f64 = 0.995;
     let profile = &planner.inspection().profile;
     let [y_m, z_m] = profile.reference();
@@ -17,7 +18,7 @@ pub(super) fn worst(planner: &Planner, places: &[WallPlace]) -> Option<WallPlace
     worst.min_by(|a, b| off_m(a).total_cmp(&off_m(b))).copied()
 }
 
-/// A stretch of the perimeter seen by fewer heads than the best-covered one.
+/// A stretch of the perimeter seen by fewer heads than the best-covered stretch.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Thin {
     pub(super) from_m: f64,
@@ -37,7 +38,7 @@ impl Thin {
     }
 }
 
-/// The thin stretches at the nominal position of the vehicle; one across the seam is split.
+/// Thin stretches at the nominal position of the vehicle. A stretch across the seam is split.
 pub(super) fn thin(planner: &Planner) -> Vec<Thin> {
     let perimeter_m = planner.inspection().profile.perimeter_m();
     let strips = planner.nominal_strips().map(Strips::as_slice).unwrap_or_default();
@@ -56,7 +57,7 @@ pub(super) fn thin(planner: &Planner) -> Vec<Thin> {
     stretches
 }
 
-/// The middle of the widest strip that no head sees, m.
+/// Centre of the widest strip that no head sees, m.
 pub(super) fn unseen_m(planner: &Planner) -> Option<f64> {
     let profile = &planner.inspection().profile;
     let strips = planner.nominal_strips()?.as_slice().iter();

@@ -1,4 +1,4 @@
-//! Walls of long dives, block by block: a search of [`Wall`] looks at all of its samples.
+//! Splits the wall of a long dive into blocks, because a search of [`Wall`] scans all of its samples.
 
 use std::cell::RefCell;
 use std::collections::BTreeMap;
@@ -7,22 +7,22 @@ use super::truth::Truth;
 use super::wall::Wall;
 use crate::TruthError;
 
-/// Length of a block, and of the wall beyond it on either side that is searched with it, m.
+/// Length of a block, and of the overlap searched on either side of it, m.
 const BLOCK_M: f64 = 64.0;
 const BEYOND_M: f64 = 32.0;
-/// Longest way that is one block, m.
+/// Longest dive that is handled as a single block, m.
 const WHOLE_M: f64 = 256.0;
 
 /// The wall of a dive.
 pub(crate) struct Blocks {
-    /// Of a dive that isn't long.
+    /// Wall of a short dive.
     whole: Option<Wall>,
-    /// Of a long one, by number, as they are asked for.
+    /// Blocks of a long dive by number, built on demand.
     blocks: RefCell<BTreeMap<i64, Wall>>,
 }
 
 impl Blocks {
-    /// Of a dive's true samples; those of a long way are taken when they are asked for.
+    /// Wraps a dive's true samples. Blocks of a long dive are built on demand.
     ///
     /// Errors: as for [`Wall::new`].
     pub(crate) fn of(truth: &Truth) -> Result<Self, TruthError> {
@@ -31,7 +31,7 @@ impl Blocks {
         Ok(Self { whole, blocks: RefCell::default() })
     }
 
-    /// D of a stretch, m; infinite without a sample near it, or where samples can't be taken.
+    /// Hole diameter D of a stretch, m; infinite without a sample nearby, or if samples are rejected.
     pub(crate) fn hole_m(&self, truth: &Truth, from_m: f64, to_m: f64) -> f64 {
         if let Some(whole) = &self.whole {
             return whole.hole_m(from_m, to_m);
@@ -43,10 +43,10 @@ impl Blocks {
             let near = (begins_m - BEYOND_M)..(ends_m + BEYOND_M);
             let places =
                 truth.samples.iter().map(|sample| sample.place).filter(|[x_m, _]| near.contains(x_m));
-            // Samples that are numbers, which these are, are always taken.
+            // `Wall::new` rejects only samples that aren't numbers, and true samples always are numbers.
             Wall::new(places, truth.perimeter_m).unwrap_or_default()
         });
-        // A larger circle may hold samples from farther away.
+        // A larger circle may contain samples that lie outside this block and its overlap.
         Some(wall.hole_m(from_m, to_m)).filter(|hole_m| *hole_m < 2.0 * BEYOND_M).unwrap_or(f64::INFINITY)
     }
 }

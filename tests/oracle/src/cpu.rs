@@ -1,7 +1,8 @@
 //! CPU time of this thread.
 //!
-//! Wall time says little: on a loaded machine it was seen six to eight times CPU time. The clock of the thread's CPU time counts what
-//! the kernel does for it, too (page faults); `getrusage` tells both apart by sampling once in 4 ms, too coarse for what is measured.
+//! Wall time is unusable on a loaded machine: it was seen at six to eight times the CPU time. The thread's CPU clock
+//! includes kernel work for the thread, such as page faults. `getrusage` separates user and kernel time by sampling
+//! every 4 ms, which is too coarse here.
 
 use std::hint::black_box;
 
@@ -13,7 +14,7 @@ pub fn cpu_s() -> f64 {
     time.tv_sec as f64 + time.tv_nsec as f64 * 1e-9
 }
 
-/// What some work gives, and the CPU time that it takes, s.
+/// Runs some work and returns its result and the CPU time used, s.
 pub fn timed<R>(work: impl FnOnce() -> R) -> (R, f64) {
     let begun_s = cpu_s();
     let result = black_box(work());

@@ -1,9 +1,8 @@
-//! A dive simulated once, and replayed through the loop with any settings: what is reported, what it costs, and D_true of each
-//! section.
+//! Simulates a dive once, replays it with any settings, and compares the reported sections with D_true.
 //!
-//! The loop's chainage may be off as a whole (slack, the wheel's scale): sections are those of its chainage, which is also
-//! where a vehicle would be sent back to. Each is compared with the stretch of wall that it was: its bounds are moved by the
-//! median of the difference (true less estimated chainage of the vehicle) over the pings whose samples landed in or near it.
+//! The estimated chainage may have a constant offset (slack, wheel scale). Section bounds are in estimated chainage,
+//! because a vehicle would be sent back by it. For the comparison each section's bounds are shifted by the median of
+//! true minus estimated vehicle chainage, over the pings whose samples landed in or near the section.
 
 use std::cell::RefCell;
 use std::collections::BTreeMap;
@@ -30,13 +29,13 @@ use crate::blocks::Blocks;
 use crate::timed;
 use crate::truth::{Truth, TruthTaker};
 
-/// How far from a section samples still say how far off its chainage is, m.
+/// Samples up to this far from a section count for its chainage offset, m.
 const NEAR_M: f64 = 1.0;
 
-/// Packets that devices sent, in the order of their times.
+/// Packets sent by the devices, in order of time.
 #[derive(Debug, Default)]
 pub struct Packets {
-    /// Receive time, source, and where its bytes end.
+    /// Receive time, source and end offset of each packet's bytes.
     list: Vec<(MonoNs, u16, usize)>,
     bytes: Vec<u8>,
 }
@@ -57,18 +56,18 @@ impl Packets {
         self.list.is_empty()
     }
 
-    /// The packets from the first one on, for a loop.
+    /// Feed of all packets from the first, for a loop.
     pub fn feed(&self) -> PacketFeed<'_> {
         PacketFeed { packets: self, next: 0, from: 0 }
     }
 }
 
-/// Packets in memory as a source of packets.
+/// Packet source that reads from memory.
 #[derive(Debug)]
 pub struct PacketFeed<'a> {
     packets: &'a Packets,
     next: usize,
-    /// Where the next packet's bytes begin.
+    /// Offset of the next packet's bytes.
     from: usize,
 }
 
@@ -93,21 +92,21 @@ impl PacketSource for PacketFeed<'_> {
 
 /// A simulated dive.
 pub struct Recorded {
-    /// What its devices sent.
+    /// Packets sent by the devices.
     pub packets: Packets,
-    /// Where beams met the wall.
+    /// True places where beams met the wall.
     pub truth: Arc<Truth>,
-    /// Where the vehicle truly was.
+    /// True trajectory of the vehicle.
     pub scenery: Scenery,
     wall: Blocks,
-    /// D_true of stretches that were asked for, by the bits of their bounds.
+    /// Cache of D_true by the bits of the stretch's bounds.
     holes_m: RefCell<BTreeMap<[u64; 2], f64>>,
 }
 
-/// A section as it was judged, and as it truly was.
+/// A section as reported, with its true hole.
 #[derive(Debug, Clone)]
 pub struct JudgedSection {
-    /// What was reported.
+    /// Report of the section.
     pub report: SectionReport,
     /// D_true, m; infinite without a single sample.
     pub true_hole_m: f64,
@@ -115,7 +114,7 @@ pub struct JudgedSection {
     pub shift_m: f64,
 }
 
-/// A dive, reported and true.
+/// A dive as reported, with its truth.
 pub struct JudgedDive {
     /// Report of the loop.
     pub report: Report,
@@ -125,14 +124,14 @@ pub struct JudgedDive {
     pub sections: Vec<JudgedSection>,
 }
 
-/// Dives a scene; the loop is told the scene's vehicle file.
+/// Simulates a scene and replays it with the scene's own vehicle file.
 ///
 /// Errors: see [`TruthError`].
 pub fn dive(scene: &Scene) -> Result<JudgedDive, TruthError> {
     dive_believing(scene, &scene.vehicle)
 }
 
-/// Dives a scene, the loop being told another vehicle file, whose sensors must send the same bytes.
+/// Simulates a scene and replays it with another vehicle file, whose sensors must send the same bytes.
 ///
 /// Errors: see [`TruthError`].
 pub fn dive_believing(scene: &Scene, believed: &VehicleConfig) -> Result<JudgedDive, TruthError> {
@@ -140,9 +139,10 @@ pub fn dive_believing(scene: &Scene, believed: &VehicleConfig) -> Result<JudgedD
 }
 
 impl Recorded {
-    /// Simulates a scene. A pilot who heeds advice hears a loop that is told `believed`, which also has the profile for arc lengths.
+    /// Simulates a scene. A pilot who follows advice gets it from a loop configured with `believed`, which also
+    /// supplies the profile for arc lengths.
     ///
-    /// Errors: a scene that can't be simulated, or whose truth the oracle can't take.
+    /// Errors: the scene can't be simulated, or the oracle rejects its truth.
     pub fn of(scene: &Scene, believed: &VehicleConfig) -> Result<Self, TruthError> {
         let mut simulation = headrace_replay::simulation_believing(scene, believed, true)?;
         let mut taker = TruthTaker::new(scene, &simulation, &believed.tunnel.profile);
@@ -165,7 +165,7 @@ impl Recorded {
         })
     }
 
-    /// From the first to the last packet, s.
+    /// Time from the first to the last packet, s.
     pub fn duration_s(&self) -> f64 {
         let ends = self.packets.list.first().zip(self.packets.list.last());
         ends.map_or(0.0, |((first, ..), (last, ..))| last.since(*first).as_secs_f64())
@@ -177,14 +177,14 @@ impl Recorded {
         *self.holes_m.borrow_mut().entry(key).or_insert_with(|| self.wall.hole_m(&self.truth, from_m, to_m))
     }
 
-    /// Replays it with the settings of a vehicle file and judges what is reported by the truth.
+    /// Replays the dive with the settings of a vehicle file and compares its report with the truth.
     ///
     /// Errors: the loop can't be armed or driven.
     pub fn judged(&self, vehicle: &VehicleConfig) -> Result<JudgedDive, TruthError> {
         self.judged_with(vehicle, vehicle.navigation(), &mut |_| {})
     }
 
-    /// The same with another navigation; `note` sees the loop after each tick.
+    /// As [`Recorded::judged`], with another navigation; `note` sees the loop after each tick.
     ///
     /// Errors: the loop can't be armed or driven.
     pub fn judged_with(
@@ -196,7 +196,7 @@ impl Recorded {
         Ok(self.judge(&self.replayed(vehicle, navigation, note)?))
     }
 
-    /// A loop at the end of a replay, for [`Recorded::judge`].
+    /// Replays the dive and returns the loop at its end, for [`Recorded::judge`].
     ///
     /// Errors: the loop can't be armed or driven.
     pub fn replayed(
@@ -211,7 +211,7 @@ impl Recorded {
         Ok(dive)
     }
 
-    /// What a replayed loop reports, beside the truth.
+    /// Compares the report of a replayed loop with the truth.
     pub fn judge(&self, dive: &Loop) -> JudgedDive {
         let report = Report::of(dive);
         let shifts = dive.resource::<Seen>().map_or_else(Shifts::default, |seen| seen.shifts(&self.scenery));
@@ -224,14 +224,14 @@ impl Recorded {
         JudgedDive { report, truth: Arc::clone(&self.truth), sections }
     }
 
-    /// CPU time of a replay with the settings of a vehicle file, s; without arming and without the report.
+    /// CPU time of a replay with the settings of a vehicle file, without arming and report, s.
     ///
     /// Errors: the loop can't be armed or driven.
     pub fn cpu_s(&self, vehicle: &VehicleConfig) -> Result<f64, TruthError> {
         self.cpu_with_s(vehicle, vehicle.navigation(), Pace::default())
     }
 
-    /// The same with another navigation and length of ticks.
+    /// As [`Recorded::cpu_s`], with another navigation and tick length.
     ///
     /// Errors: the loop can't be armed or driven.
     pub fn cpu_with_s(
@@ -243,7 +243,7 @@ impl Recorded {
         Ok(self.timed_with(vehicle, navigation, pace)?.1)
     }
 
-    /// A loop at the end of a replay, and the CPU time of it, s.
+    /// Replays the dive and returns the loop at its end and the CPU time used, s.
     ///
     /// Errors: the loop can't be armed or driven.
     pub fn timed(&self, vehicle: &VehicleConfig) -> Result<(Loop, f64), TruthError> {
@@ -267,7 +267,7 @@ impl Recorded {
     }
 }
 
-/// A loop of a vehicle file, armed.
+/// Arms a loop with a vehicle file.
 ///
 /// Errors: see [`PluginError`].
 pub fn armed(
@@ -292,11 +292,11 @@ fn scenery_of(simulation: &Simulation) -> Result<Scenery, TruthError> {
     })
 }
 
-/// Of each placed sample: when, its chainage, the vehicle's; as estimated.
+/// Time, chainage and vehicle chainage of each placed sample, all as estimated.
 #[derive(Resource, Default)]
 struct Seen(Vec<(MonoNs, f64, f64)>);
 
-/// Copies how samples were placed, and touches nothing.
+/// Observer that copies how samples were placed and changes nothing.
 struct Watch;
 
 impl Plugin for Watch {
@@ -327,12 +327,12 @@ impl Seen {
     }
 }
 
-/// Estimated chainage of samples, and by how much more the vehicle's true chainage was, m; by chainage.
+/// Estimated chainage of samples with true minus estimated vehicle chainage, m; sorted by chainage.
 #[derive(Default)]
 struct Shifts(Vec<(f64, f64)>);
 
 impl Shifts {
-    /// The median about a section; of the nearest sample where there are none about it; 0 without any.
+    /// Median shift near a section, else the shift of the nearest sample, else 0.
     fn about(&self, from_m: f64, to_m: f64) -> f64 {
         let before = |x_m: f64| self.0.partition_point(|(sample_x_m, _)| *sample_x_m < x_m);
         let near = self.0.get(before(from_m - NEAR_M)..before(to_m + NEAR_M)).unwrap_or_default();

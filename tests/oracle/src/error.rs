@@ -1,36 +1,36 @@
-//! Why a dive has no truth.
+//! Errors of a comparison with the truth.
 
 use headrace_monitor::PluginError;
 use headrace_replay::SimulationError;
 use headrace_replay::drive::DriveError;
 
-/// Why a dive can't be held against its truth.
+/// Reason why a dive can't be compared with its truth.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum TruthError {
-    /// A scene can't be simulated.
+    /// The scene can't be simulated.
     #[error("measuring a scene: {0}")]
     Simulation(#[from] SimulationError),
-    /// A loop can't be armed.
+    /// The loop can't be armed.
     #[error("arming a loop to measure: {0}")]
     Arming(#[from] PluginError),
-    /// A loop can't be driven.
+    /// The loop can't be driven.
     #[error("driving a loop to measure: {0}")]
     Driving(#[from] DriveError),
-    /// The oracle can't take a truth.
+    /// The oracle rejects the truth.
     #[error("taking the true hole of {what}: {why}")]
     Oracle {
-        /// Of what.
+        /// Rejected item.
         what: String,
-        /// Why not.
+        /// Reason.
         why: String,
     },
-    /// A figure can't be had.
+    /// A figure can't be computed.
     #[error("measuring {what}: {why}")]
     Figure {
-        /// Of what.
+        /// Name of the figure.
         what: String,
-        /// Why not.
+        /// Reason.
         why: String,
     },
 }

@@ -1,5 +1,7 @@
-//! D_true: D of the places where beams truly met the wall. By Voronoi vertices and edges of a triangulation that the program's own
-//! search for holes doesn't use, on arc lengths that share no ray casting with it; and simulated dives whose verdicts are held against it.
+//! Computes D_true, the hole diameter D over the places where beams truly met the wall.
+//!
+//! It uses Voronoi vertices and edges of a triangulation, and arc lengths without ray casting; the program shares
+//! neither. Simulated dives are compared with it.
 
 mod blocks;
 mod cpu;

@@ -1,19 +1,20 @@
-//! Arc lengths of a profile by its outline alone: many points of the curve, and the ray that passes between two of them.
+//! Arc lengths from a profile's outline alone: many points of the curve, and the ray that passes between two of them.
+//!
 //! It shares no ray casting with the program.
 
 use headrace_geometry::math::{self, TAU};
 use headrace_geometry::tunnel::{Profile, Yz};
 
-/// Points of the outline: chords, and those that cut a corner, are then within a hundredth of a millimetre of the curve of any tunnel.
+/// Number of outline points. Chords, also those that cut a corner, stay within 0.01 mm of the curve of any tunnel.
 const POINTS: u32 = 200_000;
 
 /// A profile's outline about its reference point, by angle.
 pub struct Outline {
     reference: Yz,
     perimeter_m: f64,
-    /// Angle of the first point.
+    /// Angle of the first point, rad.
     from_rad: f64,
-    /// Angle beyond the first point, place and arc length; angles grow.
+    /// Angle from the first point, place and arc length, in order of angle.
     points: Vec<(f64, Yz, f64)>,
 }
 
@@ -47,7 +48,7 @@ impl Outline {
             self.points.partition_point(|(angle, ..)| *angle <= turned).clamp(1, self.points.len() - 1);
         let (_, a, arc_a_m) = self.points[after - 1];
         let (_, b, arc_b_m) = self.points[after];
-        // How far either end of the chord lies beside the ray: the crossing divides it in that ratio.
+        // Distances of both ends of the chord from the ray: the crossing divides the chord in their ratio.
         let beside =
             |p: Yz| towards[0] * (p[1] - self.reference[1]) - towards[1] * (p[0] - self.reference[0]);
         let (left, right) = (beside(a), beside(b));

@@ -1,7 +1,7 @@
-//! Where beams truly met the wall, from the simulator's ground truth.
+//! Collects the places where beams truly met the wall, from the simulator's ground truth.
 //!
-//! A return is of the wall where its beam's axis met something that stays (wall, boulder, opening's side), within the head's range,
-//! and no effect put another sound or nothing in its place ([`REPLACING`]).
+//! A return counts as wall if its beam's axis met something fixed (wall, boulder, side of an opening) within the
+//! head's range, and if no effect in [`REPLACING`] replaced or removed it.
 
 use headrace_geometry::math;
 use headrace_geometry::time::MonoNs;
@@ -13,7 +13,7 @@ use super::wall::{Place, Wall};
 use crate::TruthError;
 use crate::outline::Outline;
 
-/// Effects that put another sound, or none, in place of the wall's return, or spoil its bytes.
+/// Effects that replace or remove the wall's return, or corrupt its bytes.
 pub const REPLACING: [&str; 10] = [
     "occlusion",
     "near_returns",
@@ -26,7 +26,7 @@ pub const REPLACING: [&str; 10] = [
     "device_faults",
     "stuck_range",
 ];
-/// What those effects change of a return that is no longer the wall's.
+/// Properties that those effects change in a replaced return.
 const REPLACED: [&str; 2] = ["range_m", "wrong_bytes"];
 
 /// A place where a beam truly met the wall.
@@ -40,18 +40,18 @@ pub struct TrueSample {
     pub place: Place,
 }
 
-/// What was truly so.
+/// Ground truth of a dive.
 #[derive(Debug, Clone)]
 pub struct Truth {
-    /// Where beams met the wall, source by source within a second.
+    /// Places where beams met the wall, grouped by source within each second.
     pub samples: Vec<TrueSample>,
-    /// Least and largest chainage of the vehicle, m.
+    /// Least and greatest chainage of the vehicle, m.
     pub way_m: [f64; 2],
     /// Length of the wall's circumference, m.
     pub perimeter_m: f64,
-    /// Returns of profiling heads, of the wall or not.
+    /// Number of returns of profiling heads, from the wall or not.
     pub returns: u64,
-    /// Largest difference of a sample's arc length from the one that the simulator's rays give, m.
+    /// Largest difference between a sample's arc length here and in the simulator, m.
     pub arc_off_m: f64,
 }
 
@@ -64,17 +64,17 @@ impl Truth {
     }
 }
 
-/// Takes a simulation's truth as it becomes known.
+/// Collects a simulation's truth while it runs.
 pub struct TruthTaker {
     outline: Outline,
     replacing: Vec<bool>,
-    /// Least and largest range of each source, m; none of sensors that are no heads.
+    /// Least and greatest range of each source, m; `None` for sensors that are no heads.
     reach_m: Vec<Option<[f64; 2]>>,
     truth: Truth,
 }
 
 impl TruthTaker {
-    /// For a simulation of this scene that notes its truth, arc lengths being told on this profile.
+    /// Prepares to collect the truth of this scene; arc lengths are measured on `profile`.
     pub fn new(scene: &Scene, simulation: &Simulation, profile: &Profile) -> Self {
         let sound_mps = scene.vehicle.site.sound_speed_mps;
         let reach = |sensor: &SensorFacts| sensor.head.map(|head| head.reach_m(sound_mps));
@@ -94,7 +94,7 @@ impl TruthTaker {
         }
     }
 
-    /// Takes what has become known.
+    /// Collects the truth that is new since the last call.
     pub fn note(&mut self, simulation: &mut Simulation) {
         for row in simulation.take_truth() {
             let [least_m, most_m] = self.truth.way_m;
@@ -109,7 +109,7 @@ impl TruthTaker {
         }
     }
 
-    /// All that has been taken.
+    /// Returns everything collected.
     pub fn truth(self) -> Truth {
         self.truth
     }

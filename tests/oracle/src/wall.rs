@@ -1,14 +1,16 @@
-//! Largest empty circles on an unrolled wall, from all samples at once: Voronoi vertices of a Delaunay triangulation
-//! with exact predicates, and Voronoi edges where they cross the ends of a section. No cells, no search radius.
+//! Largest empty circles on an unrolled wall, from all samples at once.
+//!
+//! Candidates are the Voronoi vertices of a Delaunay triangulation with exact predicates, and Voronoi edges where
+//! they cross the ends of a section. There are no cells and no search radius.
 
 use headrace_geometry::math;
 use spade::{DelaunayTriangulation, HasPosition, Point2, Triangulation};
 
 use crate::TruthError;
 
-/// Smaller coordinates are zero: the triangulation's exact predicates take none below 1e-142.
+/// Smaller coordinates are set to zero, because the exact predicates accept none below 1e-142.
 const TINY_M: f64 = 1e-100;
-/// By how much rounding may make a circumradius too small, and move a centre, m.
+/// Largest error that rounding causes in a circumradius or a centre, m.
 const ROUNDING_M: f64 = 1e-6;
 
 /// A place: chainage and arc length, m.
@@ -39,14 +41,14 @@ pub struct Circle {
 pub struct Wall {
     perimeter_m: f64,
     samples: Vec<Place>,
-    /// The same and their images on either side, by arc length.
+    /// The samples and their images on either side, by arc length.
     images: Vec<Place>,
     /// Empty circles through three samples, the largest first.
     circles: Vec<Circle>,
 }
 
 impl Wall {
-    /// Takes samples as chainage and arc length, m, on a wall of this perimeter, m.
+    /// Builds the wall from samples (chainage and arc length, m) on this perimeter, m.
     ///
     /// Errors: a place that is no number, or farther away than any wall.
     pub fn new(samples: impl IntoIterator<Item = Place>, perimeter_m: f64) -> Result<Self, TruthError> {
@@ -68,7 +70,7 @@ impl Wall {
         self.samples.iter().map(distance).fold(f64::INFINITY, f64::min)
     }
 
-    /// The largest circle without a sample whose centre lies between two chainages; `None` without samples.
+    /// The largest empty circle whose centre lies between two chainages; `None` without samples.
     pub fn largest(&self, from_m: f64, to_m: f64) -> Option<Circle> {
         let ends = [self.largest_on(from_m)?, self.largest_on(to_m)?];
         let mut best = if ends[0].radius_m >= ends[1].radius_m { ends[0] } else { ends[1] };
@@ -84,15 +86,15 @@ impl Wall {
         Some(best)
     }
 
-    /// D of a stretch between two chainages, m: the diameter of that circle, infinite without samples.
+    /// D of a stretch between two chainages, m: the diameter of its largest empty circle, infinite without samples.
     pub fn hole_m(&self, from_m: f64, to_m: f64) -> f64 {
         self.largest(from_m, to_m).map_or(f64::INFINITY, |circle| 2.0 * circle.radius_m)
     }
 
-    /// The same with centres at one chainage: the highest point of the lower envelope of distances, which lies where two
-    /// samples are equally far.
+    /// The largest empty circle with its centre at one chainage. It lies where two samples are equally far: the
+    /// highest point of the lower envelope of distances.
     pub fn largest_on(&self, x_m: f64) -> Option<Circle> {
-        // Squared distances are parabolas of one shape: each pair crosses once.
+        // Squared distances are parabolas of one shape, so each pair crosses once.
         let mut envelope: Vec<(f64, f64)> = Vec::new();
         let crossing = |left: &(f64, f64), right: &(f64, f64)| {
             0.5 * (left.0 + right.0) + (right.1 - left.1) / (2.0 * (right.0 - left.0))
@@ -125,7 +127,7 @@ impl Wall {
     }
 }
 
-/// Circumcircles of a Delaunay triangulation with their centres on the wall, the largest first.
+/// Circumcircles of a Delaunay triangulation with centres on the wall, the largest first.
 fn circles(images: &[Place], perimeter_m: f64) -> Result<Vec<Circle>, TruthError> {
     let tidy = |value: f64| if value.abs() < TINY_M { 0.0 } else { value };
     let vertices = images.iter().map(|[x, sigma]| Vertex(Point2::new(tidy(*x), tidy(*sigma)))).collect();
@@ -138,7 +140,7 @@ fn circles(images: &[Place], perimeter_m: f64) -> Result<Vec<Circle>, TruthError
     let mut circles: Vec<Circle> = triangles
         .inner_faces()
         .filter_map(|face| circle(face.positions().map(|at| [at.x, at.y])))
-        // A centre on the seam may be rounded to either side of it, and its image to the other.
+        // Rounding may move a centre on the seam to either side, and its image to the other.
         .filter(|circle| (-ROUNDING_M..perimeter_m + ROUNDING_M).contains(&circle.centre[1]))
         .map(|Circle { centre: [x, sigma], radius_m }| Circle {
             centre: [x, math::wrap(sigma, perimeter_m)],
@@ -149,7 +151,7 @@ fn circles(images: &[Place], perimeter_m: f64) -> Result<Vec<Circle>, TruthError
     Ok(circles)
 }
 
-/// The circle through three places, unless rounding leaves none.
+/// The circle through three places; `None` if they are collinear within rounding.
 fn circle([a, b, c]: [Place; 3]) -> Option<Circle> {
     let [b, c] = [b, c].map(|p| [p[0] - a[0], p[1] - a[1]]);
     let [bb, cc] = [b, c].map(|p| p[0] * p[0] + p[1] * p[1]);

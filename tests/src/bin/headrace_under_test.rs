@@ -1,4 +1,4 @@
-//! The program under test: the package's own build of it, since only binaries of this package are built for its tests.
+//! Builds the program as a binary of this package, since tests only get binaries of their own package.
 
 use std::process::ExitCode;
 

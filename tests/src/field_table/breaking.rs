@@ -1,4 +1,4 @@
-//! One device that breaks, from a number.
+//! The fault of one device, drawn from a seed.
 
 use headrace_geometry::math;
 use headrace_sensor::device::Sense;
@@ -6,31 +6,31 @@ use headrace_simulator::Scene;
 
 use crate::random_dives::Draw;
 
-/// Ways to break.
+/// Kinds of faults.
 pub const FAULTS: [&str; 5] = ["stick", "jump", "die", "return", "babble"];
-/// Senses whose devices break.
+/// Senses whose devices may fail.
 pub const SENSES: [Sense; 5] =
     [Sense::Head, Sense::Echosounder, Sense::Depth, Sense::Inertial, Sense::Tether];
 
 /// A device and its fault.
 #[derive(Debug, Clone)]
 pub struct Breakage {
-    /// What the device senses.
+    /// Sense of the device.
     pub sense: Sense,
     /// Its name.
     pub sensor: String,
-    /// One of [`FAULTS`]; what dies returns only as `return`.
+    /// One of [`FAULTS`]; a device that dies recovers only with `return`.
     pub fault: &'static str,
-    /// When, seconds of the dive.
+    /// Begin of the fault, seconds of the dive.
     pub from_s: f64,
-    /// For how long, seconds; to the end of the dive without.
+    /// Duration, seconds; `None` lasts to the end of the dive.
     pub for_s: Option<f64>,
-    /// By how much it jumps: m, of a head and an inertial unit degrees.
+    /// Size of a jump: m; degrees for a head or an inertial unit.
     pub size: f64,
 }
 
 impl Breakage {
-    /// The fault of a seed in a dive of this duration: all senses and faults in turns, the rest drawn.
+    /// The fault of a seed in a dive of this duration: senses and faults in rotation, the rest drawn.
     pub fn of(seed: u64, plain: &Scene, duration_s: f64) -> Self {
         let mut draw = Draw::new(seed ^ 0xb4ea_4a6e);
         let turn = usize::try_from(seed).unwrap();
@@ -43,7 +43,7 @@ impl Breakage {
         let from_s = duration_s * draw.between(0.2, 0.7);
         let length_s = math::exp(draw.between(0.0, math::ln(60.0)));
         let lasts = fault == "die" || draw.below(4) == 0;
-        // From what nobody would notice to what everybody must.
+        // From sizes that nothing can detect to sizes that must be detected.
         let [least, most] = match sense {
             Sense::Head | Sense::Inertial => [1.0, 40.0],
             _ => [0.05, 5.0],
@@ -59,7 +59,7 @@ impl Breakage {
         }
     }
 
-    /// The effect that makes it.
+    /// Effect of the simulator that causes the fault.
     pub fn effect(&self) -> String {
         let kind = if self.fault == "return" { "die" } else { self.fault };
         let size = if kind == "jump" { format!("size = {:.3}\n", self.size) } else { String::new() };

@@ -1,4 +1,4 @@
-//! What dives in each cell of the table: scenes, and the vehicle files that headrace is told.
+//! Cells of the field table: the scenes that are simulated, and the vehicle files that headrace reads.
 
 use std::fmt::Write as _;
 
@@ -26,23 +26,23 @@ pub struct Vehicle {
     pub target_m: f64,
     /// Layout of its heads.
     pub layout: &'static str,
-    /// Metres of a dive, unless told otherwise: more where passes are far apart.
+    /// Length of a dive unless stated otherwise, m; longer if passes are far apart.
     pub length_m: f64,
-    /// Places beyond the portal are at this share of their chainage, where its tunnel is shorter than 7 km.
+    /// Factor on the chainage of [`PLACES`] beyond the portal, for tunnels shorter than 7 km.
     pub far_share: f64,
-    /// Noise of its inertial unit, where nothing else is said.
+    /// Noise of its inertial unit, unless a condition changes it.
     unit: Unit,
-    /// The largest speed at which Eq. 16 keeps the target with what the vehicle hides, and no other margin, m/s. A number, so
-    /// that speeds beyond it stay the same when plans change.
+    /// Largest speed that keeps the target by Eq. 16 with the vehicle's own occlusion and no other margin, m/s. It is
+    /// a constant, so that speeds derived from it don't change with the planner.
     pub edge_mps: f64,
 }
 
-/// Inertial units, by what is simulated of them: what the vehicle file says, or leaves to the data sheet.
+/// Inertial units by their simulated noise, from the vehicle file or the data sheet.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Unit {
-    /// The one of the preset `xsens_mti600`: `plugins/imu_can/src/noise.rs`.
+    /// Noise of the preset `xsens_mti600`: `plugins/imu_can/src/noise.rs`.
     Xsens,
-    /// An autopilot's, of which nothing is known but the defaults of `[navigation]`.
+    /// An autopilot's unit, known only by the defaults of `[navigation]`.
     Autopilot,
 }
 
@@ -77,44 +77,44 @@ const fn vehicle(
     Vehicle { name, file, mode, target_m, layout, length_m, far_share, unit, edge_mps }
 }
 
-/// What is the matter with a dive.
+/// Condition of a dive: its sensor errors, wall and driving.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Condition {
-    /// Nothing but motion and what the vehicle hides.
+    /// No effects but motion and the vehicle's own occlusion.
     Clean,
-    /// Every sensor as its maker says.
+    /// Every sensor has the noise of its data sheet.
     DataSheet,
-    /// The same, and the vehicle file says of every noise what it truly is: no allowance for rough walls, tilt or slack.
+    /// As `DataSheet`, with a vehicle file that states the true noises: no allowance for rough walls, tilt or slack.
     Told,
-    /// A MEMS unit, slack, both as the vehicle file says; a wheel 0.5 % off, steel.
+    /// A MEMS unit and slack, both stated in the vehicle file; a wheel with 0.5 % error, and steel.
     Poor,
-    /// Returns lost in runs, near returns, second echoes.
+    /// Returns lost in runs, returns from before the wall, second echoes.
     Murk,
-    /// The wall has the bumps that vehicle files allow for.
+    /// The wall has the roughness that vehicle files allow for.
     Rough,
-    /// The wall is built some centimetres off the design, here in and there out.
+    /// The wall deviates from the design by some centimetres, inwards and outwards.
     AsBuilt,
-    /// A pilot who wanders, stops and goes back.
+    /// A pilot who wanders, stops and turns back.
     Lively,
-    /// The water's speed of sound is 4 % more than the vehicle file says.
+    /// The water's speed of sound is 4 % above that of the vehicle file.
     WrongSound,
-    /// A head is turned by 3 degrees from what the vehicle file says.
+    /// A head is turned by 3 degrees against the vehicle file.
     WrongMount,
-    /// The wall is 6 % wider than the vehicle file says.
+    /// The wall is 6 % wider than in the vehicle file.
     WrongWall,
-    /// What a sensor says comes 0.3 s late.
+    /// A sensor's data arrive 0.3 s late.
     WrongLatency,
-    /// The cable's counter counts 2 % too much.
+    /// The cable's counter reads 2 % too much.
     WrongCable,
-    /// The inertial unit is a MEMS one, and the vehicle file names a better one.
+    /// The inertial unit is a MEMS one, but the vehicle file names a better one.
     WrongUnit,
-    /// The cable hangs, and the vehicle file says that it is kept taut.
+    /// The cable hangs, but the vehicle file states that it is taut.
     WrongSlack,
-    /// One device sticks, jumps, dies, returns or babbles.
+    /// One device gets stuck, jumps, dies, returns or babbles.
     Broken,
 }
 
-/// All conditions with their names.
+/// All conditions with their names in the table.
 pub const CONDITIONS: [(&str, Condition); 16] = [
     ("clean", Condition::Clean),
     ("data-sheet", Condition::DataSheet),
@@ -134,28 +134,28 @@ pub const CONDITIONS: [(&str, Condition); 16] = [
     ("broken", Condition::Broken),
 ];
 
-/// Where dives begin: a name and a chainage, m.
+/// Start of a dive: its name and chainage, m.
 pub type Place = (&'static str, f64);
 
-/// The places; in shorter tunnels at a share of that ([`Vehicle::far_share`]).
+/// Start places; shorter tunnels use a share of the chainage ([`Vehicle::far_share`]).
 pub const PLACES: [Place; 3] = [("portal", 3.0), ("3000", 3000.0), ("6900", 6900.0)];
 
-/// How fast a vehicle goes.
+/// Speed and driving of a dive.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Driven {
-    /// At the speed that `plan --write` gives for mode and target.
+    /// At the speed from `plan --write` for mode and target.
     Planned,
-    /// The same, after the vehicle has stood where it begins.
+    /// The same, after the vehicle has been stationary at its start.
     Stood,
-    /// So many times the largest speed of Eq. 16, phases as planned.
+    /// At this factor times the largest speed of Eq. 16, with planned phases.
     Times(f64),
-    /// By a pilot who hears the live advice, follows it within 5 % and 3 s later, and never goes back.
+    /// By a pilot who follows the live advice within 5 % and 3 s later, and never goes back.
     Advised,
-    /// By one who is in a hurry all the way, 1.2 times the speed of Eq. 16, and then goes back for all that was missed.
+    /// By a pilot who drives at 1.2 times the speed of Eq. 16, and then goes back for every missed section.
     Back,
 }
 
-/// All with their names.
+/// All ways of driving with their names in the table.
 pub const DRIVEN: [(&str, Driven); 5] = [
     ("planned", Driven::Planned),
     ("stood", Driven::Stood),
@@ -167,31 +167,31 @@ pub const DRIVEN: [(&str, Driven); 5] = [
 /// A cell of the table.
 #[derive(Debug, Clone, Copy)]
 pub struct Cell {
-    /// What dives.
+    /// Vehicle.
     pub vehicle: Vehicle,
-    /// What is the matter.
+    /// Condition.
     pub condition: Condition,
-    /// Where it begins, m.
+    /// Chainage of the start, m.
     pub start_m: f64,
-    /// Where it was let in, if it is driven to `start_m` from there, m.
+    /// Chainage of its launch, if it drives from there to `start_m`, m.
     pub let_in_m: Option<f64>,
-    /// How fast it goes.
+    /// Driving.
     pub driven: Driven,
 }
 
-/// A dive of a cell: what is simulated, and what headrace is told.
+/// A dive of a cell: the simulated scene, and the vehicle file that headrace reads.
 pub struct CellDive {
-    /// Simulated.
+    /// The simulated scene.
     pub scene: Scene,
-    /// Has the vehicle file that headrace is told.
+    /// A scene with the vehicle file that headrace reads.
     pub believed: Scene,
 }
 
-/// The depth sensor's noise and counts, and what a compass scatters; heads and echosounders have tables of their own.
-/// Sources: `replay/simulator/src/calls/data_sheets.rs`.
+/// Noise and resolution of the depth sensor, and scatter of a compass; heads and echosounders have tables of their
+/// own. Source: `replay/simulator/src/calls/data_sheets.rs`.
 const DEPTH: &str = "depth_steps = {}\ndepth_noise = { noise_pa = 152 }\n";
-/// Noise and biases of the units, as the vehicle files say or leave to data sheets: `plugins/imu_can/src/noise.rs`, and the
-/// defaults of `[navigation]` in docs/reference/vehicle-file.md.
+/// Noise and biases of the units. Source: `plugins/imu_can/src/noise.rs`, and the defaults of `[navigation]` in
+/// docs/reference/vehicle-file.md.
 const XSENS: &str = "imu_noise = { gyro_degps_rthz = 0.0077, accel_mps2_rthz = 0.0006, attitude_deg = 0.3 }\n\
      imu_bias = { gyro_degps = 0.0022, accel_mps2 = 0.002, tau_s = 300, gyro_constant_degps = 0.05, accel_constant_mps2 = 0.02 }\n";
 const AUTOPILOT: &str = "imu_noise = { gyro_degps_rthz = 0.01, accel_mps2_rthz = 0.003, attitude_deg = 0.3 }\n\
@@ -199,34 +199,36 @@ const AUTOPILOT: &str = "imu_noise = { gyro_degps_rthz = 0.01, accel_mps2_rthz =
 /// Source: field.md, "poor".
 const MEMS: &str = "imu_noise = { gyro_degps_rthz = 0.007, accel_mps2_rthz = 0.001, attitude_deg = 0.3 }\n\
      imu_bias = { gyro_degps = 0.2, accel_mps2 = 0.02, tau_s = 300 }\n";
-/// What is said of it, and of a cable that hangs, in the vehicle file.
+/// Settings of the vehicle file for this unit.
 const MEMS_TOLD: &str = "gyro_noise_degps_rthz = 0.007\naccel_noise_mps2_rthz = 0.001\ngyro_bias_degps = 0.2\n\
      gyro_bias_time_s = 300\naccel_bias_mps2 = 0.02\naccel_bias_time_s = 300\n";
 const STEEL: &str = "magnetic_disturbance = { per_100m = 4, up_to_deg = 10, length_m = 6 }\n";
 const SLACK: &str = "tether_slack = { reach_m = 0.15, period_s = 30 }\n";
-/// Slack that is told: of a cable that doesn't hang, and of that one.
+/// Slack settings of the vehicle file, for a taut and for a hanging cable.
 const TAUT: &str = "slack_sd_m = 0.003\nslack_time_s = 10\n";
 const HANGS: &str = "slack_sd_m = 0.06\nslack_time_s = 10\n";
 
-/// What the data sheet's effects are, said in the vehicle file: counts of 2 cm and noise of 1 cm of heads with ranges of 10 m, noise
-/// of echosounders and depth (152 Pa), of attitudes; nothing of cable and its scale. Units say theirs by their preset.
+/// Settings of the vehicle file that state the noises of the `DataSheet` effects. They cover heads (resolution 2 cm,
+/// noise 1 cm, range 10 m), echosounders, depth (152 Pa) and attitudes. Cable and scale have next to none. Inertial
+/// units state theirs by their preset.
 const TRUE_NOISES: &str = "return_sd_m = 0.0116\necho_sd_m = 0.02\ndepth_sd_m = 0.0155\ntilt_sd_deg = 0.3\nattitude_sd_deg = 0.3\n\
      heading_sd_deg = 0.3\ndeviation_deg = 0.01\ntether_sd_m = 0.0001\nslack_sd_m = 0.0001\nslack_time_s = 10\ntether_scale_sd = 0.00001\n";
 
-/// Standard deviation of a rough wall's bumps: with the heads' own noise what vehicle files allow for, 3 cm, m.
+/// Standard deviation of a rough wall, m. Together with the heads' own noise it gives the 3 cm that vehicle files
+/// allow for.
 const ROUGH_M: f64 = 0.028;
 
-/// How far the wall is built off the design at most, m: some tolerances of linings add up to this.
+/// Largest deviation of the wall from the design, m: the sum of some lining tolerances.
 const OFF_DESIGN_M: f64 = 0.06;
 
-/// How long a vehicle stands that does so first, s.
+/// Stationary time before a dive that begins with a stop, s.
 const STANDS_S: f64 = 30.0;
 
-/// Speed of a vehicle that is driven to where it is to begin, m/s.
+/// Speed on the way from the launch to the start, m/s.
 const WAY_MPS: f64 = 0.3;
 
 impl Cell {
-    /// The dive of a seed over so many metres.
+    /// The dive of a seed with this length.
     pub fn dive(&self, seed: u64, length_m: f64) -> CellDive {
         let plain = self.plain(seed, length_m);
         let [planned_mps, speed_mps] = self.speeds_mps(&plain.vehicle);
@@ -237,24 +239,24 @@ impl Cell {
         CellDive { scene: parse(&text, &truly, seed), believed: parse(&text, &told, seed) }
     }
 
-    /// The speed that `plan` says over that of Eq. 16.
+    /// Planned speed over the speed of Eq. 16.
     pub fn plan_share(&self) -> f64 {
         self.plan_mps(&self.plain(1, 1.0).vehicle) / self.vehicle.edge_mps
     }
 
-    /// What breaks in the dive of a seed over so many metres.
+    /// The broken device in the dive of a seed with this length.
     pub fn broken(&self, seed: u64, length_m: f64) -> Breakage {
         let plain = self.plain(seed, length_m);
         let [_, speed_mps] = self.speeds_mps(&plain.vehicle);
         Breakage::of(seed, &plain, length_m / speed_mps)
     }
 
-    /// Without effects, at some speed.
+    /// The scene without effects, at any speed.
     fn plain(&self, seed: u64, length_m: f64) -> Scene {
         parse(&self.text(seed, length_m, 0.1, ""), &self.told(), seed)
     }
 
-    /// The vehicle file that headrace is told; the planned speed is yet to be filled in.
+    /// The vehicle file that headrace reads, without the planned speed.
     fn told(&self) -> String {
         let Vehicle { file, mode, target_m, layout, .. } = self.vehicle;
         let text = String::from_utf8(scenes::vehicle_file(file).unwrap()).unwrap();
@@ -270,7 +272,8 @@ impl Cell {
         told.replace("[heads]", &format!("[navigation]\n{}\n[heads]", self.told_navigation()))
     }
 
-    /// Who knows that a cable hangs, or doesn't, and what a unit is worth, says so in the vehicle file.
+    /// Navigation settings that state the cable's slack and the unit's noise, for conditions in which the pilot knows
+    /// them.
     fn told_navigation(&self) -> String {
         match self.condition {
             Condition::Poor => format!("{HANGS}{MEMS_TOLD}"),
@@ -279,14 +282,14 @@ impl Cell {
         }
     }
 
-    /// The vehicle as it truly is.
+    /// The vehicle file of the simulated vehicle.
     fn truly(&self, told: &str, plain: &Scene, seed: u64) -> String {
         let counts = |by: f64| {
             let count = 2000.0 * by;
             told.replace("counts_per_metre = 2000", &format!("counts_per_metre = {count:.1}"))
         };
         match self.condition {
-            // It counts fewer than told, so that nothing lies beyond the tunnel's end.
+            // The counter reads less than stated, so that no chainage lies beyond the tunnel's end.
             Condition::Poor => counts(0.995),
             Condition::WrongCable => counts(0.98),
             Condition::WrongMount => {
@@ -297,18 +300,18 @@ impl Cell {
         }
     }
 
-    /// Planned speed and speed driven, m/s.
+    /// Planned speed and driven speed, m/s.
     fn speeds_mps(&self, vehicle: &VehicleConfig) -> [f64; 2] {
         let planned_mps = HELD_SHARE * self.plan_mps(vehicle);
         match self.driven {
             Driven::Planned | Driven::Stood => [planned_mps, planned_mps],
             Driven::Times(times) => [planned_mps, times * self.vehicle.edge_mps],
-            // The most that the pilot would drive.
+            // The largest speed that the pilot would drive.
             Driven::Advised | Driven::Back => [planned_mps, 1.2 * self.vehicle.edge_mps],
         }
     }
 
-    /// The plan's speed, m/s.
+    /// Planned speed, m/s.
     fn plan_mps(&self, vehicle: &VehicleConfig) -> f64 {
         planned_mps(vehicle, &self.told().replace("PLANNED", "0.1"), self.vehicle.mode)
     }
@@ -364,7 +367,7 @@ impl Cell {
         )
     }
 
-    /// Bulges and hollows all round the wall, two to a metre of the way.
+    /// Bulges and hollows all round the wall, two per metre.
     fn as_built(&self, seed: u64, length_m: f64) -> String {
         let most_m = self.aside_m(OFF_DESIGN_M);
         let mut draw = Draw::new(seed ^ 0xb17);
@@ -372,7 +375,7 @@ impl Cell {
         let mut text = String::new();
         for _ in 0..math::round_to_i64(2.0 * (to_m - from_m)) {
             let [long_m, wide_m] = [draw.between(2.0, 6.0), self.aside_m(draw.between(1.0, 4.0))];
-            // None begins before the tunnel does.
+            // None begins before the tunnel's start.
             let at_m = draw.between(from_m, to_m).max(0.1 + long_m / 2.0);
             let [depth_m, arc_m] = [draw.between(-most_m, most_m), self.aside_m(draw.between(0.0, 36.0))];
             writeln!(
@@ -385,7 +388,7 @@ impl Cell {
         text
     }
 
-    /// No wandering into a pipe's wall.
+    /// Offset from the centre line that keeps clear of a pipe's wall, m.
     fn aside_m(&self, most_m: f64) -> f64 {
         if self.vehicle.name == "pipe" { 0.3 * most_m } else { most_m }
     }
@@ -426,8 +429,8 @@ impl Cell {
         }
     }
 
-    /// Stretches of 5 to 20 m, 2 to 6 m apart, in which 10 to 30 % of the heads' returns are lost in runs; 5 % come from before the
-    /// wall in clusters, and some by way of a second wall. Source: field.md, "murk".
+    /// Murky stretches of 5 to 20 m, 2 to 6 m apart. In them 10 to 30 % of the heads' returns are lost in runs. 5 %
+    /// come from clusters before the wall, and some by way of a second wall. Source: field.md, "murk".
     fn murk(&self, heads: &str, seed: u64, length_m: f64) -> String {
         if self.condition != Condition::Murk {
             return String::new();
@@ -452,7 +455,7 @@ impl Cell {
         murk
     }
 
-    /// The one thing that is wrong or breaks.
+    /// Effect of the condition's single error or broken device.
     fn wrong(&self, plain: &Scene, seed: u64, duration_s: f64) -> String {
         let mut draw = Draw::new(seed);
         match self.condition {
@@ -468,7 +471,7 @@ impl Cell {
     }
 }
 
-/// Sensors of a sense, by name.
+/// Names of the sensors of a sense.
 fn of_sense(scene: &Scene, sense: Sense) -> Vec<String> {
     scene
         .facts()
@@ -483,7 +486,7 @@ fn quoted(ids: &[String]) -> String {
     format!("{ids:?}")
 }
 
-/// A vehicle file one of whose heads is turned by 3 degrees about the vertical.
+/// Turns one head in a vehicle file by 3 degrees about the vertical.
 fn turned(file: &str, head: &str) -> String {
     let mut within = false;
     let mut lines = Vec::new();

@@ -1,4 +1,4 @@
-//! Figures of a cell: verdicts and sigmas against the truth.
+//! Figures of a cell: verdicts and standard deviations compared with the truth.
 
 use headrace_geometry::math;
 use headrace_monitor::report::AdviceReport;
@@ -17,66 +17,66 @@ pub const KINDS_OF_SOURCES: [(&str, Sense); 6] = [
     ("tether", Sense::Tether),
     ("dvl", Sense::Velocity),
 ];
-/// Beyond the target, sections at the ends of a dive have no neighbours on one side over so many metres: the length of the
-/// hull, and the way to the next pass.
+/// Length at the ends of a dive, beyond the target, in which sections miss neighbours on one side, m. It covers the
+/// hull and the distance to the next pass.
 const END_M: f64 = 2.0;
-/// A hole's centre is within its section where it is farther than this from the section's bounds, m.
+/// A hole belongs to a section if its centre is farther than this from the section's bounds, m.
 const FLANK_M: f64 = 0.005;
-/// A way that reaches into a section by no more than this isn't in it, m.
+/// A section counts as entered if the vehicle reaches farther into it than this, m.
 const TOUCH_M: f64 = 0.02;
 
-/// A section that passed although its true hole is over the target.
+/// A section that passed although its true hole exceeds the target.
 #[derive(Debug, Clone)]
 pub struct Falsely {
     /// Seed of the dive.
     pub seed: u64,
-    /// Where the section begins, m.
+    /// Chainage of the section's start, m.
     pub start_m: f64,
-    /// Diameter of its hole as told, its standard deviation, and in truth, m.
+    /// Diameter of its hole, m: as reported, standard deviation, true.
     pub hole_m: [f64; 3],
-    /// Where the hole is as told, chainage and clock.
+    /// Reported place of the hole, chainage and clock.
     pub at: (f64, String),
-    /// Returns that weren't taken for wall.
+    /// Number of returns that weren't accepted as wall.
     pub doubtful: u32,
 }
 
-/// What came of the dives of a cell.
+/// Figures of all dives of a cell.
 #[derive(Debug, Clone, Default)]
 pub struct Figures {
-    /// Dives.
+    /// Number of dives.
     pub dives: u32,
-    /// Sections, those at the ends included.
+    /// Number of sections, with those at the ends.
     pub sections: u32,
-    /// Of them, D_true is over the target.
+    /// Sections with D_true over the target.
     pub over: u32,
-    /// Of those, passed.
+    /// Passed sections with D_true over the target.
     pub passed_over: u32,
-    /// Passed although D_true is over 1.1 times the target.
+    /// Passed sections with D_true over 1.1 times the target.
     pub passed_far: u32,
-    /// Each of those that passed over the target.
+    /// Every passed section with D_true over the target.
     pub falsely: Vec<Falsely>,
-    /// D_true is below 0.9 times the target.
+    /// Sections with D_true below 0.9 times the target.
     pub under: u32,
-    /// Of those, failed.
+    /// Failed sections with D_true below 0.9 times the target.
     pub failed_under: u32,
-    /// Metres away from the ends.
+    /// Length without the ends, m.
     pub inner_m: f64,
-    /// Of them, passed, failed, can't say, open.
+    /// Length without the ends by verdict, m: passed, failed, can't say, open.
     pub verdicts_m: [f64; 4],
-    /// Of them, D_true is within the target.
+    /// Length without the ends with D_true within the target, m.
     pub passable_m: f64,
-    /// Of each inner section with a bounded hole of its own: D less D_true and sigma, m.
+    /// D less D_true, and its standard deviation, of each inner section with a bounded hole of its own, m.
     pub errors: Vec<[f64; 2]>,
-    /// For each kind of source, measurements used and the sum of their normalised innovations squared.
+    /// Number of measurements used and sum of their normalised innovations squared, by kind of source.
     pub innovations: [(f64, f64); KINDS_OF_SOURCES.len()],
-    /// Speeds advised away from the ends, m/s.
+    /// Advised speeds away from the ends, m/s.
     pub advised_mps: Vec<f64>,
-    /// Metres of the vehicle's way, and those of them that have a section in the report.
+    /// Length of the vehicle's trajectory, and the part of it with a section in the report, m.
     pub way_m: [f64; 2],
 }
 
 impl Figures {
-    /// Adds a dive from a chainage on, m.
+    /// Adds a dive, from the chainage `from_m` on.
     pub fn add(&mut self, dive: &JudgedDive, scene: &Scene, from_m: f64) {
         self.dives += 1;
         let target_m = dive.report.target_m;
@@ -156,7 +156,7 @@ impl Figures {
         if let Some(metres) = place.and_then(|place| self.verdicts_m.get_mut(place)) {
             *metres += length_m;
         }
-        // A circle centred on a bound is the flank of a neighbour's hole: twice as far off as the place is.
+        // A circle centred on a bound is the flank of a neighbour's hole; its distance counts twice.
         let is_own = section
             .report
             .hole_x_m
@@ -181,7 +181,7 @@ impl Figures {
         }
     }
 
-    /// Metres of the way that are told: those of the loop's chainage that have a section.
+    /// Adds the reported length: the part of the estimated chainage that has a section.
     fn tell(&mut self, dive: &JudgedDive) {
         let section_m = dive.report.section_m;
         let [Some(first), Some(last)] = [dive.sections.first(), dive.sections.last()] else {
@@ -189,7 +189,7 @@ impl Figures {
             return;
         };
         let from = math::floor_to_i64((dive.truth.way_m[0] - first.shift_m) / section_m);
-        // A way that ends where a section begins isn't in it.
+        // A trajectory that ends where a section begins doesn't enter it.
         let to = math::floor_to_i64((dive.truth.way_m[1] - last.shift_m - TOUCH_M) / section_m);
         let mut told: Vec<i64> = dive
             .sections
@@ -202,17 +202,17 @@ impl Figures {
         self.way_m[1] += told as f64 * section_m;
     }
 
-    /// Share of the inner metres with a verdict, by its number: passed, failed, can't say, open.
+    /// Share of the inner length with a verdict, by its number: passed, failed, can't say, open.
     pub fn share(&self, verdict: usize) -> f64 {
         self.verdicts_m[verdict] / self.inner_m
     }
 
-    /// Share of the inner metres with D_true within the target.
+    /// Share of the inner length with D_true within the target.
     pub fn passable(&self) -> f64 {
         self.passable_m / self.inner_m
     }
 
-    /// Root mean square of the errors over their sigmas.
+    /// Root mean square of errors over standard deviations.
     pub fn ratio_rms(&self) -> f64 {
         if self.errors.is_empty() {
             f64::NAN
@@ -221,7 +221,7 @@ impl Figures {
         }
     }
 
-    /// Share of errors within so many sigmas.
+    /// Share of errors within this many standard deviations.
     pub fn within(&self, sigmas: f64) -> f64 {
         let within = self.errors.iter().filter(|[error_m, sd_m]| error_m.abs() <= sigmas * sd_m).count();
         within as f64 / self.errors.len() as f64
@@ -232,12 +232,12 @@ impl Figures {
         rms(self.errors.iter().map(|[error_m, _]| *error_m))
     }
 
-    /// Median of the sigmas, m.
+    /// Median of the standard deviations, m.
     pub fn sd_m(&self) -> f64 {
         median(self.errors.iter().map(|[_, sd_m]| *sd_m))
     }
 
-    /// Median of the speeds advised, m/s.
+    /// Median of the advised speeds, m/s.
     pub fn advised_mps(&self) -> f64 {
         median(self.advised_mps.iter().copied())
     }
@@ -248,18 +248,18 @@ impl Figures {
         (used > 0.0).then(|| sum / used)
     }
 
-    /// Passed although D_true is over the target, of those where it is.
+    /// Share of sections over the target that passed.
     pub fn false_passes(&self) -> f64 {
         f64::from(self.passed_over) / f64::from(self.over.max(1))
     }
 
-    /// Failed although D_true is below 0.9 times the target, of those where it is.
+    /// Share of sections below 0.9 times the target that failed.
     pub fn false_fails(&self) -> f64 {
         f64::from(self.failed_under) / f64::from(self.under.max(1))
     }
 }
 
-/// The median; not a number of none.
+/// Median; not a number without values.
 fn median(of: impl Iterator<Item = f64>) -> f64 {
     let mut all: Vec<f64> = of.collect();
     all.sort_by(f64::total_cmp);

@@ -1,4 +1,4 @@
-//! The table of field dives: vehicles in conditions at places, each dive judged against its truth.
+//! The table of field dives: vehicles under conditions at places, each dive compared with its truth.
 
 pub mod breaking;
 mod cells;
@@ -9,7 +9,7 @@ pub use figures::{Falsely, Figures, KINDS_OF_SOURCES};
 
 use crate::truth;
 
-/// Figures of the dives of a cell with these seeds, each over so many metres.
+/// Figures of a cell's dives with these seeds and this length.
 pub fn figures(cell: &Cell, seeds: impl IntoIterator<Item = u64>, length_m: f64) -> Figures {
     let mut figures = Figures::default();
     for seed in seeds {

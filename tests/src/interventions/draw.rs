@@ -1,4 +1,4 @@
-//! Dives with injected causes: what is drawn of them, and the files of a dive with some of them removed.
+//! Dives with injected causes: drawn from a seed, with their files when some of the causes are removed.
 
 use std::f64::consts::TAU;
 use std::fmt::Write as _;
@@ -8,14 +8,14 @@ use headrace_geometry::math;
 
 use crate::random_dives::Draw;
 
-/// Where dives begin, m.
+/// Chainage at which dives begin, m.
 pub(super) const START_M: f64 = 3.0;
-/// How far a vehicle that doesn't turn back too early goes on, or one that does goes back, m.
+/// Distance that a vehicle goes on beyond the far end, m. One that turns back too early returns by it instead.
 const ON_M: f64 = 4.5;
-/// Way over which it rolls when it is passed again rolled, m.
+/// Distance over which the vehicle rolls before a rolled pass, m.
 const ROLLS_OVER_M: f64 = 1.0;
 
-/// What gives a position; none of it behind the hull.
+/// Sensors that give a position; no hull hides them.
 const SENSORS: &str = r#"[[sensors]]
 id = "left"
 plugin = "ping1d"
@@ -49,38 +49,38 @@ plugin = "tether_hid"
 counts_per_metre = 2000
 "#;
 
-/// A cause as it is injected.
-#[expect(missing_docs, reason = "the variants say what their fields are")]
+/// An injected cause.
+#[expect(missing_docs, reason = "the variants name their fields")]
 #[derive(Debug, Clone, PartialEq)]
 pub enum Injected {
-    /// A stretch driven so many times as fast.
+    /// A stretch driven at this multiple of the speed.
     TooFast { over_m: [f64; 2], factor: f64 },
     /// A mode with coarser steps.
     AngularStep { mode: &'static str },
-    /// Returns are missing; keys of the effect.
+    /// Missing returns, with the keys of the effect.
     MissingReturns { keys: String },
-    /// A range setting that ends before the wall, m.
+    /// A range setting shorter than the distance to the wall, m.
     OutOfRange { range_m: u32 },
-    /// What is in the beams' way, which vehicle files know of anyway, really is.
+    /// Parts in the beams' way are real. Vehicle files declare them anyway.
     Occluded,
-    /// Beside the middle by [y, z], m.
+    /// Offset from the centre line by [y, z], m.
     Aside { over_m: [f64; 2], by_m: [f64; 2] },
-    /// Yaw to and fro.
+    /// Oscillating yaw.
     Swing { over_m: [f64; 2], yaw_deg: f64, every_s: f64 },
-    /// Offsets of the heads, degrees.
+    /// Phase offsets of the heads, degrees.
     Phase { offsets_deg: Vec<f64> },
-    /// A head stands still now and then.
+    /// A head stalls now and then.
     HeadStalled { head: usize, per_hour: f64 },
-    /// Heads say nothing over a stretch.
+    /// Heads are silent over a stretch.
     HeadSilent { heads: Vec<usize>, over_m: [f64; 2] },
-    /// What gives the position says nothing over a stretch.
+    /// The source of position is silent over a stretch.
     PositionLost { sensor: &'static str, over_m: [f64; 2] },
-    /// The vehicle turns back at the end instead of going on.
+    /// The vehicle turns back before the end.
     NotPassed,
 }
 
 impl Injected {
-    /// The cause that it is.
+    /// The cause that the program should find.
     pub fn cause(&self) -> Cause {
         match self {
             Self::TooFast { .. } => Cause::TooFast,
@@ -102,9 +102,9 @@ impl Injected {
 #[derive(Debug, Clone)]
 struct Tunnel {
     keys: String,
-    /// From the middle to the farthest wall, m.
+    /// Distance from the centre line to the farthest wall, m.
     far_m: f64,
-    /// From the middle to the nearest wall, m.
+    /// Distance from the centre line to the nearest wall, m.
     near_m: f64,
     middle_m: [f64; 2],
     range_m: u32,
@@ -113,19 +113,19 @@ struct Tunnel {
 /// A dive drawn from a seed.
 #[derive(Debug, Clone)]
 pub struct Drawn {
-    /// Number that it was drawn from.
+    /// Seed.
     pub seed: u64,
-    /// Which noise its effects draw.
+    /// Number of the noise that its effects draw.
     noise: u64,
-    /// What is injected.
+    /// Injected causes.
     pub injected: Vec<Injected>,
     /// Chainage of the far end, m.
     pub end_m: f64,
-    /// Speed without anything injected, m/s.
+    /// Speed without injected causes, m/s.
     pub speed_mps: f64,
-    /// Target T, m; at first a guess.
+    /// Target T, m; an estimate at first.
     pub target_m: f64,
-    /// How much larger T is than the largest hole without anything injected.
+    /// Target over the largest hole without injected causes.
     pub margin: f64,
     tunnel: Tunnel,
     mode: &'static str,
@@ -133,20 +133,20 @@ pub struct Drawn {
     heads: Vec<String>,
     hull: &'static str,
     way: &'static str,
-    /// Heads hide the wall from each other in truth, too, whatever is injected.
+    /// Whether heads hide the wall from each other, independent of injected causes.
     in_each_others_way: bool,
     swaying: bool,
-    /// A stretch passed at most so fast, m/s.
+    /// A stretch with a speed limit, m/s.
     at_most: Option<([f64; 2], f64)>,
-    /// A stretch passed again in the end, once rolled so far to each side, degrees.
+    /// A stretch passed again at the end, rolled by this angle to each side, degrees.
     again: Option<([f64; 2], f64)>,
 }
 
-/// A turn of each mode, seconds, and its step, degrees. Source: Jorge et al. 2021, Table 2.
+/// Turn time, seconds, and step, degrees, of each mode. Source: Jorge et al. 2021, Table 2.
 const MODES: [(&str, f64, f64); 4] =
     [("medium", 10.8, 0.6), ("fast", 8.0, 0.9), ("faster", 6.6, 1.2), ("fastest", 4.8, 2.4)];
 
-/// A box on the vehicle's top that hides what is above the heads.
+/// A box on top of the vehicle that hides the wall above the heads.
 const HULL: &str = "[[hull]]\nleast_m = [-0.7, -0.25, 0.1]\nmost_m = [0.7, 0.25, 0.3]\n";
 
 fn tunnel(draw: &mut Draw) -> Tunnel {
@@ -190,7 +190,7 @@ fn heads(count: usize, side_by_side: bool) -> Vec<String> {
     (0..count).map(place).collect()
 }
 
-/// The eleven kinds that can be injected.
+/// The eleven causes that can be injected.
 pub const KINDS: [Cause; 11] = [
     Cause::TooFast,
     Cause::AngularStep,
@@ -221,7 +221,7 @@ impl Drawn {
         let mode = if has(Cause::AngularStep) { 1 + draw.below(2) } else { draw.below(4) };
         let (mode, turn_s, step_deg) = MODES[mode];
         let step_m = tunnel.far_m * step_deg.to_radians();
-        // The distance between passes against the steps along the wall.
+        // Distance between passes over the steps along the wall.
         let ratio = if has(Cause::AngularStep) { draw.between(0.8, 1.1) } else { draw.between(2.5, 5.0) };
         let gap_s = turn_s / count as f64;
         let speed_mps = (ratio * step_m / gap_s).clamp(0.03, 0.35);
@@ -251,13 +251,14 @@ impl Drawn {
         drawn
     }
 
-    /// The same dive with other noise, by its number.
+    /// The same dive with another noise, by its number.
     #[must_use]
     pub fn with_noise(&self, noise: u64) -> Self {
         Self { noise: self.seed + 1_000_000 * noise, ..self.clone() }
     }
 
-    /// The same dive without these causes, a stretch at most so fast (m/s), and perhaps passed again, rolled so far (degrees).
+    /// The same dive without these causes, and with a speed limit on a stretch (m/s). It is passed again, rolled by
+    /// an angle (degrees), if one is given.
     #[must_use]
     pub fn changed(
         &self,
@@ -313,7 +314,7 @@ impl Drawn {
             },
             Cause::Phase => {
                 let mut offsets_deg = vec![0.0; count];
-                // All but the first nearly together.
+                // All heads but the first are nearly in phase with each other.
                 for (head, offset_deg) in offsets_deg.iter_mut().enumerate().skip(1) {
                     let together_deg = 360.0 * head as f64 / count as f64;
                     *offset_deg = math::wrap_signed(together_deg * draw.between(0.7, 1.0), 360.0);
@@ -338,7 +339,7 @@ impl Drawn {
         }
     }
 
-    /// The vehicle file with what `is_in` of the injected causes.
+    /// Vehicle file with the injected causes that `is_in` selects.
     pub fn vehicle(&self, is_in: &dyn Fn(usize) -> bool) -> String {
         let (mut mode, mut range_m) = (self.mode, self.tunnel.range_m);
         for injected in self.present(is_in) {
@@ -364,7 +365,7 @@ impl Drawn {
         text + SENSORS
     }
 
-    /// The scene file with what `is_in` of the injected causes.
+    /// Scene file with the injected causes that `is_in` selects.
     pub fn scene(&self, is_in: &dyn Fn(usize) -> bool) -> String {
         let path = self.path(is_in);
         let mut text = format!("seed = {}\nvehicle = \"vehicle.toml\"\n{}", self.noise, path.text());
@@ -416,7 +417,8 @@ impl Drawn {
         let last_m = if turns_back { self.end_m - ON_M } else { self.end_m + ON_M };
         points.push(self.point(&|_| false, last_m, last_m));
         if let Some(([from_m, to_m], roll_deg)) = self.again {
-            // Heads apart along the hull are in phase on the way there alone: who is to be rolled to each side goes over it twice.
+            // Heads apart along the hull are in phase in the forward direction only, so a pass rolled to each side
+            // needs two forward runs.
             let from_m = from_m.max(START_M);
             let to_m = to_m.min(self.end_m + ON_M);
             let sides_deg: &[f64] = if roll_deg > 0.0 { &[-roll_deg, roll_deg] } else { &[0.0] };
@@ -444,7 +446,7 @@ impl Drawn {
                 Injected::TooFast { over_m, factor } if (over_m[0]..over_m[1]).contains(&before_m) => {
                     point.speed_mps *= factor;
                 }
-                // Reached, and left again, within what the neighbouring points leave.
+                // The offset is reached, and left again, within the distance to the neighbouring points.
                 Injected::Aside { over_m, by_m } if (over_m[0]..=over_m[1]).contains(&x_m) => {
                     point.place_m = [point.place_m[0] + by_m[0], point.place_m[1] + by_m[1]];
                 }
@@ -464,7 +466,7 @@ impl Drawn {
     }
 }
 
-/// A point of a path, and the speed towards it.
+/// A point of a path, with the speed on the way to it.
 #[derive(Debug, Clone, Copy)]
 struct Point {
     x_m: f64,
@@ -490,7 +492,7 @@ impl Path {
         text
     }
 
-    /// When the vehicle first reaches a chainage, seconds of the dive.
+    /// Time at which the vehicle first reaches a chainage, seconds of the dive.
     fn time_s(&self, x_m: f64) -> f64 {
         let mut at_s = 0.0;
         for pair in self.0.windows(2) {
@@ -508,7 +510,7 @@ impl Path {
     }
 }
 
-/// The effect of an injected cause that is one.
+/// Writes the simulator effect of an injected cause, if it has one.
 fn effect(injected: &Injected, path: &Path, count: usize, text: &mut String) {
     let dies = |sensors: &str, over_m: [f64; 2]| {
         let [from_s, to_s] = over_m.map(|x_m| path.time_s(x_m));

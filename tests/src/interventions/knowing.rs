@@ -1,5 +1,7 @@
-//! What the best of tellers could tell: one who knows what was injected, and simulates the very dive without each of it, with other noise than
-//! the judge. How often it is right bounds what can be told from a dive.
+//! Upper bound for finding causes, from a reference that knows the injected causes.
+//!
+//! The reference simulates the same dive without each cause, with other noise than the judge. The share of its right
+//! answers bounds the answers of any method.
 
 use std::collections::BTreeMap;
 
@@ -8,20 +10,20 @@ use headrace_coverage::Cause;
 use super::matrix::Count;
 use super::{Intervened, Right, hole_at_m, report, right};
 
-/// Noises that it tries.
+/// Number of noises that the reference tries.
 const NOISES: u64 = 3;
 
-/// How often a teller who knows all but the noise is right about dives with two causes.
+/// Right answers of the reference for dives with two causes; it knows everything but the noise.
 #[derive(Debug, Default, Clone, Copy)]
 pub struct Knowing {
-    /// Stretches.
+    /// All stretches.
     pub stretches: Count,
-    /// Stretches whose true set is two.
+    /// Stretches whose true set has two causes.
     pub pairs: Count,
 }
 
 impl Knowing {
-    /// Adds a dive; one with a single cause says nothing.
+    /// Adds a dive; dives with a single cause are ignored.
     pub fn add(&mut self, dive: &Intervened) {
         if dive.drawn.injected.len() < 2 {
             return;
@@ -46,7 +48,7 @@ impl Knowing {
         }
     }
 
-    /// Adds up.
+    /// Returns the sum.
     #[must_use]
     pub fn and(self, other: Self) -> Self {
         Self { stretches: self.stretches.and(other.stretches), pairs: self.pairs.and(other.pairs) }
@@ -54,7 +56,7 @@ impl Knowing {
 }
 
 impl Intervened {
-    /// The sets of causes that are right of each section, had the noise of the dives without each cause been another one.
+    /// Right sets of causes of each section, simulated with another noise.
     fn with_noise(&self, noise: u64) -> Vec<Right> {
         let drawn = self.drawn.with_noise(noise);
         let without = [0, 1].map(|k| report(&drawn, &|other| other != k));

@@ -1,4 +1,4 @@
-//! Confusion matrix: causes told against true ones.
+//! Confusion matrix: displayed causes against true ones.
 
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
@@ -10,9 +10,9 @@ use super::{Intervened, Right};
 /// Counts of answers.
 #[derive(Debug, Default, Clone, Copy)]
 pub struct Count {
-    /// All.
+    /// Number of answers.
     pub all: u32,
-    /// Right ones.
+    /// Number of right answers.
     pub right: u32,
 }
 
@@ -22,41 +22,41 @@ impl Count {
         self.right += u32::from(right);
     }
 
-    /// The sum.
+    /// Returns the sum.
     #[must_use]
     pub(super) fn and(self, other: Self) -> Self {
         Self { all: self.all + other.all, right: self.right + other.right }
     }
 
-    /// "3 of 4 (75.0 %)".
+    /// Text such as "3 of 4 (75.0 %)".
     pub fn text(self) -> String {
         format!("{} of {} ({:.1} %)", self.right, self.all, 100.0 * self.share())
     }
 
-    /// Share of right ones; 1 of nothing.
+    /// Share of right answers; 1 without answers.
     pub fn share(self) -> f64 {
         if self.all == 0 { 1.0 } else { f64::from(self.right) / f64::from(self.all) }
     }
 }
 
-/// Told against true, of dives with one cause and with two, by section and by stretch.
+/// Displayed against true causes, for dives with one cause and with two, by section and by stretch.
 #[derive(Debug, Default)]
 pub struct Matrix {
-    /// By number of injected causes less one.
+    /// Sections, by number of injected causes less one.
     pub sections: [Count; 2],
-    /// The same of stretches.
+    /// Stretches, by number of injected causes less one.
     pub stretches: [Count; 2],
-    /// Stretches of which a set of two is true.
+    /// Stretches whose true set has two causes.
     pub pairs: Count,
-    /// Stretches whose true set is two, that are told right or nearly: see [`super::Judged::is_close`].
+    /// Stretches whose true set has two causes, displayed right or nearly right: see [`super::Judged::is_close`].
     pub close_pairs: Count,
-    /// Stretches told as at most one run.
+    /// Stretches displayed as at most one run.
     pub one_run: Count,
-    /// Dives of which nothing failed.
+    /// Dives without a failed section.
     pub idle: u32,
-    /// By true cause (of dives with one) and told ones: sections and stretches.
+    /// Sections and stretches by true and displayed cause, for dives with one cause.
     told: BTreeMap<(String, String), [u32; 2]>,
-    /// The same of dives with two, wrong ones only.
+    /// Wrong ones by true and displayed cause, for dives with two causes.
     wrong: BTreeMap<(String, String), u32>,
 }
 
@@ -104,7 +104,8 @@ impl Matrix {
 
     /// The matrix as text.
     pub fn text(&self) -> String {
-        let mut text = String::from("one cause injected: true cause, then told with sections/stretches\n");
+        let mut text =
+            String::from("one cause injected: true cause, then displayed causes with sections/stretches\n");
         let mut last = "";
         for ((right, told), [sections, stretches]) in &self.told {
             if right != last {
@@ -113,7 +114,7 @@ impl Matrix {
             }
             write!(text, " {told} {sections}/{stretches};").unwrap();
         }
-        text.push_str("\ntwo causes injected, wrong stretches: true, told, how many\n");
+        text.push_str("\ntwo causes injected, wrong stretches: true, displayed, number\n");
         for ((right, told), stretches) in &self.wrong {
             writeln!(text, "  {right:<45} {told:<35} {stretches}").unwrap();
         }
@@ -122,8 +123,11 @@ impl Matrix {
             ("stretches, one cause", self.stretches[0]),
             ("sections, two causes", self.sections[1]),
             ("stretches, two causes", self.stretches[1]),
-            ("of these stretches whose true set is two", self.pairs),
-            ("the same, or what is told alone brings holes within 1.05 of the target", self.close_pairs),
+            ("of these, stretches with a true set of two causes", self.pairs),
+            (
+                "the same, or a displayed cause whose removal brings holes within 1.05 of the target",
+                self.close_pairs,
+            ),
             ("stretches of at most one run", self.one_run),
         ] {
             writeln!(text, "{what}: {}", count.text()).unwrap();

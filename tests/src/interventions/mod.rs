@@ -1,9 +1,8 @@
-//! Causes by intervention: dives with injected causes, simulated with and without each of them, against what the loop puts
-//! its fails down to.
+//! Judges displayed causes by intervention: dives are simulated with and without each of their injected causes.
 //!
-//! The true cause of a failed section is the injected one whose removal brings its hole within the target, and of two that
-//! both must go, the set of both. Where either alone suffices, either is right. Nothing of how the program finds causes is
-//! used here: simulations alone decide.
+//! The true cause of a failed section is the injected one whose removal brings its hole within the target. If both of
+//! two must be removed, their set is the true cause. If removing either is enough, either is right. Only simulations
+//! decide; the program's search for causes isn't used.
 
 mod draw;
 mod knowing;
@@ -19,43 +18,43 @@ pub use knowing::Knowing;
 pub use matrix::Matrix;
 pub use remedy::remedies;
 
-/// How far from the ends of the way sections are left out, m: there they fail whatever is injected.
+/// Sections this near to the ends of the trajectory are left out, m: they fail with any cause.
 const END_M: f64 = 2.0;
-/// Failed sections this near to each other are one stretch, m.
+/// Failed sections this near to each other form one stretch, m.
 const JOIN_M: f64 = 0.5;
 
-/// A hole up to so many times the target is about the target's.
+/// A hole up to this multiple of the target counts as close to the target.
 const CLOSE: f64 = 1.05;
 
-/// Sets of causes, any of which is right; each sorted.
+/// Alternative sets of causes, each sorted; any of them is right.
 pub type Right = Vec<Vec<Cause>>;
 
-/// A section that fails, why it does, and what was told.
+/// A failed section with its true and its displayed causes.
 #[derive(Debug, Clone)]
 pub struct Judged {
-    /// Chainage at which it begins and ends, m.
+    /// Chainage of its start and end, m.
     pub ends_m: [f64; 2],
-    /// The sets of causes that are right.
+    /// Sets of causes that are right.
     pub right: Right,
-    /// The causes told, sorted.
+    /// Displayed causes, sorted.
     pub told: Vec<Cause>,
-    /// Its run.
+    /// Number of its run.
     pub run: Option<u32>,
     /// Diameter of its hole, m.
     pub hole_m: f64,
-    /// The same without each of the injected causes alone; infinite where there is no hole to be measured.
+    /// Diameter without each of the injected causes alone, m; infinite if the hole can't be measured.
     pub without_m: Vec<f64>,
-    /// The figures behind what was told.
+    /// Evidence for the displayed causes.
     pub evidence: Evidence,
 }
 
 impl Judged {
-    /// Whether what was told is right.
+    /// Whether the displayed causes are right.
     pub fn is_right(&self) -> bool {
         self.right.contains(&self.told)
     }
 
-    /// Whether it is one of the injected causes, and the right answer hangs by less than a twentieth of the target.
+    /// Whether an injected cause is displayed, and the right answer depends on less than a twentieth of the target.
     pub fn is_close(&self, injected: &[Injected], target_m: f64) -> bool {
         let alone = injected.iter().zip(&self.without_m).find(|(cause, _)| self.told == [cause.cause()]);
         alone.is_some_and(|(_, hole_m)| *hole_m <= CLOSE * target_m)
@@ -64,11 +63,11 @@ impl Judged {
 
 /// A dive with its failed sections.
 pub struct Intervened {
-    /// What was drawn, with the target as it was set.
+    /// The drawn dive, with its final target.
     pub drawn: Drawn,
-    /// Report with everything injected.
+    /// Report with all injected causes.
     pub report: Report,
-    /// The failed sections whose fail the injected causes explain.
+    /// Failed sections that the injected causes explain.
     pub sections: Vec<Judged>,
 }
 
@@ -76,12 +75,12 @@ pub struct Intervened {
 pub struct Stretch<'a> {
     /// Its sections.
     pub sections: &'a [Judged],
-    /// The sets that are right for all of it.
+    /// Sets that are right for all of its sections.
     pub right: Right,
 }
 
 impl Stretch<'_> {
-    /// What was told of most of it.
+    /// Causes displayed for most of it.
     pub fn told(&self) -> &[Cause] {
         let count = |told: &[Cause]| self.sections.iter().filter(|section| section.told == told).count();
         self.sections
@@ -91,7 +90,7 @@ impl Stretch<'_> {
             .unwrap_or(&[])
     }
 
-    /// How many runs it was told as.
+    /// Number of runs that it is displayed as.
     pub fn runs(&self) -> usize {
         let mut runs: Vec<u32> = self.sections.iter().filter_map(|section| section.run).collect();
         runs.sort_unstable();
@@ -100,14 +99,14 @@ impl Stretch<'_> {
     }
 }
 
-/// Report of a dive with what `is_in` of the injected causes.
+/// Report of a dive with the injected causes that `is_in` selects.
 pub fn report(drawn: &Drawn, is_in: &dyn Fn(usize) -> bool) -> Report {
     let vehicle = drawn.vehicle(is_in);
     let scene = scenes::scene_from(&drawn.scene(is_in), &|_| Ok(vehicle.as_bytes().to_vec()));
     scenes::report(&scene)
 }
 
-/// Draws a dive and simulates it with and without each of the causes injected.
+/// Draws a dive and simulates it with and without each of its injected causes.
 pub fn intervene(seed: u64, kinds: &[usize]) -> Intervened {
     let mut drawn = Drawn::of(seed, kinds);
     let without_all = report(&drawn, &|_| false);
@@ -115,7 +114,7 @@ pub fn intervene(seed: u64, kinds: &[usize]) -> Intervened {
     let is_inner = |section: &&SectionReport| section.start_m >= inner_m[0] && section.end_m <= inner_m[1];
     let holes_m = without_all.sections.iter().filter(is_inner).filter_map(|section| section.hole_m);
     drawn.target_m = drawn.margin * holes_m.fold(0.0, f64::max);
-    // Holes don't depend on the target, verdicts do.
+    // Holes don't depend on the target, but verdicts do.
     let all = report(&drawn, &|_| true);
     let without: Vec<Report> = match kinds {
         [_, _] => (0..2).map(|k| report(&drawn, &|other| other != k)).collect(),
@@ -155,18 +154,18 @@ pub fn intervene(seed: u64, kinds: &[usize]) -> Intervened {
     Intervened { drawn, report: all, sections }
 }
 
-/// Diameter of the hole of the section that begins there, m; infinite where there is no hole to be measured.
+/// Diameter of the hole in the section that begins at `start_m`, m; infinite if it can't be measured.
 fn hole_at_m(report: &Report, start_m: f64) -> f64 {
     let same = report.sections.iter().find(|other| (other.start_m - start_m).abs() < 1e-6);
     same.and_then(|same| same.hole_m).unwrap_or(f64::INFINITY)
 }
 
-/// The causes told of a section, sorted.
+/// Displayed causes of a section, sorted.
 fn told(evidence: &Evidence) -> Vec<Cause> {
     evidence.causes.iter().collect()
 }
 
-/// Which sets of causes are right; `None` where the section fails without any of them.
+/// Right sets of causes; `None` if the section fails without any of them.
 fn right(drawn: &Drawn, alone: &[bool], together: bool) -> Option<Right> {
     if !together {
         return None;
@@ -183,7 +182,7 @@ fn right(drawn: &Drawn, alone: &[bool], together: bool) -> Option<Right> {
 }
 
 impl Intervened {
-    /// The stretches of the failed sections.
+    /// Stretches of the failed sections.
     pub fn stretches(&self) -> Vec<Stretch<'_>> {
         let mut stretches: Vec<Stretch<'_>> = Vec::new();
         let mut from = 0;
@@ -207,13 +206,13 @@ impl Intervened {
     }
 }
 
-/// The kinds injected into the dive of a number: one into every other dive, two into the others, all in turn.
+/// Kinds injected into the dive with this number: one in every other dive, two in the others, in rotation.
 pub fn kinds(seed: u64) -> Vec<usize> {
     let number = usize::try_from(seed).unwrap();
     if number.is_multiple_of(2) {
         return vec![number / 2 % KINDS.len()];
     }
-    // All pairs in turn.
+    // All pairs in rotation.
     let pairs: Vec<[usize; 2]> =
         (0..KINDS.len()).flat_map(|a| (a + 1..KINDS.len()).map(move |b| [a, b])).collect();
     pairs[number / 2 * 17 % pairs.len()].to_vec()

@@ -1,27 +1,27 @@
-//! Remedies: what is told to do about a run is done in the simulator, and its sections pass or don't.
+//! Simulates the displayed remedy of each run, to see whether its sections pass.
 
 use headrace_coverage::Action;
 use headrace_monitor::report::ReturnReport;
 
 use super::{Injected, Intervened, Judged, hole_at_m, report};
 
-/// How much more than the stretch is passed otherwise, m: heads sit apart along the hull.
+/// Length added at either end of a stretch that is passed otherwise, m: heads sit apart along the hull.
 const ROOM_M: f64 = 2.0;
-/// How far a vehicle is rolled that hides the wall from its heads, degrees.
+/// Roll angle for a vehicle that hides the wall from its own heads, degrees.
 const ROLLED_DEG: f64 = 75.0;
 
-/// A run with what was told to do about it, and whether that clears it.
+/// A run with its displayed remedy, and the result of the remedy.
 #[derive(Debug, Clone)]
 pub struct Remedied {
-    /// What was told.
+    /// Displayed remedy.
     pub told: ReturnReport,
-    /// Holes of its sections then, by where they begin, m; infinite where there is none to be measured.
+    /// Start and new hole diameter of each of its sections, m; infinite if it can't be measured.
     pub then_m: Vec<[f64; 2]>,
-    /// Whether all of its sections then meet the target.
+    /// Whether all of its sections meet the target afterwards.
     pub clears: bool,
 }
 
-/// Whether an action takes an injected cause away.
+/// Whether an action removes an injected cause.
 fn mends(action: Action, injected: &Injected) -> bool {
     match action {
         Action::FinerMode => matches!(injected, Injected::AngularStep { .. }),
@@ -37,7 +37,7 @@ fn mends(action: Action, injected: &Injected) -> bool {
     }
 }
 
-/// Does what was told about each run of a dive that has failed sections to be explained.
+/// Simulates the displayed remedy of each run that contains explained failed sections.
 pub fn remedies(dive: &Intervened) -> Vec<Remedied> {
     let of_run = |told: &ReturnReport| -> Vec<Judged> {
         dive.sections.iter().filter(|section| section.run == Some(told.run)).cloned().collect()
@@ -58,7 +58,7 @@ fn remedy(dive: &Intervened, told: &ReturnReport, sections: &[Judged]) -> Remedi
     } else {
         (has(Action::Again) && !turned_back).then_some(0.0)
     };
-    // Slower without a speed is the planned one, in other settings of the heads.
+    // "Slower" without a speed means the planned speed, with other settings of the heads.
     let at_most_mps =
         if told.at_most_mps > 0.0 || !has(Action::Slower) { told.at_most_mps } else { dive.drawn.speed_mps };
     let then = report(&dive.drawn.changed(&mended, over_m, at_most_mps, again_deg), &|_| true);

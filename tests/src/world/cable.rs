@@ -1,4 +1,5 @@
-//! Cables of the simulated machine: what the host's lines read and write, without ports, threads or a clock.
+//! Cables of the simulated machine: the data that the host's lines read and write, without ports, threads or a real
+//! clock.
 
 use std::collections::VecDeque;
 use std::io;
@@ -11,7 +12,7 @@ use headrace_geometry::time::{DurNs, MonoNs};
 use headrace_ports::{Host, Line, OpenError, OpenErrorKind, READ_BYTES};
 use headrace_sensor::connect::Connect;
 
-/// How an open line fails.
+/// Errors with which an open line may fail.
 pub const FAILURES: [io::ErrorKind; 4] = [
     io::ErrorKind::BrokenPipe,
     io::ErrorKind::ConnectionReset,
@@ -19,7 +20,7 @@ pub const FAILURES: [io::ErrorKind; 4] = [
     io::ErrorKind::PermissionDenied,
 ];
 
-/// The clock of the world, which stands until it is set.
+/// The world's clock, which changes only when it is set.
 #[derive(Default)]
 pub struct Clock(AtomicU64);
 
@@ -39,29 +40,29 @@ impl Clock {
 pub struct Cable {
     /// Address at which the machine opens it.
     pub connect: Connect,
-    /// What has arrived at the machine and hasn't been read.
+    /// Data that has arrived at the machine and isn't read yet.
     pub to_host: SegQueue<Vec<u8>>,
-    /// What the machine has sent.
+    /// Data sent by the machine.
     pub to_device: SegQueue<Vec<u8>>,
-    /// The device can't be opened.
+    /// Whether opening the device fails.
     pub refuses: AtomicBool,
-    /// Writing fails.
+    /// Whether writing fails.
     pub deaf: AtomicBool,
-    /// Grows when the connection breaks: lines opened before fail.
+    /// Number of times that the connection broke. Lines opened before a break fail.
     breaks: AtomicU64,
-    /// How it broke, an index of [`FAILURES`].
+    /// Kind of the last break, an index of [`FAILURES`].
     failure: AtomicU64,
-    /// Lines opened on it so far.
+    /// Number of lines opened so far.
     opened: AtomicU64,
-    /// Datagrams that the machine gave up unread since it was last asked.
+    /// Datagrams that the machine dropped unread since the last query.
     unread: AtomicU64,
 }
 
-/// Datagrams that the machine keeps for a port which doesn't read.
+/// Number of datagrams that the machine keeps for a port that doesn't read.
 const KEPT_DATAGRAMS: usize = 400;
 
 impl Cable {
-    /// A sound cable.
+    /// Creates a sound cable.
     pub fn new(connect: Connect) -> Self {
         let (to_host, to_device) = (SegQueue::new(), SegQueue::new());
         let [refuses, deaf] = [AtomicBool::new(false), AtomicBool::new(false)];
@@ -69,7 +70,7 @@ impl Cable {
         Self { connect, to_host, to_device, refuses, deaf, breaks, failure, opened, unread }
     }
 
-    /// A message of the device arrives. Datagrams are given up where too many wait.
+    /// Delivers a message of the device. Datagrams are dropped if too many wait.
     pub fn arrive(&self, bytes: Vec<u8>) {
         if matches!(self.connect, Connect::Udp { .. }) && self.to_host.len() >= KEPT_DATAGRAMS {
             self.unread.fetch_add(1, Ordering::SeqCst);
@@ -78,14 +79,14 @@ impl Cable {
         }
     }
 
-    /// Breaks the connection; what hasn't been read is lost.
+    /// Breaks the connection; unread data is lost.
     pub fn break_off(&self, failure: usize) {
         while self.to_host.pop().is_some() {}
         self.failure.store(failure as u64, Ordering::SeqCst);
         self.breaks.fetch_add(1, Ordering::SeqCst);
     }
 
-    /// Whether the machine has it open, and it isn't broken.
+    /// Whether the machine has the cable open, and it isn't broken.
     pub fn is_open(&self) -> bool {
         self.opened.load(Ordering::SeqCst) > self.breaks.load(Ordering::SeqCst)
     }
@@ -127,7 +128,7 @@ struct OpenCable {
     cable: Arc<Cable>,
     clock: Arc<Clock>,
     breaks: u64,
-    /// What didn't fit into the last read.
+    /// Rest of a message that didn't fit into the last read.
     left: VecDeque<u8>,
 }
 
@@ -167,7 +168,7 @@ impl Line for OpenCable {
         self.cable.unread.swap(0, Ordering::SeqCst)
     }
 
-    /// Asks as over UDP: with the length of the answer, which comes as a message.
+    /// Exchanges a message as over UDP: the answer arrives as one message with its length.
     fn exchange(
         &mut self,
         write: &[u8],

@@ -1,4 +1,4 @@
-//! Emulated devices at the far ends of the cables, and what becomes of what they send.
+//! Emulated devices at the far ends of the cables, with the faults of their frames.
 
 use std::collections::VecDeque;
 use std::sync::Arc;
@@ -14,7 +14,7 @@ use super::plan::{CableFault, Window};
 use crate::faulty::step;
 use crate::random::Random;
 
-/// Longest delay of a part of a frame.
+/// Longest delay of a part of a frame, ns.
 const LONGEST_DELAY_NS: usize = 80_000_000;
 
 /// A device at the end of its cable.
@@ -22,19 +22,19 @@ pub struct Device {
     emulated: Emulated,
     cable: Arc<Cable>,
     faults: Vec<Window<CableFault>>,
-    /// What is under way, with the time at which it arrives.
+    /// Parts under way, with their arrival times.
     under_way: VecDeque<(MonoNs, Vec<u8>)>,
     random: Random,
-    /// Whether bytes may be cut and joined anywhere, or each message comes whole or not at all.
+    /// Whether bytes may be split and joined anywhere, or each message arrives whole or not at all.
     is_stream: bool,
     was_broken: bool,
-    /// Some frames are lost without having been planned.
+    /// Whether unplanned frame losses occur.
     loses: bool,
     whole: u64,
 }
 
 impl Device {
-    /// A device that is switched on. With `loses` some of its frames are lost, without having been planned.
+    /// Creates a device that is switched on. `loses` adds unplanned frame losses.
     pub fn new(
         emulated: Emulated,
         cable: Arc<Cable>,
@@ -52,27 +52,28 @@ impl Device {
         &self.cable
     }
 
-    /// Frames that it has sent whole and in order over an open cable.
+    /// Number of frames sent whole and in order over an open cable.
     pub fn whole(&self) -> u64 {
         self.whole
     }
 
-    /// Whether its cable has only delayed and cut what it sent.
+    /// Whether the cable has only delayed and split frames.
     pub fn is_lossless(&self) -> bool {
         self.faults.iter().all(|fault| matches!(fault.what, CableFault::Cut | CableFault::Held))
     }
 
-    /// Whether nothing ever happened to it.
+    /// Whether the device has had no fault at all.
     pub fn is_untouched(&self) -> bool {
         self.faults.is_empty()
     }
 
-    /// Whether its connection is broken as planned.
+    /// Whether the planned break of the connection has happened.
     pub fn is_broken(&self) -> bool {
         self.was_broken
     }
 
-    /// Hears what the machine has sent, measures, sends, and lets arrive what is due. A `quiet` one sends nothing new.
+    /// Handles the machine's bytes, measures, sends, and delivers parts that are due. A `quiet` device sends nothing
+    /// new.
     pub fn step(&mut self, now: MonoNs, quiet: bool) {
         self.connection(now);
         let mut out = Vec::new();
@@ -133,7 +134,7 @@ impl Device {
             self.put(now, frame.clone());
         }
         if self.has(CableFault::Disordered, now) && self.random.one_in(4) {
-            // Overtaken by what is sent in the meantime.
+            // Messages sent in the meantime overtake this one.
             let late = now + DurNs(self.random.below(LONGEST_DELAY_NS) as i64);
             let place = self.under_way.partition_point(|(at, _)| *at <= late);
             return self.under_way.insert(place, (late, frame));
@@ -146,7 +147,7 @@ impl Device {
         self.put(arrives, frame);
     }
 
-    /// A stream loses some bytes of a frame, a message carrier the frame.
+    /// Loses some bytes of a frame on a stream, or the whole frame on a message carrier.
     fn lose_some(&mut self, now: MonoNs, mut frame: Vec<u8>) {
         if self.is_stream {
             let from = self.random.below(frame.len());
@@ -156,7 +157,7 @@ impl Device {
         }
     }
 
-    /// A frame arrives in parts.
+    /// Delivers a frame in parts.
     fn cut(&mut self, now: MonoNs, frame: &[u8]) {
         let mut rest = frame;
         let mut at = now;
@@ -170,14 +171,14 @@ impl Device {
         }
     }
 
-    /// Behind all that is under way: cables keep the order.
+    /// Queues a part behind all parts under way, because cables keep the order.
     fn put(&mut self, at: MonoNs, bytes: Vec<u8>) {
         let at = self.under_way.back().map_or(at, |(last, _)| at.max(*last));
         self.under_way.push_back((at, bytes));
     }
 }
 
-/// Lets a device hear and measure, in a vehicle that goes along the middle of a pipe of 3 m radius at 0.2 m/s.
+/// Lets a device receive and measure, in a vehicle that moves along the middle of a pipe of 3 m radius at 0.2 m/s.
 fn feel(device: &mut Emulated, heard: Option<&[u8]>, now: MonoNs, out: &mut Vec<Vec<u8>>) {
     match device {
         Emulated::Head(device) | Emulated::Echosounder(device) => {

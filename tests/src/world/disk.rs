@@ -1,4 +1,4 @@
-//! A disk in memory that fails as planned, and what is left on it after a kill or a power cut.
+//! A disk in memory that fails as planned, and its content after a kill or a power cut.
 
 use std::io;
 use std::path::{Path, PathBuf};
@@ -12,9 +12,9 @@ use super::plan::{DiskFault, Window};
 use super::sabotage::Sabotage;
 use crate::random::Random;
 
-/// Smallest unit that a power cut leaves whole.
+/// Smallest unit that a power cut leaves intact, bytes.
 const SECTOR_BYTES: usize = 512;
-/// Linux: input or output error, no space left on device.
+/// Linux error numbers: input or output error, no space left on device.
 const EIO: i32 = 5;
 const ENOSPC: i32 = 28;
 
@@ -22,30 +22,30 @@ enum Done {
     Created(PathBuf),
     Wrote(PathBuf, Vec<u8>),
     Synced(PathBuf),
-    /// A sync has failed: what wasn't synced reads as zeros.
+    /// A sync has failed: unsynced data reads as zeros.
     Lost(PathBuf),
     Removed(PathBuf),
 }
 
-/// The disk. Clones are the same disk.
+/// A simulated disk. Clones share its content.
 #[derive(Clone)]
 pub struct SimulatedDisk {
     clock: Arc<Clock>,
     faults: Arc<[Window<DiskFault>]>,
     done: Arc<SegQueue<Done>>,
-    /// Operations that have failed.
+    /// Operations that failed.
     failed: Arc<SegQueue<DiskFault>>,
     sabotage: Option<Sabotage>,
 }
 
-/// A file as left on the disk.
+/// A file left on the disk.
 #[derive(Debug, Clone, Default)]
 pub struct LeftFile {
     /// Its name.
     pub path: PathBuf,
     /// Its content.
     pub bytes: Vec<u8>,
-    /// Bytes that a power cut can't touch.
+    /// Number of bytes that a power cut can't damage.
     synced: usize,
 }
 
@@ -56,12 +56,12 @@ impl SimulatedDisk {
         Self { clock, faults: faults.into(), done, failed, sabotage }
     }
 
-    /// Operations that have failed so far.
+    /// Number of operations that failed so far.
     pub fn failures(&self) -> usize {
         self.failed.len()
     }
 
-    /// What is on the disk; after a power cut what wasn't synced is cut off or has holes.
+    /// Content of the disk. After a power cut, unsynced data is cut off or has holes.
     pub fn left(&self, power_cut: Option<&mut Random>) -> Vec<LeftFile> {
         let mut files: Vec<LeftFile> = Vec::new();
         while let Some(done) = self.done.pop() {
@@ -104,7 +104,7 @@ fn of<'a>(files: &'a mut [LeftFile], path: &Path) -> &'a mut LeftFile {
     files.iter_mut().find(|file| file.path == path).unwrap()
 }
 
-/// Sectors that weren't synced are there or not, each by itself; the length is anything from what was synced on.
+/// Keeps or drops each unsynced sector at random. The length becomes anything from the synced length on.
 fn tear(file: &mut LeftFile, random: &mut Random) {
     let unsynced = file.bytes.len() - file.synced;
     file.bytes.truncate(file.synced + random.below(unsynced + 1));

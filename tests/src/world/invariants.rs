@@ -1,13 +1,13 @@
-//! What must hold of every dive in a world, whatever went wrong.
+//! Invariants of every dive in a simulated world, whatever fails.
 
 use super::plan::{Ending, MachineFault};
 use super::{Line, Lived, Replayed};
 use crate::drops;
 
-/// A loop that runs takes what comes, recorded or not, within some steps.
+/// Longest time for which a running loop may leave packets waiting, recorded or not.
 const LONGEST_WAIT_NS: i64 = 500_000_000;
 
-/// What doesn't hold, as text.
+/// Broken invariants, as text.
 pub fn broken(lived: &Lived, replayed: &Result<Replayed, String>) -> Vec<String> {
     let mut broken: Vec<String> =
         lived.lines.iter().enumerate().filter_map(|(number, line)| of_line(lived, number, line)).collect();
@@ -21,7 +21,7 @@ pub fn broken(lived: &Lived, replayed: &Result<Replayed, String>) -> Vec<String>
     broken
 }
 
-/// No fault touches another device; no delay loses a frame; after all faults every device runs again.
+/// No fault affects another device, no delay loses a frame, and every device runs again after all faults.
 fn of_line(lived: &Lived, number: usize, line: &Line) -> Option<String> {
     let finished = lived.plan.ending == Ending::Finished;
     let is_of = |fault: MachineFault| matches!(fault, MachineFault::LoopStalls | MachineFault::PortsStall);
@@ -43,8 +43,8 @@ fn of_line(lived: &Lived, number: usize, line: &Line) -> Option<String> {
     Some(format!("device {number}: {what}: {line:?}"))
 }
 
-/// A log has what the loop took, in that order; what is missing was told, by the recorder and by the reader; what lines dropped before
-/// the loop could take it is stated; and nothing is said to be missing that isn't.
+/// Checks a log against the dive. It contains every packet that the loop took, in that order. Recorder and reader
+/// report every missing packet, and no other. Drops on a line before the loop are recorded.
 fn of_log(lived: &Lived, replayed: &Replayed) -> Vec<String> {
     let finished = lived.plan.ending == Ending::Finished;
     let (ours, theirs) = (&lived.consumed, &replayed.consumed);
@@ -56,7 +56,7 @@ fn of_log(lived: &Lived, replayed: &Replayed) -> Vec<String> {
     let mut hold = |holds: bool, what: &str| {
         if !holds {
             let losses = &replayed.losses;
-            broken.push(format!("{what}: {missing} of {} packets missing, told: {losses:?}", ours.len()));
+            broken.push(format!("{what}: {missing} of {} packets missing, reported: {losses:?}", ours.len()));
         }
     };
     hold(invented == 0, "the log has what the loop never took, or in another order");
@@ -72,7 +72,7 @@ fn of_log(lived: &Lived, replayed: &Replayed) -> Vec<String> {
         hold(dropped == lines_dropped, "the log doesn't say what the lines dropped");
         let untroubled = lived.disk_failures == 0 && skipped == 0;
         hold(!untroubled || summary.faults.is_empty(), "the recorder reports a fault that wasn't");
-        hold(!untroubled || losses.is_empty(), "losses are told, and the disk gave no trouble");
+        hold(!untroubled || losses.is_empty(), "losses are reported although the disk had no fault");
     }
     broken
 }

@@ -1,5 +1,7 @@
-//! A simulated world for faults: the true drivers, line services, loop and recorder on devices, cables, a disk and a clock that
-//! fail as one seed says. No thread, no port, no time but the world's: a seed that fails does so again.
+//! A simulated world for fault tests. Real drivers, line services, loop and recorder run on simulated devices,
+//! cables, disk and clock.
+//!
+//! One seed determines every failure. There are no threads, no ports and no real time, so a failing seed fails again.
 
 pub mod cable;
 pub mod device;
@@ -43,13 +45,13 @@ use disk::{LeftFile, SimulatedDisk};
 use plan::{BEGIN, Ending, MachineFault, Plan};
 pub use sabotage::Sabotage;
 
-/// Longest step of the world.
+/// Longest step of the world, ns.
 const LONGEST_STEP_NS: usize = 12_000_000;
-/// How long a finished dive waits for what is under way.
+/// Longest wait of a finished dive for data under way.
 const PATIENCE: DurNs = DurNs::from_millis(4_000);
-/// Capacity of the queue to the terminal, soon full.
+/// Capacity of the queue to the terminal; small, so that it fills soon.
 const NOTICES: usize = 4;
-/// What the recorder took longer ago is synced: half a second, and a step of the world.
+/// Age at which recorded packets are certainly synced: half a second plus one step of the world.
 const SYNC_PERIOD: DurNs = DurNs::from_millis(500 + 13);
 
 const TUNNEL: &str = r#"name = "a world of faults"
@@ -67,7 +69,7 @@ surface_above_floor_m = 8
 planned_speed_mps = 0.2
 "#;
 
-/// The sensors, by the tables of the vehicle file.
+/// Tables of the sensors in the vehicle file.
 const SENSORS: [&str; 6] = [
     "plugin = \"imagenex881\"\nconnect = \"tcp:10.0.0.1:4040\"\nmode = \"fastest\"\nrange_m = 5\n",
     "plugin = \"imagenex881\"\nconnect = \"serial:/dev/ttyS1\"\nmode = \"fastest\"\nrange_m = 5\n",
@@ -77,7 +79,7 @@ const SENSORS: [&str; 6] = [
     "plugin = \"tether_hid\"\nconnect = \"udp:10.0.0.2:9002\"\ncounts_per_metre = 2000\n",
 ];
 
-/// Size of the recorder's queue: so small that a stall of seconds fills it.
+/// Size of the recorder's queue, bytes; so small that a stall of seconds fills it.
 const QUEUE_BYTES: usize = 128 * 1024;
 
 /// The vehicle file of all worlds.
@@ -113,73 +115,73 @@ pub struct World {
     consumed: Vec<Consumed>,
     disk: SimulatedDisk,
     recorder: RecorderWorker,
-    /// Packets consumed when the recorder had emptied its queue, with the time, since its last trouble.
+    /// Number of packets consumed each time the recorder emptied its queue, with the time, since its last trouble.
     taken: VecDeque<(MonoNs, usize)>,
     is_failing: bool,
-    /// Packets that the recorder was too far behind to take.
+    /// Number of packets that the recorder skipped because it was too far behind.
     skipped: usize,
-    /// Since when packets have been waiting and the loop has taken none, and the longest that it did, as long as it ran.
+    /// Time since which packets wait while the loop takes none, and the longest such wait while the loop ran.
     waiting_since: Option<MonoNs>,
     longest_wait: DurNs,
     notices: NoticeReceiver,
-    /// Packets that must be in the log, whatever the end.
+    /// Number of packets that must be in the log, however the dive ends.
     certain: usize,
 }
 
-/// What a dive has come to.
+/// Result of a dive.
 pub struct Lived {
-    /// What went wrong.
+    /// Planned faults.
     pub plan: Plan,
-    /// All that the loop took, in its order.
+    /// Packets taken by the loop, in order.
     pub consumed: Vec<Consumed>,
     /// Digest of the results.
     pub digest: u64,
-    /// By device.
+    /// Lines, one for each device.
     pub lines: Vec<Line>,
-    /// What the recorder says of its recording; `None` where it was killed.
+    /// Summary of the recorder; `None` if it was killed.
     pub summary: Option<Summary>,
-    /// Operations of the disk that have failed.
+    /// Number of disk operations that failed.
     pub disk_failures: usize,
     /// Files of the recording.
     pub left: Vec<LeftFile>,
-    /// Of the packets consumed, those that must be in the log whatever the end.
+    /// Number of consumed packets that must be in the log, however the dive ends.
     pub certain: usize,
-    /// The longest time for which a running loop took nothing though packets waited.
+    /// Longest time for which a running loop took nothing although packets waited.
     pub longest_wait: DurNs,
 }
 
-/// What a replay of the files that are left comes to.
+/// Result of replaying the files that are left.
 pub struct Replayed {
-    /// All that the loop took.
+    /// Packets taken by the loop.
     pub consumed: Vec<Consumed>,
     /// Digest of the results.
     pub digest: u64,
-    /// What the player says is missing.
+    /// Losses reported by the player.
     pub losses: Vec<String>,
 }
 
-/// What came of a device's line.
+/// Result of a device's line.
 #[derive(Debug)]
 pub struct Line {
-    /// Nothing happened to it.
+    /// No fault affected it.
     pub untouched: bool,
-    /// Its cable only cut and delayed.
+    /// Its cable only split and delayed frames.
     pub lossless: bool,
-    /// Frames that it sent whole.
+    /// Number of frames sent whole.
     pub whole: u64,
-    /// Good frames that the loop found.
+    /// Number of good frames that the loop found.
     pub good: u64,
-    /// Its line's history.
+    /// History of the line.
     pub history: LineHistory,
 }
 
 impl World {
-    /// The world of a seed, before the dive.
+    /// Creates the world of a seed, before the dive.
     pub fn new(seed: u64) -> Self {
         Self::sabotaged(seed, None)
     }
 
-    /// The same with something that breaks an invariant.
+    /// As [`World::new`], with a sabotage that breaks an invariant.
     pub fn sabotaged(seed: u64, sabotage: Option<Sabotage>) -> Self {
         let mut random = Random(seed);
         let text = vehicle_text();
@@ -244,14 +246,14 @@ impl World {
         }
     }
 
-    /// The same world with a terminal that takes everything, or nothing.
+    /// The same world with a terminal that accepts everything, or nothing.
     #[must_use]
     pub fn with_terminal(mut self, stands: bool) -> Self {
         self.plan = self.plan.with_terminal(stands);
         self
     }
 
-    /// Lets the dive happen.
+    /// Runs the dive.
     pub fn live(mut self) -> Lived {
         while self.clock.now() < self.plan.end {
             self.step(false);
@@ -307,7 +309,8 @@ impl World {
         Duration::from_nanos(u64::try_from(self.clock.now().since(BEGIN).0).unwrap())
     }
 
-    /// Lets the recorder write. What it had taken half a second and a step ago is certain, unless its disk gave it trouble.
+    /// Lets the recorder write. Packets that it took more than half a second and a step ago are certain, unless its
+    /// disk failed.
     fn record(&mut self, now: MonoNs) {
         let since_begin = self.since_begin();
         let failures = self.disk.failures();
@@ -370,9 +373,9 @@ impl World {
 }
 
 impl Lived {
-    /// Replays what is left, from files in `folder`; `None` where nothing is.
+    /// Replays the files that are left, from `folder`; `None` without files.
     ///
-    /// Errors: the files can't be read as a log, with why.
+    /// Errors: the reason why the files can't be read as a log.
     pub fn replay(&self, folder: &Folder) -> Result<Replayed, String> {
         let name = |path: &Path| folder.path(path.file_name().unwrap().to_str().unwrap());
         let files: Vec<PathBuf> = self.left.iter().map(|file| name(&file.path)).collect();
@@ -413,7 +416,7 @@ fn app(vehicle: &VehicleConfig) -> App {
     app
 }
 
-/// The loop of a recorded dive, and its recorder.
+/// Creates the loop of a recorded dive and its recorder.
 fn assemble(
     vehicle: &VehicleConfig,
     text: &str,
@@ -441,9 +444,9 @@ fn assemble(
     (app.arm(vehicle.navigation()).unwrap(), worker, notices)
 }
 
-/// What a service's thread would do until it waits.
+/// Does the work of a line service's thread until it would wait.
 fn serve(service: &mut LineService, cable: &Cable, now: MonoNs) {
-    // A step reads once; a driver that is due at once for ever would hold the thread, too.
+    // Each step reads once. The limit catches a driver that is always due, which would block the thread, too.
     for _ in 0..10_000 {
         let due = match service.closed_until() {
             Some(until) => until <= now,
@@ -456,7 +459,7 @@ fn serve(service: &mut LineService, cable: &Cable, now: MonoNs) {
         }
         service.step();
     }
-    panic!("a line is due without end");
+    panic!("a line service is always due");
 }
 
 fn note(dive: &Loop, consumed: &mut Vec<Consumed>) {

@@ -1,4 +1,4 @@
-//! What goes wrong in a world, drawn from its seed.
+//! Faults of a world, drawn from its seed.
 
 use std::fmt;
 
@@ -6,31 +6,32 @@ use headrace_geometry::time::{DurNs, MonoNs};
 
 use crate::random::Random;
 
-/// Begin of a dive: the machine was switched on a while before.
+/// Start of a dive, some time after the machine was switched on.
 pub const BEGIN: MonoNs = MonoNs(1_000_000_000);
-/// Time within which faults begin, and by which they have ended, ns.
+/// Time within which faults begin, ns.
 const BEGIN_WITHIN_NS: usize = 6_000_000_000;
 const END_WITHIN_NS: usize = 7_000_000_000;
-/// Length of a dive: afterwards there is time to recover.
+/// Length of a dive, including time to recover after the last fault.
 const LENGTH: DurNs = DurNs(12_000_000_000);
-/// Longest faults: of a cable that only delays, shorter than any silence timeout; of a loop or recorder, long enough for queues to fill.
+/// Longest fault, ns. It is shorter than any silence timeout for a cable that only delays, and long enough to fill
+/// the queues for a loop or recorder.
 const LONGEST_HOLD_NS: usize = 1_500_000_000;
 const LONGEST_STALL_NS: usize = 7_000_000_000;
 const LONGEST_NS: usize = 3_000_000_000;
 
-/// A fault and when it holds.
+/// A fault and the time in which it is active.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Window<T> {
     /// The fault.
     pub what: T,
-    /// Begin, included.
+    /// Begin, inclusive.
     pub from: MonoNs,
-    /// End, not included.
+    /// End, exclusive.
     pub to: MonoNs,
 }
 
 impl<T> Window<T> {
-    /// Whether it holds at that time.
+    /// Whether the fault is active at that time.
     pub fn holds(&self, now: MonoNs) -> bool {
         self.from <= now && now < self.to
     }
@@ -41,23 +42,23 @@ impl<T> Window<T> {
 pub enum CableFault {
     /// A stream arrives in pieces of any length, up to 80 ms apart.
     Cut,
-    /// Nothing arrives, and then all at once.
+    /// Nothing arrives, and then everything at once.
     Held,
     /// Bytes or messages are lost.
     Lost,
     /// Bits are flipped.
     Garbled,
-    /// Noise comes between frames.
+    /// Noise arrives between frames.
     Babble,
-    /// Messages come twice.
+    /// Messages arrive twice.
     Doubled,
     /// Messages overtake each other.
     Disordered,
-    /// The device says nothing.
+    /// The device sends nothing.
     Silent,
-    /// The connection breaks, and can't be opened for a while.
+    /// The connection breaks and can't be reopened for a while.
     Broken,
-    /// Writing fails.
+    /// Writes to the device fail.
     Deaf,
 }
 
@@ -86,13 +87,13 @@ const OF_MESSAGES: [CableFault; 9] = [
 /// Faults of the machine.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum MachineFault {
-    /// The loop doesn't get the processor.
+    /// The loop gets no CPU time.
     LoopStalls,
-    /// The recorder's thread doesn't, or its disk doesn't answer.
+    /// The recorder's thread gets no CPU time, or its disk doesn't respond.
     RecorderStalls,
-    /// The threads of the ports don't.
+    /// The port threads get no CPU time.
     PortsStall,
-    /// The terminal takes nothing.
+    /// The terminal accepts nothing.
     TerminalStands,
 }
 
@@ -106,13 +107,13 @@ const OF_MACHINES: [MachineFault; 4] = [
 /// Faults of a disk.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum DiskFault {
-    /// Writing fails.
+    /// Writes fail.
     WriteFails,
-    /// Writing takes a part of what it is given, or is interrupted.
+    /// Writes are partial or interrupted.
     WritesInPart,
-    /// Syncing fails, and what wasn't synced is lost.
+    /// Syncs fail, and unsynced data is lost.
     SyncFails,
-    /// There is no room.
+    /// The disk is full.
     Full,
     /// No file can be created.
     CreateFails,
@@ -129,31 +130,31 @@ const OF_DISKS: [DiskFault; 5] = [
 /// How a dive ends.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Ending {
-    /// In order.
+    /// Regular end.
     Finished,
     /// The program is killed.
     Killed,
-    /// The power is cut: what hasn't been synced is lost, or torn.
+    /// The power is cut: unsynced data is lost or torn.
     PowerCut,
 }
 
-/// All that goes wrong in a dive.
+/// All faults of a dive.
 #[derive(Clone)]
 pub struct Plan {
-    /// By cable.
+    /// Faults of each cable.
     pub cables: Vec<Vec<Window<CableFault>>>,
-    /// Of the machine.
+    /// Faults of the machine.
     pub machine: Vec<Window<MachineFault>>,
-    /// Of the disk.
+    /// Faults of the disk.
     pub disk: Vec<Window<DiskFault>>,
-    /// The end.
+    /// End of the dive.
     pub ending: Ending,
-    /// When the dive ends.
+    /// Time at which the dive ends.
     pub end: MonoNs,
 }
 
 impl Plan {
-    /// Draws a plan for cables, of which those that are streams are told. One of them at least stays sound.
+    /// Draws a plan. `streams` states which cables carry byte streams. At least one cable stays sound.
     pub fn draw(random: &mut Random, streams: &[bool]) -> Self {
         let mut cables = vec![Vec::new(); streams.len()];
         let sound = random.below(streams.len());
@@ -182,7 +183,7 @@ impl Plan {
         Self { cables, machine, disk, ending, end: BEGIN + LENGTH - DurNs(early as i64) }
     }
 
-    /// The same, the terminal apart: it takes everything, or nothing.
+    /// The same plan with a terminal that accepts everything, or nothing.
     #[must_use]
     pub fn with_terminal(mut self, stands: bool) -> Self {
         self.machine.retain(|window| window.what != MachineFault::TerminalStands);
@@ -191,7 +192,7 @@ impl Plan {
         self
     }
 
-    /// Whether a fault of the machine holds.
+    /// Whether a fault of the machine is active.
     pub fn has(&self, fault: MachineFault, now: MonoNs) -> bool {
         self.machine.iter().any(|window| window.what == fault && window.holds(now))
     }

@@ -1,22 +1,22 @@
-//! What breaks an invariant on purpose, to see that it is found.
+//! Deliberate violations of an invariant, to test that they are found.
 
-/// What breaks an invariant on purpose, to see that it is found.
+/// A deliberate violation of an invariant.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Sabotage {
-    /// Every hundredth frame of a sound device is lost on its way.
+    /// Every hundredth frame of a sound device is lost on the way.
     CableLoses,
-    /// When one connection breaks another does.
+    /// When one connection breaks, another breaks too.
     NeighbourBreaks,
-    /// Every fortieth write is forgotten, and reported as done.
+    /// Every fortieth write is dropped but reported as done.
     DiskForgets,
-    /// Syncs are reported and not done.
+    /// Syncs are reported as done but aren't done.
     SyncLies,
-    /// What lines drop isn't recorded.
+    /// Drops on a line aren't recorded.
     DropsUntold,
 }
 
 impl Sabotage {
-    /// All of them.
+    /// All sabotages.
     pub const ALL: [Self; 5] =
         [Self::CableLoses, Self::NeighbourBreaks, Self::DiskForgets, Self::SyncLies, Self::DropsUntold];
 }

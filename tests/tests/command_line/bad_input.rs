@@ -1,6 +1,7 @@
-//! Input that is wrong: each message names file, line, key, value and what is allowed, and each exit code is the right
-//! one (0 ok, 1 failed, 2 usage, 3 finished but data was lost). Of a damaged log all that can be read is used, and what
-//! is lost is said with its time span.
+//! Wrong input: every message names file, line, key, value and allowed values, with the right exit code.
+//!
+//! Exit codes are 0 ok, 1 failed, 2 usage, 3 finished but data was lost. The readable part of a damaged log is used,
+//! and losses are reported with their time span.
 
 use std::fmt::Write as _;
 use std::path::Path;
@@ -9,13 +10,13 @@ use headrace_tests::{Folder, SCENE, VEHICLE, raw_messages, write_log};
 use mcap::{Compression, WriteOptions};
 use serde_json::Value;
 
-/// A text with one thing changed, which must be there exactly once.
+/// Replaces one piece of a text, which must occur exactly once.
 fn change(text: &str, from: &str, to: &str) -> String {
     assert_eq!(text.matches(from).count(), 1, "{from:?}");
     text.replace(from, to)
 }
 
-/// What the program says of each wrong text, where every answer must be a usage error with nothing on stdout.
+/// Output of the program for each wrong text. Every run must be a usage error with nothing on stdout.
 fn refusals(command: &[&str], file: &str, text: &str, cases: &[(&str, &str, &str)]) -> String {
     let folder = Folder::with_dive();
     let mut said = String::new();
@@ -29,7 +30,7 @@ fn refusals(command: &[&str], file: &str, text: &str, cases: &[(&str, &str, &str
 }
 
 #[test]
-fn a_wrong_vehicle_file_is_refused_with_file_line_key_value_and_what_is_allowed() {
+fn wrong_vehicle_file_is_refused_with_line_key_value_and_allowed_values() {
     let cases = [
         ("key missing", "target_m = 1.2\n", ""),
         ("key of a sensor missing", "counts_per_metre = 2000\n", ""),
@@ -119,7 +120,7 @@ fn a_wrong_vehicle_file_is_refused_with_file_line_key_value_and_what_is_allowed(
 }
 
 #[test]
-fn a_wrong_scene_is_refused_with_file_line_key_value_and_what_is_allowed() {
+fn wrong_scene_is_refused_with_line_key_value_and_allowed_values() {
     let cases = [
         ("key missing", "vehicle = \"vehicle.toml\"\n", ""),
         ("vehicle file not there", "vehicle = \"vehicle.toml\"", "vehicle = \"boat.toml\""),
@@ -167,7 +168,7 @@ fn a_wrong_scene_is_refused_with_file_line_key_value_and_what_is_allowed() {
 }
 
 #[test]
-fn a_wrong_polyline_is_refused_with_its_line_or_vertex() {
+fn wrong_polyline_is_refused_with_its_line_or_vertex() {
     let folder = Folder::new();
     let tunnel = "profile = \"polyline\"\nfile = \"profile.csv\"\n";
     folder.write("vehicle.toml", change(VEHICLE, "profile = \"circle\"\nradius_m = 3\n", tunnel));
@@ -186,7 +187,7 @@ fn a_wrong_polyline_is_refused_with_its_line_or_vertex() {
     refuse("no number", Some("y_m,z_m\n-2,0\n2,zero\n2,4\n-2,4\n"));
     refuse("one number", Some("y_m,z_m\n-2,0\n2\n2,4\n-2,4\n"));
     refuse("not finite", Some("-2,0\n2,0\n2,inf\n-2,4\n"));
-    // A side chamber behind a corner, which the middle doesn't see.
+    // A side chamber behind a corner, which can't be seen from the centre.
     refuse("not star-shaped", Some("-2,0\n2,0\n2,1\n5,1\n5,6\n4.5,6\n4.5,2\n2,2\n2,4\n-2,4\n"));
     refuse("crosses itself", Some("-2,0\n2,4\n2,0\n-2,4\n"));
     insta::assert_snapshot!(said, @r#"
@@ -197,20 +198,20 @@ fn a_wrong_polyline_is_refused_with_its_line_or_vertex() {
     two points
         headrace: vehicle.toml:6: tunnel.file = "profile.csv": a profile needs at least 3 distinct points; this one has 2
     no number
-        headrace: vehicle.toml:6: tunnel.file = "profile.csv": line 3 of it is "2,zero"; wanted is y_m,z_m
+        headrace: vehicle.toml:6: tunnel.file = "profile.csv": line 3 is "2,zero"; allowed is y_m,z_m
     one number
-        headrace: vehicle.toml:6: tunnel.file = "profile.csv": line 3 of it is "2"; wanted is y_m,z_m
+        headrace: vehicle.toml:6: tunnel.file = "profile.csv": line 3 is "2"; allowed is y_m,z_m
     not finite
-        headrace: vehicle.toml:6: tunnel.file = "profile.csv": line 3 of it: vertex 2 has a coordinate that is no number within 1000 m
+        headrace: vehicle.toml:6: tunnel.file = "profile.csv": line 3: vertex 2 has a coordinate that is not a number within 1000 m
     not star-shaped
-        headrace: vehicle.toml:6: tunnel.file = "profile.csv": line 6 of it: the profile isn't star-shaped about (0.9523809523809526, 2.119047619047619): it runs backwards or crosses itself at vertex 5, counted from 0
+        headrace: vehicle.toml:6: tunnel.file = "profile.csv": line 6: the profile isn't star-shaped about (0.9523809523809526, 2.119047619047619): it runs backwards or crosses itself at vertex 5, counted from 0
     crosses itself
-        headrace: vehicle.toml:6: tunnel.file = "profile.csv": line 1 of it: the profile isn't star-shaped about (-2, 0): it runs backwards or crosses itself at vertex 0, counted from 0
+        headrace: vehicle.toml:6: tunnel.file = "profile.csv": line 1: the profile isn't star-shaped about (-2, 0): it runs backwards or crosses itself at vertex 0, counted from 0
     "#);
 }
 
 #[test]
-fn a_profile_from_a_polyline_goes_into_the_log_and_replays_without_the_file() {
+fn log_replays_without_the_polyline_file() {
     let folder = Folder::new();
     let tunnel = "profile = \"polyline\"\nfile = \"profile.csv\"\n";
     folder.write("vehicle.toml", change(VEHICLE, "profile = \"circle\"\nradius_m = 3\n", tunnel));
@@ -223,7 +224,7 @@ fn a_profile_from_a_polyline_goes_into_the_log_and_replays_without_the_file() {
 }
 
 #[test]
-fn a_dbc_goes_into_the_log_and_replays_without_the_file() {
+fn log_replays_without_the_dbc_file() {
     let folder = Folder::new();
     let dbc = include_str!("../../../plugins/imu_can/dbc/xsens_mti600.dbc");
     let keys = "dbc = \"imu.dbc\"\nsignals = { rate = [\"GyroX\", \"GyroY\", \"GyroZ\"], force = [\"AccX\", \"AccY\", \"AccZ\"], \
@@ -245,7 +246,7 @@ fn a_dbc_goes_into_the_log_and_replays_without_the_file() {
     assert_eq!(folder.digest("dive.mcap", &[]), report["digest"].as_str().unwrap());
 }
 
-/// A log of the short dive in chunks of about a second, with the vehicle file in it.
+/// Writes a log of the short dive with its vehicle file, in chunks of about a second.
 fn chunked_log(folder: &Folder, log: &str) -> usize {
     let dive = folder.read("dive.mcap");
     let messages = raw_messages(&dive);
@@ -258,13 +259,13 @@ fn losses(report: &Value) -> Vec<&str> {
     report["log"]["losses"].as_array().unwrap().iter().map(|loss| loss.as_str().unwrap()).collect()
 }
 
-/// The number after `word` in a loss, as "after 9.800 s".
+/// The number after `word` in a loss such as "after 9.800 s".
 fn seconds(loss: &str, word: &str) -> f64 {
     let (_, rest) = loss.split_once(word).unwrap_or_else(|| panic!("no {word:?} in {loss:?}"));
     rest.split_whitespace().next().unwrap().parse().unwrap()
 }
 
-/// Every number as #, for texts whose words matter.
+/// Replaces every number with #, for texts whose words matter.
 fn without_numbers(text: &str) -> String {
     let mut short = String::new();
     for c in text.chars().map(|c| if c.is_ascii_digit() { '#' } else { c }) {
@@ -276,7 +277,7 @@ fn without_numbers(text: &str) -> String {
 }
 
 #[test]
-fn of_a_truncated_log_the_beginning_is_used_and_the_rest_said_to_be_lost() {
+fn truncated_log_is_used_up_to_the_cut_and_the_rest_reported_lost() {
     let folder = Folder::with_dive();
     let count = chunked_log(&folder, "chunked.mcap");
     let dive = folder.read("dive.mcap");
@@ -299,7 +300,7 @@ fn of_a_truncated_log_the_beginning_is_used_and_the_rest_said_to_be_lost() {
             let last_s = messages[read - 1].log_time as f64 * 1e-9;
             assert!((seconds(losses[0], "after") - last_s).abs() < 1e-3, "{losses:?}, last {last_s}");
 
-            // What was read counts as if it had been the whole dive.
+            // The part that was read counts as a complete dive.
             write_log(&folder.path("short.mcap"), WriteOptions::new(), Some(VEHICLE), &messages[..read]);
             let (_, short) = folder.replay("short.mcap", &[]);
             assert_eq!(report["digest"], short["digest"], "{log} {tenths}");
@@ -316,7 +317,7 @@ fn of_a_truncated_log_the_beginning_is_used_and_the_rest_said_to_be_lost() {
 }
 
 #[test]
-fn of_a_corrupt_log_all_but_the_broken_chunk_is_used() {
+fn corrupt_log_loses_only_the_broken_chunk() {
     let folder = Folder::with_dive();
     let count = chunked_log(&folder, "chunked.mcap");
     let whole = folder.read("chunked.mcap");
@@ -336,7 +337,7 @@ fn of_a_corrupt_log_all_but_the_broken_chunk_is_used() {
         assert_eq!(code, Some(3));
         let read = usize::try_from(report["log"]["messages"].as_u64().unwrap()).unwrap();
         assert!(read < count && read > count * 8 / 10, "{read} of {count}");
-        // The loss reaches from the last message before the chunk to the first one after it.
+        // The loss spans from the last message before the chunk to the first one after it.
         let [loss] = losses(&report)[..] else { panic!("{:?}", losses(&report)) };
         let close = |word, at_ns: u64| (seconds(loss, word) - at_ns as f64 * 1e-9).abs() < 0.02;
         assert_eq!(chunk.message_start_time > first_ns, loss.contains("after"), "{loss}");
@@ -347,7 +348,7 @@ fn of_a_corrupt_log_all_but_the_broken_chunk_is_used() {
 }
 
 #[test]
-fn a_byte_changed_anywhere_is_noticed_or_changes_nothing() {
+fn changed_byte_is_detected_or_has_no_effect() {
     let folder = Folder::with_dive();
     chunked_log(&folder, "chunked.mcap");
     for log in ["dive.mcap", "chunked.mcap"] {
@@ -374,7 +375,7 @@ fn a_byte_changed_anywhere_is_noticed_or_changes_nothing() {
 }
 
 #[test]
-fn what_is_no_log_is_named() {
+fn file_that_is_no_log_is_identified() {
     let folder = Folder::with_dive();
     folder.write("empty.mcap", "");
     folder.write("text.mcap", VEHICLE);
@@ -394,7 +395,7 @@ fn what_is_no_log_is_named() {
 }
 
 #[test]
-fn a_log_without_a_vehicle_file_needs_one_given() {
+fn log_without_a_vehicle_file_needs_the_vehicle_option() {
     let folder = Folder::with_dive();
     let dive = folder.read("dive.mcap");
     write_log(&folder.path("bare.mcap"), WriteOptions::new(), None, &raw_messages(&dive));
@@ -405,7 +406,7 @@ fn a_log_without_a_vehicle_file_needs_one_given() {
 }
 
 #[test]
-fn a_source_that_the_vehicle_file_lacks_is_lost_and_said_so() {
+fn source_missing_in_the_vehicle_file_is_reported_lost() {
     let folder = Folder::with_dive();
     folder.write("other.toml", change(VEHICLE, "id = \"sonar_1\"", "id = \"front\""));
     let answer = folder.headrace(&["replay", "dive.mcap", "--vehicle", "other.toml"]);
@@ -464,7 +465,7 @@ fn every_command_has_help_with_an_example() {
     assert!(commands.contains(&"replay") && commands.contains(&"demo"), "{commands:?}");
     for command in commands.into_iter().filter(|command| *command != "help") {
         let answer = folder.headrace(&[command, "--help"]);
-        // Done by a program that needn't be there: then it is said how to build it.
+        // Another program provides it. If that is missing, the message says how to build it.
         if ["campaign", "batch", "cost"].contains(&command) && answer.code == Some(2) {
             assert!(
                 answer.stderr.contains("cargo build --release --manifest-path lab/Cargo.toml -p headrace_c"),
@@ -479,7 +480,7 @@ fn every_command_has_help_with_an_example() {
 }
 
 #[test]
-fn a_wrong_log_is_a_wrong_argument_and_leaves_nothing() {
+fn wrong_log_is_a_usage_error_and_leaves_no_file() {
     let folder = Folder::new();
     folder.write("vehicle.toml", VEHICLE);
     folder.write("empty.mcap", "");

@@ -1,4 +1,5 @@
-//! `headrace check`: all errors of a file at once, what can't be shared, reached or interleaved, and what a plan makes of it.
+//! `headrace check`: all errors of a file at once, conflicts of lines, walls out of range, and the figures of the
+//! plan.
 
 use std::fmt::Write as _;
 
@@ -6,7 +7,7 @@ use headrace_geometry::math;
 use headrace_tests::{Folder, SCENE, VEHICLE, root};
 use serde_json::Value;
 
-/// A text with some things changed, each of which must be there exactly once.
+/// Replaces several pieces of a text, each of which must occur exactly once.
 fn changed(text: &str, changes: &[(&str, &str)]) -> String {
     changes.iter().fold(text.to_owned(), |text, (from, to)| {
         assert_eq!(text.matches(from).count(), 1, "{from:?}");
@@ -15,7 +16,7 @@ fn changed(text: &str, changes: &[(&str, &str)]) -> String {
 }
 
 #[test]
-fn all_errors_of_a_vehicle_file_are_told_at_once_with_line_and_nearest_key() {
+fn all_vehicle_file_errors_are_listed_at_once_with_line_and_nearest_key() {
     let folder = Folder::new();
     let wrong = changed(
         VEHICLE,
@@ -48,7 +49,7 @@ fn all_errors_of_a_vehicle_file_are_told_at_once_with_line_and_nearest_key() {
 }
 
 #[test]
-fn all_errors_of_a_scene_and_its_vehicle_file_are_told_at_once() {
+fn all_errors_of_a_scene_and_its_vehicle_file_are_listed_at_once() {
     let folder = Folder::new();
     folder.write("vehicle.toml", VEHICLE);
     let more = "[[trajectory.legs]]\ndistance_m = 0\nspeed_mps = 0\n\n\
@@ -84,14 +85,14 @@ fn all_errors_of_a_scene_and_its_vehicle_file_are_told_at_once() {
     assert!(!folder.path("dive.mcap").exists());
 }
 
-/// What `check` says of each changed vehicle file, with its exit code.
+/// Output of `check` for each changed vehicle file, with its exit code.
 fn findings(cases: &[(&str, &[(&str, &str)])]) -> String {
     let folder = Folder::new();
     let mut said = String::new();
     for (what, changes) in cases {
         folder.write("vehicle.toml", changed(VEHICLE, changes));
         let answer = folder.headrace(&["check", "vehicle.toml"]);
-        // With errors nothing is summarised: warnings alone leave the summary as it is.
+        // Errors suppress the summary; warnings alone keep it.
         assert_eq!(answer.stdout.is_empty(), answer.code == Some(2), "{what}");
         write!(said, "{what}: {}\n{}", answer.code.unwrap(), answer.stderr).unwrap();
     }
@@ -129,35 +130,35 @@ fn lines_that_two_sensors_cannot_share_are_errors() {
     ];
     insta::assert_snapshot!(findings(&cases), @r#"
     two Pings on one serial port: 2
-    headrace: vehicle.toml:37: sensors[3].connect: is the serial port of sensor "ping_left", and nothing tells the bytes of two ping1d there apart; give each its own
+    headrace: vehicle.toml:37: sensors[3].connect: is the serial port of sensor "ping_left", and the bytes of two ping1d cannot be separated there; give each its own
     headrace: warning: vehicle.toml:15: sensors: have no connect, so that `run` can't reach them: ping_up, ping_down, depth, imu, tether
     one serial port at two rates: 2
-    headrace: vehicle.toml:37: sensors[3].connect: is the serial port of sensor "ping_left" with other settings; it can be opened once
+    headrace: vehicle.toml:37: sensors[3].connect: is the serial port of sensor "ping_left" with other settings; only one sensor can open it
     headrace: warning: vehicle.toml:15: sensors: have no connect, so that `run` can't reach them: ping_up, ping_down, depth, imu, tether
     two Pings on one UDP address: 2
-    headrace: vehicle.toml:37: sensors[3].connect: is the UDP address of sensor "ping_left", and nothing tells the bytes of two ping1d there apart; give each its own
+    headrace: vehicle.toml:37: sensors[3].connect: is the UDP address of sensor "ping_left", and the bytes of two ping1d cannot be separated there; give each its own
     headrace: warning: vehicle.toml:15: sensors: have no connect, so that `run` can't reach them: ping_up, ping_down, depth, imu, tether
     two Pings on two: 0
     headrace: warning: vehicle.toml:15: sensors: have no connect, so that `run` can't reach them: ping_up, ping_down, depth, imu, tether
     two heads on one TCP address: 2
-    headrace: vehicle.toml:25: sensors[1].connect: is the TCP address of sensor "sonar_0", and nothing tells the bytes of two imagenex881 there apart; give each its own
+    headrace: vehicle.toml:25: sensors[1].connect: is the TCP address of sensor "sonar_0", and the bytes of two imagenex881 cannot be separated there; give each its own
     headrace: warning: vehicle.toml:15: sensors: have no connect, so that `run` can't reach them: ping_left, ping_right, ping_up, ping_down, depth, imu, tether
     two heads of two ids there: 0
     headrace: warning: vehicle.toml:15: sensors: have no connect, so that `run` can't reach them: ping_left, ping_right, ping_up, ping_down, depth, imu, tether
     two units of one id on CAN: 2
-    headrace: vehicle.toml:63: sensors[8].connect: is the CAN interface of sensor "imu", and nothing tells the bytes of two imu_can there apart; give each its own
+    headrace: vehicle.toml:63: sensors[8].connect: is the CAN interface of sensor "imu", and the bytes of two imu_can cannot be separated there; give each its own
     headrace: warning: vehicle.toml:15: sensors: have no connect, so that `run` can't reach them: ping_left, ping_right, ping_up, ping_down, depth, tether
     two units of two ids there: 0
     headrace: warning: vehicle.toml:15: sensors: have no connect, so that `run` can't reach them: ping_left, ping_right, ping_up, ping_down, depth, tether
     no such way to connect: 2
-    headrace: vehicle.toml:25: sensors[1].connect: "usb" is no way to connect; allowed are serial:/dev/serial/by-id/NAME?baud=115200, serial:usb:VID:PID[:SERIAL]?baud=115200, tcp:HOST:PORT, udp:HOST:PORT, udp-listen:ADDRESS:PORT, can:INTERFACE, hid:VID:PID[:SERIAL], i2c:/dev/i2c-1:0x40
+    headrace: vehicle.toml:25: sensors[1].connect: unknown carrier "usb"; allowed are serial:/dev/serial/by-id/NAME?baud=115200, serial:usb:VID:PID[:SERIAL]?baud=115200, tcp:HOST:PORT, udp:HOST:PORT, udp-listen:ADDRESS:PORT, can:INTERFACE, hid:VID:PID[:SERIAL], i2c:/dev/i2c-1:0x40
     headrace: warning: vehicle.toml:15: sensors: have no connect, so that `run` can't reach them: ping_left, ping_right, ping_up, ping_down, depth, imu, tether
     "#);
 }
 
-/// A dive goes on with it: it may be the only file there is.
+/// The dive goes on with the wrong file, since it may be the only one.
 #[test]
-fn a_dive_says_what_check_refuses() {
+fn run_warns_of_errors_found_by_check() {
     let folder = Folder::new();
     folder.write("vehicle.toml", VEHICLE.replace("range_m = 5", "range_m = 3"));
     let answer = folder.headrace(&["run", "vehicle.toml", "--no-page", "--no-record", "--for", "0.5"]);
@@ -170,7 +171,7 @@ fn a_dive_says_what_check_refuses() {
 }
 
 #[test]
-fn walls_out_of_reach_and_heads_out_of_step_are_told() {
+fn walls_out_of_range_and_heads_out_of_phase_are_reported() {
     let first = "0.4:4040\"\nmode = \"fastest\"\nrange_m = 5";
     let second = "0.5:4040\"\nmode = \"fastest\"\nrange_m = 5";
     let both = |with: &str| [first.replace("range_m = 5", with), second.replace("range_m = 5", with)];
@@ -190,16 +191,16 @@ fn walls_out_of_reach_and_heads_out_of_step_are_told() {
     as it is: 0
     headrace: warning: vehicle.toml:15: sensors: have no connect, so that `run` can't reach them: ping_left, ping_right, ping_up, ping_down, depth, imu, tether
     a range of 3 m in a tunnel of 6 m: 2
-    headrace: vehicle.toml:20: sensors[0].range_m: reaches 0 % of the wall around this head: it is 3.00 to 3.00 m away, and the setting hears 0.19 to 2.89 m; out of reach: all around
-    headrace: vehicle.toml:27: sensors[1].range_m: reaches 0 % of the wall around this head: it is 3.00 to 3.00 m away, and the setting hears 0.19 to 2.89 m; out of reach: all around
+    headrace: vehicle.toml:20: sensors[0].range_m: reaches 0 % of the wall around this head: it is 3.00 to 3.00 m away, and the setting covers 0.19 to 2.89 m; out of reach: all around
+    headrace: vehicle.toml:27: sensors[1].range_m: reaches 0 % of the wall around this head: it is 3.00 to 3.00 m away, and the setting covers 0.19 to 2.89 m; out of reach: all around
     headrace: warning: vehicle.toml:15: sensors: have no connect, so that `run` can't reach them: ping_left, ping_right, ping_up, ping_down, depth, imu, tether
     a range of 2 m there: 2
-    headrace: vehicle.toml:20: sensors[0].range_m: reaches 0 % of the wall around this head: it is 3.00 to 3.00 m away, and the setting hears 0.19 to 1.93 m; out of reach: all around
-    headrace: vehicle.toml:27: sensors[1].range_m: reaches 0 % of the wall around this head: it is 3.00 to 3.00 m away, and the setting hears 0.19 to 1.93 m; out of reach: all around
+    headrace: vehicle.toml:20: sensors[0].range_m: reaches 0 % of the wall around this head: it is 3.00 to 3.00 m away, and the setting covers 0.19 to 1.93 m; out of reach: all around
+    headrace: vehicle.toml:27: sensors[1].range_m: reaches 0 % of the wall around this head: it is 3.00 to 3.00 m away, and the setting covers 0.19 to 1.93 m; out of reach: all around
     headrace: warning: vehicle.toml:15: sensors: have no connect, so that `run` can't reach them: ping_left, ping_right, ping_up, ping_down, depth, imu, tether
     a tunnel of 14 m: 2
-    headrace: vehicle.toml:20: sensors[0].range_m: reaches 0 % of the wall around this head: it is 7.00 to 7.00 m away, and the setting hears 0.19 to 4.82 m; out of reach: all around
-    headrace: vehicle.toml:27: sensors[1].range_m: reaches 0 % of the wall around this head: it is 7.00 to 7.00 m away, and the setting hears 0.19 to 4.82 m; out of reach: all around
+    headrace: vehicle.toml:20: sensors[0].range_m: reaches 0 % of the wall around this head: it is 7.00 to 7.00 m away, and the setting covers 0.19 to 4.82 m; out of reach: all around
+    headrace: vehicle.toml:27: sensors[1].range_m: reaches 0 % of the wall around this head: it is 7.00 to 7.00 m away, and the setting covers 0.19 to 4.82 m; out of reach: all around
     headrace: warning: vehicle.toml:15: sensors: have no connect, so that `run` can't reach them: ping_left, ping_right, ping_up, ping_down, depth, imu, tether
     a small tunnel: 0
     headrace: warning: vehicle.toml:15: sensors: have no connect, so that `run` can't reach them: ping_left, ping_right, ping_up, ping_down, depth, imu, tether
@@ -213,7 +214,7 @@ fn walls_out_of_reach_and_heads_out_of_step_are_told() {
 }
 
 #[test]
-fn what_a_plan_makes_of_a_file_is_what_plan_says() {
+fn check_and_plan_give_the_same_figures() {
     let folder = Folder::new();
     for name in ["vita1", "vita2-2", "vita2-3", "vita2-4", "pipe", "autopilot", "bluerov2"] {
         let file = root().join(format!("deploy/vehicles/{name}.toml"));
@@ -280,7 +281,7 @@ fn json_has_every_error_with_its_line() {
     assert_eq!(errors[1]["line"], line("id = \"imu\""));
 }
 
-/// A circle of 3 m radius in points so many to a turn.
+/// A circle of 3 m radius with this number of points.
 fn surveyed(points: u32) -> String {
     let mut text = "y_m,z_m\n".to_owned();
     for k in 0..points {
@@ -291,7 +292,7 @@ fn surveyed(points: u32) -> String {
 }
 
 #[test]
-fn a_profile_finer_than_a_sonar_tells_is_named() {
+fn profile_finer_than_the_sonar_resolution_is_reported() {
     let folder = Folder::new();
     let tunnel = changed(
         VEHICLE,
@@ -308,12 +309,12 @@ fn a_profile_finer_than_a_sonar_tells_is_named() {
     }
     insta::assert_snapshot!(said, @"
     600 points: nothing
-    20000 points: headrace: warning: vehicle.toml:6: tunnel.file: is finer than a sonar tells: 19999 of 20000 edges are shorter than 2 mm, the finest step of a range here, the first of 0.943 mm at 0.000 m round the wall (6:00); which way so short an edge faces is the survey's error, points every 10 mm say as much
+    20000 points: headrace: warning: vehicle.toml:6: tunnel.file: is finer than a sonar resolves: 19999 of 20000 edges are shorter than 2 mm, the finest step of a range here, the first of 0.943 mm at 0.000 m round the wall (6:00); the direction of such short edges is survey noise, and points every 10 mm are enough
     ");
 }
 
 #[test]
-fn more_sensors_than_a_dive_takes_are_told_as_a_dive_refuses_them() {
+fn too_many_sensors_give_the_same_error_in_check_and_run() {
     let folder = Folder::with_dive();
     let with = |count: usize| {
         let mut text = VEHICLE.to_owned();
@@ -339,9 +340,9 @@ fn more_sensors_than_a_dive_takes_are_told_as_a_dive_refuses_them() {
     assert!(answer.stderr.contains("many.toml:284: sensors[64].id: 65 sensors"), "{}", answer.stderr);
 }
 
-/// What a file plans is what it is: heads that are started for its planned speed, at which `run` will give the same advice.
+/// The vehicle file's speed limits apply to heads started for its planned speed; `run` gives the same advice.
 #[test]
-fn what_the_planned_speed_allows_is_told_beside_what_a_plan_could() {
+fn limits_at_the_planned_speed_are_listed_beside_the_plan_limits() {
     let folder = Folder::new();
     let vita = std::fs::read_to_string(root().join("deploy/vehicles/vita2-4.toml")).unwrap();
     let planned = |mps: &str| {
@@ -362,7 +363,7 @@ fn what_the_planned_speed_allows_is_told_beside_what_a_plan_could() {
 }
 
 #[test]
-fn check_says_what_cable_and_speed_allow_and_names_missing_keys() {
+fn check_lists_cable_and_speed_limits_and_missing_keys() {
     let folder = Folder::new();
     let slack = "[navigation]\nslack_sd_m = 0.2\nslack_time_s = 5\n\n[[sensors]]\nid = \"sonar_0\"";
     let counts = "counts_per_metre = 2000";

@@ -1,4 +1,4 @@
-//! What any program of its kind does: completions, manual pages, terminals without colour, quiet, and time left.
+//! Common conventions of command-line programs: completions, manual pages, colours, quiet, and remaining time.
 
 use std::io::Write as _;
 use std::process::{Command, Stdio};
@@ -6,7 +6,7 @@ use std::process::{Command, Stdio};
 use headrace_tests::screen::Screen;
 use headrace_tests::{Folder, program, root, skipped};
 
-/// The commands that help lists.
+/// Commands listed by help.
 fn commands(folder: &Folder) -> Vec<String> {
     let help = folder.headrace(&["--help"]).stdout;
     let (_, list) = help.split_once("Commands:\n").unwrap();
@@ -29,7 +29,7 @@ fn completions_know_all_commands_and_are_valid_scripts() {
         assert!(answer.stdout.contains("sound-speed"), "{shell}: options of commands");
     }
     let script = folder.headrace(&["completions", "bash"]).stdout;
-    // As readline would ask it.
+    // Completes as readline would.
     let asked = "\nCOMP_WORDS=(headrace rep); COMP_CWORD=1; _headrace headrace rep headrace; echo \"${COMPREPLY[*]}\"\n";
     let bash = Command::new("bash").arg("-s").stdin(Stdio::piped()).stdout(Stdio::piped()).spawn();
     let Ok(mut bash) = bash else { return skipped("no bash") };
@@ -50,7 +50,7 @@ fn every_command_has_a_manual_page() {
         let page = String::from_utf8(folder.read(&format!("pages/headrace-{command}.1"))).unwrap();
         assert!(page.contains(".SH SYNOPSIS") && page.contains(&command), "{page}");
     }
-    // Again, but not over a page of somebody else's.
+    // A second run works, but doesn't overwrite a foreign page.
     assert_eq!(folder.headrace(&["man", "pages"]).code, Some(0));
     folder.write("pages/headrace.1", ".TH headrace 1\n");
     assert_eq!(folder.headrace(&["man", "pages"]).code, Some(2));
@@ -58,7 +58,7 @@ fn every_command_has_a_manual_page() {
 }
 
 #[test]
-fn colours_are_for_terminals_that_want_them() {
+fn colours_appear_only_on_terminals_that_support_them() {
     let folder = Folder::with_dive();
     // Help, an error of the command line, log messages, and a dive with flags.
     let outputs: [&[&str]; 4] = [
@@ -72,7 +72,7 @@ fn colours_are_for_terminals_that_want_them() {
         assert!(shown(&[]).contains("\x1b["), "{arguments:?}: a terminal has colours");
         assert!(shown(&[("NO_COLOR", "")]).contains("\x1b["), "{arguments:?}: empty is unset");
         let plain = shown(&[("NO_COLOR", "1")]);
-        // Only the line that overwrites itself is left.
+        // Only the sequence that overwrites the present line may remain.
         assert!(!plain.replace("\r\x1b[K", "").contains('\x1b'), "{arguments:?}: {plain:?}");
         let dumb = shown(&[("TERM", "dumb")]);
         assert!(!dumb.contains('\x1b'), "{arguments:?}: {dumb:?}");
@@ -94,7 +94,7 @@ fn quiet_leaves_results_and_errors() {
 }
 
 #[test]
-fn work_over_two_seconds_says_how_long_it_still_takes() {
+fn work_over_2_s_shows_the_remaining_time() {
     let folder = Folder::new();
     let scene = root().join("deploy/scenes/seven-kilometres.toml");
     let simulate = ["simulate", scene.to_str().unwrap(), "-o", "long.mcap"];
@@ -108,20 +108,20 @@ fn work_over_two_seconds_says_how_long_it_still_takes() {
     quiet.end();
 }
 
-/// A process that shares stdout may set it not to wait.
+/// Another process that shares stdout may make it non-blocking.
 #[cfg(target_os = "linux")]
 #[test]
-fn report_is_whole_on_a_pipe_that_does_not_wait() {
+fn report_is_complete_on_a_non_blocking_pipe() {
     use rustix::fs::{OFlags, fcntl_setfl};
     let folder = Folder::with_dive();
     let (mut reader, mut writer) = std::io::pipe().unwrap();
     fcntl_setfl(&writer, OFlags::NONBLOCK).unwrap();
-    // A pipe holds 64 KiB; spaces may precede JSON.
+    // Fill the pipe, which holds 64 KiB; JSON allows leading spaces.
     writer.write_all(&vec![b' '; 60_000]).unwrap();
     let mut command = program();
     command.args(["replay", "dive.mcap", "--json"]).current_dir(folder.path("")).stdout(writer);
     let mut replay = command.spawn().unwrap();
-    // It has the pipe's end, too.
+    // The command holds a copy of the pipe's end.
     drop(command);
     std::thread::sleep(std::time::Duration::from_secs(2));
     let mut bytes = Vec::new();
@@ -132,7 +132,7 @@ fn report_is_whole_on_a_pipe_that_does_not_wait() {
 }
 
 #[test]
-fn report_to_a_named_pipe_without_a_reader_fails_and_with_one_is_whole() {
+fn report_to_a_named_pipe_fails_without_a_reader_and_is_complete_with_one() {
     use rustix::fs::{CWD, FileType, Mode, mknodat};
     let folder = Folder::with_dive();
     mknodat(CWD, folder.path("pipe"), FileType::Fifo, Mode::RUSR | Mode::WUSR, 0).unwrap();
@@ -150,7 +150,7 @@ fn report_to_a_named_pipe_without_a_reader_fails_and_with_one_is_whole() {
 
 #[cfg(target_os = "linux")]
 #[test]
-fn too_little_address_space_is_refused_and_nothing_aborts() {
+fn too_little_address_space_is_refused_without_an_abort() {
     let folder = Folder::with_dive();
     let headrace = program();
     for limit_kib in [100_000, 150_000, 200_000] {
@@ -166,7 +166,7 @@ fn too_little_address_space_is_refused_and_nothing_aborts() {
 
 #[cfg(target_os = "linux")]
 #[test]
-fn output_that_cannot_be_written_is_no_success() {
+fn unwritable_output_is_a_failure() {
     let folder = Folder::with_dive();
     folder.record("dive.mcap", "live.mcap", &[]);
     let code = |arguments: &[&str], to: Stdio| {
@@ -196,10 +196,10 @@ fn output_that_cannot_be_written_is_no_success() {
         assert_eq!(failed, Some(1), "{arguments:?}: {said}");
         assert!(said.contains("standard output: No space left on device"), "{arguments:?}: {said}");
     }
-    // A dive isn't failed for its terminal.
+    // A full disk behind the terminal doesn't fail a dive.
     let dive = ["run", "vehicle.toml", "--source", "dive.mcap", "--speed", "max"];
     assert_eq!(code(&dive, full()).0, Some(0));
-    // Whoever closes a pipe wants no more of it.
+    // A reader that closes the pipe wants no more output.
     for arguments in [&["replay", "live.mcap"][..], &["replay", "live.mcap", "--json"], &["help"], &dive] {
         let (reader, writer) = std::io::pipe().unwrap();
         drop(reader);

@@ -1,4 +1,4 @@
-//! Log messages: on stderr, by level and crate, never among results.
+//! Log messages go to stderr, by level and crate, and never mix with results.
 
 use headrace_tests::{Answer, Folder, VEHICLE};
 use serde_json::Value;
@@ -13,7 +13,8 @@ fn headrace(folder: &Folder, rust_log: Option<&str>, arguments: &[&str]) -> Answ
     Answer { code: output.status.code(), stdout: text(output.stdout), stderr: text(output.stderr) }
 }
 
-/// Probes an address where nothing listens: events of this crate (the vehicle file) and of `headrace_ports` (the probe).
+/// Probes an address where nothing listens. It causes events of this crate (vehicle file) and of `headrace_ports`
+/// (probe).
 fn probe(folder: &Folder, rust_log: Option<&str>, flags: &[&str]) -> Answer {
     let devices = ["devices", "--vehicle", "vehicle.toml", "--address", "tcp:127.0.0.1:1", "--json"];
     headrace(folder, rust_log, &[flags, &devices].concat())
@@ -24,7 +25,7 @@ const SENSOR_EVENT: &str = "DEBUG headrace::vehicle_file: sensor ";
 const PROBE_EVENT: &str = "headrace_ports::probe: probing";
 
 #[test]
-fn verbose_shows_events_of_every_crate_and_the_default_none() {
+fn verbose_shows_events_of_every_crate_and_the_default_shows_none() {
     let folder = Folder::new();
     folder.write("vehicle.toml", VEHICLE);
     let quiet = probe(&folder, None, &[]);
@@ -38,7 +39,7 @@ fn verbose_shows_events_of_every_crate_and_the_default_none() {
 }
 
 #[test]
-fn the_variable_shows_only_the_crate_that_it_names() {
+fn log_variable_shows_only_the_named_crate() {
     let folder = Folder::new();
     folder.write("vehicle.toml", VEHICLE);
     let ports = probe(&folder, Some("headrace_ports=debug"), &[]);
@@ -50,7 +51,7 @@ fn the_variable_shows_only_the_crate_that_it_names() {
 }
 
 #[test]
-fn a_variable_that_cannot_be_read_is_a_warning_which_quiet_hides() {
+fn invalid_log_variable_is_a_warning_hidden_by_quiet() {
     let folder = Folder::new();
     folder.write("vehicle.toml", VEHICLE);
     let warned = probe(&folder, Some("headrace=loud"), &[]);
@@ -60,7 +61,7 @@ fn a_variable_that_cannot_be_read_is_a_warning_which_quiet_hides() {
 }
 
 #[test]
-fn a_replay_logs_its_files_memory_and_phases_beside_the_same_report() {
+fn replay_logs_files_memory_and_phases_with_unchanged_report() {
     let folder = Folder::with_dive();
     let silent = headrace(&folder, None, &["replay", "dive.mcap", "--json"]);
     assert_eq!(silent.stderr, "");
@@ -80,7 +81,7 @@ fn a_replay_logs_its_files_memory_and_phases_beside_the_same_report() {
 }
 
 #[test]
-fn a_recording_logs_its_file_and_a_damaged_log_its_damage() {
+fn recording_logs_its_file_and_a_damaged_log_its_damage() {
     let folder = Folder::with_dive();
     let run =
         ["run", "vehicle.toml", "--source", "dive.mcap", "--speed", "max", "-v", "--record", "again.mcap"];

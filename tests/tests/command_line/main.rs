@@ -1,6 +1,6 @@
-//! The command line: what it answers, refuses and draws, and the files that it writes for people and programs.
+//! Tests of the command line: answers, refusals, screens, and the files that it writes.
 
-#![allow(clippy::unwrap_used, clippy::panic, reason = "a test stops at what it can't do")]
+#![allow(clippy::unwrap_used, clippy::panic, reason = "a failed step ends the test")]
 
 mod bad_input;
 mod check;

@@ -1,4 +1,5 @@
-//! `--mavlink-out`, in the eyes of a ground station: its bytes are taken apart by the guide's description, without our decoder.
+//! Checks `--mavlink-out` as a ground station sees it. Bytes are decoded by the MAVLink guide's description, without
+//! headrace's decoder.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::net::UdpSocket;
@@ -6,7 +7,7 @@ use std::time::Duration;
 
 use headrace_tests::{Folder, root};
 
-/// Names that QGroundControl takes for the autopilot's.
+/// Names that QGroundControl interprets as the autopilot's.
 const RESERVED: [&str; 8] =
     ["TetherTrn", "RFTarget", "CamTilt", "Lights1", "Lights2", "PilotGain", "InputHold", "RollPitch"];
 
@@ -26,13 +27,13 @@ struct Said {
     payload: Vec<u8>,
 }
 
-/// A datagram, which is one frame of the second version.
+/// Decodes a datagram, which is one MAVLink 2 frame.
 fn said(datagram: &[u8]) -> Said {
     let length = usize::from(datagram[1]);
     assert_eq!((datagram[0], datagram[2], datagram.len()), (0xfd, 0, 12 + length), "{datagram:?}");
     assert_eq!(datagram[5..7], [7, 191], "system and component");
     let id = u32::from_le_bytes([datagram[7], datagram[8], datagram[9], 0]);
-    // HEARTBEAT, NAMED_VALUE_FLOAT, STATUSTEXT and nothing else, with their CRC_EXTRA.
+    // Checks that only HEARTBEAT, NAMED_VALUE_FLOAT and STATUSTEXT occur, by their CRC_EXTRA.
     let extra =
         *BTreeMap::from([(0, 50), (251, 170), (253, 83)]).get(&id).unwrap_or_else(|| panic!("message {id}"));
     let summed = datagram[1..10 + length].iter().copied().chain([extra]);
@@ -47,7 +48,7 @@ fn text_of(bytes: &[u8]) -> String {
     String::from_utf8(bytes[..end].to_vec()).unwrap()
 }
 
-/// All that a replay says, and its digest.
+/// All messages of a replay, and its digest.
 fn heard(log: &str) -> (Vec<Said>, String) {
     let socket = UdpSocket::bind("127.0.0.1:0").unwrap();
     socket.set_read_timeout(Some(Duration::from_millis(500))).unwrap();
@@ -92,16 +93,16 @@ fn replay(log: &str, to: &str) -> String {
 }
 
 #[test]
-fn a_ground_station_hears_heartbeats_figures_and_each_alert_once() {
+fn ground_station_receives_heartbeats_values_and_each_alert_once() {
     let (all, digest) = heard("too-fast");
     let of = |id: u32| all.iter().filter(move |said| said.id == id);
-    // None lost on the way: their numbers go up by one.
+    // No frame is lost on the way: sequence numbers increase by one.
     let mut expected = 0_u8;
     for said in &all {
         assert_eq!(said.sequence, expected);
         expected = expected.wrapping_add(1);
     }
-    // An onboard computer, no autopilot; once a second of the dive's 81.
+    // The type is an onboard computer, not an autopilot; the dive lasts 81 s with one heartbeat each.
     assert!(of(0).all(|said| said.payload[4..6] == [18, 8]));
     assert!((75..=90).contains(&of(0).count()), "{}", of(0).count());
     let name = |said: &Said| text_of(&said.payload[8..18]);
@@ -121,7 +122,7 @@ fn a_ground_station_hears_heartbeats_figures_and_each_alert_once() {
     );
     assert!(limits.iter().any(|mps| (0.2..0.35).contains(mps)), "{limits:?}");
     assert!(values("HR_MISS_M").iter().any(|m| *m > 2.0));
-    // Texts, joined by their numbers.
+    // Joins text parts by their numbers.
     let mut texts: BTreeMap<(usize, u16), String> = BTreeMap::new();
     for (place, said) in of(253).enumerate() {
         let id = u16::from_le_bytes([said.payload[51], said.payload[52]]);
@@ -135,11 +136,11 @@ fn a_ground_station_hears_heartbeats_figures_and_each_alert_once() {
     );
     let different: BTreeSet<&String> = texts.iter().collect();
     assert_eq!(different.len(), texts.len(), "said twice: {texts:#?}");
-    assert_eq!(replay("too-fast", "127.0.0.1:9"), digest, "nobody listens there");
+    assert_eq!(replay("too-fast", "127.0.0.1:9"), digest, "no program listens there");
 }
 
 #[test]
-fn addresses_that_are_none_are_refused_with_what_there_is() {
+fn invalid_addresses_are_refused_with_the_valid_forms() {
     let folder = Folder::with_dive();
     for to in ["14550", "nowhere", "tcp:127.0.0.1:5760"] {
         let answer = folder.headrace(&["replay", "dive.mcap", "--mavlink-out", to]);

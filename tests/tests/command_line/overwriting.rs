@@ -1,11 +1,12 @@
-//! What is there already isn't overwritten unasked, and outputs are tried before the work begins.
+//! Existing files are only overwritten with `--force`, and outputs are checked before the work begins.
 
 use std::collections::BTreeMap;
 use std::ffi::OsString;
 
 use headrace_tests::{Folder, SCENE, VEHICLE, program, root, skipped};
 
-/// A command that must refuse to write over a file, which stays as it is; and which does with `--force`, if it may.
+/// Checks that a command refuses to overwrite `there`, which stays unchanged, and overwrites it with `--force` if
+/// allowed.
 #[track_caller]
 fn refuses(folder: &Folder, command: &[&str], there: &str) {
     let before = folder.read(there);
@@ -15,7 +16,7 @@ fn refuses(folder: &Folder, command: &[&str], there: &str) {
     assert_eq!(folder.read(there), before, "{command:?}");
 }
 
-/// A command that must refuse to write a file that it reads, even with `--force`: nothing changes in the folder.
+/// Checks that a command refuses to write to its own input, even with `--force`. The folder stays unchanged.
 #[track_caller]
 fn never(folder: &Folder, command: &[&str]) {
     let before = content(folder);
@@ -28,7 +29,7 @@ fn never(folder: &Folder, command: &[&str]) {
     }
 }
 
-/// A command that must refuse to write two outputs into one file, and name both: nothing changes in the folder.
+/// Checks that a command refuses to write two outputs to one file, and names both. The folder stays unchanged.
 #[track_caller]
 fn two_files(folder: &Folder, command: &[&str], named: &[&str]) {
     let before = content(folder);
@@ -55,7 +56,7 @@ fn accepts(folder: &Folder, command: &[&str], there: &str) {
 }
 
 #[test]
-fn a_simulation_overwrites_simulations_only() {
+fn simulation_overwrites_only_simulations() {
     let folder = Folder::with_dive();
     let simulate = ["simulate", "scene.toml", "-o"];
     let to = |log: &'static str| [&simulate[..], &[log]].concat();
@@ -73,7 +74,7 @@ fn a_simulation_overwrites_simulations_only() {
 }
 
 #[test]
-fn a_report_overwrites_reports_only() {
+fn report_overwrites_only_reports() {
     let folder = Folder::with_dive();
     let replay = ["replay", "dive.mcap", "--report"];
     let to = |report: &'static str| [&replay[..], &[report]].concat();
@@ -94,7 +95,7 @@ fn a_report_overwrites_reports_only() {
     refuses(&folder, &["replay", "dive.mcap", "--expect", "other.json", "--bless"], "other.json");
     accepts(&folder, &[&to("other.json")[..], &["--force"]].concat(), "other.json");
     assert!(folder.read("other.json").starts_with(b"{\n  \"report_version\":"));
-    // Not even then.
+    // Even `--force` doesn't allow it.
     let before = folder.read("dive.mcap");
     let answer = folder.headrace(&[&to("dive.mcap")[..], &["--force"]].concat());
     assert_eq!(answer.code, Some(2), "{}", answer.stderr);
@@ -102,7 +103,7 @@ fn a_report_overwrites_reports_only() {
 }
 
 #[test]
-fn recordings_and_what_is_made_of_them_overwrite_no_other_log() {
+fn recordings_and_derived_logs_overwrite_no_other_log() {
     let folder = Folder::with_dive();
     folder.record("dive.mcap", "live.mcap", &[]);
     folder.record("dive.mcap", "live_2.mcap", &[]);
@@ -126,7 +127,7 @@ fn recordings_and_what_is_made_of_them_overwrite_no_other_log() {
 }
 
 #[test]
-fn imports_rehearsals_and_pictures_overwrite_their_own_only() {
+fn imports_rehearsals_and_pictures_overwrite_only_their_own_kind() {
     let folder = Folder::with_dive();
     folder.write("candump.log", "(1700000000.000000) can0 020#0001\n(1700000000.010000) can0 020#0002\n");
     let import = ["import", "candump.log", "--source", "imu=can0", "--vehicle", "vehicle.toml", "-o"];
@@ -150,7 +151,7 @@ fn imports_rehearsals_and_pictures_overwrite_their_own_only() {
 }
 
 #[test]
-fn a_demonstration_leaves_a_folder_with_another_dive_alone() {
+fn demonstration_leaves_a_folder_with_another_dive_unchanged() {
     let folder = Folder::with_dive();
     folder.record("dive.mcap", "live.mcap", &[]);
     std::fs::rename(folder.path("live.mcap"), folder.path("dive.mcap")).unwrap();
@@ -158,7 +159,7 @@ fn a_demonstration_leaves_a_folder_with_another_dive_alone() {
 }
 
 #[test]
-fn outputs_are_tried_before_the_work() {
+fn outputs_are_checked_before_the_work_begins() {
     let folder = Folder::with_dive();
     folder.write("file", "");
     for wrong in ["missing/report.json", "file/report.json", "."] {
@@ -173,7 +174,7 @@ fn outputs_are_tried_before_the_work() {
             &["recover", "dive.mcap", "-o", wrong],
         ] {
             let answer = folder.headrace(command);
-            // Nothing on stdout: no dive was shown, and nothing was done.
+            // Nothing on stdout: no dive was shown and no work was done.
             assert_eq!(
                 (answer.code, answer.stdout.as_str()),
                 (Some(2), ""),
@@ -188,7 +189,7 @@ fn outputs_are_tried_before_the_work() {
 
 #[cfg(unix)]
 #[test]
-fn what_is_no_file_is_never_removed_to_make_way() {
+fn only_regular_files_are_ever_replaced() {
     let folder = Folder::new();
     std::fs::create_dir(folder.path("out")).unwrap();
     let link = folder.path("out/dive.mcap");
@@ -202,7 +203,7 @@ fn what_is_no_file_is_never_removed_to_make_way() {
 }
 
 #[test]
-fn what_a_command_reads_it_never_writes() {
+fn command_never_writes_its_own_input() {
     let folder = Folder::with_dive();
     folder.record("dive.mcap", "live.mcap", &[]);
     folder.write("candump.log", "(1700000000.000000) can0 020#0001\n");
@@ -229,7 +230,7 @@ fn what_a_command_reads_it_never_writes() {
 
 #[cfg(unix)]
 #[test]
-fn links_to_what_a_command_reads_are_seen() {
+fn links_to_an_input_are_detected() {
     use std::os::unix::fs::symlink;
     let folder = Folder::with_dive();
     std::fs::hard_link(folder.path("dive.mcap"), folder.path("hard.mcap")).unwrap();
@@ -251,7 +252,7 @@ fn links_to_what_a_command_reads_are_seen() {
 }
 
 #[test]
-fn outputs_of_a_command_are_different_files() {
+fn two_outputs_of_a_command_must_differ() {
     let folder = Folder::with_dive();
     let run = ["run", "vehicle.toml", "--source", "dive.mcap", "--speed", "max", "--record", "x.mcap"];
     let live = ["run", "vehicle.toml", "--for", "1", "--record", "x.mcap"];
@@ -270,13 +271,13 @@ fn outputs_of_a_command_are_different_files() {
     }
     let simulate = ["simulate", "scene.toml", "-o", "new.mcap", "--truth", "./new.mcap"];
     two_files(&folder, &simulate, &["-o new.mcap", "./new.mcap (--truth)"]);
-    // What has nothing to lose may be named twice.
+    // Files without content to lose may be named twice.
     #[cfg(unix)]
     accepts(&folder, &["simulate", "scene.toml", "-o", "/dev/null", "--truth", "/dev/null"], "vehicle.toml");
 }
 
 #[test]
-fn a_dive_is_not_removed_for_a_recording_that_cannot_begin() {
+fn recording_that_cannot_begin_keeps_the_existing_dive() {
     let folder = Folder::with_dive();
     folder.record("dive.mcap", "live.mcap", &[]);
     folder.record("dive.mcap", "other.mcap", &[]);
@@ -290,7 +291,7 @@ fn a_dive_is_not_removed_for_a_recording_that_cannot_begin() {
 }
 
 #[test]
-fn the_expected_report_is_read_before_the_replay_and_not_replaced() {
+fn expected_report_is_read_before_the_replay_and_not_replaced() {
     let folder = Folder::with_dive();
     let golden = ["replay", "dive.mcap", "--report", "golden.json"];
     accepts(&folder, &golden, "golden.json");
@@ -306,7 +307,7 @@ fn the_expected_report_is_read_before_the_replay_and_not_replaced() {
 
 #[cfg(target_os = "linux")]
 #[test]
-fn what_was_there_stays_where_the_new_file_cannot_be_written() {
+fn existing_file_stays_if_the_new_one_cannot_be_written() {
     let folder = Folder::with_dive();
     folder.record("dive.mcap", "live.mcap", &[]);
     let commands: [&[&str]; 5] = [
@@ -340,10 +341,10 @@ fn what_was_there_stays_where_the_new_file_cannot_be_written() {
     }
 }
 
-/// A simulation that is killed in the middle leaves nothing behind, whatever kills it; where the file system knows files without a name.
+/// A simulation killed at any point leaves no file, if the file system supports unnamed files.
 #[cfg(target_os = "linux")]
 #[test]
-fn a_simulation_that_is_killed_leaves_nothing_behind() {
+fn killed_simulation_leaves_no_file() {
     let folder = Folder::with_dive();
     folder.write("long.toml", SCENE.replace("speed_mps = 0.2", "speed_mps = 0.001"));
     let before = content(&folder);

@@ -1,4 +1,4 @@
-//! `headrace plan`: what people read, what programs read, and what is refused with which reason.
+//! `headrace plan`: its text, its JSON and CSV, and its refusals with their reasons.
 
 use std::fmt::Write as _;
 
@@ -17,7 +17,7 @@ fn json(folder: &Folder, args: &[&str]) -> Value {
 }
 
 #[test]
-fn a_vehicle_s_plan_in_words() {
+fn plan_text_of_a_vehicle() {
     let answer = plan(&Folder::new(), &["--vehicle", VITA_2]);
     assert_eq!((answer.code, answer.stderr.as_str()), (Some(0), ""));
     insta::assert_snapshot!(answer.stdout, @r"
@@ -48,7 +48,7 @@ fn a_vehicle_s_plan_in_words() {
 }
 
 #[test]
-fn a_plan_with_drift_yaw_and_a_deadline_in_words() {
+fn plan_text_with_drift_yaw_and_a_deadline() {
     let args = ["--tunnel", "ceran", "--length", "7000", "--heads", "2", "--layout", "sector_offset"];
     let allowed = ["--target", "0.6", "--drift", "1", "--yaw", "10", "--hours", "30", "--range", "20"];
     let answer = plan(&Folder::new(), &[&args[..], &allowed].concat());
@@ -66,7 +66,7 @@ fn a_plan_with_drift_yaw_and_a_deadline_in_words() {
     * faster    1.2 ~ 10.60     1.17  0.065  0.120  0.414   0.065  0.687     0.687   0.706   0.71     1.41   0.054    35.7
       fastest   2.4 ~  6.80     0.58  0.130  0.239  0.782   0.065  0.441     0.441   0.830   0.83     1.66    none
 
-    fastest: a target of 0.6 m is met at no speed: neighbours of one turn are 0.782 m apart, whatever the speed
+    fastest: no speed meets a target of 0.6 m: neighbours of one turn are 0.782 m apart, whatever the speed
     * finest at this speed: faster; it misses the target
     faster: 0.055 m/s by geometry
     ~ extrapolated from another range setting; measure the turn period and add it to the vehicle file
@@ -75,7 +75,7 @@ fn a_plan_with_drift_yaw_and_a_deadline_in_words() {
 }
 
 #[test]
-fn programs_read_the_same_figures_as_json_and_csv() {
+fn json_and_csv_have_the_same_figures() {
     let folder = Folder::new();
     let args = ["--tunnel", "ceran-blueprint", "--heads", "3", "--speed", "0.2", "--target", "0.9"];
     let plan_json = json(&folder, &args);
@@ -106,9 +106,9 @@ fn programs_read_the_same_figures_as_json_and_csv() {
     }
 }
 
-/// Its T fits the target, and leaves no room for what the position errs by.
+/// Its spacing T meets the target but leaves no margin for position errors.
 #[test]
-fn a_speed_between_the_plan_s_and_that_of_geometry_doesn_t_meet_the_target() {
+fn speed_between_plan_and_geometric_limit_misses_the_target() {
     let folder = Folder::new();
     let at = |speed: &str| {
         let plan = json(&folder, &["--vehicle", VITA_2, "--mode", "fast", "--speed", speed]);
@@ -121,7 +121,7 @@ fn a_speed_between_the_plan_s_and_that_of_geometry_doesn_t_meet_the_target() {
 }
 
 #[test]
-fn v_max_asked_back_as_a_speed_gives_the_target() {
+fn planning_at_v_max_gives_the_target_back() {
     let folder = Folder::new();
     for tunnel in ["ceran", "rectangle,width_m=4,height_m=3", "circle,radius_m=1.2"] {
         for layout in ["phase_shift", "sector_offset"] {
@@ -136,7 +136,7 @@ fn v_max_asked_back_as_a_speed_gives_the_target() {
 }
 
 #[test]
-fn measured_turns_of_a_vehicle_file_outweigh_the_table() {
+fn measured_turn_times_of_a_vehicle_file_override_the_table() {
     let folder = Folder::new();
     let measured = "mode = \"fast\"\nrange_m = 5\nturn_period_s = 6\n\
                     [[sensors.measured_turns]]\nmode = \"slow\"\nrange_m = 4\nturn_period_s = 15\n\
@@ -152,15 +152,15 @@ fn measured_turns_of_a_vehicle_file_outweigh_the_table() {
         (mode["turn_s"].as_f64().unwrap(), mode["turn_basis"].as_str().unwrap().to_owned())
     };
     assert_eq!(turn("fast"), (6.0, "measured".to_owned()));
-    // A sixth of the way from 4 m to 10 m.
+    // A sixth of the range from 4 m to 10 m.
     assert_eq!(turn("slow"), (16.0, "estimated".to_owned()));
-    // 5 m less, there and back, 600 pings: 4 s of sound at 1500 m/s.
+    // A range shorter by 5 m saves 10 m of sound path in each of 600 pings: 4 s at 1500 m/s.
     let (medium_s, basis) = turn("medium");
     assert!((medium_s - (10.8 - 600.0 * 10.0 / 1500.0)).abs() < 1e-6 && basis == "estimated", "{medium_s}");
 }
 
 #[test]
-fn what_cannot_be_planned_is_refused_with_its_reason() {
+fn impossible_plans_are_refused_with_the_reason() {
     let folder = Folder::new();
     folder.write("bow.csv", "y_m,z_m\n-1,0\n1,0\n-1,2\n1,2\n");
     let vehicle = |more: &str| {
@@ -209,7 +209,7 @@ fn what_cannot_be_planned_is_refused_with_its_reason() {
     --vehicle sensors.toml
         headrace: plan: sensors.toml has no profiling head
     --tunnel ceran
-        headrace: planning: nothing is asked: give a target, a speed or a time
+        headrace: planning: no question: give a target, a speed or a time
     --tunnel egg --target 0.5
         headrace: --tunnel:1: profile = "egg": must be one of ceran, ceran-blueprint, rectangle, circle, arch, trimmed_circle, polyline
     --tunnel circle,radius_m=-3 --target 0.5
@@ -217,7 +217,7 @@ fn what_cannot_be_planned_is_refused_with_its_reason() {
     --tunnel circle,radius=3 --target 0.5
         headrace: --tunnel:2: radius: is not a key here; did you mean radius_m?
     --tunnel bow.csv --target 0.5
-        headrace: --tunnel:2: file = "bow.csv": line 2 of it: the profile isn't star-shaped about (-1, 0): it runs backwards or crosses itself at vertex 0, counted from 0
+        headrace: --tunnel:2: file = "bow.csv": line 2: the profile isn't star-shaped about (-1, 0): it runs backwards or crosses itself at vertex 0, counted from 0
     --tunnel ceran --target 0.5 --layout sector_offset
         headrace: planning: sector offset divides a turn among heads: it needs at least 2, not 1
     --tunnel ceran --target 0.5 --drift 8
@@ -238,12 +238,12 @@ fn what_cannot_be_planned_is_refused_with_its_reason() {
 }
 
 #[test]
-fn a_target_that_no_mode_meets_is_an_answer_with_exit_code_1() {
+fn target_that_no_mode_meets_exits_with_1() {
     let folder = Folder::new();
     let args = ["--tunnel", "ceran", "--target", "0.02"];
     let answer = plan(&folder, &args);
     assert_eq!(answer.code, Some(1));
-    assert!(answer.stdout.contains("a target of 0.02 m is met at no speed"), "{}", answer.stdout);
+    assert!(answer.stdout.contains("no speed meets a target of 0.02 m"), "{}", answer.stdout);
     assert!(!answer.stdout.contains("NaN") && !answer.stdout.contains("inf"));
     let modes = &json(&folder, &args)["modes"];
     assert!(modes.as_array().unwrap().iter().all(|mode| mode["reason"] == "angular_step"));
@@ -252,7 +252,7 @@ fn a_target_that_no_mode_meets_is_an_answer_with_exit_code_1() {
 }
 
 #[test]
-fn pictures_are_drawn_and_the_same_each_time() {
+fn pictures_are_identical_in_every_run() {
     let folder = Folder::new();
     for pictures in ["once", "twice"] {
         let answer = plan(&folder, &["--vehicle", VITA_2, "--svg", pictures]);
@@ -264,10 +264,10 @@ fn pictures_are_drawn_and_the_same_each_time() {
     }
 }
 
-/// The pages show what the command draws now: where a picture has changed on purpose, the command in docs/how-to/plan/README.md
-/// makes it anew.
+/// The documents show the pictures that the command draws now. If a picture changes on purpose, renew it with the
+/// command in docs/how-to/plan/README.md.
 #[test]
-fn the_pages_show_the_pictures_that_are_drawn() {
+fn pages_show_the_pictures_of_the_current_program() {
     let folder = Folder::new();
     let args = ["--vehicle", VITA_2, "--target", "0.5", "--mode", "fast", "--svg", "pictures"];
     assert_eq!(plan(&folder, &args).code, Some(0));
@@ -276,14 +276,14 @@ fn the_pages_show_the_pictures_that_are_drawn() {
         let shown = std::fs::read(&page).unwrap();
         assert!(
             shown == folder.read(&format!("pictures/{name}.svg")),
-            "{} differs from what is drawn",
+            "{} differs from the picture drawn now",
             page.display()
         );
     }
 }
 
 #[test]
-fn the_lines_that_a_plan_writes_make_its_best_answer_the_vehicle_s() {
+fn written_plan_lines_configure_the_best_mode() {
     let folder = Folder::new();
     let written = plan(&folder, &["--vehicle", VITA_2, "--write"]);
     assert_eq!((written.code, written.stderr.as_str()), (Some(0), ""));
@@ -298,7 +298,7 @@ fn the_lines_that_a_plan_writes_make_its_best_answer_the_vehicle_s() {
     assert!((0.0..0.001).contains(&(0.95 * v_max_mps - speed_mps)), "{speed_mps} of {v_max_mps}");
     assert_eq!(line("mode"), format!("mode = {}", best["mode"]));
     assert_eq!(written.stdout.matches("[[sensors]]").count(), 4);
-    // Pasted in place of the same keys: a vehicle that passes at its planned speed.
+    // Replacing the vehicle's keys by these lines gives a vehicle that passes at its planned speed.
     let old = std::fs::read_to_string(VITA_2).unwrap();
     let pasted: Vec<String> = old
         .lines()
@@ -314,7 +314,7 @@ fn the_lines_that_a_plan_writes_make_its_best_answer_the_vehicle_s() {
     let now =
         &again["modes"].as_array().unwrap().iter().find(|mode| mode["best"] == true).unwrap()["v_max_mps"];
     assert!((now.as_f64().unwrap() - v_max_mps).abs() < 0.003, "{now} of {v_max_mps}");
-    // Who drives as planned is not told that it is too fast, once the heading is known, and all of it passes.
+    // A pilot at the planned speed gets no too-fast alert once the heading is known, and every section passes.
     folder.write(
         "scene.toml",
         format!(

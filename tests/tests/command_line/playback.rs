@@ -1,4 +1,4 @@
-//! `replay --interactive` with keys on a terminal, and with words in a pipe; a demonstration that is interrupted.
+//! `replay --interactive` with keys on a terminal and with commands in a pipe, and an interrupted demonstration.
 
 use std::io::Write as _;
 use std::process::Stdio;
@@ -12,7 +12,7 @@ use serde_json::Value;
 const PLAY: [&str; 5] = ["replay", "dive.mcap", "--interactive", "--speed", "0.5x"];
 
 #[test]
-fn keys_play_a_dive_and_leave_it() {
+fn keys_control_and_end_a_replay() {
     let folder = Folder::with_dive();
     let mut screen = Screen::run(&folder, &PLAY, 100, &[]);
     screen.until("q leave");
@@ -30,7 +30,7 @@ fn keys_play_a_dive_and_leave_it() {
     screen.until("END      left and down go back, q leaves");
     screen.press(b"\x1b[B");
     screen.until("AT       0:00:00.000");
-    // Nothing that is typed is shown.
+    // Typed characters aren't echoed.
     screen.press(b"xyzzy");
     screen.press(b"q");
     let (code, shown) = screen.end();
@@ -41,7 +41,7 @@ fn keys_play_a_dive_and_leave_it() {
 }
 
 #[test]
-fn ctrl_c_and_termination_leave_the_terminal_in_order() {
+fn ctrl_c_and_sigterm_restore_the_terminal() {
     let folder = Folder::with_dive();
     let mut screen = Screen::run(&folder, &PLAY, 100, &[]);
     screen.until("q leave");
@@ -56,7 +56,7 @@ fn ctrl_c_and_termination_leave_the_terminal_in_order() {
 }
 
 #[test]
-fn words_in_a_pipe_play_a_dive_and_leave_it() {
+fn piped_commands_control_and_end_a_replay() {
     let folder = Folder::with_dive();
     for leave in ["end", "quit"] {
         let mut command = program();
@@ -64,7 +64,7 @@ fn words_in_a_pipe_play_a_dive_and_leave_it() {
         let mut child = command.stdout(Stdio::piped()).spawn().unwrap();
         let mut words = child.stdin.take().unwrap();
         write!(words, "pause\nseek 10s\n{leave}\n").unwrap();
-        // The pipe stays open: it is the word that leaves.
+        // The pipe stays open, so the command ends the replay.
         let status = child.wait().unwrap();
         drop(words);
         assert!(matches!(status.code(), Some(0 | 1)), "{leave}: {status:?}");
@@ -72,11 +72,11 @@ fn words_in_a_pipe_play_a_dive_and_leave_it() {
 }
 
 #[test]
-fn an_interrupted_demonstration_leaves_its_report_and_summary() {
+fn interrupted_demonstration_keeps_its_report_and_summary() {
     let folder = Folder::new();
     let mut screen = Screen::run(&folder, &["demo", "--speed", "20x", "--out", "demo"], 100, &[]);
     screen.until("m/s");
-    // A wrapper signals the program, and then its group.
+    // A wrapper signals the program and then its process group.
     screen.signal(Signal::INT);
     std::thread::sleep(std::time::Duration::from_millis(5));
     screen.signal(Signal::INT);
@@ -87,7 +87,7 @@ fn an_interrupted_demonstration_leaves_its_report_and_summary() {
     assert_eq!(faults(&super::report_schema::schema(), &report), Vec::<String>::new());
     let duration_s = report["dive"]["duration_s"].as_f64().unwrap();
     assert!(duration_s > 0.0);
-    // The log holds the same dive.
+    // The log contains the same dive.
     let (_, replayed) = folder.replay("demo/dive.mcap", &[]);
     assert_eq!(replayed["digest"], report["digest"]);
 }

@@ -1,16 +1,18 @@
-//! The README shows what the program shows.
+//! Checks that the README shows the program's present output.
 
 use headrace_tests::{Folder, root};
 
-/// Begins what the README shows of the demonstration; what follows is indented by four.
+/// Text before the demonstration's output in the README; the output is indented by four spaces.
 const BEGIN: &str = "leaves a report and a log in `headrace-demo/`:\n\n";
-/// Stands for lines left out.
+/// Placeholder for omitted lines.
 const LEFT_OUT: &str = "    [...]";
-/// Tells this test to write the README anew.
+/// Environment variable with which this test rewrites the README.
 const RENEW: &str = "HEADRACE_RENEW_README";
 
-/// Of the demonstration's output in a pipe: from the state before the flag to the first that is good again, from the state before it
-/// is cleared to that, and the summary of the way. Nothing within these is left out.
+/// The part of the demonstration's piped output that the README shows, without gaps.
+///
+/// It consists of the lines from the state before the flag to the first good state, those from the state before
+/// clearing to the cleared state, and the summary of the coverage extent.
 fn excerpt(stdout: &str) -> String {
     let lines: Vec<&str> = stdout.lines().collect();
     let first = lines.iter().position(|line| line.contains("MISSED: ")).unwrap() - 1;
@@ -25,9 +27,9 @@ fn excerpt(stdout: &str) -> String {
     parts.join(&format!("{LEFT_OUT}\n"))
 }
 
-/// `HEADRACE_RENEW_README=1 cargo test -p headrace_tests --test command_line readme` renews it.
+/// To renew it: `HEADRACE_RENEW_README=1 cargo test -p headrace_tests --test command_line readme`.
 #[test]
-fn the_readme_shows_the_demonstration_as_it_is() {
+fn readme_shows_the_current_demonstration_output() {
     let folder = Folder::new();
     let answer = folder.headrace(&["demo", "--speed", "max"]);
     assert_eq!(answer.code, Some(0), "{}", answer.stderr);

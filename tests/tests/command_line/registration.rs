@@ -1,4 +1,4 @@
-//! Sensors join a loop once each, and what their decoders withhold is in the report.
+//! Sensors can be added to a loop once each, and readings withheld by their decoders are in the report.
 
 use headrace_config::Document;
 use headrace_fusion::direct::DirectNavigation;
@@ -29,7 +29,7 @@ fn device(kind: &dyn DeviceKind, connect: &str, keys: &str) -> Box<dyn Device> {
 }
 
 #[test]
-fn a_sensor_joins_a_loop_once() {
+fn sensor_can_be_added_to_a_loop_only_once() {
     for device in [
         device(
             &headrace_imagenex881::Imagenex881Kind,
@@ -46,7 +46,7 @@ fn a_sensor_joins_a_loop_once() {
 }
 
 #[test]
-fn the_report_tells_what_was_withheld() {
+fn report_counts_withheld_readings() {
     let mut app = app();
     app.add_device(device(&headrace_bar100::Bar100Kind, "i2c:/dev/i2c-1:0x40", "").as_ref()).unwrap();
     let navigation = DirectNavigation::new(shapes::circle(2.5).unwrap(), Site::default());

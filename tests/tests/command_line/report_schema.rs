@@ -1,5 +1,5 @@
-//! Reports are as docs/reference/report.schema.json says: real ones of several kinds are held to it, and it describes each key
-//! with its unit.
+//! Checks reports of several kinds against docs/reference/report.schema.json, which must describe each key with its
+//! unit.
 //!
 //! The schema uses a small part of JSON Schema (2020-12), which `headrace_tests::json_schema` checks.
 
@@ -13,7 +13,7 @@ pub(crate) fn schema() -> Value {
 }
 
 #[test]
-fn reports_of_all_kinds_are_as_the_schema_says() {
+fn reports_of_all_kinds_match_the_schema() {
     let schema = schema();
     let folder = Folder::with_dive();
     let check = |what: &str, report: &Value| {
@@ -54,7 +54,7 @@ fn reports_of_all_kinds_are_as_the_schema_says() {
 }
 
 #[test]
-fn golden_reports_are_as_the_schema_says() {
+fn golden_reports_match_the_schema() {
     let schema = schema();
     let folder = Folder::with_dive();
     let bless = || {
@@ -64,7 +64,7 @@ fn golden_reports_are_as_the_schema_says() {
     let mut golden = bless();
     assert_eq!(faults(&schema, &golden), Vec::<String>::new());
     assert_eq!(golden["log"], Value::Null);
-    // With tolerances, which stay; a golden report of an earlier version lacks keys, and gets them.
+    // Tolerances are kept. A golden report of an earlier version has missing keys, and they are added.
     golden["tolerances"] = serde_json::json!({"/summary/hole/max_m": 0.1});
     golden.as_object_mut().unwrap().remove("log");
     folder.write("golden.json", golden.to_string());
@@ -74,7 +74,7 @@ fn golden_reports_are_as_the_schema_says() {
 }
 
 #[test]
-fn a_report_that_is_wrong_is_found_out() {
+fn wrong_report_violates_the_schema() {
     let schema = schema();
     let folder = Folder::with_dive();
     let (_, report) = folder.replay("dive.mcap", &[]);
@@ -101,7 +101,7 @@ fn a_report_that_is_wrong_is_found_out() {
     assert_eq!(faults(&schema, &less).len(), 1);
 }
 
-/// What a key's ending says of its unit, and the words for it.
+/// Units by the ending of a key, and their names in descriptions.
 const UNITS: [(&str, &str); 11] = [
     ("_ratio", "without unit"),
     ("nis", "without unit"),
@@ -127,7 +127,7 @@ fn every_key_is_required_and_described_with_its_unit() {
             object["required"].as_array().unwrap().iter().map(|key| key.as_str().unwrap()).collect();
         required.sort_unstable();
         let mut keys: Vec<_> = properties.keys().map(String::as_str).collect();
-        // Golden reports may have it, others never do.
+        // Only golden reports may have it.
         keys.retain(|key| *key != "tolerances");
         keys.sort_unstable();
         assert_eq!(required, keys);

@@ -1,10 +1,10 @@
-//! What a dive looks like on terminals of several widths, and to programs.
+//! Output of a dive on terminals of several widths, and in a pipe.
 
 use headrace_tests::Folder;
 use headrace_tests::pty::{OnTerminal, shown_lines};
 use serde_json::Value;
 
-/// Begun in the middle, too fast for a stretch, on and back; the heads die at the end.
+/// The dive starts within the tunnel, is too fast over a stretch, turns back and goes on. All heads die at the end.
 const SCENE: &str = "seed = 3\nvehicle = \"vita2-4.toml\"\n[vehicle_changes]\nheads.planned_speed_mps = 0.09\n[trajectory]\nstart_m = 3\n
 [[trajectory.legs]]\ndistance_m = 3\nspeed_mps = 0.09\n
 [[trajectory.legs]]\ndistance_m = 3\nspeed_mps = 0.4\n
@@ -40,7 +40,7 @@ fn no_line_wraps_at_sixty_columns_or_at_any_width() {
 }
 
 #[test]
-fn a_status_is_red_while_the_vehicle_goes_too_fast_and_green_while_it_does_not() {
+fn status_is_red_while_too_fast_and_green_otherwise() {
     let written = on_terminal(&dive(), 100);
     let statuses: Vec<&str> = written.split("\r\x1b[K").skip(1).collect();
     let coloured = |code: &str, what: &str| {
@@ -53,7 +53,7 @@ fn a_status_is_red_while_the_vehicle_goes_too_fast_and_green_while_it_does_not()
 }
 
 #[test]
-fn in_a_pipe_there_are_neither_colours_nor_broken_lines() {
+fn piped_output_has_no_colours_and_no_broken_lines() {
     let folder = dive();
     let answer = folder.headrace(&["replay", "dive.mcap"]);
     assert!(!answer.stdout.contains(['\x1b', '\r']));
@@ -62,9 +62,10 @@ fn in_a_pipe_there_are_neither_colours_nor_broken_lines() {
     insta::assert_snapshot!(answer.stdout.split("digest").next().unwrap());
 }
 
-/// Who has slowed down as he was told goes on missing the wall, for another cause: the stretch is one run, and that is told, too.
+/// A pilot who has slowed down still misses the wall, now for another cause. The stretch is one run, and the new
+/// cause is announced, too.
 #[test]
-fn a_missed_stretch_that_goes_on_for_another_cause_is_told_again() {
+fn missed_stretch_is_announced_again_when_its_cause_changes() {
     let folder = dive();
     let dying = "sensors = [\"sonar_0\", \"sonar_1\", \"sonar_2\"]\nfrom_s = 42\nfor_s = 70\n";
     let [kept, _] = SCENE.split("sensors =").collect::<Vec<_>>()[..] else { panic!("{SCENE}") };
@@ -92,7 +93,7 @@ fn a_missed_stretch_that_goes_on_for_another_cause_is_told_again() {
 }
 
 #[test]
-fn json_lines_have_the_state_once_a_second_and_what_is_told_once() {
+fn json_lines_have_the_state_every_second_and_each_event_once() {
     let folder = dive();
     let answer = folder.headrace(&["replay", "dive.mcap", "--json-lines"]);
     let lines: Vec<Value> = answer.stdout.lines().map(|line| serde_json::from_str(line).unwrap()).collect();

@@ -1,5 +1,6 @@
-//! `--tui` on terminals of several sizes, as another program reads them: pages of kept dives at fixed times, keys, and the
-//! terminal in order on every way out.
+//! Checks `--tui` on terminals of several sizes with a separate terminal emulator.
+//!
+//! Tests cover pages of golden dives at fixed times, keys, and the restored terminal after every kind of exit.
 
 use headrace_tests::screen::Screen;
 use headrace_tests::{Folder, root};
@@ -7,7 +8,7 @@ use rustix::process::Signal;
 
 const UNICODE: (&str, &str) = ("LANG", "C.UTF-8");
 
-/// A kept dive on a terminal, played to its end and paused there.
+/// Plays a golden dive on a terminal to its end, and pauses there.
 fn ended(log: &str, size: (u16, u16), variables: &[(&str, &str)]) -> (Folder, Screen) {
     let folder = Folder::new();
     let log = root().join(format!("tests/golden/{log}.mcap"));
@@ -18,7 +19,7 @@ fn ended(log: &str, size: (u16, u16), variables: &[(&str, &str)]) -> (Folder, Sc
     (folder, screen)
 }
 
-/// The page at a time, so many times ten seconds and the rest before the end.
+/// The page at `time`, reached from the end by `back` steps of ten seconds; the first step covers the rest.
 fn at(screen: &mut Screen, back: usize, time: &str) -> String {
     screen.until_page(" END ");
     for _ in 0..back {
@@ -28,7 +29,7 @@ fn at(screen: &mut Screen, back: usize, time: &str) -> String {
 }
 
 #[test]
-fn a_kept_dive_at_a_time_on_three_terminals() {
+fn golden_dives_match_snapshots_on_three_terminal_sizes() {
     for size in [(60, 20), (80, 24), (120, 40)] {
         let (_folder, mut screen) = ended("too-fast", size, &[UNICODE]);
         let page = at(&mut screen, 5, "0:00:31");
@@ -37,7 +38,7 @@ fn a_kept_dive_at_a_time_on_three_terminals() {
 }
 
 #[test]
-fn what_is_wrong_is_first() {
+fn problems_are_shown_first() {
     for log in ["stalls", "adrift", "slipping-cable", "murk"] {
         let (_folder, screen) = ended(log, (80, 24), &[UNICODE]);
         let page = screen.until_page(" END ");
@@ -46,7 +47,7 @@ fn what_is_wrong_is_first() {
 }
 
 #[test]
-fn without_colours_and_unicode_words_and_shapes_are_left() {
+fn without_colours_and_unicode_words_and_shapes_remain() {
     let (_folder, mut screen) = ended("too-fast", (80, 24), &[("NO_COLOR", "1"), ("LC_ALL", "C")]);
     let page = at(&mut screen, 5, "0:00:31");
     assert!(page.is_ascii(), "{page}");
@@ -62,7 +63,7 @@ fn without_colours_and_unicode_words_and_shapes_are_left() {
 }
 
 #[test]
-fn keys_move_through_a_replay_and_leave_it() {
+fn keys_seek_in_a_replay_and_end_it() {
     let (_folder, mut screen) = ended("too-fast", (100, 30), &[UNICODE]);
     assert!(!screen.is_in_order(), "keys come without a line end");
     at(&mut screen, 1, "0:01:11");
@@ -94,7 +95,7 @@ fn keys_move_through_a_replay_and_leave_it() {
     assert!(!screen.terminal().screen().hide_cursor() && !screen.terminal().screen().alternate_screen());
 }
 
-/// Its name, what is done, and whether the end is an orderly one.
+/// Name of the exit, its action, and whether it is a regular end.
 type Way<'a> = (&'a str, &'a dyn Fn(&mut Screen), bool);
 
 #[test]
@@ -127,7 +128,7 @@ fn every_way_out_leaves_the_terminal_in_order() {
 }
 
 #[test]
-fn a_program_without_a_terminal_says_what_it_needs() {
+fn tui_without_a_terminal_is_refused_with_the_requirements() {
     let folder = Folder::with_dive();
     let answer = folder.headrace(&["replay", "dive.mcap", "--tui"]);
     assert_eq!(answer.code, Some(2), "{}", answer.stderr);
@@ -135,7 +136,7 @@ fn a_program_without_a_terminal_says_what_it_needs() {
 }
 
 #[test]
-fn log_messages_wait_until_the_terminal_is_back() {
+fn log_messages_are_held_until_the_terminal_is_restored() {
     let folder = Folder::with_dive();
     let mut screen =
         Screen::run(&folder, &["replay", "dive.mcap", "--tui", "--speed", "max", "-v"], 100, &[UNICODE]);
@@ -151,7 +152,7 @@ fn log_messages_wait_until_the_terminal_is_back() {
 }
 
 #[test]
-fn an_alert_is_acknowledged_and_a_note_taken_by_keys_and_both_are_in_the_log() {
+fn keys_acknowledge_alerts_and_take_notes_and_both_are_logged() {
     let folder = Folder::new();
     let mut screen =
         Screen::sized(&folder, &["demo", "--tui", "--speed", "20x", "--out", "demo"], (100, 30), &[UNICODE]);

@@ -1,6 +1,7 @@
-//! Dive logs open in people's viewers: read with the plain `mcap` crate, every message under `/result/view/` is as its
-//! channel's schema says and tells what the loop published; summary and indexes are right; a replay takes no notice of it.
-//! Other readers' checks are in `tests/viewers/`.
+//! Checks dive logs as other viewers read them, with the plain `mcap` crate.
+//!
+//! Every message under `/result/view/` must match its channel's schema and the loop's published results. Summary and
+//! indexes must be right, and a replay must ignore these messages. Checks by other readers are in `tests/viewers/`.
 
 use std::collections::BTreeMap;
 
@@ -9,7 +10,7 @@ use headrace_tests::{Folder, VEHICLE};
 use mcap::{MessageStream, Summary};
 use serde_json::Value;
 
-/// Twenty seconds at an ordinary speed, then some that are far too fast.
+/// Twenty seconds at a normal speed, then a stretch that is far too fast.
 const SCENE: &str = r#"name = "dive with a missed stretch"
 vehicle = "vehicle.toml"
 
@@ -25,7 +26,7 @@ distance_m = 12
 speed_mps = 0.9
 "#;
 
-/// A recorded dive, and its report.
+/// Records a dive; returns its folder and report.
 fn recorded() -> (Folder, Value) {
     let folder = Folder::new();
     folder.write("vehicle.toml", VEHICLE);
@@ -36,7 +37,7 @@ fn recorded() -> (Folder, Value) {
     (folder, report)
 }
 
-/// Messages of the view by topic, each held to its schema.
+/// View messages by topic, each checked against its schema.
 fn view(log: &[u8]) -> BTreeMap<String, Vec<Value>> {
     let mut topics: BTreeMap<String, Vec<Value>> = BTreeMap::new();
     for message in MessageStream::new(log).unwrap().map(Result::unwrap) {
@@ -68,7 +69,7 @@ fn time_s(value: &Value) -> f64 {
 }
 
 #[test]
-fn every_message_is_as_its_schema_says_and_tells_the_dive() {
+fn every_view_message_matches_its_schema_and_the_dive() {
     let (folder, report) = recorded();
     let topics = view(&folder.read("live.mcap"));
     let names: Vec<&str> = topics.keys().map(String::as_str).collect();
@@ -99,7 +100,7 @@ fn every_message_is_as_its_schema_says_and_tells_the_dive() {
     for cloud in &topics["points"] {
         for (head, [x_m, y_m, z_m]) in points_of(cloud) {
             assert!(head < 2 && (2.0..20.0).contains(&x_m), "head {head} at {x_m}");
-            // The wall of a circle of 3 m, whose floor is at z = 0.
+            // Points lie on a circle of 3 m radius with its lowest point at z = 0.
             assert!(((y_m * y_m + (z_m - 3.0) * (z_m - 3.0)).sqrt() - 3.0).abs() < 0.05, "{y_m}, {z_m}");
         }
     }
@@ -124,7 +125,7 @@ fn every_message_is_as_its_schema_says_and_tells_the_dive() {
 }
 
 #[test]
-fn a_message_that_is_not_as_its_schema_says_is_found_out() {
+fn message_that_violates_its_schema_is_detected() {
     let (folder, _) = recorded();
     let log = folder.read("live.mcap");
     let mut channels = MessageStream::new(&log).unwrap().map(Result::unwrap);
@@ -147,7 +148,7 @@ fn a_message_that_is_not_as_its_schema_says_is_found_out() {
     assert_eq!(faults(&schema, &less).len(), 1);
 }
 
-/// Head and place of each point of a cloud.
+/// Head and position of each point of a cloud.
 fn points_of(cloud: &Value) -> Vec<(u8, [f64; 3])> {
     let origin = numbers(&cloud["pose"]["position"], ["x", "y", "z"]);
     let stride = usize::try_from(cloud["point_stride"].as_u64().unwrap()).unwrap();
@@ -169,7 +170,7 @@ fn points_of(cloud: &Value) -> Vec<(u8, [f64; 3])> {
 }
 
 #[test]
-fn summary_and_indexes_agree_with_the_file_read_from_end_to_end() {
+fn summary_and_indexes_match_a_full_read() {
     let (folder, _) = recorded();
     let log = folder.read("live.mcap");
     let mut counts: BTreeMap<u16, u64> = BTreeMap::new();
@@ -190,12 +191,12 @@ fn summary_and_indexes_agree_with_the_file_read_from_end_to_end() {
     assert_eq!(stats.attachment_count as usize, summary.attachment_indexes.len());
     assert_eq!(stats.metadata_count as usize, summary.metadata_indexes.len());
     let mut indexed: BTreeMap<u16, u64> = BTreeMap::new();
-    // The first chunk has the channels' definitions and no message.
+    // The first chunk has the channel definitions and no message.
     for chunk in summary.chunk_indexes.iter().filter(|chunk| !chunk.message_index_offsets.is_empty()) {
         let indexes: Vec<_> = summary.read_message_indexes(&log, chunk).unwrap().into_iter().collect();
         for (channel, entries) in indexes {
             *indexed.entry(channel.id).or_default() += entries.len() as u64;
-            // Each look unpacks the chunk.
+            // Every lookup decompresses the chunk, so only some entries are checked.
             for entry in entries.into_iter().step_by(41) {
                 let message = summary.seek_message(&log, chunk, &entry).unwrap();
                 assert_eq!((message.channel.id, message.log_time), (channel.id, entry.log_time));
@@ -212,7 +213,7 @@ fn summary_and_indexes_agree_with_the_file_read_from_end_to_end() {
 }
 
 #[test]
-fn replay_verify_and_recover_are_undisturbed() {
+fn view_messages_do_not_affect_replay_verify_or_recover() {
     let (folder, report) = recorded();
     assert_eq!(folder.digest("live.mcap", &[]), report["digest"].as_str().unwrap());
     let answer = folder.headrace(&["verify", "live.mcap"]);
@@ -223,7 +224,7 @@ fn replay_verify_and_recover_are_undisturbed() {
 }
 
 #[test]
-fn the_first_pose_that_differs_is_named() {
+fn verify_names_the_first_different_pose() {
     let (folder, _) = recorded();
     folder.write("other.toml", VEHICLE.replace("counts_per_metre = 2000", "counts_per_metre = 2000.000001"));
     let answer = folder.headrace(&["verify", "live.mcap", "--vehicle", "other.toml"]);
@@ -231,9 +232,9 @@ fn the_first_pose_that_differs_is_named() {
     assert!(answer.stdout.contains("poses: first difference at tick"), "{}", answer.stdout);
 }
 
-/// A layout names what is there: topics, and keys of their schemas.
+/// A layout may only use existing topics and keys of their schemas.
 #[test]
-fn the_layout_names_topics_and_keys_that_are_there() {
+fn layout_uses_existing_topics_and_keys() {
     let (folder, _) = recorded();
     let topics = view(&folder.read("live.mcap"));
     let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../docs/how-to/viewers/layout.json");
@@ -259,7 +260,7 @@ fn the_layout_names_topics_and_keys_that_are_there() {
     }
 }
 
-/// Keys and texts of a JSON value, all of them.
+/// Collects all keys and texts of a JSON value.
 fn texts(value: &Value, found: &mut Vec<String>) {
     match value {
         Value::String(text) => found.push(text.clone()),

@@ -1,9 +1,10 @@
-//! What a pilot is told who goes back for a stretch that was missed: nothing that he knows, no limit where there is none, and one end.
+//! Advice to a pilot who goes back for a missed stretch: no repeated statements, no needless speed limit, and one
+//! clear end.
 
 use headrace_tests::{Folder, root};
 use serde_json::Value;
 
-/// Lines of a dive of the shipped vehicle in a scene.
+/// Output lines of a dive of the shipped vehicle in this scene.
 fn told(scene: &str) -> Vec<Value> {
     let folder = Folder::new();
     let file = root().join("deploy/vehicles/vita2-4.toml");
@@ -24,7 +25,7 @@ fn figure(line: &Value, key: &str) -> f64 {
     line[key].as_f64().unwrap_or_else(|| panic!("{key} of {line}"))
 }
 
-/// Conditions, but for the seconds after each turn.
+/// Conditions, without the seconds after each turn.
 fn conditions(lines: &[Value], back: bool, between_m: [f64; 2]) -> Vec<&str> {
     let states = of(lines, "state");
     let within = |state: &&&Value| {
@@ -36,7 +37,7 @@ fn conditions(lines: &[Value], back: bool, between_m: [f64; 2]) -> Vec<&str> {
 }
 
 #[test]
-fn the_demonstration_s_stretch_is_told_once_and_cleared_once_as_it_was_told() {
+fn demonstration_stretch_is_announced_once_and_cleared_once() {
     let lines = told(&std::fs::read_to_string(root().join("deploy/scenes/demo.toml")).unwrap());
     let (flags, ends, cleared) = (of(&lines, "flag"), of(&lines, "flag_ends"), of(&lines, "cleared"));
     assert_eq!([flags.len(), ends.len(), cleared.len()], [1, 1, 1], "{flags:?} {ends:?} {cleared:?}");
@@ -46,7 +47,7 @@ fn the_demonstration_s_stretch_is_told_once_and_cleared_once_as_it_was_told() {
     assert_eq!(cleared[0]["from_m"], flags[0]["from_m"]);
     let [from_m, to_m] = ["from_m", "to_m"].map(|key| figure(cleared[0], key));
     assert!(to_m - from_m > 4.0, "{from_m} to {to_m}");
-    // The way back leaves more samples, and sections of which nothing can be said until they are passed again.
+    // The way back adds samples, and sections that stay undecided until they are passed again.
     let unsure = of(&lines, "cannot_say");
     let within = unsure.iter().filter(|line| (from_m..to_m).contains(&figure(line, "from_m")));
     assert_eq!(within.count(), 0, "{unsure:?}");
@@ -57,7 +58,7 @@ fn the_demonstration_s_stretch_is_told_once_and_cleared_once_as_it_was_told() {
     assert_eq!(end["summary"]["fail_m"], 0.0, "{end}");
 }
 
-/// The way there at a speed that passes, or not, and back fast.
+/// A dive with this speed on the way out, and a fast way back.
 fn there_and_back(there_mps: f64) -> Vec<Value> {
     told(&format!(
         "vehicle = \"vehicle.toml\"\n[vehicle_changes]\nheads.planned_speed_mps = 0.09\n[trajectory]\nkind = \"waypoints\"\n\
@@ -67,7 +68,7 @@ fn there_and_back(there_mps: f64) -> Vec<Value> {
 }
 
 #[test]
-fn over_wall_that_has_passed_and_on_the_way_back_to_what_was_missed_no_speed_is_too_fast() {
+fn no_speed_is_too_fast_over_passed_wall_or_on_the_way_back() {
     let lines = there_and_back(0.09);
     let conditions_there = conditions(&lines, false, [7.0, 13.0]);
     assert!(conditions_there.iter().all(|condition| *condition != "passed"), "{conditions_there:?}");
@@ -78,9 +79,9 @@ fn over_wall_that_has_passed_and_on_the_way_back_to_what_was_missed_no_speed_is_
     assert!(back.len() > 5 && back.iter().all(|condition| *condition == "going_back"), "{back:?}");
 }
 
-/// A pilot slows down before new wall: the limit is back before he is there.
+/// A pilot must slow down before new wall, so the limit returns in time.
 #[test]
-fn the_limit_is_back_before_new_wall_is() {
+fn speed_limit_returns_before_new_wall() {
     let lines = told(
         "vehicle = \"vehicle.toml\"\n[vehicle_changes]\nheads.planned_speed_mps = 0.09\n[trajectory]\nkind = \"waypoints\"\n\
          [[trajectory.waypoints]]\nchainage_m = 5\nstay_s = 10\n[[trajectory.waypoints]]\nchainage_m = 12\nspeed_mps = 0.09\n\
@@ -92,13 +93,13 @@ fn the_limit_is_back_before_new_wall_is() {
         .filter(|state| state["speed_mps"].as_f64().is_some_and(|mps| mps > 0.25))
         .collect();
     let first = again.iter().find(|state| state["condition"] == "too_fast").unwrap();
-    // The heads are 0.55 m before the middle, and saw wall up to there.
+    // The heads are 0.55 m before the vehicle's origin, and have seen wall up to there.
     let x_m = figure(&first["position"], "chainage_m");
     assert!((9.0..11.5).contains(&x_m), "{x_m}");
     assert!(again.iter().any(|state| state["condition"] == "passed"));
 }
 
-/// Too fast over 6 m, and back to a place; on from there at a speed, or no farther.
+/// A dive that is too fast over 6 m and returns to a chainage; it goes on at a speed or ends there.
 fn missed_and_back(to_m: f64, on_mps: Option<f64>) -> String {
     let on = on_mps.map_or_else(String::new, |mps| {
         format!("[[trajectory.waypoints]]\nchainage_m = 20\nspeed_mps = {mps}\n")
@@ -111,9 +112,9 @@ fn missed_and_back(to_m: f64, on_mps: Option<f64>) -> String {
     )
 }
 
-/// What is told is the place of the vehicle's middle, and its heads sit before and behind it.
+/// The displayed position is the vehicle's origin; its heads are before and behind it.
 #[test]
-fn who_goes_back_as_far_as_told_and_on_as_fast_as_told_clears_it_all() {
+fn following_the_go_back_advice_clears_every_missed_section() {
     let end = |lines: &[Value]| of(lines, "end")[0]["summary"]["fail_m"].as_f64().unwrap();
     let lines = told(&missed_and_back(17.9, None));
     assert!(end(&lines) > 5.0);
@@ -129,9 +130,9 @@ fn who_goes_back_as_far_as_told_and_on_as_fast_as_told_clears_it_all() {
     assert!(left_m < 0.1, "{left_m} m, {text}");
 }
 
-/// A dive that ends on the way back has what was missed in its sums.
+/// A dive that ends on the way back still counts its missed sections in the totals.
 #[test]
-fn what_was_missed_is_missed_where_the_dive_ends_on_the_way_back() {
+fn dive_that_ends_on_the_way_back_reports_its_missed_sections() {
     let lines = told(&missed_and_back(10.5, None));
     let end = of(&lines, "end")[0];
     let missed_m = end["summary"]["fail_m"].as_f64().unwrap();

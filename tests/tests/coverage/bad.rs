@@ -1,9 +1,10 @@
-//! What a wall can't be: samples outside of the tunnel, and a profile that they contradict. Said once, counted, never a pass.
+//! Impossible walls: samples outside the tunnel, and a profile that contradicts the returns. Both are reported once,
+//! counted, and never pass.
 
 use headrace_tests::{Folder, SCENE, VEHICLE};
 use serde_json::Value;
 
-/// The short dive with another scene and vehicle; its report, and what the terminal said.
+/// Runs the short dive with another scene and vehicle; returns its report and terminal output.
 fn dive(vehicle: &str, scene: &str) -> (Value, String) {
     let folder = Folder::new();
     folder.write("vehicle.toml", vehicle);
@@ -18,7 +19,7 @@ fn metres(report: &Value, verdict: &str) -> f64 {
 }
 
 #[test]
-fn a_profile_that_the_returns_contradict_passes_nowhere_and_is_said_once() {
+fn profile_contradicted_by_returns_never_passes_and_is_reported_once() {
     let vehicle = VEHICLE.replace("[water]", "[navigation]\nway = \"direct\"\n\n[water]");
     let as_built = "\n[tunnel.as_built]\nprofile = \"rectangle\"\nwidth_m = 7.6\nheight_m = 7.6\n";
     let (right, _) = dive(&vehicle, SCENE);
@@ -33,7 +34,7 @@ fn a_profile_that_the_returns_contradict_passes_nowhere_and_is_said_once() {
 }
 
 #[test]
-fn samples_behind_the_portal_are_said_once_with_how_far() {
+fn samples_behind_the_portal_are_reported_once_with_distance() {
     let scene = SCENE.replace("start_m = 3", "start_m = 0.6");
     let vehicle = VEHICLE.replace(
         "id = \"sonar_1\"\nplugin = \"imagenex881\"\n",
@@ -48,7 +49,7 @@ fn samples_behind_the_portal_are_said_once_with_how_far() {
 }
 
 #[test]
-fn a_declared_opening_is_listed_and_does_not_fail() {
+fn declared_opening_is_listed_and_does_not_fail() {
     let (scene, vehicle) = (
         format!("{SCENE}\n[effects.missing_returns]\nshare = 0.0001\n"),
         format!(
@@ -65,7 +66,8 @@ fn a_declared_opening_is_listed_and_does_not_fail() {
         .map(|section| section["start_m"].as_f64().unwrap())
         .collect();
     assert_eq!(masked, [4.0, 4.25, 4.5, 4.75, 5.0, 5.25]);
-    // Two of twelve hours; from 4.2 m on it is a fifth of the first section, to 5.4 m three fifths of the last.
+    // The opening covers two of twelve hours. From 4.2 to 5.4 m it takes a fifth of the first section and three
+    // fifths of the last.
     let share = |start_m: f64| {
         let section =
             report["sections"].as_array().unwrap().iter().find(|s| s["start_m"] == start_m).unwrap();
@@ -82,7 +84,7 @@ fn a_declared_opening_is_listed_and_does_not_fail() {
 }
 
 #[test]
-fn other_targets_and_sections_are_judged_as_by_themselves() {
+fn several_targets_give_the_same_verdicts_as_single_runs() {
     let folder = Folder::with_dive();
     let (_, together) = folder.replay("dive.mcap", &["--target", "0.5,1.2,2", "--section", "0.25,1"]);
     let others = together["what_if"].as_array().unwrap();
@@ -100,12 +102,12 @@ fn other_targets_and_sections_are_judged_as_by_themselves() {
 }
 
 #[test]
-fn another_speed_of_sound_moves_the_wall() {
+fn wrong_speed_of_sound_shifts_the_wall() {
     let folder = Folder::with_dive();
     let mean = |report: &Value| report["sections"][8]["deviation"]["mean_m"].as_f64().unwrap();
     let (_, as_told) = folder.replay("dive.mcap", &[]);
     let (_, faster) = folder.replay("dive.mcap", &["--sound-speed", "1500"]);
     assert!(mean(&as_told).abs() < 0.02, "{}", mean(&as_told));
-    // 3.7 per cent of three metres.
+    // The expected shift is 3.7 % of 3 m.
     assert!((0.06..0.15).contains(&mean(&faster)), "{}", mean(&faster));
 }

@@ -1,4 +1,5 @@
-//! A cable counter that sticks at speed: told at once, and nothing passes for it.
+//! A cable counter that gets stuck while the vehicle moves: it is reported at once, and no section passes because of
+//! it.
 
 use bevy_ecs::prelude::{Res, ResMut, Resource, Single};
 use headrace_geometry::time::MonoNs;
@@ -13,21 +14,21 @@ use headrace_tests::random_dives::Draw;
 use headrace_tests::{scenes, truth};
 
 const DIVES: u64 = 24;
-/// Eq. 16 of the vehicle and mode at a target of 0.5 m.
+/// Speed of Eq. 16 for the vehicle and mode at a target of 0.5 m, m/s.
 const EDGE_MPS: f64 = 0.118;
 const LENGTH_M: f64 = 14.0;
 const TOLD_WITHIN_S: f64 = 2.0;
-/// Sections that pass with D_true over 1.1 T, today: where samples from before and from within the doubt meet, sigma is too
-/// small. There must be none; until then no more.
+/// Known number of sections that pass with D_true over 1.1 T. The reported sigma is too small where samples from
+/// before and during the doubt meet. The goal is zero.
 const KNOWN_FAR: usize = 1;
 
-/// A dive during which the counter stands.
+/// A dive during which the counter is stuck.
 struct Stuck {
     scene: Scene,
     from_s: f64,
 }
 
-/// From well within the target to well beyond it.
+/// Draws a dive from well within the target to well beyond it.
 fn stuck(seed: u64, speeds_mps: [f64; 2]) -> Stuck {
     let mut draw = Draw::new(seed);
     let [least_mps, most_mps] = speeds_mps;
@@ -56,7 +57,7 @@ fn stuck(seed: u64, speeds_mps: [f64; 2]) -> Stuck {
     Stuck { scene: scenes::seeded(&text, &load, Some(seed)), from_s }
 }
 
-/// The beat at which the loop first had the alert.
+/// Time of the update at which the loop first had the alert.
 #[derive(Resource, Default)]
 struct Told(Option<MonoNs>);
 
@@ -77,7 +78,7 @@ fn watch(alerts: Res<'_, Alerts>, mut told: ResMut<'_, Told>, vehicle: Single<'_
     }
 }
 
-/// When it was told, seconds after the counter stood.
+/// Delay of the alert after the counter got stuck, seconds.
 fn told_after_s(stuck: &Stuck) -> Option<f64> {
     let vehicle = &stuck.scene.vehicle;
     let mut app = App::new(vehicle.mission());
@@ -103,7 +104,7 @@ fn in_two_threads<T: Send>(of: impl Fn(u64) -> T + Sync) -> Vec<T> {
 }
 
 #[test]
-fn a_counter_that_sticks_is_told_within_two_seconds() {
+fn stuck_cable_is_flagged_within_2_s() {
     let late = in_two_threads(|seed| {
         let stuck = stuck(seed, [0.2, 0.45]);
         (seed, told_after_s(&stuck))
@@ -115,7 +116,7 @@ fn a_counter_that_sticks_is_told_within_two_seconds() {
 }
 
 #[test]
-fn val_a_counter_that_sticks_at_speed_lets_nothing_far_over_the_target_pass() {
+fn stuck_cable_passes_no_section_far_over_the_target() {
     let counts = in_two_threads(|seed| {
         let stuck = stuck(seed, [0.28, 0.45]);
         let dive = truth::dive(&stuck.scene);
@@ -147,9 +148,10 @@ fn val_a_counter_that_sticks_at_speed_lets_nothing_far_over_the_target_pass() {
     assert!(far <= KNOWN_FAR, "{far}");
 }
 
-/// A velocity log that looks askance shows three quarters of the speed. The counter is right: nothing tells which of both is.
+/// A misaligned velocity log shows three quarters of the speed. The counter is right, but no other sensor tells which
+/// of the two is wrong.
 #[test]
-fn a_velocity_log_that_differs_from_the_counter_is_named_and_nothing_wrong_passes() {
+fn velocity_log_that_contradicts_the_counter_is_reported_and_passes_nothing_wrong() {
     let log = "\n[[sensors]]\nid = \"dvl\"\nplugin = \"a50\"\nposition_m = [-0.2, 0, -0.1]\n";
     let load = |name: &str| {
         let mut file = scenes::vehicle_file(name)?;
@@ -170,7 +172,7 @@ fn a_velocity_log_that_differs_from_the_counter_is_named_and_nothing_wrong_passe
     let wrong = of(41);
     let [alert] = wrong.report.alerts.as_slice() else { panic!("{:?}", wrong.report.alerts) };
     assert_eq!((alert.kind, alert.head.as_deref()), ("cable_doubted", Some("dvl")));
-    // A quarter of a minute's 12 m at most.
+    // A quarter of the 12 m of a minute at most.
     assert!((0.5..3.5).contains(&alert.worst_m), "{alert:?}");
     let target_m = wrong.report.target_m;
     let is_wrong =

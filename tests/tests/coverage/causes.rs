@@ -1,24 +1,24 @@
-//! What a fail is put down to: scenes that each inject one cause alone, and the cause that is named.
+//! Scenes that each inject a single cause, and the cause that the report gives for their failed sections.
 
 use std::collections::BTreeMap;
 use std::fmt::Write;
 
 use headrace_tests::instrumented;
 
-/// What is simulated in every scene.
+/// Effects of every scene.
 const ALWAYS: &str = "[effects.motion_within_turn]\n[effects.range_noise]\nsd_m = 0.01\n\
     [effects.imu_noise]\ngyro_degps_rthz = 0.005\n";
 const STEADY: &str = "[trajectory]\nstart_m = 3\n[[trajectory.legs]]\ndistance_m = 12\nspeed_mps = 0.185\n";
-/// Sections near the ends aren't passed on both sides.
+/// Chainages away from the ends; sections near the ends aren't passed on both sides.
 const INNER_M: std::ops::Range<f64> = 5.5..13.0;
 const SEEDS: u64 = 2;
 
 /// A scene that injects one cause.
 struct Case {
-    /// The word that the report should use.
+    /// Expected cause in the report.
     cause: &'static str,
     what: &'static str,
-    /// What is changed of VITA 2 with four heads.
+    /// Changes to VITA 2 with four heads.
     changes: &'static str,
     way: &'static str,
     effects: &'static str,
@@ -107,11 +107,11 @@ const CASES: [Case; 11] = [
     },
 ];
 
-/// Causes named of the sections that fail, with how many.
+/// Number of failed sections by reported cause.
 fn named(case: &Case, seed: u64) -> BTreeMap<&'static str, u32> {
     let vehicle = include_str!("../../../deploy/vehicles/vita2-4.toml")
         .replace("planned_speed_mps = 0.10", "planned_speed_mps = 0.185");
-    // A return that is missing where the vehicle is in the way is put down to that, whether it is simulated or not.
+    // A missing return that the vehicle hides is attributed to occlusion, simulated or not.
     let thin = "plugin = \"imagenex881\"\nbody_radius_m = 0.001";
     let vehicle = match case.cause {
         "missing_returns" => vehicle.replace("plugin = \"imagenex881\"", thin),
@@ -134,7 +134,7 @@ fn named(case: &Case, seed: u64) -> BTreeMap<&'static str, u32> {
 }
 
 #[test]
-fn the_cause_that_is_named_is_the_one_that_was_injected() {
+fn reported_cause_is_the_injected_one() {
     let (mut right, mut all, mut table, mut wrong) = (0, 0, String::new(), String::new());
     for case in &CASES {
         let (mut of_case, mut right_of_case) = (0, 0);
@@ -144,7 +144,7 @@ fn the_cause_that_is_named_is_the_one_that_was_injected() {
             right_of_case += named.get(case.cause).copied().unwrap_or(0);
             writeln!(table, "{:<15} {:<55} seed {seed}: {named:?}", case.cause, case.what).unwrap();
         }
-        // Where the counter slips, little is sure enough to fail.
+        // While the counter slips, few sections are certain enough to fail.
         if of_case < 2 || 10 * right_of_case < 9 * of_case {
             let Case { cause, what, .. } = case;
             writeln!(wrong, "{what}: {right_of_case} of {of_case} failed sections are named {cause}")
@@ -157,9 +157,10 @@ fn the_cause_that_is_named_is_the_one_that_was_injected() {
     assert!(100 * right >= 95 * all, "{right} of {all}\n{table}");
 }
 
-/// Heads apart along the hull are in phase about the planned speed: what fails below it passes at it, and is put down to the phase.
+/// Heads apart along the hull are in phase near the planned speed. Sections that fail below it would pass at it, so
+/// the cause is the phase.
 #[test]
-fn what_only_a_faster_speed_mends_is_put_down_to_the_phase() {
+fn fail_that_only_a_higher_speed_mends_is_attributed_to_phase() {
     let driven = |speed_mps: f64| {
         let vehicle = include_str!("../../../deploy/vehicles/vita2-4.toml");
         let scene = format!(

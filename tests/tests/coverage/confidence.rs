@@ -1,9 +1,10 @@
-//! The confidence of verdicts: one dive judged with one, two and three standard deviations between hole and target.
+//! Confidence of verdicts: one dive judged with a margin of one, two and three standard deviations between hole and
+//! target.
 
 use headrace_monitor::report::{Report, SectionReport};
 use headrace_tests::instrumented;
 
-/// Ever faster, so that holes grow from well below the target to beyond it.
+/// Increasing speed, so that holes grow from well below the target to beyond it.
 fn scene() -> String {
     let leg = |k: u32| {
         let speed_mps = 0.11 + 0.004 * f64::from(k);
@@ -22,7 +23,7 @@ fn judged(confidence: u32) -> Report {
     instrumented::dive(&vehicle, &scene()).report
 }
 
-/// Its verdict, by the hole, its bounds and standard deviation as reported.
+/// Whether a verdict follows from the reported hole, its bounds and standard deviation.
 fn keeps_clear(report: &Report, section: &SectionReport) -> bool {
     let error_m = f64::from(report.confidence_sd) * section.hole_sd_m;
     let passes = section.hole_most_m.is_some_and(|most_m| most_m + error_m <= report.target_m);
@@ -36,7 +37,7 @@ fn keeps_clear(report: &Report, section: &SectionReport) -> bool {
 }
 
 #[test]
-fn a_verdict_keeps_as_many_standard_deviations_clear_of_the_target_as_the_vehicle_file_says() {
+fn verdict_margin_follows_the_configured_confidence() {
     let reports = [1, 2, 3].map(judged);
     for (confidence, report) in (1..).zip(&reports) {
         assert_eq!(report.confidence_sd, confidence);

@@ -1,19 +1,20 @@
-//! Counters of whole centimetres on cables that swing: no wrong speed is told, and no verdict follows from one.
+//! Counters with 1 cm resolution on swinging cables: they cause no wrong displayed speed and no wrong verdict.
 
 use headrace_simulator::Scene;
 use headrace_tests::{scenes, truth};
 
-/// As many dives of each kind.
+/// Number of dives of each kind.
 const DIVES: u64 = 8;
-/// Largest error of the speed that is told, m/s: 0.98 was told of a vehicle that kept 0.2.
+/// Largest allowed error of the displayed speed, m/s. The fault displayed 0.98 for a vehicle at 0.2.
 const SPEED_OFF_MPS: f64 = 0.2;
 
-/// Ways between stops, m, and the speed on each, m/s; and how long the vehicle stays at the end of each, s.
+/// Legs: distance between stops, m, speed on it, m/s, and duration of the stop at its end, s.
 type Legs = &'static [(f64, f64, f64)];
 const STEADY: Legs = &[(14.0, 0.2, 0.0)];
 const STOP_AND_GO: Legs = &[(3.0, 0.3, 6.0), (2.0, 0.2, 11.0), (4.0, 0.31, 4.0), (3.0, 0.25, 0.0)];
 const WANDERING: &str = "tether_slack = { reach_m = 0.06, period_s = 30 }\n";
-/// Three swings that reach 10 cm together, one of them as long as a head's turn, and a unit whose attitude wanders as the cable does.
+/// Three swings with a total reach of 10 cm, one of them as long as a head's turn. The inertial unit's attitude
+/// wanders at the cable's rate.
 const SWINGING: &str = "tether_slack = { swings = [{ reach_m = 0.03, period_s = 8 }, { reach_m = 0.021, period_s = 10 }, \
     { reach_m = 0.055, period_s = 20 }] }\n";
 
@@ -36,15 +37,15 @@ fn scene(seed: u64, legs: Legs, slack: &str, start_m: f64) -> Scene {
     scenes::seeded(&text, &|name: &str| scenes::vehicle_file(name), Some(seed))
 }
 
-/// What a dive tells wrongly.
+/// Wrong results of a dive.
 #[derive(Debug, Default)]
 struct Wrong {
-    /// Largest error of the speed that is told while there is a fix, m/s.
+    /// Largest error of the displayed speed while there is a fix, m/s.
     speed_mps: f64,
     /// Sections that pass with a true hole over 1.1 T, or fail with one below 0.9 T.
     passed: usize,
     failed: usize,
-    /// Sections that can't be said, and all.
+    /// Sections with the verdict can't say, and all sections.
     cannot_say: usize,
     sections: usize,
 }
@@ -72,7 +73,7 @@ fn wrong(scene: &Scene, most_mps: f64) -> Wrong {
     wrong
 }
 
-/// Dives of a kind, and what they tell wrongly together; the share of sections that can't be said.
+/// Wrong results of all dives of a kind, and the share of sections with the verdict can't say.
 fn dives(legs: Legs, slack: &str) -> (Wrong, f64) {
     let most_mps = legs.iter().fold(0.0, |most: f64, (_, speed_mps, _)| most.max(*speed_mps));
     let mut all = Wrong::default();
@@ -91,10 +92,10 @@ fn dives(legs: Legs, slack: &str) -> (Wrong, f64) {
     (all, share)
 }
 
-/// Of a cable that swings by 11 cm and is declared taut, much can't be said: what changes by 5 cm/s is as likely the vehicle, for a unit of this
-/// class. Nothing passes wrongly.
+/// With a cable that swings by 11 cm but is declared taut, many sections stay undecided. For a unit of this class a
+/// change of 5 cm/s may as well be the vehicle. Nothing passes wrongly.
 #[test]
-fn val_counters_of_centimetres_on_lively_cables_tell_no_wrong_speed_and_no_wrong_verdict() {
+fn coarse_counters_on_swinging_cables_give_no_wrong_speed_or_verdict() {
     let (wandering, swinging) = ([WANDERING, "0.06 m"], [SWINGING, "0.11 m"]);
     for (legs, [slack, reach], most) in [
         (STEADY, wandering, 0.2),
@@ -106,7 +107,7 @@ fn val_counters_of_centimetres_on_lively_cables_tell_no_wrong_speed_and_no_wrong
         println!("slack of {reach}: {wrong:?}, can't say {:.1} %", 100.0 * cannot_say);
         assert!(wrong.sections > 200, "{reach}: {wrong:?}");
         assert!(wrong.speed_mps < SPEED_OFF_MPS, "{reach}: {wrong:?}");
-        // A fail costs a way back, a pass a rock: one section in a hundred may fail for nothing.
+        // A false fail costs a way back, but a false pass may miss a rock. One section in a hundred may fail falsely.
         assert!(wrong.passed == 0 && 100 * wrong.failed <= wrong.sections, "{reach}: {wrong:?}");
         assert!(cannot_say <= most, "{reach}: {cannot_say}");
     }

@@ -1,4 +1,4 @@
-//! Two hundred short dives of all kinds, made once for the tests of holes and the tests of flags.
+//! Two hundred short dives of all kinds, simulated once for the tests of holes and flags.
 
 use std::sync::LazyLock;
 

@@ -1,5 +1,6 @@
-//! Two hundred dives in each of which one device breaks: whatever it says then, no section passes that is truly far over
-//! the target. Seeds go through all senses and faults; time, length and size are drawn.
+//! Two hundred dives with one broken device each: no section passes whose true hole is far over the target.
+//!
+//! Seeds rotate through all senses and faults; begin, duration and size are drawn.
 
 use std::collections::BTreeMap;
 
@@ -10,10 +11,10 @@ use headrace_tests::random_dives::Draw;
 const SEEDS: u64 = 200;
 const LENGTH_M: f64 = 7.0;
 
-/// Most that may pass, of those with D_true over T.
+/// Largest share of sections with D_true over T that may pass.
 const MOST_OVER: f64 = 0.025;
 
-/// From well within the target to well beyond it, near the portal and far from it.
+/// A cell from well within the target to well beyond it, near the portal or far from it.
 fn cell(seed: u64) -> Cell {
     let vehicle = VEHICLES.into_iter().find(|vehicle| vehicle.name == "vita2-4").unwrap();
     let mut draw = Draw::new(seed);
@@ -32,7 +33,7 @@ fn dives(seeds: impl Iterator<Item = u64>) -> Vec<(u64, Figures)> {
 }
 
 #[test]
-fn val_whatever_breaks_nothing_far_over_the_target_passes() {
+fn broken_devices_pass_no_section_far_over_the_target() {
     let mut all: Vec<(u64, Figures)> = std::thread::scope(|scope| {
         let halves = [0, 1].map(|odd| scope.spawn(move || dives((odd..SEEDS).step_by(2))));
         halves.into_iter().flat_map(|half| half.join().unwrap()).collect()

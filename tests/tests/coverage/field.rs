@@ -1,5 +1,6 @@
-//! A tenth of the table of field dives: what must never be, in cells that take little time.
-//! `cargo bench -p headrace_tests --bench field` makes the whole table.
+//! A tenth of the field table: cells that are quick to run, checked for results that must never occur.
+//!
+//! `cargo bench -p headrace_tests --bench field` computes the whole table.
 
 use headrace_tests::field_table::{self, Cell, Condition, Driven, Figures, KINDS_OF_SOURCES, VEHICLES};
 use headrace_tests::truth;
@@ -28,9 +29,9 @@ fn print(name: &str, figures: &Figures) {
     );
 }
 
-/// None passes that is far over the target, and of those over it at most one in forty.
+/// No section far over the target passes, and at most one in forty of those over it.
 #[test]
-fn val_what_passes_is_within_the_target() {
+fn passed_sections_are_within_the_target() {
     let vehicle = VEHICLES.into_iter().find(|vehicle| vehicle.name == "vita2-4").unwrap();
     for condition in [Condition::Clean, Condition::DataSheet, Condition::Lively] {
         for start_m in [16.0, 6900.0] {
@@ -52,10 +53,10 @@ fn val_what_passes_is_within_the_target() {
     }
 }
 
-/// On a wall whose bumps are as large as the vehicle file allows for, errors of D are as large as said, in both directions: echosounders
-/// see one bump for seconds, which mustn't be taken for the place.
+/// On walls as rough as the vehicle file allows, errors of D match their standard deviation in both directions.
+/// Echosounders see one bump for seconds and must not take it for a position change.
 #[test]
-fn val_bumps_are_not_taken_for_the_place() {
+fn wall_bumps_do_not_bias_the_position() {
     for name in ["vita2-4", "pipe", "bluerov2"] {
         let vehicle = VEHICLES.into_iter().find(|vehicle| vehicle.name == name).unwrap();
         let condition = Condition::Rough;
@@ -69,9 +70,10 @@ fn val_bumps_are_not_taken_for_the_place() {
     }
 }
 
-/// A vehicle that stands for half a minute, the program running, knows its gyros' bias before it sets out, and so its heading soon.
+/// A vehicle that is stationary for half a minute with the program running learns its gyro bias first. It then knows
+/// its heading sooner.
 #[test]
-fn val_who_stands_first_can_say_sooner() {
+fn initial_stop_gives_earlier_verdicts() {
     let vehicle = VEHICLES.into_iter().find(|vehicle| vehicle.name == "vita2-4").unwrap();
     let [at_once, stood] = [Driven::Planned, Driven::Stood].map(|driven| {
         let cell = Cell { vehicle, condition: Condition::DataSheet, start_m: 16.0, let_in_m: None, driven };
@@ -84,9 +86,9 @@ fn val_who_stands_first_can_say_sooner() {
     assert!(stood <= 0.02, "{stood} of metres can't be said, {at_once} without standing");
 }
 
-/// What would pass all sees each section that mustn't, and what would fail all each that mustn't.
+/// Passing everything counts every false pass, and failing everything every false fail.
 #[test]
-fn figures_see_false_verdicts() {
+fn figures_count_false_verdicts() {
     let vehicle = VEHICLES.into_iter().find(|vehicle| vehicle.name == "vita2-4").unwrap();
     let cell = Cell {
         vehicle,
@@ -107,7 +109,7 @@ fn figures_see_false_verdicts() {
     };
     let passed = all("pass");
     assert!(passed.over > 5 && passed.passed_over == passed.over, "{passed:?}");
-    // The ends, where there is a neighbour on one side alone.
+    // The ends count too, where a section has a neighbour on one side only.
     assert!((1..=passed.over).contains(&passed.passed_far), "{passed:?}");
     assert_eq!((passed.failed_under, passed.share(0)), (0, 1.0));
     let failed = all("fail");

@@ -1,6 +1,7 @@
-//! Flags of two hundred short dives against the definition: raised when a fail can no longer be undone by going on
-//! forward, cleared when a later pass fills the hole. The oracle has the poses and all samples, and knows nothing of
-//! the order in which sections are judged.
+//! Checks the flags of two hundred short dives against their definition.
+//!
+//! A flag is raised when going on forward can no longer undo a fail, and cleared when a later pass fills the hole.
+//! The oracle has the poses and all samples, but not the order in which sections are judged.
 
 use std::sync::LazyLock;
 
@@ -12,7 +13,8 @@ use headrace_tests::random_dives::{Kind, Seeded};
 
 use crate::dives::DIVES;
 
-/// A dive with its flags, if a fail is a hole larger than the target, or larger by two of its standard deviations.
+/// A dive with its due flags for two kinds of fail: a hole larger than the target, or larger by two of its standard
+/// deviations.
 struct Judged {
     seeded: &'static Seeded,
     dive: &'static Dive,
@@ -30,7 +32,7 @@ static JUDGED: LazyLock<Vec<Judged>> = LazyLock::new(|| {
     DIVES.iter().map(judge).collect()
 });
 
-/// Says of each section of the dives named what is wrong with its flags: as due at the target, and by two sigma.
+/// Collects the flag errors that `wrong` finds in each section, from the flags due at the target and at two sigma.
 #[track_caller]
 fn every_flag(
     dives: impl Fn(&Judged) -> bool,
@@ -49,10 +51,10 @@ fn every_flag(
     assert!(said.is_empty(), "{} of {raised} flags: {:#?}", said.len(), &said[..said.len().min(8)]);
 }
 
-/// Flags wait for the section's end to go by, or for the vehicle to stand.
+/// Flags wait until the section's end is passed or the vehicle is stationary, s.
 const SOON_S: f64 = 3.0;
 
-/// Whether a flag was raised before its moment, or without one.
+/// Whether a flag was raised before its due moment, or without one.
 fn is_early(judged: &Judged, due: &Flag) -> bool {
     due.raised_s
         .is_some_and(|raised_s| due.may_s.is_none_or(|may_s| raised_s < may_s - 1.5 * EVERY.as_secs_f64()))
@@ -68,7 +70,7 @@ fn direct(judged: &Judged) -> bool {
 }
 
 #[test]
-fn no_fail_that_going_on_can_not_undo_is_without_its_flag() {
+fn every_permanent_fail_is_flagged() {
     every_flag(forward, |_, _, due| {
         let due_s = due.due_s.filter(|due_s| due_s + SOON_S < due.end_s);
         (due_s.is_some() && due.raised_s.is_none()).then_some("never raised")
@@ -76,14 +78,14 @@ fn no_fail_that_going_on_can_not_undo_is_without_its_flag() {
 }
 
 #[test]
-fn no_flag_is_raised_while_going_on_can_still_bring_the_hole_within_the_target() {
+fn no_flag_is_raised_while_the_hole_can_still_be_filled() {
     every_flag(forward, |judged, due, _| {
         is_early(judged, due).then_some("raised though going on could have undone it")
     });
 }
 
 #[test]
-fn a_flag_is_raised_within_a_turn_of_its_moment_unless_the_vehicle_stands() {
+fn flag_of_a_moving_vehicle_is_raised_within_one_turn() {
     every_flag(
         |judged| forward(judged) && judged.seeded.kind != Kind::Parked,
         |judged, _, due| {
@@ -92,20 +94,21 @@ fn a_flag_is_raised_within_a_turn_of_its_moment_unless_the_vehicle_stands() {
     );
 }
 
-/// How far the heads may have gone on when a flag comes, m (`docs/why/coverage.md`, "Verdicts").
+/// Distance that the heads may have moved when a flag is raised, m (`docs/why/coverage.md`, "Verdicts").
 const LATE_M: f64 = 0.25;
-/// When the estimate has settled, seconds from the beginning: alignment, and 20 s.
+/// Settling time of the estimate from the start, seconds: alignment, and 20 s.
 const SETTLED_S: f64 = 22.0;
 
 #[test]
-fn a_flag_comes_within_a_quarter_of_a_metre_of_its_moment() {
+fn flag_is_raised_within_25_cm_of_its_due_moment() {
     let (mut late, mut on_time) = (Vec::new(), 0);
     for judged in JUDGED.iter().filter(|judged| forward(judged) && judged.seeded.kind != Kind::Parked) {
-        // Under a filter, deviations differ from place to place: what is due by a third one is due.
+        // With a filter, standard deviations differ from place to place. A flag counts as due if the definition with
+        // a third one gives it.
         let flags =
             if direct(judged) { &judged.by_two_sigma } else { &judged.journey.flags(judged.dive, 3.0) };
         for flag in flags {
-            // While the estimate settles its deviations shrink, and the last ones, which are reported, aren't those of the moment.
+            // Standard deviations shrink while the estimate settles, but the report only has the final ones.
             let settles = !direct(judged) && flag.due_s.is_some_and(|due_s| due_s < SETTLED_S);
             let is_late = flag.late_m.filter(|_| !settles).map(|late_m| late_m > LATE_M);
             on_time += u32::from(is_late == Some(false));
@@ -116,23 +119,23 @@ fn a_flag_comes_within_a_quarter_of_a_metre_of_its_moment() {
 }
 
 #[test]
-fn without_turning_back_no_flag_is_cleared() {
+fn no_flag_is_cleared_without_turning_back() {
     every_flag(forward, |_, due, _| due.cleared_s.map(|_| "cleared"));
 }
 
 #[test]
-fn where_position_is_sure_the_sections_flagged_are_those_that_fail() {
+fn with_exact_position_flagged_sections_are_failed_sections() {
     every_flag(
         |judged| forward(judged) && direct(judged),
         |_, _, due| {
             let stands = due.raised_s.is_some() && due.cleared_s.is_none();
-            (stands && !due.fails).then_some("its flag stands, and it doesn't fail")
+            (stands && !due.fails).then_some("the flag remains although the section doesn't fail")
         },
     );
 }
 
 #[test]
-fn a_flag_is_cleared_only_when_a_later_pass_has_filled_the_hole() {
+fn flag_is_cleared_only_after_the_hole_is_filled() {
     let reversing = |judged: &Judged| judged.seeded.kind == Kind::Reversing;
     every_flag(reversing, |judged, due, _| {
         let cleared_s = due.cleared_s?;
@@ -151,7 +154,7 @@ fn a_flag_is_cleared_only_when_a_later_pass_has_filled_the_hole() {
 }
 
 #[test]
-fn a_hole_that_a_later_pass_has_surely_filled_keeps_no_flag() {
+fn filled_hole_has_no_flag() {
     let reversing = |judged: &Judged| judged.seeded.kind == Kind::Reversing;
     every_flag(reversing, |judged, due, _| {
         let section = judged.dive.report.sections.iter().find(|section| section.start_m >= due.start_m)?;
@@ -161,7 +164,7 @@ fn a_hole_that_a_later_pass_has_surely_filled_keeps_no_flag() {
 }
 
 #[test]
-fn on_the_way_out_flags_of_a_dive_that_turns_back_are_raised_like_others() {
+fn turning_back_later_does_not_change_flags_of_the_way_out() {
     every_flag(
         |judged| judged.seeded.kind == Kind::Reversing && direct(judged),
         |judged, due, _| {
@@ -174,13 +177,13 @@ fn on_the_way_out_flags_of_a_dive_that_turns_back_are_raised_like_others() {
 }
 
 #[test]
-fn no_flag_is_raised_by_the_end_of_a_dive() {
+fn end_of_a_dive_raises_no_flag() {
     every_flag(forward, |_, due, _| due.raised_at_the_end().then_some("raised by the end"));
 }
 
 #[test]
-fn no_flag_is_raised_while_going_on_can_still_undo_the_fail() {
-    // By the deviation in the end: under a filter it was another when the flag was raised.
+fn no_flag_is_raised_while_the_fail_can_still_be_undone() {
+    // Judged by the final standard deviation; with a filter it was different when the flag was raised.
     every_flag(
         |judged| forward(judged) && direct(judged),
         |judged, _, due| is_early(judged, due).then_some("raised though going on could have undone it"),
@@ -188,11 +191,11 @@ fn no_flag_is_raised_while_going_on_can_still_undo_the_fail() {
 }
 
 #[test]
-fn a_vehicle_that_stands_or_turns_back_has_its_flags_within_a_turn() {
+fn flag_of_a_stationary_or_returning_vehicle_is_raised_within_one_turn() {
     every_flag(
         |judged| direct(judged) && matches!(judged.seeded.kind, Kind::Parked | Kind::Reversing),
         |judged, _, due| {
-            // Who turns back at that moment may undo it.
+            // A vehicle that turns back at that moment may still undo the fail.
             let due_s = due.due_s.filter(|due_s| {
                 let back_s = judged.journey.turned_back_s();
                 !(back_s - 3.0..judged.journey.turned_on_s()).contains(due_s)

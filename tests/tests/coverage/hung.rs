@@ -1,4 +1,4 @@
-//! Devices that hang: a head that says the same for ever is as good as silent, and so is an inertial unit.
+//! Stuck devices: a head or inertial unit that repeats itself for ever counts as silent.
 
 use headrace_coverage::Cause;
 use headrace_monitor::messages::Notice;
@@ -10,7 +10,7 @@ const NOISE: &str = "motion_within_turn = {}\nocclusion = {}\nrange_noise = { sd
 const SWAY: &str =
     "pilot_drift = { across_m = 0.3, up_m = 0.2, yaw_deg = 12, pitch_deg = 3, period_s = 25 }\n";
 
-/// VITA 2 with four heads stands for a minute, then goes on for so many metres.
+/// VITA 2 with four heads is stationary for a minute, then drives this far.
 fn scene(start_m: f64, way: (f64, f64), effects: &str) -> Scene {
     seeded(5, start_m, way, effects)
 }
@@ -29,9 +29,9 @@ fn hangs(sensor: &str, from_s: f64) -> String {
     format!("device_faults = {{ sensors = [{sensor:?}], kind = \"stick\", from_s = {from_s} }}\n")
 }
 
-/// Truth, the ids of what was told to hang or to hear nothing, and the speeds advised at the end.
+/// Truth, ids of sources reported as stuck or without returns, and the speeds advised at the end.
 struct Told {
-    /// True holes of the sections that pass, m.
+    /// True holes of passed sections, m.
     passed_m: Vec<f64>,
     causes: Vec<(Cause, Vec<String>)>,
     alerts: Vec<(&'static str, String)>,
@@ -57,9 +57,9 @@ fn dive(scene: &Scene) -> Told {
     }
 }
 
-/// For a second nobody knows: what that does to the position is within what passes have to spare.
+/// For one second the fault isn't detectable. Its effect on the position stays within the margin of passed sections.
 #[test]
-fn while_the_inertial_unit_repeats_itself_nothing_over_the_target_passes_and_it_is_named() {
+fn stuck_inertial_unit_is_reported_and_passes_nothing_over_the_target() {
     let (mut passed, mut over) = (0, 0);
     for (seed, start_m) in [(1, 2.0), (2, 3000.0), (3, 6900.0), (5, 6900.0)] {
         let [sound, hung] = ["", &hangs("imu", 100.0)]
@@ -78,10 +78,10 @@ fn while_the_inertial_unit_repeats_itself_nothing_over_the_target_passes_and_it_
     assert!(100 * over <= passed, "{over} of {passed}");
 }
 
-/// A head that hangs says one angle and one range for ever, one that hears nothing turns all the same: the speed that is told, the cause and
-/// the head that is named are those of a silent one.
+/// A stuck head repeats one angle and one range, and a head without returns keeps turning. Both get the speed, the
+/// cause and the head name of a silent head.
 #[test]
-fn a_head_that_hears_nothing_is_told_as_a_silent_one() {
+fn head_without_returns_is_reported_as_silent() {
     let deaf = "stuck_range = { range_m = 0.3, from_s = 90, sensors = [\"sonar_1\"] }\n";
     let silent = "device_faults = { sensors = [\"sonar_1\"], kind = \"die\", from_s = 90 }\n";
     let [deaf, silent, stuck] =

@@ -1,6 +1,6 @@
-//! Coverage of the wall: holes, verdicts, flags and causes against independent accounts of them.
+//! Coverage of the wall: holes, verdicts, flags and causes, compared with independent computations.
 
-#![allow(clippy::unwrap_used, clippy::panic, reason = "a test stops at what it can't do")]
+#![allow(clippy::unwrap_used, clippy::panic, reason = "a failed step ends the test")]
 
 mod bad;
 mod cable;

@@ -1,4 +1,4 @@
-//! Memory grows with metres, not with hours: a vehicle that stands for long fills nothing.
+//! Memory grows with the distance covered, not with time: a stationary vehicle fills none.
 
 use headrace_geometry::time::{DurNs, MonoNs};
 use headrace_monitor::App;
@@ -8,20 +8,20 @@ use headrace_simulator::{START, Simulation};
 use headrace_tests::scenes;
 use headrace_vehicle::Mission;
 
-/// A minute on the way, then standing for an hour with noise.
+/// A minute of motion, then an hour stationary with noise.
 const SCENE: &str = "vehicle = \"vita2-4.toml\"\n[trajectory]\nkind = \"waypoints\"\n\
     [[trajectory.waypoints]]\nchainage_m = 5\n\
     [[trajectory.waypoints]]\nchainage_m = 17\nspeed_mps = 0.2\nstay_s = 3600\n\
     [[trajectory.waypoints]]\nchainage_m = 17.1\nspeed_mps = 0.2\n\
     [effects]\nrange_noise = { sd_m = 0.02 }\n";
 
-/// What grows at all once the loop is armed: bytes of samples, and entries of the advice's history.
+/// Memory that may grow once the loop is armed: bytes of samples, and entries of the advice's history.
 fn used(dive: &Loop) -> [usize; 2] {
     [dive.coverage().store.usage().bytes, dive.advice_log().entries.len()]
 }
 
 #[test]
-fn standing_still_for_long_fills_no_memory() {
+fn stationary_vehicle_does_not_grow_memory() {
     let scene = scenes::scene(SCENE);
     let mut app = App::new(Mission { length_m: 100.0, ..scene.vehicle.mission() });
     for sensor in &scene.vehicle.sensors {
@@ -49,6 +49,6 @@ fn standing_still_for_long_fills_no_memory() {
     }
     let [early, late] = [seen[seen.len() / 2].1, seen.last().unwrap().1];
     assert!(late[0] * 100 <= early[0] * 105, "samples: {early:?}, then {late:?} bytes");
-    // An entry every ten seconds, and a few.
+    // One entry every ten seconds, and a few more.
     assert!(late[1] < 500, "advice: {late:?} entries");
 }

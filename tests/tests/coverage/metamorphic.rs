@@ -1,5 +1,6 @@
-//! What must not change the answers: a mirror, chainage that begins elsewhere, arc length that begins elsewhere, names and
-//! the order of heads, the length of ticks.
+//! Transformations that must not change results.
+//!
+//! These are a mirror, other origins of chainage and arc length, names and order of heads, and the tick length.
 
 use std::fmt::Write as _;
 use std::sync::Arc;
@@ -17,13 +18,13 @@ use serde_json::Value;
 
 const TOLERANCE_M: f64 = 1e-9;
 
-/// One dive beside another that must give the same answers elsewhere.
+/// Two dives whose results must agree after a transformation.
 struct Beside<'a> {
     here: &'a Dive,
     there: &'a Dive,
-    /// What is there at a greater chainage by so much, m.
+    /// Chainage offset of the second dive, m.
     along_m: f64,
-    /// Where an arc length there is here.
+    /// Map from arc lengths of the second dive to those of the first.
     around: &'a dyn Fn(f64) -> f64,
 }
 
@@ -60,7 +61,7 @@ impl Beside<'_> {
                 && both(deviations[0], deviations[1])
         };
         let cause = |section: &SectionReport| section.cause.map(|evidence| evidence.cause);
-        // Of several holes of one size either dive may name another: it must be one here as well.
+        // If several holes have the same size, the dives may report different ones. The place must be a hole in both.
         let is_hole_here = b.hole_x_m.zip(b.hole_arc_m).zip(a.hole_m).is_none_or(|((x, sigma), hole_m)| {
             near(2.0 * wall.clear_m([x - self.along_m, (self.around)(sigma)]), hole_m)
         });
@@ -83,8 +84,8 @@ impl Beside<'_> {
     }
 }
 
-/// A vehicle without a filter; heads at places of the body's frame. With a `side` of -1 all of it is mirrored: places, the
-/// way heads turn, and where echosounders look.
+/// A vehicle without a filter, with heads at these places of the body frame. A `side` of -1 mirrors places, direction
+/// of the heads' turns, and direction of the echosounders.
 fn vehicle(tunnel: &str, heads: &[[f64; 2]], side: f64) -> String {
     let mut text = format!(
         "target_m = 0.7\n[tunnel]\nlength_m = 1200\n{tunnel}\n[navigation]\nway = \"direct\"\n[heads]\nplanned_speed_mps = 0\n"
@@ -110,7 +111,7 @@ fn vehicle(tunnel: &str, heads: &[[f64; 2]], side: f64) -> String {
     text
 }
 
-/// Slow enough, then too fast, and back over some of it.
+/// Slow enough, then too fast, and back over a part.
 fn legs(start_m: f64, place_m: [f64; 2]) -> String {
     let mut text = format!(
         "vehicle = \"vehicle.toml\"\n[effects]\nmotion_within_turn = {{}}\n[trajectory]\nstart_m = {start_m}\nplace_m = {place_m:?}\n"
@@ -124,9 +125,9 @@ fn legs(start_m: f64, place_m: [f64; 2]) -> String {
 const CIRCLE: &str = "profile = \"circle\"\nradius_m = 2";
 const HEADS: [[f64; 2]; 2] = [[0.4, 0.1], [-0.3, 0.05]];
 
-/// The same bytes, which a mirrored vehicle in a mirrored tunnel would have sent as well.
+/// A mirrored vehicle in a mirrored tunnel would have sent the same bytes.
 #[test]
-fn a_mirrored_tunnel_has_mirrored_answers() {
+fn wall_mirror_mirrors_the_report() {
     let corners = [[-1.8, 0.0], [2.2, 0.0], [2.6, 1.4], [1.0, 3.0], [-1.4, 2.6], [-2.1, 1.0]];
     let [polygon, mirrored] = [1.0, -1.0].map(|side| {
         let lines: Vec<String> = corners.iter().map(|[y, z]| format!("{},{z}", side * y)).collect();
@@ -151,7 +152,7 @@ fn a_mirrored_tunnel_has_mirrored_answers() {
 }
 
 #[test]
-fn chainage_may_begin_elsewhere() {
+fn chainage_origin_does_not_change_results() {
     let vehicle = vehicle(CIRCLE, &HEADS, 1.0);
     let dive = |start_m: f64| instrumented::dive(&vehicle, &legs(start_m, [0.3, 2.1]));
     let here = dive(3.1);
@@ -162,7 +163,7 @@ fn chainage_may_begin_elsewhere() {
 }
 
 #[test]
-fn arc_length_may_begin_elsewhere() {
+fn arc_length_origin_does_not_change_results() {
     let (vehicle, scene) = (vehicle(CIRCLE, &HEADS, 1.0), legs(3.1, [0.3, 2.1]));
     let here = instrumented::dive(&vehicle, &scene);
     let (perimeter_m, [y, z]) = (here.profile.perimeter_m(), here.profile.reference());
@@ -173,13 +174,13 @@ fn arc_length_may_begin_elsewhere() {
         let there = instrumented::dive_with_profile(&vehicle, &scene, there);
         let around = |arc_m: f64| math::wrap(arc_m + begins_m, perimeter_m);
         let moved = here.samples().zip(there.samples()).all(|(a, b)| (a.place[1] - b.place[1]).abs() > 0.1);
-        assert!(moved, "the loop was told of another beginning");
+        assert!(moved, "the loop uses another origin");
         Beside { here: &here, there: &there, along_m: 0.0, around: &around }.agree();
     }
 }
 
 #[test]
-fn ticks_may_have_any_length_in_dives_of_every_kind() {
+fn tick_length_does_not_change_results() {
     for seed in 0..8 {
         let seeded = seeded(seed);
         let dive = |ms: i64| {
@@ -194,21 +195,21 @@ fn ticks_may_have_any_length_in_dives_of_every_kind() {
     }
 }
 
-/// The vehicle's file with its heads, which come first, in another order.
+/// The vehicle file with its heads, which come first, in another order.
 fn reordered(vehicle: &str, heads: usize) -> String {
     let mut tables: Vec<&str> = vehicle.split("[[sensors]]\n").collect();
     tables[1..=heads].reverse();
     tables.join("[[sensors]]\n")
 }
 
-/// What a report says of the wall and to the pilot.
+/// The report's results on the wall and for the pilot.
 fn answers<'a>(report: &'a Value, keys: &[&str]) -> Vec<&'a Value> {
     assert!(report["summary"]["flags_raised"].as_u64().unwrap() > 5, "{}", report["summary"]);
     keys.iter().map(|key| &report[*key]).collect()
 }
 
 #[test]
-fn heads_may_stand_in_any_order_in_the_vehicle_file() {
+fn head_order_does_not_change_results() {
     let folder = Folder::new();
     let vehicle = vehicle(CIRCLE, &[HEADS[0], HEADS[1], [0.0, -0.2]], 1.0);
     folder.write("vehicle.toml", &vehicle);
@@ -218,7 +219,7 @@ fn heads_may_stand_in_any_order_in_the_vehicle_file() {
     folder.write("reordered.toml", reordered(&vehicle, 3));
     let (_, got) = folder.replay("dive.mcap", &["--vehicle", "reordered.toml"]);
     assert_eq!(got["sources"][0]["id"], "sonar_2", "the order is another");
-    // What is said of phases goes by the heads' order, and so do causes: start angles are given out in that order.
+    // Phases depend on the order of the heads, and so do causes: start angles are assigned in that order.
     let [got, expected] = [got, expected].map(|mut report| {
         for section in report["sections"].as_array_mut().unwrap() {
             section.as_object_mut().unwrap().remove("cause");
@@ -229,7 +230,7 @@ fn heads_may_stand_in_any_order_in_the_vehicle_file() {
     assert_eq!(answers(&got, &keys), answers(&expected, &keys));
 }
 
-/// A message of a channel with another name.
+/// A message whose channel has another name.
 fn renamed<'a>(message: &Message<'a>, named: &dyn Fn(&str) -> String) -> Message<'a> {
     let metadata = message.channel.metadata.iter().map(|(key, value)| (key.clone(), named(value))).collect();
     let topic = named(&message.channel.topic);
@@ -238,7 +239,7 @@ fn renamed<'a>(message: &Message<'a>, named: &dyn Fn(&str) -> String) -> Message
 }
 
 #[test]
-fn heads_may_have_any_name() {
+fn head_names_do_not_change_results() {
     let folder = Folder::new();
     let vehicle = vehicle(CIRCLE, &HEADS, 1.0);
     folder.write("vehicle.toml", &vehicle);

@@ -1,5 +1,7 @@
-//! Holes, spacings and verdicts of two hundred short dives against an oracle that has all samples and the definitions, and
-//! no more: no cells, no search radius, no order in which sections are judged. `flags.rs` has the flags.
+//! Checks holes, spacings and verdicts of two hundred short dives against an oracle.
+//!
+//! The oracle uses only all samples and the definitions. It has no cells, no search radius and no order of judging.
+//! `flags.rs` has the flags.
 
 use std::collections::BTreeMap;
 
@@ -15,10 +17,10 @@ use headrace_tests::spacings::{Spacing, spacings, spread};
 use crate::dives::DIVES;
 
 const TOLERANCE_M: f64 = 1e-9;
-/// Where the search for a hole ends: the report calls larger ones unbounded.
+/// Limit of the search for holes, m; the report calls larger ones unbounded.
 const SEARCH_M: f64 = 12.0;
 
-/// Holds every section of every dive to what `misses` has to say of it.
+/// Checks every section of every dive with `misses`, which returns a description of an error.
 #[track_caller]
 fn every_section(mut misses: impl FnMut(&Dive, &Wall, &SectionReport) -> Option<String>) {
     let mut said = Vec::new();
@@ -35,7 +37,7 @@ fn every_section(mut misses: impl FnMut(&Dive, &Wall, &SectionReport) -> Option<
 }
 
 #[test]
-fn dives_of_every_kind_have_sections_of_every_verdict() {
+fn random_dives_cover_every_verdict() {
     let mut count = BTreeMap::new();
     for (seeded, dive) in DIVES.iter() {
         for section in &dive.report.sections {
@@ -49,7 +51,7 @@ fn dives_of_every_kind_have_sections_of_every_verdict() {
 }
 
 #[test]
-fn a_sample_lies_where_the_ray_from_the_reference_point_meets_the_design() {
+fn sample_lies_on_the_design_along_its_reference_ray() {
     for (seeded, dive) in DIVES.iter() {
         for Sample { place, point } in dive.samples() {
             let off_m = dive.profile.arc_of([point[1], point[2]]) - place[1];
@@ -60,20 +62,21 @@ fn a_sample_lies_where_the_ray_from_the_reference_point_meets_the_design() {
     }
 }
 
-/// Whether a hole's diameter, m, is within a section's bounds.
+/// Whether a diameter, m, is within the bounds of a section's hole.
 fn is_within(section: &SectionReport, diameter_m: f64) -> bool {
     let (Some(least_m), Some(most_m)) = (section.hole_least_m, section.hole_most_m) else { return false };
     (least_m - TOLERANCE_M..=most_m + TOLERANCE_M).contains(&diameter_m)
 }
 
-/// Whether a section has passed by the samples of some of its visits: those of the others could only make its hole smaller.
+/// Whether a section has passed by the samples of some of its visits. Samples of other visits could only make its
+/// hole smaller.
 fn is_of_a_visit(section: &SectionReport, diameter_m: f64) -> bool {
     let most_m = section.hole_most_m.filter(|_| section.verdict == "pass");
     most_m.is_some_and(|most_m| diameter_m <= most_m + TOLERANCE_M)
 }
 
 #[test]
-fn val_holes_are_the_largest_empty_circles() {
+fn holes_are_the_largest_empty_circles() {
     every_section(|_, wall, section| {
         let Some(hole_m) = section.hole_m else { return Some("not measured".to_owned()) };
         let largest = wall.largest(section.start_m, section.end_m)?;
@@ -83,7 +86,7 @@ fn val_holes_are_the_largest_empty_circles() {
                 !section.hole_bounded && hole_m <= expected_m && ["fail", "open"].contains(&section.verdict);
             return (!said).then(|| format!("{hole_m} m, bounded, not {expected_m} m"));
         }
-        // A sample that was packed has moved by micrometres; the bounds say so.
+        // Packing moves samples by micrometres, which the bounds include.
         let right =
             section.hole_bounded && (is_within(section, expected_m) || is_of_a_visit(section, expected_m));
         (!right).then(|| format!("{hole_m} m, not {expected_m} m about {:?}", largest.centre))
@@ -91,7 +94,7 @@ fn val_holes_are_the_largest_empty_circles() {
 }
 
 #[test]
-fn a_hole_is_where_it_is_said_to_be() {
+fn reported_hole_position_is_right() {
     every_section(|_, wall, section| {
         let centre = section.hole_x_m.zip(section.hole_arc_m).filter(|_| section.hole_bounded);
         let (x_m, arc_m) = centre?;
@@ -103,22 +106,22 @@ fn a_hole_is_where_it_is_said_to_be() {
 }
 
 #[test]
-fn val_verdicts_follow_from_hole_sigma_and_target() {
+fn verdicts_follow_from_hole_sigma_and_target() {
     every_section(|dive, wall, section| {
         let largest = wall.largest(section.start_m, section.end_m)?;
         let (hole_m, target_m, twice_m) =
             (2.0 * largest.radius_m, dive.report.target_m, 2.0 * section.hole_sd_m);
-        // What going on forward could still fill is open.
+        // Holes that going on forward could still fill leave the section open.
         let reached = reached(dive);
         let (rear_m, passed_m) = (reached.last()?.rear_m, all_passed_from_m(&reached));
         let radius_m = f64::midpoint(target_m, twice_m);
         let ends = [section.start_m, section.end_m];
         let first_m = first_failing_m(wall, ends, radius_m, passed_m);
-        // Whether a circle lies just where all heads have been.
+        // Whether a circle lies right at the edge of the part that all heads have passed.
         let late_m = first_failing_m(wall, ends, radius_m, passed_m + NEAR_M);
         let is_near = late_m != first_failing_m(wall, ends, radius_m, passed_m - NEAR_M);
-        // Where the first such circle is, is known to a part of the section; the program goes by the largest deviation
-        // round the wall, and by the farthest wall for the reach of a tilted head.
+        // The first such circle is known to a part of the section. The program uses the largest deviation round the
+        // wall, and the farthest wall for the reach of a tilted head.
         let near_m = (section.end_m - section.start_m) / f64::from(PARTS) + 2.0 * section.hole_sd_m + 0.03;
         let clear_m = first_m.map_or(f64::NEG_INFINITY, |first_m| rear_m - first_m - radius_m);
         let behind_m = rear_m - largest.centre[0] - largest.radius_m;
@@ -129,7 +132,7 @@ fn val_verdicts_follow_from_hole_sigma_and_target() {
             either @ ("fail" | "cannot_say") if (hole_m - twice_m - target_m).abs() < 0.01 => either,
             either @ ("open" | "cannot_say") if behind_m.abs() <= near_m => either,
             either @ ("open" | "cannot_say" | "fail") if from_end_m.abs() <= near_m || is_near => either,
-            // A flag stands until the hole is filled.
+            // A flag stays until the hole is filled.
             either @ "fail" if section.flagged_s.is_some() && section.cleared_s.is_none() => either,
             _ if clear_m > 0.0 => "fail",
             _ if behind_m < 0.0 || from_end_m < 0.0 => "open",
@@ -140,8 +143,8 @@ fn val_verdicts_follow_from_hole_sigma_and_target() {
     });
 }
 
-/// Why a spread isn't that of these values; `None` if it is. Variances are compared: where all values are equal, a
-/// deviation is the root of rounding.
+/// Describes how a spread differs from that of these values; `None` if it matches. Variances are compared, because
+/// the deviation of equal values is the root of a rounding error.
 fn differs(got: &SpreadReport, values: &[f64]) -> Option<String> {
     let expected = spread(values);
     let figures = [got.min_m, got.mean_m, got.max_m, got.sd_m.map(|sd_m| sd_m * sd_m)];
@@ -155,7 +158,7 @@ fn differs(got: &SpreadReport, values: &[f64]) -> Option<String> {
 }
 
 #[test]
-fn val_spacings_of_every_section() {
+fn spacings_of_every_section_match_their_definitions() {
     let (mut judged, mut sections) = (0, 0);
     for (seeded, dive) in DIVES.iter() {
         let all = spacings(&dive.pings, dive.profile.perimeter_m());
@@ -190,7 +193,7 @@ fn val_spacings_of_every_section() {
     assert!(10 * judged > 7 * sections, "{judged} of {sections} sections without ends of rows");
 }
 
-// What the oracle itself must get right.
+// Tests of the oracle itself.
 
 fn lattice(rows: u32, columns: u32, at: impl Fn(f64, f64) -> Place) -> Vec<Place> {
     let row = |i| (0..columns).map(move |j| (f64::from(i), f64::from(j)));
@@ -204,21 +207,21 @@ fn holds(wall: &Wall, from_m: f64, to_m: f64, expected_m: f64) {
 }
 
 #[test]
-fn lattices_have_holes_that_are_known() {
+fn lattices_have_their_known_holes() {
     let diagonal_m = math::sqrt(2.0);
-    // Squares of 0.25 m, all corners on common circles; then as far as a section that holds no centre sees of them.
+    // Squares of 0.25 m, with all corners on common circles, and the same seen from a section without a centre.
     let squares = Wall::new(lattice(20, 24, |i, j| [0.25 * i, 0.25 * j]), 6.0).unwrap();
     holds(&squares, 1.0, 1.25, 0.25 * diagonal_m);
     holds(&squares, 1.0, 1.05, 2.0 * math::hypot(0.05, 0.125));
-    // Rows set off by half a step: triangles with sides of 0.4 m.
+    // Rows offset by half a step: triangles with sides of 0.4 m.
     let height_m = 0.2 * math::sqrt(3.0);
     let triangles =
         Wall::new(lattice(20, 10, |i, j| [height_m * i, 0.4 * j + 0.2 * (i % 2.0)]), 4.0).unwrap();
     holds(&triangles, 1.0, 2.0, 0.8 / math::sqrt(3.0));
-    // One ring: the farther away, the larger.
+    // A single ring: the hole grows with the distance.
     let ring = Wall::new(lattice(1, 10, |_, j| [0.0, 0.3 * j]), 3.0).unwrap();
     holds(&ring, 1.0, 2.0, 2.0 * math::hypot(2.0, 0.15));
-    // One sample, again and again: the far side of the perimeter.
+    // A repeated single sample: the hole is centred at the far side of the perimeter.
     let one = Wall::new(vec![[5.0, 0.0]; 7], 8.0).unwrap();
     holds(&one, 5.0, 8.0, 10.0);
     assert!(Wall::new(Vec::new(), 8.0).unwrap().largest(0.0, 1.0).is_none());
@@ -230,7 +233,7 @@ fn scattered(seed: u64, count: usize, perimeter_m: f64) -> Vec<Place> {
 }
 
 #[test]
-fn holes_of_small_sets_are_what_a_dense_search_finds() {
+fn holes_of_small_sets_match_a_dense_search() {
     let (perimeter_m, step_m) = (2.0, 0.004);
     for seed in 0..30 {
         let wall =
@@ -244,13 +247,13 @@ fn holes_of_small_sets_are_what_a_dense_search_finds() {
             .fold(0.0, f64::max);
         let exact = wall.largest(0.0, 0.5).unwrap();
         let short_m = exact.radius_m - dense_m;
-        // The distance to the nearest sample changes by no more than one moves.
+        // The distance to the nearest sample changes by no more than the movement.
         assert!((-1e-12..=step_m / math::sqrt(2.0)).contains(&short_m), "{seed}: {exact:?}, {dense_m}");
     }
 }
 
 #[test]
-fn the_seam_may_lie_anywhere() {
+fn seam_position_does_not_change_holes() {
     let perimeter_m = 3.0;
     for seed in 0..20 {
         let samples = scattered(seed, 60, perimeter_m);
@@ -263,7 +266,7 @@ fn the_seam_may_lie_anywhere() {
     }
 }
 
-/// One head on a circle, `count` pings a turn, `d_m` of chainage a ping.
+/// Samples of one head on a circle with `count` pings a turn and `d_m` of chainage a ping.
 fn helix(radius_m: f64, count: u32, d_m: f64, pings: u32) -> Vec<Ping> {
     let ping = |k: u32| {
         let angle = TAU * f64::from(k % count) / f64::from(count);
@@ -286,7 +289,7 @@ fn helix(radius_m: f64, count: u32, d_m: f64, pings: u32) -> Vec<Ping> {
 }
 
 #[test]
-fn a_helix_has_the_spacings_of_its_formulas() {
+fn helix_spacings_match_the_formulas() {
     let (radius_m, count, d_m) = (2.0, 40, 0.01);
     let mut pings = helix(radius_m, count, d_m, 130);
     let chord_m = 2.0 * radius_m * math::sin(TAU / 80.0);
@@ -302,7 +305,7 @@ fn a_helix_has_the_spacings_of_its_formulas() {
         assert!((spacing.t_y_m.unwrap() - t_y_m).abs() < 1e-12);
         assert!((spacing.t_m[0].unwrap() - math::hypot(t_x_m + d_m, t_y_m)).abs() < 1e-12);
     }
-    // A return that stays away: the next turn has nothing over its two steps, T_y is measured across the gap.
+    // A missing return: the next turn has no pass over its two steps, and T_y spans the gap.
     pings[20].sample = None;
     let all = spacings(&pings, TAU * radius_m);
     assert!(

@@ -1,4 +1,4 @@
-//! Settings that are wrong are named with their figure within a hundred metres, and right ones aren't.
+//! Wrong settings are reported with their value within a hundred metres, and correct ones aren't.
 
 use headrace_monitor::report::SettingReport;
 use headrace_simulator::Scene;
@@ -10,7 +10,7 @@ fn doubted(scene: &Scene, believed: &Scene) -> Option<SettingReport> {
     report.alerts.iter().find_map(|alert| alert.setting.clone())
 }
 
-/// A vehicle file in which a line of one sensor is another.
+/// A vehicle file with one line of one sensor replaced.
 fn changed(file: &str, sensor: &str, key: &str, value: &str) -> String {
     let head = format!("id = {sensor:?}");
     let at = file.find(&head).unwrap();
@@ -34,12 +34,13 @@ const EFFECTS: &str = "motion_within_turn = {}\nocclusion = {}\ndepth_steps = {}
      imu_noise = { gyro_degps_rthz = 0.007, accel_mps2_rthz = 0.001, attitude_deg = 0.3 }\n\
      imu_bias = { gyro_degps = 0.003, accel_mps2 = 0.002, tau_s = 300 }\n";
 
-/// A dive of 100 m by a pilot who wanders a little, of a vehicle as it is, headrace being told another file.
+/// Setting reported in a dive of 100 m by a pilot who wanders slightly. The vehicle is as in `truly`, but headrace
+/// reads `told`.
 fn told(truly: &str, told: &str, aside_m: f64, seed: u64) -> Option<SettingReport> {
     told_swinging(truly, told, [aside_m, 3.0], seed)
 }
 
-/// The same by one who yaws by so much, degrees.
+/// As [`told`], by a pilot who yaws by this angle, degrees.
 fn told_swinging(truly: &str, told: &str, [aside_m, yaw_deg]: [f64; 2], seed: u64) -> Option<SettingReport> {
     let heads: Vec<&str> = ["sonar_0", "sonar_1", "sonar_2", "sonar_3"]
         .into_iter()
@@ -56,12 +57,12 @@ fn told_swinging(truly: &str, told: &str, [aside_m, yaw_deg]: [f64; 2], seed: u6
     doubted(&parse(truly), &parse(told))
 }
 
-/// The vehicles, and a head of each.
+/// Vehicle files with one of their heads.
 const OF_VEHICLES: [(&str, &str); 2] = [("vita1.toml", "sonar_0"), ("vita2-4.toml", "sonar_1")];
 const ASIDE_M: f64 = 0.5;
 
 #[test]
-fn a_head_turned_about_its_axis_is_named_with_its_angle() {
+fn head_turned_about_its_axis_is_reported_with_angle() {
     for (name, head) in OF_VEHICLES {
         let right = file(name);
         for by_deg in [3, -3] {
@@ -75,11 +76,12 @@ fn a_head_turned_about_its_axis_is_named_with_its_angle() {
     }
 }
 
-/// It shows in how ranges change as the vehicle turns to and fro. Of one head alone it can't be told from a heading that is off.
+/// It shows in how ranges change as the vehicle yaws back and forth. With a single head it can't be separated from a
+/// heading error.
 #[test]
-fn a_head_yawed_or_pitched_on_its_mount_is_named_with_its_angle() {
+fn head_yawed_or_pitched_on_its_mount_is_reported_with_angle() {
     let right = file("vita2-4.toml");
-    // The first looks ahead, the other back.
+    // The first head looks forward, the other aft.
     for (head, what, angles, by_deg) in [
         ("sonar_1", "head_yawed", "[0, 0, 3]", 3.0),
         ("sonar_3", "head_yawed", "[0, 0, 177]", -3.0),
@@ -94,7 +96,7 @@ fn a_head_yawed_or_pitched_on_its_mount_is_named_with_its_angle() {
 }
 
 #[test]
-fn a_head_the_wrong_way_round_is_named_where_the_vehicle_leaves_the_middle() {
+fn reversed_head_is_reported_when_the_vehicle_is_off_centre() {
     for (name, head) in OF_VEHICLES {
         let right = file(name);
         let doubt = told(&changed(&right, head, "angles_deg", "[0, 0, 180]"), &right, ASIDE_M, 1).unwrap();
@@ -107,7 +109,7 @@ fn a_head_the_wrong_way_round_is_named_where_the_vehicle_leaves_the_middle() {
 }
 
 #[test]
-fn heads_that_are_swapped_are_named() {
+fn swapped_heads_are_reported() {
     let right = file("vita2-4.toml");
     let mut swapped = right.clone();
     for key in ["position_m", "angles_deg"] {
@@ -125,9 +127,9 @@ fn cell(vehicle: &str, condition: Condition) -> Cell {
     Cell { vehicle, condition, start_m: 100.0, let_in_m: None, driven: Driven::Planned }
 }
 
-/// Ranges by sound that is faster than told are too short; a wall that is wider is too far.
+/// Faster sound than configured gives ranges that are too short; a wider wall gives ranges that are too long.
 #[test]
-fn a_scale_of_ranges_is_named_with_its_figure() {
+fn wrong_range_scale_is_reported_with_its_value() {
     for vehicle in ["vita1", "vita2-4"] {
         for (condition, share) in [(Condition::WrongSound, 1.0 / 1.04 - 1.0), (Condition::WrongWall, 0.06)] {
             let dive = cell(vehicle, condition).dive(1, 50.0);
@@ -143,7 +145,7 @@ fn a_scale_of_ranges_is_named_with_its_figure() {
 }
 
 #[test]
-fn right_settings_are_not_doubted() {
+fn correct_settings_are_not_reported() {
     for (name, _) in OF_VEHICLES {
         let right = file(name);
         assert_eq!(told(&right, &right, ASIDE_M, 1), None, "{name}");
@@ -158,9 +160,10 @@ fn right_settings_are_not_doubted() {
     }
 }
 
-/// A head that sees a vault round itself has nothing to show how it is turned by; without noise its millimetres are alike all the way.
+/// A head that sees a vault about its own axis can't observe its rotation. Without noise its errors of millimetres
+/// are the same all along.
 #[test]
-fn a_head_whose_sector_is_round_is_not_doubted_for_millimetres() {
+fn head_in_a_round_sector_is_not_reported_for_millimetres() {
     for layout in ["sector_offset", "phase_shift"] {
         let scene = scenes::scene(&format!(
             "vehicle = \"vita2-4.toml\"\n[vehicle_changes]\nheads.layout = {layout:?}\n[trajectory]\nstart_m = 5\n\
@@ -171,7 +174,7 @@ fn a_head_whose_sector_is_round_is_not_doubted_for_millimetres() {
 }
 
 #[test]
-fn walls_that_are_not_as_drawn_here_and_there_are_no_settings() {
+fn local_wall_deviations_are_not_reported_as_settings() {
     for name in ["collapse", "boulders", "steel", "vita1-field"] {
         let path = headrace_tests::root().join(format!("deploy/scenes/{name}.toml"));
         let text = std::fs::read_to_string(path).unwrap().replace("../vehicles/", "");

@@ -1,4 +1,4 @@
-//! The oracle's holes are those of another program, which shares nothing with either.
+//! The oracle's holes match those of another program that shares no code with it or with headrace.
 
 use std::path::Path;
 use std::process::Command;
@@ -7,7 +7,7 @@ use headrace_oracle::second;
 use headrace_oracle::wall::{Place, Wall};
 use headrace_tests::{root, skipped};
 
-/// The places of `tests/oracles/holes_truth.csv` and the wall's perimeter.
+/// Places from `tests/oracles/holes_truth.csv`, and the wall's perimeter.
 fn committed() -> Wall {
     let text = std::fs::read_to_string(root().join("tests/oracles/holes_truth.csv")).unwrap();
     let (first, rest) = text.split_once('\n').unwrap();
@@ -19,7 +19,7 @@ fn committed() -> Wall {
     Wall::new(rest.lines().skip(1).map(place), perimeter_m).unwrap()
 }
 
-/// Bounds and D of sections.
+/// Bounds and D of the sections in a table.
 fn holes(table: &str) -> Vec<[f64; 3]> {
     let row = |line: &str| -> [f64; 3] {
         let cells: Vec<f64> = line.split(',').map(|cell| cell.parse().unwrap()).collect();
@@ -29,7 +29,7 @@ fn holes(table: &str) -> Vec<[f64; 3]> {
 }
 
 #[test]
-fn val_true_holes_are_those_of_another_program() {
+fn true_holes_match_another_program() {
     let wall = committed();
     let expected = holes(&std::fs::read_to_string(root().join("tests/oracles/holes.csv")).unwrap());
     assert_eq!(expected.len(), 12);
@@ -42,7 +42,7 @@ fn val_true_holes_are_those_of_another_program() {
 }
 
 #[test]
-fn val_the_other_program_still_gives_the_table() {
+fn other_program_still_gives_the_committed_table() {
     let script = root().join("tests/oracles/holes.py");
     let has_scipy = Command::new("python3").args(["-c", "import scipy"]).output();
     if !has_scipy.is_ok_and(|output| output.status.success()) {

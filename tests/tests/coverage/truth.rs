@@ -1,4 +1,4 @@
-//! The oracle of D_true against other ways to the same figures.
+//! Checks the D_true oracle against other computations.
 
 use headrace_geometry::math;
 use headrace_geometry::tunnel::{Profile, shapes};
@@ -16,7 +16,7 @@ fn dive(start_m: f64, effects: &str) -> JudgedDive {
     )))
 }
 
-/// The samples by strips of chainage, for a search that shares nothing with the triangulation.
+/// Samples in strips of chainage, for a search that shares nothing with the triangulation.
 struct Strips<'a> {
     truth: &'a Truth,
     from_m: f64,
@@ -56,12 +56,12 @@ fn strip(from_m: f64, x_m: f64) -> usize {
 }
 
 #[test]
-fn true_holes_are_what_a_fine_grid_finds() {
+fn true_holes_match_a_fine_grid() {
     let dive = dive(16.0, EFFECTS);
     let strips = Strips::of(&dive.truth);
     let (along, around) = (5_u32, 720_u32);
     let mut judged = 0;
-    // The ends are far from all samples, where the search would take long.
+    // The ends are far from all samples, so the search would take long there.
     for section in dive.sections.iter().filter(|section| section.true_hole_m < 1.5) {
         let [from_m, to_m] = [section.report.start_m, section.report.end_m].map(|x_m| x_m + section.shift_m);
         let place = |i: u32, j: u32| {
@@ -72,7 +72,7 @@ fn true_holes_are_what_a_fine_grid_finds() {
         };
         let grid_m = (0..=along).flat_map(|i| (0..around).map(move |j| place(i, j)));
         let grid_m = grid_m.map(|at| 2.0 * strips.clear_m(at)).fold(0.0, f64::max);
-        // Twice the distance to the nearest sample changes by no more than twice one's way from the nearest grid point.
+        // The diameter changes by no more than twice the distance to the nearest grid point.
         let off_m =
             math::hypot((to_m - from_m) / f64::from(along), dive.truth.perimeter_m / f64::from(around));
         let short_m = section.true_hole_m - grid_m;
@@ -83,7 +83,7 @@ fn true_holes_are_what_a_fine_grid_finds() {
 }
 
 #[test]
-fn an_outline_has_the_arc_lengths_of_its_profile() {
+fn outline_arc_lengths_match_the_profile() {
     let arrow = [[-2.0, 0.0], [3.0, 0.5], [2.5, 3.0], [0.3, 4.0], [-2.5, 2.0]];
     let profiles = [
         shapes::ceran().unwrap(),
@@ -95,7 +95,7 @@ fn an_outline_has_the_arc_lengths_of_its_profile() {
     for profile in profiles {
         let outline = Outline::of(&profile);
         for k in 0..5_000 {
-            // Places inside and outside the wall, far from each other.
+            // Places inside and outside the wall, far apart.
             let off_m = 0.3 + 1.5 * math::wrap(0.37 * f64::from(k), 1.0);
             let [y, z] = profile.point_at(0.618 * profile.perimeter_m() * f64::from(k));
             let [y0, z0] = profile.reference();
@@ -107,19 +107,19 @@ fn an_outline_has_the_arc_lengths_of_its_profile() {
     }
 }
 
-/// Whether a section is judged by samples that were placed after the estimate had settled, and not the dive's end.
+/// Whether a section has only samples placed after the estimate settled, and isn't at the dive's end.
 fn settled(section: &truth::JudgedSection, start_m: f64) -> bool {
     settled_below(section, start_m, 0.7)
 }
 
-/// The same for larger true holes.
+/// As [`settled`], and with a true hole below `hole_m`.
 fn settled_below(section: &truth::JudgedSection, start_m: f64, hole_m: f64) -> bool {
     section.report.start_m > start_m + 1.5 && section.true_hole_m < hole_m
 }
 
-/// Without errors the loop's holes are the true ones, wherever the dive begins.
+/// Without errors the reported holes are the true ones, wherever the dive begins.
 #[test]
-fn an_ideal_dive_has_its_true_holes() {
+fn ideal_dive_reports_true_holes() {
     for start_m in [16.0, 6900.0] {
         let dive = dive(start_m, "motion_within_turn = {}\n");
         let inner: Vec<_> = dive.sections.iter().filter(|section| settled(section, start_m)).collect();
@@ -133,7 +133,7 @@ fn an_ideal_dive_has_its_true_holes() {
 }
 
 #[test]
-fn what_is_no_return_of_the_wall_fills_nothing() {
+fn returns_from_other_than_wall_fill_no_hole() {
     let count = |effects: &str| dive(16.0, effects).truth.samples.len() as f64;
     let all = count("motion_within_turn = {}\n");
     for (effect, least, most) in [
@@ -148,9 +148,9 @@ fn what_is_no_return_of_the_wall_fills_nothing() {
     }
 }
 
-/// A cable that counts wrongly moves sections along the tunnel, and their true stretches with them.
+/// A wrong cable count moves sections along the tunnel, and their true stretches with them.
 #[test]
-fn stretches_follow_the_cable() {
+fn true_stretches_follow_the_cable_error() {
     let effects = "motion_within_turn = {}\ntether_slack = { reach_m = 0.4, period_s = 400 }\n";
     let dive = dive(16.0, effects);
     let most_m = dive.sections.iter().map(|section| section.shift_m.abs()).fold(0.0, f64::max);
@@ -161,9 +161,10 @@ fn stretches_follow_the_cable() {
     }
 }
 
-/// Heads that hear their own vehicle from 10 cm on: it hides a part of the wall, and what they hear of it fills no hole.
+/// Heads with a least range of 10 cm also hear their own vehicle, which hides a part of the wall. Its echoes fill no
+/// hole.
 #[test]
-fn what_a_vehicle_answers_itself_passes_nothing() {
+fn echoes_of_the_vehicle_pass_no_section() {
     let load = |name: &str| {
         let text = String::from_utf8(scenes::vehicle_file(name)?).unwrap();
         let near = text.replace("min_range_m = 0.5", "min_range_m = 0.1");

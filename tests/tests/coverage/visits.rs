@@ -1,11 +1,11 @@
-//! Places visited several times: what a later visit makes good, what it doesn't take back, and what two of them prove together.
+//! Places visited several times: what a later visit adds, what it can't revoke, and how two visits combine.
 
 use headrace_tests::{scenes, truth};
 
 const SENSORS: &str = "imu_noise = { gyro_degps_rthz = 0.007, accel_mps2_rthz = 0.0006, attitude_deg = 0.2 }\n\
     imu_bias = { gyro_degps = 0.003, accel_mps2 = 0.0003, tau_s = 300 }\nrange_noise = { sd_m = 0.01 }\n";
 
-/// A dive of `vita2-4` from 5 m on over these legs, m and m/s; backwards where negative.
+/// A dive of `vita2-4` from 5 m over these legs (m, m/s); negative distances go backwards.
 fn dive(seed: u64, legs: &[(f64, f64)], effects: &str) -> truth::JudgedDive {
     let leg = |(by_m, speed_mps): &(f64, f64)| {
         format!("[[trajectory.legs]]\ndistance_m = {by_m}\nspeed_mps = {speed_mps}\n")
@@ -18,15 +18,15 @@ fn dive(seed: u64, legs: &[(f64, f64)], effects: &str) -> truth::JudgedDive {
     truth::dive(&scenes::seeded(&text, &vehicle, Some(seed)))
 }
 
-/// The vehicle's file; the cable's slack may wander by 6 cm in minutes: little from one pass to the next, much from one visit to
-/// another.
+/// A vehicle file whose cable slack may wander by 6 cm within minutes. That is little between passes and much between
+/// visits.
 fn vehicle(name: &str) -> Result<Vec<u8>, String> {
     let file = String::from_utf8(scenes::vehicle_file(name)?).map_err(|error| error.to_string())?;
     let file = file.replace("slack_sd_m = 0.02", "slack_sd_m = 0.06");
     Ok(file.replace("slack_time_s = 10", "slack_time_s = 60").into_bytes())
 }
 
-/// Sections between two chainages with this verdict, by their start, m.
+/// Starts of the sections between two chainages with this verdict, m.
 fn with_verdict(dive: &truth::JudgedDive, verdict: &str, [from_m, to_m]: [f64; 2]) -> Vec<String> {
     let within = dive.sections.iter().map(|section| &section.report);
     let within = within.filter(|section| section.start_m >= from_m && section.end_m <= to_m);
@@ -41,12 +41,12 @@ fn far_over(dive: &truth::JudgedDive, target_m: f64) -> usize {
     passed.filter(|section| section.true_hole_m > 1.1 * target_m).count()
 }
 
-/// The counter stands for 12 s while the vehicle goes on.
+/// The counter is stuck for 12 s while the vehicle moves on.
 const STUCK: &str =
     "[[effects.device_faults]]\nsensors = [\"tether\"]\nkind = \"stick\"\nfrom_s = 60\nfor_s = 12\n";
 
 #[test]
-fn sections_with_samples_from_before_and_after_a_doubt_pass_once_a_visit_shows_them_whole() {
+fn sections_sampled_across_a_position_doubt_pass_after_one_complete_visit() {
     let out = dive(4, &[(12.0, 0.09)], STUCK);
     let back = dive(4, &[(12.0, 0.09), (9.0, -0.09)], STUCK);
     let where_m = [8.0, 13.0];
@@ -59,7 +59,7 @@ fn sections_with_samples_from_before_and_after_a_doubt_pass_once_a_visit_shows_t
 }
 
 #[test]
-fn the_way_home_takes_no_pass_back() {
+fn way_home_revokes_no_pass() {
     let out = dive(2, &[(12.0, 0.09)], "");
     let home = dive(2, &[(12.0, 0.09), (12.0, -0.4)], "");
     let where_m = [6.0, 15.0];
@@ -69,9 +69,9 @@ fn the_way_home_takes_no_pass_back() {
     assert!(lost.is_empty(), "{lost:?}");
 }
 
-/// Each of two visits is too fast, and the cable's slack is another on the way back.
+/// Each of two visits is too fast, and the cable's slack differs on the way back.
 #[test]
-fn val_two_visits_prove_together_what_they_have_seen_and_no_more() {
+fn two_visits_combine_only_their_own_samples() {
     let (mut over, mut wrong, mut passed) = (0, 0, 0);
     for seed in 0..10 {
         let dive =

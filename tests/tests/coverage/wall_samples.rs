@@ -1,5 +1,6 @@
-//! Only what is taken for wall fills holes: heads that answer anything, murk, and real boulders and caves, against what the
-//! beams truly met.
+//! Only returns accepted as wall fill holes, compared with what the beams truly met.
+//!
+//! Cases are stuck and noisy heads, murk, boulders and caves.
 
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
@@ -12,12 +13,12 @@ use headrace_tests::instrumented::{self, Dive, Sample};
 use headrace_tests::scenes;
 
 const VITA: &str = include_str!("../../../deploy/vehicles/vita2-4.toml");
-/// In a pipe of 1 m radius at a creep.
+/// A very slow dive in a pipe of 1 m radius.
 const CREEP: &str = "vehicle = \"vehicle.toml\"\n[trajectory]\nstart_m = 2\n[[trajectory.legs]]\ndistance_m = 6\n\
     speed_mps = 0.03\n[effects]\nmotion_within_turn = {}\nrange_noise = { sd_m = 0.005 }\n";
 const DRIFT: &str = "pilot_drift = { across_m = 0.2, up_m = 0.1, yaw_deg = 6, period_s = 15 }\n";
 
-/// A vehicle of this many heads, in front and aft by turns, in a pipe of 1 m radius.
+/// A vehicle with this many heads, alternating front and aft, in a pipe of 1 m radius.
 fn pipe(heads: usize) -> String {
     let mut text = "target_m = 0.25\n[tunnel]\nprofile = \"circle\"\nradius_m = 1\nlength_m = 30\n[water]\n\
         sound_speed_mps = 1447\n[navigation]\nslack_time_s = 10\n[heads]\nplanned_speed_mps = 0.03\n"
@@ -39,13 +40,12 @@ fn dive(heads: usize, effects: &str) -> Dive {
     instrumented::dive(&pipe(heads), &format!("{CREEP}{effects}"))
 }
 
-/// What a head is not believed for.
+/// Alerts that state why a head isn't trusted.
 fn named<'a>(dive: &'a Dive, head: &str) -> Vec<&'a AlertReport> {
     dive.report.alerts.iter().filter(|alert| alert.head.as_deref() == Some(head)).collect()
 }
 
-/// For each ping, in the loop's order, by how much its range is off that to what its beam met, m; `None` if either is
-/// missing.
+/// Range error of each ping against what its beam met, m, in the loop's order; `None` if either is missing.
 fn errors_m(vehicle: &str, scene: &str, dive: &Dive) -> Vec<Option<f64>> {
     let scene = scenes::scene_from(scene, &|_| Ok(vehicle.as_bytes().to_vec()));
     let mut simulation = Simulation::with_truth(&scene).unwrap();
@@ -62,21 +62,21 @@ fn errors_m(vehicle: &str, scene: &str, dive: &Dive) -> Vec<Option<f64>> {
     dive.pings.iter().map(|ping| heads[ping.head].next().unwrap()).collect()
 }
 
-/// How a dive in murk compares with what its beams truly met.
+/// Returns and sections of a dive in murk, compared with what the beams truly met.
 #[derive(Debug, Default)]
 struct Compared {
-    /// Returns that met the wall, and those of them called doubtful.
+    /// Returns that met the wall, and how many of them were called doubtful.
     met: usize,
     met_doubtful: usize,
-    /// Returns that met something else, and those of them taken for wall.
+    /// Returns that met something else, and how many of them were accepted as wall.
     strays: usize,
     strays_wall: usize,
-    /// Sections that passed, and the largest true hole of them, targets.
+    /// Sections that passed, and their largest true hole over the target.
     passed: usize,
     worst: f64,
 }
 
-/// A return has met the wall if its range is no more than `near_m` off.
+/// Compares a dive; a return has met the wall if its range error is at most `near_m`.
 fn compared(vehicle: &str, scene: &str, near_m: f64) -> Compared {
     let dive = instrumented::dive(vehicle, scene);
     let errors_m = errors_m(vehicle, scene, &dive);
@@ -102,18 +102,18 @@ fn compared(vehicle: &str, scene: &str, near_m: f64) -> Compared {
 }
 
 #[test]
-fn a_head_that_answers_one_range_for_ever_passes_nothing() {
+fn head_stuck_at_one_range_passes_nothing() {
     let sound = dive(1, "");
     assert!(sound.report.summary.pass_m > 5.0, "{:?}", sound.report.summary);
     let alone = dive(1, "stuck_range = { sensors = [\"sonar_0\"] }\n");
     assert!(alone.report.summary.pass_m <= 0.0, "{:?}", alone.report.summary);
-    // In the middle of a round pipe one range may be a wall: another pipe's.
+    // At the centre of a round pipe a constant range may be the wall of another pipe.
     let kinds: Vec<_> = alone.report.alerts.iter().map(|alert| alert.kind).collect();
     assert_eq!(kinds, ["profile_contradicted"]);
 }
 
 #[test]
-fn one_such_head_of_several_is_named_and_the_others_count() {
+fn one_stuck_head_of_several_is_reported_and_the_others_count() {
     for (heads, stuck, least_m) in [(2, 0, 1.0), (2, 1, 2.5), (3, 0, 2.0), (3, 1, 3.0)] {
         let id = format!("sonar_{stuck}");
         let effects = format!("stuck_range = {{ sensors = [\"{id}\"] }}\n");
@@ -125,7 +125,7 @@ fn one_such_head_of_several_is_named_and_the_others_count() {
         assert!((-0.5..-0.4).contains(&alerts[0].worst_m), "{at}");
         assert!(dive.report.alerts.iter().all(|alert| alert.head.as_deref().is_none_or(|head| head == id)));
         assert!(dive.report.summary.pass_m >= least_m, "{at}");
-        // No section passes by its returns.
+        // No section passes because of its returns.
         let others = dive.samples_of(|head| head != stuck);
         let wall = Wall::new(others, dive.profile.perimeter_m()).unwrap();
         for section in dive.report.sections.iter().filter(|section| section.verdict == "pass") {
@@ -136,7 +136,7 @@ fn one_such_head_of_several_is_named_and_the_others_count() {
 }
 
 #[test]
-fn a_head_that_comes_to_its_senses_counts_again() {
+fn recovered_head_counts_again() {
     let dive = dive(3, "stuck_range = { sensors = [\"sonar_1\"], from_s = 60, to_s = 120 }\n");
     assert_eq!(named(&dive, "sonar_1").len(), 1);
     let doubtful: Vec<f64> = dive
@@ -146,12 +146,12 @@ fn a_head_that_comes_to_its_senses_counts_again() {
         .map(|ping| ping.received.since(dive.pings[0].received).as_secs_f64())
         .collect();
     assert!(doubtful.len() > 2000 && doubtful[0] > 58.0, "{} from {}", doubtful.len(), doubtful[0]);
-    // Votes need some turns of new wall.
+    // The vote on a head needs some turns of new wall.
     assert!(doubtful.last().unwrap() < &145.0, "{:?}", doubtful.last());
 }
 
 #[test]
-fn a_range_that_stays_while_the_vehicle_sways_is_named_even_within_the_tolerance() {
+fn constant_range_of_a_swaying_vehicle_is_reported_even_within_tolerance() {
     let dive = dive(2, &format!("stuck_range = {{ range_m = 0.95, sensors = [\"sonar_1\"] }}\n{DRIFT}"));
     let alerts = named(&dive, "sonar_1");
     let constant = alerts.iter().find(|alert| alert.kind == "head_constant").unwrap();
@@ -160,14 +160,14 @@ fn a_range_that_stays_while_the_vehicle_sways_is_named_even_within_the_tolerance
 }
 
 #[test]
-fn noise_passes_nothing_and_one_such_head_of_two_is_named() {
+fn noise_passes_nothing_and_one_noisy_head_of_two_is_reported() {
     let effects = |head: &str| format!("outliers = {{ share = 1, near_m = 0.1, sensors = [\"{head}\"] }}\n");
     let alone = dive(1, &effects("sonar_0"));
     assert!(alone.report.summary.pass_m <= 0.0, "{:?}", alone.report.summary);
     assert_eq!(named(&alone, "sonar_0")[0].kind, "head_scattered");
     let causes = alone.report.sections.iter().filter_map(|section| section.cause);
     let causes: Vec<&str> = causes.map(|evidence| evidence.cause.as_str()).collect();
-    // Whose returns don't count is as good as silent.
+    // A head whose returns are all rejected counts as silent.
     let silent = causes.iter().filter(|cause| **cause == "head_silent").count();
     assert!(causes.len() > 10 && 10 * silent >= 9 * causes.len(), "{causes:?}");
     let one_of_two = dive(2, &effects("sonar_1"));
@@ -176,7 +176,7 @@ fn noise_passes_nothing_and_one_such_head_of_two_is_named() {
 }
 
 #[test]
-fn sound_heads_are_believed_in_a_pipe_that_is_wider_and_in_one_that_the_vehicle_sways_in() {
+fn sound_heads_are_accepted_in_a_wider_pipe_and_while_swaying() {
     let wider = "[tunnel.as_built]\nprofile = \"circle\"\nradius_m = 1.06\n";
     for scene in [format!("{CREEP}{DRIFT}"), format!("{CREEP}{wider}")] {
         let dive = instrumented::dive(&pipe(2), &scene);
@@ -189,7 +189,7 @@ fn sound_heads_are_believed_in_a_pipe_that_is_wider_and_in_one_that_the_vehicle_
 }
 
 #[test]
-fn in_murk_what_passes_has_no_larger_hole_of_returns_that_met_the_wall() {
+fn sections_passed_in_murk_have_true_holes_within_the_target() {
     let heads = "sensors = [\"sonar_0\", \"sonar_1\", \"sonar_2\"]";
     let near =
         format!("outliers = {{ share = 0.05, near_m = 0.1, far_m = 0.8, {heads} }}\nmultipath = {{}}\n");
@@ -220,7 +220,7 @@ fn in_murk_what_passes_has_no_larger_hole_of_returns_that_met_the_wall() {
 }
 
 #[test]
-fn caves_heaps_boulders_traps_and_side_tunnels_stay_wall() {
+fn caves_heaps_boulders_traps_and_side_tunnels_count_as_wall() {
     for name in ["collapse.toml", "boulders.toml"] {
         let path = headrace_tests::root().join("deploy/scenes").join(name);
         let dive = instrumented::dive(VITA, &std::fs::read_to_string(path).unwrap());
@@ -230,7 +230,7 @@ fn caves_heaps_boulders_traps_and_side_tunnels_stay_wall() {
         assert!(dive.report.alerts.iter().all(|alert| alert.head.is_none()), "{:?}", dive.report.alerts);
         let told = dive.report.dive.samples_rejected.doubtful_returns;
         assert_eq!(usize::try_from(told).unwrap(), doubtful);
-        // No section fails for want of them.
+        // No section fails because they are missing.
         let all =
             dive.pings.iter().filter_map(|ping| ping.sample.or(ping.doubtful)).map(|sample| sample.place);
         let wall = Wall::new(all, dive.profile.perimeter_m()).unwrap();
@@ -244,7 +244,7 @@ fn caves_heaps_boulders_traps_and_side_tunnels_stay_wall() {
 }
 
 #[test]
-fn what_is_taken_for_wall_does_not_depend_on_the_target() {
+fn wall_classification_does_not_depend_on_the_target() {
     let outliers = "outliers = { share = 0.08, near_m = 0.1, sensors = [\"sonar_0\", \"sonar_1\"] }\n";
     let samples = |target_m: &str| {
         let vehicle = pipe(2).replace("target_m = 0.25", &format!("target_m = {target_m}"));

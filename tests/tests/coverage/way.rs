@@ -1,5 +1,7 @@
-//! Every metre of the way is accounted for: each section in which the vehicle or its heads have been has a verdict, or is
-//! open, whether a head looked there or not; and a dive without a position says so first.
+//! Every metre of the dive is accounted for, and a dive without a position says so first.
+//!
+//! Each section that the vehicle or its heads have entered has a verdict or is open, whether a head looked there or
+//! not.
 
 use headrace_geometry::time::DurNs;
 use headrace_monitor::report::{Report, SectionReport};
@@ -9,12 +11,12 @@ use headrace_tests::{Folder, SCENE, VEHICLE as SHORT, instrumented};
 use crate::dives::DIVES;
 
 const VEHICLE: &str = include_str!("../../../deploy/vehicles/vita2-4.toml");
-/// VITA 2's heads ahead of and behind its origin, m.
+/// Distance of VITA 2's heads ahead of and behind its origin, m.
 const HEAD_M: f64 = 0.551;
 const START_M: f64 = 3.0;
 const SPEED_MPS: f64 = 0.11;
 
-/// A steady way at the speed that the heads are programmed for, with these effects.
+/// A steady dive at the planned speed of the heads, with these effects.
 fn steady(distance_m: f64, effects: &str) -> Report {
     let scene = format!(
         "seed = 3\nvehicle = \"vehicle.toml\"\n[trajectory]\nstart_m = {START_M}\n[[trajectory.legs]]\n\
@@ -29,7 +31,7 @@ fn silence(sensors: &str, span: &str) -> String {
 
 const ALL: &str = r#""sonar_0", "sonar_1", "sonar_2", "sonar_3""#;
 
-/// The sums by verdict are the way, and the sections reported are those of the way, one after the other.
+/// Checks that lengths by verdict add up to the coverage extent, and that the report lists its sections without gaps.
 #[track_caller]
 fn accounted_for(what: &str, report: &Report) {
     let all_m = report.summary.way_m();
@@ -44,7 +46,7 @@ fn accounted_for(what: &str, report: &Report) {
     assert!(report.sections.iter().all(judged), "{what}");
 }
 
-/// A section fails because these heads were silent.
+/// Checks that a section fails because these heads were silent.
 #[track_caller]
 fn fails_by_silence(section: &SectionReport, heads: &[usize]) {
     let evidence = section.cause.unwrap();
@@ -53,19 +55,20 @@ fn fails_by_silence(section: &SectionReport, heads: &[usize]) {
     assert_eq!(evidence.silent_heads.iter().collect::<Vec<_>>(), heads);
 }
 
-/// When the plane `behind_m` behind the vehicle has left a section by half the target, seconds after the start.
+/// Time at which the plane `behind_m` behind the vehicle has left a section by half the target, seconds after the
+/// start.
 fn left_s(section: &SectionReport, behind_m: f64) -> f64 {
     (section.end_m + 0.25 + behind_m - START_M) / SPEED_MPS
 }
 
-/// How long after that the section was flagged, seconds.
+/// Delay of the section's flag after that moment, seconds.
 fn late_s(report: &Report, section: &SectionReport, behind_m: f64) -> f64 {
     section.flagged_s.unwrap() - report.dive.start_s - left_s(section, behind_m)
 }
 
 #[test]
-fn where_all_heads_are_dead_the_way_fails_as_the_vehicle_leaves_it() {
-    // Dead at 5.2 m, the rear heads then at 4.65 m.
+fn sections_without_any_live_head_fail_as_the_vehicle_leaves_them() {
+    // The heads die at 5.2 m, with the rear heads at 4.65 m.
     let report = steady(9.0, &silence(ALL, "from_s = 20"));
     accounted_for("dead", &report);
     assert!(report.way.to_m.unwrap() > START_M + 9.0, "{:?}", report.way);
@@ -75,8 +78,8 @@ fn where_all_heads_are_dead_the_way_fails_as_the_vehicle_leaves_it() {
     for section in dark {
         fails_by_silence(section, &[0, 1, 2, 3]);
         let late_s = late_s(&report, section, HEAD_M);
-        // A beat, and what position errors add to half the target; at the soonest when the section's beginning has been left, since a
-        // circle about that may be large enough.
+        // The limit is one update plus the position margin on half the target. The earliest moment is when the
+        // section's start is left, since a circle about it may be large enough.
         assert!((-0.25 / SPEED_MPS - 0.1..2.5).contains(&late_s), "{}: {late_s} s late", section.start_m);
     }
     let home = report.way_home.iter().map(|back| back.from_m).fold(0.0, f64::max);
@@ -88,8 +91,8 @@ fn where_all_heads_are_dead_the_way_fails_as_the_vehicle_leaves_it() {
 }
 
 #[test]
-fn heads_that_come_back_are_waited_for_and_the_stretch_between_fails() {
-    // Dead from 5.75 m to 8.5 m.
+fn stretch_between_loss_and_return_of_heads_fails() {
+    // The heads are dead from 5.75 m to 8.5 m.
     let report = steady(9.0, &silence(ALL, "from_s = 25\nfor_s = 25"));
     accounted_for("dead and back", &report);
     let between = |from_m: f64, to_m: f64| {
@@ -106,7 +109,7 @@ fn heads_that_come_back_are_waited_for_and_the_stretch_between_fails() {
     }
 }
 
-/// A dive without errors of position along these legs, metres.
+/// A dive along these legs (m) without position errors.
 fn legs(distances_m: &[f64]) -> Report {
     let vehicle = VEHICLE.replace("slack_sd_m = 0.02", "way = \"direct\"\n#");
     let mut scene = format!("seed = 3\nvehicle = \"vehicle.toml\"\n[trajectory]\nstart_m = {START_M}\n");
@@ -122,7 +125,7 @@ fn legs(distances_m: &[f64]) -> Report {
 }
 
 #[test]
-fn where_the_way_begins_and_turns_back_there_is_no_flag_and_no_pass_by_default() {
+fn start_and_turning_point_get_no_flag_and_no_default_pass() {
     let report = legs(&[9.0, -4.0]);
     accounted_for("there and back", &report);
     let front_m = START_M + HEAD_M;
@@ -142,7 +145,7 @@ fn where_the_way_begins_and_turns_back_there_is_no_flag_and_no_pass_by_default()
 }
 
 #[test]
-fn what_the_vehicle_comes_back_through_is_judged_like_any_other() {
+fn section_crossed_on_the_way_back_is_judged_like_any_other() {
     let (once, again) = (legs(&[3.0]), legs(&[3.0, -5.0, 5.0]));
     accounted_for("once", &once);
     accounted_for("again", &again);
@@ -155,7 +158,7 @@ fn what_the_vehicle_comes_back_through_is_judged_like_any_other() {
 }
 
 #[test]
-fn where_ticks_end_makes_no_difference_to_dead_heads() {
+fn tick_boundaries_do_not_change_verdicts_of_dead_heads() {
     let silence = silence(ALL, "from_s = 8\nfor_s = 6");
     let scene = format!(
         "vehicle = \"vehicle.toml\"\n[trajectory]\nstart_m = 3\n[[trajectory.legs]]\ndistance_m = 4\n\
@@ -167,24 +170,24 @@ fn where_ticks_end_makes_no_difference_to_dead_heads() {
 }
 
 #[test]
-fn while_some_heads_are_alive_they_alone_are_waited_for() {
+fn flags_wait_only_for_live_heads() {
     let report = steady(6.0, &silence(r#""sonar_1", "sonar_2", "sonar_3""#, "from_s = 0"));
     accounted_for("three of four", &report);
     let inner: Vec<_> = report.sections.iter().filter(|s| s.start_m >= 5.25 && s.end_m <= 8.5).collect();
     assert!(inner.len() > 10);
     for section in inner {
         fails_by_silence(section, &[1, 2, 3]);
-        // The head in front leaves it ten seconds before those aft would.
+        // The front head leaves it ten seconds before the aft heads would.
         let late_s = late_s(&report, section, -HEAD_M);
         assert!(late_s < 4.0, "{}: {late_s} s late", section.start_m);
     }
-    // One of four, at a speed that suits three.
+    // One of four heads, at a speed that suits three.
     let silent = silence("\"sonar_1\"", "from_s = 10");
     let (one, none) = (steady(6.0, &silent), steady(6.0, ""));
     accounted_for("one of four", &one);
     for report in [&one, &none] {
         let judged = report.sections.iter().filter(|s| s.end_m <= 7.5);
-        // Where the way begins, not all heads have been.
+        // At the start, not all heads have passed.
         let beyond = |s: &&SectionReport| !s.not_inspected;
         assert!(judged.clone().filter(beyond).count() > 12);
         assert!(judged.filter(beyond).all(|s| s.verdict != "open"));
@@ -197,15 +200,15 @@ fn while_some_heads_are_alive_they_alone_are_waited_for() {
 }
 
 #[test]
-fn the_sums_are_the_way_on_dives_of_all_kinds() {
+fn verdict_lengths_add_up_in_random_dives() {
     for (seeded, dive) in DIVES.iter().take(40) {
         accounted_for(&format!("seed {} ({:?})", seeded.seed, seeded.kind), &dive.report);
     }
 }
 
-/// Short dives in and beyond a short tunnel, there and back, that end anywhere within a section.
+/// Short dives in and beyond a short tunnel, out and back, that end anywhere within a section.
 #[test]
-fn metres_by_verdict_add_up_to_the_way_wherever_a_dive_begins_turns_and_ends() {
+fn verdict_lengths_add_up_wherever_a_dive_begins_turns_and_ends() {
     let vehicle = SHORT.replace("length_m = 100", "length_m = 8");
     let (mut outside, mut not_inspected_m) = (0, 0.0);
     for seed in 0..60 {
@@ -230,7 +233,7 @@ fn metres_by_verdict_add_up_to_the_way_wherever_a_dive_begins_turns_and_ends() {
 }
 
 #[test]
-fn wherever_heads_fall_silent_what_is_left_unseen_fails_at_once_and_the_sums_are_the_way() {
+fn sections_unseen_because_of_silent_heads_fail_at_once() {
     let mut dark = 0;
     for seed in (0..48).filter(|seed| seeded(*seed).kind != Kind::Reversing) {
         let dive = seeded(seed);
@@ -243,7 +246,7 @@ fn wherever_heads_fall_silent_what_is_left_unseen_fails_at_once_and_the_sums_are
         let what = format!("seed {seed}");
         accounted_for(&what, report);
         let Some(to_m) = report.way.to_m else { continue };
-        // Heads are at most 0.6 m from the vehicle, either way; sections are left by half the target.
+        // Heads are at most 0.6 m from the vehicle, in either direction; a section is left by half the target.
         let (target_m, section_m) = (report.target_m, report.section_m);
         let seen_m = dive.samples().map(|sample| sample.place[0]).fold(f64::NEG_INFINITY, f64::max);
         let far = |s: &&SectionReport| s.start_m > seen_m + target_m;
@@ -265,8 +268,8 @@ fn wherever_heads_fall_silent_what_is_left_unseen_fails_at_once_and_the_sums_are
 }
 
 #[test]
-fn a_stretch_without_a_position_is_of_the_way_and_fails_when_left() {
-    // The filter gives up some seconds after the cable falls silent.
+fn stretch_without_a_position_counts_and_fails_when_left() {
+    // The filter drops its fix some seconds after the cable falls silent.
     let report = steady(12.0, &silence("\"tether\"", "from_s = 25\nfor_s = 50"));
     accounted_for("outage", &report);
     let lost =
@@ -277,7 +280,7 @@ fn a_stretch_without_a_position_is_of_the_way_and_fails_when_left() {
 }
 
 #[test]
-fn without_a_position_nothing_is_judged_and_that_is_said_first() {
+fn dive_without_a_position_judges_nothing_and_says_so_first() {
     for (sensor, lacking, words) in [("tether", "no_chainage", "chainage"), ("imu", "no_heading", "heading")]
     {
         let folder = Folder::new();
@@ -302,7 +305,7 @@ fn without_a_position_nothing_is_judged_and_that_is_said_first() {
 }
 
 #[test]
-fn a_dive_outside_the_tunnel_is_no_inspection_and_exits_with_1() {
+fn dive_outside_the_tunnel_exits_with_1() {
     let folder = Folder::new();
     folder.write("vehicle.toml", SHORT);
     folder.write("scene.toml", SCENE.replace("start_m = 3", "start_m = 105"));
@@ -316,7 +319,7 @@ fn a_dive_outside_the_tunnel_is_no_inspection_and_exits_with_1() {
 }
 
 #[test]
-fn a_dive_that_mostly_had_no_position_is_no_inspection() {
+fn dive_mostly_without_a_position_exits_with_1() {
     let folder = Folder::new();
     folder.write("vehicle.toml", SHORT);
     let silence = format!("[effects]\n{}", silence("\"tether\"", "from_s = 2"));
@@ -330,10 +333,10 @@ fn a_dive_that_mostly_had_no_position_is_no_inspection() {
     assert!(answer.stdout.contains("NO INSPECTION: "), "{}", answer.stdout);
 }
 
-/// What is placed while the estimate settles is no measure of what is placed after: a vehicle that waits until it is sure of its
-/// heading has all metres but those its front heads looked at meanwhile.
+/// Samples placed while the estimate settles say nothing about later ones. A vehicle that waits until its heading is
+/// known loses only the metres that its front heads saw meanwhile.
 #[test]
-fn a_vehicle_that_waits_until_its_heading_is_known_loses_no_metre_to_doubt() {
+fn waiting_for_a_known_heading_leaves_no_undecided_metre() {
     let vehicle = VEHICLE.replace("planned_speed_mps = 0.10", "planned_speed_mps = 0.09");
     assert_ne!(vehicle, VEHICLE);
     let scene = format!(

@@ -1,4 +1,4 @@
-//! Files of each kind that are whole: small logs of our own making, and fixtures of foreign formats.
+//! Intact files of each kind: small headrace logs, and fixtures of foreign formats.
 
 use std::collections::BTreeMap;
 use std::io::Cursor;
@@ -16,13 +16,13 @@ use mcap::{Compression, WriteOptions};
 use crate::messages::{Said, said};
 use crate::mutate::broken;
 
-/// Begin of the logs that are broken.
+/// Start time of the logs.
 const BEGIN: MonoNs = MonoNs(1_000_000_000);
 
-/// Number of the first sensor of the second vehicle.
+/// Number of the second vehicle's first sensor.
 pub(crate) const OTHERS: u8 = 128;
 
-/// What reads a file.
+/// Kind of a file, which decides its reader.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) enum Kind {
     Log,
@@ -35,11 +35,11 @@ pub(crate) enum Kind {
     Mcap,
     Vehicle,
     Scene,
-    /// What a device sends: the number of the sensor, a seed of how the bytes come in pieces, and the bytes.
+    /// Bytes of a device: sensor number, seed of the split into pieces, and the bytes.
     Line,
-    /// A packet of the operator's input.
+    /// A packet of operator input.
     Console,
-    /// A message of the page's viewer.
+    /// A message of a page viewer.
     Viewer,
 }
 
@@ -76,7 +76,7 @@ pub(crate) struct File {
 
 pub(crate) struct Corpus {
     pub(crate) files: Vec<File>,
-    /// What the logs say, all of them: a broken one says as much, or what it has lost. By the log that it was.
+    /// Messages of all intact logs. A broken log must contain those of its original, or report the loss.
     pub(crate) said: Vec<Said>,
 }
 
@@ -84,7 +84,7 @@ impl Corpus {
     pub(crate) fn new() -> Self {
         let mut files = Vec::new();
         let mut add = |kind, bytes| files.push(File { kind, bytes });
-        // Three times as often as foreign files: they are what must not be lost.
+        // Headrace logs are three times as frequent as foreign files, since they must never lose data silently.
         for messages in [12, 60] {
             add(Kind::Log, ours(messages));
             add(
@@ -136,7 +136,7 @@ impl Corpus {
         Self { files, said }
     }
 
-    /// A broken file.
+    /// Returns a broken file.
     pub(crate) fn mutant(&self, random: &mut Random) -> (Kind, Vec<u8>) {
         let file = &self.files[random.below(self.files.len())];
         let others: Vec<&File> =
@@ -159,7 +159,7 @@ const REQUESTS: [&str; 3] = [
     r#"{"do":"rate","hz":1}"#,
 ];
 
-/// What each device of the two vehicles sends in the first seconds of a short dive.
+/// Bytes that each device of the two vehicles sends in the first seconds of a short dive.
 fn lines() -> Vec<Vec<u8>> {
     let mut found = Vec::new();
     for (text, first) in [(headrace_tests::VEHICLE.to_owned(), 0), (headrace_tests::other_vehicle(), OTHERS)]
@@ -185,7 +185,7 @@ fn fixture(name: &str) -> Vec<u8> {
     std::fs::read(headrace_tests::root().join("tests/ros").join(name)).unwrap()
 }
 
-/// Content that is told from any other, of several lengths.
+/// Unique content of varying length.
 fn content(number: u64) -> Vec<u8> {
     let mut random = Random(number);
     (0..=number % 40).map(|_| random.bits().to_le_bytes()[3]).collect()
@@ -221,7 +221,7 @@ fn foreign(messages: u64, set: impl FnOnce(WriteOptions) -> WriteOptions) -> Vec
 }
 
 fn frame(sequence: u8) -> Vec<u8> {
-    // Its last field isn't zero, so that all 28 bytes are sent.
+    // The last field isn't zero, so that all 28 bytes are sent.
     let attitude = ATTITUDE_DATA { yawspeed: 1.0, ..ATTITUDE_DATA::DEFAULT };
     let frame = Message::Attitude(attitude).to_frame(MavHeader { system_id: 1, component_id: 1, sequence });
     frame.raw_bytes().to_vec()

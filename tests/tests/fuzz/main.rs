@@ -1,18 +1,20 @@
-//! Broken files, by chance: what reads dive logs, foreign ones, files that people write, devices' lines, commands and viewers' messages
-//! must neither panic nor hang, take no more memory than a bound, and lose nothing of a dive log in silence.
+//! Randomly broken files: no reader may panic, hang, exceed its memory bound, or lose data of a dive log silently.
 //!
-//! `cargo test -p headrace_tests --test fuzz` tries a few files, the same each time; `.ci/run` goes on for a minute from a seed of its own:
+//! Readers cover dive logs, foreign logs, files written by people, lines of devices, commands and viewers' messages.
+//! `cargo test -p headrace_tests --test fuzz` tries a few files, always the same. `.ci/run` runs for a minute from a
+//! new seed:
 //!
 //!     HEADRACE_FUZZ_SECONDS=600 cargo test -p headrace_tests --test fuzz -- --ignored --nocapture
 //!     HEADRACE_FUZZ_SEED=42 HEADRACE_FUZZ_SECONDS=60 cargo test -p headrace_tests --test fuzz -- --ignored --nocapture
 //!
-//! What is found is kept in the system's folder for temporary files, and told with seed, number and kind. A kept file is tried again by
-//! `HEADRACE_FUZZ_FILE=path`, its kind in its name. [`targets::try_one`] is the entry point that other fuzzers may call.
+//! A failing file is kept in the system's temporary folder and printed with seed, number and kind.
+//! `HEADRACE_FUZZ_FILE=path` tries a kept file again; its name contains its kind. Other fuzzers can call
+//! [`targets::try_one`].
 
-#![allow(clippy::unwrap_used, clippy::panic, reason = "a test stops at what it can't do")]
+#![allow(clippy::unwrap_used, clippy::panic, reason = "a failed step ends the test")]
 #![expect(
     unsafe_code,
-    reason = "a global allocator is an unsafe trait; this one counts and hands on to the system's"
+    reason = "a global allocator is an unsafe trait; this one counts and calls the system's"
 )]
 
 mod corpus;
@@ -33,11 +35,11 @@ use headrace_tests::random::Random;
 use corpus::{Corpus, Kind};
 use targets::{Surroundings, try_one};
 
-/// The most that one file may take, whatever it claims (`docs/reference/limits.md`).
+/// Largest memory for one file, whatever it claims, bytes (`docs/reference/limits.md`).
 const MOST_MEMORY: usize = 200 << 20;
-/// The longest that one file may take; a hundredth is much already.
+/// Longest time for one file; a hundredth of it is much already.
 const LONGEST: DurNs = DurNs::from_millis(20_000);
-/// Files that are tried each time.
+/// Number of files in an ordinary test run.
 const FEW: u64 = 1500;
 const SEED_OF_FEW: u64 = 20_260_501;
 
@@ -51,11 +53,11 @@ fn took(bytes: usize) {
     MOST_HELD.fetch_max(held, Ordering::Relaxed);
 }
 
-// SAFETY: every call is handed on to the system's allocator unchanged.
+// SAFETY: every call is passed to the system's allocator unchanged.
 unsafe impl GlobalAlloc for Counting {
     unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
         took(layout.size());
-        // SAFETY: the caller's promises are passed on.
+        // SAFETY: the caller upholds the allocator's contract.
         unsafe { System.alloc(layout) }
     }
 
@@ -76,7 +78,7 @@ unsafe impl GlobalAlloc for Counting {
 #[global_allocator]
 static ALLOCATOR: Counting = Counting;
 
-/// A file that is being tried.
+/// A file under test.
 struct Trial {
     seed: u64,
     number: u64,
@@ -84,7 +86,7 @@ struct Trial {
 }
 
 impl Trial {
-    /// Keeps a file that something is wrong with, and says so.
+    /// Keeps a failing file and returns a description.
     fn found(&self, bytes: &[u8], problem: &str) -> String {
         let Self { seed, number, kind } = self;
         let path = std::env::temp_dir().join(format!("headrace-fuzz-{seed}-{number}.{}", kind.name()));
@@ -93,7 +95,7 @@ impl Trial {
         format!("seed {seed}, file {number} ({}): {problem}; kept as {kept}", kind.name())
     }
 
-    /// Tries a file.
+    /// Tries one file.
     fn of(&self, bytes: &[u8], corpus: &Corpus, around: &Surroundings) -> Result<(), String> {
         let before = HELD.load(Ordering::Relaxed);
         MOST_HELD.store(before, Ordering::Relaxed);
@@ -115,7 +117,7 @@ impl Trial {
     }
 }
 
-/// Ends the program if a file takes too long: nothing else ends what hangs.
+/// Ends the program if a file takes too long, because a hanging reader can't be stopped otherwise.
 fn watched<T>(work: impl FnOnce(&dyn Fn(&Trial, &[u8])) -> T) -> T {
     static NUMBER: AtomicUsize = AtomicUsize::new(0);
     let done = AtomicBool::new(false);
@@ -133,7 +135,7 @@ fn watched<T>(work: impl FnOnce(&dyn Fn(&Trial, &[u8])) -> T) -> T {
                 }
             }
         });
-        // What hangs can't be kept afterwards.
+        // A file that hangs can't be kept afterwards.
         let result = work(&|trial, bytes| {
             NUMBER.fetch_add(1, Ordering::Relaxed);
             let name = format!("headrace-fuzz-last-{}.{}", std::process::id(), trial.kind.name());
@@ -146,7 +148,7 @@ fn watched<T>(work: impl FnOnce(&dyn Fn(&Trial, &[u8])) -> T) -> T {
     })
 }
 
-/// Tries files from a seed until `enough` says so after so many.
+/// Tries files from a seed until `enough` returns true for their number.
 fn fuzz(seed: u64, enough: impl Fn(u64) -> bool) -> Vec<String> {
     let corpus = Corpus::new();
     let around = Surroundings::new();
@@ -174,7 +176,7 @@ fn number(variable: &str) -> Option<u64> {
 }
 
 #[test]
-fn files_as_they_are_have_nothing_amiss() {
+fn intact_files_have_no_findings() {
     let (corpus, around) = (Corpus::new(), Surroundings::new());
     for (number, file) in (0..).zip(&corpus.files) {
         let trial = Trial { seed: 0, number, kind: file.kind };
@@ -188,14 +190,14 @@ fn files_as_they_are_have_nothing_amiss() {
 }
 
 #[test]
-fn a_few_broken_files() {
+fn few_broken_files_are_handled() {
     let problems = fuzz(SEED_OF_FEW, |tried| tried >= FEW);
     assert!(problems.is_empty(), "{}", problems.join("\n"));
 }
 
 #[test]
 #[ignore = "takes a minute; .ci/run has it"]
-fn a_minute_of_broken_files() {
+fn minute_of_broken_files_is_handled() {
     let seconds = number("HEADRACE_FUZZ_SECONDS").unwrap_or(60);
     let seed = number("HEADRACE_FUZZ_SEED").unwrap_or_else(|| now().0 ^ u64::from(std::process::id()) << 40);
     println!("HEADRACE_FUZZ_SEED={seed}");

@@ -5,10 +5,10 @@ use std::io::Cursor;
 
 use headrace_replay::log::{LogReader, MessageKind};
 
-/// Messages of a log: time and content, and how often.
+/// Messages of a log by time and content, with their number.
 pub(crate) type Said = BTreeMap<(u64, Vec<u8>), u32>;
 
-/// What a log says, and whether it says that nothing is missing. Errors: it is none.
+/// Reads a log; returns its messages, and whether it reports no loss. Errors: it isn't a log.
 pub(crate) fn said(bytes: &[u8]) -> Result<(Said, bool), String> {
     let mut log =
         LogReader::new(Cursor::new(bytes.to_vec()), "log".to_owned()).map_err(|error| error.to_string())?;

@@ -1,8 +1,8 @@
-//! What befalls files: bits turn, ends are missing, parts are lost, doubled or come from elsewhere, and lengths lie.
+//! Damages files: flipped bits, missing ends, lost, doubled or foreign parts, and wrong lengths.
 
 use headrace_tests::random::Random;
 
-/// A part of so many bytes: begins anywhere, and is more often short than long.
+/// A random part of `len` bytes, more often short than long.
 fn part(random: &mut Random, len: usize) -> core::ops::Range<usize> {
     let start = random.below(len);
     let most = match random.below(3) {
@@ -13,7 +13,7 @@ fn part(random: &mut Random, len: usize) -> core::ops::Range<usize> {
     start..(start + random.below(most)).min(len)
 }
 
-/// Lengths and counts that make trouble.
+/// A length or count that is likely to cause trouble.
 fn lie(random: &mut Random, truth: u64) -> u64 {
     match random.below(9) {
         0 => 0,
@@ -28,7 +28,7 @@ fn lie(random: &mut Random, truth: u64) -> u64 {
     }
 }
 
-/// Breaks a file once to eight times; `other` is one whose parts may come into it.
+/// Damages a file one to eight times; parts of `other` may be inserted.
 pub(crate) fn broken(random: &mut Random, bytes: &[u8], other: &[u8]) -> Vec<u8> {
     let mut bytes = bytes.to_vec();
     for _ in 0..=random.below(4) * random.below(3) {
@@ -70,7 +70,8 @@ fn once(random: &mut Random, bytes: &mut Vec<u8>, other: &[u8]) {
     }
 }
 
-/// A number of four or eight bytes, in either order, becomes another. Small ones are more likely lengths.
+/// Replaces a number of four or eight bytes, in either byte order. Small numbers are preferred, since they are more
+/// likely lengths.
 fn lengths(random: &mut Random, bytes: &mut [u8], at: usize) {
     let width = if random.below(2) == 0 { 4 } else { 8 };
     let big_endian = random.below(4) == 0;

@@ -1,4 +1,4 @@
-//! What reads files, and what must hold of it.
+//! Readers of files, and the conditions that they must satisfy.
 
 use std::io::Cursor;
 
@@ -28,10 +28,10 @@ use headrace_tests::random::Random;
 use crate::corpus::{Corpus, Kind, OTHERS};
 use crate::messages::{Said, said};
 
-/// What files need about them: a vehicle, and mappings.
+/// Vehicles and mappings that the readers need.
 pub(crate) struct Surroundings {
     vehicle: VehicleConfig,
-    /// Those whose devices send lines, the second from sensor `OTHERS` on.
+    /// Vehicles whose devices send lines; the second one's sensors begin at `OTHERS`.
     vehicles: [VehicleConfig; 2],
 }
 
@@ -89,7 +89,7 @@ impl Surroundings {
         Self { vehicle: read(VEHICLE), vehicles }
     }
 
-    /// Every sensor listens to the line of this name, and to one named as itself.
+    /// Takers for every sensor: each listens to the line of this name, and to one named like itself.
     fn takers(&self, kind: Kind) -> Vec<Taker> {
         let line = match kind {
             Kind::Tlog => tlog::STREAM,
@@ -110,7 +110,7 @@ impl Surroundings {
             .collect()
     }
 
-    /// As a mapping says, for the topics that there are; stamps are followed in half of them.
+    /// Feeds by a mapping of the given topics; stamps are used in half of them.
     fn feeds(&self, topics: &[Topic]) -> Feeds {
         let there = TOPICS.iter().filter(|(name, _)| topics.iter().any(|topic| topic.name == *name));
         let text = there.fold(String::new(), |text, (topic, sensor)| {
@@ -122,9 +122,9 @@ impl Surroundings {
     }
 }
 
-/// Tries a file that may be anything.
+/// Tries a file of any content.
 ///
-/// Errors: what is wrong with how it was read, in words.
+/// Errors: a description of what is wrong with how it was read.
 pub(crate) fn try_one(
     kind: Kind,
     bytes: &[u8],
@@ -149,7 +149,7 @@ pub(crate) fn try_one(
     if !silent || !is_vouched_for(bytes) {
         return Ok(());
     }
-    // Parts of other logs may have come into it; but one it must be whole.
+    // Parts of other logs may have been inserted, but the messages of one log must be complete.
     let holds =
         |whole: &Said| whole.iter().all(|(message, count)| said.get(message).is_some_and(|got| got >= count));
     if corpus.said.iter().any(holds) {
@@ -159,7 +159,7 @@ pub(crate) fn try_one(
     }
 }
 
-/// Whether checksums are there: zero says that there is none, and then nobody can tell that a byte has changed.
+/// Whether every checksum is present. A checksum of zero means none, and then a changed byte can't be detected.
 fn is_vouched_for(log: &[u8]) -> bool {
     let mut rest = &log[8..];
     while let Some((head, behind)) = rest.split_first_chunk::<9>() {
@@ -181,7 +181,7 @@ fn is_vouched_for(log: &[u8]) -> bool {
     true
 }
 
-/// How much a file gives.
+/// Number of items that a file yields.
 pub(crate) fn gives(kind: Kind, bytes: &[u8], around: &Surroundings) -> u64 {
     match kind {
         Kind::Log => said(bytes).unwrap().0.len() as u64,
@@ -193,8 +193,8 @@ pub(crate) fn gives(kind: Kind, bytes: &[u8], around: &Surroundings) -> u64 {
     }
 }
 
-/// Decodes what a device sent, whole and in pieces; how many readings it has. Errors: a reading that is no number, counts that are
-/// no account of the bytes, or readings that depend on the pieces.
+/// Decodes bytes of a device whole and in pieces; returns the number of readings. Errors: a reading that is no
+/// number, counts that don't add up, or readings that depend on the pieces.
 fn sent(bytes: &[u8], around: &Surroundings) -> Result<u64, String> {
     let &[number, seed, ref line @ ..] = bytes else { return Ok(0) };
     let [first, second] = &around.vehicles;
@@ -206,7 +206,7 @@ fn sent(bytes: &[u8], around: &Surroundings) -> Result<u64, String> {
     let mut said = Ok(());
     while !rest.is_empty() {
         let (now, later) = rest.split_at((1 + random.below(24)).min(rest.len()));
-        // Mostly at once, and now and then after a silence, or stamped before what came before.
+        // Mostly at once, sometimes after a silence, or with an earlier timestamp.
         at = match random.below(40) {
             0 => at + DurNs::from_millis(3_600_000),
             1 => MonoNs(at.0.saturating_sub(1_000_000_000)),
@@ -227,7 +227,7 @@ fn sent(bytes: &[u8], around: &Surroundings) -> Result<u64, String> {
     said.map(|()| count)
 }
 
-/// Reads a packet of the operator's input. Errors: one that isn't the same again as written.
+/// Reads a packet of operator input. Errors: it isn't identical when written again.
 fn command(bytes: &[u8]) -> Result<u64, String> {
     let Ok(command) = console::Command::parse(bytes) else { return Ok(0) };
     let json = command.to_json();
@@ -237,7 +237,7 @@ fn command(bytes: &[u8]) -> Result<u64, String> {
     }
 }
 
-/// Reads a viewer's message. Errors: one that is taken and that the loop's input has no command for.
+/// Reads a viewer's message. Errors: it is accepted but the loop's input has no command for it.
 fn from_viewer(bytes: &[u8]) -> Result<u64, String> {
     let Ok(text) = str::from_utf8(bytes) else { return Ok(0) };
     match headrace_dashboard::command::command_of(text) {
@@ -252,10 +252,10 @@ fn from_viewer(bytes: &[u8]) -> Result<u64, String> {
     }
 }
 
-/// Most errors that are told of a file, and the line that says that there are more.
+/// Most errors listed for a file, with the line that states that there are more.
 const MOST_ERRORS: usize = 101;
 
-/// Reads a vehicle file or a scene; its sensors. Errors: what is wrong with how its errors are told.
+/// Reads a vehicle file or a scene; returns its number of sensors. Errors: a fault in how its errors are listed.
 fn written_by_people(kind: Kind, bytes: &[u8]) -> Result<u64, String> {
     let Ok(text) = str::from_utf8(bytes) else { return Ok(0) };
     let document = Document::new("file", text);
@@ -279,10 +279,10 @@ fn written_by_people(kind: Kind, bytes: &[u8]) -> Result<u64, String> {
     }
 }
 
-/// Imports a file into a log, which must be whole.
+/// Imports a file into a log, which must be intact.
 fn imported(kind: Kind, bytes: &[u8], around: &Surroundings) -> u64 {
     let format: Box<dyn Format> = match kind {
-        // The others aren't imported.
+        // Other kinds aren't imported.
         Kind::Log | Kind::Mcap | Kind::Vehicle | Kind::Scene | Kind::Line | Kind::Console | Kind::Viewer => {
             let Ok(recording) = Mcap::open("file", Cursor::new(bytes)) else { return 0 };
             let feeds = around.feeds(&recording.topics());

@@ -1,4 +1,4 @@
-//! Files that people write, and foreign logs, which never end or hold far more than such a file has.
+//! Text files and foreign logs that never end or are far larger than such files should be.
 
 use std::fmt::Write as _;
 
@@ -23,7 +23,7 @@ fn with_profile(file: &str) -> String {
     vehicle
 }
 
-/// A file with its content, the command, and what it says.
+/// A file name with content, the command, and the expected message.
 type Bomb = (&'static str, String, &'static [&'static str], &'static str);
 
 /// All of them.
@@ -59,7 +59,7 @@ fn files() -> Vec<Bomb> {
             "a vehicle of 1 MiB",
             format!("{VEHICLE}#{}", "x".repeat(1 << 20)),
             check,
-            "the longest that is read has 1048576",
+            "the most allowed is 1048576",
         ),
         (
             "a vehicle of 17 MiB",
@@ -83,14 +83,19 @@ fn files() -> Vec<Bomb> {
             "70,000 sensors of nothing",
             VEHICLE.to_owned() + &"[[sensors]]\n".repeat(70_000),
             check,
-            "tables; up to 2000 are read",
+            "tables; the most allowed is 2000",
         ),
-        ("20,000 sensors", VEHICLE.to_owned() + &many(20_000, sensor), check, "tables; up to 2000 are read"),
+        (
+            "20,000 sensors",
+            VEHICLE.to_owned() + &many(20_000, sensor),
+            check,
+            "tables; the most allowed is 2000",
+        ),
         (
             "70,000 openings",
             VEHICLE.to_owned() + &"[[openings]]\n".repeat(70_000),
             check,
-            "tables; up to 2000 are read",
+            "tables; the most allowed is 2000",
         ),
         ("tables in tables", format!("a={}", "[".repeat(500_000)), check, "recurs"),
         ("a key of 400,000 parts", format!("{}=1", ["a"; 400_000].join(".")), check, "recursion limit"),
@@ -99,13 +104,13 @@ fn files() -> Vec<Bomb> {
             "a profile that never ends",
             with_profile("/dev/zero"),
             check,
-            "it is a pipe, a device or a socket; a file is wanted",
+            "it is a pipe, a device or a socket; a file is required",
         ),
         (
             "a profile that is a pipe",
             with_profile("pipe"),
             check,
-            "it is a pipe, a device or a socket; a file is wanted",
+            "it is a pipe, a device or a socket; a file is required",
         ),
         ("a profile of 400,000 points", with_profile("points.csv"), check, "has more than 100000 points"),
         ("a profile of 30 MB", with_profile("long.csv"), check, "it is longer than 16777216 bytes"),
@@ -159,7 +164,7 @@ fn change(text: &str, from: &str, to: &str) -> String {
 }
 
 #[test]
-fn files_that_are_bombs_are_refused_with_the_limit() {
+fn oversized_files_are_refused_with_the_limit() {
     let folder = Folder::new();
     folder.write("vehicle.toml", VEHICLE);
     folder.write("map.toml", "time_column = \"t\"\n[[columns]]\ncolumn = \"depth\"\nsensor = \"depth\"\nquantity = \"pressure\"\nunit = \"Pa\"\n");
@@ -189,9 +194,9 @@ fn files_that_are_bombs_are_refused_with_the_limit() {
     assert!(wrong.is_empty(), "{}", wrong.join("\n"));
 }
 
-/// Lists of one-letter names take the most memory for each byte.
+/// Lists of one-letter names take the most memory per byte.
 #[test]
-fn dbc_files_of_any_length_stay_within_the_memory() {
+fn dbc_files_of_any_length_stay_within_the_memory_limit() {
     let folder = Folder::new();
     let signals = "[sensors.signals]\nrate = [\"GyroX\", \"GyroY\", \"GyroZ\"]\nforce = [\"AccX\", \"AccY\", \"AccZ\"]\n\
         quaternion = [\"QuatW\", \"QuatX\", \"QuatY\", \"QuatZ\"]\n";
@@ -218,7 +223,7 @@ fn dbc_files_of_any_length_stay_within_the_memory() {
 }
 
 #[test]
-fn a_pipe_or_a_device_in_place_of_a_file_keeps_nobody_waiting() {
+fn pipe_or_device_instead_of_a_file_does_not_block() {
     let folder = Folder::new();
     rustix::fs::mknodat(
         rustix::fs::CWD,
@@ -240,7 +245,7 @@ fn a_pipe_or_a_device_in_place_of_a_file_keeps_nobody_waiting() {
             let ran = run(&folder, arguments);
             assert_eq!(ran.code, Some(2), "{arguments:?}");
             assert!(
-                ran.stderr.contains("it is a pipe, a device or a socket; a file is wanted"),
+                ran.stderr.contains("it is a pipe, a device or a socket; a file is required"),
                 "{}",
                 ran.stderr
             );

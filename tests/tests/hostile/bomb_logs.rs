@@ -1,15 +1,15 @@
-//! Logs that claim, or unpack to, far more than they are.
+//! Logs that claim, or unpack to, far more than their size.
 
 use crate::records::{
     Part, attachment, channel, chunk, ended, log, map, message, message_head, metadata, packed_chunk, record,
     record_head, schema, text, zstd,
 };
 
-/// A log, and what is said of it.
+/// A log with its expected message.
 pub(crate) struct Bomb {
     pub(crate) name: &'static str,
     pub(crate) bytes: Vec<u8>,
-    /// Part of a loss that a replay names; the log isn't whole.
+    /// Part of a loss that a replay must report; the log is damaged.
     pub(crate) told: &'static str,
 }
 
@@ -27,13 +27,13 @@ fn numbered(count: u32) -> impl Iterator<Item = (String, String)> {
     (0..count).map(|number| (format!("{number:x}"), String::new()))
 }
 
-/// A record of `len` bytes: `front`, and one byte as often as needed.
+/// A record of `len` bytes: `front`, then one repeated byte.
 fn filled<'a>(head: &'a mut Vec<u8>, opcode: u8, front: &[u8], len: u64) -> [Part<'a>; 2] {
     *head = [record_head(opcode, len), front.to_vec()].concat();
     [Part::Bytes(head), Part::Repeated(b'a', len - front.len() as u64)]
 }
 
-/// Bombs in chunks: what they unpack to.
+/// Bombs in chunks: sizes after unpacking.
 fn chunks() -> Vec<Bomb> {
     let bomb = |name, records: &[Vec<u8>], told| Bomb { name, bytes: log(records), told };
     let zeros = |len| packed_chunk(&[Part::Repeated(0, len)], (1, 2));
@@ -106,7 +106,7 @@ fn chunks() -> Vec<Bomb> {
     ]
 }
 
-/// Bombs in the records around chunks.
+/// Bombs in records around chunks.
 fn headers() -> Vec<Bomb> {
     let bomb = |name, records: &[Vec<u8>], told| Bomb { name, bytes: log(records), told };
     let channels = |topic: &str, metadata: &[u8]| -> Vec<u8> {
@@ -133,7 +133,7 @@ fn headers() -> Vec<Bomb> {
         bomb(
             "a channel with a million entries",
             &[channel(2, "/raw/depth", &map(numbered(1_000_000)))],
-            "bytes of definitions and metadata|bytes that are no records",
+            "bytes of definitions and metadata|bytes that aren't records",
         ),
         bomb("metadata of a million entries", &[depth(), metadata("m", numbered(500_000))], HEADERS),
         bomb(
@@ -182,11 +182,11 @@ fn headers() -> Vec<Bomb> {
     ]
 }
 
-/// Bombs of numbers that point elsewhere, and of what is told of them.
+/// Bombs of offsets and sizes that point elsewhere.
 fn pointers() -> Vec<Bomb> {
     let some = |records: &[Vec<u8>]| log(&[&[depth()], records, &[message(1, 5, b"a")]].concat());
     let index = |count: u32| record(7, &[&[1, 0][..], &count.to_le_bytes(), &[0; 64]].concat());
-    // An attachment of 2^64-1 bytes in a record of 2 KiB.
+    // An attachment that claims 2^64-1 bytes in a record of 2 KiB.
     let endless = [&[0; 16][..], &text("endless"), &text(""), &u64::MAX.to_le_bytes(), &[0; 2000]].concat();
     let nameless =
         [&[0; 16][..], &text(&"n".repeat(3000)), &text(""), &5_u64.to_le_bytes(), b"hello", &[0; 4]].concat();
@@ -204,7 +204,7 @@ fn pointers() -> Vec<Bomb> {
         .flat_map(|n| message(3, n, &[&n.to_le_bytes()[..], &n.to_le_bytes(), &[1; 2000]].concat()))
         .collect();
     vec![
-        bomb("an attachment of 2^64-1 bytes", some(&[record(9, &endless)]), "bytes that are no records"),
+        bomb("an attachment of 2^64-1 bytes", some(&[record(9, &endless)]), "bytes that aren't records"),
         bomb(
             "an attachment with a name of 3,000 letters",
             some(&[record(9, &nameless)]),
@@ -213,16 +213,16 @@ fn pointers() -> Vec<Bomb> {
         bomb(
             "a record of 2^64-1 bytes",
             some(&[record_head(6, u64::MAX), vec![0; 100]]),
-            "bytes that are no records|ends before",
+            "bytes that aren't records|ends before",
         ),
-        bomb("indexes of 2^32-1 entries", some(&[index(u32::MAX).repeat(1000)]), "bytes that are no records"),
+        bomb("indexes of 2^32-1 entries", some(&[index(u32::MAX).repeat(1000)]), "bytes that aren't records"),
         bomb("a summary that points at the beginning", circle, "begins elsewhere"),
         bomb(
             "an index of chunks beyond the end",
             some(&[record(8, &index_of_chunks).repeat(1000)]),
-            "bytes that are no records",
+            "bytes that aren't records",
         ),
-        bomb("statistics of 2^64-1 messages", some(&[record(11, &statistics)]), "bytes that are no records"),
+        bomb("statistics of 2^64-1 messages", some(&[record(11, &statistics)]), "bytes that aren't records"),
         bomb("ticks of 2^32-1 packets", log(&[depth(), channel(2, "/loop/tick", &[0; 4]), ticks]), ""),
         bomb(
             "40 MB of results of nothing",

@@ -1,5 +1,6 @@
-//! Bombs: files that claim, or unpack to, far more than they are. Every command that reads one ends, takes less than 200 MiB, and
-//! says what it left out.
+//! Bombs: files that claim, or unpack to, far more than their size.
+//!
+//! Every command that reads one ends, takes less than 200 MiB, and reports what it skipped.
 
 use std::io::{Cursor, Read, Result, Seek, SeekFrom};
 
@@ -9,11 +10,11 @@ use headrace_tests::{Folder, VEHICLE};
 use crate::bomb_logs::{Bomb, all};
 use crate::run::run;
 
-/// The most that any log may take.
+/// Largest memory for any log, MiB.
 const MOST_MIB: u64 = 200;
 
 #[test]
-fn bombs_of_logs_take_little_memory_and_are_told() {
+fn log_bombs_take_little_memory_and_are_reported() {
     let folder = Folder::new();
     folder.write("vehicle.toml", VEHICLE);
     println!("| bomb | bytes | replay MiB | s | verify MiB | s | recover MiB | s |");
@@ -37,7 +38,7 @@ fn bombs_of_logs_take_little_memory_and_are_told() {
         }
         for ran in [replayed, recovered] {
             let is_told = told.split('|').any(|words| ran.stdout.contains(words));
-            // What is no packet is lost to a dive alone.
+            // Records that aren't packets are lost to a dive only.
             if (ran.code, is_told) != (Some(3), true) && !(told.contains("over 4096") && ran.code == Some(0))
             {
                 let start: String = ran.stdout.chars().take(400).collect();
@@ -48,7 +49,7 @@ fn bombs_of_logs_take_little_memory_and_are_told() {
     assert!(wrong.is_empty(), "{}", wrong.join("\n"));
 }
 
-/// A log in memory that counts what is read of it.
+/// A log in memory that counts the bytes read.
 struct Counted<'a> {
     log: Cursor<&'a [u8]>,
     read: u64,
@@ -69,7 +70,7 @@ impl Seek for Counted<'_> {
 }
 
 #[test]
-fn what_is_read_of_a_bomb_is_in_proportion_to_its_length() {
+fn bytes_read_of_a_bomb_are_proportional_to_its_length() {
     for Bomb { name, bytes, .. } in all() {
         let mut counted = Counted { log: Cursor::new(&bytes), read: 0 };
         let mut messages = 0_u64;
@@ -81,7 +82,7 @@ fn what_is_read_of_a_bomb_is_in_proportion_to_its_length() {
         drop(log);
         let len = bytes.len() as u64;
         println!("{name}: {len} bytes, {} read, {messages} messages", counted.read);
-        // Frames are looked at in steps of a reader's buffer, which is filled anew after each jump.
+        // Frames are read in steps of the reader's buffer, which is refilled after each seek.
         assert!(counted.read <= (1 << 20) + 16 * len, "{name}: {} of {len}", counted.read);
         assert!(messages <= len / 31 + 100, "{name}: {messages} of {len} bytes");
     }

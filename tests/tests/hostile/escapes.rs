@@ -1,4 +1,4 @@
-//! Names from outside hold codes that a terminal obeys: they are shown, and no line has more than its own.
+//! Names from outside may contain terminal control codes. They are shown escaped, and each line stays a single line.
 
 use headrace_tests::{Folder, VEHICLE, raw_messages, write_log};
 use mcap::WriteOptions;
@@ -6,7 +6,8 @@ use mcap::WriteOptions;
 use crate::records::{attachment, channel, log, message, metadata};
 use crate::run::run;
 
-/// Clears the screen, names the window, rings, goes back, in C1 and in C0; turns the text round; and a line of its own.
+/// Control codes in C1 and C0: clear screen, window title, bell, carriage return, text direction, and a line of its
+/// own.
 const EVIL: &str = "a\x1b[2J\x1b]0;t\x07\rb\u{9b}31m\u{202e}c\u{2066}\ndigest 0000000000000000";
 
 #[track_caller]
@@ -17,7 +18,7 @@ fn is_plain(what: &str, text: &str) {
 }
 
 #[test]
-fn names_in_a_log_are_shown_as_they_are() {
+fn control_codes_in_log_names_are_escaped() {
     let folder = Folder::new();
     folder.write("vehicle.toml", VEHICLE);
     let entry = |key: &str| std::iter::once((key.to_owned(), EVIL.to_owned()));
@@ -60,7 +61,7 @@ fn names_in_a_log_are_shown_as_they_are() {
 }
 
 #[test]
-fn names_of_files_and_in_files_are_shown_as_they_are() {
+fn control_codes_in_file_names_and_contents_are_escaped() {
     let folder = Folder::with_dive();
     let dive = folder.read("dive.mcap");
     let vehicle = VEHICLE.replacen("name = ", "name = \"a\\u001b[2J\" # ", 1);
@@ -89,7 +90,7 @@ fn names_of_files_and_in_files_are_shown_as_they_are() {
         is_plain(&format!("{arguments:?}"), &ran.stdout);
         is_plain(&format!("{arguments:?}"), &ran.log);
     }
-    // A name in a vehicle file has no use for them.
+    // A name in a vehicle file may not contain them.
     folder.write("evil.toml", &vehicle);
     let ran = run(&folder, &["check", "evil.toml"]);
     assert_eq!(ran.code, Some(2));

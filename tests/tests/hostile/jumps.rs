@@ -1,4 +1,4 @@
-//! Jumps in logs that are odd: what comes after a place must not be known there.
+//! Seeks in odd logs: data after a position must not be known at that position.
 
 use std::io::Cursor;
 
@@ -6,7 +6,7 @@ use headrace_replay::log::LogReader;
 
 use crate::records::{MAGIC, channel, chunk, message, record, text};
 
-/// A log whose summary says that it has one channel; the second is defined by its second chunk.
+/// A log whose summary lists one channel; its second chunk defines another.
 fn with_a_late_channel() -> Vec<u8> {
     let depth = channel(1, "/raw/depth", &[0; 4]);
     let first = [message(1, 5, b"a"), message(9, 6, b"b")].concat();
@@ -21,7 +21,7 @@ fn with_a_late_channel() -> Vec<u8> {
     [&data, &summary, &footer, MAGIC].concat()
 }
 
-/// What is left of a log: its messages, and its losses.
+/// Remaining messages and losses of a log.
 fn rest(log: &mut LogReader<Cursor<Vec<u8>>>) -> (Vec<Vec<u8>>, Vec<String>) {
     let mut messages = Vec::new();
     while let Some(message) = log.next().unwrap() {
@@ -31,7 +31,7 @@ fn rest(log: &mut LogReader<Cursor<Vec<u8>>>) -> (Vec<Vec<u8>>, Vec<String>) {
 }
 
 #[test]
-fn a_channel_defined_later_isnt_known_on_the_way_back() {
+fn channel_defined_later_is_unknown_after_seeking_back() {
     let mut log = LogReader::new(Cursor::new(with_a_late_channel()), "late".to_owned()).unwrap();
     let begin = log.place();
     let straight = rest(&mut log);
@@ -42,7 +42,7 @@ fn a_channel_defined_later_isnt_known_on_the_way_back() {
         log.go_to(&begin).unwrap();
         assert_eq!(rest(&mut log), straight);
     }
-    // A reader that has read nothing knows it at the end.
+    // A reader that has read nothing knows the channel at the end.
     let mut other = LogReader::new(Cursor::new(with_a_late_channel()), "late".to_owned()).unwrap();
     other.go_to(&end).unwrap();
     assert_eq!((rest(&mut other), other.header().sources.len()), ((Vec::new(), straight.1), 1));

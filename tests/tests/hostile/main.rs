@@ -1,6 +1,6 @@
-//! Hostile and broken input: every command ends, in bounded memory, and tells what it couldn't take.
+//! Hostile and broken input: every command ends within bounded memory and reports what it couldn't read.
 
-#![allow(clippy::unwrap_used, clippy::panic, reason = "a test stops at what it can't do")]
+#![allow(clippy::unwrap_used, clippy::panic, reason = "a failed step ends the test")]
 
 mod bomb_files;
 mod bomb_logs;

@@ -1,4 +1,4 @@
-//! Records of MCAP and frames of zstd made by hand: other writers don't lie.
+//! Hand-made MCAP records and zstd frames, because ordinary writers produce no wrong ones.
 //!
 //! Sources: MCAP format specification, "Records"; RFC 8878, 3.1.1.
 
@@ -41,13 +41,13 @@ pub(crate) fn metadata(name: &str, entries: impl Iterator<Item = (String, String
     record(12, &[text(name), map(entries)].concat())
 }
 
-/// An attachment without checksum, whose data has the length it claims.
+/// An attachment without checksum; its data has the stated length.
 pub(crate) fn attachment(name: &str, data: &[u8]) -> Vec<u8> {
     let head = [&[0; 16][..], &text(name), &text(""), &(data.len() as u64).to_le_bytes()].concat();
     record(9, &[&head, data, &[0; 4]].concat())
 }
 
-/// A chunk that claims to unpack to so many bytes, of messages between two times.
+/// A chunk that states this unpacked size, with messages between two times.
 pub(crate) fn chunk(packing: &str, unpacked: u64, packed: &[u8], times: (u64, u64)) -> Vec<u8> {
     let numbers = [times.0, times.1, unpacked].map(u64::to_le_bytes).concat();
     let len = (packed.len() as u64).to_le_bytes();
@@ -59,17 +59,17 @@ pub(crate) fn log(records: &[Vec<u8>]) -> Vec<u8> {
     ended(records, 0)
 }
 
-/// The same, whose footer says where the summary begins.
+/// As [`log`], with a footer that states where the summary begins.
 pub(crate) fn ended(records: &[Vec<u8>], summary: u64) -> Vec<u8> {
     let header = record(1, &[text(""), text("by hand")].concat());
     let footer = record(2, &[&summary.to_le_bytes()[..], &[0; 12]].concat());
     [MAGIC, &header, &records.concat(), &record(15, &[0; 4]), &footer, MAGIC].concat()
 }
 
-/// Part of what a frame unpacks to.
+/// A part of the data that a frame unpacks to.
 pub(crate) enum Part<'a> {
     Bytes(&'a [u8]),
-    /// One byte, so many times.
+    /// One byte, repeated this often.
     Repeated(u8, u64),
 }
 
@@ -93,12 +93,12 @@ pub(crate) fn zstd(window_log: u8, parts: &[Part<'_>]) -> Vec<u8> {
             }
         }
     }
-    // An empty last one.
+    // An empty last block.
     frame.extend([1, 0, 0]);
     frame
 }
 
-/// A chunk packed by [`zstd`], which tells the truth.
+/// A chunk packed by [`zstd`], with its true size.
 pub(crate) fn packed_chunk(parts: &[Part<'_>], times: (u64, u64)) -> Vec<u8> {
     let lengths = parts.iter().map(|part| match part {
         Part::Bytes(bytes) => bytes.len() as u64,
@@ -107,7 +107,7 @@ pub(crate) fn packed_chunk(parts: &[Part<'_>], times: (u64, u64)) -> Vec<u8> {
     chunk("zstd", lengths.sum(), &zstd(17, parts), times)
 }
 
-/// The head of a record of a length that its content is yet to have.
+/// Header of a record; the content of this length follows later.
 pub(crate) fn record_head(opcode: u8, len: u64) -> Vec<u8> {
     [&[opcode], len.to_le_bytes().as_slice()].concat()
 }

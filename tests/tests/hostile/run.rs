@@ -1,4 +1,4 @@
-//! Runs the program on input that may keep it for ever.
+//! Runs the program on input that might block it for ever.
 
 use std::process::{Child, Stdio};
 use std::time::Duration;
@@ -7,24 +7,24 @@ use headrace_geometry::time::DurNs;
 use headrace_ports::now;
 use headrace_tests::{Folder, program};
 
-/// No file here takes more than seconds; what isn't done by then never ends.
+/// Runs here take seconds; a run that takes longer than this never ends.
 const HANGS_AFTER: DurNs = DurNs::from_millis(120_000);
 
-/// What a run gave.
+/// Result of a run.
 pub(crate) struct Ran {
     pub(crate) code: Option<i32>,
     pub(crate) stdout: String,
-    /// Lines of stderr that are for people.
+    /// Lines of stderr without log messages.
     pub(crate) stderr: String,
     /// All of stderr.
     pub(crate) log: String,
-    /// Most memory that was resident, MiB.
+    /// Peak resident memory, MiB.
     pub(crate) most_mib: u64,
-    /// Time from start to end, s; for tables, and never judged.
+    /// Duration, s; printed in tables but never judged.
     pub(crate) took_s: f64,
 }
 
-/// Runs the program in a folder, and asks it for its memory; it must come to an end by itself.
+/// Runs the program in a folder and measures its memory; it must end by itself.
 #[track_caller]
 pub(crate) fn run(folder: &Folder, arguments: &[&str]) -> Ran {
     let files = ["out", "err"].map(|name| folder.path(name));

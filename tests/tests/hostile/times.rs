@@ -1,4 +1,4 @@
-//! Timestamps that no clock has, and clocks that jump by years.
+//! Impossible timestamps, and clocks that jump by years.
 
 use headrace_tests::{Folder, VEHICLE, raw_messages, write_log};
 use mcap::WriteOptions;
@@ -7,7 +7,7 @@ use crate::run::{Ran, run};
 
 const DAY_NS: u64 = 24 * 3600 * 1_000_000_000;
 
-/// The commands that read a log.
+/// Commands that read a log.
 const READING: [&[&str]; 7] = [
     &["replay", "odd.mcap"],
     &["replay", "odd.mcap", "--smooth"],
@@ -18,10 +18,10 @@ const READING: [&[&str]; 7] = [
     &["recover", "odd.mcap", "-o", "recovered.mcap", "--force"],
 ];
 
-/// A time from number and time.
+/// A time computed from number and time of a message.
 type Stamp<'a> = &'a dyn Fn(u64, u64) -> u64;
 
-/// The dive, with times as `stamp` has them from number and time.
+/// Writes the dive with times changed by `stamp`.
 fn odd(folder: &Folder, stamp: impl Fn(u64, u64) -> u64) {
     let dive = folder.read("dive.mcap");
     let mut messages = raw_messages(&dive);
@@ -31,7 +31,7 @@ fn odd(folder: &Folder, stamp: impl Fn(u64, u64) -> u64) {
     write_log(&folder.path("odd.mcap"), WriteOptions::new(), Some(VEHICLE), &messages);
 }
 
-/// All commands come to an end; what each gave.
+/// Runs all commands, which must end; returns their results.
 fn all(folder: &Folder) -> Vec<Ran> {
     READING.iter().map(|arguments| run(folder, arguments)).collect()
 }
@@ -44,7 +44,7 @@ fn losses(ran: &Ran) -> Vec<&str> {
 }
 
 #[test]
-fn messages_at_the_end_of_time_are_told_and_left_out() {
+fn messages_with_impossible_times_are_reported_and_skipped() {
     let folder = Folder::with_dive();
     for last in [u64::MAX, u64::MAX - 1, i64::MAX as u64 + 1] {
         odd(&folder, |number, at| if number == 4000 { last } else { at });
@@ -58,7 +58,7 @@ fn messages_at_the_end_of_time_are_told_and_left_out() {
             }
         }
     }
-    // Nothing else is in it.
+    // The log contains nothing else.
     for stamp in [u64::MAX, i64::MAX as u64, 0] {
         odd(&folder, |_, _| stamp);
         let codes: Vec<_> = all(&folder).iter().map(|ran| ran.code).collect();
@@ -68,7 +68,7 @@ fn messages_at_the_end_of_time_are_told_and_left_out() {
 }
 
 #[test]
-fn clocks_that_jump_keep_nobody_waiting() {
+fn clock_jumps_cause_no_wait() {
     let folder = Folder::with_dive();
     let year = 364 * DAY_NS;
     let jumps: [(&str, Stamp<'_>, Option<i32>); 6] = [

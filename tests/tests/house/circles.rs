@@ -1,7 +1,8 @@
-//! Files of a crate that need one another in a circle can't be understood, tested or moved one by one.
+//! Finds import cycles between files of a crate; such files can't be understood, tested or moved one by one.
 //!
-//! A file needs the file that defines what it imports: `pub use` is followed to there, and is no need of its own. A path in
-//! code counts if it begins with `crate`, `super` or `self`; what a parent says of its children by their bare names doesn't.
+//! A file depends on the file that defines an imported item. `pub use` is followed to that file and is no dependency
+//! itself. A path in code counts if it begins with `crate`, `super` or `self`. Bare names of child modules don't
+//! count.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
@@ -10,7 +11,7 @@ use crate::imports::{Used, imports};
 use crate::workspace::{root, workspace};
 
 #[test]
-fn no_files_import_in_a_circle() {
+fn no_files_import_each_other_in_a_cycle() {
     let mut found = BTreeMap::new();
     let load = |file: &Path| std::fs::read_to_string(file).ok();
     let targets: Vec<PathBuf> = workspace().into_values().flat_map(|package| package.targets).collect();
@@ -25,31 +26,31 @@ fn no_files_import_in_a_circle() {
     assert!(found.is_empty(), "files that import one another in a circle, and their imports: {found:#?}");
 }
 
-/// Names from the crate's root on.
+/// Names from the crate's root.
 type Module = Vec<String>;
 
 #[derive(Debug, Default)]
 struct Content {
-    /// Usually one; more where features choose.
+    /// Usually one file; several if features choose between them.
     files: Vec<PathBuf>,
     used: Vec<Used>,
     reexports: BTreeMap<String, Vec<String>>,
 }
 
-/// Modules of a crate that are in files of their own.
+/// Modules of a crate that have their own files.
 #[derive(Debug, Default)]
 struct Sources(BTreeMap<Module, Content>);
 
-/// Files that need one another, in order of their names.
+/// Files that depend on each other, sorted by name.
 #[derive(Debug, PartialEq, Eq)]
 struct Circle {
     files: Vec<PathBuf>,
-    /// Which of them imports which.
+    /// Pairs of importing and imported file.
     imports: Vec<(PathBuf, PathBuf)>,
 }
 
 impl Sources {
-    /// Follows the declarations of modules from the crate's root file on.
+    /// Reads the modules declared from the crate's root file on.
     fn read(root: &Path, load: &dyn Fn(&Path) -> Option<String>) -> Self {
         let mut sources = Self::default();
         let mut waiting = vec![(Module::new(), root.to_owned())];
@@ -57,7 +58,7 @@ impl Sources {
             let text = load(&file).unwrap_or_else(|| panic!("no file {}", file.display()));
             let found = imports(&text);
             let folder = file.parent().unwrap();
-            // Modules of a root or a mod.rs are beside it, those of other files in a folder of its name.
+            // Modules of a root or a mod.rs are beside it; those of other files are in a folder of its name.
             let own = if module.is_empty() || file.ends_with("mod.rs") {
                 folder.to_owned()
             } else {
@@ -82,7 +83,7 @@ impl Sources {
         sources
     }
 
-    /// A path from the root on; `None` if it leads out of the crate.
+    /// Path from the crate's root; `None` if it leads out of the crate.
     fn absolute(&self, module: &[String], used: &Used) -> Option<Module> {
         let mut from = [module, &used.inside].concat();
         let mut path = used.path.as_slice();
@@ -105,7 +106,7 @@ impl Sources {
         Some(from)
     }
 
-    /// The module in whose file the item of a path from the root on is defined.
+    /// The module whose file defines the item of a path.
     fn definition(&self, path: &[String], depth: u32) -> Module {
         let mut here = Module::new();
         for (place, name) in path.iter().enumerate() {
@@ -114,7 +115,7 @@ impl Sources {
                 continue;
             }
             here.pop();
-            // Depth: two modules may reexport all of one another.
+            // The depth is limited, because two modules may reexport each other with globs.
             if let Some(behind) = self.0.get(&here).and_then(|content| content.reexports.get(name))
                 && depth < 8
                 && let Some(on) = self.absolute(&here, &Used { inside: Vec::new(), path: behind.clone() })
@@ -154,7 +155,7 @@ impl Sources {
     }
 }
 
-/// Strongly connected components of a graph: the largest sets of nodes that all reach one another (Tarjan 1972).
+/// Strongly connected components of a graph: the largest sets of nodes that all reach each other (Tarjan 1972).
 fn components<N: Ord + Clone>(graph: &BTreeMap<N, BTreeSet<N>>) -> Vec<BTreeSet<N>> {
     let mut search = Search { graph, seen: BTreeMap::new(), stack: Vec::new(), found: Vec::new() };
     for node in graph.keys() {
@@ -167,15 +168,15 @@ fn components<N: Ord + Clone>(graph: &BTreeMap<N, BTreeSet<N>>) -> Vec<BTreeSet<
 
 struct Search<'a, N> {
     graph: &'a BTreeMap<N, BTreeSet<N>>,
-    /// In which order nodes were seen.
+    /// Order in which nodes were visited.
     seen: BTreeMap<&'a N, usize>,
-    /// Those that are in no component yet.
+    /// Nodes that belong to no component yet.
     stack: Vec<&'a N>,
     found: Vec<BTreeSet<N>>,
 }
 
 impl<'a, N: Ord + Clone> Search<'a, N> {
-    /// Gives the earliest node on the stack that this one reaches.
+    /// Visits a node; returns the earliest node on the stack that it reaches.
     fn visit(&mut self, node: &'a N) -> usize {
         let number = self.seen.len();
         self.seen.insert(node, number);
@@ -200,7 +201,7 @@ impl<'a, N: Ord + Clone> Search<'a, N> {
 mod tests {
     use super::*;
 
-    /// Files of the circles in a crate of these files, the first of them its root.
+    /// Files of the cycles in a crate of these files; the first file is the root.
     fn circles(files: &[(&str, &str)]) -> Vec<String> {
         let load = |file: &Path| {
             files.iter().find(|(name, _)| Path::new(name) == file).map(|(_, text)| (*text).to_owned())
@@ -215,7 +216,7 @@ mod tests {
     const NONE: [&str; 0] = [];
 
     #[test]
-    fn two_files_that_import_each_other_are_a_circle() {
+    fn two_files_that_import_each_other_are_a_cycle() {
         let root = ("src/lib.rs", "mod a;\nmod b;");
         let b = ("src/b.rs", "pub struct B;");
         let a = ("src/a.rs", "use crate::b::B;\npub struct A;");
@@ -228,7 +229,7 @@ mod tests {
     }
 
     #[test]
-    fn a_circle_may_be_long_and_leaves_out_what_only_leads_there() {
+    fn long_cycle_excludes_files_that_only_lead_to_it() {
         let files = [
             ("src/lib.rs", "mod a;\nmod b;\nmod c;\nmod d;\nmod e;\nuse a::A;"),
             ("src/a.rs", "use crate::b::B;"),
@@ -241,7 +242,7 @@ mod tests {
     }
 
     #[test]
-    fn two_circles_are_told_apart() {
+    fn two_cycles_are_reported_separately() {
         let files = [
             ("src/lib.rs", "mod a;\nmod b;\nmod c;\nmod d;"),
             ("src/a.rs", "use crate::b::B;"),
@@ -253,7 +254,7 @@ mod tests {
     }
 
     #[test]
-    fn a_parent_and_its_child_are_a_circle() {
+    fn parent_and_child_that_import_each_other_are_a_cycle() {
         let child = ("src/a/b.rs", "use super::A;");
         for (parent, text) in [("src/a.rs", "mod b;\nuse b::B;"), ("src/a/mod.rs", "mod b;\nuse self::b::B;")]
         {
@@ -265,7 +266,7 @@ mod tests {
     }
 
     #[test]
-    fn a_reexport_is_followed_and_is_no_need_itself() {
+    fn reexport_is_followed_and_is_no_import_itself() {
         let root = "mod a;\nmod b;\npub use b::B as Other;\npub struct Error;";
         let files = [
             ("src/lib.rs", root),
@@ -282,7 +283,7 @@ mod tests {
     }
 
     #[test]
-    fn modules_that_reexport_all_of_one_another_end() {
+    fn mutual_glob_reexports_terminate() {
         let files = [
             ("src/lib.rs", "mod a;\nmod b;\nmod c;"),
             ("src/a.rs", "pub use crate::b::X;"),
@@ -293,7 +294,7 @@ mod tests {
     }
 
     #[test]
-    fn tests_may_import_what_they_test() {
+    fn tests_may_import_the_tested_module() {
         let root = ("src/lib.rs", "mod a;\n#[cfg(test)]\nmod tests;");
         let inline =
             "use crate::Error;\n#[cfg(test)]\nmod tests { use super::*; use crate::tests::fixture; }";
@@ -302,7 +303,7 @@ mod tests {
     }
 
     #[test]
-    fn an_inline_module_is_a_part_of_its_file() {
+    fn inline_module_belongs_to_its_file() {
         let files = [
             ("src/lib.rs", "mod a;\nmod b;"),
             ("src/a.rs", "pub mod inner { use super::A; use super::super::b::B; }\npub struct A;"),
@@ -314,7 +315,7 @@ mod tests {
     }
 
     #[test]
-    fn each_file_that_a_feature_chooses_counts() {
+    fn every_file_chosen_by_a_feature_counts() {
         let files = [
             ("src/lib.rs", "mod b;\n#[cfg(unix)]\nmod a;\n#[cfg(not(unix))]\n#[path = \"other.rs\"]\nmod a;"),
             ("src/a.rs", ""),

@@ -1,4 +1,4 @@
-//! `docs/why/hard-cases.md` has the rows of its list, and the tests that they name are there.
+//! Checks that `docs/why/hard-cases.md` has every row of its list, and that the named tests exist.
 
 use crate::workspace::root;
 

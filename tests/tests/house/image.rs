@@ -1,4 +1,4 @@
-//! `deploy/blueos-image`: what BlueOS is given to install.
+//! Checks the archive that `deploy/blueos-image` makes for BlueOS.
 
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
@@ -9,7 +9,7 @@ use serde_json::Value;
 
 use super::workspace::root;
 
-/// The head of a program of ELF for 64-bit Arm, which names no dynamic linker.
+/// Header of an ELF program for 64-bit Arm without a dynamic linker.
 fn program() -> Vec<u8> {
     let mut bytes = vec![0; 64];
     bytes[..6].copy_from_slice(b"\x7fELF\x02\x01");
@@ -17,7 +17,7 @@ fn program() -> Vec<u8> {
     bytes
 }
 
-/// Nothing where Python isn't there.
+/// Runs the script; `None` without Python.
 fn made(program: &Path, folder: &Path) -> Option<Output> {
     let script = root().join("deploy/blueos-image");
     Command::new("python3").arg(script).args([program, folder]).current_dir(root()).output().ok()
@@ -31,9 +31,10 @@ fn json(path: PathBuf) -> Value {
     serde_json::from_slice(&std::fs::read(path).unwrap()).unwrap()
 }
 
-/// All names in it are digests of what they name, the processor is told, and BlueOS' labels are what it reads.
+/// Every name in the image is the digest of its content, the processor is stated, and the labels are those that
+/// BlueOS reads.
 #[test]
-fn an_image_for_blueos_holds_the_program() {
+fn blueos_image_contains_the_program() {
     let folder = Folder::new();
     let at = |name: &str| folder.path(name);
     std::fs::write(at("program"), program()).unwrap();
@@ -71,9 +72,9 @@ fn an_image_for_blueos_holds_the_program() {
     assert_eq!(read("permissions")["HostConfig"]["NetworkMode"], "host");
 }
 
-/// An image has no libraries: what needs some is refused, as is what is no program.
+/// An image has no libraries, so programs that need some are refused, and so are files that aren't programs.
 #[test]
-fn what_an_image_could_not_start_is_refused() {
+fn blueos_image_refuses_programs_that_cannot_start() {
     let folder = Folder::new();
     let text = folder.path("text");
     std::fs::write(&text, "no program").unwrap();

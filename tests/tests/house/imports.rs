@@ -1,6 +1,6 @@
-//! What a Rust file declares and imports, read from its tokens: enough to tell which files need which.
+//! Reads the declarations and imports of a Rust file from its tokens, to find which files depend on which.
 
-/// A token of Rust, as far as imports go.
+/// A token of Rust, as far as imports need it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Token<'a> {
     Word(&'a str),
@@ -30,13 +30,13 @@ pub(crate) struct Used {
     pub(crate) path: Vec<String>,
 }
 
-/// What a file declares and imports; what is only for tests is left out.
+/// Declarations and imports of a file, without those for tests only.
 #[derive(Debug, Default)]
 pub(crate) struct Imports {
     pub(crate) modules: Vec<Declared>,
     /// Paths of `use` declarations, and paths in code that begin with `crate`, `super` or `self`.
     pub(crate) used: Vec<Used>,
-    /// `pub use`: the name that others see, and the path behind it.
+    /// `pub use`: the public name and the path behind it.
     pub(crate) reexports: Vec<(String, Vec<String>)>,
 }
 
@@ -44,7 +44,7 @@ pub(crate) struct Imports {
 pub(crate) fn imports(text: &str) -> Imports {
     let tokens = tokens(text);
     let mut found = Imports::default();
-    // Inline modules around, each with the depth of braces outside of it.
+    // Enclosing inline modules, each with the brace depth outside of it.
     let mut around: Vec<(&str, usize)> = Vec::new();
     let (mut depth, mut at) = (0_usize, 0);
     while at < tokens.len() {
@@ -73,7 +73,7 @@ pub(crate) fn imports(text: &str) -> Imports {
                     }
                 }
             }
-            // Not the `use<..>` of a type.
+            // This excludes the `use<..>` of a type.
             [Word("use"), next, ..] if *next != Mark('<') => {
                 let end = here.iter().position(|token| *token == Mark(';')).unwrap_or(here.len());
                 let (front, mut leaves) = (Front::of(before), Vec::new());
@@ -106,11 +106,11 @@ pub(crate) fn imports(text: &str) -> Imports {
     found
 }
 
-/// What stands in front of an item: visibility and attributes.
+/// Visibility and attributes before an item.
 #[derive(Debug, Default)]
 struct Front<'a> {
     is_public: bool,
-    /// `#[cfg(test)]`, or with more conditions.
+    /// Whether `#[cfg(test)]` is present, alone or with other conditions.
     is_test: bool,
     /// Value of `#[path]`.
     path: Option<&'a str>,
@@ -152,7 +152,7 @@ impl<'a> Front<'a> {
     }
 }
 
-/// The leaves of a use tree: the name that each goes by here, and its path.
+/// Leaves of a use tree: the local name and the path of each.
 fn tree<'a>(tokens: &[Token<'a>], around: &[&'a str], leaves: &mut Vec<(&'a str, Vec<&'a str>)>) {
     let (mut path, mut rest) = (around.to_vec(), tokens);
     while let [Word(word), Separator, behind @ ..] = rest {
@@ -172,7 +172,7 @@ fn tree<'a>(tokens: &[Token<'a>], around: &[&'a str], leaves: &mut Vec<(&'a str,
             });
             parts.for_each(|part| tree(part, &path, leaves));
         }
-        // The module itself; also the target of a glob.
+        // The module itself, also as the target of a glob.
         [Word("self")] => leaves.extend(path.last().copied().map(|name| (name, path.clone()))),
         [Word("self"), Word("as"), Word(name)] => leaves.push((name, path)),
         [Mark('*')] => leaves.push(("*", path)),
@@ -182,7 +182,7 @@ fn tree<'a>(tokens: &[Token<'a>], around: &[&'a str], leaves: &mut Vec<(&'a str,
     }
 }
 
-/// Tokens of a block in braces, from its opening to its closing one.
+/// Number of tokens in a braced block, with both braces.
 fn block(tokens: &[Token<'_>]) -> usize {
     let mut depth = 0_usize;
     let end = tokens.iter().position(|token| {
@@ -236,7 +236,7 @@ fn tokens(text: &str) -> Vec<Token<'_>> {
     tokens
 }
 
-/// Length of a block comment, in which there may be others.
+/// Length of a block comment, with nested ones.
 fn comment(text: &str) -> usize {
     let (mut depth, mut at) = (0_usize, 0);
     loop {
@@ -269,7 +269,7 @@ fn quoted(text: &str) -> usize {
     end.map_or(text.len(), |(at, _)| at + 1)
 }
 
-/// Length of a raw string behind its `r`, if there is one.
+/// Length of a raw string after its `r`, if there is one.
 fn raw(text: &str) -> Option<usize> {
     let content = text.trim_start_matches('#');
     let hashes = &text[..text.len() - content.len()];
@@ -278,7 +278,7 @@ fn raw(text: &str) -> Option<usize> {
     Some(hashes.len() + 1 + content.find(&end).map_or(content.len(), |at| at + end.len()))
 }
 
-/// Length of a character with its quotes; of a lifetime's mark alone.
+/// Length of a character literal with its quotes, or of a lifetime's mark.
 fn character(text: &str) -> usize {
     let mut characters = text.char_indices().skip(1);
     match (characters.next(), characters.next()) {
@@ -300,14 +300,14 @@ mod tests {
     }
 
     #[test]
-    fn a_use_tree_has_a_path_for_each_leaf() {
+    fn use_tree_has_a_path_for_each_leaf() {
         let text = "use crate::{a::{self, B as C}, d::*, e};\nuse super::super::f::G as _;\nuse h as i;";
         let paths = ["crate::a", "crate::a::B", "crate::d", "crate::e", "super::super::f::G", "h"];
         assert_eq!(used(text), paths);
     }
 
     #[test]
-    fn reexports_go_by_the_name_that_others_see() {
+    fn reexports_use_the_public_name() {
         let found =
             imports("pub use a::{B, C as D};\npub(crate) use self::e::F;\npub(in crate::g) use h::*;");
         let names: Vec<_> =
@@ -317,7 +317,7 @@ mod tests {
     }
 
     #[test]
-    fn paths_in_code_count_from_crate_super_and_self() {
+    fn paths_in_code_count_if_they_begin_with_crate_super_or_self() {
         let text = "fn f(a: crate::a::A) -> super::B { self::c::d(); a.self_::e(); x::crate_::f() }";
         assert_eq!(used(text), ["crate::a::A", "super::B", "self::c::d"]);
     }
@@ -338,7 +338,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_for_tests_is_left_out() {
+    fn test_only_imports_are_left_out() {
         let text = "#[cfg(test)]\nuse crate::a;\n#[cfg(test)]\n#[allow(dead_code)]\npub(crate) mod tests { use crate::b; mod c; }\n\
             #[cfg(all(test, unix))]\nmod d;\n#[cfg(not(test))]\nmod e;\nuse crate::f;";
         assert_eq!(used(text), ["crate::f"]);
@@ -348,7 +348,7 @@ mod tests {
     }
 
     #[test]
-    fn inline_modules_are_known_around_what_they_hold() {
+    fn paths_know_their_inline_modules() {
         let found = imports(
             "mod a { use super::B; mod c { fn d() { super::e() } } }\nuse super::F;\nmod g { mod h; }",
         );
@@ -360,7 +360,7 @@ mod tests {
     }
 
     #[test]
-    fn a_module_may_name_its_file() {
+    fn module_may_name_its_file() {
         let found = imports("#[cfg(feature = \"mesh\")]\n#[path = \"other.rs\"]\npub mod a;");
         let file = Some("other.rs".to_owned());
         assert_eq!(found.modules, [Declared { name: vec!["a".to_owned()], file }]);

@@ -1,6 +1,6 @@
-//! Rules of this repository: layers, circles, what the core may use, and what each crate states about itself.
+//! Rules of this repository: layers, import cycles, limits of the core, and the metadata of each crate.
 
-#![allow(clippy::unwrap_used, clippy::panic, reason = "a test stops at what it can't do")]
+#![allow(clippy::unwrap_used, clippy::panic, reason = "a failed step ends the test")]
 
 mod circles;
 mod english;

@@ -1,8 +1,8 @@
-//! The tests that `docs/why/promises.md` and `docs/reference/recorder.md` name are there.
+//! Checks that the tests named in `docs/why/promises.md` and `docs/reference/recorder.md` exist.
 
 use crate::workspace::root;
 
-/// Checks each row of a page that names a test; returns how many there are.
+/// Checks each row of a page that names a test; returns their number.
 fn count_named_tests(page: &str) -> usize {
     let page = std::fs::read_to_string(root().join(page)).unwrap();
     assert!(page.lines().count() < 150);
@@ -22,7 +22,7 @@ fn count_named_tests(page: &str) -> usize {
 }
 
 #[test]
-fn every_promise_names_a_test_that_is_there() {
+fn every_promise_names_an_existing_test() {
     for page in ["docs/why/promises.md", "docs/reference/recorder.md"] {
         let named = count_named_tests(page);
         assert!(named > 20, "{page}: {named}");

@@ -1,4 +1,4 @@
-//! What dependencies may be: their licences, their sources, and how much of them isn't Rust.
+//! Limits on dependencies: licences, sources, and libraries in other languages.
 
 use std::collections::BTreeSet;
 use std::process::Command;
@@ -7,12 +7,12 @@ use serde_json::Value;
 
 use super::workspace::root;
 
-/// Crates that link libraries in other languages: by the name of the library.
+/// Names of linked libraries in other languages.
 const FOREIGN_LIBRARIES: [&str; 4] = ["hidapi", "lz4", "ring_core_0_17_14_", "zstd"];
-/// Not built for any system that we run on: only pages in a browser need it.
+/// Crates that are never built for a supported system; only web pages need them.
 const NEVER_BUILT: [&str; 1] = ["wasm_bindgen"];
 
-/// All packages that the lock file names and any feature needs.
+/// All packages of the lock file that any feature needs.
 fn packages() -> Vec<Value> {
     let output = Command::new(env!("CARGO"))
         .args(["metadata", "--format-version", "1", "--locked", "--all-features"])
@@ -24,7 +24,7 @@ fn packages() -> Vec<Value> {
     metadata["packages"].as_array().unwrap().clone()
 }
 
-/// The licences that `deny.toml` allows.
+/// Licences allowed by `deny.toml`.
 fn allowed() -> BTreeSet<String> {
     let text = std::fs::read_to_string(root().join("deny.toml")).unwrap();
     let list = text.split_once("allow = [").unwrap().1.split_once(']').unwrap().0;
@@ -92,16 +92,16 @@ fn crates_come_from_the_registry_or_this_tree() {
 }
 
 #[test]
-fn libraries_in_other_languages_are_known() {
+fn foreign_libraries_are_listed() {
     let linked: BTreeSet<String> =
         packages().iter().filter_map(|package| package["links"].as_str().map(str::to_owned)).collect();
     let known = FOREIGN_LIBRARIES.iter().chain(&NEVER_BUILT).map(|name| (*name).to_owned());
     assert_eq!(linked, known.collect());
 }
 
-/// `deploy/sbom` lists what is linked into the program and nothing else, each part with its licence and its checksum.
+/// `deploy/sbom` lists exactly the parts linked into the program, each with licence and checksum.
 #[test]
-fn the_bill_of_materials_lists_what_is_linked() {
+fn bill_of_materials_lists_exactly_the_linked_crates() {
     let Ok(output) = Command::new("python3").arg(root().join("deploy/sbom")).current_dir(root()).output()
     else {
         return headrace_tests::skipped("python3 is not there");

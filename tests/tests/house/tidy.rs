@@ -1,4 +1,4 @@
-//! Layers, a core without I/O and locks, short files, and what each crate states about itself.
+//! Rules of layers, a core without I/O and locks, file length, and the metadata of each crate.
 
 use std::path::{Path, PathBuf};
 
@@ -6,17 +6,17 @@ use crate::workspace::{Package, root, sources, workspace};
 
 const LONGEST_FILE: usize = 600;
 
-/// Crates of the core, bottom up: each needs only some before it.
+/// Crates of the core, bottom up; each may use only crates before it.
 const CORE: [&str; 8] =
     ["config", "geometry", "sampling", "sensor", "fusion", "coverage", "vehicle", "monitor"];
 
-/// All that a device's crate needs of the core.
+/// Core crates that a device's crate may use.
 const FOR_DEVICES: [&str; 1] = ["sensor"];
 
-/// What the ports need, which connect devices with the loop.
+/// Crates that the ports may use; ports connect devices with the loop.
 const FOR_PORTS: [&str; 3] = ["sensor", "geometry", "monitor"];
 
-/// What crates of `replay/` need of one another and of the plugins, besides the core.
+/// Crates of `replay/` and plugins that each crate of `replay/` may use, besides the core.
 const FOR_REPLAY: [(&str, &[&str]); 3] = [
     ("replay/simulator", &[]),
     ("replay/player", &["replay/simulator"]),
@@ -26,7 +26,7 @@ const FOR_REPLAY: [(&str, &[&str]); 3] = [
     ),
 ];
 
-/// What the core may not name: time, randomness, files, ports, threads, the environment, locks and unbounded queues.
+/// Names that the core may not use: time, randomness, files, ports, threads, environment, locks and unbounded queues.
 const BARRED_FROM_CORE: [&str; 13] = [
     "std::fs",
     "std::net",
@@ -43,13 +43,13 @@ const BARRED_FROM_CORE: [&str; 13] = [
     "mpsc",
 ];
 
-/// Packages in Rust of the other workspace.
+/// Rust packages of the other workspace.
 const LAB: [&str; 4] = ["lab/cost", "lab/engine", "lab/experiments", "lab/tables"];
 
-/// The operator's page: no device.
+/// The operator's page, which is no device.
 const PAGE: &str = "plugins/dashboard";
 
-/// Whether a package in a folder may need one in another.
+/// Whether a package in a folder may depend on one in another.
 fn may_need(place: &Path, needed: &Path) -> bool {
     let core = |needed: &Path| CORE.iter().position(|name| needed == Path::new("core").join(name));
     let one_of = |names: &[&str]| names.iter().any(|name| needed == Path::new("core").join(name));
@@ -57,7 +57,7 @@ fn may_need(place: &Path, needed: &Path) -> bool {
     match kind {
         "core" => core(needed).zip(core(place)).is_some_and(|(needed, place)| needed < place),
         "plugins" if place == Path::new("plugins/ports") => one_of(&FOR_PORTS),
-        // It shows what the loop has found.
+        // The page shows results of the loop.
         "plugins" if place == Path::new(PAGE) => core(needed).is_some(),
         "plugins" => one_of(&FOR_DEVICES),
         "replay" => {
@@ -67,7 +67,7 @@ fn may_need(place: &Path, needed: &Path) -> bool {
             core(needed).is_some() || others.iter().any(|other| needed == Path::new(other))
         }
         "pictures" => core(needed).is_some(),
-        // The program uses every library, and nothing that tests it.
+        // The program uses every library, but no test package.
         "" => !needed.starts_with("tests"),
         "tests" => true,
         _ => panic!("{} has no layer", place.display()),
@@ -89,7 +89,7 @@ fn dependencies_point_one_way() {
 }
 
 #[test]
-fn layers_let_nothing_point_back() {
+fn layer_rule_rejects_dependencies_that_point_back() {
     let pairs = [
         ("core/sampling", "core/geometry", true),
         ("core/geometry", "core/sampling", false),
@@ -116,14 +116,14 @@ fn layers_let_nothing_point_back() {
 }
 
 #[test]
-fn the_core_does_no_io_and_takes_no_lock() {
+fn core_has_no_io_and_no_locks() {
     let mut said = Vec::new();
     let sources: Vec<_> =
         CORE.iter().flat_map(|name| sources(&root().join("core").join(name).join("src"))).collect();
     assert!(sources.len() > 20, "{} files", sources.len());
     for (path, text) in sources {
         for (number, line) in text.lines().enumerate() {
-            // Words about such things, in comments, are no use of them.
+            // Comments may mention these names.
             let code = line.split("//").next().unwrap_or_default();
             for barred in BARRED_FROM_CORE.iter().filter(|barred| code.contains(**barred)) {
                 said.push(format!("{}:{}: {barred}", path.display(), number + 1));
@@ -144,10 +144,10 @@ fn no_file_is_long() {
     }
 }
 
-/// Of passed tests cargo shows nothing that they print, and `.ci/count-skipped` couldn't count it.
+/// Cargo hides the output of passed tests, so `.ci/count-skipped` could not count other messages.
 #[test]
-fn what_is_skipped_is_said_by_the_one_helper() {
-    // In pieces, so that this file isn't found.
+fn skipped_tests_are_reported_only_by_the_helper() {
+    // Split, so that this file isn't found itself.
     let printed = ["println!(\"", "skipped: "].concat();
     for folder in ["src", "core", "plugins", "replay", "tests"].into_iter().chain(LAB) {
         for (path, text) in sources(&root().join(folder)) {
@@ -157,7 +157,7 @@ fn what_is_skipped_is_said_by_the_one_helper() {
 }
 
 #[test]
-fn every_crate_says_what_it_is() {
+fn every_crate_has_a_description() {
     for (name, package) in workspace() {
         for target in package.targets {
             let text = std::fs::read_to_string(&target).unwrap();
@@ -179,7 +179,7 @@ fn every_crate_says_what_it_is() {
 }
 
 #[test]
-fn versions_and_lints_are_stated_in_the_root_alone() {
+fn versions_and_lints_are_only_in_the_root_manifest() {
     for (name, package) in workspace() {
         let text = std::fs::read_to_string(package.folder().join("Cargo.toml")).unwrap();
         assert!(text.contains("[lints]\nworkspace = true"), "{name}: does not take the workspace's lints");
@@ -190,18 +190,18 @@ fn versions_and_lints_are_stated_in_the_root_alone() {
     }
 }
 
-/// Names of documents in a text: words that end as their files do.
+/// Document names in a text: words with the file ending of documents.
 fn documents_in(text: &str) -> impl Iterator<Item = &str> {
     let is_part = |c: char| c.is_ascii_alphanumeric() || "_-./".contains(c);
     text.split(move |c: char| !is_part(c)).map(|word| word.trim_end_matches('.')).filter(|word| {
-        // In pieces, so that this file names none.
+        // Split, so that this file names no document.
         word.strip_suffix(["m", "d"].concat().as_str())
             .and_then(|stem| stem.strip_suffix('.'))
             .is_some_and(|stem| !stem.is_empty())
     })
 }
 
-/// All files below a folder that people read or edit, without what is built.
+/// All files below a folder that people read or edit, without build output.
 fn readable(folder: &Path, found: &mut Vec<PathBuf>) {
     for entry in std::fs::read_dir(folder).unwrap_or_else(|error| panic!("{}: {error}", folder.display())) {
         let path = entry.unwrap().path();
@@ -219,9 +219,9 @@ fn readable(folder: &Path, found: &mut Vec<PathBuf>) {
     }
 }
 
-/// What is named as a source, or for more, is in the tree.
+/// Every document that a text refers to must exist.
 #[test]
-fn documents_that_are_named_exist() {
+fn named_documents_exist() {
     let mut files = Vec::new();
     readable(root(), &mut files);
     let names: Vec<String> =
@@ -232,7 +232,7 @@ fn documents_that_are_named_exist() {
     };
     let (mut said, mut seen) = (Vec::new(), 0);
     for (file, name) in files.iter().zip(&names) {
-        // What changed tells of files as they were.
+        // The change log names files as they were.
         if name == "CHANGELOG.md" {
             continue;
         }
@@ -248,7 +248,7 @@ fn documents_that_are_named_exist() {
 }
 
 #[test]
-fn documents_are_found_in_any_text() {
+fn document_names_are_found_in_text() {
     let name = |stem: &str| [stem, ".m", "d"].concat();
     let text = format!(
         "/// see `{}`, ({}#ways), and {}. No md, no .mdx.",

@@ -9,9 +9,9 @@ use serde_json::Value;
 pub(crate) use headrace_tests::root;
 
 pub(crate) struct Package {
-    /// Its folder, from the root on.
+    /// Folder of the package, from the root.
     pub(crate) place: PathBuf,
-    /// Packages of this workspace that it needs to be built; what its tests need besides is left out.
+    /// Packages of this workspace that it needs to build, without those for its tests.
     pub(crate) needs: Vec<String>,
     /// Root files of its libraries, programs, tests and benches.
     pub(crate) targets: Vec<PathBuf>,

@@ -1,5 +1,7 @@
-//! val: foreign logs become ours, and the ordinary decoders read them. Recordings of others are in `recordings/`, trimmed;
-//! where `HEADRACE_RECORDINGS` is set, they are read at full length, too.
+//! Validation: foreign logs become headrace logs that the ordinary decoders read.
+//!
+//! Recordings made by others are in `recordings/`, trimmed. If `HEADRACE_RECORDINGS` is set, they are read at full
+//! length, too.
 
 use std::fmt::Write as _;
 use std::path::Path;
@@ -55,7 +57,7 @@ fn refused(folder: &Folder, arguments: &[&str], words: &[&str]) {
     assert!(!folder.path("out.mcap").exists(), "no log of a file that is none");
 }
 
-/// How many entries of a telemetry log are whole, and what its vehicle's sensors get of them.
+/// Number of intact entries in a telemetry log, and of messages for its vehicle's sensors.
 struct Telemetry {
     entries: u64,
     attitude: u64,
@@ -63,8 +65,8 @@ struct Telemetry {
 }
 
 #[test]
-fn telemetry_of_a_bluerov_replays() {
-    // As `oracles/tlog.py` counts them: attitude is ATTITUDE and RAW_IMU, depth is SCALED_PRESSURE2.
+fn bluerov_telemetry_replays() {
+    // Counts by `oracles/tlog.py`: attitude is ATTITUDE and RAW_IMU, depth is SCALED_PRESSURE2.
     let trimmed = Telemetry { entries: 6499 - 4, attitude: 776 + 81, depth: 188 };
     let full_length = Telemetry { entries: 35_916 - 4, attitude: 5245 + 528, depth: 635 };
     for (path, wanted) in recordings::both(TELEMETRY, trimmed, full_length) {
@@ -76,7 +78,7 @@ fn check_telemetry(file: &str, wanted: &Telemetry) {
     let folder = Folder::new();
     folder.write("vehicle.toml", format!("{TUNNEL}{AUTOPILOT}"));
     let answer = folder.headrace(&["import", file, "--vehicle", "vehicle.toml", "-o", "out.mcap", "--json"]);
-    // Four frames of its camera have a checksum that fits no definition.
+    // Four camera frames have a checksum that matches no definition.
     assert_eq!(answer.code, Some(3), "{}", answer.stderr);
     let shown = json(&answer);
     assert!(answer.stderr.contains("4 times"), "{}", answer.stderr);
@@ -104,7 +106,7 @@ fn check_telemetry(file: &str, wanted: &Telemetry) {
 }
 
 #[test]
-fn a_log_of_an_autopilot_s_memory_is_told_before_anything_is_asked_of_it() {
+fn autopilot_memory_log_is_recognised_before_any_question() {
     let folder = Folder::new();
     folder.write("00000012.BIN", [b"\xA3\x95\x80".as_slice(), &[7; 500]].concat());
     let dataflash = ["no log of Ping Viewer", "a dataflash log of ArduPilot", ".tlog"];
@@ -112,7 +114,7 @@ fn a_log_of_an_autopilot_s_memory_is_told_before_anything_is_asked_of_it() {
 }
 
 #[test]
-fn a_telemetry_log_cut_off_gives_what_is_whole_and_says_so() {
+fn truncated_telemetry_log_keeps_whole_entries_and_reports_the_loss() {
     let folder = Folder::new();
     folder.write("vehicle.toml", format!("{TUNNEL}{AUTOPILOT}"));
     folder.write("cut.tlog", &std::fs::read(recordings::trimmed(TELEMETRY)).unwrap()[..100_005]);
@@ -123,7 +125,7 @@ fn a_telemetry_log_cut_off_gives_what_is_whole_and_says_so() {
 }
 
 #[test]
-fn candump_of_a_simulated_dive_has_the_same_bytes_at_the_same_times() {
+fn candump_import_keeps_bytes_and_times_of_the_dive() {
     let folder = Folder::with_dive();
     let vehicle =
         VEHICLE.replace("preset = \"xsens_mti600\"", "connect = \"can:can3\"\npreset = \"xsens_mti600\"");
@@ -165,7 +167,7 @@ fn candump_of_a_simulated_dive_has_the_same_bytes_at_the_same_times() {
 }
 
 #[test]
-fn an_imagenex_file_gives_its_returns_at_its_times() {
+fn imagenex_file_keeps_its_returns_and_times() {
     for (path, shots) in recordings::both("imagenex852_cidco/19_26_51-2016_11_18-sonar.852", 300, 917) {
         check_shots(&path, shots);
     }
@@ -189,7 +191,7 @@ fn check_shots(path: &Path, shots: usize) {
 }
 
 #[test]
-fn an_imagenex_file_without_times_is_no_dive() {
+fn imagenex_file_without_times_is_refused() {
     let trimmed = ["there is no shot in its 32000 bytes", "no date and time: 50 times, 32000 bytes"];
     let full_length = ["there is no shot in its 113280 bytes", "no date and time: 177 times, 113280 bytes"];
     for (path, words) in recordings::both("imagenex852_cidco/hydroball.852", trimmed, full_length) {
@@ -200,7 +202,7 @@ fn an_imagenex_file_without_times_is_no_dive() {
 }
 
 #[test]
-fn bare_ping_frames_have_no_times_and_are_named() {
+fn ping_frames_without_times_are_refused() {
     let real = "ping360_tank_rgu/Uniform_Pipe__50__1N__2024-03-12_11-31-02Gain_1.bin";
     let made_up = recordings::trimmed("ping360_made_up/frames.bin");
     for path in [made_up].into_iter().chain(recordings::full_length(real)) {
@@ -229,7 +231,7 @@ fn mapping(columns: &[(&str, &str, &str, &str)]) -> String {
 }
 
 #[test]
-fn a_table_becomes_the_bytes_that_its_sensors_would_have_sent() {
+fn table_becomes_the_bytes_of_its_sensors() {
     let folder = Folder::new();
     folder.write("vehicle.toml", VEHICLE);
     folder.write("table.csv", TABLE);
@@ -251,7 +253,7 @@ fn a_table_becomes_the_bytes_that_its_sensors_would_have_sent() {
     let arguments = ["import", "table.csv", "--vehicle", "vehicle.toml", "-o", "out.mcap", "--map"];
     let answer = folder.headrace(&[&arguments[..], &["map.toml", "--json"]].concat());
     assert_eq!(answer.code, Some(3), "{}", answer.stderr);
-    assert!(answer.stderr.contains("rows with a cell that is no number: 1 times"), "{}", answer.stderr);
+    assert!(answer.stderr.contains("rows with a cell that isn't a number: 1 times"), "{}", answer.stderr);
     let shown = json(&answer);
     let counts = &shown["messages"];
     assert_eq!((&counts["imu"], &counts["ping_left"], &counts["tether"]), (&12.into(), &3.into(), &4.into()));
@@ -262,7 +264,7 @@ fn a_table_becomes_the_bytes_that_its_sensors_would_have_sent() {
     let heard =
         |id: &str| sources.iter().find(|source| source["id"] == id).unwrap()["frames"].as_u64().unwrap();
     assert_eq!((heard("imu"), heard("ping_left"), heard("tether")), (12, 3, 4));
-    // Three pressures, after the calibration that the sensor's memory gives.
+    // Three pressures, after the calibration from the sensor's memory.
     assert_eq!(counts["depth"], heard("depth"));
     assert!(heard("depth") > 3);
     std::fs::remove_file(folder.path("out.mcap")).unwrap();
@@ -270,7 +272,7 @@ fn a_table_becomes_the_bytes_that_its_sensors_would_have_sent() {
         (&columns[..4], "rate_x, rate_y, rate_z, force_x, force_y, force_z"),
         (&[("deep", "depth", "pressure", "mbar")], "is no column; there are t_s, depth (mbar), roll"),
         (&[("along", "depth", "pressure", "m")], "must be one of Pa, hPa, mbar, kPa, bar"),
-        (&[("along", "dvl", "velocity_x", "m/s")], "is no sensor of the vehicle file"),
+        (&[("along", "dvl", "velocity_x", "m/s")], "isn't a sensor of the vehicle file"),
     ] {
         folder.write("wrong.toml", mapping(columns));
         refused(&folder, &[&arguments[1..], &["wrong.toml"]].concat(), &["wrong.toml:", words]);
@@ -278,10 +280,12 @@ fn a_table_becomes_the_bytes_that_its_sensors_would_have_sent() {
     refused(&folder, &arguments[1..6], &["--map MAPPING.toml"]);
 }
 
-/// Rows that were cut, decimal commas beside commas, and ranges beyond the setting are told, and none of their values lands in another column; a
-/// byte order mark is none of the first column's name.
+/// Faulty rows are reported, and none of their values lands in another column.
+///
+/// Faults are truncated rows, decimal commas beside separators, and ranges beyond the setting. A byte order mark
+/// isn't part of the first column's name.
 #[test]
-fn rows_that_are_not_as_the_header_are_lost_and_told() {
+fn rows_that_contradict_the_header_are_skipped_and_reported() {
     let folder = Folder::new();
     folder.write("vehicle.toml", format!("{TUNNEL}{HEAD}"));
     folder.write("map.toml", mapping(&[("a", "sonar_0", "angle", "deg"), ("r", "sonar_0", "range", "m")]));
@@ -294,8 +298,8 @@ fn rows_that_are_not_as_the_header_are_lost_and_told() {
     let (code, messages, _) = import("1,0.0,3.0\n1.1,2.4,3.1,\n1.2,4.8,\n");
     assert_eq!((code, messages), (Some(0), 3));
     for (rows, told, words) in [
-        ("1,0.0,3.0\n1.1,2,4,3,1\n1.2,4.8,3.0\n", 2, "rows with other cells than the header"),
-        ("1,0.0,3.0\n1.1,2.4,3.1\n1.2,4\n", 2, "rows with other cells than the header"),
+        ("1,0.0,3.0\n1.1,2,4,3,1\n1.2,4.8,3.0\n", 2, "rows with more or fewer cells than the header"),
+        ("1,0.0,3.0\n1.1,2.4,3.1\n1.2,4\n", 2, "rows with more or fewer cells than the header"),
         ("1,0.0,3.0\n1.1,2.4,3.1\n1.2,4.8,2", 2, "a last row without a line end: it may be cut short"),
         ("1,0.0,3.0\n1.1,2.4,30\n1.2,4.8,3.0\n", 3, "at its range setting: as if nothing was heard"),
     ] {
@@ -306,7 +310,7 @@ fn rows_that_are_not_as_the_header_are_lost_and_told() {
 }
 
 #[test]
-fn what_is_no_such_file_is_named_with_what_it_looks_like() {
+fn wrong_file_kind_is_refused_with_the_likely_kind() {
     let folder = Folder::new();
     folder.write("vehicle.toml", format!("{TUNNEL}{AUTOPILOT}{HEAD}"));
     folder.write("empty.tlog", b"");

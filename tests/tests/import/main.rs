@@ -1,6 +1,6 @@
-//! Files and recordings of others become dive logs.
+//! Foreign files and recordings become dive logs.
 
-#![allow(clippy::unwrap_used, clippy::panic, reason = "a test stops at what it can't do")]
+#![allow(clippy::unwrap_used, clippy::panic, reason = "a failed step ends the test")]
 
 mod import;
 mod recordings;

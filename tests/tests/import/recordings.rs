@@ -1,9 +1,9 @@
-//! val: recorded dives of other vehicles through our decoders. Ping360 frames and Imagenex 852 logs are read in the tests
-//! of their crates (`ping1d`, `imagenex881`).
+//! Validation: recorded dives of other vehicles through headrace's decoders.
 //!
-//! `small.tlog` is a BlueROV2 with ArduSub at the surface, in waves (`recordings/bluerov2_ardusub_logs`): its first 40 s
-//! and, where `HEADRACE_RECORDINGS` is set, all 263 s. With `--nocapture` the tests print counts and ranges. What is
-//! expected was found by another reader of the same files, `oracles/tlog.py`.
+//! `small.tlog` is a BlueROV2 with ArduSub at the surface, in waves (`recordings/bluerov2_ardusub_logs`): its first
+//! 40 s and, if `HEADRACE_RECORDINGS` is set, all 263 s. With `--nocapture` the tests print counts and ranges.
+//! Expected values come from an independent reader of the same files, `oracles/tlog.py`. Ping360 frames and Imagenex
+//! 852 logs are read in the tests of their crates (`ping1d`, `imagenex881`).
 
 use std::path::{Path, PathBuf};
 
@@ -16,20 +16,20 @@ use headrace_sensor::device::Decoder as _;
 use headrace_sensor::reading::{Decoded, Packet, Reading};
 use headrace_tests::recordings;
 
-/// Frames of the camera (component 100) whose checksum fits no definition.
+/// Number of camera frames (component 100) whose checksum matches no definition.
 const BAD: u64 = 4;
 
-/// What `oracles/tlog.py` finds in a file; least and most, angles in radians and in the autopilot's own sense.
+/// Values found by `oracles/tlog.py` in a file; least and greatest, angles in radians with the autopilot's signs.
 struct Wanted {
     frames: u64,
     attitudes: usize,
     roll: [f64; 2],
     pitch: [f64; 2],
     yaw: [f64; 2],
-    /// Also of the first pressure sensor.
+    /// Also the number of readings of the first pressure sensor.
     forces: usize,
     mean_force_g: f64,
-    /// Of the second pressure sensor.
+    /// Readings of the second pressure sensor.
     pressures: usize,
     pressure_hpa: [f64; 2],
     temperature_degc: [f64; 2],
@@ -65,7 +65,7 @@ fn both() -> Vec<(PathBuf, Wanted)> {
     recordings::both("bluerov2_ardusub_logs/small.tlog", TRIMMED, FULL_LENGTH)
 }
 
-/// What a part says in a whole file, and its decoder.
+/// Readings of a part in a whole file, and its decoder.
 fn readings(path: &Path, frames: u64, part: Part) -> (Vec<Decoded>, MavlinkDecoder) {
     let file = std::fs::read(path).unwrap();
     let meaning = Meaning { part, system_id: Some(1), component_id: Some(1), latency: DurNs::ZERO };
@@ -78,7 +78,7 @@ fn readings(path: &Path, frames: u64, part: Part) -> (Vec<Decoded>, MavlinkDecod
     }
     let counts = decoder.counts();
     assert_eq!((counts.good_frames, decoder.withheld()), (frames - BAD, 0));
-    // A bad frame may hold more than one byte that could begin one.
+    // A bad frame may contain more than one byte that could begin a frame.
     assert!(counts.bad_frames >= BAD && counts.bad_frames <= 2 * BAD, "{counts:?}");
     (readings, decoder)
 }
@@ -94,7 +94,7 @@ fn spread(values: impl Iterator<Item = f64>) -> (f64, f64, f64) {
 }
 
 #[test]
-fn a_bluerovs_attitude_rates_and_forces_are_read() {
+fn bluerov_attitude_rates_and_forces_are_read() {
     for (path, wanted) in both() {
         check_imu(&path, &wanted);
     }
@@ -125,7 +125,7 @@ fn check_imu(path: &Path, wanted: &Wanted) {
         assert!((got.0 - least).abs() < 1e-5 && (got.1 - most).abs() < 1e-5, "{got:?}");
     };
     near(roll, wanted.roll);
-    // Pitch and yaw the other way round than the autopilot's.
+    // Pitch and yaw have the opposite sign of the autopilot's.
     let reversed = |[least, most]: [f64; 2]| [-most, -least];
     near(pitch, reversed(wanted.pitch));
     near(yaw, reversed(wanted.yaw));
@@ -136,8 +136,8 @@ fn check_imu(path: &Path, wanted: &Wanted) {
     assert!(up.1 < 6.0 && up.2 < 2.0, "{up:?}");
 }
 
-/// The angle between a force and up by the attitude last told before it, degrees: small for a vehicle that hardly moves,
-/// and only if both have their axes right.
+/// The angle between the measured force and up by the latest attitude, degrees. It is small for a vehicle that hardly
+/// moves, and only if both have their axes right.
 fn up(
     attitudes: &[(MonoNs, Rot<headrace_sensor::reading::Level, headrace_geometry::frames::Sensor>)],
     at: MonoNs,
@@ -149,7 +149,7 @@ fn up(
 }
 
 #[test]
-fn a_bluerovs_pressures_are_read() {
+fn bluerov_pressures_are_read() {
     for (path, wanted) in both() {
         check_pressures(&path, &wanted);
     }
@@ -178,7 +178,7 @@ fn check_pressures(path: &Path, wanted: &Wanted) {
         let pressure = spread(water.iter().map(|water| water.pressure_pa));
         let temperature = spread(water.iter().map(|water| water.temperature_degc));
         println!("{message:?}: {count} pressures {pressure:.1?} Pa, {temperature:.2?} degrees Celsius");
-        // At the surface: half a metre of water and the weather, no more.
+        // At the surface: half a metre of water and the weather at most.
         assert!(pressure.0 > 100_000.0 && pressure.1 < 102_000.0, "{pressure:?}");
         if message == PressureMessage::Second {
             let [least, most] = wanted.pressure_hpa.map(|hpa| 100.0 * hpa);

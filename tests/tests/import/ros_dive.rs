@@ -1,5 +1,6 @@
-//! val: a simulated dive's values, written as a recording of ROS 2 by a writer of this file's own, give the dive once more: the same bytes
-//! at the same times, and so the same digest.
+//! Validation: a simulated dive written as a ROS 2 recording and imported gives the same bytes, times and digest.
+//!
+//! The recording is written by this file's own writer.
 
 use std::collections::BTreeMap;
 use std::io::Cursor;
@@ -13,7 +14,7 @@ use headrace_sensor::reading::{Packet, Reading};
 use headrace_tests::{Folder, raw_messages};
 use mcap::{Message, WriteOptions};
 
-/// Plain CDR, little-endian: the encapsulation's four bytes, then numbers aligned from behind them.
+/// Plain CDR, little-endian: four bytes of encapsulation, then numbers aligned relative to the end of them.
 struct Cdr(Vec<u8>);
 
 impl Cdr {
@@ -51,7 +52,7 @@ impl Cdr {
     }
 }
 
-/// What becomes of a device's messages: topic, type, CDR; `None` for what says nothing by itself.
+/// A device's message as topic, type and CDR; `None` for one without content of its own.
 type Written = Option<(String, &'static str, Cdr)>;
 
 struct Translator {
@@ -115,7 +116,7 @@ impl Translator {
             }
             id if id.starts_with("ping") => {
                 let mm = u32::from_le_bytes(bytes[8..12].try_into().unwrap());
-                // An echosounder reckons with 1500 m/s, and the water has 1447.
+                // An echosounder assumes 1500 m/s, but the water has 1447.
                 let range_m = if mm == 0 { f64::INFINITY } else { f64::from(mm) / 1000.0 * 1447.0 / 1500.0 };
                 let cdr = stamped.number([0]).f32(0.4).f32(0.3).f32(100.0).f32(range_m);
                 Some((format!("/{id}"), "sensor_msgs/msg/Range", cdr))
@@ -158,7 +159,7 @@ fn recording(messages: &[Message<'_>]) -> Vec<u8> {
 }
 
 #[test]
-fn a_dive_recorded_by_ros_is_the_dive() {
+fn ros_recording_gives_the_same_dive() {
     let folder = Folder::with_dive();
     let dive = folder.read("dive.mcap");
     let messages = raw_messages(&dive);
@@ -172,7 +173,7 @@ fn a_dive_recorded_by_ros_is_the_dive() {
     assert_eq!((answer.code, answer.stderr.as_str()), (Some(0), ""));
     let imported = folder.read("out.mcap");
     let got = raw_messages(&imported);
-    // Messages of one moment stand in another order, which doesn't matter.
+    // Messages of the same moment are in another order, which doesn't matter.
     let shown = |messages: &[Message<'_>]| {
         let mut all: Vec<_> = messages
             .iter()
@@ -188,6 +189,6 @@ fn a_dive_recorded_by_ros_is_the_dive() {
     for (got, wanted) in got.iter().zip(&wanted) {
         assert_eq!(got, wanted);
     }
-    // Ours has ticks, and the other is read by its times.
+    // The headrace log has ticks; the other is read by time.
     assert_eq!(folder.digest("out.mcap", &[]), folder.digest("dive.mcap", &[]));
 }

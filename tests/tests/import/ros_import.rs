@@ -1,5 +1,7 @@
-//! val: recordings that Python's `rosbags` has written (tests/ros/make.py) give the same messages as tables of the same values;
-//! and what is wrong with a recording is named.
+//! Validation: recordings written by Python's `rosbags` (tests/ros/make.py) give the same messages as tables of the
+//! same values.
+//!
+//! Faults of a recording are reported.
 
 use headrace_tests::{Answer, Folder, VEHICLE, raw_messages};
 use serde_json::Value;
@@ -19,7 +21,7 @@ fn fixture(name: &str) -> Vec<u8> {
     std::fs::read(headrace_tests::root().join("tests/ros").join(name)).unwrap()
 }
 
-/// A folder with the recordings and tables, the vehicle file and a mapping with this in each of its tables.
+/// A folder with recordings, tables and the vehicle file, and a mapping with `further` in each of its tables.
 fn folder(further: &str) -> Folder {
     let folder = Folder::new();
     folder.write("vehicle.toml", VEHICLE);
@@ -42,7 +44,7 @@ fn import(folder: &Folder, file: &str, map: &str) -> Answer {
     folder.headrace(&["import", file, "--vehicle", "vehicle.toml", "--map", map, "-o", "out.mcap", "--json"])
 }
 
-/// A message: its topic, nanoseconds after 1970 by the log's anchor, its bytes.
+/// A message: topic, nanoseconds after 1970 by the log's anchor, and bytes.
 type Heard = (String, u64, Vec<u8>);
 
 fn heard(folder: &Folder) -> Vec<Heard> {
@@ -63,7 +65,7 @@ fn of<'a>(all: &'a [Heard], topic: &str) -> Vec<&'a Heard> {
 }
 
 #[test]
-fn recordings_of_all_kinds_give_the_messages_of_the_tables() {
+fn recordings_of_all_kinds_match_the_tables() {
     let folder = folder("");
     let columns = |columns: &[(&str, &str, &str, &str)]| {
         let head = "time_column = \"t\"\nutc = true\n".to_owned();
@@ -98,7 +100,7 @@ fn recordings_of_all_kinds_give_the_messages_of_the_tables() {
         let answer = import(&folder, name, "topics.toml");
         assert_eq!(answer.code, Some(0), "{name}: {}", answer.stderr);
         let shown: Value = serde_json::from_str(&answer.stdout).unwrap();
-        assert_eq!(shown["passed_over"], 1, "{name}: what nobody wants");
+        assert_eq!(shown["passed_over"], 1, "{name}: unused topics");
         let got = heard(&folder);
         for id in ["imu", "depth", "tether", "sonar_0"] {
             let topic = format!("/raw/{id}");
@@ -107,11 +109,11 @@ fn recordings_of_all_kinds_give_the_messages_of_the_tables() {
                 "{name}: {topic}"
             );
         }
-        // Angles of points are computed anew, and what heard nothing has no point.
+        // Angles of points are computed anew, and a beam without a return has no point.
         let wanted: Vec<_> =
             of(&tables, "/raw/sonar_1").into_iter().filter(|(_, _, bytes)| bytes[8..10] != [0, 0]).collect();
         assert_eq!(of(&got, "/raw/sonar_1"), wanted, "{name}");
-        // A table can't say that nothing was heard, so that pings have other numbers: distance and confidence alone.
+        // A table can't state a missing return, so ping numbers differ. Only distance and confidence are compared.
         let distances = |all: &[Heard]| -> Vec<_> {
             let pings = of(all, "/raw/ping_left").into_iter();
             pings.map(|(_, at_ns, bytes)| (*at_ns, bytes[8..14].to_vec())).collect()
@@ -129,22 +131,22 @@ fn recordings_of_all_kinds_give_the_messages_of_the_tables() {
 }
 
 #[test]
-fn stamps_of_another_time_base_are_named_and_may_be_followed() {
+fn stamps_of_another_time_base_are_reported_and_can_be_used() {
     let folder = folder("");
     folder.write("header.toml", mapping("time = \"header\""));
     assert_eq!(import(&folder, "boot_time.mcap", "header.toml").code, Some(0));
     let followed = heard(&folder);
     let answer = import(&folder, "boot_time.mcap", "topics.toml");
-    let words = "/imu/data: header stamps are on another time base, 1699999980.000 s before the record; the times of the record";
+    let words = "/imu/data: header stamps are on another time base, 1699999980.000 s before recording; the times of recording";
     assert!(answer.stderr.contains(words), "{}", answer.stderr);
     assert!(!answer.stderr.contains("/cable"), "{}", answer.stderr);
     let recorded = heard(&folder);
     assert_eq!(of(&followed, "/raw/imu"), of(&recorded, "/raw/imu"));
-    // A scan's stamp is that of its first beam, and it is recorded with its last.
+    // A scan's stamp is that of its first beam; it is recorded with its last.
     assert_eq!(import(&folder, "humble.mcap", "header.toml").code, Some(0));
     assert_eq!(of(&heard(&folder), "/raw/sonar_0"), of(&recorded, "/raw/sonar_0"));
     let answer = import(&folder, "boot_time.mcap", "header.toml");
-    assert!(answer.stderr.contains("they are followed, moved by 1699999980.000 s"), "{}", answer.stderr);
+    assert!(answer.stderr.contains("they are used, shifted by 1699999980.000 s"), "{}", answer.stderr);
 }
 
 #[track_caller]
@@ -160,10 +162,15 @@ fn refused(folder: &Folder, file: &str, map: Option<&str>, words: &[&str]) {
 }
 
 #[test]
-fn what_has_no_choice_is_matched_aloud_and_what_has_is_asked_for() {
+fn unambiguous_topics_are_matched_and_ambiguous_ones_need_a_mapping() {
     let folder = folder("");
-    let words =
-        ["which profiling head is which?", "/sonar/points", "/sonar/scan", "sonar_0, sonar_1", "--map"];
+    let words = [
+        "which profiling head sends which topic",
+        "/sonar/points",
+        "/sonar/scan",
+        "sonar_0, sonar_1",
+        "--map",
+    ];
     refused(&folder, "none.bag", None, &words);
     let (head, _) = VEHICLE.split_once("[[sensors]]").unwrap();
     let one = "[[sensors]]\nid = \"imu\"\nplugin = \"imu_can\"\npreset = \"xsens_mti600\"\n";
@@ -180,13 +187,13 @@ fn what_has_no_choice_is_matched_aloud_and_what_has_is_asked_for() {
         &folder,
         "none.bag",
         None,
-        &["no topic is of a sensor", "/chatter (std_msgs/", "dvl (velocity log)"],
+        &["no topic belongs to a sensor", "/chatter (std_msgs/", "dvl (velocity log)"],
     );
-    refused(&folder, "humble.mcap", None, &["no topic is of a sensor"]);
+    refused(&folder, "humble.mcap", None, &["no topic belongs to a sensor"]);
 }
 
 #[test]
-fn wrong_mappings_are_named() {
+fn wrong_mappings_are_refused() {
     let folder = folder("");
     let table = |topic: &str, sensor: &str, further: &str| {
         format!("[[topics]]\ntopic = \"{topic}\"\nsensor = \"{sensor}\"\n{further}\n")
@@ -194,9 +201,9 @@ fn wrong_mappings_are_named() {
     let imu = table("/imu/data", "imu", "");
     for (text, words) in [
         (String::new(), "topics"),
-        (table("/imu", "imu", ""), "is no topic of the file; there are"),
-        (table("/chatter", "imu", ""), "messages of type std_msgs/msg/String aren't known"),
-        (table("/imu/data", "gyro", ""), "is no sensor of the vehicle file"),
+        (table("/imu", "imu", ""), "isn't a topic of the file, which has"),
+        (table("/chatter", "imu", ""), "messages of type std_msgs/msg/String aren't supported"),
+        (table("/imu/data", "gyro", ""), "isn't a sensor of the vehicle file"),
         (
             table("/imu/data", "depth", ""),
             "is a depth sensor, and a topic of sensor_msgs/msg/Imu is that of a inertial unit",
@@ -223,7 +230,7 @@ fn wrong_mappings_are_named() {
     );
 }
 
-/// Imports what `change` makes of a file: exit code and what is said.
+/// Imports a file after `change`; returns exit code and output.
 fn changed(folder: &Folder, name: &str, change: impl FnOnce(&mut Vec<u8>)) -> (Option<i32>, String) {
     let mut bytes = fixture(name);
     change(&mut bytes);
@@ -233,10 +240,10 @@ fn changed(folder: &Folder, name: &str, change: impl FnOnce(&mut Vec<u8>)) -> (O
     (answer.code, answer.stderr)
 }
 
-/// States three more messages than the recording has.
+/// Raises the stated number of messages by three.
 fn state_three_more(bytes: &mut [u8]) {
     let number = |bytes: &[u8], at: usize| u64::from_le_bytes(bytes[at..at + 8].try_into().unwrap());
-    // The closing magic has 8 bytes, and the footer before it 20, of which the first 8 say where the summary begins.
+    // The closing magic has 8 bytes. The footer before it has 20, and their first 8 give the start of the summary.
     let mut at = usize::try_from(number(bytes, bytes.len() - 28)).unwrap();
     while bytes[at] != mcap::records::op::STATISTICS {
         at += 9 + usize::try_from(number(bytes, at + 1)).unwrap();
@@ -246,7 +253,7 @@ fn state_three_more(bytes: &mut [u8]) {
 }
 
 #[test]
-fn messages_missing_from_a_stated_count_are_told() {
+fn messages_below_the_stated_count_are_reported() {
     let folder = folder("");
     let (code, said) = changed(&folder, "humble.mcap", |bytes| state_three_more(bytes));
     assert_eq!(code, Some(3), "{said}");
@@ -261,7 +268,7 @@ fn find(bytes: &[u8], what: &[u8], after: usize) -> usize {
 }
 
 #[test]
-fn what_is_wrong_with_a_recording_is_named() {
+fn damage_of_a_recording_is_reported() {
     let folder = folder("");
     for name in ["none.bag", "bz2.bag", "lz4.bag", "humble.mcap"] {
         let (code, said) = changed(&folder, name, |bytes| bytes.truncate(bytes.len() * 3 / 5));
@@ -271,7 +278,9 @@ fn what_is_wrong_with_a_recording_is_named() {
         assert!(said.contains(words), "{name}: {said}");
         assert!(!heard(&folder).is_empty());
     }
-    for (name, words) in [("lz4.bag", "chunks that don't unpack"), ("bz2.bag", "chunks that don't unpack")] {
+    for (name, words) in
+        [("lz4.bag", "chunks that can't be unpacked"), ("bz2.bag", "chunks that can't be unpacked")]
+    {
         let (code, said) = changed(&folder, name, |bytes| {
             let at = find(bytes, b"compression=", 0);
             bytes[at + 200..at + 240].fill(0);
@@ -290,17 +299,17 @@ fn what_is_wrong_with_a_recording_is_named() {
         bytes[at + 12] += 1;
     };
     let (code, said) = changed(&folder, "none.bag", longer);
-    assert!(code == Some(3) && said.contains("the bag says that it has"), "{said}");
+    assert!(code == Some(3) && said.contains("the bag states "), "{said}");
     let undefined = |bytes: &mut Vec<u8>| {
-        // The first definition in a chunk gets another number; the one at the end stays.
+        // Changes the number of the first definition in a chunk; the one at the end stays.
         let chunk = find(bytes, b"compression=", 0);
         let at = find(bytes, b"conn=", chunk);
         bytes[at + 5] = 99;
     };
     let (code, said) = changed(&folder, "none.bag", undefined);
-    assert!(code == Some(3) && said.contains("connection that is defined nowhere before"), "{said}");
+    assert!(code == Some(3) && said.contains("connection without an earlier definition"), "{said}");
     let twice = |bytes: &mut Vec<u8>| {
-        // The second gets the number of the first.
+        // Gives the second definition the number of the first.
         let chunk = find(bytes, b"op=\x05", 0);
         let first = find(bytes, b"conn=", chunk);
         let second = find(bytes, b"op=\x07", find(bytes, b"op=\x07", first) + 1);
@@ -308,18 +317,18 @@ fn what_is_wrong_with_a_recording_is_named() {
         bytes[second + 5] = bytes[first + 5];
     };
     let (code, said) = changed(&folder, "none.bag", twice);
-    assert!(code == Some(3) && said.contains("defined a second time, otherwise"), "{said}");
+    assert!(code == Some(3) && said.contains("connections with a second, different definition"), "{said}");
     let other = |bytes: &mut Vec<u8>| {
         while let Some(at) = bytes.windows(8).position(|window| window == b"6a62c6da") {
             bytes[at] = b'7';
         }
     };
     let (code, said) = changed(&folder, "none.bag", other);
-    assert!(code == Some(2) && said.contains("is defined otherwise (MD5 7a62c6da"), "{said}");
+    assert!(code == Some(2) && said.contains("(MD5 7a62c6da"), "{said}");
 }
 
 #[test]
-fn other_files_are_named() {
+fn other_file_kinds_are_refused() {
     let folder = folder("");
     folder.write("old.bag", b"#ROSBAG V1.2\nmuch more");
     folder.write("text.bag", b"hello");
@@ -335,7 +344,7 @@ fn other_files_are_named() {
     refused(&folder, "dive.mcap", None, &["is a dive log already"]);
 }
 
-/// A recording by the test's own hand: messages in plain CDR, each with its topic, type and time in seconds.
+/// A hand-made recording: messages in plain CDR, each with topic, type and time in seconds.
 fn recording(messages: &[(&str, &str, u64, Vec<u8>)]) -> Vec<u8> {
     let mut file = std::io::Cursor::new(Vec::new());
     let mut writer = mcap::WriteOptions::new().profile("ros2").create(&mut file).unwrap();
@@ -351,7 +360,7 @@ fn recording(messages: &[(&str, &str, u64, Vec<u8>)]) -> Vec<u8> {
     file.into_inner()
 }
 
-/// Encapsulation, a stamp of the record's time, a frame of three letters, and doubles behind it.
+/// Encapsulation, a stamp with the record's time, a frame name of three letters, and doubles.
 fn stamped(seconds: u32, frame: &str, values: &[f64]) -> Vec<u8> {
     let head = [&[0, 1, 0, 0][..], &(1_700_000_000 + seconds).to_le_bytes(), &[0; 4], &[4, 0, 0, 0]].concat();
     let values: Vec<u8> = values.iter().flat_map(|value| value.to_le_bytes()).collect();
@@ -367,7 +376,7 @@ fn imu(wxyz: [f64; 4], without: bool, force_z: f64) -> Vec<f64> {
 }
 
 #[test]
-fn values_that_are_none_or_strange_are_named() {
+fn missing_and_odd_values_are_reported() {
     let folder = folder("");
     let of_imu = |seconds: u32, frame, values: &[f64]| {
         ("/imu/data", "sensor_msgs/msg/Imu", u64::from(seconds), stamped(seconds, frame, values))
@@ -410,19 +419,19 @@ fn values_that_are_none_or_strange_are_named() {
     for words in [
         "note: /imu/data: 3 messages without orientation",
         "note: /imu/data: 1 messages without specific force",
-        "note: /imu/data: 1 messages are of another frame than the first, \"abc\"",
+        "note: /imu/data: 1 messages have another frame than the first, \"abc\"",
         "so that z is down; `angles_deg` of imu must say so",
-        "lost: /imu/data: 1 messages whose orientation is no unit quaternion",
+        "lost: /imu/data: 1 messages whose orientation isn't a unit quaternion",
         "note: /pressure: no pressure is above 150.0 Pa",
-        "lost: /pressure: 1 messages whose value is no number",
-        "lost: /pressure: 1 messages with values that the sensor can't say",
-        "lost: /pressure: 1 messages shorter than their type says",
+        "lost: /pressure: 1 messages whose value isn't a number",
+        "lost: /pressure: 1 messages with values that the sensor can't encode",
+        "lost: /pressure: 1 messages shorter than their type requires",
         "lost: /pressure: 1 messages in another encapsulation than plain CDR",
     ] {
         assert!(answer.stderr.contains(words), "{words:?} is not in {}", answer.stderr);
     }
     let shown: Value = serde_json::from_str(&answer.stdout).unwrap();
-    // Of four samples: times, orientation of the first, four rates, three forces.
+    // Four samples: times, orientation of the first, four rates, three forces.
     assert_eq!(shown["messages"]["imu"], 4 + 1 + 4 + 3);
     let (_, report) = folder.replay("out.mcap", &[]);
     assert!(report["sources"].as_array().unwrap().iter().all(|source| source["bad_frames"] == 0));

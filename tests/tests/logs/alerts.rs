@@ -1,5 +1,6 @@
-//! Alerts and an operator's commands: the same however the stream is cut into ticks, in a replay, and in verify; and no result
-//! but the alerts knows of a command.
+//! Alerts and operator commands are the same for any tick length, in replay and in verify.
+//!
+//! Commands change no result but the alerts.
 
 use headrace_geometry::time::{DurNs, MonoNs};
 use headrace_monitor::App;
@@ -15,14 +16,14 @@ use headrace_simulator::{START, Scene, Simulation};
 use headrace_tests::{Folder, scenes};
 use serde_json::Value;
 
-/// Fast for a stretch, then back over a part of it; a head dies, and comes back.
+/// Fast over a stretch, then back over a part of it; a head dies and comes back.
 const SCENE: &str = "vehicle = \"vita2-4.toml\"\n[trajectory]\n
 [[trajectory.legs]]\ndistance_m = 10\nspeed_mps = 0.18\n
 [[trajectory.legs]]\ndistance_m = 8\nspeed_mps = 0.4\n
 [[trajectory.legs]]\ndistance_m = 6\nspeed_mps = -0.18\n
 [[trajectory.legs]]\ndistance_m = 12\nspeed_mps = 0.18\n
 [[effects.device_faults]]\nkind = \"die\"\nsensors = [\"sonar_1\"]\nfrom_s = 35\nfor_s = 12\n";
-/// When the head dies, seconds after the beginning.
+/// Time at which the head dies, seconds after the beginning.
 const DIES_S: f64 = 35.0;
 
 struct Packet {
@@ -47,7 +48,7 @@ fn after(seconds: f64) -> MonoNs {
     START + DurNs::from_secs_f64(seconds)
 }
 
-/// What an operator does, some of it no command.
+/// Operator actions, some of which are no valid command.
 const COMMANDS: [(f64, &str); 14] = [
     (12.0, r#"{"do":"note","text":"start of the lining","by":"AB"}"#),
     (20.0, r#"{"do":"voice","id":7,"by":"AB"}"#),
@@ -88,7 +89,7 @@ fn armed(scene: &Scene) -> (Loop, Vec<Port>) {
 
 type Change = (MonoNs, AlertChange, ListedAlert);
 
-/// A dive in ticks of so many milliseconds, with the changes of alerts.
+/// Runs a dive with ticks of `tick_ms`; returns the loop and the changes of alerts.
 fn dive(scene: &Scene, packets: &[Packet], tick_ms: i64) -> (Loop, Vec<Change>) {
     let (mut dive, mut ports) = armed(scene);
     let mut changes = Vec::new();
@@ -128,7 +129,7 @@ fn json(dive: &Loop) -> Value {
 }
 
 #[test]
-fn alerts_and_commands_do_not_depend_on_where_ticks_end() {
+fn tick_boundaries_do_not_change_alerts_and_commands() {
     let scene = scenes::scene(SCENE);
     let packets = with_commands(&scene);
     let (expected, told) = dive(&scene, &packets, 20);
@@ -141,7 +142,7 @@ fn alerts_and_commands_do_not_depend_on_where_ticks_end() {
     for change in ["raised", "acknowledged", "silenced", "rectified", "cleared", "changed"] {
         assert!(done.iter().any(|done| done.as_str() == change), "{change}");
     }
-    // What is over asks for nothing.
+    // An alert that is over requires no action.
     let around = expected.surroundings();
     let asks = |alert: &&ListedAlert| !alert.advice(&around).is_empty();
     let (holding, over): (Vec<_>, Vec<_>) =
@@ -166,7 +167,7 @@ fn alerts_and_commands_do_not_depend_on_where_ticks_end() {
 }
 
 #[test]
-fn no_result_but_the_alerts_knows_of_a_command() {
+fn commands_change_no_result_but_alerts() {
     let scene = scenes::scene(SCENE);
     let (plain, _) = dive(&scene, &sent(&scene), 20);
     let (operated, _) = dive(&scene, &with_commands(&scene), 20);
@@ -180,7 +181,7 @@ fn no_result_but_the_alerts_knows_of_a_command() {
         }
     }
     assert_eq!(one, other);
-    // What is no command changes nothing at all.
+    // An invalid command changes nothing at all.
     let mut packets = sent(&scene);
     let source = scene.vehicle.sensors.len();
     for (number, bytes) in
@@ -195,7 +196,7 @@ fn no_result_but_the_alerts_knows_of_a_command() {
 }
 
 #[test]
-fn a_speeding_stretch_and_a_dead_head_are_told_once_and_in_time() {
+fn too_fast_stretch_and_dead_head_are_alerted_once_and_in_time() {
     let scene = scenes::scene(SCENE);
     let (dive, told) = dive(&scene, &sent(&scene), 20);
     let raised = |kind: ListKind| -> Vec<f64> {
@@ -203,22 +204,22 @@ fn a_speeding_stretch_and_a_dead_head_are_told_once_and_in_time() {
             told.iter().filter(|(_, change, alert)| *change == AlertChange::Raised && alert.kind == kind);
         raised.map(|(at, ..)| at.since(START).as_secs_f64()).collect()
     };
-    // And once more after the way back, on which any speed will do.
+    // A second one follows after the way back, during which any speed is allowed.
     let too_fast = raised(ListKind::TooFast);
     assert!(matches!(too_fast[..], [first, again] if first < 10.0 && again > 100.0), "{too_fast:?}");
-    // Once it is over it still tells of the speed that was too fast, not of the one that the pilot slowed down to.
+    // After it is over, the alert still shows the speed that was too fast, not the later one.
     let fast = dive.alert_list().iter().find(|alert| alert.kind == ListKind::TooFast).unwrap();
     let Figures::Advice(figures) = fast.figures else { panic!("{:?}", fast.figures) };
     assert!(figures.speed_mps > 1.2 * figures.v_max_mps, "{figures:?}");
     let [silent_s] = raised(ListKind::SensorSilent)[..] else {
         panic!("{:?}", raised(ListKind::SensorSilent))
     };
-    // The head's last reading, 2 s, and a beat; no hold time is set.
+    // Limits: the head's last reading, 2 s, and one update; no latch time is configured.
     assert!((DIES_S + 1.5..DIES_S + 2.3).contains(&silent_s), "{silent_s}");
     let head = dive.alert_list().iter().find(|alert| alert.kind == ListKind::SensorSilent).unwrap();
     assert_eq!(dive.sources()[head.source.unwrap().index()].id, "sonar_1");
-    assert_eq!(head.state, AlertState::Rectified, "it came back, and nobody has acknowledged it");
-    // One alert for the stretch that was missed, part of which a later pass has mended.
+    assert_eq!(head.state, AlertState::Rectified, "it returned, and the alert is unacknowledged");
+    // One alert for the missed stretch, a part of which a later pass has filled.
     let missed = raised(ListKind::Missed);
     let runs = dive.coverage().sections.runs().all();
     assert!(missed.len() <= runs.len() && !missed.is_empty(), "{missed:?}, {} runs", runs.len());
@@ -232,7 +233,7 @@ fn a_speeding_stretch_and_a_dead_head_are_told_once_and_in_time() {
 }
 
 #[test]
-fn a_dive_whose_sensors_are_all_silent_says_so_by_the_time_it_is_told() {
+fn dive_with_only_silent_sensors_raises_alerts_in_time() {
     let scene = scenes::scene(SCENE);
     let mut packets = sent(&scene);
     packets.retain(|packet| packet.at < after(20.0));
@@ -251,9 +252,9 @@ fn a_dive_whose_sensors_are_all_silent_says_so_by_the_time_it_is_told() {
     assert_eq!(dive.tally().span.unwrap().1, last, "the console is no sensor");
 }
 
-/// Commands from any thread, in a dive that goes on; they come stamped with the dive's clock.
+/// Commands from any thread get the dive's clock as timestamp.
 #[test]
-fn commands_of_any_thread_reach_the_loop() {
+fn commands_from_any_thread_reach_the_loop() {
     let scene = scenes::scene(SCENE);
     let mut app = App::new(scene.vehicle.mission());
     for sensor in &scene.vehicle.sensors {
@@ -284,7 +285,7 @@ fn commands_of_any_thread_reach_the_loop() {
 }
 
 #[test]
-fn acknowledgements_of_a_recorded_dive_are_in_its_replay_and_verify_says_equal() {
+fn recorded_acknowledgements_replay_and_verify_as_equal() {
     let scene = scenes::scene(SCENE);
     let folder = Folder::new();
     let console = SourceInfo { id: CONSOLE_ID.to_owned(), plugin: String::new(), connect: String::new() };
@@ -334,7 +335,7 @@ fn acknowledgements_of_a_recorded_dive_are_in_its_replay_and_verify_says_equal()
     let lines = folder.headrace(&["replay", "live.mcap", "--json-lines"]).stdout;
     let lines: Vec<Value> = lines.lines().map(|line| serde_json::from_str(line).unwrap()).collect();
     let of = |kind: &str| lines.iter().filter(|line| line["type"] == kind).cloned().collect::<Vec<_>>();
-    // A voice once more, with its seconds.
+    // The voice note appears again with its duration.
     assert_eq!(of("note").len(), 4);
     assert!(of("alert_change").iter().any(|line| line["change"] == "acknowledged"));
     let states = of("state");

@@ -1,5 +1,7 @@
-//! The same bytes in the same order give the same digest: live and replayed, in ticks of any length, at any speed, with
-//! idle and with busy cores. (.ci/run compares debug and release builds.)
+//! The same bytes in the same order give the same digest.
+//!
+//! This holds live and in replay, for any tick length and speed, and with idle or busy cores. (.ci/run compares debug
+//! and release builds.)
 
 use std::sync::atomic::{AtomicBool, Ordering};
 
@@ -7,9 +9,9 @@ use headrace_tests::Folder;
 
 const TICKS_MS: [&str; 6] = ["1", "5", "20", "100", "777", "60000"];
 
-/// Runs `work` while `threads` threads do nothing as fast as they can.
+/// Runs `work` while `threads` threads keep the cores busy.
 fn while_busy<T>(threads: usize, work: impl FnOnce() -> T) -> T {
-    /// Ends the threads when `work` panics, too.
+    /// Ends the threads, also when `work` panics.
     struct Stop<'a>(&'a AtomicBool);
     impl Drop for Stop<'_> {
         fn drop(&mut self) {
@@ -32,7 +34,7 @@ fn while_busy<T>(threads: usize, work: impl FnOnce() -> T) -> T {
 }
 
 #[test]
-fn a_live_dive_and_the_replay_of_its_log_agree() {
+fn live_dive_and_its_replay_have_the_same_digest() {
     let folder = Folder::new();
     let answer = folder.headrace(&["demo", "--speed", "max", "--out", "demo"]);
     assert_eq!(answer.code, Some(0), "{}", answer.stderr);
@@ -49,9 +51,9 @@ fn a_live_dive_and_the_replay_of_its_log_agree() {
     );
 }
 
-/// Dives in which failed sections settle, flags are cleared on a later pass, and judging depends on judging.
+/// Dives in which failed sections settle, later passes clear flags, and verdicts depend on earlier verdicts.
 #[test]
-fn ticks_of_any_length_agree_where_sections_fail_settle_and_are_cleared() {
+fn tick_length_does_not_change_failed_and_cleared_sections() {
     let folder = Folder::new();
     let vehicle = include_str!("../../../deploy/vehicles/vita2-4.toml");
     folder.write("vehicle.toml", vehicle.replace("planned_speed_mps = 0.10", "planned_speed_mps = 0.197"));
@@ -72,12 +74,12 @@ fn ticks_of_any_length_agree_where_sections_fail_settle_and_are_cleared() {
 }
 
 #[test]
-fn a_report_expected_is_met_or_each_difference_named() {
+fn expected_report_matches_or_each_difference_is_named() {
     let folder = Folder::with_dive();
     let (_, mut report) = folder.replay("dive.mcap", &["--report", "golden.json"]);
     assert_eq!(folder.replay("dive.mcap", &["--expect", "golden.json"]).0, Some(0));
 
-    // Another log's name is no difference; another hole is, however small.
+    // Another log name is no difference, but any change of a hole is.
     report["log"]["path"] = "elsewhere.mcap".into();
     folder.write("golden.json", report.to_string());
     assert_eq!(folder.replay("dive.mcap", &["--expect", "golden.json"]).0, Some(0));
@@ -93,9 +95,9 @@ fn a_report_expected_is_met_or_each_difference_named() {
     assert_eq!(places, ["/digest:", &section]);
 }
 
-/// Only where the golden report says so may anything differ, and only by so much.
+/// Only values with a stated tolerance may differ, and only within it.
 #[test]
-fn a_golden_report_may_state_tolerances() {
+fn golden_report_may_state_tolerances() {
     let folder = Folder::with_dive();
     let (_, report) = folder.replay("dive.mcap", &[]);
     let meets = |tolerances: serde_json::Value, change: &dyn Fn(&mut serde_json::Value)| {
@@ -130,7 +132,7 @@ fn a_golden_report_may_state_tolerances() {
     assert_eq!(meets(serde_json::json!({"/sections": -1}), &same), 2);
     let answer = folder.headrace(&["replay", "dive.mcap", "--expect", "golden.json"]);
     assert!(answer.stderr.contains("tolerances of \"/sections\" is -1"), "{}", answer.stderr);
-    // They stay when it is made anew.
+    // Tolerances are kept when the report is renewed.
     meets(serde_json::json!({"/digest": "any"}), &other);
     folder.replay("dive.mcap", &["--expect", "golden.json", "--bless"]);
     let golden: serde_json::Value = serde_json::from_slice(&folder.read("golden.json")).unwrap();
@@ -138,7 +140,7 @@ fn a_golden_report_may_state_tolerances() {
 }
 
 #[test]
-fn a_golden_report_is_renewed_with_a_word_on_what_changes() {
+fn renewing_a_golden_report_prints_the_changes() {
     let folder = Folder::with_dive();
     let bless = |further: &[&str]| {
         let arguments = ["replay", "dive.mcap", "--expect", "golden.json", "--bless"];
@@ -159,7 +161,7 @@ fn a_golden_report_is_renewed_with_a_word_on_what_changes() {
 }
 
 #[test]
-fn a_dive_recorded_again_is_the_same_dive() {
+fn dive_recorded_again_has_the_same_digest() {
     let folder = Folder::with_dive();
     let expected = folder.digest("dive.mcap", &[]);
     for (speed, again) in [("max", "max.mcap"), ("40x", "40x.mcap")] {
@@ -173,14 +175,14 @@ fn a_dive_recorded_again_is_the_same_dive() {
 }
 
 #[test]
-fn a_scene_gives_the_same_log_each_time() {
+fn simulation_of_a_scene_is_repeatable() {
     let folder = Folder::with_dive();
     folder.simulate("scene.toml", "again.mcap");
     assert!(folder.read("dive.mcap") == folder.read("again.mcap"), "two logs of one scene differ");
 }
 
 #[test]
-fn ticks_of_any_length_give_the_same_report() {
+fn tick_length_does_not_change_the_report() {
     let folder = Folder::with_dive();
     let (_, expected) = folder.replay("dive.mcap", &[]);
     for tick in TICKS_MS {
@@ -191,13 +193,13 @@ fn ticks_of_any_length_give_the_same_report() {
 }
 
 #[test]
-fn speed_has_no_part_in_the_result() {
+fn replay_speed_does_not_change_the_result() {
     let folder = Folder::with_dive();
     assert_eq!(folder.digest("dive.mcap", &["--speed", "20x"]), folder.digest("dive.mcap", &[]));
 }
 
 #[test]
-fn repetitions_give_the_same_digest() {
+fn repeated_replays_give_the_same_digest() {
     let folder = Folder::with_dive();
     let expected = folder.digest("dive.mcap", &[]);
     for repetition in 0..20 {
@@ -207,7 +209,7 @@ fn repetitions_give_the_same_digest() {
 }
 
 #[test]
-fn busy_cores_change_nothing() {
+fn busy_cores_do_not_change_the_digest() {
     let folder = Folder::with_dive();
     let expected = folder.digest("dive.mcap", &[]);
     let cores = std::thread::available_parallelism().map_or(2, usize::from);

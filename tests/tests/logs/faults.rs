@@ -1,4 +1,4 @@
-//! Media that fail while a dive is recorded, terminals that are closed, and who is told.
+//! Media that fail during a recording, closed terminals, and the reports of these faults.
 
 use std::io::{BufRead as _, BufReader, Write as _};
 use std::path::Path;
@@ -10,7 +10,7 @@ use serde_json::Value;
 
 const DIVE: [&str; 4] = ["run", "vehicle.toml", "--source", "dive.mcap"];
 
-/// The program below another one, in a folder.
+/// The program started by another one, in a folder.
 fn below(folder: &Folder, command: &[&str], arguments: &[&str]) -> Command {
     let [above, options @ ..] = command else { panic!("no command") };
     let mut below = Command::new(above);
@@ -19,7 +19,7 @@ fn below(folder: &Folder, command: &[&str], arguments: &[&str]) -> Command {
     below
 }
 
-/// Whether system calls of a process may be made to fail here.
+/// Whether system calls of a process can be made to fail here.
 fn has_strace() -> bool {
     let can = Command::new("strace").args(["-o", "/dev/null", "true"]).output();
     let can = can.is_ok_and(|output| output.status.success());
@@ -29,7 +29,7 @@ fn has_strace() -> bool {
     can
 }
 
-/// Dives and records with this fault of the system's, for so long that there are several syncs; the exit code and the report.
+/// Records a dive with this fault of the system, long enough for several syncs; returns exit code and report.
 fn with_fault(folder: &Folder, fault: &[&str], records: &[&str]) -> (Option<i32>, Value) {
     let strace = [&["strace", "-f", "-qq", "-o", "trace.txt"][..], fault].concat();
     let records: Vec<&str> = records.iter().flat_map(|record| ["--record", record]).collect();
@@ -43,7 +43,7 @@ fn losses(report: &Value) -> String {
     report["log"]["losses"].to_string()
 }
 
-/// What `replay`, `verify` and `recover` say of a log that isn't whole: each its exit code 3.
+/// Checks that `replay`, `verify` and `recover` all report a damaged log, each with exit code 3.
 #[track_caller]
 fn all_find_it(folder: &Folder, log: &str, words: &str) {
     let (code, report) = folder.replay(log, &[]);
@@ -55,7 +55,7 @@ fn all_find_it(folder: &Folder, log: &str, words: &str) {
 }
 
 #[test]
-fn a_sync_that_fails_once_is_told_and_costs_nothing() {
+fn single_failed_sync_is_reported_and_loses_nothing() {
     let folder = Folder::with_dive();
     if !has_strace() {
         return;
@@ -67,20 +67,20 @@ fn a_sync_that_fails_once_is_told_and_costs_nothing() {
     assert!(code == Some(3) && told.contains("Input/output error") && told.contains("no message"), "{told}");
     assert!(folder.path("log.part002.mcap").exists());
     all_find_it(&folder, "log.mcap", "recording failed in log.mcap");
-    // Both parts are played by the recording's name, and are the dive.
+    // The recording's name replays both parts, which give the same dive.
     assert_eq!(folder.replay("log.mcap", &[]).1["digest"], digest.as_str());
     assert_eq!(folder.replay("recovered.mcap", &[]).1["digest"], digest.as_str());
 }
 
 #[test]
-fn a_recording_that_failed_is_told_live_and_stays_told() {
+fn failed_recording_is_reported_live_and_until_the_end() {
     let folder = Folder::with_dive();
     if !has_strace() {
         return;
     }
     let strace = ["strace", "-f", "-qq", "-o", "trace.txt", "-e", "trace=fdatasync"];
     let strace = [&strace[..], &["-e", "inject=fdatasync:error=EIO:when=2"]].concat();
-    // Four seconds: a second sync ends before the dive does on a loaded machine, too.
+    // Four seconds, so that a second sync ends before the dive does even on a loaded machine.
     let arguments = ["--record", "log.mcap", "--speed", "5x", "--json-lines"];
     let output = below(&folder, &strace, &arguments).output().unwrap();
     assert_eq!(output.status.code(), Some(3));
@@ -104,7 +104,7 @@ fn a_recording_that_failed_is_told_live_and_stays_told() {
 }
 
 #[test]
-fn a_medium_that_takes_nothing_more_leaves_a_log_that_is_cut_off() {
+fn full_medium_leaves_a_truncated_log() {
     let folder = Folder::with_dive();
     if !has_strace() {
         return;
@@ -117,7 +117,7 @@ fn a_medium_that_takes_nothing_more_leaves_a_log_that_is_cut_off() {
 }
 
 #[test]
-fn one_of_two_recordings_that_fails_leaves_the_other_alone() {
+fn failure_of_one_recording_keeps_the_other() {
     let folder = Folder::with_dive();
     if !has_strace() {
         return;
@@ -140,7 +140,7 @@ fn one_of_two_recordings_that_fails_leaves_the_other_alone() {
     assert!(twice.code == Some(2) && twice.stderr.contains("given twice"), "{}", twice.stderr);
 }
 
-/// So large a file may be that a log of the dive has several parts; `None` where that can't be set.
+/// A file size limit that splits a log of the dive into several parts; `None` if it can't be set.
 fn limit(folder: &Folder) -> Option<String> {
     folder.record("dive.mcap", "whole.mcap", &[]);
     let bytes = std::fs::metadata(folder.path("whole.mcap")).unwrap().len();
@@ -153,7 +153,7 @@ fn limit(folder: &Folder) -> Option<String> {
 }
 
 #[test]
-fn a_file_that_may_not_grow_is_followed_by_another() {
+fn file_size_limit_starts_another_part() {
     let folder = Folder::with_dive();
     let Some(limit) = limit(&folder) else { return };
     let mut dive =
@@ -177,15 +177,15 @@ fn ended(mut child: Child) -> Option<i32> {
         std::thread::sleep(Duration::from_millis(100));
     }
     child.kill().unwrap();
-    panic!("it doesn't end")
+    panic!("the process doesn't end")
 }
 
 #[test]
-fn a_stderr_that_nobody_reads_holds_up_no_recording_that_fails() {
+fn unread_stderr_does_not_block_a_failing_recording() {
     let folder = Folder::with_dive();
     let Some(limit) = limit(&folder) else { return };
     let (reader, mut stderr) = std::io::pipe().unwrap();
-    // What a pipe holds.
+    // Fills the pipe.
     stderr.write_all(&vec![b'.'; 1 << 16]).unwrap();
     let arguments = ["-vv", "--record", "log.mcap", "--speed", "max", "--report", "report.json"];
     let mut dive = below(&folder, &["prlimit", &limit], &arguments);
@@ -196,12 +196,12 @@ fn a_stderr_that_nobody_reads_holds_up_no_recording_that_fails() {
     assert!(losses(&report).contains("File too large"), "{}", losses(&report));
 }
 
-/// Waits until a dive writes to a file: an empty one is only tried before the dive begins.
+/// Waits until a dive has written to a file; before the dive the file is created empty as a test.
 fn wait_for(path: &Path, dive: &mut Child) {
     wait_for_more(path, 0, dive);
 }
 
-/// Waits until a file is longer than so many bytes; returns its length.
+/// Waits until a file is longer than `than` bytes; returns its length.
 fn wait_for_more(path: &Path, than: u64, dive: &mut Child) -> u64 {
     loop {
         let len = std::fs::metadata(path).map_or(0, |file| file.len());
@@ -214,7 +214,7 @@ fn wait_for_more(path: &Path, than: u64, dive: &mut Child) -> u64 {
 }
 
 #[test]
-fn a_medium_that_is_pulled_costs_the_log_and_not_the_report() {
+fn removed_medium_loses_the_log_but_not_the_report() {
     let folder = Folder::with_dive();
     let digest = folder.digest("dive.mcap", &[]);
     std::fs::create_dir(folder.path("stick")).unwrap();
@@ -234,7 +234,7 @@ fn a_medium_that_is_pulled_costs_the_log_and_not_the_report() {
 }
 
 #[test]
-fn a_report_that_cannot_be_written_leaves_the_summary() {
+fn unwritable_report_still_prints_the_summary() {
     let folder = Folder::with_dive();
     std::fs::create_dir(folder.path("stick")).unwrap();
     let mut dive = headrace_tests::program();
@@ -255,7 +255,7 @@ fn signal(name: &str, dive: &Child) {
 }
 
 #[test]
-fn a_dive_on_ports_outlives_its_terminal_and_ends_when_told() {
+fn live_dive_survives_its_terminal_and_ends_on_a_signal() {
     let folder = Folder::with_dive();
     for (end, arguments) in [("TERM", ["--json-lines"]), ("INT", ["--json"])] {
         let mut dive = headrace_tests::program();
@@ -264,10 +264,10 @@ fn a_dive_on_ports_outlives_its_terminal_and_ends_when_told() {
         let mut dive = dive.stdout(Stdio::piped()).stderr(Stdio::null()).spawn().unwrap();
         let mut lines = BufReader::new(dive.stdout.take().unwrap()).lines();
         if end == "TERM" {
-            // The signals are taken before the first line is said.
+            // Signal handlers are installed before the first line is printed.
             lines.next().unwrap().unwrap();
         } else {
-            // A log has a header before that; a second holds the rest of the start.
+            // The header is written earlier; a second write holds the rest of the start.
             wait_for(&folder.path("log.mcap"), &mut dive);
             std::thread::sleep(Duration::from_secs(1));
         }
@@ -276,9 +276,9 @@ fn a_dive_on_ports_outlives_its_terminal_and_ends_when_told() {
             assert!(dive.try_wait().unwrap().is_none(), "{name} has ended the dive");
         }
         signal(end, &dive);
-        // The way out isn't read any more, as with a terminal that is gone.
+        // Output is no longer read, as with a closed terminal.
         drop(lines);
-        // Nothing was inspected.
+        // Exit code 1: nothing was inspected.
         assert_eq!(ended(dive), Some(1), "{end}");
         let report: Value = serde_json::from_slice(&folder.read("report.json")).unwrap();
         assert_eq!(losses(&report), "[]");
@@ -286,10 +286,11 @@ fn a_dive_on_ports_outlives_its_terminal_and_ends_when_told() {
     }
 }
 
-/// A recording that another program takes away in mid-dive is told at once and goes on in another part: what was in it is lost.
+/// A recording that another program removes during the dive is reported at once and continues in another part. The
+/// removed data is lost.
 #[cfg(target_os = "linux")]
 #[test]
-fn a_recording_that_is_taken_away_is_told_and_goes_on() {
+fn removed_recording_is_reported_and_continues_in_a_new_part() {
     let folder = Folder::with_dive();
     let (log, other) = (folder.path("log.mcap"), folder.path("other.mcap"));
     let digest = folder.digest("dive.mcap", &[]);
@@ -310,7 +311,7 @@ fn a_recording_that_is_taken_away_is_told_and_goes_on() {
         let arguments = ["--record", "log.mcap", "--report", "report.json", "--speed", "5x", "--json-lines"];
         let dive = dive.args(DIVE).args(arguments).current_dir(folder.path(""));
         let mut dive = dive.stdout(Stdio::piped()).stderr(Stdio::null()).spawn().unwrap();
-        // It grows as it is synced, twice a second: by then some of it is certain, and can be lost.
+        // The file grows with each sync, twice a second. After some growth certain data exists that can be lost.
         (0..4).fold(0, |len, _| wait_for_more(&log, len, &mut dive));
         take();
         let output = dive.wait_with_output().unwrap();
@@ -327,7 +328,7 @@ fn a_recording_that_is_taken_away_is_told_and_goes_on() {
         let report: Value = serde_json::from_slice(&folder.read("report.json")).unwrap();
         assert_eq!(report["digest"], digest.as_str());
         assert!(losses(&report).contains(words), "{words}: {}", losses(&report));
-        // The rest is there, and says what is missing before it.
+        // The rest is present and states the loss before it.
         let (code, rest) = folder.replay("log.part002.mcap", &[]);
         assert!(code == Some(3) && losses(&rest).contains(words), "{code:?}: {}", losses(&rest));
         assert!(rest["log"]["messages"].as_u64() > Some(1000), "{}", rest["log"]);
@@ -339,7 +340,7 @@ fn a_recording_that_is_taken_away_is_told_and_goes_on() {
 
 #[cfg(target_os = "linux")]
 #[test]
-fn a_recording_that_is_moved_is_whole() {
+fn moved_recording_is_complete() {
     let folder = Folder::with_dive();
     let digest = folder.digest("dive.mcap", &[]);
     let mut dive = headrace_tests::program();
@@ -347,7 +348,7 @@ fn a_recording_that_is_moved_is_whole() {
     let mut dive = dive.stdout(Stdio::piped()).stderr(Stdio::null()).spawn().unwrap();
     wait_for(&folder.path("log.mcap"), &mut dive);
     std::fs::rename(folder.path("log.mcap"), folder.path("moved.mcap")).unwrap();
-    // It can't be read back by its name, which is a loss of the report.
+    // It can't be read back by its name, which the report counts as a loss.
     assert_eq!(dive.wait_with_output().unwrap().status.code(), Some(3));
     assert!(!folder.path("log.part002.mcap").exists());
     assert_eq!(folder.digest("moved.mcap", &[]), digest);

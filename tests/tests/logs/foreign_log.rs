@@ -1,5 +1,7 @@
-//! A log made by anyone's MCAP writer replays: only what the devices sent, on /raw/ channels, without our vehicle file,
-//! metadata, ticks and /sent/, however it is compressed, chunked or ordered, gives the digest of the log that we made.
+//! Logs written by any MCAP writer replay to the same digest as the headrace log of the same dive.
+//!
+//! Such a log has only the devices' data on /raw/ channels, in any compression, chunking and order. It has no vehicle
+//! file, metadata, ticks or /sent/.
 
 use std::io::Write as _;
 use std::process::{Command, Stdio};
@@ -9,14 +11,14 @@ use mcap::{Compression, WriteOptions};
 
 const WITH_VEHICLE: [&str; 2] = ["--vehicle", "vehicle.toml"];
 
-/// A whole number in 0..n from a Lehmer generator.
+/// An integer in 0..n from a Lehmer generator.
 fn draw(state: &mut u64, n: usize) -> usize {
     *state = *state * 48_271 % 2_147_483_647;
     usize::try_from(*state).unwrap() % n
 }
 
 #[test]
-fn however_it_is_stored_the_digest_is_the_same() {
+fn storage_options_do_not_change_the_digest() {
     let folder = Folder::with_dive();
     let expected = folder.digest("dive.mcap", &[]);
     let dive = folder.read("dive.mcap");
@@ -37,7 +39,7 @@ fn however_it_is_stored_the_digest_is_the_same() {
 }
 
 #[test]
-fn messages_out_of_order_are_taken_in_the_order_of_their_time() {
+fn unordered_messages_are_read_in_order_of_time() {
     let folder = Folder::with_dive();
     let expected = folder.digest("dive.mcap", &[]);
     let dive = folder.read("dive.mcap");
@@ -66,7 +68,7 @@ fn messages_out_of_order_are_taken_in_the_order_of_their_time() {
 }
 
 #[test]
-fn sequence_numbers_publish_times_and_channel_numbers_are_not_needed() {
+fn sequence_publish_time_and_channel_ids_are_ignored() {
     let folder = Folder::with_dive();
     let expected = folder.digest("dive.mcap", &[]);
     let dive = folder.read("dive.mcap");
@@ -85,7 +87,7 @@ fn sequence_numbers_publish_times_and_channel_numbers_are_not_needed() {
 }
 
 #[test]
-fn other_channels_are_passed_over() {
+fn other_channels_are_skipped() {
     let folder = Folder::with_dive();
     let expected = folder.digest("dive.mcap", &[]);
     let dive = folder.read("dive.mcap");
@@ -102,7 +104,7 @@ fn other_channels_are_passed_over() {
 }
 
 #[test]
-fn a_topic_on_two_channels_is_one_source() {
+fn topic_on_two_channels_is_one_source() {
     let folder = Folder::with_dive();
     let expected = folder.digest("dive.mcap", &[]);
     let dive = folder.read("dive.mcap");
@@ -118,7 +120,7 @@ fn a_topic_on_two_channels_is_one_source() {
 }
 
 #[test]
-fn on_another_clock_the_sections_are_the_same() {
+fn another_clock_does_not_change_the_sections() {
     const UTC_OF_OUR_ZERO_NS: u64 = 1_790_000_000_123_456_789;
     let folder = Folder::with_dive();
     let (_, expected) = folder.replay("dive.mcap", &[]);
@@ -142,7 +144,7 @@ fn on_another_clock_the_sections_are_the_same() {
     }
 }
 
-/// Copies the devices' messages with Python's `mcap` package, in the order of time as its reader gives them.
+/// Copies the devices' messages with Python's `mcap` package, in its reader's order of time.
 const COPY: &str = r#"
 from mcap.reader import make_reader
 from mcap.writer import CompressionType, Writer
@@ -162,7 +164,7 @@ for name, compression in [("lz4", CompressionType.LZ4), ("zstd", CompressionType
 "#;
 
 #[test]
-fn a_log_copied_with_python_has_the_same_digest() {
+fn log_copied_with_python_has_the_same_digest() {
     let folder = Folder::with_dive();
     let python = |arguments: &[&str], input: &str| {
         let mut child = Command::new("python3")
@@ -190,7 +192,7 @@ fn a_log_copied_with_python_has_the_same_digest() {
 }
 
 #[test]
-fn a_vehicle_file_attached_by_others_is_used() {
+fn vehicle_file_attached_by_other_software_is_used() {
     let folder = Folder::with_dive();
     let dive = folder.read("dive.mcap");
     write_log(&folder.path("foreign.mcap"), WriteOptions::new(), Some(VEHICLE), &raw_messages(&dive));

@@ -1,16 +1,17 @@
-//! Logs of hard situations, kept as they were recorded: each replays to the report that is kept beside it, and to the
-//! words that a person has read. `tests/golden/make` makes logs of new scenes, and reports anew.
+//! Golden logs of hard situations: each replays to its stored report and to its reviewed text.
+//!
+//! `tests/golden/make` makes logs of new scenes and renews reports.
 
 use std::path::PathBuf;
 
-/// A log in a repository is small.
+/// Size limit of a log in the repository, bytes.
 const MOST_BYTES: u64 = 2_000_000;
 
 fn folder() -> PathBuf {
     headrace_tests::root().join("tests/golden")
 }
 
-/// Names of the files with an ending, in order, without it.
+/// Names of the files with an extension, in order and without the extension.
 fn names(ending: &str) -> Vec<String> {
     let entries = std::fs::read_dir(folder()).unwrap();
     let name = |entry: std::io::Result<std::fs::DirEntry>| entry.unwrap().file_name().into_string().unwrap();
@@ -44,7 +45,7 @@ fn golden_logs_replay_to_their_reports_and_words() {
 }
 
 #[test]
-fn each_has_its_scene_its_report_and_its_words_and_is_small() {
+fn every_golden_log_has_scene_report_and_text_and_is_small() {
     let logs = names(".mcap");
     assert!(logs.len() >= 10, "{logs:?}");
     for ending in [".scene.toml", ".json", ".snap"] {

@@ -1,6 +1,6 @@
-//! Dive logs: recorded, replayed, verified, recovered and trimmed; damaged, foreign and odd ones.
+//! Dive logs: recorded, replayed, verified, recovered and trimmed, also damaged, foreign and odd ones.
 
-#![allow(clippy::unwrap_used, clippy::panic, reason = "a test stops at what it can't do")]
+#![allow(clippy::unwrap_used, clippy::panic, reason = "a failed step ends the test")]
 
 mod alerts;
 mod determinism;

@@ -1,4 +1,4 @@
-//! Logs that aren't as a log should be: what is odd is named, with what was done about it, and nothing is taken silently.
+//! Odd logs: every deviation is reported with the way it was handled, and nothing is accepted silently.
 
 use std::fs::File;
 
@@ -6,21 +6,21 @@ use headrace_tests::{Answer, Folder, VEHICLE, raw_messages, write_log};
 use mcap::WriteOptions;
 
 const WITH_VEHICLE: [&str; 2] = ["--vehicle", "vehicle.toml"];
-/// Seconds from 1970 to the autumn of 2026, as ns.
+/// Nanoseconds from 1970 to autumn 2026.
 const UTC_OF_OUR_ZERO_NS: u64 = 1_790_000_000_000_000_000;
 
 fn replay(folder: &Folder, log: &str) -> Answer {
     folder.headrace(&[&["replay", log], &WITH_VEHICLE[..]].concat())
 }
 
-/// What a replay says of the log itself.
+/// Output of a replay about the log itself.
 fn told(answer: &Answer) -> String {
     let odd = answer.stdout.lines().filter(|line| line.contains("LOST") || line.contains("note"));
     odd.fold(String::new(), |all, line| all + line.trim() + "\n")
 }
 
 #[test]
-fn messages_stamped_by_another_clock_are_left_out_and_named() {
+fn messages_of_another_clock_are_skipped_and_reported() {
     let folder = Folder::with_dive();
     let dive = folder.read("dive.mcap");
     let mut messages = raw_messages(&dive);
@@ -32,9 +32,9 @@ fn messages_stamped_by_another_clock_are_left_out_and_named() {
     write_log(&folder.path("mixed.mcap"), WriteOptions::new(), None, &messages);
     let answer = replay(&folder, "mixed.mcap");
     assert_eq!(answer.code, Some(3), "{}", answer.stderr);
-    insta::assert_snapshot!(told(&answer), @r#"LOST: 406 messages of source "depth" left out: they are stamped by another clock, 56.8 years after the one of most messages"#);
+    insta::assert_snapshot!(told(&answer), @r#"LOST: 406 messages of source "depth" left out: they are stamped by another clock, 56.8 years after that of most messages"#);
 
-    // The same where that clock comes first in the order of time: most messages count, not the first ones.
+    // The same holds if that clock's messages come first: the majority counts, not the first ones.
     for message in &mut messages {
         message.log_time = match message.channel.topic.as_str() {
             "/raw/depth" => message.log_time - UTC_OF_OUR_ZERO_NS,
@@ -44,11 +44,11 @@ fn messages_stamped_by_another_clock_are_left_out_and_named() {
     write_log(&folder.path("mixed.mcap"), WriteOptions::new(), None, &messages);
     let answer = replay(&folder, "mixed.mcap");
     assert_eq!(answer.code, Some(3), "{}", answer.stderr);
-    insta::assert_snapshot!(told(&answer), @r#"LOST: 406 messages of source "depth" left out: they are stamped by another clock, 56.8 years before the one of most messages"#);
+    insta::assert_snapshot!(told(&answer), @r#"LOST: 406 messages of source "depth" left out: they are stamped by another clock, 56.8 years before that of most messages"#);
 }
 
 #[test]
-fn a_topic_on_two_channels_is_noted() {
+fn topic_on_two_channels_is_reported() {
     let folder = Folder::with_dive();
     let dive = folder.read("dive.mcap");
     let mut messages = raw_messages(&dive);
@@ -66,7 +66,7 @@ fn a_topic_on_two_channels_is_noted() {
 }
 
 #[test]
-fn messages_beyond_the_order_that_can_be_made_are_counted() {
+fn messages_too_late_to_be_ordered_are_counted() {
     let folder = Folder::with_dive();
     let dive = folder.read("dive.mcap");
     let options = WriteOptions::new().chunk_size(Some(20_000));
@@ -74,18 +74,18 @@ fn messages_beyond_the_order_that_can_be_made_are_counted() {
     let mut bytes = folder.read("lying.mcap");
     let chunks = mcap::Summary::read(&bytes).unwrap().unwrap().chunk_indexes;
     let (one, later) = (&chunks[chunks.len() / 2], &chunks[chunks.len() / 2 + 2]);
-    // The head of a chunk lies: it says that it begins later than it does.
+    // The chunk header states a later start than the true one.
     let place = usize::try_from(one.chunk_start_offset).unwrap() + 9;
     bytes[place..][..8].copy_from_slice(&later.message_start_time.to_le_bytes());
     bytes[place + 8..][..8].copy_from_slice(&later.message_end_time.to_le_bytes());
     folder.write("lying.mcap", bytes);
     let answer = replay(&folder, "lying.mcap");
     assert_eq!(answer.code, Some(3), "{}", answer.stderr);
-    insta::assert_snapshot!(told(&answer), @"LOST: 419 messages out of order by more than can be held, taken where they stand");
+    insta::assert_snapshot!(told(&answer), @"LOST: 419 messages out of order by more than can be held, delivered in file order");
 }
 
 #[test]
-fn an_attached_vehicle_file_with_an_unknown_plugin_is_refused() {
+fn attached_vehicle_file_with_an_unknown_plugin_is_refused() {
     let folder = Folder::with_dive();
     let dive = folder.read("dive.mcap");
     let vehicle = VEHICLE.replace("plugin = \"bar100\"", "plugin = \"bar300\"");
@@ -93,15 +93,15 @@ fn an_attached_vehicle_file_with_an_unknown_plugin_is_refused() {
     let answer = folder.headrace(&["replay", "foreign.mcap"]);
     assert_eq!((answer.code, answer.stdout.as_str()), (Some(2), ""));
     insta::assert_snapshot!(answer.stderr, @r#"headrace: foreign.mcap/vehicle.toml:51: sensors[6].plugin = "bar300": must be one of imagenex881, ping1d, bar100, imu_can, tether_hid, mavlink, a50; did you mean "bar100"?"#);
-    // Another vehicle file reads it, whatever its channels call their plugin.
+    // Another vehicle file reads it, whatever plugin its channels name.
     assert_eq!(replay(&folder, "foreign.mcap").code, Some(0));
 }
 
 #[test]
-fn a_log_of_a_later_format_is_refused() {
+fn log_of_a_later_format_is_refused() {
     let folder = Folder::with_dive();
     let mut writer = mcap::Writer::new(File::create(folder.path("later.mcap")).unwrap()).unwrap();
-    // The digest of "headrace", "format" and "2", each with its length before it.
+    // Digest of "headrace", "format" and "2", each with its length before it.
     let digest = "5f4cd66e8dd4654ec3c05024c8cca16d3efe0230a90901805f639cd21db7270c";
     let metadata = [("format", "2"), ("sha256", digest)].map(|(k, v)| (k.to_owned(), v.to_owned()));
     let record = mcap::records::Metadata { name: "headrace".to_owned(), metadata: metadata.into() };

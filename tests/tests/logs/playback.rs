@@ -1,4 +1,4 @@
-//! Playback of a recorded dive: pauses, single ticks, jumps forwards and back change no result and hide no loss.
+//! Playback of a recorded dive: pauses, single ticks and seeks change no result and hide no loss.
 
 use std::io::Write;
 use std::process::{Output, Stdio};
@@ -22,7 +22,7 @@ use headrace_vehicle::VehicleConfig;
 use proptest::prelude::*;
 use serde_json::Value;
 
-/// Each stop: the time, the tick, the digest, and whether it was the end.
+/// Each stop: time, tick, digest, and whether it was the end.
 #[derive(Default)]
 struct Stops(Vec<(MonoNs, u64, u64, bool)>);
 
@@ -52,7 +52,7 @@ fn armed(vehicle: &VehicleConfig) -> Loop {
     app.arm(vehicle.navigation()).unwrap()
 }
 
-/// What is left of a dive that has ended.
+/// Result of a finished dive.
 #[derive(Debug, PartialEq)]
 struct Outcome {
     digest: u64,
@@ -66,7 +66,7 @@ impl Outcome {
     }
 }
 
-/// The order in which packets are consumed, by their sources.
+/// Sources of the packets in the order in which they are consumed.
 #[derive(Resource, Default)]
 struct Consumed(Vec<u16>);
 
@@ -85,12 +85,12 @@ fn watch(inbox: Res<'_, Inbox>, mut consumed: ResMut<'_, Consumed>) {
     consumed.0.extend(inbox.iter().map(|(source, _)| source.0));
 }
 
-/// A dive of ours was consumed in an order that receive times don't tell: it is played in that order, a log without ticks by
-/// time.
+/// A headrace log replays in its recorded order of consumption, which receive times don't show. A log without ticks
+/// replays by time.
 #[test]
-fn a_log_of_ours_is_played_as_it_was_consumed_and_others_by_time() {
+fn headrace_log_replays_in_consumed_order_and_others_by_time() {
     let folder = Folder::new();
-    // Sources as recorded, each with its receive time.
+    // Sources in recorded order, each with its receive time.
     let recorded = [(2, 3_000), (0, 1_000), (1, 2_000), (1, 2_500), (0, 2_200)];
     for (ticks, wanted) in [(true, [2, 0, 1, 1, 0]), (false, [0, 1, 0, 1, 2])] {
         let mut app = App::new(vehicle().mission());
@@ -118,7 +118,7 @@ fn a_log_of_ours_is_played_as_it_was_consumed_and_others_by_time() {
     }
 }
 
-/// Executes commands, a snapshot after each `interval` of work; where it stopped, and how it ended.
+/// Executes commands with a snapshot after each `interval` of work; returns the stops and the result.
 fn play(folder: &Folder, log: &str, commands: &[PlaybackCommand], interval: Duration) -> (Stops, Outcome) {
     let mut dive = armed(&vehicle());
     let mut player = Player::open(&files_of(&[folder.path(log)]).unwrap()).unwrap();
@@ -135,7 +135,7 @@ fn play(folder: &Folder, log: &str, commands: &[PlaybackCommand], interval: Dura
     (stops, Outcome::of(&dive, &player))
 }
 
-/// Time, tick and digest at the end of each tick of a log that is replayed straight through, and how it ended.
+/// Time, tick and digest at the end of each tick of a straight replay, and its result.
 fn through(folder: &Folder, log: &str) -> (Vec<(MonoNs, u64, u64)>, Outcome) {
     let mut dive = armed(&vehicle());
     let mut player = Player::open(&files_of(&[folder.path(log)]).unwrap()).unwrap();
@@ -148,7 +148,7 @@ fn through(folder: &Folder, log: &str) -> (Vec<(MonoNs, u64, u64)>, Outcome) {
     (ticks, Outcome::of(&dive, &player))
 }
 
-/// The dive as a simulation gives it, by log time; as our recorder writes it, by ticks; and so in parts.
+/// The dive in three forms: from the simulator, by log time; from the recorder, by ticks; and in parts.
 fn logs() -> Folder {
     let folder = Folder::with_dive();
     folder.record("dive.mcap", "ticks.mcap", &[]);
@@ -158,12 +158,12 @@ fn logs() -> Folder {
 }
 
 #[test]
-fn every_jump_lands_in_the_state_of_a_log_played_through() {
+fn every_seek_reaches_the_state_of_a_straight_replay() {
     let folder = logs();
     for log in ["dive.mcap", "ticks.mcap", "parts"] {
         let (ticks, outcome) = through(&folder, log);
         assert!(outcome.losses.is_empty(), "{:?}", outcome.losses);
-        // Before the last two ticks, where a step has no end of its own to stand at.
+        // Before the last two ticks, because a step there has no end of its own.
         let (begun, late) = (ticks[0].0, ticks[ticks.len() - 3].0);
         let span = late.since(begun).0;
         for interval in [Duration::from_millis(5), Duration::from_millis(40), Duration::MAX] {
@@ -194,7 +194,7 @@ fn every_jump_lands_in_the_state_of_a_log_played_through() {
 }
 
 #[test]
-fn at_the_end_it_waits_until_it_is_sent_back() {
+fn playback_waits_at_the_end_for_a_seek() {
     let folder = logs();
     let (ticks, outcome) = through(&folder, "ticks.mcap");
     let [begun, before, last] = [0, ticks.len() - 2, ticks.len() - 1].map(|number| ticks[number]);
@@ -211,7 +211,7 @@ fn at_the_end_it_waits_until_it_is_sent_back() {
     ];
     let (stops, ended) = play(&folder, "ticks.mcap", &commands, Duration::from_millis(5));
     let at = |(at, tick, digest): (MonoNs, u64, u64), ended| (at, tick, digest, ended);
-    // Each time that it comes to the end, or is sent on from there.
+    // Each time that it reaches the end, or is resumed there.
     let expected = [
         at(before, false),
         at(last, false),
@@ -227,7 +227,7 @@ fn at_the_end_it_waits_until_it_is_sent_back() {
     assert_eq!(ended, outcome);
 }
 
-/// Changes a byte in each of three chunks of a log: two next to each other in the middle, and a later one.
+/// Damages a byte in each of three chunks of a log: two adjacent ones in the middle, and a later one.
 fn damage(folder: &Folder, log: &str) {
     let mut bytes = folder.read(log);
     let mut chunks = Vec::new();
@@ -240,14 +240,14 @@ fn damage(folder: &Folder, log: &str) {
         at += 9 + usize::try_from(len).unwrap();
     }
     for number in [chunks.len() / 2, chunks.len() / 2 + 1, chunks.len() * 3 / 4] {
-        // Behind its head.
+        // After the chunk header.
         bytes[chunks[number] + 100] ^= 0x55;
     }
     folder.write(log, bytes);
 }
 
 #[test]
-fn a_jump_over_damage_and_back_loses_what_a_replay_straight_through_does() {
+fn seeking_over_damage_reports_the_same_losses_as_a_straight_replay() {
     let folder = logs();
     damage(&folder, "dive.mcap");
     damage(&folder, "ticks.mcap");
@@ -258,7 +258,7 @@ fn a_jump_over_damage_and_back_loses_what_a_replay_straight_through_does() {
         assert_eq!(outcome.losses.len(), if log == "parts" { 6 } else { 3 }, "{log}: {:?}", outcome.losses);
         let at = |share: usize| PlaybackCommand::Seek(ticks[(ticks.len() - 1) * share / 100].0);
         for interval in [Duration::from_millis(5), Duration::MAX] {
-            // To the end, back to before the damage, to a snapshot behind it, between the damaged places.
+            // Seeks to the end, before the damage, to a snapshot after it, and between the damaged places.
             for jumps in [&[95, 10][..], &[100, 20, 90, 10], &[60, 5, 58, 96, 56]] {
                 let mut commands = vec![PlaybackCommand::Pause];
                 commands.extend(jumps.iter().map(|share| at(*share)));
@@ -268,7 +268,7 @@ fn a_jump_over_damage_and_back_loses_what_a_replay_straight_through_does() {
             }
         }
     }
-    // The same for the report and the exit code.
+    // Report and exit code are the same, too.
     for log in ["ticks.mcap", "parts"] {
         let (code, straight) = folder.replay(log, &[]);
         assert_eq!(code, Some(3));
@@ -281,7 +281,7 @@ fn a_jump_over_damage_and_back_loses_what_a_replay_straight_through_does() {
 }
 
 #[test]
-fn who_ends_before_damage_that_was_seen_is_told_of_it() {
+fn ending_before_seen_damage_still_reports_it() {
     let folder = logs();
     damage(&folder, "ticks.mcap");
     let losses = |lines: &str| {
@@ -297,14 +297,14 @@ fn who_ends_before_damage_that_was_seen_is_told_of_it() {
         "pause\nseek 1h\nback 10s\nback 1h\nend\n",
         "pause\nseek 19s\nseek 1s\ngo\n",
     ] {
-        // Their times may be known better at the end of the log.
+        // The times of losses may be known more exactly at the end of the log.
         let (code, told) = losses(lines);
         assert_eq!((code, told.as_array().unwrap().len()), (Some(3), 3), "{lines}: {told}");
     }
 }
 
 #[test]
-fn a_replay_shown_from_the_middle_gives_the_whole_dive_s_report() {
+fn replay_started_in_the_middle_reports_the_whole_dive() {
     let folder = logs();
     let (code, whole) = folder.replay("ticks.mcap", &[]);
     assert_eq!(code, Some(0));
@@ -331,9 +331,10 @@ fn interactive(folder: &Folder, arguments: &[&str], lines: &str) -> Output {
     program.wait_with_output().unwrap()
 }
 
-/// Other targets are judged by the whole log: beside what was played of it their figures would be of another dive.
+/// Alternative targets are judged by the whole log. Beside a partial replay their figures would describe another
+/// dive.
 #[test]
-fn a_replay_that_was_left_is_not_judged_by_other_targets() {
+fn unfinished_replay_is_not_judged_by_other_targets() {
     let folder = logs();
     let arguments = ["ticks.mcap", "--speed", "1x", "--target", "0.5,0.3", "--report", "left.json"];
     let answer = interactive(&folder, &arguments, "pause\nseek 12s\nend\n");

@@ -1,11 +1,11 @@
-//! Damaged logs and full disks through the program: exit codes, what is said, and that what is left replays to the same digest.
+//! Damaged logs and full disks: exit codes, messages, and a remaining log that replays to the same digest.
 
 use std::process::Command;
 
 use headrace_tests::Folder;
 use serde_json::Value;
 
-/// A dive that was recorded live, and the log of it.
+/// Records a dive live; returns its folder and log.
 fn recorded() -> (Folder, Vec<u8>) {
     let folder = Folder::with_dive();
     folder.record("dive.mcap", "live.mcap", &[]);
@@ -22,10 +22,10 @@ fn recover(folder: &Folder, log: &str, output: &str) -> (Option<i32>, Value) {
 }
 
 #[test]
-fn a_damaged_log_and_the_one_recovered_from_it_are_the_same_dive() {
+fn damaged_log_and_its_recovery_have_the_same_digest() {
     let (folder, whole) = recorded();
     let mut spotted = whole.clone();
-    // As a medium loses a block.
+    // As when a medium loses a block.
     spotted[whole.len() / 2..][..4096].fill(0);
     for (name, bytes) in [("cut", &whole[..whole.len() * 2 / 3]), ("spotted", &spotted)] {
         let (log, fixed) = (format!("{name}.mcap"), format!("{name}-fixed.mcap"));
@@ -42,7 +42,7 @@ fn a_damaged_log_and_the_one_recovered_from_it_are_the_same_dive() {
         let losses = |report: &Value| report["log"]["losses"].as_array().unwrap().len();
         assert_eq!(losses(&recovered), losses(&damaged), "{name}: {}", recovered["log"]["losses"]);
     }
-    // What the dive published live is kept, too.
+    // Results published live are kept, too.
     let answer = folder.headrace(&["verify", "cut-fixed.mcap", "--json"]);
     let told: Value = serde_json::from_str(&answer.stdout).unwrap();
     assert_eq!(answer.code, Some(3), "{told}");
@@ -50,7 +50,7 @@ fn a_damaged_log_and_the_one_recovered_from_it_are_the_same_dive() {
 }
 
 #[test]
-fn nothing_is_overwritten_and_what_is_no_log_leaves_nothing() {
+fn recover_overwrites_nothing_and_leaves_no_file_for_a_non_log() {
     let (folder, _) = recorded();
     let (code, told) = recover(&folder, "live.mcap", "fixed.mcap");
     assert_eq!((code, &told["losses"]), (Some(0), &Value::Array(Vec::new())), "{told}");
@@ -67,7 +67,7 @@ fn nothing_is_overwritten_and_what_is_no_log_leaves_nothing() {
 }
 
 #[test]
-fn logs_cut_or_changed_anywhere_end_in_the_exit_codes_of_the_design() {
+fn logs_cut_or_changed_anywhere_give_the_documented_exit_codes() {
     let (folder, whole) = recorded();
     let digest = folder.digest("live.mcap", &[]);
     let mut lost = 0;
@@ -90,7 +90,7 @@ fn logs_cut_or_changed_anywhere_end_in_the_exit_codes_of_the_design() {
                 assert!(report["log"]["losses"][0].is_string(), "case {case}");
                 lost += 1;
             }
-            // The vehicle file is damaged, or behind the cut.
+            // The vehicle file is damaged or lies after the cut.
             Some(2) => assert!(answer.stderr.contains("no vehicle file"), "case {case}: {}", answer.stderr),
             code => panic!("case {case}: {code:?}: {}", answer.stderr),
         }
@@ -98,12 +98,12 @@ fn logs_cut_or_changed_anywhere_end_in_the_exit_codes_of_the_design() {
     assert!(lost > 20, "{lost} of 40");
 }
 
-/// Records the short dive on a disk of so many kB, and takes the log from there; `None` where no disk can be made.
+/// Records the short dive on a disk of this size and moves the log off it; `None` if no disk can be made.
 fn on_a_disk_of(folder: &Folder, kilobytes: u32) -> Option<(i32, Value, String)> {
     std::fs::create_dir_all(folder.path("disk")).unwrap();
     let program = headrace_tests::program();
     let program = program.get_program().to_str().unwrap();
-    // A mount that nobody else sees, and that goes with the shell.
+    // A private mount that ends with the shell.
     let script = format!(
         "mount -t tmpfs -o size={kilobytes}k none disk || exit 99
         '{program}' run vehicle.toml --source dive.mcap --record disk/log.mcap --speed max --json > report.json 2> said.txt
@@ -117,10 +117,10 @@ fn on_a_disk_of(folder: &Folder, kilobytes: u32) -> Option<(i32, Value, String)>
 }
 
 #[test]
-fn a_disk_that_is_nearly_full_costs_the_echoes_and_a_full_one_the_recording() {
+fn nearly_full_disk_drops_echoes_and_full_disk_ends_the_recording() {
     let folder = Folder::with_dive();
     let digest = folder.digest("dive.mcap", &[]);
-    // Room for all that is small; and for a few seconds.
+    // Room for everything small, and room for a few seconds.
     for (kilobytes, words) in [(20_000, "echo returns"), (80, "recording failed")] {
         let Some((code, report, said)) = on_a_disk_of(&folder, kilobytes) else {
             headrace_tests::skipped("unshare and mount are not allowed here");
@@ -130,12 +130,12 @@ fn a_disk_that_is_nearly_full_costs_the_echoes_and_a_full_one_the_recording() {
         let losses = report["log"]["losses"].to_string();
         assert!(losses.contains(words), "{losses}");
         assert!(said.contains("MB left"), "a warning while the dive goes on: {said}");
-        // What was kept reads, and says what is missing.
+        // The kept part is readable and states the loss.
         let (code, replayed) = folder.replay("small.mcap", &[]);
         let losses = replayed["log"]["losses"].to_string();
         assert!(code == Some(3) && losses.contains("echo returns out"), "{code:?}: {losses}");
         if kilobytes > 1000 {
-            // These heads send ranges, which are short: all of them are kept, and only the results of pings left out.
+            // These heads send short ranges, which are all kept. Only the results of pings are dropped.
             assert_eq!(replayed["digest"], digest.as_str());
         }
     }

@@ -1,4 +1,4 @@
-//! A dive recorded in parts is the same dive: replayed, verified, recovered, and killed while it is recorded.
+//! A dive recorded in parts is the same dive: replayed, verified, recovered, and killed while recording.
 
 use std::path::Path;
 use std::process::{Command, Stdio};
@@ -7,7 +7,7 @@ use std::time::Duration;
 use headrace_tests::Folder;
 use serde_json::Value;
 
-/// How often a dive is killed.
+/// Number of kills.
 const KILLS: u64 = 12;
 
 fn record(folder: &Folder, further: &[&str]) -> Value {
@@ -24,7 +24,7 @@ fn shell_digest(folder: &Folder, files: &str) -> Option<String> {
 }
 
 #[test]
-fn a_dive_in_parts_replays_and_verifies_as_the_same_dive() {
+fn dive_in_parts_replays_and_verifies_as_one() {
     let folder = Folder::with_dive();
     let whole = record(&folder, &["--record", "whole.mcap"]);
     std::fs::create_dir(folder.path("parts")).unwrap();
@@ -39,7 +39,7 @@ fn a_dive_in_parts_replays_and_verifies_as_the_same_dive() {
     assert!(names(&report).len() >= 3 && names(&report)[..3] == expected, "{:?}", names(&report));
     assert_eq!(names(&whole), [""; 0]);
 
-    // The recording's name, its folder, its files in any order.
+    // By the recording's name, its folder, or its files in any order.
     let mut files = names(&report);
     files.reverse();
     let files: Vec<&str> = files.iter().map(String::as_str).collect();
@@ -64,12 +64,12 @@ fn a_dive_in_parts_replays_and_verifies_as_the_same_dive() {
         answer.stdout
     );
 
-    // Together they become one log again.
+    // Recover joins them to one log.
     let answer = folder.headrace(&["recover", "parts", "-o", "joined.mcap"]);
     assert_eq!(answer.code, Some(0), "{}{}", answer.stdout, answer.stderr);
     assert_eq!(folder.digest("joined.mcap", &[]), whole["digest"].as_str().unwrap());
 
-    // A part that is missing is a loss; so is all but one.
+    // A missing part is a loss, and so are all missing parts but one.
     std::fs::remove_file(folder.path("parts/dive.part002.mcap")).unwrap();
     let (code, lacking) = folder.replay("parts", &[]);
     let losses = lacking["log"]["losses"].to_string();
@@ -83,9 +83,9 @@ fn a_dive_in_parts_replays_and_verifies_as_the_same_dive() {
 }
 
 #[test]
-fn the_report_of_a_dive_on_ports_names_its_parts() {
+fn live_report_lists_the_parts_of_the_recording() {
     let folder = Folder::with_dive();
-    // Whoever is at these addresses, if anybody: it is too little for a second part.
+    // These addresses may have devices or not; the data is too little for a second part.
     let arguments =
         ["run", "vehicle.toml", "--record", "live.mcap", "--rotate", "1GiB", "--for", "1", "--json"];
     let answer = folder.headrace(&arguments);
@@ -100,7 +100,7 @@ fn the_report_of_a_dive_on_ports_names_its_parts() {
 }
 
 #[test]
-fn nothing_is_recorded_over_parts_and_dives_are_not_mixed() {
+fn parts_are_never_overwritten_or_mixed() {
     let folder = Folder::with_dive();
     for name in ["a", "b"] {
         let log = format!("{name}.mcap");
@@ -119,14 +119,14 @@ fn nothing_is_recorded_over_parts_and_dives_are_not_mixed() {
 }
 
 #[test]
-fn a_dive_that_is_killed_between_parts_reads_to_its_last_second() {
+fn dive_killed_between_parts_loses_at_most_one_second() {
     let folder = Folder::with_dive();
     let (mut parts, mut same) = (0, 0);
     for number in 0..KILLS {
         let name = format!("killed-{number}");
         std::fs::create_dir(folder.path(&name)).unwrap();
         let log = format!("{name}/dive.mcap");
-        // A part lasts a twentieth of a second of ours.
+        // A part lasts a twentieth of a second of real time.
         let mut dive = headrace_tests::program()
             .args(["run", "vehicle.toml", "--source", "dive.mcap", "--record", &log])
             .args(["--rotate", "1s", "--speed", "20x"])
@@ -147,7 +147,7 @@ fn a_dive_that_is_killed_between_parts_reads_to_its_last_second() {
         };
         assert_eq!(told["differences"], Value::Array(Vec::new()), "{name}: {told}");
         let lost = told["losses"].as_array().unwrap();
-        // The part that was being written, and one that had just been begun.
+        // Only the part being written and one just begun may be lost.
         assert!(lost.len() <= 2, "{name}: {told}");
         assert!(lost.iter().all(|loss| !loss.as_str().unwrap().contains("missing")), "{name}: {told}");
         same += told["same_records"].as_u64().unwrap();
@@ -158,7 +158,7 @@ fn a_dive_that_is_killed_between_parts_reads_to_its_last_second() {
 }
 
 #[test]
-fn a_part_that_is_named_twice_is_read_once() {
+fn part_named_twice_is_read_once() {
     let folder = Folder::with_dive();
     record(&folder, &["--record", "a.mcap", "--rotate", "5s"]);
     let digest = folder.digest("a.mcap", &[]);
@@ -175,7 +175,7 @@ fn a_part_that_is_named_twice_is_read_once() {
     for further in [&names[1..], &["a.part002.mcap"], &["./a.part002.mcap", "a.mcap"]] {
         assert_eq!(folder.digest("a.mcap", further), digest, "{further:?}");
     }
-    // Another file that says that it is the same part is one too many, and both are named.
+    // A second file that claims the same part is refused, and both are named.
     std::fs::copy(folder.path("a.part002.mcap"), folder.path("b.mcap")).unwrap();
     let answer = folder.headrace(&["replay", "a.mcap", "b.mcap"]);
     assert_eq!(answer.code, Some(2), "{}", answer.stdout);

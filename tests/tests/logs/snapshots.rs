@@ -1,4 +1,4 @@
-//! A loop's state is saved at any tick and put into another loop, which goes on to the same state, bit for bit.
+//! A loop's state saved at any tick and restored into another loop continues to the same state, bit for bit.
 
 use headrace_geometry::time::MonoNs;
 use headrace_monitor::App;
@@ -26,7 +26,8 @@ const COMMANDS: [&str; 7] = [
     r#"{"do":"nothing"}"#,
 ];
 
-/// All that a scene's devices send, every third packet of a stream of bytes cut in two: frames are open at any moment.
+/// All packets of a scene's devices. Every third packet of a byte stream is cut in two, so that frames are incomplete
+/// at any moment.
 pub(crate) fn packets(scene: &Scene) -> Vec<Packet> {
     let mut simulation = Simulation::new(scene).unwrap();
     let mut all = Vec::new();
@@ -41,7 +42,7 @@ pub(crate) fn packets(scene: &Scene) -> Vec<Packet> {
         for bytes in [&bytes[..cut], &bytes[cut..]].into_iter().filter(|bytes| !bytes.is_empty()) {
             all.push(Packet { source, at, bytes: bytes.to_vec() });
         }
-        // An operator at work.
+        // Adds operator commands.
         if all.len() % 97 == 0 {
             let command = COMMANDS[all.len() / 97 % COMMANDS.len()].as_bytes().to_vec();
             all.push(Packet { source: scene.vehicle.sensors.len(), at, bytes: command });
@@ -62,7 +63,7 @@ fn armed(vehicle: &VehicleConfig) -> (Loop, Vec<Port>) {
     (dive, ports)
 }
 
-/// Runs a loop on packets, a tick for some.
+/// Runs a loop on packets, with a tick after some of them.
 fn run((dive, ports): &mut (Loop, Vec<Port>), packets: &[Packet]) {
     for some in packets.chunks(23) {
         for packet in some {
@@ -73,12 +74,12 @@ fn run((dive, ports): &mut (Loop, Vec<Port>), packets: &[Packet]) {
     }
 }
 
-/// Saves a dive at many moments; from each, another loop goes on to the next, and must be in the same state there.
+/// Saves a dive at many moments. From each, another loop runs to the next and must reach the same state.
 fn goes_on_from_anywhere(scene: &Scene) {
     let packets = packets(scene);
     let (mut whole, mut other) = (armed(&scene.vehicle), armed(&scene.vehicle));
     let mut saved = whole.0.save().unwrap();
-    // Not where anything else of the dive has its period.
+    // A stretch that matches no other period of the dive.
     let stretch = packets.len() / 17 + 1;
     for (number, stretch) in packets.chunks(stretch).enumerate() {
         run(&mut whole, stretch);
@@ -99,19 +100,19 @@ fn goes_on_from_anywhere(scene: &Scene) {
     assert!(reports[0].dive.samples_valid > 100);
 }
 
-/// To and fro, so that sections fail, settle, and are cleared.
+/// Back and forth, so that sections fail, settle and are cleared.
 pub(crate) const LEGS: &str = "[trajectory]\nstart_m = 3\n[[trajectory.legs]]\ndistance_m = 5\nspeed_mps = 0.197\n\
     [[trajectory.legs]]\ndistance_m = 5\nspeed_mps = 0.4\n[[trajectory.legs]]\ndistance_m = 7\nspeed_mps = -0.3\n";
 
 pub(crate) const EFFECTS: &str = "[effects]\nrange_noise = { sd_m = 0.02 }\nmissing_returns = { share = 0.1, mean_run = 5 }\n\
     pilot_drift = { across_m = 0.4, yaw_deg = 4 }\n";
 
-/// An inertial unit by a file of its frames, as its crate's README has it.
+/// An inertial unit defined by a DBC file of its frames, as in its crate's README.
 const DBC: &str = "dbc = \"sbg_ellipse.dbc\"\naxes = \"frd\"\nsignals.rate = [\"GyroX\", \"GyroY\", \"GyroZ\"]\n\
     signals.force = [\"AccX\", \"AccY\", \"AccZ\"]\nsignals.quaternion = [\"QuatW\", \"QuatX\", \"QuatY\", \"QuatZ\"]\n\
     signals.rate_valid = { signal = \"ImuStatus\", mask = 0x2E1 }\nsignals.sample_time = \"ImuTime\"";
 
-/// A dive of the vehicle that every test has, with changes to its file.
+/// A dive of the common test vehicle, with changes to its file.
 fn small_vehicle(change: impl Fn(&str) -> String) -> Scene {
     let vehicle = change(headrace_tests::VEHICLE);
     let load = |name: &str| match name {
@@ -123,28 +124,28 @@ fn small_vehicle(change: impl Fn(&str) -> String) -> Scene {
 }
 
 #[test]
-fn four_heads_with_the_filter() {
+fn snapshot_of_four_heads_with_filter_resumes_identically() {
     goes_on_from_anywhere(&scenes::scene(&format!("vehicle = \"vita2-4.toml\"\n{LEGS}{EFFECTS}")));
 }
 
 #[test]
-fn without_a_filter() {
+fn snapshot_without_a_filter_resumes_identically() {
     goes_on_from_anywhere(&small_vehicle(|vehicle| format!("{vehicle}[navigation]\nway = \"direct\"\n")));
 }
 
 #[test]
-fn an_inertial_unit_by_a_dbc_file() {
+fn snapshot_with_a_dbc_inertial_unit_resumes_identically() {
     goes_on_from_anywhere(&small_vehicle(|vehicle| vehicle.replace("preset = \"xsens_mti600\"", DBC)));
 }
 
 #[test]
-fn an_autopilot_and_a_velocity_log() {
+fn snapshot_with_autopilot_and_velocity_log_resumes_identically() {
     goes_on_from_anywhere(&small_vehicle(|_| headrace_tests::other_vehicle()));
 }
 
 /// Another vehicle's state is refused.
 #[test]
-fn another_vehicle_s_state_is_refused() {
+fn snapshot_of_another_vehicle_is_refused() {
     let two = small_vehicle(str::to_owned);
     let four = scenes::scene(&format!("vehicle = \"vita2-4.toml\"\n{LEGS}"));
     let (mut two, four) = (armed(&two.vehicle).0, armed(&four.vehicle).0);

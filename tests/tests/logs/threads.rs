@@ -1,5 +1,6 @@
-//! A replay on several threads, and several loops with one navigation: every tick is as on one thread, bit for bit, however the
-//! feed ends.
+//! Replays on several threads, and loops that share a navigation, give the same ticks as one thread, bit for bit.
+//!
+//! This holds however the feed ends.
 
 use std::hash::{DefaultHasher, Hash, Hasher};
 
@@ -24,7 +25,7 @@ use crate::snapshots::{EFFECTS, LEGS, Packet, packets};
 
 const THREADS: [usize; 3] = [1, 2, 3];
 
-/// How a feed ends.
+/// The end of a feed.
 #[derive(Clone, Copy, PartialEq)]
 enum End {
     /// After its last packet.
@@ -66,7 +67,7 @@ impl PacketSource for Feed {
     }
 }
 
-/// Four heads to and fro: sections fail, settle and are cleared, an operator is at work.
+/// A scene of four heads, back and forth: sections fail, settle and are cleared, and an operator acts.
 fn scene() -> Scene {
     scenes::scene(&format!("vehicle = \"vita2-4.toml\"\n{LEGS}{EFFECTS}"))
 }
@@ -83,7 +84,7 @@ fn armed(vehicle: &VehicleConfig, plugin: Option<&dyn Plugin>) -> Loop {
     app.arm(vehicle.navigation()).unwrap()
 }
 
-/// All that can be asked of a loop after a tick.
+/// Digest of everything that can be read from a loop after a tick.
 fn of_tick(dive: &Loop) -> u64 {
     let mut hasher = DefaultHasher::new();
     let inbox = dive.resource::<Inbox>().unwrap();
@@ -98,7 +99,7 @@ fn of_tick(dive: &Loop) -> u64 {
     hasher.finish()
 }
 
-/// A dive on so many threads: each tick, how it ended, and the report and the state at the end.
+/// Result of a dive on some number of threads: each tick, the end, and the final report and state.
 #[derive(PartialEq)]
 struct Dived {
     ticks: Vec<u64>,
@@ -113,7 +114,7 @@ fn dived(threads: usize, scene: &Scene, tick_ms: i64, packets: &[Packet], end: E
     let (mut ticks, tick) = (Vec::new(), DurNs::from_millis(tick_ms));
     let mut note = |dive: &Loop| ticks.push(of_tick(dive));
     let driven = match threads {
-        // Not by the function that is tested.
+        // Zero threads: driven without the function under test.
         0 => drive(&mut dive, &mut feed, Pace { tick, speed: None }, &mut note),
         threads => drive_on(threads, &mut dive, &mut feed, tick, &mut note),
     };
@@ -122,7 +123,7 @@ fn dived(threads: usize, scene: &Scene, tick_ms: i64, packets: &[Packet], end: E
     Dived { ticks, error, report, state }
 }
 
-/// The report at the end, and the state before it.
+/// Report at the end, and the state before it.
 fn ended(dive: &mut Loop) -> (Value, Vec<u8>) {
     let state = dive.save().unwrap();
     dive.finish(&mut |_, _| ());
@@ -139,7 +140,7 @@ fn same(one: &Dived, other: &Dived, what: &str) {
 }
 
 #[test]
-fn every_tick_is_the_same_on_any_number_of_threads() {
+fn number_of_threads_does_not_change_any_tick() {
     let scene = scene();
     let packets = packets(&scene);
     for tick_ms in [20, 777] {
@@ -154,7 +155,7 @@ fn every_tick_is_the_same_on_any_number_of_threads() {
 }
 
 #[test]
-fn a_feed_that_fails_ends_the_dive_where_it_does_on_one_thread() {
+fn failing_feed_ends_the_dive_at_the_same_tick_on_any_number_of_threads() {
     let scene = scene();
     let packets = packets(&scene);
     for at in [0, 1, packets.len() / 3, packets.len() - 1] {
@@ -168,7 +169,7 @@ fn a_feed_that_fails_ends_the_dive_where_it_does_on_one_thread() {
 }
 
 #[test]
-fn a_thread_that_panics_is_an_error_and_nobody_waits_for_it() {
+fn panicking_thread_is_an_error_and_never_blocks() {
     let scene = scene();
     let packets = packets(&scene);
     for (threads, at) in [(2, 0), (2, 5000), (3, 5000)] {
@@ -181,7 +182,7 @@ fn a_thread_that_panics_is_an_error_and_nobody_waits_for_it() {
             "{words}"
         );
     }
-    // The caller's own panic is passed on, and leaves no thread waiting.
+    // A panic of the caller is passed on and leaves no thread waiting.
     let mut feed = Feed { packets, next: 0, end: End::Last };
     let mut dive = armed(&scene.vehicle, None);
     let caught = std::panic::catch_unwind(std::panic::AssertUnwindSafe(|| {
@@ -190,7 +191,7 @@ fn a_thread_that_panics_is_an_error_and_nobody_waits_for_it() {
     assert!(caught.is_err());
 }
 
-/// An outlet that holds packets back now and then.
+/// An outlet that is sometimes behind and holds packets back.
 struct Behind;
 
 #[derive(Resource, Default)]
@@ -229,7 +230,7 @@ fn see(inbox: Res<'_, Inbox>, mut seen: ResMut<'_, Seen>) {
 }
 
 #[test]
-fn outlets_that_are_behind_are_waited_for_and_plugins_see_all() {
+fn loop_waits_for_slow_outlets_and_plugins_see_every_packet() {
     let scene = scene();
     let packets = packets(&scene);
     let expected = dived(0, &scene, 20, &packets, End::Last).report;
@@ -248,9 +249,9 @@ fn outlets_that_are_behind_are_waited_for_and_plugins_see_all() {
     }
 }
 
-/// What a loop that is split can't do is refused, and doing it twice, too.
+/// A split loop refuses operations that it can't do, and a second split.
 #[test]
-fn a_split_loop_is_neither_saved_nor_split_again() {
+fn split_loop_cannot_be_saved_or_split_again() {
     let scene = scene();
     let mut dive = armed(&scene.vehicle, None);
     let saved = dive.save().unwrap();
@@ -263,7 +264,7 @@ fn a_split_loop_is_neither_saved_nor_split_again() {
 }
 
 #[test]
-fn several_loops_with_one_navigation_end_as_each_would_alone() {
+fn loops_that_share_a_navigation_end_as_each_would_alone() {
     let scene = scene();
     let packets = packets(&scene);
     let asked = [(0.3, 0.25), (0.5, 0.25), (0.8, 1.0), (1.2, 0.5)];
@@ -305,7 +306,7 @@ fn several_loops_with_one_navigation_end_as_each_would_alone() {
 }
 
 #[test]
-fn loops_that_place_pings_otherwise_share_no_navigation() {
+fn loops_with_different_placement_cannot_share_a_navigation() {
     let scene = scene();
     let (mut first, mut other) = (scene.vehicle.mission(), scene.vehicle.mission());
     (first.length_m, other.site.sound_speed_mps) = (50.0, first.site.sound_speed_mps + 1.0);
@@ -322,9 +323,9 @@ fn loops_that_place_pings_otherwise_share_no_navigation() {
     assert!(matches!(driven, Err(DriveError::Unlike { number: 1 })), "{driven:?}");
 }
 
-/// The program's own way, with a log that is damaged in the middle, and one that is cut off.
+/// The program's own replay with two logs: one damaged in the middle, one truncated.
 #[test]
-fn damaged_logs_lose_the_same_on_any_number_of_threads() {
+fn number_of_threads_does_not_change_the_losses_of_damaged_logs() {
     let folder = Folder::with_dive();
     folder.record("dive.mcap", "live.mcap", &[]);
     let whole = folder.read("live.mcap");

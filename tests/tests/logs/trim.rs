@@ -1,10 +1,11 @@
-//! Trimmed logs: with nothing cut the same dive, cut the same verdicts inside, and no name left where none is to be.
+//! Trimmed logs: uncut they are the same dive, cut they keep the verdicts inside, and anonymous ones contain no
+//! names.
 
 use headrace_tests::{Folder, SCENE, VEHICLE, raw_messages, write_log};
 use mcap::WriteOptions;
 use serde_json::Value;
 
-/// Two minutes: a steady way, long enough for an inside.
+/// Two minutes at a steady speed, long enough for inner sections.
 const LONG: &str = r#"name = "long dive"
 vehicle = "vehicle.toml"
 
@@ -16,7 +17,7 @@ distance_m = 24
 speed_mps = 0.2
 "#;
 
-/// A dive that was recorded live.
+/// Records a dive live.
 fn recorded(scene: &str, vehicle: &str) -> Folder {
     let folder = Folder::new();
     folder.write("vehicle.toml", vehicle);
@@ -32,7 +33,7 @@ fn trim(folder: &Folder, output: &str, further: &[&str]) -> Value {
     serde_json::from_str(&answer.stdout).unwrap()
 }
 
-/// Verdict and hole of each section that lies within a stretch.
+/// Verdict and hole of each section within a stretch.
 fn within(report: &Value, from_m: f64, to_m: f64) -> Vec<(f64, String)> {
     let sections = report["sections"].as_array().unwrap().iter();
     let inside = sections.filter_map(|section| {
@@ -44,14 +45,14 @@ fn within(report: &Value, from_m: f64, to_m: f64) -> Vec<(f64, String)> {
 }
 
 #[test]
-fn with_nothing_cut_it_is_the_same_dive_down_to_its_results() {
+fn uncut_trim_keeps_the_dive_and_its_results() {
     let folder = recorded(headrace_tests::SCENE, VEHICLE);
     let digest = folder.digest("live.mcap", &[]);
     for (name, further) in
         [("copy.mcap", &[][..]), ("echoless.mcap", &["--drop-echoes"]), ("public.mcap", &["--anonymise"])]
     {
         let told = trim(&folder, name, further);
-        // Alerts name people.
+        // Alerts contain people's names.
         let leaves_out = told["results_left_out"].as_u64().unwrap() > 0;
         assert_eq!((told["cut"].as_u64(), leaves_out), (Some(0), name == "public.mcap"), "{told}");
         assert_eq!(folder.digest(name, &[]), digest, "{name}");
@@ -63,7 +64,7 @@ fn with_nothing_cut_it_is_the_same_dive_down_to_its_results() {
 }
 
 #[test]
-fn a_cut_says_that_it_is_one_and_judges_its_inside_as_the_whole() {
+fn cut_log_says_so_and_keeps_the_verdicts_inside() {
     let folder = recorded(LONG, VEHICLE);
     let (_, whole) = folder.replay("live.mcap", &[]);
     let expected = within(&whole, 12.0, 19.0);
@@ -85,7 +86,7 @@ fn a_cut_says_that_it_is_one_and_judges_its_inside_as_the_whole() {
         assert_eq!(answer.code, Some(1), "{}", answer.stdout);
         assert!(answer.stdout.contains("this log is an extract"), "{}", answer.stdout);
     }
-    // Only what there was is said to be missing.
+    // Only data that existed is reported as removed.
     for (name, further, said, unsaid) in [
         ("later.mcap", ["--from", "20s"], "before was cut off", "after was cut off"),
         ("earlier.mcap", ["--to", "20s"], "after was cut off", "before was cut off"),
@@ -101,8 +102,8 @@ fn a_cut_says_that_it_is_one_and_judges_its_inside_as_the_whole() {
 }
 
 #[test]
-fn echoes_go_and_ranges_stay() {
-    // Heads that send their echo, 252 bytes of it, with the range.
+fn trim_removes_echoes_and_keeps_ranges() {
+    // Heads that send their echo (252 bytes) with the range.
     let folder = recorded(headrace_tests::SCENE, VEHICLE);
     let dive = folder.read("dive.mcap");
     let mut messages = raw_messages(&dive);
@@ -127,7 +128,7 @@ fn echoes_go_and_ranges_stay() {
 }
 
 #[test]
-fn an_anonymous_log_has_no_name_address_comment_or_time_of_day() {
+fn anonymous_log_has_no_name_address_comment_or_time_of_day() {
     let vehicle = VEHICLE
         .replace("name = \"test vehicle\"", "name = \"VITA of Upperplant\" # bought by Anna")
         .replace("profile = \"circle\"\nradius_m = 3", "profile = \"polyline\"\nfile = \"upperplant.csv\"");
@@ -138,7 +139,7 @@ fn an_anonymous_log_has_no_name_address_comment_or_time_of_day() {
     folder.simulate("scene.toml", "plain.mcap");
     folder.record("plain.mcap", "live.mcap", &[]);
     let told = trim(&folder, "public.mcap", &["--anonymise"]);
-    // Attachments and metadata aren't compressed; so is nothing after this.
+    // Attachments and metadata aren't compressed; after this nothing is.
     let answer = folder.headrace(&["recover", "public.mcap", "-o", "again.mcap"]);
     assert_eq!(answer.code, Some(0), "{}", answer.stderr);
     let text = String::from_utf8_lossy(&folder.read("public.mcap")).to_lowercase();
@@ -157,7 +158,7 @@ fn an_anonymous_log_has_no_name_address_comment_or_time_of_day() {
 }
 
 #[test]
-fn times_outside_the_dive_are_refused_and_leave_what_was_there() {
+fn times_outside_the_dive_are_refused_and_keep_existing_files() {
     let folder = recorded(SCENE, VEHICLE);
     trim(&folder, "part.mcap", &["--to", "5s"]);
     let before = folder.read("part.mcap");

@@ -1,9 +1,9 @@
-//! A replay is held against what the live dive published: the same, or named where it first parts.
+//! Verify compares a replay with the results of the live dive, and reports the first difference.
 
 use headrace_tests::{Folder, VEHICLE};
 use serde_json::Value;
 
-/// A dive that was recorded live.
+/// Records a dive live.
 fn recorded() -> Folder {
     let folder = Folder::with_dive();
     folder.record("dive.mcap", "live.mcap", &[]);
@@ -19,7 +19,7 @@ fn verified(folder: &Folder, further: &[&str]) -> (Option<i32>, Value) {
 }
 
 #[test]
-fn the_same_program_gives_the_same_dive_at_any_tick() {
+fn verify_passes_at_any_tick_length() {
     let folder = recorded();
     for tick in ["1", "20", "5000"] {
         let (code, told) = verified(&folder, &["live.mcap", "--tick-ms", tick]);
@@ -33,9 +33,9 @@ fn the_same_program_gives_the_same_dive_at_any_tick() {
 }
 
 #[test]
-fn another_mount_by_a_hair_is_found_with_tick_sensor_field_and_bits() {
+fn verify_reports_a_tiny_mount_change_with_tick_sensor_field_and_bits() {
     let folder = recorded();
-    // Two ulps of a metre and a bit, where the sensor's id says which.
+    // Two ulps of a metre and a bit, found in the sensor that the id names.
     let other = VEHICLE.replacen("mode = \"fastest\"", "mode = \"fastest\"\nangles_deg = [0, 0, 1e-13]", 1);
     folder.write("other.toml", other);
     let (code, told) = verified(&folder, &["live.mcap", "--vehicle", "other.toml"]);
@@ -50,7 +50,7 @@ fn another_mount_by_a_hair_is_found_with_tick_sensor_field_and_bits() {
 }
 
 #[test]
-fn a_log_that_was_cut_off_is_verified_as_far_as_it_goes() {
+fn truncated_log_is_verified_up_to_its_end() {
     let folder = recorded();
     let whole = folder.read("live.mcap");
     folder.write("cut.mcap", &whole[..whole.len() / 2]);
@@ -60,7 +60,7 @@ fn a_log_that_was_cut_off_is_verified_as_far_as_it_goes() {
 }
 
 #[test]
-fn a_log_without_results_has_nothing_to_be_verified_by() {
+fn log_without_results_cannot_be_verified() {
     let folder = Folder::with_dive();
     let answer = folder.headrace(&["verify", "dive.mcap"]);
     assert_eq!(answer.code, Some(1));

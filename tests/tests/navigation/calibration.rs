@@ -1,11 +1,11 @@
-//! `headrace calibrate`: logs of a vehicle whose heads sit otherwise than the file says, and whose messages come late.
+//! `headrace calibrate`: logs of a vehicle with wrong mounts in its file and late messages.
 
 use std::fmt::Write as _;
 
 use headrace_tests::Folder;
 use serde_json::Value;
 
-/// Two heads and all that gives a position; narrow beams, since the simulated ones are rays here.
+/// Two heads and all sensors that give a position; narrow beams, because the simulated ones are rays here.
 fn vehicle(front: &str, aft: &str, zero_at_m: f64) -> String {
     let pings = [("left", "0, 90"), ("right", "0, -90"), ("up", "-90, 0"), ("down", "90, 0")];
     let pings = pings.map(|(id, angles)| {
@@ -52,12 +52,12 @@ zero_at_m = {zero_at_m}
     )
 }
 
-/// As the file has it.
+/// Mounts as in the file.
 fn filed() -> String {
     vehicle("position_m = [0.1, 0, 0]", "position_m = [-0.1, 0, 0]\nangles_deg = [0, 0, 180]", 0.0)
 }
 
-/// A stand of twelve seconds, and a way of thirty on which the vehicle yaws, rolls and pitches.
+/// Stationary for twelve seconds, then thirty seconds of motion with yaw, roll and pitch.
 fn scene(stand: bool, effects: &str) -> String {
     let mut scene =
         "name = \"calibration\"\nvehicle = \"true.toml\"\n[trajectory]\nkind = \"waypoints\"\n".to_owned();
@@ -95,7 +95,7 @@ fn found<'a>(report: &'a Value, of: &str, what: &str) -> &'a Value {
         .unwrap_or_else(|| panic!("{of} {what}: {report:#}"))
 }
 
-/// That a latency was found within three of its own standard deviations, and better than `most_ms`.
+/// Checks that a latency was found within three of its standard deviations and within `most_ms`.
 #[track_caller]
 fn assert_latency(report: &Value, of: &str, truth_ms: f64, most_ms: f64) {
     let row = found(report, of, "latency");
@@ -107,9 +107,9 @@ const LATE_UNIT: &str =
     "line_delay = { sensors = [\"imu\"], latency_ms = 80 }\noutliers = { share = 0.08 }\n";
 const LATE_HEAD: &str = "line_delay = { sensors = [\"front\"], latency_ms = 50 }\n";
 
-/// A head that is turned and another that faces the other way, a counter that was zeroed elsewhere, a unit that is late.
+/// A rotated head, a reversed head, a counter with another zero, and a late inertial unit.
 #[test]
-fn what_is_wrong_with_the_file_is_found_and_offered() {
+fn calibrate_finds_and_offers_wrong_settings() {
     let front = "position_m = [0.1, 0, 0.04]\nangles_deg = [4, 0, 0]";
     let truth = vehicle(front, "position_m = [-0.1, 0, 0]\nangles_deg = [0, 0, 0]", 1.5);
     let folder = folder(true, &truth, LATE_UNIT);
@@ -153,7 +153,7 @@ fn what_is_wrong_with_the_file_is_found_and_offered() {
     imu          latency                             0.0       73.4      6.6 ms  differs
 
     not told by this log
-      tether, latency: the vehicle hardly turned or moved for it: it would be known to 38 ms
+      tether, latency: the vehicle hardly turned or moved: the latency would be known only to 38 ms
 
     for the vehicle file
     [water]
@@ -173,18 +173,18 @@ fn what_is_wrong_with_the_file_is_found_and_offered() {
 }
 
 #[test]
-fn a_late_head_is_found_and_nothing_else_is_late() {
+fn calibrate_finds_only_the_late_head() {
     let folder = folder(true, &filed(), LATE_HEAD);
     let answer = folder.headrace(&["calibrate", "dive.mcap", "--json"]);
     assert_eq!(answer.code, Some(0), "{}", answer.stderr);
     let report: Value = serde_json::from_str(&answer.stdout).unwrap();
-    // The vehicle file takes none of 32 ms or more: a head answers before its next ping.
+    // The vehicle file accepts less than 32 ms only, because a head answers before its next ping.
     let untold = report["untold"].as_array().unwrap();
     let why = untold.iter().find(|row| row["of"] == "front" && row["what"] == "latency").unwrap()["why"]
         .as_str()
         .unwrap();
     let found_ms: f64 = why.split(' ').next().unwrap().parse().unwrap();
-    assert!((found_ms - 50.0).abs() < 30.0 && why.contains(" ms: it can't be as late"), "{why}");
+    assert!((found_ms - 50.0).abs() < 30.0 && why.contains(" ms, so it can't be that late"), "{why}");
     for of in ["aft", "imu", "ping_left", "ping_right", "ping_up", "ping_down"] {
         assert_latency(&report, of, 0.0, 30.0);
     }
@@ -194,9 +194,10 @@ fn a_late_head_is_found_and_nothing_else_is_late() {
     assert_eq!(report["untold"][0]["of"], "water");
 }
 
-/// Nothing else is to be changed for walls that aren't there; whichever of the two it is, the speed of sound that fits is told.
+/// No other setting may be changed to explain distant walls. The matching speed of sound is reported, whether it or
+/// the wall is wrong.
 #[test]
-fn a_wrong_speed_of_sound_is_named_and_no_line_is_given() {
+fn wrong_speed_of_sound_is_reported_without_a_settings_line() {
     for (share, says) in [(0.04, "ranges are -"), (-0.04, "ranges are +")] {
         let folder = folder(true, &filed(), &format!("sound_speed_error = {{ share = {share} }}\n"));
         let answer = folder.headrace(&["calibrate", "dive.mcap"]);
@@ -210,9 +211,9 @@ fn a_wrong_speed_of_sound_is_named_and_no_line_is_given() {
     }
 }
 
-/// Without a stand there are no mounts and no zeros; with little of the log there is nothing at all.
+/// Without a stationary phase there are no mounts and no zeros; with a very short log there is no result at all.
 #[test]
-fn a_vehicle_that_moves_is_told_so() {
+fn calibrate_without_a_stationary_phase_says_so() {
     let folder = folder(false, &filed(), "");
     let answer =
         folder.headrace(&["calibrate", "dive.mcap", "--from", "8", "--to", "8.9", "--chainage", "10"]);
@@ -239,7 +240,7 @@ fn a_vehicle_that_moves_is_told_so() {
 }
 
 #[test]
-fn options_that_make_no_sense_are_refused() {
+fn invalid_options_are_refused() {
     let folder = folder(false, &filed(), "");
     for (options, words) in [
         (["--from", "9", "--to", "9"], "--to 9 is not after --from 9"),

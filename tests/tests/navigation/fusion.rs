@@ -1,4 +1,4 @@
-//! The filter against the truth of simulated dives, beside the paper's way of navigating on the same data.
+//! The filter compared with the truth of simulated dives, and with the paper's navigation on the same data.
 
 use headrace_fusion::direct::DirectNavigation;
 use headrace_fusion::filter::sources::Consistency;
@@ -8,11 +8,11 @@ use headrace_tests::field::{Figures, POSE, TURN_S, field, figures, nees, rms, sh
 use headrace_tests::scenes;
 use headrace_tests::tracking::{self, Silence, Track, dive, filter};
 
-/// Seeds; the bounds below are those of so many dives.
+/// Number of seeds; the bounds below belong to this number of dives.
 const SEEDS: u64 = 20;
-/// How far the vehicle comes in a turn of its head.
+/// Distance that the vehicle covers in a turn of its head, m.
 const T_X_M: f64 = TURN_S * 0.197;
-/// Epochs until the first estimate has settled.
+/// Number of epochs until the first estimate has settled.
 const SETTLED: usize = 50;
 
 type Pick = fn(&Figures) -> f64;
@@ -21,11 +21,11 @@ fn mean_of(all: &[Figures], pick: Pick) -> f64 {
     rms(all.iter().map(pick))
 }
 
-/// One dive with the filter, and what the same returns give without it and with the truth.
+/// One dive with the filter, and the same returns without it and with the truth.
 struct Dives {
     filter: Track,
     without: Figures,
-    /// Error of the hole of each section, m, and its standard deviation as told.
+    /// Error of each section's hole, m, and its reported standard deviation.
     holes: Vec<(f64, f64)>,
 }
 
@@ -39,7 +39,7 @@ fn dives(seed: u64) -> Dives {
     Dives { filter, without, holes }
 }
 
-/// Error of the hole of each section, m, and its standard deviation as told.
+/// Error of each section's hole, m, and its reported standard deviation.
 fn hole_errors(ours: &Track, truth: &Track) -> Vec<(f64, f64)> {
     let pairs = ours.report.sections.iter().filter_map(|ours| {
         let same = |other: &f64| (other - ours.start_m).abs() < 1e-6;
@@ -49,18 +49,18 @@ fn hole_errors(ours: &Track, truth: &Track) -> Vec<(f64, f64)> {
     pairs.collect()
 }
 
-/// The vehicle's file says what kind of unit it has: a restless one.
+/// The vehicle file for this kind of inertial unit, which has high noise.
 fn told(name: &str) -> Result<Vec<u8>, String> {
     let file = String::from_utf8(scenes::vehicle_file(name)?).map_err(|error| error.to_string())?;
     let unit = "[navigation]\ngyro_bias_degps = 0.2\ngyro_bias_time_s = 300\naccel_bias_mps2 = 0.02";
     Ok(file.replace("[navigation]", unit).into_bytes())
 }
 
-/// It should be 0.9: with a unit as restless as this one, walls that correct the attitude only in part leave a yaw that a pass
-/// shares with the next less than the filter believes.
+/// The goal is 0.9. With a noisy unit, walls correct the attitude only in part. The remaining yaw is shared by
+/// neighbouring passes less than the filter assumes.
 const LEAST_APART: f64 = 0.8;
 
-/// Of heads apart along the hull, neighbouring passes are made at quite different times.
+/// Heads apart along the hull make neighbouring passes at quite different times.
 #[test]
 fn holes_of_heads_apart_along_the_hull_are_within_their_bounds() {
     let mut all = Vec::new();
@@ -77,14 +77,14 @@ fn holes_of_heads_apart_along_the_hull_are_within_their_bounds() {
         let scene = scenes::seeded(&text, &told, Some(seed));
         let ours = dive(&scene, filter(&scene), Silence::default());
         let errors = hole_errors(&ours, &tracking::true_dive(&scene));
-        // The ends have no neighbours on one side.
+        // Sections at the ends have no neighbours on one side.
         all.extend(errors.iter().skip(12).rev().skip(12).copied());
     }
     holes_within_their_bounds(&all, LEAST_APART);
 }
 
 #[test]
-fn field_dives_are_tracked_and_the_filter_knows_how_well() {
+fn filter_is_accurate_and_consistent_in_field_dives() {
     let all: Vec<Dives> = std::thread::scope(|scope| {
         let half =
             |odd: u64| move || (1..=SEEDS).filter(|seed| seed % 2 == odd).map(dives).collect::<Vec<_>>();
@@ -98,7 +98,9 @@ fn field_dives_are_tracked_and_the_filter_knows_how_well() {
     holes_within_their_bounds(&holes, 0.9);
 }
 
-/// Across the tunnel within 5 cm, a turn's way within 2 % of T_x, three times better than without a filter.
+/// Checks the filter's errors: across and up within 5 cm, across three times smaller than without a filter.
+///
+/// The displacement over a turn must be within 2 % of T_x or 3 cm, averaged over the dives.
 fn accuracy(all: &[Dives]) {
     let ours: Vec<Figures> = all.iter().map(|dives| figures(&dives.filter)).collect();
     let theirs: Vec<Figures> = all.iter().map(|dives| dives.without).collect();
@@ -108,7 +110,7 @@ fn accuracy(all: &[Dives]) {
         ("up, m", |f| f.up_m),
         ("along, m", |f| f.along_m),
         ("displacement over a turn, m", |f| f.turn_m),
-        ("its sigma as told, m", |f| f.turn_arc_m),
+        ("its reported sigma, m", |f| f.turn_arc_m),
         ("yaw, deg", |f| f.yaw_deg),
         ("roll and pitch, deg", |f| f.tilt_deg),
         ("share of pings with a fix", |f| f.fixed),
@@ -125,14 +127,15 @@ fn accuracy(all: &[Dives]) {
     assert!(mean_of(&ours, |f| f.turn_m) < limit_m, "{:.4} m a turn", mean_of(&ours, |f| f.turn_m));
 }
 
-/// NEES of the pose, meaned over the dives epoch by epoch, lies within its 95 % bounds three times out of four, and is right to a seventh in the mean.
+/// Checks the NEES of the pose. Averaged over the dives for each epoch, it lies within its 95 % bounds in three
+/// epochs of four. Its mean is right to a seventh.
 fn consistent_estimates(all: &[Dives]) {
     let epochs = all.iter().map(|dives| dives.filter.epochs.len()).min().unwrap();
     let runs = all.len() as f64;
     let means: Vec<f64> = (SETTLED..epochs)
         .map(|epoch| all.iter().map(|dives| nees(&dives.filter.epochs[epoch])).sum::<f64>() / runs)
         .collect();
-    // Wilson and Hilferty's cube: close to chi-square's own bounds with so many degrees of freedom.
+    // Wilson-Hilferty approximation: close to the chi-square bounds for this many degrees of freedom.
     let freedom = runs * POSE.len() as f64;
     let bound = |z: f64| {
         let cube = 1.0 - 2.0 / (9.0 * freedom) + z * math::sqrt(2.0 / (9.0 * freedom));
@@ -145,13 +148,13 @@ fn consistent_estimates(all: &[Dives]) {
         bound(-1.96),
         bound(1.96)
     );
-    // Noise that is learnt makes the estimate a little too sure.
+    // Learnt noise makes the estimate slightly overconfident.
     assert!(within > 0.75 && mean < 6.9, "{within}, {mean}");
 }
 
-/// NIS of each kind of sensor is one to a fifth in the mean, learnt as it is; meaned over ten seconds and all dives it lies within its
-/// 95 % bounds a third of the time at least; that of sensors whose noise
-/// is less than what they are trusted for (rounding taken for noise, a compass without steel near) doesn't lie above.
+/// Checks the NIS of each kind of sensor. Its mean is one to within a fifth, because the noise is learnt. Averaged
+/// over ten seconds and all dives it lies within its 95 % bounds at least a third of the time. For sensors with less
+/// noise than assumed it doesn't lie above the bounds (rounding treated as noise, a compass without steel nearby).
 fn consistent_innovations(all: &[Dives]) {
     for (name, sources, both_sides) in [
         ("head", 0..1, true),
@@ -176,13 +179,13 @@ fn consistent_innovations(all: &[Dives]) {
         let (sum, count) = bins.iter().fold((0.0, 0), |(sum, n), (s, c)| (sum + s, n + c));
         let mean = sum / count as f64;
         println!("NIS of {name}: mean {mean:.3}, within bounds at {within:.2} of times");
-        // Readings of a counter share a rounding error: each is trusted less than it deserves alone.
+        // Readings of a counter share a rounding error, so each one gets less weight than it would need alone.
         let least = if name == "tether" { 0.1 } else { 0.8 };
         assert!(within > 0.3 && (least..1.2).contains(&mean), "{name}: {mean} {z:.1?}");
     }
 }
 
-/// Mean of chi-square with one degree of freedom below the gate of 99.9 %.
+/// Mean of chi-square with one degree of freedom, truncated at the gate of 99.9 %.
 const GATED_MEAN: f64 = 0.988;
 const BIN_S: f64 = 10.0;
 
@@ -198,7 +201,8 @@ fn add_to_bins(bins: &mut [(f64, u64)], track: &Track, source: usize) {
     }
 }
 
-/// D is within two of its standard deviations of what the same returns give at their true places, `least` to 99 % of the time.
+/// Checks that D is within two standard deviations of its true value in `least` to 99 % of the sections. The true
+/// value uses the same returns at their true places.
 fn holes_within_their_bounds(holes: &[(f64, f64)], least: f64) {
     let within = share(holes.iter().map(|(error, sigma)| error.abs() <= 2.0 * sigma));
     let [error_m, arc_m] = [rms(holes.iter().map(|h| h.0)), rms(holes.iter().map(|h| h.1))];
@@ -209,8 +213,10 @@ fn holes_within_their_bounds(holes: &[(f64, f64)], least: f64) {
     assert!((least..=0.99).contains(&within), "{within}");
 }
 
-/// What a dive with a silence came to: whether each error of its epochs is within three standard deviations, the worst, and the share
-/// of pings without a fix.
+/// Result of a dive with a silent sensor.
+///
+/// It has three parts: whether each error of its epochs is within three standard deviations, the largest ratio, and
+/// the share of pings without a fix.
 fn silenced(seed: u64, silence: Silence) -> (Vec<bool>, f64, f64) {
     let scene = field(seed, 40.0);
     let track = dive(&scene, filter(&scene), silence);
@@ -221,9 +227,9 @@ fn silenced(seed: u64, silence: Silence) -> (Vec<bool>, f64, f64) {
     (off.iter().map(|off| *off <= 3.0).collect(), off.iter().copied().fold(0.0, f64::max), lost)
 }
 
-/// Each sensor lost for a while, and for good: the error stays within what is told of it, and grows no faster.
+/// Each sensor is lost for a while, and for good. The error stays within its reported bounds and grows no faster.
 #[test]
-fn whatever_falls_silent_the_error_stays_within_its_bounds() {
+fn silent_sensors_keep_the_error_within_its_bounds() {
     for (name, sources) in [
         ("the head", vec![0]),
         ("the left echosounder", vec![1]),
@@ -235,7 +241,7 @@ fn whatever_falls_silent_the_error_stays_within_its_bounds() {
         ("everything", vec![0, 1, 2, 3, 4, 5, 6, 7]),
     ] {
         for to_s in [70.0, 120.0, f64::INFINITY] {
-            // What a guessed motion would teach of the ranges shows when the unit is back, in some dives.
+            // In some dives a guessed motion biases the learnt range noise, which shows once the unit is back.
             let seeds = if name == "the inertial unit" && to_s.is_finite() { 1..=6 } else { 3..=3 };
             let dives: Vec<_> = seeds
                 .map(|seed| silenced(seed, Silence { sources: sources.clone(), from_s: 60.0, to_s }))
@@ -246,7 +252,8 @@ fn whatever_falls_silent_the_error_stays_within_its_bounds() {
             println!(
                 "{name} from 60 to {to_s} s: within 3 sigma {within:.4}, worst {worst:.1}, no fix {lost:.2}"
             );
-            // Of normal errors 0.3 % are beyond, and of so many none by much.
+            // About 0.3 % of normal errors exceed three standard deviations, and none in such a sample exceeds them
+            // by much.
             assert!(within > 0.997 && worst < 5.0, "{name} to {to_s}: {within}, {worst}");
             let is_needed = sources.contains(&7) && !sources.contains(&6) && to_s > 100.0;
             assert_eq!(

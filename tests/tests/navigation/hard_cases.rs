@@ -1,4 +1,4 @@
-//! The whole loop where few vehicles go: over the top, about the yaw of 180 degrees.
+//! The whole loop in unusual attitudes: over the top, and about a yaw of 180 degrees.
 
 use std::fmt::Write as _;
 
@@ -11,7 +11,9 @@ use headrace_tests::tracking::{Silence, Track, dive, filter};
 const SCENE: &str = "vehicle = \"vita2-2.toml\"\n[effects]\nmotion_within_turn = {}\n[trajectory]\nkind = \"recorded\"\n\
     file = \"way.csv\"\n";
 
-/// Out of the horizontal and back, at 0.05 m/s: nose down and over to 135 degrees, up and over, beyond 180 to the left, and to the right.
+/// Trajectory out of the horizontal and back, at 0.05 m/s.
+///
+/// The vehicle goes nose down and over to 135 degrees, up and over, and beyond 180 degrees to the left and right.
 fn way() -> String {
     let turns =
         [(40.0, 0.0, 0.0), (100.0, 135.0, 0.0), (160.0, 0.0, 0.0), (220.0, -135.0, 0.0), (280.0, 0.0, 0.0)];
@@ -32,11 +34,11 @@ fn way() -> String {
     text
 }
 
-/// Largest errors of fixes, and how many there were.
+/// Largest errors of fixes, and the number of fixes.
 #[derive(Debug, Default)]
 struct Errors {
     turn_rad: f64,
-    /// With the hull within 30 degrees of the tunnel's axis, either way, and anywhere.
+    /// Error with the hull within 30 degrees of the tunnel's axis in either direction, and at any angle, m.
     along_axis_m: f64,
     anywhere_m: f64,
     upside_down: u32,
@@ -67,9 +69,10 @@ fn errors(track: &Track) -> Errors {
     found
 }
 
-/// Where beams look along the tunnel and graze the wall, few measure the place: it is off by more there than the filter says.
+/// If beams look along the tunnel and graze the wall, few of them measure the position. The error there exceeds the
+/// filter's standard deviation.
 #[test]
-fn over_the_top_and_round_about_the_fix_stays_right() {
+fn fix_stays_right_over_the_top_and_at_180_degrees() {
     let way = way();
     let scene = scenes::scene_from(SCENE, &|name| {
         if name == "way.csv" { Ok(way.clone().into_bytes()) } else { scenes::vehicle_file(name) }

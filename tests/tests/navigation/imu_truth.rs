@@ -1,9 +1,9 @@
-//! val: attitude by gyros and accelerometers alone against optical motion capture, beside the filters of Madgwick and
-//! Mahony (crate `ahrs`) on the same samples.
+//! Validation: attitude from gyros and accelerometers alone, compared with optical motion capture.
 //!
-//! The recording is trial 12 of BROAD (slow hand motion within about a metre; `recordings/imu_broad`), its first 105 s
-//! and, where `HEADRACE_RECORDINGS` is set, all 196 s. With `--nocapture` the test prints, in degrees, the error of the
-//! inclination while the unit moves, and by how much the heading drifts over the recording.
+//! The filters of Madgwick and Mahony (crate `ahrs`) run on the same samples. The recording is trial 12 of BROAD
+//! (slow hand motion within about a metre; `recordings/imu_broad`), its first 105 s and, if `HEADRACE_RECORDINGS` is
+//! set, all 196 s. With `--nocapture` the test prints the inclination error while the unit moves and the heading
+//! drift over the recording, in degrees.
 
 use std::fs::File;
 use std::io::Read as _;
@@ -23,23 +23,23 @@ use headrace_tests::recordings;
 use nalgebra_of_peers as peers;
 
 const NAME: &str = "imu_broad/derived_12_undisturbed_slow_translation_C_95Hz.csv.gz";
-/// What is taken of the recording, which at full length has other columns, too.
+/// Columns used; the full-length recording has others, too.
 const COLUMNS: [&str; 11] = ["gx", "gy", "gz", "ax", "ay", "az", "qw", "qx", "qy", "qz", "movement"];
 const DEGREE: f64 = core::f64::consts::PI / 180.0;
 const GRAVITY_MPS2: f64 = 9.81;
 const SAMPLE_S: f64 = 0.0105;
-/// The errors move on so often, as in the filter: about 0.1 s.
+/// Samples between updates of the error state, as in the filter: about 0.1 s.
 const EPOCH: usize = 10;
-/// A second.
+/// Samples in a second.
 const SECOND: usize = 95;
-/// A hand's usual speed: what is known of velocity when nothing measures it.
+/// Usual speed of a hand, m/s: the prior for velocity when nothing measures it.
 const HAND_MPS: f64 = 0.5;
-/// A unit lies still when over a second neither rate nor force varies by more than this: a few times their noise.
+/// A unit is at rest if neither rate nor force varies by more than this within a second: a few times their noise.
 const STILL_RADPS: f64 = DEGREE;
 const STILL_MPS2: f64 = 0.8;
 const STILL_SD_MPS: f64 = 0.01;
 
-/// A sample: its axes are the body's, and east, north and up are the tunnel's.
+/// A sample in the body's axes; the tunnel's axes are east, north and up.
 #[derive(Clone, Copy)]
 struct Sample {
     rate_radps: Vec3<Body>,
@@ -74,14 +74,14 @@ fn mean(vectors: impl Iterator<Item = Vec3<Body>>) -> Vec3<Body> {
     sum.scaled(1.0 / count)
 }
 
-/// Length of the box around vectors.
+/// Size of the bounding box of vectors.
 fn spread(vectors: impl Iterator<Item = Vec3<Body>> + Clone) -> f64 {
     let first = vectors.clone().next().unwrap().0;
     let (low, high) = vectors.fold((first, first), |(low, high), v| (low.inf(&v.0), high.sup(&v.0)));
     (high - low).norm()
 }
 
-/// The attitude with which every filter begins: level by the first second's force.
+/// Initial attitude of every filter: level by the force in the first second.
 fn first_attitude(samples: &[Sample]) -> Rot<Tunnel, Body> {
     let force = mean(samples.iter().take(SECOND).map(|sample| sample.force_mps2));
     let roll = math::atan2(force.y(), force.z());
@@ -89,12 +89,12 @@ fn first_attitude(samples: &[Sample]) -> Rot<Tunnel, Body> {
     Rot::from_roll_pitch_yaw(roll, pitch, 0.0)
 }
 
-/// How far a filter was off, in degrees.
+/// Errors of a filter, degrees.
 #[derive(Debug, Clone, Copy)]
 struct Off {
     inclination_rms: f64,
     inclination_max: f64,
-    /// At the end, against the first truth.
+    /// Heading error at the end, relative to the first true heading.
     drift: f64,
 }
 
@@ -121,7 +121,7 @@ fn judge(samples: &[Sample], mut filter: impl FnMut(&Sample) -> Rot<Tunnel, Body
     }
 }
 
-/// The filter's own parts for a unit that has nothing beside it.
+/// The filter's own components for a unit without other sensors.
 struct Alone {
     settings: Settings,
     state: State,
@@ -131,8 +131,8 @@ struct Alone {
 }
 
 impl Alone {
-    /// With the usual settings: they are those of such a unit, whose samples at rest show 0.011 deg/s and 0.0045 m/s^2
-    /// per root of a hertz. Nothing was chosen by this recording.
+    /// Creates it with the usual settings. They belong to a unit whose samples at rest show 0.011 deg/s and 0.0045
+    /// m/s^2 per root hertz, and weren't tuned on this recording.
     fn new(attitude: Rot<Tunnel, Body>) -> Self {
         let settings = Settings::default();
         let mut sds = [1e-3; ERRORS];
@@ -175,7 +175,7 @@ impl Alone {
         leg.disturb(&self.settings, &transition, &mut self.factors);
     }
 
-    /// Once a second velocity is about that of a hand, or none at all and the gyros show their bias.
+    /// Once a second, constrains the velocity to that of a hand, or to zero at rest, where the gyros show their bias.
     fn end_second(&mut self) {
         let rates = self.second.iter().map(|sample| sample.rate_radps);
         let forces = self.second.iter().map(|sample| sample.force_mps2);
@@ -210,7 +210,7 @@ fn ours(samples: &[Sample]) -> Off {
 type PeerVector = peers::Vector3<f64>;
 type PeerRotation = peers::UnitQuaternion<f64>;
 
-/// Judges a peer, whose step takes its own types.
+/// Judges a filter of the `ahrs` crate, which uses types of its own.
 fn judge_peer(samples: &[Sample], mut step: impl FnMut(PeerVector, PeerVector) -> PeerRotation) -> Off {
     let vector = |v: Vec3<Body>| PeerVector::new(v.x(), v.y(), v.z());
     judge(samples, |sample| {
@@ -234,15 +234,15 @@ fn mahony(samples: &[Sample], kp: f64, ki: f64) -> Off {
     judge_peer(samples, |rate, force| *filter.update_imu(&rate, &force).unwrap())
 }
 
-/// A filter by name, and how far it was off.
+/// A filter's name and its errors.
 type Judged = (String, Off);
 
-/// The least inclined of many.
+/// The one with the smallest inclination error.
 fn best(many: impl Iterator<Item = Judged>) -> Judged {
     many.min_by(|(_, a), (_, b)| a.inclination_rms.total_cmp(&b.inclination_rms)).unwrap()
 }
 
-/// The peers with the gains that their crate gives them.
+/// The published filters with their crate's default gains.
 fn usual_peers(samples: &[Sample]) -> [Judged; 2] {
     [
         ("Madgwick, usual gain 0.1".to_owned(), madgwick(samples, 0.1)),
@@ -250,7 +250,7 @@ fn usual_peers(samples: &[Sample]) -> [Judged; 2] {
     ]
 }
 
-/// The peers with the gains that incline them least in this very recording.
+/// The published filters with the gains that are best for this recording.
 fn best_peers(samples: &[Sample]) -> [Judged; 2] {
     let betas = [0.0005, 0.001, 0.002, 0.003, 0.005, 0.01, 0.02, 0.033, 0.05, 0.1, 0.2];
     let kps = [0.01, 0.02, 0.05, 0.07, 0.1, 0.2, 0.5, 1.0, 2.0];
@@ -266,7 +266,7 @@ fn say(name: &str, off: &Off) {
     println!("{name:<60} {:>6.3} {:>7.3} {:>8.2}", off.inclination_rms, off.inclination_max, off.drift);
 }
 
-/// The same samples without the gyros' mean over the rest before the motion.
+/// The same samples without the gyros' mean during the rest before the motion.
 fn unbiased(samples: &[Sample]) -> Vec<Sample> {
     let rest = samples.iter().take_while(|sample| !sample.moving);
     let bias = mean(rest.map(|sample| sample.rate_radps));
@@ -274,7 +274,7 @@ fn unbiased(samples: &[Sample]) -> Vec<Sample> {
 }
 
 #[test]
-fn val_attitude_by_rates_and_forces_alone_is_no_worse_than_published_filters() {
+fn attitude_from_imu_alone_is_no_worse_than_published_filters() {
     for (path, rows) in recordings::both(NAME, 10_000, 18_707) {
         let samples = samples(&path);
         assert_eq!(samples.len(), rows);
@@ -294,13 +294,13 @@ fn no_worse_than_published_filters(samples: &[Sample]) {
         assert!(ours.inclination_rms <= off.inclination_rms, "{name}: {off:?}; ours {ours:?}");
         assert!(ours.drift.abs() <= off.drift.abs(), "{name}: {off:?}; ours {ours:?}");
     }
-    // Told their bias beforehand, the peers still need gains that suit this recording to come as near.
+    // Even with their bias removed, the published filters come as close only with gains tuned to this recording.
     let unbiased = unbiased(samples);
     for (name, off) in usual_peers(&unbiased) {
-        say(&format!("{name}, told the bias"), &off);
+        say(&format!("{name}, bias removed"), &off);
         assert!(ours.inclination_rms <= off.inclination_rms, "{name}: {off:?}; ours {ours:?}");
     }
     for (name, off) in best_peers(&unbiased) {
-        say(&format!("{name}, told the bias"), &off);
+        say(&format!("{name}, bias removed"), &off);
     }
 }

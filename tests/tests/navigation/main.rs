@@ -1,6 +1,6 @@
-//! Navigation: the filter and the smoother against the truth, calibration, outages, other vehicles.
+//! Navigation: filter and smoother compared with the truth, calibration, outages, and other vehicles.
 
-#![allow(clippy::unwrap_used, clippy::panic, reason = "a test stops at what it can't do")]
+#![allow(clippy::unwrap_used, clippy::panic, reason = "a failed step ends the test")]
 
 mod calibration;
 mod fusion;

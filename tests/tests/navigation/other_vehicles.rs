@@ -1,5 +1,6 @@
-//! A vehicle whose autopilot owns inertial unit, pressure and distances, and which has a velocity log: devices that came
-//! with their own crates alone go the whole way from the simulator's bytes to navigation.
+//! A vehicle whose autopilot owns the inertial unit, pressure and distances, with a velocity log.
+//!
+//! Its devices come with their own crates alone, and are tested from the simulator's bytes to navigation.
 
 use headrace_tests::Folder;
 use serde_json::Value;
@@ -17,14 +18,14 @@ fn source<'a>(report: &'a Value, id: &str) -> &'a Value {
 }
 
 #[test]
-fn an_autopilots_parts_and_a_velocity_log_navigate() {
+fn autopilot_sensors_and_a_velocity_log_are_fused() {
     let folder = Folder::new();
     folder.write("vehicle.toml", headrace_tests::other_vehicle());
     folder.write("scene.toml", SCENE);
     folder.simulate("scene.toml", "dive.mcap");
     let (code, report) = folder.replay("dive.mcap", &[]);
     assert_eq!(code, Some(0), "{}", report["log"]["losses"]);
-    // 40 s, at the rates of their tables.
+    // Counts in 40 s, at the rates of their tables.
     for (id, readings) in [
         ("imu", 12_000),
         ("depth", 400),
@@ -41,11 +42,12 @@ fn an_autopilots_parts_and_a_velocity_log_navigate() {
             assert_eq!(source[nothing], 0, "{id}: {source}");
         }
     }
-    // Its axes, its lever and its delay are right: devices without noise agree. With one axis the wrong way it is 0.08.
+    // Axes, lever and delay are right, so devices without noise agree. With one axis reversed the value is 0.08.
     let dvl = &source(&report, "dvl")["navigation"];
     println!("velocity log: {dvl}");
     assert_eq!(dvl["gated"], 0, "{dvl}");
-    // The first is of a moment before the filter began: it comes 100 ms after its ping. Three parts of a reading, twice a second.
+    // The first reading precedes the filter's start, because it arrives 100 ms after its ping. A reading has three
+    // components, twice a second.
     assert!(dvl["late"].as_u64().unwrap() <= 1 && dvl["used"].as_u64().unwrap() > 220, "{dvl}");
     assert!(dvl["nis"].as_f64().unwrap() < 0.001, "{dvl}");
     let dive = &report["dive"];

@@ -1,5 +1,7 @@
-//! Sensors that fall silent in the middle of a dive: what can't be placed is said so, nothing is flagged that going on
-//! forward fills, and the dive goes on once they are back.
+//! Sensors that fall silent during a dive.
+//!
+//! Pings that can't be placed are reported. No flag is raised for a hole that going on forward fills. The dive goes
+//! on once the sensors return.
 
 use headrace_tests::{Folder, raw_messages, write_log};
 use mcap::WriteOptions;
@@ -7,10 +9,10 @@ use serde_json::Value;
 
 const LEG: &str = "vehicle = \"vehicle.toml\"\n[trajectory]\nstart_m = 2\n[[trajectory.legs]]\ndistance_m = 12\nspeed_mps = 0.197\n";
 
-/// Replays a four-head dive of 12 m without what `source` sent between two moments, in seconds of its clock.
+/// Replays a four-head dive of 12 m without the data of `source` between two times, in seconds of its clock.
 fn without(way: &str, source: &str, from_s: f64, to_s: f64) -> Value {
     let folder = Folder::new();
-    // The heads' bodies aren't simulated: nothing is hidden, and the paper's speed meets the target.
+    // The heads' bodies aren't simulated, so nothing is hidden and the paper's speed meets the target.
     let vehicle = include_str!("../../../deploy/vehicles/vita2-4.toml")
         .replace("planned_speed_mps = 0.10", "planned_speed_mps = 0.197")
         .replace("[navigation]", &format!("[navigation]\nway = \"{way}\""));
@@ -38,19 +40,19 @@ fn failed(report: &Value) -> Vec<&Value> {
 }
 
 #[test]
-fn without_a_filter_a_lost_tether_is_named_as_lost_position_and_its_return_raises_no_false_flag() {
+fn tether_loss_without_a_filter_is_a_lost_position_and_raises_no_false_flag() {
     let report = without("direct", "tether", 25.0, 31.0);
     assert!(report["dive"]["samples_rejected"]["no_fix"].as_u64().unwrap() > 500);
     let failed = failed(&report);
     assert!(!failed.is_empty(), "0.8 m of wall without a sample");
     let named = failed.iter().filter(|section| section["cause"]["cause"] == "position_lost").count();
     assert!(2 * named > failed.len(), "{named} of {}: {failed:#?}", failed.len());
-    // The vehicle never turned back, so that no flag may have been cleared.
+    // The vehicle never turned back, so no flag may have been cleared.
     assert_eq!(report["summary"]["flags_cleared"], 0, "{}", report["summary"]);
 }
 
 #[test]
-fn a_short_silence_of_the_tether_is_bridged() {
+fn short_tether_silence_is_bridged() {
     for (way, until_s) in [("direct", 26.5), ("filter", 31.0)] {
         let report = without(way, "tether", 25.0, until_s);
         assert_eq!(failed(&report).len(), 0, "{way}");
@@ -58,7 +60,7 @@ fn a_short_silence_of_the_tether_is_bridged() {
 }
 
 #[test]
-fn three_of_four_echosounders_are_enough() {
+fn three_of_four_echosounders_keep_the_position() {
     for way in ["direct", "filter"] {
         let report = without(way, "ping_left", 25.0, 60.0);
         assert_eq!(failed(&report).len(), 0, "{way}");

@@ -1,5 +1,7 @@
-//! Walls that aren't as designed: bumps that a vehicle at rest sees turn after turn make its heading no surer, and a fallen vault draws no estimate
-//! along.
+//! Walls that deviate from the design.
+//!
+//! Bumps that a stationary vehicle sees turn after turn must not make its heading more certain. A fallen vault must
+//! not bias the estimate.
 
 use headrace_fusion::filter::state::{ATTITUDE, POSITION};
 use headrace_geometry::math;
@@ -7,7 +9,8 @@ use headrace_simulator::START;
 use headrace_tests::scenes;
 use headrace_tests::tracking::{self, Silence};
 
-/// Yaw's errors over their standard deviations, rms, and the largest of these, radians, from 15 to 30 s after it has been let in, by seeds.
+/// Root mean square of yaw errors over their standard deviations, and the largest of these, radians, by seed. The
+/// window is 15 to 30 s after the launch.
 fn yaw(rough: &str) -> (f64, f64) {
     let (mut squares, mut count, mut largest_sd_rad) = (0.0, 0.0, 0.0_f64);
     for seed in 1..=8 {
@@ -38,7 +41,7 @@ fn yaw(rough: &str) -> (f64, f64) {
 }
 
 #[test]
-fn who_stands_before_a_rough_wall_is_no_surer_of_its_heading_than_right() {
+fn stationary_vehicle_at_a_rough_wall_keeps_an_honest_heading_sd() {
     let (ratio, _) = yaw("[[tunnel.rough]]\nsd_m = 0.028\nseed = 3\n");
     println!("rough: {ratio:.2} standard deviations");
     assert!((0.3..1.0).contains(&ratio), "{ratio}");
@@ -47,9 +50,10 @@ fn who_stands_before_a_rough_wall_is_no_surer_of_its_heading_than_right() {
     assert!(ratio < 1.0 && largest_sd_rad.to_degrees() < 0.8, "{ratio}, {largest_sd_rad}");
 }
 
-/// Its slopes begin with centimetres, which would pass for the vehicle's height; the seeds are those whose estimate once followed them.
+/// The slopes of the fallen vault begin with centimetres, which look like a change of height. The seeds are those in
+/// which the estimate once followed them.
 #[test]
-fn a_fallen_vault_draws_no_estimate_along() {
+fn fallen_vault_does_not_bias_the_estimate() {
     let text = include_str!("../../../deploy/scenes/collapse.toml").replace("../vehicles/", "");
     for seed in [1, 10, 14] {
         let scene = scenes::seeded(&text, &scenes::vehicle_file, Some(seed));

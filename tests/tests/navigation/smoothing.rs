@@ -1,4 +1,4 @@
-//! Smoothing against the truth of simulated dives, beside the filter on the same data; and `replay --smooth`.
+//! The smoother compared with the truth of simulated dives and with the filter, and `replay --smooth`.
 
 use headrace_fusion::filter::state::State;
 use headrace_fusion::smooth::backward::Backward;
@@ -17,15 +17,15 @@ use headrace_tests::tracking::{self, Epoch, Silence, Track, dive, filter};
 use headrace_vehicle::NavigationConfig;
 
 const SEEDS: u64 = 3;
-/// Room for the steps of a dive of ten minutes.
+/// Capacity for the steps of a dive of ten minutes.
 const STEPS: usize = 1 << 13;
 
 struct Smoothed {
-    /// What the filter said.
+    /// Track of the filter.
     filter: Track,
-    /// What is said along the smoothed track.
+    /// Dive along the smoothed track.
     dive: Track,
-    /// Smoothed estimates, the earliest first.
+    /// Smoothed estimates in order of time.
     epochs: Vec<Epoch>,
 }
 
@@ -55,18 +55,20 @@ fn smoothed(scene: &Scene, silence: &Silence) -> Smoothed {
 
 type Pick = fn(&Figures) -> f64;
 
-/// What the cable shows too much is all that is left of the error along the tunnel: no other sensor sees it, and its model isn't
-/// the scene's (a spline without anything faster than its period), so that no estimate of it need be better than another.
+/// Allowed error along the tunnel over the filter's. It is due to cable slack, which no other sensor observes. The
+/// model of slack isn't the scene's (a spline without components faster than its period), so smoothing need not
+/// improve it.
 const SLACK: f64 = 1.25;
 
 struct Dives {
     smoothed: Smoothed,
-    /// Error of the hole of each section, m, and its standard deviation as told: by the filter, and smoothed.
+    /// Error of each section's hole, m, and its reported standard deviation: filtered, and smoothed.
     holes: [Vec<(f64, f64)>; 2],
 }
 
-/// The scene's slack remembers a quarter of itself after a turn; a lag of 15 s, which the filter bears, has it remember more
-/// than half. A smoother leans on its model more than a filter does: with that, D is within two sigma 88.9 % of the time.
+/// Dives in which slack keeps a quarter of itself after a turn. A smoother depends on its model more than a filter.
+/// With a slack time of 15 s, which keeps more than half and which the filter tolerates, D is within two sigma 88.9 %
+/// of the time.
 fn dives(seed: u64) -> Dives {
     let scene = field_with(seed, 65.0, &SETTINGS.replace("slack_time_s = 15", "slack_time_s = 8"), "");
     let smoothed = smoothed(&scene, &Silence::default());
@@ -82,10 +84,11 @@ fn dives(seed: u64) -> Dives {
     Dives { smoothed, holes }
 }
 
-/// Smoothed errors are no larger than the filter's, and are known: NEES of a pose is near 6, D within two of its standard
-/// deviations of the truth 90 to 99 % of the time.
+/// Smoothed errors are no larger than the filter's, and consistent.
+///
+/// The NEES of a pose is near 6, and D is within two standard deviations of the truth 90 to 99 % of the time.
 #[test]
-fn smoothed_dives_are_nearer_to_the_truth_and_know_how_near() {
+fn smoothing_reduces_errors_and_stays_consistent() {
     let all: Vec<Dives> = std::thread::scope(|scope| {
         let half =
             |odd: u64| move || (1..=SEEDS).filter(|seed| seed % 2 == odd).map(dives).collect::<Vec<_>>();
@@ -95,13 +98,13 @@ fn smoothed_dives_are_nearer_to_the_truth_and_know_how_near() {
     let by_filter: Vec<Figures> = all.iter().map(|dives| figures(&dives.smoothed.filter)).collect();
     let smoothed: Vec<Figures> = all.iter().map(|dives| figures(&dives.smoothed.dive)).collect();
     println!("| rms over {SEEDS} dives | filter | smoothed |\n|---|---|---|");
-    // How much of the filter's error may be left.
+    // Allowed share of the filter's error.
     let rows: [(&str, Pick, f64); 8] = [
         ("across, m", |f| f.across_m, 0.5),
         ("up, m", |f| f.up_m, 0.5),
         ("along, m", |f| f.along_m, SLACK),
         ("displacement over a turn, m", |f| f.turn_m, SLACK),
-        ("its sigma as told, m", |f| f.turn_arc_m, 1.0),
+        ("its reported sigma, m", |f| f.turn_arc_m, 1.0),
         ("yaw, deg", |f| f.yaw_deg, 0.6),
         ("roll and pitch, deg", |f| f.tilt_deg, 0.6),
         ("share of pings with a fix", |f| f.fixed, 1.001),
@@ -130,14 +133,14 @@ fn smoothed_dives_are_nearer_to_the_truth_and_know_how_near() {
             "D of {} sections, {name}: error {error_m:.4} m, sigma {arc_m:.4} m, within two: {within:.3}",
             holes.len()
         );
-        // Told to be faster than it is, slack makes less sure than one could be.
+        // A slack time configured shorter than the true one gives standard deviations larger than needed.
         assert!((0.9..=0.998).contains(&within), "{name}: {within}");
     }
 }
 
-/// With the shipped vehicle's own settings, which are wide, nothing that the filter knew is lost, and no error grows.
+/// With the shipped vehicle's wide settings, smoothing loses nothing that the filter knew, and no error grows.
 #[test]
-fn the_shipped_vehicle_gains_by_smoothing() {
+fn smoothing_helps_the_shipped_vehicle() {
     for seed in 1..=2 {
         let track = smoothed(&field_with(seed, 40.0, "[heads]", ""), &Silence::default());
         let [was, is] = [&track.filter, &track.dive].map(figures);
@@ -148,7 +151,7 @@ fn the_shipped_vehicle_gains_by_smoothing() {
     }
 }
 
-/// Root mean square of an error between two times, and how far beyond its standard deviation it comes at most.
+/// Root mean square of an error between two times, and its largest ratio to the standard deviation.
 fn between(epochs: &[Epoch], error: usize, from_s: f64, to_s: f64) -> (f64, f64) {
     let inside = epochs.iter().filter(|epoch| {
         let at_s = epoch.at.since(START).as_secs_f64();
@@ -161,10 +164,10 @@ fn between(epochs: &[Epoch], error: usize, from_s: f64, to_s: f64) -> (f64, f64)
 }
 
 #[test]
-fn a_silence_is_bridged_from_both_sides() {
+fn smoothing_bridges_a_silence_from_both_sides() {
     let scene = field(3, 33.0);
     let from_s = 80.0;
-    // Without the wall an estimate is given up as lost after half a minute, and then there is no later side.
+    // Without walls an estimate is dropped after half a minute, and then there is no later side.
     for (name, sources, errors, to_s) in [
         ("the tether", vec![7], vec![0], from_s + 60.0),
         ("all sonars", vec![0, 1, 2, 3, 4], vec![1, 2], from_s + 10.0),
@@ -187,9 +190,9 @@ fn a_silence_is_bridged_from_both_sides() {
     }
 }
 
-/// Displacement over a turn, which verdicts hang on, by a cable that doesn't hang slack.
+/// Displacement over a turn, on which verdicts depend, with a taut cable.
 #[test]
-fn displacements_are_far_nearer_where_the_cable_is_taut() {
+fn smoothed_displacements_are_accurate_on_a_taut_cable() {
     let settings = SETTINGS.replace("slack_sd_m = 0.085", "slack_sd_m = 0.001");
     let scene = field_with(1, 40.0, &settings, "tether_slack = { reach_m = 0.15, period_s = 30 }\n");
     let track = smoothed(&scene, &Silence::default());
@@ -199,7 +202,7 @@ fn displacements_are_far_nearer_where_the_cable_is_taut() {
 }
 
 #[test]
-fn a_smoothed_track_is_cut_where_the_estimate_was_lost() {
+fn smoothed_track_is_split_at_a_lost_estimate() {
     let scene = field(2, 20.0);
     let sources = (0..8).collect();
     let track = smoothed(&scene, &Silence { sources, from_s: 40.0, to_s: 60.0 });
@@ -216,7 +219,7 @@ fn a_smoothed_track_is_cut_where_the_estimate_was_lost() {
     assert!(track.epochs.iter().all(|epoch| epoch.factors.is_sound()));
 }
 
-/// Noise, far more slack than the filter reckons with, and steel on the short dive, three times as long.
+/// Noise, far more slack than the filter assumes, and steel, on the short dive extended to three times its length.
 const NOISE: &str = "
 [effects]
 imu_noise = { gyro_degps_rthz = 0.01, accel_mps2_rthz = 0.002, attitude_deg = 0.5 }
@@ -234,7 +237,7 @@ fn noisy() -> Folder {
 }
 
 #[test]
-fn replay_says_what_smoothing_changed() {
+fn replay_reports_changes_by_smoothing() {
     let folder = noisy();
     let answer =
         folder.headrace(&["replay", "dive.mcap", "--smooth", "--target", "0.7", "--report", "r.json"]);
@@ -279,7 +282,7 @@ fn replay_says_what_smoothing_changed() {
 }
 
 #[test]
-fn a_smoothed_replay_is_the_same_in_ticks_of_any_length() {
+fn tick_length_does_not_change_a_smoothed_replay() {
     let folder = noisy();
     let digest = folder.digest("dive.mcap", &["--smooth"]);
     for tick_ms in ["1", "333", "60000"] {
@@ -293,7 +296,7 @@ fn a_smoothed_replay_is_the_same_in_ticks_of_any_length() {
 }
 
 #[test]
-fn there_is_nothing_to_smooth_without_a_filter() {
+fn smoothing_without_a_filter_is_refused() {
     let folder = Folder::with_dive();
     folder.write("direct.toml", headrace_tests::VEHICLE.to_owned() + "\n[navigation]\nway = \"direct\"\n");
     let answer = folder.headrace(&["replay", "dive.mcap", "--smooth", "--vehicle", "direct.toml"]);

@@ -1,4 +1,4 @@
-//! Who is let in: hosts, origins, tokens, and what isn't a message.
+//! Access control of the page: hosts, origins, tokens, and invalid messages.
 
 use headrace_tests::Folder;
 use headrace_tests::page_client::{Serving, Viewer};
@@ -30,7 +30,7 @@ fn other_hosts_and_origins_are_refused() {
 }
 
 #[test]
-fn without_a_token_nothing_is_said_and_a_viewer_only_sees() {
+fn missing_token_gets_nothing_and_viewer_token_is_read_only() {
     let folder = Folder::with_dive();
     folder.write("tokens", TOKENS);
     let serving = Serving::start(&folder, &["replay", "dive.mcap", ANY, "--page-token-file", "tokens"]);
@@ -64,11 +64,11 @@ fn without_a_token_nothing_is_said_and_a_viewer_only_sees() {
     operator.send(&json!({"do": "play", "command": "end"}));
     operator.until_type("end");
     let (_, told) = serving.end();
-    assert!(!told.contains("0123456789"), "tokens are never told: {told}");
+    assert!(!told.contains("0123456789"), "tokens are never printed: {told}");
 }
 
 #[test]
-fn rubbish_is_refused_and_the_page_goes_on() {
+fn invalid_messages_are_refused_and_the_page_goes_on() {
     let folder = Folder::with_dive();
     let serving = Serving::start(&folder, &["replay", "dive.mcap", ANY]);
     let closes = |message: Message| {
@@ -82,7 +82,7 @@ fn rubbish_is_refused_and_the_page_goes_on() {
     closes(Message::Text("[1,2]".into()));
     closes(Message::Binary(vec![1, 2, 3].into()));
     closes(Message::Text(format!("{{\"do\":\"{}\"}}", "x".repeat(5000)).into()));
-    // Valid, but too many a second.
+    // Valid messages, but too many per second.
     let mut flood = Viewer::connect(&serving, "", &[]).unwrap();
     flood.until_type("ready");
     let mut sent = 0;

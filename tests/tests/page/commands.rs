@@ -1,4 +1,4 @@
-//! What operators do, in a dive that goes on now: seen by all viewers, in the log, and in the replay of it.
+//! Operator commands during a live dive reach all viewers, the log, and its replay.
 
 use headrace_tests::Folder;
 use headrace_tests::page_client::{Serving, Viewer, acknowledge_all};
@@ -7,7 +7,7 @@ use serde_json::{Value, json};
 use crate::ANY;
 
 #[test]
-fn an_acknowledgement_and_a_note_of_one_viewer_reach_the_others_and_the_log() {
+fn acknowledgements_and_notes_reach_other_viewers_and_the_log() {
     let folder = Folder::new();
     let serving = Serving::start(&folder, &["demo", ANY, "--no-open", "--speed", "60x"]);
     let mut one = Viewer::connect(&serving, "", &[]).unwrap();

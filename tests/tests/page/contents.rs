@@ -1,4 +1,4 @@
-//! What viewers get: the loop's own results, whole or since they were lost.
+//! Data sent to viewers: the loop's own results, complete or as changes since a lost connection.
 
 use headrace_tests::Folder;
 use headrace_tests::page_client::{Serving, Viewer};
@@ -16,7 +16,7 @@ fn replayed_with(folder: &Folder, further: &[&str]) -> (Serving, Viewer) {
     let serving = Serving::start(folder, &arguments);
     let mut viewer = Viewer::connect(&serving, "", &[]).unwrap();
     viewer.until_type("ready");
-    // At the end of the log playback stands still.
+    // Playback pauses at the end of the log.
     viewer.until("the end of the log", |viewer| viewer.state["playback"]["paused"] == true);
     (serving, viewer)
 }
@@ -35,7 +35,7 @@ fn end(serving: Serving, viewer: &mut Viewer) -> Value {
 }
 
 #[test]
-fn all_that_a_viewer_has_at_the_end_equals_the_report() {
+fn viewer_state_at_the_end_equals_the_report() {
     let folder = Folder::with_dive();
     let (serving, mut viewer) = replayed(&folder);
     let last = end(serving, &mut viewer);
@@ -88,11 +88,11 @@ fn all_that_a_viewer_has_at_the_end_equals_the_report() {
 }
 
 #[test]
-fn the_same_dive_is_held_to_another_target_beside_its_own() {
+fn dive_is_compared_with_a_second_target() {
     let folder = Folder::with_dive();
     let (serving, mut viewer) = replayed_with(&folder, &["--target", "0.5,0.2"]);
     assert_eq!(viewer.hello["compared_m"], 0.2);
-    // What is behind a vehicle that goes on is judged, not only at the end.
+    // Sections behind a moving vehicle are judged at once, not only at the end.
     let judged =
         |viewer: &Viewer| viewer.sections.values().filter(|section| section.compared == Some(2)).count();
     assert!(judged(&viewer) > 3, "{:?}", viewer.sections);
@@ -102,7 +102,7 @@ fn the_same_dive_is_held_to_another_target_beside_its_own() {
     let mut apart_m = 0.0;
     for (other, key) in [(0, "open_m"), (1, "pass_m"), (2, "fail_m"), (3, "cannot_say_m")] {
         let of = |key: &str| report["what_if"][1][key].as_f64().unwrap();
-        // The page shows what wouldn't be inspected as open.
+        // The page shows sections that aren't inspected as open.
         let reported_m = of(key) + if key == "open_m" { of("not_inspected_m") } else { 0.0 };
         let sections = viewer.sections.values().filter(|section| section.compared == Some(other)).count();
         let shown_m = sections as f64 * section_m;
@@ -110,7 +110,8 @@ fn the_same_dive_is_held_to_another_target_beside_its_own() {
         assert!((shown_m - summed_m).abs() < 1e-6, "{key}: {shown_m}, {summed_m}");
         apart_m += (shown_m - reported_m).abs() / 2.0;
     }
-    // The dive's own holes are held to it, and the report is of a replay of its own: at the ends of what was seen they differ.
+    // The page compares the dive's own holes, and the report comes from a separate replay. They differ at the ends of
+    // the covered stretch.
     let way_m = report["way"]["length_m"].as_f64().unwrap();
     assert!(
         apart_m <= 0.2 * way_m,
@@ -122,12 +123,12 @@ fn the_same_dive_is_held_to_another_target_beside_its_own() {
 }
 
 #[test]
-fn who_was_lost_gets_what_has_changed_and_has_the_same_as_who_is_new() {
+fn resumed_viewer_gets_the_changes_and_matches_a_new_viewer() {
     let folder = Folder::with_dive();
     let (serving, mut lost) = replayed(&folder);
-    // A jump shows less, and is another instance: from there it is lost, and the dive goes on without it.
+    // A seek shows less and starts another instance. The connection is lost after it, while the dive goes on.
     let [from_s, to_s] = span_s(&lost);
-    // Late, so that some of the tunnel is judged for good.
+    // Late, so that a part of the tunnel has final verdicts.
     let middle_s = to_s - 0.1 * (to_s - from_s);
     lost.send(&json!({"do": "play", "command": "pause"}));
     lost.send(&json!({"do": "play", "command": "seek", "to_s": middle_s}));
@@ -164,7 +165,7 @@ fn who_was_lost_gets_what_has_changed_and_has_the_same_as_who_is_new() {
 }
 
 #[test]
-fn samples_come_by_chainage_and_none_is_lost_by_jumps() {
+fn samples_arrive_by_chainage_and_survive_seeks() {
     let folder = Folder::with_dive();
     let (serving, mut viewer) = replayed(&folder);
     let count = || {
@@ -191,12 +192,13 @@ fn samples_come_by_chainage_and_none_is_lost_by_jumps() {
     viewer.until("the beginning", |viewer| viewer.state["now_s"].as_f64() < Some(from_s + 0.5));
     viewer.send(&json!({"do": "play", "command": "step_section"}));
     viewer.until("a section", |viewer| viewer.sections.values().any(|section| section.verdict != 0));
-    viewer.until("it stands still", |viewer| viewer.state["playback"]["paused"] == true);
+    viewer.until("playback pauses", |viewer| viewer.state["playback"]["paused"] == true);
     assert!(viewer.state["now_s"].as_f64() < Some(to_s - 1.0), "{}", viewer.state["now_s"]);
     end(serving, &mut viewer);
 }
 
-/// The fields of Cockpit's page "External Integrations" (May 2026): one that is missing, null or of another type discards the whole file.
+/// Fields of Cockpit's page "External Integrations" (May 2026). A field that is missing, null or of another type
+/// makes Cockpit discard the whole file.
 fn is_what_cockpit_accepts(extras: &Value) {
     let texts = |of: &Value, keys: &[&str]| {
         for key in keys {
@@ -233,7 +235,7 @@ fn is_what_cockpit_accepts(extras: &Value) {
 }
 
 #[test]
-fn other_programs_read_lines_states_and_figures() {
+fn other_programs_can_read_lines_state_and_metrics() {
     let folder = Folder::with_dive();
     let (serving, mut viewer) = replayed(&folder);
     let (_, extras) = serving.ask("GET", "/cockpit_extras.json", &[], "");
@@ -242,7 +244,7 @@ fn other_programs_read_lines_states_and_figures() {
     let icon = extras["widgets"][0]["iconUrl"].as_str().unwrap();
     let (status, picture) = serving.ask("GET", &icon[icon.find("/assets").unwrap()..], &[], "");
     assert!(status == 200 && picture.contains("<svg"), "{icon}: {status}");
-    // The dive goes on meanwhile, until the end of the log: then both have its last state.
+    // The dive goes on meanwhile until the end of the log; then both have its last state.
     loop {
         let (status, answer) = serving.ask("GET", "/state.json", &[], "");
         let body = answer.split("\r\n\r\n").nth(1).unwrap();
@@ -266,7 +268,7 @@ fn other_programs_read_lines_states_and_figures() {
 }
 
 #[test]
-fn a_dive_in_a_file_holds_what_a_viewer_gets() {
+fn exported_file_holds_the_data_of_a_viewer() {
     use std::io::Read as _;
     let folder = Folder::with_dive();
     let answer = folder.headrace(&["export", "dive.mcap", "--html", "dive.html"]);
@@ -296,10 +298,7 @@ fn a_dive_in_a_file_holds_what_a_viewer_gets() {
     let timeline = frames.iter().find(|frame| frame["type"] == "timeline").unwrap();
     let (times, states) = (timeline["t_s"].as_array().unwrap(), timeline["states"].as_array().unwrap());
     assert!(times.len() > 5 && times.len() == states.len(), "{} {}", times.len(), states.len());
-    assert!(
-        states.iter().skip(1).all(|state| state.get("version").is_none()),
-        "what is constant is there once"
-    );
+    assert!(states.iter().skip(1).all(|state| state.get("version").is_none()), "constant parts occur once");
     let again = folder.headrace(&["export", "dive.mcap", "--html", "dive.html"]);
     assert!(matches!(again.code, Some(0 | 1)), "its own kind is overwritten: {}", again.stderr);
     assert_eq!(folder.read("dive.html"), page.as_bytes(), "byte for byte");
@@ -307,7 +306,7 @@ fn a_dive_in_a_file_holds_what_a_viewer_gets() {
     assert_eq!(folder.headrace(&["export", "dive.mcap", "--html", "other.html"]).code, Some(2));
 }
 
-/// Source: RFC 4648, section 4.
+/// Base64 encoding. Source: RFC 4648, section 4.
 fn base64(text: &str) -> Vec<u8> {
     const DIGITS: &[u8] = b"ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
     let (mut bytes, mut bits, mut count) = (Vec::new(), 0_u32, 0);

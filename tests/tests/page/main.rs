@@ -1,7 +1,7 @@
-//! The operator's page over real sockets: what viewers get, what they may do, and that the dive doesn't notice them.
+//! The operator's page over real sockets: its data, its access rights, and its lack of influence on the dive.
 
 #![cfg(unix)]
-#![allow(clippy::unwrap_used, clippy::panic, reason = "a test stops at what it can't do")]
+#![allow(clippy::unwrap_used, clippy::panic, reason = "a failed step ends the test")]
 
 mod access;
 mod commands;
@@ -11,5 +11,5 @@ mod tls;
 mod undisturbed;
 mod voice;
 
-/// A page on any port.
+/// Serves the page on any free port.
 const ANY: &str = "--page=127.0.0.1:0";

@@ -1,8 +1,8 @@
-//! The page by TLS, with a certificate of files: who speaks TLS and has a token is served, and nobody else; files that can't be used
-//! are named.
+//! The page over TLS with certificate files: only clients with TLS and a token are served, and unusable files are
+//! reported.
 //!
-//! `certificates/` has a certificate for `localhost` and 127.0.0.1 until 2126, its key, and the key of none, for tests alone
-//! (`openssl ecparam -name prime256v1 -genkey`, `openssl req -x509` without a CA's rights).
+//! `certificates/` has a certificate for `localhost` and 127.0.0.1 until 2126, its key, and an unrelated key, for
+//! tests alone (`openssl ecparam -name prime256v1 -genkey`, `openssl req -x509` without a CA's rights).
 
 use std::io::{Read, Write};
 use std::net::TcpStream;
@@ -36,7 +36,7 @@ fn text(name: &str) -> String {
     file(name).display().to_string()
 }
 
-/// A replay whose page has tokens and the certificate.
+/// Starts a replay whose page has tokens and the certificate.
 fn serving(folder: &Folder) -> Serving {
     folder.write("tokens", TOKENS);
     let (certificate, key) = (text("server.cert.pem"), text("server.key.pem"));
@@ -44,7 +44,7 @@ fn serving(folder: &Folder) -> Serving {
     Serving::start(folder, &[&["replay", "dive.mcap", ANY], files.as_slice()].concat())
 }
 
-/// A connection of a client that trusts the test's certificate, or nobody.
+/// A connection of a client that trusts the test's certificate, or none.
 fn secured(address: &str, trusts: bool) -> Secured {
     let mut roots = RootCertStore::empty();
     if trusts {
@@ -60,7 +60,7 @@ fn secured(address: &str, trusts: bool) -> Secured {
     StreamOwned::new(client, stream)
 }
 
-/// Answer to a request by TLS: status, and all of it.
+/// Sends a request over TLS; returns status and full response.
 fn ask_secured(address: &str, method: &str, path: &str, header: &str) -> (u16, String) {
     let mut stream = secured(address, true);
     let further = if header.is_empty() { String::new() } else { format!("{header}\r\n") };
@@ -76,7 +76,7 @@ fn ask_secured(address: &str, method: &str, path: &str, header: &str) -> (u16, S
 }
 
 #[test]
-fn by_tls_the_page_is_for_those_with_a_token() {
+fn tls_page_requires_a_token() {
     let folder = Folder::with_dive();
     let serving = serving(&folder);
     let ask = |method, path, header| ask_secured(&serving.address, method, path, header);
@@ -98,7 +98,7 @@ fn by_tls_the_page_is_for_those_with_a_token() {
 }
 
 #[test]
-fn by_tls_the_feed_goes_on() {
+fn feed_works_over_tls() {
     let folder = Folder::with_dive();
     let serving = serving(&folder);
     let address = &serving.address;
@@ -114,11 +114,11 @@ fn by_tls_the_feed_goes_on() {
 }
 
 #[test]
-fn who_speaks_no_tls_gets_nothing_and_harms_nobody() {
+fn client_without_tls_gets_nothing_and_blocks_nobody() {
     let folder = Folder::with_dive();
     let serving = serving(&folder);
     let address = serving.address.as_str();
-    // Begins no handshake, and stays.
+    // This client begins no handshake and stays connected.
     let silent = TcpStream::connect(address).unwrap();
     for (path, token) in [("/", None), ("/state.json", Some(TOKEN))] {
         let mut plain = TcpStream::connect(address).unwrap();
@@ -128,7 +128,7 @@ fn who_speaks_no_tls_gets_nothing_and_harms_nobody() {
             .write_all(format!("GET {path} HTTP/1.1\r\nHost: {address}\r\n{token}\r\n\r\n").as_bytes())
             .unwrap();
         let mut answer = Vec::new();
-        // It may be reset, with what was sent unread.
+        // The connection may be reset, with unread data.
         let _reset = plain.read_to_end(&mut answer);
         assert!(answer.len() < 16 && !answer.starts_with(b"HTTP"), "{answer:?}");
     }
@@ -140,7 +140,7 @@ fn who_speaks_no_tls_gets_nothing_and_harms_nobody() {
 }
 
 #[test]
-fn files_that_cannot_be_used_are_named_and_the_dive_goes_on() {
+fn unusable_certificate_files_are_reported_and_the_dive_goes_on() {
     let folder = Folder::with_dive();
     folder.write("garbage.pem", "-----BEGIN CERTIFICATE-----\nnot base64!\n-----END CERTIFICATE-----\n");
     folder.write("empty.pem", "");

@@ -1,4 +1,4 @@
-//! Viewers cost the dive nothing: its results are the same with a stalled one, one that floods, and none.
+//! Viewers don't influence the dive: its results are the same with a stalled viewer, a flooding viewer, and none.
 
 use std::net::TcpListener;
 
@@ -10,12 +10,12 @@ use tungstenite::Message;
 use crate::ANY;
 
 #[test]
-fn a_stalled_and_a_flooding_viewer_change_nothing() {
+fn stalled_and_flooding_viewers_do_not_change_results() {
     let folder = Folder::new();
     let bare = folder.headrace(&["demo", "--speed", "max", "--out", "bare"]);
     assert_eq!(bare.code, Some(0), "{}", bare.stderr);
     let serving = Serving::start(&folder, &["demo", ANY, "--no-open", "--speed", "400x", "--out", "watched"]);
-    // Connected, and never read from again.
+    // Connected, but never read from.
     let _stalled: Vec<Viewer> = (0..8).map(|_| Viewer::connect(&serving, "", &[]).unwrap()).collect();
     let mut flooding = Viewer::connect(&serving, "", &[]).unwrap();
     while flooding.send_raw(Message::Text("x".repeat(4000).into())).is_ok() {}
@@ -29,10 +29,10 @@ fn a_stalled_and_a_flooding_viewer_change_nothing() {
 }
 
 #[test]
-fn a_viewer_that_takes_nothing_is_dropped_and_counted_and_the_others_are_served_on() {
+fn stalled_viewer_is_dropped_and_counted_and_others_are_served() {
     let folder = Folder::with_dive();
     let serving = Serving::start(&folder, &["replay", "dive.mcap", ANY]);
-    // Connected, and never read from again.
+    // Connected, but never read from.
     let _stalled = Viewer::connect(&serving, "", &[]).unwrap();
     let mut viewer = Viewer::connect(&serving, "", &[]).unwrap();
     viewer.until("the end of the log", |viewer| viewer.state["playback"]["paused"] == true);
@@ -42,7 +42,7 @@ fn a_viewer_that_takes_nothing_is_dropped_and_counted_and_the_others_are_served_
         let line = figures.lines().find_map(|line| line.strip_prefix(name)?.strip_prefix(' '));
         line.unwrap().parse::<u64>().unwrap()
     };
-    // Each jump is all of the dive anew, so that what the machine keeps for a viewer fills; then ten seconds pass.
+    // Each seek sends the whole dive again and fills the viewer's socket buffer; then ten seconds pass.
     let to_s = viewer.state["playback"]["to_s"].as_f64().unwrap();
     for jump in 0..600 {
         let to_s = to_s - f64::from(jump % 2) * 2.0;
@@ -60,7 +60,7 @@ fn a_viewer_that_takes_nothing_is_dropped_and_counted_and_the_others_are_served_
 }
 
 #[test]
-fn a_taken_port_is_named_and_the_next_is_used() {
+fn taken_port_is_reported_and_the_next_one_used() {
     let folder = Folder::with_dive();
     let (taken, port) = loop {
         let listener = TcpListener::bind("127.0.0.1:0").unwrap();
@@ -89,7 +89,7 @@ fn a_taken_port_is_named_and_the_next_is_used() {
 }
 
 #[test]
-fn no_page_unless_asked_where_nobody_watches() {
+fn page_is_off_by_default_without_a_terminal() {
     let folder = Folder::with_dive();
     let answer = folder.headrace(&["replay", "dive.mcap", "--speed", "50x"]);
     assert!(!answer.stdout.contains("http://") && !answer.stderr.contains("http://"));

@@ -1,4 +1,4 @@
-//! Voice notes: the note is the loop's, its recording the log's, and neither needs the other.
+//! Voice notes: the loop keeps the note, the log keeps the recording, and neither needs the other.
 
 use std::fs::File;
 use std::io::BufWriter;
@@ -16,19 +16,19 @@ const OPERATOR: &str = "Authorization: Bearer operator-0123456789abcdef";
 const WEBM: &str = "Content-Type: audio/webm;codecs=opus";
 const LOG: &str = "headrace-demo/dive.mcap";
 
-/// A recording as a browser's, in all that is looked at: it doesn't compress.
+/// A recording that resembles a browser's in every checked respect; it isn't compressible.
 fn webm(seed: u64, bytes: usize) -> Vec<u8> {
     let mut random = Random(seed);
     let noise = (4..bytes).map(|_| random.byte());
     [0x1a, 0x45, 0xdf, 0xa3].into_iter().chain(noise).collect()
 }
 
-/// A demonstration that goes on until it is told to end.
+/// A demonstration that runs until it is stopped.
 fn demo(folder: &Folder, further: &[&str]) -> Serving {
     Serving::start(folder, &[&["demo", ANY, "--no-open", "--speed", "30x"], further].concat())
 }
 
-/// Begins a voice note; once this returns the page's server knows of it.
+/// Begins a voice note, and waits until the page's server knows it.
 fn begin(viewer: &mut Viewer, id: u32) {
     viewer.send(&json!({"do": "voice", "id": id, "by": "AB"}));
     viewer.until("that it is done", |viewer| {
@@ -40,7 +40,7 @@ fn upload(serving: &Serving, id: u32, headers: &[&str], audio: &[u8]) -> (u16, S
     serving.ask("POST", &format!("/voice/{id}?seconds=12"), &[&[WEBM], headers].concat(), audio)
 }
 
-/// The note with this voice, as the viewer's list has it.
+/// The note with this voice id in the viewer's list.
 fn note(viewer: &Viewer, id: u32) -> Option<&Value> {
     let told = viewer.others.iter().rev().filter(|other| other["type"] == "note");
     told.chain(&viewer.notes).find(|note| note["voice"]["id"] == id)
@@ -53,7 +53,7 @@ fn interrupt(serving: Serving, viewer: &mut Viewer) -> Value {
     end
 }
 
-/// The recordings in a log: id, and the bytes after the head.
+/// Recordings in a log: id, and the bytes after the header.
 fn recordings(folder: &Folder, logs: &[&str]) -> Vec<(u32, Vec<u8>)> {
     let files: Vec<_> = logs.iter().map(|log| folder.path(log)).collect();
     let mut log = DiveLog::open(&files).unwrap();
@@ -68,7 +68,7 @@ fn recordings(folder: &Folder, logs: &[&str]) -> Vec<(u32, Vec<u8>)> {
     found
 }
 
-/// Whether any message of a log has these bytes, once it is unpacked.
+/// Whether any decompressed message of a log contains these bytes.
 fn mentions(folder: &Folder, log: &str, words: &str) -> bool {
     let mut log = DiveLog::open(&[folder.path(log)]).unwrap();
     let mut is_found = false;
@@ -95,7 +95,7 @@ fn without_voices(folder: &Folder, from: &str, to: &str) {
 }
 
 #[test]
-fn a_voice_is_a_note_of_the_moment_it_began_and_its_bytes_are_in_the_log() {
+fn voice_note_has_its_start_time_and_its_bytes_in_the_log() {
     let folder = Folder::new();
     let serving = demo(&folder, &[]);
     let mut one = Viewer::connect(&serving, "", &[]).unwrap();
@@ -106,7 +106,7 @@ fn a_voice_is_a_note_of_the_moment_it_began_and_its_bytes_are_in_the_log() {
     assert_eq!((&begun["voice"], &begun["text"]), (&json!({"id": 7, "seconds": null}), &json!("")));
     assert!(begun["chainage_m"].is_number() && begun["by"] == "AB", "{begun}");
     assert_eq!(serving.ask("GET", "/voice/7", &[], "").0, 404, "nothing has been sent yet");
-    // The dive goes on while somebody speaks.
+    // The dive goes on while the operator speaks.
     let at_s = begun["at_s"].as_f64().unwrap();
     one.until("time", |viewer| viewer.state["at_s"].as_f64().unwrap() > at_s + 5.0);
     let audio = webm(1, 180_000);
@@ -141,8 +141,8 @@ fn a_voice_is_a_note_of_the_moment_it_began_and_its_bytes_are_in_the_log() {
     assert_eq!(folder.headrace(&["recover", LOG, "-o", "recovered.mcap"]).code, Some(0));
     assert_eq!(recordings(&folder, &["recovered.mcap"]), [(7, audio.clone())]);
     assert_eq!(folder.headrace(&["trim", LOG, "--anonymise", "-o", "public.mcap"]).code, Some(0));
-    assert_eq!(recordings(&folder, &["public.mcap"]), [], "a voice tells who speaks");
-    assert!(!mentions(&folder, "public.mcap", "\"AB\""), "who noted something");
+    assert_eq!(recordings(&folder, &["public.mcap"]), [], "a voice identifies its speaker");
+    assert!(!mentions(&folder, "public.mcap", "\"AB\""), "names of note takers are removed");
     assert!(mentions(&folder, LOG, "\"AB\""), "else the line above says nothing");
 
     let replay = Serving::start(&folder, &["replay", LOG, ANY]);
@@ -158,12 +158,12 @@ fn a_voice_is_a_note_of_the_moment_it_began_and_its_bytes_are_in_the_log() {
         folder.headrace(&["export", "silent.mcap", "--html", "silent.html"]);
         folder.read("silent.html").len()
     });
-    // Base64, packed and base64 again.
+    // Base64, compressed, and base64 again.
     assert!(spoken > silent + audio.len(), "{spoken} and {silent} bytes: the page has the voice in it");
 }
 
 #[test]
-fn notes_writes_the_files_of_voices_and_overwrites_nothing() {
+fn notes_writes_voice_files_and_overwrites_nothing() {
     let folder = Folder::new();
     let serving = demo(&folder, &[]);
     let mut viewer = Viewer::connect(&serving, "", &[]).unwrap();
@@ -206,7 +206,7 @@ fn notes_writes_the_files_of_voices_and_overwrites_nothing() {
 }
 
 #[test]
-fn only_an_operator_s_recording_of_a_note_that_was_begun_is_taken() {
+fn voice_recording_needs_an_operator_and_a_begun_note() {
     let folder = Folder::new();
     folder.write("tokens", TOKENS);
     let serving = demo(&folder, &["--page-token-file", "tokens"]);
@@ -262,7 +262,7 @@ fn only_an_operator_s_recording_of_a_note_that_was_begun_is_taken() {
 }
 
 #[test]
-fn a_dive_that_is_not_recorded_keeps_no_voice_and_says_so() {
+fn voice_note_of_an_unrecorded_dive_is_refused() {
     let folder = Folder::with_dive();
     let serving = Serving::start(&folder, &["run", "vehicle.toml", "--no-record", ANY]);
     let mut viewer = Viewer::connect(&serving, "", &[]).unwrap();
@@ -273,7 +273,7 @@ fn a_dive_that_is_not_recorded_keeps_no_voice_and_says_so() {
 }
 
 #[test]
-fn a_damaged_voice_costs_itself_alone() {
+fn damaged_voice_note_loses_only_itself() {
     let folder = Folder::new();
     let serving = demo(&folder, &[]);
     let mut viewer = Viewer::connect(&serving, "", &[]).unwrap();
@@ -301,7 +301,7 @@ fn a_damaged_voice_costs_itself_alone() {
 }
 
 #[test]
-fn in_a_recording_of_parts_each_voice_is_in_the_part_of_its_time() {
+fn voice_note_is_in_the_part_of_its_time() {
     let folder = Folder::with_dive();
     std::fs::create_dir(folder.path("parts")).unwrap();
     let arguments = ["run", "vehicle.toml", ANY, "--record", "parts/dive.mcap", "--rotate", "1s"];
@@ -318,9 +318,9 @@ fn in_a_recording_of_parts_each_voice_is_in_the_part_of_its_time() {
     };
     let audio = [webm(1, 90_000), webm(2, 90_000)];
     speak(7, &audio[0]);
-    // No device is there: an operator's commands are all that is recorded.
+    // No device is connected, so only operator commands are recorded.
     while !folder.path("parts/dive.part002.mcap").exists() {
-        // As many as an operator may send.
+        // The largest rate that is allowed for an operator.
         let (status, answer) = serving.ask("POST", "/actions/silence", &[], "{}");
         assert!([200, 429].contains(&status), "{answer}");
     }

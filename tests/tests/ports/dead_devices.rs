@@ -1,4 +1,4 @@
-//! What the pilot sees when every device dies during a dive: the state grows old on the screen, though nothing comes.
+//! The screen when every device dies during a dive: the displayed age grows although no data arrives.
 
 use std::io::{BufRead as _, BufReader};
 use std::process::Stdio;
@@ -9,7 +9,7 @@ use headrace_tests::pty::{OnTerminal, shown_lines};
 use crate::rehearsal::{Running, headrace, scene};
 
 #[test]
-fn when_all_devices_die_the_state_grows_old_on_the_screen() {
+fn screen_shows_growing_age_after_all_devices_die() {
     let folder = Folder::new();
     folder.write("scene.toml", scene(30.0));
     let emulate = headrace()

@@ -1,4 +1,4 @@
-//! `headrace devices`: emulated devices on real ports say what they are, and what isn't there is said with what mends it.
+//! `headrace devices`: identifies emulated devices on real ports, and reports missing ones with a remedy.
 
 use std::net::{IpAddr, Ipv4Addr};
 use std::sync::Arc;
@@ -17,12 +17,12 @@ use serde_json::Value;
 
 const KINDS: [&dyn DeviceKind; 2] = [&headrace_imagenex881::Imagenex881Kind, &headrace_ping1d::Ping1dKind];
 const LOCAL: IpAddr = IpAddr::V4(Ipv4Addr::LOCALHOST);
-/// Questions before a device is held to be silent.
+/// Number of requests before a device counts as silent.
 const TRIES: u32 = 30;
 const HEAD: &str = "plugin = \"imagenex881\"\nmode = \"slow\"\nrange_m = 10\nhead_id = 0x12";
 const PING: &str = "plugin = \"ping1d\"\ndevice_id = 7";
 
-/// A vehicle of sensors with these keys, each with where it is connected.
+/// A vehicle file of sensors with these keys, each with its address.
 fn vehicle_text(sensors: &[(&str, String)]) -> String {
     let mut text =
         include_str!("../../../deploy/vehicles/pipe.toml").split("[[sensors]]").next().unwrap().to_owned();
@@ -42,7 +42,7 @@ fn emulator(keys: &str) -> Emulated {
     vehicle.sensors[0].emulator(&EmulatorSetup { start, head: None, site: Site::default(), polled: false })
 }
 
-/// A device on a line, until it is dropped.
+/// A device on a line; it runs until it is dropped.
 struct Device {
     connect: Connect,
     stopping: Arc<AtomicBool>,
@@ -50,7 +50,7 @@ struct Device {
 }
 
 impl Device {
-    /// What it answers is up to `answer`, who gets what a host has sent.
+    /// Starts a device; `answer` gets the host's bytes and returns the reply.
     fn new(carrier: Carrier, mut answer: impl FnMut(&[u8]) -> Vec<Vec<u8>> + Send + 'static) -> Self {
         let mut stand = EmulatedPort::new(carrier, LOCAL).unwrap();
         let (connect, stopping) = (stand.connect().clone(), Arc::new(AtomicBool::new(false)));
@@ -105,7 +105,7 @@ fn asked(device: &Device) -> Answer {
     probe(&device.connect, &mut probes()).unwrap()
 }
 
-/// What a device is, asked again where the machine is too busy for its answer to come in time.
+/// Identity of a device, with retries if the machine is too busy for an answer in time.
 fn identity(device: &Device) -> Option<String> {
     (0..TRIES).find_map(|_| match asked(device) {
         Answer::Is(identity) => Some(identity),
@@ -113,7 +113,7 @@ fn identity(device: &Device) -> Option<String> {
     })
 }
 
-/// Exit code, standard output, standard error.
+/// Runs the program; returns exit code, standard output and standard error.
 fn headrace(arguments: &[&str]) -> (Option<i32>, String, String) {
     let output = headrace_tests::program().arg("devices").args(arguments).output().unwrap();
     let text = |bytes: &[u8]| String::from_utf8(bytes.to_vec()).unwrap();
@@ -121,7 +121,7 @@ fn headrace(arguments: &[&str]) -> (Option<i32>, String, String) {
 }
 
 #[test]
-fn devices_on_real_ports_say_what_they_are() {
+fn devices_on_real_ports_are_identified() {
     for carrier in [Carrier::Serial, Carrier::Tcp, Carrier::Udp] {
         for (keys, words) in [
             (HEAD, "Imagenex 881 family or 852 sounder, head_id = 0x12"),
@@ -131,7 +131,7 @@ fn devices_on_real_ports_say_what_they_are() {
             ),
         ] {
             let device = Device::emulated(carrier, keys);
-            // Twice, since whoever asks leaves the line as it was.
+            // Twice, because a probe must leave the line as it was.
             for _ in 0..2 {
                 let identity = identity(&device).unwrap_or_else(|| panic!("{carrier:?}: {words}: no answer"));
                 assert!(identity.starts_with(words), "{carrier:?}: {identity}");
@@ -141,7 +141,7 @@ fn devices_on_real_ports_say_what_they_are() {
 }
 
 #[test]
-fn silence_and_bytes_that_nobody_knows_are_told_apart() {
+fn silence_and_unknown_bytes_are_distinguished() {
     let silent = Device::new(Carrier::Serial, |_| Vec::new());
     assert_eq!(asked(&silent), Answer::Silence);
     let modem =
@@ -153,11 +153,11 @@ fn silence_and_bytes_that_nobody_knows_are_told_apart() {
     assert!(bytes > 0 && bytes % 7 == 0, "{bytes}");
     let nobody = Connect::parse("tcp:127.0.0.1:1").unwrap();
     let trouble = probe(&nobody, &mut probes()).unwrap_err().to_string();
-    assert!(trouble.contains("nobody listens there"), "{trouble}");
+    assert!(trouble.contains("no device listens there"), "{trouble}");
 }
 
 #[test]
-fn the_command_lists_this_machine_and_asks_at_addresses() {
+fn devices_command_lists_ports_and_probes_addresses() {
     let (code, plain, _) = headrace(&[]);
     assert_eq!(code, Some(0));
     for title in ["Serial ports", "HID devices", "CAN interfaces", "I2C buses"] {
@@ -179,7 +179,7 @@ fn the_command_lists_this_machine_and_asks_at_addresses() {
 }
 
 #[test]
-fn a_vehicle_file_is_held_against_what_is_there() {
+fn vehicle_file_is_compared_with_the_devices_found() {
     let folder = std::env::temp_dir().join(format!("headrace-devices-{}", std::process::id()));
     std::fs::create_dir_all(&folder).unwrap();
     let file = folder.join("vehicle.toml");
@@ -203,7 +203,7 @@ fn a_vehicle_file_is_held_against_what_is_there() {
     assert_eq!(code, Some(1), "{told}");
     assert!(
         told.contains("no such device is plugged in")
-            && told.contains("a device of this kind isn't connected by can:"),
+            && told.contains("a device of this kind cannot use can:"),
         "{told}"
     );
 }

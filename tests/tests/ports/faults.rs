@@ -1,6 +1,7 @@
-//! Devices on real ports whose lines fail: unplugged, garbled, stalled, mistaken for others. Whatever happens, each frame
-//! that a device sent whole is used, the device is used again by itself, what is wrong is said in words, and no other
-//! sensor is troubled.
+//! Devices on real ports whose lines fail: unplugged, garbled, stalled, or with the wrong device.
+//!
+//! Every frame that a device sent whole is used, the device is used again without help, the fault is reported in
+//! words, and no other sensor is disturbed.
 
 use std::os::unix::fs::PermissionsExt as _;
 
@@ -20,18 +21,19 @@ fn sensor(text: &'static str, end: End, fault: impl Fault + 'static) -> Sensor {
     Sensor { text, end, fault: Box::new(fault) }
 }
 
-/// What a sensor's status says of a machine that is too busy for the device at the other end, and not of what is tested.
+/// Statuses caused by a busy machine at the other end, which the tests ignore.
 const OF_A_BUSY_MACHINE: [&str; 3] = [
     "wrong: can't keep up with",
     "wrong: falls behind since answers get lost",
     "silent: the line is open, and no frame has come yet",
 ];
 
-/// The statuses of a sensor, each one that differs once, the same on a busy machine and on an idle one.
+/// Statuses of a sensor without repetition, the same on a busy machine and on an idle one.
 fn words(said: &[String]) -> String {
     let mut all: Vec<String> = Vec::new();
     for status in said {
-        // Who reads an unplugged port is told other words than who writes to it; which comes first is the machine's choice.
+        // Reading from an unplugged port gives another message than writing to it, and the machine decides which
+        // comes first.
         let status = status.replace("the port is gone", "Broken pipe");
         let is_news = status != "running" && !OF_A_BUSY_MACHINE.iter().any(|begin| status.starts_with(begin));
         if is_news && !all.contains(&status) {
@@ -41,7 +43,8 @@ fn words(said: &[String]) -> String {
     all.join("\n")
 }
 
-/// Unplugged in the middle of an answer, missed, plugged in again, and used again, twice.
+/// A device that is unplugged within an answer, noticed as missing, and plugged in and used again, twice. Returns the
+/// statuses.
 fn unplugged_and_plugged_in(text: &'static str, end: End, name: &str) -> String {
     let folder = Folder::new();
     let log = folder.path(&format!("{name}.mcap"));
@@ -64,38 +67,38 @@ fn unplugged_and_plugged_in(text: &'static str, end: End, name: &str) -> String 
 }
 
 #[test]
-fn a_serial_device_that_is_unplugged_is_used_again_under_its_stable_name() {
+fn replugged_serial_device_is_used_again_under_its_stable_name() {
     let folder = Folder::new();
     let end = End::serial(&folder.path(""), "usb-head-port0");
     insta::assert_snapshot!(unplugged_and_plugged_in(HEAD, end, "serial"), @r#"
     running: Imagenex 881 family, head 0x10
     closed: lost <line>: Broken pipe; it is tried again
-    closed: opening <place>: it isn't there; plug it in, or see headrace devices
+    closed: opening <place>: there is no such port; plug it in, or run headrace devices
     "#);
 }
 
 #[test]
-fn a_connection_that_the_device_closes_is_made_again() {
+fn connection_closed_by_the_device_is_reopened() {
     insta::assert_snapshot!(unplugged_and_plugged_in(HEAD, End::tcp(), "tcp"), @r#"
     running: Imagenex 881 family, head 0x10
     closed: lost <line>: the device has closed the connection; it is tried again
-    closed: opening <place>: nobody listens there; is the device switched on, and the port's number right?
+    closed: opening <place>: no device listens there; check that the device is switched on and the port number is right
     "#);
 }
 
 #[test]
-fn an_echosounder_that_is_unplugged_gets_its_settings_again() {
+fn replugged_echosounder_gets_its_settings_again() {
     let folder = Folder::new();
     let end = End::serial(&folder.path(""), "usb-ping-port0");
     insta::assert_snapshot!(unplugged_and_plugged_in(PING, end, "ping"), @r#"
     running: Ping echosounder, revision 1, firmware 3.29.0
     closed: lost <line>: Broken pipe; it is tried again
-    closed: opening <place>: it isn't there; plug it in, or see headrace devices
+    closed: opening <place>: there is no such port; plug it in, or run headrace devices
     "#);
 }
 
 #[test]
-fn a_bridge_that_goes_and_comes_again_is_used_again() {
+fn returning_bridge_is_used_again() {
     let mut rig = Rig::new(vec![sensor(PING, End::udp(), Healthy), healthy()]);
     rig.more(0, 40);
     rig.control(0).unplug();
@@ -108,12 +111,12 @@ fn a_bridge_that_goes_and_comes_again_is_used_again() {
     ended.untroubled(1);
     insta::assert_snapshot!(words(&ended.view.said[0]), @r#"
     running: Ping echosounder, revision 1, firmware 3.29.0
-    closed: lost <line>: nobody listens there; it is tried again
+    closed: lost <line>: no device listens there; it is tried again
     "#);
 }
 
 #[test]
-fn a_device_that_is_plugged_in_later_is_used_then() {
+fn device_plugged_in_later_is_used() {
     let folder = Folder::new();
     let serial = End::serial(&folder.path(""), "usb-head-port0").absent();
     let sensors = vec![sensor(HEAD, serial, Healthy), sensor(PING, End::tcp().absent(), Healthy), healthy()];
@@ -130,16 +133,16 @@ fn a_device_that_is_plugged_in_later_is_used_then() {
     ended.all_used();
     ended.untroubled(2);
     insta::assert_snapshot!(words(&ended.view.said[0]), @r#"
-    closed: opening <place>: it isn't there; plug it in, or see headrace devices
+    closed: opening <place>: there is no such port; plug it in, or run headrace devices
     running: Imagenex 881 family, head 0x10
     "#);
     insta::assert_snapshot!(words(&ended.view.said[1]), @r#"
-    closed: opening <place>: nobody listens there; is the device switched on, and the port's number right?
+    closed: opening <place>: no device listens there; check that the device is switched on and the port number is right
     running: Ping echosounder, revision 1, firmware 3.29.0
     "#);
 }
 
-/// An echosounder and a head on garbled lines, then on sound ones, beside a sensor that is untroubled.
+/// An echosounder and a head on garbled lines, then on sound ones, beside a sensor that must not be disturbed.
 fn garbled(change: fn(&mut Random, &[u8]) -> Vec<u8>) {
     let folder = Folder::new();
     let end = End::serial(&folder.path(""), "usb-ping-port0");
@@ -165,16 +168,16 @@ fn garbled(change: fn(&mut Random, &[u8]) -> Vec<u8>) {
 }
 
 #[test]
-fn flipped_bits_cost_the_frames_that_they_are_in() {
+fn flipped_bits_lose_only_their_own_frames() {
     garbled(flipped);
 }
 
 #[test]
-fn lost_bytes_cost_the_frames_that_they_are_missing_from() {
+fn lost_bytes_lose_only_their_own_frames() {
     garbled(thinned);
 }
 
-/// Garbage between frames, with beginnings of frames in it that promise more.
+/// Garbage between frames, with frame headers in it that promise more bytes.
 fn with_bursts(seed: u64, lure: &'static [u8]) -> impl Fault {
     let mut random = Random(seed);
     EachFrame(move |_, frame: &[u8], line: &mut Wire| {
@@ -189,9 +192,9 @@ fn with_bursts(seed: u64, lure: &'static [u8]) -> impl Fault {
 }
 
 #[test]
-fn bursts_of_garbage_cost_no_frame() {
+fn bursts_of_garbage_lose_no_frame() {
     let folder = Folder::new();
-    // A profile of 1200 strengths; a return of 500 points.
+    // A profile of 1200 strengths, and a return of 500 points.
     let end = End::serial(&folder.path(""), "usb-ping-port0");
     let sensors = vec![
         sensor(PING, end, with_bursts(3, b"BR\xCA\x04\x14\x05\x01\x00")),
@@ -210,7 +213,7 @@ fn bursts_of_garbage_cost_no_frame() {
     ended.untroubled(2);
 }
 
-/// Stalls in every third frame: for shorter than frames usually pause, or for longer, or for ever.
+/// Stalls in every third frame: shorter than the usual pause, longer, or for ever.
 fn stalling() -> impl Fault {
     EachFrame(|number, frame: &[u8], line: &mut Wire| {
         let (first, second) = frame.split_at(frame.len() / 2);
@@ -234,7 +237,7 @@ fn stalling() -> impl Fault {
 }
 
 #[test]
-fn a_device_that_stalls_in_a_frame_costs_it_only_if_the_rest_never_comes() {
+fn frame_that_stalls_is_lost_only_if_its_rest_never_arrives() {
     let folder = Folder::new();
     let end = End::serial(&folder.path(""), "usb-ping-port0");
     let sensors = vec![sensor(PING, end, stalling()), sensor(HEAD, End::tcp(), stalling()), healthy()];
@@ -258,7 +261,7 @@ fn twice() -> impl Fault {
 }
 
 #[test]
-fn two_answers_to_one_question_are_two_readings_and_confuse_nobody() {
+fn two_answers_to_one_request_are_two_readings() {
     let sensors = vec![
         sensor(PING, End::tcp(), twice()),
         sensor(HEAD, End::tcp(), twice()),
@@ -278,7 +281,7 @@ fn two_answers_to_one_question_are_two_readings_and_confuse_nobody() {
     assert_eq!(depth.withheld, 0, "the calibration is whole before the first measurement: {depth:?}");
 }
 
-/// Says that it is another device, until it is healed.
+/// A device that claims to be another one until it is healed.
 struct Disguised(fn(&mut Vec<u8>));
 
 impl Fault for Disguised {
@@ -289,7 +292,7 @@ impl Fault for Disguised {
     }
 }
 
-/// A Ping360's type in what an echosounder says that it is.
+/// Changes an echosounder's identity to a Ping360.
 fn as_ping360(frame: &mut Vec<u8>) {
     use headrace_ping1d::codec::{Addressed, Frame, Message};
     let parsed = Frame::parse(frame).unwrap();
@@ -307,7 +310,7 @@ fn as_head_0x11(frame: &mut Vec<u8>) {
 }
 
 #[test]
-fn another_device_on_the_port_is_named_and_the_right_one_used_when_it_comes() {
+fn wrong_device_is_reported_and_the_right_one_used_later() {
     let sensors = vec![
         sensor(PING, End::tcp(), Disguised(as_ping360)),
         sensor(HEAD, End::tcp(), Disguised(as_head_0x11)),
@@ -340,7 +343,7 @@ fn another_device_on_the_port_is_named_and_the_right_one_used_when_it_comes() {
     "#);
 }
 
-/// Sends garbage as fast as the line takes it.
+/// Sends garbage as fast as the line accepts it.
 struct Babbling(Random);
 
 impl Fault for Babbling {
@@ -355,7 +358,7 @@ impl Fault for Babbling {
 }
 
 #[test]
-fn a_babbling_device_troubles_nobody_else_and_is_used_when_it_has_done() {
+fn babbling_device_disturbs_no_other_and_is_used_afterwards() {
     let folder = Folder::new();
     let sensors = vec![sensor(HEAD, End::tcp(), Babbling(Random(5))), healthy()];
     let mut rig = Rig::recorded(sensors, Some(&folder.path("babble.mcap")));
@@ -372,13 +375,13 @@ fn a_babbling_device_troubles_nobody_else_and_is_used_when_it_has_done() {
 }
 
 #[test]
-fn a_device_that_falls_silent_is_said_to_be_and_used_when_it_speaks() {
+fn silent_device_is_reported_and_used_when_it_returns() {
     let mut rig = Rig::new(vec![sensor(PING, End::tcp(), Healthy), healthy()]);
     rig.more(0, 20);
     rig.until("it runs", |view| view.phases[0] == Some(Phase::Running));
     rig.control(0).fall_silent();
     rig.says(0, "is it switched on?");
-    // Its line has been opened again since, and it is still silent.
+    // Its line has been reopened since, and it is still silent.
     rig.until("enough", |view| view.good[1] >= 600);
     assert_ne!(rig.view().phases[0], Some(Phase::Running), "{:?}", rig.view().said[0]);
     rig.control(0).speak();
@@ -393,7 +396,7 @@ fn a_device_that_falls_silent_is_said_to_be_and_used_when_it_speaks() {
     "#);
 }
 
-/// Loses the first of what the host says.
+/// Loses the first requests of the host.
 struct DeafAtFirst(usize);
 
 impl Fault for DeafAtFirst {
@@ -406,9 +409,9 @@ impl Fault for DeafAtFirst {
     }
 }
 
-/// Each awaits an answer that doesn't come, and asks nothing while the other does.
+/// Each waits for an answer that doesn't arrive, and sends nothing while the other waits.
 #[test]
-fn two_devices_on_a_line_whose_first_answers_are_lost_wait_for_each_other_no_longer_than_for_an_answer() {
+fn two_devices_on_a_line_with_lost_first_answers_wait_one_answer_timeout() {
     let end = End::tcp();
     let beside = End::beside(&end);
     let second = "plugin = \"ping1d\"\ninterval_ms = 50\ndevice_id = 2\n";
@@ -423,7 +426,7 @@ fn two_devices_on_a_line_whose_first_answers_are_lost_wait_for_each_other_no_lon
 }
 
 #[test]
-fn a_port_that_this_user_may_not_open_is_said_to_be_and_used_when_it_may() {
+fn port_without_permission_is_reported_and_used_once_permitted() {
     let folder = Folder::new();
     let end = End::serial(&folder.path(""), "usb-head-port0");
     let port = folder.path("usb-head-port0");

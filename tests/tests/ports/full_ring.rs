@@ -1,4 +1,4 @@
-//! A ring that is full costs packets: each of them is counted, and none that came through.
+//! A full ring loses packets: exactly the lost ones are counted.
 
 use std::net::UdpSocket;
 use std::sync::Arc;
@@ -19,7 +19,7 @@ use headrace_sensor::driver::{DeviceHealth, Driver, Wire};
 use headrace_sensor::reading::{Decoded, Packet};
 use headrace_vehicle::Mission;
 
-/// Decodes nothing.
+/// Decoder that decodes nothing.
 struct Nothing;
 
 impl Stateful for Nothing {
@@ -38,7 +38,7 @@ impl Decoder for Nothing {
     }
 }
 
-/// Delivers what it hears, and counts the packets.
+/// Delivers received packets and counts them.
 struct Counting(Arc<AtomicU64>);
 
 impl Driver for Counting {
@@ -65,12 +65,12 @@ impl Driver for Counting {
 }
 
 #[test]
-fn every_packet_that_finds_no_room_is_counted_and_none_that_does() {
+fn exactly_the_packets_without_room_are_counted() {
     let profile = shapes::circle(3.0).unwrap();
     let navigation = DirectNavigation::new(profile.clone(), Site::default());
     let mut app = App::new(Mission::new(profile, 1.0));
     let [id, plugin, connect] = ["flood", "none", "none"].map(str::to_owned);
-    // As small as rings are: room for one packet of the longest kind.
+    // The smallest ring has room for one packet of the longest kind.
     app.add_source(SourceSpec { id, plugin, connect, decoder: Box::new(Nothing), ring_bytes: 0 }).unwrap();
     let mut dive = app.arm(Box::new(navigation)).unwrap();
     let ours = UdpSocket::bind("127.0.0.1:0").unwrap();
@@ -84,7 +84,8 @@ fn every_packet_that_finds_no_room_is_counted_and_none_that_does() {
         driver: Box::new(Counting(count.clone())),
     };
     let supervisor = Supervisor::start(vec![connection], None).unwrap();
-    // No tick takes anything meanwhile. A datagram that comes before the port is open, or that the kernel drops, isn't heard.
+    // No tick empties the ring meanwhile. Datagrams before the port is open, or dropped by the kernel, aren't
+    // received.
     let device = UdpSocket::bind("127.0.0.1:0").unwrap();
     while count.load(Ordering::Acquire) < 20 {
         device.send_to(&[7; 1000], place).unwrap();

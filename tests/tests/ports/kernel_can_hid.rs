@@ -1,8 +1,8 @@
-//! What Linux itself does with CAN interfaces that go down and counters that are unplugged, which the drivers rely on.
+//! Linux's own behaviour on which the drivers rely: CAN interfaces that go down, and counters that are unplugged.
 //!
-//! CAN interfaces and `/dev/uhid` want root and modules, so these tests are ignored here and run on a virtual machine's
-//! kernel: `tests/vm/run -- PROGRAM kernel_can_hid:: --ignored --test-threads=1`, where PROGRAM is the built `ports` test;
-//! `.ci/run` does so.
+//! CAN interfaces and `/dev/uhid` need root and modules. So these tests are ignored here and run on a virtual
+//! machine's kernel: `tests/vm/run -- PROGRAM kernel_can_hid:: --ignored --test-threads=1`, where PROGRAM is the
+//! built `ports` test. `.ci/run` does so.
 
 use std::fs::File;
 use std::io::ErrorKind;
@@ -15,9 +15,9 @@ use headrace_tether_hid::report::REFERENCE_DESCRIPTOR;
 use hidapi::{DeviceInfo, HidApi, HidDevice};
 use socketcan::{CanFrame, CanSocket, EmbeddedFrame, Socket, SocketOptions, StandardId};
 
-/// Nothing that is waited for takes as long.
+/// Longest wait for expected data.
 const LONG: Duration = Duration::from_secs(10);
-/// For what must not come.
+/// Wait for data that must not arrive.
 const SHORT: Duration = Duration::from_millis(100);
 
 const ENODEV: i32 = 19;
@@ -26,13 +26,13 @@ const ENETDOWN: i32 = 100;
 const VENDOR_ID: u16 = 0x1209;
 const PRODUCT_ID: u16 = 0x0001;
 
-/// `ip link ...`, words parted by spaces.
+/// Runs `ip link ...` with words separated by spaces.
 fn ip_link(words: &str) {
     let status = Command::new("ip").arg("link").args(words.split(' ')).status().unwrap();
     assert!(status.success(), "ip link {words}: {status}");
 }
 
-/// A virtual CAN interface of this test's own, gone when it is dropped.
+/// A virtual CAN interface of this test, removed when dropped.
 struct Interface(&'static str);
 
 impl Interface {
@@ -59,14 +59,14 @@ fn frame(first: u8) -> CanFrame {
     CanFrame::new(StandardId::new(0x123).unwrap(), &[first, 2, 3]).unwrap()
 }
 
-/// The error's number and kind, of a read that must not give a frame.
+/// Error number and kind of a read that must not return a frame.
 fn refused(read: std::io::Result<CanFrame>) -> (Option<i32>, ErrorKind) {
     let error = read.unwrap_err();
     println!("CAN: {error:?}");
     (error.raw_os_error(), error.kind())
 }
 
-/// What a socket says that has nothing to say.
+/// Result of reading from a socket without data.
 fn silence(socket: &CanSocket) -> ErrorKind {
     socket.set_read_timeout(SHORT).unwrap();
     let (_, kind) = refused(socket.read_frame());
@@ -77,13 +77,13 @@ fn silence(socket: &CanSocket) -> ErrorKind {
 #[test]
 #[ignore = "needs a kernel with vcan: tests/vm/run"]
 #[expect(clippy::disallowed_methods, reason = "the kernel's clock is compared with ours")]
-fn a_frame_comes_with_the_time_at_which_the_kernel_received_it() {
+fn frame_carries_the_kernel_receive_time() {
     let vcan = Interface::up("vcan5");
     let (sender, stamped, plain) = (vcan.socket(), vcan.socket(), vcan.socket());
     stamped.set_recv_timestamp(true).unwrap();
 
-    // Whether a frame's stamp is from before it was read. The kernel begins to stamp a moment after it was asked to; what
-    // comes before gets the time at which it is read.
+    // Whether a frame's timestamp precedes its reading. The kernel begins to stamp a moment after it is enabled;
+    // earlier frames get the time of reading.
     let stamped_early = |number| {
         let before = SystemTime::now();
         sender.write_frame(&frame(number)).unwrap();
@@ -105,7 +105,7 @@ fn a_frame_comes_with_the_time_at_which_the_kernel_received_it() {
 
 #[test]
 #[ignore = "needs a kernel with vcan: tests/vm/run"]
-fn a_reader_hears_once_that_can_is_down_and_hears_frames_when_it_is_up_again() {
+fn can_reader_gets_one_down_error_and_frames_after_up() {
     let vcan = Interface::up("vcan6");
     let (sender, reader) = (vcan.socket(), vcan.socket());
 
@@ -129,13 +129,13 @@ fn a_reader_hears_once_that_can_is_down_and_hears_frames_when_it_is_up_again() {
 
 #[test]
 #[ignore = "needs a kernel with vcan: tests/vm/run"]
-fn an_adapter_that_was_unplugged_needs_a_new_socket() {
+fn unplugged_can_adapter_needs_a_new_socket() {
     let first = Interface::up("vcan7");
     let old = first.socket();
     drop(first);
     assert_eq!(refused(old.read_frame()).0, Some(ENODEV));
     let missing = CanSocket::open("vcan7").unwrap_err();
-    println!("CAN: opening what is gone: {missing:?}");
+    println!("CAN: opening an absent device: {missing:?}");
     assert_eq!(missing.raw_os_error(), Some(ENODEV));
 
     let second = Interface::up("vcan7");
@@ -168,14 +168,14 @@ fn report(count: i32) -> Vec<u8> {
     report
 }
 
-/// The counter with this serial number among what the kernel has now.
+/// The counter with this serial number in the kernel's present list.
 fn listed(api: &mut HidApi, serial: &str) -> Option<DeviceInfo> {
     api.refresh_devices().unwrap();
     let ours = |device: &&DeviceInfo| (device.vendor_id(), device.product_id()) == (VENDOR_ID, PRODUCT_ID);
     api.device_list().filter(ours).find(|device| device.serial_number() == Some(serial)).cloned()
 }
 
-/// Waits until the kernel has made the counter's hidraw; gives the device and its path.
+/// Waits until the kernel has created the counter's hidraw; returns the device and its path.
 fn open(api: &mut HidApi, serial: &str) -> (HidDevice, String) {
     for _ in 0..1000 {
         if let Some(found) = listed(api, serial)
@@ -199,7 +199,7 @@ fn read(device: &HidDevice) -> hidapi::HidResult<Vec<u8>> {
 
 #[test]
 #[ignore = "needs a kernel with uhid: tests/vm/run"]
-fn a_counter_is_found_by_its_serial_number_and_heard() {
+fn counter_is_found_by_its_serial_number_and_read() {
     let mut api = HidApi::new().unwrap();
     let mut other = plug(uhid(), "HR-0001");
     let mut ours = plug(uhid(), "HR-0002");
@@ -219,7 +219,7 @@ fn a_counter_is_found_by_its_serial_number_and_heard() {
 
 #[test]
 #[ignore = "needs a kernel with uhid: tests/vm/run"]
-fn of_reports_that_nobody_reads_the_first_63_are_kept() {
+fn unread_reports_keep_the_first_63() {
     let mut api = HidApi::new().unwrap();
     let mut device = plug(uhid(), "HR-0003");
     let (reader, _) = open(&mut api, "HR-0003");
@@ -237,14 +237,14 @@ fn of_reports_that_nobody_reads_the_first_63_are_kept() {
 
 #[test]
 #[ignore = "needs a kernel with uhid: tests/vm/run"]
-fn an_unplugged_counter_is_an_error_and_is_found_again_under_another_number() {
+fn unplugged_counter_is_an_error_and_returns_under_another_number() {
     let mut api = HidApi::new().unwrap();
     let mut device = plug(uhid(), "HR-0004");
     let (reader, first_path) = open(&mut api, "HR-0004");
     device.report(&report(7)).unwrap();
     assert_eq!(read(&reader).unwrap(), report(7));
 
-    // A reader that waits is woken.
+    // A blocked reader is woken.
     let waiting = thread::spawn(move || (read(&reader).unwrap_err(), reader));
     let kernel = device.unplug().unwrap();
     let (error, reader) = waiting.join().unwrap();
@@ -253,10 +253,10 @@ fn an_unplugged_counter_is_an_error_and_is_found_again_under_another_number() {
     assert!(read(&reader).unwrap_err().to_string().contains("disconnected"), "the error stays");
     assert!(listed(&mut api, "HR-0004").is_none());
     let missing = api.open_serial(VENDOR_ID, PRODUCT_ID, "HR-0004").unwrap_err();
-    println!("HID: opening what is gone: {missing:?}");
+    println!("HID: opening an absent device: {missing:?}");
     drop(reader);
 
-    // Something else is plugged in meanwhile and takes the counter's number.
+    // Another counter is plugged in meanwhile and takes the number.
     let _other = plug(uhid(), "HR-0005");
     let (_other_reader, other_path) = open(&mut api, "HR-0005");
     assert_eq!(other_path, first_path);
@@ -269,12 +269,12 @@ fn an_unplugged_counter_is_an_error_and_is_found_again_under_another_number() {
 
 #[test]
 #[ignore = "needs a kernel with uhid: tests/vm/run"]
-fn what_an_unplugged_counter_said_last_is_lost() {
+fn last_report_of_an_unplugged_counter_is_lost() {
     let mut api = HidApi::new().unwrap();
     let mut device = plug(uhid(), "HR-0006");
     let (reader, _) = open(&mut api, "HR-0006");
     device.report(&report(1)).unwrap();
-    // Closing is unplugging, too.
+    // Closing counts as unplugging, too.
     drop(device);
     let error = read(&reader).unwrap_err();
     println!("HID: a report waited, the device went: {error:?}");

@@ -1,7 +1,7 @@
-//! Our drivers of CAN and HID on a real kernel, against the emulators of the same devices: all that is sent is decoded, and
-//! interfaces and counters that go and come are taken up again while the other sensor goes on.
+//! The CAN and HID drivers on a real kernel, with emulated devices.
 //!
-//! For a virtual machine's kernel, as `kernel_can_hid.rs`:
+//! Everything sent is decoded. Interfaces and counters that disappear and return are used again while the other
+//! sensor goes on. They need a virtual machine's kernel, as `kernel_can_hid.rs`:
 //! `tests/vm/run --with target/debug/headrace_under_test -- PROGRAM kernel_drivers:: --ignored --test-threads=1`.
 
 use std::cell::{Cell, RefCell};
@@ -29,11 +29,11 @@ use serde_json::Value;
 const IMU: usize = 0;
 const TETHER: usize = 1;
 
-/// Nothing that is waited for takes as long.
+/// Longest wait for expected data.
 const LONG: DurNs = DurNs::from_millis(20_000);
-/// A line on which nothing has come for so long has nothing more to give.
+/// Silence after which a line has no more data.
 const SETTLED: DurNs = DurNs::from_millis(200);
-/// Messages that are sent at once: fewer than the kernel keeps of a counter.
+/// Messages sent at once: fewer than the kernel buffers for a counter.
 const BURST: usize = 20;
 
 const COUNTER: &str = "hid:1209:0001:HR-0001";
@@ -63,13 +63,13 @@ counts_per_metre = 2000
 const WAY: &str =
     "vehicle = \"vehicle.toml\"\n[trajectory]\n[[trajectory.legs]]\ndistance_m = 20\nspeed_mps = 0.2\n";
 
-/// `ip link ...`, words parted by spaces.
+/// Runs `ip link ...` with words separated by spaces.
 fn ip_link(words: &str) {
     let status = Command::new("ip").arg("link").args(words.split(' ')).status().unwrap();
     assert!(status.success(), "ip link {words}: {status}");
 }
 
-/// A virtual CAN interface of this test's own, gone when it is dropped.
+/// A virtual CAN interface of this test, removed when dropped.
 struct Interface(&'static str);
 
 impl Interface {
@@ -91,7 +91,7 @@ fn counter(serial: &str) -> EmulatedPort {
     EmulatedPort::hid(&identity, &REFERENCE_DESCRIPTOR).unwrap()
 }
 
-/// The path that the kernel gives a counter.
+/// Path that the kernel gives a counter.
 fn path(serial: &str) -> String {
     for _ in 0..1000 {
         let api = HidApi::new().unwrap();
@@ -104,7 +104,7 @@ fn path(serial: &str) -> String {
     panic!("{serial} was plugged in and is not listed");
 }
 
-/// An inertial unit and a counter on their lines, a supervisor that serves them, and a loop that decodes.
+/// An inertial unit and a counter on their lines, their supervisor, and a decoding loop.
 struct Rehearsal {
     supervisor: Supervisor,
     dive: Loop,
@@ -114,7 +114,7 @@ struct Rehearsal {
 }
 
 impl Rehearsal {
-    /// `change` puts something between a sensor's line and its driver.
+    /// Starts it; `change` may wrap each sensor's driver.
     fn new(connects: [&str; 2], change: &dyn Fn(usize, Box<dyn Driver>) -> Box<dyn Driver>) -> Self {
         let scene = scenes::scene_from(WAY, &|_| Ok(TWO_SENSORS.as_bytes().to_vec()));
         let vehicle = &scene.vehicle;
@@ -135,7 +135,7 @@ impl Rehearsal {
         Self { supervisor, dive, said: Vec::new(), simulation, messages: [VecDeque::new(), VecDeque::new()] }
     }
 
-    /// What the sensor says next.
+    /// Next message of the sensor.
     fn next_message(&mut self, source: usize) -> Vec<u8> {
         loop {
             if let Some(message) = self.messages[source].pop_front() {
@@ -146,7 +146,7 @@ impl Rehearsal {
         }
     }
 
-    /// Runs the loop until `ended`, or for so long; gives whether it has ended.
+    /// Runs the loop until `ended` returns true or the time is over; returns the last result of `ended`.
     fn run(&mut self, time: DurNs, ended: &dyn Fn(&Loop, &[Status]) -> bool) -> bool {
         let until = now() + time;
         let has_ended = Cell::new(false);
@@ -167,7 +167,7 @@ impl Rehearsal {
         assert!(self.run(LONG, ended), "{what}: not within {} s; {:?}", LONG.as_secs_f64(), self.said);
     }
 
-    /// Waits until a sensor's status is this one.
+    /// Waits until a sensor has this status.
     #[track_caller]
     fn wait_for(&mut self, source: usize, phase: Phase, words: &str) {
         self.wait(words, &|_, said| {
@@ -180,7 +180,7 @@ impl Rehearsal {
         self.dive.decoder_counts()[source].good_frames
     }
 
-    /// Runs until nothing more comes of a sensor; gives the frames by then.
+    /// Runs until a sensor's data has ended; returns the number of frames.
     fn settle(&mut self, source: usize) -> u64 {
         loop {
             let good = self.good(source);
@@ -197,26 +197,26 @@ impl Rehearsal {
         }
     }
 
-    /// Talks to a sensor's driver until it hears: what is sent before the line is open is lost.
+    /// Sends to a sensor's driver until a message arrives; messages before the line is open are lost.
     #[track_caller]
     fn call(&mut self, source: usize, stand: &mut EmulatedPort) {
         let before = self.settle(source);
         let until = now() + LONG;
         while self.good(source) == before {
-            assert!(now() < until, "sensor {source} isn't heard: {:?}", self.said);
+            assert!(now() < until, "no message of sensor {source} arrives: {:?}", self.said);
             self.send(source, stand, 1);
             self.run(DurNs::from_millis(50), &|_, _| false);
         }
     }
 
-    /// Sends so many messages, all of which must be decoded, and no more.
+    /// Sends `count` messages, and checks that exactly these are decoded.
     #[track_caller]
     fn exactly(&mut self, source: usize, stand: &mut EmulatedPort, count: usize) {
         let before = self.settle(source);
         self.exactly_after(before, source, stand, count);
     }
 
-    /// The same, at once: there were so many before.
+    /// The same at once, with `before` messages decoded earlier.
     #[track_caller]
     fn exactly_after(&mut self, before: u64, source: usize, stand: &mut EmulatedPort, count: usize) {
         for burst in (0..count).step_by(BURST) {
@@ -228,13 +228,13 @@ impl Rehearsal {
         assert_eq!(self.settle(source) - before, count as u64, "sensor {source}");
     }
 
-    /// The sensor has been running since it first was.
+    /// Whether the sensor has been running without interruption.
     fn is_undisturbed(&self, source: usize) -> bool {
         let mut said = self.said.iter().filter(|status| status.source == source);
         said.all(|status| matches!(status.phase, Phase::Running | Phase::Silent))
     }
 
-    /// Ends; nothing that came was bad.
+    /// Ends the rehearsal and checks that no bad frame was received.
     fn end(mut self) -> Vec<LineHistory> {
         let histories = self.supervisor.stop(&mut self.dive, &mut |_| ());
         for (counts, history) in self.dive.decoder_counts().iter().zip(&histories) {
@@ -265,7 +265,7 @@ fn every_frame_and_every_report_is_decoded() {
     assert!(histories.iter().all(|history| history.lost == 0), "{histories:?}");
 }
 
-/// A driver that takes its time, and what it noted: the stamp of each message and when it was read.
+/// A slow driver that notes the timestamp of each message and the time of its reading.
 struct Dawdler {
     driver: Box<dyn Driver>,
     noted: Arc<SegQueue<(MonoNs, MonoNs)>>,
@@ -303,7 +303,7 @@ impl Driver for Dawdler {
 
 #[test]
 #[ignore = "needs a kernel with vcan and uhid: tests/vm/run"]
-fn a_frame_is_stamped_when_the_kernel_has_it_however_late_it_is_read() {
+fn late_read_does_not_change_a_frame_timestamp() {
     let _vcan = Interface::up("vcan2");
     let mut imu = EmulatedPort::can("vcan2").unwrap();
     let noted = Arc::new(SegQueue::new());
@@ -326,7 +326,7 @@ fn a_frame_is_stamped_when_the_kernel_has_it_however_late_it_is_read() {
         sent.since(begun).as_secs_f64() * 1e3
     );
     assert_eq!(all.len(), BURST);
-    // Two clocks are compared, neither of them at the same moment.
+    // Two clocks are compared, and not at the same moment.
     let slack = DurNs::from_millis(2);
     for (number, (stamp, read)) in all.iter().enumerate() {
         assert!(
@@ -341,7 +341,7 @@ fn a_frame_is_stamped_when_the_kernel_has_it_however_late_it_is_read() {
 
 #[test]
 #[ignore = "needs a kernel with vcan and uhid: tests/vm/run"]
-fn a_can_interface_that_goes_down_and_up_is_heard_again_from_its_first_frame() {
+fn can_interface_down_and_up_is_read_again_from_the_first_frame() {
     let vcan = Interface::up("vcan3");
     let (mut imu, mut tether) = (EmulatedPort::can(vcan.0).unwrap(), counter("HR-0001"));
     let mut rehearsal = Rehearsal::new(["can:vcan3", COUNTER], &unchanged);
@@ -357,7 +357,7 @@ fn a_can_interface_that_goes_down_and_up_is_heard_again_from_its_first_frame() {
             Phase::Closed,
             "opening vcan3: the interface is down; sudo ip link set vcan3 up",
         );
-        // What the unit says meanwhile goes nowhere. The second time it takes longer than silence is borne.
+        // Messages of the unit are lost meanwhile. The second outage is longer than the silence timeout.
         rehearsal.send(IMU, &mut imu, 3);
         rehearsal.exactly(TETHER, &mut tether, 60);
         if round == 1 {
@@ -378,7 +378,7 @@ fn a_can_interface_that_goes_down_and_up_is_heard_again_from_its_first_frame() {
 
 #[test]
 #[ignore = "needs a kernel with vcan and uhid: tests/vm/run"]
-fn a_unit_on_an_interface_that_is_down_is_heard_once_it_is_up() {
+fn unit_on_a_down_interface_is_read_once_it_is_up() {
     let vcan = Interface::up("vcan4");
     ip_link("set vcan4 down");
     let mut rehearsal = Rehearsal::new(["can:vcan4", COUNTER], &unchanged);
@@ -393,7 +393,7 @@ fn a_unit_on_an_interface_that_is_down_is_heard_once_it_is_up() {
 
 #[test]
 #[ignore = "needs a kernel with vcan and uhid: tests/vm/run"]
-fn a_can_adapter_that_is_unplugged_and_plugged_in_again_is_taken_up_again() {
+fn replugged_can_adapter_is_used_again() {
     let vcan = Interface::up("vcan6");
     let (mut imu, mut tether) = (EmulatedPort::can(vcan.0).unwrap(), counter("HR-0001"));
     let mut rehearsal = Rehearsal::new(["can:vcan6", COUNTER], &unchanged);
@@ -408,7 +408,7 @@ fn a_can_adapter_that_is_unplugged_and_plugged_in_again_is_taken_up_again() {
     rehearsal.send(IMU, &mut imu, 3);
     rehearsal.exactly(TETHER, &mut tether, 60);
     let vcan = Interface::up("vcan6");
-    // The end that was there before goes on, too.
+    // The other end, which existed before, goes on as well.
     rehearsal.call(IMU, &mut imu);
     rehearsal.exactly(IMU, &mut imu, 100);
     rehearsal.wait_for(IMU, Phase::Running, "");
@@ -421,7 +421,7 @@ fn a_can_adapter_that_is_unplugged_and_plugged_in_again_is_taken_up_again() {
 
 #[test]
 #[ignore = "needs a kernel with vcan and uhid: tests/vm/run"]
-fn a_counter_that_is_unplugged_is_taken_up_again_under_another_number() {
+fn replugged_counter_is_used_again_under_another_number() {
     let _vcan = Interface::up("vcan7");
     let (mut imu, mut tether) = (EmulatedPort::can("vcan7").unwrap(), counter("HR-0001"));
     let first = path("HR-0001");
@@ -437,7 +437,7 @@ fn a_counter_that_is_unplugged_is_taken_up_again_under_another_number() {
     assert!(rehearsal.said.iter().any(lost), "{:?}", rehearsal.said);
     rehearsal.exactly(IMU, &mut imu, 100);
 
-    // Another counter takes its number; ours gets another, and is the only one that is heard.
+    // Another counter takes its number. The first one gets a new number and is the only one that is read.
     let mut other = counter("HR-0002");
     assert_eq!(path("HR-0002"), first);
     let mut tether = counter("HR-0001");
@@ -454,7 +454,7 @@ fn a_counter_that_is_unplugged_is_taken_up_again_under_another_number() {
 
 #[test]
 #[ignore = "needs a kernel with vcan and uhid: tests/vm/run"]
-fn two_counters_of_one_make_are_told_apart_by_serial_number_alone() {
+fn two_equal_counters_are_distinguished_by_serial_number() {
     let (first, mut second) = (counter("HR-0001"), counter("HR-0002"));
     let paths = [path("HR-0001"), path("HR-0002")];
     let mut rehearsal = Rehearsal::new(["can:vcan0", "hid:1209:0001"], &unchanged);
@@ -468,7 +468,7 @@ fn two_counters_of_one_make_are_told_apart_by_serial_number_alone() {
     rehearsal.end();
 }
 
-/// A process of ours that doesn't outlive its test.
+/// A child process that ends with its test.
 struct Process(Child);
 
 impl Drop for Process {
@@ -482,7 +482,7 @@ impl Drop for Process {
 
 #[test]
 #[ignore = "needs a kernel with vcan and uhid: tests/vm/run"]
-fn a_rehearsal_and_a_dive_meet_on_the_kernels_can_and_hid() {
+fn rehearsal_and_dive_connect_by_kernel_can_and_hid() {
     let folder = Folder::new();
     let connected = VEHICLE
         .replace("plugin = \"ping1d\"", "plugin = \"ping1d\"\nconnect = \"udp:192.168.2.2:9090\"")

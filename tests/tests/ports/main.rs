@@ -1,7 +1,7 @@
-//! Devices on real ports: emulated ones, faulty lines, and the kernel's own CAN and HID; and what comes of their bytes on the
-//! way to the loop.
+//! Devices on real ports: emulated ones, faulty lines, the kernel's own CAN and HID, and the way of their bytes to
+//! the loop.
 
-#![allow(clippy::unwrap_used, clippy::panic, reason = "a test stops at what it can't do")]
+#![allow(clippy::unwrap_used, clippy::panic, reason = "a failed step ends the test")]
 
 #[cfg(unix)]
 mod dead_devices;

@@ -1,4 +1,5 @@
-//! A rehearsal: `emulate` and `run` in two processes, on pseudoterminals, TCP and UDP, against the scene's own replay.
+//! A rehearsal, `emulate` and `run` in two processes on pseudoterminals, TCP and UDP, compared with the scene's own
+//! replay.
 
 use std::collections::BTreeMap;
 use std::io::{BufRead as _, BufReader};
@@ -8,7 +9,7 @@ use std::process::{Child, Command, Stdio};
 use headrace_tests::Folder;
 use serde_json::Value;
 
-/// Four heads, two of them on serial lines, echosounders on both kinds of line, the rest on UDP.
+/// Four heads, two of them on serial lines, echosounders on both kinds of line, all others on UDP.
 pub(crate) fn scene(distance_m: f64) -> String {
     let vehicle = headrace_tests::root().join("deploy/vehicles/vita2-4.toml");
     format!(
@@ -63,7 +64,7 @@ impl Drop for Running {
     }
 }
 
-/// Dives live in a rehearsal; gives the exit code and the report.
+/// Runs a live dive in a rehearsal; returns exit code and report.
 fn live(folder: &Folder, scene: &Path) -> (Option<i32>, Value) {
     let emulate = headrace()
         .args(["emulate", "--stand", "0", "--linger", "30", "--out"])
@@ -98,7 +99,7 @@ pub(crate) fn report(path: &Path) -> Value {
     serde_json::from_slice(&std::fs::read(path).unwrap()).unwrap()
 }
 
-/// The same scene simulated and replayed.
+/// Simulates and replays the same scene.
 fn replayed(folder: &Folder, scene: &Path) -> (Option<i32>, Value) {
     let log = folder.path("scene.mcap");
     let done = headrace().arg("simulate").arg(scene).arg("-o").arg(&log).status().unwrap();
@@ -117,26 +118,26 @@ fn replay(folder: &Folder, log: &Path, name: &str) -> (Option<i32>, Value) {
     (done.unwrap().code(), report(&folder.path(name)))
 }
 
-/// Sections by the chainage at which they begin, as written in millimetres.
+/// Sections by the chainage of their start, written in millimetres.
 fn sections(report: &Value) -> BTreeMap<String, &Value> {
     let sections = report["sections"].as_array().unwrap().iter();
     sections.map(|section| (format!("{:9.3}", section["start_m"].as_f64().unwrap()), section)).collect()
 }
 
-/// Holes of a live dive and of its scene's replay may be so far apart, m.
+/// Largest difference between holes of a live dive and of its scene's replay, m.
 const APART_M: f64 = 0.12;
-/// The scene's target, m, and the standard deviations of its confidence.
+/// Target of the scene, m, and the number of standard deviations of its confidence.
 const TARGET_M: f64 = 0.7;
 const CONFIDENCE_SD: f64 = 2.0;
 
-/// Whether a section passes by less than holes may be apart.
+/// Whether the margin of a passed section is less than that difference.
 fn is_near(section: &Value) -> bool {
     let of = |key: &str| section[key].as_f64().unwrap_or(f64::NAN);
     section["verdict"] == "pass" && TARGET_M - of("hole_m") - CONFIDENCE_SD * of("hole_sd_m") < APART_M
 }
 
-/// Where sections of the live dive and of its replay differ, except in the last half metre: whether the last beats and turns
-/// of a dive were still seen decides how far its way goes, and whether the section under them is judged.
+/// Differences between sections of the live dive and of its replay, without the last half metre. There, the last
+/// updates and turns decide how far the dive reaches and whether its last section is judged.
 fn differences(live: &BTreeMap<String, &Value>, replay: &BTreeMap<String, &Value>) -> Vec<String> {
     let last = live.keys().max().max(replay.keys().max()).unwrap();
     let last_m: f64 = last.trim().parse().unwrap();
@@ -150,8 +151,8 @@ fn differences(live: &BTreeMap<String, &Value>, replay: &BTreeMap<String, &Value
             continue;
         };
         let hole_m = |section: &Value| section["hole_m"].as_f64().unwrap_or(f64::NAN);
-        // Phases among heads are the same, to some millimetres of hole; a machine that stalls for a quarter of a second
-        // truly makes one larger.
+        // Phases between heads differ by some millimetres of hole at most. A machine that stalls for a quarter of a
+        // second truly enlarges a hole.
         let apart_m = (hole_m(ours) - hole_m(theirs)).abs();
         if apart_m > APART_M {
             different.push(format!("{start} m: holes are {apart_m:.3} m apart"));
@@ -159,7 +160,7 @@ fn differences(live: &BTreeMap<String, &Value>, replay: &BTreeMap<String, &Value
         let near = [ours, theirs].iter().any(|section| is_near(section));
         let (ours, theirs) = (&ours["verdict"], &theirs["verdict"]);
         println!("{start} m  live {ours}, replay {theirs}, holes {apart_m:.3} m apart");
-        // What passes barely in one dive can't be said to in the other.
+        // A section that barely passes in one dive may stay undecided in the other.
         let barely = near
             && [ours, theirs].contains(&&"pass".into())
             && [ours, theirs].contains(&&"cannot_say".into());
@@ -170,8 +171,8 @@ fn differences(live: &BTreeMap<String, &Value>, replay: &BTreeMap<String, &Value
     different
 }
 
-/// Rehearses a dive. As far as the machine keeps time its lines stay open and its sections are those of the scene's replay, so that only
-/// a test that has the machine to itself asks for that.
+/// Rehearses a dive. Only if the machine keeps time do its lines stay open and its sections match the scene's replay.
+/// So `keeps_time` is only set in tests that have the machine to themselves.
 fn rehearse(distance_m: f64, keeps_time: bool) {
     let folder = Folder::new();
     let scene_file = folder.path("scene.toml");
@@ -191,21 +192,21 @@ fn rehearse(distance_m: f64, keeps_time: bool) {
     let different = differences(&ours, &theirs);
     assert!(different.is_empty() || !keeps_time, "{different:#?}");
     assert!(!ours.is_empty(), "no section was judged");
-    // What was recorded is what was seen.
+    // The replay of the recording shows the same results.
     let (again_code, again) = replay(&folder, &folder.path("live.mcap"), "again.json");
     assert_eq!((again_code, &again["digest"]), (code, &live["digest"]));
     assert_eq!(again["sections"], live["sections"]);
 }
 
-/// Two thirds of a minute under way.
+/// Forty seconds of motion.
 #[test]
-fn a_rehearsal_is_recorded_as_it_was_seen() {
+fn rehearsal_replays_as_it_was_seen() {
     rehearse(3.6, false);
 }
 
-/// Three minutes under way.
+/// Three minutes of motion.
 #[test]
 #[ignore = "takes three minutes and more; .ci/run does it"]
-fn a_rehearsal_of_three_minutes_gives_the_sections_of_the_scene_s_replay() {
+fn three_minute_rehearsal_gives_the_sections_of_the_scene_replay() {
     rehearse(16.2, true);
 }

@@ -1,5 +1,7 @@
-//! `headrace run` and `headrace check` where ports are wrong, missing or silent: each sensor's trouble is named with what
-//! would be right, the dive goes on with what there is, and exit codes are the right ones.
+//! `headrace run` and `headrace check` with wrong, missing or silent ports.
+//!
+//! Each sensor's trouble is reported with the valid form, the dive goes on with the other sensors, and exit codes are
+//! right.
 
 use headrace_tests::faulty::{End, Fault, Faulty, Healthy, Wire};
 use headrace_tests::pty::Terminal;
@@ -13,7 +15,7 @@ use std::time::Duration;
 
 use crate::rehearsal::Running;
 
-/// Sensors whose lines are none, each wrong in another way.
+/// Sensors with invalid lines, each in another way.
 const WRONG: [(&str, &str, &str); 7] = [
     ("no_colon", HEAD, "192.168.0.5"),
     ("no_port", HEAD, "tcp:192.168.0.5"),
@@ -24,7 +26,7 @@ const WRONG: [(&str, &str, &str); 7] = [
     ("empty", COUNTER, ""),
 ];
 
-/// Sensors whose lines aren't there.
+/// Sensors whose lines don't exist.
 const ABSENT: [(&str, &str, &str); 4] = [
     ("adapter", HEAD, "serial:/dev/serial/by-id/usb-headrace-none"),
     ("usb", HEAD, "serial:usb:1209:fffe:none"),
@@ -43,7 +45,7 @@ fn report(folder: &Folder) -> Value {
     serde_json::from_slice(&folder.read("report.json")).unwrap()
 }
 
-/// Each sensor's last status, a line each.
+/// Last status of each sensor, one line each.
 fn statuses(report: &Value) -> String {
     let line = |source: &Value| {
         format!("{}: {}\n", source["id"].as_str().unwrap(), source["line"]["status"].as_str().unwrap())
@@ -52,10 +54,10 @@ fn statuses(report: &Value) -> String {
 }
 
 const RUN: [&str; 7] = ["run", "vehicle.toml", "--no-record", "--report", "report.json", "--for", "3"];
-/// The same, for as long as it takes.
+/// Arguments of a run without a time limit.
 const RUN_UNTIL: [&str; 2] = ["vehicle.toml", "--no-record"];
 
-/// Whether the first sensor has given readings and been said to run.
+/// Whether the first sensor has given readings and been reported as running.
 fn first_runs(report: &Value) -> bool {
     let first = &report["sources"][0];
     let status = first["line"]["status"].as_str().unwrap_or_default();
@@ -63,7 +65,7 @@ fn first_runs(report: &Value) -> bool {
 }
 
 #[test]
-fn check_names_every_connect_that_is_wrong_with_what_is_right() {
+fn check_reports_every_wrong_connect_with_the_valid_form() {
     let folder = Folder::new();
     folder.write("vehicle.toml", vehicle(&WRONG));
     let answer = folder.headrace(&["check", "vehicle.toml"]);
@@ -73,7 +75,7 @@ fn check_names_every_connect_that_is_wrong_with_what_is_right() {
     headrace: vehicle.toml:11: sensors[0].connect: there is no colon; allowed are serial:/dev/serial/by-id/NAME?baud=115200, serial:usb:VID:PID[:SERIAL]?baud=115200, tcp:HOST:PORT, udp:HOST:PORT, udp-listen:ADDRESS:PORT, can:INTERFACE, hid:VID:PID[:SERIAL], i2c:/dev/i2c-1:0x40
     headrace: vehicle.toml:18: sensors[1].connect: there is no port; allowed is tcp:192.168.0.5:4040
     headrace: vehicle.toml:25: sensors[2].connect: baud="fast" must be a whole number from 1 to 12000000; allowed is serial:/dev/serial/by-id/NAME?baud=115200 or serial:usb:0403:6001:A10K
-    headrace: vehicle.toml:32: sensors[3].connect: a device of this kind isn't connected by can:; it is by tcp:, serial: or udp:
+    headrace: vehicle.toml:32: sensors[3].connect: a device of this kind cannot use can:; it can use tcp:, serial: or udp:
     headrace: vehicle.toml:39: sensors[4].connect: there is no product id; allowed is hid:VID:PID[:SERIAL] with four hexadecimal digits each, hid:1209:0001
     headrace: vehicle.toml:46: sensors[5].connect: address "0x99" must be 0x08 to 0x77; allowed is i2c:/dev/i2c-1:0x40
     headrace: warning: vehicle.toml:9: sensors: have no connect, so that `run` can't reach them: empty
@@ -81,7 +83,7 @@ fn check_names_every_connect_that_is_wrong_with_what_is_right() {
 }
 
 #[test]
-fn ports_that_are_wrong_or_not_there_are_named_while_the_dive_goes_on() {
+fn wrong_or_missing_ports_are_reported_while_the_dive_goes_on() {
     let folder = Folder::new();
     let end = End::tcp();
     let place = end.connect().to_string();
@@ -112,27 +114,27 @@ fn ports_that_are_wrong_or_not_there_are_named_while_the_dive_goes_on() {
     no_colon: closed: connect = "192.168.0.5": there is no colon; allowed are serial:/dev/serial/by-id/NAME?baud=115200, serial:usb:VID:PID[:SERIAL]?baud=115200, tcp:HOST:PORT, udp:HOST:PORT, udp-listen:ADDRESS:PORT, can:INTERFACE, hid:VID:PID[:SERIAL], i2c:/dev/i2c-1:0x40
     no_port: closed: connect = "tcp:192.168.0.5": there is no port; allowed is tcp:192.168.0.5:4040
     baud: closed: connect = "serial:/dev/ttyUSB0?baud=fast": baud="fast" must be a whole number from 1 to 12000000; allowed is serial:/dev/serial/by-id/NAME?baud=115200 or serial:usb:0403:6001:A10K
-    carrier: closed: connect = "can:can0": a device of this kind isn't connected by can:; it is by tcp:, serial: or udp:
+    carrier: closed: connect = "can:can0": a device of this kind cannot use can:; it can use tcp:, serial: or udp:
     product: closed: connect = "hid:1209": there is no product id; allowed is hid:VID:PID[:SERIAL] with four hexadecimal digits each, hid:1209:0001
     address: closed: connect = "i2c:/dev/i2c-1:0x99": address "0x99" must be 0x08 to 0x77; allowed is i2c:/dev/i2c-1:0x40
-    empty: closed: connect = "": nothing is said of where the sensor is; allowed are serial:/dev/serial/by-id/NAME?baud=115200, serial:usb:VID:PID[:SERIAL]?baud=115200, tcp:HOST:PORT, udp:HOST:PORT, udp-listen:ADDRESS:PORT, can:INTERFACE, hid:VID:PID[:SERIAL], i2c:/dev/i2c-1:0x40
+    empty: closed: connect = "": it is empty; allowed are serial:/dev/serial/by-id/NAME?baud=115200, serial:usb:VID:PID[:SERIAL]?baud=115200, tcp:HOST:PORT, udp:HOST:PORT, udp-listen:ADDRESS:PORT, can:INTERFACE, hid:VID:PID[:SERIAL], i2c:/dev/i2c-1:0x40
     "#);
-    // A kernel without CAN says so.
+    // A kernel without CAN gives another message.
     let absent = statuses(&absent).replace(
         "this kernel has no CAN; sudo modprobe can-raw",
-        "there is no such interface; plug the adapter in; ip link shows what there is",
+        "there is no such interface; plug the adapter in; ip link lists the interfaces",
     );
     insta::assert_snapshot!(absent, @r#"
     head: running: Imagenex 881 family, head 0x10
-    adapter: closed: opening /dev/serial/by-id/usb-headrace-none: it isn't there; plug it in, or see headrace devices
-    usb: closed: looking for serial:usb:1209:fffe:none: no such device is plugged in; headrace devices shows what is
-    counter: closed: looking for hid:1209:fffe:none: no such device is plugged in; headrace devices shows what is
-    imu: closed: opening none77: there is no such CAN interface; plug the adapter in; ip link shows what there is
+    adapter: closed: opening /dev/serial/by-id/usb-headrace-none: there is no such port; plug it in, or run headrace devices
+    usb: closed: looking for serial:usb:1209:fffe:none: no such device is plugged in; headrace devices lists those that are
+    counter: closed: looking for hid:1209:fffe:none: no such device is plugged in; headrace devices lists those that are
+    imu: closed: opening none77: there is no such CAN interface; plug the adapter in; ip link lists the interfaces
     "#);
 }
 
 #[test]
-fn a_dive_without_any_sensor_fails_and_says_what_each_lacks() {
+fn dive_without_any_sensor_fails_with_each_reason() {
     let folder = Folder::new();
     folder.write("vehicle.toml", vehicle(&ABSENT));
     let answer = folder.headrace(&RUN);
@@ -142,7 +144,7 @@ fn a_dive_without_any_sensor_fails_and_says_what_each_lacks() {
     }
 }
 
-/// Waits for the end of a dive whose terminal takes nothing: ten times as long as the program waits for it.
+/// Waits for the end of a dive with a blocked terminal: ten times as long as the program waits.
 fn ends_and_reports(mut run: Running, folder: &Folder) {
     let code = (0..300).find_map(|_| {
         std::thread::sleep(Duration::from_millis(100));
@@ -153,7 +155,7 @@ fn ends_and_reports(mut run: Running, folder: &Folder) {
 }
 
 #[test]
-fn a_terminal_that_takes_nothing_from_the_start_keeps_no_dive_from_its_end() {
+fn terminal_blocked_from_the_start_does_not_keep_a_dive_from_ending() {
     let folder = Folder::new();
     folder.write("vehicle.toml", vehicle(&ABSENT));
     let full = Terminal::open(100);
@@ -165,7 +167,7 @@ fn a_terminal_that_takes_nothing_from_the_start_keeps_no_dive_from_its_end() {
 }
 
 #[test]
-fn nor_does_one_that_stops_while_it_shows_the_whole_page() {
+fn terminal_blocked_within_a_page_does_not_keep_a_dive_from_ending() {
     let folder = Folder::new();
     folder.write("vehicle.toml", vehicle(&ABSENT));
     let mut terminal = Terminal::open(100);
@@ -177,16 +179,16 @@ fn nor_does_one_that_stops_while_it_shows_the_whole_page() {
     ends_and_reports(Running(run), &folder);
 }
 
-/// The size of a pipe. Source: pipe(7), "Pipe capacity".
+/// Size of a pipe, bytes. Source: pipe(7), "Pipe capacity".
 const PIPE: usize = 1 << 16;
 
 #[test]
-fn nor_does_a_pipe_that_nobody_reads_to_the_last_byte() {
+fn blocked_pipe_at_any_byte_does_not_keep_a_dive_from_ending() {
     let folder = Folder::new();
     folder.write("vehicle.toml", vehicle(&ABSENT));
     let whole = folder.headrace(&RUN).stdout.len();
     assert!((200..PIPE).contains(&whole), "{whole} bytes");
-    // Full from the start, and at last within the summary.
+    // The pipe is full from the start in the first case, and within the summary in the last.
     let lines = [0, whole - 150, whole - 100, whole - 50, whole - 10].map(|room| ("", room));
     let json = ["--json", "--json-lines"].map(|how| (how, 0));
     let runs = lines.into_iter().chain(json).map(|(how, room)| {
@@ -205,7 +207,7 @@ fn nor_does_a_pipe_that_nobody_reads_to_the_last_byte() {
 }
 
 #[test]
-fn required_sensors_that_can_t_be_end_the_dive() {
+fn unavailable_required_sensor_ends_the_dive() {
     let folder = Folder::new();
     let sensors: Vec<_> = WRONG[..1].iter().chain(&ABSENT).copied().collect();
     folder.write("vehicle.toml", vehicle(&sensors));
@@ -223,11 +225,11 @@ fn required_sensors_that_can_t_be_end_the_dive() {
     headrace: --require sonar: no such sensor; expected all, or ids of no_colon, adapter, usb, counter, imu
     headrace: sensor "no_colon" is required: connect = "192.168.0.5": there is no colon; allowed are serial:/dev/serial/by-id/NAME?baud=115200, serial:usb:VID:PID[:SERIAL]?baud=115200, tcp:HOST:PORT, udp:HOST:PORT, udp-listen:ADDRESS:PORT, can:INTERFACE, hid:VID:PID[:SERIAL], i2c:/dev/i2c-1:0x40
     headrace: sensor "no_colon" is required: connect = "192.168.0.5": there is no colon; allowed are serial:/dev/serial/by-id/NAME?baud=115200, serial:usb:VID:PID[:SERIAL]?baud=115200, tcp:HOST:PORT, udp:HOST:PORT, udp-listen:ADDRESS:PORT, can:INTERFACE, hid:VID:PID[:SERIAL], i2c:/dev/i2c-1:0x40
-    headrace: required sensor "adapter" wasn't running within 1 s: opening /dev/serial/by-id/usb-headrace-none: it isn't there; plug it in, or see headrace devices
+    headrace: required sensor "adapter" wasn't running within 1 s: opening /dev/serial/by-id/usb-headrace-none: there is no such port; plug it in, or run headrace devices
     "#);
 }
 
-/// Reports that end early, as those of a counter of another make.
+/// Truncated reports, as of a counter by another maker.
 struct Short;
 
 impl Fault for Short {
@@ -237,7 +239,7 @@ impl Fault for Short {
 }
 
 #[test]
-fn reports_that_are_shorter_than_configured_are_named() {
+fn reports_shorter_than_configured_are_reported() {
     let folder = Folder::new();
     let end = End::udp();
     folder.write("vehicle.toml", vehicle(&[("counter", COUNTER, &end.connect().to_string())]));
@@ -253,7 +255,7 @@ fn reports_that_are_shorter_than_configured_are_named() {
 }
 
 #[test]
-fn a_live_dive_s_log_has_what_was_sent_and_replays_to_the_same_digest() {
+fn live_log_has_sent_bytes_and_replays_to_the_same_digest() {
     let folder = Folder::new();
     let (head, counter) = (End::tcp(), End::udp());
     let places = [head.connect().to_string(), counter.connect().to_string()];

@@ -1,4 +1,4 @@
-//! A long rehearsal whose devices freeze every now and then: what memory, files, threads and processor it takes, and what it drops.
+//! A long rehearsal whose devices freeze now and then: measures memory, files, threads, CPU time and drops.
 //!
 //! `HEADRACE_SOAK_MINUTES=60 cargo test -p headrace_tests --test ports soak -- --ignored --nocapture`
 
@@ -10,17 +10,17 @@ use headrace_tests::Folder;
 
 use super::rehearsal::{Running, headrace, interrupt, report, scene};
 
-/// Length of a soak unless the environment says otherwise, minutes.
+/// Default length of a soak, minutes.
 const MINUTES: f64 = 10.0;
-/// Between two looks, and two faults.
+/// Interval between two samples, and between two faults.
 const LOOK: Duration = Duration::from_secs(5);
 const LOOKS_A_FAULT: usize = 7;
-/// How long the devices are frozen.
+/// Duration of a freeze.
 const FREEZE: Duration = Duration::from_millis(1_500);
-/// Looks before files and threads count.
+/// Samples before files and threads count.
 const WARM_UP: usize = 12;
 
-/// What a process takes.
+/// Resources of a process.
 #[derive(Debug, Clone, Copy)]
 struct Look {
     resident_kib: f64,
@@ -38,13 +38,13 @@ fn look(pid: u32) -> Option<Look> {
     };
     let stat = std::fs::read_to_string(format!("{proc}/stat")).ok()?;
     let words: Vec<&str> = stat.rsplit_once(')')?.1.split_whitespace().collect();
-    // User and system time; of the words after the name, the 12th and 13th.
+    // User and system time are the 12th and 13th word after the name.
     let cpu_ticks = words.get(11)?.parse::<f64>().ok()? + words.get(12)?.parse::<f64>().ok()?;
     let files = std::fs::read_dir(format!("{proc}/fd")).ok()?.count();
     Some(Look { resident_kib: field("VmRSS:")?, files, threads: field("Threads:")?, cpu_ticks })
 }
 
-/// Slope of a straight line through values at equal distances, a step.
+/// Slope of a line fitted to equidistant values, per step.
 fn slope(values: &[f64]) -> f64 {
     let count = values.len() as f64;
     let (mean_at, mean) = ((count - 1.0) / 2.0, values.iter().sum::<f64>() / count);
@@ -63,7 +63,7 @@ fn signal(pid: u32, name: &str) {
 
 #[test]
 #[ignore = "takes ten minutes and more: HEADRACE_SOAK_MINUTES"]
-fn a_soak_neither_leaks_nor_drops() {
+fn soak_neither_leaks_nor_drops() {
     let minutes = std::env::var("HEADRACE_SOAK_MINUTES").map_or(MINUTES, |text| text.parse().unwrap());
     let looks = (minutes * 60.0 / LOOK.as_secs_f64()).ceil();
     let folder = Folder::new();
@@ -104,7 +104,7 @@ fn a_soak_neither_leaks_nor_drops() {
     let resident: Vec<f64> = warm.iter().map(|look| look.resident_kib / 1024.0).collect();
     let tenths: Vec<String> =
         (0..=10).map(|tenth| format!("{:.1}", resident[tenth * (resident.len() - 1) / 10])).collect();
-    // Rings, lists and sections are allocated when the dive begins, and touched one after the other.
+    // Rings, lists and sections are allocated when the dive begins, but touched one after the other.
     let later = &resident[resident.len() / 2..];
     let (first, last) = (warm[0], warm[warm.len() - 1]);
     // Linux: 100 ticks a second.

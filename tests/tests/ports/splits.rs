@@ -1,5 +1,6 @@
-//! From the device to the readings, without ports: a lossless stream gives the same readings however it is split and whenever
-//! its parts come, each timed by the part that brought its frame's first byte.
+//! From device to readings without ports: splits and delays of a lossless stream don't change readings or times.
+//!
+//! The time of each reading is that of the part with the first byte of its frame.
 
 use headrace::devices::KINDS;
 use headrace_config::Document;
@@ -26,14 +27,14 @@ const STREAMS: [&str; 7] = [
     "plugin = \"a50\"\n",
     "plugin = \"mavlink\"\npart = \"imu\"\nsystem_id = 1\n",
 ];
-/// Devices whose carriers keep messages whole: those may only come late.
+/// Devices whose carriers keep messages whole; these messages can only be late.
 const MESSAGES: [&str; 3] = [
     "plugin = \"imu_can\"\npreset = \"xsens_mti600\"\n",
     "plugin = \"bar100\"\n",
     "plugin = \"tether_hid\"\ncounts_per_metre = 2000\n",
 ];
 
-/// Collects what a driver delivers.
+/// Collects the messages that a driver delivers.
 #[derive(Default)]
 struct Delivered(Vec<(MonoNs, Vec<u8>)>);
 
@@ -70,7 +71,7 @@ fn told<M: Measurement>(device: &mut dyn Emulator<M>, mut feel: impl FnMut(&mut 
     frames
 }
 
-/// What the device sends.
+/// Frames of the device.
 fn frames(device: &dyn Device, random: &mut Random) -> Vec<Vec<u8>> {
     let setup = EmulatorSetup {
         start: START,
@@ -100,7 +101,7 @@ fn frames(device: &dyn Device, random: &mut Random) -> Vec<Vec<u8>> {
     }
 }
 
-/// Readings of these parts of a stream, through driver and decoder, with the driver woken whenever it wants to be.
+/// Readings of these parts of a stream through driver and decoder, with the driver woken at its own deadlines.
 fn readings(device: &dyn Device, parts: &[(MonoNs, &[u8])]) -> Vec<String> {
     let mut driver = device.driver(&DriverSetup { begun: START, head: None });
     let mut wire = Delivered::default();
@@ -119,7 +120,7 @@ fn readings(device: &dyn Device, parts: &[(MonoNs, &[u8])]) -> Vec<String> {
     readings
 }
 
-/// Readings of these parts by the decoder alone, as from a log of another's.
+/// Readings of these parts through the decoder alone, as from a foreign log.
 fn decoded(device: &dyn Device, parts: &[(MonoNs, &[u8])]) -> Vec<String> {
     let (mut decoder, mut readings) = (device.specification().decoder, Vec::new());
     for (received, bytes) in parts {
@@ -139,7 +140,8 @@ fn wake_until(driver: &mut dyn Driver, at: MonoNs, wire: &mut dyn Wire) {
     }
 }
 
-/// Delays of parts, ms: mostly as on a good line, now and then as on a bridge, a slow network, or one that fails for seconds.
+/// Delays of parts: mostly as on a good line, sometimes as on a bridge, a slow network, or one that fails for
+/// seconds.
 fn delay(random: &mut Random) -> DurNs {
     let ms = [1, 1, 3, 20, 66, 66, 120, 250, 1500, 4000];
     DurNs::from_millis(ms[random.below(ms.len())])
@@ -170,7 +172,7 @@ fn compare(text: &str, frames: &[Vec<u8>], parts: &[(MonoNs, &[u8])], how: &str)
 }
 
 #[test]
-fn a_stream_split_anyhow_and_delayed_anyhow_gives_the_same_readings_at_the_times_of_their_first_bytes() {
+fn splits_and_delays_of_a_stream_do_not_change_readings_or_times() {
     let mut random = Random(20);
     for text in STREAMS {
         let frames = frames(device(text).as_ref(), &mut random);
@@ -180,7 +182,7 @@ fn a_stream_split_anyhow_and_delayed_anyhow_gives_the_same_readings_at_the_times
             let (mut parts, mut rest, mut at) = (Vec::new(), stream.as_slice(), START);
             while !rest.is_empty() {
                 let (now, later) = rest.split_at((1 + random.below(longest)).min(rest.len()));
-                // Byte by byte a long pause in every frame would take hours.
+                // A long pause after every byte would take hours.
                 at = at
                     + if longest > 2 || random.one_in(50) {
                         delay(&mut random)
@@ -196,7 +198,7 @@ fn a_stream_split_anyhow_and_delayed_anyhow_gives_the_same_readings_at_the_times
 }
 
 #[test]
-fn frames_whose_last_byte_comes_with_the_next_one_are_all_used() {
+fn frames_completed_by_the_next_read_are_all_used() {
     let mut random = Random(21);
     for text in STREAMS {
         let frames = frames(device(text).as_ref(), &mut random);
@@ -229,7 +231,7 @@ fn blocks_of_64_bytes_lose_nothing() {
 }
 
 #[test]
-fn whole_messages_that_come_late_give_the_same_readings() {
+fn late_messages_give_the_same_readings() {
     let mut random = Random(23);
     for text in MESSAGES {
         let frames = frames(device(text).as_ref(), &mut random);

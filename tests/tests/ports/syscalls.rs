@@ -1,4 +1,4 @@
-//! An armed tick makes no system call, seen by strace from outside.
+//! An armed tick makes no system call, checked with strace.
 
 use std::process::Command;
 
@@ -17,7 +17,7 @@ const SCENE: &str = "vehicle = \"vita2-4.toml\"\n[trajectory]\n
 [[trajectory.legs]]\ndistance_m = 40\nspeed_mps = 0.4\n";
 const PACKETS: usize = 40_000;
 
-/// Does what is to be traced within two calls that nothing else makes.
+/// Runs traced work between two calls that nothing else makes.
 fn marked<T>(work: impl FnOnce() -> T) -> T {
     std::hint::black_box(getppid());
     let done = work();
@@ -25,7 +25,7 @@ fn marked<T>(work: impl FnOnce() -> T) -> T {
     done
 }
 
-/// System calls within the marks, and the number of marked parts.
+/// System calls between the marks, and the number of marked parts.
 fn calls(trace: &str) -> (Vec<&str>, usize) {
     let (mut within, mut calls, mut parts) = (None, Vec::new(), 0);
     for line in trace.lines() {
@@ -39,7 +39,7 @@ fn calls(trace: &str) -> (Vec<&str>, usize) {
             within = None;
             parts += 1;
         } else if within == Some(thread)
-            // Lines on signals, and ends of calls, the mark's too, where another thread's came between.
+            // Skips signals, and ends of interrupted calls, including the mark's own.
             && !call.starts_with("---")
             && !call.starts_with("<... ")
         {
@@ -50,7 +50,7 @@ fn calls(trace: &str) -> (Vec<&str>, usize) {
 }
 
 #[test]
-fn an_armed_tick_makes_no_system_call() {
+fn armed_tick_makes_no_system_call() {
     let folder = Folder::new();
     let trace = folder.path("trace");
     let traced = |program: &std::path::Path, arguments: &[&str]| {
@@ -66,13 +66,13 @@ fn an_armed_tick_makes_no_system_call() {
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stdout));
     let trace = std::fs::read_to_string(&trace).unwrap();
     let (calls, ticks) = calls(&trace);
-    // The one call is made on purpose, to see that calls are seen.
+    // The single call is deliberate, to test that calls are seen.
     assert!(calls.len() == 1 && calls[0].starts_with("getuid("), "in {ticks} ticks: {calls:#?}");
     assert!(ticks > 1000, "{ticks} ticks");
 }
 
 #[test]
-#[ignore = "an_armed_tick_makes_no_system_call runs it"]
+#[ignore = "armed_tick_makes_no_system_call runs it"]
 fn ticks_to_be_traced() {
     let scene = scenes::scene(SCENE);
     let vehicle = &scene.vehicle;

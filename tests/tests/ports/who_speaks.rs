@@ -1,5 +1,5 @@
-//! `headrace run` where others speak than the devices: senders on a port that anybody may send to, systems that aren't the
-//! vehicle's autopilot, two sensors that lead to one device, a log of older firmware's words.
+//! `headrace run` with foreign senders: open ports, other systems, two sensors on one device, and logs of older
+//! firmware.
 
 use std::net::UdpSocket;
 use std::os::unix::fs::symlink;
@@ -41,8 +41,8 @@ fn report(folder: &Folder) -> Value {
     serde_json::from_slice(&folder.read("report.json")).unwrap()
 }
 
-/// A dive on a local port to which a device sends, and a stranger: first frames of another system, and from when the host has
-/// spoken to the device, the device's own. Gives the report and the pressures that were recorded.
+/// A dive on a local port with a device and a stranger. The first frames come from another system; the device sends
+/// once the host has spoken to it. Returns the report and the number of recorded pressures.
 fn dive_among_strangers(option: &str, keys: &str) -> (Value, usize, usize) {
     let folder = Folder::new();
     let place = UdpSocket::bind("127.0.0.1:0").unwrap().local_addr().unwrap();
@@ -64,7 +64,7 @@ fn dive_among_strangers(option: &str, keys: &str) -> (Value, usize, usize) {
     let (answer, report) = thread::scope(|scope| {
         scope.spawn(|| {
             until_end(&|| {
-                // Errors are those of a port that nobody has opened yet.
+                // Errors occur as long as the port isn't open.
                 device.send_to(&[heartbeat(1), pressure(1, TRUE_HPA)].concat(), place).unwrap_or_default();
                 let heard = device.recv(&mut [0; 300]).is_ok_and(|count| count > 0);
                 known.fetch_or(heard, Ordering::Relaxed);
@@ -103,7 +103,7 @@ fn dive_among_strangers(option: &str, keys: &str) -> (Value, usize, usize) {
 }
 
 #[test]
-fn on_a_port_for_anybody_the_first_autopilot_is_heard_and_nobody_else() {
+fn open_port_accepts_only_the_first_autopilot() {
     for (option, keys) in [("", ""), ("?from=<device>", ""), ("?from=<device>", "system_id = 1\n")] {
         let (report, of_device, of_strangers) = dive_among_strangers(option, keys);
         let source = &report["sources"][0];
@@ -113,7 +113,7 @@ fn on_a_port_for_anybody_the_first_autopilot_is_heard_and_nobody_else() {
         assert!(source["line"]["strangers"].as_u64().unwrap() > 20, "{source}");
         let status = source["line"]["status"].as_str().unwrap();
         assert!(status.starts_with("running: MAVLink system 1; from 127.0.0.1:"), "{status}");
-        assert!(status.contains("not believed: 127.0.0.1:"), "{status}");
+        assert!(status.contains("ignored: 127.0.0.1:"), "{status}");
     }
 }
 
@@ -132,7 +132,7 @@ fn two(folder: &Folder, connects: [&str; 2]) -> Vec<Value> {
 }
 
 #[test]
-fn two_sensors_that_lead_to_one_device_arent_both_read() {
+fn two_sensors_on_one_device_are_refused() {
     let folder = Folder::new();
     let end = End::serial(&folder.path(""), "usb-head-port0");
     let place = end.connect().to_string();
@@ -144,7 +144,7 @@ fn two_sensors_that_lead_to_one_device_arent_both_read() {
     let device = Faulty::start(vec![emulated(HEAD)], end, Box::new(Healthy));
     for (connects, why) in [
         ([place.as_str(), other.as_str()], "leads to the same device as"),
-        ([place.as_str(), place.as_str()], "nothing tells the bytes of two"),
+        ([place.as_str(), place.as_str()], "the bytes of two"),
     ] {
         let sources = two(&folder, connects);
         let status = |number: usize| sources[number]["line"]["status"].as_str().unwrap();
@@ -156,7 +156,7 @@ fn two_sensors_that_lead_to_one_device_arent_both_read() {
 }
 
 #[test]
-fn a_serial_port_that_another_program_has_is_not_read() {
+fn serial_port_locked_by_another_program_is_not_read() {
     let folder = Folder::new();
     let end = End::serial(&folder.path(""), "usb-head-port0");
     let file = std::fs::File::open(folder.path("usb-head-port0")).unwrap();
@@ -169,5 +169,5 @@ fn a_serial_port_that_another_program_has_is_not_read() {
     drop(device);
     assert_eq!(answer.code, Some(1), "{}{}", answer.stdout, answer.stderr);
     let status = report(&folder)["sources"][0]["line"]["status"].as_str().unwrap().to_owned();
-    assert!(status.starts_with("closed: ") && status.contains("another program has it"), "{status}");
+    assert!(status.starts_with("closed: ") && status.contains("another program uses it"), "{status}");
 }

@@ -1,5 +1,5 @@
-//! What devices send, with bytes changed, lost and put in: the same readings however it is split, all of them numbers, and counts
-//! that are an account of the bytes.
+//! Device bytes with changes, losses and insertions: readings are finite and don't depend on splits, and counts add
+//! up.
 
 use headrace::devices::KINDS;
 use headrace_config::Document;
@@ -12,7 +12,7 @@ use headrace_vehicle::VehicleConfig;
 
 use crate::{Case, few, many};
 
-/// A vehicle, and what each of its sensors sends in a short dive.
+/// A vehicle, and the bytes of each of its sensors in a short dive.
 struct Lines {
     vehicle: VehicleConfig,
     messages: Vec<Vec<Vec<u8>>>,
@@ -35,7 +35,7 @@ fn lines() -> [Lines; 2] {
     })
 }
 
-/// All at one time: then readings don't depend on how the bytes came.
+/// One time for all parts, so that readings don't depend on how the bytes arrive.
 const AT: MonoNs = MonoNs(1_000_000_000);
 
 fn decoding(case: &mut Case, lines: &[Lines; 2]) -> Result<(), String> {
@@ -76,7 +76,7 @@ fn decoding(case: &mut Case, lines: &[Lines; 2]) -> Result<(), String> {
     if let Some(wrong) = whole.iter().find(|decoded| !decoded.reading.is_finite()) {
         return Err(format!("{wrong:?} of {bytes:02X?}"));
     }
-    // CAN frames, HID reports and I2C transactions come whole.
+    // CAN frames, HID reports and I2C transactions arrive whole.
     let is_stream =
         !matches!(vehicle.sensor_configs[number].plugin.as_str(), "imu_can" | "tether_hid" | "bar100");
     if is_stream && (format!("{whole:?}") != format!("{split:?}") || counts != split_counts) {
@@ -89,14 +89,14 @@ fn decoding(case: &mut Case, lines: &[Lines; 2]) -> Result<(), String> {
 }
 
 #[test]
-fn readings_are_numbers_and_the_same_however_their_bytes_are_split() {
+fn byte_splits_do_not_change_finite_readings() {
     let lines = lines();
     few("codecs", &|case| decoding(case, &lines));
 }
 
 #[test]
 #[ignore = "long; see the module's description"]
-fn codecs_at_length() {
+fn codecs_hold_for_many_cases() {
     let lines = lines();
     many("codecs", &|case| decoding(case, &lines));
 }

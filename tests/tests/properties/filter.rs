@@ -1,4 +1,5 @@
-//! A factored covariance through any steps: it stays one, and each measurement does to it what a scalar formula says.
+//! A factored covariance through random steps: it stays a covariance, and each measurement follows the scalar
+//! formula.
 
 use headrace_fusion::filter::factors::Factors;
 use headrace_geometry::math;
@@ -6,7 +7,8 @@ use headrace_geometry::math;
 use crate::{Case, few, many};
 
 const N: usize = 6;
-/// Variances of 1e-10 and 1e+10 that depend on each other have factors of 1e10: of two million cases four were over 1e-9, the worst 3e-8.
+/// Tolerance as a share. Dependent variances of 1e-10 and 1e+10 have factors of 1e10. In two million cases four were
+/// over 1e-9, the worst 3e-8.
 const SHARE: f64 = 1e-6;
 
 fn row(case: &mut Case) -> [f64; N] {
@@ -43,14 +45,14 @@ fn steps(case: &mut Case) -> Result<(), String> {
                 let (h, noise) = (row(case), case.of_any_size(-10, 10).abs());
                 let before = p.variance_along(&h);
                 let gain = p.measure(&h, noise);
-                // The sum of both, and what is left of the variance: v noise / (v + noise).
+                // The sum of both, and the remaining variance: v noise / (v + noise).
                 let (sum, left) = (before + noise, before / (1.0 + before / noise));
                 let after = p.variance_along(&h);
                 let size: f64 = (0..N).map(|i| h[i] * h[i] * p.variance(i)).sum();
                 if (gain.variance / sum - 1.0).abs() > SHARE {
                     return Err(format!("innovation {} is not {sum}", gain.variance));
                 }
-                // What cancels in h P h^T is as large as its parts.
+                // Terms that cancel in h P h^T are as large as its parts.
                 if (after - left).abs() > SHARE * left + SHARE * size {
                     return Err(format!(
                         "{after:e} is left, not {left:e}; before {before:e}, noise {noise:e}"
@@ -69,7 +71,7 @@ fn steps(case: &mut Case) -> Result<(), String> {
                 }
             }
             3 => {
-                // Each error drives the ones before it, as place is driven by velocity.
+                // Each error drives the ones before it, as velocity drives position.
                 let dt = case.of_any_size(-9, 2).abs();
                 p.shear(|column, len| {
                     for i in 0..len.saturating_sub(1) {
@@ -85,12 +87,12 @@ fn steps(case: &mut Case) -> Result<(), String> {
 }
 
 #[test]
-fn a_covariance_stays_one_and_measurements_do_what_they_should() {
+fn covariance_stays_valid_and_measurements_follow_the_scalar_formula() {
     few("filter", &steps);
 }
 
 #[test]
 #[ignore = "long; see the module's description"]
-fn filter_at_length() {
+fn filter_holds_for_many_cases() {
     many("filter", &steps);
 }

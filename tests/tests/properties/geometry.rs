@@ -1,14 +1,15 @@
-//! Rays in cross-sections of any kind, against a look at each edge by the plain formula.
+//! Rays in random cross-sections, compared with the plain formula on each edge.
 
 use headrace_geometry::math::{self, TAU};
 use headrace_geometry::tunnel::{Profile, Yz, shapes};
 
 use crate::{Case, few, many, within};
 
-/// Edges of a micrometre are met to some nanometres, m: what tells on which side of a ray their ends lie cancels to their length.
+/// Tolerance, m. Hits on edges of a micrometre are exact to some nanometres: the test on which side of a ray their
+/// ends lie cancels digits down to their length.
 const OFF_M: f64 = 1e-8;
 
-/// Points of a polygon that is star-shaped about (0, 3), with repeats, slivers, corners and straight runs.
+/// Corners of a polygon that is star-shaped about (0, 3), with repeated points, slivers, corners and straight runs.
 fn points(case: &mut Case) -> Vec<Yz> {
     let count = 3 + case.below(60);
     let mut turns: Vec<f64> = (0..count).map(|k| (k as f64 + 0.9 * case.unit()) / count as f64).collect();
@@ -31,7 +32,7 @@ fn points(case: &mut Case) -> Vec<Yz> {
         .collect()
 }
 
-/// Where a ray first meets an edge ahead, in its own lengths, and the sine between them; edges count a little beyond their ends.
+/// First edge that a ray meets: distance in ray lengths, and sine between ray and edge. Edges are extended slightly.
 fn meets(points: &[Yz], origin: Yz, ray: Yz) -> Option<(f64, f64)> {
     let cross = |a: Yz, b: Yz| a[0] * b[1] - a[1] * b[0];
     let edges = points.iter().zip(points.iter().cycle().skip(1));
@@ -49,7 +50,7 @@ fn rays(case: &mut Case) -> Result<(), String> {
     let given = points(case);
     let profile = match Profile::polygon(&given, Some([0.0, 3.0])) {
         Ok(profile) => profile,
-        // Too few distinct points, half a turn without one: refused with a reason.
+        // Too few distinct points, or a gap of half a turn: refused with a reason.
         Err(why) => return if why.to_string().is_empty() { Err("no reason".to_owned()) } else { Ok(()) },
     };
     for _ in 0..8 {
@@ -89,7 +90,7 @@ fn rays(case: &mut Case) -> Result<(), String> {
                 nearest.distance_m
             ));
         }
-        // Through a corner or along an edge rounding says which of two walls is met.
+        // Through a corner or along an edge, rounding decides which of two walls is hit.
         if let Some((t, sine)) = meets(&given, origin, ray)
             && sine > 1e-3 * math::hypot(ray[0], ray[1])
         {
@@ -108,7 +109,7 @@ fn rays(case: &mut Case) -> Result<(), String> {
     inverses(case, &profile)
 }
 
-/// Arc length to place and back, in a polygon and in a shape of arcs.
+/// Converts arc length to a place and back, in a polygon and in a shape of arcs.
 fn inverses(case: &mut Case, polygon: &Profile) -> Result<(), String> {
     let width_m = case.between(0.5, 12.0);
     let shape = match case.below(3) {
@@ -120,7 +121,7 @@ fn inverses(case: &mut Case, polygon: &Profile) -> Result<(), String> {
         let arc_m = case.unit() * profile.perimeter_m();
         let place = profile.point_at(arc_m);
         let back = profile.point_at(profile.arc_of(place));
-        // It is the direction that counts: an edge that points at the reference point has one for all of it.
+        // Directions are compared, because an edge that points at the reference point has a single direction.
         let [to, from] =
             [place, back].map(|at| [at[0] - profile.reference()[0], at[1] - profile.reference()[1]]);
         let turned_rad = math::atan2(to[0] * from[1] - to[1] * from[0], to[0] * from[0] + to[1] * from[1]);
@@ -132,12 +133,12 @@ fn inverses(case: &mut Case, polygon: &Profile) -> Result<(), String> {
 }
 
 #[test]
-fn rays_end_on_the_wall_where_the_plain_formula_says() {
+fn rays_match_the_plain_formula() {
     few("geometry", &rays);
 }
 
 #[test]
 #[ignore = "long; see the module's description"]
-fn geometry_at_length() {
+fn geometry_holds_for_many_cases() {
     many("geometry", &rays);
 }

@@ -1,11 +1,11 @@
-//! The largest hole of samples in any arrangement, against Voronoi vertices of all of them.
+//! The largest hole of random sample arrangements, compared with Voronoi vertices of all samples.
 
 use headrace_coverage::{HoleFinder, SampleStore, StoreLayout, WallSample};
 use headrace_oracle::wall::Wall;
 
 use crate::{Case, few, many};
 
-/// Samples at random, on a lattice, on a line, in one place, on each other, or closer together than any vehicle lays them.
+/// Samples that are random, on a lattice, on a line, in one place, coincident, or denser than any vehicle's.
 fn samples(case: &mut Case, perimeter_m: f64) -> Vec<[f64; 2]> {
     let count = 1 + case.below(24);
     let kind = case.below(7);
@@ -58,7 +58,7 @@ fn hole(case: &mut Case) -> Result<(), String> {
     if !numbers.iter().all(|number| number.is_finite()) {
         return Err(format!("{hole:?}"));
     }
-    // Places are rounded at a far chainage, and so are the samples that the oracle gets.
+    // A far chainage rounds positions, so the oracle gets the same rounded samples.
     let wall = Wall::new(samples.iter().map(|[x_m, arc_m]| [(x_m + along_m) - along_m, *arc_m]), perimeter_m)
         .map_err(|why| why.to_string())?;
     let ends = [(from_m + along_m) - along_m, (to_m + along_m) - along_m];
@@ -81,12 +81,12 @@ fn hole(case: &mut Case) -> Result<(), String> {
 }
 
 #[test]
-fn holes_are_those_of_the_voronoi_diagram() {
+fn holes_match_the_voronoi_diagram() {
     few("holes", &hole);
 }
 
 #[test]
 #[ignore = "long; see the module's description"]
-fn holes_at_length() {
+fn holes_hold_for_many_cases() {
     many("holes", &hole);
 }

@@ -1,12 +1,12 @@
-//! Properties that hold of any case, over as many random ones as there is time for:
+//! Properties of random cases, with an adjustable number of cases:
 //!
 //!     HEADRACE_PROPERTY_CASES=10000000 cargo test -p headrace_tests --test properties -- --ignored --nocapture
 //!     HEADRACE_PROPERTY_SEED=42 HEADRACE_PROPERTY_CASES=1000000 cargo test -p headrace_tests --test properties holes -- --ignored --nocapture
 //!
-//! So many cases are shared by the five subjects; a seed of its own is printed with the count. Case n of a seed is case 0 of seed + n.
-//! Ordinary tests take a few thousand of each subject, the same each time.
+//! The five subjects share the cases; the seed is printed with the count. Case n of a seed is case 0 of seed + n.
+//! Ordinary tests run a few thousand fixed cases of each subject.
 
-#![allow(clippy::unwrap_used, clippy::panic, reason = "a test stops at what it can't do")]
+#![allow(clippy::unwrap_used, clippy::panic, reason = "a failed step ends the test")]
 
 mod codecs;
 mod filter;
@@ -19,10 +19,10 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use headrace_geometry::math;
 use headrace_tests::random::Random;
 
-/// Cases of a subject in ordinary tests, and the seed of the first.
+/// Number of cases of a subject in ordinary tests, and the seed of the first.
 const FEW: u64 = 3000;
 const SEED_OF_FEW: u64 = 20_260_901;
-/// Cases of all subjects in a long run, unless it is told another number.
+/// Default number of cases of all subjects in a long run.
 const MANY: u64 = 10_000_000;
 const SUBJECTS: u64 = 5;
 
@@ -45,7 +45,7 @@ impl Case {
         math::exp(self.between(from, to) * core::f64::consts::LN_10)
     }
 
-    /// Between two powers of ten, either sign.
+    /// Magnitude between two powers of ten, with either sign.
     pub(crate) fn of_any_size(&mut self, from: i32, to: i32) -> f64 {
         let size = self.power_of_ten(f64::from(from), f64::from(to));
         if self.below(2) == 0 { size } else { -size }
@@ -73,7 +73,7 @@ pub(crate) fn within(error: f64, bound: f64) -> bool {
 
 type Property<'a> = &'a dyn Fn(&mut Case) -> Result<(), String>;
 
-/// Tries so many cases; those that fail or panic, ten at most.
+/// Runs `count` cases; returns those that fail or panic, ten at most.
 fn failing(subject: &str, seed: u64, count: u64, property: Property<'_>) -> Vec<String> {
     let mut found = Vec::new();
     for number in 0..count {
@@ -94,14 +94,14 @@ fn failing(subject: &str, seed: u64, count: u64, property: Property<'_>) -> Vec<
     found
 }
 
-/// Holds a few cases to a property.
+/// Checks a property with a few cases.
 #[track_caller]
 pub(crate) fn few(subject: &str, property: Property<'_>) {
     let found = failing(subject, SEED_OF_FEW, FEW, property);
     assert!(found.is_empty(), "{}", found.join("\n"));
 }
 
-/// Holds a subject's share of many.
+/// Checks a property with its subject's share of many cases.
 #[track_caller]
 pub(crate) fn many(subject: &str, property: Property<'_>) {
     let number = |name: &str| {
@@ -117,9 +117,9 @@ pub(crate) fn many(subject: &str, property: Property<'_>) {
     println!("{subject}: {count} cases hold");
 }
 
-/// A planted fault is found, and told with its seed.
+/// A planted fault is found and reported with its seed.
 #[test]
-fn a_case_that_fails_is_told_and_comes_again() {
+fn failing_case_is_reported_and_repeatable() {
     let rare = |case: &mut Case| if case.below(500) == 7 { Err("seven".to_owned()) } else { Ok(()) };
     let found = failing("planted", 1, 5000, &rare);
     assert!(found.len() > 3, "{found:?}");

@@ -1,8 +1,7 @@
-//! The advice holds when it is followed: simulated vehicles go at the speed that they are told under way, and the wall is
-//! judged; a tenth faster, it isn't met any more.
+//! The advice is right: simulated vehicles that follow it meet the target, and a tenth faster they miss it.
 //!
-//! Heads apart along the hull are started in phase for the speed that the advice itself names for their mode, and turn on
-//! as they are when the pilot goes at another.
+//! Heads apart along the hull start in phase for the speed that the advice gives for their mode. They keep turning
+//! unchanged when the pilot drives at another speed.
 
 use std::fmt::Write as _;
 
@@ -14,14 +13,14 @@ use headrace_tests::advised::{Advised, dive};
 use headrace_tests::scenes;
 
 const TICK: DurNs = DurNs(20_000_000);
-/// Where dives begin, and the length of tunnel that is judged, m.
+/// Chainage at which dives begin, and the length of tunnel that is judged, m.
 const START_M: f64 = 5.0;
 const JUDGED_M: f64 = 10.0;
-/// Where half of the sections' holes reach this share of the T predicted, a tenth more speed must show in them.
+/// If the holes of half of the sections reach this share of the predicted T, a tenth more speed must show in them.
 const NEAR: f64 = 0.95;
-/// Beats in which a vehicle comes to a stop.
+/// Number of updates in which a vehicle comes to a stop.
 const BRAKING: usize = 15;
-/// The vehicle swings about as a pilot lets it.
+/// Oscillation of the vehicle under a pilot.
 const SWING: &str = "pilot_drift = { yaw_deg = 10, period_s = 20 }\n";
 
 /// A vehicle on its way along the tunnel.
@@ -34,7 +33,7 @@ struct Case {
     target_m: f64,
     aside_m: f64,
     yaw_deg: f64,
-    /// A source that says nothing.
+    /// A source that sends nothing.
     dumb: Option<&'static str>,
     effects: &'static str,
     filter: bool,
@@ -85,12 +84,12 @@ const SWINGING: [Case; 6] = [
 ];
 
 impl Case {
-    /// How far from the ends of the dive sections aren't judged, m: not all heads have passed there.
+    /// Distance from the ends of the dive in which sections aren't judged, m: not all heads have passed there.
     fn ends_m(&self) -> f64 {
         1.2 * self.target_m + 1.0 + 8.0 * self.yaw_deg.to_radians()
     }
 
-    /// So many metres at `speed_mps`, heads in phase for `planned_mps`.
+    /// A scene of `length_m` at `speed_mps`, with heads in phase for `planned_mps`.
     fn scene(&self, planned_mps: f64, speed_mps: f64, length_m: f64) -> Scene {
         let Self { vehicle, layout, mode, target_m, aside_m, yaw_deg, effects, .. } = self;
         let way = if self.filter { "filter" } else { "direct" };
@@ -125,14 +124,14 @@ impl Case {
         dive(&self.scene(planned_mps, speed_mps, length_m), self.dumb, TICK)
     }
 
-    /// The speed for which heads are put in phase: what the advice says that their mode allows then.
+    /// Speed for which heads are put in phase: the advice for their mode at that speed.
     fn planned_mps(&self) -> f64 {
         let first = dive(&self.scene(0.1, 0.1, 3.0), self.dumb, TICK);
         let alternatives = first.beats.last().unwrap().advice.alternatives;
         alternatives.iter().flatten().find(|other| other.mode.as_str() == self.mode).unwrap().v_max_mps
     }
 
-    /// The advice under way, and the dives at it and at a tenth more.
+    /// The advice during a dive, and the dives at it and at a tenth more.
     fn followed(&self) -> Followed {
         let planned_mps = self.planned_mps();
         let v_max_mps = self.dive(planned_mps, planned_mps).median(v_max_mps);
@@ -149,13 +148,13 @@ struct Followed {
     dives: [Advised; 2],
 }
 
-/// What came of the metres between the ends.
+/// Results of the length between the ends.
 struct Judged {
     failing: f64,
     passing: f64,
-    /// T predicted at that speed, m, the median of the beats.
+    /// Predicted T at that speed, m, as the median of the updates.
     predicted_t_m: f64,
-    /// The holes of sections, as shares of that T: the median and the largest.
+    /// Holes of sections as shares of that T: median and largest.
     holes: [f64; 2],
 }
 
@@ -201,7 +200,7 @@ fn row(case: &Case, followed: &Followed) {
 }
 
 #[test]
-fn val_followed_it_meets_the_target_and_a_tenth_faster_it_does_not() {
+fn advised_speed_meets_the_target_and_a_tenth_more_does_not() {
     let mut broken = Vec::new();
     let (mut near, mut within) = (0, 0);
     for case in &STEADY {
@@ -211,12 +210,13 @@ fn val_followed_it_meets_the_target_and_a_tenth_faster_it_does_not() {
         if at.failing > 0.02 || at.passing < 0.98 {
             broken.push(format!("{}: {:.3} fail when it is followed", case.what, at.failing));
         }
-        // The forecast is the advice's other side, until the vehicle slows down at the end.
+        // The forecast agrees with the advice until the vehicle slows down at the end.
         let forecast = |dive: &Advised| {
             let settled = &dive.settled()[..dive.settled().len() - BRAKING];
             settled.iter().filter(|beat| beat.advice.will_exceed).count() as f64 / settled.len() as f64
         };
-        // Of heads apart along the hull T is least at one speed: what the rounding of counter and angles makes of it is above that.
+        // With heads apart along the hull, T is least at one speed. Rounding of counter and angles keeps it above
+        // that.
         let met = at.predicted_t_m <= case.target_m;
         within += usize::from(met);
         if met && forecast(&dives[0]) > 0.0 || forecast(&dives[1]) < 1.0 {
@@ -228,7 +228,7 @@ fn val_followed_it_meets_the_target_and_a_tenth_faster_it_does_not() {
                 broken.push(format!("{}: {:.3} fail a tenth faster", case.what, above.failing));
             }
         }
-        // Where fewer fail, it is because holes stay below what is predicted, and nowhere above it.
+        // If fewer sections fail, the reason is that their holes stay below the prediction, and nowhere above it.
         if at.holes[1].max(above.holes[1]) > 1.0 {
             broken.push(format!("{}: holes of {:?} and {:?} of T", case.what, at.holes, above.holes));
         }
@@ -238,9 +238,9 @@ fn val_followed_it_meets_the_target_and_a_tenth_faster_it_does_not() {
     assert!(near >= 8, "holes are near T in {near} cases only");
 }
 
-/// What is missed at a third above the advice is told to be passed again at about that advice: two numbers of one screen.
+/// Sections missed at a third above the advice get a repeat speed near that advice. Both numbers are on one screen.
 #[test]
-fn the_way_home_says_about_what_the_advice_does() {
+fn way_home_and_advice_give_similar_speeds() {
     let sectors = |of: Case, target_m: f64| Case { layout: "sector_offset", target_m, ..of };
     let coarse = Case { mode: "faster", ..FOUR };
     for case in [VITA1, FOUR, sectors(TWO, 0.9), sectors(FOUR, 0.5), sectors(FOUR, 0.7), sectors(coarse, 0.5)]
@@ -260,7 +260,7 @@ fn the_way_home_says_about_what_the_advice_does() {
 }
 
 #[test]
-fn val_under_a_swinging_vehicle_it_is_lower_and_holds() {
+fn advice_for_a_swinging_vehicle_is_lower_and_holds() {
     let mut broken = Vec::new();
     for case in &SWINGING {
         let followed = case.followed();
@@ -290,13 +290,14 @@ const LOSSY: [Case; 4] = [
     },
 ];
 
-/// Where returns are lost, 95 of 100 sections pass at the speed that is told, and at that told without losses they don't.
+/// While returns are lost, 95 of 100 sections pass at the advised speed. At the speed advised without losses they
+/// don't.
 #[test]
-fn val_it_makes_up_for_returns_that_are_lost() {
+fn advice_compensates_lost_returns() {
     let mut broken = Vec::new();
     for case in &LOSSY {
         let sound_mps = Case { effects: "", ..*case }.planned_mps();
-        // What is lost is known some turns after it began; slowly, the vehicle hasn't come far by then.
+        // Losses are known some turns after they began. At low speed, the vehicle hasn't moved far by then.
         let v_max_mps = case.dive(sound_mps, 0.5 * sound_mps).median(v_max_mps);
         let dives = [v_max_mps, sound_mps].map(|speed_mps| case.dive(sound_mps, speed_mps));
         let [at, as_before] = [0, 1].map(|k| Judged::of(case, &dives[k]));
@@ -314,20 +315,20 @@ fn val_it_makes_up_for_returns_that_are_lost() {
         if as_before.passing > 0.9 {
             broken.push(format!("{}: {:.3} pass at the speed without losses", case.what, as_before.passing));
         }
-        // What is to be passed again and what may be gone are told on one screen.
+        // The repeat speed and the present limit are on one screen.
         if !(0.5..2.0).contains(&(again / v_max_mps)) {
             broken.push(format!("{}: again at {again:.4} m/s, where {v_max_mps:.4} is advised", case.what));
         }
     }
     assert!(broken.is_empty(), "{broken:#?}");
-    // A few that are lost singly cost little.
+    // A few single losses have little effect.
     let few = Case { effects: "missing_returns = { share = 0.05 }\n", ..VITA1 };
     let [sound_mps, mps] = [VITA1, few].map(|case| case.dive(0.1, 0.1).median(v_max_mps));
     assert!((0.85..0.99).contains(&(mps / sound_mps)), "{mps} of {sound_mps}");
 }
 
 #[test]
-fn where_slower_does_not_help_it_says_so() {
+fn advice_says_so_if_slower_does_not_help() {
     let coarse = Case { mode: "fastest", target_m: 0.3, ..VITA1 };
     for speed_mps in [0.1, 0.03] {
         let dive = coarse.dive(speed_mps, speed_mps);
@@ -337,11 +338,11 @@ fn where_slower_does_not_help_it_says_so() {
         assert!(matches!(dive.settled()[0].advice.remedy, Some(Remedy::Mode(_))));
         assert!(Judged::of(&coarse, &dive).failing > 0.98, "{speed_mps} m/s");
     }
-    // In the mode that is advised instead it is met.
+    // In the alternative mode the target is met.
     let Some(Remedy::Mode(mode)) = coarse.dive(0.1, 0.1).settled()[0].advice.remedy else { panic!() };
     let finer = Case { mode: mode.as_str().to_owned().leak(), ..coarse };
     assert!(finer.followed().at.failing <= 0.02, "{mode:?}");
-    // Nobody sees the sector of a head that is dumb.
+    // Nothing covers the sector of a silent head.
     let unseen = Case { layout: "sector_offset", dumb: Some("sonar_1"), ..TWO }.dive(0.1, 0.1);
     let last = unseen.settled()[0].advice;
     assert_eq!((last.reason, last.v_max_mps), (Reason::AngularStep, 0.0));
@@ -349,7 +350,7 @@ fn where_slower_does_not_help_it_says_so() {
 }
 
 #[test]
-fn a_filter_lowers_it_by_what_it_leaves_unsure_and_no_more() {
+fn filter_uncertainty_lowers_the_advice_by_its_margin_only() {
     for case in [Case { mode: "slow", target_m: 5.0, ..VITA1 }, TWO, Case { target_m: 0.9, ..FOUR }] {
         let direct_mps = case.dive(0.15, 0.15).median(v_max_mps);
         let filtered = Case { filter: true, ..case }.dive(0.15, 0.15);
@@ -360,14 +361,14 @@ fn a_filter_lowers_it_by_what_it_leaves_unsure_and_no_more() {
     }
 }
 
-/// Changes a minute of what is shown between one beat and the next, where `changed` says so.
+/// Changes per minute of a displayed value, counted between updates for which `changed` returns true.
 fn a_minute(beats: &[AdviceEntry], changed: impl Fn(&AdviceEntry, &AdviceEntry) -> bool) -> f64 {
     let changes = beats.windows(2).filter(|pair| changed(&pair[0], &pair[1])).count();
     changes as f64 * 300.0 / beats.len() as f64
 }
 
 #[test]
-fn in_the_field_it_can_be_read() {
+fn advice_in_the_field_changes_slowly_enough_to_read() {
     let text = include_str!("../../../deploy/scenes/vita1-field.toml").replace("../vehicles/", "");
     // At a speed that meets the target half of the time.
     let shorter = text.replace("distance_m = 130\nspeed_mps = 0.16", "distance_m = 50\nspeed_mps = 0.197");
@@ -388,7 +389,7 @@ fn in_the_field_it_can_be_read() {
     );
     assert!(jumps <= 1.0 && reasons <= 0.2, "{jumps} and {reasons}");
     assert!(crossings > 10.0 && forecasts < 0.5 * crossings, "{forecasts} of {crossings}");
-    // A forecast that is taken back has held for a second.
+    // A forecast that is withdrawn has been displayed for a second at least.
     let mut since = None;
     for (k, beat) in beats.iter().enumerate() {
         match (beat.advice.will_exceed, since) {
@@ -403,7 +404,7 @@ fn in_the_field_it_can_be_read() {
 }
 
 #[test]
-fn what_is_shown_does_not_depend_on_ticks() {
+fn tick_length_does_not_change_displayed_advice() {
     let case = SWINGING[0];
     let scene = case.scene(0.15, 0.15, 6.0);
     let dives = [1, 20, 370].map(|ms| dive(&scene, None, DurNs(ms * 1_000_000)));

@@ -1,4 +1,4 @@
-//! The errors of position that `plan` expects are those that the live advice has in calm dives, and the speeds are the same.
+//! In calm dives, `plan` and live advice agree on position errors and speeds.
 
 use headrace::devices::KINDS;
 use headrace_sampling::margin::{APART_SHARE, error_time_s};
@@ -6,9 +6,9 @@ use headrace_simulator::calm;
 use headrace_tests::field_table::VEHICLES;
 use headrace_tests::passable::Outing;
 
-/// `plan` and live may differ by a tenth in the errors of position, and by a twentieth in speed.
+/// `plan` and live may differ by a tenth in the position errors, and by a twentieth in speed.
 #[test]
-fn val_plan_expects_what_live_says() {
+fn plan_and_live_position_errors_agree() {
     for vehicle in [VEHICLES[0], VEHICLES[1], VEHICLES[3], VEHICLES[5]] {
         let outing = Outing::steady(vehicle, 3);
         let plan_mps = outing.plan_mps();
@@ -37,9 +37,9 @@ fn val_plan_expects_what_live_says() {
     }
 }
 
-/// Of some of the dives of `cargo bench --bench advice`, steady but for the last.
+/// Some of the dives of `cargo bench --bench advice`, steady except the last.
 #[test]
-fn val_what_passes_is_what_is_advised() {
+fn advised_speeds_match_the_largest_passing_speeds() {
     let mut ratios = Vec::new();
     for seed in [0, 2, 3, 5, 6] {
         let compared = Outing::drawn(seed).compare();
@@ -51,9 +51,9 @@ fn val_what_passes_is_what_is_advised() {
     assert!(ratios.iter().all(|ratio| (0.899..1.001).contains(ratio)), "{ratios:?}");
 }
 
-/// Driven a millimetre a second faster and faster, a vehicle is advised the same.
+/// The advice stays the same for a vehicle that is driven faster in steps of 1 mm/s.
 #[test]
-fn the_advice_does_not_depend_on_the_speed_driven() {
+fn advice_does_not_depend_on_the_driven_speed() {
     let outing = Outing::steady(VEHICLES[3], 1);
     let advised = [0.094, 0.099, 0.1, 0.101, 0.106]
         .map(|speed_mps| outing.dive(0.1, speed_mps).median(|beat| beat.advice.v_max_mps));

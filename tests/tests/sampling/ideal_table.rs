@@ -1,8 +1,9 @@
-//! The table of ideal scenes: SLOW to FASTEST with 1, 2 and 4 heads in phase shift, together at the circle's
-//! centre of the `ceran` profile, at 0.197 m/s, from a scene to bytes to a log to a report.
+//! The table of ideal scenes, from scene to bytes to log to report.
 //!
-//! The mean distance between passes must be v T / s within 0.5 %, and the largest hole over nine metres within 0.1 % of
-//! the table, whose values were computed elsewhere from Delaunay circumcircles.
+//! It covers SLOW to FASTEST with 1, 2 and 4 heads in phase shift, together at the circle's centre of the `ceran`
+//! profile, at 0.197 m/s. The mean distance between passes must be v T / s within 0.5 %. The largest hole over nine
+//! metres must be within 0.1 % of the table, whose values come from an independent computation of Delaunay
+//! circumcircles.
 
 use std::fmt::Write as _;
 use std::path::Path;
@@ -11,7 +12,7 @@ use serde_json::Value;
 
 const SPEED_MPS: f64 = 0.197;
 
-/// Mode, period of a turn in seconds, largest hole in metres with 1, 2 and 4 heads.
+/// Mode, turn time in seconds, and largest hole in metres with 1, 2 and 4 heads.
 const TABLE: [(&str, f64, [f64; 3]); 5] = [
     ("slow", 21.6, [4.248, 2.125, 1.064]),
     ("medium", 10.8, [2.128, 1.067, 0.542]),
@@ -63,7 +64,7 @@ fn report(mode: &str, heads: usize) -> Value {
 }
 
 #[test]
-fn val_the_table_of_ideal_scenes() {
+fn ideal_scenes_match_the_table() {
     let mut misses = String::new();
     for (mode, turn_s, holes) in TABLE {
         for (heads, expected_m) in [1, 2, 4].into_iter().zip(holes) {

@@ -1,7 +1,7 @@
-//! Several heads interleave as the paper's §5 says: heads stepped ping by ping along a straight tunnel, and the
-//! places along it where each looks at an angle.
+//! Interleaving of several heads by the paper's §5, tested by stepping heads ping by ping along a straight tunnel.
 //!
-//! Only positions are simulated, from what each head is told to do; no formula of the layouts is used to expect another.
+//! The tests collect the chainages at which each head looks at an angle. Only positions are simulated, from each
+//! head's program; no layout formula is used to test another.
 
 use headrace_geometry::frames::{Mount, Rot, Vec3};
 use headrace_geometry::math::{PI, TAU, floor_to_i64};
@@ -15,17 +15,17 @@ use headrace_sampling::layout::{
 use headrace_sampling::schedule::Schedule;
 use proptest::{prelude::*, test_runner::RngSeed};
 
-/// Angles closer together than this are one, radians: far above rounding, far below a step.
+/// Angles closer than this count as equal, radians: far above rounding, far below a step.
 const SAME_RAD: f64 = 1e-9;
 const SAME_M: f64 = 1e-7;
-/// Pings to a turn that 2 to 6 sectors divide.
+/// Number of pings in a turn, divisible by 2 to 6 sectors.
 const STEPS: u32 = 120;
-/// All forward, in turns, one forward before the rest, and all aft.
+/// Facings: all forward, alternating, one forward before the others aft, and all aft.
 const FACINGS: [fn(usize) -> bool; 4] = [|_| false, |k| k % 2 == 1, |k| k > 0, |_| true];
 
 const SPEEDS_MPS: [f64; 3] = [0.1, 0.197, 0.8];
 
-/// Heads along a hull, all on the axis and turning alike.
+/// Heads along a hull, all on the axis and turning in the same direction.
 #[derive(Debug, Clone)]
 struct Rig {
     hull_m: Vec<f64>,
@@ -63,7 +63,7 @@ impl Rig {
         self.hull_m.iter().zip(&self.aft).map(spec).collect()
     }
 
-    /// A dive at `speed_mps` of heads laid out for `planned_mps`, for some turns more than the hull is long.
+    /// A dive at `speed_mps` of heads laid out for `planned_mps`, some turns longer than the hull.
     fn dive(&self, layout: HeadLayout, planned_mps: f64, speed_mps: f64) -> Dive {
         let [back_m, front_m] = ends(&self.hull_m);
         let ping_m = speed_mps * self.ping_s();
@@ -86,17 +86,17 @@ impl Rig {
     }
 }
 
-/// The least and the largest.
+/// Least and greatest value.
 fn ends(of: &[f64]) -> [f64; 2] {
     [of.iter().copied().fold(f64::MAX, f64::min), of.iter().copied().fold(f64::MIN, f64::max)]
 }
 
-/// The short way round.
+/// Angle wrapped to half a turn either way.
 fn wrapped(angle: f64) -> f64 {
     angle - TAU * (angle / TAU).round()
 }
 
-/// Own angles at the pings, not reduced to a turn.
+/// A head's own angles at the pings, not reduced to a turn.
 fn walk(program: &HeadProgram, step_rad: f64, pings: u32) -> Vec<f64> {
     let mut step_rad = if program.growing { step_rad } else { -step_rad };
     let Some((least, size)) = program.sector else {
@@ -115,7 +115,7 @@ fn walk(program: &HeadProgram, step_rad: f64, pings: u32) -> Vec<f64> {
     angles
 }
 
-/// A head's way through the tunnel: where it begins, and its angle in the body's frame at each ping.
+/// A head's trajectory: its start, and its angle in the body's frame at each ping.
 struct Track {
     x_m: f64,
     ping_m: f64,
@@ -123,7 +123,7 @@ struct Track {
 }
 
 impl Track {
-    /// Chainages at which it looks at a body angle; a turning point there is one.
+    /// Chainages at which it looks at a body angle; a turning point at that angle counts once.
     fn passes(&self, angle: f64) -> Vec<f64> {
         let off: Vec<f64> = self.body.iter().map(|body| wrapped(body - angle)).collect();
         let mut found = Vec::new();
@@ -138,7 +138,7 @@ impl Track {
         found
     }
 
-    /// Body angle where it has a chainage.
+    /// Body angle at a chainage.
     fn body_at(&self, chainage_m: f64) -> f64 {
         let n = (chainage_m - self.x_m) / self.ping_m;
         let whole = usize::try_from(floor_to_i64(n)).unwrap();
@@ -148,12 +148,12 @@ impl Track {
 
 struct Dive {
     tracks: Vec<Track>,
-    /// First and last chainage that all heads have.
+    /// First and last chainage common to all heads.
     shared_m: [f64; 2],
 }
 
 impl Dive {
-    /// All passes of a body angle where all heads have been, in order along the tunnel.
+    /// All passes of a body angle within the common chainages, in order.
     fn passes(&self, angle: f64) -> Vec<f64> {
         let mut all: Vec<f64> = self.tracks.iter().flat_map(|track| track.passes(angle)).collect();
         all.retain(|&m| m > self.shared_m[0] - SAME_M && m < self.shared_m[1] + SAME_M);
@@ -161,7 +161,7 @@ impl Dive {
         all
     }
 
-    /// Passes of an angle are so far apart from one end to the other.
+    /// Checks that passes of an angle are `apart_m` apart from end to end.
     fn assert_even(&self, angle: f64, apart_m: f64) {
         let (all, [first, last]) = (self.passes(angle), self.shared_m);
         assert!(all.len() > 3 && all[0] - first < apart_m + SAME_M, "{all:?} from {first}");
@@ -171,7 +171,7 @@ impl Dive {
         }
     }
 
-    /// At each place all heads are equally far in their sectors.
+    /// Checks that at each place all heads have the same phase in their sectors.
     fn assert_in_step(&self, within_rad: f64) {
         let [first, last] = self.shared_m;
         for place_m in (0..200).map(|n| first + (last - first) * f64::from(n) / 200.3) {
@@ -183,14 +183,15 @@ impl Dive {
         }
     }
 
-    /// In its own sector a head passes each angle at two distances in turn, and no other head passes it.
+    /// Checks that a head passes each angle of its own sector at two alternating distances, and no other head passes
+    /// it.
     fn assert_two_distances(&self, k: usize, pitch_m: f64) {
         let heads = self.tracks.len();
         for share in [0.0, 0.03, 0.25, 0.4, 0.5, 0.75, 0.9, 1.0] {
             let angle = TAU * (k as f64 + share) / heads as f64;
             let mut own = self.tracks[k].passes(angle);
             if [0.0, 1.0].contains(&share) {
-                // A turning point is where two passes meet.
+                // Two passes meet at a turning point.
                 own = own.iter().flat_map(|&m| [m, m]).collect();
             } else {
                 let by = |track: &&Track| !track.passes(angle).is_empty();
@@ -214,7 +215,7 @@ fn gaps(passes: &[f64]) -> Vec<f64> {
     passes.windows(2).map(|pair| pair[1] - pair[0]).collect()
 }
 
-/// Together, evenly apart, and unequally in no order.
+/// Hulls with heads together, evenly spaced, and unevenly spaced in no order.
 fn hulls(heads: usize) -> [Vec<f64>; 3] {
     let uneven = [0.4, -0.71, 1.102, 0.05, -0.33, 0.62];
     [vec![0.3; heads], (0..heads).map(|k| -0.3 * k as f64).collect(), uneven[..heads].to_vec()]
@@ -243,11 +244,11 @@ fn phase_shifted_heads_pass_each_angle_at_even_distances() {
 }
 
 #[test]
-fn sectors_are_swept_at_two_alternating_distances_and_in_step_at_each_place() {
+fn sectors_are_swept_at_two_alternating_distances_in_phase() {
     for (heads, facing) in (2..=6).flat_map(|heads| FACINGS.map(|facing| (heads, facing))) {
         for speed_mps in SPEEDS_MPS {
             let pitch_m = speed_mps * 21.6;
-            // Whole numbers of pings' way apart, so that they pass a place at the same steps.
+            // Distances of whole pings, so that all heads pass a place at the same steps.
             let hull_m =
                 [37, 0, 251, 90, 90, 163].map(|pings| -f64::from(pings) * pitch_m / f64::from(STEPS));
             let rig = Rig::new(&hull_m[..heads], facing, 21.6);
@@ -256,7 +257,7 @@ fn sectors_are_swept_at_two_alternating_distances_and_in_step_at_each_place() {
             dive.assert_in_step(1e-7);
             for k in 0..heads {
                 dive.assert_two_distances(k, pitch_m);
-                // Both neighbours turn round there, one half a sweep after the other.
+                // Both neighbours turn round there, half a sweep apart.
                 dive.assert_even(TAU * (k + 1) as f64 / heads as f64, pitch_m / heads as f64);
             }
             // Elsewhere a head reaches the end of its sector up to a ping early or late.
@@ -268,9 +269,10 @@ fn sectors_are_swept_at_two_alternating_distances_and_in_step_at_each_place() {
     }
 }
 
-/// 2.4 degrees in quarters of a turn, 0.9 degrees in thirds: the short step makes the sweep longer than 2 T / s.
+/// Steps of 2.4 degrees in quarters of a turn, and of 0.9 degrees in thirds. The short last step makes the sweep
+/// longer than 2 T / s.
 #[test]
-fn sectors_that_the_step_does_not_divide_are_in_step_within_two_pings() {
+fn sectors_not_divisible_by_the_step_are_in_phase_within_two_pings() {
     for (steps, heads, turn_s) in [(150, 4, 4.8), (400, 3, 8.0)] {
         let rig = Rig { steps, ..Rig::new(&hulls(heads)[2], |_| false, turn_s) };
         rig.dive(SectorOffset, 0.1, 0.1).assert_in_step(2.0 * rig.step_rad());
@@ -278,7 +280,7 @@ fn sectors_that_the_step_does_not_divide_are_in_step_within_two_pings() {
 }
 
 #[test]
-fn algorithm_1_puts_a_head_where_the_lead_was_at_the_same_chainage() {
+fn algorithm_1_gives_a_head_the_angle_of_the_lead_at_the_same_chainage() {
     for (of, (behind_m, speed_mps)) in (2..=6_usize)
         .flat_map(|of| [(0.0, 0.3), (0.3, 0.197), (1.102, 0.5), (3.7, 0.4), (-0.6, 0.197)].map(|at| (of, at)))
     {
@@ -286,7 +288,7 @@ fn algorithm_1_puts_a_head_where_the_lead_was_at_the_same_chainage() {
         let program = HeadProgram { start_rad: 0.0, growing: true, sector: Some((0.0, size)) };
         let ping_m = speed_mps * rig.ping_s();
         let lead = Track { x_m: 0.0, ping_m, body: walk(&program, rig.step_rad(), 8 * STEPS) };
-        // From where both have been at the place, in odd fractions of a ping.
+        // From the chainage where both have been, in odd fractions of a ping.
         for now_m in (0..150).map(|n| 3.8 + f64::from(n) * 1.37 * ping_m) {
             let state = |m: f64| (lead.body_at(m), lead.body_at(m + SAME_M) > lead.body_at(m));
             let ((angle_rad, growing), (along, outward)) = (state(now_m), state(now_m - behind_m));
@@ -297,7 +299,7 @@ fn algorithm_1_puts_a_head_where_the_lead_was_at_the_same_chainage() {
                 let off = wrapped(body - along - number as f64 * size);
                 assert!(off.abs() < 1e-8, "{sector:?} {off} off, lead at {angle_rad} {growing}");
                 assert!((0.0..TAU).contains(&got.angle_rad), "{got:?}");
-                // At a turning point it is both.
+                // At a turning point it has both directions.
                 if along > 1e-5 && along < size - 1e-5 {
                     assert_eq!(got.growing, outward != reversed, "{sector:?}, lead {angle_rad} {growing}");
                 }
@@ -307,13 +309,13 @@ fn algorithm_1_puts_a_head_where_the_lead_was_at_the_same_chainage() {
 }
 
 #[test]
-fn a_faster_vehicle_has_uneven_gaps_by_the_phase_errors_of_its_heads() {
+fn faster_vehicle_has_gaps_uneven_by_the_phase_errors() {
     let (turn_s, planned_mps, speed_mps) = (8.0, 0.197, 0.25);
     let pitch_m = speed_mps * turn_s;
     for (heads, facing) in (2..=6).flat_map(|heads| FACINGS.map(|facing| (heads, facing))) {
         for hull_m in &hulls(heads)[1..] {
             let dive = Rig::new(hull_m, facing, turn_s).dive(PhaseShift, planned_mps, speed_mps);
-            // Turns by which a head is late at a place, besides its phase: x / (v T) - x / (v' T).
+            // Delay of a head at a place besides its phase, turns: x / (v T) - x / (v' T).
             let late = |x_m: f64| (ends(hull_m)[1] - x_m) * (1.0 / planned_mps - 1.0 / speed_mps) / turn_s;
             let first: Vec<f64> = dive.tracks.iter().map(|track| track.passes(1.0)[0]).collect();
             for k in 1..heads {
@@ -329,7 +331,7 @@ fn a_faster_vehicle_has_uneven_gaps_by_the_phase_errors_of_its_heads() {
 
 proptest! {
     #![proptest_config(ProptestConfig {
-        // The same values each time: one in a million starts so near a step that rounding decides its ping.
+        // A fixed seed: one start in a million is so near to a step that rounding decides its ping.
         cases: 100, failure_persistence: None, rng_seed: RngSeed::Fixed(881), ..ProptestConfig::default()
     })]
 
@@ -339,9 +341,9 @@ proptest! {
         rig.dive(PhaseShift, speed_mps, speed_mps).assert_even(angle, apart_m);
     }
 
-    /// At a speed other than the planned one, so that the gaps aren't all one.
+    /// At a speed other than the planned one, so that gaps differ.
     #[test]
-    fn neither_a_shift_along_the_hull_nor_turning_every_head_round_changes_the_gaps(
+    fn shifting_or_reversing_all_heads_does_not_change_the_gaps(
         rig in random_rig(), layout in prop::sample::select(vec![PhaseShift, SectorOffset]),
         shift_m in -3.0..3.0, speed_mps in 0.05..1.0, angle in 0.0..TAU,
     ) {
@@ -355,7 +357,7 @@ proptest! {
     }
 
     #[test]
-    fn a_schedule_agrees_with_stepping_each_program(
+    fn schedule_agrees_with_stepping_each_program(
         rig in random_rig(), layout in prop::sample::select(vec![PhaseShift, SectorOffset]), speed_mps in 0.05..1.0,
     ) {
         let schedule = Schedule::new(&rig.specs(), layout, speed_mps).unwrap();
@@ -374,14 +376,14 @@ proptest! {
 }
 
 #[test]
-fn a_sector_of_twelve_and_a_half_steps_ends_with_half_a_step_and_pings_its_ends_once() {
+fn sector_of_12_5_steps_ends_with_a_half_step_and_pings_each_end_once() {
     let rig = Rig { steps: 50, ..Rig::new(&[0.0; 4], |_| false, 5.0) };
     let schedule = Schedule::new(&rig.specs(), SectorOffset, 0.2).unwrap();
     assert!((schedule.sweep_s().unwrap() - 2.6).abs() < 1e-9, "{:?}", schedule.sweep_s());
     let out = (0..13).map(|n| 7.2 * f64::from(n));
     let sweep: Vec<f64> = out.clone().chain(out.map(|degrees| 90.0 - degrees)).collect();
     for (n, degrees) in (0..1000).zip(sweep.iter().cycle()) {
-        // From the very nanosecond of a ping, though 0.3 / 0.1 is below 3, to a microsecond before the next.
+        // From the exact nanosecond of a ping, although 0.3 / 0.1 is below 3, to a microsecond before the next.
         for ns in [100_000_000 * n, 100_000_000 * n + 99_999_000] {
             let got = schedule.angle_rad(0, DurNs(ns)).unwrap().to_degrees();
             assert!((got - degrees).abs() < 1e-6, "{got} for {degrees} at {ns} ns");
@@ -391,7 +393,7 @@ fn a_sector_of_twelve_and_a_half_steps_ends_with_half_a_step_and_pings_its_ends_
 }
 
 #[test]
-fn what_has_no_layout_is_a_named_error() {
+fn impossible_layout_is_a_named_error() {
     let specs = |heads: usize| Rig::new(&vec![0.0; heads], |_| false, 8.0).specs();
     let refusal = |heads: &[HeadSpec], layout, speed_mps| {
         let refused = programs(heads, layout, speed_mps).unwrap_err();
@@ -422,7 +424,7 @@ fn what_has_no_layout_is_a_named_error() {
 }
 
 #[test]
-fn a_step_not_above_zero_is_a_named_error_in_either_layout() {
+fn step_not_above_zero_is_a_named_error_in_either_layout() {
     for (layout, step_rad) in [PhaseShift, SectorOffset].into_iter().flat_map(|l| [(l, 0.0), (l, -0.1)]) {
         let head = HeadSpec { step_rad, ..Rig::new(&[0.0], |_| false, 8.0).specs()[0] };
         assert!(programs(&[head; 2], layout, 0.2).is_err(), "{layout:?} in steps of {step_rad}");
@@ -430,7 +432,7 @@ fn a_step_not_above_zero_is_a_named_error_in_either_layout() {
 }
 
 #[test]
-fn a_lead_outside_sector_0_is_a_named_error() {
+fn lead_outside_sector_0_is_a_named_error() {
     let sector = Sector { number: 1, of: 4, behind_m: 0.3, reversed: false };
     for angle_rad in [-0.1, 1.6, 6.2, f64::NAN] {
         let got = in_step(InSector { angle_rad, growing: true }, &sector, 8.0, 0.2);

@@ -1,6 +1,6 @@
-//! Sampling theory, plans and advice: the equations against independent values, and simulated dives against what they promise.
+//! Sampling theory, plans and advice: equations compared with independent values, and promises with simulated dives.
 
-#![allow(clippy::unwrap_used, clippy::panic, reason = "a test stops at what it can't do")]
+#![allow(clippy::unwrap_used, clippy::panic, reason = "a failed step ends the test")]
 
 mod advice;
 mod calm;

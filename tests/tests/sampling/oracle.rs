@@ -1,7 +1,8 @@
-//! Sampling theory against values of 50 digits: `oracles/sampling.py` made `oracles/sampling.csv` with mpmath.
+//! Sampling theory compared with values of 50 digits, made with mpmath by `oracles/sampling.py`
+//! (`oracles/sampling.csv`).
 //!
-//! Inputs are doubles taken as exact, so that each tolerance is what rounding within the computation may do: some units
-//! in the last place, times the condition of the case where an input's own rounding would show.
+//! Inputs are doubles taken as exact. So each tolerance is the rounding within the computation: some units in the
+//! last place, times the condition number if an input's own rounding would matter.
 
 use headrace_geometry::frames::{Body, Mount, Point3, Pose, Rot, Tunnel, Vec3};
 use headrace_geometry::math::{self, FRAC_PI_2, TAU};
@@ -34,7 +35,7 @@ impl Row {
         u32::try_from(math::round_to_i64(self.i(i))).unwrap()
     }
 
-    /// Holds `got` to the value within `tolerance`, absolute.
+    /// Checks `got` against the value, with an absolute tolerance.
     fn near(&self, got: f64, tolerance: f64) {
         let off = (got - self.value).abs();
         assert!(
@@ -47,24 +48,24 @@ impl Row {
         );
     }
 
-    /// Within some units in the last place.
+    /// Checks `got` to within some units in the last place.
     fn ulps(&self, got: f64, ulps: f64) {
         self.near(got, ulps * ULP * self.value.abs());
     }
 
-    /// How far off `got` is, as a share of the value.
+    /// Error of `got` as a share of the value.
     fn share(&self, got: f64) -> f64 {
         (got - self.value).abs() / self.value.abs().max(f64::MIN_POSITIVE)
     }
 
-    /// On a circle of this circumference.
+    /// Checks `got` on a circle of this circumference.
     fn around(&self, got: f64, modulus: f64, tolerance: f64) {
         let off = math::wrap_signed(got - self.value, modulus);
         self.near(self.value + off, tolerance);
     }
 }
 
-/// Rows of the cases named, which must be there.
+/// Rows of these cases, which must exist.
 fn rows(cases: &[&str]) -> Vec<Row> {
     let mut found = Vec::new();
     for (number, line) in ROWS.lines().enumerate() {
@@ -87,14 +88,14 @@ fn rows(cases: &[&str]) -> Vec<Row> {
     found
 }
 
-/// How much the rounding of an angle near 90 degrees is magnified.
+/// Factor by which the rounding of an angle near 90 degrees is magnified.
 fn condition(angle_rad: f64) -> f64 {
     1.0 + angle_rad / (FRAC_PI_2 - angle_rad).abs()
 }
 
-/// Near 90 degrees the tangent has no bound, and the difference of two would have no digits left.
+/// Near 90 degrees the tangent is unbounded, and the difference of two tangents would lose all digits.
 #[test]
-fn val_steps_that_end_near_90_degrees() {
+fn steps_near_90_degrees_match_the_oracle() {
     let (mut worst, mut magnified) = (0.0_f64, 0.0_f64);
     for row in rows(&["eq6"]) {
         worst = worst.max(row.share(section::t_y2_m(row.i(1), row.i(2), row.count(3)).unwrap()));
@@ -103,9 +104,9 @@ fn val_steps_that_end_near_90_degrees() {
     found_at("sampling.corner", magnified, worst, 8.0 * ULP);
 }
 
-/// As T_y comes near to the target the difference of their squares would cancel.
+/// As T_y approaches the target, the difference of their squares would cancel.
 #[test]
-fn val_speeds_where_little_is_left_of_the_target() {
+fn speeds_near_the_limit_match_the_oracle() {
     let (mut worst, mut magnified) = (0.0_f64, 0.0_f64);
     for row in rows(&["eq16_speed"]) {
         let [target, t_y, gap_s, ping_s] = [1, 2, 3, 4].map(|i| row.i(i));
@@ -117,9 +118,9 @@ fn val_speeds_where_little_is_left_of_the_target() {
     found_at("sampling.speed", magnified, worst, 8.0 * ULP);
 }
 
-/// At a crawl a head turns any number of times while the vehicle comes to where another head has been.
+/// At a crawl, a head makes any number of turns until the vehicle reaches another head's former position.
 #[test]
-fn val_phases_at_a_crawl() {
+fn phases_at_a_crawl_match_the_oracle() {
     let (mut worst_rad, mut turned_most) = (0.0_f64, 0.0_f64);
     for row in rows(&["eq20", "eq21"]) {
         let [phase, rate, x, v] = [1, 2, 3, 4].map(|i| row.i(i));
@@ -133,7 +134,7 @@ fn val_phases_at_a_crawl() {
 }
 
 #[test]
-fn val_the_cross_section() {
+fn cross_section_matches_the_oracle() {
     for row in rows(&["eq5", "eq6", "eq7", "eq8", "eq10", "eq22"]) {
         match row.case.as_str() {
             "eq5" => row.ulps(section::t_y1_m(row.i(1), row.i(2)).unwrap(), 8.0),
@@ -148,16 +149,16 @@ fn val_the_cross_section() {
 }
 
 #[test]
-fn val_the_footprint() {
+fn footprint_matches_the_oracle() {
     for row in rows(&["footprint"]) {
         row.ulps(section::footprint_m(row.i(1), row.i(2), row.i(3)).unwrap(), 8.0);
     }
 }
 
 #[test]
-fn val_forward_motion() {
+fn forward_motion_matches_the_oracle() {
     for row in rows(&["eq11", "eq12", "eq13", "eq15", "eq16", "eq17", "eq18", "eq16_speed"]) {
-        // A head of one step a turn pings once in its period.
+        // A head with one step a turn pings once per period.
         let once = |speed, period| Spiral::new(speed, Turn::new(TAU, period).unwrap(), 1.0).unwrap();
         match row.case.as_str() {
             "eq11" => row.ulps(once(row.i(1), row.i(2)).advance_m(), 2.0),
@@ -185,7 +186,7 @@ fn val_forward_motion() {
 }
 
 #[test]
-fn val_phases_of_heads_apart() {
+fn phases_of_heads_apart_match_the_oracle() {
     for row in rows(&["eq20", "eq21"]) {
         let [phase, rate, x, v] = [1, 2, 3, 4].map(|i| row.i(i));
         let start = if row.case == "eq20" { start_rad } else { start_reversed_rad };
@@ -195,7 +196,7 @@ fn val_phases_of_heads_apart() {
 }
 
 #[test]
-fn val_algorithm_1() {
+fn algorithm_1_matches_the_oracle() {
     for row in rows(&["algorithm1"]) {
         let sector = Sector {
             number: row.count(1) as usize,
@@ -226,11 +227,11 @@ fn sounding(profile: &Profile, row: &Row, angle_rad: f64) -> Sounding {
 }
 
 #[test]
-fn val_where_beams_meet_the_wall() {
+fn beam_wall_hits_match_the_oracle() {
     for row in rows(&["cast_x", "cast_y", "cast_z", "cast_sigma"]) {
         let profile = shape(row.i(1));
         let hit = sounding(&profile, &row, row.i(6));
-        // Off squareness, a beam's rounding moves its end along the wall by so much more.
+        // At oblique incidence, rounding of a beam moves its end along the wall by a larger factor.
         let tolerance = 64.0 * ULP * (3.0 + hit.range_m()) / hit.squareness;
         match row.case.as_str() {
             "cast_x" => row.near(hit.beam.x(), tolerance),
@@ -242,7 +243,7 @@ fn val_where_beams_meet_the_wall() {
 }
 
 #[test]
-fn val_steps_on_any_wall() {
+fn steps_on_any_wall_match_the_oracle() {
     for row in rows(&["step", "perimeter"]) {
         let profile = shape(row.i(1));
         if row.case == "perimeter" {
@@ -257,7 +258,7 @@ fn val_steps_on_any_wall() {
 }
 
 #[test]
-fn tolerances_are_tight_enough_to_notice_a_subtraction_that_loses_digits() {
+fn tolerances_detect_a_cancelling_subtraction() {
     let lost = rows(&["eq6"]).iter().any(|row| {
         let [h, step] = [row.i(1), row.i(2)];
         let m = f64::from(row.count(3));

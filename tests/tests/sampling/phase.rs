@@ -1,4 +1,4 @@
-//! Heads apart along the hull keep their phase at one speed: a dive at another says by how much they are out of it.
+//! Heads apart along the hull are in phase at one speed only; at another speed the advice reports their phase error.
 
 use headrace_tests::Folder;
 use serde_json::Value;
@@ -9,8 +9,8 @@ const APART_M: f64 = 1.102;
 const TURN_S: f64 = 8.0;
 const PLANNED_MPS: f64 = 0.197;
 
-/// Advice of a dive at a constant speed, without its first seconds. Nothing disturbs its sensors, so that the speed is known
-/// without a filter, which would allow for slack of the cable.
+/// Advice in a dive at constant speed, without its first seconds. Nothing disturbs its sensors, so the speed is known
+/// without a filter, which would add a margin for slack.
 fn advice(speed_mps: f64, vehicle: &str) -> Vec<Value> {
     let folder = Folder::new();
     let direct = "[navigation]\nway = \"direct\"\n";
@@ -31,7 +31,7 @@ fn advice(speed_mps: f64, vehicle: &str) -> Vec<Value> {
 }
 
 #[test]
-fn the_phase_error_is_what_the_change_of_speed_makes_of_it() {
+fn phase_error_follows_from_the_change_of_speed() {
     assert!(VEHICLE.contains("planned_speed_mps = 0.197"));
     for speed_mps in [0.12, PLANNED_MPS, 0.23, 0.35] {
         let advice = advice(speed_mps, VEHICLE);
@@ -40,7 +40,7 @@ fn the_phase_error_is_what_the_change_of_speed_makes_of_it() {
         for entry in &advice {
             let error_deg = entry["phase_error_deg"].as_f64().unwrap();
             let off = (error_deg / 360.0 - turns + 0.5).rem_euclid(1.0) - 0.5;
-            // Heads step by 0.9 degrees, starts are rounded to 0.3.
+            // Heads step by 0.9 degrees, and start angles are rounded to 0.3.
             assert!(off.abs() * 360.0 < 1.5, "{speed_mps} m/s: {error_deg} degrees, not {}", turns * 360.0);
         }
     }

@@ -1,10 +1,8 @@
-//! What a plan promises against the wall itself: heads stepped by their schedule, their beams cast, and the largest
-//! circle looked for that holds no sample.
+//! A plan's promised hole compared with simulated beams.
 //!
-//! What the vehicle itself hides from its heads is found here, too, by following beams step by step.
-//!
-//! A circle that is found is no larger than the largest, so that none may exceed the promise; and the promise is no
-//! more than twice what is found, or it would cost the crew their time.
+//! Heads are stepped by their schedule, their beams are cast, and the largest empty circle is searched. Occlusion by
+//! the vehicle is found by following beams step by step. The search can only underestimate, so no circle may exceed
+//! the promise. The promise may be at most twice the circle found, or it would waste the crew's time.
 
 use headrace_geometry::frames::{Body, Mount, Point3, Pose, Rot, Vec3};
 use headrace_geometry::math::{self, PI, TAU};
@@ -20,7 +18,7 @@ const MODES: [(&str, f64, f64); 3] = [("medium", 0.6, 10.8), ("fast", 0.9, 8.0),
 
 type Head = (HeadSpec, Vec<HeadMode>);
 
-/// A head at a place of the vehicle, facing forward or aft, whose turns take `slower` times as long.
+/// A head at a place of the vehicle, facing forward or aft, with turns longer by the factor `slower`.
 fn head(place: [f64; 3], aft: bool, radius_m: f64, slower: f64) -> Head {
     let mode = |(name, step_deg, turn_s): (&'static str, f64, f64)| HeadMode {
         name,
@@ -74,24 +72,24 @@ fn ceran(heads: Vec<Head>, layout: HeadLayout) -> Inspection {
     inspection(shapes::ceran().unwrap(), heads, layout)
 }
 
-/// Where the vehicle is: chainage is left out, it goes steadily.
+/// Lateral position and heading of the vehicle by time; its chainage grows steadily.
 type Way = fn(f64) -> (f64, f64);
 
 fn straight(_: f64) -> (f64, f64) {
     (0.0, 0.0)
 }
 
-/// Length of the steps in which a beam is followed away from its head, m: the sliver of 5 mm is met by two at least.
+/// Step along a beam, m: short enough that at least two steps meet the sliver of 5 mm.
 const STEP_M: f64 = 0.002;
-/// Farther from a head there is nothing of the vehicle, m.
+/// Largest distance of a part of the vehicle from a head, m.
 const VEHICLE_M: f64 = 1.6;
 
-/// Whether a beam ends at the vehicle: followed step by step, is a place on it within another head or the hull? A head's own body and
-/// a box about the head hide nothing.
+/// Whether a beam ends at the vehicle, found in steps along it. A head's own body and a box that contains the head
+/// hide nothing.
 fn is_hidden(inspection: &Inspection, number: usize, angle_rad: f64) -> bool {
     let (spec, _) = &inspection.heads[number];
     let from = spec.mount.position;
-    // 0 is down, growing clockwise seen from behind the head; one that faces aft is turned about the upright.
+    // 0 is down and grows clockwise seen from behind the head; one that faces aft is turned about the vertical.
     let (sine, cosine) = math::sin_cos(angle_rad);
     let towards = spec.mount.rotation * Vec3::new(0.0, sine, -cosine);
     let others = || inspection.heads.iter().enumerate().filter(|(other, _)| *other != number);
@@ -99,7 +97,7 @@ fn is_hidden(inspection: &Inspection, number: usize, angle_rad: f64) -> bool {
         let in_head = others().any(|(_, (other, _))| {
             let HeadBody { radius_m, ahead_m, behind_m } = other.body;
             let off = at + other.mount.position.scaled(-1.0);
-            // Heads look forward or aft here, so that their axes are the vehicle's.
+            // Heads look forward or aft here, so their axes are the vehicle's.
             let along_m = (other.mount.rotation * Vec3::new(1.0, 0.0, 0.0)).x() * off.x();
             radius_m > 0.0
                 && (-behind_m..=ahead_m).contains(&along_m)
@@ -117,7 +115,7 @@ fn in_box(part: &Obstacle, at: Vec3<Body>) -> bool {
     within(Vec3::x) && within(Vec3::y) && within(Vec3::z)
 }
 
-/// Samples (chainage, arc length) of a dive as long as `length_m`.
+/// Samples (chainage, arc length) of a dive over `length_m`.
 fn samples(planner: &Planner, mode: usize, speed_mps: f64, length_m: f64, way: Way) -> Vec<[f64; 2]> {
     let schedule = planner.schedule(mode, speed_mps).unwrap();
     let inspection = planner.inspection();
@@ -145,7 +143,7 @@ fn samples(planner: &Planner, mode: usize, speed_mps: f64, length_m: f64, way: W
     samples
 }
 
-/// Samples in square cells, for the nearest of them to a place; arc length is cyclic.
+/// Samples in square cells for a nearest-neighbour search; arc length is cyclic.
 struct Wall {
     cells: Vec<Vec<[f64; 2]>>,
     from_m: f64,
@@ -242,13 +240,13 @@ impl Wall {
     }
 }
 
-/// Hole over promise at the speed that the plan gives for a target.
+/// Hole over promise at the planned speed for a target.
 fn ratio(inspection: Inspection, mode: &str, target_m: f64, way: Way) -> f64 {
     let planner = Planner::new(inspection).unwrap();
     let number = planner.modes().iter().position(|planned| planned.mode.name == mode).unwrap();
     let speed_mps = planner.v_max_mps(number, target_m).unwrap();
     let pitch_m = speed_mps * planner.modes()[number].mode.turn.period_s();
-    // The ends, where not all heads have been, are left out.
+    // The ends, which not all heads have passed, are left out.
     let from_m = pitch_m + 6.0;
     let to_m = from_m + pitch_m;
     let samples = samples(&planner, number, speed_mps, to_m + pitch_m + 6.0, way);
@@ -256,7 +254,7 @@ fn ratio(inspection: Inspection, mode: &str, target_m: f64, way: Way) -> f64 {
     wall.hole_m(from_m, to_m, target_m / 8.0) / target_m
 }
 
-/// Every case keeps its promise, and not by too much.
+/// Checks that every case keeps its promise, with a ratio of `least` at least.
 fn hold(cases: Vec<(&str, Inspection, &str, f64, Way)>, least: f64) {
     let mut broken = Vec::new();
     for (what, inspection, mode, target_m, way) in cases {
@@ -270,7 +268,7 @@ fn hold(cases: Vec<(&str, Inspection, &str, f64, Way)>, least: f64) {
 }
 
 #[test]
-fn ideal_heads_and_sectors() {
+fn plan_bounds_the_hole_of_ideal_heads_and_sectors() {
     let three = || ideal(3);
     hold(
         vec![
@@ -284,7 +282,7 @@ fn ideal_heads_and_sectors() {
 }
 
 #[test]
-fn heads_on_a_real_hull() {
+fn plan_bounds_the_hole_of_heads_on_a_real_hull() {
     let side = || vita(&[(0.551, 0.0, 0.0), (-0.551, 0.15, 0.0), (-0.551, -0.15, 0.0)]);
     let over = |z: f64| vita(&[(0.55, 0.0, z), (-0.55, 0.0, -z)]);
     hold(
@@ -312,7 +310,7 @@ fn heads_on_a_real_hull() {
 }
 
 #[test]
-fn a_vehicle_that_heads_askew() {
+fn plan_bounds_the_hole_of_an_askew_vehicle() {
     let askew =
         |heads, degrees: f64| Inspection { yaw_rad: degrees.to_radians(), ..ceran(heads, PhaseShift) };
     hold(
@@ -331,7 +329,7 @@ fn a_vehicle_that_heads_askew() {
 }
 
 #[test]
-fn a_vehicle_that_swings_and_drifts() {
+fn plan_bounds_the_hole_of_a_swinging_and_drifting_vehicle() {
     // 5 degrees either way in 30 s turns at up to 1.05 degrees a second.
     let swings = |yaw_deg: f64, rate_degps: f64, heads| Inspection {
         yaw_rad: yaw_deg.to_radians(),
@@ -340,7 +338,8 @@ fn a_vehicle_that_swings_and_drifts() {
     };
     let swinging = |heads| swings(5.0, 1.05, heads);
     let swing: Way = |t| (0.0, f64::to_radians(5.0) * math::sin(TAU * t / 30.0));
-    // 15 degrees either way in 20 s: at its largest rate all through a turn of MEDIUM it would be 51, and is 30 at most.
+    // 15 degrees either way in 20 s. At the largest rate throughout a turn of MEDIUM the swing would be 51 degrees,
+    // but it is 30 at most.
     let swing_wide: Way = |t| (0.0, f64::to_radians(15.0) * math::sin(TAU * t / 20.0));
     let drifting = |heads| Inspection { drift_m: 1.5, ..ceran(heads, PhaseShift) };
     hold(
@@ -355,7 +354,7 @@ fn a_vehicle_that_swings_and_drifts() {
 }
 
 #[test]
-fn heads_out_of_step_and_hidden_slivers() {
+fn plan_bounds_the_hole_of_heads_out_of_phase_and_hidden_slivers() {
     let unequal = |slower: f64| vec![head([0.0; 3], false, 0.0, 1.0), head([0.0; 3], false, 0.0, slower)];
     let sliver = |width_m: f64| Inspection {
         hull: vec![Obstacle::Box {

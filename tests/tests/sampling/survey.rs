@@ -1,4 +1,4 @@
-//! `docs/why/cost` prices surveys by what `headrace plan` says.
+//! Checks the prices in `docs/why/cost` against `headrace plan`.
 
 use headrace_tests::{program, root};
 use serde_json::Value;
@@ -11,7 +11,7 @@ const VEHICLES: [(&str, &str); 4] = [
     ("VITA 2, four heads", "vita2-4.toml"),
 ];
 
-/// What `plan` says of a vehicle's mode: speed and hours.
+/// Speed and hours that `plan` gives for a vehicle's mode.
 fn planned(file: &str, target_m: &Value, mode: &str) -> [f64; 2] {
     let vehicle = root().join("deploy/vehicles").join(file);
     let mut command = program();
@@ -24,7 +24,7 @@ fn planned(file: &str, target_m: &Value, mode: &str) -> [f64; 2] {
 }
 
 #[test]
-fn the_survey_of_docs_cost_says_what_plan_says_to_the_bit() {
+fn cost_page_matches_plan_to_the_bit() {
     let results: Value =
         serde_json::from_str(&std::fs::read_to_string(root().join("docs/why/cost/cost.json")).unwrap())
             .unwrap();

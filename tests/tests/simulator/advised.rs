@@ -1,4 +1,4 @@
-//! A pilot who hears advice: hurries, is told what he missed, goes back, and leaves nothing behind.
+//! A simulated pilot with advice: hurries, gets a missed stretch reported, goes back, and leaves no missed section.
 
 use headrace_simulator::{Message, Scene, Simulation};
 use headrace_tests::{scenes, truth};
@@ -16,7 +16,7 @@ fn simulation(scene: &Scene) -> Simulation {
     headrace_replay::simulation(scene, false).unwrap()
 }
 
-/// True chainage each second.
+/// True chainage at each second.
 fn way(scene: &Scene) -> Vec<f64> {
     let mut simulation = simulation(scene);
     while simulation.next_message().is_some() {}
@@ -26,7 +26,7 @@ fn way(scene: &Scene) -> Vec<f64> {
 }
 
 #[test]
-fn what_the_pilot_hears_and_does_is_the_same_every_time() {
+fn advised_pilot_is_repeatable() {
     let scene = scene(HURRY);
     let all = || {
         let (mut simulation, mut all) = (simulation(&scene), Vec::new());
@@ -39,7 +39,7 @@ fn what_the_pilot_hears_and_does_is_the_same_every_time() {
 }
 
 #[test]
-fn the_pilot_goes_back_for_what_was_missed_and_leaves_nothing_behind() {
+fn pilot_goes_back_and_leaves_no_missed_section() {
     let hurried = scene(HURRY);
     let way = way(&hurried);
     let back_m = way.windows(2).map(|pair| (pair[0] - pair[1]).max(0.0)).sum::<f64>();
@@ -55,7 +55,7 @@ fn the_pilot_goes_back_for_what_was_missed_and_leaves_nothing_behind() {
 }
 
 #[test]
-fn the_pilot_drives_no_faster_than_told_but_for_his_hand() {
+fn pilot_keeps_to_the_advised_speed_within_tolerance() {
     let scene = scene("");
     let way = way(&scene);
     let report = truth::dive(&scene).report;

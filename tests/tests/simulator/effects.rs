@@ -1,11 +1,11 @@
-//! A scene pays for the effects that it names and for no other: what isn't named changes not one bit.
+//! A scene pays only for the effects that it names; an unnamed effect changes no bit.
 
 use std::collections::BTreeMap;
 
 use headrace_tests::{Folder, SCENE, VEHICLE, raw_messages};
 use serde_json::Value;
 
-/// Messages of each source: when, and what.
+/// Messages of each source: time and bytes.
 type Lines = BTreeMap<String, Vec<(u64, Vec<u8>)>>;
 
 fn folder() -> Folder {
@@ -14,7 +14,7 @@ fn folder() -> Folder {
     folder
 }
 
-/// What each source of the short dive sends with these effects.
+/// Messages of each source in the short dive with these effects.
 fn lines(folder: &Folder, effects: &str, further: &[&str]) -> Lines {
     folder.write("scene.toml", format!("{SCENE}\n[effects]\n{effects}\n"));
     let arguments = [&["simulate", "scene.toml", "-o", "dive.mcap"], further].concat();
@@ -36,7 +36,7 @@ fn explained(folder: &Folder, effects: &str) -> Value {
 }
 
 #[test]
-fn an_effect_changes_no_bit_of_what_it_is_not_for() {
+fn effect_changes_only_its_own_sensors() {
     let folder = folder();
     let plain = lines(&folder, "", &[]);
     assert_eq!(plain.len(), 9);
@@ -56,7 +56,7 @@ fn an_effect_changes_no_bit_of_what_it_is_not_for() {
 }
 
 #[test]
-fn what_one_effect_draws_does_not_depend_on_others() {
+fn random_draws_of_an_effect_do_not_depend_on_others() {
     let folder = folder();
     let noise = "range_noise = { sd_m = 0.05, sensors = [\"sonar_0\"] }";
     let alone = lines(&folder, noise, &[]);
@@ -65,12 +65,12 @@ fn what_one_effect_draws_does_not_depend_on_others() {
     let together = lines(&folder, &format!("{others}\n{noise}"), &[]);
     assert_eq!(alone["/raw/sonar_0"], together["/raw/sonar_0"]);
     assert_ne!(alone["/raw/imu"], together["/raw/imu"]);
-    // The order of the scene is no matter either.
+    // The order in the scene doesn't matter either.
     assert_eq!(lines(&folder, &format!("{noise}\n{others}"), &[]), together);
 }
 
 #[test]
-fn a_seed_gives_its_dive_again_and_another_gives_another() {
+fn same_seed_repeats_the_dive_and_another_changes_it() {
     let folder = folder();
     let effects = "range_noise = { sd_m = 0.05 }\nmissing_returns = { share = 0.1 }";
     let first = lines(&folder, effects, &["--seed", "7"]);
@@ -86,7 +86,7 @@ fn a_seed_gives_its_dive_again_and_another_gives_another() {
 }
 
 #[test]
-fn keeping_the_truth_changes_nothing_of_the_log() {
+fn truth_output_does_not_change_the_log() {
     let folder = folder();
     let effects = "motion_within_turn = {}\nrange_noise = { sd_m = 0.05 }\nline_delay = { jitter_ms = 3 }";
     let plain = lines(&folder, effects, &[]);
@@ -97,12 +97,12 @@ fn keeping_the_truth_changes_nothing_of_the_log() {
     let column = |name: &str| columns.iter().position(|column| *column == name).unwrap();
     let rows: Vec<Vec<&str>> = rows.map(|row| row.split(',').collect()).collect();
     assert!(rows.iter().all(|row| row.len() == columns.len()));
-    // Each ping of the log has its row.
+    // Every ping of the log has a row.
     let pings = rows.iter().filter(|row| row[column("source")] == "sonar_0").count();
     assert_eq!(pings, plain["/raw/sonar_0"].len());
     let number = |row: &Vec<&str>, name| row[column(name)].parse::<f64>().unwrap();
     for row in rows.iter().filter(|row| row[column("sense")] == "profiling_head") {
-        // The tunnel's radius is 3 m, its middle 3 m above the floor.
+        // The tunnel's radius is 3 m, with its centre 3 m above the floor.
         let (y, z) = (number(row, "wall_y_m"), number(row, "wall_z_m"));
         assert!((headrace_geometry::math::hypot(y, z - 3.0) - 3.0).abs() < 1e-9, "{row:?}");
         let noise = number(row, "measured_range_m") - number(row, "true_range_m");
@@ -111,7 +111,7 @@ fn keeping_the_truth_changes_nothing_of_the_log() {
 }
 
 #[test]
-fn only_what_is_named_has_systems_components_and_streams() {
+fn only_named_effects_have_systems_components_and_streams() {
     let folder = folder();
     let none = explained(&folder, "");
     assert_eq!(none["effects"].as_array().unwrap().len(), 0);
@@ -125,15 +125,15 @@ fn only_what_is_named_has_systems_components_and_streams() {
     assert_eq!(effect["systems"].as_array().unwrap().len(), 1);
     assert_eq!(effect["components"][0]["sensors"], serde_json::json!(["sonar_1"]));
     assert_eq!(effect["streams"], serde_json::json!(["sonar_1"]));
-    // The snapshot of a turn is taken by a base system, which the effect replaces.
+    // A base system takes a turn's snapshot; the effect replaces it.
     let moving = explained(&folder, "motion_within_turn = {}");
     assert_eq!(moving["base"].as_array().unwrap().len(), base - 1);
     assert_eq!(moving["effects"][0]["replaces"], serde_json::json!(["aim_held"]));
 }
 
-/// What the scene calls for is listed with what calls for it, and is simulated only where the scene says so.
+/// Effects that the scene calls for are listed with their reason, and simulated only if the scene says so.
 #[test]
-fn a_scene_says_what_it_calls_for_and_takes_what_it_wants() {
+fn called_effects_are_listed_and_simulated_only_on_request() {
     let folder = folder();
     let names = |list: &Value| -> Vec<String> {
         let of = |entry: &Value| entry["effect"].as_str().unwrap().to_owned();
@@ -159,15 +159,15 @@ fn a_scene_says_what_it_calls_for_and_takes_what_it_wants() {
         (fate("beam_cone"), fate("imu_bias"), fate("occlusion")),
         ("left".into(), "as named".into(), "taken".into())
     );
-    // No byte differs from those of the scene without the descriptions that aren't taken.
+    // No byte differs from the scene without the unused descriptions.
     let plain = lines(&folder, "", &[]);
     let described = "\n[water]\ntemperature_degc = 4\n[[water.murk]]\nfrom_m = 1\nto_m = 9\nsilt_gpl = 3\n[cable]\nslack_m = 1\n";
     assert_eq!(lines(&folder, described, &[]), plain);
 }
 
-/// An effect that does nothing is free, one that puts ranges off isn't; the price is what the processor is busy for it.
+/// An effect without influence is free, and one that shifts ranges isn't. The price is CPU time.
 #[test]
-fn worth_tells_what_matters_from_what_does_not() {
+fn worth_separates_effects_that_matter_from_others() {
     let folder = folder();
     let effects = "motion_within_turn = {}\nimu_noise = { gyro_degps_rthz = 1e-7 }\nmissing_returns = { share = 0.5, mean_run = 9 }";
     folder.write("scene.toml", format!("{SCENE}\n[effects]\n{effects}\n"));
@@ -185,12 +185,12 @@ fn worth_tells_what_matters_from_what_does_not() {
     assert!(lost["is_free"] == false && lost["hole_m"]["mean"].as_f64().unwrap() < -0.02, "{lost}");
     let spared = worth["spared"]["effects"].as_array().unwrap();
     assert!(spared.contains(&"imu_noise".into()) && !spared.contains(&"missing_returns".into()), "{worth}");
-    // One seed gives no interval.
+    // A single seed gives no interval.
     let one = folder.headrace(&["simulate", "scene.toml", "--explain=worth", "--seeds", "1"]);
     assert!(one.code == Some(2) && one.stderr.contains("seeds"), "{}", one.stderr);
 }
 
-/// Exit code 2 and these words.
+/// Checks for exit code 2 and these words.
 #[track_caller]
 fn refused(scene: &str, words: &[&str]) {
     let folder = folder();
@@ -199,7 +199,7 @@ fn refused(scene: &str, words: &[&str]) {
 }
 
 #[test]
-fn a_scene_that_contradicts_itself_is_refused_with_the_place() {
+fn contradictory_scene_is_refused_with_the_place() {
     let scene = |rest: &str| format!("{SCENE}\n{rest}\n");
     refused(&scene("[effects]\nfog = {}"), &["scene.toml:12: effects.fog: is not a key here", "range_noise"]);
     let missing = "[effects.range_noise]\nsd_m = 0.1\nsensors = [\"sonar_9\"]";
@@ -220,7 +220,7 @@ fn a_scene_that_contradicts_itself_is_refused_with_the_place() {
 }
 
 #[test]
-fn a_vehicle_without_the_sensor_of_an_effect_is_told_so() {
+fn effect_without_its_sensor_is_refused() {
     let folder = folder();
     let (without, _) = VEHICLE.split_once("[[sensors]]\nid = \"imu\"").unwrap();
     folder.write("vehicle.toml", without);
@@ -233,7 +233,7 @@ fn a_vehicle_without_the_sensor_of_an_effect_is_told_so() {
 
 #[test]
 #[cfg(not(feature = "mesh"))]
-fn a_build_without_meshes_says_so() {
+fn build_without_meshes_refuses_mesh_scenes() {
     let mesh = "[[tunnel.features]]\nkind = \"mesh\"\nfile = \"rock.ply\"";
     refused(
         &format!("{SCENE}\n{mesh}\n"),
@@ -242,7 +242,7 @@ fn a_build_without_meshes_says_so() {
 }
 
 #[test]
-fn a_report_finds_the_drifts_that_clocks_were_given() {
+fn report_finds_the_simulated_clock_drifts() {
     let folder = Folder::new();
     folder
         .write("vehicle.toml", VEHICLE.replace("counts_per_metre", "clock_ms_offset = 7\ncounts_per_metre"));
@@ -259,7 +259,7 @@ fn a_report_finds_the_drifts_that_clocks_were_given() {
             let clock = &sources.iter().find(|source| source["id"] == id).unwrap()["device_clock"];
             let number = |key: &str| clock[key].as_f64().unwrap();
             assert_eq!((&clock["restarts"], &clock["jumps"]), (&0.into(), &0.into()), "{id}");
-            // An effect's seconds are longer than true ones by so much: its clock is slow.
+            // An effect's seconds are longer than true ones, so its clock is slow.
             let (error, sd) = (number("drift_ppm") + ppm, number("drift_sd_ppm"));
             assert!(error.abs() < 5.0 * sd && sd < 30.0, "{id}: {clock}");
         }
@@ -268,12 +268,13 @@ fn a_report_finds_the_drifts_that_clocks_were_given() {
     }
 }
 
-/// A vehicle file that has the water's speed of sound wrong by 3.7 % puts the wall 11 cm off; told by the depth sensor's
-/// temperature it is where it is.
+/// A vehicle file with a speed of sound wrong by 3.7 % shifts the wall by 11 cm. Corrected by the depth sensor's
+/// temperature, the wall is right.
 #[test]
-fn the_water_s_temperature_makes_up_for_a_wrong_speed_of_sound() {
+fn water_temperature_corrects_a_wrong_speed_of_sound() {
     let folder = folder();
-    // The emulated depth sensor is in water of 10 degrees, in which sound goes at 1447.3 m/s and a little more below.
+    // The emulated depth sensor is in water of 10 degrees, in which sound travels at 1447.3 m/s, and slightly faster
+    // deeper down.
     let effects = "motion_within_turn = {}\nsound_speed_error = { true_mps = 1448.1 }\n";
     let mean_m = |water: &str| {
         folder.write("vehicle.toml", VEHICLE.replace("sound_speed_mps = 1447", water));
@@ -300,7 +301,7 @@ fn the_water_s_temperature_makes_up_for_a_wrong_speed_of_sound() {
     assert!((1447.0..1449.0).contains(&least_mps) && most_mps < 1449.0, "{least_mps} to {most_mps}");
 }
 
-/// Pings of a head that lost their return, or strayed, by an effect alone.
+/// Pings of a head that an effect alone removed or displaced.
 fn touched(effect: &str) -> Vec<bool> {
     let ranges = |effects: &str| -> Vec<Option<f64>> {
         let scene = format!("{SCENE}\n[effects]\n{effects}\n");
@@ -317,13 +318,14 @@ fn touched(effect: &str) -> Vec<bool> {
 }
 
 #[test]
-fn what_one_effect_draws_says_nothing_of_what_another_draws() {
+fn random_draws_of_two_effects_are_independent() {
     let share = |is: &[bool]| is.iter().filter(|is| **is).count() as f64 / is.len() as f64;
     let lost = touched("missing_returns = { share = 0.3, sensors = [\"sonar_0\"] }");
     let stray = touched("outliers = { share = 0.3, sensors = [\"sonar_0\"] }");
     assert!(lost.len() > 500 && (share(&lost) - 0.3).abs() < 0.1 && (share(&stray) - 0.3).abs() < 0.1);
     let both: Vec<bool> = lost.iter().zip(&stray).map(|(a, b)| *a && *b).collect();
-    // Of one stream it would be all of the smaller; each on its own, 0.09 within five standard deviations.
+    // With a shared stream the overlap would be the whole smaller set; with separate streams it is 0.09 within five
+    // standard deviations.
     let sd = (0.09_f64 * 0.91 / both.len() as f64).sqrt();
     assert!((share(&both) - 0.09).abs() < 5.0 * sd + 0.01, "{}", share(&both));
 }

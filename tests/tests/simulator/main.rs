@@ -1,6 +1,6 @@
 //! The simulator: scenes, effects, boulders and meshes.
 
-#![allow(clippy::unwrap_used, clippy::panic, reason = "a test stops at what it can't do")]
+#![allow(clippy::unwrap_used, clippy::panic, reason = "a failed step ends the test")]
 
 mod advised;
 mod boulders;

@@ -1,10 +1,10 @@
-//! Scenes with meshes, through the binary.
+//! Scenes with meshes, run through the program.
 
 use std::fmt::Write as _;
 
 use headrace_tests::{Folder, SCENE, VEHICLE};
 
-/// A box of 1 m as PLY, on its lower side.
+/// A box of 1 m as PLY, standing on its lower side.
 fn cuboid() -> String {
     let mut text = String::from(
         "ply\nformat ascii 1.0\nelement vertex 8\nproperty float x\nproperty float y\nproperty float z\n\
@@ -24,7 +24,7 @@ fn folder(keys: &str) -> Folder {
     folder
 }
 
-/// Values of one column of the truth, from the rows whose `key` column is as told.
+/// Values of one column of the truth, from the rows whose `key` column has `value`.
 fn column(truth: &str, (key, value): (&str, &str), wanted: &str) -> Vec<String> {
     let mut rows = truth.lines().skip_while(|line| line.starts_with('#'));
     let columns: Vec<&str> = rows.next().unwrap().split(',').collect();
@@ -34,7 +34,7 @@ fn column(truth: &str, (key, value): (&str, &str), wanted: &str) -> Vec<String> 
 }
 
 #[test]
-fn a_body_on_the_floor_is_what_sounders_measure() {
+fn sounder_measures_a_body_on_the_floor() {
     let folder = folder("file = \"box.ply\"\nname = \"car\"\nchainage_m = 5");
     folder.write("box.ply", cuboid());
     let arguments = ["simulate", "scene.toml", "-o", "dive.mcap", "--truth", "truth.csv"];
@@ -47,7 +47,7 @@ fn a_body_on_the_floor_is_what_sounders_measure() {
     let mut over = 0;
     for (chainage, height) in chainages.iter().zip(&heights) {
         let (chainage_m, height_m): (f64, f64) = (chainage.parse().unwrap(), height.parse().unwrap());
-        // The sounder looks straight down from the vehicle's place, near enough.
+        // The sounder looks straight down from close to the vehicle's position.
         if (chainage_m - 5.0).abs() < 0.45 {
             over += 1;
             assert!((height_m - 1.0).abs() < 1e-9, "{chainage_m}: {height_m}");
@@ -60,7 +60,7 @@ fn a_body_on_the_floor_is_what_sounders_measure() {
 }
 
 #[test]
-fn a_mesh_that_is_none_is_refused_with_the_place() {
+fn invalid_mesh_is_refused_with_the_place() {
     let folder = folder("file = \"box.ply\"\nchainage_m = 5");
     let place = "scene.toml:13: tunnel.features[0].file = \"box.ply\"";
     folder.refuses_scene(&[place, "can't be read"]);

@@ -1,4 +1,4 @@
-//! The scenes that are shipped: each can be simulated, and names only what its vehicle has.
+//! The shipped scenes: each can be simulated, and names only parts that its vehicle has.
 
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
@@ -35,15 +35,15 @@ fn every_shipped_scene_can_be_simulated() {
                 heard += usize::from(sounding.measured.range_m.is_some());
             }
         }
-        assert!(pings > 500 && heard > pings / 2, "{name}: {heard} of {pings} pings heard");
+        assert!(pings > 500 && heard > pings / 2, "{name}: {heard} of {pings} pings with a return");
         let added = simulation.added().len();
         assert!(added > 0 && text.contains("motion_within_turn"), "{name}: {added} effects");
     }
 }
 
-/// The page about the scenes tells the metres that their dives have.
+/// The page of the scenes has the same lengths as their dives.
 #[test]
-fn every_shipped_scene_shows_what_its_page_says() {
+fn shipped_scenes_match_the_figures_of_their_page() {
     let folder = headrace_tests::root().join("deploy/scenes");
     let page = std::fs::read_to_string(folder.join("README.md")).unwrap();
     let rows: Vec<Vec<&str>> = page

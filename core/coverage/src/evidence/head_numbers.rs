@@ -1,10 +1,11 @@
-//! A set of heads in evidence: the list of their numbers in text formats such as JSON, the set itself in snapshots.
+//! Serialises a set of heads in evidence: as a list of numbers in text formats such as JSON, as bits in
+//! snapshots.
 
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
 use headrace_sampling::head::HeadSet;
 
-#[expect(clippy::trivially_copy_pass_by_ref, reason = "serde hands fields on by reference")]
+#[expect(clippy::trivially_copy_pass_by_ref, reason = "serde passes fields by reference")]
 pub(super) fn serialize<S: Serializer>(heads: &HeadSet, serializer: S) -> Result<S::Ok, S::Error> {
     if serializer.is_human_readable() {
         serializer.collect_seq(heads.iter())

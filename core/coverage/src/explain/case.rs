@@ -1,4 +1,4 @@
-//! A failed section, its surroundings, and what was counted of them.
+//! A failed section, its surroundings, and the counts over them.
 
 use crate::cause::Cause;
 use crate::causes::Causes;
@@ -9,9 +9,9 @@ use crate::passage::{Drive, Passage};
 use headrace_geometry::math;
 use headrace_sampling::head::HeadSet;
 
-/// Without a factor that was present, distances are at most this share of what they were.
+/// Removing a factor helps if distances shrink at least to this share.
 pub(super) const HELPS: f64 = 0.93;
-/// Multiple of the target up to which a hole's size counts where it is asked what is lacking about it.
+/// Largest hole size considered when missing samples around it are counted, in targets.
 pub(super) const WIDEST: f64 = 8.0;
 
 /// A failed section and its surroundings.
@@ -19,29 +19,29 @@ pub(super) const WIDEST: f64 = 8.0;
 pub struct Case<'a> {
     /// Its hole.
     pub hole: &'a Hole,
-    /// Chainages at which it begins and ends, m.
+    /// Chainages of its two ends, m.
     pub bounds_m: (f64, f64),
     /// Number of the first visit whose samples count.
     pub first_visit: u32,
     /// Stretch that every live head had swept by then.
     pub swept_by_all: Option<Reach>,
-    /// Where samples may still land: nothing is known of the wall there.
+    /// Stretch where samples may still land: the wall there is unknown.
     pub to_come: Option<Reach>,
     /// No head was alive then.
     pub none_alive: bool,
-    /// No head pinged in it, and some went through it silent.
+    /// No head pinged in the section, and some passed through it silent.
     pub is_dark: bool,
-    /// Nothing sure relates its samples to each other.
+    /// Its samples come from stretches of navigation with no certain relation to each other.
     pub is_torn: bool,
     /// Target T, m.
     pub target_m: f64,
-    /// Causes named of the sections beside it: of equally small sets, those are preferred.
+    /// Causes named for the neighbouring sections. They are preferred among equally small sets.
     pub beside: [Causes; 2],
-    /// Latest lacks.
+    /// Latest missing samples.
     pub lacks: &'a Lacks,
 }
 
-/// Counts over sections, and the moment of the largest T as driven.
+/// Counts over the sections, and the driving figures at the largest T as driven.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Seen {
     pub(super) pings: u32,
@@ -82,30 +82,34 @@ impl Seen {
     }
 }
 
-/// Whether every live head has swept the hole, as far as the target matters.
+/// Whether every live head has swept the hole, up to the size of the target.
 pub(super) fn is_passed(case: &Case<'_>) -> bool {
     let radius_m = case.hole.diameter_m.min(case.target_m) / 2.0;
     let [from_m, to_m] = [case.hole.x_m - radius_m, case.hole.x_m + radius_m];
     case.swept_by_all.is_some_and(|swept| from_m >= swept.from_m && to_m <= swept.to_m)
 }
 
-/// Silent heads would have pinged nobody knows where: in sectors, never heard, or all of them silent for longer than is remembered.
+/// Whether the pings of silent heads can't be reconstructed.
+///
+/// True in sectors, for heads never heard, or if all heads were silent for longer than the list of missing
+/// samples goes back.
 pub(super) fn is_dark(case: &Case<'_>, seen: &Seen) -> bool {
     !seen.silent.is_empty() && seen.worst.is_in_sectors || is_unheard(case, seen)
 }
 
-/// Silent heads were never heard, or none was.
+/// Whether silent heads were never heard, or no head was.
 pub(super) fn is_unheard(case: &Case<'_>, seen: &Seen) -> bool {
     !seen.silent.is_empty() && seen.worst.is_unheard || case.is_dark && !is_remembered(case)
 }
 
-/// Whether it is known where the silent heads would have pinged in the section.
+/// Whether the places where silent heads would have pinged in the section are known.
 pub(super) fn is_remembered(case: &Case<'_>) -> bool {
     let mut lacking = case.lacks.between(case.bounds_m.0, case.bounds_m.1);
     lacking.any(|lack| lack.why.has(Cause::HeadSilent))
 }
 
-/// Whether a lack lies in a hole, as far as the target matters: the hole may still shrink from ahead.
+/// Whether a missing sample lies in a hole, up to the size of the target: the hole may still shrink from
+/// ahead.
 pub(super) fn is_in(hole: &Hole, target_m: f64, perimeter_m: f64, lack: &Lack) -> bool {
     let around_m = math::wrap_signed(lack.arc_m - hole.arc_m, perimeter_m);
     math::hypot(lack.x_m - hole.x_m, around_m) < hole.diameter_m.min(target_m) / 2.0

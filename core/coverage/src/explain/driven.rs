@@ -1,4 +1,4 @@
-//! How vehicle and heads would have moved without some of the factors that were present.
+//! Movement of the vehicle and its heads with some of the present factors removed.
 
 use super::case::HELPS;
 use crate::cause::Cause;
@@ -8,7 +8,9 @@ use headrace_geometry::math;
 use headrace_sampling::losses::MOST_PASSES;
 
 impl Drive {
-    /// The largest speed that fits where it takes so many passes for one, m/s; zero where so much is lost that no speed is worth driving.
+    /// Largest speed that fits if this many passes are needed in place of one, m/s.
+    ///
+    /// Zero if so much is lost that no speed is worth driving.
     pub(crate) fn with_losses_mps(&self, passes_needed: f64) -> f64 {
         if passes_needed >= MOST_PASSES {
             return 0.0;
@@ -21,8 +23,10 @@ impl Drive {
         }
     }
 
-    /// The same without some factors. `margin_m` is the target less a margin, for the speed that would have been right, m; `all_turn`: no
-    /// head is silent or out of step any more.
+    /// These figures with some factors removed.
+    ///
+    /// `margin_m` is the target less a margin, m; it gives the speed that would have been right. With
+    /// `all_turn`, no head is silent or out of step any more.
     pub(super) fn without(&self, removed: Causes, margin_m: f64, all_turn: bool) -> Self {
         let mut then = *self;
         let mut slower = 1.0;
@@ -57,7 +61,7 @@ impl Drive {
             let squared = (margin_m - t_y_m) * (margin_m + t_y_m);
             let along_m = math::sqrt(squared.max(0.0)).max(0.3 * margin_m);
             let fits = along_m / (then.speed_mps * slower * self.all_gap_s + then.advance_m()).max(1e-9);
-            // What is advised allows for wall that the vehicle hides.
+            // Advised speeds allow for wall that the vehicle hides.
             let advised = if self.fits_mps > 0.0 { self.fits_mps / then.speed_mps.max(1e-9) } else { 1.0 };
             then.speed_mps *= fits.min(advised).min(1.0);
         }

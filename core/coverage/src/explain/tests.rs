@@ -28,14 +28,14 @@ fn sound() -> Drive {
     }
 }
 
-/// A wall with a lattice of samples but for some places, and what is known of it.
+/// A wall with a lattice of samples except in some places, and what is known about it.
 struct Wall {
     along_m: f64,
     around_m: f64,
     drive: Drive,
     /// A place without samples: its ends along and around, m.
     bare: Option<[[f64; 2]; 2]>,
-    /// Why they are lacking; empty: nobody knows.
+    /// Why its samples are missing; empty if unknown.
     why: Causes,
     end_m: f64,
     beside: [Causes; 2],
@@ -69,7 +69,7 @@ fn named(wall: &Wall) -> Vec<Cause> {
         StoreLayout { perimeter_m: PERIMETER_M, from_m: 0.0, to_m: 20.0, cell_m: 0.25, capacity: 40_000 };
     let (mut store, mut lacks) = (SampleStore::new(layout), Lacks::default());
     let count = |length_m: f64, step_m: f64| math::floor_to_i64(length_m / step_m + 1e-9);
-    // The middle between two passes lies in the middle of the section.
+    // The centre between two passes lies in the centre of the section.
     let rows = count(4.0, wall.along_m);
     let x_m = |i: i64| 10.125 + (i as f64 + 0.5) * wall.along_m;
     for i in (-rows..=rows).filter(|i| x_m(*i) < wall.end_m) {
@@ -87,7 +87,7 @@ fn named(wall: &Wall) -> Vec<Cause> {
     }
     let mut finder = HoleFinder::default();
     let hole = finder.largest(&store, BOUNDS_M.0, BOUNDS_M.1);
-    assert!(hole.diameter_m > TARGET_M, "the section fails: {hole:?}");
+    assert!(hole.diameter_m > TARGET_M, "the section has to fail: {hole:?}");
     let case = Case {
         hole: &hole,
         bounds_m: BOUNDS_M,
@@ -109,7 +109,7 @@ fn named(wall: &Wall) -> Vec<Cause> {
 }
 
 #[test]
-fn each_cause_alone_is_named() {
+fn each_single_cause_is_named() {
     for (cause, wall) in [
         (
             Cause::TooFast,
@@ -150,16 +150,16 @@ fn each_cause_alone_is_named() {
 }
 
 #[test]
-fn of_two_that_are_needed_both_are_named_and_of_two_that_suffice_the_one_the_pilot_can_change() {
+fn two_needed_causes_are_both_named_and_of_two_sufficient_the_changeable_one() {
     let fast = Wall { along_m: 0.7, drive: Drive { speed_mps: 0.35, ..sound() }, ..Wall::default() };
     let wide = Some([[8.6, 11.7], [3.0, 5.5]]);
     let why = Causes::of(Cause::MissingReturns);
     assert_eq!(named(&Wall { bare: wide, why, ..fast }), [Cause::TooFast, Cause::MissingReturns]);
-    // What was lost here and there has only made it worse.
+    // Scattered losses have only made it worse.
     let here = Some([[10.4, 10.5], [3.0, 3.1]]);
     let fast = Wall { along_m: 0.7, drive: Drive { speed_mps: 0.35, ..sound() }, ..Wall::default() };
     assert_eq!(named(&Wall { bare: here, why, ..fast }), [Cause::TooFast]);
-    // What lacks for two reasons lacks for both.
+    // A sample missing for two reasons needs both removed.
     let both = Causes::of(Cause::PositionLost).with(Cause::OutOfRange);
     assert_eq!(
         named(&Wall { bare: BARE, why: both, ..Wall::default() }),
@@ -167,9 +167,9 @@ fn of_two_that_are_needed_both_are_named_and_of_two_that_suffice_the_one_the_pil
     );
 }
 
-/// Heads a little out of phase make it worse, but without the others it would pass.
+/// Heads slightly out of phase make the hole worse, but without the other two factors it would pass.
 #[test]
-fn of_three_that_are_present_the_two_that_suffice_are_named() {
+fn two_sufficient_causes_of_three_present_are_named() {
     let wide = Some([[8.6, 11.7], [3.0, 5.5]]);
     let drive = Drive { speed_mps: 0.35, gap_s: 2.4, healthy_gap_s: 2.4, ..sound() };
     let wall =
@@ -177,9 +177,10 @@ fn of_three_that_are_present_the_two_that_suffice_are_named() {
     assert_eq!(named(&wall), [Cause::TooFast, Cause::MissingReturns]);
 }
 
-/// What takes longer to go round leaves passes farther apart: where they leave no room for that, it isn't enough.
+/// A setting with a longer turn leaves passes farther apart. If they have no room for that, the setting alone
+/// isn't enough.
 #[test]
-fn a_longer_range_or_a_finer_step_is_not_for_nothing() {
+fn longer_range_and_finer_step_widen_the_pass_gap() {
     let other = |turn: f64| OtherSettings { finer_step: 0.5, finer_turn: turn, longer_turn: turn };
     let drive = |turn: f64| Drive { other: other(turn), ..sound() };
     let far = |turn: f64| Wall {
@@ -198,25 +199,25 @@ fn a_longer_range_or_a_finer_step_is_not_for_nothing() {
     assert_eq!(named(&coarse(3.0)), [Cause::Unknown]);
 }
 
-/// A head that stays out of step leaves the passes as far apart as they are, however straight the vehicle goes.
+/// A head that stays out of step leaves the passes equally far apart, however straight the vehicle goes.
 #[test]
-fn what_a_silent_head_leaves_stays_when_the_swing_is_taken_away() {
+fn stalled_head_gap_remains_when_swing_is_removed() {
     let why = Causes::of(Cause::HeadStalled);
     let drive = Drive { swing_m: 0.4, gap_s: 4.0, gap_at_plan_s: 4.0, ..sound() };
     let wall = Wall { along_m: 0.78, bare: Some([[9.0, 11.3], [3.0, 6.0]]), why, drive, ..Wall::default() };
     assert_eq!(named(&wall), [Cause::OffAxis, Cause::HeadStalled]);
 }
 
-/// Of heads that were never there nothing else is known: however fast it went, that is no cause.
+/// Nothing else is known about heads that were never heard: the speed is no cause then.
 #[test]
-fn where_no_head_was_heard_their_silence_is_named() {
+fn silence_is_named_if_no_head_was_heard() {
     let fast = || Wall { along_m: 0.7, drive: Drive { speed_mps: 0.35, ..sound() }, ..Wall::default() };
     assert_eq!(named(&Wall { is_dark: true, ..fast() }), [Cause::HeadSilent]);
     assert_eq!(named(&fast()), [Cause::TooFast]);
 }
 
 #[test]
-fn what_is_named_beside_is_preferred_if_it_suffices() {
+fn cause_of_a_neighbour_is_preferred_if_sufficient() {
     let wall = |beside: Cause| Wall {
         along_m: 0.7,
         drive: Drive { speed_mps: 0.26, planned_mps: 0.1, planned_gap_s: 2.6, healthy_gap_s: 2.6, ..sound() },
@@ -224,30 +225,33 @@ fn what_is_named_beside_is_preferred_if_it_suffices() {
         ..Wall::default()
     };
     assert_eq!(named(&wall(Cause::TooFast)), [Cause::TooFast]);
-    // It has to be a factor that was present.
+    // Only factors that were present can be preferred.
     assert_eq!(named(&wall(Cause::Occluded)), [Cause::TooFast]);
 }
 
 #[test]
-fn a_report_has_the_same_word_for_a_cause_wherever_it_stands() {
+fn causes_have_the_same_word_everywhere_in_a_report() {
     for cause in Cause::ALL {
         assert_eq!(serde_json::to_value(cause).unwrap(), cause.as_str());
     }
 }
 
-/// Where so many passes are made for one, they and the pings between them take the way that fits.
+/// If more passes are needed in place of one, these passes and the pings between them share the distance that
+/// fits.
 #[test]
-fn with_losses_the_speed_is_that_at_which_all_passes_needed_fit() {
+fn speed_with_losses_fits_all_passes_needed() {
     let drive = Drive { fits_mps: 0.19, fits_along_m: 0.4, ..sound() };
     assert!((drive.with_losses_mps(1.0) - 0.19).abs() < 1e-12);
     // 0.4 m over 1.5 passes of 2 s and a ping.
     assert!((drive.with_losses_mps(1.5) - 0.4 / 3.02).abs() < 1e-12);
-    assert!((drive.with_losses_mps(1.01) - 0.19).abs() < 1e-12, "no faster than without losses");
+    assert!((drive.with_losses_mps(1.01) - 0.19).abs() < 1e-12, "not faster than without losses");
 }
 
-/// What would have been is between the times that were measured: as scheduled, had none stood still, at the planned speed.
+/// Times between passes with factors removed lie between the measured ones.
+///
+/// These are as scheduled, without stalls, and at the planned speed.
 #[test]
-fn without_a_cause_the_passes_are_those_of_who_is_left() {
+fn removing_a_cause_keeps_the_passes_of_the_remaining_heads() {
     let drive = Drive {
         healthy_gap_s: 4.0,
         planned_gap_s: 3.0,
@@ -281,7 +285,8 @@ fn without_a_cause_the_passes_are_those_of_who_is_left() {
         let then = without(causes, all_turn);
         assert!(near(then.healthy_gap_s, gap_s), "{causes:?} {all_turn}: {}", then.healthy_gap_s);
     }
-    // A longer range takes twice as long, a finer mode half as long again: all that turns with the heads.
+    // A longer range doubles the time between passes. A finer mode takes half as long again. Both scale every
+    // time that turns with the heads.
     for (causes, slower, finer) in [
         (&[Cause::OutOfRange][..], 2.0, 1.0),
         (&[Cause::AngularStep], 1.5, 0.5),
@@ -296,25 +301,31 @@ fn without_a_cause_the_passes_are_those_of_who_is_left() {
     assert!(near(straight.swing_m, 0.0) && near(straight.t_y_m, 0.2) && near(straight.healthy_gap_s, 4.0));
 }
 
-/// Of 0.5 m with steps of 0.3 m along the wall 0.4 m are left along the tunnel.
+/// With a target of 0.5 m and steps of 0.3 m along the wall, 0.4 m are left along the tunnel.
 #[test]
-fn who_was_too_fast_would_have_gone_as_fast_as_fits_and_no_faster() {
+fn removing_too_fast_gives_the_largest_fitting_speed() {
     let drive = Drive { speed_mps: 0.4, t_y_m: 0.3, middle_t_y_m: 0.3, ..sound() };
     let slowed_mps = |drive: Drive| drive.without(Causes::of(Cause::TooFast), 0.5, true).speed_mps;
-    // A pass takes 2 s, and a ping after it.
+    // A pass takes 2 s, and a ping follows it.
     assert!((slowed_mps(drive) - 0.4 / 2.02).abs() < 1e-9, "{}", slowed_mps(drive));
-    assert!((slowed_mps(Drive { fits_mps: 0.1, ..drive }) - 0.1).abs() < 1e-9, "hidden wall takes more");
+    assert!(
+        (slowed_mps(Drive { fits_mps: 0.1, ..drive }) - 0.1).abs() < 1e-9,
+        "hidden wall needs a lower speed"
+    );
     assert!((slowed_mps(Drive { fits_mps: 0.35, ..drive }) - 0.4 / 2.02).abs() < 1e-9);
-    assert!((slowed_mps(Drive { speed_mps: 0.15, ..drive }) - 0.15).abs() < 1e-9, "it wasn't too fast");
-    // Where steps leave nothing, three tenths of the target do.
+    assert!(
+        (slowed_mps(Drive { speed_mps: 0.15, ..drive }) - 0.15).abs() < 1e-9,
+        "the vehicle wasn't too fast"
+    );
+    // If steps leave nothing, three tenths of the target remain.
     let coarse = Drive { t_y_m: 0.6, middle_t_y_m: 0.6, ..drive };
     assert!((slowed_mps(coarse) - 0.15 / 2.02).abs() < 1e-9, "{}", slowed_mps(coarse));
 }
 
-/// At 0.1 m/s heads pass as far apart after 4 s as after 2 s at the planned 0.2 m/s: only what is farther by more than it takes to help is mended
-/// by going as planned.
+/// At 0.1 m/s heads pass as far apart after 4 s as after 2 s at the planned 0.2 m/s. Driving as planned mends
+/// only distances that are larger by more than the helping factor.
 #[test]
-fn who_was_slower_than_planned_would_have_gone_as_planned_if_that_helps() {
+fn removing_phase_gives_the_planned_speed_if_that_helps() {
     let then = |planned_gap_s: f64| {
         let drive = Drive {
             speed_mps: 0.1,

@@ -1,4 +1,4 @@
-//! What a section's hole would have been without some of the factors that were present.
+//! A section's hole with some of the present factors removed.
 
 use super::case::{Case, HELPS, Seen, WIDEST, is_dark, is_in, is_passed, is_unheard};
 use crate::cause::Cause;
@@ -11,34 +11,36 @@ use crate::store::SampleStore;
 use headrace_geometry::math;
 use headrace_sampling::spacing;
 
-/// The share of the target that is left for the hole when speed is put right: a plan keeps a margin.
+/// Share of the target that the hole may use once the speed is corrected: a plan keeps a margin.
 const MARGIN: f64 = 0.85;
-/// Least and largest factor by which the wall is drawn together, or apart: a finer step or a longer range takes longer to go round.
+/// Limits of the factor that scales the wall. A finer step or a longer range takes longer to turn, which
+/// stretches it.
 const LEAST: f64 = 0.1;
 const MOST: f64 = 3.0;
-/// Multiple of the target beyond which what is left of the hole says that something else is the matter.
+/// Multiple of the target above which the remaining hole has some other cause.
 const AT_MOST: f64 = 1.3;
-/// Halvings by which the hole with all that is lacking put back is searched for.
+/// Most halvings in the search for the hole with all missing samples put back.
 const SEARCHED: u32 = 5;
-/// Share of what is lacking near a hole, for reasons that stay, from which that alone makes a hole.
+/// Share of samples near a hole missing for persistent reasons above which these alone make a hole.
 const STAYS: f64 = 0.15;
-/// Largest set that is looked for.
+/// Size of the largest set tried.
 const MOST_NAMED: u32 = 3;
-/// Most sets that are tried.
+/// Most sets tried.
 const MOST_TRIED: u32 = 120;
 
-/// Tries what a hole would have been without some of the factors.
+/// Tries holes with some of the factors removed.
 pub(super) struct Trial<'a> {
     case: &'a Case<'a>,
     drive: &'a Drive,
     seen: &'a Seen,
     store: &'a SampleStore,
     finder: &'a mut HoleFinder,
-    /// The factors that were present, and those of them for which samples are lacking.
+    /// Factors that were present, and those of them with missing samples.
     present: Causes,
     lacking: Causes,
     left: u32,
-    /// Between what the diameter of the hole with all that is lacking put back is known to be, m, and how often that may still be halved.
+    /// Bounds of the hole's diameter with all missing samples put back, m, and the halvings left to narrow
+    /// them.
     full_m: [f64; 2],
     halvings: u32,
 }
@@ -63,7 +65,7 @@ impl<'a> Trial<'a> {
         let lacking: Causes = lacking.into_iter().filter(|cause| present.has(*cause)).collect();
         let most_m = case.hole.diameter_m.min(WIDEST * case.target_m);
         let [from_m, to_m] = [-0.5, 0.5].map(|side| case.hole.x_m + side * case.hole.diameter_m);
-        // What would be put back elsewhere leaves it as large.
+        // Samples put back outside the hole don't shrink it.
         let fills = |lack: &Lack| {
             lack.why.is_within(lacking) && is_in(case.hole, case.hole.diameter_m, store.perimeter_m(), lack)
         };
@@ -73,10 +75,11 @@ impl<'a> Trial<'a> {
         Self { case, drive, seen, store, finder, present, left: MOST_TRIED, lacking, full_m, halvings }
     }
 
-    /// The smallest set among the factors present without which the section would have met the target.
+    /// Smallest set of present factors without which the section would have met the target.
     pub(super) fn smallest(&mut self) -> Causes {
         let silent = Causes::of(Cause::HeadSilent);
-        // Where no head pinged their silence comes first: however the vehicle went is no cause, but what they wouldn't have heard may be.
+        // If no head pinged, their silence comes first. The vehicle's driving is no cause then, but reasons
+        // for which heads would not have heard the wall may be.
         let surely = if self.case.is_dark { silent } else { Causes::default() };
         if self.case.is_dark {
             let is_driven = |cause: &Cause| {
@@ -105,28 +108,29 @@ impl<'a> Trial<'a> {
         present
     }
 
-    /// A set without `occluded`, where that is of wall out of range and the rest nearly does: heads that hide wall from each other do so with
-    /// a longer range, too, and others see it.
+    /// The set without `occluded`, if occlusion concerns wall out of range and the rest nearly suffices.
+    ///
+    /// Heads that hide wall from each other also do so with a longer range, and other heads see that wall.
     fn less_occluded(&mut self, set: Causes) -> Causes {
         let rest = set.without(Cause::Occluded);
         let is_far = set.has(Cause::Occluded) && set.has(Cause::OutOfRange);
         if is_far && self.passes_without(rest, AT_MOST) { rest } else { set }
     }
 
-    /// The one factor without which the section would have met the target, if any is enough; the one that is sure where there is one.
+    /// The single factor without which the section would have met the target; a certain one if there is one.
     fn alone(&mut self, surely: Causes) -> Option<Causes> {
         let [not_passed, silent, phase, lost] =
             [Cause::NotPassed, Cause::HeadSilent, Cause::Phase, Cause::PositionLost].map(Causes::of);
         let is_short = self.is_short();
         let first = [
-            // Nothing else is known of wall that wasn't passed.
+            // Nothing else is known about wall that wasn't passed.
             (true, not_passed),
-            // Nor of heads that were never there.
+            // The same holds for heads that were never heard.
             (is_unheard(self.case, self.seen), silent),
-            // A speed is changed most easily: what the planned one would have mended is put down to that.
+            // Speed is changed most easily, so it is named if the planned speed would have been enough.
             (!is_short && self.drive.is_slow_out_of_phase(1.0 / HELPS), phase),
         ];
-        // Those that may only seem to explain it come last.
+        // Factors that may only seem to explain the hole come last.
         let last = [(self.is_only_adrift(), lost), (is_short, phase)];
         let present = self.present;
         let is_last = |set: &Causes| last.iter().any(|(is, last)| *is && set == last);
@@ -138,24 +142,26 @@ impl<'a> Trial<'a> {
         in_turn.filter(|set| set.is_within(present)).find(|set| self.passes_without(*set, 1.0))
     }
 
-    /// Whether a head is silent or has stood still: those that are left turn out of phase without it.
+    /// Whether a head is silent or has stalled: the remaining heads are out of phase without it.
     fn is_short(&self) -> bool {
         self.present.has(Cause::HeadSilent) || self.present.has(Cause::HeadStalled)
     }
 
-    /// Whether nothing but the error of one pass against the next speaks of the position: a fail is one in spite of that error, which explains
-    /// any hole, so that whatever else does comes first.
+    /// Whether the only evidence against the position is the error of one pass against the next.
+    ///
+    /// A fail already allows for that error, and the error would explain any hole. Every other explanation
+    /// therefore comes first.
     fn is_only_adrift(&self) -> bool {
         self.seen.adrift && !self.seen.unseen && !self.case.is_torn
     }
 
-    /// The factors without which no set will do: all the others together don't.
+    /// Factors that every sufficient set contains: all others together don't suffice.
     fn needed(&mut self, present: Causes) -> Causes {
         let mut is_needed = |cause: &Cause| !self.passes_without(present.without(*cause), 1.0);
         present.iter().filter(|cause| is_needed(cause)).collect()
     }
 
-    /// Whether the section would have met so many times the target without some factors.
+    /// Whether the section would have met `times` the target with some factors removed.
     fn passes_without(&mut self, removed: Causes, times: f64) -> bool {
         if self.left == 0 {
             return false;
@@ -174,27 +180,29 @@ impl<'a> Trial<'a> {
         !self.finder.has_circle_otherwise(bounds_m, radius_m, &otherwise)
     }
 
-    /// Lays out the wall as it would have been without some factors.
+    /// Lays out the wall with some factors removed.
     fn lay(&mut self, removed: Causes, radius_m: f64, otherwise: &Otherwise) {
         let Case { bounds_m, first_visit, target_m, lacks, .. } = *self.case;
         let reach_m = (target_m.max(2.0 * radius_m) + bounds_m.1 - bounds_m.0) / otherwise.along;
         let put_back = lacks
-            // Those about to be mirrored, too.
+            // Includes samples that are mirrored later.
             .between(bounds_m.0 - 2.0 * reach_m, bounds_m.1 + 2.0 * reach_m)
             .filter(|lack| lack.why.is_within(removed))
             .map(|lack| [lack.x_m, lack.arc_m]);
         self.finder.lay_otherwise((self.store, first_visit), bounds_m, radius_m, otherwise, put_back);
     }
 
-    /// Whether wall is taken to be covered without some factors, since nobody knows where what is lacking would have been.
+    /// Whether wall counts as covered with some factors removed, because the places of its missing samples
+    /// are unknown.
     fn covers(&self, removed: Causes) -> bool {
         let is_lost = self.case.is_torn || self.seen.unseen || self.seen.adrift;
         removed.has(Cause::PositionLost) && is_lost
             || removed.has(Cause::HeadSilent) && is_dark(self.case, self.seen)
     }
 
-    /// The distance between neighbours that is left without some factors, by how the vehicle and its heads moved alone, m; infinite where
-    /// much is lacking for reasons that stay.
+    /// Distance between neighbours that remains with some factors removed, m, by movement alone.
+    ///
+    /// Infinite if much is missing for persistent reasons.
     fn stays_m(&self, removed: Causes) -> f64 {
         let Case { bounds_m, lacks, .. } = *self.case;
         let (mut all, mut stay) = (0_u32, 0_u32);
@@ -209,7 +217,9 @@ impl<'a> Trial<'a> {
         spacing::t_max_m(then.along_m(), 0.0, then.t_y_m)
     }
 
-    /// Whether what is lost by chance, and stays so, leaves enough: where beams no longer swing, the wall can't be drawn together for it.
+    /// Whether random losses that persist leave enough samples once the beams no longer swing.
+    ///
+    /// The wall can't be compressed for such losses.
     fn is_sampled_without(&self, removed: Causes, target_m: f64) -> bool {
         let is_lossy = self.present.less(removed).has(Cause::MissingReturns);
         if !is_lossy || !removed.has(Cause::OffAxis) {
@@ -219,8 +229,10 @@ impl<'a> Trial<'a> {
         spacing::t_max_m(self.drive.passes_needed * then.along_m(), 0.0, then.t_y_m) <= target_m
     }
 
-    /// How vehicle and heads moved, and how they would have without some factors; `healthy_gap_s` is the time between passes of the heads
-    /// that there are: where silent or stalled ones stay so, it is that without them.
+    /// Movement of vehicle and heads as driven, and with some factors removed.
+    ///
+    /// `healthy_gap_s` is the time between passes of the present heads: if silent or stalled heads stay so,
+    /// it leaves them out.
     fn drives(&self, removed: Causes) -> [Drive; 2] {
         let stalls = Causes::of(Cause::HeadSilent).with(Cause::HeadStalled);
         let staying = self.present.less(removed);
@@ -232,8 +244,9 @@ impl<'a> Trial<'a> {
         [now, now.without(removed, MARGIN * self.case.target_m, all_turn)]
     }
 
-    /// What the figures of driving have to explain: the diameter of the hole with all that is lacking put back, m, as nearly as it matters where
-    /// it lies between two.
+    /// Diameter of the hole that driving has to explain, with all missing samples put back, m.
+    ///
+    /// It is only as exact as the comparison with the two bounds needs.
     fn full_m(&mut self, [least_m, most_m]: [f64; 2]) -> f64 {
         let matters = |[smaller_m, larger_m]: [f64; 2]| smaller_m < most_m && larger_m > least_m;
         if least_m < most_m && self.halvings > 0 && matters(self.full_m) {
@@ -254,12 +267,12 @@ impl<'a> Trial<'a> {
         self.full_m[1]
     }
 
-    /// Where samples may still land; beyond the end of what was passed, the wall isn't as it is before.
+    /// Stretch where samples may still land. Beyond the end of the passed stretch the wall is not mirrored.
     fn to_come(&self) -> Option<Reach> {
         self.case.to_come.filter(|_| is_passed(self.case))
     }
 
-    /// How the wall would have been sampled without some factors.
+    /// How the wall would have been sampled with some factors removed.
     fn otherwise(&mut self, removed: Causes) -> Otherwise {
         let all = Some(Reach { from_m: f64::NEG_INFINITY, to_m: f64::INFINITY });
         let swept = self.case.swept_by_all;

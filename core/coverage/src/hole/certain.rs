@@ -7,22 +7,23 @@ use crate::store::SampleStore;
 /// Search resolution, m: a circle larger than the radius by less than this may be missed.
 const FINE_M: f64 = 1e-3;
 
-/// How large a circle has to be, by the arc length of its centre.
+/// Required size of a circle, as a function of the arc length of its centre.
 pub struct Needed<'a> {
-    /// The radius there, m.
+    /// Required radius there, m.
     pub radius_m: &'a dyn Fn(f64) -> f64,
-    /// The largest, m.
+    /// Largest required radius, m.
     pub most_m: f64,
-    /// The largest change with the arc length, m/m.
+    /// Largest change of the radius with arc length, m/m.
     pub slope: f64,
 }
 
 impl HoleFinder {
-    /// True if a circle of the radius needed, centred between two chainages, holds no sample and lies outside each of
-    /// `reaches`: where samples may still land, or where not all heads have been.
+    /// Whether a circle of the required radius, centred between two chainages, is certain to stay empty.
     ///
-    /// The distance to the nearest sample or to the reach is 1-Lipschitz: as for holes, tiles whose bound is too small
-    /// are dropped and the others halved.
+    /// It holds no sample and lies outside each of `reaches`: where samples may still land, or where not all
+    /// heads have been. The distance to the nearest sample or to the reach is 1-Lipschitz. As for holes,
+    /// tiles whose bound is too small are dropped and the others halved.
+    ///
     /// Allocates: never, unless a section is over 4,000 cells large.
     pub fn has_circle(
         &mut self,
@@ -72,7 +73,7 @@ mod tests {
     proptest! {
         /// Against brute force over a fine grid.
         #[test]
-        fn a_circle_is_found_where_there_is_one_and_nowhere_else(
+        fn circle_is_found_exactly_if_brute_force_finds_one(
             samples in proptest::collection::vec((0.0f64..4.0, 0.0f64..PERIMETER_M), 0..40),
             reach_m in 1.0f64..4.0,
             radius_m in 0.1f64..1.2,
@@ -92,7 +93,7 @@ mod tests {
                 });
                 nearest.fold(f64::INFINITY, f64::min).min(reach_m - x_m)
             };
-            // Larger by the arc length, to the far side and back.
+            // The radius grows with arc length to the far side and shrinks back.
             let radius_m = |arc_m: f64| radius_m + slope * arc_m.min(PERIMETER_M - arc_m);
             let places = (0..=25).flat_map(|i| (0..600).map(move |k| {
                 (1.0 + 0.01 * f64::from(i), 0.01 * f64::from(k))

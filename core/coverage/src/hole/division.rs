@@ -1,9 +1,10 @@
-//! A tile divided into the Voronoi cells of its samples: each share is a convex polygon on which the distance to its
-//! sample is largest at a corner.
+//! A tile divided into the Voronoi cells of its samples.
+//!
+//! Each share is a convex polygon, on which the distance to its sample is largest at a corner.
 
 /// Maximum samples that a tile is divided among; with more it is halved instead.
 pub(super) const MAX_OWNERS: usize = 24;
-/// Maximum corners of a share; with more the tile is halved, too.
+/// Maximum corners of a share. With more, the tile is halved, too.
 const MAX_CORNERS: usize = 12;
 
 /// A share of a tile.
@@ -16,7 +17,7 @@ pub(super) struct Share {
     len: usize,
     /// Squared distance of the farthest corner from the owner; zero when nothing is left.
     pub farthest2: f64,
-    /// That corner.
+    /// The farthest corner.
     pub farthest: (f64, f64),
 }
 
@@ -108,7 +109,8 @@ impl Division {
         self.shares.iter().max_by(|a, b| a.farthest2.total_cmp(&b.farthest2))
     }
 
-    /// Adds the share of a sample. False if it has one already or there is no room for it: the tile is too large.
+    /// Adds the share of a sample. False if the sample has one already or there is no room: the tile is too
+    /// large.
     pub(super) fn add(&mut self, owner: (f64, f64)) -> bool {
         let same = |share: &Share| (share.owner.0 - owner.0).abs() + (share.owner.1 - owner.1).abs() <= 0.0;
         if self.shares.len() == MAX_OWNERS || self.shares.iter().any(same) {

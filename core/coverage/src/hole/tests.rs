@@ -27,8 +27,10 @@ fn nearest_m(perimeter_m: f64, samples: &[(f64, f64)], place: (f64, f64)) -> f64
     samples.iter().map(distance).fold(f64::INFINITY, f64::min)
 }
 
-/// D from all candidate maxima of f: circumcentres of three samples (or their images), and points on the two edges
-/// equidistant from two samples. Shares no code with the search.
+/// D from all candidate maxima of f, without any code of the search.
+///
+/// Candidates are the circumcentres of three samples (or their images), and the points on the two edges
+/// equidistant from two samples.
 fn brute_force(perimeter_m: f64, samples: &[(f64, f64)], from_m: f64, to_m: f64) -> f64 {
     let images: Vec<(f64, f64)> =
         samples.iter().flat_map(|s| [-perimeter_m, 0.0, perimeter_m].map(|turn| (s.0, s.1 + turn))).collect();
@@ -62,20 +64,20 @@ fn brute_force(perimeter_m: f64, samples: &[(f64, f64)], from_m: f64, to_m: f64)
 
 proptest! {
     #[test]
-    fn verif_scattered_samples_agree_with_brute_force(
+    fn scattered_samples_agree_with_brute_force(
         samples in proptest::collection::vec((-2.0f64..3.0, 0.0f64..PERIMETER_M), 1..14),
     ) {
         let hole = largest(PERIMETER_M, &samples, 0.0, 0.5);
         let expected = brute_force(PERIMETER_M, &samples, 0.0, 0.5);
         prop_assert!((hole.diameter_m - expected).abs() < 1e-9, "{} and {}", hole.diameter_m, expected);
         let at_centre = 2.0 * nearest_m(PERIMETER_M, &samples, (hole.x_m, hole.arc_m));
-        prop_assert!((at_centre - hole.diameter_m).abs() < 1e-9, "its centre is where it says");
+        prop_assert!((at_centre - hole.diameter_m).abs() < 1e-9, "the stated centre has the stated distance");
         prop_assert!(hole.least_m <= hole.diameter_m && hole.most_m - hole.least_m < 1e-9, "{:?}", hole);
     }
 
     /// The window's search against brute force.
     #[test]
-    fn the_nearest_is_the_nearest(
+    fn window_finds_the_nearest_sample(
         samples in proptest::collection::vec((-3.0f64..4.0, 0.0f64..PERIMETER_M), 0..60),
         place in (0.0f64..1.0, -8.0f64..16.0),
         within_m in 0.05f64..3.0,
@@ -90,7 +92,7 @@ proptest! {
                 prop_assert!((math::sqrt(found.distance2) - expected).abs() < 1e-12);
                 let image_m = found.arc_m + found.turns * PERIMETER_M - place.1;
                 let by_image_m = math::hypot(found.x_m - place.0, image_m);
-                prop_assert!((by_image_m - expected).abs() < 1e-12, "its image is the near one");
+                prop_assert!((by_image_m - expected).abs() < 1e-12, "the image must be the near one");
             }
             (found, expected) => prop_assert_eq!(found.is_some(), expected.is_some()),
         }
@@ -99,7 +101,7 @@ proptest! {
     /// D lies within the bounds of a tolerant search, which are no farther apart than the tolerance. A verdict from them
     /// is the exact one, or undecided where T lies between them.
     #[test]
-    fn verif_bounds_of_a_tolerant_search_hold(
+    fn bounds_of_a_tolerant_search_contain_the_hole(
         samples in proptest::collection::vec((-2.0f64..3.0, 0.0f64..PERIMETER_M), 1..14),
         tolerance_m in 0.0f64..0.5,
         target_m in 0.1f64..6.0,
@@ -116,9 +118,9 @@ proptest! {
         }
     }
 
-    /// The same with packed samples: the bounds include their displacement.
+    /// Bounds also hold with packed samples: they include the displacement.
     #[test]
-    fn verif_bounds_after_packing_hold(
+    fn bounds_after_packing_contain_the_hole(
         samples in proptest::collection::vec((-2.0f64..3.0, 0.0f64..PERIMETER_M), 1..14),
     ) {
         let layout = StoreLayout { perimeter_m: PERIMETER_M, from_m: -20.0, to_m: 340.0, cell_m: 0.4, capacity: 1000 };
@@ -134,9 +136,9 @@ proptest! {
         prop_assert!(width_m > 0.0 && width_m < 1e-4, "{:?}", hole);
     }
 
-    /// The same with a cell so full that samples were thinned.
+    /// Bounds also hold with a cell so full that samples were thinned.
     #[test]
-    fn verif_bounds_after_thinning_hold(
+    fn bounds_after_thinning_contain_the_hole(
         crowd in proptest::collection::vec((0.0f64..0.4, 4.0f64..4.4), 200..500),
     ) {
         let mut samples: Vec<_> = crowd.into_iter().filter(|s| s.1 < 4.15 || s.1 > 4.25).collect();
@@ -160,9 +162,9 @@ proptest! {
         );
     }
 
-    /// A small pipe: holes wider than its perimeter.
+    /// In a small pipe holes are wider than its perimeter.
     #[test]
-    fn verif_a_pipe_narrower_than_its_holes(
+    fn pipe_narrower_than_its_holes_agrees_with_brute_force(
         samples in proptest::collection::vec((-2.0f64..3.0, 0.0f64..1.1), 1..10),
     ) {
         let hole = largest(1.1, &samples, 0.0, 0.5);
@@ -172,7 +174,7 @@ proptest! {
 
     /// On a lattice every local maximum is equidistant from four samples.
     #[test]
-    fn verif_a_perfect_lattice(dx in 0.11f64..0.7, around in 6u32..24, shift in 0.0f64..1.0) {
+    fn lattice_has_its_diagonal_as_hole(dx in 0.11f64..0.7, around in 6u32..24, shift in 0.0f64..1.0) {
         let darc = PERIMETER_M / f64::from(around);
         let mut samples = Vec::new();
         for i in -12..=12 {
@@ -188,7 +190,7 @@ proptest! {
 
     /// D does not depend on the order of the samples, the seam or the origin of the chainage.
     #[test]
-    fn meta_shifted_mirrored_reversed(
+    fn shifting_mirroring_and_reversing_keep_the_hole(
         samples in proptest::collection::vec((-2.0f64..3.0, 0.0f64..PERIMETER_M), 1..30),
         turn in 0.0f64..PERIMETER_M,
     ) {
@@ -220,7 +222,7 @@ fn one_sample_is_antipodal_to_its_hole() {
 }
 
 #[test]
-fn samples_on_a_line_and_repeated_and_all_in_one_place() {
+fn collinear_repeated_and_coincident_samples_give_the_right_hole() {
     let line: Vec<_> = (0..90).map(|i| (0.1, f64::from(i) * 0.1)).collect();
     let expected = brute_force(PERIMETER_M, &line[..20], 0.0, 0.25);
     let hole = largest(PERIMETER_M, &line[..20], 0.0, 0.25);
@@ -234,19 +236,19 @@ fn samples_on_a_line_and_repeated_and_all_in_one_place() {
 }
 
 #[test]
-fn spacings_of_a_nanometre_and_of_metres_in_one_set() {
+fn nanometre_and_metre_spacings_in_one_set_give_the_right_hole() {
     let mut samples: Vec<_> = (0..20).map(|i| (f64::from(i) * 1e-9, 3.0 + f64::from(i % 3) * 1e-9)).collect();
     samples.extend([(0.3, 6.0), (-0.4, 0.5), (0.2, 8.0)]);
     let few = [(0.0, 3.0), (0.3, 6.0), (-0.4, 0.5), (0.2, 8.0)];
     let hole = largest(PERIMETER_M, &samples, 0.0, 0.25);
     let expected = brute_force(PERIMETER_M, &few, 0.0, 0.25);
-    // The samples of a nanometre apart are one in what is expected.
+    // Samples a nanometre apart count as one in the expected value.
     found("holes.spacings", (hole.diameter_m - expected).abs(), 1e-7);
 }
 
-/// Far along the tunnel D is the same, to double precision there.
+/// Far along the tunnel D is the same, within double precision there.
 #[test]
-fn chainage_of_seven_and_of_a_thousand_kilometres() {
+fn hole_is_the_same_at_7_km_and_at_1000_km() {
     let samples: Vec<_> =
         (0..60).map(|i| (f64::from(i) * 0.05 - 1.0, (f64::from(i) * 2.3) % PERIMETER_M)).collect();
     let near = largest(PERIMETER_M, &samples, 0.0, 0.25).diameter_m;
@@ -271,7 +273,7 @@ fn chainage_of_seven_and_of_a_thousand_kilometres() {
 
 /// Reference values: `ceran`, 0.197 m/s, heads at the circle's centre in phase shift, as positions only.
 #[test]
-fn val_reference_holes_of_ideal_helices() {
+fn ideal_helices_have_the_reference_holes() {
     let profile = headrace_geometry::tunnel::shapes::ceran().unwrap();
     let perimeter_m = profile.perimeter_m();
     let modes = [
@@ -306,7 +308,7 @@ fn val_reference_holes_of_ideal_helices() {
 }
 
 #[test]
-fn samples_of_earlier_visits_fill_no_hole_of_a_later_one() {
+fn samples_of_earlier_visits_do_not_fill_later_holes() {
     let grid = |off_m: f64| {
         (0..60).flat_map(move |i| {
             (0..20).map(move |k| (f64::from(i) * 0.1 + off_m, f64::from(k) * PERIMETER_M / 20.0))
@@ -326,9 +328,9 @@ fn samples_of_earlier_visits_fill_no_hole_of_a_later_one() {
     assert!(!none.bounded);
 }
 
-/// A hole that has grown, moved along or around, or lost what bounded it is another one.
+/// A hole that has grown, moved along or around, or become unbounded is a different one.
 #[test]
-fn a_hole_is_like_another_within_a_centimetre_in_every_respect() {
+fn holes_are_alike_within_a_centimetre_in_every_respect() {
     let hole = Hole { diameter_m: 0.6, least_m: 0.6, most_m: 0.6, x_m: 7.0, arc_m: 3.0, bounded: true };
     let little = Hole { diameter_m: 0.609, x_m: 6.991, arc_m: 3.009, ..hole };
     assert!(hole.is_like(&little) && little.is_like(&hole));

@@ -22,7 +22,7 @@ pub(super) struct Nearest {
     pub x_m: f64,
     /// Its arc length, in [0, perimeter), m.
     pub arc_m: f64,
-    /// Whole turns to add to the arc length for the nearest image.
+    /// Whole turns to add to the arc length to get the nearest image.
     pub turns: f64,
     /// Squared distance on the unrolled wall, m2.
     pub distance2: f64,
@@ -70,7 +70,9 @@ impl Default for Window {
 }
 
 impl Window {
-    /// Loads all samples of the visits from one on between two chainages relative to `origin_m`, in cells of about `cell_m`.
+    /// Loads all samples between two chainages relative to `origin_m` into cells of about `cell_m`.
+    ///
+    /// Samples count from visit `first_visit` on.
     ///
     /// Allocates: never.
     pub(super) fn fill(
@@ -89,14 +91,14 @@ impl Window {
         self.sort();
     }
 
-    /// Begins a window between two chainages relative to `origin_m`; samples are pushed, then sorted.
+    /// Begins a window between two chainages relative to `origin_m`. Samples are then pushed and sorted.
     pub(super) fn begin(&mut self, perimeter_m: f64, origin_m: f64, between_m: (f64, f64), cell_m: f64) {
         self.lay_out(perimeter_m, origin_m, between_m, cell_m);
         self.unsorted.clear();
         self.overfull = false;
     }
 
-    /// Adds a sample, unless it lies outside; its chainage is from the window's origin.
+    /// Adds a sample unless it lies outside the window. Its chainage is relative to the window's origin.
     pub(super) fn push(&mut self, x_m: f64, arc_m: f64) {
         let [_, per_row, per_column] = self.per_m;
         let row = (x_m - self.from_m) * per_row;
@@ -161,7 +163,7 @@ impl Window {
         self.near(x_m, arc_m, within_m, -1.0)
     }
 
-    /// The nearest sample to a point within `within_m`, or one that is within `enough_m`.
+    /// Nearest sample to a point within `within_m`, or any sample within `enough_m`.
     pub(super) fn near_enough(&self, x_m: f64, arc_m: f64, within_m: f64, enough_m: f64) -> Option<Nearest> {
         let enough2 = if enough_m > 0.0 { enough_m * enough_m } else { -1.0 };
         self.near(x_m, arc_m, within_m, enough2)
@@ -245,7 +247,7 @@ impl Window {
         }
     }
 
-    /// Searches all samples of a row, each by its shorter way round the perimeter.
+    /// Searches all samples of a row, each by its shorter direction round the perimeter.
     fn look_all_round(&self, first: usize, best: &mut Search) {
         let half_m = self.perimeter_m / 2.0;
         for spot in self.spots(first, first + self.columns) {
@@ -270,13 +272,13 @@ struct Search {
     x_m: f64,
     arc_m: f64,
     limit2: f64,
-    /// Squared distance at which no nearer one is looked for, m2.
+    /// Squared distance below which the search stops, m2.
     enough2: f64,
     found: Option<(Spot, f64)>,
 }
 
 impl Search {
-    /// Takes a sample that is nearer than the one found, and says whether it is.
+    /// Takes a sample that is nearer than the one found. Returns whether it is nearer.
     fn takes(&mut self, spot: &Spot, turns: f64, distance2: f64) -> bool {
         let is_nearer = distance2 < self.limit2 || (distance2 <= self.limit2 && self.found.is_none());
         if is_nearer {
@@ -285,7 +287,7 @@ impl Search {
         is_nearer
     }
 
-    /// Whether what was found is so near that no nearer one is looked for.
+    /// Whether the sample found is near enough to stop the search.
     fn is_enough(&self) -> bool {
         self.limit2 <= self.enough2 && self.found.is_some()
     }

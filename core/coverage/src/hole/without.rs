@@ -1,43 +1,44 @@
-//! Holes as they would have been: with samples that are lacking put back, the wall drawn together, or stretches covered.
+//! Hypothetical holes: with missing samples put back, the wall compressed, or stretches covered.
 
 use super::{HoleFinder, NO_OWNER, Tile, cell_m, first_tiles};
 use crate::frontier::Reach;
 use crate::store::SampleStore;
 
-/// Search resolution, as a share of the radius: a circle larger by less than this may be missed.
+/// Search resolution as a share of the radius: a circle larger by less than this may be missed.
 const FINE: f64 = 0.01;
 
-/// What would have been otherwise.
+/// Hypothetical changes to the wall.
 #[derive(Debug, Clone, Copy)]
 pub struct Otherwise {
     /// Factor on distances along the tunnel, above 0, at most 1.
     pub along: f64,
-    /// The same around the perimeter.
+    /// Factor on distances around the perimeter.
     pub around: f64,
-    /// Stretches whose wall would have been covered.
+    /// Stretches whose wall counts as covered.
     pub covered: [Option<Reach>; 4],
-    /// Where samples may still land: the wall there is taken to become as it is on this side.
+    /// Stretch where samples may still land. Its wall is taken as the mirror image of the wall on this side.
     pub to_come: Option<Reach>,
 }
 
 impl Otherwise {
-    /// Nothing.
+    /// No change.
     pub const NOTHING: Self = Self { along: 1.0, around: 1.0, covered: [None; 4], to_come: None };
 
-    /// How far a chainage would be from a stretch that would have been covered, m.
+    /// Distance of a chainage from the nearest stretch counted as covered, m.
     fn clear_m(&self, x_m: f64) -> f64 {
         let off_m = |reach: &Reach| (reach.from_m - x_m).max(x_m - reach.to_m).max(0.0);
         let covered_m = self.covered.iter().flatten().map(off_m).fold(f64::INFINITY, f64::min) * self.along;
         self.to_come.as_ref().map(off_m).map_or(covered_m, |to_come_m| covered_m.min(to_come_m))
     }
 
-    /// The end of where samples may still land at which the wall is mirrored, m.
+    /// End of the stretch where samples may still land, at which the wall is mirrored, m.
     fn mirror_m(&self) -> Option<f64> {
         self.to_come.iter().flat_map(|reach| [reach.from_m, reach.to_m]).find(|x_m| x_m.is_finite())
     }
 }
 
-/// A stretch and its mirror image, in ascending order, and as one where they meet: all between two that are far apart is neither.
+/// A stretch and its mirror image, in ascending order. They are one stretch if they meet; a gap between them
+/// is in neither.
 fn with_mirrored([from_m, to_m]: [f64; 2], mirror_m: f64) -> [Option<[f64; 2]>; 2] {
     let image_m = [2.0 * mirror_m - to_m, 2.0 * mirror_m - from_m];
     if image_m[0] > to_m {
@@ -50,8 +51,11 @@ fn with_mirrored([from_m, to_m]: [f64; 2], mirror_m: f64) -> [Option<[f64; 2]>; 
 }
 
 impl HoleFinder {
-    /// Lays out the wall as it would have been `otherwise`, with the samples `more` (chainage and arc length, m) as well, for
-    /// circles of up to `radius_m` centred between two chainages; samples count from `first_visit` on.
+    /// Lays out the wall with the changes `otherwise` and the additional samples `more` (chainage and arc
+    /// length, m).
+    ///
+    /// It serves circles of up to `radius_m` centred between two chainages. Samples count from visit
+    /// `first_visit` on.
     ///
     /// Allocates: never.
     pub fn lay_otherwise(
@@ -90,8 +94,10 @@ impl HoleFinder {
         window.sort();
     }
 
-    /// True if a circle of `radius_m` centred between two chainages would hold no sample on the wall that was laid out
-    /// [`otherwise`](Self::lay_otherwise), for circles as large at least.
+    /// Whether a circle of `radius_m` centred between two chainages holds no sample on the wall laid out by
+    /// [`lay_otherwise`](Self::lay_otherwise).
+    ///
+    /// The wall must have been laid out for circles at least this large.
     ///
     /// Allocates: never, unless a section is over 4,000 cells large.
     pub fn has_circle_otherwise(
@@ -125,7 +131,8 @@ mod tests {
     use super::*;
     use crate::store::{StoreLayout, WallSample};
 
-    /// Samples every 0.5 m along and around a wall of 10 m perimeter, but for those that `is_in` leaves out.
+    /// Samples every 0.5 m along and around a wall of 10 m perimeter, except those for which `is_in` is
+    /// false.
     fn has(
         is_in: impl Fn(u32, u32) -> bool,
         radius_m: f64,
@@ -154,7 +161,7 @@ mod tests {
     }
 
     #[test]
-    fn a_wall_drawn_together_has_smaller_holes() {
+    fn compressed_wall_has_smaller_holes() {
         let all = |_, _| true;
         // Half the diagonal of a mesh of 0.5 by 0.5 m, and of 0.25 by 0.5 m.
         for (otherwise, radius_m) in [
@@ -167,9 +174,9 @@ mod tests {
         }
     }
 
-    /// Of a bare stretch of 2.5 m, drawn together to 0.75 m, the wall on both sides counts.
+    /// A bare stretch of 2.5 m, compressed to 0.75 m, is bounded by the wall on both sides.
     #[test]
-    fn what_is_drawn_near_from_far_away_counts() {
+    fn distant_samples_count_on_a_compressed_wall() {
         let sides = |i: u32, _| i <= 8 || i >= 13;
         let otherwise = Otherwise { along: 0.3, ..Otherwise::NOTHING };
         assert!(has(sides, 0.44, &otherwise, &[]));
@@ -177,21 +184,21 @@ mod tests {
     }
 
     #[test]
-    fn where_samples_may_still_land_the_wall_becomes_as_it_is_before() {
-        // Drawn together, a circle at the end reaches ahead, where nothing has landed yet.
+    fn wall_is_mirrored_into_the_stretch_to_come() {
+        // On a compressed wall, a circle at the end extends ahead, where nothing has landed yet.
         let ends = |i: u32, _| i <= 10;
         let otherwise = Otherwise { along: 0.3, ..Otherwise::NOTHING };
         let to_come = Some(Reach { from_m: 5.25, to_m: f64::INFINITY });
         assert!(has(ends, 0.275, &otherwise, &[]));
         assert!(!has(ends, 0.275, &Otherwise { to_come, ..otherwise }, &[]));
-        // A strip that nobody sees stays one.
+        // A strip that no head sees remains a hole.
         let strip = |i: u32, k: u32| i <= 11 && k != 4;
         let to_come = Some(Reach { from_m: 6.0, to_m: f64::INFINITY });
         assert!(has(strip, 0.4, &Otherwise { to_come, ..otherwise }, &[]));
     }
 
     #[test]
-    fn a_mirror_far_away_brings_nothing_of_what_lies_between() {
+    fn distant_mirror_adds_no_samples_between() {
         let same = |found: [Option<[f64; 2]>; 2], expected: &[[f64; 2]]| {
             assert_eq!(found.into_iter().flatten().collect::<Vec<_>>(), expected);
         };
@@ -202,7 +209,7 @@ mod tests {
     }
 
     #[test]
-    fn a_stretch_that_would_have_been_covered_is_no_hole() {
+    fn covered_stretch_is_no_hole() {
         let behind = |i: u32, _| i <= 9;
         assert!(has(behind, 0.4, &Otherwise::NOTHING, &[]));
         let ahead = Some(Reach { from_m: 4.7, to_m: f64::INFINITY });

@@ -4,7 +4,7 @@ use super::*;
 
 const COUNT: i64 = 60;
 
-/// Runs, and the section states that they are checked against.
+/// Runs, and the section states for checking them.
 struct Rig {
     runs: Runs,
     failing: Vec<Option<Failing>>,
@@ -29,7 +29,7 @@ impl Rig {
 
     fn say_all(&mut self, section: i64, causes: Option<Causes>, diameter_m: f64) {
         let slot = usize::try_from(section + 5).unwrap();
-        // Some speed mends all but the largest holes.
+        // A speed can mend all but the largest holes.
         let again_mps = if diameter_m < 1.0 { 0.1 * diameter_m } else { 0.0 };
         let failing = causes.map(|causes| Failing { causes, again_mps });
         (self.failing[slot], self.holes[slot]) = (failing, diameter_m);
@@ -66,14 +66,17 @@ impl Rig {
             assert_eq!(run.cleared.is_some(), members.is_empty());
             let (Some(first), Some(last)) = (members.first(), members.last()) else { continue };
             assert_eq!((run.from, run.to), (*first, *last + 1));
-            assert!(members.windows(2).all(|pair| pair[1] - pair[0] <= 3), "run {number} has fallen apart");
+            assert!(
+                members.windows(2).all(|pair| pair[1] - pair[0] <= 3),
+                "run {number} has a gap that is too wide"
+            );
             let largest = members
                 .iter()
                 .map(|index| self.holes[usize::try_from(index + 5).unwrap()])
                 .fold(0.0, f64::max);
             assert!((run.worst.1.diameter_m - largest).abs() < 1e-12);
             for other in last + 1..=(last + 3).min(COUNT - 6) {
-                assert!(self.runs.of(other).is_none(), "run {number} and its neighbour");
+                assert!(self.runs.of(other).is_none(), "run {number} must include its neighbour");
             }
             let having =
                 |cause: Cause| members.iter().filter(|index| causes(**index).unwrap().has(cause)).count();
@@ -100,17 +103,17 @@ impl Rig {
 }
 
 #[test]
-fn neighbours_are_one_run_that_grows_merges_and_is_cleared() {
+fn run_grows_merges_and_is_cleared() {
     let mut rig = Rig::new();
     rig.say(10, Some(Cause::TooFast), 1.0);
     rig.say(11, Some(Cause::TooFast), 1.5);
     rig.say(16, Some(Cause::TooFast), 1.2);
-    // Within half a metre of both.
+    // This section is within half a metre of both runs.
     rig.say(14, Some(Cause::Phase), 1.1);
     let first = *rig.runs.get(RunId(0)).unwrap();
     assert_eq!((first.from, first.to, first.failed, first.worst.0), (10, 17, 4, 11));
     assert_eq!(rig.runs.get(RunId(1)).unwrap().merged_into, Some(RunId(0)));
-    // The last that would still join on either side, and the first that wouldn't.
+    // The last sections that would still join on either side, and the first that wouldn't.
     assert_eq!([6, 7, 19, 20].map(|section| rig.runs.is_beyond(&first, section)), [true, false, false, true]);
     for section in [10, 11, 14, 16] {
         rig.say(section, None, 0.2);
@@ -120,12 +123,12 @@ fn neighbours_are_one_run_that_grows_merges_and_is_cleared() {
 }
 
 #[test]
-fn a_run_has_the_cause_of_most_of_its_sections_and_names_the_next() {
+fn run_has_its_most_frequent_cause_and_names_the_next() {
     let mut rig = Rig::new();
     let run = |rig: &Rig| *rig.runs.get(RunId(0)).unwrap();
     rig.say(0, Some(Cause::Occluded), 1.0);
     rig.say(1, Some(Cause::TooFast), 1.0);
-    assert_eq!(run(&rig).cause, Cause::Occluded, "the first of two that are as frequent");
+    assert_eq!(run(&rig).cause, Cause::Occluded, "the first of two equally frequent causes");
     rig.say_all(2, Some(Causes::of(Cause::TooFast).with(Cause::Phase)), 1.0);
     assert_eq!(run(&rig).cause, Cause::TooFast);
     assert_eq!(run(&rig).causes(), [Cause::TooFast, Cause::Phase, Cause::Occluded]);
@@ -133,8 +136,8 @@ fn a_run_has_the_cause_of_most_of_its_sections_and_names_the_next() {
     for section in 3..22 {
         rig.say(section, Some(Cause::TooFast), 1.0);
     }
-    assert_eq!(run(&rig).named(), Causes::of(Cause::TooFast), "one of 22 isn't named");
-    // Judged anew.
+    assert_eq!(run(&rig).named(), Causes::of(Cause::TooFast), "a cause of one section in 22 isn't named");
+    // All sections are judged again.
     for section in 1..22 {
         rig.say(section, Some(Cause::HeadSilent), 1.0);
     }
@@ -143,7 +146,7 @@ fn a_run_has_the_cause_of_most_of_its_sections_and_names_the_next() {
 }
 
 #[test]
-fn a_run_filled_in_its_middle_falls_in_two_and_the_first_part_keeps_the_number() {
+fn run_filled_in_its_middle_splits_and_the_first_part_keeps_the_number() {
     let mut rig = Rig::new();
     for section in 0..9 {
         rig.say(section, Some(Cause::MissingReturns), 0.6 + 0.1 * section as f64);
@@ -160,7 +163,7 @@ fn a_run_filled_in_its_middle_falls_in_two_and_the_first_part_keeps_the_number()
 proptest! {
     /// Runs match the section states after any sequence of updates.
     #[test]
-    fn runs_are_what_the_sections_say(
+    fn runs_match_the_section_states(
         said in proptest::collection::vec((-5..COUNT - 5, 0_u8..4, 0.1_f64..3.0), 1..300),
     ) {
         let mut rig = Rig::new();
@@ -170,7 +173,7 @@ proptest! {
             let causes = [None, Some(Causes::of(Cause::TooFast)), Some(both), Some(lost)];
             rig.say_all(section, causes[usize::from(cause)], diameter_m);
         }
-        // So many changes may exhaust the run numbers; then sections are in no run.
+        // Many changes may exhaust the run numbers. Sections are then in no run.
         if rig.runs.all().len() < usize::try_from(COUNT).unwrap() {
             rig.check();
         }

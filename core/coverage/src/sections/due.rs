@@ -1,5 +1,7 @@
-//! Which sections are due for judging: those that the heads have left, those that may fail for certain by a part of them, and
-//! at the end all that aren't settled.
+//! Decides which sections are due for judging.
+//!
+//! Due are sections that the heads have left, those of which a part may certainly fail, and at the end all
+//! that aren't settled.
 
 use super::super::frontier::{Moved, Outlook, Reach, clear_of};
 use super::super::hole::{FARTHEST_M, Needed};
@@ -7,22 +9,23 @@ use super::super::section::Verdict;
 use super::{Ended, Judging, Request, Sections, clamp};
 use headrace_geometry::math;
 
-/// Distance that the heads go between two looks at what they have left behind, m: a flag comes at most so late.
+/// Distance travelled between two checks of sections left behind, m. It bounds the delay of a flag.
 const LOOK_M: f64 = 0.125;
 
-/// Wherever the heads reach next: any chainage that is finite.
+/// Check at the next movement: every finite reach is beyond these limits.
 pub(super) const LOOK_AT_ONCE: [f64; 2] = [f64::MIN, f64::MAX];
 
 impl Sections {
-    /// Whether the heads have moved so far that sections may be due.
+    /// Whether the heads have moved far enough for sections to be due.
     pub fn may_be_due(&self, moved: &Moved) -> bool {
         let [behind_m, ahead_m] = self.next_look_m;
         let is_due = |reach: Reach| reach.from_m >= behind_m || reach.to_m <= ahead_m;
         !moved.is_nothing() || moved.to_come.is_some_and(is_due)
     }
 
-    /// Sets where to look next: what lies behind is left in steps of a part of a section, as is what lies ahead of a vehicle
-    /// that goes back.
+    /// Sets the next places to check.
+    ///
+    /// Wall behind is left in steps of a part of a section. So is wall ahead when the vehicle goes back.
     fn look_again(&mut self, to_come: Option<Reach>) {
         let Some(Reach { from_m, to_m }) = to_come else { return };
         let parts = (-math::floor_to_i64(-self.section_m / LOOK_M)).max(1);
@@ -35,8 +38,10 @@ impl Sections {
         ];
     }
 
-    /// Calls `ask` for every section of the way due for judging after the heads have moved: those that left the zone or
-    /// never were in it, those whose hole may no longer get samples, and those of which a part may fail for certain.
+    /// Calls `ask` for every section of the coverage extent due for judging after the heads have moved.
+    ///
+    /// These are sections that left the zone or never were in it, those whose hole can get no more samples,
+    /// and those of which a part may certainly fail.
     ///
     /// Allocates: never.
     pub fn due(&mut self, moved: &Moved, outlook: &Outlook, ask: &mut impl FnMut(Request)) {
@@ -65,7 +70,8 @@ impl Sections {
                 let may_fail = !section.is_flagged() && section.verdict == Verdict::Open;
                 let is_out = index < moved.left_behind.end || index >= moved.left_ahead.start;
                 let Some(hole) = section.hole else {
-                    // Of the way, but never in reach of a head: beside the heads, or where the vehicle set out.
+                    // Sections of the coverage extent that no head ever reached lie beside the heads, or
+                    // where the vehicle set out.
                     let (from_m, to_m) = bounds_m;
                     let clear = clear_of(moved.to_come, from_m).min(clear_of(moved.to_come, to_m)) > 0.0;
                     if !is_out {
@@ -88,9 +94,11 @@ impl Sections {
         }
     }
 
-    /// Calls `ask` for sections of the still zone: those that may fail for certain although their hole may still get samples,
-    /// and flagged ones with samples since they were judged. Otherwise they would get no verdict while the vehicle is
+    /// Calls `ask` for sections of the still zone, which otherwise get no verdict while the vehicle is
     /// stationary.
+    ///
+    /// These are sections that may certainly fail although their hole may still get samples, and flagged ones
+    /// with new samples since they were judged.
     ///
     /// Allocates: never.
     pub fn look_around(&mut self, outlook: &Outlook, ask: &mut impl FnMut(Request)) {
@@ -105,8 +113,9 @@ impl Sections {
         }
     }
 
-    /// Whether a section has an empty circle, too large for the target by the errors there, where all heads have been and no
-    /// more samples will land.
+    /// Whether a section already has an empty circle that is too large for the target, with the errors there.
+    ///
+    /// All heads have passed the circle, and no more samples will land in it.
     pub(super) fn fails_already(&self, request: &Request, judging: &mut Judging<'_>) -> bool {
         let Judging { store, finder, profile, .. } = judging;
         let Request { section: index, to_come, not_passed, .. } = *request;
@@ -128,12 +137,12 @@ impl Sections {
         most_clear_m > least_m && finder.has_circle(store, bounds_m, [to_come, not_passed], &needed)
     }
 
-    /// Calls `ask` for every section of the way that isn't settled, at the end of a dive.
+    /// Calls `ask` for every section of the coverage extent that isn't settled, at the end of a dive.
     pub fn unsettled(&mut self, outlook: &Outlook, ask: &mut impl FnMut(Request)) {
         let ask_for = Request::at(outlook);
         for index in self.sections_of(outlook.way) {
             let Some(section) = self.get_mut(index) else { continue };
-            // Samples farther away than a pass depends on may have narrowed the hole of a fail.
+            // Samples too far away to change a pass may still have narrowed the hole of a fail.
             if section.stale || !section.settled || section.verdict != Verdict::Pass {
                 section.stale = false;
                 ask(Request { ended: Some(Ended(outlook.through)), ..ask_for(index) });
@@ -154,9 +163,9 @@ mod tests {
     use headrace_geometry::time::MonoNs;
     use headrace_geometry::tunnel::shapes;
 
-    /// What is left in part is looked at every few centimetres of the way, behind and ahead.
+    /// Partly left sections are checked every few centimetres of travel, behind and ahead.
     #[test]
-    fn the_next_look_is_a_few_centimetres_on() {
+    fn next_check_is_a_few_centimetres_on() {
         let mut sections = Sections::new(0.25, 0.5, -1.0, 10.0);
         for k in 0..100 {
             let x_m = 4.0 + 0.013 * f64::from(k);
@@ -170,9 +179,10 @@ mod tests {
         assert_eq!(sections.next_look_m.map(f64::to_bits), LOOK_AT_ONCE.map(f64::to_bits));
     }
 
-    /// Of a stretch in which the vehicle stands, what has failed is judged again only once there is something new; all else may come to fail.
+    /// Around a stationary vehicle a failed section is judged again only after new samples. Every other
+    /// section may come to fail.
     #[test]
-    fn where_the_vehicle_stands_what_is_new_is_judged() {
+    fn stationary_vehicle_judges_sections_with_new_samples() {
         let mut sections = Sections::new(0.25, 0.5, -1.0, 10.0);
         for (index, flagged, stale) in
             [(8, false, true), (9, false, false), (10, true, true), (11, true, false)]
@@ -197,13 +207,14 @@ mod tests {
         };
         let way = Some(Reach { from_m: 0.1, to_m: 2.9 });
         assert_eq!(asked(None, way), [], "it moves");
-        assert_eq!(asked(Some(8..12), None), [], "it has been nowhere");
+        assert_eq!(asked(Some(8..12), None), [], "the vehicle has no coverage extent");
         assert_eq!(asked(Some(8..12), way), [(8, true), (9, true), (10, false)]);
-        assert_eq!(asked(Some(8..40), way), [(8, true), (9, true)], "nothing has come since");
+        assert_eq!(asked(Some(8..40), way), [(8, true), (9, true)], "no samples since");
     }
 
-    /// What is asked of sections when the heads, whose samples may land from 3.25 m on, have left 2.5 to 3 m: the section, and whether only
-    /// for a certain fail.
+    /// Requests when the heads have left 2.5 to 3 m and samples may land from 3.25 m on.
+    ///
+    /// Each has the section's index, and whether it is only for a certain fail.
     fn due(set: impl Fn(&mut Sections)) -> Vec<(i64, bool)> {
         let mut sections = Sections::new(0.25, 0.5, 1.0, 10.0);
         set(&mut sections);
@@ -225,7 +236,7 @@ mod tests {
         all
     }
 
-    /// All but this section are settled, and have been judged.
+    /// Requests if every section except this one is settled and judged.
     fn alone(index: i64, set: impl Fn(&mut Section)) -> Vec<(i64, bool)> {
         due(|sections| {
             for other in 4..16 {
@@ -243,22 +254,24 @@ mod tests {
     }
 
     #[test]
-    fn what_has_been_left_without_a_judgement_is_judged() {
+    fn section_left_without_a_verdict_is_judged() {
         let found = due(|_| {});
-        // All that lies behind, whole; at the zone's ends what may fail by a part that is left; nothing of what is to come.
+        // Everything behind is judged whole. At the zone's ends sections may fail by the part left. Nothing
+        // ahead is judged.
         let mut expected: Vec<_> = (4..12).map(|index| (index, false)).collect();
         expected.extend([(12, true), (15, true)]);
         assert_eq!(found, expected);
-        assert_eq!(alone(10, |_| {}), [], "it has been judged, and nothing has come since");
+        assert_eq!(alone(10, |_| {}), [], "the section has been judged, and no samples came since");
         assert_eq!(alone(10, |section| section.stale = true)[0], (10, false));
         assert_eq!(alone(10, |section| section.not_inspected = true)[0], (10, false));
         assert_eq!(alone(10, |section| section.hole = None), [(10, false)]);
-        assert_eq!(alone(9, |section| section.stale = true), [], "it was left before");
+        assert_eq!(alone(9, |section| section.stale = true), [], "the section was left before");
     }
 
-    /// Of a large hole what is out of reach, twice as far as its centre, may be too large already; out of reach as a whole it is judged for good.
+    /// The part of a large hole out of reach, twice as far as its centre, may already be too large. A hole
+    /// fully out of reach is judged finally.
     #[test]
-    fn a_hole_that_may_still_be_filled_is_judged_once_enough_of_it_is_left() {
+    fn fillable_hole_is_judged_once_enough_of_it_is_left() {
         let at = |diameter_m: f64, x_m: f64, sd_m: f64, verdict: Verdict, flagged: bool| {
             alone(9, |section| {
                 (section.hole, section.hole_sd_m) = (Some(hole(diameter_m, x_m)), sd_m);
@@ -271,15 +284,16 @@ mod tests {
         assert_eq!(at(2.0, 2.9, 0.0, open, false), [(9, false)], "0.7 m of it");
         assert_eq!(at(2.0, 2.9, 0.15, open, false), [(9, true)], "0.4 m for certain");
         assert_eq!(at(2.0, 3.1, 0.0, open, false), [(9, true)], "0.3 m of it");
-        assert_eq!(at(2.0, 2.9, 0.0, Verdict::CannotSay, false), [], "nothing is open");
-        assert_eq!(at(2.0, 3.1, 0.0, open, true), [], "it is flagged already");
+        assert_eq!(at(2.0, 2.9, 0.0, Verdict::CannotSay, false), [], "no section is open");
+        assert_eq!(at(2.0, 3.1, 0.0, open, true), [], "the section is already flagged");
     }
 
     const PERIMETER_M: f64 = 6.0 * core::f64::consts::PI;
 
-    /// Whether a section fails for certain whose wall, of a pipe of 3 m radius, has one empty circle, where the wall is `beside` the vehicle
-    /// or above it: with so much of an error of chainage, m, and of yaw, rad. Samples may still land from 0.65 m beyond it on, and nobody has
-    /// been there up to 1 m before.
+    /// Whether a section with one empty circle certainly fails, in a pipe of 3 m radius.
+    ///
+    /// The circle is beside the vehicle (`is_beside`) or above it. The errors are of chainage, m, and of yaw,
+    /// rad. Samples may still land from 0.65 m beyond it, and no head has been there up to 1 m before.
     fn fails(circle_m: f64, is_beside: bool, [along_m, yaw_rad]: [f64; 2], to_come_m: f64) -> bool {
         let profile = shapes::circle(3.0).unwrap();
         let [y_m, z_m] = profile.reference();
@@ -324,28 +338,30 @@ mod tests {
             tell: &mut |_, _| {},
         };
         let everywhere = Request { not_passed: None, ..request };
-        assert!(!sections.fails_already(&everywhere, &mut judging), "only where some heads haven't been");
+        assert!(!sections.fails_already(&everywhere, &mut judging), "only where some heads haven't passed");
         sections.fails_already(&request, &mut judging)
     }
 
-    /// Three standard deviations of its diameter above the target of 0.5 m. A hole's error is 1.2 of that of a pass.
+    /// The limit is three standard deviations of the diameter above the target of 0.5 m. A hole's error is
+    /// 1.2 times that of a pass.
     #[test]
-    fn a_circle_that_nothing_can_fill_fails_by_its_errors_where_it_is() {
+    fn unfillable_circle_fails_by_the_errors_at_its_place() {
         for is_beside in [true, false] {
             let fails = |circle_m: f64, errors: [f64; 2]| fails(circle_m, is_beside, errors, 10.9);
-            assert!(!fails(0.245, [0.0; 2]) && fails(0.255, [0.0; 2]), "as large as the target");
-            // 0.5 m and thrice 0.06 m.
+            assert!(!fails(0.245, [0.0; 2]) && fails(0.255, [0.0; 2]), "the circle must exceed the target");
+            // 0.5 m plus three times 0.06 m.
             assert!(!fails(0.335, [0.05, 0.0]) && fails(0.345, [0.05, 0.0]));
         }
-        // A yaw of 0.02 moves what is 3 m beside the vehicle by 0.06 m, and nothing above it: 0.5 m and thrice 0.072 m there.
+        // A yaw of 0.02 rad moves wall 3 m beside the vehicle by 0.06 m, and wall above it by nothing: 0.5 m
+        // plus three times 0.072 m.
         assert!(!fails(0.35, true, [0.0, 0.02], 10.9) && fails(0.365, true, [0.0, 0.02], 10.9));
         assert!(fails(0.265, false, [0.0, 0.02], 10.9));
         for (to_come_m, yaw_rad) in
             [10.9, 10.45].into_iter().flat_map(|x_m| [0.0, 0.06, 0.1].map(|yaw| (x_m, yaw)))
         {
-            // Though it would have to be far larger elsewhere.
+            // Elsewhere on the wall the circle would need to be far larger.
             assert!(fails(0.265, false, [0.0, yaw_rad], to_come_m), "{to_come_m} {yaw_rad}");
         }
-        assert!(!fails(0.3, true, [0.0; 2], 10.3), "a sample may still land in it");
+        assert!(!fails(0.3, true, [0.0; 2], 10.3), "samples may still land in it");
     }
 }

@@ -12,18 +12,18 @@ fn sections() -> Sections {
 }
 
 #[test]
-fn a_stretch_has_the_sections_that_it_touches_and_that_there_are() {
+fn stretch_contains_the_existing_sections_it_touches() {
     let of = |from_m: f64, to_m: f64| sections().sections_of(Some(Reach { from_m, to_m }));
     assert_eq!(of(1.1, 1.9), 4..8);
-    assert_eq!(of(1.0, 2.0), 4..9, "both at their beginning");
+    assert_eq!(of(1.0, 2.0), 4..9, "both ends at section boundaries");
     assert_eq!(of(3.3, 3.3), 13..14);
     assert_eq!((of(-20.0, -0.6), of(9.9, 40.0)), (-4..-2, 39..40));
     assert!(of(11.0, 12.0).is_empty() && sections().sections_of(None).is_empty());
 }
 
-/// A judged section is counted once, however often its verdict changes; what isn't judged is open.
+/// A judged section is counted once, however often its verdict changes. An unjudged one is open.
 #[test]
-fn metres_are_those_of_the_latest_verdicts() {
+fn metres_follow_the_latest_verdicts() {
     let mut sections = sections();
     let [pass, fail] = [Verdict::Pass, Verdict::Fail].map(|verdict| Some(verdict as usize));
     for (before, now) in [(None, fail), (None, fail), (None, fail), (None, pass), (fail, pass), (fail, None)]
@@ -36,9 +36,10 @@ fn metres_are_those_of_the_latest_verdicts() {
     assert!(found.iter().zip(expected).all(|(a, b)| (a - b).abs() < 1e-12), "{found:?}");
 }
 
-/// A section with pings has its own error; one without has the largest of those within T / 2 of it, and no other.
+/// A section with pings has its own error. One without pings has the largest of those within T / 2 of it, and
+/// no other.
 #[test]
-fn a_section_without_pings_has_the_error_of_those_beside_it() {
+fn section_without_pings_has_the_error_of_its_neighbours() {
     let error_of = |placed_in: i64, asked: i64| {
         let mut sections = sections();
         for (index, sd_m) in [(placed_in, 0.03), (30, 0.01)] {
@@ -54,11 +55,11 @@ fn a_section_without_pings_has_the_error_of_those_beside_it() {
         }
     };
     let near = |found: f64, expected: f64| (found - expected).abs() < 1e-12;
-    // Section 20 is 5 to 5.25 m, and what lies within 0.25 m of it 4.75 to 5.5 m.
+    // Section 20 spans 5 to 5.25 m. The wall within 0.25 m of it spans 4.75 to 5.5 m.
     for (beside, expected) in [(18, 0.0), (19, 0.03), (21, 0.03), (22, 0.03), (23, 0.0)] {
         assert!(near(error_of(beside, 20), expected), "{beside}: {}", error_of(beside, 20));
     }
-    assert!(near(error_of(31, 30), 0.01), "its own, though there is a larger one beside it");
+    assert!(near(error_of(31, 30), 0.01), "its own error, although a neighbour has a larger one");
     assert!(near(error_of(29, 28), 0.03) && near(error_of(27, 28), 0.03));
 }
 
@@ -69,14 +70,14 @@ fn hole(diameter_m: f64) -> Hole {
 }
 
 #[test]
-fn a_wall_without_samples_never_passes() {
+fn wall_without_samples_never_passes() {
     let hole = Hole { bounded: false, ..hole(2.0 * FARTHEST_M) };
     assert_eq!(verdict(&hole, 0.0, 100.0, BEHIND), Verdict::Fail);
     assert_eq!(verdict(&hole, 0.0, 100.0, 1.0), Verdict::Open);
 }
 
 #[test]
-fn the_verdict_needs_as_many_standard_deviations_as_asked() {
+fn verdict_keeps_the_configured_standard_deviations() {
     for (confidence_sd, diameter_m, expected) in [
         (1.0, 0.89, Verdict::Pass),
         (1.0, 0.91, Verdict::CannotSay),
@@ -91,11 +92,11 @@ fn the_verdict_needs_as_many_standard_deviations_as_asked() {
     ] {
         assert_eq!(verdict(&hole(diameter_m), confidence_sd * 0.1, 1.0, BEHIND), expected, "{diameter_m}");
     }
-    assert_eq!(verdict(&hole(1.0), 0.0, 1.0, BEHIND), Verdict::Pass, "as large as the target passes");
+    assert_eq!(verdict(&hole(1.0), 0.0, 1.0, BEHIND), Verdict::Pass, "a hole as large as the target passes");
 }
 
 #[test]
-fn what_samples_may_still_fill_is_open_until_enough_of_it_is_out_of_their_reach() {
+fn fillable_hole_is_open_until_enough_of_it_is_out_of_reach() {
     let at = |clear_m: f64| verdict(&hole(2.0), 0.2, 1.0, clear_m);
     assert_eq!([0.0, 0.59, 0.61, 1.0].map(at), [Verdict::Open, Verdict::Open, Verdict::Fail, Verdict::Fail]);
     let unsure = |clear_m: f64| verdict(&hole(1.1), 0.2, 1.0, clear_m);
@@ -103,7 +104,7 @@ fn what_samples_may_still_fill_is_open_until_enough_of_it_is_out_of_their_reach(
 }
 
 #[test]
-fn bounds_on_either_side_of_the_target_say_nothing() {
+fn bounds_on_either_side_of_the_target_give_no_verdict() {
     let within = |diameter_m: f64, least_m: f64, most_m: f64| {
         verdict(&Hole { least_m, most_m, ..hole(diameter_m) }, 0.0, 0.5, BEHIND)
     };
@@ -113,8 +114,10 @@ fn bounds_on_either_side_of_the_target_say_nothing() {
     assert_eq!(within(0.49, 0.45, 0.5), Verdict::Pass);
 }
 
-/// Judges a section of a pipe seen by two visits, a mesh of samples each, m: the second is of another stretch of navigation or of the same one.
-/// Returns its verdict, its hole's diameter, m, and the first visit that counts.
+/// Judges a section of a pipe seen by two visits, each with a mesh of samples of this size, m.
+///
+/// With `is_related` both visits are of one stretch of navigation. Returns the verdict, the hole's diameter,
+/// m, and the first visit that counts.
 fn seen_twice(meshes_m: [f64; 2], is_related: bool) -> (Verdict, f64, u32) {
     let profile = shapes::circle(3.0).unwrap();
     let perimeter_m = profile.perimeter_m();
@@ -130,7 +133,7 @@ fn seen_twice(meshes_m: [f64; 2], is_related: bool) -> (Verdict, f64, u32) {
             errors: [PassError::default(); 2],
         };
         let around = math::round_to_i64(perimeter_m / mesh_m);
-        // The middle between two rows is that of the section.
+        // The centre between two rows is that of the section.
         let rows = math::floor_to_i64(2.0 / mesh_m);
         for (i, k) in (-rows..rows).flat_map(|i| (0..around).map(move |k| (i, k))) {
             let (x_m, arc_m) = (5.125 + mesh_m * (i as f64 + 0.5), perimeter_m / around as f64 * k as f64);
@@ -160,21 +163,21 @@ fn seen_twice(meshes_m: [f64; 2], is_related: bool) -> (Verdict, f64, u32) {
     (section.verdict, section.hole.unwrap().diameter_m, section.visits.first())
 }
 
-/// A mesh leaves holes as wide as its diagonal: 0.28 m of 0.2 m, 0.48 m of 0.34 m, for a target of 0.5 m.
+/// A mesh leaves holes as wide as its diagonal: 0.28 m for 0.2 m, 0.48 m for 0.34 m. The target is 0.5 m.
 #[test]
-fn holes_are_those_of_all_visits_unless_the_newest_alone_shows_that_they_are_small() {
+fn hole_is_of_all_visits_unless_the_newest_alone_passes() {
     let fine_m = 0.2 * math::sqrt(2.0);
     let (verdict, hole_m, first) = seen_twice([0.2, 0.34], true);
     assert!(hole_m < fine_m + 1e-3, "{hole_m}");
-    assert_eq!((verdict, first), (Verdict::Pass, 0), "each adds to what the other shows");
+    assert_eq!((verdict, first), (Verdict::Pass, 0), "each visit adds to the other");
     let (verdict, hole_m, first) = seen_twice([0.2, 0.34], false);
     assert!((hole_m - 0.34 * math::sqrt(2.0)).abs() < 0.01, "{hole_m}");
-    assert_eq!((verdict, first), (Verdict::Pass, 1), "nothing relates the first to it");
+    assert_eq!((verdict, first), (Verdict::Pass, 1), "the first visit has no relation to the second");
     let (verdict, hole_m, first) = seen_twice([0.2, 0.6], false);
     assert!(hole_m < fine_m + 1e-3, "{hole_m}");
-    assert_eq!((verdict, first), (Verdict::CannotSay, 0), "neither the newest alone, nor both");
+    assert_eq!((verdict, first), (Verdict::CannotSay, 0), "neither the newest visit alone nor both pass");
     let (verdict, hole_m, first) = seen_twice([0.6, 0.2], true);
     assert!(hole_m < fine_m + 1e-3, "{hole_m}");
     assert_eq!((verdict, first), (Verdict::Pass, 0));
-    assert_eq!(seen_twice([0.6, 0.62], true).0, Verdict::Fail, "both are too wide, even together");
+    assert_eq!(seen_twice([0.6, 0.62], true).0, Verdict::Fail, "both meshes are too wide, even together");
 }

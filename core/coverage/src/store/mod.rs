@@ -1,9 +1,9 @@
 //! Samples on the unrolled wall, in bricks of several rows of square cells around the perimeter.
 //!
-//! Bricks near the vehicle are open: unpacked samples, listed by cell. Those farther away are packed to four bytes per
-//! sample and opened again when the vehicle comes back or a pass search needs them. Full cells are thinned. Memory in
-//! use therefore grows with the wall seen, not with the time spent there. All of it is allocated before the loop is
-//! armed; the OS maps a page on first use.
+//! Bricks near the vehicle are open: they hold unpacked samples, listed by cell. Bricks farther away are
+//! packed to four bytes per sample. A packed brick is opened again when the vehicle comes back or a pass
+//! search needs it. Full cells are thinned, so memory in use grows with the wall seen, not with the time
+//! spent there. All of it is allocated before the loop is armed. The OS maps a page on first use.
 
 mod open;
 mod packed;
@@ -18,15 +18,15 @@ use headrace_geometry::math;
 use headrace_geometry::snapshot::stateful;
 use headrace_sampling::head::MAX_HEADS;
 
-/// Bricks open at a time. At a metre each they extend beyond any search radius to either side.
+/// Number of bricks open at a time. At a metre each they extend beyond any search radius on either side.
 const OPEN_BRICKS: usize = 64;
-/// Least length of a brick, m.
+/// Minimum length of a brick, m.
 const BRICK_M: f64 = 1.0;
 /// Maximum rows per brick: an open brick has a bit for each in a `u32`.
 const MOST_ROWS: usize = 32;
 /// Sample capacity of the open bricks.
 const OPEN_SAMPLES: usize = 1 << 18;
-/// Overhead words per brick: unused ones in its last block, and head switches.
+/// Overhead words per brick: unused words in its last block, and head switches.
 const WORDS_PER_BRICK: usize = 48;
 
 /// A sample on the unrolled wall.
@@ -38,10 +38,11 @@ pub struct WallSample {
     pub arc_m: f64,
     /// Number of the head, below [`MAX_HEADS`].
     pub head: usize,
-    /// Step from the same head's sample before, along the tunnel and along the perimeter, m, if it was a single step of
-    /// the same sweep.
+    /// Step from the same head's previous sample, along the tunnel and along the perimeter, m.
+    ///
+    /// `None` unless it was a single step of one sweep.
     pub step_m: Option<[f64; 2]>,
-    /// Number of the visit in which it was measured, from zero, never falling.
+    /// Number of the visit in which it was measured, from zero. It never decreases.
     pub visit: u32,
 }
 
@@ -54,14 +55,14 @@ pub struct StoreLayout {
     pub from_m: f64,
     /// Last chainage, m.
     pub to_m: f64,
-    /// Nominal edge of a cell, m; half the target suits the searches.
+    /// Nominal edge of a cell, m. Half the target suits the searches.
     pub cell_m: f64,
     /// Minimum capacity, samples.
     pub capacity: u32,
 }
 
 impl StoreLayout {
-    /// The edge of a cell that suits searches for holes about as large as the target, m.
+    /// Cell edge that suits searches for holes about as large as the target, m.
     pub fn cell_for_target_m(target_m: f64) -> f64 {
         (target_m / 2.0).clamp(0.05, 0.5)
     }
@@ -72,18 +73,18 @@ impl StoreLayout {
 pub enum Kept {
     /// Stored.
     Stored,
-    /// Dropped: its cell is full and has one close by that represents it.
+    /// Dropped: its cell is full, and a nearby sample represents it.
     Thinned,
 }
 
-/// Why a sample was not kept.
+/// Reason for which a sample was not kept.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 pub enum StoreError {
     /// Its chainage is outside the store's extent, or its coordinates aren't finite.
-    #[error("the sample lies outside the stretch of tunnel that the store covers")]
+    #[error("storing a sample: it lies outside the stretch of tunnel that the store covers")]
     Outside,
     /// The store is full.
-    #[error("the store is full")]
+    #[error("storing a sample: the store is full")]
     Full,
 }
 
@@ -103,7 +104,7 @@ pub struct StoreUse {
     pub kept: u64,
     /// Samples dropped by thinning.
     pub thinned: u64,
-    /// Bytes in use now or before, i.e. mapped by the OS.
+    /// Bytes in use now or before: those mapped by the OS.
     pub bytes: usize,
 }
 
@@ -112,7 +113,7 @@ pub struct StoreUse {
 struct Brick {
     /// Link to its first block in the arena, or zero.
     first_block: u32,
-    /// Its samples.
+    /// Number of its samples.
     count: u32,
     /// Slot plus one if it is open, or zero.
     slot: u16,
@@ -128,7 +129,7 @@ impl Brick {
     }
 }
 
-/// See the module's description.
+/// Store of samples in bricks; see the module's description.
 #[derive(Debug, Clone)]
 pub struct SampleStore {
     layout: StoreLayout,
@@ -140,7 +141,7 @@ pub struct SampleStore {
     bricks: Vec<Brick>,
     open: OpenBricks,
     arena: Arena,
-    /// The longest single step so far, along the tunnel and along the perimeter, m.
+    /// Longest single step so far, along the tunnel and along the perimeter, m.
     longest_step_m: [f64; 2],
     kept: u64,
     thinned: u64,
@@ -151,7 +152,7 @@ stateful!(SampleStore { state: open, arena, longest_step_m, kept, thinned; slots
 impl SampleStore {
     /// An empty store.
     ///
-    /// Allocates: startup only; all that it will ever use.
+    /// Allocates: at startup, all that it will ever use.
     pub fn new(layout: StoreLayout) -> Self {
         let rows = math::floor_to_i64((layout.to_m - layout.from_m) / layout.cell_m).max(0) + 1;
         let columns = math::floor_to_i64(layout.perimeter_m / layout.cell_m).max(1);
@@ -161,7 +162,7 @@ impl SampleStore {
         let bricks = to_usize(rows).div_ceil(rows_per_brick);
         let capacity = layout.capacity as usize;
         let open_samples = OPEN_SAMPLES.min(capacity);
-        // Nearly all samples take one word; open ones are budgeted at the maximum.
+        // Nearly all samples take one word. Open ones are budgeted at the maximum.
         let words = capacity
             + capacity / 8
             + MOST_WORDS * (open_samples + 1)
@@ -181,7 +182,8 @@ impl SampleStore {
         }
     }
 
-    /// Frees all samples and their memory; nothing can be stored any more. The count of thinned samples remains.
+    /// Frees all samples and their memory. Nothing can be stored afterwards. The count of thinned samples
+    /// remains.
     pub fn release(&mut self) {
         let layout = StoreLayout { to_m: self.layout.from_m, capacity: 0, ..self.layout };
         *self = Self { thinned: self.thinned, ..Self::new(layout) };
@@ -208,9 +210,9 @@ impl SampleStore {
         }
     }
 
-    /// Stores a sample, unless its cell is full and holds one close by.
+    /// Stores a sample, unless its cell is full and holds one nearby.
     ///
-    /// Errors: it lies outside, or the store is full.
+    /// Errors: the sample lies outside, or the store is full.
     /// Allocates: never.
     pub fn insert(&mut self, sample: WallSample) -> Result<Kept, StoreError> {
         let row = self.row(sample.x_m).filter(|_| sample.arc_m.is_finite()).ok_or(StoreError::Outside)?;
@@ -247,8 +249,9 @@ impl SampleStore {
         Ok(Kept::Stored)
     }
 
-    /// Calls `take` with chainage and arc length, m, and the number of the visit of all samples between two chainages, m, and
-    /// perhaps of some beyond.
+    /// Calls `take` with chainage, arc length, m, and visit number of all samples between two chainages, m.
+    ///
+    /// It may include some samples beyond them.
     ///
     /// Allocates: never.
     pub fn each_between(&self, from_m: f64, to_m: f64, mut take: impl FnMut(f64, f64, u32)) {

@@ -16,16 +16,16 @@ pub(super) struct Node {
     pub x_m: f64,
     /// Arc length, in [0, perimeter), m.
     pub arc_m: f64,
-    /// Single step from the sample before, along the tunnel and the perimeter, m; zero without one.
+    /// Single step from the previous sample, along the tunnel and the perimeter, m; zero without one.
     pub step_m: [f64; 2],
-    /// Number of the visit.
+    /// Visit number.
     pub visit: u32,
     next_in_cell: Link,
     next_of_head: Link,
 }
 
 impl Node {
-    /// The sample itself.
+    /// The node's sample.
     pub(super) fn sample(&self) -> Packed {
         let Self { x_m, arc_m, step_m, visit, .. } = *self;
         Packed { x_m, arc_m, step_m, visit }
@@ -63,10 +63,10 @@ pub(super) struct OpenBricks {
     rows: usize,
     columns: usize,
     cells: Vec<Cell>,
-    /// For each column of a slot, a bitmask of the rows that have samples.
+    /// Bitmask, for each column of a slot, of the rows that have samples.
     rows_seen: Vec<u32>,
     chains: Vec<[Chain; MAX_HEADS]>,
-    /// The brick in each slot.
+    /// Brick in each slot.
     bricks: Vec<Option<u32>>,
     nodes: Vec<Node>,
     most_nodes: usize,
@@ -78,7 +78,7 @@ pub(super) struct OpenBricks {
 stateful!(OpenBricks { state: free, used; lists: nodes; slots: cells, rows_seen, chains, bricks; fixed: rows, columns, most_nodes; });
 
 impl OpenBricks {
-    /// Allocates: startup only.
+    /// Allocates: at startup only.
     pub(super) fn new(slots: usize, (rows, columns): (usize, usize), most_nodes: usize) -> Self {
         Self {
             rows,
@@ -99,7 +99,7 @@ impl OpenBricks {
         self.most_nodes - self.used
     }
 
-    /// Samples in the open bricks.
+    /// Number of samples in the open bricks.
     pub(super) fn used(&self) -> usize {
         self.used
     }
@@ -109,18 +109,18 @@ impl OpenBricks {
         self.nodes.len() * size_of::<Node>() + self.cells.len() * size_of::<Cell>()
     }
 
-    /// A slot that holds no brick.
+    /// A slot without a brick.
     pub(super) fn free_slot(&self) -> Option<usize> {
         self.bricks.iter().position(Option::is_none)
     }
 
-    /// The slot of the open brick farthest from another, and that brick.
+    /// Slot and number of the open brick farthest from another one.
     pub(super) fn farthest_from(&self, brick: u32) -> Option<(usize, u32)> {
         let held = self.bricks.iter().enumerate().filter_map(|(slot, held)| Some((slot, (*held)?)));
         held.filter(|(_, held)| *held != brick).max_by_key(|(_, held)| held.abs_diff(brick))
     }
 
-    /// Assigns a slot to a brick, without samples.
+    /// Assigns a slot to a brick without samples.
     pub(super) fn place(&mut self, slot: usize, brick: u32) {
         if let Some(held) = self.bricks.get_mut(slot) {
             *held = Some(brick);
@@ -171,18 +171,18 @@ impl OpenBricks {
         self.rows_seen.get(slot * self.columns + column).copied().unwrap_or(0)
     }
 
-    /// Samples in a cell of a slot.
+    /// Number of samples in a cell of a slot.
     pub(super) fn count(&self, at: CellAt) -> u32 {
         self.cells.get(self.index(at)).map_or(0, |list| list.count)
     }
 
-    /// The samples of a cell of a slot, the latest first.
+    /// Samples of a cell of a slot, latest first.
     pub(super) fn in_cell(&self, at: CellAt) -> impl Iterator<Item = &Node> {
         let latest = self.cells.get(self.index(at)).map_or(0, |list| list.latest);
         self.list(latest, |node| node.next_in_cell)
     }
 
-    /// The samples of a head in a slot, the earliest first.
+    /// Samples of a head in a slot, earliest first.
     pub(super) fn of_head(&self, slot: usize, head: usize) -> impl Iterator<Item = &Node> {
         let chain = self.chains.get(slot).and_then(|chains| chains.get(head));
         self.list(chain.map_or(0, |chain| chain.first), |node| node.next_of_head)

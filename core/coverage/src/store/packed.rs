@@ -1,9 +1,9 @@
 //! Packed samples away from the vehicle, four bytes each.
 //!
-//! The samples of a brick lie in a chain of blocks, head by head in order of arrival, so that most take one word: the
-//! difference from the sample before, in quanta of 2^-17 m. Quanta count from chainage and arc length zero of the brick:
-//! one lattice for all samples, on which a step ends exactly where the next begins, and on which an unpacked sample is
-//! packed again without further loss.
+//! The samples of a brick lie in a chain of blocks, head by head in order of arrival. Most take one word: the
+//! difference from the previous sample, in quanta of 2^-17 m. Quanta count from chainage and arc length zero
+//! of the brick. All samples thus share one lattice, on which a step ends exactly where the next begins. An
+//! unpacked sample is packed again without further loss.
 
 use headrace_geometry::math;
 use headrace_geometry::snapshot::{Restorer, Saver, SnapshotError, Stateful};
@@ -11,18 +11,19 @@ use headrace_sampling::head::MAX_HEADS;
 
 /// Quanta per metre.
 const QUANTA_PER_M: f64 = 131_072.0;
-/// Maximum displacement of a sample by packing, m: half a quantum along the tunnel, and one along the perimeter, whose
-/// last quantum is partial.
+/// Maximum displacement of a sample by packing, m.
+///
+/// It is half a quantum along the tunnel, and one along the perimeter, whose last quantum is partial.
 pub(super) const MOVED_M: f64 = 8.6e-6;
-/// Sample words per block; one more word links to the next block.
+/// Sample words per block. One more word links to the next block.
 pub(super) const ROOM: usize = 31;
 /// Maximum words per sample.
 pub(super) const MOST_WORDS: usize = 7;
-/// Lower half of an escape word: one that isn't a difference.
+/// Lower half of an escape word, which is no difference.
 const ESCAPE: u16 = 0x8000;
 const PLACE: u16 = 0;
 const STEPPED: u16 = 1;
-/// The next word is the number of the visit of the samples from here on.
+/// The next word is the visit number of the samples that follow.
 const VISIT: u16 = u16::MAX;
 /// Tags from this one on switch heads: `HEAD` plus the head's number.
 const HEAD: u16 = 2;
@@ -49,15 +50,15 @@ pub(super) struct Packed {
     pub x_m: f64,
     /// Arc length, m.
     pub arc_m: f64,
-    /// Single step from the sample before, along the tunnel and the perimeter, m; zero without one.
+    /// Single step from the previous sample, along the tunnel and the perimeter, m; zero without one.
     pub step_m: [f64; 2],
-    /// Number of the visit.
+    /// Visit number.
     pub visit: u32,
 }
 
 impl Lattice {
     pub(super) fn new(from_m: f64, perimeter_m: f64) -> Self {
-        // The last quantum whose middle is below the perimeter.
+        // The last quantum with its centre below the perimeter.
         let last_arc = math::floor_to_i64(perimeter_m * QUANTA_PER_M - 0.5 - 1e-6).max(0);
         Self { origin: math::floor_to_i64(from_m * QUANTA_PER_M), perimeter_m, last_arc }
     }
@@ -69,13 +70,13 @@ impl Lattice {
         }
     }
 
-    /// The middle of its quantum, m.
+    /// Centre of a quantum, m.
     fn place_m(&self, spot: Spot) -> (f64, f64) {
         (((self.origin + spot.x) as f64 + 0.5) / QUANTA_PER_M, (spot.arc as f64 + 0.5) / QUANTA_PER_M)
     }
 }
 
-/// Difference word for a sample close to the one before; `None` if it is too far.
+/// Difference word for a sample close to the previous one; `None` if it is too far away.
 fn difference(from: Spot, to: Spot, stepped: bool) -> Option<u32> {
     let along = i16::try_from(to.x - from.x).ok().filter(|along| (-0x4000..0x4000).contains(along))?;
     let around = i16::try_from(to.arc - from.arc).ok().filter(|around| *around != i16::MIN)?;
@@ -92,7 +93,7 @@ fn escape(tag: u16) -> u32 {
 pub(super) struct Arena {
     blocks: Vec<[u32; ROOM + 1]>,
     most: usize,
-    /// First of the free blocks: index plus one, or zero.
+    /// First free block: index plus one, or zero.
     free: u32,
     used: usize,
 }
@@ -109,7 +110,7 @@ impl Stateful for Arena {
         let bytes = from.raw()?;
         let (blocks, rest) = bytes.as_chunks::<{ 4 * (ROOM + 1) }>();
         if !rest.is_empty() || blocks.len() > self.most {
-            return Err(from.unfit(format!("{} bytes of blocks, and room for {}", bytes.len(), self.most)));
+            return Err(from.unfit(format!("{} bytes of blocks; at most {} fit", bytes.len(), self.most)));
         }
         self.blocks.clear();
         self.blocks.extend(blocks.iter().map(|block| {
@@ -124,7 +125,7 @@ impl Stateful for Arena {
 }
 
 impl Arena {
-    /// Allocates: startup only.
+    /// Allocates: at startup only.
     pub(super) fn new(most_blocks: usize) -> Self {
         Self { blocks: Vec::with_capacity(most_blocks), most: most_blocks, free: 0, used: 0 }
     }
@@ -217,7 +218,7 @@ impl<'a> Writer<'a> {
         let [along_m, around_m] = sample.step_m;
         let stepped = along_m.abs() + around_m.abs() > 0.0;
         let start_m = (sample.x_m - along_m, math::wrap(sample.arc_m - around_m, self.lattice.perimeter_m));
-        // But for rounding, the step began at the sample before.
+        // Except for rounding, the step began at the previous sample.
         let follows = |before: &Packed| {
             (before.x_m - start_m.0).abs() < 1e-9 && (before.arc_m - start_m.1).abs() < 1e-9
         };
@@ -256,13 +257,13 @@ impl<'a> Writer<'a> {
         Some(())
     }
 
-    /// The brick's first block.
+    /// First block of the brick.
     pub(super) fn finish(self) -> u32 {
         self.first
     }
 }
 
-/// Reads a brick: iterates over head number and sample.
+/// Reads a brick: iterates over head numbers and samples.
 pub(super) struct Reader<'a> {
     arena: &'a Arena,
     lattice: Lattice,

@@ -10,13 +10,13 @@ use headrace_geometry::math;
 #[derive(Debug, Clone, Copy)]
 struct Place {
     x_m: f64,
-    /// In [0, perimeter).
+    /// Arc length in [0, perimeter), m.
     arc_m: f64,
     perimeter_m: f64,
 }
 
 impl Place {
-    /// Distance in chainage to where a sample's step crosses the arc length, if it does.
+    /// Distance in chainage to the place where a sample's step crosses the arc length, if it does, m.
     fn to_crossing_m(self, end: &Node) -> Option<f64> {
         let [along_m, around_m] = end.step_m;
         let mut to_end = end.arc_m - self.arc_m;
@@ -26,13 +26,13 @@ impl Place {
             to_end += self.perimeter_m;
         }
         let to_start = to_end - around_m;
-        // The start point belongs to the step before.
+        // The start point belongs to the previous step.
         let crosses = (to_start < 0.0 && to_end >= 0.0) || (to_start > 0.0 && to_end <= 0.0);
         crosses.then(|| (end.x_m - along_m * (to_end / around_m) - self.x_m).abs())
     }
 }
 
-/// The brick that a search has reached on one side.
+/// Brick that a search has reached on one side.
 #[derive(Debug, Clone, Copy, Default)]
 struct Side {
     brick: Option<u32>,
@@ -42,11 +42,12 @@ struct Side {
 }
 
 impl SampleStore {
-    /// Distance in chainage to the nearest pass over `arc_m` within `within_m`, m; accurate to some micrometres if a packed
-    /// brick had to be opened for it.
+    /// Distance in chainage to the nearest pass over `arc_m` within `within_m`, m.
     ///
-    /// A pass is a single step of a head from one sample to the next; where it crosses `arc_m` its chainage is
-    /// interpolated. Source: docs/reference/glossary.md, "Spacing and holes", T_x.
+    /// It is accurate to some micrometres if a packed brick had to be opened. A pass is a single step of a
+    /// head from one sample to the next. Its chainage at `arc_m` is interpolated. Source:
+    /// docs/reference/glossary.md, "Spacing and holes", T_x.
+    ///
     /// Allocates: never.
     pub fn nearest_pass_m(&mut self, x_m: f64, arc_m: f64, within_m: f64) -> Option<f64> {
         let perimeter_m = self.layout.perimeter_m;
@@ -54,7 +55,7 @@ impl SampleStore {
         let centre = math::floor_to_i64((x_m - self.layout.from_m) / self.layout.cell_m);
         let into_row = (x_m - self.layout.from_m) - centre as f64 * self.layout.cell_m;
         let inner = into_row.min(self.layout.cell_m - into_row).max(0.0);
-        // A step ends at most its length from where it crosses the arc length.
+        // A step ends at most its own length from the place where it crosses the arc length.
         let [along_m, around_m] = self.longest_step_m;
         let left = math::floor_to_i64((place.arc_m - around_m) / self.column_m);
         let right = math::floor_to_i64((place.arc_m + around_m) / self.column_m);

@@ -9,7 +9,7 @@ fn sample(x_m: f64, arc_m: f64) -> WallSample {
     WallSample { x_m, arc_m, head: 0, step_m: None, visit: 0 }
 }
 
-/// Samples of several heads in single steps from point to point; the first of each head has none.
+/// Samples of several heads in single steps from point to point. The first sample of each head has no step.
 fn steps(places: &[(f64, f64)], heads: usize) -> Vec<WallSample> {
     let mut last = vec![None; heads];
     let mut all = Vec::new();
@@ -31,15 +31,15 @@ fn store(samples: &[WallSample]) -> SampleStore {
     store
 }
 
-/// Opens enough other bricks that none of the first 40 m stays open.
+/// Opens so many other bricks that none of the first 40 m stays open.
 fn pack_the_first_40_m(store: &mut SampleStore) {
     for k in 0..100 {
         store.insert(sample(210.0 - 1.2 * f64::from(k), 0.0)).unwrap();
     }
-    assert!(store.bricks.iter().take(30).all(|brick| brick.slot == 0), "all of them are packed");
+    assert!(store.bricks.iter().take(30).all(|brick| brick.slot == 0), "all bricks must be packed");
 }
 
-/// Samples kept of the first 40 m, sorted.
+/// Kept samples of the first 40 m, sorted.
 fn kept(store: &SampleStore) -> Vec<(f64, f64)> {
     let mut kept = Vec::new();
     store.each_between(-1.0, 40.0, |x_m, arc_m, _| kept.push((x_m, arc_m)));
@@ -76,7 +76,7 @@ fn places(most: usize) -> impl Strategy<Value = Vec<(f64, f64)>> {
 proptest! {
     /// Against brute force over every step.
     #[test]
-    fn the_nearest_pass_is_the_nearest(
+    fn nearest_pass_agrees_with_brute_force(
         places in places(60),
         heads in 1_usize..4,
         place in (-3.0f64..14.0, 0.0f64..PERIMETER_M),
@@ -91,10 +91,10 @@ proptest! {
         }
     }
 
-    /// Passes in packed bricks are found to the accuracy of packing. Steps are as short as those of real heads, so that
-    /// interpolation along a step doesn't amplify the error.
+    /// Passes in packed bricks are found to the accuracy of packing. Steps are as short as those of real
+    /// heads, so interpolation along a step doesn't amplify the error.
     #[test]
-    fn passes_outlive_packing(
+    fn passes_survive_packing(
         starts in proptest::collection::vec((0.0f64..12.0, 0.0f64..PERIMETER_M, -0.06f64..0.06), 1..8),
         place in (-1.0f64..13.0, 0.0f64..PERIMETER_M),
     ) {
@@ -124,9 +124,9 @@ proptest! {
         }
     }
 
-    /// Repeatedly packed and opened, each sample stays where it was within the stated displacement.
+    /// Each sample stays within the stated displacement when packed and opened repeatedly.
     #[test]
-    fn samples_outlive_packing(places in places(200), heads in 1_usize..8, reversed: bool) {
+    fn samples_survive_packing(places in places(200), heads in 1_usize..8, reversed: bool) {
         let mut samples = steps(&places, heads);
         if reversed {
             samples.reverse();
@@ -134,7 +134,7 @@ proptest! {
         let mut store = store(&samples);
         let mut expected = places.clone();
         expected.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.total_cmp(&b.1)));
-        prop_assert_eq!(kept(&store), expected, "open, nothing is moved");
+        prop_assert_eq!(kept(&store), expected, "no sample moves while open");
         prop_assert_eq!(store.fidelity(-1.0, 12.0), Fidelity::default());
         pack_the_first_40_m(&mut store);
         let once = kept(&store);
@@ -150,12 +150,12 @@ proptest! {
             }
             pack_the_first_40_m(&mut store);
         }
-        prop_assert_eq!(kept(&store), once, "a second time nothing is moved");
+        prop_assert_eq!(kept(&store), once, "no sample moves the second time");
     }
 
-    /// A dropped sample has a kept one within the stated distance.
+    /// Every dropped sample has a kept one within the stated distance.
     #[test]
-    fn a_kept_one_stands_for_each_that_is_not(
+    fn every_dropped_sample_has_a_kept_one_nearby(
         places in proptest::collection::vec((0.0f64..0.31, 1.0f64..1.31), 400..900),
         packing: bool,
     ) {
@@ -167,7 +167,7 @@ proptest! {
             }
         }
         let (kept, fidelity) = (kept(&store), store.fidelity(0.0, 0.3));
-        prop_assert!(kept.len() < places.len(), "something is left out");
+        prop_assert!(kept.len() < places.len(), "some samples must be dropped");
         prop_assert_eq!(kept.len() + store.usage().thinned as usize, places.len());
         for place in &places {
             let nearest = kept.iter().map(|other| apart(*place, *other)).fold(f64::INFINITY, f64::min);
@@ -176,14 +176,14 @@ proptest! {
         let farthest = places.iter().map(|place| {
             kept.iter().map(|other| apart(*place, *other)).fold(f64::INFINITY, f64::min)
         }).fold(0.0, f64::max);
-        prop_assert!(farthest > 0.1 * fidelity.thinned_m, "the distance said is not out of all proportion");
+        prop_assert!(farthest > 0.1 * fidelity.thinned_m, "the stated distance is realistic");
     }
 }
 
 #[test]
-fn a_pass_is_found_where_its_step_crosses() {
+fn pass_is_found_at_the_crossing_of_its_step() {
     let mut store = store(&[sample(1.0, 7.2), sample(1.1, 0.2), sample(3.0, 7.2)]);
-    // From (1.0, 7.2) to (1.3, 0.1), crossing the seam at its middle.
+    // From (1.0, 7.2) to (1.3, 0.1), crossing the seam at its centre.
     let step = WallSample { step_m: Some([0.3, 0.2]), ..sample(1.3, 0.1) };
     store.insert(step).unwrap();
     let distance = store.nearest_pass_m(2.0, 0.0, 5.0).unwrap();
@@ -193,7 +193,7 @@ fn a_pass_is_found_where_its_step_crosses() {
 }
 
 #[test]
-fn what_is_outside_or_too_much_is_refused() {
+fn samples_outside_or_beyond_capacity_are_refused() {
     let layout = StoreLayout { perimeter_m: 3.0, from_m: 0.0, to_m: 1.0, cell_m: 0.25, capacity: 1 };
     let mut store = SampleStore::new(layout);
     let sample = sample(0.5, 1.0);
@@ -207,9 +207,9 @@ fn what_is_outside_or_too_much_is_refused() {
     assert_eq!(store.insert(sample), Err(StoreError::Full));
 }
 
-/// Refused samples are reported; kept ones stay.
+/// Refused samples are reported. Kept ones remain.
 #[test]
-fn a_full_store_loses_nothing_that_it_kept() {
+fn full_store_keeps_all_stored_samples() {
     let mut store = SampleStore::new(StoreLayout { capacity: 3_000, ..LAYOUT });
     let mut stored = 0;
     for k in 0..20_000_u32 {
@@ -225,9 +225,9 @@ fn a_full_store_loses_nothing_that_it_kept() {
     assert_eq!(seen, stored);
 }
 
-/// Four heads at 50 pings per second for an hour on one spot, with centimetre jitter.
+/// Four heads at 50 pings per second spend an hour on one spot, with centimetre jitter.
 #[test]
-fn a_parked_vehicle_fills_cells_and_no_more() {
+fn stationary_vehicle_fills_its_cells_only() {
     let mut store = SampleStore::new(LAYOUT);
     let (mut hashed, mut after_half) = (1_u64, None);
     let mut noise_m = || {
@@ -249,16 +249,16 @@ fn a_parked_vehicle_fills_cells_and_no_more() {
     assert_eq!(usage.kept + usage.thinned, 4 * pings as u64);
     assert!(usage.kept < 10_000, "{usage:?}");
     assert!(usage.bytes < 2_000_000, "{usage:?}");
-    assert!(usage.kept - after_half.kept < 300, "it hardly grows any more: {after_half:?} {usage:?}");
+    assert!(usage.kept - after_half.kept < 300, "it should hardly grow any more: {after_half:?} {usage:?}");
     assert!(store.fidelity(100.0, 100.0).thinned_m <= 0.02);
 }
 
-/// A step is dropped from a full cell where one close by goes in its direction: passes are told apart by it.
+/// A full cell drops a step only if a nearby one has the same direction, which distinguishes passes.
 #[test]
-fn a_step_is_dropped_for_one_in_its_direction_alone() {
+fn step_is_dropped_only_for_one_in_its_direction() {
     let mut store = SampleStore::new(LAYOUT);
     let mut goes = |around_m: f64, k: u32| {
-        // Over a decimetre of one cell, a millimetre apart.
+        // Spread over a decimetre of one cell, a millimetre apart.
         let off_m = 0.001 * f64::from(k % 100);
         let before = store.usage().thinned;
         store.insert(WallSample { step_m: Some([0.002, around_m]), ..sample(100.1, 3.05 + off_m) }).unwrap();
@@ -266,13 +266,13 @@ fn a_step_is_dropped_for_one_in_its_direction_alone() {
     };
     let ways: Vec<bool> = (0..400).map(|k| goes(0.05, k)).collect();
     assert!(ways[..100].iter().all(|dropped| !dropped) && ways[300..].iter().all(|dropped| *dropped));
-    assert!(!goes(-0.03, 17), "the first to go back is kept");
+    assert!(!goes(-0.03, 17), "the first step in the other direction is kept");
     assert!(goes(0.05, 17));
 }
 
-/// Back and forth over one section: neither memory nor error grows.
+/// Memory and error don't grow when the vehicle drives back and forth over one section.
 #[test]
-fn back_and_forth_a_hundred_times() {
+fn hundred_passes_back_and_forth_do_not_grow_memory() {
     let mut store = SampleStore::new(LAYOUT);
     let mut after_seventy = None;
     for round in 0..100 {
@@ -289,7 +289,7 @@ fn back_and_forth_a_hundred_times() {
         }
     }
     let (usage, (then, used)) = (store.usage(), after_seventy.unwrap());
-    assert!(usage.kept < used.kept + used.kept / 50, "full cells take no more: {used:?} {usage:?}");
+    assert!(usage.kept < used.kept + used.kept / 50, "full cells must take no more: {used:?} {usage:?}");
     assert!(usage.bytes < used.bytes + used.bytes / 50, "{used:?} {usage:?}");
     let now = kept(&store);
     let lost = then.iter().filter(|place| !now.iter().any(|other| apart(**place, *other) <= packed::MOVED_M));
@@ -319,9 +319,9 @@ fn samples_keep_their_visits_when_packed() {
     assert_eq!(visits(&store), before);
 }
 
-/// One stretch may hold as many samples as the open ones have room for.
+/// One stretch may hold as many samples as fit into the open bricks.
 #[test]
-fn a_stretch_that_needs_all_the_room_is_opened_again() {
+fn stretch_that_fills_all_open_bricks_is_opened_again() {
     let mut store = SampleStore::new(StoreLayout { capacity: 4, ..LAYOUT });
     for k in 0..4 {
         let at = f64::from(k);
@@ -329,15 +329,18 @@ fn a_stretch_that_needs_all_the_room_is_opened_again() {
         store.insert(WallSample { step_m, ..sample(1.0 + 0.01 * at, 2.0 + 0.1 * at) }).unwrap();
     }
     store.insert(sample(100.0, 0.0)).unwrap();
-    assert!(store.bricks.iter().take(30).all(|brick| brick.slot == 0), "it was packed for the one far away");
-    // The step from 2.2 to 2.3 m crosses at its middle.
+    assert!(
+        store.bricks.iter().take(30).all(|brick| brick.slot == 0),
+        "it must be packed for the distant sample"
+    );
+    // The step from 2.2 to 2.3 m crosses at its centre.
     let distance = store.nearest_pass_m(1.5, 2.25, 5.0).unwrap();
     assert!((distance - 0.475).abs() < 3e-5, "{distance}");
 }
 
-/// A head that turns on, its samples in single steps or not, takes four bytes a sample once packed.
+/// Samples of a turning head take four bytes each once packed, in single steps or not.
 #[test]
-fn a_sweep_takes_a_word_a_sample_when_packed() {
+fn packed_sweep_takes_one_word_per_sample() {
     for is_stepped in [true, false] {
         let mut store = SampleStore::new(LAYOUT);
         let all = store.arena.free_words();
@@ -354,15 +357,15 @@ fn a_sweep_takes_a_word_a_sample_when_packed() {
 }
 
 #[test]
-fn cells_are_of_half_the_target_within_reason() {
+fn cell_edge_is_half_the_target_within_limits() {
     for (target_m, cell_m) in [(0.5, 0.25), (0.8, 0.4), (1.0, 0.5), (6.0, 0.5), (0.1, 0.05), (0.02, 0.05)] {
         assert!((StoreLayout::cell_for_target_m(target_m) - cell_m).abs() < 1e-12, "{target_m}");
     }
 }
 
-/// Samples are found where they are, wherever the wall begins.
+/// A pass is found at its place, wherever the wall begins.
 #[test]
-fn a_pass_is_found_within_little_of_its_place() {
+fn pass_is_found_at_its_place() {
     for from_m in [-1.0, 0.0, 6000.0] {
         let layout = StoreLayout { from_m, to_m: from_m + 40.0, ..LAYOUT };
         let mut store = SampleStore::new(layout);
@@ -378,9 +381,9 @@ fn a_pass_is_found_within_little_of_its_place() {
     }
 }
 
-/// The wall's last place is one of its last row.
+/// The very end of the wall belongs to its last row.
 #[test]
-fn a_sample_at_the_very_end_is_found() {
+fn sample_at_the_very_end_is_found() {
     let layout = StoreLayout { from_m: 0.0, to_m: 10.0, cell_m: 0.25, ..LAYOUT };
     let mut store = SampleStore::new(layout);
     for (k, x_m) in [9.4, 10.0].into_iter().enumerate() {

@@ -1,18 +1,20 @@
 //! Thinning of full cells: samples close enough to a kept one are dropped.
 //!
-//! A hole is then overestimated by at most twice that distance. The fuller a cell, the coarser the thinning, down to a
-//! sixteenth of the cell, so that a cell holds some hundreds of samples at most.
+//! A hole is overestimated by at most twice that distance. Thinning gets coarser as a cell fills, down to a
+//! sixteenth of the cell, so a cell holds some hundreds of samples at most.
 
 use super::open::{CellAt, OpenBricks};
 
-/// Thinning tiers: from this many samples in a cell on, those closer to a kept one than this share of the cell's edge
-/// are dropped.
+/// Thinning tiers: samples in the cell from which the tier applies, and its distance as a share of the cell's
+/// edge.
+///
+/// Samples closer than that to a kept one are dropped.
 const TIERS: [(u32, f64); 4] = [(64, 1.0 / 128.0), (96, 1.0 / 64.0), (128, 1.0 / 32.0), (160, 1.0 / 16.0)];
 
-/// Extra samples in a cell before samples at the end of a step are thinned.
+/// Additional samples in a cell before samples at the end of a step are thinned.
 const PASSES: u32 = 64;
 
-/// Maximum distance of a dropped sample from a kept one, m, after thinning up to a tier; tier 0 is none.
+/// Maximum distance of a dropped sample from a kept one after thinning up to a tier, m; zero for tier 0.
 pub(super) fn delta_m(tier: u8, edge_m: f64) -> f64 {
     let tier = usize::from(tier).checked_sub(1).and_then(|tier| TIERS.get(tier));
     tier.map_or(0.0, |(_, share)| share * edge_m)
@@ -26,7 +28,7 @@ pub(super) fn stands_for(
     step_m: Option<[f64; 2]>,
     edge_m: f64,
 ) -> Option<u8> {
-    // A step is a pass: it is dropped later, and only if one close by in the same direction represents it.
+    // A step is a pass. It is dropped later, and only if a nearby step in the same direction represents it.
     let around_m = step_m.map_or(0.0, |[_, around_m]| around_m);
     let count = open.count(at).saturating_sub(if step_m.is_some() { PASSES } else { 0 });
     let tier = TIERS.iter().take_while(|(from, _)| count >= *from).count();

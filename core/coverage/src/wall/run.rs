@@ -1,46 +1,49 @@
-//! Successive returns of a head that agree with one another and with nothing else yet.
+//! A run: successive returns of a head that agree only with one another so far.
 
 use serde::{Deserialize, Serialize};
 
 use crate::wall_limits::{PlacedReturn, WallLimits};
 
-/// Most returns that wait for one another.
+/// Maximum number of waiting returns.
 pub const MOST_WAITING: usize = 24;
-/// What is off the wall by more than so many times its width, with a jump to the wall on both sides, hangs in the water, or came by way
-/// of two walls: rocks, heaps, niches and caves are about as wide as they are high or deep, and of a side tunnel as much is seen.
-/// Tuned on the field table's murk: clusters of returns there are 12 times and more as far from the wall as they are wide.
+/// Ratio of distance from the wall to width above which a run with a jump to the wall on both sides is no
+/// wall.
+///
+/// It hangs in the water, or is an echo off two walls. Rocks, heaps, niches and caves are about as wide as
+/// they are high or deep, and side tunnels are seen as deep as they are wide. Tuned on the field table's
+/// murk: clusters of returns there are at least 12 times as far from the wall as they are wide.
 const SLENDER: f64 = 4.0;
 
-/// See the module's description.
+/// A run of returns; see the module's description.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub(super) struct Run {
     waiting: [PlacedReturn; MOST_WAITING],
     waits: u8,
-    /// The first return, also of a run of which some have been given up, and how many there were.
+    /// First return, including those of the run already given up, and the number of returns.
     first: Option<PlacedReturn>,
     all: u32,
-    /// How far it is off the design at most, and how wide it is, m.
+    /// Largest distance from the design, and width, m.
     off_m: f64,
     width_m: f64,
 }
 
 impl Run {
-    /// How many wait.
+    /// Number of waiting returns.
     pub(super) fn count(&self) -> u32 {
         u32::from(self.waits)
     }
 
-    /// Those that wait.
+    /// Waiting returns.
     pub(super) fn returns(&self) -> impl Iterator<Item = &PlacedReturn> {
         self.waiting.iter().take(usize::from(self.waits))
     }
 
-    /// Adds a return, which waits.
+    /// Adds a waiting return.
     pub(super) fn add(&mut self, placed: &PlacedReturn, limits: &WallLimits) {
         let first = *self.first.get_or_insert(*placed);
         self.all += 1;
         self.off_m = self.off_m.max(placed.off_m.abs());
-        // Each return stands for a step to either side.
+        // Each return represents a step to either side.
         let steps = f64::from(self.all.max(2)) / f64::from(self.all.max(2) - 1);
         self.width_m = self.width_m.max(steps * limits.width_m(&first, placed));
         if let Some(slot) = self.waiting.get_mut(usize::from(self.waits)) {
@@ -49,7 +52,7 @@ impl Run {
         }
     }
 
-    /// Whether it is wall for its width.
+    /// Whether the run is wide enough to be wall.
     pub(super) fn is_broad(&self) -> bool {
         self.all > 1 && SLENDER * self.width_m >= self.off_m
     }
@@ -59,7 +62,7 @@ impl Run {
         usize::from(self.waits) == MOST_WAITING
     }
 
-    /// Those that waited are given up but for the last one.
+    /// Gives up the waiting returns except the last one.
     pub(super) fn give_up(&mut self, last: &PlacedReturn) {
         self.waiting[0] = *last;
         self.waits = 1;

@@ -1,20 +1,20 @@
-//! Heads in a round tunnel whose wall is anything, and what of their returns is taken for wall.
+//! Heads in a round tunnel with any wall, and the classification of their returns.
 
 use super::*;
 use headrace_geometry::math::{self, TAU};
 
 const STEPS: u32 = 150;
 
-/// Heads that turn in step, evenly spread, while the vehicle goes on.
+/// Heads that turn together, evenly spread, while the vehicle moves on.
 struct Turning {
     limits: WallLimits,
     relief: Relief,
     heads: Vec<HeadWall>,
-    /// Way between two passes, m.
+    /// Distance travelled between two passes, m.
     pass_m: f64,
 }
 
-/// How often returns of a head were taken for what.
+/// Counts of a head's returns by classification.
 #[derive(Debug, Clone, Default, PartialEq)]
 struct Count {
     wall: usize,
@@ -33,8 +33,10 @@ impl Turning {
         }
     }
 
-    /// Turns; `heard` is the range from the middle that a head says at a chainage and an angle, and the turn's and the
-    /// step's number; none where it hears nothing.
+    /// Runs some turns.
+    ///
+    /// `heard` is the range from the centre that a head measures, by head, chainage, angle, and the numbers
+    /// of turn and step; `None` if it hears nothing.
     fn turn(&mut self, turns: u32, heard: impl Fn(usize, f64, f64, [u32; 2]) -> Option<f64>) -> Vec<Count> {
         let radius_m = self.limits.radius_m;
         let mut counts = vec![Count::default(); self.heads.len()];
@@ -65,7 +67,7 @@ impl Turning {
         counts
     }
 
-    /// One head, of which nothing is doubtful.
+    /// Checks that nothing of a single head is doubtful.
     #[track_caller]
     fn all_wall(mut self, turns: u32, wall_m: impl Fn(f64, f64) -> f64) {
         for count in self.turn(turns, |_, x_m, angle, _| Some(wall_m(x_m, angle))) {
@@ -75,7 +77,7 @@ impl Turning {
     }
 }
 
-/// From -1 to 1, the same for the same numbers.
+/// Pseudo-random number from -1 to 1, the same for the same inputs.
 fn noise(a: u32, b: u32) -> f64 {
     let mixed = (u64::from(a) << 32 | u64::from(b)).wrapping_mul(0x9e37_79b9_7f4a_7c15);
     let mixed = (mixed ^ (mixed >> 29)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
@@ -83,14 +85,14 @@ fn noise(a: u32, b: u32) -> f64 {
 }
 
 #[test]
-fn smooth_and_rough_walls_and_wider_ones_are_wall_in_tunnels_of_any_size() {
+fn smooth_rough_and_wide_walls_are_wall_in_tunnels_of_any_size() {
     for radius_m in [0.3, 1.0, 6.0] {
         Turning::new(radius_m, 1).all_wall(10, |_, _| radius_m);
         Turning::new(radius_m, 1).all_wall(10, |_, _| 1.06 * radius_m);
         // Overbreak of a quarter of the radius, three lobes around and one along.
         Turning::new(radius_m, 2)
             .all_wall(10, |x_m, angle| radius_m * (1.12 + 0.12 * math::sin(3.0 * angle + x_m / radius_m)));
-        // As vehicles find it that take themselves to be in the middle.
+        // A vehicle beside its estimated place in the centre measures this.
         Turning::new(radius_m, 1).all_wall(10, |_, angle| radius_m * (1.0 + 0.15 * math::sin(angle)));
     }
 }
@@ -98,7 +100,7 @@ fn smooth_and_rough_walls_and_wider_ones_are_wall_in_tunnels_of_any_size() {
 #[test]
 fn boulders_and_niches_are_wall_to_their_edges() {
     for (inward_m, half_width) in [(1.5, 0.1), (-2.0, 0.15), (3.0, 0.3)] {
-        // Three or more steps wide: its edges are one return each, both sides of them.
+        // Objects are at least three steps wide. Their edges are one return each, on both sides.
         Turning::new(6.0, 1).all_wall(8, |x_m, angle| {
             let within = (0.5..2.0).contains(&x_m) && (angle - 3.0).abs() < half_width;
             if within { 6.0 - inward_m } else { 6.0 }
@@ -106,9 +108,10 @@ fn boulders_and_niches_are_wall_to_their_edges() {
     }
 }
 
-/// Five returns in a row that agree, far from the wall, once: a cloud of bubbles. A pole that stands there is met again.
+/// Five successive returns that agree, far from the wall, once: a cloud of bubbles. A pole at the same place
+/// is met again.
 #[test]
-fn what_hangs_before_the_wall_is_doubtful_and_a_pole_is_wall_when_it_is_met_again() {
+fn floating_object_is_doubtful_and_pole_met_again_is_wall() {
     let near = |angle: f64| (angle - 3.0).abs() < 2.6 * TAU / f64::from(STEPS);
     for radius_m in [1.0, 6.0] {
         let cloud = |_: usize, _: f64, angle: f64, [turn, _]: [u32; 2]| {
@@ -121,7 +124,7 @@ fn what_hangs_before_the_wall_is_doubtful_and_a_pole_is_wall_when_it_is_met_agai
         };
         let count = &Turning::new(radius_m, 1).turn(6, pole)[0];
         assert_eq!((count.wall, count.doubtful), (6 * STEPS as usize - 5, 5), "{radius_m}");
-        // An echo by way of two walls, three times in a row.
+        // An echo off two walls, three times in a row.
         let echo = |_: usize, _: f64, angle: f64, [turn, _]: [u32; 2]| {
             Some(if turn == 2 && (angle - 3.0).abs() < 1.6 * TAU / f64::from(STEPS) {
                 1.9 * radius_m
@@ -134,9 +137,9 @@ fn what_hangs_before_the_wall_is_doubtful_and_a_pole_is_wall_when_it_is_met_agai
     }
 }
 
-/// A heap whose foot slopes to the wall, higher than it is wide.
+/// A heap that is higher than wide, with a foot that slopes to the wall.
 #[test]
-fn what_ends_in_a_slope_to_the_wall_is_wall() {
+fn run_ending_in_a_slope_to_the_wall_is_wall() {
     let steep = |_: f64, angle: f64| {
         let off = (angle - 3.0).abs();
         6.0 - (1.4 - 12.0 * off).max(0.0)
@@ -145,7 +148,7 @@ fn what_ends_in_a_slope_to_the_wall_is_wall() {
 }
 
 #[test]
-fn what_is_met_once_is_doubtful_and_wall_when_the_next_pass_meets_it_again() {
+fn single_hit_is_doubtful_until_the_next_pass_confirms_it() {
     let mut turning = Turning::new(6.0, 1);
     let fish = |_: usize, _: f64, _: f64, at: [u32; 2]| Some(if at == [2, 70] { 3.0 } else { 6.0 });
     let count = &turning.turn(5, fish)[0];
@@ -155,17 +158,21 @@ fn what_is_met_once_is_doubtful_and_wall_when_the_next_pass_meets_it_again() {
         Some(if step == 70 && turn >= 2 { 3.0 } else { 6.0 })
     };
     let count = &turning.turn(6, post)[0];
-    assert_eq!((count.wall, count.doubtful), (6 * STEPS as usize - 1, 1), "of four hits the first");
+    assert_eq!(
+        (count.wall, count.doubtful),
+        (6 * STEPS as usize - 1, 1),
+        "only the first of four hits is doubtful"
+    );
 }
 
 #[test]
-fn second_echoes_and_near_ones_here_and_there_are_doubtful_and_the_head_is_believed() {
+fn stray_echoes_are_doubtful_and_the_head_stays_trusted() {
     for radius_m in [1.0, 6.0] {
         let mut turning = Turning::new(radius_m, 2);
         let murk = |head: usize, _: f64, _: f64, [turn, step]: [u32; 2]| {
             let place = [turn + 1000 * u32::try_from(head).unwrap(), step];
             let share = noise(place[0] + 7, place[1]);
-            // A share of 0.05 falls anywhere before the wall, one of 0.03 comes by way of two walls.
+            // 5 % of the returns fall anywhere before the wall, 3 % are echoes off two walls.
             Some(match share {
                 ..-0.9 => radius_m * (0.4 + 0.4 * noise(place[0], place[1] + 500)),
                 0.94.. => 2.0 * radius_m * (1.0 + 0.2 * noise(place[0], place[1] + 900)),
@@ -187,7 +194,7 @@ fn second_echoes_and_near_ones_here_and_there_are_doubtful_and_the_head_is_belie
 }
 
 #[test]
-fn a_head_that_says_anything_is_not_believed() {
+fn random_ranges_make_a_head_distrusted() {
     let mut turning = Turning::new(1.0, 1);
     let count = &turning.turn(10, |_, _, _, [turn, step]| Some(1.0 + 0.9 * noise(turn, step)))[0];
     assert!(
@@ -198,7 +205,7 @@ fn a_head_that_says_anything_is_not_believed() {
 }
 
 #[test]
-fn a_head_that_sees_what_no_other_sees_is_not_believed_until_it_does() {
+fn outvoted_head_is_distrusted_until_it_agrees() {
     for wrong in 0..3 {
         let mut turning = Turning::new(1.0, 3);
         let frozen = |head: usize, _: f64, _: f64, _: [u32; 2]| Some(if head == wrong { 0.55 } else { 1.0 });
@@ -214,27 +221,27 @@ fn a_head_that_sees_what_no_other_sees_is_not_believed_until_it_does() {
         }
         let counts = turning.turn(6, frozen);
         assert_eq!((counts[wrong].wall, counts[wrong].doubtful), (0, 6 * STEPS as usize));
-        // The chainage begins anew: as if the vehicle had gone back.
+        // The chainage begins again, as if the vehicle had gone back.
         turning.turn(4, |_, _, _, _| Some(1.0));
         let counts = turning.turn(4, |_, _, _, _| Some(1.0));
-        assert_eq!(counts[wrong].doubtful, 0, "it is believed again");
+        assert_eq!(counts[wrong].doubtful, 0, "the head is trusted again");
     }
 }
 
 #[test]
-fn a_cave_that_all_heads_see_is_wall() {
+fn cave_seen_by_all_heads_is_wall() {
     Turning::new(1.0, 3).all_wall(12, |x_m, _| if (0.6..1.2).contains(&x_m) { 1.45 } else { 1.0 });
 }
 
 #[test]
-fn an_unchanging_range_is_the_wall_in_the_middle_of_a_pipe_and_a_fault_out_of_it() {
+fn constant_range_is_wall_in_the_centre_of_a_pipe_and_a_fault_off_it() {
     for (out_m, named) in [(0.0, 0), (0.02, 0), (0.2, 1)] {
         let mut turning = Turning::new(1.0, 1);
         let limits = turning.limits;
         let mut names = 0;
         for step in 0..5 * STEPS {
             let angle = TAU * f64::from(step % STEPS) / f64::from(STEPS);
-            // From `out_m` left of the middle, a circle of a range of 0.95 m about the head.
+            // From `out_m` left of the centre, a constant range of 0.95 m makes a circle about the head.
             let (sine, cosine) = math::sin_cos(angle);
             let (y, z) = (out_m + 0.95 * sine, -0.95 * cosine);
             let design_m = -out_m * sine + math::sqrt(1.0 - out_m * out_m * cosine * cosine);
@@ -252,9 +259,9 @@ fn an_unchanging_range_is_the_wall_in_the_middle_of_a_pipe_and_a_fault_out_of_it
     }
 }
 
-/// From a place out of the middle, where a range that stays agrees with the wall for a while each turn.
+/// Out of the centre, a constant range agrees with the wall for a while in each turn.
 #[test]
-fn a_head_that_sticks_for_a_while_is_not_believed_from_then_on_until_it_moves() {
+fn stuck_head_is_distrusted_until_its_range_moves() {
     for (radius_m, out_m) in [(1.0, 0.3), (6.0, 1.0)] {
         let mut turning = Turning::new(radius_m, 1);
         let limits = turning.limits;
@@ -265,7 +272,7 @@ fn a_head_that_sticks_for_a_while_is_not_believed_from_then_on_until_it_moves() 
             let (sine, cosine) = math::sin_cos(angle);
             let design_m = -out_m * sine + math::sqrt(radius_m * radius_m - out_m * out_m * cosine * cosine);
             let sticks = (2 * STEPS..2 * STEPS + STEPS / 2).contains(&step);
-            // Where it begins, it is right.
+            // The range is right when the head gets stuck.
             let range_m = if sticks { *stuck_m.get_or_insert(design_m) } else { design_m };
             let (y, z) = (out_m + range_m * sine, -range_m * cosine);
             let placed = PlacedReturn {
@@ -279,11 +286,11 @@ fn a_head_that_sticks_for_a_while_is_not_believed_from_then_on_until_it_moves() 
             stuck_wall += usize::from(sticks && sorted.this == Taken::Wall);
             named.extend(sorted.distrusted);
             if step == 4 * STEPS {
-                assert_eq!(turning.heads[0].distrusted(), None, "it moves again");
+                assert_eq!(turning.heads[0].distrusted(), None, "the range moves again");
             }
         }
         let [(Distrust::Constant(_), [from_m, to_m])] = named[..] else { panic!("{named:?}") };
-        // All that it said of the wall while it stuck is taken back, and nothing from before.
+        // All wall samples since the head got stuck are withdrawn, and none from before.
         let begun_m = 0.001 * f64::from(2 * STEPS);
         assert!((from_m - begun_m).abs() <= 0.001 + 1e-9, "{from_m}");
         assert!(
@@ -294,9 +301,9 @@ fn a_head_that_sticks_for_a_while_is_not_believed_from_then_on_until_it_moves() 
 }
 
 #[test]
-fn tolerances_scale_with_the_section() {
+fn tolerances_scale_with_the_cross_section() {
     let of = |radius_m: f64| WallLimits::new(TAU * radius_m, (0.2 * radius_m).min(0.5));
     assert!((of(1.0).tolerance_m - 0.1).abs() < 1e-12 && (of(1.0).contradiction_m - 0.2).abs() < 1e-12);
-    assert!((of(0.15).tolerance_m - 0.03).abs() < 1e-12, "no less than sonars are good for");
-    assert!((of(20.0).tolerance_m - 0.5).abs() < 1e-12, "no more than contradicts the design");
+    assert!((of(0.15).tolerance_m - 0.03).abs() < 1e-12, "not below the sonars' accuracy");
+    assert!((of(20.0).tolerance_m - 0.5).abs() < 1e-12, "not above the contradiction limit");
 }

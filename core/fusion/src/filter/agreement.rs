@@ -1,4 +1,4 @@
-//! Detects a divergent filter: a wrong estimate gates out every measurement that would correct it.
+//! Detection of a divergent filter, whose wrong estimate rejects every measurement that would correct it.
 
 use core::ops::Range;
 
@@ -8,11 +8,13 @@ use super::measure::ScalarUpdate;
 use super::state::{ATTITUDE, Errors, HEADING, POSITION, RANGES, VELOCITY};
 use headrace_sensor::device::SensorKind;
 
-/// Averaging length, in measurements of a kind.
+/// Averaging length, in measurements of one kind.
 const MEMORY: u32 = 40;
-/// Minimum share of them within the gate; below it, what they measure is lost and reacquired.
+/// Minimum share of measurements within the gate. Below it, the measured quantity is lost and reacquired.
 const LEAST_AGREEING: f64 = 0.35;
-/// Standard deviations added then: across the tunnel, along it, and of the attitude; m, m/s, radians.
+/// Standard deviations added when a quantity is lost, m, m/s, radians.
+///
+/// They apply across the tunnel, along it, and to the attitude.
 const LOST_M: f64 = 1.5;
 const LOST_MPS: f64 = 1.0;
 const LOST_WAY_M: f64 = 100.0;
@@ -22,7 +24,7 @@ const LOST_YAW_RAD: f64 = 0.1;
 const LOST_RAD: f64 = 1.0;
 const LOST_SCALE: f64 = 0.03;
 
-/// Whether ranges agree with the wall, and attitudes with the tilt. `cable.rs` has the cable.
+/// Tracks whether ranges agree with the wall, and attitudes with the tilt. `cable.rs` judges the cable.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct Agreement {
     wall: Memory,
@@ -49,7 +51,7 @@ impl Memory {
         self.agreeing += share * (f64::from(u8::from(agrees)) - self.agreeing);
     }
 
-    /// Whether they disagree; if so, the average restarts.
+    /// Whether measurements and estimate disagree; if so, the average restarts.
     fn is_lost(&mut self) -> bool {
         let is_lost = self.seen == MEMORY && self.agreeing < LEAST_AGREEING;
         if is_lost {
@@ -60,29 +62,30 @@ impl Memory {
 }
 
 impl Agreement {
-    /// Notes whether a scalar update of such a sensor passed its gate.
+    /// Notes whether a scalar update of a sensor of this kind passed its gate.
     pub fn note(&mut self, kind: SensorKind, row: &ScalarUpdate, agrees: bool) {
         match kind {
             SensorKind::Head | SensorKind::Echosounder { .. } => self.wall.note(agrees),
-            // Tilt alone: a compass may stay disturbed for long.
+            // Only tilt counts, since a compass may stay disturbed for long.
             SensorKind::Imu if row.h.get(HEADING) == Some(&0.0) => self.tilt.note(agrees),
             _ => {}
         }
     }
 
-    /// Adds variances where a kind of measurement no longer agrees: to the part of the state that it measures, and to what
-    /// may have moved it.
+    /// Adds variances if a kind of measurement no longer agrees.
+    ///
+    /// They go to the part of the state that it measures, and to the errors that may have caused the disagreement.
     pub fn seek(&mut self, variances: &mut Errors) {
         let [wall, tilt] = [&mut self.wall, &mut self.tilt].map(Memory::is_lost);
         if wall {
             add(variances, POSITION + 1..POSITION + 3, LOST_M);
             add(variances, VELOCITY + 1..VELOCITY + 3, LOST_MPS);
-            // A tilt error moves the estimate too, through gravity; what turned it astray has turned the yaw as well, which the compass's
-            // deviation may have taken up.
+            // A tilt error moves the estimate too, through gravity. Its cause has also turned the yaw, and the
+            // compass deviation may have absorbed that.
             add(variances, ATTITUDE..ATTITUDE + 2, LOST_TILT_RAD);
             add(variances, ATTITUDE + 2..ATTITUDE + 3, LOST_YAW_RAD);
             add(variances, HEADING..HEADING + 1, LOST_YAW_RAD);
-            // The tunnel may be wider from here on.
+            // The tunnel may be wider from this place on.
             add(variances, RANGES..RANGES + 1, LOST_SCALE);
         }
         if tilt {
@@ -91,7 +94,7 @@ impl Agreement {
     }
 }
 
-/// Adds variances where the chainage is lost. Nothing is linearized about it: any distance will do.
+/// Adds variances when the chainage is lost. No model is linearised about the chainage, so any distance will do.
 pub fn seek_way(variances: &mut Errors) {
     add(variances, POSITION..POSITION + 1, LOST_WAY_M);
     add(variances, VELOCITY..VELOCITY + 1, LOST_WAY_MPS);

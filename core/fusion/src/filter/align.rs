@@ -1,4 +1,4 @@
-//! Alignment: the first estimate, from the readings of the first second.
+//! Alignment: computes the first estimate from the readings of the first second.
 
 use serde::{Deserialize, Serialize};
 
@@ -23,21 +23,25 @@ use headrace_sensor::reading::Reading;
 
 /// Alignment time.
 pub const LISTENS: DurNs = DurNs(1_000_000_000);
-/// Echoes per sounder for the median.
+/// Number of echoes per echosounder in the median.
 const ECHOES: usize = 9;
-/// Initial standard deviations: position in the section with echoes, and without; chainage without a cable reading; yaw
-/// of a vehicle without a compass, assumed to look along the tunnel; velocity; tilt.
+/// Initial standard deviations.
+///
+/// In this order: position in the section with echoes and without; chainage without a cable reading; yaw without a
+/// compass, when the vehicle is assumed to look along the tunnel; velocity; tilt.
 const PLACE_SD_M: f64 = 0.3;
 const PLACE_UNSEEN_SD_M: f64 = 2.0;
 const CHAINAGE_UNTOLD_SD_M: f64 = 10.0;
 const YAW_UNTOLD_SD_RAD: f64 = 0.2;
 const VELOCITY_SD_MPS: f64 = 0.5;
 const TILT_SD_RAD: f64 = 0.05;
-/// Scale error of the cable from here on, a ratio: as good as none. Nothing but a velocity log could tell it from speed, and the
-/// least persistent error of the speed would make a scale of it, and of the scale a way of metres.
+/// Scale error of the cable from here on, a ratio; practically zero.
+///
+/// Only a velocity log could separate it from speed. Otherwise the smallest persistent speed error would become a
+/// scale error, and that would become metres of chainage.
 const SCALE_SD: f64 = 1e-6;
 
-/// Readings collected so far.
+/// Readings collected during the alignment.
 #[derive(Debug, Clone)]
 pub struct Listening {
     since: Option<MonoNs>,
@@ -58,7 +62,7 @@ stateful!(Listening { state: since, before, hears_wall, attitude, force, told, h
 struct Told {
     at: MonoNs,
     chainage_m: f64,
-    /// Distance from the origin of the cable's scale, m.
+    /// Distance from the zero of the cable's scale, m.
     way_m: f64,
     sd_m: f64,
 }
@@ -86,7 +90,7 @@ impl Default for Listening {
 }
 
 impl Listening {
-    /// Takes a reading.
+    /// Adds a reading.
     pub fn hear(
         &mut self,
         context: &Context,
@@ -127,22 +131,22 @@ impl Listening {
             _ => {}
         }
         if self.before.is_some() && self.hears_wall && !heard_wall {
-            // The other sensors may have returned only now, too.
+            // The other sensors may also have returned only now.
             self.since = Some(at);
         }
     }
 
-    /// After the loss of an estimate: its chainage and standard deviation, m.
+    /// Starts an alignment after the loss of an estimate with this chainage and standard deviation, m.
     pub fn after(before: Option<(f64, f64)>) -> Self {
         Self { before, ..Self::default() }
     }
 
-    /// Chainage of the lost estimate and its standard deviation, m.
+    /// Returns the chainage of the lost estimate and its standard deviation, m.
     pub fn before(&self) -> Option<(f64, f64)> {
         self.before
     }
 
-    /// The part still missing.
+    /// Returns the part that is still missing.
     pub fn lacks(&self) -> NoFix {
         if self.attitude.is_none() && self.force.is_none() {
             NoFix::Heading
@@ -153,14 +157,14 @@ impl Listening {
         }
     }
 
-    /// Start of the alignment, a time of validity.
+    /// Returns the start of the alignment, a time of validity.
     pub fn since(&self) -> Option<MonoNs> {
         self.since
     }
 
-    /// The first estimate at `at`, once the alignment has lasted long enough.
+    /// Returns the first estimate at `at`, once the alignment has lasted long enough.
     pub fn settle(&self, at: MonoNs, context: &Context) -> Option<(State, Factors<ERRORS>)> {
-        // After a loss, wait for an echo of the wall: before it a new estimate can't be any better.
+        // After a loss, the alignment waits for an echo of the wall: without one, a new estimate would be no better.
         if at.since(self.since?).0 < LISTENS.0 || (self.before.is_some() && !self.hears_wall) {
             return None;
         }
@@ -184,8 +188,10 @@ impl Listening {
         Some((state, self.factors(at, &context.settings, place_sd_m)))
     }
 
-    /// Chainage and yaw errors are correlated with the errors of cable and compass, so that reading these again adds no
-    /// information; and slack is correlated with its rate.
+    /// Builds the initial covariance.
+    ///
+    /// Chainage and yaw errors are correlated with the errors of cable and compass, so that reading these again adds
+    /// no information. Slack is correlated with its rate.
     fn factors(&self, at: MonoNs, settings: &Settings, [y_sd_m, z_sd_m]: [f64; 2]) -> Factors<ERRORS> {
         let mut sds = [0.0; ERRORS];
         let untold_sd_m = self.before.map_or(0.0, |(_, sd_m)| sd_m).max(CHAINAGE_UNTOLD_SD_M);
@@ -206,10 +212,10 @@ impl Listening {
             }
         }
         let ones = [
-            // The part that isn't correlated with the rate.
+            // The part that is not correlated with the rate.
             (SLACK, settings.slack.reach / core::f64::consts::SQRT_2),
             (SLACK_RATE, settings.slack.drive()),
-            // What was wrong on the way to here; from here on the scale makes more of it.
+            // Error accumulated on the way to this place; from here on the scale error adds to it.
             (CREEP, settings.scale_sd * self.told.map_or(0.0, |told| told.way_m.abs())),
             (SCALE, SCALE_SD),
             (DEPTH, settings.depth_offset_sd_m),
@@ -259,7 +265,7 @@ impl Heard {
     }
 }
 
-/// Attitude of a body at rest that looks along the tunnel, from the direction of gravity.
+/// Attitude of a body at rest that faces along the tunnel, from the direction of gravity.
 fn level(force: Vec3<Body>) -> Rot<Tunnel, Body> {
     let roll = math::atan2(force.y(), force.z());
     let pitch = math::atan2(-force.x(), math::hypot(force.y(), force.z()));
@@ -275,10 +281,11 @@ mod tests {
     use headrace_geometry::tunnel::shapes;
     use headrace_sensor::reading::{Level, TetherLength};
 
-    /// Repeated readings of cable and compass add no information: chainage and yaw stay as uncertain as slack, scale and
-    /// deviation.
+    /// Repeated readings of cable and compass add no information.
+    ///
+    /// Chainage and yaw stay as uncertain as slack, scale and deviation.
     #[test]
-    fn readings_that_made_the_first_estimate_do_not_count_twice() {
+    fn readings_used_in_alignment_add_no_information_again() {
         let context = Context {
             profile: shapes::ceran().unwrap(),
             site: Site::default(),

@@ -1,8 +1,8 @@
-//! Whether the cable counter and the estimate agree.
+//! Decision whether the cable counter and the estimate agree.
 //!
-//! A counter sticks, slips or runs free; an estimate may drift. While they disagree both hypotheses are kept: readings are withheld, the
-//! inertial unit carries the chainage, and the chainage is as uncertain as the two differ. Derivation: `docs/why/navigation.md`, "When cable and
-//! estimate disagree".
+//! A counter may stick, slip or run free, and an estimate may drift. During a disagreement both hypotheses are kept:
+//! readings are withheld, the inertial unit carries the chainage, and the chainage is as uncertain as the difference
+//! between both. Derivation: `docs/why/navigation.md`, "When cable and estimate disagree".
 
 use serde::{Deserialize, Serialize};
 
@@ -13,51 +13,56 @@ use headrace_sensor::reading::SourceId;
 
 /// Averaging time of innovations, s.
 const RECENT_S: f64 = 1.0;
-/// A dispute begins when the mean exceeds so many of its standard deviations. From 3 to 6 the number of silent seeded dives is about the same;
-/// with 4, slack of seven times the declared size disputes a sound counter.
+/// Mean innovation, in its standard deviations, at which a dispute begins.
+///
+/// From 3 to 6 the number of silent seeded dives is about the same. With 4, slack of seven times the declared size
+/// disputes a sound counter.
 const DISPUTED_SDS: f64 = 5.0;
-/// Each innovation is clipped to so many standard deviations.
+/// Limit in standard deviations at which each innovation is clipped.
 const MOST_SDS: f64 = 6.0;
 /// Smallest innovation that begins a dispute, m.
 const LEAST_M: f64 = 0.01;
-/// A counter on a lively cable is stuck when its count has not changed for so long.
+/// A counter on a lively cable is stuck when its count has not changed for this time.
 const STANDS_FOR: DurNs = DurNs(2_000_000_000);
 /// Least difference between two counts, m.
 const SAME_COUNT_M: f64 = 1e-6;
 /// Time after which a dispute is reported, and time over which agreement ends it.
 const NOTICED_AFTER: DurNs = DurNs(1_000_000_000);
 const RETURNED_AFTER: DurNs = DurNs(500_000_000);
-/// Standard deviation of the innovation up to which a reading that agrees says that nothing was lost, m.
+/// Maximum sd of the innovation at which an agreeing reading rules out a loss, m.
 const SURE_M: f64 = 0.3;
-/// Share of the vehicle's way meanwhile, and length, that such a reading may lack.
+/// Tolerance of such a reading: a share of the vehicle's distance meanwhile, and a length, m.
 const MISSING_SHARE: f64 = 0.1;
 const MISSING_M: f64 = 0.02;
-/// A counter runs as the vehicle does within a tenth of its way and this, over so long and so far.
+/// Tolerance within which a counter runs as the vehicle does: a share of its distance, and a length, m.
+///
+/// The agreement must last for the time and the distance below.
 const SAME_SHARE: f64 = 0.1;
 const SAME_M: f64 = 0.01;
-/// Further share of its way by which the vehicle's may differ where that is uncertain.
+/// Additional share while the vehicle's own distance is uncertain.
 const UNSURE_SHARE: f64 = 0.3;
 const RUNS_FOR: DurNs = DurNs(1_000_000_000);
 const RUNS_M: f64 = 0.05;
-/// Difference of the hypotheses, with the innovation's standard deviation, from which the estimate is given up, m; and how far the counter
-/// must have run meanwhile to be alive.
+/// Difference of the hypotheses at which the estimate is given up, m, innovation sd included.
+///
+/// The counter must also have run by `ALIVE_M` meanwhile to count as alive.
 const LOST_M: f64 = 1.0;
 const ALIVE_M: f64 = 0.1;
 
 /// A dispute between counter and estimate.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct CableDoubt {
-    /// When its readings left what was expected.
+    /// Time at which the readings left the expected range.
     pub since: MonoNs,
-    /// Chainage expected then, m.
+    /// Expected chainage at that time, m.
     pub from_m: f64,
-    /// Largest difference since between the counter and the other source, m.
+    /// Largest difference so far between the counter and the other source, m.
     pub differs_m: f64,
-    /// The velocity log that it differs from; `None` of the estimate, which the inertial unit carries.
+    /// Velocity log that it differs from; `None` for the estimate, which the inertial unit carries.
     pub log: Option<SourceId>,
 }
 
-/// A reading against the estimate.
+/// A cable reading compared with the estimate.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct CableReading {
     /// Time of validity.
@@ -66,13 +71,13 @@ pub struct CableReading {
     pub shown_m: f64,
     /// Shown less expected, m.
     pub off_m: f64,
-    /// Standard deviation of that, m.
+    /// Standard deviation of `off_m`, m.
     pub sd_m: f64,
     /// Whether it is within the gate.
     pub agrees: bool,
     /// Whether it agrees with the inertial unit's motion as well as usual.
     pub is_usual: bool,
-    /// Whether slack moves the counter by steps all the time.
+    /// Whether slack moves the counter in steps all the time.
     pub is_lively: bool,
 }
 
@@ -82,22 +87,24 @@ impl CableReading {
     }
 }
 
-/// What to do with a reading.
+/// Decision about a reading.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Use {
     /// Fuse it.
     Fuse,
-    /// Don't.
+    /// Ignore it.
     Withhold,
-    /// Don't from now on, and take back these corrections of chainage and speed, m and m/s, by the readings just before.
+    /// Ignore readings from now on, and revert the corrections by the last ones.
+    ///
+    /// The values are the corrections of chainage and speed, m and m/s.
     Dispute([f64; 2]),
-    /// The counter runs truly again, and has lost or gained so much meanwhile, m: shown less expected.
+    /// The counter runs correctly again and has lost or gained this length meanwhile, m: shown less expected.
     Slipped(f64),
-    /// The estimate is given up, and the counter runs: begin anew with what it shows, which may lack this much, m.
+    /// Give up the estimate and restart from the running counter, which may be off by this much, m.
     Seek(f64),
 }
 
-/// See the module's description.
+/// State of the comparison between cable counter and estimate.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct Cable {
     /// The last reading.
@@ -106,9 +113,9 @@ pub struct Cable {
     changed: Option<CableReading>,
     /// The first of successive readings beyond the gate.
     left: Option<CableReading>,
-    /// What readings have lately made of the estimate.
+    /// Recent effect of the counter's readings on the estimate.
     pub corrections: Corrections,
-    /// Mean of the last innovations, in standard deviations.
+    /// Running mean of the innovations, in standard deviations.
     mean_sds: f64,
     dispute: Option<Dispute>,
 }
@@ -117,33 +124,33 @@ pub struct Cable {
 struct Dispute {
     /// The first reading that was withheld.
     first: CableReading,
-    /// The reading from which the counter runs as the vehicle does.
+    /// Reading since which the counter runs as the vehicle does.
     same_from: CableReading,
-    /// When readings began to agree again.
+    /// Time since which readings agree again.
     agreeing_from: Option<MonoNs>,
-    /// What it showed when the estimate was lost, m.
+    /// Counter reading when the estimate was lost, m.
     lost_from_m: Option<f64>,
-    /// The longest way since, by counter or estimate, and the largest difference, m.
+    /// Longest distance since, by counter or estimate, and the largest difference, m.
     longest_m: f64,
     most_m: f64,
 }
 
 impl Cable {
-    /// The dispute, once it has lasted.
+    /// Returns the dispute, once it has lasted long enough.
     pub fn doubt(&self, now: MonoNs) -> Option<CableDoubt> {
         let Dispute { first, most_m: differs_m, .. } = self.dispute?;
         let has_lasted = now.since(first.at).0 >= NOTICED_AFTER.0;
         has_lasted.then(|| CableDoubt { since: first.at, from_m: first.expected_m(), differs_m, log: None })
     }
 
-    /// By how much the hypotheses differ, m: 0 while counter and estimate agree and the count changes.
+    /// Difference between the hypotheses, m; 0 while counter and estimate agree and the count changes.
     pub fn differs_m(&self) -> f64 {
         let disagrees = self.dispute.is_some() || self.left.is_some();
         let off_m = self.last.filter(|_| disagrees).map_or(0.0, |last| last.off_m);
         math::hypot(off_m, self.corrections.lost_m())
     }
 
-    /// Takes a reading.
+    /// Processes a reading and decides what to do with it.
     pub fn take(&mut self, reading: &CableReading) -> Use {
         let before = self.last.replace(*reading);
         if let Some(dispute) = &mut self.dispute {
@@ -159,7 +166,7 @@ impl Cable {
         self.corrections.pass(dt_s, is_same);
         let off_sds = (reading.off_m / reading.sd_m).clamp(-MOST_SDS, MOST_SDS);
         self.mean_sds = left * self.mean_sds + (1.0 - left) * off_sds;
-        // Of white innovations the mean has this standard deviation.
+        // Standard deviation of the running mean of white innovations.
         let is_apart = self.mean_sds.abs() > DISPUTED_SDS * math::sqrt((1.0 - left) / (1.0 + left));
         if let Some(first) = self.goes_wrong(reading, is_apart) {
             self.dispute = Some(Dispute::between(first, reading));
@@ -168,14 +175,16 @@ impl Cable {
         if reading.agrees { Use::Fuse } else { Use::Withhold }
     }
 
-    /// The first reading of those that show that counter and estimate disagree, if they do.
+    /// Returns the first of the readings that show a disagreement between counter and estimate.
+    ///
+    /// `None` without one.
     fn goes_wrong(&mut self, reading: &CableReading, is_apart: bool) -> Option<CableReading> {
         let lasts = |since: &CableReading, time: DurNs| reading.at.since(since.at).0 >= time.0;
         let changed = *self.changed.get_or_insert(*reading);
         if (changed.shown_m - reading.shown_m).abs() > SAME_COUNT_M {
             self.changed = Some(*reading);
         }
-        // Slack that moves a counter by steps all the time doesn't stop at once: the wheel does.
+        // Slack that moves a counter in steps all the time does not stop at once; a stuck wheel does.
         if reading.is_lively && lasts(&changed, STANDS_FOR) {
             return Some(changed);
         }
@@ -183,7 +192,7 @@ impl Cable {
         if reading.agrees {
             self.left = None;
         }
-        // An estimate that is unsure needs the counter.
+        // An uncertain estimate needs the counter.
         let is_unusual = !reading.is_usual && reading.sd_m <= SURE_M;
         let disagrees = is_unusual || is_apart && reading.off_m.abs() > LEAST_M;
         disagrees.then_some(first)
@@ -191,7 +200,7 @@ impl Cable {
 }
 
 impl Dispute {
-    /// From the first reading that disagreed to this one.
+    /// Starts a dispute at the first reading that disagreed.
     fn between(first: CableReading, reading: &CableReading) -> Self {
         Self {
             first,
@@ -233,15 +242,16 @@ impl Dispute {
         Use::Withhold
     }
 
-    /// Whether it shows most of the way that the vehicle has made meanwhile. The gate alone would let a counter in that still
-    /// stands, once the estimate is unsure enough.
+    /// Whether the counter shows most of the distance that the vehicle has travelled meanwhile.
+    ///
+    /// The gate alone would accept a counter that is still stuck, once the estimate is uncertain enough.
     fn has_caught_up(&self, reading: &CableReading) -> bool {
         let way_m = (reading.expected_m() - self.first.expected_m()).abs();
         reading.off_m.abs() <= MISSING_SHARE * way_m + MISSING_M
     }
 }
 
-/// Way between two readings, the longer by the counter and by the estimate, m.
+/// Distance between two readings, m: the longer of counter and estimate.
 fn way_m(first: &CableReading, reading: &CableReading) -> f64 {
     let expected_m = (reading.expected_m() - first.expected_m()).abs();
     expected_m.max((reading.shown_m - first.shown_m).abs())
@@ -253,14 +263,14 @@ mod tests {
 
     const START: MonoNs = MonoNs(1_000_000_000);
 
-    /// A reading at a time, s, of a counter that shows this and is off by so much; within a gate of 3 standard deviations or not.
+    /// A reading at time `t`, s, of a counter that is off by `off_m`; the gate is 3 standard deviations.
     fn reading(t: f64, shown_m: f64, off_m: f64, sd_m: f64) -> CableReading {
         let at = START + DurNs::from_secs_f64(t);
         let agrees = off_m.abs() <= 3.0 * sd_m;
         CableReading { at, shown_m, off_m, sd_m, agrees, is_usual: true, is_lively: false }
     }
 
-    /// When a dispute begins, s: the counter counts a share of a vehicle's way at 0.1 m/s from 10 s on.
+    /// Returns when a dispute begins, s, if the counter shows only a share of the distance at 0.1 m/s from 10 s on.
     fn disputed_at(share: f64, change: impl Fn(f64, &mut CableReading)) -> Option<f64> {
         let mut cable = Cable::default();
         (0..200).map(|k| f64::from(k) / 10.0).find(|t| {
@@ -272,7 +282,7 @@ mod tests {
     }
 
     #[test]
-    fn a_stuck_or_slipping_counter_is_disputed_within_two_seconds() {
+    fn stuck_or_slipping_counter_is_disputed_within_2_s() {
         for (share, within_s) in [(0.0, 1.0), (0.4, 1.5), (-1.0, 0.8), (0.85, 4.0)] {
             let at_s = disputed_at(share, |_, _| {}).unwrap();
             assert!((10.1..10.0 + within_s).contains(&at_s), "{share}: {at_s}");
@@ -280,9 +290,10 @@ mod tests {
         assert_eq!(disputed_at(1.0, |_, _| {}), None);
     }
 
-    /// White innovations have a mean of 0.22 over a second: five times that is reached after 1.4 s of 1.5, and never of 1.
+    /// White innovations have a mean of 0.22 over a second. Innovations of 1.5 reach five times that after 1.4 s, and
+    /// those of 1 never do.
     #[test]
-    fn innovations_that_stay_on_one_side_begin_a_dispute() {
+    fn biased_innovations_begin_a_dispute() {
         let off = |sds: f64, sd_m: f64| {
             disputed_at(1.0, |t, reading| {
                 (reading.off_m, reading.sd_m) = (if t < 3.0 { 0.0 } else { sds * sd_m }, sd_m);
@@ -307,7 +318,7 @@ mod tests {
     }
 
     #[test]
-    fn a_counter_that_stands_is_disputed_only_where_slack_would_move_it() {
+    fn stationary_counter_is_disputed_only_on_a_lively_cable() {
         let stands = |is_lively: bool| {
             move |t: f64, reading: &mut CableReading| {
                 reading.shown_m = if t < 6.0 { reading.shown_m } else { 7.6 };
@@ -320,7 +331,7 @@ mod tests {
     }
 
     #[test]
-    fn standing_count_is_doubted_and_a_dispute_takes_back_its_last_second() {
+    fn dispute_reverts_the_last_second_of_a_stationary_count() {
         let mut cable = Cable::default();
         for k in 0..100_u32 {
             assert_eq!(cable.take(&reading(f64::from(k) / 10.0, 7.0, 0.0, 0.005)), Use::Fuse);
@@ -329,12 +340,12 @@ mod tests {
         assert!((cable.differs_m() - 0.3 * 0.099).abs() < 1e-9, "{}", cable.differs_m());
         let unusual = CableReading { is_usual: false, ..reading(10.0, 7.0, 0.0, 0.005) };
         let Use::Dispute([way_m, _]) = cable.take(&unusual) else { panic!("no dispute") };
-        // A sum that fades over a second: 1 / (e^0.1 - 1) corrections.
+        // A sum that decays over a second: 1 / (e^0.1 - 1) corrections.
         assert!((way_m - 0.001 / (math::exp(0.1) - 1.0)).abs() < 1e-6, "{way_m}");
     }
 
     #[test]
-    fn the_position_is_as_uncertain_as_counter_and_estimate_differ() {
+    fn position_sd_is_the_difference_of_counter_and_estimate() {
         let mut cable = Cable::default();
         assert_eq!(cable.take(&reading(0.0, 7.0, 0.01, 0.005)), Use::Fuse);
         assert_eq!(cable.differs_m().to_bits(), 0.0_f64.to_bits());
@@ -342,13 +353,18 @@ mod tests {
             cable.take(&reading(t, 7.0, off_m, 0.005));
             assert!((cable.differs_m() + off_m).abs() < 1e-12, "{t}");
         }
-        assert_eq!(cable.doubt(START + DurNs::from_secs_f64(1.0)), None, "not yet a second");
+        assert_eq!(
+            cable.doubt(START + DurNs::from_secs_f64(1.0)),
+            None,
+            "a dispute shorter than a second is no doubt"
+        );
         let doubt = cable.doubt(START + DurNs::from_secs_f64(1.2)).unwrap();
         assert!((doubt.from_m - 7.02).abs() < 1e-12 && (doubt.differs_m - 0.5).abs() < 1e-12, "{doubt:?}");
     }
 
-    /// What ends the dispute of a counter that was off by -0.4 m, and when, s: while the vehicle goes on at this speed it counts a share of
-    /// that, and so much is unsure.
+    /// Returns when and how the dispute of a counter that was off by -0.4 m ends, s.
+    ///
+    /// The vehicle moves at `speed_mps`, the counter shows `share` of that, and `sd_m` is uncertain.
     fn ends(share: f64, speed_mps: f64, sd_m: f64) -> Option<(f64, Use)> {
         let reading = |t: f64| {
             let (expected_m, shown_m) = (7.0 + speed_mps * t, 6.6 + share * speed_mps * t);
@@ -359,9 +375,10 @@ mod tests {
         times.map(|t| (t, dispute.take(&reading(t)))).find(|(_, used)| *used != Use::Withhold)
     }
 
-    /// Truly: within a tenth of its way and a centimetre; where the vehicle's way is unsure, within four tenths.
+    /// The tolerance is a tenth of the distance plus a centimetre, and four tenths while the vehicle's distance is
+    /// uncertain.
     #[test]
-    fn a_counter_has_slipped_once_it_runs_truly_again() {
+    fn dispute_ends_as_slip_once_the_counter_runs_correctly() {
         for (share, speed_mps, sd_m, at_s, lost_m) in [
             (1.0, 0.1, 0.0, 1.0, -0.4),
             (1.0, 0.2, 0.0, 1.0, -0.4),
@@ -376,18 +393,18 @@ mod tests {
             };
             assert!((found_s - at_s).abs() < 1e-6 && (found_m - lost_m).abs() < 1e-6, "{found_s} {found_m}");
         }
-        // Neither does one that stands: the vehicle may be moving.
+        // A stationary counter does not end it either, since the vehicle may be moving.
         for (share, speed_mps) in [(0.0, 0.02), (1.0, 0.0)] {
             assert_eq!(ends(share, speed_mps, 0.0), None, "{share} {speed_mps}");
         }
     }
 
-    /// Beyond a metre the estimate is given up where the counter runs, and not where it stands.
+    /// Beyond a metre, the estimate is given up if the counter runs, and kept if the counter is stationary.
     #[test]
-    fn a_lost_estimate_begins_anew_with_a_counter_that_runs() {
+    fn lost_estimate_restarts_from_a_running_counter() {
         let (_, used) = ends(2.0, 0.3, 1.1).unwrap();
         let Use::Seek(lacking_m) = used else { panic!("{used:?}") };
         assert!(lacking_m > 1.1, "{lacking_m}");
-        assert_eq!(ends(0.0, 0.03, 1.1), None, "it stands");
+        assert_eq!(ends(0.0, 0.03, 1.1), None, "the counter is stationary");
     }
 }

@@ -1,9 +1,10 @@
-//! Relative error covariance between two epochs (stochastic cloning): the error of the displacement between them, which
-//! matters when two passes of a head are compared, and is less than the errors of either position.
+//! Relative error covariance between two epochs, by stochastic cloning.
 //!
-//! A sample stays where it was georeferenced; its error is that of the estimate then, and isn't corrected later. So each
-//! clone keeps the covariance of the errors at its time, and their transition from the clone before, through the
-//! filter's propagation and corrections. Derivation: `docs/why/navigation.md`, "Relative uncertainty".
+//! It is the error of the displacement between the epochs, which matters when two head passes are compared. It is
+//! smaller than the error of either position. A sample stays where it was georeferenced, so its error is that of the
+//! estimate at that time. Each clone keeps the covariance of the errors at its time. It also keeps their transition
+//! from the previous clone, through propagation and corrections. Derivation: `docs/why/navigation.md`, "Relative
+//! uncertainty".
 
 use serde::{Deserialize, Serialize};
 
@@ -16,9 +17,11 @@ use headrace_geometry::time::{DurNs, MonoNs};
 
 /// Time between two clones.
 pub const STEP: DurNs = DurNs(2_000_000_000);
-/// Clones kept: over four turns of a head in its slowest mode (4 x 28 s).
+/// Number of clones kept: over four turns of a head in its slowest mode (4 x 28 s).
 pub const CLONES: usize = 60;
-/// Share to which the variance of the chainage has fallen where it became sure at once: as a silent cable is heard again.
+/// Share to which the variance of the chainage must fall to count as a sudden gain.
+///
+/// This happens, for instance, when a silent cable returns.
 const SURE_SHARE: f64 = 0.1;
 /// Errors that move a sample along the tunnel: chainage, pitch and yaw.
 pub const MOVING: [usize; 3] = [POSITION, ATTITUDE + 1, ATTITUDE + 2];
@@ -30,9 +33,9 @@ struct Moment {
     at: MonoNs,
     /// Rows of the covariance at that time.
     rows: [Errors; 3],
-    /// By columns: transition of errors from the clone before.
+    /// Columns of the transition of errors from the previous clone.
     since_last: Square,
-    /// Relative to the newest clone.
+    /// Covariance relative to the newest clone.
     relative: Relative,
 }
 
@@ -42,19 +45,19 @@ impl Moment {
         self.rows[0][POSITION]
     }
 
-    /// Whether its chainage is unsure beside one of a later time with this variance, m^2.
+    /// Whether its chainage is uncertain compared with a later one of this variance, m^2.
     fn is_unsure_beside(&self, later_m2: f64) -> bool {
         later_m2 < SURE_SHARE * self.chainage_m2()
     }
 }
 
-/// See the module's description.
+/// Clones of earlier errors, for relative covariances.
 #[derive(Debug, Clone)]
 pub struct ErrorClones {
     /// Ring buffer.
     clones: Vec<Moment>,
     count: usize,
-    /// By columns: transition of errors from the newest clone until now.
+    /// Columns of the transition of errors from the newest clone until now.
     since: Square,
 }
 
@@ -90,7 +93,7 @@ impl ErrorClones {
         }
     }
 
-    /// Adds a clone when the last one is old enough, or the chainage has become sure since.
+    /// Adds a clone if the last one is old enough, or if the chainage has suddenly become more certain since.
     pub fn note(&mut self, at: MonoNs, factors: &Factors<ERRORS>) {
         let is_enough = |newest: &Moment| {
             at.since(newest.at).0 < STEP.0 && !newest.is_unsure_beside(factors.variance(POSITION))
@@ -110,18 +113,20 @@ impl ErrorClones {
         self.compare();
     }
 
-    /// Covariance at the newest clone relative to `lag` before, extrapolated beyond the oldest; `None` before there are two.
+    /// Returns the covariance at the newest clone relative to `lag` earlier.
+    ///
+    /// `None` with fewer than two clones. Extrapolates beyond the oldest clone.
     pub fn relative(&self, lag: DurNs) -> Option<Relative> {
         let newest = self.newest()?;
         let kept = self.clones.len();
-        // Zero over no time.
+        // The relative covariance over no time is zero.
         let (mut newer_s, mut newer, mut newer_m2) = (0.0, Relative::default(), newest.chainage_m2());
         let wanted_s = lag.as_secs_f64();
         for back in 1..kept {
             let clone = self.back(back)?;
             let age_s = newest.at.since(clone.at).as_secs_f64();
             if age_s >= wanted_s {
-                // What was placed in between was placed as unsurely as before.
+                // Soundings placed in between were as uncertain as the earlier clone.
                 if clone.is_unsure_beside(newer_m2) {
                     return Some(clone.relative);
                 }
@@ -134,7 +139,9 @@ impl ErrorClones {
         (kept > 1).then(|| newer.weighted(wanted_s / newer_s, &newer, 0.0))
     }
 
-    /// Compares each older clone with the newest: backwards, carrying along the dependence of its errors on older ones.
+    /// Compares each older clone with the newest.
+    ///
+    /// It works backwards and carries along how the newest errors depend on older ones.
     fn compare(&mut self) {
         let Some(now) = self.newest().copied() else { return };
         let mut depends = MOVING.map(|i| core::array::from_fn(|j| if i == j { 1.0 } else { 0.0 }));
@@ -157,7 +164,9 @@ impl ErrorClones {
     }
 }
 
-/// Covariance of the difference of errors, where `depends` maps the errors then to those now.
+/// Returns the covariance of the difference of errors.
+///
+/// `depends` maps the earlier errors to the present ones.
 fn against(now: &[Errors; 3], then: &[Errors; 3], depends: &[Errors; 3]) -> Relative {
     let cross: [[f64; 3]; 3] = depends.map(|row| then.map(|column| sum(&row, &column)));
     let mut relative = [[0.0; 3]; 3];
@@ -178,7 +187,7 @@ fn sum(a: &Errors, b: &Errors) -> f64 {
     a.iter().zip(b).map(|(a, b)| a * b).sum()
 }
 
-/// A row times a matrix given by columns.
+/// Product of a row and a matrix given by columns.
 fn product(row: &Errors, columns: &Square) -> Errors {
     columns.map(|column| sum(row, &column))
 }
@@ -193,9 +202,11 @@ mod tests {
 
     use super::*;
 
-    /// What was placed while a cable was silent was placed unsurely until it was heard, not ever more surely in the 2 s before.
+    /// Soundings from before a silent cable returns stay uncertain.
+    ///
+    /// They do not become gradually more certain over the last 2 s.
     #[test]
-    fn a_chainage_that_becomes_sure_at_once_was_unsure_until_then() {
+    fn chainage_before_a_sudden_gain_in_certainty_stays_uncertain() {
         let mut clones = ErrorClones::default();
         let mut factors = Factors::independent(core::array::from_fn(|_| 1.0));
         let at = |k: i64| MonoNs(0) + DurNs::from_millis(100 * k);
@@ -209,7 +220,7 @@ mod tests {
         let sd_m = |clones: &ErrorClones, lag_s: f64| {
             clones.relative(DurNs::from_secs_f64(lag_s)).unwrap().sd_m(Vec3::zero())
         };
-        // The last clone before was 1.1 s old.
+        // The last clone before the return was 1.1 s old.
         for lag_s in [0.1, 0.5, 1.1, 2.0, 4.0] {
             let is_m = sd_m(&clones, lag_s);
             assert!((is_m - 1.0).abs() < 0.01, "{lag_s}: {is_m}");
@@ -217,7 +228,8 @@ mod tests {
         for k in 52..=90 {
             clones.note(at(k), &factors);
         }
-        // Surely placed since, at 5.1, 7.1 and, as the newest, 8.1 s or before; and before that as unsurely as ever.
+        // Soundings placed since are certain: 5.1 s, 7.1 s and, as the newest, 8.1 s. Earlier ones are as uncertain
+        // as before.
         let [since_m, before_m] = [1.9, 4.0].map(|lag_s| sd_m(&clones, lag_s));
         assert!(since_m < 0.1 && (before_m - 1.0).abs() < 0.01, "{since_m} {before_m}");
     }

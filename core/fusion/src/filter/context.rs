@@ -1,4 +1,4 @@
-//! What the filter is told before a dive.
+//! Configuration of the filter for one dive.
 
 use super::settings::Settings;
 use super::suspicion::Design;
@@ -7,7 +7,7 @@ use headrace_geometry::site::Site;
 use headrace_geometry::snapshot::stateful;
 use headrace_geometry::tunnel::Profile;
 
-/// Parameters of a dive.
+/// Configuration of a dive.
 #[derive(Debug, Clone)]
 pub struct Context {
     /// Design profile.
@@ -21,7 +21,7 @@ pub struct Context {
 }
 
 impl Context {
-    /// What settings are held against.
+    /// Returns the part that settings are checked against.
     pub(super) fn design(&self) -> Design<'_> {
         let Self { profile, site, settings, unit_at } = self;
         Design { profile, site, settings, unit_at: *unit_at }

@@ -1,45 +1,56 @@
-//! What the cable counter has lately made of the estimate, and what of that is lost if its wheel has stuck.
+//! Recent corrections of the estimate by the cable counter, and how much is lost if its wheel has stuck.
 //!
-//! A count that stands says that the vehicle stands, or that the wheel does; a filter that believes it stops the vehicle either way. So the
-//! hypothesis of a stuck wheel is kept beside: the estimate without these corrections. Derivation: `docs/why/navigation.md`, "A count that stands".
+//! A stationary count means either that the vehicle is stationary or that the wheel has stuck. A filter that trusts
+//! the count stops the vehicle in both cases. So the alternative hypothesis is kept beside it: the estimate without
+//! these corrections. Derivation: `docs/why/navigation.md`, "A count that stands".
 
 use serde::{Deserialize, Serialize};
 
 use headrace_geometry::math;
 
-/// Time for which corrections by a count that changes are remembered, s: a counter goes wrong before it is noticed.
+/// Time for which corrections by a changing count are remembered, s.
+///
+/// It is needed because a counter fails before the failure is noticed.
 const RECENT_S: f64 = 1.0;
-/// A count that stands for less than this may be that of a slow vehicle with coarse steps, s.
+/// A count that is stationary for less than this may belong to a slow vehicle with coarse counter steps, s.
 const STANDS_S: f64 = 2.0;
-/// A wheel has stuck in one case of ten: the variance of what is lost is a tenth of the corrections squared.
+/// Standard deviation of the loss, as a share of the corrections.
+///
+/// A wheel is stuck in one case of ten, so the variance of the loss is a tenth of the corrections squared.
 const STUCK_SHARE: f64 = 0.3;
-/// Standard deviations of the corrections that chance explains. With none, stops make a position unsure (can't say in 24 % of the seeded
-/// dives, instead of 19); with one, wheels that stick are silent in 9 of 800 instead of 6.
+/// Standard deviations of the corrections that count as chance.
+///
+/// With 0, stops make positions uncertain: 24 % of the seeded dives are `cannot_say`, instead of 19 %. With 1, stuck
+/// wheels stay silent in 9 of 800, instead of 6.
 const CHANCE_SDS: f64 = 0.5;
-/// Time for which what is lost counts between passes, s: about a head's turn. It is that of a count's first such time, too: what a vehicle
-/// that hovers for minutes is corrected by says nothing of the wheel.
+/// Time for which a loss counts between passes, s: about one turn of a head.
+///
+/// Corrections of a stationary count are also limited to its first such period. Later corrections of a hovering
+/// vehicle say nothing about the wheel.
 const PASSES_S: f64 = 20.0;
 
-/// See the module's description.
+/// Corrections by the cable counter, and the loss they imply if its wheel has stuck.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct Corrections {
-    /// Corrections of chainage and speed of the last second, m and m/s.
+    /// Corrections of chainage and speed in the last second, m and m/s.
     recent: [f64; 2],
-    /// The same with all since the count changed, the speeds carried on.
+    /// Corrections since the count changed, including those; the speed corrections are integrated.
     sums: [f64; 2],
-    /// Standard deviations that the covariance expects of them, m and m/s.
+    /// Standard deviations of the corrections that the covariance predicts, m and m/s.
     by_chance: [f64; 2],
-    /// For how long the count has stood, s.
+    /// Time for which the count has been stationary, s.
     stood_s: f64,
-    /// Standard deviation of what may be lost since the count stands, and between passes, m.
+    /// Standard deviations of the possible loss since the count became stationary, and between passes, m.
     lacks_m: f64,
     lost_m: f64,
-    /// Variance of what may be lost for good and has not been asked for, m^2.
+    /// Variance of the possible permanent loss that has not been taken yet, m^2.
     slipped_m2: f64,
 }
 
 impl Corrections {
-    /// Notes how a reading that was fused has corrected chainage and speed, m and m/s, and what variance that took from them, m^2 and m^2/s^2.
+    /// Notes a fused reading.
+    ///
+    /// Inputs: its corrections of chainage and speed, m and m/s, and the variances it removed, m^2 and m^2/s^2.
     pub fn note(&mut self, by: [f64; 2], variances: [f64; 2]) {
         for sums in [&mut self.recent, &mut self.sums] {
             for (sum, by) in sums.iter_mut().zip(by) {
@@ -51,7 +62,7 @@ impl Corrections {
         }
     }
 
-    /// Takes a reading so long after the one before, s, whose count is the same or not.
+    /// Advances by the time since the previous reading, s; `is_same` if the count has not changed.
     pub fn pass(&mut self, dt_s: f64, is_same: bool) {
         self.lost_m *= math::exp(-dt_s / PASSES_S);
         self.recent = self.recent.map(|sum| sum * math::exp(-dt_s / RECENT_S));
@@ -68,7 +79,7 @@ impl Corrections {
 
     fn stand(&mut self, dt_s: f64) {
         self.stood_s += dt_s;
-        // The corrected speed is missing in the way.
+        // The corrected speed is missing in the distance.
         for [way_m, speed_mps] in [&mut self.sums, &mut self.by_chance] {
             *way_m += *speed_mps * dt_s;
         }
@@ -88,19 +99,20 @@ impl Corrections {
         }
     }
 
-    /// Those of the last second, m and m/s, to be taken back: none are left. What a counter that is wound by half metres has made of the
-    /// estimate since its count changed is mostly right: with all of it taken back the chainage left the truth by 4 to 18 m instead of 1 to 3
-    /// (the scene `leak-current`).
+    /// Takes the corrections of the last second, m and m/s, and clears all corrections.
+    ///
+    /// A cable that is wound in by half metres corrects the estimate mostly rightly after its count changes. With all
+    /// corrections taken back, the chainage left the truth by 4 to 18 m instead of 1 to 3 m (scene `leak-current`).
     pub fn take_back(&mut self) -> [f64; 2] {
         core::mem::take(self).recent
     }
 
-    /// Standard deviation of what counter and estimate may have lost between passes, m.
+    /// Returns the standard deviation of the possible loss between passes, m.
     pub fn lost_m(&self) -> f64 {
         self.lost_m
     }
 
-    /// Variance of what may be lost for good since this was last asked, m^2.
+    /// Takes the variance of the possible permanent loss since the last call, m^2.
     pub fn take_slipped_m2(&mut self) -> f64 {
         core::mem::take(&mut self.slipped_m2)
     }
@@ -110,7 +122,8 @@ impl Corrections {
 mod tests {
     use super::*;
 
-    /// Corrections by a millimetre and so many m/s each reading, ten a second: of a count that changes for 10 s, and then stands.
+    /// Corrections of 1 mm and `speed_mps` at each of ten readings a second: the count changes for 10 s, then is
+    /// stationary.
     fn stood(readings: u32, speed_mps: f64, variances: [f64; 2]) -> Corrections {
         let mut corrections = Corrections::default();
         for k in 0..100 + readings {
@@ -120,13 +133,13 @@ mod tests {
         corrections
     }
 
-    /// A sum that fades over a second: 1 / (e^0.1 - 1) corrections and the last one.
+    /// A sum that decays over a second: 1 / (e^0.1 - 1) corrections plus the last one.
     fn lately() -> f64 {
         1.0 / (math::exp(0.1) - 1.0) + 1.0
     }
 
     #[test]
-    fn dispute_takes_back_last_second_of_a_changing_count() {
+    fn dispute_reverts_the_last_second_of_a_changing_count() {
         let mut corrections = stood(0, -0.002, [0.0; 2]);
         assert!(corrections.lost_m() == 0.0 && corrections.take_slipped_m2() == 0.0);
         let [way_m, speed_mps] = corrections.take_back();
@@ -134,14 +147,15 @@ mod tests {
         assert_eq!(corrections, Corrections::default());
     }
 
-    /// What has been wrong for long has been believed for long.
+    /// A long-standing error has also been trusted for long.
     #[test]
-    fn dispute_takes_back_last_second_of_a_standing_count() {
+    fn dispute_reverts_a_long_stationary_count() {
         let [way_m, speed_mps] = stood(50, -0.002, [0.0; 2]).take_back();
         assert!((way_m - 0.001 * lately()).abs() < 1e-6 && (speed_mps + 2.0 * way_m).abs() < 1e-6, "{way_m}");
     }
 
-    /// The estimate as the counter has made it, less that without it: what the speed lost becomes way.
+    /// The loss is the difference between the estimate with the counter and without it: a lost speed becomes a
+    /// distance.
     #[test]
     fn corrected_speed_adds_to_the_lost_distance() {
         let speeds = (0..50).map(|k| 0.002 * (lately() + f64::from(k)));
@@ -151,10 +165,10 @@ mod tests {
     }
 
     #[test]
-    fn corrections_beyond_chance_are_doubted_by_a_tenth_of_their_square() {
+    fn corrections_beyond_chance_add_a_tenth_of_their_square() {
         let sure = stood(50, 0.0, [0.0; 2]);
         assert!((sure.lost_m() - 0.3e-3 * (lately() + 49.0)).abs() < 1e-6, "{}", sure.lost_m());
-        // As much by chance as there is: half of it.
+        // Corrections half as large as chance allows.
         let chance_m = 0.001 * (lately() + 49.0);
         let variance = chance_m * chance_m / 54.0;
         let half = stood(50, 0.0, [variance, 0.0]);
@@ -165,7 +179,7 @@ mod tests {
         );
     }
 
-    /// Corrections of a vehicle that hovers go to and fro.
+    /// Corrections of a hovering vehicle alternate in sign.
     #[test]
     fn long_stop_counts_by_its_first_20_s() {
         let mut corrections = stood(190, 0.0, [0.0; 2]);
@@ -178,9 +192,10 @@ mod tests {
         assert!((corrections.lost_m() - first_m).abs() < 0.004, "{}", corrections.lost_m());
     }
 
-    /// It counts for a head's turn between passes, and for good in the position; a slow vehicle's coarse steps are no stops.
+    /// The doubt counts for one turn of a head between passes, and permanently in the position. Coarse steps of a
+    /// slow vehicle are no stops.
     #[test]
-    fn doubt_of_a_stop_stays_when_the_count_changes_again() {
+    fn doubt_about_a_stop_remains_when_the_count_changes() {
         for (readings, slips) in [(15, false), (50, true)] {
             let mut corrections = stood(readings, 0.0, [0.0; 2]);
             let before_m = corrections.lost_m();

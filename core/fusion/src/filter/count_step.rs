@@ -1,31 +1,32 @@
-//! The step of a tether counter, recognised from its counts.
+//! Resolution step of a tether counter, recognised from its counts.
 //!
-//! A file may state a smaller step than the counter has: its converter's instead of its wheel's. A counter that stands between its changes
-//! shows its step; changes that are multiples of one step show it, too.
+//! A vehicle file may state a smaller step than the counter has, for instance that of its converter instead of its
+//! wheel. A counter that pauses between changes shows its step. Changes that are multiples of one step show it, too.
 
 use serde::{Deserialize, Serialize};
 
 use headrace_geometry::math;
 use headrace_geometry::time::{DurNs, MonoNs};
 
-/// Changes of the count in a block. The step is the larger of the last two blocks': a garbled reading spoils one of them.
+/// Number of changes per block. The step is the larger of the last two blocks', because a garbled reading spoils one
+/// of them.
 const BLOCK: u32 = 50;
-/// Step of a counter that has not moved yet, m: common steps are 0.5 mm to 1 cm.
+/// Assumed step of a counter that has not moved yet, m; common steps are 0.5 mm to 1 cm.
 const COMMON_STEP_M: f64 = 0.01;
-/// Most readings that are taken for looks at one and the same rounding error.
+/// Maximum number of readings that count as repeats of one rounding error.
 const MOST_LOOKS: f64 = 50.0;
 
-/// See the module's description. Changes are in stated steps.
+/// Step detector of a tether counter. Changes are in stated steps.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct CountStep {
     last_m: Option<f64>,
-    /// When the count changed last.
+    /// Time of the last change of the count.
     changed: MonoNs,
-    /// Smallest and largest change of the block under way, and greatest common divisor of its changes.
+    /// Smallest and largest change in the present block, and the greatest common divisor of its changes.
     smallest: u64,
     largest: u64,
     common: u64,
-    /// Readings that differ from the one before, and that don't.
+    /// Number of readings that differ from the one before, and number of those that do not.
     changes: u32,
     stands: u32,
     /// Steps of the last two blocks that show one.
@@ -33,7 +34,7 @@ pub struct CountStep {
 }
 
 impl CountStep {
-    /// Takes a reading of a counter whose step is stated, m.
+    /// Processes a reading; `stated_m` is the counter's stated step, m.
     pub fn hear(&mut self, at: MonoNs, length_m: f64, stated_m: f64) {
         let Some(before_m) = self.last_m.replace(length_m) else {
             self.changed = at;
@@ -51,7 +52,7 @@ impl CountStep {
         self.changes += 1;
         if self.changes == BLOCK {
             let [_, latest] = self.blocks;
-            // Changes that are all alike show a way, and no step.
+            // Equal changes show a constant speed, but no step.
             if self.stands >= BLOCK / 5 {
                 self.blocks = [latest, self.smallest];
             } else if self.smallest < self.largest {
@@ -62,13 +63,14 @@ impl CountStep {
         }
     }
 
-    /// The step, m: as stated, or larger where the counts say so.
+    /// Returns the step, m: the stated one, or a larger one if the counts show it.
     pub fn step_m(&self, stated_m: f64) -> f64 {
         let [before, latest] = self.blocks;
         if before.max(latest) > 0 {
             return stated_m * before.max(latest) as f64;
         }
-        // Until a block is full, the smallest change so far is the best guess, and before the first one a common step.
+        // Until a block is full, the smallest change so far is the best guess. Before the first change it is a common
+        // step.
         match (self.changes, self.stands >= self.changes) {
             (0, _) => stated_m.max(COMMON_STEP_M),
             (_, true) => stated_m * self.smallest as f64,
@@ -76,8 +78,10 @@ impl CountStep {
         }
     }
 
-    /// How many readings of this period share the rounding error of one now, where the counter moves so far between two of them, m: those
-    /// since the count changed; and as many as repeat an error because their way is a whole number of steps.
+    /// Returns how many readings share the rounding error of the present one.
+    ///
+    /// `period` is the time between readings, and `way_m` the counter's movement in it, m. Readings since the last
+    /// change share the error. So do readings that repeat it because their distance is a whole number of steps.
     pub fn looks_at_an_error(&self, at: MonoNs, period: DurNs, way_m: f64, step_m: f64) -> f64 {
         let stood = at.since(self.changed).as_secs_f64() / period.as_secs_f64();
         let steps = way_m / step_m;
@@ -86,7 +90,7 @@ impl CountStep {
     }
 }
 
-/// Euclid's algorithm; zero is divided by everything.
+/// Greatest common divisor by Euclid's algorithm; every number divides zero.
 fn common_divisor(mut a: u64, mut b: u64) -> u64 {
     while b > 0 {
         (a, b) = (b, a % b);
@@ -103,7 +107,10 @@ mod tests {
         MonoNs(7_000_000_000 + 20_000_000 * u64::from(k))
     }
 
-    /// The step recognised from a way, m, by time, s, that a wheel of this step shows 50 times a second, rounded to stated steps.
+    /// Recognised step, m, of a wheel with step `step_m` that shows `way_m`, as a function of time in s, 50 times a
+    /// second.
+    ///
+    /// The counts are rounded to stated steps.
     fn recognised_m(step_m: f64, stated_m: f64, way_m: impl Fn(f64) -> f64) -> f64 {
         let mut step = CountStep::default();
         for k in 0..3000_u32 {
@@ -114,7 +121,7 @@ mod tests {
     }
 
     #[test]
-    fn a_step_larger_than_stated_is_recognised() {
+    fn step_larger_than_stated_is_recognised() {
         for step_m in [0.005, 0.01, 0.0123, 0.025, 0.05] {
             for speed_mps in [0.05, 0.1, 0.2] {
                 let swaying = |t: f64| speed_mps * t + 0.1 * math::sin(0.3 * t);
@@ -122,23 +129,26 @@ mod tests {
                 assert!((found_m - step_m).abs() <= 0.000_51, "{step_m} at {speed_mps}: {found_m}");
             }
         }
-        // Multiples of one step show it without standing between them.
+        // Changes that are multiples of one step show it without pauses.
         let found_m = recognised_m(0.01, 0.0005, |t| 2.0 * t + 1.7 * math::sin(0.7 * t));
         assert!((found_m - 0.01).abs() < 1e-9, "{found_m}");
     }
 
     #[test]
-    fn a_step_is_never_smaller_than_stated() {
+    fn step_is_at_least_the_stated_one() {
         for speed_mps in [0.003, 0.2] {
             let found_m = recognised_m(0.0005, 0.0005, |t| speed_mps * t + 0.02 * math::sin(0.4 * t));
             assert!((found_m - 0.0005).abs() < 1e-12, "{speed_mps}: {found_m}");
         }
         assert!((recognised_m(0.0005, 0.02, |t| 0.2 * t) - 0.02).abs() < 1e-12, "as stated");
-        assert!((recognised_m(0.01, 0.0005, |_| 3.0) - COMMON_STEP_M).abs() < 1e-12, "it stands");
+        assert!(
+            (recognised_m(0.01, 0.0005, |_| 3.0) - COMMON_STEP_M).abs() < 1e-12,
+            "a stationary counter has the common step"
+        );
     }
 
     #[test]
-    fn one_garbled_reading_hides_no_step() {
+    fn one_garbled_reading_leaves_the_step() {
         let mut step = CountStep::default();
         for k in 0..6000_u32 {
             let t = f64::from(k) / 50.0;
@@ -149,7 +159,7 @@ mod tests {
     }
 
     #[test]
-    fn readings_share_a_rounding_error_while_the_count_stands_or_their_way_is_a_whole_number_of_steps() {
+    fn readings_of_an_unchanged_count_or_whole_steps_share_a_rounding_error() {
         let mut step = CountStep::default();
         let at = |t: f64| MonoNs(7_000_000_000) + DurNs::from_secs_f64(t);
         for k in 0..=20_u32 {
@@ -172,9 +182,9 @@ mod tests {
         }
     }
 
-    /// Before it has moved, a common step; then the smallest change so far.
+    /// Before the first movement it is a common step, then the smallest change so far.
     #[test]
-    fn a_step_is_guessed_until_counts_show_it() {
+    fn step_is_guessed_until_counts_show_it() {
         let mut step = CountStep::default();
         for k in 0..100 {
             step.hear(at(k), 3.0, 0.0005);
@@ -184,6 +194,6 @@ mod tests {
         step.hear(at(100), 3.048, 0.0005);
         assert!((step.step_m(0.0005) - 0.048).abs() < 1e-12);
         step.hear(at(101), 3.0485, 0.0005);
-        assert!((step.step_m(0.0005) - 0.0005).abs() < 1e-12, "it is finer");
+        assert!((step.step_m(0.0005) - 0.0005).abs() < 1e-12, "a finer step shows itself");
     }
 }

@@ -1,39 +1,40 @@
-//! Whether the cable counter still counts from its first zero.
+//! Decision whether the cable counter still counts from its first zero.
 //!
-//! A count that begins again from zero tells nothing about the vehicle: the counter was plugged in again, or another one took its
-//! place, or the log goes on with an earlier time of a dive. The chainage is kept only where the counter alone was away, while the
-//! other sensors carried the estimate. Derivation: `docs/why/navigation.md`, "When a counter begins again from zero".
+//! A count that restarts from zero gives no position. Either the counter was plugged in again, another counter
+//! replaced it, or the log continues with an earlier time of a dive. The chainage is kept only if the counter alone
+//! was away while the other sensors carried the estimate. Derivation: `docs/why/navigation.md`, "When a counter
+//! begins again from zero".
 
 use headrace_geometry::time::{DurNs, MonoNs};
 use headrace_sensor::reading::TetherLength;
 use serde::{Deserialize, Serialize};
 
-/// See the module's description.
+/// Validity of the counter's zero.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub struct CounterZero {
     /// Number of the counter's last restart.
     restarts: u32,
-    /// When the counter was last heard.
+    /// Time of the counter's last reading.
     heard: Option<MonoNs>,
-    /// When any other sensor was last heard, and their longest silence since the counter was.
+    /// Time of the last reading of any other sensor, and their longest silence since the counter's.
     others: Option<MonoNs>,
     silence: DurNs,
     is_lost: bool,
 }
 
 impl CounterZero {
-    /// Whether the zero is unknown, and with it the chainage.
+    /// Whether the zero, and with it the chainage, is unknown.
     pub fn is_lost(&self) -> bool {
         self.is_lost
     }
 
-    /// Takes the receive time of any other sensor's reading.
+    /// Notes the receive time of a reading of any other sensor.
     pub fn hear_other(&mut self, received: MonoNs) {
         let before = self.others.replace(received).unwrap_or(received);
         self.silence = self.silence.max(received.since(before));
     }
 
-    /// Takes a reading of the counter; `is_sure` where the chainage is known without it.
+    /// Processes a reading of the counter; `is_sure` says that the chainage is known without it.
     pub fn hear(&mut self, received: MonoNs, length: &TetherLength, is_sure: bool) {
         let number = length.restart.map_or(0, |restart| restart.number);
         let before = core::mem::replace(&mut self.restarts, number);
@@ -41,7 +42,7 @@ impl CounterZero {
         self.silence = DurNs(0);
         let Some(heard) = self.heard.replace(received) else { return };
         let was_away = length.restart.is_some_and(|restart| restart.was_away);
-        // A stop of the whole vehicle, or of its log, silences all.
+        // A stop of the whole vehicle or its log silences all sensors.
         let is_alone = others.0.saturating_mul(2) < received.since(heard).0;
         self.is_lost |= number != before && !(was_away && is_alone && is_sure);
     }
@@ -56,7 +57,7 @@ mod tests {
         TetherLength { length_m: 30.0, resolution_m: 0.001, restart }
     }
 
-    /// Whether the zero is lost when the counter is away for a time, ms, and the others for another.
+    /// Whether the zero is lost when the counter is silent for one time and the others for another, ms.
     fn is_lost(counter_ms: u64, others_ms: u64, was_away: bool, is_sure: bool) -> bool {
         let at = |ms: u64| MonoNs(1_000_000_000 + 1_000_000 * ms);
         let mut zero = CounterZero::default();
@@ -70,11 +71,11 @@ mod tests {
     }
 
     #[test]
-    fn restart_keeps_the_zero_only_where_the_counter_alone_was_away() {
+    fn restart_keeps_the_zero_only_if_the_counter_alone_was_away() {
         assert!(!is_lost(1000, 10, true, true));
-        assert!(is_lost(1000, 10, false, true), "it wasn't away");
-        assert!(is_lost(1000, 900, true, true), "all were silent");
-        assert!(is_lost(1000, 10, true, false), "nothing else knew the chainage");
+        assert!(is_lost(1000, 10, false, true), "the counter was not away");
+        assert!(is_lost(1000, 900, true, true), "all sensors were silent");
+        assert!(is_lost(1000, 10, true, false), "the chainage was unknown without it");
     }
 
     #[test]

@@ -1,4 +1,6 @@
-//! The error-state Kalman filter: an epoch is a leg of propagation, followed by the measurements of its time.
+//! The error-state Kalman filter.
+//!
+//! An epoch is one leg of propagation followed by the measurements of its time.
 
 use core::ops::Range;
 
@@ -34,71 +36,81 @@ use headrace_sensor::reading::{Reading, SonarReturn};
 
 mod counter;
 
-/// Room for the inertial sample times of an epoch.
+/// Capacity for the inertial sample times of an epoch.
 const KNOTS: usize = 256;
-/// Velocity at rest, standard deviation, m/s: motion of the sea, or of the deck.
+/// Standard deviation of the velocity at rest, m/s: motion of the sea or of the deck.
 const REST_SD_MPS: f64 = 0.02;
-/// Mean turn rate over a second at rest, standard deviation, rad/s.
+/// Standard deviation of the mean turn rate over a second at rest, rad/s.
 const REST_SD_RADPS: f64 = 1e-3;
-/// Gate of the rest hypothesis, exceeded once in ten thousand times.
+/// Gate of the rest hypothesis; a valid one exceeds it once in ten thousand times.
 const REST_GATE: f64 = 15.1;
-/// Standard deviation of a range below which a wall counts as flat, m, unless ranges are more precise still.
+/// Standard deviation of a range below which a wall counts as flat, m.
+///
+/// The limit is the range's own noise if that is smaller.
 const NEAR_M: f64 = 0.03;
-/// Prior standard deviation of the vehicle's speed, m/s.
+/// Standard deviation of the speed prior, m/s.
 const SPEED_SD_MPS: f64 = 0.5;
 /// Standard deviation added to an estimate beyond the wall, m.
 const BEYOND_M: f64 = 1.5;
 
-/// Standard deviation from which a gyro's bias is known: a pass of 3 s is off by a milliradian, and standing would show little more, rad/s.
+/// Standard deviation below which the gyro bias counts as known, rad/s.
+///
+/// A pass of 3 s is then off by a milliradian, and standing still longer would gain little.
 pub(super) const BIAS_KNOWN_RADPS: f64 = 3e-4;
-/// Square of an innovation over its variance up to which the wall may be as smooth as it has shown itself.
+/// Largest normalised squared innovation at which the wall may be as smooth as it has been so far.
 const SMOOTH: f64 = 4.0;
-/// Largest step of a counter, as a share of its noise, whose rounding doesn't count.
+/// Largest step of a counter, as a share of its noise, at which its rounding is negligible.
 const FINE_SHARE: f64 = 0.2;
 /// Time within which an estimate settles.
 const SETTLES_WITHIN: DurNs = DurNs(20_000_000_000);
-/// Yaw known to this hardly moves what was placed, 5 cm at 6 m: what its getting surer would gain, relating nothing to it any more costs.
+/// Standard deviation of yaw below which the estimate counts as settled.
+///
+/// Soundings then move by 5 cm at 6 m. A further gain in certainty would not be worth the loss of their relation to
+/// later ones.
 const SETTLED_RAD: f64 = 0.5 * core::f64::consts::PI / 180.0;
 
-/// Maximum steps of an epoch: its leg, two widenings of the covariance, and an end.
+/// Maximum number of steps of an epoch: its leg, two widenings of the covariance, and an end.
 const STEPS: usize = 4;
 
-/// The estimate at one time, and its covariance.
+/// The estimate at one time, with its covariance.
 #[derive(Debug, Clone)]
 pub struct Eskf {
-    /// Time of the estimate: all readings valid before have been fused.
+    /// Time of the estimate; all readings valid before it have been fused.
     pub at: MonoNs,
     /// The estimated state.
     pub state: State,
-    /// The covariance of its errors.
+    /// Covariance of its errors.
     pub factors: Factors<ERRORS>,
     /// Clones for relative covariances.
     pub clones: ErrorClones,
-    /// When the chainage was last reacquired.
+    /// Time of the last reacquisition of the chainage.
     pub way_sought: Option<MonoNs>,
-    /// Variance of what the counter may have lost without the vehicle's having stood still, m^2.
+    /// Variance of the counter's possible loss while the vehicle was moving, m^2.
     slipped_m2: f64,
-    /// How often what was placed before has lost its relation to what is placed from then on.
+    /// Number of times later soundings have lost their relation to earlier ones.
     pub ties: u32,
-    /// When the estimate began, and the standard deviation of yaw then or when it had last halved, radians.
+    /// Start time of the estimate, and the standard deviation of yaw then or when it last halved, radians.
     begun: (MonoNs, f64),
-    /// How often it has halved while the estimate settled.
+    /// Number of times it has halved while the estimate settled.
     pub settled: u32,
-    /// The estimates through the last epoch, before its measurements.
+    /// Estimates through the last epoch, before its measurements.
     knots: Vec<(MonoNs, State)>,
     agreement: Agreement,
-    /// Whether the cable counter is believed.
+    /// Comparison of the cable counter with the estimate.
     pub cable: Cable,
     unrest: Unrest,
     slack_level: SlackLevel,
-    /// How rough the wall is.
+    /// Roughness of the wall.
     roughness: Roughness,
     seen_again: SeenAgain,
-    /// Share of the declared variance with which heads' ranges count: that of the head that shows most, until the gyros' bias is known.
+    /// Share of the declared variance applied to ranges of heads until the gyro bias is known.
+    ///
+    /// It is the largest share among the heads.
     smoothness: f64,
-    /// Whether the vehicle is known to be at rest: its heads then see the same bumps turn after turn.
+    /// Whether the vehicle is known to be at rest; its heads then see the same bumps in every turn.
     pub is_at_rest: bool,
-    /// Whether inertial data were lacking in the last epoch: what the vehicle did is then a guess, of which no noise is learnt.
+    /// Whether inertial data were missing in the last epoch. The vehicle's motion is then a guess, from which no
+    /// noise is learnt.
     is_blind: bool,
     /// Settings that the ranges contradict.
     pub suspicions: Suspicions,
@@ -112,7 +124,7 @@ pub struct Eskf {
 stateful!(Eskf { state: at, state, factors, clones, way_sought, slipped_m2, ties, begun, settled, agreement, cable, unrest, slack_level, roughness, seen_again, smoothness, is_at_rest, is_blind, suspicions, doubts; lists: knots; fixed: steps, keeps_steps; });
 
 impl Default for Eskf {
-    /// Allocated buffers without an estimate.
+    /// Allocates the buffers, without an estimate.
     fn default() -> Self {
         Self {
             at: MonoNs(0),
@@ -143,7 +155,7 @@ impl Default for Eskf {
 }
 
 impl Eskf {
-    /// From now on keeps in `steps` the data of an epoch for smoothing. The caller drains them after each epoch.
+    /// Keeps the data of each epoch for smoothing in `steps` from now on. The caller drains them after each epoch.
     ///
     /// Allocates: their buffer.
     pub fn keep_steps(&mut self) {
@@ -151,7 +163,7 @@ impl Eskf {
         self.keeps_steps = true;
     }
 
-    /// Begins with an estimate and its covariance.
+    /// Starts with an estimate and its covariance.
     pub fn begin(&mut self, at: MonoNs, state: State, factors: Factors<ERRORS>) {
         (self.at, self.state, self.factors) = (at, state, factors);
         self.clones.clear();
@@ -165,8 +177,10 @@ impl Eskf {
         self.begun = (at, self.pose_sd().yaw_rad);
     }
 
-    /// While the estimate settles, samples are placed ever more surely, and those from before are no measure of passes after:
-    /// whenever yaw has become twice as sure, errors between passes are those of passes from then on.
+    /// Restarts the relation between passes whenever the standard deviation of yaw has halved.
+    ///
+    /// While the estimate settles, samples become ever more certain. Earlier samples then say nothing about the
+    /// errors between later passes.
     fn settle(&mut self) {
         let (begun, yaw_rad) = self.begun;
         let now_rad = self.pose_sd().yaw_rad;
@@ -179,7 +193,7 @@ impl Eskf {
         }
     }
 
-    /// Advances to a later time, and fuses the window's readings up to it.
+    /// Advances to a later time and fuses the window's readings up to it.
     pub fn advance(
         &mut self,
         to: MonoNs,
@@ -205,7 +219,8 @@ impl Eskf {
         }
         let mut errors = [0.0; ERRORS];
         while let Some(waiting) = window.pop(to) {
-            // Each reading is compared with the best estimate so far: after a silence the first ones move it far.
+            // Each reading is compared with the best estimate so far, because the first readings after a silence move
+            // it far.
             let known = errors;
             let later_s = to.since(waiting.at).as_secs_f64();
             let mut then = self.state_at(waiting.at);
@@ -249,7 +264,7 @@ impl Eskf {
         }
     }
 
-    /// A force beyond what is plausible may have been true: the speed that it carried is then missing.
+    /// Adds the speed of a force beyond the plausible limits, which may have been real, to the uncertainty.
     fn note_jolt(&mut self, speed_mps: f64, epoch_s: f64) {
         let variance = speed_mps * speed_mps;
         let way = variance * epoch_s * epoch_s;
@@ -259,7 +274,7 @@ impl Eskf {
         }
     }
 
-    /// Adds to the error variances; the estimate stays.
+    /// Adds to the error variances; the estimate itself is unchanged.
     fn widen(&mut self, variances: &Errors) {
         self.keep(self.at, &Move::Widened(*variances), self.state);
         self.factors.widen(variances);
@@ -278,7 +293,7 @@ impl Eskf {
         self.keep(self.at, &Move::End, self.state);
     }
 
-    /// Fuses zero velocity (ZUPT), unless that is too unlikely, and a mean turn rate as the gyro bias.
+    /// Fuses zero velocity (ZUPT), unless it is too improbable, and a mean turn rate as the gyro bias.
     pub fn rest(&mut self, mean_radps: Option<Vec3<Body>>) {
         let rows = measure::rest(&self.state, REST_SD_MPS);
         let unlikely = |row: &ScalarUpdate| {
@@ -295,7 +310,7 @@ impl Eskf {
         self.state.correct(&errors);
     }
 
-    /// True if state and covariance are finite and no variance is negative.
+    /// Whether state and covariance are finite and no variance is negative.
     pub fn is_sound(&self) -> bool {
         self.state.is_sound() && self.factors.is_sound()
     }
@@ -346,7 +361,8 @@ impl Eskf {
         row.noise += self.left_out(row.bends);
         let (kind, declared) = (source.sensor.kind, row.noise);
         let is_head_square = kind == SensorKind::Head && row.is_square();
-        // A counter's rounding is an error that its readings share: nothing is learnt from innovations in which it counts.
+        // A counter's rounding error is shared by several readings. No noise is learnt from innovations in which it
+        // matters.
         let is_white = !matches!(&waiting.reading, Reading::TetherLength(length)
             if source.count_step.step_m(length.resolution_m) > FINE_SHARE * settings.tether_sd_m);
         if settings.learns && is_white {
@@ -356,7 +372,7 @@ impl Eskf {
         let along = self.factors.along(&row.h);
         let of_estimate = row.h.iter().zip(&along).map(|(h, along)| h * along).sum::<f64>();
         if settings.learns && is_head_square {
-            // What is too far off for a smooth wall is weighed as of a rough one.
+            // A residual too large for a smooth wall gets the weight of a rough one.
             let smooth = row.noise * self.smoothness;
             if innovation * innovation <= SMOOTH * (of_estimate + smooth) {
                 row.noise = smooth;
@@ -374,7 +390,7 @@ impl Eskf {
             source.noise_level.note_share((innovation * innovation - of_estimate) / declared, is_near);
         }
         let relative = source.noise_level.relative(nis.min(settings.gate));
-        // Rocks move the heads' ranges as restless gyros would.
+        // Rocks move the ranges of heads in the same way as restless gyros would.
         if kind != SensorKind::Head {
             self.unrest.note([part(RATE_BIAS), part(FORCE_BIAS)], variance, relative);
         }
@@ -412,13 +428,17 @@ impl Eskf {
         }
     }
 
-    /// Variance that the wall's bumps give a range of which many see the same one, m^2; 0 of other measurements.
+    /// Variance that bumps of the wall give a range when many pings see the same bump, m^2.
+    ///
+    /// 0 for other measurements.
     fn bumps(&self, kind: SensorKind, settings: &Settings) -> f64 {
         let sees_one = settings.learns && matches!(kind, SensorKind::Echosounder { .. });
         if sees_one { self.roughness.variance_m2(settings) } else { 0.0 }
     }
 
-    /// The noise with which a ping is fused, that of many which see the same bump; notes it for the wall's roughness.
+    /// Returns the noise of one of many pings that see the same bump.
+    ///
+    /// It also notes the ping for the roughness.
     fn spread_over_looks(
         &mut self,
         row: &ScalarUpdate,
@@ -444,8 +464,8 @@ impl Eskf {
         noise_m2
     }
 
-    /// Variance of the second-order terms neglected by an update. It matters only while position or attitude is hardly
-    /// known.
+    /// Variance of the second-order terms that an update neglects. It matters only while position or attitude is
+    /// hardly known.
     ///
     /// For a normal error e, f'' e^2 / 2 has a mean square of 3/4 (f'' sd^2)^2.
     fn left_out(&self, [by_place, by_turn, by_both]: [f64; 3]) -> f64 {
@@ -455,8 +475,9 @@ impl Eskf {
         0.75 * bent * bent
     }
 
-    /// Inflates R by the measurement's curvature, evaluated at +/-1 sd (sigma-point check). `None` if there is no measurement
-    /// from there.
+    /// Inflates R by the measurement's curvature, evaluated at +-1 sd (sigma-point check).
+    ///
+    /// `None` if there is no measurement at those points.
     fn straight(
         &self,
         mut row: ScalarUpdate,
@@ -480,7 +501,9 @@ impl Eskf {
         Some(row)
     }
 
-    /// Pulls an estimate beyond the wall back into the tunnel: no beam could be predicted from there.
+    /// Moves an estimate that lies beyond the wall back into the tunnel.
+    ///
+    /// No beam could be predicted from beyond the wall.
     fn stay_inside(&mut self, profile: &Profile) {
         let place = [self.state.position.y(), self.state.position.z()];
         if profile.contains(place) {
@@ -502,18 +525,20 @@ impl Eskf {
         self.state.correct(&errors);
     }
 
-    /// Standard deviations of the estimate.
+    /// Returns the standard deviations of the estimate.
     pub fn pose_sd(&self) -> PoseSd {
         let along_m = math::sqrt(self.along_sd_m() * self.along_sd_m() + self.slipped_m2);
         PoseSd { along_m, ..PoseSd::of(&self.factors) }
     }
 
-    /// Standard deviation of the chainage without what the counter has lost for good: what samples placed from now on share, m.
+    /// Standard deviation of the chainage that later samples share, m.
+    ///
+    /// Excludes the counter's permanent losses.
     pub fn along_sd_m(&self) -> f64 {
         math::hypot(PoseSd::of(&self.factors).along_m, self.cable.differs_m())
     }
 
-    /// Bounds the speed by its prior, against unaided accelerometers that integrate gravity.
+    /// Bounds the speed by its prior, so that unaided accelerometers do not integrate gravity without limit.
     fn bound_speed(&mut self) {
         let mut errors = [0.0; ERRORS];
         for (axis, row) in measure::rest(&self.state, SPEED_SD_MPS).iter().enumerate() {
@@ -529,10 +554,12 @@ impl Eskf {
         self.apply(row, &gain, known, errors);
     }
 
-    /// Corrects by a range of the wall: the attitude, and what is learnt from it, by a share of what it tells.
+    /// Corrects by a range to the wall.
     ///
-    /// Source: Brink, Partial-Update Schmidt-Kalman Filter, 2017; the covariance is Joseph's for the smaller gain, which is
-    /// the best one's plus a dyad of the gain left out.
+    /// Applies only a share of the correction of the attitude and related errors.
+    ///
+    /// Source: Brink, Partial-Update Schmidt-Kalman Filter, 2017. The covariance is Joseph's for the smaller gain,
+    /// which equals the optimal one plus a dyad of the omitted gain.
     fn correct_by_wall(&mut self, row: &ScalarUpdate, share: f64, known: &Errors, errors: &mut Errors) {
         let mut gain = self.factors.measure(&row.h, row.noise);
         let mut left_out = [0.0; ERRORS];

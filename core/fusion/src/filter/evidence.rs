@@ -1,30 +1,33 @@
-//! Sums by which settings are judged: of one parameter, and of a source that may sit where another does.
+//! Sums for judging settings: for one parameter, and for a source that may be mounted in another's place.
 
 use serde::{Deserialize, Serialize};
 
 use headrace_geometry::math;
 
-/// Sources with ranges that are followed.
+/// Maximum number of range sources that are followed.
 pub(super) const FOLLOWED: usize = 12;
-/// One reading in so many is compared with its alternatives: each costs a ray.
+/// One reading in this many is compared with its alternatives, because each comparison costs a ray.
 pub(super) const COMPARED: u32 = 4;
-/// Fewest blocks that say how sure a figure is.
+/// Minimum number of blocks from which the uncertainty of a figure can be computed.
 pub(super) const FEWEST_BLOCKS: u32 = 8;
-/// Standard deviations from which a figure is certain, and from which an alternative is: how much it gains varies with the
-/// vehicle's place.
+/// Standard deviations above which a figure counts as certain.
+///
+/// For an alternative the limit is lower (`SURE_GAIN`), because its gain varies with the vehicle's position.
 pub(super) const SURE: f64 = 6.0;
 pub(super) const SURE_GAIN: f64 = 3.0;
-/// Normalised squares that a parameter explains, of each reading of all sources, from which it shows: a seventh of their noise.
+/// Minimum normalised square that a parameter must explain, per reading of all sources.
+///
+/// It is a seventh of their noise.
 const EXPLAINS: f64 = 0.02;
-/// What of the vehicle's pose is unknown within a spell: place across and up, roll, pitch and yaw.
+/// Unknowns of the vehicle's pose within a spell: position across and up, roll, pitch and yaw.
 pub(super) const POSE: usize = 5;
-/// What a comparison counts of a miss at most, m: a share of echoes is of something else.
+/// Largest residual that counts in a comparison, m, since some echoes come from other objects.
 const MOST_MISSED_M: f64 = 0.5;
-/// Mean square by which a source must miss, m^2, and the share of it that an alternative may leave.
+/// Minimum mean square residual of a source, m^2, and the share that an alternative may leave.
 const MISSES_M2: f64 = 0.01;
 const LEAVES: f64 = 0.4;
 
-/// Sums of one parameter within a spell, beside those of the vehicle's pose.
+/// Sums of one parameter within a spell, next to those of the vehicle's pose.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub(super) struct Line {
     pub(super) by_pose: [f64; POSE],
@@ -32,7 +35,7 @@ pub(super) struct Line {
     pub(super) residuals: f64,
 }
 
-/// Sums of one parameter over blocks, freed of the vehicle's pose.
+/// Sums of one parameter over blocks, with the vehicle's pose eliminated.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub(super) struct Fit {
     pub(super) blocks: u32,
@@ -44,13 +47,15 @@ pub(super) struct Fit {
     values_2: f64,
 }
 
-/// How a source's ranges fit where it sits, and where another does; itself the other way round, if that is the same.
+/// Comparison of a source's fit at its own mount with the fit at another mount, or turned by half a turn.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub(super) struct Alternative {
     pub(super) source: u16,
     pub(super) other: u16,
     pub(super) is_echo: bool,
-    /// Of the block, and of all blocks before: squares missed, those missed by the alternative, readings.
+    /// Sums of the present block, and of all earlier blocks.
+    ///
+    /// Each has own squares, squares of the alternative, and number of readings.
     pub(super) block: [f64; 3],
     pub(super) all: [f64; 3],
     pub(super) blocks: u32,
@@ -85,7 +90,7 @@ pub(super) fn solved(factor: &[[f64; POSE]; POSE], right: [f64; POSE]) -> [f64; 
 }
 
 impl Fit {
-    /// Adds the sums of a block of so many readings, of all sources.
+    /// Adds the sums of a block; `readings` counts all sources.
     pub(super) fn add(&mut self, [weight, value]: [f64; 2], readings: u32) {
         if weight <= 0.0 {
             return;
@@ -99,12 +104,12 @@ impl Fit {
         self.values_2 += value * value;
     }
 
-    /// Whether there have been blocks enough for anything to be said.
+    /// Whether there are enough blocks for a statement.
     pub(super) fn is_settled(&self) -> bool {
         self.blocks >= FEWEST_BLOCKS
     }
 
-    /// Estimate and standard deviation by the scatter of blocks.
+    /// Returns the estimate and its standard deviation from the scatter of blocks.
     pub(super) fn estimate(&self) -> Option<[f64; 2]> {
         if self.blocks < FEWEST_BLOCKS || self.weight <= 0.0 {
             return None;
@@ -115,9 +120,11 @@ impl Fit {
         Some([estimate, math::sqrt((scatter * n / (n - 1.0)).max(0.0)) / self.weight])
     }
 
-    /// The estimate where it is certainly beyond this, and its standard deviations from zero: by the scatter of blocks, and by the noise
-    /// of ranges, without which blocks hardly scatter. `None` where it hardly changes any range: what is made of millimetres then is
-    /// what walls and beams are otherwise than assumed.
+    /// Returns the estimate and its distance from zero in sd, if it is certainly beyond `least`.
+    ///
+    /// The standard deviation includes the scatter of blocks and the noise of ranges, because blocks alone may hardly
+    /// scatter. `None` if the parameter hardly changes any range: an estimate from millimetres reflects model errors
+    /// of walls and beams.
     pub(super) fn certain(&self, least: f64) -> Option<(f64, f64)> {
         let [estimate, scatter] = self.estimate()?;
         let sure_sd = estimate.abs() / scatter.max(1.0 / math::sqrt(self.weight));
@@ -125,14 +132,14 @@ impl Fit {
         (estimate.abs() >= least && sure_sd >= SURE && shows).then_some((estimate, sure_sd))
     }
 
-    /// Sum of normalised squares that it explains.
+    /// Sum of normalised squares that the parameter explains.
     pub(super) fn explains(&self) -> f64 {
         self.value * self.value / self.weight.max(f64::MIN_POSITIVE)
     }
 }
 
 impl Alternative {
-    /// Adds a reading: missed where it sits, and where the other sits, m.
+    /// Adds a reading: residuals at its own mount and at the other mount, m.
     pub(super) fn note(&mut self, missed_m: [f64; 2]) {
         let [own, theirs] = missed_m.map(|missed_m| missed_m.abs().min(MOST_MISSED_M));
         for (sum, part) in self.block.iter_mut().zip([own * own, theirs * theirs, 1.0]) {
@@ -160,8 +167,9 @@ impl Alternative {
         theirs / own.max(f64::MIN_POSITIVE)
     }
 
-    /// Standard deviations by which the alternative fits better, where it certainly does and leaves little: of both, for two
-    /// sources that are swapped.
+    /// Returns by how many standard deviations the alternative fits better.
+    ///
+    /// `None` unless it certainly does and leaves little. For two swapped sources, the limit applies to both.
     pub(super) fn certain(&self, share_left: f64) -> Option<f64> {
         let [own, _, readings] = self.all;
         let n = f64::from(self.blocks);
@@ -174,7 +182,7 @@ impl Alternative {
         (sure_sd >= SURE_GAIN).then_some(sure_sd)
     }
 
-    /// Sum of normalised squares that it explains, for a range of 3 cm.
+    /// Sum of normalised squares that the alternative explains, for a range noise of 3 cm.
     pub(super) fn explains(&self) -> f64 {
         let [own, theirs, _] = self.all;
         (own - theirs) * f64::from(COMPARED) / (0.03 * 0.03)
@@ -185,7 +193,8 @@ impl Alternative {
 mod tests {
     use super::*;
 
-    /// Blocks alike, as without noise, of a parameter that changes ranges by so many of their standard deviations.
+    /// A fit to identical blocks, as without noise, of a parameter that changes ranges by `changes_sd` standard
+    /// deviations.
     fn alike(changes_sd: f64, by: f64) -> Fit {
         let mut fit = Fit::default();
         let weight = 100.0 * (changes_sd / by) * (changes_sd / by);
@@ -193,9 +202,9 @@ mod tests {
         fit
     }
 
-    /// Standard deviations of a mean by its values, of an alternative that gains by turns so many square metres of a quarter.
+    /// An alternative gains a varying number of square metres; its certainty equals that of the mean gain.
     #[test]
-    fn an_alternative_is_as_sure_as_its_blocks_agree() {
+    fn alternative_is_as_certain_as_its_blocks_agree() {
         let sure_sd = |scatter_m2: f64| {
             let mut alternative = Alternative::default();
             for k in 0..8 {
@@ -206,7 +215,8 @@ mod tests {
             }
             alternative.certain(alternative.share_left())
         };
-        // The mean gain is 0.2 m^2; that of eight which lie so far off it, alternately, is sure to so much over the root of seven.
+        // The mean gain is 0.2 m^2. Eight values that alternate around it by the scatter give it an sd of scatter
+        // over the root of seven.
         for scatter_m2 in [0.05, 0.04, 0.02] {
             let expected = 0.2 / scatter_m2 * math::sqrt(7.0);
             let found = sure_sd(scatter_m2).unwrap();
@@ -215,11 +225,11 @@ mod tests {
     }
 
     #[test]
-    fn what_hardly_changes_a_range_is_not_certain_though_blocks_do_not_scatter() {
+    fn parameter_with_negligible_effect_is_not_certain_despite_low_scatter() {
         assert!(alike(1.0, 0.05).certain(0.03).is_some());
         assert!(alike(0.2, 0.2).certain(0.03).is_some(), "6 mm of 3 cm");
         assert_eq!(alike(0.1, 0.2).certain(0.03), None, "3 mm");
-        assert_eq!(alike(0.001, 1e9).certain(0.03), None, "a turn in a round pipe");
-        assert_eq!(alike(1.0, 0.02).certain(0.03), None, "less than what is told");
+        assert_eq!(alike(0.001, 1e9).certain(0.03), None, "a rotated head in a round pipe");
+        assert_eq!(alike(1.0, 0.02).certain(0.03), None, "below the reporting limit");
     }
 }

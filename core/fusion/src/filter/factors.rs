@@ -1,8 +1,8 @@
 //! A covariance kept as its factors: P = U D U^T, U unit upper triangular, D diagonal.
 //!
-//! Updates change D by products and quotients of positive numbers alone, so that P stays symmetric and non-negative
-//! however badly it is scaled; updates of the covariance itself fail, Joseph's form included, when a precise
-//! measurement follows a long drift (see the tests).
+//! Updates change D only by products and quotients of positive numbers. P therefore stays symmetric and non-negative,
+//! however badly it is scaled. Updates of P itself, Joseph's form included, fail when a precise measurement follows a
+//! long drift (see the tests).
 //!
 //! Source: Bierman, Factorization Methods for Discrete Sequential Estimation, 1977: V.3 (measurement), III.4
 //! (addition of a dyad, after Agee and Turner).
@@ -12,7 +12,7 @@ use headrace_geometry::snapshot::{Restorer, Saver, SnapshotError, Stateful};
 /// Factors of the covariance of `N` errors.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Factors<const N: usize> {
-    /// Columns of U: `u[j][i]` is its element (i, j). Below the diagonal nothing is read; on it is 1.
+    /// Columns of U: `u[j][i]` is its element (i, j). Elements below the diagonal are never read; the diagonal is 1.
     u: [[f64; N]; N],
     d: [f64; N],
 }
@@ -26,7 +26,7 @@ pub struct Gain<const N: usize> {
     pub variance: f64,
 }
 
-/// Process noise of one error or two.
+/// Process noise of one or two errors.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Noise {
     variance: f64,
@@ -47,7 +47,7 @@ impl<const N: usize> Stateful for Factors<N> {
 }
 
 impl<const N: usize> Factors<N> {
-    /// Independent errors of these variances, none negative.
+    /// Creates independent errors with these variances, which must not be negative.
     pub fn independent(variances: [f64; N]) -> Self {
         let mut u = [[0.0; N]; N];
         for (j, column) in u.iter_mut().enumerate() {
@@ -96,8 +96,9 @@ impl<const N: usize> Factors<N> {
         along
     }
 
-    /// e^T P^-1 e: squared Mahalanobis distance, chi-square with `N` degrees of freedom. Infinite where an error of zero
-    /// variance isn't zero.
+    /// Squared Mahalanobis distance e^T P^-1 e, chi-square with `N` degrees of freedom.
+    ///
+    /// Infinite if an error with zero variance is not zero.
     pub fn distance(&self, errors: &[f64; N]) -> f64 {
         let mut rest = *errors;
         let mut sum = 0.0;
@@ -113,7 +114,7 @@ impl<const N: usize> Factors<N> {
         sum
     }
 
-    /// P^-1 e, by back substitution. Components of zero variance count as nothing.
+    /// Solves P^-1 e by back substitution. Components with zero variance are ignored.
     pub fn solve(&self, errors: &[f64; N]) -> [f64; N] {
         let mut rest = *errors;
         for (j, column) in self.u.iter().enumerate().rev() {
@@ -134,7 +135,9 @@ impl<const N: usize> Factors<N> {
         rest
     }
 
-    /// Factors of the covariance of a sum of independent errors, each transformed by the rows of a matrix.
+    /// Returns the factors of the covariance of a sum of independent, transformed errors.
+    ///
+    /// Each part has a matrix, given by rows.
     ///
     /// Source: Thornton's modified weighted Gram-Schmidt, in Bierman 1977, VI.4.
     pub fn of_sum<const M: usize>(parts: [(&Self, &[[f64; N]; N]); M]) -> Self {
@@ -165,18 +168,18 @@ impl<const N: usize> Factors<N> {
         sum
     }
 
-    /// A row times U.
+    /// Multiplies a row by U.
     fn through(&self, row: &[f64; N]) -> [f64; N] {
         core::array::from_fn(|j| self.u.get(j).map_or(0.0, |column| dot(column, row, j + 1)))
     }
 
-    /// The elements above the diagonal of U and those of D, column by column.
+    /// Returns the elements above the diagonal of U and those of D, column by column.
     pub fn numbers(&self) -> impl Iterator<Item = f64> + '_ {
         let columns = self.u.iter().zip(&self.d).enumerate();
         columns.flat_map(|(j, (column, d))| column.iter().take(j).copied().chain([*d]))
     }
 
-    /// Factors from such numbers; `None` when there are too few.
+    /// Reads factors from such numbers; `None` if there are too few.
     pub fn of_numbers(numbers: &mut impl Iterator<Item = f64>) -> Option<Self> {
         let mut factors = Self::independent([0.0; N]);
         for (j, (column, d)) in factors.u.iter_mut().zip(&mut factors.d).enumerate() {
@@ -187,7 +190,7 @@ impl<const N: usize> Factors<N> {
         Some(factors)
     }
 
-    /// Fuses a measurement of the errors weighted by `h`, with noise of a positive variance.
+    /// Fuses a measurement of the errors, weighted by `h`, with noise of a positive variance.
     ///
     /// Source: Bierman 1977, V.3.
     pub fn measure(&mut self, h: &[f64; N], noise: f64) -> Gain<N> {
@@ -212,7 +215,7 @@ impl<const N: usize> Factors<N> {
         Gain { k: k.map(|k| k / variance), variance }
     }
 
-    /// Adds noise of a variance to the errors, weighted by `a`, whose entries from `len` on are zero.
+    /// Adds noise of a variance to the errors, weighted by `a`; entries of `a` from `len` on are zero.
     pub fn add(&mut self, mut variance: f64, mut a: [f64; N], len: usize) {
         for (j, (column, d)) in self.u.iter_mut().zip(&mut self.d).enumerate().take(len).rev() {
             enter(j, column, d, &mut variance, &mut a);
@@ -224,18 +227,18 @@ impl<const N: usize> Factors<N> {
         self.add_all([Noise::of_one(i, variance)]);
     }
 
-    /// Adds to the variances of the errors; entries that aren't above zero change nothing.
+    /// Adds to the variances of the errors; entries that are not positive are ignored.
     pub fn widen(&mut self, variances: &[f64; N]) {
         for (i, variance) in variances.iter().enumerate().filter(|(_, variance)| **variance > 0.0) {
             self.add_to(i, *variance);
         }
     }
 
-    /// Adds noises in order.
+    /// Adds several noises in order, interleaved column by column.
     ///
-    /// They take turns column by column. The result is bit-identical to adding one after the other, as each depends on those
-    /// before it only through the current column; and while one waits for its quotient, on which its next column depends,
-    /// the processor works on the others.
+    /// The result is bit-identical to adding them one after the other, because each depends on the earlier ones only
+    /// through the current column. Interleaving is faster: while one noise waits for the quotient that its next
+    /// column needs, the processor works on the others.
     pub fn add_all<const M: usize>(&mut self, noises: [Noise; M]) {
         let mut variances = noises.map(|noise| noise.variance);
         let lens = noises.map(|noise| noise.weights[0].0 + 1);
@@ -252,8 +255,9 @@ impl<const N: usize> Factors<N> {
         }
     }
 
-    /// Replaces the errors e by F e, where F is unit upper triangular: `transform` works on one vector of errors, whose
-    /// entries from the given index on are zero.
+    /// Replaces the errors e by F e, where F is unit upper triangular.
+    ///
+    /// `transform` works on one vector of errors; its entries from the given index on are zero.
     pub fn shear(&mut self, transform: impl Fn(&mut [f64; N], usize)) {
         for (j, column) in self.u.iter_mut().enumerate() {
             transform(column, j + 1);
@@ -277,7 +281,7 @@ impl<const N: usize> Factors<N> {
         }
     }
 
-    /// Whether all are finite numbers and no variance is negative.
+    /// Whether all numbers are finite and no variance is negative.
     pub fn is_sound(&self) -> bool {
         self.d.iter().all(|d| d.is_finite() && *d >= 0.0)
             && self.u.as_flattened().iter().all(|u| u.is_finite())
@@ -285,18 +289,18 @@ impl<const N: usize> Factors<N> {
 }
 
 impl Noise {
-    /// The same, its variance multiplied by a factor.
+    /// Returns the noise with its variance multiplied by a factor.
     #[must_use]
     pub fn scaled(self, factor: f64) -> Self {
         Self { variance: self.variance * factor, ..self }
     }
 
-    /// Noise of a variance in one error.
+    /// Creates noise of a variance in one error.
     pub fn of_one(i: usize, variance: f64) -> Self {
         Self { variance, weights: [(i, 1.0); 2] }
     }
 
-    /// Noise of a variance in an error, coupled by `share` into one of lower index.
+    /// Creates noise of a variance in one error, coupled by `share` into an error with a lower index.
     pub fn of_two(i: usize, (before, share): (usize, f64), variance: f64) -> Self {
         Self { variance, weights: [(i, 1.0), (before, share)] }
     }
@@ -310,8 +314,9 @@ impl Noise {
     }
 }
 
-/// Enters noise into column `j` of the factors, after the columns above it; the remaining variance and weights apply to
-/// the columns below.
+/// Adds noise to column `j` of the factors, after the columns above it.
+///
+/// The remaining variance and weights apply to the columns below.
 ///
 /// Source: Agee and Turner 1972, in Bierman 1977, III.4.
 fn enter<const N: usize>(j: usize, column: &mut [f64; N], d: &mut f64, variance: &mut f64, a: &mut [f64; N]) {
@@ -332,7 +337,7 @@ fn at<const N: usize>(column: &[f64; N], i: usize) -> f64 {
     column.get(i).copied().unwrap_or(0.0)
 }
 
-/// Product of the first `len` elements, in four sums of fixed order.
+/// Dot product of the first `len` elements, in four sums of fixed order.
 fn dot<const N: usize>(a: &[f64; N], b: &[f64; N], len: usize) -> f64 {
     let (a, b) = (a.get(..len).unwrap_or_default(), b.get(..len).unwrap_or_default());
     let mut sums = [0.0; 4];
@@ -370,7 +375,7 @@ mod tests {
     }
 
     #[test]
-    fn noises_that_take_turns_give_the_bits_of_one_after_the_other() {
+    fn interleaved_noises_are_bit_identical_to_sequential_ones() {
         let noises: [Noise; 9] = core::array::from_fn(|i| match i {
             7 => Noise::of_two(5, (2, -1.3), 0.11),
             8 => Noise::of_two(6, (5, 0.7), 0.2),

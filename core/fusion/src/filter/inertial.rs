@@ -14,25 +14,26 @@ use super::state::{
 use headrace_geometry::frames::{Body, Vec3};
 use headrace_geometry::math;
 
-/// Mean of an inertial unit's samples over an interval, in the body's frame.
+/// Mean of an inertial unit's samples over an interval, in the body frame.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Felt {
-    /// Turn rate, rad/s; `None` without gyro data: the attitude then stays, and its error grows fast.
+    /// Turn rate, rad/s; `None` without gyro data. The attitude is then unchanged, and its error grows fast.
     pub rate_radps: Option<Vec3<Body>>,
-    /// Specific force, m/s^2; `None` without accelerometer data: the velocity then stays, and its error grows fast.
+    /// Specific force, m/s^2; `None` without accelerometer data. The velocity is then unchanged, and its error grows
+    /// fast.
     pub force_mps2: Option<Vec3<Body>>,
 }
 
-/// Number of values of a leg.
+/// Number of values in the record of a leg.
 pub const LEG_NUMBERS: usize = 1 + 5 * 9 + 2 * 3 + 2 + 2 + 2 + 2;
 
 /// Propagation accumulated since the errors were last propagated.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Leg {
     dt_s: f64,
-    /// Integral of the rotation while there is gyro data.
+    /// Integral of the rotation over times with gyro data.
     turned: Matrix3<f64>,
-    /// The same while there is accelerometer data, and its integral.
+    /// Integral and double integral of the rotation over times with accelerometer data.
     pushed: Matrix3<f64>,
     pushed_twice: Matrix3<f64>,
     /// Velocity and displacement by specific force, without gravity.
@@ -43,9 +44,9 @@ pub struct Leg {
     tilting_twice: Matrix3<f64>,
     /// Time without gyro data, and without accelerometer data, s.
     blind_s: [f64; 2],
-    /// Way along the tunnel, m, and the cable's scale error on it: what creeps.
+    /// Distance along the tunnel, m, and the cable's scale error on it; their product is the creep.
     creeping: [f64; 2],
-    /// Factors of the process noise of gyro biases and accelerometer biases.
+    /// Factors for the process noise of gyro and accelerometer biases.
     unrest: [f64; 2],
     /// The cable's slack.
     slack: [f64; 2],
@@ -79,8 +80,9 @@ impl State {
         leg.add(dt_s, turn, force, felt.rate_radps.is_some());
     }
 
-    /// Propagates the estimate over `dt_s`; returns its attitude in the middle of that, and the specific force in the
-    /// tunnel's frame.
+    /// Propagates the estimate over `dt_s`.
+    ///
+    /// Returns the attitude in the middle of the interval, and the specific force in the tunnel frame.
     pub fn move_on(
         &mut self,
         felt: &Felt,
@@ -148,7 +150,7 @@ impl Leg {
         Wander { reach, time_s }
     }
 
-    /// Its values, for a record.
+    /// Returns its values for a record.
     pub fn numbers(&self) -> impl Iterator<Item = f64> + '_ {
         let squares = [&self.turned, &self.pushed, &self.pushed_twice, &self.tilting, &self.tilting_twice];
         let squares = squares.into_iter().flat_map(|matrix| matrix.iter().copied());
@@ -157,7 +159,7 @@ impl Leg {
         [self.dt_s].into_iter().chain(squares).chain(ways).chain(rest)
     }
 
-    /// The leg from such values; `None` when there are too few.
+    /// Reads a leg from such values; `None` if there are too few.
     pub fn of_numbers(numbers: &mut impl Iterator<Item = f64>) -> Option<Self> {
         let mut leg = Self { dt_s: numbers.next()?, ..Self::default() };
         let squares = [
@@ -177,7 +179,9 @@ impl Leg {
         Some(leg)
     }
 
-    /// The same with these factors of the process noise of gyro biases and accelerometer biases, and this slack.
+    /// Returns the leg with these noise factors and this slack.
+    ///
+    /// The factors are for the process noise of gyro and accelerometer biases.
     #[must_use]
     pub fn with_noise(self, unrest: [f64; 2], slack: Wander) -> Self {
         Self { unrest, slack: [slack.reach, slack.time_s], ..self }
@@ -188,12 +192,12 @@ impl Leg {
         self.dt_s
     }
 
-    /// Whether inertial data were lacking, if only for a part of it.
+    /// Whether inertial data were missing for any part of it.
     pub fn is_blind(&self) -> bool {
         self.blind_s.iter().any(|blind_s| *blind_s > 0.0)
     }
 
-    /// Transition of errors from its beginning to its end.
+    /// Returns the transition of errors from its beginning to its end.
     pub fn transition(&self, settings: &Settings) -> Transition {
         let fading = |time_s: f64| math::exp(-self.dt_s / time_s).max(LEAST_FADING);
         Transition {
@@ -220,7 +224,7 @@ impl Leg {
         }
     }
 
-    /// Adds the process noise: noise of the inertial sensors, and drift of the sensor errors.
+    /// Adds the process noise: noise of the inertial sensors and drift of the sensor errors.
     pub fn disturb(&self, settings: &Settings, transition: &Transition, factors: &mut Factors<ERRORS>) {
         let [blind_rate_s, blind_force_s] = self.blind_s;
         let variance = |density: f64, blind_density: f64, blind_s: f64| {
@@ -230,7 +234,8 @@ impl Leg {
         let rate = variance(settings.rate_noise, settings.blind_rate_noise, blind_rate_s);
         for k in 0..3 {
             factors.add_all([
-                // White force noise over the leg: displacement correlated with velocity, plus an independent dt^2 / 12.
+                // White force noise over the leg: displacement correlated with velocity, plus an independent dt^2 /
+                // 12.
                 Noise::of_two(VELOCITY + k, (POSITION + k, self.dt_s / 2.0), force),
                 Noise::of_one(POSITION + k, force * self.dt_s * self.dt_s / 12.0),
                 Noise::of_one(ATTITUDE + k, rate),
@@ -239,7 +244,7 @@ impl Leg {
         factors.add_all(self.wandering(settings, transition));
     }
 
-    /// Process noise of the sensor errors.
+    /// Returns the process noise of the sensor errors.
     fn wandering(&self, settings: &Settings, transition: &Transition) -> [Noise; 12] {
         let fading = |i: usize, wander: Wander| {
             let left = transition.left_of(i);
@@ -267,7 +272,7 @@ impl Leg {
     }
 }
 
-/// Least decay factor: below it an error hardly matters, and zero would lead to a division by zero.
+/// Minimum decay factor, to avoid a division by zero. An error below it is negligible.
 const LEAST_FADING: f64 = 1e-3;
 
 /// Transition of errors between two times: e' = F e.
@@ -281,9 +286,9 @@ pub struct Transition {
     way_pushed: Matrix3<f64>,
     velocity_turned: Matrix3<f64>,
     way_turned: Matrix3<f64>,
-    /// Way along the tunnel, m, and the cable's scale error on it.
+    /// Distance along the tunnel, m, and the cable's scale error on it.
     creeping: [f64; 2],
-    /// Errors that decay, and their factors.
+    /// Errors that decay, with their factors.
     fading: [(usize, f64); 9],
 }
 
@@ -305,7 +310,7 @@ impl Transition {
         state.heading_offset_rad *= self.left_of(HEADING);
     }
 
-    /// Decay factor of an error; 1 if it doesn't decay.
+    /// Decay factor of an error; 1 for an error that does not decay.
     fn left_of(&self, error: usize) -> f64 {
         self.fading.iter().find(|(i, _)| *i == error).map_or(1.0, |(_, left)| *left)
     }
@@ -320,7 +325,7 @@ impl Transition {
         }
     }
 
-    /// The part without decay; errors from `len` on are zero.
+    /// Applies the part without decay; errors from `len` on are zero.
     fn shear(&self, e: &mut Errors, len: usize) {
         if len <= VELOCITY {
             return;

@@ -1,4 +1,4 @@
-//! Measurement models: the value expected by the estimate, and its derivative with respect to each error.
+//! Measurement models: the value that the estimate predicts, and its derivative with respect to each error.
 //!
 //! Derivation: `docs/why/navigation.md`, "Measurements".
 
@@ -10,8 +10,9 @@ use headrace_geometry::frames::{Body, Rot, Sensor, Tunnel, Vec3};
 use headrace_geometry::math;
 use headrace_geometry::tunnel::Profile;
 
-/// Least cosine of the incidence at which a head's range is believed more than declared. Where a hull is pitched over the top, beams look along the
-/// tunnel, and few of them hold the attitude.
+/// Minimum cosine of the incidence at which a head's range may get more weight than declared.
+///
+/// If the hull is pitched over the top, beams look along the tunnel, and few of them determine the attitude.
 const SQUARE: f64 = 0.8;
 
 /// A scalar measurement.
@@ -25,12 +26,16 @@ pub struct ScalarUpdate {
     pub noise: f64,
     /// For a range, the beam's inclination along the tunnel.
     pub lean: Option<Lean>,
-    /// Second derivatives of the expected value, neglected by the update: by position, 1/m; by rotation, m; by both.
+    /// Second derivatives of the expected value, which the update neglects.
+    ///
+    /// They are by position, 1/m, by rotation, m, and by both.
     pub bends: [f64; 3],
 }
 
-/// Inclination of a beam along the tunnel. It lengthens the range in either direction: a filter that isn't sure of the
-/// direction would take its first guess for proven.
+/// Inclination of a beam along the tunnel.
+///
+/// It lengthens the range in either direction. A filter that is uncertain of the direction would take its first guess
+/// as proven.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Lean {
     /// Component of the beam along the tunnel.
@@ -46,7 +51,7 @@ impl ScalarUpdate {
         Self { h: [0.0; ERRORS], residual, noise, lean: None, bends: [0.0; 3] }
     }
 
-    /// A direct measurement of one error.
+    /// Creates a direct measurement of one error.
     pub fn of(error: usize, residual: f64, noise: f64) -> Self {
         Self::new(residual, noise).with_one(error, 1.0)
     }
@@ -63,8 +68,9 @@ impl ScalarUpdate {
         self
     }
 
-    /// The same update, without its dependence on the beam's inclination where that isn't to be used or its direction is
-    /// uncertain: `sd_of` gives the standard deviation of a weighted sum of errors.
+    /// Drops the dependence on the beam's inclination if it is not to be used or its direction is uncertain.
+    ///
+    /// `sd_of` returns the standard deviation of a weighted sum of errors.
     #[must_use]
     pub fn unless_sure(mut self, is_used: bool, sd_of: impl Fn(&Errors) -> f64) -> Self {
         let Some(lean) = self.lean else { return self };
@@ -79,17 +85,18 @@ impl ScalarUpdate {
         self
     }
 
-    /// Whether a beam meets the wall squarely: a range changes by the place as one over the cosine of the incidence.
+    /// Whether a beam meets the wall squarely. A range changes with the position by one over the cosine of the
+    /// incidence.
     pub fn is_square(&self) -> bool {
         vec::<Tunnel>(&self.h, POSITION).norm() < 1.0 / SQUARE
     }
 
-    /// Part of the residual due to the errors found since `known`.
+    /// Part of the residual that is due to the errors found since `known`.
     pub fn found(&self, known: &Errors, errors: &Errors) -> f64 {
         self.h.iter().zip(errors.iter().zip(known)).map(|(h, (error, known))| h * (error - known)).sum()
     }
 
-    /// The same update for the errors `later_s` after the measurement.
+    /// Returns the update for the errors `later_s` after the measurement.
     #[must_use]
     pub fn seen_later(mut self, later_s: f64) -> Self {
         for k in 0..3 {
@@ -102,11 +109,13 @@ impl ScalarUpdate {
     }
 }
 
-/// Minimum cosine of the incidence: beams that graze the wall more measure its roughness rather than the position.
+/// Minimum cosine of the incidence.
+///
+/// Beams that graze the wall more measure its roughness rather than the position.
 const LEAST_COSINE: f64 = 0.5;
-/// Minimum distance of the wall assumed for its curvature, m.
+/// Minimum distance assumed for the curvature of the wall, m.
 const LEAST_HEIGHT_M: f64 = 0.5;
-/// An inclination is certain when it is so many standard deviations from zero.
+/// Standard deviations from zero at which an inclination counts as certain.
 const SURE: f64 = 3.0;
 
 /// A sonar's beam.
@@ -122,7 +131,9 @@ pub struct Beam {
     pub unsure_rad: f64,
 }
 
-/// Range of the first echo of the design wall. `None` where the beam misses the wall, or grazes it.
+/// Predicts the range of the first echo from the design wall.
+///
+/// `None` if the beam misses or grazes the wall.
 pub fn range(state: &State, profile: &Profile, beam: &Beam, range_m: f64, sd_m: f64) -> Option<ScalarUpdate> {
     let arm = state.attitude * beam.offset;
     let origin = state.position + arm;
@@ -144,7 +155,7 @@ pub fn range(state: &State, profile: &Profile, beam: &Beam, range_m: f64, sd_m: 
     // d expected / d incidence, and d incidence = turn . (along x normal) / sin(incidence).
     let slope = if nearest > 0.0 { expected_m * sin / cos / math::sin(incidence) } else { 0.0 };
     let turning = arm.cross(&normal).scaled(stretch / cos) + along.cross(&normal).scaled(slope);
-    // The range may be as short as that of the wider cone's nearest ray: mean square of a uniform distribution.
+    // The range may be as short as the wider cone's nearest ray: mean square of a uniform distribution.
     let soonest_m = stretch * height_m / math::cos((incidence - beam.unsure_rad).max(0.0));
     let unsure_m = (expected_m - soonest_m).max(0.0) / math::sqrt(3.0);
     let mut row = ScalarUpdate::new(range_m - expected_m, sd_m * sd_m + unsure_m * unsure_m);
@@ -161,7 +172,7 @@ pub fn range(state: &State, profile: &Profile, beam: &Beam, range_m: f64, sd_m: 
     Some(row.with_one(RANGES, designed_m))
 }
 
-/// Height of a pressure sensor at `offset` from the inertial unit, m above the tunnel's floor.
+/// Predicts the height of a pressure sensor at `offset` from the inertial unit, m above the tunnel floor.
 pub fn height(state: &State, offset: Vec3<Body>, height_m: f64, sd_m: f64) -> ScalarUpdate {
     let arm = state.attitude * offset;
     let expected_m = state.position.z() + arm.z() + state.depth_offset_m;
@@ -171,7 +182,7 @@ pub fn height(state: &State, offset: Vec3<Body>, height_m: f64, sd_m: f64) -> Sc
         .with_one(DEPTH, 1.0)
 }
 
-/// Chainage shown by the cable, whose end is at `offset` from the inertial unit.
+/// Predicts the chainage shown by the cable, whose end is at `offset` from the inertial unit.
 pub fn chainage(state: &State, offset: Vec3<Body>, chainage_m: f64, sd_m: f64) -> ScalarUpdate {
     let arm = state.attitude * offset;
     let expected_m = state.position.x() + arm.x() + state.creep_m + state.slack_m;
@@ -182,9 +193,10 @@ pub fn chainage(state: &State, offset: Vec3<Body>, chainage_m: f64, sd_m: f64) -
         .with_one(SLACK, 1.0)
 }
 
-/// Attitude computed by a unit, about the tunnel's x, y and z. About z it is a compass, with its deviation.
+/// Predicts an attitude computed by a unit, about the tunnel's x, y and z. About z it is a compass with its
+/// deviation.
 ///
-/// Smooth at any attitude, a pitch of 90 degrees included: it compares rotations, not angles.
+/// The model compares rotations, not angles, so it is smooth at any attitude, including a pitch of 90 degrees.
 pub fn attitude(
     state: &State,
     measured: Rot<Tunnel, Body>,
@@ -202,7 +214,9 @@ pub fn attitude(
     ]
 }
 
-/// Velocity over ground in the frame of a sensor at `offset`, m/s; `rate_radps` is the turn rate of the body.
+/// Predicts the velocity over ground in the frame of a sensor at `offset`, m/s.
+///
+/// `rate_radps` is the turn rate of the body.
 pub fn velocity(
     state: &State,
     (offset, mounted): (Vec3<Body>, Rot<Body, Sensor>),
@@ -216,14 +230,14 @@ pub fn velocity(
     let axes = [Vec3::new(1.0, 0.0, 0.0), Vec3::new(0.0, 1.0, 0.0), Vec3::new(0.0, 0.0, 1.0)];
     let residuals = [off.x(), off.y(), off.z()];
     core::array::from_fn(|k| {
-        // The sensor's axis in the tunnel's frame.
+        // Axis of the sensor in the tunnel frame.
         let axis = state.attitude * (mounted * axes.get(k).copied().unwrap_or_else(Vec3::zero));
         let residual = residuals.get(k).copied().unwrap_or(0.0);
         ScalarUpdate::new(residual, sd_mps * sd_mps).with(VELOCITY, axis).with(ATTITUDE, axis.cross(&moved))
     })
 }
 
-/// Gyro bias of a unit that doesn't turn: its mean rate, rad/s.
+/// Measures the gyro bias of a unit that does not turn by its mean rate, rad/s.
 pub fn no_turn(state: &State, mean_radps: Vec3<Body>, sd_radps: f64) -> [ScalarUpdate; 3] {
     let off = mean_radps + -state.rate_bias_radps;
     let off = [off.x(), off.y(), off.z()];

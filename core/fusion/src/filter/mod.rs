@@ -1,7 +1,8 @@
 //! Navigation by an error-state Kalman filter: inertial propagation, corrected by all other sensors.
 //!
-//! Readings wait in a window until all of their time have come, and are fused at their time of validity, epoch by epoch; a
-//! fix is the estimate of the last epoch, propagated by the inertial samples since. Derivation: `docs/why/navigation.md`.
+//! Readings wait in a window until all readings of their time have arrived. They are fused at their time of validity,
+//! epoch by epoch. A fix is the estimate of the last epoch, propagated by the inertial samples since. Derivation:
+//! `docs/why/navigation.md`.
 
 pub mod agreement;
 pub mod align;
@@ -66,9 +67,11 @@ use headrace_sensor::reading::Reading;
 
 /// Longest extrapolation of a fix beyond the last inertial sample.
 pub(super) const CARRIES: DurNs = DurNs(2_000_000_000);
-/// A clock that goes back by more than this has been set; readings stamped further in the future are rejected.
+/// A clock that goes back by more than this has been reset.
+///
+/// Readings stamped further in the future are rejected.
 pub(super) const CLOCK_JUMP: DurNs = DurNs(10_000_000_000);
-/// Standard deviations beyond which the estimate is restarted: linearized updates wouldn't converge.
+/// Standard deviations beyond which the estimate is restarted: linearised updates would not converge.
 const LOST_PLACE_M: f64 = 3.0;
 const LOST_TILT_RAD: f64 = 0.2;
 /// Silence of all sensors after which the estimate is restarted.
@@ -76,17 +79,18 @@ const SILENCE: DurNs = DurNs(5_000_000_000);
 /// Plausible limits of inertial samples; beyond them the unit is saturated or faulty.
 const MOST_RATE_RADPS: f64 = 10.0;
 const MOST_FORCE_MPS2: f64 = 50.0;
-/// Room for the estimates after the last epoch: the longest window and epoch, 1.5 s, of a unit at 600 Hz.
+/// Capacity for estimates after the last epoch: the longest window plus epoch, 1.5 s, of a unit at 600 Hz.
 const AHEAD: usize = 1024;
-/// Time between two head passes when no head is known to turn.
+/// Time between two passes of the heads while no head is known to turn.
 const USUAL_GAP: DurNs = DurNs(20_000_000_000);
 
-/// See the module's description.
+/// Navigation by the error-state Kalman filter.
 pub struct FilterNavigation {
     context: Context,
     window: Window,
     sources: Vec<Option<Source>>,
-    /// The inertial unit used for propagation: the first one heard. The estimate refers to its position.
+    /// Inertial unit used for propagation: the first one that delivered a reading. The estimate refers to its
+    /// position.
     unit: Option<usize>,
     listening: Listening,
     stillness: Stillness,
@@ -94,16 +98,16 @@ pub struct FilterNavigation {
     zero: CounterZero,
     running: Eskf,
     is_running: bool,
-    /// Epochs begin at this time, and at multiples of their length after it.
+    /// Start of the first epoch; later epochs begin at multiples of the epoch length after it.
     epoch_zero: MonoNs,
     /// Latest receive time.
     received: MonoNs,
-    /// The estimate of the last epoch, propagated onwards.
+    /// Estimates propagated from the last epoch.
     ahead: Vec<(MonoNs, State)>,
     standing: Result<Relative, NoFix>,
-    /// Covariance relative to an estimate as sure as this one that has nothing to do with it.
+    /// Covariance relative to an independent estimate of the same uncertainty.
     revisit: Relative,
-    /// Number of restarts of the estimate: it was lost, not finite, or the clock went back.
+    /// Number of restarts of the estimate, because it was lost or not finite, or because the clock went back.
     restarts: u64,
     journal: Option<Journal>,
 }
@@ -111,7 +115,7 @@ pub struct FilterNavigation {
 stateful!(FilterNavigation { state: context, window, unit, listening, stillness, raw_ways, zero, running, is_running, epoch_zero, received, standing, revisit, restarts; lists: ahead; slots: sources; fixed: journal; });
 
 impl FilterNavigation {
-    /// Without readings yet.
+    /// Creates it without readings.
     pub fn new(profile: Profile, site: Site, settings: Settings) -> Self {
         Self {
             context: Context { profile, site, settings, unit_at: Vec3::zero() },
@@ -134,17 +138,19 @@ impl FilterNavigation {
         }
     }
 
-    /// The estimate and its covariance; `None` before the first.
+    /// Returns the estimate and its covariance; `None` before the first.
     pub fn running(&self) -> Option<&Eskf> {
         self.is_running.then_some(&self.running)
     }
 
-    /// When the cable's readings left what was expected, once that has lasted for a second; `None` while they are believed.
+    /// Returns when the cable readings left the expected range, once that has lasted for a second.
+    ///
+    /// `None` while the readings are trusted.
     pub fn cable_doubted_since(&self) -> Option<MonoNs> {
         self.cable_doubt().map(|doubt| doubt.since)
     }
 
-    /// Position on the vehicle of the inertial unit, to which the estimate refers.
+    /// Position of the inertial unit on the vehicle; the estimate refers to it.
     pub fn unit_at(&self) -> Vec3<Body> {
         self.context.unit_at
     }
@@ -154,7 +160,7 @@ impl FilterNavigation {
         self.restarts
     }
 
-    /// From now on records the steps of each epoch, for smoothing.
+    /// Records the steps of each epoch from now on, for smoothing.
     #[must_use]
     pub(crate) fn with_journal(mut self, journal: Journal) -> Self {
         self.running.keep_steps();
@@ -195,12 +201,12 @@ impl FilterNavigation {
         self.after_epochs();
     }
 
-    /// The filter's own dispute with the cable's counter.
+    /// The filter's own doubt about the cable counter.
     fn dispute(&self) -> Option<CableDoubt> {
         self.running().and_then(|running| running.cable.doubt(running.at))
     }
 
-    /// By how much ways in raw form differ, as an error along the tunnel.
+    /// Difference between the raw distances, as an error along the tunnel.
     fn raw_error(&self) -> Relative {
         Relative::along(self.raw_ways.doubt().map_or(0.0, |doubt| doubt.differs_m))
     }
@@ -226,7 +232,7 @@ impl FilterNavigation {
         }
     }
 
-    /// The last beginning of an epoch at or before a time.
+    /// Start of the epoch that contains a time.
     fn epoch_before(&self, at: MonoNs) -> MonoNs {
         let epoch_ns = self.context.settings.epoch.0.unsigned_abs().max(1);
         MonoNs(at.0 - at.0.saturating_sub(self.epoch_zero.0) % epoch_ns)
@@ -240,7 +246,7 @@ impl FilterNavigation {
         }
         let pass_gap = self.pass_gap();
         let relative = self.running.clones.relative(pass_gap);
-        // At first nothing relates what is placed now to what was placed before.
+        // At first, nothing relates new soundings to earlier ones.
         self.revisit = sd.independent();
         let differs = Relative::along(self.running.cable.differs_m());
         let relative = relative.unwrap_or(self.revisit).weighted(1.0, &differs, 1.0);
@@ -252,8 +258,10 @@ impl FilterNavigation {
         self.carry_ahead();
     }
 
-    /// Whether the chainage was reacquired since the heads last passed here: the cable has slipped, and the offset between
-    /// samples georeferenced before and now is unknown. It stays so after the counter's zero was lost.
+    /// Whether the chainage was reacquired since the heads last passed this place.
+    ///
+    /// Then the cable has slipped, and the offset between earlier and present soundings is unknown. This remains so
+    /// once the counter's zero is lost.
     fn has_jumped(&self) -> bool {
         if self.zero.is_lost() {
             return true;
@@ -262,8 +270,9 @@ impl FilterNavigation {
         self.running.way_sought.is_some_and(|then| self.running.at.since(then).0 <= longest.0)
     }
 
-    /// Starts a new alignment: the last estimate is too far off to be corrected step by step. Georeferenced samples stay;
-    /// the chainage is kept until the cable is heard.
+    /// Starts a new alignment, because the last estimate is too far off for step-by-step correction.
+    ///
+    /// Georeferenced samples remain. The chainage is kept until the next cable reading.
     fn begin_anew(&mut self, along_m: f64) {
         self.write_end();
         let x_m = self.running.state.position.x();
@@ -290,13 +299,14 @@ impl FilterNavigation {
         }
     }
 
-    /// Time over which errors accumulate between neighbouring passes of a place.
+    /// Time over which errors accumulate between successive passes over a place.
     fn pass_gap(&self) -> DurNs {
         self.between_passes(APART_SHARE)
     }
 
-    /// Time between two passes of evenly spread heads, plus a share of the time until the rearmost head reaches the position
-    /// of the foremost.
+    /// Time between two passes of evenly spread heads.
+    ///
+    /// Includes a share of the time until the rearmost head reaches the position of the foremost.
     fn between_passes(&self, apart_share: f64) -> DurNs {
         let (mut passes_per_s, mut ahead_m, mut astern_m) = (0.0, f64::NEG_INFINITY, f64::INFINITY);
         for source in self.sources.iter().flatten() {
@@ -312,7 +322,7 @@ impl FilterNavigation {
         DurNs::from_secs_f64(error_time_s(passes_per_s, ahead_m - astern_m, speed_mps, apart_share))
     }
 
-    /// Puts a reading into the window, unless recent ones make it redundant.
+    /// Adds a reading to the window, unless recent readings make it redundant.
     fn take(&mut self, number: usize, at: MonoNs, reading: &Reading) {
         let step_rad = self.context.settings.return_step_rad;
         let Some(Some(source)) = self.sources.get_mut(number) else { return };
@@ -365,7 +375,8 @@ impl FilterNavigation {
 impl Navigation for FilterNavigation {
     fn update(&mut self, number: usize, sensor: &SensorInfo, times: Times, reading: &Reading) {
         if self.received.since(times.received) > CLOCK_JUMP {
-            // Or the timestamp before was wrong. Waiting until the clock catches up would be no better.
+            // The clock was reset, or the previous timestamp was wrong. Waiting for the clock to catch up would be no
+            // better.
             let along_m = self.running.pose_sd().along_m;
             self.begin_anew(along_m);
             self.window.clear();

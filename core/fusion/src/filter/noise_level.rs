@@ -1,7 +1,8 @@
-//! Level of a source's white noise relative to what is declared, learnt from its innovations.
+//! Level of a source's white noise relative to the declared one, learnt from its innovations.
 //!
-//! The innovations of a filter that is right are white: half the mean square of the difference of two is their variance. What
-//! drifts more slowly, an error of the estimate or a bias, cancels in it. Derivation: `docs/why/navigation.md`, "Noise that is learnt".
+//! The innovations of a correct filter are white. Their variance is then half the mean square of the difference
+//! between two of them. Slower errors of the estimate or a bias cancel in that difference. Derivation:
+//! `docs/why/navigation.md`, "Noise that is learnt".
 
 use serde::{Deserialize, Serialize};
 
@@ -10,34 +11,37 @@ use headrace_sensor::device::SensorKind;
 
 /// Change of the level's logarithm by a measurement whose normalised square is off by one.
 const GAIN: f64 = 0.01;
-/// Largest normalised square that counts: one outlier is no noise.
+/// Upper limit of the normalised square that counts, since one outlier is no noise.
 const MOST: f64 = 9.0;
-/// Least share of a head's declared variance: counts of 2 cm and noise of 1 cm of the 3 cm that are declared for a rough wall.
+/// Minimum share of a head's declared variance.
+///
+/// Counts of 2 cm and noise of 1 cm leave this much of the 3 cm declared for a rough wall.
 const LEAST_OF_HEAD: f64 = 0.15;
-/// Largest square of an innovation that isn't used, as a share of the declared variance: rocks and strays aren't the wall, and a wall that is built
-/// otherwise has many of them.
+/// Upper limit of the square of a rejected innovation, as a share of the declared variance.
+///
+/// Rocks and stray echoes are not the wall, and a wall that differs from its design causes many of them.
 const MOST_UNUSED: f64 = 2.0;
-/// Measurements of which the mean is taken, and the fewest that say anything.
+/// Number of measurements in the mean, and the minimum for a statement.
 const MEMORY: u32 = 200;
 const FEW: u32 = 30;
-/// Returns of a head's turn that are used, one every three degrees: fewer haven't seen all of the wall.
+/// Returns used in a turn of a head, one every three degrees. Fewer returns have not seen all of the wall.
 const TURN: u32 = 120;
-/// Mean normalised square from which innovations are larger than noise explains.
+/// Mean normalised square above which innovations are larger than noise explains.
 const UNUSUAL: f64 = 1.8;
 
-/// See the module's description.
+/// Learnt noise level of a source.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct NoiseLevel {
     /// The last innovation of each scalar of a reading.
     last: [Option<f64>; 3],
     /// Factor of the declared variance.
     factor: f64,
-    /// Running mean of the normalised squares of all innovations, and how many it has seen.
+    /// Running mean of the normalised squares of all innovations, and their number.
     nis: f64,
     seen: u32,
-    /// Running mean of their squares beyond what the estimate explains, as a share of the declared variance.
+    /// Running mean of the squares beyond the estimate's own uncertainty, as a share of the declared variance.
     share: f64,
-    /// The same of the last few: where the wall begins to be otherwise.
+    /// The same over the last few, to notice where the wall changes.
     latest: f64,
 }
 
@@ -47,10 +51,12 @@ impl Default for NoiseLevel {
     }
 }
 
-/// Limits of the level, as factors of the declared variance; `None` where it isn't learnt.
+/// Returns the limits of the level, as factors of the declared variance; `None` if it is not learnt.
 ///
-/// An inertial unit's tilt is declared for its slow errors, which no difference shows; a head's range for the wall's bumps and shape as well, which a
-/// beam that leans would take for a yaw: differences only raise it, and what lowers it is the square of all that it is off ([`NoiseLevel::smoothness`]).
+/// The declared tilt noise of an inertial unit covers its slow errors, which do not show in differences. The declared
+/// range noise of a head also covers bumps and shape of the wall, which a leaning beam would confuse with yaw.
+/// Differences only raise a head's level; it is lowered by the square of its total residual
+/// ([`NoiseLevel::smoothness`]).
 fn limits(kind: SensorKind, scalar: usize) -> Option<[f64; 2]> {
     match kind {
         SensorKind::Head => Some([1.0, 9.0]),
@@ -63,7 +69,7 @@ fn limits(kind: SensorKind, scalar: usize) -> Option<[f64; 2]> {
 }
 
 impl NoiseLevel {
-    /// Notes an innovation of the reading's scalar of this number, and its variance.
+    /// Notes an innovation and its variance; `scalar` is the index within the reading.
     pub fn note(&mut self, kind: SensorKind, scalar: usize, innovation: f64, variance: f64) {
         let Some(before) = self.last.get_mut(scalar).and_then(|last| last.replace(innovation)) else {
             return;
@@ -74,8 +80,9 @@ impl NoiseLevel {
         self.factor = (self.factor * math::exp(GAIN * (white - 1.0))).clamp(least, most);
     }
 
-    /// Notes the normalised square of any innovation, used or not; returns it relative to the mean of those before, where that is
-    /// above what it should be.
+    /// Notes the normalised square of any innovation, used or rejected.
+    ///
+    /// Returns it relative to the earlier mean if that mean is above its expected value.
     pub fn relative(&mut self, nis: f64) -> f64 {
         let usual = if self.seen >= FEW { self.nis.max(1.0) } else { 1.0 };
         self.seen = (self.seen + 1).min(MEMORY);
@@ -83,7 +90,9 @@ impl NoiseLevel {
         nis / usual
     }
 
-    /// Notes the square of an innovation beyond what the estimate explains, as a share of the declared variance.
+    /// Notes the square of an innovation beyond the estimate's own uncertainty.
+    ///
+    /// It is given as a share of the declared variance.
     pub fn note_share(&mut self, share: f64, is_used: bool) {
         let most = if is_used { MOST } else { MOST_UNUSED };
         let share = share.clamp(-most, most);
@@ -91,31 +100,34 @@ impl NoiseLevel {
         self.latest += (share - self.latest) / f64::from(self.seen.clamp(1, FEW));
     }
 
-    /// Share of its declared noise that a source has had lately: 0 to 1, the most until some measurements have been seen.
+    /// Recent share of its declared noise, 0 to 1; 1 until there are enough measurements.
     pub fn share(&self) -> f64 {
         if self.seen >= FEW { self.share.clamp(0.0, 1.0) } else { 1.0 }
     }
 
-    /// Whether innovations are about as large as they should be. Of ranges they are larger where the wall isn't as designed.
+    /// Whether innovations have about the expected size. Innovations of ranges are larger if the wall differs from
+    /// its design.
     pub fn is_usual(&self) -> bool {
         self.nis < UNUSUAL
     }
 
-    /// Notes that a measurement of this scalar wasn't used: the next difference would span it.
+    /// Notes that a measurement of this scalar was not used, because the next difference would span it.
     pub fn skip(&mut self, scalar: usize) {
         if let Some(last) = self.last.get_mut(scalar) {
             *last = None;
         }
     }
 
-    /// Factor of the declared variance, 1 where it isn't learnt.
+    /// Factor of the declared variance; 1 if it is not learnt.
     pub fn factor(&self, kind: SensorKind, scalar: usize) -> f64 {
         limits(kind, scalar).map_or(1.0, |_| self.factor)
     }
 
-    /// Factor, 1 at most, of the variance of a head's range that meets the wall squarely: the share that such innovations show, once a turn of
-    /// them is known, of the last few if that is more. Where the wall isn't as designed, they are large whether it is rough or bent. `None` of
-    /// a head that hasn't measured anything.
+    /// Factor, at most 1, of the variance of a head's range that meets the wall squarely.
+    ///
+    /// It is the share shown by such innovations once a turn of them is known, or by the last few if that is larger.
+    /// On a wall that differs from its design it is large, whether the wall is rough or bent. `None` for a head
+    /// without measurements.
     pub fn smoothness(&self) -> Option<f64> {
         let is_known = self.seen >= TURN;
         (self.seen > 0)
@@ -129,7 +141,7 @@ mod tests {
 
     const HEAD: SensorKind = SensorKind::Head;
 
-    /// The level after so many measurements of a head, each by so much of its declared deviation off.
+    /// Level after `count` measurements of a head that are off by `off` of its declared standard deviation.
     fn level(count: u32, off: impl Fn(u32) -> f64, is_used: bool) -> NoiseLevel {
         let mut level = NoiseLevel::default();
         for k in 0..count {
@@ -152,28 +164,28 @@ mod tests {
     }
 
     #[test]
-    fn a_head_before_a_smooth_wall_is_believed_as_it_shows_itself_after_a_turn() {
+    fn smooth_wall_lowers_the_noise_of_a_head_after_one_turn() {
         near(level(119, |k| 0.5 * math::sin(f64::from(k)), true).smoothness().unwrap(), 1.0);
         near(level(2000, alternating(0.5), true).share(), 0.25);
         near(
             level(2000, |k| 0.5 * math::sqrt(2.0) * math::sin(f64::from(k)), true).smoothness().unwrap(),
             0.25,
         );
-        // Never below what its counts and its noise leave.
+        // It never falls below the part that counts and noise leave.
         near(level(2000, alternating(0.01), true).smoothness().unwrap(), 0.15);
     }
 
-    /// Of a wall that is built otherwise neighbouring ranges are off alike, so that differences show nothing.
+    /// On a wall that differs from its design, neighbouring ranges are off alike, so their differences show nothing.
     #[test]
-    fn a_wall_of_another_shape_is_no_smooth_one() {
+    fn wall_of_another_shape_is_not_smooth() {
         near(level(2000, |_| 1.0, true).smoothness().unwrap(), 1.0);
         near(level(2000, |_| 3.0, true).smoothness().unwrap(), 1.0);
         near(level(2000, |k| math::sin(f64::from(k) / 40.0), true).smoothness().unwrap(), 0.5);
     }
 
-    /// What isn't used says that the wall is otherwise, and one stray in twenty hardly does.
+    /// Rejected innovations show that the wall differs; one stray echo in twenty hardly does.
     #[test]
-    fn what_is_not_used_counts_a_little() {
+    fn rejected_innovations_count_a_little() {
         near(level(2000, |_| 9.0, false).share(), 1.0);
         let mut one = level(1000, alternating(0.5), true);
         for k in 0..200 {
@@ -182,9 +194,9 @@ mod tests {
         assert!((0.26..0.4).contains(&one.share()), "{}", one.share());
     }
 
-    /// A head that has become noisy is believed less than declared, and no other source is taken for a head.
+    /// The weight of a head that has become noisy falls below the declared one, and no other source counts as a head.
     #[test]
-    fn a_noisy_head_is_believed_less_and_others_by_their_differences_alone() {
+    fn noisy_head_loses_weight_and_other_sources_learn_from_differences_only() {
         let noisy = level(4000, alternating(2.0), true);
         assert!((3.0..9.1).contains(&noisy.factor(HEAD, 0)), "{}", noisy.factor(HEAD, 0));
         let quiet = level(2000, |k| 0.5 * math::sin(f64::from(k)), true);

@@ -1,4 +1,4 @@
-//! How sure an estimate's pose is, and whether that is enough to place samples.
+//! Standard deviations of an estimate's pose, and the limits for placing samples.
 
 use serde::{Deserialize, Serialize};
 
@@ -9,27 +9,27 @@ use crate::relative::Relative;
 use headrace_geometry::frames::Vec3;
 use headrace_geometry::math;
 
-/// Maximum standard deviations of position in the section and yaw for georeferencing, m and radians.
+/// Limits for georeferencing: standard deviations of position in the section and of yaw, m and radians.
 const PLACE_LIMIT_M: f64 = 0.5;
 const YAW_LIMIT_RAD: f64 = 0.25;
-/// The same for chainage, relative to the heads' previous pass, and to the cable's length.
+/// The same for the chainage, relative to the previous pass of the heads and to the cable's length, m.
 const ALONG_LIMIT_M: f64 = 1.0;
 
 /// Standard deviations of an estimate.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct PoseSd {
-    /// Of the chainage, excluding the cable's scale, m.
+    /// Sd of the chainage, excluding the cable's scale, m.
     pub along_m: f64,
-    /// Of the position in the section, in the worse direction, m.
+    /// Sd of the position in the section, in the worse direction, m.
     pub place_m: f64,
-    /// Of roll or pitch, radians.
+    /// Sd of roll or pitch, radians.
     pub tilt_rad: f64,
-    /// Of yaw, radians.
+    /// Sd of yaw, radians.
     pub yaw_rad: f64,
 }
 
 impl PoseSd {
-    /// Those of an estimate and the covariance of its errors.
+    /// Takes them from the covariance of an estimate's errors.
     pub fn of(factors: &Factors<ERRORS>) -> Self {
         let of = |i: usize| math::sqrt(factors.variance(i));
         let mut along = [0.0; ERRORS];
@@ -46,14 +46,14 @@ impl PoseSd {
         }
     }
 
-    /// Covariance relative to an estimate as sure as this one that has nothing to do with it.
+    /// Returns the covariance relative to an independent estimate of the same uncertainty.
     pub fn independent(&self) -> Relative {
         let variance = |sd: f64| 2.0 * sd * sd;
         let [along, tilt, yaw] = [self.along_m, self.tilt_rad, self.yaw_rad].map(variance);
         Relative::new([[along, 0.0, 0.0], [0.0, tilt, 0.0], [0.0, 0.0, yaw]])
     }
 
-    /// Whether this estimate and relative covariance are good enough to georeference samples.
+    /// Checks whether this estimate and its relative covariance are good enough to georeference samples.
     ///
     /// Errors: the part that is too uncertain.
     pub fn standing(&self, relative: Relative) -> Result<Relative, NoFix> {
@@ -73,9 +73,9 @@ impl PoseSd {
 mod tests {
     use super::*;
 
-    /// The limits of docs/why/navigation.md: at 4 m, 0.25 rad move a sample by a metre.
+    /// Limits of docs/why/navigation.md: at 4 m, a yaw of 0.25 rad moves a sample by a metre.
     #[test]
-    fn what_is_known_too_badly_places_no_sample() {
+    fn too_uncertain_estimate_gives_no_fix() {
         let sure = PoseSd { along_m: 0.1, place_m: 0.05, tilt_rad: 0.01, yaw_rad: 0.02 };
         let near = Relative::along(0.05);
         assert_eq!(sure.standing(near), Ok(near));

@@ -1,9 +1,8 @@
-//! Ways along the tunnel by the cable counter and by a velocity log, in raw form, and by the estimate: whether they differ by more than
-//! their data sheets allow.
+//! Comparison of distances along the tunnel by cable counter, velocity log and estimate.
 //!
-//! The check takes readings, and never the filter's covariance, gates or learnt noise: where the filter convinces itself of a wrong speed,
-//! this still tells. The inertial unit, which gives changes of speed only, is compared with the counter in `slack_level.rs`. Derivation:
-//! `docs/why/navigation.md`, "Ways in raw form".
+//! It finds differences beyond the data sheets. It uses readings, and never the filter's covariance, gates or learnt
+//! noise. So it still works when the filter has settled on a wrong speed. The inertial unit measures changes of speed
+//! only; `slack_level.rs` compares it with the counter. Derivation: `docs/why/navigation.md`, "Ways in raw form".
 
 use super::cable::CableDoubt;
 use super::settings::Settings;
@@ -17,19 +16,23 @@ use headrace_geometry::time::{DurNs, MonoNs};
 use headrace_sensor::device::{SensorInfo, SensorKind};
 use headrace_sensor::reading::{Reading, SourceId};
 
-/// Times over which ways are compared, s.
+/// Time windows over which distances are compared, s.
 const WINDOWS_S: [f64; 3] = [2.0, 10.0, 60.0];
-/// Time between two comparisons, and room for those of the longest window.
+/// Time between two comparisons, and capacity for those of the longest window.
 const EVERY: DurNs = DurNs(200_000_000);
 const ROOM: usize = 320;
-/// Room for the last readings of a source, and the least time between those kept: the longest window of the filter and more, at any rate.
+/// Capacity for the last readings of a source, and the minimum time between kept readings.
+///
+/// At any reading rate, they span more than the filter's longest window.
 const READINGS: usize = 96;
 const NEAR: DurNs = DurNs(20_000_000);
-/// A source that says nothing for so long isn't compared; a velocity log may speak every two seconds.
+/// Silence after which a source is not compared.
+///
+/// A velocity log may send a reading only every two seconds.
 const SILENT: DurNs = DurNs(3_000_000_000);
-/// Ways are compared so long after: readings come late.
+/// Delay of the comparison, because readings arrive late.
 const BEHIND: DurNs = DurNs(500_000_000);
-/// Standard deviations that ways may differ by, and how long they must differ by more.
+/// Maximum difference in standard deviations, and how long the difference must exceed it.
 const MOST_SDS: f64 = 5.0;
 const LASTS: DurNs = DurNs(1_000_000_000);
 /// Scale error of a velocity log, a ratio: 1 % on the data sheet of the A50, and its mount.
@@ -37,35 +40,35 @@ const LOG_SCALE: f64 = 0.015;
 /// Correlation time of its noise, s.
 const LOG_TIME_S: f64 = 0.25;
 
-/// Columns of a row: ways by the cable's counter, by the log, and by the estimate.
+/// Columns of a row: distances by the cable counter, by the log, and by the estimate.
 const CABLE: usize = 0;
 const LOG: usize = 1;
 const ESTIMATE: usize = 2;
 
-/// See the module's description.
+/// Recent distances by each source, and the doubt that they cause.
 #[derive(Debug, Clone)]
 pub(super) struct RawWays {
-    /// The counter's last readings, as chainages, the velocity log's way by its readings, and the last estimates, m.
+    /// Last readings of the counter as chainages, distance by the velocity log, and last estimates, m.
     cable: Vec<(MonoNs, [f64; 1])>,
     log: Vec<(MonoNs, [f64; 1])>,
     estimate: Vec<(MonoNs, [f64; 1])>,
-    /// The velocity log that is compared.
+    /// The velocity log in the comparison.
     log_source: Option<usize>,
-    /// The last attitude that an inertial unit has told.
+    /// Last attitude from an inertial unit.
     attitude: Option<(MonoNs, Rot<Tunnel, Body>)>,
-    /// Ways, m, by column; not a number where there is none.
+    /// Distances by column, m; NaN for a missing one.
     rows: Vec<(MonoNs, [f64; 3])>,
-    /// When the cable began to differ from log and estimate.
+    /// Time since which the cable has differed from log and estimate.
     since: [Option<MonoNs>; 2],
     doubt: Option<CableDoubt>,
-    /// The estimate's [`super::eskf::Eskf::ties`] at the last comparison.
+    /// [`super::eskf::Eskf::ties`] of the estimate at the last comparison.
     ties: u32,
 }
 
 stateful!(RawWays { state: log_source, attitude, since, doubt, ties; lists: cable, log, estimate, rows; });
 
 impl Default for RawWays {
-    /// Allocated without readings.
+    /// Allocates the buffers, without readings.
     fn default() -> Self {
         let readings = || Vec::with_capacity(READINGS);
         let rows = Vec::with_capacity(ROOM);
@@ -84,7 +87,7 @@ impl Default for RawWays {
 }
 
 impl RawWays {
-    /// Takes a reading.
+    /// Processes a reading.
     ///
     /// Allocates: never.
     pub(super) fn hear(
@@ -122,12 +125,14 @@ impl RawWays {
         }
     }
 
-    /// Compares the ways up to an epoch's end, where the estimate's chainage is this, m. `None` where the filter itself has told that it
-    /// differs from the cable. What it was before its `ties` changed has nothing to do with what it is after.
+    /// Compares the distances up to an epoch's end.
+    ///
+    /// `estimate_m` is the estimate's chainage there, m; `None` while the filter itself reports a dispute with the
+    /// cable. A change of `ties` means that earlier chainages are unrelated to later ones.
     ///
     /// Allocates: never.
     pub(super) fn compare(&mut self, at: MonoNs, estimate_m: Option<f64>, ties: u32, settings: &Settings) {
-        // What is told of a difference is told by the filter until it is over.
+        // While the filter reports a dispute, this comparison stays silent.
         if core::mem::replace(&mut self.ties, ties) != ties || estimate_m.is_none() {
             self.estimate.clear();
             self.forget(ESTIMATE);
@@ -151,7 +156,7 @@ impl RawWays {
         self.judge(at, settings);
     }
 
-    /// Notes since when the cable's way differs from the others, and the largest difference that has lasted.
+    /// Updates since when the cable differs from the others, and the largest lasting difference.
     fn judge(&mut self, at: MonoNs, settings: &Settings) {
         let mut doubt: Option<CableDoubt> = None;
         for (k, other) in [LOG, ESTIMATE].into_iter().enumerate() {
@@ -179,17 +184,17 @@ impl RawWays {
         });
     }
 
-    /// What the cable shows, m.
+    /// Chainage that the cable shows, m.
     fn cable_m(&self) -> f64 {
         self.cable.last().map_or(0.0, |(_, [shown_m])| *shown_m)
     }
 
-    /// The difference that has lasted.
+    /// Returns the difference that has lasted.
     pub(super) fn doubt(&self) -> Option<CableDoubt> {
         self.doubt
     }
 
-    /// Forgets the ways of a column.
+    /// Removes the distances of a column.
     fn forget(&mut self, column: usize) {
         for (_, row) in &mut self.rows {
             if let Some(way_m) = row.get_mut(column) {
@@ -198,8 +203,10 @@ impl RawWays {
         }
     }
 
-    /// By how much the cable's way over the last seconds, or as long as both have been heard, differs from another one, m; `None` where one
-    /// is missing or they may.
+    /// Difference of the cable's distance from another one over the window, m.
+    ///
+    /// The time may be shorter if both are not available for the whole window. `None` if one is missing or the
+    /// difference is within its tolerance.
     fn differs_m(&self, other: usize, window_s: f64, settings: &Settings) -> Option<f64> {
         let (at, _) = self.rows.last()?;
         let both = |row: &[f64; 3]| {
@@ -216,13 +223,15 @@ impl RawWays {
         let of_scale_m = math::hypot(settings.scale_sd, log_scale) * f64::max(cable_m.abs(), other_m.abs());
         let counter_m2 = 2.0 * settings.tether_sd_m * settings.tether_sd_m;
         let variance_m2 = counter_m2 + of_scale_m * of_scale_m + log_mps * log_mps * LOG_TIME_S * window_s;
-        // Slack has an end, on either side.
+        // Slack is limited in both directions.
         let slack_m = 2.0 * MOST_REACH_M.max(3.0 * settings.slack.reach);
         (differs_m > slack_m + MOST_SDS * math::sqrt(variance_m2)).then_some(differs_m)
     }
 }
 
-/// Adds a reading that isn't near the last; what is earlier than those before, or much later, begins anew.
+/// Appends a reading unless it is close to the last one.
+///
+/// An earlier or much later one restarts the list.
 fn append(readings: &mut Vec<(MonoNs, [f64; 1])>, at: MonoNs, way_m: f64) {
     if readings.last().is_some_and(|(last, _)| (0..NEAR.0).contains(&at.since(*last).0)) {
         return;
@@ -245,7 +254,7 @@ mod tests {
     const TETHER: usize = 1;
     const DVL: usize = 4;
 
-    /// A vehicle that goes to and fro, by time, s, m.
+    /// Position of a vehicle that moves to and fro, m, at a time in s.
     fn way_m(t: f64) -> f64 {
         3000.0 + 0.2 * t + 2.0 * math::sin(t / 20.0)
     }
@@ -254,7 +263,9 @@ mod tests {
         0.2 + 0.1 * math::cos(t / 20.0)
     }
 
-    /// Compares for so long, s; when there was a doubt first, and the last one. Each function gives what a source shows, by time.
+    /// Compares for `lasts_s`; returns when a doubt first appeared, s, and the last doubt.
+    ///
+    /// Each function gives the value that a source shows at a time.
     fn compared(
         lasts_s: u32,
         cable_m: impl Fn(f64) -> f64,
@@ -264,7 +275,7 @@ mod tests {
         compared_at(10, 1, lasts_s, (cable_m, log_mps, estimate_m))
     }
 
-    /// The same of a counter of so many readings a second, and a log of one in so many of them.
+    /// The same with a counter of `rate_hz` readings a second and a log with one reading for several of them.
     fn compared_at(
         rate_hz: u32,
         log_every: u32,
@@ -301,7 +312,7 @@ mod tests {
     }
 
     #[test]
-    fn sound_sources_with_slack_and_scale_errors_of_their_data_sheets_agree() {
+    fn sources_within_their_data_sheets_agree() {
         for period_s in [3.0, 20.0, 60.0] {
             let cable_m = |t: f64| 1.002 * way_m(t) + 0.15 * math::sin(t * math::TAU / period_s);
             let none = compared(300, cable_m, |t| Some(1.01 * speed_mps(t) + 0.002), |t| Some(way_m(t)));
@@ -310,16 +321,16 @@ mod tests {
     }
 
     #[test]
-    fn a_velocity_log_a_fifth_off_is_named_with_the_difference() {
+    fn velocity_log_off_by_a_fifth_is_named_with_the_difference() {
         let (first_s, doubt) = compared(120, way_m, |t| Some(1.2 * speed_mps(t)), |t| Some(way_m(t)));
         let doubt = doubt.unwrap();
-        // A fifth of the last minute's 12 m, or less where the vehicle is slow.
+        // A fifth of the last minute's 12 m, or less if the vehicle is slow.
         assert!((0.5..3.6).contains(&doubt.differs_m) && doubt.log == Some(SourceId(4)), "{doubt:?}");
         assert!((5.0..20.0).contains(&first_s.unwrap()), "{first_s:?}");
     }
 
     #[test]
-    fn a_counter_that_stands_differs_from_the_log_within_seconds() {
+    fn stationary_counter_differs_from_the_log_within_seconds() {
         let stands = |t: f64| way_m(t.min(60.0));
         let (first_s, doubt) = compared(70, stands, |t| Some(speed_mps(t)), |t| Some(way_m(t.min(60.0))));
         assert!((61.0..68.0).contains(&first_s.unwrap()), "{first_s:?}");
@@ -327,7 +338,7 @@ mod tests {
     }
 
     #[test]
-    fn an_estimate_that_runs_away_from_the_counter_is_told_unless_it_was_told_before() {
+    fn diverging_estimate_is_reported_unless_the_filter_reports_it() {
         let runs = |t: f64| Some(way_m(t) + 0.5 * (t - 60.0).max(0.0));
         let (first_s, doubt) = compared(70, way_m, |_| None, runs);
         assert!((61.0..63.0).contains(&first_s.unwrap()), "{first_s:?}");
@@ -338,7 +349,7 @@ mod tests {
     }
 
     #[test]
-    fn counters_of_any_rate_are_compared_with_logs_of_any_rate() {
+    fn counters_and_logs_of_any_rate_are_compared() {
         for (rate_hz, log_every) in [(10, 1), (10, 10), (10, 20), (50, 5), (200, 50), (1000, 125)] {
             let log_mps = |t: f64| Some(1.2 * speed_mps(t));
             let compare = |share: f64| {
@@ -352,7 +363,7 @@ mod tests {
     }
 
     #[test]
-    fn a_log_that_was_silent_is_compared_from_then_on() {
+    fn silent_log_is_compared_once_it_returns() {
         let log_mps = |t: f64| (!(30.0..50.0).contains(&t)).then(|| speed_mps(t));
         assert_eq!(compared(120, way_m, log_mps, |t| Some(way_m(t))), (None, None));
     }

@@ -1,6 +1,8 @@
-//! How rough the wall is, learnt from echosounders that face each other: the sum of their ranges doesn't depend on where the vehicle is
-//! between them, so that what it has beyond their noise is the wall's. An echosounder sees one bump for seconds. Derivation:
-//! `docs/why/navigation.md`, "Bumps of the wall".
+//! Roughness of the wall, learnt from echosounders that face each other.
+//!
+//! The sum of their ranges does not depend on the vehicle's position between them. Its variation beyond their noise
+//! therefore comes from the wall. An echosounder sees one bump for seconds. Derivation: `docs/why/navigation.md`,
+//! "Bumps of the wall".
 
 use serde::{Deserialize, Serialize};
 
@@ -8,32 +10,32 @@ use super::settings::Settings;
 use headrace_geometry::frames::{Tunnel, Vec3};
 use headrace_geometry::time::{DurNs, MonoNs};
 
-/// Bumps of which the mean is taken, and as how many the declared noise counts.
+/// Number of bumps in the mean, and the number of bumps that the declared noise counts as.
 const MEMORY: f64 = 30.0;
 const DECLARED: f64 = 1.0;
-/// Largest square of a sum that counts, a factor of its variance: one outlier is no bump.
+/// Upper limit of the square of a sum, as a factor of its variance, since one outlier is no bump.
 const MOST: f64 = 9.0;
-/// Largest variance, a factor of the declared one: 6 cm.
+/// Upper limit of the variance, as a factor of the declared one: 6 cm.
 const ROUGHEST: f64 = 4.0;
-/// A vehicle that is slower moves sideways at such a speed, and so past bumps, m/s.
+/// Minimum speed past bumps, m/s: a slower vehicle drifts sideways at about this speed.
 const STILL_MPS: f64 = 0.05;
-/// Echosounders whose last looks are kept.
+/// Number of echosounders whose last looks are kept.
 const ECHOSOUNDERS: usize = 8;
-/// Largest cosine between the directions in which two that face each other lengthen with the place.
+/// Maximum cosine between the range gradients of two echosounders that face each other.
 const FACING: f64 = -0.95;
-/// Longest time between their looks, s.
+/// Maximum time between their looks, s.
 const AT_ONCE_S: f64 = 0.25;
 
-/// A ping that was fused.
+/// A fused ping.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub(super) struct Look {
-    /// Which echosounder's.
+    /// Number of the echosounder.
     pub(super) source: usize,
-    /// When.
+    /// Time of the ping.
     pub(super) at: MonoNs,
-    /// Change of the expected range per metre of the place.
+    /// Change of the expected range per metre of position.
     pub(super) by_place: Vec3<Tunnel>,
-    /// What the range has beyond the estimate that it has corrected, m.
+    /// Residual of the range after the correction, m.
     pub(super) left_m: f64,
     /// Variance of its white noise, m^2.
     pub(super) white_m2: f64,
@@ -49,15 +51,17 @@ pub(super) struct Roughness {
 }
 
 impl Default for Roughness {
-    /// As declared.
+    /// Starts with the declared roughness.
     fn default() -> Self {
         Self { factor: 1.0, seen: DECLARED, looks: [None; ECHOSOUNDERS] }
     }
 }
 
 impl Roughness {
-    /// Notes a ping that has corrected the estimate: `bump` is the share of a bump that it adds to those seen, `scale_m2` the variance
-    /// that the scale of ranges, still unknown, gives a sum of two.
+    /// Notes a ping that has corrected the estimate.
+    ///
+    /// `bump` is the share of a bump that the ping adds. `scale_m2` is the variance that the unknown scale of ranges
+    /// gives a sum of two.
     pub(super) fn note(&mut self, look: Look, bump: f64, scale_m2: f64, settings: &Settings) {
         let faces = |other: &&Look| {
             other.by_place.dot(&look.by_place) < FACING
@@ -68,7 +72,7 @@ impl Roughness {
             let noise_m2 = look.white_m2 + other.white_m2 + scale_m2;
             let sum_m = look.left_m + other.left_m;
             let most_m2 = MOST * (noise_m2 + 2.0 * self.variance_m2(settings).max(declared_m2));
-            // Each sees a bump of its own, and each of the two has the other for its partner.
+            // Each echosounder sees its own bump, and each of the two counts the pair.
             let found_m2 = ((sum_m * sum_m).min(most_m2) - noise_m2) / 2.0;
             let share = bump / 2.0;
             self.seen = (self.seen + share).min(MEMORY);
@@ -81,20 +85,21 @@ impl Roughness {
         }
     }
 
-    /// Variance of the wall's bumps, m^2.
+    /// Returns the variance of the wall's bumps, m^2.
     pub(super) fn variance_m2(&self, settings: &Settings) -> f64 {
         self.factor.clamp(0.0, ROUGHEST) * settings.echo_sd_m * settings.echo_sd_m
     }
 
-    /// How many pings of this echosounder see the same bump, at least 1, at such a speed: together they say no more of the place than one
-    /// that sees it alone. 1 of the first.
+    /// Returns how many pings of this echosounder see the same bump at this speed, at least 1.
+    ///
+    /// Together they give no more information on the position than a single ping. The result is 1 for the first ping.
     pub(super) fn looks_at_a_bump(&self, source: usize, at: MonoNs, speed_mps: f64, bump_m: f64) -> f64 {
         let before = self.looks.iter().flatten().find(|look| look.source == source);
         before.map_or(1.0, |before| looks(at.since(before.at), speed_mps, bump_m))
     }
 }
 
-/// How many pings that come `apart` see the same bump, at such a speed.
+/// Number of pings at the interval `apart` that see the same bump at this speed.
 fn looks(apart: DurNs, speed_mps: f64, bump_m: f64) -> f64 {
     let way_m = apart.as_secs_f64().abs() * speed_mps.abs().max(STILL_MPS);
     if way_m > 0.0 { (bump_m / way_m).max(1.0) } else { 1.0 }
@@ -105,12 +110,13 @@ mod tests {
     use super::*;
     use headrace_geometry::math;
 
-    /// Heights of bumps a third of a metre long, of this standard deviation.
+    /// Heights of bumps a third of a metre long, with this standard deviation.
     fn height_m(side: f64, along_m: f64, sd_m: f64) -> f64 {
         sd_m * (math::sin((19.0 + 2.0 * side) * along_m) + math::sin((31.7 + 4.0 * side) * along_m))
     }
 
-    /// What is found after so long with two echosounders abreast, 0.1 m/s, when the vehicle sways between the walls as it likes.
+    /// Roughness found after a time with two opposite echosounders at 0.1 m/s, while the vehicle sways between the
+    /// walls.
     fn found_m(rough_m: f64, white_m: f64, scale_m2: f64, end_s: f64) -> f64 {
         let settings = Settings::default();
         let mut roughness = Roughness::default();
@@ -131,9 +137,10 @@ mod tests {
         math::sqrt(roughness.variance_m2(&settings))
     }
 
-    /// The wall's bumps are found whatever the vehicle does between the walls, and a smooth wall is found smooth though declared rough.
+    /// The wall's roughness is found whatever the vehicle's motion. A smooth wall is found smooth even if declared
+    /// rough.
     #[test]
-    fn roughness_is_what_the_sum_of_two_ranges_has_beyond_their_noise() {
+    fn roughness_is_the_excess_of_the_range_sum_over_its_noise() {
         for rough_m in [0.0, 0.01, 0.03, 0.05] {
             for white_m in [0.0, 0.02] {
                 let found_m = found_m(rough_m, white_m, 0.0, 400.0);
@@ -142,10 +149,12 @@ mod tests {
         }
     }
 
-    /// Nothing is learnt while the scale of ranges is unknown, of one echosounder, or of two that look the same way; and no wall is
-    /// rougher than twice what is declared.
+    /// Nothing is learnt while the scale of ranges is unknown, from one echosounder, or from two that look the same
+    /// way.
+    ///
+    /// The learnt roughness is at most twice the declared one.
     #[test]
-    fn roughness_is_as_declared_until_it_is_seen() {
+    fn roughness_is_as_declared_until_observed() {
         let settings = Settings::default();
         assert!((found_m(0.05, 0.0, 0.1, 100.0) - settings.echo_sd_m).abs() < 1e-12);
         assert!((found_m(1.0, 0.0, 0.0, 400.0) - 2.0 * settings.echo_sd_m).abs() < 1e-12);
@@ -159,11 +168,12 @@ mod tests {
     }
 
     #[test]
-    fn looks_at_a_bump_are_those_on_its_way() {
+    fn looks_at_a_bump_are_the_pings_along_its_length() {
         let looks = |apart_s: f64, speed_mps: f64| looks(DurNs::from_secs_f64(apart_s), speed_mps, 0.1);
         assert!((looks(0.1, 0.2) - 5.0).abs() < 1e-9);
         assert!((looks(0.1, -0.2) - 5.0).abs() < 1e-9 && (looks(-0.1, 0.2) - 5.0).abs() < 1e-9);
-        // Hardly moving, it still sways; farther apart than a bump, each ping is news; at one time, they count as one.
+        // A nearly stationary vehicle still sways. Pings farther apart than a bump are independent, and simultaneous
+        // ones count as one.
         assert!((looks(0.1, 0.0) - 20.0).abs() < 1e-9);
         assert_eq!((looks(1.0, 0.2), looks(0.0, 0.2)), (1.0, 1.0));
     }

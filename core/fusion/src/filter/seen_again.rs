@@ -1,41 +1,48 @@
-//! How much the returns of heads say that see bumps which heads have seen before. A vehicle that stands sees the same ones turn after turn:
-//! taken for news each time, they turn the estimate as surely as wrongly. Derivation: `docs/why/navigation.md`, "Bumps seen again".
+//! Weight of head returns from bumps that the heads have seen before.
+//!
+//! A stationary vehicle sees the same bumps in every turn. If each turn counted as new information, the estimate
+//! would become wrong and overconfident. Derivation: `docs/why/navigation.md`, "Bumps seen again".
 
 use serde::{Deserialize, Serialize};
 
 use super::settings::Settings;
 use headrace_geometry::math;
 
-/// Largest share of bumps in a return's noise.
+/// Largest share of bumps in the noise of a return.
 const MOST_BUMPS: f64 = 0.9;
-/// Most passes that count: an estimate that gyros alone would carry away is still held by what is seen again.
+/// Maximum number of passes that count.
+///
+/// Repeated bumps must still hold an estimate that gyros alone would let drift.
 const MOST_PASSES: f64 = 10.0;
 
-/// How often heads have passed the bumps that they see.
+/// Number of times the heads have passed the present bumps.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub(super) struct SeenAgain {
-    /// Where they began to see these: chainage, m.
+    /// Chainage at which they began to see these bumps, m.
     from_m: Option<f64>,
-    /// Returns since, of all heads.
+    /// Returns of all heads since.
     returns: u32,
 }
 
 impl SeenAgain {
-    /// Notes where the vehicle is, m.
+    /// Notes the position of the vehicle, m.
     pub(super) fn pass(&mut self, x_m: f64, settings: &Settings) {
         if self.from_m.is_none_or(|from_m| (x_m - from_m).abs() >= settings.seen_again_m) {
             *self = Self { from_m: Some(x_m), returns: 0 };
         }
     }
 
-    /// How often a bump has been seen, this time with it, at least 1: of a turn that has begun, half the bumps have been seen once more.
+    /// Mean number of times a bump has been seen, including now, at least 1.
+    ///
+    /// In the turn under way, half of the bumps have been seen once more.
     fn passes(&self, settings: &Settings) -> f64 {
         (0.5 + f64::from(self.returns) * settings.return_step_rad / math::TAU).clamp(1.0, MOST_PASSES)
     }
 
-    /// Takes a return of this range; variance with which it is fused, m^2: by itself it has the `declared_m2`, of which bumps are a share.
+    /// Counts a return and gives the variance with which to fuse it, m^2.
     ///
-    /// n looks at one bump say together what their mean does; each has the noise of what it adds to those before.
+    /// `declared_m2` is its own variance, partly from bumps. n looks at one bump together have the weight of their
+    /// mean. Each gets the noise of its own contribution.
     pub(super) fn noise_m2(
         &mut self,
         range_m: f64,
@@ -46,7 +53,7 @@ impl SeenAgain {
         let passes = self.passes(settings);
         self.returns = self.returns.saturating_add(1);
         let step_m = settings.return_step_rad * range_m;
-        // So many of one pass see it.
+        // Number of returns within one pass that see the bump.
         let around = if step_m > 0.0 { (settings.bump_m / step_m).max(1.0) } else { 1.0 };
         let bumps_m2 = bumps.min(MOST_BUMPS) * declared_m2;
         let own_m2 = (declared_m2 - bumps_m2) / around;
@@ -60,7 +67,7 @@ mod tests {
 
     const DECLARED_M2: f64 = 9e-4;
 
-    /// The noise of a return after so many passes, at a range at which `around` returns of a turn see one bump.
+    /// Noise of a return after `passes`, at a range where `around` returns of a turn see one bump.
     fn noise_m2(passes: f64, around: f64, bumps: f64) -> f64 {
         let settings = Settings::default();
         let returns = math::round_to_i64((passes - 0.5) * math::TAU / settings.return_step_rad);
@@ -68,9 +75,9 @@ mod tests {
         seen.noise_m2(settings.bump_m / settings.return_step_rad / around, DECLARED_M2, bumps, &settings)
     }
 
-    /// Weighed as least squares would, returns that see one bump say together what their mean says.
+    /// Weighted as in least squares, returns that see one bump have the weight of their mean.
     #[test]
-    fn returns_that_see_one_bump_say_together_what_their_mean_says() {
+    fn returns_from_one_bump_have_the_weight_of_their_mean() {
         let bumps = 0.6;
         for around in [1.0, 4.0] {
             let mut information = 0.0;
@@ -84,16 +91,16 @@ mod tests {
     }
 
     #[test]
-    fn a_smooth_wall_is_news_each_time_and_a_rough_one_hardly_again() {
+    fn repeated_passes_count_fully_on_a_smooth_wall_and_hardly_on_a_rough_one() {
         assert!((noise_m2(9.0, 1.0, 0.0) - DECLARED_M2).abs() < 1e-15);
         assert!(noise_m2(9.0, 1.0, 1.0) > 100.0 * DECLARED_M2);
-        // What stands for an hour is still held, by as little as this.
+        // After an hour at rest, repeated bumps still keep this small weight.
         assert!((noise_m2(1e6, 1.0, 1.0) - noise_m2(MOST_PASSES, 1.0, 1.0)).abs() < 1e-15);
     }
 
-    /// Passes add up while the vehicle stands, and begin anew a little way on, ahead or astern.
+    /// Passes accumulate while the vehicle is stationary, and restart a short distance ahead or astern.
     #[test]
-    fn passes_are_counted_until_the_vehicle_moves_on() {
+    fn passes_accumulate_until_the_vehicle_moves_on() {
         let settings = Settings::default();
         let mut seen = SeenAgain::default();
         let mut after = |returns: u32, x_m: f64| {
@@ -101,7 +108,7 @@ mod tests {
             (0..returns).for_each(|_| _ = seen.noise_m2(6.0, DECLARED_M2, 0.5, &settings));
             seen.passes(&settings)
         };
-        // 120 returns are a turn.
+        // 120 returns are one turn.
         let passes = [(0, 7.0), (120, 7.01), (240, 7.0), (60, 7.06), (0, 7.03), (0, 7.0)]
             .map(|(n, x_m)| after(n, x_m));
         for (found, right) in passes.iter().zip([1.0, 1.5, 3.5, 1.0, 1.0, 1.0]) {

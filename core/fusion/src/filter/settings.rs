@@ -1,5 +1,6 @@
-//! Noise settings of the sensors. Defaults suit a small vehicle with a MEMS unit; a vehicle file's `[navigation]` table
-//! overrides them.
+//! Noise settings of the sensors.
+//!
+//! Defaults suit a small vehicle with a MEMS unit; a vehicle file's `[navigation]` table overrides them.
 
 use serde::{Deserialize, Serialize};
 
@@ -19,32 +20,35 @@ pub struct Wander {
 }
 
 impl Wander {
-    /// The process of a bias with a constant part and a wandering one: its variance is that of both together, and it wanders
-    /// as fast as the wandering part does.
+    /// Creates the process of a bias with a constant and a wandering part.
+    ///
+    /// Its variance is the sum of both, and its correlation time is that of the wandering part.
     pub fn of_bias(bias: &BiasSpec) -> Self {
         let variance = bias.turn_on * bias.turn_on + bias.in_run * bias.in_run;
         Self { reach: math::sqrt(variance), time_s: bias.time_s * variance / (bias.in_run * bias.in_run) }
     }
 
-    /// Variance by which a process of one lag wanders in a second.
+    /// Variance that a process of one lag gains per second.
     pub fn density(&self) -> f64 {
         2.0 * self.reach * self.reach / self.time_s
     }
 
-    /// Standard deviation of the driving rate of a smooth process (two equal lags in series) of standard deviation `reach`.
+    /// Standard deviation of the driving rate of a smooth process with standard deviation `reach`.
+    ///
+    /// A smooth process is two equal lags in series.
     pub fn drive(&self) -> f64 {
         core::f64::consts::SQRT_2 * self.reach / self.time_s
     }
 }
 
-/// See the module's description. Every number is positive.
+/// Noise settings of the sensors. Every number is positive.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Settings {
     /// White noise of the gyros, rad/s/sqrt(Hz).
     pub rate_noise: f64,
     /// White noise of the accelerometers, m/s^2/sqrt(Hz).
     pub force_noise: f64,
-    /// The same without gyro, or accelerometer, data: the vehicle's own turning and acceleration.
+    /// The same without gyro or accelerometer data: the vehicle's own turning and acceleration.
     pub blind_rate_noise: f64,
     /// See `blind_rate_noise`.
     pub blind_force_noise: f64,
@@ -54,7 +58,7 @@ pub struct Settings {
     pub force_bias: Wander,
     /// Noise of a tether counter, its quantum excluded, m.
     pub tether_sd_m: f64,
-    /// Slack of the cable, m, a smooth process: two lags in series. By default that of one that swings within 16 s: nobody has promised less.
+    /// Slack of the cable, m, a smooth process (two lags in series). The default suits periods of 16 s.
     pub slack: Wander,
     /// Initial scale error of the cable, a ratio, and its random walk, per root of a second.
     pub scale_sd: f64,
@@ -62,50 +66,57 @@ pub struct Settings {
     pub scale_noise: f64,
     /// Noise of a depth sensor, its quantum excluded, m.
     pub depth_sd_m: f64,
-    /// Its initial offset, m, and its random walk, m per root of a second: water level, density, surface pressure.
+    /// Initial offset of a depth sensor, m, and its random walk, m per root of a second.
+    ///
+    /// It covers water level, density and surface pressure.
     pub depth_offset_sd_m: f64,
     /// See `depth_offset_sd_m`.
     pub depth_noise: f64,
-    /// Noise of an attitude about the vertical, radians.
+    /// Noise of an attitude about the vertical axis, radians.
     pub heading_sd_rad: f64,
-    /// A compass's deviation, radians.
+    /// Deviation of a compass, radians.
     pub heading: Wander,
-    /// Noise of an attitude about level axes, radians, with gyro and accelerometer data.
+    /// Noise of an attitude about horizontal axes, radians, with gyro and accelerometer data.
     pub tilt_sd_rad: f64,
-    /// The same without these, radians.
+    /// The same without gyro or accelerometer data, radians.
     pub attitude_sd_rad: f64,
     /// Noise of an echosounder, m, wall roughness included.
     pub echo_sd_m: f64,
-    /// Length of wall along which its bumps are one and the same to an echosounder, m.
+    /// Length of wall along which an echosounder sees the same bump, m.
     pub bump_m: f64,
-    /// Way along the tunnel within which heads see the same bumps again, m.
+    /// Distance along the tunnel within which heads see the same bumps again, m.
     pub seen_again_m: f64,
-    /// Full width of its beam, radians: which part of the wall within it echoes is uncertain.
+    /// Full width of an echosounder's beam, radians. It is uncertain which part of the wall within it echoes.
     pub echo_beam_rad: f64,
-    /// Initial scale error of all ranges against the design, a ratio, and its random walk, per root of a second.
+    /// Initial scale error of all ranges against the design, a ratio.
+    ///
+    /// With its random walk, per root of a second.
     pub range_scale_sd: f64,
     /// See `range_scale_sd`.
     pub range_scale_noise: f64,
     /// Noise of a head's return, m, wall roughness included.
     pub return_sd_m: f64,
-    /// Full width of its beam, radians: the nearest part of the wall echoes first.
+    /// Full width of a head's beam, radians. The nearest part of the wall echoes first.
     pub return_beam_rad: f64,
-    /// Angle between the returns of a head that are used, radians: nearer ones see the same roughness.
+    /// Angle between used returns of a head, radians; closer ones see the same roughness.
     pub return_step_rad: f64,
     /// Noise of a velocity over ground, m/s.
     pub velocity_sd_mps: f64,
-    /// Gate: a measurement is rejected when its innovation squared exceeds its variance by this factor.
+    /// Gate: a measurement is rejected if its innovation squared exceeds this factor times its variance.
     pub gate: f64,
-    /// Readings older than this on arrival are too late.
+    /// Maximum age of a reading on arrival; older ones are too late.
     pub window: DurNs,
-    /// Length of an epoch, positive, 0.2 s at most for estimates that hold: readings are fused, and errors carried on, once in each.
-    /// Epochs begin at its multiples.
+    /// Length of an epoch, positive; at most 0.2 s for reliable estimates.
+    ///
+    /// Readings are fused, and errors propagated, once per epoch. Epochs begin at multiples of it.
     pub epoch: DurNs,
-    /// Whether the level of the sources' noise is learnt. Likelihoods can only be compared without.
+    /// Whether noise levels of the sources are learnt. Likelihoods are comparable only without it.
     pub learns: bool,
-    /// Share of a wall's ranges' correction of the attitude, and of what is learnt from it, that is made: 0 to 1, the best estimate.
-    /// What matters to coverage is the attitude of one pass relative to the next, which the gyros know better than walls, whose
-    /// shape isn't the design's. A smoother needs 1: [`crate::smooth::beside`].
+    /// Share of the correction of attitude and related errors by wall ranges that is applied.
+    ///
+    /// 0 is none and 1 the optimal estimate. Coverage depends on the attitude of one pass relative to the next. The
+    /// gyros know that better than walls, whose shape differs from the design. A smoother needs 1:
+    /// [`crate::smooth::beside`].
     pub wall_share: f64,
 }
 
@@ -121,7 +132,7 @@ impl Default for Settings {
             tether_sd_m: 0.005,
             slack: Wander { reach: 0.06, time_s: 2.5 },
             scale_sd: 0.002,
-            // Nobody sets it: a wheel's scale doesn't change within a dive. It keeps the variance from becoming zero.
+            // Not configurable: a wheel's scale does not change within a dive. It keeps the variance above zero.
             scale_noise: 1e-9,
             depth_sd_m: 0.02,
             depth_offset_sd_m: 0.5,
@@ -131,9 +142,9 @@ impl Default for Settings {
             tilt_sd_rad: 2.0 * DEGREE,
             attitude_sd_rad: 1.0 * DEGREE,
             echo_sd_m: 0.03,
-            // Nobody sets it: two thirds of the 0.3 m over which the bumps of field dives follow one another (docs/why/field.md).
+            // Not configurable: two thirds of the 0.3 m between bumps in field dives (docs/why/field.md).
             bump_m: 0.2,
-            // Nobody sets it: about what a vehicle drives while its heads turn half round.
+            // Not configurable: about the vehicle's distance during half a turn of a head.
             seen_again_m: 0.05,
             echo_beam_rad: 25.0 * DEGREE,
             range_scale_sd: 0.03,
@@ -151,11 +162,11 @@ impl Default for Settings {
     }
 }
 
-/// Chi-square with one degree of freedom is above this once in a thousand times.
+/// Chi-square with one degree of freedom exceeds this once in a thousand times.
 const GATE_999: f64 = 10.828;
 
 impl Settings {
-    /// The same, with an inertial unit's own noise.
+    /// Returns the settings with an inertial unit's own noise.
     #[must_use]
     pub fn with_inertial(self, noise: &InertialNoise) -> Self {
         Self {

@@ -1,10 +1,10 @@
-//! How fast and how far the cable's slack changes, measured by comparing the counter with inertial motion in raw form.
+//! Speed and size of the cable's slack, measured by comparing the counter with raw inertial motion.
 //!
-//! The difference of both is slack, plus what the inertial unit's constant errors make of it: a polynomial of second degree in time. Its
-//! third differences show slack alone. They are compared, at several lags, with those of the slack model; where they are larger than
-//! declared, the slack is faster or reaches farther. A third difference that is far larger than usual shows that the counter or the
-//! inertial unit has gone wrong. No cable reading has changed what is compared here: of the estimate only its heading is used.
-//! Derivation: `docs/why/navigation.md`, "Slack".
+//! Their difference is slack plus the effect of the inertial unit's constant errors, which is a second-degree
+//! polynomial in time. Its third differences contain slack alone. They are compared with those of the slack model at
+//! several lags. If they are larger than declared, the slack is faster or reaches farther. A third difference far
+//! above the usual means that the counter or the inertial unit has failed. The comparison does not depend on earlier
+//! cable readings: it uses only the heading of the estimate. Derivation: `docs/why/navigation.md`, "Slack".
 
 use super::inertial::Felt;
 use super::settings::{Settings, Wander};
@@ -16,54 +16,64 @@ use headrace_geometry::time::{DurNs, MonoNs};
 
 /// Lags of the third differences, s.
 const LAGS_S: [f64; 4] = [0.5, 1.0, 2.0, 4.0];
-/// Room for the differences between counter and inertial motion: those of three of the longest lags at ten a second.
+/// Capacity for differences between counter and inertial motion: three of the longest lags at ten a second.
 const ROOM: usize = 256;
-/// Room for inertial samples of an epoch.
+/// Capacity for the inertial samples of an epoch.
 const KNOTS: usize = 256;
 /// Averaging time of the mean squares, s.
 const MEMORY_S: f64 = 40.0;
-/// Times its rms that a third difference counts at most: faults are rare and large, slack isn't.
+/// Multiple of the rms at which a third difference is clipped.
+///
+/// Faults are rare and large; slack is not.
 const MOST_SDS: f64 = 3.0;
-/// Standard deviations by which a mean square may exceed what noise explains: it is of few independent differences.
+/// Standard deviations by which a mean square may exceed the noise.
+///
+/// A margin is needed because it comes from few independent differences.
 const MARGIN_SDS: f64 = 1.5;
-/// Time constant by which inertial velocity is forgotten, s: it keeps numbers small and hardly changes a third difference.
+/// Time constant with which inertial velocity decays, s. It keeps numbers small and hardly changes a third
+/// difference.
 const FORGETS_S: f64 = 1000.0;
-/// Time over which the attitude is levelled and turned to the estimate's heading, s: slowly, as only what changes within a lag counts.
+/// Time over which the attitude is levelled and aligned with the estimate's heading, s.
+///
+/// Only changes within a lag matter.
 const LEVELS_S: f64 = 100.0;
-/// Largest difference from the estimate's attitude, rad. Beyond it the track begins anew.
+/// Largest difference from the estimate's attitude, rad; beyond it the track restarts.
 const MOST_OFF_RAD: f64 = 0.3;
-/// Standard deviations within which counter and inertial motion agree, once so many differences have been seen.
+/// Standard deviations within which counter and inertial motion agree.
+///
+/// The second constant is the number of differences needed to judge.
 const AGREES_SDS: f64 = 4.0;
 const FEW: u32 = 50;
 const ENOUGH: u32 = 200;
-/// How many times faster than declared slack is taken to be until it has been compared.
+/// Factor by which slack is assumed to be faster than declared until it has been compared.
 const AT_FIRST: f64 = 2.0;
-/// Third differences up to a few of these say nothing: what a lever arm and a leaning vehicle make of them, m.
+/// Third differences up to a few times this are ignored, m: a lever arm or a tilting vehicle causes them.
 const LEAST_M: f64 = 0.01;
-/// Time by which counter and inertial unit may be late against one another where a speed changes, s.
+/// Possible delay between counter and inertial unit when the speed changes, s.
 const LATE_S: f64 = 0.1;
-/// Slack is lively if it usually moves the counter by more than so many steps in a second.
+/// Counter steps per second above which slack counts as lively.
 const LIVELY_STEPS: f64 = 4.0;
-/// Averages are compared with the model this often.
+/// Interval at which averages are compared with the model.
 const COMPARES: DurNs = DurNs(1_000_000_000);
-/// Readings farther apart than this aren't compared.
+/// Maximum time between compared readings.
 const GAP: DurNs = DurNs(1_500_000_000);
-/// Shortest time constant, and farthest reach, of slack: faster is noise of the counter; farther is a fault. s, m.
+/// Shortest time constant, s, and largest reach, m, of slack. Faster changes are counter noise; larger ones are a
+/// fault.
 const LEAST_TIME_S: f64 = 0.15;
 pub(super) const MOST_REACH_M: f64 = 0.15;
 
-/// See the module's description.
+/// Level of the slack, from third differences.
 #[derive(Debug, Clone)]
 pub(super) struct SlackLevel {
     attitude: Option<Rot<Tunnel, Body>>,
-    /// Inertial position and velocity along the tunnel, without their constants.
+    /// Inertial position and velocity along the tunnel, up to their constants.
     way_m: f64,
     speed_mps: f64,
-    /// The position through the last epoch.
+    /// Position through the last epoch.
     knots: Vec<(MonoNs, [f64; 1])>,
-    /// Counter less inertial position, and what the counter shows, m.
+    /// Counter less inertial position, and the counter's reading, m.
     differences: Vec<(MonoNs, [f64; 2])>,
-    /// Mean squares of third differences by lag, m^2, and their means, m; weights of the averages so far.
+    /// Mean squares of third differences by lag, m^2, their means, m, and the weights of the averages so far.
     squares_m2: [f64; LAGS_S.len()],
     means_m: [f64; LAGS_S.len()],
     seen: [u32; LAGS_S.len()],
@@ -75,7 +85,7 @@ pub(super) struct SlackLevel {
 stateful!(SlackLevel { state: attitude, way_m, speed_mps, squares_m2, means_m, seen, compared, slack; lists: knots, differences; });
 
 impl Default for SlackLevel {
-    /// Allocated without readings.
+    /// Allocates the buffers, without readings.
     fn default() -> Self {
         Self {
             attitude: None,
@@ -93,27 +103,29 @@ impl Default for SlackLevel {
 }
 
 impl SlackLevel {
-    /// The slack's reach and time constant: as declared, or farther and faster where that has shown itself.
+    /// Returns the slack's reach and time constant: the declared ones, or larger and faster ones if observed.
     pub(super) fn slack(&self, settings: &Settings) -> Wander {
         let declared = settings.slack;
         self.slack.unwrap_or(Wander { time_s: declared.time_s / AT_FIRST, ..declared })
     }
 
-    /// Whether slack moves a counter of this step, m, all the time: third differences over a second usually exceed [`LIVELY_STEPS`] and the
-    /// noise.
+    /// Whether slack moves a counter with this step, m, all the time.
+    ///
+    /// Third differences over a second then usually exceed [`LIVELY_STEPS`] and the noise.
     pub(super) fn is_lively(&self, step_m: f64, noises: Noises, settings: &Settings) -> bool {
         let least_m = LIVELY_STEPS * step_m;
         self.squares_m2[1] > (least_m * least_m).max(noises.third_square_m2(1.0, settings))
     }
 
-    /// Begins an epoch at a time.
+    /// Begins an epoch.
     pub(super) fn begin(&mut self, at: MonoNs) {
         self.knots.clear();
         self.knots.push((at, [self.way_m]));
     }
 
-    /// Takes the inertial data from the last knot to `until`, of a vehicle of about this heading and gyro bias. Without them nothing is
-    /// compared.
+    /// Integrates inertial data from the last knot to `until`; `about` gives heading and gyro bias.
+    ///
+    /// Without inertial data nothing is compared.
     ///
     /// Allocates: never.
     pub(super) fn go_on(&mut self, felt: &Felt, until: MonoNs, about: &State, gravity_mps2: f64) {
@@ -137,7 +149,7 @@ impl SlackLevel {
         let gain = up.x - self.speed_mps / FORGETS_S;
         self.way_m += (self.speed_mps + gain * dt_s / 2.0) * dt_s;
         self.speed_mps += gain * dt_s;
-        // Gravity is up: what it leans is turned back.
+        // Gravity points up: its apparent lean is removed slowly.
         let back = Vec3::<Tunnel>::new(up.y / gravity_mps2, -up.x / gravity_mps2, off.z());
         let back = rotation(back.scaled(dt_s / LEVELS_S));
         self.attitude = Some(back * (middle * rotation(rate.scaled(dt_s / 2.0))));
@@ -146,7 +158,9 @@ impl SlackLevel {
         }
     }
 
-    /// Takes a reading of the counter, of the epoch that was begun last; whether counter and inertial motion agree as well as usual.
+    /// Processes a counter reading in the current epoch.
+    ///
+    /// Returns whether counter and inertial motion agree as usual.
     ///
     /// Allocates: never.
     pub(super) fn hear(&mut self, at: MonoNs, shown_m: f64, noises: Noises, settings: &Settings) -> bool {
@@ -176,12 +190,14 @@ impl SlackLevel {
         agrees
     }
 
-    /// Compares nothing across this time: the counter has stuck or slipped, or a force is missing.
+    /// Restarts the comparison at this time, because the counter has stuck or slipped, or a force is missing.
     pub(super) fn skip(&mut self) {
         self.differences.clear();
     }
 
-    /// Third difference of counter less inertial position, and how far the counter's ways over three successive lags differ, m.
+    /// Returns the third difference of counter less inertial position, m.
+    ///
+    /// The second value is the spread of the counter's distances over three lags, m.
     fn third_difference_m(&self, at: MonoNs, lag_s: f64) -> Option<[f64; 2]> {
         let then = |lags: f64| at_time(&self.differences, at - DurNs::from_secs_f64(lags * lag_s));
         let [[u0, z0], [u1, z1], [u2, z2], [u3, z3]] = [then(0.0)?, then(1.0)?, then(2.0)?, then(3.0)?];
@@ -191,14 +207,16 @@ impl SlackLevel {
         Some([u0 - 3.0 * u1 + 3.0 * u2 - u3, most_m - least_m])
     }
 
-    /// Averages a third difference; whether it is as usual, or at most what noise and readings that come late explain, m^2.
+    /// Averages a third difference.
+    ///
+    /// Returns whether it is usual, or explained by noise and late readings, m^2.
     fn note(&mut self, lag: usize, third_m: f64, dt_s: f64, [noise_m2, late_m2]: [f64; 2]) -> bool {
         let (Some(square_m2), Some(mean_m), Some(seen)) =
             (self.squares_m2.get_mut(lag), self.means_m.get_mut(lag), self.seen.get_mut(lag))
         else {
             return true;
         };
-        // Noise is what it has shown itself to be, once that is known.
+        // The noise counts as observed, once it is known.
         let seen_m2 = if *seen < ENOUGH { square_m2.max(noise_m2) } else { *square_m2 };
         let usual_m2 = seen_m2 + late_m2 + LEAST_M * LEAST_M;
         let off_m = third_m - *mean_m;
@@ -212,7 +230,9 @@ impl SlackLevel {
         agrees
     }
 
-    /// The slowest slack of the declared reach whose third differences are as large as those seen, or of a farther one.
+    /// Returns the slowest slack whose third differences are as large as observed.
+    ///
+    /// It has the declared reach, or a larger one if necessary.
     fn shown(&self, noises: Noises, settings: &Settings) -> Wander {
         let declared = settings.slack;
         let seen_m2: [f64; LAGS_S.len()] = core::array::from_fn(|k| {
@@ -223,7 +243,7 @@ impl SlackLevel {
         let least_reach =
             seen_m2.iter().map(|seen| math::sqrt(seen.max(0.0) / 20.0)).fold(declared.reach, f64::max);
         let most_reach = MOST_REACH_M.max(declared.reach);
-        // A faster slack reaches farther: a sine lies above a broad spectrum of the same variance.
+        // A faster slack gets a larger reach, because a sine lies above a broad spectrum of the same variance.
         let model = |time_s: f64| {
             let reach = declared.reach * math::sqrt(math::sqrt(math::sqrt(declared.time_s / time_s)));
             Wander { reach: reach.max(least_reach).min(most_reach), time_s }
@@ -245,7 +265,9 @@ impl SlackLevel {
     }
 }
 
-/// Mean square of the slack's third difference over its variance, at a lag of so many time constants: autocorrelation (1 + x) e^-x.
+/// Mean square of the slack's third difference over its variance, at a lag of `x` time constants.
+///
+/// The autocorrelation is (1 + x) e^-x.
 fn third_square(x: f64) -> f64 {
     let correlation = |x: f64| (1.0 + x) * math::exp(-x);
     20.0 - 30.0 * correlation(x) + 12.0 * correlation(2.0 * x) - 2.0 * correlation(3.0 * x)
@@ -261,15 +283,19 @@ pub(super) struct Noises {
 }
 
 impl Noises {
-    /// From the counter's variance, m^2, the variance of the estimated gyro bias, rad^2/s^2, and its random walk, rad^2/s^3. A constant bias
-    /// error does not count: it is in the mean.
+    /// Creates it from the counter's variance, m^2, and the gyro bias.
+    ///
+    /// The bias is given by its variance, rad^2/s^2, and its random walk, rad^2/s^3. A constant bias error does not
+    /// count, because it is part of the mean.
     pub(super) fn of(counter_m2: f64, known: f64, wander: f64) -> Self {
         let renewed = 1.0 - math::exp(-MEMORY_S * wander / known.max(f64::MIN_POSITIVE));
         Self { counter_m2, rate_bias_rad2ps2: renewed * known }
     }
 
-    /// Mean square of their third difference at a lag, m^2: of the counter's white noise, and of the inertial unit's declared noise, that is
-    /// white force noise, a walk of tilt and of bias, and a turn of gravity.
+    /// Mean square of the noise's third difference at a lag, m^2.
+    ///
+    /// It includes the counter's white noise and the inertial unit's declared noise: white force noise, a random walk
+    /// of tilt and bias, and a rotation of gravity.
     fn third_square_m2(self, lag_s: f64, settings: &Settings) -> f64 {
         const GRAVITY_MPS2: f64 = 9.81;
         let tilting = GRAVITY_MPS2 * settings.rate_noise;
@@ -282,7 +308,7 @@ impl Noises {
     }
 }
 
-/// The values at a time, between their neighbours; `None` outside.
+/// Interpolates the values at a time between their neighbours; `None` outside.
 pub(super) fn at_time<const N: usize>(values: &[(MonoNs, [f64; N])], at: MonoNs) -> Option<[f64; N]> {
     let next = values.partition_point(|(then, _)| *then < at);
     let (after, to) = *values.get(next)?;
@@ -306,7 +332,8 @@ mod tests {
         State::at_rest(Point3::zero(), Rot::identity())
     }
 
-    /// The level after two minutes of a vehicle that moves and tilts along a known way: its counter shows `slack_m` more, by time, s.
+    /// Level after two minutes of a known motion and tilt, with a counter that shows `slack_m` too much at each time,
+    /// s.
     fn level_after(slack_m: impl Fn(f64) -> f64) -> (SlackLevel, u32) {
         let (mut level, mut unusual) = (SlackLevel::default(), 0);
         let at = |t: f64| MonoNs(7_000_000_000) + DurNs::from_secs_f64(t);
@@ -316,7 +343,7 @@ mod tests {
             level.begin(at(from_s - 0.1));
             for k in 1..=10_u32 {
                 let t = from_s - 0.1 + f64::from(k) / 100.0;
-                // A unit tilted by a degree, whose gyros and accelerometers are off.
+                // A unit tilted by a degree, with gyro and accelerometer errors.
                 let force_mps2 = -0.3 / 36.0 * math::sin((t - 0.005) / 6.0);
                 let force = Vec3::new(force_mps2 + 0.17 + 0.02, 0.01, GRAVITY_MPS2);
                 let felt = Felt { rate_radps: Some(Vec3::new(1e-4, 2e-4, 0.0)), force_mps2: Some(force) };
@@ -330,7 +357,7 @@ mod tests {
     }
 
     #[test]
-    fn a_taut_or_slow_cable_is_as_declared() {
+    fn taut_or_slow_cable_has_the_declared_slack() {
         let declared = Settings::default().slack;
         for slack_m in [0.0, 0.02] {
             let (level, unusual) = level_after(|t| slack_m * math::sin(t / 6.0));
@@ -338,9 +365,11 @@ mod tests {
         }
     }
 
-    /// The fastest change of a sine is its amplitude times its angular frequency; of the model, three standard deviations of its rate.
+    /// The fastest change of a sine is its amplitude times its angular frequency.
+    ///
+    /// That of the model is three standard deviations of its rate.
     #[test]
-    fn a_lively_cable_is_faster_than_declared_and_reaches_farther_if_it_must() {
+    fn lively_cable_is_faster_and_reaches_farther_than_declared() {
         for (amplitude_m, period_s) in [(0.06, 8.0), (0.06, 3.0), (0.15, 4.0), (0.03, 2.0)] {
             let omega = math::TAU / period_s;
             let (level, _) = level_after(|t| amplitude_m * math::sin(omega * t));
@@ -352,7 +381,7 @@ mod tests {
     }
 
     #[test]
-    fn a_counter_that_sticks_is_unusual_within_a_second() {
+    fn stuck_counter_is_unusual_within_1_s() {
         let sticks = |t: f64| {
             if (60.0..70.0).contains(&t) {
                 -0.2 * (t - 60.0)
@@ -370,7 +399,7 @@ mod tests {
     }
 
     #[test]
-    fn without_inertial_data_nothing_is_compared() {
+    fn comparison_needs_inertial_data() {
         let (mut level, _) = level_after(|_| 0.0);
         level.begin(MonoNs(127_000_000_000));
         level.go_on(
@@ -383,9 +412,9 @@ mod tests {
         assert!(level.differences.is_empty());
     }
 
-    /// Against the process itself: two lags in series, stepped by a thousandth of their time.
+    /// Comparison with the process itself: two lags in series, stepped by a hundredth of their time constant.
     #[test]
-    fn third_differences_of_the_slack_model_are_those_of_the_process() {
+    fn slack_model_has_the_third_differences_of_the_process() {
         let (mut seed, mut rate, mut slack) = (3_u64, 0.0, 0.0);
         let mut draw = || {
             (0..12).fold(-6.0, |sum, _| {

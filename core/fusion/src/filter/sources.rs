@@ -11,19 +11,25 @@ use headrace_sensor::device::{SensorInfo, SensorKind};
 use headrace_sensor::reading::{Reading, SonarReturn};
 use headrace_sensor::sampling::head::SILENT_AFTER;
 
-/// A head is stuck where so many of its returns are of one range, though those that are expected vary by more than a length, m: a
-/// reading that is left out by mistake costs nothing. They are expected for sure within a standard deviation, m.
+/// Limits for a stuck head: number of returns, and variation of the expected range, m.
+///
+/// So many returns have one range although the expected range varies by more. A reading that is dropped by mistake
+/// costs nothing. The expected ranges must be certain to within a standard deviation, m.
 const FEW_OF_ONE_RANGE: u32 = 3;
 const VARIES_M: f64 = 0.05;
 const SURE_M: f64 = 0.02;
-/// Update periods of attitudes, cables and depths: their errors are correlated over longer times.
+/// Update period of attitudes, because their errors are correlated over longer times.
+///
+/// The same applies to cables and depths.
 pub const ATTITUDE_PERIOD: DurNs = DurNs(100_000_000);
 /// See [`ATTITUDE_PERIOD`].
 pub const TETHER_PERIOD: DurNs = DurNs(100_000_000);
 /// See [`ATTITUDE_PERIOD`].
 pub const DEPTH_PERIOD: DurNs = DurNs(500_000_000);
-/// See [`ATTITUDE_PERIOD`]; a velocity log's errors, of its scale, its mount and the bottom, last for 10 s: so many readings share one. With 3 s,
-/// a log that shows a fifth too much carries the estimate away (`docs/why/navigation.md`, "Seeded dives").
+/// See [`ATTITUDE_PERIOD`]. Errors of a velocity log's scale, mount and bottom last for 10 s, so many readings share
+/// one.
+///
+/// With 3 s, a log that shows a fifth too much pulls the estimate away (`docs/why/navigation.md`, "Seeded dives").
 pub const VELOCITY_PERIOD: DurNs = DurNs(500_000_000);
 /// See [`VELOCITY_PERIOD`].
 pub const VELOCITY_LOOKS: f64 = 20.0;
@@ -39,18 +45,19 @@ pub struct Consistency {
     pub gated: u64,
     /// Readings that arrived too late to be fused.
     pub late: u64,
-    /// Readings that were implausible or not finite, or for which there was no room.
+    /// Readings that were implausible or not finite, or that found no room.
     pub dropped: u64,
     /// Sum of the normalised innovations squared (NIS) of the measurements used.
     pub nis_sum: f64,
-    /// Minus twice the log-likelihood of all innovations, up to a constant for each measurement: sum of NIS (clamped at the
-    /// gate) less 1, and of the logarithm of the innovation variance over the usual one. Between two ways of reading the same
-    /// log, the lower one is likelier.
+    /// Minus twice the log-likelihood of all innovations, up to a constant for each measurement.
+    ///
+    /// It is the sum of NIS (clipped at the gate) less 1, and of the logarithm of the innovation variance over the
+    /// usual one. Between two interpretations of the same log, the lower value is more likely.
     pub surprise: f64,
 }
 
 impl Consistency {
-    /// Counts an innovation of this variance, and whether it was used.
+    /// Counts an innovation and whether it was used.
     pub fn count(&mut self, nis: f64, gate: f64, variance: f64, usual: f64) {
         self.surprise += nis.min(gate) - 1.0 + math::ln(variance / usual);
         if nis <= gate {
@@ -61,20 +68,20 @@ impl Consistency {
         }
     }
 
-    /// Mean NIS of the measurements used; `None` without any.
+    /// Returns the mean NIS of the used measurements; `None` without any.
     pub fn nis(&self) -> Option<f64> {
         (self.used > 0).then(|| self.nis_sum / self.used as f64)
     }
 }
 
-/// See the module's description.
+/// The filter's record of one source.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Source {
     /// Mount and kind.
     pub sensor: SensorInfo,
     /// Innovation statistics.
     pub consistency: Consistency,
-    /// When a reading of it was last put into the window.
+    /// Time at which one of its readings was last put into the window.
     pub taken: Option<MonoNs>,
     /// For a head, its rotation.
     pub turning: Turning,
@@ -95,7 +102,7 @@ pub struct Turning {
 }
 
 impl Source {
-    /// A source without readings yet.
+    /// Creates a source without readings.
     pub fn new(sensor: SensorInfo) -> Self {
         Self {
             sensor,
@@ -108,8 +115,10 @@ impl Source {
         }
     }
 
-    /// Notes a head's range, by how much it is longer than the estimate's, m, and how sure that is; whether the head says that one
-    /// range wherever it looks. Nothing is known of it while the estimate is unsure.
+    /// Notes a head's range; returns whether the head reports one range in every direction.
+    ///
+    /// Inputs: the excess over the estimated range, m, and the estimate's uncertainty. Nothing is concluded while the
+    /// estimate is uncertain.
     pub fn says_one_range(&mut self, reading: &Reading, residual_m: f64, estimate_sd_m: f64) -> bool {
         let Reading::Sonar(SonarReturn { range_m: Some(range_m), .. }) = reading else { return false };
         if estimate_sd_m > SURE_M {
@@ -120,18 +129,20 @@ impl Source {
         self.is_stuck()
     }
 
-    /// Whether a head's last returns are of one range where those of the estimate vary.
+    /// Whether a head's last returns have one range although the estimated ranges vary.
     fn is_stuck(&self) -> bool {
         self.one_range.is_stuck(FEW_OF_ONE_RANGE, VARIES_M)
     }
 
-    /// Counts a reading's scalar of this number as one that isn't used.
+    /// Counts a scalar of a reading as rejected; `number` is its index in the reading.
     pub fn leave_out(&mut self, number: usize) {
         self.consistency.gated += 1;
         self.noise_level.skip(number);
     }
 
-    /// Whether `period` has passed since its last reading in the window; if so, this one becomes the last.
+    /// Whether `period` has passed since its last reading in the window.
+    ///
+    /// If so, this reading becomes the last.
     pub fn is_due(&mut self, at: MonoNs, period: DurNs) -> bool {
         let due = self.taken.is_none_or(|taken| at.since(taken).0.abs() >= period.0);
         if due {
@@ -141,8 +152,10 @@ impl Source {
     }
 }
 
-/// Whether the range of another head than this source changes with the wall: what makes this one's stay is then no error of the estimate,
-/// as it may be in a round tunnel.
+/// Whether the range of any other head follows the wall.
+///
+/// If so, a constant range of this source is its own fault. In a round tunnel, an error of the estimate could
+/// otherwise explain it.
 pub fn others_change(sources: &[Option<Source>], source: usize) -> bool {
     let mut others = sources.iter().enumerate().filter(|(number, _)| *number != source);
     others.any(|(_, other)| {
@@ -152,15 +165,18 @@ pub fn others_change(sources: &[Option<Source>], source: usize) -> bool {
     })
 }
 
-/// Share of the declared variance of heads' ranges that the wall leaves them: that of the head that shows most. Where one begins to see rocks, the
-/// others will.
+/// Share of the declared variance to apply to ranges of heads: that of the head with the largest one.
+///
+/// If one head begins to see rocks, the others soon will.
 pub fn smoothness(sources: &[Option<Source>]) -> f64 {
     let heads = sources.iter().flatten().filter(|source| source.sensor.kind == SensorKind::Head);
     heads.filter_map(|head| head.noise_level.smoothness()).reduce(f64::max).unwrap_or(1.0)
 }
 
 impl Turning {
-    /// Notes a ping; whether it has a range and looks at least `step_rad` away from the last one used.
+    /// Notes a ping.
+    ///
+    /// Returns whether it has a range and points at least `step_rad` away from the last used one.
     pub fn ping(&mut self, at: MonoNs, sonar: &SonarReturn, step_rad: f64) -> bool {
         if let Some((before, angle_rad)) = self.last {
             let dt_s = at.since(before).as_secs_f64();
@@ -180,7 +196,7 @@ impl Turning {
         elsewhere && sonar.range_m.is_some()
     }
 
-    /// Turns per second; `None` when it doesn't turn.
+    /// Turns per second; `None` for a head that does not turn.
     pub fn turns_per_s(&self, now: MonoNs) -> Option<f64> {
         let (last, _) = self.last?;
         (now.since(last).0.abs() <= SILENT_AFTER.0 && self.rate_radps > 0.0)
@@ -193,7 +209,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_is_used_and_what_is_gated_is_counted_and_the_mean_is_of_what_is_used() {
+    fn consistency_counts_used_and_gated_and_averages_used() {
         let mut consistency = Consistency::default();
         assert_eq!(consistency.nis(), None);
         for nis in [0.5, 9.0, 2.5, 16.0, 100.0] {
@@ -201,7 +217,7 @@ mod tests {
         }
         assert_eq!((consistency.used, consistency.gated), (3, 2));
         assert_eq!(consistency.nis(), Some(4.0));
-        // Beyond the gate an innovation says no more than at it.
+        // Innovations are clipped at the gate.
         assert!((consistency.surprise - (0.5 + 9.0 + 2.5 + 9.0 + 9.0 - 5.0)).abs() < 1e-12);
     }
 }

@@ -1,4 +1,6 @@
-//! Sums of a spell: of all that is fitted, beside those of the vehicle's pose, which explains what it can.
+//! Sums of a spell for all fitted parameters and the vehicle's pose.
+//!
+//! The pose takes priority in explaining residuals.
 
 use serde::{Deserialize, Serialize};
 
@@ -14,17 +16,17 @@ const POSE_SD: [f64; POSE] = [0.3, 0.3, 0.005, 0.01, 0.02];
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub(super) struct Spell {
     pub(super) begun: Option<MonoNs>,
-    /// Information on the pose, and its right side.
+    /// Information on the pose, and its right-hand side.
     pub(super) pose: [[f64; POSE]; POSE],
     pub(super) residuals: [f64; POSE],
     pub(super) scale: Line,
     pub(super) turned: [Line; FOLLOWED],
-    /// By pitch and by yaw of a head on its mount.
+    /// Sums for pitch and yaw of each head on its mount.
     pub(super) tilted: [[TiltLine; 2]; FOLLOWED],
 }
 
 impl Spell {
-    /// Adds what a reading says of the vehicle's pose.
+    /// Adds a reading's information on the vehicle's pose.
     pub(super) fn add(&mut self, by_pose: [f64; POSE], residual_m: f64, weight: f64) {
         for ((by, line), sum) in by_pose.iter().zip(&mut self.pose).zip(&mut self.residuals) {
             for (part, other) in line.iter_mut().zip(&by_pose) {
@@ -34,7 +36,7 @@ impl Spell {
         }
     }
 
-    /// The lower Cholesky factor of the information on the pose, priors included.
+    /// Returns the lower Cholesky factor of the information on the pose, priors included.
     pub(super) fn factor(&self) -> Option<[[f64; POSE]; POSE]> {
         let mut factor = [[0.0; POSE]; POSE];
         for (i, (line, sd)) in self.pose.iter().zip(POSE_SD).enumerate() {
@@ -52,7 +54,7 @@ impl Spell {
             .then_some(factor)
     }
 
-    /// Weight and weighted value of a parameter, freed of the vehicle's pose.
+    /// Returns weight and weighted value of a parameter after the pose is eliminated.
     pub(super) fn freed(&self, line: &Line, factor: &[[f64; POSE]; POSE]) -> [f64; 2] {
         let (by, residuals) = (solved(factor, line.by_pose), solved(factor, self.residuals));
         [line.squares - dot(&by, &by), line.residuals - dot(&by, &residuals)]
@@ -63,9 +65,10 @@ impl Spell {
 mod tests {
     use super::*;
 
-    /// Of three readings with residuals of 1, 2 and 3 m by a parameter; some of it the pose explains as well, all of it if it does so alone.
+    /// Three readings have residuals of 1, 2 and 3 m from a parameter. The pose explains some of it, or all of it if
+    /// it acts alone.
     #[test]
-    fn what_a_pose_explains_is_taken_off() {
+    fn residuals_that_the_pose_explains_are_removed() {
         let line = |by_pose: [f64; POSE]| Line { squares: 3.0, residuals: 6.0, by_pose };
         let spell = |weight: f64| {
             let mut spell = Spell::default();
@@ -77,7 +80,7 @@ mod tests {
         let freed = |spell: &Spell, line: &Line| spell.freed(line, &spell.factor().unwrap());
         let alone = freed(&spell(1.0), &line([0.0; POSE]));
         assert!((alone[0] - 3.0).abs() < 1e-12 && (alone[1] - 6.0).abs() < 1e-12, "{alone:?}");
-        // The pose is known to 0.3 m beforehand: of 3 readings and 11.1 of the prior that leaves 1 - 3 / 14.1.
+        // The prior of the pose is 0.3 m: 3 readings against 11.1 of the prior leave a share of 1 - 3 / 14.1.
         let like_it = freed(&spell(1.0), &line([3.0, 0.0, 0.0, 0.0, 0.0]));
         let left = 1.0 - 3.0 / (3.0 + 1.0 / 0.09);
         assert!(

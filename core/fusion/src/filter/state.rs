@@ -10,33 +10,33 @@ use headrace_geometry::math;
 pub const ERRORS: usize = 22;
 /// Index of the error of the inertial unit's position, m, in the tunnel's frame.
 pub const POSITION: usize = 0;
-/// Of the cable's creep, m.
+/// Index of the error of the cable's creep, m.
 pub const CREEP: usize = 3;
-/// Of its velocity, m/s, in the tunnel's frame.
+/// Index of the velocity error of the inertial unit, m/s, in the tunnel's frame.
 pub const VELOCITY: usize = 4;
-/// Of the attitude: the rotation vector in the tunnel's frame that takes the estimate to the truth, radians.
+/// Index of the attitude error: rotation vector in the tunnel's frame from estimate to truth, radians.
 pub const ATTITUDE: usize = 7;
-/// Of the accelerometers' bias, m/s^2, in the body's frame.
+/// Index of the error of the accelerometer bias, m/s^2, in the body's frame.
 pub const FORCE_BIAS: usize = 10;
-/// Of the gyros' bias, rad/s, in the body's frame.
+/// Index of the error of the gyro bias, rad/s, in the body's frame.
 pub const RATE_BIAS: usize = 13;
-/// Of the cable's slack, m.
+/// Index of the error of the cable's slack, m.
 pub const SLACK: usize = 16;
-/// Of the rate of the slack, m/s.
+/// Index of the error of the slack's rate, m/s.
 pub const SLACK_RATE: usize = 17;
-/// Of the cable's scale, a ratio.
+/// Index of the error of the cable's scale, a ratio.
 pub const SCALE: usize = 18;
-/// Of the depth sensor's offset, m of height.
+/// Index of the error of the depth sensor's offset, m of height.
 pub const DEPTH: usize = 19;
-/// Of the compass's deviation, radians.
+/// Index of the error of the compass deviation, radians.
 pub const HEADING: usize = 20;
-/// Of the scale of all sonars' ranges, a ratio.
+/// Index of the error of the scale of all sonar ranges, a ratio.
 pub const RANGES: usize = 21;
 
 /// Number of values of a state.
 pub const STATE_NUMBERS: usize = ERRORS + 1;
 
-/// One number for each error. Errors that drive others come after them: see `docs/why/navigation.md`.
+/// One number for each error. Errors that drive others come after them; see `docs/why/navigation.md`.
 pub type Errors = [f64; ERRORS];
 
 /// The estimate.
@@ -44,9 +44,9 @@ pub type Errors = [f64; ERRORS];
 pub struct State {
     /// Position of the inertial unit.
     pub position: Point3<Tunnel>,
-    /// Its velocity, m/s.
+    /// Velocity of the inertial unit, m/s.
     pub velocity_mps: Vec3<Tunnel>,
-    /// Body to tunnel.
+    /// Rotation from body to tunnel frame.
     pub attitude: Rot<Tunnel, Body>,
     /// Accelerometer bias, m/s^2, to be subtracted.
     pub force_bias_mps2: Vec3<Body>,
@@ -54,22 +54,22 @@ pub struct State {
     pub rate_bias_radps: Vec3<Body>,
     /// Slack of the cable, m: positive where it shows too much chainage.
     pub slack_m: f64,
-    /// Driving rate of the slack, m/s: it decays as the slack does.
+    /// Driving rate of the slack, m/s; it decays like the slack.
     pub slack_rate_mps: f64,
     /// Creep of the cable, m: chainage shown too large by all scale errors and slips so far.
     pub creep_m: f64,
-    /// Scale error of the cable here and now, a ratio: positive where it shows too much.
+    /// Local scale error of the cable, a ratio; positive if it shows too much.
     pub scale: f64,
     /// Offset of the depth sensor, m: positive where it shows too much height.
     pub depth_offset_m: f64,
     /// Deviation of the compass, radians, positive to the left.
     pub heading_offset_rad: f64,
-    /// Share by which ranges are longer than the design and the speed of sound say: the wall is wider, or sound slower.
+    /// Scale error of ranges, a ratio: positive if the wall is wider, or sound slower, than configured.
     pub range_scale: f64,
 }
 
 impl State {
-    /// At rest, with zero sensor errors.
+    /// Creates a state at rest with zero sensor errors.
     pub fn at_rest(position: Point3<Tunnel>, attitude: Rot<Tunnel, Body>) -> Self {
         Self {
             position,
@@ -87,7 +87,7 @@ impl State {
         }
     }
 
-    /// Applies estimated errors to the estimate.
+    /// Adds estimated errors to the estimate.
     pub fn correct(&mut self, errors: &Errors) {
         self.position = self.position + vec(errors, POSITION);
         self.velocity_mps = self.velocity_mps + vec(errors, VELOCITY);
@@ -106,7 +106,7 @@ impl State {
         self.heading_offset_rad += heading_rad;
     }
 
-    /// The errors that would take this estimate to another, the truth for instance.
+    /// Returns the errors that take this estimate to another one, for instance the truth.
     pub fn errors_to(&self, truth: &Self) -> Errors {
         let mut errors = [0.0; ERRORS];
         put(&mut errors, POSITION, truth.position - self.position);
@@ -131,7 +131,7 @@ impl State {
         errors
     }
 
-    /// The estimate interpolated by `share` towards another; the sensor errors are the other's.
+    /// Interpolates by `share` towards another estimate; the sensor errors are those of the other.
     #[must_use]
     pub fn between(&self, other: &Self, share: f64) -> Self {
         let turn = rotation_vector(other.attitude * self.attitude.inverse());
@@ -143,7 +143,7 @@ impl State {
         }
     }
 
-    /// Its values, in the order of the errors; the attitude as a quaternion.
+    /// Returns its values in the order of the errors, with the attitude as a quaternion.
     pub fn numbers(&self) -> [f64; STATE_NUMBERS] {
         let [px, py, pz] = self.position.0.into();
         let [vx, vy, vz] = self.velocity_mps.0.into();
@@ -160,7 +160,7 @@ impl State {
         ]
     }
 
-    /// The estimate from such values; `None` when the quaternion is invalid.
+    /// Reads an estimate from such values; `None` if the quaternion is invalid.
     pub fn of_numbers(numbers: [f64; STATE_NUMBERS]) -> Option<Self> {
         let [
             px,
@@ -216,7 +216,7 @@ impl State {
     }
 }
 
-/// Three errors from index `from` on.
+/// Reads three errors from index `from` on.
 pub fn vec<F>(errors: &Errors, from: usize) -> Vec3<F> {
     let [x, y, z] = [0, 1, 2].map(|k| errors.get(from + k).copied().unwrap_or(0.0));
     Vec3::new(x, y, z)
@@ -229,45 +229,45 @@ pub fn put<F: Copy>(errors: &mut Errors, from: usize, value: Vec3<F>) {
     }
 }
 
-/// Errors as they were `by_s` before.
+/// Returns the errors as they were `by_s` earlier.
 pub fn earlier(errors: &Errors, by_s: f64) -> Errors {
     let mut then = *errors;
     put(&mut then, POSITION, vec::<Tunnel>(errors, POSITION) + vec::<Tunnel>(errors, VELOCITY).scaled(-by_s));
     then
 }
 
-/// Adds to one of the errors, or of their variances.
+/// Adds to one error, or to one variance of an error.
 pub fn add_to(errors: &mut Errors, i: usize, amount: f64) {
     if let Some(slot) = errors.get_mut(i) {
         *slot += amount;
     }
 }
 
-/// The rotation by a rotation vector, radians.
+/// Returns the rotation for a rotation vector, radians.
 pub fn rotation<To: Copy>(by: Vec3<To>) -> Rot<To, To> {
     let angle = by.norm();
-    // sin(a / 2) / a, by its series where the quotient loses its digits.
+    // sin(a / 2) / a; as a series where the quotient would lose digits.
     let share = if angle < 1e-4 { 0.5 - angle * angle / 48.0 } else { math::sin(angle / 2.0) / angle };
     let [x, y, z] = [by.x() * share, by.y() * share, by.z() * share];
     Rot::from_wxyz(math::cos(angle / 2.0), x, y, z).unwrap_or_else(Rot::identity)
 }
 
-/// The rotation vector of a rotation, radians, of length 0 to pi.
+/// Returns the rotation vector of a rotation, radians, with a length of 0 to pi.
 pub fn rotation_vector<To: Copy, From: Copy>(rotation: Rot<To, From>) -> Vec3<To> {
     let [w, x, y, z] = rotation.wxyz();
-    // Antipodal quaternions are the same rotation: the short way round.
+    // Antipodal quaternions are the same rotation; this takes the shorter way round.
     let (w, v) = if w < 0.0 { (-w, Vec3::new(-x, -y, -z)) } else { (w, Vec3::new(x, y, z)) };
     let sine = v.norm();
     let share = if sine < 1e-5 { 2.0 + sine * sine / 3.0 } else { 2.0 * math::atan2(sine, w) / sine };
     v.scaled(share)
 }
 
-/// The matrix of a rotation.
+/// Returns the matrix of a rotation.
 pub fn matrix<To: Copy, From: Copy>(rotation: Rot<To, From>) -> Matrix3<f64> {
     *UnitQuaternion::to_rotation_matrix(rotation.0).matrix()
 }
 
-/// The matrix of a cross product from the left.
+/// Returns the matrix that multiplies by a cross product from the left.
 pub fn cross(v: Vector3<f64>) -> Matrix3<f64> {
     v.cross_matrix()
 }

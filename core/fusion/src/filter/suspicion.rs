@@ -1,8 +1,10 @@
-//! Settings that the ranges contradict: one parameter each, fitted to what ranges lack of the design.
+//! Detection of wrong settings by fits to the residuals of ranges against the design.
 //!
-//! Within a spell of some seconds the vehicle's place and roll may be off by what explains the ranges best; what is left is
-//! fitted. Spells add up to blocks of way. Blocks are as independent as the wall lets them be, and their scatter says how sure
-//! a figure is. Derivation: `docs/why/navigation.md`, "Settings in doubt".
+//! Each setting is one parameter.
+//!
+//! Within a spell of a few seconds, the vehicle's position and attitude absorb what they can. The parameters are
+//! fitted to the rest. Spells add up to blocks of distance. Blocks are about as independent as the wall allows, and
+//! their scatter gives the uncertainty of a figure. Derivation: `docs/why/navigation.md`, "Settings in doubt".
 
 use serde::{Deserialize, Serialize};
 
@@ -23,57 +25,61 @@ use headrace_geometry::tunnel::Profile;
 use headrace_sensor::device::{SensorInfo, SensorKind};
 use headrace_sensor::reading::Reading;
 
-/// Length of a spell: as long as a filter that is told wrong ranges stays about where it is.
+/// Length of a spell: about as long as a filter with wrong ranges keeps its position.
 const SPELL: DurNs = DurNs(2_000_000_000);
-/// Shortest block, in time and in way; one in which the vehicle hardly moves is given up after the longest time.
+/// Minimum length of a block, in time and distance. A block with hardly any motion is dropped after the maximum time.
 const BLOCK: DurNs = DurNs(20_000_000_000);
 const BLOCK_M: f64 = 3.0;
 const LONGEST: DurNs = DurNs(120_000_000_000);
-/// Fewest readings of a block.
+/// Minimum number of readings in a block.
 const FEWEST_READINGS: u32 = 100;
-/// Least figures that are told: a share of the range, and an angle.
+/// Smallest reported figures: a share of the range, and an angle.
 const LEAST_SCALE: f64 = 0.015;
 const LEAST_ANGLE_RAD: f64 = 0.03;
-/// Residual from which a range weighs less, and beyond which it doesn't count, m.
+/// Residual above which a range loses weight, and above which it does not count, m.
 const FAR_M: f64 = 0.5;
 const BEYOND_M: f64 = 2.0;
-/// Alternatives of the sources that are followed.
+/// Number of alternatives for the followed sources.
 const ALTERNATIVES: usize = FOLLOWED * FOLLOWED;
-/// Mean square by which an echosounder misses that doesn't fit at all, m^2: it draws the estimate off, and makes heads look
-/// turned.
+/// Mean square residual of an echosounder that does not fit at all, m^2.
+///
+/// It pulls the estimate away and makes heads look turned.
 const ASTRAY_M2: f64 = 0.04;
 
 /// A setting that is likely wrong.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub enum Setting {
-    /// Ranges are too long by this share: the speed of sound is set too high, or the wall is that much wider than
-    /// drawn.
+    /// Ranges are too long by this share.
+    ///
+    /// The speed of sound is set too high, or the wall is wider than drawn by this share.
     RangeScale(f64),
-    /// A head is turned about its axis from how it is said to sit, radians: to be added to its roll.
+    /// A head is rotated about its axis by this angle from its configured mount, radians.
+    ///
+    /// The angle is to be added to its roll.
     HeadTurned(f64),
-    /// A head is pitched on its mount, radians: to be added to its pitch.
+    /// A head is pitched on its mount by this angle, radians, to be added to its pitch.
     HeadPitched(f64),
-    /// A head is yawed on its mount, radians: to be added to its yaw.
+    /// A head is yawed on its mount by this angle, radians, to be added to its yaw.
     HeadYawed(f64),
-    /// A source looks the other way.
+    /// A source faces the opposite way.
     WrongWayRound,
-    /// Two sources are swapped: the other's number.
+    /// Two sources are swapped; the value is the number of the other one.
     Swapped(u16),
 }
 
 /// A setting in doubt.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct SettingDoubt {
-    /// What is likely wrong.
+    /// The setting that is likely wrong.
     pub setting: Setting,
-    /// Number of the source, for what is one source's.
+    /// Number of the source, if the setting belongs to one source.
     pub source: Option<u16>,
-    /// Standard deviations from right.
+    /// Standard deviations from the configured value.
     pub sure_sd: f64,
 }
 
 impl Setting {
-    /// The word used in reports and logs.
+    /// The word for it in reports and logs.
     pub fn as_str(self) -> &'static str {
         match self {
             Self::RangeScale(_) => "range_scale",
@@ -85,7 +91,7 @@ impl Setting {
         }
     }
 
-    /// The share or the angle, radians; 0 where there is none.
+    /// Returns the share or the angle, radians; 0 if there is none.
     pub fn figure(self) -> f64 {
         match self {
             Self::RangeScale(figure)
@@ -96,7 +102,7 @@ impl Setting {
         }
     }
 
-    /// The angle, radians, of a head that isn't as it is said to sit.
+    /// Returns the angle by which a head differs from its configured mount, radians.
     pub fn angle_rad(self) -> Option<f64> {
         match self {
             Self::HeadTurned(by_rad) | Self::HeadPitched(by_rad) | Self::HeadYawed(by_rad) => Some(by_rad),
@@ -104,7 +110,7 @@ impl Setting {
         }
     }
 
-    /// The other source, of two that are swapped.
+    /// Returns the other one of two swapped sources.
     pub fn other(self) -> Option<u16> {
         match self {
             Self::Swapped(other) => Some(other),
@@ -114,7 +120,7 @@ impl Setting {
 }
 
 impl SettingDoubt {
-    /// Whether it is of the same setting, whatever the figure.
+    /// Whether it concerns the same setting, whatever the figure.
     pub fn is_of_same(&self, other: &Self) -> bool {
         self.source == other.source
             && self.setting.as_str() == other.setting.as_str()
@@ -122,7 +128,7 @@ impl SettingDoubt {
     }
 }
 
-/// What ranges are compared with.
+/// Reference for ranges.
 #[derive(Debug, Clone, Copy)]
 pub struct Design<'a> {
     /// Design profile.
@@ -135,14 +141,16 @@ pub struct Design<'a> {
     pub unit_at: Vec3<Body>,
 }
 
-/// A reading's range against the design.
+/// A range reading compared with the design.
 struct Look {
     beam: Beam,
     range_m: f64,
     sd_m: f64,
 }
 
-/// Where and when a block began, its readings, and the sums of its spells, freed of the vehicle's pose.
+/// A block: its start, its readings, and the sums of its spells.
+///
+/// The vehicle's pose is eliminated from the sums.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 struct Block {
     begun: Option<(MonoNs, f64)>,
@@ -152,7 +160,7 @@ struct Block {
     tilted: [[[f64; 5]; 2]; FOLLOWED],
 }
 
-/// See the module's description.
+/// Sums for all settings that are judged.
 #[derive(Debug, Clone)]
 pub struct Suspicions {
     block: Block,
@@ -162,7 +170,7 @@ pub struct Suspicions {
     turned: [Fit; FOLLOWED],
     tilted: [[TiltFit; 2]; FOLLOWED],
     alternatives: Vec<Alternative>,
-    /// Readings of each source that is followed, and the share of its declared variance that it shows, 1 at most.
+    /// Number of readings of each followed source, and its observed share of the declared variance, at most 1.
     heard: [u32; FOLLOWED],
     levels: [f64; FOLLOWED],
     doubt: Option<SettingDoubt>,
@@ -171,7 +179,7 @@ pub struct Suspicions {
 stateful!(Suspicions { state: block, spell, followed, scale, turned, tilted, heard, levels, doubt; lists: alternatives; });
 
 impl Default for Suspicions {
-    /// Allocated without readings.
+    /// Allocates the buffers, without readings.
     fn default() -> Self {
         Self {
             block: Block::default(),
@@ -189,8 +197,10 @@ impl Default for Suspicions {
 }
 
 impl Suspicions {
-    /// The likeliest of the settings that are certainly wrong, with the estimate's scale of all ranges and its standard
-    /// deviation: what that explains is no residual any more.
+    /// Returns the most likely of the settings that are certainly wrong.
+    ///
+    /// Inputs: the estimate's scale of all ranges and its standard deviation, whose effect is no longer part of the
+    /// residuals.
     pub fn doubt(&self, [share, sd]: [f64; 2]) -> Option<SettingDoubt> {
         let sure_sd = share.abs() / sd.max(f64::MIN_POSITIVE);
         let is_scaled = self.scale.is_settled() && share.abs() >= LEAST_SCALE && sure_sd >= SURE;
@@ -198,7 +208,7 @@ impl Suspicions {
         self.doubt.or_else(|| is_scaled.then_some(SettingDoubt { setting, source: None, sure_sd }))
     }
 
-    /// Takes a reading that isn't fused yet, with the estimate at its time.
+    /// Processes a reading before it is fused, with the estimate at its time.
     ///
     /// Allocates: never.
     pub fn hear(
@@ -242,7 +252,7 @@ impl Suspicions {
         let own_turn = turn + -arm.cross(&place);
         let expected_m = look.range_m - row.residual;
         let by_pose = [place.y(), place.z(), turn.x(), turn.y(), turn.z()];
-        // What is known to be wrong makes nothing an outlier.
+        // A known scale error makes no range an outlier.
         let scale = self.scale.estimate().map_or(0.0, |[scale, _]| scale);
         let off_m = row.residual.abs().min((row.residual - scale * expected_m).abs());
         let weight = (FAR_M / off_m.max(FAR_M)) / row.noise;
@@ -266,7 +276,7 @@ impl Suspicions {
         }
     }
 
-    /// The place of a source among those that are followed.
+    /// Index of a source among the followed ones.
     fn slot(&mut self, source: usize) -> Option<usize> {
         let source = u16::try_from(source).ok()?;
         let place = self.followed.iter().position(|known| known.is_none_or(|known| known == source))?;
@@ -274,7 +284,9 @@ impl Suspicions {
         Some(place)
     }
 
-    /// Compares a reading with what the other sources of its kind would have read, and itself the other way round.
+    /// Compares a reading with the predictions for other mounts.
+    ///
+    /// These are the mounts of other sources of its kind, and its own mount turned round.
     fn compare(
         &mut self,
         state: &State,
@@ -406,19 +418,19 @@ fn info(sources: &[Option<Source>], number: usize) -> Option<&SensorInfo> {
     sources.get(number)?.as_ref().map(|source| &source.sensor)
 }
 
-/// The axes about which a mount is pitched and yawed, in the body's frame.
+/// Axes about which a mount is pitched and yawed, in the body frame.
 fn tilt_axes(mount: &Rot<Body, Sensor>) -> [Vec3<Body>; 2] {
     let ahead = *mount * Vec3::<Sensor>::new(1.0, 0.0, 0.0);
     let level = math::hypot(ahead.x(), ahead.y()).max(f64::MIN_POSITIVE);
     [Vec3::new(-ahead.y() / level, ahead.x() / level, 0.0), Vec3::new(0.0, 0.0, 1.0)]
 }
 
-/// Half a turn about a sensor's own vertical.
+/// Half a turn about the sensor's own vertical axis.
 fn round() -> Rot<Sensor, Sensor> {
     Rot::from_roll_pitch_yaw(0.0, 0.0, math::PI)
 }
 
-/// What a reading of a source that sits so has measured; `None` without a range.
+/// Interprets a reading of a source with this mount; `None` without a range.
 fn look(info: &SensorInfo, design: &Design<'_>, reading: &Reading) -> Option<Look> {
     let Design { site, settings, unit_at, .. } = design;
     let (along, range_m, first_rad, unsure_rad, sd_m) = match (info.kind, reading) {
@@ -466,7 +478,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn heads_that_sit_otherwise_have_an_angle_and_only_those() {
+    fn only_misaligned_heads_have_an_angle() {
         for by_rad in [0.05, -0.02] {
             for setting in
                 [Setting::HeadTurned(by_rad), Setting::HeadPitched(by_rad), Setting::HeadYawed(by_rad)]

@@ -1,27 +1,31 @@
-//! Sums by which a head is found whose axis leans: it is yawed or pitched on its mount.
+//! Sums that detect a head with a tilted axis: one that is yawed or pitched on its mount.
 //!
-//! A beam that leans along the tunnel is longer whichever way it leans, by about the square of the lean. A head's own lean shows
-//! therefore as a share of the vehicle's: where that turns to one side its ranges are too long, and too short where it turns to the
-//! other. What they are too long all the time may as well be the wall's shape, and is left out. Derivation: `docs/why/navigation.md`,
-//! "Settings in doubt".
+//! A beam that leans along the tunnel is longer in either direction, by about the square of the lean. So a head's own
+//! lean shows as an asymmetry. Its ranges are too long while the vehicle turns to one side, and too short while it
+//! turns to the other. A constant excess may as well be the wall's shape, and is eliminated. Derivation:
+//! `docs/why/navigation.md`, "Settings in doubt".
 
 use serde::{Deserialize, Serialize};
 
 use super::evidence::{FEWEST_BLOCKS, POSE, SURE, dot, solved};
 use headrace_geometry::math;
 
-/// Share of the weight that is left where what is there all the time is left out: the vehicle has turned to and fro.
+/// Minimum share of the weight after the constant part is eliminated.
+///
+/// Less means that the vehicle has not turned to and fro enough.
 const LEAST_LEFT: f64 = 0.05;
 
-/// Standard deviations by the noise of ranges that the least tilt told must be.
+/// Minimum significance of the smallest reported tilt, in standard deviations by range noise.
 const SHOWS: f64 = 3.0;
-/// Beyond this no small change describes it, radians.
+/// Largest tilt for which the linear model holds, radians.
 const MOST_RAD: f64 = 0.3;
 
-/// Places of the sums: of the pattern's square, of pattern and derivative, of the derivative's square, of each with residuals.
+/// Number of sums.
+///
+/// They are pattern squared, pattern times derivative, derivative squared, and each with the residuals.
 const SUMS: usize = 5;
 
-/// Sums of a head and an axis within a spell, beside those of the vehicle's pose.
+/// Sums of one head and axis within a spell, next to those of the vehicle's pose.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub(super) struct TiltLine {
     pattern_by_pose: [f64; POSE],
@@ -29,7 +33,7 @@ pub(super) struct TiltLine {
     sums: [f64; SUMS],
 }
 
-/// The same over blocks, freed of the vehicle's pose, and their second moments.
+/// The same over blocks after the vehicle's pose is eliminated, with their second moments.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub(super) struct TiltFit {
     blocks: u32,
@@ -38,7 +42,7 @@ pub(super) struct TiltFit {
 }
 
 impl TiltLine {
-    /// Adds a reading: its derivatives by pose, and by the tilt and by half of the tilt's square at no lean.
+    /// Adds a reading: its derivatives by pose, by the tilt, and by half of the tilt's square at zero lean.
     pub(super) fn add(
         &mut self,
         by_pose: [f64; POSE],
@@ -65,7 +69,9 @@ impl TiltLine {
         }
     }
 
-    /// The sums freed of the vehicle's pose, of which `residuals` are the residuals' sums and `factor` the information's factor.
+    /// Returns the sums after the pose is eliminated.
+    ///
+    /// `residuals` are the sums of residuals by pose, and `factor` is the factor of the pose information.
     pub(super) fn freed(&self, residuals: [f64; POSE], factor: &[[f64; POSE]; POSE]) -> [f64; SUMS] {
         let [pattern, tilt, residuals] =
             [self.pattern_by_pose, self.tilt_by_pose, residuals].map(|sums| solved(factor, sums));
@@ -101,7 +107,9 @@ impl TiltFit {
         }
     }
 
-    /// The tilt, radians, and its weight, freed of what is there all the time; `None` where the vehicle hasn't turned enough.
+    /// Returns the tilt, radians, and its weight, without the constant part.
+    ///
+    /// `None` if the vehicle has not turned enough.
     fn estimate(&self) -> Option<(f64, f64)> {
         let [pattern_2, both, tilt_2, pattern_off, tilt_off] = self.sums;
         if self.blocks < FEWEST_BLOCKS || pattern_2 <= 0.0 {
@@ -112,9 +120,10 @@ impl TiltFit {
         (weight > LEAST_LEFT * tilt_2).then(|| ((tilt_off - share * pattern_off) / weight, weight))
     }
 
-    /// The tilt where it is certainly beyond this, radians, and its standard deviations from zero: by the scatter of the blocks, and no
-    /// fewer than the noise of ranges leaves, of whose declared variance the head shows `level`. `None` where declared noise
-    /// would show no such tilt, and where there is more than a tilt.
+    /// Returns the tilt if it certainly exceeds `least_rad`, and its distance from zero in standard deviations.
+    ///
+    /// The standard deviation is the scatter of blocks, at least that of range noise at the observed `level` of the
+    /// declared variance. `None` if declared noise would hide such a tilt, or if the residuals show more than a tilt.
     pub(super) fn certain(&self, least_rad: f64, level: f64) -> Option<(f64, f64)> {
         let (tilt_rad, weight) = self.estimate()?;
         if weight * least_rad * least_rad < SHOWS * SHOWS {
@@ -123,7 +132,7 @@ impl TiltFit {
         let [pattern_2, both, _, pattern_off, _] = self.sums;
         let share = both / pattern_2;
         let steady = (pattern_off - tilt_rad * both) / pattern_2;
-        // What a block's sums leave, linear in them.
+        // Remainder of a block's sums, linear in them.
         let left = [share * steady, share * tilt_rad - steady, -tilt_rad, -share, 1.0];
         let scatter = self.squares.iter().zip(left).map(|(line, a)| a * dot(line, &left)).sum::<f64>();
         let n = f64::from(self.blocks);
@@ -132,7 +141,7 @@ impl TiltFit {
         ((least_rad..MOST_RAD).contains(&tilt_rad.abs()) && sure_sd >= SURE).then_some((tilt_rad, sure_sd))
     }
 
-    /// Sum of normalised squares that it explains.
+    /// Sum of normalised squares that the tilt explains.
     pub(super) fn explains(&self) -> f64 {
         self.estimate().map_or(0.0, |(tilt_rad, weight)| tilt_rad * tilt_rad * weight)
     }
@@ -144,7 +153,8 @@ mod tests {
 
     const NOISE_M: f64 = 0.01;
 
-    /// Readings of a head that leans by `tilt_rad` on a wall that is off by `steady` of the pattern: pattern, derivative, residual, by block.
+    /// Readings of a head with `tilt_rad` on a wall that is off by `steady` of the pattern: pattern, derivative,
+    /// residual, by block.
     fn blocks(tilt_rad: f64, steady: f64) -> Vec<Vec<[f64; 3]>> {
         let mut seed = 5_u64;
         let mut draw = || {
@@ -175,9 +185,9 @@ mod tests {
         fit
     }
 
-    /// Against least squares by the readings themselves, for two unknowns by Cramer's rule.
+    /// Comparison with least squares over the readings themselves, for two unknowns by Cramer's rule.
     #[test]
-    fn a_tilt_is_that_of_least_squares_and_as_sure_as_its_blocks_scatter() {
+    fn tilt_equals_least_squares_with_the_certainty_of_its_blocks() {
         let weight = 1.0 / (NOISE_M * NOISE_M);
         let square = |x: f64| x * x;
         for (tilt_rad, steady) in [(0.05, 0.02), (-0.08, -0.1), (0.2, 0.3)] {
@@ -188,7 +198,7 @@ mod tests {
             let whole = pp * tt - pt * pt;
             let (found_rad, found_steady) = ((pp * to - pt * po) / whole, (tt * po - pt * to) / whole);
             let fit = fit(&blocks);
-            // What a tilt explains is what squares are left without it, less those with it.
+            // The tilt explains the difference between the squares left without it and with it.
             let left = |tilt: f64, steady: f64| sum(&|r| square(r[2] - tilt * r[1] - steady * r[0]));
             let explained = left(0.0, po / pp) - left(found_rad, found_steady);
             assert!((fit.explains() / explained - 1.0).abs() < 1e-6, "{} {explained}", fit.explains());
@@ -208,8 +218,12 @@ mod tests {
                 "{sure_sd} {found_rad} {sd_rad}"
             );
         }
-        assert_eq!(fit(&blocks(0.005, 0.02)).certain(0.01, 1.0), None, "less than is asked for");
-        // Ranges that scatter less than declared are as sure as they scatter, and by their noise at most.
+        assert_eq!(
+            fit(&blocks(0.005, 0.02)).certain(0.01, 1.0),
+            None,
+            "a tilt below the limit is not reported"
+        );
+        // Certainty follows the scatter of ranges if that is below the declared one, but is limited by their noise.
         let sure_sd = |level: f64| fit(&blocks(0.05, 0.0)).certain(0.01, level).unwrap().1;
         assert!(
             (sure_sd(100.0) / sure_sd(400.0) - 2.0).abs() < 1e-9,

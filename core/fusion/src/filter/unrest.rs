@@ -1,8 +1,8 @@
-//! How much more the biases of an inertial unit wander than is declared, learnt from the corrections that they get.
+//! Excess drift of inertial biases over the declared one, learnt from their corrections.
 //!
-//! A measurement corrects a bias by its gain times the innovation, whose mean square is the gain squared times the innovation's
-//! variance. Where corrections are larger than that, the bias moves more than the filter believes. Derivation:
-//! `docs/why/navigation.md`, "Noise that is learnt".
+//! A measurement corrects a bias by its gain times the innovation. The expected square of that is the gain squared
+//! times the innovation's variance. If corrections are larger, the bias drifts more than the filter assumes.
+//! Derivation: `docs/why/navigation.md`, "Noise that is learnt".
 
 use serde::{Deserialize, Serialize};
 
@@ -11,25 +11,25 @@ use headrace_geometry::math;
 
 /// Averaging time of the ratio, s.
 const MEMORY_S: f64 = 10.0;
-/// Mean ratio above which the noise is raised, and how fast: by this power of the ratio in a second.
+/// Mean ratio above which the noise is raised, and the power of the ratio by which it rises per second.
 const TOO_LARGE: f64 = 1.1;
 const RAISES_PER_S: f64 = 2.0;
-/// Mean ratio below which a raised noise falls back, and the time over which it does, s.
+/// Mean ratio below which a raised noise decays, and the time constant of the decay, s.
 const SMALL: f64 = 0.7;
 const FALLS_OVER_S: f64 = 20.0;
-/// Factor at first: a unit is taken to be restless until it has shown otherwise.
+/// Initial factor: a unit counts as restless until its readings show otherwise.
 const AT_FIRST: f64 = 1e3;
-/// Wandering of the worst unit allowed for, per root of a second: 0.3 degrees/s and 50 mm/s^2 in 300 s.
+/// Random walk of the worst unit allowed for, per root of a second: 0.3 degrees/s and 50 mm/s^2 in 300 s.
 const MOST_RATE: f64 = 4.3e-4;
 const MOST_FORCE: f64 = 4.1e-3;
 
-/// See the module's description: gyros, accelerometers.
+/// Factors for gyros and accelerometers.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Unrest([Ratio; 2]);
 
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 struct Ratio {
-    /// Sums of squared corrections, and of what they should be, fading.
+    /// Decaying sums of squared corrections and of their expected values.
     corrected: f64,
     expected: f64,
     factor: f64,
@@ -41,15 +41,17 @@ impl Default for Unrest {
     }
 }
 
-/// Largest factor for a process: what makes it as restless as the worst unit.
+/// Largest factor for a process, which makes it as restless as the worst unit.
 fn most(wander: Wander, worst: f64) -> f64 {
     let density = wander.density();
     (worst * worst / density).max(1.0)
 }
 
 impl Unrest {
-    /// Notes a correction: the biases' covariances with the innovation, gyros' and accelerometers', the innovation's variance,
-    /// and its normalised square.
+    /// Notes a correction.
+    ///
+    /// Inputs: the covariances of gyro and accelerometer biases with the innovation, the innovation's variance, and
+    /// its normalised square.
     pub fn note(&mut self, covariances: [[f64; 3]; 2], variance: f64, nis: f64) {
         for (ratio, covariances) in self.0.iter_mut().zip(covariances) {
             // (P h / s)^2 s, summed over the axes.

@@ -1,4 +1,6 @@
-//! Reordering window: readings wait until all of their time have come, and are fused in order of validity.
+//! Reordering window that releases readings in order of validity.
+//!
+//! Readings wait until all readings of their time have arrived.
 
 use serde::{Deserialize, Serialize};
 
@@ -8,14 +10,16 @@ use headrace_geometry::snapshot::stateful;
 use headrace_geometry::time::{DurNs, MonoNs};
 use headrace_sensor::reading::Reading;
 
-/// Room for waiting readings; four heads, four sounders and the rest have a tenth of it in a window.
+/// Capacity for waiting readings. Four heads, four echosounders and the other sensors need a tenth of it.
 const MOST: usize = 1024;
-/// Room for samples of inertial units.
+/// Capacity for samples of inertial units.
 const MOST_FELT: usize = 1024;
 /// Longest interval for which an inertial sample is valid.
 const SPEAKS_FOR: DurNs = DurNs(100_000_000);
-/// Samples nearer than this are merged: rate and force of one, or several that came in one burst, of which the mean counts for all the
-/// time since the one before.
+/// Time within which samples are merged into their mean.
+///
+/// They are rate and force of one sample, or several samples of one burst. The mean of a burst covers all the time
+/// since the sample before it.
 const SAME: DurNs = DurNs(500_000);
 
 /// A waiting reading.
@@ -23,13 +27,13 @@ const SAME: DurNs = DurNs(500_000);
 pub struct Waiting {
     /// Time of validity.
     pub at: MonoNs,
-    /// Its source.
+    /// Number of its source.
     pub source: usize,
     /// The reading.
     pub reading: Reading,
 }
 
-/// Samples of one time: their means, and how many rates and forces these are of.
+/// Means of the samples at one time, and their numbers of rates and forces.
 #[derive(Debug, Clone, Copy, Serialize, Deserialize)]
 struct FeltAt {
     at: MonoNs,
@@ -37,12 +41,12 @@ struct FeltAt {
     counts: [u32; 2],
 }
 
-/// Readings in order of validity; those of the same time in order of arrival.
+/// Readings in order of validity; readings of the same time in order of arrival.
 #[derive(Debug, Clone)]
 pub struct Window {
     waiting: Vec<Waiting>,
     felt: Vec<FeltAt>,
-    /// The last implausible force that may have been true, and the speed that it would have carried, m/s.
+    /// Time of the last implausible force that may have been real, and its speed change, m/s.
     jolt: Option<(MonoNs, f64)>,
 }
 
@@ -55,7 +59,7 @@ impl Default for Window {
 }
 
 impl Window {
-    /// Inserts a reading in order; false when there is no room.
+    /// Inserts a reading in order; returns false if there is no room.
     pub fn take(&mut self, reading: Waiting) -> bool {
         if self.waiting.len() == MOST {
             return false;
@@ -65,21 +69,21 @@ impl Window {
         true
     }
 
-    /// Notes a turn rate; false when there is no room.
+    /// Adds a turn rate; returns false if there is no room.
     pub fn take_rate(&mut self, at: MonoNs, rate_radps: Vec3<Body>) -> bool {
         self.felt_at(at)
             .map(|FeltAt { felt, counts: [of, _], .. }| take_mean(&mut felt.rate_radps, of, rate_radps))
             .is_some()
     }
 
-    /// Notes a specific force; false when there is no room.
+    /// Adds a specific force; returns false if there is no room.
     pub fn take_force(&mut self, at: MonoNs, force_mps2: Vec3<Body>) -> bool {
         self.felt_at(at)
             .map(|FeltAt { felt, counts: [_, of], .. }| take_mean(&mut felt.force_mps2, of, force_mps2))
             .is_some()
     }
 
-    /// Notes a force that isn't used, m/s^2: the speed that it may have carried over the time since the sample before.
+    /// Notes a rejected force, m/s^2, and its speed change over the time since the previous sample.
     pub fn take_jolt(&mut self, at: MonoNs, force_mps2: f64) {
         let before = self.felt.iter().rev().map(|felt| felt.at).find(|felt| *felt < at);
         let lasted = before.map_or(SPEAKS_FOR, |before| at.since(before).min(SPEAKS_FOR));
@@ -87,12 +91,12 @@ impl Window {
         self.jolt = Some((at, carried_mps + force_mps2 * lasted.as_secs_f64()));
     }
 
-    /// Speed that implausible forces up to a time may have carried, m/s; returned once.
+    /// Takes the speed change of implausible forces up to a time, m/s.
     pub fn jolted(&mut self, until: MonoNs) -> f64 {
         self.jolt.take_if(|(at, _)| *at <= until).map_or(0.0, |(_, speed_mps)| speed_mps)
     }
 
-    /// Speed that implausible forces may have carried, m/s, and since when, of those that aren't fused yet.
+    /// Returns time and speed change, m/s, of implausible forces that are not fused yet.
     pub fn jolt(&self) -> Option<(MonoNs, f64)> {
         self.jolt
     }
@@ -110,8 +114,9 @@ impl Window {
         self.felt.get_mut(place)
     }
 
-    /// Inertial data from `from` on, and the end of its validity, `until` at the latest: a sample is the mean over the time
-    /// before it.
+    /// Returns the inertial data valid from `from` on, and the end of their validity, at most `until`.
+    ///
+    /// A sample is the mean over the time before it.
     pub fn felt(&self, from: MonoNs, until: MonoNs) -> (Felt, MonoNs) {
         let next = self.felt.partition_point(|felt| felt.at <= from);
         let speaking = |number: Option<usize>| {
@@ -126,7 +131,7 @@ impl Window {
                 return (Felt { rate_radps: None, force_mps2: None }, later.clamp(from + DurNs(1), until));
             }
         };
-        // For a unit that sends rates and forces alternately: the nearest of each.
+        // A unit may send rates and forces alternately; the nearest of each is used.
         let near = |pick: fn(&Felt) -> Option<Vec3<Body>>| {
             pick(&sample).or_else(|| {
                 let around = [Some(next + 1), next.checked_sub(1), next.checked_sub(2)];
@@ -175,7 +180,7 @@ impl Window {
     }
 }
 
-/// Takes one more into a mean of so many.
+/// Adds one more value to a running mean.
 fn take_mean(mean: &mut Option<Vec3<Body>>, of: &mut u32, value: Vec3<Body>) {
     *of = of.saturating_add(1);
     *mean = Some(mean.map_or(value, |mean| mean + (value + -mean).scaled(1.0 / f64::from(*of))));

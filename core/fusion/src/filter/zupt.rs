@@ -1,4 +1,6 @@
-//! Zero-velocity (ZUPT) detector: a vehicle at rest on deck or on the ground. Its gyros then show their bias.
+//! Detection of zero velocity (ZUPT).
+//!
+//! The gyros of a vehicle at rest on deck or on the ground show their bias.
 
 use serde::{Deserialize, Serialize};
 
@@ -7,24 +9,26 @@ use headrace_geometry::time::{DurNs, MonoNs};
 use headrace_sensor::device::SensorKind;
 use headrace_sensor::reading::Reading;
 
-/// Averaging window; a floating vehicle never stays steady for `MEANS` windows.
+/// Averaging window. A floating vehicle never stays steady for `MEANS` windows.
 const MEAN_OVER: DurNs = DurNs(1_000_000_000);
 const MEANS: u32 = 5;
-/// How many means at rest make the bias known.
+/// Number of means at rest after which the bias is known.
 const ENOUGH: u32 = 25;
-/// Seconds after which one that stands and isn't at rest floats.
+/// Seconds after which a stationary vehicle that is not at rest counts as floating.
 const FLOATS: u32 = 15;
-/// How long a vehicle is asked to stand from the first estimate on.
+/// Time after the first estimate during which the pilot is asked to keep the vehicle still.
 const ASKS_FOR: DurNs = DurNs(60_000_000_000);
-/// Pauses of the cable that are remembered, and how many times the longest of them it must have stood: who winds it in by half metres
-/// lets it stand between them while the vehicle goes on.
+/// Number of remembered pauses of the cable.
+///
+/// The cable counts as at rest after a multiple of the longest pause. A winch operator who winds by half metres
+/// leaves the cable stationary between pulls while the vehicle moves on.
 const PAUSES: usize = 4;
 const PAUSES_TO_REST: u64 = 2;
-/// Largest difference between means of turn rate and specific force at rest, rad/s and m/s^2.
+/// Largest difference between means at rest: turn rate, rad/s, and specific force, m/s^2.
 const SAME_RATE: f64 = 1e-3;
 const SAME_FORCE: f64 = 0.02;
 
-/// See the module's description.
+/// Detector of a vehicle at rest.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct Stillness {
     rate: Means,
@@ -32,20 +36,20 @@ pub struct Stillness {
     cable_m: Option<f64>,
     cable_still: bool,
     cable_at: MonoNs,
-    /// When it last moved, and how long it had stood the last times before, the latest last.
+    /// Time of the cable's last movement, and the lengths of the pauses before it, the latest last.
     cable_moved_at: Option<MonoNs>,
     pauses: [DurNs; PAUSES],
-    /// Means taken at rest.
+    /// Number of means taken at rest.
     rested: u32,
-    /// Seconds for which the cable has stood without the vehicle being at rest.
+    /// Seconds for which the cable has been stationary without the vehicle being at rest.
     floated: u32,
-    /// It has stood for long without being at rest, and not been at rest since.
+    /// Whether the vehicle floats: stationary for long without being at rest, and not at rest since.
     floats: bool,
-    /// When the first estimate began.
+    /// Start of the first estimate.
     asks_from: Option<MonoNs>,
 }
 
-/// Means of successive windows, compared with the first of a steady run.
+/// Means of successive windows, each compared with the first of a steady run.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 struct Means {
     since: Option<MonoNs>,
@@ -53,12 +57,12 @@ struct Means {
     count: f64,
     first: Option<[f64; 3]>,
     alike: u32,
-    /// The latest mean, until it is taken.
+    /// Latest mean, until it is taken.
     latest: Option<[f64; 3]>,
 }
 
 impl Means {
-    /// Takes a value; whether a window ended with it.
+    /// Adds a value; returns whether a window ended with it.
     fn take(&mut self, at: MonoNs, value: [f64; 3], same: f64) -> bool {
         let since = *self.since.get_or_insert(at);
         let ends = at.since(since).0 >= MEAN_OVER.0;
@@ -80,12 +84,12 @@ impl Means {
 }
 
 impl Stillness {
-    /// Takes a reading.
+    /// Processes a reading.
     pub fn take(&mut self, at: MonoNs, kind: SensorKind, reading: &Reading) {
         match (kind, reading) {
             (SensorKind::Imu, Reading::AngularRate(rate)) => {
                 if at.since(self.cable_at).0 > MEAN_OVER.0 {
-                    // A counter that says nothing doesn't say that the cable is still.
+                    // A silent counter is no evidence that the cable is stationary.
                     self.moved();
                 }
                 let ended = self.rate.take(at, [rate.x(), rate.y(), rate.z()], SAME_RATE);
@@ -126,7 +130,7 @@ impl Stillness {
         }
     }
 
-    /// Whether the cable has stood for much longer than it did the last times before it moved on.
+    /// Whether the cable has been stationary for much longer than in its recent pauses.
     fn cable_rests(&self) -> bool {
         let longest = self.pauses.iter().map(|pause| pause.0.unsigned_abs()).max().unwrap_or(0);
         self.cable_moved_at.is_none_or(|moved_at| {
@@ -134,26 +138,27 @@ impl Stillness {
         })
     }
 
-    /// Whether gyros and accelerometers have been steady for long, and the cable hasn't moved for as long, nor only paused.
+    /// Whether gyros and accelerometers have been steady for long, and the cable has been at rest for as long.
     pub fn is_still(&self) -> bool {
         self.rate.alike >= MEANS && self.force.alike >= MEANS && self.cable_still && self.cable_rests()
     }
 
-    /// Mean turn rate of the last window at rest, rad/s; returned once.
+    /// Takes the mean turn rate of the last window at rest, rad/s.
     pub fn take_mean_rate(&mut self) -> Option<Vec3<Sensor>> {
         let [x, y, z] = self.rate.latest.take()?;
         self.rested = self.rested.saturating_add(1);
         Some(Vec3::new(x, y, z))
     }
 
-    /// Notes that an estimate begins.
+    /// Notes the start of an estimate.
     pub fn ask_from(&mut self, at: MonoNs) {
         self.asks_from.get_or_insert(at);
     }
 
-    /// How much longer the vehicle should stand until its gyros' bias is as well known as that makes it, s; 0 of one that floats, or
-    /// whose unit is too noisy: standing as still as it can, it isn't at rest. It is asked at the dive's beginning only: later, what
-    /// makes passes unsure is seldom the gyros.
+    /// Returns how much longer the vehicle should stand still for its gyro bias to become known, s.
+    ///
+    /// 0 for a vehicle that floats or has too noisy a unit: even when stationary, it is not at rest. 0 later in a
+    /// dive, too, because uncertain passes then seldom come from the gyros.
     pub fn lacking_s(&self, now: MonoNs) -> u32 {
         let lacking = ENOUGH.saturating_sub(self.rested);
         let begins = self.asks_from.is_some_and(|from| (0..ASKS_FOR.0).contains(&now.since(from).0));
@@ -190,24 +195,22 @@ mod tests {
     }
 
     #[test]
-    fn a_vehicle_on_deck_rests_and_one_that_floats_does_not() {
-        assert!(still(|_| 0.003, |_| Some(0.0)), "biases and noise aren't motion");
+    fn vehicle_on_deck_is_at_rest_and_floating_one_is_not() {
+        assert!(still(|_| 0.003, |_| Some(0.0)), "biases and noise are no motion");
         assert!(!still(|t| 0.01 * math::sin(t / 2.0), |_| Some(0.0)), "it turns to and fro");
         assert!(!still(|_| 0.0, |t| Some(0.05 * t)), "the cable runs");
-        assert!(
-            !still(|_| 0.0, |t| (t < 5.0).then_some(0.0)),
-            "nothing is known of the cable since it fell silent"
-        );
+        assert!(!still(|_| 0.0, |t| (t < 5.0).then_some(0.0)), "the counter fell silent");
         assert!(
             still(|_| 0.0, |t| (!(2.0..5.0).contains(&t)).then_some(0.0)),
-            "it speaks again, and is still"
+            "the counter returned and is still"
         );
     }
 
-    /// A cable wound in by half metres stands for longer than the means take, and the vehicle goes on meanwhile; it is at rest once the
-    /// cable has stood for twice as long as it did between the last pulls.
+    /// A cable wound in by half metres pauses for longer than the means take, and the vehicle moves on meanwhile.
+    ///
+    /// The vehicle is at rest once the cable has been stationary for twice as long as between the last pulls.
     #[test]
-    fn a_cable_wound_in_by_pulls_is_no_vehicle_at_rest() {
+    fn cable_wound_in_by_pulls_is_not_at_rest() {
         let pulled = |speed_mps: f64, t: f64| 0.5 * math::floor_to_i64(2.0 * speed_mps * t) as f64;
         let mut stillness = Stillness::default();
         let mut rested_s = 0_u32;
@@ -215,7 +218,7 @@ mod tests {
             let (at, t) = (MonoNs(u64::from(k) * 10_000_000), f64::from(k) / 100.0);
             stillness.take(at, SensorKind::Imu, &Reading::AngularRate(Vec3::zero()));
             stillness.take(at, SensorKind::Imu, &Reading::SpecificForce(Vec3::new(0.0, 0.0, 9.8)));
-            // A pull every 7 s until 63 s have gone.
+            // One pull every 7 s for 63 s.
             let length_m = pulled(0.5 / 7.0, t.min(63.5));
             let length = TetherLength { length_m, resolution_m: 0.001, restart: None };
             stillness.take(
@@ -226,11 +229,11 @@ mod tests {
             rested_s =
                 rested_s.max(if stillness.is_still() && (14.0..76.0).contains(&t) { k / 100 } else { 0 });
         }
-        assert_eq!(rested_s, 0, "it went on");
-        assert!(stillness.is_still(), "the cable has stood for 27 s");
+        assert_eq!(rested_s, 0, "the vehicle moved on");
+        assert!(stillness.is_still(), "the cable has been stationary for 27 s");
     }
 
-    /// Seconds asked for after so long: while turned like this, with a cable of this length.
+    /// Seconds still required at `end_s`, with this turn rate and cable length.
     fn lacking_s(rate: impl Fn(f64) -> f64, way_m: impl Fn(f64) -> f64, end_s: u32) -> u32 {
         let mut stillness = Stillness::default();
         stillness.ask_from(MonoNs(0));
@@ -249,19 +252,19 @@ mod tests {
     }
 
     #[test]
-    fn who_floats_is_not_asked_to_stand_again_and_again() {
+    fn floating_vehicle_is_not_asked_to_stand_still_again() {
         let sways = |t: f64| 0.01 * math::sin(t / 2.0);
         let set_off = |t: f64| (t - 40.0).max(0.0) * 0.1;
-        assert_eq!(lacking_s(|_| 0.0, |_| 0.0, 35), 0, "it has stood");
-        assert_eq!(lacking_s(|_| 0.0, |t| 0.1 * t, 35), 30, "it has only gone on");
+        assert_eq!(lacking_s(|_| 0.0, |_| 0.0, 35), 0, "it has stood still");
+        assert_eq!(lacking_s(|_| 0.0, |t| 0.1 * t, 35), 30, "it has only moved on");
         assert_eq!(lacking_s(sways, |_| 0.0, 10), 30, "it may yet come to rest");
-        assert_eq!(lacking_s(sways, |_| 0.0, 35), 0, "it floats");
-        assert_eq!(lacking_s(sways, set_off, 55), 0, "it has floated");
+        assert_eq!(lacking_s(sways, |_| 0.0, 35), 0, "it is floating");
+        assert_eq!(lacking_s(sways, set_off, 55), 0, "it was floating before");
         let lands = |t: f64| if t < 30.0 { sways(t) } else { 0.0 };
-        assert!((15..30).contains(&lacking_s(lands, |_| 0.0, 45)), "it stands now");
-        // Slow, on a coarse counter that stands between its steps, it goes on.
+        assert!((15..30).contains(&lacking_s(lands, |_| 0.0, 45)), "it now stands still");
+        // A slow vehicle moves on, with a coarse counter that pauses between its steps.
         assert_eq!(lacking_s(sways, |t| math::floor_to_i64(2.0 * t) as f64 * 0.01, 55), 30);
-        assert_eq!(lacking_s(|_| 0.0, |t| 0.1 * t, 61), 0, "it has set out");
+        assert_eq!(lacking_s(|_| 0.0, |t| 0.1 * t, 61), 0, "the dive is under way");
         let mut set_back = Stillness::default();
         set_back.ask_from(MonoNs(3_600_000_000_000));
         assert_eq!(set_back.lacking_s(MonoNs(0)), 0, "the clock was set back by an hour");

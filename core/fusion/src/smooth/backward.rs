@@ -1,4 +1,4 @@
-//! Backward pass over a dive: each estimate of the filter is corrected by the measurements after it.
+//! Backward pass over a dive: corrects each estimate of the filter by the measurements after it.
 
 use super::relative_backward::Later;
 use super::rts_step::Gain;
@@ -18,23 +18,23 @@ pub struct Estimate {
     pub at: MonoNs,
     /// The smoothed state.
     pub state: State,
-    /// The covariance of its errors.
+    /// Covariance of its errors.
     pub factors: Factors<ERRORS>,
 }
 
-/// Processes the filter's steps from the last to the first, and builds a track from them.
+/// Processes the filter's steps from last to first and builds a track from them.
 pub struct Backward {
     settings: Settings,
     now: Option<(u32, Estimate)>,
     later: Later,
-    /// In reverse order, as are their points.
+    /// In reverse order, like their points.
     pieces: Vec<Piece>,
     points: Vec<Point>,
     relatives: Vec<(MonoNs, Relative)>,
 }
 
 impl Backward {
-    /// With the settings of the filter.
+    /// Creates it with the settings of the filter.
     pub fn new(settings: Settings) -> Self {
         Self {
             settings,
@@ -46,15 +46,15 @@ impl Backward {
         }
     }
 
-    /// Takes the step before the one taken last.
+    /// Processes the step before the one processed last.
     ///
-    /// Allocates: its point of the track.
+    /// Allocates: the step's point of the track.
     pub fn take(&mut self, placed: &Placed) {
         let step = &placed.step;
         let after = self.now.filter(|(piece, _)| *piece == placed.piece).map(|(_, after)| after);
         let smoothed = after.and_then(|after| self.smooth(step, &after));
         let now = smoothed.unwrap_or_else(|| {
-            // No later information: the filter's estimate stands.
+            // There is no later information: the filter's estimate is kept.
             self.end_piece();
             self.pieces.push(Piece::begin(placed, self.points.len(), self.relatives.len()));
             Estimate { at: step.at, state: step.state, factors: step.factors }
@@ -70,18 +70,20 @@ impl Backward {
         self.now = Some((placed.piece, now));
     }
 
-    /// The estimate smoothed last, the earliest in time so far.
+    /// Returns the estimate smoothed last, which is the earliest in time so far.
     pub fn now(&self) -> Option<&Estimate> {
         self.now.as_ref().map(|(_, now)| now)
     }
 
-    /// The track of all steps.
+    /// Returns the track of all steps.
     pub fn finish(mut self) -> Track {
         self.end_piece();
         Track::of_reversed(self.pieces, self.points, self.relatives, self.settings.epoch)
     }
 
-    /// Smoothed estimate at the step's beginning, from that at its end; `None` if it isn't finite.
+    /// Smooths the estimate at the step's beginning from the one at its end.
+    ///
+    /// `None` if the result is not finite.
     fn smooth(&mut self, step: &Step, after: &Estimate) -> Option<Estimate> {
         if matches!(step.by, Move::End) {
             return None;

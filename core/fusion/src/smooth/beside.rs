@@ -1,8 +1,8 @@
-//! The filter whose steps are smoothed, beside the filter that navigates.
+//! A second filter beside the navigating one, whose steps are smoothed.
 //!
-//! A Rauch-Tung-Striebel smoother holds for best gains alone. The navigating filter takes walls in part, which forgets on purpose what
-//! its covariance relates: going backwards, errors then grow without bound. So steps are recorded by a filter of its own, which hears the
-//! same and takes walls whole.
+//! A Rauch-Tung-Striebel smoother is valid for optimal gains only. The navigating filter applies wall measurements in
+//! part and so discards some correlation on purpose; a backward pass over its steps would diverge. The second filter
+//! gets the same readings, applies wall measurements in full and records the steps.
 
 use super::journal::Journal;
 use crate::filter::FilterNavigation;
@@ -19,7 +19,9 @@ use headrace_geometry::tunnel::Profile;
 use headrace_sensor::device::SensorInfo;
 use headrace_sensor::reading::Reading;
 
-/// The filter with a smoother's beside it. Fixes and all else that it tells are bit for bit those of the filter alone.
+/// The navigating filter together with the recorded one.
+///
+/// Its fixes and all other outputs equal those of the navigating filter alone, bit for bit.
 pub struct BesideNavigation {
     navigating: FilterNavigation,
     recorded: FilterNavigation,
@@ -27,14 +29,14 @@ pub struct BesideNavigation {
 
 stateful!(BesideNavigation { state: navigating, recorded; });
 
-/// The filter to smooth: with best gains, its steps written to a journal.
+/// Creates the filter to smooth: it uses optimal gains and writes its steps to a journal.
 pub fn smoothable(profile: Profile, site: Site, settings: Settings, journal: Journal) -> FilterNavigation {
     let settings = Settings { wall_share: 1.0, ..settings };
     FilterNavigation::new(profile, site, settings).with_journal(journal)
 }
 
 impl BesideNavigation {
-    /// Without readings yet.
+    /// Creates both filters without readings.
     pub fn new(profile: Profile, site: Site, settings: Settings, journal: Journal) -> Self {
         Self {
             navigating: FilterNavigation::new(profile.clone(), site, settings),

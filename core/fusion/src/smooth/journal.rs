@@ -1,4 +1,4 @@
-//! Output queue of the filter's steps: bounded, and drained between ticks by the recorder.
+//! Bounded output queue of the filter's steps; the recorder drains it between ticks.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -28,7 +28,7 @@ struct Shared {
 }
 
 impl Journal {
-    /// A queue with room for `capacity` records, and its reading end.
+    /// Creates a queue for `capacity` records; returns both ends.
     ///
     /// Allocates: all of it.
     pub fn new(capacity: usize) -> (Self, JournalReader) {
@@ -37,17 +37,20 @@ impl Journal {
         (Self { queue: Arc::clone(&queue), piece: 0, clock: 0 }, JournalReader { queue })
     }
 
-    /// Begins a new piece at a new first estimate, unrelated to what was before.
+    /// Begins a new piece with a first estimate that is unrelated to the earlier ones.
     pub fn begin(&mut self) {
         self.piece = self.piece.saturating_add(1);
     }
 
-    /// The clock has been set back.
+    /// Notes that the clock has been set back.
     pub fn clock_set(&mut self) {
         self.clock = self.clock.saturating_add(1);
     }
 
-    /// Writes a step. One that isn't sound, or finds the queue full, breaks the track: no later one can correct those before.
+    /// Writes a step.
+    ///
+    /// A step that is not sound, or that finds the queue full, breaks the track: later steps can no longer correct
+    /// earlier ones.
     ///
     /// Allocates: never.
     pub fn write(&mut self, step: &Step, unit_at: Vec3<Body>, gap: DurNs) {
@@ -64,7 +67,7 @@ impl Journal {
 }
 
 impl JournalReader {
-    /// The oldest record waiting.
+    /// Takes the oldest waiting record.
     pub fn next(&self) -> Option<Words> {
         self.queue.records.pop()
     }

@@ -1,8 +1,8 @@
 //! Smoothing over a whole dive: later measurements correct earlier estimates.
 //!
-//! The filter records each step as it runs ([`step`], [`journal`]). Afterwards [`backward`] processes the steps in reverse
-//! order and builds a [`track`], along which the dive is replayed once more. Derivation: `docs/why/navigation.md`,
-//! "Smoothing".
+//! The filter records each step as it runs ([`step`], [`journal`]). Afterwards [`backward`] processes the steps in
+//! reverse order and builds a [`track`]. A second replay takes its positions from that track. Derivation:
+//! `docs/why/navigation.md`, "Smoothing".
 
 pub mod backward;
 pub mod beside;

@@ -1,5 +1,6 @@
-//! Relative error covariance between two smoothed epochs: on the backward pass, each later one waits for the epoch one
-//! head pass before it.
+//! Relative error covariance between two smoothed epochs, one head pass apart.
+//!
+//! On the backward pass, each later epoch waits until the pass reaches the epoch one gap earlier.
 
 use super::rts_step::Gain;
 use crate::filter::clones::{CLONES, MOVING, STEP};
@@ -8,24 +9,24 @@ use crate::filter::state::{ERRORS, Errors};
 use crate::relative::Relative;
 use headrace_geometry::time::{DurNs, MonoNs};
 
-/// Gap of an epoch that no earlier pass can be related to: the cable has slipped in between.
+/// Gap of an epoch with no related earlier pass, because the cable has slipped in between.
 pub const UNTIED: DurNs = DurNs(i64::MAX);
-/// Standard deviation of the chainage then, m.
+/// Standard deviation of the chainage of such an epoch, m.
 const UNTIED_M: f64 = 1e3;
 
-/// A waiting epoch.
+/// An epoch that waits for its earlier pass.
 #[derive(Debug, Clone, Copy)]
 struct Moment {
     /// Its index in the results.
     number: usize,
     at: MonoNs,
-    /// Time since the heads' previous pass.
+    /// Time since the previous pass of the heads.
     gap: DurNs,
-    /// Rows of its covariance for the errors that move a sample.
+    /// Rows of its covariance, for the errors that move a sample.
     own: [Errors; 3],
-    /// Covariances of all errors at the current epoch with those of this one.
+    /// Cross-covariances of this epoch's three errors with all errors at the current epoch.
     with: [Errors; 3],
-    /// Time from the current epoch to this one, s, and the relative covariance between them.
+    /// Time from the current epoch to this one, s, and the relative covariance between both.
     age_s: f64,
     relative: Relative,
 }
@@ -41,12 +42,14 @@ pub struct Later {
 pub type Answer = (usize, Relative);
 
 impl Later {
-    /// Whether an epoch is far enough from the last one noted.
+    /// Whether an epoch is at least one step from the last one noted.
     pub fn is_due(&self, at: MonoNs) -> bool {
         self.newest.is_none_or(|newest| newest.since(at).0 >= STEP.0)
     }
 
-    /// Adds an epoch that waits for the one `gap` before it; returns the answer of one that has to make room.
+    /// Adds an epoch that waits for the epoch one `gap` earlier.
+    ///
+    /// If there is no room, it drops the oldest waiting epoch and returns its answer.
     pub fn note(
         &mut self,
         number: usize,
@@ -62,7 +65,7 @@ impl Later {
         first
     }
 
-    /// Goes back to an earlier epoch, and answers those that waited for it.
+    /// Moves to an earlier epoch and answers the epochs that waited for it.
     pub fn back(
         &mut self,
         at: MonoNs,
@@ -85,7 +88,7 @@ impl Later {
         });
     }
 
-    /// Beginning of the piece: answers all that wait.
+    /// Ends a piece: answers all waiting epochs.
     pub fn end(&mut self, answer: impl FnMut(Answer)) {
         self.waiting.drain(..).map(|moment| moment.answer()).for_each(answer);
         self.newest = None;
@@ -103,7 +106,9 @@ impl Moment {
     }
 }
 
-/// Covariance of the difference of errors: `own` of an epoch, `before` of an earlier one, `with` their cross-covariance.
+/// Returns the covariance of the difference between the errors of two epochs.
+///
+/// `own` is that of the later epoch, `before` that of the earlier one, and `with` their cross-covariance.
 fn against(own: &[Errors; 3], before: &[Errors; 3], with: &[Errors; 3]) -> Relative {
     let of = |rows: &[Errors; 3], row: usize, error: usize| {
         rows.get(row).and_then(|row| row.get(error)).copied().unwrap_or(0.0)
@@ -119,9 +124,9 @@ fn against(own: &[Errors; 3], before: &[Errors; 3], with: &[Errors; 3]) -> Relat
 mod tests {
     use super::*;
 
-    /// Epochs come latest first; one is noted where it is a step before the last.
+    /// Epochs arrive latest first. One is noted if it is at least a step from the last one noted.
     #[test]
-    fn epochs_are_noted_a_step_apart() {
+    fn epochs_are_noted_one_step_apart() {
         let at = |s: u64| MonoNs(1_000_000_000 * s);
         let mut later = Later::default();
         assert!(later.is_due(at(100)));

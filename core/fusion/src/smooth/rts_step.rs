@@ -1,4 +1,6 @@
-//! A step of the Rauch-Tung-Striebel smoother on factors: the covariance stays symmetric and non-negative.
+//! One step of the Rauch-Tung-Striebel smoother on factors.
+//!
+//! Factors keep the covariance symmetric and non-negative.
 //!
 //! Source: H. E. Rauch, F. Tung, C. T. Striebel, Maximum likelihood estimates of linear dynamic systems, AIAA J. 3, 1965.
 
@@ -9,12 +11,14 @@ use crate::filter::factors::Factors;
 pub struct Gain<const N: usize> {
     /// Rows of C = P F^T (F P F^T + Q)^-1.
     rows: [[f64; N]; N],
-    /// Rows of I - C F: the part not determined by the end.
+    /// Rows of I - C F: the part of the error that the end does not determine.
     rest: [[f64; N]; N],
 }
 
 impl<const N: usize> Gain<N> {
-    /// From the covariance at the step's beginning, the step's error transition, and the covariance at its end before the
+    /// Creates the gain of a step.
+    ///
+    /// Inputs: the covariance at the beginning, the step's error transition, and the covariance at the end before the
     /// measurements there.
     pub fn new(before: &Factors<N>, carry: impl Fn(&mut [f64; N]), predicted: &Factors<N>) -> Self {
         let unit: [[f64; N]; N] =
@@ -37,13 +41,15 @@ impl<const N: usize> Gain<N> {
         Self { rows, rest }
     }
 
-    /// Errors at the beginning from those at the end.
+    /// Maps errors at the end to errors at the beginning.
     pub fn back(&self, errors: &[f64; N]) -> [f64; N] {
         self.rows.map(|row| sum(&row, errors))
     }
 
-    /// Smoothed covariance at the beginning, from the filter's P there and the smoothed S at the end with the step's noise Q
-    /// added: `(I - C F) P (I - C F)^T + C (S + Q) C^T`, which is P + C (S - F P F^T - Q) C^T.
+    /// Returns the smoothed covariance at the beginning.
+    ///
+    /// Inputs: the filter's P there, and the smoothed S at the end with the step's noise Q added. The result is `(I -
+    /// C F) P (I - C F)^T + C (S + Q) C^T`, which equals P + C (S - F P F^T - Q) C^T.
     pub fn smoothed(&self, before: &Factors<N>, end_and_noise: &Factors<N>) -> Factors<N> {
         Factors::of_sum([(before, &self.rest), (end_and_noise, &self.rows)])
     }

@@ -9,60 +9,60 @@ use headrace_geometry::time::{DurNs, MonoNs};
 
 /// Numbers of a covariance's factors.
 const FACTOR_NUMBERS: usize = ERRORS * (ERRORS + 1) / 2;
-/// Header words of a record: the two times, the kind of move, piece, clock and gap.
+/// Header words of a record: both times, the kind of move, piece, clock and gap.
 const HEADER: usize = 6;
 /// Words of a record.
 pub const WORDS: usize = HEADER + 3 + 2 * STATE_NUMBERS + FACTOR_NUMBERS + LEG_NUMBERS;
 
-/// A record: integers as they are, floats as their bits. Its tail is unused where a step needs less.
+/// A record: integers as they are, floats as their bits. Shorter steps leave its tail unused.
 pub type Words = [u64; WORDS];
 
-/// Change between two estimates other than by measurements.
+/// Change between two estimates that measurements do not cause.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[expect(clippy::large_enum_variant, reason = "most are legs, and few are kept at a time")]
 pub enum Move {
     /// Propagation over a leg.
     Leg(Leg),
-    /// Variances added to those of the errors, which had been too small.
+    /// Variances added to those of the errors, which had been underestimated.
     Widened(Errors),
-    /// None: this was the last estimate of its piece.
+    /// No change: this is the last estimate of its piece.
     End,
 }
 
-/// A step from an estimate, measurements included, to the prediction before the next measurements.
+/// A step from an estimate after its measurements to the prediction before the next measurements.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Step {
     /// Start time.
     pub at: MonoNs,
     /// End time.
     pub to: MonoNs,
-    /// The estimate at its beginning.
+    /// Estimate at the beginning.
     pub state: State,
-    /// The covariance of its errors.
+    /// Covariance of its errors.
     pub factors: Factors<ERRORS>,
     /// The change.
     pub by: Move,
-    /// The estimate at its end, before the measurements there.
+    /// Estimate at the end, before the measurements there.
     pub predicted: State,
 }
 
-/// A step with its context in the dive.
+/// A step with its place in the dive.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Placed {
     /// The step.
     pub step: Step,
-    /// Position on the vehicle of the inertial unit, to which the estimate refers, m.
+    /// Position of the inertial unit on the vehicle, m; the estimate refers to it.
     pub unit_at: Vec3<Body>,
-    /// Time between two head passes of a place.
+    /// Time between two passes of the heads over a place.
     pub gap: DurNs,
-    /// Number of the piece, a run of contiguous steps.
+    /// Number of the piece; a piece is a run of contiguous steps.
     pub piece: u32,
-    /// Number of times the clock had been set back.
+    /// Number of times the clock has been set back.
     pub clock: u32,
 }
 
 impl Step {
-    /// Whether all its numbers are finite and no variance is negative.
+    /// Whether all numbers are finite and no variance is negative.
     pub fn is_sound(&self) -> bool {
         self.state.is_sound() && self.predicted.is_sound() && self.factors.is_sound()
     }
@@ -85,7 +85,7 @@ impl Move {
         }
     }
 
-    /// Covariance before the measurements at the end, bit-identical to the filter's.
+    /// Returns the covariance before the measurements at the end, bit-identical to the filter's.
     pub fn predict(&self, settings: &Settings, factors: &Factors<ERRORS>) -> Factors<ERRORS> {
         let mut predicted = *factors;
         if let Self::Leg(leg) = self {
@@ -105,7 +105,7 @@ impl Move {
 }
 
 impl Placed {
-    /// The record.
+    /// Encodes the step as a record.
     pub fn words(&self) -> Words {
         let Step { at, to, state, factors, by, predicted } = &self.step;
         let header: [u64; HEADER] =

@@ -1,4 +1,6 @@
-//! The smoother against an independent oracle: batch least squares over all errors of all times, by normal equations.
+//! Comparison of the smoother with an independent oracle.
+//!
+//! The oracle is batch least squares over all errors at all times, by normal equations.
 
 use nalgebra::{SMatrix, SVector};
 
@@ -32,7 +34,7 @@ fn white(time: usize) -> [f64; N] {
     [place + if time == JUMP.0 { JUMP.1 } else { 1e-3 }, speed, bias]
 }
 
-/// Measurements by turns: position with bias, speed, position, none.
+/// Measurements in turn: position with bias, speed, position, none.
 fn measured(time: usize) -> Option<([f64; N], f64)> {
     let value = f64::from(u32::try_from((time * 37) % 11).unwrap()) / 4.0;
     match time % 4 {
@@ -45,11 +47,11 @@ fn measured(time: usize) -> Option<([f64; N], f64)> {
 
 struct Known {
     means: [[f64; N]; TIMES],
-    /// Joint covariance of all errors of all times.
+    /// Joint covariance of all errors at all times.
     covariance: SMatrix<f64, ALL, ALL>,
 }
 
-/// Information of the start, the steps and the measurements, summed and inverted.
+/// Solves for all times at once: sums the information of the start, the steps and the measurements, then inverts it.
 fn all_at_once() -> Known {
     let mut information = SMatrix::<f64, ALL, ALL>::zeros();
     let mut vector = SVector::<f64, ALL>::zeros();
@@ -127,9 +129,9 @@ fn forwards() -> Vec<Filtered> {
         .collect()
 }
 
-/// Means, covariances, and cross-covariances of any two times equal those of the batch solution.
+/// Means, covariances and cross-covariances of any two times equal those of the batch solution.
 #[test]
-fn val_smoothing_is_least_squares_over_all_times() {
+fn smoothing_equals_least_squares_over_all_times() {
     let known = all_at_once();
     let filtered = forwards();
     let near = |is: f64, should: f64, what: &str| {
@@ -137,7 +139,7 @@ fn val_smoothing_is_least_squares_over_all_times() {
     };
     let last = filtered.last().unwrap();
     let (mut mean, mut factors) = (last.mean, last.factors);
-    // Cross-covariances of each later time's errors with the current ones, by columns.
+    // Columns of the cross-covariance between each later time's errors and the current ones.
     let unit = |m: usize| core::array::from_fn(|i| if i == m { 1.0 } else { 0.0 });
     let mut later = vec![(TIMES - 1, core::array::from_fn::<[f64; N], N, _>(|m| factors.along(&unit(m))))];
     for time in (0..TIMES - 1).rev() {
@@ -164,10 +166,11 @@ fn val_smoothing_is_least_squares_over_all_times() {
     }
 }
 
-/// Near-exact measurements after the step on a poor prior, with and without process noise: no variance becomes negative,
-/// and none grows.
+/// Near-exact measurements follow the step on a poor prior, with and without process noise.
+///
+/// No variance becomes negative, and none grows.
 #[test]
-fn verif_no_variance_loses_its_sign() {
+fn smoothed_variances_stay_positive_and_never_grow() {
     let before = Factors::independent([1e8, 1e-12, 1.0]);
     for noise in [0.0, 1e-14, 1e6] {
         let mut predicted = before;
@@ -193,7 +196,7 @@ fn verif_no_variance_loses_its_sign() {
 }
 
 #[test]
-fn steps_come_back_from_their_records() {
+fn steps_survive_a_round_trip_through_records() {
     let mut state = State::at_rest(Point3::new(1.0, -2.0, 3.0), Rot::from_roll_pitch_yaw(0.1, 0.2, 0.3));
     let mut leg = Leg::default();
     let felt =

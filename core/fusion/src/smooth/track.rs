@@ -25,7 +25,7 @@ pub(super) struct Point {
     sd: PoseSd,
 }
 
-/// A contiguous span of the track.
+/// A contiguous part of the track.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Piece {
     clock: u32,
@@ -34,13 +34,13 @@ pub(super) struct Piece {
     relatives: Range<usize>,
 }
 
-/// See the module's description.
+/// The vehicle's smoothed trajectory.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Track {
     pieces: Vec<Piece>,
     points: Vec<Point>,
     relatives: Vec<(MonoNs, Relative)>,
-    /// Length of the filter's epochs: so far beyond its last point it goes.
+    /// Length of the filter's epochs; the track extends this far beyond its last point.
     epoch: DurNs,
 }
 
@@ -52,7 +52,7 @@ impl Point {
 }
 
 impl Piece {
-    /// Begins at these counts of points and relatives, in reverse order.
+    /// Begins a piece at these counts of points and relatives, which are in reverse order.
     pub(super) fn begin(placed: &Placed, points: usize, relatives: usize) -> Self {
         Self {
             clock: placed.clock,
@@ -68,7 +68,7 @@ impl Piece {
 }
 
 impl Track {
-    /// From pieces, points and relatives in reverse order.
+    /// Builds the track from pieces, points and relatives in reverse order.
     pub(super) fn of_reversed(
         mut pieces: Vec<Piece>,
         mut points: Vec<Point>,
@@ -86,7 +86,7 @@ impl Track {
         Self { pieces, points, relatives, epoch }
     }
 
-    /// Number of pieces: one more than of breaks.
+    /// Number of pieces, which is the number of breaks plus one.
     pub fn pieces(&self) -> usize {
         self.pieces.len()
     }
@@ -96,21 +96,21 @@ impl Track {
         self.points.len()
     }
 
-    /// Whether it has no points.
+    /// Whether the track has no points.
     pub fn is_empty(&self) -> bool {
         self.points.is_empty()
     }
 
-    /// Fix at time `at` of the clock after it had been set back `clock` times.
+    /// Returns the fix at time `at` of the clock after it had been set back `clock` times.
     ///
-    /// Errors: the part that isn't known well enough there.
+    /// Errors: the part that is not known well enough at that time.
     pub fn fix(&self, clock: u32, at: MonoNs) -> Result<Fix, NoFix> {
         let begun = |piece: &&Piece| {
             piece.clock == clock && self.points_of(piece).first().is_some_and(|first| first.at <= at)
         };
         let piece = self.pieces.iter().rev().find(begun).ok_or(NoFix::Heading)?;
         let points = self.points_of(piece);
-        // Beyond the last point, the last leg is extrapolated.
+        // The last leg is extrapolated beyond the last point.
         let next = points.partition_point(|point| point.at <= at).min(points.len().saturating_sub(1));
         let (before, after) = (points.get(next.saturating_sub(1)), points.get(next));
         let (before, after) = before.zip(after).ok_or(NoFix::Heading)?;
@@ -135,7 +135,7 @@ impl Track {
         self.points.get(piece.points.clone()).unwrap_or_default()
     }
 
-    /// Covariance relative to the heads' previous pass, interpolated linearly in time.
+    /// Covariance relative to the previous pass of the heads, interpolated linearly in time.
     fn relative(&self, piece: &Piece, at: MonoNs) -> Relative {
         let known = self.relatives.get(piece.relatives.clone()).unwrap_or_default();
         let next = known.partition_point(|(moment, _)| *moment <= at);
@@ -149,7 +149,7 @@ impl Track {
     }
 }
 
-/// The pose interpolated by `share` from one to another, or extrapolated.
+/// Interpolates or extrapolates the pose by `share` from one to the other.
 fn between(from: &Pose, to: &Pose, share: f64) -> Pose {
     let turn = rotation_vector(to.attitude * from.attitude.inverse());
     Pose {
@@ -158,7 +158,7 @@ fn between(from: &Pose, to: &Pose, share: f64) -> Pose {
     }
 }
 
-/// Navigation along a track, independent of the readings.
+/// Navigation along a given track, independent of the readings.
 pub struct TrackNavigation {
     track: Track,
     consistency: [Option<Consistency>; MAX_SOURCES],
@@ -169,7 +169,7 @@ pub struct TrackNavigation {
 stateful!(TrackNavigation { state: clock, received; slots: consistency; fixed: track; });
 
 impl TrackNavigation {
-    /// Along a track made by a filter, with the innovation statistics of its sources.
+    /// Creates navigation along a filter's track, with the innovation statistics of the filter's sources.
     pub fn new(track: Track, consistency: [Option<Consistency>; MAX_SOURCES]) -> Self {
         Self { track, consistency, clock: 0, received: MonoNs(0) }
     }
@@ -177,7 +177,7 @@ impl TrackNavigation {
 
 impl Navigation for TrackNavigation {
     fn update(&mut self, _: usize, _: &SensorInfo, times: Times, _: &Reading) {
-        // Counted as in the filter.
+        // Clock resets are counted as in the filter.
         if self.received.since(times.received) > CLOCK_JUMP {
             self.clock = self.clock.saturating_add(1);
             self.received = times.received;
@@ -190,7 +190,7 @@ impl Navigation for TrackNavigation {
     }
 
     fn fix(&self, at: MonoNs) -> Result<Fix, NoFix> {
-        // The fix of the first ping after the clock was set back is requested before the reset is known.
+        // After the clock is set back, the fix of the first ping is requested before this method learns of the reset.
         if self.received.since(at) > CLOCK_JUMP {
             return Err(NoFix::Heading);
         }
@@ -204,7 +204,7 @@ mod tests {
     use headrace_geometry::frames::{Point3, Rot, Tunnel};
     use headrace_geometry::math;
 
-    /// Where the inertial unit sits, ahead of the vehicle's origin.
+    /// Position of the inertial unit, ahead of the vehicle's origin.
     fn unit_at() -> Vec3<Body> {
         Vec3::new(0.3, 0.0, 0.0)
     }
@@ -218,15 +218,17 @@ mod tests {
         turn * Rot::identity()
     }
 
-    /// After `t` s of this drive: half a metre a second further in and turned left by 0.2 rad, ever faster by 0.1 m/s.
+    /// Point after `t` s of a drive: 0.5 m/s along the tunnel, a left turn of 0.2 rad/s, and a speed that grows by
+    /// 0.1 m/s per second.
     fn point(t: f64, from_x_m: f64) -> Point {
         let mut state = State::at_rest(Point3::new(from_x_m + 0.5 * t, 1.0, 2.0), turned(0.2 * t));
         state.velocity_mps = Vec3::new(0.4 + 0.1 * t, 0.0, 0.0);
         Point::of(at(t), &state, &PoseSd { along_m: 0.1, place_m: 0.05, tilt_rad: 0.01, yaw_rad: 0.02 })
     }
 
-    /// Two drives of the first clock, the second from 10 s on, and one of the clock after it had been set back. An error between passes is known
-    /// at 0 s and at 2 s.
+    /// Track of two drives of the first clock, the second from 10 s on, and one drive after the clock was set back.
+    ///
+    /// The relative covariance is known at 0 s and at 2 s.
     fn track() -> Track {
         let drives =
             [(0, 0.0, vec![0.0, 1.0, 2.0]), (0, 100.0, vec![10.0, 11.0, 14.0]), (1, 200.0, vec![1.0, 2.0])];
@@ -248,28 +250,28 @@ mod tests {
     }
 
     #[test]
-    fn the_way_is_even_between_points_and_goes_on_for_an_epoch() {
+    fn track_interpolates_between_points_and_extends_by_one_epoch() {
         let track = track();
         for t in [0.0, 0.25, 0.5, 1.0, 1.7, 2.0, 2.09] {
             let fix = track.fix(0, at(t)).unwrap();
             assert!((fix.speed_mps - (0.4 + 0.1 * t)).abs() < 1e-9, "{t}: {}", fix.speed_mps);
-            // The unit is ahead of the origin, where the vehicle is turned to.
+            // The unit is ahead of the origin in the vehicle's heading.
             let (ahead_m, aside_m) = (0.3 * math::cos(0.2 * t), 0.3 * math::sin(0.2 * t));
             let place = fix.pose.position;
             let off_m = [place.x() - (0.5 * t - ahead_m), place.y() - (1.0 - aside_m), place.z() - 2.0];
             assert!(off_m.iter().all(|off_m| off_m.abs() < 1e-9), "{t}: {place:?}");
             assert!(rotation_vector(fix.pose.attitude * turned(0.2 * t).inverse()).norm() < 1e-9, "{t}");
-            // Variances go from 0.01 to 0.04 m^2.
+            // Variances grow from 0.01 to 0.04 m^2.
             let variance_m2 = 0.01 + 0.015 * t.min(2.0);
             assert!((fix.relative.sd_m(Vec3::zero()) - math::sqrt(variance_m2)).abs() < 1e-9, "{t}");
-            // Two visits that have nothing in common, where the unit is.
+            // Two visits whose errors are independent, at the unit's position.
             let revisit_m = fix.revisit.sd_m(fix.pose.attitude * unit_at());
             assert!((revisit_m - 0.1 * math::sqrt(2.0)).abs() < 1e-9, "{t}: {revisit_m}");
         }
     }
 
     #[test]
-    fn nothing_is_known_where_no_drive_was() {
+    fn fix_outside_every_drive_fails() {
         let track = track();
         let lacks = |clock: u32, t: f64| track.fix(clock, at(t)).err();
         for (clock, t) in
@@ -290,9 +292,9 @@ mod tests {
         assert_eq!((none.pieces(), none.len(), none.is_empty()), (0, 0, true));
     }
 
-    /// A clock set back by 10 s or more begins anew; what came before it is then of the clock before.
+    /// A clock set back by 10 s or more starts a new count; earlier times then belong to the clock before.
     #[test]
-    fn a_clock_set_back_leads_to_the_drive_after_it() {
+    fn clock_reset_switches_to_the_drive_after_it() {
         let mut navigation = TrackNavigation::new(track(), [None; MAX_SOURCES]);
         let mut hear = |t: f64| {
             let times = Times { received: at(t), valid: at(t) };
@@ -306,9 +308,9 @@ mod tests {
         let none = -1.0;
         assert!(is(hear(1.5), [0.0, 100.0]));
         assert!(is(hear(10.6), [0.0, 100.0]));
-        assert!(is(hear(2.0), [0.0, 100.0]), "late by less than 10 s: of the same clock");
+        assert!(is(hear(2.0), [0.0, 100.0]), "late by less than 10 s counts as the same clock");
         assert!(is(hear(11.4), [0.0, 100.0]));
-        assert!(is(hear(11.6), [none, 100.0]), "a ping of 10 s ago is of a clock set back");
-        assert!(is(hear(1.4), [200.0, none]), "it was set back");
+        assert!(is(hear(11.6), [none, 100.0]), "a ping from 10 s ago belongs to a clock that was set back");
+        assert!(is(hear(1.4), [200.0, none]), "the clock was set back");
     }
 }

@@ -1,4 +1,5 @@
-//! The filter's errors against its standard deviations, in dives drawn from seeds over all that varies in the field.
+//! The filter's errors against its standard deviations, in seeded dives that vary everything that varies in the
+//! field.
 //!
 //!     cargo test --release -p headrace_fusion --test consistency two_thousand -- --ignored --nocapture
 //!
@@ -7,7 +8,7 @@
 #![expect(
     clippy::unwrap_used,
     clippy::cast_possible_truncation,
-    reason = "a test stops at what it can't do; times are small"
+    reason = "a test panics on failure; times are small"
 )]
 
 mod tally;
@@ -18,15 +19,15 @@ use std::ops::Range;
 use tally::{Tally, share};
 use world::{Fault, Log, Motion, Recipe};
 
-/// Dives of the ordinary test, a tenth of the many.
+/// Dives of the ordinary test, a tenth of the full set.
 const FEW: Range<u64> = 0..200;
-/// Dives with a velocity log, of four kinds in turn.
+/// Dives with a velocity log, four kinds in turn.
 const WITH_LOG: Range<u64> = 0..80;
-/// Dives of a vehicle that hovers.
+/// Dives of a hovering vehicle.
 const HOVERING: Range<u64> = 0..24;
 const MANY: Range<u64> = 0..2000;
 
-/// Runs the dives of recipes on all processors; results are in order of their seeds.
+/// Runs the dives of a recipe on all processors; results are in the order of seeds.
 fn dives(seeds: Range<u64>, recipe: fn(u64) -> Recipe) -> Vec<(Recipe, Tally)> {
     let threads = std::thread::available_parallelism().map_or(1, |n| n.get() as u64);
     let of_thread = |thread: u64| {
@@ -41,7 +42,7 @@ fn dives(seeds: Range<u64>, recipe: fn(u64) -> Recipe) -> Vec<(Recipe, Tally)> {
     all
 }
 
-/// A cable with slack that is lively for an ordinary one, and steps of centimetres, as the vehicle file declares them.
+/// Whether the vehicle file declares a cable with unusually lively slack and steps of centimetres.
 fn is_lively_and_stepped(recipe: &Recipe) -> bool {
     recipe.fault == Fault::None && recipe.is_declared && recipe.slack_m <= 0.06 && recipe.quantum_m >= 0.004
 }
@@ -103,14 +104,15 @@ fn table(all: &[(Recipe, Tally)]) {
 }
 
 #[test]
-fn errors_are_within_their_standard_deviations_or_reported() {
+fn errors_are_within_their_sd_or_reported() {
     let all = dives(FEW, Recipe::of);
     table(&all);
     let silent = |is_declared: bool| {
         all.iter().filter(|(recipe, tally)| recipe.is_declared == is_declared && tally.silent > 0).count()
     };
     assert_eq!(silent(true), 0, "dives with an unreported error of over 5 sd");
-    // Two are silent, and should not be: slack that nobody declared, and a wheel that sticks at 0.05 m/s. See docs/why/navigation.md, "Seeded dives".
+    // Two dives are silent: undeclared slack, and a wheel that sticks at 0.05 m/s. See docs/why/navigation.md,
+    // "Seeded dives".
     assert!(silent(false) <= 2, "{}", silent(false));
     let within = |pick: &dyn Fn(&Recipe) -> bool| share(&of(&all, pick), |tally| [tally.within, tally.fixes]);
     assert!((0.93..0.98).contains(&within(&|recipe| recipe.is_declared)));
@@ -119,9 +121,9 @@ fn errors_are_within_their_standard_deviations_or_reported() {
     assert!(unsure <= 0.08, "{unsure}");
 }
 
-/// A log that hangs, that is a fifth off, or that follows drifting silt is a reason to be unsure, and no reason to be wrong.
+/// A log that hangs, is off by a fifth or follows drifting silt makes the filter uncertain, but never wrong.
 #[test]
-fn a_velocity_log_that_is_wrong_makes_no_error_that_is_not_reported() {
+fn wrong_velocity_log_causes_no_unreported_error() {
     let all = dives(WITH_LOG, Recipe::with_log);
     table(&all);
     assert_eq!(all.iter().filter(|(_, tally)| tally.silent > 0).count(), 0);
@@ -130,12 +132,12 @@ fn a_velocity_log_that_is_wrong_makes_no_error_that_is_not_reported() {
         assert!(share(&of(log), |tally| [tally.within, tally.fixes]) > 0.9, "{log:?}");
     }
     let unsure = share(&of(Log::Sound), |tally| [tally.unsure, tally.epochs]);
-    assert!(unsure < 0.15, "a sound log is no reason to be unsure: {unsure}");
+    assert!(unsure < 0.15, "a sound log leaves too many epochs uncertain: {unsure}");
 }
 
-/// A count that stands for minutes is mostly that of a vehicle that hovers.
+/// A count that is stationary for minutes mostly belongs to a hovering vehicle.
 #[test]
-fn hovering_vehicle_keeps_a_sure_position() {
+fn hovering_vehicle_keeps_a_certain_position() {
     let all = dives(HOVERING, Recipe::hovering);
     table(&all);
     let unsure = share(&of(&all, &|_| true), |tally| [tally.unsure, tally.epochs]);

@@ -1,6 +1,6 @@
-//! Dives drawn from seeds: a true motion, and the readings that sensors of known errors give of it.
+//! Dives drawn from seeds: a true motion, and the readings of sensors with known errors.
 //!
-//! It shares no code with the simulator, and with the filter only the wall, the site and the units.
+//! It shares no code with the simulator. With the filter it shares only the wall, the site and the units.
 
 use headrace_fusion::filter::settings::Settings;
 use headrace_geometry::frames::{Body, Mount, Point3, Pose, Rot, Sensor, Tunnel, Vec3, head_direction};
@@ -14,9 +14,9 @@ use headrace_sensor::reading::{EchoRange, Level, Reading, SonarReturn, TetherLen
 pub(crate) const IMU: usize = 0;
 pub(crate) const TETHER: usize = 1;
 pub(crate) const DEPTH: usize = 2;
-/// The first of four: left, right, down, up.
+/// First of four echosounders: left, right, down, up.
 pub(crate) const ECHOES: usize = 3;
-/// The first of two.
+/// First of two heads.
 pub(crate) const HEADS: usize = 7;
 
 pub(crate) const VELOCITY_LOG: usize = 9;
@@ -28,7 +28,7 @@ const IMU_S: f64 = 0.01;
 const TETHER_S: f64 = 0.02;
 const HEAD_RADPS: f64 = 1.7;
 
-/// How the vehicle moves along the tunnel.
+/// Motion of the vehicle along the tunnel.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Motion {
     Steady,
@@ -37,15 +37,15 @@ pub(crate) enum Motion {
     BackAndForth,
 }
 
-/// Which source hangs or sticks for a while.
+/// Source that hangs or sticks for a while.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Fault {
     None,
     /// The inertial unit repeats its last readings.
     ImuHangs,
-    /// The counter's wheel stands while the cable runs.
+    /// The counter's wheel is stuck while the cable runs.
     CableSticks,
-    /// The counter says nothing.
+    /// The counter is silent.
     CableSilent,
     /// The depth sensor repeats its last reading.
     DepthHangs,
@@ -53,17 +53,17 @@ pub(crate) enum Fault {
     EchoHangs,
 }
 
-/// What a velocity log does.
+/// Behaviour of the velocity log.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Log {
-    /// There is none.
+    /// No log.
     None,
     Sound,
     /// It repeats its last reading for a while.
     Hangs,
-    /// It shows a fifth too much, always.
+    /// It always shows a fifth too much.
     Scaled,
-    /// It follows silt that drifts at 0.15 m/s, for a while.
+    /// For a while it follows silt that drifts at 0.15 m/s.
     Drifts,
 }
 
@@ -80,7 +80,7 @@ impl Fault {
         [Self::None, Self::ImuHangs, Self::CableSticks, Self::CableSilent, Self::DepthHangs, Self::EchoHangs];
 }
 
-/// What a dive is made of.
+/// Parameters of a dive.
 #[derive(Debug, Clone, Copy)]
 #[expect(clippy::struct_excessive_bools, reason = "each is a factor of its own")]
 pub(crate) struct Recipe {
@@ -91,11 +91,11 @@ pub(crate) struct Recipe {
     pub(crate) speed_mps: f64,
     pub(crate) slack_m: f64,
     pub(crate) slack_period_s: f64,
-    /// Whether the slack is one sine rather than three.
+    /// Whether the slack is one sine instead of three.
     pub(crate) slack_is_sine: bool,
-    /// Whether the vehicle file declares slack and inertial noise as they are.
+    /// Whether the vehicle file declares slack and inertial noise correctly.
     pub(crate) is_declared: bool,
-    /// 0 a data sheet's, 1 a small vehicle's, 2 a cheap one.
+    /// 0 is as a data sheet, 1 a small vehicle's, 2 a cheap one.
     pub(crate) imu_class: usize,
     pub(crate) motion: Motion,
     pub(crate) fault: Fault,
@@ -106,7 +106,7 @@ pub(crate) struct Recipe {
     pub(crate) duration_s: f64,
 }
 
-/// A source of random numbers: splitmix64.
+/// Random number generator (splitmix64).
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Draws(u64);
 
@@ -145,7 +145,7 @@ impl Draws {
 }
 
 impl Recipe {
-    /// The dive of a seed.
+    /// Returns the dive of a seed.
     pub(crate) fn of(seed: u64) -> Self {
         let mut draws = Draws(seed.wrapping_mul(0xD134_2543_DE82_EF95));
         let log_between = |draws: &mut Draws, least: f64, most: f64| {
@@ -181,12 +181,12 @@ impl Recipe {
         }
     }
 
-    /// The dive of a seed with a velocity log, sound or not in turn.
+    /// Returns the dive of a seed with a velocity log; sound and faulty ones alternate.
     pub(crate) fn with_log(seed: u64) -> Self {
         Self { log: Log::ALL[seed as usize % Log::ALL.len()], fault: Fault::None, ..Self::of(seed) }
     }
 
-    /// A vehicle that hovers for five minutes, with a cable that is as the vehicle file says.
+    /// Returns a dive that hovers for five minutes, with a cable as declared in the vehicle file.
     pub(crate) fn hovering(seed: u64) -> Self {
         let recipe = Self::of(seed);
         let slack_m = recipe.slack_m.min(0.06);
@@ -215,7 +215,7 @@ impl Recipe {
         }
     }
 
-    /// What the vehicle file says.
+    /// Settings in the vehicle file.
     pub(crate) fn settings(&self) -> Settings {
         let usual = Settings::default();
         if !self.is_declared {
@@ -228,7 +228,7 @@ impl Recipe {
     }
 }
 
-/// Adds a source's readings: period and phase, s, number, and what it reads by time, s.
+/// Adds a source's readings: period and phase, s, number, and its reading at a time, s.
 type Every<'a> = dyn FnMut(f64, f64, usize, &mut dyn FnMut(f64) -> Option<Reading>) + 'a;
 
 /// A sum of sines: amplitude, angular frequency, phase.
@@ -243,7 +243,7 @@ pub(crate) struct Dive {
     pub(crate) recipe: Recipe,
     pub(crate) profile: Profile,
     pub(crate) site: Site,
-    /// Way along the tunnel by steps of [`STEP_S`], m.
+    /// Distance along the tunnel in steps of [`STEP_S`], m.
     way_m: Vec<f64>,
     slack: Sines,
     swaying: [Sines; 5],
@@ -252,7 +252,7 @@ pub(crate) struct Dive {
     tilts: [Sines; 3],
 }
 
-/// Time between the points of a dive's way, s.
+/// Time between the points of a trajectory, s.
 const STEP_S: f64 = 0.005;
 
 impl Dive {
@@ -440,7 +440,7 @@ impl Dive {
         }
         let payout_m = self.chainage_m(t) + value(&self.slack, t);
         let (stuck_m, lost_m) = stuck.get();
-        // A wheel that has stuck has lost that much for good.
+        // A wheel that was stuck has lost that much for good.
         let shown_m = if self.is_faulty(t, Fault::CableSticks) {
             stuck.set((stuck_m, payout_m - stuck_m));
             stuck_m
@@ -452,7 +452,7 @@ impl Dive {
         let steps = shown_m / quantum_m;
         let whole = if self.recipe.floors { math::floor_to_i64(steps) } else { math::round_to_i64(steps) };
         let resolution_m = if self.recipe.states_quantum { quantum_m } else { 5e-4 };
-        // What a converter of fine steps makes of a wheel of coarse ones.
+        // A fine-stepped converter rounds the counts of a coarse wheel.
         let length_m = math::round_to_i64(whole as f64 * quantum_m / resolution_m) as f64 * resolution_m;
         Some(Reading::TetherLength(TetherLength { length_m, resolution_m, restart: None }))
     }
@@ -491,7 +491,7 @@ impl Dive {
     }
 }
 
-/// Way along the tunnel by steps of [`STEP_S`], m.
+/// Distance along the tunnel in steps of [`STEP_S`], m.
 fn way(recipe: &Recipe, draws: &mut Draws) -> Vec<f64> {
     let steps = (recipe.duration_s / STEP_S) as usize + 4;
     let speed = recipe.speed_mps;
@@ -523,7 +523,7 @@ fn way(recipe: &Recipe, draws: &mut Draws) -> Vec<f64> {
             }
         }
     };
-    // Speed follows what is wanted with two lags of 0.5 s.
+    // Speed follows the demanded one with two lags of 0.5 s.
     let (mut first, mut second, mut x) = (0.0, 0.0, 0.0);
     let mut way_m = Vec::with_capacity(steps);
     for k in 0..steps {

@@ -20,9 +20,9 @@ pub use element::Piece;
 pub use nearest::Nearest;
 pub use plane::Yz;
 
-/// Points closer together than this are the same, m.
+/// Distance below which two points count as equal, m.
 const SAME_POINT_M: f64 = 1e-9;
-/// Polygons of more elements than this have a table of how far they reach.
+/// Number of elements above which a polygon has a table of its extent by direction.
 const MANY: usize = 256;
 /// Number of [`Profile::places`].
 const PLACES: u32 = 64;
@@ -32,11 +32,11 @@ const PLACES: u32 = 64;
 pub struct Profile {
     elements: Vec<Element>,
     tree: Tree,
-    /// Only of many elements.
+    /// Present only if there are many elements.
     support: Option<Support>,
     perimeter_m: f64,
     reference: Yz,
-    /// Places as far apart as one another, from the floor's centre on.
+    /// Equidistant places, from the floor's centre on.
     places: Vec<Yz>,
 }
 
@@ -53,39 +53,39 @@ pub struct WallHit {
     pub normal: Yz,
 }
 
-/// Why a profile is rejected.
+/// Reason why a profile is rejected.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum ProfileError {
-    /// Fewer than three distinct points.
+    /// There are fewer than three distinct points.
     #[error("a profile needs at least 3 distinct points; this one has {count}")]
     TooFewPoints {
         /// Distinct points.
         count: usize,
     },
-    /// A coordinate isn't finite, or exceeds 1000 m.
-    #[error("vertex {vertex} has a coordinate that is no number within 1000 m")]
+    /// A coordinate is not finite, or exceeds 1000 m.
+    #[error("vertex {vertex} has a coordinate that is not a number within 1000 m")]
     NotFinite {
         /// Index of the vertex, from zero.
         vertex: usize,
     },
-    /// From the reference point, the wall at this vertex is hidden or runs backwards.
+    /// As seen from the reference point, the wall at this vertex is hidden or runs backwards.
     #[error(
         "the profile isn't star-shaped about ({y}, {z}): it runs backwards or crosses itself at vertex {vertex}, counted from 0",
         y = .reference[0], z = .reference[1]
     )]
     NotStarShaped {
-        /// Index, among what was given, of the piece, or of the point of a polygon at which the offending edge begins.
+        /// Index of the input piece, or of the polygon point at which the offending edge begins.
         vertex: usize,
         /// The reference point.
         reference: Yz,
     },
-    /// A polygon all of which lies on one side of y = 0.
+    /// All of the polygon lies on one side of y = 0.
     #[error(
         "the profile lies beside y = 0, where arc length begins at the floor; it must have points on either side"
     )]
     BesideMiddle,
-    /// The curve doesn't wind about its reference point exactly once.
+    /// The curve does not wind about its reference point exactly once.
     #[error("the profile winds {turns} times about ({y}, {z}); it must do so once", y = .reference[0], z = .reference[1])]
     Winding {
         /// Number of turns.
@@ -96,7 +96,7 @@ pub enum ProfileError {
 }
 
 impl ProfileError {
-    /// The vertex that it is about, by its index among those given.
+    /// Returns the offending vertex, by its index in the input.
     pub fn vertex(&self) -> Option<usize> {
         match self {
             Self::NotFinite { vertex } | Self::NotStarShaped { vertex, .. } => Some(*vertex),
@@ -106,8 +106,10 @@ impl ProfileError {
 }
 
 impl Profile {
-    /// A closed curve that begins at `start`, the floor's centre, and runs counter-clockwise (y right, z up) through
-    /// `pieces` back to it. All of the wall must be visible from `reference`.
+    /// Creates a closed curve from the floor's centre `start` through `pieces` back to it, counter-clockwise (y
+    /// right, z up).
+    ///
+    /// All of the wall must be visible from `reference`.
     ///
     /// Errors: see [`ProfileError`].
     /// Allocates: startup only.
@@ -171,10 +173,10 @@ impl Profile {
         self.hit(self.reference, direction).is_some_and(|hit| hit.range_m >= 1.0)
     }
 
-    /// First exit from the profile of the ray from `origin` along `direction` (any non-zero length).
+    /// Returns the first exit of the ray from `origin` along `direction` (any non-zero length).
     ///
-    /// From inside there is always one: where rounding lets a ray slip between two elements, their common vertex is
-    /// used. From outside: `None`.
+    /// From inside there is always one: if rounding lets a ray slip between two elements, their common vertex is
+    /// used. From outside it is `None`.
     pub fn cast(&self, origin: Yz, direction: Yz) -> Option<WallHit> {
         if !self.contains(origin) {
             return None;
@@ -182,32 +184,34 @@ impl Profile {
         self.hit(origin, direction)
     }
 
-    /// [`Profile::cast`] without its test of `origin`, for many rays from one point known to be inside.
+    /// [`Profile::cast`] without its check of `origin`, for many rays from one point known to be inside.
     pub fn cast_from_inside(&self, origin: Yz, direction: Yz) -> Option<WallHit> {
         self.hit(origin, direction)
     }
 
-    /// Arc length of the wall seen from the reference point in the direction of `point`: the coordinate for spacing
-    /// when the wall differs from the design. Zero for the reference point itself.
+    /// Returns the arc length of the wall in the direction of `point`, as seen from the reference point.
+    ///
+    /// It is the coordinate for spacing if the wall differs from the design. Zero for the reference point itself.
     pub fn arc_of(&self, point: Yz) -> f64 {
         let direction = sub(point, self.reference);
         self.hit(self.reference, direction).map_or(0.0, |hit| hit.arc_m)
     }
 
-    /// Wall point at arc length `arc_m`, taken modulo the perimeter.
+    /// Returns the wall point at arc length `arc_m`, modulo the perimeter.
     pub fn point_at(&self, arc_m: f64) -> Yz {
         let arc = math::wrap(arc_m, self.perimeter_m);
         let index = self.elements.partition_point(|element| element.arc_m <= arc).saturating_sub(1);
         self.elements.get(index).map_or(self.reference, |element| element.point_at(arc - element.arc_m))
     }
 
-    /// Sixty-four places round the wall, evenly from the floor's centre on: what is asked for often and needn't be exact is asked there.
+    /// 64 equidistant places around the wall, from the floor's centre on, for frequent approximate checks.
     pub fn places(&self) -> &[Yz] {
         &self.places
     }
 
-    /// Clock position of an arc length, seen from the reference point looking along the tunnel, to the nearest half
-    /// hour: 6 is the floor's centre, 9 the left wall, 12 the crown.
+    /// Returns the clock position of an arc length to the nearest half hour: 6 floor's centre, 9 left wall, 12 crown.
+    ///
+    /// It is seen from the reference point, looking along the tunnel.
     pub fn clock(&self, arc_m: f64) -> String {
         let place = sub(self.point_at(arc_m), self.reference);
         // Head angle: 0 down, growing to the left.
@@ -230,14 +234,15 @@ impl Profile {
         }
     }
 
-    /// Largest distance, m, of the wall from a line through `origin` across the unit vector `direction`, on either side; of a
-    /// polygon of many points an upper bound, by 0.03 % at most of its size.
+    /// Returns the largest distance of the wall from a line through `origin` across the unit vector `direction`, m.
+    ///
+    /// Both sides count. For a polygon of many points it is an upper bound, at most 0.03 % of its size too large.
     pub fn farthest_along_m(&self, origin: Yz, direction: Yz) -> f64 {
         let farthest_m = |element: &Element| {
             let start_m = dot(sub(element.start, origin), direction).abs();
             let Shape::Arc { centre, radius_m, middle, cos_half, .. } = element.shape else { return start_m };
             let (centre_m, towards) = (dot(sub(centre, origin), direction), dot(middle, direction));
-            // Where the arc's tangent runs across the direction, on this side or the other.
+            // Place where the arc's tangent is perpendicular to the direction, on this side or the other.
             let ahead_m = if towards >= cos_half { (centre_m + radius_m).abs() } else { 0.0 };
             let astern_m = if -towards >= cos_half { (centre_m - radius_m).abs() } else { 0.0 };
             start_m.max(ahead_m).max(astern_m)
@@ -251,8 +256,9 @@ impl Profile {
         }
     }
 
-    /// Where each piece begins and how long it is, m: arc lengths. Of a polygon the first and the last are parts of one edge, unless
-    /// a point lies at the floor's centre.
+    /// Returns start and length of each piece, m, as arc lengths.
+    ///
+    /// In a polygon, the first and the last are parts of one edge unless a point lies at the floor's centre.
     pub fn pieces_m(&self) -> impl ExactSizeIterator<Item = (f64, f64)> + '_ {
         self.elements.iter().map(|element| (element.arc_m, element.length_m))
     }
@@ -271,7 +277,7 @@ impl Profile {
         let entry = |bounds: &Bounds| bounds.entry(origin, direction);
         self.tree.search(self.elements.len(), entry, |some| {
             for (index, element) in self.elements.iter().enumerate().take(some.end).skip(some.start) {
-                // Of equally near ones the first along the wall, in whatever order they are looked at.
+                // Among equally near elements the first along the wall counts, whatever the order of the search.
                 if let Some(t) = element.crossing(origin, direction)
                     && best.is_none_or(|nearest| (t, index) < nearest)
                 {
@@ -292,7 +298,7 @@ impl Profile {
         })
     }
 
-    /// For a ray that slipped between two elements: the vertex ahead that is nearest to the ray.
+    /// Returns the vertex nearest to a ray that slipped between two elements.
     fn nearest_vertex(&self, origin: Yz, direction: Yz) -> Option<(f64, usize)> {
         let length2 = dot(direction, direction);
         let ahead = |(index, element): (usize, &Element)| {
@@ -306,7 +312,7 @@ impl Profile {
     }
 }
 
-/// Of elements with the indices of their pieces.
+/// Checks elements given with the indices of their pieces.
 fn check_star_shaped<'a>(
     elements: impl Iterator<Item = (&'a Element, usize)>,
     reference: Yz,

@@ -27,8 +27,9 @@ pub fn circle(radius_m: f64) -> Result<Profile, ProfileError> {
     Profile::new([0.0, 0.0], &[Piece::Arc { centre, sweep_rad: TAU }], centre)
 }
 
-/// The paper's Fig. 2: vertical walls under an arc of radius `arch_radius_m` >= width / 2; `height_m` is the height of
-/// the crown. The reference point is at half height.
+/// The paper's Fig. 2: vertical walls under an arc of radius `arch_radius_m` >= width / 2.
+///
+/// `height_m` is the height of the crown. The reference point is at half height.
 ///
 /// Errors: dimensions that give no valid profile.
 pub fn arch(width_m: f64, height_m: f64, arch_radius_m: f64) -> Result<Profile, ProfileError> {
@@ -45,8 +46,9 @@ pub fn arch(width_m: f64, height_m: f64, arch_radius_m: f64) -> Result<Profile, 
     Profile::new([0.0, 0.0], &pieces, [0.0, height_m / 2.0])
 }
 
-/// A circle with its lower part cut off by a flat floor of width `base_m`; the reference point is the circle's centre,
-/// above the floor.
+/// A circle with its lower part cut off by a flat floor of width `base_m`.
+///
+/// The reference point is the circle's centre, above the floor.
 ///
 /// Errors: dimensions that give no valid profile.
 pub fn trimmed_circle(radius_m: f64, base_m: f64) -> Result<Profile, ProfileError> {

@@ -1,4 +1,7 @@
-//! Alerts and notes as JSON. Field names are the contract; `docs/reference/live-state.schema.json` is its schema. Allocates: for outlets.
+//! Alerts and notes as JSON. The field names are a contract; `docs/reference/live-state.schema.json` is the
+//! schema.
+//!
+//! Allocates: for outlets.
 
 use serde::Serialize;
 
@@ -9,75 +12,75 @@ use crate::notes::{Note, Spoken};
 use crate::pilot_text::station;
 use headrace_geometry::time::MonoNs;
 
-/// Alerts in a list at most.
+/// Maximum number of alerts in a list.
 pub const MOST_SHOWN: usize = 64;
-/// Cleared ones follow, as long as there are fewer in it.
+/// Cleared alerts are added while the list is shorter than this.
 const RECENT: usize = 20;
 
-/// An alert.
+/// An alert in JSON.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct ListedAlertJson {
-    /// Its number, from 1; never given again.
+    /// Number from 1. It is never reused.
     pub number: u32,
     /// `emergency_alarm`, `alarm`, `warning` or `caution`.
     pub priority: &'static str,
     /// `coverage`, `speed`, `position`, `sensor`, `recording` or `setting`.
     pub class: &'static str,
-    /// Its kind.
+    /// Kind.
     pub kind: &'static str,
-    /// What holds.
+    /// Problem.
     pub text: String,
-    /// What to do; empty where there is nothing.
+    /// Action to take; empty if there is none.
     pub advice: String,
     /// `active`, `rectified` or `cleared`.
     pub state: AlertState,
-    /// When it was raised first, seconds on the log's clock.
+    /// Time of its first raising, seconds on the log's clock.
     pub since_s: f64,
-    /// Since when it holds no longer.
+    /// Time from which its condition no longer holds.
     pub rectified_s: Option<f64>,
-    /// Since when it is over.
+    /// Time at which it ended.
     pub cleared_s: Option<f64>,
-    /// Who knows of it.
+    /// Acknowledgement, if any.
     pub acknowledged: Option<AcknowledgedJson>,
-    /// Until when its sound is off.
+    /// Time until which its sound is silenced.
     pub silenced_until_s: Option<f64>,
     /// Whether it sounds now.
     pub sounds: bool,
     /// Whether somebody must still acknowledge it.
     pub needs_acknowledgement: bool,
-    /// Where it begins, or where the vehicle was when it was raised, m.
+    /// Beginning of its stretch, or place of the vehicle when it was raised, m.
     pub from_m: Option<f64>,
-    /// Where it ends, m.
+    /// End of its stretch, m.
     pub to_m: Option<f64>,
-    /// Where to go back to, m.
+    /// Place to go back to, m.
     pub back_to_m: Option<f64>,
-    /// The speed then, m/s.
+    /// Largest speed for passing it again, m/s.
     pub at_most_mps: Option<f64>,
-    /// The sensor that it names, by its id.
+    /// Id of the sensor that it names.
     pub sensor: Option<String>,
-    /// Times that it was raised; of missed stretches, those that it stands for.
+    /// Number of times that it was raised; for missed stretches, number of stretches that it represents.
     pub count: u32,
-    /// The alert that stands for it now.
+    /// Alert that it was merged into.
     pub merged_into: Option<u32>,
 }
 
-/// Who has acknowledged an alert.
+/// Acknowledgement of an alert.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct AcknowledgedJson {
-    /// By whom.
+    /// Person or device.
     pub by: String,
-    /// When, seconds on the log's clock.
+    /// Time, seconds on the log's clock.
     pub at_s: f64,
 }
 
-/// Counts of alerts that aren't over.
+/// Counts of alerts that have not ended.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize)]
 pub struct AlertCountsJson {
-    /// Those that somebody must still acknowledge.
+    /// Alerts that somebody must still acknowledge.
     pub unacknowledged: u32,
-    /// Those that hold.
+    /// Alerts whose condition holds.
     pub active: u32,
-    /// Of each priority, all that aren't over.
+    /// Alerts of this priority that have not ended.
     pub emergency_alarm: u32,
     /// See `emergency_alarm`.
     pub alarm: u32,
@@ -87,47 +90,47 @@ pub struct AlertCountsJson {
     pub caution: u32,
 }
 
-/// What is left, where it is told.
+/// Remaining cable, time and charge, as far as they are known.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
 pub struct LeftJson {
     /// Cable beyond the vehicle's place, m.
     pub cable_m: Option<f64>,
-    /// Time, seconds; below zero is over.
+    /// Time, seconds; negative once it is used up.
     pub time_s: Option<f64>,
     /// Charge of the battery, percent.
     pub battery_pct: Option<f64>,
 }
 
-/// A note.
+/// A note in JSON.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct NoteJson {
-    /// Its number, from 1.
+    /// Number from 1.
     pub number: u32,
-    /// When, seconds on the log's clock.
+    /// Time, seconds on the log's clock.
     pub at_s: f64,
-    /// By whom.
+    /// Author.
     pub by: String,
-    /// Its text; empty for a mark and a voice note.
+    /// Text; empty for a mark and a voice note.
     pub text: String,
-    /// Of a voice note.
+    /// Recording, of a voice note.
     pub voice: Option<SpokenJson>,
-    /// Where the vehicle was, m; `None` without a position.
+    /// Place of the vehicle, m; `None` without a position.
     pub chainage_m: Option<f64>,
-    /// The same as engineers write it.
+    /// Place of the vehicle as stationing.
     pub station: Option<String>,
 }
 
-/// What was spoken, of a voice note.
+/// Recording of a voice note.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct SpokenJson {
-    /// Ties the note to its recording in the log.
+    /// Id that ties the note to its recording in the log.
     pub id: u32,
-    /// How long its recording is, seconds; `None` while, or if, none is in the log.
+    /// Length of its recording, seconds; `None` until a recording is in the log.
     pub seconds: Option<u32>,
 }
 
 impl NoteJson {
-    /// What it says, in words.
+    /// Text for display.
     pub fn words(&self) -> String {
         match &self.voice {
             Some(SpokenJson { seconds: Some(seconds), .. }) => format!("voice, {seconds} s"),
@@ -156,7 +159,7 @@ impl From<&Note> for NoteJson {
 }
 
 impl ListedAlert {
-    /// As JSON, at `now`.
+    /// The alert in JSON, at `now`.
     pub fn json(&self, around: &Surroundings<'_>, now: MonoNs) -> ListedAlertJson {
         let (from_m, to_m) = self.bounds_m(around.section_m);
         let seconds = |at: Option<MonoNs>| at.map(MonoNs::as_secs_f64);
@@ -195,8 +198,9 @@ impl ListedAlert {
 }
 
 impl AlertList {
-    /// What to show, the most urgent first, and the number of alerts that aren't over and have found no room. A few of those that
-    /// are over come last.
+    /// Alerts to show, most urgent first, and the number of live alerts left out for lack of room.
+    ///
+    /// A few ended alerts come last.
     pub fn shown(&self) -> (Vec<&ListedAlert>, usize) {
         let mut all: Vec<&ListedAlert> = self.iter().collect();
         all.sort_by_key(|alert| alert.rank());
@@ -205,7 +209,7 @@ impl AlertList {
         (all, live.saturating_sub(MOST_SHOWN))
     }
 
-    /// Counts of those that aren't over.
+    /// Counts of the alerts that have not ended.
     pub fn counts(&self) -> AlertCountsJson {
         let mut counts = AlertCountsJson::default();
         for alert in self.iter().filter(|alert| alert.is_live()) {
@@ -222,7 +226,7 @@ impl AlertList {
         counts
     }
 
-    /// What is left, as of a live state.
+    /// Remaining cable, time and charge, as of a live state.
     pub fn left(&self, state: &LiveState) -> LeftJson {
         LeftJson {
             cable_m: self.cable_left_m(state.chainage_m),

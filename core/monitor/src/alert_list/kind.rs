@@ -5,22 +5,22 @@ use serde::{Deserialize, Serialize};
 use crate::alerts::AlertKind;
 pub use headrace_vehicle::AlertClass;
 
-/// How urgent an alert is.
+/// Urgency of an alert.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Priority {
-    /// To be known; needs no acknowledgement.
+    /// For information. It needs no acknowledgement.
     Caution,
-    /// To be attended to before it becomes worse.
+    /// Needs attention before it becomes worse.
     Warning,
-    /// Something must be done.
+    /// Needs action.
     Alarm,
     /// The vehicle may be lost.
     EmergencyAlarm,
 }
 
 impl Priority {
-    /// The word used in JSON.
+    /// Word used in JSON.
     pub fn as_str(self) -> &'static str {
         match self {
             Self::Caution => "caution",
@@ -31,26 +31,26 @@ impl Priority {
     }
 }
 
-/// Kind of an alert of the list.
+/// Kind of an alert in the list.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub enum ListKind {
-    /// Flagged sections.
+    /// Sections are flagged as missed.
     Missed,
-    /// Nothing can be said of what is judged now.
+    /// Sections judged now get no verdict.
     CannotSay,
-    /// Over v_max.
+    /// The speed is over v_max.
     TooFast,
-    /// Slower won't help.
+    /// No speed meets the target.
     NoSpeed,
-    /// The present turn misses the target, though the speed is within v_max.
+    /// The present turn misses the target although the speed is within v_max.
     TurnFails,
     /// There is no position.
     NoPosition,
-    /// The position is too uncertain.
+    /// The position error is too large.
     PositionDoubtful,
     /// No profiling head gives readings.
     NoSonar,
-    /// Nothing comes from any sensor.
+    /// No sensor delivers data.
     NoData,
     /// A sensor gives no readings.
     SensorSilent,
@@ -68,7 +68,7 @@ pub enum ListKind {
     SettingDoubted,
     /// See [`AlertKind::OutsideTunnel`].
     OutsideTunnel,
-    /// See [`AlertKind::ProfileContradicted`].
+    /// Most samples contradict the profile; see [`AlertKind::ProfileContradicted`].
     ProfileContradicted,
     /// A recording fails.
     NotRecorded,
@@ -78,14 +78,14 @@ pub enum ListKind {
     TimeLeft,
     /// Little charge is left.
     BatteryLeft,
-    /// A head turns and pings, and hears no wall.
+    /// A head turns and pings without detecting the wall.
     SensorDeaf,
     /// A sensor repeats its last reading.
     SensorHung,
 }
 
 impl ListKind {
-    /// All of them.
+    /// All kinds.
     pub const ALL: [Self; 24] = [
         Self::Missed,
         Self::CannotSay,
@@ -113,7 +113,7 @@ impl ListKind {
         Self::SensorHung,
     ];
 
-    /// The word used in JSON.
+    /// Word used in JSON.
     pub fn as_str(self) -> &'static str {
         match self {
             Self::Missed => "missed",
@@ -143,7 +143,7 @@ impl ListKind {
         }
     }
 
-    /// Its class, by which sounds are muted, and hold times set.
+    /// Class, which decides muting and hold times.
     pub fn class(self) -> AlertClass {
         match self {
             Self::Missed | Self::CannotSay => AlertClass::Coverage,
@@ -168,7 +168,7 @@ impl ListKind {
         }
     }
 
-    /// Its priority when it is raised; what is left may make it more urgent.
+    /// Priority when it is raised. A smaller remainder may raise it.
     pub fn priority(self) -> Priority {
         match self {
             Self::CannotSay | Self::TurnFails => Priority::Caution,
@@ -197,17 +197,18 @@ impl ListKind {
         }
     }
 
-    /// The alert about the dive as a whole that it tells of.
+    /// Corresponding alert about the dive as a whole.
     pub(super) fn of_dive(self) -> Option<AlertKind> {
         AlertKind::ALL.into_iter().find(|kind| Self::from(*kind) == self)
     }
 
-    /// Whether there may be one for each sensor, besides one for none: the cable's counter may differ from a velocity log.
+    /// Whether it may name a sensor: the cable counter may differ from the inertial unit or from a velocity
+    /// log.
     pub(super) fn may_name_a_sensor(self) -> bool {
         self.is_of_sensor() || self == Self::CableDoubted
     }
 
-    /// Whether there is one for each sensor.
+    /// Whether each sensor has its own alert of this kind.
     pub(super) fn is_of_sensor(self) -> bool {
         matches!(
             self,

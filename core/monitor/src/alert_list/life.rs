@@ -1,4 +1,4 @@
-//! The life of an alert: what each event makes of it.
+//! Life cycle of an alert: the effect of each event on its state.
 
 use super::{
     Acknowledgement, AlertChange, AlertList, AlertState, Figures, ListKind, ListedAlert, MOST_LISTED,
@@ -10,14 +10,15 @@ use crate::result_stream::{RecordKind, ResultStream};
 use headrace_geometry::time::MonoNs;
 use headrace_sensor::reading::SourceId;
 
-/// Where changes are told.
+/// Context for publishing changes.
 pub(crate) struct Telling<'a> {
     pub(crate) notices: &'a mut Notices,
     pub(crate) stream: &'a mut ResultStream,
 }
 
 impl Telling<'_> {
-    /// Publishes a change. Allocates: never; a notice that finds no room is in the digest all the same.
+    /// Publishes a change. Allocates: never. The digest includes a notice even if the queue has no room for
+    /// it.
     pub(super) fn tell(&mut self, alert: &ListedAlert, change: AlertChange, at: MonoNs) {
         digest(self.stream, alert, change, at);
         if self.notices.0.len() < self.notices.0.capacity() {
@@ -48,7 +49,7 @@ fn digest(stream: &mut ResultStream, alert: &ListedAlert, change: AlertChange, a
 }
 
 impl Figures {
-    /// The figure that stands for them in digests.
+    /// Figure that represents them in digests.
     fn first(&self) -> f64 {
         match *self {
             Self::None => 0.0,
@@ -63,7 +64,7 @@ impl Figures {
 }
 
 impl AlertList {
-    /// Adds a new alert; returns its number.
+    /// Adds a new alert. Returns its number.
     pub(super) fn raise(
         &mut self,
         kind: ListKind,
@@ -92,7 +93,7 @@ impl AlertList {
             merged_into: None,
             figures,
         };
-        // Room has been made.
+        // There is room now.
         if self.alerts.len() < self.alerts.capacity() {
             self.alerts.push(alert);
         }
@@ -100,7 +101,8 @@ impl AlertList {
         alert.number
     }
 
-    /// Drops the oldest cleared alert where there is no room for another; where none is, two missed stretches share one.
+    /// Drops the oldest cleared alert if there is no room for another. If no alert is cleared, two missed
+    /// stretches share one.
     fn make_room(&mut self, at: MonoNs, to: &mut Telling<'_>) {
         if self.alerts.len() < MOST_LISTED {
             return;
@@ -109,7 +111,7 @@ impl AlertList {
             self.share_one(at, to);
         }
         let oldest = self.alerts.iter().position(|alert| !alert.is_live());
-        // There are far fewer situations other than missed stretches than there is room.
+        // Situations other than missed stretches are far fewer than the capacity.
         let oldest =
             oldest.or_else(|| self.alerts.iter().position(|alert| alert.priority == Priority::Caution));
         if let Some(oldest) = oldest {
@@ -118,7 +120,8 @@ impl AlertList {
         }
     }
 
-    /// It holds again before anybody acknowledged it, or goes on with other figures.
+    /// Reactivates an alert: its condition holds again before an acknowledgement, or continues with other
+    /// figures.
     pub(super) fn hold_again(&mut self, number: u32, at: MonoNs, to: &mut Telling<'_>) {
         let Some(alert) = self.get_mut(number) else { return };
         (alert.state, alert.rectified) = (AlertState::Active, None);
@@ -127,7 +130,7 @@ impl AlertList {
         to.tell(&alert, AlertChange::Raised, at);
     }
 
-    /// What it tells of holds no longer.
+    /// Marks that an alert's condition no longer holds.
     pub(super) fn rectify(&mut self, number: u32, at: MonoNs, to: &mut Telling<'_>) {
         let Some(alert) = self.get_mut(number).filter(|alert| alert.state == AlertState::Active) else {
             return;
@@ -144,7 +147,8 @@ impl AlertList {
         to.tell(&alert, change, at);
     }
 
-    /// Somebody knows of the alert of this number, or with 0 of all. False where nothing was to be acknowledged.
+    /// Acknowledges the alert with this number, or all alerts with 0. False if there was nothing to
+    /// acknowledge.
     pub(crate) fn acknowledge(&mut self, number: u32, by: Who, at: MonoNs, to: &mut Telling<'_>) -> bool {
         let mut any = false;
         let is_meant = |alert: &&mut ListedAlert| number == 0 || alert.number == number;
@@ -161,7 +165,7 @@ impl AlertList {
         any
     }
 
-    /// Silences what sounds. False where nothing did.
+    /// Silences all sounding alerts. False if none sounded.
     pub(crate) fn silence(&mut self, at: MonoNs, to: &mut Telling<'_>) -> bool {
         let mut any = false;
         for alert in self.alerts.iter_mut().filter(|alert| alert.sounds(at)) {
@@ -172,7 +176,7 @@ impl AlertList {
         any
     }
 
-    /// Another priority: a higher one is to be acknowledged anew.
+    /// Raises the priority. An alert with a higher priority must be acknowledged again.
     pub(super) fn set_priority(&mut self, number: u32, priority: Priority, at: MonoNs, to: &mut Telling<'_>) {
         let Some(alert) = self.get_mut(number).filter(|alert| alert.priority < priority) else { return };
         alert.priority = priority;

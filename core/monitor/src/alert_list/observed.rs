@@ -1,4 +1,4 @@
-//! What holds at a beat, by situation.
+//! Conditions checked at each update, by situation.
 
 use serde::{Deserialize, Serialize};
 
@@ -11,37 +11,37 @@ use headrace_fusion::filter::suspicion::SettingDoubt;
 use headrace_geometry::time::{DurNs, MonoNs};
 use headrace_sensor::reading::SourceId;
 
-/// What hasn't been there yet isn't missed until so long after the first beat.
+/// Time after the first update before data or positions that never arrived count as missing.
 const GRACE: DurNs = DurNs(30_000_000_000);
-/// Nothing can be said of what is judged now: so long after such a stretch has grown.
+/// Time for which `CannotSay` stays active after such a stretch has last grown.
 const GROWS: DurNs = DurNs(10_000_000_000);
-/// Shares of what there is, percent, at which it is little: warning, alarm, emergency alarm.
+/// Remaining shares, percent, for warning, alarm and emergency alarm.
 const CABLE_PCT: [f64; 3] = [10.0, 5.0, -1.0];
 const TIME_PCT: [f64; 3] = [10.0, 0.0, -1.0];
 const BATTERY_PCT: [f64; 3] = [20.0, 10.0, 5.0];
-/// What is left must be so much more again before it is no longer little, percent.
+/// Dead band: a remainder must rise by this much, percent, to leave its priority.
 const MORE_PCT: f64 = 2.0;
 
-/// What has been there once.
+/// Data and positions seen at least once.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub(super) struct Had {
     position: bool,
     sure_position: bool,
     sonar: bool,
     turning: u64,
-    /// The stretch of which nothing could be said, and when it last grew.
+    /// The last stretch without a verdict, and the time at which it last grew.
     unsure: Option<(Stretch, MonoNs)>,
 }
 
-/// A beat, with the state as of then.
+/// An update, with the state as of that time.
 pub(crate) struct Beat<'a> {
     pub(crate) at: MonoNs,
-    /// Its `now` is the beat, too.
+    /// State with `now` equal to the time of the update.
     pub(crate) state: &'a LiveState,
     pub(crate) setting: Option<SettingDoubt>,
 }
 
-/// Something that may hold.
+/// A condition that may hold.
 pub(super) struct Seen {
     pub(super) kind: ListKind,
     pub(super) source: Option<SourceId>,
@@ -56,7 +56,7 @@ impl Seen {
 }
 
 impl AlertList {
-    /// Takes a beat.
+    /// Checks all conditions at an update.
     pub(crate) fn beat(&mut self, beat: &Beat<'_>, to: &mut Telling<'_>) {
         let Beat { at, state, .. } = *beat;
         let begun = *self.begun.get_or_insert(at);
@@ -75,7 +75,9 @@ impl AlertList {
         self.take_recording(at, to);
     }
 
-    /// Takes the time while no sensor speaks: `state` is as of the last beat, but for its `now`, which is `at`.
+    /// Checks sensors and remainders while no sensor delivers data.
+    ///
+    /// `state` is that of the last update, except that its `now` is `at`.
     pub(crate) fn time(&mut self, at: MonoNs, state: &LiveState, to: &mut Telling<'_>) {
         let Some(begun) = self.begun else { return };
         self.take_sensors(at, state, to);
@@ -83,13 +85,13 @@ impl AlertList {
         self.take_recording(at, to);
     }
 
-    /// A recording fails, or goes on.
+    /// Records whether a recording fails.
     pub(crate) fn set_recording(&mut self, fails: bool, at: MonoNs, to: &mut Telling<'_>) {
         self.recording_fails = fails;
         self.take_recording(at, to);
     }
 
-    /// What is told of the vehicle's battery.
+    /// Records the charge of the vehicle's battery, percent.
     pub(crate) fn set_battery(&mut self, battery_pct: f64) {
         self.battery_pct = Some(battery_pct);
     }
@@ -99,7 +101,7 @@ impl AlertList {
         self.observe(at, &seen, to);
     }
 
-    /// Whether something that hasn't been there yet should have been.
+    /// Whether data or positions that never arrived are overdue.
     fn is_late(&self, at: MonoNs) -> bool {
         self.begun.is_some_and(|begun| at.since(begun).0 >= GRACE.0)
     }
@@ -112,7 +114,7 @@ impl AlertList {
             .advice
             .as_ref()
             .map_or(Figures::None, |advice| Figures::Advice(AdviceFigures::of(advice, speed_mps)));
-        // The dead band of the speed is that between a little fast and too fast.
+        // The dead band of the speed lies between slightly over and too fast.
         let is_over = condition == Condition::Over && self.is_active(ListKind::TooFast, None);
         let too_fast = condition == Condition::TooFast || is_over;
         self.observe(at, &Seen::of(ListKind::TooFast, too_fast, figures), to);
@@ -138,7 +140,7 @@ impl AlertList {
 
     fn take_unsure(&mut self, beat: &Beat<'_>, to: &mut Telling<'_>) {
         let Beat { at, state, .. } = *beat;
-        // The ends of the way are told when they are left.
+        // The ends of the coverage extent are reported when they are left.
         let now = state.unsure.filter(|stretch| stretch.why != Unsure::NotInspected);
         let before = self.had.unsure;
         if now.is_some() && now != before.map(|(stretch, _)| stretch) {
@@ -149,7 +151,7 @@ impl AlertList {
         self.observe(at, &Seen::of(ListKind::CannotSay, grows, Figures::CannotSay(stretch)), to);
     }
 
-    /// Alerts about the dive as a whole.
+    /// Checks alerts about the dive as a whole.
     fn take_dive(&mut self, beat: &Beat<'_>, to: &mut Telling<'_>) {
         let Beat { at, state, setting } = *beat;
         let active = |kind: ListKind, source: Option<SourceId>| {
@@ -182,10 +184,10 @@ impl AlertList {
         let heard = |source: u16| state.heard.get(usize::from(source)).copied().flatten();
         let is_silent =
             |source: u16| matches!(state.sensor(source.into()), SensorState::Never | SensorState::Silent);
-        // Nothing from anybody is one situation, not one for each.
+        // If no sensor delivers data, that is one situation, not one for each sensor.
         let all_silent = state.sources > 0 && sources().all(is_silent);
         self.observe(at, &Seen::of(ListKind::NoData, all_silent, Figures::None), to);
-        // Silent is who says nothing while another one speaks.
+        // A sensor is silent if it delivers nothing while another one does.
         let newest = sources().filter_map(heard).max();
         for source in sources() {
             let holds = match (heard(source), newest) {
@@ -218,7 +220,7 @@ impl AlertList {
         self.observe(at, &Seen::of(ListKind::NoSonar, no_sonar, Figures::None), to);
     }
 
-    /// What is left of cable, time and battery.
+    /// Checks the remaining cable, time and charge.
     fn take_left(&mut self, at: MonoNs, state: &LiveState, begun: MonoNs, to: &mut Telling<'_>) {
         let cable = self.cable_left_m(state.chainage_m).zip(self.limits.cable_m);
         let time = self.limits.dive_time.map(DurNs::as_secs_f64);
@@ -251,12 +253,12 @@ impl AlertList {
         }
     }
 
-    /// Cable left beyond the vehicle's place, m; `None` where its length isn't told.
+    /// Cable left beyond the vehicle's place, m; `None` if its length is unknown.
     pub(super) fn cable_left_m(&self, x_m: Option<f64>) -> Option<f64> {
         self.limits.cable_m.zip(x_m).map(|(cable_m, x_m)| cable_m - x_m.max(0.0))
     }
 
-    /// Time left, seconds; `None` where the dive's isn't told.
+    /// Time left, seconds; `None` if the dive's duration is unlimited.
     pub(super) fn time_left_s(&self, at: MonoNs) -> Option<f64> {
         let all = self.limits.dive_time?;
         Some((all - self.begun.map_or(DurNs(0), |begun| at.since(begun))).as_secs_f64())
@@ -266,7 +268,7 @@ impl AlertList {
         self.timers.get(timer::place(kind, source)).is_some_and(|timer| timer.number != 0)
     }
 
-    /// Takes what holds of a situation, and does what is due.
+    /// Applies an observed condition to its situation, and raises or ends its alert when due.
     pub(super) fn observe(&mut self, at: MonoNs, seen: &Seen, to: &mut Telling<'_>) {
         let Seen { kind, source, holds, figures } = *seen;
         let place = timer::place(kind, source);
@@ -291,7 +293,8 @@ impl AlertList {
         }
     }
 
-    /// One alert per situation: one that nobody has acknowledged yet holds again.
+    /// Raises an alert, or reactivates the one that nobody has acknowledged yet: each situation has one
+    /// alert.
     fn raise_or_hold_again(
         &mut self,
         kind: ListKind,
@@ -315,7 +318,7 @@ impl AlertList {
         number
     }
 
-    /// The figures of what goes on; a change of place is told.
+    /// Updates the figures of a continuing alert. A change of place is published.
     fn update(&mut self, number: u32, figures: Figures, to: &mut Telling<'_>, at: MonoNs) {
         let Some(alert) = self.get_mut(number) else { return };
         alert.figures = alert.figures.and_then(figures, alert.kind);
@@ -329,8 +332,9 @@ impl AlertList {
 }
 
 impl Figures {
-    /// What is told of a situation that goes on: what is now, but of speeds the highest. Once the pilot has slowed down, the last
-    /// one is a speed that is allowed.
+    /// Figures of a continuing situation: the present ones, except that the highest speed is kept.
+    ///
+    /// Once the pilot has slowed down, the present speed would be one that is allowed.
     fn and_then(self, now: Self, kind: ListKind) -> Self {
         match (self, now) {
             (Self::Advice(before), Self::Advice(figures))

@@ -1,28 +1,28 @@
-//! Missed stretches: an alert per run of flagged sections, merged as they are.
+//! Alerts for missed stretches: one per run of flagged sections, merged as the runs are.
 
 use super::{AlertChange, AlertList, AlertState, Figures, ListKind, ListedAlert, Telling};
 use crate::pilot_text::CauseFigures;
 use headrace_coverage::{RunChange, RunId, Sections};
 use headrace_geometry::time::MonoNs;
 
-/// A run that has changed, as it was then.
+/// A changed run, with its figures at the time of the change.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct RunInput {
-    /// Index of the event at which it was judged; of a beat, of the event that it precedes.
+    /// Index of the event at which it was judged; for an update, of the event that follows the update.
     pub(crate) event: usize,
-    /// Judged at a beat, which comes before that event.
+    /// It was judged at an update, which precedes that event.
     pub(crate) at_beat: bool,
     pub(crate) at: MonoNs,
     pub(crate) id: RunId,
     pub(crate) change: RunChange,
     pub(super) stretch: (i64, i64),
-    /// Causes and arc length of the worst hole, m.
+    /// Causes, and arc length of the worst hole, m.
     pub(super) causes: Option<(CauseFigures, f64)>,
     pub(super) merged_into: Option<RunId>,
 }
 
 impl RunInput {
-    /// Of a run after a judgement; `None` if there is no such run.
+    /// Input for a run after a judgement; `None` if there is no such run.
     pub(crate) fn of(
         (event, at_beat): (usize, bool),
         at: MonoNs,
@@ -37,7 +37,7 @@ impl RunInput {
 }
 
 impl AlertList {
-    /// Takes a run's change.
+    /// Applies a run's change.
     pub(crate) fn take_run(&mut self, input: &RunInput, to: &mut Telling<'_>) {
         let at = input.at;
         match input.change {
@@ -60,7 +60,7 @@ impl AlertList {
     }
 
     fn set_alert_of(&mut self, id: RunId, number: u32) {
-        // Within its room: there are no more runs than sections.
+        // The capacity suffices: there are no more runs than sections.
         while self.by_run.len() <= id.0 as usize && self.by_run.len() < self.by_run.capacity() {
             self.by_run.push(0);
         }
@@ -73,7 +73,7 @@ impl AlertList {
         let v_max_mps = self.v_max_mps;
         let figures =
             input.causes.map_or(Figures::None, |(causes, arc_m)| Figures::Missed(causes, arc_m, v_max_mps));
-        // Part of a stretch that is told already: what a later pass left of it.
+        // This is a part of a stretch that already has an alert, left over by a later pass.
         let (from, until) = input.stretch;
         let has = |alert: &&ListedAlert| {
             alert.kind == ListKind::Missed
@@ -94,7 +94,9 @@ impl AlertList {
         self.set_alert_of(input.id, number);
     }
 
-    /// A stretch has grown, or shrunk if it is one run; what a later pass mends in the middle of it leaves one alert.
+    /// Adapts an alert to a run that has grown, or that has shrunk if it is the alert's only run.
+    ///
+    /// A gap filled in its middle leaves one alert.
     fn widen(&mut self, number: u32, input: &RunInput, to: &mut Telling<'_>) {
         let Some(alert) = self.get_mut(number) else { return };
         let (from, until) = alert.stretch.unwrap_or(input.stretch);
@@ -124,13 +126,13 @@ impl AlertList {
         }
     }
 
-    /// Two runs have become one: of their alerts the one with the lower number stands for both.
+    /// Two runs have merged. The alert with the lower number represents both.
     fn merge_runs(&mut self, input: &RunInput, to: &mut Telling<'_>) {
         let Some(into) = input.merged_into else { return };
         let (other, kept) = (self.alert_of(input.id), self.alert_of(into));
         self.set_alert_of(input.id, 0);
         if other == kept {
-            // Two runs of one alert are one now.
+            // Two runs of one alert have merged.
             if let Some(alert) = self.get_mut(kept) {
                 alert.open_runs = alert.open_runs.saturating_sub(1);
             }
@@ -146,7 +148,7 @@ impl AlertList {
         }
     }
 
-    /// Lets the alert `low` stand for `high`, which is over.
+    /// Merges the alert `high`, which ends, into the alert `low`.
     fn merge(&mut self, low: u32, high: u32, at: MonoNs, to: &mut Telling<'_>) {
         let Some(gone) = self.get_mut(high) else { return };
         let before = *gone;
@@ -161,7 +163,7 @@ impl AlertList {
         kept.stretch = both.map(|(one, other)| (one.0.min(other.0), one.1.max(other.1))).or(kept.stretch);
         kept.count += before.count;
         kept.open_runs += before.open_runs;
-        // What nobody knew of isn't hidden behind what somebody did.
+        // An unacknowledged alert must not disappear behind an acknowledged one.
         if before.needs_acknowledgement() {
             (kept.acknowledged, kept.silenced_until) = (None, before.silenced_until);
         }
@@ -173,7 +175,8 @@ impl AlertList {
         to.tell(&kept, AlertChange::Changed, at);
     }
 
-    /// Where the list is full of live alerts: the newest missed stretch shares the alert of its nearest neighbour.
+    /// Frees an entry of a list full of live alerts: the newest missed stretch is merged into its nearest
+    /// neighbour.
     pub(super) fn share_one(&mut self, at: MonoNs, to: &mut Telling<'_>) {
         let stretches = || {
             let missed = self.alerts.iter().filter(|alert| alert.kind == ListKind::Missed && alert.is_live());

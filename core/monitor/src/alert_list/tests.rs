@@ -7,7 +7,7 @@ use headrace_geometry::snapshot::{Restorer, Saver, Stateful as _};
 use headrace_vehicle::ClassTiming;
 use proptest::prelude::*;
 
-/// A list, and where it tells.
+/// A list, and the context for its changes.
 struct Bench {
     list: AlertList,
     notices: Notices,
@@ -26,7 +26,7 @@ impl Bench {
         }
     }
 
-    /// The same with another memory: all state goes by a snapshot.
+    /// The same list after its state has passed through a snapshot.
     fn restored(self) -> Self {
         let mut saver = Saver::default();
         self.list.save(&mut saver);
@@ -53,10 +53,10 @@ impl Bench {
     }
 }
 
-/// What may happen.
+/// Possible events.
 #[derive(Debug, Clone, Copy)]
 enum Happens {
-    /// A beat at which each situation holds or not.
+    /// An update at which each situation holds or not.
     Beat([bool; 3]),
     AcknowledgeNewest,
     AcknowledgeAll,
@@ -64,11 +64,12 @@ enum Happens {
     Snapshot,
 }
 
-/// Of each priority that a situation of its own may have.
+/// One kind of each priority with a situation of its own.
 const KINDS: [ListKind; 3] = [ListKind::TooFast, ListKind::NotRecorded, ListKind::TurnFails];
 const BEAT_MS: u64 = 200;
 
-/// The life of one situation's alerts, as in the table of MSC.302(87), written from the history of what held.
+/// Life cycle of one situation's alerts by the table of MSC.302(87), derived from the history of the
+/// condition.
 #[derive(Debug, Clone, Default)]
 struct Oracle {
     history: Vec<(u64, bool)>,
@@ -78,7 +79,10 @@ struct Oracle {
 }
 
 impl Oracle {
-    /// How long it has held, breaks shorter than `least_ms` included, and how long it hasn't, by the last history alone.
+    /// Time for which the condition has held, including breaks shorter than `least_ms`, and time for which it
+    /// hasn't.
+    ///
+    /// Derived from the latest history only.
     fn spells_ms(&self, least_ms: u64) -> (Option<u64>, Option<u64>) {
         let now = self.history.last().map_or(0, |(at, _)| *at);
         let off_from = |until: usize| {
@@ -86,7 +90,7 @@ impl Oracle {
             back.last().map(|(at, _)| *at)
         };
         let off = off_from(self.history.len()).map(|from| now - from);
-        // The first time of holding after the last break that was long enough.
+        // The first time that the condition held after the last long break.
         let (mut on, mut break_from) = (None, None);
         for (at, held) in &self.history {
             if *held {
@@ -110,7 +114,7 @@ impl Oracle {
             "active unacknowledged" | "active acknowledged" | "active caution"
                 if off.is_some_and(|off| off >= off_ms) =>
             {
-                // What ends begins anew.
+                // After its end, a situation starts afresh.
                 self.history.clear();
                 self.all.last_mut().unwrap().1 =
                     if state == "active unacknowledged" { "rectified unacknowledged" } else { "cleared" };
@@ -161,9 +165,9 @@ fn happens() -> impl Strategy<Value = Happens> {
 }
 
 proptest! {
-    /// Whatever holds and whatever an operator does, each alert is where the table says.
+    /// Every alert is in the state of the table after any conditions and operator commands.
     #[test]
-    fn alerts_live_as_the_table_says(
+    fn alert_life_cycle_follows_the_msc_table(
         steps in proptest::collection::vec((happens(), 1usize..8), 1..120),
         hold_ms in prop_oneof![Just(0u64), 200..1500u64],
         off_ms in prop_oneof![Just(0u64), 200..3000u64],
@@ -227,14 +231,14 @@ proptest! {
 }
 
 #[test]
-fn a_speed_that_flickers_about_its_limit_raises_one_alert() {
+fn flickering_speed_raises_one_alert() {
     let mut bench = Bench::new(1.0, 5.0);
     for beat in 0..3000_u64 {
         let seen = Seen::of(ListKind::TooFast, beat % 3 != 0, Figures::None);
         bench.with(|list, to| list.observe(MonoNs(beat * 200_000_000), &seen, to));
     }
     assert_eq!((bench.list.raised(), bench.notices.0.len()), (1, 1));
-    // Without hold time and dead band it is ten a minute.
+    // Without hold time and dead band there are ten alerts a minute.
     let mut bench = Bench::new(0.0, 0.0);
     for beat in 0..300_u64 {
         let seen = Seen::of(ListKind::TurnFails, beat % 3 != 0, Figures::None);
@@ -244,7 +248,7 @@ fn a_speed_that_flickers_about_its_limit_raises_one_alert() {
 }
 
 #[test]
-fn an_acknowledgement_is_made_once_and_of_what_there_is() {
+fn only_existing_unacknowledged_alerts_are_acknowledged() {
     let mut bench = Bench::new(0.0, 0.0);
     let at = MonoNs(7);
     let acknowledge =
@@ -252,13 +256,13 @@ fn an_acknowledgement_is_made_once_and_of_what_there_is() {
     assert!(!acknowledge(&mut bench, 0) && !acknowledge(&mut bench, 1));
     bench.with(|list, to| list.observe(at, &Seen::of(ListKind::NotRecorded, true, Figures::None), to));
     bench.with(|list, to| list.observe(at, &Seen::of(ListKind::TurnFails, true, Figures::None), to));
-    assert!(!acknowledge(&mut bench, 2), "a caution needs none");
+    assert!(!acknowledge(&mut bench, 2), "a caution needs no acknowledgement");
     assert!(acknowledge(&mut bench, 1) && !acknowledge(&mut bench, 1) && !acknowledge(&mut bench, 0));
     assert_eq!(bench.list.get(1).unwrap().acknowledged, Some(Acknowledgement { by: Who::cut("AB"), at }));
 }
 
 #[test]
-fn what_becomes_more_urgent_is_acknowledged_anew() {
+fn higher_priority_needs_a_new_acknowledgement() {
     let mut bench = Bench::new(0.0, 5.0);
     let mut state = crate::live_state::test_state();
     let mut beat = |bench: &mut Bench, at_s: u64, pct: f64| {
@@ -279,7 +283,7 @@ fn what_becomes_more_urgent_is_acknowledged_anew() {
     beat(&mut bench, 4, 10.0);
     assert_eq!(battery(&bench), Some((Priority::Alarm, true)));
     bench.with(|list, to| list.acknowledge(0, Who::cut("AB"), MonoNs(5), to));
-    // It flickers.
+    // The charge flickers.
     beat(&mut bench, 6, 11.0);
     beat(&mut bench, 7, 10.0);
     assert_eq!(battery(&bench), Some((Priority::Alarm, false)));
@@ -288,14 +292,14 @@ fn what_becomes_more_urgent_is_acknowledged_anew() {
 }
 
 #[test]
-fn an_alert_is_as_long_as_what_is_still_missed_of_its_stretch() {
+fn alert_spans_the_part_still_missed() {
     let mut bench = Bench::new(0.0, 0.0);
     let stretch = |bench: &Bench| bench.list.iter().next().and_then(|alert| alert.stretch);
     bench.run(0, RunChange::Raised, (40, 41), None);
     bench.run(0, RunChange::Changed, (40, 64), None);
     bench.run(0, RunChange::Changed, (40, 52), None);
-    assert_eq!(stretch(&bench), Some((40, 52)), "passed again from its far end");
-    // Passed in the middle: two runs of one alert.
+    assert_eq!(stretch(&bench), Some((40, 52)), "the far end was passed again");
+    // The middle was passed again: two runs of one alert.
     bench.run(1, RunChange::Raised, (48, 52), None);
     bench.run(0, RunChange::Changed, (40, 44), None);
     assert_eq!((stretch(&bench), bench.list.iter().count()), (Some((40, 52)), 1));
@@ -305,7 +309,7 @@ fn an_alert_is_as_long_as_what_is_still_missed_of_its_stretch() {
 }
 
 #[test]
-fn runs_that_merge_keep_the_lower_number_and_what_nobody_knew_of() {
+fn merged_runs_keep_the_lower_number_and_stay_unacknowledged() {
     let mut bench = Bench::new(0.0, 0.0);
     bench.run(0, RunChange::Raised, (10, 11), None);
     bench.run(1, RunChange::Raised, (14, 15), None);
@@ -315,7 +319,7 @@ fn runs_that_merge_keep_the_lower_number_and_what_nobody_knew_of() {
     let [kept, gone] = [1, 2].map(|number| *bench.list.get(number).unwrap());
     assert_eq!((kept.stretch, kept.count, kept.needs_acknowledgement()), (Some((10, 15)), 2, true));
     assert_eq!((gone.state, gone.merged_into), (AlertState::Cleared, Some(1)));
-    // A later pass mends the middle, which leaves another run: still one alert. Then all of it.
+    // A later pass fills the middle and leaves another run: still one alert. Then all of it is filled.
     bench.run(2, RunChange::Raised, (13, 15), None);
     bench.run(0, RunChange::Changed, (10, 12), None);
     assert_eq!(bench.list.raised(), 2);
@@ -326,14 +330,14 @@ fn runs_that_merge_keep_the_lower_number_and_what_nobody_knew_of() {
     bench.with(|list, to| list.acknowledge(0, Who::cut("AB"), MonoNs(9), to));
     assert_eq!(bench.list.get(1).unwrap().state, AlertState::Cleared);
     bench.run(3, RunChange::Raised, (10, 11), None);
-    assert_eq!(bench.list.raised(), 3, "what is over is over");
+    assert_eq!(bench.list.raised(), 3, "a cleared alert stays cleared");
 }
 
 proptest! {
-    /// 7 km of runs, raised and cleared at random: whatever is missed and wasn't acknowledged is in an alert that says so, in a
-    /// list that never grows; and once all is mended, nothing holds.
+    /// 7 km of runs are raised and cleared at random. Every unacknowledged missed stretch stays in an alert,
+    /// the list never grows, and no alert holds once all is filled.
     #[test]
-    fn no_missed_stretch_is_lost_from_a_full_list(
+    fn full_list_loses_no_missed_stretch(
         events in proptest::collection::vec((0u8..10, 0u32..2000), 800..2500),
     ) {
         let mut bench = Bench::new(0.0, 0.0);

@@ -1,4 +1,4 @@
-//! Hold time and dead band of a situation: when what holds is told, and when it is over.
+//! Hold time and dead band of a situation: decides when its alert is raised and when it ends.
 
 use serde::{Deserialize, Serialize};
 
@@ -6,45 +6,46 @@ use super::ListKind;
 use headrace_geometry::time::{DurNs, MonoNs};
 use headrace_sensor::reading::{MAX_SOURCES, SourceId};
 
-/// Number of situations: one of each kind, and one of each kind and sensor where it names one.
+/// Number of situations: one of each kind, and one per sensor for kinds that name a sensor.
 pub(super) const COUNT: usize = ListKind::ALL.len() * MAX_SOURCES;
 
-/// Place of a situation's timer.
+/// Index of a situation's timer.
 pub(super) fn place(kind: ListKind, source: Option<SourceId>) -> usize {
     kind as usize * MAX_SOURCES + source.map_or(0, |source| source.index() % MAX_SOURCES)
 }
 
-/// A situation.
+/// Timer of a situation.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub(super) struct Timer {
-    /// Number of its alert while that is active; zero else.
+    /// Number of its alert while that is active, otherwise zero.
     pub(super) number: u32,
-    /// Since when it has held, short breaks included.
+    /// Time since which the condition has held, short breaks included.
     on: Option<MonoNs>,
-    /// Since when it hasn't, within a break.
+    /// Beginning of the present break.
     off: Option<MonoNs>,
 }
 
-/// What is due.
+/// Action that is due.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Due {
-    /// It has held for long enough.
+    /// Raise: the condition has held long enough.
     Raise,
-    /// It goes on.
+    /// Continue: the active alert goes on.
     GoesOn,
-    /// It hasn't held for long enough.
+    /// End: the condition has been absent long enough.
     End,
-    /// Neither.
+    /// No action.
     Nothing,
 }
 
 impl Timer {
-    /// Takes what holds at `at`. A break shorter than `off` ends nothing, one shorter than `hold` begins nothing anew.
+    /// Updates the timer at `at`. A break shorter than `off` doesn't end an alert; one shorter than `hold`
+    /// doesn't restart the hold time.
     pub(super) fn take(&mut self, at: MonoNs, holds: bool, hold: DurNs, off: DurNs) -> Due {
         let is_active = self.number != 0;
         if holds {
             self.off = None;
-            // A clock that goes back begins anew.
+            // A clock that goes back restarts the timer.
             let on = self.on.filter(|on| *on <= at).unwrap_or(at);
             self.on = Some(on);
             return match (is_active, at.since(on).0 >= hold.0) {

@@ -1,4 +1,4 @@
-//! Words for alerts, made of the table that the pilot's other lines are made of. Allocates: for outlets, not for a tick.
+//! Texts of alerts, from the table used for the pilot's other lines. Allocates: for outlets, not for a tick.
 
 use super::{AlertState, Figures, ListKind, ListedAlert};
 use crate::app::SourceInfo;
@@ -11,27 +11,27 @@ use crate::unsure_stretch::{UnsureStretch, helps_text, unsure_text};
 use headrace_coverage::{Sections, Stretch};
 use headrace_geometry::tunnel::Profile;
 
-/// What words need of the dive.
+/// Properties of the dive that the texts need.
 #[derive(Debug, Clone, Copy)]
 pub struct Surroundings<'a> {
-    /// The sources, for their ids.
+    /// Sources, for their ids.
     pub sources: &'a [SourceInfo],
-    /// The tunnel, for clock positions.
+    /// Tunnel profile, for clock positions.
     pub profile: &'a Profile,
     /// Length of a section, m.
     pub section_m: f64,
     /// Target T, m.
     pub target_m: f64,
-    /// Standard deviations of a hole that a verdict keeps clear of the target.
+    /// Confidence: standard deviations of a hole by which a verdict must clear the target.
     pub confidence_sd: f64,
-    /// The sections, for where to go back to.
+    /// Sections, for the place to go back to.
     pub sections: &'a Sections,
-    /// What the heads are called and could be set to.
+    /// Names and other settings of the heads.
     pub heads: &'a HeadWords,
 }
 
 impl<'a> Surroundings<'a> {
-    /// Those of a dive.
+    /// Surroundings of a dive.
     pub(crate) fn of(
         sources: &'a [SourceInfo],
         profile: &'a Profile,
@@ -59,7 +59,7 @@ impl<'a> Surroundings<'a> {
 }
 
 impl ListedAlert {
-    /// Where it begins and ends, m.
+    /// Beginning and end of its stretch, m.
     pub fn bounds_m(&self, section_m: f64) -> (Option<f64>, Option<f64>) {
         match self.stretch {
             Some((from, to)) => (Some(from as f64 * section_m), Some(to as f64 * section_m)),
@@ -67,7 +67,7 @@ impl ListedAlert {
         }
     }
 
-    /// What holds.
+    /// Text of the problem.
     pub fn text(&self, around: &Surroundings<'_>) -> String {
         let name = self.source.map(|source| around.name(source.index())).unwrap_or_default();
         let place = match self.bounds_m(around.section_m) {
@@ -113,7 +113,7 @@ impl ListedAlert {
         }
     }
 
-    /// What to do; empty where there is nothing, and once it is over.
+    /// Text of the action; empty if there is none, and once the alert has ended.
     pub fn advice(&self, around: &Surroundings<'_>) -> String {
         if self.state != AlertState::Active {
             return String::new();
@@ -155,7 +155,7 @@ fn plain_text(kind: ListKind, name: &str, place: &str) -> String {
     }
 }
 
-/// The words of a line that begins with `ch` and its place.
+/// Text of a line that begins with `ch` and its place.
 fn place_first(text: &str, x_m: f64) -> String {
     let place = station(x_m);
     let said = text.strip_prefix(&format!("ch {place}")).unwrap_or(text).trim_start();

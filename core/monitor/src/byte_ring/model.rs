@@ -1,7 +1,8 @@
-//! A ring whose interleavings are explored by loom: all orders of its accesses, and all that weaker memory lets a reader see.
+//! A ring for loom, which explores all orders of its accesses and all effects of weaker memory.
 //!
-//! The indices are loom's, with the orderings that ringbuf's have. The bytes are visible as soon as they are stored, which
-//! is no weaker: what a reader may see of them follows from the indices alone, and ringbuf sees to that.
+//! The indices are loom's, with the orderings of ringbuf's. The bytes are visible as soon as they are stored.
+//! That is no weaker: the bytes that a reader may see follow from the indices alone, which ringbuf
+//! guarantees.
 
 use std::sync::atomic::AtomicU8;
 use std::sync::atomic::Ordering::Relaxed;
@@ -25,19 +26,19 @@ impl Shared {
     }
 }
 
-/// Writing end. Its own index is at hand and isn't loaded: loom would take the load for one that hides the reader's.
+/// Writing end. It caches its own index, since loom would take a load of it for one that hides the reader's.
 pub struct ModelProducer {
     shared: Arc<Shared>,
     write: usize,
 }
 
-/// Reading end, likewise.
+/// Reading end. It caches its own index, too.
 pub struct ModelConsumer {
     shared: Arc<Shared>,
     read: usize,
 }
 
-/// A ring of `capacity` bytes, within `loom::model`.
+/// A ring of `capacity` bytes, for use within `loom::model`.
 pub fn ring(capacity: usize) -> (ModelProducer, ModelConsumer) {
     let bytes = (0..capacity).map(|_| AtomicU8::new(0)).collect();
     let shared = Arc::new(Shared { bytes, read: AtomicUsize::new(0), write: AtomicUsize::new(0) });
@@ -89,8 +90,9 @@ impl ByteConsumer for ModelConsumer {
     }
 }
 
-/// A reading end that takes all for there: a protocol on it that waits for its message doesn't. Models of broken protocols are
-/// of this, and must be found to be so.
+/// A reading end that assumes all bytes are present, so a protocol on it doesn't wait for its message.
+///
+/// Models of broken protocols use it and must be found to fail.
 pub struct Hasty(pub ModelConsumer);
 
 impl ByteConsumer for Hasty {
@@ -116,7 +118,7 @@ pub fn packets(capacity: usize) -> (Port<ModelProducer>, ModelReader) {
     packets_by(capacity, |consumer| consumer)
 }
 
-/// The same with another reading end.
+/// The loop's ring on a model, with another reading end.
 pub fn packets_by<R: ByteConsumer>(
     capacity: usize,
     reading: impl FnOnce(ModelConsumer) -> R,
@@ -129,7 +131,7 @@ pub fn packets_by<R: ByteConsumer>(
 pub struct ModelReader<R: ByteConsumer = ModelConsumer>(PortReader<R>);
 
 impl<R: ByteConsumer> ModelReader<R> {
-    /// The next packet, as the loop takes it: receive time and bytes.
+    /// Next packet as the loop takes it: receive time and bytes.
     pub fn take_next(&mut self) -> Option<(u64, Vec<u8>)> {
         let header = self.0.peek()?;
         let mut bytes = vec![0; header.len];
@@ -138,7 +140,7 @@ impl<R: ByteConsumer> ModelReader<R> {
     }
 }
 
-/// Runs a model, tells how many executions it had, and gives their number.
+/// Runs a model, prints its number of executions, and returns it.
 pub fn explore(name: &str, preemptions: Option<usize>, model: impl Fn() + Sync + Send + 'static) -> usize {
     let executions = std::sync::Arc::new(std::sync::atomic::AtomicUsize::new(0));
     let count = std::sync::Arc::clone(&executions);

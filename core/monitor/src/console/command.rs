@@ -11,76 +11,76 @@ pub const MAX_COMMAND_BYTES: usize = 512;
 /// Longest note, bytes.
 pub const MAX_NOTE_BYTES: usize = 240;
 
-/// Who commands: initials, a name, or a device.
+/// Author of a command: initials, a name, or a device.
 pub type Who = ShortText<16>;
 /// Text of a note.
 pub type NoteText = ShortText<MAX_NOTE_BYTES>;
 
 /// A command.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-#[expect(clippy::large_enum_variant, reason = "copied into room that is there already; a box would allocate")]
+#[expect(clippy::large_enum_variant, reason = "copied into preallocated room; a box would allocate")]
 pub enum Command {
-    /// Acknowledges the alert of this number; 0 for all that need it.
+    /// Acknowledges the alert with this number; 0 acknowledges all that need it.
     Acknowledge {
-        /// Its number.
+        /// Number of the alert.
         alert: u32,
-        /// By whom.
+        /// Author.
         by: Who,
     },
-    /// Silences all that sound, for 30 s.
+    /// Silences all sounding alerts for 30 s.
     Silence {
-        /// By whom.
+        /// Author.
         by: Who,
     },
-    /// A note at the present place.
+    /// Adds a note at the present place.
     Note {
-        /// Its text; empty for a mark.
+        /// Text; empty for a mark.
         text: NoteText,
-        /// By whom.
+        /// Author.
         by: Who,
     },
-    /// A voice note at the present place: its recording begins.
+    /// Adds a voice note at the present place: its recording begins.
     Voice {
-        /// Ties the note to its recording; not 0.
+        /// Id that ties the note to its recording; not 0.
         id: u32,
-        /// By whom.
+        /// Author.
         by: Who,
     },
     /// From the program: the recording of a voice note is in the log.
     Voiced {
-        /// The note's.
+        /// Id of the note.
         id: u32,
-        /// How long it is, seconds, 1 to 60.
+        /// Length, seconds, 1 to 60.
         seconds: u32,
     },
-    /// From the program: a recording fails, or goes on.
+    /// From the program: a recording fails, or works again.
     Recording {
         /// Whether it fails.
         fails: bool,
     },
-    /// What is told of the vehicle from outside.
+    /// From outside: remaining resources of the vehicle.
     Limits {
         /// Charge of its battery, percent.
         battery_pct: f64,
     },
-    /// From the program: the time goes on though no sensor speaks.
+    /// From the program: time passes although no sensor delivers data.
     Time,
 }
 
-/// Why bytes are no command.
+/// Reason for which bytes are no command.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[error("reading a command, at byte {at}: expected {expected}")]
 pub struct CommandError {
-    /// Place of the first byte that is wrong.
+    /// Index of the first wrong byte.
     pub at: usize,
-    /// What is allowed there.
+    /// Allowed input there.
     pub expected: &'static str,
 }
 
 /// Keys of a command.
 const KEYS: [&str; 8] = ["do", "alert", "by", "text", "fails", "battery_pct", "id", "seconds"];
 
-/// Values of the keys so far.
+/// Values of the keys read so far.
 #[derive(Default)]
 struct Values {
     what: Option<Who>,
@@ -89,14 +89,14 @@ struct Values {
     text: Option<NoteText>,
     fails: Option<bool>,
     battery_pct: Option<f64>,
-    /// Of a voice note.
+    /// Id of a voice note.
     id: Option<u32>,
-    /// Of a voice note.
+    /// Length of a voice note.
     seconds: Option<u32>,
 }
 
 impl Command {
-    /// Whether an operator may send it; the others come from the program itself.
+    /// Whether an operator may send it. The program itself sends the others.
     pub fn is_operators(&self) -> bool {
         matches!(
             self,
@@ -104,7 +104,7 @@ impl Command {
         )
     }
 
-    /// The same of nobody, and without what somebody wrote.
+    /// The command without its author and text.
     #[must_use]
     pub fn anonymous(self) -> Self {
         let by = Who::default();
@@ -117,9 +117,9 @@ impl Command {
         }
     }
 
-    /// Reads a packet: one JSON object with the keys of its command and no others. Allocates: never.
+    /// Parses a packet: one JSON object with the keys of its command and no others. Allocates: never.
     ///
-    /// Errors: what isn't as it must be first.
+    /// Errors: the first deviation from that form.
     pub fn parse(bytes: &[u8]) -> Result<Self, CommandError> {
         if bytes.len() > MAX_COMMAND_BYTES {
             return Err(CommandError { at: MAX_COMMAND_BYTES, expected: "at most 512 bytes" });
@@ -131,7 +131,7 @@ impl Command {
         values.command().map_err(|expected| CommandError { at: 0, expected })
     }
 
-    /// As a packet.
+    /// The command as a packet.
     pub fn to_json(&self) -> String {
         let mut json = String::with_capacity(64);
         let by = |json: &mut String, by: &Who| quote(json, ",\"by\":", by.as_str());
@@ -173,7 +173,7 @@ impl Command {
     }
 }
 
-/// Adds a key and a text, which has no control characters.
+/// Appends a key and a text, which has no control characters.
 fn quote(json: &mut String, key: &str, text: &str) {
     json.push_str(key);
     json.push('"');
@@ -187,7 +187,7 @@ fn quote(json: &mut String, key: &str, text: &str) {
 }
 
 impl Values {
-    /// The command, which has all its keys and no other.
+    /// Builds the command from exactly its own keys.
     fn command(self) -> Result<Command, &'static str> {
         let Self { what, alert, by, text, fails, battery_pct, id, seconds } = self;
         let what = what.ok_or("the key \"do\"")?;
@@ -225,7 +225,7 @@ impl Values {
     }
 }
 
-/// A place in a text.
+/// A position in a text.
 struct Scan<'a> {
     text: &'a str,
     at: usize,
@@ -245,7 +245,7 @@ impl Scan<'_> {
         self.at += self.rest().bytes().take_while(is_space).count();
     }
 
-    /// Whether `word` comes next, after blanks; it is passed then.
+    /// Skips blanks, and consumes `word` if it comes next. Returns whether it did.
     fn has(&mut self, word: &str) -> bool {
         self.skip_space();
         let has = self.rest().starts_with(word);
@@ -304,7 +304,7 @@ impl Scan<'_> {
         if self.has("false") { Ok(false) } else { self.wrong("true or false") }
     }
 
-    /// A number as JSON writes it, without an exponent.
+    /// Scans a number as JSON writes it, without an exponent.
     fn number(&mut self) -> &str {
         let bytes = self.rest().as_bytes();
         let digits = |from: usize| bytes.iter().skip(from).take_while(|byte| byte.is_ascii_digit()).count();
@@ -363,11 +363,11 @@ impl Scan<'_> {
         Some(char)
     }
 
-    /// The character that an escape stands for, after its backslash.
+    /// Character that an escape represents, after its backslash.
     fn escaped(&mut self) -> Option<char> {
         match self.next()? {
             char @ ('"' | '\\' | '/') => Some(char),
-            // Refused as control characters where they are put.
+            // These are refused later as control characters.
             'b' | 'f' | 'n' | 'r' | 't' => Some('\n'),
             'u' => {
                 let first = self.unit()?;

@@ -8,21 +8,21 @@ use headrace_geometry::snapshot::stateful;
 use headrace_geometry::time::MonoNs;
 use headrace_sensor::reading::{Packet, SourceId};
 
-/// Most commands of a tick: more than the source's ring holds.
+/// Maximum number of commands in a tick: more than the source's ring holds.
 const MOST_OF_TICK: usize = 256;
 
-/// Traffic of the console.
+/// Traffic statistics of the console.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub struct ConsoleCounts {
-    /// Packets.
+    /// Number of packets.
     pub packets: u64,
-    /// Of these, such that are no command.
+    /// Number of packets that are no command.
     pub invalid: u64,
-    /// Commands that changed nothing: an alert that there isn't, or that needs no acknowledgement.
+    /// Commands without effect: the alert doesn't exist, or needs no acknowledgement.
     pub without_effect: u64,
 }
 
-/// The source.
+/// The console as a source.
 #[derive(Debug, Resource)]
 pub(crate) struct Console {
     pub(crate) source: SourceId,
@@ -45,7 +45,7 @@ pub(crate) struct ReceivedCommand {
 pub(crate) struct Commands(pub(crate) Vec<ReceivedCommand>);
 
 impl Commands {
-    /// Allocates: all that it will ever use.
+    /// Allocates: at startup, all that it will ever use.
     pub(crate) fn new() -> Self {
         Self(Vec::with_capacity(MOST_OF_TICK))
     }
@@ -56,7 +56,7 @@ impl Console {
         Self { source, counts: ConsoleCounts::default() }
     }
 
-    /// Takes a packet that comes before the event of this index.
+    /// Takes a packet that comes before the event with this index.
     pub(crate) fn take(&mut self, packet: Packet<'_>, before: usize, commands: &mut Commands) {
         self.counts.packets += 1;
         match Command::parse(packet.bytes) {

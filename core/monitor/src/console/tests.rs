@@ -7,7 +7,7 @@ fn who(text: &str) -> Who {
 }
 
 #[test]
-fn commands_are_read_as_they_are_written_down() {
+fn commands_are_read_as_documented() {
     let note = |text: &str| Command::Note { text: NoteText::new(text).unwrap(), by: who("AB") };
     for (json, command) in [
         (r#"{"do":"acknowledge","alert":12,"by":"AB"}"#, Command::Acknowledge { alert: 12, by: who("AB") }),
@@ -48,11 +48,11 @@ fn ports_take_as_many_notes_as_the_report_holds() {
     }
     assert_eq!(taken, MOST_NOTES);
     assert_eq!(port.send(&note), Err(ConsoleError::MostNotes));
-    assert_eq!(port.send(&Command::Silence { by: who("AB") }), Ok(()), "other commands go on");
+    assert_eq!(port.send(&Command::Silence { by: who("AB") }), Ok(()), "other commands are still accepted");
 }
 
 #[test]
-fn notes_that_find_no_room_in_the_queue_are_not_counted() {
+fn notes_without_room_in_the_queue_are_not_counted() {
     let port = ConsolePort { waiting: Arc::new(ArrayQueue::new(1)), clock: None, notes: Arc::default() };
     let note = Command::Note { text: NoteText::default(), by: who("AB") };
     assert_eq!(port.send(&note), Ok(()));
@@ -62,7 +62,7 @@ fn notes_that_find_no_room_in_the_queue_are_not_counted() {
 }
 
 #[test]
-fn what_is_no_command_is_refused_with_its_place() {
+fn invalid_command_is_refused_with_its_place() {
     let long = format!(r#"{{"do":"note","text":"{}","by":"AB"}}"#, "x".repeat(241));
     let longest = format!(r#"{{"do":"time"{}}}"#, " ".repeat(500));
     for json in [
@@ -115,9 +115,9 @@ fn what_is_no_command_is_refused_with_its_place() {
 }
 
 proptest! {
-    /// Whatever bytes come, what is taken is JSON with those values, by another reader.
+    /// A command accepted from any bytes is JSON with the same values, according to another reader.
     #[test]
-    fn what_is_taken_is_json(text in "\\PC{0,60}", by in "[ -~]{0,16}", cut in 0usize..90) {
+    fn accepted_command_is_valid_json(text in "\\PC{0,60}", by in "[ -~]{0,16}", cut in 0usize..90) {
         let written = json!({"do": "note", "text": text, "by": by}).to_string();
         let read = Command::parse(written.as_bytes());
         let fits = !text.is_empty() && text.len() <= MAX_NOTE_BYTES && written.len() <= MAX_COMMAND_BYTES;

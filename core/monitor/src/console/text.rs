@@ -23,7 +23,7 @@ impl<const BYTES: usize> ShortText<BYTES> {
         text.chars().all(|char| all.push(char)).then_some(all)
     }
 
-    /// As much of a text as fits, without its control characters.
+    /// As much of a text as fits, without control characters.
     pub fn cut(text: &str) -> Self {
         let mut all = Self::default();
         let mut fits = text.chars().filter(|char| !char.is_control());
@@ -31,13 +31,13 @@ impl<const BYTES: usize> ShortText<BYTES> {
         all
     }
 
-    /// Adds a character; false, and nothing is added, if there is no room for it or it is a control character.
+    /// Appends a character. False, with nothing added, if there is no room or it is a control character.
     pub(super) fn push(&mut self, char: char) -> bool {
         let from = usize::from(self.len);
         let room = self.bytes.get_mut(from..from + char.len_utf8()).filter(|_| !char.is_control());
         let Some(room) = room else { return false };
         char.encode_utf8(room);
-        // At most BYTES, which is far below.
+        // The length is at most BYTES, which is far below the limit.
         self.len += u16::try_from(char.len_utf8()).unwrap_or(0);
         true
     }
@@ -45,7 +45,7 @@ impl<const BYTES: usize> ShortText<BYTES> {
     /// The text.
     pub fn as_str(&self) -> &str {
         let bytes = self.bytes.get(..usize::from(self.len)).unwrap_or_default();
-        // Made of whole characters.
+        // The bytes are whole characters.
         core::str::from_utf8(bytes).unwrap_or_default()
     }
 }

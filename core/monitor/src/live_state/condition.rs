@@ -1,4 +1,4 @@
-//! What the pilot is to know first: one condition, and one lamp.
+//! Condition and lamp: the most important fact for the pilot, and its colour.
 
 use serde::Serialize;
 
@@ -7,41 +7,44 @@ use headrace_fusion::NoFix;
 use headrace_geometry::time::DurNs;
 use headrace_sampling::advice::Reason;
 
-/// Share of v_max beyond which a speed is over it: that of the advice's margin and of the error of its measurement.
+/// Ratio to v_max above which a speed is over it: covers the advice's margin and the measurement error.
 const OVER: f64 = 1.02;
-/// Share below which a speed is another one than v_max.
+/// Ratio to v_max below which a speed counts as different from it.
 const UNDER: f64 = 0.97;
-/// Share beyond which it is too fast: what a pilot who follows the advice keeps.
+/// Ratio to v_max above which a speed is too fast: a pilot who follows the advice stays below it.
 const TOO_FAST: f64 = 1.05;
 
-/// What holds now; where several do, the first of this list.
+/// Present condition; if several hold, the first of this list.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Condition {
-    /// Nothing has come from any sensor.
+    /// No sensor has delivered data.
     NoData,
-    /// Nothing has come for so long.
+    /// No data has arrived for this long.
     Old(DurNs),
-    /// There is no position, for want of this.
+    /// There is no position, for this reason.
     NoPosition(NoFix),
-    /// No head is over the tunnel, which ends or begins at this chainage (m), the position sure.
+    /// No head is inside the tunnel, whose end or beginning is at this chainage (m). The position is
+    /// reliable.
     Outside(f64),
-    /// No profiling head gives readings.
+    /// No profiling head delivers readings.
     NoSonar,
-    /// All wall here has passed, and the position is sure: any speed will do.
+    /// All wall here has passed, and the position is reliable: any speed is fine.
     Passed,
-    /// On the way back for a missed stretch, to this chainage (m), faster than what counts: it is passed again from there.
+    /// The vehicle is going back to this chainage (m) for a missed stretch, too fast for coverage. It passes
+    /// the stretch again from there.
     GoingBack(f64),
-    /// Slower won't help.
+    /// No speed meets the target.
     NoSpeed,
     /// The speed is well over v_max.
     TooFast,
-    /// At this speed the present turn misses the target, though the speed is within v_max.
+    /// At this speed the present turn misses the target although the speed is within v_max.
     TurnFails,
-    /// What is placed now can't be judged.
+    /// Samples placed now can't be judged.
     CannotSay(PositionDoubt),
-    /// The speed is a little over v_max.
+    /// The speed is slightly over v_max.
     Over,
-    /// At this speed the present turn may miss the target for what errors of position take of it, though v_max is faster.
+    /// At this speed position errors may make the present turn miss the target, although a faster speed would
+    /// meet it.
     TurnUnsure,
     /// The speed is within v_max.
     Good,
@@ -51,16 +54,16 @@ pub enum Condition {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Lamp {
-    /// Go on.
+    /// Continue.
     Green,
     /// Take care.
     Amber,
-    /// Do something.
+    /// Act.
     Red,
 }
 
 impl Condition {
-    /// The word used in JSON.
+    /// Word used in JSON.
     pub fn as_str(self) -> &'static str {
         match self {
             Self::NoData => "no_data",
@@ -80,7 +83,7 @@ impl Condition {
         }
     }
 
-    /// Its colour.
+    /// Colour of the condition.
     pub fn lamp(self) -> Lamp {
         match self {
             Self::Good | Self::Passed | Self::GoingBack(_) => Lamp::Green,
@@ -96,12 +99,12 @@ impl Condition {
 }
 
 impl LiveState {
-    /// Whether the T forecast at the present speed is over this, m, or unbounded.
+    /// Whether T forecast at the present speed is above this limit, m, or unbounded.
     fn turn_exceeds(&self, limit_m: f64) -> bool {
         self.advice.and_then(|advice| advice.predicted_t_m).is_none_or(|t_m| t_m > limit_m)
     }
 
-    /// What holds now.
+    /// Present condition.
     pub fn condition(&self) -> Condition {
         let Some(age) = self.age() else { return Condition::NoData };
         if self.is_old() {
@@ -122,7 +125,7 @@ impl LiveState {
         let going_back = self.back_to_m.filter(|_| self.position == PositionState::Ok);
         let Some(v_max_mps) = self.v_max_mps() else {
             return match advice.reason {
-                // Of a head that doesn't turn, or not long enough yet, nothing is known.
+                // A head that isn't turning, or not long enough yet, gives no evidence.
                 Reason::NoReturns => Condition::NoSonar,
                 Reason::NoHeadingOrFix => Condition::NoPosition(NoFix::Heading),
                 Reason::AngularStep | Reason::HelixPitch => {
@@ -136,7 +139,7 @@ impl LiveState {
         }
         match self.position {
             _ if share > TOO_FAST => Condition::TooFast,
-            // The forecast is held for a second; the turn itself may have been mended.
+            // The forecast is latched for a second. The turn itself may already be better.
             _ if advice.will_exceed && self.turn_exceeds(self.target_m) && share <= OVER => {
                 Condition::TurnFails
             }

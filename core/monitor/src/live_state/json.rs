@@ -1,5 +1,7 @@
-//! The live state as JSON: plain values with units in their names, ages against the tick, old marked as old.
-//! `docs/reference/live-state.schema.json` is its schema. Allocates: for outlets' threads, not for the loop's.
+//! The live state as JSON: plain values with units in their names, ages against the tick, stale data marked.
+//!
+//! `docs/reference/live-state.schema.json` is its schema. Allocates: for outlets' threads, not for the
+//! loop's.
 
 use serde::Serialize;
 
@@ -8,20 +10,20 @@ use crate::alert_list::{AlertCountsJson, AlertList, LeftJson, ListedAlertJson, S
 use crate::pilot_text::{gain_text, station};
 use headrace_geometry::time::{DurNs, MonoNs};
 
-/// The live state as JSON. Field names are the contract.
+/// The live state as JSON. The field names are a contract.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct LiveStateJson {
     /// Version of this schema.
     pub version: u32,
-    /// When it was published, seconds on the log's clock.
+    /// Time of publication, seconds on the log's clock.
     pub now_s: f64,
-    /// The beat that it is as of; `None` before the first.
+    /// Time of the update that made it; `None` before the first.
     pub at_s: Option<f64>,
-    /// How old it is then, seconds.
+    /// Age at that time, seconds.
     pub age_s: Option<f64>,
-    /// Whether to show it as old.
+    /// Whether to show it as stale.
     pub old: bool,
-    /// What holds first, a word.
+    /// Most important condition, as a word.
     pub condition: &'static str,
     /// Its colour.
     pub lamp: Lamp,
@@ -29,31 +31,31 @@ pub struct LiveStateJson {
     pub position: PositionJson,
     /// Speed along the tunnel, positive inwards, m/s; `None` without a position.
     pub speed_mps: Option<f64>,
-    /// The largest speed at which the target is met, m/s; `None` where there is none.
+    /// Largest speed that meets the target, m/s; `None` if there is none.
     pub v_max_mps: Option<f64>,
-    /// What limits the speed; `None` before the first advice.
+    /// Limiting factor of the speed; `None` before the first advice.
     pub reason: Option<&'static str>,
-    /// What is left, and what is kept back.
+    /// Distances to the limits, and margins.
     pub margins: MarginsJson,
     /// Forecast of the present turn.
     pub turn: Option<TurnJson>,
     /// Every sensor, in the order of the vehicle file.
     pub sensors: Vec<SensorJson>,
-    /// Metres of the way; together they are `way_m`.
+    /// Metres of the coverage extent by verdict. Their sum is `way_m`.
     pub metres: MetresJson,
-    /// The stretch of which nothing could be said that was judged last.
+    /// Last judged stretch without a verdict.
     pub cannot_say: Option<StretchJson>,
     /// Alerts about the dive as a whole that hold now.
     pub alerts: Vec<AlertJson>,
-    /// Counts of the alerts that aren't over.
+    /// Counts of the alerts that have not ended.
     pub alert_counts: AlertCountsJson,
-    /// What would gain more speed, in words; `None` where nothing would.
+    /// Text of the setting that would allow more speed; `None` if there is none.
     pub remedy: Option<String>,
-    /// What is left of cable, time and battery, where it is told.
+    /// Remaining cable, time and charge, as far as they are known.
     pub left: LeftJson,
-    /// The alerts, the most urgent first, at most 64; a few of those that are over come last.
+    /// Alerts, most urgent first, at most 64. A few ended ones come last.
     pub alert_list: Vec<ListedAlertJson>,
-    /// Alerts that aren't over and have found no room in `alert_list`.
+    /// Number of live alerts without room in `alert_list`.
     pub alerts_hidden: usize,
 }
 
@@ -62,34 +64,39 @@ pub struct LiveStateJson {
 pub struct PositionJson {
     /// `ok`, `doubtful` or `none`.
     pub state: &'static str,
-    /// Why it is doubtful (`cable`, `spread`), or what is lacking (`no_heading`, `no_chainage`, `no_place_in_section`).
+    /// Reason for the state.
+    ///
+    /// A doubtful position has `cable` or `spread`; a missing one `no_heading`, `no_chainage` or
+    /// `no_place_in_section`.
     pub why: Option<&'static str>,
     /// Chainage, m.
     pub chainage_m: Option<f64>,
-    /// The same as engineers write it.
+    /// Chainage as stationing.
     pub station: Option<String>,
-    /// Standard deviations: chainage and place in the section, m.
+    /// Standard deviation of chainage, m.
     pub chainage_sd_m: Option<f64>,
-    /// See `chainage_sd_m`.
+    /// Standard deviation of the place in the cross-section, m.
     pub place_sd_m: Option<f64>,
     /// Standard deviation of yaw, degrees.
     pub yaw_sd_deg: Option<f64>,
     /// Standard deviation of one pass against the next, m; `None` without a position.
     pub pass_sd_m: Option<f64>,
-    /// How much longer the vehicle should stand still for its gyros' bias to be known, s; 0 if it needn't.
+    /// Time for which the vehicle should stay stationary to find the gyros' bias, s; 0 if unneeded.
     pub stand_s: u32,
 }
 
-/// What is left to limits, and what is kept back.
+/// Distances to the limits, and margins.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct MarginsJson {
-    /// v_max less the speed, m/s; below zero is too fast.
+    /// v_max less the speed, m/s; negative if too fast.
     pub speed_mps: Option<f64>,
-    /// Target less the T forecast for the present turn, m; below zero it fails.
+    /// Target less the T forecast for the present turn, m; negative if the turn fails.
     pub turn_m: Option<f64>,
-    /// What position errors take of the target, m: the confidence times the standard deviation of one pass against the next.
+    /// Part of the target taken by position errors, m.
+    ///
+    /// It is the confidence times the standard deviation of one pass against the next.
     pub position_m: Option<f64>,
-    /// Share of returns that are lost, where that is what bounds the speed; else `None`.
+    /// Share of lost returns if they limit the speed, otherwise `None`.
     pub lost_share: Option<f64>,
 }
 
@@ -98,7 +105,7 @@ pub struct MarginsJson {
 pub struct TurnJson {
     /// Target T, m.
     pub target_m: f64,
-    /// T predicted, m; `None` where it is unbounded.
+    /// Forecast T, m; `None` if it is unbounded.
     pub predicted_t_m: Option<f64>,
     /// Whether it will exceed the target.
     pub will_exceed: bool,
@@ -113,51 +120,52 @@ pub struct TurnJson {
 /// A sensor.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct SensorJson {
-    /// Its id.
+    /// Id.
     pub id: String,
-    /// Its state.
+    /// State.
     pub state: SensorState,
-    /// How long ago its last reading came, seconds; `None` if none has.
+    /// Age of its last reading, seconds; `None` if there is none.
     pub age_s: Option<f64>,
     /// Whether it is a profiling head.
     pub is_head: bool,
 }
 
-/// Metres of the way.
+/// Metres of the coverage extent.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct MetresJson {
-    /// By state.
+    /// Metres by verdict.
     #[serde(flatten)]
     pub by_state: LiveMetres,
-    /// Their sum.
+    /// Sum of the metres.
     pub way_m: f64,
 }
 
 /// A stretch.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct StretchJson {
-    /// Why: `not_inspected`, `position`, `several_stretches`, `doubtful_returns`, `distrusted_head`, `contradicted_profile`,
-    /// `other_size` or `no_wall`.
+    /// Reason: `not_inspected`, `position`, `several_stretches`, `doubtful_returns`, `distrusted_head`,
+    /// `contradicted_profile`, `other_size` or `no_wall`.
     pub why: &'static str,
-    /// Where it begins, m.
+    /// Beginning, m.
     pub from_m: f64,
-    /// Where it ends, m.
+    /// End, m.
     pub to_m: f64,
 }
 
-/// An alert.
+/// An alert about the dive as a whole.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct AlertJson {
-    /// Its kind.
+    /// Kind.
     pub kind: &'static str,
-    /// The head that isn't believed, by its id.
+    /// Id of the distrusted head.
     pub head: Option<String>,
-    /// When it began, seconds on the log's clock.
+    /// Time at which it began, seconds on the log's clock.
     pub since_s: f64,
 }
 
 impl LiveState {
-    /// As JSON, with the alerts of the same dive: see [`Loop::live_state_json`](crate::run::Loop::live_state_json).
+    /// The state in JSON, with the alerts of the same dive: see
+    /// [`Loop::live_state_json`](crate::run::Loop::live_state_json).
     pub fn json(&self, around: &Surroundings<'_>, alerts: &AlertList) -> LiveStateJson {
         let Surroundings { sources, section_m, .. } = *around;
         let (shown, alerts_hidden) = alerts.shown();

@@ -12,7 +12,7 @@ fn status(state: &LiveState) -> PilotLine {
     status_line(state, &profile, &two(), &|source| ["sonar_0", "sonar_1", "tether"][source].to_owned())
 }
 
-/// What there is to show, as states.
+/// States that cover everything shown.
 fn states() -> Vec<LiveState> {
     let good = test_state();
     let speed = |mps: f64| {
@@ -51,7 +51,7 @@ fn states() -> Vec<LiveState> {
 }
 
 #[test]
-fn the_status_at_sixty_columns_and_whole() {
+fn status_at_60_columns_and_in_full() {
     let lines = |columns: usize| states().iter().map(|state| status(state).cut(columns)).collect::<Vec<_>>();
     let narrow = lines(60);
     assert!(narrow.iter().all(|line| line.chars().count() <= 60));
@@ -77,18 +77,18 @@ fn stretch(why: Unsure) -> UnsureStretch {
     }
 }
 
-/// What is too fast doesn't read like what is told.
+/// A speed over the limit doesn't read like the limit.
 #[test]
-fn a_speed_that_is_over_another_reads_like_another() {
+fn speed_over_the_limit_reads_differently_from_it() {
     assert_eq!(speed_decimals(Some(0.104), Some(0.098)), 3);
-    assert_eq!(speed_decimals(Some(0.098), Some(0.104)), 2, "it is within");
+    assert_eq!(speed_decimals(Some(0.098), Some(0.104)), 2, "it is within the limit");
     assert_eq!(speed_decimals(Some(0.12), Some(0.098)), 2);
     assert_eq!(speed_decimals(None, Some(0.1)), 2);
 }
 
-/// Slower isn't always better: below the speed that the heads are in phase for, they are out of it.
+/// Slower isn't always better: below their planned speed the heads are out of phase.
 #[test]
-fn what_helps_an_unsure_stretch_is_the_speed_that_fits() {
+fn fitting_speed_helps_an_unsure_stretch() {
     let helps = |speed_mps: f64, fits_mps: f64, is_uneven: bool| {
         let driven = Driven { speed_mps, fits_mps, is_uneven, is_short: false };
         helps_text(&UnsureStretch { driven, ..stretch(Unsure::Position) })
@@ -98,23 +98,23 @@ fn what_helps_an_unsure_stretch_is_the_speed_that_fits() {
     assert_eq!(helps(0.2, 0.1, true), format!("at most 0.10 m/s, or {surer}"));
     assert_eq!(helps(0.09, 0.1, true), format!("at 0.10 m/s, or {surer}"));
     assert_eq!(helps(0.09, 0.1, false), surer, "faster won't help");
-    assert_eq!(helps(0.1, 0.1, true), surer, "driven as told");
+    assert_eq!(helps(0.1, 0.1, true), surer, "driven as advised");
     assert_eq!(helps(0.1, 0.0, true), surer, "no speed is known");
     assert_eq!(helps(0.0, 0.1, true), surer, "never driven");
     let driven = Driven { speed_mps: 0.2, fits_mps: 0.1, is_uneven: false, is_short: false };
     let lost = UnsureStretch { is_mostly_error: true, driven, ..stretch(Unsure::Position) };
-    assert_eq!(helps_text(&lost), surer, "the error is what matters");
+    assert_eq!(helps_text(&lost), surer, "the error matters more");
     let short = Driven { is_short: true, ..driven };
     let silent = UnsureStretch { driven: short, ..stretch(Unsure::Position) };
     assert_eq!(
         helps_text(&silent),
         "pass it again slower, or with the silent head restored",
-        "the speeds are those of all heads"
+        "the speeds apply to all heads"
     );
 }
 
 #[test]
-fn what_cannot_be_said_is_told_with_why_and_what_helps() {
+fn unsure_stretch_is_shown_with_reason_and_remedy() {
     let profile = shapes::circle(3.0).unwrap();
     let mut text = String::new();
     for why in Unsure::ALL {
@@ -132,7 +132,7 @@ fn what_cannot_be_said_is_told_with_why_and_what_helps() {
 }
 
 #[test]
-fn a_line_is_broken_between_words_and_what_to_do_begins_anew() {
+fn line_breaks_between_words_and_before_the_action() {
     let line = PilotLine {
         place: "0+014.25".to_owned(),
         speed: String::new(),
@@ -149,11 +149,11 @@ fn a_line_is_broken_between_words_and_what_to_do_begins_anew() {
     let widths = |columns: usize| line.broken(columns).iter().map(|l| l.chars().count()).max().unwrap();
     assert!((40..130).all(|columns| widths(columns) <= columns));
     let words = |text: &str| text.split_whitespace().map(str::to_owned).collect::<Vec<_>>();
-    assert_eq!(words(&line.broken(40).join(" ")), words(&line.text()), "nothing is lost");
+    assert_eq!(words(&line.broken(40).join(" ")), words(&line.text()), "no word is lost");
 }
 
 #[test]
-fn on_a_narrow_screen_what_to_do_stays_and_why_goes() {
+fn narrow_screen_keeps_the_action_and_drops_the_reason() {
     let line = PilotLine {
         place: "0+039.06".to_owned(),
         speed: "0.09 m/s".to_owned(),
@@ -167,5 +167,5 @@ fn on_a_narrow_screen_what_to_do_stays_and_why_goes() {
     assert!(line.cut(200).contains("missed 1.00 m  -> go 0.10 m/s"));
     assert_eq!(line.cut(60), "0+039.06   THIS TURN MAY MISS  -> go 0.10 m/s");
     let remedy = PilotLine { action: String::new(), ..line };
-    assert!(remedy.cut(40).contains("THIS TURN MAY MISS: heads"), "what it says itself stays");
+    assert!(remedy.cut(40).contains("THIS TURN MAY MISS: heads"), "the instruction stays");
 }

@@ -17,11 +17,11 @@ pub struct AdviceReport {
     pub speed_mps: f64,
     /// Largest speed that meets the target, m/s.
     pub v_max_mps: f64,
-    /// Slower than this, heads apart along the hull run out of phase, m/s; zero where slower always helps.
+    /// Speed below which heads apart along the hull run out of phase, m/s; zero if slower always helps.
     pub from_mps: f64,
-    /// The speed nearest to the present one that meets the target, m/s, where that doesn't.
+    /// Speed nearest to the present one that meets the target, m/s, if the present one doesn't.
     pub nearest_mps: Option<f64>,
-    /// Why.
+    /// Limiting factor.
     pub reason: &'static str,
     /// T predicted at the present speed, m.
     pub predicted_t_m: Option<f64>,
@@ -37,26 +37,26 @@ pub struct AdviceReport {
     pub remedy: Option<String>,
     /// Speeds possible in each mode of the heads.
     pub alternatives: Vec<AlternativeReport>,
-    /// Speed for which to start the heads anew in their present mode, which meets the target then, m/s.
+    /// Speed at which the present mode meets the target if the heads are restarted for it, m/s.
     pub start_anew_for_mps: Option<f64>,
-    /// What each margin costs.
+    /// Speed lost to each margin.
     pub margins: Option<MarginsReport>,
 }
 
-/// The largest speeds with margins added one after the other.
+/// Largest speeds with margins added one after the other.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct MarginsReport {
-    /// The speeds, m/s.
+    /// Speeds, m/s.
     #[serde(flatten)]
     pub margins: Margins,
-    /// The margin that costs most.
+    /// Margin that costs most speed.
     pub costliest: &'static str,
 }
 
 /// Speed possible in one mode of the heads.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct AlternativeReport {
-    /// The mode.
+    /// Mode.
     pub mode: String,
     /// Largest speed that meets the target, m/s.
     pub v_max_mps: f64,

@@ -1,4 +1,4 @@
-//! Whether a dive is an inspection at all, and the way that its verdicts are of.
+//! Whether a dive is an inspection at all, and the coverage extent of its verdicts.
 
 use serde::Serialize;
 
@@ -9,27 +9,29 @@ use headrace_fusion::NoFix;
 /// Share of a dive's pings without a position above which its verdicts are no inspection.
 const MOST: f64 = 0.5;
 
-/// The way: whole sections of tunnel in which the vehicle or its heads, pinging or not, have been.
+/// Coverage extent: whole sections of tunnel in which the vehicle or its heads, pinging or not, have been.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct WayReport {
-    /// Where its first section begins, m; `None` without a position.
+    /// Beginning of its first section, m; `None` without a position.
     pub from_m: Option<f64>,
-    /// Where its last section ends, m.
+    /// End of its last section, m.
     pub to_m: Option<f64>,
-    /// Between them, m: the sum of the metres by verdict.
+    /// Length, m: the sum of the metres by verdict.
     pub length_m: f64,
 }
 
-/// Why a dive is no inspection.
+/// Reason for which a dive is no inspection.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct NotInspectedReport {
     /// `no_sonar`, `no_position`, `outside_tunnel` or `mostly_no_position`.
     pub reason: &'static str,
-    /// What most returns without a position lacked: `no_heading`, `no_chainage` or `no_place_in_section`.
+    /// Most frequent missing requirement of returns without a position.
+    ///
+    /// One of `no_heading`, `no_chainage` and `no_place_in_section`.
     pub lacking: Option<&'static str>,
     /// Share of pings without a position.
     pub without_position_share: f64,
-    /// Sources that never gave a reading.
+    /// Sources that never delivered a reading.
     pub silent_sources: Vec<String>,
 }
 

@@ -1,4 +1,5 @@
-//! Report of a dive: plain values with units in their names. Its JSON is versioned; docs/ has the schema.
+//! Report of a dive: plain values with units in their names. Its JSON is versioned; docs/reference has the
+//! schema.
 
 use serde::Serialize;
 
@@ -39,14 +40,14 @@ pub use unsure::UnsureReport;
 /// Version of the report schema.
 pub const REPORT_VERSION: u32 = 7;
 
-/// A whole report. Field names are the contract.
+/// A whole report. The field names are a contract.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Report {
     /// Version of this schema.
     pub report_version: u32,
-    /// Why the dive is no inspection; `None` where it is one.
+    /// Reason for which the dive is no inspection; `None` if it is one.
     pub not_inspected: Option<NotInspectedReport>,
-    /// The log, where the dive was read from or written to one.
+    /// Log that the dive was read from or written to, if any.
     pub log: Option<LogReport>,
     /// Digest of all results, 16 hexadecimal digits.
     pub digest: String,
@@ -54,19 +55,19 @@ pub struct Report {
     pub target_m: f64,
     /// Length of a section, m.
     pub section_m: f64,
-    /// Standard deviations of the hole that a verdict of pass or fail keeps clear of the target.
+    /// Confidence: standard deviations of the hole by which a pass or a fail must clear the target.
     pub confidence_sd: u32,
-    /// The way: the metres that the verdicts are of.
+    /// Coverage extent: the metres that the verdicts cover.
     pub way: WayReport,
     /// The dive as a whole.
     pub dive: DiveReport,
     /// Metres by verdict, and the spacings over all sections.
     pub summary: SummaryReport,
-    /// Every section of the way, in the order of chainage.
+    /// Every section of the coverage extent, in the order of chainage.
     pub sections: Vec<SectionReport>,
     /// Neighbouring flagged sections, by their stable number.
     pub runs: Vec<RunReport>,
-    /// Stretches of which neither a pass nor a fail can be told, though nothing more will come, in the order of chainage.
+    /// Stretches that neither pass nor fail although no more samples will come, in the order of chainage.
     pub unsure: Vec<UnsureReport>,
     /// Stretches to pass again on the way home, from the far end to the portal.
     pub way_home: Vec<ReturnReport>,
@@ -74,22 +75,22 @@ pub struct Report {
     pub survey: SurveyReport,
     /// Metres by verdict for the additional targets and section lengths requested.
     pub what_if: Vec<WhatIfReport>,
-    /// What its text calls the heads, and what they could be set to.
+    /// Names of the heads and their alternative settings, for its text.
     #[serde(skip)]
     pub heads: HeadWords,
     /// Declared openings of the wall, excluded from verdicts.
     pub openings: Vec<OpeningReport>,
     /// Alerts about the dive as a whole.
     pub alerts: Vec<AlertReport>,
-    /// Alerts with their lives, by number.
+    /// Alerts with their life cycle, in order of their numbers.
     pub alert_list: Vec<ListedAlertJson>,
-    /// Cleared alerts that are left out for lack of room.
+    /// Number of cleared alerts left out for lack of room.
     pub alerts_dropped: u64,
-    /// What was put down during the dive.
+    /// Notes made during the dive.
     pub notes: Vec<NoteJson>,
-    /// Notes that are left out for lack of room.
+    /// Number of notes left out for lack of room.
     pub notes_dropped: u32,
-    /// Traffic of the operator's input; `None` where there was none.
+    /// Traffic of the operator's input; `None` if there was none.
     pub console: Option<ConsoleReport>,
     /// Advice history.
     pub advice: Vec<AdviceReport>,
@@ -104,15 +105,15 @@ pub struct Report {
 /// The log that a dive was read from or written to.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct LogReport {
-    /// Its path as given.
+    /// Path as given.
     pub path: String,
-    /// Its SHA-256, hexadecimal; for a recording in parts, of the parts' concatenated bytes.
+    /// SHA-256, hexadecimal; for a recording in parts, of the parts' concatenated bytes.
     pub sha256: String,
     /// Messages of sources.
     pub messages: u64,
     /// Losses in plain text, each with its time span.
     pub losses: Vec<String>,
-    /// Irregularities and how they were handled, in plain text; no data were lost by them.
+    /// Irregularities and their handling, in plain text; no data were lost by them.
     pub notes: Vec<String>,
     /// Its files in order, for a recording in parts.
     pub parts: Vec<PartReport>,
@@ -121,9 +122,9 @@ pub struct LogReport {
 /// A part of a recording.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct PartReport {
-    /// Its path.
+    /// Path.
     pub path: String,
-    /// Its SHA-256, hexadecimal.
+    /// SHA-256, hexadecimal.
     pub sha256: String,
     /// Messages of sources.
     pub messages: u64,
@@ -138,19 +139,19 @@ pub struct DiveReport {
     pub start_s: f64,
     /// Minimum chainage that any head's reach covered, m.
     pub from_m: Option<f64>,
-    /// Maximum, m.
+    /// Maximum chainage that any head's reach covered, m.
     pub to_m: Option<f64>,
-    /// Between them, m.
+    /// Distance between them, m.
     pub distance_m: f64,
     /// Whether any profiling head pinged; if not, there is no coverage.
     pub sonar: bool,
     /// Minimum speed of sound used for ranges, m/s.
     pub sound_speed_least_mps: f64,
-    /// Maximum, m/s.
+    /// Maximum speed of sound used for ranges, m/s.
     pub sound_speed_most_mps: f64,
     /// Samples on the wall.
     pub samples_valid: u64,
-    /// Of these, samples dropped by thinning of full cells.
+    /// Valid samples dropped by thinning of full cells.
     pub samples_thinned: u64,
     /// Pings without a sample, by reason.
     pub samples_rejected: RejectedReport,
@@ -159,9 +160,9 @@ pub struct DiveReport {
 /// Pings that gave no sample.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 pub struct RejectedReport {
-    /// No return though the wall was within range.
+    /// No return although the wall was within range.
     pub missing: u64,
-    /// No return, the wall out of range.
+    /// No return because the wall was out of range.
     pub out_of_range: u64,
     /// Occluded by the vehicle.
     pub occluded: u64,
@@ -171,7 +172,7 @@ pub struct RejectedReport {
     pub outside: u64,
     /// The sample store was full.
     pub not_stored: u64,
-    /// Returns that weren't taken for wall.
+    /// Returns that were not accepted as wall.
     pub doubtful_returns: u64,
 }
 
@@ -186,11 +187,11 @@ pub struct SummaryReport {
     pub cannot_say_m: f64,
     /// Metres still open.
     pub open_m: f64,
-    /// Metres where the way begins or turns back that not all heads have passed.
+    /// Metres that not all heads have passed, where the vehicle began or turned back.
     pub not_inspected_m: f64,
-    /// Fails that were flagged, and flags that a later pass cleared.
+    /// Number of fails that were flagged.
     pub flags_raised: u32,
-    /// See `flags_raised`.
+    /// Number of flags that a later pass cleared.
     pub flags_cleared: u32,
     /// Distance between passes.
     pub t_x: SpreadReport,
@@ -207,11 +208,11 @@ pub struct SummaryReport {
 pub struct OpeningReport {
     /// Display name.
     pub name: String,
-    /// Where it begins, m.
+    /// Beginning, m.
     pub from_m: f64,
-    /// Where it ends, m.
+    /// End, m.
     pub to_m: f64,
-    /// Arc length at which it begins, m; `None` for the whole perimeter.
+    /// Arc length of its beginning, m; `None` for the whole perimeter.
     pub arc_from_m: Option<f64>,
     /// Its length along the perimeter, m; `None` for the whole perimeter.
     pub arc_length_m: Option<f64>,
@@ -225,28 +226,31 @@ pub struct AlertReport {
     pub kind: &'static str,
     /// Time of its first occurrence, seconds on the log's clock.
     pub since_s: f64,
-    /// Occurrences: samples, judgements of sections, or times that a head or the cable's counter wasn't believed.
+    /// Number of occurrences.
+    ///
+    /// They are samples, judgements of sections, or times that a head or the cable counter was distrusted.
     pub count: u64,
     /// Chainage of its first occurrence, m.
     pub x_m: f64,
-    /// Largest deviation, m: beyond the end of the tunnel, or a section's mean from the design profile. Of a head: mean
-    /// between successive returns, constant range, or mean deviation from the design. Of the cable's counter, the largest difference
-    /// from the other source. Of a setting, 0.
+    /// Largest deviation, m: beyond the end of the tunnel, or a section's mean from the design profile.
+    ///
+    /// For a head: mean between successive returns, constant range, or mean deviation from the design. For
+    /// the cable counter: the largest difference from the other source. For a setting: 0.
     pub worst_m: f64,
-    /// The head that isn't believed, or the velocity log that the cable's counter differs from, by its id.
+    /// Id of the distrusted head, or of the velocity log that the cable counter differs from.
     pub head: Option<String>,
-    /// The setting in doubt; `None` for other alerts.
+    /// Doubtful setting; `None` for other alerts.
     pub setting: Option<SettingReport>,
 }
 
 /// Traffic of the operator's input.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 pub struct ConsoleReport {
-    /// Packets.
+    /// Number of packets.
     pub packets: u64,
-    /// Of these, such that are no command.
+    /// Number of packets that are no command.
     pub invalid: u64,
-    /// Commands that changed nothing.
+    /// Number of commands without effect.
     pub without_effect: u64,
 }
 
@@ -255,15 +259,17 @@ pub struct ConsoleReport {
 pub struct SettingReport {
     /// `range_scale`, `head_turned`, `head_pitched`, `head_yawed`, `wrong_way_round` or `swapped`.
     pub what: &'static str,
-    /// Name of the source; `None` where it is no single one's.
+    /// Name of the source; `None` if the setting belongs to no single one.
     pub source: Option<String>,
     /// Name of the source that it is swapped with.
     pub other: Option<String>,
-    /// Ranges over those that the design has; `None` for other settings.
+    /// Ratio of measured ranges to the design's; `None` for other settings.
     pub range_ratio: Option<f64>,
-    /// Angle by which the head is turned about its axis, pitched or yawed, to be added to that of the vehicle file, degrees; `None` for other settings.
+    /// Angle to be added to that in the vehicle file, degrees; `None` for other settings.
+    ///
+    /// The head is turned about its axis, pitched or yawed by it.
     pub angle_deg: Option<f64>,
-    /// Standard deviations from right.
+    /// Number of standard deviations from the correct value.
     pub sure_ratio: f64,
 }
 
@@ -307,11 +313,14 @@ impl Report {
             smoothing: None,
         };
         let (sum_m, way_m) = (report.summary.way_m(), report.way.length_m);
-        debug_assert!((sum_m - way_m).abs() < 1e-6, "metres by verdict: {sum_m} m of a way of {way_m} m");
+        debug_assert!(
+            (sum_m - way_m).abs() < 1e-6,
+            "metres by verdict add up to {sum_m} m, not to the coverage extent of {way_m} m"
+        );
         report
     }
 
-    /// Metres by verdict for the target and the sections that the dive was judged by.
+    /// Metres by verdict for the dive's own target and sections.
     pub fn metres(&self) -> WhatIfReport {
         let sum = &self.summary;
         WhatIfReport {
@@ -341,7 +350,7 @@ impl SummaryReport {
     }
 }
 
-/// The alerts that are kept, as of the end.
+/// Alerts kept, as of the end.
 fn listed(dive: &Loop) -> Vec<ListedAlertJson> {
     let around = dive.surroundings();
     let now = dive.tally().span.map_or(MonoNs(0), |(_, last)| last);
@@ -353,7 +362,7 @@ fn console_report(counts: ConsoleCounts) -> Option<ConsoleReport> {
     (packets > 0).then_some(ConsoleReport { packets, invalid, without_effect })
 }
 
-/// The confidence as the whole number that it is configured as.
+/// Confidence as a whole number, as it is configured.
 fn confidence(confidence_sd: f64) -> u32 {
     u32::try_from(headrace_geometry::math::round_to_i64(confidence_sd)).unwrap_or(0)
 }
@@ -396,7 +405,7 @@ fn summarise<'a>(section_m: f64, sections: impl Iterator<Item = &'a Section>) ->
         if let Some(found) = section.hole {
             hole.add(found.diameter_m);
         }
-        // Each section counts once, so that the sums add up to the way.
+        // Each section counts once, so that the sums add up to the coverage extent.
         let place = match (section.verdict, section.not_inspected) {
             (Verdict::Pass, _) => 0,
             (Verdict::Fail, _) => 1,

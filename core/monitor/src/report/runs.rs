@@ -1,4 +1,4 @@
-//! Runs of flagged sections in the report, and what to pass again.
+//! Runs of flagged sections in the report, and the stretches to pass again.
 
 use serde::Serialize;
 
@@ -12,56 +12,58 @@ use headrace_sensor::device::{SensorInfo, SensorKind};
 /// Neighbouring flagged sections.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct RunReport {
-    /// Its stable number.
+    /// Stable number.
     pub id: u32,
-    /// Its main cause: that of most of its sections.
+    /// Main cause: that of most of its sections.
     pub cause: Cause,
-    /// All causes of its sections, the main one first, then the others as they are frequent.
+    /// All causes of its sections: the main one, then the others by frequency.
     pub causes: Vec<Cause>,
-    /// Figures of the causes that its text names, each of a section that has it.
+    /// Figures of the causes named in its text, each from a section that has it.
     #[serde(skip)]
     pub figures: Option<CauseFigures>,
-    /// Heads that were silent in the section with its largest hole, or where it was put down to them, by the ids of their
-    /// sources.
+    /// Ids of the sources of silent heads in the section with the largest hole, or where silence is the
+    /// cause.
     pub silent_sources: Vec<String>,
-    /// Where it begins, m.
+    /// Beginning, m.
     pub start_m: f64,
-    /// Where it ends, m.
+    /// End, m.
     pub end_m: f64,
     /// Metres of it that fail.
     pub failed_m: f64,
-    /// Its largest hole, m; the last one before it was cleared.
+    /// Largest hole, m; the last one before it was cleared.
     pub hole_m: f64,
     /// Chainage of that hole's centre, m.
     pub hole_x_m: f64,
-    /// The same on a clock seen along the tunnel.
+    /// Clock position of that centre, looking along the tunnel.
     pub hole_clock: String,
-    /// When its first flag was raised, seconds on the log's clock.
+    /// Time of its first flag, seconds on the log's clock.
     pub raised_s: f64,
-    /// Time since which none of its sections fails, seconds on the log's clock.
+    /// Time from which none of its sections fails, seconds on the log's clock.
     pub cleared_s: Option<f64>,
-    /// The run that it was merged into.
+    /// Run that it was merged into.
     pub merged_into: Option<u32>,
 }
 
 /// A stretch to pass again.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct ReturnReport {
-    /// The run that it is for.
+    /// Number of its run.
     pub run: u32,
     /// Chainage of its far end, m.
     pub from_m: f64,
     /// Chainage of its near end, m.
     pub to_m: f64,
-    /// Chainage that the vehicle's origin is to go back to, so that all heads pass it from its far end on or back, m.
+    /// Chainage for the vehicle's origin to go back to, m.
+    ///
+    /// From there all heads pass the stretch from its far end on or back.
     pub back_to_m: f64,
-    /// Change to make against the main cause.
+    /// Action against the main cause.
     pub action: Action,
-    /// Changes to make, all of them, in the order of the run's causes.
+    /// All actions, in the order of the run's causes.
     pub actions: Vec<Action>,
-    /// Maximum speed then, m/s: the planned one where that meets the target; zero if none does in this mode.
+    /// Maximum speed then, m/s: the planned one if that meets the target; zero if no speed does in this mode.
     pub at_most_mps: f64,
-    /// Seconds at that speed, twice over it where it is to be passed rolled to each side.
+    /// Duration at that speed, seconds; for two passes if the vehicle has to roll to each side.
     pub takes_s: Option<f64>,
 }
 
@@ -95,7 +97,8 @@ pub(super) fn run_reports(dive: &Loop) -> Vec<RunReport> {
         .collect()
 }
 
-/// Metres of a run's sections that fail, as it is judged now: a flag stays where nothing can be said since.
+/// Metres of a run's sections that fail at present. A flag remains on a section that no longer gets a
+/// verdict.
 fn failed_m(sections: &Sections, run: &Run) -> f64 {
     let fails = |index: &i64| sections.get(*index).is_some_and(|section| section.verdict == Verdict::Fail);
     (run.from..run.to).filter(fails).count() as f64 * sections.section_m()
@@ -107,7 +110,7 @@ fn head_ids(dive: &Loop) -> Vec<String> {
     dive.sources().iter().zip(dive.sensors()).filter(is_head).map(|(source, _)| source.id.clone()).collect()
 }
 
-/// What to pass again, as it is judged now: open runs, from the far end to the portal.
+/// Stretches to pass again by the present verdicts: open runs, from the far end to the portal.
 pub fn way_home(sections: &Sections) -> Vec<ReturnReport> {
     let runs: &Runs = sections.runs();
     let open = (0..).map(RunId).zip(runs.all()).filter(|(_, run)| run.is_open());

@@ -10,11 +10,11 @@ use headrace_geometry::time::MonoNs;
 /// One section.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct SectionReport {
-    /// Where it begins, m.
+    /// Beginning, m.
     pub start_m: f64,
-    /// Where it ends, m.
+    /// End, m.
     pub end_m: f64,
-    /// Diameter of its largest hole, m; `None` where it wasn't measured.
+    /// Diameter of its largest hole, m; `None` if it wasn't measured.
     pub hole_m: Option<f64>,
     /// Lower bound of the hole, m: thinned samples may have divided it.
     pub hole_least_m: Option<f64>,
@@ -28,7 +28,8 @@ pub struct SectionReport {
     pub hole_x_m: Option<f64>,
     /// Arc length of the hole's centre, m from the floor's centre via the left wall.
     pub hole_arc_m: Option<f64>,
-    /// The same as a clock seen along the tunnel: 6 is the floor's centre, 9 the left wall.
+    /// Clock position of the hole's centre, looking along the tunnel: 6 is the floor's centre, 9 the left
+    /// wall.
     pub hole_clock: Option<String>,
     /// Distance between passes.
     pub t_x: SpreadReport,
@@ -46,32 +47,34 @@ pub struct SectionReport {
     pub masked_share: f64,
     /// `pass`, `fail`, `cannot_say` or `open`.
     pub verdict: &'static str,
-    /// Open, and going on won't change it: where the way begins or turns back, not all heads have been.
+    /// Open, and further driving won't change it: not all heads have passed where the vehicle began or turned
+    /// back.
     pub not_inspected: bool,
-    /// Why it can't be said; `None` with other verdicts.
+    /// Reason for `cannot_say`; `None` with other verdicts.
     pub cannot_say: Option<&'static str>,
     /// Cause, while the verdict is `fail`.
     pub cause: Option<Evidence>,
-    /// When it was flagged, seconds on the log's clock.
+    /// Time of its flag, seconds on the log's clock.
     pub flagged_s: Option<f64>,
-    /// When a later pass cleared the flag.
+    /// Time at which a later pass cleared the flag.
     pub cleared_s: Option<f64>,
-    /// Returns on its wall that weren't taken for wall.
+    /// Returns on its wall that were not accepted as wall.
     pub doubtful_returns: u32,
-    /// Whether it holds samples of a head that wasn't believed soon after; it can't pass.
+    /// Whether it holds samples of a head that was distrusted soon after; it can't pass.
     pub suspect: bool,
 }
 
-/// A section's wall against the design profile, along the rays from the reference point; beyond the design is positive.
+/// Deviation of a section's wall from the design, along the rays from the reference point. Outward is
+/// positive.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct DeviationReport {
     /// Mean, m.
     pub mean_m: f64,
-    /// Largest inward deviation, m, at most zero.
+    /// Largest inward deviation, m; never above zero.
     pub inmost_m: f64,
-    /// Largest outward deviation, m, at least zero.
+    /// Largest outward deviation, m; never below zero.
     pub outmost_m: f64,
-    /// Cross-section area over that of the design; `None` without sweeps.
+    /// Ratio of the cross-section area to the design's; `None` without sweeps.
     pub area_ratio: Option<f64>,
     /// Whether most samples exceed the contradiction limit.
     pub contradicts: bool,

@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-/// Verdicts of a dive by the filter alone, against those of the smoothed dive.
+/// Verdicts of a dive by the filter alone, compared with those of the smoothed dive.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct SmoothingReport {
     /// Digest of the results by the filter alone.
@@ -13,7 +13,7 @@ pub struct SmoothingReport {
     pub pieces: u64,
     /// Metres by verdict by the filter alone.
     pub before: MetresReport,
-    /// The same smoothed.
+    /// Metres by verdict after smoothing.
     pub after: MetresReport,
     /// Sections whose verdict has changed, in the order of chainage.
     pub changed: Vec<ChangeReport>,
@@ -37,13 +37,13 @@ pub struct MetresReport {
 /// A section whose verdict has changed.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct ChangeReport {
-    /// Where it begins, m.
+    /// Beginning, m.
     pub start_m: f64,
-    /// Where it ends, m.
+    /// End, m.
     pub end_m: f64,
-    /// By the filter alone; `None` if no head passed the section on its trajectory.
+    /// Verdict by the filter alone; `None` if no head passed the section on its trajectory.
     pub before: Option<JudgedReport>,
-    /// Smoothed; `None` if no head passed the section on the smoothed trajectory.
+    /// Verdict after smoothing; `None` if no head passed the section on the smoothed trajectory.
     pub after: Option<JudgedReport>,
 }
 
@@ -52,7 +52,7 @@ pub struct ChangeReport {
 pub struct JudgedReport {
     /// `pass`, `fail`, `cannot_say` or `open`.
     pub verdict: &'static str,
-    /// Diameter of the largest hole, m; `None` where it wasn't measured.
+    /// Diameter of the largest hole, m; `None` if it wasn't measured.
     pub hole_m: Option<f64>,
     /// Its standard deviation, m.
     pub hole_sd_m: f64,

@@ -1,10 +1,11 @@
-//! Changes by smoothing: the report of a smoothed dive against that by the filter alone.
+//! Compares the report of a smoothed dive with that by the filter alone.
 
 use super::sections::SectionReport;
 use super::smoothing::{ChangeReport, JudgedReport, MetresReport, SmoothingReport};
 use super::{Report, SummaryReport};
 
-/// Compares the report by the filter with the smoothed one, made of `estimates` estimates in `pieces` contiguous pieces.
+/// Compares the filter's report with the smoothed one, made of `estimates` estimates in `pieces` contiguous
+/// pieces.
 pub fn compare(filter: &Report, smoothed: &Report, estimates: u64, pieces: u64) -> SmoothingReport {
     SmoothingReport {
         filter_digest: filter.digest.clone(),
@@ -26,7 +27,7 @@ fn judged(section: &SectionReport) -> JudgedReport {
     JudgedReport { verdict, hole_m, hole_sd_m }
 }
 
-/// Both are in the order of chainage; either may have sections that the other lacks.
+/// Both lists are in the order of chainage. Either may have sections that are missing in the other.
 fn changes(before: &[SectionReport], after: &[SectionReport]) -> Vec<ChangeReport> {
     let (mut before, mut after) = (before.iter().peekable(), after.iter().peekable());
     let mut changed = Vec::new();

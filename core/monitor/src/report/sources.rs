@@ -9,7 +9,7 @@ use headrace_sensor::device_clock::ClockReport;
 /// Traffic of a source.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct SourceReport {
-    /// Its name.
+    /// Name.
     pub id: String,
     /// Kind of device.
     pub plugin: String,
@@ -19,7 +19,7 @@ pub struct SourceReport {
     pub frames: u64,
     /// Candidate frames that failed.
     pub bad_frames: u64,
-    /// Bytes that belong to no good frame.
+    /// Bytes that belong to no valid frame.
     pub skipped_bytes: u64,
     /// Readings decoded from them.
     pub readings: u64,
@@ -27,7 +27,7 @@ pub struct SourceReport {
     pub withheld: u64,
     /// Longest silence between two packets, seconds.
     pub longest_gap_s: f64,
-    /// Time from its last packet to the dive's last reading, seconds; `None` if it never sent any.
+    /// Time from its last packet to the dive's last reading, seconds; `None` without packets.
     pub silent_at_end_s: Option<f64>,
     /// Packets per second.
     pub rate_hz: f64,
@@ -42,30 +42,32 @@ pub struct SourceReport {
 /// Connection statistics of a sensor.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct LineReport {
-    /// Times it was opened.
+    /// Number of times it was opened.
     pub opened: u64,
-    /// Times it was lost, or closed after a silence timeout.
+    /// Number of times it was lost, or closed after a silence timeout.
     pub lost: u64,
-    /// Packets dropped for lack of room, or by the carrier, unread.
+    /// Packets dropped unread, for lack of room or by the carrier.
     pub dropped_packets: u64,
-    /// Messages of senders that aren't the device, which weren't used.
+    /// Messages of senders other than the device, which were not used.
     pub strangers: u64,
     /// Final status, in plain text.
     pub status: String,
 }
 
-/// A source's device clock against ours. Informative: readings are timed by the receive time.
+/// A source's device clock compared with the program's. For information only: readings are timed by the
+/// receive time.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct DeviceClockReport {
     /// Timestamps received.
     pub stamps: u64,
-    /// Times it restarted or fell behind.
+    /// Number of times it restarted or fell behind.
     pub restarts: u64,
-    /// Times it jumped ahead.
+    /// Number of times it jumped ahead.
     pub jumps: u64,
     /// Time on its clock over which the drift is estimated, seconds.
     pub span_s: f64,
-    /// Drift, parts per million; positive if it gains on ours. `None` until there are enough data.
+    /// Drift, parts per million; positive if it gains on the program's clock. `None` until there are enough
+    /// data.
     pub drift_ppm: Option<f64>,
     /// Standard deviation of the drift, parts per million.
     pub drift_sd_ppm: Option<f64>,

@@ -4,7 +4,7 @@ use serde::Serialize;
 
 use headrace_coverage::Spread;
 
-/// Count, mean, deviation and extremes; `None` where there is no value.
+/// Count, mean, deviation and extremes; `None` without values.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct SpreadReport {
     /// Number of values.

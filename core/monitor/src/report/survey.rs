@@ -11,13 +11,13 @@ use headrace_geometry::tunnel::Profile;
 pub struct SurveyReport {
     /// Edge of a node along the tunnel, m.
     pub node_m: f64,
-    /// The same round the perimeter, m.
+    /// Edge of a node round the perimeter, m.
     pub around_m: f64,
     /// Minimum samples per node.
     pub enough: u16,
     /// Nodes passed.
     pub nodes: u32,
-    /// Share of them that have enough; `None` without nodes.
+    /// Share of these nodes with enough samples; `None` without nodes.
     pub enough_share: Option<f64>,
     /// Nodes without a sample.
     pub empty: u32,
@@ -30,13 +30,13 @@ pub struct SurveyReport {
 /// A row of nodes round the perimeter.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct NodeRowReport {
-    /// Where it begins, m.
+    /// Beginning, m.
     pub start_m: f64,
     /// Its nodes.
     pub nodes: u32,
-    /// Those with enough samples.
+    /// Nodes with enough samples.
     pub enough: u32,
-    /// Those without any.
+    /// Nodes without any sample.
     pub empty: u32,
 }
 
@@ -47,7 +47,7 @@ pub struct HolidayReport {
     pub x_m: f64,
     /// Arc length of its centre, m.
     pub arc_m: f64,
-    /// The same on a clock.
+    /// Clock position of its centre.
     pub clock: String,
 }
 

@@ -1,23 +1,23 @@
-//! Stretches of which neither a pass nor a fail can be told, in the report.
+//! Unsure stretches in the report.
 
 use serde::Serialize;
 
 use crate::resources::Coverage;
 use crate::telling::UnsureStretch;
 
-/// Neighbouring sections of which neither a pass nor a fail can be told for one reason, though nothing more will come.
+/// Neighbouring sections that neither pass nor fail for the same reason although no more samples will come.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct UnsureReport {
-    /// `not_inspected`, `position`, `several_stretches`, `doubtful_returns`, `distrusted_head`, `contradicted_profile`,
-    /// `other_size` or `no_wall`.
+    /// Reason: `not_inspected`, `position`, `several_stretches`, `doubtful_returns`, `distrusted_head`,
+    /// `contradicted_profile`, `other_size` or `no_wall`.
     pub why: &'static str,
-    /// Where it begins, m.
+    /// Beginning, m.
     pub start_m: f64,
-    /// Where it ends, m.
+    /// End, m.
     pub end_m: f64,
     /// Metres of it that are unsure.
     pub unsure_m: f64,
-    /// Its largest hole, m.
+    /// Largest hole, m.
     pub hole_m: f64,
     /// Standard deviation of that hole, m.
     pub hole_sd_m: f64,

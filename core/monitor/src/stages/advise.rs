@@ -13,7 +13,7 @@ use headrace_sampling::advice::{self, Advice, Hysteresis, Remedy};
 use headrace_sampling::passes::{Phasing, Situation};
 use headrace_sampling::swing::{Looks, Swing};
 
-/// The least speed at which heads apart along the hull are taken to follow each other, m/s.
+/// Minimum speed for which heads apart along the hull are assumed to follow each other, m/s.
 const SLOWEST_MPS: f64 = 0.05;
 
 /// The advisor, and the time limit of the dive from its first packet.
@@ -28,12 +28,12 @@ pub(crate) struct Advisor {
 stateful!(Advisor { state: advisor, looks, hysteresis; fixed: dive_time; });
 
 impl Advisor {
-    /// Allocates: all that it will ever use.
+    /// Allocates: at startup, all that it will ever use.
     pub(crate) fn new(advisor: advice::Advisor, target_m: f64, dive_time: Option<DurNs>) -> Self {
         Self { advisor, dive_time, looks: Looks::default(), hysteresis: Hysteresis::new(target_m) }
     }
 
-    /// The advice at each beat of a tick, in order; `begun` is the receive time of the first packet.
+    /// Fills the advice for each update of a tick, in order. `begun` is the receive time of the first packet.
     pub(crate) fn fill(&mut self, placed: &[Placed], begun: Option<MonoNs>, list: &mut Vec<Advice>) {
         list.clear();
         for item in placed {
@@ -42,12 +42,13 @@ impl Advisor {
         }
     }
 
-    /// Advice to show at a beat; `begun` is the receive time of the first packet.
+    /// Advice to show at an update. `begun` is the receive time of the first packet.
     fn advise(&mut self, at: MonoNs, situation: &Situation, begun: Option<MonoNs>) -> Advice {
         let left = self.dive_time.zip(begun).map(|(time, begun)| (time - at.since(begun)).as_secs_f64());
         let was_astern = self.advisor.is_astern();
         let advice = self.advisor.advise(situation, swing(&mut self.looks, at, situation), left);
-        // On the way back heads apart along the hull are in phase at other speeds, which don't hold any more once it goes on.
+        // On the way back, heads apart along the hull are in phase at other speeds, which become invalid when
+        // the vehicle turns round.
         if self.advisor.is_astern() != was_astern {
             self.hysteresis.forget();
         }
@@ -85,7 +86,7 @@ fn digest(stream: &mut ResultStream, at: MonoNs, advice: &Advice) {
     }
 }
 
-/// Finds the advice at each beat. Without an advisor it has come with the tick: see [`crate::split`].
+/// Computes the advice for each update. Without an advisor it has come with the tick: see [`crate::split`].
 pub(super) fn find(
     placed: Res<'_, PlacedList>,
     tally: Res<'_, Tally>,
@@ -131,7 +132,7 @@ mod tests {
         MonoNs(0) + DurNs::from_secs_f64(seconds)
     }
 
-    /// Two heads that turn in 8 s, so far apart along the hull, m.
+    /// Two heads that turn in 8 s, this far apart along the hull, m.
     fn two_heads(apart_m: f64) -> Situation {
         let mut situation = Situation { configured: 2, ..situation(Some(5.0)) };
         for (number, slot) in situation.heads.iter_mut().take(2).enumerate() {
@@ -150,7 +151,7 @@ mod tests {
     }
 
     #[test]
-    fn each_beat_of_a_tick_has_its_advice_with_the_time_that_is_left() {
+    fn each_update_of_a_tick_has_advice_with_the_time_left() {
         let head = HeadSpec {
             mount: mount(),
             step_rad: 0.0157,
@@ -173,15 +174,15 @@ mod tests {
             }
             list.iter().map(|advice| advice.left.time_s).collect::<Vec<_>>()
         };
-        assert_eq!(left_s(Some(100.0), Some(10.0)), [Some(80.0), Some(79.8)], "of this tick alone");
+        assert_eq!(left_s(Some(100.0), Some(10.0)), [Some(80.0), Some(79.8)], "only of this tick");
         assert_eq!(left_s(None, Some(10.0)), [None, None]);
-        assert_eq!(left_s(Some(100.0), None), [None, None], "it hasn't begun");
+        assert_eq!(left_s(Some(100.0), None), [None, None], "the dive hasn't begun");
     }
 
-    /// A vehicle that yaws by 0.01 rad/s. Heads 180 degrees apart pass every 4 s; those 0.8 m apart come to a place 8 s after one another at
-    /// 0.1 m/s.
+    /// A vehicle that yaws by 0.01 rad/s. Heads 180 degrees apart pass every 4 s. Heads 0.8 m apart reach a
+    /// place 8 s after one another at 0.1 m/s.
     #[test]
-    fn a_swing_is_that_between_passes_and_between_heads_apart() {
+    fn swing_covers_passes_and_heads_apart_along_the_hull() {
         let swung = |apart_m: f64, speed_mps: f64| {
             let mut looks = Looks::default();
             let mut last = Swing::default();
@@ -194,7 +195,7 @@ mod tests {
             }
             last
         };
-        // To a beat.
+        // Accurate to one update.
         let near = |found: f64, expected: f64| (found - expected).abs() < 0.05 * expected;
         for (apart_m, speed_mps) in [(0.8, 0.1), (0.8, -0.1), (0.8, 0.2)] {
             let found = swung(apart_m, speed_mps);
@@ -202,7 +203,8 @@ mod tests {
         }
         let side_by_side = swung(0.0, 0.1);
         assert!(near(side_by_side.rate_radps, 0.01) && side_by_side.apart_rate_radps.abs() <= 0.0);
-        // At rest they are taken to follow at 0.05 m/s: in 16 s. Only the last half minute counts, all of it together.
+        // A stationary vehicle is assumed to move at 0.05 m/s, which takes 16 s. Only the last half minute
+        // counts.
         let at_rest = swung(0.8, 0.0);
         assert!(near(at_rest.apart_rate_radps, 0.01) && near(at_rest.most_rad, 0.298), "{at_rest:?}");
     }

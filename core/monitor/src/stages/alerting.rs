@@ -1,4 +1,4 @@
-//! The alert list's part of a tick: judgements, beats and commands in the order in which they were consumed.
+//! Applies judgements, updates and commands to the alert list, in the order in which they were consumed.
 
 use bevy_ecs::prelude::Resource;
 
@@ -9,11 +9,11 @@ use crate::messages::{Event, Notice, Notices};
 use crate::notes::{Note, Notes, Spoken};
 use crate::result_stream::{RecordKind, ResultStream};
 
-/// Runs that have changed in this tick, in order.
+/// Runs changed in this tick, in order.
 #[derive(Debug, Resource)]
 pub(crate) struct RunInputs(pub(crate) Vec<RunInput>);
 
-/// What alerts are made of, and where they go.
+/// Inputs and outputs of the alert list.
 pub(crate) struct Alerting<'a> {
     pub(crate) list: &'a mut AlertList,
     pub(crate) notes: &'a mut Notes,
@@ -23,30 +23,30 @@ pub(crate) struct Alerting<'a> {
     pub(crate) notices: &'a mut Notices,
     pub(crate) stream: &'a mut ResultStream,
     pub(crate) events: &'a [Event],
-    /// How many runs, commands and events have been taken.
+    /// Numbers of runs, commands and events already applied.
     pub(crate) taken: (usize, usize, usize),
 }
 
 impl Alerting<'_> {
-    /// Takes what comes before the beat that precedes the event of this index.
+    /// Applies everything before the update that precedes the event with this index.
     pub(crate) fn before(&mut self, event: usize, state: &mut LiveState) {
         self.until(Some(event), state);
         self.hear(state, event);
     }
 
-    /// Takes a beat, after what comes before it.
+    /// Applies an update, after everything before it.
     pub(crate) fn beat(&mut self, beat: &Beat<'_>) {
         let mut to = Telling { notices: self.notices, stream: self.stream };
         self.list.beat(beat, &mut to);
     }
 
-    /// Takes the rest of the tick; `state` is as of the last beat.
+    /// Applies the rest of the tick. `state` is as of the last update.
     pub(crate) fn rest(&mut self, state: &mut LiveState) {
         self.until(None, state);
         self.hear(state, self.events.len());
     }
 
-    /// Notes when sensors have spoken, up to the event of this index.
+    /// Records the times of the sensors' readings, up to the event with this index.
     fn hear(&mut self, state: &mut LiveState, until: usize) {
         for event in self.events.get(self.taken.2..until).unwrap_or_default() {
             if let Some(slot) = state.heard.get_mut(event.source.index()) {
@@ -56,7 +56,8 @@ impl Alerting<'_> {
         self.taken.2 = until.max(self.taken.2);
     }
 
-    /// Takes runs and commands up to a beat, or all: a command comes before what the event after it has brought.
+    /// Applies runs and commands up to an update, or all. A command precedes the results of the event after
+    /// it.
     fn until(&mut self, beat: Option<usize>, state: &mut LiveState) {
         loop {
             let run = self.runs.0.get(self.taken.0);
@@ -172,7 +173,8 @@ mod tests {
 
     const NOW: MonoNs = MonoNs(9_000_000_000);
 
-    /// The run of a section without a sample, raised at the event of this index, or at the beat before it.
+    /// The run of a section without a sample, raised at the event with this index, or at the update before
+    /// it.
     fn run(event: usize, at_beat: bool) -> RunInput {
         let profile = shapes::circle(3.0).unwrap();
         let perimeter_m = profile.perimeter_m();
@@ -200,7 +202,7 @@ mod tests {
         RunInput::of((event, at_beat), NOW, told.unwrap(), &sections).unwrap()
     }
 
-    /// What a tick brings: a run, a command that acknowledges all alerts, and a reading at each of ten events.
+    /// Inputs of a tick: a run, a command that acknowledges all alerts, and a reading at each of ten events.
     struct Bench {
         list: AlertList,
         notes: Notes,
@@ -237,8 +239,10 @@ mod tests {
             }
         }
 
-        /// Goes up to the beat that precedes the event of this index, or through the tick: alerts raised, those acknowledged, commands without
-        /// effect, and the last reading heard.
+        /// Applies inputs up to the update before the event with this index, or the whole tick.
+        ///
+        /// Returns the number of alerts raised, of those acknowledged, of commands without effect, and the
+        /// last reading heard.
         fn until(&mut self, beat: Option<usize>) -> (u32, usize, u64, Option<u64>) {
             let mut alerting = Alerting {
                 list: &mut self.list,
@@ -262,7 +266,7 @@ mod tests {
     }
 
     #[test]
-    fn a_command_comes_before_what_the_event_after_it_brings() {
+    fn command_precedes_the_results_of_the_next_event() {
         for (before, acknowledged) in [(4, 0), (5, 0), (6, 1), (9, 1)] {
             let found = Bench::new(run(5, false), before).until(None);
             assert_eq!(found, (1, acknowledged, 1 - acknowledged as u64, Some(9)), "{before}");
@@ -270,16 +274,16 @@ mod tests {
     }
 
     #[test]
-    fn a_beat_has_what_came_before_the_event_that_it_precedes() {
+    fn update_includes_only_what_came_before_it() {
         let at = |run: RunInput, command_before: usize, beat: usize| {
             Bench::new(run, command_before).until(Some(beat))
         };
         assert_eq!(at(run(4, false), 9, 5), (1, 0, 0, Some(4)));
-        assert_eq!(at(run(5, false), 9, 5), (0, 0, 0, Some(4)), "that event comes after the beat");
-        assert_eq!(at(run(5, true), 9, 5), (1, 0, 0, Some(4)), "at the beat itself");
+        assert_eq!(at(run(5, false), 9, 5), (0, 0, 0, Some(4)), "that event comes after the update");
+        assert_eq!(at(run(5, true), 9, 5), (1, 0, 0, Some(4)), "at the update itself");
         assert_eq!(at(run(6, true), 9, 5), (0, 0, 0, Some(4)));
-        assert_eq!(at(run(9, false), 5, 5), (0, 0, 1, Some(4)), "a command just before it");
-        assert_eq!(at(run(9, false), 6, 5), (0, 0, 0, Some(4)), "one after it");
+        assert_eq!(at(run(9, false), 5, 5), (0, 0, 1, Some(4)), "the command comes just before the update");
+        assert_eq!(at(run(9, false), 6, 5), (0, 0, 0, Some(4)), "the command comes after the update");
         assert_eq!(at(run(2, false), 4, 5), (1, 1, 0, Some(4)));
         assert_eq!(at(run(2, false), 4, 0), (0, 0, 0, None));
     }

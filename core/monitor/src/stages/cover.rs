@@ -1,6 +1,7 @@
-//! Georeferenced pings to samples, passes and sections, and sections to verdicts.
+//! Converts georeferenced pings to samples, passes and sections, and judges sections.
 //!
-//! Both in one pass over the pings: which sections are judged, and on which evidence, depends on earlier verdicts.
+//! One pass over the pings does both, since earlier verdicts decide which sections are judged, and on which
+//! evidence.
 
 use bevy_ecs::prelude::{Res, ResMut, Single};
 
@@ -25,14 +26,15 @@ use headrace_sampling::passes::Situation;
 
 /// Interval between checks of the sections of a still zone.
 const LOOK_AROUND: DurNs = DurNs(1_000_000_000);
-/// Time in which a pilot slows down before wall that hasn't passed, seconds.
+/// Time that a pilot needs to slow down before wall that hasn't passed, seconds.
 const SOON_S: f64 = 5.0;
-/// A vehicle goes back at this speed or faster, m/s.
+/// Speed at or below which the vehicle counts as going back, m/s.
 const ASTERN_MPS: f64 = -0.02;
-/// So many standard deviations of a pass against the one before make up the target where a speed says nothing.
+/// Confidence at which the error against the previous pass must reach the target for a speed to be no
+/// evidence.
 const ADRIFT_SD: f64 = 2.0;
 
-#[expect(clippy::too_many_arguments, reason = "a system's arguments are what it reads and writes")]
+#[expect(clippy::too_many_arguments, reason = "a system's arguments are its inputs and outputs")]
 pub(super) fn cover(
     (placed, of_events): (Res<'_, PlacedList>, Res<'_, PlacedEvents>),
     tunnel: Res<'_, TunnelDesign>,
@@ -144,7 +146,7 @@ pub(super) fn cover(
     }
 }
 
-/// Whether all wall that heads see here, and in the next seconds, has passed: nothing is to be gained or missed.
+/// Whether all wall that heads see here, and in the next seconds, has passed, so that any speed is fine.
 fn is_passed(coverage: &Coverage, heads: &Heads<'_, '_>, situation: &Situation) -> bool {
     let Coverage { sections, .. } = coverage;
     let reaches = heads.iter().map(|(.., frontier)| frontier.0.map(|reach| reach.latest()));
@@ -157,7 +159,8 @@ fn is_passed(coverage: &Coverage, heads: &Heads<'_, '_>, situation: &Situation) 
     indices.all(|index| sections.get(index).is_some_and(|section| section.verdict == Verdict::Pass))
 }
 
-/// Where a vehicle that goes back is to turn round for the nearest missed stretch that isn't ahead of it, m.
+/// Place where a vehicle that goes back has to turn round for the nearest missed stretch that isn't ahead of
+/// it, m.
 fn back_to_m(sections: &Sections, situation: &Situation) -> Option<f64> {
     let x_m = situation.pose.filter(|_| situation.speed_mps < ASTERN_MPS)?.position.x();
     let missed = sections.runs().all().iter().filter(|run| run.is_open());
@@ -168,7 +171,7 @@ fn back_to_m(sections: &Sections, situation: &Situation) -> Option<f64> {
 fn count(tally: &mut Tally, ping: &PlacedPing) {
     tally.without_fix += u64::from(ping.fix.is_none());
     match ping.outcome {
-        // Counted when it is known what the return is.
+        // Counted once the return is classified.
         Outcome::Sample { .. } => {}
         Outcome::Lost(Loss::Missing, _) => tally.missing += 1,
         Outcome::Lost(Loss::OutOfRange, _) => tally.out_of_range += 1,
@@ -182,14 +185,14 @@ fn count(tally: &mut Tally, ping: &PlacedPing) {
     }
 }
 
-/// Adds a ping to the passage of the section that its head is in.
+/// Adds a ping to the passage of the section in which its head is.
 fn note_passage(
     coverage: &mut Coverage,
     frontier: &HeadFrontier,
     drive: &Drive,
     (ping, profile): (&PlacedPing, &Profile),
 ) {
-    // Without a fix, a ping counts where its head was last known to be.
+    // Without a fix, a ping counts at its head's last known place.
     let Some(reach) = ping.reach.or_else(|| Some(frontier.0?.latest())) else { return };
     let index = coverage.sections.index_of(reach.middle_m());
     let turns = coverage.frontier.turns();
@@ -257,7 +260,7 @@ mod tests {
     use headrace_sensor::device::{SensorInfo, SensorKind};
     use headrace_sensor::reading::SourceId;
 
-    /// Sections of which those of these indices have failed.
+    /// Sections of which the ones with these indices have failed.
     fn missed(failed: &[i64]) -> Sections {
         let (Coverage { store, mut sections, .. }, profile) = (coverage(), pipe());
         let mut judging = Judging {
@@ -283,24 +286,28 @@ mod tests {
         sections
     }
 
-    /// Half a metre, the target, before the stretch from 5 m on, or that from 10 m on.
+    /// The place is half a metre, the target, before the stretch from 5 m on, or that from 10 m on.
     #[test]
-    fn who_goes_back_turns_round_before_the_nearest_missed_stretch() {
+    fn vehicle_going_back_turns_before_the_nearest_missed_stretch() {
         let turns_m = |failed: &[i64], speed_mps: f64, x_m: Option<f64>| {
             back_to_m(&missed(failed), &Situation { speed_mps, ..situation(x_m) })
         };
         let two = [20, 21, 40];
         assert_eq!(turns_m(&two, -0.1, Some(12.0)), Some(9.5));
         assert_eq!(turns_m(&two, -0.1, Some(9.6)), Some(9.5));
-        assert_eq!(turns_m(&two, -0.1, Some(9.4)), Some(4.5), "past the one there is the other");
+        assert_eq!(
+            turns_m(&two, -0.1, Some(9.4)),
+            Some(4.5),
+            "the vehicle is past one, and the other remains"
+        );
         assert_eq!(turns_m(&two, -0.1, Some(4.4)), None, "past both");
-        assert_eq!(turns_m(&[], -0.1, Some(12.0)), None, "nothing is missed");
-        assert_eq!(turns_m(&two, -0.1, None), None, "nobody knows where it is");
+        assert_eq!(turns_m(&[], -0.1, Some(12.0)), None, "no section is missed");
+        assert_eq!(turns_m(&two, -0.1, None), None, "its place is unknown");
         assert_eq!((turns_m(&two, 0.1, Some(12.0)), turns_m(&two, -0.01, Some(12.0))), (None, None));
     }
 
     #[test]
-    fn every_ping_is_counted_once_by_what_came_of_it() {
+    fn every_ping_is_counted_once_by_its_outcome() {
         let mut tally = Tally::default();
         let of = |outcome: Outcome, has_fix: bool| {
             let ping = pinged(5.1, 1.0);
@@ -330,12 +337,12 @@ mod tests {
             without_fix: 4,
             ..Tally::default()
         };
-        assert_eq!(tally, expected, "a return is counted when it is known what it is");
+        assert_eq!(tally, expected, "a return is counted once it is classified");
     }
 
-    /// A ping without a fix counts where its head was last known to be.
+    /// A ping without a fix counts at its head's last known place.
     #[test]
-    fn a_section_s_passage_has_its_pings_and_its_worst_moment() {
+    fn passage_has_all_pings_and_the_worst_moment() {
         let (mut coverage, profile) = (coverage(), pipe());
         let here = Reach { from_m: 7.0, to_m: 7.2 };
         let frontier = HeadFrontier(Some(HeadReach::after(None, MonoNs(0), here)));
@@ -362,14 +369,15 @@ mod tests {
         let elsewhere = coverage.sections.get(28).unwrap().passage;
         let counts = [elsewhere.pings, elsewhere.placed, elsewhere.unplaced, elsewhere.standing];
         assert_eq!(counts, [2, 0, 2, 2]);
-        // Nobody knows where a head is that never was anywhere.
+        // A head that never had a fix has no known place.
         note_passage(&mut coverage, &HeadFrontier(None), &drive, (&away, &profile));
         assert_eq!(coverage.sections.get(28).unwrap().passage, elsewhere);
     }
 
-    /// Where two standard deviations against the pass before make up the target, its speed says nothing: a hole's error is 1.2 of a pass's.
+    /// If two standard deviations against the previous pass reach the target, the speed is no evidence. A
+    /// hole's error is 1.2 times a pass's.
     #[test]
-    fn a_ping_whose_place_is_too_unsure_says_nothing_of_the_speed() {
+    fn ping_with_uncertain_place_is_no_evidence_of_speed() {
         let profile = pipe();
         let noted = |sd_m: f64| {
             let mut coverage = coverage();
@@ -383,7 +391,7 @@ mod tests {
     }
 
     #[test]
-    fn a_head_s_reach_is_where_it_last_had_a_fix_while_it_is_heard() {
+    fn head_reach_stays_at_the_last_fix_while_heard() {
         let at = |seconds: u64| MonoNs(seconds * 1_000_000_000);
         let ping = |seconds: u64, x_m: Option<f64>| PlacedPing {
             received: at(seconds),
@@ -397,14 +405,15 @@ mod tests {
         note_reach(&mut frontier, &ping(2, Some(5.0)));
         note_reach(&mut frontier, &ping(9, None));
         let expected = HeadReach::after(None, at(9), Reach { from_m: 5.0, to_m: 5.0 });
-        assert_eq!(frontier.0, Some(expected), "heard at 9 s, where it was at 2 s");
+        assert_eq!(frontier.0, Some(expected), "heard at 9 s, with the reach of 2 s");
         note_reach(&mut frontier, &ping(10, Some(6.0)));
         assert_eq!(frontier.0.map(|reach| reach.latest()), Some(Reach { from_m: 6.0, to_m: 6.0 }));
     }
 
-    /// At 0.4 m/s five seconds are 2 m: all from a quarter of a metre behind the rear head to that before where the front one will be.
+    /// At 0.4 m/s five seconds are 2 m. The checked wall extends from a quarter of a metre behind the rear
+    /// head to the same ahead of the front head's future place.
     #[test]
-    fn all_has_passed_where_what_is_seen_and_comes_soon_has() {
+    fn all_has_passed_if_visible_and_upcoming_wall_has() {
         let passed = |between: core::ops::Range<i64>, speed_mps: f64, x_m: Option<f64>| {
             let mut coverage = coverage();
             for index in between {
@@ -428,13 +437,14 @@ mod tests {
             let heads = state.get_mut(&mut world).unwrap();
             is_passed(&coverage, &heads, &Situation { speed_mps, ..situation(x_m) })
         };
-        // From 4.75 m, section 19, to 8.25 m, section 33; going back from 2.75 m, section 11, to 6.25 m, section 25.
+        // From 4.75 m, section 19, to 8.25 m, section 33. Going back: from 2.75 m, section 11, to 6.25 m,
+        // section 25.
         assert!(passed(19..34, 0.4, Some(5.5)) && passed(11..26, -0.4, Some(5.5)));
         assert!(passed(19..26, 0.0, Some(5.5)));
         for between in [20..34, 19..33, 19..26] {
             assert!(!passed(between.clone(), 0.4, Some(5.5)), "{between:?}");
         }
         assert!(!passed(12..26, -0.4, Some(5.5)) && !passed(11..25, -0.4, Some(5.5)));
-        assert!(!passed(0..120, 0.4, None), "without a place nothing is known");
+        assert!(!passed(0..120, 0.4, None), "nothing is known without a position");
     }
 }

@@ -1,4 +1,4 @@
-//! Bytes to readings.
+//! Converts bytes to readings.
 
 use bevy_ecs::prelude::{Query, Res, ResMut};
 
@@ -9,7 +9,7 @@ use crate::merge::Inbox;
 use crate::messages::{Event, Events};
 use crate::resources::{Tally, VehicleEntities};
 
-#[expect(clippy::too_many_arguments, reason = "a system's arguments are what it reads and writes")]
+#[expect(clippy::too_many_arguments, reason = "a system's arguments are its inputs and outputs")]
 pub(super) fn decode(
     inbox: Res<'_, Inbox>,
     entities: Res<'_, VehicleEntities>,
@@ -23,7 +23,7 @@ pub(super) fn decode(
     events.0.clear();
     commands.0.clear();
     for (source, packet) in inbox.iter() {
-        // No sensor: the dive's times and counts are theirs.
+        // The console is no sensor: it doesn't contribute to the dive's times and counts.
         if source == console.source {
             console.take(packet, events.0.len(), &mut commands);
             continue;

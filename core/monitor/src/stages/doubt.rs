@@ -1,4 +1,4 @@
-//! What navigation doubts, as alerts.
+//! Raises alerts for the doubts of navigation.
 
 use super::judge::digest_alert;
 use crate::alerts::{AlertKind, Alerts};
@@ -9,7 +9,7 @@ use headrace_geometry::time::MonoNs;
 use headrace_sampling::passes::Situation;
 use headrace_sensor::reading::SourceId;
 
-/// Notes the doubts of a beat.
+/// Records the doubts of an update.
 pub(super) fn note(
     at: MonoNs,
     situation: &Situation,

@@ -1,4 +1,4 @@
-//! Motion statistics of the vehicle and its heads per beat, stored with each section's passage.
+//! Motion statistics of the vehicle and its heads at each update, stored with each section's passage.
 
 use bevy_ecs::prelude::Component;
 
@@ -18,46 +18,52 @@ use headrace_sampling::swing::Looks;
 
 /// Maximum look-back over the time between neighbouring passes, seconds.
 const LONGEST_S: f64 = 50.0;
-/// Relative change of passes from which the speed that fits is found anew.
+/// Relative change of the passes above which the fitting speed is computed again.
 const SAME_PASSES: f64 = 0.01;
-/// Speeds that are tried for it, each this share of the one before.
+/// Search for the fitting speed: number of speeds tried, and ratio of each to the previous one.
 const SLOWER: u32 = 80;
 const SLOWER_BY: f64 = 0.97;
-/// Beams round a place for which steps along the wall are found.
+/// Number of beams round a place for which steps along the wall are computed.
 const RAYS: u32 = 72;
-/// Steps along the wall are found anew after such a way across the tunnel, m.
+/// Movement across the tunnel after which the steps along the wall are computed again, m.
 const MOVED_M: f64 = 0.05;
-/// Time between passes over the scheduled one up to which heads are in step.
+/// Ratio of the time between passes to the scheduled one below which heads are in phase.
 const IN_STEP: f64 = 1.05;
-/// Waits of a place in a sector that are told apart: from a whole sweep there and back at its ends to half of one in its middle.
+/// Classes of waiting time in a sector: from a whole sweep there and back at its ends to half of one in its
+/// middle.
 const WAITS: usize = 4;
 /// Speed below which the vehicle counts as stationary, m/s.
 const SLOW_MPS: f64 = 0.01;
 
-/// What a dive is to meet.
+/// Requirements of a dive.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Plan {
-    /// Speed for which heads are in phase, m/s; zero if none is planned.
+    /// Speed for which the heads are set in phase, m/s; zero if none is planned.
     pub(super) planned_mps: f64,
     /// Target T, m.
     pub(super) target_m: f64,
-    /// Standard deviations of a hole that a verdict of pass keeps below it.
+    /// Confidence: standard deviations of a hole by which a pass must clear the target.
     pub(super) confidence_sd: f64,
-    /// What other settings of the heads would change.
+    /// Changes that other settings of the heads would bring.
     pub(super) other: OtherSettings,
 }
 
-/// How vehicle and heads moved at the last beat, and what that needs of earlier ones.
+/// Movement of vehicle and heads at the last update, and the earlier data that it needs.
 #[derive(Debug, Clone, Default, Component)]
 pub(crate) struct Driving {
     pub(super) now: Drive,
-    /// The step of the heads, radians, and the place for which steps along the wall were last found, m.
+    /// Step of the heads, radians, and the place for which steps along the wall were last computed, m.
     step_rad: f64,
     place_m: [f64; 2],
-    /// The largest steps along the wall, m, by wait: the n-th where it is at most 1 - n / 8 of the longest. Heads that turn on wait alike everywhere.
+    /// Largest steps along the wall by class of waiting time, m.
+    ///
+    /// Class n has waits of at most 1 - n / 8 of the longest. Heads that turn continuously wait equally
+    /// everywhere.
     steps_m: [f64; WAITS],
-    /// The time between passes, seconds, the steps along the wall and the target less its margin, m, for which the speed
-    /// that fits was last found.
+    /// Inputs of the last computed fitting speed.
+    ///
+    /// They are the time between passes, seconds, the steps along the wall, m, and the target less its
+    /// margin, m.
     fitted: [f64; 3],
     looks: Looks,
     pub(super) lacking: Lacking,
@@ -66,9 +72,9 @@ pub(crate) struct Driving {
 stateful!(Driving { state: now, step_rad, place_m, steps_m, fitted, looks, lacking; });
 
 impl Driving {
-    /// Updates the statistics for a beat, from the situation as it is and as it would be had no head been silent or stood
-    /// still.
+    /// Updates the statistics, from the present situation and the one with no head silent or stalled.
     ///
+    /// Allocates: never.
     /// Allocates: never.
     pub(super) fn note(
         &mut self,
@@ -91,7 +97,7 @@ impl Driving {
         let place_m = [pose.position.y(), pose.position.z()];
         self.note_steps(situation, place_m, profile);
         let look = pose.attitude * Vec3::new(1.0, 0.0, 0.0);
-        // Neighbouring passes may be those of heads apart along the hull.
+        // Neighbouring passes may belong to heads apart along the hull.
         let apart_s = apart_m(situation) / situation.speed_mps.abs().max(SLOW_MPS);
         let since = at - DurNs::from_secs_f64((self.now.healthy_gap_s + apart_s).min(LONGEST_S));
         let turned_rad = self.looks.turned_since(look, since);
@@ -99,7 +105,7 @@ impl Driving {
         self.looks.keep(at, look);
     }
 
-    /// Updates the speed that fits once the heads' passes have changed.
+    /// Updates the fitting speed if the heads' passes have changed.
     fn note_fit(&mut self, healthy: &Situation, plan: &Plan) {
         let now = &mut self.now;
         let Plan { target_m, confidence_sd, .. } = *plan;
@@ -134,7 +140,7 @@ impl Driving {
         };
     }
 
-    /// Updates the largest steps along the wall once the vehicle or its heads' steps have changed enough.
+    /// Updates the largest steps along the wall if the vehicle or its heads' steps have changed enough.
     fn note_steps(&mut self, situation: &Situation, place_m: Yz, profile: &Profile) {
         let step_rad = situation.heads.iter().flatten().map(|motion| motion.step_rad).fold(0.0, f64::max);
         if step_rad <= 0.0 {
@@ -178,7 +184,7 @@ impl Driving {
         let gap_at_plan_s = gap_s(&as_it_is.at(plan_mps));
         let healthy_at_plan_s = gap_s(&phasing.at(plan_mps));
         let all_turn = turning == situation.configured && self.lacking.all_turn(at);
-        // At another speed than the planned one heads that are in step may be uneven, and others even.
+        // At other than the planned speed, heads in phase may pass unevenly, and others evenly.
         if all_turn && gap_at_plan_s <= IN_STEP * gap_s(&scheduled_at_plan).min(healthy_at_plan_s) {
             self.lacking.stalled = HeadSet::default();
         }
@@ -202,8 +208,10 @@ impl Driving {
     }
 }
 
-/// Largest distances along the perimeter between the places that two beams meet, a step apart, seen from a place, m: by the wait of a place
-/// in one of so many sectors, or all as the first where there are none.
+/// Largest distances along the perimeter between the wall points of two beams a step apart, seen from a
+/// place, m.
+///
+/// They are by class of waiting time in one of `sectors` sectors. Without sectors all are equal to the first.
 fn steps_by_wait_m(profile: &Profile, place_m: Yz, step_rad: f64, sectors: usize) -> [f64; WAITS] {
     let arc_m = |angle_rad: f64| {
         let wall = profile.cast(place_m, [math::sin(angle_rad), -math::cos(angle_rad)]);
@@ -224,7 +232,7 @@ fn steps_by_wait_m(profile: &Profile, place_m: Yz, step_rad: f64, sectors: usize
     steps_m
 }
 
-/// How far apart along the hull the heads that turn are, m.
+/// Largest distance along the hull between turning heads, m.
 fn apart_m(situation: &Situation) -> f64 {
     let x_m = || situation.heads.iter().flatten().map(|motion| motion.mount.position.x());
     (x_m().fold(f64::NEG_INFINITY, f64::max) - x_m().fold(f64::INFINITY, f64::min)).max(0.0)
@@ -240,7 +248,7 @@ mod tests {
 
     const STEP_RAD: f64 = 0.9 * math::TAU / 360.0;
 
-    /// Four heads side by side that turn in 8 s, at these angles, on a vehicle in the middle of a pipe.
+    /// Four heads side by side that turn in 8 s, at these angles, on a vehicle in the centre of a pipe.
     fn situation(angles_deg: [f64; 4], speed_mps: f64, profile: &Profile) -> Situation {
         let mut heads = [None; MAX_HEADS];
         for (slot, angle_deg) in heads.iter_mut().zip(angles_deg) {
@@ -276,26 +284,26 @@ mod tests {
         driving.now
     }
 
-    /// Of four heads a quarter of a turn apart, 8 s a turn, one leaves a gap of half a turn.
+    /// If one of four heads a quarter of a turn apart is missing, at 8 s a turn, the gap is half a turn.
     #[test]
-    fn a_head_that_stood_still_is_not_counted_on_until_it_is_in_step() {
+    fn stalled_head_counts_again_only_once_in_phase() {
         let near = |found: f64, expected: f64| (found - expected).abs() < 1e-9;
         let mut driving = Driving::default();
         assert!(near(noted(&mut driving, EVEN, 0.2, 0.2).left_at_plan_s, 2.0), "none did");
         driving.lacking.stalled = HeadSet::default().with(1);
-        // Half an eighth of a turn late.
+        // A sixteenth of a turn late.
         let late = noted(&mut driving, [0.0, 67.5, 180.0, 270.0], 0.2, 0.2);
         assert!(near(late.left_at_plan_s, 4.0) && near(late.gap_s, 2.5) && near(late.planned_gap_s, 2.0));
-        assert!(near(late.even_gap_s, 2.0), "were they even");
+        assert!(near(late.even_gap_s, 2.0), "if they were evenly spread");
         assert!(driving.lacking.stalled.has(1));
         let again = noted(&mut driving, EVEN, 0.2, 0.2);
         assert!(near(again.left_at_plan_s, 4.0) && near(again.gap_s, 2.0));
-        assert!(driving.lacking.stalled.is_empty(), "it is in step again");
+        assert!(driving.lacking.stalled.is_empty(), "the head is in phase again");
         assert!(near(noted(&mut driving, EVEN, 0.2, 0.2).left_at_plan_s, 2.0));
     }
 
     #[test]
-    fn while_all_heads_stand_still_the_times_between_passes_are_those_of_before() {
+    fn pass_gaps_are_kept_while_all_heads_stand_still() {
         let profile = shapes::circle(3.0).unwrap();
         let plan =
             Plan { planned_mps: 0.2, target_m: 0.5, confidence_sd: 2.0, other: OtherSettings::default() };
@@ -308,15 +316,15 @@ mod tests {
         assert_eq!(times(&driving.now), times(&before), "{:?}", driving.now);
     }
 
-    /// From the middle of a pipe of 3 m radius a step goes 0.0471 m along the wall, which leaves 0.4978 m of the target along the tunnel, for 2 s
-    /// and a ping.
+    /// From the centre of a pipe of 3 m radius a step measures 0.0471 m along the wall. That leaves 0.4978 m
+    /// of the target along the tunnel, for 2 s and a ping.
     #[test]
-    fn the_speed_that_fits_leaves_room_for_the_steps() {
+    fn fitting_speed_leaves_room_for_the_steps() {
         let along_m = math::sqrt(0.25 - 9.0 * STEP_RAD * STEP_RAD);
         let most_mps = along_m / 2.02;
         let fits_mps = |planned_mps: f64| {
             let mut driving = Driving::default();
-            // Steps are known from the first beat on.
+            // Steps are known from the first update on.
             noted(&mut driving, EVEN, -0.1, planned_mps);
             let now = noted(&mut driving, EVEN, -0.1, planned_mps);
             assert!((now.fits_along_m - along_m).abs() < 1e-6 && (now.speed_mps - 0.1).abs() < 1e-12);
@@ -324,17 +332,17 @@ mod tests {
             now.fits_mps
         };
         assert!((fits_mps(0.2) - 0.2).abs() < 1e-12, "as planned");
-        // Of what is tried, three hundredths apart, the fastest.
+        // The fastest of the speeds tried, which are three hundredths apart.
         for planned_mps in [0.0, 1.02 * most_mps] {
             let found = fits_mps(planned_mps);
             assert!(found <= most_mps && found > 0.96 * most_mps, "{planned_mps}: {found} of {most_mps}");
         }
     }
 
-    /// In a pipe of 3 m radius, seen from 1 m below its middle: a step goes twice as far along the floor as a metre away, four times along
-    /// the ceiling, and thrice to the sides.
+    /// In a pipe of 3 m radius, seen from 1 m below its centre. Relative to a distance of one metre, a step
+    /// is twice as long along the floor, four times along the ceiling, and three times at the sides.
     #[test]
-    fn steps_are_the_largest_where_a_place_waits_so_long() {
+    fn steps_are_the_largest_in_their_waiting_class() {
         const SMALL_RAD: f64 = 1e-4;
         let profile = shapes::circle(3.0).unwrap();
         let [y_m, z_m] = profile.reference();
@@ -346,26 +354,27 @@ mod tests {
         let all = of([0.0, -1.0], 0);
         assert!(
             near(all[0], 4.0) && all[1..].iter().all(|step| step.abs() <= 0.0),
-            "all wait alike: {all:?}"
+            "all waits must be equal: {all:?}"
         );
-        // Two sectors end below and above; the middle quarter of each is at a side.
+        // Two sectors end below and above. The middle quarter of each is at a side.
         let below = of([0.0, -1.0], 2);
         assert!(near(below[0], 4.0) && (3.0..3.5).contains(&below[3]), "{below:?}");
-        assert!(below.windows(2).all(|pair| pair[0] > pair[1]), "ever less from the ceiling on: {below:?}");
+        assert!(below.windows(2).all(|pair| pair[0] > pair[1]), "decreasing from the ceiling on: {below:?}");
         for aside_m in [-1.0, 1.0] {
             let beside = of([aside_m, 0.0], 2);
             assert!(near(beside[3], 4.0) && (3.0..3.7).contains(&beside[0]), "{beside:?}");
         }
-        // Four end at the sides, too; the middle quarter of the upper ones begins at 34 degrees, where a step goes 3.83 times as far.
+        // Four sectors end at the sides, too. The middle quarter of the upper ones begins at 34 degrees, with
+        // a step 3.83 times as long.
         let four = of([0.0, -1.0], 4);
         assert!(near(four[0], 4.0) && near(four[3], 3.83), "{four:?}");
-        // From the middle a step is one everywhere.
+        // From the centre a step has the same length everywhere.
         assert!(of([0.0, 0.0], 3).iter().all(|step| near(*step, 3.0)));
     }
 
-    /// Beside the middle by so much, a step goes farther along the wall on the other side.
+    /// With the vehicle this far beside the centre, a step on the opposite wall gets longer.
     #[test]
-    fn steps_are_found_anew_after_five_centimetres_or_another_step() {
+    fn steps_are_recomputed_after_5_cm_or_a_new_step() {
         let profile = shapes::circle(3.0).unwrap();
         let mut driving = Driving::default();
         let mut t_y_m = |aside_m: f64, finer: f64| {
@@ -384,7 +393,7 @@ mod tests {
         assert!(near(t_y_m(0.0, 1.0), middle_m, middle_m));
         assert!(near(t_y_m(0.04, 1.0), middle_m, middle_m), "little has changed");
         assert!(near(t_y_m(0.3, 1.0), 3.3 * STEP_RAD, middle_m));
-        assert!(near(t_y_m(0.26, 1.0), 3.3 * STEP_RAD, middle_m), "little has since");
+        assert!(near(t_y_m(0.26, 1.0), 3.3 * STEP_RAD, middle_m), "little has changed since");
         assert!(near(t_y_m(0.26, 0.5), 1.63 * STEP_RAD, 0.5 * middle_m), "another mode");
         assert!(near(t_y_m(0.0, 0.5), 0.5 * middle_m, 0.5 * middle_m));
     }

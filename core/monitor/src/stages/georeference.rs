@@ -1,4 +1,4 @@
-//! Returns to points on the wall.
+//! Converts returns to points on the wall.
 
 use bevy_ecs::prelude::{Query, Res, ResMut};
 
@@ -29,7 +29,7 @@ type HeadParts = (
     &'static HiddenAngles,
 );
 
-#[expect(clippy::too_many_arguments, reason = "a system's arguments are what it reads and writes")]
+#[expect(clippy::too_many_arguments, reason = "a system's arguments are its inputs and outputs")]
 pub(super) fn georeference(
     events: Res<'_, Events>,
     positioned: Res<'_, PositionedList>,
@@ -90,7 +90,7 @@ pub(super) fn georeference(
     }
 }
 
-/// Counts a ping at wall that the head could hear.
+/// Counts a ping at wall that the head could detect.
 fn count(losses: &mut LossCount, ping: &PlacedPing, range_m: Option<f64>, tunnel: &TunnelDesign) {
     match ping.outcome {
         Outcome::Sample { point, arc_m } => {
@@ -107,9 +107,9 @@ fn count(losses: &mut LossCount, ping: &PlacedPing, range_m: Option<f64>, tunnel
     }
 }
 
-/// Angle beside occluded ones at which the vehicle may be heard, too, radians.
+/// Angle next to occluded ones at which the vehicle may also return echoes, radians.
 const BESIDE_RAD: f64 = 0.09;
-/// At occluded angles, returns from nearer than this share of the range to the wall are from the vehicle.
+/// Share of the range to the wall below which a return at an occluded angle is from the vehicle.
 const VEHICLE_SHARE: f64 = 0.5;
 
 fn outcome(
@@ -142,7 +142,7 @@ fn outcome(
         return sample(range_m);
     }
     let loss = match wall_m {
-        // Whether the vehicle is in the way can't be told of wall that isn't heard anyway.
+        // Occlusion is undetectable for wall out of range.
         Some(wall_m) if wall_m > longest_m(sonar, tunnel) => Loss::OutOfRange,
         _ if hidden => Loss::Occluded,
         Some(_) => Loss::Missing,
@@ -156,7 +156,7 @@ fn longest_m(sonar: &SonarReturn, tunnel: &TunnelDesign) -> f64 {
     tunnel.site.rescaled_range_m(sonar.max_range_m, sonar.sound_speed_mps)
 }
 
-/// Reach of a head: its samples lie in the plane across its axis; when tilted, that plane spans some chainage.
+/// Reach of a head. Its samples lie in the plane across its axis. If tilted, that plane spans some chainage.
 pub(super) fn reach(pose: &Pose, mount: &Mount, tunnel: &TunnelDesign) -> Reach {
     let origin = pose.place(mount.position);
     let axis = pose.attitude * (mount.rotation * Vec3::new(1.0, 0.0, 0.0));
@@ -193,7 +193,7 @@ fn situation(
             continue;
         };
         if at.since(last).0.abs() <= SILENT_AFTER.0 {
-            // Heads ping at different times; their angles are extrapolated to a common epoch.
+            // Heads ping at different times. Their angles are extrapolated to a common epoch.
             let angle_rad = angle_rad + rate_radps * at.since(last).as_secs_f64();
             let (mount, sector_rad) = (mounted.info.mount, track.sector_rad());
             let others = heads.iter().filter(|(other, ..)| other.0 != head.0);
@@ -241,7 +241,8 @@ mod tests {
         TunnelDesign { profile, site, length_m, contradiction_m: 1.0, limits }
     }
 
-    /// In the middle of a pipe of 3 m radius, a ping at 90 degrees, to the left, through water as fast as the head believes.
+    /// Outcome of a ping at 90 degrees, to the left, in the centre of a pipe of 3 m radius. The head's speed
+    /// of sound is that of the water.
     fn heard(range_m: Option<f64>, hidden: bool) -> Outcome {
         let tunnel = tunnel();
         let [y_m, z_m] = tunnel.profile.reference();
@@ -256,7 +257,7 @@ mod tests {
     }
 
     #[test]
-    fn an_echo_of_the_vehicle_is_no_wall() {
+    fn echo_off_the_vehicle_is_no_wall() {
         for range_m in [0.1, 0.75, 1.4] {
             assert!(
                 matches!(heard(Some(range_m), true), Outcome::Lost(Loss::Occluded, Some(_))),
@@ -264,15 +265,16 @@ mod tests {
             );
             assert!(matches!(heard(Some(range_m), false), Outcome::Sample { .. }), "{range_m}");
         }
-        // Beyond half way it isn't the vehicle that is heard.
+        // A return from beyond half the range isn't from the vehicle.
         assert!(matches!(heard(Some(1.6), true), Outcome::Sample { .. }));
         assert!(matches!(heard(None, true), Outcome::Lost(Loss::Occluded, Some(_))));
         assert!(matches!(heard(None, false), Outcome::Lost(Loss::Missing, Some(_))));
     }
 
-    /// Whether or not they have pinged at a beat, they turn on as they did; who has been silent for more than two seconds is nowhere.
+    /// Heads are extrapolated to an update whether or not they have pinged at it. A head silent for over two
+    /// seconds is left out.
     #[test]
-    fn heads_are_where_they_have_turned_to_by_the_beat() {
+    fn head_angles_are_extrapolated_to_the_update() {
         const RATE_RADPS: f64 = 0.785;
         let at = |seconds: f64| MonoNs(0) + DurNs::from_secs_f64(seconds);
         // 400 pings in 8 s, from these times on, at these rates.

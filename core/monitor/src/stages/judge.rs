@@ -18,7 +18,7 @@ pub(crate) struct Results<'a> {
     pub(crate) digests: &'a mut Digests,
     pub(crate) alerts: &'a mut Alerts,
     pub(crate) runs: &'a mut RunInputs,
-    /// Index of the event at which is judged, and whether that is at a beat before it.
+    /// Index of the event of the judgement, and whether it is at an update before that event.
     pub(crate) place: (usize, bool),
 }
 
@@ -81,8 +81,9 @@ pub(crate) fn judge_one(
     }
 }
 
-/// Keeps runs that have changed for the list of alerts. Those that are cleared come last: what they have left belongs to the same
-/// alert.
+/// Keeps changed runs for the list of alerts.
+///
+/// Cleared runs come last, since their remains belong to the same alert.
 fn note_runs(notices: &[Notice], place: (usize, bool), sections: &Sections, runs: &mut RunInputs) {
     for cleared in [false, true] {
         for notice in notices {
@@ -94,7 +95,7 @@ fn note_runs(notices: &[Notice], place: (usize, bool), sections: &Sections, runs
     }
 }
 
-/// Adds an alert to the digest, with its chainage and deviation, m, and the head where it names one.
+/// Adds an alert to the digest, with its chainage, deviation, m, and head if it names one.
 pub(crate) fn digest_alert(
     digests: &mut Digests,
     kind: AlertKind,
@@ -117,7 +118,8 @@ mod tests {
 
     const AT: MonoNs = MonoNs(7_000_000_000);
 
-    /// Judges a section without a sample, 20 m before where samples may still land; some heads haven't been up to a chainage, m.
+    /// Judges a section without a sample, 20 m before where samples may still land. Some heads haven't passed
+    /// a chainage, m.
     fn judged(coverage: &mut Coverage, section: i64, not_passed_m: f64) -> (Vec<Notice>, Vec<RunInput>) {
         let request = Request {
             section,
@@ -143,7 +145,7 @@ mod tests {
     }
 
     #[test]
-    fn a_fail_is_told_with_its_run_and_what_is_unsure_with_its_stretch() {
+    fn fail_is_published_with_its_run_and_unsure_section_with_its_stretch() {
         let mut coverage = coverage();
         let (notices, runs) = judged(&mut coverage, 40, -20.0);
         let run = Notice::Run { id: RunId(0), at: AT, change: RunChange::Raised };
@@ -151,7 +153,7 @@ mod tests {
         assert_eq!((notices, coverage.unsure), (vec![run, section], None));
         let found = runs.iter().map(|run| (run.id, run.change, run.event, run.at_beat, run.at));
         assert_eq!(found.collect::<Vec<_>>(), [(RunId(0), RunChange::Raised, 3, true, AT)]);
-        // Where not all heads have been nothing can be said: one stretch of neighbours, and another one far away.
+        // If not all heads have passed, there is no verdict: one stretch of neighbours, and a distant one.
         for (section, from, to, sections) in [(20, 20, 21, 1), (21, 20, 22, 2), (60, 60, 61, 1)] {
             let (notices, runs) = judged(&mut coverage, section, 20.0);
             assert_eq!((notices.len(), runs.len()), (1, 0));
@@ -161,9 +163,9 @@ mod tests {
         }
     }
 
-    /// Alerts of what is cleared go to the runs that are left, which must be known by then.
+    /// Alerts of cleared runs pass to the remaining runs, which must be known by then.
     #[test]
-    fn runs_that_are_cleared_come_last_while_there_is_room() {
+    fn cleared_runs_come_last_while_there_is_room() {
         let mut coverage = coverage();
         for section in [20, 40, 60] {
             judged(&mut coverage, section, -20.0);

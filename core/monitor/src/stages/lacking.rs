@@ -1,7 +1,9 @@
-//! Samples that are lacking: pings that were lost, those of silent and stalled heads, and those made without a fix.
+//! Finds missing samples: lost pings, pings that silent and stalled heads would have made, and pings without
+//! a fix.
 //!
-//! A head that is silent or stands is taken to turn on at its last rate; where its pings would have met the design is
-//! noted at each beat. Pings without a fix are noted once there is one again, along the straight way between the two.
+//! A silent or stalled head is assumed to turn on at its last rate. Each update records where its pings would
+//! have met the design. Pings without a fix are recorded once there is a fix again, along the straight line
+//! between the two fixes.
 
 use serde::{Deserialize, Serialize};
 
@@ -18,29 +20,29 @@ use headrace_sampling::head::{HeadMotion, HeadSet, MAX_HEADS};
 use headrace_sampling::losses::LossRate;
 use headrace_sampling::passes::Situation;
 
-/// Time without a ping at a new angle after which a head is lacking.
+/// Time without a ping at a new angle after which a head's samples count as missing.
 const LACKING_AFTER: DurNs = DurNs(400_000_000);
-/// Pings at hidden angles from which it is told whether they are, and the share of them that gets nothing.
+/// Number of pings at hidden angles needed to decide on occlusion, and share of losses that confirms it.
 const HIDDEN_PINGS: u16 = 600;
 const HIDDEN_SHARE: f64 = 0.7;
-/// Pings without a fix that are kept: four heads for over two minutes.
+/// Capacity for pings without a fix: four heads for over two minutes.
 const ROOM: usize = 1 << 15;
 
-/// A head as it was last seen turning.
+/// A head as last seen turning.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 struct Turning {
-    /// Angle, radians, rate, rad/s, and step, radians, at a beat.
+    /// Angle, radians, rate, rad/s, and step, radians, at an update.
     seen: Option<(MonoNs, f64, f64, f64)>,
-    /// Its last ping, and its last at a new angle.
+    /// Times of its last ping, and of its last ping at a new angle.
     pinged: Option<MonoNs>,
     moved: Option<MonoNs>,
-    /// Until when its lacks have been noted.
+    /// Time up to which its missing samples have been recorded.
     noted: Option<MonoNs>,
     /// Longest range at its setting, m.
     longest_m: f64,
-    /// Of the latest pings at angles that the vehicle hides: those that got nothing, and all.
+    /// Latest pings at angles that the vehicle hides: number without a return, and total.
     hidden: [u16; 2],
-    /// Whether the last ping that it would have made would have got nothing.
+    /// Whether the last simulated ping was lost.
     would_lose: bool,
 }
 
@@ -55,10 +57,10 @@ impl Turning {
         }
     }
 
-    /// Whether a ping that it would have made would have got nothing: drawn from what it loses by chance, by the number that its time is.
+    /// Whether a simulated ping is lost: drawn from the head's loss rate, with its time as the random number.
     fn would_lose(&mut self, when: MonoNs, rate: LossRate) -> bool {
         let LossRate { share, after_lost } = rate;
-        // A head that lost all, or whose losses never end, says nothing of how they begin.
+        // For a head that lost everything, or whose losses never end, the rate after a return is unknown.
         let is_known = share < 1.0 && after_lost < 1.0;
         let after_heard = if is_known { share * (1.0 - after_lost) / (1.0 - share) } else { share };
         let chance = if self.would_lose { after_lost } else { after_heard };
@@ -66,43 +68,43 @@ impl Turning {
         self.would_lose
     }
 
-    /// Whether the vehicle does hide what it is taken to hide.
+    /// Whether the vehicle really hides the angles assumed to be hidden.
     fn is_hidden(&self) -> bool {
         let [lost, all] = self.hidden;
         HIDDEN_SHARE * f64::from(all) <= f64::from(lost)
     }
 }
 
-/// A ping that was made, or should have been, without a fix.
+/// A ping without a fix, made or simulated.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 struct Away {
     at: MonoNs,
     head: u8,
     angle_rad: f64,
-    /// Why it is lacking beside the position; a ping without a return is judged by where it was aimed.
+    /// Causes other than the position. A ping without a return is judged by its aim.
     why: Causes,
     is_lost: bool,
 }
 
-/// What is needed of earlier beats and pings.
+/// Data of earlier updates and pings.
 #[derive(Debug, Clone)]
 pub(crate) struct Lacking {
     heads: [Turning; MAX_HEADS],
-    /// The last beat with a fix.
+    /// Last update with a fix.
     pose: Option<(MonoNs, Pose)>,
     away: Vec<Away>,
-    /// There was no room for some.
+    /// Some pings were dropped for lack of room.
     forgot: bool,
-    /// Heads that have stood still, and haven't been in step with the others since.
+    /// Heads that have stalled and have been out of phase since.
     pub(super) stalled: HeadSet,
-    /// Heads that heard no wall at the last beat.
+    /// Heads that detected no wall at the last update.
     deaf: HeadSet,
 }
 
 stateful!(Lacking { state: heads, pose, forgot, stalled, deaf; lists: away; });
 
 impl Default for Lacking {
-    /// Allocates: startup only; all that it will ever use.
+    /// Allocates: at startup, all that it will ever use.
     fn default() -> Self {
         Self {
             heads: [Turning::default(); MAX_HEADS],
@@ -116,13 +118,13 @@ impl Default for Lacking {
 }
 
 impl Lacking {
-    /// Whether every head that has pinged does so at new angles.
+    /// Whether every head that pings does so at new angles.
     pub(super) fn all_turn(&self, at: MonoNs) -> bool {
         let turns = |moved: MonoNs| at.since(moved).0 <= LACKING_AFTER.0;
         self.heads.iter().filter_map(|head| head.moved).all(turns)
     }
 
-    /// The situation as it would be had no head been silent or stood still: such heads turn on as they last did.
+    /// The situation with no head silent or stalled: such heads turn on as they last did.
     pub(super) fn healthy(&mut self, at: MonoNs, situation: &Situation, heads: &Heads<'_, '_>) -> Situation {
         let stalled = self.stalled;
         let mut healthy = *situation;
@@ -147,7 +149,7 @@ impl Lacking {
     }
 }
 
-/// Notes a ping: a lack, if it was aimed at the wall in vain.
+/// Records a ping, as a missing sample if it was aimed at the wall without a return.
 pub(super) fn note_ping(lacking: &mut Lacking, ping: &PlacedPing, lacks: &mut Lacks) {
     if ping.standing {
         lacking.stalled = lacking.stalled.with(ping.head);
@@ -164,14 +166,14 @@ pub(super) fn note_ping(lacking: &mut Lacking, ping: &PlacedPing, lacks: &mut La
         Outcome::Sample { .. } => head.note_hidden(ping.hidden == Hidden::Yes, false),
         Outcome::Lost(loss, Some(Aim { x_m, arc_m })) => {
             head.note_hidden(loss == Loss::Occluded, true);
-            // Where the wall is heard at such angles all the same, what isn't is missing.
+            // If the wall is detected at such angles after all, lost pings there are missing returns.
             let heard = loss == Loss::Occluded && !head.is_hidden();
             let cause = match loss {
                 Loss::Missing if deaf.has(ping.head) => Cause::HeadSilent,
                 Loss::Occluded if heard => Cause::MissingReturns,
                 loss => Cause::of_loss(loss),
             };
-            // With a longer range the vehicle would be in the way still.
+            // With a longer range the vehicle would still occlude it.
             let stays = loss == Loss::OutOfRange && ping.hidden == Hidden::Yes && head.is_hidden();
             let why = if stays { Causes::of(cause).with(Cause::Occluded) } else { Causes::of(cause) };
             lacks.add(Lack { x_m, arc_m, head: number_of(ping.head), why });
@@ -187,12 +189,12 @@ pub(super) fn note_ping(lacking: &mut Lacking, ping: &PlacedPing, lacks: &mut La
     }
 }
 
-/// A head's number as it is kept.
+/// A head's number as stored.
 pub(super) fn number_of(head: usize) -> u8 {
     u8::try_from(head).unwrap_or(u8::MAX)
 }
 
-/// Notes the heads that hear no wall: what they haven't heard for a turn isn't missing by chance.
+/// Records the heads that detect no wall. Their losses in the last turn are not random.
 fn note_deaf(lacking: &mut Lacking, deaf: HeadSet, coverage: &mut Coverage) {
     let before = core::mem::replace(&mut lacking.deaf, deaf);
     for head in deaf.iter().filter(|head| !before.has(*head)) {
@@ -209,7 +211,7 @@ fn note_deaf(lacking: &mut Lacking, deaf: HeadSet, coverage: &mut Coverage) {
     }
 }
 
-/// Notes a beat: what silent and stalled heads would have pinged since the last one, and where pings without a fix were.
+/// Records at an update simulated pings of silent and stalled heads, and places of pings without a fix.
 ///
 /// Allocates: never.
 pub(super) fn note_beat(
@@ -229,7 +231,7 @@ pub(super) fn note_beat(
     let speed_mps = situation.speed_mps;
     for (number, mounted, hidden, ..) in heads {
         let Some(head) = turning.get_mut(number.0) else { continue };
-        // A head that has stood still lacks where it would be otherwise until it is in step again.
+        // A stalled head's samples are missing at its expected place until it is in phase again.
         let out_of_step = stalled.has(number.0);
         let late = |moved: &MonoNs| out_of_step || at.since(*moved).0 > LACKING_AFTER.0;
         let Some(moved) = head.moved.filter(late) else { continue };
@@ -265,7 +267,7 @@ pub(super) fn note_beat(
                 let placing = Placing { mount: &mounted.info.mount, turning: head, profile, hidden: &hides };
                 placing.lack(&pose, &ping, now, coverage);
             } else if !keep(away, Away { why: ping.why.with(Cause::PositionLost), ..ping }) {
-                // Nor is there room for those after it.
+                // There is no room for the following ones either.
                 *forgot = true;
                 when = when + DurNs((self::owed(when, at, period) - 1).saturating_mul(period.0));
             }
@@ -278,7 +280,7 @@ pub(super) fn note_beat(
     }
 }
 
-/// Notes pings without a fix once there is one again.
+/// Records pings without a fix once there is a fix again.
 ///
 /// Allocates: never.
 pub(super) fn note_away(
@@ -313,21 +315,23 @@ pub(super) fn note_away(
     }
 }
 
-/// Pings due from `first` to `at`. The work of a beat must not grow with the time since the last one, which a log may put years
-/// apart.
+/// Number of pings due from `first` to `at`.
+///
+/// It takes constant time, since a log may put years between two updates.
 fn owed(first: MonoNs, at: MonoNs, period: DurNs) -> i64 {
     let since = at.since(first).0;
     if since < 0 { 0 } else { since.checked_div(period.0).map_or(0, |periods| periods.saturating_add(1)) }
 }
 
-/// A number from 0 to 1, the same each time, that is spread evenly over different ones. Source: Steele et al. 2014, the finalizer of splitmix64.
+/// Pseudo-random number from 0 to 1, evenly spread over different inputs. Source: Steele et al. 2014,
+/// finalizer of splitmix64.
 fn unit_of(number: u64) -> f64 {
     let mixed = (number ^ (number >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
     let mixed = (mixed ^ (mixed >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
     ((mixed ^ (mixed >> 31)) >> 11) as f64 / (1_u64 << 53) as f64
 }
 
-/// Keeps a ping without a fix; false if there is no room.
+/// Keeps a ping without a fix. False if there is no room.
 fn keep(away: &mut Vec<Away>, ping: Away) -> bool {
     let has_room = away.len() < away.capacity();
     if has_room {
@@ -340,7 +344,7 @@ fn hides(heads: &Heads<'_, '_>, head: usize, angle_rad: f64) -> bool {
     heads.iter().any(|(number, _, hidden, ..)| number.0 == head && hidden.hides(angle_rad))
 }
 
-/// A straight way between two fixes.
+/// A straight line between two fixes.
 struct Way {
     from: (MonoNs, Pose),
     to: (MonoNs, Pose),
@@ -352,7 +356,7 @@ impl Way {
         (self.to.1.position.x() - self.from.1.position.x()).abs() / seconds
     }
 
-    /// The pose at a time between them: the attitude is the nearer one's.
+    /// Pose at a time between the fixes. The attitude is that of the nearer fix.
     fn at(&self, at: MonoNs) -> Pose {
         let whole_s = self.to.0.since(self.from.0).as_secs_f64().max(1e-3);
         let share = (at.since(self.from.0).as_secs_f64() / whole_s).clamp(0.0, 1.0);
@@ -362,7 +366,7 @@ impl Way {
     }
 }
 
-/// Places what a head would have pinged.
+/// Context for placing a head's simulated pings.
 struct Placing<'a> {
     mount: &'a Mount,
     turning: &'a Turning,
@@ -371,7 +375,7 @@ struct Placing<'a> {
 }
 
 impl Placing<'_> {
-    /// Notes a lack where a ping was or would have been aimed, and how the vehicle went by.
+    /// Records a missing sample at the aim of a ping, made or simulated, and the driving figures there.
     fn lack(&self, pose: &Pose, ping: &Away, drive: Drive, coverage: &mut Coverage) {
         let origin = pose.place(self.mount.position);
         let beam = pose.attitude * (self.mount.rotation * head_direction(ping.angle_rad));
@@ -383,10 +387,10 @@ impl Placing<'_> {
             section.passage.drive = section.passage.drive.or_worse(drive);
         }
         let mut why = ping.why;
-        // A ping that was made and got nothing was lost for another reason, too; one that wasn't would have been.
+        // A ping made without a return was lost for another reason, too. So would a simulated one have been.
         let made = why == Causes::of(Cause::PositionLost);
         if ping.is_lost {
-            // What the head wouldn't have heard anyway, or not from there, isn't missing by chance.
+            // Wall that the head would not have detected anyway is not lost by chance.
             let elsewhere = |why: Causes| why.without(Cause::MissingReturns);
             let is_far = wall.range_m > self.turning.longest_m;
             let is_hidden = self.turning.is_hidden() && (self.hidden)(ping.angle_rad);

@@ -1,4 +1,4 @@
-//! The live state: what earlier stages have found, as of each beat.
+//! Builds the live state: results of earlier stages, as of each update.
 
 use bevy_ecs::prelude::{Query, Res, ResMut};
 
@@ -21,12 +21,12 @@ use headrace_sampling::head::HeadSet;
 use headrace_sampling::passes::Situation;
 use headrace_sensor::reading::SourceId;
 
-/// Share of the target that the advice keeps back for position errors at most.
+/// Maximum share of the target that the advice reserves for position errors.
 const SPREAD_SHARE: f64 = 0.2;
-/// How long an alert of single occurrences holds.
+/// Time for which an alert of single occurrences holds.
 const HOLDS: DurNs = DurNs(10_000_000_000);
 
-/// What has been judged, and the alerts that hold, at a beat.
+/// Judged metres and active alerts at an update.
 pub(super) fn standing<'a>(
     at: MonoNs,
     coverage: &Coverage,
@@ -83,7 +83,7 @@ fn active<'a>(
     active
 }
 
-/// Why each source isn't believed: a set of sources by kind.
+/// Bitmask, for each kind of alert, of the sources distrusted for it.
 #[derive(Default)]
 struct HeadBits([u64; AlertKind::ALL.len()]);
 
@@ -99,7 +99,7 @@ impl HeadBits {
     }
 }
 
-#[expect(clippy::too_many_arguments, reason = "a system's arguments are what it reads and writes")]
+#[expect(clippy::too_many_arguments, reason = "a system's arguments are its inputs and outputs")]
 pub(super) fn live(
     events: Res<'_, Events>,
     positioned: Res<'_, PositionedList>,
@@ -219,7 +219,9 @@ mod tests {
 
     const AT: MonoNs = MonoNs(9_000_000_000);
 
-    /// The live state after a beat at which passes were so unsure against one another, for a target of half a metre and two standard deviations.
+    /// Live state after an update with this error between passes.
+    ///
+    /// The target is half a metre, with two standard deviations.
     fn after(pass_error_m: f64, is_cable_doubted: bool, lacking: Option<NoFix>) -> LiveState {
         let pose = Pose { position: Point3::new(12.5, 0.0, 3.0), attitude: Rot::identity() };
         let relative = Relative::along(pass_error_m);
@@ -266,7 +268,7 @@ mod tests {
 
     /// Two standard deviations may take a fifth of the target.
     #[test]
-    fn a_position_is_doubtful_where_passes_are_too_unsure_or_the_cable_is_not_believed() {
+    fn position_is_doubtful_if_passes_are_uncertain_or_the_cable_is_distrusted() {
         let spread = PositionState::Doubtful(PositionDoubt::Spread);
         let cable = PositionState::Doubtful(PositionDoubt::Cable);
         for (pass_error_m, is_cable_doubted, lacking, expected) in [
@@ -289,9 +291,9 @@ mod tests {
         }
     }
 
-    /// A head that isn't believed is told of by its own alert, and by no other.
+    /// A distrusted head has its own alert, and no other.
     #[test]
-    fn of_each_head_it_is_known_why_it_is_not_believed() {
+    fn each_distrusted_head_has_its_reason() {
         let kinds = [AlertKind::HeadScattered, AlertKind::HeadConstant, AlertKind::HeadOutvoted];
         for (added, kind) in [(0, kinds[0]), (5, kinds[1]), (63, kinds[2])] {
             let mut bits = HeadBits::default();

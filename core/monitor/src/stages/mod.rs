@@ -1,4 +1,4 @@
-//! The core's own systems, one file a stage.
+//! Systems of the core, one file per stage.
 
 #![allow(clippy::needless_pass_by_value, reason = "bevy hands systems their arguments by value")]
 
@@ -38,7 +38,7 @@ pub(super) fn add(schedule: &mut Schedule) {
     ));
 }
 
-/// Adds those that place pings.
+/// Adds the systems that place pings.
 pub(super) fn add_placing(schedule: &mut Schedule) {
     schedule.add_systems((
         decode::decode.in_set(Stage::Decode),

@@ -1,4 +1,4 @@
-//! Readings to fixes.
+//! Converts readings to fixes.
 
 use bevy_ecs::prelude::{Query, Res, ResMut, Single};
 
@@ -23,7 +23,7 @@ pub(super) fn navigate(
     let (mut navigator, mut state) = vehicle.into_inner();
     let navigator = &mut *navigator;
     for (index, event) in events.0.iter().enumerate() {
-        // Time may stall or go back; each beat is emitted once. After a gap only the last beat is.
+        // Time may stall or go back. Each update is emitted once. After a gap only the last one is.
         if let Some(at) = beat_before(&mut navigator.next_beat, event.received) {
             let fix = navigator.navigation.fix(at);
             let navigation = &navigator.navigation;
@@ -49,7 +49,7 @@ pub(super) fn navigate(
 }
 
 impl Navigator {
-    /// Whether the inertial unit or velocity log that an event is from hangs: what it repeats says nothing.
+    /// Whether the inertial unit or velocity log of an event is stuck: its repeated readings are ignored.
     fn hangs(&mut self, event: &Event) -> bool {
         let source = event.source.index();
         let bit = 1_u64 << (source % 64);
@@ -63,7 +63,7 @@ impl Navigator {
     }
 }
 
-/// The last beat at or before `now`, unless already emitted.
+/// Time of the last update at or before `now`, unless it was already emitted.
 fn beat_before(next: &mut Option<MonoNs>, now: MonoNs) -> Option<MonoNs> {
     let period = ADVICE_PERIOD.0.unsigned_abs();
     let last = MonoNs(now.0 - now.0 % period);
@@ -104,9 +104,9 @@ mod tests {
     use super::*;
     use headrace_geometry::time::DurNs;
 
-    /// Five times a second; the time before the first packet has none.
+    /// Updates come five times a second, from the first packet on.
     #[test]
-    fn each_beat_comes_once_and_after_a_gap_only_the_last() {
+    fn each_update_comes_once_and_only_the_last_after_a_gap() {
         let at = |seconds: f64| MonoNs(0) + DurNs::from_secs_f64(seconds);
         let mut next = None;
         for (now_s, beat_s) in [
@@ -114,7 +114,7 @@ mod tests {
             (1.199, None),
             (1.2, Some(1.2)),
             (1.21, None),
-            // The time goes back, and catches up.
+            // Time goes back, and catches up.
             (0.3, None),
             (1.39, None),
             (1.43, Some(1.4)),

@@ -1,4 +1,4 @@
-//! Samples to the store, and their spacings to their sections.
+//! Stores samples, and adds their spacings to their sections.
 
 use crate::entities::{HeadSweep, LastSample};
 use crate::messages::{Outcome, PlacedPing};
@@ -72,20 +72,20 @@ mod tests {
     use super::*;
     use crate::fixtures::{coverage, heard, pinged, tunnel};
 
-    /// Steps of a tenth of a radian, of which each is 0.3 m along the wall and a centimetre along the tunnel.
+    /// Pings of a tenth of a radian each, 0.3 m along the wall and a centimetre along the tunnel.
     fn at(step: u32) -> PlacedPing {
         let step = f64::from(step);
         heard(5.05 + 0.01 * step, 0.1 * step, 3.0)
     }
 
     #[test]
-    fn a_head_s_samples_are_steps_while_none_is_lost_between() {
+    fn samples_form_single_steps_until_one_is_lost() {
         let (mut coverage, tunnel, mut sweep) = (coverage(), tunnel(), HeadSweep::default());
         let mut note = |ping: &PlacedPing| {
             assert_eq!(note_sample(&mut coverage, &mut sweep, &tunnel, ping), Ok(()));
             let section = coverage.sections.get(20).unwrap();
             let (samples, steps, t_y_m) = (section.samples, section.t_y_m.count, section.t_y_m.max);
-            // A pass is a single step that crosses an arc length: those of the middles between steps.
+            // A pass is a single step that crosses an arc length; these are the centres between steps.
             let passes = [0.5, 1.5, 2.5, 3.5].map(|middle| {
                 let Outcome::Sample { arc_m, .. } = heard(5.1, 0.1 * middle, 3.0).outcome else { panic!() };
                 coverage.store.nearest_pass_m(5.1, arc_m, 1.0).is_some()
@@ -96,36 +96,36 @@ mod tests {
         assert_eq!((samples, steps), (1, 0));
         let (samples, steps, t_y_m, passes) = note(&at(1));
         assert_eq!((samples, steps, passes), (2, 1, [true, false, false, false]));
-        // A chord of a tenth of a radian of 3 m, and a centimetre along.
+        // The chord of a tenth of a radian at 3 m, and a centimetre along.
         let chord_m = 2.0 * 3.0 * math::sin(0.05);
         assert!((t_y_m - math::hypot(chord_m, 0.01)).abs() < 1e-9, "{t_y_m}");
-        // One is lost: the next step isn't a single one, but as far as it is.
+        // After a lost ping the next step isn't single, but its spacing is measured.
         note(&pinged(5.07, 0.2));
         let (samples, steps, t_y_m, passes) = note(&at(3));
         assert_eq!((samples, steps, passes), (3, 2, [true, false, false, false]));
         assert!((t_y_m - math::hypot(6.0 * math::sin(0.1), 0.02)).abs() < 1e-9, "{t_y_m}");
-        // A step that isn't a single one, and one of a new sweep, which has none before.
+        // A step that isn't single, and a sample of a new sweep, which has no previous one.
         let (samples, steps, _, passes) = note(&PlacedPing { single_step: false, ..at(4) });
         assert_eq!((samples, steps, passes), (4, 3, [true, false, false, false]));
         let (samples, steps, ..) = note(&PlacedPing { new_sweep: true, ..at(5) });
         assert_eq!((samples, steps), (5, 3));
     }
 
-    /// A turn later, 0.2 m further on, half way between two steps of the first.
+    /// A turn later, 0.2 m further on, half way between two steps of the first turn.
     #[test]
-    fn the_distance_to_the_pass_before_is_that_along_the_tunnel() {
+    fn distance_to_the_previous_pass_is_along_the_tunnel() {
         let (mut coverage, tunnel, mut sweep) = (coverage(), tunnel(), HeadSweep::default());
         for ping in [at(0), at(1), at(2), PlacedPing { new_sweep: true, ..heard(5.235, 0.05, 3.0) }] {
             note_sample(&mut coverage, &mut sweep, &tunnel, &ping).unwrap();
         }
         let section = coverage.sections.get(20).unwrap();
-        // The pass crossed there at 5.055 m. Of the first, each sample is on the step that ends at it.
+        // The pass crossed there at 5.055 m. Each sample of the first turn lies on the step that ends at it.
         assert!((section.t_x_m.max - 0.18).abs() < 1e-9, "{:?}", section.t_x_m);
         assert_eq!((section.samples, section.t_y_m.count), (4, 2));
     }
 
     #[test]
-    fn what_is_beyond_the_store_breaks_the_sweep() {
+    fn sample_beyond_the_store_breaks_the_sweep() {
         let (mut coverage, tunnel, mut sweep) = (coverage(), tunnel(), HeadSweep::default());
         note_sample(&mut coverage, &mut sweep, &tunnel, &at(0)).unwrap();
         let outside = note_sample(&mut coverage, &mut sweep, &tunnel, &heard(33.0, 0.1, 3.0));

@@ -1,4 +1,4 @@
-//! Speed of sound during the dive, from a depth sensor's temperature; sonar readings are corrected for it.
+//! Speed of sound during the dive, from a depth sensor's temperature. Sonar readings are corrected for it.
 
 use bevy_ecs::prelude::Resource;
 
@@ -7,7 +7,8 @@ use headrace_geometry::snapshot::stateful;
 use headrace_geometry::time::MonoNs;
 use headrace_sensor::reading::{Decoded, Reading, SourceId};
 
-/// Plausible water temperatures, degrees Celsius; outside, the sensor is faulty or out of the water.
+/// Plausible water temperatures, degrees Celsius. Outside this range the sensor is faulty or out of the
+/// water.
 const WATER_DEGC: core::ops::RangeInclusive<f64> = 0.0..=40.0;
 /// Low-pass time constant, s: faster changes are sensor noise.
 const SLOWNESS_S: f64 = 60.0;
@@ -15,19 +16,19 @@ const SLOWNESS_S: f64 = 60.0;
 /// The current speed of sound.
 #[derive(Debug, Clone, Resource)]
 pub(crate) struct SoundSpeed {
-    /// Depth sensor that supplies it; `None` for the site's.
+    /// Depth sensor that supplies it; `None` to use the site's.
     source: Option<SourceId>,
     site_mps: f64,
     now_mps: f64,
     heard: Option<MonoNs>,
-    /// Minimum and maximum so far.
+    /// Minimum and maximum so far, m/s.
     span_mps: [f64; 2],
 }
 
 stateful!(SoundSpeed { state: now_mps, heard, span_mps; fixed: source, site_mps; });
 
 impl SoundSpeed {
-    /// The site's speed, until `source` supplies another.
+    /// Uses the site's speed until `source` supplies another.
     pub(crate) fn new(site_mps: f64, source: Option<SourceId>) -> Self {
         Self { source, site_mps, now_mps: site_mps, heard: None, span_mps: [site_mps; 2] }
     }
@@ -37,8 +38,10 @@ impl SoundSpeed {
         self.span_mps
     }
 
-    /// Updates the speed from a depth sensor, and corrects sonar readings: consumers rescale ranges to the site's speed,
-    /// so the speed stated by the device is scaled by site over current speed.
+    /// Updates the speed from a depth sensor, and corrects sonar readings.
+    ///
+    /// Consumers rescale ranges to the site's speed, so the speed stated by the device is scaled by site over
+    /// current speed.
     pub(super) fn pass(&mut self, source: SourceId, decoded: &mut Decoded) {
         match &mut decoded.reading {
             Reading::Pressure(water)
@@ -89,7 +92,7 @@ mod tests {
         Decoded { valid_at: MonoNs(0) + DurNs::from_secs_f64(at_s), reading: Reading::Pressure(water) }
     }
 
-    /// Corrected range of 4 m computed by a device with 1500 m/s.
+    /// Corrected range of 4 m, computed by a device with 1500 m/s.
     fn metres(sound: &mut SoundSpeed, site: &Site) -> f64 {
         let echo = EchoRange { range_m: Some(4.0), confidence: 1.0, sound_speed_mps: 1500.0 };
         let mut decoded = Decoded { valid_at: MonoNs(0), reading: Reading::Echo(echo) };
@@ -99,7 +102,7 @@ mod tests {
     }
 
     #[test]
-    fn ranges_are_those_of_the_water_that_the_sensor_is_in() {
+    fn ranges_use_the_measured_water() {
         let site = Site::default();
         let mut sound = SoundSpeed::new(site.sound_speed_mps, Some(DEPTH));
         assert!((metres(&mut sound, &site) - 4.0 * 1447.0 / 1500.0).abs() < 1e-12);

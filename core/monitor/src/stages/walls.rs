@@ -1,4 +1,4 @@
-//! Sorts returns: those taken for wall become samples, doubtful ones are counted and recorded.
+//! Outlier filter: returns accepted as wall become samples, doubtful ones are counted and recorded.
 
 use bevy_ecs::prelude::{Query, Res, ResMut};
 use bevy_ecs::system::SystemState;
@@ -17,10 +17,10 @@ use headrace_coverage::{Beam, Cause, Causes, Lack, Loss, Outlook, PlacedReturn, 
 use headrace_geometry::frames::{Point3, Tunnel};
 use headrace_geometry::math;
 
-/// Metres beyond either end of the tunnel from which samples are told.
+/// Distance beyond either end of the tunnel at which samples raise an alert, m.
 const WELL_BEYOND_M: f64 = 1.0;
 
-/// What sorting reads and writes, apart from the head.
+/// Inputs and outputs of the filter, apart from the head.
 pub(super) struct Sorting<'a> {
     pub(super) coverage: &'a mut Coverage,
     pub(super) tunnel: &'a TunnelDesign,
@@ -30,8 +30,9 @@ pub(super) struct Sorting<'a> {
     pub(super) alerts: &'a mut Alerts,
 }
 
-/// Takes a ping: its return is sorted with those that waited for it; one without a return breaks the sweep. Returns the
-/// chainages at which samples of a head that has just been distrusted lie, m.
+/// Filters a ping's return, and those that waited for it. A ping without a return breaks the sweep.
+///
+/// Returns the chainages of the samples of a head that has just become distrusted, m.
 pub(super) fn note_ping(
     sorting: &mut Sorting<'_>,
     sweep: &mut HeadSweep,
@@ -83,7 +84,7 @@ pub(super) fn note_ping(
     Some(between_m)
 }
 
-/// What sorting reads and writes at the end of a dive.
+/// Inputs and outputs of the filter at the end of a dive.
 type End<'w, 's> = (
     Query<'w, 's, &'static mut HeadSweep>,
     ResMut<'w, Coverage>,
@@ -94,7 +95,8 @@ type End<'w, 's> = (
     ResMut<'w, Alerts>,
 );
 
-/// Ends a dive: no return will come that says what the waiting ones are. Allocates: not within a tick.
+/// Classifies the waiting returns at the end of a dive, when no more returns will come. Allocates: not within
+/// a tick.
 pub(crate) fn end_returns(world: &mut World) {
     let heads = world.resource::<VehicleEntities>().heads.clone();
     let mut state = SystemState::<End<'_, '_>>::new(world);
@@ -119,8 +121,7 @@ pub(crate) fn end_returns(world: &mut World) {
     }
 }
 
-/// Marks the sections that hold samples of a head that isn't believed any more, and asks for those that have passed to be
-/// judged again.
+/// Marks the sections that hold samples of a distrusted head, and requests judging of those that have passed.
 pub(super) fn suspect(
     coverage: &mut Coverage,
     [from_m, to_m]: [f64; 2],
@@ -137,7 +138,7 @@ pub(super) fn suspect(
     }
 }
 
-/// Takes the return that waited, and what has come since.
+/// Applies a waiting return, and the pings since.
 fn settle(sorting: &mut Sorting<'_>, sweep: &mut HeadSweep, waiting: &Waiting, is_wall: bool) {
     if is_wall {
         wall(sorting, sweep, &waiting.ping);
@@ -164,7 +165,7 @@ fn wall(sorting: &mut Sorting<'_>, sweep: &mut HeadSweep, ping: &PlacedPing) {
     store(sorting, sweep, ping);
 }
 
-/// Stores a sample, or breaks the sweep for want of one.
+/// Stores a sample, or breaks the sweep if there is none.
 fn store(sorting: &mut Sorting<'_>, sweep: &mut HeadSweep, ping: &PlacedPing) {
     match note_sample(sorting.coverage, sweep, sorting.tunnel, ping) {
         Ok(()) => {}
@@ -173,7 +174,7 @@ fn store(sorting: &mut Sorting<'_>, sweep: &mut HeadSweep, ping: &PlacedPing) {
     }
 }
 
-/// Counts a doubtful return: for holes and causes it is a missing one, aimed where its beam meets the design.
+/// Counts a doubtful return. For holes and causes it is a missing one, aimed where its beam meets the design.
 fn doubtful(sorting: &mut Sorting<'_>, sweep: &mut HeadSweep, ping: &PlacedPing) {
     sorting.tally.doubtful += 1;
     digest(sorting.digests, ping, RecordKind::Doubtful);
@@ -182,7 +183,7 @@ fn doubtful(sorting: &mut Sorting<'_>, sweep: &mut HeadSweep, ping: &PlacedPing)
     let lost = PlacedPing { outcome: Outcome::Lost(Loss::Missing, aim), ..*ping };
     store(sorting, sweep, &lost);
     let Coverage { lacks, sections, .. } = &mut *sorting.coverage;
-    // Whose returns don't count at all might as well be silent.
+    // A head whose returns are all rejected counts as silent.
     let is_distrusted = sweep.wall.distrusted().is_some();
     if let Some(reach) = ping.reach
         && let Some(section) = sections.get_mut(sections.index_of(reach.middle_m()))
@@ -193,7 +194,7 @@ fn doubtful(sorting: &mut Sorting<'_>, sweep: &mut HeadSweep, ping: &PlacedPing)
         }
     }
     let Some(Aim { x_m, arc_m }) = aim else { return };
-    // What is heard beside the vehicle's outline, and isn't the wall, is the vehicle.
+    // An echo beside the vehicle's outline that isn't wall comes from the vehicle.
     let cause = match ping.hidden {
         Hidden::No if is_distrusted => Cause::HeadSilent,
         Hidden::No => Cause::MissingReturns,
@@ -205,7 +206,7 @@ fn doubtful(sorting: &mut Sorting<'_>, sweep: &mut HeadSweep, ping: &PlacedPing)
     }
 }
 
-/// Where a beam would have met the design profile.
+/// Point where a beam would have met the design profile.
 fn aim(tunnel: &TunnelDesign, origin: &Point3<Tunnel>, point: &Point3<Tunnel>) -> Option<Aim> {
     let beam = *point - *origin;
     let length_m = Some(beam.norm()).filter(|length_m| *length_m > 0.0)?;
@@ -214,7 +215,9 @@ fn aim(tunnel: &TunnelDesign, origin: &Point3<Tunnel>, point: &Point3<Tunnel>) -
     Some(Aim { x_m: origin.x() + wall.range_m * beam.x() / length_m, arc_m: wall.arc_m })
 }
 
-/// Chainage of a sample well beyond either end of the tunnel, and by how much, m: heads of a vehicle that turns at an end reach over it.
+/// Chainage of a sample well beyond either end of the tunnel, and its distance from the end, m.
+///
+/// Heads of a vehicle that turns at an end reach slightly beyond it.
 fn beyond_end_m(ping: &PlacedPing, length_m: f64) -> Option<(f64, f64)> {
     let Outcome::Sample { point, .. } = ping.outcome else { return None };
     let x_m = point.x();
@@ -267,7 +270,7 @@ mod tests {
             }
         }
 
-        /// Takes a ping: how many samples there are then, and how many doubtful returns.
+        /// Filters a ping. Returns the number of samples and of doubtful returns then.
         fn note(&mut self, ping: &PlacedPing) -> (u64, u64) {
             let mut sorting = Sorting {
                 coverage: &mut self.coverage,
@@ -288,14 +291,15 @@ mod tests {
 
     const STEP_RAD: f64 = 0.0157;
 
-    /// The return of this number on the way round, from the wall at its range or from before it.
+    /// Return with this number in the turn, from the wall at its range or from before it.
     fn at(number: u32, range_m: f64) -> PlacedPing {
         heard(5.1, 1.0 + STEP_RAD * f64::from(number), range_m)
     }
 
-    /// What comes alone from before the wall waits for the next return, and is a missing one then: in a hole, and for its cause.
+    /// An isolated echo from before the wall waits for the next return. It then counts as missing in holes
+    /// and causes.
     #[test]
-    fn what_nobody_agrees_with_is_missing_where_it_was_aimed() {
+    fn isolated_return_is_missing_at_its_aim() {
         for (hidden, cause) in [(Hidden::No, Cause::MissingReturns), (Hidden::Beside, Cause::Occluded)] {
             let mut bench = Bench::new();
             assert_eq!(bench.note(&at(0, 3.0)), (1, 0));
@@ -313,17 +317,17 @@ mod tests {
 
     /// A rock of 0.6 m, wide enough for its height, is wall from its first return on.
     #[test]
-    fn what_waits_is_wall_once_others_agree() {
+    fn waiting_return_is_wall_once_others_agree() {
         let mut bench = Bench::new();
         bench.note(&at(0, 3.0));
         let mut found = Vec::new();
         for number in 1..20 {
             found.push(bench.note(&at(number, 2.4)));
         }
-        assert_eq!(found[0], (1, 0), "the first waits");
+        assert_eq!(found[0], (1, 0), "the first return waits");
         assert_eq!(found.last(), Some(&(20, 0)), "{found:?}");
         assert!(bench.lacks().is_empty() && bench.sweep.waiting.last_mut().is_none());
-        // All in single steps: a pass crosses each.
+        // All are single steps: a pass crosses each.
         let crossed = |number: f64| {
             let Outcome::Sample { arc_m, .. } = heard(5.1, 1.0 + STEP_RAD * number, 2.4).outcome else {
                 panic!()
@@ -334,7 +338,7 @@ mod tests {
     }
 
     #[test]
-    fn samples_for_which_there_is_no_room_are_counted() {
+    fn samples_without_room_are_counted() {
         let mut bench = Bench::new();
         let perimeter_m = bench.tunnel.profile.perimeter_m();
         let layout = StoreLayout { perimeter_m, from_m: 0.0, to_m: 32.0, cell_m: 0.25, capacity: 2 };
@@ -345,9 +349,9 @@ mod tests {
         assert_eq!((bench.tally.samples, bench.tally.not_stored, bench.tally.outside), (5, 3, 0));
     }
 
-    /// A rock's first two returns: what came between, while the first waited, counts once that is settled.
+    /// A rock's first two returns. Pings while the first one waited count once it is classified.
     #[test]
-    fn a_loss_after_one_that_waits_breaks_the_sweep() {
+    fn loss_after_a_waiting_return_breaks_the_sweep() {
         let is_stepped = |between: Option<PlacedPing>| {
             let mut bench = Bench::new();
             bench.note(&at(0, 3.0));
@@ -368,13 +372,13 @@ mod tests {
         assert_eq!(
             is_stepped(Some(PlacedPing { new_sweep: true, ..lost })),
             (false, 1),
-            "nothing is before it"
+            "it has no previous sample"
         );
     }
 
-    /// The digest of results tells where each sample lies.
+    /// The digest of results depends on the place of each sample.
     #[test]
-    fn a_sample_is_in_the_digest_with_its_place() {
+    fn digest_includes_the_place_of_a_sample() {
         let digest = |x_m: f64| {
             let (mut bench, mut digests) = (Bench::new(), Digests::default());
             let mut sorting = Sorting {
@@ -394,7 +398,7 @@ mod tests {
     }
 
     #[test]
-    fn a_return_beyond_the_tunnel_s_end_is_told_once_with_how_far() {
+    fn return_beyond_the_tunnel_is_reported_once_with_its_distance() {
         let mut bench = Bench::new();
         let mut note = |x_m: f64| {
             bench.note(&PlacedPing { new_sweep: true, ..heard(x_m, 1.0, 3.0) });
@@ -402,19 +406,19 @@ mod tests {
             (alert.map(|alert| alert.worst_m), bench.notices.0.len())
         };
         assert_eq!(note(29.9), (None, 0));
-        assert_eq!(note(30.9), (None, 0), "heads reach over the end");
+        assert_eq!(note(30.9), (None, 0), "heads reach beyond the end");
         let (worst_m, told) = note(31.1);
         assert!((worst_m.unwrap() - 1.1).abs() < 1e-9 && told == 1, "{worst_m:?} {told}");
         let (worst_m, told) = note(31.5);
         assert!((worst_m.unwrap() - 1.5).abs() < 1e-9 && told == 1, "{worst_m:?} {told}");
         assert_eq!((bench.tally.samples, bench.tally.outside), (4, 0));
         bench.note(&PlacedPing { new_sweep: true, ..heard(33.0, 1.0, 3.0) });
-        assert_eq!((bench.tally.samples, bench.tally.outside), (5, 1), "beyond what is stored");
+        assert_eq!((bench.tally.samples, bench.tally.outside), (5, 1), "beyond the store");
     }
 
-    /// Sections that hold samples of a head that isn't believed any more are judged again, if they have been.
+    /// Sections with samples of a distrusted head are judged again if they have been judged.
     #[test]
-    fn what_a_distrusted_head_has_seen_is_judged_again() {
+    fn sections_seen_by_a_distrusted_head_are_judged_again() {
         let mut coverage = coverage();
         let hole = headrace_coverage::Hole {
             diameter_m: 0.3,
@@ -437,7 +441,7 @@ mod tests {
     }
 
     #[test]
-    fn what_still_waits_at_the_end_of_a_dive_is_doubtful() {
+    fn waiting_return_at_the_end_of_a_dive_is_doubtful() {
         let mut bench = Bench::new();
         bench.note(&at(0, 3.0));
         bench.note(&at(1, 1.5));

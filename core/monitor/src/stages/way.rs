@@ -1,4 +1,5 @@
-//! The way: where vehicle and heads have been, pinging or not, and what they leave behind where no head pings.
+//! Coverage extent: where vehicle and heads have been, pinging or not, and sections left behind if no head
+//! pings.
 
 use bevy_ecs::prelude::Query;
 
@@ -20,7 +21,8 @@ type HeadParts = (
     &'static mut HeadFrontier,
 );
 
-/// Updates the way for a beat with a fix; where no head is alive, requests judging of the sections that are left.
+/// Extends the coverage extent at an update with a fix. If no head is alive, requests judging of the sections
+/// left behind.
 pub(super) fn note_beat(
     coverage: &mut Coverage,
     heads: &mut Heads<'_, '_>,
@@ -41,7 +43,7 @@ pub(super) fn note_beat(
         } else if situation.deaf.has(head.0) {
             note_silence(coverage, head.0, None, here);
         } else if frontier.0.is_none() {
-            // Not heard yet, and perhaps about to ping.
+            // The head has not been heard yet, and may be about to ping.
             frontier.0 = Some(HeadReach::silent_at(None, here));
         }
     }
@@ -57,7 +59,7 @@ pub(super) fn note_beat(
     }
 }
 
-/// Marks the sections that a silent head has gone through since it was last known to be somewhere.
+/// Marks the sections that a silent head has passed since its last known place.
 fn note_silence(coverage: &mut Coverage, head: usize, before: Option<Reach>, here: Reach) {
     let (now_m, before_m) = (here.middle_m(), before.unwrap_or(here).middle_m());
     let gone =
@@ -84,7 +86,8 @@ mod tests {
         MonoNs(seconds * 1_000_000_000)
     }
 
-    /// A vehicle whose heads, half a metre ahead and half a metre astern, were last heard at these times, at 4.5 m and 3.5 m.
+    /// A vehicle with heads half a metre ahead and half a metre astern, last heard at these times, at 4.5 m
+    /// and 3.5 m.
     struct Bench {
         world: World,
         coverage: Coverage,
@@ -111,7 +114,7 @@ mod tests {
             Self { world, coverage, requests: Requests(Vec::new()) }
         }
 
-        /// Where the heads are taken to be after a beat at a chainage, m.
+        /// Assumed places of the heads after an update at a chainage, m.
         fn beat(&mut self, seconds: u64, x_m: Option<f64>) -> [Option<f64>; 2] {
             let tunnel = tunnel();
             let mut state = SystemState::<Heads<'_, '_>>::new(&mut self.world);
@@ -122,7 +125,7 @@ mod tests {
             [places.next().flatten(), places.next().flatten()]
         }
 
-        /// Sections that a head has gone through in silence.
+        /// Sections that a head has passed silently.
         fn silent(&self, head: usize) -> Vec<i64> {
             let sections = 0..128;
             let passage = |index: &i64| self.coverage.sections.get(*index).unwrap().passage.silent.has(head);
@@ -131,33 +134,34 @@ mod tests {
     }
 
     #[test]
-    fn a_silent_head_goes_on_with_the_vehicle_and_leaves_its_mark() {
-        // The second is silent from 1 s on, the first is heard.
+    fn silent_head_moves_with_the_vehicle_and_marks_sections() {
+        // The second head is silent from 1 s on, the first one is heard.
         let mut bench = Bench::new([Some(9), Some(1)]);
-        assert_eq!(bench.beat(10, Some(5.0)), [Some(4.5), Some(4.5)], "the first is where it last pinged");
+        assert_eq!(bench.beat(10, Some(5.0)), [Some(4.5), Some(4.5)], "the first head is at its last ping");
         // From 3.5 m to 4.5 m.
         assert_eq!((bench.silent(0), bench.silent(1)), (vec![], (14..=18).collect()));
         assert_eq!(bench.beat(11, Some(5.6)), [Some(4.5), Some(5.1)]);
         assert_eq!((bench.silent(0), bench.silent(1)), (vec![], (14..=20).collect()));
         let way = bench.coverage.frontier.way().unwrap();
         assert!((way.from_m - 4.5).abs() < 1e-9 && (way.to_m - 6.1).abs() < 1e-9, "{way:?}");
-        // All heads, pinging or not, have been where the rear one was at last, from where the front one was at first.
+        // The stretch passed by all heads spans from the front one's first place to the rear one's last.
         let through = bench.coverage.frontier.through();
-        assert_eq!(through, None, "nowhere: 5.1 m isn't beyond 5.5 m");
+        assert_eq!(through, None, "empty: 5.1 m isn't beyond 5.5 m");
         bench.beat(12, Some(7.0));
         let through = bench.coverage.frontier.through().unwrap();
         assert!((through.from_m - 5.5).abs() < 1e-9 && (through.to_m - 6.5).abs() < 1e-9, "{through:?}");
     }
 
     #[test]
-    fn what_silent_heads_leave_is_judged_at_the_beat() {
+    fn sections_left_by_silent_heads_are_judged_at_the_update() {
         let mut bench = Bench::new([Some(1), Some(1)]);
         bench.beat(10, Some(5.0));
         bench.requests.0.clear();
         for seconds in 11..=20 {
             bench.beat(seconds, Some(5.0 + 0.3 * (seconds - 10) as f64));
         }
-        // From 4.5 m, where the way begins with the rear head, to a quarter of a metre before where that is, 7.5 m.
+        // From 4.5 m, where the extent begins with the rear head, to a quarter of a metre before its place at
+        // 7.5 m.
         let whole = bench.requests.0.iter().filter(|request| !request.only_fails);
         let mut left: Vec<i64> = whole.map(|request| request.section).collect();
         left.sort_unstable();
@@ -167,7 +171,7 @@ mod tests {
     }
 
     #[test]
-    fn nothing_is_known_of_the_way_without_a_fix() {
+    fn coverage_extent_is_unknown_without_a_fix() {
         let mut bench = Bench::new([Some(1), None]);
         assert_eq!(bench.beat(10, None), [Some(4.5), None]);
         assert!(bench.coverage.frontier.way().is_none() && bench.silent(0).is_empty());

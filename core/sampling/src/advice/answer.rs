@@ -1,4 +1,4 @@
-//! The advice and its parts.
+//! Speed advice and its parts.
 
 use serde::{Deserialize, Serialize};
 
@@ -11,19 +11,21 @@ const MODE_NAME_BYTES: usize = 15;
 /// The limiting factor of the advice.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Reason {
-    /// The distance between passes limits: slower helps.
+    /// The distance between passes is the limit: a lower speed helps.
     HelixPitch,
+    /// A lower speed does not help. Another mode or position, or a steadier vehicle would.
+    ///
     /// The distance between neighbours of one turn, a strip that no head sees, or the swing of the beams reaches the
-    /// target: slower doesn't help; another mode or position, or a steadier vehicle would.
+    /// target.
     AngularStep,
-    /// Without position and heading, no advice is possible.
+    /// No advice is possible without position and heading.
     NoHeadingOrFix,
-    /// No head gives returns.
+    /// No head delivers returns.
     NoReturns,
 }
 
 impl Reason {
-    /// All of them.
+    /// All reasons.
     pub const ALL: [Self; 4] = [Self::HelixPitch, Self::AngularStep, Self::NoHeadingOrFix, Self::NoReturns];
 
     /// Name used in reports and logs.
@@ -36,7 +38,7 @@ impl Reason {
         }
     }
 
-    /// Severity: a graver reason has a larger number.
+    /// Severity: a more severe reason has a larger number.
     pub(super) fn gravity(self) -> u8 {
         match self {
             Self::HelixPitch => 0,
@@ -55,7 +57,7 @@ pub struct ModeName {
 }
 
 impl ModeName {
-    /// From a name, truncated to 15 bytes.
+    /// Creates it from a name, truncated to 15 bytes.
     pub fn new(name: &str) -> Self {
         let mut bytes = [0; MODE_NAME_BYTES];
         let len = name.floor_char_boundary(MODE_NAME_BYTES);
@@ -75,7 +77,7 @@ impl core::fmt::Debug for ModeName {
     }
 }
 
-/// Remedy where slower doesn't help.
+/// Remedy if a lower speed does not help.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Remedy {
     /// Another mode.
@@ -87,7 +89,7 @@ pub enum Remedy {
 }
 
 impl Remedy {
-    /// Its number in published data; 0 stands for no remedy.
+    /// Its number in published data; 0 means no remedy.
     pub fn number(self) -> u64 {
         match self {
             Self::HoldHeading => 1,
@@ -96,7 +98,7 @@ impl Remedy {
         }
     }
 
-    /// The remedy with that number, with the name of the mode for [`Remedy::Mode`]; `None` for any other number.
+    /// Returns the remedy with that number; `mode` is the name for [`Remedy::Mode`]. `None` for any other number.
     pub fn of(number: u64, mode: &str) -> Option<Self> {
         let all = [Self::HoldHeading, Self::Centre, Self::Mode(ModeName::new(mode))];
         all.into_iter().find(|remedy| remedy.number() == number)
@@ -112,21 +114,23 @@ impl Remedy {
     }
 }
 
-/// What all heads would allow in one of their modes.
+/// Result of all heads in one of their modes.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Alternative {
     /// The mode.
     pub mode: ModeName,
-    /// The largest speed at which the target is met with the heads started in phase, m/s; zero if there is none.
+    /// The largest speed at which the target is met with the heads started in phase, m/s.
+    ///
+    /// Zero if there is none.
     pub v_max_mps: f64,
 }
 
-/// Starting the heads anew in the mode in which they are, in phase for a speed.
+/// A restart of the heads in their present mode, in phase for a speed.
 ///
-/// The vehicle file's line for it: `planned_speed_mps` in `[heads]`.
+/// It corresponds to `planned_speed_mps` in `[heads]` of the vehicle file.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Anew {
-    /// The speed to start them for, which is the largest that meets the target then, m/s.
+    /// Speed to start them for, m/s: the largest that then meets the target.
     pub planned_speed_mps: f64,
 }
 
@@ -140,63 +144,70 @@ pub struct Left {
 }
 
 impl Left {
-    /// Hours needed for the length at a speed; `None` at zero speed.
+    /// Returns the hours needed for the length at a speed; `None` at zero speed.
     pub fn hours_at(&self, speed_mps: f64) -> Option<f64> {
         (speed_mps > 0.0).then(|| self.length_m / speed_mps / 3600.0)
     }
 
-    /// Whether the time suffices at a speed; `None` if it isn't known.
+    /// Whether the time is enough at a speed; `None` if the time is unknown.
     pub fn suffices_at(&self, speed_mps: f64) -> Option<bool> {
         let time_s = self.time_s?;
         Some(self.hours_at(speed_mps).is_some_and(|hours| hours * 3600.0 <= time_s))
     }
 }
 
-/// The advice.
+/// Speed advice.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Advice {
     /// The largest speed at which sections will pass, m/s; zero if there is none.
     pub v_max_mps: f64,
-    /// Slower than this, heads apart along the hull run out of phase, and the target isn't met, m/s; zero where all slower
-    /// speeds meet it.
+    /// Lower end of the interval of speeds that meet the target, m/s; zero if all lower speeds meet it.
+    ///
+    /// Below it, heads apart along the hull run out of phase.
     pub from_mps: f64,
-    /// The speed nearest to the present one that meets the target, m/s; `None` where the present one does, or none is near.
+    /// Speed nearest to the present one that meets the target, m/s.
+    ///
+    /// `None` if the present one does, or none is near.
     pub nearest_mps: Option<f64>,
     /// The limiting factor.
     pub reason: Reason,
-    /// T_max predicted at the present speed, m; `None` where it can't be predicted or is unbounded.
+    /// T_max predicted at the present speed, m; `None` if it is unpredictable or unbounded.
     pub predicted_t_m: Option<f64>,
-    /// At the present speed the present turn will exceed the target; false where nothing can be predicted.
+    /// Whether the present turn will exceed the target at the present speed; false without a prediction.
     pub will_exceed: bool,
-    /// At the present speed the present turn may exceed it: T comes within what errors of position take of the target; false where
-    /// nothing can be predicted.
+    /// Whether the present turn may exceed the target at the present speed; false without a prediction.
+    ///
+    /// T is then within the position margin of the target.
     pub may_exceed: bool,
-    /// The target less what errors of position take, m.
+    /// Target less the margin for position errors, m.
     pub sure_m: f64,
     /// The longest time between two passes over a place that all heads see, seconds.
     pub pass_gap_s: f64,
-    /// That time with the heads' passes evenly spread, seconds.
+    /// The same time if the heads' passes were evenly spread, s.
     pub even_pass_gap_s: f64,
     /// The largest distance between neighbours of one turn, m.
     pub t_y_m: f64,
     /// Time between two pings, seconds; the longest of any head.
     pub ping_period_s: f64,
-    /// Phase error of the head farthest out of phase, radians of its turn; `None` in sectors, or with one head.
+    /// Phase error of the head farthest out of phase, radians of its turn.
+    ///
+    /// `None` in sectors, or with one head.
     pub phase_error_rad: Option<f64>,
     /// Remaining tunnel and time.
     pub left: Left,
-    /// Where slower doesn't help because no head sees a strip of the wall: the strip's width and the arc length of its
-    /// middle, m.
+    /// Width of a strip that no head sees, and the arc length of its middle, m.
+    ///
+    /// `Some` only if a lower speed does not help because of it.
     pub unseen_m: Option<[f64; 2]>,
-    /// Remedy where slower doesn't help.
+    /// Remedy if a lower speed does not help.
     pub remedy: Option<Remedy>,
     /// Alternatives in the modes that all heads have.
     pub alternatives: [Option<Alternative>; MAX_MODES],
-    /// What starting the heads anew would give; `None` where their phases don't depend on the speed.
+    /// Effect of restarting the heads; `None` if their phases do not depend on the speed.
     pub anew: Option<Anew>,
-    /// What each margin costs, every five seconds.
+    /// Cost of each margin, updated every five seconds.
     pub margins: Option<Margins>,
-    /// Share of returns that are lost by chance, of the heads that turn.
+    /// Share of returns that the turning heads lose by chance.
     pub lost_share: f64,
 }
 

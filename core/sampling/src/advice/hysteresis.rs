@@ -1,30 +1,36 @@
-//! Hysteresis of the displayed advice, so that it doesn't chatter.
+//! Hysteresis of the displayed advice, against flicker.
 
 use super::answer::{Advice, Reason};
 use super::search::SPEED_MARGIN;
 use headrace_geometry::snapshot::stateful;
 use headrace_geometry::time::{DurNs, MonoNs};
 
-/// Less restrictive advice is shown once nothing more restrictive has come for this long.
+/// Less restrictive advice is displayed after no more restrictive one has come for this long.
 const HOLD: DurNs = DurNs(1_000_000_000);
-/// A higher speed is shown once it has been higher for this long, and by this share: 3 mm/s at 0.1 m/s.
+/// Time for which a higher speed must last before it is displayed.
+///
+/// It must be higher by the share below: 3 mm/s at 0.1 m/s.
 const RISES_AFTER: DurNs = DurNs(10_000_000_000);
 const RISES_BY: f64 = 0.03;
-/// A lower speed is shown at once where it is lower by this share; less is within half of the margin held back.
+/// A lower speed is displayed at once if it is lower by this share.
+///
+/// Smaller differences are within half of the speed margin.
 const FALLS_BY: f64 = SPEED_MARGIN / 2.0;
-/// Number of advice updates kept: those within `HOLD` at 5 Hz.
+/// Number of stored advice updates: those within `HOLD` at 5 Hz.
 const HELD: usize = 6;
-/// A turn is forecast to exceed the target when the predicted T is above it by this share: half of the speed margin, so
-/// that the forecast doesn't chatter at the advised speed.
+/// Share by which the predicted T must exceed the target for a forecast of too large T.
+///
+/// It is half of the speed margin, so that the forecast does not flicker at the advised speed.
 const BEYOND: f64 = SPEED_MARGIN / 2.0;
-/// The same of what errors of position leave of the target: a pilot may be over the advised speed by a hundredth or two.
+/// The same for the target less position errors; a pilot may exceed the advised speed by 1 or 2 %.
 const MAYBE_BEYOND: f64 = 0.03;
 
-/// Shows the most restrictive advice of the last second: the gravest reason and, within it, the lowest speed.
+/// Displays the most restrictive advice of the last second.
 ///
-/// A graver reason shows at once, a lesser one after it has held for a second. A speed lower by half a hundredth shows at once,
-/// one higher by three hundredths after ten seconds, and then the least of these; smaller changes don't show. Until there has
-/// been a speed, or a reason against any, advice is shown unfiltered.
+/// That is the most severe reason and, within it, the lowest speed. A more severe reason appears at once, a less
+/// severe one after it has lasted a second. A speed that is lower by 0.5 % appears at once. A speed that is higher by
+/// 3 % appears after ten seconds, as the lowest of that time. Smaller changes do not appear. Advice is unfiltered
+/// until the first speed, or the first reason against any speed.
 #[derive(Debug, Clone)]
 pub struct Hysteresis {
     target_m: f64,
@@ -33,16 +39,16 @@ pub struct Hysteresis {
     begun: bool,
     will_exceed: bool,
     may_exceed: bool,
-    /// The speed shown, m/s, with the time of the advice last taken.
+    /// Displayed speed, m/s, and the time of the latest advice.
     shown: Option<(MonoNs, f64)>,
-    /// Since when all speeds have been higher than that one, and the least of them, m/s.
+    /// Time since which all speeds have been higher than the displayed one, and the lowest of them, m/s.
     rising: Option<(MonoNs, f64)>,
 }
 
 stateful!(Hysteresis { state: held, next, begun, will_exceed, may_exceed, shown, rising; fixed: target_m; });
 
 impl Hysteresis {
-    /// For a target T, m.
+    /// Creates the filter for a target T, m.
     pub fn new(target_m: f64) -> Self {
         Self {
             target_m,
@@ -56,12 +62,12 @@ impl Hysteresis {
         }
     }
 
-    /// Forgets what was shown: the vehicle has turned back, and goes by other speeds.
+    /// Resets the filter, because the vehicle has turned back and other speeds apply.
     pub fn forget(&mut self) {
         *self = Self::new(self.target_m);
     }
 
-    /// Takes the advice at a timestamp of data time and returns the advice to show.
+    /// Processes the advice at a timestamp of data time and returns the advice to display.
     ///
     /// Allocates: never.
     pub fn show(&mut self, at: MonoNs, advice: Advice) -> Advice {
@@ -91,7 +97,7 @@ impl Hysteresis {
         shown
     }
 
-    /// The speed to show, m/s, for the lowest of the last second.
+    /// Returns the speed to display, m/s, for the lowest of the last second.
     fn steadied_mps(&mut self, at: MonoNs, speed_mps: f64, is_speed: bool) -> f64 {
         let before = self.shown.filter(|(then, _)| at.since(*then).0.abs() <= HOLD.0);
         let Some((_, before_mps)) = before.filter(|_| is_speed) else {
@@ -158,7 +164,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_forgotten_holds_nothing_back() {
+    fn reset_removes_earlier_advice() {
         let mut steady = Hysteresis::new(TARGET_M);
         let show = |steady: &mut Hysteresis, k: u64, mps: f64| {
             steady.show(MonoNs(3_000_000_000 + k * 200_000_000), speed(mps)).v_max_mps
@@ -166,26 +172,26 @@ mod tests {
         for k in 0..20 {
             show(&mut steady, k, 0.1);
         }
-        assert!((show(&mut steady, 20, 0.2) - 0.1).abs() < 1e-12, "a higher speed waits");
+        assert!((show(&mut steady, 20, 0.2) - 0.1).abs() < 1e-12, "a higher speed is delayed");
         steady.forget();
         assert!((show(&mut steady, 21, 0.2) - 0.2).abs() < 1e-12);
     }
 
     #[test]
-    fn a_graver_reason_shows_at_once_and_a_lesser_one_after_a_second() {
+    fn severe_reason_appears_at_once_and_lesser_one_after_1_s() {
         let ladder = [Reason::HelixPitch, Reason::AngularStep, Reason::NoReturns, Reason::NoHeadingOrFix];
         for pair in ladder.windows(2) {
             let [lesser, graver] = [0, 1].map(|k| Advice::nothing(pair[k]));
             let given = [vec![speed(0.2)], vec![lesser; 10], vec![graver], vec![lesser; 8]].concat();
             let reasons: Vec<_> = shown(given).iter().map(|advice| advice.reason).collect();
             assert_eq!(reasons[10], pair[0], "before");
-            assert_eq!(reasons[11..17], [pair[1]; 6], "at once, and for a second");
-            assert_eq!(reasons[17..], [pair[0]; 3], "after it");
+            assert_eq!(reasons[11..17], [pair[1]; 6], "the severe reason appears at once, for a second");
+            assert_eq!(reasons[17..], [pair[0]; 3], "the lesser reason appears after that");
         }
     }
 
     #[test]
-    fn reasons_that_come_and_go_do_not_flicker() {
+    fn intermittent_reasons_do_not_flicker() {
         let flickering =
             (0..100).map(|k| if k % 3 == 0 { Advice::nothing(Reason::AngularStep) } else { speed(0.2) });
         let shown = shown(flickering);
@@ -193,21 +199,21 @@ mod tests {
     }
 
     #[test]
-    fn a_lower_speed_shows_at_once_and_a_higher_one_after_ten_seconds() {
+    fn lower_speed_appears_at_once_and_higher_one_after_10_s() {
         let given = [vec![speed(0.2); 10], vec![speed(0.1)], vec![speed(0.2); 70]].concat();
         let speeds: Vec<f64> = shown(given).iter().map(|advice| advice.v_max_mps).collect();
         assert!((speeds[9] - 0.2).abs() < 1e-12);
-        // The lowest of a second, and ten seconds of what is higher.
+        // The lowest of a second, and ten seconds of higher speeds.
         assert_eq!(speeds[10..66], [0.1; 56]);
         assert_eq!(speeds[66..], [0.2; 15]);
     }
 
     #[test]
-    fn small_changes_do_not_show() {
+    fn small_changes_do_not_appear() {
         let wavering = (0..300).map(|k| speed(0.1 + if k % 7 < 3 { 0.0009 } else { 0.0027 }));
         let speeds: Vec<f64> = shown(wavering).iter().map(|advice| advice.v_max_mps).collect();
         assert!(speeds[1..].iter().all(|speed_mps| (speed_mps - 0.1009).abs() < 1e-12));
-        // What sinks slowly is followed, never more than half a hundredth above it.
+        // A slowly falling speed is followed, with a lag of at most 0.5 %.
         let sinking: Vec<_> = (0..300).map(|k| speed(0.1 - 1e-4 * f64::from(k))).collect();
         let shown = shown(sinking.iter().copied());
         let over = |(shown, given): (&Advice, &Advice)| shown.v_max_mps > given.v_max_mps * 1.0051;
@@ -215,7 +221,7 @@ mod tests {
     }
 
     #[test]
-    fn what_comes_before_the_first_speed_is_not_held() {
+    fn advice_before_the_first_speed_is_unfiltered() {
         let given = [vec![Advice::nothing(Reason::NoHeadingOrFix); 3], vec![speed(0.2); 2]].concat();
         let shown = shown(given);
         assert_eq!(shown[2].reason, Reason::NoHeadingOrFix);
@@ -223,10 +229,10 @@ mod tests {
     }
 
     #[test]
-    fn what_is_exceeded_is_said_at_once_and_taken_back_once_the_target_is_met() {
+    fn exceedance_appears_at_once_and_clears_at_the_target() {
         let at = |t_m: f64| advice(Reason::HelixPitch, 0.2, t_m);
         let given = [
-            // Above the target by less than `BEYOND`.
+            // Above the target, but by less than `BEYOND`.
             vec![at(0.502); 3],
             vec![at(0.503)],
             vec![at(0.5005); 10],
@@ -237,13 +243,13 @@ mod tests {
         assert_eq!(exceed[..3], [false; 3]);
         assert_eq!(exceed[3..19], [true; 16]);
         assert_eq!(exceed[19..22], [false; 3]);
-        assert!(exceed[22], "a strip that nobody sees");
+        assert!(exceed[22], "an unseen strip is above any limit");
         let nothing = shown(vec![Advice::nothing(Reason::NoHeadingOrFix)]);
         assert!(!nothing[0].will_exceed);
     }
 
     #[test]
-    fn what_may_be_exceeded_is_said_beyond_what_a_pilot_keeps_and_held_until_it_is_well_within() {
+    fn possible_exceedance_has_hysteresis() {
         let at =
             |t_m: f64| Advice { may_exceed: t_m > 0.4, sure_m: 0.4, ..advice(Reason::HelixPitch, 0.2, t_m) };
         let given = [vec![at(0.411); 3], vec![at(0.413)], vec![at(0.406); 10], vec![at(0.403); 8]].concat();
@@ -254,7 +260,7 @@ mod tests {
     }
 
     #[test]
-    fn after_a_silence_nothing_is_held() {
+    fn silence_resets_the_hysteresis() {
         let mut steady = Hysteresis::new(TARGET_M);
         steady.show(MonoNs(0), speed(0.1));
         assert!((steady.show(MonoNs(1_200_000_000), speed(0.2)).v_max_mps - 0.2).abs() < 1e-12);

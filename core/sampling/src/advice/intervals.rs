@@ -1,8 +1,10 @@
-//! Intervals of speed that meet a target: heads apart along the hull keep their phases in some speeds only.
+//! Intervals of speed that meet a target.
 //!
-//! The speed to name depends on what is measured of the heads and of the vehicle's pose, and not on how fast it goes now: it is
-//! the upper end of the highest interval. An interval that shrinks to nothing while heads run out of phase ends the
-//! continuity, since the next one may be far below; there, and back again, [`EASE`] is between.
+//! They arise because heads apart along the hull are in phase only at some speeds.
+//!
+//! The advised speed depends on the measured heads and the vehicle's pose, not on the present speed. It is the upper
+//! end of the highest interval. If that interval vanishes while heads run out of phase, the next one may be far
+//! below, and the advice jumps. In both directions [`EASE`] provides hysteresis.
 
 use super::search::{self, SPEED_MARGIN};
 use crate::margin::SureTarget;
@@ -11,43 +13,45 @@ use crate::spacing;
 use crate::strips::{Going, Strips};
 use headrace_geometry::math;
 
-/// Share of the target by which an interval that is followed may miss it, and a higher one must meet it: as a speed,
-/// 2 mm/s at 0.1 m/s.
+/// Hysteresis as a share of the target.
+///
+/// A followed interval may miss the target by this share, and a higher one must meet it by as much; 2 mm/s at 0.1
+/// m/s.
 pub(super) const EASE: f64 = 0.02;
-/// Speeds nearer to each other than this share are of one interval.
+/// Speeds closer together than this share belong to one interval.
 const NEAR: f64 = 0.05;
-/// Speeds tried on either side, and the share between them.
+/// Number of speeds tried on either side, and the relative step between them.
 const TRIED: i32 = 30;
 const TRIED_SHARE: f64 = 0.001;
 
-/// What decides whether a speed meets a target.
+/// Inputs that decide whether a speed meets a target.
 pub(super) struct Driving<'a> {
     pub(super) strips: &'a Strips,
     pub(super) phasing: &'a Phasing,
     pub(super) going: &'a Going,
     pub(super) parallax_rad: f64,
-    /// Lost returns count.
+    /// Whether lost returns count.
     pub(super) lossy: bool,
     pub(super) astern: bool,
     pub(super) sure: SureTarget,
-    /// What is left of the target at most, and the heads' distance along the hull, m.
+    /// Largest remaining target, and the heads' distance along the hull, m.
     pub(super) most_m: f64,
     pub(super) apart_m: f64,
-    /// No speed above it meets the target, however the heads are phased, m/s.
+    /// Speed above which no phase meets the target, m/s.
     pub(super) bound_mps: f64,
 }
 
 impl Driving<'_> {
-    /// Whether a speed meets the target, more or less a share of it.
+    /// Whether a speed meets the target, enlarged by the share `more`.
     pub(super) fn meets(&self, speed_mps: f64, more: f64) -> bool {
         self.tries(speed_mps, more).is_ok()
     }
 
-    /// The same. Where it doesn't meet the target: no speed down to the one that is given does.
+    /// The same. The error is a speed at most as high; no speed between both meets the target.
     pub(super) fn tries(&self, speed_mps: f64, more: f64) -> Result<(), f64> {
         let most_m = self.most_m * (1.0 + more);
         let then = self.passes(speed_mps);
-        // No strip has more passes than all heads make: this test alone rules out most speeds.
+        // No strip has more passes than all heads make together: this test alone rules out most speeds.
         let gap_s = then.gap_s(then.heads()).unwrap_or(f64::INFINITY);
         if speed_mps * gap_s > most_m {
             return Err(self.below_mps(speed_mps, gap_s, most_m));
@@ -57,18 +61,19 @@ impl Driving<'_> {
             return Err(speed_mps);
         }
         let Some(unmet) = self.strips.unmet(0, &then, speed_mps, target_m, self.going) else { return Ok(()) };
-        // A narrower strip may be met by what is on either side of it.
+        // The wall on either side may meet the target across a narrower strip.
         let stays = unmet.width_m > most_m;
         let below_mps = |along_m| self.below_mps(speed_mps, unmet.gap_s, along_m).min(speed_mps);
         Err(if stays { spacing::along_m(most_m, unmet.t_y_m).map_or(0.0, below_mps) } else { speed_mps })
     }
 
-    /// At a speed v, passes are g apart in time and more than `most_m` along the wall: down to this speed, m/s, they stay so.
+    /// Returns the speed, m/s, down to which passes stay more than `most_m` apart.
     ///
-    /// At u < v the heads, at most a apart along the hull, come to a place by up to a (1 / u - 1 / v) earlier or later against each other. Their longest gap is
-    /// at least g less that, and u times it at least u g - a (1 - u / v).
+    /// At the given speed they are `gap_s` apart in time. At u < v, heads at most a apart along the hull shift by up
+    /// to a (1 / u - 1 / v) in time against each other. Their longest gap is at least g less that shift, so its
+    /// length is at least u g - a (1 - u / v).
     fn below_mps(&self, speed_mps: f64, gap_s: f64, most_m: f64) -> f64 {
-        /// For rounding.
+        /// Allowance for rounding.
         const A_LITTLE: f64 = 1e-9;
         let apart_m = self.apart_m;
         (most_m + apart_m) / (gap_s + apart_m / speed_mps) * (1.0 + A_LITTLE)
@@ -83,7 +88,7 @@ impl Driving<'_> {
         self.phasing.at(signed_mps).beside(self.parallax_rad).lossy(self.lossy)
     }
 
-    /// The largest speed, m/s; zero where there is none. `last_mps` is the one found before.
+    /// Returns the largest speed, m/s, or zero; `last_mps` is the previous result.
     pub(super) fn fastest_mps(&self, last_mps: Option<f64>) -> f64 {
         let highest = |more: f64| {
             if self.phasing.fits_some_speeds() {
@@ -105,8 +110,10 @@ impl Driving<'_> {
         top_mps
     }
 
-    /// A speed that meets the target, m/s, reduced by [`SPEED_MARGIN`]; by up to twice that where T grows faster than the
-    /// speed just above it, as where heads run out of phase: an error of a hundredth then costs more than a hundredth of T.
+    /// Returns the speed after the margin [`SPEED_MARGIN`], or up to twice that margin.
+    ///
+    /// The larger margin applies where T grows faster than the speed. T does so where heads run out of phase: a speed
+    /// error of 1 % then costs more than 1 % of T.
     pub(super) fn kept_back_mps(&self, fastest_mps: f64) -> f64 {
         const STEEP: f64 = 2.0 * SPEED_MARGIN;
         let meets = |speed_mps: f64| self.meets(speed_mps, 0.0);
@@ -120,7 +127,7 @@ impl Driving<'_> {
         less_mps.min(search::kept_back_mps(fastest_mps, 1.0 - edge_mps / fastest_mps / (1.0 + STEEP), meets))
     }
 
-    /// The best speed near one that met the target, where it misses it by little.
+    /// Best speed near the previous result, if that misses the target by little.
     fn kept_mps(&self, last_mps: f64) -> Option<f64> {
         let near = (-TRIED..=TRIED).map(|k| last_mps * (1.0 + TRIED_SHARE * f64::from(k)));
         let best =
@@ -128,10 +135,12 @@ impl Driving<'_> {
         (best.1 <= self.sure.at_m(best.0) * (1.0 + EASE)).then_some(best.0)
     }
 
-    /// The lower end of the interval up to a speed that meets the target, m/s; zero where all slower speeds do.
+    /// Returns the lower end of the interval below a speed that meets the target, m/s.
+    ///
+    /// Zero if all lower speeds meet it.
     pub(super) fn lower_end_mps(&self, speed_mps: f64) -> f64 {
         const STEP: f64 = 0.99;
-        /// Slower than this share of it, nobody wants to go.
+        /// Share of the speed below which the search stops, since no pilot would go that slowly.
         const SLOWEST: f64 = 0.2;
         if !self.phasing.fits_some_speeds() {
             return 0.0;
@@ -147,8 +156,9 @@ impl Driving<'_> {
         0.0
     }
 
-    /// The speed nearest to `speed_mps` that meets the target, m/s, within a factor of two; `None` where it does itself, or none
-    /// does.
+    /// Returns the speed nearest to `speed_mps` that meets the target, m/s, within a factor of two.
+    ///
+    /// `None` if `speed_mps` meets it, or no speed does.
     pub(super) fn nearest_mps(&self, speed_mps: f64) -> Option<f64> {
         const STEPS: i32 = 70;
         const STEP: f64 = 0.01;

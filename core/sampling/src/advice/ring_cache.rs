@@ -1,4 +1,4 @@
-//! Cached ring of each head, recast when the vehicle has moved.
+//! Cached ring of each head, recast after the vehicle moves.
 
 use crate::error::SamplingError;
 use crate::head::{HeadMode, HeadSpec};
@@ -9,22 +9,26 @@ use headrace_geometry::frames::Pose;
 use headrace_geometry::snapshot::stateful;
 use headrace_geometry::tunnel::Profile;
 
-/// Relative change of the speed that is tolerated before the rings are recast.
+/// Relative speed change that is tolerated before rings are recast.
 const SHARE: f64 = 0.002;
-/// Limits of the movement across the tunnel before a recast, m: the lower, since the target may leave next to nothing;
-/// the upper, since hidden strips move along with the vehicle.
+/// Limits of the movement across the tunnel before a recast, m.
+///
+/// The lower limit is needed because the target may leave next to nothing; the upper one because hidden strips move
+/// with the vehicle.
 const STILL_M: [f64; 2] = [0.004, 0.1];
-/// Tolerated rotation per metre of that, as a quaternion's component (half an angle, rad).
+/// Tolerated rotation per metre of that movement, as a quaternion component (half an angle, rad).
 const TURN_PER_M: f64 = 0.2;
 
-/// How finely the advice looks at the wall, and how often anew.
+/// Resolution and update rate of the advice's view of the wall.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Looks {
-    /// Rays of a head's ring, evenly over a turn; at least one. Steps of heads are taken to be whole multiples of the angle
-    /// between them, rounded up.
+    /// Number of rays in a head's ring, evenly over a turn; at least one.
+    ///
+    /// Steps of heads are rounded up to whole multiples of the angle between rays.
     pub ring: u32,
-    /// How far the vehicle may move across the tunnel before a ring is cast anew, m; `None` as far as the speed changes by
-    /// 0.2 %, 4 mm at least and 0.1 m at most.
+    /// Movement across the tunnel before a ring is recast, m.
+    ///
+    /// `None` means a movement that changes the speed by 0.2 %, within 4 mm to 0.1 m.
     pub anew_m: Option<f64>,
 }
 
@@ -35,11 +39,11 @@ impl Default for Looks {
     }
 }
 
-/// How far the vehicle may move across the tunnel, m, before rings are recast, where steps of `t_y_m` on a wall
-/// `range_m` away bound the speed v for a target T, with the beams' swing w at `swing_share` = w / v.
+/// Returns the movement across the tunnel before rings are recast, m.
 ///
-/// A change dT_y changes v + w ~ T_x = sqrt(T^2 - T_y^2) by the share (T_y / T_x)^2 dT_y / T_y. A step changes with its
-/// range, twice as much where the wall falls away.
+/// Steps of `t_y_m` on a wall `range_m` away bound the speed v for a target T; `swing_share` is w / v for a beam
+/// swing w. A change dT_y changes v + w ~ T_x = sqrt(T^2 - T_y^2) by the share (T_y / T_x)^2 dT_y / T_y. A step
+/// changes with its range, twice as much where the wall falls away.
 pub(super) fn still_m(target_m: f64, t_y_m: f64, range_m: f64, swing_share: f64) -> f64 {
     let around2 = t_y_m * t_y_m;
     let along2 = (target_m * target_m - around2).max(0.0);
@@ -51,7 +55,7 @@ pub(super) fn still_m(target_m: f64, t_y_m: f64, range_m: f64, swing_share: f64)
 pub(super) struct AdvisedHead {
     pub(super) spec: HeadSpec,
     pub(super) modes: Vec<HeadMode>,
-    /// Angles that the vehicle hides, and the sector, in the sensor's frame.
+    /// Hidden angles, and the sector, in the sensor frame.
     pub(super) hidden: Vec<AngleRange>,
     pub(super) sector: Option<AngleRange>,
     pub(super) ring: Ring,
@@ -61,7 +65,9 @@ pub(super) struct AdvisedHead {
 stateful!(AdvisedHead { state: ring, cast_at; fixed: spec, modes, hidden, sector; });
 
 impl AdvisedHead {
-    /// Whether the vehicle is within `still_m`, and [`TURN_PER_M`] of that, of the pose at which the ring was cast.
+    /// Whether the vehicle is close to the pose at which the ring was cast.
+    ///
+    /// Limits: `still_m`, and [`TURN_PER_M`] times that.
     pub(super) fn is_near(&self, pose: &Pose, still_m: f64) -> bool {
         let Some(cast_at) = &self.cast_at else { return false };
         let near = |a: &[f64], b: &[f64], by: f64| a.iter().zip(b).all(|(a, b)| (a - b).abs() <= by);
@@ -70,7 +76,7 @@ impl AdvisedHead {
             && near(&cast_at.attitude.wxyz(), &pose.attitude.wxyz(), still_m * TURN_PER_M)
     }
 
-    /// Recasts the head's ring of so many rays. On an error `cast_at` is `None`, and the caller keeps the last view.
+    /// Recasts the head's ring. After an error `cast_at` is `None`, and the caller keeps the last view.
     pub(super) fn cast(&mut self, profile: &Profile, pose: &Pose, ring: u32) -> Result<(), SamplingError> {
         self.cast_at = None;
         let standing = Standing::new(profile, pose, &self.spec.mount)?;
@@ -79,7 +85,7 @@ impl AdvisedHead {
         Ok(())
     }
 
-    /// Updates the view: the wall within its sector, and what is hidden or out of reach.
+    /// Updates the view: wall within its sector, hidden wall, and wall out of reach.
     pub(super) fn look(&self, profile: &Profile, pose: &Pose, sound_speed_mps: f64, view: &mut View) {
         view.hidden.clear();
         let Ok(standing) = Standing::new(profile, pose, &self.spec.mount) else { return };

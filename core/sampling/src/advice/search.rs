@@ -1,9 +1,11 @@
 //! Search for speeds that meet a target, which may form several intervals.
 
-/// Share of the speed held back for the error of its measurement.
+/// Share of the speed held back for errors of its measurement.
 pub const SPEED_MARGIN: f64 = 0.01;
 
-/// The largest speed up to `bound_mps` that meets the target where all slower ones do; zero if there is none.
+/// Returns the largest speed up to `bound_mps` that meets the target, if all slower ones do.
+///
+/// Zero if there is none.
 pub(super) fn highest_mps(bound_mps: f64, meets: impl Fn(f64) -> bool) -> f64 {
     const LEAST_SHARE: f64 = 1e-3;
     if meets(bound_mps) {
@@ -13,8 +15,10 @@ pub(super) fn highest_mps(bound_mps: f64, meets: impl Fn(f64) -> bool) -> f64 {
     if meets(least_mps) { edge_mps(least_mps, bound_mps, meets) } else { 0.0 }
 }
 
-/// The largest speed up to `bound_mps` that meets the target, found by stepping down from the bound; zero if none is
-/// found. `tries` a speed: where it doesn't meet the target, it says below which it may be met again.
+/// Finds the largest speed up to `bound_mps` that meets the target, by stepping down.
+///
+/// Zero if there is none. `tries` returns, for a speed that misses the target, the speed below which it may be met
+/// again.
 pub(super) fn downwards_mps(bound_mps: f64, tries: impl Fn(f64) -> Result<(), f64>) -> f64 {
     const TRIED: u32 = 256;
     let at = |k: u32| bound_mps * (1.0 - f64::from(k) / f64::from(TRIED));
@@ -35,8 +39,9 @@ pub(super) fn downwards_mps(bound_mps: f64, tries: impl Fn(f64) -> Result<(), f6
     0.0
 }
 
-/// `fastest_mps`, which meets the target, reduced by `share`; where that leaves the interval of speeds that meet the
-/// target, the middle of the interval.
+/// Returns `fastest_mps`, which meets the target, reduced by `share`.
+///
+/// If that leaves the interval of speeds that meet the target, it returns the middle of the interval.
 pub(super) fn kept_back_mps(fastest_mps: f64, share: f64, meets: impl Fn(f64) -> bool) -> f64 {
     let less_mps = fastest_mps * (1.0 - share);
     if fastest_mps <= 0.0 || meets(less_mps) {
@@ -45,7 +50,7 @@ pub(super) fn kept_back_mps(fastest_mps: f64, share: f64, meets: impl Fn(f64) ->
     f64::midpoint(edge_mps(fastest_mps, less_mps, meets), fastest_mps)
 }
 
-/// Edge of the interval, by bisection between a speed that meets the target and one that doesn't.
+/// Finds the edge of an interval by bisection between a speed that meets the target and one that does not.
 pub(super) fn edge_mps(mut good: f64, mut bad: f64, meets: impl Fn(f64) -> bool) -> f64 {
     for _ in 0..30 {
         let middle = f64::midpoint(good, bad);
@@ -63,7 +68,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_is_kept_back_does_not_leave_the_stretch() {
+    fn margin_does_not_leave_the_interval() {
         let wide = |mps: f64| (0.1..=0.2).contains(&mps);
         assert!((kept_back_mps(0.2, 0.01, wide) - 0.198).abs() < 1e-12);
         let narrow = |mps: f64| (0.199..=0.2).contains(&mps);
@@ -72,7 +77,7 @@ mod tests {
     }
 
     #[test]
-    fn the_highest_stretch_is_found() {
+    fn highest_interval_is_found() {
         let islands = |mps: f64| (0.05..=0.1).contains(&mps) || (0.13..=0.15).contains(&mps);
         assert!((highest_mps(0.3, |mps| mps < 0.1) - 0.1).abs() < 1e-9);
         assert!((highest_mps(0.3, |_| true) - 0.3).abs() <= 0.0 && highest_mps(0.3, |_| false) <= 0.0);

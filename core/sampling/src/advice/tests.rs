@@ -31,7 +31,7 @@ struct Case {
 }
 
 impl Case {
-    /// Heads at x along the hull with these angles, all in FAST, in the middle of `ceran`.
+    /// Heads at x along the hull with these angles, all in FAST, in the centre of `ceran`.
     fn new(angles_deg: &[f64], x_m: &[f64], speed_mps: f64, target_m: f64) -> Self {
         let profile = shapes::ceran().unwrap();
         let specs: Vec<HeadSpec> = x_m.iter().map(|x| spec([*x, 0.0, 0.0], 0.0)).collect();
@@ -78,7 +78,7 @@ impl Case {
         self.advisor().advise(&self.situation, Swing::default(), self.left_s)
     }
 
-    /// T at a speed, m, by the paper's equation, with the phases that heads have at it.
+    /// T at a speed, m, by the paper's equation, with the phases of the heads at that speed.
     fn t_at_m(&self, advice: &Advice, speed_mps: f64) -> f64 {
         let passes = Phasing::of(&self.situation).at(speed_mps);
         let gap_s = passes.gap_s(passes.heads()).unwrap();
@@ -87,7 +87,7 @@ impl Case {
 }
 
 #[test]
-fn at_the_largest_speed_the_target_is_just_met() {
+fn largest_speed_just_meets_the_target() {
     let advice = Case::new(&[10.0, 100.0, 190.0, 280.0], &[0.0; 4], 0.2, 0.5).advice();
     assert!((advice.pass_gap_s - 2.0).abs() < 1e-9 && (advice.even_pass_gap_s - 2.0).abs() < 1e-12);
     assert_eq!((advice.reason, advice.remedy), (Reason::HelixPitch, None));
@@ -98,27 +98,27 @@ fn at_the_largest_speed_the_target_is_just_met() {
 }
 
 #[test]
-fn the_largest_speed_is_one_at_which_the_phases_of_heads_apart_hold() {
+fn largest_speed_keeps_heads_apart_in_phase() {
     let case = Case::new(&[0.0, 0.0], &[0.8, 0.0], 0.2, 1.0);
     let advice = case.advice();
     let t_at = |speed_mps: f64| case.t_at_m(&advice, speed_mps);
     let v_max = advice.v_max_mps / (1.0 - SPEED_MARGIN);
     assert!((t_at(v_max) - 1.0).abs() < 1e-6, "{v_max}: {}", t_at(v_max));
     assert!(t_at(1.02 * v_max) > 1.0);
-    // Evenly phased at every speed, they could go faster.
+    // Evenly phased at every speed, they could move faster.
     let even = spacing::speed_for_target_mps(1.0, advice.t_y_m, 4.0, advice.ping_period_s).unwrap();
     assert!(v_max < 0.99 * even, "{v_max} and {even}");
     let faster = Case::new(&[0.0, 0.0], &[0.8, 0.0], 0.5, 1.0).advice();
     assert!(advice.phase_error_rad.unwrap().abs() < 1e-9 && faster.phase_error_rad.unwrap().abs() > 0.5);
-    // At too high a speed, the advice is a speed that meets the target.
+    // At too high a present speed, the advised speed still meets the target.
     let passes = Phasing::of(&case.situation).at(faster.v_max_mps);
     let t_m = |v: f64| spacing::t_max_m(v * passes.gap_s(passes.heads()).unwrap(), v * 0.02, faster.t_y_m);
     assert!(faster.v_max_mps > 0.1 && t_m(faster.v_max_mps) <= 1.0);
 }
 
 #[test]
-fn a_speed_that_meets_the_target_is_not_called_too_fast() {
-    // Heads 1.1 m apart meet 0.5 m in narrow intervals of speed only; the vehicle's speed is in one of them.
+fn speed_that_meets_the_target_is_not_too_fast() {
+    // Heads 1.1 m apart meet 0.5 m only in narrow intervals of speed; the present speed is in one of them.
     let phase_deg = |v: f64| 180.0 - 360.0 * 1.1 / (v * 8.0);
     for v in [0.06, 0.085, 0.1, 0.105] {
         let case = Case::new(&[0.0, phase_deg(v)], &[0.0, -1.1], v, 0.5);
@@ -129,7 +129,7 @@ fn a_speed_that_meets_the_target_is_not_called_too_fast() {
 }
 
 #[test]
-fn in_sectors_a_head_that_is_gone_leaves_its_sector_unseen() {
+fn missing_head_leaves_its_sector_unseen() {
     let mut case = Case::new(&[10.0, 190.0], &[0.0; 2], 0.05, 0.8);
     case.situation.layout = HeadLayout::SectorOffset;
     let whole = case.advice();
@@ -144,7 +144,7 @@ fn in_sectors_a_head_that_is_gone_leaves_its_sector_unseen() {
 }
 
 #[test]
-fn a_wall_out_of_reach_is_not_seen() {
+fn wall_out_of_reach_is_unseen() {
     let mut case = Case::new(&[0.0], &[0.0], 0.2, 0.5);
     case.specs[0].range_m[1] = 2.0;
     let advice = case.advice();
@@ -152,7 +152,7 @@ fn a_wall_out_of_reach_is_not_seen() {
 }
 
 #[test]
-fn at_rest_the_way_out_stays_the_way_out() {
+fn stationary_vehicle_keeps_its_direction() {
     let case = Case::new(&[0.0, 180.0], &[0.0; 2], 0.2, 1.0);
     let mut advisor = case.advisor();
     let mut then = case.situation;
@@ -165,7 +165,7 @@ fn at_rest_the_way_out_stays_the_way_out() {
 }
 
 #[test]
-fn on_the_way_back_the_phases_and_the_length_of_the_way_back_count() {
+fn return_uses_its_own_phases_and_length() {
     let case = Case::new(&[30.0, 250.0], &[0.9, -0.3], -0.2, 1.0);
     let advice = case.advice();
     let v = advice.v_max_mps / (1.0 - SPEED_MARGIN);
@@ -186,7 +186,7 @@ fn alternatives_give_speed_hours_and_whether_they_suffice() {
     let names: Vec<_> = advice.alternatives.iter().flatten().map(|other| other.mode.as_str()).collect();
     assert_eq!(names, ["slow", "fast", "fastest"]);
     let [slow, fast, _] = [0, 1, 2].map(|k| advice.alternatives[k].unwrap());
-    // The present mode, in phase: equal to the advice.
+    // The present mode in phase gives the advised speed.
     assert!((fast.v_max_mps - advice.v_max_mps).abs() < 1e-9);
     assert!((slow.v_max_mps - 1.0 / 10.818 * 0.99).abs() < 1e-3);
     assert!((advice.left.hours_at(fast.v_max_mps).unwrap() - 900.0 / fast.v_max_mps / 3600.0).abs() < 1e-12);
@@ -195,20 +195,20 @@ fn alternatives_give_speed_hours_and_whether_they_suffice() {
     assert!(!suffices(0.299) && suffices(0.301) && !suffices(slow.v_max_mps));
 }
 
-/// Two heads in sectors of half a turn each: a place waits for as long as a whole turn takes.
+/// Two heads in sectors of half a turn each: the longest wait of a place equals a whole turn.
 #[test]
-fn in_sectors_alternatives_go_there_and_back_in_the_time_of_their_mode() {
+fn sector_alternatives_use_the_sweep_time_of_their_mode() {
     let mut case = Case::new(&[10.0, 190.0], &[0.0; 2], 0.05, 0.8);
     case.situation.layout = HeadLayout::SectorOffset;
     let advice = case.advice();
     let [slow, fast, _] = [0, 1, 2].map(|k| advice.alternatives[k].unwrap().v_max_mps);
-    assert!((fast - advice.v_max_mps).abs() < 1e-9, "as they are: {fast} {}", advice.v_max_mps);
-    // 21.6 s and a ping, with steps along the wall that hardly count.
+    assert!((fast - advice.v_max_mps).abs() < 1e-9, "the present mode: {fast} {}", advice.v_max_mps);
+    // 21.6 s plus a ping, with negligible steps along the wall.
     assert!((slow / (0.8 / 21.618 * 0.99) - 1.0).abs() < 0.01, "{slow}");
 }
 
 #[test]
-fn where_slower_does_not_help_it_says_what_would() {
+fn remedy_is_given_if_slower_does_not_help() {
     let mut case = Case::new(&[0.0], &[0.0], 0.2, 0.1);
     let advice = case.advice();
     assert_eq!((advice.v_max_mps, advice.reason), (0.0, Reason::AngularStep));
@@ -216,7 +216,7 @@ fn where_slower_does_not_help_it_says_what_would() {
     assert_eq!(advice.left.hours_at(advice.v_max_mps), None);
     assert!(advice.alternatives[0].unwrap().v_max_mps > 0.0);
 
-    // Near the floor's corner the same mode's steps are too long; in the middle they aren't.
+    // Near the corner of the floor this mode's steps are too long, but not in the centre.
     case = Case::new(&[0.0], &[0.0], 0.2, 0.25);
     assert_eq!(case.advice().reason, Reason::HelixPitch);
     case.situation.pose =
@@ -234,23 +234,23 @@ fn where_slower_does_not_help_it_says_what_would() {
 }
 
 #[test]
-fn heads_that_hide_the_wall_from_each_other_slow_the_vehicle_down() {
+fn mutual_occlusion_lowers_the_speed() {
     let free = Case::new(&[0.0, 90.0, 180.0, 270.0], &[0.0; 4], 0.1, 0.5).advice();
     let case = hiding_each_other();
     let mut advisor = case.advisor();
     let hidden = advisor.advise(&case.situation, Swing::default(), None);
     assert!((hidden.pass_gap_s - 2.0).abs() < 0.15, "{hidden:?}");
-    // Both heads on one side have the other wall hidden by a neighbour: half of the passes are missing there.
+    // Each head has one wall hidden by its neighbour, where half of the passes are missing.
     let parallax_s = advisor.parallax_rad / TAU * 8.0;
     assert!((0.1..0.15).contains(&parallax_s), "{parallax_s}");
-    // The hidden strips lie where steps are short.
+    // Steps are short on the hidden strips.
     let t_m = spacing::t_max_m(0.125 * (4.0 + parallax_s), 0.125 * 0.02, 0.1);
     assert!((hidden.predicted_t_m.unwrap() - t_m).abs() < 0.01, "{hidden:?}");
     assert!(hidden.v_max_mps < 0.6 * free.v_max_mps, "{} and {}", hidden.v_max_mps, free.v_max_mps);
 }
 
 #[test]
-fn old_rings_are_cast_one_a_call_and_the_same_in_the_end() {
+fn outdated_rings_are_recast_one_per_call() {
     let mut case = Case::new(&[0.0, 120.0, 240.0], &[0.0; 3], 0.1, 0.5);
     for (spec, y_m) in case.specs.iter_mut().zip([-0.5, 0.0, 0.5]) {
         spec.mount.position = Vec3::new(0.0, y_m, 0.0);
@@ -258,7 +258,7 @@ fn old_rings_are_cast_one_a_call_and_the_same_in_the_end() {
     let mut advisor = case.advisor();
     advisor.advise(&case.situation, Swing::default(), None);
     let pose = case.situation.pose.unwrap();
-    assert!(advisor.heads.iter().all(|head| head.is_near(&pose, 1e-9)), "at first all are cast");
+    assert!(advisor.heads.iter().all(|head| head.is_near(&pose, 1e-9)), "the first call casts all rings");
     let moved = Pose { position: Point3::new(100.0, 1.0, pose.position.z()), ..pose };
     let then = Situation { pose: Some(moved), ..case.situation };
     for cast in 1..=3 {
@@ -270,7 +270,7 @@ fn old_rings_are_cast_one_a_call_and_the_same_in_the_end() {
 }
 
 #[test]
-fn while_the_vehicle_moves_on_each_head_s_ring_has_its_turn() {
+fn moving_vehicle_recasts_rings_in_turn() {
     let case = Case::new(&[0.0, 120.0, 240.0], &[0.0; 3], 0.1, 0.5);
     let mut advisor = case.advisor();
     let pose = case.situation.pose.unwrap();
@@ -288,7 +288,7 @@ fn hiding_each_other() -> Case {
     let places = [[0.5, 0.15, 0.0], [0.5, -0.15, 0.0], [-0.5, 0.15, 0.0], [-0.5, -0.15, 0.0]];
     for ((spec, motion), place) in case.specs.iter_mut().zip(&mut case.situation.heads).zip(places) {
         *spec = self::spec(place, 0.04);
-        // Phased for 0.125 m/s, at which 1 m is a whole turn's advance.
+        // Phased for 0.125 m/s, at which 1 m is the advance of a whole turn.
         if let Some(motion) = motion {
             motion.mount = spec.mount;
         }
@@ -296,8 +296,10 @@ fn hiding_each_other() -> Case {
     case
 }
 
-/// The largest relative error in speed of an advisor that caches rings, against one that recasts each time, on a track
-/// to and fro and round about, at 1.5 cm/s and half a degree per second; and the number of rings cast in 600 updates.
+/// Largest relative speed error of an advisor that caches rings, compared with one that recasts each time.
+///
+/// The track moves to and fro and in circles at 1.5 cm/s and half a degree per second. Also returns the number of
+/// rings cast in 600 updates.
 fn off_by(case: &Case, swing: Swing) -> (f64, usize) {
     let [y_m, z_m] = case.profile.reference();
     let mut advisor = case.advisor();
@@ -321,7 +323,7 @@ fn off_by(case: &Case, swing: Swing) -> (f64, usize) {
 }
 
 #[test]
-fn what_an_advisor_remembers_hardly_changes_its_advice() {
+fn cached_rings_hardly_change_the_advice() {
     let around = || Case::new(&[10.0, 100.0, 190.0, 280.0], &[0.0; 4], 0.2, 0.5);
     let (still, swing) =
         (Swing::default(), Swing { rate_radps: 0.01, most_rad: 1.0, apart_rate_radps: 0.01 });
@@ -330,7 +332,7 @@ fn what_an_advisor_remembers_hardly_changes_its_advice() {
         ("hiding each other", hiding_each_other(), still, 0.002, 0..100),
         ("a wide target", Case::new(&[0.0], &[0.0], 0.1, 1.0), still, 0.002, 0..30),
         ("swinging", around(), swing, 0.006, 0..250),
-        // Steps are nearly as long as the target: each centimetre counts, so rings are recast more often.
+        // Steps are nearly as long as the target, so each centimetre matters and rings are recast more often.
         ("a target hard to meet", Case::new(&[0.0, 180.0], &[0.0; 2], 0.1, 0.3), still, 0.02, 250..600),
     ] {
         let (off, cast) = off_by(&case, swing);
@@ -339,18 +341,18 @@ fn what_an_advisor_remembers_hardly_changes_its_advice() {
 }
 
 #[test]
-fn the_swing_of_the_vehicle_slows_it_down_and_a_steady_heading_helps() {
+fn swing_lowers_the_speed_and_steady_heading_is_the_remedy() {
     let case = Case::new(&[0.0, 180.0], &[0.0, 0.0], 0.2, 1.0);
     let advise = |swing: Swing| case.advisor().advise(&case.situation, swing, None);
     let still = advise(Swing::default());
     let swing = Swing { rate_radps: 0.01, most_rad: 1.0, apart_rate_radps: 0.01 };
     let swung = advise(swing);
-    // The speed is reduced by the sweep of the beams at their range.
+    // The speed is reduced by the beam sweep at their range.
     let lost_mps = (still.v_max_mps - swung.v_max_mps) / (1.0 - SPEED_MARGIN);
     assert!((0.05..0.07).contains(&lost_mps), "{lost_mps}");
     assert!(swung.predicted_t_m > still.predicted_t_m && swung.reason == Reason::HelixPitch);
     assert!(swung.alternatives[1].unwrap().v_max_mps < still.alternatives[1].unwrap().v_max_mps);
-    // A swing of small extent costs no more than that, however fast.
+    // A fast swing of small extent costs no more than its extent.
     let little = advise(Swing { rate_radps: 0.05, most_rad: 0.01, apart_rate_radps: 0.05 });
     assert!(little.v_max_mps > swung.v_max_mps, "{little:?}");
     let wild = advise(Swing { rate_radps: 0.2, most_rad: 1.0, apart_rate_radps: 0.2 });
@@ -360,7 +362,7 @@ fn the_swing_of_the_vehicle_slows_it_down_and_a_steady_heading_helps() {
 }
 
 #[test]
-fn a_swing_goes_on_while_heads_apart_follow_each_other() {
+fn swing_acts_between_heads_apart() {
     let together = Case::new(&[0.0, 180.0], &[0.0, 0.0], 0.2, 1.5);
     let apart = Case::new(&[0.0, 0.0], &[0.8, 0.0], 0.2, 1.5);
     let swing = Swing { rate_radps: 0.01, most_rad: 1.0, apart_rate_radps: 0.01 };
@@ -369,16 +371,16 @@ fn a_swing_goes_on_while_heads_apart_follow_each_other() {
         assert!((advice.pass_gap_s - 4.0).abs() < 1e-9, "{advice:?}");
         advice.predicted_t_m.unwrap()
     };
-    // At 0.2 m/s, 0.8 m take as long as the time between passes. Of two heads all neighbouring passes are of both.
+    // At 0.2 m/s, 0.8 m take as long as the time between passes. With two heads, all neighbouring passes are by both.
     let swept_m = 0.01 * 4.0 * 6.05;
     assert!((t_m(&apart) - t_m(&together) - swept_m).abs() < 0.03, "{} {}", t_m(&apart), t_m(&together));
 }
 
 #[test]
-fn an_unsure_position_lowers_the_speed_to_what_meets_the_target_less_its_margin() {
+fn position_error_lowers_the_speed_by_its_margin() {
     let mut case = Case::new(&[10.0, 100.0, 190.0, 280.0], &[0.0; 4], 0.2, 0.5);
     let sure = case.advice();
-    // Two standard deviations of 17 mm, of which 2 mm are free: 3 cm of the half metre.
+    // Two standard deviations of 17 mm, of which 2 mm are free, take 3 cm of the half metre.
     case.situation.pass_error_m = 0.017;
     let unsure = case.advice();
     let meets_m = |advice: &Advice, v_mps: f64| {
@@ -390,15 +392,15 @@ fn an_unsure_position_lowers_the_speed_to_what_meets_the_target_less_its_margin(
     let fast = |advice: &Advice| advice.alternatives[1].unwrap().v_max_mps;
     assert!((meets_m(&unsure, fast(&unsure)) - 0.47).abs() < 1e-3, "{}", fast(&unsure));
     assert!(fast(&sure) > 1.05 * fast(&unsure));
-    // What it costs is told as position's share, and nothing else has changed.
+    // The cost appears as the share of position, and nothing else changes.
     let [margins, before] = [unsure.margins.unwrap(), sure.margins.unwrap()];
     assert!((margins.swing_mps - before.swing_mps).abs() < 1e-9);
     assert!((margins.position_mps - unsure.v_max_mps).abs() < 1e-9 && margins.pass_error_m >= 0.017);
 }
 
-/// Of speeds advised before, one is kept only where it misses the target by next to nothing: whatever the phases become.
+/// A previously advised speed is kept only if it misses the target by next to nothing, whatever the phases become.
 #[test]
-fn a_speed_that_is_kept_meets_the_target() {
+fn kept_speed_meets_the_target() {
     let mut advisor = Case::new(&[0.0, 0.0], &[0.8, 0.0], 0.2, 1.0).advisor();
     let mut kept = 0;
     for k in 0..72 {
@@ -409,12 +411,14 @@ fn a_speed_that_is_kept_meets_the_target() {
         assert!(t_m <= 1.0 + intervals::EASE, "{k}: {t_m} at {v}");
         kept += u32::from((v / case.advice().v_max_mps - 1.0).abs() > 1e-6);
     }
-    assert!(kept > 0, "some are kept");
+    assert!(kept > 0, "some speeds are kept");
 }
 
-/// Where three returns in ten are lost, more passes are needed for one, and the speed is lower for it; nothing is lost of none.
+/// With 30 % lost returns, more than one pass is needed and the speed is lower.
+///
+/// A zero rate costs nothing.
 #[test]
-fn lost_returns_slow_the_vehicle_down() {
+fn lost_returns_lower_the_speed() {
     let v_mps = |share: f64| {
         let mut case = Case::new(&[10.0, 100.0, 190.0, 280.0], &[0.0; 4], 0.2, 0.5);
         case.situation.losses = [LossRate::independent(share); MAX_HEADS];
@@ -425,23 +429,24 @@ fn lost_returns_slow_the_vehicle_down() {
     assert!(all[2] < 0.75 * all[0], "{all:?}");
 }
 
-/// Heads far apart meet the target from a lower speed on, and at all speeds from there to the one advised.
+/// Heads far apart meet the target in an interval that reaches up to the advised speed.
 #[test]
-fn the_interval_of_speeds_begins_where_the_target_is_met() {
+fn speed_interval_starts_where_the_target_is_met() {
     let case = Case::new(&[0.0, 0.0], &[2.4, 0.0], 0.2, 1.0);
     let advice = case.advice();
     let t_at = |speed_mps: f64| case.t_at_m(&advice, speed_mps);
     let (from, to) = (advice.from_mps, advice.v_max_mps);
-    // At 0.15 m/s the rear head comes to a place just when the front one does again.
+    // At 0.15 m/s, the rear head passes a place just when the front one does again.
     assert!(from > 0.15 && to > 1.1 * from, "{from} to {to}");
     assert!((0..=50).map(|k| from + (to - from) * f64::from(k) / 50.0).all(|v| t_at(v) <= 1.0 + 1e-6));
     assert!(t_at(0.985 * from) > 1.0, "{}", t_at(0.985 * from));
 }
 
-/// What a speed that fails rules out below it holds no speed that meets the target: with heads anywhere along the hull and beside one
-/// another, some wall hidden, swinging and unsure of the position.
+/// No speed below a failed one that was ruled out meets the target.
+///
+/// Heads are anywhere along the hull and side by side, with hidden wall, swing and position errors.
 #[test]
-fn no_speed_that_meets_the_target_is_passed_over() {
+fn search_skips_no_speed_that_meets_the_target() {
     let mut seed = 7_u64;
     let mut draw = |from: f64, to: f64| {
         seed = seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
@@ -449,7 +454,7 @@ fn no_speed_that_meets_the_target_is_passed_over() {
     };
     let (mut found, mut hidden, mut skipped) = (0, 0, 0);
     for number in 0..240 {
-        // Every other one as tight as may be: two heads in line, and nothing but their phases.
+        // Every other case is as tight as possible: two heads in line, and only their phases.
         let bare = number % 2 == 0;
         let heads = if bare { 2 } else { 2 + number % 3 };
         let angles: Vec<f64> = (0..heads).map(|_| draw(0.0, 360.0)).collect();
@@ -493,10 +498,11 @@ fn no_speed_that_meets_the_target_is_passed_over() {
     assert!(found > 100 && hidden > 20 && skipped > 10_000, "{found} {hidden} {skipped}");
 }
 
-/// A higher interval of speeds is told once its best speed meets the target with 2 % to spare, and not as soon as it meets it: while
-/// heads run out of phase it comes and goes.
+/// A higher interval is advised once its best speed meets the target with 2 % to spare.
+///
+/// While heads run out of phase, such an interval appears and vanishes.
 #[test]
-fn a_higher_interval_is_told_once_it_meets_the_target_with_something_to_spare() {
+fn higher_interval_is_advised_once_it_meets_the_target_with_margin() {
     let mut advisor = Case::new(&[0.0, 0.0], &[1.1, 0.0], 0.1, 0.5).advisor();
     let (mut last_mps, mut jumps, mut waited) = (None::<f64>, 0, 0);
     for k in 0..1440 {
@@ -514,16 +520,20 @@ fn a_higher_interval_is_told_once_it_meets_the_target_with_something_to_spare() 
                 !is_told || least_m < 0.985 * 0.5,
                 "{k}: {last_mps} to {now_mps}, T {least_m} m at best above"
             );
-            assert!(is_told || least_m > 0.975 * 0.5, "{k}: {last_mps} stays {now_mps}, T {least_m} m above");
+            assert!(
+                is_told || least_m > 0.975 * 0.5,
+                "{k}: {last_mps} is kept as {now_mps}, T {least_m} m above"
+            );
         }
         last_mps = Some(now_mps).filter(|now_mps| *now_mps > 0.0);
     }
-    assert!(jumps > 0 && waited > 0, "{jumps} told at once, {waited} waited");
+    assert!(jumps > 0 && waited > 0, "{jumps} advised at once, {waited} delayed");
 }
 
-/// Heads 1.1 m apart that were started for 0.1 m/s meet 0.5 m in some intervals of speed: which is nearest, and where the highest begins.
+/// Heads 1.1 m apart, started for 0.1 m/s, meet 0.5 m in several intervals: the nearest, and the start of the
+/// highest.
 #[test]
-fn of_several_intervals_of_speed_the_nearest_and_the_highest_are_told() {
+fn nearest_and_highest_speed_intervals_are_advised() {
     let started_deg = 180.0 - 360.0 * 1.1 / (0.1 * 8.0);
     let (mut inside, mut outside) = (0, 0);
     for speed_mps in (0..60).map(|k| 0.025 + 0.002 * f64::from(k)) {
@@ -543,7 +553,7 @@ fn of_several_intervals_of_speed_the_nearest_and_the_highest_are_told() {
         };
         outside += 1;
         assert!(t_m(speed_mps) > 0.5 && t_m(nearest_mps) <= 0.5, "{speed_mps}: {nearest_mps}");
-        // What is nearer, by more than the hundredth of what is tried, doesn't meet it but for the narrowest intervals.
+        // Closer speeds, by more than the step of 1 %, miss the target except in the narrowest intervals.
         let off = math::ln(nearest_mps / speed_mps).abs() - 0.01;
         for nearer in (1..200).map(|k| 0.003 * f64::from(k)).filter(|nearer| *nearer < off) {
             let by = math::exp(nearer);
@@ -552,13 +562,17 @@ fn of_several_intervals_of_speed_the_nearest_and_the_highest_are_told() {
     }
     assert!(inside > 10 && outside > 10, "{inside} {outside}");
     let standing = Case::new(&[0.0, started_deg], &[0.0, -1.1], 0.01, 0.5).advice();
-    assert!(standing.nearest_mps.is_none() && standing.from_mps > 0.0, "who stands has no speed to change");
+    assert!(
+        standing.nearest_mps.is_none() && standing.from_mps > 0.0,
+        "a stationary vehicle has no nearest speed"
+    );
 }
 
-/// Where heads run out of phase just above the speed that meets the target, up to 2 % of it is held back instead of 1 %, so that who is
-/// over the advice by 2 % is over the target by no more.
+/// Up to 2 % of the speed is held back where heads run out of phase just above it, instead of 1 %.
+///
+/// A vehicle 2 % above the advice then exceeds the target by at most 2 %.
 #[test]
-fn a_speed_keeps_away_from_where_t_grows_faster_than_the_speed() {
+fn speed_margin_is_larger_where_t_grows_faster_than_speed() {
     let (mut even, mut steep) = (0, 0);
     for (apart_m, k) in
         [0.0, 0.3, 1.1, 2.5].into_iter().flat_map(|apart_m| (0..40).map(move |k| (apart_m, k)))
@@ -584,7 +598,7 @@ fn a_speed_keeps_away_from_where_t_grows_faster_than_the_speed() {
             );
             even += 1;
         } else {
-            // No more than it takes.
+            // No more than necessary.
             assert!((1.019..1.0203).contains(&over), "{started_mps}: {kept}, {over}");
             steep += 1;
         }
@@ -593,7 +607,7 @@ fn a_speed_keeps_away_from_where_t_grows_faster_than_the_speed() {
 }
 
 #[test]
-fn what_is_lost_is_the_mean_of_the_heads_that_turn() {
+fn lost_share_is_the_mean_of_turning_heads() {
     assert!((mean([0.1, 0.2, 0.6].into_iter()) - 0.3).abs() < 1e-12);
     assert!(mean(core::iter::empty()).abs() <= 0.0);
 }

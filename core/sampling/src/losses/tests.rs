@@ -1,4 +1,4 @@
-//! The passes that are asked for against walls that are sampled with losses drawn at random, whose holes are found by brute force.
+//! Comparison of the required passes with simulated walls: losses drawn at random, holes found by brute force.
 
 use super::*;
 
@@ -26,7 +26,7 @@ impl Draw {
     }
 }
 
-/// Share of quarter metres without a circle of the target's diameter that holds no sample, where passes are so far apart.
+/// Share of stretches of 0.25 m without an empty circle of the target's diameter, with passes `along_m` apart.
 fn share_passed(along_m: f64, t_y_m: f64, rates: &[LossRate], seed: u64) -> f64 {
     const STRETCHES: usize = 80;
     const FINE_M: f64 = 0.02;
@@ -35,7 +35,7 @@ fn share_passed(along_m: f64, t_y_m: f64, rates: &[LossRate], seed: u64) -> f64 
     let turns = (length_m / along_m).ceil() as usize + 1;
     let pings = (PERIMETER_M / t_y_m).round();
     let mut lost = vec![false; rates.len()];
-    // Samples by rows of half a metre along the wall.
+    // Samples in rows of half a metre along the wall.
     let mut rows = vec![Vec::new(); (length_m / TARGET_M) as usize + 3];
     for turn in 0..turns {
         let head = turn % rates.len();
@@ -76,7 +76,7 @@ fn along_m(t_y_m: f64, passes: f64) -> f64 {
 }
 
 #[test]
-fn nineteen_of_twenty_stretches_pass_with_the_passes_that_are_asked_for() {
+fn required_passes_let_19_of_20_stretches_pass() {
     let rates = [
         LossRate::independent(0.02),
         LossRate::independent(0.1),
@@ -89,14 +89,14 @@ fn nineteen_of_twenty_stretches_pass_with_the_passes_that_are_asked_for() {
         for (seed, rate) in (1..).zip(rates) {
             let passes = passes(t_y_m, &[rate]);
             let share = share_passed(along_m(t_y_m, passes), t_y_m, &[rate], seed);
-            // Of 80 stretches; neighbours share their holes.
+            // Over 80 stretches; neighbouring ones share holes.
             assert!(share >= 0.87, "steps of {t_y_m} m, {rate:?}: {passes:.2} passes, {share:.2} pass");
         }
     }
 }
 
 #[test]
-fn with_notably_fewer_passes_they_do_not() {
+fn notably_fewer_passes_let_fewer_stretches_pass() {
     let rates =
         [LossRate::independent(0.2), LossRate::independent(0.5), LossRate { share: 0.2, after_lost: 0.8 }];
     for t_y_m in [0.07, 0.1] {
@@ -109,29 +109,29 @@ fn with_notably_fewer_passes_they_do_not() {
 }
 
 #[test]
-fn a_head_that_hears_nothing_leaves_its_passes_to_the_others() {
+fn silent_head_leaves_its_passes_to_the_others() {
     let sound = LossRate::default();
     let deaf = LossRate::independent(1.0);
     assert!((passes(0.1, &[sound, deaf, sound, sound]) - 2.0).abs() < 1e-12);
     assert!((passes(0.1, &[deaf, deaf, sound, sound]) - 3.0).abs() < 1e-12);
     assert!((passes(0.1, &[deaf]) - MOST_PASSES).abs() < 1e-12);
-    // That it loses some, too, costs more than either alone.
+    // Losses of that head, too, cost more than either alone.
     let lossy = LossRate::independent(0.1);
     let all = passes(0.1, &[deaf, lossy, lossy, lossy]);
     assert!(all > 2.05 && all > passes(0.1, &[lossy; 4]), "{all}");
-    // Alike, it doesn't matter how many they are.
+    // With equal loss rates, the number of heads has no effect.
     assert!((passes(0.1, &[lossy; 4]) - passes(0.1, &[lossy])).abs() < 1e-12);
 }
 
 #[test]
-fn it_grows_with_what_is_lost_and_has_no_steps() {
+fn required_passes_grow_continuously_with_losses() {
     for t_y_m in [0.03, 0.1, 0.2, 0.35] {
         let at = |share: f64| passes(t_y_m, &[LossRate::independent(share)]);
         assert!(at(0.002) >= 1.0 && at(0.998) >= 6.0);
         for k in 0..4980 {
             let [mut low, mut high] = [k, k + 1].map(|k| 0.002 + 2e-4 * f64::from(k));
             assert!(at(high) >= at(low) - 1e-9, "steps of {t_y_m} m, {high}: {} to {}", at(low), at(high));
-            // It is steep where a run comes to be as wide as the target.
+            // The slope is steep where a run becomes as wide as the target.
             for _ in 0..40 {
                 let middle = f64::midpoint(low, high);
                 if at(middle) - at(low) > at(high) - at(middle) { high = middle } else { low = middle }
@@ -142,24 +142,26 @@ fn it_grows_with_what_is_lost_and_has_no_steps() {
 }
 
 #[test]
-fn without_losses_or_without_a_speed_it_asks_for_nothing() {
+fn no_extra_passes_without_losses_or_without_a_speed() {
     assert!((passes(0.1, &[LossRate::default(); 4]) - 1.0).abs() <= 0.0);
     assert!((passes(0.1, &[]) - 1.0).abs() <= 0.0);
-    // Steps longer than the target: no speed is to be divided.
+    // With steps longer than the target there is no speed to reduce.
     assert!((passes(0.6, &[LossRate::independent(0.5)]) - 1.0).abs() <= 0.0);
 }
 
-/// What is lost by chance makes small holes often and large ones never; where nothing is lost by chance, no hole is.
+/// Chance losses make small holes often and large ones never.
+///
+/// Without chance losses there are no chance holes.
 #[test]
-fn a_hole_came_by_chance_where_its_losses_can_have_met() {
+fn hole_is_by_chance_if_enough_losses_can_coincide() {
     let hole = |hole_m: f64, rate: LossRate| sampled(0.1).is_by_chance(hole_m, 0.3, rate);
     let often = LossRate { share: 0.3, after_lost: 0.6 };
-    assert!(hole(0.55, often), "one pass and three pings");
-    assert!(!hole(2.0, often), "nearly five passes, each of fourteen pings");
+    assert!(hole(0.55, often), "the loss of one pass and three pings is likely");
+    assert!(!hole(2.0, often), "the loss of nearly five passes of fourteen pings is unlikely");
     let [never, runs] = [LossRate::default(), LossRate { share: 0.58, after_lost: 0.98 }];
     assert!(!hole(0.55, never));
     assert!(hole(2.0, runs), "most of each turn is lost in long runs");
-    // The same hole is likelier where more is lost, and where it is smaller.
+    // The same hole is more likely with higher losses, and a smaller hole is more likely.
     for share in 1..9 {
         let rate = LossRate::independent(f64::from(share) / 10.0);
         let largest = |from: i32| (from..60).rev().find(|n| hole(f64::from(*n) / 20.0, rate)).unwrap_or(0);

@@ -1,4 +1,4 @@
-//! Heads in sectors: when neighbours come to the end that their sectors share.
+//! Heads in sectors: timing of neighbours at the end that their sectors share.
 
 use serde::{Deserialize, Serialize};
 
@@ -6,27 +6,29 @@ use crate::head::{HeadMotion, MAX_HEADS, faces_aft};
 use crate::occlusion::AngleRange;
 use headrace_geometry::math::{self, TAU};
 
-/// What is assumed of neighbours whose sweeps aren't known: that they come to their ends at once.
+/// Unevenness assumed for neighbours with unknown sweeps: both reach their ends at once.
 pub(super) const AT_ONCE: f64 = 0.5;
 
-/// Where a head is on its way through its sector, there and back.
+/// Position of a head in its sweep through its sector, there and back.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub(super) struct Leg {
     /// Number of its sector, and how many there are, in the body's sense of rotation.
     sector: i64,
     of: i64,
-    /// Share of a sweep there and back since it was at the beginning of the sector, 0 to 1.
+    /// Share of a sweep there and back since the beginning of the sector, 0 to 1.
     share: f64,
 }
 
 impl Leg {
-    /// Of a head that turns within `sector`, angles in its sensor frame; `None` for a sector without a size.
+    /// Creates it for a head that turns within `sector`, angles in its sensor frame.
+    ///
+    /// `None` for a sector without a size.
     pub(super) fn of(motion: &HeadMotion, sector: &AngleRange) -> Option<Self> {
         let size_rad = Some(sector.size_rad).filter(|size_rad| *size_rad > 0.0)?;
         let along = math::wrap_signed(motion.angle_rad - sector.middle_rad(), TAU) / size_rad + 0.5;
         let along = along.clamp(0.0, 1.0);
         let grows = motion.rate_radps > 0.0;
-        // A head that faces aft turns the other way round.
+        // A head that faces aft turns in the opposite sense.
         let (along, grows, from_rad) = if faces_aft(motion.mount.rotation) {
             (1.0 - along, !grows, TAU - sector.from_rad - size_rad)
         } else {
@@ -41,9 +43,11 @@ impl Leg {
     }
 }
 
-/// How far from evenly after one another neighbours come to the end that their sectors share, the largest, as a share of the advance in
-/// a sweep there and back: 0 where one comes half a sweep after the other, [`AT_ONCE`] where both come at one place, or nothing is
-/// known. `ahead` is how far ahead each head sits, as a share of that advance.
+/// Largest unevenness of neighbours at the end that their sectors share.
+///
+/// It is a share of the advance in a sweep there and back. 0 if one comes half a sweep after the other; [`AT_ONCE`]
+/// if both come at the same place or the timing is unknown. `ahead` is the position of each head along the hull, as a
+/// share of that advance.
 pub(super) fn uneven(legs: &[Option<Leg>; MAX_HEADS], ahead: &[f64; MAX_HEADS]) -> f64 {
     let known = || legs.iter().zip(ahead).filter_map(|(leg, ahead)| Some(((*leg)?, *ahead)));
     let mut most: Option<f64> = None;
@@ -68,9 +72,10 @@ mod tests {
     use headrace_geometry::frames::{Mount, Rot, Vec3};
     use headrace_geometry::time::DurNs;
 
-    /// Two heads ahead, two behind that face aft, started for a speed: by their programs, and by the speed at which they go.
+    /// Two heads ahead and two aft-facing ones behind, started for a speed: by their programs, and by the speed they
+    /// move at.
     #[test]
-    fn heads_that_are_started_for_a_speed_come_evenly_at_it_and_at_no_other() {
+    fn sector_heads_are_even_only_at_the_planned_speed() {
         const SWEEP_S: f64 = 4.0;
         let mount = |x_m: f64, y_m: f64| Mount {
             position: Vec3::new(x_m, y_m, 0.0),
@@ -86,7 +91,7 @@ mod tests {
         for speed_mps in [0.05, 0.11, 0.2] {
             let schedule = Schedule::new(&specs, HeadLayout::SectorOffset, speed_mps).unwrap();
             let programs = layout::programs(&specs, HeadLayout::SectorOffset, speed_mps).unwrap();
-            // At some moments of a sweep there and back, the turning points' neighbourhood included.
+            // Several moments of a sweep there and back, including those near the turning points.
             for moment in 0..50 {
                 let at_s = 7.0 + 0.083 * f64::from(moment);
                 let legs = legs_at(&schedule, &specs, &programs, at_s);
@@ -97,7 +102,7 @@ mod tests {
                     }
                     uneven(&legs, &ahead)
                 };
-                // A step of a head is a two hundredth of the sweep.
+                // One step of a head is 1/200 of the sweep.
                 assert!(at(speed_mps) < 0.011, "{speed_mps} m/s, {at_s} s: {}", at(speed_mps));
                 // The rear heads come to a place 1.1 m / v after those in front.
                 let later_s = 2.0 * x_m / speed_mps - 2.0 * x_m / (1.1 * speed_mps);
@@ -118,7 +123,7 @@ mod tests {
         for (head, ((slot, spec), program)) in legs.iter_mut().zip(specs).zip(programs).enumerate() {
             let (from_rad, size_rad) = program.sector.unwrap();
             let angle_rad = |at_s: f64| schedule.angle_rad(head, DurNs::from_secs_f64(at_s)).unwrap();
-            // As heads are heard: at the last ping, and by the step to it.
+            // Angles as received: at the last ping, and with the step to it.
             let pings = (at_s / spec.ping_period_s).floor() * spec.ping_period_s + 1e-6;
             let step_rad = math::wrap_signed(angle_rad(pings) - angle_rad(pings - spec.ping_period_s), TAU);
             let motion = HeadMotion {

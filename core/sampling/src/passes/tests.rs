@@ -41,24 +41,24 @@ fn evenly_phased_heads_share_the_turn() {
     assert!(errors[..4].iter().all(|error| error.unwrap().abs() < 1e-9) && errors[4].is_none());
     let planned = Passes::evenly_phased(HeadSet::first(4), |_| 8.0).unwrap();
     assert!((all(&planned) - 2.0).abs() < 1e-12);
-    // Side by side, they see a place at angles that differ by up to 9 degrees: a fortieth of a turn.
+    // Side by side, they see a place at angles that differ by up to 9 degrees, a fortieth of a turn.
     assert!((all(&planned.beside(TAU / 40.0)) - 2.2).abs() < 1e-12);
     assert!((planned.beside(TAU / 40.0).gap_s(HeadSet::first(1)).unwrap() - 8.0).abs() < 1e-12);
 }
 
 #[test]
-fn where_heads_do_not_see_a_place_the_others_leave_longer_gaps() {
+fn place_hidden_from_some_heads_has_longer_gaps() {
     let passes = Passes::evenly_phased(HeadSet::first(4), |_| 8.0).unwrap();
     let gap_s =
         |hidden: [usize; 2]| passes.gap_s(passes.heads().without(hidden[0]).without(hidden[1])).unwrap();
-    // Half a turn apart: doubled. A quarter apart: two passes in a row are missing.
+    // Half a turn apart, the gap doubles. A quarter apart, two successive passes are missing.
     assert!((gap_s([0, 2]) - 4.0).abs() < 1e-12 && (gap_s([0, 1]) - 6.0).abs() < 1e-12);
     assert_eq!(passes.gap_s(HeadSet::default()), None);
     assert_eq!(passes.gap_s(HeadSet::default().with(6)), None);
 }
 
 #[test]
-fn several_passes_take_as_long_as_the_turn_leaves_them() {
+fn several_passes_share_the_rest_of_the_turn() {
     let even = Passes::evenly_phased(HeadSet::first(4), |_| 8.0).unwrap();
     let time_s = |heads: HeadSet, needed: f64| even.time_for_s(heads, even.gap_s(heads).unwrap(), needed);
     let all = even.heads();
@@ -81,21 +81,21 @@ fn heads_together_pass_together() {
     let together = passes(&[0.0, 0.0], &[0.0, 0.0]);
     assert!((all(&together) - 8.0).abs() < 1e-9 && (together.even_gap_s() - 4.0).abs() < 1e-12);
     assert!((together.phase_errors_rad(2)[1].unwrap().abs() - math::PI).abs() < 1e-9);
-    // Half a pitch apart along the hull, the same angles interleave: 0.2 m/s, 8 s a turn, 0.8 m.
+    // Half a pitch apart along the hull, equal angles interleave: at 0.2 m/s and 8 s per turn, 0.8 m.
     let apart = passes(&[0.0, 0.0], &[0.8, 0.0]);
     assert!((all(&apart) - 4.0).abs() < 1e-9);
 }
 
 #[test]
-fn turned_round_the_vehicle_s_heads_are_apart_the_other_way() {
+fn reversed_vehicle_reverses_the_order_of_heads() {
     let mut back = situation(&[0.0, 90.0], &[0.9, -0.3]);
     let out = Phasing::of(&back).at(0.2);
     let turned = Rot::from_roll_pitch_yaw(0.0, 0.0, math::PI);
     back.pose = Some(Pose { position: headrace_geometry::frames::Point3::zero(), attitude: turned });
-    // Returning nose first mirrors going out nose first; tail first doesn't.
+    // A return nose first mirrors the way out nose first; a return tail first does not.
     assert!((all(&Phasing::of(&back).at(-0.2)) - all(&out)).abs() < 1e-9);
     assert!((all(&Phasing::of(&back).at(0.2)) - all(&out)).abs() > 0.1);
-    // Askew, heads are farther apart along the tunnel; with their planes along it, there is no phase.
+    // At a yaw, heads are farther apart along the tunnel. If their planes lie along it, there is no phase.
     let askew = |yaw: f64| Rot::from_roll_pitch_yaw(0.0, 0.0, yaw);
     let mount = Mount { position: Vec3::new(1.0, 0.0, 0.0), rotation: Rot::identity() };
     assert!((ahead_m(&askew(0.5), &mount).unwrap() - 1.0 / math::cos(0.5)).abs() < 1e-12);
@@ -103,11 +103,11 @@ fn turned_round_the_vehicle_s_heads_are_apart_the_other_way() {
 }
 
 #[test]
-fn a_head_that_is_late_has_a_positive_error() {
-    // The second of two belongs half a turn ahead; it is 30 degrees short of that.
+fn late_head_has_a_positive_phase_error() {
+    // The second of two heads should be half a turn ahead, but is 30 degrees short of that.
     let passes = passes(&[0.0, 150.0], &[0.0, 0.0]);
     assert!((passes.phase_errors_rad(2)[1].unwrap() - f64::to_radians(30.0)).abs() < 1e-9);
-    // Ten per cent faster than scheduled, a head 1.6 m (a turn's advance) astern is early by a tenth / 1.1 of a turn.
+    // At 10 % above the planned speed, a head 1.6 m astern (one turn's advance) is early by 0.1 / 1.1 of a turn.
     let at = |speed| Phasing::of(&situation(&[0.0, 180.0], &[1.6, 0.0])).at(speed).phase_errors_rad(2)[1];
     assert!(at(0.2).unwrap().abs() < 1e-9);
     assert!((at(0.22).unwrap() - TAU * (1.0 - 1.0 / 1.1)).abs() < 1e-9, "{:?}", at(0.22));
@@ -115,7 +115,7 @@ fn a_head_that_is_late_has_a_positive_error() {
 }
 
 #[test]
-fn heads_that_all_turn_the_other_way_are_phased_alike_and_opposed_ones_are_not() {
+fn reversed_heads_are_phased_alike_and_opposed_heads_are_not() {
     let mut mirrored = situation(&[0.0, 180.0], &[0.0, 0.0]);
     for head in mirrored.heads.iter_mut().flatten() {
         head.rate_radps = -head.rate_radps;
@@ -129,7 +129,7 @@ fn heads_that_all_turn_the_other_way_are_phased_alike_and_opposed_ones_are_not()
 }
 
 #[test]
-fn heads_out_of_step_leave_the_faster_one_to_count_on() {
+fn heads_out_of_step_count_as_the_fastest_one() {
     let mut mixed = situation(&[0.0, 180.0], &[0.0, 0.0]);
     if let Some(second) = mixed.heads.iter_mut().flatten().nth(1) {
         second.rate_radps = TAU / 21.6;
@@ -140,13 +140,13 @@ fn heads_out_of_step_leave_the_faster_one_to_count_on() {
 }
 
 #[test]
-fn a_turning_point_makes_no_sector_of_a_layout_that_turns_on() {
+fn turning_point_does_not_make_a_phase_shift_layout_a_sector() {
     let mut jerked = situation(&[0.0, 180.0], &[0.0, 0.0]);
     for head in jerked.heads.iter_mut().flatten() {
         head.sector_rad = Some(f64::to_radians(0.9));
     }
     assert!((all(&Phasing::of(&jerked).at(0.2)) - 4.0).abs() < 1e-9);
-    // In sectors, a sector that isn't measured yet is half a turn for two heads, there and back.
+    // In sectors, an unmeasured sector is half a turn for two heads, there and back.
     let mut sectors = situation(&[0.0, 180.0], &[0.0, 0.0]);
     sectors.layout = HeadLayout::SectorOffset;
     assert!((all(&Phasing::of(&sectors).at(0.2)) - 8.0).abs() < 1e-9);
@@ -154,7 +154,7 @@ fn a_turning_point_makes_no_sector_of_a_layout_that_turns_on() {
 }
 
 #[test]
-fn heads_that_are_left_share_the_turn_evenly() {
+fn remaining_heads_share_the_turn_evenly() {
     let three = Passes::evenly_phased(HeadSet::first(4).without(1), |_| 9.0).unwrap();
     assert!((all(&three) - 3.0).abs() < 1e-12);
     let none = HeadSet::default();
@@ -164,18 +164,18 @@ fn heads_that_are_left_share_the_turn_evenly() {
 }
 
 #[test]
-fn parallax_grows_as_the_wall_comes_near() {
+fn parallax_grows_towards_the_wall() {
     let wide = headrace_geometry::tunnel::shapes::circle(6.0).unwrap();
     let narrow = headrace_geometry::tunnel::shapes::circle(1.0).unwrap();
     let of = |profile: &Profile, z: f64| parallax_rad(profile, &[[0.15, z], [-0.15, z]]);
-    // Seen from 6 m, the heads are 0.3 m apart.
+    // At 6 m range, the heads are 0.3 m apart.
     assert!((of(&wide, 6.0) - 0.05).abs() < 1e-3 && of(&narrow, 1.0) > 0.29);
     assert!(parallax_rad(&wide, &[[0.1, 6.0]]) <= 0.0 && parallax_rad(&wide, &[]) <= 0.0);
 }
 
-/// Wherever along the hull the vehicle's origin is.
+/// The result does not depend on the position of the vehicle's origin along the hull.
 #[test]
-fn who_follow_one_another_are_apart_by_a_share_of_the_hull() {
+fn successive_heads_are_apart_by_a_share_of_the_hull() {
     for origin_m in [-3.0, 0.0, 0.4, 5.0] {
         let at = |x_m: &[f64]| {
             let x_m: Vec<f64> = x_m.iter().map(|x_m| x_m + origin_m).collect();
@@ -187,7 +187,7 @@ fn who_follow_one_another_are_apart_by_a_share_of_the_hull() {
             (vec![0.9, -0.3], 1.2, 1.0),
             (vec![0.9, 0.9, -0.3, -0.3], 1.2, 0.5),
             (vec![0.9, -0.3, 0.9, -0.3], 1.2, 1.0),
-            // From the last to the first over all of it, and twice over half.
+            // The last head is followed by the first over the full distance, and two steps cover half each.
             (vec![0.0, 0.4, 0.8], 0.8, 2.0 / 3.0),
             (vec![0.7, 0.7], 0.0, 0.0),
             (vec![0.7], 0.0, 0.0),
@@ -199,7 +199,7 @@ fn who_follow_one_another_are_apart_by_a_share_of_the_hull() {
             assert_eq!(heads.fits_some_speeds(), apart_m > 0.0, "{x_m:?}");
         }
     }
-    // Out of step, nobody follows anyone.
+    // Heads out of step have no order.
     let mut loose = situation(&[0.0, 180.0], &[0.9, -0.3]);
     loose.heads[1].as_mut().unwrap().rate_radps = -TAU / 8.0;
     let heads = Phasing::of(&loose);
@@ -208,15 +208,15 @@ fn who_follow_one_another_are_apart_by_a_share_of_the_hull() {
     );
 }
 
-/// Heads apart along the hull that are scheduled for a speed share the turn at that speed, wherever they stand now, and not at another.
+/// Heads apart along the hull share the turn at the scheduled speed from any present position, and at no other speed.
 #[test]
-fn heads_as_scheduled_share_the_turn_at_the_planned_speed() {
+fn scheduled_heads_share_the_turn_at_the_planned_speed() {
     for x_m in [[0.8, 0.0, -0.5], [0.0, 1.3, 0.2]] {
         let phasing = Phasing::of(&situation(&[3.0, 200.0, 77.0], &x_m)).as_scheduled(3, 0.1);
         let gap_s = |mps: f64| all(&phasing.at(mps));
         assert!((gap_s(0.1) - 8.0 / 3.0).abs() < 1e-9, "{x_m:?}: {}", gap_s(0.1));
         assert!(gap_s(0.13) > 3.0, "{x_m:?}: {}", gap_s(0.13));
-        // A schedule for no speed is for heads at one place of the hull.
+        // A schedule for speed zero is for heads at one place of the hull.
         let at_rest = Phasing::of(&situation(&[3.0, 200.0, 77.0], &[0.0; 3])).as_scheduled(3, 0.0);
         assert!((all(&at_rest.at(0.1)) - 8.0 / 3.0).abs() < 1e-9);
     }

@@ -8,8 +8,10 @@ use crate::margin::Margins;
 use crate::section;
 use crate::spacing::Spiral;
 
-/// A planning question. A target asks for the speed; a speed or a time asks for the target that it allows; both
-/// together ask whether they are compatible.
+/// A planning question.
+///
+/// A target asks for the speed. A speed or a time asks for the target that it allows. Both together ask whether they
+/// are compatible.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Question {
     /// Target T, m.
@@ -51,19 +53,19 @@ pub struct Answer {
     pub margins: Option<Margins>,
     /// Hours at that speed for the whole length.
     pub needed_h: Option<f64>,
-    /// Why no speed meets the target: `angular_step`, `unseen_strip` or `off_axis`.
+    /// Reason why no speed meets the target: `angular_step`, `unseen_strip` or `off_axis`.
     pub reason: Option<&'static str>,
     /// The same as a message.
     pub refused: Option<String>,
-    /// Speed of the figures below: the one asked about, or else `v_max_mps`, m/s.
+    /// Speed of the figures below, m/s: the one in the question, or else `v_max_mps`.
     pub speed_mps: Option<f64>,
     /// Spacing at that speed.
     pub spacing: Option<Spacing>,
-    /// Part of the target left to errors of position at that speed, m; zero where nothing is known of them.
+    /// Part of the target reserved for position errors at that speed, m; zero if they are unknown.
     pub position_margin_m: f64,
-    /// Whether the target is met at the speed asked about, errors of position included.
+    /// Whether the target is met at the speed in the question, position errors included.
     pub meets_target: Option<bool>,
-    /// Whether the time asked about suffices at `v_max_mps`.
+    /// Whether the time in the question is enough at `v_max_mps`.
     pub suffices: Option<bool>,
     /// Whether it is the best of the modes.
     pub best: bool,
@@ -90,16 +92,16 @@ pub struct Spacing {
     pub t_min_m: f64,
     /// T_mean. Eq. 17.
     pub t_mean_m: f64,
-    /// T_max at any tolerated pose, including hidden strips. Eq. 16. `None` where a strip is seen by no head.
+    /// T_max at any tolerated pose, including hidden strips. Eq. 16. `None` if no head sees a strip.
     pub t_max_m: Option<f64>,
-    /// The smallest feature that is sure to be hit once.
+    /// Size of the smallest feature that is certain to be hit once.
     pub hit_once_m: Option<f64>,
-    /// The smallest feature that is sure to be hit twice: the sampling theorem's size.
+    /// Size of the smallest feature that is certain to be hit twice, as in the sampling theorem.
     pub hit_twice_m: Option<f64>,
 }
 
 impl Planner {
-    /// The answers for all modes, or for the one named.
+    /// Returns the answers for all modes, or for the mode `only`.
     ///
     /// Errors: no target, speed or time; one that isn't above zero. A target that a mode can't meet is an answer, not
     /// an error.
@@ -208,7 +210,7 @@ struct Asked {
     needed_mps: Option<f64>,
 }
 
-/// Marks the best mode: the fastest for the target, or the finest at the speed asked about.
+/// Marks the best mode: the fastest for the target, or the finest at the speed in the question.
 fn mark_best(answers: &mut [Answer], asked: &Asked) {
     let t_max = |answer: &Answer| answer.spacing.and_then(|spacing| spacing.t_max_m);
     let best = if asked.asked_mps.is_some() {

@@ -1,4 +1,4 @@
-//! Briefing of the crew beyond the figures of a mode: hidden angles, starts of the heads, and interference.
+//! Briefing of the crew: hidden angles, starts of the heads, and interference.
 
 use serde::Serialize;
 
@@ -23,7 +23,7 @@ pub struct Briefing {
     pub strips: Vec<ThinStrip>,
     /// Start of each head.
     pub starts: Vec<Start>,
-    /// For heads apart along the hull, the spacing rule for starts at equal angles.
+    /// Spacing rule for heads apart along the hull that start at equal angles.
     pub hull_rules: Vec<HullAdvice>,
     /// Pairs of heads that can hear each other.
     pub exposures: Vec<Heard>,
@@ -40,7 +40,7 @@ pub struct Hidden {
     pub size_deg: f64,
     /// Length of wall that it hides, m.
     pub wall_m: f64,
-    /// Clock position of the middle of that, seen looking along the tunnel.
+    /// Clock position of the middle of that wall, looking along the tunnel.
     pub clock: String,
 }
 
@@ -55,7 +55,7 @@ pub struct ThinStrip {
     pub clock: String,
     /// The heads that see it.
     pub seen_by: Vec<usize>,
-    /// Ratio of T_x there to the smallest T_x of any strip; `None` where no head sees it.
+    /// Ratio of T_x there to the smallest T_x of any strip; `None` if no head sees it.
     pub t_x_factor: Option<f64>,
 }
 
@@ -79,7 +79,7 @@ pub struct HullAdvice {
     pub head: usize,
     /// Distance behind the foremost head, m.
     pub behind_m: f64,
-    /// s-ths of a turn in which the vehicle travels that far, to the nearest.
+    /// Number of s-ths of a turn in which the vehicle travels that far, to the nearest.
     pub q: u32,
     /// The speed that fits the rule, m/s.
     pub speed_mps: f64,
@@ -87,7 +87,7 @@ pub struct HullAdvice {
     pub apart_m: f64,
 }
 
-/// How long two heads can hear each other.
+/// Time in which two heads can hear each other.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Heard {
     /// The two heads.

@@ -1,4 +1,4 @@
-//! What another mount of the heads would gain.
+//! Gain in speed from another mount of the heads.
 
 use serde::Serialize;
 
@@ -8,24 +8,26 @@ use headrace_geometry::frames::Vec3;
 
 /// Gap left between two heads along the hull, m: for connectors and cables.
 const GAP_M: f64 = 0.05;
-/// A mount nearer than this to the present one is the same, m.
+/// Distance below which two mounts count as the same, m.
 const SAME_M: f64 = 0.01;
 
-/// Heads one behind the other, on the line along the hull through their middle: none hides the wall from another.
+/// Heads in line along the hull through their common middle, so that none hides the wall from another.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct InLine {
-    /// Where each head would be, in the body frame, m, in the order of the heads.
+    /// Position of each head in the body frame, m, in the order of the heads.
     pub positions_m: Vec<[f64; 3]>,
     /// Fastest mode there.
     pub mode: &'static str,
-    /// The largest speed at which sections pass there, m/s.
+    /// Largest speed at which sections pass there, m/s.
     pub v_max_mps: f64,
-    /// The same as the heads are mounted, in their fastest mode, m/s; `None` where none meets the target.
+    /// The same for the present mounts, in their fastest mode, m/s; `None` if none meets the target.
     pub present_mps: Option<f64>,
 }
 
 impl Planner {
-    /// The best speed with the heads in line; `None` where they are, or where no mode meets the target then.
+    /// Returns the best speed with the heads in line.
+    ///
+    /// `None` if they already are, or if no mode meets the target then.
     ///
     /// Errors: as for [`Planner::new`].
     pub fn in_line(&self, target_m: f64) -> Result<Option<InLine>, SamplingError> {
@@ -50,7 +52,7 @@ impl Planner {
     }
 }
 
-/// The same with the heads in line, in their order along the hull; `None` where they are.
+/// The inspection with the heads in line, in their order along the hull; `None` if they already are.
 fn in_line(inspection: &Inspection) -> Option<Inspection> {
     let mut moved = inspection.clone();
     let count = moved.heads.len() as f64;
@@ -73,7 +75,7 @@ fn in_line(inspection: &Inspection) -> Option<Inspection> {
         spec.mount.position = Vec3::new(at_m, y_m, z_m);
         last = Some((at_m, long_m));
     }
-    // Spread to both sides alike.
+    // Centred, so that both sides extend equally.
     let shift_m = x_m - moved.heads.iter().map(|(spec, _)| spec.mount.position.x()).sum::<f64>() / count;
     let mut farthest_m: f64 = 0.0;
     for ((spec, _), (before, _)) in moved.heads.iter_mut().zip(&inspection.heads) {

@@ -1,4 +1,4 @@
-//! What live will advise: the largest speed for heads that were started for another one.
+//! Prediction of the live advice: the largest speed for heads that were started for another one.
 
 use super::Planner;
 use crate::advice::{Advisor, Looks, Task};
@@ -10,8 +10,10 @@ use crate::passes::Situation;
 use crate::swing::Swing;
 
 impl Planner {
-    /// The largest speed in a mode for heads that were started for `planned_mps`, m/s, steady and on the axis: the advice under way, with the
-    /// same margins. Zero where no speed meets the target.
+    /// Returns the largest speed in a mode for heads started for `planned_mps`, m/s.
+    ///
+    /// Zero if no speed meets the target. It equals the live advice, margins included, for a steady vehicle on the
+    /// axis.
     ///
     /// Errors: no such mode; a target or a speed that isn't above zero; heads that the layout doesn't allow.
     pub fn as_started_mps(&self, mode: usize, target_m: f64, planned_mps: f64) -> Result<f64, SamplingError> {
@@ -58,7 +60,7 @@ impl Planner {
             lost_at_most: LossRate::default(),
         };
         let mut advisor = Advisor::new(&inspection.profile, task, &heads, &inspection.hull);
-        // Of several outdated rings each call casts one.
+        // Each call recasts one of several outdated rings.
         let calls = 0..specs.len().max(1);
         let advised = calls.map(|_| advisor.advise(&situation, Swing::default(), None).v_max_mps);
         Ok(advised.last().unwrap_or(0.0))

@@ -60,7 +60,7 @@ fn speed(target_m: f64) -> Question {
 }
 
 #[test]
-fn v_max_put_back_into_the_forward_equations_is_the_target() {
+fn v_max_gives_the_target_in_the_forward_equations() {
     let drifting = Inspection { drift_m: 1.0, yaw_rad: 0.2, ..vita_2(HeadLayout::PhaseShift) };
     let sectors = vita_2(HeadLayout::SectorOffset);
     for inspection in [ideal(1), ideal(2), ideal(4), vita_2(HeadLayout::PhaseShift), drifting, sectors] {
@@ -79,9 +79,10 @@ fn v_max_put_back_into_the_forward_equations_is_the_target() {
     }
 }
 
-/// The reference table: T_max of Eq. 16, here for the worst start of a head's pings, which is at most a little more.
+/// The reference table: T_max of Eq. 16, here for the worst start angle of the pings, which gives at most a little
+/// more.
 #[test]
-fn val_ideal_heads_give_the_reference_table() {
+fn ideal_heads_give_the_reference_table() {
     let expected = [
         [4.259, 2.132, 1.069],
         [2.134, 1.074, 0.548],
@@ -103,7 +104,7 @@ fn val_ideal_heads_give_the_reference_table() {
 }
 
 #[test]
-fn side_walls_that_neighbours_hide_get_half_of_the_passes() {
+fn occluded_side_walls_get_half_of_the_passes() {
     let planner = Planner::new(vita_2(HeadLayout::PhaseShift)).unwrap();
     let fast = 2;
     let (gap_s, hidden_s) = planner.gaps_s(fast).unwrap();
@@ -114,31 +115,31 @@ fn side_walls_that_neighbours_hide_get_half_of_the_passes() {
     for strip in hidden {
         assert!(strip.seen_by.len() == 2 && (strip.arc.length_m - 1.7).abs() < 0.1, "{strip:?}");
     }
-    // Steps are short on the side walls; the corners, seen by all, give less.
+    // Steps are short on the side walls, so the corners, which all heads see, limit the speed.
     let t_m = planner.t_max_m(fast, 0.1).unwrap();
     assert!((0.41..0.43).contains(&t_m), "{t_m}");
 }
 
 #[test]
-fn in_sectors_heads_look_outwards_and_leave_their_distance_at_floor_and_crown() {
+fn sector_heads_look_outwards_and_leave_floor_and_crown_unseen() {
     let planner = Planner::new(vita_2(HeadLayout::SectorOffset)).unwrap();
     assert!(planner.hidden().iter().all(|ranges| ranges.len() == 1));
     let strips = planner.nominal_strips().unwrap().as_slice();
     let unseen: Vec<_> = strips.iter().filter(|strip| strip.seen_by.is_empty()).collect();
-    // The sectors are free of occlusion; but heads 0.3 m apart see neither floor nor crown between them.
+    // The sectors are free of occlusion, but heads 0.3 m apart leave floor and crown between them unseen.
     assert_eq!(unseen.len(), 2, "{strips:?}");
     assert!(unseen.iter().all(|strip| (strip.arc.length_m - 0.3).abs() < 0.01));
     let answers = planner.answers(&speed(0.4), None).unwrap();
     let fastest = &answers[4];
     assert_eq!((fastest.reason, fastest.v_max_mps), (Some("angular_step"), None));
-    assert!(fastest.refused.as_ref().unwrap().contains("met at no speed"));
+    assert!(fastest.refused.as_ref().unwrap().contains("no speed meets a target"));
     let slow = planner.answers(&speed(0.25), None).unwrap();
     assert_eq!(slow[0].reason, Some("unseen_strip"), "{:?}", slow[0].refused);
     assert!(slow[0].refused.as_ref().unwrap().contains("no head sees 0.30 m of the wall"));
 }
 
 #[test]
-fn a_target_asks_for_speed_and_a_time_for_the_target() {
+fn question_with_target_gives_speed_and_with_time_gives_target() {
     let planner = Planner::new(ideal(2)).unwrap();
     let answers = planner.answers(&speed(1.0), None).unwrap();
     let best: Vec<_> = answers.iter().filter(|answer| answer.best).map(|answer| answer.mode).collect();
@@ -165,7 +166,7 @@ fn a_target_asks_for_speed_and_a_time_for_the_target() {
 }
 
 #[test]
-fn what_cannot_be_planned_is_named() {
+fn impossible_plan_names_the_cause() {
     let why = |inspection| Planner::new(inspection).unwrap_err();
     assert_eq!(why(ideal(0)), SamplingError::HeadCount { heads: 0 });
     let one = Inspection { layout: HeadLayout::SectorOffset, ..ideal(1) };
@@ -187,12 +188,14 @@ fn what_cannot_be_planned_is_named() {
     for bad in [0.0, -1.0, f64::NAN] {
         assert!(planner.answers(&speed(bad), None).is_err() && planner.t_max_m(0, bad).is_err());
     }
-    // A target that a mode can't meet is an answer, not an error.
+    // A target that a mode cannot meet is an answer, not an error.
     let answers = planner.answers(&speed(0.1), None).unwrap();
     assert!(answers[0].v_max_mps.is_some() && answers[4].reason == Some("angular_step"));
 }
 
-/// One head alone in the middle loses nothing to margins, four of a vehicle something to each of the first.
+/// One head in the centre loses nothing to margins.
+///
+/// Four heads of a vehicle lose something to each of the first ones.
 #[test]
 fn margins_go_from_the_geometry_alone_to_the_largest_speed() {
     for (inspection, loses) in [(ideal(1), false), (vita_2(HeadLayout::PhaseShift), true)] {
@@ -209,12 +212,12 @@ fn margins_go_from_the_geometry_alone_to_the_largest_speed() {
     }
 }
 
-/// What every head reaches is what the shortest range reaches; a mode's pings are those of a turn.
+/// The reach of all heads is the shortest of their ranges; the pings of a mode are those of a turn.
 #[test]
-fn a_plan_knows_its_reach_and_the_time_between_pings() {
+fn plan_states_its_reach_and_ping_period() {
     let mut shorter = ideal(2);
     shorter.heads[1].0.range_m[1] = 8.0;
-    // In water that is faster by a tenth, the same times are ranges longer by a tenth.
+    // With a speed of sound 10 % higher, the same times give ranges 10 % longer.
     shorter.sound_speed_mps = 1650.0;
     let planner = Planner::new(shorter).unwrap();
     assert!((planner.reach_m() - 8.8).abs() < 1e-9, "{}", planner.reach_m());
@@ -225,7 +228,7 @@ fn a_plan_knows_its_reach_and_the_time_between_pings() {
 }
 
 #[test]
-fn drift_and_yaw_only_make_it_worse() {
+fn drift_and_yaw_never_improve_the_plan() {
     let still = Planner::new(ideal(2)).unwrap();
     let drifting =
         Planner::new(Inspection { drift_m: 1.5, yaw_rad: f64::to_radians(15.0), ..ideal(2) }).unwrap();
@@ -240,7 +243,7 @@ fn drift_and_yaw_only_make_it_worse() {
 }
 
 #[test]
-fn the_perimeter_shows_the_corners_the_hidden_strips_and_the_sectors() {
+fn perimeter_shows_corners_hidden_strips_and_sectors() {
     let planner = Planner::new(vita_2(HeadLayout::PhaseShift)).unwrap();
     let places = planner.perimeter(2, 0.1, 720).unwrap();
     let most = places.iter().map(|place| place.t_y_m).fold(0.0, f64::max);
@@ -259,7 +262,7 @@ fn the_perimeter_shows_the_corners_the_hidden_strips_and_the_sectors() {
 }
 
 #[test]
-fn the_pattern_is_what_the_heads_lay() {
+fn pattern_equals_the_samples_of_the_heads() {
     let planner = Planner::new(vita_2(HeadLayout::PhaseShift)).unwrap();
     let samples = planner.pattern(2, 0.1, 2.0).unwrap();
     assert_eq!(samples.len(), 4 * 801);
@@ -268,25 +271,25 @@ fn the_pattern_is_what_the_heads_lay() {
     assert!((hidden - 15.33 / 360.0).abs() < 2e-3, "{hidden}");
     let sectors = inspection(vec![head([0.0; 3], false, 0.0); 2], HeadLayout::SectorOffset);
     let samples = Planner::new(sectors).unwrap().pattern(2, 0.1, 2.0).unwrap();
-    // Two turns are four sweeps of half a turn: three turning points within.
+    // Two turns are four sweeps of half a turn, with three turning points in between.
     assert_eq!(samples.iter().filter(|sample| sample.new_sweep).count(), 2 * 4);
 }
 
 #[test]
-fn heads_side_by_side_gain_by_standing_in_line_and_those_in_line_nothing() {
+fn only_side_by_side_heads_gain_from_mounts_in_line() {
     let planner = Planner::new(vita_2(HeadLayout::PhaseShift)).unwrap();
     let gain = planner.in_line(0.5).unwrap().unwrap();
     assert!(gain.v_max_mps > 1.3 * gain.present_mps.unwrap(), "{gain:?}");
     let [places, sides]: [Vec<f64>; 2] =
         [0, 1].map(|k| gain.positions_m.iter().map(|place| place[k]).collect());
     assert_eq!(sides, [0.0; 4]);
-    // As far ahead as astern, and no two within one another.
+    // They extend equally ahead and astern, and no two overlap.
     assert!(places.iter().sum::<f64>().abs() < 1e-12, "{places:?}");
     let mut sorted = places.clone();
     sorted.sort_by(f64::total_cmp);
     assert!(sorted.windows(2).all(|pair| pair[1] - pair[0] > 0.05), "{sorted:?}");
-    assert!(places[0] > 0.0 && places[2] < 0.0, "heads in front stay in front: {places:?}");
-    // What is said of the other mount is what a plan of it says.
+    assert!(places[0] > 0.0 && places[2] < 0.0, "heads in front must remain in front: {places:?}");
+    // A plan with the other mount gives the same speed as this prediction.
     let mut there = vita_2(HeadLayout::PhaseShift);
     for ((spec, _), place) in there.heads.iter_mut().zip(&gain.positions_m) {
         spec.mount.position = Vec3::new(place[0], place[1], place[2]);
@@ -298,10 +301,11 @@ fn heads_side_by_side_gain_by_standing_in_line_and_those_in_line_nothing() {
     assert_eq!(Planner::new(ideal(1)).unwrap().in_line(0.5).unwrap(), None);
 }
 
-/// Heads apart along the hull are in phase about the speed that they were started for: what live will say of a file isn't what a plan says that
-/// may start them anew.
+/// Heads apart along the hull are in phase only near the speed they were started for.
+///
+/// The live advice therefore differs from a plan that may restart them.
 #[test]
-fn heads_started_for_another_speed_allow_less() {
+fn heads_started_for_another_speed_lower_the_speed() {
     let target_m = 0.6;
     let mode = 2;
     let apart = Planner::new(vita_2(HeadLayout::PhaseShift)).unwrap();
@@ -312,7 +316,7 @@ fn heads_started_for_another_speed_allow_less() {
     let held = started(&apart, HELD_SHARE);
     assert!(held > HELD_SHARE && held <= 1.0, "{held}");
     assert!(started(&apart, 0.7) < 0.9, "{}", started(&apart, 0.7));
-    // Without heads apart it makes no difference but the share that is kept back for measuring the speed.
+    // Without heads apart, only the speed margin makes a difference.
     let alone = Planner::new(ideal(1)).unwrap();
     let [slow, fast] = [0.3, 0.9].map(|share| started(&alone, share));
     assert!((slow - fast).abs() < 1e-3);
@@ -322,17 +326,18 @@ fn heads_started_for_another_speed_allow_less() {
     );
 }
 
-/// The target of an error is the one that was asked for, not what errors of position leave of it.
+/// The error names the configured target, not the target less position errors.
 #[test]
-fn a_target_that_no_speed_meets_is_told_as_it_was_asked_for() {
+fn error_names_the_configured_target() {
     let swinging = Inspection { yaw_rate_radps: 10.0, ..vita_2(HeadLayout::PhaseShift) };
     let why = Planner::new(swinging).unwrap().v_max_mps(2, 0.6).unwrap_err();
     assert!(why.to_string().contains("a target of 0.6 m"), "{why}");
 }
 
-/// From one place all heads see the same neighbours as one does; from different places the least and the most are those of any of them.
+/// Heads at one position see the same neighbours as one head. At different positions, minimum and maximum are over
+/// all of them.
 #[test]
-fn distances_of_neighbours_are_those_of_all_heads() {
+fn neighbour_distances_cover_all_heads() {
     let chords_m = |inspection: Inspection| {
         let planner = Planner::new(inspection).unwrap();
         planner.modes().iter().map(|mode| mode.chords_m).collect::<Vec<_>>()
@@ -353,9 +358,9 @@ fn distances_of_neighbours_are_those_of_all_heads() {
     }
 }
 
-/// At 0.2 rad/s beams go 2.4 m along wall 6 m away between two passes, but no farther than from one tolerated yaw to the other.
+/// At 0.2 rad/s beams move 2.4 m along a wall 6 m away between two passes, but only between the tolerated yaws.
 #[test]
-fn a_swing_ends_at_the_tolerated_yaw() {
+fn swing_is_limited_by_the_tolerated_yaw() {
     let v_mps = |yaw_deg: f64, rate_radps: f64| {
         let of = Inspection { yaw_rad: yaw_deg.to_radians(), yaw_rate_radps: rate_radps, ..ideal(4) };
         Planner::new(of).unwrap().v_max_mps(2, 1.2)

@@ -1,4 +1,4 @@
-//! Planned spacing and sample pattern on the wall, place by place.
+//! Planned spacing and sample pattern by place on the wall.
 
 use super::Planner;
 use crate::error::{SamplingError, positive};
@@ -16,7 +16,7 @@ pub struct WallPlace {
     pub arc_m: f64,
     /// Distance between neighbours of one turn on the wall, the largest of the heads that see it, m.
     pub t_y_m: f64,
-    /// Distance between passes, m, the smaller and the larger where two alternate; `None` where no head sees it.
+    /// Distance between passes, m, the smaller and the larger if two alternate; `None` if no head sees it.
     pub t_x_m: Option<[f64; 2]>,
     /// T from both, m.
     pub t_m: Option<f64>,
@@ -31,14 +31,14 @@ pub struct PatternSample {
     pub x_m: f64,
     /// Arc length, m.
     pub arc_m: f64,
-    /// Hidden by the vehicle.
+    /// Whether the vehicle hides it.
     pub hidden: bool,
-    /// First sample of a head, or the first after a turning point.
+    /// Whether it is the first sample of a head, or the first after a turning point.
     pub new_sweep: bool,
 }
 
 impl Planner {
-    /// Spacing around the perimeter in a mode at a speed, at `places` equidistant places.
+    /// Returns the spacing around the perimeter in a mode at a speed, at `places` equidistant places.
     ///
     /// Errors: a speed that isn't above zero; as for [`Standing::sounding`].
     pub fn perimeter(
@@ -75,7 +75,7 @@ impl Planner {
         Ok((0..places).map(place).collect())
     }
 
-    /// The samples of a number of turns in a mode at a speed, head by head, each in order of time.
+    /// Returns the samples of a number of turns in a mode at a speed, head by head, each in order of time.
     ///
     /// Errors: a speed or number of turns that isn't above zero; as for [`Standing::sounding`].
     pub fn pattern(
@@ -130,7 +130,7 @@ impl Around {
         self.perimeter_m * (place as f64 + 0.5) / self.t_y_m.len() as f64
     }
 
-    /// Records a head's step at each place that it passes over and sees.
+    /// Records a head's step at each place that it crosses and sees.
     fn add(
         &mut self,
         planner: &Planner,

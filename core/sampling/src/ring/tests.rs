@@ -23,9 +23,9 @@ fn standing(profile: &Profile) -> Standing<'_> {
     Standing::new(profile, &pose(profile, 0.0, 0.0, 0.0), &mount()).unwrap()
 }
 
-/// The reference table: T_max of Eq. 16 for `ceran` at 0.197 m/s, with the pings where they fall.
+/// The reference table: T_max of Eq. 16 for `ceran` at 0.197 m/s, with pings at their actual angles.
 #[test]
-fn val_t_max_of_the_reference_table() {
+fn t_max_equals_the_reference_table() {
     let profile = shapes::ceran().unwrap();
     let modes = [
         (0.3, 21.6, [4.259, 2.132, 1.069]),
@@ -37,7 +37,7 @@ fn val_t_max_of_the_reference_table() {
     for (step_deg, turn_s, expected) in modes {
         let turn = Turn::new(f64::to_radians(step_deg), turn_s).unwrap();
         for (heads, expected) in [1.0, 2.0, 4.0].into_iter().zip(expected) {
-            // A quarter turn is 37.5 steps of 2.4 degrees: every other head meets the corner half a step off.
+            // A quarter turn is 37.5 steps of 2.4 degrees, so every other head meets the corner half a step off.
             let t_y = (0..4)
                 .map(|head| TAU * (f64::from(head) / heads))
                 .map(|start| Ring::cast(&standing(&profile), start, turn.steps()).unwrap().largest_step_m(1))
@@ -48,9 +48,9 @@ fn val_t_max_of_the_reference_table() {
     }
 }
 
-/// The closed forms on a flat floor and on a circle, to 1e-12 of their values, 7 km into the tunnel.
+/// The closed forms hold on a flat floor and on a circle to 1e-12 of their values, 7 km into the tunnel.
 #[test]
-fn verif_ray_casting_agrees_with_the_closed_forms() {
+fn ray_casting_agrees_with_the_closed_forms() {
     let square = shapes::rectangle(4.0, 4.0).unwrap();
     let round = shapes::circle(6.05).unwrap();
     for steps in [150_u32, 300, 400, 600, 1200] {
@@ -76,7 +76,7 @@ fn verif_ray_casting_agrees_with_the_closed_forms() {
 }
 
 #[test]
-fn verif_the_footprint_on_a_flat_wall_and_ahead() {
+fn footprint_on_a_flat_wall_and_ahead() {
     let square = shapes::rectangle(40.0, 4.0).unwrap();
     let beam = f64::to_radians(2.4);
     for angle_deg in [0.0, 20.0, 60.0, 80.0] {
@@ -90,13 +90,13 @@ fn verif_the_footprint_on_a_flat_wall_and_ahead() {
 }
 
 #[test]
-fn yaw_makes_steps_longer_and_what_meets_no_wall_is_named() {
+fn yaw_lengthens_steps_and_beams_without_a_wall_are_errors() {
     let profile = shapes::ceran().unwrap();
     let turned = pose(&profile, 0.0, 0.0, f64::to_radians(15.0));
     let head = Standing::new(&profile, &turned, &mount()).unwrap();
     let ring = Ring::cast(&head, 0.0, 400).unwrap();
     assert!(ring.largest_step_m(1) > Ring::cast(&standing(&profile), 0.0, 400).unwrap().largest_step_m(1));
-    // Turned by 15 degrees, the beam to the left wall leads ahead or astern by tan(15 degrees) of its reach.
+    // At a yaw of 15 degrees, the beam to the left wall leads ahead or astern by tan(15 degrees) of its range.
     let left = head.sounding(math::FRAC_PI_2).unwrap();
     assert!((left.beam.x() / left.beam.y() + math::tan(f64::to_radians(15.0))).abs() < 1e-12);
 
@@ -113,7 +113,7 @@ fn yaw_makes_steps_longer_and_what_meets_no_wall_is_named() {
 }
 
 #[test]
-fn a_ring_read_at_a_stride_is_that_of_a_coarser_head_from_every_start() {
+fn strided_ring_equals_a_coarser_head_from_every_start() {
     let profile = shapes::ceran().unwrap();
     let fine = Ring::cast(&standing(&profile), 0.0, 1200).unwrap();
     let coarse = |start: u32| {
@@ -128,7 +128,7 @@ fn a_ring_read_at_a_stride_is_that_of_a_coarser_head_from_every_start() {
 }
 
 #[test]
-fn few_pings_a_turn_leave_most_of_the_wall_between_them() {
+fn few_pings_per_turn_leave_most_of_the_wall_between_them() {
     let profile = shapes::rectangle(20.0, 2.0).unwrap();
     let ring = Ring::cast(&standing(&profile), 0.0, 1200).unwrap();
     let perimeter_m = profile.perimeter_m();
@@ -149,7 +149,7 @@ fn few_pings_a_turn_leave_most_of_the_wall_between_them() {
 proptest! {
     /// Eq. 10: for any head position and profile, the mean chord of a turn is at most perimeter / pings.
     #[test]
-    fn verif_the_mean_step_is_bounded_by_the_perimeter(
+    fn mean_step_is_bounded_by_the_perimeter(
         radii in prop::collection::vec(0.5..6.0f64, 5..40),
         (along, around) in (0.0..0.95f64, 0.0..TAU),
         steps in 3_u32..800,
@@ -165,7 +165,7 @@ proptest! {
             })
             .collect();
         let profile = Profile::polygon(&points, Some([0.0, 0.0])).unwrap();
-        // A place between the reference point and the wall.
+        // A point between the reference point and the wall.
         let (sine, cosine) = math::sin_cos(around);
         let wall = profile.cast([0.0, 0.0], [cosine, sine]).unwrap().range_m;
         let pose = pose(&profile, along * wall * cosine, along * wall * sine, 0.0);

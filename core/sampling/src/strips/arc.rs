@@ -17,7 +17,7 @@ pub struct Arc {
 }
 
 impl Arc {
-    /// The part of the wall covered by a range of head angles.
+    /// Returns the part of the wall covered by a range of head angles.
     ///
     /// Errors: as for [`Standing::sounding`].
     pub fn of(standing: &Standing<'_>, angles: &AngleRange) -> Result<Self, SamplingError> {
@@ -31,7 +31,7 @@ impl Arc {
             math::wrap(arc_m(angles.middle_rad())? - first, perimeter_m),
             math::wrap(last - first, perimeter_m),
         );
-        // A head that faces aft sweeps the wall in the other direction.
+        // A head that faces aft sweeps the wall in the opposite direction.
         Ok(if middle <= whole {
             Self { from_m: first, length_m: whole }
         } else {
@@ -39,7 +39,7 @@ impl Arc {
         })
     }
 
-    /// From the start of this arc to the end of the next, in the head's direction of rotation.
+    /// Joins this arc and the next in the head's direction of rotation.
     pub(super) fn on_to(&self, next: &Self, forward: bool, perimeter_m: f64) -> Self {
         let (first, last) = if forward { (self, next) } else { (next, self) };
         let length_m = math::wrap(last.from_m + last.length_m - first.from_m, perimeter_m);
@@ -56,7 +56,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn an_arc_goes_on_to_the_end_of_the_next_also_over_the_seam() {
+    fn arc_joins_the_next_one_across_the_seam() {
         let arc = |from_m: f64, length_m: f64| Arc { from_m, length_m };
         let onward = |a: Arc, b: Arc, forward: bool| {
             let joined = a.on_to(&b, forward, 20.0);

@@ -1,4 +1,4 @@
-//! Where two figures of a strip limit the speed: the time between its passes, and its longest step.
+//! Limit of the speed from two figures of a strip: the time between its passes, and its longest step.
 
 use crate::spacing;
 use headrace_geometry::math;
@@ -25,7 +25,8 @@ pub struct Going {
 pub(super) struct Limit {
     pub(super) gap_s: f64,
     pub(super) t_y_m: f64,
-    /// Across a place that sectors leave out, of which `t_y_m` is the width: [`crate::passes::Passes::uneven_ends`]. `None` anywhere else.
+    /// Unevenness across a place that sectors leave out, whose width is `t_y_m`; `None` anywhere else. See
+    /// [`crate::passes::Passes::uneven_ends`].
     pub(super) uneven: Option<f64>,
 }
 
@@ -40,13 +41,15 @@ impl Limit {
         let advance_m = over_ground_mps * going.ping_period_s;
         let t_m = spacing::t_max_m(t_x_m, advance_m, self.t_y_m);
         let Some(uneven) = self.uneven else { return t_m };
-        // One row may be moved against the other.
+        // One row may be shifted against the other.
         t_m.min(staggered_m(t_x_m - going.shift_m + advance_m, self.t_y_m, uneven, going.shift_m))
     }
 
-    /// The largest speed that solves T = hypot((v + w) t + shift + u a / v, T_y), with t the sum of gap and ping
-    /// period, w the swing speed, u that between heads, and a their distance; or, if faster, the same with the swing's limit
-    /// between passes, or that of the circle between two rows of turning points.
+    /// Returns the largest speed that solves T = hypot((v + w) t + shift + u a / v, T_y).
+    ///
+    /// t is the sum of gap and ping period, w the swing speed, u that between heads, and a their distance. If it is
+    /// faster, the result is instead that with the swing's limit between passes, or that of the circle between two
+    /// rows of turning points.
     pub(super) fn speed_mps(&self, target_m: f64, going: &Going) -> Option<f64> {
         let along_m = spacing::along_m(target_m, self.t_y_m)?;
         let staggered_m =
@@ -71,13 +74,14 @@ impl Limit {
     }
 }
 
-/// The largest circle between two rows of samples `along_m` apart in each and `across_m` from one another: its diameter, m. One row is
-/// half of that further along than the other, by the share `uneven` of it and by `moved_m` more or less, and at most as far as to be level
-/// with it.
+/// Diameter of the largest circle between two rows of samples, m.
 ///
-/// The circle goes through two samples of a row and the one of the other row between them, which is a and b from them along the tunnel:
-/// 2 R = sqrt((a^2 + c^2) (b^2 + c^2)) / c, c being `across_m`. Where c^2 < a b its centre isn't between the rows: on one of them
-/// there is no more room than its own samples leave, and beyond are the rows' legs.
+/// Samples are `along_m` apart in each row, and rows `across_m`. One row is shifted along by half of `along_m`, by
+/// the share `uneven` of it and by +-`moved_m`, but at most until it is level with the other.
+///
+/// The circle passes through two samples of a row and the sample of the other row between them, at distances a and b
+/// along the tunnel: 2 R = sqrt((a^2 + c^2) (b^2 + c^2)) / c, with c = `across_m`. If c^2 < a b, its centre is not
+/// between the rows. On a row, its own samples limit the space, and the rows' legs lie beyond.
 fn staggered_m(along_m: f64, across_m: f64, uneven: f64, moved_m: f64) -> f64 {
     let off_m = (uneven * along_m + moved_m).min(along_m / 2.0);
     let square = |x_m: f64| x_m * x_m;
@@ -89,7 +93,7 @@ fn staggered_m(along_m: f64, across_m: f64, uneven: f64, moved_m: f64) -> f64 {
     math::sqrt((a2 + across2) * (b2 + across2)) / across_m
 }
 
-/// The inverse of [`staggered_m`] by `along_m`, which is at most the target, m.
+/// Inverse of [`staggered_m`] by `along_m`; at most the target, m.
 fn along_staggered_m(target_m: f64, across_m: f64, uneven: f64, moved_m: f64) -> f64 {
     let (mut meets_m, mut misses_m) = (0.0, target_m);
     if staggered_m(misses_m, across_m, uneven, moved_m) <= target_m {
@@ -111,7 +115,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn circles_between_staggered_rows_are_as_told() {
+    fn circles_between_staggered_rows_equal_brute_force() {
         for (along_m, across_m) in [(0.5, 0.3), (0.4, 0.4), (0.3, 0.35), (0.5, 0.22), (0.6, 0.1)] {
             for uneven in [0.0, 0.02, 0.05, 0.1, 0.2, 0.35, 0.5] {
                 let samples: Vec<[f64; 2]> = (-4..=4)
@@ -128,7 +132,7 @@ mod tests {
                 let told_m = staggered_m(along_m, across_m, uneven, 0.0);
                 let what = format!("{along_m} {across_m} {uneven}: {widest_m} {told_m}");
                 assert!(widest_m <= told_m + 1e-9, "{what}");
-                // Where no circle is centred between the rows, less room is left on them by the other row's samples.
+                // If no circle is centred between the rows, the samples of the other row limit the space on them.
                 let is_between = across_m * across_m >= along_m * along_m * (0.25 - uneven * uneven);
                 assert!(!is_between || widest_m > told_m - 0.005, "{what}");
                 assert!((staggered_m(along_m, across_m, 0.0, uneven * along_m) - told_m).abs() < 1e-12);
@@ -136,13 +140,13 @@ mod tests {
                 assert!((back_m - along_m).abs() < 1e-9, "{what}: {back_m}");
             }
         }
-        // Level with one another, they are the corners of a rectangle.
+        // Level rows form the corners of a rectangle.
         assert!((staggered_m(0.4, 0.3, 0.5, 0.0) - 0.5).abs() < 1e-12);
         assert!((staggered_m(0.4, 0.3, 0.3, 1.0) - 0.5).abs() < 1e-12);
     }
 
     #[test]
-    fn a_speed_is_the_inverse_of_its_limit_however_it_swings_or_is_shifted() {
+    fn limit_speed_inverts_the_limit_with_swing_and_shift() {
         let bounded = Some(0.3);
         for (swing_mps, shift_m, swing_most_m) in
             [(0.0, 0.0, None), (0.01, 0.0, None), (0.0, 0.03, None), (0.01, 0.03, bounded)]

@@ -1,4 +1,4 @@
-//! Passes over each strip that it takes for one, where returns are lost.
+//! Number of passes over each strip that replace one if returns are lost.
 
 use super::Strips;
 use super::thin::Thin;
@@ -6,8 +6,9 @@ use crate::head::{HeadSet, MAX_HEADS};
 use crate::losses::{LossRate, Sampled};
 
 impl Strips {
-    /// Finds how many passes over each strip it takes for one in a setting, with what each head loses, `None` for a head that is
-    /// absent; for [`crate::passes::Passes::lossy`].
+    /// Computes the passes over each strip that replace one in a setting, for [`crate::passes::Passes::lossy`].
+    ///
+    /// `rates` are the losses of each head, `None` for an absent head.
     ///
     /// Allocates: not with capacity for the settings.
     pub fn count_losses(&mut self, setting: usize, target_m: f64, rates: &[Option<LossRate>; MAX_HEADS]) {
@@ -31,7 +32,7 @@ impl Strips {
         }
     }
 
-    /// Passes needed for one within a strip, and across it.
+    /// Returns the passes that replace one within a strip, and across it.
     pub(super) fn needed(&self, setting: usize, k: usize, thin: &Thin<'_>) -> [f64; 2] {
         let needed = || self.needed.get(setting * self.strips.len() + k).copied();
         if thin.is_lossy() { needed().unwrap_or([1.0; 2]) } else { [1.0; 2] }

@@ -59,7 +59,7 @@ fn closed(target_m: f64, t_y_m: f64, gap_s: f64) -> f64 {
 }
 
 #[test]
-fn where_all_see_all_there_is_one_strip() {
+fn full_view_gives_one_strip() {
     let one = strips(&[all_around(&[]), all_around(&[])]);
     let whole = Strip { arc: arc(0.0, 30.0), seen_by: HeadSet::first(2), hidden: false, wait: 1.0 };
     assert_eq!(one.as_slice(), [whole]);
@@ -70,7 +70,7 @@ fn where_all_see_all_there_is_one_strip() {
 }
 
 #[test]
-fn a_hidden_strip_crosses_the_seam() {
+fn hidden_strip_may_cross_the_seam() {
     let some = strips(&[all_around(&[arc(29.0, 2.0)]), all_around(&[])]);
     let widths: Vec<f64> = some.as_slice().iter().map(|strip| strip.arc.length_m).collect();
     assert_eq!(widths, [28.0, 2.0]);
@@ -80,7 +80,7 @@ fn a_hidden_strip_crosses_the_seam() {
 }
 
 #[test]
-fn fewer_passes_on_a_hidden_strip_slow_the_vehicle_down() {
+fn fewer_passes_on_a_hidden_strip_lower_the_speed() {
     let hidden = [arc(7.0, 1.7)];
     let views = [all_around(&hidden), all_around(&[]), all_around(&hidden), all_around(&[])];
     let some = strips(&views);
@@ -90,19 +90,19 @@ fn fewer_passes_on_a_hidden_strip_slow_the_vehicle_down() {
 }
 
 #[test]
-fn a_narrow_hidden_strip_counts_as_a_long_step_if_that_is_better() {
+fn narrow_hidden_strip_counts_as_a_long_step() {
     let some = strips(&[all_around(&[arc(7.0, 0.1)]), all_around(&[])]);
-    // Pings may end a step before it on either side.
+    // Pings may end one step before it on either side.
     let v = speed(&some, &turning(2), 0.8).unwrap();
     assert!((v - closed(0.8, 0.5, 4.0)).abs() < 1e-9);
-    // Narrower than the spacing of the ring's soundings, it still counts.
+    // It counts even if it is narrower than the spacing of the ring's soundings.
     let sliver = strips(&[all_around(&[arc(7.0013, 1e-4)])]);
     let v = speed(&sliver, &turning(1), 0.8).unwrap();
     assert!((v - closed(0.8, 0.4001, 8.0)).abs() < 1e-9, "{v}: {sliver:?}");
 }
 
 #[test]
-fn a_strip_that_no_head_sees_can_make_every_speed_too_high() {
+fn unseen_strip_can_make_every_speed_too_high() {
     let views = [all_around(&[arc(7.0, 0.7)]), all_around(&[arc(7.0, 0.7)])];
     let why = speed(&strips(&views), &turning(2), 0.5).unwrap_err();
     assert!(
@@ -119,7 +119,7 @@ fn a_strip_that_no_head_sees_can_make_every_speed_too_high() {
 }
 
 #[test]
-fn sectors_that_leave_a_place_out_are_noticed_and_pinged_up_to_their_ends() {
+fn gap_between_sectors_is_noticed_and_pinged_to_its_edges() {
     let views = [
         View { sector: Some(Sector::evenly(arc(0.2, 14.8))), hidden: Vec::new() },
         View { sector: Some(Sector::evenly(arc(15.0, 14.9))), hidden: Vec::new() },
@@ -128,8 +128,8 @@ fn sectors_that_leave_a_place_out_are_noticed_and_pinged_up_to_their_ends() {
     let some = strips(&views);
     let unseen: Vec<&Strip> = some.as_slice().iter().filter(|strip| strip.seen_by.is_empty()).collect();
     assert!(unseen.len() == 1 && (unseen[0].arc.length_m - 0.3).abs() < 1e-9);
-    // Wide enough for the target, it is the end of a sector that counts; else the circle through three samples, two of them on one
-    // side and 8 s apart, the third between them on the other.
+    // For a large target, the end of a sector is the limit. Otherwise the circle through three samples is: two on one
+    // side, 8 s apart, and the third between them on the other side.
     let v = speed(&some, &passes, 1.0).unwrap();
     assert!((v - closed(1.0, 0.2, 8.0)).abs() < 1e-9);
     let v = speed(&some, &passes, 0.35).unwrap();
@@ -139,32 +139,32 @@ fn sectors_that_leave_a_place_out_are_noticed_and_pinged_up_to_their_ends() {
 }
 
 #[test]
-fn what_is_hidden_from_a_head_beyond_its_sector_hides_nothing() {
+fn hidden_arc_outside_a_sector_has_no_effect() {
     let plain = |from_m: f64, length_m: f64| View {
         sector: Some(Sector::evenly(arc(from_m, length_m))),
         hidden: Vec::new(),
     };
     let open = [plain(0.0, 14.99), plain(15.0, 15.0)];
-    // The narrow strip that both leave out, and wall of the other's.
+    // A narrow strip that both leave out, and wall of the other's sector.
     let mut beside = open.clone();
     beside[0].hidden = vec![arc(14.992, 5.0)];
     let passes = Passes::in_sectors(HeadSet::first(2), 8.0).unwrap();
     let speeds = [&open, &beside].map(|views| speed(&strips(views), &passes, 0.5).unwrap());
     assert!((speeds[0] - speeds[1]).abs() < 1e-12, "{speeds:?}");
-    // Within its own it does.
+    // Within its own sector it does.
     let mut own = open.clone();
     own[0].hidden = vec![arc(7.0, 0.4)];
     assert!(speed(&strips(&own), &passes, 0.5).is_err());
 }
 
-/// Against the samples themselves: of two heads in the middle of a rectangle, whose corners lie within their sectors.
+/// Comparison with the samples of two heads in the middle of a rectangle, whose corners lie within their sectors.
 #[test]
-fn in_sectors_a_long_step_counts_with_the_wait_where_it_is() {
+fn long_step_in_a_sector_counts_with_its_local_wait() {
     let (target_m, sweep_s, count) = (0.5, 8.0, 75);
     let profile = shapes::rectangle(6.0, 4.0).unwrap();
     let ring = ring(&profile);
     let perimeter_m = profile.perimeter_m();
-    // The first from the floor's centre up the left side to the roof's, the other down again.
+    // The first head sweeps from the floor's centre up the left side to the roof's, the other down the right side.
     let half = perimeter_m / 2.0;
     let views = [0.0, half].map(|from_m| {
         let [y, z] = profile.reference();
@@ -211,8 +211,8 @@ fn in_sectors_a_long_step_counts_with_the_wait_where_it_is() {
 }
 
 #[test]
-fn steps_count_where_they_are() {
-    // A rectangle's steps are long in its corners; a strip in the middle of the floor has none of them.
+fn steps_count_on_their_own_strip() {
+    // Steps of a rectangle are long in its corners; a strip in the middle of the floor has none of them.
     let profile = shapes::rectangle(8.0, 4.0).unwrap();
     let ring = ring(&profile);
     let mut some = Strips::default();
@@ -224,7 +224,7 @@ fn steps_count_where_they_are() {
 }
 
 #[test]
-fn what_swings_or_is_shifted_makes_passes_farther_apart() {
+fn swing_and_shift_widen_the_distance_between_passes() {
     let one = strips(&[all_around(&[])]);
     let rough = Going { swing_mps: 0.01, apart_swing_mps: 0.01, shift_m: 0.05, apart_m: 0.2, ..GOING };
     let v = one.bound_for_target(0, &turning(1), 0.5, &rough).unwrap().speed_mps;
@@ -232,7 +232,7 @@ fn what_swings_or_is_shifted_makes_passes_farther_apart() {
     assert!(v < speed(&one, &turning(1), 0.5).unwrap() - 0.01);
     let worse = Going { swing_mps: 0.1, apart_swing_mps: 0.1, ..rough };
     assert!(one.bound_for_target(0, &turning(1), 0.5, &worse).is_err());
-    // A bounded swing leaves room for speed.
+    // A bounded swing allows a higher speed.
     let to_and_fro = Going { swing_most_m: Some(0.1), ..worse };
     let v = one.bound_for_target(0, &turning(1), 0.5, &to_and_fro).unwrap().speed_mps;
     assert!((one.t_max_m(0, &turning(1), v, &to_and_fro) - 0.5).abs() < 1e-12);
@@ -240,7 +240,7 @@ fn what_swings_or_is_shifted_makes_passes_farther_apart() {
 }
 
 #[test]
-fn what_is_out_of_reach_is_hidden() {
+fn wall_out_of_reach_is_hidden() {
     let profile = shapes::rectangle(8.0, 4.0).unwrap();
     let ring = ring(&profile);
     let hidden = |reach_m: [f64; 2]| {
@@ -260,7 +260,7 @@ fn what_is_out_of_reach_is_hidden() {
 }
 
 #[test]
-fn a_strip_over_the_seam_is_one() {
+fn strip_across_the_seam_is_one() {
     let mut some = Strips::default();
     some.rebuild(10.0, &[all_around(&[arc(8.0, 4.0), arc(1.0, 2.0)])]);
     let unseen: Vec<&Strip> = some.as_slice().iter().filter(|strip| strip.seen_by.is_empty()).collect();
@@ -272,8 +272,8 @@ fn a_strip_over_the_seam_is_one() {
 }
 
 #[test]
-fn without_room_more_is_hidden_and_not_less() {
-    // Slots all around, out of reach, and two views with too little capacity for them.
+fn full_capacity_hides_more_wall_never_less() {
+    // Slots all around are out of reach, and two views have too little capacity for them.
     let points: Vec<[f64; 2]> = (0..240)
         .map(|k| {
             let (sine, cosine) = math::sin_cos(math::TAU * (f64::from(k) + 0.3) / 240.0);
@@ -299,9 +299,9 @@ fn without_room_more_is_hidden_and_not_less() {
     }
 }
 
-/// In either direction of rotation: just before its end it is the same strip, just beyond another one, over the seam, too.
+/// In both directions of rotation: before its end it is the same strip, after it another one, even across the seam.
 #[test]
-fn each_sounding_knows_how_far_its_strip_goes_on() {
+fn each_sounding_has_the_distance_to_its_strip_end() {
     let mut strips = strips(&[all_around(&[arc(4.0, 3.0), arc(28.0, 3.5)]), all_around(&[arc(10.0, 5.0)])]);
     let ring = ring(&pipe());
     for (forward, side) in [(true, 1.0), (false, -1.0)] {

@@ -1,26 +1,26 @@
-//! Which strips are passed less often than others.
+//! Detection of strips that are passed less often than others.
 
 use crate::head::HeadSet;
 use crate::passes::Passes;
 
 /// Number of head sets whose gaps are kept; strips hidden from one or two heads rarely make more.
 const SETS: usize = 8;
-/// Strips of which it is known which set sees them; those beyond are looked at anew.
+/// Number of strips whose head set is cached; others are looked up again.
 const STRIPS: usize = 64;
-/// Number of a set that isn't kept.
+/// Number of a set that is not kept.
 const NOT_KEPT: u8 = u8::MAX;
 
-/// The time between passes over each strip, and which strips are thin: passed less often than the one passed most often.
+/// Time between passes over each strip, and which strips are thin: passed less often than the best one.
 pub(super) struct Thin<'a> {
     passes: &'a Passes,
-    /// Sets of heads with their gaps, seconds: many strips are seen by the same heads.
+    /// Head sets with their gaps, s; many strips are seen by the same heads.
     sets: [(HeadSet, Option<f64>); SETS],
     set_of: [u8; STRIPS],
     best_s: f64,
 }
 
 impl<'a> Thin<'a> {
-    /// Of strips by the heads that see them.
+    /// Creates it for strips given by the heads that see them.
     pub(super) fn of(passes: &'a Passes, strips: impl Iterator<Item = HeadSet>) -> Self {
         let mut thin = Self {
             passes,
@@ -53,18 +53,18 @@ impl<'a> Thin<'a> {
         thin
     }
 
-    /// Time between passes over the strip that is passed most often, seconds; infinite where none is.
+    /// Time between passes over the strip that is passed most often, s; infinite if none is.
     pub(super) fn best_s(&self) -> f64 {
         self.best_s
     }
 
-    /// Time between passes over a strip, by its number, seconds; `None` where no head sees it.
+    /// Time between passes over a strip, by its number, s; `None` if no head sees it.
     pub(super) fn gap_s(&self, k: usize, seen_by: HeadSet) -> Option<f64> {
         let kept = self.set_of.get(k).and_then(|number| self.sets.get(usize::from(*number)));
         kept.map_or_else(|| self.passes.gap_s(seen_by), |(_, gap_s)| *gap_s)
     }
 
-    /// The longest time that so many passes over a strip take, seconds: see [`Passes::time_for_s`].
+    /// Longest time of `needed` passes over a strip, s; see [`Passes::time_for_s`].
     pub(super) fn time_for_s(&self, seen_by: HeadSet, gap_s: f64, needed: f64) -> f64 {
         if needed > 1.0 { self.passes.time_for_s(seen_by, gap_s, needed) } else { gap_s }
     }
@@ -79,7 +79,7 @@ impl<'a> Thin<'a> {
         self.passes.is_lossy()
     }
 
-    /// Whether a strip is passed as often as any.
+    /// Whether a strip is passed as often as the best one.
     pub(super) fn is_full(&self, k: usize, seen_by: HeadSet) -> bool {
         self.gap_s(k, seen_by).is_some_and(|gap_s| gap_s <= self.best_s)
     }

@@ -18,8 +18,10 @@ pub struct View {
 stateful!(View { state: sector; lists: hidden; });
 
 impl View {
-    /// Hides the parts of a ring nearer or farther than the head's reach. Without capacity for another arc, the last is
-    /// extended over the visible part between: hiding too much is the safe side.
+    /// Hides the parts of a ring nearer or farther than the head's reach.
+    ///
+    /// Without capacity for another arc, it extends the last one over the visible part in between: hiding too much is
+    /// the safe side.
     ///
     /// Allocates: not with capacity for one arc.
     pub fn hide_out_of_reach(&mut self, ring: &Ring, reach_m: [f64; 2]) {

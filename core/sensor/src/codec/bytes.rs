@@ -1,13 +1,13 @@
-//! A byte string of bounded length without the heap.
+//! A byte string of bounded length without heap allocation.
 
-/// Up to `N` bytes. Those beyond the length are zero, so that equality of values is equality of contents.
+/// Up to `N` bytes. Unused bytes are zero, so that equal values have equal contents.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub struct Bytes<const N: usize> {
     bytes: [u8; N],
     len: usize,
 }
 
-/// Bytes that did not fit.
+/// The bytes do not fit.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[error("storing {len} bytes; the most allowed is {max}")]
 pub struct TooLong {
@@ -24,7 +24,7 @@ impl<const N: usize> Default for Bytes<N> {
 }
 
 impl<const N: usize> Bytes<N> {
-    /// Holds a copy of `bytes`.
+    /// Creates a copy of `bytes`.
     ///
     /// Errors: more than `N`.
     pub fn new(bytes: &[u8]) -> Result<Self, TooLong> {
@@ -35,7 +35,7 @@ impl<const N: usize> Bytes<N> {
 
     /// Appends `bytes`.
     ///
-    /// Errors: they don't fit; nothing is appended.
+    /// Errors: they do not fit; nothing is appended.
     pub fn extend(&mut self, bytes: &[u8]) -> Result<(), TooLong> {
         let len = self.len + bytes.len();
         let free = self.bytes.get_mut(self.len..len).ok_or(TooLong { len, max: N })?;
@@ -44,18 +44,18 @@ impl<const N: usize> Bytes<N> {
         Ok(())
     }
 
-    /// Holds none.
+    /// Removes all bytes.
     pub fn clear(&mut self) {
         self.as_mut_slice().fill(0);
         self.len = 0;
     }
 
-    /// The bytes held, to be changed.
+    /// Returns the bytes, mutably.
     pub fn as_mut_slice(&mut self) -> &mut [u8] {
         self.bytes.get_mut(..self.len).unwrap_or_default()
     }
 
-    /// The bytes held.
+    /// Returns the bytes.
     pub fn as_slice(&self) -> &[u8] {
         self.bytes.get(..self.len).unwrap_or_default()
     }
@@ -72,7 +72,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_does_not_fit_is_refused_whole() {
+    fn oversized_input_is_rejected_whole() {
         let mut bytes = Bytes::<4>::new(&[1, 2, 3]).unwrap();
         assert_eq!(bytes.extend(&[4, 5]), Err(TooLong { len: 5, max: 4 }));
         assert_eq!(bytes, Bytes::new(&[1, 2, 3]).unwrap());

@@ -12,8 +12,8 @@ const SEED: u64 = 881;
 
 /// Proptest configuration of the contract's tests: the same values on every run.
 ///
-/// By chance garbage passes a weak checksum now and then, and a test that meets it fails though nothing is wrong.
-/// With a fixed seed this happens never or always, and a failure is reproducible without a regression file. Set
+/// Garbage sometimes passes a weak checksum by chance, and the test then fails although the codec is correct. With a
+/// fixed seed this happens never or always, and a failure is reproducible without a regression file. Set
 /// `PROPTEST_RNG_SEED` to try other values.
 pub fn config() -> Config {
     let from_environment = Config::default();
@@ -46,7 +46,7 @@ pub fn decode_all<C: Codec>(codec: &mut C, bytes: &[u8]) -> Vec<C::Value> {
     values
 }
 
-/// Garbage, then a good frame: the frame must be the last value.
+/// Decodes garbage followed by a good frame, which must be the last value.
 pub fn decode_after_garbage<C: Codec>(codec: &mut C, garbage: &[u8], frame: &[u8]) -> Vec<C::Value> {
     let mut values = Vec::new();
     codec.push(garbage, &mut |value| values.push(value));
@@ -58,14 +58,14 @@ pub fn decode_after_garbage<C: Codec>(codec: &mut C, garbage: &[u8], frame: &[u8
     values
 }
 
-/// Whether all of the bytes are one good frame.
+/// Whether all bytes are exactly one good frame.
 fn is_one_frame<C: Codec>(codec: &mut C, bytes: &[u8]) -> bool {
     let values = decode_all(codec, bytes);
     let counts = codec.counts();
     values.len() == 1 && counts.bad_frames == 0 && counts.skipped_bytes == 0
 }
 
-/// Sets two neighbouring bytes so that all of `bytes` passes as one frame, if any values do.
+/// Sets two neighbouring bytes so that `bytes` passes as one frame, if any values do.
 fn made_to_match<C: Codec>(new: &impl Fn() -> C, bytes: &mut [u8], at: usize) -> bool {
     let Some(before) = bytes.get(at..at + 2).map(<[u8]>::to_vec) else { return false };
     if bytes.len() > MOST_MATCHED {
@@ -81,8 +81,9 @@ fn made_to_match<C: Codec>(new: &impl Fn() -> C, bytes: &mut [u8], at: usize) ->
     false
 }
 
-/// A place in a frame for each of a few attempts, and what a byte there is turned by: the same each time. By one, a digit mostly stays
-/// a digit.
+/// Positions in a frame to corrupt, each with the amount to add to its byte; the same on every run.
+///
+/// An amount of one mostly keeps a digit a digit.
 fn attempts(len: usize) -> impl Iterator<Item = (usize, u8)> {
     const TURNS: [u8; 6] = [0x5B, 0x80, 0x24, 0xFF, 0x11, 0xC2];
     (0..12_usize).map(move |k| {
@@ -90,15 +91,17 @@ fn attempts(len: usize) -> impl Iterator<Item = (usize, u8)> {
     })
 }
 
-/// Longer frames have no checksum, and trying all values of two bytes in them takes long.
+/// Maximum frame length for this test. Longer frames have no checksum, and trying all values of two bytes takes long.
 const MOST_MATCHED: usize = 100;
 
-/// Wrong frames that pass all the same: a byte of a good one is changed, and its checksum, if it has any, happens to match.
+/// Returns wrong frames that pass by chance.
+///
+/// One byte of a good frame is changed, and its checksum, if any, matches.
 pub fn matching_by_chance<C: Codec>(new: &impl Fn() -> C, frame: &[u8]) -> Vec<Vec<u8>> {
     let wrong = attempts(frame.len()).filter_map(|(at, turn)| {
         let mut wrong = frame.to_vec();
         wrong[at] ^= turn;
-        // A checksum stands near the end, and perhaps in digits.
+        // A checksum is near the end, possibly in digits.
         let places = (0..frame.len().saturating_sub(1))
             .rev()
             .take(6)
@@ -109,7 +112,7 @@ pub fn matching_by_chance<C: Codec>(new: &impl Fn() -> C, frame: &[u8]) -> Vec<V
     wrong.collect()
 }
 
-/// Beginnings of frames that were cut short and pass together with the first bytes of the good frame behind them.
+/// Returns truncated frames that pass together with the first bytes of the good frame after them.
 pub fn matching_into_the_next<C: Codec>(new: &impl Fn() -> C, frame: &[u8]) -> Vec<Vec<u8>> {
     let len = frame.len();
     let cut = (2..len).rev().step_by(len.div_ceil(6)).filter_map(|keep| {
@@ -123,11 +126,11 @@ pub fn matching_into_the_next<C: Codec>(new: &impl Fn() -> C, frame: &[u8]) -> V
 ///
 /// `codec` is an expression that creates a new codec, `values` a proptest strategy of all values that can be encoded,
 /// `encode` a function from `&Value` to its bytes, and `frames` one or more good frames as the device sends them.
-/// On a byte stream only the protocol's framing distinguishes a frame from garbage. Where the last bytes of the
-/// garbage and the first of the frame together form a valid frame, no decoder can do better; the macro's garbage is
-/// random, so the probability of that is the protocol's. The values are drawn from one fixed seed (see
-/// [`contract::config`](crate::codec::contract::config)), so that this chance is taken once, when a test or a strategy
-/// is changed, and not on each run.
+/// On a byte stream, only the protocol's framing distinguishes a frame from garbage. If the last bytes of the garbage
+/// and the first of the frame form a valid frame, no decoder can do better. The macro's garbage is random, so the
+/// probability of that is the protocol's. The values come from one fixed seed (see
+/// [`contract::config`](crate::codec::contract::config)). A chance match therefore appears when a test or strategy
+/// changes, not at random runs.
 #[macro_export]
 macro_rules! codec_contract {
     ($module:ident, codec: $codec:expr, values: $values:expr, encode: $encode:expr, frames: $frames:expr $(,)?) => {
@@ -145,7 +148,7 @@ macro_rules! codec_contract {
                 #![proptest_config($crate::codec::contract::config())]
 
                 #[test]
-                fn any_bytes_never_panic_and_every_byte_is_accounted_for(
+                fn any_bytes_are_accounted_for_without_panic(
                     bytes in proptest::collection::vec(any::<u8>(), 0..2000),
                     pieces in proptest::collection::vec(0usize..40, 0..60),
                 ) {
@@ -157,7 +160,7 @@ macro_rules! codec_contract {
                 }
 
                 #[test]
-                fn input_split_anywhere_gives_the_same_values(
+                fn split_input_gives_the_same_values(
                     values in proptest::collection::vec($values, 1..6),
                     noise in proptest::collection::vec(any::<u8>(), 0..30),
                     pieces in proptest::collection::vec(0usize..25, 0..200),
@@ -178,7 +181,7 @@ macro_rules! codec_contract {
                 }
 
                 #[test]
-                fn garbage_before_a_good_frame_does_not_lose_it(
+                fn frame_after_garbage_is_found(
                     garbage in proptest::collection::vec(any::<u8>(), 0..100),
                     value in $values,
                 ) {
@@ -188,7 +191,7 @@ macro_rules! codec_contract {
                 }
 
                 #[test]
-                fn a_frame_cut_short_before_a_good_one_does_not_lose_it(
+                fn frame_after_a_truncated_one_is_found(
                     cut in $values,
                     keep in any::<prop::sample::Index>(),
                     value in $values,
@@ -206,7 +209,7 @@ macro_rules! codec_contract {
             }
 
             #[test]
-            fn the_given_frames_are_good_split_at_every_byte() {
+            fn given_frames_decode_split_at_every_byte() {
                 for frame in $frames {
                     let frame: &[u8] = frame.as_ref();
                     let expected = decode_all(&mut $codec, frame);
@@ -217,9 +220,9 @@ macro_rules! codec_contract {
                 }
             }
 
-            /// A wrong frame whose checksum happens to match is a value like any other, and costs no frame behind it.
+            /// A wrong frame with a matching checksum is a value like any other, and costs no later frame.
             #[test]
-            fn a_checksum_that_happens_to_match_costs_no_other_frame() {
+            fn chance_checksum_match_costs_no_other_frame() {
                 let mut tried = 0;
                 for frame in $frames {
                     let frame: &[u8] = frame.as_ref();
@@ -235,9 +238,9 @@ macro_rules! codec_contract {
                 assert!(tried > 0);
             }
 
-            /// A frame cut short whose checksum matches with what comes next costs the frame that it takes bytes of, and no more.
+            /// A truncated frame with a chance match costs only the frame that the next bytes belong to.
             #[test]
-            fn a_checksum_that_matches_into_the_next_frame_costs_that_frame_alone() {
+            fn chance_match_into_the_next_frame_costs_only_that_frame() {
                 for frame in $frames {
                     let frame: &[u8] = frame.as_ref();
                     for cut in matching_into_the_next(&|| $codec, frame) {

@@ -1,9 +1,9 @@
-//! Framing with rescanning, written once for every codec.
+//! Framing with rescanning, shared by all codecs.
 
 use super::{Codec, CodecCounts};
 use headrace_geometry::snapshot::{Restorer, Saver, SnapshotError, Stateful};
 
-/// Verdict on a frame candidate at the front of the held bytes.
+/// Verdict on a frame candidate at the start of the held bytes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Verdict {
     /// No frame begins here.
@@ -38,23 +38,23 @@ pub trait Framing: Copy {
     /// Verdict on the start of `front`, which has at least one byte. Depends on these bytes alone.
     fn judge(&self, front: &[u8]) -> Verdict;
 
-    /// Value of a frame accepted by [`Framing::judge`]; `None` if it carries nothing of use.
+    /// Returns the value of a frame accepted by [`Framing::judge`]; `None` if it carries nothing useful.
     fn read(&self, frame: &[u8]) -> Option<Self::Value>;
 }
 
-/// Codec of a [`Framing`]: holds an incomplete frame between pushes and finds frames in arbitrary input.
+/// Codec of a [`Framing`]: keeps an incomplete frame between pushes and finds frames in arbitrary input.
 ///
-/// `N` is the maximum frame length; a candidate that needs more is bad.
-/// On a byte stream, scanning resumes at the second byte of a failed candidate, so that a frame inside a false one is
-/// found; a byte that starts no frame is skipped without counting a bad frame. In a whole message, anything other than
-/// frames makes the rest of the message one bad frame; apparent frames in that rest are ignored.
+/// `N` is the maximum frame length; a candidate that needs more is bad. On a byte stream, scanning resumes at the
+/// second byte of a failed candidate, so that a frame inside a false one is found. A byte that starts no frame is
+/// skipped without counting a bad frame. In a whole message, anything other than frames makes the rest of the message
+/// one bad frame, and apparent frames in that rest are ignored.
 /// Allocates: never.
 #[derive(Debug, Clone)]
 pub struct Framed<F, const N: usize> {
     framing: F,
     held: [u8; N],
     len: usize,
-    /// The current message has turned out bad; the rest of it is skipped.
+    /// Whether the current message is bad, so that the rest of it is skipped.
     astray: bool,
     counts: CodecCounts,
 }
@@ -66,14 +66,14 @@ impl<F: Default, const N: usize> Default for Framed<F, N> {
 }
 
 impl<F, const N: usize> Framed<F, N> {
-    /// A codec that has seen nothing yet.
+    /// Creates a codec without input so far.
     pub fn new(framing: F) -> Self {
         Self { framing, held: [0; N], len: 0, astray: false, counts: CodecCounts::default() }
     }
 }
 
 impl<F, const N: usize> Framed<F, N> {
-    /// The format.
+    /// Returns the frame format.
     pub fn framing(&self) -> &F {
         &self.framing
     }
@@ -99,8 +99,9 @@ impl<F, const N: usize> Stateful for Framed<F, N> {
 }
 
 impl<F: Framing, const N: usize> Framed<F, N> {
-    /// Like [`Codec::push`], but passes each frame's bytes to `take`, with the number of bytes from the frame's first to the
-    /// last received.
+    /// Like [`Codec::push`], but passes each frame's bytes to `take`.
+    ///
+    /// The second argument is the number of bytes from the frame's start to the last received byte.
     pub fn push_frames(&mut self, mut bytes: &[u8], mut take: impl FnMut(&[u8], usize)) {
         while !bytes.is_empty() && !self.astray {
             let (now, later) = bytes.split_at(bytes.len().min(N - self.len));
@@ -120,10 +121,11 @@ impl<F: Framing, const N: usize> Framed<F, N> {
         self.astray = false;
     }
 
-    /// After a silence, before `next` is pushed: gives up held bytes only on evidence that they are a false start, which is
-    /// a whole frame inside them or at the front of `next`. Without any they are kept, however long the rest of the frame
-    /// takes: silence alone doesn't tell a false start from a line that delivers late. Passes frames to `take` as
-    /// [`Framed::push_frames`] does. A whole message ends with the silence.
+    /// Handles a silence, before `next` is pushed: drops held bytes only if they are provably a false start.
+    ///
+    /// The proof is a whole frame inside them or at the start of `next`. Otherwise they are kept, however long the
+    /// rest of the frame takes, because silence alone does not distinguish a false start from a slow line. Frames go
+    /// to `take` as in [`Framed::push_frames`]. In message mode, the message ends with the silence.
     pub fn settle_frames(&mut self, next: &[u8], mut take: impl FnMut(&[u8], usize)) {
         if F::WHOLE_MESSAGES || self.is_whole_frame(next) {
             return self.flush_frames(take);
@@ -141,7 +143,7 @@ impl<F: Framing, const N: usize> Framed<F, N> {
             && matches!(self.framing.judge(front), Verdict::Frame(n) if (1..=front.len().min(N)).contains(&n))
     }
 
-    /// Takes frames from the held bytes; candidates that begin before `give_up_before` aren't waited for.
+    /// Takes frames from the held bytes; candidates that begin before `give_up_before` are not waited for.
     fn scan(&mut self, later: usize, give_up_before: usize, take: &mut impl FnMut(&[u8], usize)) {
         let mut start = 0;
         while start < self.len {
@@ -228,14 +230,14 @@ pub(super) mod tests {
     }
 
     #[test]
-    fn a_frame_inside_a_false_one_is_found() {
+    fn frame_inside_a_false_one_is_found() {
         let mut codec = Framed::<Marked<false>, 8>::default();
         assert_eq!(pushed(&mut codec, &[0xA5, 5, 0xA5, 1, 7, 0x5A, 0, 0]), [[7]]);
         assert_eq!(codec.counts(), CodecCounts { good_frames: 1, bad_frames: 1, skipped_bytes: 4 });
     }
 
     #[test]
-    fn silence_frees_a_frame_that_a_false_start_held_back() {
+    fn silence_releases_a_frame_behind_a_false_start() {
         let mut codec = Framed::<Marked<false>, 8>::default();
         assert!(pushed(&mut codec, &[0xA5, 5, 0xA5, 0, 0x5A]).is_empty());
         assert_eq!(codec.held_bytes(), 5);
@@ -245,23 +247,23 @@ pub(super) mod tests {
     }
 
     #[test]
-    fn each_frame_comes_with_how_far_back_it_begins() {
+    fn each_frame_has_the_distance_to_its_start() {
         let mut codec = Framed::<Marked<false>, 8>::default();
         let mut behind = Vec::new();
         codec.push_frames(&[0, 0xA5, 5, 0xA5], |_, back| behind.push(back));
-        // The false start is held along with the first byte of a frame, and the next push exceeds the buffer.
+        // The codec holds the false start and the first byte of a frame, and the next push exceeds the buffer.
         codec.push_frames(&[1, 7, 0x5A, 0, 0, 0xA5, 0, 0x5A, 0], |_, back| behind.push(back));
         assert_eq!(behind, [10, 4]);
     }
 
     #[test]
-    fn a_candidate_longer_than_there_is_room_for_is_bad() {
+    fn candidate_longer_than_the_buffer_is_bad() {
         let mut codec = Framed::<Marked<false>, 7>::default();
         assert_eq!(pushed(&mut codec, &[0xA5, 5, 0xA5, 1, 7, 0x5A]), [[7]]);
     }
 
     #[test]
-    fn a_message_that_goes_astray_is_left_out_to_its_end() {
+    fn bad_message_is_skipped_to_its_end() {
         let good = [0xA5, 1, 7, 0x5A];
         let mut codec = Framed::<Marked<true>, 8>::default();
         for start in [&[0xA5, 5, 1][..], &[0x11], &[0xA5, 9], &[0xA5, 0, 0]] {
@@ -276,7 +278,7 @@ pub(super) mod tests {
     }
 
     #[test]
-    fn a_message_cut_short_holds_no_other() {
+    fn truncated_message_contains_no_other() {
         let mut codec = Framed::<Marked<true>, 8>::default();
         assert!(pushed(&mut codec, &[0xA5, 5, 0xA5, 0, 0x5A]).is_empty());
         codec.flush(&mut |value| panic!("{value:?}"));

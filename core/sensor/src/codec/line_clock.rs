@@ -6,20 +6,19 @@ use super::{Codec as _, Framed, Framing};
 use headrace_geometry::snapshot::stateful;
 use headrace_geometry::time::{DurNs, MonoNs};
 
-/// Packets tracked by a [`LineClock`]: a kilobyte from a port that delivers 32 bytes at a time.
+/// Number of packets tracked by a [`LineClock`]: 1 kB from a port that delivers 32 bytes at a time.
 const MAX_PARTS: usize = 32;
 
-/// Stamps each frame of a byte stream with the receive time of the packet that brought its first byte, even if earlier
-/// bytes are still held, and whenever its last byte comes.
+/// Stamps each frame of a byte stream with the receive time of the packet that contained its first byte.
 ///
-/// Beyond `MAX_PARTS` packets those before the newest are merged into one: a frame that begins among them, after a false
-/// start, is stamped too early.
+/// Earlier bytes may still be held, and the last byte may come at any time. Beyond `MAX_PARTS` packets, those before
+/// the newest are merged into one. A frame that begins among them, after a false start, is then stamped too early.
 /// Allocates: never.
 #[derive(Debug, Clone)]
 pub struct LineClock {
     silence: DurNs,
     last: MonoNs,
-    /// Packets that brought the held bytes, oldest first.
+    /// Packets that contained the held bytes, oldest first.
     parts: [Part; MAX_PARTS],
     len: usize,
 }
@@ -33,13 +32,15 @@ struct Part {
 stateful!(LineClock { state: last, len; slots: parts; fixed: silence; });
 
 impl LineClock {
-    /// `silence` is the longest usual gap within a frame: after a longer one between two packets a false start that holds
-    /// frames back is looked for ([`Framed::settle_frames`]).
+    /// Creates a clock; `silence` is the longest usual gap within a frame.
+    ///
+    /// After a longer gap between two packets, it looks for a false start that holds frames back
+    /// ([`Framed::settle_frames`]).
     pub fn new(silence: DurNs) -> Self {
         Self { silence, last: MonoNs(0), parts: [Part::default(); MAX_PARTS], len: 0 }
     }
 
-    /// Pushes a packet's bytes into `codec`; `take` gets each complete frame and its receive time.
+    /// Pushes a packet's bytes into `codec`; `take` receives each complete frame with its receive time.
     pub fn push<F: Framing, const N: usize>(
         &mut self,
         codec: &mut Framed<F, N>,
@@ -72,7 +73,7 @@ impl LineClock {
         }
     }
 
-    /// Receive time of the byte `behind` bytes before the end, itself included.
+    /// Returns the receive time of the byte `behind` bytes before the end, that byte included.
     fn received(&self, behind: usize) -> MonoNs {
         let mut after = 0;
         let holds = |part: &&Part| {
@@ -117,19 +118,19 @@ mod tests {
     }
 
     #[test]
-    fn a_frame_in_pieces_came_with_its_first_byte() {
+    fn frame_in_pieces_has_the_time_of_its_first_byte() {
         let packets: [&[u8]; 4] = [&[0xA5], &[2, 8], &[9, 0x5A, 0xA5, 0, 0x5A, 0xA5], &[0, 0x5A]];
         assert_eq!(times(&mut clock(5), &packets), [1, 3, 3]);
     }
 
     #[test]
-    fn a_frame_held_back_by_a_false_start_keeps_its_own_time() {
+    fn frame_behind_a_false_start_keeps_its_time() {
         let packets: [&[u8]; 4] = [&[0xA5, 5], &[0xA5], &[1, 7], &[0x5A, 0, 0]];
         assert_eq!(times(&mut clock(5), &packets), [2]);
     }
 
     #[test]
-    fn silence_frees_a_frame_with_the_time_it_had() {
+    fn silence_releases_a_frame_with_its_own_time() {
         let false_start = [&[0xA5, 5][..], &[0xA5, 0, 0x5A]];
         let mut codec = Framed::<Marked<false>, 8>::default();
         let mut clock = clock(5);
@@ -138,13 +139,13 @@ mod tests {
         }
         let mut times = Vec::new();
         let after = MonoNs(2) + DurNs::from_millis(5);
-        clock.push(&mut codec, after, &[], |at, _| panic!("not yet, at {at:?}"));
+        clock.push(&mut codec, after, &[], |at, _| panic!("a frame before its time, at {at:?}"));
         clock.push(&mut codec, after + DurNs(5_000_001), &[0xA5, 0, 0x5A], |at, _| times.push(at));
         assert_eq!(times, [MonoNs(2), after + DurNs(5_000_001)]);
     }
 
     #[test]
-    fn any_number_of_packets_is_endured() {
+    fn any_number_of_packets_is_handled() {
         let mut clock = clock(5);
         let mut packets: Vec<&[u8]> = vec![&[]; 100];
         packets[0] = &[0xA5, 5];

@@ -1,7 +1,9 @@
-//! Codecs between a device's bytes and its values, without I/O, and the contract that each of them is tested against.
+//! Codecs between a device's bytes and its values, without I/O, and their contract.
 //!
-//! A codec is a pure state machine. It takes bytes in whatever pieces a port delivers and emits values; it reads no clock,
-//! does no I/O, and holds no more than one frame's worth of bytes. Ports are another layer.
+//! Every codec is tested against the contract.
+//!
+//! A codec is a pure state machine. It takes bytes in any pieces that a port delivers and emits values. It reads no
+//! clock, does no I/O, and holds at most one frame of bytes. Ports are a separate layer.
 
 mod bytes;
 #[cfg(feature = "contract")]
@@ -25,11 +27,14 @@ pub struct CodecCounts {
     pub skipped_bytes: u64,
 }
 
-/// Bytes to values and back, sans-I/O.
+/// Converts bytes to values and back, without I/O.
 ///
-/// Contract, checked by the module `contract` for each implementation: no input panics; the same bytes split anywhere give
-/// the same values; garbage before a good frame doesn't lose it; encode then decode is the identity; the bytes held
-/// between pushes are bounded by [`Codec::MAX_FRAME_BYTES`].
+/// The module `contract` checks every implementation against this contract:
+/// - No input panics.
+/// - The same bytes split anywhere give the same values.
+/// - A good frame after garbage is found.
+/// - Decoding reverses encoding.
+/// - At most [`Codec::MAX_FRAME_BYTES`] bytes are held between pushes.
 pub trait Codec {
     /// Value of one frame, in the protocol's units.
     type Value: Clone + PartialEq + core::fmt::Debug;
@@ -37,9 +42,10 @@ pub trait Codec {
     /// Maximum frame length; also the bound on the bytes held between two pushes.
     const MAX_FRAME_BYTES: usize;
 
-    /// Whether the transport itself delivers whole messages (CAN frames, HID reports, I2C transactions). Garbage is
-    /// then a separate message and the port calls [`Codec::flush`] after each; on a byte stream garbage may directly precede
-    /// a frame.
+    /// Whether the transport delivers whole messages (CAN frames, HID reports, I2C transactions).
+    ///
+    /// Garbage is then a separate message, and the port calls [`Codec::flush`] after each. On a byte stream, garbage
+    /// may directly precede a frame.
     const WHOLE_MESSAGES: bool;
 
     /// Takes received bytes and calls `sink` for each value completed, in order.
@@ -47,8 +53,9 @@ pub trait Codec {
     /// Allocates: never.
     fn push(&mut self, bytes: &[u8], sink: &mut dyn FnMut(Self::Value));
 
-    /// Signals a silence longer than the pause allowed within a frame, or the end of a message: an incomplete frame is given
-    /// up and its bytes are rescanned.
+    /// Signals the end of a message, or a silence longer than the pause allowed within a frame.
+    ///
+    /// An incomplete frame is given up, and its bytes are rescanned.
     fn flush(&mut self, sink: &mut dyn FnMut(Self::Value));
 
     /// Counters so far.

@@ -1,9 +1,9 @@
-//! When samples would have come that were late: the device's own clock tells how much later than usual.
+//! Corrected arrival times of late samples, from the device's own clock.
 //!
-//! Buses, adapters and a busy host deliver samples in bursts. Of a unit that samples every 2.5 ms, several then have the same receive
-//! time, and a jerk that one of them has felt would count for as long as the gap before it. The device's stamps tell the samples
-//! apart: receive time less device time is usually near its minimum, and what a stamp came later than that, its sample came late.
-//! Receive times still order everything; only the time of validity is put back.
+//! Buses, adapters and a busy host deliver samples in bursts. Several samples of a unit with a period of 2.5 ms then
+//! have the same receive time. A jerk in one of them would count for the whole gap before it. The device's stamps
+//! separate the samples: receive time less device time is usually near its minimum, and any excess is the delay of
+//! the sample. Receive times still define the order; only the time of validity is corrected.
 
 use core::cmp::Ordering;
 
@@ -13,29 +13,35 @@ use super::{ClockReport, DeviceClock};
 use crate::reading::Reading;
 use headrace_geometry::time::{DurNs, MonoNs};
 
-/// How fast the usual delay follows stamps that come later than it, per second: more than clocks drift apart. It follows earlier ones
-/// so many times as fast, and is so about the delay that one stamp in ten is below. A stamp that is garbled moves it no further.
+/// Rate at which the usual delay follows later stamps, per second: faster than clocks drift apart.
+///
+/// It follows earlier stamps faster by the factor below, and so settles at the delay that one stamp in ten undercuts.
+/// A garbled stamp has no larger effect than any other.
 const RISES: f64 = 1e-3;
 const FALLS_TIMES: f64 = 9.0;
 /// Longest time between stamps that counts, s.
 const MOST_BETWEEN_S: f64 = 0.1;
-/// Least lateness that is corrected: less comes of ticks, and of the frames of one sample being sent one after the other.
+/// Minimum delay that is corrected.
+///
+/// Smaller ones come from ticks and from sending a sample's frames one after the other.
 const LEAST: DurNs = DurNs(1_000_000);
-/// Largest: a clock that stands still looks late, too, and navigation waits no longer for samples.
+/// Maximum delay that is corrected. A stopped clock looks late, too, and navigation does not wait longer for samples.
 const MOST: DurNs = DurNs(150_000_000);
 
-/// A device's clock, and the times of its samples. Allocates: never.
+/// Times of the samples of a device with a clock. Allocates: never.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct SampleTimes {
     clock: DeviceClock,
     delay: UsualDelay,
     stamped: Option<Stamped>,
     last_reading: Option<MonoNs>,
-    /// How much more often readings came soon after a stamp than a stamp soon after readings: some units send it last.
+    /// Count of readings just after a stamp, less stamps just after a reading.
+    ///
+    /// Some units send the stamp last.
     leads: i8,
 }
 
-/// A stamped sample: when its stamp came, when that would usually have come, and which of its readings have.
+/// A stamped sample: the stamp's receive time, its usual receive time, and which readings have arrived.
 #[derive(Debug, Clone, Copy, Serialize, Deserialize)]
 struct Stamped {
     received: MonoNs,
@@ -43,13 +49,13 @@ struct Stamped {
     told: [bool; KINDS],
 }
 
-/// Rate, force, attitude: a stamp is of the first of each that follows it.
+/// Number of kinds: rate, force, attitude. A stamp belongs to the first of each that follows it.
 const KINDS: usize = 3;
-/// How often it must have led more than not to be believed, and the limit of the count.
+/// Minimum lead count for the stamp to count as leading, and the limit of the count.
 const SURE_LEADS: i8 = 8;
 const MOST_LEADS: i8 = 16;
 
-/// What receive time less device time usually is.
+/// Usual difference between receive time and device time.
 #[derive(Debug, Clone, Copy, Default, Serialize, Deserialize)]
 struct UsualDelay {
     delay: Option<DurNs>,
@@ -58,7 +64,7 @@ struct UsualDelay {
 }
 
 impl SampleTimes {
-    /// Of a clock of `bits` bits (1 to 64) whose ticks are `tick` long, as [`DeviceClock::new`].
+    /// Creates it for a clock of `bits` bits (1 to 64) with ticks of length `tick`, as [`DeviceClock::new`].
     pub fn new(bits: u32, tick: DurNs) -> Self {
         Self {
             clock: DeviceClock::new(bits, tick),
@@ -69,15 +75,17 @@ impl SampleTimes {
         }
     }
 
-    /// Takes the stamp of a sample.
+    /// Processes the stamp of a sample.
     pub fn stamp(&mut self, ticks: u64, received: MonoNs) {
         let device = self.clock.take(ticks, received);
         let late = self.delay.late(device, received);
         self.stamped = Some(Stamped { received, usual: received - late, told: [false; KINDS] });
     }
 
-    /// When a reading received at `received` would have come if its sample weren't late; `received` of what follows no stamp, of
-    /// what came about as soon as usual, of what is later than a queue explains, and of a unit that sends its stamps after its readings.
+    /// Returns the receive time that a reading would have had without its sample's delay.
+    ///
+    /// Returns `received` for a reading without a stamp, one with a usual delay, or one later than a queue explains.
+    /// The same holds for a unit that sends its stamps after its readings.
     pub fn arrival(&mut self, reading: &Reading, received: MonoNs) -> MonoNs {
         let kind = match reading {
             Reading::AngularRate(_) => 0,
@@ -88,7 +96,7 @@ impl SampleTimes {
         let Some(stamped) = &mut self.stamped else { return received };
         let last = self.last_reading.replace(received);
         if let Some(last) = last.filter(|_| stamped.told == [false; KINDS]) {
-            // In a burst they are the same, and say nothing.
+            // Equal receive times within a burst are no evidence.
             let lead = match received.since(stamped.received).cmp(&stamped.received.since(last)) {
                 Ordering::Less => 1,
                 Ordering::Equal => 0,
@@ -103,14 +111,14 @@ impl SampleTimes {
         if is_late && !is_told && self.leads >= SURE_LEADS { stamped.usual } else { received }
     }
 
-    /// Statistics of the clock.
+    /// Returns statistics of the clock.
     pub fn report(&self) -> ClockReport {
         self.clock.report()
     }
 }
 
 impl UsualDelay {
-    /// How much later than usual a stamp came; zero for the first of an epoch of the clock.
+    /// Returns the delay of a stamp beyond the usual one; zero for the first of a clock epoch.
     fn late(&mut self, device: DurNs, received: MonoNs) -> DurNs {
         let delay = received.since(MonoNs(0)) - device;
         let is_first = device <= DurNs::ZERO || device < self.device;

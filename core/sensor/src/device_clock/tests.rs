@@ -1,4 +1,4 @@
-//! Clocks of known drift under non-negative delays.
+//! Clocks with known drift and non-negative delays.
 
 use proptest::prelude::*;
 
@@ -6,7 +6,7 @@ use super::*;
 
 const S: u64 = 1_000_000_000;
 
-/// Numbers in [0, 1), the same for the same seed.
+/// Reproducible random numbers in [0, 1).
 struct Random(u64);
 
 impl Random {
@@ -21,7 +21,7 @@ impl Random {
     }
 }
 
-/// A device whose clock is off by `ppm`, and that sends its time every `period_ns`.
+/// A device whose clock is off by `ppm` and that sends its time every `period_ns`.
 struct Device {
     bits: u32,
     tick: i64,
@@ -36,7 +36,7 @@ impl Device {
         DeviceClock::new(self.bits, DurNs(self.tick))
     }
 
-    /// Its stamp at host time `true_ns`.
+    /// Returns its stamp at host time `true_ns`.
     #[expect(clippy::cast_possible_truncation, reason = "positive and below 2^63")]
     fn ticks(&self, true_ns: f64) -> u64 {
         let elapsed = (true_ns * (1.0 + self.ppm / 1e6) / self.tick as f64) as u64;
@@ -44,14 +44,14 @@ impl Device {
         self.first_ticks.wrapping_add(elapsed) & mask
     }
 
-    /// Sends from `from_s` to `to_s` and gives the last unwrapped time.
+    /// Sends from `from_s` to `to_s`; returns the last unwrapped time.
     #[expect(clippy::cast_possible_truncation, reason = "positive and below 2^63")]
     fn send(&self, clock: &mut DeviceClock, random: &mut Random, from_s: f64, to_s: f64) -> DurNs {
         let mut at = from_s * 1e9;
         let mut last = 0;
         let mut device = DurNs::ZERO;
         while at < to_s * 1e9 {
-            // A queue keeps the order.
+            // A queue preserves the order.
             last = last.max(5 * S + (at + 300e3 + random.queue_ns(self.queue_ns)) as u64);
             device = clock.take(self.ticks(at), MonoNs(last));
             at += self.period_ns;
@@ -76,7 +76,7 @@ fn sbg(ppm: f64) -> Device {
 }
 
 #[test]
-fn drifts_are_found_within_what_is_said_of_them() {
+fn drift_is_found_within_its_sd() {
     let mut within_two = 0;
     let mut squares = 0.0;
     let cases = 160;
@@ -91,7 +91,7 @@ fn drifts_are_found_within_what_is_said_of_them() {
         assert_eq!((report.restarts, report.jumps), (0, 0), "seed {seed}");
         let error = (drift.ppm - ppm) / drift.sd_ppm;
         assert!(error.abs() < 5.0, "seed {seed}: {drift:?} of {ppm}");
-        // The sd itself must be small: a few ppm within a minute or two, fractions later.
+        // The sd itself must be small: a few ppm after a minute or two, and fractions of that later.
         assert!(drift.sd_ppm < 300.0 / seconds, "seed {seed}, {seconds} s: {drift:?}");
         within_two += u32::from(error.abs() < 2.0);
         squares += error * error;
@@ -103,7 +103,7 @@ fn drifts_are_found_within_what_is_said_of_them() {
 
 #[test]
 fn ten_hours_are_exact_to_the_tick() {
-    // It wraps every 71.6 minutes: eight and a half times.
+    // The clock wraps every 71.6 minutes: eight and a half times.
     let device = Device { period_ns: 1e8, ..sbg(20.0) };
     let mut clock = device.clock();
     let total = device.send(&mut clock, &mut Random(3), 0.0, 36_000.0);
@@ -115,7 +115,7 @@ fn ten_hours_are_exact_to_the_tick() {
     let drift = report.drift.unwrap();
     println!("ten hours: {drift:?}");
     assert!((drift.ppm - 20.0).abs() < 0.01 && drift.sd_ppm < 0.01, "{drift:?}");
-    // The offset is that of the least delay, 300 us, to within what queues of 5 ms leave.
+    // The offset is that of the minimum delay, 300 us, to within the effect of queues of 5 ms.
     let earliest = clock.earliest(total).unwrap();
     let least = MonoNs(5 * S + 35_999_900_000_000 + 300_000);
     let off = earliest.since(least).0.abs();
@@ -123,7 +123,7 @@ fn ten_hours_are_exact_to_the_tick() {
 }
 
 #[test]
-fn hours_of_silence_and_rounds_missed_are_bridged() {
+fn hours_of_silence_and_missed_wraps_are_bridged() {
     for gap_s in [3600.0, 4294.9, 4295.0, 20_000.0] {
         let device = sbg(-150.0);
         let mut clock = device.clock();
@@ -140,7 +140,7 @@ fn hours_of_silence_and_rounds_missed_are_bridged() {
 }
 
 #[test]
-fn a_restart_begins_an_epoch_and_the_drift_is_kept() {
+fn restart_begins_an_epoch_and_keeps_the_drift() {
     let device = Device { first_ticks: 0, ..xsens(80.0) };
     let mut clock = device.clock();
     let mut random = Random(4);
@@ -158,8 +158,8 @@ fn a_restart_begins_an_epoch_and_the_drift_is_kept() {
 }
 
 #[test]
-fn a_restart_that_looks_like_a_delay_is_found_out() {
-    // Its clock reads 4.9 s at 4.9 s and, after a restart, 6 s at 13 s: 7 s behind, without having gone back.
+fn restart_that_looks_like_a_delay_is_recognised() {
+    // Its clock shows 4.9 s at 4.9 s and, after a restart, 6 s at 13 s: 7 s behind, without a step back.
     let mut clock = DeviceClock::new(32, DurNs(1000));
     let mut take = |device_ms: u64, ours_ms: u64| clock.take(device_ms * 1000, MonoNs(ours_ms * 1_000_000));
     for i in 0..50 {
@@ -174,8 +174,8 @@ fn a_restart_that_looks_like_a_delay_is_found_out() {
 }
 
 #[test]
-fn a_jump_ahead_of_an_hour_begins_an_epoch() {
-    // With a clock that wraps every 71.6 minutes, an hour ahead is the same as 11.6 minutes behind: a restart.
+fn jump_ahead_by_1_h_begins_an_epoch() {
+    // For a clock that wraps every 71.6 minutes, an hour ahead equals 11.6 minutes behind: a restart.
     for (device, epochs) in [(xsens(30.0), (0, 1)), (sbg(30.0), (1, 0))] {
         let mut clock = device.clock();
         let mut random = Random(5);
@@ -193,12 +193,12 @@ fn a_jump_ahead_of_an_hour_begins_an_epoch() {
 }
 
 #[test]
-fn a_stall_is_neither_a_restart_nor_a_drift() {
+fn stall_is_neither_restart_nor_drift() {
     let device = Device { queue_ns: 1e5, ..sbg(12.0) };
     let mut clock = device.clock();
     let mut random = Random(6);
     device.send(&mut clock, &mut random, 0.0, 200.0);
-    // Nothing comes for four seconds, then all of it at once.
+    // Four seconds of silence, then everything at once.
     for i in 0..200_u32 {
         let at_s = 200.0 + f64::from(i) * 0.02;
         clock.take(device.ticks(at_s * 1e9), MonoNs(5 * S + 204 * S));
@@ -211,7 +211,7 @@ fn a_stall_is_neither_a_restart_nor_a_drift() {
 }
 
 #[test]
-fn a_start_within_a_stall_is_forgiven() {
+fn start_within_a_stall_is_tolerated() {
     let device = sbg(25.0);
     let mut clock = device.clock();
     for i in 0..150_u32 {
@@ -225,8 +225,8 @@ fn a_start_within_a_stall_is_forgiven() {
 }
 
 #[test]
-fn ticks_of_another_length_show() {
-    // Ticks of 100 us interpreted as 1 us make a slow clock, the reverse a fast one.
+fn wrong_tick_length_shows_as_drift() {
+    // Ticks of 100 us read as 1 us make a slow clock, and the reverse a fast one.
     for (real, taken) in [(100_000, 1000), (1000, 100_000)] {
         let device = Device { tick: real, ..xsens(0.0) };
         let mut clock = DeviceClock::new(32, DurNs(taken));
@@ -237,8 +237,8 @@ fn ticks_of_another_length_show() {
 }
 
 #[test]
-fn a_counter_of_groups_is_unwrapped() {
-    // A sample every 10 ms, counted in 16 bits: it wraps every 655 s.
+fn sample_counter_is_unwrapped() {
+    // A sample every 10 ms, counted in 16 bits, wraps every 655 s.
     let mut clock = DeviceClock::new(16, DurNs(10_000_000));
     let mut last = DurNs::ZERO;
     for i in 0..200_000_u64 {
@@ -249,7 +249,7 @@ fn a_counter_of_groups_is_unwrapped() {
 }
 
 #[test]
-fn little_is_said_of_little() {
+fn few_stamps_give_no_drift() {
     let mut clock = DeviceClock::new(32, DurNs(1000));
     assert_eq!(
         clock.report(),
@@ -261,9 +261,9 @@ fn little_is_said_of_little() {
 }
 
 proptest! {
-    /// For any input: no panic, time never goes back within an epoch, and each epoch is counted.
+    /// For any input: no panic, time never decreases within an epoch, and each epoch is counted.
     #[test]
-    fn anything_is_endured(
+    fn any_stamps_are_handled(
         bits in 0_u32..80,
         tick in -5_i64..2_000_000_000,
         stamps in proptest::collection::vec((any::<u64>(), any::<u64>()), 0..300),

@@ -1,26 +1,28 @@
-//! Cuts a byte stream into the device's frames, so that each log message is one frame, stamped with its first byte.
+//! Splits a byte stream into the device's frames.
+//!
+//! Each log message is therefore one frame, stamped with its first byte.
 
 use std::collections::VecDeque;
 
 use crate::codec::{Codec as _, CodecCounts, Framed, Framing};
 use headrace_geometry::time::{DurNs, MonoNs};
 
-/// Cuts a byte stream, received in arbitrary pieces, into frames; bytes between frames are passed on too.
+/// Splits a byte stream that arrives in arbitrary pieces into frames, and passes on the bytes in between.
 ///
-/// No byte is dropped or reordered: the pieces concatenate to the input. However a stream is split and whenever its parts
-/// come, the frames are the same; each has the receive time of the part with its first byte, even if its last one comes much
-/// later, as from a bridge that sends blocks.
+/// No byte is dropped or reordered: the pieces concatenate to the input. The frames are the same however the stream
+/// is split and whenever its parts come. Each frame has the receive time of the part with its first byte, even if its
+/// last one comes much later, as from a bridge that sends blocks.
 #[derive(Debug, Clone)]
 pub struct Cutter<F, const N: usize> {
     codec: Framed<F, N>,
     silence: DurNs,
     /// Receive time of the last bytes.
     last: MonoNs,
-    /// Whether the silence since then has been noticed.
+    /// Whether the silence since then has been handled.
     settled: bool,
-    /// Bytes not passed on yet.
+    /// Bytes that have not been passed on yet.
     pending: Vec<u8>,
-    /// Receive times of the pending bytes and the byte count of each, oldest first.
+    /// Receive times of the pending bytes, each with its byte count, oldest first.
     parts: VecDeque<(MonoNs, usize)>,
 }
 
@@ -31,19 +33,20 @@ pub struct Piece<'a> {
     pub received: MonoNs,
     /// Its bytes.
     pub bytes: &'a [u8],
-    /// Whether it is a frame; otherwise it is the bytes before one.
+    /// Whether it is a frame; otherwise it contains bytes before a frame.
     pub is_frame: bool,
 }
 
 impl<F: Framing, const N: usize> Cutter<F, N> {
-    /// `silence` is the longest usual gap within a frame: after a longer one a false start that holds frames back is looked
-    /// for ([`Framed::settle_frames`]).
+    /// Creates a cutter; `silence` is the longest usual gap within a frame.
+    ///
+    /// After a longer gap it looks for a false start that holds frames back ([`Framed::settle_frames`]).
     pub fn new(framing: F, silence: DurNs) -> Self {
         let (pending, parts) = (Vec::with_capacity(2 * N), VecDeque::new());
         Self { codec: Framed::new(framing), silence, last: MonoNs(0), settled: true, pending, parts }
     }
 
-    /// Takes received bytes; `take` gets the pieces completed by them.
+    /// Processes received bytes; `take` receives the completed pieces.
     pub fn push(&mut self, received: MonoNs, bytes: &[u8], take: &mut dyn FnMut(Piece<'_>)) {
         if !self.settled && received.since(self.last) > self.silence {
             self.settled = true;
@@ -62,19 +65,21 @@ impl<F: Framing, const N: usize> Cutter<F, N> {
         self.hand_on(&found, take);
     }
 
-    /// Gives up an incomplete frame: the line was closed.
+    /// Gives up an incomplete frame because the line was closed.
     pub fn flush(&mut self, take: &mut dyn FnMut(Piece<'_>)) {
         let mut found = Vec::new();
         self.codec.flush_frames(|frame, behind| found.push((behind, frame.len())));
         self.hand_on(&found, take);
     }
 
-    /// Time at which to push no bytes, so that an incomplete frame that holds others back is noticed; `None` if there is none.
+    /// Returns when to push zero bytes to resolve an incomplete frame that holds others back.
+    ///
+    /// `None` if there is none.
     pub fn settles(&self) -> Option<MonoNs> {
         (!self.settled && !self.pending.is_empty()).then(|| self.last + self.silence + DurNs(1))
     }
 
-    /// Whether these bytes, on their own, hold a frame that is `one_of_its`.
+    /// Whether these bytes alone contain a frame that is `one_of_its`.
     pub fn accepts(&self, bytes: &[u8], one_of_its: impl Fn(&[u8]) -> bool) -> bool {
         let (mut codec, mut found) = (Framed::<F, N>::new(*self.codec.framing()), false);
         codec.push_frames(bytes, |frame, _| found |= one_of_its(frame));
@@ -87,8 +92,9 @@ impl<F: Framing, const N: usize> Cutter<F, N> {
         self.codec.counts()
     }
 
-    /// Passes on all pending bytes except those held by the codec; `found` has, for each frame, the distance of its start
-    /// from the end, and its length.
+    /// Passes on all pending bytes except those held by the codec.
+    ///
+    /// `found` contains, for each frame, the distance of its start from the end, and its length.
     fn hand_on(&mut self, found: &[(usize, usize)], take: &mut dyn FnMut(Piece<'_>)) {
         let total = self.pending.len();
         let mut handed = 0;
@@ -171,7 +177,7 @@ mod tests {
     }
 
     #[test]
-    fn frames_come_apart_from_what_is_between_them_each_with_its_first_byte_s_time() {
+    fn frames_are_separated_and_have_the_time_of_their_first_byte() {
         let parts: [(u64, &[u8]); 4] =
             [(1, &[7, 0xA5]), (2, &[1]), (3, &[9, 0x5A, 8, 8, 0xA5, 0]), (4, &[0x5A, 6])];
         let expected: Pieces = vec![
@@ -185,7 +191,7 @@ mod tests {
     }
 
     #[test]
-    fn silence_hands_on_what_was_begun_and_a_frame_inside_it() {
+    fn silence_releases_an_incomplete_frame_and_one_inside_it() {
         let mut cutter = cutter();
         assert!(pushed(&mut cutter, &[(1, &[0xA5, 5, 0xA5, 0, 0x5A])]).is_empty());
         assert_eq!(cutter.settles(), Some(MonoNs(52)));
@@ -195,26 +201,26 @@ mod tests {
     }
 
     #[test]
-    fn a_frame_whose_last_byte_comes_with_the_next_one_is_whole_and_has_its_first_bytes_time() {
+    fn frame_completed_with_the_next_one_keeps_its_first_time() {
         let parts: [(u64, &[u8]); 3] =
             [(1, &[0xA5, 1, 9]), (1 + 66, &[0x5A, 0xA5, 1, 8]), (1 + 2 * 66, &[0x5A, 0xA5])];
         let expected: Pieces = vec![(1, vec![0xA5, 1, 9, 0x5A], true), (67, vec![0xA5, 1, 8, 0x5A], true)];
         let mut cutter = cutter();
         assert_eq!(pushed(&mut cutter, &parts), expected);
-        // Nobody is woken again and again for the frame that is begun.
+        // No repeated wake-ups for a frame that has begun.
         assert!(pushed(&mut cutter, &[(133 + 52, &[])]).is_empty());
         assert_eq!(cutter.settles(), None);
     }
 
     #[test]
-    fn a_frame_cut_short_is_given_up_for_a_whole_one_after_a_silence() {
+    fn truncated_frame_yields_to_a_whole_one_after_silence() {
         let parts: [(u64, &[u8]); 2] = [(1, &[0xA5, 5, 1]), (100, &[0xA5, 0, 0x5A])];
         let expected: Pieces = vec![(1, vec![0xA5, 5, 1], false), (100, vec![0xA5, 0, 0x5A], true)];
         assert_eq!(pushed(&mut cutter(), &parts), expected);
     }
 
     #[test]
-    fn wakes_of_others_dont_put_the_silence_off() {
+    fn other_wake_ups_do_not_delay_the_silence() {
         let mut cutter = cutter();
         let lure: [(u64, &[u8]); 3] = [(1, &[0xA5, 5, 0xA5, 0, 0x5A]), (30, &[]), (51, &[])];
         assert!(pushed(&mut cutter, &lure).is_empty());
@@ -222,9 +228,10 @@ mod tests {
     }
 
     proptest! {
-        /// However the input is split, all bytes are passed on in order, times never decrease, and the frames are the codec's.
+        /// For any split of the input, all bytes are passed on in order, times never decrease, and the frames are the
+        /// codec's.
         #[test]
-        fn nothing_is_lost_or_changed(
+        fn cutter_loses_and_changes_nothing(
             bytes in proptest::collection::vec(prop_oneof![Just(0xA5u8), Just(0x5A), 0u8..7], 0..200),
             cuts in proptest::collection::vec(1usize..20, 1..40),
         ) {

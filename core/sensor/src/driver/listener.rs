@@ -11,7 +11,9 @@ pub struct Listener<F, const N: usize> {
 }
 
 impl<F: Framing, const N: usize> Listener<F, N> {
-    /// `silence` is the inter-frame timeout; `silence_timeout` is the longest time between messages of a healthy device.
+    /// Creates a listener.
+    ///
+    /// `silence` is the inter-frame timeout. `silence_timeout` is the longest time between messages of a healthy device.
     pub fn new(framing: F, silence: DurNs, silence_timeout: DurNs) -> Self {
         Self { cutter: Cutter::new(framing, silence), silence_timeout }
     }
@@ -49,10 +51,10 @@ impl<F: Framing + Send, const N: usize> Driver for Listener<F, N> {
     }
 }
 
-/// Describes the fault of a message, if it has one.
+/// Returns the fault of a message, if it has one.
 pub type Judge = Box<dyn Fn(&[u8]) -> Option<String> + Send>;
 
-/// Listens to whole messages and delivers each.
+/// Listens to whole messages and delivers each one.
 pub struct MessageListener {
     judge: Judge,
     silence_timeout: DurNs,
@@ -61,7 +63,9 @@ pub struct MessageListener {
 }
 
 impl MessageListener {
-    /// `judge` identifies foreign messages; `silence_timeout` is the longest time between messages of a healthy device.
+    /// Creates a listener.
+    ///
+    /// `judge` identifies foreign messages. `silence_timeout` is the longest time between messages of a healthy device.
     pub fn new(judge: Judge, silence_timeout: DurNs) -> Self {
         Self { judge, silence_timeout, good_frames: 0, complaint: None }
     }

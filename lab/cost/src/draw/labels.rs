@@ -1,4 +1,4 @@
-//! Labels beside markers, where they cover neither markers nor one another.
+//! Places labels beside markers so that they cover neither markers nor one another.
 
 use headrace_pictures::canvas::{Letters, Side, width_px};
 use headrace_pictures::polyline::{Frame, Px};
@@ -6,29 +6,29 @@ use headrace_pictures::polyline::{Frame, Px};
 /// Space between a marker and its label, pixels.
 const APART_PX: f64 = 9.0;
 
-/// From so far away on a line leads from the marker to its label, pixels.
+/// Distance from which on a line leads from the marker to its label, pixels.
 const FAR_PX: f64 = 14.0;
 
 /// A label with its place.
 pub(super) struct Placed {
     pub(super) place: Px,
     pub(super) side: Side,
-    /// Where a line to its marker ends; `None` of a label right beside it.
+    /// Start of a line to its marker; `None` if the label is right beside the marker.
     pub(super) led_from: Option<Px>,
 }
 
-/// What is taken up on a sheet so far.
+/// Areas of a sheet that are already occupied.
 #[derive(Default)]
 pub(super) struct Taken(Vec<Frame>);
 
 impl Taken {
-    /// Takes up the place of a marker.
+    /// Occupies the area of a marker.
     pub(super) fn marker(&mut self, [x, y]: Px) {
         const HALF_PX: f64 = 6.0;
         self.0.push(Frame { left: x - HALF_PX, top: y - HALF_PX, right: x + HALF_PX, bottom: y + HALF_PX });
     }
 
-    /// A free place for a label beside a marker, within a frame, which is then taken; `None` where there is none.
+    /// Finds and occupies a free place within a frame for a label beside a marker; `None` if there is none.
     pub(super) fn label(
         &mut self,
         [x, y]: Px,
@@ -42,7 +42,7 @@ impl Taken {
                 let by_px = match side {
                     Side::Right => APART_PX,
                     Side::Left => -APART_PX,
-                    // Right above or below its marker.
+                    // Directly above or below its marker.
                     Side::Middle if step == 0.0 => continue,
                     Side::Middle => 0.0,
                 };
@@ -85,7 +85,7 @@ mod tests {
     const SHEET: Frame = Frame { left: 0.0, top: 0.0, right: 400.0, bottom: 200.0 };
 
     #[test]
-    fn labels_of_crowded_markers_dont_cover_one_another() {
+    fn labels_of_crowded_markers_do_not_overlap() {
         let mut taken = Taken::default();
         let markers: Vec<Px> = (0..10).map(|k| [100.0 + 4.0 * f64::from(k), 100.0]).collect();
         for at in &markers {
@@ -102,7 +102,7 @@ mod tests {
     }
 
     #[test]
-    fn a_label_without_room_isnt_drawn() {
+    fn label_without_room_is_not_drawn() {
         let narrow = Frame { left: 0.0, top: 0.0, right: 30.0, bottom: 30.0 };
         assert!(Taken::default().label([15.0, 15.0], "much too long", SMALL, &narrow).is_none());
     }

@@ -1,4 +1,4 @@
-//! A trade as a picture: a chart for each scene, error to the right, cost upwards, both logarithmic.
+//! Draws a trade: a chart for each scene, with error to the right and cost upwards, both logarithmic.
 
 mod labels;
 mod panel;
@@ -13,15 +13,15 @@ use crate::words::number;
 use panel::{BAND, CLEAR, PLATEAU, Panel};
 
 const WIDTH_PX: u32 = 1000;
-/// Of a chart with its heading and what stands below it.
+/// Height of a chart with its heading and the text below, pixels.
 const PANEL_PX: f64 = 470.0;
-/// Title and legend.
+/// Height of title and legend, pixels.
 const TOP_PX: f64 = 96.0;
 const LINE_PX: f64 = 17.0;
-/// Lines for settings that are left out.
+/// Maximum number of lines for settings that are left out.
 const MOST_LEFT_OUT: usize = 6;
 
-/// A trade as SVG.
+/// Draws a trade as SVG.
 pub fn svg(trade: &Trade) -> String {
     let scenes = trade.scenes();
     let left_out = left_out(trade);
@@ -42,7 +42,7 @@ fn whole(px: f64) -> u32 {
     u32::try_from(headrace_geometry::math::floor_to_i64(px) + 1).unwrap_or(0)
 }
 
-/// What the marks mean, in a line below the title.
+/// Explains the marks in a line below the title.
 fn legend(canvas: &Canvas, trade: &Trade) {
     let y = 70.0;
     let mut x = 14.0;
@@ -66,7 +66,7 @@ fn legend(canvas: &Canvas, trade: &Trade) {
     }
 }
 
-/// Lines that say what isn't shown, or not where it is.
+/// Lines that state settings not shown, and points shown elsewhere than they are.
 fn left_out(trade: &Trade) -> Vec<String> {
     let fits = |line: String| {
         let room_px = f64::from(WIDTH_PX) - 28.0;

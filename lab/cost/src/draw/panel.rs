@@ -1,5 +1,6 @@
-//! One scene's chart: a line a method, a marker a setting, the front, the plateau, and in words the default, the knee and the price of
-//! the next step.
+//! One scene's chart: a line per method, a marker per setting, the front, and the plateau.
+//!
+//! Text states the default, the knee and the price of the next step.
 
 use headrace_pictures::canvas::{BOLD, Canvas, NORMAL, SMALL, Side};
 use headrace_pictures::chart::{Axis, Chart};
@@ -14,16 +15,16 @@ use crate::words;
 
 /// Band under the front.
 pub(super) const BAND: Look = Look { colour: Colour(214, 214, 214), width_px: 9.0, ..look::T };
-/// Ground of the plateau.
+/// Background of the plateau.
 pub(super) const PLATEAU: Colour = Colour(255, 240, 200);
 const WHISKER: Look = Look { colour: Colour(170, 170, 170), width_px: 0.9, ..look::T };
-/// From a marker to a label that stands away from it.
+/// Line from a marker to a label that isn't beside it.
 const LEADER: Look = Look { colour: Colour(110, 110, 110), width_px: 0.7, ..look::T };
-/// Errors within this ratio of the least are the plateau's.
+/// Errors within this ratio of the least error belong to the plateau.
 const SAME: f64 = 1.05;
-/// The least error that is told, as a multiple of the oracle's own.
+/// The least error shown, as a multiple of the oracle's own error.
 pub(super) const CLEAR: f64 = 10.0;
-/// Room about the outermost points, as a ratio.
+/// Margin around the outermost points, as a ratio.
 const ROOM: f64 = 1.25;
 
 pub(super) struct Panel<'a> {
@@ -63,7 +64,7 @@ impl<'a> Panel<'a> {
         }
     }
 
-    /// Where a point is drawn: errors that the oracle can't tell are drawn at the least that it can.
+    /// Position of a point. Errors below the oracle's resolution are drawn at that resolution.
     fn place(&self, point: &Point) -> [f64; 2] {
         [self.shown(point.error()), point.cost.middle]
     }
@@ -101,7 +102,7 @@ impl<'a> Panel<'a> {
         front
     }
 
-    /// The ground of a method's points that cost clearly more than others for no less error.
+    /// Draws the background of a method's points that cost clearly more than others without less error.
     fn plateau(&self, canvas: &Canvas, x: [f64; 2], y: [f64; 2]) {
         for method in self.methods() {
             self.plateau_of(method, canvas, x, y);
@@ -167,7 +168,7 @@ impl<'a> Panel<'a> {
             chart.canvas.marker(at, &look(point), size_px, point.is_default);
             taken.marker(at);
         }
-        // Those that must be read first; where there is no room left, the table on the page has the others.
+        // The most important ones come first. If there is no room left, the table on the page has the others.
         let knee = crate::point::knee(&self.trade.points, self.scene, self.trade.resolution());
         let is_knee = |point: &Point| knee.is_some_and(|knee| std::ptr::eq(knee, point));
         let mut points = self.points.clone();

@@ -1,4 +1,4 @@
-//! The points of a trade as CSV: a row a point.
+//! The points of a trade as CSV: one row per point.
 
 use crate::point::{Interval, Point, Trade};
 
@@ -30,7 +30,7 @@ fn row(trade: &Trade, point: &Point, [name, unit]: [&str; 2], error: Interval) -
     row
 }
 
-/// A cell, quoted where it has to be.
+/// A cell, quoted if necessary.
 fn quoted(cell: &str) -> String {
     if cell.contains([',', '"', '\n']) {
         format!("\"{}\"", cell.replace('"', "\"\""))

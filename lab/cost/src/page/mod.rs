@@ -1,5 +1,6 @@
-//! What was measured as files: a page in Markdown, JSON, and a CSV and a picture a trade. All are made from [`Results`] alone, so that a
-//! page that isn't its data's can be told.
+//! Writes results as files: a page in Markdown, JSON, and a CSV and a picture for each trade.
+//!
+//! All are made from [`Results`] alone, so a page that doesn't match its data can be detected.
 
 mod csv;
 mod markdown;
@@ -15,19 +16,19 @@ pub use table::table;
 /// Version of `cost.json`.
 pub const COST_VERSION: u32 = 1;
 
-/// What the bounds of costs are.
+/// Meaning of the bounds of costs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Bars {
-    /// Quartiles of nine rounds: what files have that don't say.
+    /// Quartiles of nine rounds, in files that don't state their bounds.
     #[default]
     Quartiles,
-    /// The median's interval of 95 %.
+    /// The 95 % interval of the median.
     Median,
 }
 
 impl Bars {
-    /// What they are, in words.
+    /// Description for the page.
     pub fn as_str(self) -> &'static str {
         match self {
             Self::Quartiles => "median of nine rounds measured in turns, with quartiles",
@@ -38,7 +39,7 @@ impl Bars {
     }
 }
 
-/// All that was measured.
+/// All results.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Results {
     /// Version of this format.
@@ -47,14 +48,14 @@ pub struct Results {
     pub program: String,
     /// The machine: processor, cores, debug or release.
     pub machine: String,
-    /// The command that gives this again.
+    /// The command that reproduces the results.
     pub command: String,
-    /// What the bounds of costs are.
+    /// Meaning of the bounds of costs.
     #[serde(default)]
     pub bars: Bars,
     /// The trades.
     pub trades: Vec<Trade>,
-    /// What isn't a choice.
+    /// Costs of things that aren't a choice.
     pub given: Vec<Given>,
 }
 

@@ -1,9 +1,9 @@
-//! A trade for the terminal.
+//! Formats a trade for the terminal.
 
 use crate::point::{Point, Trade};
 use crate::words::{self, append, number};
 
-/// A trade as a table, with its advice. Figures are numbered; what they are stands below.
+/// Formats a trade as a table, with its advice. Figures are numbered and explained below the table.
 pub fn table(trade: &Trade) -> String {
     let mut text = format!("{}\n{}\n", trade.title, trade.question);
     let names = trade.figures();
@@ -40,7 +40,7 @@ pub fn table(trade: &Trade) -> String {
     text
 }
 
-/// The setting, without the knob's name where the method is called by that.
+/// The setting, without the knob's name if the method has the same name.
 fn shown(point: &Point) -> String {
     if point.knob == point.method { point.value.clone() } else { words::setting(point) }
 }

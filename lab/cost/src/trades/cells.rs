@@ -5,7 +5,7 @@ use headrace_monitor::run::Loop;
 /// Empty squares of a grid: chainage of the centre and edge, m.
 pub(super) struct Squares(Vec<[f64; 2]>);
 
-/// The largest empty square that ends at each cell of the way's grid.
+/// The largest empty square that ends at each cell of the grid over the passed wall.
 pub(super) fn squares(dive: &Loop) -> Squares {
     let coverage = dive.coverage();
     let [along_m, around_m] = coverage.soundings.node_m();
@@ -13,7 +13,8 @@ pub(super) fn squares(dive: &Loop) -> Squares {
     let way = coverage.sections.sections_of(coverage.frontier.way());
     let (from_m, to_m) = (coverage.sections.bounds_m(way.start).0, coverage.sections.bounds_m(way.end).0);
     let mut squares = Vec::new();
-    // Cells of the row before and of this one: how many on edge the largest empty square is that ends there.
+    // For each cell of the previous and the current row: the edge, in cells, of the largest empty square that ends
+    // there.
     let (mut before, mut here): (Vec<u32>, Vec<u32>) = (Vec::new(), Vec::new());
     let mut row_m = f64::NEG_INFINITY;
     for node in coverage.soundings.nodes_between(from_m, to_m) {
@@ -39,7 +40,7 @@ pub(super) fn squares(dive: &Loop) -> Squares {
 }
 
 impl Squares {
-    /// The edge of the largest one whose centre lies between two chainages, m; 0 without any.
+    /// The edge of the largest square whose centre lies between two chainages, m; 0 if there is none.
     pub(super) fn largest_m(&self, from_m: f64, to_m: f64) -> f64 {
         let before = |x_m: f64| self.0.partition_point(|[at_m, _]| *at_m < x_m);
         let within = self.0.get(before(from_m)..before(to_m)).unwrap_or_default();

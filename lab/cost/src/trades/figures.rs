@@ -4,12 +4,12 @@ use headrace_geometry::math;
 
 use crate::point::{Error, Interval};
 
-/// Mean with its 95 % interval; of a single value that value.
+/// Mean with its 95 % interval; for a single value, that value.
 pub(super) fn spread(values: &[f64]) -> Option<Interval> {
     Interval::mean(values).or_else(|| Interval::quartiles(values))
 }
 
-/// Root mean square; `None` of nothing.
+/// Root mean square; `None` without values.
 pub(super) fn rms(values: impl Iterator<Item = f64>) -> Option<f64> {
     let (mut count, mut sum) = (0.0, 0.0);
     for value in values {
@@ -18,7 +18,7 @@ pub(super) fn rms(values: impl Iterator<Item = f64>) -> Option<f64> {
     (count > 0.0).then(|| math::sqrt(sum / count))
 }
 
-/// An error whose interval is that of values, one a dive; nothing of no values.
+/// An error whose interval comes from one value per dive; `None` without values.
 pub(super) fn error(name: &str, unit: &str, values: &[f64]) -> Option<Error> {
     Some(Error::new(name, unit, spread(values)?))
 }

@@ -1,4 +1,6 @@
-//! Holes: what finding the largest hole of a section exactly costs, beside tolerances, the lattice's T, and counts of cells.
+//! Holes: the cost of finding the largest hole of a section exactly.
+//!
+//! It is compared with tolerances, the lattice's T, and counts of cells.
 
 use headrace_coverage::HoleFinder;
 use headrace_monitor::run::Loop;
@@ -27,42 +29,44 @@ const QUICK_CELLS_M: [f64; 1] = [0.1];
 /// Lengths of sections, m, besides the shipped one.
 const SECTIONS_M: [f64; 2] = [0.05, 1.0];
 const QUICK_SECTIONS_M: [f64; 1] = [1.0];
-/// Metres of a dive that are judged, away from its ends.
+/// Range of a dive that is judged, away from its ends, m.
 const JUDGED_M: [f64; 2] = [4.0, 16.0];
-/// Beyond the end of a dive the tunnel goes on so far, m: grids of fine cells would otherwise be of its whole length.
+/// Length of tunnel beyond the end of a dive, m. Without this limit, grids of fine cells would cover the whole tunnel.
 const BEYOND_M: f64 = 30.0;
 const STRETCHES: u32 = 4;
 const NS: f64 = 1e9;
 /// Speed of all scenes, m/s.
 const SPEED_MPS: f64 = 0.1;
 
-/// Target of all scenes, m; a tenth of it is what decides, and a tenth of that counts as no difference.
+/// Target of all scenes, m. A tenth of it decides, and a tenth of that counts as no difference.
 const TARGET_M: f64 = 0.5;
 const DECIDES_M: f64 = TARGET_M / 10.0;
 const NOTHING_M: f64 = DECIDES_M / 10.0;
 
-/// A way to find how large the holes are.
+/// A method of finding the size of holes.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Setting {
     Exact,
     Tolerance(f64),
     Section(f64),
-    /// T_max of Eq. 16 for the speed that is driven.
+    /// T_max of Eq. 16 for the driven speed.
     Planned,
     /// The largest diagonal of a section's samples.
     Lattice,
     Cells(f64),
 }
 
-/// What is dived.
+/// A scene to dive.
 struct Case {
     name: &'static str,
-    /// The scene, but for the length of its only leg.
+    /// The scene, without the length of its only leg.
     text: String,
 }
 
-/// Effects of the field on four heads, as the field scene of VITA 1 has them on one, with a pilot who sways less: at a target of half a
-/// metre more than that misses it everywhere.
+/// Effects of the field on four heads.
+///
+/// The field scene of VITA 1 has them on one head. Here the pilot sways less, since with a target of half a metre more
+/// sway would miss it everywhere.
 const FIELD: &str = "motion_within_turn = {}\nocclusion = {}\n\
     pilot_drift = { across_m = 0.3, up_m = 0.2, yaw_deg = 2, period_s = 40 }\n\
     imu_noise = { gyro_degps_rthz = 0.007, accel_mps2_rthz = 0.001, attitude_deg = 0.3 }\n\
@@ -81,7 +85,7 @@ fn cases() -> Result<[Case; 3], CostError> {
     Ok([
         Case { name: "ideal", text: own("", "motion_within_turn = {}\nocclusion = {}\n") },
         Case { name: "drop-outs", text: drop_outs },
-        // Who knows that a cable hangs says so in the vehicle file.
+        // The vehicle file must state that the cable hangs.
         Case { name: "field", text: own("[vehicle_changes]\nnavigation.slack_sd_m = 0.06\n", FIELD) },
     ])
 }
@@ -132,7 +136,7 @@ fn left_out(inputs: &Inputs<'_>) -> Vec<LeftOut> {
     inputs.effort.pick(Some(quick), None).into_iter().collect()
 }
 
-/// A case's dives, a seed each.
+/// A case's dives, one per seed.
 struct Dives(Vec<(Scene, Recorded)>);
 
 impl Dives {
@@ -163,7 +167,7 @@ impl Dives {
         Ok(off_m)
     }
 
-    /// The sections as each setting has them, and the first dive, which is timed.
+    /// Judges the sections with each setting; keeps the first dive for timing.
     fn prepared(mut self, name: &'static str, settings: &[Setting]) -> Result<Prepared, CostError> {
         let mut judged: Vec<Vec<Vec<Judged>>> = settings.iter().map(|_| Vec::new()).collect();
         for (scene, recorded) in &mut self.0 {
@@ -183,7 +187,7 @@ struct Prepared {
     name: &'static str,
     vehicle: VehicleConfig,
     recorded: Recorded,
-    /// Of each setting, of each seed, the sections.
+    /// The sections by setting and seed.
     judged: Vec<Vec<Vec<Judged>>>,
 }
 
@@ -228,7 +232,7 @@ fn settings(effort: Effort) -> Vec<Setting> {
 }
 
 impl Setting {
-    /// Replays with this setting, and sets the vehicle back.
+    /// Replays with this setting, and then restores the vehicle.
     fn with<T>(
         self,
         vehicle: &mut VehicleConfig,
@@ -246,7 +250,7 @@ impl Setting {
         result
     }
 
-    /// The sections as this setting has them.
+    /// Judges the sections with this setting.
     fn judged(self, vehicle: &mut VehicleConfig, recorded: &Recorded) -> Result<Vec<Judged>, CostError> {
         self.with(vehicle, |vehicle| {
             let ended = recorded.replayed(vehicle, vehicle.navigation(), &mut |_| {})?;
@@ -263,7 +267,9 @@ impl Setting {
         })
     }
 
-    /// CPU time of a replay, and of looking for the holes of all its sections once more, s. What needs no search is without it.
+    /// CPU time of a replay, and of one more search for the holes of all its sections, s.
+    ///
+    /// Settings that need no search skip it.
     fn cost_s(self, vehicle: &mut VehicleConfig, recorded: &Recorded) -> Result<[f64; 2], CostError> {
         self.with(vehicle, |vehicle| {
             let (ended, whole_s) = recorded.timed(vehicle)?;
@@ -316,7 +322,7 @@ impl Setting {
 /// Name of the figure that isn't an error.
 const SEARCH: &str = "search or count alone";
 
-/// The sections by a T of the lattice.
+/// Judges the sections by a T of the lattice.
 fn by_lattice(dive: &JudgedDive, t_m: &dyn Fn(&JudgedSection) -> Option<f64>) -> Vec<Judged> {
     let target_m = dive.report.target_m;
     let judged = |section: &JudgedSection| {
@@ -327,7 +333,7 @@ fn by_lattice(dive: &JudgedDive, t_m: &dyn Fn(&JudgedSection) -> Option<f64>) ->
     verdicts::inner(dive).map(judged).collect()
 }
 
-/// T_max of Eq. 16 at the speed driven, for the heads as they are set, m.
+/// T_max of Eq. 16 at the driven speed for the configured heads, m.
 fn planned_t_m(vehicle: &VehicleConfig) -> Result<f64, CostError> {
     let failed = |why: &str| CostError::Figure { what: "T of the plan".to_owned(), why: why.to_owned() };
     let planner = Planner::new(vehicle.inspection().map_err(|why| failed(&why))?)?;
@@ -341,7 +347,7 @@ fn planned_t_m(vehicle: &VehicleConfig) -> Result<f64, CostError> {
     Ok(planner.t_max_m(mode, SPEED_MPS)?)
 }
 
-/// The sections by the largest empty square of cells; one as large as the target fails.
+/// Judges the sections by the largest empty square of cells; a square as large as the target fails.
 fn by_cells(dive: &JudgedDive, ended: &Loop) -> Vec<Judged> {
     let (target_m, squares) = (dive.report.target_m, cells::squares(ended));
     let judged = |section: &JudgedSection| {
@@ -351,7 +357,7 @@ fn by_cells(dive: &JudgedDive, ended: &Loop) -> Vec<Judged> {
     verdicts::inner(dive).map(judged).collect()
 }
 
-/// Looks for the hole of each section once.
+/// Searches once for the hole of each section.
 fn search(dive: &Loop, tolerance_m: f64) {
     let (coverage, mut finder) = (dive.coverage(), HoleFinder::new(tolerance_m));
     for index in coverage.sections.sections_of(coverage.frontier.way()) {

@@ -1,4 +1,4 @@
-//! What a finer look costs the live loop: the rings of the advice, ticks, and vertices of a surveyed profile.
+//! Cost of finer settings in the live loop: the rings of the advice, ticks, and vertices of a surveyed profile.
 
 use std::fmt::Write as _;
 
@@ -22,10 +22,10 @@ use crate::words::number;
 use headrace_oracle::dive::{Recorded, armed};
 use headrace_oracle::{TruthError, timed};
 
-/// The finest ring and look, which settings are held against, and another lattice of rays as fine but for a sixth.
+/// Reference settings: the finest ring and interval, and another lattice of rays that is coarser by a sixth.
 const FINEST: Looks = Looks { ring: 3600, anew_m: Some(0.001) };
 const AS_FINE: Looks = Looks { ring: 3000, anew_m: Some(0.001) };
-/// Differences of speed below this are the same, m/s.
+/// Largest difference of speed that counts as equal, m/s.
 const RESOLUTION_MPS: f64 = 1e-5;
 const USUAL_TICK_MS: u32 = 20;
 
@@ -40,9 +40,9 @@ struct Setting {
     tick_ms: u32,
 }
 
-/// What came of a dive.
+/// Result of a dive.
 struct Ran {
-    /// Advised speed at each beat, m/s; zero where there is none.
+    /// Advised speed at each update, m/s; zero if there is none.
     v_max_mps: Vec<f64>,
     verdicts: Vec<(i64, &'static str)>,
     /// CPU time of each tick, s.
@@ -149,7 +149,7 @@ fn settings() -> Vec<Setting> {
     settings
 }
 
-/// A recorded dive whose settings are judged, ready to be timed.
+/// A recorded dive with its settings judged, ready to be timed.
 struct Prepared {
     scene: &'static str,
     seeds: u32,
@@ -157,7 +157,7 @@ struct Prepared {
     markers: Vec<Marker>,
 }
 
-/// A setting as it is run, and what came of it.
+/// A setting as it is run, and its result.
 struct Marker {
     setting: Setting,
     vehicle: VehicleConfig,
@@ -165,7 +165,7 @@ struct Marker {
 }
 
 impl Prepared {
-    /// A scene, how far two references are apart, and the median of the speeds advised, m/s.
+    /// Prepares a scene; also returns the difference between two references and the median advised speed, m/s.
     fn of(inputs: &Inputs<'_>, name: &'static str, text: &str) -> Result<(Self, f64, f64), CostError> {
         let settings = settings();
         let seeds = inputs.effort.pick(1, 3);
@@ -201,7 +201,7 @@ impl Prepared {
         Ok((Self { scene: name, seeds, recorded, markers }, size, v_mps))
     }
 
-    /// The design profile as so many vertices on it, in place of its arcs.
+    /// Prepares the design profile as `count` vertices on it, instead of its arcs.
     fn surveyed(inputs: &Inputs<'_>) -> Result<Self, CostError> {
         let scene = inputs.scene(SHORT, 1)?;
         let recorded = Recorded::of(&scene, &scene.vehicle)?;
@@ -231,7 +231,7 @@ impl Prepared {
 }
 
 impl Marker {
-    /// Share of a core.
+    /// Share of a core that the loop takes.
     fn cost(&self, recorded: &Recorded) -> Result<f64, CostError> {
         let pace = Pace { tick: tick(self.setting.tick_ms), speed: None };
         Ok(recorded.cpu_with_s(&self.vehicle, self.vehicle.navigation(), pace)? / recorded.duration_s())
@@ -297,12 +297,12 @@ impl Ran {
         Ok(Self { v_max_mps, verdicts, ticks_s, digest: report.digest.clone() })
     }
 
-    /// How far its advice is off another's, beat by beat, rms, m/s.
+    /// Difference of its advice from another's, update by update, rms, m/s.
     fn off_mps(&self, other: &Self) -> f64 {
         rms(self.v_max_mps.iter().zip(&other.v_max_mps).map(|(a, b)| a - b)).unwrap_or(0.0)
     }
 
-    /// Sections of 100 with another verdict than another's.
+    /// Number of sections, per 100, with another verdict than the other run.
     fn other_verdicts(&self, other: &Self) -> f64 {
         let differing = self.verdicts.iter().zip(&other.verdicts).filter(|(a, b)| a != b).count();
         let differing = differing + self.verdicts.len().abs_diff(other.verdicts.len());
@@ -343,7 +343,7 @@ impl Against {
 
 const VERTICES: [u32; 5] = [10, 100, 1_000, 10_000, 100_000];
 
-/// A profile's file: so many vertices at equal arc lengths.
+/// A profile's file: `count` vertices at equal arc lengths.
 fn outline(profile: &Profile, count: u32) -> String {
     let mut lines = String::new();
     for k in 0..count {
@@ -377,7 +377,7 @@ fn left_out(inputs: &Inputs<'_>) -> Vec<LeftOut> {
     left_out
 }
 
-/// Of each scene: what the coarsest ring and the longest tick save, and why they aren't the default all the same.
+/// For each scene, the savings by the coarsest ring and the longest tick, and why they aren't the default.
 fn reasons(points: &[Point]) -> Vec<String> {
     let mut scenes: Vec<&str> = Vec::new();
     for point in points.iter().filter(|point| point.method == "tick") {
@@ -385,7 +385,7 @@ fn reasons(points: &[Point]) -> Vec<String> {
             scenes.push(&point.scene);
         }
     }
-    // Of a method in a scene: the default, and the setting of the largest number.
+    // For a method in a scene: the default, and the setting with the largest number.
     let pair = |scene: &str, method: &str| {
         let of = || points.iter().filter(|point| point.scene == scene && point.method == method);
         let coarsest = of().max_by(|a, b| a.number.unwrap_or(0.0).total_cmp(&b.number.unwrap_or(0.0)))?;

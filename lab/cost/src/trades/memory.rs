@@ -1,4 +1,4 @@
-//! What determinism and memory cost: what isn't a choice, and so has no picture.
+//! Cost of determinism and memory. These aren't choices, so there is no picture.
 
 use std::hint::black_box;
 
@@ -11,17 +11,17 @@ use crate::point::{Given, Interval};
 use crate::scene::Inputs;
 use headrace_oracle::timed;
 
-/// Arguments of functions that are tried.
+/// Number of arguments tried per function.
 const ARGUMENTS: u32 = 100_000;
 /// Length of a tunnel, m, and the perimeter of its wall.
 const LENGTH_M: f64 = 7000.0;
 const PERIMETER_M: f64 = 28.0;
-/// Samples on a metre of wall, and round it.
+/// Number of samples per metre of tunnel.
 const PER_M: u32 = 1_000;
-/// Metres of wall that are sampled: so many remain open, and so many are packed.
+/// Metres of wall with samples that remain open, and of wall with samples that are packed.
 const OPEN_M: u32 = 20;
 const PACKED_M: u32 = 160;
-/// Bytes of a sample as it is before it is packed: chainage, arc length, step, visit, head.
+/// Bytes of a sample before packing: chainage, arc length, step, visit, head.
 const PLAIN_BYTES: usize = size_of::<WallSample>();
 
 /// Makes the table.
@@ -48,7 +48,7 @@ pub fn tabulate(inputs: &Inputs<'_>, progress: &mut dyn FnMut(&str)) -> Result<G
 
 type Function = (&'static str, fn(f64) -> f64, fn(f64) -> f64, [f64; 2]);
 
-/// Name, as the core has it, as the platform has it, and from which to which argument.
+/// Name, the core's function, the platform's function, and the range of arguments.
 #[expect(
     clippy::disallowed_methods,
     reason = "the platform's functions are what the core's are held against"
@@ -60,12 +60,13 @@ const FUNCTIONS: [Function; 4] = [
     ("logarithm", math::ln, |x| x.ln(), [0.01, 100.0]),
 ];
 
-/// Arguments evenly over a range.
+/// Evenly spaced arguments over a range.
 fn arguments([from, to]: [f64; 2]) -> impl Iterator<Item = f64> {
     (0..ARGUMENTS).map(move |k| from + (to - from) * (f64::from(k) + 0.5) / f64::from(ARGUMENTS))
 }
 
-/// Share of arguments at which two functions differ in their bits, percent, and the largest difference in units of the last place.
+/// Share of arguments for which two functions differ in their bits, percent, and the largest difference in units of the
+/// last place.
 fn differing(ours: fn(f64) -> f64, others: fn(f64) -> f64, range: [f64; 2]) -> (f64, u64) {
     let (mut count, mut most) = (0_u32, 0);
     for argument in arguments(range) {
@@ -88,7 +89,7 @@ fn of_function(inputs: &Inputs<'_>, function: &Function) -> Result<Vec<String>, 
     Ok(row(&format!("libm: {name}"), lost, &costs))
 }
 
-/// Nanoseconds of each setting, one of `count` pieces of its work.
+/// Nanoseconds per piece for each setting; the work has `count` pieces.
 fn ns_each<T>(
     inputs: &Inputs<'_>,
     count: u32,
@@ -106,7 +107,7 @@ fn row(what: &str, lost: String, costs: &[Interval]) -> Vec<String> {
     vec![what.to_owned(), lost, ns(0), ns(1)]
 }
 
-/// Places in double precision against single.
+/// Compares places in double precision with single precision.
 fn single_precision(inputs: &Inputs<'_>) -> Result<Vec<String>, CostError> {
     let places: Vec<[f64; 2]> =
         arguments([LENGTH_M - 100.0, LENGTH_M]).zip(arguments([0.0, PERIMETER_M])).map(Into::into).collect();
@@ -133,11 +134,11 @@ fn single_precision(inputs: &Inputs<'_>) -> Result<Vec<String>, CostError> {
     Ok(row("places in double precision, not single", lost, &costs))
 }
 
-/// Samples packed to some four bytes, against as many that stay open.
+/// Compares samples packed to about four bytes with samples that stay open.
 fn packing(inputs: &Inputs<'_>) -> Result<Vec<String>, CostError> {
     let (half, packed) = (filled(PACKED_M / 2)?, filled(PACKED_M)?);
     let moved_m = packed.fidelity(0.0, 10.0).moved_m;
-    // What is open is as much in both.
+    // The open part is the same in both.
     let [fewer, more] = [half.usage(), packed.usage()];
     let bytes = (more.bytes - fewer.bytes) as f64 / (more.kept - fewer.kept).max(1) as f64;
     let costs = in_turns(inputs.effort.rounds(), &[PACKED_M, OPEN_M], |metres| {
@@ -167,7 +168,7 @@ fn filled(metres: u32) -> Result<SampleStore, CostError> {
     Ok(store)
 }
 
-/// A helix of one head's samples.
+/// Adds a helix of one head's samples.
 fn fill(store: &mut SampleStore, metres: u32) -> Result<(), CostError> {
     let step_m = [1.0 / f64::from(PER_M), PERIMETER_M / 120.0];
     for k in 0..metres * PER_M {
@@ -186,14 +187,14 @@ mod tests {
     use super::*;
 
     #[test]
-    fn functions_that_are_the_same_differ_nowhere_and_others_as_much_as_they_do() {
+    fn equal_functions_do_not_differ_and_others_by_their_difference() {
         assert_eq!(differing(math::sin, math::sin, [-7.0, 7.0]), (0.0, 0));
         let off = |x: f64| f64::from_bits(math::exp(x).to_bits() + 3);
         assert_eq!(differing(math::exp, off, [-1.0, 1.0]), (100.0, 3));
     }
 
     #[test]
-    fn a_packed_sample_takes_less_and_moves_by_less_than_its_quantum() {
+    fn packed_sample_is_smaller_and_moves_by_less_than_its_quantum() {
         let store = filled(PACKED_M).unwrap();
         let usage = store.usage();
         let bytes = usage.bytes as f64 / usage.kept as f64;

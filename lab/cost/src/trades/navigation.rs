@@ -1,4 +1,4 @@
-//! What a better navigation costs: methods, rates of the inertial unit, epochs and windows, near the portal and far from it.
+//! Cost of better navigation: methods, rates of the inertial unit, epochs and windows, near the portal and far from it.
 
 mod cable;
 mod heard;
@@ -35,13 +35,13 @@ const CHAINAGES_M: [u32; 3] = [16, 3000, 6900];
 const USUAL_HZ: u32 = 100;
 /// A tenth of the smallest shipped target, 0.5 m.
 const DECIDES_M: f64 = 0.05;
-/// The time at which a section is passed is found to this, s.
+/// Accuracy of the time at which a section is passed, s.
 const MOMENT_S: f64 = 0.1;
-/// So much of a dive is timed, s.
+/// Length of a dive that is timed, s.
 const TIMED_S: f64 = 15.0;
-/// What is worse by less than this is the same.
+/// Differences below this count as equal.
 const RESOLUTION_M: f64 = 5e-4;
-/// A beam of more than a turn: no return of a head is ever far enough from the one before to be used.
+/// A beam of more than a turn. No return of a head is then far enough from the one before to be used.
 const NO_RETURNS_RAD: f64 = 1e9;
 
 /// A scene at a chainage.
@@ -50,13 +50,13 @@ struct Place {
     text: String,
     vehicle: String,
     speed_mps: f64,
-    /// Time of a turn of its heads, s.
+    /// Duration of a turn of its heads, s.
     turn_s: f64,
-    /// Whether all knobs are tried here, or methods alone.
+    /// Whether all knobs are tried here, or only the methods.
     all_knobs: bool,
 }
 
-/// How a dive is navigated.
+/// Method of navigation.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Way {
     Cable,
@@ -77,12 +77,12 @@ struct Setting {
     way: Way,
 }
 
-/// A dive with what navigation hears of it.
+/// A dive with the input of navigation.
 struct Dived {
     recorded: Recorded,
     vehicle: VehicleConfig,
     hearing: Hearing,
-    /// What is timed.
+    /// The part that is timed.
     timed: Hearing,
     by_cable: JudgedDive,
 }
@@ -148,24 +148,26 @@ fn places(inputs: &Inputs<'_>) -> Result<Vec<Place>, CostError> {
     Ok(places)
 }
 
-/// The four heads of VITA 2, and the slack of the shipped scene's cable.
+/// The four heads of VITA 2, and the cable slack of the shipped scene.
 const FOUR_HEADS: &str = "\"sonar_0\", \"sonar_1\", \"sonar_2\", \"sonar_3\"";
 const SLACK: &str = "tether_slack = { reach_m = 0.15, period_s = 30 }";
 
-/// The field scene with VITA 2 and four heads. What its vehicle file says of the cable, slack_sd_m = 0.02, is of one that is kept taut.
+/// The field scene with VITA 2 and four heads.
+///
+/// The vehicle file's slack_sd_m = 0.02 is that of a taut cable.
 fn four_heads(field: &str) -> String {
     let four = field.replace("vita1.toml", "vita2-4.toml").replace("\"sonar_0\"", FOUR_HEADS);
     four.replace(SLACK, "tether_slack = { reach_m = 0.03, period_s = 30 }")
 }
 
-/// The field scene with VITA 2 and four heads from a chainage on, leg by leg: metres and m/s.
+/// The field scene with VITA 2 and four heads from a chainage on, with legs in metres and m/s.
 ///
-/// Errors: the shipped scene isn't as it is expected.
+/// Errors: the shipped scene isn't as expected.
 pub(super) fn field_of_four(from_m: u32, legs: &[(f64, f64)]) -> Result<String, CostError> {
     moved(&four_heads(file("vita1-field.toml")?), from_m, legs)
 }
 
-/// The field scene elsewhere, leg by leg: metres and m/s.
+/// The field scene at another chainage, with legs in metres and m/s.
 fn moved(text: &str, from_m: u32, legs: &[(f64, f64)]) -> Result<String, CostError> {
     const START: &str = "start_m = 5\n";
     const LEG: &str = "[[trajectory.legs]]\ndistance_m = 130\nspeed_mps = 0.16\n";
@@ -178,7 +180,7 @@ fn moved(text: &str, from_m: u32, legs: &[(f64, f64)]) -> Result<String, CostErr
     Ok(text.replace(START, &format!("start_m = {from_m}\n")).replace(LEG, &legs))
 }
 
-/// The markers of a place: methods, and where all knobs are tried, these.
+/// The settings for a place: methods and, if all knobs are tried, these.
 fn settings(usual: &Settings, all_knobs: bool) -> Vec<Setting> {
     let deaf = Settings { return_step_rad: NO_RETURNS_RAD, ..*usual };
     let method = |value: &str, way, is_default| Setting {
@@ -226,11 +228,11 @@ fn settings(usual: &Settings, all_knobs: bool) -> Vec<Setting> {
     settings
 }
 
-/// A place whose dives are judged, ready to be timed.
+/// A place with its dives judged, ready to be timed.
 struct Prepared {
     scene: String,
     settings: Vec<Setting>,
-    /// What is measured: a default is a marker of several lines, and measured once.
+    /// The distinct settings. A default is a marker of several lines, and is measured once.
     unique: Vec<(u32, Way)>,
     /// Number of seeds and errors of each of them.
     errors: Vec<(u32, Vec<Error>)>,
@@ -288,7 +290,7 @@ impl Prepared {
         found.map_or(f64::NAN, |(_, dived)| dived.cost_ns_per_s(way))
     }
 
-    /// A marker; `cost` is of what it shares with others.
+    /// Makes a marker; `cost` gives the cost of a distinct setting, which several markers may share.
     fn point(&self, setting: &Setting, cost: impl Fn(usize) -> Option<Interval>) -> Option<Point> {
         let which = self.unique.iter().position(|unique| *unique == (setting.rate_hz, setting.way))?;
         let ((seeds, errors), cost) = self.errors.get(which).zip(cost(which))?;
@@ -308,7 +310,7 @@ impl Prepared {
     }
 }
 
-/// Times what is measured of all places in turns.
+/// Times the distinct settings of all places in turns.
 fn points(inputs: &Inputs<'_>, prepared: &[Prepared]) -> Result<Vec<Point>, CostError> {
     let all: Vec<(&Prepared, (u32, Way))> =
         prepared.iter().flat_map(|place| place.unique.iter().map(move |unique| (place, *unique))).collect();
@@ -324,7 +326,7 @@ fn points(inputs: &Inputs<'_>, prepared: &[Prepared]) -> Result<Vec<Point>, Cost
     Ok(points)
 }
 
-/// What navigation itself gave in one dive.
+/// Results of navigation itself in one dive.
 #[derive(Debug, Clone, Copy)]
 struct Figures {
     turn_m: Option<f64>,
@@ -377,7 +379,7 @@ impl Dived {
         }
     }
 
-    /// CPU time of the navigation alone, ns a second of dive.
+    /// CPU time of navigation alone, ns per second of dive.
     fn cost_ns_per_s(&self, way: &Way) -> f64 {
         let ((), cpu_s) = timed(|| {
             let mut navigation = self.navigation(way, &self.timed);
@@ -429,7 +431,7 @@ impl Dived {
         JudgedDive { report: report.clone(), truth: Arc::clone(truth), sections: sections.clone() }
     }
 
-    /// Time over which errors accumulate between neighbouring passes of a place, as the filter has it, s.
+    /// Time over which errors accumulate between neighbouring passes of a place, as in the filter, s.
     fn between_passes_s(&self, place: &Place) -> f64 {
         let heads = self.vehicle.heads();
         let passes_per_s = heads.len() as f64 / place.turn_s;
@@ -439,7 +441,7 @@ impl Dived {
     }
 }
 
-/// How long after the vehicle had truly passed the end of a section it was flagged, mean of the flags, s; `None` without one.
+/// Mean delay between truly passing the end of a section and its flag, s; `None` without flags.
 fn flag_delay_s(dive: &JudgedDive, scenery: &Scenery) -> Option<f64> {
     let end_s = dive.report.dive.duration_s;
     let passed_s = |chainage_m: f64| {
@@ -458,8 +460,10 @@ fn flag_delay_s(dive: &JudgedDive, scenery: &Scenery) -> Option<f64> {
     (count > 0.0).then(|| delays.iter().sum::<f64>() / count)
 }
 
-/// D_true by two references; and true places against what a taut cable says, after its way through emulator, bytes and decoder: two
-/// references of the same displacement that share the trajectory alone.
+/// Error of the references.
+///
+/// One comparison is D_true by two references. The other compares true places with a taut cable's readings after
+/// emulator, bytes and decoder, which share only the trajectory with them.
 fn oracle(inputs: &Inputs<'_>, places: &[Place]) -> Result<OracleError, CostError> {
     let (mut hole_m, mut displacement_m) = (0.0_f64, 0.0_f64);
     for place in places.iter().filter(|place| place.all_knobs) {

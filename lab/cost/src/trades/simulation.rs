@@ -1,4 +1,4 @@
-//! What a truer simulation costs: each effect left out, and the rays of a beam.
+//! Cost of a truer simulation: each effect left out, and the rays of a beam.
 
 mod effects;
 
@@ -16,38 +16,38 @@ use crate::words::number;
 use headrace_oracle::dive::{JudgedDive, Recorded};
 use headrace_oracle::timed;
 
-/// Rays of a beam that are held against [`MANY_RAYS`].
+/// Numbers of rays per beam that are compared with [`MANY_RAYS`].
 const RAYS: [u32; 7] = [1, 2, 4, 8, 16, 32, 64];
-/// Rays of a beam by default.
+/// Default number of rays per beam.
 const USUAL_RAYS: u32 = 16;
 const MANY_RAYS: u32 = 1024;
-/// As good as many, in other places within the beam.
+/// A second reference, as good as many rays, with rays at other places within the beam.
 const OTHER_RAYS: u32 = 769;
 /// A tenth of the smallest shipped target, 0.5 m.
 const DECIDES_M: f64 = 0.05;
-/// The simulation's own rounding is far below, and no difference of D so small matters.
+/// Smallest difference of D that matters, m; the simulation's own rounding is far below it.
 const RESOLUTION_M: f64 = 1e-4;
-/// Differences need seeds to differ between.
+/// Fewest seeds: differences need a spread.
 const LEAST_SEEDS: u32 = 2;
-/// So many seconds of a dive are timed, at most: a slice of the simulation is a second.
+/// Maximum number of seconds of a dive that are timed; a slice of the simulation is a second.
 const TIMED_S: u32 = 8;
-/// As [`MANY_RAYS`] take their time.
+/// Number of seeds for rays, since [`MANY_RAYS`] take long.
 const RAYS_SEEDS: u32 = 2;
 
-/// A scene with what may be left out of it.
+/// A scene and the effects that may be left out of it.
 struct Stage {
     name: &'static str,
     text: String,
     effects: Vec<String>,
-    /// Sizes of its boulders, m, by their numbers among the features.
+    /// Sizes of its boulders by feature number, m.
     boulders_m: Vec<f64>,
 }
 
-/// What a dive gave.
+/// Results of a dive.
 struct Figures {
-    /// D of each section, by where it begins in millimetres, and its verdict.
+    /// D and verdict of each section, by the section's start in millimetres.
     sections: Vec<(i64, Option<f64>, &'static str)>,
-    /// Numbers of the features that were hit.
+    /// Numbers of the hit features.
     features_hit: Vec<u16>,
 }
 
@@ -122,18 +122,20 @@ fn stages(inputs: &Inputs<'_>) -> Result<Vec<Stage>, CostError> {
     Ok(stages)
 }
 
-/// Boulders round the wall, from the smallest to the largest, m.
+/// Number of boulders around the wall.
 const BOULDERS: u32 = 60;
 const SMALLEST_M: f64 = 0.02;
 const LARGEST_M: f64 = 0.8;
 
-/// Size of a boulder, m: neighbours in number are neighbours in size.
+/// Size of a boulder, m. Consecutive numbers have similar sizes.
 fn boulder_m(number: u32) -> f64 {
     SMALLEST_M + (LARGEST_M - SMALLEST_M) * f64::from(number) / f64::from(BOULDERS - 1)
 }
 
-/// A boulder of the scene, none near another of its size: chainage and arc length follow additive sequences of golden ratio and
-/// root of two.
+/// Table of a boulder.
+///
+/// Chainage and arc length follow additive sequences of the golden ratio and the root of two, so that no boulder is
+/// near another of its size.
 fn boulder(number: usize, size_m: f64) -> String {
     let share = |by: f64| math::wrap(number as f64 * by, 1.0);
     let (chainage_m, arc_m) = (5.5 + 3.0 * share(0.618_033_988_7), 28.0 * share(0.414_213_562_4));
@@ -149,8 +151,9 @@ const BOULDERS_EFFECTS: &str =
 /// VITA 2 with four heads along a plain stretch.
 const BARE: &str = "vehicle = \"vita2-4.toml\"\n[trajectory]\nstart_m = 5\n[[trajectory.legs]]\ndistance_m = 4\nspeed_mps = 0.09\n";
 
-/// The scenes whose beams' rays are varied: short ones, since a thousand rays take their time. The first is the one on which both
-/// references are held against each other.
+/// The scenes in which the number of rays is varied.
+///
+/// They are short, since a thousand rays take long. Both references are compared on the first one.
 fn beams(inputs: &Inputs<'_>) -> Result<Vec<Stage>, CostError> {
     let lengths = inputs.effort.pick(&[("field", 7.0)][..], &[("field", 20.0), ("boulders", 0.6)]);
     let mut of_field = vec![field(20)?];
@@ -170,7 +173,7 @@ fn beams(inputs: &Inputs<'_>) -> Result<Vec<Stage>, CostError> {
     Ok(beams)
 }
 
-/// The shipped field scene over so many metres.
+/// The shipped field scene over `length_m` metres.
 fn field(length_m: u32) -> Result<Stage, CostError> {
     let text = file("vita1-field.toml")?.replace("distance_m = 130", &format!("distance_m = {length_m}"));
     // At the speed that its vehicle file plans.
@@ -184,16 +187,16 @@ fn field(length_m: u32) -> Result<Stage, CostError> {
     Ok(Stage { name: "field", text, effects, boulders_m: Vec::new() })
 }
 
-/// A marker whose errors are known, with what is timed of it: a point without its cost.
+/// A marker with known errors and the scene to time: a point without its cost.
 struct Prepared {
     point: Point,
     scene: Scene,
-    /// Returns of a head in the time that is simulated.
+    /// Number of sonar returns in the simulated time.
     returns: f64,
 }
 
 impl Prepared {
-    /// The first seed's scene is timed.
+    /// Prepares timing of the first seed's scene.
     fn of(inputs: &Inputs<'_>, text: &str, point: Point) -> Result<Self, CostError> {
         let scene = inputs.scene(text, 1)?;
         let recorded = Recorded::of(&scene, &scene.vehicle)?;
@@ -202,7 +205,7 @@ impl Prepared {
         Ok(Self { point, scene, returns })
     }
 
-    /// CPU time of a simulation, ns a return of a head.
+    /// CPU time of a simulation, ns per sonar return.
     fn cost_ns(&self) -> Result<f64, CostError> {
         let mut simulation = Simulation::new(&self.scene)?;
         let ((), cpu_s) = timed(|| (0..TIMED_S).take_while(|_| simulation.advance()).for_each(drop));
@@ -210,7 +213,7 @@ impl Prepared {
     }
 }
 
-/// Times all markers of all scenes in turns; what leaving an effect out saves is against its scene's whole.
+/// Times all markers of all scenes in turns. The savings of leaving an effect out are relative to the whole scene.
 fn points(inputs: &Inputs<'_>, prepared: Vec<Prepared>) -> Result<Vec<Point>, CostError> {
     let costs = in_turns(inputs.effort.rounds(), &prepared, Prepared::cost_ns)?;
     let mut whole = f64::NAN;
@@ -226,7 +229,7 @@ fn points(inputs: &Inputs<'_>, prepared: Vec<Prepared>) -> Result<Vec<Point>, Co
     Ok(points)
 }
 
-/// The line of effects that are left out, one by one; the default leaves none out and comes first.
+/// The line of effects left out one by one. The default leaves none out and comes first.
 const LEFT_OUT: &str = "left out";
 
 fn effects_of(inputs: &Inputs<'_>, stage: &Stage, seeds: u32) -> Result<Vec<Prepared>, CostError> {
@@ -257,7 +260,7 @@ fn effects_of(inputs: &Inputs<'_>, stage: &Stage, seeds: u32) -> Result<Vec<Prep
     Ok(prepared)
 }
 
-/// Markers of rays, and how far two references are from one another, m.
+/// The markers for numbers of rays, and the difference between two references, m.
 fn rays_of(inputs: &Inputs<'_>, stage: &Stage, seeds: u32) -> Result<(Vec<Prepared>, f64), CostError> {
     let rays = || [MANY_RAYS].into_iter().chain(RAYS);
     let text = |rays: u32| Ok((rays.to_string(), effects::with_rays(&stage.text, rays)?));
@@ -283,13 +286,13 @@ fn rays_of(inputs: &Inputs<'_>, stage: &Stage, seeds: u32) -> Result<(Vec<Prepar
     if stage.name != "field" {
         return Ok((prepared, 0.0));
     }
-    // One dive says how far two references are apart.
+    // One dive shows the difference between two references.
     let others = [MANY_RAYS, OTHER_RAYS].map(text).into_iter().collect::<Result<Vec<_>, CostError>>()?;
     let (references, _) = self::differences(inputs, &others, 1)?;
     Ok((prepared, references.get(1).map_or(f64::NAN, Differences::change_m)))
 }
 
-/// Of each seed: how a change of the scene changed its figures.
+/// For each seed, the effect of a change of the scene on the results.
 #[derive(Default)]
 struct Differences {
     hole_m: Vec<f64>,
@@ -302,7 +305,7 @@ impl Differences {
         spread(&self.hole_m).map_or(f64::NAN, |change| change.middle.abs())
     }
 
-    /// The size of the mean change first, with the interval of its size; then the change itself.
+    /// The errors: first the size of the mean change, with the interval of its size; then the change itself.
     fn errors(&self) -> Vec<Error> {
         let size = spread(&self.hole_m).map(|Interval { low, middle, high }| Interval {
             low: if low <= 0.0 && high >= 0.0 { 0.0 } else { low.abs().min(high.abs()) },
@@ -319,7 +322,9 @@ impl Differences {
     }
 }
 
-/// Dives each text with the same seeds, and compares each with the first text's; and which features each met, dive by dive.
+/// Dives each text with the same seeds and compares it with the first text.
+///
+/// Also returns the features hit in each dive.
 fn differences(
     inputs: &Inputs<'_>,
     texts: &[(String, String)],
@@ -344,10 +349,10 @@ fn differences(
     Ok((differences, hits))
 }
 
-/// Numbers of the features that were hit, dive by dive.
+/// Numbers of the hit features, dive by dive.
 type Hits = Vec<Vec<u16>>;
 
-/// The smallest boulder hit and the largest missed, m; nothing where there are none.
+/// The smallest boulder hit and the largest missed, m; empty if there are none.
 fn boulders_hit(sizes_m: &[f64], hits: &Hits) -> Vec<Error> {
     let by_number = || (0_u16..).zip(sizes_m);
     let (mut smallest_m, mut missed_m) = (Vec::new(), Vec::new());
@@ -362,7 +367,7 @@ fn boulders_hit(sizes_m: &[f64], hits: &Hits) -> Vec<Error> {
     errors.into_iter().flatten().collect()
 }
 
-/// Section by section: both dives are of one vehicle on one way.
+/// Compares section by section; both dives are of one vehicle on one trajectory.
 fn compare(whole: &Figures, other: &Figures, differences: &mut Differences) {
     let (mut changes_m, mut count, mut passed, mut differing) = (Vec::new(), 0.0, 0.0, 0.0);
     for (start, hole_m, verdict) in &other.sections {
@@ -397,7 +402,7 @@ impl Figures {
     }
 }
 
-/// Numbers of the features that the axes of beams met and whose returns were heard.
+/// Numbers of the features that beam axes met and whose returns were detected.
 fn features_hit(scene: &Scene) -> Result<Vec<u16>, CostError> {
     let mut simulation = Simulation::with_truth(scene)?;
     let mut hit = Vec::new();
@@ -440,7 +445,7 @@ fn left_out(inputs: &Inputs<'_>) -> Vec<LeftOut> {
 /// A change of D below this counts as none, m.
 const UNCHANGED_M: f64 = 0.01;
 
-/// Why a beam has as many rays, and a scene all its effects.
+/// Reasons for the default number of rays and for keeping all effects.
 fn reasons(points: &[Point]) -> Vec<String> {
     let of_rays = |rays: u32| {
         let is = move |point: &&Point| point.knob == "rays" && point.value == rays.to_string();
@@ -474,7 +479,7 @@ fn reasons(points: &[Point]) -> Vec<String> {
     rays.into_iter().chain(effects).collect()
 }
 
-/// The dearest effect that changed nothing, and the one that changed most.
+/// Advice: the most expensive effect that changed nothing, and the effect that changed most.
 fn advice(points: &[Point]) -> String {
     let left_out = || points.iter().filter(|point| point.method == LEFT_OUT && !point.is_default);
     let figure = |point: &Point, name: &str| {

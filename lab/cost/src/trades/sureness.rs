@@ -1,4 +1,6 @@
-//! The price of sureness: what the standard deviation of the displacement between passes, and the confidence asked for, cost in hours.
+//! The price of confidence in hours.
+//!
+//! It depends on the standard deviation of the displacement between passes, and on the required confidence.
 
 use headrace_sampling::layout::HeadLayout;
 use headrace_sampling::margin::ExpectedErrors;
@@ -15,7 +17,7 @@ use crate::words::number;
 use headrace_oracle::dive::Recorded;
 
 const VEHICLE: &str = "vita2-4.toml";
-/// The mode of its heads, and its target, m.
+/// The mode and the target, m, of its heads.
 const MODE: &str = "fast";
 const TARGET_M: f64 = 0.5;
 /// Length of the tunnel, m.
@@ -25,9 +27,9 @@ const SIGMAS_M: [f64; 7] = [0.002, 0.005, 0.01, 0.02, 0.03, 0.04, 0.06];
 /// Standard deviations between hole and target for a verdict.
 const CONFIDENCES: [u32; 3] = [1, 2, 3];
 const USUAL: u32 = 2;
-/// Second half of a dive: so much faster than planned, that there is what mustn't pass.
+/// Ratio of the speed in the second half of a dive to the planned speed, so that some sections must fail.
 const HURRY: f64 = 1.2;
-/// Times between two passes for which a standard deviation is told, s: any.
+/// Times between two passes for which a standard deviation is stated, s: all of them.
 const TIMES_S: [f64; 2] = [0.001, 1000.0];
 
 /// Measures the trade.
@@ -130,11 +132,11 @@ fn point(
     })
 }
 
-/// What verdicts of so many sigma are worth in field dives, half at a speed and half faster.
+/// Errors of verdicts at `confidence` sigmas in field dives, half at a speed and half faster.
 fn dived(inputs: &Inputs<'_>, confidence: u32, speed_mps: f64) -> Result<Vec<Error>, CostError> {
     let half_m = inputs.effort.pick(8.0, 15.0);
     let legs = [(half_m, speed_mps), (half_m, HURRY * speed_mps)];
-    // Phases hold for a speed to a millimetre a second.
+    // Phases are computed for a speed to a millimetre per second.
     let changes = format!("[vehicle_changes]\nheads.planned_speed_mps = {speed_mps:.3}\n");
     let text = field_of_four(16, &legs)?.replace("[trajectory]", &format!("{changes}[trajectory]"));
     let seeds: Vec<u32> = (1..=inputs.effort.seeds()).collect();
@@ -147,7 +149,7 @@ fn dived(inputs: &Inputs<'_>, confidence: u32, speed_mps: f64) -> Result<Vec<Err
     Ok(verdicts::errors(&dives, TARGET_M))
 }
 
-/// Why verdicts are of two sigma although one is cheaper.
+/// Reasons for verdicts at two sigmas although one is cheaper.
 fn reasons(points: &[Point]) -> Vec<String> {
     let passed = |confidence: u32| {
         let is = |point: &&Point| point.method == format!("{confidence} sigma");

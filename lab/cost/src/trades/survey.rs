@@ -1,7 +1,7 @@
-//! Survey: what a finer target costs in hours of diving.
+//! Survey: the cost of a finer target in hours of diving.
 //!
-//! Hours and T are `plan`'s, from the same functions. Beside T stands the largest hole of a simulated dive at the speed that is
-//! planned for it, its heads phased for that speed: a promise that is kept shows less than T.
+//! Hours and T come from the functions of `plan`. They are shown beside the largest hole of a simulated dive at the
+//! planned speed, with heads phased for that speed. The plan is kept if that hole is smaller than T.
 
 use headrace_sampling::layout::HeadLayout;
 use headrace_sampling::plan::{Planner, Question};
@@ -19,25 +19,27 @@ use headrace_oracle::truth::{Truth, TruthTaker};
 /// Targets, m.
 const TARGETS_M: [f64; 8] = [0.2, 0.3, 0.4, 0.5, 0.7, 1.0, 1.4, 2.0];
 const QUICK_TARGETS_M: [f64; 3] = [0.5, 0.7, 1.0];
-/// Modes, drifts and layouts are compared at these.
+/// Targets for comparing modes, drifts and layouts, m.
 const FEW_TARGETS_M: [f64; 4] = [0.4, 0.5, 1.0, 2.0];
 const QUICK_FEW_TARGETS_M: [f64; 1] = [SHIPPED_M];
 /// The shipped target, m.
 const SHIPPED_M: f64 = 0.5;
 /// The shipped mode of the vehicle whose modes are compared.
 const SHIPPED_MODE: &str = "fast";
-/// Places of a vehicle that is off the middle, left and up, as multiples of its drift, m.
+/// Positions of a vehicle off the middle, left and up, as multiples of its drift.
 const PLACES: [[f64; 2]; 5] = [[1.0, 1.0], [-1.0, -1.0], [1.0, -1.0], [-1.0, 1.0], [1.0, 0.0]];
-/// Speed of the way back, on which nothing is inspected, m/s: what the demonstration's pilot goes at when in a hurry, rounded.
+/// Speed of the way back, during which nothing is inspected, m/s.
+///
+/// It is the speed of the demonstration's pilot when in a hurry, rounded.
 const WAY_BACK_MPS: f64 = 0.3;
-/// Share of the way that is gone over again.
+/// Share of the tunnel that is passed a second time.
 const AGAIN_SHARE: f64 = 0.1;
-/// Length of a section in which both references are compared, m, and how many of them.
+/// Length of the sections in which both references are compared, m, and their number.
 const STRETCH_M: f64 = 0.25;
 const STRETCHES: u32 = 4;
-/// The least that is claimed of the oracle, m: both references are computed to that.
+/// Smallest error claimed for the oracle, m: both references are computed to that.
 const LEAST_M: f64 = 1e-9;
-/// Names of the vehicles that are compared, with their files; the last is the one whose modes, layouts and drifts are.
+/// Names of the compared vehicles, with their files. The modes, layouts and drifts compared are those of the last one.
 const VEHICLES: [(&str, &str); 4] = [
     ("VITA 1, one head", "vita1.toml"),
     ("VITA 2, two heads", "vita2-2.toml"),
@@ -48,9 +50,9 @@ const VEHICLES: [(&str, &str); 4] = [
 /// Scene of the vehicles.
 const HEADS: &str = "heads, each vehicle in its fastest mode";
 
-/// A vehicle with what is changed of it.
+/// A vehicle with changes.
 struct Way<'a> {
-    /// The line in the picture.
+    /// Name of its line in the picture.
     method: String,
     file: &'a str,
     mode: Option<&'static str>,
@@ -138,7 +140,7 @@ fn reasons(points: &[Point]) -> Vec<String> {
     reasons
 }
 
-/// Promises that a dive doesn't keep.
+/// Text about plans that a dive doesn't keep.
 fn broken(points: &[Point]) -> Option<String> {
     let is_broken = |point: &&Point| {
         point.errors.get(1).is_some_and(|error| error.unit == "m" && error.interval.middle > point.error())
@@ -247,7 +249,7 @@ impl Survey<'_> {
         Ok(())
     }
 
-    /// Takes a point, of the true holes of its dives; the tunnel is so long, m.
+    /// Adds a point with the true holes of its dives; the tunnel is `length_m` long.
     fn point(&mut self, planned: &Planned<'_>, holes: &[TrueHole], length_m: f64) {
         let Planned { scene, way, mode, target_m, speed_mps, there_h } = *planned;
         let back_h = length_m / WAY_BACK_MPS / 3600.0;
@@ -293,7 +295,7 @@ fn is_shipped(target_m: f64) -> bool {
     (target_m - SHIPPED_M).abs() < 1e-9
 }
 
-/// What is planned for a target.
+/// The plan for a target.
 struct Planned<'a> {
     scene: &'a str,
     way: &'a Way<'a>,
@@ -303,19 +305,19 @@ struct Planned<'a> {
     there_h: f64,
 }
 
-/// The largest hole of a dive, m, and by how much both references may be off, where that was looked at.
+/// The largest hole of a dive, m, and the error of both references if compared.
 struct TrueHole {
     hole_m: f64,
     may_be_off_m: Option<f64>,
 }
 
-/// The true holes of what is planned: one of each seed.
+/// The true holes of the plans, one per seed.
 fn true_holes(
     inputs: &Inputs<'_>,
     planned: &[Planned<'_>],
     middle: [f64; 2],
 ) -> Result<Vec<Vec<TrueHole>>, CostError> {
-    // Without effects that draw random numbers there is nothing to a seed but the place off the middle.
+    // Without effects that draw random numbers a seed changes only the position off the middle.
     let seeds_of = |planned: &Planned<'_>| {
         if planned.way.drift_m > 0.0 { inputs.effort.pick(2, 5) } else { 1 }
     };
@@ -347,9 +349,9 @@ fn true_hole(inputs: &Inputs<'_>, dives: &Dives<'_>, seed: u32) -> Result<TrueHo
     Ok(TrueHole { hole_m: truth.wall()?.hole_m(from_m, to_m), may_be_off_m })
 }
 
-/// The plan of a vehicle file with another layout and a tolerated drift: what `headrace plan` says of it.
+/// The plan of a vehicle file with another layout and a tolerated drift, as from `headrace plan`.
 ///
-/// Errors: a vehicle that is wrong, or that can't be planned for.
+/// Errors: the vehicle is invalid, or can't be planned for.
 pub fn planner(
     inputs: &Inputs<'_>,
     text: &str,
@@ -399,7 +401,7 @@ impl Dives<'_> {
     }
 }
 
-/// What follows, from the hours of the points.
+/// Advice from the hours of the points.
 fn advice(points: &[Point]) -> String {
     let hours = |method: &str, target_m: f64| {
         let is = |point: &&Point| {

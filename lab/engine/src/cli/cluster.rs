@@ -1,4 +1,4 @@
-//! The command line of campaigns on many machines.
+//! Command line of campaigns on many machines.
 
 use std::net::SocketAddr;
 use std::sync::Arc;
@@ -8,7 +8,7 @@ use headrace_campaign::campaign::Campaign;
 use headrace_campaign::maker::Maker;
 use headrace_campaign::{Error, cluster};
 
-/// Where a program of the cluster listens unless told otherwise; the second is an executor's.
+/// Default addresses of the scheduler and of an executor.
 const LISTENS: [SocketAddr; 2] = [
     SocketAddr::new(std::net::IpAddr::V4(std::net::Ipv4Addr::LOCALHOST), 50050),
     SocketAddr::new(std::net::IpAddr::V4(std::net::Ipv4Addr::LOCALHOST), 50051),
@@ -35,7 +35,7 @@ pub(crate) struct Arguments {
 }
 
 impl Arguments {
-    /// Is the scheduler or an executor, if that is asked.
+    /// Runs as the scheduler or an executor, if requested; returns whether it did.
     pub(crate) async fn serve(&self, maker: &Arc<Maker>, threads: usize) -> Result<bool, Error> {
         if self.schedule {
             let address = self.listen.unwrap_or(LISTENS[0]);
@@ -52,7 +52,7 @@ impl Arguments {
         Ok(true)
     }
 
-    /// The session of the scheduler that is given.
+    /// The session of the given scheduler.
     pub(crate) fn session(&self, campaign: &Campaign) -> Result<Option<SessionContext>, Error> {
         let Some(scheduler) = &self.scheduler else { return Ok(None) };
         host_and_port("--scheduler", scheduler)?;
@@ -60,7 +60,7 @@ impl Arguments {
     }
 }
 
-/// A host, and the number of a port.
+/// Splits a host and a port number.
 fn host_and_port<'a>(option: &str, text: &'a str) -> Result<(&'a str, u16), Error> {
     let both = text.rsplit_once(':').and_then(|(host, port)| Some((host, port.parse().ok()?)));
     let found = both.filter(|(host, port)| !host.is_empty() && *port > 0);

@@ -1,11 +1,11 @@
-//! Campaigns on a cluster of processes of this machine. `campaign/try-cluster` kills executors, and measures.
+//! Campaigns on a cluster of processes on this machine. `lab/try-cluster` kills executors, and measures.
 
 use std::net::{SocketAddr, TcpListener, TcpStream};
 use std::process::{Child, Stdio};
 
 use super::*;
 
-/// Processes that end with this.
+/// Processes that end when this is dropped.
 struct Cluster {
     address: String,
     processes: Vec<Child>,
@@ -21,7 +21,7 @@ impl Drop for Cluster {
 }
 
 impl Cluster {
-    /// A scheduler and two executors of one thread with this cache.
+    /// Starts a scheduler and two executors with one thread each and this cache.
     fn start(cache: &Path) -> Self {
         let free = || TcpListener::bind("127.0.0.1:0").unwrap().local_addr().unwrap();
         let address = free();
@@ -37,7 +37,7 @@ impl Cluster {
     fn process(&mut self, cache: &Path, arguments: &[&str], address: SocketAddr) {
         let mut command = Command::new(env!("CARGO_BIN_EXE_headrace-campaign"));
         command.args(arguments).arg("--listen").arg(address.to_string()).arg("--cache").arg(cache);
-        // What a killed one leaves goes with the cache's folder.
+        // Files left by a killed process are removed with the cache's folder.
         command.env("TMPDIR", cache.parent().unwrap());
         let mut child = command.stderr(Stdio::null()).spawn().unwrap();
         while TcpStream::connect(address).is_err() {
@@ -49,9 +49,9 @@ impl Cluster {
 }
 
 #[test]
-fn executors_make_the_tables_and_answers_that_threads_make() {
+fn executors_give_the_same_tables_and_answers_as_threads() {
     let (folder, scratch) = (dives(), tempfile::tempdir().unwrap());
-    // What can't be read is a row.
+    // An unreadable log is a row.
     std::fs::write(folder.path().join("nothing.mcap"), "nothing").unwrap();
     let (here, there) = (scratch.path().join("here"), scratch.path().join("there"));
     let cluster = Cluster::start(&there);
@@ -79,14 +79,14 @@ fn executors_make_the_tables_and_answers_that_threads_make() {
         let (answer, summary) = ask(folder.path(), &there, sql, &scheduler);
         assert!(!expected.is_empty());
         assert_eq!(answer, expected, "{sql}");
-        // The unreadable one is tried again.
+        // The unreadable log is tried again.
         assert!(summary.contains(" 1 replayed, 5 from the cache"), "{summary}");
     }
     assert!(files(&there) == files(&here), "executors make other files of another target than threads");
 }
 
 #[test]
-fn a_cache_that_is_not_the_executors_is_named() {
+fn cache_not_shared_with_executors_is_named() {
     let (folder, scratch) = (dives(), tempfile::tempdir().unwrap());
     let cluster = Cluster::start(&scratch.path().join("theirs"));
     let output = run(folder.path(), &scratch.path().join("ours"), &["--scheduler", &cluster.address]);
@@ -95,7 +95,7 @@ fn a_cache_that_is_not_the_executors_is_named() {
 }
 
 #[test]
-fn a_scheduler_that_is_not_there_is_named() {
+fn missing_scheduler_is_named() {
     let (folder, cache) = (dives(), tempfile::tempdir().unwrap());
     for (scheduler, code, why) in
         [("nowhere", 2, "--scheduler nowhere: expected HOST:PORT"), ("127.0.0.1:9", 1, "127.0.0.1:9")]

@@ -14,7 +14,7 @@ const SIZE_PX: [u32; 2] = [900, 640];
 const FRAME: Frame = Frame { left: 66.0, top: 78.0, right: 806.0, bottom: 540.0 };
 /// Top of the legend, pixels.
 const LEGEND_PX: f64 = 600.0;
-/// One in this many samples is marked, in Figures 6 and 8: more would overlap.
+/// Interval between marked samples in Figures 6 and 8; more marks would overlap.
 const MARKED: [usize; 2] = [5, 20];
 
 /// Look of dimension lines.
@@ -61,7 +61,7 @@ fn note(canvas: &Canvas, marked: usize, more: &str) {
     canvas.text([14.0, 626.0], &words, Side::Right, SMALL);
 }
 
-/// A length dimensioned along the tunnel, its text on white above or below it.
+/// A dimension along the tunnel, with its text on white above or below it.
 fn measured(chart: &Chart<'_>, [from_m, to_m]: [f64; 2], arc_m: f64, look: &Look, words: (&str, f64)) {
     let (from, to) = (chart.px([from_m, arc_m]), chart.px([to_m, arc_m]));
     chart.canvas.span(from, to, look);

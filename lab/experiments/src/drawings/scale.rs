@@ -1,4 +1,4 @@
-//! A colour scale from pale to dark: a larger value is darker in greyscale print and for the colour-blind, too.
+//! A colour scale from pale to dark. Larger values are darker, also in greyscale print and for colour-blind readers.
 
 use headrace_geometry::math;
 use headrace_pictures::canvas::{Canvas, NORMAL, SMALL, Side};

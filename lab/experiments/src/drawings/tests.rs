@@ -1,4 +1,4 @@
-//! The pictures: well-formed, reproducible, and their content.
+//! Tests that the pictures are well-formed and reproducible, and checks their content.
 
 use headrace_pictures::xml::well_formed;
 
@@ -15,7 +15,7 @@ fn check(svg: &str, says: &[&str]) {
 }
 
 #[test]
-fn figure_6_shows_passes_evenly_spaced_and_a_faster_head() {
+fn figure_6_shows_evenly_spaced_passes_and_a_faster_head() {
     let figure = figures::phase_shift().unwrap();
     let spaced_m = figure.t_x_m / 4.0;
     assert!((figure.t_x_m - 0.197 * 4.8).abs() < 1e-9);
@@ -42,7 +42,7 @@ fn figure_6_shows_passes_evenly_spaced_and_a_faster_head() {
 }
 
 #[test]
-fn figure_8_shows_long_and_short_ways_whose_sum_is_two_t_x_over_s() {
+fn figure_8_shows_long_and_short_distances_that_add_up_to_two_t_x_over_s() {
     let figure = figures::sectors().unwrap();
     let gaps: Vec<f64> = figure.at_line.windows(2).map(|pair| pair[1] - pair[0]).collect();
     assert!(gaps.len() >= 4, "{gaps:?}");
@@ -74,7 +74,7 @@ fn drawn(configurations: &[(u8, &'static str, bool, bool)]) -> (Walls, String) {
 }
 
 #[test]
-fn figure_12_has_passes_evenly_spaced_by_alignment_and_otherwise_not() {
+fn figure_12_passes_are_evenly_spaced_only_if_aligned() {
     let (figure, svg) = drawn(&PHASES[..3]);
     let sectors = &figure.panels[2];
     assert!(
@@ -99,7 +99,7 @@ fn figure_12_has_passes_evenly_spaced_by_alignment_and_otherwise_not() {
 }
 
 #[test]
-fn figure_13_has_gaps_on_the_side_walls_in_phase_shift_and_strips_without_samples_in_sectors() {
+fn figure_13_shows_side_wall_gaps_in_phase_shift_and_empty_strips_in_sectors() {
     let (figure, svg) = drawn(&[AT_GAPS[1], AT_GAPS[3]]);
     let [phase, sector] = figure.panels.as_slice() else { panic!("two panels") };
     let gap = phase.widest.unwrap();

@@ -20,7 +20,7 @@ const APART_PX: f64 = 20.0;
 /// Height of the panels of samples and of surfaces, pixels.
 const SAMPLES_PX: [f64; 2] = [136.0, 446.0];
 const SURFACES_PX: [f64; 2] = [514.0, 790.0];
-/// Most dots in a panel.
+/// Maximum number of dots in a panel.
 const MOST_DOTS: usize = 3000;
 /// Strips with widely spaced passes or none.
 const WIDE: Colour = Colour(255, 244, 200);
@@ -106,12 +106,12 @@ fn samples(chart: &Chart<'_>, panel: &Panel, length_m: f64) {
     }
 }
 
-/// One in this many samples is drawn.
+/// Interval between drawn samples.
 fn thinned(panel: &Panel) -> usize {
     panel.samples.len().div_ceil(MOST_DOTS).max(1)
 }
 
-/// Cells by colour; vertically adjacent cells of one colour are joined.
+/// Draws cells by colour; vertically adjacent cells of one colour are joined.
 fn surface(chart: &Chart<'_>, panel: &Panel, figure: &Walls) {
     let [along, round] = panel.cells.map(|cells| usize::try_from(cells).unwrap_or(1).max(1));
     let size_m = [figure.length_m / along as f64, figure.profile.perimeter_m() / round as f64];

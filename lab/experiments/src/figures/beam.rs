@@ -15,7 +15,7 @@ const RANGE_M: f64 = 10.0;
 const POINTS: u32 = 60;
 /// Rays of a simulated beam: the most a scene allows.
 const RAYS: usize = 64;
-/// One in this many points of a curve is also simulated.
+/// Interval between points of a curve that are also simulated.
 const SIMULATED: u32 = 6;
 
 /// Figure 15.
@@ -44,7 +44,7 @@ pub(crate) struct Footprint {
     pub simulated: Vec<[f64; 2]>,
 }
 
-/// Computes them for the blueprint's tunnel.
+/// Computes the footprints for the blueprint's tunnel.
 ///
 /// Errors: none in practice.
 pub(crate) fn footprints() -> Result<Footprints, ExperimentError> {

@@ -17,7 +17,7 @@ pub(crate) use walls::{AT_GAPS, PHASES, Panel, Walls, walls};
 pub(crate) struct Place {
     /// Head number.
     pub head: u16,
-    /// Way along the tunnel from where the picture begins, m.
+    /// Distance along the tunnel from the start of the picture, m.
     pub x_m: f64,
     /// Arc length from the floor's centre, m.
     pub arc_m: f64,
@@ -50,7 +50,7 @@ impl Window {
         within.map(|s| Place { head: s.head, x_m: s.at.x() - self.from_m, arc_m: s.arc_m }).collect()
     }
 
-    /// The heads' tracks within and one step beyond.
+    /// The heads' tracks within the window and one step beyond.
     fn ways(&self, dive: &Dive) -> Vec<Way> {
         let mut ways = Vec::new();
         for samples in &dive.heads {
@@ -68,7 +68,7 @@ impl Window {
     }
 }
 
-/// Adds a step to the track that it continues, if any; a step over the seam as two that meet there.
+/// Adds a step to the track that it continues, if any. A step over the seam becomes two that meet there.
 fn add_step(ways: &mut Vec<Way>, head: u16, perimeter_m: f64, from: [f64; 2], to: [f64; 2]) {
     for [begin, end] in polyline::over_seam(perimeter_m, from, to) {
         match ways.last_mut() {

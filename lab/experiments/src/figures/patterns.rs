@@ -83,7 +83,7 @@ fn pitch_m(dive: &Dive) -> f64 {
     SPEED_MPS * dive.ping_period_s * TAU / dive.step_rad
 }
 
-/// Simulates four heads, FASTEST.
+/// Simulates four heads in FASTEST.
 ///
 /// Errors: none with the built-in vehicles.
 pub(crate) fn phase_shift() -> Result<PhaseShift, ExperimentError> {
@@ -152,7 +152,7 @@ fn faster(dive: &Dive, gain_m: f64, length_m: f64) -> Vec<Way> {
     ways
 }
 
-/// Simulates two heads, MEDIUM.
+/// Simulates two heads in MEDIUM.
 ///
 /// Errors: none with the built-in vehicles.
 pub(crate) fn sectors() -> Result<Sectors, ExperimentError> {

@@ -1,9 +1,9 @@
-//! The seam and the beams; figures of whole dives are tested with their drawings.
+//! Tests the seam and the beams. Figures of whole dives are tested with their drawings.
 
 use super::*;
 
 #[test]
-fn a_way_over_the_seam_is_two() {
+fn track_over_the_seam_is_split_in_two() {
     let mut ways = Vec::new();
     for (from, to) in [([0.0, 8.0], [1.0, 9.0]), ([1.0, 9.0], [3.0, 1.0]), ([3.0, 1.0], [4.0, 2.0])] {
         add_step(&mut ways, 3, 10.0, from, to);
@@ -13,9 +13,9 @@ fn a_way_over_the_seam_is_two() {
     assert!(ways.iter().all(|way| way.head == 3));
 }
 
-/// The simulator's cone against the paper's formula, computed independently.
+/// Compares the simulator's cone with the paper's formula, computed independently.
 #[test]
-fn verif_simulated_beams_cover_what_the_formula_says() {
+fn simulated_beams_match_the_formula() {
     let figure = footprints().unwrap();
     assert!((figure.corner_deg - 59.27).abs() < 0.05, "{}", figure.corner_deg);
     for footprint in figure.by_range.iter().chain(&figure.by_angle) {

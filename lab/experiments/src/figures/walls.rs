@@ -19,9 +19,11 @@ const START_M: f64 = 5.0;
 const CELLS: [u32; 2] = [40, 100];
 /// Lines along the wall on which passes are counted.
 const LINES: u32 = 360;
-/// A line with gaps this many times the usual is in a shadow.
+/// Ratio of a line's largest gap to the usual one from which the line is in a shadow.
 const IN_SHADOW: f64 = 1.5;
-/// Share of cells within the distance scale: those at a floor's corners, which any such surface rounds off, exceed it.
+/// Share of cells within the distance scale.
+///
+/// The cells at a floor's corners exceed it, since any such surface rounds corners off.
 const SCALE_SHARE: f64 = 0.93;
 
 /// Heads, mode, sectors, aligned.
@@ -51,7 +53,7 @@ pub(crate) struct Walls {
     pub length_m: f64,
     /// The panels.
     pub panels: Vec<Panel>,
-    /// Upper end of the colour scale, m: all but a few cells are below.
+    /// Upper end of the colour scale, m; all except a few cells are below.
     pub most_m: f64,
 }
 
@@ -196,7 +198,7 @@ fn lines(dive: &Dive, window: Window) -> Vec<Line> {
     (0..LINES).map(line).collect()
 }
 
-/// The largest gap; of adjacent lines in the same shadow, that of the middle one.
+/// The largest gap. Among adjacent lines in the same shadow, that of the middle one.
 fn widest(lines: &[Line]) -> Option<Gap> {
     let mut lengths: Vec<f64> = lines.iter().filter_map(Line::widest).map(|gap| gap.length_m()).collect();
     lengths.sort_by(f64::total_cmp);
@@ -211,7 +213,7 @@ fn widest(lines: &[Line]) -> Option<Gap> {
     lines.get(middle).unwrap_or(worst).widest()
 }
 
-/// Runs of lines for which `kind` holds, from and to, m.
+/// Runs of lines that satisfy `kind`, from and to, m.
 fn strips(lines: &[Line], perimeter_m: f64, kind: impl Fn(&Line) -> bool) -> Vec<[f64; 2]> {
     let apart_m = perimeter_m / f64::from(LINES);
     let mut strips: Vec<[f64; 2]> = Vec::new();

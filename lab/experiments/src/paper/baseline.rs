@@ -9,7 +9,7 @@ use super::drift::{Across, Rig, across};
 use super::modes::{Mode, modes};
 use super::printed::Line;
 
-/// Our predictions for all modes and rigs.
+/// Recomputed predictions for all modes and rigs.
 #[derive(Debug, Clone)]
 pub(super) struct Baselines {
     modes: Vec<Mode>,

@@ -1,4 +1,4 @@
-//! Tables 3 and 4: the baseline beside ours.
+//! Tables 3 and 4: the printed baseline beside the recomputed one.
 
 use headrace_sampling::layout::HeadLayout;
 use serde::Serialize;
@@ -43,7 +43,7 @@ pub struct SeveralHeadsRow {
     pub t_y_max_m: Cell,
 }
 
-/// A printed number beside ours at the paper's stated speed and at the speed it was computed for.
+/// A printed number beside recomputed ones at the paper's stated speed and at the speed of its computation.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct AtBothSpeeds {
     /// At [`STATED_SPEED_MPS`].

@@ -4,16 +4,16 @@ use serde::Serialize;
 
 use super::printed::{Digits, Printed, difference_percent};
 
-/// A printed number and ours, both in the unit of the field's name.
+/// A printed number and the recomputed one, both in the unit of the field's name.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Cell {
     /// As the paper has it.
     pub printed: Printed,
-    /// Our value.
+    /// Recomputed value.
     pub ours: f64,
-    /// Difference of ours from the printed number, percent of it; `None` for a printed zero.
+    /// Difference of the recomputed from the printed number, percent of the printed one; `None` for a printed zero.
     pub difference_percent: Option<f64>,
-    /// Whether rounding or truncating ours gives the printed digits.
+    /// Whether rounding or truncating the recomputed value gives the printed digits.
     pub digits: Digits,
     /// Mark of the note that it refers to.
     pub note: Option<char>,
@@ -30,15 +30,15 @@ pub struct Note {
     pub text: String,
 }
 
-/// Whether a note is about a fault of the paper.
+/// Kind of a note.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum NoteKind {
-    /// The paper contradicts itself or its own equations.
+    /// The paper is inconsistent with itself or with its own equations.
     Erratum,
-    /// The same, found only when the tables were recomputed.
+    /// An erratum found only when the tables were recomputed.
     NewErratum,
-    /// Origin of the printed numbers, or the reason why ours differ.
+    /// Origin of the printed numbers, or the reason for a difference.
     Finding,
 }
 
@@ -65,13 +65,14 @@ impl Cell {
         Self { note: Some(mark), ..self }
     }
 
-    /// Refers to a note if neither rounding nor truncating ours gives the printed digits.
+    /// Adds the mark of a note, unless rounding or truncating the value gives the printed digits.
     pub(super) fn noted_unless_equal(self, mark: char) -> Self {
         if self.digits == Digits::Neither { self.noted(mark) } else { self }
     }
 
-    /// Refers to a note if rounding ours doesn't give the printed digits: where related numbers differ, truncation
-    /// would match this one by chance.
+    /// Adds the mark of a note, unless rounding the value gives the printed digits.
+    ///
+    /// If related numbers differ, truncation would match this one only by chance.
     pub(super) fn noted_unless_rounded(self, mark: char) -> Self {
         if self.digits.rounded() { self } else { self.noted(mark) }
     }

@@ -25,20 +25,20 @@ pub struct CombinedRow {
 /// T of a layout.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Combined {
-    /// Of the mean T_y.
+    /// T for the mean T_y.
     pub t_mean_m: CombinedCell,
-    /// Of T_ymin.
+    /// T for T_ymin.
     pub t_min_m: CombinedCell,
-    /// Of T_ymax.
+    /// T for T_ymax.
     pub t_max_m: CombinedCell,
 }
 
-/// A printed T beside two of ours, which ignore the vehicle's advance between two pings, as the paper does.
+/// A printed T beside two recomputed ones. Like the paper, they ignore the vehicle's advance between two pings.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct CombinedCell {
     /// From the T_x and T_y that Table 4 prints as experimental.
     pub from_experiment: Cell,
-    /// From our baseline at [`STATED_SPEED_MPS`].
+    /// From the recomputed baseline at [`STATED_SPEED_MPS`].
     pub predicted: Cell,
 }
 
@@ -77,7 +77,7 @@ const SECTOR_OFFSET: Columns = Columns {
     ],
 };
 
-/// Table 5. Its lines are in the order of Table 4's.
+/// Table 5, whose lines are in the order of Table 4's.
 pub(super) fn combined(baselines: &Baselines) -> Result<Table<CombinedRow>, PaperError> {
     let row = |(line, experiment): (Line, Line)| {
         Ok(CombinedRow {

@@ -13,8 +13,9 @@ use super::modes::Mode;
 const DRIFT_M: f64 = 1.5;
 /// Greatest yaw relative to the tunnel's direction, degrees (§8.1).
 const YAW_DEG: f64 = 15.0;
-/// Soundings per turn, a hundredth of a degree apart: every step of Table 2 is a whole number of them, and the last one
-/// before a corner is found to 0.2 % of its length.
+/// Soundings per turn, a hundredth of a degree apart.
+///
+/// Every step of Table 2 is a whole number of them, and the last step before a corner is found to 0.2 % of its length.
 const SOUNDINGS: u32 = 36_000;
 
 /// Mounting positions of the heads on the vehicle (§8).
@@ -70,7 +71,7 @@ pub(super) fn across(rig: Rig, modes: &[Mode]) -> Result<Vec<Across>, PaperError
     modes.iter().zip(largest_m).map(of_mode).collect()
 }
 
-/// Least distance of the rig's heads from the floor, m.
+/// Minimum distance of the rig's heads from the floor, m.
 pub(super) fn floor_m(profile: &Profile, rig: Rig) -> Result<f64, PaperError> {
     let lowest_m = rig.offsets_m().iter().map(|[_, up_m]| *up_m).fold(0.0, f64::min);
     Ok(height_m(profile)? / 2.0 - DRIFT_M + lowest_m)
@@ -84,7 +85,8 @@ pub(super) fn height_m(profile: &Profile) -> Result<f64, PaperError> {
 
 /// The largest chord between neighbouring samples in each mode, for any phase of the pings within the turn.
 ///
-/// The worst over the positions and headings that the paper allows: drift and mounting offset add up, whatever the heading.
+/// It is the worst case over the positions and headings that the paper allows. Drift and mounting offset add up,
+/// whatever the heading.
 fn largest_chords_m(profile: &Profile, rig: Rig, modes: &[Mode]) -> Result<Vec<f64>, PaperError> {
     let middle_m = height_m(profile)? / 2.0;
     let mut largest_m = vec![0.0; modes.len()];
@@ -102,7 +104,7 @@ fn largest_chords_m(profile: &Profile, rig: Rig, modes: &[Mode]) -> Result<Vec<f
     Ok(largest_m)
 }
 
-/// Zero or maximal drift left, up and in heading, in all combinations.
+/// All combinations of zero or maximal drift left, up and in heading.
 fn extremes() -> impl Iterator<Item = [f64; 3]> {
     const ENDS: [f64; 3] = [-1.0, 0.0, 1.0];
     ENDS.into_iter().flat_map(|y| ENDS.into_iter().flat_map(move |z| ENDS.map(|yaw| [y, z, yaw])))

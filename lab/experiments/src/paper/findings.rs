@@ -18,8 +18,9 @@ pub(super) struct Place {
     pub(super) aside_m: f64,
 }
 
-/// The position from which Eq. 5 and 6 give a rig's printed T_ymin and T_ymax. Found by search; the tests check every
-/// printed digit that isn't an erratum.
+/// The position from which Eq. 5 and 6 give a rig's printed T_ymin and T_ymax.
+///
+/// It was found by search; the tests check every printed digit that isn't an erratum.
 pub(super) fn fitting_place(rig: Rig) -> Place {
     match rig {
         Rig::Vita1 => Place { floor_m: 2.511, aside_m: 6.613 },
@@ -33,7 +34,7 @@ pub(super) fn is_copied(mode: &str, heads: u8) -> bool {
     mode == "FAST" && heads >= 3
 }
 
-/// Intervals of an input that give the printed T_y of those rows that aren't errata.
+/// Intervals of an input that give the printed T_y of the rows without errata.
 fn of_rows(
     rows: impl IntoIterator<Item = Line>,
     wanted: impl Fn(&str, u8) -> bool,
@@ -48,8 +49,9 @@ fn of_rows(
     Ok(Interval::common(intervals))
 }
 
-/// Perimeters that give all printed means of Tables 3 and 4 when divided by n, m: with all rounded, and with some possibly
-/// truncated.
+/// Perimeters that give all printed means of Tables 3 and 4 when divided by n, m.
+///
+/// One interval assumes rounding, the other allows truncation too.
 pub(super) fn perimeters_m(baselines: &Baselines) -> Result<[Interval; 2], PaperError> {
     let perimeter = |from: fn(&super::Printed) -> Interval| {
         of_rows(
@@ -105,7 +107,7 @@ pub(super) fn corner_step_m(place: Place, step_rad: f64) -> f64 {
     place.floor_m * (math::tan(corner) - math::tan(corner - step_rad))
 }
 
-/// Why the means differ, by the rows of Table 3.
+/// Note on the differences of the means in Table 3.
 pub(super) fn means<'a>(
     mark: char,
     baselines: &Baselines,
@@ -134,7 +136,7 @@ pub(super) fn means<'a>(
     Ok(Note::new(mark, NoteKind::Finding, text))
 }
 
-/// The speed of Table 4.
+/// Note on the speed of Table 4.
 pub(super) fn speed(mark: char, baselines: &Baselines) -> Result<Note, PaperError> {
     let [one_head, several] = speeds_mps(baselines)?;
     let text = format!(
@@ -146,7 +148,7 @@ pub(super) fn speed(mark: char, baselines: &Baselines) -> Result<Note, PaperErro
     Ok(Note::new(mark, NoteKind::NewErratum, text))
 }
 
-/// Why Table 3's minima differ.
+/// Note on the differences of Table 3's minima.
 pub(super) fn minima_of_one(mark: char, baselines: &Baselines) -> Result<Note, PaperError> {
     let profile = shapes::ceran_blueprint()?;
     let most = floors_m(baselines, Rig::Vita1, |mode| mode != "FASTEST")?;
@@ -165,7 +167,7 @@ pub(super) fn minima_of_one(mark: char, baselines: &Baselines) -> Result<Note, P
     Ok(Note::new(mark, NoteKind::Erratum, text))
 }
 
-/// Why Table 4's minima differ.
+/// Note on the differences of Table 4's minima.
 pub(super) fn minima_of_several(mark: char, baselines: &Baselines) -> Result<Note, PaperError> {
     let in_line = floors_m(baselines, Rig::Vita2InLine, |mode| mode != "FASTEST")?;
     let fastest = floors_m(baselines, Rig::Vita2InLine, |mode| mode == "FASTEST")?;
@@ -184,7 +186,7 @@ pub(super) fn minima_of_several(mark: char, baselines: &Baselines) -> Result<Not
     Ok(Note::new(mark, NoteKind::Erratum, text))
 }
 
-/// Why Table 3's maxima differ.
+/// Note on the differences of Table 3's maxima.
 pub(super) fn maxima_of_one(mark: char, baselines: &Baselines) -> Result<Note, PaperError> {
     let place = fitting_place(Rig::Vita1);
     let slow_m = corner_step_m(place, baselines.mode("SLOW")?.turn.step_rad());
@@ -198,7 +200,7 @@ pub(super) fn maxima_of_one(mark: char, baselines: &Baselines) -> Result<Note, P
     Ok(Note::new(mark, NoteKind::Finding, text))
 }
 
-/// Why Table 4's maxima differ.
+/// Note on the differences of Table 4's maxima.
 pub(super) fn maxima_of_several(mark: char, baselines: &Baselines) -> Result<Note, PaperError> {
     let (in_line, pairs) = (fitting_place(Rig::Vita2InLine), fitting_place(Rig::Vita2Pairs));
     let fast_m = corner_step_m(pairs, baselines.mode("FAST")?.turn.step_rad());

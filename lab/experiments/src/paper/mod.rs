@@ -1,4 +1,5 @@
-//! The paper's Tables 1 to 5 recomputed: each printed number, ours beside it, and a note where the error is the paper's.
+//! The paper's Tables 1 to 5 recomputed: each printed number beside the recomputed one, with notes on the paper's
+//! errors.
 //!
 //! Source: Jorge et al., "Analytical Approach to Sampling Estimation of Underwater Tunnels Using Mechanical Profiling
 //! Sonars", Sensors 2021, 21, 1900 (CC BY 4.0). Its numbers are in the `*.csv` files here, as printed.
@@ -24,12 +25,13 @@ pub use measured::{Measured, Spacings, measured};
 pub use modes::{ModeRow, OverlapRow};
 pub use printed::{Digits, Interval, Printed};
 
-/// The paper's name.
+/// Citation of the paper.
 pub const SOURCE: &str = "Jorge et al., Sensors 2021, 21, 1900 (CC BY 4.0)";
 /// The speed of the paper's experiments, m/s (§7.2).
 pub const STATED_SPEED_MPS: f64 = 0.197;
-/// The speed that Table 4's baseline was computed for, m/s: the only one to a tenth of a millimetre per second that gives
-/// its printed digits.
+/// The speed for which Table 4's baseline was computed, m/s.
+///
+/// To a tenth of a millimetre per second it is the only speed that gives the printed digits.
 pub const FITTING_SPEED_MPS: f64 = 0.196;
 
 /// Tables 1 to 5.
@@ -39,11 +41,11 @@ pub struct Tables {
     pub source: &'static str,
     /// The speed that the paper states, m/s.
     pub stated_speed_mps: f64,
-    /// The speed that Table 4's baseline was computed for, m/s.
+    /// The speed for which Table 4's baseline was computed, m/s.
     pub fitting_speed_mps: f64,
     /// Speeds that give all printed T_x of Table 4's baseline, m/s.
     pub consistent_speed_mps: Interval,
-    /// The perimeter used for our means, m.
+    /// The perimeter used for the recomputed means, m.
     pub perimeter_m: f64,
     /// Perimeters that give all printed means of Tables 3 and 4 with rounding, m; except copied rows.
     pub consistent_perimeter_m: Interval,
@@ -59,7 +61,7 @@ pub struct Tables {
     pub table_5: Table<CombinedRow>,
 }
 
-/// Why the tables can't be computed: an error in the built-in numbers.
+/// The tables can't be computed because of an error in the built-in numbers.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum PaperError {
@@ -73,7 +75,7 @@ pub enum PaperError {
         /// Name of the column.
         column: &'static str,
     },
-    /// A mode that Table 2 doesn't have.
+    /// A mode that isn't in Table 2.
     #[error("mode {name} isn't in table 2")]
     Mode {
         /// Its name.

@@ -1,4 +1,4 @@
-//! Numbers as the paper prints them, and the intervals they allow.
+//! Numbers as the paper prints them, and the intervals of values that they allow.
 
 use core::fmt;
 
@@ -7,7 +7,7 @@ use serde::{Serialize, Serializer};
 
 use super::PaperError;
 
-/// Tolerance of ours, as a share of a printed number's last digit: 0.196 x 8 / 2 is just off 0.784.
+/// Tolerance of recomputed values, as a share of a printed number's last digit: 0.196 x 8 / 2 is just off 0.784.
 const ROUNDING: f64 = 1e-6;
 /// More decimals than any table has.
 const MOST_DECIMALS: usize = 6;
@@ -19,17 +19,17 @@ pub struct Printed {
     decimals: usize,
 }
 
-/// How a printed number's digits follow from ours.
+/// How a printed number's digits follow from the recomputed value.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Digits {
-    /// Ours rounded, and ours truncated as well.
+    /// By rounding, and by truncating as well.
     Both,
-    /// Ours rounded.
+    /// By rounding.
     Rounded,
-    /// Ours truncated.
+    /// By truncating.
     Truncated,
-    /// Neither.
+    /// By neither.
     Neither,
 }
 
@@ -43,7 +43,7 @@ pub struct Interval {
 }
 
 impl Digits {
-    /// Whether rounding ours gives the printed digits.
+    /// Whether rounding the recomputed value gives the printed digits.
     pub fn rounded(self) -> bool {
         matches!(self, Self::Both | Self::Rounded)
     }
@@ -119,15 +119,15 @@ impl Interval {
         })
     }
 
-    /// How far `value` is outside; zero inside.
+    /// Distance of `value` from the interval; zero inside.
     pub(super) fn missed_by(self, value: f64) -> f64 {
         (self.low - value).max(value - self.high).max(0.0)
     }
 }
 
-/// Difference of ours from a printed number, percent of it; `None` for a printed zero.
+/// Difference of the recomputed from the printed number, percent of the printed one; `None` for a printed zero.
 pub(super) fn difference_percent(ours: f64, printed: Printed) -> Option<f64> {
-    // Beyond 12 digits a difference is rounding, and would show as -0.00.
+    // A difference beyond 12 digits is due to rounding, and would show as -0.00.
     let percent = (ours / printed.value - 1.0) * 100.0;
     percent.is_finite().then(|| math::round_to_i64(percent * 1e6) as f64 / 1e6)
 }
@@ -162,7 +162,7 @@ impl Line {
     }
 }
 
-/// The lines of a table of the paper, 1 to 5; none of any other.
+/// The lines of a table of the paper, 1 to 5; empty for any other number.
 pub(super) fn lines(table: u8) -> Vec<Line> {
     let text = match table {
         1 => include_str!("table1.csv"),

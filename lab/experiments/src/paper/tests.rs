@@ -10,7 +10,7 @@ fn tables() -> Tables {
     super::tables().unwrap()
 }
 
-/// Cells whose digits follow from ours neither by rounding nor by truncation, by name.
+/// Names of cells whose printed digits follow neither by rounding nor by truncation.
 fn apart<'a>(cells: impl IntoIterator<Item = (String, &'a Cell)>) -> Vec<String> {
     let cells = cells.into_iter();
     cells.filter(|(_, cell)| cell.digits == Digits::Neither).map(|(name, _)| name).collect()
@@ -41,14 +41,14 @@ fn digits_come_from_rounding_or_truncation() {
 }
 
 #[test]
-fn val_table_1_to_the_digit() {
+fn table_1_matches_to_the_digit() {
     let table = tables().table_1;
     let expected = [[8.0, 4.67], [4.0, 2.33], [2.67, 1.55], [2.0, 1.16], [1.0, 0.0]];
     let printed =
         |row: &OverlapRow| [row.overlap_600_khz, row.overlap_1_mhz].map(|cell| cell.printed.value());
     assert_eq!(table.rows.iter().map(printed).collect::<Vec<_>>(), expected);
     let cells = || table.rows.iter().flat_map(|row| [&row.overlap_600_khz, &row.overlap_1_mhz]);
-    // 0 is at best 0.58 truncated to an integer: an erratum all the same.
+    // 0 is at best 0.58 truncated to an integer, which is still an erratum.
     assert_eq!(truncated(cells()), [1.55, 1.16, 0.0]);
     assert_eq!(apart(cells().map(|cell| (cell.printed.to_string(), cell))), [""; 0]);
     let none = table.rows[4].overlap_1_mhz;
@@ -57,7 +57,7 @@ fn val_table_1_to_the_digit() {
 }
 
 #[test]
-fn val_table_2_to_the_digit() {
+fn table_2_matches_to_the_digit() {
     let table = tables().table_2;
     assert_eq!(table.rows.len(), 5);
     let cells = || table.rows.iter().flat_map(|row| [&row.samples_per_turn, &row.ping_rate_hz]);
@@ -66,7 +66,7 @@ fn val_table_2_to_the_digit() {
 }
 
 #[test]
-fn val_every_t_x_of_the_baselines_but_fast_s() {
+fn baseline_t_x_match_except_fast() {
     let tables = tables();
     let one = tables.table_3.rows.iter().map(|row| (row.mode.to_owned(), &row.t_x_m));
     assert_eq!(apart(one), ["FAST"]);
@@ -85,13 +85,13 @@ fn val_every_t_x_of_the_baselines_but_fast_s() {
 }
 
 #[test]
-fn val_the_means_and_their_perimeter() {
+fn means_give_a_consistent_perimeter() {
     let tables = tables();
     let one = tables.table_3.rows.iter().map(|row| (row.mode.to_owned(), &row.t_y_mean_m));
     assert_eq!(apart(one), ["SLOW", "FAST", "FASTER", "FASTEST"]);
     let Interval { low, high } = tables.consistent_perimeter_m;
     assert!((low - 34.425).abs() < 1e-9 && (high - 34.5).abs() < 1e-9, "{low} to {high}");
-    // For any perimeter of the interval, all means but those of copied rows match to the digit.
+    // For any perimeter of the interval, all means except those of copied rows match to the digit.
     for perimeter_m in [low + 1e-6, high - 1e-6] {
         for line in lines(3).into_iter().chain(lines(4)) {
             let (mode, heads) = (line.text("mode").unwrap(), line.heads().unwrap());
@@ -106,7 +106,7 @@ fn val_the_means_and_their_perimeter() {
 
 /// The head positions in the notes give each printed extreme by Eq. 5 and 6, except errata.
 #[test]
-fn val_the_extremes_from_the_fitting_places() {
+fn fitting_places_give_the_printed_extremes() {
     let mut misses = Vec::new();
     for line in lines(3).into_iter().chain(lines(4)) {
         let (mode, heads) = (line.text("mode").unwrap(), line.heads().unwrap());
@@ -136,11 +136,11 @@ fn val_the_extremes_from_the_fitting_places() {
     );
 }
 
-/// The worst chord by ray casting is Eq. 6 with its last step in the farther corner, whose distance yaw increases.
+/// The worst chord by ray casting equals Eq. 6 with its last step in the farther corner, whose distance yaw increases.
 #[test]
-fn verif_the_largest_step_is_at_the_corner() {
+fn largest_step_is_at_the_corner() {
     let table = tables().table_3;
-    // The blueprint's mid-height less 1.65 m; half its base plus 1.5 m, seen at 15 degrees yaw.
+    // The blueprint's mid-height minus 1.65 m; half its base plus 1.5 m, seen at 15 degrees yaw.
     let aside_m = 6.449_655 / math::cos(15_f64.to_radians());
     let place = Place { floor_m: 2.701_094, aside_m };
     for (row, step_deg) in table.rows.iter().zip([0.3_f64, 0.6, 0.9, 1.2, 2.4]) {
@@ -150,7 +150,7 @@ fn verif_the_largest_step_is_at_the_corner() {
 }
 
 #[test]
-fn val_table_5_from_the_experiments_of_table_4() {
+fn table_5_follows_from_the_experiments_of_table_4() {
     let table = tables().table_5;
     let layouts = table.rows.iter().flat_map(|row| [row.phase_shift, row.sector_offset]);
     let cells: Vec<Cell> =
@@ -165,7 +165,7 @@ fn val_table_5_from_the_experiments_of_table_4() {
 }
 
 #[test]
-fn what_differs_refers_to_a_note_that_is_there() {
+fn differing_cells_refer_to_existing_notes() {
     let tables = tables();
     let marks = |notes: &[Note]| notes.iter().map(|note| note.mark).collect::<String>();
     assert_eq!(marks(&tables.table_3.notes), "abcde");

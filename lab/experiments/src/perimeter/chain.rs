@@ -5,7 +5,7 @@ use core::f64::consts::SQRT_2;
 use super::error::PerimeterError;
 use super::image::Image;
 
-/// A closed line of pixels round the head.
+/// A closed line of pixels around the head.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Chain {
     /// Steps to a pixel sharing a side.
@@ -14,10 +14,11 @@ pub(crate) struct Chain {
     pub diagonal: usize,
     /// Changes of direction from one step to the next.
     pub corners: usize,
-    /// Length with steps of 1 and sqrt 2 pixels, m: too long by 5 % for lines of all directions (Freeman's).
+    /// Length with steps of 1 and sqrt 2 pixels (Freeman), m. It is 5 % too long for lines of all directions.
     pub steps_m: f64,
-    /// Length with 0.980, 1.406 and -0.091 for straight steps, diagonal ones and corners, m: without bias for long lines
-    /// of all directions. Source: Vossepoel, Smeulders 1982.
+    /// Length with 0.980, 1.406 and -0.091 for straight steps, diagonal ones and corners, m.
+    ///
+    /// It has no bias for long lines of all directions. Source: Vossepoel, Smeulders 1982.
     pub corrected_m: f64,
 }
 
@@ -48,7 +49,7 @@ pub(super) fn trace(ring: &Image, pixel_m: f64) -> Result<Chain, PerimeterError>
     })
 }
 
-/// Directions from pixel to pixel until back at the first; even ones are straight.
+/// Directions from pixel to pixel until back at the first pixel; even ones are straight.
 fn walk(ring: &Image, first: usize) -> Vec<usize> {
     let (mut directions, mut at, mut before) = (Vec::new(), first, None);
     loop {

@@ -13,7 +13,7 @@ pub(super) struct Echoes {
 }
 
 impl Echoes {
-    /// From pings with any echo within range. Each ping's strongest bin is one.
+    /// Collects pings with any echo within range. Each ping's strongest bin is scaled to one.
     pub(super) fn of(pings: &[Ping], settings: &Settings) -> Result<Self, PerimeterError> {
         let mut lines: Vec<(f64, Vec<f64>)> = pings
             .iter()
@@ -57,10 +57,12 @@ impl Echoes {
     }
 }
 
-/// One ping's bins: each ray adds an echo of the pulse's length centred on its range, of equal area. `None` without any.
+/// One ping's bins.
+///
+/// Each ray adds an echo of the pulse's length centred on its range, all with equal area. `None` without any echo.
 fn line(ranges_m: &[f64], settings: &Settings) -> Option<Vec<f64>> {
     let bin_m = settings.range_max_m / settings.bins as f64;
-    // An echo shorter than a bin would fall into one or two of them depending on its position.
+    // An echo shorter than a bin would fall into one or two bins, depending on its position.
     let half = settings.pulse_m.max(bin_m) / 2.0;
     let mut bins = vec![0.0; settings.bins];
     for range_m in ranges_m.iter().filter(|r| r.is_finite() && **r >= 0.0 && **r < settings.range_max_m) {
@@ -105,7 +107,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_echo_is_left_out() {
+    fn invalid_ranges_are_left_out() {
         let settings = Settings::of_paper();
         for range in [f64::NAN, f64::INFINITY, -1.0, 10.0, 1e300] {
             assert!(line(&[range], &settings).is_none(), "{range}");

@@ -1,6 +1,6 @@
-//! Why a perimeter can't be computed.
+//! Errors of computing a perimeter.
 
-/// Why a perimeter can't be computed.
+/// A perimeter can't be computed.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum PerimeterError {
@@ -23,7 +23,7 @@ pub enum PerimeterError {
     /// The skeleton doesn't close around the head; a longer pulse or more dilation would close it.
     #[error("the wall's skeleton does not close round the head")]
     NotClosed,
-    /// The skeleton has a fork left by pruning and thinning.
+    /// The skeleton still has a fork after pruning and thinning.
     #[error("the wall's skeleton forks at {forks} pixels")]
     Forked {
         /// Pixels with other than two neighbours.

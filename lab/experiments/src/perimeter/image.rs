@@ -5,7 +5,7 @@ use headrace_geometry::math::{self, TAU};
 use super::echo::Echoes;
 use super::settings::Settings;
 
-/// Square, with a border that is never set, so that every set pixel has eight neighbours.
+/// A square image with a border that is never set, so that every set pixel has eight neighbours.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Image {
     pub(super) side: usize,
@@ -75,8 +75,9 @@ impl Image {
         }
     }
 
-    /// The set pixels that bound the area around the centre, or `None` if that area reaches the border. Of several
-    /// components (specks within the area are bounded too), the largest.
+    /// The set pixels that bound the area around the centre; `None` if that area reaches the border.
+    ///
+    /// Of several components the largest is returned, since specks within the area are bounded too.
     pub(super) fn round_the_middle(&self) -> Option<Self> {
         let middle = self.side / 2 * self.side + self.side / 2;
         let mut seen = vec![false; self.set.len()];

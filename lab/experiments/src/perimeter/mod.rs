@@ -18,8 +18,10 @@ use chain::trace;
 use echo::Echoes;
 use image::Image;
 
-/// Length of the closed polygon through points given by (angle in radians, range in metres), in the order of their
-/// angles. Points at the same angle keep their given order.
+/// Length of the closed polygon through points, m.
+///
+/// Points are (angle in radians, range in metres) in the order of their angles. Points at the same angle keep their
+/// given order.
 ///
 /// Errors: fewer than three finite points.
 pub(crate) fn polygon_m(places: &[(f64, f64)]) -> Result<f64, PerimeterError> {

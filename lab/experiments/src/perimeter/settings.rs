@@ -23,12 +23,12 @@ pub(crate) struct Settings {
     pub pixel_m: f64,
     /// Echo threshold for setting a pixel, as a share of its ping's strongest bin; above 0, at most 1.
     pub threshold: f64,
-    /// Dilation before thinning, pixels, so that neighbouring echoes touch: the paper cleaned by hand.
+    /// Dilation before thinning, pixels, so that neighbouring echoes touch. The paper cleaned the image by hand.
     pub grow_px: usize,
 }
 
 impl Settings {
-    /// The paper's values where given: 10 m, 500 points (§9.2). Pulse, pixel and threshold are ours.
+    /// The paper's values if given: 10 m, 500 points (§9.2). Pulse, pixel and threshold are chosen here.
     pub(crate) fn of_paper() -> Self {
         Self { range_max_m: 10.0, bins: 500, pulse_m: 0.05, pixel_m: 0.02, threshold: 0.5, grow_px: 2 }
     }

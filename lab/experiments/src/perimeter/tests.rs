@@ -23,7 +23,7 @@ fn close(value: f64, wanted: f64, share: f64) {
 }
 
 #[test]
-fn a_circles_polygon_falls_short_by_its_chords() {
+fn polygon_of_a_circle_is_short_by_its_chords() {
     let profile = shapes::circle(4.0).unwrap();
     let pings = turn(&profile, [0.0, 4.0], 0.0, 1);
     let chords = 1200.0 * 8.0 * math::sin(PI / 1200.0);
@@ -36,7 +36,7 @@ fn a_circles_polygon_falls_short_by_its_chords() {
 }
 
 #[test]
-fn a_circles_skeleton_has_its_perimeter_once_corrected() {
+fn corrected_skeleton_of_a_circle_has_its_perimeter() {
     for (centre, radius) in [([0.0, 4.0], 4.0), ([0.6, 4.3], 4.0), ([0.0, 2.0], 2.0)] {
         let profile = shapes::circle(radius).unwrap();
         let chain = skeleton(&turn(&profile, centre, 0.0, 1), &Settings::of_paper()).unwrap();
@@ -46,7 +46,7 @@ fn a_circles_skeleton_has_its_perimeter_once_corrected() {
 }
 
 #[test]
-fn ceran_comes_out_of_a_thin_beam() {
+fn thin_beam_gives_the_perimeter_of_ceran() {
     let profile = shapes::ceran_blueprint().unwrap();
     let pings = turn(&profile, profile.reference(), 0.0, 1);
     close(polygon_m(&least_ranges(&pings)).unwrap(), 34.17, 1e-3);
@@ -55,7 +55,7 @@ fn ceran_comes_out_of_a_thin_beam() {
 }
 
 #[test]
-fn a_wide_beam_rounds_corners_off() {
+fn wide_beam_rounds_corners_off() {
     let profile = shapes::ceran_blueprint().unwrap();
     let pings = turn(&profile, profile.reference(), 1.4, 29);
     let first = polygon_m(&least_ranges(&pings)).unwrap();
@@ -65,7 +65,7 @@ fn a_wide_beam_rounds_corners_off() {
 }
 
 #[test]
-fn a_square_is_a_square() {
+fn polygon_of_a_square_has_its_perimeter() {
     let profile = shapes::rectangle(4.0, 4.0).unwrap();
     let chain = skeleton(&turn(&profile, [0.0, 2.0], 0.0, 1), &Settings::of_paper()).unwrap();
     close(chain.steps_m, 16.0, 0.01);
@@ -73,7 +73,7 @@ fn a_square_is_a_square() {
 }
 
 #[test]
-fn a_gap_is_bridged_by_interpolation_or_said() {
+fn gap_is_bridged_by_interpolation_or_reported() {
     let profile = shapes::circle(4.0).unwrap();
     let mut pings = turn(&profile, [0.0, 4.0], 0.0, 1);
     pings.retain(|p| p.angle_rad > 0.5);
@@ -97,7 +97,7 @@ fn specks_inside_change_nothing() {
 }
 
 #[test]
-fn what_has_no_perimeter_is_refused() {
+fn input_without_perimeter_is_refused() {
     let settings = Settings::of_paper();
     assert_eq!(skeleton(&[], &settings), Err(PerimeterError::TooFewPings { count: 0 }));
     assert_eq!(polygon_m(&[(0.0, 1.0); 2]), Err(PerimeterError::TooFewPings { count: 2 }));

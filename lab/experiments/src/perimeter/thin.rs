@@ -2,7 +2,7 @@
 
 use super::image::Image;
 
-/// Removes pixels from both sides of every line until it is about one pixel thick, keeping its middle.
+/// Thins every line from both sides to about one pixel, and keeps its middle.
 ///
 /// Source: Zhang, Suen, "A fast parallel algorithm for thinning digital patterns", 1984.
 pub(super) fn zhang_suen(image: &mut Image) {
@@ -37,8 +37,9 @@ fn rises(ring: [bool; 8]) -> usize {
     (0..8).filter(|k| !ring[*k] && ring[(k + 1) % 8]).count()
 }
 
-/// Prunes, and thins to single lines, until neither changes anything: a spur's end may be two pixels that keep each other,
-/// and a removed spur may leave a filled corner.
+/// Prunes and thins to single lines until neither changes anything.
+///
+/// The end of a spur may be two pixels that keep each other, and a removed spur may leave a filled corner.
 pub(super) fn clean(image: &mut Image) {
     loop {
         let before = image.pixels().len();
@@ -50,8 +51,9 @@ pub(super) fn clean(image: &mut Image) {
     }
 }
 
-/// Removes one by one pixels that no connection needs and that aren't ends, so that lines have no filled corners
-/// and no pixel has more neighbours than the line's shape requires.
+/// Removes pixels one by one that aren't ends and that no connection needs.
+///
+/// Lines then have no filled corners, and no pixel has more neighbours than the line's shape requires.
 fn to_single(image: &mut Image) {
     loop {
         let mut changed = false;
@@ -103,7 +105,7 @@ mod tests {
     }
 
     #[test]
-    fn a_bar_becomes_its_middle_line() {
+    fn bar_is_thinned_to_its_middle_line() {
         let mut image = drawn(&[
             "...........",
             "...........",
@@ -123,7 +125,7 @@ mod tests {
     }
 
     #[test]
-    fn spurs_go_and_rings_stay() {
+    fn spurs_are_removed_and_rings_remain() {
         let mut image = drawn(&[
             "...........",
             ".#.........",
@@ -138,7 +140,7 @@ mod tests {
             "...........",
         ]);
         clean(&mut image);
-        // One closed line about row 5, column 4, at most a pixel off where the spur was.
+        // One closed line about row 5, column 4, at most one pixel off at the removed spur.
         let pixels = image.pixels();
         assert!((6..=8).contains(&pixels.len()), "{pixels:?}");
         assert!(pixels.iter().all(|k| image.neighbours(*k) == 2), "{pixels:?}");
@@ -146,7 +148,7 @@ mod tests {
     }
 
     #[test]
-    fn steps_lose_their_corners_and_squares_stay_whole() {
+    fn steps_lose_corners_and_squares_stay_whole() {
         let mut image = drawn(&[
             "..........",
             "..####....",
@@ -165,7 +167,7 @@ mod tests {
     }
 
     #[test]
-    fn yokois_number_agrees_with_pieces_counted() {
+    fn yokoi_number_agrees_with_counted_components() {
         for mask in 0..256_u32 {
             let mut image = Image::empty(5);
             let ring = image.round(12);

@@ -1,7 +1,7 @@
 //! Quadratic B-splines on a row of cells: their values, and the banded matrices of their integrals.
 //!
 //! n cells have n + 2 functions; function i has its support on cells i - 2 to i. Lengths are in cells. Integrals cover
-//! only the existing cells, so that the boundary condition is the natural one (no flux).
+//! only the existing cells, so the boundary condition is the natural one (no flux).
 
 /// Integral of N_a N_b over a cell.
 const MASS: [[f64; 3]; 3] = [
@@ -91,7 +91,7 @@ mod tests {
     }
 
     #[test]
-    fn verif_integrals_over_a_cell_by_gauss_points() {
+    fn cell_integrals_match_gauss_quadrature() {
         let root = (0.6_f64).sqrt() / 2.0;
         let gauss = [(0.5 - root, 5.0 / 18.0), (0.5, 8.0 / 18.0), (0.5 + root, 5.0 / 18.0)];
         let integral = |f: &dyn Fn(f64) -> f64| gauss.iter().map(|(t, w)| w * f(*t)).sum::<f64>();
@@ -106,14 +106,14 @@ mod tests {
     }
 
     #[test]
-    fn a_constant_has_no_stiffness_anywhere() {
+    fn constant_field_has_zero_stiffness() {
         let mut product = vec![0.0; 8];
         Band::stiffness(6).add_product(1, &[1.0; 8], &mut product);
         assert!(product.iter().all(|p| p.abs() < 1e-15), "{product:?}");
     }
 
     #[test]
-    fn a_product_along_the_middle_axis_is_that_of_each_line() {
+    fn product_along_the_middle_axis_equals_that_of_each_line() {
         let band = Band::mass(3);
         let source: Vec<f64> = (0..2 * 5 * 3).map(f64::from).collect();
         let mut target = vec![0.0; 30];

@@ -8,7 +8,7 @@ use super::Xyz;
 use super::wall::Stretch;
 use crate::Spread;
 
-/// Smaller coordinates are zero: the triangulation's exact predicates take none below 1e-142.
+/// Coordinates smaller than this become zero, since the triangulation's exact predicates accept none below 1e-142.
 const TINY_M: f64 = 1e-100;
 
 /// A sample on the unrolled wall.
@@ -23,7 +23,7 @@ pub(crate) struct Deviation {
 }
 
 impl Deviation {
-    /// From a position in the tunnel.
+    /// The deviation of a position in the tunnel.
     pub(crate) fn of(profile: &Profile, place: Xyz) -> Self {
         let centre = profile.reference();
         let direction = [place[1] - centre[0], place[2] - centre[1]];
@@ -49,7 +49,7 @@ impl HasPosition for Vertex {
     }
 }
 
-/// Why samples can't be triangulated.
+/// Samples can't be triangulated.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[error("the samples can't be triangulated: {why}")]
 pub struct ChartError {
@@ -72,7 +72,7 @@ pub(crate) struct ChartSpread {
 }
 
 impl Chart {
-    /// Of two samples at one position the later is used.
+    /// Triangulates samples; of two samples at one position the later is used.
     ///
     /// Errors: a coordinate that isn't finite, or is beyond 1e60.
     pub(crate) fn new(perimeter_m: f64, samples: &[Deviation]) -> Result<Self, ChartError> {
@@ -101,8 +101,9 @@ impl Chart {
     }
 }
 
-/// The sample, and its image on the other side of the seam: half a perimeter beyond each side, more than any gap
-/// that a triangle could bridge.
+/// The sample and its image on the other side of the seam.
+///
+/// Images extend half a perimeter beyond each side, more than any gap that a triangle could bridge.
 fn images(perimeter_m: f64, sample: &Deviation) -> [Vertex; 2] {
     let sigma = math::wrap(sample.arc_m, perimeter_m);
     let other = if sigma < perimeter_m / 2.0 { sigma + perimeter_m } else { sigma - perimeter_m };
@@ -131,7 +132,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_linear_along_is_kept_across_the_seam() {
+    fn linear_deviation_is_kept_across_the_seam() {
         let chart = Chart::new(20.0, &lattice(20.0, |x, _| 0.1 * x - 0.3)).unwrap();
         let stretch = Stretch { from_m: 0.0, to_m: 10.0, step_m: 0.07 };
         let compared = chart.compare(&stretch, |x, _| 0.1 * x - 0.3);
@@ -140,7 +141,7 @@ mod tests {
     }
 
     #[test]
-    fn a_wave_round_the_wall_is_met_up_to_its_curvature() {
+    fn wave_around_the_wall_is_matched_up_to_its_curvature() {
         let wave = |_: f64, s: f64| 0.2 * math::sin(s / 20.0 * math::TAU);
         let chart = Chart::new(20.0, &lattice(20.0, wave)).unwrap();
         let stretch = Stretch { from_m: 0.0, to_m: 10.0, step_m: 0.05 };
@@ -151,7 +152,7 @@ mod tests {
     }
 
     #[test]
-    fn a_boulder_between_samples_is_missed_and_counted_in_full() {
+    fn boulder_between_samples_is_missed_and_counted_in_full() {
         let chart = Chart::new(20.0, &lattice(20.0, |_, _| 0.0)).unwrap();
         let boulder = |x: f64, s: f64| if math::hypot(x - 5.25, s - 10.25) < 0.2 { -0.3 } else { 0.0 };
         let compared = chart.compare(&Stretch { from_m: 1.0, to_m: 9.0, step_m: 0.05 }, boulder);
@@ -159,7 +160,7 @@ mod tests {
     }
 
     #[test]
-    fn a_place_has_the_deviation_it_was_put_at() {
+    fn place_has_its_given_deviation() {
         let profile = shapes::ceran_blueprint().unwrap();
         for k in 0..300 {
             let (sigma, off) = (f64::from(k) * 0.113, math::sin(f64::from(k)) * 0.4);
@@ -170,7 +171,7 @@ mod tests {
     }
 
     #[test]
-    fn outside_without_samples_and_with_twins_nothing_breaks() {
+    fn outside_points_missing_and_duplicate_samples_are_handled() {
         let chart = Chart::new(20.0, &lattice(20.0, |_, _| 1.0)).unwrap();
         assert_eq!(chart.deviation_m(-0.1, 3.0), None);
         assert_eq!(Chart::new(20.0, &[]).unwrap().deviation_m(1.0, 1.0), None);

@@ -1,5 +1,6 @@
-//! The zero surface of a field on a grid, by marching tetrahedra: six per cell, all sharing its long diagonal, so that
-//! neighbours share faces and no case is ambiguous.
+//! Extracts the zero surface of a field on a grid by marching tetrahedra.
+//!
+//! There are six per cell, all sharing its long diagonal, so that neighbours share faces and no case is ambiguous.
 
 use super::grid::Grid;
 use super::mesh::Mesh;
@@ -8,10 +9,10 @@ use super::{Xyz, along, dot, sub};
 /// Corners of a cell are numbered by bits: 1 along x, 2 along y, 4 along z. Each tetrahedron is a path from 0 to 7.
 const TETRAHEDRA: [[usize; 4]; 6] =
     [[0, 1, 3, 7], [0, 1, 5, 7], [0, 2, 3, 7], [0, 2, 6, 7], [0, 4, 5, 7], [0, 4, 6, 7]];
-/// Edges that begin at a node: to each other corner of the cell whose least corner it is.
+/// Number of edges that begin at a node: to each other corner of the cell whose least corner it is.
 const EDGES: usize = 7;
 const NONE: u32 = u32::MAX;
-/// Most steps of the search along an edge; each at least halves the interval.
+/// Maximum number of steps of the search along an edge; each at least halves the interval.
 const STEPS: usize = 24;
 /// Tolerance of an edge crossing, as a share of the edge.
 const CLOSE_ENOUGH: f64 = 1e-6;
@@ -107,7 +108,7 @@ impl<F: Fn(Xyz) -> f64> Extraction<'_, F> {
         self.on_edge[slot]
     }
 
-    /// By false position, with bisection where that converges slowly.
+    /// Finds the crossing by false position, with bisection if that converges slowly.
     fn crossing(&self, from: usize, to: usize) -> Xyz {
         let (start, way) = (self.place(from), sub(self.place(to), self.place(from)));
         let (mut low, mut high) = ((0.0, self.corners[from]), (1.0, self.corners[to]));
@@ -164,7 +165,7 @@ mod tests {
     }
 
     #[test]
-    fn a_surface_through_corners_is_whole() {
+    fn surface_through_grid_corners_is_meshed() {
         let plane = mesh(&GRID, |p| ((p[0] + 1.5) / 0.2).round() - 5.0);
         assert!(plane.triangles.len() >= 15 * 15 * 2);
         let none = mesh(&GRID, |_| 1.0);

@@ -32,12 +32,12 @@ impl Grid {
         self.nodes().iter().product()
     }
 
-    /// The box with cells twice as large, one more where their number is odd.
+    /// The box with cells twice as large, rounded up for odd numbers of cells.
     pub(super) fn coarser(&self) -> Self {
         Self { origin: self.origin, cell_m: self.cell_m * 2.0, cells: self.cells.map(|n| n.div_ceil(2)) }
     }
 
-    /// The functions at a position; outside the box those of the nearest cell, extrapolated.
+    /// The functions at a position. Outside the box, those of the nearest cell, extrapolated.
     pub(super) fn local(&self, place: Xyz) -> Local {
         let mut along = [[0.0; 3]; 3];
         let mut cell = [0_usize; 3];
@@ -90,8 +90,9 @@ impl Grid {
         self.scatter(&Local { first: local.first, along: squares }, amount, field);
     }
 
-    /// The coarser grid's field represented exactly on this one: a quadratic B-spline is the sum of four of half its width
-    /// with the weights 1, 3, 3, 1 over 4.
+    /// Represents the coarser grid's field exactly on this grid.
+    ///
+    /// A quadratic B-spline is the sum of four of half its width with the weights 1, 3, 3, 1 over 4.
     pub(super) fn refined(&self, coarse: &Grid, field: &[f64]) -> Vec<f64> {
         let (from, to) = (coarse.nodes(), self.nodes());
         let x = refine_axis(field, 1, from[0], to[0], from[1] * from[2]);
@@ -123,7 +124,7 @@ mod tests {
     const FINE: Grid = Grid { origin: [1.0, -2.0, 0.5], cell_m: 0.5, cells: [8, 5, 6] };
 
     #[test]
-    fn refining_changes_no_value() {
+    fn refining_keeps_all_values() {
         let coarse = FINE.coarser();
         let field: Vec<f64> = (0..coarse.len()).map(|k| math::sin(k as f64 * 1.7)).collect();
         let refined = FINE.refined(&coarse, &field);

@@ -25,12 +25,14 @@ pub(crate) struct MeshIndex<'a> {
     members: Vec<u32>,
 }
 
-/// Most bins of an index.
+/// Maximum number of bins of an index.
 const BINS_MAX: f64 = 4e6;
 
 impl MeshIndex<'_> {
-    /// `bin_m` is the side of a bin, m: about that of a triangle. It is enlarged if there would be too many bins.
-    /// `None` for a mesh without triangles, with an invalid vertex index or a vertex that isn't finite.
+    /// Builds the index with bins of side `bin_m`, m, about that of a triangle.
+    ///
+    /// The side is enlarged if there would be too many bins. `None` for a mesh without triangles, with an invalid
+    /// vertex index or a vertex that isn't finite.
     pub(crate) fn new(mesh: &Mesh, bin_m: f64) -> Option<MeshIndex<'_>> {
         let known = |t: &[u32; 3]| t.iter().all(|k| (*k as usize) < mesh.vertices.len());
         let finite = |p: &Xyz| p.iter().all(|c| c.is_finite());
@@ -149,7 +151,7 @@ fn bounds(places: &[Xyz]) -> (Xyz, Xyz) {
     (least, most)
 }
 
-/// The point of a triangle nearest to `place`: the foot on its plane where that is inside, else on an edge.
+/// The point of a triangle nearest to `place`: the foot on its plane if that is inside, otherwise a point on an edge.
 fn nearest_of(place: Xyz, [a, b, c]: [Xyz; 3]) -> Xyz {
     let (u, v, w) = (sub(b, a), sub(c, a), sub(place, a));
     let (uu, uv, vv, uw, vw) = (dot(u, u), dot(u, v), dot(v, v), dot(u, w), dot(v, w));
@@ -197,7 +199,7 @@ mod tests {
     }
 
     #[test]
-    fn the_nearest_triangle_is_that_of_a_search_through_all() {
+    fn nearest_triangle_equals_that_of_a_full_search() {
         let mesh = heap();
         for bin_m in [0.1, 0.5, 3.0, 100.0] {
             let index = MeshIndex::new(&mesh, bin_m).unwrap();
@@ -217,7 +219,7 @@ mod tests {
     }
 
     #[test]
-    fn verif_nearest_of_by_a_dense_search() {
+    fn nearest_point_matches_a_dense_search() {
         let corners = [[0.0, 0.0, 0.0], [2.0, 0.1, 0.3], [0.4, 1.5, -0.2]];
         for k in 0..200 {
             let t = f64::from(k);
@@ -237,7 +239,7 @@ mod tests {
     }
 
     #[test]
-    fn no_mesh_has_no_index() {
+    fn empty_mesh_has_no_index() {
         assert!(MeshIndex::new(&Mesh::default(), 1.0).is_none());
         let broken = Mesh { vertices: vec![[0.0; 3]], triangles: vec![[0, 0, 1]] };
         assert!(MeshIndex::new(&broken, 1.0).is_none());

@@ -5,8 +5,10 @@ use headrace_geometry::tunnel::Profile;
 
 use super::{Sample, Xyz};
 
-/// Normals towards the line along the tunnel through the profile's reference point, which needs no design. On a flat
-/// floor off the centre it is off by up to the angle at which the floor is seen.
+/// Normals towards the line along the tunnel through the profile's reference point.
+///
+/// They don't depend on the design. On a flat floor off the centre, the error is at most the angle at which the floor
+/// is seen.
 pub(crate) fn towards_axis(profile: &Profile, places: &[Xyz]) -> Vec<Sample> {
     let [y, z] = profile.reference();
     let sample = |place: &Xyz| {
@@ -24,7 +26,7 @@ mod tests {
     use headrace_geometry::tunnel::shapes;
 
     #[test]
-    fn they_look_inwards_and_are_the_wall_s_on_an_arc_about_the_reference() {
+    fn normals_point_inwards_and_match_an_arc_about_the_reference() {
         let profile = shapes::ceran_blueprint().unwrap();
         let places: Vec<Xyz> =
             (0..200).map(|k| profile.point_at(f64::from(k) * 0.17)).map(|[y, z]| [1.0, y, z]).collect();

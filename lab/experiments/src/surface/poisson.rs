@@ -1,13 +1,12 @@
 //! Screened Poisson reconstruction on a regular grid.
 //!
-//! The samples' normals, spread by B-splines and weighted with the wall area that each represents, are a vector field V. The
-//! field chi that minimises the integral of |grad chi - V|^2 plus `point_weight` times (area / samples) times the sum of
-//! chi^2 at the samples jumps from negative to positive at the wall; the surface is the level set of its mean at the samples.
+//! The samples' normals, spread by B-splines and weighted with the wall area that each represents, form a vector field
+//! V. The field chi minimises the integral of |grad chi - V|^2 plus `point_weight` times (area / samples) times the sum
+//! of chi^2 at the samples. It jumps from negative to positive at the wall. The surface is the level set of its mean at
+//! the samples.
 //!
-//! It differs from the paper's tool in one respect: cells of size `depth` fill a box around the samples, where
-//! an octree has coarser ones away from samples. A tunnel is so slim that the whole box is small. The published crate
-//! `poisson_reconstruction` 0.4 was tried first: it recomputes the products of basis functions for every pair of
-//! functions and every sample, and needs 75 s for 20,000 samples of a sphere at depth 5, with a mean error of half a cell.
+//! It differs from the paper's tool in one respect: cells of size `depth` fill a box around the samples, while an
+//! octree has coarser ones away from samples. A tunnel is so slim that the whole box is small.
 //!
 //! Source: Kazhdan, Hoppe, "Screened Poisson surface reconstruction", 2013; the paper's §8.2.
 
@@ -18,12 +17,13 @@ use super::mesh::Mesh;
 use super::solver::{Screened, Solved, divergence};
 use super::{Sample, Xyz, extract};
 
-/// Most functions of a grid: about 1.5 GB.
+/// Maximum number of functions of a grid, which take about 1.5 GB.
 const NODES_MAX: usize = 16_000_000;
 /// Cells of the density grid are larger by this factor (2 levels, as in Kazhdan's program).
 const DENSITY_CELLS: usize = 4;
-/// Factor by which spreading and reading with quadratic B-splines reduces a density across a wall, averaged over its
-/// position in a cell: the integral of the spline's square.
+/// Factor by which spreading and reading with quadratic B-splines reduces a density across a wall.
+///
+/// It is averaged over the position in a cell: the integral of the spline's square.
 const ACROSS: f64 = 11.0 / 20.0;
 /// Levels below the finest on which a first solution is computed, and on which normals of sparse samples are spread.
 const COARSER_LEVELS: usize = 4;
@@ -32,24 +32,25 @@ const COARSER_LEVELS: usize = 4;
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[non_exhaustive]
 pub(crate) struct Settings {
-    /// A cell is `scale` times the largest extent of the samples over 2^depth; 2 to 12.
+    /// A cell is `scale` times the largest extent of the samples divided by 2^depth; 2 to 12.
     pub depth: u32,
     /// Weight of passing through the samples; 0 to 1000.
     pub point_weight: f64,
     /// Normals are spread in cells large enough to hold about this many samples; above 0.
     pub samples_per_node: f64,
-    /// The cube of 2^depth cells over the largest extent of the samples; at least 1.
+    /// Ratio of the cube of 2^depth cells to the largest extent of the samples; at least 1.
     pub scale: f64,
     /// Margin around the samples, cells; at least 2.
     pub margin_cells: usize,
     /// Relative residual at which the solver stops.
     pub tolerance: f64,
-    /// Most steps of the solver.
+    /// Maximum number of steps of the solver.
     pub steps_max: usize,
 }
 
 impl Settings {
-    /// The paper's: depth 8, one sample per node, point weight 5 (§8.2); the cube 1.1 times the samples, as in its tool.
+    /// The paper's settings: depth 8, one sample per node, point weight 5 (§8.2), and the cube 1.1 times the samples,
+    /// as in its tool.
     pub(crate) fn of_paper() -> Self {
         Self {
             depth: 8,
@@ -63,7 +64,7 @@ impl Settings {
     }
 }
 
-/// Why a surface can't be made.
+/// A surface can't be made.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum PoissonError {
@@ -92,7 +93,7 @@ pub enum PoissonError {
     /// The grid would be too large.
     #[error("the grid would have {nodes:.0} nodes; the most is {NODES_MAX}; a smaller depth needs fewer")]
     TooLarge {
-        /// Nodes wanted.
+        /// Nodes needed.
         nodes: f64,
     },
     /// The solver hasn't converged within its step limit.
@@ -124,7 +125,7 @@ struct Cloud<'a> {
 }
 
 impl Surface {
-    /// Through wall samples with unit normals towards the water.
+    /// Reconstructs the surface through wall samples with unit normals towards the water.
     ///
     /// Errors: see [`PoissonError`].
     pub(crate) fn through(samples: &[Sample], settings: &Settings) -> Result<Self, PoissonError> {
@@ -141,7 +142,7 @@ impl Surface {
         Ok(Self { grid, field, level: sum / cloud.area_m2 })
     }
 
-    /// Positive towards the water, negative behind the wall; the step across the wall is about one.
+    /// The field: positive towards the water, negative behind the wall. The step across the wall is about one.
     pub(crate) fn value(&self, place: Xyz) -> f64 {
         self.grid.value(&self.field, place) - self.level
     }
@@ -202,7 +203,8 @@ fn grid_round(samples: &[Sample], settings: &Settings) -> Result<Grid, PoissonEr
 }
 
 impl<'a> Cloud<'a> {
-    /// A sample among k in a patch of wall represents a k-th of it; the patches are those of a grid of larger cells.
+    /// Assigns each sample its area: one of k samples in a patch represents a k-th of it. Patches are the cells of a
+    /// coarser grid.
     fn measure(samples: &'a [Sample], grid: &Grid, samples_per_node: f64) -> Self {
         let patches = Grid {
             origin: grid.origin,
@@ -223,8 +225,9 @@ impl<'a> Cloud<'a> {
         Self { samples, areas_m2, coarser, area_m2 }
     }
 
-    /// Coefficients of V on a grid `level` levels above the finest, from the samples spread there or above;
-    /// `finest` is the level being solved, below which none is spread.
+    /// Coefficients of V on a grid `level` levels above the finest, from the samples spread there or above.
+    ///
+    /// `finest` is the level being solved, below which no sample is spread.
     fn normals(&self, grid: &Grid, level: usize, finest: usize) -> [Vec<f64>; 3] {
         let mut field = if level < COARSER_LEVELS && self.coarser.iter().any(|c| *c > level) {
             let coarse = grid.coarser();

@@ -33,7 +33,7 @@ pub(super) struct Solved {
 }
 
 impl<'a> Screened<'a> {
-    /// `weight` is that of one sample, in units of cells.
+    /// Creates the left-hand side; `weight` is that of one sample, in units of cells.
     pub(super) fn new(grid: &'a Grid, samples: Vec<Local>, weight: f64) -> Self {
         let mut system = Self {
             grid,
@@ -91,7 +91,7 @@ impl<'a> Screened<'a> {
         }
     }
 
-    /// Improves `field` until the residual is `tolerance` of the right-hand side, or `steps_max` steps were taken.
+    /// Improves `field` until the residual is `tolerance` of the right-hand side, or after `steps_max` steps.
     pub(super) fn solve(&self, rhs: &[f64], field: &mut [f64], tolerance: f64, steps_max: usize) -> Solved {
         let mut scratch = self.scratch();
         let mut image = vec![0.0; field.len()];

@@ -13,14 +13,17 @@ pub(crate) struct Stretch {
     pub from_m: f64,
     /// End, m.
     pub to_m: f64,
-    /// Lattice spacing along the tunnel and around it, m; above 0. The paper doesn't give its own; 0.1 is fine
-    /// compared with a beam's step, 0.2 gives the same figures four times as fast.
+    /// Lattice spacing along the tunnel and around it, m; above 0.
+    ///
+    /// The paper doesn't state its own. 0.1 is fine compared with a beam's step; 0.2 gives the same figures four times
+    /// as fast.
     pub step_m: f64,
 }
 
 impl Stretch {
-    /// Chainages and arc lengths of its positions, x outermost: whole steps from `from_m`, and around the wall the number that
-    /// divides it evenly.
+    /// Chainages and arc lengths of its positions, x outermost.
+    ///
+    /// Chainages are whole steps from `from_m`. The number of positions around the wall divides it evenly.
     pub(crate) fn places(&self, perimeter_m: f64) -> impl Iterator<Item = (f64, f64)> + use<> {
         let Self { from_m, to_m, step_m } = *self;
         let along = math::floor_to_i64((to_m - from_m) / step_m + 1e-9).max(-1);
@@ -76,7 +79,7 @@ mod tests {
     }
 
     #[test]
-    fn a_tube_a_known_way_off_is_so_far_off() {
+    fn tube_at_a_known_offset_has_that_distance() {
         let profile = shapes::circle(2.0).unwrap();
         let stretch = Stretch { from_m: 1.0, to_m: 9.0, step_m: 0.1 };
         let mesh = tube(&profile, 0.05);
@@ -88,7 +91,7 @@ mod tests {
     }
 
     #[test]
-    fn places_cover_the_stretch_and_no_more() {
+    fn places_cover_exactly_the_stretch() {
         let stretch = Stretch { from_m: 10.0, to_m: 11.0, step_m: 0.1 };
         let places: Vec<_> = stretch.places(5.02).collect();
         assert_eq!(places.len(), 11 * 50);

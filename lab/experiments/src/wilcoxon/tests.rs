@@ -1,7 +1,7 @@
 use super::*;
 
-/// Published critical values of min(W+, W-): two-sided alpha 0.10, 0.05, 0.02, 0.01; 0 where there is none.
-/// Source: Wilcoxon and Wilcox 1964, as reprinted in textbooks.
+/// Published critical values of min(W+, W-): two-sided alpha 0.10, 0.05, 0.02, 0.01; 0 if there is none. Source:
+/// Wilcoxon and Wilcox 1964, as reprinted in textbooks.
 const CRITICAL: [(usize, [usize; 4]); 26] = [
     (5, [0, 99, 99, 99]),
     (6, [2, 0, 99, 99]),
@@ -35,7 +35,7 @@ const ALPHAS: [f64; 4] = [0.10, 0.05, 0.02, 0.01];
 const NONE: usize = 99;
 
 #[test]
-fn val_critical_values_are_the_published_ones() {
+fn critical_values_match_published_ones() {
     for (n, row) in CRITICAL {
         for (critical, alpha) in row.into_iter().zip(ALPHAS) {
             let p = |w: usize| exact(n, w as f64)[0];
@@ -49,7 +49,7 @@ fn val_critical_values_are_the_published_ones() {
 }
 
 #[test]
-fn val_ten_pairs_with_eight() {
+fn ten_pairs_with_a_rank_sum_of_eight_have_the_exact_p() {
     // 1 to 10 with the ranks 3 and 5 positive.
     let differences: Vec<f64> =
         (1..=10).map(|k| if k == 3 || k == 5 { f64::from(k) } else { -f64::from(k) }).collect();
@@ -67,7 +67,7 @@ fn all_choices(ranks: &[f64]) -> Vec<f64> {
 }
 
 #[test]
-fn verif_exact_p_is_that_of_all_signs() {
+fn exact_p_matches_all_sign_choices() {
     for n in 1..=12 {
         let ranks: Vec<f64> = (1..=n).map(f64::from).collect();
         let choices = all_choices(&ranks);
@@ -86,7 +86,7 @@ fn verif_exact_p_is_that_of_all_signs() {
 }
 
 #[test]
-fn verif_mean_and_variance_with_ties_and_zeros_are_those_of_all_signs() {
+fn mean_and_variance_with_ties_and_zeros_match_all_sign_choices() {
     let values = [0.0, 0.0, 1.0, -1.0, 2.0, 2.0, -2.0, 3.0, 5.0, -5.0, 8.0];
     for (zeros, ranks) in [
         (Zeros::Wilcoxon, vec![1.5, 1.5, 4.0, 4.0, 4.0, 6.0, 7.5, 7.5, 9.0]),
@@ -106,8 +106,8 @@ fn verif_mean_and_variance_with_ties_and_zeros_are_those_of_all_signs() {
 }
 
 #[test]
-fn verif_the_tie_correction_is_the_textbooks() {
-    // n (n + 1) (2 n + 1) / 24 less the sum of (t^3 - t) / 48.
+fn tie_correction_matches_the_textbook() {
+    // n (n + 1) (2 n + 1) / 24 minus the sum of (t^3 - t) / 48.
     let values = [1.0, 1.0, 1.0, -2.0, 2.0, 4.0, -5.0, 5.0, 5.0, 5.0];
     let test = of_differences(&values, Options::default()).unwrap();
     let variance = 10.0 * 11.0 * 21.0 / 24.0 - (24.0 + 6.0 + 60.0) / 48.0;
@@ -116,7 +116,7 @@ fn verif_the_tie_correction_is_the_textbooks() {
 }
 
 #[test]
-fn the_normal_distribution_takes_over_smoothly() {
+fn normal_approximation_starts_at_51_pairs_close_to_exact() {
     let differences = |n: i32| -> Vec<f64> {
         (1..=n).map(|k| if k % 3 == 0 { -f64::from(k) } else { f64::from(k) }).collect()
     };
@@ -132,7 +132,7 @@ fn the_normal_distribution_takes_over_smoothly() {
 }
 
 #[test]
-fn a_whole_of_2_to_the_50_is_counted_exactly() {
+fn sign_choices_of_50_pairs_are_counted_exactly() {
     let counts = sign_choices(50);
     assert_eq!(
         counts.iter().sum::<f64>().to_bits(),
@@ -142,7 +142,7 @@ fn a_whole_of_2_to_the_50_is_counted_exactly() {
 }
 
 #[test]
-fn order_and_swapping_change_what_they_should() {
+fn reordering_and_swapping_have_their_expected_effect() {
     let (left, right) = ([1.0, 2.5, 3.0, 9.0, 4.0], [1.1, 2.0, 1.0, 3.0, 4.9]);
     let test = of_pairs(&left, &right, Options::default()).unwrap();
     let swapped = of_pairs(&right, &left, Options::default()).unwrap();
@@ -152,7 +152,7 @@ fn order_and_swapping_change_what_they_should() {
 }
 
 #[test]
-fn what_can_not_be_ranked_is_refused() {
+fn unrankable_input_is_refused() {
     let refused = |values: &[f64]| of_differences(values, Options::default()).err();
     assert_eq!(refused(&[]), Some(WilcoxonError::NoDifference));
     assert_eq!(refused(&[0.0, -0.0]), Some(WilcoxonError::NoDifference));

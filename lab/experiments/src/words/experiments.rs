@@ -3,7 +3,7 @@
 use crate::paper::SOURCE;
 use crate::{Experiments, HiddenRow, MeshRow, Pair, Perimeter, RunRow, SignedRankRow};
 
-/// All of it.
+/// Formats all experiments.
 pub fn words(report: &Experiments) -> String {
     let mut text = format!(
         "Experiments of {SOURCE}, repeated at {} m/s in the blueprint's tunnel. Each pair is the paper's figure and ours.\n",

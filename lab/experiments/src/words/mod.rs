@@ -1,4 +1,4 @@
-//! Tables and experiments as text, for a terminal.
+//! Tables and experiments as text for a terminal.
 
 mod experiments;
 mod tables;

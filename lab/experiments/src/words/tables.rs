@@ -8,7 +8,7 @@ use crate::paper::{
 /// Line length of notes, characters.
 const WIDTH: usize = 108;
 
-/// All five.
+/// Formats all five tables.
 pub fn words(tables: &Tables) -> String {
     let mut text = format!(
         "As printed in {}, and ours; % is by how much ours is larger.\n\
@@ -136,7 +136,7 @@ fn combined_head(layout: &str) -> String {
     format!("  {layout}; pred.: predicted by the baseline\n{top}\n{}", heads("  mode    s", COMBINED, 3))
 }
 
-/// From the experiments, then as predicted.
+/// Two columns: from the experiments, then as predicted.
 const COMBINED: &str = "  paper   ours     %  pred.     %";
 
 fn combined(row: &CombinedRow, layout: &Combined) -> String {
@@ -163,7 +163,7 @@ fn cell(cell: &Cell, decimals: usize) -> String {
     format!("{:>7}{}", cell.printed, ours(cell, decimals))
 }
 
-/// Our value, the difference, and a mark.
+/// The recomputed value, the difference, and a mark.
 fn ours(cell: &Cell, decimals: usize) -> String {
     format!("{:>8.decimals$}{:>7} {}", cell.ours, percent(cell), sign(cell))
 }
@@ -178,7 +178,7 @@ fn percent(cell: &Cell) -> String {
     }
 }
 
-/// The mark of the note that a cell refers to, or else of how its printed digits follow from ours.
+/// The mark of the note that a cell refers to, or otherwise of how its printed digits follow.
 fn sign(cell: &Cell) -> char {
     cell.note.unwrap_or(match cell.digits {
         Digits::Both => '=',

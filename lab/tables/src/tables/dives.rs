@@ -5,13 +5,13 @@ use headrace_monitor::report::Report;
 use crate::column::{Column, Get, Table, count};
 use crate::replay::Dive;
 
-/// What is known of a log.
+/// Facts about a log.
 pub(crate) struct Row<'a> {
     pub(crate) log: &'a str,
     pub(crate) sha256: &'a str,
     pub(crate) parameters: &'a str,
     pub(crate) version: &'a str,
-    /// The dive, or why there is none.
+    /// The dive, or the reason why there is none.
     pub(crate) dive: Result<&'a Dive, &'a str>,
 }
 
@@ -25,7 +25,7 @@ impl Row<'_> {
     }
 }
 
-/// The exit code that `headrace replay` would have had.
+/// The exit code that `headrace replay` would have returned.
 fn exit_code(row: &Row<'_>) -> i64 {
     match row.report() {
         None => 2,

@@ -1,11 +1,11 @@
-//! `runs`: neighbouring flagged sections of one cause, and what passing them again takes.
+//! `runs`: adjacent flagged sections with one cause, and how to pass them again.
 
 use headrace_monitor::report::{Report, ReturnReport, RunReport};
 
 use super::sections::words;
 use crate::column::{Column, Get, Table, count};
 
-/// A run, and the way back to it where it is open.
+/// A run and, if it is open, the way back to it.
 pub(crate) struct Run<'a> {
     run: &'a RunReport,
     back: Option<&'a ReturnReport>,

@@ -1,4 +1,4 @@
-//! `sections`, `holes` and `flags`: what the sections of the way say.
+//! `sections`, `holes` and `flags`: the results of the sections of the coverage extent.
 
 use headrace_coverage::Evidence;
 use headrace_monitor::report::SectionReport;
@@ -17,7 +17,7 @@ fn causes(row: &SectionReport) -> Option<String> {
     evidence(row).map(|evidence| words(evidence.causes.iter()))
 }
 
-/// Causes by name, the main one first.
+/// Names of causes, the main one first.
 pub(super) fn words(causes: impl IntoIterator<Item = headrace_coverage::Cause>) -> String {
     causes.into_iter().map(headrace_coverage::Cause::as_str).collect::<Vec<_>>().join(",")
 }
@@ -145,7 +145,7 @@ pub(crate) struct Hole<'a> {
     sections: i64,
 }
 
-/// The holes of a dive: one that several neighbouring sections share is one.
+/// The holes of a dive. A hole shared by several adjacent sections occurs once.
 pub(crate) fn holes(sections: &[SectionReport]) -> Vec<Hole<'_>> {
     let place = |section: &SectionReport| {
         [section.hole_m, section.hole_x_m, section.hole_arc_m].map(|number| number.map(f64::to_bits))

@@ -1,4 +1,4 @@
-// A made-up dive in the feed's format: a horseshoe of 3 m radius, four heads in phase shift, missed and unsure stretches.
+// A mock dive in the feed's format: a horseshoe of 3 m radius, four heads in phase shift, missed and undecided stretches.
 
 export const TARGET_M = 0.5, SECTION_M = 0.25, RADIUS_M = 3, HEADS = 4, TURN_S = 4, PINGS = 72;
 export const BEGUN_S = 100;
@@ -23,7 +23,7 @@ function profileAt(arc) {
 export const PERIMETER_M = 4 * RADIUS_M + Math.PI * RADIUS_M;
 export const PROFILE = Array.from({ length: 120 }, (_, k) => profileAt((k / 120) * PERIMETER_M));
 
-/** Arc length where the ray from the reference point (0, R) at a head angle (0 down, growing to the left) meets the wall. */
+/** Arc length at which the ray from the reference point (0, R) at a head angle (0 down, growing to the left) meets the wall. */
 export function arcAt(angle) {
   const R = RADIUS_M, a = ((angle % (2 * Math.PI)) + 2 * Math.PI) % (2 * Math.PI);
   const y = Math.sin(a), z = -Math.cos(a);
@@ -33,13 +33,13 @@ export function arcAt(angle) {
 }
 export const CLOCK_ARC_M = Array.from({ length: 12 }, (_, hour) => arcAt((hour / 12) * 2 * Math.PI + Math.PI));
 
-/** Even noise in 0..1 by number. */
+/** Uniform noise in 0..1 by number. */
 export function noise(n) {
   const x = Math.sin(n * 12.9898 + 4.1) * 43758.5453;
   return x - Math.floor(x);
 }
 
-/** Stretches of the dive that aren't as the others: every 137 m one was missed, every 411 m one can't be said. */
+/** Special stretches of the dive: every 137 m one was missed, and every 411 m one is undecided. */
 export function kindAt(x_m) {
   const missed = x_m % 137, unsure = (x_m + 60) % 411;
   if (missed > 12 && missed < 18.25) return "fast";
@@ -47,7 +47,7 @@ export function kindAt(x_m) {
   return "";
 }
 
-/** A section's record as of a vehicle at `at_m` going inwards. */
+/** A section's record for a vehicle at `at_m` that moves inwards. */
 export function sectionRecord(view, at, index, at_m, isCleared) {
   const x = (index + 0.5) * SECTION_M, kind = kindAt(x), behind = at_m - x;
   const missed = kind === "fast" && !isCleared;
@@ -94,7 +94,7 @@ export function sectionsFrame(from, to, at_m, seq, cleared = () => false) {
   return frame(1, to - from, 32, (view, at, n) => sectionRecord(view, at, from + n, at_m, cleared(from + n)), seq);
 }
 
-/** The pings of a stretch of time on a way x(t), by the heads that live. */
+/** Pings of the active heads in a time span of a trajectory x(t). */
 export function pings(from_s, to_s, xOf, heads) {
   const step_s = TURN_S / PINGS, out = [];
   for (let n = Math.ceil(from_s / step_s); n * step_s < to_s; n += 1) {
@@ -121,7 +121,7 @@ export function samplesFrame(list, begun_s, seq = 0) {
   }, seq);
 }
 
-/** Samples between two chainages of the way already made: 0.2 m/s, 0.6 m/s where it was too fast. */
+/** Samples between two chainages of the trajectory so far: 0.2 m/s, and 0.6 m/s where it was too fast. */
 export function samplesBetween(from_m, to_m, begun_s, most = 200_000) {
   const list = [];
   for (let metre = Math.floor(from_m); metre < to_m; metre += 1) {

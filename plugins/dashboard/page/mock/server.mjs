@@ -1,4 +1,4 @@
-// Plays a made-up dive to the page in the feed's format, and does as tests say: POST /mock/control with a JSON object.
+// Plays a mock dive to the page in the feed's format. Tests control it by POST /mock/control with a JSON object.
 import { createServer } from "node:http";
 import { existsSync, readFileSync } from "node:fs";
 import { extname, join, normalize } from "node:path";
@@ -13,7 +13,7 @@ const CSP = "default-src 'self'; style-src 'self'; script-src 'self'; img-src 's
 const KEPT = 2000;
 const TICK_MS = 200;
 
-/** Starts it; port 0 takes a free one. */
+/** Starts the server; port 0 takes a free one. */
 export async function serve(options = {}) {
   let world = new World(options);
   const clients = new Set();
@@ -79,7 +79,7 @@ export async function serve(options = {}) {
     return answer({ type: "done", do: command.do });
   };
 
-  /** What tests ask for. */
+  /** Commands of tests. */
   const control = (ask) => {
     if (ask.speed_mps !== undefined) world.setSpeed(ask.speed_mps);
     if (ask.kill) world.kill(ask.kill);

@@ -1,4 +1,4 @@
-// The made-up dive as it goes on: speed, alerts with their life, sensors that die, position that is lost.
+// State of the mock dive over time: speed, alerts with their life cycle, failing sensors, lost position.
 import * as dive from "./dive.mjs";
 
 const SENSORS = [
@@ -43,7 +43,7 @@ export class World {
       tokens_needed: false };
   }
 
-  /** A run that is missed raises one alert; alerts of the way so far: the last few runs. */
+  /** A missed run raises one alert; alerts of the trajectory so far: the last few runs. */
   seedAlerts() {
     for (let k = Math.max(0, Math.floor(this.at_m / 137) - 4); k * 137 + 18.25 < this.at_m - 1; k += 1) {
       const alert = this.missed(k * 137 + 12);
@@ -133,7 +133,7 @@ export class World {
     if (!fast && wasFast) this.settle((alert) => alert.kind === "too_fast");
   }
 
-  /** Goes on by some seconds; gives the pings. */
+  /** Advances by some seconds; returns the pings. */
   step(by_s) {
     if (this.playback?.paused) return [];
     const from_s = this.t_s, from_m = this.at_m, speed = this.speed_mps * (this.playback?.speed ?? 1);

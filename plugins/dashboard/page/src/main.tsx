@@ -55,7 +55,7 @@ const WIDGETS: Record<string, () => preact.JSX.Element> = {
   alerts: () => <><h1 class="sr">headrace: alerts</h1><Token /><main><Alerts /></main><AlertAnnouncer /></>,
 };
 
-/** The whole page is visibly old where what it shows is, whatever part is looked at. */
+/** The whole page is visibly old if its data is, whichever part is shown. */
 function watch(): void {
   const { dataset } = document.documentElement;
   const lost = lost_s(store);

@@ -3,7 +3,7 @@ import { chromium } from "playwright-core";
 
 export const EXECUTABLE = process.env.CHROMIUM ?? "/usr/bin/chromium";
 
-/** A microphone that hums, and is given to whoever asks. */
+/** A humming microphone that any page gets without a question. */
 export const MICROPHONE = ["--use-fake-device-for-media-stream", "--use-fake-ui-for-media-stream"];
 
 const opened = new Set();
@@ -19,12 +19,12 @@ export async function browser(more = []) {
   return started;
 }
 
-/** Ends all that are open: also those of a test that failed, for which the tests would wait for ever. */
+/** Closes all open browsers, including those of a failed test, which would otherwise keep the tests from ending. */
 export async function closeAll() {
   for (const started of opened) await started.close();
 }
 
-/** A page of its own context, with what it prints and fails on gathered in `problems`. */
+/** A page in its own context; `problems` collects its messages and errors. */
 export async function open(chromium, url, { width = 1280, height = 800, palette = "dusk", init, ...more } = {}) {
   const context = await chromium.newContext({ viewport: { width, height }, ...more });
   await context.addInitScript((palette) => {

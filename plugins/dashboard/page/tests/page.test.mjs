@@ -1,4 +1,4 @@
-// The page against a made-up dive, in Debian's Chromium. Nothing sleeps: conditions are waited for.
+// The page with a mock dive, in Debian's Chromium. Tests never sleep, but wait for conditions.
 import assert from "node:assert/strict";
 import { after, before, describe, it } from "node:test";
 import { readFileSync } from "node:fs";
@@ -14,7 +14,7 @@ let chromium;
 before(async () => { chromium = await browser(); });
 after(async () => { await chromium.close(); });
 
-/** A dive and a page on it, closed when done. */
+/** Runs a test with a dive and a page, and closes both. */
 async function on(options, run, { path = "/", ...more } = {}) {
   const mock = await serve({ length_m: 7000, at_m: 60, ...options });
   const opened = await open(chromium, mock.url + path, more);
@@ -28,7 +28,7 @@ async function on(options, run, { path = "/", ...more } = {}) {
 }
 const word = (page, text) => page.locator(".condition .word", { hasText: text }).waitFor();
 
-/** Pixels of a picture within 24 of a colour in each part. */
+/** Number of pixels within 24 of a colour in each component. */
 const countNear = (page, picture, colour) => page.evaluate(async ({ base64, colour }) => {
   const bitmap = await createImageBitmap(new Blob([Uint8Array.from(atob(base64), (each) => each.charCodeAt(0))]));
   const context = new OffscreenCanvas(bitmap.width, bitmap.height).getContext("2d");
@@ -41,13 +41,13 @@ const countNear = (page, picture, colour) => page.evaluate(async ({ base64, colo
 const condition = (page, name) => page.locator(`.condition[data-condition="${name}"]`).waitFor();
 
 
-describe("what it shows", () => {
-  it("v_max with its reason, and the wall", () => on({}, async ({ page }) => {
+describe("display", () => {
+  it("shows v_max with its reason, and the wall", () => on({}, async ({ page }) => {
     await condition(page, "good");
     assert.match(await page.locator(".most .value").innerText(), /0\.24/);
     assert.match(await page.locator(".why").innerText(), /slower helps/);
     assert.match(await page.locator(".chainage").innerText(), /^0\+06\d\.\d$/);
-    // The stretch from 0+012 to 0+018 was missed: holes over T are yellow, its outline is red, the rest of the way is blue to grey.
+    // The stretch from 0+012 to 0+018 was missed: holes over T are yellow, its outline is red, and the rest is blue to grey.
     await page.waitForFunction(() => !document.querySelector(".condition.old"));
     const near = async (colour) => countNear(page, await page.screenshot({ clip: await page.locator(".wall-box").boundingBox() }), colour);
     let yellow = 0;
@@ -57,14 +57,14 @@ describe("what it shows", () => {
     assert.ok(await near([0x57, 0x5d, 0x6d]) >= 2000, "no wall that passes");
   }));
 
-  it("what would gain more, where slower won't help", () => on({}, async ({ mock, page }) => {
+  it("shows a faster option if slower won't help", () => on({}, async ({ mock, page }) => {
     mock.control({ condition: "no_speed", lamp: "red", remedy: "set the heads to SLOW" });
     await condition(page, "no_speed");
     assert.match(await page.locator(".remedy").innerText(), /set the heads to SLOW/);
     assert.match(await page.locator(".condition .advice").innerText(), /set the heads to SLOW/);
   }));
 
-  it("a dead position", () => on({}, async ({ mock, page }) => {
+  it("shows a lost position", () => on({}, async ({ mock, page }) => {
     await condition(page, "good");
     mock.control({ position: "none" });
     await word(page, "NO POSITION");
@@ -72,7 +72,7 @@ describe("what it shows", () => {
     assert.match(await page.locator(".sure").innerText(), /no heading/);
   }));
 
-  it("a killed sensor within 2 s of its silence, with its age", () => on({}, async ({ mock, page }) => {
+  it("shows a silent sensor within 2 s, with its age", () => on({}, async ({ mock, page }) => {
     await page.locator('[data-sensor="aft_port"][data-state="ok"]').waitFor();
     mock.control({ kill: "aft_port" });
     await page.locator('[data-sensor="aft_port"][data-state="silent"]').waitFor({ timeout: 4000 });
@@ -80,12 +80,12 @@ describe("what it shows", () => {
     await page.locator('.alert[data-kind="sensor_silent"]').waitFor();
   }));
 
-  it("a recording that fails", () => on({}, async ({ mock, page }) => {
+  it("shows a failed recording", () => on({}, async ({ mock, page }) => {
     mock.control({ recording: { on: true, fails: true, words: "NOT RECORDED", path: "dive.mcap" } });
     await page.locator(".recording", { hasText: "NOT RECORDED" }).waitFor();
   }));
 
-  it("parts of it by their paths", async () => {
+  it("serves its parts by their paths", async () => {
     for (const [path, there] of [["speed", ".gauge"], ["wall", ".wall-box canvas"], ["alerts", ".alert-list"]]) {
       await on({}, async ({ page }) => {
         await page.locator(there).first().waitFor();
@@ -96,7 +96,7 @@ describe("what it shows", () => {
     }
   });
 
-  it("all the rest where there is no WebGL2", () => on({}, async ({ page }) => {
+  it("shows everything else without WebGL2", () => on({}, async ({ page }) => {
     await page.locator(".missing", { hasText: "no WebGL2" }).waitFor();
     await condition(page, "good");
   }, { init: (page) => page.addInitScript(() => {
@@ -111,7 +111,7 @@ describe("voice notes", () => {
   after(async () => { await hears.close(); });
   const voice = (page) => page.locator(".notes .voice");
 
-  /** A dive and a page on it with a microphone. */
+  /** Runs a test with a dive and a page with a microphone. */
   async function spoken(run) {
     const mock = await serve({ length_m: 7000, at_m: 60, mode: "demo" });
     const opened = await open(hears, mock.url);
@@ -125,7 +125,7 @@ describe("voice notes", () => {
     }
   }
 
-  it("is put down when it begins, shows its seconds, and plays", () => spoken(async ({ mock, page }) => {
+  it("creates a note when it begins, shows its seconds, and plays", () => spoken(async ({ mock, page }) => {
     await voice(page).click();
     await page.locator(".notes .voice.recording", { hasText: "End 0:01" }).waitFor();
     const [begun] = mock.control({}).notes;
@@ -144,7 +144,7 @@ describe("voice notes", () => {
     assert.equal(await page.locator(".said.refused").count(), 0);
   }));
 
-  it("held, it ends when it is let go", () => spoken(async ({ page }) => {
+  it("ends a held recording on release", () => spoken(async ({ page }) => {
     await voice(page).hover();
     await page.mouse.down();
     await page.locator(".notes .voice.recording", { hasText: "End 0:01" }).waitFor();
@@ -152,17 +152,17 @@ describe("voice notes", () => {
     await page.locator(".notes li", { hasText: /voice, [12] s/ }).waitFor();
   }));
 
-  it("that can't be kept is told, and is sent again", () => spoken(async ({ mock, page }) => {
-    mock.control({ refuses: "the voice isn't kept: nothing is being recorded at present" });
+  it("reports a recording that can't be stored, and sends it again", () => spoken(async ({ mock, page }) => {
+    mock.control({ refuses: "the voice note isn't recorded: nothing is being recorded at present" });
     await voice(page).click();
     await page.locator(".notes .voice.recording").waitFor();
     await voice(page).click();
-    await page.locator(".notes .voice-words", { hasText: "the voice isn't kept: nothing is being recorded" }).waitFor();
+    await page.locator(".notes .voice-words", { hasText: "the voice note isn't recorded: nothing is being recorded" }).waitFor();
     mock.control({ refuses: null });
     await page.locator(".notes .voice.unsent", { hasText: "Send again" }).click();
     await page.locator(".notes li", { hasText: "voice, 1 s" }).waitFor();
     await page.locator(".notes .voice.idle").waitFor();
-    // And goes by itself once there is a connection again.
+    // It is sent without help once there is a connection again.
     await voice(page).click();
     await page.locator(".notes .voice.recording").waitFor();
     mock.control({ closed: true });
@@ -172,7 +172,7 @@ describe("voice notes", () => {
     await page.locator(".notes li", { hasText: "voice, 1 s" }).nth(1).waitFor();
   }));
 
-  it("says why there is none, without a microphone, a secure page or a recording", async () => {
+  it("gives the reason without a microphone, a secure page or a recorded dive", async () => {
     const told = (page, words) => page.locator(".notes .voice-words", { hasText: words }).waitFor();
     await on({ mode: "demo" }, async ({ mock, page }) => {
       await condition(page, "good");
@@ -194,7 +194,7 @@ describe("voice notes", () => {
 });
 
 describe("alerts", () => {
-  it("a stretch passed too fast raises one, acknowledged in one browser and seen in the other", () => on({ at_m: 148 }, async ({ mock, page, again }) => {
+  it("show a stretch passed too fast once, acknowledged in one browser and displayed in the other", () => on({ at_m: 148 }, async ({ mock, page, again }) => {
     await condition(page, "good");
     mock.control({ speed_mps: 0.5 });
     await condition(page, "too_fast");
@@ -214,7 +214,7 @@ describe("alerts", () => {
     await other.context.close();
   }));
 
-  /** Items of the list that can be read whole, all its items, and how many are said to be hidden. */
+  /** Fully visible items of the list, all its items, and the displayed number of hidden ones. */
   const listed = (page) => page.evaluate(() => {
     const frame = document.querySelector(".alert-list").getBoundingClientRect();
     const items = [...document.querySelectorAll(".alert")];
@@ -228,14 +228,14 @@ describe("alerts", () => {
     for (let k = 0; k < count; k += 1) mock.control({ raise: { priority: k === 3 ? "alarm" : "warning", kind: `kind_${k}`, text: `sensor ${k} has been silent for a while`, advice: "look at its plug" } });
   };
 
-  it("of twenty at 1280x800 the first are shown, the rest are counted and reached by keys", () => on({ at_m: 1 }, async ({ mock, page }) => {
+  it("show the first of twenty at 1280x800, count the rest, and reach them by keys", () => on({ at_m: 1 }, async ({ mock, page }) => {
     await page.locator(".alert-list .none").waitFor();
     raised(mock, 20);
     await page.waitForFunction(() => document.querySelectorAll(".alert").length === 20 && document.querySelector(".alerts .more"));
     const before = await listed(page);
     assert.ok(before.fits, "the page has grown over its window");
     assert.ok(before.whole.length >= 10, `${before.whole.length} of 20 can be read`);
-    // The one alarm comes first, and what is cut by the edge counts as shown or as hidden, not as both.
+    // The only alarm comes first, and an item cut by the edge counts as either shown or hidden.
     assert.equal(before.whole[0], 4);
     assert.ok([0, 1].includes(20 - before.whole.length - before.hidden), JSON.stringify(before));
     await page.locator(".alert-list").focus();
@@ -244,7 +244,7 @@ describe("alerts", () => {
     const after = await listed(page);
     assert.ok(after.whole.length >= 10 && after.all === 20, JSON.stringify(after));
     assert.ok(!after.whole.includes(4) && after.fits, JSON.stringify(after));
-    // A line opens while it has the focus, with what is to be done.
+    // An item opens while it has the focus, with its action.
     const last = page.locator(".alert").last(), advice = last.locator(".do");
     assert.ok(!(await advice.isVisible()));
     await last.getByRole("button", { name: /Ack alert/ }).focus();
@@ -254,7 +254,7 @@ describe("alerts", () => {
     await page.waitForFunction((hidden) => Number.parseInt(document.querySelector(".alerts .more")?.textContent ?? "0", 10) === hidden, before.hidden);
   }));
 
-  it("of more than the list holds the rest are counted, and move up as others are acknowledged", () => on({ at_m: 1 }, async ({ mock, page }) => {
+  it("count those beyond the list, which move up as others are acknowledged", () => on({ at_m: 1 }, async ({ mock, page }) => {
     await page.locator(".alert-list .none").waitFor();
     raised(mock, 70);
     await page.waitForFunction(() => document.querySelectorAll(".alert").length === 64);
@@ -269,7 +269,7 @@ describe("alerts", () => {
     assert.ok((await listed(page)).fits);
   }));
 
-  it("what is over stays until it is acknowledged; a caution doesn't", () => on({}, async ({ mock, page }) => {
+  it("keep cleared alerts until acknowledged, except cautions", () => on({}, async ({ mock, page }) => {
     await condition(page, "good");
     mock.control({ raise: { priority: "alarm", class: "coverage", kind: "missed", text: "MISSED 0+040" } });
     mock.control({ raise: { priority: "caution", class: "setting", kind: "setting_doubted", text: "setting doubted" } });
@@ -282,11 +282,11 @@ describe("alerts", () => {
     await page.locator('.alert[data-kind="missed"]').waitFor({ state: "detached" });
   }));
 
-  it("says how many more there are", () => on({}, async ({ mock, page }) => {
+  it("show the number of further alerts", () => on({}, async ({ mock, page }) => {
     await condition(page, "good");
     for (let n = 0; n < 30; n += 1) mock.control({ raise: { text: `warning ${n}`, kind: `kind_${n}` } });
     await page.locator(".alert").nth(29).waitFor();
-    // Hidden below, and at least partly in sight.
+    // Items hidden below, and items at least partly visible.
     await page.waitForFunction((all) => {
       const below = Number(/^(\d+) more hidden below/.exec(document.querySelector(".more")?.innerText ?? "")?.[1]);
       const bottom = document.querySelector(".alert-list").getBoundingClientRect().bottom;
@@ -297,7 +297,7 @@ describe("alerts", () => {
 });
 
 describe("connection", () => {
-  it("a network lost for 20 s: counts, and recovers with nothing missing", async () => {
+  it("recovers completely from a network loss of 20 s, and counts the seconds", async () => {
     await on({ at_m: 90 }, async ({ mock, page }) => {
       await condition(page, "good");
       await page.keyboard.press("0");
@@ -321,7 +321,7 @@ describe("connection", () => {
     });
   });
 
-  it("a program that says nothing: old within 2 s", () => on({}, async ({ mock, page }) => {
+  it("shows data as old within 2 s if the program sends nothing", () => on({}, async ({ mock, page }) => {
     await condition(page, "good");
     mock.control({ mute: true });
     await word(page, "OLD");
@@ -330,19 +330,19 @@ describe("connection", () => {
     await word(page, "GOOD");
   }));
 
-  it("a reload, and a restart of the program as another instance", () => on({ at_m: 90 }, async ({ mock, page }) => {
+  it("survives a reload, and a restart of the program as another instance", () => on({ at_m: 90 }, async ({ mock, page }) => {
     await condition(page, "good");
     mock.control({ missed_m: 80 });
     await page.locator(".alert", { hasText: "MISSED 0+080" }).waitFor();
     await page.reload();
     await page.locator(".alert", { hasText: "MISSED 0+080" }).waitFor();
     mock.control({ restart: "mock-2" });
-    // Another program: what the first one had told is gone.
+    // Another instance: the data of the first is gone.
     await page.locator(".alert", { hasText: "MISSED 0+080" }).waitFor({ state: "detached" });
     await condition(page, "good");
   }));
 
-  it("a token where one is wanted", () => on({ token: "right" }, async ({ mock, page }) => {
+  it("asks for a token if one is required", () => on({ token: "right" }, async ({ mock, page }) => {
     await word(page, "NO ACCESS");
     await page.getByLabel(/Token/).fill("wrong");
     await page.keyboard.press("Enter");
@@ -359,7 +359,7 @@ describe("connection", () => {
 });
 
 describe("keyboard", () => {
-  it("does everything", () => on({ mode: "demo", at_m: 60 }, async ({ mock, page }) => {
+  it("reaches every action", () => on({ mode: "demo", at_m: 60 }, async ({ mock, page }) => {
     await condition(page, "good");
     mock.control({ missed_m: 50 });
     await page.locator(".alert.open").first().waitFor();
@@ -391,11 +391,11 @@ describe("keyboard", () => {
     await condition(page, "good");
   }));
 
-  it("plays a replay", () => on({ mode: "replay", at_m: 60 }, async ({ mock, page }) => {
+  it("controls a replay", () => on({ mode: "replay", at_m: 60 }, async ({ mock, page }) => {
     await page.locator(".replay").waitFor();
     await page.keyboard.press(" ");
     await page.locator(".paused").waitFor();
-    // A paused dive doesn't grow old.
+    // A paused dive doesn't age.
     for (const key of [".", ",", "l", "j"]) {
       const before = await page.locator(".replay input").inputValue();
       await page.keyboard.press(key);
@@ -411,9 +411,9 @@ describe("keyboard", () => {
   }));
 });
 
-describe("for everybody", () => {
+describe("accessibility", () => {
   for (const palette of ["day", "dusk", "night"]) {
-    it(`axe finds nothing serious, ${palette}`, () => on({ at_m: 148 }, async ({ mock, page }) => {
+    it(`axe finds no serious problem, ${palette}`, () => on({ at_m: 148 }, async ({ mock, page }) => {
       await condition(page, "good");
       mock.control({ speed_mps: 0.5 });
       mock.control({ missed_m: 140 });
@@ -427,7 +427,7 @@ describe("for everybody", () => {
     }, { palette, reducedMotion: "reduce" }));
   }
 
-  it("green, amber and red are told apart under deuteranopia, and by shape and word besides", () => on({}, async ({ page }) => {
+  it("green, amber and red differ under deuteranopia, and also by shape and word", () => on({}, async ({ page }) => {
     await condition(page, "good");
     const colours = await page.evaluate(() => ["day", "dusk", "night"].flatMap((palette) => {
       document.documentElement.dataset.palette = palette;
@@ -456,8 +456,8 @@ function lab([r, g, b]) {
   return [116 * y - 16, 500 * (x - y), 200 * (y - z)];
 }
 
-describe("one dive in one file", () => {
-  it("opens with no network, with a slider over its time", async () => {
+describe("exported dive", () => {
+  it("opens without a network, with a slider over its time", async () => {
     const world = new World({ length_m: 7000, at_m: 60 });
     const states = [], t_s = [];
     for (let n = 0; n < 20; n += 1) { world.step(1); t_s.push(world.t_s); states.push(world.state()); }
@@ -488,7 +488,7 @@ describe("one dive in one file", () => {
       await page.getByLabel("Time of the dive").focus();
       await page.keyboard.press("Home");
       await page.locator(".chainage", { hasText: "0+060.2" }).waitFor();
-      // What is constant is in the first entry alone.
+      // Constant parts are in the first entry only.
       assert.equal(await page.locator(".sensor[data-sensor]").count(), 10);
       assert.deepEqual(requests.filter((url) => url !== "/"), []);
       assert.deepEqual(problems, []);
@@ -500,8 +500,8 @@ describe("one dive in one file", () => {
   });
 });
 
-describe("speed of drawing", () => {
-  it("at 7 km with 28,000 sections: measured and printed", () => on({ at_m: 6990 }, async ({ page }) => {
+describe("drawing speed", () => {
+  it("is measured and printed at 7 km with 28,000 sections", () => on({ at_m: 6990 }, async ({ page }) => {
     await condition(page, "good");
     const measure = (span) => page.evaluate(async ({ span, count }) => {
       const press = (key) => dispatchEvent(new KeyboardEvent("keydown", { key }));

@@ -25,7 +25,7 @@ async function freePort() {
 }
 
 const running = new Set();
-/** Starts the program; with the address of its page once it has said so. */
+/** Starts the program; returns it with the printed address of its page. */
 async function start(cwd, port, ...args) {
   const child = spawn(BIN, [...args, `--page=127.0.0.1:${port}`], { cwd, stdio: ["ignore", "pipe", "pipe"] });
   running.add(child);
@@ -55,7 +55,7 @@ describe("with the program", { skip: BIN ? false : "HEADRACE_BIN isn't set", con
     rmSync(folder, { recursive: true, force: true });
   });
 
-  it("a dive too fast for a stretch raises one alert, acknowledged for all, in the log and its replay", async () => {
+  it("raises one alert for a stretch passed too fast, acknowledged for all, in the log and its replay", async () => {
     const out = join(folder, "demo");
     const { child, url } = await start(folder, await freePort(), "demo", "--no-open", "--out", out, "--force", "--speed", "6x");
     const one = await open(chromium, url), other = await open(chromium, url);
@@ -72,11 +72,11 @@ describe("with the program", { skip: BIN ? false : "HEADRACE_BIN isn't set", con
     await other.page.locator(".notes", { hasText: "by the page" }).waitFor();
     await one.page.locator(`.alert[data-number="${number}"]`).getByRole("button", { name: /Ack alert/ }).click();
     await other.page.locator(`.alert[data-number="${number}"]:not(.open)`, { hasText: "ack page" }).waitFor();
-    // One situation, one alert.
+    // One situation gives one alert.
     assert.equal(await other.page.locator('.alert[data-kind="missed"]').count(), 1);
     await one.page.reload();
     await one.page.locator(`.alert[data-number="${number}"]:not(.open)`, { hasText: "ack page" }).waitFor();
-    // Each only as far as the dive is not over.
+    // Each check applies only while the dive isn't over.
     if (child.exitCode === null) await Promise.race([once(child, "exit"), one.page.locator(".word", { hasText: "DIVE ENDED" }).waitFor(LONG)]);
     assert.deepEqual([one.problems, other.problems], [[], []]);
     await stop(child, "SIGINT");
@@ -90,13 +90,13 @@ describe("with the program", { skip: BIN ? false : "HEADRACE_BIN isn't set", con
     await page.getByLabel("Time of the dive").focus();
     await page.keyboard.press("End");
     await page.locator(".notes", { hasText: "by the page" }).waitFor(LONG);
-    // The pilot has gone back: acknowledged, and passed again, it is over.
+    // The pilot has gone back: the alert is acknowledged, and cleared after the new pass.
     assert.equal(await page.locator(`.alert[data-number="${number}"]`).count(), 0);
     const report = JSON.parse(execFileSync(BIN, ["replay", join(out, "dive.mcap"), "--json"], { maxBuffer: 1 << 28 }));
     const alert = report.alert_list.find((alert) => alert.number === Number(number));
     assert.deepEqual([alert.kind, alert.state, alert.acknowledged?.by], ["missed", "cleared", "page"]);
     assert.ok(await page.getByRole("button", { name: "Acknowledge all" }).isDisabled());
-    // The program dies and comes back: the page says so, and goes on by itself.
+    // The program is killed and restarted: the page reports it, and recovers without help.
     await stop(replay.child);
     await page.locator(".word", { hasText: "NO CONNECTION" }).waitFor();
     await start(folder, port, "replay", join(out, "dive.mcap"), "--speed", "8x");
@@ -106,7 +106,7 @@ describe("with the program", { skip: BIN ? false : "HEADRACE_BIN isn't set", con
     await context.close();
   });
 
-  it("what is spoken into one browser is in the other, in the log, and in the replay", async () => {
+  it("shows a voice note of one browser in the other, in the log, and in the replay", async () => {
     const out = join(folder, "spoken");
     const { child, url } = await start(folder, await freePort(), "demo", "--no-open", "--out", out, "--force", "--speed", "4x");
     const hears = await browser(MICROPHONE);
@@ -115,7 +115,7 @@ describe("with the program", { skip: BIN ? false : "HEADRACE_BIN isn't set", con
     await one.page.locator(".notes .voice").click();
     await one.page.locator(".notes .voice.recording", { hasText: "End 0:02" }).waitFor();
     await one.page.locator(".notes .voice").click();
-    // How long it was open is up to this machine; two seconds were waited for.
+    // The length depends on this machine; the test waited for two seconds.
     const line = other.page.locator(".notes li", { hasText: /voice, \d+ s/ });
     await line.waitFor();
     const seconds = Number(/voice, (\d+) s/.exec(await line.innerText())[1]);
@@ -140,7 +140,7 @@ describe("with the program", { skip: BIN ? false : "HEADRACE_BIN isn't set", con
     assert.equal(note.voice.seconds, seconds);
     const sound = readFileSync(join(voices, "note-1.webm"));
     assert.equal(sound.length, note.recording.bytes);
-    // Opus in WebM, of a few kB a second.
+    // Opus in WebM, a few kB per second.
     assert.ok(sound.subarray(0, 4).equals(Buffer.from([0x1a, 0x45, 0xdf, 0xa3])) && sound.includes("A_OPUS"));
     assert.ok(sound.length > 500 * seconds && sound.length < 10_000 * (seconds + 1), `${sound.length} bytes in ${seconds} s`);
 
@@ -156,12 +156,12 @@ describe("with the program", { skip: BIN ? false : "HEADRACE_BIN isn't set", con
     await context.close();
   });
 
-  it("sensors that fall silent in a rehearsal show within 2 s of their silence", async () => {
+  it("shows sensors that fall silent in a rehearsal within 2 s", async () => {
     const out = join(folder, "rehearsal");
     const emulator = spawn(BIN, ["emulate", SCENE, "--out", out], { stdio: ["ignore", "pipe", "ignore"] });
     running.add(emulator);
     const vehicle = join(out, "vehicle.toml");
-    // Its last line names the devices' ports: all are open then, and the vehicle file is written.
+    // Its last line names the devices' ports. By then all are open and the vehicle file is written.
     await once(emulator.stdout, "data");
     const { child, url } = await start(folder, await freePort(), "run", vehicle);
     const { page, context, problems } = await open(chromium, url);

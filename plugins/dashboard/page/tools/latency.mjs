@@ -1,7 +1,7 @@
-// From a change of an alert in the loop to the picture that shows it: node tools/latency.mjs PROGRAM [rounds]
-// Logs of tests/golden replayed at real speed, seen by a page in Chromium on loopback. Time 0 is the tick that the alert says; when that
-// was on the clock is known from the line of `--json-lines` that came soonest after its own tick, so that the figure is too small by what
-// that one took. The end is the task after the frame in which the page shows the alert's new state.
+// Latency from a change of an alert in the loop to the frame that shows it: node tools/latency.mjs PROGRAM [rounds]
+// It replays logs of tests/golden at real speed to a page in Chromium on loopback. Time 0 is the tick of the alert. Its clock time is
+// taken from the line of `--json-lines` that arrived soonest after its own tick, so the figure is too small by that line's delay. The end
+// is the task after the frame in which the page shows the alert's new state.
 import { spawn } from "node:child_process";
 import { mkdtempSync, rmSync } from "node:fs";
 import { tmpdir } from "node:os";
@@ -12,11 +12,11 @@ import { browser, open } from "../tests/browser.mjs";
 
 const [program, rounds = "3"] = process.argv.slice(2);
 const LOGS = ["too-fast", "slipping-cable", "stalls"];
-/** A replay with a page goes on after its last line until it is ended; then nothing comes for longer than this, ms. */
+/** A replay with a page continues after its last line until it is ended; then no data arrive for longer than this, ms. */
 const OVER_MS = 3000;
 const golden = (name) => fileURLToPath(new URL(`../../../../tests/golden/${name}`, import.meta.url));
 
-/** In the page: when each alert was first shown in each of its states, ms since 1970. */
+/** In the page: first display of each alert in each of its states, ms since 1970. */
 function watch() {
   globalThis.shown = {};
   const look = () => {

@@ -1,4 +1,4 @@
-// Pictures of the page by a made-up dive, to be looked at: node tools/shots.mjs OUT [name part]
+// Screenshots of the page with a mock dive, for review: node tools/shots.mjs OUT [name part]
 import { mkdirSync } from "node:fs";
 import { serve } from "../mock/server.mjs";
 import { open, browser } from "../tests/browser.mjs";

@@ -5,7 +5,7 @@ import { readFileSync, writeFileSync } from "node:fs";
 const dist = new URL("../dist/", import.meta.url);
 const read = (name) => readFileSync(new URL(name, dist), "utf8");
 const icon = Buffer.from(read("assets/icon.svg")).toString("base64");
-// What would end the element early is written otherwise; both mean the same inside a string of JavaScript.
+// Sequences that would end the element early are escaped; both forms mean the same inside a JavaScript string.
 const script = read("assets/page.js").replaceAll("</script", "<\\/script").replaceAll("<!--", "<\\!--");
 const page = read("index.html");
 

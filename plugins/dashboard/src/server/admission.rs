@@ -1,4 +1,4 @@
-//! Requests by the tokens that they show: what they may do.
+//! Rights of requests by their tokens.
 
 use std::collections::{BTreeSet, VecDeque};
 use std::hash::{DefaultHasher, Hash as _, Hasher as _};
@@ -16,11 +16,11 @@ use super::places::Place;
 use super::reply::{ask_to_wait, plain, refused};
 use crate::access::{Role, tokens_of};
 
-/// Wrong tokens that are remembered, in all and of a client.
+/// Number of wrong tokens that are remembered, in total and for a client.
 const MOST_WRONG: usize = 256;
 const MOST_WRONG_OF_CLIENT: usize = 4;
 
-/// The connection of a request.
+/// Connection of a request.
 #[derive(Clone)]
 pub(super) struct Caller {
     pub(super) peer: IpAddr,
@@ -32,16 +32,16 @@ pub(super) struct Admitted {
     pub(super) role: Role,
     pub(super) client: Client,
     place: Arc<Place>,
-    /// The address is one that a proxy forwards for.
+    /// Whether the address comes from a declared proxy.
     is_forwarded: bool,
 }
 
-/// Why a request may not see the dive.
+/// Reason why a request may not see the dive.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Denied {
-    /// No token, or none that is right.
+    /// No token, or no right one.
     NoToken,
-    /// Too many wrong tokens came from its address: it isn't compared.
+    /// Too many wrong tokens came from its address, so the token isn't compared.
     Spent,
 }
 
@@ -53,7 +53,7 @@ impl Denied {
         }
     }
 
-    /// The same as an answer to a command.
+    /// The refusal as an answer to a command.
     pub(super) fn refusal(self, shared: &Shared) -> Response {
         refused(shared, self.status(), self.why().trim_end())
     }
@@ -82,7 +82,7 @@ impl FromRequestParts<Arc<Shared>> for Admitted {
 }
 
 impl Admitted {
-    /// Admits a request by these of its tokens.
+    /// Admits a request by these tokens of it.
     pub(super) fn of_tokens(
         shared: &Shared,
         caller: &Caller,
@@ -97,14 +97,14 @@ impl Admitted {
         Ok(Self { role, client, place: Arc::clone(&caller.place), is_forwarded })
     }
 
-    /// Whether its connection may carry a stream of the feed; it does so from now on.
+    /// Whether its connection may carry a stream of the feed. If so, it counts as a stream from now on.
     pub(super) fn may_stream(&self) -> bool {
         self.place.stream(self.client, self.is_forwarded)
     }
 }
 
-/// Wrong tokens of clients, the latest last, by their hashes. To show one of them again is no guess: old tokens in the tabs of a browser
-/// must not spend the budget of its address.
+/// Hashes of clients' wrong tokens, the latest last. A repeated token is no guess, so old tokens in a browser's tabs
+/// don't spend the budget of its address.
 #[derive(Default)]
 pub(super) struct WrongTokens(Mutex<VecDeque<(Client, u64)>>);
 
@@ -137,8 +137,8 @@ fn hash_of(token: &str) -> u64 {
 }
 
 impl Shared {
-    /// The role of these tokens. Each wrong one costs a guess of the client's budget. Tokens cost none that the client has shown before:
-    /// a right one on this connection, or one of its last wrong ones.
+    /// Role of these tokens. Each wrong one costs a guess of the client's budget. Tokens that the client has shown
+    /// before are free: a right one on this connection, or one of its last wrong ones.
     fn role(&self, client: Client, place: &Place, tokens: &BTreeSet<String>) -> Result<Role, Denied> {
         if self.access.tokens.is_none() {
             return Ok(Role::Operator);

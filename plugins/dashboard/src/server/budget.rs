@@ -1,4 +1,4 @@
-//! Budgets of requests: so many at once, and so many a second after that.
+//! Rate limits of requests: a burst, and a refill per second.
 
 use std::collections::BTreeMap;
 use std::sync::{Mutex, PoisonError};
@@ -7,17 +7,17 @@ use tokio::time::Instant;
 
 use super::client::Client;
 
-/// Clients that a budget remembers. A table of this size takes about 200 KiB.
+/// Number of clients that a budget remembers. A table of this size takes about 200 KiB.
 const MOST_CLIENTS: usize = 4096;
 
-/// Size of a budget, and its refill.
+/// Size of a budget, and its refill per second.
 #[derive(Debug, Clone, Copy)]
 struct Rate {
     most: f64,
     per_s: f64,
 }
 
-/// What is left of a budget, and when that was.
+/// Remaining budget, and its time.
 #[derive(Debug, Clone, Copy)]
 struct Left(f64, Instant);
 
@@ -27,7 +27,7 @@ impl Left {
     }
 }
 
-/// A budget that all share.
+/// A budget shared by all.
 pub(crate) struct Budget {
     rate: Rate,
     left: Mutex<Option<Left>>,
@@ -38,7 +38,7 @@ impl Budget {
         Self { rate: Rate { most, per_s }, left: Mutex::new(None) }
     }
 
-    /// Takes one, if there is one left.
+    /// Takes one if available.
     pub(crate) fn take(&self) -> bool {
         let mut left = self.left.lock().unwrap_or_else(PoisonError::into_inner);
         let now = Instant::now();
@@ -60,7 +60,7 @@ impl Budgets {
         Self { rate: Rate { most, per_s }, left: Mutex::default() }
     }
 
-    /// Takes as many from a client's budget, if all of them are left; otherwise none.
+    /// Takes `count` from a client's budget if all are available; otherwise takes none.
     pub(crate) fn take(&self, client: Client, count: usize) -> bool {
         if count == 0 {
             return true;
@@ -79,7 +79,7 @@ impl Budgets {
         true
     }
 
-    /// Gives back what a client didn't use.
+    /// Returns unused requests to a client's budget.
     pub(crate) fn give_back(&self, client: Client, count: usize) {
         let mut left = self.left.lock().unwrap_or_else(PoisonError::into_inner);
         if let Some(left) = left.get_mut(&client) {
@@ -88,7 +88,7 @@ impl Budgets {
     }
 }
 
-/// Makes room in a full table: forgets clients with a full budget, or else the one with the most left.
+/// Makes room in a full table: removes clients with a full budget, or else the one with the most left.
 fn forget_one(left: &mut BTreeMap<Client, Left>, rate: Rate, now: Instant) {
     left.retain(|_, left| left.now(rate, now) < rate.most);
     if left.len() >= MOST_CLIENTS {
@@ -108,7 +108,7 @@ mod tests {
     }
 
     #[test]
-    fn budget_of_one_client_leaves_others_theirs() {
+    fn budget_of_one_client_does_not_affect_others() {
         let budgets = Budgets::new(20.0, 0.0);
         assert!(budgets.take(client(1), 15) && !budgets.take(client(1), 6) && budgets.take(client(1), 5));
         assert!(!budgets.take(client(1), 1) && budgets.take(client(2), 20));

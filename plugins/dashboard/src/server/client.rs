@@ -1,13 +1,14 @@
-//! Clients by their address, which limits count by.
+//! Clients by address, as counted by rate limits.
 
 use std::net::{IpAddr, Ipv6Addr};
 
 use axum::http::{HeaderMap, HeaderName};
 
-/// Addresses that a request has passed, the nearest last; each proxy adds the one before it.
+/// Addresses that a request has passed, the nearest last; each proxy appends the previous one.
 const FORWARDED_FOR: HeaderName = HeaderName::from_static("x-forwarded-for");
 
-/// The address that limits count by: one of IPv4, or the first half of one of IPv6, of which a machine has many.
+/// Address counted by limits: an IPv4 address, or the first half of an IPv6 address, because a machine has many of
+/// those.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) struct Client(IpAddr);
 
@@ -19,7 +20,7 @@ impl Client {
         })
     }
 
-    /// Behind a declared proxy the address that it forwards for, otherwise the connection's own.
+    /// Behind a declared proxy the forwarded address, otherwise the connection's own.
     pub(super) fn of_request(peer: IpAddr, proxies: &[IpAddr], headers: &HeaderMap) -> Self {
         let is_proxy = |address: &IpAddr| proxies.contains(&address.to_canonical());
         if !is_proxy(&peer) {
@@ -27,7 +28,7 @@ impl Client {
         }
         let lines = headers.get_all(FORWARDED_FOR).iter().filter_map(|line| line.to_str().ok());
         let passed: Vec<_> = lines.flat_map(|line| line.split(',')).collect();
-        // Only proxies that are declared are believed: what is further left may be made up.
+        // Only declared proxies are trusted; addresses further left may be forged.
         let addresses = passed.iter().rev().map_while(|text| text.trim().parse::<IpAddr>().ok());
         Self::of_address(addresses.into_iter().find(|address| !is_proxy(address)).unwrap_or(peer))
     }

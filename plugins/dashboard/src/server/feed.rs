@@ -18,24 +18,24 @@ use crate::command::{Asked, Command, LONGEST};
 use crate::model::{Body, Message, Sort};
 use crate::site::May;
 
-/// A viewer is sent a ping so long after its answer to the last one, and must answer within so long: a stalled one is dropped within
-/// [`STALLED_AFTER`], however much of the feed its machine holds for it unread.
+/// Interval of pings, counted from the last answer, and the timeout of an answer. A stalled viewer is dropped within
+/// [`STALLED_AFTER`], however much of the feed its machine buffers unread.
 const PING_EVERY: Duration = Duration::from_secs(2);
 const ANSWERS_WITHIN: Duration = Duration::from_secs(8);
-/// A viewer that takes a long message more slowly than this is dropped, bytes a second.
+/// A viewer that reads a long message more slowly than this is dropped, bytes a second.
 const SLOWEST_PER_S: f64 = 20_000.0;
-/// Messages read of a viewer after it was told that its connection is closed.
+/// Number of messages read from a viewer after its connection was closed with a reason.
 const MOST_AFTER_CLOSE: usize = 64;
-/// Messages a second from a viewer.
+/// Limit of messages a second from a viewer.
 pub(super) const MOST_PER_S: f64 = 20.0;
 
-/// Where a viewer was when it was lost.
+/// Position of a viewer when its connection was lost.
 pub(super) struct Resume {
     pub(super) instance: String,
     pub(super) since: u64,
 }
 
-/// Counts a viewer as long as it is there.
+/// Counts a viewer while it is connected.
 struct Counted(Arc<Shared>);
 
 impl Counted {
@@ -52,13 +52,13 @@ impl Drop for Counted {
     }
 }
 
-/// Why a viewer isn't served any more.
+/// Reason why a viewer is no longer served.
 enum Over {
-    /// It is gone, or said so.
+    /// It has disconnected.
     Gone,
-    /// It takes nothing.
+    /// It accepts no data.
     Stalled,
-    /// What it sends isn't allowed.
+    /// It sent something that isn't allowed.
     Refused,
     /// The page ends.
     Ended,
@@ -69,18 +69,18 @@ struct Viewer {
     shared: Arc<Shared>,
     may: May,
     instance: String,
-    /// The last message that it got.
+    /// Last message sent to it.
     seq: u64,
     state_every: Duration,
     state_sent: Option<Instant>,
     budget: Budget,
-    /// When the next ping is due.
+    /// Time of the next ping.
     ping_at: Instant,
-    /// When the answer to the last ping is due.
+    /// Deadline of the answer to the last ping.
     answer_by: Option<Instant>,
 }
 
-/// Serves a viewer until it goes.
+/// Serves a viewer until it disconnects.
 pub(super) async fn serve(socket: WebSocket, shared: Arc<Shared>, role: Role, resume: Option<Resume>) {
     let _counted = Counted::new(Arc::clone(&shared));
     let may = may(&shared, role);
@@ -107,7 +107,8 @@ pub(super) async fn serve(socket: WebSocket, shared: Arc<Shared>, role: Role, re
         Over::Ended => (close_code::AWAY, "ended"),
     };
     let close = Frame::Close(Some(CloseFrame { code, reason: reason.into() }));
-    // It may be gone already; otherwise its answer is waited for, so that it reads what was sent before. Who floods is not read on.
+    // It may be gone already. Otherwise its answer is awaited, so that it reads all data sent before. A flooding
+    // client isn't read any more.
     let _closed = timeout(Duration::from_millis(500), async {
         if viewer.socket.send(close).await.is_ok() {
             for _ in 0..MOST_AFTER_CLOSE {
@@ -120,7 +121,7 @@ pub(super) async fn serve(socket: WebSocket, shared: Arc<Shared>, role: Role, re
     .await;
 }
 
-/// What a role may do in this dive.
+/// Rights of a role in this dive.
 pub(super) fn may(shared: &Shared, role: Role) -> May {
     let model = shared.model();
     let operates = role == Role::Operator;
@@ -130,7 +131,7 @@ pub(super) fn may(shared: &Shared, role: Role) -> May {
 impl Viewer {
     async fn watch(&mut self) -> Over {
         loop {
-            // Subscribed under the model's lock: nothing is missed or comes twice.
+            // Subscribed under the model's lock, so that nothing is missed or sent twice.
             let (messages, mut batches, instance) = {
                 let model = self.shared.model();
                 let Some(batches) = self.shared.fan().as_ref().map(tokio::sync::broadcast::Sender::subscribe)
@@ -220,7 +221,7 @@ impl Viewer {
         let within = STALLED_AFTER + Duration::from_secs_f64(bytes as f64 / SLOWEST_PER_S);
         match timeout(within, self.socket.send(frame)).await {
             Ok(Ok(())) => {
-                // An answer isn't read meanwhile, and what a slow line holds comes before it.
+                // Answers aren't read meanwhile, and data buffered by a slow line comes before them.
                 self.answer_by = self.answer_by.map(|by| by + began.elapsed());
                 Ok(())
             }
@@ -229,7 +230,7 @@ impl Viewer {
         }
     }
 
-    /// Sends a ping. Its answer shows that all before it has been read.
+    /// Sends a ping. Its answer shows that all earlier data has been read.
     async fn ping(&mut self) -> Result<(), Over> {
         if self.answer_by.is_some() {
             return Err(Over::Stalled);
@@ -283,7 +284,7 @@ impl Viewer {
     fn obey(&mut self, text: &str) -> Result<&'static str, String> {
         match Asked::parse(text)? {
             Asked::Rate(hz) => {
-                // A little less, so that beats of a steady rhythm aren't missed by a hair.
+                // Slightly less, so that regular updates aren't missed by a small margin.
                 self.state_every = Duration::from_secs_f64((0.9 / hz).max(0.0));
                 Ok("rate")
             }
@@ -306,7 +307,7 @@ impl Viewer {
         }
     }
 
-    /// Refuses what no page of ours sends, and ends.
+    /// Refuses a message that no page of this program sends, and ends the connection.
     async fn refuse(&mut self, why: &str) -> Result<(), Over> {
         Shared::count(&self.shared.counts.refused, 1);
         self.answer(&json!({"type": "refused", "seq": self.seq, "why": why})).await?;

@@ -1,4 +1,4 @@
-//! Connections: accepted at once, with TLS where there is a certificate, and closed where they show nothing in time.
+//! Connections: accepted at once, with TLS if there is a certificate, and closed if no request arrives in time.
 
 use std::io;
 use std::net::SocketAddr;
@@ -18,19 +18,21 @@ use super::client::Client;
 use super::stall::Stream;
 use super::{Shared, TlsFiles, answers};
 
-/// Wait after a connection couldn't be taken.
+/// Pause after a connection couldn't be accepted.
 const PAUSE: Duration = Duration::from_millis(100);
-/// A connection whose next request's head isn't there in so long is closed: silent, half sent or idle.
+/// Timeout of a request's head: a silent, half-sent or idle connection is closed.
 const HEAD_WITHIN: Duration = Duration::from_secs(10);
-/// How long a TLS handshake may take.
+/// Timeout of a TLS handshake.
 #[cfg(feature = "tls")]
 const HANDSHAKE_WITHIN: Duration = Duration::from_secs(5);
-/// Bytes that the kernel holds for a connection to send, and as much again for its own needs. On its own it holds megabytes, and hides
-/// for a minute that a viewer takes nothing.
+/// Send buffer of a connection in the kernel, bytes; the kernel uses as much again for itself. Its default of
+/// megabytes would hide for a minute that a viewer reads nothing.
 const SEND_BUFFER: u32 = 32 << 10;
-/// Bytes that are held for a connection here: the longest head of a request, and what of an answer waits to be sent.
+/// Buffer of a connection in this program, bytes.
+///
+/// It holds the longest head of a request, and the part of an answer that waits to be sent.
 const HELD: usize = 64 << 10;
-/// Connections that the kernel holds until they are accepted.
+/// Number of connections that the kernel holds until they are accepted.
 const BACKLOG: u32 = 1024;
 
 /// Certificate and key.
@@ -40,9 +42,9 @@ pub(super) struct Tls {
 }
 
 impl Tls {
-    /// Reads them.
+    /// Reads certificate and key.
     ///
-    /// Errors: which file, and what is wrong with it.
+    /// Errors: the file and its fault.
     #[cfg(not(feature = "tls"))]
     pub(super) fn read(files: &TlsFiles) -> Result<Self, String> {
         let path = files.certificate.display();
@@ -51,9 +53,9 @@ impl Tls {
         ))
     }
 
-    /// Reads them.
+    /// Reads certificate and key.
     ///
-    /// Errors: which file, and what is wrong with it.
+    /// Errors: the file and its fault.
     #[cfg(feature = "tls")]
     pub(super) fn read(files: &TlsFiles) -> Result<Self, String> {
         use tokio_rustls::rustls::pki_types::pem::PemObject as _;
@@ -83,10 +85,10 @@ impl Tls {
 
 /// Listens on an address. Must be called within the runtime.
 ///
-/// Errors: the system's.
+/// Errors: those of the system.
 pub(super) fn listen(address: SocketAddr) -> io::Result<TcpListener> {
     let socket = if address.is_ipv4() { TcpSocket::new_v4() } else { TcpSocket::new_v6() }?;
-    // As the standard library does: elsewhere it would let two programs share a port.
+    // As the standard library does: on other systems it would let two programs share a port.
     #[cfg(unix)]
     socket.set_reuseaddr(true)?;
     // Accepted connections inherit it.
@@ -102,7 +104,7 @@ pub(super) async fn accept(listener: TcpListener, tls: Option<Tls>, shared: Arc<
     loop {
         match listener.accept().await {
             Ok((tcp, from)) => {
-                // Small messages are due at once.
+                // Small messages must be sent at once.
                 if let Err(error) = tcp.set_nodelay(true) {
                     tracing::debug!(%error, "a connection of the page delays small messages");
                 }
@@ -115,14 +117,14 @@ pub(super) async fn accept(listener: TcpListener, tls: Option<Tls>, shared: Arc<
                 tokio::time::sleep(PAUSE).await;
             }
         }
-        // Each has its turn before enough others come to take its place.
+        // Each connection gets its turn before enough others arrive to take its place.
         tokio::task::yield_now().await;
     }
 }
 
 type App = TowerToHyperService<axum::Router>;
 
-/// Serves a connection until it ends or its place is another's.
+/// Serves a connection until it ends or loses its place.
 async fn serve(tcp: TcpStream, caller: Caller, app: App, tls: Option<Arc<Tls>>, shared: Arc<Shared>) {
     let place = Arc::clone(&caller.place);
     let stream = Stream::new(tcp, Arc::clone(&place), shared);

@@ -1,4 +1,4 @@
-//! The server: one thread with sockets and timers, which the loop's thread never waits for in a live dive.
+//! The server: one thread with sockets and timers. In a live dive the loop's thread never waits for it.
 
 #![expect(clippy::disallowed_types, reason = "locks between the page's threads; the loop's takes none")]
 
@@ -35,87 +35,87 @@ use crate::fed::Fed;
 use crate::model::{Message, Model};
 use crate::site::Site;
 
-/// The usual port.
+/// Default port.
 pub const PORT: u16 = 8881;
-/// Ports that are tried, from the one asked for.
+/// Number of ports that are tried, starting with the requested one.
 const PORTS: u16 = 10;
-/// Batches that a viewer may be behind before it gets all that has changed at once.
+/// Number of batches that a viewer may be behind before it gets all changes at once.
 const BATCHES: usize = 64;
-/// Wrong tokens that a client may send at once, and so many a second after that.
+/// Budget of wrong tokens of a client, in a burst and per second.
 const MOST_GUESSES: f64 = 20.0;
 const GUESSES_PER_S: f64 = 1.0;
-/// How long viewers get for the last messages.
+/// Time in which viewers get the last messages.
 const ENDS_WITHIN: Duration = Duration::from_secs(1);
 
-/// Certificate and key, as files in PEM.
+/// Certificate and key as PEM files.
 #[derive(Debug, Clone)]
 pub struct TlsFiles {
-    /// The certificate, and those that lead to its issuer.
+    /// The certificate with its intermediate certificates.
     pub certificate: std::path::PathBuf,
     /// Its private key.
     pub key: std::path::PathBuf,
 }
 
-/// Where the page is served, and for whom.
+/// Address and access rules of the page.
 #[derive(Debug, Clone)]
 pub struct Settings {
-    /// Address and port; port 0 is any.
+    /// Address and port; port 0 is any free port.
     pub address: SocketAddr,
-    /// Tokens; none on loopback.
+    /// Tokens; `None` on loopback.
     pub tokens: Option<Tokens>,
     /// Names of this machine.
     pub hosts: Vec<String>,
     /// Origins of pages that may frame this one and send actions.
     pub origins: Vec<String>,
-    /// Proxies whose `X-Forwarded-For` is believed.
+    /// Proxies whose `X-Forwarded-For` is trusted.
     pub proxies: Vec<IpAddr>,
     /// Certificate and key.
     pub tls: Option<TlsFiles>,
 }
 
-/// Why the page can't be served.
+/// Reason why the page can't be served.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum PageError {
-    /// No port can be listened on.
+    /// No port is available.
     #[error("the page can't be served on {address} or the {PORTS} ports from there: {source}")]
     Bind {
-        /// The address asked for.
+        /// Requested address.
         address: SocketAddr,
-        /// Why.
+        /// Reason.
         source: io::Error,
     },
-    /// No thread or runtime.
+    /// The thread or runtime can't be started.
     #[error("the page's thread can't be started: {0}")]
     Thread(io::Error),
-    /// No TLS.
+    /// TLS can't be set up.
     #[error("{0}")]
     Tls(String),
 }
 
-/// What takes the operators' commands: `Err` with why not.
+/// Handler of operators' commands; its error is the reason of a refusal.
 pub type Act = Arc<dyn Fn(Command) -> Result<(), String> + Send + Sync>;
-/// What takes the recording of a voice note, for the log, and then tells the loop of it: `Err` with why not.
+/// Handler that logs the recording of a voice note and then notifies the loop; its error is the reason of a refusal.
 pub type Keep = Arc<dyn Fn(&Voice) -> Result<(), String> + Send + Sync>;
-/// What finds the recording of a note of this id and time, seconds, in a log: `None` where there is none that reads. It may take
-/// seconds.
+/// Finds the recording of the note with this id and time (seconds) in a log; `None` without a readable one. It may
+/// take seconds.
 pub type Recall = Arc<dyn Fn(u32, f64) -> Result<Option<Voice>, String> + Send + Sync>;
 
-/// Where voice notes' recordings go to, or come from.
+/// Storage of voice recordings.
 #[derive(Clone)]
 pub enum Voices {
-    /// Nowhere.
+    /// None.
     None,
-    /// Into the log of a dive that goes on now.
+    /// The log of a live dive.
     Kept(Keep),
-    /// From a log.
+    /// A recorded log.
     Recalled(Recall),
 }
 
-/// What takes commands of playback.
+/// Handler of playback commands.
 pub type Direct = Arc<dyn Fn(Play) -> Result<(), String> + Send + Sync>;
 
-/// Counts for `/metrics`.
+/// Counters for `/metrics`.
 #[derive(Debug, Default)]
 pub(crate) struct Counts {
     pub(crate) viewers: AtomicUsize,
@@ -128,11 +128,11 @@ pub(crate) struct Counts {
     pub(crate) bytes: AtomicU64,
 }
 
-/// What the handlers share.
+/// State shared by the handlers.
 pub(crate) struct Shared {
     model: Mutex<Model>,
     pub(crate) access: Access,
-    /// None once the page ends.
+    /// `None` once the page ends.
     fan: Mutex<Option<broadcast::Sender<Arc<[Message]>>>>,
     pub(crate) counts: Counts,
     pub(crate) act: Act,
@@ -141,10 +141,10 @@ pub(crate) struct Shared {
     pub(crate) is_tls: bool,
     proxies: Vec<IpAddr>,
     places: Arc<places::Places>,
-    /// Wrong tokens of each client.
+    /// Budget of wrong tokens of each client.
     guesses: budget::Budgets,
     wrong_tokens: admission::WrongTokens,
-    /// Actions of each operator by HTTP.
+    /// Budget of actions by HTTP of each operator.
     actions: budget::Budgets,
     stop: Notify,
     has_ended: AtomicBool,
@@ -159,7 +159,7 @@ impl Shared {
         self.fan.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// A viewer took nothing for too long.
+    /// Counts a viewer that accepted no data for too long.
     fn count_stalled(&self) {
         Self::count(&self.counts.stalled, 1);
         tracing::info!(
@@ -179,12 +179,12 @@ pub struct Page {
     thread: Option<JoinHandle<()>>,
     sender: mpsc::Sender<Fed>,
     address: SocketAddr,
-    /// Ports that were taken.
+    /// Ports that were taken by other programs.
     taken: Vec<u16>,
 }
 
 impl Page {
-    /// Serves a dive. `instance` is unique to it.
+    /// Serves a dive. `instance` is its unique name.
     ///
     /// Errors: see [`PageError`].
     pub fn start(
@@ -231,12 +231,12 @@ impl Page {
         Ok(Self { shared, thread: Some(thread), sender, address, taken })
     }
 
-    /// Where it is served.
+    /// Address of the page.
     pub fn address(&self) -> SocketAddr {
         self.address
     }
 
-    /// Ports before that one, which others have.
+    /// Ports before that one which other programs use.
     pub fn taken(&self) -> &[u16] {
         &self.taken
     }
@@ -246,7 +246,7 @@ impl Page {
         if self.shared.is_tls { "https" } else { "http" }
     }
 
-    /// What takes results of a loop for it: `waits` for a replay.
+    /// Collector for a loop's results; `waits` is for a replay.
     pub fn collector(&self, dive: &Loop, waits: bool) -> Collector {
         let (is_playback, recorded_to, compared_m) = {
             let model = self.shared.model();
@@ -256,15 +256,15 @@ impl Page {
         Collector::new(self.sender.clone(), dive, waits, is_playback, recorded_to).compared_with(compared_m)
     }
 
-    /// How many watch.
+    /// Number of viewers.
     pub fn viewers(&self) -> usize {
         self.shared.counts.viewers.load(Ordering::Relaxed)
     }
 
-    /// Ends it: viewers get the last messages, `end` the very last, for a second at most.
+    /// Ends the page. Viewers get the last messages, with `end` as the very last, within a second.
     pub fn end(mut self, end: Option<serde_json::Value>) {
         if let Some(end) = end {
-            // Its thread may have ended early, which is told below.
+            // Its thread may have ended early, which is reported below.
             let _ended = self.sender.blocking_send(Fed::End(Box::new(end)));
         }
         self.stop();
@@ -287,7 +287,7 @@ impl Drop for Page {
     }
 }
 
-/// The first free port from the one asked for, and those that were taken.
+/// The first free port from the requested one, and the taken ones before it.
 fn bind(asked: SocketAddr) -> Result<(TcpListener, Vec<u16>), PageError> {
     let mut taken = Vec::new();
     let mut failed = io::Error::other("no port");
@@ -313,7 +313,7 @@ async fn serve(
 ) {
     let pump = pump::pump(fed, Arc::clone(&shared));
     let serving = tokio::spawn(listener::accept(listener, tls, Arc::clone(&shared)));
-    // Ends when the page is to.
+    // Ends when the page is to end.
     pump.await;
     drop(shared.fan().take());
     let gone = async {

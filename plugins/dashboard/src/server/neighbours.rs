@@ -1,13 +1,13 @@
-//! What BlueOS and Cockpit ask for. It is answered without a token, and says nothing of the dive.
+//! Requests of BlueOS and Cockpit. They are answered without a token, and reveal nothing of the dive.
 
 use serde_json::{Value, json};
 
-/// Where Cockpit finds its widgets and actions.
+/// Path at which Cockpit finds widgets and actions.
 pub(super) const EXTRAS: &str = "/cockpit_extras.json";
-/// The service's icon in BlueOS, by its name in Material Design Icons.
+/// Name of the service's icon in Material Design Icons, for BlueOS.
 const ICON: &str = "mdi-tunnel";
 
-/// The service as BlueOS lists it.
+/// The service as listed by BlueOS.
 pub(super) fn service() -> Value {
     json!({
         "name": "headrace",
@@ -23,9 +23,9 @@ pub(super) fn service() -> Value {
     })
 }
 
-/// Widgets, actions and buttons of a joystick for Cockpit. `base` is this server as the browser knows it.
+/// Widgets, actions and joystick buttons for Cockpit. `base` is this server's address as seen by the browser.
 pub(super) fn extras(base: &str) -> Value {
-    // Cockpit shows a picture, not an icon by name; it calls it `iconUrl` now, `iframeIcon` before.
+    // Cockpit shows a picture, not a named icon. Its field is now `iconUrl`, and was `iframeIcon` before.
     let icon = format!("{base}/assets/icon.svg");
     let widget = |name: &str, path: &str| {
         json!({"name": name, "iframeUrl": format!("{base}/widget/{path}"), "iconUrl": icon, "iframeIcon": icon,

@@ -1,7 +1,7 @@
-//! Places for connections, in three classes: those that have shown no token, viewers', and operators'.
+//! Places for connections in three classes: without a token, viewers, and operators.
 //!
-//! Each class has a number of places of its own, so that none takes another's. Where a class is full, its oldest connection that
-//! carries no stream is closed for the newest: silence can't keep anybody out.
+//! Each class has its own number of places, so that none takes another's. In a full class the oldest connection
+//! without a stream is closed for the newest one. So idle connections can't keep anybody out.
 
 use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -11,11 +11,11 @@ use tokio::sync::Notify;
 use super::client::Client;
 use crate::access::Role;
 
-/// Connections of a class at a time. A browser opens up to six.
+/// Number of connections of a class. A browser opens up to six.
 pub(super) const MOST_OF_CLASS: usize = 64;
-/// Streams of the feed at a time, of each token.
+/// Number of feed streams of each token.
 pub(super) const MOST_STREAMS: usize = 32;
-/// Streams of an address that a declared proxy forwards for: Cockpit's three widgets and the page, twice.
+/// Number of streams of an address behind a declared proxy: Cockpit's three widgets and the page, twice.
 const MOST_STREAMS_FORWARDED: usize = 8;
 
 /// Connections, the oldest first.
@@ -31,16 +31,16 @@ struct Held {
     stream: Option<Client>,
 }
 
-/// A connection's place; it is free again once this is dropped.
+/// A connection's place, which is freed when this is dropped.
 pub(super) struct Place {
-    /// Tells the connection that it must close, and is its identity among the places.
+    /// Tells the connection to close, and identifies it among the places.
     key: Arc<Notify>,
     places: Arc<Places>,
     shown: Mutex<Option<(Client, Role)>>,
 }
 
 impl Places {
-    /// A place for a new connection.
+    /// Takes a place for a new connection.
     pub(super) fn enter(self: &Arc<Self>, peer: Client) -> Place {
         let key = Arc::new(Notify::new());
         let mut held = self.held();
@@ -54,7 +54,7 @@ impl Places {
     }
 }
 
-/// Closes a connection of a class that is full: of the address with the most, the oldest that carries no stream.
+/// Closes a connection of a full class: the oldest without a stream, of the address with the most connections.
 fn make_room(held: &mut Vec<Held>, class: Option<Role>) {
     if held.iter().filter(|one| one.class == class).count() < MOST_OF_CLASS {
         return;
@@ -72,18 +72,18 @@ fn make_room(held: &mut Vec<Held>, class: Option<Role>) {
 }
 
 impl Place {
-    /// Ends once the place is another's.
+    /// Ends once the place is taken away.
     pub(super) async fn closed(&self) {
         self.key.notified().await;
     }
 
-    /// The role whose token this client has shown on this connection.
+    /// Role whose token this client has shown on this connection.
     pub(super) fn shown(&self, client: Client) -> Option<Role> {
         let shown = self.shown.lock().unwrap_or_else(PoisonError::into_inner);
         shown.filter(|(by, _)| *by == client).map(|(_, role)| role)
     }
 
-    /// A client has shown a role's token: the connection is of that class from now on.
+    /// Moves the connection to the class of a role whose token the client has shown.
     pub(super) fn promote(&self, client: Client, role: Role) {
         *self.shown.lock().unwrap_or_else(PoisonError::into_inner) = Some((client, role));
         let mut held = self.places.held();
@@ -94,7 +94,7 @@ impl Place {
         held.push(own);
     }
 
-    /// Whether the connection may carry a stream; it does so from now on.
+    /// Whether the connection may carry a stream. If so, it counts as a stream from now on.
     pub(super) fn stream(&self, client: Client, is_forwarded: bool) -> bool {
         let mut held = self.places.held();
         let Some(at) = self.index(&held) else { return false };
@@ -150,7 +150,7 @@ mod tests {
     }
 
     #[test]
-    fn the_address_with_most_connections_loses_first() {
+    fn address_with_most_connections_loses_first() {
         let places = Arc::new(Places::default());
         let other = places.enter(client(2));
         let _many: Vec<_> = (0..1000).map(|_| places.enter(client(1))).collect();

@@ -1,4 +1,4 @@
-//! Takes what the loop hands over, and gives each message to all viewers, encoded once.
+//! Takes messages of the loop, and sends each one, encoded once, to all viewers.
 
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
@@ -11,12 +11,12 @@ use super::Shared;
 use crate::fed::Fed;
 use crate::model::Message;
 
-/// Least time between two batches that hold nothing urgent: five a second, with some grace for beats that come early.
+/// Least time between two batches without urgent data: five a second, with a tolerance for early updates.
 const BATCH_EVERY: Duration = Duration::from_millis(190);
-/// The state is sent again after so long without any: of a replay that stands still.
+/// Interval of sending the state again if there is no new one, as in a paused replay.
 const AGAIN_AFTER: Duration = Duration::from_secs(2);
 
-/// Goes on until the page is to end.
+/// Runs until the page ends.
 pub(super) async fn pump(mut fed: mpsc::Receiver<Fed>, shared: Arc<Shared>) {
     let (mut flushed, mut is_due) = (Instant::now(), false);
     let mut is_open = true;
@@ -54,12 +54,12 @@ pub(super) async fn pump(mut fed: mpsc::Receiver<Fed>, shared: Arc<Shared>) {
             flush(&shared);
             return;
         }
-        // Viewers have their turn also while a replay feeds as fast as it can.
+        // Viewers get their turn even while a replay feeds as fast as it can.
         tokio::task::yield_now().await;
     }
 }
 
-/// Takes a message and those that wait behind it; whether one is urgent.
+/// Takes a message and those waiting behind it; returns whether one is urgent.
 fn take(one: Fed, fed: &mut mpsc::Receiver<Fed>, shared: &Shared) -> bool {
     let mut model = shared.model();
     let mut is_urgent = model.take(one);
@@ -73,7 +73,7 @@ fn take(one: Fed, fed: &mut mpsc::Receiver<Fed>, shared: &Shared) -> bool {
 }
 
 fn flush(shared: &Shared) {
-    // The lock is held until it is sent: who comes in between has either all or nothing of it.
+    // The lock is held while sending, so that a viewer that connects meanwhile gets either all or nothing of it.
     let mut model = shared.model();
     let messages = model.flush();
     send(shared, messages);
@@ -89,7 +89,7 @@ fn send(shared: &Shared, messages: Vec<Message>) {
     if !messages.is_empty()
         && let Some(fan) = &*shared.fan()
     {
-        // Nobody may be watching.
+        // There may be no viewer.
         let _nobody = fan.send(messages.into());
     }
 }

@@ -1,4 +1,4 @@
-//! A connection that fails once its peer has taken nothing for a while.
+//! A connection that fails once its peer has accepted no data for a while.
 
 use std::io;
 use std::pin::Pin;
@@ -13,7 +13,7 @@ use tokio::time::{Sleep, sleep};
 use super::Shared;
 use super::places::Place;
 
-/// A peer that takes nothing for so long is dropped.
+/// A peer that accepts no data for this long is dropped.
 pub(super) const STALLED_AFTER: Duration = Duration::from_secs(10);
 
 /// A TCP stream whose writes fail once none has made progress for [`STALLED_AFTER`].
@@ -21,7 +21,7 @@ pub(super) struct Stream {
     tcp: TcpStream,
     deadline: Option<Pin<Box<Sleep>>>,
     shared: Arc<Shared>,
-    /// Held as long as the stream is, also where that has become a WebSocket.
+    /// Place held as long as the stream exists, also after it has become a WebSocket.
     _place: Arc<Place>,
 }
 
@@ -30,7 +30,7 @@ impl Stream {
         Self { tcp, deadline: None, shared, _place: place }
     }
 
-    /// A write's result: an error if it has waited too long.
+    /// Result of a write; an error if it has waited too long.
     fn limited<T>(&mut self, cx: &mut Context<'_>, written: Poll<io::Result<T>>) -> Poll<io::Result<T>> {
         if written.is_ready() {
             self.deadline = None;

@@ -1,4 +1,4 @@
-//! The server over real sockets, with clients that keep it busy or guess tokens.
+//! The server over real sockets, with clients that flood it or guess tokens.
 
 use std::io::{Read as _, Write as _};
 use std::net::{Ipv4Addr, TcpStream};
@@ -15,7 +15,7 @@ use crate::site::Mode;
 const VIEWER: &str = "Authorization: Bearer viewer-0123456789\r\n";
 const OPERATOR: &str = "Authorization: Bearer operator-01234567\r\n";
 
-/// A page with tokens, and a count of the commands that it has handed on.
+/// A page with tokens, and the number of commands that it has passed on.
 struct Served {
     page: Page,
     commands: Arc<AtomicU32>,
@@ -67,7 +67,7 @@ impl Served {
         stream
     }
 
-    /// Status, head and body of the answer to a request on a connection of its own.
+    /// Sends a request on a new connection; returns status, head and body of the answer.
     fn ask(&self, request: &str, headers: &str, body: &str) -> (u16, String) {
         ask(&mut self.connect(), request, headers, body)
     }
@@ -84,7 +84,7 @@ impl Served {
     }
 }
 
-/// Status and head of the answer to a request on an open connection. Its body is read, too.
+/// Sends a request on an open connection; returns status and head of the answer, and also reads its body.
 fn ask(stream: &mut TcpStream, request: &str, headers: &str, body: &str) -> (u16, String) {
     let length = body.len();
     let text =
@@ -111,7 +111,7 @@ fn answer(stream: &mut TcpStream) -> (u16, String) {
     (head.split(' ').nth(1).unwrap().parse().unwrap(), head)
 }
 
-/// Whether the other side has closed a connection; what it has sent is read.
+/// Whether the other side has closed a connection; also reads the data that it sent.
 fn is_closed(stream: &mut TcpStream) -> bool {
     stream.set_nonblocking(true).unwrap();
     let mut bytes = [0; 4096];
@@ -140,7 +140,7 @@ fn operator_is_served_within_1_s_among_1000_connections() {
             2 => "GET /register_service HTTP/1.1\r\nHost: 127.0.0.1\r\n\r\n".to_owned(),
             _ => format!("GET /feed.jsonl HTTP/1.1\r\nHost: 127.0.0.1\r\n{VIEWER}\r\n"),
         };
-        // It may have been closed for a newer one already.
+        // It may already have been closed for a newer one.
         let _closed = stream.write_all(sent.as_bytes());
         others.push(stream);
         if number % 20 == 19 {
@@ -151,7 +151,7 @@ fn operator_is_served_within_1_s_among_1000_connections() {
             let mut socket = served.connect();
             assert_eq!(ask(&mut socket, "GET /feed", &format!("{OPERATOR}{UPGRADE}"), "").0, 101);
             longest = longest.max(began.elapsed());
-            // An operator is taken 20 actions a second.
+            // An operator may send 20 actions a second.
             std::thread::sleep(Duration::from_millis(50));
         }
     }
@@ -179,7 +179,7 @@ fn operator_is_served_within_1_s_while_1000_connections_a_second_are_opened() {
         let (mut longest, mut refused) = (Duration::ZERO, 0);
         for _ in 0..60 {
             let began = Instant::now();
-            // A connection that was closed for a newer one is opened anew, as browsers do.
+            // A connection closed for a newer one is reopened, as browsers do.
             while served.ask("GET /state.json", OPERATOR, "").0 != 200 {
                 refused += 1;
             }
@@ -226,7 +226,7 @@ fn unread_streams_are_dropped_10_s_after_nothing_is_taken() {
     let began = Instant::now();
     let mut dropped = Vec::new();
     while dropped.len() < 2 && began.elapsed() < Duration::from_secs(40) {
-        // As much as the feed of a dive with four heads.
+        // About the feed of a dive with four heads.
         served.feed(4400);
         std::thread::sleep(Duration::from_millis(200));
         while (dropped.len() as u64) < served.count(|counts| &counts.stalled) {
@@ -249,7 +249,7 @@ fn samples_have_one_content_type() {
 }
 
 #[test]
-fn wrong_tokens_share_one_budget_however_they_come() {
+fn wrong_tokens_share_one_budget_in_any_header() {
     let served = served(&[]);
     let mut right = served.connect();
     assert_eq!(ask(&mut right, "GET /state.json", OPERATOR, "").0, 200);
@@ -263,7 +263,7 @@ fn wrong_tokens_share_one_budget_however_they_come() {
         );
     }
     let bearer = "Authorization: Bearer wrong\r\n";
-    // One guess a second comes back, perhaps just between two requests.
+    // The budget refills by one guess a second, possibly between two requests.
     let asked = AtomicU32::new(0);
     let spent = |request: &str, headers: &str| {
         (0..3).any(|_| {
@@ -342,7 +342,7 @@ fn guesses_of_a_flood_are_21_in_the_first_second() {
 }
 
 #[test]
-fn actions_are_limited_and_all_that_are_answered_are_handed_on() {
+fn actions_are_limited_and_accepted_ones_are_passed_on() {
     let served = served(&[]);
     let mut stream = served.connect();
     let (mut done, mut refused) = (0, 0);

@@ -1,4 +1,4 @@
-//! Recordings of voice notes: taken of operators for the log, and played to viewers.
+//! Recordings of voice notes: accepted from operators for the log, and played to viewers.
 
 use std::collections::VecDeque;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -19,18 +19,18 @@ use super::reply::{Here, json_answer, plain, refused};
 use super::{Voices, feed};
 use crate::access::query;
 
-/// Voice notes that were begun and whose recordings haven't come; the oldest is forgotten.
+/// Number of begun voice notes without a recording; beyond it the oldest is forgotten.
 const MOST_BEGUN: usize = 32;
-/// Recordings that are held to be played, bytes; the oldest are let go, and are in the log.
+/// Size of recordings held for playing, bytes; beyond it the oldest are dropped from memory and stay in the log.
 const MOST_HELD_BYTES: usize = 16 << 20;
-/// Recordings that are being sent at a time.
+/// Number of recordings received at a time.
 const MOST_COMING: usize = 2;
-/// Recordings at once, and a second.
+/// Budget of recordings: burst, and refill per second.
 const RATE: (f64, f64) = (8.0, 0.2);
-/// How long one may be on its way: 512 KiB at 10 kB/s.
+/// Timeout of an upload: 512 KiB at 10 kB/s.
 const COMES_WITHIN: Duration = Duration::from_mins(1);
 
-/// Voice notes' recordings on their way.
+/// State of voice notes whose recordings are expected or held.
 pub(crate) struct Desk {
     to: Voices,
     begun: Mutex<VecDeque<u32>>,
@@ -40,7 +40,7 @@ pub(crate) struct Desk {
     recalling: Semaphore,
 }
 
-/// A status, and why.
+/// Status and reason.
 type Refusal = (StatusCode, String);
 
 impl Desk {
@@ -55,7 +55,7 @@ impl Desk {
         }
     }
 
-    /// The loop has been told that a voice note begins.
+    /// Registers a voice note that the loop knows.
     pub(super) fn begin(&self, id: u32) {
         let mut begun = self.begun();
         if !begun.contains(&id) {
@@ -86,7 +86,7 @@ impl Desk {
         }
     }
 
-    /// Keeps the recording of a note that was begun; again, once it is there.
+    /// Stores the recording of a begun note; repeated uploads are accepted.
     fn keep(&self, voice: Voice) -> Result<(), Refusal> {
         let Voices::Kept(keep) = &self.to else {
             return Err((StatusCode::CONFLICT, "this dive isn't recorded: no voice can be kept".to_owned()));
@@ -98,7 +98,7 @@ impl Desk {
             let why = format!("no voice note {} waits for its recording", voice.id);
             return Err((StatusCode::CONFLICT, why));
         }
-        // Before anybody hears that it is there.
+        // Stored before any viewer is notified.
         let voice = Arc::new(voice);
         self.hold(Arc::clone(&voice));
         if let Err(why) = keep(&voice) {
@@ -112,7 +112,7 @@ impl Desk {
     /// The recording of a note, from memory or from the log.
     async fn recall(&self, id: u32, at_s: f64) -> Result<Option<Arc<Voice>>, Refusal> {
         let Voices::Recalled(recall) = &self.to else { return Ok(self.get(id)) };
-        // One after another: each may read much of a log.
+        // One at a time, because each may read much of a log.
         let _turn = self.recalling.acquire().await;
         if let Some(voice) = self.get(id) {
             return Ok(Some(voice));
@@ -128,7 +128,7 @@ impl Desk {
     }
 }
 
-/// Takes the recording of a voice note that was begun on the feed.
+/// Receives the recording of a voice note that was begun on the feed.
 pub(super) async fn take(
     State(shared): Here,
     Path(id): Path<String>,
@@ -190,7 +190,7 @@ fn refusal(error: &VoiceError) -> Refusal {
     (status, error.to_string())
 }
 
-/// Plays the recording of a voice note to whoever sees the dive.
+/// Plays the recording of a voice note to any viewer.
 pub(super) async fn play(State(shared): Here, Path(id): Path<String>, _: Admitted) -> Response {
     let spoken = id.parse().ok().and_then(|id| Some((id, shared.model().spoken_s(id)?)));
     let Some((id, at_s)) = spoken else {

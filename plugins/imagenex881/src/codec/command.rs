@@ -99,7 +99,7 @@ pub enum CommandError {
     },
     /// A setting whose code would terminate the command early.
     #[error(
-        "switch command: byte {index} would be 0xFD, which may stand only at the end; choose a setting beside it"
+        "switch command: byte {index} would be 0xFD, which is allowed only at the end; choose a neighbouring value of the setting"
     )]
     EarlyTerminator {
         /// Index in the command.

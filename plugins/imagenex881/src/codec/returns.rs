@@ -52,7 +52,7 @@ impl Tag {
         }
     }
 
-    /// True for GS models. Those add fields behind the common header, known from one source only.
+    /// True for GS models, which add fields behind the common header, known from one source only.
     pub const fn is_gs(self) -> bool {
         matches!(self, Self::Ina | Self::Inb | Self::Inc)
     }

@@ -1,4 +1,5 @@
-//! The driver against an emulated head, on a line that loses, corrupts, duplicates and delays messages; no port, no clock.
+//! The driver with an emulated head, on a line that loses, corrupts, duplicates and delays messages; without port or
+//! clock.
 
 use headrace_sensor::device::{Direction, Emulator as _, EmulatorSetup};
 use headrace_sensor::geometry::math::{PI, TAU};
@@ -73,7 +74,7 @@ impl Wire for Ends<'_> {
 }
 
 impl Rig {
-    /// A rig whose head stands at `stands_rad` at the start.
+    /// A rig with the head at `stands_rad` at the start.
     fn new(text: &str, program: HeadProgram, stands_rad: f64, faults: Faults) -> Self {
         let settings = settings(text).unwrap();
         let now = BEGUN;
@@ -137,7 +138,7 @@ impl Rig {
                 Some((_, pause)) => {
                     let (first, second) = bytes.split_at(5);
                     self.line.push((at, first.to_vec()));
-                    // A head that stalls in mid-answer sends no more.
+                    // A head that stalls within an answer sends no more.
                     self.line.extend((*pause < STALLS).then(|| (at + *pause, second.to_vec())));
                 }
                 None => self.line.push((at, bytes.clone())),
@@ -211,7 +212,7 @@ fn after_s(seconds: i64) -> MonoNs {
 }
 
 #[test]
-fn a_head_is_taken_to_its_program_from_wherever_it_stands() {
+fn head_is_homed_to_its_program_from_any_position() {
     let sector = HeadProgram { start_rad: 0.5, growing: false, sector: Some((0.0, PI / 2.0)) };
     for text in ["mode = \"fast\"", "mode = \"slow\"\nangle_sign = \"inverted\"\nangle_offset_deg = 40"] {
         for program in [turning(0.0, true), turning(4.0, false), sector] {
@@ -226,7 +227,7 @@ fn a_head_is_taken_to_its_program_from_wherever_it_stands() {
 }
 
 #[test]
-fn heads_keep_their_phases_without_knowing_of_each_other() {
+fn heads_keep_their_phases_independently() {
     let pings: Vec<_> = [0.0, TAU / 2.0]
         .into_iter()
         .map(|start_rad| {
@@ -242,7 +243,7 @@ fn heads_keep_their_phases_without_knowing_of_each_other() {
 }
 
 #[test]
-fn after_a_fault_no_place_is_left_out_and_the_phase_comes_back() {
+fn fault_leaves_no_gap_and_the_phase_recovers() {
     let faults = [
         Faults { lost_commands: vec![300], ..Faults::default() },
         Faults { lost_answers: vec![300, 310], ..Faults::default() },
@@ -264,7 +265,7 @@ fn after_a_fault_no_place_is_left_out_and_the_phase_comes_back() {
 
 /// With one answer in fifty lost, the head falls behind, catches up, and misses only the pings of the lost answers.
 #[test]
-fn a_line_that_loses_much_costs_no_more_than_it_loses() {
+fn lossy_line_misses_only_the_lost_pings() {
     let lost: Vec<usize> = (1..60).map(|n| 50 * n).collect();
     let mut rig = Rig::new(
         "mode = \"fast\"",
@@ -280,7 +281,7 @@ fn a_line_that_loses_much_costs_no_more_than_it_loses() {
 }
 
 #[test]
-fn a_head_that_was_switched_off_is_found_and_taken_back() {
+fn power_cycled_head_is_located_and_homed() {
     let mut rig = Rig::new("mode = \"fast\"", turning(0.0, true), 0.0, Faults::default());
     rig.run(after_s(5));
     let text = "mode = \"fast\"";
@@ -292,7 +293,7 @@ fn a_head_that_was_switched_off_is_found_and_taken_back() {
 }
 
 #[test]
-fn a_silent_head_is_asked_less_often_and_for_ever() {
+fn silent_head_is_polled_less_often_but_without_end() {
     let faults = Faults { lost_commands: (0..10_000).collect(), ..Faults::default() };
     let mut rig = Rig::new("mode = \"fast\"", turning(0.0, true), 0.0, faults);
     rig.run(after_s(100));
@@ -301,7 +302,7 @@ fn a_silent_head_is_asked_less_often_and_for_ever() {
 }
 
 #[test]
-fn another_head_and_one_that_refuses_are_complained_of() {
+fn wrong_head_and_rejected_commands_are_reported() {
     let mut rig = Rig::new("mode = \"fast\"", turning(0.0, true), 0.0, Faults::default());
     let settings = settings("mode = \"fast\"").unwrap();
     let command = settings.command;

@@ -8,7 +8,7 @@ use crate::plugin::HeadDecoder;
 use crate::settings::counts_of_rad;
 use crate::settings::tests::settings;
 
-/// Distance of the wall, all round.
+/// Radius of the tube, m.
 const RADIUS_M: f64 = 4.0;
 
 /// Result of a rehearsal: send and receive times in ns, and the readings.
@@ -59,7 +59,7 @@ fn counts(run: &Run) -> Vec<i32> {
 }
 
 #[test]
-fn a_ping_is_at_start_and_then_each_period() {
+fn pings_are_at_start_and_every_period() {
     let run = run("mode = \"fastest\"", DurNs::from_millis(5), turning(0.0, true), 400);
     for (i, k) in (0..400_u64).enumerate() {
         let ping = 7_000_000_000 + k * 32_000_000;
@@ -69,7 +69,7 @@ fn a_ping_is_at_start_and_then_each_period() {
 }
 
 #[test]
-fn readings_are_the_tube_in_the_devices_metres() {
+fn readings_are_the_tube_radius_in_device_metres() {
     for returns in ["profile", "imx", "igx"] {
         let text = format!("mode = \"slow\"\nreturns = \"{returns}\"");
         let run = run(&text, DurNs::ZERO, turning(1.0, true), 1200);
@@ -81,7 +81,7 @@ fn readings_are_the_tube_in_the_devices_metres() {
 }
 
 #[test]
-fn a_wall_beyond_the_range_setting_is_not_heard() {
+fn wall_beyond_the_range_setting_gives_no_echo() {
     let near = run("mode = \"slow\"\nrange_m = 4", DurNs::ZERO, turning(0.0, true), 3);
     assert!(near.readings.iter().all(|(_, sonar)| sonar.range_m.is_none()));
     let fine = run("mode = \"slow\"\nrange_m = 5", DurNs::ZERO, turning(0.0, true), 3);
@@ -89,7 +89,7 @@ fn a_wall_beyond_the_range_setting_is_not_heard() {
 }
 
 #[test]
-fn a_turn_closes_and_goes_on_either_way() {
+fn turn_closes_and_continues_in_either_direction() {
     for (mode, step) in [("slow", 1), ("medium", 2), ("fast", 3), ("faster", 4), ("fastest", 8)] {
         for growing in [true, false] {
             let pings = 1200 / step as usize;
@@ -106,7 +106,7 @@ fn a_turn_closes_and_goes_on_either_way() {
 }
 
 #[test]
-fn sign_and_offset_leave_the_program_in_the_sensors_frame() {
+fn sign_and_offset_keep_the_program_in_the_sensor_frame() {
     let text = "mode = \"fast\"\nangle_sign = \"inverted\"\nangle_offset_deg = 33";
     let run = run(text, DurNs::ZERO, turning(PI / 2.0, true), 50);
     for (k, got) in (0..).zip(counts(&run)) {
@@ -132,7 +132,7 @@ fn check_sweep(text: &str, step: i32, least: i32, size: i32, start: i32, growing
 }
 
 #[test]
-fn a_sector_is_swept_to_both_ends_which_are_not_repeated() {
+fn sector_sweep_pings_each_end_once() {
     for text in ["mode = \"fast\"", "mode = \"fast\"\nangle_sign = \"inverted\"\nangle_offset_deg = 10"] {
         for (least, size) in [(0, 600), (600, 600), (0, 300), (300, 300), (900, 300), (0, 1200)] {
             check_sweep(text, 3, least, size, least, true);
@@ -142,13 +142,13 @@ fn a_sector_is_swept_to_both_ends_which_are_not_repeated() {
 }
 
 #[test]
-fn a_step_that_does_not_divide_the_sector_is_cut_at_its_end() {
+fn step_that_does_not_divide_the_sector_is_shortened_at_its_end() {
     check_sweep("mode = \"fastest\"", 8, 0, 300, 0, true);
     check_sweep("mode = \"fast\"", 3, 400, 400, 800, false);
 }
 
 #[test]
-fn the_head_keeps_a_sector_that_it_is_commanded() {
+fn head_stays_in_its_commanded_sector() {
     let settings = settings("mode = \"fastest\"").unwrap();
     // 90 degrees about 180: positions 1050 to 150, across the wrap.
     let command = Command { sector_deg: 90.0, train_deg: 180.0, ..settings.command };
@@ -161,7 +161,7 @@ fn the_head_keeps_a_sector_that_it_is_commanded() {
 }
 
 #[test]
-fn the_head_reverses_once_when_told() {
+fn head_reverses_once_on_command() {
     let settings = settings("mode = \"fast\"").unwrap();
     let mut head = Head::new(600, true);
     let mut ping = |reverse| {
@@ -173,7 +173,7 @@ fn the_head_reverses_once_when_told() {
 }
 
 #[test]
-fn the_answer_has_the_position_that_the_head_reports() {
+fn answer_has_the_position_of_the_head() {
     let settings = settings("mode = \"fast\"").unwrap();
     let setup = EmulatorSetup {
         start: MonoNs(0),
@@ -196,7 +196,7 @@ fn the_answer_has_the_position_that_the_head_reports() {
 }
 
 #[test]
-fn regress_what_others_measured_is_told_without_having_begun() {
+fn imported_soundings_are_answered_without_a_begin() {
     let settings = settings("mode = \"fastest\"\nrange_m = 5").unwrap();
     let setup = EmulatorSetup { start: MonoNs(0), head: None, site: Site::default(), polled: true };
     let mut emulator = HeadEmulator::new(settings.clone(), DurNs(0), &setup);

@@ -39,7 +39,7 @@ fn decode(decoder: &mut HeadDecoder, received_ms: i64, bytes: &[u8]) -> Vec<(i64
 }
 
 #[test]
-fn a_return_becomes_a_reading_valid_a_latency_earlier() {
+fn reading_is_valid_one_latency_before_its_return() {
     let got = decode(&mut decoder("mode = \"fast\""), 100, &bytes(&good()));
     let expected = SonarReturn {
         angle_rad: PI / 4.0,
@@ -52,7 +52,7 @@ fn a_return_becomes_a_reading_valid_a_latency_earlier() {
 }
 
 #[test]
-fn near_ranges_count_in_2_mm_and_nothing_heard_is_no_range() {
+fn near_ranges_have_2_mm_resolution_and_no_echo_gives_no_range() {
     let mut decoder = decoder("mode = \"fast\"\nrange_m = 3");
     let near = Return { header: Header { range_m: 3, profile_counts: 1234, ..good().header }, ..good() };
     let [(_, sonar)] = decode(&mut decoder, 0, &bytes(&near))[..] else { panic!() };
@@ -63,14 +63,14 @@ fn near_ranges_count_in_2_mm_and_nothing_heard_is_no_range() {
 }
 
 #[test]
-fn an_angle_goes_through_sign_and_offset() {
+fn angle_uses_sign_and_offset() {
     let mut decoder = decoder("mode = \"fast\"\nangle_sign = \"inverted\"\nangle_offset_deg = 180");
     let [(_, sonar)] = decode(&mut decoder, 0, &bytes(&good()))[..] else { panic!() };
     assert!((sonar.angle_rad - 0.75 * PI).abs() < 1e-12);
 }
 
 #[test]
-fn what_cannot_be_trusted_is_rejected_and_counted() {
+fn untrustworthy_returns_are_rejected_and_counted() {
     let mut decoder = decoder("mode = \"fast\"");
     let header = good().header;
     let bad = [
@@ -95,7 +95,7 @@ fn what_cannot_be_trusted_is_rejected_and_counted() {
 }
 
 #[test]
-fn a_return_in_pieces_is_valid_from_its_first_byte() {
+fn split_return_has_the_time_of_its_first_byte() {
     let mut decoder = decoder("mode = \"fast\"");
     let two = [bytes(&good()), bytes(&good())].concat();
     assert_eq!(decode(&mut decoder, 100, &two[..5]), []);
@@ -105,7 +105,7 @@ fn a_return_in_pieces_is_valid_from_its_first_byte() {
 }
 
 #[test]
-fn a_return_behind_one_cut_short_is_not_given_its_time() {
+fn return_after_a_truncated_one_has_its_own_time() {
     let mut decoder = decoder("mode = \"fast\"");
     let whole = bytes(&good());
     assert_eq!(decode(&mut decoder, 100, &whole[..9]), []);
@@ -115,7 +115,7 @@ fn a_return_behind_one_cut_short_is_not_given_its_time() {
 }
 
 #[test]
-fn after_a_silence_a_new_return_is_not_given_an_old_time() {
+fn return_after_a_silence_has_its_own_time() {
     let mut decoder = decoder("mode = \"fast\"");
     assert_eq!(decode(&mut decoder, 100, &bytes(&good())[..5]), []);
     let [(ms, _)] = decode(&mut decoder, 5000, &bytes(&good()))[..] else { panic!() };
@@ -123,7 +123,7 @@ fn after_a_silence_a_new_return_is_not_given_an_old_time() {
 }
 
 #[test]
-fn a_head_says_what_it_is() {
+fn head_specification_follows_its_settings() {
     let settings = settings("mode = \"slow\"\nangle_offset_deg = 90").unwrap();
     let head = Imagenex881 { sensor: sensor(), settings };
     assert_eq!(head.specification().kind, SensorKind::Head);
@@ -133,7 +133,7 @@ fn a_head_says_what_it_is() {
 }
 
 #[test]
-fn returns_without_their_echo_are_the_same_readings() {
+fn returns_without_echo_give_the_same_readings() {
     let echo = Bytes::new(&[0x5A; 252]).unwrap();
     let long = Return { header: Header { tag: Tag::Imx, ..good().header }, echo };
     let packet = [bytes(&long), bytes(&good()), bytes(&long)].concat();

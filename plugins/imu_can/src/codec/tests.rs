@@ -137,7 +137,7 @@ fn worked_example_9_bosch_and_sbg() {
 }
 
 #[test]
-fn values_that_say_nothing_are_none() {
+fn unavailable_values_are_none() {
     let triple = |raw, figures| j1939::Triple { raw, figures, latency: 0xFF };
     assert_eq!(triple([0x7D00, 0xFE00, 0x7D00], 0).rates_degps(), None);
     assert_eq!(triple([0x7D00, 0x7D00, 0xFFFF], 0).accelerations_mps2(), None);
@@ -149,7 +149,7 @@ fn values_that_say_nothing_are_none() {
 }
 
 #[test]
-fn a_base_moves_the_codes_to_29_bits() {
+fn base_moves_the_codes_to_29_bits() {
     let based = MessageSet::Xsens(xsens::Ids { base: Some(0x19FF_0000) });
     let text = "19FF0032#000000000200";
     assert_eq!(message(based, text), Message::Xsens(xsens::Message::RateOfTurn([0, 0, 512])));
@@ -158,7 +158,7 @@ fn a_base_moves_the_codes_to_29_bits() {
 }
 
 #[test]
-fn nothing_is_read_of_other_frames_and_wrong_lengths_are_bad() {
+fn other_frames_are_ignored_and_wrong_lengths_are_bad() {
     let mut codec = ImuCodec::new(XSENS);
     let mut none = |message| panic!("{message:?}");
     let remote = CanFrame::of_kind(FrameKind::Remote(CanId::Standard(0x34)), &[0; 6]).unwrap();
@@ -172,7 +172,7 @@ fn nothing_is_read_of_other_frames_and_wrong_lengths_are_bad() {
 }
 
 #[test]
-fn a_frame_with_more_than_eight_bytes_is_left_out_to_its_end() {
+fn frame_over_eight_bytes_is_skipped_completely() {
     // A CAN FD frame of 72 bytes, whose data would parse as further frames.
     let mut bytes = [0; 72];
     bytes[0] = 0x34;

@@ -69,7 +69,7 @@ struct Vector<const N: usize> {
 stateful!(Vector<3> { slots: came; fixed: parts; });
 stateful!(Vector<4> { slots: came; fixed: parts; });
 
-/// Components of different samples were combined.
+/// Error: components of different samples were combined.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 struct Mixed;
 

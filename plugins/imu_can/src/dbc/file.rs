@@ -31,7 +31,7 @@ pub enum DbcError {
     },
     /// Text too long.
     #[error(
-        "reading the DBC: {0} bytes; at most {MOST_BYTES} are read: leave only the messages of the unit in it"
+        "reading the DBC: {0} bytes; at most {MOST_BYTES} are allowed: keep only the messages of the unit"
     )]
     Long(usize),
     /// No such signal.
@@ -79,7 +79,7 @@ pub enum DbcError {
     },
     /// Factor zero, or factor or offset not finite.
     #[error(
-        "reading the signal {signal:?}: factor {factor}, offset {offset}; allowed are finite ones, the factor not zero"
+        "reading the signal {signal:?}: factor {factor}, offset {offset}; both must be finite, and the factor not zero"
     )]
     Scale {
         /// Name of the signal.
@@ -91,7 +91,7 @@ pub enum DbcError {
     },
     /// Invalid identifier.
     #[error(
-        "reading the message {message:?}: identifier {id}; standard ones reach to 2047, extended ones have bit 31 set"
+        "reading the message {message:?}: identifier {id}; allowed are up to 2047, or with bit 31 set for an extended one"
     )]
     Id {
         /// Name of the message.
@@ -101,7 +101,7 @@ pub enum DbcError {
     },
     /// Nested multiplexing, or not exactly one multiplexer in the message.
     #[error(
-        "reading the signal {signal:?}: it is multiplexed in a way that isn't read; one switch a message is, with single \
+        "reading the signal {signal:?}: unsupported multiplexing; allowed is one multiplexer per message, with single \
          values"
     )]
     Multiplexed {

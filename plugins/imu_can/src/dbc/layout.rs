@@ -103,7 +103,7 @@ impl Bits {
     /// Raw bits of the representable value nearest to `value`.
     #[expect(
         clippy::cast_possible_truncation,
-        reason = "a double beyond what the signal can say saturates, which is what is wanted"
+        reason = "a double beyond the range of the signal saturates, as intended"
     )]
     pub fn raw(self, value: f64, bits: u32) -> u64 {
         let bits = bits.clamp(1, 64);
@@ -156,7 +156,7 @@ mod tests {
         #![proptest_config(ProptestConfig::with_cases(4096))]
 
         #[test]
-        fn bits_are_those_that_a_walk_finds(
+        fn bits_match_a_walk_over_the_signal(
             data: [u8; 8], start in 0_u64..70, size in 0_u64..70, order in order(), bytes in 0_usize..=8,
         ) {
             let bits = walk(start, size, order);
@@ -170,7 +170,7 @@ mod tests {
         }
 
         #[test]
-        fn what_is_put_in_comes_out_and_nothing_else_changes(
+        fn inserted_bits_are_extracted_and_no_others_change(
             data: [u8; 8], raw: u64, start in 0_u64..64, size in 1_u64..=64, order in order(),
         ) {
             let Some(layout) = Layout::new(start, size, order, 8) else { return Ok(()) };
@@ -183,7 +183,7 @@ mod tests {
         }
 
         #[test]
-        fn signed_numbers_are_two_s_complement(raw: u64, bits in 1_u32..=64) {
+        fn signed_numbers_are_twos_complement(raw: u64, bits in 1_u32..=64) {
             let raw = raw & (u64::MAX >> (64 - bits));
             let negative = raw >> (bits - 1) == 1;
             let expected = i128::from(raw) - if negative { 1_i128 << bits } else { 0 };
@@ -192,7 +192,7 @@ mod tests {
         }
 
         #[test]
-        fn numbers_come_back_from_their_bits(raw: u64, bits in 1_u32..=53, float: f32, double: f64) {
+        fn numbers_round_trip_through_their_bits(raw: u64, bits in 1_u32..=53, float: f32, double: f64) {
             let raw = raw & (u64::MAX >> (64 - bits));
             for kind in [Bits::Unsigned, Bits::Signed] {
                 prop_assert_eq!(kind.raw(kind.value(raw, bits), bits) & (u64::MAX >> (64 - bits)), raw);
@@ -204,7 +204,7 @@ mod tests {
     }
 
     #[test]
-    fn what_a_signal_cannot_say_is_the_nearest_that_it_can() {
+    fn value_out_of_range_encodes_as_the_nearest() {
         assert_eq!(Bits::Unsigned.raw(-3.0, 8), 0);
         assert_eq!(Bits::Unsigned.raw(1e30, 8), 255);
         assert_eq!(Bits::Signed.raw(1e30, 8), 127);

@@ -46,7 +46,7 @@ pub enum Kind {
 #[non_exhaustive]
 pub enum MappingError {
     /// Unit that doesn't fit the quantity.
-    #[error("taking {signal:?} for a {quantity}: its unit is {unit:?}; allowed are {allowed}")]
+    #[error("using {signal:?} as a {quantity}: its unit is {unit:?}; allowed are {allowed}")]
     Unit {
         /// Name of the signal.
         signal: String,
@@ -59,7 +59,7 @@ pub enum MappingError {
     },
     /// Sample time whose tick can't be used.
     #[error(
-        "taking {signal:?} for the sample time: a step of {factor} {unit:?}; allowed are whole numbers without an offset, \
+        "using {signal:?} as the sample time: a step of {factor} {unit:?}; allowed are whole numbers without an offset, \
          in ns, us, ms or s, a step being 1 ns to 15 minutes and whole nanoseconds"
     )]
     Time {
@@ -72,7 +72,8 @@ pub enum MappingError {
     },
     /// Mask or value with bits beyond the signal.
     #[error(
-        "taking {signal:?} for a state: it has {bits} bits, and the mask is {mask:#X}, the value {value:#X}"
+        "using {signal:?} as a state: mask {mask:#X}, value {value:#X}; allowed are an integer signal, a mask within its \
+         {bits} bits, and a value within the mask"
     )]
     Mask {
         /// Name of the signal.

@@ -149,7 +149,7 @@ static MAPPINGS: LazyLock<[(Mapping, MessageSet); 4]> = LazyLock::new(|| {
 
 proptest! {
     #[test]
-    fn a_dbc_gives_what_the_preset_gives_xsens(
+    fn dbc_and_preset_agree_for_xsens(
         quaternions in frames(&XSENS_QUATERNION), angles in frames(&XSENS_EULER), others in frames(&XSENS_IDS),
     ) {
         let [(by_quaternion, set), (by_euler, _), ..] = &*MAPPINGS;
@@ -159,7 +159,7 @@ proptest! {
     }
 
     #[test]
-    fn a_dbc_gives_what_the_preset_gives_sbg(
+    fn dbc_and_preset_agree_for_sbg(
         quaternions in frames(&SBG_QUATERNION), angles in frames(&SBG_EULER),
     ) {
         let [_, _, (by_quaternion, set), (by_euler, _)] = &*MAPPINGS;
@@ -169,7 +169,7 @@ proptest! {
 
     /// Truncated texts, texts with changed bytes, and arbitrary texts: an error or a result, never a panic.
     #[test]
-    fn any_text_is_endured(
+    fn any_text_is_parsed_without_a_panic(
         cut in 0_usize..4000, changes in proptest::collection::vec((0_usize..4000, any::<char>()), 0..4),
         any in "\\PC*", which in 0_usize..4,
     ) {
@@ -192,7 +192,7 @@ proptest! {
 
     /// Out-of-range numbers in the numeric fields.
     #[test]
-    fn any_numbers_are_endured(
+    fn any_numbers_are_parsed_without_a_panic(
         id: u64, bytes: u64, start: u64, size: u64, order in 0_u8..2, factor in any::<f64>(), mux in 0_u64..5,
     ) {
         let signal = format!("SG_ A m{mux} : {start}|{size}@{order}- ({factor:e},0) [0|0] \"deg/s\" H");
@@ -206,7 +206,7 @@ proptest! {
 }
 
 #[test]
-fn readings_come_and_are_the_presets() {
+fn dbc_readings_equal_the_preset_readings() {
     let [(mapping, set), ..] = &*MAPPINGS;
     let packets: Vec<Vec<u8>> = [
         frame(0x05, &[0, 0, 0x27, 0x10]),
@@ -255,7 +255,7 @@ BO_ 70000 Far: 8 U\n SG_ InFar : 0|8@1- (1,0) [0|0] \"\" H\n\
 SIG_VALTYPE_ 600 F32 : 1;\nSIG_VALTYPE_ 601 F64 : 2;\nSIG_VALTYPE_ 601 Bad : 1;\n";
 
 #[test]
-fn a_vector_in_several_frames_is_told_when_all_of_one_sample_is_there() {
+fn vector_in_several_frames_is_reported_once_complete() {
     let own = "[signals]\nforce = [\"TX2.AX\", \"AY\", \"AZ\"]\n";
     let mut decoder = DbcDecoder::new(&mapped(OTHERS, own).unwrap());
     let half_g = [0, 0, 0, 0, 0x53, 0x8F, 0, 0];
@@ -269,7 +269,7 @@ fn a_vector_in_several_frames_is_told_when_all_of_one_sample_is_there() {
     let Reading::SpecificForce(force) = got[0].reading else { panic!() };
     assert!([force.x(), force.y(), force.z()].iter().all(|mps2| (mps2 - 0.5 * 9.806_65).abs() < 1e-3));
     assert_eq!(got[0].valid_at, MonoNs(9_000_000));
-    // After a lost frame the remaining parts aren't joined with the next sample, and the sample after that is complete.
+    // After a lost frame, remaining parts aren't joined with the next sample. The sample after that is complete.
     assert_eq!((send(0x80, 10).len(), send(0x70, 1).len()), (0, 0));
     assert_eq!((send(0x80, 10).len(), send(0x70, 1).len(), send(0x576, 1).len()), (0, 0, 1));
     assert_eq!(decoder.withheld(), 0);
@@ -305,7 +305,7 @@ fn worked_examples_of_other_makers() {
 }
 
 #[test]
-fn what_else_a_dbc_has_is_passed_over() {
+fn other_dbc_content_is_ignored() {
     let dbc = DbcFile::parse(&format!("\u{FEFF}{}", RICH.replace('\n', "\r\n"))).unwrap();
     let place = dbc.signal("Rate").unwrap().place;
     assert_eq!(place.id, CanId::Extended(100));
@@ -314,7 +314,7 @@ fn what_else_a_dbc_has_is_passed_over() {
 }
 
 #[test]
-fn what_is_no_number_is_withheld() {
+fn non_finite_values_are_withheld() {
     let own = "[signals]\nrate = [\"F32\", \"F32\", \"F32\"]\n";
     let mut decoder = DbcDecoder::new(&mapped(OTHERS, own).unwrap());
     let mut send = |value: f32| {
@@ -326,7 +326,7 @@ fn what_is_no_number_is_withheld() {
 }
 
 #[test]
-fn errors_name_what_is_wrong_and_what_is_allowed() {
+fn errors_name_the_fault_and_the_allowed_values() {
     let dbc = DbcFile::parse(OTHERS).unwrap();
     let error = |name: &str| dbc.signal(name).unwrap_err().to_string();
     let none = error("GyroX");
@@ -365,7 +365,7 @@ fn errors_name_what_is_wrong_and_what_is_allowed() {
         more("valid = { signal = \"Page\", mask = 0x100 }").contains("it has 8 bits, and the mask is 0x100")
     );
     assert!(more("valid = { signal = \"Page\", mask = 1, value = 2 }").contains("the value 0x2"));
-    assert!(more("valid = { signal = \"F32\", mask = 1 }").contains("taking \"Float.F32\" for a state"));
+    assert!(more("valid = { signal = \"F32\", mask = 1 }").contains("using \"Float.F32\" as a state"));
     assert!(more("valid = { signal = \"Page\" }").contains("signals.valid.mask: is missing"));
     assert!(more("sample_time = \"AY\"").contains("a step of 0.000127465 \"g\""));
     assert!(more("heading = \"AY\"").contains("is not a key here"));
@@ -373,7 +373,7 @@ fn errors_name_what_is_wrong_and_what_is_allowed() {
 }
 
 #[test]
-fn a_text_that_is_no_dbc_is_named_with_its_line() {
+fn invalid_dbc_is_refused_with_its_line() {
     let line = |text: &str| match DbcFile::parse(text) {
         Err(DbcError::Parse { line, problem }) => (line, problem),
         other => panic!("{other:?}"),
@@ -411,7 +411,7 @@ fn configured(own: &str) -> Result<Box<dyn Device>, String> {
 }
 
 #[test]
-fn an_emulated_unit_comes_back_by_its_dbc() {
+fn emulated_unit_round_trips_by_its_dbc() {
     let paged = "[signals]\nrate = [\"Low\", \"F32\", \"High\"]\n".to_owned();
     let cases = [
         ("xsens.dbc", XSENS, XSENS_KEYS.to_owned(), 3),
@@ -461,10 +461,10 @@ fn an_emulated_unit_comes_back_by_its_dbc() {
 }
 
 #[test]
-fn a_vehicle_file_names_a_dbc_or_a_preset() {
+fn vehicle_file_names_either_a_dbc_or_a_preset() {
     let error = |own: &str| configured(own).err().unwrap();
     assert_eq!(error("dbc = \"gone.dbc\"\n"), "v.toml:1: dbc = \"gone.dbc\": isn't there");
-    assert!(error("preset = \"sbg_ellipse\"\ndbc = \"sbg.dbc\"\n").contains("is there beside preset"));
+    assert!(error("preset = \"sbg_ellipse\"\ndbc = \"sbg.dbc\"\n").contains("is given beside preset"));
     assert!(error("preset = \"sbg_ellipse\"\naxes = \"frd\"\n").contains("is not a key here"));
     assert!(error(&format!("dbc = \"sbg.dbc\"\nid_base = 0\n{SBG_KEYS}")).contains("is not a key here"));
 }

@@ -38,7 +38,7 @@ impl<'a> Frame<'a> {
         good.then_some(Self { id: u16::from_le_bytes([i0, i1]), source, destination, payload })
     }
 
-    /// The frame as bytes.
+    /// Encodes the frame.
     ///
     /// Errors: a payload longer than [`MAX_PAYLOAD_BYTES`].
     pub fn encode(&self) -> Result<Bytes<MAX_FRAME_BYTES>, TooLong> {
@@ -50,7 +50,7 @@ impl<'a> Frame<'a> {
     }
 }
 
-/// Begins a frame; its payload is to be appended.
+/// Begins a frame; the caller appends its payload.
 pub(super) fn begin(
     frame: &mut Bytes<MAX_FRAME_BYTES>,
     id: u16,
@@ -60,11 +60,11 @@ pub(super) fn begin(
     let [i0, i1] = id.to_le_bytes();
     let [b, r] = START;
     frame.clear();
-    // The length is known at the end.
+    // The length is set at the end.
     frame.extend(&[b, r, 0, 0, i0, i1, source, destination])
 }
 
-/// Ends a frame, whose payload is there.
+/// Ends a frame whose payload is complete.
 pub(super) fn end(frame: &mut Bytes<MAX_FRAME_BYTES>) -> Result<(), TooLong> {
     let len = frame.as_slice().len().saturating_sub(HEADER_BYTES);
     let length = u16::try_from(len).map_err(|_| TooLong { len, max: MAX_PAYLOAD_BYTES })?;

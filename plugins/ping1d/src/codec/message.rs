@@ -42,7 +42,7 @@ record! {
 record! {
     /// Listening range of a device.
     ScanRange {
-        /// Nearest distance, mm.
+        /// Minimum distance, mm.
         start_mm: u32,
         /// Length from there, mm; at least 1000.
         length_mm: u32,
@@ -133,7 +133,7 @@ impl core::fmt::Debug for Text {
 #[non_exhaustive]
 pub enum MessageError {
     /// Payload length that doesn't fit its message.
-    #[error("ping message {id}: payload of {len} bytes doesn't fit it")]
+    #[error("ping message {id}: a payload of {len} bytes is wrong for this message")]
     Length {
         /// Message id.
         id: u16,
@@ -141,7 +141,7 @@ pub enum MessageError {
         len: usize,
     },
     /// Count of strengths that doesn't match the payload length.
-    #[error("ping profile: {announced} strengths are announced and {present} are there")]
+    #[error("ping profile: {announced} strengths are announced, but {present} are present")]
     Count {
         /// Count according to the profile.
         announced: u16,
@@ -149,9 +149,7 @@ pub enum MessageError {
         present: usize,
     },
     /// An id that may not be sent as an unknown message.
-    #[error(
-        "ping message {id}: can't be sent as unknown; it has a meaning of its own, or starts the bootloader"
-    )]
+    #[error("ping message {id}: can't be sent as unknown: the id is known, or starts the bootloader")]
     NotSendable {
         /// Message id.
         id: u16,
@@ -330,10 +328,10 @@ impl Message {
         }
     }
 
-    /// Encodes the message as a frame from one device id to another, in place of what `frame` held: messages and frames are as large as
-    /// the longest, and better lent than moved.
+    /// Encodes the message as a frame from one device id to another, replacing the content of `frame`.
     ///
-    /// Errors: a payload beyond [`MAX_PAYLOAD_BYTES`], or an id that may not be sent as [`Message::Other`].
+    /// The frame is passed in because frames are as large as the longest message. Errors: a payload beyond
+    /// [`MAX_PAYLOAD_BYTES`], or an id that may not be sent as [`Message::Other`].
     pub fn encode_to(
         &self,
         frame: &mut Bytes<MAX_FRAME_BYTES>,

@@ -95,7 +95,7 @@ fn worked_frames_both_ways() {
 }
 
 #[test]
-fn every_length_and_id_of_the_table_is_right() {
+fn every_message_length_and_id_matches_the_table() {
     let lengths = [
         (id::ACK, 2),
         (id::DEVICE_INFORMATION, 6),
@@ -118,7 +118,7 @@ fn every_length_and_id_of_the_table_is_right() {
 }
 
 #[test]
-fn a_profile_whose_count_lies_is_refused() {
+fn profile_with_a_false_count_is_refused() {
     let (_, _, Message::Profile(profile)) = examples().swap_remove(6) else { panic!() };
     let message = Message::Profile(profile);
     let told = Addressed { source: 1, destination: 0, message }.encode().unwrap();
@@ -131,7 +131,7 @@ fn a_profile_whose_count_lies_is_refused() {
 }
 
 #[test]
-fn a_nack_says_what_can_be_read_of_it() {
+fn nack_keeps_its_readable_text() {
     let of = |bytes: &[u8]| {
         let (got, _) = decode(&frame(id::NACK, &[&[0xEC, 0x03], bytes].concat()));
         let [Addressed { message: Message::Nack { nacked_id: 1004, text }, .. }] = got[..] else { panic!() };
@@ -146,7 +146,7 @@ fn a_nack_says_what_can_be_read_of_it() {
 }
 
 #[test]
-fn an_unknown_message_is_kept_but_a_known_id_is_not_sent_as_one() {
+fn unknown_message_is_kept_and_known_ids_are_refused_as_unknown() {
     let other = |id| Addressed {
         source: 1,
         destination: 0,
@@ -160,7 +160,7 @@ fn an_unknown_message_is_kept_but_a_known_id_is_not_sent_as_one() {
 }
 
 #[test]
-fn a_stray_b_before_a_frame_loses_nothing() {
+fn stray_b_before_a_frame_loses_nothing() {
     for (bytes, _, message) in examples() {
         let (got, counts) = decode(&[b"B", &bytes[..]].concat());
         assert_eq!(got.iter().map(|value| value.message).collect::<Vec<_>>(), [message]);
@@ -169,7 +169,7 @@ fn a_stray_b_before_a_frame_loses_nothing() {
 }
 
 #[test]
-fn a_length_that_lies_swallows_nothing() {
+fn false_length_swallows_nothing() {
     let good = examples().swap_remove(4).0;
     let mut profile = examples().swap_remove(6).0;
     profile[2] = 0xFF;
@@ -185,7 +185,7 @@ fn a_length_that_lies_swallows_nothing() {
 }
 
 #[test]
-fn the_longest_frame_is_taken_and_a_longer_one_is_not() {
+fn longest_frame_is_accepted_and_a_longer_one_refused() {
     let longest = frame(2300, &[7; MAX_PAYLOAD_BYTES]);
     assert_eq!(longest.len(), MAX_FRAME_BYTES);
     assert_eq!(decode(&longest).1.good_frames, 1);
@@ -195,7 +195,7 @@ fn the_longest_frame_is_taken_and_a_longer_one_is_not() {
 }
 
 #[test]
-fn a_ping360s_frames_are_framed_and_summed_right() {
+fn ping360_frames_have_correct_framing_and_checksum() {
     let real = [
         "ping360_tank_rgu/Uniform_Pipe__50__1N__2024-03-12_11-31-02Gain_1.bin",
         "ping360_tank_rgu/Uniform_Pipe__90__1N__2024-03-12_11-38-25Gain_1.bin",

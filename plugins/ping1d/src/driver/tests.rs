@@ -1,4 +1,4 @@
-//! The driver against an emulated device on a lossy line; no port, no clock.
+//! The driver with an emulated device on a lossy line; without port or clock.
 
 use headrace_sensor::device::{Emulator as _, EmulatorSetup};
 use headrace_sensor::geometry::site::Site;
@@ -109,7 +109,7 @@ impl Rig {
 }
 
 #[test]
-fn settings_come_first_and_then_a_distance_each_interval() {
+fn settings_precede_a_distance_each_interval() {
     let mut rig = Rig::new("interval_ms = 50\nsound_speed_mps = 1447\nscan_m = 8\ngain = 2", 0);
     rig.run(10.0);
     assert!((190..=200).contains(&rig.distances()), "{}", rig.distances());
@@ -127,7 +127,7 @@ fn settings_come_first_and_then_a_distance_each_interval() {
 }
 
 #[test]
-fn a_continuous_device_is_started_once_and_not_asked() {
+fn continuous_device_is_started_once_and_not_polled() {
     let mut rig = Rig::new("polling = \"continuous\"\ninterval_ms = 50", 0);
     rig.run(10.0);
     assert!((190..=200).contains(&rig.distances()), "{}", rig.distances());
@@ -135,14 +135,14 @@ fn a_continuous_device_is_started_once_and_not_asked() {
 }
 
 #[test]
-fn a_line_that_loses_messages_costs_those_and_a_wait() {
+fn lossy_line_costs_only_its_lost_messages_and_a_timeout() {
     let mut rig = Rig::new("interval_ms = 50", 7);
     rig.run(20.0);
     assert!(rig.distances() > 180, "{}", rig.distances());
 }
 
 #[test]
-fn a_setting_that_is_lost_is_said_again() {
+fn lost_setting_is_sent_again() {
     for lost in 2..12 {
         let mut rig = Rig::new("interval_ms = 50\nsound_speed_mps = 1447\nscan_m = 8\ngain = 2", 0);
         rig.loses_only = Some(lost);
@@ -155,7 +155,7 @@ fn a_setting_that_is_lost_is_said_again() {
 }
 
 #[test]
-fn a_device_that_answers_nothing_is_told_each_setting_and_asked_for_distances() {
+fn silent_device_still_gets_settings_and_distance_requests() {
     let mut rig = Rig::new("interval_ms = 50", 1);
     rig.run(10.0);
     let said = |wanted: Message| rig.sent.iter().filter(|sent| **sent == wanted).count();
@@ -164,7 +164,7 @@ fn a_device_that_answers_nothing_is_told_each_setting_and_asked_for_distances() 
 }
 
 #[test]
-fn a_speed_of_sound_that_another_client_has_set_is_set_back() {
+fn foreign_speed_of_sound_is_set_back() {
     let mut rig = Rig::new("", 0);
     rig.run(5.0);
     let other = Addressed { source: 0, destination: 1, message: Message::SetSpeedOfSound(1_480_000) };
@@ -174,7 +174,7 @@ fn a_speed_of_sound_that_another_client_has_set_is_set_back() {
 }
 
 #[test]
-fn another_device_on_the_line_is_complained_of() {
+fn wrong_device_on_the_line_is_reported() {
     let mut rig = Rig::new("", 0);
     rig.drive(|driver, now, wire| driver.opened(now, wire));
     let device = DeviceInformation {

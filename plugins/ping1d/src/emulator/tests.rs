@@ -6,7 +6,7 @@ use super::*;
 use crate::plugin::PingDecoder;
 use crate::settings::tests::settings;
 
-/// Send times and readings with their times, all in ms; `range_m` gives the wall's distance after a number of seconds.
+/// Send times, and readings with their times, in ms; `range_m` gives the wall's distance by seconds.
 fn run(
     text: &str,
     range_m: impl Fn(f64) -> Option<f64>,
@@ -39,7 +39,7 @@ fn run(
 }
 
 #[test]
-fn readings_are_the_wall_in_the_devices_millimetres() {
+fn readings_are_the_wall_distance_in_device_millimetres() {
     let wall_m = |at_s: f64| 3.8 - 0.1 * at_s;
     for device_mps in [1500.0, 1447.0] {
         let text = format!("sound_speed_mps = {device_mps}");
@@ -54,7 +54,7 @@ fn readings_are_the_wall_in_the_devices_millimetres() {
 }
 
 #[test]
-fn where_there_is_no_wall_there_is_no_range_and_no_confidence() {
+fn missing_wall_gives_no_range_and_no_confidence() {
     let (_, readings) = run("interval_ms = 100", |_| None, DurNs::ZERO);
     let silent = EchoRange { range_m: None, confidence: 0.0, sound_speed_mps: 1500.0 };
     assert!(readings.iter().all(|(_, echo)| *echo == silent));

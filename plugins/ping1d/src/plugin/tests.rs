@@ -49,13 +49,13 @@ fn every_message_with_a_distance_becomes_a_reading() {
 }
 
 #[test]
-fn no_confidence_or_no_distance_is_no_range() {
+fn zero_confidence_or_distance_gives_no_range() {
     assert_eq!(one(&Message::Distance(Distance { confidence_percent: 0, ..PING })).range_m, None);
     assert_eq!(one(&Message::Distance(Distance { distance_mm: 0, ..PING })).range_m, None);
 }
 
 #[test]
-fn other_messages_other_devices_and_nonsense_give_no_reading() {
+fn other_messages_devices_and_undefined_values_give_no_reading() {
     let mut decoder = decoder();
     let nonsense = Distance { confidence_percent: 101, ..PING };
     for message in [Message::Ack(1004), Message::PingInterval(66), Message::Distance(nonsense)] {
@@ -67,7 +67,7 @@ fn other_messages_other_devices_and_nonsense_give_no_reading() {
 }
 
 #[test]
-fn a_datagram_may_hold_part_of_a_frame_or_several() {
+fn datagram_may_hold_a_part_of_a_frame_or_several() {
     let mut decoder = decoder();
     let two = [frame(&Message::Distance(PING)), frame(&Message::Distance(PING))].concat();
     assert_eq!(decode(&mut decoder, 100, &two[..20]), []);
@@ -76,7 +76,7 @@ fn a_datagram_may_hold_part_of_a_frame_or_several() {
 }
 
 #[test]
-fn a_frame_cut_short_delays_nothing_after_a_silence() {
+fn truncated_frame_delays_nothing_after_a_silence() {
     let mut decoder = decoder();
     let longer = Message::Profile(Profile { distance: PING, strengths: Bytes::new(&[9; 200]).unwrap() });
     assert_eq!(decode(&mut decoder, 100, &frame(&longer)[..30]), []);
@@ -87,14 +87,14 @@ fn a_frame_cut_short_delays_nothing_after_a_silence() {
 }
 
 #[test]
-fn an_echosounder_says_what_it_is() {
+fn echosounder_specification_follows_its_settings() {
     let ping = Ping1d { sensor: sensor(), settings: settings("").unwrap() };
     assert!(matches!(ping.specification().kind, SensorKind::Echosounder { .. }));
     assert!(ping.head().is_none());
 }
 
 #[test]
-fn a_profile_without_its_strengths_is_the_same_reading() {
+fn profile_without_strengths_gives_the_same_reading() {
     let strengths = Bytes::new(&[1; 150]).unwrap();
     let profile = frame(&Message::Profile(Profile { distance: PING, strengths }));
     let mut shorter = Vec::new();

@@ -33,7 +33,7 @@ fn told(stand: &mut EmulatedPort, count: usize) -> Vec<u8> {
 }
 
 #[test]
-fn bytes_pass_both_ways_on_every_carrier_that_is_here() {
+fn bytes_pass_both_ways_on_every_available_carrier() {
     let all: Vec<u8> = (0..=255).collect();
     for carrier in [Carrier::Serial, Carrier::Tcp, Carrier::Udp] {
         let mut stand = EmulatedPort::new(carrier, LOCAL).unwrap();
@@ -47,7 +47,7 @@ fn bytes_pass_both_ways_on_every_carrier_that_is_here() {
 }
 
 #[test]
-fn a_host_that_goes_and_comes_again_is_served_again() {
+fn returning_host_is_served_again() {
     for carrier in [Carrier::Serial, Carrier::Tcp, Carrier::Udp] {
         let mut stand = EmulatedPort::new(carrier, LOCAL).unwrap();
         for round in 0..3 {
@@ -62,7 +62,7 @@ fn a_host_that_goes_and_comes_again_is_served_again() {
 }
 
 #[test]
-fn a_device_that_goes_is_noticed() {
+fn disappearing_device_is_detected() {
     for carrier in [Carrier::Serial, Carrier::Tcp] {
         let stand = EmulatedPort::new(carrier, LOCAL).unwrap();
         let mut stand = stand;

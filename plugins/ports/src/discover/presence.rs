@@ -10,7 +10,7 @@ use crate::open_error::OpenError;
 pub enum Presence {
     /// It exists and can be opened, under this name.
     There(String),
-    /// A network address: can only be checked by connecting.
+    /// A network address, which can only be checked by connecting.
     Elsewhere,
 }
 

@@ -9,7 +9,8 @@ use headrace_sensor::connect::Connect;
 use super::*;
 use crate::open_error::OpenErrorKind;
 
-/// Another machine's files in a temporary folder. All belong to us, and our group is called dialout there.
+/// Another machine's files in a temporary folder. All files belong to this user, and this user's group is called
+/// dialout there.
 struct Tree(PathBuf);
 
 impl Drop for Tree {
@@ -94,7 +95,7 @@ impl Tree {
         self.path("/etc/group").metadata().unwrap().gid()
     }
 
-    /// Seen by a user who is neither owner, in the group, nor root.
+    /// The machine as seen by a user who is neither owner, nor in the group, nor root.
     fn seen_by_stranger(&self) -> Machine {
         self.seen_by(4009, &[4009])
     }
@@ -116,7 +117,7 @@ fn said(machine: &Machine, connect: &str) -> String {
 }
 
 #[test]
-fn usb_ports_are_named_by_what_stays() {
+fn usb_ports_have_stable_names() {
     let tree = Tree::new("usb");
     tree.usb_serial("1-1", ("0403", "6001"), Some("A10K"), &["ttyUSB10"]);
     tree.usb_serial("1-2", ("10c4", "ea60"), None, &["ttyUSB2"]);
@@ -145,7 +146,7 @@ fn usb_ports_are_named_by_what_stays() {
 }
 
 #[test]
-fn what_is_no_port_is_not_listed() {
+fn ttys_without_hardware_are_not_listed() {
     let tree = Tree::new("phantoms");
     // A console without hardware, an undetected UART, a firmware port.
     tree.file("/sys/class/tty/tty1/uevent", "");
@@ -159,7 +160,7 @@ fn what_is_no_port_is_not_listed() {
 }
 
 #[test]
-fn who_may_not_open_is_told_what_gives_the_right() {
+fn denied_user_gets_the_command_that_grants_access() {
     let tree = Tree::new("rights");
     tree.usb_serial("1-1", ("0403", "6001"), Some("A10K"), &["ttyUSB0"]);
     let connect = "serial:/dev/ttyUSB0";
@@ -170,7 +171,7 @@ fn who_may_not_open_is_told_what_gives_the_right() {
         (
             0o660,
             tree.seen_by(4001, &[4001]),
-            "log in again: this user has been put into the group dialout since",
+            "log in again: this user joined the group dialout after the login",
         ),
         (0o600, tree.seen_by_member(), "sudo chgrp dialout /dev/ttyUSB0 && sudo chmod 660 /dev/ttyUSB0"),
         (0o640, tree.seen_by_member(), "sudo chgrp dialout /dev/ttyUSB0"),
@@ -189,7 +190,7 @@ fn who_may_not_open_is_told_what_gives_the_right() {
     assert_eq!(said(&tree.seen_by(0, &[0]), connect), "There(\"/dev/ttyUSB0\")", "root may");
     tree.device("/dev/ttyUSB0", 0o666);
     assert_eq!(said(&tree.seen_by_stranger(), connect), "There(\"/dev/ttyUSB0\")");
-    assert!(said(&tree.seen_by_stranger(), "serial:/dev/ttyUSB7").contains("it isn't there"));
+    assert!(said(&tree.seen_by_stranger(), "serial:/dev/ttyUSB7").contains("there is no such port"));
 }
 
 #[test]
@@ -208,7 +209,7 @@ fn counters_are_named_by_ids_and_serial_number() {
 }
 
 #[test]
-fn can_interfaces_say_what_they_lack() {
+fn can_interfaces_report_missing_requirements() {
     let tree = Tree::new("can");
     tree.net("eth0", "1", "0x1003", "up");
     tree.net("can0", "280", "0x40080", "down");
@@ -222,7 +223,7 @@ fn can_interfaces_say_what_they_lack() {
     for (connect, words) in [
         ("can:can0", "the interface is down; sudo ip link set can0 up type can bitrate 250000"),
         ("can:can1", "There(\"can1\")"),
-        ("can:can2", "off the bus; see to bit rate, wiring and termination: ip -details link show can2"),
+        ("can:can2", "off the bus; check bit rate, wiring and termination: ip -details link show can2"),
         ("can:vcan0", "There(\"vcan0\")"),
         ("can:vcan1", "the interface is down; sudo ip link set vcan1 up"),
         ("can:can7", "there is no such CAN interface; plug the adapter in"),
@@ -243,7 +244,7 @@ fn can_interfaces_say_what_they_lack() {
 }
 
 #[test]
-fn buses_without_device_files_want_a_module() {
+fn bus_without_device_files_needs_a_module() {
     let tree = Tree::new("i2c");
     for (name, says) in [("i2c-1", "bcm2835 (i2c@7e804000)"), ("i2c-0", "SMBus I801"), ("1-0040", "ms5837")] {
         tree.file(&format!("/sys/bus/i2c/devices/{name}/name"), says);
@@ -259,7 +260,7 @@ fn buses_without_device_files_want_a_module() {
 }
 
 #[test]
-fn this_machine_can_be_looked_at() {
+fn discovery_runs_on_this_machine() {
     let found = discover(&Machine::ours());
     for found in &found {
         assert!(!found.name.is_empty() && found.connect.is_some(), "{found:?}");

@@ -21,8 +21,9 @@ const DATA_AT: usize = 8;
 /// Identifier flag for 29 bits. Source: Linux, `CAN_EFF_FLAG`.
 const EXTENDED: u32 = 0x8000_0000;
 
-/// Errors that a socket reports once: interface down (the socket receives again when it is up), and interface gone (it never
-/// receives again). Source: Linux, errno.
+/// Errors that a socket reports once. Source: Linux, errno.
+///
+/// On interface down, the socket receives again when the interface is up. On interface gone, it never receives again.
 const ENETDOWN: i32 = 100;
 const ENODEV: i32 = 19;
 
@@ -30,7 +31,7 @@ struct Can {
     socket: CanSocket,
     timeout: ReadTimeout,
     interface: String,
-    /// The interface was reported down, and no frame has come since.
+    /// Whether the interface was reported down and no frame has arrived since.
     is_down: bool,
 }
 
@@ -38,7 +39,7 @@ pub(super) fn open(interface: &str) -> Result<Box<dyn Line>, OpenError> {
     let opening = || {
         let socket = CanSocket::open(interface)?;
         socket.set_recv_timestamp(true)?;
-        // Bus-off and bus errors come as error frames.
+        // Bus-off and bus errors arrive as error frames.
         socket.set_error_filter_accept_all()?;
         Ok(socket)
     };

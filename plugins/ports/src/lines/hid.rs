@@ -17,7 +17,8 @@ use crate::open_error::OpenError;
 
 struct Hid {
     device: HidDevice,
-    /// Keeps other programs of our kind off: the kernel gives a report to all that have opened the device.
+    /// Lock against other headrace processes, because the kernel gives each report to every program that has the
+    /// device open.
     _lock: File,
 }
 
@@ -32,7 +33,7 @@ pub(super) fn open(identity: &UsbIdentity) -> Result<Box<dyn Line>, OpenError> {
     Ok(Box::new(Hid { device: opened.map_err(|error| failed(&error))?, _lock: lock }))
 }
 
-/// Device file of the one device of this identity.
+/// Device file of the only device with this identity.
 pub(super) fn path_of(identity: &UsbIdentity) -> Result<String, OpenError> {
     let what = format!("hid:{identity}");
     let api = HidApi::new().map_err(|error| diagnosis::opening(&what, &io_error(&error)))?;

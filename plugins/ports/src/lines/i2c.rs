@@ -22,7 +22,7 @@ struct Bus<B> {
 pub(super) fn open(bus: &str, address: u8) -> Result<Box<dyn Line>, OpenError> {
     let opened =
         I2cdev::new(bus).map_err(|error| diagnosis::opening(bus, &io::Error::other(error.to_string())));
-    // The crate's error hides the error kind; opening the file directly gives it.
+    // The crate's error hides the error kind; opening the file directly returns it.
     let opened = opened.map_err(|trouble| match std::fs::File::open(bus) {
         Err(error) => diagnosis::opening(bus, &error),
         Ok(_) => trouble,
@@ -92,7 +92,7 @@ mod tests {
     }
 
     #[test]
-    fn a_transaction_is_what_was_written_and_then_what_was_read() {
+    fn transaction_is_the_written_then_the_read_bytes() {
         let mut line = Bus { bus: Echo(Vec::new()), address: 0x40 };
         let (_, bytes) = line.exchange(&[0xAC], DurNs(0), 5).unwrap().unwrap();
         assert_eq!(bytes, [0xAC; 6]);

@@ -11,16 +11,16 @@ use headrace_sensor::driver::Strangers;
 /// Maximum bytes of one read.
 pub const READ_BYTES: usize = 2048;
 
-/// Who is heard on a line that anybody may send to. Outlives the line's being reopened.
+/// Senders on a line that accepts any sender. The value survives a reopening of the line.
 #[derive(Default)]
 pub struct Senders {
-    /// The device.
+    /// Accepted sender, which is the device.
     pub believed: Option<SocketAddr>,
-    /// All others.
+    /// Rejected senders.
     pub strangers: Strangers,
 }
 
-/// Tells whether bytes hold a message of a device on the line.
+/// Returns whether bytes hold a message of a device on the line.
 pub type IsValid<'a> = &'a dyn Fn(&[u8]) -> bool;
 
 /// An open line.
@@ -30,7 +30,7 @@ pub trait Line: Send {
     /// Errors: the connection is lost.
     fn read(&mut self, wait: Duration, into: &mut [u8; READ_BYTES]) -> io::Result<Option<(MonoNs, usize)>>;
 
-    /// The same where anybody may send: only the bytes of one sender, the first valid one, are returned.
+    /// As [`Line::read`] on a line that accepts any sender: returns only bytes of one sender, the first valid one.
     ///
     /// Errors: the connection is lost.
     fn read_device(
@@ -48,10 +48,10 @@ pub trait Line: Send {
     /// Errors: the connection is lost.
     fn write(&mut self, bytes: &[u8]) -> io::Result<()>;
 
-    /// On a bus: writes, waits `settle`, reads, and returns the transaction (bytes written, then bytes read) with the time at
-    /// which the read began. `None` if the answer comes as a message.
+    /// Exchanges a transaction on a bus: writes, waits `settle`, and reads.
     ///
-    /// Errors: the connection is lost; the line is no bus.
+    /// Returns the bytes written and then the bytes read, with the time at which the read began. `None` if the answer
+    /// comes as a message. Errors: the connection is lost; the line is no bus.
     fn exchange(
         &mut self,
         write: &[u8],
@@ -67,7 +67,7 @@ pub trait Line: Send {
         None
     }
 
-    /// Messages that were dropped since the last call, unread, as far as the carrier tells.
+    /// Number of messages dropped unread since the last call, as far as the carrier reports them.
     fn dropped(&mut self) -> u64 {
         0
     }
@@ -80,8 +80,10 @@ pub trait Line: Send {
     }
 }
 
-/// [`Line::exchange`] of an emulated bus: sends a datagram of the bytes to write and the read length; the answer, which comes as a
-/// message, is the transaction.
+/// Performs [`Line::exchange`] on an emulated bus.
+///
+/// It sends a datagram of the bytes to write and the read length; the answer, which arrives as a message, is the
+/// transaction.
 pub(super) fn exchange_by_datagram(
     line: &mut impl Line,
     write: &[u8],
@@ -92,7 +94,7 @@ pub(super) fn exchange_by_datagram(
     Ok(None)
 }
 
-/// A socket's read timeout, set only when it changes: most waits are as long as the last.
+/// A socket's read timeout, which is set only when it changes: most waits are as long as the last.
 #[derive(Default)]
 pub(super) struct ReadTimeout(Duration);
 

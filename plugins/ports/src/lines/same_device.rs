@@ -1,4 +1,4 @@
-//! Whether two `connect`s that are written differently lead to one device.
+//! Tests whether two differently written `connect`s lead to the same device.
 
 use std::fs;
 use std::net::{SocketAddr, ToSocketAddrs as _};
@@ -6,7 +6,7 @@ use std::path::PathBuf;
 
 use headrace_sensor::connect::{Connect, SerialPort};
 
-/// What a `connect` leads to at present.
+/// Present target of a `connect`.
 #[derive(Debug, PartialEq, Eq)]
 enum End {
     /// A device file, links resolved.
@@ -19,10 +19,10 @@ enum End {
     Local(u16),
 }
 
-/// True if both lead to one device now: by a link, by a USB identity, by another name of a host. False if that can't be
-/// known because either isn't there.
+/// True if both lead to the same device now: by a link, a USB identity, or another name of a host. False if either is
+/// absent, because then it isn't known.
 pub(crate) fn same_device(one: &Connect, other: &Connect) -> bool {
-    // Looking names up takes time, and is of no use between carriers.
+    // Name lookups take time, and are useless between carriers.
     one.carrier() == other.carrier() && end(one).is_some_and(|end| Some(end) == self::end(other))
 }
 
@@ -40,7 +40,7 @@ fn end(connect: &Connect) -> Option<End> {
         #[cfg(target_os = "linux")]
         Connect::Hid(identity) => super::hid::path_of(identity).ok().map(|path| End::File(path.into())),
         Connect::I2c { bus, address } => fs::canonicalize(bus).ok().map(|bus| End::Bus(bus, *address)),
-        // An interface has one name.
+        // A CAN interface has a single name.
         _ => None,
     }
 }
@@ -53,7 +53,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn links_and_names_that_lead_to_one_end_are_found() {
+    fn links_and_names_of_the_same_device_are_detected() {
         let folder = std::env::temp_dir().join(format!("headrace-same-device-{}", std::process::id()));
         fs::create_dir_all(&folder).unwrap();
         let path = |name: &str| folder.join(name).display().to_string();

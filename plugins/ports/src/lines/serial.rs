@@ -38,7 +38,7 @@ pub(super) fn open(port: &SerialPort, baud: u32) -> Result<Box<dyn Line>, OpenEr
     Ok(Box::new(Serial { port, byte_time, emptied: clock::now() }))
 }
 
-/// The crate reports a port that another program has locked as absent.
+/// Converts the serial crate's error, which reports a port locked by another program as absent.
 fn cause(path: &str, error: serialport::Error) -> io::Error {
     let flags = OFlags::RDWR | OFlags::NOCTTY | OFlags::NONBLOCK | OFlags::CLOEXEC;
     let opened = rustix::fs::open(path, flags, Mode::empty());

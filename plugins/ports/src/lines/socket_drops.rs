@@ -1,27 +1,27 @@
-//! Datagrams that the kernel dropped at a socket whose queue was full, because its reader, or the whole machine, stood.
+//! Datagrams that the kernel dropped because a socket's queue was full while its reader or the whole machine stalled.
 //!
-//! Linux counts them for each socket in `/proc/net/udp`: the tenth column is the socket's inode, the thirteenth the count. Elsewhere
-//! none are known.
+//! Linux counts them for each socket in `/proc/net/udp`: the tenth column is the socket's inode, the thirteenth the
+//! count. On other systems the count isn't available.
 
 use std::fs;
 use std::net::UdpSocket;
 use std::os::fd::AsRawFd as _;
 use std::os::unix::fs::MetadataExt as _;
 
-/// Where the kernel tells them, for IPv4 and IPv6.
+/// The kernel's tables for IPv4 and IPv6.
 const TABLES: [&str; 2] = ["/proc/self/net/udp", "/proc/self/net/udp6"];
 /// Columns of the tables.
 const INODE: usize = 9;
 const DROPS: usize = 12;
 
-/// Drops at a socket since they were last asked for.
+/// Counts drops at a socket between queries.
 #[derive(Debug, Default)]
 pub(super) struct SocketDrops {
     told: u64,
 }
 
 impl SocketDrops {
-    /// Datagrams dropped at a socket since the last call; none where the kernel doesn't tell.
+    /// Number of datagrams dropped at a socket since the last call; 0 if the kernel doesn't report it.
     pub(super) fn new_ones(&mut self, socket: &UdpSocket) -> u64 {
         let all = dropped(socket).unwrap_or(self.told);
         let new = all.saturating_sub(self.told);
@@ -35,7 +35,7 @@ fn dropped(socket: &UdpSocket) -> Option<u64> {
     TABLES.iter().find_map(|table| of_inode(&fs::read_to_string(table).ok()?, &inode))
 }
 
-/// The drops of the socket with an inode, in a table's text.
+/// Drop count of the socket with this inode, from a table's text.
 fn of_inode(table: &str, inode: &str) -> Option<u64> {
     table.lines().find_map(|line| {
         let columns: Vec<&str> = line.split_whitespace().collect();
@@ -48,13 +48,13 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_socket_that_is_not_read_drops_and_each_drop_is_told_once() {
+    fn unread_socket_drops_are_reported_once() {
         let socket = UdpSocket::bind("127.0.0.1:0").unwrap();
         let sender = UdpSocket::bind("127.0.0.1:0").unwrap();
         let mut drops = SocketDrops::default();
         assert_eq!(drops.new_ones(&socket), 0);
         let to = socket.local_addr().unwrap();
-        // As much as fits into no queue that a kernel gives by itself.
+        // More than fits into any queue that a kernel provides by default.
         let sent: u64 = 40_000;
         for _ in 0..sent {
             sender.send_to(&[7; 1000], to).unwrap();
@@ -71,7 +71,7 @@ mod tests {
     }
 
     #[test]
-    fn a_table_is_read_as_the_kernel_writes_it() {
+    fn kernel_table_is_parsed() {
         let table = "   sl  local_address rem_address   st tx_queue rx_queue tr tm->when retrnsmt   uid  timeout inode ref pointer drops\n\
             \x20 311: 0100007F:1F90 00000000:0000 07 00000000:00034800 00:00000000 00000000     0        0 48213 2 0000000000000000 97\n";
         assert_eq!(of_inode(table, "48213"), Some(97));

@@ -1,4 +1,4 @@
-//! UDP to a bridge that answers only clients that have sent first. The kernel drops what others send.
+//! UDP to a bridge that answers only clients that have sent first. The kernel drops datagrams of other senders.
 
 use std::io;
 use std::net::{ToSocketAddrs as _, UdpSocket};

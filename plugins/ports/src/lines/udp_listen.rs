@@ -1,8 +1,8 @@
-//! UDP from a device that sends to a local port, to which anybody else may send, too.
+//! UDP from a device that sends to a local port, which accepts any sender.
 //!
-//! One sender is heard, pinned by address and port: the one of `?from=`, or the first whose message a driver of the line
-//! accepts. Nothing of others reaches a driver, nor is anything sent to them. A device that falls silent may come back from
-//! another port, not from another address.
+//! One sender is accepted, pinned by address and port: the one of `?from=`, or the first whose message a driver of
+//! the line accepts. Data of others never reaches a driver, and nothing is sent to them. A device that falls silent
+//! may return from another port, but not from another address.
 
 use std::collections::VecDeque;
 use std::io;
@@ -17,7 +17,7 @@ use crate::clock;
 use crate::diagnosis;
 use crate::open_error::OpenError;
 
-/// Senders whose bytes are held until one is valid; of more the one heard first is forgotten.
+/// Number of senders whose bytes are held until one is valid; beyond it the oldest is forgotten.
 const MAX_CANDIDATES: usize = 8;
 
 struct UdpListen {
@@ -25,7 +25,7 @@ struct UdpListen {
     timeout: ReadTimeout,
     drops: SocketDrops,
     from: From,
-    /// The sender that is heard, and that commands go to.
+    /// Accepted sender, which also receives commands.
     peer: Option<SocketAddr>,
     candidates: VecDeque<Candidate>,
 }
@@ -38,7 +38,7 @@ enum From {
     Port(SocketAddr),
 }
 
-/// A sender that nothing valid has come from yet: perhaps its frames come in parts.
+/// A sender without a valid message so far; its frames may arrive in parts.
 struct Candidate {
     from: SocketAddr,
     first: MonoNs,
@@ -73,14 +73,14 @@ impl UdpListen {
         match (self.from, senders.believed) {
             (From::Port(peer), _) => from == peer,
             (From::Host(host), _) => from.ip() == host,
-            // Before the line was reopened.
+            // The sender before the line was reopened.
             (From::Anybody, Some(before)) => from.ip() == before.ip(),
             (From::Anybody, None) => true,
         }
     }
 
-    /// Takes a datagram of a sender that may be the device. Once it is valid, alone or after the sender's earlier ones, the
-    /// sender is pinned, and what is valid is in `into`.
+    /// Handles a datagram of a sender that may be the device. Once its bytes are valid, alone or with its earlier
+    /// ones, the sender is pinned and the valid bytes are in `into`.
     fn introduce(
         &mut self,
         (received, from, count): (MonoNs, SocketAddr, usize),
@@ -107,12 +107,12 @@ impl UdpListen {
             into.iter_mut().zip(&own.bytes).for_each(|(to, byte)| *to = *byte);
         }
         self.candidates.drain(..).for_each(|other| dismiss(&other, senders));
-        tracing::info!(%from, "the device is this sender; others aren't heard");
+        tracing::info!(%from, "this sender is accepted as the device; others are ignored");
         (self.peer, senders.believed) = (Some(from), Some(from));
         Some((first, count))
     }
 
-    /// Adds to a candidate's bytes; their time and length if they are valid together.
+    /// Adds to a candidate's bytes; returns their time and length if they are valid together.
     fn hold(
         &mut self,
         received: MonoNs,
@@ -147,7 +147,7 @@ fn refuse(from: SocketAddr, messages: u64, senders: &mut Senders) {
 }
 
 impl Line for UdpListen {
-    /// Of anybody: only for probing.
+    /// Reads from any sender; only for probing.
     fn read(&mut self, wait: Duration, into: &mut [u8; READ_BYTES]) -> io::Result<Option<(MonoNs, usize)>> {
         self.read_device(wait, into, &mut Senders::default(), &|_| true)
     }
@@ -208,7 +208,7 @@ mod tests {
     const WAIT: Duration = Duration::from_secs(10);
     const NONE: Duration = Duration::from_millis(20);
 
-    /// Valid are bytes with an `M`, then some, then a `!`.
+    /// Bytes are valid if they contain an `M`, further bytes, and then a `!`.
     fn is_valid(bytes: &[u8]) -> bool {
         bytes.iter().position(|b| *b == b'M').is_some_and(|at| bytes[at..].contains(&b'!'))
     }
@@ -235,7 +235,7 @@ mod tests {
             from.send_to(text.as_bytes(), &self.address).unwrap();
         }
 
-        /// What is heard of a datagram that surely comes.
+        /// Content of the next accepted datagram, which must arrive.
         fn heard(&mut self, wait: Duration) -> Option<String> {
             let mut into = [0; READ_BYTES];
             let read = self.line.read_device(wait, &mut into, &mut self.senders, &is_valid).unwrap();
@@ -268,7 +268,7 @@ mod tests {
     }
 
     #[test]
-    fn the_first_valid_sender_is_heard_alone_and_commands_go_to_it() {
+    fn first_valid_sender_is_pinned_and_gets_the_commands() {
         let (mut place, device, stranger) = (Place::new(""), sender(), sender());
         place.tell(&stranger, "x");
         assert_eq!(place.heard(WAIT), None);
@@ -285,13 +285,13 @@ mod tests {
         assert_eq!(place.heard(WAIT).unwrap(), "in any way");
         let strangers = &place.senders.strangers;
         let name = stranger.local_addr().unwrap();
-        assert_eq!((strangers.messages(), strangers.words().unwrap()), (3, format!("not believed: {name}")));
+        assert_eq!((strangers.messages(), strangers.words().unwrap()), (3, format!("ignored: {name}")));
         stranger.set_read_timeout(Some(NONE)).unwrap();
         assert!(stranger.recv(&mut [0; 64]).is_err(), "something was sent to a stranger");
     }
 
     #[test]
-    fn a_device_whose_frames_come_in_parts_is_known_by_them_together_whatever_others_send_between() {
+    fn device_with_split_frames_is_accepted_despite_other_senders() {
         let (mut place, device, stranger) = (Place::new(""), sender(), sender());
         for (from, text) in [(&device, "..M"), (&stranger, "M"), (&device, "1"), (&stranger, "2")] {
             place.tell(from, text);
@@ -303,7 +303,7 @@ mod tests {
     }
 
     #[test]
-    fn a_device_may_come_back_from_another_port_of_its_address() {
+    fn device_may_return_from_another_port_of_its_address() {
         let (mut place, device) = (Place::new(""), sender());
         place.tell(&device, "M1!");
         assert!(place.heard(WAIT).is_some());
@@ -319,7 +319,7 @@ mod tests {
     }
 
     #[test]
-    fn a_configured_sender_is_the_only_one() {
+    fn configured_sender_is_the_only_one_accepted() {
         let device = sender();
         let mut place = Place::new(&device.local_addr().unwrap().to_string());
         let stranger = sender();
@@ -338,7 +338,7 @@ mod tests {
     }
 
     #[test]
-    fn any_number_of_strangers_is_endured() {
+    fn any_number_of_strangers_is_handled() {
         let (mut place, device) = (Place::new(""), sender());
         for _ in 0..3 * MAX_CANDIDATES {
             place.tell(&sender(), "M");

@@ -12,9 +12,9 @@ use crate::order::Order;
 use crate::{Clock, Entry, Format, ImportError, Input, Source as _, Step, Told};
 
 const MAGIC: &[u8] = b"#ROSBAG V2.0\n";
-/// More than the names and numbers of a header need, bytes.
+/// Upper bound on the length of a header, bytes.
 const MOST_HEADER: usize = 1 << 16;
-/// Most bytes of the definitions at the end of a bag, which are read at once.
+/// Maximum number of bytes of the definitions at the end of a bag, which are read at once.
 const MOST_INDEX: u64 = 64 << 20;
 /// Times below this, in 2001, are not UTC.
 pub(super) const FIRST_UTC_NS: u64 = 1_000_000_000_000_000_000;
@@ -60,7 +60,7 @@ struct Record<'a> {
     len: usize,
 }
 
-/// Kind of a record.
+/// Kind of an accepted record.
 enum Accepted<'a> {
     /// A record without further content.
     Read,
@@ -68,7 +68,7 @@ enum Accepted<'a> {
     Chunk(&'a [u8]),
 }
 
-/// Why a record can't be read.
+/// Reason why a record can't be read.
 enum Stop<'a> {
     /// It is incomplete: its fields and the available part of its data, if the fields are complete.
     More(Option<(Fields<'a>, &'a [u8])>),
@@ -136,7 +136,7 @@ fn record(front: &[u8]) -> Result<Record<'_>, Stop<'_>> {
         len.map(|len| usize::try_from(len).unwrap_or(usize::MAX))
     };
     let header_len = length(front).ok_or(Stop::More(None))?;
-    // The shortest has only its kind: a length, `op=` and a byte.
+    // The shortest header has only its kind: a length, `op=` and a byte.
     if !(8..=MOST_HEADER).contains(&header_len) {
         return Err(Stop::Bad);
     }
@@ -212,10 +212,10 @@ impl Format for Bag {
         }
         if let Some(Stated { index_at, chunks, .. }) = self.stated {
             if index_at == 0 {
-                told.losses.push("the bag was not closed, so that its end may be missing".to_owned());
+                told.losses.push("the bag was not closed; its end may be missing".to_owned());
             } else if self.chunks != u64::from(chunks) {
                 let found = self.chunks;
-                told.losses.push(format!("the bag says that it has {chunks} chunks; there are {found}"));
+                told.losses.push(format!("the bag states {chunks} chunks; it has {found}"));
             }
         }
         told
@@ -223,14 +223,14 @@ impl Format for Bag {
 }
 
 impl Bag {
-    /// A bag whose messages go to `feeds`.
+    /// Creates a bag whose messages go to `feeds`.
     pub fn new(feeds: Feeds) -> Self {
         Self { feeds, ..Self::default() }
     }
 
-    /// The topics of a bag: from its index, or else by a scan of the whole bag.
+    /// Reads the topics of a bag from its index, or else by a scan of the whole bag.
     ///
-    /// Errors: the file can't be read, or is no bag.
+    /// Errors: the file can't be read, or isn't a bag.
     pub fn topics<R: Read + Seek>(name: &str, mut file: R) -> Result<Vec<Topic>, ImportError> {
         let failed = |source| ImportError::Read { name: name.to_owned(), offset: 0, source };
         let mut front = Vec::new();
@@ -292,7 +292,7 @@ impl Bag {
         })
     }
 
-    /// Processes a record. `None` if it lacks a required field of its kind.
+    /// Processes a record. `None` if a required field of its kind is missing.
     fn accept<'a>(&mut self, fields: Fields<'a>, data: &[u8], out: &mut Vec<Entry>) -> Option<Accepted<'a>> {
         match fields.u8(b"op")? {
             2 => self.message(fields.u32(b"conn")?, fields.time_ns(b"time")?, data, out),
@@ -310,12 +310,12 @@ impl Bag {
         let md5 = data.text(b"md5sum").unwrap_or_else(|| "*".to_owned());
         let known = match Type::named(&type_name) {
             Some(known) if known.is_defined_as(&md5) => Ok(known),
-            Some(_) => Err(format!("its {type_name} is defined otherwise (MD5 {md5}) than ROS has it")),
-            None => Err(format!("messages of type {type_name} aren't known")),
+            Some(_) => Err(format!("its definition of {type_name} (MD5 {md5}) differs from that of ROS")),
+            None => Err(format!("messages of type {type_name} aren't supported")),
         };
         let topic = Topic { name, type_name, known };
         if *self.connections.entry(number).or_insert_with(|| topic.clone()) != topic {
-            let what = "connections that are defined a second time, otherwise: the first holds";
+            let what = "connections with a second, different definition: the first is used";
             *self.lost.entry(what).or_default() += 1;
         }
         Some(())
@@ -323,8 +323,7 @@ impl Bag {
 
     fn message(&mut self, connection: u32, record_ns: u64, data: &[u8], out: &mut Vec<Entry>) {
         let Some(topic) = self.connections.get(&connection) else {
-            *self.lost.entry("messages of a connection that is defined nowhere before them").or_default() +=
-                1;
+            *self.lost.entry("messages of a connection without an earlier definition").or_default() += 1;
             return;
         };
         self.first_ns = Some(self.first_ns.map_or(record_ns, |first_ns| first_ns.min(record_ns)));
@@ -352,13 +351,13 @@ impl Bag {
                 // A chunk contains no chunks.
                 let taken = fields.u8(b"op") != Some(5) && self.accept(fields, data, out).is_some();
                 if !taken {
-                    *self.lost.entry("records in chunks that can't be there").or_default() += 1;
+                    *self.lost.entry("records in chunks that no chunk may contain").or_default() += 1;
                 }
                 chunk.at += len;
             }
             Err(Stop::More(_)) if chunk.step == Step::More => return Step::More,
             Err(_) => {
-                *self.lost.entry("chunks whose rest is no record").or_default() += 1;
+                *self.lost.entry("chunks that end in bytes that aren't a record").or_default() += 1;
                 return chunk.step;
             }
         }

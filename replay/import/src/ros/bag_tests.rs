@@ -1,4 +1,4 @@
-//! Tests with bags written here.
+//! Tests with generated bags.
 
 use std::io::Cursor;
 
@@ -51,7 +51,7 @@ fn bag(chunks: &[Vec<u8>], index: &[Vec<u8>]) -> Vec<u8> {
     [header(at), chunks.concat(), index.concat()].concat()
 }
 
-/// Entries that no sensor takes, and the final report.
+/// Number of entries for no sensor, and the final report.
 fn read(file: &[u8]) -> (usize, Vec<String>) {
     let mut input = Input::new("bag", Cursor::new(file.to_vec()), Bag::default());
     let (mut order, mut count) = (Order::default(), 0);
@@ -68,7 +68,7 @@ fn three() -> [Vec<u8>; 2] {
 }
 
 #[test]
-fn a_bag_is_read_and_its_topics_are_known_by_its_index() {
+fn bag_is_read_and_its_index_gives_the_topics() {
     let file = bag(&three(), &[connection(0, "/a")]);
     assert_eq!(read(&file), (3, Vec::new()));
     let topics = Bag::topics("bag", Cursor::new(&file)).unwrap();
@@ -81,30 +81,32 @@ fn a_bag_is_read_and_its_topics_are_known_by_its_index() {
 }
 
 #[test]
-fn damage_costs_its_chunk_and_is_named() {
+fn damage_loses_only_its_chunk_and_is_named() {
     let [first, second] = three();
     let mut broken = second.clone();
     let at = broken.windows(4).position(|window| window == b"none").unwrap();
     broken[at..at + 4].copy_from_slice(b"zstd");
     let (count, losses) = read(&bag(&[first.clone(), broken], &[]));
     assert_eq!(count, 2);
-    assert!(losses[0].contains("packed in a way that isn't known"), "{losses:?}");
+    assert!(losses[0].contains("with an unknown compression"), "{losses:?}");
     let garbage = [bag(std::slice::from_ref(&first), &[]), vec![0xEE; 30], second].concat();
     let (count, losses) = read(&garbage);
     assert_eq!(count, 3);
     assert!(losses[0].contains("no record of a bag: 1 times, 30 bytes"), "{losses:?}");
-    assert!(losses[1].contains("says that it has 1 chunks; there are 2"), "{losses:?}");
+    assert!(losses[1].contains("states 1 chunks; it has 2"), "{losses:?}");
     let wild = [chunk(&[vec![9; 20]]), chunk(&[chunk(&[])]), chunk(&[message(7, 1)])];
     let said = read(&bag(&wild, &[])).1.join("; ");
-    for words in
-        ["whose rest is no record", "records in chunks that can't be there", "defined nowhere before them"]
-    {
+    for words in [
+        "bytes that aren't a record",
+        "records in chunks that no chunk may contain",
+        "without an earlier definition",
+    ] {
         assert!(said.contains(words), "{words}: {said}");
     }
 }
 
 #[test]
-fn a_bag_cut_anywhere_gives_the_messages_before_the_cut() {
+fn bag_cut_anywhere_delivers_messages_before_the_cut() {
     let file = bag(&three(), &[connection(0, "/a")]);
     let mut before = 0;
     for cut in MAGIC.len()..file.len() {
@@ -118,7 +120,7 @@ fn a_bag_cut_anywhere_gives_the_messages_before_the_cut() {
 
 proptest! {
     #[test]
-    fn any_bytes_are_taken_or_lost(
+    fn any_bytes_are_parsed_or_counted_as_lost(
         bytes in proptest::collection::vec(any::<u8>(), 0..600),
         at in 0_usize..400,
     ) {

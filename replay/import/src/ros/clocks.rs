@@ -1,23 +1,23 @@
-//! Header timestamps of messages compared with the record times.
+//! Compares the header timestamps of messages with the record times.
 
-/// Timestamps later than the record time by more than this are of another clock.
+/// A timestamp later than the record time by more than this comes from another clock.
 const AHEAD_NS: i64 = 5_000_000;
-/// Greatest recording delay of messages from a computer whose clock is synchronised to ours.
+/// Greatest recording delay of messages from a computer with a synchronised clock.
 const LATE_NS: i64 = 1_000_000_000;
 /// Greatest variation of that delay.
 const VARIES_NS: i64 = 500_000_000;
-/// From this offset on, the clock has another epoch rather than an error.
+/// Offset above which the clock has another epoch rather than an error.
 const OTHER_BASE_NS: i64 = 3_600_000_000_000;
-/// A followed timestamp that is off by more than this restarts the offset.
+/// Deviation of a followed timestamp above which the offset restarts.
 const ASTRAY_NS: i64 = 10_000_000_000;
 
 /// Source of the time of a message's values.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub(super) enum Base {
-    /// When it was recorded.
+    /// The time of recording.
     #[default]
     Record,
-    /// The stamp in its header.
+    /// The timestamp in its header.
     Header,
 }
 
@@ -42,7 +42,7 @@ impl Clocks {
         Self { base, ..Self::default() }
     }
 
-    /// The time of a message's values, and whether it is from the timestamp.
+    /// The time of a message's values, and whether it comes from the timestamp.
     pub(super) fn time(&mut self, record_ns: u64, stamp_ns: Option<u64>) -> (u64, bool) {
         self.messages += 1;
         let Some(stamp_ns) = stamp_ns.filter(|stamp_ns| *stamp_ns > 0) else {
@@ -77,33 +77,30 @@ impl Clocks {
         if self.unstamped > 0 && (followed || self.unstamped < self.messages) {
             let (unstamped, messages) = (self.unstamped, self.messages);
             all.push(format!(
-                "{unstamped} of {messages} messages have no header stamp; theirs is the time of the record"
+                "{unstamped} of {messages} messages have no header stamp; they get their time of recording"
             ));
         }
         let Some((least, most)) = self.lag_ns else { return all };
         let done = match self.moved_ns {
-            Some(0) => "they are followed as they are".to_owned(),
-            Some(moved) => format!("they are followed, moved by {} s", seconds(moved)),
-            None => "the times of the record are taken".to_owned(),
+            Some(0) => "they are used unchanged".to_owned(),
+            Some(moved) => format!("they are used, shifted by {} s", seconds(moved)),
+            None => "the times of recording are used".to_owned(),
         };
         let problem = if least.abs() > OTHER_BASE_NS || most.abs() > OTHER_BASE_NS {
-            Some(format!(
-                "header stamps are on another time base, {} s before the record",
-                range(least, most)
-            ))
+            Some(format!("header stamps are on another time base, {} s before recording", range(least, most)))
         } else if least < -AHEAD_NS {
             Some(format!(
-                "header stamps are up to {} s later than the record: another clock, not set by it",
+                "header stamps are up to {} s later than recording: they come from another clock",
                 seconds(-least)
             ))
         } else if most - least > VARIES_NS {
             Some(format!(
-                "header stamps are {} s before the record: messages came late, or the clock isn't set by it",
+                "header stamps are {} s before recording: messages came late, or from another clock",
                 range(least, most)
             ))
         } else if most > LATE_NS {
             Some(format!(
-                "header stamps are {} s before the record: another clock, not set by it",
+                "header stamps are {} s before recording: they come from another clock",
                 range(least, most)
             ))
         } else {
@@ -115,7 +112,7 @@ impl Clocks {
         }
         if self.anew > 0 {
             all.push(format!(
-                "header stamps jump by over 10 s against the record {} times, and are moved anew",
+                "header stamps jump by over 10 s against recording {} times, and get a new shift each time",
                 self.anew
             ));
         }
@@ -125,7 +122,7 @@ impl Clocks {
 
 fn difference(one_ns: u64, other_ns: u64) -> i64 {
     let difference = i128::from(one_ns) - i128::from(other_ns);
-    // Half of what there is, so that two can be subtracted.
+    // Limited to half the range, so that two values can be subtracted.
     let most = i128::from(i64::MAX / 2);
     i64::try_from(difference.clamp(-most, most)).unwrap_or_default()
 }
@@ -152,36 +149,38 @@ mod tests {
     }
 
     #[test]
-    fn stamps_that_agree_need_no_words() {
+    fn agreeing_stamps_give_no_findings() {
         let (times, said) = words(Base::Record, &[(1000 * S, 1000 * S - 3), (1001 * S, 1001 * S - 900)]);
         assert_eq!((times, said.as_str()), (vec![1000 * S, 1001 * S], ""));
         assert_eq!(words(Base::Header, &[(1000 * S, 1000 * S - 3)]).0, [1000 * S - 3]);
     }
 
     #[test]
-    fn another_time_base_is_named_and_moved() {
+    fn another_time_base_is_named_and_shifted() {
         let pairs = [(50_000 * S, 10 * S), (50_001 * S, 10 * S + 900_000_000)];
         let (times, said) = words(Base::Record, &pairs);
         assert_eq!(times, [50_000 * S, 50_001 * S]);
         assert!(said.contains("another time base, 49990.000 to 49990.100 s before"), "{said}");
-        assert!(said.contains("the times of the record are taken"), "{said}");
+        assert!(said.contains("the times of recording are used"), "{said}");
         let (times, said) = words(Base::Header, &pairs);
         assert_eq!(times, [50_000 * S, 50_000 * S + 900_000_000]);
-        assert!(said.contains("moved by 49990.000 s"), "{said}");
+        assert!(said.contains("shifted by 49990.000 s"), "{said}");
     }
 
     #[test]
-    fn clocks_that_are_off_are_named() {
+    fn clock_offsets_are_named() {
         assert!(words(Base::Record, &[(10 * S, 11 * S)]).1.contains("up to 1.000 s later"));
         assert!(
-            words(Base::Record, &[(10 * S, 8 * S)]).1.contains("2.000 s before the record: another clock")
+            words(Base::Record, &[(10 * S, 8 * S)])
+                .1
+                .contains("2.000 s before recording: they come from another clock")
         );
         assert!(words(Base::Record, &[(10 * S, 10 * S), (20 * S, 19 * S)]).1.contains("came late"));
         assert!(words(Base::Record, &[(10 * S, 9 * S), (11 * S, 8 * S)]).1.contains("go back 1 times"));
         let (times, said) =
             words(Base::Header, &[(100 * S, 100 * S), (101 * S, 501 * S), (102 * S, 502 * S)]);
         assert_eq!(times, [100 * S, 101 * S, 102 * S]);
-        assert!(said.contains("jump by over 10 s against the record 1 times"), "{said}");
+        assert!(said.contains("jump by over 10 s against recording 1 times"), "{said}");
         let mut clocks = Clocks::new(Base::Header);
         assert_eq!(clocks.time(5, Some(0)), (5, false));
         assert!(clocks.words()[0].contains("no header stamp"));

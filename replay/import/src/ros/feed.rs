@@ -16,7 +16,7 @@ use crate::{Entry, Told};
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Manner {
     pub(super) base: Base,
-    /// For pressures and lengths: size of their unit in ours.
+    /// For pressures and lengths: factor of their unit to SI.
     pub(super) unit: f64,
     pub(super) plane: Plane,
 }
@@ -27,7 +27,7 @@ impl Default for Manner {
     }
 }
 
-/// Takes the messages of a topic.
+/// Converts the messages of a topic.
 pub(super) struct Feed {
     of: Type,
     sensor: EmulatedSensor,
@@ -100,7 +100,7 @@ impl Feed {
                 self.inertia(*wxyz, *rate_radps, *force_mps2)?
             }
             Values::Range(range_m) => Value::Range(*range_m),
-            Values::Scalar(value) if !value.is_finite() => return Err("whose value is no number"),
+            Values::Scalar(value) if !value.is_finite() => return Err("whose value isn't a number"),
             Values::Scalar(value) if self.of == Type::FluidPressure => {
                 let pressure_pa = value * self.manner.unit;
                 self.highest_pa = self.highest_pa.max(pressure_pa);
@@ -110,12 +110,12 @@ impl Feed {
             Values::Velocity(velocity) if velocity.iter().all(|part| part.is_finite()) => {
                 Value::Velocity(*velocity)
             }
-            Values::Velocity(_) => return Err("whose value is no number"),
+            Values::Velocity(_) => return Err("whose value isn't a number"),
         };
         self.say((at_ns, stamped), &value, out)
     }
 
-    /// Missing parts are omitted, as long as there is at least one.
+    /// Converts an inertial message. Missing parts are omitted, but at least one must be present.
     fn inertia(
         &mut self,
         wxyz: Option<[f64; 4]>,
@@ -132,7 +132,7 @@ impl Feed {
                 let [w, x, y, z] = wxyz;
                 Rot::from_wxyz(w, x, y, z).unwrap_or_else(nowhere)
             }
-            Some(_) => return Err("whose orientation is no unit quaternion"),
+            Some(_) => return Err("whose orientation isn't a unit quaternion"),
             None => nowhere(),
         };
         for (missing, what) in [
@@ -150,22 +150,25 @@ impl Feed {
         Ok(Value::Inertia(attitude, rate.unwrap_or(unknown), force.unwrap_or(unknown)))
     }
 
-    /// A message's beams. It is recorded when the last of them is measured; its timestamp is that of the first.
+    /// Converts a message's beams.
+    ///
+    /// The message is recorded when the last beam has been measured; its timestamp is that of the first.
     fn beams(&mut self, beams: &Beams, at: (u64, bool), out: &mut Vec<Entry>) -> Result<(), &'static str> {
         let told = beams.told(self.manner.plane)?;
-        for (count, what) in [(told.nowhere, "points that are nowhere: nothing heard, no angle known")] {
+        for (count, what) in [(told.nowhere, "points without a position: no echo, at an unknown angle")] {
             if count > 0 {
                 *self.noted.entry(what).or_default() += count;
             }
         }
         if told.off_plane > 0 {
-            *self.lost.entry("points outside the plane that the beam turns in (`plane`)").or_default() +=
+            *self.lost.entry("points outside the beam's plane of rotation (`plane`)").or_default() +=
                 told.off_plane;
         }
         let last_s = told.beams.last().map_or(0.0, |beam| beam.after_s);
         let first_s = told.beams.first().map_or(0.0, |beam| beam.after_s);
         if told.beams.len() > 1 && last_s <= first_s {
-            *self.noted.entry("of several beams without times: all are given one").or_default() += 1;
+            *self.noted.entry("with several beams and no times: all beams get the same time").or_default() +=
+                1;
         }
         let mut unsaid = 0_u64;
         let mut beyond = 0_u64;
@@ -179,11 +182,12 @@ impl Feed {
         if beyond > 0 {
             *self.lost.entry(BEYOND).or_default() += beyond;
         }
-        if unsaid > 0 { Err("with beams that the sensor can't say") } else { Ok(()) }
+        if unsaid > 0 { Err("with beams that the sensor can't encode") } else { Ok(()) }
     }
 
-    /// Encodes a value. Values with a timestamp are received after the sensor's delays; those without when they
-    /// were recorded.
+    /// Encodes a value.
+    ///
+    /// Values with a timestamp are received after the sensor's delays; those without, at the time of recording.
     fn say(
         &mut self,
         (at_ns, stamped): (u64, bool),
@@ -195,7 +199,7 @@ impl Feed {
             let stamp_ns = if stamped { received.0 } else { at_ns };
             out.push(Entry { stamp_ns, stream: stream.clone(), bytes: bytes.to_vec() });
         });
-        if said { Ok(()) } else { Err("with values that the sensor can't say") }
+        if said { Ok(()) } else { Err("with values that the sensor can't encode") }
     }
 
     /// Reports losses and remarks.
@@ -216,7 +220,7 @@ impl Feed {
             let (count, first) = (self.other_frames, self.frame_id.as_deref().unwrap_or_default());
             let first = String::from_utf8_lossy(first);
             remark(format!(
-                "{count} messages are of another frame than the first, {first:?}; the vehicle file has one mount for all"
+                "{count} messages have another frame than the first, {first:?}; the vehicle file has one mount for all"
             ));
         }
         let upward_mps2 = self.upward_mps2 / self.taken.max(1) as f64;
@@ -229,13 +233,13 @@ impl Feed {
         if self.of == Type::FluidPressure && self.taken > 0 && self.highest_pa < LEAST_PA {
             let highest_pa = self.highest_pa;
             remark(format!(
-                "no pressure is above {highest_pa:.1} Pa, less than that of the air; `unit` of a mapping says what they are in"
+                "no pressure is above {highest_pa:.1} Pa, which is less than air pressure; set `unit` in the mapping"
             ));
         }
     }
 }
 
-/// The unit that a reason counts: messages, unless it begins with another.
+/// The unit counted by a reason: messages, unless the reason begins with another unit.
 fn messages(why: &str) -> &'static str {
     if why.starts_with("points") || why.starts_with("ranges") { "" } else { "messages " }
 }

@@ -1,4 +1,4 @@
-//! Assigns topics to sensors: by a mapping, or where the choice is unique.
+//! Assigns topics to sensors: by a mapping, or if the choice is unique.
 
 use headrace_config::{ConfigError, Section};
 use headrace_sensor::device::Sense;
@@ -12,7 +12,7 @@ use super::{Feeds, Topic};
 use crate::csv::{LENGTH, PRESSURE};
 use crate::emulated::EmulatedSensor;
 
-/// Why topics and sensors can't be matched.
+/// Topics and sensors can't be matched.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum MatchError {
@@ -21,10 +21,10 @@ pub enum MatchError {
     Mapping(#[from] ConfigError),
     /// Several assignments are possible.
     #[error(
-        "which {sense} is which? topics {topics}, sensors {sensors}; --map MAPPING.toml says which topic is of which sensor"
+        "can't tell which {sense} sends which topic: topics {topics}, sensors {sensors}; assign them with --map MAPPING.toml"
     )]
     Several {
-        /// What they sense.
+        /// The kind of measurement.
         sense: &'static str,
         /// The topics.
         topics: String,
@@ -32,7 +32,7 @@ pub enum MatchError {
         sensors: String,
     },
     /// No assignment is possible.
-    #[error("no topic is of a sensor of the vehicle file: topics {topics}; sensors {sensors}")]
+    #[error("no topic belongs to a sensor of the vehicle file: topics {topics}; sensors {sensors}")]
     None {
         /// The topics, their types, and their problems.
         topics: String,
@@ -43,11 +43,13 @@ pub enum MatchError {
 
 const SENSES: [Sense; 5] = [Sense::Head, Sense::Echosounder, Sense::Depth, Sense::Inertial, Sense::Velocity];
 
-/// Most topics listed in an error; a recording may have hundreds.
+/// Maximum number of topics listed in an error; a recording may have hundreds.
 const MOST_SHOWN: usize = 20;
 
 impl Feeds {
-    /// Without a mapping: a sensor and a topic of a fitting type are matched where each is the only one of its kind.
+    /// Assigns topics without a mapping.
+    ///
+    /// A sensor and a topic of a fitting type are matched if each is the only one of its kind.
     ///
     /// Errors: several of a kind, or none.
     pub fn matching(vehicle: &VehicleConfig, topics: &[Topic]) -> Result<Self, MatchError> {
@@ -63,7 +65,7 @@ impl Feeds {
                 ([topic], [(id, device)]) => {
                     let Some(of) = topic.of() else { continue };
                     let sensor = EmulatedSensor::new(id, *device, vehicle);
-                    feeds.matched.push(format!("{} ({}) is taken for {id}", topic.name, topic.type_name));
+                    feeds.matched.push(format!("{} ({}) is assigned to {id}", topic.name, topic.type_name));
                     feeds.by_topic.insert(topic.name.clone(), Feed::new(of, sensor, Manner::default()));
                 }
                 (topics, sensors) => {
@@ -86,7 +88,7 @@ impl Feeds {
         Ok(feeds)
     }
 
-    /// By a mapping only.
+    /// Assigns topics by a mapping only.
     ///
     /// Errors: a key with an invalid value, an unknown sensor or topic, or a sensor and topic of different kinds.
     pub fn mapped(
@@ -97,9 +99,7 @@ impl Feeds {
         let mut feeds = Self::default();
         let sections = mapping.sections("topics")?;
         if sections.is_empty() {
-            return Err(mapping
-                .invalid("topics", "is missing; it says which topic is of which sensor")
-                .into());
+            return Err(mapping.invalid("topics", "is missing; it assigns topics to sensors").into());
         }
         for section in sections {
             let (topic, feed) = feed(&section, vehicle, topics)?;
@@ -124,7 +124,7 @@ fn feed(
 ) -> Result<(String, Feed), MatchError> {
     let name = section.required("topic", section.text("topic")?)?;
     let Some(topic) = topics.iter().find(|topic| topic.name == name) else {
-        let problem = format!("is no topic of the file; there are {}", shown(topics.iter()));
+        let problem = format!("isn't a topic of the file, which has {}", shown(topics.iter()));
         return Err(section.invalid("topic", &problem).into());
     };
     let of = match &topic.known {
@@ -135,7 +135,7 @@ fn feed(
     let sensor = EmulatedSensor::named(section, vehicle, &id)?;
     if sensor.sense != of.sense() {
         let (is, wants) = (sensor.sense.as_str(), of.sense().as_str());
-        let problem = format!("is a {is}, and a topic of {} is that of a {wants}", topic.type_name);
+        let problem = format!("is a {is}, but a topic of {} belongs to a {wants}", topic.type_name);
         return Err(section.invalid("sensor", &problem).into());
     }
     let base = section.choice("time", &[("record", Base::Record), ("header", Base::Header)])?;

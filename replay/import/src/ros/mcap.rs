@@ -1,6 +1,6 @@
-//! Recordings of ROS 2 in MCAP; also those of ROS 1 converted to MCAP.
+//! Recordings of ROS 2 in MCAP, and those of ROS 1 converted to MCAP.
 //!
-//! Sources: MCAP format specification and its "well-known" profiles and encodings; the log reader has the rest.
+//! Sources: MCAP format specification and its "well-known" profiles and encodings. The log reader parses MCAP itself.
 
 use std::collections::BTreeMap;
 use std::io::{Read, Seek};
@@ -25,9 +25,9 @@ pub struct Mcap<R> {
     feeds: Feeds,
     found: Vec<Entry>,
     first_ns: Option<u64>,
-    /// Messages that its summary states; `None` where it states none.
+    /// Number of messages stated in its summary; `None` if the summary doesn't state it.
     stated: Option<u64>,
-    /// Messages read.
+    /// Number of messages read.
     read: u64,
     is_at_end: bool,
 }
@@ -35,11 +35,11 @@ pub struct Mcap<R> {
 impl<R: Read + Seek> Mcap<R> {
     /// Opens a recording.
     ///
-    /// Errors: the file can't be read, is no MCAP, or is a dive log.
+    /// Errors: the file can't be read, isn't MCAP, or is a dive log.
     pub fn open(name: &str, mut file: R) -> Result<Self, ImportError> {
         let failed = |source| ImportError::Read { name: name.to_owned(), offset: 0, source };
         let bytes = file.seek(std::io::SeekFrom::End(0)).map_err(failed)?;
-        // The reader tells what can't be read.
+        // The log reader reports anything unreadable.
         let stated = stated_messages(&mut file, bytes).ok().flatten();
         let reader = LogReader::new(file, name.to_owned())?;
         if reader.header().metadata.contains_key(FORMAT_KEY) {
@@ -82,8 +82,8 @@ fn topic(channel: &ChannelInfo<'_>) -> (Topic, Encoding) {
     let (encoding, schema) = (channel.encoding, channel.schema.unwrap_or_default());
     let known = match (encoding, Type::named(schema)) {
         ("cdr" | "ros1", Some(known)) => Ok(known),
-        ("cdr" | "ros1", None) => Err(format!("messages of type {schema} aren't known")),
-        (encoding, _) => Err(format!("messages are encoded as {encoding:?}; cdr and ros1 are known")),
+        ("cdr" | "ros1", None) => Err(format!("messages of type {schema} aren't supported")),
+        (encoding, _) => Err(format!("messages are encoded as {encoding:?}; supported are cdr and ros1")),
     };
     let topic = Topic { name: channel.topic.to_owned(), type_name: schema.to_owned(), known };
     (topic, if encoding == "ros1" { Encoding::Ros1 } else { Encoding::Cdr })
@@ -136,7 +136,7 @@ impl<R: Read + Seek> Source for Mcap<R> {
         }
         if self.reader.late() > 0 {
             told.losses.push(format!(
-                "{} messages stand too late in the file to be put in order",
+                "{} messages come too late in the file to be put in order",
                 self.reader.late()
             ));
         }

@@ -1,4 +1,4 @@
-//! The known messages, and the sensor values taken from them.
+//! The known message types, and the sensor values taken from them.
 //!
 //! Sources: the .msg files of ROS' common_interfaces (sensor_msgs, geometry_msgs, std_msgs), REP 103 (axes and units),
 //! REP 117 (ranges), REP 145 (inertial units).
@@ -53,18 +53,18 @@ const TYPES: [(Type, &str, &str); 10] = [
 ];
 
 impl Type {
-    /// By its name, as ROS 1 or ROS 2 (`sensor_msgs/msg/Imu`) writes it.
+    /// Finds a type by its name, as written by ROS 1 or ROS 2 (`sensor_msgs/msg/Imu`).
     pub(super) fn named(name: &str) -> Option<Self> {
         let name = name.replacen("/msg/", "/", 1);
         TYPES.iter().find(|(_, known, _)| *known == name).map(|(known, ..)| *known)
     }
 
-    /// Whether a ROS 1 definition is the known one; `*` stands for an unknown definition.
+    /// Whether a ROS 1 definition is the known one; `*` means an unknown definition.
     pub(super) fn is_defined_as(self, md5: &str) -> bool {
         md5 == "*" || TYPES.iter().any(|(known, _, known_md5)| *known == self && *known_md5 == md5)
     }
 
-    /// Sensors that it may belong to.
+    /// Kind of sensor to which it may belong.
     pub(super) fn sense(self) -> Sense {
         match self {
             Self::Imu => Sense::Inertial,
@@ -76,7 +76,7 @@ impl Type {
         }
     }
 
-    /// Whether it identifies its quantity: a bare number may be anything.
+    /// Whether the type identifies its quantity: a bare number may be anything.
     pub(super) fn is_telling(self) -> bool {
         !matches!(self, Self::Float32 | Self::Float64)
     }
@@ -85,13 +85,13 @@ impl Type {
 /// A message's values, in its units and axes.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) enum Values {
-    /// Parts that the sender declares as missing are `None`.
+    /// Parts that the sender marks as missing are `None`.
     Inertial {
         wxyz: Option<[f64; 4]>,
         rate_radps: Option<[f64; 3]>,
         force_mps2: Option<[f64; 3]>,
     },
-    /// `None` without an echo.
+    /// A range; `None` without an echo.
     Range(Option<f64>),
     /// A pressure, or a length of cable: in the mapping's unit, by default SI.
     Scalar(f64),
@@ -99,7 +99,7 @@ pub(super) enum Values {
     Beams(Beams),
 }
 
-/// A message: its timestamp and frame where it has them, and its values.
+/// A message: its timestamp and frame if it has them, and its values.
 pub(super) struct Read<'a> {
     pub(super) header: Option<Header<'a>>,
     pub(super) values: Values,
@@ -111,9 +111,9 @@ pub(super) struct Read<'a> {
 pub(super) fn read(of: Type, encoding: Encoding, bytes: &[u8]) -> Result<Read<'_>, &'static str> {
     let mut wire = Wire::new(bytes, encoding).ok_or("in another encapsulation than plain CDR")?;
     let read =
-        fields(of, &mut wire).ok_or("shorter than their type says, or with a count that can't be")??;
+        fields(of, &mut wire).ok_or("shorter than their type requires, or with an impossible count")??;
     if !wire.is_done() {
-        return Err("longer than their type says");
+        return Err("longer than their type allows");
     }
     Ok(read)
 }
@@ -146,7 +146,7 @@ fn fields<'a>(of: Type, wire: &mut Wire<'a>) -> Option<Result<Read<'a>, &'static
     Some(Ok(Read { header, values }))
 }
 
-/// A covariance that begins with -1 marks a missing value.
+/// Parses an inertial message. A covariance that begins with -1 marks a missing value.
 fn inertial(wire: &mut Wire<'_>) -> Option<Values> {
     let [x, y, z, w] = wire.doubles()?;
     let told = |covariance: [f64; 9]| covariance.first().is_none_or(|first| !is_minus_one(*first));
@@ -184,7 +184,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn types_are_known_by_both_names() {
+    fn types_are_found_by_both_names() {
         assert_eq!(Type::named("sensor_msgs/Imu"), Some(Type::Imu));
         assert_eq!(Type::named("sensor_msgs/msg/LaserScan"), Some(Type::LaserScan));
         assert_eq!(Type::named("sensor_msgs/Image"), None);
@@ -192,7 +192,7 @@ mod tests {
     }
 
     #[test]
-    fn lengths_that_are_wrong_are_named() {
+    fn wrong_lengths_are_named() {
         let whole = [[0; 16].as_slice(), &[0; 37 * 8]].concat();
         assert!(read(Type::Imu, Encoding::Ros1, &whole).is_ok());
         assert!(read(Type::Imu, Encoding::Ros1, &whole[1..]).err().unwrap().contains("shorter"));

@@ -1,7 +1,7 @@
 //! Recordings of ROS: messages of known types become the bytes that sensors of the vehicle file would have sent.
 //!
-//! [`bag`] reads bags of ROS 1, [`mcap`] those of ROS 2. Both pass messages to [`Feeds`], which assigns topics to sensors by
-//! a mapping, or where the choice is unique.
+//! [`bag`] reads bags of ROS 1, [`mcap`] those of ROS 2. Both pass messages to [`Feeds`], which assigns topics to
+//! sensors by a mapping, or if the choice is unique.
 
 pub mod bag;
 mod clocks;
@@ -33,7 +33,7 @@ pub struct Topic {
     pub name: String,
     /// Name of its message type.
     pub type_name: String,
-    /// The type, if known and readable; else why not.
+    /// The type, if known and readable; otherwise the reason why not.
     pub known: Result<Type, String>,
 }
 
@@ -51,12 +51,12 @@ impl Feeds {
         &self.matched
     }
 
-    /// Greatest age of values at their message, ns: the beams of a head's whole turn come in one message.
+    /// Greatest age of values at their message, ns. The beams of a head's whole turn come in one message.
     pub(super) fn reach_ns(&self) -> u64 {
         if self.by_topic.values().any(Feed::is_of_head) { 40_000_000_000 } else { WINDOW_NS }
     }
 
-    /// Processes a message. Those of other topics, or of another type than their topic's, belong to no sensor.
+    /// Processes a message. Messages of other topics, or of another type than their topic's, belong to no sensor.
     pub(super) fn take(
         &mut self,
         topic: &Topic,
@@ -68,7 +68,7 @@ impl Feeds {
         let feed = self.by_topic.get_mut(&topic.name);
         match feed.filter(|feed| topic.known.as_ref().is_ok_and(|known| feed.is_of(*known))) {
             Some(feed) => feed.take(encoding, record_ns, bytes, out),
-            // Counted as not taken by any sensor.
+            // Counted as belonging to no sensor.
             None => out.push(Entry { stamp_ns: record_ns, stream: String::new(), bytes: Vec::new() }),
         }
     }

@@ -1,14 +1,15 @@
 //! Scans and point clouds of a profiling head as beams: angle, range and time.
 //!
-//! A scan turns about its own z, counted from x towards y. The head's x is that axis, its 0 (down, -z) the scan's x, its y the
-//! scan's y. A cloud's points are in the head's own frame, its beam in the plane of y and z, unless the mapping says `xy`.
+//! A scan turns about its own z axis, counted from x towards y. The head's x is that axis, the head's zero angle (down,
+//! -z) is the scan's x, and the head's y is the scan's y. A cloud's points are in the head's own frame with the beam in
+//! the plane of y and z, unless the mapping says `xy`.
 
 use headrace_geometry::math;
 
 use super::ranges::heard;
 use super::wire::Wire;
 
-/// More than the beams of any head's turn.
+/// Upper bound on the number of beams in a head's turn.
 const MOST_BEAMS: usize = 1 << 16;
 /// Longest time offset within a message, s.
 const LONGEST_S: f64 = 120.0;
@@ -38,31 +39,33 @@ pub(super) enum Plane {
 /// Beams in a message.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) enum Beams {
-    /// With given angles, not yet checked.
+    /// Beams with given angles, not checked yet.
     Turned(Vec<Beam>),
     /// Points, with time after the timestamp, s.
     Points(Vec<([f64; 3], f64)>),
 }
 
-/// Valid beams, and counts of the others.
+/// The valid beams, and counts of the others.
 #[derive(Debug, Default)]
 pub(super) struct Told {
-    /// In order of time.
+    /// Sorted by time.
     pub(super) beams: Vec<Beam>,
     /// Points outside the plane.
     pub(super) off_plane: u64,
-    /// Points that are NaN or at the origin: no echo, direction unknown.
+    /// Points that are NaN or at the origin: no echo in an unknown direction.
     pub(super) nowhere: u64,
 }
 
 impl Beams {
+    /// The valid beams in a head's axes.
+    ///
     /// Errors: as text, why they can't be a head's.
     pub(super) fn told(&self, plane: Plane) -> Result<Told, &'static str> {
         let mut told = Told::default();
         match self {
             Self::Turned(beams) => {
                 if beams.iter().any(|beam| !beam.angle_rad.is_finite() || beam.angle_rad.abs() > 1e3) {
-                    return Err("with angles that are none");
+                    return Err("with angles that aren't numbers");
                 }
                 told.beams.clone_from(beams);
             }
@@ -101,7 +104,7 @@ impl Told {
     }
 }
 
-/// sensor_msgs/LaserScan after its header.
+/// Parses a sensor_msgs/LaserScan after its header.
 pub(super) fn scan(wire: &mut Wire<'_>) -> Option<Beams> {
     let [first, _last, step, each_s, _scan_s, least, most] = wire.singles()?;
     let ranges = wire.single_sequence()?;
@@ -119,7 +122,7 @@ pub(super) fn scan(wire: &mut Wire<'_>) -> Option<Beams> {
     Some(Beams::Turned((0..).zip(&ranges).map(beam).collect()))
 }
 
-/// sensor_msgs/PointCloud after its header.
+/// Parses a sensor_msgs/PointCloud after its header.
 pub(super) fn points(wire: &mut Wire<'_>) -> Option<Beams> {
     let count = wire.count(12)?;
     let points = (0..count).map(|_| Some((wire.singles()?, 0.0))).collect::<Option<Vec<_>>>()?;
@@ -175,7 +178,7 @@ impl Field {
     }
 }
 
-/// The fields used, of those in a cloud.
+/// The fields of a cloud that are used.
 #[derive(Debug, Default)]
 struct Layout {
     place: [Option<Field>; 3],
@@ -183,7 +186,8 @@ struct Layout {
 }
 
 impl Layout {
-    /// Drivers of Ouster (`t`), Velodyne (`time`) and Hesai (`timestamp`) use these names for a point's time.
+    /// Adds a field. Drivers of Ouster (`t`), Velodyne (`time`) and Hesai (`timestamp`) use these names for a point's
+    /// time.
     fn add(&mut self, name: &[u8], offset: usize, datatype: u8) {
         let number = match datatype {
             6 => Number::U32,
@@ -218,7 +222,7 @@ impl Layout {
     }
 }
 
-/// sensor_msgs/PointCloud2 after its header.
+/// Parses a sensor_msgs/PointCloud2 after its header.
 pub(super) fn cloud(wire: &mut Wire<'_>, stamp_ns: u64) -> Option<Result<Beams, &'static str>> {
     let (height, width) = (usize::try_from(wire.u32()?).ok()?, usize::try_from(wire.u32()?).ok()?);
     let mut layout = Layout::default();
@@ -260,7 +264,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn points_come_back_as_the_head_would_point() {
+    fn points_give_the_beam_angles_of_the_head() {
         for quarter in -3_i32..=4 {
             let angle_rad = f64::from(quarter) * FRAC_PI_2 / 2.0;
             let at = head_direction(angle_rad).scaled(3.0);
@@ -268,14 +272,14 @@ mod tests {
             let beam = told.beams[0];
             assert!((beam.angle_rad - angle_rad).abs() < 1e-12, "{angle_rad}: {beam:?}");
             assert!((beam.range_m.unwrap() - 3.0).abs() < 1e-12);
-            // As seen by a scanner whose x is the head's 0 and whose y is the head's y.
+            // As seen by a scanner whose x is the head's zero angle and whose y is the head's y.
             let told = Beams::Points(vec![([-at.z(), at.y(), at.x()], 0.0)]).told(Plane::Xy).unwrap();
             assert!((told.beams[0].angle_rad - angle_rad).abs() < 1e-12);
         }
     }
 
     #[test]
-    fn points_that_no_beam_reaches_are_counted() {
+    fn points_outside_all_beams_are_counted() {
         let all = [[3.0, 0.0, 1.0], [0.0, f64::NAN, 1.0], [0.0; 3], [0.0, 1.0, 1.0]];
         let told = Beams::Points(all.map(|point| (point, 0.0)).to_vec()).told(Plane::Yz).unwrap();
         assert_eq!((told.beams.len(), told.off_plane, told.nowhere), (1, 1, 2));

@@ -1,7 +1,9 @@
 //! Interpretation of ranges.
 
-/// A range by REP 117: infinite if nothing was in range or a target was too near, NaN if not measured; beyond its
-/// limits it is invalid, provided the limits are valid.
+/// Interprets a range by REP 117; `None` if there was no echo.
+///
+/// A range is infinite if nothing was in range or a target was too near, and NaN if not measured. A range beyond its
+/// limits is invalid, provided the limits are valid.
 pub(super) fn heard(range_m: f64, least_m: f64, most_m: f64) -> Option<f64> {
     let limited = most_m > 0.0 && least_m <= most_m;
     let within = !limited || (least_m..=most_m).contains(&range_m);
@@ -13,7 +15,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn ranges_mean_what_rep_117_says() {
+    fn ranges_are_interpreted_by_rep_117() {
         assert_eq!(heard(2.0, 0.5, 5.0), Some(2.0));
         for none in [f64::INFINITY, f64::NEG_INFINITY, f64::NAN, 0.4, 5.1, 0.0, -1.0] {
             assert_eq!(heard(none, 0.5, 5.0), None, "{none}");

@@ -1,4 +1,4 @@
-//! Number of messages that an MCAP file states in its summary.
+//! Reads the number of messages that an MCAP file states in its summary.
 //!
 //! Source: MCAP format specification, "Footer" and "Statistics".
 
@@ -9,12 +9,12 @@ const FOOTER: u8 = 0x02;
 const FOOTER_BYTES: u64 = 20;
 /// Opcode and length of a record.
 const HEAD_BYTES: u64 = 9;
-/// The footer's record and the closing magic.
+/// Length of the footer's record and the closing magic, bytes.
 const END_BYTES: u64 = HEAD_BYTES + FOOTER_BYTES + 8;
-/// Most records of a summary that are passed over: a recording of a day has some thousands of chunks.
+/// Maximum number of records of a summary that are skipped; a recording of a day has some thousands of chunks.
 const MOST_RECORDS: usize = 100_000;
 
-/// Number of messages of a file of `bytes` bytes; `None` without a summary, or without statistics in it.
+/// Number of messages in a file of `bytes` bytes; `None` without a summary, or without statistics in it.
 ///
 /// Errors: the file can't be read.
 pub(super) fn stated_messages(file: &mut (impl Read + Seek), bytes: u64) -> Result<Option<u64>> {
@@ -72,7 +72,7 @@ mod tests {
     }
 
     #[test]
-    fn message_count_is_found_behind_other_records() {
+    fn message_count_is_found_after_other_records() {
         let statistics = record(STATISTICS, &[&1234_u64.to_le_bytes()[..], &[0; 38]].concat());
         let other = record(0x08, &[7; 100]);
         assert_eq!(stated(&[&other[..], &other, &statistics].concat(), 50), Some(1234));

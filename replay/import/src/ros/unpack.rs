@@ -2,7 +2,7 @@
 
 use std::io::Read;
 
-/// Largest unpacked size of a chunk, bytes; a recorder makes chunks of less than a megabyte plus one message.
+/// Largest unpacked size of a chunk, bytes. A recorder makes chunks of less than a megabyte plus one message.
 pub(super) const MOST_UNPACKED: usize = 64 << 20;
 
 /// An unpacked chunk.
@@ -10,7 +10,7 @@ pub(super) const MOST_UNPACKED: usize = 64 << 20;
 pub(super) enum Unpacked {
     /// All of it.
     Whole(Vec<u8>),
-    /// The available part of one truncated by the end of the file.
+    /// The available part of a chunk that the end of the file cuts off.
     Cut(Vec<u8>),
     /// Nothing, with the reason.
     Bad(&'static str),
@@ -21,22 +21,22 @@ pub(super) enum Unpacked {
 /// Source: ROS wiki, "Bags/Format/2.0": none, bz2, and lz4 as roslz4 writes it, in frames of LZ4.
 pub(super) fn unpack(packing: &[u8], packed: &[u8], size: u32, cut: bool) -> Unpacked {
     let Some(size) = usize::try_from(size).ok().filter(|size| *size <= MOST_UNPACKED) else {
-        return Unpacked::Bad("chunks that would take more than 64 MiB");
+        return Unpacked::Bad("chunks that would unpack to more than 64 MiB");
     };
     match packing {
         b"none" => judged(Ok(packed.to_vec()), size, cut),
         b"bz2" => read(bzip2::read::BzDecoder::new(packed), size, cut),
         b"lz4" => match lz4::Decoder::new(packed) {
             Ok(decoder) => read(decoder, size, cut),
-            Err(_) => Unpacked::Bad("chunks that don't unpack"),
+            Err(_) => Unpacked::Bad("chunks that can't be unpacked"),
         },
-        _ => Unpacked::Bad("chunks packed in a way that isn't known; none, bz2 and lz4 are"),
+        _ => Unpacked::Bad("chunks with an unknown compression; supported are none, bz2 and lz4"),
     }
 }
 
 fn read(reader: impl Read, size: usize, cut: bool) -> Unpacked {
     let mut unpacked = Vec::new();
-    // One byte more shows that it is longer than stated.
+    // One byte more than stated shows that the chunk is longer.
     let result = reader.take(size as u64 + 1).read_to_end(&mut unpacked);
     judged(if result.is_ok() { Ok(unpacked) } else { Err(unpacked) }, size, cut)
 }
@@ -45,8 +45,8 @@ fn judged(unpacked: Result<Vec<u8>, Vec<u8>>, size: usize, cut: bool) -> Unpacke
     match unpacked {
         Ok(bytes) | Err(bytes) if cut && bytes.len() <= size => Unpacked::Cut(bytes),
         Ok(bytes) if bytes.len() == size => Unpacked::Whole(bytes),
-        Ok(_) => Unpacked::Bad("chunks of another length than they say"),
-        Err(_) => Unpacked::Bad("chunks that don't unpack"),
+        Ok(_) => Unpacked::Bad("chunks of another length than stated"),
+        Err(_) => Unpacked::Bad("chunks that can't be unpacked"),
     }
 }
 
@@ -55,7 +55,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn lengths_are_held_to() {
+    fn stated_lengths_are_enforced() {
         assert_eq!(unpack(b"none", b"abc", 3, false), Unpacked::Whole(b"abc".to_vec()));
         assert!(matches!(unpack(b"none", b"abc", 4, false), Unpacked::Bad(_)));
         assert_eq!(unpack(b"none", b"abc", 4, true), Unpacked::Cut(b"abc".to_vec()));

@@ -12,7 +12,7 @@ pub enum Encoding {
     Cdr,
 }
 
-/// Most padding bytes after a message's last field.
+/// Maximum number of padding bytes after a message's last field.
 const MOST_PADDING: usize = 7;
 
 /// The rest of a message.
@@ -42,7 +42,7 @@ macro_rules! numbers {
 }
 
 impl<'a> Wire<'a> {
-    /// `None` if the encapsulation isn't plain CDR.
+    /// Starts at a message's beginning; `None` if the encapsulation isn't plain CDR.
     pub(super) fn new(message: &'a [u8], encoding: Encoding) -> Option<Self> {
         let (bytes, big_endian) = match (encoding, message) {
             (Encoding::Ros1, bytes) => (bytes, false),
@@ -54,7 +54,7 @@ impl<'a> Wire<'a> {
 
     numbers!(u8, u32, f32, f64);
 
-    /// Numbers of single precision, as doubles.
+    /// Reads numbers of single precision as doubles.
     pub(super) fn singles<const N: usize>(&mut self) -> Option<[f64; N]> {
         let mut all = [0.0; N];
         for one in &mut all {
@@ -71,7 +71,7 @@ impl<'a> Wire<'a> {
         Some(all)
     }
 
-    /// The count before a sequence whose elements take at least `element_bytes`; `None` if they can't fit.
+    /// Reads the count before a sequence whose elements take at least `element_bytes`; `None` if they can't fit.
     pub(super) fn count(&mut self, element_bytes: usize) -> Option<usize> {
         let count = usize::try_from(self.u32()?).ok()?;
         let most = (self.bytes.len() - self.at) / element_bytes.max(1);
@@ -83,13 +83,13 @@ impl<'a> Wire<'a> {
         (0..count).map(|_| self.f32()).collect()
     }
 
-    /// Length-prefixed bytes.
+    /// Reads length-prefixed bytes.
     pub(super) fn bytes(&mut self) -> Option<&'a [u8]> {
         let count = self.count(1)?;
         self.take(count)
     }
 
-    /// A text's bytes, without CDR's terminating zero.
+    /// Reads a text's bytes, without CDR's terminating zero.
     pub(super) fn text(&mut self) -> Option<&'a [u8]> {
         let text = self.bytes()?;
         Some(match self.encoding {
@@ -107,7 +107,7 @@ impl<'a> Wire<'a> {
         Some(Header { stamp_ns, frame_id: self.text()? })
     }
 
-    /// Whether everything but padding has been read; ROS 1 has no padding.
+    /// Whether everything except padding has been read; ROS 1 has no padding.
     pub(super) fn is_done(&self) -> bool {
         let left = self.bytes.len() - self.at;
         left == 0 || self.encoding == Encoding::Cdr && left <= MOST_PADDING
@@ -133,7 +133,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn cdr_aligns_from_behind_the_encapsulation() {
+    fn cdr_alignment_counts_from_after_the_encapsulation() {
         let bytes = [0, 1, 0, 0, 7, 0xAA, 0xAA, 0xAA, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0xF0, 0x3F];
         let mut wire = Wire::new(&bytes, Encoding::Cdr).unwrap();
         assert_eq!((wire.u8(), wire.u32(), wire.f64()), (Some(7), Some(1), Some(1.0)));
@@ -145,7 +145,7 @@ mod tests {
     }
 
     #[test]
-    fn counts_that_lie_take_no_memory() {
+    fn wrong_counts_take_no_memory() {
         let bytes = [0xFF, 0xFF, 0xFF, 0xFF, 1, 2, 3, 4];
         assert_eq!(Wire::new(&bytes, Encoding::Ros1).unwrap().single_sequence(), None);
         assert_eq!(Wire::new(&bytes, Encoding::Ros1).unwrap().text(), None);

@@ -1,4 +1,4 @@
-//! The formats on constructed and on arbitrary bytes.
+//! The formats with constructed and arbitrary bytes.
 
 use headrace_config::Document;
 use headrace_mavlink::MavHeader;
@@ -37,7 +37,7 @@ fn cut(format: &mut dyn Format, mut file: &[u8]) -> (Vec<Entry>, Vec<(usize, &'s
 }
 
 fn frame(sequence: u8) -> Vec<u8> {
-    // Its last field isn't zero, so no trailing bytes are truncated and all 28 are sent.
+    // The last field isn't zero, so no trailing bytes are truncated and all 28 are sent.
     let attitude = ATTITUDE_DATA { yawspeed: 1.0, ..ATTITUDE_DATA::DEFAULT };
     let frame = Message::Attitude(attitude).to_frame(MavHeader { system_id: 1, component_id: 1, sequence });
     frame.raw_bytes().to_vec()
@@ -78,7 +78,7 @@ fn shot(seconds: u8) -> Vec<u8> {
 }
 
 #[test]
-fn a_telemetry_log_gives_frames_and_finds_the_next_one_behind_damage() {
+fn telemetry_log_gives_frames_and_resynchronises_after_damage() {
     let (entries, lost, left) = cut(&mut TlogFormat::default(), &tlog(0..3));
     assert_eq!((entries.len(), lost.len(), left), (3, 0, 0));
     assert_eq!((entries[2].stamp_ns, &entries[2].bytes), (1_600_000_000_000_002_000, &frame(2)));
@@ -93,7 +93,7 @@ fn a_telemetry_log_gives_frames_and_finds_the_next_one_behind_damage() {
 }
 
 #[test]
-fn a_log_of_ping_viewer_gives_messages_past_midnight_too() {
+fn ping_viewer_log_gives_messages_across_midnight() {
     let file = ping_log(&[("23:59:59.999", b"one"), ("00:00:00.001\0", b"two")]);
     let (entries, lost, left) = cut(&mut PingFormat::default(), &file);
     let got: Vec<_> =
@@ -107,7 +107,7 @@ fn a_log_of_ping_viewer_gives_messages_past_midnight_too() {
 }
 
 #[test]
-fn shots_come_at_the_times_of_their_headers() {
+fn imagenex_shots_get_the_times_of_their_headers() {
     let mut file = [shot(10), shot(11), shot(12)].concat();
     let (entries, lost, left) = cut(&mut ImagenexFormat, &file);
     assert_eq!((entries.len(), lost.len(), left), (3, 0, 0));
@@ -120,7 +120,7 @@ fn shots_come_at_the_times_of_their_headers() {
 }
 
 #[test]
-fn a_table_s_values_are_on_the_wire_in_the_wire_s_units() {
+fn table_values_are_encoded_in_units_of_the_wire() {
     let vehicle = "target_m = 1\n[tunnel]\nprofile = \"circle\"\nradius_m = 3\nlength_m = 100\n\
         [[sensors]]\nid = \"d\"\nplugin = \"mavlink\"\npart = \"pressure\"\n";
     let mapping = "time_column = \"t\"\ntime_unit = \"ms\"\nseparator = \";\"\n[[columns]]\ncolumn = \"p\"\n\
@@ -141,7 +141,7 @@ fn a_table_s_values_are_on_the_wire_in_the_wire_s_units() {
 
 proptest! {
     #[test]
-    fn any_bytes_are_taken_or_lost(
+    fn any_bytes_are_parsed_or_counted_as_lost(
         bytes in proptest::collection::vec(any::<u8>(), 0..3000),
         which in 0_usize..3,
         at in 0_usize..400,
@@ -164,7 +164,7 @@ proptest! {
     }
 
     #[test]
-    fn any_table_is_taken_or_lost(
+    fn any_table_is_parsed_or_counted_as_lost(
         bytes in prop_oneof![
             proptest::collection::vec(any::<u8>(), 0..2000),
             "(-?[0-9e.]{0,22},[-0-9einaf.]{0,9},[0-9.]{0,3}\n?){0,40}".prop_map(String::into_bytes),

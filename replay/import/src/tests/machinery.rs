@@ -11,7 +11,8 @@ use crate::candump::Candump;
 use crate::input::READ_BYTES;
 use crate::*;
 
-/// Eight bytes each: u32 stamp in ms, 'E', stream, two bytes. 'X' in the fifth place is bad.
+/// A test format with entries of eight bytes: u32 stamp in ms, 'E', stream, two bytes. An 'X' in the fifth place is
+/// bad.
 struct Eights;
 
 impl Format for Eights {
@@ -95,7 +96,7 @@ fn entries_are_put_in_order_and_losses_counted() {
 }
 
 #[test]
-fn a_long_file_is_held_in_part_only() {
+fn long_file_is_held_only_in_part() {
     let file: Vec<u8> = (0..400_000).flat_map(|n: u32| eight(n, b'E', b'a', n.to_le_bytes()[0])).collect();
     let import = open(&file, Box::new(Eights)).unwrap();
     assert!(import.input.held.len() <= 2 * READ_BYTES);
@@ -113,7 +114,7 @@ fn a_file_without_entries_is_named() {
 }
 
 #[test]
-fn candump_loses_no_more_than_the_bad_line() {
+fn candump_loses_only_the_bad_line() {
     let text = "(1.0) can0 123#11\nnonsense\n\n(1.1) can0 123#22\n(1.2) can0 123#33";
     let mut import = open(text.as_bytes(), Box::new(Candump)).unwrap();
     let mut count = 0;
@@ -129,7 +130,7 @@ fn candump_loses_no_more_than_the_bad_line() {
 
 proptest! {
     #[test]
-    fn any_bytes_are_taken_or_lost(
+    fn any_bytes_are_parsed_or_counted_as_lost(
         bytes in prop_oneof![
             proptest::collection::vec(any::<u8>(), 0..2000),
             "(\\([0-9.]{0,12}\\) can[0-9] [0-9A-F]{0,9}#[0-9A-FR_.]{0,18}\n?){0,40}".prop_map(String::into_bytes),

@@ -1,4 +1,4 @@
-//! Messages that aren't certain yet: written since the last sync, or waiting for a medium that can be written to again.
+//! Messages that aren't synced yet: written since the last sync, or waiting until a medium is writable again.
 
 use std::collections::{BTreeMap, VecDeque};
 
@@ -8,7 +8,7 @@ use super::format::{RAW_PREFIX, SENT_PREFIX, TICK_TOPIC, Tick, VOICE_TOPIC};
 use super::part::Progress;
 use super::writer::{Lane, LogHeader};
 
-/// Most bytes kept: minutes of four heads.
+/// Maximum number of bytes kept, enough for minutes of four heads.
 const MAX_BYTES: usize = 16 << 20;
 
 /// A message without its bytes.
@@ -18,7 +18,7 @@ pub(super) struct Head {
     pub(super) log_time: MonoNs,
     pub(super) publish_time: MonoNs,
     pub(super) len: usize,
-    /// Index of the tick, of a message that is one.
+    /// Index of the tick, if the message is a tick.
     tick: Option<u64>,
 }
 
@@ -36,12 +36,12 @@ impl Backlog {
         self.data.extend(bytes);
     }
 
-    /// The oldest message, if there are more than may be kept.
+    /// Removes and returns the oldest message if the limit is exceeded.
     pub(super) fn overflow(&mut self) -> Option<Head> {
         if self.bytes() > MAX_BYTES { self.pop() } else { None }
     }
 
-    /// Drops the recordings of voice notes; returns them without their bytes.
+    /// Drops the recordings of voice notes and returns their heads.
     pub(super) fn drop_voices(&mut self) -> Vec<Head> {
         let (mut dropped, mut at) = (Vec::new(), 0);
         let Self { heads, data } = self;
@@ -95,7 +95,7 @@ impl Backlog {
     }
 }
 
-/// Totals of a recording's messages, in whatever part they are.
+/// Totals of a recording's messages, over all parts.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Tally {
     messages: u64,
@@ -114,7 +114,7 @@ impl Tally {
         self.last = Some(head.log_time);
     }
 
-    /// As a part states it.
+    /// The totals in the form in which a part states them.
     pub(super) fn progress(&self, header: &LogHeader) -> Progress {
         let source = |prefix: &str, number: u16| {
             header.sources.get(usize::from(number)).map(|source| format!("{prefix}{}", source.id))

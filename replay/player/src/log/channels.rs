@@ -12,7 +12,7 @@ use super::{Many, SourceInfo};
 /// Rank of the first channel that isn't raw; source numbers are u16.
 const OTHER_RANK: u32 = 1 << 16;
 
-/// What a channel carries.
+/// Content of a channel.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum ChannelKind {
     Raw(u16),
@@ -28,18 +28,18 @@ pub(super) enum ChannelKind {
 pub(super) struct Channel {
     pub(super) definition: Definition,
     pub(super) kind: ChannelKind,
-    /// Place among messages of the same time: raw by source, then the others by topic.
+    /// Sort rank among messages of the same time: raw messages by source, then the others by topic.
     pub(super) rank: u32,
 }
 
-/// What became of a channel's definition.
+/// Result of adding a channel's definition.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Admission {
-    /// It is known now.
+    /// Added, or known already.
     Known,
     /// It contradicts a known channel.
     Conflict,
-    /// There are too many of something.
+    /// Exceeds a limit.
     Beyond(Many),
 }
 
@@ -51,14 +51,14 @@ pub(super) struct Channels {
     others: u32,
     /// Memory of the definitions.
     budget: HeaderBudget,
-    /// What of the log's own list, which is known from the start, was too much.
+    /// The limit that the log's own channel list exceeded, if any.
     refused: Option<Many>,
-    /// Definitions found while messages are read, in that order.
+    /// Definitions found while messages are read, in order of appearance.
     later: Vec<Definition>,
 }
 
 impl Channels {
-    /// Numbers the sources: by their channels' metadata where it numbers all of them from 0 on, otherwise by name.
+    /// Numbers the sources: by their channels' metadata if it numbers all of them from 0, otherwise by name.
     pub(super) fn new(definitions: BTreeMap<u16, Definition>, budget: HeaderBudget) -> Self {
         let mut definitions: Vec<Definition> = definitions.into_values().collect();
         let numbers: BTreeMap<&str, Option<u16>> =
@@ -67,7 +67,7 @@ impl Channels {
         let stated = distinct.iter().copied().map(usize::from).eq(0..numbers.len());
         definitions.sort_by_cached_key(|d| (stated.then(|| stated_number(d)), d.topic.clone(), d.id));
         let mut channels = Self { budget, ..Self::default() };
-        // Raw first: sources with only sent bytes come after those that sent something themselves.
+        // Raw channels first, so that sources with only sent bytes come after those that sent something themselves.
         let (raw, others): (Vec<_>, Vec<_>) =
             definitions.into_iter().partition(|d| stated || d.topic.starts_with(RAW_PREFIX));
         for definition in raw.into_iter().chain(others) {
@@ -78,7 +78,7 @@ impl Channels {
         channels
     }
 
-    /// What of the definitions that it was made of was too much.
+    /// The limit that the initial definitions exceeded, if any.
     pub(super) fn refused(&self) -> Option<Many> {
         self.refused
     }
@@ -103,7 +103,7 @@ impl Channels {
         &self.later
     }
 
-    /// Goes back, or ahead, to where these have been found among the messages.
+    /// Sets the channels to those known at a place where `later` have been found among the messages.
     pub(super) fn go_to(&mut self, later: &[Definition]) {
         let same = self.later.iter().zip(later).take_while(|(one, other)| one.id == other.id).count();
         for gone in self.later.drain(same..).rev() {
@@ -208,7 +208,7 @@ fn stated_number(definition: &Definition) -> Option<u16> {
     definition.metadata.get(SOURCE_KEY)?.parse().ok()
 }
 
-/// The channels listed in the metadata record that repeats them.
+/// The channels in the metadata record that repeats them.
 pub(super) fn listed(entries: &BTreeMap<String, String>) -> Vec<Definition> {
     let mut definitions: BTreeMap<u16, Definition> = BTreeMap::new();
     for (key, value) in entries {
@@ -257,7 +257,7 @@ mod tests {
     }
 
     #[test]
-    fn sources_are_numbered_by_metadata_that_numbers_all() {
+    fn sources_are_numbered_by_metadata_if_it_numbers_all() {
         let stated =
             [("/raw/a", Some("1")), ("/raw/b", Some("0")), ("/sent/a", Some("1")), ("/loop/tick", None)];
         assert_eq!(ids(&channels(&stated)), ["b", "a"]);
@@ -274,7 +274,7 @@ mod tests {
     }
 
     #[test]
-    fn channels_found_later_are_forgotten_on_the_way_back() {
+    fn channels_defined_after_a_position_are_forgotten_when_going_back() {
         let mut channels = channels(&[("/raw/a", None)]);
         let first = channels.get(0).unwrap().definition.clone();
         for (id, topic) in [(7, "/raw/b"), (5, "/imu"), (9, "/sent/c")] {
@@ -292,7 +292,7 @@ mod tests {
     }
 
     #[test]
-    fn there_is_an_end_of_channels_and_of_sources() {
+    fn channels_and_sources_have_limits() {
         let topics: Vec<String> = (0..MAX_SOURCES + 2).map(|n| format!("/raw/{n}")).collect();
         let all: Vec<_> = topics.iter().map(|topic| (topic.as_str(), None)).collect();
         let found = channels(&all);

@@ -1,4 +1,4 @@
-//! Unpacking chunks, and checking the checksums over larger parts of a file, with the `mcap` crate's reader.
+//! Unpacks chunks and checks the checksums over larger parts of a file, with the `mcap` crate's reader.
 
 use std::io::{Read, Seek};
 
@@ -38,7 +38,7 @@ pub(super) fn unpack<R: Read + Seek>(
     }
     let mut reader = reader(|options| options.with_skip_start_magic(true).with_validate_chunk_crcs(true));
     if let Err(error) = reader.add_decompressor(Unzstd::default()) {
-        // Not reached: it has a name.
+        // Not reached, since the compression has a name.
         tracing::error!(%error, "chunks packed by zstd can't be read");
     }
     // The header is rebuilt: in a chunk cut by the end of the file, its lengths and checksum cover data that isn't there.
@@ -64,7 +64,7 @@ pub(super) fn unpack<R: Read + Seek>(
             Unpacked::Bad(LossKind::TooLarge { limit: MAX_UNPACKED_BYTES })
         }
         Err(McapError::UnsupportedCompression(name)) => Unpacked::Bad(LossKind::Compression(name)),
-        // No checksum covers the content: a header of zeros makes an empty chunk of any bytes.
+        // Without a checksum nothing covers the content: a header of zeros turns any bytes into an empty chunk.
         _ if place.doubtful && place.crc == 0 => Unpacked::Bad(LossKind::Contents),
         _ if place.cut => Unpacked::Cut,
         Ok(()) => Unpacked::Whole,
@@ -73,8 +73,9 @@ pub(super) fn unpack<R: Read + Seek>(
     })
 }
 
-/// Whether the checksum over everything before the data end record matches; also true if there is none, or a record is too
-/// large to read.
+/// Whether the checksum over everything before the data end record matches.
+///
+/// Also true if there is no checksum, or a record is too large to read.
 pub(super) fn data_section_holds<R: Read + Seek>(file: &mut LogFile<R>) -> Result<bool, LogError> {
     let reader = reader(|options| options.with_emit_chunks(true).with_validate_data_section_crc(true));
     let result = drive(file, 0..u64::MAX, reader, &mut |opcode, _| opcode != op::DATA_END)?;
@@ -88,7 +89,7 @@ pub(super) fn summary_holds<R: Read + Seek>(file: &mut LogFile<R>, data_end: u64
     Ok(drive(file, data_end..u64::MAX, reader, &mut |opcode, _| opcode != op::FOOTER)?.is_ok())
 }
 
-/// A reader that allocates no more than for the longest record, whatever lengths a file claims.
+/// Creates a reader that allocates no more than the longest record needs, whatever lengths a file claims.
 fn reader(set: impl FnOnce(LinearReaderOptions) -> LinearReaderOptions) -> LinearReader {
     let limit = usize::try_from(MAX_UNPACKED_BYTES).unwrap_or(usize::MAX);
     let options = LinearReaderOptions::default().with_skip_end_magic(true).with_record_length_limit(limit);

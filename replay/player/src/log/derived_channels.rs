@@ -13,11 +13,11 @@ pub struct Made {
     pub bytes: Vec<u8>,
 }
 
-/// Derives messages from results as they pass through the recorder. The loop is not involved.
+/// Derives messages from results as they pass through the recorder, without involving the loop.
 pub trait DerivedChannels: Send {
     /// Takes a message of result channel `channel`; called whether or not the disk has room for the message.
     fn take(&mut self, channel: u16, at: MonoNs, message: &[u8], made: &mut Vec<Made>);
 
-    /// The dive has ended.
+    /// Called when the dive has ended.
     fn end(&mut self, made: &mut Vec<Made>);
 }

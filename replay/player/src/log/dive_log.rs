@@ -1,8 +1,8 @@
 //! A dive's log: one file, or the parts of a recording read as one.
 //!
-//! Parts are ordered by the part number they contain, not by file name. Each is scanned once on opening, then read in turn, one
-//! reader at a time. The running totals in each part's header show whether a part is missing or isn't the one that was
-//! recorded.
+//! Parts are ordered by the part number they contain, not by file name. Each part is scanned once on opening; then the
+//! parts are read one after the other. The running totals in each part's header show whether a part is missing or has
+//! been exchanged.
 
 use std::fs::File;
 use std::io::{Read, Seek};
@@ -22,11 +22,11 @@ pub struct PartFile {
     pub path: PathBuf,
     /// Source messages read from it so far.
     pub messages: u64,
-    /// Part number, where the recording has parts.
+    /// Part number, if the recording has parts.
     number: Option<u32>,
 }
 
-/// Opens the log with that index in the list.
+/// Opens the log with a given index in the list.
 type Open<R> = Box<dyn FnMut(usize) -> Result<LogReader<R>, LogError> + Send>;
 
 /// A position in a dive's log, to continue reading from.
@@ -51,7 +51,7 @@ pub struct DiveLog<R = File> {
     reader: LogReader<R>,
     info: LogInfo,
     has_ticks: bool,
-    /// For each source of the file being read, its number in the dive.
+    /// For each source of the file being read, its source number in the dive.
     numbers: Vec<u16>,
     topics: Vec<String>,
     /// Losses between files.
@@ -60,18 +60,18 @@ pub struct DiveLog<R = File> {
     earlier: Vec<Loss>,
     late: u64,
     times: Option<(MonoNs, MonoNs)>,
-    /// For each file that was cut off, how the next one goes on.
+    /// For each file that was cut off, its continuation in the next file.
     resumed: Vec<Option<Resumed>>,
     /// Messages delivered from the file being read.
     delivered: u64,
 }
 
-/// How the next part of a recording goes on after one that was cut off.
+/// Continuation of a recording in the next part after a part was cut off.
 #[derive(Debug, Clone)]
 struct Resumed {
-    /// Totals before the next part, which repeats all that comes after them.
+    /// Totals before the next part, which repeats everything after them.
     before: Progress,
-    /// Messages that are in the part cut off and not repeated.
+    /// Messages of the cut-off part that the next part doesn't repeat.
     messages: u64,
     /// First log time of the next part.
     at: Option<MonoNs>,
@@ -80,7 +80,7 @@ struct Resumed {
 impl DiveLog<File> {
     /// Opens a log, or the parts of a recording; see [`super::files_of`].
     ///
-    /// Errors: a file can't be read, isn't MCAP, or has a later format; several files that aren't parts of one recording.
+    /// Errors: a file can't be read, isn't MCAP, or has a later format; or several files aren't parts of one recording.
     pub fn open(files: &[PathBuf]) -> Result<Self, LogError> {
         let log = match files {
             [file] => Self::single(LogReader::open(file)?, file),
@@ -122,10 +122,10 @@ impl DiveLog<File> {
 }
 
 impl<R: Read + Seek> DiveLog<R> {
-    /// The log of a single reader.
+    /// Creates the log from a single reader.
     pub fn of(reader: LogReader<R>) -> Self {
         let file = PartFile { path: PathBuf::new(), messages: 0, number: None };
-        // No file follows.
+        // Never called, since no file follows.
         let open = |_| Err(LogError::NoLogs { folder: PathBuf::new() });
         Self::start(Box::new(open), reader, vec![file], Vec::new())
     }
@@ -157,7 +157,7 @@ impl<R: Read + Seek> DiveLog<R> {
         log
     }
 
-    /// The log's header; that of the first part if there are several.
+    /// The log's header; with several parts, that of the first.
     pub fn header(&self) -> &LogInfo {
         &self.info
     }
@@ -172,12 +172,12 @@ impl<R: Read + Seek> DiveLog<R> {
         self.has_ticks
     }
 
-    /// Whether the file being read has a channel of voice notes' recordings.
+    /// Whether the file being read has a channel of voice recordings.
     pub(super) fn has_voices(&self) -> bool {
         self.reader.has_voices()
     }
 
-    /// Passes over what is earlier than this, by the chunks' headers. Before the first message is read.
+    /// Skips messages earlier than `at`, by the chunk headers; call before reading the first message.
     ///
     /// Errors: a further file can't be opened.
     pub(super) fn pass_before(&mut self, at: MonoNs) -> Result<(), LogError> {
@@ -204,7 +204,7 @@ impl<R: Read + Seek> DiveLog<R> {
         self.times
     }
 
-    /// Topics with several channels in the file being read, with the channel numbers: one source each.
+    /// Topics with several channels in the file being read, with the channel numbers. They share one source.
     pub fn doubles(&self) -> Vec<(String, Vec<u16>)> {
         self.reader.doubles()
     }
@@ -295,12 +295,12 @@ impl<R: Read + Seek> DiveLog<R> {
         }
         (self.earlier, self.late, self.delivered) = (place.earlier.clone(), place.late, place.delivered);
         self.reader.go_to(&place.place)?;
-        // Of the channels known there.
+        // Numbers the sources of the channels known at the place.
         self.number_sources();
         Ok(())
     }
 
-    /// Moves on to the next file.
+    /// Moves to the next file.
     fn go_on(&mut self) -> Result<(), LogError> {
         let read: Vec<Loss> = self.reader.losses().iter().filter_map(|loss| self.in_part(loss)).collect();
         self.earlier.extend(read);
@@ -314,15 +314,14 @@ impl<R: Read + Seek> DiveLog<R> {
         Ok(())
     }
 
-    /// Leaves out of the file what the next one repeats.
+    /// Excludes messages of this file that the next one repeats.
     fn pass_over(&mut self) {
         if let Some(Some(resumed)) = self.resumed.get(self.at) {
             self.reader.pass_over(&resumed.before);
         }
     }
 
-    /// Maps the file's sources to the dive's by name; new ones are added, as long as there aren't too many in all files
-    /// together.
+    /// Maps the file's sources to the dive's by name; adds new ones up to the limit over all files.
     fn number_sources(&mut self) {
         self.numbers.clear();
         for source in self.reader.sources() {
@@ -335,11 +334,11 @@ impl<R: Read + Seek> DiveLog<R> {
         }
     }
 
-    /// A loss of the file being read as one of the dive's; `None` if the next part has what is lost.
+    /// Converts a loss of the file being read to one of the dive; `None` if the next part has the lost messages.
     fn in_part(&self, loss: &Loss) -> Option<Loss> {
         let mut loss = loss.clone();
         if let Some(Some(resumed)) = self.resumed.get(self.at) {
-            // The next part says why this one was cut off.
+            // The next part states why this one was cut off.
             if loss.kind == LossKind::Truncated && self.delivered == resumed.messages {
                 return None;
             }
@@ -373,7 +372,7 @@ struct Arranged {
     losses: Vec<Loss>,
 }
 
-/// Scans each file and puts them in order.
+/// Scans each file and sorts the files by part number.
 fn arrange(files: &[PathBuf]) -> Result<Arranged, LogError> {
     let (mut parts, mut losses): (Vec<(PathBuf, Glance)>, _) = (Vec::new(), Vec::new());
     let mut unread = None;
@@ -388,7 +387,7 @@ fn arrange(files: &[PathBuf]) -> Result<Arranged, LogError> {
                 }
                 _ => return Err(LogError::NotAPart { path: path.clone() }),
             },
-            // A file just created when the power failed.
+            // The file was created just before the power failed.
             (Err(LogError::NotMcap { name, found, wanted }), Some(part)) => {
                 losses.push(loss(LossKind::PartUnreadable { part, found: found.clone() }, None, None));
                 unread = Some(LogError::NotMcap { name, found, wanted });
@@ -404,7 +403,7 @@ fn arrange(files: &[PathBuf]) -> Result<Arranged, LogError> {
     }
 }
 
-/// Checks that all parts are of one recording and none occurs twice.
+/// Checks that all parts belong to one recording and that none occurs twice.
 fn agree(parts: &[(PathBuf, Glance)]) -> Result<(), LogError> {
     let dive = |glance: &Glance| glance.part.as_ref().map(|part| part.head.dive.clone());
     let mut named = parts.iter().filter_map(|(path, glance)| Some((path, dive(glance)?)));
@@ -449,7 +448,7 @@ fn between(parts: &[Glance]) -> Vec<Loss> {
     losses
 }
 
-/// How each part that was cut off goes on in the next.
+/// For each part that was cut off, finds its continuation in the next part.
 fn resumed(parts: &[Glance]) -> Vec<Option<Resumed>> {
     let pair = |pair: &[Glance]| {
         let [one, next] = pair else { return None };

@@ -1,9 +1,9 @@
-//! Errors that concern a log as a whole. Damage within one is a [`super::Loss`].
+//! Errors that concern a log as a whole. Damage within a log is a [`super::Loss`].
 
 use std::io;
 use std::path::PathBuf;
 
-/// A log could not be written, or not be read.
+/// A log could not be written or read.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum LogError {
@@ -59,7 +59,7 @@ pub enum LogError {
         /// MCAP's first bytes, in hex.
         wanted: String,
     },
-    /// A log of a later version of this program.
+    /// A log written by a later version of this program.
     #[error("{name} is a log of format {found}; this program reads formats up to {known}")]
     TooNew {
         /// The log, as the caller named it.
@@ -94,7 +94,7 @@ pub enum LogError {
         one: PathBuf,
         /// Its recording.
         one_dive: String,
-        /// A part of another one.
+        /// A part of the other recording.
         other: PathBuf,
         /// Its recording.
         other_dive: String,
@@ -122,7 +122,7 @@ pub enum LogError {
         channel: String,
     },
     /// More packets in one tick than a tick message can count.
-    #[error("a tick of {packets} packets; a message holds up to {}", u32::MAX)]
+    #[error("a tick of {packets} packets can't be written; a message holds up to {}", u32::MAX)]
     TickTooLong {
         /// Packets in the tick.
         packets: usize,
@@ -133,12 +133,12 @@ pub enum LogError {
         /// Cause.
         source: io::Error,
     },
-    /// A medium that neither takes anything nor fails.
+    /// A medium that neither accepts data nor fails.
     #[error(
         "the recording wasn't complete {waited_s} s after the dive's end: its medium is too slow or doesn't answer; how much of the log is on it isn't known"
     )]
     Stuck {
-        /// How long it was waited for, s.
+        /// Time waited, s.
         waited_s: u64,
     },
     /// A bug in the recorder.

@@ -1,26 +1,26 @@
-//! What went wrong with a recording while it was made.
+//! Faults of a recording while it is made.
 
 use std::path::PathBuf;
 
 use headrace_geometry::time::{DurNs, MonoNs};
 
-/// Most faults that are listed; later ones extend the last.
+/// Maximum number of faults that are listed; later ones extend the last entry.
 const MAX_FAULTS: usize = 100;
 
-/// A part of a recording that couldn't be written on.
+/// A part of a recording that could no longer be written.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct RecordingFault {
     /// The part.
     pub path: PathBuf,
     /// What was attempted, and the system's error.
     pub error: String,
-    /// Messages that are in no part.
+    /// Messages that no part contains.
     pub lost: u64,
-    /// Log time of the last message that is certain before it, where there is one.
+    /// Log time of the last synced message before the fault, if any.
     pub from: Option<MonoNs>,
-    /// Log time of the first message after it, where there is one.
+    /// Log time of the first message after the fault, if any.
     pub to: Option<MonoNs>,
-    /// The part in which the recording goes on; `None` where it ended there.
+    /// The part in which the recording continues; `None` if the recording ended.
     pub continued: Option<PathBuf>,
 }
 
@@ -43,33 +43,33 @@ impl RecordingFault {
     }
 }
 
-/// News of a recording, for those who watch the dive.
+/// A change in the state of a recording, reported to those who watch the dive.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum RecordingEvent {
-    /// A part can't be written on; nothing is recorded until another can be begun, which is tried again and again.
+    /// A part can't be written any more. Nothing is recorded until a new part can be begun, which is retried.
     Failed {
         /// The part.
         path: PathBuf,
         /// What was attempted, and the system's error.
         error: String,
     },
-    /// The recording goes on.
+    /// The recording continues.
     Resumed(RecordingFault),
-    /// The medium takes nothing and gives no error, and the queue is full: what comes now isn't recorded.
+    /// The medium accepts nothing without an error, and the queue is full: new data isn't recorded.
     Behind,
     /// The medium takes data again.
     CaughtUp {
         /// Packets that weren't recorded.
         packets: u64,
     },
-    /// The medium takes long: a power cut would lose the last seconds.
+    /// The medium is slow: a power cut would lose the last seconds.
     Late {
         /// The recording.
         path: PathBuf,
-        /// Time of the dive that isn't on the medium yet.
+        /// Dive time that isn't on the medium yet.
         by: DurNs,
     },
-    /// It no longer does.
+    /// The medium is no longer slow.
     InTime {
         /// The recording.
         path: PathBuf,
@@ -77,7 +77,7 @@ pub enum RecordingEvent {
 }
 
 impl RecordingEvent {
-    /// Whether what comes now is lost, or would be with the power.
+    /// Whether new data is lost, or would be lost in a power cut.
     pub fn fails(&self) -> bool {
         matches!(self, Self::Failed { .. } | Self::Behind | Self::Late { .. })
     }

@@ -1,7 +1,7 @@
 //! Fields of MCAP records, parsed from untrusted bytes.
 //!
-//! Source: MCAP format specification, "Serialization": little-endian integers, strings and maps with a length in bytes
-//! before them.
+//! Source: MCAP format specification, "Serialization": integers are little-endian; strings and maps have a length
+//! prefix in bytes.
 
 use std::collections::BTreeMap;
 
@@ -72,7 +72,7 @@ impl<'a> Fields<'a> {
         Some(map)
     }
 
-    /// Memory that the map here would take, see [`map_cost`]; it isn't taken.
+    /// Memory that the map at the current position would take, see [`map_cost`]; doesn't advance.
     pub(super) fn map_cost(&self) -> Option<u64> {
         let mut all = *self;
         let len = all.u32()?;
@@ -113,7 +113,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_length_that_lies_gives_nothing() {
+    fn wrong_length_gives_none() {
         assert_eq!(Fields::new(&[5, 0, 0, 0, b'a']).text(), None);
         assert_eq!(Fields::new(&[0xFF; 12]).map(), None);
         assert_eq!(Fields::new(&[1, 0, 0, 0, 0xFF]).text(), None);
@@ -122,7 +122,7 @@ mod tests {
     }
 
     #[test]
-    fn a_map_comes_out_as_written() {
+    fn written_map_is_read_back() {
         let bytes = b"\x0c\0\0\0\x01\0\0\0a\x03\0\0\0bcd rest";
         let mut fields = Fields::new(bytes);
         assert_eq!(fields.map(), Some(BTreeMap::from([("a".to_owned(), "bcd".to_owned())])));

@@ -5,12 +5,13 @@
 //! | `/raw/<source id>` | bytes as received: one device frame, datagram, CAN frame, HID report or I2C transaction | receive time | time of validity, if the device gives one, else the receive time |
 //! | `/sent/<source id>` | bytes sent to the device | time of sending | the same |
 //! | `/loop/tick` | one tick of the loop, see [`Tick`] | the tick's time | the same |
-//! | `/notes/voice` | the recording of a voice note, see [`super::voice`]; read by people and never by a replay | that of the message before it | the same |
+//! | `/notes/voice` | the recording of a voice note, see [`super::voice`]; read by people, never by a replay | that of the previous message | the same |
 //! | `/result/poses`, `/result/pings`, `/result/judgements`, `/result/advice`, `/result/states` | the loop's results of a tick as words ([`headrace_monitor::result_stream`]): u64 tick, u64 number of the first record, records; for `verify`, never read by a replay | the tick's time | the same |
 //! | `/result/view/...` | the same for viewers, in JSON: [`crate::view`] | the tick's time | the same |
 //!
 //! Times are nanoseconds of the host's monotonic clock. Every channel counts its messages from 0 (`sequence`).
-//! Channels of bytes have the message encoding `application/octet-stream` and no schema; their metadata has `plugin`,
+//!
+//! Channels of bytes have the message encoding `application/octet-stream` and no schema. Their metadata has `plugin`,
 //! `connect` and `source`, the source's number in `/loop/tick`.
 
 use std::collections::BTreeMap;
@@ -18,9 +19,9 @@ use std::collections::BTreeMap;
 use headrace_geometry::time::MonoNs;
 use sha2::{Digest, Sha256};
 
-/// Version of what this module describes.
+/// Version of the format described by this module.
 pub const FORMAT_VERSION: u32 = 1;
-/// What the `library` of our logs begins with, before this program's version.
+/// Prefix of the `library` field of this program's logs; the program's version follows.
 pub const LIBRARY: &str = "headrace ";
 /// Prefix of a source's id: bytes received.
 pub const RAW_PREFIX: &str = "/raw/";
@@ -30,9 +31,9 @@ pub const SENT_PREFIX: &str = "/sent/";
 pub const RESULT_PREFIX: &str = "/result/";
 /// Topic prefix of results for viewers.
 pub const VIEW_PREFIX: &str = "/result/view/";
-/// The channel of voice notes' recordings.
+/// Topic of the channel of voice recordings.
 pub const VOICE_TOPIC: &str = "/notes/voice";
-/// The channel of ticks.
+/// Topic of the channel of ticks.
 pub const TICK_TOPIC: &str = "/loop/tick";
 /// Message encoding of raw, sent, tick and voice channels.
 pub const BYTES_ENCODING: &str = "application/octet-stream";
@@ -48,7 +49,7 @@ pub const LOSSES: &str = "headrace.losses";
 pub const ATTACHMENT_PREFIX: &str = "attachment/";
 /// Key in [`METADATA`] with [`FORMAT_VERSION`].
 pub const FORMAT_KEY: &str = "format";
-/// Key, in the metadata records that we write, of the digest of name and other entries (MCAP has none there).
+/// Key of a digest over a metadata record's name and other entries. MCAP has no checksum for metadata records.
 pub const DIGEST_KEY: &str = "sha256";
 /// Name of the attachment with the vehicle file.
 pub const VEHICLE_FILE: &str = "vehicle.toml";
@@ -118,18 +119,18 @@ pub(super) fn tick_head(index: u64, now: MonoNs, packets: u32) -> [u8; TICK_HEAD
     head
 }
 
-/// Bytes of `order` as stored in the message.
+/// The bytes of `order` as stored in the message.
 pub(super) fn order_bytes(order: &[u16]) -> impl Iterator<Item = u8> {
     order.iter().flat_map(|source| source.to_le_bytes())
 }
 
-/// A loss as stored in [`LOSSES`].
+/// Formats a loss for [`LOSSES`].
 pub(super) fn stated_loss(from: Option<MonoNs>, to: Option<MonoNs>, words: &str) -> String {
     let time = |time: Option<MonoNs>| time.map_or_else(|| "-".to_owned(), |time| time.0.to_string());
     format!("{} {} {words}", time(from), time(to))
 }
 
-/// Parses what [`stated_loss`] wrote: from, to, words.
+/// Parses the text of [`stated_loss`]: from, to, words.
 pub(super) fn read_loss(text: &str) -> (Option<MonoNs>, Option<MonoNs>, &str) {
     let mut parts = text.splitn(3, ' ');
     let mut time = || parts.next().and_then(|time| time.parse().ok()).map(MonoNs);
@@ -137,14 +138,14 @@ pub(super) fn read_loss(text: &str) -> (Option<MonoNs>, Option<MonoNs>, &str) {
     (from, to, parts.next().unwrap_or(text))
 }
 
-/// Adds the digest of name and other entries to a metadata record.
+/// Adds the digest of the name and the other entries to a metadata record.
 pub(super) fn seal(name: &str, mut metadata: BTreeMap<String, String>) -> BTreeMap<String, String> {
     metadata.remove(DIGEST_KEY);
     metadata.insert(DIGEST_KEY.to_owned(), digest_of(name, &metadata));
     metadata
 }
 
-/// Removes the digest from a metadata record; `false` if it doesn't match. Records of other writers need none.
+/// Removes the digest from a metadata record; `false` if it doesn't match. Other writers' records need no digest.
 pub(super) fn unseal(name: &str, metadata: &mut BTreeMap<String, String>) -> bool {
     match metadata.remove(DIGEST_KEY) {
         Some(digest) => digest == digest_of(name, metadata),
@@ -189,7 +190,7 @@ mod tests {
     }
 
     #[test]
-    fn a_count_that_lies_is_an_error() {
+    fn tick_with_wrong_count_is_an_error() {
         let mut bytes = encode(0, 0, &[1, 2]);
         bytes[16..20].copy_from_slice(&u32::MAX.to_le_bytes());
         assert_eq!(Tick::decode(&bytes), Err(TickError { packets: u32::MAX, len: 24 }));
@@ -213,7 +214,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn what_was_encoded_is_decoded(index: u64, now: u64, order: Vec<u16>) {
+        fn encoded_ticks_are_decoded(index: u64, now: u64, order: Vec<u16>) {
             let bytes = encode(index, now, &order);
             let tick = Tick::decode(&bytes).unwrap();
             prop_assert_eq!((tick.index, tick.now), (index, MonoNs(now)));
@@ -221,7 +222,7 @@ mod tests {
         }
 
         #[test]
-        fn any_bytes_decode_or_fail(bytes: Vec<u8>) {
+        fn any_bytes_decode_or_give_an_error(bytes: Vec<u8>) {
             if let Ok(tick) = Tick::decode(&bytes) {
                 prop_assert_eq!(TICK_HEAD_BYTES + 2 * tick.order().len(), bytes.len());
             }

@@ -1,8 +1,9 @@
-//! Record boundaries in a file that may be damaged.
+//! Finds record boundaries in a file that may be damaged.
 //!
-//! A record is an opcode, a u64 length and that many bytes, without a start marker, so a wrong length loses everything
-//! after it. Three checks detect it: most kinds of records imply their length twice (record length and field lengths), a
-//! length must leave room for the next record, and a record must follow.
+//! A record consists of an opcode, a u64 length and that many bytes, without a start marker. A wrong length therefore
+//! loses everything after it. Three checks detect a wrong length. First, most kinds of records imply their length
+//! twice, by record length and field lengths. Second, a length must leave room for the next record. Third, a record
+//! must follow.
 //!
 //! Source: MCAP format specification, "Records".
 
@@ -18,7 +19,7 @@ use super::format::LIBRARY;
 use super::limits::map_cost;
 use super::medium::Medium;
 
-/// A greater length of a record is taken as damage, except for chunks and attachments.
+/// Greatest plausible length of a record other than a chunk or attachment; a greater one counts as damage.
 const MAX_RECORD_BYTES: u64 = 256 << 20;
 /// Opcode and length.
 const RECORD_HEAD_BYTES: usize = 9;
@@ -45,7 +46,7 @@ impl<R: Read + Seek> LogFile<R> {
         self.medium().len()
     }
 
-    /// What the file lies on.
+    /// The file's medium.
     pub(super) fn medium(&self) -> &Medium<R> {
         self.input.get_ref()
     }
@@ -54,7 +55,9 @@ impl<R: Read + Seek> LogFile<R> {
         &self.name
     }
 
-    /// Reads from `at` until `into` is full or the file ends; returns the number of bytes. What the medium fails to give is zeros.
+    /// Reads from `at` until `into` is full or the file ends; returns the number of bytes.
+    ///
+    /// Bytes that the medium fails to read become zeros.
     pub(super) fn read_at(&mut self, at: u64, into: &mut [u8]) -> Result<usize, LogError> {
         let mut done = 0;
         let mut read = || {
@@ -91,11 +94,11 @@ pub(super) struct Definition {
     pub(super) id: u16,
     pub(super) topic: String,
     pub(super) metadata: BTreeMap<String, String>,
-    /// Schema and message encoding, for logs of other writers. Ours neither need nor repeat them.
+    /// Schema and message encoding, for logs of other writers. This program's logs neither need nor repeat them.
     pub(super) form: Option<(u16, String)>,
 }
 
-/// Compares the fields that our list of channels has; `form` is left out.
+/// Compares the fields that the log's channel list contains; `form` is left out.
 impl PartialEq for Definition {
     fn eq(&self, other: &Self) -> bool {
         (self.id, &self.topic, &self.metadata) == (other.id, &other.topic, &other.metadata)
@@ -112,7 +115,7 @@ impl Definition {
         Some(Self { id, topic: topic.to_owned(), metadata: fields.map()?, form })
     }
 
-    /// Memory that it takes, see [`map_cost`].
+    /// Memory of the definition, see [`map_cost`].
     pub(super) fn cost(&self) -> u64 {
         let form = self.form.as_ref().map_or(0, |(_, encoding)| encoding.len());
         let texts = self.metadata.iter().map(|(key, value)| key.len() + value.len());
@@ -121,7 +124,7 @@ impl Definition {
     }
 }
 
-/// Number and name of a schema.
+/// Parses the number and name of a schema.
 pub(super) fn schema(fields: &mut Fields<'_>) -> Option<(u16, String)> {
     Some((fields.u16()?, fields.text()?.to_owned()))
 }
@@ -134,11 +137,11 @@ pub(super) struct ChunkPlace {
     pub(super) unpacked_len: u64,
     pub(super) crc: u32,
     pub(super) compression: String,
-    /// Log times of its messages, from and to; both 0 where there are none.
+    /// First and last log time of its messages; both 0 if there are none.
     pub(super) times: (u64, u64),
     /// Whether the file ends within it.
     pub(super) cut: bool,
-    /// Whether its header is damaged: its length doesn't match the record length.
+    /// Whether its header is damaged: the lengths of its fields contradict the record length.
     pub(super) doubtful: bool,
 }
 
@@ -164,7 +167,7 @@ pub(super) enum Item {
     },
     Chunk(ChunkPlace),
     Attachment(AttachmentPlace),
-    /// One whose names are too long to be read.
+    /// An attachment whose names are too long to be read.
     UnreadAttachment,
     Metadata,
     Statistics {
@@ -195,13 +198,13 @@ pub(super) struct Frame {
 pub(super) enum Found {
     /// A record that lies within the file.
     Record(Frame),
-    /// A record that is cut by the end of the file, or whose length is wrong.
+    /// A record that the end of the file cuts off, or whose length is wrong.
     Cut(Frame),
     /// The closing magic bytes.
     Closing,
     /// The end of the file.
     End,
-    /// No record.
+    /// No record starts here.
     Nothing,
 }
 
@@ -251,9 +254,9 @@ pub(super) fn look<R: Read + Seek>(file: &mut LogFile<R>, at: u64) -> Result<Fou
     Ok(whole_or_cut(file, frame(end, item, false)))
 }
 
-/// A record whose opcode is damaged, identified by its content.
+/// Identifies a record whose opcode is damaged by its content.
 fn disguised(opcode: u8, body: u64, glance: &[u8], len: u64) -> Option<Item> {
-    // A message may hold anything, but one that parses as a chunk with matching lengths is no coincidence.
+    // A message may contain any bytes, but it is no coincidence if they parse as a chunk with matching lengths.
     let kinds: &[u8] =
         if opcode == op::MESSAGE { &[op::CHUNK] } else { &[op::CHUNK, op::ATTACHMENT, op::METADATA] };
     kinds
@@ -262,7 +265,7 @@ fn disguised(opcode: u8, body: u64, glance: &[u8], len: u64) -> Option<Item> {
         .map(|it| it.0)
 }
 
-/// Opcodes reserved by MCAP and so far unused; damage easily produces them.
+/// Whether an opcode is reserved by MCAP and still unused. Damage easily produces these.
 fn is_reserved(opcode: u8) -> bool {
     (op::DATA_END + 1..0x80).contains(&opcode)
 }
@@ -292,8 +295,10 @@ fn whole_or_cut<R: Read + Seek>(file: &LogFile<R>, frame: Frame) -> Found {
     if frame.end <= file.len() { Found::Record(frame) } else { Found::Cut(frame) }
 }
 
-/// A chunk implies its length twice. Where the two differ, the one followed by a record is right. Where both are the
-/// largest u64, its writer had not closed it.
+/// Identifies a chunk, which implies its length twice.
+///
+/// If the two lengths differ, the one followed by a record is right. If both are the largest u64, its writer had not
+/// closed the chunk.
 fn look_at_chunk<R: Read + Seek>(
     file: &mut LogFile<R>,
     mut frame: Frame,
@@ -330,7 +335,7 @@ fn record_follows<R: Read + Seek>(file: &mut LogFile<R>, at: u64) -> Result<bool
     Ok(whole && opcode <= op::DATA_END && is_possible(opcode, len) && len <= file.len() - at)
 }
 
-/// Parses the needed fields of a record and the least length that its fields imply.
+/// Parses the needed fields of a record, and the least length that its fields imply.
 fn parse(opcode: u8, body: u64, bytes: &[u8]) -> Option<(Item, u64)> {
     let mut fields = Fields::new(bytes);
     let item = match opcode {
@@ -363,7 +368,7 @@ fn parse(opcode: u8, body: u64, bytes: &[u8]) -> Option<(Item, u64)> {
         }
         op::ATTACHMENT => {
             let place = attachment_place(&mut fields)?;
-            // One of 2^64 bytes is longer than any record: it is damaged, rather than of another kind.
+            // An attachment of almost 2^64 bytes is damaged rather than a record of another kind.
             let len = place.head_len.saturating_add(place.data_len).saturating_add(4);
             return Some((Item::Attachment(place), len));
         }
@@ -404,7 +409,7 @@ fn parse(opcode: u8, body: u64, bytes: &[u8]) -> Option<(Item, u64)> {
     Some((item, fields.taken()))
 }
 
-/// A record that ends in a length-prefixed list.
+/// The item, with the record length implied by a trailing length-prefixed list.
 fn with_list(mut fields: Fields<'_>, item: Item) -> Option<(Item, u64)> {
     let len = fields.u32()?;
     Some((item, fields.taken() + u64::from(len)))

@@ -1,56 +1,60 @@
-//! Limits on what is read of a log, whatever its lengths and counts claim. Each is several times what logs of dives and of robots
-//! have; together they keep a reader under some 130 MiB. What lies beyond one is named as a loss, with the limit.
+//! Limits on the content read from a log, whatever its lengths and counts claim.
 //!
-//! The same table, with what is said, is in `docs/reference/limits.md`.
+//! Each limit is several times the value found in logs of dives and robots. Together they keep a reader below about 130
+//! MiB. Content beyond a limit is reported as a loss that states the limit.
+//!
+//! `docs/reference/limits.md` has the same table with the messages.
 
 use headrace_geometry::time::MonoNs;
 
-/// Latest timestamp, in 2262 where timestamps count from 1970: a time and a duration after it still fit into 64 bits.
+/// Latest timestamp, in 2262 if timestamps count from 1970. The sum of a time and a duration then still fits into 64
+/// bits.
 pub(super) const LATEST: MonoNs = MonoNs(i64::MAX as u64);
-/// Most bytes of a chunk's records, each taken to be [`RECORD_COST`] longer than it is; and of a record outside chunks.
+/// Maximum number of bytes of a record outside chunks, and of all records of a chunk with [`RECORD_COST`] added to each.
 pub(super) const MAX_UNPACKED_BYTES: u64 = 32 << 20;
-/// Memory of a message beside its bytes.
+/// Memory of a message in addition to its bytes.
 pub(super) const RECORD_COST: u64 = 64;
-/// All chunks up to a place in a log may unpack to so many times its distance from the beginning: what is packed best there is
-/// repeats itself every few hundred bytes, and nothing but zeros packs to a thirty-thousandth.
+/// Largest ratio of the unpacked length of all chunks up to a place to the place's offset in the file.
+///
+/// The ratio is that of content that repeats itself every few hundred bytes. Runs of zeros reach about 30,000.
 pub(super) const MAX_UNPACKED_RATIO: u64 = 512;
-/// And to these bytes more, so that short logs may say little at length.
+/// Unpacked bytes allowed in addition, so that short logs may be highly compressed.
 const UNPACKED_ANYWAY: u64 = 64 << 20;
 /// Largest window of a chunk packed by zstd, as a power of two: 16 MiB, more than levels up to 19 use.
 pub(super) const MAX_WINDOW_LOG: u32 = 24;
-/// Most bytes of overlapping pieces held in memory to merge their messages; one piece more may come in.
+/// Maximum number of bytes of overlapping pieces held in memory for merging; may be exceeded by one piece.
 pub(super) const MAX_HELD_BYTES: usize = 32 << 20;
-/// Most pieces: chunks, and runs of messages outside chunks. Three days of half-second chunks.
+/// Maximum number of pieces: chunks, and runs of messages outside chunks. Enough for three days of half-second chunks.
 pub(super) const MAX_PIECES: usize = 1 << 19;
-/// Most channels.
+/// Maximum number of channels.
 pub(super) const MAX_CHANNELS: usize = 4096;
-/// Most sources: names after `/raw/` and `/sent/`.
+/// Maximum number of sources: names after `/raw/` and `/sent/`.
 pub(super) const MAX_SOURCES: usize = 1024;
-/// Most bytes of all definitions and metadata, each entry of a map taken to be [`ENTRY_COST`] longer than it is.
+/// Maximum number of bytes of all definitions and metadata, with [`ENTRY_COST`] added for each entry of a map.
 pub(super) const MAX_HEADER_BYTES: u64 = 8 << 20;
-/// Memory of an entry of a map beside its bytes.
+/// Memory of an entry of a map in addition to its bytes.
 const ENTRY_COST: u64 = 128;
-/// Most bytes of all attachments together.
+/// Maximum number of bytes of all attachments together.
 pub(super) const MAX_ATTACHMENT_BYTES: u64 = 16 << 20;
 /// Longest text that a loss quotes of a log, bytes.
 const MAX_QUOTED_BYTES: usize = 100;
 
-/// Most bytes that the chunks of the first `packed` bytes of a log may unpack to.
+/// Maximum number of bytes that the chunks in the first `packed` bytes of a log may unpack to.
 pub(super) fn unpacked_limit(packed: u64) -> u64 {
     packed.saturating_mul(MAX_UNPACKED_RATIO).saturating_add(UNPACKED_ANYWAY)
 }
 
-/// Memory of the entries of a map, of which so many bytes are texts.
+/// Memory of `entries` entries of a map whose texts take `bytes`.
 pub(super) fn map_cost(entries: u64, bytes: u64) -> u64 {
     entries.saturating_mul(ENTRY_COST).saturating_add(bytes)
 }
 
-/// What of [`MAX_HEADER_BYTES`] has been used.
+/// Used share of [`MAX_HEADER_BYTES`].
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct HeaderBudget(u64);
 
 impl HeaderBudget {
-    /// Takes so much; `false` if it isn't there, and nothing is taken.
+    /// Reserves memory; returns `false` and reserves nothing if there isn't enough.
     pub(super) fn take(&mut self, cost: u64) -> bool {
         let used = self.0.saturating_add(cost);
         let fits = used <= MAX_HEADER_BYTES;
@@ -60,13 +64,13 @@ impl HeaderBudget {
         fits
     }
 
-    /// Gives back what was taken.
+    /// Releases reserved memory.
     pub(super) fn give_back(&mut self, cost: u64) {
         self.0 = self.0.saturating_sub(cost);
     }
 }
 
-/// A text of a log, for quoting in a loss: its beginning, if it is long.
+/// A text of a log for quoting in a loss; long texts are cut.
 pub(super) fn quoted(text: &str) -> String {
     if text.len() <= MAX_QUOTED_BYTES {
         return text.to_owned();
@@ -79,7 +83,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn headers_fit_or_are_refused_whole() {
+    fn headers_beyond_the_limit_are_refused_whole() {
         let mut budget = HeaderBudget::default();
         assert!(budget.take(MAX_HEADER_BYTES - 10));
         assert!(!budget.take(11) && !budget.take(u64::MAX));

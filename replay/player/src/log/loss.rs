@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 
 use super::limits::LATEST;
 
-/// Most losses that are listed; later ones extend the last.
+/// Maximum number of losses that are listed; later ones extend the last entry.
 const MAX_LOSSES: usize = 1000;
 
 /// Kind of damage.
@@ -16,13 +16,13 @@ const MAX_LOSSES: usize = 1000;
 pub enum LossKind {
     /// The file ends before its closing records: recording or copying was interrupted.
     Truncated,
-    /// Bytes that are no records: wrong lengths, or overwritten.
+    /// Bytes that aren't records: wrong lengths, or overwritten.
     Framing,
-    /// A chunk whose checksum doesn't match. None of it is delivered.
+    /// A chunk with a wrong checksum. None of its messages is delivered.
     Checksum,
-    /// A chunk that doesn't unpack, or contains anything but records. None of it is delivered.
+    /// A chunk that can't be unpacked, or contains something other than records. None of its messages is delivered.
     Contents,
-    /// A chunk, or messages outside chunks, that the medium doesn't give: its error.
+    /// A chunk or messages outside chunks that the medium fails to read, with the error.
     Unreadable(String),
     /// A chunk with an unsupported compression.
     Compression(String),
@@ -31,24 +31,24 @@ pub enum LossKind {
         /// Limit, bytes.
         limit: u64,
     },
-    /// Chunks that claim to unpack to many times the length of the log. None of them is delivered.
+    /// Chunks that claim to unpack to many times the length of the log. None of their messages is delivered.
     Swells {
         /// Limit, as a multiple of the log's length up to there.
         limit: u64,
     },
-    /// A chunk whose unpacking would take more memory than is given to it.
+    /// A chunk whose unpacking would exceed the memory limit.
     Window {
         /// Limit, bytes.
         limit: u64,
     },
-    /// More of something than is read.
+    /// More items of a kind than the limit allows.
     Beyond {
-        /// Of what.
+        /// Kind of item.
         what: Many,
         /// Limit.
         limit: u64,
     },
-    /// Messages stamped later than any clock can be.
+    /// Messages with a timestamp beyond the limit.
     Stamped {
         /// Messages not delivered.
         messages: u64,
@@ -57,24 +57,24 @@ pub enum LossKind {
     },
     /// An attachment that fails its checksum, or that the log lists but doesn't contain.
     Attachment(String),
-    /// A metadata record that fails its checksum, or is missing from a log of ours.
+    /// A metadata record that fails its checksum, or is missing from a log of this program.
     Metadata(String),
-    /// Messages of a log of ours that aren't there, found by the gaps that they leave in the numbers of the others.
+    /// Messages missing from a log of this program, found by gaps in the message numbers.
     Missing {
         /// Messages missing.
         messages: u64,
     },
-    /// Messages of a log of ours whose numbers occur before.
+    /// Messages in a log of this program whose numbers occur before.
     Repeated {
         /// Messages delivered again.
         messages: u64,
     },
-    /// Messages of a log of ours that come after ones with higher numbers.
+    /// Messages in a log of this program that follow messages with higher numbers.
     Disordered {
         /// Messages delivered too late.
         messages: u64,
     },
-    /// A record within a chunk of a kind that no chunk may have, such as another chunk.
+    /// A record in a chunk that no chunk may contain, such as another chunk.
     Misplaced,
     /// Messages of a channel whose definition isn't in the log.
     UnknownChannel {
@@ -88,9 +88,9 @@ pub enum LossKind {
         /// The channel's number.
         channel: u16,
     },
-    /// Every record is readable, but the end of the log isn't where the footer puts it: records are missing or inserted.
+    /// All records are readable, but the log's end isn't where the footer says: records are missing or inserted.
     Displaced,
-    /// Every record is readable, but the checksum over all of them doesn't match: an unlocated byte has changed.
+    /// All records are readable, but their common checksum doesn't match: a byte has changed at an unknown position.
     DataSection,
     /// Damage of one part of a recording.
     InPart {
@@ -112,7 +112,7 @@ pub enum LossKind {
         part: u32,
         /// Messages up to and including this part, by its own total.
         messages: u64,
-        /// The same by the next part's header.
+        /// The same total by the next part's header.
         wanted: u64,
     },
     /// A part of a recording that isn't an MCAP file.
@@ -131,7 +131,7 @@ pub enum LossKind {
     Stated(String),
 }
 
-/// What a log may have too many of.
+/// Kinds of items that have a limit.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Many {
     /// Chunks, and runs of messages outside chunks.
@@ -167,7 +167,7 @@ pub struct Loss {
     pub offset: u64,
     /// Length in the file, bytes.
     pub bytes: u64,
-    /// Last intact receive time before it, where there is one.
+    /// First receive time after it, if any.
     pub from: Option<MonoNs>,
     /// First receive time after it, where there is one.
     pub to: Option<MonoNs>,
@@ -177,10 +177,10 @@ impl fmt::Display for LossKind {
     fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Truncated => out.write_str("the file ends before its closing records"),
-            Self::Framing => out.write_str("bytes that are no records"),
+            Self::Framing => out.write_str("bytes that aren't records"),
             Self::Checksum => out.write_str("a chunk that fails its checksum"),
             Self::Contents => out.write_str("a chunk that does not unpack"),
-            Self::Unreadable(error) => write!(out, "the medium doesn't give them: {error}"),
+            Self::Unreadable(error) => write!(out, "the medium can't read them: {error}"),
             Self::Compression(name) => write!(out, "a chunk compressed as {name:?}; zstd and lz4 are known"),
             Self::TooLarge { limit } => {
                 write!(out, "larger than the {limit} bytes that are read into memory")
@@ -188,18 +188,18 @@ impl fmt::Display for LossKind {
             Self::Swells { limit } => {
                 write!(
                     out,
-                    "chunks that would unpack to over {limit} times the length of the log: they aren't"
+                    "chunks that would unpack to over {limit} times the length of the log: they are skipped"
                 )
             }
             Self::Window { limit } => {
                 write!(out, "a chunk whose unpacking would take more than {limit} bytes")
             }
             Self::Beyond { what, limit } => {
-                write!(out, "more than {limit} {}: those beyond aren't read", what.as_str())
+                write!(out, "more than {limit} {}: the rest isn't read", what.as_str())
             }
             Self::Stamped { messages, first } => write!(
                 out,
-                "{messages} messages stamped {first} ns or later: the latest time that is taken is {} ns",
+                "{messages} messages stamped {first} ns or later: the latest time allowed is {} ns",
                 LATEST.0
             ),
             Self::Missing { messages } => {
@@ -212,7 +212,7 @@ impl fmt::Display for LossKind {
                 write!(out, "{messages} messages are out of order: they follow messages with higher numbers")
             }
             Self::Misplaced => out.write_str(
-                "a chunk with a record that no chunk may have, such as another chunk: that record is not read",
+                "a chunk with a record that no chunk may contain, such as another chunk: that record is not read",
             ),
             Self::Attachment(name) => write!(out, "attachment {name:?} is damaged"),
             Self::Metadata(name) => write!(out, "metadata {name:?} is damaged"),
@@ -221,10 +221,10 @@ impl fmt::Display for LossKind {
             }
             Self::Conflict { channel } => write!(out, "channel {channel} is defined twice, differently"),
             Self::Displaced => out.write_str(
-                "whole records are missing or were put in: the summary begins elsewhere than the log says",
+                "whole records are missing or were inserted: the summary isn't where the log says",
             ),
             Self::DataSection => {
-                out.write_str("some byte has changed: the checksum over the whole log does not fit")
+                out.write_str("a byte has changed: the checksum over the whole log does not match")
             }
             Self::Stated(words) => out.write_str(words),
             Self::InPart { part, kind } => write!(out, "part {part}: {kind}"),
@@ -236,7 +236,7 @@ impl fmt::Display for LossKind {
 }
 
 impl LossKind {
-    /// As text, of a part that is missing or not as it should be.
+    /// Writes the text of a loss that concerns a whole part.
     fn write_of_part(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::PartsMissing { first, last: None } => {
@@ -257,7 +257,7 @@ impl LossKind {
                 write!(out, "part {part} can't be read: it begins with [{found}], which no MCAP file does")
             }
             Self::PartByName { part } => {
-                write!(out, "part {part} doesn't say which part it is; taken for that by its name")
+                write!(out, "part {part} doesn't state its number, which was taken from its name")
             }
             _ => Ok(()),
         }
@@ -311,12 +311,12 @@ impl Losses {
         &mut self.0
     }
 
-    /// Whether further losses only extend the last.
+    /// Whether the list is full, so that further losses only extend the last entry.
     pub(super) fn is_full(&self) -> bool {
         self.0.len() >= MAX_LOSSES
     }
 
-    /// Adds a range to the loss of that kind, which is listed once.
+    /// Adds a range to the loss of that kind; each kind is listed once.
     pub(super) fn extend(&mut self, kind: LossKind, offset: u64, bytes: u64) {
         if let Some(known) = self.0.iter_mut().rev().find(|loss| loss.kind == kind) {
             known.bytes = known.bytes.saturating_add(bytes);

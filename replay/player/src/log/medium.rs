@@ -1,14 +1,14 @@
-//! A log's medium, some of which may fail to be read.
+//! A log's medium, parts of which may be unreadable.
 
 use std::io::{Error, ErrorKind, Read, Result, Seek, SeekFrom};
 use std::ops::Range;
 
-/// What is taken for unreadable together: a sector of a disk.
+/// Smallest unit treated as unreadable: a sector of a disk.
 const SECTOR_BYTES: u64 = 512;
-/// Ranges that are told apart; more are taken together with what lies between them.
+/// Maximum number of unreadable ranges kept apart; further ones are joined, including the bytes between them.
 const MOST_RANGES: usize = 1024;
 
-/// Reads zeros in place of what the medium fails to give, and keeps where that was: what lies elsewhere may be sound.
+/// Returns zeros for unreadable bytes and records their ranges; content elsewhere may be intact.
 pub(super) struct Medium<R> {
     input: R,
     at: u64,
@@ -19,7 +19,9 @@ pub(super) struct Medium<R> {
 }
 
 impl<R: Read + Seek> Medium<R> {
-    /// Errors: the length can't be had.
+    /// Creates the medium.
+    ///
+    /// Errors: the length can't be determined.
     pub(super) fn new(mut input: R) -> Result<Self> {
         let len = input.seek(SeekFrom::End(0))?;
         input.rewind()?;
@@ -35,7 +37,7 @@ impl<R: Read + Seek> Medium<R> {
         self.failed.iter().any(|failed| failed.start < part.end && part.start < failed.end)
     }
 
-    /// What couldn't be read so far, as far as it was tried.
+    /// The ranges found unreadable so far.
     pub(super) fn failed(&self) -> &[Range<u64>] {
         &self.failed
     }

@@ -1,4 +1,4 @@
-//! Merges the messages of the pieces in memory into order.
+//! Merges the messages of the pieces in memory into one order.
 
 use core::cmp::Reverse;
 use std::collections::BinaryHeap;
@@ -6,7 +6,7 @@ use std::collections::binary_heap::PeekMut;
 
 use super::fields::{Fields, MessageHead};
 
-/// Used-up batches whose memory is kept, and the most of each, bytes: as much as our own chunks take.
+/// Number of used-up batches kept for reuse, and the most bytes of each, enough for one chunk of this program's logs.
 const KEPT: usize = 4;
 const KEPT_BYTES: usize = 3 << 20;
 
@@ -50,7 +50,7 @@ impl Batch {
     }
 }
 
-/// Order of messages: by time, rank and sequence where requested, then by position in the file.
+/// Sort key of messages: time, rank and sequence if requested, then the position in the file.
 type Key = (u64, u32, u32, usize, usize);
 
 /// The pieces in memory.
@@ -88,9 +88,9 @@ impl Merge {
         self.heads.peek().map(|Reverse(((time, ..), _))| *time)
     }
 
-    /// An empty batch to fill, with the memory of a used-up one.
+    /// An empty batch to fill, which reuses the memory of a used-up one.
     pub(super) fn empty_batch(&mut self) -> Batch {
-        // Not before: the bytes of the message taken last may be in one of them.
+        // Released only here, because the bytes of the last returned message may be in one of them.
         for slot in self.released.drain(..) {
             if let Some(batch) = self.batches.get_mut(slot)
                 && (batch.memory() > KEPT_BYTES || self.spare.len() >= KEPT)
@@ -105,7 +105,7 @@ impl Merge {
         batch
     }
 
-    /// Adds the messages of piece `span`, starting with number `next`.
+    /// Adds the messages of piece `span`, starting with message number `next`.
     pub(super) fn add(&mut self, span: usize, mut batch: Batch, next: usize) {
         if self.by_time {
             batch.entries.sort_by_key(|entry| (entry.head.log_time, entry.rank, entry.head.sequence));
@@ -144,7 +144,7 @@ impl Merge {
         let batch = self.batches.get_mut(slot)?;
         let entry = *batch.entries.get(batch.next)?;
         batch.next += 1;
-        // The next message overall is usually from the same batch: it stays at the top.
+        // The next message is usually from the same batch, which then stays at the top.
         if let Some(key) = key(self.by_time, span, batch) {
             *head = Reverse((key, slot));
         } else {

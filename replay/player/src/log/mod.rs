@@ -1,33 +1,34 @@
-//! The dive log: an MCAP file with the bytes of every device as received, the order in which the loop consumed them, and
-//! the loop's results.
+//! The dive log: an MCAP file with the received bytes of every device, their order of consumption, and the loop's
+//! results.
 //!
-//! [`mod@format`] names channels and metadata and lays out `/loop/tick`. [`LogWriter`] writes a log, [`Recorder`] does so
-//! on a thread of its own behind a lock-free queue, and [`LogReader`] reads logs, ours and others', whole or damaged.
+//! [`mod@format`] names channels and metadata and defines `/loop/tick`. [`LogWriter`] writes a log. [`Recorder`] writes
+//! one on its own thread behind a lock-free queue. [`LogReader`] reads logs of this program and of others, intact or
+//! damaged.
 //!
-//! A log that we write, in the order of the file:
+//! A log of this program, in file order:
 //!
 //! | record | content |
 //! |---|---|
 //! | metadata `headrace` | [`format::FORMAT_KEY`] and the caller's entries: version, digest of the configuration, clock anchors |
-//! | metadata `headrace.part` | only of a recording: identity of this part of it ([`PartHead`]) |
+//! | metadata `headrace.part` | only in a recording: identity of this part ([`PartHead`]) |
 //! | attachments | `vehicle.toml` and the files that it names |
 //! | a chunk | definitions of all channels, nothing else |
 //! | metadata `headrace.channels` | the same definitions again, so that a log survives the loss of that chunk |
-//! | metadata `headrace.losses` | only where something is missing: description and time span ([`format::LOSSES`]) |
+//! | metadata `headrace.losses` | only if something is missing: description and time span ([`format::LOSSES`]) |
 //! | chunks | messages, each chunk at most half a second of a dive |
-//! | metadata `headrace.part.end` | only of a recording: whether another part follows ([`PartEnd`]) |
+//! | metadata `headrace.part.end` | only in a recording: whether another part follows ([`PartEnd`]) |
 //! | summary | indexes for viewers |
 //!
-//! [`DiveLog`] reads one log, or the parts of a recording as one.
+//! [`DiveLog`] reads one log, or the parts of a recording as one. Recordings of voice notes ([`voice`]) have their own
+//! chunks.
 //!
-//! Recordings of voice notes ([`voice`]) have chunks of their own.
+//! The message numbers of a channel have no gaps and continue in the next part. In this program's logs, readers report
+//! a gap as removed, repeated or moved records. A closed log of this program without a summary has lost its end.
 //!
-//! The numbers of a channel's messages have no gaps in a log and go on in the next part. Readers report where ours have:
-//! records were removed, repeated or moved. A log of ours that is closed without a summary has lost its end.
-//!
-//! The file is append-only: written bytes are never modified, so a power cut can't damage them. After an error of the medium a
-//! file is left as it is, without an end, and the recording goes on in another part, which repeats what wasn't synced: its
-//! [`PartHead`] says from which message of each channel on. Readers leave these out of the part before.
+//! The file is append-only: written bytes are never modified, so a power cut can't damage them. After an error of the
+//! medium a file is left without an end. The recording continues in another part, which repeats the messages that
+//! weren't synced. Its [`PartHead`] states the first repeated message of each channel, and readers skip these messages
+//! in the previous part.
 
 #![cfg_attr(not(test), warn(clippy::indexing_slicing))]
 

@@ -1,7 +1,7 @@
-//! Finds missing, repeated and reordered messages of our logs by their numbers.
+//! Finds missing, repeated and reordered messages in this program's logs by their message numbers.
 //!
-//! Each channel counts its messages, and the count goes on from part to part. Checksums cover one record each: they don't show
-//! that a whole record was removed, repeated or moved. The numbers do.
+//! Each channel counts its messages, and the count continues from part to part. A checksum covers one record; it can't
+//! show that a whole record was removed, repeated or moved. The numbers can.
 
 use std::collections::BTreeMap;
 
@@ -15,10 +15,10 @@ use super::part::{PART_END, Part};
 use super::scan::{Scan, Span};
 use super::{Loss, LossKind};
 
-/// Most runs that are kept of a channel. A whole log has one, and a few while pieces are read out of order.
+/// Maximum number of runs kept per channel. An intact log has one run, and a few while pieces are read out of order.
 const MAX_RUNS: usize = 64;
 
-/// Successive numbers of a channel: pieces and numbers of the first and last.
+/// Consecutive message numbers of a channel: pieces and numbers of the first and last.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 struct Run {
     pieces: (usize, usize),
@@ -34,17 +34,17 @@ struct Count {
     runs: Vec<Run>,
 }
 
-/// The numbers of all messages read so far.
+/// The message numbers of everything read so far.
 #[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub(super) struct Numbering {
     channels: BTreeMap<u16, Count>,
     /// Messages read.
     messages: u64,
-    /// Messages of the log according to its closing records.
+    /// Number of messages in the log according to its closing records.
     wanted: Option<u64>,
 }
 
-/// What is wrong with messages.
+/// Kind of numbering fault.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Fault {
     Missing,
@@ -52,20 +52,22 @@ enum Fault {
     Disordered,
 }
 
-/// A place between pieces where numbers don't follow each other.
+/// A place between pieces where consecutive numbers are interrupted.
 #[derive(Debug)]
 struct Break {
     fault: Fault,
     messages: u64,
-    /// First and last piece before which it may lie; the number of pieces stands for the end of the log.
+    /// First and last piece before which the break may lie; the number of pieces means the end of the log.
     pieces: (usize, usize),
 }
 
 impl Numbering {
-    /// Of a log with these channels, which ends at `end`; `None` of other writers' logs, which may number as they like. Reports
-    /// a part that has no end record and yet is closed.
+    /// Creates the numbering of a log with these channels that ends at `end`.
+    ///
+    /// `None` for logs of other writers, which may number as they like. Reports a part that is closed but has no end
+    /// record.
     pub(super) fn of(scan: &mut Scan, part: Option<&Part>, channels: &Channels, end: u64) -> Option<Self> {
-        // One that wasn't closed has a loss already.
+        // A log that wasn't closed has a loss already.
         if part.is_some_and(|part| part.end.is_none()) && scan.losses.list().is_empty() {
             let kind = LossKind::Metadata(PART_END.to_owned());
             scan.losses.push(Loss { kind, offset: end, bytes: 0, from: None, to: None });
@@ -84,14 +86,14 @@ impl Numbering {
     pub(super) fn add(&mut self, piece: usize, entries: &[Entry]) {
         for head in entries.iter().map(|entry| entry.head) {
             self.messages += 1;
-            // Messages of a channel that is defined nowhere are a loss of their own.
+            // Messages of an undefined channel are reported as a separate loss.
             if let Some(count) = self.channels.get_mut(&head.channel) {
                 count.add(piece, head.sequence);
             }
         }
     }
 
-    /// Adds the losses of a log that has been read to its end, apart from those at places with a known loss.
+    /// Adds the losses of a completely read log, except at places with a known loss.
     pub(super) fn report(&self, spans: &[Span], losses: &mut Losses) {
         let known = losses.list();
         let mut found: Vec<Break> = self.channels.values().flat_map(Count::breaks).collect();
@@ -118,43 +120,43 @@ impl Numbering {
         }
     }
 
-    /// How many of the messages that the log should have lack at its end, where no number skips them.
+    /// Number of messages missing at the log's end, where no gap in the numbers shows them.
     fn missing(&self, wanted: u64, found: &[Break]) -> u64 {
         let sum = |fault| found.iter().filter(|one| one.fault == fault).map(|one| one.messages).sum::<u64>();
         wanted.saturating_add(sum(Fault::Repeated)).saturating_sub(self.messages + sum(Fault::Missing))
     }
 }
 
-/// Whether a loss has nothing to do with the number of messages before the closing records.
+/// Whether a loss can't affect the number of messages before the closing records.
 fn is_elsewhere(known: &Loss) -> bool {
     matches!(known.kind, LossKind::Stated(_) | LossKind::Misplaced | LossKind::Truncated)
 }
 
-/// Whether a known loss may be the reason for a break between two offsets.
+/// Whether a known loss may explain a break between two offsets.
 fn explains(known: &Loss, (from, to): (u64, u64)) -> bool {
     match known.kind {
-        // A statement of the log's writer, which numbers only what it writes.
+        // Stated by the log's writer, which numbers only messages that it writes.
         LossKind::Stated(_) => false,
-        // One loss stands for several places.
+        // One such loss covers several places.
         LossKind::Swells { .. } | LossKind::Beyond { .. } | LossKind::Unreadable(_) => true,
         _ => known.offset <= to && from <= known.offset.saturating_add(known.bytes),
     }
 }
 
 impl Break {
-    /// Whether both may be the same place, with messages of two channels.
+    /// Whether both breaks may be the same place, seen in two channels.
     fn meets(&self, other: &Self) -> bool {
         let (first, last) = (self.pieces.0.max(other.pieces.0), self.pieces.1.min(other.pieces.1));
         self.fault == other.fault && first <= last
     }
 
-    /// Adds the messages of another channel. One with few messages leaves a wide gap, which the others narrow.
+    /// Narrows the place with the break of another channel. A channel with few messages leaves a wide gap.
     fn add(&mut self, other: &Self) {
         self.messages += other.messages;
         self.pieces = (self.pieces.0.max(other.pieces.0), self.pieces.1.min(other.pieces.1));
     }
 
-    /// Offsets in the file between which it lies.
+    /// File offsets between which the break lies.
     fn place(&self, spans: &[Span]) -> (u64, u64) {
         let before = self.pieces.0.checked_sub(1).and_then(|piece| spans.get(piece));
         let from = before.map_or(0, |span| span.end);
@@ -180,7 +182,7 @@ impl Break {
 
 impl Count {
     fn add(&mut self, piece: usize, number: u32) {
-        // Numbers wrap: this one is the nearest to the last.
+        // Numbers wrap at 32 bits; this picks the nearest one to the last.
         let near = self.runs.last().map_or(self.first, |run| run.last);
         let low = u64::from(number.wrapping_sub(low_word(near)));
         let ahead = low <= u64::from(u32::MAX / 2);
@@ -194,7 +196,7 @@ impl Count {
             return;
         };
         (run.last, run.pieces.1) = (number, piece);
-        // Pieces may be read in another order than they have in the file: this one may close a gap.
+        // Pieces may be read in another order than that of the file, so this one may close a gap.
         let after = self.runs.iter().position(|run| run.first == number + 1 && piece < run.pieces.0);
         let after =
             after.filter(|at| self.runs.get(*at).is_some_and(|run| self.is_clear(piece, run.pieces.0 - 1)));
@@ -207,12 +209,12 @@ impl Count {
         }
     }
 
-    /// Whether a run that ends in a piece may go on in another: it isn't before that, and no other run comes between.
+    /// Whether a run that ends in one piece may continue in another: later, and with no other run between.
     fn is_clear(&self, from: usize, to: usize) -> bool {
         from <= to && !self.runs.iter().any(|run| from < run.pieces.1 && run.pieces.0 <= to)
     }
 
-    /// The places where the numbers don't follow each other, or do so elsewhere in the file.
+    /// The places where consecutive numbers are interrupted, or continue elsewhere in the file.
     fn breaks(&self) -> Vec<Break> {
         let mut runs = self.runs.clone();
         runs.sort_by_key(|run| (run.first, run.pieces));

@@ -1,9 +1,11 @@
 //! Metadata of a log that is one part of a dive's recording.
 //!
-//! Metadata `headrace.part`, before the first message: `dive`, `number` (from 1), and the totals of the earlier parts: `messages`
-//! of all channels, `tick` (index of the last, or `-`), `sequence<topic>` (number of each channel's next message).
-//! Metadata `headrace.part.end`, after the last message: `messages` and `tick` again, including this part, and `follows`: `yes`
-//! where the recording continues in the next part, `no` where the dive ended.
+//! The record `headrace.part` comes before the first message. It has `dive`, `number` (from 1), and the totals of the
+//! earlier parts: `messages` of all channels, `tick` (index of the last, or `-`), and `sequence<topic>` (number of each
+//! channel's next message).
+//!
+//! The record `headrace.part.end` comes after the last message. It has `messages` and `tick` including this part. Its
+//! `follows` is `yes` if the recording continues in the next part, `no` if the dive ended.
 
 use std::collections::BTreeMap;
 use std::ffi::OsStr;
@@ -23,7 +25,7 @@ const MESSAGES_KEY: &str = "messages";
 const TICK_KEY: &str = "tick";
 const FOLLOWS_KEY: &str = "follows";
 const SEQUENCE_PREFIX: &str = "sequence";
-/// Precedes the part number in a part's file name.
+/// Text before the part number in a part's file name.
 const NAME_MARK: &str = ".part";
 /// Digits of a dive's identifier.
 const DIVE_DIGITS: usize = 16;
@@ -68,7 +70,7 @@ pub struct Part {
     pub end: Option<PartEnd>,
 }
 
-/// A unique identifier of a recording: a digest of the numbers given, such as start times.
+/// Unique identifier of a recording: a digest of numbers such as start times.
 pub fn dive_name(moment: &[u64]) -> String {
     let mut hasher = Sha256::new();
     for word in moment {
@@ -120,7 +122,7 @@ impl Progress {
         })
     }
 
-    /// Whether both have the same totals, apart from the topics' sequence numbers.
+    /// Whether both have the same totals, apart from the sequence numbers of topics.
     pub(super) fn meets(&self, other: &Self) -> bool {
         (self.messages, self.tick) == (other.messages, other.tick)
     }
@@ -158,7 +160,7 @@ impl PartEnd {
 }
 
 impl Part {
-    /// Messages of this part alone, by the totals at its two ends.
+    /// Messages of this part alone, computed from the totals at its two ends.
     pub(super) fn messages(&self) -> Option<u64> {
         self.end.as_ref()?.after.messages.checked_sub(self.head.before.messages)
     }
@@ -189,7 +191,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn parts_have_names_that_sort_and_say_which_they_are() {
+    fn part_names_sort_and_contain_the_number() {
         let recording = Path::new("logs/gate 3.mcap");
         let names: Vec<PathBuf> = [1, 2, 10, 100].map(|number| part_path(recording, number)).into();
         assert_eq!(names.first(), Some(&PathBuf::from("logs/gate 3.part001.mcap")));
@@ -204,7 +206,7 @@ mod tests {
     }
 
     #[test]
-    fn what_a_part_says_comes_out_as_it_went_in() {
+    fn part_records_are_read_back_as_written() {
         let before = Progress { messages: 7, tick: None, sequences: [("/raw/a".to_owned(), 3)].into() };
         let head = PartHead { dive: dive_name(&[1, 2]), number: 2, before };
         let after = Progress { messages: 9, tick: Some(4), sequences: BTreeMap::new() };

@@ -26,7 +26,7 @@ pub struct Full {
 /// Header of each entry in the queue: kind, a spare byte, number, length, log time, publish time.
 pub(super) const ENTRY_HEAD_BYTES: usize = 24;
 
-/// State shared by the ends of a recorder, apart from the queue.
+/// State shared by both ends of a recorder, apart from the queue.
 pub(super) struct State {
     pub(super) stopping: AtomicBool,
     /// Whether nothing empties the queue any more.
@@ -35,38 +35,38 @@ pub(super) struct State {
     pub(super) failing: AtomicBool,
     /// Ticks that this recorder was too far behind to take.
     pub(super) gaps: ArrayQueue<Gap>,
-    /// Log times, ns: of the last tick that the loop has handed over or skipped, and up to which all is certain to be on the medium, or
-    /// given up. 0 before the first.
+    /// Log time of the last tick that the loop handed over or skipped, and log time up to which data is synced or given
+    /// up, ns. Both are 0 before the first.
     pub(super) handed_ns: AtomicU64,
     pub(super) certain_ns: AtomicU64,
-    /// Steps taken, by which a recorder that is stuck is told from one that is slow.
+    /// Number of steps; it distinguishes a stuck recorder from a slow one.
     pub(super) steps: AtomicU64,
-    /// News for those who watch the dive; the oldest are dropped.
+    /// Events for those who watch the dive; the oldest are dropped.
     pub(super) events: ArrayQueue<RecordingEvent>,
     /// Bytes that the port threads sent to the devices, which don't pass through the loop.
     pub(super) sent: ArrayQueue<SentMessage>,
     pub(super) sent_dropped: AtomicU64,
-    /// Packets that lines dropped before the loop could take them.
+    /// Packets that the lines dropped before the loop could receive them.
     pub(super) dropped: ArrayQueue<Dropped>,
-    /// Those of which there was no room to say more.
+    /// Number of dropped packets that didn't fit in `dropped`.
     pub(super) dropped_besides: AtomicU64,
     /// Recordings of voice notes, which don't pass through the loop either.
     pub(super) voices: ArrayQueue<Vec<u8>>,
-    /// Whether the recorder takes no further one: set before it takes the last.
+    /// Whether the recorder accepts no further voice recording; set before it takes the last one.
     pub(super) voices_end: AtomicBool,
     pub(super) results_missing: AtomicU64,
 }
 
 impl State {
-    /// The loop has handed over, or skipped, a tick.
+    /// Records that the loop has handed over or skipped a tick.
     pub(super) fn hand(&self, now: MonoNs) {
-        // What came before the first tick is no time of the dive.
+        // Data from before the first tick doesn't belong to the dive's time.
         if self.handed_ns.swap(now.0, Ordering::Relaxed) == 0 {
             self.certain_ns.fetch_max(now.0, Ordering::Relaxed);
         }
     }
 
-    /// Time of the dive that isn't certain to be on the medium yet.
+    /// Dive time that isn't certain to be on the medium yet.
     pub(super) fn unsafe_for(&self) -> DurNs {
         let certain = MonoNs(self.certain_ns.load(Ordering::Relaxed));
         DurNs(MonoNs(self.handed_ns.load(Ordering::Relaxed)).since(certain).0.max(0))
@@ -78,7 +78,7 @@ impl State {
 pub(super) struct Gap {
     /// Times of the first and last of them.
     pub(super) span: (MonoNs, MonoNs),
-    /// Packets of these ticks.
+    /// Number of packets of these ticks.
     pub(super) packets: u64,
 }
 
@@ -89,16 +89,16 @@ pub(super) struct SentMessage {
     pub(super) bytes: Vec<u8>,
 }
 
-/// Packets of a source that were dropped before the loop could take them.
+/// Packets of a source that were dropped before the loop could receive them.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Dropped {
     pub(super) source: u16,
-    /// Times between which.
+    /// First and last time between which they were dropped.
     pub(super) span: (MonoNs, MonoNs),
     pub(super) packets: u64,
 }
 
-/// Logs what goes on on devices' lines beside the loop, from any thread.
+/// Logs traffic on the devices' lines that bypasses the loop, from any thread.
 #[derive(Clone)]
 pub struct LinePort {
     pub(super) state: Arc<State>,
@@ -113,14 +113,14 @@ impl LinePort {
         }
     }
 
-    /// States in the log that packets of `source` were dropped between two times, before the loop could take them. Never blocks.
+    /// Records in the log that packets of `source` were dropped between two times. Never blocks.
     pub fn lost(&self, source: u16, from: MonoNs, to: MonoNs, packets: u64) {
         if let Some(oldest) = self.state.dropped.force_push(Dropped { source, span: (from, to), packets }) {
             self.state.dropped_besides.fetch_add(oldest.packets, Ordering::Relaxed);
         }
     }
 
-    /// Number of messages sent that were dropped.
+    /// Number of sent messages that were dropped.
     pub fn sent_dropped(&self) -> u64 {
         self.state.sent_dropped.load(Ordering::Relaxed)
     }
@@ -168,15 +168,16 @@ impl<R: ByteProducer> Entries<R> {
         Ok(())
     }
 
-    /// The message, or a part of it.
+    /// Appends the message, or a part of it.
     pub(super) fn put(&mut self, bytes: &[u8]) {
         self.ring.push(bytes);
     }
 }
 
-/// Works until it is told to stop and nothing is left: `work` says how much it found to do, `idle` waits a little.
+/// Works until `is_stopping` returns true and nothing is left.
 ///
-/// The flag is read before the queue is looked at, so that what was pushed before it was set is taken.
+/// `work` returns the amount of work it found; `idle` waits briefly. The flag is read before the queue, so that
+/// everything pushed before the flag was set is processed.
 pub(super) fn until_stopped(
     is_stopping: impl Fn() -> bool,
     mut work: impl FnMut() -> usize,
@@ -199,7 +200,7 @@ pub(super) struct Queue<R: ByteConsumer = Cons<Arc<HeapRb<u8>>>> {
     pub(super) message: Vec<u8>,
 }
 
-/// However the recorder ends, the loop doesn't wait for it.
+/// Marks the recorder as closed however it ends, so that the loop doesn't wait for it.
 pub(super) struct ClosedWhenDropped(pub(super) Arc<State>);
 
 impl Drop for ClosedWhenDropped {
@@ -216,7 +217,7 @@ pub(super) struct Entry {
 }
 
 impl<R: ByteConsumer> Queue<R> {
-    /// The next entry, if all of it is there; its message is then in `message`.
+    /// Takes the next entry if it is complete; its message is then in `message`.
     pub(super) fn take(&mut self) -> Option<Entry> {
         let mut head = [0; ENTRY_HEAD_BYTES];
         if self.ring.peek(&mut head) < ENTRY_HEAD_BYTES {
@@ -264,7 +265,8 @@ mod tests {
         entries.put(&message(number));
     }
 
-    /// A loop that pushes two entries and then sets the flag, and a recorder that takes until `until` ends it.
+    /// Explores a loop that pushes two entries and sets the flag, against a recorder that takes entries until `until`
+    /// ends it.
     fn explored<R: ByteConsumer + 'static>(
         name: &str,
         reading: fn(ModelConsumer) -> R,
@@ -301,10 +303,9 @@ mod tests {
         until_stopped(is_stopping, work, loom::thread::yield_now);
     }
 
-    /// However loop and recorder interleave, entries come out whole and in order, and none that was pushed before the stop is
-    /// left in the queue.
+    /// In every interleaving of loop and recorder, entries arrive whole and in order, and none remains in the queue.
     #[test]
-    fn entries_are_taken_whole_and_all_of_them_before_the_stop() {
+    fn all_entries_are_taken_whole_before_the_stop() {
         let name = "header then body in the recorder's queue, and its stop";
         let executions = explored(name, |consumer| consumer, as_it_is);
         assert!(executions > 50, "{executions}");
@@ -312,13 +313,13 @@ mod tests {
 
     #[test]
     #[should_panic = "assertion `left == right` failed"]
-    fn a_recorder_that_takes_the_header_for_the_entry_is_found() {
+    fn exploration_finds_a_recorder_that_takes_incomplete_entries() {
         explored("the recorder's queue, a message not waited for", Hasty, as_it_is);
     }
 
     #[test]
     #[should_panic = "assertion `left == right` failed"]
-    fn a_recorder_that_looks_at_the_flag_last_is_found() {
+    fn exploration_finds_a_recorder_that_reads_the_flag_last() {
         explored(
             "the recorder's stop, the flag read last",
             |consumer| consumer,

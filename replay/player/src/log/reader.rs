@@ -1,4 +1,4 @@
-//! Reads logs, ours and others', intact or damaged, one piece at a time.
+//! Reads logs of this program and of others, intact or damaged, one piece at a time.
 
 use std::collections::BTreeMap;
 use std::fs::File;
@@ -23,26 +23,28 @@ use super::scan::{FoundDefinitions, Piece, Span, beyond, date_losses, scan};
 use super::{LogError, Loss, LossKind, Many, SourceInfo};
 use crate::regular_file;
 
-/// First opcode of the records that other programs may define. Source: MCAP format specification, "Records".
+/// First opcode that other programs may define. Source: MCAP format specification, "Records".
 const PRIVATE: u8 = 0x80;
 
 /// A log's header.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct LogInfo {
-    /// Text of the vehicle file, where the log has one that is valid text.
+    /// Text of the vehicle file, if the log has one and it is valid UTF-8.
     pub vehicle_toml: Option<String>,
-    /// The other attachments: name and content.
+    /// Name and content of the other attachments.
     pub attachments: Vec<(String, Vec<u8>)>,
-    /// Metadata: of our own record by key, of others as `<name of the record>/<key>`.
+    /// Metadata: entries of this program's record by key, of other records by `<name of the record>/<key>`.
     pub metadata: BTreeMap<String, String>,
-    /// The sources; a source's index is its number in [`MessageKind`]. Numbered by the channels' metadata where these
-    /// number all of them (as in our logs), else by the names of `/raw/...` in order, then `/sent/...`.
+    /// The sources; a source's index is its number in [`MessageKind`].
+    ///
+    /// Sources are numbered by their channels' metadata if it numbers all of them, as in this program's logs. Otherwise
+    /// they are numbered by name: `/raw/...` first, then `/sent/...`.
     pub sources: Vec<SourceInfo>,
-    /// Part of a recording, where that has several.
+    /// Position in the recording, if it has several parts.
     pub part: Option<Part>,
 }
 
-/// ChannelKind of message.
+/// Kind of message.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum MessageKind<'a> {
     /// Bytes from a source.
@@ -64,18 +66,18 @@ pub enum MessageKind<'a> {
         /// Its topic.
         topic: &'a str,
     },
-    /// A channel that isn't ours.
+    /// A message of a channel that this program doesn't define.
     Other,
 }
 
 /// A message of a log.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct LogMessage<'a> {
-    /// ChannelKind.
+    /// Its kind.
     pub kind: MessageKind<'a>,
     /// Number of its channel.
     pub channel: u16,
-    /// Time of receipt, or of creation.
+    /// Time of receipt or of creation.
     pub log_time: MonoNs,
     /// Time of validity.
     pub publish_time: MonoNs,
@@ -90,9 +92,9 @@ pub struct LogMessage<'a> {
 pub struct LogPlace {
     /// Pieces read so far.
     read: usize,
-    /// Those of them with messages left: number, and messages taken.
+    /// Pieces read with messages left: piece number, and messages taken.
     open: Vec<(usize, usize)>,
-    /// Times of pieces already read, where their chunk headers were wrong.
+    /// Times of pieces already read whose chunk headers had wrong times.
     corrected: Vec<(usize, (u64, u64))>,
     latest: u64,
     late: u64,
@@ -110,22 +112,22 @@ pub struct ChannelInfo<'a> {
     pub id: u16,
     /// Its topic.
     pub topic: &'a str,
-    /// Message encoding; empty where not given.
+    /// Message encoding; empty if unknown.
     pub encoding: &'a str,
-    /// Name of its schema, where the log contains one.
+    /// Name of its schema, if the log contains it.
     pub schema: Option<&'a str>,
 }
 
 /// Reads a log.
 ///
-/// Opening scans the whole file once, without unpacking it, so the order of messages doesn't depend on the presence of a
-/// summary. A log with a `/loop/tick` channel is then read in file order. Others' logs are brought into the
-/// order of (log time, source, sequence): a piece (a chunk, or about a megabyte of messages outside chunks) is held
-/// from when its earliest message may be next, and overlapping pieces are merged. That is exact as long as
-/// overlapping pieces fit into 32 MiB and chunk headers have correct times; messages out of order are counted in
-/// [`LogReader::late`].
+/// Opening scans the whole file once without unpacking it. The order of messages therefore doesn't depend on a summary.
 ///
-/// Damage is not an error: readable messages are delivered, and [`LogReader::losses`] lists what is missing.
+/// A log with a `/loop/tick` channel is read in file order. Other logs are sorted by log time, source and sequence: a
+/// piece (a chunk, or about a megabyte of messages outside chunks) is held from the time of its earliest message on,
+/// and overlapping pieces are merged. The order is exact if overlapping pieces fit into 32 MiB and chunk headers have
+/// correct times. [`LogReader::late`] counts messages out of order.
+///
+/// Damage is not an error: readable messages are delivered, and [`LogReader::losses`] lists the missing ones.
 pub struct LogReader<R = File> {
     file: LogFile<R>,
     info: LogInfo,
@@ -134,7 +136,7 @@ pub struct LogReader<R = File> {
     losses: Losses,
     /// Pieces in file order.
     spans: Vec<Span>,
-    /// Times from chunk headers, by piece, where the messages had others.
+    /// Chunk header times, by piece, where those of the messages differ.
     stated: BTreeMap<usize, (u64, u64)>,
     /// Piece numbers in reading order.
     plan: Vec<u32>,
@@ -145,16 +147,16 @@ pub struct LogReader<R = File> {
     latest: u64,
     late: u64,
     finished: bool,
-    /// Message numbers of the pieces read so far, of a log of ours that is read from its beginning.
+    /// Message numbers of the pieces read so far; only for this program's logs read from the beginning.
     numbering: Option<Numbering>,
-    /// By channel, the message number from which on another log repeats its messages.
+    /// By channel, the first message number that the next log repeats.
     repeated: BTreeMap<u16, u32>,
 }
 
 impl LogReader<File> {
     /// Opens a log.
     ///
-    /// Errors: the file can't be read, isn't MCAP, or is of a later format.
+    /// Errors: the file can't be read, isn't MCAP, or has a later format.
     pub fn open(path: &Path) -> Result<Self, LogError> {
         let file = regular_file::open(path);
         let file = file.map_err(|source| LogError::Open { path: path.to_owned(), source })?;
@@ -211,7 +213,7 @@ impl<R: Read + Seek> LogReader<R> {
         &self.info
     }
 
-    /// Takes the attachments out of the header: they may be long, and are held once.
+    /// Takes the attachments out of the header, so that long ones are held only once.
     pub(super) fn take_attachments(&mut self) -> Vec<(String, Vec<u8>)> {
         core::mem::take(&mut self.info.attachments)
     }
@@ -221,12 +223,12 @@ impl<R: Read + Seek> LogReader<R> {
         self.channels.has(ChannelKind::Tick)
     }
 
-    /// Whether the log has a channel of voice notes' recordings.
+    /// Whether the log has a channel of voice recordings.
     pub(super) fn has_voices(&self) -> bool {
         self.channels.has(ChannelKind::Voice)
     }
 
-    /// Passes over what its chunks' headers say is earlier than this. Before the first message is read.
+    /// Skips chunks that end before `at` according to their headers; call before reading the first message.
     pub(super) fn pass_before(&mut self, at: MonoNs) {
         let is_due = |number: &u32| {
             self.spans.get(*number as usize).is_none_or(|span| !span.is_dated() || span.to >= at.0)
@@ -247,7 +249,7 @@ impl<R: Read + Seek> LogReader<R> {
         })
     }
 
-    /// Leaves out what comes after these totals. Before the first message is read.
+    /// Excludes the messages after these totals; call before reading the first message.
     pub(super) fn pass_over(&mut self, after: &Progress) {
         let number = |topic: &str| after.sequences.get(topic).copied().unwrap_or_default();
         self.repeated = self.channels.all().map(|channel| (channel.id, number(&channel.topic))).collect();
@@ -275,8 +277,10 @@ impl<R: Read + Seek> LogReader<R> {
         self.channels.sources()
     }
 
-    /// Damage found so far. Damage to the framing is known from the start, damage within chunks once they have
-    /// been read; the list is complete when [`LogReader::next`] has returned `None`.
+    /// Damage found so far.
+    ///
+    /// Damage to the framing is known after opening, damage within chunks after reading them. The list is complete when
+    /// [`LogReader::next`] has returned `None`.
     pub fn losses(&self) -> &[Loss] {
         self.losses.list()
     }
@@ -300,7 +304,7 @@ impl<R: Read + Seek> LogReader<R> {
 
     /// The next message, or `None` at the end.
     ///
-    /// Errors: an I/O error that isn't of some of the log's bytes; damage is not an error, nor what the medium fails to give.
+    /// Errors: an I/O error that doesn't concern particular bytes. Damage and unreadable bytes are losses, not errors.
     #[expect(
         clippy::should_implement_trait,
         reason = "messages borrow from the reader, which no Iterator allows"
@@ -361,8 +365,9 @@ impl<R: Read + Seek> LogReader<R> {
         }
     }
 
-    /// Continues from a position of this or another reader of the same file: messages, their order and losses are the same
-    /// as when the log is read straight through, whatever has been read in between.
+    /// Continues from a position of this or another reader of the same file.
+    ///
+    /// Messages, their order and losses are the same as in a straight read, whatever was read in between.
     ///
     /// Errors: an I/O error.
     pub fn go_to(&mut self, place: &LogPlace) -> Result<(), LogError> {
@@ -375,7 +380,7 @@ impl<R: Read + Seek> LogReader<R> {
         for (number, times) in &place.corrected {
             self.correct(*number, *times);
         }
-        // Messages of a channel that is defined only after the position are lost there, as when the log is read straight through.
+        // Messages before the definition of their channel are lost, as in a straight read.
         self.channels.go_to(&place.defined);
         for (number, next) in &place.open {
             self.read_span(*number, *next)?;
@@ -388,7 +393,7 @@ impl<R: Read + Seek> LogReader<R> {
         Ok(())
     }
 
-    /// Sets the times of a piece, and records those of its header.
+    /// Sets the times of a piece and stores those of its header.
     fn correct(&mut self, number: usize, times: (u64, u64)) {
         let Some(span) = self.spans.get_mut(number).filter(|span| (span.from, span.to) != times) else {
             return;
@@ -403,14 +408,14 @@ impl<R: Read + Seek> LogReader<R> {
         self.read_span(number, 0)
     }
 
-    /// Reads a piece, of which `next` messages have already been taken.
+    /// Reads a piece of which `next` messages have already been taken.
     fn read_span(&mut self, number: usize, next: usize) -> Result<(), LogError> {
         let mut batch = self.merge.empty_batch();
         let mut found = Vec::new();
         let Some(span) = self.spans.get(number).copied() else { return Ok(()) };
         self.fill(&span, &mut batch, &mut found)?;
         if self.file.medium().has_failed_within(&(span.at..span.end)) {
-            // Not all is covered by checksums.
+            // Checksums don't cover everything, so nothing of the piece is used.
             batch.clear();
             found = vec![LossKind::Unreadable(self.file.medium().error().to_owned())];
         }
@@ -447,7 +452,8 @@ impl<R: Read + Seek> LogReader<R> {
             return;
         }
         if self.losses.is_full() {
-            // Only the last one's length grows, and its time is found at the end; each search passes over all that is empty.
+            // Only the last loss grows, and its time is determined at the end, since each search skips everything
+            // empty.
             let (offset, bytes) = (span.at, span.end.saturating_sub(span.at));
             self.losses.push(Loss { kind, offset, bytes, from: None, to: None });
             return;
@@ -463,9 +469,10 @@ impl<R: Read + Seek> LogReader<R> {
         });
     }
 
-    /// Messages outside chunks are covered only by the checksum over the whole log, which is checked at the end of a log that
-    /// seems intact. It is not checked where there are chunks: the `mcap` crate's own writer gets it wrong when the chunks'
-    /// checksums are disabled.
+    /// Checks the checksum over the whole log at the end of a log that seems intact.
+    ///
+    /// Only this checksum covers messages outside chunks. It isn't checked in logs with chunks, because the `mcap`
+    /// crate's writer computes it wrongly when chunk checksums are disabled.
     fn finish(&mut self) -> Result<(), LogError> {
         if self.finished {
             return Ok(());
@@ -510,7 +517,7 @@ fn read_chunk<R: Read + Seek>(
     let unpacked = unpack(file, place, |opcode, body| match opcode {
         op::MESSAGE => sound &= batch.push(body),
         op::SCHEMA | op::CHANNEL => definitions.take(opcode, body),
-        // Readers pass over records of private kinds; all others have their place outside chunks.
+        // Readers skip records of private kinds; all other kinds belong outside chunks.
         opcode => misplaced |= opcode < PRIVATE,
     })?;
     if let Unpacked::Bad(kind) = unpacked {
@@ -556,7 +563,7 @@ fn read_run<R: Read + Seek>(file: &mut LogFile<R>, span: &Span, batch: &mut Batc
     Ok(())
 }
 
-/// Sets the ranks of messages, and removes those of unknown channels and times, and those that are repeated elsewhere.
+/// Sets the ranks of messages. Removes messages of unknown channels, impossible times, and those repeated elsewhere.
 fn place_entries(
     batch: &mut Batch,
     channels: &Channels,
@@ -566,7 +573,7 @@ fn place_entries(
     let mut unknown: BTreeMap<u16, u64> = BTreeMap::new();
     let (mut messages, mut first) = (0, u64::MAX);
     batch.entries.retain_mut(|entry| {
-        // Message numbers wrap.
+        // Message numbers wrap at 32 bits.
         let is_from = |number: &u32| entry.head.sequence.wrapping_sub(*number) <= u32::MAX / 2;
         if repeated.get(&entry.head.channel).is_some_and(is_from) {
             return false;

@@ -1,7 +1,7 @@
-//! The recorder: a log's writer on its own thread, behind a lock-free queue.
+//! The recorder: a log writer on its own thread, behind a lock-free queue.
 //!
 //! The loop must neither wait for a disk nor lose a byte. It checks [`RecorderPort::vacant_bytes`] before it consumes
-//! more, and leaves packets in their ports' rings while the queue is full.
+//! more packets, and leaves packets in their ports' rings while the queue is full.
 
 use std::io::{ErrorKind, Write};
 use std::path::Path;
@@ -29,25 +29,25 @@ use super::voice::VoicePort;
 use super::worker::RecorderWorker;
 use super::writer::{Lane, LogHeader, Summary};
 
-/// Sleep of the thread when the queue is empty. The loop can't wake it: that would be a system call.
+/// Sleep of the thread while the queue is empty. The loop can't wake the thread without a system call.
 const NAP: Duration = Duration::from_millis(2);
-/// Minimum queue size: fits the longest packet of a port, and a tick with many packets.
+/// Minimum queue size. It fits the longest packet of a port, and a tick with many packets.
 const MIN_QUEUE_BYTES: usize = 64 * 1024;
-/// Capacity for messages to devices: some seconds of eight heads.
+/// Capacity for messages to devices, enough for some seconds of eight heads.
 const SENT_MESSAGES: usize = 2048;
-/// Capacity for recordings of voice notes: a minute each, and at most 4 MiB.
+/// Capacity for voice recordings. Each lasts at most a minute and takes at most 4 MiB.
 const VOICES: usize = 8;
-/// How long a medium that neither takes anything nor fails is waited for at the end.
+/// Time to wait at the end for a medium that neither accepts data nor fails.
 const PATIENCE: Duration = Duration::from_secs(30);
-/// Capacity for news of the recording.
+/// Capacity for events of the recording.
 const EVENTS: usize = 64;
 
 /// Starts recorders.
 pub struct Recorder;
 
-/// The loop's end. Its methods don't block, allocate or make system calls.
+/// The loop's end of a recorder. Its methods don't block, allocate or make system calls.
 pub struct RecorderPort {
-    /// Without a cached index, so that the port is `Sync` and can be a resource of the loop's world.
+    /// Has no cached index, so that the port is `Sync` and can be a resource of the loop's world.
     entries: Entries,
     state: Arc<State>,
     result_channels: usize,
@@ -55,21 +55,23 @@ pub struct RecorderPort {
     gap: Option<Gap>,
 }
 
-/// Handle to stop the recorder. If dropped without [`RecorderHandle::finish`] it still completes the file, but errors
-/// are discarded.
+/// Handle to stop the recorder.
+///
+/// If dropped without [`RecorderHandle::finish`], it still completes the file, but errors are discarded.
 pub struct RecorderHandle {
     thread: Option<JoinHandle<Summary>>,
     state: Arc<State>,
-    /// How long a medium that neither takes anything nor fails is waited for at the end.
+    /// Time to wait at the end for a medium that neither accepts data nor fails.
     pub(super) patience: Duration,
-    /// When it was told to end, and whether it is waited for only so long in all.
+    /// Time of the request to end, and whether the waiting time is limited in total.
     ending: Option<(Instant, bool)>,
 }
 
 impl Recorder {
-    /// Starts a recorder that writes to `writer`, with a queue of `queue_bytes`. The header is written before this
-    /// returns. If flushing `writer` doesn't sync to the medium, a power cut loses more than a second. After an error there is
-    /// no other part to go on in.
+    /// Starts a recorder that writes to `writer`, with a queue of `queue_bytes`.
+    ///
+    /// The header is written before this returns. If flushing `writer` doesn't sync to the medium, a power cut loses
+    /// more than a second. After an error the recording ends, since there is no other part to continue in.
     ///
     /// Errors: the header could not be written, or the thread not started.
     pub fn start<W: Write + Send + 'static>(
@@ -83,12 +85,14 @@ impl Recorder {
         Self::spawn(begun)
     }
 
-    /// Starts a recorder that writes to new files on the disk, synced each half second. It warns when the disk fills, and then
-    /// drops echoes before anything else: [`Summary::left_out`]. `path` names the recording: its file, or with
-    /// [`Rotation::every`] its parts, see [`super::part_path`]. After an error it goes on in a further part: [`Summary::faults`].
+    /// Starts a recorder that writes to new files on disk and syncs them every half second.
     ///
-    /// Errors: as for [`Recorder::start`]; a file exists that is this recording or would be taken for a part of it (a dive is
-    /// never overwritten), or can't be created.
+    /// It warns when the disk fills, then drops echoes before anything else: [`Summary::left_out`]. `path` names the
+    /// recording: its file or, with [`Rotation::every`], its parts, see [`super::part_path`]. After an error the
+    /// recording continues in a further part: [`Summary::faults`].
+    ///
+    /// Errors: as for [`Recorder::start`]; a file can't be created; or a file exists that is this recording or looks
+    /// like a part of it. A dive is never overwritten.
     pub fn create(
         path: &Path,
         header: &LogHeader,
@@ -103,9 +107,11 @@ impl Recorder {
         Self::spawn(Self::unthreaded(Box::new(Disk), path, header, rotation, queue_bytes, derived)?)
     }
 
-    /// A recorder whose steps the caller takes, on any storage. The header is written and synced before this returns.
+    /// Creates a recorder without a thread, on any storage; the caller runs its steps.
     ///
-    /// Errors: the first part can't be created, or its header not be written.
+    /// The header is written and synced before this returns.
+    ///
+    /// Errors: the first part can't be created, or its header can't be written.
     pub fn unthreaded(
         storage: Box<dyn Storage>,
         path: &Path,
@@ -143,7 +149,7 @@ impl Recorder {
         Ok((port, RecorderWorker::new(queue, recording, header, derived, state)))
     }
 
-    /// Takes a recorder's steps on a thread of its own.
+    /// Runs a recorder's steps on its own thread.
     ///
     /// Errors: the thread could not be started.
     pub(super) fn spawn(
@@ -209,11 +215,12 @@ impl RecorderPort {
         self.state.results_missing.fetch_add(1, Ordering::Relaxed);
     }
 
-    /// Skips a tick of so many packets, for which there is no room. The log states it; the first one is told.
+    /// Skips a tick of `packets` packets for which there is no room. The log states it; the first skip is reported as
+    /// an event.
     pub fn skip(&mut self, at: MonoNs, packets: u64) {
         self.state.hand(at);
         if self.gap.is_none() {
-            // Where nobody takes them there is no room, and nobody to tell.
+            // If nobody reads the events, the queue is full and the event isn't needed.
             self.state.events.push(RecordingEvent::Behind).ok();
         }
         let gap = self.gap.get_or_insert(Gap { span: (at, at), packets: 0 });
@@ -241,17 +248,17 @@ impl RecorderPort {
         self.entries.ring.capacity().get()
     }
 
-    /// Bytes in the queue of an entry with a message of `len` bytes.
+    /// Bytes that an entry with a message of `len` bytes takes in the queue.
     pub const fn entry_bytes(len: usize) -> usize {
         ENTRY_HEAD_BYTES.saturating_add(len)
     }
 
-    /// Bytes in the queue of the entry of a tick that consumed `packets`.
+    /// Bytes that the entry of a tick with `packets` packets takes in the queue.
     pub const fn tick_entry_bytes(packets: usize) -> usize {
         Self::entry_bytes(TICK_HEAD_BYTES.saturating_add(packets.saturating_mul(2)))
     }
 
-    /// Whether the recorder has ended and takes nothing more.
+    /// Whether the recorder has ended and accepts nothing more.
     pub fn is_closed(&self) -> bool {
         self.state.closed.load(Ordering::Acquire)
     }
@@ -262,7 +269,7 @@ impl RecorderPort {
         Ok(())
     }
 
-    /// Ends a stretch of skipped ticks. If there is no room to say so, it is told with the next.
+    /// Ends a stretch of skipped ticks. If there is no room to state it, it is stated with the next stretch.
     fn end_gap(&mut self) {
         if let Some(gap) = self.gap.take() {
             self.gap = self.state.gaps.push(gap).err();
@@ -272,7 +279,7 @@ impl RecorderPort {
         }
     }
 
-    /// Begins an entry with a message of `len` bytes. What was skipped before it is told before it.
+    /// Begins an entry with a message of `len` bytes, after a statement of any skipped ticks.
     fn begin(&mut self, lane: Lane, log_time: MonoNs, publish_time: MonoNs, len: usize) -> Result<(), Full> {
         if Self::entry_bytes(len) <= self.vacant_bytes() {
             self.end_gap();
@@ -294,18 +301,19 @@ impl RecorderHandle {
         self.state.failing.load(Ordering::Acquire)
     }
 
-    /// What has happened to the recording, once each, oldest first.
+    /// The next event of the recording, oldest first; each is returned once.
     pub fn next_event(&self) -> Option<RecordingEvent> {
         self.state.events.pop()
     }
 
-    /// Time of the dive that a power cut would lose now, as far as the loop has recorded it: from what is certain to be on the medium to
-    /// the last tick. What was given up after an error counts as certain.
+    /// Dive time that a power cut would lose now: from the last synced message to the last tick.
+    ///
+    /// Messages given up after an error count as synced.
     pub fn unsafe_for(&self) -> DurNs {
         self.state.unsafe_for()
     }
 
-    /// A port for what goes on on devices' lines beside the loop.
+    /// A port for traffic on devices' lines that bypasses the loop.
     pub fn line_port(&self) -> LinePort {
         LinePort { state: Arc::clone(&self.state) }
     }
@@ -315,8 +323,9 @@ impl RecorderHandle {
         VoicePort { state: Arc::clone(&self.state) }
     }
 
-    /// Tells the thread to end, and doesn't wait for it: several recorders end in the time of the slowest. With `in_time` it is waited for
-    /// 30 s in all, and not as long as it makes progress.
+    /// Tells the thread to end without waiting for it, so that several recorders end in the time of the slowest.
+    ///
+    /// With `in_time` the total wait is 30 s; otherwise waiting continues while there is progress.
     #[expect(clippy::disallowed_methods, reason = "how long a medium is waited for is wall time")]
     pub fn begin_to_end(&mut self, in_time: bool) {
         self.ending.get_or_insert((Instant::now(), in_time));
@@ -326,9 +335,9 @@ impl RecorderHandle {
         }
     }
 
-    /// Writes the rest of the queue and the summary, and ends the thread. Errors of writing are in [`Summary::faults`].
+    /// Writes the rest of the queue and the summary, and ends the thread. Write errors are in [`Summary::faults`].
     ///
-    /// Errors: the thread panicked, or its medium neither takes anything nor fails.
+    /// Errors: the thread panicked, or its medium neither accepts data nor fails.
     pub fn finish(mut self) -> Result<Summary, LogError> {
         self.stop().unwrap_or(Err(LogError::Panicked))
     }
@@ -344,7 +353,7 @@ impl RecorderHandle {
             if now != steps && !in_time {
                 (steps, since) = (now, Instant::now());
             } else if since.elapsed() > self.patience {
-                // Nothing ends a thread that waits for its medium; it ends with the program.
+                // A thread that waits for its medium can't be stopped; it ends with the program.
                 return Some(Err(LogError::Stuck { waited_s: self.patience.as_secs() }));
             }
             thread::sleep(NAP);

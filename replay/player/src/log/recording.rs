@@ -1,8 +1,10 @@
-//! A recording in its parts. A part that can't be written on is left as it is, never ended; another is begun, and what
-//! wasn't certain to be in the last one is written again.
+//! A recording in its parts.
 //!
-//! After an error nothing that was written since the last sync can be relied on (a file system may forget it and report
-//! success the next time), so messages are kept in memory until they are synced.
+//! A part that can't be written any more is left without an end. Another part is begun, and messages that may be
+//! missing from the last one are written again.
+//!
+//! After an error, nothing written since the last sync is reliable: a file system may discard it and report success the
+//! next time. Messages are therefore kept in memory until they are synced.
 
 use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
@@ -18,16 +20,16 @@ use super::rotate::{Every, Rotation};
 use super::storage::{Buffered, Storage, Taken};
 use super::writer::{Lane, LogHeader, LogWriter, PartSummary, Summary};
 
-/// A sync is due once so much isn't certain, bytes.
+/// Unsynced bytes after which a sync is due.
 const SYNC_BYTES: usize = 4 << 20;
-/// Wait after the second vain attempt to go on; doubled after each other. The first is made at once.
+/// Wait after the second failed attempt to continue; doubled after each further one. The first retry is immediate.
 const FIRST_WAIT: Duration = Duration::from_millis(250);
 const LONGEST_WAIT: Duration = Duration::from_secs(8);
-/// Attempts at writing the rest when the dive has ended.
+/// Attempts to write the rest after the dive has ended.
 const LAST_ATTEMPTS: u32 = 3;
-/// Most statements kept for a part that can't be begun yet.
+/// Maximum number of statements kept for a part that can't be begun yet.
 const MAX_STATEMENTS: usize = 100;
-/// Names tried for a part, where files with that name are there already.
+/// Number of names tried for a part if files with these names exist.
 const NAMES: u32 = 1000;
 
 /// The part being written.
@@ -36,19 +38,19 @@ struct OpenPart {
     log: LogWriter<Buffered>,
     /// Log time of its first message, or of the last failed rotation.
     began: Option<MonoNs>,
-    /// File size from which it is due to end, bytes.
+    /// File size at which the part should end, bytes.
     ends_at: u64,
-    /// Whether nothing but its header is certain.
+    /// Whether only its header is synced.
     fresh: bool,
-    /// Messages from sources that are certain.
+    /// Number of synced messages from sources.
     raw_messages: u64,
-    /// Messages that are certain, and their bytes.
+    /// Number of synced messages, and their bytes.
     certain: (u64, u64),
     /// Log time of the last message before it.
     before: Option<MonoNs>,
 }
 
-/// Time without a part that can be written on.
+/// A period without a part that can be written.
 struct Outage {
     fault: RecordingFault,
     retry_at: Duration,
@@ -63,22 +65,22 @@ pub(super) struct Recording {
     storage: Box<dyn Storage>,
     path: PathBuf,
     rotation: Rotation,
-    /// Header of every part; `part` is set for each.
+    /// Header of every part; `part` is set for each part.
     header: LogHeader,
     open: Option<OpenPart>,
-    /// Number of the last part that has anything in it.
+    /// Number of the last part with any content.
     number: u32,
     /// Number in the name of the last part.
     named: u32,
-    /// Totals of what is certain or lost: what comes before the backlog.
+    /// Totals of messages that are synced or lost: everything before the backlog.
     settled: Tally,
     backlog: Backlog,
-    /// Statements that aren't certain yet.
+    /// Statements that aren't synced yet.
     statements: Vec<Statement>,
-    /// Whether packets have been written whose tick hasn't.
+    /// Whether packets have been written whose tick hasn't been written yet.
     within_tick: bool,
     outage: Option<Outage>,
-    /// Messages of channels that the header doesn't have, and the first of these channels.
+    /// Number of messages for channels that the header doesn't have, and the first of these channels.
     refused: Option<(u64, Lane)>,
     sum: Summary,
     events: Vec<RecordingEvent>,
@@ -123,7 +125,7 @@ impl Recording {
         self.storage.free_bytes(&self.path)
     }
 
-    /// Log time of the last message that is certain, or given up.
+    /// Log time of the last message that is synced or given up.
     pub(super) fn certain_to(&self) -> Option<MonoNs> {
         self.settled.last
     }
@@ -133,12 +135,12 @@ impl Recording {
         self.open.is_none()
     }
 
-    /// News since the last call.
+    /// Events since the last call.
     pub(super) fn take_events(&mut self) -> Vec<RecordingEvent> {
         core::mem::take(&mut self.events)
     }
 
-    /// Tells the time since the recording began, and goes on in another part if that is due.
+    /// Sets the time since the recording began, and retries with another part if that is due.
     pub(super) fn look(&mut self, now: Duration) {
         self.now = now;
         if self.open.is_none() && self.outage.as_ref().is_some_and(|outage| now >= outage.retry_at) {
@@ -168,7 +170,7 @@ impl Recording {
         }
     }
 
-    /// Counts a message that is given up.
+    /// Counts a message as lost.
     fn lose(&mut self, lost: &Head) {
         self.settled.add(lost);
         if let Some(outage) = &mut self.outage {
@@ -188,7 +190,7 @@ impl Recording {
         }
     }
 
-    /// Makes all that was written certain.
+    /// Syncs everything written so far.
     pub(super) fn sync(&mut self) {
         let Some(part) = &mut self.open else { return };
         match part.log.flush() {
@@ -197,7 +199,7 @@ impl Recording {
         }
     }
 
-    /// What is in the open part is certain.
+    /// Marks everything in the open part as synced.
     fn settle(&mut self) {
         let Some(part) = &mut self.open else { return };
         while let Some(head) = self.backlog.pop() {
@@ -211,7 +213,7 @@ impl Recording {
         part.fresh = false;
     }
 
-    /// Leaves the open part as it is.
+    /// Abandons the open part, without an end.
     fn fail(&mut self, error: &LogError) {
         let Some(part) = self.open.take() else { return };
         let OpenPart { path, log, fresh, raw_messages, certain, before, .. } = part;
@@ -219,9 +221,9 @@ impl Recording {
         drop(log);
         let is_taken = matches!(error, LogError::Write { source, .. } if Taken::is_in(source));
         let (mut lost, mut from) = (0, self.settled.last);
-        // A part of which nothing is certain isn't one; but the first has the recording's name.
+        // A part without synced content is removed, except the first, which has the recording's name.
         if is_taken {
-            // Nor is one that isn't there any more. What is there in its place is another's.
+            // A deleted file is no part either. A file now at its path belongs to another program.
             (lost, from) = (certain.0, before);
             self.sum.messages -= certain.0;
             self.sum.message_bytes -= certain.1;
@@ -251,7 +253,7 @@ impl Recording {
         }
     }
 
-    /// Begins another part after an error, and writes into it all that isn't certain.
+    /// Begins another part after an error, and writes the unsynced messages into it.
     fn resume(&mut self) {
         let part = match self.begin_part() {
             Ok(part) => part,
@@ -266,7 +268,7 @@ impl Recording {
         self.open = Some(part);
         if let Err(error) = self.write_again(&path) {
             self.fail(&error);
-            // A voice is as long as seconds of a dive, which may find room without it.
+            // A voice recording is as large as seconds of a dive, which may fit without it.
             for lost in self.backlog.drop_voices() {
                 self.lose(&lost);
             }
@@ -280,7 +282,7 @@ impl Recording {
         add(&mut self.sum.faults, fault);
     }
 
-    /// Writes the statements and the backlog into the part that has just been begun, and syncs it.
+    /// Writes the statements and the backlog into the newly begun part, and syncs it.
     fn write_again(&mut self, path: &Path) -> Result<(), LogError> {
         let Some(part) = &mut self.open else { return Ok(()) };
         if let Some(outage) = &mut self.outage {
@@ -318,7 +320,7 @@ impl Recording {
             }
     }
 
-    /// Begins the next part, whose first message has time `at`, and ends the last. If it can't be begun the last goes on.
+    /// Ends the part and begins the next, whose first message has time `at`. If that fails, the last part continues.
     fn rotate(&mut self, at: MonoNs) {
         self.sync();
         if self.open.is_none() {
@@ -379,7 +381,7 @@ impl Recording {
         }
     }
 
-    /// Creates the next file. A part other than the first passes over names that are taken.
+    /// Creates the next file. A part other than the first skips existing names.
     fn create(&mut self) -> Result<(PathBuf, Box<dyn super::storage::StoredFile>), LogError> {
         let first = self.named + 1;
         for name in first..first.saturating_add(NAMES) {
@@ -398,7 +400,7 @@ impl Recording {
         Err(LogError::Create { path, source: ErrorKind::AlreadyExists.into() })
     }
 
-    /// Removes the file of the part created last; if that fails, its name is passed over.
+    /// Removes the file of the part created last; if that fails, its name is skipped.
     fn discard(&mut self, path: &Path) {
         match self.storage.remove(path) {
             Ok(()) => self.named = self.named.saturating_sub(1),
@@ -406,7 +408,7 @@ impl Recording {
         }
     }
 
-    /// Ends a part whose messages are certain, and adds it to the totals.
+    /// Ends a part whose messages are synced, and adds it to the totals.
     fn end(&mut self, part: OpenPart, follows: bool) {
         let OpenPart { path, mut log, raw_messages, .. } = part;
         let bytes = log.bytes();

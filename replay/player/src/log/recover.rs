@@ -26,12 +26,14 @@ pub struct Recovered {
     pub losses: Vec<Loss>,
 }
 
-/// Writes the readable content of a log to `output`, in the same order: attachments, metadata, messages of devices, ticks and
-/// results. It replays to the same digest, and states its losses. Parts of a recording become one log; a single part
-/// remains a part. `open` opens the log; it is called twice, first to find all damage.
-/// `known` are the result channels whose schemas this program has; `from` is the name of the source log.
+/// Writes the readable content of a log to `output`, in the same order: attachments, metadata, device messages, ticks
+/// and results.
 ///
-/// Errors: the log can't be read, or the output not written.
+/// The new log replays to the same digest and states its losses. Parts of a recording become one log; a single part
+/// remains a part. `open` opens the log; it is called twice, first to find all damage. `known` are the result channels
+/// whose schemas this program has; `from` is the name of the source log.
+///
+/// Errors: the log can't be read, or the output can't be written.
 pub fn recover<R: Read + Seek, W: Write>(
     open: &mut dyn FnMut() -> Result<DiveLog<R>, LogError>,
     output: W,
@@ -61,9 +63,9 @@ pub fn recover<R: Read + Seek, W: Write>(
     Ok(done)
 }
 
-/// Facts about a log read to its end.
+/// Facts about a log that has been read completely.
 pub(super) struct Found {
-    /// Includes content without a channel in dive logs.
+    /// All losses, including content without a channel in dive logs.
     pub(super) losses: Vec<Loss>,
     pub(super) topics: Vec<String>,
     pub(super) sources: Vec<SourceInfo>,
@@ -118,7 +120,7 @@ pub(super) fn header<R: Read + Seek>(
     }
 }
 
-/// The channel of the new log for a message; `None` if a dive log has none for it.
+/// The channel of the new log for a message; `None` if dive logs have no such channel.
 pub(super) fn lane(message: &LogMessage<'_>, results: &BTreeMap<&str, u16>) -> Option<Lane> {
     match message.kind {
         MessageKind::Raw { source } => Some(Lane::Raw(source)),

@@ -1,4 +1,4 @@
-//! When a recording goes on in another part, and the files that are taken for its parts.
+//! Splitting a recording into parts, and finding the files of its parts.
 
 use std::collections::BTreeSet;
 use std::fs::File;
@@ -13,34 +13,35 @@ use super::framing::{Found, Item, LogFile, look};
 use super::part::{PART, PartHead, named_part};
 use crate::whole_file::folder_of;
 
-/// When a part of a recording ends.
+/// Condition under which a part of a recording ends.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Every {
-    /// Once its file has that many bytes; the second in which it reaches them is still in it.
+    /// The file has this many bytes; the second in which it reaches them still belongs to the part.
     Bytes(u64),
-    /// Once its messages span that much of the dive's time.
+    /// The messages span this much dive time.
     Span(DurNs),
 }
 
 /// How a recording is split into parts.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct Rotation {
-    /// When a part ends; `None` for a single file, which goes on in a second part only after an error.
+    /// Condition under which a part ends; `None` for a single file, which continues in a second part only after an
+    /// error.
     pub every: Option<Every>,
     /// Unique identifier of the recording, see [`super::dive_name`].
     pub dive: String,
 }
 
-/// The existing files that would be taken for this recording or a part of it.
+/// The existing files that look like this recording or a part of it.
 ///
-/// Errors: its folder can't be read.
+/// Errors: the folder can't be read.
 pub fn in_the_way(recording: &Path) -> std::io::Result<Vec<PathBuf>> {
     let mut files: Vec<PathBuf> = recording.exists().then(|| recording.to_owned()).into_iter().collect();
     files.extend(parts_of(recording)?);
     Ok(files)
 }
 
-/// The files next to a recording that are named as its parts, in order.
+/// The files beside a recording that are named as its parts, in order.
 pub(super) fn parts_of(recording: &Path) -> std::io::Result<Vec<PathBuf>> {
     let mut parts = Vec::new();
     for entry in std::fs::read_dir(folder_of(recording))? {
@@ -57,10 +58,10 @@ pub(super) fn parts_of(recording: &Path) -> std::io::Result<Vec<PathBuf>> {
     Ok(parts.into_iter().map(|(_, path)| path).collect())
 }
 
-/// Files of the paths a user named: a log, with the parts in which its recording went on after an error; a folder of logs; or a
-/// recording in parts by the name it was given.
+/// The log files for paths named by the user.
 ///
-/// A file that is named twice, or once by itself and once as a part, is one of them once.
+/// A path is a log, with the parts in which its recording continued after an error; a folder of logs; or the given name
+/// of a recording in parts. A file that is named twice, or both alone and as a part, occurs once.
 ///
 /// Errors: a folder can't be read or contains no log.
 pub fn files_of(named: &[PathBuf]) -> Result<Vec<PathBuf>, LogError> {
@@ -91,24 +92,24 @@ pub fn files_of(named: &[PathBuf]) -> Result<Vec<PathBuf>, LogError> {
     Ok(files)
 }
 
-/// The further parts of a recording whose first part is at that path.
+/// The further parts of a recording whose first part is at `path`.
 fn continuations(path: &Path) -> Vec<PathBuf> {
     let mut parts = parts_of(path).unwrap_or_default();
     if parts.is_empty() {
         return parts;
     }
     let Some(first) = part_head(path).filter(|head| head.number == 1) else { return Vec::new() };
-    // One without a head was being made when the power failed.
+    // A part without a head was being created when the power failed.
     parts.retain(|part| part_head(part).is_none_or(|head| head.dive == first.dive));
     parts
 }
 
-/// Records at the beginning of a log among which is what part it is.
+/// Number of records at the beginning of a log that are searched for its part metadata.
 const HEAD_RECORDS: usize = 4;
-/// Longest record that is read for it, bytes.
+/// Longest record that is read for the part metadata, bytes.
 const MAX_HEAD_BYTES: u64 = 1 << 20;
 
-/// Which part a log says that it is; `None` where it says nothing.
+/// The part metadata of a log; `None` if it has none.
 fn part_head(path: &Path) -> Option<PartHead> {
     let mut file = LogFile::new(File::open(path).ok()?, path.display().to_string()).ok()?;
     let mut at = mcap::MAGIC.len() as u64;

@@ -1,5 +1,7 @@
-//! Scans a whole log before it is read: positions and times of chunks, channels, attachments, metadata, and damage.
-//! Chunk data is skipped, so the scan is quick.
+//! Scans a whole log before it is read.
+//!
+//! Finds positions and times of chunks, channels, attachments, metadata, and damage. Chunk data is skipped, so the scan
+//! is quick.
 
 use std::collections::BTreeMap;
 use std::io::{Read, Seek};
@@ -28,9 +30,9 @@ const RUN_BYTES: u64 = 1 << 20;
 /// A unit of reading.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Piece {
-    /// Its header is read again when needed: a long dive has a hundred thousand chunks of half a second each.
+    /// A chunk. Its header is read again when needed: a long dive has a hundred thousand chunks of half a second each.
     Chunk,
-    /// Messages outside chunks, with records of other kinds between them.
+    /// A run of messages outside chunks, with records of other kinds between them.
     Run,
 }
 
@@ -54,22 +56,22 @@ pub(super) struct Scan {
     /// Names of schemas by their numbers.
     pub(super) schemas: BTreeMap<u16, String>,
     definitions: BTreeMap<u16, Definition>,
-    /// Definitions in the summary, which count only if its checksum fits.
+    /// Definitions in the summary; they count only if its checksum matches.
     summary: BTreeMap<u16, Definition>,
     /// Messages and channels of the log according to its summary.
     summary_counts: Option<(u64, u32)>,
-    /// Messages of the log according to a summary whose checksum fits.
+    /// Number of messages according to a summary with a matching checksum.
     pub(super) messages: Option<u64>,
     data_end: Option<core::ops::Range<u64>>,
-    /// Whether it is one of our logs, which have no messages outside chunks, numbered messages and a summary.
+    /// Whether this program wrote the log. Such logs have no messages outside chunks, numbered messages and a summary.
     pub(super) ours: bool,
-    /// Whether it has the record that repeats its channels.
+    /// Whether the log has the record that repeats its channels.
     has_list: bool,
-    /// Attachments listed by a log of ours.
+    /// Attachments listed by a log of this program.
     announced: Vec<String>,
     /// Losses stated by the log itself.
     stated: Vec<Loss>,
-    /// The last record if that was the footer, and the start of the summary according to it.
+    /// The footer's range and the summary start that it states, if the last record was a footer.
     footer: Option<(core::ops::Range<u64>, u64)>,
     /// Whether the next message may be appended to the last run.
     run_open: bool,
@@ -116,7 +118,7 @@ pub(super) fn scan<R: Read + Seek>(file: &mut LogFile<R>) -> Result<(Scan, Chann
     Ok((scan, channels))
 }
 
-/// The loss of what is too much.
+/// The loss for exceeding a limit.
 pub(super) fn beyond(what: Many) -> LossKind {
     let limit = match what {
         Many::Pieces => MAX_PIECES as u64,
@@ -128,7 +130,7 @@ pub(super) fn beyond(what: Many) -> LossKind {
     LossKind::Beyond { what, limit }
 }
 
-/// The beginning of the log can't be read.
+/// The error for a log whose beginning can't be read.
 fn unread<R: Read + Seek>(file: &LogFile<R>) -> LogError {
     let source = std::io::Error::other(file.medium().error().to_owned());
     LogError::Read { name: file.name().to_owned(), offset: 0, source }
@@ -143,7 +145,7 @@ impl Scan {
     fn walk<R: Read + Seek>(&mut self, file: &mut LogFile<R>, start: u64) -> Result<(), LogError> {
         let (mut at, mut found) = (start, look(file, start)?);
         loop {
-            // Where to continue after damage.
+            // Position to continue from after damage.
             let resumed = match found {
                 Found::Closing => {
                     let end = at + mcap::MAGIC.len() as u64;
@@ -188,7 +190,7 @@ impl Scan {
     }
 
     fn accept<R: Read + Seek>(&mut self, file: &mut LogFile<R>, frame: &Frame) -> Result<(), LogError> {
-        // Nothing follows a footer: that one was a damaged record of another kind.
+        // Nothing follows a footer, so that footer was a damaged record of another kind.
         if let Some((footer, _)) = self.footer.take() {
             self.lose(LossKind::Framing, footer);
         }
@@ -198,7 +200,7 @@ impl Scan {
             Item::Chunk(place) => self.add_chunk(frame.at, frame.end, place),
             Item::Channel => self.add_channel(file, frame)?,
             Item::Schema => {
-                // Its content isn't kept, and may be long.
+                // The content isn't kept and may be long.
                 let body = file.bytes_at(frame.body, (frame.end - frame.body).min(MAX_HEADER_BYTES))?;
                 let schema = schema(&mut Fields::new(&body));
                 if let Some((number, name)) = schema.filter(|(number, _)| !self.schemas.contains_key(number))
@@ -236,7 +238,7 @@ impl Scan {
             self.lose(LossKind::TooLarge { limit: MAX_UNPACKED_BYTES }, frame.at..frame.end);
             return;
         }
-        // Its length includes what lies between its messages.
+        // The length of a run includes records between its messages.
         let within = |last: &&mut Span| self.run_open && frame.end - last.at <= RUN_BYTES;
         let last = self.spans.last_mut().filter(within);
         if let Some(run) = last {
@@ -260,7 +262,7 @@ impl Scan {
 
     fn add_chunk(&mut self, at: u64, end: u64, place: &ChunkPlace) {
         let (from, to) = place.times;
-        // Larger ones aren't unpacked, nor what is cut beyond its records.
+        // Chunks over the limit aren't unpacked, nor is a truncated chunk unpacked beyond its records.
         if !place.compression.is_empty() && !place.cut && place.unpacked_len <= MAX_UNPACKED_BYTES {
             let unpacked = self.unpacked.saturating_add(place.unpacked_len);
             if unpacked > unpacked_limit(end) {
@@ -304,7 +306,7 @@ impl Scan {
             self.lose(LossKind::Framing, frame.at..frame.end);
             return Ok(());
         };
-        // Each entry is kept with the name.
+        // Each entry is stored with the record's name.
         let names = cost / map_cost(1, 0) * name.len() as u64;
         if !self.budget.take(cost.saturating_add(names)) {
             self.lose_beyond(Many::HeaderBytes, frame.at..frame.end);
@@ -348,7 +350,8 @@ impl Scan {
         }
         self.attachment_bytes = used;
         let body = file.bytes_at(frame.body, place.head_len + place.data_len + 4)?;
-        // The crate's parser checks the checksum. It requires consistent lengths, which the framing has verified.
+        // The `mcap` crate's parser checks the checksum. It requires consistent lengths, which the framing has
+        // verified.
         match mcap::parse_record(op::ATTACHMENT, &body) {
             Ok(mcap::records::Record::Attachment { data, .. }) => {
                 self.attachments.push((place.name.clone(), data.into_owned()));
@@ -358,15 +361,17 @@ impl Scan {
         Ok(())
     }
 
-    /// Missing whole records leave no gap. If the end of the file is lost, so are the closing records; if records are lost
-    /// elsewhere, the summary doesn't begin where the footer says.
+    /// Checks the end of the log for missing whole records, which leave no gap in the framing.
+    ///
+    /// If the end of the file is lost, the closing records are missing. If records are lost elsewhere, the summary
+    /// isn't where the footer says.
     fn check_closing(&mut self, at: u64) {
         let (Some((_, summary)), Some(data_end)) = (self.footer.take(), self.data_end.clone()) else {
             self.lose(LossKind::Truncated, at..at);
             return;
         };
         if summary == 0 && self.ours {
-            // Our writer ends no log without a summary: it was removed, and the last messages with it.
+            // This program always writes a summary; its absence means that the last messages were removed with it.
             self.lose(LossKind::Truncated, at..at);
         }
         if summary != 0 && summary != data_end.end && self.losses.list().is_empty() {
@@ -382,8 +387,9 @@ impl Scan {
         Err(LogError::TooNew { name: file.name().to_owned(), found: found.clone(), known: FORMAT_VERSION })
     }
 
-    /// Takes the channels of an intact summary in preference to all others: a tool that copied a log of ours may have
-    /// renumbered them. Returns whether these are all.
+    /// Prefers the channels of an intact summary to all others; returns whether these are all channels.
+    ///
+    /// A tool that copied a log of this program may have renumbered them.
     fn take_summary<R: Read + Seek>(&mut self, file: &mut LogFile<R>) -> Result<bool, LogError> {
         let Some(data_end) = self.data_end.as_ref().map(|record| record.start) else { return Ok(false) };
         if self.summary.is_empty() || !summary_holds(file, data_end)? {
@@ -402,7 +408,7 @@ impl Scan {
     }
 
     /// Reads all chunks for channel definitions, for truncated logs of other writers. Definitions in intact chunks take
-    /// precedence over those outside.
+    /// precedence over those outside chunks.
     fn look_into_chunks<R: Read + Seek>(&mut self, file: &mut LogFile<R>) -> Result<(), LogError> {
         for number in 0..self.spans.len() {
             let Some(span) = self.spans.get(number).copied() else { break };
@@ -425,7 +431,7 @@ impl Scan {
         Ok(())
     }
 
-    /// Adds a definition found in a chunk; one of a whole chunk replaces what is known.
+    /// Adds a definition found in a chunk; one from an intact chunk replaces a known one.
     fn add_found(&mut self, definition: Definition, whole: bool, part: core::ops::Range<u64>) {
         let known = self.definitions.get(&definition.id);
         if known.is_some_and(|known| !whole || *known == definition) {
@@ -439,7 +445,7 @@ impl Scan {
         }
     }
 
-    /// Reports expected records missing from a log of ours, if no other loss has been found.
+    /// Reports expected records missing from a log of this program, if no other loss has been found.
     fn miss_parts(&mut self) {
         if !self.ours || !self.losses.list().is_empty() {
             return;
@@ -470,14 +476,15 @@ impl Scan {
     }
 }
 
-/// Sets the time spans of losses from the pieces around them. Chunk headers may have wrong times; once all pieces
-/// are `read`, the times are those of their messages.
+/// Sets the time spans of losses from the pieces around them.
+///
+/// Chunk headers may have wrong times. Once all pieces are `read`, the times are those of their messages.
 pub(super) fn date_losses(losses: &mut Losses, spans: &[Span], read: bool) {
     for loss in losses.list_mut().iter_mut().filter(|loss| !matches!(loss.kind, LossKind::Stated(_))) {
         let next = spans.partition_point(|span| span.at < loss.offset);
         let end = loss.offset.saturating_add(loss.bytes.max(1));
         let after = spans.iter().skip(next).find(|span| span.at >= end && span.is_dated());
-        // A chunk cut by the end of the file may have delivered messages nevertheless: the loss begins after them.
+        // A chunk cut off by the end of the file may have delivered messages; the loss begins after them.
         let cut = usize::from(read && loss.kind == LossKind::Truncated);
         let cut = spans.get(next..).and_then(|rest| rest.get(..cut)).unwrap_or_default();
         let before = spans.iter().take(next).chain(cut).rev().find(|span| span.is_dated());
@@ -485,8 +492,9 @@ pub(super) fn date_losses(losses: &mut Losses, spans: &[Span], read: bool) {
     }
 }
 
-/// Whether a record's length is trusted: if confirmed by its fields, or if another record follows. Where the file's end cuts
-/// the following record, the length is wrong if there are records within it.
+/// Whether a record's length is trusted: its fields confirm it, or another record follows.
+///
+/// If the end of the file cuts off the following record, the length is wrong if there are records within it.
 fn is_believed<R: Read + Seek>(file: &mut LogFile<R>, frame: &Frame, next: &Found) -> Result<bool, LogError> {
     let followed = !matches!(next, Found::Nothing);
     Ok(match next {
@@ -499,7 +507,7 @@ fn is_believed<R: Read + Seek>(file: &mut LogFile<R>, frame: &Frame, next: &Foun
 }
 
 impl Span {
-    /// The chunk, from its header; `None` for a run.
+    /// The chunk, read from its header; `None` for a run.
     pub(super) fn chunk<R: Read + Seek>(
         &self,
         file: &mut LogFile<R>,
@@ -514,24 +522,24 @@ impl Span {
         })
     }
 
-    /// Whether its times are valid: a chunk without messages has none.
+    /// Whether its times are valid. A chunk without messages has no times.
     pub(super) fn is_dated(&self) -> bool {
         (self.from, self.to) != (0, 0)
     }
 }
 
-/// Definitions in a chunk, up to the memory that all of a log's may take.
+/// Definitions in a chunk, up to the memory limit for all definitions of a log.
 #[derive(Default)]
 pub(super) struct FoundDefinitions {
     pub(super) channels: Vec<Definition>,
     pub(super) schemas: Vec<(u16, String)>,
     budget: HeaderBudget,
-    /// Whether there was more.
+    /// Whether the limit was exceeded.
     pub(super) beyond: bool,
 }
 
 impl FoundDefinitions {
-    /// Takes a record of the chunk, if it is a definition.
+    /// Stores a record of the chunk if it is a definition.
     pub(super) fn take(&mut self, opcode: u8, body: &[u8]) {
         match opcode {
             op::CHANNEL => {
@@ -551,7 +559,7 @@ impl FoundDefinitions {
     }
 }
 
-/// A whole record, unless it is too long to be read.
+/// The whole body of a record; `None` if it is too long to be read.
 fn whole_body<R: Read + Seek>(file: &mut LogFile<R>, frame: &Frame) -> Result<Option<Vec<u8>>, LogError> {
     let len = frame.end - frame.body;
     if len > MAX_HEADER_BYTES { Ok(None) } else { file.bytes_at(frame.body, len).map(Some) }

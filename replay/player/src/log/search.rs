@@ -1,4 +1,4 @@
-//! Searches for records after damage, byte by byte, until several records follow each other.
+//! Searches byte by byte for records after damage, until several records follow each other.
 
 use std::io::{Read, Seek};
 
@@ -7,15 +7,15 @@ use mcap::records::op;
 use super::LogError;
 use super::framing::{Found, Item, LogFile, look};
 
-/// Records that must follow each other to accept a position.
+/// Number of consecutive records needed to accept a position.
 const CHAIN: usize = 3;
 /// Read size, bytes.
 const SEARCH_BYTES: usize = 64 * 1024;
 
-/// The first position within `from..until` from which records follow each other.
+/// The first position within `from..until` at which consecutive records start.
 ///
-/// A byte before a record may look like another record, with a length that by chance ends at a record boundary; so one with
-/// an unconfirmed length is accepted only if there are no records within it.
+/// A byte before a record may look like another record with a length that happens to end at a record boundary. A
+/// position with an unconfirmed length is therefore accepted only if no records lie within it.
 pub(super) fn find_records<R: Read + Seek>(
     file: &mut LogFile<R>,
     from: u64,
@@ -29,7 +29,7 @@ pub(super) fn find_records<R: Read + Seek>(
     Ok(first.map(|chain| chain.at))
 }
 
-/// The first of several records that follow each other.
+/// The first of several consecutive records.
 struct Chain {
     at: u64,
     end: u64,
@@ -63,7 +63,8 @@ fn find_chain<R: Read + Seek>(
     Ok(None)
 }
 
-/// Quick check that rejects nearly every position: a known opcode and a length below 2^32, or the closing bytes.
+/// Quick check that rejects nearly every position: it requires a known opcode and a length below 2^32, or the closing
+/// bytes.
 fn may_begin(head: &[u8]) -> bool {
     match head {
         [1..=op::DATA_END, _, _, _, _, 0, 0, 0] => true,

@@ -1,21 +1,22 @@
-//! Free disk space during a recording, and which messages are dropped when it runs low.
+//! Monitors free disk space during a recording, and decides which messages to drop when it runs low.
 //!
-//! The dive should outlast the disk: small irreplaceable data (readings of position, ticks, judgements, advice) is kept to the
-//! last byte; echoes, by far the largest share of a log, go first. Echoes are recognised by source and length: the log
-//! header lists the sonars, since the recorder doesn't decode devices. Packets of heads that send only ranges are short and
-//! kept: such a dive still replays to its digest.
+//! Small irreplaceable data (position readings, ticks, judgements, advice) is kept to the last byte. Echoes, by far the
+//! largest share of a log, are dropped first, so that the disk lasts for the whole dive.
+//!
+//! The recorder doesn't decode devices, so it recognises echoes by source and length; the log header lists the sonars.
+//! Packets of heads that send only ranges are short and kept: such a dive still replays to its digest.
 
 use std::time::Duration;
 
 use headrace_geometry::time::MonoNs;
 
-/// Free bytes below which the user is warned: some hours of a dive.
+/// Free bytes below which the user is warned, enough for some hours of a dive.
 const WARN_BELOW_BYTES: u64 = 1 << 30;
-/// Free bytes below which echoes are dropped: enough for days of the remaining messages.
+/// Free bytes below which echoes are dropped, enough for days of the remaining messages.
 const SPARE_BELOW_BYTES: u64 = 128 << 20;
-/// Longer packets of sonars are echoes, bytes; packets with only ranges are shorter.
+/// Longest sonar packet that is kept, bytes. Longer packets are echoes; packets with only ranges are shorter.
 pub(super) const LONGEST_KEPT_BYTES: usize = 128;
-/// Interval of free space queries.
+/// Interval between queries of the free space.
 const ASK_EVERY: Duration = Duration::from_secs(2);
 
 /// Messages that a recorder has dropped because its disk was nearly full.
@@ -63,7 +64,7 @@ impl Space {
         }
         self.free = free;
         let free_mb = free / 1_000_000;
-        // Hysteresis: once dropped, echoes stay so until there is much more room.
+        // Hysteresis: after echoes have been dropped, recording them resumes only with much more free space.
         let sparing = free < SPARE_BELOW_BYTES || (self.sparing && free < WARN_BELOW_BYTES);
         if sparing && !self.sparing {
             tracing::warn!(
@@ -86,7 +87,7 @@ impl Space {
         self.sparing
     }
 
-    /// Counts a dropped message. Returns the statement for the log at the first.
+    /// Counts a dropped message. The first one returns the statement for the log.
     pub(super) fn leave_out(&mut self, at: MonoNs, bytes: usize) -> Option<String> {
         let first = self.left_out.span.map(|span| span.0);
         self.left_out.span = Some((first.unwrap_or(at), at));

@@ -1,4 +1,4 @@
-//! Where a recorder keeps its files: the disk, or in tests anything whose every operation can fail or wait.
+//! Storage for a recorder's files: the disk or, in tests, anything whose operations can fail or wait.
 
 use std::fs::{File, Metadata, OpenOptions};
 use std::io;
@@ -6,52 +6,55 @@ use std::path::{Path, PathBuf};
 
 use crate::whole_file::{folder_of, number_of};
 
-/// Files that are created once and only grow.
+/// Storage for files that are created once and only grow.
 pub trait Storage: Send {
-    /// Creates a file, which must not exist. Once this returns its name survives a power cut.
+    /// Creates a file, which must not exist. Once this returns, its name survives a power cut.
     ///
-    /// Errors: it exists; the system's.
+    /// Errors: the file exists; those of the system.
     fn create(&mut self, path: &Path) -> io::Result<Box<dyn StoredFile>>;
 
     /// Removes a file.
     ///
-    /// Errors: it doesn't exist; the system's.
+    /// Errors: the file doesn't exist; those of the system.
     fn remove(&mut self, path: &Path) -> io::Result<()>;
 
-    /// Bytes free beside a file; `None` where that is unknown.
+    /// Free bytes on the file's medium; `None` if unknown.
     fn free_bytes(&mut self, path: &Path) -> Option<u64>;
 }
 
 /// A file that is open for writing. Closing it by dropping writes nothing.
 pub trait StoredFile: Send {
-    /// Appends the first of these bytes, and returns how many.
+    /// Appends a prefix of these bytes, and returns its length.
     ///
-    /// Errors: the system's; `Interrupted` is tried again.
+    /// Errors: those of the system; `Interrupted` is retried.
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize>;
 
-    /// Once this returns, what was written survives a power cut. After an error nothing written since the last success may, or,
-    /// where another program has taken the file away, nothing at all.
+    /// Syncs the file: once this returns, everything written survives a power cut.
     ///
-    /// Errors: the system's; the file was taken away.
+    /// After an error, nothing written since the last success is certain. If another program has taken the file away,
+    /// nothing at all is certain.
+    ///
+    /// Errors: those of the system; the file was taken away.
     fn sync(&mut self) -> io::Result<()>;
 }
 
-/// The machine's file systems.
+/// The file systems of the machine.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Disk;
 
 impl Storage for Disk {
     fn create(&mut self, path: &Path) -> io::Result<Box<dyn StoredFile>> {
-        // What is appended to a file that others have cut short leaves it shorter than what was written.
+        // Append mode: if another program truncates the file, it stays shorter than the written length, which shows the
+        // fault.
         let file = OpenOptions::new().append(true).create_new(true).open(path)?;
-        // Only on Unix: other systems don't open folders.
+        // Only on Unix, since other systems can't open folders.
         let synced = if cfg!(unix) {
             File::open(folder_of(path)).and_then(|folder| folder.sync_all())
         } else {
             Ok(())
         };
         if let Err(error) = synced {
-            // What was not there before shall not be there after an error.
+            // An error must leave no new file behind.
             self.remove(path).ok();
             return Err(error);
         }
@@ -65,12 +68,12 @@ impl Storage for Disk {
 
     fn free_bytes(&mut self, path: &Path) -> Option<u64> {
         let disk = rustix::fs::statvfs(folder_of(path)).ok()?;
-        // Of what other users than root may take.
+        // Space available to users other than root.
         Some(disk.f_bavail.saturating_mul(disk.f_frsize))
     }
 }
 
-/// What another program has done to a recording's file: all that was in it is gone, or not where it is looked for.
+/// Change by another program to a recording's file, whose content is then gone or not at its path.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 pub(super) enum Taken {
     #[error("another program has deleted the file")]
@@ -82,20 +85,22 @@ pub(super) enum Taken {
 }
 
 impl Taken {
-    /// Whether an error is one of these.
+    /// Whether an error has this cause.
     pub(super) fn is_in(error: &io::Error) -> bool {
         error.get_ref().is_some_and(<dyn std::error::Error + Send + Sync>::is::<Self>)
     }
 }
 
-/// A file on the disk, which others may take away. One that is moved is written on: nothing of it is lost.
+/// A file on the disk that other programs may delete, truncate or replace.
+///
+/// Writing continues after a move, which loses nothing.
 struct DiskFile {
     file: File,
     path: PathBuf,
     written: u64,
-    /// Device and number, where the file system says the same of the open file as of its name.
+    /// Device and inode number, if the file system reports the same for the open file and its name.
     known: Option<(u64, u64)>,
-    /// Whether it has been synced: a dive begins with a header that is taken away, and goes on elsewhere.
+    /// Whether it has been synced once. A dive whose first file disappears with only a header continues in another.
     is_begun: bool,
 }
 
@@ -107,9 +112,9 @@ impl DiskFile {
         Self { file, path: path.to_owned(), written: 0, known, is_begun: false }
     }
 
-    /// What others have done to it.
+    /// Change to the file by other programs, if any.
     fn taken(&self) -> Option<Taken> {
-        // Where the system doesn't say, it is taken to be there.
+        // If the system can't tell, the file is assumed to be in place.
         let own = self.file.metadata().ok()?;
         if own.len() < self.written {
             return Some(Taken::CutShort);
@@ -148,14 +153,16 @@ fn links(_: &Metadata) -> u64 {
     1
 }
 
-/// Bytes gathered before they are passed to the file.
+/// Size of the write buffer, bytes.
 const BUFFER_BYTES: usize = 64 << 10;
 
-/// A stored file as a writer. Flushing syncs what was written since; dropping discards what hasn't been passed on.
+/// A stored file as a writer.
+///
+/// Flushing syncs everything written since the last sync. Dropping discards buffered bytes.
 pub(super) struct Buffered {
     file: Box<dyn StoredFile>,
     buffer: Vec<u8>,
-    /// Whether nothing was written since the last sync: another would take as long for nothing.
+    /// Whether nothing was written since the last sync, so that another one would be useless.
     is_synced: bool,
 }
 
@@ -199,7 +206,7 @@ impl io::Write for Buffered {
     }
 }
 
-/// A single writer as storage, for [`super::Recorder::start`]: flushing is its sync, and there is no second file.
+/// A single writer as storage, for [`super::Recorder::start`]. Flushing it syncs it, and there is no second file.
 pub(super) struct OneWriter<W>(pub(super) Option<W>);
 
 struct WriterFile<W>(W);

@@ -1,4 +1,4 @@
-//! A reduced log: cut to spans of time, without echoes, or anonymised.
+//! Writes a reduced log: limited to time spans, without echoes, or anonymised.
 
 use std::collections::BTreeMap;
 use std::io::{Read, Seek, Write};
@@ -9,15 +9,15 @@ use super::recover::{header, lane, look_through, words};
 use super::writer::Lane;
 use super::{DiveLog, LogError, LogHeader, LogInfo, LogMessage, LogWriter, ResultChannel};
 
-/// Metadata key of a trimmed log: what was done to it.
+/// Metadata key of a trimmed log that describes the changes.
 pub const TRIMMED: &str = "trimmed";
 
 /// Changes a source message: may write replacement bytes, and returns whether it did. Empty bytes drop the message.
 pub type Change<'a> = &'a mut dyn FnMut(u16, &[u8], &mut Vec<u8>) -> bool;
 
-/// Content to keep of a log, and how it is changed.
+/// The content of a log to keep, and the changes to it.
 pub struct Trim<'a> {
-    /// Log time spans to keep, each from and to, not overlapping, in order; empty keeps all.
+    /// Log time spans to keep, each from and to, in order and without overlap; empty keeps everything.
     pub spans: Vec<(MonoNs, MonoNs)>,
     /// Description of the changes, for the log's metadata.
     pub words: String,
@@ -25,9 +25,9 @@ pub struct Trim<'a> {
     pub header: &'a dyn Fn(&LogInfo, LogHeader) -> LogHeader,
     /// Changes source messages.
     pub change: Change<'a>,
-    /// Whether recordings of voice notes are kept, as long as they are within the spans.
+    /// Whether to keep voice recordings within the spans.
     pub voices: bool,
-    /// Whether the results of a topic are kept, where all of the dive is.
+    /// Whether to keep the results of a topic, if the whole dive is kept.
     pub results: &'a dyn Fn(&str) -> bool,
 }
 
@@ -38,15 +38,15 @@ pub struct Trimmed {
     pub messages: u64,
     /// Messages outside the spans.
     pub cut: u64,
-    /// Result messages dropped: a part of a dive isn't judged like the whole, and some name people.
+    /// Dropped result messages. A part of a dive gets other judgements than the whole, and some results name people.
     pub results: u64,
     /// Source messages that were changed.
     pub changed: u64,
     /// Source messages that became empty.
     pub emptied: u64,
-    /// Bytes of source messages before.
+    /// Bytes of source messages before the change.
     pub bytes_before: u64,
-    /// And after.
+    /// Bytes of source messages after the change.
     pub bytes_after: u64,
     /// Losses of the original log.
     pub losses: u64,
@@ -115,14 +115,14 @@ fn state_cuts<W: Write>(
     Ok(())
 }
 
-/// Writes one message after another.
+/// Writes the messages to keep, one after the other.
 struct Cutter<'a, W: Write> {
     numbers: BTreeMap<&'a str, u16>,
     log: LogWriter<W>,
     done: Trimmed,
     /// Sources of the packets kept since the last tick, in order.
     order: Vec<u16>,
-    /// Whether all were kept.
+    /// Whether all packets were kept.
     whole: bool,
     shorter: Vec<u8>,
 }
@@ -165,7 +165,7 @@ impl<W: Write> Cutter<'_, W> {
         written
     }
 
-    /// Writes a tick with only the kept ones of its packets.
+    /// Writes a tick that lists only its kept packets.
     fn tick(&mut self, message: &LogMessage<'_>) -> Result<(), LogError> {
         let order = core::mem::take(&mut self.order);
         let whole = core::mem::replace(&mut self.whole, true);

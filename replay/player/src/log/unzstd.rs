@@ -1,5 +1,7 @@
-//! Unpacks chunks packed by zstd, in bounded memory: as the `mcap` crate's own decompressor, but for the window, which a frame
-//! may else set to 128 MiB; and without the formats of zstd before 0.8, which have windows of their own.
+//! Unpacks chunks packed by zstd in bounded memory.
+//!
+//! Works like the `mcap` crate's decompressor, except that it limits the window, which a frame may otherwise set to 128
+//! MiB. Formats of zstd before 0.8, which have windows of their own, aren't supported.
 
 use mcap::sans_io::decompressor::{DecompressResult, Decompressor};
 use mcap::{McapError, McapResult};
@@ -7,18 +9,18 @@ use zstd_safe::{DCtx, DParameter, InBuffer, OutBuffer, ResetDirective, get_error
 
 use super::limits::MAX_WINDOW_LOG;
 
-/// zstd's own words for a window that is over the limit.
+/// Error text of zstd for a window over the limit.
 pub(super) const TOO_MUCH_MEMORY: &str = "Frame requires too much memory for decoding";
-/// Begin of a frame, and of one to be skipped, whose last four bits are free. Source: RFC 8878, 3.1.
+/// Magic numbers of a frame and of a skippable frame, whose last four bits are free. Source: RFC 8878, 3.1.
 const FRAME: u32 = 0xFD2F_B528;
 const SKIPPABLE: u32 = 0x184D_2A50;
 
-/// A decompressor of frames whose windows are up to 2^[`MAX_WINDOW_LOG`] bytes.
+/// Decompresses frames with windows of up to 2^[`MAX_WINDOW_LOG`] bytes.
 #[derive(Default)]
 pub(super) struct Unzstd {
-    /// Made when it is first needed.
+    /// Created on first use.
     context: Option<DCtx<'static>>,
-    /// Bytes that it would like next; 0 before a frame.
+    /// Bytes that zstd suggests to read next; 0 before a frame.
     need: usize,
 }
 
@@ -33,7 +35,7 @@ impl Decompressor for Unzstd {
 
     fn decompress(&mut self, src: &[u8], dst: &mut [u8]) -> McapResult<DecompressResult> {
         if self.need == 0 {
-            // Fewer bytes than that ask for more.
+            // Too few bytes for the magic number; asks for more.
             let Some(magic) = src.first_chunk() else {
                 return Ok(DecompressResult { consumed: 0, wrote: 0 });
             };

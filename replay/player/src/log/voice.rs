@@ -1,8 +1,8 @@
-//! Recordings of voice notes in a log: from the operator's page to the recorder, and back.
+//! Voice recordings in a log: from the operator's page to the recorder, and back.
 //!
-//! A message of `/notes/voice`, little-endian: u32 id of the note, u32 seconds, u16 length of the media type, the media type, and
-//! from there on the bytes of the recording, a file as the browser made it. It has a chunk of its own: damage to it is damage to
-//! nothing else. No replay reads it; what the loop knows of it is in the operator's commands.
+//! A message of `/notes/voice` has, in little-endian order: u32 id of the note, u32 seconds, u16 length of the media
+//! type, the media type, then the recording as the browser made it. It has its own chunk, so damage to it affects
+//! nothing else. No replay reads it; the operator's commands hold everything the loop needs.
 
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -15,52 +15,54 @@ use super::fields::Fields;
 use super::queue::State;
 use super::{DiveLog, LogError, MessageKind};
 
-/// Why a recording isn't taken.
+/// Reason why a recording isn't accepted.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum NotKept {
     /// The medium fails, or the recorder has ended.
-    #[error("the voice isn't kept: nothing is being recorded at present")]
+    #[error("the voice note isn't recorded: nothing is being recorded at present")]
     Failing,
-    /// Others wait.
-    #[error("the voice isn't kept: others are still being written; send it again")]
+    /// The queue of recordings is full.
+    #[error("the voice note isn't recorded: others are still being written; send it again")]
     Full,
 }
 
-/// A message that is no recording of a voice note.
+/// A message that isn't a valid voice recording.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum VoiceMessageError {
-    /// It ends before what it says it has.
+    /// The message is shorter than its fields say.
     #[error("a voice message of {0} bytes is cut off in its head")]
     Short(usize),
-    /// It has what no recording may have.
+    /// The recording is invalid.
     #[error(transparent)]
     Voice(#[from] VoiceError),
 }
 
-/// Takes recordings of voice notes, from any thread.
+/// Accepts recordings of voice notes from any thread.
 #[derive(Clone)]
 pub struct VoicePort {
     pub(super) state: Arc<State>,
 }
 
 impl VoicePort {
-    /// Hands a recording to the log. Never blocks. It is as certain as what a sensor sends: written within a second, and again in
-    /// another part if the medium fails then.
+    /// Passes a recording to the log. Never blocks.
     ///
-    /// Errors: see [`NotKept`]; nothing was taken.
+    /// It is as safe as sensor data: it is written within a second, and again in another part if the medium then fails.
+    ///
+    /// Errors: see [`NotKept`]; nothing was accepted.
     pub fn keep(&self, voice: &Voice) -> Result<(), NotKept> {
         if self.state.failing.load(Ordering::Acquire) || self.state.voices_end.load(Ordering::SeqCst) {
             return Err(NotKept::Failing);
         }
         self.state.voices.push(encode(voice)).map_err(|_| NotKept::Full)?;
-        // The recorder sets it before it looks for the last time: while it isn't set, this one is taken.
+        // The recorder sets the flag before its last look at the queue. If it is still unset, this recording will be
+        // taken.
         if self.state.voices_end.load(Ordering::SeqCst) { Err(NotKept::Failing) } else { Ok(()) }
     }
 }
 
-/// A recording as a message.
+/// Encodes a recording as a message.
 pub fn encode(voice: &Voice) -> Vec<u8> {
     let media_type = voice.container.media_type().as_bytes();
     let mut message = Vec::with_capacity(10 + media_type.len() + voice.audio.len());
@@ -72,7 +74,7 @@ pub fn encode(voice: &Voice) -> Vec<u8> {
     message
 }
 
-/// A message as a recording. Logs come from anywhere: it is held to what the page would have taken.
+/// Decodes a message. Since logs may come from anywhere, the recording must pass the page's own checks.
 ///
 /// Errors: see [`VoiceMessageError`].
 pub fn decode(message: &[u8]) -> Result<Voice, VoiceMessageError> {
@@ -88,8 +90,9 @@ pub fn decode(message: &[u8]) -> Result<Voice, VoiceMessageError> {
     Ok(Voice { id, seconds, container, audio: audio.to_vec() }.checked()?)
 }
 
-/// Finds the recording of a note in a log, from a time on: that of the note, as it is later. `None` where the log has none that
-/// reads.
+/// Finds the recording of a note in a log, at or after `from`, the time of the note.
+///
+/// `None` if the log has no readable recording of it.
 ///
 /// Errors: the log can't be read.
 pub fn find_voice(files: &[PathBuf], id: u32, from: MonoNs) -> Result<Option<Voice>, LogError> {
@@ -127,7 +130,7 @@ mod tests {
     }
 
     #[test]
-    fn a_message_that_is_no_voice_says_why() {
+    fn invalid_voice_messages_give_specific_errors() {
         let message = encode(&voice(b"OggS"));
         assert_eq!(decode(&message[..9]), Err(VoiceMessageError::Short(9)));
         assert_eq!(decode(&message[..18]), Err(VoiceMessageError::Short(18)));
@@ -139,7 +142,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn any_bytes_are_a_voice_or_refused(bytes: Vec<u8>) {
+        fn any_bytes_decode_to_a_valid_voice_or_an_error(bytes: Vec<u8>) {
             if let Ok(voice) = decode(&bytes) {
                 prop_assert_eq!(voice.checked().map(|voice| encode(&voice).len()), Ok(bytes.len()));
             }

@@ -15,15 +15,15 @@ use super::space::{LONGEST_KEPT_BYTES, Space};
 use super::voice::VoicePort;
 use super::writer::{Lane, LogHeader, Summary};
 
-/// Interval at which a chunk is closed and synced. Half of the second that a power cut may cost, since closing
+/// Interval at which a chunk is closed and synced. It is half of the second that a power cut may cost, since closing
 /// and syncing take time too.
 const FLUSH_PERIOD: Duration = Duration::from_millis(500);
-/// Time between two statements of what lines dropped.
+/// Interval between statements of packets dropped by lines.
 const DROPPED_PERIOD: Duration = Duration::from_secs(5);
 /// Entries written in one step.
 const BATCH: usize = 256;
 
-/// A recorder without its thread: whoever has it takes the steps, and says what time it is.
+/// A recorder without its thread. The caller runs the steps and passes the time.
 pub struct RecorderWorker {
     queue: Queue,
     recording: Recording,
@@ -33,14 +33,14 @@ pub struct RecorderWorker {
     space: Space,
     echoes: Echoes,
     beside: Beside,
-    /// Packets of skipped ticks.
+    /// Number of packets in skipped ticks.
     skipped: u64,
     /// Names of the sources.
     ids: Vec<String>,
-    /// What lines have dropped since that was last stated, by source, and when that was.
+    /// Packets dropped by lines since the last statement, by source, and the time of that statement.
     dropped: BTreeMap<u16, Dropped>,
     dropped_stated: Duration,
-    /// Log time of the last entry: voice notes' recordings have no other clock of the dive.
+    /// Log time of the last entry. Voice recordings get it as their time, since they have no time of their own.
     last: Option<MonoNs>,
     state: Arc<State>,
     _closed: ClosedWhenDropped,
@@ -52,10 +52,10 @@ struct Beside {
     made: Vec<Made>,
 }
 
-/// Messages dropped when the disk fills.
+/// Recognises messages that are dropped when the disk fills.
 struct Echoes {
     sonars: Vec<u16>,
-    /// Which results are one per echo.
+    /// For each result channel, whether it has a record per echo.
     results: Vec<bool>,
 }
 
@@ -101,7 +101,7 @@ impl RecorderWorker {
         }
     }
 
-    /// A port for what goes on on devices' lines beside the loop.
+    /// A port for traffic on devices' lines that bypasses the loop.
     pub fn line_port(&self) -> LinePort {
         LinePort { state: Arc::clone(&self.state) }
     }
@@ -111,7 +111,7 @@ impl RecorderWorker {
         VoicePort { state: Arc::clone(&self.state) }
     }
 
-    /// What has happened to the recording, once each, oldest first.
+    /// The next event of the recording, oldest first; each is returned once.
     pub fn next_event(&self) -> Option<RecordingEvent> {
         self.state.events.pop()
     }
@@ -121,8 +121,9 @@ impl RecorderWorker {
         &self.state
     }
 
-    /// Writes some of what is in the queue, and syncs and tries again what is due, at `now` since the recording began. `now`
-    /// never goes back. Returns whether there was anything in the queue.
+    /// Writes some entries of the queue; syncs and retries if due.
+    ///
+    /// `now` is the time since the recording began and never goes back. Returns whether the queue had entries.
     pub fn step(&mut self, now: Duration) -> bool {
         let recording = &mut self.recording;
         self.space.look(now, || recording.free_bytes());
@@ -140,8 +141,8 @@ impl RecorderWorker {
         taken += self.write_voices();
         self.state_gaps();
         self.state_dropped(now, false);
-        // A sync that takes long covers all that came while the last one took long. Where there is always more, the backlog's size
-        // makes the recording sync.
+        // A slow sync covers everything that arrived during the last one. Under constant load the backlog's size
+        // triggers a sync.
         if !is_behind {
             self.flush_in_time(now);
         }
@@ -152,7 +153,7 @@ impl RecorderWorker {
     /// Writes the rest of the queue, and ends the log.
     pub fn finish(mut self, now: Duration) -> Summary {
         self.state.voices_end.store(true, Ordering::SeqCst);
-        // The end of the log syncs what is left.
+        // Ending the log syncs the rest.
         self.flushed = now;
         while self.step(now) {}
         self.state_dropped(now, true);
@@ -179,7 +180,7 @@ impl RecorderWorker {
         summary
     }
 
-    /// States the ticks that were skipped.
+    /// States the skipped ticks in the log.
     fn state_gaps(&mut self) {
         while let Some(Gap { span: (from, to), packets }) = self.state.gaps.pop() {
             self.skipped += packets;
@@ -188,7 +189,9 @@ impl RecorderWorker {
         }
     }
 
-    /// States what lines dropped: at the end, else every few seconds, so that a log in which packets are missing for hours stays readable.
+    /// States the packets dropped by lines, at the end or every few seconds.
+    ///
+    /// The interval keeps a log readable in which packets are missing for hours.
     fn state_dropped(&mut self, now: Duration, at_end: bool) {
         let dropped = core::iter::from_fn(|| self.state.dropped.pop());
         for Dropped { source, span: (from, to), packets } in dropped {
@@ -230,7 +233,7 @@ impl RecorderWorker {
         self.state.failing.store(self.recording.is_failing(), Ordering::Release);
     }
 
-    /// Writes the entry taken last and the messages derived from it.
+    /// Writes the last taken entry and the messages derived from it.
     fn write_all(&mut self, entry: &Entry) {
         let message = core::mem::take(&mut self.queue.message);
         self.write(entry, &message);
@@ -275,7 +278,7 @@ impl RecorderWorker {
         written
     }
 
-    /// Writes recordings of voice notes, once the dive has begun; returns their number.
+    /// Writes voice recordings once the dive has begun; returns their number.
     fn write_voices(&mut self) -> usize {
         let mut written = 0;
         while let Some(at) = self.last

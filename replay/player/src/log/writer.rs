@@ -1,4 +1,4 @@
-//! Writes a log, on the caller's thread: the only place that turns messages into records.
+//! Writes a log on the caller's thread. No other module turns messages into records.
 
 use std::collections::BTreeMap;
 use std::fs::File;
@@ -19,7 +19,7 @@ use super::format::{
 use super::part::{PART, PART_END, PartEnd, PartHead, Progress};
 use super::{LeftOut, LogError, RecordingFault};
 
-/// Bytes above which a chunk is closed, whatever its time span.
+/// Size at which a chunk is closed, whatever its time span, bytes.
 const CHUNK_BYTES: u64 = 1 << 20;
 /// Time span of messages, in dive time, at which a chunk is closed.
 const CHUNK_SPAN: DurNs = DurNs(500_000_000);
@@ -30,7 +30,7 @@ const CHUNK_INDEX_CHANNEL_BYTES: u64 = 10;
 /// A log's header.
 #[derive(Debug, Clone, Default)]
 pub struct LogHeader {
-    /// Text of the vehicle file; empty where there is none.
+    /// Text of the vehicle file; empty if there is none.
     pub vehicle_toml: String,
     /// Files named by the vehicle file: name and content.
     pub attachments: Vec<(String, Vec<u8>)>,
@@ -38,15 +38,15 @@ pub struct LogHeader {
     pub metadata: BTreeMap<String, String>,
     /// The sources; a source's index is its number in the messages.
     pub sources: Vec<SourceInfo>,
-    /// Whether ticks will be written. A simulation has none, and its log no channel of ticks.
+    /// Whether ticks will be written. The log of a simulation has no ticks and no channel for them.
     pub ticks: bool,
     /// Whether recordings of voice notes may be written.
     pub voices: bool,
     /// The results; a result's index is its number in the messages.
     pub results: Vec<ResultChannel>,
-    /// Numbers of the sources that are sonars: their long packets are echoes, dropped first when a disk fills.
+    /// Numbers of the sources that are sonars. Their long packets are echoes, dropped first when a disk fills.
     pub sonars: Vec<u16>,
-    /// Part metadata, for one part of several. Its channels continue the numbering.
+    /// Metadata of this part if there are several. Its channels continue the numbering.
     pub part: Option<PartHead>,
 }
 
@@ -65,7 +65,7 @@ impl LogHeader {
 /// A source of bytes, as its channels describe it.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct SourceInfo {
-    /// Name, also of its channels.
+    /// Name of the source and of its channels.
     pub id: String,
     /// Kind of device; empty where unknown.
     pub plugin: String,
@@ -86,7 +86,8 @@ pub struct ResultChannel {
     pub schema: String,
     /// Message encoding, for instance `json`.
     pub message_encoding: String,
-    /// Whether it is dropped with the echoes when the disk fills: it has a record per echo, or isn't needed for a replay.
+    /// Whether it is dropped with the echoes when the disk fills: it has a record per echo, or a replay doesn't need
+    /// it.
     pub follows_echoes: bool,
 }
 
@@ -109,7 +110,7 @@ pub struct Summary {
     pub left_out: LeftOut,
     /// Messages to devices that didn't fit in the recorder's queue.
     pub sent_dropped: u64,
-    /// Packets of ticks that the recorder was too far behind to take while another one went on.
+    /// Packets of ticks that this recorder skipped because it was too far behind while another recorder continued.
     pub skipped: u64,
     /// Ticks whose results didn't all fit in the recorder's queue.
     pub results_missing: u64,
@@ -143,14 +144,15 @@ struct Channel {
     sequence: u32,
 }
 
-/// Writes a log. The underlying writer is append-only and never sought, so that written bytes stay unchanged. A log is ended
-/// by [`LogWriter::finish`] alone: one that is dropped, or had an error, gets neither summary nor footer, so that it is found
-/// to be cut off.
+/// Writes a log.
 ///
-/// Chunks are compressed with zstd at its lowest level: nothing waits for the writing of a dive, at some hundred
-/// kB/s, and even a small computer compresses a thousand times faster; so the smaller file wins over lz4's speed.
+/// The underlying writer only appends and never seeks, so written bytes stay unchanged. Only [`LogWriter::finish`] ends
+/// a log. A log that is dropped or had an error gets neither summary nor footer, so that readers find it cut off.
+///
+/// Chunks are compressed with zstd at its lowest level. A dive produces some hundred kB/s, and even a small computer
+/// compresses a thousand times faster, so the smaller file counts more than the speed of lz4.
 pub struct LogWriter<W: Write> {
-    /// Dropped before the writer, which would end the log.
+    /// Declared first: it must be dropped before the writer, which would otherwise end the log.
     medium: Closing,
     writer: mcap::Writer<NoSeek<Counted<W>>>,
     raw: Vec<Channel>,
@@ -166,11 +168,11 @@ pub struct LogWriter<W: Write> {
     last_tick: Option<u64>,
     /// Totals of earlier parts.
     before: Progress,
-    /// Losses stated.
+    /// Number of stated losses.
     losses: u64,
     /// Time of the first message of the open chunk.
     chunk_began: Option<MonoNs>,
-    /// Whether the last message was a voice.
+    /// Whether the last message was a voice recording.
     is_alone: bool,
 }
 
@@ -192,8 +194,8 @@ impl<W: Write> LogWriter<W> {
         if let Some(result) = header.results.iter().find(|result| !result.topic.starts_with(RESULT_PREFIX)) {
             return Err(LogError::Topic { topic: result.topic.clone() });
         }
-        // With threads the output would depend on the machine, but the log of a simulation must be a function of
-        // its scene. Without seeking a chunk is written at once when it is closed.
+        // With threads the output would depend on the machine, but the log of a simulation must depend only on its
+        // scene. Without seeking, a chunk is written as soon as it is closed.
         let options = mcap::WriteOptions::new()
             .profile("headrace")
             .library(format!("{LIBRARY}{}", env!("CARGO_PKG_VERSION")))
@@ -270,7 +272,7 @@ impl<W: Write> LogWriter<W> {
         all
     }
 
-    /// Approximate file size if it were ended now, bytes: the last chunk isn't compressed yet.
+    /// Approximate size of the file if it were ended now, bytes. The last chunk isn't compressed yet.
     pub(super) fn bytes(&self) -> u64 {
         let channels = self.raw.len() + self.sent.len() + self.results.len() + 1;
         let index = CHUNK_INDEX_BYTES + CHUNK_INDEX_CHANNEL_BYTES * channels as u64;
@@ -354,11 +356,12 @@ impl<W: Write> LogWriter<W> {
             publish_time: publish_time.0,
         };
         channel.sequence = channel.sequence.wrapping_add(1);
-        // Limits the loss from damage to one chunk, however fast the dive is written. A voice is as long as seconds of a dive, and has
-        // a chunk of its own, so that damage to it is damage to nothing else.
+        // Closing chunks by time limits the damage to one chunk, however fast the dive is written. A voice recording is
+        // as large as seconds of a dive, so it gets its own chunk: damage to it affects nothing else.
         let is_alone = core::mem::replace(&mut self.is_alone, lane == Lane::Voice) || self.is_alone;
         if self.chunk_began.is_some_and(|began| is_alone || log_time.since(began).0 >= CHUNK_SPAN.0) {
-            // To close a chunk is to flush, for the `mcap` crate; the medium is left to those who know how long it takes.
+            // The `mcap` crate flushes when it closes a chunk. The flush stops here, since the caller decides when to
+            // sync.
             self.medium.0.is_spared.store(true, Ordering::Relaxed);
             let closed = self.writer.flush();
             self.medium.0.is_spared.store(false, Ordering::Relaxed);
@@ -431,13 +434,13 @@ fn write_metadata<W: Write>(
     Ok(())
 }
 
-/// Bytes passed to the medium, and whether more may be.
+/// Number of bytes passed to the medium, and whether more may be passed.
 #[derive(Default)]
 struct Medium {
     bytes: AtomicU64,
-    /// The `mcap` crate's writer ends a log when it is dropped, also after an error. It mustn't.
+    /// Set to stop the `mcap` crate's writer from ending the log when it is dropped, also after an error.
     shut: AtomicBool,
-    /// Whether a flush ends at this side of it.
+    /// Whether a flush stops before the medium.
     is_spared: AtomicBool,
 }
 
@@ -450,7 +453,7 @@ impl Drop for Closing {
     }
 }
 
-/// A writer with a count of its bytes, that takes nothing after an error.
+/// A writer that counts its bytes and accepts nothing after an error.
 struct Counted<W> {
     writer: W,
     medium: Arc<Medium>,

@@ -1,13 +1,13 @@
-//! Content-defined chunking: cuts bytes into blocks so that two snapshots share what they have in common.
+//! Content-defined chunking: cuts bytes into blocks so that two snapshots share the blocks they have in common.
 //!
-//! Cuts depend on the bytes around them and not on their offset (gear hash: Xia et al., "FastCDC", USENIX ATC 2016), so an
-//! insertion changes the blocks around it and none behind.
+//! Cuts depend on the surrounding bytes, not on their offset (gear hash: Xia et al., "FastCDC", USENIX ATC 2016). An
+//! insertion therefore changes the blocks around it and none behind.
 
-/// Least length of a block but the last, bytes.
+/// Minimum length of a block except the last, bytes.
 const MIN_BYTES: usize = 8 << 10;
-/// Greatest length of a block, bytes.
+/// Maximum length of a block, bytes.
 const MAX_BYTES: usize = 128 << 10;
-/// A block ends where these bits of the hash are zero: on average every 32 KiB beyond the least length.
+/// A block ends where these bits of the hash are zero: on average every 32 KiB beyond the minimum length.
 const CUT_MASK: u64 = 0x7fff << 48;
 
 /// A pseudorandom number for each value of a byte (splitmix64).
@@ -82,7 +82,7 @@ mod tests {
     }
 
     #[test]
-    fn an_insertion_changes_the_blocks_around_it_alone() {
+    fn insertion_changes_only_the_blocks_around_it() {
         let bytes = noise(4 << 20, 2);
         let mut longer = bytes.clone();
         longer.splice(1_000_000..1_000_000, noise(777, 3));
@@ -93,7 +93,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn blocks_of_any_bytes_concatenate_to_them(bytes in proptest::collection::vec(any::<u8>(), 0..40_000)) {
+        fn blocks_concatenate_to_the_original_bytes(bytes in proptest::collection::vec(any::<u8>(), 0..40_000)) {
             prop_assert_eq!(blocks(&bytes).collect::<Vec<_>>().concat(), bytes);
         }
     }

@@ -1,7 +1,7 @@
-//! Snapshots of a replay in progress, held in memory so that playback can jump back without starting over.
+//! Stores snapshots of a replay in memory, so that playback can jump back without starting over.
 //!
-//! Snapshots are cut into blocks by content and each distinct block is held once: most of a dive's state is wall already
-//! behind the vehicle, which consecutive snapshots have in common.
+//! Snapshots are cut into blocks by content, and each distinct block is stored once. Consecutive snapshots share most
+//! of their state, since it describes wall that the vehicle has passed.
 
 mod blocks;
 
@@ -15,23 +15,23 @@ use headrace_geometry::time::MonoNs;
 #[derive(Debug)]
 pub struct SnapshotStore {
     snapshots: BTreeMap<MonoNs, Vec<Arc<[u8]>>>,
-    /// Every block of any snapshot, once.
+    /// The distinct blocks of all snapshots.
     blocks: BTreeSet<Arc<[u8]>>,
-    /// Memory of the blocks and of the references to them, bytes.
+    /// Memory of the blocks and the references to them, bytes.
     used_bytes: usize,
     max_bytes: usize,
     interval: Duration,
 }
 
 impl SnapshotStore {
-    /// An empty store for at most `max_bytes` of snapshots, due whenever `interval` of work has been done since the last.
+    /// Creates an empty store for at most `max_bytes` of snapshots, each due after `interval` of work.
     ///
-    /// The first snapshot is held whatever its size.
+    /// The first snapshot is kept whatever its size.
     pub fn new(max_bytes: usize, interval: Duration) -> Self {
         Self { snapshots: BTreeMap::new(), blocks: BTreeSet::new(), used_bytes: 0, max_bytes, interval }
     }
 
-    /// Work between two snapshots; doubled each time the store was full.
+    /// Work between two snapshots. It doubles each time the store is full.
     pub fn interval(&self) -> Duration {
         self.interval
     }
@@ -41,8 +41,10 @@ impl SnapshotStore {
         self.snapshots.range(..=at).next_back().map(|(time, _)| *time)
     }
 
-    /// Adds a snapshot, unless there is one of that time. When there is no room, every other snapshot is dropped and the
-    /// interval doubled until there is; a snapshot that doesn't fit beside the first alone isn't kept.
+    /// Adds a snapshot, unless one of that time exists.
+    ///
+    /// If there is no room, every other snapshot is dropped and the interval doubled until there is. A snapshot that
+    /// doesn't fit beside the first one isn't kept.
     pub fn insert(&mut self, at: MonoNs, snapshot: &[u8]) {
         if self.snapshots.contains_key(&at) {
             return;
@@ -69,7 +71,7 @@ impl SnapshotStore {
         self.snapshots.get(&at).map(|blocks| blocks.concat())
     }
 
-    /// Memory of the blocks not stored yet.
+    /// Memory needed for the blocks that aren't stored yet, bytes.
     fn growth(&self, blocks: &BTreeSet<&[u8]>) -> usize {
         blocks.iter().filter(|block| !self.blocks.contains(**block)).map(|block| block_bytes(block)).sum()
     }
@@ -84,7 +86,7 @@ impl SnapshotStore {
         held
     }
 
-    /// Drops every other snapshot but the first, and the blocks no longer used.
+    /// Drops every other snapshot after the first, and the blocks no longer used.
     fn thin(&mut self) {
         let mut is_kept = false;
         self.snapshots.retain(|_, _| {
@@ -121,7 +123,7 @@ mod tests {
     }
 
     #[test]
-    fn a_full_store_drops_every_other_snapshot_and_asks_for_fewer() {
+    fn full_store_drops_every_other_snapshot_and_doubles_the_interval() {
         let mut store = SnapshotStore::new(16 << 20, INTERVAL);
         let snapshot = |number: u64| noise(1 << 20, number);
         for number in 0..100 {
@@ -152,7 +154,7 @@ mod tests {
     }
 
     #[test]
-    fn the_first_snapshot_is_kept_and_one_too_large_beside_it_is_not() {
+    fn snapshot_too_large_beside_the_first_is_not_kept() {
         let mut store = SnapshotStore::new(1 << 20, INTERVAL);
         store.insert(MonoNs(5), &noise(2 << 20, 1));
         store.insert(MonoNs(6), &noise(2 << 20, 2));

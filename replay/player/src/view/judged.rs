@@ -1,4 +1,4 @@
-//! Coverage judgements for viewers: each section's verdict, the stretches currently missed, and alerts to the pilot.
+//! Coverage judgements for viewers: section verdicts, missed stretches, and alerts to the pilot.
 
 use std::collections::BTreeMap;
 
@@ -11,7 +11,8 @@ use super::site::Site;
 
 /// Interval at which the list of missed stretches is shown, if changed.
 const EVERY: DurNs = DurNs(2_000_000_000);
-/// Most stretches listed, the last along the tunnel: a dive that misses everything still has a small log.
+/// Maximum number of stretches listed. The last ones along the tunnel are kept. A dive that misses everything still has a
+/// small log.
 const MOST_STRETCHES: usize = 40;
 
 /// A judgement of a section, as published.
@@ -35,7 +36,7 @@ pub(super) struct Sections {
     flagged: BTreeMap<i64, (Cause, f64)>,
     /// First and last section of each run.
     runs: BTreeMap<u64, (i64, i64)>,
-    /// Changed runs; the pilot is alerted with the next judgement, which is of the section that changed them.
+    /// Changed runs. The pilot is alerted with the next judgement, which is that of the section that changed them.
     changed_runs: Vec<(u64, u64)>,
     shown: Option<MonoNs>,
     changed: bool,
@@ -47,7 +48,9 @@ impl Sections {
         self.changed_runs.push((id, change));
     }
 
-    /// Takes a section's judgement. Returns the section as shown, and the alerts to the pilot; `v_max_mps` is the advised speed.
+    /// Processes a section's judgement. Returns the section as shown, and the alerts to the pilot.
+    ///
+    /// `v_max_mps` is the advised speed.
     pub(super) fn judge(&mut self, judged: &Judged, site: &Site, v_max_mps: f64) -> (Section, Vec<Log>) {
         let index = judged.section;
         let flagged = match judged.change {
@@ -68,13 +71,13 @@ impl Sections {
         (shown(judged, flagged, site), said)
     }
 
-    /// Alert to the pilot about a run changed by a section.
+    /// Creates the alert to the pilot about a run that a section changed.
     fn say(&mut self, id: u64, change: u64, judged: &Judged, site: &Site, v_max_mps: f64) -> Option<Log> {
         let index = judged.section;
         let span = self.runs.entry(id).or_insert((index, index));
         if change == RunChange::Cleared as u64 {
             let (from, to) = self.runs.remove(&id)?;
-            // Part of it may be another run now.
+            // Part of the range may belong to another run now.
             let open = self.flagged.range(from..=to).next().is_some();
             let words = cleared_text(from as f64 * site.section_m, (to + 1) as f64 * site.section_m);
             return (!open).then(|| Log::new(judged.at, Level::Info, words));
@@ -99,7 +102,7 @@ impl Sections {
         self.shown = None;
     }
 
-    /// The missed stretches, if changed and due.
+    /// The missed stretches, if they changed and an update is due.
     pub(super) fn show(&mut self, at: MonoNs, site: &Site) -> Option<Missed> {
         let waits = self.shown.is_some_and(|shown| (0..EVERY.0).contains(&at.since(shown).0));
         (self.changed && !waits).then(|| {

@@ -1,11 +1,11 @@
-//! Messages for viewers: JSON with the keys of Foxglove's schemas, and of our own.
+//! Messages for viewers: JSON with the keys of Foxglove's schemas and of this program's own schemas.
 //!
-//! Numbers are rounded to display precision, to keep the text short.
+//! Numbers are rounded to display precision to keep the text short.
 
 use headrace_geometry::time::MonoNs;
 use serde::Serialize;
 
-/// A time in Foxglove's format. Ours is the host's monotonic clock, as everywhere in a log.
+/// A time in Foxglove's format, on the host's monotonic clock like all times in a log.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 pub(super) struct Time {
     sec: u64,
@@ -196,7 +196,7 @@ pub(super) struct Section {
     pub(super) hole_clock: String,
     pub(super) target_m: f64,
     pub(super) flagged: bool,
-    /// Empty unless the section is flagged or fails.
+    /// Cause; empty unless the section is flagged or fails.
     pub(super) cause: &'static str,
     pub(super) words: String,
 }
@@ -227,7 +227,7 @@ pub(super) struct Advice {
     pub(super) words: String,
 }
 
-/// Rounded to 1 / `parts`; JSON has only finite numbers, so others become zero.
+/// Rounds to 1 / `parts`. Non-finite values become zero, since JSON can't represent them.
 pub(super) fn rounded(value: f64, parts: f64) -> f64 {
     if value.is_finite() { (value * parts).round() / parts + 0.0 } else { 0.0 }
 }
@@ -252,7 +252,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn base64_as_the_rfc_has_it() {
+    fn base64_matches_the_rfc_examples() {
         for (bytes, text) in [
             ("", ""),
             ("f", "Zg=="),

@@ -1,10 +1,11 @@
-//! A dive for viewers: converts the loop's results ([`headrace_monitor::result_stream`]) to messages that
-//! Foxglove and Lichtblick display, under Foxglove's schemas and some of our own.
+//! Converts the loop's results ([`headrace_monitor::result_stream`]) to messages that Foxglove and Lichtblick display.
+//!
+//! Schemas are Foxglove's and some of this program's own.
 //!
 //! | topic below `/result/view/` | schema | content, rate |
 //! |---|---|---|
-//! | `transforms` | `foxglove.FrameTransforms` | `tunnel` to `vehicle` and to `wall`, at each beat (5 Hz) |
-//! | `pose` | `foxglove.PoseInFrame` | the vehicle, at each beat |
+//! | `transforms` | `foxglove.FrameTransforms` | `tunnel` to `vehicle` and to `wall`, at each update (5 Hz) |
+//! | `pose` | `foxglove.PoseInFrame` | the vehicle, at each update |
 //! | `vehicle` | `headrace.Vehicle` | the same for plots, with speed and standard deviations |
 //! | `points` | `foxglove.PointCloud` | samples of half a second, with the head number |
 //! | `wall` | `foxglove.Grid` | the unrolled wall within 8 m of the vehicle, every 2 s |
@@ -13,9 +14,10 @@
 //! | `advice` | `headrace.Advice` | the advice when it changes, and every second |
 //! | `alerts` | `foxglove.Log` | alerts to the pilot |
 //!
-//! Frame `tunnel` is ours ([`headrace_geometry::frames`]): z is up, the viewers' convention, so nothing needs rotating.
-//! `wall` lies flat beside it: x is chainage, y the arc length. The messages are made on the recorder's thread
-//! ([`DerivedChannels`]), not in the loop, and a replay reads none of them.
+//! Frame `tunnel` is the one of [`headrace_geometry::frames`]. Its z axis points up, as viewers expect, so nothing
+//! needs rotating. Frame `wall` lies flat beside it: x is chainage, y is arc length.
+//!
+//! The recorder's thread makes the messages ([`DerivedChannels`]), not the loop. A replay reads none of them.
 
 mod judged;
 mod messages;
@@ -58,7 +60,7 @@ pub use site::Site;
 const BESIDE_M: f64 = 1.0;
 /// Interval at which unchanged advice is repeated.
 const ADVICE_EVERY: DurNs = DurNs(1_000_000_000);
-/// Speeds nearer than this count as the same advice, m/s.
+/// Speeds that differ by less than this count as the same advice, m/s.
 const SAME_MPS: f64 = 0.005;
 
 /// Makes viewer messages from the loop's results.
@@ -69,14 +71,14 @@ pub struct View {
     points: Points,
     wall: Wall,
     sections: Sections,
-    /// Chainage and speed at the last known position.
+    /// Chainage and speed of the last known position.
     last: Option<(f64, f64)>,
     v_max_mps: f64,
     told: Option<Told>,
     at: MonoNs,
 }
 
-/// The advice shown last.
+/// The advice last shown.
 #[derive(Debug)]
 struct Told {
     at: MonoNs,
@@ -86,7 +88,7 @@ struct Told {
 }
 
 impl View {
-    /// For a dive without results so far.
+    /// Creates the view of a dive without results so far.
     pub fn new(site: Site) -> Self {
         let steps = 64;
         let arcs = (0..steps).map(|step| f64::from(step) / f64::from(steps) * site.profile.perimeter_m());
@@ -118,7 +120,8 @@ impl View {
             }
             RecordKind::Alert => self.alert(&mut words, made),
             RecordKind::Advice => self.advice(&mut words, made),
-            // Points are samples; doubtful returns, the live state and the list of alerts are in the log's results.
+            // Viewers show samples only. Doubtful returns, the live state and the list of alerts remain in the log's
+            // results.
             RecordKind::NoSample
             | RecordKind::Doubtful
             | RecordKind::State
@@ -288,7 +291,7 @@ impl View {
         Some(())
     }
 
-    /// An alert about the dive as a whole, or of a head.
+    /// Creates an alert about the dive as a whole or about a head.
     fn alert(&self, words: &mut Words<'_>, made: &mut Outbox<'_>) -> Option<()> {
         let at = MonoNs(words.integer()?);
         let kind = words.one_of(&AlertKind::ALL, |kind| kind as u64)?;
@@ -310,7 +313,7 @@ impl DerivedChannels for View {
         let mut rest = words.as_slice();
         while let Some((record, after)) = first_record(rest) {
             rest = after;
-            // A record in another version's format isn't shown.
+            // Records in another version's format aren't shown.
             let _ = self.record(record, &mut made);
         }
         self.at = at;
@@ -332,7 +335,7 @@ impl DerivedChannels for View {
 
 /// Output of messages.
 struct Outbox<'a> {
-    /// Their log time: that of the results they are made from, so that log times don't go back.
+    /// Log time of the messages: that of the results they are made from, so that log times don't go back.
     at: MonoNs,
     made: &'a mut Vec<Made>,
 }
@@ -371,7 +374,7 @@ impl Words<'_> {
         Some(first.map(f64::from_bits))
     }
 
-    /// The one of `all` whose number is the next word.
+    /// The element of `all` whose number is the next word.
     fn one_of<T: Copy>(&mut self, all: &[T], number: impl Fn(T) -> u64) -> Option<T> {
         let word = self.integer()?;
         all.iter().copied().find(|kind| number(*kind) == word)

@@ -1,4 +1,4 @@
-//! Samples as point clouds of half a second each.
+//! Collects samples into point clouds of half a second each.
 
 use headrace_geometry::time::{DurNs, MonoNs};
 
@@ -7,25 +7,27 @@ use super::site::TUNNEL;
 
 /// Time span of a cloud.
 const SPAN: DurNs = DurNs(500_000_000);
-/// Most points of a cloud.
+/// Maximum number of points of a cloud.
 const MOST_POINTS: usize = 4096;
-/// Bytes per point: three floats. The head number is stored in the least significant byte of x, which was zero; a
-/// viewer that takes it for part of x is off by some micrometres. A stride that is no multiple of three would
-/// compress a seventh worse in base64.
+/// Bytes per point: three floats.
+///
+/// The head number is stored in the least significant byte of x, which rounding has set to zero. A viewer that reads it
+/// as part of x is off by some micrometres. A stride that isn't a multiple of three would compress a seventh worse in
+/// base64.
 const STRIDE: usize = 12;
 const FIELDS: [Field; 4] =
     [Field::float("x", 0), Field::float("y", 4), Field::float("z", 8), Field::byte("head", 0)];
-/// Coordinates are rounded to 1 / this, m (4 mm): finer than the samples' accuracy. The lower half of a float's bits are then
-/// zeros, which compress well.
+/// Coordinates are rounded to 1 / this, m (4 mm), which is finer than the samples' accuracy. The lower half of a
+/// float's bits is then zero and compresses well.
 const PARTS_PER_M: f64 = 256.0;
-/// Points farther than this from their cloud's origin, m, would have fewer zero bits and aren't shown.
+/// Greatest distance of a point from its cloud's origin, m. Points beyond have fewer zero bits and aren't shown.
 const FARTHEST_M: f64 = 128.0;
 
 /// Points of the current cloud.
 #[derive(Debug, Default)]
 pub(super) struct Points {
     began: Option<MonoNs>,
-    /// Chainage of the cloud's origin, m: a float is too coarse for seven kilometres.
+    /// Chainage of the cloud's origin, m. A float is too coarse for a chainage of seven kilometres.
     origin_m: f64,
     data: Vec<u8>,
 }

@@ -1,8 +1,9 @@
 //! The channels of a view and their schemas.
 //!
-//! Names and keys of `foxglove.*` are those of Foxglove's published JSON Schemas (docs.foxglove.dev, "Message schemas").
-//! Only features that viewers' schema parsers support are used: `type` is one word, no references, no null. Enumerations
-//! give their type beside the names, which some parsers require and others ignore.
+//! Names and keys of `foxglove.*` are those of Foxglove's published JSON Schemas (docs.foxglove.dev, "Message
+//! schemas"). Only features that viewers' schema parsers support are used: `type` is one word, and there are no
+//! references and no null. Enumerations state their type beside the names, which some parsers require and others
+//! ignore.
 
 use serde_json::{Value, json};
 
@@ -10,7 +11,7 @@ use super::topic::Topic;
 use crate::log::ResultChannel;
 use crate::log::format::VIEW_PREFIX;
 
-/// The channels of a view, numbered after the streams of results.
+/// The channels of a view. Their numbers follow those of the result streams.
 pub fn channels() -> Vec<ResultChannel> {
     let channel = |topic: &Topic| {
         let (name, schema_name, schema) = schema_of(*topic);
@@ -20,14 +21,14 @@ pub fn channels() -> Vec<ResultChannel> {
             schema_encoding: "jsonschema".to_owned(),
             schema: titled(schema_name, schema).to_string(),
             message_encoding: "json".to_owned(),
-            // All of it can be recomputed from the rest of the log, so it is dropped first.
+            // It can be recomputed from the rest of the log, so it is dropped first when the disk fills.
             follows_echoes: true,
         }
     };
     Topic::ALL.iter().map(channel).collect()
 }
 
-/// A topic's name, its schema's, and the schema.
+/// Returns a topic's name, the name of its schema, and the schema.
 fn schema_of(topic: Topic) -> (&'static str, &'static str, Value) {
     match topic {
         Topic::Transforms => ("transforms", "foxglove.FrameTransforms", transforms()),
@@ -42,7 +43,7 @@ fn schema_of(topic: Topic) -> (&'static str, &'static str, Value) {
     }
 }
 
-/// An object whose keys are all required, but for those named.
+/// Schema of an object whose keys are all required except `optional`.
 fn object(properties: &Value, optional: &[&str]) -> Value {
     let keys = properties.as_object().into_iter().flat_map(|properties| properties.keys());
     let required: Vec<&String> = keys.filter(|key| !optional.contains(&key.as_str())).collect();
@@ -99,7 +100,7 @@ fn list(items: &Value) -> Value {
     json!({"type": "array", "items": items})
 }
 
-/// Names for numbers, from the first on.
+/// Enumeration schema: names for consecutive numbers from `first`.
 fn names(first: u32, names: &[&str]) -> Value {
     let named: Vec<Value> =
         (first..).zip(names).map(|(number, name)| json!({"title": name, "const": number})).collect();

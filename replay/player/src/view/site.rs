@@ -11,17 +11,17 @@ pub(super) const WALL: &str = "wall";
 /// Facts about the site that a view needs.
 #[derive(Debug, Clone)]
 pub struct Site {
-    /// Design profile.
+    /// Design profile of the tunnel.
     pub profile: Profile,
     /// Target T, m.
     pub target_m: f64,
     /// Length of a section, m.
     pub section_m: f64,
-    /// How far before a missed stretch the vehicle is to turn round, m.
+    /// Distance before a missed stretch at which the vehicle should turn round, m.
     pub run_up_m: f64,
     /// Length of the tunnel, m.
     pub length_m: f64,
-    /// What the heads are called and could be set to.
+    /// Names and possible settings of the heads.
     pub head_words: HeadWords,
     /// Numbers of the sources that are heads.
     pub heads: Vec<u64>,

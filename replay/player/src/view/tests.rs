@@ -23,7 +23,7 @@ fn record(kind: RecordKind, words: &[u64]) -> Vec<u64> {
     [&[(words.len() as u64) << 8 | kind as u64], words].concat()
 }
 
-/// Messages made from some records of a stream, by topic name.
+/// The messages made from records of a stream, by topic name.
 fn taken(view: &mut View, stream: &str, at: u64, records: &[Vec<u64>]) -> BTreeMap<String, Vec<Value>> {
     let words = [&[0, 0], records.concat().as_slice()].concat();
     let message: Vec<u8> = words.into_iter().flat_map(u64::to_le_bytes).collect();
@@ -66,7 +66,7 @@ fn section(at: u64, index: i64, change: Judgement, verdict: Verdict) -> Vec<u64>
 }
 
 #[test]
-fn a_pose_is_a_transform_a_pose_and_figures_for_plots() {
+fn pose_becomes_transform_pose_and_plot_figures() {
     let mut view = view();
     let made = taken(&mut view, "poses", 7, &[pose(1_200_000_000, 12.345_678)]);
     let transforms = made["transforms"][0]["transforms"].as_array().unwrap();
@@ -123,7 +123,7 @@ fn the_wall_shows_samples_and_verdicts_near_the_vehicle() {
 }
 
 #[test]
-fn flags_are_said_once_and_cleared_in_the_pilot_s_words() {
+fn flags_and_clearings_are_alerted_once_in_pilot_words() {
     let mut view = view();
     let run = |change: RunChange| record(RecordKind::Run, &[0, change as u64]);
     let raised = [run(RunChange::Raised), section(1, 40, Judgement::Raised, Verdict::Fail)];
@@ -156,7 +156,7 @@ fn advice(at: u64, v_max_mps: f64, will_exceed: bool) -> Vec<u64> {
 }
 
 #[test]
-fn advice_is_told_when_it_changes_and_every_second() {
+fn advice_is_published_on_change_and_every_second() {
     let mut view = view();
     taken(&mut view, "poses", 0, &[pose(0, 10.0)]);
     let beats: Vec<_> = (0..15).map(|k| advice(k * 200_000_000, 0.3, false)).collect();
@@ -168,9 +168,9 @@ fn advice_is_told_when_it_changes_and_every_second() {
     assert_eq!((&made["alerts"][0]["level"], &made["advice"][0]["speed_mps"]), (&3.into(), &0.2.into()));
 }
 
-/// Viewers' JSON schema parsers support only one word for `type`, and no references.
+/// Viewers' JSON schema parsers support only a single word for `type`, and no references.
 #[test]
-fn schemas_use_what_viewers_read() {
+fn schemas_use_only_features_that_viewers_support() {
     fn look(schema: &Value, place: &str) {
         let kind = schema["type"].as_str().unwrap_or_else(|| panic!("{place}: no type"));
         for (key, inner) in schema["properties"].as_object().into_iter().flatten() {
@@ -195,7 +195,7 @@ fn schemas_use_what_viewers_read() {
 }
 
 #[test]
-fn words_that_are_none_show_nothing() {
+fn invalid_words_show_nothing() {
     let mut view = view();
     for kind in 0..=255_u64 {
         for len in 0..20_u64 {

@@ -25,10 +25,10 @@ const FIELDS: [Field; 6] = [
     Field::byte("samples", 4),
     Field::byte("verdict", 5),
 ];
-/// Cap on the sample count shown per cell: exact counts would dominate the message size.
+/// Largest sample count shown per cell: exact counts would dominate the message size.
 const MOST_SAMPLES: u8 = 3;
 
-/// Samples and verdicts per cell; allocated only for the part of the tunnel passed.
+/// Samples and verdicts per cell; allocated only for the passed part of the tunnel.
 #[derive(Debug)]
 pub(super) struct Wall {
     cells: usize,
@@ -74,7 +74,7 @@ impl Wall {
         }
     }
 
-    /// Takes a section's verdict.
+    /// Stores a section's verdict.
     pub(super) fn judge(&mut self, section: i64, verdict: Verdict) {
         if let Some(column) = self.column(section)
             && column.verdict != verdict
@@ -95,7 +95,7 @@ impl Wall {
         self.shown = None;
     }
 
-    /// The wall around a chainage, if changed and due.
+    /// The wall around a chainage, if it changed and an update is due.
     pub(super) fn show(&mut self, at: MonoNs, x_m: f64) -> Option<Grid> {
         let waits = self.shown.is_some_and(|shown| (0..EVERY.0).contains(&at.since(shown).0));
         (self.changed && !waits).then(|| {
@@ -129,8 +129,9 @@ impl Wall {
     }
 }
 
-/// Colour, samples and verdict of a cell. Unseen cells are transparent, and cells of a judged section without a
-/// sample are dark: holes show as dark.
+/// Colour, samples and verdict of a cell.
+///
+/// A cell without a sample is transparent in an open section and dark in a judged one, so that holes show.
 fn cell(column: Option<&Column>, row: usize) -> [u8; FIELDS.len()] {
     let Some(column) = column else { return [0; FIELDS.len()] };
     let samples = column.samples.get(row).copied().unwrap_or(0);

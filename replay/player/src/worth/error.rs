@@ -1,21 +1,21 @@
-//! Why worth can't be measured.
+//! Errors of measuring effects.
 
 use crate::adviser::SimulationError;
 use crate::drive::DriveError;
 
-/// Why worth can't be measured.
+/// The effects of a scene can't be measured.
 #[derive(Debug, thiserror::Error)]
 pub enum WorthError {
-    /// A scene can't be simulated, perhaps without one of its effects.
+    /// A scene can't be simulated, possibly because an effect was left out.
     #[error(transparent)]
     Simulation(#[from] SimulationError),
     /// A loop can't be armed for the scene's vehicle.
     #[error("arming the loop that judges the scene: {0}")]
     Loop(#[from] headrace_monitor::PluginError),
-    /// A simulated dive doesn't go through the loop.
+    /// The loop can't process a simulated dive.
     #[error(transparent)]
     Drive(#[from] DriveError),
-    /// Too few seeds for an interval.
+    /// Too few seeds for a confidence interval.
     #[error("measuring worth: {0} seeds; an interval needs at least 2")]
     Seeds(usize),
 }

@@ -1,4 +1,4 @@
-//! What the loop finds in a scene's dive.
+//! Results of the loop for a simulated dive.
 
 use std::collections::BTreeMap;
 
@@ -12,19 +12,19 @@ use crate::adviser::simulation;
 use crate::drive::{Pace, drive};
 use crate::simulation_feed::SimulationFeed;
 
-/// Figures of a dive.
+/// Results of a dive.
 #[derive(Debug, Clone)]
 pub(super) struct Figures {
-    /// D of each section where it is bounded, m, by where the section begins, mm.
+    /// D of each section, m, where it is bounded, by the section's start, mm.
     holes_m: BTreeMap<i64, f64>,
-    /// Length of the sections that have been passed through, m.
+    /// Length of the sections that the vehicle has passed, m.
     pub(super) way_m: f64,
     /// Metres with the verdict pass.
     pub(super) passed_m: f64,
 }
 
 impl Figures {
-    /// Dives a scene.
+    /// Simulates a scene and runs it through the loop.
     ///
     /// Errors: see [`WorthError`].
     pub(super) fn of(scene: &Scene) -> Result<Self, WorthError> {
@@ -49,12 +49,12 @@ impl Figures {
         Ok(figures)
     }
 
-    /// Mean of D, m.
+    /// Mean D, m.
     pub(super) fn hole_m(&self) -> f64 {
         self.holes_m.values().sum::<f64>() / self.holes_m.len() as f64
     }
 
-    /// Mean over the sections that both dives have of the difference of D, m; zero if they share none.
+    /// Mean difference of D over the sections that both dives have, m; zero if they share none.
     pub(super) fn hole_more_than_m(&self, other: &Self) -> f64 {
         let both = self.holes_m.iter().filter_map(|(at, hole_m)| Some(hole_m - other.holes_m.get(at)?));
         let differences: Vec<f64> = both.collect();

@@ -1,4 +1,4 @@
-//! What simulating costs.
+//! Measures the cost of simulating.
 
 use headrace_sensor::device::{Direction, Sense};
 use headrace_simulator::Scene;
@@ -8,10 +8,10 @@ use super::error::WorthError;
 use super::mean::Mean;
 use crate::adviser::{SimulationError, simulation};
 
-/// Rounds, in turns, whose mean and interval are told.
+/// Number of alternating rounds for the mean and its interval.
 const ROUNDS: usize = 5;
 
-/// What simulating costs with all effects, ns of the processor for each return of a head.
+/// Cost of simulating with all effects, ns of processor time per sonar return.
 ///
 /// Errors: see [`WorthError`].
 pub(super) fn all_ns(scene: &Scene) -> Result<Mean, WorthError> {
@@ -19,7 +19,7 @@ pub(super) fn all_ns(scene: &Scene) -> Result<Mean, WorthError> {
     Ok(Mean::of(&rounds?))
 }
 
-/// What these effects cost of it.
+/// Share of the cost due to these effects, ns of processor time per sonar return.
 ///
 /// Errors: see [`WorthError`].
 pub(super) fn of_ns(scene: &mut Scene, effects: &[&str]) -> Result<Mean, WorthError> {
@@ -34,7 +34,7 @@ pub(super) fn of_ns(scene: &mut Scene, effects: &[&str]) -> Result<Mean, WorthEr
     Ok(Mean::of(&differences))
 }
 
-/// Time of this thread on the processor to simulate a scene, over the returns of its heads, ns.
+/// Processor time of this thread to simulate a scene, per sonar return, ns.
 fn ns_a_return(scene: &Scene) -> Result<f64, SimulationError> {
     let mut simulation = simulation(scene, false)?;
     let sensors = &scene.facts().sensors;
@@ -47,7 +47,7 @@ fn ns_a_return(scene: &Scene) -> Result<f64, SimulationError> {
     Ok((thread_ns() - began_ns) / returns.max(1) as f64)
 }
 
-/// Time that this thread has been on a processor, ns.
+/// Processor time used by this thread, ns.
 fn thread_ns() -> f64 {
     let time = clock_gettime(ClockId::ThreadCPUTime);
     time.tv_sec as f64 * 1e9 + time.tv_nsec as f64

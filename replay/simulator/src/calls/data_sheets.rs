@@ -1,4 +1,4 @@
-//! What the models of sensors call for, by their data sheets.
+//! Effects implied by the models of sensors, from their data sheets.
 //!
 //! | model | effect | parameters | source |
 //! |---|---|---|---|
@@ -11,7 +11,7 @@
 //! | bar100 | depth_steps, depth_noise | 31.2 mm; a count of 305 Pa / 2 | the data sheet: 3.05 mbar; resolution 3 mbar |
 //! | those with a known noise | imu_noise, imu_bias | the device's own figures | its crate, by [`Device::inertial_noise`] |
 //!
-//! A head calls for more by being on a vehicle: see [`of_vehicle`].
+//! A head implies further effects by being on a vehicle: see [`of_vehicle`].
 //!
 //! [`Device::inertial_noise`]: headrace_sensor::device::Device::inertial_noise
 
@@ -21,10 +21,10 @@ use headrace_vehicle::VehicleConfig;
 use super::{Call, number};
 use crate::facts::{Facts, SensorFacts};
 
-/// Heads whose beams differ by less share a frequency, radians: 5 kHz.
+/// Heads whose beam widths differ by less than this share a frequency, radians. It corresponds to 5 kHz.
 const SAME_BEAM_RAD: f64 = 2e-4;
 
-/// What the vehicle's sensors call for, each by its model.
+/// Effects implied by the vehicle's sensors, each by its model.
 pub(super) fn calls(vehicle: &VehicleConfig, facts: &Facts) -> Vec<Call> {
     let mut calls = of_vehicle(vehicle, facts);
     let models = vehicle.sensor_configs.iter().map(|config| config.plugin.as_str());
@@ -94,7 +94,7 @@ fn inertial(noise: &InertialNoise) -> Own {
     ]
 }
 
-/// What heads call for by being on a vehicle that moves, beside others, beside the hull.
+/// Effects implied by heads on a moving vehicle, beside other heads and the hull.
 fn of_vehicle(vehicle: &VehicleConfig, facts: &Facts) -> Vec<Call> {
     let heads: Vec<&SensorFacts> = facts.sensors.iter().filter(|sensor| sensor.head.is_some()).collect();
     let ids = |sensors: &[&SensorFacts]| sensors.iter().map(|sensor| sensor.id.clone()).collect::<Vec<_>>();

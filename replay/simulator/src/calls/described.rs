@@ -1,4 +1,4 @@
-//! What a scene says is there: water, linings, a cable, thrusters, and what its tunnel has.
+//! Effects implied by a scene's descriptions: water, linings, a cable, thrusters, and features of the tunnel.
 
 use headrace_config::{ConfigError, Section};
 use headrace_geometry::math;
@@ -11,11 +11,12 @@ use crate::facts::Facts;
 use crate::stretch::Stretch;
 use crate::trajectory::Ground;
 
-/// A cable that can be named.
+/// A known cable, selected by name.
 ///
-/// Strength and diameter are of the maker's page (docs.bluerobotics.com/fathom-r2: 7.6 mm, 350 lb); the stiffness EA is the
-/// strength over the strain at which aramid breaks, 3.6 % (DuPont, "Kevlar aramid fiber technical guide", Kevlar 29), the drag that
-/// of a smooth cylinder drawn along its axis at 0.2 m/s, with a friction coefficient of 0.01.
+/// Strength and diameter are from the maker's page (docs.bluerobotics.com/fathom-r2: 7.6 mm, 350 lb). The stiffness EA
+/// is the strength divided by the strain at which aramid breaks, 3.6 % (DuPont, "Kevlar aramid fiber technical guide",
+/// Kevlar 29). The drag is that of a smooth cylinder drawn along its axis at 0.2 m/s, with a friction coefficient of
+/// 0.01.
 struct Cable {
     name: &'static str,
     diameter_m: f64,
@@ -26,13 +27,14 @@ const CABLES: [Cable; 1] = [Cable { name: "fathom", diameter_m: 0.0076, strength
 const ARAMID_STRAIN: f64 = 0.036;
 const FRICTION: f64 = 0.01;
 const DRAWN_MPS: f64 = 0.2;
-/// Water beside openings in which corners return sound by way of two walls, m.
+/// Length of water on either side of an opening in which corners return sound by way of two walls, m.
 const BESIDE_M: f64 = 1.0;
-/// Length over which a steel lining's end pulls a compass, m, and by how much at most, degrees: the scene steel.toml.
+/// Length over which the end of a steel lining disturbs a compass, m, and the largest disturbance, degrees, as in the
+/// scene steel.toml.
 const STEEL_END_M: f64 = 6.0;
 const STEEL_END_DEG: f64 = 10.0;
 
-/// What a scene says is there.
+/// The descriptions in a scene.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Described {
     temperature_degc: Option<f64>,
@@ -52,12 +54,12 @@ struct Murk {
     grain_um: f64,
 }
 
-/// Water that leaves the tunnel, or comes in where it is negative.
+/// A leak: a flow out of the tunnel, or into it if negative.
 #[derive(Debug, Clone, Copy)]
 struct Leak {
     chainage_m: f64,
     flow_m3ps: f64,
-    /// Whether the water comes along the tunnel from the portal, rather than from its far end.
+    /// Whether the water comes from the portal rather than from the tunnel's far end.
     from_portal: bool,
 }
 
@@ -83,7 +85,7 @@ struct Thrusters {
     accel_mps2: f64,
 }
 
-/// The tables that say what is there.
+/// The tables with descriptions.
 pub(crate) struct Tables<'a> {
     water: Option<Section<'a>>,
     stretches: Vec<Section<'a>>,
@@ -92,9 +94,9 @@ pub(crate) struct Tables<'a> {
 }
 
 impl<'a> Tables<'a> {
-    /// `[water]`, `[cable]`, `[thrusters]` and the stretches of `[tunnel]`.
+    /// The tables `[water]`, `[cable]`, `[thrusters]` and the stretches of `[tunnel]`.
     ///
-    /// Errors: one is no table.
+    /// Errors: one of them isn't a table.
     pub(crate) fn of(root: &Section<'a>, tunnel: Option<&Section<'a>>) -> Result<Self, ConfigError> {
         let stretches = tunnel.map(|tunnel| tunnel.sections("stretches")).transpose()?;
         Ok(Self {
@@ -159,7 +161,7 @@ impl Described {
         water.finish()
     }
 
-    /// What all this calls for.
+    /// The effects that all descriptions imply.
     pub(super) fn calls(&self, site: &Site, facts: &Facts, environment: &Environment) -> Vec<Call> {
         let of = |sense: Sense| {
             let sensors = facts.sensors.iter().filter(|sensor| sensor.sense == sense);
@@ -205,7 +207,7 @@ impl Described {
             let place_m = [murk.stretch.from_m, murk.stretch.to_m];
             let by = format!("murk of {} g/l from {} to {} m", murk.silt_gpl, place_m[0], place_m[1]);
             let call = |effect, keys: &[_]| Call::new(effect, by.clone(), keys).within(place_m);
-            // field.md, "murk": runs of lost returns, 5 % near ones, second echoes.
+            // field.md, "murk": runs of lost returns, 5 % near returns, second echoes.
             let lost = [("share", number(0.2)), ("mean_run", number(6.0))];
             let near = [("share", number(0.05)), ("mean_run", number(3.0))];
             let silt = [("silt_gpl", number(murk.silt_gpl)), ("grain_um", number(murk.grain_um))];
@@ -220,7 +222,7 @@ impl Described {
     }
 
     fn of_leaks(&self, facts: &Facts, environment: &Environment) -> Vec<Call> {
-        // A trajectory that is given over ground isn't carried.
+        // A current doesn't carry a vehicle whose trajectory is given over ground.
         if self.leaks.is_empty() || facts.ground == Ground::Tunnel {
             return Vec::new();
         }
@@ -237,7 +239,7 @@ impl Described {
     }
 }
 
-/// `from_m` and `to_m`, both needed.
+/// Reads `from_m` and `to_m`, both required.
 fn within(table: &Section<'_>, length_m: f64) -> Result<Stretch, ConfigError> {
     let stretch = Stretch::read(table, length_m)?;
     for (key, end_m) in [("from_m", stretch.from_m), ("to_m", stretch.to_m)] {
@@ -246,7 +248,7 @@ fn within(table: &Section<'_>, length_m: f64) -> Result<Stretch, ConfigError> {
     Ok(stretch)
 }
 
-/// Corners at openings return sound by way of two walls.
+/// At openings, corners return sound by way of two walls.
 fn openings(environment: &Environment, sonars: &[String], length_m: f64) -> Vec<Call> {
     let by_opening = |(name, [from_m, to_m]): (&str, [f64; 2])| {
         let place_m = [(from_m - BESIDE_M).max(0.0), (to_m + BESIDE_M).min(length_m)];
@@ -256,7 +258,7 @@ fn openings(environment: &Environment, sonars: &[String], length_m: f64) -> Vec<
     environment.openings().map(by_opening).collect()
 }
 
-/// Beside rubble a beam meets stones and the wall behind them.
+/// Beside rubble, a beam hits stones and the wall behind them.
 fn rubble(environment: &Environment, sonars: &[String]) -> Option<Call> {
     let [from_m, to_m] = environment.rubble_m()?;
     let by = format!("rubble from {from_m:.1} to {to_m:.1} m");
@@ -264,10 +266,11 @@ fn rubble(environment: &Environment, sonars: &[String]) -> Option<Call> {
 }
 
 impl Lining {
-    /// Smooth walls return little sound but square to them, and the more by other ways; steel's ends pull compasses.
+    /// Adds the effects of a lining.
     ///
-    /// Shares are those of the scene steel.toml; backscatter against rough rock after Urick, "Principles of underwater sound",
-    /// ch. 8 (smooth bottoms are 10 to 20 dB below rock).
+    /// Smooth walls return little sound except at perpendicular incidence, and more by indirect paths. The ends of
+    /// steel disturb compasses. Shares are those of the scene steel.toml. The backscatter relative to rough rock is
+    /// from Urick, "Principles of underwater sound", ch. 8 (smooth bottoms are 10 to 20 dB below rock).
     fn call(self, stretch: Stretch, [heads, sonars, units]: [&[String]; 3], calls: &mut Vec<Call>) {
         let (name, wall_db, share) = match self {
             Self::Rock => return,

@@ -1,9 +1,10 @@
-//! Many calls for effects as one set of tables: where two calls for an effect meet, the later one's keys hold.
+//! Merges many calls for effects into one set of tables. If two calls for an effect overlap, the later one's keys
+//! apply.
 
 use super::{Call, Called, Fate, Value};
 use crate::effects::KINDS;
 
-/// Key whose values are put in a row instead of the later one holding.
+/// Key whose values are concatenated instead of replaced by the later call's.
 const PLACES: &str = "places";
 
 /// Effect whose tables are groups of sensors.
@@ -11,17 +12,17 @@ const GROUPED: &str = "interference";
 
 type Keys = Vec<(&'static str, Value)>;
 
-/// Sensors with the same pieces, and, if that matters, the group that they are.
+/// Sensors with the same pieces and, for grouped effects, the group of sensors.
 type Shared<'a> = (Vec<&'a String>, Vec<Piece>, Option<Option<&'a Vec<String>>>);
 
-/// A table to be: where, and what.
+/// A table to write: its place and its content.
 #[derive(Debug, Clone, PartialEq)]
 struct Piece {
     place_m: [f64; 2],
     keys: Keys,
 }
 
-/// The calls, by effect.
+/// Merges the calls by effect.
 pub(super) fn merge(calls: &[Call]) -> Vec<Called> {
     let mut all = Vec::new();
     for kind in KINDS {
@@ -65,7 +66,7 @@ fn tables(effect: &str, calls: &[&Call]) -> String {
         };
         let acting: Vec<&Call> = calls.iter().filter(acts).copied().collect();
         let pieces = pieces(&acting);
-        // Of heads that hear each other a table is a frequency: those of two calls aren't one.
+        // For heads that hear each other a table is a frequency, so two calls give two tables.
         let group = acting.first().filter(|_| effect == GROUPED).map(|call| call.sensors.as_ref());
         match shared.iter_mut().find(|(_, other, of)| *other == pieces && *of == group) {
             Some((ids, ..)) => ids.extend(sensor),
@@ -81,7 +82,7 @@ fn tables(effect: &str, calls: &[&Call]) -> String {
     text
 }
 
-/// The places where different sets of calls hold, in order, without those where none does.
+/// The places in which different sets of calls apply, in order. Places without any call are left out.
 fn pieces(calls: &[&Call]) -> Vec<Piece> {
     const ALL: [f64; 2] = [f64::NEG_INFINITY, f64::INFINITY];
     let place = |call: &Call| call.place_m.unwrap_or(ALL);

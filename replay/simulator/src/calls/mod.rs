@@ -1,5 +1,7 @@
-//! What a scene's descriptions call for: a lining, silt, a leak, rubble, thrusters, a cable, the models of sensors each imply
-//! effects, with their places and the parameters of data sheets. Whether they are taken says `[effects] take`.
+//! Effects implied by a scene's descriptions, with their places and parameters from data sheets.
+//!
+//! A lining, silt, a leak, rubble, thrusters, a cable and the models of sensors each imply effects. The key `take` of
+//! `[effects]` decides whether they are simulated.
 
 mod data_sheets;
 mod described;
@@ -13,44 +15,44 @@ use crate::facts::Facts;
 
 pub(crate) use described::{Described, Tables};
 
-/// Which of the effects that a scene calls for are simulated.
+/// Selects which of the implied effects are simulated.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Take {
-    /// Those alone that the scene names.
+    /// Only the effects that the scene names.
     #[default]
     Only,
-    /// Those that it calls for, too; one that it names is as named.
+    /// Implied effects as well; an effect that the scene names is simulated as named.
     Called,
 }
 
-/// An effect that a scene calls for.
+/// An effect that a scene implies.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Called {
     /// Its name.
     pub effect: &'static str,
-    /// What in the scene or its vehicle file calls for it.
+    /// The parts of the scene or its vehicle file that imply it.
     pub by: Vec<String>,
     /// Its tables, as they would be written in the scene.
     pub tables: String,
-    /// What becomes of it.
+    /// Whether and how it is simulated.
     pub fate: Fate,
 }
 
-/// What becomes of an effect that a scene calls for.
+/// Whether and how an implied effect is simulated.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Fate {
-    /// It is simulated as called.
+    /// Simulated as implied.
     Taken,
     /// It is simulated as the scene names it.
     Named,
-    /// It isn't simulated: the scene takes only what it names.
+    /// Not simulated: the scene takes only named effects.
     NotTaken,
-    /// It isn't simulated: `leave` names it.
+    /// Not simulated: `leave` lists it.
     Left,
 }
 
 impl Fate {
-    /// Its words.
+    /// Its display text.
     pub fn as_str(self) -> &'static str {
         match self {
             Self::Taken => "taken",
@@ -64,14 +66,14 @@ impl Fate {
 /// A value of an effect's key, as TOML.
 type Value = String;
 
-/// One call for an effect.
+/// A single call for an effect.
 #[derive(Debug, Clone, PartialEq)]
 struct Call {
     effect: &'static str,
     by: String,
     /// Sensors that it acts on; `None` for an effect on the vehicle or the water.
     sensors: Option<Vec<String>>,
-    /// Where; `None` for everywhere.
+    /// Chainages between which it acts; `None` for everywhere.
     place_m: Option<[f64; 2]>,
     keys: Vec<(&'static str, Value)>,
 }
@@ -95,7 +97,7 @@ fn number(value: f64) -> Value {
     format!("{value:?}")
 }
 
-/// All that a scene calls for, in the order of [`crate::effects::KINDS`].
+/// All effects that a scene implies, in the order of [`crate::effects::KINDS`].
 pub(crate) fn called(
     described: &Described,
     vehicle: &VehicleConfig,
@@ -107,7 +109,7 @@ pub(crate) fn called(
     merge::merge(&calls)
 }
 
-/// Keys of `[effects]` that aren't effects.
+/// The keys of `[effects]` other than effects.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Choice {
     pub(crate) take: Take,
@@ -115,9 +117,9 @@ pub(crate) struct Choice {
 }
 
 impl Choice {
-    /// Reads `take` and `leave`; `instead` overrides what `take` says.
+    /// Reads `take` and `leave`; `instead` overrides the value of `take`.
     ///
-    /// Errors: another word; `leave` without `take = "called"`, or a name that is no effect.
+    /// Errors: another value; `leave` without `take = "called"`; a name that isn't an effect.
     pub(crate) fn read(effects: Option<&Section<'_>>, instead: Option<Take>) -> Result<Self, ConfigError> {
         let Some(section) = effects else {
             return Ok(Self { take: instead.unwrap_or_default(), leave: Vec::new() });
@@ -126,16 +128,16 @@ impl Choice {
         let take = section.choice("take", &words)?.unwrap_or_default();
         let leave = section.texts("leave")?;
         if leave.is_some() && take == Take::Only {
-            return Err(section.invalid("leave", "is of use only with take = \"called\""));
+            return Err(section.invalid("leave", "has an effect only with take = \"called\""));
         }
         let leave = leave.unwrap_or_default();
         if let Some(unknown) = leave.iter().find(|name| crate::effects::named(name).is_none()) {
-            return Err(section.invalid("leave", &format!("names {unknown:?}, which is no effect")));
+            return Err(section.invalid("leave", &format!("names {unknown:?}, which isn't an effect")));
         }
         Ok(Self { take: instead.unwrap_or(take), leave })
     }
 
-    /// Says of each call what becomes of it, the effects of these names being the scene's own.
+    /// Sets for each call whether and how it is simulated. `is_named` tells which effects the scene names itself.
     pub(crate) fn decide(&self, called: &mut [Called], is_named: impl Fn(&str) -> bool) {
         for call in called {
             call.fate = match self.take {
@@ -148,7 +150,7 @@ impl Choice {
     }
 }
 
-/// The tables of all effects that are taken, as a text to parse.
+/// The tables of all taken effects, as text to parse.
 pub(crate) fn taken(called: &[Called]) -> String {
     let taken = called.iter().filter(|call| call.fate == Fate::Taken);
     taken.map(|call| call.tables.as_str()).collect::<Vec<_>>().concat()

@@ -25,16 +25,16 @@ fn fates(effects: &str) -> Vec<(&'static str, Fate)> {
 }
 
 #[test]
-fn what_is_called_is_not_taken_unless_the_scene_says_so() {
+fn implied_effects_are_taken_only_if_the_scene_says_so() {
     let (plain, described) = (dive().dive(""), dive().dive(MURK.split("[tunnel]").next().unwrap()));
     assert!(plain.messages == described.messages);
     assert!(dive().simulation(MURK).unwrap().added().is_empty());
     assert!(fates(MURK).iter().all(|(_, fate)| *fate == Fate::NotTaken));
 }
 
-/// The tables that are shown are those that act: named in the scene in place of being called, they give the same bytes.
+/// The displayed tables are those that act: named in the scene, they give the same bytes.
 #[test]
-fn called_effects_are_as_if_named() {
+fn implied_effects_act_like_named_ones() {
     let called = format!("{MURK}[effects]\ntake = \"called\"\n");
     let scene = dive().scene(&called).unwrap();
     let tables: String = scene.called().iter().map(|call| call.tables.as_str()).collect();
@@ -46,7 +46,7 @@ fn called_effects_are_as_if_named() {
 }
 
 #[test]
-fn each_description_calls_for_its_effects() {
+fn each_description_implies_its_effects() {
     let effects =
         |text: &str| -> Vec<&'static str> { fates(text).iter().map(|(effect, _)| *effect).collect() };
     let bare = effects("");
@@ -86,7 +86,7 @@ fn each_description_calls_for_its_effects() {
         let found: Vec<&str> = effects(text).into_iter().filter(|effect| !bare.contains(effect)).collect();
         assert_eq!(found, more, "{text}");
     }
-    // A leak's current: half a cubic metre a second through a rectangle of 6 by 5 m.
+    // A leak's current: half a cubic metre per second through a rectangle of 6 by 5 m.
     let scene = dive().scene("[water]\n[[water.leaks]]\nchainage_m = 20\nflow_m3ps = 0.5").unwrap();
     let current = scene.called().iter().find(|call| call.effect == "current").unwrap();
     let speed_mps: f64 =
@@ -96,7 +96,7 @@ fn each_description_calls_for_its_effects() {
 }
 
 #[test]
-fn named_effects_override_called_ones_and_leave_leaves_out() {
+fn named_effects_override_implied_ones_and_leave_omits_them() {
     let text = format!(
         "{MURK}[effects]\ntake = \"called\"\nleave = [\"beam_cone\"]\nrange_noise = {{ sd_m = 0.2 }}\n"
     );
@@ -109,7 +109,7 @@ fn named_effects_override_called_ones_and_leave_leaves_out() {
 }
 
 #[test]
-fn an_effect_left_out_for_the_time_being_is_as_one_that_is_not_named() {
+fn effect_left_out_acts_like_one_that_is_not_named() {
     let both = "[effects]\nrange_noise = { sd_m = 0.2 }\nmissing_returns = { share = 0.2 }\n";
     let mut scene = dive().scene(both).unwrap();
     scene.leave_out(&["range_noise"]);
@@ -122,7 +122,7 @@ fn an_effect_left_out_for_the_time_being_is_as_one_that_is_not_named() {
 }
 
 #[test]
-fn where_calls_meet_the_later_one_s_keys_hold() {
+fn later_call_overrides_keys_of_overlapping_calls() {
     let on = |call: Call| call.on(&["a".to_owned(), "b".to_owned()]);
     let calls = [
         on(Call::new("echo_strength", "one", &[("wall_db", number(0.0)), ("silt_gpl", number(1.0))])),
@@ -149,7 +149,7 @@ fn where_calls_meet_the_later_one_s_keys_hold() {
 }
 
 #[test]
-fn descriptions_that_cannot_be_are_refused() {
+fn impossible_descriptions_are_refused() {
     let refusal = |text: &str| dive().refusal(text);
     for (text, words) in [
         ("[tunnel]\n[[tunnel.stretches]]\nfrom_m = 1\nlining = \"steel\"", "to_m: is missing"),
@@ -160,7 +160,7 @@ fn descriptions_that_cannot_be_are_refused() {
         ("[cable]\ntype = \"rope\"", "fathom"),
         ("[thrusters]\nrpm = 900", "accel_mps2: is missing"),
         ("[effects]\nleave = [\"occlusion\"]", "only with take = \"called\""),
-        ("[effects]\ntake = \"called\"\nleave = [\"fog\"]", "names \"fog\", which is no effect"),
+        ("[effects]\ntake = \"called\"\nleave = [\"fog\"]", "names \"fog\", which isn't an effect"),
         ("[effects]\ntake = \"all\"", "only"),
     ] {
         assert!(refusal(text).contains(words), "{text}: {}", refusal(text));

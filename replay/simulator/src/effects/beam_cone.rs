@@ -1,4 +1,4 @@
-//! A beam is a cone; its range is formed from all the wall within it.
+//! A beam is a cone, and its range is formed from all the wall within it.
 
 mod bins;
 
@@ -19,21 +19,26 @@ use crate::sensing::{Ray, Rays, Reach, Samples, Scenery};
 use crate::stages::{OwnBeam, Stage};
 use bins::Bins;
 
-/// A beam is a cone; its range is formed from all the wall within it: the nearest point, the mean, or the surface by the
-/// paper's interpolation.
+/// A beam is a cone, and its range is formed from all the wall within it.
 ///
-/// Keys: `rays` per beam, from 1 to 1024 (16; 64 where `form` is bilinear); the cone's full width `width_deg`, from 0.1
-/// to 60, or the head's frequency `frequency_khz` from which it follows, from 600 to 1000 (a head's own width; 30 for an
-/// echosounder); `form` first, mean or bilinear (first); `bin_m`, range bin width for bilinear, from 0.001 to 1 m (a
-/// 500th of a head's range setting, in this water; 0.15 for an echosounder).
-/// Source: Jorge et al. 2021, §6 and §9.2; for an echosounder the field of view of a Ping1D in BlueOS, 0.52 rad, and the
-/// 200 points of its profile over 30 m.
+/// The range is that of the nearest point, the mean, or the surface by the paper's interpolation.
+///
+/// Keys:
+/// - `rays` per beam, from 1 to 1024 (16; 64 if `form` is bilinear).
+/// - `width_deg`, the cone's full width, from 0.1 to 60, or `frequency_khz`, the head's frequency from which it
+///   follows, from 600 to 1000 (a head's own width; 30 for an echosounder).
+/// - `form`: first, mean or bilinear (first).
+/// - `bin_m`, the range bin width for bilinear, from 0.001 to 1 m (a 500th of a head's range setting in this water;
+///   0.15 for an echosounder).
+///
+/// Source: Jorge et al. 2021, §6 and §9.2; for an echosounder the field of view of a Ping1D in BlueOS, 0.52 rad, and
+/// the 200 points of its profile over 30 m.
 pub(super) struct BeamConeKind;
 
 /// Angle between successive rays of a sunflower pattern, radians: the golden angle. Source: Vogel, "A better way to
 /// construct the sunflower head", Mathematical Biosciences 44, 1979.
 const GOLDEN_RAD: f64 = 2.399_963_229_728_653;
-/// Strength at the beam's edge relative to its axis: the width is between half-power points.
+/// Strength at the beam's edge relative to its axis. The width is measured between half-power points.
 const EDGE: f64 = 0.5;
 /// Width of an echosounder's beam, degrees.
 const ECHOSOUNDER_DEG: f64 = 30.0;
@@ -55,7 +60,7 @@ const FORMS: [(&str, Form); 3] = [("first", Form::First), ("mean", Form::Mean), 
 struct Parameters {
     rays: usize,
     width_deg: Option<f64>,
-    /// Heads only.
+    /// For heads only.
     frequency_khz: Option<f64>,
     form: Form,
     bin_m: Option<f64>,
@@ -69,7 +74,7 @@ pub struct Cone {
 
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct ConeRay {
-    /// Components along the beam's axis, along the tunnel, and across both.
+    /// Components along the beam's axis, along the tunnel, and perpendicular to both.
     parts: [f64; 3],
     /// Strength relative to the axis.
     strength: f64,
@@ -85,8 +90,10 @@ struct BeamCone {
 }
 
 impl Cone {
-    /// A cone `width_rad` wide with this many rays: the axis first, then a sunflower pattern, evenly over its disc; the last
-    /// two are at its edges in the plane of turning, where an oblique wall is nearest and farthest.
+    /// A cone of `width_rad` with this many rays.
+    ///
+    /// The first ray is the axis. The others fill the disc evenly in a sunflower pattern. The last two are at the edges
+    /// in the plane of turning, where an oblique wall is nearest and farthest.
     pub fn new(width_rad: f64, rays: usize) -> Self {
         let last = rays.max(2) - 1;
         let ray = |number: usize| {
@@ -104,8 +111,9 @@ impl Cone {
         Self { rays: (0..rays.max(1)).map(ray).collect() }
     }
 
-    /// Its rays: components along the beam's axis, along the tunnel, and across both; the axis first, the edges in the plane
-    /// of turning last.
+    /// Components of its rays along the beam's axis, along the tunnel, and perpendicular to both.
+    ///
+    /// The axis comes first, the edges in the plane of turning last.
     pub fn parts(&self) -> impl Iterator<Item = [f64; 3]> {
         self.rays.iter().map(|ray| ray.parts)
     }
@@ -201,8 +209,10 @@ impl BeamCone {
         }
     }
 
-    /// The paper's surface: each ray's echo, weighted by beam strength and incidence, is shared between the two nearest range
-    /// bins; the surface is where the sum is strongest.
+    /// Range of the surface as defined by the paper.
+    ///
+    /// Each ray's echo, weighted by beam strength and incidence, is shared between the two nearest range bins. The
+    /// surface is at the largest sum.
     fn surface_m(&mut self, ray: &Ray) -> Option<f64> {
         for (hit, part) in self.hits.iter().zip(&self.cone.rays) {
             if let Some(hit) = hit {
@@ -229,7 +239,7 @@ fn look_in_cones(scenery: Res<'_, Scenery>, mut sonars: Query<'_, '_, Looking<'_
         for (sounding, ray) in samples.list.iter_mut().zip(&mut rays.0) {
             beam.hits.clear();
             beam.hits.extend(beam.cone.hits(&scenery.environment, ray, reach.0));
-            // The ground truth is where the beam's axis meets the wall.
+            // In the ground truth, the hit is that of the beam's axis.
             ray.hit = beam.hits.first().copied().flatten();
             sounding.range_m = beam.range_m(ray);
         }

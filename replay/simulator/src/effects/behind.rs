@@ -1,9 +1,9 @@
-//! Heads that miss some of the steps commanded.
+//! Heads that miss some of the commanded steps.
 
 use headrace_geometry::math::{self, TAU};
 use headrace_sensor::measurement::Sounding;
 
-/// Offset of a head from its commands. Hosts command steps, not angles, so a missed step is never made up.
+/// Offset of a head from its commands. Hosts command steps rather than angles, so a missed step is never made up.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Behind {
     commanded_rad: Option<f64>,
@@ -11,8 +11,9 @@ pub(super) struct Behind {
 }
 
 impl Behind {
-    /// Applies the head's offset to the next ping; `made` is false if the step to it was missed, `told` true if the reported
-    /// angle includes the offset.
+    /// Applies the head's offset to the next ping.
+    ///
+    /// `made` is false if the head missed the step to it. `told` is true if the reported angle includes the offset.
     pub(super) fn step(&mut self, sounding: &mut Sounding, made: bool, told: bool) {
         let commanded_rad = sounding.angle_rad;
         let step_rad =

@@ -16,10 +16,10 @@ use crate::random::Stream;
 use crate::sensing::Line;
 use crate::stages::Stage;
 
-/// Independently for each byte from a device: a bit is flipped, the byte is lost, or another byte is inserted before it.
+/// Changes bytes from devices at random: a bit is flipped, the byte is lost, or another byte is inserted before it.
 ///
-/// `flipped_per_million`, `dropped_per_million` and `inserted_per_million` are the rates; all zero by default. A message
-/// that loses all its bytes doesn't arrive. Bytes to devices are unchanged.
+/// Each byte is affected independently. `flipped_per_million`, `dropped_per_million` and `inserted_per_million` are the
+/// rates, all zero by default. A message that loses all its bytes doesn't arrive. Bytes to devices are unchanged.
 pub(super) struct ByteErrorsKind;
 
 #[derive(Debug, Clone, Copy)]
@@ -29,11 +29,11 @@ struct Parameters {
     inserted: f64,
 }
 
-/// Affected bytes, all with the same probability: drawn by the gaps between them.
+/// Selects affected bytes by drawing the gaps between them; all bytes have the same probability.
 struct Hits {
     stream: Stream,
     kind: u64,
-    /// Logarithm of the probability that a byte isn't affected; zero if none is.
+    /// Logarithm of the probability that a byte isn't affected; zero if no byte is affected.
     ln_missed: f64,
     count: u64,
     next: u64,
@@ -44,7 +44,7 @@ struct ByteErrors {
     flipped: Hits,
     dropped: Hits,
     inserted: Hits,
-    /// Bytes on the line so far.
+    /// Number of bytes on the line so far.
     seen: u64,
     rest: Line,
 }
@@ -99,7 +99,7 @@ impl Hits {
         hits
     }
 
-    /// Unaffected bytes before the next affected one: geometrically distributed.
+    /// Number of unaffected bytes before the next affected one, geometrically distributed.
     fn gap(&self) -> u64 {
         if self.ln_missed == 0.0 {
             return u64::MAX;
@@ -108,7 +108,7 @@ impl Hits {
         math::floor_to_i64(math::ln(u) / self.ln_missed).unsigned_abs()
     }
 
-    /// A number between 0 and 1 if this byte is affected; call in order of bytes.
+    /// A number between 0 and 1 if this byte is affected. Call in order of bytes.
     fn hit(&mut self, byte: u64) -> Option<f64> {
         if byte < self.next {
             return None;
@@ -131,7 +131,7 @@ impl ByteErrors {
         }
     }
 
-    /// Messages keep their indices, also those that lose all bytes: the outbox drops them.
+    /// Damages the messages, which keep their indices even if they lose all bytes. The outbox drops empty messages.
     fn damage(&mut self, line: &mut Line) {
         let mut rest = std::mem::take(&mut self.rest);
         rest.clear();
@@ -165,7 +165,7 @@ impl ByteErrors {
     }
 }
 
-/// An integer in [0, `count`) from `which` in (0, 1).
+/// Maps `which` in (0, 1) to an integer in [0, `count`).
 fn below(count: f64, which: f64) -> u8 {
     u8::try_from(math::floor_to_i64(count * which)).unwrap_or_default()
 }
@@ -200,7 +200,7 @@ mod tests {
     }
 
     #[test]
-    fn as_many_bytes_are_hit_as_wanted() {
+    fn number_of_affected_bytes_matches_the_rate() {
         let flipped = through(0.003, 0.0, 0.0);
         assert!(flipped.len() == BYTES && flipped.iter().all(|byte| byte.count_ones() <= 1));
         near(flipped.iter().filter(|byte| **byte != 0).count(), 0.003);
@@ -214,7 +214,7 @@ mod tests {
     }
 
     #[test]
-    fn a_message_without_bytes_never_comes() {
+    fn message_without_bytes_never_arrives() {
         let keys = "[effects.byte_errors]\ndropped_per_million = 500000\n";
         let lost = Bench::turning(keys).messages();
         assert!(lost.iter().all(|message| !message.3.is_empty()));
@@ -222,7 +222,7 @@ mod tests {
     }
 
     #[test]
-    fn slices_make_no_difference_and_no_error_is_refused() {
+    fn slice_length_changes_nothing_and_zero_rates_are_refused() {
         let keys = "[effects.byte_errors]\ndropped_per_million = 9000\nflipped_per_million = 9000\n\
                     inserted_per_million = 9000\n";
         same_in_any_slices(&Bench::turning(keys));

@@ -14,11 +14,11 @@ use crate::facts::Facts;
 use crate::sensing::Samples;
 use crate::stages::Stage;
 
-/// The clock of a device that samples on its own schedule drifts at a constant rate: it samples at the wrong times, and
-/// stamps the times that its clock shows.
+/// The clock of a device that samples on its own schedule drifts at a constant rate.
 ///
-/// Its seconds are `ppm` millionths longer than true ones (or drawn normally with standard deviation `sd_ppm`); positive
-/// values sample late. Refused for heads and echosounders, which ping when the host asks.
+/// The device samples at the wrong times and stamps the times of its clock. Its seconds are `ppm` millionths too long,
+/// or a draw from a normal distribution with standard deviation `sd_ppm`; positive values sample late. Refused for
+/// heads and echosounders, which ping when the host requests it.
 pub(super) struct ClockDriftKind;
 
 #[derive(Debug, Clone, Copy)]
@@ -82,7 +82,7 @@ mod tests {
     use crate::testing_motion::{Bench, refusal, same_in_any_slices};
 
     #[test]
-    fn samples_are_as_late_as_the_clock_is_slow_and_as_many_as_there_is_time_for() {
+    fn sample_delay_and_count_match_the_clock_drift() {
         for ppm in [400.0, -400.0] {
             let keys = format!("[effects.clock_drift]\nppm = {ppm}\n");
             let (plain, late) =
@@ -102,7 +102,7 @@ mod tests {
     }
 
     #[test]
-    fn slices_make_no_difference_and_devices_without_a_clock_are_refused() {
+    fn slice_length_changes_nothing_and_devices_without_a_clock_are_refused() {
         same_in_any_slices(&Bench::turning("[effects.clock_drift]\nppm = -900\n"));
         same_in_any_slices(&Bench::turning("[effects.clock_drift]\nsd_ppm = 900\n"));
         let why = |keys: &str| refusal(&format!("[effects.clock_drift]\n{keys}"));

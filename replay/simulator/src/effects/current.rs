@@ -15,18 +15,20 @@ use crate::trajectory::{Flow, Ground, Knots, Trajectory};
 const NAME: &str = "current";
 /// Steps per correlation time of a gust's speed.
 const STEPS: f64 = 8.0;
-/// Largest distance to which a current may carry the vehicle out of the tunnel, m: the same as for a trajectory.
+/// Largest distance by which a current may carry the vehicle out of the tunnel, m; the same limit as for trajectories.
 const OUTSIDE_M: f64 = 20.0;
 /// Interval at which the trajectory is checked against [`OUTSIDE_M`], s.
 const LOOK_S: f64 = 5.0;
 
-/// The water flows along the tunnel and carries a vehicle that holds its speed through water: legs and a pilot's course
-/// end at the same place, after another duration.
+/// The water flows along the tunnel and carries a vehicle that holds its speed through water.
 ///
-/// `speed_mps` is positive towards growing chainage, from `from_m` to `to_m`; several tables are several stretches, as on both
-/// sides of a leak. `gust_sd_mps`, in a table for all of the tunnel, adds a Gauss-Markov variation whose correlation falls
-/// to 1/e within `gust_s` (60 by default); the displacement by gusts isn't corrected.
-/// A trajectory given over ground is independent of currents, so combining the two is refused.
+/// Legs and a pilot's course end at the same place, after another duration.
+///
+/// `speed_mps` is positive towards growing chainage, from `from_m` to `to_m`. Several tables are several stretches, as
+/// on both sides of a leak. `gust_sd_mps`, in a table for the whole tunnel, adds a Gauss-Markov variation whose
+/// correlation falls to 1/e within `gust_s` (60 by default); the displacement by gusts isn't corrected. A trajectory
+/// over ground is independent of currents, so combining the two is refused.
+///
 /// Source: Jorge et al. 2021, §9.1 (0.10 m/s through a leak, against the vehicle or with it).
 pub(super) struct CurrentKind;
 
@@ -61,17 +63,14 @@ impl EffectKind for CurrentKind {
             keys::some_not_zero(&table, &[("speed_mps", speed_mps), ("gust_sd_mps", gust_sd_mps)])?;
             if gust_sd_mps > 0.0 {
                 if stretch != Stretch::ALL || current.gust_sd_mps > 0.0 {
-                    let problem =
-                        "can be said once, in a table without from_m and to_m: gusts are of all the water";
+                    let problem = "must be in one table without from_m and to_m: gusts affect all the water";
                     return Err(table.invalid("gust_sd_mps", problem));
                 }
                 (current.gust_sd_mps, current.gust_s) = (gust_sd_mps, gust_s.unwrap_or(current.gust_s));
             }
             table.finish()?;
             if speed_mps != 0.0 && !current.flow.add(stretch, speed_mps) {
-                return Err(
-                    table.invalid("from_m", "begins a stretch that an earlier table has a current for, too")
-                );
+                return Err(table.invalid("from_m", "begins a stretch that overlaps one of an earlier table"));
             }
         }
         Ok(Box::new(current))
@@ -149,7 +148,7 @@ mod tests {
     }
 
     #[test]
-    fn a_pilot_comes_to_the_same_end_in_another_time() {
+    fn current_changes_the_duration_of_a_pilot_but_not_the_end() {
         let end = |keys: &str| {
             let sim = Bench::on(PILOT, keys).simulation();
             (sim.duration_s(), sim.pose(sim.end()).unwrap().position.x())
@@ -163,10 +162,11 @@ mod tests {
         }
     }
 
-    /// The speed of a gust, its correlation after `gust_s`, and the displacement: for times t well above T its variance is
-    /// 2 sd^2 T t.
+    /// Checks the speed of a gust, its correlation after `gust_s`, and the displacement.
+    ///
+    /// For times t well above T the variance of the displacement is 2 sd^2 T t.
     #[test]
-    fn gusts_are_as_strong_and_as_long_as_wanted() {
+    fn gusts_have_their_strength_and_correlation_time() {
         let current = Current { flow: Flow::default(), gust_sd_mps: 0.05, gust_s: 20.0, length_m: 1e6 };
         let (mut speeds, mut lagged, mut ways) = (0.0, 0.0, 0.0);
         let (runs, seconds) = (200_u32, 4000.0);
@@ -185,25 +185,25 @@ mod tests {
             ways += way_m * way_m / f64::from(runs);
         }
         let sd_mps = math::sqrt(speeds / count);
-        // Splines smooth the quickest changes a little.
+        // Splines slightly smooth the quickest changes.
         assert!((0.046..0.051).contains(&sd_mps), "{sd_mps}");
         let correlation = lagged / speeds;
         assert!((correlation - math::exp(-1.0)).abs() < 0.04, "{correlation}");
-        // The drawn speeds hold for a step, so the sum is that of the discrete process.
+        // Each drawn speed lasts for one step, so the sum is that of the discrete process.
         let kept = math::exp(-1.0 / STEPS);
         let wanted = 0.05 * 0.05 * seconds * (20.0 / STEPS) * (1.0 + kept) / (1.0 - kept);
         assert!((ways / wanted - 1.0).abs() < 5.0 * math::sqrt(2.0 / f64::from(runs)), "{ways} {wanted}");
     }
 
     #[test]
-    fn a_current_that_carries_off_or_changes_nothing_is_refused() {
+    fn current_that_carries_the_vehicle_off_or_has_no_effect_is_refused() {
         let why = |trajectory: &str, keys: &str| {
             Bench::on(trajectory, &format!("[effects.current]\n{keys}")).refusal()
         };
         let strong = why(LEGS, "speed_mps = -0.3");
         assert!(strong.starts_with("simulating current: it carries the vehicle off: leg 0"), "{strong}");
         let strong = why(PILOT, "speed_mps = -0.5");
-        assert!(strong.contains("current: it carries the vehicle off: it has not come to 40 m"), "{strong}");
+        assert!(strong.contains("current: it carries the vehicle off: it has not reached 40 m"), "{strong}");
         let ground = why(WAYPOINTS, "speed_mps = 0.1");
         assert!(
             ground.contains("effects.current: changes nothing: the trajectory is given over ground"),

@@ -17,14 +17,15 @@ use crate::random::Stream;
 use crate::sensing::Samples;
 use crate::stages::Stage;
 
-/// Step of the draw of the offset; no sample has this number.
+/// Step number reserved for drawing the offset; no sample has it.
 const OFFSET: u64 = u64::MAX;
 
 /// A depth sensor's pressure has white noise, an offset, and a drift.
 ///
-/// `noise_pa` is the standard deviation of each sample's noise; `offset_sd_pa` that of an offset drawn for the dive; `drift_pa`
-/// that of a Gauss-Markov process whose correlation falls to 1/e within `tau_s` (3,600). All are zero by default.
-/// Source: Brown and Hwang, Introduction to Random Signals and Applied Kalman Filtering, 4th ed., §4.4 (exact steps).
+/// `noise_pa` is the standard deviation of each sample's noise. `offset_sd_pa` is that of an offset drawn once per
+/// dive. `drift_pa` is that of a Gauss-Markov process whose correlation falls to 1/e within `tau_s` (3,600). All are
+/// zero by default. Source: Brown and Hwang, Introduction to Random Signals and Applied Kalman Filtering, 4th ed., §4.4
+/// (exact steps).
 pub(super) struct DepthNoiseKind;
 
 #[derive(Debug, Clone, Copy)]
@@ -40,7 +41,7 @@ struct DepthNoise {
     parameters: Parameters,
     stream: Stream,
     offset_pa: f64,
-    /// The drift, in standard deviations, and when it was so.
+    /// The drift, in standard deviations, and its time.
     drift: f64,
     before: Option<MonoNs>,
 }
@@ -90,7 +91,7 @@ fn disturb(mut sensors: Query<'_, '_, (&mut Samples<Pressure>, &mut DepthNoise)>
 }
 
 impl DepthNoise {
-    /// Error of a step's sample. Call for each step, in order.
+    /// Error of a step's sample. Call once per step, in order.
     fn error_pa(&mut self, step: u64, at: MonoNs) -> f64 {
         let Parameters { noise_pa, drift_pa, tau_s, .. } = self.parameters;
         let [white, wander] = self.stream.at(step).normal();
@@ -114,7 +115,7 @@ mod tests {
     }
 
     #[test]
-    fn noise_is_white_and_as_strong_as_said() {
+    fn noise_is_white_with_the_given_strength() {
         let errors = errors_pa("[effects.depth_noise]\nnoise_pa = 300\n");
         let n = errors.len() as f64;
         assert!(n > 3000.0);
@@ -126,7 +127,7 @@ mod tests {
 
     /// Over a lag t, the mean square of a Gauss-Markov process's change is 2 sd^2 (1 - exp(-t / tau)).
     #[test]
-    fn drift_wanders_as_fast_as_said() {
+    fn drift_changes_at_the_given_rate() {
         let parameters = Parameters { noise_pa: 0.0, offset_sd_pa: 0.0, drift_pa: 100.0, tau_s: 20.0 };
         let stream = Stream::new(3, "depth_noise", "depth");
         let mut noise = DepthNoise { parameters, stream, offset_pa: 0.0, drift: 0.0, before: None };
@@ -136,14 +137,14 @@ mod tests {
             let pairs = drift.iter().zip(drift.iter().skip(lag));
             let found = pairs.map(|(a, b)| (b - a) * (b - a)).sum::<f64>() / (drift.len() - lag) as f64;
             let wanted = 2e4 * (1.0 - math::exp(-(lag as f64) * 0.1 / 20.0));
-            // Independent stretches are some two tau long: 1,000 of them.
+            // Independent stretches are about two tau long: 1,000 of them.
             assert!((found / wanted - 1.0).abs() < 5.0 * math::sqrt(2.0 / 1000.0), "{lag}: {found} {wanted}");
         }
     }
 
-    /// What the drift takes up anew with each sample has nothing to do with that sample's noise.
+    /// The drift's increments are independent of the noise of the same samples.
     #[test]
-    fn noise_and_drift_are_drawn_apart() {
+    fn noise_and_drift_are_independent() {
         let stream = Stream::new(3, "depth_noise", "depth");
         let series = |noise_pa: f64, drift_pa: f64| -> Vec<f64> {
             let parameters = Parameters { noise_pa, offset_sd_pa: 0.0, drift_pa, tau_s: 1.0 };
@@ -171,12 +172,12 @@ mod tests {
         let squares = offsets.iter().map(|pa| pa * pa / 1e6);
         let (second, fourth) = (squares.clone().sum::<f64>() / n, squares.map(|of| of * of).sum::<f64>() / n);
         assert!((second - 1.0).abs() < 5.0 * math::sqrt(2.0 / n), "{second}");
-        // Of a normal distribution it is 3, and its variance 96 / n.
+        // For a normal distribution it is 3, with variance 96 / n.
         assert!((fourth - 3.0).abs() < 5.0 * math::sqrt(96.0 / n) && fourth > 1.5, "{fourth}");
     }
 
     #[test]
-    fn the_offset_is_one_for_the_dive_and_slices_dont_matter() {
+    fn offset_is_constant_over_the_dive_and_slices() {
         let errors = errors_pa("[effects.depth_noise]\noffset_sd_pa = 1000\n");
         assert!(errors[0] != 0.0 && errors.iter().all(|error| (error - errors[0]).abs() < 1e-6));
         same_in_any_slices(&Bench::turning("[effects.depth_noise]\nnoise_pa = 300\ndrift_pa = 100\n"));

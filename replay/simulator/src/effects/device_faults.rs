@@ -21,16 +21,18 @@ use line::BrokenLine;
 use span::Span;
 use values::{Jumped, Stuck};
 
-/// A device breaks: `kind` says how, `from_s` from when (seconds of the dive, 0), `for_s` for how long (to the end). After
-/// that it is as before.
+/// A device breaks.
 ///
-/// - `stick`: it goes on saying its last value: range, pressure, attitude with rates and forces, velocity, or cable. A head
+/// `kind` is the fault, `from_s` its start (seconds of the dive, 0), `for_s` its duration (to the end). Afterwards the
+/// device works as before.
+///
+/// - `stick`: it repeats its last value: range, pressure, attitude with rates and forces, velocity, or cable. A head
 ///   goes on turning.
-/// - `jump`: what it says is off by `size`: an echosounder's range by metres, a head's angle by degrees, depth by metres of
-///   water, an inertial unit's heading by degrees, a velocity by m/s along its x, the cable by metres. Required, from -1000
-///   to 1000.
-/// - `die`: it says nothing.
-/// - `babble`: as many bytes as ever, but random ones.
+/// - `jump`: its value is off by `size`: an echosounder's range by metres, a head's angle by degrees, depth by metres
+///   of water, an inertial unit's heading by degrees, a velocity by m/s along its x, the cable by metres. Required,
+///   from -1000 to 1000.
+/// - `die`: it sends nothing.
+/// - `babble`: it sends as many bytes as ever, but random ones.
 pub(super) struct DeviceFaultsKind;
 
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -1,4 +1,4 @@
-//! Whether an echo is strong enough to be detected.
+//! Detects an echo only if it is strong enough.
 
 use bevy_ecs::prelude::{Component, Query, Res};
 use headrace_config::{ConfigError, Section};
@@ -21,17 +21,22 @@ pub(crate) use sonar::{Silt, Sonar, frequency_of_khz, pulse_of_us, water_absorpt
 
 mod sonar;
 
-/// A head detects an echo that is louder than the noise and, amplified, than its threshold. The echo of a rough wall is the sum of
-/// many: its power is exponentially distributed about the mean that the sonar equation gives, so that a ping gets a return
-/// with probability exp(-1 / m), m being that mean over the power that is just detected.
+/// A head detects an echo that is louder than the noise and, after amplification, louder than its threshold.
 ///
-/// Keys, besides `from_m` and `to_m` of the stretch: the water's `temperature_degc`, 0 to 40 (10), and its silt, `silt_gpl` in
-/// grams per litre, 0 to 100 (0), of grains of radius `grain_um`, 0.5 to 100 (10), both of which absorb sound; the wall's
-/// backscatter against rough rock, `wall_db`, -60 to 20 (0); and the head's settings `frequency_khz`, 600 to 1000 (that of its
-/// beam's width), `pulse_us`, 10 to 1000 (that of its range setting), `gain_db`, 0 to 40 (20), `log_gain_db`, 10 to 40 (20), and
-/// `absorption_dbpm`, 0 to 2.55 (0.6 above 837 kHz, else 0.2).
-/// Source: the sonar equation and Lambert's law after Urick, "Principles of underwater sound", ch. 2 and 8; figures of the
-/// 881L family where [`sonar`] names them.
+/// The echo of a rough wall is the sum of many echoes. Its power is exponentially distributed about the mean given by
+/// the sonar equation. A ping therefore gets a return with probability exp(-1 / m), where m is that mean divided by the
+/// power that is just detected.
+///
+/// Keys, besides `from_m` and `to_m` of the stretch:
+/// - the water's `temperature_degc`, 0 to 40 (10), and its silt, `silt_gpl` in grams per litre, 0 to 100 (0), of grains
+///   of radius `grain_um`, 0.5 to 100 (10); both absorb sound.
+/// - the wall's backscatter relative to rough rock, `wall_db`, -60 to 20 (0).
+/// - the head's settings: `frequency_khz`, 600 to 1000 (that of its beam's width), `pulse_us`, 10 to 1000 (that of its
+///   range setting), `gain_db`, 0 to 40 (20), `log_gain_db`, 10 to 40 (20), and `absorption_dbpm`, 0 to 2.55 (0.6 above
+///   837 kHz, else 0.2).
+///
+/// Source: the sonar equation and Lambert's law after Urick, "Principles of underwater sound", ch. 2 and 8; figures of
+/// the 881L family where [`sonar`] names them.
 pub(super) struct EchoStrengthKind;
 
 #[derive(Debug, Clone, Copy)]
@@ -119,7 +124,7 @@ type Detecting<'a> = (&'a mut Samples<Sounding>, &'a Rays, &'a EchoStrength, Opt
 fn detect(scenery: Res<'_, Scenery>, mut heads: Query<'_, '_, Detecting<'_>>) {
     for (mut samples, rays, echoes, stopped) in &mut heads {
         for (number, ((step, sounding), ray)) in samples.steps().zip(&rays.0).enumerate() {
-            // Parts of the vehicle are near enough to be heard always.
+            // Echoes of the vehicle's own parts are always strong enough.
             let Some(hit) = ray.hit.filter(|_| !Stopped::has(stopped, number)) else { continue };
             let Some(sonar) = echoes.places.here(&scenery, ray) else { continue };
             let [chance, _] = echoes.stream.at(step).uniform();

@@ -11,9 +11,10 @@ pub(super) fn dot(a: Vec3<Tunnel>, b: Vec3<Tunnel>) -> f64 {
     a.0.dot(&b.0)
 }
 
-/// Two unit vectors perpendicular to a beam's and to each other: the first as nearly along the tunnel as possible, the
-/// second across it, in the plane in which a head turns whose axis is along the tunnel. For a beam along the tunnel the
-/// first is as nearly upwards as possible.
+/// Two unit vectors perpendicular to a beam's direction and to each other.
+///
+/// The first is as nearly along the tunnel as possible. The second is across the tunnel, in the plane in which a head
+/// turns whose axis is along the tunnel. For a beam along the tunnel the first is as nearly upwards as possible.
 pub(super) fn square_to(direction: Vec3<Tunnel>) -> [Vec3<Tunnel>; 2] {
     let along = direction.x().abs() > ALONG;
     let towards = if along { Vec3::new(0.0, 0.0, 1.0) } else { Vec3::new(1.0, 0.0, 0.0) };
@@ -35,7 +36,7 @@ pub(super) fn mirrored(direction: Vec3<Tunnel>, normal: Vec3<Tunnel>) -> Vec3<Tu
     direction + normal.scaled(-2.0 * dot(direction, normal))
 }
 
-/// Angle between two vectors of any length but zero, radians, in [0, pi].
+/// Angle between two non-zero vectors of any length, radians, in [0, pi].
 pub(super) fn between_rad(a: Vec3<Tunnel>, b: Vec3<Tunnel>) -> f64 {
     math::atan2(a.0.cross(&b.0).norm(), dot(a, b))
 }
@@ -45,7 +46,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn vectors_square_to_a_beam_are_square_and_one_is_in_the_plane_of_turning() {
+    fn perpendicular_vectors_include_one_in_the_plane_of_turning() {
         for k in 0..50 {
             let (a, b) = (f64::from(k) * 0.7, f64::from(k) * 0.31);
             let ((sa, ca), (sb, cb)) = (math::sin_cos(a), math::sin_cos(b));

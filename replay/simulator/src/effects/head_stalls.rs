@@ -18,14 +18,15 @@ use crate::random::Stream;
 use crate::sensing::Samples;
 use crate::stages::Stage;
 
-/// Interval of the times at which a stall may begin.
+/// Interval between the times at which a stall may begin.
 const STEP: DurNs = DurNs(100_000_000);
 
-/// Now and then a head stalls and keeps pinging at its angle; afterwards it continues from there, so the offset remains.
+/// From time to time a head stalls and pings repeatedly at its angle; afterwards it continues from there, so the offset
+/// remains.
 ///
-/// Stalls begin `per_hour` times an hour, with equal probability at any tenth of a second, and last `seconds = [least,
-/// most]`, drawn evenly, by default 2 to 20; one that begins during another may extend it. With `told`, the default, the
-/// head reports its true angle; without, the commanded one.
+/// Stalls begin `per_hour` times per hour, with equal probability at any tenth of a second. They last `seconds =
+/// [least, most]`, drawn evenly, by default 2 to 20. A stall that begins during another may extend it. With `told`, the
+/// default, the head reports its true angle; without, the commanded one.
 pub(super) struct HeadStallsKind;
 
 #[derive(Debug, Clone, Copy)]
@@ -88,7 +89,7 @@ impl Stalls {
         Self { stream, chance, seconds: parameters.seconds, next_step: 0, until: START }
     }
 
-    /// Whether the head stalls; call in order of time.
+    /// Whether the head stalls at this time. Call in order of time.
     fn at(&mut self, at: MonoNs) -> bool {
         let step = at.since(START).0.max(0).unsigned_abs() / STEP.0.unsigned_abs();
         while self.next_step <= step {
@@ -124,7 +125,7 @@ mod tests {
 
     /// For stalls that may overlap, the share of time without one is exp(-rate x mean length).
     #[test]
-    fn stalls_are_as_many_and_as_long_as_wanted() {
+    fn stalls_have_their_rate_and_length() {
         let parameters = Parameters { per_hour: 60.0, seconds: [2.0, 10.0], told: true };
         let mut stalls = Stalls::new(Stream::new(5, "head_stalls", "head"), &parameters);
         let (hours, step_s) = (200, 0.1);
@@ -137,14 +138,14 @@ mod tests {
         }
         let free = math::exp(-6.0 / 60.0);
         let share = f64::from(still) / f64::from(count);
-        // Of 12,000 stalls.
+        // Spread over 12,000 stalls.
         assert!((share - (1.0 - free)).abs() < 5.0 * 0.095 / math::sqrt(12_000.0) * 1.5, "{share}");
         let wanted = f64::from(hours) * 60.0 * free;
         assert!((f64::from(begun) - wanted).abs() < 5.0 * math::sqrt(wanted), "{begun} {wanted}");
     }
 
     #[test]
-    fn a_head_that_stands_pings_one_angle_and_goes_on_in_whole_steps() {
+    fn stalled_head_repeats_one_angle_and_continues_in_whole_steps() {
         for told in [true, false] {
             let keys = format!("[effects.head_stalls]\nper_hour = 600\nseconds = [1, 1]\ntold = {told}\n");
             let (plain, pings) = (
@@ -164,7 +165,7 @@ mod tests {
     }
 
     #[test]
-    fn slices_make_no_difference_and_nonsense_is_refused() {
+    fn slice_length_changes_nothing_and_invalid_keys_are_refused() {
         same_in_any_slices(&Bench::sectors("[effects.head_stalls]\nper_hour = 600\nseconds = [0.5, 3]\n"));
         assert!(refusal("[effects.head_stalls]\n").contains("must not be zero"));
         assert!(refusal("[effects.head_stalls]\nper_hour = 1\nseconds = [3, 2]\n").contains("[least, most]"));

@@ -20,20 +20,24 @@ use crate::random::Stream;
 use crate::sensing::Samples;
 use crate::stages::Stage;
 
-/// Step of the draws for constant parts; no sample has this number.
+/// Step number reserved for the draws of constant parts; no sample has it.
 const CONSTANT: u64 = u64::MAX;
 /// Block of the tilt's draws, after the biases'.
 const TILT: u64 = 3;
 
 /// Varying and constant biases of an inertial unit, independent for each axis.
 ///
-/// `gyro_degps` and `accel_mps2` are the standard deviations of first-order Gauss-Markov processes whose correlation
-/// falls to 1/e within `tau_s` (300 by default); they are stationary from the first sample.
-/// `gyro_constant_degps` and `accel_constant_mps2` are standard deviations of parts constant through the dive.
-/// `attitude_drift_deg_per_hour` turns the unit's own attitude about the vertical at a constant rate, positive to the
-/// left, and `tilt_deg` is the standard deviation of a process like the biases' that tilts it, within `tilt_tau_s` (30 by default): the effect
-/// of biases and accelerations on the unit's own filter isn't simulated otherwise. All are zero by default.
-/// Source: Brown and Hwang, Introduction to Random Signals and Applied Kalman Filtering, 4th ed., §4.4 (exact steps).
+/// - `gyro_degps` and `accel_mps2` are the standard deviations of first-order Gauss-Markov processes whose correlation
+///   falls to 1/e within `tau_s` (300 by default). They are stationary from the first sample.
+/// - `gyro_constant_degps` and `accel_constant_mps2` are standard deviations of parts that are constant through the
+///   dive.
+/// - `attitude_drift_deg_per_hour` turns the unit's own attitude about the vertical at a constant rate, positive to the
+///   left.
+/// - `tilt_deg` is the standard deviation of a similar process that tilts the attitude, with time constant `tilt_tau_s`
+///   (30 by default). The effect of biases and accelerations on the unit's own filter isn't simulated otherwise.
+///
+/// All are zero by default. Source: Brown and Hwang, Introduction to Random Signals and Applied Kalman Filtering, 4th
+/// ed., §4.4 (exact steps).
 pub(super) struct ImuBiasKind;
 
 #[derive(Debug, Clone, Copy)]
@@ -53,12 +57,14 @@ struct ImuBias {
     parameters: Parameters,
     stream: Stream,
     constant: [f64; 6],
-    /// In standard deviations: turn rates, then forces.
+    /// Turn rates, then forces, in standard deviations.
     wandering: [f64; 6],
     /// Roll and pitch of the attitude, in standard deviations.
     tilt: [f64; 2],
     before: Option<MonoNs>,
-    /// Sample interval, and of biases and tilt the correlation over it and the weight of the new draw; kept, as most samples come at one rate.
+    /// Last sample interval, with the correlation over it and the weight of the new draw, for biases and tilt.
+    ///
+    /// Kept because most samples come at one rate.
     kept: (DurNs, [[f64; 2]; 2]),
 }
 
@@ -217,9 +223,10 @@ mod tests {
         [a, b, c, d, e, f]
     }
 
-    /// Over many seeds: the variance at the first sample and much later, and the correlation exp(-t / tau) between them.
+    /// Over many seeds, compares the variance at the first sample and much later, and the correlation exp(-t / tau)
+    /// between them.
     #[test]
-    fn biases_are_stationary_and_forget_over_tau() {
+    fn biases_are_stationary_and_decorrelate_over_tau() {
         let (runs, steps, tau_s) = (4000, 50, 2.0);
         let (mut first, mut last, mut both) = (0.0, 0.0, 0.0);
         for seed in 0..runs {
@@ -243,9 +250,9 @@ mod tests {
         assert!((both / n - wanted).abs() < 5.0 * math::sqrt((1.0 + wanted * wanted) / n), "{}", both / n);
     }
 
-    /// Twice as many samples, the same process: the variance of the change over a time doesn't depend on the rate.
+    /// Twice as many samples give the same process: the variance of the change over a time doesn't depend on the rate.
     #[test]
-    fn a_bias_wanders_by_time_not_by_sample() {
+    fn bias_change_depends_on_time_not_on_sample_count() {
         let change = |millis: i64| {
             let mut sum = 0.0;
             for seed in 0..4000 {
@@ -267,7 +274,7 @@ mod tests {
     }
 
     #[test]
-    fn what_stays_stays_and_the_attitude_drifts_evenly() {
+    fn constant_biases_stay_constant_and_attitude_drifts_evenly() {
         let keys = "[effects.imu_bias]\ngyro_constant_degps = 0.1\nattitude_drift_deg_per_hour = 36\n";
         let (plain, leaning) =
             (Bench::turning("").run::<Inertia>("imu"), Bench::turning(keys).run::<Inertia>("imu"));
@@ -280,9 +287,9 @@ mod tests {
         }
     }
 
-    /// Stationary, with the correlation that the time constant says, about level axes alone.
+    /// The tilt is stationary, has the correlation of its time constant, and acts only about level axes.
     #[test]
-    fn a_tilt_wanders_about_level_axes_and_leaves_rates_and_forces_alone() {
+    fn tilt_varies_about_level_axes_without_changing_rates_or_forces() {
         let keys = "[effects.imu_bias]\ntilt_deg = 0.5\ntilt_tau_s = 2\n";
         let (plain, tilted) =
             (Bench::long("").run::<Inertia>("imu"), Bench::long(keys).run::<Inertia>("imu"));
@@ -297,7 +304,7 @@ mod tests {
             .collect();
         let lag = plain.iter().position(|inertia| inertia.at.since(plain[0].at).0 >= 2_000_000_000).unwrap();
         let wanted = f64::to_radians(0.5) * f64::to_radians(0.5);
-        // Of a process of correlation time tau, n samples over t seconds are worth t / (2 tau).
+        // For a process with correlation time tau, n samples over t seconds count as t / (2 tau).
         let worth = plain.len() as f64 / lag as f64 / 2.0;
         for axis in 0..2 {
             let product = |lag: usize| {
@@ -312,7 +319,7 @@ mod tests {
     }
 
     #[test]
-    fn slices_make_no_difference_and_no_bias_is_refused() {
+    fn slice_length_changes_nothing_and_zero_bias_is_refused() {
         same_in_any_slices(&Bench::turning(
             "[effects.imu_bias]\ngyro_degps = 0.2\naccel_mps2 = 0.01\ntau_s = 5\n",
         ));

@@ -18,16 +18,20 @@ use crate::random::Stream;
 use crate::sensing::Samples;
 use crate::stages::Stage;
 
-/// Length of the spans of time in each of which there may be one bump, s.
+/// Length of the time spans that contain at most one bump each, s.
 const SPAN_S: f64 = 1.0;
 
-/// Now and then the vehicle bumps into the wall, a rock, its own cable: it is thrust one way and swings back.
+/// From time to time the vehicle bumps into the wall, a rock or its own cable: it is pushed one way and swings back.
 ///
-/// Keys: `per_hour`, to 1,800 (needed); the speed `speed_mps = [least, most]` that a bump gives ([0.02, 0.1]), evenly drawn, in a
-/// direction evenly drawn; `seconds`, from the first touch until the vehicle is at rest again, 0.01 to 1 (0.2). The force is one
-/// turn of a sine, so that speed is gained and lost again and the vehicle's place changes by millimetres, which the true
-/// trajectory leaves out. Sensors on one vehicle feel the same bumps.
-/// Source: momentum; the speeds are those at which such vehicles go.
+/// Keys:
+/// - `per_hour`, to 1,800 (needed).
+/// - `speed_mps = [least, most]`, the speed that a bump gives ([0.02, 0.1]), drawn evenly, in an evenly drawn
+///   direction.
+/// - `seconds`, from the first touch until the vehicle is at rest again, 0.01 to 1 (0.2).
+///
+/// The force is one period of a sine, so the speed is gained and lost again. The vehicle's place changes by
+/// millimetres, which the true trajectory leaves out. Sensors on one vehicle feel the same bumps. Source: momentum; the
+/// speeds are those at which such vehicles travel.
 pub(super) struct ImuBumpsKind;
 
 #[derive(Debug, Clone, Copy)]
@@ -100,13 +104,13 @@ impl ImuBumps {
         each.reduce(|a, b| a + b)
     }
 
-    /// Share of a bump's speed that the vehicle has so long after its begin.
+    /// Share of a bump's speed that the vehicle has `after_s` after the bump's start.
     fn share(&self, after_s: f64) -> f64 {
         let turn = (after_s / self.parameters.seconds).clamp(0.0, 1.0);
         (1.0 - math::cos(math::TAU * turn)) / 2.0
     }
 
-    /// Begin and speed of the bump in a span, if there is one.
+    /// Start time and speed of the bump in a span, if there is one.
     fn drawn(&self, span: u64) -> Option<(f64, Vec3<Sensor>)> {
         let [chance, along] = self.stream.at(span).uniform();
         if chance >= self.parameters.chance {
@@ -130,10 +134,10 @@ mod tests {
 
     const KEYS: &str = "[effects.imu_bumps]\nper_hour = 400\nspeed_mps = [0.05, 0.2]\nseconds = 0.3\n";
 
-    /// Bumps found in the difference of two dives: as many as wanted, each as long and as strong as wanted, and each leaves the
-    /// vehicle at the speed it had.
+    /// Bumps in the difference of two dives have the right number, length and strength, and leave the vehicle at its
+    /// previous speed.
     #[test]
-    fn bumps_are_as_many_as_long_and_as_strong_as_wanted() {
+    fn bumps_have_their_rate_length_and_strength() {
         let (plain, with) = (Bench::long("").run::<Inertia>("imu"), Bench::long(KEYS).run::<Inertia>("imu"));
         let period_s = plain[0].period.as_secs_f64();
         let force: Vec<Vec3<Sensor>> =
@@ -143,7 +147,7 @@ mod tests {
             force.chunk_by(|a, b| felt(a) == felt(b)).filter(|run| felt(&run[0])).collect();
         let (spans, chance) = (640.0, 400.0 / 3600.0);
         let n = bumps.len() as f64;
-        // Two that meet are found as one.
+        // Two overlapping bumps are found as one.
         assert!((n - spans * chance).abs() < 5.0 * math::sqrt(spans * chance), "{n}");
         let mut single = 0;
         for bump in &bumps {
@@ -164,16 +168,17 @@ mod tests {
         assert!(single * 4 > bumps.len() * 3);
     }
 
-    /// Sizes and directions of the bumps of a seed, as drawn in so many spans.
+    /// Sizes and directions of a seed's bumps in `spans` time spans.
     fn bumps(spans: u64) -> Vec<Vec3<Sensor>> {
         let parameters = Parameters { chance: 0.5, speed_mps: [0.05, 0.2], seconds: 0.3 };
         let bumps = ImuBumps { parameters, stream: Stream::new(5, "imu_bumps", "vehicle") };
         (0..spans).filter_map(|span| bumps.drawn(span)).map(|(_, speed)| speed).collect()
     }
 
-    /// Even on a sphere: the mean of each component is 0, that of its square a third. Even from least to most: mean and variance.
+    /// Directions are even on a sphere: each component has mean 0 and mean square 1/3. Sizes are even from least to
+    /// most, in mean and variance.
     #[test]
-    fn bumps_come_from_everywhere_and_are_of_every_size() {
+    fn bumps_have_even_directions_and_sizes() {
         let bumps = bumps(20_000);
         let n = bumps.len() as f64;
         let mean = |of: &dyn Fn(&Vec3<Sensor>) -> f64| bumps.iter().map(of).sum::<f64>() / n;
@@ -207,7 +212,7 @@ mod tests {
     }
 
     #[test]
-    fn slices_make_no_difference_and_nonsense_is_refused() {
+    fn slice_length_changes_nothing_and_invalid_keys_are_refused() {
         same_in_any_slices(&Bench::turning(KEYS));
         assert!(refusal("[effects.imu_bumps]\n").contains("per_hour: must not be zero"));
         assert!(refusal("[effects.imu_bumps]\nper_hour = 9\nspeed_mps = 1\n").contains("must be"));

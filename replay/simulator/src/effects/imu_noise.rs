@@ -17,17 +17,17 @@ use crate::random::Stream;
 use crate::sensing::Samples;
 use crate::stages::Stage;
 
-/// Blocks of random numbers, two of them for each vector.
+/// Blocks of random numbers; each vector takes two.
 const RATE: u64 = 0;
 const FORCE: u64 = 2;
 const ATTITUDE: u64 = 4;
 
 /// White noise of an inertial unit, independent for each axis.
 ///
-/// `gyro_degps_rthz` and `accel_mps2_rthz` are densities: the sd of a sample is density times the root of the unit's rate,
-/// so that of an integral over t seconds is density times the root of t. `attitude_deg` is the sd of the rotation of each
-/// attitude about each axis of the unit. All are zero by default.
-/// Source: IEEE Std 952-1997, C.1 (angle random walk); a MEMS unit's data sheet has 0.007 deg/s/sqrt(Hz).
+/// `gyro_degps_rthz` and `accel_mps2_rthz` are densities. The sd of a sample is the density times the root of the
+/// unit's rate, and that of an integral over t seconds is the density times the root of t. `attitude_deg` is the sd of
+/// the rotation of each attitude about each axis of the unit. All are zero by default. Source: IEEE Std 952-1997, C.1
+/// (angle random walk); a MEMS unit's data sheet has 0.007 deg/s/sqrt(Hz).
 pub(super) struct ImuNoiseKind;
 
 #[derive(Debug, Clone, Copy)]
@@ -117,7 +117,7 @@ mod tests {
     const KEYS: &str =
         "[effects.imu_noise]\ngyro_degps_rthz = 0.007\naccel_mps2_rthz = 0.001\nattitude_deg = 0.5\n";
 
-    /// White noise of density N has, in means over t, an Allan deviation of N / sqrt(t), for every t.
+    /// For every t, means over t of white noise with density N have an Allan deviation of N / sqrt(t).
     #[test]
     fn rates_and_forces_have_their_densities_over_any_time() {
         let (plain, noisy) = (Bench::long("").run::<Inertia>("imu"), Bench::long(KEYS).run::<Inertia>("imu"));
@@ -140,7 +140,7 @@ mod tests {
                     let n = (means.len() - 1) as f64;
                     let variance = squares / n / 2.0;
                     let wanted = density * density / (period_s * length as f64);
-                    // Neighbouring differences share a mean: the variance of the estimate is 3/n of its square.
+                    // Neighbouring differences share a mean, so the variance of the estimate is 3/n of its square.
                     let off = variance / wanted - 1.0;
                     assert!(off.abs() < 5.0 * math::sqrt(3.0 / n), "{length} {axis}: {off}");
                 }
@@ -166,7 +166,7 @@ mod tests {
     }
 
     #[test]
-    fn slices_make_no_difference_and_no_noise_is_refused() {
+    fn slice_length_changes_nothing_and_zero_noise_is_refused() {
         same_in_any_slices(&Bench::turning(KEYS));
         assert!(refusal("[effects.imu_noise]\n").contains("or accel_mps2_rthz or attitude_deg must not be"));
     }

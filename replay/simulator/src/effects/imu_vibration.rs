@@ -20,10 +20,12 @@ use crate::stages::Stage;
 
 /// Thrusters shake an inertial unit at one frequency.
 ///
-/// Keys: `frequency_hz`, 1 to 2,000 (needed): the turns of a shaft a second, or times its blades; the amplitudes along and about
-/// each axis of the unit, `accel_mps2` and `gyro_degps`, zero by default. Each axis has a phase of its own. A unit that integrates
-/// between samples sees the mean over its period T: the amplitude goes with sin(pi f T) / (pi f T), and what is above half
-/// the rate of samples appears below it.
+/// Keys:
+/// - `frequency_hz`, 1 to 2,000 (needed): the shaft's turns per second, or that times the number of blades.
+/// - `accel_mps2` and `gyro_degps`, the amplitudes along and about each axis of the unit, zero by default.
+///
+/// Each axis has its own phase. A unit that integrates between samples sees the mean over its period T. The amplitude
+/// is therefore multiplied by sin(pi f T) / (pi f T), and frequencies above half the sample rate appear below it.
 /// Source: sampling theorem; strapdown units integrate between their outputs.
 pub(super) struct ImuVibrationKind;
 
@@ -91,7 +93,7 @@ impl ImuVibration {
         let Parameters { frequency_hz, accel_mps2, gyro_radps } = self.parameters;
         let half_rad = math::TAU / 2.0 * frequency_hz * inertia.period.as_secs_f64();
         let kept = if half_rad > 0.0 { math::sin(half_rad) / half_rad } else { 1.0 };
-        // Whole turns are left out first, so that hours into a dive no digits are lost.
+        // Whole turns are removed first, so that no digits are lost hours into a dive.
         let turns = frequency_hz * inertia.at.since(START).as_secs_f64();
         let now_rad = math::TAU * math::wrap(turns, 1.0);
         let [a, b, c, d, e, f] = self.phases_rad.map(|phase_rad| math::sin(now_rad + phase_rad));
@@ -105,13 +107,14 @@ mod tests {
     use super::*;
     use crate::testing_motion::{Bench, refusal, same_in_any_slices};
 
-    /// What a unit measures along or about one of its axes.
+    /// Component of a measurement along or about one axis.
     type Axis = fn(&Inertia) -> f64;
 
-    /// A swing of 83 Hz, integrated over each sample's period in many small steps, gives these means along and about each axis: one
-    /// phase an axis, found from the first samples, holds for all, and no two axes have the same.
+    /// Compares samples with an oscillation of 83 Hz, integrated over each sample's period in many small steps.
+    ///
+    /// One phase per axis, found from the first samples, fits all samples, and no two axes share a phase.
     #[test]
-    fn samples_are_means_of_each_axis_s_own_swing() {
+    fn samples_are_means_of_a_separate_oscillation_per_axis() {
         let keys = "[effects.imu_vibration]\nfrequency_hz = 83\naccel_mps2 = 4\ngyro_degps = 6\n";
         let (plain, shaken) =
             (Bench::turning("").run::<Inertia>("imu"), Bench::turning(keys).run::<Inertia>("imu"));
@@ -151,7 +154,7 @@ mod tests {
     }
 
     #[test]
-    fn slices_make_no_difference_and_nonsense_is_refused() {
+    fn slice_length_changes_nothing_and_invalid_keys_are_refused() {
         same_in_any_slices(&Bench::turning("[effects.imu_vibration]\nfrequency_hz = 25\ngyro_degps = 1\n"));
         assert!(refusal("[effects.imu_vibration]\naccel_mps2 = 1\n").contains("frequency_hz: is missing"));
         assert!(

@@ -24,31 +24,35 @@ use crate::sensing::{Ray, Rays, Samples, Scenery, Slice, Source};
 use crate::stages::Stage;
 use pings::{Ping, Pings};
 
-/// Heads that share a frequency hear each other: a head takes the first sound after its own ping for its echo. Another
-/// head's ping arrives by reflection where its beam meets the wall, or directly, where its beam points at this head's
-/// body. If its apparent range, (c (t_other - t_own) + path) / 2, is less than that of the own echo and at least the
-/// head's least range, it is reported instead.
+/// Heads that share a frequency hear each other: a head takes the first sound after its own ping for its echo.
 ///
-/// It is always heard if it arrives within this head's beam; otherwise, through side lobes, with a probability. A wall
-/// point is within the beam up to half the beam's width and a margin from its axis; the other head, up to half the width
-/// and its body's.
+/// Another head's ping arrives by reflection at the point where its beam meets the wall, or directly if its beam points
+/// at this head's body. Its apparent range is (c (t_other - t_own) + path) / 2. If that is less than the range of the
+/// own echo and at least the head's least range, it is reported instead.
 ///
-/// Keys: `sensors`, those that share a frequency, two or more (all heads), one table per frequency; `share`, the
-/// probability through side lobes, from 0 to 1 (0); `margin_deg`, from 0 to 45 (half the other's beam, as the patch is
-/// insonified that widely).
+/// The ping is always heard if it arrives within this head's beam; otherwise it is heard through side lobes with a
+/// probability. A wall point is within the beam up to half the beam's width plus a margin from its axis; the other
+/// head, up to half the width plus half its body's angular size.
 ///
-/// Heads whose bodies overlap are idealised ones and don't hear each other. Pings of another head that begin while a head
-/// is already listening aren't simulated yet: they are extrapolated from the last two before, which is wrong for a ping or
-/// two where a head turns round.
+/// Keys:
+/// - `sensors`, those that share a frequency, two or more (all heads), one table per frequency.
+/// - `share`, the probability through side lobes, from 0 to 1 (0).
+/// - `margin_deg`, from 0 to 45 (half the other's beam, since the insonified patch is that wide).
+///
+/// Heads whose bodies overlap are idealised ones and don't hear each other. Pings of another head that begin while a
+/// head is already listening are extrapolated from the two pings before. That is wrong for a ping or two when a head
+/// turns round.
+///
 /// Source: Jorge et al. 2021, §10; core/sampling/src/interference.rs, which plans with the same two paths.
 pub(super) struct InterferenceKind;
 
-/// Upper bound of the distance between heads, m: vehicle files place them within 20 m of the body's origin in x, y and z.
+/// Upper bound of the distance between heads, m. Vehicle files place them within 20 m of the body's origin in x, y and
+/// z.
 const APART_M: f64 = 70.0;
 
 #[derive(Debug, Clone, Copy)]
 struct Parameters {
-    /// Heads of one number share a frequency.
+    /// Heads with the same number share a frequency.
     frequency: usize,
     share: f64,
     margin_rad: Option<f64>,
@@ -79,7 +83,7 @@ impl EffectKind for InterferenceKind {
             let mut sensors = targets(table, facts, &[Sense::Head])?;
             sensors.dedup();
             if sensors.len() < 2 {
-                return Err(table.invalid_itself("has one head, which has no other to hear"));
+                return Err(table.invalid_itself("has one head; at least two are needed"));
             }
             let share = table.number("share", 0.0..=1.0)?.unwrap_or(0.0);
             let margin_rad = table.number("margin_deg", 0.0..=45.0)?.map(f64::to_radians);
@@ -104,7 +108,7 @@ impl Effect for PerSensor<Parameters> {
     }
 }
 
-/// Adds the slice's pings and drops those that can no longer be heard.
+/// Adds the slice's pings and drops pings that can no longer be heard.
 fn remember(
     slice: Res<'_, Slice>,
     scenery: Res<'_, Scenery>,
@@ -160,9 +164,9 @@ struct Ear<'a> {
     ray: &'a Ray,
     stopped: bool,
     step: u64,
-    /// Ranges between which a sound would be taken for the echo.
+    /// Ranges between which a sound would be taken for the echo, m.
     within_m: [f64; 2],
-    /// Whether one has been heard.
+    /// Whether another head's ping has been heard.
     heard: bool,
 }
 
@@ -185,7 +189,7 @@ impl Ear<'_> {
         }
     }
 
-    /// A ping that arrives by reflection at the wall.
+    /// Considers a ping that arrives by reflection at the wall.
     fn by_the_wall(&mut self, other: u64, sounds: &Hears, ping: &Ping, later_m: f64) {
         let Some(wall) = ping.wall else { return };
         let range_m = (later_m + (wall - ping.origin).norm() + (wall - self.ray.origin).norm()) / 2.0;
@@ -200,7 +204,7 @@ impl Ear<'_> {
         }
     }
 
-    /// A ping that arrives directly from a head whose beam points at this one.
+    /// Considers a ping that arrives directly from a head whose beam points at this one.
     fn straight(&mut self, other: u64, sounds: &Hears, ping: &Ping, later_m: f64) {
         let way_m = (ping.origin - self.ray.origin).norm();
         let range_m = f64::midpoint(later_m, way_m);
@@ -219,7 +223,7 @@ impl Ear<'_> {
         }
     }
 
-    /// Whether a sound at this range would precede all others, and isn't below the least range.
+    /// Whether a sound at this range precedes all others and isn't below the least range.
     fn comes_first(&self, range_m: f64) -> bool {
         range_m >= self.within_m[0] && range_m < self.within_m[1]
     }
@@ -235,7 +239,7 @@ impl Ear<'_> {
 }
 
 impl Hears {
-    /// Upper bound of the distance at which a wall still returns this head's sound, m.
+    /// Upper bound of the distance from which a wall still returns this head's sound, m.
     fn rings_m(&self) -> f64 {
         // A factor of 1.5 exceeds any difference in the speed of sound.
         self.spec.range_m[1] * 1.5

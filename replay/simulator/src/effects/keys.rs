@@ -4,9 +4,9 @@ use std::ops::RangeInclusive;
 
 use headrace_config::{ConfigError, Section};
 
-/// The table of an effect on the vehicle or the tunnel, rather than on single sensors.
+/// Accepts a single table, for an effect on the vehicle or the tunnel.
 ///
-/// Errors: more than one.
+/// Errors: more than one table.
 pub(super) fn only_one(tables: Vec<Section<'_>>) -> Result<Vec<Section<'_>>, ConfigError> {
     match tables.get(1) {
         Some(second) => Err(second.invalid_itself("is a second table; this effect has one")),
@@ -14,9 +14,9 @@ pub(super) fn only_one(tables: Vec<Section<'_>>) -> Result<Vec<Section<'_>>, Con
     }
 }
 
-/// Two numbers `[least, most]`.
+/// Reads two numbers `[least, most]`.
 ///
-/// Errors: other than two, one outside `allowed`, or in the wrong order.
+/// Errors: not two numbers, one outside `allowed`, or the wrong order.
 pub(super) fn span(
     table: &Section<'_>,
     key: &'static str,
@@ -30,7 +30,7 @@ pub(super) fn span(
     }
 }
 
-/// A number, zero where it is absent.
+/// Reads a number that defaults to zero.
 ///
 /// Errors: outside `allowed`.
 pub(super) fn or_zero(

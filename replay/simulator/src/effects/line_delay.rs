@@ -16,14 +16,15 @@ use crate::random::Stream;
 use crate::sensing::Line;
 use crate::stages::Stage;
 
-/// Every sense.
+/// All senses.
 pub(super) const SENSES: [Sense; 6] =
     [Sense::Head, Sense::Echosounder, Sense::Depth, Sense::Inertial, Sense::Velocity, Sense::Tether];
 
-/// Messages from a device come late, in addition to the latency in the vehicle file; none overtakes another on its line.
+/// Messages from a device arrive late, in addition to the latency in the vehicle file.
 ///
-/// All are delayed by `latency_ms` and, each by itself, by an exponentially distributed time of mean `jitter_ms`. A
-/// message that would overtake the one before arrives with it. Messages to devices aren't delayed.
+/// All messages are delayed by `latency_ms`, and each one by a further exponentially distributed time with mean
+/// `jitter_ms`. A message that would overtake the previous one on its line arrives together with it. Messages to
+/// devices aren't delayed.
 pub(super) struct LineDelayKind;
 
 #[derive(Debug, Clone, Copy)]
@@ -105,7 +106,7 @@ mod tests {
     const KEYS: &str = "[effects.line_delay]\nlatency_ms = 40\njitter_ms = 3\n";
 
     #[test]
-    fn what_is_received_is_late_and_nothing_overtakes() {
+    fn received_messages_are_late_and_keep_their_order() {
         let bench = Bench::turning("");
         let late = Bench::turning(KEYS);
         for source in 0..bench.sensors() {
@@ -127,7 +128,8 @@ mod tests {
         }
     }
 
-    /// Far apart, so that none is delayed by the one before: mean and variance of the exponential distribution.
+    /// Messages are far apart, so that none delays the next: mean and variance are those of the exponential
+    /// distribution.
     #[test]
     fn jitter_is_exponential() {
         let parameters = Parameters { latency_s: 0.0, jitter_s: 0.003 };
@@ -146,7 +148,7 @@ mod tests {
     }
 
     #[test]
-    fn slices_make_no_difference_and_no_delay_is_refused() {
+    fn slice_length_changes_nothing_and_zero_delay_is_refused() {
         same_in_any_slices(&Bench::turning(KEYS));
         assert!(refusal("[effects.line_delay]\n").contains("or jitter_ms must not be zero"));
     }

@@ -18,15 +18,15 @@ use crate::random::Stream;
 use crate::sensing::{Samples, Scenery};
 use crate::stages::Stage;
 
-/// Length of a stretch of tunnel that may contain a random disturbance, m.
+/// Length of a tunnel stretch that contains at most one random disturbance, m.
 const CELL_M: f64 = 1.0;
 
-/// Near steel, the attitude of an inertial unit is turned about the vertical by a raised cosine of the vehicle's chainage,
-/// largest in the middle of the disturbance.
+/// Steel turns the attitude of an inertial unit about the vertical.
 ///
-/// `places` are tables of `chainage_m` (the middle), `length_m` and `deg`, positive to the left. `per_100m` adds places at
-/// random, `length_m` long (5 by default), with an angle drawn evenly up to `up_to_deg` (10 by default) either way. They
-/// belong to the tunnel: all units see the same, and overlapping ones add.
+/// The turn is a raised cosine of the vehicle's chainage, largest in the middle of the disturbance. `places` are tables
+/// of `chainage_m` (the middle), `length_m` and `deg`, positive to the left. `per_100m` adds places at random,
+/// `length_m` long (5 by default), with an angle drawn evenly up to `up_to_deg` (10 by default) either way.
+/// Disturbances belong to the tunnel: all units see the same ones, and overlapping ones add.
 pub(super) struct MagneticDisturbanceKind;
 
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -46,7 +46,7 @@ struct Disturbance {
     tunnel_m: f64,
 }
 
-/// Disturbances in order of their middle.
+/// Disturbances, sorted by their middle.
 #[derive(Clone, Component)]
 struct Steel {
     places: Vec<Place>,
@@ -170,7 +170,7 @@ mod tests {
     use crate::testing_motion::{Bench, LONG, refusal};
 
     #[test]
-    fn a_place_pulls_yaw_alone_most_in_its_middle_and_not_beyond_its_ends() {
+    fn disturbance_turns_only_yaw_most_at_its_middle_and_within_its_ends() {
         let keys = "[effects.magnetic_disturbance]\n\
                     places = [{ chainage_m = 20, length_m = 4, deg = 10 }, { chainage_m = 21, length_m = 4, deg = -4 }]\n";
         let (plain, pulled) = (Bench::on(LONG, ""), Bench::on(LONG, keys));
@@ -194,7 +194,7 @@ mod tests {
     }
 
     #[test]
-    fn random_places_are_as_many_and_as_strong_as_wanted() {
+    fn random_places_have_their_rate_and_strength() {
         let disturbance = Disturbance {
             per_100m: 5.0,
             up_to_rad: 0.2,
@@ -217,7 +217,7 @@ mod tests {
     }
 
     #[test]
-    fn no_place_and_half_a_place_are_refused() {
+    fn missing_and_incomplete_places_are_refused() {
         let why = |keys: &str| refusal(&format!("[effects.magnetic_disturbance]\n{keys}"));
         assert!(why("up_to_deg = 5").contains("or places must not be zero"));
         assert!(why("places = [{ chainage_m = 3, deg = 2 }]").contains("places[0].length_m: is missing"));

@@ -19,15 +19,18 @@ use crate::random::Stream;
 use crate::sensing::{Ray, Rays, Samples, Scenery};
 use crate::stages::Stage;
 
-/// Some pings get no return: a share of them anywhere, singly or in runs; those at grazing incidence, which return little
-/// sound; those whose echo comes from far away. The three are independent of each other.
+/// Some pings get no return: a random share, singly or in runs; pings at grazing incidence; and pings at far walls.
 ///
-/// Keys: `from_m` and `to_m` of the stretch where they are lost; `share` of all pings, from 0 to 0.95 (0), and the mean length of their runs, `mean_run` pings, from
-/// share / (1 - share), or 1 if that is more, to 10,000 (1 / (1 - share): independent pings); `grazing_from_deg` and
-/// `grazing_to_deg`, incidence beyond which some, and from which all, are lost, from 0, perpendicular to the wall, to 90;
-/// `far_from_m` and `far_to_m`, the same for the range, from 0 to 200 m. Between the two of a pair the share grows
-/// linearly; equal values give a sharp edge. At least one of the three is required.
-/// Source: runs after Gilbert, "Capacity of a burst-noise channel", Bell System Technical Journal 39, 1960.
+/// The three parts are independent of each other, and at least one is required. Keys:
+/// - `from_m` and `to_m` of the stretch in which returns are lost.
+/// - `share` of all pings, from 0 to 0.95 (0), and the mean length of their runs, `mean_run` pings, from share / (1 -
+///   share), or 1 if that is more, to 10,000 (1 / (1 - share): independent pings).
+/// - `grazing_from_deg` and `grazing_to_deg`, the incidence beyond which some, and from which all, are lost, from 0,
+///   perpendicular to the wall, to 90.
+/// - `far_from_m` and `far_to_m`, the same for the range, from 0 to 200 m.
+///
+/// Between the two values of a pair the share grows linearly; equal values give a sharp edge. Source: runs after
+/// Gilbert, "Capacity of a burst-noise channel", Bell System Technical Journal 39, 1960.
 pub(super) struct MissingReturnsKind;
 
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -79,7 +82,7 @@ impl EffectKind for MissingReturnsKind {
                 far: ramp(table, ["far_from_m", "far_to_m"], 200.0)?,
             };
             if parameters == (Parameters { runs: None, grazing: None, far: None }) {
-                let problem = "must be above zero, or grazing_from_deg or far_from_m be there";
+                let problem = "must be above zero, or grazing_from_deg or far_from_m must be given";
                 return Err(table.invalid("share", problem));
             }
             Ok(parameters)
@@ -112,14 +115,14 @@ impl Effect for PerSensor<Places<Parameters>> {
 }
 
 impl Parameters {
-    /// Whether the ping of a step gets no return. Call for each step, in order; `in_run` is its state.
+    /// Whether the ping of a step gets no return. Call once per step, in order; `in_run` is its state.
     fn loses(&self, in_run: &mut Option<bool>, drawn: [f64; 2], ray: &Ray, echo: Echo) -> bool {
         let [first, second] = drawn;
         let runs = self.runs.is_some_and(|runs| runs.next(*in_run, first));
         *in_run = Some(runs);
         let share =
             |ramp: Option<Ramp>, at: Option<f64>| ramp.zip(at).map_or(0.0, |(ramp, at)| ramp.share(at));
-        // The incidence on an obstacle of the vehicle isn't known.
+        // The incidence on a part of the vehicle is unknown.
         let hit = ray.hit.filter(|_| self.grazing.is_some() && !echo.stopped);
         let incidence_deg = hit.map(|hit| math::acos(squareness(ray.direction, hit.normal)).to_degrees());
         let stays = (1.0 - share(self.grazing, incidence_deg)) * (1.0 - share(self.far, echo.range_m));
@@ -127,7 +130,7 @@ impl Parameters {
     }
 }
 
-/// What a ping has come back with so far.
+/// The echo of a ping so far.
 #[derive(Debug, Clone, Copy)]
 struct Echo {
     range_m: Option<f64>,
@@ -164,7 +167,7 @@ mod tests {
     }
 
     #[test]
-    fn a_share_is_lost_each_on_its_own() {
+    fn share_of_independent_losses_is_as_given() {
         let dive = Dive { seconds: 500.0, ..Dive::with_head() };
         let lost = lost(&dive, "share = 0.3");
         assert_share(lost.iter().filter(|lost| **lost).count(), lost.len(), 0.3);
@@ -183,11 +186,12 @@ mod tests {
             .map(<[bool]>::len)
             .collect();
         let (count, whole) = (runs.len() as f64, lost.len() as f64);
-        // Lengths are geometric: variance mean (mean - 1).
+        // Lengths are geometric, with variance mean (mean - 1).
         let found = runs.iter().sum::<usize>() as f64 / count;
         assert!((found - mean).abs() < 5.0 * math::sqrt(mean * (mean - 1.0) / count), "{found}");
         assert_share(runs.iter().filter(|run| **run == 1).count(), runs.len(), 1.0 / mean);
-        // The share's variance is that of independent pings, by (1 + r) / (1 - r), r the chain's correlation.
+        // The share's variance is that of independent pings times (1 + r) / (1 - r), where r is the chain's
+        // correlation.
         let correlation = Runs::new(share, mean).correlation();
         let variance = share * (1.0 - share) / whole * (1.0 + correlation) / (1.0 - correlation);
         let found = runs.iter().sum::<usize>() as f64 / whole;
@@ -203,7 +207,7 @@ mod tests {
             let (hit, _) = row.wall().unwrap();
             let headrace_sensor::measurement::Sounding { angle_rad, range_m, .. } =
                 row.sounding.unwrap().measured;
-            // A wall of the rectangle: incidence from the angle to the nearest axis.
+            // A wall of the rectangle: incidence is the angle to the nearest axis.
             let across = math::sin(angle_rad).abs();
             let square = if hit.normal.z().abs() > 0.5 { math::cos(angle_rad).abs() } else { across };
             let incidence_deg = math::acos(square).to_degrees();
@@ -219,7 +223,7 @@ mod tests {
     }
 
     #[test]
-    fn far_walls_are_lost_sharply_where_the_ramp_has_no_length() {
+    fn zero_length_ramp_loses_far_walls_sharply() {
         let dive = Dive::with_head();
         let base = dive.dive("").ranges_m(0);
         let lost = lost(&dive, "far_from_m = 3\nfar_to_m = 3");
@@ -229,12 +233,12 @@ mod tests {
     }
 
     #[test]
-    fn slices_dont_matter() {
+    fn slice_length_does_not_change_results() {
         Dive::with_head().assert_slices_dont_matter("[effects.missing_returns]\nshare = 0.3\nmean_run = 20");
     }
 
     #[test]
-    fn losses_that_cannot_be_are_refused() {
+    fn impossible_losses_are_refused() {
         let refusal = |keys: &str| Dive::with_head().refusal(&format!("[effects.missing_returns]\n{keys}"));
         assert!(refusal("").contains("must be above zero, or"));
         assert!(refusal("share = 0.99").contains("from 0 to 0.95"));

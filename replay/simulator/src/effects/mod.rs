@@ -1,5 +1,6 @@
-//! The effects that a scene may name: one file each, each its own plugin. One that isn't named adds no system, no component
-//! and no random number.
+//! The effects that a scene may name, one file and one plugin each.
+//!
+//! An effect that isn't named adds no system, component or random number.
 
 #![allow(clippy::needless_pass_by_value, reason = "bevy hands systems their arguments by value")]
 
@@ -60,7 +61,7 @@ pub use targets::PerSensor;
 
 /// All effects. Within a stage, systems run in this order, whatever the order of the scene.
 pub const KINDS: [&dyn EffectKind; 38] = [
-    // The vehicle, where it isn't what its file says.
+    // The vehicle, if it differs from its file.
     &mount_error::MountErrorKind,
     // Turning of heads, and the pose from which they look.
     &start_phase_error::StartPhaseErrorKind,
@@ -113,14 +114,14 @@ pub const KINDS: [&dyn EffectKind; 38] = [
 /// The effects that a scene names, in the order of [`KINDS`].
 pub struct Named(pub(crate) Vec<(&'static dyn EffectKind, Box<dyn Effect>)>);
 
-/// The effect of a name.
+/// The effect with this name.
 pub(crate) fn named(name: &str) -> Option<&'static dyn EffectKind> {
     KINDS.into_iter().find(|kind| kind.name() == name)
 }
 
 /// Reads the `[effects]` table.
 ///
-/// Errors: a name that is no effect; see [`EffectKind::read`].
+/// Errors: a name that isn't an effect; see [`EffectKind::read`].
 pub(crate) fn parse(section: Option<Section<'_>>, facts: &Facts) -> Result<Named, ConfigError> {
     let mut named = Vec::new();
     let Some(section) = section else { return Ok(Named(named)) };
@@ -141,7 +142,7 @@ impl Named {
         self.0.iter().any(|(kind, _)| kind.name() == name)
     }
 
-    /// These and those of a text of tables, none of which is among these.
+    /// Adds the effects of a text of tables, none of which may be present already.
     ///
     /// Errors: see [`EffectKind::read`].
     pub(crate) fn and(mut self, tables: &str, facts: &Facts) -> Result<Self, ConfigError> {

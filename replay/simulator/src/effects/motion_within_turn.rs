@@ -10,8 +10,10 @@ use crate::error::SceneError;
 use crate::facts::Facts;
 use crate::stages::{AIM_HELD, Stage, aim_moving};
 
-/// Heads look from the vehicle's pose at each ping. Without it, a turn is one picture, taken from the pose at the turn's
-/// beginning, as in simulators that take a scan at once.
+/// Heads look from the vehicle's pose at each ping.
+///
+/// Without this effect, a turn is one picture from the pose at the turn's beginning, as in simulators that take a whole
+/// scan at once.
 pub(super) struct MotionWithinTurnKind;
 
 struct Moving;

@@ -12,11 +12,11 @@ use crate::error::SceneError;
 use crate::facts::Facts;
 use crate::sensing::Mounted;
 
-/// A sensor's true mount differs from the vehicle file's, by which the loop goes.
+/// A sensor's true mount differs from that in the vehicle file, which the loop uses.
 ///
-/// `position_m` and `angles_deg` (roll, pitch and yaw, before those of the file) are added to all sensors named;
-/// `position_sd_m`, to 1, and `angles_sd_deg`, to 30, are the standard deviations of further errors, drawn for each axis and
-/// sensor. A head that hides the wall from others is where the file says.
+/// `position_m` and `angles_deg` (roll, pitch and yaw, before those of the file) are added for all named sensors.
+/// `position_sd_m`, to 1, and `angles_sd_deg`, to 30, are the standard deviations of further errors, drawn for each
+/// axis and sensor. A head that occludes others is at its place in the file.
 pub(super) struct MountErrorKind;
 
 #[derive(Debug, Clone, Copy)]
@@ -72,7 +72,7 @@ impl Effect for PerSensor<Parameters> {
 }
 
 impl Parameters {
-    /// The mount as it is; `drawn` has, for each axis, the error of place and angle in standard deviations.
+    /// The mount with its error. `drawn` has the error of position and angle for each axis, in standard deviations.
     fn moved(&self, mount: &Mount, drawn: [[f64; 2]; 3]) -> Mount {
         let off_m = [0, 1, 2].map(|axis: usize| {
             let [place, _] = drawn.get(axis).copied().unwrap_or_default();
@@ -95,10 +95,12 @@ mod tests {
     use super::*;
     use crate::testing::Dive;
 
-    /// In a rectangle on whose axis the head is, a beam that is turned by a roll of the mount meets the wall where an unturned
-    /// one at another angle would; one moved sideways, sideways.
+    /// Compares with a head on the axis of a rectangle.
+    ///
+    /// With a mount rolled by an angle, a beam meets the wall like an unrolled beam at another angle. With a mount
+    /// moved sideways, the beam starts sideways.
     #[test]
-    fn a_head_turned_and_moved_sees_the_walls_from_there() {
+    fn turned_and_moved_head_sees_walls_from_its_true_mount() {
         let dive = Dive::with_head();
         let keys = "[effects.mount_error]\nposition_m = [0, 0.25, 0.5]\nangles_deg = [3, 0, 0]";
         let dived = dive.dive(keys);
@@ -118,7 +120,7 @@ mod tests {
     }
 
     #[test]
-    fn draws_have_their_spread_and_are_each_sensor_s_own() {
+    fn draws_have_their_spread_and_are_independent_per_sensor() {
         let mut places = Vec::new();
         for seed in 0..200 {
             let dive = Dive { seed, seconds: 0.2, ..Dive::with_heads(&[[0.3, 0.0, 0.0], [-0.3, 0.0, 0.0]]) };
@@ -135,7 +137,7 @@ mod tests {
         assert!(pairs.abs() < 5e-4 / math::sqrt(n / 2.0), "{pairs}");
     }
 
-    /// A beam at right angles to a head's axis, turned by small angles: roll moves it within its plane, pitch and yaw out of it.
+    /// Roll moves a beam perpendicular to the head's axis within its plane; pitch and yaw move it out of the plane.
     #[test]
     fn angles_have_their_spread_about_each_axis() {
         let sd_rad = f64::to_radians(0.5);
@@ -156,9 +158,10 @@ mod tests {
         }
     }
 
-    /// On a sensor that looks to the left, its own x is the vehicle's y: a roll moves z backwards, a pitch moves x down.
+    /// On a sensor that looks to the left, the sensor's x is the vehicle's y: a roll moves z backwards, a pitch moves x
+    /// down.
     #[test]
-    fn errors_are_about_the_sensor_s_own_axes() {
+    fn angle_errors_act_about_the_axes_of_the_sensor() {
         let left = Mount {
             position: Vec3::new(0.3, 0.0, 0.0),
             rotation: Rot::from_roll_pitch_yaw(0.0, 0.0, math::TAU / 4.0),
@@ -182,7 +185,7 @@ mod tests {
     }
 
     #[test]
-    fn slices_dont_matter_and_no_error_is_refused() {
+    fn slice_length_changes_nothing_and_zero_error_is_refused() {
         Dive::with_head().assert_slices_dont_matter("[effects.mount_error]\nangles_sd_deg = 2");
         let refusal = Dive::with_head().refusal("[effects.mount_error]");
         assert!(refusal.contains("or angles_sd_deg must not be zero"), "{refusal}");

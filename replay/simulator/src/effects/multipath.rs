@@ -1,4 +1,4 @@
-//! Some echoes come by way of two walls.
+//! Some echoes arrive by way of two walls.
 
 use bevy_ecs::prelude::{Component, Query, Res};
 use headrace_config::{ConfigError, Section};
@@ -18,17 +18,21 @@ use crate::random::Stream;
 use crate::sensing::{Ray, Rays, Reach, Samples, Scenery};
 use crate::stages::Stage;
 
-/// Some echoes come by way of two walls: the first reflects the beam specularly, the second returns it directly to the
-/// sonar. The range is half of that path, (r1 + r12 + r2) / 2. It replaces the direct echo more often towards grazing
-/// incidence: the direct echo's strength goes with the cosine of incidence.
+/// Some echoes arrive by way of two walls: the first reflects the beam specularly, the second returns it to the sonar.
 ///
-/// Keys: `from_m` and `to_m` of the stretch where this is so; the share of the returns where the beam is perpendicular to the wall, `square_share` (0), and where it is along
-/// the wall, `share` (0.1), both from 0 to 1; between, it goes with 1 less the cosine of incidence. The echo stays the
-/// direct one where the path meets no second wall within reach, or the sonar doesn't see that wall.
+/// The range is half of that path, (r1 + r12 + r2) / 2. It replaces the direct echo more often towards grazing
+/// incidence, since the direct echo's strength is proportional to the cosine of incidence.
+///
+/// Keys:
+/// - `from_m` and `to_m` of the stretch in which this happens.
+/// - `square_share` (0) and `share` (0.1), the share of returns with the beam perpendicular to the wall and along it,
+///   both from 0 to 1; between, the share grows with 1 minus the cosine of incidence.
+///
+/// The echo remains the direct one if the path meets no second wall within reach, or the sonar doesn't see that wall.
 /// Source: geometry of mirrors; the law of the direct echo is Lambert's.
 pub(super) struct MultipathKind;
 
-/// Reflected rays begin this far off the wall, m.
+/// Distance off the wall at which reflected rays begin, m.
 const OFF_WALL_M: f64 = 1e-6;
 
 #[derive(Debug, Clone, Copy)]
@@ -76,7 +80,8 @@ impl Effect for PerSensor<Places<Parameters>> {
     }
 }
 
-/// The range by way of two walls of a beam that has met the first one, m; `None` if there is no such path within `far_m`.
+/// The range by way of two walls of a beam that has met the first wall, m; `None` if there is no such path within
+/// `far_m`.
 fn double_bounce_m(environment: &Environment, ray: &Ray, far_m: f64) -> Option<f64> {
     let first = ray.hit?;
     let from = first.point + first.normal.scaled(OFF_WALL_M);
@@ -124,9 +129,9 @@ mod tests {
         Ray { origin, direction, hit: environment.cast(origin, direction, 100.0) }
     }
 
-    /// Unfolded at the walls it meets, a reflected beam is straight, through mirrored rooms.
+    /// Unfolded at the walls that it meets, a reflected beam is a straight line through mirrored rooms.
     #[test]
-    fn verif_in_a_rectangle_the_way_is_that_to_an_image() {
+    fn path_in_a_rectangle_leads_to_a_mirror_image() {
         let (half_width_m, height_m, [y, z]) = (3.0, 5.0, [0.7, 2.1]);
         let room = Environment::straight(shapes::rectangle(2.0 * half_width_m, height_m).unwrap());
         for k in 0..720 {
@@ -140,7 +145,7 @@ mod tests {
                 [to_side, to_side + 2.0 * half_width_m / dy.abs(), to_flat, to_flat + height_m / dz.abs()];
             crossings.sort_by(f64::total_cmp);
             let along_m = crossings[1];
-            // The place there, folded back into the room.
+            // The point there, folded back into the room.
             let fold = |at: f64, period: f64| {
                 let at = math::wrap(at, 2.0 * period);
                 if at > period { 2.0 * period - at } else { at }
@@ -154,10 +159,10 @@ mod tests {
     }
 
     #[test]
-    fn verif_in_a_circle_the_second_way_is_a_chord_of_the_same_incidence() {
+    fn second_path_in_a_circle_is_a_chord_with_equal_incidence() {
         let (radius_m, out_m) = (4.0, 1.5);
         let pipe = Environment::straight(shapes::circle(radius_m).unwrap());
-        // The circle stands on the floor: its centre is a radius above it.
+        // The circle rests on the floor: its centre is a radius above it.
         for k in 0..720 {
             let angle_rad = (f64::from(k) + 0.37) * math::TAU / 720.0;
             let ray = cast(&pipe, [out_m, radius_m], angle_rad);
@@ -198,12 +203,12 @@ mod tests {
     }
 
     #[test]
-    fn slices_dont_matter() {
+    fn slice_length_does_not_change_results() {
         Dive::with_head().assert_slices_dont_matter("[effects.multipath]\nshare = 0.5");
     }
 
     #[test]
-    fn no_share_and_too_much_are_refused() {
+    fn missing_and_excessive_shares_are_refused() {
         let refusal = |keys: &str| Dive::with_head().refusal(&format!("[effects.multipath]\n{keys}"));
         assert!(refusal("share = 0").contains("must be above zero"));
         assert!(refusal("share = 2").contains("from 0 to 1"));

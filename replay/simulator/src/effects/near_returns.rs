@@ -1,4 +1,4 @@
-//! Returns from before the wall, in clusters.
+//! Returns from objects before the wall, in clusters.
 
 use bevy_ecs::prelude::{Component, Query, Res};
 use headrace_config::{ConfigError, Section};
@@ -16,14 +16,16 @@ use crate::random::Stream;
 use crate::sensing::{Rays, Samples, Scenery};
 use crate::stages::Stage;
 
-/// Something before the wall returns the sound: bubbles, a cloud of silt, weed. A cluster is hit by some pings one after
-/// another, whose returns lie about one range; the next cluster is elsewhere.
+/// Bubbles, clouds of silt or weed before the wall return the sound.
 ///
-/// Keys: `from_m` and `to_m` of the stretch where this is so; the `share` of pings, from 0 (excluded) to 0.95, and the mean
-/// length of their runs, `mean_run` pings, as of missing_returns; the ranges between which a cluster lies, evenly drawn,
-/// `near_m` (0.6) and `far_m` (3), from 0 to 200 m; the standard deviation of the returns about it, `spread_m` (0.1). A return
-/// beyond the wall isn't heard.
-/// Source: field.md, "murk": 5 % near returns. Runs: see missing_returns.
+/// Consecutive pings hit the same cluster and return about the same range; the next cluster is elsewhere. Keys:
+/// - `from_m` and `to_m` of the stretch in which this happens.
+/// - the `share` of pings, from 0 (excluded) to 0.95, and the mean length of their runs, `mean_run` pings, as in
+///   missing_returns.
+/// - `near_m` (0.6) and `far_m` (3), the ranges between which a cluster lies, drawn evenly, from 0 to 200 m.
+/// - `spread_m` (0.1), the standard deviation of the returns about the cluster's range.
+///
+/// A return beyond the wall isn't heard. Source: field.md, "murk": 5 % near returns. Runs: see missing_returns.
 pub(super) struct NearReturnsKind;
 
 #[derive(Debug, Clone, Copy)]
@@ -40,10 +42,10 @@ struct NearReturns {
     cluster: Cluster,
 }
 
-/// The cluster being passed.
+/// The current cluster.
 #[derive(Debug, Clone, Copy, Default)]
 struct Cluster {
-    /// Whether the last ping met one; `None` before the first.
+    /// Whether the last ping hit one; `None` before the first.
     met: Option<bool>,
     range_m: f64,
 }
@@ -85,7 +87,7 @@ impl Effect for PerSensor<Places<Parameters>> {
 }
 
 impl Parameters {
-    /// The range of the cluster that a step's ping meets, m. Call for each step, in order.
+    /// The range of the cluster that a step's ping hits, m. Call once per step, in order.
     fn met_m(&self, cluster: &mut Cluster, stream: Stream, step: u64) -> Option<f64> {
         let [chance, place] = stream.at(step).uniform();
         let meets = self.runs.next(cluster.met, chance);
@@ -125,7 +127,7 @@ mod tests {
 
     use crate::testing::Dive;
 
-    /// Walls are 2.5 m off at the nearest.
+    /// Soundings with near returns. The nearest walls are 2.5 m away.
     fn near(keys: &str) -> Vec<Option<f64>> {
         let dive = Dive { seconds: 2000.0, ..Dive::with_head() };
         let (base, with) = (dive.dive(""), dive.dive(&format!("[effects.near_returns]\n{keys}")));
@@ -133,9 +135,9 @@ mod tests {
         pairs.map(|(was, is)| is.filter(|_| was != is)).collect()
     }
 
-    /// Runs, within them one range with its spread, from one to the next another.
+    /// Pings of a run share one range, with its spread; the next run has another range.
     #[test]
-    fn clusters_have_their_share_their_runs_and_their_spread() {
+    fn clusters_have_their_share_runs_and_spread() {
         let (share, mean) = (0.1, 6.0);
         let near = near("share = 0.1\nmean_run = 6\nnear_m = 0.8\nfar_m = 2\nspread_m = 0.05");
         let runs: Vec<Vec<f64>> = near
@@ -151,7 +153,8 @@ mod tests {
         let variance = share * (1.0 - share) / whole * (1.0 + correlation) / (1.0 - correlation);
         assert!((pings / whole - share).abs() < 5.0 * math::sqrt(variance), "{}", pings / whole);
 
-        // Within a run the returns' variance is that of the spread; that of runs' means is that of even places, and a little.
+        // Within a run the variance is that of the spread. That of runs' means is that of even places, and a little
+        // more.
         let long: Vec<&Vec<f64>> = runs.iter().filter(|run| run.len() > 1).collect();
         let (mut within, mut freedom, mut means) = (0.0, 0.0, Vec::new());
         for run in &long {
@@ -168,16 +171,16 @@ mod tests {
         assert!((spread / 0.12 - 1.0).abs() < 5.0 * math::sqrt(0.8 / n) + 0.02, "{spread}");
     }
 
-    /// The wall is 3 m off, and of clusters from 2 to 4 m half are before it; where the wall is out of reach, all are heard.
+    /// The wall is 3 m away, so half of the clusters from 2 to 4 m are before it. With no wall in reach, all are heard.
     #[test]
-    fn beyond_the_wall_there_is_none_and_silence_is_filled() {
+    fn clusters_beyond_the_wall_are_silent_and_pings_without_wall_get_returns() {
         let dive = Dive { seconds: 400.0, ..Dive::with_sounder() };
         let keys = "[effects.near_returns]\nshare = 0.4\nnear_m = 2\nfar_m = 4\nspread_m = 0\n";
         let (base, with) = (dive.dive("").ranges_m(0), dive.dive(keys).ranges_m(0));
         let wall_m = base[0].unwrap();
         assert!(with.iter().all(|range_m| range_m.unwrap() <= wall_m));
         let nearer = with.iter().filter(|range_m| range_m.unwrap() < wall_m).count();
-        // Single pings: 1 / (1 - share) to a run, whose pings go together.
+        // Single pings have 1 / (1 - share) pings per run, which share their fate.
         let share = 0.4 * (wall_m - 2.0) / 2.0;
         let sd = math::sqrt(share * (1.0 - share) / base.len() as f64 * 2.0 / (1.0 - 0.4));
         assert!((nearer as f64 / base.len() as f64 - share).abs() < 5.0 * sd, "{nearer} of {}", base.len());
@@ -186,9 +189,9 @@ mod tests {
         assert_eq!(heard, 0, "what is lost in the sonar is lost wherever it came from");
     }
 
-    /// Two stretches with a gap between them, in each of which nearly every ping meets a cluster: that of the first stays there.
+    /// Two stretches with a gap. Nearly every ping hits a cluster, and the first stretch's cluster must end with it.
     #[test]
-    fn a_cluster_doesn_t_go_on_behind_its_stretch() {
+    fn cluster_ends_with_its_stretch() {
         let dive = Dive { seconds: 60.0, ..Dive::with_head() };
         let table = |from_m: f64, near_m: f64| {
             format!(
@@ -216,7 +219,7 @@ mod tests {
     }
 
     #[test]
-    fn slices_dont_matter_and_nonsense_is_refused() {
+    fn slice_length_changes_nothing_and_invalid_keys_are_refused() {
         Dive::with_head().assert_slices_dont_matter("[effects.near_returns]\nshare = 0.3\nmean_run = 9");
         let refusal = |keys: &str| Dive::with_head().refusal(&format!("[effects.near_returns]\n{keys}"));
         assert!(refusal("").contains("share: must be above zero"));

@@ -15,15 +15,19 @@ use crate::facts::Facts;
 use crate::sensing::{Echosounder, Mounted, Samples};
 use crate::stages::Stage;
 
-/// Parts of the vehicle occlude beams: the other heads' bodies, the hull's boxes and the tether return an echo in place of
-/// the wall behind them. Nearer than the sonar's least range there is no return.
+/// Parts of the vehicle occlude beams: other heads' bodies, the hull's boxes and the tether return an echo instead of
+/// the wall.
 ///
-/// Keys: whether `heads` (true), `hull` (true) and `tether` (false) occlude; of the tether, a straight piece:
-/// `tether_from_m`, its start in the body's frame (needed); `tether_towards`, its direction ([-1, 0, 0]: aft);
-/// `tether_length_m`, from 0.1 to 500 (20); `tether_radius_m`, from 0.001 to 0.1 (0.006).
+/// Below the sonar's least range there is no return. Keys:
+/// - whether `heads` (true), `hull` (true) and `tether` (false) occlude.
+/// - for the tether, a straight piece: `tether_from_m`, its start in the body's frame (needed); `tether_towards`, its
+///   direction ([-1, 0, 0]: aft); `tether_length_m`, from 0.1 to 500 (20); `tether_radius_m`, from 0.001 to 0.1
+///   (0.006).
 ///
-/// Only the beam's axis is tested: a wide beam is hidden for as long, not longer and more weakly. A head isn't hidden by a
-/// body that it is inside, so that idealised heads in one place don't hide anything from each other.
+/// Only the beam's axis is tested. A wide beam is therefore hidden for the same angle as a narrow one, and not
+/// gradually. A head isn't hidden by a body that contains it, so idealised heads in one place don't hide anything from
+/// each other.
+///
 /// Source: core/sampling/src/occlusion.rs, which plans with the same bodies.
 pub(super) struct OcclusionKind;
 
@@ -39,7 +43,7 @@ struct Occlusion {
     obstacles: Vec<Obstacle>,
 }
 
-/// For each of the slice's beams, whether it is stopped before the wall; for later effects.
+/// For each of the slice's beams, whether the vehicle stops it before the wall; used by later effects.
 #[derive(Debug, Clone, Default, Component)]
 pub(super) struct Stopped(Vec<bool>);
 
@@ -66,7 +70,7 @@ impl EffectKind for OcclusionKind {
             let parameters =
                 Parameters { heads: flag("heads", true)?, hull: flag("hull", true)?, tether: tether(table)? };
             if !parameters.heads && !parameters.hull && parameters.tether.is_none() {
-                return Err(table.invalid_itself("has neither heads, hull nor tether to stand in the way"));
+                return Err(table.invalid_itself("has neither heads, hull nor tether that occlude beams"));
             }
             Ok(parameters)
         })?))
@@ -84,7 +88,7 @@ fn tether(table: &Section<'_>) -> Result<Option<Obstacle>, ConfigError> {
         let given = [from.is_some(), towards.is_some(), length.is_some(), radius.is_some()];
         let idle = keys.iter().zip(given).find(|(_, given)| *given);
         return idle
-            .map_or(Ok(None), |(key, _)| Err(table.invalid(key, "is of use only with tether = true")));
+            .map_or(Ok(None), |(key, _)| Err(table.invalid(key, "has an effect only with tether = true")));
     }
     let vector = |[x, y, z]: [f64; 3]| Vec3::<Body>::new(x, y, z);
     let from = vector(table.required("tether_from_m", from)?);
@@ -157,7 +161,7 @@ mod tests {
     }
 
     #[test]
-    fn a_neighbour_hides_twice_the_arc_sine_of_its_radius_by_its_distance() {
+    fn neighbour_hides_twice_the_arcsine_of_radius_over_distance() {
         let dive = side_by_side();
         let scene = dive.scene("").unwrap();
         let radius_m = scene.facts.sensors[1].head.unwrap().body.radius_m;
@@ -189,7 +193,7 @@ mod tests {
     }
 
     #[test]
-    fn the_hull_and_the_tether_hide_when_they_are_said_to_be_there() {
+    fn hull_and_tether_hide_only_if_enabled() {
         let below = Dive {
             vehicle: "[[hull]]\nleast_m = [-1, -0.3, -1]\nmost_m = [1, 0.3, -0.5]",
             ..Dive::with_head()
@@ -217,12 +221,12 @@ mod tests {
     }
 
     #[test]
-    fn slices_dont_matter() {
+    fn slice_length_does_not_change_results() {
         side_by_side().assert_slices_dont_matter("[effects.occlusion]");
     }
 
     #[test]
-    fn what_hides_nothing_is_refused() {
+    fn occlusion_without_obstacles_is_refused() {
         let refusal = |keys: &str| Dive::with_head().refusal(&format!("[effects.occlusion]\n{keys}"));
         assert!(refusal("heads = false\nhull = false").contains("has neither"));
         assert!(refusal("tether = true").contains("tether_from_m"));

@@ -15,12 +15,16 @@ use crate::random::Stream;
 use crate::sensing::{Rays, Samples, Scenery};
 use crate::stages::Stage;
 
-/// Some returns are unrelated to the wall: their range is uniformly distributed. Echosounders in a tunnel give such
-/// outliers between echoes of all kinds.
+/// Some returns are unrelated to the wall: their range is uniformly distributed.
 ///
-/// Keys: `from_m` and `to_m` of the stretch in which they fall; their `share` of the returns, from 0 (excluded) to 1 (0.08); the nearest range `near_m` (0.3) and the farthest
-/// `far_m` (a head's range setting in this water; 30 for an echosounder), from 0 to 200 m.
-/// Source: the share is that of the logs of VITA 1, as in the project's scene vita1-field; 30 m is a Ping1D's usual scan.
+/// Echosounders in a tunnel give such outliers between echoes of all kinds. Keys:
+/// - `from_m` and `to_m` of the stretch in which they occur.
+/// - their `share` of the returns, from 0 (excluded) to 1 (0.08).
+/// - the nearest range `near_m` (0.3) and the farthest `far_m` (a head's range setting in this water; 30 for an
+///   echosounder), from 0 to 200 m.
+///
+/// Source: the share is that of the logs of VITA 1, as in the project's scene vita1-field; 30 m is a Ping1D's usual
+/// scan.
 pub(super) struct OutliersKind;
 
 /// The farthest range of an echosounder, m.
@@ -39,7 +43,7 @@ struct Outliers {
     stream: Stream,
 }
 
-/// Strays of a stretch: their share, and the ranges between which they fall, m.
+/// Outliers in a stretch: their share, and the ranges between which they lie, m.
 #[derive(Debug, Clone, Copy)]
 struct Strays {
     share: f64,
@@ -114,7 +118,7 @@ mod tests {
     use crate::testing::{Dive, assert_share};
 
     #[test]
-    fn their_share_and_their_spread_are_as_said() {
+    fn outliers_have_their_share_and_spread() {
         let dive = Dive { seconds: 1000.0, ..Dive::with_sounder() };
         let (base, dived) = (dive.dive(""), dive.dive("[effects.outliers]\nshare = 0.2\nfar_m = 20.3"));
         let pairs = || base.ranges_m(0).into_iter().zip(dived.ranges_m(0));
@@ -135,7 +139,7 @@ mod tests {
     }
 
     #[test]
-    fn without_keys_a_head_strays_within_its_range_setting_and_silence_stays() {
+    fn default_outliers_stay_within_the_range_setting_and_missing_returns_stay_missing() {
         let mut dive = Dive::with_head();
         dive.tunnel = "profile = \"rectangle\"\nwidth_m = 40\nheight_m = 5";
         let (base, dived) = (dive.dive(""), dive.dive("[effects.outliers]"));
@@ -147,12 +151,12 @@ mod tests {
     }
 
     #[test]
-    fn slices_dont_matter() {
+    fn slice_length_does_not_change_results() {
         Dive::with_sounder().assert_slices_dont_matter("[effects.outliers]");
     }
 
     #[test]
-    fn shares_and_ranges_that_make_no_sense_are_refused() {
+    fn invalid_shares_and_ranges_are_refused() {
         let refusal = |keys: &str| Dive::with_sounder().refusal(&format!("[effects.outliers]\n{keys}"));
         assert!(refusal("share = 1.5").contains("from 0 to 1"));
         assert!(refusal("share = 0").contains("above zero"));

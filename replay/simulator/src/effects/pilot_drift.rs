@@ -9,12 +9,12 @@ use crate::error::SceneError;
 use crate::facts::Facts;
 use crate::trajectory::{Offsets, wandering};
 
-/// The vehicle drifts left and right, up and down, and turns, as under a pilot: within the reaches given, smoothly, each
-/// independently.
+/// The vehicle drifts left and right, up and down, and turns, as under a pilot.
 ///
-/// Reaches: `across_m`, `up_m`, `roll_deg`, `pitch_deg`, `yaw_deg`; standard deviations are 0.4 of them. `period_s` (30
-/// by default) is the period of the drift: control points of a cubic B-spline are half of it apart.
-/// Source: Jorge et al. 2021, §8.1 (the pilot can drift 1.5 m vertically and horizontally, the heading 15 degrees).
+/// Each component varies smoothly and independently within its reach: `across_m`, `up_m`, `roll_deg`, `pitch_deg`,
+/// `yaw_deg`. Standard deviations are 0.4 of the reaches. `period_s` (30 by default) is the period of the drift:
+/// control points of a cubic B-spline are half of it apart. Source: Jorge et al. 2021, §8.1 (the pilot can drift 1.5 m
+/// vertically and horizontally, the heading 15 degrees).
 pub(super) struct PilotDriftKind;
 
 #[derive(Debug, Clone, Copy)]
@@ -72,7 +72,7 @@ mod tests {
     use crate::testing_motion::{Bench, LONG};
 
     #[test]
-    fn it_wanders_as_far_as_wanted_and_no_farther() {
+    fn drift_reaches_its_limits_without_exceeding_them() {
         let keys = "[effects.pilot_drift]\nacross_m = 1.5\nup_m = 0.5\nyaw_deg = 15\nperiod_s = 2\n";
         let (plain, sim) = (Bench::on(LONG, "").simulation(), Bench::on(LONG, keys).simulation());
         let reach = [0.0, 1.5, 0.5, 0.0, 0.0, f64::to_radians(15.0)];
@@ -92,13 +92,13 @@ mod tests {
         }
         for (axis, sum) in squares.into_iter().enumerate() {
             let sd = math::sqrt(sum / count);
-            // Of some 320 independent stretches.
+            // Based on about 320 independent stretches.
             assert!((sd - 0.4 * reach[axis]).abs() <= 0.1 * reach[axis], "{axis}: {sd}");
         }
     }
 
     #[test]
-    fn a_wall_in_its_way_and_no_reach_are_refused() {
+    fn drift_into_a_wall_and_zero_reach_are_refused() {
         let why = |keys: &str| Bench::on(LONG, &format!("[effects.pilot_drift]\n{keys}")).refusal();
         assert!(why("across_m = 20").contains("leads through the wall"));
         assert!(why("period_s = 5").contains("must not be zero"));

@@ -1,4 +1,4 @@
-//! Where along the tunnel an effect acts.
+//! The stretches of tunnel in which an effect acts.
 
 use headrace_config::{ConfigError, Section};
 use headrace_sensor::device::Sense;
@@ -8,15 +8,16 @@ use crate::facts::Facts;
 use crate::sensing::{Ray, Scenery};
 use crate::stretch::Stretch;
 
-/// The parameters of an effect on one sensor, by the stretches in which they hold.
+/// The parameters of an effect on one sensor, by the stretches in which they apply.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Places<P>(Vec<(Stretch, P)>);
 
 impl<P: Clone> PerSensor<Places<P>> {
-    /// Reads tables as [`PerSensor::read`] does, each with the stretch, `from_m` to `to_m`, to which it is limited. A sensor
-    /// may have several, one behind the other.
+    /// Reads tables like [`PerSensor::read`], each limited to the stretch from `from_m` to `to_m`.
     ///
-    /// Errors: those of [`PerSensor::read`]; stretches of one sensor that overlap.
+    /// A sensor may have several stretches that don't overlap.
+    ///
+    /// Errors: those of [`PerSensor::read`]; overlapping stretches of one sensor.
     pub(super) fn read_by_place(
         tables: Vec<Section<'_>>,
         facts: &Facts,
@@ -42,7 +43,7 @@ impl<P: Clone> PerSensor<Places<P>> {
                 if places.0.iter().any(|(other, _)| other.meets(&stretch)) {
                     let id = facts.sensors.get(source).map_or("", |sensor| sensor.id.as_str());
                     let problem = format!(
-                        "names {id:?}, which an earlier table of this effect is for, too, in this place"
+                        "names {id:?}, which an earlier table of this effect names for this place already"
                     );
                     return Err(table.invalid("sensors", &problem));
                 }
@@ -55,8 +56,9 @@ impl<P: Clone> PerSensor<Places<P>> {
 }
 
 impl<P> Places<P> {
-    /// The parameters where a sonar is whose beam is `ray`, if the effect acts there. An effect in all of the tunnel doesn't
-    /// ask where that is.
+    /// The parameters at the position of a sonar with beam `ray`, if the effect acts there.
+    ///
+    /// An effect in the whole tunnel doesn't need the position.
     pub(super) fn here(&self, scenery: &Scenery, ray: &Ray) -> Option<&P> {
         self.at(|| {
             let [chainage_m, ..] = scenery.environment.axis().chart(ray.origin);
@@ -89,7 +91,8 @@ mod tests {
     use crate::TruthRow;
     use crate::testing::{Dive, assert_share};
 
-    /// The sonar is at the vehicle's middle, so that its chainage is the truth's.
+    /// Chainages of soundings, and whether the effects changed them. The sonar is at the vehicle's middle, so its
+    /// chainage is the truth's.
     fn touched(effects: &str) -> Vec<(f64, bool)> {
         let dive = Dive { seconds: 100.0, ..Dive::with_head() };
         let range_m = |row: &TruthRow| row.sounding.and_then(|sounding| sounding.measured.range_m);
@@ -99,7 +102,7 @@ mod tests {
     }
 
     #[test]
-    fn an_effect_acts_in_its_stretches_and_nowhere_else() {
+    fn effects_act_only_in_their_stretches() {
         for effect in [
             "missing_returns]]\nshare = 0.4\n",
             "outliers]]\nshare = 0.4\n",
@@ -130,9 +133,9 @@ mod tests {
         }
     }
 
-    /// What a stretch draws is what the same steps draw in the whole tunnel.
+    /// A step draws the same numbers in a stretch as in the whole tunnel.
     #[test]
-    fn the_whole_tunnel_named_in_parts_is_the_whole_tunnel() {
+    fn stretches_that_cover_the_tunnel_equal_the_whole_tunnel() {
         let dive = Dive { seconds: 40.0, ..Dive::with_head() };
         for effect in
             ["outliers]]\nshare = 0.4\n", "range_noise]]\nsd_m = 0.1\n", "missing_returns]]\nshare = 0.2\n"]
@@ -145,7 +148,7 @@ mod tests {
     }
 
     #[test]
-    fn stretches_that_overlap_or_have_no_length_are_refused() {
+    fn overlapping_and_empty_stretches_are_refused() {
         let refusal = |keys: &str| Dive::with_head().refusal(keys);
         let two = "[[effects.outliers]]\nfrom_m = 5\nto_m = 9\n[[effects.outliers]]\nfrom_m = 8\nto_m = 12";
         assert!(refusal(two).contains("an earlier table of this effect is for, too, in this place"));

@@ -15,8 +15,9 @@ use crate::random::Stream;
 use crate::sensing::{Rays, Samples, Scenery};
 use crate::stages::Stage;
 
-/// Ranges have normally distributed noise with a constant part and a part proportional to the range, in all of the tunnel or
-/// from `from_m` to `to_m`.
+/// Ranges have normally distributed noise, with a constant part and a part proportional to the range.
+///
+/// It acts in the whole tunnel, or from `from_m` to `to_m`.
 pub(super) struct RangeNoiseKind;
 
 #[derive(Debug, Clone, Copy)]

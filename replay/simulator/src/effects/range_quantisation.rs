@@ -15,12 +15,15 @@ use crate::facts::Facts;
 use crate::sensing::{Head, Samples, Scenery};
 use crate::stages::Stage;
 
-/// Ranges are rounded to steps, as read off an echo of a limited number of points.
+/// Ranges are rounded to steps, as if read off an echo with a limited number of points.
 ///
-/// Keys, at most one of them: `quantum_m`, the step in metres as the device computes them (a head at 1500 m/s; an
-/// echosounder in metres of water), from 0.0005 to 1; `points` over a head's range setting, from 50 to 10,000 (500).
-/// Steps are of the device's own metres because it measures time; its wire format adds a step of its own.
-/// Source: Jorge et al. 2021, §6 (eta) and §9.2 (500 points over 10 m: 0.02 m).
+/// Keys, at most one of them:
+/// - `quantum_m`, the step in metres as the device computes them (a head at 1500 m/s; an echosounder in metres of
+///   water), from 0.0005 to 1.
+/// - `points` over a head's range setting, from 50 to 10,000 (500).
+///
+/// Steps are in the device's own metres because the device measures time. Its wire format adds its own step. Source:
+/// Jorge et al. 2021, §6 (eta) and §9.2 (500 points over 10 m: 0.02 m).
 pub(super) struct RangeQuantisationKind;
 
 #[derive(Debug, Clone, Copy)]
@@ -48,7 +51,9 @@ impl EffectKind for RangeQuantisationKind {
             let points = table.number("points", 50.0..=10_000.0)?;
             match (quantum_m, points) {
                 (Some(quantum_m), None) => return Ok(Step::QuantumM(quantum_m)),
-                (Some(_), Some(_)) => return Err(table.invalid("points", "and quantum_m both say the step")),
+                (Some(_), Some(_)) => {
+                    return Err(table.invalid("points", "and quantum_m both set the step; give one of them"));
+                }
                 _ => {}
             }
             let heads = targets(table, facts, &senses)?;
@@ -114,7 +119,7 @@ mod tests {
     }
 
     #[test]
-    fn ranges_are_on_the_nearest_step_of_the_head_s_own_metres() {
+    fn head_ranges_are_rounded_in_metres_of_the_device() {
         let mut dive = Dive::with_head();
         dive.vehicle = "[water]\nsound_speed_mps = 1447";
         let water = 1447.0 / 1500.0;
@@ -124,24 +129,24 @@ mod tests {
     }
 
     #[test]
-    fn an_echosounder_s_steps_are_metres_of_water() {
+    fn echosounder_steps_are_metres_of_water() {
         let mut dive = Dive::with_sounder();
         dive.trajectory = "place_m = [0.123, 2]";
         assert_lattice(&dive, "[effects.range_quantisation]\nquantum_m = 0.15", 0.15);
     }
 
     #[test]
-    fn slices_dont_matter() {
+    fn slice_length_does_not_change_results() {
         Dive::with_head().assert_slices_dont_matter("[effects.range_quantisation]");
     }
 
     #[test]
-    fn steps_that_say_nothing_or_too_much_are_refused() {
+    fn missing_and_conflicting_steps_are_refused() {
         let refusal =
             |dive: &Dive, keys: &str| dive.refusal(&format!("[effects.range_quantisation]\n{keys}"));
         assert!(refusal(&Dive::with_sounder(), "").contains("no range setting"));
         assert!(refusal(&Dive::with_sounder(), "points = 200").contains("no range setting"));
-        assert!(refusal(&Dive::with_head(), "points = 200\nquantum_m = 0.1").contains("both say the step"));
+        assert!(refusal(&Dive::with_head(), "points = 200\nquantum_m = 0.1").contains("both set the step"));
         assert!(refusal(&Dive::with_head(), "quantum_m = 0").contains("from 0.0005 to 1"));
     }
 }

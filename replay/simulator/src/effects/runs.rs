@@ -1,4 +1,4 @@
-//! Pings that something happens to, singly or in runs.
+//! Selects pings singly or in runs.
 
 use headrace_config::{ConfigError, Section};
 
@@ -11,27 +11,27 @@ const LONGEST_RUN: f64 = 10_000.0;
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Runs {
     share: f64,
-    /// Probability that it happens to a ping after one that it doesn't happen to.
+    /// Probability that a run begins with a ping.
     begin: f64,
-    /// Probability that it happens to a ping after one that it happens to.
+    /// Probability that a run continues with the next ping.
     go_on: f64,
 }
 
 impl Runs {
-    /// The chain in whose runs, of `mean` pings, this share of the pings is.
+    /// The chain whose runs, of mean length `mean`, contain this share of the pings.
     pub(super) fn new(share: f64, mean: f64) -> Self {
         Self { share, begin: share / (mean * (1.0 - share)), go_on: 1.0 - 1.0 / mean }
     }
 
     /// Reads `share` and `mean_run`; `None` for a share of zero, which is the default.
     ///
-    /// Errors: one out of range; a mean that can't make up the share.
+    /// Errors: one is out of range; the mean is too small for the share.
     pub(super) fn read(table: &Section<'_>) -> Result<Option<Self>, ConfigError> {
         let share = table.number("share", 0.0..=0.95)?.unwrap_or(0.0);
         let mean = table.number("mean_run", 1.0..=LONGEST_RUN)?;
         if share == 0.0 {
             return match mean {
-                Some(_) => Err(table.invalid("mean_run", "is of use only with a share above zero")),
+                Some(_) => Err(table.invalid("mean_run", "has an effect only with a share above zero")),
                 None => Ok(None),
             };
         }
@@ -44,8 +44,9 @@ impl Runs {
         Ok(Some(Self::new(share, mean.unwrap_or(1.0 / (1.0 - share)))))
     }
 
-    /// State of the next ping, given the last one's, by a number drawn between 0 and 1; the first is in a run with the
-    /// probability of the share.
+    /// State of the next ping from that of the last one and a number between 0 and 1.
+    ///
+    /// The first ping is in a run with the probability of the share.
     pub(super) fn next(&self, before: Option<bool>, chance: f64) -> bool {
         let in_run = match before {
             None => self.share,
@@ -55,7 +56,7 @@ impl Runs {
         chance < in_run
     }
 
-    /// Correlation of a ping's state with the next one's.
+    /// Correlation between the states of consecutive pings.
     #[cfg(test)]
     pub(super) fn correlation(&self) -> f64 {
         self.go_on - self.begin

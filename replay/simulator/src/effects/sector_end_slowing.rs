@@ -16,12 +16,12 @@ use crate::facts::Facts;
 use crate::sensing::Samples;
 use crate::stages::Stage;
 
-/// A head in a sector follows its commands with a first-order lag, so that it slows down at the ends and steps are short
-/// there: the paper's false minima. It reports its true angle. Heads that turn continuously are unchanged.
+/// A head in a sector follows its commands with a first-order lag and reports its true angle.
 ///
-/// `lag_ms` is the time constant, 100 by default. Between two pings the command is taken to change linearly, for which the
-/// lag is exact. It begins at rest.
-/// Source: Jorge et al. 2021, §8.1 (sensors "decreasing speed due to the control system of the head").
+/// It slows down at the ends, where steps are short: the paper's false minima. Heads that turn continuously are
+/// unchanged. `lag_ms` is the time constant, 100 by default. The command is taken to change linearly between two pings,
+/// for which the lag is exact. The head begins at rest. Source: Jorge et al. 2021, §8.1 (sensors "decreasing speed due
+/// to the control system of the head").
 pub(super) struct SectorEndSlowingKind;
 
 #[derive(Debug, Clone, Copy)]
@@ -127,9 +127,10 @@ mod tests {
         }
     }
 
-    /// Long after the previous reversal, the head moves by w (2 exp(-t / T) - 1) after one: it turns round T ln 2 later.
+    /// Long after the previous reversal, the head moves at w (2 exp(-t / T) - 1) after a reversal, so it turns round T
+    /// ln 2 later.
     #[test]
-    fn steps_are_short_where_the_head_turns_round_and_whole_between() {
+    fn steps_are_short_at_reversals_and_whole_between() {
         let (plain, slowed) = (pings(""), pings(KEYS));
         let step_rad = turned(&plain[0], &plain[1]).abs();
         let period_s = between_s(&plain[0], &plain[1]);
@@ -150,7 +151,7 @@ mod tests {
     }
 
     #[test]
-    fn slices_make_no_difference_and_heads_without_a_sector_are_refused() {
+    fn slice_length_changes_nothing_and_heads_without_a_sector_are_refused() {
         same_in_any_slices(&Bench::sectors(KEYS));
         let why = refusal("[effects.sector_end_slowing]\n");
         assert!(why.contains("none of its heads turns in a sector"), "{why}");

@@ -20,13 +20,17 @@ use crate::random::Stream;
 use crate::sensing::{Ray, Rays, Reach, Samples, Scenery};
 use crate::stages::Stage;
 
-/// Echoes through side lobes: where one of four side lobes, two in the plane of turning and two across it, meets the wall
-/// nearer and more perpendicularly than the beam, the nearest such lobe's range is reported with some probability.
+/// Some ranges are those of side lobes that meet the wall nearer and more perpendicularly than the beam.
 ///
-/// Keys: `from_m` and `to_m` of the stretch where this is so; their `angle_deg` from the beam's axis, from 0.1 to 80 (1.59 times the beam's width); the probability `share`,
-/// from 0 (excluded) to 1 (0.05).
-/// Source: the first side lobe of a circular piston, ka sin x = 5.136 against 1.616 at half power (Urick, "Principles of
-/// underwater sound", ch. 3); it is 17.6 dB below the beam, so it matters where the wall reflects the beam itself away.
+/// There are four side lobes, two in the plane of turning and two across it. The nearest such lobe's range is reported
+/// with some probability. Keys:
+/// - `from_m` and `to_m` of the stretch in which this happens.
+/// - their `angle_deg` from the beam's axis, from 0.1 to 80 (1.59 times the beam's width).
+/// - the probability `share`, from 0 (excluded) to 1 (0.05).
+///
+/// Source: the first side lobe of a circular piston, ka sin x = 5.136 against 1.616 at half power (Urick, "Principles
+/// of underwater sound", ch. 3). It is 17.6 dB below the beam, so it matters where the wall reflects the beam itself
+/// away.
 pub(super) struct SideLobesKind;
 
 /// Angle from the beam's axis to the first side lobe, in full widths of the beam.
@@ -128,7 +132,7 @@ mod tests {
     use crate::testing::{Dive, assert_share};
 
     #[test]
-    fn verif_the_inner_lobe_of_an_oblique_beam_is_heard() {
+    fn inner_lobe_of_oblique_beam_is_heard() {
         let dive = Dive::with_head();
         let effects = "[effects.side_lobes]\nangle_deg = 8\nshare = 1";
         let lobe_rad = f64::to_radians(8.0);
@@ -137,10 +141,10 @@ mod tests {
             dive.dive(effects).soundings(0).into_iter().zip(dive.dive("").ranges_m(0))
         {
             let (range_m, was_m) = (range_m.unwrap(), was.unwrap());
-            // On the floor, which is met within 50 degrees of the perpendicular; lobes, then, within 42.
+            // Beams that meet the floor within 50 degrees of the perpendicular; their lobes, within 42.
             let off_rad = math::wrap_signed(angle_rad, math::TAU).abs();
             if off_rad.to_degrees() < 42.0 {
-                // A lobe nearer the perpendicular than the beam has the shorter range and the smaller incidence.
+                // A lobe nearer to the perpendicular than the beam has the shorter range and the smaller incidence.
                 let inner_rad = (off_rad - lobe_rad).abs();
                 let expected_m = if inner_rad < off_rad { 2.5 / math::cos(inner_rad) } else { was_m };
                 assert!((range_m - expected_m).abs() < 1e-9, "{}", off_rad.to_degrees());
@@ -152,7 +156,7 @@ mod tests {
     }
 
     #[test]
-    fn the_share_is_as_said_and_square_beams_have_none() {
+    fn share_is_as_given_and_perpendicular_beams_have_no_lobe_echo() {
         let dive = Dive { seconds: 500.0, ..Dive::with_head() };
         let (mut oblique, mut taken) = (0, 0);
         for row in &dive.dive("[effects.side_lobes]\nshare = 0.2").rows {
@@ -167,12 +171,12 @@ mod tests {
     }
 
     #[test]
-    fn slices_dont_matter() {
+    fn slice_length_does_not_change_results() {
         Dive::with_head().assert_slices_dont_matter("[effects.side_lobes]\nshare = 0.5");
     }
 
     #[test]
-    fn no_share_and_wild_angles_are_refused() {
+    fn missing_share_and_extreme_angles_are_refused() {
         let refusal = |keys: &str| Dive::with_head().refusal(&format!("[effects.side_lobes]\n{keys}"));
         assert!(refusal("share = 0").contains("must be above zero"));
         assert!(refusal("angle_deg = 90").contains("from 0.1 to 80"));

@@ -1,4 +1,4 @@
-//! Heads miss some of the steps commanded.
+//! Heads miss some of the commanded steps.
 
 use bevy_ecs::prelude::{Component, Query};
 use headrace_config::{ConfigError, Section};
@@ -16,7 +16,8 @@ use crate::random::Stream;
 use crate::sensing::Samples;
 use crate::stages::Stage;
 
-/// Now and then a head misses a commanded step, and is behind by it from then on: hosts command steps, not angles.
+/// From time to time a head misses a commanded step and lags by that step from then on, since hosts command steps, not
+/// angles.
 ///
 /// `per_thousand` steps are missed, each independently. With `told` the head reports its true angle; without, as is the
 /// default, the commanded one.
@@ -83,7 +84,7 @@ mod tests {
     use crate::testing_motion::{Bench, refusal, same_in_any_slices};
 
     #[test]
-    fn as_many_steps_as_wanted_are_skipped_and_never_made_up() {
+    fn skipped_steps_have_their_rate_and_are_never_made_up() {
         let plain: Vec<Sounding> = Bench::long("").run("head_a");
         let step_rad = plain[1].angle_rad - plain[0].angle_rad;
         for told in [false, true] {
@@ -105,7 +106,7 @@ mod tests {
     }
 
     #[test]
-    fn slices_make_no_difference_and_nothing_to_skip_is_refused() {
+    fn slice_length_changes_nothing_and_zero_skips_are_refused() {
         same_in_any_slices(&Bench::sectors("[effects.skipped_steps]\nper_thousand = 50\n"));
         assert!(refusal("[effects.skipped_steps]\n").contains("must not be zero"));
     }

@@ -13,16 +13,16 @@ use crate::facts::Facts;
 use crate::sensing::Samples;
 use crate::stages::Stage;
 
-/// The true speed of sound differs from the vehicle file's: echoes come earlier or later, and reported ranges, which are
-/// computed with the file's speed, are scaled by file / true.
+/// The true speed of sound differs from the vehicle file's.
 ///
+/// Echoes come earlier or later. Reported ranges, which are computed with the file's speed, are scaled by file / true.
 /// Keys, one of them: `true_mps`, the true speed, from 1300 to 1700 m/s; `share`, its relative excess over the file's,
 /// from -0.1 to 0.1.
 pub(super) struct SoundSpeedErrorKind;
 
 #[derive(Debug, Clone, Copy)]
 struct Parameters {
-    /// Reported range over true range.
+    /// Ratio of reported range to true range.
     scale: f64,
 }
 
@@ -84,19 +84,19 @@ mod tests {
     }
 
     #[test]
-    fn ranges_are_off_by_the_speeds_share() {
+    fn ranges_are_scaled_by_the_ratio_of_speeds() {
         assert_scaled("[effects.sound_speed_error]\ntrue_mps = 1482", 1447.0 / 1482.0);
         assert_scaled("[effects.sound_speed_error]\nshare = -0.02", 1.0 / 0.98);
         assert_scaled("[[effects.sound_speed_error]]\nsensors = [\"sonar_0\"]\ntrue_mps = 1447", 1.0);
     }
 
     #[test]
-    fn slices_dont_matter() {
+    fn slice_length_does_not_change_results() {
         Dive::with_head().assert_slices_dont_matter("[effects.sound_speed_error]\nshare = 0.01");
     }
 
     #[test]
-    fn no_speed_or_two_are_refused() {
+    fn missing_and_double_speeds_are_refused() {
         let refusal = |keys: &str| Dive::with_head().refusal(&format!("[effects.sound_speed_error]\n{keys}"));
         assert!(refusal("").contains("is needed, and not both"));
         assert!(refusal("true_mps = 1450\nshare = 0.01").contains("not both"));

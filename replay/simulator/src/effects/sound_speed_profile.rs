@@ -15,23 +15,26 @@ use crate::facts::Facts;
 use crate::sensing::{Rays, Samples, Scenery};
 use crate::stages::Stage;
 
-/// Water lies in layers, warm above cold: the speed of sound changes evenly with the height above the tunnel's floor, and
-/// ranges, which are computed with the vehicle file's speed, are off by the mean slowness on the way.
+/// The speed of sound changes linearly with the height above the tunnel's floor, as in water with warm layers above
+/// cold.
 ///
-/// Keys, besides `from_m` and `to_m` of the stretch: the speed at the floor, `floor_mps`, from 1300 to 1700 (the file's), and its
-/// change per metre of height, `per_metre_mps`, from -50 to 50 (0). One degree is some 4 m/s. That the ray bends is left out: its
-/// radius is the speed over the gradient, 300 m at 5 m/s a metre, which over 10 m of range bends it by 2 degrees.
-/// Source: Urick, "Principles of underwater sound", ch. 5 (travel time in a constant gradient).
+/// Ranges are computed with the vehicle file's speed, so they are off by the mean slowness along the path. Keys,
+/// besides `from_m` and `to_m` of the stretch: the speed at the floor, `floor_mps`, from 1300 to 1700 (the file's), and
+/// its change per metre of height, `per_metre_mps`, from -50 to 50 (0). One degree is about 4 m/s.
+///
+/// Bending of the ray isn't simulated. Its radius is the speed divided by the gradient, 300 m at 5 m/s per metre, which
+/// bends it by 2 degrees over 10 m of range. Source: Urick, "Principles of underwater sound", ch. 5 (travel time in a
+/// constant gradient).
 pub(super) struct SoundSpeedProfileKind;
 
-/// Differences of speed below this share are taken for none.
+/// Relative differences of speed below this count as zero.
 const SAME: f64 = 1e-9;
 
 #[derive(Debug, Clone, Copy)]
 struct Parameters {
     floor_mps: f64,
     per_metre_mps: f64,
-    /// The vehicle file's.
+    /// The vehicle file's speed.
     assumed_mps: f64,
 }
 
@@ -75,9 +78,9 @@ impl Effect for PerSensor<Places<Parameters>> {
 }
 
 impl Parameters {
-    /// Reported over true range of an echo from one height to another.
+    /// Ratio of reported to true range for an echo from one height to another.
     fn scale(&self, from_z_m: f64, to_z_m: f64) -> f64 {
-        // Never below a third of the floor's speed, however deep a hollow is.
+        // The speed never falls below a third of the floor's, however deep a hollow is.
         let at_mps = |z_m: f64| (self.floor_mps + self.per_metre_mps * z_m).max(self.floor_mps / 3.0);
         let [from_mps, to_mps] = [from_z_m, to_z_m].map(at_mps);
         let faster = to_mps / from_mps - 1.0;
@@ -106,9 +109,9 @@ mod tests {
     use super::*;
     use crate::testing::Dive;
 
-    /// Against the time over the way in ten thousand pieces.
+    /// Compares with the travel time summed over ten thousand pieces of the path.
     #[test]
-    fn ranges_are_the_time_of_the_way_at_the_file_s_speed() {
+    fn ranges_are_travel_time_times_the_speed_of_the_file() {
         let mut dive = Dive::with_head();
         dive.vehicle = "[water]\nsound_speed_mps = 1447";
         for (keys, floor_mps, per_metre) in [
@@ -132,7 +135,8 @@ mod tests {
         }
     }
 
-    /// Forty metres up a gradient of -50 m/s a metre leaves no sound: the mean slowness down to a third of the floor's speed is told.
+    /// Forty metres up a gradient of -50 m/s per metre no speed is left. The mean slowness counts down to a third of
+    /// the floor's speed.
     #[test]
     fn sound_never_slows_below_a_third() {
         let profile = Parameters { floor_mps: 1440.0, per_metre_mps: -50.0, assumed_mps: 1440.0 };
@@ -144,7 +148,7 @@ mod tests {
     }
 
     #[test]
-    fn slices_dont_matter_and_nonsense_is_refused() {
+    fn slice_length_changes_nothing_and_invalid_keys_are_refused() {
         Dive::with_head().assert_slices_dont_matter("[effects.sound_speed_profile]\nper_metre_mps = 3");
         let refusal = Dive::with_head().refusal("[effects.sound_speed_profile]");
         assert!(refusal.contains("or per_metre_mps is needed"), "{refusal}");

@@ -1,4 +1,4 @@
-//! Heads start off their planned phase.
+//! Heads start at another phase than planned.
 
 use headrace_config::{ConfigError, Section};
 use headrace_geometry::math::{self, TAU};
@@ -13,13 +13,13 @@ use crate::error::SceneError;
 use crate::facts::Facts;
 use crate::random::Stream;
 
-/// Each head starts off its program's phase, and reports its true angle. A head that turns continuously starts at another
-/// angle; one in a sector starts elsewhere in its sweep, so that it keeps its sector.
+/// Each head starts off its program's phase and reports its true angle.
 ///
-/// `max_deg` draws the angle evenly within this much either way; `sd_deg` draws it normally; `offsets_deg` gives the
-/// angles, one for each head of the table, in order. Without any of them, `max_deg` is 180. In a sector the angle is a
-/// fraction of the sweep: 360 degrees are once there and back.
-/// Source: Jorge et al. 2021, §8.2 (Figure 12, without alignment).
+/// A head that turns continuously starts at another angle. A head in a sector keeps its sector and starts elsewhere in
+/// its sweep. `max_deg` draws the angle evenly within this much either way; `sd_deg` draws it normally; `offsets_deg`
+/// gives the angles, one for each head of the table, in order. Without any of them, `max_deg` is 180. In a sector the
+/// angle is a fraction of the sweep: 360 degrees are once there and back. Source: Jorge et al. 2021, §8.2 (Figure 12,
+/// without alignment).
 pub(super) struct StartPhaseErrorKind;
 
 #[derive(Debug, Clone, PartialEq)]
@@ -86,7 +86,7 @@ impl Effect for PerSensor<Offset> {
     }
 }
 
-/// A program shifted by `off_rad`; in a sector, by that fraction of a whole turn of its sweep there and back.
+/// A program shifted by `off_rad`. In a sector, the shift is that fraction of a whole sweep there and back.
 fn begun_off(program: HeadProgram, off_rad: f64) -> HeadProgram {
     let Some((least_rad, size_rad)) = program.sector else {
         return HeadProgram { start_rad: program.start_rad + off_rad, ..program };
@@ -110,7 +110,7 @@ mod tests {
     const KEYS: &str = "[effects.start_phase_error]\n";
 
     #[test]
-    fn each_head_is_off_by_its_own_angle_all_through_and_says_so() {
+    fn each_head_keeps_and_reports_its_own_phase_error() {
         let keys = format!("{KEYS}offsets_deg = [10.0, -33.0]\nsensors = [\"head_b\", \"head_a\"]\n");
         for (head, off_deg) in [("head_b", 10.0_f64), ("head_a", -33.0)] {
             let (plain, off) =
@@ -126,7 +126,7 @@ mod tests {
     }
 
     #[test]
-    fn a_sector_is_kept_and_begun_elsewhere() {
+    fn sector_is_kept_and_starts_elsewhere() {
         let program = HeadProgram { start_rad: 1.0, growing: true, sector: Some((1.0, 2.0)) };
         let begun = |off_deg: f64| {
             let HeadProgram { start_rad, growing, sector } = begun_off(program, off_deg.to_radians());
@@ -141,7 +141,7 @@ mod tests {
     }
 
     #[test]
-    fn drawn_angles_are_those_of_their_distribution() {
+    fn drawn_angles_follow_their_distribution() {
         let count = 20_000_u64;
         let angles = |offset: Offset| {
             let draw = |seed| offset.rad(0, Stream::new(seed, "start_phase_error", "head"));
@@ -159,7 +159,7 @@ mod tests {
     }
 
     #[test]
-    fn what_makes_no_sense_is_refused() {
+    fn invalid_phase_errors_are_refused() {
         let why = |keys: &str| refusal(&format!("{KEYS}{keys}"));
         assert!(why("max_deg = 1\nsd_deg = 2").contains("more than one of max_deg, sd_deg"));
         assert!(why("offsets_deg = [1]").contains("must be 2 numbers"));

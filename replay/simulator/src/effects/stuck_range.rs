@@ -1,4 +1,4 @@
-//! A sonar answers one range, whatever its beam meets.
+//! A sonar reports one range, whatever its beam meets.
 
 use bevy_ecs::prelude::{Component, Query};
 use headrace_config::{ConfigError, Section};
@@ -15,11 +15,10 @@ use crate::facts::Facts;
 use crate::sensing::Samples;
 use crate::stages::Stage;
 
-/// A sonar answers one range, whatever its beam meets: its own frame, or a bubble before the transducer.
+/// A sonar reports one range, whatever its beam meets: its own frame, or a bubble before the transducer.
 ///
-/// Keys: the range `range_m` (0.55), from 0.01 to 200 m; the time from the dive's start at which it begins, `from_s` (0),
-/// and ends, `to_s` (never), in seconds.
-/// Source: 0.55 m is what a head in its frame has answered through a whole dive.
+/// Keys: the range `range_m` (0.55), from 0.01 to 200 m; the time from the dive's start at which it begins, `from_s`
+/// (0), and ends, `to_s` (never), in seconds. Source: a head in its frame reported 0.55 m throughout a whole dive.
 pub(super) struct StuckRangeKind;
 
 #[derive(Debug, Clone, Copy)]
@@ -84,7 +83,7 @@ mod tests {
     use crate::testing::Dive;
 
     #[test]
-    fn the_range_is_the_same_between_the_two_times_and_the_wall_is_heard_before_and_after() {
+    fn range_is_constant_between_the_times_and_that_of_the_wall_otherwise() {
         let dive = Dive { seconds: 30.0, ..Dive::with_head() };
         let effect = "[effects.stuck_range]\nrange_m = 0.7\nfrom_s = 10\nto_s = 20";
         let (base, dived) = (dive.dive(""), dive.dive(effect));
@@ -96,12 +95,12 @@ mod tests {
     }
 
     #[test]
-    fn slices_dont_matter() {
+    fn slice_length_does_not_change_results() {
         Dive::with_head().assert_slices_dont_matter("[effects.stuck_range]\nfrom_s = 2");
     }
 
     #[test]
-    fn times_that_make_no_sense_are_refused() {
+    fn invalid_times_are_refused() {
         let refusal = Dive::with_head().refusal("[effects.stuck_range]\nfrom_s = 5\nto_s = 4");
         assert!(refusal.contains("must be above from_s"));
     }

@@ -5,15 +5,16 @@ use headrace_sensor::device::Sense;
 
 use crate::facts::Facts;
 
-/// Parameters of an effect, each with the number of its sensor.
+/// Parameters of an effect by sensor number.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PerSensor<P>(pub Vec<(usize, P)>);
 
 impl<P: Clone> PerSensor<P> {
-    /// Reads tables whose key `sensors` names the sensors that each applies to: all of these senses if it is absent. `read`
-    /// reads the effect's own keys.
+    /// Reads tables whose key `sensors` names the sensors that each applies to.
     ///
-    /// Errors: no such sensor in the vehicle; a sensor that is named twice, or that has another sense; unknown keys.
+    /// If the key is absent, the table applies to all sensors of these senses. `read` reads the effect's own keys.
+    ///
+    /// Errors: the vehicle has no such sensor; a sensor is named twice, or has another sense; a key is unknown.
     pub fn read(
         tables: Vec<Section<'_>>,
         facts: &Facts,
@@ -32,7 +33,8 @@ impl<P: Clone> PerSensor<P> {
             for source in sensors {
                 if found.iter().any(|(other, _)| *other == source) {
                     let id = facts.sensors.get(source).map_or("", |sensor| sensor.id.as_str());
-                    let problem = format!("names {id:?}, which an earlier table of this effect is for, too");
+                    let problem =
+                        format!("names {id:?}, which an earlier table of this effect names already");
                     return Err(table.invalid("sensors", &problem));
                 }
                 found.push((source, parameters.clone()));

@@ -1,4 +1,4 @@
-//! The tether lags behind the vehicle: the tender winds late, and in bursts.
+//! The tether lags behind the vehicle because the tender winds late and in bursts.
 
 use bevy_ecs::prelude::{Component, Query};
 use headrace_config::{ConfigError, Section};
@@ -14,12 +14,11 @@ use crate::facts::Facts;
 use crate::sensing::Samples;
 use crate::stages::Stage;
 
-/// The tender pays out and recovers cable in bursts: the counter stands until the vehicle is a threshold ahead or behind,
-/// and then catches up.
+/// The tender pays out and recovers cable in bursts.
 ///
-/// Once vehicle and cable are `hold_m` apart (0.5 by default), the drum winds at `speed_mps` (0.5 by default) until they
-/// agree; until then the count stays. A drum slower than the vehicle never catches up. Like slack, the difference is
-/// relative to its value when the counter was zeroed, so it has either sign.
+/// The counter is stationary until vehicle and cable are `hold_m` apart (0.5 by default). Then the drum winds at
+/// `speed_mps` (0.5 by default) until they agree. A drum slower than the vehicle never catches up. Like slack, the
+/// difference is relative to its value when the counter was zeroed, so it has either sign.
 pub(super) struct TetherLagKind;
 
 #[derive(Debug, Clone, Copy)]
@@ -103,9 +102,9 @@ mod tests {
         TetherLag { parameters, counted: None, winding: false }
     }
 
-    /// At a steady v, a standstill of h / v is followed by a burst of h / (w - v): the mean lag is half of h.
+    /// At a steady speed v, a standstill of h / v is followed by a burst of h / (w - v); the mean lag is half of h.
     #[test]
-    fn on_a_steady_way_the_count_is_a_saw() {
+    fn count_is_a_sawtooth_at_steady_speed() {
         let (mut winding, period_s) = (winding(), 0.01);
         let counts: Vec<f64> = (0..100_000)
             .map(|k| {
@@ -126,7 +125,7 @@ mod tests {
     }
 
     #[test]
-    fn within_the_hold_nothing_moves_and_back_is_as_late_as_there() {
+    fn count_is_stationary_within_the_threshold_and_lags_equally_both_ways() {
         let mut winding = winding();
         for k in 0..1000 {
             let travelled_m = 3.0 + 0.49 * math::sin(f64::from(k) * 0.05);
@@ -143,7 +142,7 @@ mod tests {
     }
 
     #[test]
-    fn slices_make_no_difference_and_nonsense_is_refused() {
+    fn slice_length_changes_nothing_and_invalid_keys_are_refused() {
         same_in_any_slices(&Bench::turning("[effects.late_winding]\nhold_m = 0.2\n"));
         assert!(refusal("[effects.late_winding]\nspeed_mps = 0\n").contains("from 0.01 to 5"));
     }

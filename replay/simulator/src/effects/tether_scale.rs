@@ -14,14 +14,16 @@ use crate::facts::Facts;
 use crate::sensing::Samples;
 use crate::stages::Stage;
 
-/// The counter's wheel is larger or smaller than the vehicle file says, and the cable stretches under the drag on it.
+/// The counter's wheel is larger or smaller than the vehicle file says, and the cable stretches under drag.
 ///
-/// `share` is the relative excess of what is counted, from -0.1 to 0.1 (0). `stiffness_n` is the cable's axial stiffness EA,
-/// in newtons; with it, `drag_npm` is the drag on each metre of cable that moves (0.05). The cable passes the wheel under the
-/// tension that the tender keeps, and x metres further in it bears the drag of all cable behind it, so that its mean strain
-/// over what is out is drag x / (2 EA): a cable over x metres of tunnel was counted as x / (1 + drag x / (2 EA)). The way back
-/// has the same strain; the cable's own hysteresis, and friction that hasn't built up yet after a turn, aren't simulated.
-/// Source: Hooke's law for a rod under evenly distributed load (Timoshenko, "Strength of Materials", part I, ch. I).
+/// `share` is the relative excess of the counted length, from -0.1 to 0.1 (0). `stiffness_n` is the cable's axial
+/// stiffness EA, in newtons; with it, `drag_npm` is the drag on each metre of moving cable (0.05).
+///
+/// The cable passes the wheel under the tension that the tender keeps. At x metres further in it bears the drag of all
+/// cable behind it, so its mean strain over the length out is drag x / (2 EA). A cable over x metres of tunnel was
+/// therefore counted as x / (1 + drag x / (2 EA)). The strain on the way back is the same. The cable's own hysteresis,
+/// and friction that hasn't built up yet after a turn, aren't simulated. Source: Hooke's law for a rod under evenly
+/// distributed load (Timoshenko, "Strength of Materials", part I, ch. I).
 pub(super) struct TetherScaleKind;
 
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -49,7 +51,7 @@ impl EffectKind for TetherScaleKind {
             let stiffness_n = table.number("stiffness_n", 1e3..=1e9)?;
             let drag_npm = table.number("drag_npm", 0.0..=100.0)?;
             if drag_npm.is_some() && stiffness_n.is_none() {
-                return Err(table.invalid("drag_npm", "is of use only with stiffness_n"));
+                return Err(table.invalid("drag_npm", "has an effect only with stiffness_n"));
             }
             let strain_pm = stiffness_n.map_or(0.0, |stiff_n| drag_npm.unwrap_or(0.05) / (2.0 * stiff_n));
             keys::some_not_zero(table, &[("share", share), ("stiffness_n", strain_pm)])?;
@@ -69,7 +71,7 @@ impl Effect for PerSensor<Parameters> {
 }
 
 impl Parameters {
-    /// What is counted where this length of cable is out, m.
+    /// Counted length for a given length of cable out, m.
     fn counted_m(&self, out_m: f64) -> f64 {
         out_m * (1.0 + self.share) / (1.0 + self.strain_pm * out_m.abs())
     }
@@ -95,15 +97,15 @@ mod tests {
     }
 
     #[test]
-    fn a_wheel_that_is_too_small_counts_too_much() {
+    fn too_small_wheel_counts_too_much() {
         let (plain, off) = (counts(""), counts("[effects.tether_scale]\nshare = 0.005\n"));
         assert!(plain.len() > 100);
         assert!(plain.iter().zip(&off).all(|(is, counted)| (counted / is - 1.005).abs() < 1e-12));
     }
 
-    /// Against a cable of many short rods, each stretched by the drag of those behind it.
+    /// Compares with a cable of many short rods, each stretched by the drag of the rods behind it.
     #[test]
-    fn a_cable_stretches_as_rods_in_a_row() {
+    fn cable_stretches_like_rods_in_series() {
         let (stiffness_n, drag_npm) = (40_000.0, 0.5);
         let parameters = Parameters { share: 0.0, strain_pm: drag_npm / (2.0 * stiffness_n) };
         for counted_m in [10.0, 700.0, 7000.0] {
@@ -111,11 +113,12 @@ mod tests {
             let rod_m = counted_m / f64::from(rods);
             let mut reach_m = 0.0;
             for rod in 0..rods {
-                // The middle of this rod drags all that is nearer to the wheel.
+                // The middle of this rod carries the drag of all rods nearer to the wheel.
                 let tension_n = drag_npm * (f64::from(rod) + 0.5) * rod_m;
                 reach_m += rod_m * (1.0 + tension_n / stiffness_n);
             }
-            // The drag is of what was counted, not of its stretched length: they differ by the square of the strain.
+            // The drag is computed from the counted length, not the stretched one; they differ by the square of the
+            // strain.
             let strain = drag_npm * counted_m / (2.0 * stiffness_n);
             let off = parameters.counted_m(reach_m) / counted_m - 1.0;
             assert!(off.abs() < 1.01 * strain * strain + 1e-9, "{counted_m}: {off}");
@@ -123,9 +126,9 @@ mod tests {
         }
     }
 
-    /// Of a drag of 0.05 N on a metre where the scene says none: half of it is borne on the mean, over the stiffness.
+    /// The scene gives no drag, so it is 0.05 N/m; the mean tension is half of the total drag.
     #[test]
-    fn keys_are_stiffness_and_drag() {
+    fn keys_stiffness_and_drag_set_the_stretch() {
         let plain = counts("");
         for (keys, strain_pm) in
             [("stiffness_n = 2000\n", 1.25e-5), ("stiffness_n = 2000\ndrag_npm = 0.4\n", 1e-4)]
@@ -138,7 +141,7 @@ mod tests {
     }
 
     #[test]
-    fn slices_make_no_difference_and_nonsense_is_refused() {
+    fn slice_length_changes_nothing_and_invalid_keys_are_refused() {
         same_in_any_slices(&Bench::turning("[effects.tether_scale]\nshare = -0.01\nstiffness_n = 5e4\n"));
         assert!(refusal("[effects.tether_scale]\n").contains("share: or stiffness_n must not be zero"));
         assert!(refusal("[effects.tether_scale]\ndrag_npm = 1\n").contains("only with stiffness_n"));

@@ -16,18 +16,20 @@ use crate::sensing::Samples;
 use crate::stages::Stage;
 use crate::trajectory::{Knots, wandering};
 
-/// The length of cable out differs from the vehicle's travel: its slack varies smoothly.
+/// The length of cable out differs from the vehicle's travel by a slack that varies smoothly.
 ///
-/// Slack is relative to its mean, which zeroing the counter removes, so it has either sign though no cable is shorter than
-/// the distance. `reach_m` (0.15 by default) is the largest value either way; the standard deviation is 0.4 of it.
-/// `period_s` (30 by default) is the period of the variation: control points of a cubic B-spline are half of it apart.
-/// `swings` are tables of `reach_m` and `period_s`: a cable that swings as a sine, at a random phase, also while the vehicle stands, with its full
-/// reach each time. With them, slack wanders only if `reach_m` is given, too.
+/// Slack is relative to its mean, which zeroing the counter removes. It therefore has either sign, although no cable is
+/// shorter than the distance. `reach_m` (0.15 by default) is the largest value either way; the standard deviation is
+/// 0.4 of it. `period_s` (30 by default) is the period of the variation: control points of a cubic B-spline are half of
+/// it apart.
+///
+/// `swings` are tables of `reach_m` and `period_s`: a cable that swings as a sine at a random phase with full reach,
+/// even while the vehicle is stationary. With them, the slack varies only if `reach_m` is also given.
 pub(super) struct TetherSlackKind;
 
 #[derive(Debug, Clone)]
 struct Parameters {
-    /// 0 where slack doesn't wander.
+    /// 0 if the slack doesn't vary.
     reach_m: f64,
     period_s: f64,
     swings: Vec<Swing>,
@@ -39,7 +41,7 @@ struct Swing {
     period_s: f64,
 }
 
-/// Step of the draws for the phases of swings: far from those of knots.
+/// Step number reserved for drawing the swings' phases, far from those of knots.
 const PHASES: u64 = u64::MAX;
 
 #[derive(Component)]
@@ -114,7 +116,7 @@ mod tests {
 
     /// The correlation of a cubic B-spline with independent control points falls to zero over four of them.
     #[test]
-    fn slack_has_its_reach_spread_and_time() {
+    fn slack_has_its_reach_spread_and_period() {
         let keys = "[effects.tether_slack]\nperiod_s = 1\n";
         let (plain, slack) = (Bench::on(LONG, "").run("tether"), Bench::on(LONG, keys).run("tether"));
         let more: Vec<f64> =
@@ -135,16 +137,16 @@ mod tests {
         }
     }
 
-    /// Against sines fitted by least squares: each swing has its reach and period, and nothing is left.
+    /// Compares with sines fitted by least squares: each swing has its reach and period, and nothing is left.
     #[test]
-    fn a_swing_is_a_sine_of_its_full_reach_and_comes_alone() {
+    fn swings_are_sines_of_full_reach_without_further_slack() {
         let keys = "[effects.tether_slack]\nswings = [{ reach_m = 0.03, period_s = 8 }, { reach_m = 0.055, period_s = 20 }]\n";
         let (plain, slack) = (Bench::on(LONG, "").run("tether"), Bench::on(LONG, keys).run("tether"));
         let more = plain
             .iter()
             .zip(&slack)
             .map(|(a, b): (&Payout, &Payout)| (a.at.since(START).as_secs_f64(), b.chainage_m - a.chainage_m));
-        // Whole periods of both.
+        // Whole periods of both swings.
         let more: Vec<(f64, f64)> = more.filter(|(t, _)| *t < 200.0).collect();
         assert!(more.len() > 9000, "{}", more.len());
         let mut left = more.clone();
@@ -164,7 +166,7 @@ mod tests {
     }
 
     #[test]
-    fn slices_make_no_difference_and_other_sensors_are_refused() {
+    fn slice_length_changes_nothing_and_other_sensors_are_refused() {
         same_in_any_slices(&Bench::turning("[effects.tether_slack]\n"));
         same_in_any_slices(&Bench::turning(
             "[effects.tether_slack]\nreach_m = 0.1\nswings = [{ reach_m = 0.1, period_s = 7 }]\n",

@@ -15,12 +15,12 @@ use crate::random::Stream;
 use crate::sensing::{Samples, Scenery};
 use crate::stages::Stage;
 
-/// Length of the stretches of travel in each of which the cable may slip once, m.
+/// Length of the travel stretches in each of which the cable may slip once, m.
 const STRETCH_M: f64 = 1.0;
 
-/// Now and then cable slips over the counter's wheel: the count changes permanently by a length.
+/// From time to time the cable slips over the counter's wheel, which changes the count permanently.
 ///
-/// It slips `per_100m` times in a hundred metres of travel, forwards or back, by `size_m = [least, most]` (evenly drawn,
+/// It slips `per_100m` times per hundred metres of travel, forwards or back, by `size_m = [least, most]` (drawn evenly,
 /// 0.05 to 0.3 by default), with either sign. Travel is the vehicle's, summed from count to count.
 pub(super) struct TetherSlipKind;
 
@@ -37,7 +37,7 @@ struct TetherSlip {
     at_m: Option<f64>,
     gone_m: f64,
     next_stretch: u64,
-    /// Pending slip in the last stretch drawn: travel at which it happens, and its size, m.
+    /// Pending slip in the last drawn stretch: travel at which it happens, and its size, m.
     waiting: Option<(f64, f64)>,
     slipped_m: f64,
 }
@@ -141,7 +141,7 @@ mod tests {
     }
 
     #[test]
-    fn slips_are_as_many_and_as_large_as_wanted_and_stay() {
+    fn slips_have_their_rate_and_size_and_are_permanent() {
         let slips = slips((0..4_000_000).map(|k| f64::from(k) * 0.025));
         let n = slips.len() as f64;
         assert!((n - 5000.0).abs() < 5.0 * math::sqrt(5000.0 * 0.95), "{n}");
@@ -153,7 +153,7 @@ mod tests {
     }
 
     #[test]
-    fn way_gone_back_counts_like_way_gone_there() {
+    fn travel_back_counts_like_travel_forward() {
         let ahead = slips((0..40_000).map(|k| f64::from(k) * 0.125));
         let back_and_forth = slips(
             (0..40_000).map(|k| f64::from(if k / 800 % 2 == 0 { k % 800 } else { 800 - k % 800 }) * 0.125),
@@ -163,7 +163,7 @@ mod tests {
     }
 
     #[test]
-    fn slices_make_no_difference_and_nonsense_is_refused() {
+    fn slice_length_changes_nothing_and_invalid_keys_are_refused() {
         same_in_any_slices(&Bench::turning("[effects.tether_slip]\nper_100m = 60\n"));
         assert!(refusal("[effects.tether_slip]\n").contains("must not be zero"));
         assert!(refusal("[effects.tether_slip]\nper_100m = 1\nsize_m = [1]\n").contains("[least, most]"));

@@ -1,23 +1,23 @@
-//! The tunnel's axis in plan view: straight pieces and arcs in sequence.
+//! The tunnel's axis in plan view: a sequence of straight pieces and arcs.
 //!
-//! Chainage is the arc length along the axis. The axis is smooth, bends no tighter than [`Axis::parse`] allows and turns by
-//! no more than half a turn between any two points. Hence it never approaches itself, each point of the tunnel has one
-//! nearest point of the axis, and along a straight line through the tunnel chainage is monotonic.
+//! Chainage is the arc length along the axis. The axis is smooth, bends no tighter than [`Axis::parse`] allows and
+//! turns by no more than half a turn between any two points. Hence it never approaches itself, each point of the tunnel
+//! has one nearest point of the axis, and along a straight line through the tunnel chainage is monotonic.
 
 use headrace_config::{ConfigError, Section};
 use headrace_geometry::frames::{Point3, Tunnel};
 use headrace_geometry::math::{self, PI};
 use headrace_geometry::tunnel::Yz;
 
-/// Least radius of a bend, in half-widths of the tunnel.
+/// Minimum radius of a bend, in half-widths of the tunnel.
 pub(super) const LEAST_RADIUS_HALF_WIDTHS: f64 = 2.0;
 /// Largest difference between two headings.
 const LARGEST_TURN_RAD: f64 = PI * (1.0 + 1e-12);
 
-/// The tunnel's axis, level at z = 0; before chainage 0 and past the last piece it continues straight.
+/// The tunnel's axis, level at z = 0. It continues straight before chainage 0 and past the last piece.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Axis {
-    /// Without gaps, from -infinity to +infinity of chainage.
+    /// The pieces, without gaps, from -infinity to +infinity of chainage.
     pieces: Vec<Piece>,
 }
 
@@ -74,7 +74,7 @@ impl Axis {
         Ok(axis)
     }
 
-    /// Ends the axis's last piece with another piece, after which the axis continues straight.
+    /// Appends a piece, after which the axis continues straight.
     fn append(&mut self, length_m: f64, curvature_pm: f64) {
         let Some(last) = self.pieces.pop() else { return };
         let (at, heading_rad) = (last.at, last.heading_rad);
@@ -122,7 +122,7 @@ impl Axis {
                 continue;
             }
             let (chainage_m, y) = piece.chart(plan);
-            // Off the piece's end, the distance to the end counts, so that a neighbour holds the point and none is left over.
+            // Beyond a piece's end the distance to the end counts, so that every point belongs to a piece.
             let missed = (piece.from_m - chainage_m).max(chainage_m - piece.to_m).max(0.0);
             let distance = y.abs() + missed;
             if distance < least {
@@ -170,7 +170,8 @@ impl Piece {
         if curvature_pm == 0.0 {
             return start;
         }
-        // Angles about an arc's centre are relative to its middle: up to a quarter turn either way, far from where they wrap.
+        // Angles about an arc's centre are relative to its middle: at most a quarter turn either way, far from where
+        // they wrap.
         let anchor_m = from_m + length_m / 2.0;
         let heading_rad = heading_rad + curvature_pm * length_m / 2.0;
         let Station { at, tangent } = start.station(anchor_m);
@@ -210,7 +211,7 @@ impl Piece {
             return left;
         }
         let radius_m = 1.0 / self.curvature_pm;
-        // Positive radius: the centre is to the left, and the axis's distance to it is what remains.
+        // With a positive radius the centre is to the left; the rest of the distance to it is the axis's.
         radius_m - radius_m.signum() * math::sqrt(ahead * ahead + (radius_m - left) * (radius_m - left))
     }
 
@@ -256,7 +257,7 @@ fn parse_piece(section: &Section<'_>, half_width_m: f64) -> Result<(f64, f64), C
         return Ok((section.required("length_m", length_m)?, 0.0));
     };
     if length_m.is_some() {
-        let problem = "stands beside radius_m; an arc's length follows from its radius and turn";
+        let problem = "excludes radius_m; an arc's length follows from its radius and turn";
         return Err(section.invalid("length_m", problem));
     }
     let turn_deg = section.required("turn_deg", turn_deg)?;

@@ -1,4 +1,4 @@
-//! Boulders: one, many, or the pieces of a heap.
+//! Boulders: single ones, fields of many, or the pieces of a heap.
 
 use headrace_config::{ConfigError, Section};
 use headrace_geometry::math::{self, TAU};
@@ -12,11 +12,11 @@ use super::scatter::Scatter;
 use super::shapes::Solid;
 use super::widths::floor_m;
 
-/// Sizes of a boulder, m.
+/// Allowed sizes of a boulder, m.
 const SIZE_M: core::ops::RangeInclusive<f64> = 0.01..=20.0;
-/// Share of a boulder's thickness that is below the wall, by default.
+/// Default share of a boulder's thickness that is below the wall.
 const SUNK: f64 = 0.3;
-/// Scattered boulders are at least this share of their length wide and thick.
+/// Scattered boulders are at least this share of their length in width and thickness.
 const FLATTEST: f64 = 0.5;
 
 /// An ellipsoid on the wall.
@@ -153,7 +153,7 @@ impl Field {
     }
 }
 
-/// `base` to the power of `exponent` in [0, 1), by square roots, whose exact rounding makes it equal on all machines.
+/// Raises `base` to `exponent` in [0, 1) by square roots, whose exact rounding gives the same result on all machines.
 fn power(base: f64, exponent: f64) -> f64 {
     let (mut result, mut root, mut rest) = (1.0, base, exponent);
     for _ in 0..53 {
@@ -167,7 +167,7 @@ fn power(base: f64, exponent: f64) -> f64 {
     result
 }
 
-/// `size_m`, one number or three.
+/// Reads `size_m`, one number or three.
 fn parse_size(table: &Section<'_>) -> Result<[f64; 3], ConfigError> {
     let wanted = format!(
         "must be a diameter from {} to {}, or three: along the tunnel, along the wall, across the wall",
@@ -182,7 +182,7 @@ fn parse_size(table: &Section<'_>) -> Result<[f64; 3], ConfigError> {
     }
 }
 
-/// `size_m`, the least and the most.
+/// Reads `size_m`, the least and the most.
 fn parse_sizes(table: &Section<'_>) -> Result<Option<[f64; 2]>, ConfigError> {
     match table.numbers("size_m", SIZE_M)?.as_deref() {
         None => Ok(None),

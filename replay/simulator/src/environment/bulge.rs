@@ -4,7 +4,7 @@ use headrace_geometry::math::{self, PI};
 
 /// A displaced patch of wall, a raised cosine along the tunnel and along the wall.
 ///
-/// The wall moves along the ray from the profile's reference point, so that any displacement short of that point leaves
+/// The wall moves along the ray from the profile's reference point. A displacement short of that point therefore leaves
 /// the section star-shaped.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Bulge {
@@ -73,7 +73,7 @@ impl Bulge {
     }
 }
 
-/// 1 in the middle, 0 with slope 0 at -1 and 1.
+/// A raised cosine: 1 in the middle, 0 with slope 0 at -1 and 1.
 fn raised_cosine(x: f64) -> f64 {
     0.5 + 0.5 * math::cos(PI * x)
 }

@@ -10,13 +10,13 @@ use super::keys::{self, Kind};
 use super::placing::Site;
 use super::widths::floor_m;
 
-/// Closest approach of a displacement to the reference point, as a share of the wall's distance from it.
+/// Largest displacement towards the reference point, as a share of the wall's distance from it.
 const DEEPEST_SHARE: f64 = 0.8;
-/// A patch is at least as long and as wide as it is deep: its wall is nowhere steeper than 57.5 degrees.
+/// Largest ratio of a patch's depth to its length and width. The wall is then nowhere steeper than 57.5 degrees.
 const DEEPEST_ASPECT: f64 = 1.0;
-/// Volume of fallen rock over that of the cavity it left.
+/// Ratio of the volume of fallen rock to that of its cavity.
 const LOOSENING: f64 = 1.5;
-/// Length of a fall's heap over that of its cavity.
+/// Ratio of the length of a fall's heap to that of its cavity.
 const SPREADING: f64 = 1.5;
 /// Points along a patch at which the wall's distance is evaluated.
 const PLACES: u32 = 64;
@@ -169,7 +169,7 @@ fn add(
     Ok(())
 }
 
-/// Least distance from the reference point to the wall of a patch, m.
+/// Minimum distance from the reference point to the wall of a patch, m.
 fn nearest_wall_m(bulge: &Bulge, site: &Site<'_>) -> f64 {
     let [ry, rz] = site.profile.reference();
     let distance_m = |k: u32| {

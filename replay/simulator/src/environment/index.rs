@@ -7,7 +7,7 @@ use headrace_geometry::math;
 pub(super) struct Index {
     first_m: f64,
     bucket_m: f64,
-    /// Start of each bucket's list, and the end of the last one; or empty.
+    /// Start of each bucket's list, then the end of the last one; empty without objects.
     starts: Vec<usize>,
     /// Numbers of objects, bucket by bucket. An object in several buckets is listed in each.
     numbers: Vec<u32>,
@@ -15,11 +15,11 @@ pub(super) struct Index {
 
 /// Length of a bucket, m: about the span of a boulder, and several times that of a profiler's ray.
 const BUCKET_M: f64 = 1.0;
-/// Most buckets; a longer tunnel has longer ones.
+/// Maximum number of buckets; a longer tunnel has longer buckets.
 const MOST_BUCKETS: f64 = 65_536.0;
 
 impl Index {
-    /// Indexes objects; number k extends from `spans[k].0` to `spans[k].1` of chainage, m.
+    /// Indexes objects; object number k extends from `spans[k].0` to `spans[k].1` of chainage, m.
     ///
     /// Allocates: startup only.
     pub(super) fn new(spans: &[(f64, f64)]) -> Self {
@@ -45,7 +45,7 @@ impl Index {
         index
     }
 
-    /// Numbers of all objects that extend into `[from_m, to_m]`, some of them repeated, and possibly of a few near it.
+    /// Numbers of all objects that extend into `[from_m, to_m]`, possibly repeated, and with a few nearby ones.
     pub(super) fn near(&self, from_m: f64, to_m: f64) -> &[u32] {
         let Some(count) = self.starts.len().checked_sub(1) else { return &[] };
         if to_m < self.first_m {

@@ -82,7 +82,7 @@ pub(super) fn extent_m(
     Ok((middle_m, extent_m))
 }
 
-/// The `seed` of what is scattered (1).
+/// The `seed` of scattered objects (1).
 ///
 /// Errors: below zero.
 pub(super) fn seed(table: &Section<'_>) -> Result<u64, ConfigError> {

@@ -7,7 +7,8 @@ use super::frame::Frame;
 use super::vector::{Ray, V3};
 use crate::mesh::Mesh;
 
-/// Points this close to a wall's end plane are moved this far into the wall, m: in the plane itself the mesh is open.
+/// Distance by which points close to a wall's end plane are moved into the wall, m. In the plane itself the mesh is
+/// open.
 const INTO_M: f64 = 1e-7;
 
 /// A closed mesh in the water.
@@ -23,14 +24,14 @@ pub(super) struct MeshWall {
     pub(super) feature: u16,
     pub(super) from_m: f64,
     pub(super) to_m: f64,
-    /// The same in the mesh's x.
+    /// The same span in the mesh's x.
     pub(super) x_m: (f64, f64),
     pub(super) frame: Frame,
     pub(super) mesh: Arc<Mesh>,
 }
 
 impl MeshBody {
-    /// Where the ray first meets it: the range, 0 if it begins inside, and the outward normal.
+    /// First hit of the ray: the range, 0 if it begins inside, and the outward normal.
     pub(super) fn meet(&self, ray: &Ray) -> Option<(f64, V3)> {
         let local = self.frame.local_ray(ray);
         let hit = self.mesh.cast(local.origin, local.direction, f64::MAX)?;
@@ -55,15 +56,15 @@ impl MeshWall {
         (self.from_m, self.to_m)
     }
 
-    /// Whether a point between its end planes, or in one of them, is in the tunnel.
+    /// Whether a point between its end planes, or on one of them, is in the tunnel.
     pub(super) fn holds(&self, point: V3) -> bool {
         self.mesh.contains(self.between_ends(self.frame.local(point)))
     }
 
-    /// Where the ray meets the mesh beyond `t_m`, in the tunnel, and before `until_m`, at which it passes an end.
+    /// Hit of the ray on the mesh beyond `t_m` in the tunnel, before it passes an end at `until_m`.
     pub(super) fn leave(&self, ray: &Ray, t_m: f64, until_m: f64) -> Option<(f64, Face)> {
         let local = self.frame.local_ray(ray);
-        // From a point enclosed by the mesh, which a ray leaves only through the ends.
+        // A ray from a point enclosed by the mesh leaves only through the ends.
         let from = self.between_ends(local.at(t_m));
         let hit = self.mesh.cast(from, local.direction, until_m - t_m)?;
         let face = Face { normal: self.frame.outwards(hit.normal), feature: Some(self.feature) };

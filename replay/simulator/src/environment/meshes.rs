@@ -17,11 +17,11 @@ use super::shapes::Solid;
 use crate::files::FileLoader;
 use crate::mesh::{self, Mesh, Role};
 
-/// Allowed chainage of a mesh's origin, m: the survey's origin may be far away.
+/// Allowed chainage of a mesh's origin, m. A survey's origin may be far away.
 const CHAINAGE_M: core::ops::RangeInclusive<f64> = -1.0e5..=1.0e5;
 /// Allowed position of the origin across the tunnel, m.
 const ACROSS_M: core::ops::RangeInclusive<f64> = -1000.0..=1000.0;
-/// Least length of a wall, m.
+/// Minimum length of a wall, m.
 const SHORTEST_M: f64 = 0.01;
 
 /// Position of a mesh's origin.
@@ -106,13 +106,15 @@ fn parse_wall(
         let problem = format!("has {:.3} m of wall along x; at least {SHORTEST_M} m", to_m - from_m);
         return Err(table.invalid("file", &problem));
     }
-    // Its origin may lie where the axis has turned: x continues straight.
+    // The origin may lie beyond a bend of the axis; the mesh's x continues straight.
     let (_, piece) = site.axis.piece_at(f64::midpoint(from_m, to_m));
     let frame = Frame::across(piece.station(chainage_m), across_m);
     Ok(MeshWall { feature, from_m, to_m, x_m, frame, mesh: Arc::new(mesh) })
 }
 
-/// Errors: where the mesh is, the tunnel's wall is more than the same profile along a straight axis.
+/// Checks that the tunnel around a mesh has its plain profile and a straight axis.
+///
+/// Errors: the mesh lies outside the tunnel, meets a bend, or overlaps a change of the wall.
 fn check(
     wall: &MeshWall,
     table: &Section<'_>,

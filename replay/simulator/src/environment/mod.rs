@@ -1,10 +1,11 @@
 //! The environment of a simulated vehicle: the tunnel as built, with its contents and openings.
 //!
-//! The tunnel's frame is Cartesian with its origin at the portal: x along the axis where that is straight, y left, z up.
-//! Where the axis bends, chainage and x differ; see [`Axis`].
+//! The tunnel's frame is Cartesian with its origin at the portal: x along the axis of the first straight part, y left,
+//! z up. In and after a bend, chainage and x differ; see [`Axis`].
 //!
-//! Water is (tube or hollows) without solids. A ray from the water extends to the tube's wall, on through hollows that open
-//! there, and stops at the first solid. Only boulders and roughness draw random numbers, from seeds of their own.
+//! Water is (tube or hollows) without solids. A ray from the water extends to the tube's wall, continues through
+//! hollows that open there, and stops at the first solid. Only boulders and roughness draw random numbers, from their
+//! own seeds.
 
 mod axis;
 mod boulders;
@@ -56,21 +57,21 @@ use stations::Scales;
 use tube::Tube;
 use vector::{Ray, V3};
 
-/// Rays are followed no farther than this, m.
+/// Largest length of a ray, m.
 const FARTHEST_M: f64 = 1.0e5;
-/// Least advance of a ray beyond the end of the last hollow, m.
+/// Minimum advance of a ray beyond the end of the last hollow, m.
 const PROGRESS_M: f64 = 1e-9;
-/// Most hollows and stretches of tube that a ray passes.
+/// Maximum number of hollows and stretches of tube that a ray passes.
 const MOST_PASSAGES: usize = 1_000;
 
 /// The environment of a scene.
 #[derive(Debug, Clone)]
 pub struct Environment {
-    /// The vehicle file's profile, to whose chart points of the wall are referred.
+    /// The vehicle file's profile. Points of the wall are expressed in its chart.
     design: Profile,
     tube: Tube,
     rough: Roughness,
-    /// Straight, as designed, and empty: the profile alone suffices.
+    /// Whether the tunnel is straight, as designed, and empty. The profile alone then suffices.
     plain: bool,
     solids: Vec<Placed<Solid>>,
     hollows: Vec<Placed<Hollow>>,
@@ -82,9 +83,9 @@ pub struct Environment {
 /// End of a ray.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Hit {
-    /// Range, m; of a rough wall to its bumps and hollows.
+    /// Range, m. On a rough wall it includes the bumps and hollows.
     pub range_m: f64,
-    /// Position; of a rough wall on the smooth one that it scatters about.
+    /// Position. On a rough wall it is on the smooth wall underneath.
     pub point: Point3<Tunnel>,
     /// Unit normal there, towards the water.
     pub normal: Vec3<Tunnel>,
@@ -203,11 +204,10 @@ impl Environment {
         })
     }
 
-    /// Hit of the ray from `origin` along the unit vector `direction` within `far_m`; `None` if it meets nothing, or the
-    /// origin isn't in the water.
+    /// Casts a ray from `origin` along the unit vector `direction` to at most `far_m`.
     ///
-    /// A ray that grazes a displaced or bent wall may cross up to 0.1 mm of it unnoticed; elsewhere it is exact.
-    /// Allocates: no.
+    /// `None` if it meets nothing, or the origin isn't in the water. A ray that grazes a displaced or bent wall may
+    /// cross up to 0.1 mm of it unnoticed; elsewhere the result is exact. Allocates: no.
     #[inline]
     pub fn cast(&self, origin: Point3<Tunnel>, direction: Vec3<Tunnel>, far_m: f64) -> Option<Hit> {
         if !self.plain {
@@ -250,15 +250,16 @@ impl Environment {
         })
     }
 
-    /// The hit with the range to the rough wall in place of the smooth one's. The point stays on the smooth wall, so that the side of it on
-    /// which the water is stays certain.
+    /// Replaces the range to the smooth wall by that to the rough wall.
+    ///
+    /// The point stays on the smooth wall, so that it is certain on which side the water is.
     fn roughened(&self, hit: Hit, direction: Vec3<Tunnel>, chainage_m: impl FnOnce() -> f64) -> Hit {
         let cosine = -direction.dot(&hit.normal);
         let deeper_m = self.rough.deeper_m(hit.point, (hit.range_m, cosine), chainage_m);
         Hit { range_m: hit.range_m + deeper_m, ..hit }
     }
 
-    /// Range of [`Environment::cast`] alone to the smooth wall, m, at lower cost.
+    /// Range of [`Environment::cast`] to the smooth wall, m, at lower cost.
     ///
     /// Allocates: no.
     pub fn range_m(&self, origin: Point3<Tunnel>, direction: Vec3<Tunnel>, far_m: f64) -> Option<f64> {
@@ -336,7 +337,7 @@ impl Environment {
                 reach.stop = Some(Stop::Solid { normal, feature: solid.feature });
             }
         }
-        // Met at range zero: the ray begins inside.
+        // At range zero the ray begins inside the solid.
         let in_solid = reach.t_m <= 0.0 && matches!(reach.stop, Some(Stop::Solid { .. }));
         (!in_solid).then_some(reach)
     }
@@ -344,11 +345,11 @@ impl Environment {
     fn start_in_hollow(&self, ray: &Ray) -> Option<Reach> {
         let around = |hollow: &&Placed<Hollow>| hollow.shape.contains(ray.origin);
         let hollow = self.hollows.iter().find(around)?;
-        // The wall here is provisional: the caller's search for hollows finds this one first.
+        // The wall here is provisional, since the caller's search for hollows finds this one first.
         Some(Reach { t_m: 0.0, stop: Some(Stop::Wall(None)), from_m: hollow.span_m.0, to_m: hollow.span_m.1 })
     }
 
-    /// Continues from the end of the tube through the hollows there, and through tube that they lead back to.
+    /// Continues from the end of the tube through the hollows there, and through tube beyond them.
     fn go_on_through_hollows(&self, ray: &Ray, far_m: f64, reach: &mut Reach) {
         for _ in 0..MOST_PASSAGES {
             let before_m = reach.t_m;
@@ -361,7 +362,7 @@ impl Environment {
             if reach.stop.is_none() {
                 return;
             }
-            // A hollow may end on the wall itself: the tube begins `SKIN_M` farther on.
+            // A hollow may end on the wall itself; the tube then begins `SKIN_M` farther.
             if let Some(passage) = self.tube.leave(ray, reach.t_m + SKIN_M, far_m)
                 && passage.t_m > reach.t_m + PROGRESS_M
             {
@@ -380,7 +381,7 @@ impl Environment {
     /// The hollow at the ray's end that extends farthest: range of its end, the normal there, and the hollow.
     fn longest_hollow(&self, ray: &Ray, reach: &Reach) -> Option<(f64, V3, &Placed<Hollow>)> {
         let on_wall = matches!(reach.stop, Some(Stop::Wall(_))) && reach.t_m > 0.0;
-        // The index lists hollows by where they open into the tunnel; deeper in the rock, each may meet any other.
+        // The index lists hollows by the chainage of their opening; deeper in the rock, each hollow may meet any other.
         let (near, all) = if on_wall {
             (self.hollows_by_chainage.near(reach.from_m, reach.to_m), &[][..])
         } else {
@@ -406,7 +407,7 @@ impl Environment {
 
 fn parse_as_built(section: &Section<'_>, load: Loader<'_>) -> Result<Profile, ConfigError> {
     if section.keys().contains(&"length_m") {
-        return Err(section.invalid("length_m", "isn't wanted here; the vehicle file gives the length"));
+        return Err(section.invalid("length_m", "isn't allowed here; the vehicle file gives the length"));
     }
     Ok(TunnelConfig::from_section(section, load)?.profile)
 }

@@ -87,7 +87,8 @@ pub(super) fn side_tunnel(
     let to_wall_m = ground.tube.section_range_m(chainage_m, [middle_m, centre_m], [side, 0.0]).unwrap_or(0.0);
     let (sin, cos) = math::sin_cos(slant_rad);
     let whole_m = to_wall_m / cos + length_m;
-    // A positive slant points towards growing chainage on either side; the opening's middle stays at the chainage given.
+    // A positive slant points towards growing chainage on either side; the opening's middle stays at the given
+    // chainage.
     let mut frame = ground.frame(chainage_m, [middle_m, centre_m]);
     let start = frame.outwards([-to_wall_m * sin / cos, 0.0, 0.0]);
     let inwards = frame.outwards([sin, side * cos, 0.0]);
@@ -102,7 +103,7 @@ pub(super) fn side_tunnel(
     Ok(Placed { shape: Hollow::Block(frame, half), feature, span_m })
 }
 
-/// Chainages of the tunnel that a side tunnel opens into, also where a bend leads past it, m.
+/// Chainages over which a side tunnel opens into the tunnel, also beside a bend, m.
 fn mouth_span_m(
     ground: Ground<'_>,
     chainage_m: f64,
@@ -140,7 +141,7 @@ pub(super) fn gate(
     let profile = ground.tube.profile();
     let reference = ground.tube.scaled(chainage_m, profile.reference());
     let scale = ground.tube.scale(chainage_m);
-    // The depth is that at the sides, at the height of the reference point.
+    // The depth is measured at the sides, at the height of the reference point.
     let to_side_m = ground.tube.section_range_m(chainage_m, reference, [1.0, 0.0]).unwrap_or(depth_m);
     let enlarged = scale * (1.0 + depth_m / to_side_m);
     let ring = Ring {
@@ -151,7 +152,7 @@ pub(super) fn gate(
         scale: enlarged,
     };
     let span_m = ground.span_m(chainage_m, width_m / 2.0);
-    // As large as the slot or larger: the part in the rock meets no ray.
+    // At least as large as the slot: no ray meets the part in the rock.
     let reach_m = enlarged * profile.farthest_m(profile.reference());
     let bulkhead = closed.then(|| Placed {
         shape: Solid::Block(

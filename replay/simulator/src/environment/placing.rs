@@ -5,7 +5,7 @@ use headrace_geometry::tunnel::Profile;
 use super::axis::Axis;
 use super::stations::Scales;
 
-/// On the inside of the tightest bend, an object spans this many times its own length in chainage.
+/// Largest ratio of an object's span of chainage to its length, on the inside of the tightest bend.
 const BEND: f64 = 2.0;
 
 /// A shape, its feature, and the range of chainage that it extends into, m.

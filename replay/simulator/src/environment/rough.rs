@@ -1,7 +1,6 @@
-//! Roughness of the wall: heights that scatter about it, and follow one another over some length.
+//! Roughness of the wall: random heights about the smooth wall, correlated over some length.
 //!
-//! The same place has the same height for every beam that meets it, from whichever sensor and in whichever pass: roughness isn't
-//! noise that looking again would average away.
+//! A place has the same height for every beam, sensor and pass. Roughness therefore can't be averaged away like noise.
 
 use headrace_config::{ConfigError, Section};
 use headrace_geometry::frames::{Point3, Tunnel};
@@ -11,16 +10,16 @@ use super::keys;
 use super::scatter::Scatter;
 use crate::stretch::Stretch;
 
-/// Below this cosine of incidence a beam doesn't reach deeper between the bumps: they hide one another.
+/// Below this cosine of incidence a beam doesn't reach deeper between the bumps, since they hide one another.
 const LEAST_COSINE: f64 = 0.25;
-/// Standard deviation of the sum of four 16-bit numbers, as a share of their range: 4 / 12, square root.
+/// Standard deviation of the sum of four 16-bit numbers, as a share of their range: the root of 4 / 12.
 const SUM_SD: f64 = 0.577_350_269_189_625_8;
 
 /// Rough stretches of the tunnel.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Roughness(Vec<(Stretch, Heights)>);
 
-/// Heights of a stretch: numbers at the nodes of a cubic lattice, and between nodes their mean, weighted by nearness.
+/// Heights of a stretch: random numbers at the nodes of a cubic lattice, with weighted means between nodes.
 #[derive(Debug, Clone, Copy)]
 struct Heights {
     sd_m: f64,
@@ -29,8 +28,10 @@ struct Heights {
 }
 
 impl Roughness {
-    /// Reads `[[tunnel.rough]]`: `from_m`, `to_m`; the standard deviation `sd_m` of the heights, from 0.001 to 0.3; `length_m`, from
-    /// 0.02 to 5 (0.3), beyond which heights have nothing to do with each other; `seed` (1).
+    /// Reads `[[tunnel.rough]]`.
+    ///
+    /// Keys: `from_m`, `to_m`; the standard deviation `sd_m` of the heights, from 0.001 to 0.3; the correlation length
+    /// `length_m`, from 0.02 to 5 (0.3), beyond which heights are independent; `seed` (1).
     ///
     /// Errors: a key that is missing or out of range, or stretches that overlap.
     pub(super) fn parse(tables: Vec<Section<'_>>, tunnel_m: f64) -> Result<Self, ConfigError> {
@@ -49,8 +50,9 @@ impl Roughness {
         Ok(Self(all))
     }
 
-    /// How much farther than the smooth wall the rough one is on a beam that meets that at `point` after `range_m`,
-    /// at this cosine of incidence, m.
+    /// Excess range of the rough wall over the smooth wall, m.
+    ///
+    /// The beam meets the smooth wall at `point` after `range_m`, at this cosine of incidence.
     pub(super) fn deeper_m(
         &self,
         point: Point3<Tunnel>,
@@ -64,13 +66,13 @@ impl Roughness {
         let Some((_, heights)) = self.0.iter().find(|(stretch, _)| stretch.has(chainage_m)) else {
             return 0.0;
         };
-        // No bump reaches more than half way to the sonar.
+        // No bump reaches more than halfway to the sonar.
         (heights.at_m(point) / cosine.max(LEAST_COSINE)).max(-range_m / 2.0)
     }
 }
 
 impl Heights {
-    /// How far the wall lies outside the smooth one, m.
+    /// Distance of the wall outside the smooth wall, m.
     fn at_m(&self, point: Point3<Tunnel>) -> f64 {
         let places = [point.x(), point.y(), point.z()].map(|x_m| {
             let share = x_m / self.length_m;
@@ -88,11 +90,11 @@ impl Heights {
             sum += weight * self.number(nodes);
             squares += weight * weight;
         }
-        // A mean of several scatters less than each: here it doesn't.
+        // A mean of several numbers has less spread than each; this restores the spread.
         self.sd_m * sum / math::sqrt(squares)
     }
 
-    /// A node's number: mean zero, standard deviation one.
+    /// A node's random number: mean zero, standard deviation one.
     fn number(&self, nodes: [i64; 3]) -> f64 {
         let mut hash = self.seed;
         for node in nodes {
@@ -119,7 +121,7 @@ mod tests {
     }
 
     #[test]
-    fn heights_have_the_spread_that_is_asked_for() {
+    fn heights_have_the_given_spread() {
         let many = || (0..100_000).map(|k| at_m(f64::from(k) * 0.137, f64::from(k % 97) * 0.211));
         assert!(mean(many()).abs() < 0.0005, "{}", mean(many()));
         let sd_m = mean(many().map(|h_m| h_m * h_m)).sqrt();
@@ -127,7 +129,7 @@ mod tests {
     }
 
     #[test]
-    fn heights_follow_one_another_within_the_length_and_not_beyond() {
+    fn heights_are_correlated_only_within_the_length() {
         let alike = |apart_m: f64| {
             mean((0..50_000).map(|k| {
                 let x_m = f64::from(k) * 0.371;
@@ -140,7 +142,7 @@ mod tests {
     }
 
     #[test]
-    fn seeds_have_nothing_in_common() {
+    fn different_seeds_are_independent() {
         let other = Heights { seed: 8, ..HEIGHTS };
         let product = mean((0..50_000).map(|k| {
             let at = Point3::new(f64::from(k) * 0.371, 0.2, 0.9);

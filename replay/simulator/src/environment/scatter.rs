@@ -1,4 +1,4 @@
-//! Pseudo-random numbers for what lies in the tunnel, each from a seed of its own.
+//! Pseudo-random numbers for objects in the tunnel, each from its own seed.
 
 /// SplitMix64.
 ///

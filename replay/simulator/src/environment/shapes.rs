@@ -1,7 +1,7 @@
 //! Bodies in the water and hollows in the rock.
 //!
-//! A body gives where a ray first meets it, a hollow how far a ray that is inside it goes. Another kind of shape is another
-//! variant of [`Solid`] or [`Hollow`].
+//! A body gives the first hit of a ray; a hollow gives the length over which a ray inside it continues. A new kind of
+//! shape is a new variant of [`Solid`] or [`Hollow`].
 
 use headrace_geometry::math;
 use headrace_geometry::tunnel::{Profile, Yz};
@@ -11,8 +11,10 @@ use super::frame::Frame;
 use super::mesh_parts::MeshBody;
 use super::vector::{Ray, V3, along, dot, unit};
 
-/// Distance by which a ray's point may miss a hollow and still continue in it, m. A hollow's face may lie on the wall
-/// itself, as a ditch's upper one does on a flat floor; rounding must leave no skin between.
+/// Distance by which a ray's point may miss a hollow and still continue in it, m.
+///
+/// A hollow's face may lie on the wall itself, like the upper face of a ditch on a flat floor. Rounding must leave no
+/// wall between them.
 pub(super) const SKIN_M: f64 = 1e-6;
 
 /// A solid that stops a ray.
@@ -32,7 +34,7 @@ pub(super) enum Solid {
 pub(super) enum Hollow {
     /// A box with these half lengths along the frame's axes, m.
     Block(Frame, V3),
-    /// A slot all round the tunnel.
+    /// A slot around the whole tunnel.
     Ring(Ring),
 }
 
@@ -58,7 +60,7 @@ struct Chord {
 }
 
 impl Solid {
-    /// Where the ray first meets it: the range, 0 if it begins inside, and the outward normal.
+    /// First hit of the ray: the range, 0 if it begins inside, and the outward normal.
     pub(super) fn meet(&self, ray: &Ray) -> Option<(f64, V3)> {
         let chord = match self {
             Self::Ellipsoid(frame, half) => ellipsoid_chord(frame, *half, ray)?,
@@ -119,7 +121,7 @@ impl Ring {
 
     fn leave(&self, ray: &Ray, t_m: f64) -> Option<(f64, V3)> {
         let ray = self.frame.local_ray(ray);
-        // A little ahead: on its own wall, rounding decides whether a point is inside.
+        // Tested slightly ahead, since rounding decides whether a point on the hollow's own wall is inside.
         let t_m = t_m + SKIN_M;
         let at = ray.at(t_m);
         if !self.holds(at) {
@@ -171,7 +173,7 @@ fn block_chord(frame: &Frame, half: V3, ray: &Ray) -> Option<Chord> {
 fn ellipsoid_chord(frame: &Frame, half: V3, ray: &Ray) -> Option<Chord> {
     let local = frame.local_ray(ray);
     // In units of the half diameters it is a unit sphere. The half chord follows from the ray's least distance to the
-    // centre, which loses no digits where b * b - a * c would.
+    // centre, which loses no digits, unlike b * b - a * c.
     let origin = [local.origin[0] / half[0], local.origin[1] / half[1], local.origin[2] / half[2]];
     let slope = [local.direction[0] / half[0], local.direction[1] / half[1], local.direction[2] / half[2]];
     let a = dot(slope, slope);

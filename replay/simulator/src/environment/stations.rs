@@ -71,7 +71,7 @@ impl Scales {
         }
     }
 
-    /// Whether it is 1 everywhere.
+    /// Whether the scale is 1 everywhere.
     #[expect(clippy::float_cmp, reason = "any other scale, however near, is one")]
     pub(super) fn is_one(&self) -> bool {
         self.stations.iter().all(|station| station.1 == 1.0)

@@ -7,9 +7,9 @@ use super::bulge::Bulge;
 
 /// Directions in which a profile is sampled.
 const DIRECTIONS: u32 = 2_000;
-/// Allowance for the directions between.
+/// Allowance for directions between the samples.
 const MARGIN: f64 = 1.05;
-/// Ratio of chainage speed on a bend's inside to the speed of the point, at most: bends are no tighter than twice the
+/// Largest ratio of chainage speed to the point's speed, on the inside of a bend. Bends are no tighter than twice the
 /// tunnel's reach.
 const INSIDE_OF_BEND: f64 = 2.0;
 
@@ -28,7 +28,7 @@ struct View {
     arc_m: f64,
     /// Its distance from the reference point, m.
     radius_m: f64,
-    /// The distance of its tangent from there, m.
+    /// The distance of its tangent from the reference point, m.
     tangent_m: f64,
 }
 
@@ -51,11 +51,11 @@ impl Steepness {
         }
     }
 
-    /// An upper bound on the slope of the gauge where the gauge is at most 1, 1/m.
+    /// An upper bound on the slope of the gauge, in places where the gauge is at most 1, 1/m.
     ///
-    /// With the wall at R(phi) from the reference point, displaced by D(chainage, arc), the gauge is rho / (R - D). In the
-    /// section its slope is sqrt(1 + (R' - D')^2 / (R - D)^2) / (R - D). Along the tunnel D's own slope adds to it, as does the
-    /// change of scale, which moves points in proportion to their distance from the floor's centre.
+    /// With the wall at R(phi) from the reference point, displaced by D(chainage, arc), the gauge is rho / (R - D). In
+    /// the section its slope is sqrt(1 + (R' - D')^2 / (R - D)^2) / (R - D). Along the tunnel D's own slope adds to it,
+    /// and so does the change of scale, which moves points in proportion to their distance from the floor's centre.
     pub(super) fn gauge_slope_pm(
         &self,
         bulges: &[Bulge],

@@ -1,13 +1,13 @@
 //! The tunnel's wall: a profile that follows the axis, changes its scale and is displaced in places.
 //!
-//! The gauge of a point is its distance from the reference point over the wall's in the same direction: below 1 in the
-//! tunnel, 1 on the wall. Where axis and scale are constant and nothing is displaced, the wall has a closed form.
-//! Elsewhere a ray advances in steps of (1 - gauge) over a bound on the gauge's slope, which can't pass the wall however
-//! thin a protrusion; only the last steps are at least [`LEAST_STEP_M`] long, so that a ray may cross rock unnoticed over
-//! less than that.
+//! The gauge of a point is its distance from the reference point divided by the wall's in the same direction: below 1
+//! in the tunnel, 1 on the wall. With a constant axis and scale and no displacement, the wall has a closed form.
+//! Elsewhere a ray advances in steps of (1 - gauge) divided by a bound on the gauge's slope. Such steps can't pass the
+//! wall, however thin a protrusion is. Only the last steps are at least [`LEAST_STEP_M`] long, so a ray may cross rock
+//! unnoticed over less than that.
 //!
-//! A mesh that is the wall has a stretch to itself. The planes across its ends are wall, too, where water on one side meets
-//! rock on the other, so that a ray can't escape where profile and mesh don't fit.
+//! A mesh that replaces the wall has a stretch to itself. The planes across its ends are also wall wherever water on
+//! one side meets rock on the other, so that a ray can't escape if profile and mesh don't fit.
 
 use headrace_geometry::math;
 use headrace_geometry::tunnel::{Profile, Yz};
@@ -39,9 +39,9 @@ pub(super) struct Tube {
     floor: Yz,
     scales: Scales,
     bulges: Vec<Bulge>,
-    /// None overlaps a bend, a change of scale, a bulge or another mesh.
+    /// Meshes that replace the wall. None overlaps a bend, a change of scale, a bulge or another mesh.
     meshes: Vec<MeshWall>,
-    /// Without gaps, from -infinity to +infinity of chainage.
+    /// The stretches, without gaps, from -infinity to +infinity of chainage.
     stretches: Vec<Stretch>,
 }
 
@@ -66,11 +66,11 @@ struct Stretch {
 /// A ray's passage through the tube.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Passage {
-    /// Where it leaves, m along the ray; or the limit given.
+    /// Distance along the ray at which it leaves, m, or the given limit.
     pub(super) t_m: f64,
     /// Whether it ends at wall.
     pub(super) wall: bool,
-    /// The wall there, if it is known without further computation.
+    /// The wall there, if known without further computation.
     pub(super) face: Option<Face>,
     /// Chainage of the beginning and the end, m.
     pub(super) chainages_m: [f64; 2],
@@ -202,7 +202,8 @@ impl Tube {
         self.stretches.get(number).is_some_and(|stretch| self.holds(stretch, point))
     }
 
-    /// How far the ray goes from `t_m` before it leaves the tube, at most to `far_m`; `None` if it isn't inside.
+    /// Distance that the ray travels from `t_m` before it leaves the tube, at most to `far_m`; `None` if it isn't
+    /// inside.
     pub(super) fn leave(&self, ray: &Ray, t_m: f64, far_m: f64) -> Option<Passage> {
         let start = ray.at(t_m);
         let (mut number, start_m) = self.locate(start);
@@ -273,7 +274,8 @@ impl Tube {
         stretch.mesh.and_then(|number| self.meshes.get(number))
     }
 
-    /// Where the ray leaves the tube between `t_m` and `until_m`, all within the stretch; with the face if a mesh is the wall.
+    /// Where the ray leaves the tube between `t_m` and `until_m` within the stretch, with the face if a mesh is the
+    /// wall.
     fn leave_stretch(
         &self,
         stretch: &Stretch,
@@ -292,8 +294,9 @@ impl Tube {
         left.map(|t_m| (t_m, None))
     }
 
-    /// The face of the plane between two stretches where the ray reaches it, at `t_m`; `None` if there is water beyond. Only
-    /// a mesh's end can be wall.
+    /// The face of the plane between two stretches at which the ray arrives, at `t_m`; `None` if there is water beyond.
+    ///
+    /// Only a mesh's end can be wall.
     fn end_wall(&self, from: &Stretch, to: usize, ray: &Ray, t_m: f64) -> Option<Face> {
         let to = self.stretches.get(to)?;
         let mesh = self.mesh_of(to).or(self.mesh_of(from))?;
@@ -308,7 +311,7 @@ impl Tube {
         Some(Face { normal: [against * tx, against * ty, 0.0], feature: Some(mesh.feature()) })
     }
 
-    /// In closed form: straight axis, one profile.
+    /// Closed form of leaving the tube, for a straight axis and a constant profile.
     fn leave_plain(&self, stretch: &Stretch, ray: &Ray, t_m: f64) -> Option<f64> {
         let at = ray.at(t_m);
         let [tx, ty] = stretch.piece.station(0.0).tangent;
@@ -374,7 +377,7 @@ impl Tube {
 
     #[expect(clippy::float_cmp, reason = "any other scale, however near, is one")]
     fn unscaled(&self, section: Yz, scale: f64) -> Yz {
-        // Without this the floor's position could cost a bit, and the plain case must equal the profile's own.
+        // Otherwise the floor's position could cost a bit, and the plain case must equal the profile's own.
         if scale == 1.0 {
             return section;
         }
@@ -382,7 +385,7 @@ impl Tube {
         [fy + (section[0] - fy) / scale, fz + (section[1] - fz) / scale]
     }
 
-    /// The direction in which the gauge falls, a unit vector.
+    /// The direction of steepest descent of the gauge, a unit vector.
     fn falling(&self, stretch: &Stretch, point: V3) -> V3 {
         let mut fall = [0.0; 3];
         for (k, fall) in fall.iter_mut().enumerate() {

@@ -4,7 +4,7 @@ use headrace_geometry::tunnel::Profile;
 
 /// Points at which a profile's extent is evaluated.
 const PLACES: u32 = 2_000;
-/// Allowance for the points between, as a factor of a half-width.
+/// Factor on a half-width that allows for points between the samples.
 const WIDTH_MARGIN: f64 = 1.001;
 /// A floor counts as flat where it rises by less than this, m.
 const FLAT_M: f64 = 1e-3;

@@ -10,7 +10,7 @@ use super::ply::Triangles;
 /// Role of a mesh in a scene.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Role {
-    /// The tunnel's wall over the mesh's own extent along x; open there at both ends, and closed elsewhere.
+    /// The tunnel's wall over the mesh's own extent along x, open at both ends and closed elsewhere.
     Wall,
     /// A closed solid in the water.
     Body,
@@ -22,7 +22,7 @@ const FAR_M: f64 = 100_000.0;
 const WELD: f64 = 1e-9;
 /// A wall's opening lies within this share of its length from an end, or within [`END_M`].
 const END: f64 = 0.02;
-/// As [`END`], in metres; at most a quarter of the length, so that the ends stay apart.
+/// As [`END`], in metres. The result is at most a quarter of the length, so that the ends stay apart.
 const END_M: f64 = 0.5;
 
 /// A surface that has been checked.
@@ -140,7 +140,7 @@ pub(super) fn diagonal(low: [f64; 3], high: [f64; 3]) -> f64 {
 /// For each vertex, the first one within welding distance.
 fn weld(vertices: &[[f64; 3]], low: [f64; 3], diagonal: f64) -> Vec<u32> {
     let near = (WELD * diagonal).max(f64::MIN_POSITIVE);
-    // Cells of several times that width: most vertices look into one only, and none holds many vertices.
+    // Cells are several times that wide: most vertices search only one cell, and no cell holds many vertices.
     let cell = 8.0 * near;
     let mut cells: BTreeMap<[i64; 3], Vec<u32>> = BTreeMap::new();
     let mut welded = Vec::with_capacity(vertices.len());
@@ -222,7 +222,7 @@ fn holes(vertices: &[[f64; 3]], open: &[[u32; 2]]) -> Vec<Hole> {
 
 /// Returns an error if there is any hole.
 fn refuse(vertices: &[[f64; 3]], holes: &[&Hole]) -> Result<(), MeshError> {
-    // The first of the largest.
+    // Of several equally large holes, the first one.
     let Some(largest) = holes.iter().rev().max_by_key(|hole| hole.edges.len()) else {
         return Ok(());
     };
@@ -247,8 +247,9 @@ fn ends(vertices: &[[f64; 3]], holes: &[Hole], low_x: f64, high_x: f64) -> Resul
     Ok(())
 }
 
-/// Closes a hole by triangles from the centroid of its edges' ends to each edge. Whatever its shape, each of its edges
-/// then has two faces, and the inside is defined.
+/// Closes a hole by triangles from the centroid of its rim vertices to each edge.
+///
+/// Whatever the hole's shape, each of its edges then has two faces, and the inside is defined.
 fn cap(vertices: &[[f64; 3]], hole: &Hole) -> Cap {
     let mut middle = [0.0; 3];
     for &corner in hole.edges.as_flattened() {

@@ -9,13 +9,13 @@ pub enum MeshError {
     /// The file can't be read as PLY.
     #[error("reading PLY: {0}")]
     File(String),
-    /// No triangle is left.
+    /// The mesh has no triangle left.
     #[error("the mesh has no face ({given} given; those with two corners in one place don't count)")]
     NoFaces {
-        /// Triangles given, each with two corners in one place.
+        /// Number of triangles given, each with two corners in one place.
         given: usize,
     },
-    /// More than 32 bits can number.
+    /// More elements than 32 bits can number.
     #[error("the mesh has {given} {what}; at most {} can be numbered", u32::MAX)]
     TooMany {
         /// Kind of element.

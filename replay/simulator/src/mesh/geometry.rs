@@ -1,14 +1,14 @@
-//! A ray against a box and a triangle, without gaps between triangles.
+//! Intersects a ray with a box and with a triangle, without gaps between triangles.
 //!
-//! Source: S. Woop, C. Benthin, I. Wald, "Watertight Ray/Triangle Intersection", JCGT 2(1), 2013. The side of the ray on
-//! which an edge passes is the sign of a difference of two products. Rounding keeps their order and swapping the ends
-//! changes only the sign, so the two triangles of an edge agree, or both find zero, which counts as inside: no ray passes
-//! between them.
+//! Source: S. Woop, C. Benthin, I. Wald, "Watertight Ray/Triangle Intersection", JCGT 2(1), 2013. The side of the ray
+//! on which an edge passes is the sign of a difference of two products. Rounding keeps their order, and swapping the
+//! ends changes only the sign. The two triangles of an edge therefore agree, or both find zero, which counts as inside:
+//! no ray passes between them.
 
 use headrace_geometry::math;
 
-/// Threshold below which the position in a triangle is lost in rounding (seen edge-on, or a needle). A few thousand units in
-/// the last place.
+/// Threshold below which rounding dominates the position in a triangle (seen edge-on, or a needle). A few thousand
+/// units in the last place.
 const THIN: f64 = 1e-12;
 /// Widens the interval of a box by more than its rounding error.
 const WIDER: f64 = 1.0 + 1e-15;
@@ -42,8 +42,9 @@ struct Parts {
 }
 
 impl Ray {
-    /// From an origin and a direction of any length, up to `far` times that length. A direction that is zero or not finite
-    /// meets nothing.
+    /// Prepares a ray from an origin and a direction of any length, up to `far` times that length.
+    ///
+    /// A direction that is zero or not finite meets nothing.
     pub(super) fn new(origin: [f64; 3], direction: [f64; 3], far: f64) -> Self {
         let [x, y, z] = direction.map(f64::abs);
         let axes = if z >= x && z >= y {
@@ -58,7 +59,7 @@ impl Ray {
         Self { origin, inverse: direction.map(|d| 1.0 / d), axes, shear, far }
     }
 
-    /// Lower bound of the range at which the ray enters a box; infinite if it misses it.
+    /// Lower bound of the range at which the ray enters a box; infinite if it misses the box.
     ///
     /// Comparisons are written so that NaN, from zero times infinity, bounds nothing.
     pub(super) fn enters(&self, low: [f64; 3], high: [f64; 3]) -> f64 {
@@ -153,8 +154,8 @@ impl Parts {
     }
 }
 
-/// The unit normal of a triangle on the side that a ray of this direction comes from; that of a triangle without area faces
-/// the ray.
+/// The unit normal of a triangle on the side from which a ray of this direction comes. For a triangle without area it
+/// faces the ray.
 pub(super) fn normal_against(triangle: [[f64; 3]; 3], direction: [f64; 3]) -> [f64; 3] {
     let [a, b, c] = triangle;
     let normal = cross(minus(b, a), minus(c, a));

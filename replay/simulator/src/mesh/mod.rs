@@ -28,12 +28,14 @@ pub use check::Role;
 pub use error::MeshError;
 pub use ply::{Triangles, read};
 
-/// Margin of the tree's boxes around their contents, as a share of the mesh's size: more than the rounding error of a
-/// triangle seen from up to a thousand times that distance.
+/// Margin of the tree's boxes around their contents, as a share of the mesh's size.
+///
+/// It exceeds the rounding error of a triangle seen from up to a thousand times that distance.
 const SLACK: f64 = 1e-12;
 
-/// Directions of the rays that test for inside, along no axis or plane that meshes are likely to have; mostly across the
-/// tunnel, where it is short.
+/// Directions of the rays that test whether a point is inside.
+///
+/// They avoid axes and planes that meshes are likely to have, and point mostly across the tunnel, where it is short.
 const WAYS_OUT: [[f64; 3]; 6] = [
     [0.137, 0.811, 0.573],
     [-0.219, -0.547, 0.829],
@@ -64,12 +66,13 @@ pub struct Mesh {
 impl Mesh {
     /// Checks triangles and builds the tree for casting rays.
     ///
-    /// Vertices within 1e-9 of the mesh's size of one another are welded, and triangles with two corners in one place are
-    /// dropped. Openings of a wall lie within 2 % of its length or 0.5 m of an end, whichever is more, but no more than a
-    /// quarter of the length.
-    /// Errors: coordinates out of range, corners that don't exist, no face, an edge of more than two faces, a hole in a body or
-    /// in a wall between its ends, a wall with a closed end.
-    /// Allocates: about 190 bytes per face, and twice that while building; the tree is the same on any machine.
+    /// Vertices closer than 1e-9 of the mesh's size are welded, and triangles with two corners in one place are
+    /// dropped. Openings of a wall lie within 2 % of its length or 0.5 m of an end, whichever is more, but no more than
+    /// a quarter of the length.
+    ///
+    /// Errors: coordinates out of range, corners that don't exist, no face, an edge of more than two faces, a hole in a
+    /// body or in a wall between its ends, a wall with a closed end. Allocates: about 190 bytes per face, and twice
+    /// that while building; the tree is the same on any machine.
     pub fn new(triangles: Triangles, role: Role) -> Result<Self, MeshError> {
         let mut surface = Surface::new(triangles, role)?;
         let largest = surface.low.iter().chain(&surface.high).fold(0.0_f64, |most, c| most.max(c.abs()));
@@ -87,13 +90,13 @@ impl Mesh {
         Ok(Self { surface, tree })
     }
 
-    /// The nearest point where a ray meets the mesh, from either side, no farther than `far_m`.
+    /// The nearest point at which a ray meets the mesh, from either side, no farther than `far_m`.
     ///
-    /// An origin on the surface itself is hit at range 0. `direction_unit` has length 1. `None` also if a number other than
-    /// `far_m` isn't finite.
+    /// An origin on the surface itself is hit at range 0. `direction_unit` has length 1. Also `None` if a number other
+    /// than `far_m` isn't finite.
     pub fn cast(&self, origin: [f64; 3], direction_unit: [f64; 3], far_m: f64) -> Option<MeshHit> {
         let ray = Ray::new(origin, direction_unit, far_m);
-        // Kept beside the tree's own best, which among equal ranges takes the first one visited.
+        // Kept beside the tree's own best hit, which among equal ranges is the first one visited.
         let best: Cell<Option<(f64, u32)>> = Cell::new(None);
         self.tree.find_best(
             f64::MAX,
@@ -111,11 +114,11 @@ impl Mesh {
         Some(MeshHit { range_m, normal, face: self.surface.given[leaf as usize] })
     }
 
-    /// Whether a point is in the solid, or within the wall and between its ends, which count as closed by the triangles from
-    /// the centroid of each opening to its edges. Where parts overlap, points in two of them are outside.
+    /// Whether a point is in the solid, or within the wall and between its ends.
     ///
-    /// Counts the ray's crossings of the surface: odd is inside. A ray that touches an edge is replaced by another; a point
-    /// from which all do is on the surface, and inside.
+    /// The triangles from the centroid of each opening to its edges close the ends. A point in two overlapping parts is
+    /// outside. The function counts the ray's crossings of the surface: odd is inside. A ray that touches an edge is
+    /// replaced by another. If all rays touch edges, the point is on the surface and counts as inside.
     pub fn contains(&self, point: [f64; 3]) -> bool {
         let (low, high) = self.bounds();
         // Written so that NaN is outside.
@@ -150,8 +153,9 @@ impl Mesh {
         (self.surface.low, self.surface.high)
     }
 
-    /// The least and the greatest x between which the mesh is closed all round, metres: a wall's openings lie beyond, or in
-    /// the planes there.
+    /// The least and the greatest x between which the mesh is closed all round, metres.
+    ///
+    /// A wall's openings lie beyond, or in the planes there.
     pub fn closed_m(&self) -> (f64, f64) {
         let (low, high) = (self.surface.low[0], self.surface.high[0]);
         let middle = f64::midpoint(low, high);

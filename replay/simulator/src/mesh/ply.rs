@@ -8,9 +8,9 @@ use ply_rs_bw::ply::{
 use super::MeshError;
 
 const AXES: [&str; 3] = ["x", "y", "z"];
-/// Both names of the list of a face's corners are in use.
+/// Names of the list of a face's corners; both are in use.
 const CORNERS: [&str; 2] = ["vertex_indices", "vertex_index"];
-/// Errors quote a line of the file, which may be of any length.
+/// Longest error text: errors quote a line of the file, which may be of any length.
 const MAX_ERROR_CHARS: usize = 300;
 
 /// Triangles as in the file.
@@ -22,12 +22,12 @@ pub struct Triangles {
     pub faces: Vec<[u32; 3]>,
 }
 
-/// The triangles of a PLY file; polygons become fans about their first corner. Other elements and properties than the
-/// vertices' x, y, z and the faces' corners are ignored.
+/// Reads the triangles of a PLY file; polygons become fans about their first corner.
 ///
-/// Errors: [`MeshError::File`], with the line where the parser gives it. Corners and coordinates are checked by
-/// [`super::Mesh::new`].
-/// Allocates: in proportion to `bytes`, whatever counts the header claims.
+/// Other elements and properties than the vertices' x, y, z and the faces' corners are ignored.
+///
+/// Errors: [`MeshError::File`], with the line if the parser gives it. [`super::Mesh::new`] checks corners and
+/// coordinates. Allocates: in proportion to `bytes`, whatever counts the header claims.
 pub fn read(bytes: &[u8]) -> Result<Triangles, MeshError> {
     let mut reader = Reader::new(bytes);
     let mut header = Parser::<Ignored>::new().read_header(&mut reader).map_err(|error| unreadable(&error))?;
@@ -90,7 +90,7 @@ fn check(header: &Header) -> Result<(), MeshError> {
     Ok(())
 }
 
-/// Makes the parser read coordinates in text as doubles: they may have more digits than the header's type.
+/// Makes the parser read text coordinates as doubles, since they may have more digits than the header's type.
 fn widen_text(header: &mut Header) {
     let Some(vertex) = header.elements.get_mut("vertex").filter(|_| header.encoding == Encoding::Ascii)
     else {

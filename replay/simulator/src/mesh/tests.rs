@@ -144,8 +144,9 @@ fn rough_tube() -> Triangles {
     tube(60, 48, 40.0, || 5.0 + random.signed())
 }
 
-/// Range of the nearest hit by the Moller-Trumbore method, over all triangles, infinite if there is none; `None` for rays
-/// that pass within a billionth of an edge, where the two methods may differ.
+/// Range of the nearest hit by the Moller-Trumbore method over all triangles; infinite if there is none.
+///
+/// `None` for rays that pass within a billionth of an edge, where the two methods may differ.
 fn brute(t: &Triangles, origin: [f64; 3], direction: [f64; 3]) -> Option<f64> {
     let mut nearest = f64::INFINITY;
     for face in &t.faces {
@@ -169,7 +170,7 @@ fn brute(t: &Triangles, origin: [f64; 3], direction: [f64; 3]) -> Option<f64> {
 }
 
 #[test]
-fn rays_hit_what_a_search_over_all_triangles_finds() {
+fn ray_hits_match_a_search_over_all_triangles() {
     let sphere = icosphere(3, || 2.0);
     for (triangles, role) in [
         (sphere, Role::Body),
@@ -232,7 +233,7 @@ fn no_ray_slips_between_triangles() {
             let (direction, distance) = toward(origin, target);
             let hit = mesh.cast(origin, direction, f64::INFINITY);
             let range = hit.unwrap_or_else(|| panic!("out by {target:?} from {origin:?}")).range_m;
-            // The rough body seen from off its centre may hide the target.
+            // Seen from off its centre, the rough body may hide the target.
             assert!(
                 range < distance + 1e-9 && (i % 2 == 1 || range > distance - 1e-9),
                 "{range}, not {distance}"
@@ -246,7 +247,7 @@ fn no_ray_from_a_tubes_axis_slips_through_its_wall() {
     let triangles = rough_tube();
     let mesh = Mesh::new(triangles.clone(), Role::Wall).unwrap();
     for &target in &triangles.vertices {
-        // Straight across, so that one or two components of the direction are zero or nearly so.
+        // Perpendicular to the axis, so that one or two components of the direction are zero or nearly so.
         let origin = [target[0], 0.0, 0.0];
         let (direction, distance) = toward(origin, target);
         let hit = mesh.cast(origin, direction, 100.0).unwrap();
@@ -256,7 +257,7 @@ fn no_ray_from_a_tubes_axis_slips_through_its_wall() {
 
 #[test]
 fn needles_between_triangles_neither_leak_nor_mislead() {
-    // A corner of the box's upper face is split off by points on its edge, so that triangles without area join them.
+    // Points on an edge of the box's upper face split off a corner, so that triangles without area join them.
     let mut t = cuboid([1.0, 1.0, 1.0]);
     let old =
         t.faces.iter().position(|face| face.contains(&4) && face.contains(&5) && face.contains(&7)).unwrap();
@@ -277,7 +278,7 @@ fn needles_between_triangles_neither_leak_nor_mislead() {
 }
 
 #[test]
-fn of_equal_ranges_the_first_face_counts() {
+fn first_face_wins_at_equal_ranges() {
     let triangles = cuboid([1.0, 2.0, 3.0]);
     let hit = |t: &Triangles, direction| {
         Mesh::new(t.clone(), Role::Body).unwrap().cast([0.0; 3], direction, 9.0).unwrap()
@@ -294,7 +295,7 @@ fn of_equal_ranges_the_first_face_counts() {
 }
 
 #[test]
-fn ranges_are_the_same_bits_whatever_the_order_of_faces() {
+fn ranges_are_bit_identical_for_any_order_of_faces() {
     let triangles = rough_body();
     let mut shuffled = triangles.clone();
     let mut random = Random(8);
@@ -312,7 +313,7 @@ fn ranges_are_the_same_bits_whatever_the_order_of_faces() {
 }
 
 #[test]
-fn what_is_no_number_hits_nothing() {
+fn non_finite_rays_hit_nothing() {
     let mesh = Mesh::new(cuboid([1.0; 3]), Role::Body).unwrap();
     let ahead = [1.0, 0.0, 0.0];
     assert!(mesh.cast([f64::NAN, 0.0, 0.0], ahead, 9.0).is_none());
@@ -323,7 +324,7 @@ fn what_is_no_number_hits_nothing() {
 }
 
 #[test]
-fn inside_is_what_lies_before_the_first_hit_from_within() {
+fn points_before_the_first_hit_from_within_are_inside() {
     for (triangles, role) in [(rough_body(), Role::Body), (rough_tube(), Role::Wall)] {
         let mut turned = triangles.clone();
         turned.faces.iter_mut().step_by(2).for_each(|face| face.swap(0, 1));

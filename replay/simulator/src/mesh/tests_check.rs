@@ -27,7 +27,7 @@ fn numbers_out_of_range_are_refused() {
 }
 
 #[test]
-fn triangles_with_two_corners_in_one_place_are_left_out() {
+fn degenerate_triangles_are_dropped() {
     let none = "the mesh has no face (0 given; those with two corners in one place don't count)";
     assert_eq!(refused(&Triangles::default(), Role::Wall), none);
     let mut t = cuboid([1.0; 3]);
@@ -43,7 +43,7 @@ fn triangles_with_two_corners_in_one_place_are_left_out() {
 }
 
 #[test]
-fn vertices_that_exporters_doubled_are_welded() {
+fn duplicated_vertices_are_welded() {
     let whole = icosphere(3, || 2.0);
     let mut t = Triangles::default();
     for (i, corner) in (0_u32..).zip(whole.faces.as_flattened()) {
@@ -76,7 +76,7 @@ fn a_body_with_holes_is_refused() {
     while t.faces[middle].iter().any(|corner| t.faces[0].contains(corner)) {
         middle += 1;
     }
-    // All the faces of one vertex that isn't a corner of the icosahedron.
+    // Removes all faces of one vertex that isn't a corner of the icosahedron.
     t.faces.retain(|face| !face.contains(&100));
     let expected =
         "the mesh has 2 hole(s) where it must be closed; the largest has 6 edges, one of them at (";
@@ -91,11 +91,11 @@ fn a_body_with_holes_is_refused() {
 }
 
 #[test]
-fn a_wall_is_open_at_its_ends_and_there_alone() {
+fn wall_is_open_only_at_its_ends() {
     let whole = tube(100, 8, 100.0, || 2.0);
     assert!(Mesh::new(whole.clone(), Role::Wall).is_ok());
 
-    // 16 faces between two rings: a missing one within 2 % of the end is part of the end's unevenness.
+    // 16 faces between two rings: a missing face within 2 % of the end counts as unevenness of the end.
     let mut t = whole.clone();
     t.faces.remove(16);
     assert!(Mesh::new(t, Role::Wall).is_ok());

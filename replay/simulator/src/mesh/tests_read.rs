@@ -72,7 +72,7 @@ impl Out<'_> {
 }
 
 #[test]
-fn what_is_written_is_read_back_in_every_encoding() {
+fn triangles_are_read_back_in_every_encoding() {
     let t = sample();
     assert_eq!((t.faces.len(), t.vertices.len()), (80, 42));
     for encoding in ENCODINGS {
@@ -99,7 +99,7 @@ fn refused(bytes: &[u8]) -> String {
 }
 
 #[test]
-fn faults_are_told_with_what_is_wrong() {
+fn text_file_faults_are_described() {
     let good = "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\nelement \
                 face 1\nproperty list uchar int vertex_indices\nend_header\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n";
     assert!(read(good.as_bytes()).is_ok());
@@ -131,13 +131,13 @@ fn faults_are_told_with_what_is_wrong() {
     );
     let words = refused(good.replace("3 0 1 2", "3 0 1 3").as_bytes());
     assert_eq!(words, "face 0 has vertex 3 as a corner, of 3 vertices (both counted from 0)");
-    // An error doesn't quote lines of any length.
+    // An error quotes only the beginning of a long line.
     let words = refused(good.replace("1 0 0", &"x".repeat(100_000)).as_bytes());
     assert!(words.len() < 400, "{words}");
 }
 
 #[test]
-fn faults_in_binary_files_are_told_too() {
+fn binary_file_faults_are_described() {
     let binary = ply(&sample(), "binary_big_endian");
     let faces = binary.len() - 80 * 17;
     let words = refused(&binary[..faces + 3]);
@@ -149,14 +149,14 @@ fn faults_in_binary_files_are_told_too() {
     wrong[faces + 1] = 0x7F;
     assert!(refused(&wrong).starts_with("face 0 has vertex 2147483647 as a corner, of 42 vertices"));
     let mut wrong = binary;
-    // The x of the first vertex, behind the header, two cameras and its colour.
+    // The x of the first vertex, after the header, two cameras and its colour.
     let x = faces - 42 * 31 + 1;
     wrong[x..x + 8].copy_from_slice(&f64::NAN.to_be_bytes());
     assert!(refused(&wrong).starts_with("vertex 0 (counted from 0) is at (NaN, "));
 }
 
 #[test]
-fn counts_that_lie_take_no_memory() {
+fn wrong_counts_take_no_memory() {
     let file = |vertices: u64, list: &str| {
         format!(
             "ply\nformat binary_little_endian 1.0\nelement nothing {vertices}\nelement vertex {vertices}\nproperty float \
@@ -181,7 +181,7 @@ fn counts_that_lie_take_no_memory() {
 proptest! {
     /// No bytes cause a panic; they give a mesh or an error.
     #[test]
-    fn any_bytes_are_let_pass_or_refused(bytes in proptest::collection::vec(any::<u8>(), 0..300), start in 0..3_usize) {
+    fn any_bytes_give_a_mesh_or_an_error(bytes in proptest::collection::vec(any::<u8>(), 0..300), start in 0..3_usize) {
         let starts = ["", "ply\nformat ascii 1.0\n", "ply\nformat binary_little_endian 1.0\nelement vertex 3\nproperty float "];
         let bytes = [starts[start].as_bytes(), &bytes].concat();
         if let Ok(t) = read(&bytes) {
@@ -191,7 +191,7 @@ proptest! {
 
     /// The same for files in which a few bytes are changed, lost or doubled.
     #[test]
-    fn damaged_files_are_let_pass_or_refused(
+    fn damaged_files_give_a_mesh_or_an_error(
         encoding in 0..3_usize,
         changes in proptest::collection::vec((any::<proptest::sample::Index>(), any::<u8>(), 0..4_u8, any::<bool>()), 1..6),
     ) {

@@ -1,4 +1,4 @@
-//! The trajectory of a pilot who hears a monitor's advice: decided as the dive goes, a few seconds ahead of it.
+//! The trajectory of a pilot who follows a monitor's advice. It is decided during the dive, a few seconds ahead.
 
 use headrace_geometry::math;
 use headrace_geometry::time::{DurNs, MonoNs};
@@ -14,21 +14,22 @@ use crate::told::Told;
 const STEP_S: f64 = 0.5;
 /// Time constant of the vehicle's response to the stick, s.
 const RESPONSE_S: f64 = 2.0;
-/// Knots that a place depends on beyond its time.
+/// Number of knots beyond its time that a place depends on.
 const KNOTS_AHEAD: i64 = 3;
 /// Speed at which the pilot goes back, m/s.
 const BACK_MPS: f64 = 0.2;
-/// How far a missed stretch must lie behind before the pilot goes back for it, and from how far before it he passes it again, m.
+/// Distance that a missed stretch must lie behind before the pilot goes back, and lead-in distance for passing it
+/// again, m.
 const BEHIND_M: f64 = 3.0;
 const RUN_UP_M: f64 = 2.5;
-/// A speed is held to a share that wanders over this time, s.
+/// Time over which the held share of the advised speed varies, s.
 const HOLD_S: f64 = 20.0;
-/// How long the pilot stands still in all because he is told so, s.
+/// Longest total time that the pilot keeps stationary because of advice, s.
 const MOST_STOOD_S: f64 = 120.0;
-/// How long the pilot waits at the end for what may still be told, s.
+/// Time that the pilot waits at the end for further advice, s.
 const WAITS_S: f64 = 10.0;
 
-/// A stretch on which the pilot is in a hurry and heeds no advice.
+/// A stretch on which the pilot is in a hurry and ignores advice.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Hurry {
     pub(super) from_m: f64,
@@ -42,19 +43,20 @@ pub(super) struct Heeding {
     /// Chainage of start and end, m; the end lies further in.
     pub(super) from_m: f64,
     pub(super) to_m: f64,
-    /// Position in the cross-section about which it drifts: y, z, m.
+    /// Position in the cross-section about which the vehicle drifts: y, z, m.
     pub(super) across_m: [f64; 2],
     /// The largest speed driven, m/s.
     pub(super) speed_mps: f64,
-    /// Delay between what is told and what is done, s, at least 3.
+    /// Delay between advice and action, s, at least 3.
     pub(super) lag_s: f64,
-    /// How far the speed held falls short of what is told, a share at most.
+    /// Largest share by which the held speed falls short of the advised speed.
     pub(super) within: f64,
     /// Whether missed stretches are passed again.
     pub(super) goes_back: bool,
-    /// Whether he stands still when told so, for the gyros' bias or for want of a position, and until he hears the first word.
+    /// Whether the pilot keeps stationary when advised to, for the gyros' bias or without a position, and until the
+    /// first advice.
     pub(super) stands: bool,
-    /// How long the pilot waits before he sets out, s.
+    /// Time that the pilot waits before setting out, s.
     pub(super) waits_s: f64,
     pub(super) hurries: Vec<Hurry>,
     /// The longest dive, s.
@@ -85,12 +87,12 @@ pub(super) struct Advised {
     x_m: f64,
     speed_mps: f64,
     farthest_m: f64,
-    /// Stretches that have been passed again.
+    /// Missed stretches that have been passed again.
     tried_m: Vec<[f64; 2]>,
     /// Number of the next knot to decide.
     next: i64,
     ended_s: Option<f64>,
-    /// How long the pilot has stood because he was told so, s.
+    /// Total time that the pilot has been stationary because of advice, s.
     stood_s: f64,
 }
 
@@ -122,7 +124,7 @@ impl Advised {
         }
     }
 
-    /// The longest that the dive may last, s; once the pilot is through, how long it has.
+    /// Longest possible duration of the dive, s; once the pilot has finished, its actual duration.
     pub(super) fn duration_s(&self) -> f64 {
         self.ended_s.unwrap_or(self.pilot.at_most_s)
     }
@@ -133,12 +135,12 @@ impl Advised {
         place
     }
 
-    /// Lets a current carry the vehicle.
+    /// Makes a current carry the vehicle.
     pub(super) fn carry(&mut self, flow: &Flow) {
         self.flow = flow.clone();
     }
 
-    /// Hears what is told, and decides the motion up to a time after the start, s.
+    /// Processes advice and decides the motion up to `until_s` after the start, s.
     pub(super) fn lead(&mut self, told: Vec<Told>, until_s: f64) {
         self.heard.extend(told);
         let last = math::floor_to_i64(until_s / STEP_S) + KNOTS_AHEAD;
@@ -187,14 +189,15 @@ impl Advised {
         }
     }
 
-    /// The last that was told a lag before, if any.
+    /// The last advice at least one lag before `at_s`, if any.
     fn told_at(&self, at_s: f64) -> Option<Told> {
         let by = START + DurNs::from_secs_f64((at_s - self.pilot.lag_s).max(0.0));
         let heard = |told: &&Told| told.at <= by && by > MonoNs(START.0);
         self.heard.iter().rev().find(heard).cloned()
     }
 
-    /// The farthest missed stretch that lies behind, all of it at the end of the way, and hasn't been tried yet.
+    /// The farthest missed stretch that lies behind and hasn't been passed again. While the pilot waits at the end, it
+    /// may lie at any distance behind.
     fn to_go_back_for(&self, told: &Told) -> Option<[f64; 2]> {
         let behind_m = if matches!(self.doing, Doing::Waiting { .. }) { 0.0 } else { BEHIND_M };
         let missed = told.missed_m.iter().filter(|[from_m, to_m]| {
@@ -205,7 +208,7 @@ impl Advised {
         missed.filter(|_| self.pilot.goes_back)
     }
 
-    /// Whether the pilot stands still, as he does until he is told anything; not for ever.
+    /// Whether the pilot keeps stationary. He does so until the first advice, but not for ever.
     fn stands(&mut self, told: Option<&Told>) -> bool {
         let stands = self.pilot.stands && self.stood_s < MOST_STOOD_S && told.is_none_or(|told| told.stand);
         self.stood_s += if stands { STEP_S } else { 0.0 };
@@ -225,7 +228,7 @@ impl Advised {
             return 0.0;
         }
         let pilot = &self.pilot;
-        // Where slower doesn't help, or nothing is known, the pilot goes on.
+        // If slowing down doesn't help, or nothing is known, the pilot goes on.
         let v_max_mps = told.and_then(|told| told.v_max_mps).filter(|v_max_mps| *v_max_mps > 0.0);
         v_max_mps.map_or(pilot.speed_mps, |v_max_mps| (v_max_mps * (1.0 + hold)).min(pilot.speed_mps))
     }

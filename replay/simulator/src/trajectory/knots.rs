@@ -7,7 +7,7 @@ use crate::random::Stream;
 /// Along the axis, left, up (m); roll, pitch, yaw (radians).
 pub type Offsets = [f64; 6];
 
-/// Control points of a spline, `spacing_s` apart; the first belongs to one spacing before the start.
+/// Control points of a spline, `spacing_s` apart; the first is one spacing before the start.
 ///
 /// The curve stays within the hull of four neighbouring points, so it never exceeds their range.
 #[derive(Debug, Clone, PartialEq)]
@@ -17,7 +17,7 @@ pub struct Knots {
 }
 
 impl Knots {
-    /// A spline for `duration_s` whose point number k, for the time k `spacing_s`, is `point(k)`; k begins at -1.
+    /// A spline for `duration_s`. Its point number k, from -1, is `point(k)` for the time k `spacing_s`.
     pub fn new(duration_s: f64, spacing_s: f64, mut point: impl FnMut(i64) -> Offsets) -> Self {
         let last = math::floor_to_i64(duration_s / spacing_s) + 2;
         Self { spacing_s, points: (-1..=last).map(&mut point).collect() }
@@ -84,8 +84,9 @@ impl Knots {
     }
 }
 
-/// A random variation about zero within `reach` either way, of period `period_s`: control points half a period apart,
-/// drawn evenly. Its standard deviation is 0.4 of the reach.
+/// A random variation about zero within `reach` either way, of period `period_s`.
+///
+/// Control points are half a period apart and drawn evenly. The standard deviation is 0.4 of the reach.
 pub fn wandering(stream: Stream, duration_s: f64, period_s: f64, reach: Offsets) -> Knots {
     Knots::new(duration_s, period_s / 2.0, |k| {
         // Knots begin at -1.

@@ -5,7 +5,7 @@ use super::place::Place;
 
 /// Lowest speed of a leg, m/s.
 const SLOWEST_MPS: f64 = 1e-3;
-/// Shortest piece of a leg that is cut off where the water's flow changes, m.
+/// Shortest piece into which a leg is cut where the flow changes, m.
 const SHORTEST_M: f64 = 1e-6;
 
 /// A leg at constant speed.
@@ -28,7 +28,7 @@ impl Leg {
 pub(super) struct Legs {
     across_m: [f64; 2],
     legs: Vec<Leg>,
-    /// Time, s, and chainage, m, at the beginning of each.
+    /// Time, s, and chainage, m, at the beginning of each leg.
     begins: Vec<(f64, f64)>,
     start_m: f64,
 }
@@ -57,9 +57,9 @@ impl Legs {
         Place { chainage_m, across_m: self.across_m, turned_rad: [0.0; 3] }
     }
 
-    /// The same speeds through water that flows: a leg is cut where the flow changes.
+    /// Applies a flow at the same speeds through water; a leg is cut where the flow changes.
     ///
-    /// Errors, as text: a leg that makes no way against the flow.
+    /// Errors, as text: a leg makes no progress against the flow.
     pub(super) fn carry(&mut self, flow: &Flow) -> Result<(), String> {
         let mut legs = Vec::with_capacity(self.legs.len());
         for (number, (leg, (_, begins_m))) in self.legs.iter().zip(&self.begins).enumerate() {

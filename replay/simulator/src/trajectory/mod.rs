@@ -1,4 +1,4 @@
-//! The vehicle's trajectory through the tunnel: its position at any time, relative to the axis.
+//! The vehicle's trajectory through the tunnel: its position relative to the axis at any time.
 
 mod advised;
 mod flow;
@@ -55,18 +55,18 @@ impl Trajectory {
         Self { duration_s: piloted.duration_s(), base: Base::Piloted(Box::new(piloted)), sways: Vec::new() }
     }
 
-    /// The trajectory of a pilot who hears advice.
+    /// The trajectory of a pilot who follows advice.
     fn advised(advised: Advised) -> Self {
         Self { duration_s: advised.duration_s(), base: Base::Advised(Box::new(advised)), sways: Vec::new() }
     }
 
-    /// Whether it depends on what the pilot is told.
+    /// Whether it depends on advice to the pilot.
     pub fn is_advised(&self) -> bool {
         matches!(self.base, Base::Advised(_))
     }
 
-    /// Hears what the pilot is told, and decides the motion up to `until_s` seconds after the start. A trajectory that is given
-    /// stays as it is.
+    /// Passes advice to the pilot and decides the motion up to `until_s` seconds after the start. Other trajectories
+    /// don't change.
     pub(crate) fn lead(&mut self, told: Vec<Told>, until_s: f64) {
         if let Base::Advised(advised) = &mut self.base {
             advised.lead(told, until_s);
@@ -74,12 +74,12 @@ impl Trajectory {
         }
     }
 
-    /// Duration, s; of an advised pilot's, the longest, until he is through.
+    /// Duration, s. For an advised pilot it is the longest possible one until he has finished.
     pub fn duration_s(&self) -> f64 {
         self.duration_s
     }
 
-    /// Position `after_s` seconds after the start. Before it, and after the end, the motion continues.
+    /// Position `after_s` seconds after the start. The motion continues before the start and after the end.
     pub fn place(&self, after_s: f64) -> Place {
         let mut place = match &self.base {
             Base::Legs(legs) => legs.place(after_s),
@@ -93,15 +93,14 @@ impl Trajectory {
         place
     }
 
-    /// Adds a further motion, over the current duration.
+    /// Superposes a further motion over the current duration.
     pub fn sway(&mut self, knots: Knots) {
         self.sways.push(knots);
     }
 
-    /// Lets the water's flow carry a vehicle that moves through the water. It
-    /// reaches the same end, after another duration.
+    /// Makes the flow carry a vehicle that moves through the water. It reaches the same end after another duration.
     ///
-    /// Errors, as text: a leg that makes no way against the current; a trajectory given over ground.
+    /// Errors, as text: a leg that makes no progress against the current; a trajectory given over ground.
     pub fn carry(&mut self, flow: &Flow) -> Result<(), String> {
         match &mut self.base {
             Base::Legs(legs) => {
@@ -113,7 +112,7 @@ impl Trajectory {
                 self.duration_s = piloted.duration_s();
             }
             Base::Advised(advised) => advised.carry(flow),
-            Base::Knots(_) => return Err("is of no effect: the trajectory is given over ground".to_owned()),
+            Base::Knots(_) => return Err("has no effect: the trajectory is given over ground".to_owned()),
         }
         Ok(())
     }

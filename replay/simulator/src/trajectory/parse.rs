@@ -43,7 +43,7 @@ const KINDS: [(&str, TrajectoryKind); 5] = [
 
 /// Reads a trajectory in a tunnel of this design; also returns the reference of its speeds.
 ///
-/// Errors: a key that is missing, unknown or out of range; a trajectory that leaves the tunnel at its ends.
+/// Errors: a key that is missing, unknown or out of range; a trajectory that goes beyond the tunnel's ends.
 pub(crate) fn parse(
     section: &Section<'_>,
     (design, length_m): (&Profile, f64),
@@ -112,7 +112,7 @@ fn legs(section: &Section<'_>, tunnel: Tunnel<'_>) -> Result<Trajectory, ConfigE
         let Some(parsed) = parsed else { continue };
         legs.push(parsed);
         chainage_m += parsed.distance_m * parsed.speed_mps.signum();
-        // Where it leads is known if all legs before are right.
+        // The leg's end is known if all previous legs are valid.
         if legs.len() == number + 1 {
             tunnel.check(leg, "distance_m", chainage_m)?;
         }
@@ -141,7 +141,7 @@ fn waypoints(section: &Section<'_>, tunnel: Tunnel<'_>) -> Result<Trajectory, Co
     }
     let (knots, duration_s) = waypoints::knots(&points);
     if points.is_empty() || duration_s <= 0.0 {
-        let problem = "go nowhere; wanted are at least two places apart, or one with stay_s";
+        let problem = "don't move; give at least two different places, or one with stay_s";
         return Err(section.invalid("waypoints", problem));
     }
     Ok(Trajectory::of_knots(knots, duration_s))
@@ -180,7 +180,9 @@ fn pilot(section: &Section<'_>, tunnel: Tunnel<'_>, seed: u64) -> Result<Traject
     Ok(Trajectory::piloted(piloted))
 }
 
-/// Reach of a pilot's drift: left and up, m; roll, pitch and yaw, radians. `usual` is left, up and yaw in degrees.
+/// Reads the reach of a pilot's drift: left and up, m; roll, pitch and yaw, radians.
+///
+/// `usual` has the defaults of left, up, and yaw in degrees.
 fn wander(section: &Section<'_>, [left, up, yaw]: [f64; 3]) -> Result<Offsets, ConfigError> {
     let or = |key, allowed, usual: f64| section.number(key, allowed).map(|value| value.unwrap_or(usual));
     let degrees = |key, usual| or(key, REACH_DEG, usual).map(f64::to_radians);

@@ -1,4 +1,4 @@
-//! A pilot's trajectory: moving, stopping, going back to look again, and drifting all the while.
+//! A pilot's trajectory: moving, stopping, going back for a second look, and drifting throughout.
 
 use headrace_geometry::math;
 
@@ -11,7 +11,7 @@ use crate::random::Stream;
 const STEP_S: f64 = 0.5;
 /// Time constant of the vehicle's response to the stick, s.
 const RESPONSE_S: f64 = 2.0;
-/// A dive of more than this multiple of its duration without stops is taken as endless.
+/// Ratio to its duration without stops above which a dive counts as endless.
 const MOST_TIMES_AS_LONG: f64 = 50.0;
 
 /// Parameters of a pilot.
@@ -20,11 +20,11 @@ pub(super) struct Pilot {
     /// Chainage of start and end, m.
     pub(super) from_m: f64,
     pub(super) to_m: f64,
-    /// Position in the cross-section about which it drifts: y, z, m.
+    /// Position in the cross-section about which the vehicle drifts: y, z, m.
     pub(super) across_m: [f64; 2],
     /// Speed while moving, m/s.
     pub(super) speed_mps: f64,
-    /// Stops and reversals per hour, each.
+    /// Stops per hour, and reversals per hour.
     pub(super) stops_per_hour: f64,
     pub(super) backs_per_hour: f64,
     /// The shortest and longest stop, s, and distance back, m.
@@ -35,7 +35,7 @@ pub(super) struct Pilot {
     pub(super) period_s: f64,
 }
 
-/// A pilot's trajectory with the pilot, who takes a different one in a current.
+/// A pilot and his trajectory, which changes with a current.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Piloted {
     pilot: Pilot,
@@ -68,7 +68,7 @@ impl Pilot {
                 break;
             }
             if step > most {
-                return Err(format!("has not come to {} m after {most} half seconds", self.to_m));
+                return Err(format!("has not reached {} m after {most} half seconds", self.to_m));
             }
             doing = self.decide(doing, stick, step as u64);
             if (x_m - self.from_m) * towards <= 0.0 && matches!(doing, Doing::Back { .. }) {

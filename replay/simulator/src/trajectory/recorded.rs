@@ -13,8 +13,10 @@ const MAX_S: f64 = 172_800.0;
 /// A pose with its time, s.
 type Timed = (f64, Offsets);
 
-/// Reads lines `t_s,chainage_m,y_m,z_m[,roll_deg,pitch_deg,yaw_deg]`; returns the poses, with times from the first. Skips
-/// lines that begin with #, and the first other line if it is text; times must increase. Angles are unwrapped.
+/// Reads lines `t_s,chainage_m,y_m,z_m[,roll_deg,pitch_deg,yaw_deg]`; returns the poses, with times from the first.
+///
+/// Lines that begin with # are skipped, and so is the first other line if it is text. Times must increase. Angles are
+/// unwrapped.
 ///
 /// Errors, as text, with the line.
 pub(super) fn parse(text: &str) -> Result<Vec<Timed>, String> {
@@ -47,7 +49,7 @@ pub(super) fn parse(text: &str) -> Result<Vec<Timed>, String> {
     };
     let duration_s = last_s - first_s;
     if !(duration_s > 0.0 && duration_s <= MAX_S) {
-        return Err(format!("takes {duration_s} s; allowed are up to {MAX_S} s, and more than none"));
+        return Err(format!("takes {duration_s} s; it must be above 0 and at most {MAX_S} s"));
     }
     for (at_s, _) in &mut timed {
         *at_s -= first_s;
@@ -61,7 +63,7 @@ pub(super) fn knots(timed: &[Timed]) -> (Knots, f64) {
     (through(timed, SPACING_S, duration_s), duration_s)
 }
 
-/// Unwraps angles to within half a turn of the previous ones: 179 degrees and -179 are near each other.
+/// Unwraps angles to within half a turn of the previous ones, so that 179 and -179 degrees are near each other.
 fn turn_short([.., roll, pitch, yaw]: &Offsets, [.., new_roll, new_pitch, new_yaw]: &mut Offsets) {
     for (before, angle) in [(roll, new_roll), (pitch, new_pitch), (yaw, new_yaw)] {
         *angle = before + math::wrap_signed(*angle - before, math::TAU);

@@ -46,9 +46,9 @@ fn legs_follow_each_other_without_a_jump() {
     assert!(steps.windows(2).all(|w| (w[1].chainage_m - w[0].chainage_m).abs() < 0.005 + 1e-9));
 }
 
-/// Corners are rounded over two seconds, so that a trajectory begins and ends a sixth of half a second's travel inside.
+/// Corners are rounded over two seconds, so the trajectory begins and ends a sixth of half a second's travel inside.
 #[test]
-fn waypoints_are_gone_through_at_their_speeds() {
+fn waypoints_are_passed_at_their_speeds() {
     let trajectory = trajectory(
         "kind = \"waypoints\"\n\
                    [[trajectory.waypoints]]\nchainage_m = 2\nplace_m = [0, 4]\n\
@@ -74,7 +74,7 @@ const PILOT: &str = "kind = \"pilot\"\nplace_m = [0, 5]\nstart_m = 3\nspeed_mps 
                      backs_per_hour = 90\nwander_yaw_deg = 8\nwander_s = 10\n";
 
 #[test]
-fn a_pilot_comes_to_the_end_within_bounds_there_and_back() {
+fn pilot_reaches_the_end_within_bounds_both_ways() {
     for (from_m, to_m) in [(3.0, 60.0), (3.0, -15.0)] {
         for seed in 0..20 {
             let (trajectory, ground) = parsed(&format!("{PILOT}to_m = {to_m}\n"), seed).unwrap();
@@ -101,9 +101,9 @@ fn a_pilot_comes_to_the_end_within_bounds_there_and_back() {
     }
 }
 
-/// The distance gone back is as drawn, to the nearest step.
+/// The distance back is as drawn, to the nearest step.
 #[test]
-fn a_pilot_goes_back_as_far_as_wanted() {
+fn pilot_goes_back_the_given_distance() {
     let keys = "kind = \"pilot\"\nto_m = 190\nspeed_mps = 1\nstops_per_hour = 0\nbacks_per_hour = 30\n\
                 back_m = [3, 3]\nwander_across_m = 0\nwander_up_m = 0\n";
     let (mut lost_m, mut backs) = (0.0, 0.0);
@@ -114,20 +114,20 @@ fn a_pilot_goes_back_as_far_as_wanted() {
         backs += gone.windows(2).filter(|w| w[0] >= 0.0 && w[1] < 0.0).count() as f64;
         lost_m += trajectory.duration_s() - 190.0;
     }
-    // Three seconds back, and three to make up for them; 1.5 go with starting.
+    // Three seconds back, and three to make up for them; starting takes 1.5.
     let each_s = (lost_m - 50.0 * 1.5) / backs;
     assert!((each_s - 6.0).abs() < 0.3, "{each_s} of {backs}");
 }
 
 #[test]
-fn another_seed_is_another_pilot_and_the_same_the_same() {
+fn pilot_depends_only_on_the_seed() {
     let at = |seed| parsed(&format!("{PILOT}to_m = 60\n"), seed).unwrap().0;
     assert_eq!(at(4), at(4));
     assert_ne!(at(4), at(5));
 }
 
 #[test]
-fn a_recorded_way_is_gone_as_recorded() {
+fn recorded_trajectory_is_followed_as_recorded() {
     let file = "# from the log of 3 May\n t_s,chainage_m,y_m,z_m,roll_deg,pitch_deg,yaw_deg\n\n\
                 100,5,0,4,0,0,170\n110,7,1,4,0,2,-170\n# a break\n130,7,1,5,0,2,-170\n";
     let (trajectory, ground) = recorded("kind = \"recorded\"\nfile = \"track.csv\"\n", 1, file).unwrap();
@@ -143,7 +143,7 @@ fn a_recorded_way_is_gone_as_recorded() {
 }
 
 #[test]
-fn what_is_wrong_with_a_recorded_way_is_named() {
+fn errors_of_a_recorded_trajectory_are_named() {
     let why = |file: &str| recorded("kind = \"recorded\"\nfile = \"track.csv\"\n", 1, file).unwrap_err();
     for (file, problem) in [
         ("", "has no line with a place"),
@@ -161,7 +161,7 @@ fn what_is_wrong_with_a_recorded_way_is_named() {
 }
 
 #[test]
-fn ways_that_leave_the_tunnel_or_go_nowhere_are_refused() {
+fn trajectories_that_leave_the_tunnel_or_do_not_move_are_refused() {
     let why = |trajectory: &str| parsed(trajectory, 1).unwrap_err();
     let leg = "[[trajectory.legs]]\ndistance_m = 350\nspeed_mps = -1\n";
     assert!(why(&format!("start_m = 400\n{leg}")).contains("start_m = 400: leads to chainage 400 m"));
@@ -238,7 +238,7 @@ fn wandering_has_its_reach_and_spread() {
         products += offsets[0] * offsets[1] / f64::from(count);
     }
     for (variance, reach) in squares.into_iter().zip(reach) {
-        // Of some 2,000 independent stretches; the variance is 151/315 of that of even numbers.
+        // Over about 2,000 independent stretches; the variance is 151/315 of that of even numbers.
         let wanted = reach * reach / 3.0 * 151.0 / 315.0;
         assert!((variance - wanted).abs() <= 0.1 * wanted, "{variance} {wanted}");
     }
@@ -251,10 +251,10 @@ fn everywhere(speed_mps: f64) -> Flow {
     flow
 }
 
-/// Where the flow changes within a leg, each piece takes its length over its own speed; the places between are where those
-/// times put them.
+/// If the flow changes within a leg, each piece takes its length divided by its own speed, and the places between
+/// follow from those times.
 #[test]
-fn a_current_carries_along_its_own_stretch_alone() {
+fn current_carries_only_within_its_stretch() {
     let mut flow = Flow::default();
     assert!(flow.add(Stretch { from_m: 4.0, to_m: 7.0 }, 0.1));
     assert!(flow.add(Stretch { from_m: 10.0, to_m: f64::INFINITY }, -0.05));
@@ -285,14 +285,14 @@ fn a_current_carries_along_its_own_stretch_alone() {
             legs.place(after_s).chainage_m
         );
     }
-    // Only the leg that the flow is too strong for is refused, and only where it flows.
+    // Only the leg for which the flow is too strong is refused, and only with flow on it.
     let mut strong = Flow::default();
     assert!(strong.add(Stretch { from_m: 100.0, to_m: 200.0 }, -1.0));
     legs.carry(&strong).unwrap();
 }
 
 #[test]
-fn a_current_carries_what_goes_through_water() {
+fn current_carries_only_motion_through_water() {
     let mut legs = trajectory("[[trajectory.legs]]\ndistance_m = 12\nspeed_mps = 0.2\n");
     legs.carry(&everywhere(0.1)).unwrap();
     assert!((legs.duration_s() - 40.0).abs() < 1e-9 && (legs.place(20.0).chainage_m - 6.0).abs() < 1e-9);
@@ -302,7 +302,7 @@ fn a_current_carries_what_goes_through_water() {
     let still_s = pilot.duration_s();
     pilot.carry(&everywhere(0.2)).unwrap();
     assert!(pilot.duration_s() < still_s && (pilot.place(pilot.duration_s()).chainage_m - 60.0).abs() < 0.4);
-    assert!(pilot.carry(&everywhere(-0.6)).unwrap_err().contains("has not come to 60 m"));
+    assert!(pilot.carry(&everywhere(-0.6)).unwrap_err().contains("has not reached 60 m"));
 
     let mut ground =
         Trajectory::of_knots(Knots::new(10.0, 1.0, |k| [k as f64, 0.0, 4.0, 0.0, 0.0, 0.0]), 10.0);
@@ -310,7 +310,7 @@ fn a_current_carries_what_goes_through_water() {
 }
 
 #[test]
-fn a_sway_adds_to_any_way() {
+fn sway_adds_to_any_trajectory() {
     let mut legs = trajectory("place_m = [0.5, 4]\n[[trajectory.legs]]\ndistance_m = 12\nspeed_mps = 0.2\n");
     legs.sway(Knots::new(60.0, 1.0, |_| [1.0, 0.25, -0.5, 0.1, 0.2, 0.3]));
     let place = legs.place(30.0);

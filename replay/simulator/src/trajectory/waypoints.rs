@@ -35,7 +35,7 @@ pub(super) fn knots(waypoints: &[Waypoint]) -> (Knots, f64) {
     (through(&timed, SPACING_S, at_s), at_s)
 }
 
-/// Knots on the straight lines between poses with their times, s, which increase or repeat.
+/// Knots on the straight lines between timed poses, whose times increase or repeat.
 pub(super) fn through(timed: &[(f64, Offsets)], spacing_s: f64, duration_s: f64) -> Knots {
     Knots::new(duration_s, spacing_s, |k| {
         let at_s = k as f64 * spacing_s;

@@ -1,8 +1,10 @@
-//! `switch LIST.json`: puts mutants of the listed sources behind a switch, so that one build has them all.
+//! `switch LIST.json`: puts all mutants of the listed sources behind a switch, so that a single build contains them
+//! all.
 //!
-//! The list is that of `cargo mutants --list --json`, a number added to each (`id`). Each file that it names is rewritten in place, relative to the
-//! current folder: `a + b` becomes `if crate::switched::on(7) { a - b } else { a + b }`. Prints the numbers of those that can't be
-//! switched: what is computed when it is compiled, and conditions that bind a name.
+//! LIST.json is the output of `cargo mutants --list --json` with a number (`id`) added to each mutant. Each file in
+//! it is rewritten in place, relative to the current folder:
+//! `a + b` becomes `if crate::switched::on(7) { a - b } else { a + b }`. The program prints the ids of mutants that can't be switched: code evaluated at compile time, and
+//! conditions that bind a name.
 
 use std::collections::BTreeMap;
 use std::error::Error;
@@ -71,12 +73,12 @@ fn main() -> Result<(), Box<dyn Error>> {
     Ok(())
 }
 
-/// A file's text with its places switched.
+/// Source text of a file, with the places to rewrite.
 struct Text<'a> {
     source: &'a str,
-    /// Outer places before those within them.
+    /// Outer places come before the places inside them.
     places: &'a [Place],
-    /// The mutants of a place, by its index.
+    /// Mutants of each place, by the index of the place.
     switched: &'a BTreeMap<usize, Vec<&'a Mutant>>,
 }
 
@@ -85,7 +87,7 @@ impl Text<'_> {
         self.within(0..self.source.len(), 0)
     }
 
-    /// The text of a range, places from the one of index `first` on switched.
+    /// Returns the text of a range, with the places from index `first` on behind switches.
     fn within(&self, range: Range<usize>, first: usize) -> String {
         let mut out = String::new();
         let mut at = range.start;
@@ -101,7 +103,8 @@ impl Text<'_> {
         out + &self.source[at..range.end]
     }
 
-    /// A place with its mutants, each on a line of its own: by it the compiler's errors are put down to them.
+    /// Writes a place with each of its mutants on a line of its own, so that a compiler error can be assigned to its
+    /// mutant.
     fn place(&self, index: usize, place: &Place, mutants: &[&Mutant]) -> String {
         let inner = |range: &Range<usize>| self.within(range.clone(), index + 1);
         let raw = |range: &Range<usize>| &self.source[range.clone()];
@@ -144,7 +147,7 @@ impl Text<'_> {
     }
 }
 
-/// Where something begins, as cargo-mutants says it.
+/// Start of a syntax element in cargo-mutants' notation.
 fn start(of: &impl Spanned) -> Position {
     of.span().start().into()
 }

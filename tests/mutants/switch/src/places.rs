@@ -1,4 +1,4 @@
-//! The places in a file that a mutant may change, outer ones first.
+//! Finds the places in a file that a mutant may change, outer places first.
 
 use std::ops::Range;
 
@@ -11,10 +11,10 @@ use syn::{
 
 use crate::{Position, start};
 
-/// A place; ranges are of bytes.
+/// A place that a mutant may change; ranges are in bytes.
 pub(crate) struct Place {
     pub(crate) range: Range<usize>,
-    /// Where cargo-mutants says that it is.
+    /// Position of the place in cargo-mutants' list.
     pub(crate) named_at: Position,
     pub(crate) kind: Kind,
 }
@@ -32,14 +32,14 @@ pub(crate) enum Kind {
     Guard,
     /// A function's statements.
     Body,
-    /// An arm of a match up to its arrow.
+    /// A match arm up to its arrow.
     Arm {
         guard: Option<Range<usize>>,
     },
 }
 
 impl Kind {
-    /// The name that cargo-mutants has for it.
+    /// Name of this kind of place in cargo-mutants' list.
     pub(crate) fn genre(&self) -> &'static str {
         match self {
             Self::Binary { .. } => "BinaryOperator",
@@ -69,7 +69,7 @@ impl Found {
     }
 }
 
-/// What is computed when it is compiled can't ask a switch: it isn't looked into.
+/// Compile-time code can't read a switch, so the visitor doesn't descend into it.
 impl<'a> Visit<'a> for Found {
     fn visit_item_const(&mut self, _: &'a ItemConst) {}
     fn visit_item_static(&mut self, _: &'a ItemStatic) {}
@@ -131,7 +131,8 @@ impl<'a> Visit<'a> for Found {
     }
 }
 
-/// Whether a condition binds a name, as `if let` does: no other operator can join it.
+/// Returns whether a condition binds a name, as `if let` does. Such a condition can't be combined with another
+/// operator.
 fn binds(expression: &Expr) -> bool {
     match expression {
         Expr::Let(_) => true,

@@ -1,4 +1,4 @@
-//! The counter's readings against the estimate: what is fused, and what a dispute changes.
+//! Handling of cable counter readings: whether to fuse them, and the effects of a dispute.
 
 use headrace_geometry::math;
 use headrace_sensor::device::SensorKind;
@@ -15,7 +15,8 @@ use crate::filter::state::{CREEP, Errors, POSITION, RATE_BIAS, VELOCITY, add_to}
 use crate::filter::window::Waiting;
 
 impl Eskf {
-    /// Judges a counter's reading by its innovation and that one's variance, m and m^2: whether to fuse it. `None` of other sensors.
+    /// Judges a counter reading by its innovation, m, and its variance, m^2; returns whether to fuse it. `None` for
+    /// other sensors.
     pub(super) fn believes_counter(
         &mut self,
         waiting: &Waiting,
@@ -45,7 +46,7 @@ impl Eskf {
         Some(self.trusts(&CableReading { at, shown_m, off_m, sd_m, agrees, is_usual, is_lively }, errors))
     }
 
-    /// Corrects by a counter's reading, and notes what that has made of the estimate.
+    /// Corrects by a counter reading, and notes its effect on the estimate.
     pub(super) fn correct_by_counter(&mut self, row: &ScalarUpdate, known: &Errors, errors: &mut Errors) {
         let along = |eskf: &Self, errors: &Errors| {
             [POSITION, VELOCITY].map(|i| [errors.get(i).copied().unwrap_or(0.0), eskf.factors.variance(i)])
@@ -57,7 +58,7 @@ impl Eskf {
         self.cable.corrections.note(by, [before_p[1] - after_p[1], before_v[1] - after_v[1]]);
     }
 
-    /// Judges a cable reading; whether it is to be fused. What it has lost becomes creep.
+    /// Judges a cable reading; returns whether to fuse it. Its loss becomes creep.
     fn trusts(&mut self, reading: &CableReading, errors: &mut Errors) -> bool {
         let used = self.cable.take(reading);
         self.slipped_m2 += self.cable.corrections.take_slipped_m2();
@@ -73,10 +74,11 @@ impl Eskf {
             }
             Use::Slipped(lost_m) => {
                 self.slack_level.skip();
-                // The vehicle stays where it is, so that what is placed now fits what was placed in the doubt.
+                // The vehicle keeps its position, so that later soundings fit those placed during the doubt.
                 add_to(errors, CREEP, lost_m);
                 add_to(&mut self.doubts, CREEP, lost_m * lost_m);
-                // Either may have been wrong: what the counter has lost, and what the vehicle may have made meanwhile.
+                // Either source may have been wrong: the loss of the counter, and the motion of the vehicle
+                // meanwhile.
                 self.slipped_m2 += (lost_m * lost_m).max(reading.sd_m * reading.sd_m);
                 self.ties += 1;
             }

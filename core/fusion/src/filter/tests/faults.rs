@@ -12,10 +12,10 @@ use headrace_sensor::reading::{CountRestart, EchoRange, Reading, SonarReturn, Te
 const ALL: [usize; 9] = [0, 1, 2, 3, 4, 5, 6, 7, 8];
 const NOT_UNIT: [usize; 8] = [1, 2, 3, 4, 5, 6, 7, 8];
 const RANGES: [usize; 6] = [3, 4, 5, 6, 7, 8];
-/// When faults begin.
+/// Time at which faults begin.
 const FAULT_S: f64 = 20.0;
 
-/// Replaces readings of some sources for a time after the faults begin.
+/// Replaces readings of some sources for a while after the faults begin.
 fn say_otherwise(
     events: &mut [Event],
     sources: &[usize],
@@ -30,7 +30,7 @@ fn say_otherwise(
     }
 }
 
-/// A source repeats its last reading.
+/// Makes a source repeat its last reading.
 fn freeze(events: &mut [Event], source: usize, for_s: f64) {
     let before = events.to_vec();
     let last = |like: &Reading| {
@@ -41,7 +41,7 @@ fn freeze(events: &mut [Event], source: usize, for_s: f64) {
     say_otherwise(events, &[source], for_s, |reading, _| last(reading));
 }
 
-/// Runs the fault unchecked, as it is indistinguishable from such motion, and checks that all is right after it.
+/// Runs the filter unchecked during the fault, which looks like real motion, and checks it afterwards.
 fn recovers(rig: &Rig, events: &[Event], wrong_until_s: f64) {
     let mut nav = rig.navigation();
     let parts = [0.0, FAULT_S, wrong_until_s, f64::INFINITY];
@@ -62,8 +62,8 @@ fn recovers(rig: &Rig, events: &[Event], wrong_until_s: f64) {
 }
 
 #[test]
-fn a_long_silence_is_survived_and_nothing_is_invented() {
-    /// Name, trajectory, silent sources, duration, and whether there is no fix at the end.
+fn fix_is_withheld_after_long_silence_and_returns() {
+    /// Name, trajectory, silent sources, duration, and whether the fix is missing at the end.
     type Silence = (&'static str, Way, &'static [usize], f64, bool);
     let near_wall: Way = |t| Pose {
         position: Point3::new(3.0 + 0.1 * t, 5.2, 3.0),
@@ -96,11 +96,11 @@ fn a_long_silence_is_survived_and_nothing_is_invented() {
 }
 
 #[test]
-fn uncertainty_grows_while_nothing_is_heard() {
+fn uncertainty_grows_while_all_sensors_are_silent() {
     let rig = Rig::new(rest, 1);
     let mut nav = rig.navigation();
     rig.run(&mut nav, &rig.events(0.0, FAULT_S));
-    // The first beat brings the last readings of the window.
+    // The first period still contains the last readings of the window.
     let last = at(FAULT_S + 1.0);
     Rig::hear(&mut nav, &Event { received: last, valid: last, source: OTHER, reading: rig.rate(0.0) });
     let mut before = nav.running().unwrap().factors;
@@ -109,20 +109,20 @@ fn uncertainty_grows_while_nothing_is_heard() {
         let beat = Event { received: t, valid: t, source: OTHER, reading: rig.rate(0.0) };
         Rig::hear(&mut nav, &beat);
         let running = nav.running().unwrap();
-        // What the cable has crept stays; position, velocity and attitude don't.
+        // The creep of the cable does not grow, but position, velocity and attitude do.
         for i in (0..10).filter(|i| *i != CREEP) {
             let (now, then) = (running.factors.variance(i), before.variance(i));
-            assert!(now > then, "error {i} at beat {k}: {now}, {then} before");
+            assert!(now > then, "error {i} in period {k}: {now}, {then} before");
         }
         before = running.factors;
     }
     assert!(matches!(nav.fix(at(FAULT_S + 15.5)), Err(NoFix::Chainage | NoFix::Section | NoFix::Heading)));
-    // Nor does the estimate drift off.
+    // The estimate does not drift away either.
     assert!((nav.running().unwrap().state.position - rig.unit(0.0)).norm() < 1.0);
 }
 
 #[test]
-fn what_is_no_number_is_dropped_and_counted() {
+fn readings_that_are_not_finite_are_dropped_and_counted() {
     let rig = Rig::new(cruise, 1);
     for bad in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY] {
         for source in ALL {
@@ -151,7 +151,7 @@ fn spoilt(reading: &Reading, bad: f64) -> Reading {
 }
 
 #[test]
-fn a_saturated_unit_is_not_believed() {
+fn saturated_unit_is_rejected() {
     let rig = Rig::new(cruise, 1);
     for (magnitude, for_s) in [(156.9, 0.02), (156.9, 1.0), (1e300, 0.02), (f64::MAX, 5.0)] {
         for is_rate in [true, false] {
@@ -166,7 +166,7 @@ fn a_saturated_unit_is_not_believed() {
             let mut nav = rig.navigation();
             let tally = rig.run(&mut nav, &events);
             assert!(nav.consistency(IMU).unwrap().dropped > 0);
-            // What a force may have carried isn't known; while that is too much, there is no fix.
+            // The speed change of a rejected force is unknown. While that uncertainty is too large, there is no fix.
             let lacking = if is_rate { 0 } else { math::round_to_i64(10.0 * for_s) + 5 };
             assert!(i64::from(tally.lacking) <= lacking, "{magnitude} for {for_s} s: {tally:?}");
         }
@@ -174,7 +174,7 @@ fn a_saturated_unit_is_not_believed() {
 }
 
 #[test]
-fn a_compass_may_be_disturbed() {
+fn disturbed_compass_is_survived() {
     for off_deg in [5.0_f64, 10.0, 20.0, 60.0, 180.0] {
         for sudden in [true, false] {
             let rig = Rig::new(cruise, 1);
@@ -195,7 +195,7 @@ fn a_compass_may_be_disturbed() {
 }
 
 #[test]
-fn a_sensor_that_jumps_and_comes_back_is_left_out() {
+fn jumping_sensor_is_rejected() {
     type Jump = fn(&Reading) -> Reading;
     let jumps: [(usize, Jump); 5] = [
         (TETHER, |reading| match reading {
@@ -229,7 +229,8 @@ fn a_sensor_that_jumps_and_comes_back_is_left_out() {
         let mut nav = rig.navigation();
         let tally = rig.run(&mut nav, &events);
         let consistency = nav.consistency(source).unwrap();
-        // While counter and estimate differ by metres the chainage isn't known: the jump, and a second until the counter runs truly.
+        // While counter and estimate differ by metres, the chainage is unknown: during the jump, and a second until
+        // the counter runs correctly.
         let lacking = if source == TETHER { 45 } else { 0 };
         assert!(
             tally.lacking <= lacking && consistency.gated >= 6,
@@ -239,7 +240,7 @@ fn a_sensor_that_jumps_and_comes_back_is_left_out() {
 }
 
 #[test]
-fn restart_of_the_counter_keeps_the_chainage_only_where_the_counter_alone_was_away() {
+fn restarted_counter_keeps_the_chainage_only_if_it_alone_was_away() {
     for (away_s, are_all_away, is_lost) in [(0.0, false, true), (1.0, true, true), (1.0, false, false)] {
         let rig = Rig::new(cruise, 1);
         let mut events = rig.events(0.0, 60.0);
@@ -274,8 +275,8 @@ fn ranged(reading: &Reading, share: f64) -> Reading {
 }
 
 #[test]
-fn a_jump_that_a_vehicle_could_make_is_got_over() {
-    // A knock, or a faulty unit: no single sensor shows it, and until the others have corrected it the fix is wrong.
+fn plausible_jump_is_survived() {
+    // A knock or a faulty unit: no single sensor shows it, and the fix is wrong until the others have corrected it.
     let forces = [(5.0, 0.2), (5.0, 1.0), (1.0, 5.0), (0.2, 20.0)].map(|jump| (jump, false));
     let rates = [(5.0, 0.02), (5.0, 0.2), (1.0, 1.0), (0.1, 5.0), (0.01, 20.0)].map(|jump| (jump, true));
     let jumps = forces.into_iter().chain(rates).flat_map(|jump| (1..=6).map(move |seed| (jump, seed)));
@@ -294,9 +295,9 @@ fn a_jump_that_a_vehicle_could_make_is_got_over() {
 }
 
 #[test]
-fn a_frozen_sensor_is_got_over() {
-    // The depth and one head are outvoted at once. An echosounder drags the position off by centimetres before its range is
-    // too unlikely.
+fn frozen_sensor_is_survived() {
+    // The depth sensor and one head are outvoted at once. An echosounder pulls the position by centimetres before its
+    // range becomes too improbable.
     let frozen = [(DEPTH, 0.0), (HEADS, 0.0), (ECHOES, 35.0), (ECHOES + 2, 35.0), (IMU, 60.0)];
     for (source, wrong_s) in frozen {
         for seed in 1..=6 {
@@ -308,11 +309,11 @@ fn a_frozen_sensor_is_got_over() {
     }
 }
 
-/// A counter that stands while the vehicle goes on, and one that has lost what it stood for: the estimate stays right by its own
-/// standard deviations all the while, and the counter is doubted within two seconds.
-/// Its echo is that of its own frame, or the last one heard, while it goes on turning: each turn it agrees with the wall for a while.
+/// The head reports the echo of its own frame, or its last echo, while it keeps turning.
+///
+/// In each turn it agrees with the wall for a while.
 #[test]
-fn a_head_that_says_one_range_turns_nothing() {
+fn head_with_one_range_does_not_turn_the_estimate() {
     let (for_s, mut gated) = (40.0, 0);
     for seed in 1..=5 {
         let rig = Rig::new(cruise, seed);
@@ -331,8 +332,9 @@ fn a_head_that_says_one_range_turns_nothing() {
     assert!(gated > 500, "{gated}");
 }
 
+/// The estimate stays right by its own standard deviations, and the counter is doubted within two seconds.
 #[test]
-fn a_counter_that_stands_or_slips_is_noticed_and_not_followed() {
+fn stuck_or_slipping_counter_is_doubted_and_not_followed() {
     for seed in 1..4 {
         for for_s in [2.0, 5.0, 10.0, 15.0] {
             for comes_back in [false, true] {
@@ -372,10 +374,12 @@ fn length_m(reading: &Reading) -> f64 {
     length.length_m
 }
 
-/// A counter that stands for good while the vehicle goes on: sooner or later nothing says where it is, and that is said. One that goes on so
-/// steadily that gyros and accelerometers would feel the same at rest isn't at rest, either.
+/// A counter sticks for good while the vehicle moves on. Eventually the position is unknown, and the filter reports
+/// that.
+///
+/// Motion steady enough to feel like rest to gyros and accelerometers does not count as rest.
 #[test]
-fn a_counter_that_stays_stuck_leaves_no_fix_rather_than_a_wrong_one() {
+fn permanently_stuck_counter_leads_to_no_fix() {
     let steady: Way = |t| Pose { position: Point3::new(3.0 + 0.2 * t, 0.4, 4.0), attitude: Rot::identity() };
     for way in [cruise, steady] {
         let rig = Rig::new(way, 1);
@@ -387,9 +391,9 @@ fn a_counter_that_stays_stuck_leaves_no_fix_rather_than_a_wrong_one() {
     }
 }
 
-/// The vehicle turns back within a sample: the unit's force is beyond what is plausible, and true.
+/// The vehicle reverses within one sample: the unit's force is implausible, but real.
 #[test]
-fn a_jolt_is_uncertain_and_soon_found_by_the_cable() {
+fn jolt_is_uncertain_until_the_cable_corrects_it() {
     let jolted: Way = |t| Pose {
         position: Point3::new(if t < FAULT_S { 3.0 + 0.5 * t } else { 13.0 - 0.5 * (t - FAULT_S) }, 0.4, 4.0),
         attitude: Rot::identity(),

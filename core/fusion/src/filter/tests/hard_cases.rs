@@ -1,4 +1,4 @@
-//! Extremes of time, order, attitude and scale. The outcome of each is a fix that is right by its own sd, or the named
+//! Extremes of time, order, attitude and scale. Each ends with a fix that is right by its own sd, or with the named
 //! missing part.
 
 use super::super::factors::Factors;
@@ -17,7 +17,7 @@ use headrace_support::hard_cases::{found, found_at};
 
 const HOUR: DurNs = DurNs(3_600_000_000_000);
 
-/// The estimate and its covariance a second after the last reading was valid, when the window is empty.
+/// Estimate and covariance a second after the last reading was valid, when the window is empty.
 fn outcome(rig: &Rig, events: &[Event]) -> (State, Factors<ERRORS>) {
     let mut nav = rig.navigation();
     let last = events.iter().map(|event| event.valid).max().unwrap();
@@ -31,7 +31,7 @@ fn outcome(rig: &Rig, events: &[Event]) -> (State, Factors<ERRORS>) {
 }
 
 #[test]
-fn an_ordinary_minute_is_right_and_agrees_with_itself() {
+fn ordinary_minute_is_right_and_consistent() {
     for seed in 1..5 {
         let rig = Rig::new(cruise, seed);
         let mut nav = rig.navigation();
@@ -54,7 +54,7 @@ fn an_ordinary_minute_is_right_and_agrees_with_itself() {
 }
 
 #[test]
-fn ten_hours_of_dead_reckoning_end_with_one_precise_fix() {
+fn precise_fix_after_10_h_of_dead_reckoning_is_absorbed() {
     let rig = Rig { imu_s: 0.1, ..Rig::new(cruise, 1) };
     let mut nav = rig.navigation();
     rig.run(&mut nav, &rig.events(0.0, 20.0));
@@ -68,8 +68,8 @@ fn ten_hours_of_dead_reckoning_end_with_one_precise_fix() {
         }
         rig.check(&nav, events.last().unwrap().received, &mut tally);
     }
-    assert!(nav.running().is_none() && nav.fix(at(f64::from(end_s))).is_err(), "nothing is invented");
-    assert_eq!(nav.consistency(IMU).unwrap().dropped, 0, "what nobody waits for takes no room");
+    assert!(nav.running().is_none() && nav.fix(at(f64::from(end_s))).is_err(), "a fix without measurements");
+    assert_eq!(nav.consistency(IMU).unwrap().dropped, 0, "unused samples must not fill the window");
     rig.run(&mut nav, &rig.events(f64::from(end_s), f64::from(end_s + 60)));
     let fix = nav.fix(at(f64::from(end_s + 60)));
     assert!(fix.is_ok(), "{fix:?} {:?}", nav.running().map(super::super::eskf::Eskf::pose_sd));
@@ -92,7 +92,7 @@ fn noise_of_any_scale_keeps_the_covariance_sound() {
 }
 
 #[test]
-fn a_leg_of_any_length_adds_what_it_should() {
+fn leg_of_any_length_adds_the_expected_variance() {
     let settings = Settings::default();
     let felt =
         Felt { rate_radps: Some(Vec3::new(0.1, 0.2, -0.1)), force_mps2: Some(Vec3::new(0.1, 0.0, 9.8)) };
@@ -109,7 +109,7 @@ fn a_leg_of_any_length_adds_what_it_should() {
             }
             assert!(state.is_sound() && factors.is_sound(), "{dt_s} s: {state:?}");
             for i in 0..ERRORS {
-                // Errors of the pose never shrink by waiting; those that decay do.
+                // Errors of the pose never shrink over time; errors that decay do.
                 let least = if i < 9 { 1e-4 * (1.0 - 1e-12) } else { 0.0 };
                 assert!(factors.variance(i) > least, "{dt_s} s, error {i}: {}", factors.variance(i));
             }
@@ -122,11 +122,11 @@ fn a_leg_of_any_length_adds_what_it_should() {
 }
 
 #[test]
-fn a_sample_told_twice_counts_once() {
+fn repeated_sample_counts_once() {
     let rig = Rig::new(cruise, 1);
     let events = rig.events(0.0, 20.0);
     let right = outcome(&rig, &events);
-    // At the same time; a nanosecond later; and with a timestamp that has gone back.
+    // The second copy comes at the same time, a nanosecond later, or with an earlier timestamp.
     for (later, delay) in [(0, 0), (1, 1), (0, 90_000_000)] {
         let mut again = events.clone();
         let inertial = events.iter().filter(|event| !matches!(event.reading, Reading::Attitude(_)));
@@ -141,7 +141,7 @@ fn a_sample_told_twice_counts_once() {
 }
 
 #[test]
-fn all_sensors_may_speak_at_once() {
+fn simultaneous_readings_are_fused() {
     let rig = Rig::new(cruise, 3);
     let mut events = Vec::new();
     for k in 1..=400 {
@@ -165,11 +165,11 @@ fn all_sensors_may_speak_at_once() {
 }
 
 #[test]
-fn readings_of_one_time_may_come_in_any_order() {
+fn readings_give_the_same_result_in_any_arrival_order() {
     let rig = Rig::new(cruise, 2);
     let events = rig.events(0.0, 30.0);
     let right = outcome(&rig, &events);
-    // Each source has its own delay, so that they overtake each other; all of it within the window.
+    // Each source has its own delay within the window, so that readings overtake each other.
     for shift in 1..4 {
         let mut mixed = events.clone();
         for event in mixed.iter_mut().filter(|event| seconds(event.valid) > 2.0) {
@@ -179,7 +179,7 @@ fn readings_of_one_time_may_come_in_any_order() {
         mixed.sort_by_key(|event| event.received);
         assert_eq!(outcome(&rig, &mixed), right, "shift {shift}");
     }
-    // Any number of readings of an unused source in between changes nothing.
+    // Readings of an unused source in between, however many, have no effect.
     let mut beaten = events.clone();
     beaten.extend((1..9000).map(|k| {
         let t = at(f64::from(k) / 300.0);
@@ -190,7 +190,7 @@ fn readings_of_one_time_may_come_in_any_order() {
 }
 
 #[test]
-fn late_readings_are_counted_and_change_nothing() {
+fn late_readings_are_counted_and_ignored() {
     let rig = Rig::new(cruise, 1);
     let window_ms = rig.settings.window.0 / 1_000_000;
     for (delay_ms, is_late) in [(window_ms - 1, false), (window_ms + 101, true)] {
@@ -210,7 +210,7 @@ fn late_readings_are_counted_and_change_nothing() {
 }
 
 #[test]
-fn any_attitude_is_as_good_as_another() {
+fn filter_works_at_any_attitude() {
     let ways: [(&str, Way); 6] = [
         ("nose up, over and back", |t| tilting(t, -1.8)),
         ("nose down, over and back", |t| tilting(t, 1.8)),
@@ -224,7 +224,7 @@ fn any_attitude_is_as_good_as_another() {
             let rig = Rig::new(way, seed);
             let mut nav = rig.navigation();
             let tally = rig.run(&mut nav, &rig.events(0.0, 70.0));
-            // Where no echosounder looks up or down, the first estimate has no height.
+            // The first estimate has no height if no echosounder looks up or down.
             assert!(tally.lacking <= 2, "{name}: {tally:?}");
         }
     }
@@ -243,7 +243,7 @@ fn still(t: f64, pitch: f64, yaw: f64) -> Pose {
 }
 
 #[test]
-fn a_quaternion_may_have_either_sign_and_any_length() {
+fn quaternion_sign_and_length_have_no_effect() {
     let rig = Rig::new(|t| still(t, 0.02, math::PI + 0.2 * math::sin(t / 4.0)), 1);
     let events = rig.events(0.0, 30.0);
     let (right, _) = outcome(&rig, &events);
@@ -264,7 +264,7 @@ fn a_quaternion_may_have_either_sign_and_any_length() {
 }
 
 #[test]
-fn a_fix_of_a_moment_ago_is_turned_back_too() {
+fn past_fix_has_the_past_attitude() {
     let rig = Rig::new(|t| still(t, 0.01, 0.5 * t), 1);
     let mut nav = rig.navigation();
     rig.run(&mut nav, &rig.events(0.0, 30.0));
@@ -276,7 +276,7 @@ fn a_fix_of_a_moment_ago_is_turned_back_too() {
 }
 
 #[test]
-fn a_fix_of_a_moment_ago_is_where_the_vehicle_was() {
+fn past_fix_has_the_past_position() {
     let rig = Rig::new(cruise, 1);
     let mut nav = rig.navigation();
     rig.run(&mut nav, &rig.events(0.0, 30.0));
@@ -288,9 +288,9 @@ fn a_fix_of_a_moment_ago_is_where_the_vehicle_was() {
 }
 
 #[test]
-fn the_receive_time_may_do_anything() {
+fn any_receive_time_is_survived() {
     let rig = Rig::new(rest, 2);
-    // The clock stands still for a second at a time; then goes back by as much with each.
+    // The clock stops for a second at a time, then goes back by as much each time.
     for (stamp, back) in [(1_000_000_000_u64, false), (100_000_000, true)] {
         let mut events = rig.events(0.0, 40.0);
         for event in &mut events {
@@ -302,7 +302,7 @@ fn the_receive_time_may_do_anything() {
         let tally = rig.run(&mut nav, &events);
         assert!(tally.fixes > 30, "{tally:?}");
     }
-    // An hour is skipped.
+    // The clock skips an hour.
     let mut events = rig.events(0.0, 90.0);
     for event in events.iter_mut().filter(|event| seconds(event.valid) > 30.0) {
         (event.valid, event.received) = (event.valid + HOUR, event.received + HOUR);
@@ -311,7 +311,7 @@ fn the_receive_time_may_do_anything() {
     let tally = rig.run(&mut nav, &events);
     assert_eq!(nav.restarts(), 1, "{tally:?}");
     assert!(nav.fix(at(90.0) + HOUR).is_ok(), "{:?}", nav.fix(at(90.0) + HOUR));
-    // One reading is stamped an hour ahead, and again one whose time of validity is then; the rest goes on as before.
+    // One reading is stamped an hour ahead, and so is one whose time of validity is then. The rest is unchanged.
     let mut events = rig.events(0.0, 60.0);
     let middle = events.len() / 2;
     events[middle].received = events[middle].received + HOUR;
@@ -321,22 +321,23 @@ fn the_receive_time_may_do_anything() {
     for event in &events {
         Rig::hear(&mut nav, event);
     }
-    // Once for the apparent silence of an hour's jump, and once when the clock comes back.
+    // One restart for the apparent silence of an hour's jump, and one when the clock returns.
     assert_eq!(nav.restarts(), 2);
     assert_eq!(nav.consistency(source).unwrap().dropped, 1);
     assert!(nav.fix(at(60.0)).is_ok());
 }
 
-/// The cruise, so many kilometres in.
+/// The cruise, starting `KM` kilometres into the tunnel.
 fn cruise_at<const KM: u32>(t: f64) -> Pose {
     let Pose { position: at, attitude } = cruise(t);
     Pose { position: Point3::new(at.x() + 1e3 * f64::from(KM), at.y(), at.z()), attitude }
 }
 
-/// Wherever the vehicle is, one pass is as sure against the next as near the portal, and as right: the cable's scale on the way
-/// there makes the chainage itself less sure, by 2 km at 1,000.
+/// The relative error between passes is the same at any chainage.
+///
+/// The cable's scale makes the chainage itself less certain with distance, by 2 km at 1,000 km.
 #[test]
-fn far_from_the_portal_passes_are_as_sure_as_near_it() {
+fn passes_are_equally_certain_at_any_chainage() {
     let ways: [(f64, Way); 3] = [(3e3, cruise_at::<3>), (7e3, cruise_at::<7>), (1e6, cruise_at::<1000>)];
     let (mut moved_m, mut sd_off, mut condition) = (0.0_f64, 0.0_f64, 0.0_f64);
     for seed in 1..4 {
@@ -364,7 +365,7 @@ fn far_from_the_portal_passes_are_as_sure_as_near_it() {
     found_at("filter.far_sd", condition, sd_off, 1e-4);
 }
 
-/// To and fro in the same 12 m, a minute a round.
+/// Motion to and fro over the same 12 m, one minute per round.
 fn rounds(t: f64) -> Pose {
     let phase = math::TAU * t / 60.0;
     Pose {
@@ -381,9 +382,10 @@ fn rounds(t: f64) -> Pose {
     }
 }
 
-/// It is asked to stand until its bias is known, no longer than said at first, and isn't asked again when it goes on.
+/// The advice to stand still ends once the bias is known, no later than first stated, and is not repeated after the
+/// vehicle moves on.
 #[test]
-fn who_is_asked_to_stand_is_asked_no_longer_than_it_takes() {
+fn stand_still_advice_ends_once_the_bias_is_known() {
     let rig = Rig { noise: 0.0, ..Rig::new(rest, 1) };
     let mut nav = rig.navigation();
     let mut asked = Vec::new();
@@ -402,7 +404,7 @@ fn who_is_asked_to_stand_is_asked_no_longer_than_it_takes() {
     assert!(asked[begun + 31..].iter().all(|asked_s| *asked_s == 0), "{asked:?}");
 }
 
-/// Largest change of the relative sd, a share, from the tenth minute on, at the same place of the round.
+/// Largest relative change of the sd between passes from the tenth minute on, at the same point of the round.
 fn change_over_hours(hours: u32) -> f64 {
     let rig = Rig { imu_s: 0.1, ..Rig::new(rounds, 1) };
     let mut nav = rig.navigation();
@@ -423,13 +425,13 @@ fn change_over_hours(hours: u32) -> f64 {
 }
 
 #[test]
-fn an_hour_makes_a_pass_no_less_sure() {
+fn pass_sd_is_constant_over_an_hour() {
     found("filter.hour", change_over_hours(1), 0.01);
 }
 
 #[test]
 #[ignore = "takes a minute"]
-fn ten_hours_make_a_pass_no_less_sure() {
+fn pass_sd_is_constant_over_10_h() {
     let change = change_over_hours(10);
     assert!(change < 0.01, "{change}");
 }

@@ -1,7 +1,9 @@
-//! verif_: the rows of the measurements and the transition are the derivatives of their models.
+//! Verification that the rows of measurements and the transition are the derivatives of their models.
 //!
-//! Central differences of the nonlinear functions, through `State::correct` and `State::go_on`, at states drawn at random:
-//! attitudes all over the sphere, sensors anywhere on the vehicle, biases and offsets of any sign.
+//! The reference is central differences of the nonlinear functions, through `State::correct` and `State::go_on`.
+//!
+//! States are drawn at random: attitudes all over the sphere, sensors anywhere on the vehicle, biases and offsets of
+//! either sign.
 
 use crate::filter::inertial::{Felt, Leg, Transition};
 use crate::filter::measure::{self, Beam, ScalarUpdate};
@@ -16,13 +18,17 @@ use headrace_geometry::tunnel::{Profile, shapes};
 
 const STATES: u64 = 300;
 const GRAVITY_MPS2: f64 = 9.81;
-/// Step of the differences. Their truncation error is of the order of its square (1e-8 for numbers near one), and rounding
-/// of the order of 1e-16 / 1e-4 times the numbers themselves, which reach some hundreds of metres: 1e-10.
+/// Step of the differences.
+///
+/// The truncation error is of the order of its square (1e-8 for numbers near one). Rounding is of the order of 1e-16
+/// / 1e-4 times the numbers, which reach some hundreds of metres: 1e-10.
 const STEP: f64 = 1e-4;
-/// Both of these with a margin; a wrong sign or a missing term is wrong by a hundredth at least.
+/// Covers both errors with a margin.
+///
+/// A wrong sign or missing term causes an error of at least a hundredth.
 const TOLERANCE: f64 = 1e-6;
 
-/// Knuth's MMIX generator: the upper half of its state, as a share of one.
+/// Knuth's MMIX generator; returns the upper half of its state as a share of one.
 pub(super) struct Draws(u64);
 
 impl Draws {
@@ -39,7 +45,7 @@ impl Draws {
         (self.0 >> 32) as f64 / 4_294_967_296.0
     }
 
-    /// In [-reach, reach).
+    /// Uniform in [-reach, reach).
     pub(super) fn within(&mut self, reach: f64) -> f64 {
         reach * (2.0 * self.share() - 1.0)
     }
@@ -48,12 +54,12 @@ impl Draws {
         Vec3::new(self.within(reach), self.within(reach), self.within(reach))
     }
 
-    /// Nearly normal: variance 1.
+    /// Approximately normal with variance 1.
     pub(super) fn normal(&mut self) -> f64 {
         (0..12).map(|_| self.within(0.5)).sum()
     }
 
-    /// All attitudes, upright ones, and some near a pitch of 90 degrees.
+    /// All attitudes: upright ones, and some near a pitch of 90 degrees.
     fn attitude<From>(&mut self) -> Rot<Tunnel, From> {
         let pitch = match self.0 >> 62 {
             0 => PI / 2.0 + self.within(1e-3),
@@ -94,7 +100,9 @@ fn moved(state: &State, error: usize, by: f64) -> State {
     state
 }
 
-/// A row against the differences of its residual: the expected value is the measured minus the residual.
+/// Checks a row against the differences of its residual.
+///
+/// The expected value is the measured one minus the residual.
 fn check_row(
     what: &str,
     state: &State,
@@ -114,13 +122,14 @@ fn check_row(
     true
 }
 
-/// The walls of a rectangle are the planes assumed by the row; a beam whose differences cross a corner is left
-/// out, as its wall isn't a plane.
+/// Beams on a rectangle, whose walls are the planes that the row assumes.
+///
+/// A beam whose differences cross a corner is skipped, because its wall is not a plane.
 #[test]
-fn verif_a_beam_on_flat_walls() {
+fn beam_row_on_flat_walls() {
     let profile = shapes::rectangle(7.0, 8.0).unwrap();
     let mut draws = Draws::new(1);
-    // A sounder's edge, a head's cone, and one so wide that the nearest part of the wall echoes.
+    // The edge of an echosounder's beam, a head's cone, and a cone so wide that the nearest part of the wall echoes.
     for first_rad in [0.0, 0.012, 0.4] {
         let checked =
             (0..STATES).filter(|_| check_beam(&mut draws, &profile, first_rad, |_| TOLERANCE)).count();
@@ -128,15 +137,17 @@ fn verif_a_beam_on_flat_walls() {
     }
 }
 
-/// A cone's expected range is the least of its rays', and the uncertain range reaches to the least of the wider cone.
+/// The expected range of a cone is the shortest of its rays, and the uncertainty reaches to the shortest ray of the
+/// wider cone.
 #[test]
-fn verif_the_nearest_ray_of_a_cone() {
-    // Rays by rings and around each: the minimum over a grid is too long by the square of half a mesh, 5e-3 rad, at most.
+fn cone_range_is_its_shortest_ray() {
+    // Rays on rings around the axis. The minimum over the grid is too long by at most the square of half a mesh, 5e-3
+    // rad.
     const RINGS: u32 = 200;
     let profile = shapes::rectangle(60.0, 60.0).unwrap();
     let mut draws = Draws::new(11);
     for _ in 0..40 {
-        // Leaning sideways and along the tunnel, over a floor that is too wide for a cone to meet a wall.
+        // The beam leans sideways and along the tunnel over a floor that is too wide for the cone to meet a wall.
         let lean = rotation(Vec3::new(draws.within(0.6), draws.within(0.6), 0.0)) * Rot::identity();
         let position = Point3::new(0.0, 0.0, 3.0);
         let state = State { position, attitude: lean, range_scale: 0.0, ..draws.state() };
@@ -163,11 +174,13 @@ fn verif_the_nearest_ray_of_a_cone() {
     }
 }
 
-/// Without a cone the row is exact on any wall. With one, the plane tangent to the wall where the beam's axis meets it
-/// turns as that point moves, by 1 / radius per metre: the row neglects range x sin(first) / cos^2 of it, and the point
-/// moves by at most 1 m / cosine per metre, or `range` / cosine per radian. The error is bounded by that.
+/// Beams on a round wall: without a cone, the row is exact on any wall.
+///
+/// With a cone, the tangent plane at the axis turns as that point moves, by 1 / radius per metre. The row neglects
+/// range x sin(first) / cos^2 of that. The point moves by at most 1 m / cosine per metre, or `range` / cosine per
+/// radian. These terms bound the error.
 #[test]
-fn verif_a_beam_on_round_walls() {
+fn beam_row_on_round_walls() {
     const RADIUS_M: f64 = 4.0;
     let profile = shapes::circle(RADIUS_M).unwrap();
     let mut draws = Draws::new(2);
@@ -184,12 +197,12 @@ fn check_beam(draws: &mut Draws, profile: &Profile, first_rad: f64, tolerance: i
     let state = draws.state();
     let along = draws.mounted() * Vec3::new(1.0, 0.0, 0.0);
     let beam = Beam { offset: draws.vector(0.5), along, first_rad, unsure_rad: 0.0 };
-    // The row's expected value, from a range of zero.
+    // Expected value of the row, from a measured range of zero.
     let Some(row) = measure::range(&state, profile, &beam, 0.0, 0.1) else { return false };
     let origin = state.position + state.attitude * beam.offset;
     let looks = state.attitude * along;
     let hit = profile.cast([origin.y(), origin.z()], [looks.y(), looks.z()]).unwrap();
-    // Where the cone just ceases to contain the normal, the slope has a kink.
+    // The slope has a kink where the cone just ceases to contain the normal.
     let incidence = math::acos(-(hit.normal[0] * looks.y() + hit.normal[1] * looks.z()));
     let edge = [origin.y() + looks.y() * hit.range_m, origin.z() + looks.z() * hit.range_m];
     let corner = (edge[0].abs() - 3.5).abs() < CORNER_M
@@ -203,7 +216,7 @@ fn check_beam(draws: &mut Draws, profile: &Profile, first_rad: f64, tolerance: i
 }
 
 #[test]
-fn verif_height_and_chainage() {
+fn height_and_chainage_rows() {
     let mut draws = Draws::new(3);
     for _ in 0..STATES {
         let (state, offset) = (draws.state(), draws.vector(0.8));
@@ -217,10 +230,12 @@ fn verif_height_and_chainage() {
     }
 }
 
-/// The rows of an attitude hold where measured and estimated agree, as in a converged filter: off by an angle,
-/// they are wrong by half of it. So the measured is within 1e-7 of the estimate, deviation included.
+/// The rows of an attitude are exact if measured and estimated attitude agree, as in a converged filter.
+///
+/// At a difference of an angle they are wrong by half of it. So the measured attitude is within 1e-7 of the estimate,
+/// deviation included.
 #[test]
-fn verif_attitude() {
+fn attitude_rows() {
     let mut draws = Draws::new(4);
     for _ in 0..STATES {
         let state = State { heading_offset_rad: 0.0, ..draws.state() };
@@ -233,9 +248,11 @@ fn verif_attitude() {
     }
 }
 
-/// A compass deviation turns the measured attitude about the tunnel's z: then the residual is zero.
+/// A compass deviation rotates the measured attitude about the tunnel's z axis.
+///
+/// The residual is then zero.
 #[test]
-fn verif_a_deviating_compass_is_expected() {
+fn compass_deviation_gives_no_residual() {
     let mut draws = Draws::new(5);
     for _ in 0..STATES {
         let state = draws.state();
@@ -246,10 +263,11 @@ fn verif_a_deviating_compass_is_expected() {
     }
 }
 
-/// The turn rate is given, so that the gyro bias is no error of the row: see "What is left out" in
-/// `docs/why/navigation.md`.
+/// The turn rate is an input, so that the gyro bias is not an error of the row.
+///
+/// See "What is left out" in `docs/why/navigation.md`.
 #[test]
-fn verif_velocity_and_rest() {
+fn velocity_and_rest_rows() {
     let mut draws = Draws::new(6);
     for _ in 0..STATES {
         let state = draws.state();
@@ -264,9 +282,9 @@ fn verif_velocity_and_rest() {
     }
 }
 
-/// Velocity of a point fixed to a turning body: that of the lever arm, by differences of the point's position.
+/// Velocity of a point on a turning body, by differences of the point's position.
 #[test]
-fn verif_velocity_of_a_sensor_on_an_arm() {
+fn velocity_of_a_sensor_on_a_lever_arm() {
     let mut draws = Draws::new(7);
     for _ in 0..STATES {
         let state = draws.state();
@@ -284,9 +302,11 @@ fn verif_velocity_of_a_sensor_on_an_arm() {
     }
 }
 
-/// A tenth of a second before, the position is that of now less the displacement: exact for constant velocity.
+/// A tenth of a second earlier, the position is the present one less the displacement.
+///
+/// This is exact for constant velocity.
 #[test]
-fn verif_a_row_seen_later() {
+fn row_seen_later() {
     const LATER_S: f64 = 0.07;
     let mut draws = Draws::new(8);
     for _ in 0..STATES {
@@ -310,12 +330,14 @@ fn go_on(start: &State, felt: &[Felt]) -> (State, Transition) {
     (state, transition)
 }
 
-/// The transition uses the rotation of a sample's middle for all of it: wrong by up to a quarter of the angle turned in a
-/// sample, 0.01 rad, and only in the terms of a bias, of which the largest is 0.1 s of turning, or 0.05 s^2 of force:
-/// 0.1 x 0.0025. A wrong factor or a missing term is larger for each but the displacement by a gyro bias through
-/// tilting, 10 m/s^2 x 0.1^3 / 6: so each block is compared with its own size.
+/// The transition uses the rotation in the middle of a sample for all of it.
+///
+/// Its error is up to a quarter of the angle turned in a sample, 0.01 rad, in the bias terms only. The largest of
+/// these is 0.1 s of turning, or 0.05 s^2 of force: 0.1 x 0.0025. A wrong factor or missing term is larger for each
+/// block except the displacement by a gyro bias through tilting, 10 m/s^2 x 0.1^3 / 6. So each block is compared with
+/// its own size.
 #[test]
-fn verif_the_transition() {
+fn transition_equals_differences_of_the_model() {
     let blocks = [(POSITION, 3), (VELOCITY, 3), (ATTITUDE, 3), (FORCE_BIAS, 3), (RATE_BIAS, 3)];
     let ones = [CREEP, SLACK, SLACK_RATE, SCALE, DEPTH, HEADING, RANGES].map(|i| (i, 1));
     let blocks: Vec<_> = blocks.into_iter().chain(ones).collect();
@@ -323,7 +345,7 @@ fn verif_the_transition() {
     for round in 0..STATES {
         let start = draws.state();
         let (rate, force) = (draws.vector(0.6), draws.vector(3.0) + Vec3::new(0.0, 0.0, 9.0));
-        // Some rounds lack one or the other, for a part of the epoch or for all of it.
+        // Some rounds miss gyro or accelerometer data, for part or all of the epoch.
         let blind = |k: u64, part: u64| round % 4 == part && k >= round % 3 * 4;
         let felt: Vec<_> = (0..10)
             .map(|k| Felt {
@@ -361,9 +383,9 @@ fn verif_the_transition() {
     }
 }
 
-/// Factors propagated by the transition are those of F P F^T.
+/// Factors propagated by the transition equal those of F P F^T.
 #[test]
-fn verif_the_transition_carries_factors() {
+fn transition_propagates_factors() {
     use crate::filter::factors::Factors;
     let mut draws = Draws::new(10);
     for _ in 0..20 {

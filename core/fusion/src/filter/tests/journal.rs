@@ -1,4 +1,4 @@
-//! What the filter records for smoothing.
+//! Records of the filter's steps for smoothing.
 
 use super::rig::{IMU, Rig, at, cruise};
 use crate::Navigation as _;
@@ -16,12 +16,12 @@ fn steps(reader: &JournalReader) -> Vec<Placed> {
     core::iter::from_fn(|| reader.next()).map(|words| Placed::of_words(&words).unwrap()).collect()
 }
 
-/// The steps by their numbers of piece and clock.
+/// Groups the steps by piece and clock.
 fn pieces(steps: &[Placed]) -> Vec<((u32, u32), &[Placed])> {
     steps.chunk_by(|a, b| a.piece == b.piece).map(|piece| ((piece[0].piece, piece[0].clock), piece)).collect()
 }
 
-/// Each step begins where the one before ends; the last is the end, and the only one.
+/// Whether each step begins where the previous one ends, and only the last one is an end.
 fn is_whole(piece: &[Placed]) -> bool {
     let is_end = |placed: &&Placed| matches!(placed.step.by, Move::End);
     piece.windows(2).all(|two| two[0].step.to == two[1].step.at)
@@ -30,7 +30,7 @@ fn is_whole(piece: &[Placed]) -> bool {
 }
 
 #[test]
-fn a_drive_never_known_leaves_no_steps() {
+fn drive_without_estimate_records_no_steps() {
     let rig = Rig::new(cruise, 5);
     let (mut nav, reader) = recorded(&rig);
     for event in rig.events(0.0, 1.0).iter().filter(|event| event.source == IMU) {
@@ -41,9 +41,9 @@ fn a_drive_never_known_leaves_no_steps() {
     assert_eq!(steps(&reader).len(), 0);
 }
 
-/// A clock set back by more than 10 s ends what is known, once, though nothing is heard any more before the end.
+/// A clock set back by more than 10 s ends the piece exactly once, even if no reading follows.
 #[test]
-fn what_is_known_is_recorded_to_its_end_and_ends_once() {
+fn piece_is_recorded_to_its_end_and_ends_once() {
     let rig = Rig::new(cruise, 5);
     let (mut nav, reader) = recorded(&rig);
     for event in rig.events(0.0, 30.0) {
@@ -63,7 +63,7 @@ fn what_is_known_is_recorded_to_its_end_and_ends_once() {
 }
 
 #[test]
-fn a_drive_goes_on_as_another_piece_after_the_clock_was_set_back() {
+fn clock_reset_starts_a_new_piece() {
     let rig = Rig::new(cruise, 5);
     let (mut nav, reader) = recorded(&rig);
     for event in rig.events(0.0, 30.0).iter().chain(&rig.events(0.0, 20.0)) {

@@ -1,4 +1,4 @@
-//! The filter against oracles of 100 digits, against textbook forms, and on hard cases.
+//! Tests of the filter against 100-digit oracles and textbook forms, and on hard cases.
 
 mod faults;
 mod hard_cases;

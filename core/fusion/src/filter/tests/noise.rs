@@ -1,4 +1,4 @@
-//! verif_: the process noise of an epoch is that of the modelled processes.
+//! Verification that the process noise of an epoch equals that of the modelled processes.
 
 use super::jacobians::Draws;
 use crate::filter::factors::Factors;
@@ -30,11 +30,13 @@ fn near(what: &str, is: f64, should: f64, share: f64) {
     assert!((is - should).abs() <= share * should.abs() + 1e-18, "{what}: {is}, not {should}");
 }
 
-/// Two lags in series, s' = -s / T + r, r' = -r / T + w, in steps of 1e-5 T: Euler's error is of that order.
+/// Two lags in series, s' = -s / T + r, r' = -r / T + w, in steps of 1e-5 T.
+///
+/// Euler's method has an error of that order.
 #[test]
-fn verif_slack_against_an_integral() {
+fn slack_noise_equals_an_integral_of_the_process() {
     let settings = Settings { slack: Wander { reach: 0.06, time_s: 10.0 }, ..Settings::default() };
-    // The density of w that gives s a variance of reach^2: 4 reach^2 / T^3.
+    // Density of w that gives s a variance of reach^2: 4 reach^2 / T^3.
     let density = 4.0 * 0.06 * 0.06 / 1e3;
     for lags in [0.01, 0.3, 1.0, 4.0] {
         let (_, factors) = leg(&settings, lags * 10.0, still());
@@ -48,7 +50,7 @@ fn verif_slack_against_an_integral() {
                 rr - 2.0 * rr * step + density * dt_s,
             );
         }
-        // The first steps weigh more where there are few.
+        // The first steps weigh more if there are few.
         let share = 1e-4 + 3.0 * step / lags;
         near("slack", factors.variance(SLACK), ss, share);
         near("both", factors.covariance(SLACK, SLACK_RATE), sr, share);
@@ -56,12 +58,12 @@ fn verif_slack_against_an_integral() {
     }
 }
 
-/// In the steady state the slack has its reach, and its autocorrelation is (1 + x) e^-x at x lags.
+/// In the steady state the slack has its reach, and its autocorrelation at x lags is (1 + x) e^-x.
 #[test]
-fn verif_slack_settles_at_its_reach() {
+fn slack_variance_settles_at_its_reach() {
     let settings = Settings { slack: Wander { reach: 0.3, time_s: 7.0 }, ..Settings::default() };
     let mut factors = Factors::independent([0.0; ERRORS]);
-    // Epochs of uneven length: the steady state mustn't depend on them.
+    // Epochs of uneven length, because the steady state must not depend on them.
     for k in 0..3000 {
         let (transition, noise) = leg(&settings, 0.03 + 0.02 * f64::from(k % 5), still());
         transition.carry(&mut factors);
@@ -86,13 +88,14 @@ fn add_slack(factors: &mut Factors<ERRORS>, noise: &Factors<ERRORS>) {
     factors.add_to(SLACK, noise.variance(SLACK) - sr * sr / rr);
 }
 
-/// White force and white turn rate by Monte Carlo through `State::go_on`: 4000 epochs of ten samples. The spread of a
-/// variance from n draws is sqrt(2 / n) = 2.2 %, so that 9 % is four of them. Displacement and velocity are correlated.
+/// Monte Carlo of white force and white turn rate through `State::go_on`: 4000 epochs of ten samples.
 ///
-/// Turn rate noise also tilts the force, which the epoch neglects: a level unit, seen from its own x alone, where
-/// gravity has no first-order effect when it is tilted about x.
+/// The relative spread of a variance from n draws is sqrt(2 / n) = 2.2 %, so that the limit of 9 % is four of them.
+/// Displacement and velocity are correlated. Turn rate noise also tilts the force, which the epoch neglects. So the
+/// unit is level, and only its own x axis is checked. Gravity has no first-order effect there when the unit tilts
+/// about x.
 #[test]
-fn verif_white_noise_by_draws() {
+fn white_noise_equals_monte_carlo() {
     const DRAWS: u32 = 4000;
     let settings = Settings { rate_noise: 0.004, force_noise: 0.02, ..Settings::default() };
     let (_, factors) = leg(&settings, 0.1, still());
@@ -125,9 +128,9 @@ fn verif_white_noise_by_draws() {
     }
 }
 
-/// Without gyro and accelerometer data the blind noises count, over the time without.
+/// Without gyro and accelerometer data, the blind noises apply for that time.
 #[test]
-fn verif_blind_noise() {
+fn blind_noise_applies_without_inertial_data() {
     let settings = Settings { blind_rate_noise: 0.03, blind_force_noise: 0.5, ..Settings::default() };
     let (_, blind) = leg(&settings, 0.4, Felt { rate_radps: None, force_mps2: None });
     for axis in 0..3 {
@@ -137,9 +140,11 @@ fn verif_blind_noise() {
     }
 }
 
-/// A decaying error keeps its reach when the epoch's noise makes up for it; a random walk grows with time.
+/// A decaying error keeps its reach because the epoch's noise makes up for the decay.
+///
+/// A random walk grows with time.
 #[test]
-fn verif_wandering() {
+fn decaying_errors_keep_their_reach() {
     let settings = Settings::default();
     let reaches = [
         (FORCE_BIAS, settings.force_bias.reach),

@@ -1,7 +1,7 @@
-//! The factors against values of 100 digits: `tests/oracles/fusion.py` made `fusion.csv` with mpmath.
+//! Factors compared with 100-digit values: `tests/oracles/fusion.py` made `fusion.csv` with mpmath.
 //!
-//! Inputs are doubles taken as exact, so that each tolerance bounds the rounding within the computation. Elements of a
-//! covariance are compared relative to sqrt(P_ii P_jj), the scale of these two errors.
+//! Inputs are doubles taken as exact, so that each tolerance bounds the rounding within the computation. Elements of
+//! a covariance are compared relative to sqrt(P_ii P_jj), the scale of these two errors.
 
 use super::super::factors::{Factors, Gain};
 use headrace_geometry::math;
@@ -9,13 +9,13 @@ use headrace_support::hard_cases::found_at;
 
 const LINES: &str = include_str!("../../../../../tests/oracles/fusion.csv");
 
-/// A covariance to be taken through the steps of the file.
+/// A covariance that follows the steps of the file.
 trait Covariance<const N: usize> {
     fn start(variances: [f64; N]) -> Self;
     fn element(&self, i: usize, j: usize) -> f64;
     fn measure(&mut self, h: &[f64; N], noise: f64) -> Gain<N>;
     fn add(&mut self, variance: f64, a: [f64; N]);
-    /// By F, unit upper triangular.
+    /// Transforms by F, which is unit upper triangular.
     fn shear(&mut self, f: &[[f64; N]; N]);
     fn scale(&mut self, i: usize, factor: f64);
     fn distance(&self, e: &[f64; N]) -> Option<f64>;
@@ -57,7 +57,7 @@ impl<const N: usize> Covariance<N> for Factors<N> {
     }
 }
 
-/// The full covariance, with the textbook update; `JOSEPH`: with the Joseph form, said to keep its sign.
+/// The full covariance with the textbook update, or with the Joseph form if `JOSEPH`.
 #[derive(Clone, Copy)]
 struct Whole<const N: usize, const JOSEPH: bool>([[f64; N]; N]);
 
@@ -129,7 +129,7 @@ struct Worst {
     covariance: f64,
     gain: f64,
     distance: f64,
-    /// The largest variance over the smallest, of those that must come of the steps.
+    /// Largest variance over the smallest, of those that the steps must give.
     spread: f64,
     is_sign_lost: bool,
 }
@@ -172,7 +172,7 @@ fn follow<const N: usize, C: Covariance<N>>(case: &str) -> Worst {
             "scale" => p.scale(fields[3].parse().unwrap(), numbers[1]),
             "gain" => {
                 note(&mut worst.gain, (gain.variance / numbers[0] - 1.0).abs());
-                // Relative to the largest, as gains of one measurement act together.
+                // Relative to the largest element, because the gains of one measurement act together.
                 let size = numbers[1..].iter().fold(0.0, |size: f64, k| size.max(k.abs()));
                 for (k, right) in gain.k.iter().zip(&numbers[1..]) {
                     note(&mut worst.gain, (k - right).abs() / size);
@@ -210,7 +210,7 @@ fn follow<const N: usize, C: Covariance<N>>(case: &str) -> Worst {
     worst
 }
 
-/// By factors, by the plain form, and by Joseph's.
+/// Errors of the factors, of the plain form, and of Joseph's form.
 fn all(case: &str, n: usize) -> [Worst; 3] {
     fn of<const N: usize>(case: &str) -> [Worst; 3] {
         [follow::<N, Factors<N>>(case), follow::<N, Whole<N, false>>(case), follow::<N, Whole<N, true>>(case)]
@@ -218,8 +218,10 @@ fn all(case: &str, n: usize) -> [Worst; 3] {
     if n == 4 { of::<4>(case) } else { of::<6>(case) }
 }
 
-/// Tolerance of the factors in a case: about ten times their error. Doubles alone allow some units in the last
-/// place times the ratio of the largest standard deviation to the smallest in any direction, 1e12 after ten hours.
+/// Cases, and the tolerance of the factors in each: about ten times their error.
+///
+/// Doubles allow some units in the last place times the ratio of the largest to the smallest standard deviation in
+/// any direction. That ratio is 1e12 after ten hours.
 const CASES: [(&str, usize, f64); 13] = [
     ("mild", 4, 1e-14),
     ("mild", 6, 1e-14),
@@ -235,11 +237,11 @@ const CASES: [(&str, usize, f64); 13] = [
     ("swinging", 4, 1e-9),
     ("swinging", 6, 1e-5),
 ];
-/// An update by the full covariance fails a case when its error is so many times the tolerance of the factors.
+/// The full covariance fails a case if its error is this many times the tolerance of the factors.
 const FAILS: f64 = 30.0;
 
 #[test]
-fn verif_factors_agree_with_the_textbook_at_100_digits() {
+fn factors_agree_with_100_digit_values() {
     for (case, n, tolerance) in CASES {
         let [factors, _, _] = all(case, n);
         assert!(!factors.is_sign_lost, "{case} {n}: {factors:?}");
@@ -252,7 +254,7 @@ fn verif_factors_agree_with_the_textbook_at_100_digits() {
 }
 
 #[test]
-fn the_covariance_itself_fails_where_its_factors_do_not() {
+fn full_covariance_fails_cases_that_factors_pass() {
     for (case, n, tolerance) in CASES {
         let is_hard = !matches!(case, "mild" | "ill_scaled");
         let [_, plain, joseph] = all(case, n);
@@ -261,13 +263,13 @@ fn the_covariance_itself_fails_where_its_factors_do_not() {
             assert!(fails(plain), "{case} {n}: {plain:?}");
             assert!(fails(joseph), "{case} {n}: {joseph:?}");
         }
-        // Neither is a straw man: in an easy case both are right.
+        // In an easy case both full forms are right, too.
         if case == "mild" {
             assert!(plain.covariance.max(joseph.covariance) < 1e-13, "{plain:?} {joseph:?}");
         }
     }
     let sign_lost =
         |which: usize| CASES.iter().filter(|(case, n, _)| all(case, *n)[which].is_sign_lost).count();
-    assert!(sign_lost(1) >= 5, "the plain form keeps its sign, which it didn't");
-    assert!(sign_lost(2) >= 2, "Joseph's form keeps its sign, which it didn't");
+    assert!(sign_lost(1) >= 5, "the plain form is expected to lose its sign in 5 cases or more");
+    assert!(sign_lost(2) >= 2, "Joseph's form is expected to lose its sign in 2 cases or more");
 }

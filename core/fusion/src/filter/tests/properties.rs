@@ -26,7 +26,9 @@ fn reading(number: f64) -> Reading {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(64))]
 
-    /// Every reading in the window leaves it once, in order of validity, those of the same time in order of arrival.
+    /// Each reading leaves the window once, in order of validity.
+    ///
+    /// Readings of the same time leave in order of arrival.
     #[test]
     fn readings_leave_the_window_in_order(times in proptest::collection::vec(0_u64..50, 1..200), cut in 0_u64..50) {
         let mut window = Window::default();
@@ -48,9 +50,10 @@ proptest! {
         prop_assert_eq!(left, right);
     }
 
-    /// Inertial data covers any time without a gap; a sample is valid for the time before it, a tenth of a second at most.
+    /// Inertial data cover any time without a gap. A sample is valid for the time before it, for at most a tenth of a
+    /// second.
     #[test]
-    fn what_was_felt_covers_all_time(
+    fn inertial_data_cover_all_time(
         samples in proptest::collection::vec((1_u64..3000, any::<bool>()), 0..60),
         from in 0_u64..3000,
         length in 1_u64..1000,
@@ -80,20 +83,22 @@ proptest! {
             let next = samples.iter().map(|(at, _)| at * MS).filter(|at| *at > now.0).min();
             let is_blind = felt.rate_radps.is_none() && felt.force_mps2.is_none();
             if let Some(next) = next {
-                prop_assert!(until.0 <= next, "a piece goes on beyond a sample");
-                prop_assert!(!is_blind || next > now.0 + 100 * MS, "a sample isn't heard");
+                prop_assert!(until.0 <= next, "a piece extends beyond a sample");
+                prop_assert!(!is_blind || next > now.0 + 100 * MS, "a sample is ignored");
             }
         }
-        // Removing old samples changes nothing of what comes after.
+        // Removing old samples has no effect on later ones.
         let old = MonoNs(forgotten.min(from) * MS);
         let mut younger = window.clone();
         younger.forget(old);
         prop_assert_eq!(pieces(&younger), whole);
     }
 
-    /// Echoes of a position in the section lead back to it from half a metre off; nonsense leads nowhere outside.
+    /// Echoes from a position in the section lead back to it from half a metre away.
+    ///
+    /// Nonsense never leads outside.
     #[test]
-    fn echoes_lead_to_their_place(
+    fn echoes_lead_to_their_position(
         (y, z) in (-2.5_f64..2.5, 1.5_f64..6.0),
         (off_y, off_z) in (-0.4_f64..0.4, -0.4_f64..0.4),
         (roll, pitch, yaw) in (-0.1_f64..0.1, -0.2_f64..0.2, -0.3_f64..0.3),
@@ -120,9 +125,9 @@ proptest! {
         prop_assert!(profile.contains(place.at_m), "{place:?}");
     }
 
-    /// Of a source that sends too often, the readings used are apart by its period, and no more than that.
+    /// Used readings of a source that sends too often are one period apart, and no more than needed.
     #[test]
-    fn a_source_is_used_once_a_period(steps in proptest::collection::vec(0_u64..80, 1..200)) {
+    fn source_is_used_once_per_period(steps in proptest::collection::vec(0_u64..80, 1..200)) {
         let period = DurNs::from_millis(100);
         let mut source = Source::new(Rig::sensor(TETHER));
         let (mut now, mut used) = (MonoNs(0), Vec::new());
@@ -137,9 +142,10 @@ proptest! {
         prop_assert!(used.windows(2).all(|pair| pair[1].since(pair[0]) >= period));
     }
 
-    /// A head's turns are counted in either direction and over the wrap; pings with a range are used a step apart.
+    /// Turns of a head are counted in both directions and across the wrap. Used pings with a range are one step
+    /// apart.
     #[test]
-    fn a_head_is_used_once_a_step(step_deg in 0.3_f64..5.0, clockwise in any::<bool>(), start in -10.0_f64..10.0) {
+    fn head_is_used_once_per_step(step_deg in 0.3_f64..5.0, clockwise in any::<bool>(), start in -10.0_f64..10.0) {
         let step_rad = step_deg.to_radians() * if clockwise { 1.0 } else { -1.0 };
         let wanted_rad = 3.0_f64.to_radians();
         let mut turning = Turning::default();
@@ -167,7 +173,7 @@ proptest! {
 }
 
 #[test]
-fn of_samples_in_one_burst_the_mean_counts() {
+fn samples_in_one_burst_are_averaged() {
     let mut window = Window::default();
     for (at_ns, x) in [(0, 1.0), (10 * MS, 2.0), (10 * MS, 40.0), (10 * MS + 1000, 3.0)] {
         assert!(window.take_force(MonoNs(at_ns), Vec3::new(x, 0.0, 0.0)));
@@ -180,7 +186,7 @@ fn of_samples_in_one_burst_the_mean_counts() {
 }
 
 #[test]
-fn a_full_window_refuses_and_goes_on() {
+fn full_window_rejects_readings_and_recovers() {
     let mut window = Window::default();
     let taken =
         (0..2000_u64).filter(|k| window.take(Waiting { at: MonoNs(*k), source: 0, reading: reading(0.0) }));
@@ -207,7 +213,7 @@ fn unit(i: usize) -> Errors {
     core::array::from_fn(|j| f64::from(u8::from(i == j)))
 }
 
-/// F of a leg, as a full matrix.
+/// Transition F of a leg as a full matrix.
 fn whole(transition: &Transition) -> Square {
     transposed(&core::array::from_fn(|j| {
         let mut column = unit(j);
@@ -216,10 +222,10 @@ fn whole(transition: &Transition) -> Square {
     }))
 }
 
-/// The textbook form: the errors of each clone augment those of now, and no measurement corrects them.
+/// The textbook form: each clone's errors augment the present ones, and no measurement corrects them.
 struct Augmented {
     now: Square,
-    /// Covariance of the errors then, and cross-covariance of those now with them.
+    /// Covariance of the errors at that time, and their cross-covariance with the present ones.
     clones: Vec<(Square, Square)>,
 }
 
@@ -242,7 +248,7 @@ impl Augmented {
         }
     }
 
-    /// Standard deviation of the difference of chainage at `arm`, of now against the clone `back` before the newest.
+    /// Standard deviation of the difference in chainage at `arm` between now and the clone `back` before the newest.
     fn arc_m(&self, back: usize, arm: Vec3<Tunnel>) -> f64 {
         let (then, cross) = &self.clones[self.clones.len() - 1 - back];
         let weights = [(POSITION, 1.0), (ATTITUDE + 1, arm.z()), (ATTITUDE + 2, -arm.y())];
@@ -257,8 +263,8 @@ impl Augmented {
 }
 
 #[test]
-fn the_trail_knows_what_an_augmented_filter_knows() {
-    // Several legs between clones; and so many clones that the ring wraps.
+fn clones_equal_an_augmented_filter() {
+    // Several legs between clones, and enough clones for the ring buffer to wrap.
     for (legs, leg_s, times) in [(8, 0.25, 12), (1, 2.0, 70)] {
         let settings = Settings::default();
         let rig = Rig::new(super::rig::cruise, 5);

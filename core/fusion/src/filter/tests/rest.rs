@@ -1,4 +1,4 @@
-//! What standing still tells the filter.
+//! Effect of zero-velocity updates on the filter.
 
 use crate::filter::eskf::Eskf;
 use crate::filter::factors::Factors;
@@ -6,7 +6,8 @@ use crate::filter::state::{ERRORS, Errors, RATE_BIAS, State, VELOCITY};
 use headrace_geometry::frames::{Point3, Rot, Vec3};
 use headrace_geometry::time::MonoNs;
 
-/// An estimate of this speed along one axis, as sure of it as rest is, 0.02 m/s, and of the gyros' bias as a mean at rest is, 1e-3 rad/s.
+/// An estimate with this speed along one axis and the uncertainty of rest: 0.02 m/s, and 1e-3 rad/s for the gyro
+/// bias.
 fn moving(axis: usize, speed_mps: f64) -> Eskf {
     let mut variances: Errors = [0.0; ERRORS];
     variances[VELOCITY..VELOCITY + 3].fill(0.02 * 0.02);
@@ -19,18 +20,18 @@ fn moving(axis: usize, speed_mps: f64) -> Eskf {
     eskf
 }
 
-/// A difference of two equal normal errors of 0.02 m/s is beyond 0.11 m/s once in ten thousand times.
+/// A difference of two equal normal errors of 0.02 m/s exceeds 0.11 m/s once in ten thousand times.
 #[test]
-fn who_surely_moves_is_not_at_rest_whichever_way() {
+fn moving_vehicle_is_not_at_rest_in_any_direction() {
     let turn = Vec3::new(2e-3, -4e-3, 6e-3);
     for (axis, side) in [(0, 1.0), (0, -1.0), (1, 1.0), (1, -1.0), (2, 1.0), (2, -1.0)] {
         let mut moves = moving(axis, side * 0.115);
         let before = moves.state;
         moves.rest(Some(turn));
-        assert_eq!(moves.state, before, "{axis} {side}: it moves, and turns perhaps");
+        assert_eq!(moves.state, before, "{axis} {side}: it moves and may turn");
         let mut stands = moving(axis, side * 0.105);
         stands.rest(Some(turn));
-        // As sure of one as of the other: the mean of both.
+        // Both have the same uncertainty, so the result is the mean of both.
         let half = stands.state.velocity_mps.scaled(2.0) + -before.velocity_mps.scaled(0.105 / 0.115);
         assert!(half.norm() < 1e-12, "{axis} {side}: {:?}", stands.state.velocity_mps);
         let bias = stands.state.rate_bias_radps + -turn.scaled(0.5);

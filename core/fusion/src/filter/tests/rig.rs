@@ -15,9 +15,9 @@ use headrace_sensor::reading::{EchoRange, Level, Reading, SonarReturn, TetherLen
 pub(super) const IMU: usize = 0;
 pub(super) const TETHER: usize = 1;
 pub(super) const DEPTH: usize = 2;
-/// The first of four: left, right, down, up.
+/// First of four echosounders: left, right, down, up.
 pub(super) const ECHOES: usize = 3;
-/// The first of two: one looks ahead, one back.
+/// First of two heads: one looks ahead, one back.
 pub(super) const HEADS: usize = 7;
 pub(super) const VELOCITY_LOG: usize = 9;
 /// A source unused by navigation.
@@ -38,10 +38,10 @@ pub(super) struct Event {
     pub(super) reading: Reading,
 }
 
-/// Trajectory: pose of the vehicle by time, s.
+/// Trajectory: pose of the vehicle at a time, s.
 pub(super) type Way = fn(f64) -> Pose;
 
-/// See the module's description.
+/// Simulated vehicle and sensors.
 pub(super) struct Rig {
     pub(super) profile: Profile,
     pub(super) site: Site,
@@ -62,7 +62,7 @@ pub(super) fn seconds(at: MonoNs) -> f64 {
     at.since(ORIGIN).as_secs_f64()
 }
 
-/// Forward at 0.2 m/s, swaying and turning a little.
+/// Forward motion at 0.2 m/s with a little sway and yaw.
 pub(super) fn cruise(t: f64) -> Pose {
     Pose {
         position: Point3::new(3.0 + 0.2 * t, 0.4 * math::sin(t / 7.0), 4.0 + 0.3 * math::sin(t / 11.0)),
@@ -74,14 +74,14 @@ pub(super) fn cruise(t: f64) -> Pose {
     }
 }
 
-/// At rest, level, looking along the tunnel.
+/// At rest, level, facing along the tunnel.
 pub(super) fn rest(_: f64) -> Pose {
     Pose { position: Point3::new(3.0, 0.4, 4.0), attitude: Rot::identity() }
 }
 
 impl Rig {
     pub(super) fn new(way: Way, seed: u64) -> Self {
-        // Narrow beams, equivalent to a ray; a cable whose slack changes slowly.
+        // Narrow beams, equivalent to rays, and a cable whose slack changes slowly.
         let slack = Wander { reach: 0.06, time_s: 10.0 };
         let settings = Settings { slack, return_beam_rad: 1e-6, echo_beam_rad: 1e-6, ..Settings::default() };
         let site = Site { axis_yaw_rad: 0.7, ..Site::default() };
@@ -115,7 +115,7 @@ impl Rig {
         SensorInfo { mount, kind }
     }
 
-    /// Readings of all sensors except the velocity log over a time, in order of validity.
+    /// Readings of all sensors except the velocity log over a time span, in order of validity.
     pub(super) fn events(&self, from_s: f64, to_s: f64) -> Vec<Event> {
         let mut events = Vec::new();
         let mut every = |period_s: f64, phase_s: f64, source: usize, what: &dyn Fn(f64) -> Reading| {
@@ -146,7 +146,7 @@ impl Rig {
         nav.update(event.source, &Self::sensor(event.source), times, &event.reading);
     }
 
-    /// Feeds all readings to the filter, and checks it after each.
+    /// Feeds all readings to the filter and checks it after each.
     pub(super) fn run(&self, nav: &mut FilterNavigation, events: &[Event]) -> Tally {
         let mut tally = Tally::default();
         for event in events {
@@ -156,8 +156,10 @@ impl Rig {
         tally
     }
 
-    /// Checks the invariants of the filter: finite numbers, variances above zero, and a fix that is right by its own sd or
-    /// none. Once an epoch, since nothing else changes between.
+    /// Checks the invariants of the filter: finite numbers, positive variances, and no fix or one that is right by
+    /// its own sd.
+    ///
+    /// It checks once per epoch, since nothing changes in between.
     pub(super) fn check(&self, nav: &FilterNavigation, now: MonoNs, tally: &mut Tally) {
         let Some(running) = nav.running() else {
             assert!(nav.fix(now).is_err());
@@ -203,7 +205,7 @@ impl Rig {
         for (k, axis) in axes.iter().enumerate() {
             let mut h = [0.0; ERRORS];
             (h[POSITION + k], h[VELOCITY + k]) = (1.0, since_s);
-            // The body's origin moves with the attitude's error, by axis x arm.
+            // The body's origin moves with the attitude error, by axis x arm.
             for (j, other) in axes.iter().enumerate() {
                 h[ATTITUDE + j] = other.cross(&arm).dot(axis);
             }
@@ -219,7 +221,7 @@ impl Rig {
     }
 
     pub(super) fn noisy(&self, t: f64, salt: u64, sd: f64) -> f64 {
-        // Twelve uniform numbers, by a hashed counter (splitmix64).
+        // Sum of twelve uniform numbers from a hashed counter (splitmix64).
         let mut state = self.seed ^ at(t).0.wrapping_mul(31) ^ (salt << 50);
         let sum: f64 = (0..12)
             .map(|_| {
@@ -247,7 +249,7 @@ impl Rig {
         (self.unit(t + H_S) - self.unit(t - H_S)).scaled(0.5 / H_S)
     }
 
-    /// Mean turn rate over the sample period before.
+    /// Mean turn rate over the preceding sample period.
     pub(super) fn rate(&self, t: f64) -> Reading {
         let (then, now) = ((self.way)(t - self.imu_s).attitude, (self.way)(t).attitude);
         let turn: Vec3<Body> = rotation_vector(then.inverse() * now).scaled(1.0 / self.imu_s);
@@ -255,7 +257,7 @@ impl Rig {
         Reading::AngularRate(Self::sensor(IMU).mount.rotation.inverse() * turn + noise)
     }
 
-    /// Mean specific force over the sample period before.
+    /// Mean specific force over the preceding sample period.
     pub(super) fn force(&self, t: f64) -> Reading {
         let then = t - self.imu_s;
         let gain = (self.velocity_at(t) + -self.velocity_at(then)).scaled(1.0 / self.imu_s);
@@ -338,8 +340,8 @@ pub(super) struct Tally {
     /// Epochs with a fix, and without.
     pub(super) fixes: u32,
     pub(super) lacking: u32,
-    /// Missing part in the last of them.
+    /// Missing part in the last epoch without a fix.
     pub(super) lacks: Option<NoFix>,
-    /// The largest error, in sd.
+    /// Largest error, in sd.
     pub(super) sd: f64,
 }

@@ -1,4 +1,4 @@
-//! Settings that are wrong: what the filter says of them by itself, in a dive of some minutes.
+//! Detection of wrong settings by the filter alone, in a dive of some minutes.
 
 use super::super::FilterNavigation;
 use super::super::suspicion::{Setting, SettingDoubt};
@@ -6,7 +6,7 @@ use super::rig::{HEADS, Rig, cruise};
 use crate::Navigation as _;
 use headrace_sensor::reading::{Reading, SonarReturn};
 
-/// What is doubted after four minutes in which each head's returns, by its number, were changed, and every echo scaled.
+/// Returns the doubt after four minutes with all echoes scaled and each head's returns changed.
 fn doubted(echoes: f64, change: impl Fn(usize, SonarReturn) -> SonarReturn) -> Option<SettingDoubt> {
     let rig = Rig::new(cruise, 3);
     let mut nav: FilterNavigation = rig.navigation();
@@ -25,12 +25,12 @@ fn doubted(echoes: f64, change: impl Fn(usize, SonarReturn) -> SonarReturn) -> O
 }
 
 #[test]
-fn what_is_set_right_is_not_doubted() {
+fn correct_settings_are_not_doubted() {
     assert_eq!(doubted(1.0, |_, sonar| sonar), None);
 }
 
 #[test]
-fn ranges_that_are_all_too_long_are_told_with_their_share() {
+fn scaled_ranges_are_reported_with_their_scale() {
     let scale = |_, sonar: SonarReturn| SonarReturn { range_m: sonar.range_m.map(|m| 1.04 * m), ..sonar };
     let doubt = doubted(1.04, scale).unwrap();
     assert!(
@@ -40,7 +40,7 @@ fn ranges_that_are_all_too_long_are_told_with_their_share() {
 }
 
 #[test]
-fn a_head_that_is_turned_on_its_mount_is_named_with_its_angle() {
+fn rotated_head_is_named_with_its_angle() {
     for (head, turned_rad) in [(0, 0.1), (1, -0.08)] {
         let turn = |number, sonar: SonarReturn| {
             let off_rad = if number == head { turned_rad } else { 0.0 };

@@ -1,18 +1,20 @@
-//! One piece of a profile with its place: where a ray crosses it, arc lengths on it.
+//! One piece of a profile in its place: ray crossings and arc lengths on it.
 
 use super::plane::{Yz, cross, dot, norm, sub};
 use crate::math::{self, TAU};
 
-/// Angle by which a hit may lie beyond an arc's end, rad, so that neighbours leave no gap between them.
+/// Angle by which a hit may lie beyond an arc's end, rad, so that neighbours leave no gap.
 pub(super) const ARC_SLACK_RAD: f64 = 1e-12;
-/// Margin beyond which a hit is clearly within or clearly outside an arc: difference between its cosine about the arc's
-/// middle and that of the ends; far larger than the slack and rounding together.
+/// Margin beyond which a hit is clearly inside or outside an arc.
+///
+/// It is the difference between the cosine about the arc's middle and that of the ends, and far exceeds slack plus
+/// rounding.
 const CLEAR: f64 = 1e-9;
 
 /// Sine of the angle to a ray below which an edge counts as parallel to it.
 const PARALLEL: f64 = 1e-6;
 
-/// One piece of a profile, as given; pieces run counter-clockwise with y to the right and z up.
+/// One input piece of a profile; pieces run counter-clockwise with y to the right and z up.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Piece {
     /// A straight line to this point.
@@ -64,7 +66,8 @@ impl Element {
                 let (along, apart) = (sub(self.end, self.start), left - right);
                 let t = cross(start, along) / apart;
                 let length2 = dot(direction, direction);
-                // Of a ray along the edge both products are rounding: it leaves somewhere on the edge, and nowhere else.
+                // For a ray along the edge, both products are rounding errors: it leaves somewhere on the edge, and
+                // nowhere else.
                 let t = if apart * apart < PARALLEL * PARALLEL * length2 * dot(along, along) {
                     let ends = [dot(start, direction) / length2, dot(end, direction) / length2];
                     t.clamp(ends[0].min(ends[1]), ends[0].max(ends[1]))
@@ -139,7 +142,7 @@ impl Element {
         [-outwards[0] / length, -outwards[1] / length]
     }
 
-    /// Angle that this element spans about `reference`, or `None` where it runs backwards anywhere.
+    /// Returns the angle that this element spans about `reference`; `None` if it runs backwards anywhere.
     pub(super) fn angle_about(&self, reference: Yz) -> Option<f64> {
         let (start, end) = (sub(self.start, reference), sub(self.end, reference));
         match self.shape {
@@ -169,7 +172,7 @@ impl Element {
     }
 }
 
-/// The element that a piece makes from `start`.
+/// Builds the element of a piece that starts at `start`.
 pub(super) fn build(start: Yz, piece: Piece) -> Element {
     match piece {
         Piece::LineTo(end) => {

@@ -1,4 +1,4 @@
-//! Point of a profile nearest to a given point.
+//! Point of a profile nearest to another point.
 
 use super::Profile;
 use super::element::{ARC_SLACK_RAD, Element, Shape};
@@ -18,8 +18,9 @@ pub struct Nearest {
 }
 
 impl Profile {
-    /// Point of the wall nearest to `point`, from inside or outside; exact for lines and arcs. Of equally near points,
-    /// the first in order of arc length.
+    /// Returns the point of the wall nearest to `point`, from inside or outside; exact for lines and arcs.
+    ///
+    /// Among equally near points, it is the first in order of arc length.
     ///
     /// Allocates: no.
     pub fn nearest(&self, point: Yz) -> Nearest {
@@ -72,14 +73,14 @@ mod tests {
     use super::*;
     use crate::tunnel::shapes;
 
-    /// Smallest distance to wall points 0.5 mm apart: never below the true one, and above it by less than 0.25 mm.
+    /// Smallest distance to wall points 0.5 mm apart, which exceeds the true one by less than 0.25 mm.
     fn by_places(profile: &Profile, point: Yz) -> f64 {
         let places = math::round_to_i64(profile.perimeter_m() / 5e-4);
         (0..places).map(|k| norm(sub(point, profile.point_at(k as f64 * 5e-4)))).fold(f64::INFINITY, f64::min)
     }
 
     #[test]
-    fn verif_nearest_place_is_that_of_a_dense_search() {
+    fn nearest_point_equals_a_dense_search() {
         let profiles = [
             shapes::ceran_blueprint().unwrap(),
             shapes::rectangle(4.0, 3.0).unwrap(),
@@ -102,13 +103,13 @@ mod tests {
     }
 
     #[test]
-    fn the_centre_of_an_arc_is_a_radius_away() {
+    fn centre_of_an_arc_is_one_radius_away() {
         let profile = shapes::circle(2.0).unwrap();
         assert!((profile.nearest([0.0, 2.0]).distance_m - 2.0).abs() < 1e-12);
     }
 
     #[test]
-    fn a_point_of_the_wall_is_no_distance_away() {
+    fn wall_point_has_distance_zero() {
         let profile = shapes::ceran_blueprint().unwrap();
         for k in 0..1000 {
             let arc_m = f64::from(k) * 0.03417;

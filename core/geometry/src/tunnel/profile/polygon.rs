@@ -5,8 +5,9 @@ use super::plane::{Yz, cross, norm, sub};
 use super::{Profile, ProfileError, SAME_POINT_M};
 
 impl Profile {
-    /// A polygon through `points`, in either sense of rotation; arc length begins at the lowest crossing of y = 0.
-    /// `reference` defaults to the polygon's centroid.
+    /// Creates a polygon through `points`, in either sense of rotation.
+    ///
+    /// Arc length begins at the lowest crossing of y = 0. `reference` defaults to the polygon's centroid.
     ///
     /// Errors: see [`ProfileError`], whose vertices are indices into `points`.
     /// Allocates: startup only.
@@ -24,12 +25,13 @@ impl Profile {
         }
         let (edge, start) = floor_centre(&ring).ok_or(ProfileError::BesideMiddle)?;
         let count = ring.len();
-        // From the edge that crosses y = 0.
+        // Starts at the edge that crosses y = 0.
         let vertex = |k: usize| ring.get((edge + k) % count);
         let pieces: Vec<Piece> = (1..=count).filter_map(vertex).map(|v| Piece::LineTo(v.point)).collect();
         Self::new(start, &pieces, reference.unwrap_or(centroid)).map_err(|error| match error {
             ProfileError::NotStarShaped { vertex: piece, reference } => {
-                // A piece begins where the one before it ends; the first within the edge that crosses y = 0.
+                // A piece begins where the previous one ends; the first one begins within the edge that crosses y =
+                // 0.
                 let index = vertex(piece).map_or(0, |begin| begin.index);
                 ProfileError::NotStarShaped { vertex: index, reference }
             }
@@ -38,14 +40,14 @@ impl Profile {
     }
 }
 
-/// A point, and its index among those given.
+/// A point with its index in the input.
 #[derive(Debug, Clone, Copy)]
 struct Vertex {
     index: usize,
     point: Yz,
 }
 
-/// The points without repeats of their predecessor (the first follows the last).
+/// Removes points that repeat their predecessor; the predecessor of the first is the last.
 fn distinct(points: &[Yz]) -> Vec<Vertex> {
     let mut ring: Vec<Vertex> = Vec::with_capacity(points.len());
     for (index, point) in points.iter().copied().enumerate() {
@@ -85,7 +87,7 @@ fn area_and_centroid(ring: &[Vertex]) -> (f64, Yz) {
     (area2 / 2.0, centroid)
 }
 
-/// The lowest crossing of y = 0: index of the edge's first point, and the crossing.
+/// Finds the lowest crossing of y = 0: index of the edge's first point, and the crossing.
 fn floor_centre(ring: &[Vertex]) -> Option<(usize, Yz)> {
     let crossing = |(index, (a, b)): (usize, (Yz, Yz))| {
         if (a[0] <= 0.0) == (b[0] <= 0.0) {

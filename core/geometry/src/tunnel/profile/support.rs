@@ -1,18 +1,20 @@
-//! How far a profile of many elements reaches in a direction: bounds from a table.
+//! Extent of a profile with many elements in a direction: bounds from a table.
 
 use super::plane::{Yz, dot, norm};
 use crate::math::{self, TAU};
 
-/// Directions of the table.
+/// Number of directions in the table.
 const DIRECTIONS: usize = 128;
 
-/// The farthest that points reach in each direction of the table, m. A direction between two of them is bounded by both, from above, to
-/// half the longest edge of the points' hull times tan(pi / [`DIRECTIONS`]), 0.025: 12 mm for each metre of a flat wall.
+/// Extent of the points in each direction of the table, m.
+///
+/// A direction between two entries is bounded by both from above. The excess is at most half the longest edge of the
+/// points' hull times tan(pi / [`DIRECTIONS`]), 0.025: 12 mm for each metre of a flat wall.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Support(Vec<(Yz, f64)>);
 
 impl Support {
-    /// Of points.
+    /// Computes the table for points.
     pub(super) fn of(points: &[Yz]) -> Self {
         let reach = |k: usize| {
             let (sin, cos) = math::sin_cos(TAU * k as f64 / DIRECTIONS as f64);
@@ -38,7 +40,7 @@ impl Support {
             let index = usize::try_from(index.rem_euclid(DIRECTIONS as i64)).unwrap_or_default();
             self.0.get(index).map_or(0.0, |(_, reach_m)| *reach_m)
         };
-        // The direction is a sum of its neighbours in the table, with these shares.
+        // The direction is a weighted sum of its two neighbours in the table.
         let step = TAU / DIRECTIONS as f64;
         let beyond = (turned - before as f64) * step;
         let (share, other) = (math::sin(step - beyond), math::sin(beyond));

@@ -2,7 +2,7 @@ use proptest::prelude::*;
 
 use super::*;
 
-/// A star-shaped polygon of so many points, with radii of its own.
+/// A star-shaped polygon with these radii.
 fn polygon(radii: &[f64]) -> Profile {
     let count = radii.len() as f64;
     let points = radii.iter().enumerate().map(|(k, radius_m)| {
@@ -18,9 +18,9 @@ fn plain(profile: &Profile) -> Profile {
 }
 
 proptest! {
-    /// What is asked of a profile with a tree has the same answer, to the bit, as without; rays go through vertices, too.
+    /// A profile with a tree gives bit-identical answers to one without, even for rays through vertices.
     #[test]
-    fn a_tree_changes_no_answer(
+    fn tree_gives_the_same_answers(
         radii in prop::collection::vec(1.8..2.2_f64, 25..400),
         at in (-1.0..1.0_f64, 2.0..4.0_f64),
         turns in 0.0..1.0_f64,
@@ -45,17 +45,19 @@ proptest! {
 }
 
 proptest! {
-    /// The table's bounds hold. How near they are is geometry: the farthest point is at most half a step off a direction of the table, and
-    /// tangents in two neighbouring directions meet above the edge between their points by at most half that edge times the tangent of half
-    /// a step. No edge of the hull is longer here than a chord of 2.2 m that passes 1.8 m from the centre.
+    /// The bounds of the table hold, and their excess follows from geometry.
+    ///
+    /// The farthest point is at most half a step away from a direction of the table. Tangents in two neighbouring
+    /// directions meet above the edge between their points, by at most half that edge times the tangent of half a
+    /// step. The longest edge of the hull here is a chord of 2.2 m that passes 1.8 m from the centre.
     #[test]
-    fn bounds_of_many_points_are_just_above_what_they_bound(
+    fn table_bounds_are_tight(
         radii in prop::collection::vec(prop_oneof![9 => 1.8..2.2_f64, 1 => Just(1.8)], 257..600),
         level in prop::option::of(0usize..32),
         at in (-1.0..1.0_f64, 2.0..4.0_f64),
         turns in 0.0..1.0_f64,
     ) {
-        // Few points of many stand out: edges of the hull become long.
+        // Few of many points stand out, which makes the hull's edges long.
         let radii: Vec<f64> = match level {
             Some(of_32) => radii.iter().enumerate().map(|(k, r)| if k % 32 == of_32 { *r } else { 1.8 }).collect(),
             None => radii,
@@ -78,16 +80,17 @@ proptest! {
     }
 }
 
-/// A regular polygon's centre is equally far from all edges: the first along the wall is nearest, with a tree, too.
+/// The centre of a regular polygon is equally far from all edges: the first along the wall is nearest, with or
+/// without a tree.
 #[test]
-fn of_equally_near_elements_the_first_is_taken() {
+fn first_of_equally_near_elements_is_nearest() {
     let tree = polygon(&[2.0; 96]);
     assert_eq!(tree.nearest([0.0, 3.0]), plain(&tree).nearest([0.0, 3.0]));
 }
 
-/// A survey's 100,000 points: each question looks at few of them. Counted, not timed.
+/// A survey with 100,000 points: each query visits few of them. The visits are counted, not timed.
 #[test]
-fn of_many_elements_few_are_looked_at() {
+fn query_visits_few_of_many_elements() {
     let radii: Vec<f64> = (0..100_000).map(|k| 2.0 + 0.01 * math::sin(f64::from(k) * 0.37)).collect();
     let profile = polygon(&radii);
     let mut looked = 0;
@@ -108,12 +111,12 @@ fn of_many_elements_few_are_looked_at() {
         );
         assert!(best.is_finite());
     }
-    assert!(looked / 100 < 100, "{} elements a ray", looked / 100);
+    assert!(looked / 100 < 100, "{} elements per ray", looked / 100);
 }
 
 #[test]
-fn a_refused_polygon_names_the_point_as_it_was_given() {
-    // A hook on the left wall, its edges backwards after the fourth point, however the points are counted.
+fn rejected_polygon_names_the_input_point() {
+    // A hook on the left wall with edges that run backwards after the fourth point, in any numbering of the points.
     let hooked = [[3.0, 0.0], [3.0, 4.0], [2.9, 4.0], [2.9, 0.5], [-3.0, 0.5], [-3.0, 0.0]];
     let refused = |points: &[Yz]| match Profile::polygon(points, Some([0.0, 0.2])) {
         Err(ProfileError::NotStarShaped { vertex, .. }) => {
@@ -125,17 +128,17 @@ fn a_refused_polygon_names_the_point_as_it_was_given() {
         let mut turned = hooked;
         turned.rotate_left(first);
         assert_eq!(refused(&turned), 2, "from {first}");
-        // Repeated points count in the file.
+        // Repeated points count in the file's numbering.
         let repeated: Vec<Yz> = turned.iter().flat_map(|point| [*point, *point]).collect();
         assert_eq!(refused(&repeated), 2, "from {first}");
-        // The other way round the same edge begins at its other end, or is read from it.
+        // In the opposite sense the same edge begins at its other end.
         turned.reverse();
         assert!([2, 3].contains(&refused(&turned)), "from {first}");
     }
 }
 
 #[test]
-fn a_polygon_beside_the_middle_is_refused_for_that() {
+fn polygon_beside_y_0_is_rejected() {
     let beside = [[1.0, 0.0], [3.0, 0.0], [3.0, 2.0], [1.0, 2.0]];
     assert_eq!(Profile::polygon(&beside, None), Err(ProfileError::BesideMiddle));
 }

@@ -1,27 +1,29 @@
-//! A tree of boxes over a profile's elements: what is asked of all elements costs with the logarithm of their number. It only
-//! leaves out elements that can't matter; what is found is what a look at all of them finds, bit for bit.
+//! Tree of boxes over a profile's elements, for queries in logarithmic time.
+//!
+//! It skips only elements that cannot affect the result, so results are bit-identical to a search of all elements.
 
 use super::element::{Element, Shape};
 use super::plane::{Yz, norm};
 
-/// Elements in a leaf. Neighbours along the wall lie near each other.
+/// Number of elements in a leaf; neighbours along the wall are close together.
 const LEAF: usize = 8;
-/// Profiles with no more elements than this have no tree: a look at all is as fast.
+/// Maximum number of elements without a tree, since a search of all is as fast.
 const FEW: usize = 24;
-/// Boxes are this much larger than what is in them, m: far more than rounding and an arc's slack.
+/// Margin of the boxes around their elements, m: far larger than rounding and an arc's slack.
 const MARGIN_M: f64 = 1e-6;
-/// Depth of a tree over more elements than a profile may have.
+/// Depth of a tree over the maximum number of elements.
 const DEPTH: usize = 40;
 
-/// A box about elements.
+/// A box around elements.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Bounds {
     low: Yz,
     high: Yz,
 }
 
-/// The boxes, node 1 about all, nodes 2 i and 2 i + 1 about the halves of node i; `leaves` of them are leaves. Empty for few
-/// elements.
+/// The boxes: node 1 contains all, and nodes 2 i and 2 i + 1 the halves of node i.
+///
+/// `leaves` of them are leaves. Empty for few elements.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub(super) struct Tree {
     nodes: Vec<Bounds>,
@@ -31,7 +33,7 @@ pub(super) struct Tree {
 impl Bounds {
     const EMPTY: Self = Self { low: [f64::INFINITY; 2], high: [f64::NEG_INFINITY; 2] };
 
-    /// The circle's box for an arc: larger than the arc's, and simple.
+    /// An arc gets the box of its whole circle, which is larger but simple.
     fn of(element: &Element) -> Self {
         let Element { start, end, .. } = *element;
         let of = |place: fn(f64, f64) -> f64, off: f64| {
@@ -65,7 +67,7 @@ impl Bounds {
         if from <= to { from } else { f64::INFINITY }
     }
 
-    /// Distance of a point, m; zero inside.
+    /// Returns the distance of a point, m; zero inside.
     pub(super) fn distance_m(&self, point: Yz) -> f64 {
         let off = |axis: usize| {
             let (low, high, at) = (self.low[axis], self.high[axis], point[axis]);
@@ -95,9 +97,10 @@ impl Tree {
         Self { nodes, leaves }
     }
 
-    /// Looks at the elements of which the best isn't surely worse than what was found so far, by their indices, in ranges.
-    /// `bound` is the least cost that something in a box can have; `look` returns the cost of the best found so far. Of an equal
-    /// cost all are looked at.
+    /// Visits ranges of elements, by index, that may improve on the best result so far.
+    ///
+    /// `bound` is the minimum cost of anything in a box; `look` returns the best cost found so far. Elements of equal
+    /// cost are all visited.
     pub(super) fn search(
         &self,
         count: usize,

@@ -1,4 +1,4 @@
-//! Hard rays against values of 50 digits: `tests/oracles/geometry.py` made `geometry.csv` with mpmath.
+//! Hard rays compared with 50-digit values: `tests/oracles/geometry.py` made `geometry.csv` with mpmath.
 
 use super::*;
 use crate::tunnel::{Piece, Yz};
@@ -6,7 +6,7 @@ use headrace_support::hard_cases::{found, found_at};
 
 const LINES: &str = include_str!("../../../../../tests/oracles/geometry.csv");
 
-/// Largest errors of the ray's length and of arc length in a case, m, and how many rays there were.
+/// Returns the largest errors of ray length and arc length in a case, m, and the number of rays.
 fn worst(case: &str) -> (f64, f64, u32) {
     let (mut range_m, mut arc_m, mut count) = (0.0_f64, 0.0_f64, 0);
     for line in LINES.lines().filter(|line| line.split(',').next() == Some(case)) {
@@ -31,15 +31,15 @@ fn worst(case: &str) -> (f64, f64, u32) {
 }
 
 #[test]
-fn val_rays_from_a_millimetre_off_the_wall() {
+fn rays_from_1_mm_off_the_wall() {
     let (range_m, arc_m, count) = worst("millimetre");
     assert_eq!(count, 144);
     found("geometry.millimetre", range_m.max(arc_m), 1e-13);
 }
 
-/// At 89.99 degrees to the wall a step across it is 5,730 along it.
+/// At 89.99 degrees to the wall, a step across it is 5,730 steps along it.
 #[test]
-fn val_rays_nearly_along_the_wall() {
+fn rays_nearly_along_the_wall() {
     let (range_m, arc_m, count) = worst("grazing");
     assert_eq!(count, 144);
     let condition = 1.0 / math::cos(f64::to_radians(89.99));
@@ -47,24 +47,28 @@ fn val_rays_nearly_along_the_wall() {
 }
 
 #[test]
-fn val_rays_through_corners_and_an_ulp_beside() {
+fn rays_through_corners_and_an_ulp_beside() {
     let (range_m, arc_m, count) = worst("corner");
     assert_eq!(count, 36);
     found("geometry.corner", range_m.max(arc_m), 1e-14);
 }
 
-/// What is under the root is 0, or as little as a few ulps make: an error of an ulp there is one of its square root.
+/// The value under the root is 0 or a few ulps.
+///
+/// An error of one ulp there is an error of its square root.
 #[test]
-fn val_rays_that_touch_the_vault() {
+fn rays_tangent_to_the_vault() {
     let (range_m, arc_m, count) = worst("tangent");
     assert_eq!(count, 56);
     found_at("geometry.tangent", 1.0 / math::sqrt(f64::EPSILON), range_m.max(arc_m), 1e-7);
 }
 
-/// A square with round corners, turned: each wall runs into arcs without a corner, and rounding puts a ray along it a little inside
-/// or outside of their circles, so that what is under the root has either sign.
+/// A rotated square with round corners, whose walls run into arcs without a corner.
+///
+/// Rounding puts a ray along a wall slightly inside or outside the arcs' circles, so the value under the root has
+/// either sign.
 #[test]
-fn rays_along_walls_into_arcs_end_where_the_wall_does() {
+fn rays_along_walls_end_at_the_wall_end() {
     let (half, radius) = (2.0, 0.5);
     let (mut worst_m, mut negative, mut positive) = (0.0_f64, 0, 0);
     for turn in 0..400 {
@@ -83,7 +87,7 @@ fn rays_along_walls_into_arcs_end_where_the_wall_does() {
         for side in [[half, 0.0, 0.0, 1.0], [0.0, half, -1.0, 0.0], [-half, 0.0, 0.0, -1.0]] {
             let [y, z, v, w] = side;
             let (origin, direction) = (turned([y, z]), [v * cos - w * sin, v * sin + w * cos]);
-            // Where the wall ends and the arc begins, and the arc's centre.
+            // End of the wall and start of the arc, and the arc's centre.
             let end = turned([y + inner * v, z + inner * w]);
             let centre = turned([
                 y + inner * v - radius * w.abs() * y.signum(),
@@ -102,7 +106,8 @@ fn rays_along_walls_into_arcs_end_where_the_wall_does() {
             let hit = profile
                 .cast_from_inside(origin, direction)
                 .unwrap_or_else(|| panic!("no wall at turn {turn}"));
-            // By rounding the wall itself may be met on the way, where the ray runs along it; beyond its end there is only the arc.
+            // Because of rounding, the ray may meet the wall that it runs along. Beyond the wall's end there is only
+            // the arc.
             let off = [hit.point[0] - end[0], hit.point[1] - end[1]];
             let beyond_m = off[0] * direction[0] + off[1] * direction[1];
             let across_m = off[0] * direction[1] - off[1] * direction[0];

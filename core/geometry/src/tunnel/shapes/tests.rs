@@ -23,9 +23,9 @@ fn all() -> Vec<(&'static str, Profile)> {
     ]
 }
 
-/// Dimensions of the paper's tunnel as derived from its figures.
+/// Dimensions of the paper's tunnel, derived from its figures.
 #[test]
-fn val_ceran_has_the_errata_s_dimensions() {
+fn ceran_has_the_dimensions_of_the_errata() {
     let ceran = ceran().unwrap();
     assert!((ceran.perimeter_m() - 35.90).abs() < 0.005, "{}", ceran.perimeter_m());
     assert!((ceran.reference()[1] - 3.092).abs() < 0.0005);
@@ -35,7 +35,7 @@ fn val_ceran_has_the_errata_s_dimensions() {
 }
 
 #[test]
-fn arc_length_begins_at_the_floor_s_centre_and_grows_with_the_head_angle() {
+fn arc_length_starts_at_the_floor_centre_and_grows_with_the_head_angle() {
     for (name, profile) in all() {
         let mut last = -1.0;
         for degree in 0..360 {
@@ -50,9 +50,9 @@ fn arc_length_begins_at_the_floor_s_centre_and_grows_with_the_head_angle() {
     }
 }
 
-/// A dense polyline of the same curve is inscribed in its arcs: its ranges approach ours from inside.
+/// A dense polyline of the same curve is inscribed in its arcs, so its ranges approach the exact ones from inside.
 #[test]
-fn verif_ranges_agree_with_a_dense_polyline() {
+fn ranges_agree_with_a_dense_polyline() {
     for (name, profile) in all() {
         let count = 20_000;
         let points: Vec<Yz> = (0..count)
@@ -75,7 +75,7 @@ fn verif_ranges_agree_with_a_dense_polyline() {
 }
 
 #[test]
-fn a_ray_through_a_corner_hits_it_as_do_its_neighbours_an_ulp_away() {
+fn ray_through_a_corner_and_its_ulp_neighbours_hit_it() {
     for (name, profile) in all() {
         let origin = profile.reference();
         for arc in profile.corners_m() {
@@ -92,7 +92,7 @@ fn a_ray_through_a_corner_hits_it_as_do_its_neighbours_an_ulp_away() {
 }
 
 #[test]
-fn rays_from_a_millimetre_off_the_wall_and_nearly_along_it_end_on_the_wall() {
+fn rays_from_1_mm_off_the_wall_end_on_the_wall() {
     for (name, profile) in all() {
         for step in 0..50 {
             let wall = profile.cast(profile.reference(), {
@@ -117,10 +117,12 @@ fn rays_from_a_millimetre_off_the_wall_and_nearly_along_it_end_on_the_wall() {
     }
 }
 
-/// Up along a wall that runs into a half-circle without a corner: the ray touches the vault's circle where it begins, and a few
-/// ulps beside the wall it crosses it above. The height above the springing is sqrt((2 - y) (2 + y)), without cancellation.
+/// A ray up along a wall that runs into a half-circle without a corner touches the vault's circle where it begins.
+///
+/// A few ulps beside the wall, it crosses the circle above. The height above the springing is sqrt((2 - y) (2 + y)),
+/// without cancellation.
 #[test]
-fn a_ray_tangent_to_the_vault_meets_it_where_it_begins() {
+fn ray_tangent_to_the_vault_meets_it_at_the_springing() {
     let profile = arch(4.0, 4.0, 2.0).unwrap();
     let mut half: f64 = 2.0;
     for ulps in 0..2000 {
@@ -129,7 +131,7 @@ fn a_ray_tangent_to_the_vault_meets_it_where_it_begins() {
                 panic!("no wall {ulps} ulps beside the wall");
             };
             let above_m = math::sqrt((2.0 - half) * (2.0 + half));
-            // The circle's equation cancels: an error of an ulp of 4 m^2 under the root.
+            // The circle's equation cancels: the error is an ulp of 4 m^2 under the root.
             let error_m = (hit.range_m - (1.0 + above_m)).abs();
             assert!(error_m < 4.3e-8, "{ulps} ulps, y {y}: {error_m}");
             assert!(profile.contains([hit.point[0] * 0.999, hit.point[1]]));
@@ -139,7 +141,7 @@ fn a_ray_tangent_to_the_vault_meets_it_where_it_begins() {
 }
 
 #[test]
-fn from_outside_there_is_no_range() {
+fn ray_from_outside_has_no_range() {
     for (name, profile) in all() {
         assert_eq!(profile.cast([100.0, 1.0], [-1.0, 0.0]), None, "{name}");
         assert_eq!(profile.cast(profile.reference(), [0.0, 0.0]), None, "{name}");
@@ -148,7 +150,7 @@ fn from_outside_there_is_no_range() {
 }
 
 #[test]
-fn curves_that_are_no_profile_are_refused_with_their_vertex() {
+fn invalid_curve_is_rejected_with_its_vertex() {
     let bow_tie = [[1.0, 0.0], [-1.0, 2.0], [1.0, 2.0], [-1.0, 0.0]];
     assert!(Profile::polygon(&bow_tie, Some([0.0, 1.0])).is_err());
     let hooked = [[3.0, 0.0], [3.0, 4.0], [2.9, 4.0], [2.9, 0.5], [-3.0, 0.5], [-3.0, 0.0]];
@@ -164,7 +166,7 @@ fn curves_that_are_no_profile_are_refused_with_their_vertex() {
 }
 
 #[test]
-fn repeated_and_collinear_points_and_slivers_change_nothing() {
+fn repeated_or_collinear_points_and_slivers_have_no_effect() {
     let plain = Profile::polygon(&[[2.0, 0.0], [2.0, 3.0], [-2.0, 3.0], [-2.0, 0.0]], None).unwrap();
     let messy = [
         [2.0, 0.0],
@@ -192,7 +194,7 @@ fn repeated_and_collinear_points_and_slivers_change_nothing() {
 proptest! {
     /// The wall point at any arc length has that same arc length when seen from the reference point.
     #[test]
-    fn point_at_and_sigma_of_are_inverse(which in 0usize..7, share in 0.0f64..1.0) {
+    fn point_at_and_arc_of_are_inverse(which in 0usize..7, share in 0.0f64..1.0) {
         let (name, profile) = all().swap_remove(which);
         let arc = share * profile.perimeter_m();
         let back = profile.arc_of(profile.point_at(arc));
@@ -200,9 +202,9 @@ proptest! {
         prop_assert!(apart.abs() < 1e-9, "{} at {}: {}", name, arc, back);
     }
 
-    /// Casting reversed: from the hit back towards the origin, the origin lies at the same distance.
+    /// In reverse, from the hit back towards the origin, the origin is at the same distance.
     #[test]
-    fn a_hit_lies_on_the_ray_and_on_the_wall(which in 0usize..7, y in -0.8f64..0.8, z in -0.8f64..0.8, turn in 0.0f64..1.0) {
+    fn hit_lies_on_the_ray_and_on_the_wall(which in 0usize..7, y in -0.8f64..0.8, z in -0.8f64..0.8, turn in 0.0f64..1.0) {
         let (_, profile) = all().swap_remove(which);
         let origin = [profile.reference()[0] + y, profile.reference()[1] + z];
         let direction = [math::cos(turn * TAU), math::sin(turn * TAU)];
@@ -216,7 +218,7 @@ proptest! {
 }
 
 #[test]
-fn the_farthest_wall_along_a_direction_is_what_a_dense_search_finds() {
+fn farthest_wall_along_a_direction_equals_a_dense_search() {
     for (name, profile) in all() {
         for k in 0..24 {
             let (sin, cos) = math::sin_cos(0.26 * f64::from(k));

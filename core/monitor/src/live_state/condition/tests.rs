@@ -8,13 +8,13 @@ const fn at(seconds: u64) -> MonoNs {
     MonoNs(seconds * 1_000_000_000)
 }
 
-/// Advice of a speed.
+/// Advice with this reason, speed and forecast T.
 fn advice(reason: Reason, v_max_mps: f64, t_m: f64) -> Advice {
     let none = fixtures::advice(&fixtures::situation(None));
     Advice { reason, v_max_mps, predicted_t_m: Some(t_m), will_exceed: t_m > 0.5, ..none }
 }
 
-/// Two heads and another sensor, all heard at 10 s, at 0.07 m/s where 0.07 is allowed.
+/// Two heads and another sensor, all heard at 10 s, at 0.07 m/s where 0.07 m/s is allowed.
 pub(crate) fn state() -> LiveState {
     let mut heard = LiveState::new(0.5, 2.0, 0b11, 3).heard;
     heard[..3].fill(Some(at(10)));
@@ -34,7 +34,7 @@ pub(crate) fn state() -> LiveState {
 }
 
 #[test]
-fn the_colour_follows_speed_against_what_is_allowed() {
+fn lamp_follows_the_ratio_of_speed_to_limit() {
     let driven = |speed_mps| LiveState { speed_mps: Some(speed_mps), ..state() };
     let shown = [0.05, 0.0713, 0.073, 0.11, -0.11].map(|mps| {
         let condition = driven(mps).condition();
@@ -52,9 +52,9 @@ fn the_colour_follows_speed_against_what_is_allowed() {
     );
 }
 
-/// Where nothing is to be gained or missed; but not on the word of a doubtful position, nor without sonar.
+/// Any speed is fine over wall that has passed, unless the position is doubtful or there is no sonar.
 #[test]
-fn over_wall_that_has_passed_any_speed_will_do() {
+fn any_speed_is_fine_over_passed_wall() {
     let back = LiveState { passed: true, speed_mps: Some(-0.3), ..state() };
     assert_eq!((back.condition(), back.condition().lamp()), (Condition::Passed, Lamp::Green));
     let coarse = LiveState { advice: Some(advice(Reason::AngularStep, 0.0, 0.9)), ..back };
@@ -66,9 +66,9 @@ fn over_wall_that_has_passed_any_speed_will_do() {
     assert_eq!(mute.condition(), Condition::NoSonar);
 }
 
-/// What was missed is passed again from where the vehicle turns round; slowly enough, the way back counts, too.
+/// A missed stretch is passed again from the turning point. The way back counts, too, if it is slow enough.
 #[test]
-fn on_the_way_back_for_what_was_missed_any_speed_will_do() {
+fn any_speed_is_fine_on_the_way_back_to_a_missed_stretch() {
     let back = LiveState { back_to_m: Some(8.2), speed_mps: Some(-0.3), ..state() };
     assert_eq!((back.condition(), back.condition().lamp()), (Condition::GoingBack(8.2), Lamp::Green));
     assert_eq!(LiveState { speed_mps: Some(-0.05), ..back }.condition(), Condition::Good);
@@ -79,14 +79,14 @@ fn on_the_way_back_for_what_was_missed_any_speed_will_do() {
 }
 
 #[test]
-fn a_turn_that_misses_within_the_speed_allowed_is_told_only_while_it_does() {
+fn missing_turn_within_the_limit_is_reported_while_it_misses() {
     let forecast = |t_m| Advice { will_exceed: true, ..advice(Reason::HelixPitch, 0.07, t_m) };
     let told = |t_m| LiveState { advice: Some(forecast(t_m)), ..state() }.condition();
     assert_eq!([told(0.6), told(0.4)], [Condition::TurnFails, Condition::Good]);
 }
 
 #[test]
-fn a_turn_within_what_errors_of_position_take_is_not_good() {
+fn turn_within_position_error_of_the_target_is_not_good() {
     let forecast = |may_exceed, will_exceed| Advice {
         may_exceed,
         will_exceed,
@@ -97,22 +97,18 @@ fn a_turn_within_what_errors_of_position_take_is_not_good() {
     };
     assert_eq!(driven(forecast(true, false), 0.06), Condition::TurnUnsure);
     assert_eq!(driven(forecast(false, false), 0.06), Condition::Good);
-    assert_eq!(driven(forecast(true, true), 0.06), Condition::TurnFails, "the graver of the two");
+    assert_eq!(driven(forecast(true, true), 0.06), Condition::TurnFails, "the graver condition of the two");
     assert_eq!(
         driven(forecast(true, false), 0.07),
         Condition::Good,
-        "nothing better is known than what is driven"
+        "no better speed is known than the present one"
     );
-    assert_eq!(
-        driven(forecast(true, false), 0.072),
-        Condition::Over,
-        "that it is over what is allowed says why"
-    );
+    assert_eq!(driven(forecast(true, false), 0.072), Condition::Over, "exceeding the limit is the reason");
     assert_eq!(Condition::TurnUnsure.lamp(), Lamp::Amber);
 }
 
 #[test]
-fn what_is_lacking_is_a_state_and_comes_before_what_is_doubtful() {
+fn missing_data_takes_precedence_over_doubtful_data() {
     let doubtful = LiveState { position: PositionState::Doubtful(PositionDoubt::Cable), ..state() };
     assert_eq!(doubtful.condition(), Condition::CannotSay(PositionDoubt::Cable));
     assert_eq!(LiveState { speed_mps: Some(0.11), ..doubtful }.condition(), Condition::TooFast);
@@ -129,7 +125,7 @@ fn what_is_lacking_is_a_state_and_comes_before_what_is_doubtful() {
 }
 
 #[test]
-fn it_grows_old_as_ticks_go_on_without_data() {
+fn state_gets_stale_as_ticks_continue_without_data() {
     let after = |ms: u64| LiveState { now: MonoNs(at(10).0 + ms * 1_000_000), ..state() };
     assert_eq!([after(2000), after(2001)].map(|state| state.is_old()), [false, true]);
     assert_eq!(
@@ -137,11 +133,11 @@ fn it_grows_old_as_ticks_go_on_without_data() {
         [SensorState::Ok, SensorState::Silent]
     );
     assert_eq!(after(30_000).age().map(DurNs::as_secs_f64), Some(30.0));
-    assert_eq!(LiveState { now: at(9), ..state() }.age(), Some(DurNs(0)), "a clock that was set back");
+    assert_eq!(LiveState { now: at(9), ..state() }.age(), Some(DurNs(0)), "the clock was set back");
 }
 
 #[test]
-fn sensors_say_how_they_are() {
+fn sensors_report_their_state() {
     let mut state = state();
     state.heard[2] = None;
     state.turning = 0b01;
@@ -150,16 +146,17 @@ fn sensors_say_how_they_are() {
     assert_eq!(state.silent().collect::<Vec<_>>(), [2]);
 }
 
-/// Heads are up to half a metre before or behind: until none can be over the tunnel, what is seen counts.
+/// Heads are up to half a metre before or behind the origin. Coverage counts until no head can be inside the
+/// tunnel.
 #[test]
-fn before_the_beginning_and_beyond_the_end_nothing_is_inspected() {
+fn outside_the_tunnel_nothing_is_inspected() {
     let at = |x_m: f64| LiveState { chainage_m: Some(x_m), length_m: 100.0, heads_reach_m: 0.5, ..state() };
     let shown = [-0.6, -0.4, 50.0, 100.4, 100.6].map(|x_m| at(x_m).condition());
     let [before, inside @ .., beyond] = shown;
     assert_eq!([before, beyond], [Condition::Outside(0.0), Condition::Outside(100.0)]);
     assert_eq!(inside, [Condition::Good; 3]);
     assert_eq!((beyond.as_str(), beyond.lamp()), ("outside", Lamp::Amber));
-    // Where it isn't sure of its place, that is what it has to know.
+    // An unreliable position takes precedence.
     let unsure = LiveState { position: PositionState::Doubtful(PositionDoubt::Cable), ..at(100.6) };
     assert_eq!(unsure.condition(), Condition::CannotSay(PositionDoubt::Cable));
 }

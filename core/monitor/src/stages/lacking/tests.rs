@@ -9,7 +9,7 @@ use headrace_sampling::layout::HeadLayout;
 use headrace_sensor::device::{SensorInfo, SensorKind};
 use headrace_sensor::reading::SourceId;
 
-/// A ping made without a fix, with a return or without one.
+/// A ping made without a fix, with or without a return.
 fn away(at_ms: u64, outcome: Outcome) -> PlacedPing {
     let at = MonoNs(at_ms * 1_000_000);
     PlacedPing {
@@ -30,9 +30,10 @@ fn away(at_ms: u64, outcome: Outcome) -> PlacedPing {
     }
 }
 
-/// What is taken to hide a head does so once seven in ten of the pings there get nothing; the latest hundreds count.
+/// An angle counts as hidden once seven in ten of its pings get no return. Only the latest hundreds of pings
+/// count.
 #[test]
-fn the_vehicle_hides_where_most_pings_get_nothing() {
+fn angle_is_hidden_if_most_pings_get_no_return() {
     let hides = |pings: [u32; 2]| {
         let mut turning = Turning::default();
         for (count, is_lost) in pings.into_iter().zip([true, false]) {
@@ -41,15 +42,16 @@ fn the_vehicle_hides_where_most_pings_get_nothing() {
         turning.note_hidden(false, false);
         turning.is_hidden()
     };
-    assert!(hides([0, 0]), "until something is seen there");
+    assert!(hides([0, 0]), "hidden until there is evidence");
     assert!(hides([70, 30]) && !hides([69, 31]));
     assert!(!hides([0, 3]) && hides([1, 0]));
-    assert!(!hides([10_000, 400]), "seen through for the last hundreds");
+    assert!(!hides([10_000, 400]), "the last hundreds of pings got returns");
 }
 
-/// A head that would have pinged on loses as often, and in as long runs, as it did while it was heard; twice the same pings, twice the same.
+/// A simulated head loses as often, and in runs as long, as while it was heard. The same pings give the same
+/// losses.
 #[test]
-fn what_would_have_been_lost_is_as_much_and_in_runs_as_long() {
+fn simulated_losses_match_rate_and_run_length() {
     let lost = |rate: LossRate| {
         let mut turning = Turning::default();
         (0..40_000).map(|k| turning.would_lose(MonoNs(k * 20_000_000), rate)).collect::<Vec<bool>>()
@@ -68,7 +70,7 @@ fn what_would_have_been_lost_is_as_much_and_in_runs_as_long() {
 }
 
 #[test]
-fn pings_without_a_fix_are_kept_until_there_is_no_room_and_that_is_known() {
+fn pings_without_a_fix_are_kept_up_to_capacity_and_overflow_is_recorded() {
     let (mut lacking, mut lacks) = (Lacking::default(), Lacks::default());
     let unplaced = Outcome::Unplaced(headrace_fusion::NoFix::Chainage);
     let missing = Outcome::Lost(Loss::Missing, None);
@@ -77,14 +79,10 @@ fn pings_without_a_fix_are_kept_until_there_is_no_room_and_that_is_known() {
     }
     assert_eq!((lacking.away.len(), lacking.forgot), (ROOM, false));
     let [first, second] = [lacking.away[0], lacking.away[1]];
-    assert_eq!((first.is_lost, second.is_lost), (false, true), "a return that couldn't be placed isn't lost");
+    assert_eq!((first.is_lost, second.is_lost), (false, true), "a return without a fix isn't lost");
     assert!([first, second].iter().all(|ping| ping.why == Causes::of(Cause::PositionLost) && ping.head == 1));
     note_ping(&mut lacking, &away(ROOM as u64, unplaced), &mut lacks);
-    assert_eq!(
-        (lacking.away.len(), lacking.forgot),
-        (ROOM, true),
-        "a stretch that isn't remembered is known"
-    );
+    assert_eq!((lacking.away.len(), lacking.forgot), (ROOM, true), "a forgotten stretch is recorded");
 }
 
 fn lacks_of(lacks: &Lacks) -> Vec<Lack> {
@@ -95,9 +93,9 @@ fn all_of(causes: &[Cause]) -> Causes {
     causes.iter().fold(Causes::default(), |all, cause| all.with(*cause))
 }
 
-/// What is lost at angles that the vehicle is taken to hide is lost by it, unless the wall is heard at such angles all the same.
+/// Losses at angles assumed to be hidden are due to occlusion, unless the wall is detected there after all.
 #[test]
-fn what_is_not_heard_past_the_vehicle_is_missing_once_others_are() {
+fn loss_at_hidden_angle_is_missing_once_others_return() {
     let (mut lacking, mut lacks) = (Lacking::default(), Lacks::default());
     let aim = Some(Aim { x_m: 3.0, arc_m: 2.0 });
     let lost = |loss: Loss| away(5, Outcome::Lost(loss, aim));
@@ -116,15 +114,16 @@ fn what_is_not_heard_past_the_vehicle_is_missing_once_others_are() {
     assert_eq!(causes(&[lost(Loss::Occluded)]), Some(Causes::of(Cause::MissingReturns)));
     assert_eq!(causes(&[lost(Loss::OutOfRange)]), Some(Causes::of(Cause::OutOfRange)));
     let before = lacks_of(&lacks).len();
-    assert_eq!(before, 14, "samples are none");
+    assert_eq!(before, 14, "samples are not missing");
     note_ping(&mut lacking, &PlacedPing { standing: true, ..lost(Loss::Missing) }, &mut lacks);
-    assert_eq!(lacks_of(&lacks).len(), before, "where a head stands and looks, nothing is lacking");
+    assert_eq!(lacks_of(&lacks).len(), before, "a stalled head misses nothing at its own angle");
     assert!(lacking.stalled.has(1) && !lacking.stalled.has(0));
 }
 
-/// To the left, where the wall is 3 m away, by a vehicle that is turned to the left by 0.1 rad: the beam meets it 3 tan 0.1 m astern.
+/// To the left, with the wall 3 m away and the vehicle turned to the left by 0.1 rad, the beam meets it 3 tan
+/// 0.1 m astern.
 #[test]
-fn a_ping_lacks_where_it_was_aimed_for_all_that_kept_it_from_the_wall() {
+fn lost_ping_is_missing_at_its_aim_with_all_causes() {
     let profile = pipe();
     let [y_m, z_m] = profile.reference();
     let attitude = Rot::from_roll_pitch_yaw(0.0, 0.0, 0.1);
@@ -169,7 +168,7 @@ fn a_ping_lacks_where_it_was_aimed_for_all_that_kept_it_from_the_wall() {
     }
 }
 
-/// A dive at 0.1 m/s from chainage 1 m on whose only head has turned at 50 pings a second until 10 s.
+/// A dive at 0.1 m/s from chainage 1 m. Its only head turned at 50 pings a second until 10 s.
 struct Dive {
     world: World,
     profile: Profile,
@@ -197,7 +196,7 @@ impl Dive {
         Self { world, coverage: coverage(), profile, lacking }
     }
 
-    /// What is lacking after a beat, with or without a fix.
+    /// Missing samples after an update with or without a fix.
     fn beat(&mut self, seconds: f64, has_fix: bool) -> Vec<Lack> {
         let [y_m, z_m] = self.profile.reference();
         let position = Point3::new(1.0 + 0.1 * seconds, y_m, z_m);
@@ -220,7 +219,8 @@ impl Dive {
         lacks_of(&self.coverage.lacks)
     }
 
-    /// Whether lacks are those of the pings after 10 s, in order, each where the head would have been.
+    /// Whether missing samples are those of the pings after 10 s, in order, each at the head's expected
+    /// place.
     fn are_pings_after_10_s(&self, lacks: &[Lack], why: &[Cause]) -> bool {
         let [y_m, z_m] = self.profile.reference();
         (1_u32..).zip(lacks).all(|(ping, lack)| {
@@ -235,24 +235,25 @@ impl Dive {
 }
 
 #[test]
-fn a_silent_head_lacks_where_it_would_have_turned_on_to() {
+fn silent_head_is_missing_at_its_extrapolated_angles() {
     let mut dive = Dive::new();
-    assert_eq!(dive.beat(10.2, true).len(), 0, "it may yet ping");
-    // A second of pings, and another one.
+    assert_eq!(dive.beat(10.2, true).len(), 0, "the head may still ping");
+    // One second of pings, and another.
     let first = dive.beat(11.0, true);
     assert!(first.len() == 50 && dive.are_pings_after_10_s(&first, &[Cause::HeadSilent]), "{first:?}");
     let second = dive.beat(12.0, true);
     assert!(second.len() == 100 && dive.are_pings_after_10_s(&second, &[Cause::HeadSilent]));
-    // One that pings, and stands.
+    // A head that pings but is stalled.
     let mut dive = Dive::new();
     dive.lacking.heads[0].pinged = Some(at(10.9));
     let first = dive.beat(11.0, true);
     assert!(first.len() == 50 && dive.are_pings_after_10_s(&first, &[Cause::HeadStalled]));
 }
 
-/// Without a fix they are lacking for that, too, and placed along the way once there is one again.
+/// Without a fix, pings are missing for that reason, too. They are placed along the track once there is a fix
+/// again.
 #[test]
-fn what_would_have_been_pinged_without_a_fix_is_placed_later() {
+fn simulated_pings_without_a_fix_are_placed_later() {
     let mut dive = Dive::new();
     dive.beat(10.0, true);
     assert_eq!((dive.beat(11.0, false).len(), dive.lacking.away.len()), (0, 50));
@@ -260,10 +261,10 @@ fn what_would_have_been_pinged_without_a_fix_is_placed_later() {
     assert_eq!((all.len(), dive.lacking.away.len(), dive.lacking.forgot), (100, 0, false));
     assert!(dive.are_pings_after_10_s(&all[..50], &[Cause::HeadSilent, Cause::PositionLost]), "{all:?}");
     assert!(all[50..].iter().all(|lack| lack.why == Causes::of(Cause::HeadSilent)));
-    // They went by as fast as the way between took.
+    // Their speed is that between the two fixes.
     let section = dive.coverage.sections.get(8).unwrap();
     assert!((section.passage.drive.speed_mps - 0.1).abs() < 1e-9, "{:?}", section.passage.drive);
-    // More than there is room for: those that are kept are the first.
+    // If there are more than fit, the first ones are kept.
     let mut dive = Dive::new();
     dive.beat(10.0, true);
     dive.beat(10.0 + 0.02 * (ROOM as f64 + 500.0), false);
@@ -275,13 +276,13 @@ fn what_would_have_been_pinged_without_a_fix_is_placed_later() {
     assert_eq!(
         (seen(&dive), dive.lacking.forgot),
         (Some(true), false),
-        "nobody knows what was lacking there"
+        "the missing samples there are unknown"
     );
 }
 
-/// After a gap in a log the work of a beat is bounded, and it is known that something is left out.
+/// After a gap in a log the work of an update is bounded, and the omission is recorded.
 #[test]
-fn of_what_is_owed_at_once_the_latest_are_noted() {
+fn overdue_pings_keep_the_latest() {
     for (owed, is_forgotten) in [(ROOM, false), (ROOM + 1, true)] {
         let mut dive = Dive::new();
         dive.beat(10.0, true);
@@ -292,18 +293,18 @@ fn of_what_is_owed_at_once_the_latest_are_noted() {
     }
 }
 
-/// Draws by time are as even as draws by chance, whatever the time between pings, and no two are the same.
+/// Draws by time are as even as random draws, whatever the time between pings, and no two are equal.
 #[test]
-fn draws_by_time_are_spread_evenly() {
+fn draws_by_time_are_evenly_spread() {
     for period_ns in [1_u64, 18_000_000, 20_000_000, 1 << 30, 1_000_000_000] {
         let draws: Vec<f64> = (0..16_384).map(|k| unit_of(3_600_000_000_000 + k * period_ns)).collect();
         let mut counts = [0_i32; 16];
         for draw in &draws {
             counts[usize::try_from(math::floor_to_i64(16.0 * draw)).unwrap()] += 1;
         }
-        // 1024 each, to five standard deviations.
+        // 1024 each, within five standard deviations.
         assert!(counts.iter().all(|count| (count - 1024).abs() < 160), "{period_ns}: {counts:?}");
-        // What follows the lower half is as even: neighbours have nothing to do with each other.
+        // Draws after one in the lower half are as even: neighbours are independent.
         let after_low = draws.windows(2).filter(|pair| pair[0] < 0.5 && pair[1] < 0.5).count();
         assert!(after_low.abs_diff(4096) < 300, "{period_ns}: {after_low}");
         let mut sorted = draws;

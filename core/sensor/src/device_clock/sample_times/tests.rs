@@ -3,7 +3,7 @@ use headrace_geometry::frames::Vec3;
 
 const PERIOD: DurNs = DurNs(2_500_000);
 const TICK: DurNs = DurNs(100_000);
-/// Samples by which a unit shows that its stamps come first.
+/// Number of samples after which a unit's stamps are known to come first.
 const FIRST: i64 = 30;
 
 fn force() -> Reading {
@@ -14,7 +14,7 @@ fn rate() -> Reading {
     Reading::AngularRate(Vec3::zero())
 }
 
-/// Samples every 2.5 ms whose messages come with these delays; times of their forces.
+/// Samples every 2.5 ms whose messages have these delays; returns the times of their forces.
 fn times(delays_ns: &[i64], ticks_of: impl Fn(i64) -> i64) -> Vec<(MonoNs, MonoNs)> {
     let mut times = SampleTimes::new(32, TICK);
     let of = |(k, delay_ns): (i64, &i64)| {
@@ -32,33 +32,36 @@ fn in_step(k: i64) -> i64 {
 }
 
 #[test]
-fn samples_that_come_in_time_are_valid_when_they_come() {
+fn punctual_samples_are_valid_on_arrival() {
     let delays: Vec<i64> = (0..4000).map(|k| 300_000 + k * 37 % 700_000).collect();
     for (k, (made, at)) in times(&delays, in_step).iter().enumerate().skip(30) {
         assert_eq!(at.since(*made).0, delays[k], "sample {k}");
     }
 }
 
-/// The largest error of a time after the first seconds, ns.
+/// Largest time error after the first seconds, ns.
 fn worst_ns(times: &[(MonoNs, MonoNs)]) -> i64 {
     times.iter().skip(4000).map(|(made, at)| at.since(*made).0.abs()).max().unwrap()
 }
 
 #[test]
-fn a_burst_is_told_apart() {
-    // Every tenth sample waits 25 ms, and those after it come with it.
+fn samples_of_a_burst_are_separated() {
+    // Every tenth sample waits 25 ms, and the following ones arrive with it.
     let burst = |k: i64| if k % 40 < 10 { (10 - k % 40) * PERIOD.0 } else { 0 };
     let delays: Vec<i64> = (20..20_020).map(burst).collect();
     let off = worst_ns(&times(&delays, in_step));
     assert!(off <= 300_000, "{off} ns");
     let received: Vec<i64> = (0..).zip(&delays).map(|(k, delay)| k * PERIOD.0 + delay).collect();
-    assert!(received.windows(2).filter(|pair| pair[0] == pair[1]).count() > 2500, "there were bursts");
+    assert!(
+        received.windows(2).filter(|pair| pair[0] == pair[1]).count() > 2500,
+        "the samples must arrive in bursts"
+    );
 }
 
 #[test]
-fn a_clock_that_drifts_is_followed() {
+fn drifting_clock_is_followed() {
     for ppm in [-500, -20, 200, 500] {
-        // One sample in ten 5 ms late.
+        // One sample in ten is 5 ms late.
         let delays: Vec<i64> = (0..40_000).map(|k| if k % 10 == 3 { 5_000_000 } else { 0 }).collect();
         let off = worst_ns(&times(&delays, |k| (k * PERIOD.0 - k * PERIOD.0 / 1_000_000 * ppm) / TICK.0));
         assert!(off <= 1_000_000, "{ppm} parts in a million: {off} ns");
@@ -66,8 +69,8 @@ fn a_clock_that_drifts_is_followed() {
 }
 
 #[test]
-fn a_garbled_stamp_spoils_no_sample_but_its_own() {
-    // One stamp in fifty has a bit flipped.
+fn garbled_stamp_affects_only_its_own_sample() {
+    // One stamp in fifty has a flipped bit.
     let garbled = |k: i64| if k % 50 == 7 { in_step(k) ^ 1 << (k / 50 % 32) } else { in_step(k) };
     let all = times(&vec![0; 20_000], garbled);
     let others: Vec<(MonoNs, MonoNs)> =
@@ -76,7 +79,7 @@ fn a_garbled_stamp_spoils_no_sample_but_its_own() {
 }
 
 #[test]
-fn a_clock_that_stands_still_or_begins_again_puts_nothing_back_for_long() {
+fn stopped_or_restarted_clock_corrects_only_briefly() {
     let none = vec![0; 4000];
     let stuck = times(&none, |k| in_step(k.min(1000)));
     let put_back = stuck.iter().filter(|(made, at)| made != at).count();
@@ -85,7 +88,7 @@ fn a_clock_that_stands_still_or_begins_again_puts_nothing_back_for_long() {
     assert!(again.iter().all(|(made, at)| made == at));
 }
 
-/// Samples every 10 ms whose stamp comes before or after rate and force; the times that these are given.
+/// Samples every 10 ms whose stamp comes before or after rate and force; returns their corrected times.
 fn stamped(times: &mut SampleTimes, count: u64, is_first: bool) -> Vec<MonoNs> {
     let mut got = Vec::new();
     for k in 0..count {
@@ -102,7 +105,7 @@ fn stamped(times: &mut SampleTimes, count: u64, is_first: bool) -> Vec<MonoNs> {
 }
 
 #[test]
-fn a_stamp_is_of_the_first_reading_of_each_kind() {
+fn stamp_belongs_to_the_first_reading_of_each_kind() {
     let mut times = SampleTimes::new(32, TICK);
     stamped(&mut times, 20, true);
     let at = |ms: u64| MonoNs(1_000_000_000 + ms * 1_000_000);
@@ -110,13 +113,17 @@ fn a_stamp_is_of_the_first_reading_of_each_kind() {
     for reading in [rate(), force()] {
         assert!(times.arrival(&reading, at(231)).since(at(210)).0.abs() < TICK.0);
     }
-    assert_eq!(times.arrival(&force(), at(240)), at(240), "of a later sample, which has no stamp");
+    assert_eq!(
+        times.arrival(&force(), at(240)),
+        at(240),
+        "a later sample without a stamp keeps its receive time"
+    );
     let mut unstamped = SampleTimes::new(32, TICK);
     assert_eq!(unstamped.arrival(&force(), at(0)), at(0));
 }
 
 #[test]
-fn a_stamp_that_comes_last_is_of_no_reading_after_it() {
+fn trailing_stamp_belongs_to_no_later_reading() {
     let mut times = SampleTimes::new(32, TICK);
     let got = stamped(&mut times, 200, false);
     let right = (0..200).flat_map(|k| [MonoNs(1_000_000_000 + k * 10_000_000); 2]);

@@ -1,4 +1,4 @@
-//! Navigation by the cable's counter alone: the least that a dive can be told by, and what all else is held against.
+//! Navigation by the cable's counter alone: the simplest possible method, with which all others are compared.
 
 use headrace_fusion::relative::Relative;
 use headrace_fusion::{Fix, Navigation, NoFix, Times};
@@ -12,10 +12,10 @@ use headrace_sensor::reading::Reading;
 
 /// Time over which the speed is taken, s.
 const SPEED_OVER_S: f64 = 1.0;
-/// A reading older than this says nothing, s.
+/// Age above which a reading is ignored, s.
 const STALE_S: f64 = 2.0;
 
-/// The chainage that a reading says, m; none of what isn't of a cable.
+/// The chainage of a reading, m; `None` if it isn't from a cable.
 pub(super) fn chainage_m(info: &SensorInfo, reading: &Reading) -> Option<f64> {
     match (info.kind, reading) {
         (SensorKind::Tether { zero_at_m, scale }, Reading::TetherLength(length)) => {
@@ -25,11 +25,13 @@ pub(super) fn chainage_m(info: &SensorInfo, reading: &Reading) -> Option<f64> {
     }
 }
 
-/// Chainage and speed by the counter; the vehicle in the middle of the section, level and straight ahead. Errors are taken to be
-/// those of the counter's resolution.
+/// Navigation with chainage and speed from the counter.
+///
+/// The vehicle is assumed in the middle of the section, level and straight ahead. Errors are taken to be those of the
+/// counter's resolution.
 pub(super) struct CableNavigation {
     middle: Yz,
-    /// The last reading, and one about [`SPEED_OVER_S`] before it: when, and chainage, m.
+    /// The last reading, and one about [`SPEED_OVER_S`] before it: time, and chainage, m.
     last: Option<(MonoNs, f64)>,
     before: Option<(MonoNs, f64)>,
     speed_mps: f64,
@@ -39,7 +41,7 @@ pub(super) struct CableNavigation {
 stateful!(CableNavigation { state: last, before, speed_mps, resolution_m; fixed: middle; });
 
 impl CableNavigation {
-    /// Without readings yet.
+    /// Creates the navigation, without readings.
     pub(super) fn new(profile: &Profile) -> Self {
         Self { middle: profile.reference(), last: None, before: None, speed_mps: 0.0, resolution_m: 0.0 }
     }

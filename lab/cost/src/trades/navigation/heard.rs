@@ -1,4 +1,4 @@
-//! What navigation hears of a dive, so that it can be run, and its CPU time taken, without the rest of the loop.
+//! The input of navigation in a dive, recorded so that navigation can be run and timed without the rest of the loop.
 
 use headrace_fusion::filter::settings::Settings;
 use headrace_fusion::smooth::backward::Backward;
@@ -17,10 +17,10 @@ use super::cable::CableNavigation;
 use crate::error::CostError;
 use headrace_oracle::dive::{JudgedDive, Recorded};
 
-/// Steps of an epoch are taken out of the journal right after it: as many as a silence leaves.
+/// Capacity of the journal, from which steps are taken right after their epoch; it holds the steps after a silence.
 const JOURNAL: usize = 4096;
 
-/// A reading, as navigation gets it.
+/// A reading as passed to navigation.
 #[derive(Debug, Clone, Copy)]
 struct Heard {
     source: usize,
@@ -32,12 +32,12 @@ struct Heard {
 pub(super) struct Hearing {
     sensors: Vec<SensorInfo>,
     readings: Vec<Heard>,
-    /// From the first to the last reading, s.
+    /// Time from the first to the last reading, s.
     pub(super) duration_s: f64,
 }
 
 impl Hearing {
-    /// Replays a dive with navigation by the cable alone, and takes what it hears.
+    /// Replays a dive with navigation by the cable alone, and records the input.
     ///
     /// Errors: the loop can't be armed or driven.
     pub(super) fn of(recorded: &Recorded, vehicle: &VehicleConfig) -> Result<(Self, JudgedDive), CostError> {
@@ -68,7 +68,7 @@ impl Hearing {
         ))
     }
 
-    /// Cable readings, as chainages: when they were valid, and the chainage that they say, m.
+    /// Cable readings as chainages: time of validity, and chainage, m.
     pub(super) fn chainages(&self) -> impl Iterator<Item = (MonoNs, f64)> {
         self.readings.iter().filter_map(|heard| {
             let info = self.sensors.get(heard.source)?;
@@ -76,7 +76,7 @@ impl Hearing {
         })
     }
 
-    /// The first part of the dive, s: long enough to time.
+    /// The first `part_s` of the dive, s, long enough to time.
     pub(super) fn first(&self, part_s: f64) -> Self {
         let begun = self.readings.first().map_or(MonoNs(0), |heard| heard.times.received);
         let within = |heard: &&Heard| heard.times.received.since(begun).as_secs_f64() <= part_s;
@@ -84,7 +84,7 @@ impl Hearing {
         Self { sensors: self.sensors.clone(), readings, duration_s: self.duration_s.min(part_s) }
     }
 
-    /// Runs a navigation as the loop does: before each ping a fix is asked for, which `take` gets.
+    /// Runs a navigation as the loop does: before each ping it requests a fix and passes it to `take`.
     pub(super) fn run(
         &self,
         navigation: &mut dyn Navigation,
@@ -93,7 +93,7 @@ impl Hearing {
         self.run_noting(navigation, take, &mut || {});
     }
 
-    /// The same; `after` is called after each reading.
+    /// Runs a navigation like [`Hearing::run`]; `after` is called after each reading.
     fn run_noting(
         &self,
         navigation: &mut dyn Navigation,

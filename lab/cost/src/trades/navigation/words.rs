@@ -1,4 +1,4 @@
-//! What the points say of the default, in words.
+//! Text about the default, derived from the points.
 
 use crate::point::Point;
 use crate::words::number;
@@ -13,8 +13,8 @@ fn figure(point: &Point, name: &str) -> Option<f64> {
     point.errors.iter().find(|error| error.name == name).map(|error| error.interval.middle)
 }
 
-/// Where a method does worst: its largest error across, m, and the smallest share of displacements within two of the sigmas that it
-/// tells, %.
+/// Worst case of a method: its largest error across, m, and the smallest share of displacements within two of its
+/// stated sigmas, %.
 fn worst(points: &[Point], method: &str) -> Option<[f64; 2]> {
     let of = |name: &'static str| {
         points.iter().filter(|point| point.value == method).filter_map(move |point| figure(point, name))
@@ -23,7 +23,7 @@ fn worst(points: &[Point], method: &str) -> Option<[f64; 2]> {
     Some([across_m, of("displacements within two sigma").reduce(f64::min)?])
 }
 
-/// Why the filter with sonar returns is the default where something beats it.
+/// Reasons why the filter with sonar returns is the default although something beats it.
 pub(super) fn reasons(points: &[Point]) -> Vec<String> {
     let mut reasons = Vec::new();
     if let (Some(usual), Some(cable), Some(direct)) =
@@ -55,7 +55,7 @@ pub(super) fn reasons(points: &[Point]) -> Vec<String> {
     reasons
 }
 
-/// What the data says of the default in the last scene.
+/// Advice about the default, from the data of the last scene.
 pub(super) fn advice(points: &[Point], scene: &str) -> String {
     let of = |value: &str| points.iter().find(|point| point.scene == scene && point.value == value);
     let (Some(cable), Some(usual)) = (of(CABLE), of(USUAL)) else {

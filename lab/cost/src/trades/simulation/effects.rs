@@ -1,9 +1,10 @@
-//! Effects of a scene's text: which it names, the text without one, and with other rays.
+//! Finds the effects in a scene's text, removes one, and sets the number of rays.
 
 use crate::error::CostError;
 
-/// Every effect that can be together with the others, with some parameters. Heads turn all round, so that `sector_end_slowing` doesn't
-/// apply.
+/// Every effect that can be combined with the others, with some parameters.
+///
+/// Heads turn all round, so `sector_end_slowing` doesn't apply.
 pub(super) const ALL: &str = "[effects]
 start_phase_error = { max_deg = 20 }
 skipped_steps = { per_thousand = 0.2 }
@@ -36,7 +37,7 @@ line_delay = { jitter_ms = 2 }
 byte_errors = { flipped_per_million = 20 }
 ";
 
-/// The effect that a line of a scene is of: of a line in `[effects]`, or of the header of an effect's own table.
+/// The effect of a scene's line: a line in `[effects]`, or the header of an effect's own table.
 fn effect_of(line: &str, in_effects: bool) -> Option<&str> {
     if line.starts_with('[') {
         return line.trim_matches(['[', ']']).strip_prefix("effects.");
@@ -45,7 +46,7 @@ fn effect_of(line: &str, in_effects: bool) -> Option<&str> {
     Some(name.trim())
 }
 
-/// Each line of a text with the effect that it belongs to, if any.
+/// Each line of a text with the effect to which it belongs, if any.
 fn lines(text: &str) -> impl Iterator<Item = (&str, Option<&str>)> {
     let (mut in_effects, mut table) = (false, None);
     text.lines().map(move |line| {
@@ -57,7 +58,7 @@ fn lines(text: &str) -> impl Iterator<Item = (&str, Option<&str>)> {
     })
 }
 
-/// The effects that a scene names, in its order, each once.
+/// The effects that a scene names, in order, each once.
 pub(super) fn named(text: &str) -> Vec<String> {
     let mut names: Vec<String> = Vec::new();
     for name in lines(text).filter_map(|(_, effect)| effect) {
@@ -70,7 +71,7 @@ pub(super) fn named(text: &str) -> Vec<String> {
 
 /// A scene without an effect.
 ///
-/// Errors: it doesn't name it.
+/// Errors: the scene doesn't name it.
 pub(super) fn without(text: &str, effect: &str) -> Result<String, CostError> {
     let kept = lines(text).filter(|(_, of)| *of != Some(effect)).map(|(line, _)| format!("{line}\n"));
     let kept: String = kept.collect();
@@ -81,7 +82,7 @@ pub(super) fn without(text: &str, effect: &str) -> Result<String, CostError> {
     Ok(kept)
 }
 
-/// A scene whose beams have so many rays.
+/// A scene with this number of rays per beam.
 ///
 /// Errors: it doesn't name `beam_cone` in a line of its own.
 pub(super) fn with_rays(text: &str, rays: u32) -> Result<String, CostError> {
@@ -110,7 +111,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_left_out_is_all_of_that_effect_and_nothing_else() {
+    fn leaving_out_removes_exactly_that_effect() {
         for effect in ["a", "b", "c", "d"] {
             let rest: Vec<String> = named(TEXT).into_iter().filter(|name| name != effect).collect();
             let text = without(TEXT, effect).unwrap();
@@ -122,7 +123,7 @@ mod tests {
     }
 
     #[test]
-    fn rays_are_set_in_every_form_that_is_used() {
+    fn ray_count_is_set_in_every_form() {
         for (beam, with) in [
             ("beam_cone = {}", "beam_cone = { rays = 4 }"),
             ("beam_cone = { sensors = [\"a\"] }", "beam_cone = { rays = 4, sensors = [\"a\"] }"),

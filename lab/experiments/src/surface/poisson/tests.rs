@@ -18,7 +18,7 @@ fn settings(depth: u32) -> Settings {
 }
 
 #[test]
-fn a_sphere_is_met_to_a_twentieth_of_a_cell() {
+fn sphere_is_matched_to_a_twentieth_of_a_cell() {
     let surface = Surface::through(&sphere(5000, 3.0), &settings(5)).unwrap();
     let mesh = surface.mesh();
     let spread = Spread::of(mesh.vertices.iter().map(|p| norm(*p) - 3.0));
@@ -29,7 +29,7 @@ fn a_sphere_is_met_to_a_twentieth_of_a_cell() {
 }
 
 #[test]
-fn sparse_samples_give_one_sphere_still() {
+fn sparse_samples_give_a_single_sphere() {
     let surface = Surface::through(&sphere(300, 3.0), &settings(6)).unwrap();
     let spread = Spread::of(surface.mesh().vertices.iter().map(|p| norm(*p) - 3.0));
     assert!(spread.max_m < 0.15, "{spread:?}");
@@ -54,7 +54,7 @@ fn the_same_samples_give_the_same_bits() {
 }
 
 #[test]
-fn size_and_place_change_nothing() {
+fn size_and_place_do_not_change_the_surface() {
     let moved: Vec<Sample> = sphere(2000, 2.0)
         .into_iter()
         .map(|s| Sample { place: s.place.map(|c| c * 512.0 + 1e5), normal: s.normal })
@@ -66,7 +66,7 @@ fn size_and_place_change_nothing() {
 }
 
 #[test]
-fn what_makes_no_surface_is_refused() {
+fn input_without_surface_is_refused() {
     let samples = sphere(100, 1.0);
     let refused = |samples: &[Sample], settings: Settings| Surface::through(samples, &settings).err();
     assert_eq!(refused(&[], settings(5)), Some(PoissonError::TooFewSamples { count: 0 }));

@@ -1,4 +1,4 @@
-// The alerts that hold or wait to be acknowledged, in the order of what has to be looked at first.
+// Alerts that are active or need an acknowledgement, the most urgent first.
 import { useEffect, useRef, useState } from "preact/hooks";
 import { acknowledge, silence } from "../feed/client";
 import type { Alert } from "../feed/types";
@@ -9,16 +9,16 @@ import { span } from "../text/format";
 import { actions } from "../wall/control";
 import { SoundButtons } from "./SoundButtons";
 
-/** So many are in the list; what of them has to be scrolled to is counted, and so is what isn't in it. */
+/** Number of alerts in the list; hidden and further ones are counted. */
 const SHOWN = 64;
-/** Of more than these all but the first two are a line each, until they have the focus. */
+/** In a longer list, all but the first two take one line each until they have the focus. */
 const ROOMY = 6;
 
 export function Alerts() {
   useTopics(store.topics.alerts, store.topics.hello);
   const list = sorted(store.alerts.values());
   const waiting = list.filter(isUnacknowledged).length;
-  // What the program counts beyond those that it lists is partly here, too, where it was raised since the page is open.
+  // Alerts that the program counts beyond its list may be here, if they were raised since the page was opened.
   const all = Math.max(list.length, store.alertsHidden > 0 ? SHOWN + store.alertsHidden : 0);
   const hidden = all - Math.min(list.length, SHOWN);
   const may = store.hello?.may.operate ?? false;
@@ -67,7 +67,7 @@ function Item({ alert, may }: { alert: Alert; may: boolean }) {
   );
 }
 
-/** The shape of a priority: triangle for alarms, diamond for warnings, circle for cautions. */
+/** Shape of a priority: triangle for alarms, diamond for warnings, circle for cautions. */
 function Mark({ alert }: { alert: Alert }) {
   const alarm = alert.priority === "alarm" || alert.priority === "emergency_alarm";
   return (
@@ -84,7 +84,7 @@ function Since({ alert }: { alert: Alert }) {
   return <span class="since">{now === undefined ? "" : `${span(now - alert.since_s)} ago`}</span>;
 }
 
-/** Says new alerts to a screen reader: alarms at once. */
+/** Announces new alerts to a screen reader, alarms at once. */
 export function AlertAnnouncer() {
   useTopics(store.topics.alerts);
   const newest = sorted(store.alerts.values()).find((alert) => isUnacknowledged(alert) && alert.state === "active");

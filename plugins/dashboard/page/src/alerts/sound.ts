@@ -1,4 +1,5 @@
-// Sounds of alerts by WebAudio. An alarm: three short high notes every 4 s. A warning: two long low ones every 12 s. An
+// Sounds of alerts by WebAudio. An alarm: three short high notes every 4 s. A warning: two long low ones every 12 s. An emergency
+// alarm: high and low without a pause. Silenced and muted alerts make no sound; the loop states which ones sound.
 // emergency alarm: high and low without a pause. Silenced and muted ones don't sound; the loop says which sound.
 import type { Alert, Priority } from "../feed/types";
 import { isOld } from "../store/age";
@@ -21,10 +22,10 @@ let context: AudioContext | null = null;
 let next_s = 0;
 let playing: Priority | null = null;
 
-/** Whether the browser lets sounds be heard: it wants to be touched first. */
+/** Whether the browser allows sound, which it does only after a user action. */
 export const isAudible = (): boolean => context?.state === "running";
 
-/** To be called from a click or key. */
+/** Must be called from a click or key. */
 export function unlock(): void {
   try {
     context ??= new AudioContext();
@@ -34,7 +35,7 @@ export function unlock(): void {
   void context.resume().then(() => soundTopic.changed());
 }
 
-/** The priority that sounds now; null if none does. */
+/** Priority that sounds now; null for none. */
 export function sounding(alerts: Iterable<Alert>, muted: readonly string[]): Exclude<Priority, "caution"> | null {
   const found = new Set<Priority>();
   for (const alert of alerts) {
@@ -45,7 +46,7 @@ export function sounding(alerts: Iterable<Alert>, muted: readonly string[]): Exc
 }
 
 function beat(): void {
-  // What is old may no longer be true: it shows, and doesn't sound on.
+  // Old data may no longer be true: it is displayed, but its sound stops.
   const now = prefs.sound && store.link.phase !== "file" && !isOld(store) ? sounding(store.alerts.values(), prefs.muted) : null;
   if (now !== playing) {
     playing = now;

@@ -1,4 +1,4 @@
-// Speaks alerts, if the viewer wants it. The newest wins; what is no longer true is broken off, and nothing is repeated.
+// Speaks alerts if the viewer wants it. The newest one wins, outdated speech is stopped, and nothing is repeated.
 import { prefs, prefsTopic } from "../store/prefs";
 import { isUnacknowledged } from "../store/alerts";
 import { store } from "../store/store";
@@ -10,7 +10,7 @@ function hush(): void {
   speechSynthesis.cancel();
 }
 
-/** Stations as one says them: "1+240" is "1 plus 2 4 0". */
+/** Stations as spoken: "1+240" is "1 plus 2 4 0". */
 export function sayable(text: string): string {
   return text.replace(/(\d+)\+(\d{3})(\.\d+)?/g, (_, kilometres: string, metres: string) => `${kilometres} plus ${metres.split("").join(" ")}`).toLowerCase();
 }

@@ -9,7 +9,7 @@ export const KIND_SAMPLES = 2;
 
 export interface Frame { kind: number; count: number; seq: number; view: DataView }
 
-/** Reads a frame's header; the records stay where they are. */
+/** Reads a frame's header; the records stay in place. */
 export function frameOf(bytes: ArrayBuffer, at = 0, length = bytes.byteLength - at): Frame {
   if (length < HEADER_BYTES) throw new Error(`a binary frame of ${length} bytes; ${HEADER_BYTES} are its header`);
   const head = new DataView(bytes, at, HEADER_BYTES);

@@ -1,11 +1,11 @@
-// The WebSocket to the program: connects, resumes after a drop, backs off while nothing answers.
+// The WebSocket to the program: connects, resumes after a drop, and backs off while nothing answers.
 import type { Store } from "../store/store";
 import { frameOf } from "./binary";
 import type { Command, Message } from "./types";
 
 const SUBPROTOCOL = "headrace.feed.1";
 const BACKOFF_MS = [250, 500, 1000, 2000, 4000];
-/** A connection on which nothing comes for so long is taken for dead and opened anew. */
+/** A connection without data for this long counts as dead and is reopened. */
 const SILENT_MS = 10_000;
 
 export class Feed {
@@ -21,7 +21,7 @@ export class Feed {
     setInterval(() => this.watch(), 1000);
   }
 
-  /** Connects at once, without waiting out the backoff. */
+  /** Connects at once, without waiting for the backoff. */
   again(): void {
     if (this.socket && this.socket.readyState <= WebSocket.OPEN && this.store.link.phase === "open") return;
     this.retry = 0;
@@ -38,7 +38,7 @@ export class Feed {
     return true;
   }
 
-  /** Gives the token; why it wasn't taken, or nothing. The server keeps it as a cookie. */
+  /** Sends the token; returns the reason of a refusal, or nothing. The server stores it as a cookie. */
   async login(token: string): Promise<string> {
     const url = new URL("/login", this.base);
     url.searchParams.set("token", token);
@@ -98,7 +98,7 @@ export class Feed {
     }
   }
 
-  /** A socket that can't be opened doesn't say why: the state's address does. */
+  /** A socket that can't be opened gives no reason, so the state's address is queried. */
   private async closed(reason: string): Promise<void> {
     const opened = this.store.link.phase === "open";
     this.lost(reason);
@@ -110,7 +110,7 @@ export class Feed {
         this.phase("refused", "");
       }
     } catch {
-      // No answer at all: it is tried again.
+      // No answer at all, so the connection is tried again.
     }
   }
 

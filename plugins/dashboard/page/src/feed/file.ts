@@ -62,7 +62,7 @@ export async function readDive(base64: string, store: Store): Promise<Dive> {
   return dive;
 }
 
-/** The state at an entry of the timeline: what is constant is in the first, and what an entry lacks, in those before. */
+/** State at an entry of the timeline. Constant parts are in the first entry, and parts missing in an entry are in earlier ones. */
 export function stateAt(dive: Dive, entry: number): State | null {
   const whole: Partial<State> = {};
   const first = dive.states[0];

@@ -1,4 +1,4 @@
-// What comes over the feed, as the server names it. Lengths in metres, times in seconds on the log's clock.
+// Messages of the feed, as the server names them. Lengths in metres, times in seconds on the log's clock.
 
 export type Mode = "live" | "demo" | "replay" | "file";
 export type Lamp = "green" | "amber" | "red";
@@ -40,10 +40,10 @@ export interface State {
   turn: Turn | null;
   sensors: Sensor[];
   metres: { pass_m: number; fail_m: number; cannot_say_m: number; open_m: number; not_inspected_m: number; way_m: number };
-  /** The same dive held to the hello's other target. */
+  /** Verdicts of the same dive for the second target of the hello. */
   compared?: { target_m: number; pass_m: number; fail_m: number; cannot_say_m: number; open_m: number };
   cannot_say: { why: string; from_m: number; to_m: number } | null;
-  /** The replay has reached its end, or the dive has ended. */
+  /** Whether the replay has reached its end, or the dive has ended. */
   ended?: boolean;
   alert_list?: Alert[]; alerts_hidden?: number;
   left?: { cable_m: number | null; time_s: number | null; battery_pct: number | null } | null;
@@ -69,14 +69,14 @@ export interface Alert {
 
 export interface Note {
   number: number; at_s: number; by: string; text: string; chainage_m: number | null; station: string | null;
-  /** Of a voice note; without seconds its recording isn't in the log. */
+  /** For a voice note; without seconds its recording isn't in the log. */
   voice?: { id: number; seconds: number | null } | null;
 }
 export interface Leg { from_m: number; to_m: number; at_most_mps: number | null; why: string }
 export interface Back { legs: Leg[]; way_m: number; time_s: number }
 export interface History { t_s: number[]; v_mps: (number | null)[]; v_max_mps: (number | null)[]; t_m: (number | null)[] }
 
-/** A line of `--json-lines` that is told once. */
+/** An event, as in a line of `--json-lines`. */
 export interface Told { type: string; t_s: number; text: string }
 
 export type Message =
@@ -94,7 +94,7 @@ export type Message =
   | { type: "timeline"; t_s: number[]; states: Partial<State>[] }
   | { type: "end"; summary?: unknown; digest?: string; exit?: number };
 
-/** What the page sends. */
+/** Messages that the page sends. */
 export type Command =
   | { do: "acknowledge"; alert: number; by: string }
   | { do: "silence"; by: string }

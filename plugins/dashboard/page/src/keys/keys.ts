@@ -24,7 +24,7 @@ function acknowledgeFirst(): void {
   if (first) acknowledge(first.number);
 }
 
-/** Shows the next place that is missed on the wall. */
+/** Shows the next missed place on the wall. */
 function nextMissed(): void {
   const missed = sorted(store.alerts.values()).filter((alert) => alert.from_m !== null);
   const at = missed.findIndex((alert) => alert.number === shownAlert);
@@ -78,7 +78,7 @@ export function startKeys(): void {
     const target = event.target as HTMLElement;
     const typing = /^(TEXTAREA|SELECT)$/.test(target.tagName) || (target.tagName === "INPUT" && !/^(checkbox|button)$/.test((target as HTMLInputElement).type));
     if (typing || document.querySelector("dialog[open]:not(.help)")) return;
-    // A button's own keys stay its own; so do a list's that scrolls.
+    // A button keeps its own keys, and so does a list that scrolls.
     if ((event.key === " " || event.key === "Enter") && /^(BUTTON|SUMMARY|INPUT|A)$/.test(target.tagName)) return;
     if (/^Arrow(Up|Down)$/.test(event.key) && target.tagName === "OL") return;
     const key = KEYS.find(({ keys }) => keys.includes(event.key)) ?? KEYS.find(({ keys }) => event.key.length === 1 && keys.includes(event.key.toLowerCase()) && event.key !== "A");

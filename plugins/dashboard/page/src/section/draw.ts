@@ -1,11 +1,11 @@
-// The cross-section, as seen looking inwards: left is the tunnel's left.
+// The cross-section, looking inwards: left is the tunnel's left.
 import type { Store } from "../store/store";
 import type { Return } from "../store/turns";
 import { figure } from "../text/format";
 import { colour } from "../ui/colours";
 
 const FONT = "system-ui, 'DejaVu Sans', sans-serif";
-/** Half width and half height of the vehicle as it is drawn, m. */
+/** Half width and half height of the drawn vehicle, m. */
 const VEHICLE = [0.35, 0.22] as const;
 
 interface Frame { context: CanvasRenderingContext2D; x: (y_m: number) => number; y: (z_m: number) => number; scale: number }
@@ -109,7 +109,7 @@ function returns({ context, x, y }: Frame, list: Return[], present: boolean): vo
   }
 }
 
-/** Where a head looked last. */
+/** Last aim of a head. */
 function direction(frame: Frame, pose: Pose, latest: Return, head: number, points: [number, number][]): void {
   const { context, x, y } = frame;
   const [py, pz] = latest.outcome === 2 || Number.isNaN(latest.y_m) ? pointAt(points, latest.arc) : [latest.y_m, latest.z_m];
@@ -155,7 +155,7 @@ function vehicle(frame: Frame, pose: Pose): void {
   const w = Math.max(VEHICLE[0] * scale, 12), h = Math.max(VEHICLE[1] * scale, 8);
   context.save();
   context.translate(x(pose.y_m), y(pose.z_m));
-  // Positive roll: the left side goes up, as it does in a right-handed frame with x inwards.
+  // Positive roll raises the left side, as in a right-handed frame with x inwards.
   context.rotate((pose.roll_deg * Math.PI) / 180);
   context.fillStyle = colour("vehicle");
   context.strokeStyle = colour("panel");

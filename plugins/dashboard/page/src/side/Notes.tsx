@@ -1,4 +1,4 @@
-// Notes: what was written or spoken at a place. N writes one at the present place, T records one.
+// Notes, written or spoken at a position. N writes one at the present position, T records one.
 import { useEffect, useRef } from "preact/hooks";
 import { note } from "../feed/client";
 import { store } from "../store/store";
@@ -12,12 +12,12 @@ import { actions } from "../wall/control";
 const MOST_BYTES = 240;
 let show: (() => void) | null = null;
 
-/** Opens the field at once: what is typed next belongs into it. */
+/** Focuses the field at once, so that typing goes into it. */
 export function openNote(): void {
   show?.();
 }
 
-/** What a note says, as the terminal has it, too. */
+/** Text of a note, the same as on the terminal. */
 export function words({ text, voice }: Note): string {
   if (voice) return voice.seconds === null ? "voice" : `voice, ${voice.seconds} s`;
   return text || "mark";

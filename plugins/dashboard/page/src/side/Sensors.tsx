@@ -1,4 +1,4 @@
-// A lamp for every sensor: state in words, rate, age. Ages go on while nothing comes.
+// A lamp for every sensor: state in words, rate, age. Ages grow while no data arrive.
 import { OLD_AFTER_S, sinceState_s } from "../store/age";
 import type { Sensor } from "../feed/types";
 import { store } from "../store/store";
@@ -17,7 +17,7 @@ export function Sensors() {
       <ul>
         {inOrder(state?.sensors ?? []).map((sensor) => {
           const age = sensor.age_s === null ? null : sensor.age_s + since;
-          // Where the program itself isn't heard, nothing is known of its sensors.
+          // Without a connection to the program, the state of its sensors is unknown.
           const is = since > OLD_AFTER_S ? "unknown" : sensor.state;
           const lamp = is === "ok" ? "green" : is === "unknown" ? "none" : is === "stalled" || is === "distrusted" ? "amber" : "red";
           const hz = state?.rates?.find((rate) => rate.id === sensor.id)?.hz;
@@ -37,7 +37,7 @@ export function Sensors() {
   );
 }
 
-/** What isn't well comes first: it must not be below the edge. */
+/** Sensors with trouble come first, so that they are never below the edge. */
 function inOrder(sensors: Sensor[]): Sensor[] {
   return [...sensors.filter(({ state }) => state !== "ok"), ...sensors.filter(({ state }) => state === "ok")];
 }

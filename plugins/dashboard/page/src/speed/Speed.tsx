@@ -1,4 +1,4 @@
-// The condition, the speed, what is allowed and why: what a pilot reads at two metres.
+// The condition, the speed, its limit and the reason, readable for a pilot at two metres.
 import type { Condition } from "../feed/types";
 import { shown, age_s, isOld } from "../store/age";
 import { store } from "../store/store";
@@ -22,7 +22,7 @@ export function Condition() {
   );
 }
 
-/** Says the condition once when it changes; not the seconds that count. */
+/** Announces the condition when it changes, without the counting seconds. */
 export function Announcer() {
   useTopics(store.topics.state, store.topics.link, store.topics.clock);
   const { word, advice } = shown(store);
@@ -30,7 +30,7 @@ export function Announcer() {
   return <div class="sr" role="status" aria-live="polite">{said}</div>;
 }
 
-/** Where nothing bounds the speed, and what there is to say of it. */
+/** Text if nothing limits the speed. */
 const UNBOUNDED: Partial<Record<Condition, string>> = {
   passed: "the wall here has passed",
   going_back: "the way back is judged, too: keep to the limit",
@@ -85,7 +85,7 @@ function Gauge({ speed, most }: { speed: number | null; most: number | null }) {
   );
 }
 
-/** What the present turn will come to, against the target. */
+/** Forecast of the present turn, compared with the target. */
 function Forecast() {
   const turn = store.state?.turn ?? null;
   if (!turn) return <div class="forecast">no forecast for this turn</div>;

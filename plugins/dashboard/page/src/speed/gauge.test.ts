@@ -1,7 +1,7 @@
 import { expect, it } from "vitest";
 import { marks, scaleEnd } from "./gauge";
 
-it("keeps speed and v_max on the scale", () => {
+it("speed and v_max stay on the scale", () => {
   for (const [speed, most] of [[0.18, 0.24], [0.6, 0.07], [-0.3, 0.2], [0, 0], [7.3, 0.2]] as const) {
     const end = scaleEnd(speed, most);
     expect(end).toBeGreaterThanOrEqual(Math.abs(speed));

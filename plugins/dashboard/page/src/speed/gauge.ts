@@ -1,9 +1,9 @@
-// Places on the speed gauge. Pure, for tests.
+// Positions on the speed gauge; pure functions for tests.
 
-/** Over v_max by so much is too fast, as the loop's conditions have it. */
+/** Excess over v_max that counts as too fast, as in the loop's conditions. */
 export const TOO_FAST = 1.05;
 
-/** End of the scale, m/s: v_max stands at about two thirds, and the speed still fits. */
+/** End of the scale, m/s: v_max is at about two thirds, and the speed still fits. */
 export function scaleEnd(speed_mps: number | null, v_max_mps: number | null): number {
   const need = Math.max((v_max_mps ?? 0) * 1.5, Math.abs(speed_mps ?? 0) * 1.1, 0.1);
   const steps = [0.1, 0.15, 0.2, 0.3, 0.4, 0.5, 0.6, 0.8, 1, 1.5, 2, 3, 5];

@@ -1,22 +1,22 @@
-// How old what is shown is, and what the page says of it.
+// Age of the displayed data, and its text.
 import { conditionWords, type Shown } from "../text/words";
 import { span } from "../text/format";
 import type { Store } from "./store";
 
-/** What is older is shown as old, as in the loop. */
+/** Older data is displayed as old, as in the loop. */
 export const OLD_AFTER_S = 2;
 
-/** Whether time stands still on purpose: what is shown doesn't grow old. */
+/** Whether time is paused on purpose, so that displayed data doesn't age. */
 export function stands(store: Store): boolean {
   return store.link.phase === "file" || hasEnded(store) || store.state?.playback?.paused === true;
 }
 
-/** Whether the dive has ended: nothing more is to come. */
+/** Whether the dive has ended, so that no more data arrive. */
 export function hasEnded(store: Store): boolean {
   return store.end !== null || store.state?.ended === true;
 }
 
-/** Seconds since the state came. */
+/** Seconds since the state arrived. */
 export function sinceState_s(store: Store): number {
   return stands(store) ? 0 : Math.max(0, (performance.now() - store.state_ms) / 1000);
 }
@@ -25,7 +25,7 @@ export function sinceState_s(store: Store): number {
 export function age_s(store: Store): number | null {
   const { state } = store;
   if (!state || state.age_s === null) return null;
-  // The loop's own age counts only where it says that it is old: a replay's beats stand apart in time.
+  // The loop's own age counts only if it says that it is old, because a replay's updates can be far apart in time.
   return state.age_s + sinceState_s(store);
 }
 
@@ -34,14 +34,14 @@ export function isOld(store: Store): boolean {
   return store.state !== null && (store.state.old || (age !== null && age > OLD_AFTER_S) || sinceState_s(store) > OLD_AFTER_S);
 }
 
-/** Seconds for which nothing has come; null while the connection stands. */
+/** Seconds without data; null while the connection is up. */
 export function lost_s(store: Store): number | null {
   const { phase, heard_ms, since_ms } = store.link;
   if (phase === "open" || phase === "file") return null;
   return (performance.now() - (heard_ms || since_ms)) / 1000;
 }
 
-/** What the page shows as condition. */
+/** Displayed condition. */
 export function shown(store: Store): Shown {
   const { state, link } = store;
   const lost = lost_s(store);

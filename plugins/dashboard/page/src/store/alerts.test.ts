@@ -11,7 +11,7 @@ function alert(number: number, over: Partial<Alert>): Alert {
 }
 
 describe("alerts", () => {
-  it("are listed as at sea, newest first within a rank", () => {
+  it("are listed in the order of maritime practice, newest first within a rank", () => {
     const by = { by: "AB", at_s: 1 };
     const list = [
       alert(1, { priority: "caution", needs_acknowledgement: false }),

@@ -1,9 +1,9 @@
-// Order and kinds of alerts, after IMO MSC.302(87).
+// Order and kinds of alerts by IMO MSC.302(87).
 import type { Alert, Priority } from "../feed/types";
 
 export const isUnacknowledged = (alert: Alert): boolean => alert.needs_acknowledgement && alert.acknowledged === null;
 
-/** Rank in lists: what has to be looked at first is least. */
+/** Rank in lists; the least is the most urgent. */
 export function rank(alert: Alert): number {
   const unacknowledged = isUnacknowledged(alert);
   if (alert.state === "active" && unacknowledged) {
@@ -13,7 +13,7 @@ export function rank(alert: Alert): number {
   return alert.priority === "caution" ? 5 : 4;
 }
 
-/** What isn't cleared, in the order of lists; newest first within a rank. */
+/** Alerts that aren't cleared, in the order of lists; newest first within a rank. */
 export function sorted(alerts: Iterable<Alert>): Alert[] {
   const shown = [...alerts].filter((alert) => alert.state !== "cleared");
   return shown.sort((a, b) => rank(a) - rank(b) || b.since_s - a.since_s || b.number - a.number);

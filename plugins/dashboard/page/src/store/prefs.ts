@@ -1,4 +1,4 @@
-// What this viewer has set: kept by the browser, if it keeps anything.
+// Settings of this viewer, stored by the browser if it stores anything.
 import type { AlertClass } from "../feed/types";
 import { Topic } from "./topic";
 
@@ -26,13 +26,13 @@ export function setPrefs(change: Partial<Prefs>): void {
   try {
     localStorage.setItem(KEY, JSON.stringify(prefs));
   } catch {
-    // A browser that keeps nothing: it holds until the page is closed.
+    // The browser stores nothing, so the setting lasts until the page is closed.
   }
   document.documentElement.dataset["palette"] = prefs.palette;
   prefsTopic.changed();
 }
 
-/** At most 16 bytes, as the loop takes them. */
+/** At most 16 bytes, the limit of the loop. */
 export function initials(text: string): string {
   let cut = text.trim();
   while (new TextEncoder().encode(cut).length > 16) cut = cut.slice(0, -1);

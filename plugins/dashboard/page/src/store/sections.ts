@@ -1,20 +1,20 @@
-// The wall's sections, by index, in columns that grow both ways.
+// The wall's sections by index, in columns that grow in both directions.
 import { SECTION_BYTES, type Frame } from "../feed/binary";
 
 export const OPEN = 0, PASS = 1, FAIL = 2, CANNOT_SAY = 3, NOT_INSPECTED = 4;
 export const NONE = 255;
 export const FLAGGED = 1;
-/** For which target a section's verdict is taken: the dive's own, or the other one that it is compared with. */
+/** Target of a section's verdict: the dive's own, or the second one of a comparison. */
 export type Held = "own" | "compared";
 
 export class Sections {
   /** Index of the first slot. */
   private base = 0;
   private slots = 0;
-  /** Least and greatest index that has been told; least > most if none has. */
+  /** Least and greatest index received; least > most if there is none. */
   least = Infinity;
   most = -Infinity;
-  /** 255 where nothing has been told. */
+  /** 255 if nothing has been received. */
   verdict = new Uint8Array(0);
   cause = new Uint8Array(0);
   why = new Uint8Array(0);
@@ -44,7 +44,7 @@ export class Sections {
     return held === "own" ? (this.verdict[slot] ?? OPEN) : Math.max(((this.flags[slot] ?? 0) >> 2) - 1, OPEN);
   }
 
-  /** Whether a slot is outlined as missed. */
+  /** Whether a slot has the outline of missed sections. */
   isFlagged(slot: number, held: Held): boolean {
     return held === "own" ? ((this.flags[slot] ?? 0) & FLAGGED) !== 0 : this.verdictOf(slot, held) === FAIL;
   }
@@ -58,7 +58,7 @@ export class Sections {
       if (index < least) least = index;
       if (index > most) most = index;
     }
-    // 200 km of sections of 0.05 m; beyond, the frame is nonsense and would take all memory.
+    // 200 km of sections of 0.05 m; a frame with more is invalid and would take all memory.
     if (most - least > 4_000_000) throw new Error(`sections from ${least} to ${most} in one frame`);
     this.reach(least, most);
     for (let at = 0; at < count * SECTION_BYTES; at += SECTION_BYTES) {

@@ -1,4 +1,4 @@
-// All that the page knows: what the feed has told, by concern, each with a topic. Nothing is computed here but order.
+// All data of the page: the content of the feed, by subject, each with a topic. Nothing is computed here except order.
 import { KIND_SECTIONS, type Frame } from "../feed/binary";
 import type { Alert, Back, Hello, History, Message, Note, State, Told } from "../feed/types";
 import { Sections } from "./sections";
@@ -11,9 +11,9 @@ const MOST_CLEARED = 64;
 
 export interface Link {
   phase: "connecting" | "open" | "lost" | "refused" | "file";
-  /** When the phase began, performance.now(). */
+  /** Start of the phase, performance.now(). */
   since_ms: number;
-  /** When anything came last. */
+  /** Time of the last message. */
   heard_ms: number;
   tries: number;
   why: string;
@@ -25,14 +25,14 @@ export type SampleListener = (frame: Frame) => void;
 export class Store {
   hello: Hello | null = null;
   state: State | null = null;
-  /** When the state came, performance.now(): what it says grows old from there. */
+  /** Time at which the state arrived, performance.now(); its age counts from there. */
   state_ms = 0;
   seq = 0;
-  /** All has come since the last hello. */
+  /** All data has arrived since the last hello. */
   ready = false;
-  /** How often a connection has begun. */
+  /** Number of connections so far. */
   session = 0;
-  /** All has come once: what is missing since can be asked for. */
+  /** All data has arrived once, so that later losses can be requested. */
   private known = false;
   end: { digest?: string; exit?: number } | null = null;
   alerts = new Map<number, Alert>();
@@ -44,7 +44,7 @@ export class Store {
   readonly sections = new Sections();
   readonly turns = new Turns();
   readonly link: Link = { phase: "connecting", since_ms: 0, heard_ms: 0, tries: 0, why: "" };
-  /** A command's answer, for the status line. */
+  /** Answer to a command, for the status line. */
   answer: { text: string; refused: boolean; at_ms: number } | null = null;
 
   readonly topics = {
@@ -114,7 +114,7 @@ export class Store {
     this.topics.answer.changed();
   }
 
-  /** The instance to resume with; empty if there is nothing to resume. */
+  /** Instance to resume with; empty if there is nothing to resume. */
   get instance(): string {
     return this.known ? (this.hello?.instance ?? "") : "";
   }
@@ -149,7 +149,7 @@ export class Store {
       this.alertsHidden = state.alerts_hidden;
       this.topics.alerts.changed();
     }
-    // A jump back: what has been placed since is no longer so.
+    // After a jump back, later samples are no longer valid.
     if (before && state.now_s < before.now_s - 1) {
       if (this.link.phase !== "file") this.turns.clear();
       this.end = null;
@@ -159,7 +159,7 @@ export class Store {
     this.grow(state);
   }
 
-  /** Goes on with the history from the states, once a second. */
+  /** Extends the history from the states, once a second. */
   private grow(state: State): void {
     if (state.at_s === null || this.link.phase === "file") return;
     const { t_s, v_mps, v_max_mps, t_m } = this.history;

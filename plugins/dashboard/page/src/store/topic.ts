@@ -1,4 +1,4 @@
-// A thing that changes, and who wants to know. Components are told once a frame, whatever has come since.
+// A value that changes, with its subscribers. Components are notified once a frame, however many changes there were.
 import { useEffect, useReducer } from "preact/hooks";
 
 const due = new Set<Topic>();
@@ -17,13 +17,13 @@ export class Topic {
   version = 0;
   private readonly listeners = new Set<() => void>();
 
-  /** Something has changed. */
+  /** Reports a change. */
   changed(): void {
     this.version += 1;
     due.add(this);
     if (scheduled) return;
     scheduled = true;
-    // Hidden pages get no frames; what sounds has to go on there.
+    // Hidden pages get no frames, but sounds must go on there.
     if (document.hidden) setTimeout(tell, 50);
     else requestAnimationFrame(tell);
   }
@@ -38,16 +38,16 @@ export class Topic {
   }
 }
 
-/** Draws the component again when any of these changes. */
+/** Renders the component again when any of these changes. */
 export function useTopics(...topics: Topic[]): void {
   const [, again] = useReducer((count: number) => count + 1, 0);
   const seen = topics.map((topic) => topic.version).join();
   useEffect(() => {
     const listener = () => again(undefined);
     const offs = topics.map((topic) => topic.on(listener));
-    // What changed between drawing and now.
+    // Changes between rendering and now.
     if (topics.map((topic) => topic.version).join() !== seen) listener();
     return () => offs.forEach((off) => off());
-    // Topics are the page's own and never change.
+    // Topics are constants of the page.
   }, []);
 }

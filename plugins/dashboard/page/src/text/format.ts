@@ -1,6 +1,6 @@
-// Figures as people read them.
+// Formats numbers for people.
 
-/** Chainage as engineers write it: 1+240 for 1240 m, with so many decimals. */
+/** Chainage in engineers' notation: 1+240 for 1240 m, with this many decimals. */
 export function station(chainage_m: number, decimals = 0): string {
   const scale = 10 ** decimals;
   const units = Math.round(Math.abs(chainage_m) * scale);
@@ -10,14 +10,14 @@ export function station(chainage_m: number, decimals = 0): string {
   return `${sign}${kilometres}+${metres.padStart(decimals > 0 ? 4 + decimals : 3, "0")}`;
 }
 
-/** A figure with so many decimals and a proper minus; a dash where there is none. */
+/** A number with this many decimals and a proper minus; a dash without a value. */
 export function figure(value: number | null | undefined, decimals: number): string {
   if (value === null || value === undefined || !Number.isFinite(value)) return "–";
   const text = value.toFixed(decimals);
   return Number(text) === 0 ? text.replace("-", "") : text.replace("-", "−");
 }
 
-/** A length of time: 0.4 s, 32 s, 4 min 05 s, 52 min, 2 h 13 min. */
+/** A duration: 0.4 s, 32 s, 4 min 05 s, 52 min, 2 h 13 min. */
 export function span(seconds: number): string {
   if (seconds < 9.95) return `${Math.max(0, seconds).toFixed(1)} s`;
   if (seconds < 99.5) return `${Math.round(seconds)} s`;
@@ -35,7 +35,7 @@ export function clock(seconds: number): string {
   return whole >= 3600 ? `${Math.floor(whole / 3600)}:${tail}` : tail;
 }
 
-/** Metres, as many decimals as help: 0.25 m, 12.3 m, 1,240 m. */
+/** A length with as many decimals as are useful: 0.25 m, 12.3 m, 1,240 m. */
 export function metres(value: number): string {
   if (value < 10) return `${value.toFixed(2)} m`;
   if (value < 100) return `${value.toFixed(1)} m`;

@@ -1,8 +1,8 @@
-// The words of conditions, verdicts, reasons. The one table of the page.
+// Texts of conditions, verdicts and reasons: the page's only table of them.
 import type { Condition, Lamp, State } from "../feed/types";
 import { figure, span } from "./format";
 
-/** What the page shows as condition: the loop's, or that it hears nothing of the loop. */
+/** Displayed condition: the loop's, or that no data arrive from the loop. */
 export interface Shown { word: string; advice: string; lamp: Lamp; old: boolean }
 
 export const REASONS: Record<string, string> = {
@@ -28,7 +28,7 @@ export const SENSOR_STATES: Record<string, string> = {
   ok: "ok", silent: "silent", never: "never heard", stalled: "doesn't turn", deaf: "detects no wall", hung: "hangs", distrusted: "not believed",
 };
 
-/** Words for a cause or why of the wire: too_fast is "too fast". */
+/** Text of a cause or reason: too_fast is "too fast". */
 export function plain(name: string): string {
   return name.replaceAll("_", " ");
 }
@@ -37,11 +37,11 @@ export function atMost(state: State): string {
   return state.v_max_mps === null ? "" : `at most ${figure(state.v_max_mps, 2)} m/s`;
 }
 
-/** Word and advice of a state's condition. */
+/** Name and advice of a state's condition. */
 export function conditionWords(state: State): { word: string; advice: string } {
   const most = atMost(state);
   const slower = most === "" ? "slower" : `slow to ${figure(state.v_max_mps, 2)} m/s`;
-  // Within v_max a turn misses where heads apart along the hull are out of phase: slower is worse.
+  // Below v_max, heads apart along the hull that are out of phase miss wall, and going slower makes it worse.
   const go = most === "" ? "" : `go ${figure(state.v_max_mps, 2)} m/s`;
   const stand = state.position.why === "spread" && state.position.stand_s > 0 ? `stand still ${state.position.stand_s} s` : most;
   const words: Record<Condition, [string, string]> = {

@@ -1,4 +1,4 @@
-// Shapes that say what colours say: circle good, triangle caution, octagon stop.
+// Shapes with the meaning of the colours: circle good, triangle caution, octagon stop.
 import type { Lamp } from "../feed/types";
 
 export function Shape({ lamp, size = 24 }: { lamp: Lamp | "none"; size?: number }) {

@@ -1,4 +1,4 @@
-// Asks for the token where the program wants one.
+// Asks for the token if the program requires one.
 import { useRef, useState } from "preact/hooks";
 import { login } from "../feed/client";
 import { store } from "../store/store";

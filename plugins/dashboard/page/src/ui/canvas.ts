@@ -1,9 +1,9 @@
-// A canvas as large as its place, in device pixels.
+// A canvas as large as its container, in device pixels.
 import { useEffect, useRef } from "preact/hooks";
 
 export interface Size { width: number; height: number; scale: number }
 
-/** Calls `draw` when the element's size changes; gives the element's place. */
+/** Calls `changed` when the element's size changes; returns the element's ref. */
 export function useSize<E extends HTMLElement>(changed: (size: Size) => void) {
   const element = useRef<E>(null);
   const latest = useRef(changed);

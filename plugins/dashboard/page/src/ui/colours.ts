@@ -1,4 +1,4 @@
-// Colours of the palette, for what is drawn on canvases. The style sheet has them; one table for both.
+// Colours of the palette for canvases, read from the style sheet, so that there is one table for both.
 import { prefsTopic } from "../store/prefs";
 
 let cache = new Map<string, string>();

@@ -1,11 +1,11 @@
-// The button that records a voice note, and what there is to say of it.
+// The button that records a voice note, with its messages.
 import { store } from "../store/store";
 import { useTopics } from "../store/topic";
 import { clock } from "../text/format";
 import { MOST_S } from "./lack";
 import { discard, lacks, next, voice, voiceTopic } from "./record";
 
-/** Held longer than this, it ends when it is let go. */
+/** A recording whose button is held longer than this ends on release. */
 const HELD_MS = 700;
 let down_ms: number | null = null;
 
@@ -26,7 +26,7 @@ export function VoiceButton() {
   const lack = phase === "idle" ? lacks() : null;
   const past_s = (performance.now() - voice.since_ms) / 1000;
   const words = {
-    // Pressed, it says why.
+    // A click shows the reason.
     idle: lack === null ? "Voice" : "No voice", asking: "microphone…", recording: `End ${clock(past_s)}`, sending: "sending…", unsent: "Send again",
   }[phase];
   const title = lack ?? (phase === "idle" ? "Voice note at this place: tap, speak, tap; or hold (T)" : phase === "recording" ? `${words} of ${clock(MOST_S)} (T)` : words);

@@ -4,21 +4,21 @@ import { lack, recordable, refusal, seconds, type Here } from "./lack";
 const here: Here = { connected: true, operates: true, recorded: true, secure: true, asks: true, type: "audio/webm" };
 
 describe("a voice note", () => {
-  it("can be recorded where nothing lacks", () => expect(lack(here)).toBeNull());
-  it("says why it can't be", () => {
+  it("can be recorded if nothing is missing", () => expect(lack(here)).toBeNull());
+  it("gives the reason if it can't be recorded", () => {
     expect(lack({ ...here, connected: false })).toMatch(/no connection/);
     expect(lack({ ...here, operates: false })).toMatch(/viewer's/);
     expect(lack({ ...here, recorded: false })).toMatch(/isn't recorded/);
-    // By plain HTTP from another machine a browser has no way to ask either.
+    // By plain HTTP from another machine a browser can't ask for a microphone either.
     expect(lack({ ...here, secure: false, asks: false, type: null })).toMatch(/https/);
     expect(lack({ ...here, type: null })).toMatch(/records no sound/);
   });
-  it("is of a type that the log takes", () => {
+  it("has a type that the log accepts", () => {
     expect(recordable((type) => type.startsWith("audio/mp4"))).toBe("audio/mp4");
     expect(recordable((type) => type.includes("opus"))).toBe("audio/webm;codecs=opus");
     expect(recordable(() => false)).toBeNull();
   });
-  it("tells a refusal in words", () => {
+  it("explains a refusal in words", () => {
     expect(refusal("NotAllowedError")).toMatch(/refused/);
     expect(refusal("NotFoundError")).toMatch(/no microphone/);
     expect(refusal("AbortError")).toMatch(/AbortError/);

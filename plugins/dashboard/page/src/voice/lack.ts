@@ -1,22 +1,22 @@
-// Why no voice can be recorded here, in words, and what may be.
+// Reasons why no voice note can be recorded, in words, and limits of recordings.
 
-/** As the loop and the log take them. */
+/** Limits, as in the loop and the log. */
 export const MOST_S = 60;
 export const MOST_BYTES = 512 * 1024;
-/** Speech in Opus is clear at this; a minute has 180 kB. */
+/** Bit rate at which speech in Opus is clear; a minute has 180 kB. */
 export const BITS_PER_S = 24_000;
 const TYPES = ["audio/webm;codecs=opus", "audio/ogg;codecs=opus", "audio/mp4"];
 
 export interface Here {
   connected: boolean; operates: boolean; recorded: boolean;
-  /** What browsers call a secure context. */
+  /** Whether the browser considers the page a secure context. */
   secure: boolean;
-  /** Whether there is anything to ask for a microphone. */
+  /** Whether the browser can ask for a microphone. */
   asks: boolean;
   type: string | null;
 }
 
-/** Why not; null where it can be. */
+/** The reason why not; null if a note can be recorded. */
 export function lack(here: Here): string | null {
   if (!here.connected) return "no voice now: no connection to the program";
   if (!here.operates) return "no voice here: this dive takes none, or the token is a viewer's";
@@ -26,12 +26,12 @@ export function lack(here: Here): string | null {
   return null;
 }
 
-/** The first type that the browser records and the log takes. */
+/** First type that the browser records and the log accepts. */
 export function recordable(supports: (type: string) => boolean): string | null {
   return TYPES.find(supports) ?? null;
 }
 
-/** Why the browser gave no microphone. */
+/** Reason why the browser gave no microphone. */
 export function refusal(name: string): string {
   if (name === "NotAllowedError" || name === "SecurityError") return "the microphone was refused: allow it for this page in the browser";
   if (name === "NotFoundError" || name === "OverconstrainedError") return "there is no microphone";
@@ -39,5 +39,5 @@ export function refusal(name: string): string {
   return `the microphone can't be had: ${name}`;
 }
 
-/** Whole seconds of a recording, as the note says them. */
+/** Whole seconds of a recording, as displayed in the note. */
 export const seconds = (ms: number): number => Math.min(MOST_S, Math.max(1, Math.round(ms / 1000)));

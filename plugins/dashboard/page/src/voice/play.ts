@@ -4,7 +4,7 @@ import { store } from "../store/store";
 import { Topic } from "../store/topic";
 
 export const playTopic = new Topic();
-/** The id of the note that is played; null for none. */
+/** Id of the note that is playing; null for none. */
 export let playing: number | null = null;
 
 let audio: HTMLAudioElement | null = null;
@@ -19,7 +19,7 @@ function stop(): void {
   playTopic.changed();
 }
 
-/** Plays a note's recording; once more, stops it. */
+/** Plays a note's recording; a second call stops it. */
 export async function togglePlay(id: number, number: number): Promise<void> {
   const again = playing === id;
   stop();

@@ -1,4 +1,4 @@
-// Records a voice note: the note is put down when the recording begins, its sound is sent when it has ended.
+// Records a voice note: the note is created when the recording begins, and its sound is sent when it ends.
 import { beginVoice, sendVoice } from "../feed/client";
 import { prefs } from "../store/prefs";
 import { store } from "../store/store";
@@ -10,9 +10,9 @@ interface Taken { id: number; seconds: number; sound: Blob; failed_ms: number }
 export const voiceTopic = new Topic();
 export const voice = {
   phase: "idle" as "idle" | "asking" | "recording" | "sending" | "unsent",
-  /** Since when it is recorded, performance.now(). */
+  /** Start of the recording, performance.now(). */
   since_ms: 0,
-  /** What the operator has to know; empty where there is nothing. */
+  /** Message for the operator; empty for none. */
   why: "",
 };
 
@@ -29,7 +29,7 @@ function type(): string | null {
   return typeof MediaRecorder === "undefined" ? null : recordable((each) => MediaRecorder.isTypeSupported(each));
 }
 
-/** Why no voice can be recorded now. */
+/** Reason why no voice note can be recorded now. */
 export function lacks(): string | null {
   return lack({
     connected: store.link.phase === "open" || store.link.phase === "file", operates: store.hello?.may.operate ?? false, recorded: store.state?.recording?.on ?? true,
@@ -37,7 +37,7 @@ export function lacks(): string | null {
   });
 }
 
-/** Begins, ends, or sends what couldn't be sent: whatever comes next. */
+/** Begins or ends a recording, or sends one that couldn't be sent, whichever is next. */
 export function next(): void {
   if (voice.phase === "idle") void begin();
   else if (voice.phase === "recording") end();
@@ -72,7 +72,7 @@ async function begin(): Promise<void> {
     recorder = null;
     return become("idle", `nothing can be recorded: ${String(error)}`);
   }
-  // From here on the note is there, with its time and place, whatever becomes of the sound.
+  // From here on the note exists with its time and position, whatever happens to the sound.
   if (!beginVoice(id, prefs.by)) {
     recorder.onstop = () => stream.getTracks().forEach((track) => track.stop());
     recorder.stop();
@@ -106,7 +106,7 @@ async function send(): Promise<void> {
   store.answered(`voice note of ${taken.seconds} s kept`, false);
 }
 
-/** Gives up what couldn't be sent: the note stays as a mark. */
+/** Drops a recording that couldn't be sent; the note remains as a mark. */
 export function discard(): void {
   unsent = null;
   become("idle");
@@ -119,7 +119,7 @@ export function startVoice(): void {
       voiceTopic.changed();
     }
   });
-  // What a lost connection kept back goes as soon as there is one.
+  // A recording held back by a lost connection is sent as soon as there is one.
   store.topics.link.on(() => {
     if (unsent && voice.phase === "unsent" && store.link.phase === "open" && store.link.since_ms > unsent.failed_ms) void send();
   });

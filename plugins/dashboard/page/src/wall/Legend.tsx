@@ -1,4 +1,4 @@
-// What the wall's colours and marks mean.
+// Legend of the wall's colours and marks.
 import { store } from "../store/store";
 import { useTopics } from "../store/topic";
 import { figure } from "../text/format";

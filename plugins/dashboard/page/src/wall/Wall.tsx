@@ -1,4 +1,4 @@
-// The unrolled wall: canvas for WebGL2, canvas for what is written over it, and the strip of the whole tunnel.
+// The unrolled wall: a canvas for WebGL2, a canvas for labels, and the strip of the whole tunnel.
 import { useEffect, useRef, useState } from "preact/hooks";
 import { samples as fetchSamples } from "../feed/client";
 import { prefsTopic } from "../store/prefs";
@@ -16,9 +16,9 @@ import { SampleWindow } from "./samples";
 import { left_m, right_m, roundOf, wholeView, type Round, type View } from "./view";
 
 const LEFT = 30, TOP = 8, BOTTOM = 24, STRIP = 34, STRIP_BOTTOM = 18;
-/** Between two walls, pixels. */
+/** Gap between two walls, pixels. */
 const BETWEEN = 16;
-/** Discs are drawn where their radius has so many pixels, and up to so wide a view. */
+/** Least radius of a disc in pixels, and widest view, for drawing discs. */
 const LEAST_RADIUS = 2.2, DISCS_UPTO_M = 160;
 
 function layoutOf({ width, height }: Size): Layout {
@@ -34,7 +34,7 @@ function wallColours(): WallColours {
   };
 }
 
-/** All that draws the wall, apart from components. */
+/** Everything that draws the wall, except components. */
 class Painter {
   private size: Size = { width: 0, height: 0, scale: 1 };
   private readonly gl: WallGl;
@@ -82,7 +82,7 @@ class Painter {
     return { ...wholeView(current(), from, to), span_m: to - from };
   }
 
-  /** Draws at the next frame, once. */
+  /** Draws once, at the next frame. */
   draw(): void {
     if (this.asked !== 0) return;
     this.asked = requestAnimationFrame(() => {
@@ -101,7 +101,7 @@ class Painter {
     context.setTransform(scale, 0, 0, scale, 0, 0);
     context.clearRect(0, 0, width, height);
     if (!hello) return;
-    // What came while there was no connection isn't in the window.
+    // Data that arrived without a connection isn't in the window.
     if (this.session !== store.session) this.window.clear();
     this.session = store.session;
     this.round = roundOf(hello.clock_arc_m, hello.perimeter_m);
@@ -114,7 +114,7 @@ class Painter {
     drawOverlay(context, store, view, strip, layout, vehicle(), this.round, rows);
   }
 
-  /** The wall, and below it the same for the other target where there is one. */
+  /** The wall, and below it the wall for the second target if there is one. */
   private rows(target_m: number, compared_m: number | undefined): Row[] {
     const { top, height } = this.layout;
     if (compared_m === undefined) return [{ held: "own", target_m, top, height }];
@@ -159,7 +159,7 @@ class Painter {
     return { samples: this.window, radius_m: target_m / 2, perimeter_m: hello.perimeter_m, turn_t_s: this.turns };
   }
 
-  /** What lies under a place, in words. */
+  /** Text on the place under the pointer. */
   at(x: number, y: number): string {
     const { hello, sections } = store, { left, top, width, height } = this.layout;
     if (!hello || x < left || y < top || y > top + height) return "";
@@ -169,7 +169,7 @@ class Painter {
     const row = this.rows(hello.target_m, hello.compared_m).find((each) => y <= each.top + each.height);
     const held = row?.held ?? "own", target_m = row?.target_m ?? hello.target_m;
     const verdict = ["open", "pass", "missed", "can't say", "not inspected"][sections.verdictOf(slot, held)] ?? "";
-    // Cause and why are those of the dive's own target.
+    // Cause and reason belong to the dive's own target.
     const own = held === "own" ? slot : -1, cause = hello.causes[sections.cause[own] ?? 255], why = hello.whys[sections.why[own] ?? 255];
     const words = [cause, why].filter((word) => word !== undefined).map((word) => word.replaceAll("_", " ")).join(", ");
     const d = sections.hole[slot] ?? NaN;

@@ -35,9 +35,9 @@ describe("columns of the wall", () => {
     expect(out[4]! & 7).toBe(PASS);
     expect(out[8]! & 7).toBe(ABSENT);
   });
-  it("hold the same samples to another target", () => {
+  it("judge the same samples by another target", () => {
     const sections = new Sections();
-    // Passes for its own target, is missed for the other; and one that nothing was compared of.
+    // One section passes by its own target and is missed by the other; one has no comparison.
     sections.take(frame([{ index: 0, verdict: PASS, flags: 2 | ((FAIL + 1) << 2), hole: 0.4 }, { index: 1, verdict: PASS, flags: 2, hole: 0.4 }]));
     const own = new Uint32Array(2 * 4), other = new Uint32Array(2 * 4);
     columns(sections, 1, 0.5, 0, 1, 2, own);
@@ -46,7 +46,7 @@ describe("columns of the wall", () => {
     expect(other[0]! >>> 16).toBe(Math.round((Math.fround(0.4) / 0.25) * RATIO_STEPS));
     expect(other[4]! & 7).toBe(OPEN);
   });
-  it("widen a flag that would be a single pixel, within the way", () => {
+  it("widen a flag of a single pixel within the coverage extent", () => {
     const sections = new Sections();
     sections.take(frame([-3, -2, -1, 0, 1, 2, 3].map((index) => ({ index, verdict: index === 0 ? FAIL : PASS, flags: index === 0 ? 1 : 0, hole: 0.4 }))));
     const out = new Uint32Array(7 * 4);
@@ -54,7 +54,7 @@ describe("columns of the wall", () => {
     const flagged = [0, 1, 2, 3, 4, 5, 6].filter((column) => (out[column * 4]! & FLAGGED_BIT) !== 0);
     expect(flagged).toEqual([2, 3, 4]);
   });
-  it("grow both ways and keep what was told", () => {
+  it("grow in both directions and keep received data", () => {
     const sections = new Sections();
     sections.take(frame([{ index: 5000, verdict: PASS, hole: 0.1 }]));
     sections.take(frame([{ index: -40, verdict: FAIL, hole: 0.7 }]));

@@ -1,15 +1,16 @@
-// One column of the wall for each pixel across, made of the sections that lie in it: 28,000 sections cost less than
+// One column of the wall for each horizontal pixel, made from the sections in it. 28,000 sections take less than a millisecond,
+// and only visible columns go to the graphics processor.
 // a millisecond, and only what the screen has columns for goes to the graphics processor.
 import { CANNOT_SAY, FAIL, NOT_INSPECTED, OPEN, PASS, type Held, type Sections } from "../store/sections";
 
 export const ABSENT = 7;
 export const FLAGGED_BIT = 8;
-/** Steps of D / T in a column's upper half. */
+/** Number of steps of D / T in a column's upper half. */
 export const RATIO_STEPS = 8192;
-/** Words a column: state, seen low, seen high, none. */
+/** Number of words in a column: state, seen low, seen high, none. */
 export const WORDS = 4;
 
-/** Of several verdicts in a pixel the one that matters most is shown. */
+/** Precedence of verdicts in a pixel; the most important one is displayed. */
 const RANK: number[] = [];
 RANK[PASS] = 1;
 RANK[OPEN] = 2;
@@ -51,7 +52,7 @@ export function columns(
   widen(out, count);
 }
 
-/** A flagged stretch narrower than three columns would be lost on the screen. */
+/** A flagged stretch narrower than three columns would be invisible. */
 function widen(out: Uint32Array, count: number): void {
   let run = 0;
   for (let column = 0; column <= count; column += 1) {
@@ -62,7 +63,7 @@ function widen(out: Uint32Array, count: number): void {
         const at = beside * WORDS;
         if (beside >= 0 && beside < count && ((out[at] ?? 0) & 7) !== ABSENT) out[at] = ((out[at] ?? 0) | FLAGGED_BIT) >>> 0;
       }
-      // What has just been widened isn't another run.
+      // The widened part isn't another run.
       run = 0;
       column += 1;
       continue;

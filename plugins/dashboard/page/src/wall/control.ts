@@ -1,4 +1,4 @@
-// The wall's view as a thing that keys, wheel, pinch and buttons change.
+// The wall's view, changed by keys, wheel, pinch and buttons.
 import { store } from "../store/store";
 import { Topic } from "../store/topic";
 import { FOLLOW_SPAN_M, followed, moved, movedDown, startView, wholeView, zoomed, zoomedDown, type View } from "./view";
@@ -13,20 +13,20 @@ export function set(next: View): void {
   viewTopic.changed();
 }
 
-/** Chainages of the way, and of the tunnel where its length is told. */
+/** Chainages of the coverage extent, and of the tunnel if its length is known. */
 export function wayOf(): [number, number] {
   const { sections, hello } = store;
   if (sections.least > sections.most || !hello) return [0, 0];
   return [sections.least * hello.section_m, (sections.most + 1) * hello.section_m];
 }
 
-/** The whole tunnel; where its length isn't told, the way. */
+/** The whole tunnel, or the coverage extent if the tunnel's length is unknown. */
 export function whole(): [number, number] {
   const way = wayOf();
   return [Math.min(0, way[0]), Math.max(store.hello?.length_m ?? 0, way[1], 10)];
 }
 
-/** Where the vehicle is or was last, and which way it goes. */
+/** Present or last position of the vehicle, and its direction. */
 export function vehicle(): { at_m: number; sd_m: number; direction: number; sure: boolean } | null {
   const { state } = store;
   const at_m = state?.position.chainage_m ?? null;
@@ -37,7 +37,7 @@ export function vehicle(): { at_m: number; sd_m: number; direction: number; sure
   return { at_m: last_m, sd_m: state?.position.chainage_sd_m ?? 0, direction, sure: state?.position.state === "ok" };
 }
 
-/** The view as it is drawn: with the vehicle, if it follows. */
+/** The view as drawn: with the vehicle, if it follows. */
 export function current(): View {
   const its = vehicle();
   if (view.whole) return wholeView(view, ...whole());
@@ -52,7 +52,7 @@ export const actions = {
     const [from, to] = whole();
     const now = current();
     const next = zoomed(now, factor, at, to - from);
-    // A view that follows goes on following.
+    // A view that follows continues to follow.
     set(view.follow ? { ...next, follow: true } : next);
   },
   pan(share: number): void {

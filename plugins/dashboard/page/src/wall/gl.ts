@@ -1,4 +1,4 @@
-// Draws the wall with WebGL2. Draws only when told to; uploads the columns of what is seen, and samples once.
+// Draws the wall with WebGL2, only on request. Uploads the visible columns, and each sample once.
 import { rgb } from "./cividis";
 import { WORDS } from "./columns";
 import { FLOATS, type SampleWindow } from "./samples";
@@ -18,7 +18,7 @@ export interface Drawing {
 /** Discs of a smaller radius, CSS pixels, are drawn as points. */
 const SMALL_DISC = 9;
 
-/** Rounds that a view shows parts of. */
+/** Rounds that are partly visible. */
 function rounds({ centreDown, zoomDown }: View): number[] {
   const half = 0.5 / zoomDown;
   return [-1, 0, 1].filter((shift) => centreDown + half > shift + 1e-6 && centreDown - half < shift + 1 - 1e-6);
@@ -68,7 +68,7 @@ export class WallGl {
   private readonly textures = new Map<string, { texture: WebGLTexture; width: number }>();
   private uploadedFrom: SampleWindow | null = null;
 
-  /** Fails where there is no WebGL2. */
+  /** Fails without WebGL2. */
   constructor(canvas: HTMLCanvasElement) {
     const gl = canvas.getContext("webgl2", { antialias: false, alpha: false, depth: true, powerPreference: "low-power" });
     if (!gl) throw new Error("this browser has no WebGL2");
@@ -76,7 +76,7 @@ export class WallGl {
     this.make();
   }
 
-  /** Makes all anew after the context was lost. */
+  /** Recreates everything after the context was lost. */
   make(): void {
     const gl = this.gl;
     this.wall = new Program(gl, FULL_VERTEX, WALL_FRAGMENT);
@@ -130,11 +130,11 @@ export class WallGl {
     this.use(program, drawing, colours);
     this.place(program, drawing);
     gl.uniform2f(program.at("u_radius"), across, down);
-    // A pixel that one disc covers isn't shaded again for the next.
+    // A pixel covered by one disc isn't shaded again for the next.
     gl.enable(gl.DEPTH_TEST);
     gl.depthFunc(gl.LESS);
     gl.bindVertexArray(small ? this.points : this.instanced);
-    // The window has samples beside the seam twice: other rounds are drawn only where the view reaches beyond one.
+    // The window has samples beside the seam twice, so other rounds are drawn only if the view extends beyond one.
     for (const shift of rounds(view)) {
       gl.uniform1f(program.at("u_shift"), shift);
       if (small) gl.drawArrays(gl.POINTS, 0, discs.samples.count);
@@ -150,7 +150,7 @@ export class WallGl {
     this.place(this.dots, drawing);
     const radius = (discs.radius_m / drawing.view.span_m) * drawing.part.width;
     const down = (discs.radius_m / discs.perimeter_m) * drawing.part.height * drawing.view.zoomDown;
-    // From afar the dots would hide what the discs show.
+    // From afar the dots would hide the discs.
     gl.uniform1i(this.dots.at("u_all"), Math.min(radius, down) > 4 * drawing.scale ? 1 : 0);
     gl.uniform1f(this.dots.at("u_point"), Math.min(Math.max(radius / 6, 1), 3.5 * drawing.scale));
     gl.uniform1fv(this.dots.at("u_turn_t_s"), discs.turn_t_s);
@@ -206,7 +206,7 @@ export class WallGl {
     held.width = width;
   }
 
-  /** Only what is new goes over. */
+  /** Uploads only new data. */
   private upload(samples: SampleWindow): void {
     const gl = this.gl;
     gl.bindBuffer(gl.ARRAY_BUFFER, this.buffer);

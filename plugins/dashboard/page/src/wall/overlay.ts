@@ -1,4 +1,4 @@
-// What is written over the wall: stations, clock positions, holes, alerts, the vehicle.
+// Labels over the wall: stations, clock positions, holes, alerts, the vehicle.
 import { CANNOT_SAY, FAIL, type Held } from "../store/sections";
 import { isUnacknowledged } from "../store/alerts";
 import type { Store } from "../store/store";
@@ -6,9 +6,9 @@ import { figure, station } from "../text/format";
 import { colour } from "../ui/colours";
 import { downOf, heightOf, left_m, right_m, type Round, type View } from "./view";
 
-/** Places in CSS pixels. */
+/** Positions in CSS pixels. */
 export interface Layout { left: number; top: number; width: number; height: number; stripTop: number; stripHeight: number }
-/** One of the walls: the same samples, held to one target. */
+/** One of the walls: the same samples, judged by one target. */
 export interface Row { held: Held; target_m: number; top: number; height: number }
 export interface Vehicle { at_m: number; sd_m: number; direction: number; sure: boolean }
 
@@ -35,7 +35,7 @@ export function drawOverlay(
   drawStrip(context, store, view, strip, layout, vehicle);
 }
 
-/** Which target a wall is held to, in its upper corner. */
+/** Target of a wall, in its upper corner. */
 function named(context: CanvasRenderingContext2D, { left, top }: Layout, { target_m }: Row): void {
   context.font = `bold 15px ${FONT}`;
   context.textAlign = "left";
@@ -51,7 +51,7 @@ function clocks(context: CanvasRenderingContext2D, store: Store, view: View, lay
   if (!hello) return;
   context.textAlign = "right";
   const drawn: number[] = [];
-  // The quarters first: where room is short, the hours between give way.
+  // The quarters come first; without room, the hours between are left out.
   for (const hour of [0, 3, 6, 9, 1, 2, 4, 5, 7, 8, 10, 11]) {
     const down = downOf(round, (hello.clock_arc_m[hour] ?? 0) / hello.perimeter_m);
     for (const turn of [-1, 0, 1]) {
@@ -75,7 +75,7 @@ function clocks(context: CanvasRenderingContext2D, store: Store, view: View, lay
   }
 }
 
-/** Steps of stations that stand at least `least_m` apart: 1, 2, 5 and tens of them. */
+/** Step of stations that are at least `least_m` apart: 1, 2, 5 and multiples of ten of these. */
 export function step_m(least_m: number): number {
   const ten = 10 ** Math.floor(Math.log10(least_m));
   return [1, 2, 5, 10].map((times) => times * ten).find((step) => step >= least_m - 1e-9) ?? 10 * ten;
@@ -113,7 +113,7 @@ function holes(context: CanvasRenderingContext2D, store: Store, view: View, layo
     if (slot < 0) continue;
     const verdict = sections.verdictOf(slot, held), d = sections.hole[slot] ?? NaN;
     if ((verdict !== FAIL && verdict !== CANNOT_SAY) || !(d > 0)) continue;
-    // Neighbours share a hole: only the largest of a circle's width is drawn.
+    // Neighbours share a hole, so only the largest within a circle's width is drawn.
     let largest = true;
     for (let other = index - near; other <= index + near && largest; other += 1) {
       const beside = sections.slot(other), its = beside < 0 ? 0 : (sections.hole[beside] ?? 0);
@@ -150,7 +150,7 @@ function label(context: CanvasRenderingContext2D, text: string, x: number, y: nu
   context.fillText(text, x, y);
 }
 
-/** The alerts' runs: a pointer and the number, at the top. */
+/** Runs of the alerts: a pointer and the number, at the top. */
 function missed(context: CanvasRenderingContext2D, store: Store, view: View, layout: Layout): void {
   context.font = `bold 12px ${FONT}`;
   context.textAlign = "center";
@@ -217,7 +217,7 @@ function line(context: CanvasRenderingContext2D, x: number, y: number, to: numbe
   context.stroke();
 }
 
-/** Over the strip of the whole tunnel: what part is seen above, where it ends, the vehicle. */
+/** Over the strip of the whole tunnel: the part visible above, its end, and the vehicle. */
 function drawStrip(
   context: CanvasRenderingContext2D, store: Store, view: View, strip: View, layout: Layout, vehicle: Vehicle | null,
 ): void {

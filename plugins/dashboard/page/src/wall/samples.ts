@@ -1,12 +1,12 @@
-// The samples near what is seen: fetched for a window of chainage, and grown by the live ones.
+// Samples near the visible part: fetched for a window of chainage, and extended by live ones.
 import { SAMPLE_BYTES, type Frame } from "../feed/binary";
 import { downOf, type Round } from "./view";
 
-/** Floats a sample: x from the origin, fraction of the round from the crown (beyond 0 to 1 for the copy beside the seam), time, head + 16 outcome. */
+/** Floats of a sample: x from the origin, fraction of the round from the crown (outside 0 to 1 for the copy beside the seam), time, head + 16 outcome. */
 export const FLOATS = 4;
-/** A live frame of more records may have been thinned: the server sends at most 1,000 at once, one of several. */
+/** A live frame with more records may have been thinned, because the server sends at most 1,000 at once. */
 const WHOLE_LIVE = 500;
-/** After live frames that may have been thinned, all is asked for again, but not more often than this. */
+/** Least interval of requesting all samples again after live frames that may have been thinned. */
 const AGAIN_MS = 2000;
 const CAPACITY = 260_000;
 const MARGIN = 0.2;
@@ -16,15 +16,15 @@ export class SampleWindow {
   to_m = NaN;
   origin_m = 0;
   count = 0;
-  /** Not all samples are here: what is missed can't be shown by them. */
+  /** Not all samples are loaded, so missed sections can't be judged from them. */
   thinned = false;
   private stale = false;
   private asked_ms = -Infinity;
   round: Round = { crown: 0, sign: 1 };
-  /** So near the seam, as a share of the round, a disc reaches over it. */
+  /** Distance from the seam, as a share of the round, within which a disc extends across it. */
   seam = 0;
   readonly data = new Float32Array(CAPACITY * FLOATS);
-  /** Samples that have been handed to the graphics processor already. */
+  /** Number of samples already uploaded to the graphics processor. */
   uploaded = 0;
   private asked: AbortController | null = null;
   private askedFrom_m = NaN;
@@ -47,7 +47,7 @@ export class SampleWindow {
     return !this.thinned && !this.stale && from_m >= this.from_m && to_m <= this.to_m;
   }
 
-  /** Sees to it that the samples between these are there; way: where there are any at all. */
+  /** Loads the samples between these chainages; way: the extent with samples. */
   want(from_m: number, to_m: number, way: [number, number], begun_s: number): void {
     const from = Math.max(from_m, way[0]), to = Math.min(to_m, way[1]);
     if (!(to > from) || this.covers(from, to)) return;
@@ -72,7 +72,7 @@ export class SampleWindow {
         this.changed();
       },
       () => {
-        // Without an answer the columns are shown; it is asked again when the view or the wall changes.
+        // Without an answer the columns are shown; the request is repeated when the view or the wall changes.
         if (this.asked === asked) this.asked = null;
       },
     );
@@ -80,14 +80,14 @@ export class SampleWindow {
 
   private fill(frame: Frame, from_m: number, to_m: number, way: [number, number], begun_s: number): void {
     this.origin_m = Math.round((from_m + to_m) / 2);
-    // Beyond the ends of the way there is nothing but what comes live.
+    // Beyond the ends of the coverage extent there are only live samples.
     this.from_m = from_m <= way[0] ? -Infinity : from_m;
     this.to_m = to_m >= way[1] ? Infinity : to_m;
     this.count = this.uploaded = 0;
     this.add(frame, begun_s);
   }
 
-  /** Adds live samples that lie in the window. */
+  /** Adds live samples within the window. */
   take(frame: Frame, begun_s: number): void {
     if (Number.isNaN(this.from_m)) return;
     if (frame.count > WHOLE_LIVE) this.stale = true;

@@ -34,7 +34,7 @@ void main() {
   gl_Position = vec4(corner * 2.0 - 1.0, 0.9, 1.0);
 }`;
 
-/** The columns by verdict, D / T and what was seen. */
+/** Columns by verdict, D / T and coverage. */
 export const WALL_FRAGMENT = `${COMMON}
 uniform bool u_discs;
 out vec4 colour;
@@ -59,7 +59,7 @@ void main() {
   colour = vec4(seen ? its : (judged ? u_blank : u_open), 1.0);
 }`;
 
-/** Over columns and discs: hatch where it can't be said, the outline of what is flagged. */
+/** Over columns and discs: hatch for can't say, and the outline of flagged sections. */
 export const MARKS_FRAGMENT = `${COMMON}
 out vec4 colour;
 uint stateAt(float x) { return texelFetch(u_columns, ivec2(int(clamp(x, 0.0, u_size.x - 1.0)), 0), 0).x; }
@@ -101,7 +101,7 @@ void main() {
   gl_Position = wall ? vec4(at / u_size * 2.0 - 1.0, 0.5, 1.0) : vec4(3.0, 3.0, 0.0, 1.0);
 }`;
 
-/** Small discs are points: a vertex each instead of four. */
+/** Small discs are points, which need one vertex instead of four. */
 export const POINT_DISC_VERTEX = `${COMMON}${SAMPLE_COMMON}
 layout(location = 0) in vec4 a_sample;
 uniform vec2 u_radius;

@@ -9,12 +9,12 @@ describe("the wall's view", () => {
     expect(clock.map((arc) => Math.round(downOf(round, arc / 20) * 12) % 12)).toEqual([0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11]);
     expect(heightOf(startView(), downOf(round, clock[3]! / 20))).toBeCloseTo(0.25);
   });
-  it("goes the same way where arc length is counted the other way round", () => {
+  it("goes in the same direction if arc length is counted the other way round", () => {
     const other = clock.map((arc) => (20 - arc) % 20), round = roundOf(other, 20);
     expect(round.sign).toBe(-1);
     expect(Math.round(downOf(round, other[9]! / 20) * 12)).toBe(9);
   });
-  it("keeps what is under the pointer when it zooms", () => {
+  it("keeps the place under the pointer when zooming", () => {
     const view = { ...startView(), follow: false, centre_m: 500, span_m: 100 };
     const at_m = left_m(view) + 0.2 * view.span_m, next = zoomed(view, 0.5, 0.2, 7000);
     expect(next.span_m).toBe(50);

@@ -1,4 +1,4 @@
-// What of the unrolled wall is seen. Across: chainage. Down: fractions of the perimeter, from the crown by 3 o'clock.
+// Visible part of the unrolled wall. Across: chainage. Down: fractions of the perimeter, from the crown by 3 o'clock.
 
 export interface View {
   /** Chainage in the middle, m. */
@@ -9,15 +9,15 @@ export interface View {
   follow: boolean;
   /** Shows the whole tunnel, however long it becomes. */
   whole: boolean;
-  /** How many times the height of one round; 1 shows all clock positions. */
+  /** Multiple of the height of one round; 1 shows all clock positions. */
   zoomDown: number;
-  /** Fraction of the round, from the crown, in the middle of the height. */
+  /** Fraction of the round, from the crown, at the middle of the height. */
   centreDown: number;
 }
 
 export const LEAST_SPAN_M = 1.5;
 export const FOLLOW_SPAN_M = 60;
-/** Where the vehicle stands in a view that follows it: share of the width behind it. */
+/** Position of the vehicle in a view that follows it: share of the width behind it. */
 const BEHIND = 0.78;
 
 export function startView(): View {
@@ -27,14 +27,14 @@ export function startView(): View {
 export const left_m = (view: View): number => view.centre_m - view.span_m / 2;
 export const right_m = (view: View): number => view.centre_m + view.span_m / 2;
 
-/** Follows a vehicle at a chainage that goes inwards (1) or back (-1); shows little of what lies before the portal. */
+/** Follows a vehicle at a chainage that moves inwards (1) or back (-1); shows little of the part before the portal. */
 export function followed(view: View, at_m: number, direction: number, portal_m: number): View {
   const centre_m = at_m - direction * (BEHIND - 0.5) * view.span_m;
   const least_m = Math.min(portal_m, at_m) + 0.46 * view.span_m;
   return { ...view, centre_m: Math.max(centre_m, least_m) };
 }
 
-/** Zooms about a place of the width, 0 to 1; factor below 1 zooms in. */
+/** Zooms about a position in the width, 0 to 1; a factor below 1 zooms in. */
 export function zoomed(view: View, factor: number, at: number, whole_m: number): View {
   const span_m = Math.min(Math.max(view.span_m * factor, LEAST_SPAN_M), Math.max(whole_m * 1.1, FOLLOW_SPAN_M));
   const fixed_m = left_m(view) + at * view.span_m;
@@ -54,13 +54,13 @@ export function movedDown(view: View, by: number): View {
   return { ...view, centreDown: down - Math.floor(down) };
 }
 
-/** All of the way, from the portal. */
+/** The whole coverage extent, from the portal. */
 export function wholeView(view: View, from_m: number, to_m: number): View {
   const span_m = Math.max(to_m - from_m, LEAST_SPAN_M) * 1.04;
   return { ...view, span_m, centre_m: (from_m + to_m) / 2, follow: false, whole: true, zoomDown: 1, centreDown: 0.5 };
 }
 
-/** Fractions of the round at the top edge, and how clock positions grow: down from 12 by 3, as seen inwards. */
+/** Fraction of the round at the top edge, and direction of clock positions: down from 12 by 3, looking inwards. */
 export interface Round { crown: number; sign: number }
 
 export function roundOf(clock_arc_m: number[], perimeter_m: number): Round {
@@ -75,7 +75,7 @@ export function downOf(round: Round, arc: number): number {
   return down - Math.floor(down);
 }
 
-/** Place in the height, 0 (top) to 1, of a fraction of the round; it repeats every `zoomDown`. */
+/** Position in the height, 0 (top) to 1, of a fraction of the round; it repeats every `zoomDown`. */
 export function heightOf(view: View, down: number): number {
   return (down - view.centreDown) * view.zoomDown + 0.5;
 }

@@ -59,7 +59,7 @@ fn worked_example_2_both_ways() {
 }
 
 #[test]
-fn a_step_is_rounded_not_cut() {
+fn step_is_rounded_not_truncated() {
     // In single precision 0.9 / 0.3 falls below 3.
     let step_deg = f64::from(0.9_f32) - 1e-6;
     assert_eq!(Command { step_deg, ..example_1() }.encode().unwrap()[13], 3);
@@ -71,7 +71,7 @@ fn a_step_is_rounded_not_cut() {
 }
 
 #[test]
-fn a_range_that_the_head_does_not_have_is_refused() {
+fn unsupported_range_is_refused() {
     let error = Command { range_m: 7, ..example_1() }.encode().unwrap_err();
     assert_eq!(
         error.to_string(),
@@ -80,7 +80,7 @@ fn a_range_that_the_head_does_not_have_is_refused() {
 }
 
 #[test]
-fn the_terminator_stands_at_the_end_alone() {
+fn terminator_occurs_only_at_the_end() {
     let early = |command: Command| match command.encode() {
         Err(CommandError::EarlyTerminator { index }) => index,
         other => panic!("{other:?}"),
@@ -95,7 +95,7 @@ fn the_terminator_stands_at_the_end_alone() {
 }
 
 #[test]
-fn what_no_code_stands_for_is_refused() {
+fn value_without_a_code_is_refused() {
     let refused = |command: Command| matches!(command.encode(), Err(CommandError::Outside { .. }));
     assert!(refused(Command { start_gain_db: 41.0, ..example_1() }));
     assert!(refused(Command { logf_db: 50.0, ..example_1() }));

@@ -47,7 +47,7 @@ fn worked_example_7_a_real_852_header() {
 }
 
 #[test]
-fn the_sounder_counts_centimetres_at_every_range() {
+fn sounder_resolution_is_1_cm_at_every_range() {
     let header = Header { range_m: 3, ..Return::decode(&EXAMPLE_5, None).unwrap().header };
     assert_eq!((header.count_mm(Model::Head881), header.count_mm(Model::Sounder852)), (2, 10));
     let at_5_m = Header { range_m: 5, ..header };
@@ -55,7 +55,7 @@ fn the_sounder_counts_centimetres_at_every_range() {
 }
 
 #[test]
-fn a_position_past_the_turn_is_refused_from_a_head_and_taken_from_the_sounder() {
+fn position_past_a_turn_is_refused_for_heads_and_accepted_for_sounders() {
     let mut bytes = EXAMPLE_4;
     [bytes[5], bytes[6]] = pack(1201);
     let refused = ReturnError::TooGreat { field: "head position", got: 1201, max: 1200 };
@@ -68,7 +68,7 @@ fn a_position_past_the_turn_is_refused_from_a_head_and_taken_from_the_sounder() 
 }
 
 #[test]
-fn lengths_that_lie_are_refused() {
+fn false_lengths_are_refused() {
     let mut bytes = [0; MAX_RETURN_BYTES];
     bytes[..13].copy_from_slice(&EXAMPLE_4);
     [bytes[10], bytes[11]] = pack(1);
@@ -83,7 +83,7 @@ fn lengths_that_lie_are_refused() {
 }
 
 #[test]
-fn a_value_beyond_its_bits_is_not_encoded() {
+fn value_beyond_its_bits_is_not_encoded() {
     let value = Return::decode(&EXAMPLE_4, None).unwrap();
     let too_far = Return { header: Header { profile_counts: 0x4000, ..value.header }, ..value };
     assert!(matches!(too_far.encode(), Err(ReturnError::TooGreat { max: 0x3FFF, .. })));
@@ -92,7 +92,7 @@ fn a_value_beyond_its_bits_is_not_encoded() {
 }
 
 #[test]
-fn an_echo_that_looks_like_a_return_is_an_echo() {
+fn echo_that_resembles_a_return_stays_an_echo() {
     let mut echo = [0xFC; 252];
     echo[20..33].copy_from_slice(&EXAMPLE_4);
     let header = Header { tag: Tag::Imx, ..Return::decode(&EXAMPLE_4, None).unwrap().header };
@@ -105,9 +105,11 @@ fn an_echo_that_looks_like_a_return_is_an_echo() {
     assert_eq!(got, [value]);
 }
 
-/// Returns with 0xFC only at the end, echo lengths that differ by less than a header, and no positions that read as such a
-/// length in its place: otherwise the front of one return and the whole of the next could form a false one that no decoder
-/// can detect. `an_echo_of_any_bytes_comes_back` covers the other values.
+/// Returns that can't form a false return together with the next one.
+///
+/// They have 0xFC only at the end, echo lengths that differ by less than a header, and no positions that read as such
+/// a length in its place. Otherwise the front of one return and the whole of the next could form a false one that no
+/// decoder can detect. `echo_of_any_bytes_round_trips` covers the other values.
 fn returns(tags: &[Tag], lengths: core::ops::RangeInclusive<usize>) -> impl Strategy<Value = Return> + use<> {
     let tags = proptest::sample::select(tags.to_vec());
     let echo = (proptest::collection::vec(0u8..0xFC, MAX_ECHO_BYTES), lengths);
@@ -144,7 +146,7 @@ fn encode(value: &Return) -> Vec<u8> {
 
 proptest! {
     #[test]
-    fn an_echo_of_any_bytes_comes_back(
+    fn echo_of_any_bytes_round_trips(
         value in echoes(),
         echo in proptest::collection::vec(any::<u8>(), 0..=MAX_ECHO_BYTES),
     ) {
@@ -153,7 +155,7 @@ proptest! {
     }
 
     #[test]
-    fn seven_bits_a_byte_is_what_the_maker_writes(low: u8, high: u8) {
+    fn seven_bit_packing_matches_the_maker_formula(low: u8, high: u8) {
         let written = (u16::from((high & 0x7E) >> 1) << 8) | u16::from(((high & 1) << 7) | (low & 0x7F));
         prop_assert_eq!(unpack(low, high), written);
     }

@@ -1,4 +1,4 @@
-//! Damaged logs: no panic, all intact messages are delivered, and losses are reported.
+//! Damaged logs: reading never panics, delivers all intact messages, and reports the losses.
 
 use std::collections::BTreeSet;
 
@@ -8,11 +8,11 @@ use proptest::prelude::*;
 use super::super::{LogError, LogInfo, LogWriter, LossKind};
 use super::*;
 
-/// Messages per chunk and chunks of [`log`].
+/// Messages per chunk, and number of chunks, of [`log`].
 const PER_CHUNK: usize = 6;
 const CHUNKS: usize = 6;
 
-/// A log whose chunk `n` (from 0) has the log times `100 n + 1` to `100 n + 6`, and the positions of its chunks.
+/// A log and the positions of its chunks. Chunk `n` (from 0) has the log times `100 n + 1` to `100 n + 6`.
 fn log() -> (Vec<u8>, Vec<Seen>, Vec<usize>) {
     let mut log = LogWriter::new(Vec::new(), &header(true)).unwrap();
     for chunk in 0..CHUNKS as u64 {
@@ -40,7 +40,7 @@ fn without_chunk(seen: &[Seen], chunk: usize) -> Vec<Seen> {
 
 fn is_subsequence(part: &[Seen], whole: &[Seen]) -> bool {
     let mut rest = whole.iter();
-    // The channel of a message may be unknown too, when all copies of the definitions are damaged.
+    // A message's channel may also be unknown if all copies of the definitions are damaged.
     part.iter().all(|message| {
         rest.any(|other| {
             (other.1, other.2, other.3, &other.4) == (message.1, message.2, message.3, &message.4)
@@ -49,7 +49,7 @@ fn is_subsequence(part: &[Seen], whole: &[Seen]) -> bool {
 }
 
 #[test]
-fn a_log_cut_anywhere_gives_what_was_before_the_cut() {
+fn log_cut_anywhere_delivers_messages_before_the_cut() {
     let (bytes, seen, places) = log();
     for cut in places[CHUNKS - 2]..bytes.len() {
         let (got, losses) = read(&bytes[..cut]);
@@ -63,7 +63,7 @@ fn a_log_cut_anywhere_gives_what_was_before_the_cut() {
     }
 }
 
-/// A medium of which some bytes can't be read.
+/// A medium with unreadable bytes.
 struct Worn<'a> {
     bytes: std::io::Cursor<&'a [u8]>,
     bad: core::ops::Range<usize>,
@@ -72,7 +72,7 @@ struct Worn<'a> {
 impl std::io::Read for Worn<'_> {
     fn read(&mut self, into: &mut [u8]) -> std::io::Result<usize> {
         let at = usize::try_from(self.bytes.position()).unwrap();
-        // Up to the bad bytes it reads.
+        // Reads up to the unreadable bytes.
         let len = if at < self.bad.start { into.len().min(self.bad.start - at) } else { into.len() };
         if self.bad.contains(&at) {
             return Err(std::io::Error::from_raw_os_error(5));
@@ -87,7 +87,7 @@ impl std::io::Seek for Worn<'_> {
     }
 }
 
-/// A log like that of a long dive: long packets, results, chunks of some kilobytes.
+/// A log like that of a long dive: long packets, results, and chunks of some kilobytes.
 fn long_log() -> (Vec<u8>, Vec<Seen>) {
     let mut log = LogWriter::new(Vec::new(), &header(true)).unwrap();
     for tick in 0..400_u64 {
@@ -104,7 +104,7 @@ fn long_log() -> (Vec<u8>, Vec<Seen>) {
 }
 
 #[test]
-fn what_the_medium_does_not_give_is_a_loss_and_the_rest_is_read() {
+fn unreadable_bytes_are_a_loss_and_the_rest_is_read() {
     let (bytes, seen) = long_log();
     let chunks = places(&bytes, op::CHUNK);
     let mut told = 0;
@@ -113,7 +113,7 @@ fn what_the_medium_does_not_give_is_a_loss_and_the_rest_is_read() {
         let medium = Worn { bytes: std::io::Cursor::new(&bytes), bad: bad..bad + 1 };
         let mut reader = match LogReader::new(medium, "worn".to_owned()) {
             Ok(reader) => reader,
-            // Without its first bytes it could be anything.
+            // Without its first bytes the file can't be identified as a log.
             Err(error) => {
                 assert!(bad < 512 && error.to_string().contains("os error 5"), "{bad}: {error}");
                 continue;
@@ -129,7 +129,7 @@ fn what_the_medium_does_not_give_is_a_loss_and_the_rest_is_read() {
                 .iter()
                 .any(|loss| matches!(&loss.kind, LossKind::Unreadable(why) if why.contains("os error 5")));
             told += usize::from(is_told);
-            // What doesn't lie in the sector is read.
+            // Everything outside the sector is read.
             let hit = chunks
                 .iter()
                 .filter(|place| **place < sector.end && sector.start < record_after(&bytes, **place))
@@ -151,7 +151,7 @@ fn what_the_medium_does_not_give_is_a_loss_and_the_rest_is_read() {
 }
 
 #[test]
-fn a_long_chunk_cut_anywhere_gives_what_was_before_it() {
+fn long_chunk_cut_anywhere_delivers_messages_before_the_cut() {
     let (bytes, seen) = long_log();
     let last = *places(&bytes, op::CHUNK).last().unwrap();
     let before = read(&bytes[..last]).0.len();
@@ -166,7 +166,7 @@ fn a_long_chunk_cut_anywhere_gives_what_was_before_it() {
 }
 
 #[test]
-fn a_chunk_whose_head_is_zeros_is_a_loss() {
+fn chunk_with_zeroed_head_is_a_loss() {
     let (bytes, seen) = long_log();
     for chunk in &places(&bytes, op::CHUNK)[1..] {
         let mut bytes = bytes.clone();
@@ -201,7 +201,7 @@ fn thousands_of_random_changes_never_lose_anything_silently() {
 }
 
 #[test]
-fn a_log_cut_in_its_beginning_is_a_log_or_no_log() {
+fn log_cut_near_its_start_is_read_with_losses_or_refused() {
     let (bytes, _, places) = log();
     for cut in 0..places[0] {
         match LogReader::new(Cursor::new(bytes[..cut].to_vec()), "cut".to_owned()) {
@@ -216,7 +216,7 @@ fn a_log_cut_in_its_beginning_is_a_log_or_no_log() {
 }
 
 #[test]
-fn a_chunk_that_fails_its_checksum_is_lost_alone() {
+fn chunk_with_wrong_checksum_loses_only_itself() {
     let (mut bytes, seen, places) = log();
     bytes[places[3] + 9 + 44 + 30] ^= 4;
     let (got, losses) = read(&bytes);
@@ -229,7 +229,7 @@ fn a_chunk_that_fails_its_checksum_is_lost_alone() {
 }
 
 #[test]
-fn a_record_length_that_lies_costs_at_most_its_chunk() {
+fn wrong_record_length_loses_at_most_its_chunk() {
     let (bytes, seen, places) = log();
     for lie in [0, 1, 40, 60, 1000, 1 << 20, 1 << 40, u64::MAX - 8, u64::MAX] {
         let mut bytes = bytes.clone();
@@ -246,11 +246,11 @@ fn a_record_length_that_lies_costs_at_most_its_chunk() {
 }
 
 #[test]
-fn an_overwritten_block_costs_what_it_covers() {
+fn overwritten_block_loses_only_the_chunks_it_touches() {
     let (bytes, seen, places) = log();
     for value in [0, 0xFF, 0x05] {
         let mut bytes = bytes.clone();
-        // From the middle of chunk 1 into chunk 3, as a medium loses a block.
+        // From the middle of chunk 1 into chunk 3, like a block lost by a medium.
         bytes[places[1] + 100..places[3] + 20].fill(value);
         let (got, losses) = read(&bytes);
         let kept = [&seen[..PER_CHUNK], &seen[4 * PER_CHUNK..]].concat();
@@ -270,7 +270,7 @@ fn bytes_between_records_are_skipped() {
 }
 
 #[test]
-fn however_much_is_damaged_the_rest_is_read() {
+fn intact_messages_are_read_despite_thousands_of_losses() {
     let mut log = LogWriter::new(Vec::new(), &header(true)).unwrap();
     for at in 0..3000 {
         log.raw(0, MonoNs(at), MonoNs(at), &noise(at, 30)).unwrap();
@@ -290,7 +290,7 @@ fn however_much_is_damaged_the_rest_is_read() {
 }
 
 #[test]
-fn the_channels_survive_the_loss_of_their_chunk_and_of_the_summary() {
+fn channels_survive_loss_of_their_chunk_and_of_the_summary() {
     let (bytes, seen, places) = log();
     let mut bytes = bytes[..places[CHUNKS - 1]].to_vec();
     let definitions = super::places(&bytes, op::CHUNK)[0];
@@ -321,7 +321,7 @@ fn a_damaged_attachment_is_named() {
 }
 
 #[test]
-fn other_files_are_refused_with_what_they_begin_with() {
+fn other_files_are_refused_with_their_first_bytes() {
     let error = |bytes: &[u8]| {
         LogReader::new(Cursor::new(bytes.to_vec()), "dive.mcap".to_owned()).err().unwrap().to_string()
     };
@@ -334,8 +334,8 @@ fn other_files_are_refused_with_what_they_begin_with() {
     assert!(error(b"#ROSBAG V2.0\n").contains("23 52 4f 53"));
 }
 
-/// Whether each message of `seen` that isn't among `got` lies within the time of a stated loss, or is one of a channel whose
-/// definition is lost.
+/// Asserts that each missing message lies within the time of a stated loss, or belongs to a channel whose definition is
+/// lost.
 fn missing_are_covered(got: &[Seen], seen: &[Seen], losses: &[Loss]) {
     fn key(message: &Seen) -> (u64, u64, u32, &[u8]) {
         (message.1, message.2, message.3, &message.4)
@@ -355,7 +355,7 @@ fn missing_are_covered(got: &[Seen], seen: &[Seen], losses: &[Loss]) {
     }
 }
 
-/// Damage either has no effect or is reported, and never produces a spurious message.
+/// Asserts that a change either has no effect or is reported, and never produces a spurious message.
 fn check_changed(bytes: Vec<u8>, seen: &[Seen], info: &LogInfo) {
     match LogReader::new(Cursor::new(bytes), "changed".to_owned()) {
         Ok(mut reader) => {
@@ -372,7 +372,7 @@ fn check_changed(bytes: Vec<u8>, seen: &[Seen], info: &LogInfo) {
 }
 
 #[test]
-fn a_changed_bit_is_noticed_wherever_it_is() {
+fn changed_bit_is_noticed_at_any_position() {
     let (bytes, seen, places) = log();
     let info = open(&bytes).header().clone();
     for place in 0..bytes.len() {

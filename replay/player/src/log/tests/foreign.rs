@@ -1,4 +1,4 @@
-//! Logs by other writers, with their various options.
+//! Logs written by other programs, with the various write options.
 
 use std::collections::BTreeSet;
 use std::process::Command;
@@ -12,18 +12,18 @@ use super::*;
 
 const TOPICS: [&str; 4] = ["/raw/zeta", "/tf", "/raw/alpha", "/sent/alpha"];
 
-/// Messages in the order in which they are written: neither by time nor by channel. Topic, log time, sequence.
+/// Messages in the order of writing, which is neither by time nor by channel: topic, log time, sequence.
 fn messages() -> Vec<(usize, u64, u32)> {
     let mut messages = Vec::new();
     for n in 0..400_u32 {
         let topic = usize::try_from(n * 7 % 4).unwrap();
-        // Goes back by up to 30 messages, and times repeat.
+        // Times go back by up to 30 messages, and repeat.
         messages.push((topic, 1000 + u64::from((n - n * 13 % 31 % (n + 1)) / 2), n));
     }
     messages
 }
 
-/// The order expected of a reader: by time, then raw by name, then the others by topic, then sequence.
+/// The expected reading order: by time, then raw by name, then the others by topic, then sequence.
 fn wanted() -> Vec<(String, u64, u32)> {
     let kinds = [("raw 1", 1), ("other", 3), ("raw 0", 0), ("sent 0", 2)];
     let mut wanted: Vec<_> =
@@ -80,7 +80,7 @@ fn all_options() -> Vec<(String, WriteOptions)> {
 }
 
 #[test]
-fn every_way_to_write_is_read_in_the_same_order() {
+fn all_write_options_give_the_same_reading_order() {
     for (name, options) in all_options() {
         assert_eq!(check(&write(options), &name), [], "{name}");
     }
@@ -90,7 +90,7 @@ fn every_way_to_write_is_read_in_the_same_order() {
 fn logs_that_were_never_finished_are_read() {
     for (name, options) in all_options() {
         let bytes = write(options);
-        // Without the closing records, of which the data end record is the first.
+        // Cut off before the closing records, the first of which is the data end record.
         let end = places(&bytes, op::DATA_END)[0];
         let losses = check(&bytes[..end], &name);
         assert_eq!((losses.len(), &losses[0].kind), (1, &LossKind::Truncated), "{name}");
@@ -98,7 +98,7 @@ fn logs_that_were_never_finished_are_read() {
 }
 
 #[test]
-fn a_chunk_that_its_writer_never_closed_gives_what_is_in_it() {
+fn unclosed_chunk_delivers_its_messages() {
     for compression in [None, Some(Compression::Lz4), Some(Compression::Zstd)] {
         let mut file = Cursor::new(Vec::new());
         let mut writer =
@@ -108,7 +108,7 @@ fn a_chunk_that_its_writer_never_closed_gives_what_is_in_it() {
             let header = MessageHeader { channel_id, sequence: 0, log_time: n, publish_time: n };
             writer.write_to_known_channel(&header, &(n * n * 0x9E37_79B9).to_le_bytes()).unwrap();
         }
-        // Not dropped, since that would finish the file.
+        // Not dropped, since dropping would finish the file.
         std::mem::forget(writer);
         let mut reader = open(file.get_ref());
         let seen = read_all(&mut reader);
@@ -120,7 +120,7 @@ fn a_chunk_that_its_writer_never_closed_gives_what_is_in_it() {
 }
 
 #[test]
-fn logs_cut_anywhere_give_messages_of_before_the_cut_and_say_so() {
+fn cut_logs_deliver_earlier_messages_and_report_the_cut() {
     for (name, options) in all_options() {
         let bytes = write(options);
         let whole: BTreeSet<_> = read(&bytes).0.into_iter().map(|message| message.4).collect();
@@ -133,7 +133,7 @@ fn logs_cut_anywhere_give_messages_of_before_the_cut_and_say_so() {
 }
 
 #[test]
-fn a_copy_of_our_log_with_other_channel_numbers_is_read() {
+fn renumbered_copy_of_an_own_log_is_read() {
     let mut log = LogWriter::new(Vec::new(), &header(true)).unwrap();
     for at in 0..30_u16 {
         let (source, at) = (at % 3, MonoNs(at.into()));
@@ -175,14 +175,14 @@ fn a_changed_byte_outside_chunks_is_noticed() {
 }
 
 #[test]
-fn a_message_length_that_lies_costs_that_message_and_perhaps_the_one_before() {
+fn wrong_message_length_loses_at_most_two_messages() {
     let bytes = write(WriteOptions::new().use_chunks(false));
     let at = places(&bytes, op::MESSAGE)[200];
     for lie in [0, 21, 22, 25, 100, 1 << 30, u64::MAX] {
         let mut bytes = bytes.clone();
         bytes[at + 1..at + 9].copy_from_slice(&u64::to_le_bytes(lie));
         let (seen, losses) = read(&bytes);
-        // Where nothing looks like a record, the length of the previous message may as well be wrong.
+        // If nothing looks like a record, the previous message's length may be the wrong one.
         let lost = if (22..1000).contains(&lie) { 1 } else { 2 };
         assert_eq!(seen.len(), 400 - lost, "length {lie}");
         assert_eq!((losses.len(), &losses[0].kind), (1, &LossKind::Framing), "length {lie}: {losses:?}");
@@ -191,7 +191,7 @@ fn a_message_length_that_lies_costs_that_message_and_perhaps_the_one_before() {
 }
 
 #[test]
-fn regress_what_is_missing_up_to_the_closing_bytes_is_noticed() {
+fn loss_up_to_the_closing_bytes_is_noticed() {
     let chunked = WriteOptions::new().chunk_size(Some(200)).compression(None);
     for (options, opcode) in [(chunked, op::CHUNK), (WriteOptions::new().use_chunks(false), op::MESSAGE)] {
         let whole = write(options);
@@ -204,7 +204,7 @@ fn regress_what_is_missing_up_to_the_closing_bytes_is_noticed() {
 }
 
 #[test]
-fn regress_a_message_that_passes_for_a_footer_is_noticed() {
+fn message_that_looks_like_a_footer_is_noticed() {
     let mut log = write(WriteOptions::new().use_chunks(false));
     let message = places(&log, op::MESSAGE)[7];
     log[message] = op::FOOTER;
@@ -214,7 +214,7 @@ fn regress_a_message_that_passes_for_a_footer_is_noticed() {
 }
 
 #[test]
-fn regress_whole_records_that_are_missing_are_noticed() {
+fn missing_whole_records_are_noticed() {
     let options = || WriteOptions::new().chunk_size(Some(200)).compression(None);
     let whole = write(options());
     let chunks = places(&whole, op::CHUNK);
@@ -244,7 +244,7 @@ fn messages_of_an_undefined_channel_are_counted() {
 }
 
 #[test]
-fn chunks_that_lie_about_their_times_give_late_messages() {
+fn chunks_with_wrong_times_give_late_messages() {
     let mut bytes = write(WriteOptions::new().compression(None).chunk_size(Some(200)));
     for (number, at) in places(&bytes, op::CHUNK).into_iter().enumerate() {
         let later = (1_000_000 * (number as u64 + 1)).to_le_bytes();
@@ -259,8 +259,9 @@ fn chunks_that_lie_about_their_times_give_late_messages() {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(200))]
 
-    /// Without checksums changes may go unnoticed, and another record may become a message by its opcode; but nothing
-    /// panics, and nothing is read twice.
+    /// Asserts that reading changed logs without checksums never panics and reads nothing twice.
+    ///
+    /// Changes may go unnoticed, and another record may become a message by its opcode.
     #[test]
     fn changed_logs_are_read_to_an_end(
         way in 0..14_usize,
@@ -333,7 +334,7 @@ fn with_attachment(name: &str) -> (Vec<u8>, usize) {
 }
 
 #[test]
-fn an_attachment_that_cannot_be_read_is_missing_and_said_so() {
+fn unreadable_attachment_is_missing_and_reported() {
     let (whole, at) = with_attachment("notes.txt");
     assert_eq!(read(&whole).1, vec![]);
     // Opcode and length, two times, name and media type with their lengths; then the length of the data.

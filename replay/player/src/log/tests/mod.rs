@@ -93,7 +93,7 @@ fn record_after(bytes: &[u8], at: usize) -> usize {
 /// Positions of the records with that opcode, in a log or a part of one.
 fn places(bytes: &[u8], opcode: u8) -> Vec<usize> {
     let (mut at, mut places) = (8, Vec::new());
-    // The rest at the end is the closing magic bytes, or less than a record.
+    // Less than a record remains at the end: the closing magic bytes, or part of a record.
     while at + 9 <= bytes.len() - 8 {
         places.extend((bytes[at] == opcode).then_some(at));
         at = record_after(bytes, at);

@@ -1,4 +1,4 @@
-//! Logs from which whole records were removed, repeated or moved: each record is valid, and the loss is reported all the same.
+//! Logs with whole records removed, repeated or moved: each record is valid, and the loss is still reported.
 
 use mcap::records::op;
 
@@ -11,7 +11,7 @@ const PER_CHUNK: u64 = 10;
 /// An opcode that MCAP leaves to other programs.
 const PRIVATE: u8 = 0x80;
 
-/// A log of chunks, with messages numbered as those of a recording's third part where it is one.
+/// A log of chunks. As a part, its messages are numbered like those of a recording's third part.
 fn log(ticks: bool, is_part: bool) -> Vec<u8> {
     let mut header = header(ticks);
     if is_part {
@@ -57,7 +57,7 @@ fn joined(records: &[Vec<u8>]) -> Vec<u8> {
     [mcap::MAGIC, &records.concat(), mcap::MAGIC].concat()
 }
 
-/// The records with a footer that says that there is no summary, which is left out.
+/// The records without the summary, and with a footer that says that there is none.
 fn without_summary(mut records: Vec<Vec<u8>>) -> Vec<Vec<u8>> {
     let data_end = records.iter().position(|record| record[0] == op::DATA_END).unwrap();
     records.truncate(data_end);
@@ -73,7 +73,7 @@ fn replace(record: &mut [u8]) {
     record[9..].copy_from_slice(&body);
 }
 
-/// Places of the chunks with messages among the records.
+/// Indexes of the chunks with messages among the records.
 fn chunks(records: &[Vec<u8>]) -> Vec<usize> {
     let all = (0..records.len()).filter(|place| records[*place][0] == op::CHUNK);
     let chunks: Vec<usize> = all.skip(1).collect();
@@ -81,14 +81,14 @@ fn chunks(records: &[Vec<u8>]) -> Vec<usize> {
     chunks
 }
 
-/// Kinds of the losses, and their texts, which say what is missing.
+/// Kinds and texts of the losses; the texts state the missing messages.
 fn losses(bytes: &[u8]) -> (Vec<LossKind>, Vec<String>) {
     let (_, losses) = read(bytes);
     let texts = losses.iter().map(ToString::to_string).collect();
     (losses.into_iter().map(|loss| loss.kind).collect(), texts)
 }
 
-/// Messages that are said to be missing.
+/// Number of messages reported missing.
 fn missing(kinds: &[LossKind]) -> u64 {
     let missing = kinds.iter().filter_map(|kind| match kind {
         LossKind::Missing { messages } => Some(*messages),
@@ -97,7 +97,7 @@ fn missing(kinds: &[LossKind]) -> u64 {
     missing.sum()
 }
 
-/// Calls with the records of logs with and without ticks, alone and as a part.
+/// Calls `check` with the records of logs with and without ticks, alone and as a part.
 fn each(mut check: impl FnMut(&str, Vec<Vec<u8>>)) {
     for (ticks, is_part) in [(true, false), (false, false), (true, true), (false, true)] {
         check(&format!("ticks {ticks}, part {is_part}"), records(&log(ticks, is_part)));
@@ -123,14 +123,15 @@ fn chunk_replaced_by_a_private_record_is_missing() {
 }
 
 #[test]
-fn removed_chunk_of_a_log_without_summary_is_missing_where_it_was() {
+fn removed_chunk_without_summary_is_reported_at_its_place() {
     each(|what, records| {
         let places = chunks(&records);
         for (number, chunk) in places.iter().enumerate() {
             let mut records = without_summary(records.clone());
             records.remove(*chunk);
             let (kinds, texts) = losses(&joined(&records));
-            // A log that isn't a part doesn't say how many messages it has: the last of a channel are missing unnoticed.
+            // A log that isn't a part doesn't state its number of messages, so missing last messages of a channel go
+            // unnoticed.
             let wanted = match number {
                 _ if what.contains("part true") => PER_CHUNK,
                 4 => PER_CHUNK - 1,
@@ -177,7 +178,7 @@ fn swapped_chunks_are_reported_as_out_of_order() {
     });
 }
 
-/// Closed again after the cut, with and without the summary of what is left.
+/// The log is closed again after the cut, with and without the summary of the remaining records.
 #[test]
 fn tail_cut_off_at_the_end_of_a_record_is_reported() {
     each(|what, records| {
@@ -190,9 +191,9 @@ fn tail_cut_off_at_the_end_of_a_record_is_reported() {
     });
 }
 
-/// A statistics record counts the messages of the whole log.
+/// The statistics record counts the messages of the whole log.
 #[test]
-fn summary_of_a_log_with_a_cut_tail_tells_how_many_messages_are_missing() {
+fn summary_gives_the_number_of_messages_missing_from_a_cut_tail() {
     each(|what, records| {
         let last = *chunks(&records).last().unwrap();
         let mut records = records;
@@ -211,7 +212,7 @@ fn part_without_its_end_record_is_reported() {
     assert_eq!(kinds, [LossKind::Metadata("headrace.part.end".to_owned())], "{texts:?}");
 }
 
-/// One cause, one loss.
+/// One cause gives one loss.
 #[test]
 fn messages_of_a_damaged_chunk_are_not_reported_twice() {
     each(|what, records| {
@@ -226,7 +227,7 @@ fn messages_of_a_damaged_chunk_are_not_reported_twice() {
 }
 
 #[test]
-fn losses_after_a_return_to_a_place_are_those_of_a_log_read_through() {
+fn losses_after_going_back_equal_those_of_a_straight_read() {
     each(|what, records| {
         let mut records = without_summary(records);
         let places = chunks(&records);

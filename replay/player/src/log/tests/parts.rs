@@ -71,7 +71,7 @@ fn losses(files: &[PathBuf]) -> Vec<String> {
 }
 
 #[test]
-fn parts_hold_what_one_file_does() {
+fn parts_hold_the_same_messages_as_a_single_file() {
     let whole = Folder::new("whole");
     let single = whole.0.join("dive.mcap");
     let written = record(&single, None);
@@ -86,7 +86,7 @@ fn parts_hold_what_one_file_does() {
         let paths: Vec<PathBuf> = summary.parts.iter().map(|part| part.path.clone()).collect();
         assert_eq!(paths, (1..=parts).map(|number| folder.part(number)).collect::<Vec<_>>(), "{name}");
         assert_eq!(folder.files(), paths);
-        // By the recording's name, and in any order.
+        // By the name of the recording, and in any order.
         assert_eq!(files_of(&[folder.0.join("dive.mcap")]).unwrap(), paths);
         let backwards: Vec<PathBuf> = paths.iter().rev().cloned().collect();
         for files in [&paths, &backwards] {
@@ -97,13 +97,13 @@ fn parts_hold_what_one_file_does() {
             assert_eq!(counts, summary.parts.iter().map(|part| part.raw_messages).collect::<Vec<_>>());
         }
         if let Every::Bytes(bytes) = every {
-            // Half a second of it is 4 kB.
+            // Half a second of the recording takes 4 kB.
             let len = |path: &PathBuf| std::fs::metadata(path).unwrap().len();
             let ended = &paths[..paths.len() - 1];
             assert!(ended.iter().all(|path| (bytes..bytes + 10_000).contains(&len(path))));
         }
         for path in &paths {
-            // Each is a complete log, and no tick is split.
+            // Each part is a complete log, and no tick is split.
             let (seen, losses) = read(&std::fs::read(path).unwrap());
             assert_eq!((seen[0].0.as_str(), losses), ("raw 0", vec![]));
             let info = LogReader::open(path).unwrap();
@@ -114,7 +114,7 @@ fn parts_hold_what_one_file_does() {
 }
 
 #[test]
-fn a_part_that_is_missing_or_not_the_one_recorded_is_named() {
+fn missing_or_exchanged_part_is_named() {
     let folder = Folder::new("missing");
     record(&folder.0.join("dive.mcap"), Some(&rotation(Every::Span(DurNs::from_millis(10_000)))));
     let files = folder.files();
@@ -137,7 +137,7 @@ fn a_part_that_is_missing_or_not_the_one_recorded_is_named() {
     );
     assert_eq!(said(&[4]), ["parts 1 to 3 of the recording are missing (before 31.000 s)"]);
 
-    // Another log in its place, with the same part number.
+    // Another log with the same part number replaces it.
     let other = Folder::new("unlike");
     let mut header = LogReader::open(&files[1]).unwrap().header().clone();
     let part = header.part.take().unwrap();
@@ -156,7 +156,7 @@ fn a_part_that_is_missing_or_not_the_one_recorded_is_named() {
 }
 
 #[test]
-fn parts_of_two_recordings_and_one_twice_are_refused() {
+fn mixed_recordings_and_duplicate_parts_are_refused() {
     let (one, other) = (Folder::new("one"), Folder::new("other"));
     let every = Every::Span(DurNs::from_millis(10_000));
     record(&one.0.join("dive.mcap"), Some(&rotation(every)));
@@ -172,17 +172,17 @@ fn parts_of_two_recordings_and_one_twice_are_refused() {
     let simulated = other.0.join("simulated.mcap");
     LogWriter::create(&simulated, &header(false)).unwrap().finish().unwrap();
     assert!(matches!(open(&[one.part(1), simulated]), LogError::NotAPart { .. }));
-    // Nor does a recording overwrite another's parts.
+    // A recording doesn't overwrite another's parts.
     let again = Recorder::create(&one.0.join("dive.mcap"), &header(true), &rotation(every), 0, None);
     assert!(matches!(again.err().unwrap(), LogError::Create { path, .. } if path == one.part(1)));
 }
 
 #[test]
-fn damaged_parts_cost_what_is_damaged_and_become_one_log_again() {
+fn damaged_parts_lose_only_damaged_messages_and_recover_to_one_log() {
     let folder = Folder::new("damaged");
     record(&folder.0.join("dive.mcap"), Some(&rotation(Every::Span(DurNs::from_millis(10_000)))));
     let whole = all(&mut DiveLog::open(&folder.files()).unwrap());
-    // Last parts after a power cut: one isn't ended, and the next is still empty.
+    // After a power cut one part has no end, and the next is still empty.
     let third = std::fs::read(folder.part(3)).unwrap();
     std::fs::write(folder.part(3), &third[..third.len() * 2 / 3]).unwrap();
     std::fs::write(folder.part(4), []).unwrap();
@@ -204,9 +204,9 @@ fn damaged_parts_cost_what_is_damaged_and_become_one_log_again() {
 }
 
 #[test]
-fn a_name_that_is_taken_is_passed_over() {
+fn existing_part_name_is_skipped() {
     let folder = Folder::new("refused");
-    // A folder, created after the start of the recording, blocks the path of the second part.
+    // A folder created after the start of the recording blocks the path of the second part.
     let (mut port, handle) = Recorder::create(
         &folder.0.join("dive.mcap"),
         &header(true),

@@ -1,4 +1,4 @@
-//! Resuming from an earlier position of a damaged log gives the messages and losses of a log read straight through.
+//! Resuming at an earlier position of a damaged log gives the messages and losses of a straight read.
 
 use mcap::WriteOptions;
 use mcap::records::{MessageHeader, op};
@@ -9,7 +9,7 @@ use super::*;
 
 const MESSAGES: u64 = 120;
 
-/// A log of ours, in the order of its ticks.
+/// A log of this program, in the order of its ticks.
 fn by_ticks() -> Vec<u8> {
     let mut log = LogWriter::new(Vec::new(), &header(true)).unwrap();
     for number in 0..MESSAGES {
@@ -101,9 +101,9 @@ proptest! {
     }
 }
 
-/// Two adjacent chunks, the first with wrong times and damaged: the time span of each loss depends on the other chunk.
+/// Two adjacent chunks, the first damaged and with wrong times: the time span of each loss depends on the other chunk.
 #[test]
-fn times_of_damaged_chunks_are_as_they_were() {
+fn loss_times_of_damaged_chunks_are_unchanged_after_going_back() {
     for (whole, changed) in [(by_ticks(), 2), (by_times(), 4)] {
         let chunks = places(&whole, op::CHUNK);
         let mut bytes = whole;

@@ -28,7 +28,7 @@ impl Write for SlowMedium {
     }
 
     fn flush(&mut self) -> std::io::Result<()> {
-        // The receiver may be gone.
+        // Ignored: the receiver may be gone.
         self.done.try_send(self.bytes.clone()).ok();
         Ok(())
     }
@@ -40,7 +40,7 @@ fn slow(millis: u64) -> (SlowMedium, mpsc::Receiver<Vec<u8>>) {
 }
 
 #[test]
-fn a_loop_that_respects_the_queue_loses_nothing_to_a_slow_medium() {
+fn slow_medium_loses_nothing_if_the_loop_waits_for_the_queue() {
     let (medium, flushed) = slow(1);
     let (mut port, handle) = Recorder::start(medium, &header(true), 0).unwrap();
     let mut held_back = 0;
@@ -68,7 +68,7 @@ fn a_loop_that_respects_the_queue_loses_nothing_to_a_slow_medium() {
     }
 }
 
-/// A medium whose flushes wait until they are let go, one by one; all of them once nobody holds them back.
+/// A medium whose flushes wait until they are released one by one, or all once the sender is gone.
 struct Held(mpsc::Receiver<()>);
 
 impl Write for Held {
@@ -82,7 +82,8 @@ impl Write for Held {
     }
 }
 
-/// From the first tick to the last, as long as no sync has returned; nothing, once one has that began after the last tick.
+/// Unsynced time runs from the first to the last tick until a sync returns, and is zero after a sync that began after
+/// the last tick.
 #[test]
 fn unsynced_time_runs_from_last_sync_to_last_tick() {
     let (go, held) = mpsc::channel();
@@ -108,7 +109,7 @@ fn unsynced_time_runs_from_last_sync_to_last_tick() {
     assert_eq!(handle.finish().unwrap().messages, 7);
 }
 
-/// Seconds of work for a slow medium: a dive on ports waits for 0.6 s of it, another as long as it makes progress.
+/// Seconds of work for a slow medium: a dive on ports waits 0.6 s in total, any other while there is progress.
 #[test]
 fn live_recording_ends_in_time_on_a_slow_medium() {
     for in_time in [true, false] {
@@ -129,7 +130,7 @@ fn live_recording_ends_in_time_on_a_slow_medium() {
 }
 
 #[test]
-fn what_is_older_than_a_second_reads_without_an_end() {
+fn messages_older_than_a_second_are_readable_without_an_end() {
     let (medium, flushed) = slow(0);
     let (mut port, handle) = Recorder::start(medium, &header(true), 0).unwrap();
     let header_only = flushed.recv_timeout(Duration::from_secs(1)).unwrap();
@@ -147,7 +148,7 @@ fn what_is_older_than_a_second_reads_without_an_end() {
 }
 
 #[test]
-fn a_full_queue_takes_nothing_of_an_entry() {
+fn full_queue_accepts_no_part_of_an_entry() {
     let (medium, _flushed) = slow(0);
     let (mut port, handle) = Recorder::start(medium, &header(true), 0).unwrap();
     let capacity = port.capacity_bytes();
@@ -278,7 +279,7 @@ fn within(
 }
 
 #[test]
-fn a_disk_that_fills_keeps_what_is_small_and_says_what_it_left_out() {
+fn filling_disk_keeps_small_messages_and_states_omissions() {
     let (medium, flushed) = slow(0);
     let mut header = header(true);
     header.results.push(ResultChannel {
@@ -286,7 +287,7 @@ fn a_disk_that_fills_keeps_what_is_small_and_says_what_it_left_out() {
         follows_echoes: true,
         ..ResultChannel::default()
     });
-    // A velocity log's lines are as long as echoes, but aren't echoes.
+    // Lines of a velocity log are as long as echoes, but aren't echoes.
     header.sonars = vec![0];
     let (mut port, handle) = within(Some(5_000_000), medium, &header, None);
     for tick in 1..=100_u64 {
@@ -319,11 +320,11 @@ fn a_disk_that_fills_keeps_what_is_small_and_says_what_it_left_out() {
 }
 
 #[test]
-fn what_there_was_no_room_for_is_counted() {
+fn messages_without_room_are_counted() {
     let (medium, _flushed) = slow(0);
     let (mut port, handle) = Recorder::start(medium, &header(true), 0).unwrap();
     let sent = handle.line_port();
-    // Faster than any thread empties it: the queue holds 2,048.
+    // Faster than any thread can empty the queue, which holds 2,048.
     for number in 0..1_000_000_u64 {
         sent.sent(1, MonoNs(number), b"poll");
         if sent.sent_dropped() > 0 {
@@ -337,7 +338,7 @@ fn what_there_was_no_room_for_is_counted() {
     assert_eq!((summary.sent_dropped, summary.results_missing), (dropped, 1));
 }
 
-/// Steps at the times given, with packets dropped before each; what the log then says of drops.
+/// Runs steps at the given times, with packets dropped before each; returns the log's statements of drops.
 fn drops_stated(drops: &[(Duration, u16, u64)]) -> Vec<String> {
     let (medium, flushed) = slow(0);
     let storage = Box::new(Within(None, Some(medium)));
@@ -357,7 +358,7 @@ fn drops_stated(drops: &[(Duration, u16, u64)]) -> Vec<String> {
 }
 
 #[test]
-fn what_lines_drop_is_stated_by_source_every_few_seconds() {
+fn packets_dropped_by_lines_are_stated_by_source_every_few_seconds() {
     let s = Duration::from_secs;
     let words = |packets: u64, id: &str, from: u64, to: u64| {
         format!(
@@ -378,9 +379,9 @@ fn what_lines_drop_is_stated_by_source_every_few_seconds() {
     );
 }
 
-/// No count is lost where the recorder takes none for a while, though whose the packets were isn't known of all.
+/// No count is lost while the recorder takes none, although the source of some packets is then unknown.
 #[test]
-fn drops_for_which_there_is_no_room_are_counted() {
+fn drops_without_room_are_counted() {
     let (medium, flushed) = slow(0);
     let (mut port, handle) = Recorder::start(medium, &header(true), 0).unwrap();
     port.tick(1, MonoNs(1), &[]).unwrap();
@@ -412,7 +413,7 @@ impl DerivedChannels for Echoing {
 }
 
 #[test]
-fn what_a_companion_makes_follows_its_result_and_goes_first_when_the_disk_fills() {
+fn derived_messages_follow_their_result_and_are_dropped_first_on_a_filling_disk() {
     for (free, kept) in [(None, 3), (Some(5_000_000), 0)] {
         let (medium, flushed) = slow(0);
         let mut header = header(true);
@@ -435,8 +436,8 @@ fn what_a_companion_makes_follows_its_result_and_goes_first_when_the_disk_fills(
 }
 
 #[test]
-fn a_medium_that_does_not_answer_keeps_nobody_from_the_end() {
-    /// Takes the header, and then waits until the test is over.
+fn blocked_medium_does_not_prevent_the_end() {
+    /// A medium that accepts the header and then blocks until the test is over.
     struct Hanging(usize, mpsc::Receiver<()>);
 
     impl Write for Hanging {
@@ -462,7 +463,7 @@ fn a_medium_that_does_not_answer_keeps_nobody_from_the_end() {
 }
 
 #[test]
-fn ticks_that_were_skipped_are_stated() {
+fn skipped_ticks_are_stated() {
     let (medium, flushed) = slow(0);
     let (mut port, handle) = Recorder::start(medium, &header(true), 0).unwrap();
     let second = |seconds: u64| MonoNs(seconds * 1_000_000_000);

@@ -12,7 +12,7 @@ fn recovered(bytes: &[u8]) -> (Vec<u8>, Recovered) {
     (output, done)
 }
 
-/// Five chunks of two seconds, a message a tenth of a second.
+/// Five chunks of two seconds, with ten messages per second.
 fn log(ticks: bool) -> Vec<u8> {
     let mut log = LogWriter::new(Vec::new(), &header(ticks)).unwrap();
     for number in 0..100_u64 {
@@ -30,13 +30,13 @@ fn log(ticks: bool) -> Vec<u8> {
     log.finish().unwrap().0
 }
 
-/// Messages without their numbers, which restart.
+/// The messages without their numbers, which restart.
 fn unnumbered(seen: Vec<Seen>) -> Vec<Seen> {
     seen.into_iter().map(|message| (message.0, message.1, message.2, 0, message.4)).collect()
 }
 
 #[test]
-fn a_whole_log_is_recovered_whole() {
+fn intact_log_is_recovered_completely() {
     for ticks in [true, false] {
         let bytes = log(ticks);
         let (output, done) = recovered(&bytes);
@@ -72,14 +72,14 @@ fn a_damaged_log_is_recovered_with_its_losses() {
         "{text:?}"
     );
     assert!(text.iter().all(|text| !text.starts_with("byte ")), "{text:?}");
-    // Recovering again gives the same.
+    // Recovering a second time gives the same log.
     let (again, done) = recovered(&output);
     assert_eq!(done.losses.iter().map(ToString::to_string).collect::<Vec<_>>(), text);
     assert_eq!(read(&again).0, read(&output).0);
 }
 
 #[test]
-fn a_lost_vehicle_file_is_not_made_up() {
+fn lost_vehicle_file_is_not_replaced() {
     let mut bytes = log(true);
     let at = bytes.windows(6).position(|window| window == b"target").unwrap();
     bytes[at] = b'T';
@@ -91,7 +91,7 @@ fn a_lost_vehicle_file_is_not_made_up() {
 }
 
 #[test]
-fn every_cut_recovers_to_what_it_reads() {
+fn log_cut_anywhere_recovers_all_readable_messages() {
     let bytes = log(true);
     let places = places(&bytes, op::CHUNK);
     for cut in (places[1]..bytes.len()).step_by(7) {

@@ -6,7 +6,7 @@ use super::super::format::{Tick, seal};
 use super::super::{LogError, LogReader, LogWriter, LossKind, file_digest};
 use super::*;
 
-/// Ticks that consume packets out of time order, with results and sent bytes between.
+/// Writes ticks that consume packets out of time order, with results and sent bytes between.
 fn write<W: Write>(log: &mut LogWriter<W>, rounds: u32) -> Vec<Seen> {
     let mut written = Vec::new();
     for number in 0..rounds {
@@ -50,7 +50,7 @@ fn a_log_with_ticks_is_read_as_it_was_written() {
 }
 
 #[test]
-fn the_header_comes_back() {
+fn written_header_is_read_back() {
     let written = header(true);
     let (bytes, _) = LogWriter::new(Vec::new(), &written).unwrap().finish().unwrap();
     let reader = open(&bytes);
@@ -101,7 +101,7 @@ fn chunks_close_by_size() {
 }
 
 #[test]
-fn what_the_header_does_not_have_is_refused() {
+fn messages_for_undeclared_channels_are_refused() {
     let mut log = LogWriter::new(Vec::new(), &header(true)).unwrap();
     assert!(matches!(log.raw(3, MonoNs(0), MonoNs(0), &[]), Err(LogError::NoChannel { .. })));
     assert!(matches!(log.result(1, MonoNs(0), &[]), Err(LogError::NoChannel { .. })));
@@ -111,7 +111,7 @@ fn what_the_header_does_not_have_is_refused() {
 }
 
 #[test]
-fn a_file_is_opened_by_its_path_and_digested() {
+fn file_is_opened_by_path_and_digested() {
     let path = std::env::temp_dir().join(format!("headrace-round-trip-{}.mcap", std::process::id()));
     let mut log = LogWriter::create(&path, &header(true)).unwrap();
     write(&mut log, 10);
@@ -146,7 +146,7 @@ fn a_later_format_is_refused() {
 }
 
 #[test]
-fn a_writer_that_is_dropped_ends_no_log() {
+fn dropped_writer_leaves_the_log_without_an_end() {
     let mut bytes = Vec::new();
     let mut log = LogWriter::new(&mut bytes, &header(true)).unwrap();
     log.raw(0, MonoNs(1), MonoNs(1), b"one").unwrap();

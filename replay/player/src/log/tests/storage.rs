@@ -1,5 +1,6 @@
-//! Every operation of the storage fails in turn, once or for a while: nothing is lost without a word, nothing twice, and no
-//! log that was cut off looks whole.
+//! Every storage operation fails in turn, once or for a while.
+//!
+//! No loss is unreported, no message is written twice, and no cut-off log looks complete.
 
 #![expect(
     clippy::disallowed_types,
@@ -21,7 +22,7 @@ use super::super::{
 use super::parts::{Folder, all};
 use super::*;
 
-/// What is done to the storage.
+/// An operation on the storage.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Op {
     Create,
@@ -30,10 +31,10 @@ enum Op {
     Remove,
 }
 
-/// Which operations fail, by kind and number.
+/// Decides by kind and number which operations fail.
 type Plan = Box<dyn FnMut(Op, u64) -> Option<io::Error> + Send>;
 
-/// A file, and how much of it is certain to be there after a power cut.
+/// A file, and how many of its bytes survive a power cut.
 #[derive(Debug, Clone, Default)]
 struct Content {
     bytes: Vec<u8>,
@@ -44,7 +45,7 @@ struct World {
     files: BTreeMap<PathBuf, Content>,
     ops: u64,
     plan: Plan,
-    /// Whether what a failed sync was to save is gone.
+    /// Whether a failed sync also loses the data it should have saved.
     forgets: bool,
 }
 
@@ -71,7 +72,7 @@ impl Faulty {
         act(&mut self.0.lock().unwrap())
     }
 
-    /// Puts the files into a folder, with what a power cut leaves of them or all.
+    /// Writes the files into a folder: only synced bytes after a power cut, otherwise all.
     fn store(&self, cut: bool) {
         self.with(|world| {
             for (path, content) in &world.files {
@@ -111,7 +112,7 @@ impl StoredFile for FaultyFile {
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
         self.0.with(|world| {
             let done = world.attempt(Op::Write);
-            // A write that fails may have done some of its work.
+            // A failing write may have done part of its work.
             let len = if done.is_err() { bytes.len() / 2 } else { bytes.len().min(3000) };
             world.files.get_mut(&self.1).unwrap().bytes.extend_from_slice(&bytes[..len]);
             done.map(|()| len)
@@ -139,7 +140,7 @@ fn rotation(every: Option<Every>) -> Rotation {
     Rotation { every, dive: "one".to_owned() }
 }
 
-/// A dive of six seconds, a step each tenth of one.
+/// Records a dive of six seconds with ten steps per second.
 fn dive(folder: &Folder, storage: &Faulty, every: Option<Every>) -> (Summary, Vec<RecordingEvent>) {
     let path = folder.0.join("dive.mcap");
     let begun =
@@ -169,7 +170,7 @@ fn eio() -> io::Error {
     io::Error::from_raw_os_error(5)
 }
 
-/// What a dive without faults gives, and its operations; the first ones make the header.
+/// Result of a dive without faults, and its number of operations. The first operations write the header.
 fn without_faults(name: &str, every: Option<Every>) -> (Vec<Seen>, u64) {
     let folder = Folder::new(name);
     let storage = Faulty::new(|_, _| None);
@@ -181,7 +182,7 @@ fn without_faults(name: &str, every: Option<Every>) -> (Vec<Seen>, u64) {
     (seen, storage.with(|world| world.ops))
 }
 
-/// Operations before the first message: the first part is created, and its header written and synced.
+/// Number of operations before the first message: creating the first part, and writing and syncing its header.
 fn header_ops() -> u64 {
     let folder = Folder::new("header");
     let storage = Faulty::new(|_, _| None);
@@ -191,7 +192,7 @@ fn header_ops() -> u64 {
 }
 
 #[test]
-fn an_operation_that_fails_once_costs_nothing_and_is_told() {
+fn operation_failing_once_loses_nothing_and_is_stated() {
     for (name, every) in [("once", None), ("once in parts", Some(Every::Span(DurNs::from_millis(2000))))] {
         let (expected, ops) = without_faults(name, every);
         for (at, forgets) in (header_ops()..ops).flat_map(|at| [(at, false), (at, true)]) {
@@ -204,14 +205,14 @@ fn an_operation_that_fails_once_costs_nothing_and_is_told() {
             let which = format!("{name}, operation {at} of {ops}, {forgets}: {:?}", summary.faults);
             assert_eq!(seen, expected, "{which}");
             assert_eq!(summary.messages, 4 * TICKS, "{which}");
-            // Another part that can't be begun costs the rotation alone.
+            // If the next part can't be begun, only the rotation fails.
             let Some(fault) = summary.faults.first() else {
                 assert!(every.is_some() && losses.is_empty(), "{which}: {losses:?}");
                 continue;
             };
             assert_eq!((summary.faults.len(), fault.lost), (1, 0), "{which}");
             assert!(fault.error.contains("Input/output error"), "{which}");
-            // An end that isn't certain is whole if it is there nevertheless: everything before it is certain.
+            // The summary may be complete although its sync failed; everything before it is synced.
             if fault.error.contains("the summary") {
                 continue;
             }
@@ -222,7 +223,7 @@ fn an_operation_that_fails_once_costs_nothing_and_is_told() {
             // The failed part has no end, whatever else it has.
             let (_, alone) = read(&std::fs::read(&fault.path).unwrap());
             let is_cut = |loss: &Loss| matches!(loss.kind, LossKind::Truncated | LossKind::Framing);
-            // One of which nothing was certain was removed, and is there anew.
+            // A part without synced content was removed and created anew.
             let is_anew = fault.continued.as_ref() == Some(&fault.path);
             assert!(is_anew || alone.iter().any(is_cut), "{which}: {alone:?}");
             if let [RecordingEvent::Failed { .. }, RecordingEvent::Resumed(resumed)] = events.as_slice() {
@@ -233,7 +234,7 @@ fn an_operation_that_fails_once_costs_nothing_and_is_told() {
 }
 
 #[test]
-fn a_medium_that_is_gone_for_a_while_costs_nothing_and_for_good_what_comes_after() {
+fn medium_failing_briefly_loses_nothing_and_permanently_only_later_messages() {
     let (expected, ops) = without_faults("while", None);
     for from in header_ops()..ops {
         for lasts in [2, 5, u64::MAX] {
@@ -245,11 +246,11 @@ fn a_medium_that_is_gone_for_a_while_costs_nothing_and_for_good_what_comes_after
             let which = format!("{lasts} from operation {from} on: {:?}", summary.faults);
             let lost: u64 = summary.faults.iter().map(|fault| fault.lost).sum();
             assert_eq!(summary.messages + lost, 4 * TICKS, "{which}");
-            // What isn't certain may nevertheless be there.
+            // Unsynced messages may still be present.
             assert!(expected.starts_with(&seen) && seen.len() as u64 >= summary.messages, "{which}");
             let is_end = summary.faults.iter().all(|fault| fault.error.contains("the summary"));
             assert!(!summary.faults.is_empty() && (is_end || !losses.is_empty()), "{which}");
-            // The first part stays also where nothing else can be made.
+            // The first part remains even if nothing else can be created.
             assert!(folder.0.join("dive.mcap").exists());
             if lasts < u64::MAX && from < ops / 2 {
                 assert_eq!((lost, seen.len()), (0, expected.len()), "{which}: {events:?}");
@@ -259,7 +260,7 @@ fn a_medium_that_is_gone_for_a_while_costs_nothing_and_for_good_what_comes_after
 }
 
 #[test]
-fn what_there_is_no_memory_for_is_lost_oldest_first_and_counted() {
+fn backlog_overflow_loses_and_counts_the_oldest_messages() {
     let folder = Folder::new("long");
     let path = folder.0.join("dive.mcap");
     let failing = Arc::new(std::sync::atomic::AtomicBool::new(false));
@@ -282,7 +283,7 @@ fn what_there_is_no_memory_for_is_lost_oldest_first_and_counted() {
     storage.store(false);
     let (seen, losses) = read_back(&folder);
     assert_eq!(seen.len() as u64, summary.messages);
-    // One gap, and the loss is told with its ends.
+    // There is one gap, and the loss is stated with its two ends.
     let times: Vec<u64> = seen.iter().map(|message| message.1).collect();
     let gaps: Vec<_> = times.windows(2).filter(|pair| pair[1] - pair[0] > 100_000_000).collect();
     let stated = losses.iter().find(
@@ -294,7 +295,7 @@ fn what_there_is_no_memory_for_is_lost_oldest_first_and_counted() {
 }
 
 #[test]
-fn a_power_cut_leaves_all_that_was_synced_also_after_an_error() {
+fn synced_messages_survive_a_power_cut_after_an_error() {
     let (expected, ops) = without_faults("cut", None);
     for at in (header_ops()..ops).step_by(2) {
         let folder = Folder::new("cut");
@@ -314,13 +315,13 @@ fn a_power_cut_leaves_all_that_was_synced_also_after_an_error() {
         storage.store(true);
         let (seen, losses) = read_back(&folder);
         assert!(expected.starts_with(&seen), "operation {at}");
-        // Half a second between syncs, and a step in which it is tried again.
+        // Half a second between syncs, and one step for the retry.
         assert!(seen.len() as u64 >= 4 * (TICKS / 2 - 7), "operation {at}: {}", seen.len());
         assert!(!losses.is_empty(), "operation {at}");
     }
 }
 
-/// Seconds of a dive that a kill costs where each sync takes so long: 20 ms make a tick and 20 packets.
+/// Seconds of a dive that a kill loses if each sync takes `sync`. Each 20 ms bring a tick and 20 packets.
 fn lost_s(sync: Duration) -> f64 {
     const TICK: Duration = Duration::from_millis(20);
     let folder = Folder::new("slow syncs");
@@ -360,7 +361,7 @@ fn lost_s(sync: Duration) -> f64 {
 }
 
 #[test]
-fn slow_syncs_cost_no_more_than_a_second_and_a_sync() {
+fn kill_loses_at_most_a_second_and_a_sync() {
     for sync_s in [0.001, 0.01, 0.1, 0.25, 0.5, 0.7, 1.0, 2.0, 5.0] {
         let lost = lost_s(Duration::from_secs_f64(sync_s));
         assert!(lost <= 1.0 + sync_s, "{lost} s are lost where a sync takes {sync_s} s");
@@ -368,7 +369,7 @@ fn slow_syncs_cost_no_more_than_a_second_and_a_sync() {
 }
 
 #[test]
-fn a_recording_with_a_fault_is_recovered_as_one_log_that_tells_it() {
+fn recording_with_a_fault_recovers_to_one_log_that_states_it() {
     let folder = Folder::new("recovered");
     let mut syncs = 0;
     let storage = Faulty::new(move |op, _| {
@@ -386,7 +387,7 @@ fn a_recording_with_a_fault_is_recovered_as_one_log_that_tells_it() {
     assert_eq!((recovered.len() as u64, losses.len()), (4 * TICKS, 1));
     let told = losses[0].to_string();
     assert!(told.contains(&summary.faults[0].words()), "{told}");
-    // Its first part alone lacks the rest, and is no whole dive.
+    // The first part alone misses the rest and isn't a whole dive.
     let first = recover(&mut || DiveLog::open(&files[..1]), &mut Vec::new(), &[], "first").unwrap();
     assert!(first.messages < 4 * TICKS);
     assert!(first.losses.iter().any(|loss| loss.kind == LossKind::Truncated), "{:?}", first.losses);

@@ -1,4 +1,4 @@
-//! Voices beside a dive: they cost nothing else anything.
+//! Voice recordings in a dive's log don't affect anything else.
 
 #![expect(clippy::disallowed_types, reason = "a test's storage is asked about once a step")]
 
@@ -14,11 +14,11 @@ use super::super::voice::{NotKept, VoicePort, decode};
 use super::super::{Recorder, RecorderPort, RecorderWorker, Rotation, Storage, StoredFile};
 use super::*;
 
-/// Files of at most so many bytes; what goes beyond fails.
+/// Storage whose files hold a limited number of bytes; further writes fail.
 #[derive(Clone, Default)]
 struct Small(Arc<Mutex<Files>>);
 
-/// Most bytes of each, and their contents.
+/// Maximum number of bytes of each file, and the files' contents.
 type Files = (usize, BTreeMap<PathBuf, Vec<u8>>);
 
 struct SmallFile(Small, PathBuf);
@@ -86,7 +86,7 @@ fn dive(storage: &Small) -> Dive {
 }
 
 impl Dive {
-    /// So many ticks of a tenth of a second, with a packet each.
+    /// Records `ticks` ticks of a tenth of a second, each with one packet.
     fn go_on(&mut self, ticks: u64) {
         for tick in self.3..self.3 + ticks {
             let at = MonoNs((tick + 10) * 100_000_000);
@@ -98,7 +98,7 @@ impl Dive {
     }
 }
 
-/// Packets, each once: what wasn't certain in a part is repeated in the next.
+/// Number of distinct packets. The next part repeats packets that weren't synced in the previous one.
 fn packets(seen: &[Seen]) -> usize {
     let of_head = seen.iter().filter(|message| message.0 == "raw 0");
     of_head.map(|message| message.3).collect::<BTreeSet<_>>().len()
@@ -110,7 +110,7 @@ fn voices(seen: &[Seen]) -> Vec<Voice> {
 }
 
 #[test]
-fn a_voice_is_stamped_as_what_was_recorded_before_it() {
+fn voice_gets_the_log_time_of_the_previous_message() {
     let storage = Small::of(usize::MAX);
     let mut dive = dive(&storage);
     dive.2.keep(&voice(1, 5000)).unwrap();
@@ -134,7 +134,7 @@ fn a_voice_is_stamped_as_what_was_recorded_before_it() {
 }
 
 #[test]
-fn while_nothing_can_be_recorded_a_voice_is_refused() {
+fn voice_is_refused_while_recording_fails() {
     let storage = Small::of(usize::MAX);
     let mut dive = dive(&storage);
     dive.go_on(5);
@@ -150,7 +150,7 @@ fn while_nothing_can_be_recorded_a_voice_is_refused() {
 }
 
 #[test]
-fn those_that_wait_are_few() {
+fn waiting_voices_are_limited() {
     let storage = Small::of(usize::MAX);
     let mut dive = dive(&storage);
     dive.go_on(1);
@@ -160,9 +160,9 @@ fn those_that_wait_are_few() {
     assert_eq!(voices(&storage.read()).len(), 8);
 }
 
-/// A disk with room for packets and not for a voice.
+/// The disk has room for packets but not for a voice recording.
 #[test]
-fn a_voice_for_which_there_is_no_room_is_given_up_and_the_dive_goes_on() {
+fn voice_without_room_is_dropped_and_the_dive_continues() {
     let storage = Small::of(60_000);
     let mut dive = dive(&storage);
     dive.go_on(10);

@@ -2,14 +2,13 @@
 
 use headrace_geometry::math;
 
-/// Strengths over bins of equal width, centred on its multiples.
+/// Strengths over bins of equal width, centred on multiples of the width.
 ///
-/// This is our reading of "we use bilinear interpolation of range values of the 881L sensor to determine where the tunnel
-/// surface is": the head's picture is a grid of angle and range; an echo between grid points is shared linearly
-/// among its neighbours, in angle (beam strength, which falls off linearly from the axis) as in range; and the surface
-/// is the ridge of the picture. Where the beam is oblique to the wall its echo is long, and the ridge wide and low, as
-/// the paper found next to the corners.
-/// Source: Jorge et al. 2021, §9.2.
+/// This interprets "we use bilinear interpolation of range values of the 881L sensor to determine where the tunnel
+/// surface is". The head's picture is a grid of angle and range. An echo between grid points is shared linearly among
+/// its neighbours, in angle (beam strength, which falls off linearly from the axis) and in range. The surface is the
+/// ridge of the picture. If the beam is oblique to the wall, its echo is long and the ridge is wide and low, as the
+/// paper found next to the corners. Source: Jorge et al. 2021, §9.2.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Bins {
     width_m: f64,
@@ -38,8 +37,10 @@ impl Bins {
         self.filled = (self.filled.0.min(below), self.filled.1.max(below + 2));
     }
 
-    /// Range of the strongest echo, m: centroid of the strongest bin (the nearest of equal ones) and its two neighbours.
-    /// Empties the bins; `None` if they are empty.
+    /// Range of the strongest echo, m; empties the bins.
+    ///
+    /// It is the centroid of the strongest bin and its two neighbours; of equal bins the nearest counts. `None` if the
+    /// bins are empty.
     pub(super) fn take_surface_m(&mut self) -> Option<f64> {
         let (from, to) = std::mem::replace(&mut self.filled, (usize::MAX, 0));
         let filled = self.strengths.get_mut(from..to)?;
@@ -64,7 +65,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn one_echo_is_found_where_it_is_and_leaves_the_bins_empty() {
+    fn single_echo_is_found_at_its_range_and_empties_the_bins() {
         let mut bins = Bins::new(0.02);
         for range_m in [3.0, 3.001, 3.009, 3.010, 3.0199, 0.0, 12.5] {
             bins.add(range_m, 0.7);
@@ -74,7 +75,7 @@ mod tests {
     }
 
     #[test]
-    fn the_stronger_of_two_echoes_is_taken_and_near_ones_are_taken_together() {
+    fn stronger_echo_wins_and_near_echoes_merge() {
         let mut bins = Bins::new(0.02);
         bins.add(3.0, 1.0);
         bins.add(4.0, 1.5);

@@ -15,7 +15,7 @@ fn wide_tunnel() -> Environment {
 }
 
 #[test]
-fn verif_a_beam_s_rays_span_fig_15_s_footprint() {
+fn beam_rays_span_the_footprint_of_fig_15() {
     let tunnel = wide_tunnel();
     for (angle_deg, width_deg) in [(0.0, 2.4), (30.0, 2.4), (60.0, 1.4), (60.0, 20.0)] {
         let (angle_rad, width_rad) = (f64::to_radians(angle_deg), f64::to_radians(width_deg));
@@ -30,7 +30,7 @@ fn verif_a_beam_s_rays_span_fig_15_s_footprint() {
 }
 
 #[test]
-fn the_first_return_of_an_oblique_beam_is_that_of_its_nearer_edge() {
+fn first_return_of_oblique_beam_is_from_its_nearer_edge() {
     let tunnel = wide_tunnel();
     let half_rad = f64::to_radians(0.7);
     for angle_deg in [0.0, 0.5, 20.0, 60.0] {
@@ -48,7 +48,7 @@ fn the_first_return_of_an_oblique_beam_is_that_of_its_nearer_edge() {
 }
 
 #[test]
-fn the_mean_is_that_over_the_cone_s_disc() {
+fn mean_range_is_averaged_over_the_disc_of_the_cone() {
     let tunnel = wide_tunnel();
     let (half_rad, ray) = (f64::to_radians(10.0), down(0.0, 3.0));
     let mean_m = {
@@ -56,7 +56,7 @@ fn the_mean_is_that_over_the_cone_s_disc() {
         let ranges_m = cone.hits(&tunnel, &ray, 100.0).flatten().map(|hit| hit.range_m);
         mean(ranges_m).unwrap()
     };
-    // Rays even in the square of their angle x from the axis: the mean of h / cos x.
+    // Rays spread evenly by the square of their angle x from the axis: the mean of h / cos x.
     let count = 10_000;
     let ring = |k: i32| 3.0 / math::cos(half_rad * math::sqrt((f64::from(k) + 0.5) / f64::from(count)));
     let whole_m = (0..count).map(ring).sum::<f64>() / f64::from(count);
@@ -64,7 +64,7 @@ fn the_mean_is_that_over_the_cone_s_disc() {
 }
 
 #[test]
-fn one_ray_is_the_base_s_ray_bit_for_bit() {
+fn single_ray_equals_the_base_ray_bit_for_bit() {
     let dive = Dive::with_head();
     let base = dive.dive("");
     for effects in ["[effects.beam_cone]\nrays = 1", "[effects.beam_cone]\nrays = 1\nform = \"mean\""] {
@@ -73,7 +73,7 @@ fn one_ray_is_the_base_s_ray_bit_for_bit() {
 }
 
 #[test]
-fn truth_stays_the_middle_s_and_square_ranges_stay_true() {
+fn truth_stays_on_the_axis_and_perpendicular_ranges_stay_true() {
     let dive = Dive::with_head();
     let (base, first, bilinear) = (
         dive.dive(""),
@@ -85,7 +85,7 @@ fn truth_stays_the_middle_s_and_square_ranges_stay_true() {
         let range_m = |row: &crate::truth::TruthRow| row.sounding.unwrap().measured.range_m.unwrap();
         assert!(base.wall() == first.wall() && base.wall() == bilinear.wall());
         assert!(range_m(first) <= range_m(base) + 1e-12);
-        // Half a degree more or less on a wall at most 45 degrees off square: within 3 % of the range.
+        // Half a degree either way, on a wall at most 45 degrees off perpendicular, stays within 3 % of the range.
         assert!((range_m(bilinear) - range_m(base)).abs() < 0.03 * range_m(base));
         if range_m(base) < 2.501 {
             assert!((range_m(bilinear) - range_m(base)).abs() < 0.002, "{}", range_m(bilinear));
@@ -94,7 +94,7 @@ fn truth_stays_the_middle_s_and_square_ranges_stay_true() {
 }
 
 #[test]
-fn a_small_thing_on_the_wall_is_first_but_not_strongest() {
+fn small_object_on_the_wall_is_first_but_not_strongest() {
     let mut bins = Bins::new(0.02);
     let cone = Cone::new(f64::to_radians(1.4), 64);
     for (number, part) in cone.rays.iter().enumerate() {
@@ -104,19 +104,19 @@ fn a_small_thing_on_the_wall_is_first_but_not_strongest() {
 }
 
 #[test]
-fn width_goes_with_frequency() {
+fn beam_width_follows_frequency() {
     for (khz, deg) in [(600.0, 2.4), (800.0, 1.9), (1000.0, 1.4)] {
         assert!((width_at_deg(khz) - deg).abs() < 1e-12);
     }
 }
 
 #[test]
-fn slices_dont_matter() {
+fn slice_length_does_not_change_results() {
     Dive::with_head().assert_slices_dont_matter("[effects.beam_cone]\nform = \"bilinear\"\nrays = 8");
 }
 
 #[test]
-fn what_makes_no_beam_is_refused() {
+fn impossible_beams_are_refused() {
     let refusal = |keys: &str| Dive::with_head().refusal(&format!("[effects.beam_cone]\n{keys}"));
     assert!(refusal("rays = 1025").contains("must be a whole number from 1 to 1024"));
     assert!(refusal("width_deg = 2\nfrequency_khz = 700").contains("both say how wide"));

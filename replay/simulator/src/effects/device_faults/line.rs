@@ -1,4 +1,4 @@
-//! What broken devices put on their lines.
+//! Messages of broken devices.
 
 use bevy_ecs::prelude::{Component, Query};
 use headrace_geometry::math;
@@ -8,13 +8,13 @@ use super::span::Span;
 use crate::random::Stream;
 use crate::sensing::Line;
 
-/// Says nothing, or random bytes.
+/// Sends nothing, or random bytes.
 #[derive(Component)]
 pub(super) struct BrokenLine {
     span: Span,
-    /// Of the random bytes.
+    /// Source of the random bytes.
     stream: Option<Stream>,
-    /// Bytes said so far that were random.
+    /// Number of random bytes so far.
     said: u64,
 }
 

@@ -1,8 +1,8 @@
-//! When a device is broken.
+//! The time span of a device fault.
 
 use headrace_geometry::time::MonoNs;
 
-/// From a time to another, which is excluded.
+/// From a start time to an end time, which is excluded.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Span {
     pub(super) from: MonoNs,

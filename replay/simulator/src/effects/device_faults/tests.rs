@@ -25,7 +25,7 @@ fn both<M: headrace_sensor::measurement::Measurement>(sensor: &str, fault: &str)
 }
 
 #[test]
-fn what_sticks_says_its_last_value_until_it_is_whole() {
+fn stuck_device_repeats_its_last_value_until_repaired() {
     let mut last = f64::NAN;
     for (plain, broken) in both::<Payout>("tether", "kind = \"stick\"") {
         let wanted_m = if breaks(plain.at) { last } else { plain.chainage_m };
@@ -47,7 +47,7 @@ fn what_sticks_says_its_last_value_until_it_is_whole() {
 }
 
 #[test]
-fn what_jumps_is_off_by_its_size() {
+fn jump_shifts_values_by_its_size() {
     #[track_caller]
     fn off(at: MonoNs, [plain, broken]: [f64; 2], size: f64) {
         let wanted = if breaks(at) { size } else { 0.0 };
@@ -58,7 +58,7 @@ fn what_jumps_is_off_by_its_size() {
     }
     let mut seen = 0;
     for (plain, broken) in both::<Sounding>("ping", "kind = \"jump\"\nsize = 0.7") {
-        // It looks along the tunnel, and sees a wall where the vehicle is turned.
+        // The head looks along the tunnel and sees a wall only when the vehicle is turned.
         if let (Some(plain_m), Some(broken_m)) = (plain.range_m, broken.range_m) {
             off(plain.at, [plain_m, broken_m], 0.7);
             seen += usize::from(breaks(plain.at));
@@ -78,7 +78,7 @@ fn what_jumps_is_off_by_its_size() {
     }
 }
 
-/// Messages of one line: those that aren't of the sensor are in both.
+/// Messages of one line without and with the fault; messages of other sensors are in both.
 fn lines(sensor: &str, fault: &str) -> [Vec<OnLine>; 2] {
     [String::new(), keys(sensor, fault)].map(|effects| {
         let messages = Bench::turning(&effects).messages().into_iter();
@@ -87,7 +87,7 @@ fn lines(sensor: &str, fault: &str) -> [Vec<OnLine>; 2] {
 }
 
 #[test]
-fn what_dies_says_nothing_until_it_returns() {
+fn dead_device_sends_nothing_until_it_returns() {
     for sensor in ["head_a", "ping", "depth", "imu", "tether"] {
         let [plain, broken] = lines(sensor, "kind = \"die\"");
         let missing: Vec<&OnLine> = plain.iter().filter(|message| !broken.contains(message)).collect();
@@ -98,7 +98,7 @@ fn what_dies_says_nothing_until_it_returns() {
 }
 
 #[test]
-fn what_babbles_says_as_many_bytes_as_ever() {
+fn babbling_device_sends_as_many_bytes_as_before() {
     let [plain, broken] = lines("depth", "kind = \"babble\"");
     assert_eq!(plain.len(), broken.len());
     let mut garbled = Vec::new();
@@ -116,7 +116,7 @@ fn what_babbles_says_as_many_bytes_as_ever() {
 }
 
 #[test]
-fn slices_make_no_difference() {
+fn slice_length_does_not_change_results() {
     for fault in ["kind = \"stick\"", "kind = \"jump\"\nsize = 1", "kind = \"die\"", "kind = \"babble\""] {
         for sensor in ["head_a", "ping", "depth", "imu", "tether"] {
             same_in_any_slices(&Bench::turning(&keys(sensor, fault)));
@@ -125,7 +125,7 @@ fn slices_make_no_difference() {
 }
 
 #[test]
-fn a_fault_says_what_it_is() {
+fn invalid_faults_are_refused_with_their_key() {
     assert!(refusal("[effects.device_faults]\n").contains("kind"));
     assert!(refusal("[effects.device_faults]\nkind = \"jump\"\n").contains("size"));
     assert!(refusal("[effects.device_faults]\nkind = \"die\"\nsize = 1\n").contains("\"jump\" only"));

@@ -1,4 +1,4 @@
-//! What broken devices measure.
+//! Measurements of broken devices.
 
 use bevy_ecs::prelude::{Component, Query, Res};
 use headrace_geometry::frames::Rot;
@@ -7,7 +7,7 @@ use headrace_sensor::measurement::{GroundVelocity, Inertia, Measurement, Payout,
 use super::span::Span;
 use crate::sensing::{Echosounder, Samples, Scenery};
 
-/// Goes on saying its last value.
+/// Repeats the last value.
 #[derive(Component)]
 pub(super) struct Stuck<M: Measurement> {
     span: Span,
@@ -20,9 +20,9 @@ impl<M: Measurement> Stuck<M> {
     }
 }
 
-/// A measurement whose value can be another's.
+/// A measurement whose value can be replaced by another's.
 pub(super) trait Sticking: Measurement {
-    /// The same with the value of `other`; time and a head's angles stay.
+    /// The measurement with the value of `other`, but its own time and head angles.
     #[must_use]
     fn valued(self, other: &Self) -> Self;
 }
@@ -57,7 +57,7 @@ impl Sticking for Payout {
     }
 }
 
-/// The last value before the span is held; a device that is stuck from the first on holds the first.
+/// Holds the last value before the span. A device that is stuck from the beginning holds its first value.
 pub(super) fn stick<M: Sticking>(mut devices: Query<'_, '_, (&mut Samples<M>, &mut Stuck<M>)>) {
     for (mut samples, mut stuck) in &mut devices {
         for measured in &mut samples.list {
@@ -71,7 +71,7 @@ pub(super) fn stick<M: Sticking>(mut devices: Query<'_, '_, (&mut Samples<M>, &m
     }
 }
 
-/// Says what is off by a size.
+/// Adds a constant error to values.
 #[derive(Component)]
 pub(super) struct Jumped {
     pub(super) size: f64,

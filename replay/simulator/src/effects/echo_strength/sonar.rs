@@ -2,17 +2,21 @@
 
 use headrace_geometry::math;
 
-/// Range at which a wall of rough rock, perpendicular to the beam, is heard with a mean as loud as what is just detected, m, and
-/// the frequency, absorption and pulse for which that is so: the head's largest range setting when profiling, with the
-/// settings that DUNE gives it there. No source states the head's source level, noise or threshold.
+/// Reference range at which the mean echo of rough rock, perpendicular to the beam, is just detected, m.
 ///
-/// Source: the 881L's data sheet and switch command (range settings to 100 m; 675 kHz and 0.2 dB/m above 5 m; 540 us at 100 m).
+/// It holds for the frequency, absorption and pulse below. It is the head's largest range setting when profiling, with
+/// the settings that DUNE uses there. No source states the head's source level, noise or threshold.
+///
+/// Source: the 881L's data sheet and switch command (range settings to 100 m; 675 kHz and 0.2 dB/m above 5 m; 540 us at
+/// 100 m).
 const HEARD_M: f64 = 100.0;
 const HEARD_AT_KHZ: f64 = 675.0;
 const HEARD_DBPM: f64 = 0.2;
 const HEARD_PULSE_S: f64 = 540e-6;
-/// By how much the echo of such a wall at 1 m is above the threshold at a gain of 20 dB, dB. An assumption: the maker states
-/// no threshold. With its usual gains a wall is then above the threshold as far as the absorption set is the water's.
+/// Excess of such a wall's echo at 1 m over the threshold at a gain of 20 dB, dB.
+///
+/// This is an assumption, since the maker states no threshold. With the usual gains, a wall is then above the threshold
+/// as long as the absorption setting matches the water's.
 const ABOVE_THRESHOLD_DB: f64 = 20.0;
 const USUAL_GAIN_DB: f64 = 20.0;
 /// Density of silt over that of water: quartz.
@@ -31,11 +35,11 @@ pub(crate) struct Sonar {
     pub(crate) pulse_s: f64,
     /// Speed of sound, m/s.
     pub(crate) sound_mps: f64,
-    /// What the water absorbs, one way, dB/m.
+    /// Absorption by the water, one way, dB/m.
     pub(crate) absorbed_dbpm: f64,
-    /// Backscatter of the wall against rough rock, dB.
+    /// Backscatter of the wall relative to rough rock, dB.
     pub(crate) wall_db: f64,
-    /// Gain at 1 m, dB; gain for ten times the range, dB; absorption that the gain makes up for, one way, dB/m.
+    /// Gain at 1 m, dB; gain for ten times the range, dB; and absorption for which the gain compensates, one way, dB/m.
     pub(crate) gain_db: f64,
     pub(crate) log_gain_db: f64,
     pub(crate) made_up_dbpm: f64,
@@ -51,7 +55,7 @@ pub(crate) struct Silt {
 }
 
 impl Sonar {
-    /// Probability that an echo is detected from a wall at `range_m`, the cosine of incidence being `square`.
+    /// Probability that an echo from a wall at `range_m` is detected; `square` is the cosine of incidence.
     pub(crate) fn detected(&self, range_m: f64, square: f64) -> f64 {
         let echo_db = self.echo_db(range_m.max(0.01), square);
         let noise_db = 10.0 * log10(HEARD_PULSE_S / self.pulse_s);
@@ -65,9 +69,9 @@ impl Sonar {
         math::exp(-1.0 / mean)
     }
 
-    /// Mean power of an echo, dB, against a square metre of rough rock facing the beam at 1 m.
+    /// Mean power of an echo, dB, relative to a square metre of rough rock facing the beam at 1 m.
     fn echo_db(&self, range_m: f64, square: f64) -> f64 {
-        // Lambert's law: both what falls on the wall and what comes back go with the cosine.
+        // Lambert's law: both the incident and the returned sound are proportional to the cosine.
         let scattered_db = self.wall_db + 20.0 * log10(square.max(1e-6));
         10.0 * log10(self.insonified_m2(range_m, square))
             - 40.0 * log10(range_m)
@@ -75,7 +79,8 @@ impl Sonar {
             + scattered_db
     }
 
-    /// Area of the wall whose echo arrives at one time: all within the beam, or where that is longer than the pulse, a strip.
+    /// Area of wall whose echo arrives at one time: the whole beam footprint, or a strip if the footprint is longer
+    /// than the pulse.
     fn insonified_m2(&self, range_m: f64, square: f64) -> f64 {
         let wide_m = self.beam_rad * range_m;
         let within_beam_m2 = core::f64::consts::FRAC_PI_4 * wide_m * wide_m / square.max(1e-6);
@@ -85,7 +90,7 @@ impl Sonar {
     }
 }
 
-/// The power at which an echo at [`HEARD_M`] is just detected, dB as of [`Sonar::echo_db`].
+/// The power at which an echo at [`HEARD_M`] is just detected, dB as in [`Sonar::echo_db`].
 fn heard_db() -> f64 {
     let wide_m = f64::to_radians(2.4 - (HEARD_AT_KHZ - 600.0) / 400.0) * HEARD_M;
     10.0 * log10(core::f64::consts::FRAC_PI_4 * wide_m * wide_m)
@@ -100,7 +105,7 @@ pub(crate) fn frequency_of_khz(beam_rad: f64) -> f64 {
     (600.0 + (2.4 - beam_rad.to_degrees()) * 400.0).clamp(600.0, 1000.0)
 }
 
-/// Absorption that the head is told to make up for, dB/m: at 1 MHz, and at 675 kHz.
+/// Absorption for which the head is set to compensate, dB/m: at 1 MHz, and at 675 kHz.
 ///
 /// Source: the switch command as DUNE's driver sets it; the edge is halfway.
 pub(super) fn usual_absorption_dbpm(frequency_khz: f64) -> f64 {
@@ -137,7 +142,7 @@ pub(crate) fn water_absorption_dbpm(frequency_khz: f64, t_degc: f64) -> f64 {
 }
 
 impl Silt {
-    /// Absorption of sound by the grains, one way, dB/m: friction of the water about them, and scattering.
+    /// Absorption of sound by the grains, one way, dB/m: friction of the water around them, and scattering.
     ///
     /// Source: Urick 1948, J. Acoust. Soc. Am. 20, 283.
     pub(crate) fn absorption_dbpm(&self, frequency_khz: f64, sound_mps: f64) -> f64 {
@@ -150,7 +155,7 @@ impl Silt {
         let denser = GRAIN_DENSITY - 1.0;
         let friction = k * denser * denser * s / (s * s + (GRAIN_DENSITY + tau) * (GRAIN_DENSITY + tau));
         let scattering = k * k * k * k * self.grain_m * self.grain_m * self.grain_m / 3.0;
-        // Both are of the power; a neper is of the amplitude.
+        // Both terms concern power; a neper concerns amplitude.
         volume * (friction + scattering) / 2.0 * DB_PER_NEPER
     }
 }

@@ -11,9 +11,10 @@ fn square(x: f64) -> f64 {
     x * x
 }
 
-/// Pinkerton 1949, Proc. Phys. Soc. B 62, 129: absorption of pure water over the frequency squared, 1e-15 s^2/m in nepers.
+/// Pinkerton 1949, Proc. Phys. Soc. B 62, 129: absorption of pure water divided by the frequency squared, 1e-15 s^2/m
+/// in nepers.
 #[test]
-fn water_absorbs_what_was_measured() {
+fn water_absorption_matches_measurements() {
     for (t_degc, measured) in [(0.0, 56.9), (10.0, 36.1), (20.0, 25.3), (30.0, 19.1)] {
         let measured_dbpm = measured * 1e-15 * 1e12 * 20.0 / core::f64::consts::LN_10;
         let off = water_absorption_dbpm(1000.0, t_degc) / measured_dbpm - 1.0;
@@ -22,15 +23,17 @@ fn water_absorbs_what_was_measured() {
     assert!((water_absorption_dbpm(1000.0, 10.0) / water_absorption_dbpm(500.0, 10.0) - 4.0).abs() < 1e-12);
 }
 
-/// Against the motion of a grain in swinging water, step by step with the drag on a sphere that swings (Landau and Lifshitz,
-/// "Fluid mechanics", §24, problem 5): what the drag takes out of the sound.
+/// Compares with the motion of a grain in oscillating water, integrated step by step.
+///
+/// The drag is that on an oscillating sphere (Landau and Lifshitz, "Fluid mechanics", §24, problem 5). Its work is
+/// taken from the sound.
 #[test]
-fn silt_absorbs_the_work_of_friction_about_its_grains() {
+fn silt_absorption_matches_friction_at_its_grains() {
     let (sound_mps, viscosity) = (1447.0, 1.307e-6);
     for (frequency_khz, grain_m) in [(675.0, 2e-6), (1000.0, 5e-6), (1000.0, 20e-6)] {
         let omega = math::TAU * frequency_khz * 1000.0;
         let depth_m = math::sqrt(2.0 * viscosity / omega);
-        // For a unit of displaced mass: drag = resistance * (u - v) + added * d(u - v)/dt, and Archimedes' du/dt.
+        // Per unit of displaced mass: drag = resistance * (u - v) + added * d(u - v)/dt, and Archimedes' du/dt.
         let resistance = 9.0 * viscosity / (2.0 * grain_m * grain_m) * (1.0 + grain_m / depth_m);
         let added = 0.5 * (1.0 + 9.0 * depth_m / (2.0 * grain_m));
         let (steps, turns) = (4000, 60);
@@ -52,7 +55,7 @@ fn silt_absorbs_the_work_of_friction_about_its_grains() {
             v = next;
         }
         let power = work / (5.0 * math::TAU / omega);
-        // Of a sound of velocity 1: power per area is c / 2, each for a unit of the water's density.
+        // For sound of velocity 1, the power per area is c / 2, per unit of the water's density.
         let volume = 1.0 / 2650.0;
         let neper_pm = volume * power / (sound_mps / 2.0) / 2.0;
         let scattering_neper_pm =
@@ -63,9 +66,9 @@ fn silt_absorbs_the_work_of_friction_about_its_grains() {
     }
 }
 
-/// Share that is detected, by range, incidence and silt, against the sonar equation in powers rather than decibels.
+/// Compares the detected share, by range, incidence and silt, with the sonar equation in powers instead of decibels.
 #[test]
-fn echoes_are_detected_as_often_as_the_sonar_equation_says() {
+fn detected_share_matches_the_sonar_equation() {
     let mut dive = Dive { seconds: 1500.0, speed_mps: 0.01, ..Dive::with_head() };
     dive.tunnel = "profile = \"rectangle\"\nwidth_m = 14\nheight_m = 4";
     dive.sensors[0].2 = "mode = \"medium\"\nrange_m = 10\nfrequency_khz = 675".to_owned();
@@ -105,9 +108,9 @@ fn echoes_are_detected_as_often_as_the_sonar_equation_says() {
     }
 }
 
-/// Where no wall is heard at all, parts of the vehicle are.
+/// The vehicle's own parts are detected even if no wall is.
 #[test]
-fn parts_of_the_vehicle_are_always_heard() {
+fn parts_of_the_vehicle_are_always_detected() {
     let hull = "[[hull]]\nleast_m = [-1, -0.3, -1]\nmost_m = [1, 0.3, -0.5]";
     let dive = Dive { vehicle: hull, ..Dive::with_head() };
     let plain = dive.dive("[effects.occlusion]").ranges_m(0);
@@ -122,7 +125,7 @@ fn parts_of_the_vehicle_are_always_heard() {
 }
 
 #[test]
-fn water_of_its_temperature_absorbs() {
+fn absorption_follows_water_temperature() {
     let head = Dive::with_head().scene("").unwrap().facts.sensors[0].head.unwrap();
     for temperature_degc in [4.0, 25.0] {
         let parameters = Parameters {
@@ -142,7 +145,7 @@ fn water_of_its_temperature_absorbs() {
 }
 
 #[test]
-fn with_its_usual_settings_a_head_hears_rock_about_it() {
+fn head_with_usual_settings_detects_surrounding_rock() {
     let dive = Dive { seconds: 200.0, ..Dive::with_head() };
     let ranges = dive.dive("[effects.echo_strength]").ranges_m(0);
     let lost = ranges.iter().filter(|range_m| range_m.is_none()).count();
@@ -150,7 +153,7 @@ fn with_its_usual_settings_a_head_hears_rock_about_it() {
 }
 
 #[test]
-fn slices_dont_matter_and_nonsense_is_refused() {
+fn slice_length_changes_nothing_and_invalid_keys_are_refused() {
     Dive::with_head().assert_slices_dont_matter("[effects.echo_strength]\nwall_db = -20\ngain_db = 0");
     let refusal = |keys: &str| Dive::with_head().refusal(&format!("[effects.echo_strength]\n{keys}"));
     assert!(refusal("frequency_khz = 100").contains("from 600 to 1000"));

@@ -8,9 +8,9 @@ use crate::effects::geometry::{between_rad, dot};
 use crate::environment::Environment;
 use crate::sensing::Ray;
 
-/// Directions that differ by less than this are equal, radians.
+/// Directions that differ by less than this count as equal, radians.
 const SAME_RAD: f64 = 1e-9;
-/// Most pings that are extrapolated.
+/// Maximum number of pings that are extrapolated.
 const MOST_FORESEEN: u32 = 16;
 
 /// A ping: time, origin, direction, and the point where it meets the wall.
@@ -20,7 +20,7 @@ pub(super) struct Ping {
     pub(super) origin: Point3<Tunnel>,
     pub(super) direction: Vec3<Tunnel>,
     pub(super) wall: Option<Point3<Tunnel>>,
-    /// Whether it is extrapolated, with `wall` not computed yet.
+    /// Whether it is extrapolated and its `wall` not yet computed.
     foreseen: bool,
 }
 
@@ -29,7 +29,7 @@ pub(super) struct Ping {
 pub(super) struct Pings(Vec<Ping>);
 
 impl Ping {
-    /// A ping along a ray; one stopped by the vehicle itself reaches no wall.
+    /// A ping along a ray. A ping stopped by the vehicle itself reaches no wall.
     pub(super) fn new(at: MonoNs, ray: &Ray, stopped: bool) -> Self {
         let wall = ray.hit.filter(|_| !stopped).map(|hit| hit.point);
         Self { at, origin: ray.origin, direction: ray.direction, wall, foreseen: false }
@@ -63,7 +63,7 @@ impl Ping {
 }
 
 impl Pings {
-    /// Drops pings more than `rings_s` before `from`; the last two stay for extrapolation.
+    /// Drops pings more than `rings_s` before `from`, but keeps the last two for extrapolation.
     pub(super) fn forget(&mut self, from: MonoNs, rings_s: f64) {
         let old = |ping: &Ping| from.since(ping.at).as_secs_f64() > rings_s;
         let gone = self.0.partition_point(old).min(self.0.len().saturating_sub(2));
@@ -75,8 +75,10 @@ impl Pings {
         self.0.push(ping);
     }
 
-    /// Pings from `earliest_s` to `latest_s` after `at`: up to `at` as simulated, later ones extrapolated, so that the result
-    /// doesn't depend on how far the simulation has run.
+    /// Pings from `earliest_s` to `latest_s` after `at`.
+    ///
+    /// Pings up to `at` are those simulated; later ones are extrapolated, so that the result doesn't depend on how far
+    /// the simulation has run.
     pub(super) fn around(
         &self,
         at: MonoNs,
@@ -89,7 +91,7 @@ impl Pings {
         let last = if let [.., before, last] = made { Some((before, last)) } else { None };
         let later = (1..=MOST_FORESEEN).map_while(move |count| {
             let (before, last) = last.filter(|(before, last)| before.at < last.at)?;
-            // Cheap first: nearly always the next ping comes too late to matter.
+            // Quick exit: the next ping nearly always comes too late to matter.
             let period_s = last.at.since(before.at).as_secs_f64();
             let on_s = after_s(last) + period_s * f64::from(count);
             (on_s <= latest_s).then(|| last.foreseen(before, count))
@@ -110,7 +112,7 @@ mod tests {
     }
 
     #[test]
-    fn pings_to_come_go_on_as_the_last_two() {
+    fn future_pings_continue_the_last_two() {
         let mut pings = Pings::default();
         for k in 0..100 {
             pings.add(ping(20 * k, f64::from(i32::try_from(k).unwrap()) * 0.02));
@@ -129,7 +131,7 @@ mod tests {
     }
 
     #[test]
-    fn old_pings_are_forgotten_but_for_two() {
+    fn old_pings_are_dropped_except_two() {
         let mut pings = Pings((0..10).map(|k| ping(20 * k, 0.0)).collect());
         let from = |ms| MonoNs(1_000_000_000) + DurNs::from_millis(ms);
         pings.forget(from(200), 0.05);

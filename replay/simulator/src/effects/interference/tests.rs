@@ -28,7 +28,7 @@ fn head(dive: &Dive, source: usize) -> HeadSpec {
 }
 
 #[test]
-fn the_way_by_the_wall_and_the_straight_way_take_their_time() {
+fn reflected_and_direct_paths_give_their_apparent_ranges() {
     let dive = pair();
     let spec = head(&dive, 0);
     let other_spec = head(&dive, 1);
@@ -69,7 +69,7 @@ fn the_way_by_the_wall_and_the_straight_way_take_their_time() {
         ear.hear(1, &sounds);
         ear.heard.then_some(ear.within_m[1])
     };
-    // Both look at the middle of the floor, 0.4 m beside either: the same path length for both, heard at once if sent earlier.
+    // Both heads look at the middle of the floor, 0.4 m from either. The paths are equal, and an earlier ping is heard.
     let inwards = math::atan2(0.4, 2.5);
     let way_m = 2.0 * math::hypot(0.4, 2.5);
     assert_eq!(heard(-inwards, inwards, 0.0), None);
@@ -77,7 +77,7 @@ fn the_way_by_the_wall_and_the_straight_way_take_their_time() {
         let expected_m = (way_m - earlier_ms / 1000.0 * SOUND_MPS) / 2.0;
         assert!((heard(-inwards, inwards, -earlier_ms).unwrap() - expected_m).abs() < 1e-6);
     }
-    // Earlier than that, it comes before the own ping, or within its least range.
+    // An even earlier ping arrives before the own ping, or within the least range.
     assert_eq!(heard(-inwards, inwards, -3.4), None);
     // Another point of the wall isn't within the beam.
     assert_eq!(heard(-inwards, inwards + 0.1, -1.0), None);
@@ -89,9 +89,9 @@ fn the_way_by_the_wall_and_the_straight_way_take_their_time() {
     assert_eq!(heard(right - 0.3, left, 0.0), None);
 }
 
-/// Two heads half a turn apart face each other twice a turn; each is heard at half their distance.
+/// Two heads half a turn apart face each other twice per turn, and each hears the other at half their distance.
 #[test]
-fn heads_that_ping_together_hear_each_other_when_they_face() {
+fn synchronous_heads_hear_each_other_when_facing() {
     let dive = pair();
     let spec = head(&dive, 0);
     let half_rad = spec.beam_rad / 2.0 + math::asin(spec.body.radius_m / 0.8);
@@ -116,7 +116,7 @@ fn heads_that_ping_together_hear_each_other_when_they_face() {
 }
 
 #[test]
-fn heads_out_of_step_hear_each_other_by_the_wall_and_through_side_lobes() {
+fn unsynchronised_heads_hear_each_other_by_the_wall_and_through_side_lobes() {
     let dive = Dive { seconds: 100.0, ..out_of_step() };
     let count = |effects: &str| {
         let rows = dive.dive(effects).rows;
@@ -132,7 +132,7 @@ fn heads_out_of_step_hear_each_other_by_the_wall_and_through_side_lobes() {
 }
 
 #[test]
-fn slices_dont_matter_though_pings_ring_on() {
+fn slice_length_does_not_change_results_of_lasting_pings() {
     let mut dive = out_of_step();
     dive.seconds = 12.0;
     dive.assert_slices_dont_matter("[effects.interference]\nshare = 0.5");
@@ -140,7 +140,7 @@ fn slices_dont_matter_though_pings_ring_on() {
 }
 
 #[test]
-fn heads_of_two_frequencies_hear_their_own_only() {
+fn heads_hear_only_their_own_frequency() {
     let mut dive = Dive::with_heads(&[[0.0, 0.4, 0.0], [0.0, -0.4, 0.0], [0.9, 0.4, 0.0], [0.9, -0.4, 0.0]]);
     dive.vehicle = "[water]\nsound_speed_mps = 1500";
     let crossed = "[[effects.interference]]\nsensors = [\"sonar_0\", \"sonar_2\"]\n\
@@ -158,13 +158,13 @@ fn heads_of_two_frequencies_hear_their_own_only() {
 }
 
 #[test]
-fn idealised_heads_in_one_place_hear_nothing_of_each_other() {
+fn idealised_heads_in_one_place_do_not_hear_each_other() {
     let dive = Dive::with_heads(&[[0.0; 3], [0.0; 3]]);
     assert_eq!(dive.dive("").messages, dive.dive("[effects.interference]\nshare = 1").messages);
 }
 
 #[test]
-fn one_head_is_refused() {
+fn single_head_is_refused() {
     assert!(Dive::with_head().refusal("[effects.interference]").contains("has no other to hear"));
     let refusal = |keys: &str| pair().refusal(&format!("[effects.interference]\n{keys}"));
     assert!(refusal("sensors = [\"sonar_1\"]").contains("has no other to hear"));

@@ -51,7 +51,8 @@ fn row(at: u64, values: &[f64]) -> [f64; 9] {
     row
 }
 
-/// Draws of an effect on one sensor don't depend on effects on others, nor do measurements of sensors without any.
+/// The draws of an effect on one sensor, and the measurements of sensors without effects, don't depend on effects on
+/// other sensors.
 #[test]
 fn naming_an_effect_changes_nothing_for_other_sensors() {
     for (sensor, alone) in ALONE.iter().filter(|(sensor, _)| !sensor.is_empty()) {
@@ -66,13 +67,13 @@ fn naming_an_effect_changes_nothing_for_other_sensors() {
 }
 
 #[test]
-fn all_effects_together_are_the_same_in_any_slices() {
+fn all_effects_together_are_independent_of_slice_length() {
     let all: String = ALONE.iter().map(|(_, effect)| *effect).collect();
     same_in_any_slices(&Bench::sectors(&all));
 }
 
 #[test]
-fn effects_are_run_in_the_order_of_kinds_whatever_the_scene() {
+fn effects_run_in_the_order_of_kinds_for_any_scene() {
     let (ahead, back): (String, String) =
         (ALONE.iter().map(|(_, e)| *e).collect(), ALONE.iter().rev().map(|(_, e)| *e).collect());
     assert_eq!(Bench::sectors(&ahead).messages(), Bench::sectors(&back).messages());

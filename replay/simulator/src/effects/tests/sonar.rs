@@ -32,7 +32,7 @@ fn changes(dived: &Dived, effect: u16) -> Vec<Option<(f64, f64)>> {
 }
 
 #[test]
-fn naming_an_effect_changes_no_other_s_draws() {
+fn naming_an_effect_does_not_change_draws_of_others() {
     let dive = pair();
     let outliers = |before: &str, place: u16| {
         let strays = changes(&dive.dive(&format!("{before}[effects.outliers]\nshare = 0.2")), place);
@@ -43,13 +43,13 @@ fn naming_an_effect_changes_no_other_s_draws() {
     for effects in [EFFECTS[0], EFFECTS[2], EFFECTS[3], EFFECTS[4]] {
         assert!(alone == outliers(effects, 1), "{effects}");
     }
-    // Named in the other order, they still run in the fixed order.
+    // Named in the other order, the effects still run in the fixed order.
     let (a, b) = (EFFECTS[8], EFFECTS[7]);
     assert_eq!(dive.dive(&format!("{a}{b}")).messages, dive.dive(&format!("{b}{a}")).messages);
 }
 
 #[test]
-fn another_head_changes_no_draw_of_the_first() {
+fn adding_a_head_does_not_change_draws_of_the_first() {
     let effects = [EFFECTS[2], EFFECTS[3], EFFECTS[5], EFFECTS[6], EFFECTS[8]].concat();
     let bits = |dive: &Dive| {
         let ranges_m = dive.dive(&effects).ranges_m(0);
@@ -61,7 +61,7 @@ fn another_head_changes_no_draw_of_the_first() {
 }
 
 #[test]
-fn all_together_slices_dont_matter() {
+fn all_effects_together_do_not_depend_on_slice_length() {
     pair().assert_slices_dont_matter(&EFFECTS.concat());
 }
 

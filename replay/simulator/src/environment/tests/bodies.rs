@@ -1,4 +1,4 @@
-//! Features: against an independent model of them, against closed forms, and the index against a full search.
+//! Features, compared with an independent model and closed forms; and the index, compared with a full search.
 
 use super::oracle::{Oracle, Shape, ellipsoid, upright};
 use super::*;
@@ -10,12 +10,12 @@ fn feature(kind: &str, keys: &str) -> String {
 }
 
 #[test]
-fn a_boulder_is_an_ellipsoid_that_is_sunk_into_the_floor() {
+fn boulder_is_an_ellipsoid_sunk_into_the_floor() {
     let text = feature("boulder", "chainage_m = 10\nsize_m = [2, 1, 0.8]\nsunk = 0.25");
     let environment = parse(&text, &CERAN.profile());
     let hit = cast(&environment, [10.0, 0.0, 5.0], [0.0, 0.0, -1.0]).unwrap();
     assert!((hit.range_m - (5.0 - 0.6)).abs() < 1e-12 && hit.what == What::Feature(0), "{hit:?}");
-    // At the height of its centre, 0.2 m above the floor, from along the tunnel and from the side.
+    // At the height of its centre, 0.2 m above the floor, seen along the tunnel and from the side.
     let hit = cast(&environment, [5.0, 0.0, 0.2], [1.0, 0.0, 0.0]).unwrap();
     assert!((hit.range_m - 4.0).abs() < 1e-12 && (hit.normal.x() + 1.0).abs() < 1e-12, "{hit:?}");
     let hit = cast(&environment, [10.0, 4.0, 0.2], [0.0, -1.0, 0.0]).unwrap();
@@ -51,12 +51,12 @@ fn a_rock_trap_is_a_ditch_across_the_floor() {
 }
 
 #[test]
-fn a_side_tunnel_is_as_long_as_it_says() {
+fn side_tunnel_has_its_given_length() {
     let keys = "chainage_m = 10\nside = \"left\"\nwidth_m = 3\nheight_m = 2\nsill_m = 1\nlength_m = 30";
     let environment = parse(&feature("side_tunnel", keys), &shapes::rectangle(8.0, 5.0).unwrap());
     let hit = cast(&environment, [10.0, -1.0, 2.0], [0.0, 1.0, 0.0]).unwrap();
     assert!((hit.range_m - 35.0).abs() < 1e-12 && hit.what == What::Feature(0), "{hit:?}");
-    // From inside it back to the opposite wall, and to its own.
+    // From inside it back to the opposite wall, and to its own side wall.
     let back = cast(&environment, [10.5, 30.0, 2.0], [0.0, -1.0, 0.0]).unwrap();
     assert!((back.range_m - 34.0).abs() < 1e-12 && back.what == What::Wall, "{back:?}");
     let side = cast(&environment, [10.5, 30.0, 2.0], [1.0, 0.0, 0.0]).unwrap();
@@ -71,7 +71,7 @@ fn a_side_tunnel_is_as_long_as_it_says() {
 fn a_slanting_side_tunnel_leads_forwards() {
     let keys = "chainage_m = 10\nside = \"right\"\nwidth_m = 3\nheight_m = 2\nlength_m = 10\nangle_deg = 30";
     let environment = parse(&feature("side_tunnel", keys), &shapes::rectangle(8.0, 5.0).unwrap());
-    // Its middle line meets the wall at chainage 10.
+    // Its centre line meets the wall at chainage 10.
     let (sin, cos) = math::sin_cos(math::PI / 6.0);
     let hit = cast(&environment, [10.0 - sin, -4.0 + cos, 1.0], [sin, -cos, 0.0]).unwrap();
     assert!((hit.range_m - 11.0).abs() < 1e-12 && hit.what == What::Feature(0), "{hit:?}");
@@ -132,7 +132,7 @@ fn a_fall_leaves_a_cavity_and_a_heap() {
     assert_eq!(environment.feature_name(2), "");
 }
 
-/// By the quadratic form, from the frame alone.
+/// Membership by the quadratic form, computed from the frame alone.
 fn in_ellipsoid(solid: &Solid, p: V3) -> bool {
     let Solid::Ellipsoid(frame, half) = solid else { panic!("a box") };
     let mut sum = 0.0;
@@ -144,7 +144,7 @@ fn in_ellipsoid(solid: &Solid, p: V3) -> bool {
 }
 
 #[test]
-fn everything_in_a_bend() {
+fn all_features_in_a_bend_match_the_model() {
     let shape = Shape::Rectangle(6.0, 5.0);
     let text = "[[tunnel.axis]]\nlength_m = 10\n[[tunnel.axis]]\nradius_m = 14\nturn_deg = 70\n".to_owned()
         + &feature(
@@ -181,7 +181,7 @@ fn everything_in_a_bend() {
 }
 
 #[test]
-fn the_index_finds_what_a_look_at_all_boulders_finds() {
+fn index_finds_the_same_hits_as_a_full_search() {
     let text = feature("boulders", "from_m = 0\nto_m = 100\ncount = 10000\nsize_m = [0.02, 0.6]\nseed = 11");
     let environment = parse(&text, &CERAN.profile());
     assert_eq!(environment.solids.len(), 10_000);
@@ -207,7 +207,7 @@ fn the_index_finds_what_a_look_at_all_boulders_finds() {
 }
 
 #[test]
-fn a_scatter_is_the_same_each_time_and_keeps_to_its_limits() {
+fn scatter_is_reproducible_and_within_its_limits() {
     let text = |seed: u64| {
         feature(
             "boulders",

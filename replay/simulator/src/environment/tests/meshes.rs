@@ -1,4 +1,4 @@
-//! Meshes as walls and bodies, against the profile, closed forms and one another.
+//! Meshes as walls and bodies, compared with the profile, closed forms and one another.
 
 use std::fmt::Write as _;
 
@@ -64,7 +64,7 @@ fn wall(file: &str) -> Environment {
     with(&table("file = \"t.ply\"\nrole = \"wall\"\nchainage_m = 40"), &[("t.ply", file)]).unwrap()
 }
 
-/// As [`super::cast`], to its end at any distance.
+/// As [`super::cast`], without a distance limit.
 fn cast(environment: &Environment, origin: V3, direction: V3) -> Option<Hit> {
     environment.cast(to_point(origin), to_vec(direction), FARTHEST_M)
 }
@@ -89,7 +89,7 @@ fn place_in(lcg: &mut Lcg, radius_m: f64, x_m: [f64; 2]) -> V3 {
 }
 
 #[test]
-fn a_mesh_of_the_profile_gives_the_ranges_of_the_profile() {
+fn mesh_of_the_profile_gives_equal_ranges() {
     let environment = wall(&tube(RADIUS_M, 10.0, 3, &[]));
     let within_m = RADIUS_M * (1.0 - SAGITTA);
     let mut lcg = Lcg(60);
@@ -123,16 +123,16 @@ fn a_mesh_of_the_profile_gives_the_ranges_of_the_profile() {
     assert!(into > 1_000 && out > 1_000 && through > 300, "{into} {out} {through}");
     let far = environment.cast(to_point([45.0, 0.0, 3.0]), to_vec([0.0, 1.0, 0.0]), 2.9);
     assert!(far.is_none());
-    // Along the axis there is no wall, and outside no water.
+    // Along the axis there is no wall, and outside there is no water.
     assert!(cast(&environment, [20.0, 0.1, 3.0], [1.0, 0.0, 0.0]).is_none());
     assert!(cast(&environment, [45.0, 3.1, 3.0], [0.0, 1.0, 0.0]).is_none());
 }
 
 #[test]
-fn no_ray_gets_out_where_mesh_and_profile_do_not_fit() {
+fn no_ray_escapes_between_mismatched_mesh_and_profile() {
     for (radius_m, seed) in [(4.0, 61), (2.0, 62)] {
         let environment = wall(&tube(radius_m, 10.0, 2, &[]));
-        // Between the polygon's inner circle and its outer one a point may be either.
+        // Between the polygon's inner and outer circles a point may be inside or outside.
         let is_within = |p: V3, share: f64| {
             let radius_m = if (40.0..=50.0).contains(&p[0]) { radius_m * share } else { RADIUS_M };
             math::hypot(p[1], p[2] - RADIUS_M) < radius_m
@@ -166,7 +166,7 @@ fn no_ray_gets_out_where_mesh_and_profile_do_not_fit() {
 }
 
 #[test]
-fn a_ragged_end_is_cut_off_where_the_mesh_is_closed() {
+fn ragged_end_is_cut_to_the_closed_part() {
     // Some faces of the first ring and of the last are missing: it is closed from x = 0.25 to 9.75.
     let ragged = tube(4.0, 10.0, 40, &[0, 1, 2, 50, 51, 39 * SIDES + 7]);
     let environment = wall(&ragged.replace("\n0.0 ", "\n-0.0 "));
@@ -211,7 +211,7 @@ fn a_wall_follows_the_axis_behind_a_bend() {
 }
 
 #[test]
-fn a_box_of_triangles_is_a_box() {
+fn box_of_triangles_equals_a_block() {
     let half = [0.5, 0.4, 0.3];
     let file = cuboid(half);
     let keys = "file = \"box.ply\"\nname = \"car\"\nchainage_m = 20\nacross_m = [0.5, 1.5]\n";
@@ -219,7 +219,7 @@ fn a_box_of_triangles_is_a_box() {
     let hit = cast(&straight, [17.0, 0.4, 1.4], [1.0, 0.0, 0.0]).unwrap();
     assert!((hit.range_m - 2.5).abs() < 1e-12 && (hit.normal.x() + 1.0).abs() < 1e-12, "{hit:?}");
     assert_eq!((hit.what, straight.feature_name(0)), (What::Feature(0), "car"));
-    // From inside a body nothing is hit.
+    // A ray from inside a body hits nothing.
     assert!(cast(&straight, [20.1, 0.5, 1.5], [1.0, 0.0, 0.0]).is_none());
     assert!(!straight.is_water(to_point([20.4, 0.5, 1.5])));
     assert!(straight.is_water(to_point([20.6, 0.5, 1.5])));
@@ -238,7 +238,7 @@ fn a_box_of_triangles_is_a_box() {
         let Some(hit) = hit else { continue };
         let wall_m = cast(&bare, ray.origin, ray.direction).map_or(f64::INFINITY, |hit| hit.range_m);
         let wanted_m = block.meet(&ray).map_or(wall_m, |(t_m, _)| t_m.min(wall_m));
-        // A ray along a side may be on either side of it.
+        // A ray along a side may pass on either side of it.
         assert!((hit.range_m - wanted_m).abs() < 1e-9, "{ray:?} {hit:?} {wanted_m}");
         met += usize::from(hit.what == What::Feature(0));
     }
@@ -246,7 +246,7 @@ fn a_box_of_triangles_is_a_box() {
 }
 
 #[test]
-fn a_body_stands_in_the_way() {
+fn mesh_body_obstructs_rays_and_trajectories() {
     let keys = "file = \"box.ply\"\nchainage_m = 20\nacross_m = [0, 3]";
     let environment = with(&table(keys), &[("box.ply", &cuboid([0.5; 3]))]).unwrap();
     let way = |from: V3, to: V3| environment.first_obstruction(to_point(from), to_point(to));
@@ -267,7 +267,7 @@ fn refused(text: &str, files: &[(&str, &str)], words: &[&str]) {
 }
 
 #[test]
-fn files_that_are_no_mesh_are_refused_with_the_place() {
+fn invalid_mesh_files_are_refused_with_their_location() {
     let good = cuboid([0.5; 3]);
     let keys = table("chainage_m = 20\nfile = \"box.ply\"");
     let place = "s.toml:4: tunnel.features[0].file = \"box.ply\": ";
@@ -296,7 +296,7 @@ fn files_that_are_no_mesh_are_refused_with_the_place() {
 }
 
 #[test]
-fn meshes_that_cannot_be_where_they_are() {
+fn meshes_in_impossible_positions_are_refused() {
     let body = cuboid([0.5; 3]);
     let tube = tube(3.0, 10.0, 1, &[]);
     let files = [("box.ply", body.as_str()), ("t.ply", tube.as_str())];

@@ -1,4 +1,4 @@
-//! An independent model of the same environment: a test of points for water, and rays by small steps.
+//! An independent model of the same environment: tests whether a point is water, and follows rays in small steps.
 
 use super::*;
 
@@ -209,7 +209,7 @@ impl Oracle {
 
     /// Compares thousands of rays with this model; returns the number that met each feature.
     ///
-    /// Two exceptions: steps of 2 mm may miss an object that a ray grazes, which smaller steps must then find; and a graze
+    /// Two exceptions: steps of 2 mm may miss an object that a ray grazes, which smaller steps must then find. A graze
     /// shorter than the environment's least step may be missed there.
     pub(super) fn compare(
         &self,

@@ -1,4 +1,4 @@
-//! Refused scenes, and the location given in the error.
+//! Refused scenes, and the location stated in the error.
 
 use super::*;
 
@@ -17,7 +17,7 @@ fn feature(keys: &str, place: &str, problem: &str) {
 }
 
 #[test]
-fn axes_that_are_too_tight_or_turn_back() {
+fn too_tight_or_reversing_axes_are_refused() {
     refused(
         "[[tunnel.axis]]\nradius_m = 12\nturn_deg = 30",
         "s.toml:2: tunnel.axis[0].radius_m = 12",
@@ -35,7 +35,7 @@ fn axes_that_are_too_tight_or_turn_back() {
 }
 
 #[test]
-fn stations_out_of_order_or_too_steep() {
+fn unordered_or_too_steep_stations_are_refused() {
     let two = |a: &str, b: &str| format!("[[tunnel.stations]]\n{a}\n[[tunnel.stations]]\n{b}");
     refused(
         &two("chainage_m = 5\nscale = 1", "chainage_m = 5\nscale = 1"),
@@ -52,7 +52,7 @@ fn stations_out_of_order_or_too_steep() {
 }
 
 #[test]
-fn features_that_cannot_be() {
+fn impossible_features_are_refused() {
     feature("kind = \"rock\"", "features[0].kind = \"rock\"", "boulder");
     feature("chainage_m = 5", "features[0].kind", "missing");
     feature("kind = \"boulder\"\nchainage_m = 101\nsize_m = 1", "chainage_m = 101", "0 to 100");
@@ -93,7 +93,7 @@ fn features_that_cannot_be() {
 }
 
 #[test]
-fn walls_that_cannot_be() {
+fn impossible_walls_are_refused() {
     let bulge = |depth: f64, width: f64| {
         format!(
             "kind = \"bulge\"\nchainage_m = 9\nlength_m = 8\nwidth_m = {width}\narc_m = 0\ndepth_m = {depth}\n"
@@ -122,7 +122,7 @@ fn walls_that_cannot_be() {
 
 #[test]
 #[cfg(not(feature = "mesh"))]
-fn meshes_where_there_are_none() {
+fn meshes_are_refused_without_the_mesh_feature() {
     let place = "s.toml:2: tunnel.features[0].kind = \"mesh\"";
     feature("kind = \"mesh\"\nfile = \"a.ply\"", place, "needs a build with the feature mesh");
 }

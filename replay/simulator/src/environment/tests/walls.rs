@@ -6,7 +6,7 @@ use super::*;
 const CERAN: Shape = Shape::Trimmed(6.05, 10.4);
 
 #[test]
-fn the_plain_case_is_the_profile_bit_for_bit() {
+fn plain_tunnel_equals_the_profile_bit_for_bit() {
     let profile = shapes::ceran().unwrap();
     let far_feature = "[tunnel]\n[[tunnel.features]]\nkind = \"boulder\"\nchainage_m = 90\nsize_m = 1";
     let bare = Environment::straight(profile.clone());
@@ -29,7 +29,7 @@ fn the_plain_case_is_the_profile_bit_for_bit() {
 }
 
 #[test]
-fn another_tunnel_than_the_design_stands_as_built() {
+fn tunnel_as_built_may_differ_from_the_design() {
     let text = "[tunnel.as_built]\nprofile = \"circle\"\nradius_m = 4";
     let environment = parse(text, &shapes::ceran().unwrap());
     Oracle::new(Shape::Circle(4.0)).compare(&environment, 2, 1_000, [0.0, 50.0]);
@@ -42,7 +42,7 @@ fn another_tunnel_than_the_design_stands_as_built() {
 }
 
 #[test]
-fn stations_change_the_size() {
+fn stations_scale_the_wall() {
     for (seed, shape) in [(4, CERAN), (5, Shape::Rectangle(9.0, 4.0))] {
         let mut oracle = Oracle::new(shape);
         oracle.stations = vec![(10.0, 1.0), (18.0, 0.6), (25.0, 0.6), (33.0, 1.2)];
@@ -85,7 +85,7 @@ fn a_thin_bulge_is_not_skipped() {
     let centre = environment.design.reference();
     let hit = cast(&environment, [10.0, centre[0], centre[1]], [0.0, 0.0, -1.0]).unwrap();
     assert!((hit.range_m - (centre[1] - 0.02)).abs() < 1e-9 && hit.what == What::Feature(0), "{hit:?}");
-    // Along the floor, through the middle of it and over it.
+    // Along the floor, through its middle and over it.
     let low = cast(&environment, [5.0, 0.0, 0.01], [1.0, 0.0, 0.0]).unwrap();
     assert!((low.range_m - 4.995).abs() < 1e-9 && low.what == What::Feature(0), "{low:?}");
     assert!(cast(&environment, [5.0, 0.0, 0.0201], [1.0, 0.0, 0.0]).is_none());
@@ -106,7 +106,7 @@ fn bends() -> String {
 }
 
 #[test]
-fn the_wall_follows_the_bends() {
+fn wall_follows_the_bends() {
     for (seed, shape) in [(9, CERAN), (10, Shape::Rectangle(9.0, 4.0)), (11, Shape::Circle(3.0))] {
         let mut oracle = Oracle::new(shape);
         oracle.axis = BENDS.to_vec();
@@ -115,7 +115,7 @@ fn the_wall_follows_the_bends() {
 }
 
 #[test]
-fn bends_stations_and_bulges_together() {
+fn combined_bends_stations_and_bulges_match_the_model() {
     let shape = Shape::Trimmed(5.0, 8.0);
     let mut oracle = Oracle::new(shape);
     oracle.axis = BENDS.to_vec();
@@ -130,7 +130,7 @@ fn bends_stations_and_bulges_together() {
 }
 
 #[test]
-fn arc_length_is_the_designs_in_the_axis_chart() {
+fn arc_length_is_on_the_design_profile_in_the_axis_chart() {
     let design = shapes::ceran().unwrap();
     let environment =
         parse(&format!("{}[tunnel.as_built]\nprofile = \"circle\"\nradius_m = 4", bends()), &design);
@@ -141,7 +141,7 @@ fn arc_length_is_the_designs_in_the_axis_chart() {
 }
 
 #[test]
-fn a_bump_is_the_same_from_wherever_it_is_seen_and_ends_with_its_stretch() {
+fn bump_is_equal_from_all_viewpoints_and_ends_with_its_stretch() {
     let profile = shapes::ceran().unwrap();
     let smooth = Environment::straight(profile.clone());
     let rough = parse("[tunnel]\n[[tunnel.rough]]\nfrom_m = 10\nto_m = 20\nsd_m = 0.03", &profile);
@@ -162,7 +162,7 @@ fn a_bump_is_the_same_from_wherever_it_is_seen_and_ends_with_its_stretch() {
 }
 
 #[test]
-fn rough_stretches_that_overlap_or_have_no_height_are_refused() {
+fn overlapping_or_flat_rough_stretches_are_refused() {
     let profile = shapes::ceran().unwrap();
     let twice =
         "[tunnel]\n[[tunnel.rough]]\nsd_m = 0.03\nto_m = 9\n[[tunnel.rough]]\nsd_m = 0.01\nfrom_m = 8";
