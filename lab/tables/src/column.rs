@@ -14,7 +14,7 @@ use crate::Error;
 
 /// The first column of every table.
 pub(crate) const DIVE: &str = "dive";
-const DIVE_ABOUT: &str = "The dive: the first 16 digits of its log's SHA-256; the key between tables";
+const DIVE_ABOUT: &str = "The dive: first 16 digits of its log's SHA-256; the key between tables";
 
 /// Takes a column's value from a row; `None` is null.
 pub(crate) enum Get<R> {

@@ -9,7 +9,7 @@ use std::path::{Path, PathBuf};
 
 use headrace_geometry::frames::{Rot, Vec3};
 use headrace_geometry::time::{DurNs, MonoNs};
-use headrace_mavlink::decoder::{MavlinkDecoder, Meaning, Part};
+use headrace_mavlink::decoder::{MavlinkDecoder, DecoderSettings, Part};
 use headrace_mavlink::message::{ImuMessage, PressureMessage};
 use headrace_mavlink::tlog::Tlog;
 use headrace_sensor::device::Decoder as _;
@@ -68,7 +68,7 @@ fn both() -> Vec<(PathBuf, Wanted)> {
 /// Readings of a part in a whole file, and its decoder.
 fn readings(path: &Path, frames: u64, part: Part) -> (Vec<Decoded>, MavlinkDecoder) {
     let file = std::fs::read(path).unwrap();
-    let meaning = Meaning { part, system_id: Some(1), component_id: Some(1), latency: DurNs::ZERO };
+    let meaning = DecoderSettings { part, system_id: Some(1), component_id: Some(1), latency: DurNs::ZERO };
     let (mut decoder, mut readings, mut first_us) = (MavlinkDecoder::new(meaning), Vec::new(), None);
     for logged in Tlog::new(&file) {
         let logged = logged.unwrap();

@@ -6,7 +6,7 @@ use std::collections::BTreeMap;
 use std::io::Cursor;
 
 use headrace_bar100::calibration::Overrides;
-use headrace_bar100::decoder::{Bar100Decoder, Meaning};
+use headrace_bar100::decoder::{Bar100Decoder, DecoderSettings};
 use headrace_geometry::time::{DurNs, MonoNs};
 use headrace_imagenex881::codec::{Header, Model};
 use headrace_sensor::device::Decoder as _;
@@ -64,7 +64,7 @@ impl Translator {
     fn new() -> Self {
         let overrides = Overrides::default();
         let latency = DurNs(0);
-        let depth = Meaning { overrides, ambient_bar: 1.013_25, reject_busy: false, latency };
+        let depth = DecoderSettings { overrides, ambient_bar: 1.013_25, reject_busy: false, latency };
         Self { depth: Bar100Decoder::new(depth), imu: [Vec::new(), Vec::new()] }
     }
 

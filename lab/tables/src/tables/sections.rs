@@ -26,30 +26,30 @@ pub(super) fn words(causes: impl IntoIterator<Item = headrace_coverage::Cause>) 
 pub(crate) fn sections() -> Table<SectionReport> {
     Table {
         name: "sections",
-        about: "A section of the way, in the order of chainage.",
+        about: "A section of the coverage extent, in the order of chainage.",
         columns: vec![
-            Column("chainage_m", "Where it begins, m from the portal", Get::Number(|row| Some(row.start_m))),
-            Column("end_m", "Where it ends, m", Get::Number(|row| Some(row.end_m))),
+            Column("chainage_m", "Chainage of its start, m", Get::Number(|row| Some(row.start_m))),
+            Column("end_m", "Chainage of its end, m", Get::Number(|row| Some(row.end_m))),
             Column(
                 "verdict",
                 "`pass`, `fail`, `cannot_say` or `open`",
                 Get::Text(|row| Some(row.verdict.to_owned())),
             ),
-            Column("cannot_say", "Why it can't be said", Get::Text(|row| row.cannot_say.map(str::to_owned))),
-            Column("cause", "Main cause, while the verdict is `fail`", Get::Text(cause)),
             Column(
-                "causes",
-                "All causes without which it would have passed, the main one first, with commas",
-                Get::Text(causes),
+                "cannot_say",
+                "Reason for `cannot_say`",
+                Get::Text(|row| row.cannot_say.map(str::to_owned)),
             ),
+            Column("cause", "Main cause, if the verdict is `fail`", Get::Text(cause)),
+            Column("causes", "All causes, the main one first, separated by commas", Get::Text(causes)),
             Column(
                 "not_inspected",
-                "Open, and going on won't change it: not all heads have been there",
+                "Open at an end or turning point that some heads have not passed",
                 Get::Truth(|row| Some(row.not_inspected)),
             ),
             Column(
                 "d_m",
-                "Diameter D of its largest hole, m; null where it wasn't measured",
+                "Diameter D of its largest hole, m; null if not measured",
                 Get::Number(|row| row.hole_m),
             ),
             Column(
@@ -59,7 +59,7 @@ pub(crate) fn sections() -> Table<SectionReport> {
             ),
             Column(
                 "d_least_m",
-                "Lower bound of D, m: thinned samples may have divided it",
+                "Lower bound of D, m: thinned samples may have lain in the hole",
                 Get::Number(|row| row.hole_least_m),
             ),
             Column("d_most_m", "Upper bound of D, m; null if unbounded", Get::Number(|row| row.hole_most_m)),
@@ -69,7 +69,7 @@ pub(crate) fn sections() -> Table<SectionReport> {
                 Get::Truth(|row| row.hole_m.map(|_| row.hole_bounded)),
             ),
             Column("t_x_mean_m", "Mean distance between passes, m", Get::Number(|row| row.t_x.mean_m)),
-            Column("t_x_most_m", "Greatest distance between passes, m", Get::Number(|row| row.t_x.max_m)),
+            Column("t_x_most_m", "Largest distance between passes, m", Get::Number(|row| row.t_x.max_m)),
             Column(
                 "t_y_mean_m",
                 "Mean distance between neighbours of one sweep, m",
@@ -77,12 +77,12 @@ pub(crate) fn sections() -> Table<SectionReport> {
             ),
             Column(
                 "t_y_most_m",
-                "Greatest distance between neighbours of one sweep, m",
+                "Largest distance between neighbours of one sweep, m",
                 Get::Number(|row| row.t_y.max_m),
             ),
             Column("t_mean_m", "Mean lattice diagonal, m", Get::Number(|row| row.t.mean_m)),
-            Column("t_most_m", "Greatest lattice diagonal, m", Get::Number(|row| row.t.max_m)),
-            Column("samples", "Samples on it", Get::Count(|row| count(row.samples))),
+            Column("t_most_m", "Largest lattice diagonal, m", Get::Number(|row| row.t.max_m)),
+            Column("samples", "Number of samples", Get::Count(|row| count(row.samples))),
             Column(
                 "density_perm2",
                 "Samples per square metre of wall",
@@ -90,12 +90,12 @@ pub(crate) fn sections() -> Table<SectionReport> {
             ),
             Column(
                 "doubtful_returns",
-                "Returns on it that weren't taken for wall",
+                "Number of doubtful returns",
                 Get::Count(|row| count(row.doubtful_returns)),
             ),
             Column(
                 "suspect",
-                "It holds samples of a head that wasn't believed soon after; it can't pass",
+                "It has samples of a head that was distrusted soon after, and cannot pass",
                 Get::Truth(|row| Some(row.suspect)),
             ),
             Column(
@@ -105,22 +105,22 @@ pub(crate) fn sections() -> Table<SectionReport> {
             ),
             Column(
                 "deviation_mean_m",
-                "Mean deviation of its wall from the design, m, outward positive",
+                "Mean deviation of its wall from the design, m, outwards positive",
                 Get::Number(|row| row.deviation.map(|of| of.mean_m)),
             ),
             Column(
                 "deviation_inmost_m",
-                "Greatest deviation inward, m, at most zero",
+                "Largest deviation inwards, m, at most zero",
                 Get::Number(|row| row.deviation.map(|of| of.inmost_m)),
             ),
             Column(
                 "deviation_outmost_m",
-                "Greatest deviation outward, m, at least zero",
+                "Largest deviation outwards, m, at least zero",
                 Get::Number(|row| row.deviation.map(|of| of.outmost_m)),
             ),
             Column(
                 "area_ratio",
-                "Its cross-section over the design's",
+                "Area of its cross-section, divided by the design's",
                 Get::Number(|row| row.deviation.and_then(|of| of.area_ratio)),
             ),
             Column(
@@ -128,14 +128,10 @@ pub(crate) fn sections() -> Table<SectionReport> {
                 "Most of its samples contradict the design profile",
                 Get::Truth(|row| row.deviation.map(|of| of.contradicts)),
             ),
-            Column(
-                "flagged_s",
-                "When it was flagged, s on the log's clock",
-                Get::Number(|row| row.flagged_s),
-            ),
+            Column("flagged_s", "Time of its flag, s on the log's clock", Get::Number(|row| row.flagged_s)),
             Column(
                 "cleared_s",
-                "When a later pass cleared the flag, s on the log's clock",
+                "Time at which a later pass cleared the flag, s on the log's clock",
                 Get::Number(|row| row.cleared_s),
             ),
         ],
@@ -167,7 +163,7 @@ pub(crate) fn holes(sections: &[SectionReport]) -> Vec<Hole<'_>> {
 pub(crate) fn holes_table<'a>() -> Table<Hole<'a>> {
     Table {
         name: "holes",
-        about: "The largest hole of a section; one that neighbouring sections share is one row.",
+        about: "The largest hole of a section. A hole shared by several neighbouring sections has one row.",
         columns: vec![
             Column("chainage_m", "Chainage of its centre, m", Get::Number(|row| row.section.hole_x_m)),
             Column(
@@ -177,7 +173,7 @@ pub(crate) fn holes_table<'a>() -> Table<Hole<'a>> {
             ),
             Column(
                 "clock",
-                "The same on a clock seen along the tunnel: 6 is the floor's centre, 9 the left wall",
+                "Clock position of its centre, looking along the tunnel: 6 is the floor's centre, 9 the left wall",
                 Get::Text(|row| row.section.hole_clock.clone()),
             ),
             Column("d_m", "Its diameter D, m", Get::Number(|row| row.section.hole_m)),
@@ -196,10 +192,14 @@ pub(crate) fn holes_table<'a>() -> Table<Hole<'a>> {
             Column("sections", "Sections that share it", Get::Count(|row| Some(row.sections))),
             Column(
                 "sections_from_m",
-                "Where the first of them begins, m",
+                "Chainage of the start of the first of them, m",
                 Get::Number(|row| Some(row.section.start_m)),
             ),
-            Column("sections_to_m", "Where the last of them ends, m", Get::Number(|row| Some(row.end_m))),
+            Column(
+                "sections_to_m",
+                "Chainage of the end of the last of them, m",
+                Get::Number(|row| Some(row.end_m)),
+            ),
             Column(
                 "verdict",
                 "Verdict of the first of them",
@@ -219,22 +219,26 @@ pub(crate) fn flags(sections: &[SectionReport]) -> Vec<Flag<'_>> {
 pub(crate) fn flags_table<'a>() -> Table<Flag<'a>> {
     Table {
         name: "flags",
-        about: "A section that was flagged, cleared since or not.",
+        about: "A flagged section, cleared or not.",
         columns: vec![
-            Column("chainage_m", "Where the section begins, m", Get::Number(|row| Some(row.0.start_m))),
-            Column("end_m", "Where it ends, m", Get::Number(|row| Some(row.0.end_m))),
             Column(
-                "raised_s",
-                "When it was flagged, s on the log's clock",
-                Get::Number(|row| row.0.flagged_s),
+                "chainage_m",
+                "Chainage of the section's start, m",
+                Get::Number(|row| Some(row.0.start_m)),
             ),
+            Column("end_m", "Chainage of its end, m", Get::Number(|row| Some(row.0.end_m))),
+            Column("raised_s", "Time of its flag, s on the log's clock", Get::Number(|row| row.0.flagged_s)),
             Column(
                 "cleared_s",
-                "When a later pass cleared it, s on the log's clock",
+                "Time at which a later pass cleared it, s on the log's clock",
                 Get::Number(|row| row.0.cleared_s),
             ),
-            Column("cause", "Main cause, while the verdict is `fail`", Get::Text(|row| cause(row.0))),
-            Column("causes", "All causes, the main one first, with commas", Get::Text(|row| causes(row.0))),
+            Column("cause", "Main cause, if the verdict is `fail`", Get::Text(|row| cause(row.0))),
+            Column(
+                "causes",
+                "All causes, the main one first, separated by commas",
+                Get::Text(|row| causes(row.0)),
+            ),
             Column("d_m", "Diameter D of its largest hole, m", Get::Number(|row| row.0.hole_m)),
             Column(
                 "d_sd_m",
@@ -248,12 +252,12 @@ pub(crate) fn flags_table<'a>() -> Table<Flag<'a>> {
             ),
             Column(
                 "fits_mps",
-                "Greatest speed that would have met the target, m/s; zero if none",
+                "Highest speed that would have met the target, m/s; zero if none",
                 Get::Number(|row| evidence(row.0).map(|of| of.fits_mps)),
             ),
             Column(
                 "with_losses_mps",
-                "The same as returns were lost, m/s",
+                "The same with the returns that were lost, m/s",
                 Get::Number(|row| evidence(row.0).map(|of| of.with_losses_mps)),
             ),
             Column(
@@ -273,7 +277,7 @@ pub(crate) fn flags_table<'a>() -> Table<Flag<'a>> {
             ),
             Column(
                 "swing_m",
-                "How far the beams swung along the tunnel between two passes, m",
+                "Swing of the beams along the tunnel between two passes, m",
                 Get::Number(|row| evidence(row.0).map(|of| of.swing_m)),
             ),
         ],

@@ -10,27 +10,27 @@ pub(crate) fn sources() -> Table<SourceReport> {
         name: "sources",
         about: "A sensor of the vehicle file.",
         columns: vec![
-            Column("source", "Its id", Get::Text(|row| Some(row.id.clone()))),
+            Column("source", "Id of the sensor", Get::Text(|row| Some(row.id.clone()))),
             Column("plugin", "Kind of device", Get::Text(|row| Some(row.plugin.clone()))),
             Column("packets", "Packets", Get::Count(|row| count(row.packets))),
-            Column("frames", "Frames that were whole and valid", Get::Count(|row| count(row.frames))),
-            Column("bad_frames", "Candidate frames that failed", Get::Count(|row| count(row.bad_frames))),
+            Column("frames", "Complete and valid frames", Get::Count(|row| count(row.frames))),
             Column(
-                "skipped_bytes",
-                "Bytes that belong to no good frame",
-                Get::Count(|row| count(row.skipped_bytes)),
+                "bad_frames",
+                "Candidate frames that failed their checks",
+                Get::Count(|row| count(row.bad_frames)),
             ),
-            Column("readings", "Readings decoded from them", Get::Count(|row| count(row.readings))),
-            Column("withheld", "Readings understood but not used", Get::Count(|row| count(row.withheld))),
+            Column("skipped_bytes", "Bytes outside valid frames", Get::Count(|row| count(row.skipped_bytes))),
+            Column("readings", "Decoded readings", Get::Count(|row| count(row.readings))),
+            Column("withheld", "Readings decoded but not used", Get::Count(|row| count(row.withheld))),
             Column(
                 "longest_gap_s",
-                "Longest silence between two packets, s",
+                "Longest time between two packets, s",
                 Get::Number(|row| Some(row.longest_gap_s)),
             ),
             Column("rate_hz", "Packets per second", Get::Number(|row| Some(row.rate_hz))),
             Column(
                 "drift_ppm",
-                "Drift of the device's clock, parts per million, gaining positive",
+                "Drift of the device's clock, parts per million; positive if it gains",
                 Get::Number(|row| row.device_clock.as_ref()?.drift_ppm),
             ),
             Column(
@@ -40,7 +40,7 @@ pub(crate) fn sources() -> Table<SourceReport> {
             ),
             Column(
                 "clock_restarts",
-                "Times that the device's clock restarted",
+                "Restarts of the device's clock",
                 Get::Count(|row| count(row.device_clock.as_ref()?.restarts)),
             ),
             Column(
@@ -55,7 +55,7 @@ pub(crate) fn sources() -> Table<SourceReport> {
             ),
             Column(
                 "nis",
-                "Mean normalised innovation squared: about 1 if the noise settings are right",
+                "Mean normalised innovation squared: about 1 if the noise is declared correctly",
                 Get::Number(|row| row.navigation.as_ref()?.nis),
             ),
         ],
@@ -75,7 +75,7 @@ fn state(row: &ListedAlertJson) -> Option<String> {
 pub(crate) fn alerts() -> Table<ListedAlertJson> {
     Table {
         name: "alerts",
-        about: "An alert with its life, as of the end of the dive ([alerts.md](alerts.md)).",
+        about: "An alert and its life at the end of the dive ([alerts.md](alerts.md)).",
         columns: vec![
             Column("number", "Its number, from 1", Get::Count(|row| count(row.number))),
             Column(
@@ -89,44 +89,44 @@ pub(crate) fn alerts() -> Table<ListedAlertJson> {
                 Get::Text(|row| Some(row.class.to_owned())),
             ),
             Column("kind", "Its kind", Get::Text(|row| Some(row.kind.to_owned()))),
-            Column("text", "What holds", Get::Text(|row| Some(row.text.clone()))),
+            Column("text", "Text of the alert", Get::Text(|row| Some(row.text.clone()))),
             Column("state", "`active`, `rectified` or `cleared`", Get::Text(state)),
             Column(
                 "since_s",
-                "When it was raised first, s on the log's clock",
+                "Time at which it was raised first, s on the log's clock",
                 Get::Number(|row| Some(row.since_s)),
             ),
             Column(
                 "rectified_s",
-                "Since when it holds no longer, s on the log's clock",
+                "Time at which its situation ended, s on the log's clock",
                 Get::Number(|row| row.rectified_s),
             ),
             Column(
                 "cleared_s",
-                "Since when it is over, s on the log's clock",
+                "Time at which it was cleared, s on the log's clock",
                 Get::Number(|row| row.cleared_s),
             ),
             Column(
                 "acknowledged_s",
-                "When somebody acknowledged it, s on the log's clock",
+                "Time of its acknowledgement, s on the log's clock",
                 Get::Number(|row| Some(row.acknowledged.as_ref()?.at_s)),
             ),
             Column(
                 "acknowledged_by",
-                "By whom",
+                "Name given with the acknowledgement",
                 Get::Text(|row| Some(row.acknowledged.as_ref()?.by.clone())),
             ),
-            Column("from_m", "Where it begins, or where the vehicle was, m", Get::Number(|row| row.from_m)),
-            Column("to_m", "Where it ends, m", Get::Number(|row| row.to_m)),
-            Column("source", "The sensor that it names", Get::Text(|row| row.sensor.clone())),
+            Column("from_m", "Chainage of its start, or of the vehicle, m", Get::Number(|row| row.from_m)),
+            Column("to_m", "Chainage of its end, m", Get::Number(|row| row.to_m)),
+            Column("source", "Sensor of the alert", Get::Text(|row| row.sensor.clone())),
             Column(
                 "count",
-                "Times that it was raised; of missed stretches, those that it stands for",
+                "Times that it was raised; for missed stretches, the number of stretches that it covers",
                 Get::Count(|row| count(row.count)),
             ),
             Column(
                 "merged_into",
-                "The alert that stands for it now",
+                "The alert into which it was merged",
                 Get::Count(|row| row.merged_into.map(i64::from)),
             ),
         ],
