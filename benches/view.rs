@@ -113,7 +113,7 @@ fn view() -> View {
         section_m: 0.25,
         run_up_m: 0.5,
         length_m: 1000.0,
-        head_words: headrace_monitor::head_descriptions::HeadDescriptions::default(),
+        head_descriptions: headrace_monitor::head_descriptions::HeadDescriptions::default(),
         heads: (0..4).collect(),
     })
 }

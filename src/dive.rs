@@ -201,7 +201,7 @@ pub(crate) fn view_site(vehicle: &VehicleConfig) -> Site {
         let head = HeadSpecification::of(device, spec, &mission);
         Some(head.settings(&sensor.specification().sensor.id, &mission.profile, mission.target_m))
     });
-    let head_words = HeadDescriptions::of(specified);
+    let head_descriptions = HeadDescriptions::of(specified);
     let reaches = heads.clone().map(|(_, sensor)| sensor.specification().sensor.mount.position.x().abs());
     Site {
         profile: vehicle.tunnel.profile.clone(),
@@ -209,7 +209,7 @@ pub(crate) fn view_site(vehicle: &VehicleConfig) -> Site {
         section_m: vehicle.section_m,
         run_up_m: reaches.fold(0.0, f64::max) + vehicle.target_m,
         length_m: vehicle.tunnel.length_m,
-        head_words,
+        head_descriptions,
         heads: heads.map(|(source, _)| source).collect(),
     }
 }

@@ -4,7 +4,7 @@ use headrace_config::plain::one_line;
 use headrace_geometry::time::{DurNs, MonoNs};
 use headrace_monitor::live_messages::{LiveMessage, LiveMessages};
 use headrace_monitor::live_state::{Condition, Lamp, LiveState};
-use headrace_monitor::live_text::{PilotLine, status_line, told_line};
+use headrace_monitor::live_text::{PilotLine, message_line, status_line};
 use headrace_monitor::messages::Notice;
 use headrace_monitor::run::Loop;
 use headrace_ports::{Phase, Status};
@@ -241,7 +241,7 @@ impl Watch {
     fn status(&mut self, state: &LiveState, dive: &Loop) {
         let name =
             |source: usize| dive.sources().get(source).map_or_else(String::new, |info| info.id.clone());
-        let mut line = status_line(state, &dive.mission().profile, dive.head_words(), &name);
+        let mut line = status_line(state, &dive.mission().profile, dive.head_descriptions(), &name);
         if let Some((words, is_alarm)) = self.recorded.words() {
             line.what.insert(line.what.len().min(1), words);
             line.lamp = if is_alarm { Some(Lamp::Red) } else { line.lamp };
@@ -272,7 +272,7 @@ impl Watch {
 
     fn tell(&mut self, at: MonoNs, told: &[LiveMessage], dive: &Loop) {
         for one in told {
-            let line = told_line(one, &dive.mission().profile, dive.head_words());
+            let line = message_line(one, &dive.mission().profile, dive.head_descriptions());
             if self.show == Show::Lines {
                 if one.adds_line() {
                     self.line(&line);

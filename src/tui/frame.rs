@@ -7,7 +7,7 @@ use headrace_geometry::tunnel::Profile;
 use headrace_monitor::head_descriptions::HeadDescriptions;
 use headrace_monitor::live_messages::{LiveMessage, LiveMessages};
 use headrace_monitor::live_state::{Condition, LiveState, SensorState};
-use headrace_monitor::live_text::{PilotLine, status_line, told_line};
+use headrace_monitor::live_text::{PilotLine, message_line, status_line};
 use headrace_monitor::messages::Notice;
 use headrace_monitor::pilot_text::{AdviceFigures, advice_text};
 use headrace_monitor::run::Loop;
@@ -140,7 +140,7 @@ impl FrameBuilder {
 
     pub(super) fn shot(&mut self, dive: &Loop, stopped: Option<Stop>) -> ScreenFrame {
         let state = *dive.live_state();
-        let (profile, heads) = (&dive.mission().profile, dive.head_words());
+        let (profile, heads) = (&dive.mission().profile, dive.head_descriptions());
         let name =
             |source: usize| dive.sources().get(source).map_or_else(String::new, |info| info.id.clone());
         let reason = state
@@ -231,6 +231,6 @@ fn reason_text(
 /// Adds the line of a message if it adds something to the list of alerts.
 fn tell(one: &LiveMessage, dive: &Loop, to: &mut Vec<PilotLine>) {
     if one.adds_line() {
-        to.push(told_line(one, &dive.mission().profile, dive.head_words()));
+        to.push(message_line(one, &dive.mission().profile, dive.head_descriptions()));
     }
 }

@@ -154,7 +154,7 @@ impl App {
             contradiction_m: mission.coverage.contradiction_m,
             limits: WallLimits::new(mission.profile.perimeter_m(), mission.coverage.contradiction_m),
         });
-        let words = head_words(world, mission, sources);
+        let words = head_descriptions(world, mission, sources);
         world.insert_resource(words);
         let heads = source_bits(heads.into_iter(), HeadSet::from_bits(u8::MAX));
         let sources = u16::try_from(sources.len()).unwrap_or(0);
@@ -221,7 +221,7 @@ fn sound_source(mission: &Mission, sources: &[SourceInfo]) -> Result<Option<Sour
 }
 
 /// Names of the heads and their alternative settings.
-fn head_words(world: &mut World, mission: &Mission, sources: &[SourceInfo]) -> HeadDescriptions {
+fn head_descriptions(world: &mut World, mission: &Mission, sources: &[SourceInfo]) -> HeadDescriptions {
     let mut heads = world.query::<(&Head, &Mounted, &HeadSpecification)>();
     let mut heads: Vec<_> = heads.iter(world).collect();
     heads.sort_by_key(|(head, ..)| head.0);

@@ -245,7 +245,7 @@ pub fn of_it_text(part_m: f64, whole_m: f64) -> String {
 }
 
 /// Line for a live message.
-pub fn told_line(told: &LiveMessage, profile: &Profile, heads: &HeadDescriptions) -> PilotLine {
+pub fn message_line(told: &LiveMessage, profile: &Profile, heads: &HeadDescriptions) -> PilotLine {
     let line = |place: String, what: String, action: String, lamp: Option<Lamp>| PilotLine {
         place,
         speed: String::new(),

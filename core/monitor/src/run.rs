@@ -127,7 +127,7 @@ impl Loop {
     }
 
     /// Names of the heads and their alternative settings.
-    pub fn head_words(&self) -> &HeadDescriptions {
+    pub fn head_descriptions(&self) -> &HeadDescriptions {
         self.world.resource::<HeadDescriptions>()
     }
 
@@ -205,7 +205,12 @@ impl Loop {
 
     /// Properties of the dive that texts of alerts need.
     pub fn surroundings(&self) -> TextContext<'_> {
-        TextContext::of(&self.sources, &self.mission.profile, &self.coverage().sections, self.head_words())
+        TextContext::of(
+            &self.sources,
+            &self.mission.profile,
+            &self.coverage().sections,
+            self.head_descriptions(),
+        )
     }
 
     /// Live state with the alerts, as JSON.

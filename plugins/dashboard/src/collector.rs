@@ -10,7 +10,7 @@ use headrace_geometry::frames::{Mount, Point3, Vec3};
 use headrace_geometry::time::{DurNs, MonoNs};
 use headrace_monitor::alert_list::NoteJson;
 use headrace_monitor::live_messages::{LiveMessage, LiveMessages};
-use headrace_monitor::live_text::{status_line, told_line};
+use headrace_monitor::live_text::{message_line, status_line};
 use headrace_monitor::messages::{Notice, Outcome as Placing, Placed, PlacedList};
 use headrace_monitor::report::way_home;
 use headrace_monitor::result_stream::{RecordKind, first_record};
@@ -336,7 +336,7 @@ impl Collector {
             let mut value =
                 serde_json::to_value(one).unwrap_or_else(|error| json!({"error": error.to_string()}));
             if let Some(object) = value.as_object_mut() {
-                let line = told_line(one, &dive.mission().profile, dive.head_words());
+                let line = message_line(one, &dive.mission().profile, dive.head_descriptions());
                 object.insert("t_s".to_owned(), dive.now().as_secs_f64().into());
                 object.entry("text").or_insert_with(|| line.text().into());
             }
@@ -466,7 +466,8 @@ impl Collector {
         let rates = self.sensors.iter().map(|sensor| RateJson { id: sensor.id.clone(), hz: sensor.hz });
         let name =
             |source: usize| dive.sources().get(source).map_or_else(String::new, |info| info.id.clone());
-        let text = status_line(dive.live_state(), &dive.mission().profile, dive.head_words(), &name).text();
+        let text =
+            status_line(dive.live_state(), &dive.mission().profile, dive.head_descriptions(), &name).text();
         let compared = self.compared.as_ref().map(Compared::json);
         Beside {
             pose,

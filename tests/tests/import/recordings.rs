@@ -9,7 +9,7 @@ use std::path::{Path, PathBuf};
 
 use headrace_geometry::frames::{Rot, Vec3};
 use headrace_geometry::time::{DurNs, MonoNs};
-use headrace_mavlink::decoder::{MavlinkDecoder, DecoderSettings, Part};
+use headrace_mavlink::decoder::{DecoderSettings, MavlinkDecoder, Part};
 use headrace_mavlink::message::{ImuMessage, PressureMessage};
 use headrace_mavlink::tlog::Tlog;
 use headrace_sensor::device::Decoder as _;

@@ -123,7 +123,7 @@ fn unsure_stretch_is_shown_with_reason_and_remedy() {
         } else {
             LiveMessage::CannotSay(stretch(why))
         };
-        let lines = told_line(&told, &profile, &two()).broken(60);
+        let lines = message_line(&told, &profile, &two()).broken(60);
         assert!(lines.iter().all(|line| line.chars().count() <= 60), "{lines:#?}");
         text.push_str(&lines.join("\n"));
         text.push('\n');

@@ -299,7 +299,7 @@ impl Report {
             way_home: runs::way_home(sections),
             survey: survey::survey(coverage, &dive.mission().profile),
             what_if: Vec::new(),
-            heads: dive.head_words().clone(),
+            heads: dive.head_descriptions().clone(),
             openings: dive.mission().coverage.openings.iter().map(opening_report).collect(),
             alerts: dive.alerts().iter().map(|alert| alert_report(alert, dive)).collect(),
             alert_list: listed(dive),

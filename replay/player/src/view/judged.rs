@@ -93,7 +93,7 @@ impl Sections {
                 target_m: site.target_m,
                 v_max_mps,
             };
-            Log::new(judged.at, Level::Warning, flag_text(&missed, &site.profile, &site.head_words))
+            Log::new(judged.at, Level::Warning, flag_text(&missed, &site.profile, &site.head_descriptions))
         })
     }
 
@@ -155,6 +155,6 @@ fn shown(judged: &Judged, flagged: bool, site: &Site) -> Section {
         target_m: site.target_m,
         flagged,
         cause: cause.map_or("", |figures| figures.cause().as_str()),
-        words: cause.as_ref().map(|figures| cause_text(figures, &site.head_words)).unwrap_or_default(),
+        words: cause.as_ref().map(|figures| cause_text(figures, &site.head_descriptions)).unwrap_or_default(),
     }
 }

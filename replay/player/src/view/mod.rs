@@ -270,7 +270,7 @@ impl View {
             unseen_m: (width_m > 0.0).then_some([width_m, arc_m]),
             remedy,
         };
-        let said = advice_text(&figures, &self.site.profile, &self.site.head_words);
+        let said = advice_text(&figures, &self.site.profile, &self.site.head_descriptions);
         if turned {
             let is_grave = will_exceed || reason != Reason::HelixPitch;
             let level = if is_grave { Level::Warning } else { Level::Info };

@@ -22,7 +22,7 @@ pub struct Site {
     /// Length of the tunnel, m.
     pub length_m: f64,
     /// Names and possible settings of the heads.
-    pub head_words: HeadDescriptions,
+    pub head_descriptions: HeadDescriptions,
     /// Numbers of the sources that are heads.
     pub heads: Vec<u64>,
 }

@@ -14,7 +14,7 @@ fn view() -> View {
         section_m: 0.25,
         run_up_m: 0.5,
         length_m: 100.0,
-        head_words: HeadDescriptions::default(),
+        head_descriptions: HeadDescriptions::default(),
         heads: vec![2, 5],
     })
 }
