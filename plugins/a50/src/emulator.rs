@@ -24,7 +24,7 @@ pub struct Simulated {
     pub latency: DurNs,
 }
 
-/// Ideal device: no noise; values are quantized by the wire format only.
+/// Ideal device: no noise; values are quantised by the wire format only.
 #[derive(Debug, Clone)]
 pub struct A50Emulator {
     device: Simulated,

@@ -9,7 +9,7 @@ use super::layout::DATA_BYTES;
 use super::mapping::{Attitude, Condition, Mapping, Part};
 use crate::frame::{CanFrame, CanId, Payload};
 
-/// Ideal unit: no noise, bias or added delay, but the quantization of its signals.
+/// Ideal unit: no noise, bias or added delay, but the quantisation of its signals.
 #[derive(Debug, Clone)]
 pub struct DbcEmulator {
     mapping: Mapping,
