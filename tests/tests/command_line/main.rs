@@ -19,4 +19,6 @@ mod report_schema;
 mod screens;
 #[cfg(unix)]
 mod tui;
+#[cfg(unix)]
+mod tutorial;
 mod viewers;

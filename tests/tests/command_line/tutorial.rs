@@ -1,0 +1,77 @@
+//! Runs each command of docs/first-dive.md, in its order and in one folder.
+
+use std::process::Stdio;
+use std::time::{Duration, Instant};
+
+use headrace_tests::{Folder, program, root};
+
+/// Options for the test only: no browser, no waiting, and a rehearsal of some seconds.
+const QUICK: [(&str, &[&str]); 2] =
+    [("demo", &["--no-open", "--speed", "max"]), ("emulate", &["--linger", "60"])];
+/// Duration of the rehearsal in the tutorial, and in the test, s.
+const REHEARSAL_S: [&str; 2] = ["300", "3"];
+
+/// Lines of the page's console blocks, without their prompts.
+fn commands(page: &str) -> Vec<Vec<String>> {
+    let blocks = page.split("```console\n").skip(1).map(|rest| rest.split("```").next().unwrap_or_default());
+    let lines = blocks.flat_map(str::lines).filter_map(|line| line.strip_prefix("$ headrace "));
+    lines.map(|line| line.split_whitespace().map(str::to_owned).collect()).collect()
+}
+
+/// Copies a folder of files and folders.
+fn copy(from: &std::path::Path, to: &std::path::Path) {
+    std::fs::create_dir_all(to).unwrap();
+    for entry in std::fs::read_dir(from).unwrap() {
+        let entry = entry.unwrap();
+        let target = to.join(entry.file_name());
+        if entry.path().is_dir() {
+            copy(&entry.path(), &target);
+        } else {
+            std::fs::copy(entry.path(), target).unwrap();
+        }
+    }
+}
+
+#[test]
+fn tutorial_commands_succeed_in_their_order() {
+    let page = std::fs::read_to_string(root().join("docs/first-dive.md")).unwrap();
+    let commands = commands(&page);
+    assert!(commands.len() >= 8, "{commands:?}");
+    let folder = Folder::new();
+    copy(&root().join("deploy"), &folder.path("deploy"));
+    let mut emulator = None;
+    for command in &commands {
+        let mut arguments: Vec<&str> = command.iter().map(String::as_str).collect();
+        let further =
+            QUICK.iter().find(|(name, _)| *name == arguments[0]).map_or(&[][..], |(_, further)| further);
+        arguments.extend(further);
+        if let Some(time) = arguments.iter_mut().find(|argument| **argument == REHEARSAL_S[0]) {
+            *time = REHEARSAL_S[1];
+        }
+        if arguments[0] == "emulate" {
+            let started = program()
+                .args(&arguments)
+                .current_dir(folder.path(""))
+                .stdout(Stdio::null())
+                .stderr(Stdio::null())
+                .spawn();
+            emulator = Some(started.unwrap());
+            let begun = Instant::now();
+            while !folder.path("rehearsal/vehicle.toml").exists() {
+                assert!(
+                    begun.elapsed() < Duration::from_secs(60),
+                    "no vehicle file of the rehearsal after 60 s"
+                );
+                std::thread::sleep(Duration::from_millis(50));
+            }
+            continue;
+        }
+        let answer = folder.headrace(&arguments);
+        // Three seconds of a rehearsal, during which the vehicle is at rest, inspect nothing.
+        let is_allowed = answer.code == Some(0) || arguments[0] == "run" && answer.code == Some(1);
+        assert!(is_allowed, "{arguments:?}: {:?}: {}", answer.code, answer.stderr);
+    }
+    let mut emulator = emulator.expect("the tutorial has a rehearsal");
+    emulator.kill().unwrap();
+    emulator.wait().unwrap();
+}
