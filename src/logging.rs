@@ -249,7 +249,7 @@ mod tests {
     }
 
     #[test]
-    fn without_flags_only_warnings_are_shown() {
+    fn only_warnings_are_shown_by_default() {
         let shows = enabled(None, None);
         assert!(shows("headrace_replay::log", Level::WARN) && shows("other", Level::WARN));
         assert!(!shows("headrace", Level::INFO) && !shows("other", Level::INFO));

@@ -124,7 +124,7 @@ fn no_flag_is_cleared_without_turning_back() {
 }
 
 #[test]
-fn with_exact_position_flagged_sections_are_failed_sections() {
+fn flagged_sections_are_failed_sections_at_exact_positions() {
     every_flag(
         |judged| forward(judged) && direct(judged),
         |_, _, due| {

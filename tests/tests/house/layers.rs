@@ -4,8 +4,6 @@ use std::path::{Path, PathBuf};
 
 use crate::workspace::{Package, root, sources, workspace};
 
-const LONGEST_FILE: usize = 600;
-
 /// Crates of the core, bottom up; each may use only crates before it.
 const CORE: [&str; 8] =
     ["config", "geometry", "sampling", "sensor", "fusion", "coverage", "vehicle", "monitor"];
@@ -131,17 +129,6 @@ fn core_has_no_io_and_no_locks() {
         }
     }
     assert!(said.is_empty(), "{said:#?}");
-}
-
-#[test]
-fn no_file_is_long() {
-    let folders = ["src", "core", "plugins", "replay", "pictures", "tests", "benches", "examples"];
-    for folder in folders.into_iter().chain(LAB) {
-        for (path, text) in sources(&root().join(folder)) {
-            let lines = text.lines().count();
-            assert!(lines <= LONGEST_FILE, "{}: {lines} lines; the most is {LONGEST_FILE}", path.display());
-        }
-    }
 }
 
 /// Cargo hides the output of passed tests, so `.ci/count-skipped` could not count other messages.

@@ -275,7 +275,7 @@ mod tests {
     }
 
     #[test]
-    fn update_includes_only_what_came_before_it() {
+    fn update_includes_only_earlier_events() {
         let at = |run: RunInput, command_before: usize, beat: usize| {
             Bench::new(run, command_before).until(Some(beat))
         };

@@ -42,7 +42,7 @@ fn figure_6_shows_evenly_spaced_passes_and_a_faster_head() {
 }
 
 #[test]
-fn figure_8_shows_long_and_short_distances_that_add_up_to_two_t_x_over_s() {
+fn long_and_short_distances_of_figure_8_have_the_expected_sum() {
     let figure = figures::sectors().unwrap();
     let gaps: Vec<f64> = figure.at_line.windows(2).map(|pair| pair[1] - pair[0]).collect();
     assert!(gaps.len() >= 4, "{gaps:?}");

@@ -12,7 +12,7 @@ const MAX_FAULTS: usize = 100;
 pub struct RecordingFault {
     /// The part.
     pub path: PathBuf,
-    /// What was attempted, and the system's error.
+    /// Attempted operation, and the system's error.
     pub error: String,
     /// Messages that no part contains.
     pub lost: u64,
@@ -50,7 +50,7 @@ pub enum RecordingEvent {
     Failed {
         /// The part.
         path: PathBuf,
-        /// What was attempted, and the system's error.
+        /// Attempted operation, and the system's error.
         error: String,
     },
     /// The recording continues.
