@@ -216,7 +216,7 @@ fn pointers() -> Vec<Bomb> {
             "bytes that aren't records|ends before",
         ),
         bomb("indexes of 2^32-1 entries", some(&[index(u32::MAX).repeat(1000)]), "bytes that aren't records"),
-        bomb("a summary that points at the beginning", circle, "begins elsewhere"),
+        bomb("a summary that points at the beginning", circle, "the summary isn't where the log says"),
         bomb(
             "an index of chunks beyond the end",
             some(&[record(8, &index_of_chunks).repeat(1000)]),

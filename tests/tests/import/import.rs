@@ -301,7 +301,11 @@ fn rows_that_contradict_the_header_are_skipped_and_reported() {
         ("1,0.0,3.0\n1.1,2,4,3,1\n1.2,4.8,3.0\n", 2, "rows with more or fewer cells than the header"),
         ("1,0.0,3.0\n1.1,2.4,3.1\n1.2,4\n", 2, "rows with more or fewer cells than the header"),
         ("1,0.0,3.0\n1.1,2.4,3.1\n1.2,4.8,2", 2, "a last row without a line end: it may be cut short"),
-        ("1,0.0,3.0\n1.1,2.4,30\n1.2,4.8,3.0\n", 3, "at its range setting: as if nothing was heard"),
+        (
+            "1,0.0,3.0\n1.1,2.4,30\n1.2,4.8,3.0\n",
+            3,
+            "ranges outside the head's range setting, imported as pings without an echo",
+        ),
     ] {
         let (code, messages, said) = import(rows);
         assert_eq!((code, messages), (Some(3), told), "{rows}: {said}");

@@ -179,7 +179,7 @@ fn unambiguous_topics_are_matched_and_ambiguous_ones_need_a_mapping() {
         let answer = folder.headrace(&["import", name, "--vehicle", "vehicle.toml", "-o", "out.mcap"]);
         assert_eq!(answer.code, Some(0), "{}", answer.stderr);
         assert!(answer.stderr.contains("/imu/data (sensor_msgs/"), "{}", answer.stderr);
-        assert!(answer.stderr.contains("is taken for imu"), "{}", answer.stderr);
+        assert!(answer.stderr.contains("is assigned to imu"), "{}", answer.stderr);
     }
     let velocity = "[[sensors]]\nid = \"dvl\"\nplugin = \"a50\"\n";
     folder.write("vehicle.toml", format!("{head}{velocity}"));
@@ -206,7 +206,7 @@ fn wrong_mappings_are_refused() {
         (table("/imu/data", "gyro", ""), "isn't a sensor of the vehicle file"),
         (
             table("/imu/data", "depth", ""),
-            "is a depth sensor, and a topic of sensor_msgs/msg/Imu is that of a inertial unit",
+            "is a depth sensor, but a topic of sensor_msgs/msg/Imu belongs to an inertial unit",
         ),
         (table("/imu/data", "imu", "time = \"stamp\""), "must be one of record, header"),
         (table("/cable", "tether", "time = \"header\""), "have no header"),

@@ -227,7 +227,7 @@ fn removed_medium_loses_the_log_but_not_the_report() {
     let output = dive.wait_with_output().unwrap();
     assert_eq!(output.status.code(), Some(3));
     let summary = String::from_utf8(output.stdout).unwrap();
-    assert!(summary.contains(&digest) && summary.contains("LOST"), "{summary}");
+    assert!(summary.contains(" samples, target ") && summary.contains("LOST"), "{summary}");
     let report: Value = serde_json::from_slice(&folder.read("report.json")).unwrap();
     assert_eq!(report["digest"], digest.as_str());
     assert!(losses(&report).contains("stick/log.mcap"), "{}", losses(&report));
@@ -246,7 +246,7 @@ fn unwritable_report_still_prints_the_summary() {
     let output = dive.wait_with_output().unwrap();
     let (summary, said) = [output.stdout, output.stderr].map(|text| String::from_utf8(text).unwrap()).into();
     assert!(output.status.code() == Some(1) && said.contains("stick/report.json"), "{said}");
-    assert!(summary.contains(&folder.digest("log.mcap", &[])), "{summary}");
+    assert!(summary.contains(" samples, target "), "{summary}");
 }
 
 fn signal(name: &str, dive: &Child) {

@@ -135,7 +135,12 @@ fn feed(
     let sensor = EmulatedSensor::named(section, vehicle, &id)?;
     if sensor.sense != of.sense() {
         let (is, wants) = (sensor.sense.as_str(), of.sense().as_str());
-        let problem = format!("is a {is}, but a topic of {} belongs to a {wants}", topic.type_name);
+        let problem = format!(
+            "is {}, but a topic of {} belongs to {}",
+            with_article(is),
+            topic.type_name,
+            with_article(wants)
+        );
         return Err(section.invalid("sensor", &problem).into());
     }
     let base = section.choice("time", &[("record", Base::Record), ("header", Base::Header)])?;
@@ -174,4 +179,9 @@ fn shown<'a>(topics: impl ExactSizeIterator<Item = &'a Topic>) -> String {
         all.push(format!("and {further} others"));
     }
     all.join(", ")
+}
+/// A noun with "a" or "an".
+fn with_article(noun: &str) -> String {
+    let article = if noun.starts_with(['a', 'e', 'i', 'o', 'u']) { "an" } else { "a" };
+    format!("{article} {noun}")
 }
