@@ -1,4 +1,4 @@
-//! Checks the errors of hard cases against their bounds and against `docs/why/hard-cases.md`.
+//! Checks the errors of hard cases against their bounds and against `docs/why/hard-cases.csv`.
 //!
 //! `tests/hard_cases/run` generates that page.
 
@@ -40,25 +40,31 @@ fn tell(name: &str, error: f64, bound: f64, condition: Option<f64>) {
         return;
     }
     let row = row(name);
-    let told: Vec<&str> = row.split('|').map(str::trim).skip(3).take(3).collect();
+    let told = &row[3..6];
     assert_eq!(
         told, figures,
-        "docs/why/hard-cases.md tells other figures of {name}; tests/hard_cases/run makes it anew"
+        "docs/why/hard-cases.csv tells other figures of {name}; tests/hard_cases/run makes it anew"
     );
 }
 
-/// Row of a case on the page.
+/// Fields of a case in the table.
 #[track_caller]
-fn row(name: &str) -> String {
+fn row(name: &str) -> Vec<String> {
     let list = read("tests/hard_cases/list");
     let mut fields = list.lines().map(|line| line.split('|').map(str::trim));
     let case = fields.find_map(|mut fields| (fields.next() == Some(name)).then(|| fields.next()).flatten());
     let case = case.unwrap_or_else(|| panic!("tests/hard_cases/list has no case {name}"));
-    let start = format!("| {case} |");
-    let page = read("docs/why/hard-cases.md");
-    let row = page.lines().find(|line| line.starts_with(&start));
-    row.unwrap_or_else(|| panic!("docs/why/hard-cases.md has no row {case:?}; tests/hard_cases/run makes it"))
-        .to_owned()
+    let table = read("docs/why/hard-cases.csv");
+    let row = table.lines().map(cells).find(|cells| cells.get(1).is_some_and(|found| found == case));
+    row.unwrap_or_else(|| {
+        panic!("docs/why/hard-cases.csv has no row {case:?}; tests/hard_cases/run makes it")
+    })
+}
+
+/// Cells of a line of CSV in which every cell is quoted.
+pub fn cells(line: &str) -> Vec<String> {
+    let inner = line.strip_prefix('"').and_then(|line| line.strip_suffix('"')).unwrap_or(line);
+    inner.split("\",\"").map(|cell| cell.replace("\"\"", "\"")).collect()
 }
 
 #[track_caller]
