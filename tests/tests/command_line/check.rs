@@ -358,7 +358,7 @@ fn limits_at_the_planned_speed_are_listed_beside_the_plan_limits() {
     );
     assert!(!usual.stderr.contains("planned_speed_mps"), "{}", usual.stderr);
     let most = planned("0.1129");
-    assert!(most.stderr.contains("0.1129, which leaves no room"), "{}", most.stderr);
+    assert!(most.stderr.contains("0.1129, which leaves no margin"), "{}", most.stderr);
     assert_eq!((usual.code, most.code), (Some(0), Some(0)));
 }
 
@@ -381,9 +381,9 @@ fn check_lists_cable_and_speed_limits_and_missing_keys() {
         writeln!(said, "{what}: {line}").unwrap();
     }
     insta::assert_snapshot!(said, @"
-    nothing said: cable: steps of 0.5 mm, slack of 0.06 m (sd) in 2.5 s; at 0.200 m/s a hole is measured to 0.097 m (sd), so that holes up to 1.01 m pass; not in the file: navigation.slack_sd_m, navigation.slack_time_s, sensors[8].step_m
-    slack said: cable: steps of 0.5 mm, slack of 0.2 m (sd) in 5 s; at 0.200 m/s a hole is measured to 0.194 m (sd), so that holes up to 0.81 m pass; not in the file: sensors[8].step_m
-    a wheel with magnets: cable: steps of 10 mm, slack of 0.06 m (sd) in 2.5 s; at 0.200 m/s a hole is measured to 0.102 m (sd), so that holes up to 1.00 m pass; not in the file: navigation.slack_sd_m, navigation.slack_time_s
-    steps of 5 cm: cable: steps of 50 mm, slack of 0.06 m (sd) in 2.5 s; at 0.200 m/s a hole is measured to 0.119 m (sd), so that holes up to 0.96 m pass; not in the file: navigation.slack_sd_m, navigation.slack_time_s
+    nothing said: cable: steps of 0.5 mm, slack of 0.06 m (sd) in 2.5 s; at 0.200 m/s a hole is measured to 0.097 m (sd), so holes up to 1.01 m pass; missing from the file: navigation.slack_sd_m, navigation.slack_time_s, sensors[8].step_m
+    slack said: cable: steps of 0.5 mm, slack of 0.2 m (sd) in 5 s; at 0.200 m/s a hole is measured to 0.194 m (sd), so holes up to 0.81 m pass; missing from the file: sensors[8].step_m
+    a wheel with magnets: cable: steps of 10 mm, slack of 0.06 m (sd) in 2.5 s; at 0.200 m/s a hole is measured to 0.102 m (sd), so holes up to 1.00 m pass; missing from the file: navigation.slack_sd_m, navigation.slack_time_s
+    steps of 5 cm: cable: steps of 50 mm, slack of 0.06 m (sd) in 2.5 s; at 0.200 m/s a hole is measured to 0.119 m (sd), so holes up to 0.96 m pass; missing from the file: navigation.slack_sd_m, navigation.slack_time_s
     ");
 }
