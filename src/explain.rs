@@ -19,7 +19,9 @@ const COLUMN: usize = 20;
 pub(crate) fn worth_of(scenes: &mut [Scene]) -> Result<EffectInfluence, Failure> {
     let _phase = Phase::start("worth");
     let mut progress = Progress::start();
-    Ok(measure(scenes, &mut |dived, most| progress.step(&format!("{dived} of at most {most} dives")))?)
+    Ok(measure(scenes, &mut |dived, most| {
+        progress.step(&format!("{dived} of at most {most} simulated dives"))
+    })?)
 }
 
 /// Lists a scene's systems, components and random streams, the used and unused effects, and their worth if
@@ -182,13 +184,13 @@ fn in_words(added: &Added) -> String {
         line("system", format!("{name} in {}", stage.as_str()));
     }
     for base in &added.replaces {
-        line("instead of", (*base).to_owned());
+        line("replaces", (*base).to_owned());
     }
     for (component, sensors) in &added.components {
         line("component", format!("{component} on {}", sensors.join(", ")));
     }
     if !added.streams.is_empty() {
-        line("random", format!("a stream each for {}", added.streams.join(", ")));
+        line("random", format!("one stream each for {}", added.streams.join(", ")));
     }
     if let Some(what) = &added.trajectory {
         line("trajectory", what.clone());

@@ -72,7 +72,7 @@ fn keys_seek_in_a_replay_and_end_it() {
     screen.press(b"-");
     screen.until_page(" 1024x PAUSED");
     screen.press(b"w");
-    screen.until_page("WALL all that was seen");
+    screen.until_page("WALL seen so far");
     screen.press(b"w");
     screen.until_page("WALL whole tunnel");
     screen.press(b"?");

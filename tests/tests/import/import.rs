@@ -109,7 +109,7 @@ fn check_telemetry(file: &str, wanted: &Telemetry) {
 fn autopilot_memory_log_is_recognised_before_any_question() {
     let folder = Folder::new();
     folder.write("00000012.BIN", [b"\xA3\x95\x80".as_slice(), &[7; 500]].concat());
-    let dataflash = ["no log of Ping Viewer", "a dataflash log of ArduPilot", ".tlog"];
+    let dataflash = ["not a Ping Viewer log", "a dataflash log of ArduPilot", ".tlog"];
     refused(&folder, &["00000012.BIN", "-o", "out.mcap"], &dataflash);
 }
 
@@ -151,7 +151,7 @@ fn candump_import_keeps_bytes_and_times_of_the_dive() {
         let answer = folder.headrace(&[&arguments[..], further].concat());
         assert_eq!(answer.code, Some(0), "{}", answer.stderr);
         assert!(
-            answer.stdout.contains(&format!("{} frames are of no sensor", frames.len())),
+            answer.stdout.contains(&format!("{} frames belong to no sensor", frames.len())),
             "{}",
             answer.stdout
         );
