@@ -117,9 +117,9 @@ fn worth_in_words(worth: &EffectInfluence) -> String {
     let metres = |mean: &Mean| plus_minus(mean, 1.0, 4);
     let percent = |mean: &Mean| plus_minus(mean, 100.0, 2);
     let mut text = format!(
-        "\nworth, {} seeds, means with their intervals of 95 %:\n  all effects: {} ns a return, D {} m, passed {} % of {:.1} m\n  \
-         the cheapest set that suffices: {kept}\n  \
-         left out with it: {spared}\n    saves {} ns a return; changes D by {} m (within {HOLE_LIMIT_M} m) and what passes by \
+        "\nworth, {} seeds, means with 95 % confidence intervals:\n  all effects: {} ns per return, D {} m, passed {} % of {:.1} m\n  \
+         the cheapest sufficient set: {kept}\n  \
+         effects left out: {spared}\n    saves {} ns per return; changes D by {} m (within {HOLE_LIMIT_M} m) and the passed share by \
          {} % (within {:.0} %)\n\n  {:<22}{:>COLUMN$}{:>COLUMN$}{:>COLUMN$}\n",
         worth.seeds,
         dear(&worth.all_ns),
@@ -131,12 +131,12 @@ fn worth_in_words(worth: &EffectInfluence) -> String {
         percent(&worth.spared.passed),
         PASSED_LIMIT * 100.0,
         "left out",
-        "saves, ns a return",
+        "saves, ns per return",
         "changes D by, m",
         "passed by, %",
     );
     for out in &worth.each {
-        let matters = if out.is_free() { "" } else { "  matters, or may" };
+        let matters = if out.is_free() { "" } else { "  matters or may matter" };
         append(
             &mut text,
             format_args!(

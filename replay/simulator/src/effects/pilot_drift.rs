@@ -29,7 +29,7 @@ impl EffectKind for PilotDriftKind {
     }
 
     fn summary(&self) -> &'static str {
-        "the vehicle wanders about its trajectory"
+        "the vehicle deviates from its trajectory"
     }
 
     fn read(&self, tables: Vec<Section<'_>>, _: &Facts) -> Result<Box<dyn Effect>, ConfigError> {
