@@ -39,7 +39,7 @@ impl<'py> FromPyObject<'_, 'py> for Coordinates {
         if array.getattr("ndim")?.extract::<usize>()? != 1 {
             let shape = array.getattr("shape")?;
             return Err(
-                Failure::Argument(format!("an array of shape {shape}; one dimension is wanted")).into()
+                Failure::Argument(format!("an array of shape {shape}; expected one dimension")).into()
             );
         }
         let bytes = array.call_method0("tobytes")?;

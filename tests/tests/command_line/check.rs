@@ -131,28 +131,28 @@ fn lines_that_two_sensors_cannot_share_are_errors() {
     insta::assert_snapshot!(findings(&cases), @r#"
     two Pings on one serial port: 2
     headrace: vehicle.toml:37: sensors[3].connect: is the serial port of sensor "ping_left", and the bytes of two ping1d cannot be separated there; give each its own
-    headrace: warning: vehicle.toml:15: sensors: have no connect, so that `run` can't reach them: ping_up, ping_down, depth, imu, tether
+    headrace: warning: vehicle.toml:15: sensors: have no connect, so `run` can't reach them: ping_up, ping_down, depth, imu, tether
     one serial port at two rates: 2
     headrace: vehicle.toml:37: sensors[3].connect: is the serial port of sensor "ping_left" with other settings; only one sensor can open it
-    headrace: warning: vehicle.toml:15: sensors: have no connect, so that `run` can't reach them: ping_up, ping_down, depth, imu, tether
+    headrace: warning: vehicle.toml:15: sensors: have no connect, so `run` can't reach them: ping_up, ping_down, depth, imu, tether
     two Pings on one UDP address: 2
     headrace: vehicle.toml:37: sensors[3].connect: is the UDP address of sensor "ping_left", and the bytes of two ping1d cannot be separated there; give each its own
-    headrace: warning: vehicle.toml:15: sensors: have no connect, so that `run` can't reach them: ping_up, ping_down, depth, imu, tether
+    headrace: warning: vehicle.toml:15: sensors: have no connect, so `run` can't reach them: ping_up, ping_down, depth, imu, tether
     two Pings on two: 0
-    headrace: warning: vehicle.toml:15: sensors: have no connect, so that `run` can't reach them: ping_up, ping_down, depth, imu, tether
+    headrace: warning: vehicle.toml:15: sensors: have no connect, so `run` can't reach them: ping_up, ping_down, depth, imu, tether
     two heads on one TCP address: 2
     headrace: vehicle.toml:25: sensors[1].connect: is the TCP address of sensor "sonar_0", and the bytes of two imagenex881 cannot be separated there; give each its own
-    headrace: warning: vehicle.toml:15: sensors: have no connect, so that `run` can't reach them: ping_left, ping_right, ping_up, ping_down, depth, imu, tether
+    headrace: warning: vehicle.toml:15: sensors: have no connect, so `run` can't reach them: ping_left, ping_right, ping_up, ping_down, depth, imu, tether
     two heads of two ids there: 0
-    headrace: warning: vehicle.toml:15: sensors: have no connect, so that `run` can't reach them: ping_left, ping_right, ping_up, ping_down, depth, imu, tether
+    headrace: warning: vehicle.toml:15: sensors: have no connect, so `run` can't reach them: ping_left, ping_right, ping_up, ping_down, depth, imu, tether
     two units of one id on CAN: 2
     headrace: vehicle.toml:63: sensors[8].connect: is the CAN interface of sensor "imu", and the bytes of two imu_can cannot be separated there; give each its own
-    headrace: warning: vehicle.toml:15: sensors: have no connect, so that `run` can't reach them: ping_left, ping_right, ping_up, ping_down, depth, tether
+    headrace: warning: vehicle.toml:15: sensors: have no connect, so `run` can't reach them: ping_left, ping_right, ping_up, ping_down, depth, tether
     two units of two ids there: 0
-    headrace: warning: vehicle.toml:15: sensors: have no connect, so that `run` can't reach them: ping_left, ping_right, ping_up, ping_down, depth, tether
+    headrace: warning: vehicle.toml:15: sensors: have no connect, so `run` can't reach them: ping_left, ping_right, ping_up, ping_down, depth, tether
     no such way to connect: 2
     headrace: vehicle.toml:25: sensors[1].connect: unknown carrier "usb"; allowed are serial:/dev/serial/by-id/NAME?baud=115200, serial:usb:VID:PID[:SERIAL]?baud=115200, tcp:HOST:PORT, udp:HOST:PORT, udp-listen:ADDRESS:PORT, can:INTERFACE, hid:VID:PID[:SERIAL], i2c:/dev/i2c-1:0x40
-    headrace: warning: vehicle.toml:15: sensors: have no connect, so that `run` can't reach them: ping_left, ping_right, ping_up, ping_down, depth, imu, tether
+    headrace: warning: vehicle.toml:15: sensors: have no connect, so `run` can't reach them: ping_left, ping_right, ping_up, ping_down, depth, imu, tether
     "#);
 }
 
@@ -189,26 +189,26 @@ fn walls_out_of_range_and_heads_out_of_phase_are_reported() {
     ];
     insta::assert_snapshot!(findings(&cases), @"
     as it is: 0
-    headrace: warning: vehicle.toml:15: sensors: have no connect, so that `run` can't reach them: ping_left, ping_right, ping_up, ping_down, depth, imu, tether
+    headrace: warning: vehicle.toml:15: sensors: have no connect, so `run` can't reach them: ping_left, ping_right, ping_up, ping_down, depth, imu, tether
     a range of 3 m in a tunnel of 6 m: 2
     headrace: vehicle.toml:20: sensors[0].range_m: reaches 0 % of the wall around this head: it is 3.00 to 3.00 m away, and the setting covers 0.19 to 2.89 m; out of reach: all around
     headrace: vehicle.toml:27: sensors[1].range_m: reaches 0 % of the wall around this head: it is 3.00 to 3.00 m away, and the setting covers 0.19 to 2.89 m; out of reach: all around
-    headrace: warning: vehicle.toml:15: sensors: have no connect, so that `run` can't reach them: ping_left, ping_right, ping_up, ping_down, depth, imu, tether
+    headrace: warning: vehicle.toml:15: sensors: have no connect, so `run` can't reach them: ping_left, ping_right, ping_up, ping_down, depth, imu, tether
     a range of 2 m there: 2
     headrace: vehicle.toml:20: sensors[0].range_m: reaches 0 % of the wall around this head: it is 3.00 to 3.00 m away, and the setting covers 0.19 to 1.93 m; out of reach: all around
     headrace: vehicle.toml:27: sensors[1].range_m: reaches 0 % of the wall around this head: it is 3.00 to 3.00 m away, and the setting covers 0.19 to 1.93 m; out of reach: all around
-    headrace: warning: vehicle.toml:15: sensors: have no connect, so that `run` can't reach them: ping_left, ping_right, ping_up, ping_down, depth, imu, tether
+    headrace: warning: vehicle.toml:15: sensors: have no connect, so `run` can't reach them: ping_left, ping_right, ping_up, ping_down, depth, imu, tether
     a tunnel of 14 m: 2
     headrace: vehicle.toml:20: sensors[0].range_m: reaches 0 % of the wall around this head: it is 7.00 to 7.00 m away, and the setting covers 0.19 to 4.82 m; out of reach: all around
     headrace: vehicle.toml:27: sensors[1].range_m: reaches 0 % of the wall around this head: it is 7.00 to 7.00 m away, and the setting covers 0.19 to 4.82 m; out of reach: all around
-    headrace: warning: vehicle.toml:15: sensors: have no connect, so that `run` can't reach them: ping_left, ping_right, ping_up, ping_down, depth, imu, tether
+    headrace: warning: vehicle.toml:15: sensors: have no connect, so `run` can't reach them: ping_left, ping_right, ping_up, ping_down, depth, imu, tether
     a small tunnel: 0
-    headrace: warning: vehicle.toml:15: sensors: have no connect, so that `run` can't reach them: ping_left, ping_right, ping_up, ping_down, depth, imu, tether
+    headrace: warning: vehicle.toml:15: sensors: have no connect, so `run` can't reach them: ping_left, ping_right, ping_up, ping_down, depth, imu, tether
     heads in two modes: 0
     headrace: warning: vehicle.toml:12: heads: can't interleave: the heads' turns take 3.80 s, 13.60 s; give them one mode and one range_m
-    headrace: warning: vehicle.toml:15: sensors: have no connect, so that `run` can't reach them: ping_left, ping_right, ping_up, ping_down, depth, imu, tether
+    headrace: warning: vehicle.toml:15: sensors: have no connect, so `run` can't reach them: ping_left, ping_right, ping_up, ping_down, depth, imu, tether
     negative counts: 0
-    headrace: warning: vehicle.toml:15: sensors: have no connect, so that `run` can't reach them: ping_left, ping_right, ping_up, ping_down, depth, imu, tether
+    headrace: warning: vehicle.toml:15: sensors: have no connect, so `run` can't reach them: ping_left, ping_right, ping_up, ping_down, depth, imu, tether
     headrace: warning: vehicle.toml:61: sensors[8].counts_per_metre: is negative: the count falls as cable is paid out; make it positive if it rises
     ");
 }

@@ -81,7 +81,7 @@ pub enum PoissonError {
         index: usize,
     },
     /// A setting is out of range.
-    #[error("{setting} is {value}; wanted is {wanted}")]
+    #[error("{setting} is {value}; expected {wanted}")]
     Setting {
         /// The setting's name.
         setting: &'static str,
