@@ -65,7 +65,7 @@ pub(crate) fn points(
     let [one, other] = names;
     if first.len() != second.len() {
         let lengths = format!(
-            "{one} has {} values and {other} has {}; they must be as many",
+            "{one} has {} values and {other} has {}; they must have equal lengths",
             first.len(),
             second.len()
         );
