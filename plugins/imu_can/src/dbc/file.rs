@@ -323,7 +323,7 @@ fn named(text: &str, error: &can_dbc::DbcError) -> DbcError {
         can_dbc::DbcError::Pest(_) if there.is_empty() => {
             "it ends or is empty, but more is expected".to_owned()
         }
-        can_dbc::DbcError::Pest(_) => format!("{there:?} is not as DBC has it"),
+        can_dbc::DbcError::Pest(_) => format!("{there:?} is not valid DBC"),
         _ => words,
     };
     DbcError::Parse { line, problem }
