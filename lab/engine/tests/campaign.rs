@@ -313,7 +313,7 @@ fn invalid_requests_are_named() {
         here,
         &["--question", "best"],
         2,
-        "--question best: there are years, target, causes, versions, worst",
+        "--question best: expected one of years, target, causes, versions, worst",
     );
     refused(here, &["--sql", "SELECT x FROM sections"], 1, "No field named x");
     refused(here, &["--target", "50"], 2, "target_m = 50: must be from 0.01 to 20");

@@ -270,7 +270,7 @@ fn table_becomes_the_bytes_of_its_sensors() {
     std::fs::remove_file(folder.path("out.mcap")).unwrap();
     for (columns, words) in [
         (&columns[..4], "rate_x, rate_y, rate_z, force_x, force_y, force_z"),
-        (&[("deep", "depth", "pressure", "mbar")], "is no column; there are t_s, depth (mbar), roll"),
+        (&[("deep", "depth", "pressure", "mbar")], "isn't a column; expected one of t_s, depth (mbar), roll"),
         (&[("along", "depth", "pressure", "m")], "must be one of Pa, hPa, mbar, kPa, bar"),
         (&[("along", "dvl", "velocity_x", "m/s")], "isn't a sensor of the vehicle file"),
     ] {

@@ -88,8 +88,8 @@ fn cut_log_says_so_and_keeps_the_verdicts_inside() {
     }
     // Only data that existed is reported as removed.
     for (name, further, said, unsaid) in [
-        ("later.mcap", ["--from", "20s"], "before was cut off", "after was cut off"),
-        ("earlier.mcap", ["--to", "20s"], "after was cut off", "before was cut off"),
+        ("later.mcap", ["--from", "20s"], "before was removed", "after was removed"),
+        ("earlier.mcap", ["--to", "20s"], "after was removed", "before was removed"),
     ] {
         trim(&folder, name, &further);
         let losses = folder.replay(name, &[]).1["log"]["losses"].to_string();

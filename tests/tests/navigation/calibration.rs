@@ -201,7 +201,7 @@ fn wrong_speed_of_sound_is_reported_without_a_settings_line() {
     for (share, says) in [(0.04, "ranges are -"), (-0.04, "ranges are +")] {
         let folder = folder(true, &filed(), &format!("sound_speed_error = {{ share = {share} }}\n"));
         let answer = folder.headrace(&["calibrate", "dive.mcap"]);
-        assert!(answer.stdout.contains("something is wrong, see above"), "{}", answer.stdout);
+        assert!(answer.stdout.contains("a fault was found, see above"), "{}", answer.stdout);
         assert!(!answer.stdout.contains("for the vehicle file"), "{}", answer.stdout);
         let line = answer.stdout.lines().find(|line| line.contains("water, speed of sound: ")).unwrap();
         assert!(line.contains(says), "{line}");
@@ -243,8 +243,8 @@ fn calibrate_without_a_stationary_phase_says_so() {
 fn invalid_options_are_refused() {
     let folder = folder(false, &filed(), "");
     for (options, words) in [
-        (["--from", "9", "--to", "9"], "--to 9 is not after --from 9"),
-        (["--from", "0", "--to", "2000"], "the most is 1200 s"),
+        (["--from", "9", "--to", "9"], "--to 9 must be after --from 9"),
+        (["--from", "0", "--to", "2000"], "at most 1200 s are allowed"),
         (["--at-surface", "9..3", "--from", "0"], "expected FROM..TO in seconds, FROM less than TO"),
     ] {
         let answer = folder.headrace(&[&["calibrate", "dive.mcap"], &options[..]].concat());

@@ -24,7 +24,7 @@ fn sensor(text: &'static str, end: End, fault: impl Fault + 'static) -> Sensor {
 /// Statuses caused by a busy machine at the other end, which the tests ignore.
 const OF_A_BUSY_MACHINE: [&str; 3] = [
     "wrong: can't keep up with",
-    "wrong: falls behind since answers get lost",
+    "wrong: falls behind because replies are lost",
     "silent: the line is open, but no frame has arrived yet",
 ];
 
