@@ -28,8 +28,8 @@ pub(crate) struct Arguments {
     /// Run as an executor for this scheduler, with --threads tasks at a time. It waits until the scheduler is available.
     #[arg(long, value_name = "HOST:PORT", conflicts_with = "folder")]
     executor: Option<String>,
-    /// Listening address of the scheduler or executor; by default 127.0.0.1:50050 and 127.0.0.1:50051, on this machine only. Anybody who
-    /// reaches it can read the logs: there is neither a password nor encryption.
+    /// Listening address of the scheduler or executor; by default 127.0.0.1:50050 and 127.0.0.1:50051, on this machine only.
+    /// Anybody who reaches it can read the logs: there is neither a password nor encryption.
     #[arg(long, value_name = "ADDRESS:PORT", conflicts_with = "folder")]
     listen: Option<SocketAddr>,
 }
