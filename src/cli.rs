@@ -32,7 +32,7 @@ pub(crate) const COMMANDS: &str =
     "pause, go, step [TICKS], seek TIME, ahead TIME, back TIME, speed N|max, end or quit";
 /// Keys of `replay --interactive`.
 pub(crate) const KEYS: &str =
-    "space pause or go, left and right 10 s, up and down 1 min, + - speed, . one tick, q leave";
+    "space pause or continue, left and right 10 s, up and down 1 min, + - speed, . one tick, q quit";
 
 fn interactive_help() -> String {
     format!("Keys in a terminal: {KEYS}; otherwise commands by lines on standard input: {COMMANDS}")

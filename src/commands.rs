@@ -224,7 +224,7 @@ pub(crate) fn replay(args: &Replay) -> Result<u8, Failure> {
         report.what_if = other_targets::reports(args, &files, (vehicle, &text), &report)?;
     } else if other_targets::is_asked(args) {
         tracing::warn!(
-            "other targets and sections aren't judged: the replay was stopped before the end of the log"
+            "other targets and sections aren't evaluated: the replay was stopped before the end of the log"
         );
     }
     let code = finish(&report, &args.output)?;

@@ -19,7 +19,9 @@ const COLUMN: usize = 20;
 pub(crate) fn worth_of(scenes: &mut [Scene]) -> Result<EffectInfluence, Failure> {
     let _phase = Phase::start("worth");
     let mut progress = Progress::start();
-    Ok(measure(scenes, &mut |dived, most| progress.step(&format!("{dived} of at most {most} dives")))?)
+    Ok(measure(scenes, &mut |dived, most| {
+        progress.step(&format!("{dived} of at most {most} simulated dives"))
+    })?)
 }
 
 /// Lists a scene's systems, components and random streams, the used and unused effects, and their worth if
@@ -115,9 +117,9 @@ fn worth_in_words(worth: &EffectInfluence) -> String {
     let metres = |mean: &Mean| plus_minus(mean, 1.0, 4);
     let percent = |mean: &Mean| plus_minus(mean, 100.0, 2);
     let mut text = format!(
-        "\nworth, {} seeds, means with their intervals of 95 %:\n  all effects: {} ns a return, D {} m, passed {} % of {:.1} m\n  \
-         the cheapest set that suffices: {kept}\n  \
-         left out with it: {spared}\n    saves {} ns a return; changes D by {} m (within {HOLE_LIMIT_M} m) and what passes by \
+        "\nworth, {} seeds, means with 95 % confidence intervals:\n  all effects: {} ns per return, D {} m, passed {} % of {:.1} m\n  \
+         the cheapest sufficient set: {kept}\n  \
+         effects left out: {spared}\n    saves {} ns per return; changes D by {} m (within {HOLE_LIMIT_M} m) and the passed share by \
          {} % (within {:.0} %)\n\n  {:<22}{:>COLUMN$}{:>COLUMN$}{:>COLUMN$}\n",
         worth.seeds,
         dear(&worth.all_ns),
@@ -129,12 +131,12 @@ fn worth_in_words(worth: &EffectInfluence) -> String {
         percent(&worth.spared.passed),
         PASSED_LIMIT * 100.0,
         "left out",
-        "saves, ns a return",
+        "saves, ns per return",
         "changes D by, m",
         "passed by, %",
     );
     for out in &worth.each {
-        let matters = if out.is_free() { "" } else { "  matters, or may" };
+        let matters = if out.is_free() { "" } else { "  matters or may matter" };
         append(
             &mut text,
             format_args!(
@@ -182,13 +184,13 @@ fn in_words(added: &Added) -> String {
         line("system", format!("{name} in {}", stage.as_str()));
     }
     for base in &added.replaces {
-        line("instead of", (*base).to_owned());
+        line("replaces", (*base).to_owned());
     }
     for (component, sensors) in &added.components {
         line("component", format!("{component} on {}", sensors.join(", ")));
     }
     if !added.streams.is_empty() {
-        line("random", format!("a stream each for {}", added.streams.join(", ")));
+        line("random", format!("one stream each for {}", added.streams.join(", ")));
     }
     if let Some(what) = &added.trajectory {
         line("trajectory", what.clone());

@@ -165,7 +165,7 @@ fn send_all(socket: &UdpSocket, to: &str, frames: &Receiver<Vec<u8>>) {
         if let Err(error) = socket.send_to(&frame, to) {
             // There is no listener, or no route. That doesn't affect the dive, and may pass.
             if failed == 0 {
-                tracing::warn!(%error, to, "MAVLink isn't sent; it is tried again");
+                tracing::warn!(%error, to, "MAVLink can't be sent; retrying");
             }
             failed += 1;
         }

@@ -182,7 +182,7 @@ pub(crate) fn put(text: &str) {
 
 /// Remembers that output is lost. A closed pipe is no loss: its reader wants no more.
 fn note(error: io::Error) {
-    tracing::debug!(%error, "stdout takes nothing");
+    tracing::debug!(%error, "stdout accepts no data");
     if error.kind() != io::ErrorKind::BrokenPipe {
         LOST.get_or_init(|| error);
     }

@@ -134,7 +134,7 @@ impl PlaybackObserver for Screen<'_> {
             close();
         }
         if ended && self.has_keys {
-            aside("END      left and down go back, q leaves");
+            aside("END      left and down seek back, q quits");
         }
     }
 }

@@ -133,7 +133,7 @@ fn unrecorded(written: &Summary) -> Vec<String> {
     let counts = [
         (written.sent_dropped, "messages to devices not recorded: the recorder's queue was full"),
         (written.skipped, "packets not recorded: the recorder was behind"),
-        (written.results_missing, "ticks recorded without all their results: too many"),
+        (written.results_missing, "ticks recorded with some results missing: too many results"),
     ];
     losses
         .extend(counts.iter().filter(|(count, _)| *count > 0).map(|(count, what)| format!("{count} {what}")));

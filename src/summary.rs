@@ -74,7 +74,7 @@ pub(crate) fn summary(report: &Report, columns: Option<usize>) -> String {
         let strangers = source.line.as_ref().map_or(0, |line| line.strangers);
         if strangers > 0 {
             line(format!(
-                "  {strangers} messages on the line of {} came from others and weren't used",
+                "  {strangers} messages on the line of {} came from other devices and were ignored",
                 source.id
             ));
         }
@@ -133,7 +133,7 @@ fn dropped(source: &SourceReport) -> Option<String> {
 fn silence(source: &SourceReport) -> Option<String> {
     let id = &source.id;
     match source.silent_at_end_s {
-        None => Some(format!("  {id} said nothing")),
+        None => Some(format!("  {id} sent nothing")),
         Some(end_s) if end_s > SILENT_S => Some(format!("  {id} silent for the last {end_s:.0} s")),
         Some(_) if source.longest_gap_s > SILENT_S => {
             Some(format!("  {id} silent for up to {:.0} s", source.longest_gap_s))
@@ -153,7 +153,7 @@ fn not_inspected_text(why: &NotInspectedReport, dive: &DiveReport) -> String {
         }
         "outside_tunnel" => return outside_text(dive),
         "no_position" => {
-            format!("NOTHING WAS JUDGED: the vehicle never had a position, there was no {lacking}")
+            format!("NO VERDICTS: the vehicle never had a position, because the {lacking} was unknown")
         }
         _ => format!(
             "NO INSPECTION: {:.0} % of the pings had no position, mostly because of missing {lacking}",
@@ -162,7 +162,7 @@ fn not_inspected_text(why: &NotInspectedReport, dive: &DiveReport) -> String {
     };
     match why.silent_sources.as_slice() {
         [] => text,
-        silent => format!("{text}; nothing came from {}", silent.join(", ")),
+        silent => format!("{text}; {} sent nothing", silent.join(", ")),
     }
 }
 
@@ -172,9 +172,7 @@ fn outside_text(dive: &DiveReport) -> String {
         (Some(from_m), Some(to_m)) => format!(" from {} to {}", station(from_m), station(to_m)),
         _ => String::new(),
     };
-    format!(
-        "NOTHING WAS JUDGED: the heads were outside the tunnel{place}: check the tether's zero and length_m"
-    )
+    format!("NO VERDICTS: the heads were outside the tunnel{place}: check the tether's zero and length_m")
 }
 
 /// Metres by verdict.
@@ -253,7 +251,7 @@ pub(crate) fn broken(line: &str, columns: Option<usize>) -> Vec<String> {
 fn smoothing(report: &SmoothingReport) -> Vec<String> {
     let was = &report.before;
     let mut lines = vec![format!(
-        "  smoothed {} estimates; by the filter alone: passed {:.2} m   missed {:.2} m   can't say {:.2} m   open {:.2} m   not inspected {:.2} m",
+        "  smoothed {} estimates; with the filter alone: passed {:.2} m   missed {:.2} m   can't say {:.2} m   open {:.2} m   not inspected {:.2} m",
         report.estimates, was.pass_m, was.fail_m, was.cannot_say_m, was.open_m, was.not_inspected_m
     )];
     if report.changed.is_empty() {

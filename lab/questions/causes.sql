@@ -1,4 +1,4 @@
--- Which causes cost which hours, by vehicle and pilot: the time that passing the open runs again takes
+-- Hours lost by cause, vehicle and pilot: the time to pass the open runs again
 -- picture: bars label=who hours=hours
 SELECT
     coalesce(d.vehicle, '-') || ', ' || coalesce(d.pilot, '-') || ', ' || r.cause AS who,

@@ -1,4 +1,4 @@
--- What a target of 0.3 m would have flagged: metres and flags of each dive as they were, and at 0.3 m
+-- Effect of a target of 0.3 m: metres and flags of each dive at its own target and at 0.3 m
 -- picture: bars label=log now=fail_m then=fail_at_03_m
 SELECT
     d.log, d.plant, d.day, d.target_m,

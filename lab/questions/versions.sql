@@ -1,4 +1,4 @@
--- What a new program version changes over all dives: sections by verdict before and now, and how far D moved
+-- Effect of a new program version on all dives: sections by verdict before and now, and the change of D
 -- picture: bars label=change metres=metres
 SELECT
     b.verdict || ' -> ' || s.verdict AS change,

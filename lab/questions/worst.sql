@@ -1,4 +1,4 @@
--- Worst sections of each plant: the largest holes that failed, ten a plant
+-- Worst sections of each plant: the ten largest holes of failed sections
 -- picture: bars label=section d=d_m
 SELECT * FROM (
     SELECT

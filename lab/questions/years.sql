@@ -1,4 +1,4 @@
--- The same chainage through the years: verdict and largest hole of each section, dive by dive, with what can't be said
+-- The same chainage over the years: verdict and largest hole of each section, dive by dive, including sections without a verdict
 -- picture: strips x=chainage_m to=end_m row=dived colour=verdict
 SELECT
     coalesce(d.plant || ' ', '') || coalesce(CAST(d.day AS VARCHAR), d.log) AS dived,

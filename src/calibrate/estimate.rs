@@ -29,8 +29,8 @@ pub(crate) enum NotEstimated {
     },
     /// The vehicle never stood still for long enough.
     #[error(
-        "the vehicle moved: {what} varied by {span:.2} {unit}, at most {limit} counts \
-         as still; it never stood still for {least_s} s"
+        "the vehicle moved: {what} varied by {span:.2} {unit} (at most {limit} counts \
+         as stationary); it was never stationary for {least_s} s"
     )]
     Moved {
         /// The quantity that moved.
@@ -46,7 +46,7 @@ pub(crate) enum NotEstimated {
     },
     /// A head has covered too little of the wall.
     #[error(
-        "no full turn: the head has seen only {seen_deg:.0} degrees of wall; at least {least_deg:.0} are \
+        "no full turn: the head covered only {seen_deg:.0} degrees of wall; at least {least_deg:.0} are \
          needed"
     )]
     LittleWall {
@@ -58,7 +58,7 @@ pub(crate) enum NotEstimated {
     /// Turning the head about its axis changes nothing.
     #[error(
         "the section looks the same at every angle of the head about its axis (a circle doesn't determine \
-         roll): the angle would be known only to {sd_deg:.1} degrees"
+         roll): the angle would have a standard deviation of {sd_deg:.1} degrees"
     )]
     Round {
         /// Remaining standard deviation, degrees.
@@ -66,13 +66,14 @@ pub(crate) enum NotEstimated {
     },
     /// The offset of a single head can't be separated from the vehicle's position.
     #[error(
-        "the offset of a single head can't be distinguished from the vehicle's place; at least two heads \
+        "the offset of a single head can't be distinguished from the vehicle's position; at least two heads \
          are needed"
     )]
     OneHead,
     /// Another unknown has the same effect.
     #[error(
-        "an offset looks like another place or heading of the vehicle: it would be known only to {sd_m:.3} m"
+        "an offset can't be distinguished from another position or heading of the vehicle: it would have a \
+         standard deviation of {sd_m:.3} m"
     )]
     LikePlace {
         /// Remaining standard deviation, m.
@@ -81,7 +82,8 @@ pub(crate) enum NotEstimated {
     /// A mirrored head would fit as well.
     #[error(
         "the opposite sense of rotation fits nearly as well (difference {margin:.0}, needed {needed:.0}): the \
-         section is symmetric; stand well to one side of the centre, within range of the echosounders"
+         section is symmetric; put the vehicle well to one side of the centre, within range of the \
+         echosounders"
     )]
     Mirror {
         /// Cost difference of the other way, in squared standard deviations.
@@ -91,8 +93,8 @@ pub(crate) enum NotEstimated {
     },
     /// The wall doesn't match the profile.
     #[error(
-        "the returns contradict the profile: half of them are over {median_m:.2} m off; at most {most_m} m \
-         is allowed"
+        "the returns contradict the profile: half of them deviate by more than {median_m:.2} m; at most \
+         {most_m} m is allowed"
     )]
     Contradicted {
         /// Median of the absolute residuals, m.
@@ -131,13 +133,15 @@ pub(crate) enum NotEstimated {
     #[error("the time at the surface is unknown; give --at-surface FROM..TO")]
     NoSurface,
     /// Shifting a source's timestamps changes nothing.
-    #[error("the vehicle hardly turned or moved: the latency would be known only to {sd_ms:.0} ms")]
+    #[error(
+        "the vehicle hardly turned or moved: the latency would have a standard deviation of {sd_ms:.0} ms"
+    )]
     Flat {
         /// Remaining standard deviation, ms.
         sd_ms: f64,
     },
     /// The likelihood has no maximum within the search range.
-    #[error("no latency within {reach_ms:.0} ms of the file's fits best")]
+    #[error("no best fit was found within {reach_ms:.0} ms of the file's latency")]
     NoBest {
         /// Search range to either side, ms.
         reach_ms: f64,
@@ -155,8 +159,8 @@ pub(crate) enum NotEstimated {
     },
     /// The device answers before its next request, so it can't be that late.
     #[error(
-        "{found_ms:.0} ms fits best, but the device answers every {every_ms:.0} ms, so it can't be \
-         that late; look for a delay on its line, or another fault"
+        "{found_ms:.0} ms fits best, but the device answers every {every_ms:.0} ms, so its latency is \
+         shorter; look for a delay on its line, or another fault"
     )]
     Slow {
         /// Most likely latency, ms.
@@ -166,7 +170,7 @@ pub(crate) enum NotEstimated {
     },
     /// Ranges don't fit the size of the design profile.
     #[error(
-        "ranges are {long_pct:+.1} % long for this profile: set sound_speed_mps = {sound_mps:.0} \
+        "ranges differ from this profile by {long_pct:+.1} %: set sound_speed_mps = {sound_mps:.0} \
          in the vehicle file, or correct the profile there; other values can be estimated only afterwards"
     )]
     Scaled {

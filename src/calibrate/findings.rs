@@ -52,7 +52,7 @@ impl Findings {
             events: &collected.events,
         };
         let in_time = Material { events: &within, ..all };
-        progress("how the heads sit");
+        progress("mounts of the heads");
         let heads = heads(&in_time);
         let surface = match collected.at_surface {
             Some([from, to]) => zero::surface(&all, from, to),

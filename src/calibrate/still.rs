@@ -29,7 +29,7 @@ enum Sign {
 impl Sign {
     fn what(self) -> &'static str {
         match self {
-            Self::Cable => "the cable",
+            Self::Cable => "the cable length",
             Self::Depth => "depth",
             Self::Echo => "an echosounder's range",
             Self::Attitude => "attitude",

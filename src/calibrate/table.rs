@@ -85,7 +85,7 @@ impl Table {
         table.water(vehicle, findings);
         match &findings.heads {
             Ok(heads) => heads.heads.iter().for_each(|head| table.head(vehicle, head)),
-            Err(why) => table.open("heads", "how they sit", *why),
+            Err(why) => table.open("heads", "mounts", *why),
         }
         table.tethers(vehicle, findings);
         table.lags(vehicle, findings);
@@ -179,7 +179,7 @@ impl Table {
                     Value::Facing { file: facing(filed_aft), found: facing(filed_aft != is_mirrored) };
                 self.found.push(Found { of: id.clone(), what: "faces", unit: "", decimals: 0, value });
             }
-            Err(why) => self.open(&id, "which way it faces", why),
+            Err(why) => self.open(&id, "facing direction", why),
         }
         let (roll, ..) = head.filed.rotation.roll_pitch_yaw();
         let degrees = |of: Estimate| Estimate {

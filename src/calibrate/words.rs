@@ -26,11 +26,11 @@ pub(super) fn text(
         let [y, z] = heads.place_m;
         let [from_s, to_s] = [heads.still.from, heads.still.to].map(|at| collected.seconds(at));
         line(&format!(
-            "still from {from_s:.1} to {to_s:.1} s, {:.3} m left of the middle and {:.3} m above the floor (sd {:.3}, {:.3})",
+            "stationary from {from_s:.1} to {to_s:.1} s, {:.3} m left of the centre and {:.3} m above the floor (sd {:.3}, {:.3})",
             y.value, z.value, y.sd, z.sd
         ));
         line(&format!(
-            "half of the returns within {:.3} m of the profile; ranges {:+.2} % long (sd {:.2})",
+            "half of the returns are within {:.3} m of the profile; ranges are too long by {:+.2} % (sd {:.2})",
             heads.median_m,
             heads.scale.value * 100.0,
             heads.scale.sd * 100.0
@@ -51,13 +51,13 @@ pub(super) fn text(
         table.found.iter().for_each(|found| line(&row(found)));
     }
     if !table.open.is_empty() {
-        line("\nnot told by this log");
+        line("\nnot determined by this log");
         for open in &table.open {
             line(&format!("  {}, {}: {}", open.of, open.what, open.why));
         }
     }
     if table.lines.is_empty() && table.is_amiss() {
-        line("\nsomething is wrong, see above; no line of the vehicle file is known that mends it");
+        line("\na fault was found, see above; no change of the vehicle file corrects it");
     } else if table.lines.is_empty() {
         line("\nnothing to change in the vehicle file");
     } else {

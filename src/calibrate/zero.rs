@@ -97,7 +97,8 @@ pub(crate) fn water_level(
         }
     }
     let readings = levels.len();
-    let source = of.ok_or(NotEstimated::Missing { what: "a depth sensor during the stand" })?;
+    let source =
+        of.ok_or(NotEstimated::Missing { what: "a depth sensor while the vehicle is stationary" })?;
     let value = median(&mut levels).unwrap_or(f64::NAN);
     let [_, z] = heads.place_m;
     let sd = with_quantum(math::hypot(z.sd, material.settings.depth_sd_m), quantum_m);

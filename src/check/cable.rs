@@ -43,18 +43,18 @@ impl Cable {
 
     /// Text for the summary.
     pub(super) fn line(&self) -> String {
-        let step = self.step_m.map_or("steps given by each reading".to_owned(), |step_m| {
+        let step = self.step_m.map_or("step size stated in each reading".to_owned(), |step_m| {
             format!("steps of {} mm", (step_m * 1e4).round() / 10.0)
         });
         let [slack_m, time_s] = self.slack;
         let mut parts = vec![format!("cable: {step}, slack of {slack_m} m (sd) in {time_s} s")];
         parts.extend(self.at_speed.map(|[speed_mps, sd_m, most_m]| {
             format!(
-                "at {speed_mps:.3} m/s a hole is measured to {sd_m:.3} m (sd), so that holes up to {most_m:.2} m pass"
+                "at {speed_mps:.3} m/s a hole is measured to {sd_m:.3} m (sd), so holes up to {most_m:.2} m pass"
             )
         }));
         if !self.missing.is_empty() {
-            parts.push(format!("not in the file: {}", self.missing.join(", ")));
+            parts.push(format!("missing from the file: {}", self.missing.join(", ")));
         }
         parts.join("; ")
     }

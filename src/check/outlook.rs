@@ -101,13 +101,13 @@ impl Outlook {
         let v_max_mps = self.v_max_mps();
         if let Some(v_max_mps) = v_max_mps.filter(|v_max_mps| planned_mps > *v_max_mps) {
             let problem =
-                format!("is {planned_mps}, faster than the target allows: at most {v_max_mps:.3} m/s");
+                format!("is {planned_mps}, faster than the target allows; the limit is {v_max_mps:.3} m/s");
             found.push(warning("heads.planned_speed_mps", problem));
         } else if let (Some(v_max_mps), Some(started_mps)) = (v_max_mps, self.as_started_mps)
             && started_mps < planned_mps
         {
             let problem = format!(
-                "is {planned_mps}, which leaves no room: with the heads started for it at most {:.3} m/s; {:.3} leaves some",
+                "is {planned_mps}, which leaves no margin: with the heads started for it the limit is {:.3} m/s; {:.3} leaves a margin",
                 down(started_mps),
                 down(HELD_SHARE * v_max_mps)
             );
@@ -128,7 +128,7 @@ impl Outlook {
         let mut lines = Vec::new();
         match &self.own {
             Some(own) => lines.push(format!("plan in {}: {}", own.mode, speed(own))),
-            None => lines.push("plan: the heads are not in one mode".to_owned()),
+            None => lines.push("plan: the heads are in different modes".to_owned()),
         }
         let v_max_mps = self.v_max_mps();
         if let (Some(v_max_mps), Some(started_mps)) = (v_max_mps, self.as_started_mps)

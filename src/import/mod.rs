@@ -124,8 +124,8 @@ fn format(
     vehicle: Option<&VehicleConfig>,
 ) -> Result<Box<dyn Format>, Failure> {
     if args.map.is_some() != (kind == FileKind::Csv) && kind != FileKind::Rosbag {
-        let what = "import: --map MAPPING.toml says what the columns of CSV and the topics of ROS are; CSV wants it, other \
-                    formats know it themselves";
+        let what = "import: --map MAPPING.toml assigns the columns of CSV files and the topics of ROS recordings; CSV requires it; formats \
+                    other than CSV and ROS refuse it";
         return Err(Failure::Usage(what.to_owned()));
     }
     if let Some(format) = kind.format() {
@@ -180,7 +180,11 @@ fn tell(args: &cli::Import, kind: FileKind, ids: &[String], imported: &Imported)
             say(&format!("  {id:<12} {} messages", counts(&number)));
         }
         if imported.passed_over > 0 {
-            say(&format!("  {} {}s are of no sensor here", imported.passed_over, kind.entries()));
+            say(&format!(
+                "  {} {}s belong to no sensor of the vehicle file",
+                imported.passed_over,
+                kind.entries()
+            ));
         }
     }
     for remark in &imported.remarks {
@@ -190,7 +194,7 @@ fn tell(args: &cli::Import, kind: FileKind, ids: &[String], imported: &Imported)
         complain(&format!("headrace: lost: {loss}"));
     }
     if heard == 0 {
-        complain("headrace: no sensor of the vehicle file takes any message of this file");
+        complain("headrace: no message of this file belongs to a sensor of the vehicle file");
         return Ok(failure::FAILED);
     }
     Ok(if imported.losses.is_empty() { failure::OK } else { failure::DATA_LOST })
@@ -202,13 +206,13 @@ fn tell(args: &cli::Import, kind: FileKind, ids: &[String], imported: &Imported)
 fn kind_of(path: &Path) -> Result<FileKind, Failure> {
     let kind = FileKind::of(path);
     if kind == Some(FileKind::Ping) && front_of(path)?.starts_with(&detect::DATAFLASH) {
-        return Err(named(path, &format!("importing {}: no log of Ping Viewer", path.display())));
+        return Err(named(path, &format!("importing {}: not a Ping Viewer log", path.display())));
     }
     kind.map_or_else(
         || {
-            let problem = "its name doesn't say which format it has; known are .tlog, .log (candump), .852, .81a, .81b, \
+            let problem = "the file name doesn't show the format; expected .tlog, .log (candump), .852, .81a, .81b, \
                  .81s, .31l (imagenex), .bin (ping), .csv, .bag (rosbag) and .mcap (of ROS); \
-                 --format tlog|candump|imagenex|ping|csv|rosbag|mcap says it for any name";
+                 for another name, give --format tlog|candump|imagenex|ping|csv|rosbag|mcap";
             Err(named(path, &format!("importing {}: {problem}", path.display())))
         },
         Ok,
@@ -232,7 +236,7 @@ fn named(path: &Path, problem: &str) -> Failure {
         Ok(front) => front,
         Err(failure) => return failure,
     };
-    let looks = detect::looks_like(&front).map(|words| format!("; it looks like this: {words}"));
+    let looks = detect::looks_like(&front).map(|words| format!("; its content: {words}"));
     Failure::Usage(format!("{problem}{}", looks.unwrap_or_default()))
 }
 

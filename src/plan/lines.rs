@@ -27,8 +27,8 @@ pub(super) fn lines(findings: &Findings, args: &Plan) -> Result<String, Failure>
         .map(|target_m| format!(": {target_m} m in {mode}, driven at {held_mps:.3} m/s"));
     let target = args.target.map(|target_m| format!("target_m = {target_m}\n")).unwrap_or_default();
     let mut text = format!(
-        "# In place of the same keys of {}{}\n{target}\n[heads]\nlayout = {:?}\n\
-         # The most is {speed_mps:.3}, less what a pilot's speed varies: heads apart along the hull are in phase about the planned speed only.\n\
+        "# Replaces the same keys of {}{}\n{target}\n[heads]\nlayout = {:?}\n\
+         # The limit is {speed_mps:.3}, less a margin for the pilot's speed variation: heads at different positions along the hull are in phase only near the planned speed.\n\
          planned_speed_mps = {held_mps:.3}\n",
         vehicle.display(),
         met.unwrap_or_default(),

@@ -33,7 +33,7 @@ pub(super) fn heads(findings: &Findings) -> String {
     };
     match findings.heads.len() {
         1 => "1 head".to_owned(),
-        count => format!("{count} heads in {layout}"),
+        count => format!("{count} heads, {layout}"),
     }
 }
 
@@ -90,7 +90,7 @@ fn range_warning(findings: &Findings) -> Option<String> {
 }
 
 const HEADINGS: [&str; 2] = [
-    "                                   T_y at rest, m         at  T_x, m, seen by   T_max  sure to hit, m   v_max   hours",
+    "                                   T_y at rest, m         at  T_x, m, seen by   T_max  certain hit, m   v_max   hours",
     "  mode     step   turn  overlap    min   mean  worst     m/s    all    fewest       m   once    twice     m/s  needed",
 ];
 
@@ -166,7 +166,7 @@ fn notes(findings: &Findings) -> Vec<String> {
 fn best_words(best: &Answer) -> String {
     let met = match (best.meets_target, best.suffices) {
         (Some(true), _) => "; it meets the target",
-        (Some(false), _) => "; it misses the target",
+        (Some(false), _) => "; it doesn't meet the target",
         _ => "",
     };
     match (best.v_max_mps, best.needed_h, best.meets_target) {
@@ -185,15 +185,15 @@ fn best_words(best: &Answer) -> String {
 fn margin_words(mode: &str, margins: &Margins) -> String {
     /// Difference below what the printed speeds show, m/s.
     const NOTHING_MPS: f64 = 5e-4;
-    let mut words = vec![format!("{mode}: {:.3} m/s by geometry", margins.geometry_mps)];
+    let mut words = vec![format!("{mode}: {:.3} m/s from the geometry alone", margins.geometry_mps)];
     let after = margins.speeds_mps().into_iter().skip(1);
     for ((margin, price_mps), speed_mps) in margins.prices_mps().into_iter().zip(after) {
         let why = match margin {
-            Margin::Hidden => "with what the vehicle hides".to_owned(),
-            Margin::Phase => "with heads side by side or askew".to_owned(),
-            Margin::Swing => "with yawing".to_owned(),
+            Margin::Hidden => "with occlusion by the vehicle".to_owned(),
+            Margin::Phase => "with heads side by side or at an angle".to_owned(),
+            Margin::Swing => "with yaw motion".to_owned(),
             Margin::Position => {
-                format!("with the distance between passes known to {:.1} cm", 100.0 * margins.pass_error_m)
+                format!("with passes known to +-{:.1} cm", 100.0 * margins.pass_error_m)
             }
             // A plan has no losses.
             Margin::Geometry | Margin::Losses => continue,
@@ -281,7 +281,7 @@ fn strip_words(strip: &ThinStrip, names: &impl Fn(&[usize]) -> String) -> String
         Some(factor) => {
             let heads = names(&strip.seen_by);
             format!(
-                "{width_m:.2} m of wall at {clock} are seen by {heads} only: passes there are {factor:.3} times as far apart"
+                "{width_m:.2} m of wall at {clock} are seen by {heads} only: T_x is {factor:.3} times as large there"
             )
         }
         None => format!("{width_m:.2} m of wall at {clock} are seen by NO head"),
@@ -294,7 +294,7 @@ fn heard_words(heard: &Heard, names: &impl Fn(&[usize]) -> String) -> String {
         ways.push(format!("face each other for {:.2} s", heard.facing_s));
     }
     if heard.same_patch_s > 0.0 {
-        ways.push(format!("look at the same patch for {:.2} s", heard.same_patch_s));
+        ways.push(format!("see the same patch for {:.2} s", heard.same_patch_s));
     }
-    format!("{} {} of every {:.1} s: they may interfere", names(&heard.heads), ways.join(" and "), heard.of_s)
+    format!("{} {} of every {:.1} s, and may interfere", names(&heard.heads), ways.join(" and "), heard.of_s)
 }

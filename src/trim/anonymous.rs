@@ -70,17 +70,17 @@ fn left(log: &DiveLog, vehicle: &VehicleConfig) -> Vec<String> {
         sources.iter().map(|source| source.id.as_str()).collect::<Vec<_>>().join(", ")
     };
     let mut left = vec![
-        format!("left: the sensors' ids ({})", ids(&info.sources)),
-        format!("left: the tunnel's shape ({}) and all numbers of the vehicle file", vehicle.tunnel.name),
-        "left: device data except positions, texts and system ids of MAVLink; it may contain serial numbers, versions \
+        format!("not anonymised: the sensors' ids ({})", ids(&info.sources)),
+        format!("not anonymised: the tunnel's shape ({}) and all numbers of the vehicle file", vehicle.tunnel.name),
+        "not anonymised: device data except positions, texts and system ids of MAVLink; it may contain serial numbers, versions \
          and the time of day (CAN units, velocity logs, depth sensors when they are opened)"
             .to_owned(),
     ];
     if !info.attachments.is_empty() {
-        left.push("left: the content of the attached files".to_owned());
+        left.push("not anonymised: the content of the attached files".to_owned());
     }
     if log.times().is_some_and(|(_, to)| to.0 >= UTC_FROM_NS) {
-        left.push("left: the messages' times, which are UTC and tell the date".to_owned());
+        left.push("not anonymised: the messages' times, which are UTC and show the date".to_owned());
     }
     left
 }

@@ -141,7 +141,7 @@ fn what_is_done(args: &Trim, files: &[PathBuf], spans: &[(MonoNs, MonoNs)]) -> R
         said.push(format!("of {} (sha256 {})", names.join(", "), files_digest(files)?));
     }
     if let Some([from_m, to_m]) = args.chainage {
-        said.push(format!("cut to chainage {from_m} to {to_m} m: {} spans of time", spans.len()));
+        said.push(format!("cut to chainage {from_m} to {to_m} m: {} time spans", spans.len()));
     } else if !spans.is_empty() {
         said.push("cut in time".to_owned());
     }

@@ -37,7 +37,7 @@ pub(super) fn rows(dive: &Loop) -> (Vec<AlertRow>, usize) {
         state: match (alert.state, alert.needs_acknowledgement()) {
             (AlertState::Active, true) => "NEW",
             (AlertState::Active, false) => "active",
-            (AlertState::Rectified, _) => "is OVER, not acknowledged",
+            (AlertState::Rectified, _) => "rectified, not acknowledged",
             (AlertState::Cleared, _) => "cleared",
         },
         lamp: match alert.priority {
@@ -68,7 +68,7 @@ impl Desk {
 
     /// Silences all sounding alerts; returns the answer to show.
     pub(super) fn silence(&self) -> String {
-        self.send(&Command::Silence { by: Who::cut(BY) }, "silent for 30 s".to_owned())
+        self.send(&Command::Silence { by: Who::cut(BY) }, "alerts silenced for 30 s".to_owned())
     }
 
     /// Adds a note at the present place; returns the answer to show.
@@ -80,7 +80,7 @@ impl Desk {
         match self.0.as_ref().map(|console| console.send(command)) {
             Some(Ok(())) => done,
             Some(Err(error)) => error.to_string(),
-            None => "this dive is over: what was acknowledged and noted is in its log".to_owned(),
+            None => "this dive has ended: its log contains the acknowledgements and notes".to_owned(),
         }
     }
 

@@ -191,7 +191,7 @@ impl Page {
             if condition == Condition::Good && self.late.is_none() { format!("GOOD: {what}") } else { what };
         let arrow = if self.ink.unicode { "→" } else { "->" };
         let action = match self.late {
-            Some(_) => format!("{arrow} what is below is from before; stop"),
+            Some(_) => format!("{arrow} the values below are old; stop"),
             None if shot.status.action.is_empty() => shot.status.what.get(1).cloned().unwrap_or_default(),
             None => format!("{arrow} {}", shot.status.action),
         };
@@ -238,7 +238,7 @@ impl Page {
             return;
         }
         let room = if room > 2 {
-            rows.title("TOLD", self.ink);
+            rows.title("EVENTS", self.ink);
             room - 1
         } else {
             room
@@ -264,11 +264,11 @@ impl Page {
         rows.bottom -= 1;
         let reversed = Style::default().add_modifier(Modifier::REVERSED);
         let text = match (&self.note, &self.said) {
-            (Some(note), _) => format!(" note: {note}_   (Enter keeps it, Esc doesn't)"),
+            (Some(note), _) => format!(" note: {note}_   (Enter saves it, Esc discards it)"),
             (None, Some(said)) => format!(" {said}"),
             (None, None) => {
                 let play: &[&str] =
-                    if self.playing.is_some() { &["space pause", "arrows go", "q leave"] } else { &[] };
+                    if self.playing.is_some() { &["space pause", "arrows seek", "q quit"] } else { &[] };
                 let ours = ["a acknowledge", "s silence", "n note", "w wall", "Ctrl-C ends the dive"];
                 let mut text = " ? keys".to_owned();
                 // As many keys as fit.
@@ -288,14 +288,14 @@ impl Page {
     fn show_help(&self, area: Rect, to: &mut Buffer) {
         let mut lines = vec![
             "a   acknowledge the alert on top".to_owned(),
-            "A   acknowledge all".to_owned(),
-            "s   silence for 30 s".to_owned(),
-            "n   note at the present place".to_owned(),
-            "w   wall: near, all seen, whole tunnel".to_owned(),
-            "?   these keys".to_owned(),
-            "Ctrl-C ends the dive; twice, the program".to_owned(),
+            "A   acknowledge all alerts".to_owned(),
+            "s   silence alerts for 30 s".to_owned(),
+            "n   note at this position".to_owned(),
+            "w   wall: nearby, all seen, whole tunnel".to_owned(),
+            "?   list of keys".to_owned(),
+            "Ctrl-C ends the dive; twice ends the program".to_owned(),
             String::new(),
-            "wall: height is hole / target".to_owned(),
+            "wall: bar height is hole / target".to_owned(),
             if self.ink.unicode {
                 "✖ missed  ? can't say  ~ open"
             } else {

@@ -29,7 +29,7 @@ pub(super) fn speed(shot: &ScreenFrame, ink: Palette, rows: &mut Rows<'_>) {
     let (speed_mps, v_max_mps) =
         (state.speed_mps.filter(|_| is_known), state.v_max_mps().filter(|_| is_known));
     let figure = |mps: Option<f64>| mps.map_or_else(|| "-.--".to_owned(), |mps| format!("{mps:.2}"));
-    let words = format!("SPEED  {} of at most {} m/s  ", figure(speed_mps), figure(v_max_mps));
+    let words = format!("SPEED  {} m/s (limit {})  ", figure(speed_mps), figure(v_max_mps));
     let mut spans = vec![Span::styled(words.clone(), Style::default().add_modifier(Modifier::BOLD))];
     let columns = usize::from(rows.width()).saturating_sub(words.chars().count() + 2).min(60);
     if let (Some(speed_mps), Some(v_max_mps)) = (speed_mps, v_max_mps)
@@ -101,8 +101,10 @@ pub(super) fn place(shot: &ScreenFrame, ink: Palette, rows: &mut Rows<'_>) {
             (age, Lamp::Red)
         }
         PositionState::None(_) => ("no position".to_owned(), Lamp::Red),
-        PositionState::Doubtful(_) => (format!("doubtful: passes {pm}{:.2} m", state.pass_sd_m), Lamp::Amber),
-        PositionState::Ok => (format!("sure: passes {pm}{:.2} m", state.pass_sd_m), Lamp::Green),
+        PositionState::Doubtful(_) => {
+            (format!("doubtful: pass spacing {pm}{:.2} m", state.pass_sd_m), Lamp::Amber)
+        }
+        PositionState::Ok => (format!("ok: pass spacing {pm}{:.2} m", state.pass_sd_m), Lamp::Green),
     };
     spans.push(Span::styled(format!("  {} {words}", ink.shape(lamp)), ink.style(lamp)));
     if let Some(sd) = state.sd.filter(|_| has_position) {
@@ -270,11 +272,11 @@ fn sensor_words(sensor: &SensorRow, long: bool) -> (String, Lamp) {
         SensorState::Ok if long => (format!("{id}{rate} {age}"), Lamp::Green),
         SensorState::Ok => (format!("{id}{rate}"), Lamp::Green),
         SensorState::Silent => (format!("{id} SILENT {age}"), Lamp::Red),
-        SensorState::Never => (format!("{id} never heard"), Lamp::Red),
-        SensorState::Stalled => (format!("{id} STALLED"), Lamp::Red),
-        SensorState::Hung => (format!("{id} hangs"), Lamp::Red),
+        SensorState::Never => (format!("{id} no data yet"), Lamp::Red),
+        SensorState::Stalled => (format!("{id} doesn't turn"), Lamp::Red),
+        SensorState::Hung => (format!("{id} stuck"), Lamp::Red),
         SensorState::Deaf => (format!("{id} detects no wall"), Lamp::Red),
-        SensorState::Distrusted => (format!("{id} not believed"), Lamp::Amber),
+        SensorState::Distrusted => (format!("{id} not trusted"), Lamp::Amber),
     };
     let why = if long && !why.is_empty() { format!(": {why}") } else { String::new() };
     (words + &why, lamp)
@@ -301,7 +303,7 @@ pub(super) fn wall(
     let columns = usize::from(rows.width()).saturating_sub(LABEL);
     let strip = wall.strip(extent, columns);
     let each = strip.column_m;
-    rows.title(&format!("WALL {}, a column {each} m", extent.words()), ink);
+    rows.title(&format!("WALL {}, {each} m per column", extent.words()), ink);
     if clock {
         for hour in 0..HOURS {
             let label = format!("{:>4}h ", if hour == 0 { 12 } else { hour });

@@ -108,7 +108,7 @@ impl Renderer {
                 self.came = Some(now());
             }
             Message::Interrupted => {
-                self.page.say("ending the dive; once more ends the program at once, without a report");
+                self.page.say("ending the dive; Ctrl-C again ends the program at once, without a report");
                 if let Some(commands) = &self.commands {
                     commands.send(headrace_replay::playback::PlaybackCommand::End).ok();
                 }

@@ -136,7 +136,7 @@ impl Extent {
     pub(super) fn words(self) -> &'static str {
         match self {
             Self::Near => "near the vehicle",
-            Self::Way => "all that was seen",
+            Self::Way => "seen so far",
             Self::Tunnel => "whole tunnel",
         }
     }

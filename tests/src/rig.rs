@@ -238,7 +238,7 @@ impl Ended {
         assert_eq!(self.report.sources[number].frames, self.view.whole[number]);
         // On a busy machine its line may be looked at before its first frame has come.
         let after_opening =
-            said.strip_prefix(&["silent: the line is open, and no frame has come yet".to_owned()]);
+            said.strip_prefix(&["silent: the line is open, but no frame has arrived yet".to_owned()]);
         assert_eq!(after_opening.unwrap_or(said), ["running"], "the healthy sensor");
     }
 }

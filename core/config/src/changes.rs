@@ -34,7 +34,7 @@ pub fn changed(text: &str, changes: &Section<'_>) -> Result<String, ConfigError>
             continue;
         }
         if found.is_empty() {
-            return Err(invalid("is not in the vehicle file, so that it can't be changed"));
+            return Err(invalid("is not in the vehicle file, so it can't be changed"));
         }
         edits.extend(found.into_iter().map(|span| (span, value)));
     }
@@ -115,7 +115,7 @@ mod tests {
 
     #[test]
     fn missing_key_is_rejected() {
-        let missing = "is not in the vehicle file, so that it can't be changed";
+        let missing = "is not in the vehicle file, so it can't be changed";
         let tables = "\n[[openings]]\nname = \"gate\"";
         assert_eq!(change(tables).unwrap_err(), format!("s.toml:2: openings = [[openings]]: {missing}"));
         for (changes, key) in

@@ -33,7 +33,7 @@ impl<'a> Document<'a> {
             return Ok(());
         }
         let len = self.text.len();
-        Err(self.broken_as(&format!("a text of {len} bytes; the most allowed is {MAX_TEXT_BYTES}"), 0))
+        Err(self.broken_as(&format!("a text of {len} bytes; at most {MAX_TEXT_BYTES} are allowed"), 0))
     }
 
     pub(super) fn broken(self, error: &toml::de::Error) -> ConfigError {

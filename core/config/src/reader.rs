@@ -264,7 +264,7 @@ impl<'a> Section<'a> {
         };
         let count = value.get_ref().as_array().map_or(0, |array| array.iter().count());
         if count > MOST_TABLES {
-            let problem = format!("{count} tables; the most allowed is {MOST_TABLES}");
+            let problem = format!("{count} tables; at most {MOST_TABLES} are allowed");
             return Ok(self.wrong(key, Some(value), problem)?.unwrap_or_default());
         }
         let items = value.get_ref().as_array().map(|array| array.iter().enumerate().map(table));

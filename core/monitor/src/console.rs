@@ -38,7 +38,7 @@ pub enum ConsoleError {
     Full,
     /// The dive has as many notes as its report holds.
     #[error(
-        "sending a note to the loop: the dive has {MOST_NOTES} notes, and its report holds no more; none is taken from now on"
+        "sending a note to the loop: the dive has {MOST_NOTES} notes, and its report holds no more; further notes are refused"
     )]
     MostNotes,
 }

@@ -153,7 +153,7 @@ pub fn status_line(
         let deaf = state.sensors_that_are(SensorState::Deaf);
         parts.extend(deaf.map(|source| format!("{} detects no wall", name(source))));
         let hung = state.sensors_that_are(SensorState::Hung);
-        parts.extend(hung.map(|source| format!("{} hangs", name(source))));
+        parts.extend(hung.map(|source| format!("{} stuck", name(source))));
         let forecast = losses_text(state).or_else(|| forecast_text(state));
         let any_speed =
             matches!(condition, Condition::Passed | Condition::GoingBack(_) | Condition::Outside(_));
@@ -203,7 +203,7 @@ fn turn_text(what: &str, state: &LiveState) -> String {
 
 fn doubt_text(doubt: PositionDoubt, state: &LiveState) -> String {
     match doubt {
-        PositionDoubt::Cable => "CAN'T SAY: cable doubted".to_owned(),
+        PositionDoubt::Cable => "CAN'T SAY: cable doubtful".to_owned(),
         PositionDoubt::Spread => {
             format!("CAN'T SAY: position ±{:.2} m", state.confidence_sd * state.pass_sd_m)
         }

@@ -140,7 +140,7 @@ fn one_cause_text(cause: Cause, figures: &CauseFigures, heads: &HeadDescriptions
         Cause::OffAxis if figures.swing_m > figures.t_y_m - figures.middle_t_y_m => {
             format!("beams swung {:.1} m between turns (yaw or pitch)", figures.swing_m)
         }
-        Cause::OffAxis => format!("off the middle (steps of {:.2} m along the wall)", figures.t_y_m),
+        Cause::OffAxis => format!("off-centre (steps of {:.2} m along the wall)", figures.t_y_m),
         Cause::HeadStalled => "a head stopped turning".to_owned(),
         Cause::HeadSilent => heads.silent(figures.silent_heads),
         Cause::Phase => format!("heads out of phase ({:.2} m/s)", figures.speed_mps),
@@ -314,25 +314,24 @@ pub fn alert_text(kind: AlertKind, head: &str, x_m: f64, off_m: f64) -> String {
             format!("ch {x}  samples {off_m:.2} m outside the tunnel: check the tether's zero")
         }
         AlertKind::ProfileContradicted => format!(
-            "ch {x}  the wall is {off_m:+.2} m off the design profile: wrong profile or position; nothing passes"
+            "ch {x}  the wall is {off_m:+.2} m off the design profile: wrong profile or position; no section passes"
         ),
-        AlertKind::HeadScattered => format!(
-            "ch {x}  returns of {head} are {:.2} m off one another: noise; they don't count",
-            off_m.abs()
-        ),
+        AlertKind::HeadScattered => {
+            format!("ch {x}  returns of {head} differ by {:.2} m: noise; they are ignored", off_m.abs())
+        }
         AlertKind::HeadConstant => format!(
-            "ch {x}  {head} says {off_m:.2} m wherever it looks: its own frame or a bubble; its returns don't count"
+            "ch {x}  {head} measures {off_m:.2} m at every angle: its own frame or a bubble; its returns are ignored"
         ),
         AlertKind::HeadOutvoted => format!(
-            "ch {x}  {head} sees a wall {off_m:+.2} m off the one that other heads see; its returns don't count"
+            "ch {x}  {head} measures the wall {off_m:+.2} m away from that of the other heads; its returns are ignored"
         ),
         AlertKind::SettingDoubted => format!("ch {x}  ranges contradict a setting of the vehicle file"),
         AlertKind::CableDoubted if !head.is_empty() => format!(
-            "ch {x}  cable counter and {head} differ by {:.2} m: one of them is wrong; sections there wait",
+            "ch {x}  cable counter and {head} differ by {:.2} m: one of them is wrong; sections there get no verdict",
             off_m.abs()
         ),
         AlertKind::CableDoubted => format!(
-            "ch {x}  cable counter and inertial unit differ by {:.2} m: position by the inertial unit alone; sections there wait",
+            "ch {x}  cable counter and inertial unit differ by {:.2} m: position from the inertial unit alone; sections there get no verdict",
             off_m.abs()
         ),
     }
@@ -357,7 +356,7 @@ pub fn setting_text(doubt: &SettingDoubt, x_m: f64, name: &dyn Fn(u16) -> String
         Setting::HeadYawed(by_rad) => {
             format!("{source} seems to be yawed by {:+.1} degrees on its mount", by_rad.to_degrees())
         }
-        Setting::WrongWayRound => format!("{source} seems to be the wrong way round"),
+        Setting::WrongWayRound => format!("{source} seems to be mounted the wrong way round"),
         Setting::Swapped(other) => format!("{source} and {} seem to be swapped", name(other)),
     };
     format!("ch {}  {what}", station(x_m))

@@ -112,7 +112,7 @@ impl VehicleConfig {
         }
         // A vehicle without any connection is only simulated or replayed.
         if silent.len() < self.sensors.len() {
-            let problem = format!("have no connect, so that `run` can't reach them: {}", silent.join(", "));
+            let problem = format!("have no connect, so `run` can't reach them: {}", silent.join(", "));
             found.extend((!silent.is_empty()).then(|| warning("sensors".to_owned(), problem)));
         }
         found

@@ -118,7 +118,7 @@ fn parse_points(text: &str) -> Result<(Vec<Yz>, Vec<usize>), String> {
         let mut fields = line.split(',').map(|field| field.trim().parse::<f64>().ok());
         match (fields.next().flatten(), fields.next().flatten(), fields.next()) {
             (Some(_), Some(_), None) if points.len() >= MOST_POINTS => {
-                return Err(format!("has more than {MOST_POINTS} points, the most that a profile may have"));
+                return Err(format!("has more than {MOST_POINTS} points, the limit for a profile"));
             }
             (Some(y), Some(z), None) => {
                 points.push([y, z]);
@@ -127,7 +127,7 @@ fn parse_points(text: &str) -> Result<(Vec<Yz>, Vec<usize>), String> {
             _ if number == 0 => {}
             _ => {
                 let start: String = line.chars().take(60).collect();
-                return Err(format!("line {} is {start:?}; allowed is y_m,z_m", number + 1));
+                return Err(format!("line {} is {start:?}; expected y_m,z_m", number + 1));
             }
         }
     }
@@ -146,6 +146,6 @@ mod tests {
         let words = parse_points(&"1,2\n".repeat(MOST_POINTS + 1)).unwrap_err();
         assert!(words.starts_with("has more than 100000 points"), "{words}");
         assert!(parse_points(&format!("1,2\n{}", "3".repeat(1 << 20))).unwrap_err().len() < 200);
-        assert_eq!(parse_points("1,2\n3;4\n").unwrap_err(), "line 2 is \"3;4\"; allowed is y_m,z_m");
+        assert_eq!(parse_points("1,2\n3;4\n").unwrap_err(), "line 2 is \"3;4\"; expected y_m,z_m");
     }
 }

@@ -22,7 +22,7 @@ pub enum CostError {
     #[error(transparent)]
     Truth(#[from] TruthError),
     /// A file isn't among those built into the program.
-    #[error("reading {name:?}: no such file comes with the program; it has {known}")]
+    #[error("reading {name:?}: the program contains no such file; expected one of {known}")]
     NoFile {
         /// Its name.
         name: String,

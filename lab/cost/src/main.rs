@@ -21,7 +21,7 @@ const MARK: &str = "<!-- headrace cost -->\n";
 /// First text of a table.
 const TABLE: &str = "scene,method,knob,";
 
-/// Measure what accuracy costs in time: errors against independent values, setting by setting, beside CPU time or hours.
+/// Measure the cost of accuracy: errors against independent values, setting by setting, next to CPU time or hours.
 ///
 /// Simulates dives, replays them with other settings, and prints a table and a sentence of advice for each trade; --out writes
 /// the page, JSON, CSV and pictures that docs/why/cost has. Times are CPU time of one thread.
@@ -32,19 +32,19 @@ const TABLE: &str = "scene,method,knob,";
     after_help = "Example:\n  headrace cost --quick\n  headrace cost --only survey --vehicle deploy/vehicles/vita2-4.toml\n  headrace cost --out docs/why/cost"
 )]
 struct Cost {
-    /// Take under a minute: few settings and seeds, short dives.
+    /// Measure in under a minute, with few settings, few seeds and short dives.
     #[arg(long)]
     quick: bool,
-    /// Measure these trades only.
+    /// Measure only these trades.
     #[arg(long, value_name = "TRADE,..", value_delimiter = ',', value_parser = PossibleValuesParser::new(TRADES.map(|(name, _)| name)))]
     only: Vec<String>,
-    /// Vehicle file whose survey is priced in place of the shipped ones'; the other trades are of shipped vehicles.
+    /// Vehicle file for the trade Survey, instead of the shipped files. The other trades use the shipped files.
     #[arg(long, value_name = "FILE")]
     vehicle: Option<PathBuf>,
-    /// Folder for page, JSON, tables and pictures.
+    /// Output folder for page, JSON, tables and charts.
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
-    /// Overwrite files that headrace cost hasn't written, too.
+    /// Also overwrite files that headrace cost has not written.
     #[arg(long)]
     force: bool,
     #[command(flatten)]
@@ -54,10 +54,10 @@ struct Cost {
 /// Amount of output besides the results.
 #[derive(Debug, Args)]
 struct Verbosity {
-    /// Tell on stderr what is being measured.
+    /// Print the progress on stderr.
     #[arg(short, long, conflicts_with = "quiet")]
     verbose: bool,
-    /// Show results and errors only, as without --verbose.
+    /// Show only results and errors, as without --verbose.
     #[arg(short, long)]
     quiet: bool,
 }
@@ -77,7 +77,7 @@ enum Failure {
     Unwritable { path: PathBuf, source: io::Error },
     #[error("writing to stdout: {0}")]
     Stdout(io::Error),
-    #[error("{}: exists, and isn't one that headrace cost has written; --force overwrites it", path.display())]
+    #[error("{}: exists and was not written by headrace cost; --force overwrites it", path.display())]
     InTheWay { path: PathBuf },
 }
 

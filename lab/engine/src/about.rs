@@ -44,10 +44,13 @@ impl Abouts {
         let mut reader = csv::ReaderBuilder::new().trim(csv::Trim::All).from_reader(text.as_bytes());
         let names = reader.headers().map_err(|error| wrong(1, error.to_string()))?.clone();
         if let Some(unknown) = names.iter().find(|name| !COLUMNS.contains(name)) {
-            return Err(wrong(1, format!("{unknown:?} isn't a column; there are {}", COLUMNS.join(", "))));
+            return Err(wrong(
+                1,
+                format!("{unknown:?} isn't a column; expected one of {}", COLUMNS.join(", ")),
+            ));
         }
         if !names.iter().any(|name| name == "log") {
-            return Err(wrong(1, "there is no column log".to_owned()));
+            return Err(wrong(1, "the column log is missing".to_owned()));
         }
         let mut all = BTreeMap::new();
         for (line, row) in (2..).zip(reader.records()) {
@@ -62,7 +65,7 @@ impl Abouts {
             });
             let about = About { plant: cell("plant"), pilot: cell("pilot"), day: day.transpose()? };
             if all.insert(log.clone(), about).is_some() {
-                return Err(wrong(line, format!("{log} is there twice")));
+                return Err(wrong(line, format!("{log} is listed twice")));
             }
         }
         Ok(Self(all))
@@ -107,10 +110,10 @@ mod tests {
         let why = |text| Abouts::parse("dives.csv", text).unwrap_err().to_string();
         assert_eq!(
             why("log,pilots\n"),
-            "dives.csv:1: \"pilots\" isn't a column; there are log, plant, pilot, day"
+            "dives.csv:1: \"pilots\" isn't a column; expected one of log, plant, pilot, day"
         );
         assert_eq!(why("log,day\nx,May\n"), "dives.csv:2: day = May: must be a day like 2024-05-31");
-        assert_eq!(why("log\nx\nx\n"), "dives.csv:3: x is there twice");
+        assert_eq!(why("log\nx\nx\n"), "dives.csv:3: x is listed twice");
         assert_eq!(why("plant\n"), "dives.csv:1: there is no column log");
     }
 }

@@ -93,14 +93,14 @@ impl Cache {
             Err(error) => return Found::Broken(format!("{WHOLE}: {error}")),
         };
         let Ok(written) = serde_json::from_str::<BTreeMap<String, Written>>(&whole) else {
-            return Found::Broken(format!("{WHOLE} isn't what was written"));
+            return Found::Broken(format!("{WHOLE} differs from the written file"));
         };
         for table in TABLES {
             let path = Self::table(dive, table);
             match digest(&path) {
                 Err(error) => return Found::Broken(format!("{table}.parquet: {error}")),
                 Ok(there) if written.get(table) != Some(&there) => {
-                    return Found::Broken(format!("{table}.parquet isn't what was written"));
+                    return Found::Broken(format!("{table}.parquet differs from the written file"));
                 }
                 Ok(_) => {}
             }

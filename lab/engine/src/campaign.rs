@@ -214,7 +214,9 @@ impl Campaign {
             let (Some(logs), Some(digests), Some(errors)) =
                 (texts("log"), texts("log_sha256"), texts("error"))
             else {
-                return Err(DataFusionError::Internal(format!("{} is no dives", rows.schema())).into());
+                return Err(
+                    DataFusionError::Internal(format!("{} isn't a table of dives", rows.schema())).into()
+                );
             };
             for ((log, sha256), error) in logs.iter().zip(digests).zip(errors) {
                 let Some(dive) = log.and_then(|log| by_log.get(log)) else { continue };
@@ -236,8 +238,9 @@ impl Campaign {
         let folder = self.maker.cache().dive(&self.parameters.digest(), sha256);
         if !folder.exists() {
             let (folder, cache) = (folder.display(), self.maker.cache().folder().display());
-            let why = "is missing though an executor has made it; --cache must be one folder that all see";
-            return Err(Error::Usage(format!("{folder} {why}, here it is {cache}")));
+            let why =
+                "is missing, although an executor has written it; all machines must share one --cache folder";
+            return Err(Error::Usage(format!("{folder} {why}; on this machine it is {cache}")));
         }
         Ok(Made::Kept { sha256: sha256.to_owned(), folder })
     }

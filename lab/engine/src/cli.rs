@@ -30,11 +30,11 @@ const USAGE: u8 = 2;
 /// Exit code: finished, but some logs couldn't be replayed, or lost data.
 const DATA_LOST: u8 = 3;
 
-/// Asks the dives of a folder or bucket in SQL. Each is replayed once, and its tables kept.
+/// Query the dives of a folder or bucket in SQL. Each dive is replayed once, and its tables are cached.
 #[derive(Debug, Parser)]
 #[command(name = "headrace-campaign", version = program_version(), after_help = "\
-Tables: dives, sections, holes, flags, runs, sources, alerts; the same of another version as before_dives, ...; and the table \
-function replay(log, parameters [, table]). docs/reference/dive-tables.csv has their columns.
+Tables: dives, sections, holes, flags, runs, sources, alerts; the same tables of another version as before_dives, ...; and the \
+table function replay(log, parameters [, table]). docs/reference/dive-tables.csv has their columns.
 
 Examples:
   headrace campaign dives/ --question worst --picture worst.svg
@@ -42,24 +42,24 @@ Examples:
   headrace campaign s3://bucket/dives --target 0.3 --out dives.parquet --sql \"SELECT * FROM dives\"
   headrace batch dives/ --shard 3/20 --out results/
 
-Exit code: 0 success, 1 a question can't be answered, 2 wrong file or argument, 3 finished, but logs couldn't be replayed or lost data.")]
+Exit code: 0 success, 1 a query can't be answered, 2 invalid file or argument, 3 finished, but some logs couldn't be replayed or have lost data.")]
 pub(crate) struct Arguments {
     /// Folder of logs, searched with its folders, or s3://BUCKET/PREFIX.
     #[arg(value_name = "FOLDER", required_unless_present_any = NO_FOLDER)]
     folder: Option<String>,
-    /// SQL to answer.
+    /// SQL query.
     #[arg(long, conflicts_with = "question")]
     sql: Option<String>,
-    /// Question to answer, by name; --questions lists them.
+    /// Predefined question, by name; --questions lists them.
     #[arg(long, value_name = "NAME")]
     question: Option<String>,
-    /// List the questions that are ready to ask.
+    /// List the predefined questions.
     #[arg(long)]
     questions: bool,
-    /// File for the answer, .csv, .json (lines) or .parquet; with --shard, the folder for the tables.
+    /// Output file of the answer: .csv, .json (lines) or .parquet. With --shard, output folder of the tables.
     #[arg(short, long, value_name = "FILE")]
     out: Option<PathBuf>,
-    /// Picture of the answer, SVG.
+    /// SVG chart of the answer.
     #[arg(long, value_name = "FILE.svg")]
     picture: Option<PathBuf>,
     /// Target T, metres, overriding the vehicle files'.
@@ -74,19 +74,19 @@ pub(crate) struct Arguments {
     /// Vehicle file, overriding those attached to the logs.
     #[arg(long, value_name = "FILE")]
     vehicle: Option<PathBuf>,
-    /// Judge along the smoothed trajectories.
+    /// Use the smoothed trajectories.
     #[arg(long)]
     smooth: bool,
-    /// Replays at a time; by default one for each core.
+    /// Number of simultaneous replays; by default one per core.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
     threads: Option<u16>,
-    /// Folder that keeps tables; by default ~/.cache/headrace.
+    /// Cache folder for tables; by default ~/.cache/headrace.
     #[arg(long, value_name = "DIR")]
     cache: Option<PathBuf>,
-    /// Program version to compare with, for before_dives and the like; by default the one with most dives in the cache.
+    /// Program version to compare with, for before_dives and similar tables; by default the one with most dives in the cache.
     #[arg(long, value_name = "VERSION")]
     before: Option<String>,
-    /// Only replay, every N-th dive beginning with number I, and keep the tables in the folder --out.
+    /// Replay only every N-th dive, beginning with number I, and write the tables to the folder --out.
     #[arg(long, value_name = "I/N", value_parser = shard, requires = "out", conflicts_with_all = ["sql", "question", "picture", "cache"])]
     shard: Option<(usize, usize)>,
     #[cfg(feature = "cluster")]
@@ -221,11 +221,11 @@ async fn make(campaign: &Campaign) -> Result<Finished, Error> {
 
 fn summary(campaign: &Campaign, finished: &Finished, arguments: &Arguments) {
     for (copy, of) in &finished.copies {
-        eprintln!("headrace-campaign: {copy} is a copy of {of}, and counts once");
+        eprintln!("headrace-campaign: {copy} is a copy of {of}; both count as one dive");
     }
     if !is_batch(arguments) {
         for log in &finished.unknown {
-            eprintln!("headrace-campaign: dives.csv names {log}, which isn't there");
+            eprintln!("headrace-campaign: dives.csv names {log}, which doesn't exist");
         }
     }
     let counts = campaign.maker.counts();
@@ -235,7 +235,7 @@ fn summary(campaign: &Campaign, finished: &Finished, arguments: &Arguments) {
         finished.dives.len(),
         counts.replayed(),
         counts.cached(),
-        if counts.broken() > 0 { format!(", {} broken there", counts.broken()) } else { String::new() }
+        if counts.broken() > 0 { format!(", {} damaged there", counts.broken()) } else { String::new() }
     );
 }
 
@@ -249,7 +249,7 @@ fn is_batch(arguments: &Arguments) -> bool {
 
 fn found(name: &str) -> Result<Question, Error> {
     let names = QUESTIONS.map(|question| question.name).join(", ");
-    Question::find(name).ok_or_else(|| Error::Usage(format!("--question {name}: there are {names}")))
+    Question::find(name).ok_or_else(|| Error::Usage(format!("--question {name}: expected one of {names}")))
 }
 
 fn parameters(arguments: &Arguments) -> Result<Parameters, Error> {
@@ -277,7 +277,7 @@ fn cache_folder(arguments: &Arguments) -> Result<PathBuf, Error> {
         |variable: &str, name: &str| std::env::var_os(variable).map(|base| Path::new(&base).join(name));
     below("XDG_CACHE_HOME", "headrace")
         .or_else(|| below("HOME", ".cache/headrace"))
-        .ok_or_else(|| Error::Usage("no folder to keep tables in: give one with --cache".to_owned()))
+        .ok_or_else(|| Error::Usage("no cache folder for tables; give one with --cache".to_owned()))
 }
 
 fn say(text: &str) -> Result<(), Error> {

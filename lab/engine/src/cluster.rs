@@ -144,7 +144,7 @@ fn decode<T: DeserializeOwned>(bytes: &[u8]) -> Result<Option<T>> {
     if version != program_version() {
         let here = program_version();
         return plan_err!(
-            "a plan of headrace-campaign {version} on {here}: client, scheduler and executors must be of one version"
+            "a plan of headrace-campaign {version} on {here}: client, scheduler and executors must have the same version"
         );
     }
     Ok(Some(serde_json::from_value(what).map_err(external)?))

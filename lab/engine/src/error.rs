@@ -17,7 +17,7 @@ pub enum Error {
         why: String,
     },
     /// The place contains no log.
-    #[error("looking for logs (*.mcap) in {0}: there are none")]
+    #[error("looking for logs (*.mcap) in {0}: none found")]
     NoLogs(String),
     /// A store can't be listed or read.
     #[error("reading {what}: {source}")]

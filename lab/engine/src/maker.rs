@@ -167,7 +167,7 @@ impl Maker {
             Found::Whole => Ok(Some(Made::Kept { sha256, folder })),
             Found::Nothing => Ok(None),
             Found::Broken(why) => {
-                eprintln!("headrace-campaign: {}: {why}; made anew", folder.display());
+                eprintln!("headrace-campaign: {}: {why}; replaying it again", folder.display());
                 self.counts.broken.fetch_add(1, Ordering::Relaxed);
                 self.cache.discard(&folder)?;
                 Ok(None)

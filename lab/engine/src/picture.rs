@@ -51,9 +51,9 @@ pub fn draw(sql: &str, schema: &SchemaRef, answer: &[RecordBatch]) -> Result<Str
     match kind {
         "bars" => bars(title, &answer),
         "strips" => strips(title, &answer),
-        _ => {
-            Err(Error::Usage(format!("-- picture: {kind:?} isn't a kind of picture; there are bars, strips")))
-        }
+        _ => Err(Error::Usage(format!(
+            "-- picture: {kind:?} isn't a kind of picture; expected bars or strips"
+        ))),
     }
 }
 

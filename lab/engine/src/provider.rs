@@ -45,7 +45,11 @@ impl Replayed {
     fn table(&self) -> Result<(&'static str, SchemaRef)> {
         let name = TABLES.into_iter().find(|table| *table == self.table);
         let Some(found) = name.and_then(|name| Some((name, schema(name)?))) else {
-            return plan_err!("{:?} isn't a table of a dive; there are {}", self.table, TABLES.join(", "));
+            return plan_err!(
+                "{:?} isn't a table of a dive; expected one of {}",
+                self.table,
+                TABLES.join(", ")
+            );
         };
         Ok(found)
     }
@@ -274,7 +278,7 @@ impl TableFunctionImpl for ReplayFunction {
                 Expr::Literal(ScalarValue::Utf8(Some(text)), _) => texts.push(text.as_str()),
                 other => {
                     return plan_err!(
-                        "replay({other}): its arguments are texts: replay(log, parameters [, table])"
+                        "replay({other}): its arguments must be texts: replay(log, parameters [, table])"
                     );
                 }
             }
@@ -290,10 +294,7 @@ impl TableFunctionImpl for ReplayFunction {
         if log != "*" {
             replayed.dives.retain(|dive| dive.log == log);
             if replayed.dives.is_empty() {
-                return plan_err!(
-                    "replay({log:?}): {} has no such log; * is for all of them",
-                    replayed.place
-                );
+                return plan_err!("replay({log:?}): {} has no such log; * means all logs", replayed.place);
             }
         }
         replayed.parameters = overridden(&replayed.parameters, parameters)?;

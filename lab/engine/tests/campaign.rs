@@ -176,7 +176,7 @@ fn a_log_that_cannot_be_read_is_a_row() {
     assert_eq!(output.status.code(), Some(3));
     let text = stderr(&output);
     assert!(text.contains("headrace-campaign: no-log.mcap: "), "{text}");
-    assert!(text.contains("copy.mcap is a copy of ceran/murk.mcap, and counts once"), "{text}");
+    assert!(text.contains("copy.mcap is a copy of ceran/murk.mcap; both count as one dive"), "{text}");
     assert!(
         text.ends_with("7 dives: 7 replayed, 1 from the cache; 1 unreadable, 1 with lost data\n"),
         "{text}"
@@ -238,7 +238,7 @@ fn broken_cache_entries_are_found_and_remade() {
     let text = stderr(&output);
     assert!(
         text.ends_with(
-            "5 dives: 3 replayed, 2 from the cache, 3 broken there; 0 unreadable, 0 with lost data\n"
+            "5 dives: 3 replayed, 2 from the cache, 3 damaged there; 0 unreadable, 0 with lost data\n"
         ),
         "{text}"
     );
@@ -313,7 +313,7 @@ fn invalid_requests_are_named() {
         here,
         &["--question", "best"],
         2,
-        "--question best: there are years, target, causes, versions, worst",
+        "--question best: expected one of years, target, causes, versions, worst",
     );
     refused(here, &["--sql", "SELECT x FROM sections"], 1, "No field named x");
     refused(here, &["--target", "50"], 2, "target_m = 50: must be from 0.01 to 20");
@@ -325,7 +325,7 @@ fn invalid_requests_are_named() {
     );
     refused(&here.join("none"), &[], 2, "opening ");
     let empty = tempfile::tempdir().unwrap();
-    refused(empty.path(), &[], 2, "there are none");
+    refused(empty.path(), &[], 2, "none found");
     std::fs::write(here.join("dives.csv"), "log,day\nx,May\n").unwrap();
     refused(here, &[], 2, "dives.csv:2: day = May: must be a day like 2024-05-31");
 }

@@ -7,7 +7,7 @@ use std::process::ExitCode;
 use clap::{Parser, Subcommand};
 use headrace_experiments::{ExperimentError, drawings, paper, run, words};
 
-/// The paper that headrace's sampling theory is from, computed anew.
+/// Recompute the results of the paper on which headrace's sampling theory is based.
 #[derive(Debug, Parser)]
 #[command(name = "headrace_experiments", version, arg_required_else_help = true)]
 struct Cli {
@@ -17,7 +17,7 @@ struct Cli {
 
 #[derive(Debug, Subcommand)]
 enum Command {
-    /// Tables 1 to 5: each printed number, ours beside it, and where the fault is the paper's.
+    /// Tables 1 to 5: each printed number next to the recomputed one, with notes on errors in the paper.
     #[command(after_help = "Example:\n  cargo run --release -p headrace_experiments -- tables --json")]
     Tables {
         /// Print JSON.
@@ -32,7 +32,7 @@ enum Command {
         /// Print JSON.
         #[arg(long)]
         json: bool,
-        /// Folder to draw pictures like Figures 6, 8, 12, 13 and 15 into.
+        /// Output folder for charts like Figures 6, 8, 12, 13 and 15.
         #[arg(long, value_name = "DIR")]
         svg: Option<PathBuf>,
     },

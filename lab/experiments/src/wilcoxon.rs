@@ -66,7 +66,7 @@ pub(crate) struct SignedRank {
 #[non_exhaustive]
 pub(crate) enum WilcoxonError {
     /// Two lists differ in length.
-    #[error("pairs need lists of one length; these have {left} and {right}")]
+    #[error("pairs need lists of equal length; these have {left} and {right}")]
     Lengths {
         /// Length of the first.
         left: usize,
@@ -74,7 +74,7 @@ pub(crate) enum WilcoxonError {
         right: usize,
     },
     /// A difference isn't a finite number.
-    #[error("difference {index} is no number")]
+    #[error("difference {index} isn't a number")]
     NotFinite {
         /// Its index, from zero.
         index: usize,

@@ -39,7 +39,7 @@ impl<'py> FromPyObject<'_, 'py> for Coordinates {
         if array.getattr("ndim")?.extract::<usize>()? != 1 {
             let shape = array.getattr("shape")?;
             return Err(
-                Failure::Argument(format!("an array of shape {shape}; one dimension is wanted")).into()
+                Failure::Argument(format!("an array of shape {shape}; expected one dimension")).into()
             );
         }
         let bytes = array.call_method0("tobytes")?;
@@ -65,7 +65,7 @@ pub(crate) fn points(
     let [one, other] = names;
     if first.len() != second.len() {
         let lengths = format!(
-            "{one} has {} values and {other} has {}; they must be as many",
+            "{one} has {} values and {other} has {}; they must have equal lengths",
             first.len(),
             second.len()
         );

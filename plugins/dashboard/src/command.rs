@@ -187,7 +187,7 @@ fn play(command: &str, speed: Option<f64>, to_s: Option<f64>) -> Result<Play, St
         ("seek", ..) => return Err("seek needs to_s, seconds on the log's clock".to_owned()),
         (other, ..) => {
             return Err(format!(
-                "{other:?} is no command; expected pause, go, step, step_section, end, speed or seek"
+                "{other:?} isn't a command; expected pause, go, step, step_section, end, speed or seek"
             ));
         }
     })

@@ -222,16 +222,17 @@ impl HeadDriver {
         }
         if self.refused {
             return Some(
-                "doesn't accept the command, or loses characters of it; see range_m and the line".to_owned(),
+                "doesn't accept the command, or loses characters of it; check range_m and the line"
+                    .to_owned(),
             );
         }
         (self.behind > self.timetable.len() / TOO_SLOW_SHARE).then(|| {
             if self.losses.count_ones() >= LOSSY_FROM {
-                return "falls behind since answers get lost; see the cable, its plugs and the line's rate"
+                return "falls behind because replies are lost; check the cable, its plugs and the line's rate"
                     .to_owned();
             }
             let period_ms = self.settings.ping_period.as_secs_f64() * 1000.0;
-            format!("can't keep up with a ping each {period_ms:.1} ms; set turn_period_s to what it manages")
+            format!("can't keep up with a ping every {period_ms:.1} ms; increase turn_period_s")
         })
     }
 }

@@ -17,7 +17,7 @@ pub fn listener() -> MessageListener {
 
 fn judge(message: &[u8]) -> Option<String> {
     let Some(frame) = message.first_chunk::<FRAME_BYTES>().filter(|_| message.len() == FRAME_BYTES) else {
-        return Some(format!("a message of {} bytes came; a frame has {FRAME_BYTES}", message.len()));
+        return Some(format!("received a message of {} bytes; a frame has {FRAME_BYTES}", message.len()));
     };
     CanFrame::decode(frame).err().map(|error| error.to_string())
 }

@@ -123,14 +123,15 @@ impl Driver for MavlinkDriver {
         let strangers = self.strangers.clone();
         let complaint = match self.system_id {
             _ if !others => None,
-            None => Some(
-                "no autopilot's heartbeat has come; set system_id to whose messages are meant".to_owned(),
-            ),
+            None => {
+                Some("no autopilot heartbeat has arrived; set system_id to that of the autopilot".to_owned())
+            }
             Some(id) if strangers.messages() == self.cutter.counts().good_frames => {
-                Some(format!("nothing comes of system {id}; see system_id"))
+                Some(format!("no messages from system {id}; check system_id"))
             }
             Some(_) => Some(
-                "the autopilot speaks, but not of this part; see message and its stream rates".to_owned(),
+                "the autopilot sends other messages, but not this one; check message and its stream rates"
+                    .to_owned(),
             ),
         };
         let identity = self.system_id.map(|id| format!("MAVLink system {id}"));

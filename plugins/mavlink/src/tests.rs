@@ -402,7 +402,7 @@ fn log_of_many_systems_gives_the_readings_of_one() {
 #[test]
 fn missing_heartbeat_or_wrong_system_is_reported() {
     for (configured, words) in
-        [("", "no autopilot's heartbeat"), ("system_id = 3\n", "nothing comes of system 3")]
+        [("", "no autopilot heartbeat"), ("system_id = 3\n", "no messages from system 3")]
     {
         let device = configured_part(configured);
         let mut driver = device.driver(&DriverSetup { begun: START, head: None });

@@ -76,7 +76,7 @@ impl EmulatedPort {
             Connect::Udp { address } => udp(address),
             other => Err(io::Error::new(
                 io::ErrorKind::Unsupported,
-                format!("{other} can't be had again; it is the system that chooses it"),
+                format!("{other} can't be reopened; the system chooses its name"),
             )),
         }
     }

@@ -53,7 +53,7 @@ pub(crate) const CAN_RAW: &str = "sudo modprobe can-raw";
 
 /// I2C buses have no device files.
 pub(crate) const I2C_DEV: &str =
-    "sudo modprobe i2c-dev; to have it at each start: echo i2c-dev | sudo tee /etc/modules-load.d/i2c.conf";
+    "sudo modprobe i2c-dev; to load it at each boot: echo i2c-dev | sudo tee /etc/modules-load.d/i2c.conf";
 
 /// No answer from an address.
 pub(crate) const NOBODY_ANSWERS: &str = "check that it is switched on, that its port is right, and that this computer is in its network: ip address";

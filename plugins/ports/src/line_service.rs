@@ -337,7 +337,7 @@ impl LineService {
         let why = diagnosis::losing(error);
         tracing::info!(%error, why, "connection lost");
         let Ok(connect) = self.connect.clone() else { return };
-        self.say_all(Phase::Closed, &format!("lost {connect}: {why}; it is tried again"));
+        self.say_all(Phase::Closed, &format!("lost {connect}: {why}; retrying"));
     }
 
     /// Delivers the bytes that the drivers still hold.
@@ -535,14 +535,15 @@ impl AttachedState {
             }
             // A device that stays silent over a reopened line keeps its silent status.
             let silent = self.status.clone().filter(|(phase, _)| *phase == Phase::Silent);
-            let words = "the line is open, and no frame has come yet";
+            let words = "the line is open, but no frame has arrived yet";
             return silent.unwrap_or_else(|| (Phase::Silent, words.to_owned()));
         }
         if self.is_silent(now) {
-            (Phase::Silent, format!("nothing has come for {seconds:.0} s; is it switched on?"))
+            (Phase::Silent, format!("no data for {seconds:.0} s; is it switched on?"))
         } else {
-            let words =
-                format!("bytes come, but no frame for {seconds:.0} s; another device, or another baud rate?");
+            let words = format!(
+                "bytes arrive, but no frame for {seconds:.0} s; another device, or another baud rate?"
+            );
             (Phase::Babbling, words)
         }
     }

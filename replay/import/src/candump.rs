@@ -81,7 +81,7 @@ fn nanoseconds(text: &str) -> Option<u64> {
 fn can_frame(text: &str) -> Result<[u8; FRAME_BYTES], &'static str> {
     let (id_text, data_text) = text.split_once('#').ok_or(NO_LINE)?;
     if data_text.starts_with('#') {
-        return Err("a CAN FD frame, which no sensor here takes");
+        return Err("a CAN FD frame, which no sensor accepts");
     }
     let hexadecimal = id_text.bytes().all(|byte| byte.is_ascii_hexdigit());
     let number = u32::from_str_radix(id_text, 16).ok().filter(|_| hexadecimal).ok_or(NO_LINE)?;

@@ -165,7 +165,8 @@ fn cell(text: &str) -> &str {
 fn column(section: &Section<'_>, key: &'static str, names: &[&str]) -> Result<usize, ConfigError> {
     let name = section.required(key, section.text(key)?)?;
     let found = names.iter().position(|column| *column == name);
-    found.ok_or_else(|| section.invalid(key, &format!("is no column; there are {}", names.join(", "))))
+    found
+        .ok_or_else(|| section.invalid(key, &format!("isn't a column; expected one of {}", names.join(", "))))
 }
 
 impl Target {

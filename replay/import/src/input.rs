@@ -93,7 +93,7 @@ impl<R: Read, F: Format> Source for Input<R, F> {
             }
             Step::Held => (),
             Step::More if left >= self.format.most_held() => {
-                self.losses.lost(at, left, "an entry longer than the most that is held in memory");
+                self.losses.lost(at, left, "an entry longer than the memory limit");
                 self.done += left;
             }
             Step::More => self.read()?,

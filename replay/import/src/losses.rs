@@ -62,7 +62,10 @@ impl Losses {
             all.push(format!("cut off: the entry at byte {at} has only {bytes} bytes"));
         }
         if self.late > 0 {
-            all.push(format!("{} entries out of order by more than can be held were left out", self.late));
+            all.push(format!(
+                "{} entries out of order by more than the reordering buffer holds were left out",
+                self.late
+            ));
         }
         if let Some((count, gap_ns, at)) = self.gaps {
             let (gap_s, at_s) = (gap_ns / 1_000_000_000, at.as_secs_f64());

@@ -149,7 +149,7 @@ impl Player {
         }
         if self.reader.late() > 0 {
             all.push(format!(
-                "{} messages out of order by more than can be held, delivered in file order",
+                "{} messages out of order by more than the reordering buffer holds, delivered in file order",
                 self.reader.late()
             ));
         }

@@ -25,7 +25,7 @@ pub fn read(path: &Path, most_bytes: u64) -> Result<Vec<u8>> {
     let mut bytes = Vec::new();
     open(path)?.take(most_bytes.saturating_add(1)).read_to_end(&mut bytes)?;
     if bytes.len() as u64 > most_bytes {
-        let words = format!("it is longer than {most_bytes} bytes, the most that is read of such a file");
+        let words = format!("it is longer than {most_bytes} bytes, the limit for such a file");
         return Err(Error::new(ErrorKind::FileTooLarge, words));
     }
     Ok(bytes)

@@ -80,7 +80,7 @@ impl Scene {
         (seed, take): (Option<u64>, Option<Take>),
         of_vehicle: &mut Option<ConfigErrors>,
     ) -> Result<Self, ConfigError> {
-        let text = |name: &str| String::from_utf8(load(name)?).map_err(|_| "is no text".to_owned());
+        let text = |name: &str| String::from_utf8(load(name)?).map_err(|_| "is not a text".to_owned());
         let text: Loader<'_> = &text;
         let name = root.text("name")?.unwrap_or_else(|| "unnamed scene".to_owned());
         let own_seed = root.integer("seed", 0..=i64::MAX)?.and_then(|seed| u64::try_from(seed).ok());

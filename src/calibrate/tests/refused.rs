@@ -25,8 +25,8 @@ fn moving_vehicle_is_refused() {
     for (_, profile) in profiles() {
         let stand = Stand { speed_mps: 0.1, ..Stand::new(profile, &[Wrong::default(); 2], 1) };
         let why = why(&stand);
-        assert!(matches!(why, NotEstimated::Moved { what: "the cable", unit: "m", .. }), "{why}");
-        assert!(why.to_string().starts_with("the vehicle moved: the cable varied by 1."), "{why}");
+        assert!(matches!(why, NotEstimated::Moved { what: "the cable length", unit: "m", .. }), "{why}");
+        assert!(why.to_string().starts_with("the vehicle moved: the cable length varied by 1."), "{why}");
     }
 }
 
@@ -34,7 +34,7 @@ fn moving_vehicle_is_refused() {
 fn head_that_sees_little_wall_is_refused() {
     let stand = Stand { sector_deg: 90.0, ..Stand::new(shapes::ceran().unwrap(), &[Wrong::default()], 1) };
     let why = why(&stand).to_string();
-    assert!(why.starts_with("no full turn: the head has seen only 9"), "{why}");
+    assert!(why.starts_with("no full turn: the head covered only 9"), "{why}");
 }
 
 /// Section and returns are symmetric. Without echosounders, or from the centre, the sides can't be

@@ -149,7 +149,7 @@ fn each_device_is_listed_with_its_errors_and_their_fixes() {
       /dev/i2c-1  bcm2835 (i2c@7e804000)
         connect = "i2c:/dev/i2c-1:ADDRESS"
         PROBLEM     opening /dev/i2c-1: the bus has no device file
-        fix         sudo modprobe i2c-dev; to have it at each start: echo i2c-dev | sudo tee /etc/modules-load.d/i2c.conf
+        fix         sudo modprobe i2c-dev; to load it at each boot: echo i2c-dev | sudo tee /etc/modules-load.d/i2c.conf
     Addresses
       tcp:192.168.0.5:4040
         answers     Imagenex 881 family, head_id = 0x10

@@ -142,11 +142,11 @@ fn asked(chart: &Chart<'_>, shown: &Shown<'_>, sought: &Sought) -> Option<Label>
         chart.across(asked_h, &look::ASKED);
         let lines = match shown.question.time_s {
             Some(_) if shown.question.speed_mps.is_none() => {
-                vec![format!("asked: {} h", modes::hours(asked_h))]
+                vec![format!("required: {} h", modes::hours(asked_h))]
             }
             _ => vec![
                 format!("{} h at the", modes::hours(asked_h)),
-                format!("{} m/s asked", modes::speed(asked_mps)),
+                format!("{} m/s required", modes::speed(asked_mps)),
             ],
         };
         let place = [FRAME.right, chart.px([0.0, asked_h])[1]];
@@ -186,11 +186,11 @@ fn marks(chart: &Chart<'_>, shown: &Shown<'_>, modes: &[Mode], sought: &Sought) 
     let words = match shown.question.target_m {
         Some(target_m) if found.is_empty() => format!("target {target_m} m: no mode meets it"),
         Some(target_m) => format!("target {target_m} m"),
-        None => format!("{} m, by the speed asked", short(*t_m)),
+        None => format!("{} m, at the required speed", short(*t_m)),
     };
     let place = chart.px([*t_m, 0.0])[0].max(FRAME.left + width_px(&words, NORMAL) / 2.0);
     chart.canvas.text([place, FRAME.top - 10.0], &words, Side::Middle, NORMAL);
-    for (k, line) in ["hours at the", "upright line:"].iter().enumerate() {
+    for (k, line) in ["hours at the", "vertical line:"].iter().enumerate() {
         let place = [FRAME.right + 12.0, FRAME.top - 26.0 + 15.0 * k as f64];
         chart.canvas.text(place, line, Side::Right, NORMAL);
     }

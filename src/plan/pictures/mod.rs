@@ -40,8 +40,8 @@ impl Shown<'_> {
         let Question { target_m, speed_mps, time_s } = self.question;
         let words = [
             target_m.map(|target_m| format!("target {target_m} m")),
-            speed_mps.map(|speed_mps| format!("{speed_mps} m/s asked")),
-            time_s.map(|time_s| format!("{} h asked", time_s / 3600.0)),
+            speed_mps.map(|speed_mps| format!("{speed_mps} m/s required")),
+            time_s.map(|time_s| format!("{} h required", time_s / 3600.0)),
         ];
         [Some(self.title.clone())].into_iter().chain(words).flatten().collect::<Vec<_>>().join(", ")
     }

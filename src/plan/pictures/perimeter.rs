@@ -105,7 +105,7 @@ fn note(shown: &Shown<'_>, around: &Around) -> String {
     } else {
         "the worst case of each strip of the wall"
     };
-    format!("The plan counts with T = {} m: {why}{allowed}.", short(counted_m))
+    format!("The plan uses T = {} m: {why}{allowed}.", short(counted_m))
 }
 
 /// Text on the tolerances that the plan allows for.
@@ -116,7 +116,7 @@ fn allowed(shown: &Shown<'_>) -> String {
     let yaw = degrees(inspection.yaw_rad, " of yaw");
     let turning = degrees(inspection.yaw_rate_radps, "/s of turning about");
     let all: Vec<String> = [drift, yaw, turning].into_iter().flatten().collect();
-    if all.is_empty() { String::new() } else { format!(", {} allowed for", all.join(" and ")) }
+    if all.is_empty() { String::new() } else { format!(", with {}", all.join(" and ")) }
 }
 
 fn chart<'c>(canvas: &'c Canvas, shown: &Shown<'_>, around: &Around) -> Chart<'c> {

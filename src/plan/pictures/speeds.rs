@@ -92,7 +92,7 @@ fn asked(chart: &Chart<'_>, shown: &Shown<'_>) -> Option<(f64, String)> {
         Some(time_s) if shown.question.speed_mps.is_none() => {
             format!("{} h: ", modes::hours(time_s / 3600.0))
         }
-        _ => "asked: ".to_owned(),
+        _ => "required: ".to_owned(),
     };
     Some((chart.px([asked_mps, 0.0])[0], format!("{why}{} m/s", modes::speed(asked_mps))))
 }

@@ -165,9 +165,9 @@ fn speeds_name_every_mode_with_its_speed() {
         says(&svg, &[mode]);
     }
     says(&svg, &["target 0.5 m", "at most, to meet"]);
-    silent(&svg, &["asked", "never"]);
+    silent(&svg, &["required", "never"]);
     let svg = draw(inspection(VITA_2), FAST, 0.1, SPEED, "speeds");
-    says(&svg, &["asked: 0.100 m/s", "MEDIUM"]);
+    says(&svg, &["required: 0.100 m/s", "MEDIUM"]);
     silent(&svg, &["target"]);
 }
 
@@ -186,7 +186,7 @@ fn hours_mark_the_best_mode_and_the_available_time() {
         &[&format!("{}: {hours} h at {speed} m/s", best.mode.to_uppercase()), "Hours for 7000 m, one way"],
     );
     let day = Question { time_s: Some(20.0 * 3600.0), ..TARGET };
-    says(&draw(inspection(VITA_2), FAST, 0.097, day, "hours"), &["asked: 20.0 h", "20 h asked"]);
+    says(&draw(inspection(VITA_2), FAST, 0.097, day, "hours"), &["required: 20.0 h", "20 h required"]);
 }
 
 #[test]
@@ -195,7 +195,7 @@ fn hours_without_a_target_use_the_t_of_the_speed() {
     let finest = planner.answers(&SPEED, None).unwrap().iter().position(|answer| answer.best).unwrap();
     let svg = draw(inspection(VITA_2), finest, 0.1, SPEED, "hours");
     let name = modes::name(&planner, finest);
-    says(&svg, &["m, by the speed asked", "19.4 h at the", &format!("{name}: 19.4 h at 0.100 m/s")]);
+    says(&svg, &["m, at the required speed", "19.4 h at the", &format!("{name}: 19.4 h at 0.100 m/s")]);
 }
 
 #[test]
@@ -239,7 +239,7 @@ fn small_pipes_large_tunnels_and_many_heads_can_be_drawn() {
             draw(inspection(&large), 0, 0.05, TARGET, name);
             let drifting = inspection(&format!("{large} --drift 2 --yaw 11"));
             let svg = draw(drifting, FAST, 0.25, TARGET, name);
-            assert!(name != "perimeter" || svg.contains("2 m of drift and 11° of yaw allowed for"));
+            assert!(name != "perimeter" || svg.contains("with 2 m of drift and 11° of yaw"));
         }
         draw(inspection("--tunnel ceran --heads 8 --layout sector_offset"), FAST, 0.1, TARGET, name);
         draw(inspection("--tunnel rectangle,width_m=12,height_m=0.8 --heads 3"), FAST, 0.1, TARGET, name);

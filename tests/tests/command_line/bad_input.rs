@@ -198,9 +198,9 @@ fn wrong_polyline_is_refused_with_its_line_or_vertex() {
     two points
         headrace: vehicle.toml:6: tunnel.file = "profile.csv": a profile needs at least 3 distinct points; this one has 2
     no number
-        headrace: vehicle.toml:6: tunnel.file = "profile.csv": line 3 is "2,zero"; allowed is y_m,z_m
+        headrace: vehicle.toml:6: tunnel.file = "profile.csv": line 3 is "2,zero"; expected y_m,z_m
     one number
-        headrace: vehicle.toml:6: tunnel.file = "profile.csv": line 3 is "2"; allowed is y_m,z_m
+        headrace: vehicle.toml:6: tunnel.file = "profile.csv": line 3 is "2"; expected y_m,z_m
     not finite
         headrace: vehicle.toml:6: tunnel.file = "profile.csv": line 3: vertex 2 has a coordinate that is not a number within 1000 m
     not star-shaped
@@ -387,8 +387,8 @@ fn file_that_is_no_log_is_identified() {
         said.push_str(&answer.stderr);
     }
     insta::assert_snapshot!(said, @"
-    headrace: empty.mcap is not an MCAP file: it begins with [], and [89 4d 43 41 50 30 0d 0a] is wanted
-    headrace: text.mcap is not an MCAP file: it begins with [6e 61 6d 65 20 3d 20 22], and [89 4d 43 41 50 30 0d 0a] is wanted
+    headrace: empty.mcap is not an MCAP file: it begins with []; expected [89 4d 43 41 50 30 0d 0a]
+    headrace: text.mcap is not an MCAP file: it begins with [6e 61 6d 65 20 3d 20 22]; expected [89 4d 43 41 50 30 0d 0a]
     headrace: could not open missing.mcap: No such file or directory (os error 2)
     headrace: ./dive.mcap is not a part of a recording, and only the parts of one are read as one log; name a single log, or the parts alone
     ");

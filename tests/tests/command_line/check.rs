@@ -131,28 +131,28 @@ fn lines_that_two_sensors_cannot_share_are_errors() {
     insta::assert_snapshot!(findings(&cases), @r#"
     two Pings on one serial port: 2
     headrace: vehicle.toml:37: sensors[3].connect: is the serial port of sensor "ping_left", and the bytes of two ping1d cannot be separated there; give each its own
-    headrace: warning: vehicle.toml:15: sensors: have no connect, so that `run` can't reach them: ping_up, ping_down, depth, imu, tether
+    headrace: warning: vehicle.toml:15: sensors: have no connect, so `run` can't reach them: ping_up, ping_down, depth, imu, tether
     one serial port at two rates: 2
     headrace: vehicle.toml:37: sensors[3].connect: is the serial port of sensor "ping_left" with other settings; only one sensor can open it
-    headrace: warning: vehicle.toml:15: sensors: have no connect, so that `run` can't reach them: ping_up, ping_down, depth, imu, tether
+    headrace: warning: vehicle.toml:15: sensors: have no connect, so `run` can't reach them: ping_up, ping_down, depth, imu, tether
     two Pings on one UDP address: 2
     headrace: vehicle.toml:37: sensors[3].connect: is the UDP address of sensor "ping_left", and the bytes of two ping1d cannot be separated there; give each its own
-    headrace: warning: vehicle.toml:15: sensors: have no connect, so that `run` can't reach them: ping_up, ping_down, depth, imu, tether
+    headrace: warning: vehicle.toml:15: sensors: have no connect, so `run` can't reach them: ping_up, ping_down, depth, imu, tether
     two Pings on two: 0
-    headrace: warning: vehicle.toml:15: sensors: have no connect, so that `run` can't reach them: ping_up, ping_down, depth, imu, tether
+    headrace: warning: vehicle.toml:15: sensors: have no connect, so `run` can't reach them: ping_up, ping_down, depth, imu, tether
     two heads on one TCP address: 2
     headrace: vehicle.toml:25: sensors[1].connect: is the TCP address of sensor "sonar_0", and the bytes of two imagenex881 cannot be separated there; give each its own
-    headrace: warning: vehicle.toml:15: sensors: have no connect, so that `run` can't reach them: ping_left, ping_right, ping_up, ping_down, depth, imu, tether
+    headrace: warning: vehicle.toml:15: sensors: have no connect, so `run` can't reach them: ping_left, ping_right, ping_up, ping_down, depth, imu, tether
     two heads of two ids there: 0
-    headrace: warning: vehicle.toml:15: sensors: have no connect, so that `run` can't reach them: ping_left, ping_right, ping_up, ping_down, depth, imu, tether
+    headrace: warning: vehicle.toml:15: sensors: have no connect, so `run` can't reach them: ping_left, ping_right, ping_up, ping_down, depth, imu, tether
     two units of one id on CAN: 2
     headrace: vehicle.toml:63: sensors[8].connect: is the CAN interface of sensor "imu", and the bytes of two imu_can cannot be separated there; give each its own
-    headrace: warning: vehicle.toml:15: sensors: have no connect, so that `run` can't reach them: ping_left, ping_right, ping_up, ping_down, depth, tether
+    headrace: warning: vehicle.toml:15: sensors: have no connect, so `run` can't reach them: ping_left, ping_right, ping_up, ping_down, depth, tether
     two units of two ids there: 0
-    headrace: warning: vehicle.toml:15: sensors: have no connect, so that `run` can't reach them: ping_left, ping_right, ping_up, ping_down, depth, tether
+    headrace: warning: vehicle.toml:15: sensors: have no connect, so `run` can't reach them: ping_left, ping_right, ping_up, ping_down, depth, tether
     no such way to connect: 2
     headrace: vehicle.toml:25: sensors[1].connect: unknown carrier "usb"; allowed are serial:/dev/serial/by-id/NAME?baud=115200, serial:usb:VID:PID[:SERIAL]?baud=115200, tcp:HOST:PORT, udp:HOST:PORT, udp-listen:ADDRESS:PORT, can:INTERFACE, hid:VID:PID[:SERIAL], i2c:/dev/i2c-1:0x40
-    headrace: warning: vehicle.toml:15: sensors: have no connect, so that `run` can't reach them: ping_left, ping_right, ping_up, ping_down, depth, imu, tether
+    headrace: warning: vehicle.toml:15: sensors: have no connect, so `run` can't reach them: ping_left, ping_right, ping_up, ping_down, depth, imu, tether
     "#);
 }
 
@@ -189,26 +189,26 @@ fn walls_out_of_range_and_heads_out_of_phase_are_reported() {
     ];
     insta::assert_snapshot!(findings(&cases), @"
     as it is: 0
-    headrace: warning: vehicle.toml:15: sensors: have no connect, so that `run` can't reach them: ping_left, ping_right, ping_up, ping_down, depth, imu, tether
+    headrace: warning: vehicle.toml:15: sensors: have no connect, so `run` can't reach them: ping_left, ping_right, ping_up, ping_down, depth, imu, tether
     a range of 3 m in a tunnel of 6 m: 2
     headrace: vehicle.toml:20: sensors[0].range_m: reaches 0 % of the wall around this head: it is 3.00 to 3.00 m away, and the setting covers 0.19 to 2.89 m; out of reach: all around
     headrace: vehicle.toml:27: sensors[1].range_m: reaches 0 % of the wall around this head: it is 3.00 to 3.00 m away, and the setting covers 0.19 to 2.89 m; out of reach: all around
-    headrace: warning: vehicle.toml:15: sensors: have no connect, so that `run` can't reach them: ping_left, ping_right, ping_up, ping_down, depth, imu, tether
+    headrace: warning: vehicle.toml:15: sensors: have no connect, so `run` can't reach them: ping_left, ping_right, ping_up, ping_down, depth, imu, tether
     a range of 2 m there: 2
     headrace: vehicle.toml:20: sensors[0].range_m: reaches 0 % of the wall around this head: it is 3.00 to 3.00 m away, and the setting covers 0.19 to 1.93 m; out of reach: all around
     headrace: vehicle.toml:27: sensors[1].range_m: reaches 0 % of the wall around this head: it is 3.00 to 3.00 m away, and the setting covers 0.19 to 1.93 m; out of reach: all around
-    headrace: warning: vehicle.toml:15: sensors: have no connect, so that `run` can't reach them: ping_left, ping_right, ping_up, ping_down, depth, imu, tether
+    headrace: warning: vehicle.toml:15: sensors: have no connect, so `run` can't reach them: ping_left, ping_right, ping_up, ping_down, depth, imu, tether
     a tunnel of 14 m: 2
     headrace: vehicle.toml:20: sensors[0].range_m: reaches 0 % of the wall around this head: it is 7.00 to 7.00 m away, and the setting covers 0.19 to 4.82 m; out of reach: all around
     headrace: vehicle.toml:27: sensors[1].range_m: reaches 0 % of the wall around this head: it is 7.00 to 7.00 m away, and the setting covers 0.19 to 4.82 m; out of reach: all around
-    headrace: warning: vehicle.toml:15: sensors: have no connect, so that `run` can't reach them: ping_left, ping_right, ping_up, ping_down, depth, imu, tether
+    headrace: warning: vehicle.toml:15: sensors: have no connect, so `run` can't reach them: ping_left, ping_right, ping_up, ping_down, depth, imu, tether
     a small tunnel: 0
-    headrace: warning: vehicle.toml:15: sensors: have no connect, so that `run` can't reach them: ping_left, ping_right, ping_up, ping_down, depth, imu, tether
+    headrace: warning: vehicle.toml:15: sensors: have no connect, so `run` can't reach them: ping_left, ping_right, ping_up, ping_down, depth, imu, tether
     heads in two modes: 0
     headrace: warning: vehicle.toml:12: heads: can't interleave: the heads' turns take 3.80 s, 13.60 s; give them one mode and one range_m
-    headrace: warning: vehicle.toml:15: sensors: have no connect, so that `run` can't reach them: ping_left, ping_right, ping_up, ping_down, depth, imu, tether
+    headrace: warning: vehicle.toml:15: sensors: have no connect, so `run` can't reach them: ping_left, ping_right, ping_up, ping_down, depth, imu, tether
     negative counts: 0
-    headrace: warning: vehicle.toml:15: sensors: have no connect, so that `run` can't reach them: ping_left, ping_right, ping_up, ping_down, depth, imu, tether
+    headrace: warning: vehicle.toml:15: sensors: have no connect, so `run` can't reach them: ping_left, ping_right, ping_up, ping_down, depth, imu, tether
     headrace: warning: vehicle.toml:61: sensors[8].counts_per_metre: is negative: the count falls as cable is paid out; make it positive if it rises
     ");
 }
@@ -358,7 +358,7 @@ fn limits_at_the_planned_speed_are_listed_beside_the_plan_limits() {
     );
     assert!(!usual.stderr.contains("planned_speed_mps"), "{}", usual.stderr);
     let most = planned("0.1129");
-    assert!(most.stderr.contains("0.1129, which leaves no room"), "{}", most.stderr);
+    assert!(most.stderr.contains("0.1129, which leaves no margin"), "{}", most.stderr);
     assert_eq!((usual.code, most.code), (Some(0), Some(0)));
 }
 
@@ -381,9 +381,9 @@ fn check_lists_cable_and_speed_limits_and_missing_keys() {
         writeln!(said, "{what}: {line}").unwrap();
     }
     insta::assert_snapshot!(said, @"
-    nothing said: cable: steps of 0.5 mm, slack of 0.06 m (sd) in 2.5 s; at 0.200 m/s a hole is measured to 0.097 m (sd), so that holes up to 1.01 m pass; not in the file: navigation.slack_sd_m, navigation.slack_time_s, sensors[8].step_m
-    slack said: cable: steps of 0.5 mm, slack of 0.2 m (sd) in 5 s; at 0.200 m/s a hole is measured to 0.194 m (sd), so that holes up to 0.81 m pass; not in the file: sensors[8].step_m
-    a wheel with magnets: cable: steps of 10 mm, slack of 0.06 m (sd) in 2.5 s; at 0.200 m/s a hole is measured to 0.102 m (sd), so that holes up to 1.00 m pass; not in the file: navigation.slack_sd_m, navigation.slack_time_s
-    steps of 5 cm: cable: steps of 50 mm, slack of 0.06 m (sd) in 2.5 s; at 0.200 m/s a hole is measured to 0.119 m (sd), so that holes up to 0.96 m pass; not in the file: navigation.slack_sd_m, navigation.slack_time_s
+    nothing said: cable: steps of 0.5 mm, slack of 0.06 m (sd) in 2.5 s; at 0.200 m/s a hole is measured to 0.097 m (sd), so holes up to 1.01 m pass; missing from the file: navigation.slack_sd_m, navigation.slack_time_s, sensors[8].step_m
+    slack said: cable: steps of 0.5 mm, slack of 0.2 m (sd) in 5 s; at 0.200 m/s a hole is measured to 0.194 m (sd), so holes up to 0.81 m pass; missing from the file: sensors[8].step_m
+    a wheel with magnets: cable: steps of 10 mm, slack of 0.06 m (sd) in 2.5 s; at 0.200 m/s a hole is measured to 0.102 m (sd), so holes up to 1.00 m pass; missing from the file: navigation.slack_sd_m, navigation.slack_time_s
+    steps of 5 cm: cable: steps of 50 mm, slack of 0.06 m (sd) in 2.5 s; at 0.200 m/s a hole is measured to 0.119 m (sd), so holes up to 0.96 m pass; missing from the file: navigation.slack_sd_m, navigation.slack_time_s
     ");
 }

@@ -22,10 +22,10 @@ fn plan_text_of_a_vehicle() {
     assert_eq!((answer.code, answer.stderr.as_str()), (Some(0), ""));
     insta::assert_snapshot!(answer.stdout, @r"
     ceran: perimeter 35.90 m, 7000 m long; vehicle at y 0.00 m, z 3.09 m
-    4 heads in phase shift, range setting 10 m; a beam covers 0.08 to 0.28 m of wall
+    4 heads, phase shift, range setting 10 m; a beam covers 0.08 to 0.28 m of wall
     target 0.5 m
 
-                                       T_y at rest, m         at  T_x, m, seen by   T_max  sure to hit, m   v_max   hours
+                                       T_y at rest, m         at  T_x, m, seen by   T_max  certain hit, m   v_max   hours
       mode     step   turn  overlap    min   mean  worst     m/s    all    fewest       m   once    twice     m/s  needed
       slow      0.3   21.60     4.67  0.016  0.030  0.064   0.041  0.221     0.443   0.458   0.46     0.92   0.041    47.4
       medium    0.6   10.80     2.33  0.032  0.060  0.126   0.083  0.226     0.451   0.471   0.47     0.94   0.083    23.3
@@ -34,14 +34,14 @@ fn plan_text_of_a_vehicle() {
       fastest   2.4    4.80     0.58  0.130  0.239  0.481   0.063  0.076     0.152   0.488   0.49     0.98   0.063    30.7
 
     * fastest for the target: faster, at most 0.135 m/s, 14.4 h one way
-    faster: 0.259 m/s by geometry, 0.146 with what the vehicle hides, 0.142 with heads side by side or askew, 0.135 with the distance between passes known to 1.2 cm
+    faster: 0.259 m/s from the geometry alone, 0.146 with occlusion by the vehicle, 0.142 with heads side by side or at an angle, 0.135 with passes known to +-1.2 cm
     with the heads in line, x 0.41, 0.69, -0.69, -0.41 m, y 0.00, z 0.00: faster, at most 0.251 m/s, 7.7 h
     sonar_0: 15.3 degrees about 270 are hidden by the vehicle, 1.66 m of wall at 3:00
     sonar_1: 15.3 degrees about 90 are hidden by the vehicle, 1.66 m of wall at 9:00
     sonar_2: 15.3 degrees about 90 are hidden by the vehicle, 1.66 m of wall at 3:00
     sonar_3: 15.3 degrees about 270 are hidden by the vehicle, 1.66 m of wall at 9:00
-    1.66 m of wall at 9:00 are seen by sonar_0, sonar_2 only: passes there are 2.000 times as far apart
-    1.66 m of wall at 3:00 are seen by sonar_1, sonar_3 only: passes there are 2.000 times as far apart
+    1.66 m of wall at 9:00 are seen by sonar_0, sonar_2 only: T_x is 2.000 times as large there
+    1.66 m of wall at 3:00 are seen by sonar_1, sonar_3 only: T_x is 2.000 times as large there
     start angles in faster at 0.135 m/s, degrees, + growing: sonar_0 0.0+; sonar_1 90.0+; sonar_2 265.3-; sonar_3 175.3-
     heads 1.102 m apart along the hull start at equal angles at 0.134 m/s; at this speed, 1.114 m apart (q = 5)
     ");
@@ -55,10 +55,10 @@ fn plan_text_with_drift_yaw_and_a_deadline() {
     assert_eq!(answer.code, Some(1), "{}", answer.stderr);
     insta::assert_snapshot!(answer.stdout, @r"
     ceran: perimeter 35.90 m, 7000 m long; vehicle at y 0.00 m, z 3.09 m; allowing for a constant offset of 1 m and yaw of 10.0 degrees
-    2 heads in sector offset, range setting 20 m; a beam covers 0.08 to 0.28 m of wall
+    2 heads, sector offset, range setting 20 m; a beam covers 0.08 to 0.28 m of wall
     target 0.6 m, 30 h for the whole length, one way: 0.065 m/s
 
-                                       T_y at rest, m         at  T_x, m, seen by   T_max  sure to hit, m   v_max   hours
+                                       T_y at rest, m         at  T_x, m, seen by   T_max  certain hit, m   v_max   hours
       mode     step   turn  overlap    min   mean  worst     m/s    all    fewest       m   once    twice     m/s  needed
       slow      0.3 ~ 37.60     4.67  0.016  0.030  0.108   0.065  2.437     2.437   2.439   2.44     4.88   0.015   122.2
       medium    0.6 ~ 18.80     2.33  0.032  0.060  0.213   0.065  1.219     1.219   1.223   1.22     2.45   0.031    61.5
@@ -67,8 +67,8 @@ fn plan_text_with_drift_yaw_and_a_deadline() {
       fastest   2.4 ~  6.80     0.58  0.130  0.239  0.782   0.065  0.441     0.441   0.830   0.83     1.66    none
 
     fastest: no speed meets a target of 0.6 m: neighbours of one turn are 0.782 m apart, whatever the speed
-    * finest at this speed: faster; it misses the target
-    faster: 0.055 m/s by geometry
+    * finest at this speed: faster; it doesn't meet the target
+    faster: 0.055 m/s from the geometry alone
     ~ extrapolated from another range setting; measure the turn period and add it to the vehicle file
     start angles in faster at 0.065 m/s, degrees, + growing: head_0 0.0+ within 0 to 180; head_1 180.0+ within 180 to 360
     ");

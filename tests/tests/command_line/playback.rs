@@ -15,7 +15,7 @@ const PLAY: [&str; 5] = ["replay", "dive.mcap", "--interactive", "--speed", "0.5
 fn keys_control_and_end_a_replay() {
     let folder = Folder::with_dive();
     let mut screen = Screen::run(&folder, &PLAY, 100, &[]);
-    screen.until("q leave");
+    screen.until("q quit");
     assert!(!screen.is_in_order(), "keys come without a line end");
     screen.press(b"\x1b[C");
     screen.until("AT       0:00:10.");
@@ -27,7 +27,7 @@ fn keys_control_and_end_a_replay() {
     screen.press(b"-");
     screen.until("SPEED    0.25x");
     screen.press(b"\x1b[A");
-    screen.until("END      left and down go back, q leaves");
+    screen.until("END      left and down seek back, q quits");
     screen.press(b"\x1b[B");
     screen.until("AT       0:00:00.000");
     // Typed characters aren't echoed.
@@ -44,12 +44,12 @@ fn keys_control_and_end_a_replay() {
 fn ctrl_c_and_sigterm_restore_the_terminal() {
     let folder = Folder::with_dive();
     let mut screen = Screen::run(&folder, &PLAY, 100, &[]);
-    screen.until("q leave");
+    screen.until("q quit");
     screen.press(b"\x03");
     assert!(screen.end().0.is_some(), "it ends by itself");
     assert!(screen.is_in_order());
     let mut screen = Screen::run(&folder, &PLAY, 100, &[]);
-    screen.until("q leave");
+    screen.until("q quit");
     screen.signal(Signal::TERM);
     assert!(screen.end().0.is_some());
     assert!(screen.is_in_order());

@@ -72,7 +72,7 @@ fn keys_seek_in_a_replay_and_end_it() {
     screen.press(b"-");
     screen.until_page(" 1024x PAUSED");
     screen.press(b"w");
-    screen.until_page("WALL all that was seen");
+    screen.until_page("WALL seen so far");
     screen.press(b"w");
     screen.until_page("WALL whole tunnel");
     screen.press(b"?");
@@ -119,7 +119,7 @@ fn every_way_out_leaves_the_terminal_in_order() {
             assert!(screen.is_in_order(), "{way}: {shown}");
             let terminal = screen.terminal();
             assert!(!terminal.screen().alternate_screen() && !terminal.screen().hide_cursor(), "{way}");
-            let has_summary = [" samples, ", "NOTHING WAS JUDGED", "NO COVERAGE", "NO INSPECTION"]
+            let has_summary = [" samples, ", "NO VERDICTS", "NO COVERAGE", "NO INSPECTION"]
                 .iter()
                 .any(|words| page.contains(words));
             assert!(has_summary || !in_good_order, "{way}: {code:?}: {page}");

@@ -291,8 +291,9 @@ fn dive_without_a_position_judges_nothing_and_says_so_first() {
         let answer = folder.headrace(&["replay", "dive.mcap"]);
         assert_eq!(answer.code, Some(1), "{}", answer.stdout);
         let loud = answer.stdout.lines().find(|line| !line.contains("NO POSITION")).unwrap();
-        let wanted = format!("NOTHING WAS JUDGED: the vehicle never had a position, there was no {words}");
-        assert_eq!(loud, format!("{wanted}; nothing came from {sensor}"), "{}", answer.stdout);
+        let wanted =
+            format!("NO VERDICTS: the vehicle never had a position, because the {words} was unknown");
+        assert_eq!(loud, format!("{wanted}; {sensor} sent nothing"), "{}", answer.stdout);
         let (code, report) = folder.replay("dive.mcap", &[]);
         let why = &report["not_inspected"];
         assert_eq!(
@@ -314,7 +315,7 @@ fn dive_outside_the_tunnel_exits_with_1() {
     assert_eq!((code, &report["way"]["length_m"]), (Some(1), &0.0.into()));
     assert_eq!(report["not_inspected"]["reason"], "outside_tunnel");
     let answer = folder.headrace(&["replay", "dive.mcap"]);
-    let said = "NOTHING WAS JUDGED: the heads were outside the tunnel from 0+105.20 to 0+109.00: check";
+    let said = "NO VERDICTS: the heads were outside the tunnel from 0+105.20 to 0+109.00: check";
     assert!(answer.stdout.contains(said), "{}", answer.stdout);
 }
 

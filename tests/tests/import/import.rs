@@ -109,7 +109,7 @@ fn check_telemetry(file: &str, wanted: &Telemetry) {
 fn autopilot_memory_log_is_recognised_before_any_question() {
     let folder = Folder::new();
     folder.write("00000012.BIN", [b"\xA3\x95\x80".as_slice(), &[7; 500]].concat());
-    let dataflash = ["no log of Ping Viewer", "a dataflash log of ArduPilot", ".tlog"];
+    let dataflash = ["not a Ping Viewer log", "a dataflash log of ArduPilot", ".tlog"];
     refused(&folder, &["00000012.BIN", "-o", "out.mcap"], &dataflash);
 }
 
@@ -151,7 +151,7 @@ fn candump_import_keeps_bytes_and_times_of_the_dive() {
         let answer = folder.headrace(&[&arguments[..], further].concat());
         assert_eq!(answer.code, Some(0), "{}", answer.stderr);
         assert!(
-            answer.stdout.contains(&format!("{} frames are of no sensor", frames.len())),
+            answer.stdout.contains(&format!("{} frames belong to no sensor", frames.len())),
             "{}",
             answer.stdout
         );
@@ -270,7 +270,7 @@ fn table_becomes_the_bytes_of_its_sensors() {
     std::fs::remove_file(folder.path("out.mcap")).unwrap();
     for (columns, words) in [
         (&columns[..4], "rate_x, rate_y, rate_z, force_x, force_y, force_z"),
-        (&[("deep", "depth", "pressure", "mbar")], "is no column; there are t_s, depth (mbar), roll"),
+        (&[("deep", "depth", "pressure", "mbar")], "isn't a column; expected one of t_s, depth (mbar), roll"),
         (&[("along", "depth", "pressure", "m")], "must be one of Pa, hPa, mbar, kPa, bar"),
         (&[("along", "dvl", "velocity_x", "m/s")], "isn't a sensor of the vehicle file"),
     ] {

@@ -79,8 +79,8 @@ fn cut_log_says_so_and_keeps_the_verdicts_inside() {
         let (code, report) = folder.replay(name, &[]);
         let losses = report["log"]["losses"].to_string();
         assert_eq!(code, Some(3), "{name}: {losses}");
-        assert!(losses.contains("what came before was cut off by headrace trim (before "), "{losses}");
-        assert!(losses.contains("what came after was cut off by headrace trim (after "), "{losses}");
+        assert!(losses.contains("the part before was removed by headrace trim (before "), "{losses}");
+        assert!(losses.contains("the part after was removed by headrace trim (after "), "{losses}");
         assert_eq!(within(&report, 12.0, 19.0), expected, "{name}");
         let answer = folder.headrace(&["verify", name]);
         assert_eq!(answer.code, Some(1), "{}", answer.stdout);
@@ -88,8 +88,8 @@ fn cut_log_says_so_and_keeps_the_verdicts_inside() {
     }
     // Only data that existed is reported as removed.
     for (name, further, said, unsaid) in [
-        ("later.mcap", ["--from", "20s"], "before was cut off", "after was cut off"),
-        ("earlier.mcap", ["--to", "20s"], "after was cut off", "before was cut off"),
+        ("later.mcap", ["--from", "20s"], "before was removed", "after was removed"),
+        ("earlier.mcap", ["--to", "20s"], "after was removed", "before was removed"),
     ] {
         trim(&folder, name, &further);
         let losses = folder.replay(name, &[]).1["log"]["losses"].to_string();

@@ -126,8 +126,8 @@ fn calibrate_finds_and_offers_wrong_settings() {
     assert_eq!((answer.code, answer.stderr.as_str()), (Some(0), ""));
     insta::assert_snapshot!(answer.stdout, @r#"
     dive.mcap: 0.0 to 47.7 s, test vehicle
-    still from 0.0 to 12.0 s, 0.599 m left of the middle and 2.312 m above the floor (sd 0.027, 0.027)
-    half of the returns within 0.008 m of the profile; ranges +0.00 % long (sd 0.02)
+    stationary from 0.0 to 12.0 s, 0.599 m left of the centre and 2.312 m above the floor (sd 0.027, 0.027)
+    half of the returns are within 0.008 m of the profile; ranges are too long by +0.00 % (sd 0.02)
       front: 327 returns used, 48 rejected, rms 1.0 cm, 360 degrees of wall
       aft: 332 returns used, 43 rejected, rms 0.9 cm, 360 degrees of wall
 
@@ -152,8 +152,8 @@ fn calibrate_finds_and_offers_wrong_settings() {
     depth        latency                             0.0       -4.4     23.8 ms
     imu          latency                             0.0       73.4      6.6 ms  differs
 
-    not told by this log
-      tether, latency: the vehicle hardly turned or moved: the latency would be known only to 38 ms
+    not determined by this log
+      tether, latency: the vehicle hardly turned or moved: the latency would have a standard deviation of 38 ms
 
     for the vehicle file
     [water]
@@ -184,7 +184,7 @@ fn calibrate_finds_only_the_late_head() {
         .as_str()
         .unwrap();
     let found_ms: f64 = why.split(' ').next().unwrap().parse().unwrap();
-    assert!((found_ms - 50.0).abs() < 30.0 && why.contains(" ms, so it can't be that late"), "{why}");
+    assert!((found_ms - 50.0).abs() < 30.0 && why.contains(" ms, so its latency is shorter"), "{why}");
     for of in ["aft", "imu", "ping_left", "ping_right", "ping_up", "ping_down"] {
         assert_latency(&report, of, 0.0, 30.0);
     }
@@ -201,7 +201,7 @@ fn wrong_speed_of_sound_is_reported_without_a_settings_line() {
     for (share, says) in [(0.04, "ranges are -"), (-0.04, "ranges are +")] {
         let folder = folder(true, &filed(), &format!("sound_speed_error = {{ share = {share} }}\n"));
         let answer = folder.headrace(&["calibrate", "dive.mcap"]);
-        assert!(answer.stdout.contains("something is wrong, see above"), "{}", answer.stdout);
+        assert!(answer.stdout.contains("a fault was found, see above"), "{}", answer.stdout);
         assert!(!answer.stdout.contains("for the vehicle file"), "{}", answer.stdout);
         let line = answer.stdout.lines().find(|line| line.contains("water, speed of sound: ")).unwrap();
         assert!(line.contains(says), "{line}");
@@ -243,8 +243,8 @@ fn calibrate_without_a_stationary_phase_says_so() {
 fn invalid_options_are_refused() {
     let folder = folder(false, &filed(), "");
     for (options, words) in [
-        (["--from", "9", "--to", "9"], "--to 9 is not after --from 9"),
-        (["--from", "0", "--to", "2000"], "the most is 1200 s"),
+        (["--from", "9", "--to", "9"], "--to 9 must be after --from 9"),
+        (["--from", "0", "--to", "2000"], "at most 1200 s are allowed"),
         (["--at-surface", "9..3", "--from", "0"], "expected FROM..TO in seconds, FROM less than TO"),
     ] {
         let answer = folder.headrace(&[&["calibrate", "dive.mcap"], &options[..]].concat());

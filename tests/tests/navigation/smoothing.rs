@@ -245,7 +245,7 @@ fn replay_reports_changes_by_smoothing() {
     let about = |line: &&str| ["  smoothed", "  changed:"].iter().any(|words| line.contains(words));
     let said: Vec<&str> = answer.stdout.lines().filter(about).collect();
     insta::assert_snapshot!(said.join("\n"), @r"
-      smoothed 591 estimates; by the filter alone: passed 8.00 m   missed 0.00 m   can't say 3.00 m   open 0.00 m   not inspected 1.00 m
+      smoothed 591 estimates; with the filter alone: passed 8.00 m   missed 0.00 m   can't say 3.00 m   open 0.00 m   not inspected 1.00 m
       0+003.50 to 0+004.00  changed: can't say to pass, holes 0.544±0.127 to 0.458±0.041 m
       0+009.75 to 0+011.25  changed: can't say to pass, holes 0.664±0.088 to 0.508±0.012 m
       0+012.25 to 0+013.25  changed: can't say to pass, holes 0.587±0.080 to 0.440±0.012 m

@@ -24,8 +24,8 @@ fn sensor(text: &'static str, end: End, fault: impl Fault + 'static) -> Sensor {
 /// Statuses caused by a busy machine at the other end, which the tests ignore.
 const OF_A_BUSY_MACHINE: [&str; 3] = [
     "wrong: can't keep up with",
-    "wrong: falls behind since answers get lost",
-    "silent: the line is open, and no frame has come yet",
+    "wrong: falls behind because replies are lost",
+    "silent: the line is open, but no frame has arrived yet",
 ];
 
 /// Statuses of a sensor without repetition, the same on a busy machine and on an idle one.
@@ -72,7 +72,7 @@ fn replugged_serial_device_is_used_again_under_its_stable_name() {
     let end = End::serial(&folder.path(""), "usb-head-port0");
     insta::assert_snapshot!(unplugged_and_plugged_in(HEAD, end, "serial"), @r#"
     running: Imagenex 881 family, head 0x10
-    closed: lost <line>: Broken pipe; it is tried again
+    closed: lost <line>: Broken pipe; retrying
     closed: opening <place>: there is no such port; plug it in, or run headrace devices
     "#);
 }
@@ -81,7 +81,7 @@ fn replugged_serial_device_is_used_again_under_its_stable_name() {
 fn connection_closed_by_the_device_is_reopened() {
     insta::assert_snapshot!(unplugged_and_plugged_in(HEAD, End::tcp(), "tcp"), @r#"
     running: Imagenex 881 family, head 0x10
-    closed: lost <line>: the device has closed the connection; it is tried again
+    closed: lost <line>: the device has closed the connection; retrying
     closed: opening <place>: no device listens there; check that the device is switched on and the port number is right
     "#);
 }
@@ -92,7 +92,7 @@ fn replugged_echosounder_gets_its_settings_again() {
     let end = End::serial(&folder.path(""), "usb-ping-port0");
     insta::assert_snapshot!(unplugged_and_plugged_in(PING, end, "ping"), @r#"
     running: Ping echosounder, revision 1, firmware 3.29.0
-    closed: lost <line>: Broken pipe; it is tried again
+    closed: lost <line>: Broken pipe; retrying
     closed: opening <place>: there is no such port; plug it in, or run headrace devices
     "#);
 }
@@ -111,7 +111,7 @@ fn returning_bridge_is_used_again() {
     ended.untroubled(1);
     insta::assert_snapshot!(words(&ended.view.said[0]), @r#"
     running: Ping echosounder, revision 1, firmware 3.29.0
-    closed: lost <line>: no device listens there; it is tried again
+    closed: lost <line>: no device listens there; retrying
     "#);
 }
 
@@ -333,12 +333,12 @@ fn wrong_device_is_reported_and_the_right_one_used_later() {
     ended.untroubled(2);
     insta::assert_snapshot!(words(&ended.view.said[0]), @r#"
     wrong: is a Ping360, no echosounder; connect leads to another device than this sensor
-    closed: lost <line>: the device has closed the connection; it is tried again
+    closed: lost <line>: the device has closed the connection; retrying
     running: Ping echosounder, revision 1, firmware 3.29.0
     "#);
     insta::assert_snapshot!(words(&ended.view.said[1]), @r#"
     wrong: answers as head 0x11; head_id says 0x10
-    closed: lost <line>: the device has closed the connection; it is tried again
+    closed: lost <line>: the device has closed the connection; retrying
     running: Imagenex 881 family, head 0x10
     "#);
 }
@@ -369,7 +369,7 @@ fn babbling_device_disturbs_no_other_and_is_used_afterwards() {
     let ended = rig.end_but(Some(0));
     ended.untroubled(1);
     insta::assert_snapshot!(words(&ended.view.said[0]), @r#"
-    babbling: bytes come, but no frame for 5 s; another device, or another baud rate?
+    babbling: bytes arrive, but no frame for 5 s; another device, or another baud rate?
     running: Imagenex 881 family, head 0x10
     "#);
 }
@@ -392,7 +392,7 @@ fn silent_device_is_reported_and_used_when_it_returns() {
     ended.untroubled(1);
     insta::assert_snapshot!(words(&ended.view.said[0]), @r#"
     running: Ping echosounder, revision 1, firmware 3.29.0
-    silent: nothing has come for 5 s; is it switched on?
+    silent: no data for 5 s; is it switched on?
     "#);
 }
 

@@ -92,7 +92,7 @@ fn dive_among_strangers(option: &str, keys: &str) -> (Value, usize, usize) {
     });
     // A depth sensor alone gives no position.
     assert_eq!(answer.code, Some(1), "{}{}", answer.stdout, answer.stderr);
-    assert!(answer.stdout.contains("on the line of depth came from others"), "{}", answer.stdout);
+    assert!(answer.stdout.contains("on the line of depth came from other devices"), "{}", answer.stdout);
     let log = folder.read("dive.mcap");
     let has = |value: f32| {
         let wanted = value.to_le_bytes();

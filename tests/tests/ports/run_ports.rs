@@ -78,7 +78,7 @@ fn check_reports_every_wrong_connect_with_the_valid_form() {
     headrace: vehicle.toml:32: sensors[3].connect: a device of this kind cannot use can:; it can use tcp:, serial: or udp:
     headrace: vehicle.toml:39: sensors[4].connect: there is no product id; allowed is hid:VID:PID[:SERIAL] with four hexadecimal digits each, hid:1209:0001
     headrace: vehicle.toml:46: sensors[5].connect: address "0x99" must be 0x08 to 0x77; allowed is i2c:/dev/i2c-1:0x40
-    headrace: warning: vehicle.toml:9: sensors: have no connect, so that `run` can't reach them: empty
+    headrace: warning: vehicle.toml:9: sensors: have no connect, so `run` can't reach them: empty
     "#);
 }
 

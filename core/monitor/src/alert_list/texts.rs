@@ -133,7 +133,7 @@ impl ListedAlert {
                 "go slower, or pass it again with a more certain position".to_owned()
             }
             (ListKind::NoSonar | ListKind::NoData, _) => "stop".to_owned(),
-            (ListKind::NotRecorded, _) => "free the disk, or change the medium".to_owned(),
+            (ListKind::NotRecorded, _) => "free disk space, or change the medium".to_owned(),
             (ListKind::CableLeft | ListKind::TimeLeft | ListKind::BatteryLeft, _) => "turn back".to_owned(),
             _ => String::new(),
         }
@@ -144,7 +144,7 @@ fn plain_text(kind: ListKind, name: &str, place: &str) -> String {
     match kind {
         ListKind::SensorSilent => format!("{name} silent"),
         ListKind::SensorStalled => format!("{name} doesn't turn"),
-        ListKind::SensorHung => format!("{name} hangs: it repeats one reading"),
+        ListKind::SensorHung => format!("{name} is stuck: it repeats one reading"),
         ListKind::SensorDeaf => format!("{name} detects no wall"),
         ListKind::NoSonar => "NO SONAR: no returns".to_owned(),
         ListKind::NoData => "NO DATA: nothing from any sensor".to_owned(),

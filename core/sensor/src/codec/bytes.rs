@@ -9,7 +9,7 @@ pub struct Bytes<const N: usize> {
 
 /// The bytes do not fit.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
-#[error("storing {len} bytes; the most allowed is {max}")]
+#[error("storing {len} bytes; at most {max} are allowed")]
 pub struct TooLong {
     /// Total length needed.
     pub len: usize,

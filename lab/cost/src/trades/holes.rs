@@ -131,7 +131,7 @@ pub fn measure(inputs: &Inputs<'_>, progress: &mut dyn FnMut(&str)) -> Result<Tr
 fn left_out(inputs: &Inputs<'_>) -> Vec<LeftOut> {
     let quick = LeftOut {
         what: "tolerances of 1e-4, 1e-3, 0.01 and 1 m, cells of 0.5 and 0.02 m, sections of 0.05 m, four seeds of five and 12 m of 16".to_owned(),
-        why: "`--quick`; the whole measurement has them".to_owned(),
+        why: "`--quick`; the full measurement includes them".to_owned(),
     };
     inputs.effort.pick(Some(quick), None).into_iter().collect()
 }
@@ -175,8 +175,10 @@ impl Dives {
                 judged.push(setting.judged(&mut scene.vehicle, recorded)?);
             }
         }
-        let why =
-            || CostError::Figure { what: format!("holes of {name}"), why: "no seed was dived".to_owned() };
+        let why = || CostError::Figure {
+            what: format!("holes of {name}"),
+            why: "no seed was simulated".to_owned(),
+        };
         let (scene, recorded) = self.0.into_iter().next().ok_or_else(why)?;
         Ok(Prepared { name, vehicle: scene.vehicle, recorded, judged })
     }

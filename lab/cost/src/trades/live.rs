@@ -191,7 +191,7 @@ impl Prepared {
             }
             first.get_or_insert((recorded, scene.vehicle_text.clone()));
         }
-        let why = || CostError::Figure { what: name.to_owned(), why: "no seed was dived".to_owned() };
+        let why = || CostError::Figure { what: name.to_owned(), why: "no seed was simulated".to_owned() };
         let (recorded, vehicle_text) = first.ok_or_else(why)?;
         let marker = |(setting, against): (Setting, Against)| {
             let vehicle = VehicleConfig { looks: setting.looks, ..inputs.vehicle(&vehicle_text)? };
@@ -371,7 +371,7 @@ fn left_out(inputs: &Inputs<'_>) -> Vec<LeftOut> {
     if inputs.effort.pick(true, false) {
         left_out.push(LeftOut {
             what: "a lively pilot, most of the demonstration's way, two of three seeds, and profiles of 10,000 and 100,000 vertices".to_owned(),
-            why: "`--quick`; the whole measurement has them".to_owned(),
+            why: "`--quick`; the full measurement includes them".to_owned(),
         });
     }
     left_out

@@ -38,7 +38,7 @@ pub fn tabulate(inputs: &Inputs<'_>, progress: &mut dyn FnMut(&str)) -> Result<G
     let columns = ["what", "lost", "ns with it", "ns without it"].map(str::to_owned).to_vec();
     Ok(Given {
         title: "What determinism and memory cost".to_owned(),
-        text: "The same bytes give the same results on every machine, in bounded memory. That has a price, which is no choice. Times are \
+        text: "The same bytes give the same results on every machine, in bounded memory. This has a cost that no setting avoids. Times are \
                the CPU time of one call, distance or sample, as the median of the rounds."
             .to_owned(),
         columns,
@@ -49,10 +49,7 @@ pub fn tabulate(inputs: &Inputs<'_>, progress: &mut dyn FnMut(&str)) -> Result<G
 type Function = (&'static str, fn(f64) -> f64, fn(f64) -> f64, [f64; 2]);
 
 /// Name, the core's function, the platform's function, and the range of arguments.
-#[expect(
-    clippy::disallowed_methods,
-    reason = "the platform's functions are what the core's are held against"
-)]
+#[expect(clippy::disallowed_methods, reason = "the platform's functions are the reference for the core's")]
 const FUNCTIONS: [Function; 4] = [
     ("sine", math::sin, |x| x.sin(), [-7.0, 7.0]),
     ("arc tangent", |x| math::atan2(x, 1.0), |x| x.atan2(1.0), [-10.0, 10.0]),

@@ -344,9 +344,9 @@ fn errors(figures: &[Figures], dives: &[JudgedDive]) -> Vec<Error> {
     let own = [
         of("displacement between passes", "m", |figures| figures.turn_m),
         of("position across", "m", |figures| figures.across_m),
-        of("sigma told for the displacement", "m", |figures| figures.sigma_m),
+        of("estimated sigma of the displacement", "m", |figures| figures.sigma_m),
         of("displacements within two sigma", "%", |figures| figures.within_two),
-        of("flag said after its section was passed", "s", |figures| figures.flag_delay_s),
+        of("flag raised after its section was passed", "s", |figures| figures.flag_delay_s),
     ];
     let judged = |dive: &JudgedDive| inner(dive).map(Judged::of).collect::<Vec<_>>();
     let judged: Vec<Vec<Judged>> = dives.iter().map(judged).collect();
@@ -500,7 +500,7 @@ fn left_out(inputs: &Inputs<'_>) -> Vec<LeftOut> {
     if inputs.effort.pick(true, false) {
         left_out.push(LeftOut {
             what: "chainages 3000 and 6900 m, four of five seeds, and the last metres of dives".to_owned(),
-            why: "`--quick`; the whole measurement has them".to_owned(),
+            why: "`--quick`; the full measurement includes them".to_owned(),
         });
     }
     left_out

@@ -436,7 +436,7 @@ fn left_out(inputs: &Inputs<'_>) -> Vec<LeftOut> {
     if inputs.effort.pick(true, false) {
         left_out.push(LeftOut {
             what: "collapse, field, all effects, rays among boulders, and three of five seeds".to_owned(),
-            why: "`--quick`; the whole measurement has them".to_owned(),
+            why: "`--quick`; the full measurement includes them".to_owned(),
         });
     }
     left_out

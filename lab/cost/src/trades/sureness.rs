@@ -73,7 +73,7 @@ pub fn measure(inputs: &Inputs<'_>, progress: &mut dyn FnMut(&str)) -> Result<Tr
         points,
         left_out: left_out(inputs),
         oracle: OracleError {
-            how: "sigma is given and not measured, and hours are the plan's; verdicts of the dives are judged by D_true".to_owned(),
+            how: "sigma is an input, not a measurement; the hours come from the plan; D_true checks the verdicts of the dives".to_owned(),
             size: 0.0,
         },
         reasons,
@@ -85,13 +85,13 @@ fn left_out(inputs: &Inputs<'_>) -> Vec<LeftOut> {
     let mut left_out = vec![LeftOut {
         what: "other modes and targets".to_owned(),
         why: format!(
-            "VITA 2 with four heads in {MODE} for {TARGET_M} m is what is shipped; the trade Survey has the others"
+            "the shipped file is VITA 2 with four heads in {MODE} for {TARGET_M} m; the trade Survey has the others"
         ),
     }];
     left_out.extend(inputs.effort.pick(
         Some(LeftOut {
             what: "four of five seeds, and half of the dives' length".to_owned(),
-            why: "`--quick`; the whole measurement has them".to_owned(),
+            why: "`--quick`; the full measurement includes them".to_owned(),
         }),
         None,
     ));

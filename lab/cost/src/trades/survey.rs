@@ -90,8 +90,8 @@ pub fn measure(inputs: &Inputs<'_>, progress: &mut dyn FnMut(&str)) -> Result<Tr
         left_out,
         oracle: OracleError {
             how: format!(
-                "Voronoi vertices against lower envelopes, and arc lengths of an outline against those of rays, on {compared} sections of the simulated dives; that T is promised is checked by \
-                 D_true, which no function of the plan computes"
+                "Voronoi vertices against lower envelopes, and arc lengths of an outline against those of rays, on {compared} sections of the simulated dives; D_true, which no function of the plan \
+                 computes, checks the promised T"
             ),
             size: oracle_m,
         },
@@ -105,7 +105,7 @@ fn quick_left_out() -> LeftOut {
         what: format!(
             "targets but {QUICK_TARGETS_M:?} m, of modes, layouts and drifts but {QUICK_FEW_TARGETS_M:?} m; of places off the middle all but two"
         ),
-        why: "`--quick`; the whole measurement has them".to_owned(),
+        why: "`--quick`; the full measurement includes them".to_owned(),
     }
 }
 

@@ -19,17 +19,17 @@ const LISTENS: [SocketAddr; 2] = [
 #[group(skip)]
 #[command(next_help_heading = "Many machines (all with one --cache, and logs and cache at the same paths)")]
 pub(crate) struct Arguments {
-    /// Replay and answer on the executors of this scheduler.
+    /// Run replays and queries on the executors of this scheduler.
     #[arg(long, value_name = "HOST:PORT", conflicts_with_all = ["schedule", "executor"])]
     scheduler: Option<String>,
-    /// Be the scheduler, Ballista's own.
+    /// Run as the scheduler (that of Ballista).
     #[arg(long, conflicts_with_all = ["folder", "executor"])]
     schedule: bool,
-    /// Be an executor for this scheduler, with --threads tasks at a time; waits until it is there.
+    /// Run as an executor for this scheduler, with --threads tasks at a time. It waits until the scheduler is available.
     #[arg(long, value_name = "HOST:PORT", conflicts_with = "folder")]
     executor: Option<String>,
-    /// Where the scheduler or executor listens; by default on this machine alone, 127.0.0.1:50050 and 127.0.0.1:50051. Anybody who
-    /// reaches it can read the logs: there is neither a password nor encryption.
+    /// Listening address of the scheduler or executor; by default 127.0.0.1:50050 and 127.0.0.1:50051, on this machine only.
+    /// Anybody who reaches it can read the logs: there is neither a password nor encryption.
     #[arg(long, value_name = "ADDRESS:PORT", conflicts_with = "folder")]
     listen: Option<SocketAddr>,
 }

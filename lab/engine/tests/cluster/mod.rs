@@ -91,7 +91,7 @@ fn cache_not_shared_with_executors_is_named() {
     let cluster = Cluster::start(&scratch.path().join("theirs"));
     let output = run(folder.path(), &scratch.path().join("ours"), &["--scheduler", &cluster.address]);
     assert_eq!(output.status.code(), Some(2), "{}", stderr(&output));
-    assert!(stderr(&output).contains("--cache must be one folder that all see"), "{}", stderr(&output));
+    assert!(stderr(&output).contains("all machines must share one --cache folder"), "{}", stderr(&output));
 }
 
 #[test]

@@ -66,7 +66,7 @@ pub struct Tables {
 #[non_exhaustive]
 pub enum PaperError {
     /// A column is missing or not a number.
-    #[error("table {table}, line {line}: {column} is missing or no number of up to 6 decimals")]
+    #[error("table {table}, line {line}: {column} is missing or isn't a number with at most 6 decimals")]
     Printed {
         /// Number of the table.
         table: u8,

@@ -5,13 +5,13 @@
 #[non_exhaustive]
 pub enum PerimeterError {
     /// Too few angles with an echo around the turn.
-    #[error("a perimeter needs echoes at 3 angles at least; there are {count}")]
+    #[error("a perimeter needs echoes at 3 angles or more; there are {count}")]
     TooFewPings {
         /// Angles with an echo.
         count: usize,
     },
     /// A setting is out of range.
-    #[error("{setting} is {value}; wanted is {wanted}")]
+    #[error("{setting} is {value}; expected {wanted}")]
     Setting {
         /// The setting's name.
         setting: &'static str,

@@ -75,13 +75,13 @@ pub enum PoissonError {
         count: usize,
     },
     /// A position or normal isn't finite.
-    #[error("sample {index} has a place or normal that is no number")]
+    #[error("sample {index} has a position or normal that isn't a number")]
     NotFinite {
         /// Its index, from zero.
         index: usize,
     },
     /// A setting is out of range.
-    #[error("{setting} is {value}; wanted is {wanted}")]
+    #[error("{setting} is {value}; expected {wanted}")]
     Setting {
         /// The setting's name.
         setting: &'static str,
@@ -91,7 +91,9 @@ pub enum PoissonError {
         wanted: &'static str,
     },
     /// The grid would be too large.
-    #[error("the grid would have {nodes:.0} nodes; the most is {NODES_MAX}; a smaller depth needs fewer")]
+    #[error(
+        "the grid would have {nodes:.0} nodes; at most {NODES_MAX} are allowed; a smaller depth needs fewer"
+    )]
     TooLarge {
         /// Nodes needed.
         nodes: f64,

@@ -188,7 +188,7 @@ describe("voice notes", () => {
     await on({ mode: "demo" }, async ({ page }) => {
       await page.locator(".notes .voice.lacks", { hasText: "No voice" }).waitFor();
       await voice(page).click();
-      await told(page, /by https, or of this machine/);
+      await told(page, /only for https pages/);
     }, { init: insecure });
   });
 });
@@ -276,7 +276,7 @@ describe("alerts", () => {
     await page.locator(".alert.caution", { hasText: "setting doubted" }).waitFor();
     mock.control({ settle: "missed" });
     mock.control({ settle: "setting_doubted" });
-    await page.locator('.alert.rectified[data-kind="missed"]', { hasText: "· over" }).waitFor();
+    await page.locator('.alert.rectified[data-kind="missed"]', { hasText: "· rectified" }).waitFor();
     await page.locator(".alert.caution").waitFor({ state: "detached" });
     await page.keyboard.press("a");
     await page.locator('.alert[data-kind="missed"]').waitFor({ state: "detached" });
@@ -346,7 +346,7 @@ describe("connection", () => {
     await word(page, "NO ACCESS");
     await page.getByLabel(/Token/).fill("wrong");
     await page.keyboard.press("Enter");
-    await page.locator(".token p", { hasText: "isn't right" }).waitFor();
+    await page.locator(".token p", { hasText: "token is wrong" }).waitFor();
     mock.control({ spent: true });
     await page.keyboard.press("Enter");
     await page.locator(".token p", { hasText: "Too many wrong tokens" }).waitFor();

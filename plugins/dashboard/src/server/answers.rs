@@ -290,21 +290,25 @@ async fn act(
     body: HttpBody,
 ) -> Result<Value, (StatusCode, String)> {
     if !feed::may(shared, admitted.role).operate {
-        return Err((StatusCode::FORBIDDEN, "not in this dive, or the token is a viewer's".to_owned()));
+        return Err((
+            StatusCode::FORBIDDEN,
+            "not possible in this dive, or the token is for viewing only".to_owned(),
+        ));
     }
     if !["acknowledge", "silence", "mark", "note"].contains(&name) {
         return Err((
             StatusCode::NOT_FOUND,
-            format!("no action {name:?}; acknowledge, silence, mark or note"),
+            format!("unknown action {name:?}; expected acknowledge, silence, mark or note"),
         ));
     }
     let too_long = |_| (StatusCode::PAYLOAD_TOO_LARGE, format!("at most {LONGEST} bytes"));
     if !shared.actions.take(admitted.client, 1) {
-        let why = format!("over {} actions a second from this address; send it again", feed::MOST_PER_S);
+        let why =
+            format!("more than {} actions per second from this address; send it again", feed::MOST_PER_S);
         return Err((StatusCode::TOO_MANY_REQUESTS, why));
     }
     let late = |_| {
-        (StatusCode::REQUEST_TIMEOUT, format!("the action took over {} s to come", STALLED_AFTER.as_secs()))
+        (StatusCode::REQUEST_TIMEOUT, format!("the action took over {} s to arrive", STALLED_AFTER.as_secs()))
     };
     let bytes = timeout(STALLED_AFTER, to_bytes(body, LONGEST)).await.map_err(late)?.map_err(too_long)?;
     let wrong = |why: String| (StatusCode::BAD_REQUEST, why);

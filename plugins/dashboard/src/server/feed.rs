@@ -256,7 +256,7 @@ impl Viewer {
                 return if self.budget.take() {
                     Ok(())
                 } else {
-                    self.refuse("over 20 messages a second").await
+                    self.refuse("more than 20 messages per second").await
                 };
             }
             Frame::Close(_) => return Err(Over::Gone),
@@ -266,7 +266,7 @@ impl Viewer {
             return self.refuse(&format!("a message of {} bytes; at most {LONGEST}", text.len())).await;
         }
         if !self.budget.take() {
-            return self.refuse("over 20 messages a second").await;
+            return self.refuse("more than 20 messages per second").await;
         }
         match serde_json::from_str::<Value>(&text) {
             Ok(Value::Object(_)) => {}
@@ -289,11 +289,11 @@ impl Viewer {
                 Ok("rate")
             }
             Asked::Play(_) if !self.may.playback => {
-                Err("this dive can't be paused, or the token is a viewer's".to_owned())
+                Err("this dive can't be paused, or the token is for viewing only".to_owned())
             }
             Asked::Play(play) => (self.shared.direct)(play).map(|()| "play"),
             Asked::Command(_) if !self.may.operate => {
-                Err("not in this dive, or the token is a viewer's".to_owned())
+                Err("not possible in this dive, or the token is for viewing only".to_owned())
             }
             Asked::Command(command) => {
                 let done = command.word();

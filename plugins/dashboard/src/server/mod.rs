@@ -163,7 +163,7 @@ impl Shared {
     fn count_stalled(&self) {
         Self::count(&self.counts.stalled, 1);
         tracing::info!(
-            "a viewer of the page took nothing for {} s and was dropped",
+            "a viewer of the page read nothing for {} s and was dropped",
             stall::STALLED_AFTER.as_secs()
         );
     }

@@ -89,7 +89,10 @@ impl Desk {
     /// Stores the recording of a begun note; repeated uploads are accepted.
     fn keep(&self, voice: Voice) -> Result<(), Refusal> {
         let Voices::Kept(keep) = &self.to else {
-            return Err((StatusCode::CONFLICT, "this dive isn't recorded: no voice can be kept".to_owned()));
+            return Err((
+                StatusCode::CONFLICT,
+                "this dive isn't recorded, so voice notes can't be stored".to_owned(),
+            ));
         };
         if self.get(voice.id).is_some_and(|held| *held == voice) {
             return Ok(());
@@ -144,7 +147,7 @@ pub(super) async fn take(
     let received = if feed::may(&shared, admitted.role).operate {
         receive(&shared.voices, &id, &headers, &uri, body).await
     } else {
-        Err((StatusCode::FORBIDDEN, "not in this dive, or the token is a viewer's".to_owned()))
+        Err((StatusCode::FORBIDDEN, "not possible in this dive, or the token is for viewing only".to_owned()))
     };
     match received {
         Ok(()) => json_answer(&json!({"type": "done", "do": "voice"})),
@@ -159,7 +162,8 @@ async fn receive(
     uri: &Uri,
     body: HttpBody,
 ) -> Result<(), Refusal> {
-    let too_many = || (StatusCode::TOO_MANY_REQUESTS, "too many voices at a time; send it again".to_owned());
+    let too_many =
+        || (StatusCode::TOO_MANY_REQUESTS, "too many voice notes at once; send it again".to_owned());
     let _place = desk.coming.try_acquire().map_err(|_| too_many())?;
     let wrong = |why: String| (StatusCode::BAD_REQUEST, why);
     let id = id.parse().map_err(|_| wrong(format!("no id of a voice note: {id:?}")))?;
@@ -175,7 +179,7 @@ async fn receive(
     if !desk.budget.take() {
         return Err(too_many());
     }
-    let late = |_| (StatusCode::REQUEST_TIMEOUT, "the voice took over a minute to come".to_owned());
+    let late = |_| (StatusCode::REQUEST_TIMEOUT, "the voice note took over a minute to arrive".to_owned());
     let audio = timeout(COMES_WITHIN, to_bytes(body, MAX_VOICE_BYTES)).await.map_err(late)?;
     let audio = audio.map_err(|_| refusal(&VoiceError::Bytes(MAX_VOICE_BYTES + 1)))?.to_vec();
     desk.keep(Voice { id, seconds, container, audio }.checked().map_err(|error| refusal(&error))?)
@@ -200,7 +204,9 @@ pub(super) async fn play(State(shared): Here, Path(id): Path<String>, _: Admitte
         Ok(Some(voice)) => {
             ([(header::CONTENT_TYPE, voice.container.media_type())], voice.audio.clone()).into_response()
         }
-        Ok(None) => plain(StatusCode::NOT_FOUND, "its recording can't be had here: it may be in the log\n"),
+        Ok(None) => {
+            plain(StatusCode::NOT_FOUND, "its recording isn't available here; it may be in the log\n")
+        }
         Err((status, why)) => {
             let kind = [(header::CONTENT_TYPE, "text/plain; charset=utf-8")];
             (status, kind, format!("its recording can't be read: {why}\n")).into_response()

@@ -147,7 +147,7 @@ pub enum ReturnError {
         got: [u8; 6],
     },
     /// A field above its maximum.
-    #[error("return: {field} {got}; the most allowed is {max}")]
+    #[error("return: {field} is {got}; at most {max} is allowed")]
     TooGreat {
         /// Name of the field.
         field: &'static str,

@@ -321,9 +321,9 @@ fn named(text: &str, error: &can_dbc::DbcError) -> DbcError {
         text.lines().nth(line.saturating_sub(1)).unwrap_or_default().trim().chars().take(60).collect();
     let problem = match error {
         can_dbc::DbcError::Pest(_) if there.is_empty() => {
-            "it ends, or is empty, where more is wanted".to_owned()
+            "it ends or is empty, but more is expected".to_owned()
         }
-        can_dbc::DbcError::Pest(_) => format!("{there:?} is not as DBC has it"),
+        can_dbc::DbcError::Pest(_) => format!("{there:?} is not valid DBC"),
         _ => words,
     };
     DbcError::Parse { line, problem }

@@ -67,7 +67,9 @@ impl Signals<'_, '_> {
         let quaternion = self.parts("quaternion", Kind::Share)?.map(Attitude::Quaternion);
         let euler = self.parts("euler", Kind::Angle)?.map(Attitude::Euler);
         if quaternion.is_some() && euler.is_some() {
-            return Err(self.section.invalid("euler", "is there beside quaternion; one of them is attitude"));
+            return Err(self
+                .section
+                .invalid("euler", "is given beside quaternion; only one of them may give the attitude"));
         }
         Ok(quaternion.or(euler))
     }

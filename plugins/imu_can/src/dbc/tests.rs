@@ -391,7 +391,7 @@ fn invalid_dbc_is_refused_with_its_line() {
     let far_line = 1 + far.lines().position(|line| line.contains("Far")).unwrap();
     assert_eq!(line(&far).0, far_line);
     let error = mapped("BO_ x\n", "[signals]\n").unwrap_err();
-    assert_eq!(error, "imu.dbc:1: DBC: \"BO_ x\" is not as DBC has it");
+    assert_eq!(error, "imu.dbc:1: DBC: \"BO_ x\" is not valid DBC");
 }
 
 fn configured(own: &str) -> Result<Box<dyn Device>, String> {

@@ -19,7 +19,7 @@ const MOST_INDEX: u64 = 64 << 20;
 /// Times below this, in 2001, are not UTC.
 pub(super) const FIRST_UTC_NS: u64 = 1_000_000_000_000_000_000;
 
-const NO_RECORD: &str = "no record of a bag";
+const NO_RECORD: &str = "no bag record";
 
 /// A bag as a format; its streams are the sensors' ids.
 #[derive(Default)]

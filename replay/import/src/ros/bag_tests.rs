@@ -92,7 +92,7 @@ fn damage_loses_only_its_chunk_and_is_named() {
     let garbage = [bag(std::slice::from_ref(&first), &[]), vec![0xEE; 30], second].concat();
     let (count, losses) = read(&garbage);
     assert_eq!(count, 3);
-    assert!(losses[0].contains("no record of a bag: 1 times, 30 bytes"), "{losses:?}");
+    assert!(losses[0].contains("no bag record: 1 times, 30 bytes"), "{losses:?}");
     assert!(losses[1].contains("states 1 chunks; it has 2"), "{losses:?}");
     let wild = [chunk(&[vec![9; 20]]), chunk(&[chunk(&[])]), chunk(&[message(7, 1)])];
     let said = read(&bag(&wild, &[])).1.join("; ");

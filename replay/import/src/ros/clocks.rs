@@ -95,7 +95,7 @@ impl Clocks {
             ))
         } else if most - least > VARIES_NS {
             Some(format!(
-                "header stamps are {} s before recording: messages came late, or from another clock",
+                "header stamps are {} s before recording: messages arrived late, or come from another clock",
                 range(least, most)
             ))
         } else if most > LATE_NS {

@@ -50,7 +50,7 @@ pub enum LogError {
         source: mcap::McapError,
     },
     /// Not an MCAP file.
-    #[error("{name} is not an MCAP file: it begins with [{found}], and [{wanted}] is wanted")]
+    #[error("{name} is not an MCAP file: it begins with [{found}]; expected [{wanted}]")]
     NotMcap {
         /// The log, as the caller named it.
         name: String,

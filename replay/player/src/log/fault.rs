@@ -36,7 +36,10 @@ impl RecordingFault {
         let path = path.display();
         match continued {
             Some(next) => {
-                format!("recording failed in {path}: {error}; {lost}; it goes on in {}", next.display())
+                format!(
+                    "recording failed in {path}: {error}; {lost}; recording continues in {}",
+                    next.display()
+                )
             }
             None => format!("recording failed in {path}: {error}; {lost}; nothing was recorded after that"),
         }
@@ -86,12 +89,12 @@ impl RecordingEvent {
     pub fn words(&self) -> String {
         match self {
             Self::Failed { path, error } => {
-                format!("NOT RECORDED to {}: {error}; tried again in another part", path.display())
+                format!("NOT RECORDED to {}: {error}; retrying in another part", path.display())
             }
             Self::Resumed(fault) => fault.words(),
-            Self::Behind => "NOT RECORDED: the medium takes nothing, and gives no error".to_owned(),
+            Self::Behind => "NOT RECORDED: the medium accepts no data and reports no error".to_owned(),
             Self::CaughtUp { packets } => {
-                format!("recorded again; {packets} packets are missing from before")
+                format!("recorded again; {packets} earlier packets are missing")
             }
             Self::Late { path, by } => format!(
                 "the last {:.0} s are not on the disk yet: a power cut would lose them; {} is too slow",

@@ -179,9 +179,9 @@ impl fmt::Display for LossKind {
             Self::Truncated => out.write_str("the file ends before its closing records"),
             Self::Framing => out.write_str("bytes that aren't records"),
             Self::Checksum => out.write_str("a chunk that fails its checksum"),
-            Self::Contents => out.write_str("a chunk that does not unpack"),
+            Self::Contents => out.write_str("a chunk that can't be decompressed"),
             Self::Unreadable(error) => write!(out, "the medium can't read them: {error}"),
-            Self::Compression(name) => write!(out, "a chunk compressed as {name:?}; zstd and lz4 are known"),
+            Self::Compression(name) => write!(out, "a chunk compressed as {name:?}; zstd and lz4 are supported"),
             Self::TooLarge { limit } => {
                 write!(out, "larger than the {limit} bytes that are read into memory")
             }
@@ -203,10 +203,10 @@ impl fmt::Display for LossKind {
                 LATEST.0
             ),
             Self::Missing { messages } => {
-                write!(out, "{messages} messages are missing: the numbers of the messages skip them")
+                write!(out, "{messages} messages are missing: their sequence numbers are skipped")
             }
             Self::Repeated { messages } => {
-                write!(out, "{messages} messages are there twice: their numbers have occurred before")
+                write!(out, "{messages} messages are duplicates: their numbers occurred before")
             }
             Self::Disordered { messages } => {
                 write!(out, "{messages} messages are out of order: they follow messages with higher numbers")
@@ -250,8 +250,8 @@ impl LossKind {
             }
             Self::PartUnlike { part, messages, wanted } => write!(
                 out,
-                "part {part} is not the one that was recorded: with it there are {messages} messages, and the next part \
-                 says {wanted}"
+                "part {part} is not the one that was recorded: with it there are {messages} messages; the next part states \
+                 {wanted}"
             ),
             Self::PartUnreadable { part, found } => {
                 write!(out, "part {part} can't be read: it begins with [{found}], which no MCAP file does")

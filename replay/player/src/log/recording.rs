@@ -258,7 +258,7 @@ impl Recording {
         let part = match self.begin_part() {
             Ok(part) => part,
             Err(error) => {
-                tracing::debug!("the recording can't go on yet: {error}");
+                tracing::debug!("the recording can't continue yet: {error}");
                 self.wait();
                 return;
             }
@@ -331,14 +331,14 @@ impl Recording {
         last.began = Some(at);
         match next {
             Err(error) => {
-                tracing::warn!("the recording goes on in {}: {error}", last.path.display());
+                tracing::warn!("the recording continues in {}: {error}", last.path.display());
                 if let Some(Every::Bytes(bytes)) = self.rotation.every {
                     last.ends_at = last.log.bytes().saturating_add(bytes);
                 }
             }
             Ok(next) => {
                 self.number += 1;
-                tracing::info!(from = %last.path.display(), to = %next.path.display(), "recording goes on in the next part");
+                tracing::info!(from = %last.path.display(), to = %next.path.display(), "recording continues in the next part");
                 let next = OpenPart { began: Some(at), ..next };
                 if let Some(last) = self.open.replace(next) {
                     self.end(last, true);
@@ -418,7 +418,7 @@ impl Recording {
             Err(_) => (bytes, 0),
         };
         if let Err(error) = ended {
-            tracing::error!("{} has no end: {error}", path.display());
+            tracing::error!("{} could not be completed: {error}", path.display());
             let fault = RecordingFault {
                 path: path.clone(),
                 error: error.to_string(),

@@ -102,15 +102,15 @@ fn state_cuts<W: Write>(
 ) -> Result<(), LogError> {
     let (Some(first), Some(last), Some(times)) = (spans.first(), spans.last(), times) else { return Ok(()) };
     if times.0 < first.0 {
-        log.lost(None, Some(first.0), "what came before was cut off by headrace trim")?;
+        log.lost(None, Some(first.0), "the part before was removed by headrace trim")?;
     }
     for pair in spans.windows(2) {
         if let [before, after] = pair {
-            log.lost(Some(before.1), Some(after.0), "cut out by headrace trim")?;
+            log.lost(Some(before.1), Some(after.0), "removed by headrace trim")?;
         }
     }
     if times.1 >= last.1 {
-        log.lost(Some(last.1), None, "what came after was cut off by headrace trim")?;
+        log.lost(Some(last.1), None, "the part after was removed by headrace trim")?;
     }
     Ok(())
 }

@@ -139,7 +139,7 @@ impl EffectKind for BeamConeKind {
     }
 
     fn summary(&self) -> &'static str {
-        "a beam is a cone, and its range comes from all the wall within it"
+        "each beam is a cone, and all of the wall within the cone sets its range"
     }
 
     fn read(&self, tables: Vec<Section<'_>>, facts: &Facts) -> Result<Box<dyn Effect>, ConfigError> {

@@ -55,7 +55,7 @@ impl EffectKind for ByteErrorsKind {
     }
 
     fn summary(&self) -> &'static str {
-        "bytes are changed, lost and made up on lines"
+        "bytes on lines are corrupted, lost or inserted"
     }
 
     fn read(&self, tables: Vec<Section<'_>>, facts: &Facts) -> Result<Box<dyn Effect>, ConfigError> {

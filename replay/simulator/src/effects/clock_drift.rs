@@ -33,7 +33,7 @@ impl EffectKind for ClockDriftKind {
     }
 
     fn summary(&self) -> &'static str {
-        "devices' own clocks gain or lose"
+        "device clocks drift"
     }
 
     fn read(&self, tables: Vec<Section<'_>>, facts: &Facts) -> Result<Box<dyn Effect>, ConfigError> {

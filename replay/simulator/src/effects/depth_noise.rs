@@ -52,7 +52,7 @@ impl EffectKind for DepthNoiseKind {
     }
 
     fn summary(&self) -> &'static str {
-        "depth scatters, is off, and drifts"
+        "depth readings have noise, an offset and drift"
     }
 
     fn read(&self, tables: Vec<Section<'_>>, facts: &Facts) -> Result<Box<dyn Effect>, ConfigError> {

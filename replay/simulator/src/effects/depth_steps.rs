@@ -36,7 +36,7 @@ impl EffectKind for DepthStepsKind {
     }
 
     fn summary(&self) -> &'static str {
-        "depth comes in steps"
+        "depth readings are quantised"
     }
 
     fn read(&self, tables: Vec<Section<'_>>, facts: &Facts) -> Result<Box<dyn Effect>, ConfigError> {

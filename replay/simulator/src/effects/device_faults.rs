@@ -69,7 +69,7 @@ impl EffectKind for DeviceFaultsKind {
     }
 
     fn summary(&self) -> &'static str {
-        "a device sticks, jumps, dies or babbles for a while"
+        "a device gets stuck, jumps, stops or sends random bytes for a while"
     }
 
     fn read(&self, tables: Vec<Section<'_>>, facts: &Facts) -> Result<Box<dyn Effect>, ConfigError> {

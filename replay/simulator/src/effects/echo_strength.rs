@@ -63,7 +63,7 @@ impl EffectKind for EchoStrengthKind {
     }
 
     fn summary(&self) -> &'static str {
-        "echoes that are too weak, from afar, at grazing angles, through silt, aren't detected"
+        "weak echoes aren't detected: at long range, at grazing angles or through silt"
     }
 
     fn read(&self, tables: Vec<Section<'_>>, facts: &Facts) -> Result<Box<dyn Effect>, ConfigError> {

@@ -58,7 +58,7 @@ impl EffectKind for HeadStallsKind {
     }
 
     fn summary(&self) -> &'static str {
-        "heads stand still for a while and go on from there"
+        "heads stop for a while and then continue from the same angle"
     }
 
     fn read(&self, tables: Vec<Section<'_>>, facts: &Facts) -> Result<Box<dyn Effect>, ConfigError> {

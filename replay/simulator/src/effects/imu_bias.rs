@@ -74,7 +74,7 @@ impl EffectKind for ImuBiasKind {
     }
 
     fn summary(&self) -> &'static str {
-        "turn rates and forces have biases that wander"
+        "angular rates and accelerations have drifting biases"
     }
 
     fn read(&self, tables: Vec<Section<'_>>, facts: &Facts) -> Result<Box<dyn Effect>, ConfigError> {

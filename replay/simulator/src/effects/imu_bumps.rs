@@ -53,7 +53,7 @@ impl EffectKind for ImuBumpsKind {
     }
 
     fn summary(&self) -> &'static str {
-        "the vehicle bumps into things, which inertial units feel"
+        "the vehicle hits obstacles, and inertial units measure the shocks"
     }
 
     fn read(&self, tables: Vec<Section<'_>>, facts: &Facts) -> Result<Box<dyn Effect>, ConfigError> {

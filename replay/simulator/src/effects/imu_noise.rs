@@ -49,7 +49,7 @@ impl EffectKind for ImuNoiseKind {
     }
 
     fn summary(&self) -> &'static str {
-        "turn rates, forces and attitudes scatter"
+        "angular rates, accelerations and attitudes have noise"
     }
 
     fn read(&self, tables: Vec<Section<'_>>, facts: &Facts) -> Result<Box<dyn Effect>, ConfigError> {

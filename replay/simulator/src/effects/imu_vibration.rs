@@ -49,7 +49,7 @@ impl EffectKind for ImuVibrationKind {
     }
 
     fn summary(&self) -> &'static str {
-        "thrusters shake inertial units"
+        "inertial units measure the vibration of thrusters"
     }
 
     fn read(&self, tables: Vec<Section<'_>>, facts: &Facts) -> Result<Box<dyn Effect>, ConfigError> {

@@ -73,7 +73,7 @@ impl EffectKind for InterferenceKind {
     }
 
     fn summary(&self) -> &'static str {
-        "heads that share a frequency hear each other's pings"
+        "heads on the same frequency receive each other's pings"
     }
 
     fn read(&self, tables: Vec<Section<'_>>, facts: &Facts) -> Result<Box<dyn Effect>, ConfigError> {

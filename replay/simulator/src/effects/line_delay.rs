@@ -47,7 +47,7 @@ impl EffectKind for LineDelayKind {
     }
 
     fn summary(&self) -> &'static str {
-        "messages come late"
+        "messages arrive late"
     }
 
     fn read(&self, tables: Vec<Section<'_>>, facts: &Facts) -> Result<Box<dyn Effect>, ConfigError> {

@@ -59,7 +59,7 @@ impl EffectKind for MagneticDisturbanceKind {
     }
 
     fn summary(&self) -> &'static str {
-        "steel in the lining pulls the yaw of inertial units"
+        "steel in the lining disturbs the yaw of inertial units"
     }
 
     fn read(&self, tables: Vec<Section<'_>>, facts: &Facts) -> Result<Box<dyn Effect>, ConfigError> {

@@ -70,7 +70,7 @@ impl EffectKind for MissingReturnsKind {
     }
 
     fn summary(&self) -> &'static str {
-        "some pings come back with nothing: anywhere, in runs, at grazing angles, from afar"
+        "some pings have no return: at random, in runs, at grazing angles or at long range"
     }
 
     fn read(&self, tables: Vec<Section<'_>>, facts: &Facts) -> Result<Box<dyn Effect>, ConfigError> {

@@ -33,7 +33,7 @@ impl EffectKind for MountErrorKind {
     }
 
     fn summary(&self) -> &'static str {
-        "sensors aren't mounted as the vehicle file says"
+        "sensor mounts differ from the vehicle file"
     }
 
     fn read(&self, tables: Vec<Section<'_>>, facts: &Facts) -> Result<Box<dyn Effect>, ConfigError> {

@@ -53,7 +53,7 @@ impl EffectKind for MultipathKind {
     }
 
     fn summary(&self) -> &'static str {
-        "some echoes come by way of two walls"
+        "some echoes are reflected by two walls"
     }
 
     fn read(&self, tables: Vec<Section<'_>>, facts: &Facts) -> Result<Box<dyn Effect>, ConfigError> {

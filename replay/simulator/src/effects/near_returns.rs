@@ -56,7 +56,7 @@ impl EffectKind for NearReturnsKind {
     }
 
     fn summary(&self) -> &'static str {
-        "bubbles, silt and weed before the wall return the sound, in clusters"
+        "bubbles, silt and weed in front of the wall reflect pings, in clusters"
     }
 
     fn read(&self, tables: Vec<Section<'_>>, facts: &Facts) -> Result<Box<dyn Effect>, ConfigError> {

@@ -60,7 +60,7 @@ impl EffectKind for OcclusionKind {
     }
 
     fn summary(&self) -> &'static str {
-        "other heads, the hull and the tether stand in the beams' way"
+        "other heads, the hull and the tether block beams"
     }
 
     fn read(&self, tables: Vec<Section<'_>>, facts: &Facts) -> Result<Box<dyn Effect>, ConfigError> {

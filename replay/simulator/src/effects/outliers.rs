@@ -56,7 +56,7 @@ impl EffectKind for OutliersKind {
     }
 
     fn summary(&self) -> &'static str {
-        "some returns fall anywhere"
+        "some returns have random ranges"
     }
 
     fn read(&self, tables: Vec<Section<'_>>, facts: &Facts) -> Result<Box<dyn Effect>, ConfigError> {

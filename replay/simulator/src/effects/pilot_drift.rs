@@ -29,7 +29,7 @@ impl EffectKind for PilotDriftKind {
     }
 
     fn summary(&self) -> &'static str {
-        "the vehicle wanders about its trajectory"
+        "the vehicle deviates from its trajectory"
     }
 
     fn read(&self, tables: Vec<Section<'_>>, _: &Facts) -> Result<Box<dyn Effect>, ConfigError> {
@@ -56,7 +56,7 @@ impl Effect for Drift {
         let [_, y, z, roll, pitch, yaw] = self.reach;
         let [roll, pitch, yaw] = [roll, pitch, yaw].map(f64::to_degrees);
         let what = format!(
-            "wanders by up to {y} m across, {z} m up, {roll:.1} deg of roll, {pitch:.1} of pitch, {yaw:.1} of yaw"
+            "deviates by up to {y} m across, {z} m up, {roll:.1} deg of roll, {pitch:.1} of pitch, {yaw:.1} of yaw"
         );
         let Some(mut scenery) = sim.scenery(what) else { return Ok(()) };
         let duration_s = scenery.trajectory.duration_s();

@@ -38,7 +38,7 @@ impl EffectKind for RangeNoiseKind {
     }
 
     fn summary(&self) -> &'static str {
-        "ranges scatter about the true one"
+        "ranges have noise"
     }
 
     fn read(&self, tables: Vec<Section<'_>>, facts: &Facts) -> Result<Box<dyn Effect>, ConfigError> {

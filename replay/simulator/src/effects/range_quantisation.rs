@@ -41,7 +41,7 @@ impl EffectKind for RangeQuantisationKind {
     }
 
     fn summary(&self) -> &'static str {
-        "ranges come in steps"
+        "ranges are quantised"
     }
 
     fn read(&self, tables: Vec<Section<'_>>, facts: &Facts) -> Result<Box<dyn Effect>, ConfigError> {

@@ -43,7 +43,7 @@ impl EffectKind for SectorEndSlowingKind {
     }
 
     fn summary(&self) -> &'static str {
-        "heads turn round softly at the ends of their sectors, with short steps there"
+        "heads slow down at the ends of their sectors, with shorter steps there"
     }
 
     fn read(&self, tables: Vec<Section<'_>>, facts: &Facts) -> Result<Box<dyn Effect>, ConfigError> {

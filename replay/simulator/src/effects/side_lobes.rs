@@ -63,7 +63,7 @@ impl EffectKind for SideLobesKind {
     }
 
     fn summary(&self) -> &'static str {
-        "a nearer wall beside the beam is heard in place of the one within it"
+        "a nearer wall beside the beam is detected instead of the wall within it"
     }
 
     fn read(&self, tables: Vec<Section<'_>>, facts: &Facts) -> Result<Box<dyn Effect>, ConfigError> {

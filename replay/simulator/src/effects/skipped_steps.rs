@@ -42,7 +42,7 @@ impl EffectKind for SkippedStepsKind {
     }
 
     fn summary(&self) -> &'static str {
-        "heads don't make every step, and fall behind"
+        "heads skip steps and fall behind"
     }
 
     fn read(&self, tables: Vec<Section<'_>>, facts: &Facts) -> Result<Box<dyn Effect>, ConfigError> {

@@ -35,7 +35,7 @@ impl EffectKind for SoundSpeedErrorKind {
     }
 
     fn summary(&self) -> &'static str {
-        "sound is faster or slower than the vehicle file says, and ranges are off by that share"
+        "the speed of sound differs from the vehicle file, which scales all ranges"
     }
 
     fn read(&self, tables: Vec<Section<'_>>, facts: &Facts) -> Result<Box<dyn Effect>, ConfigError> {

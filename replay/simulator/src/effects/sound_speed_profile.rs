@@ -47,7 +47,7 @@ impl EffectKind for SoundSpeedProfileKind {
     }
 
     fn summary(&self) -> &'static str {
-        "sound is faster in warm water above than in cold below"
+        "the speed of sound is higher in warm water above than in cold water below"
     }
 
     fn read(&self, tables: Vec<Section<'_>>, facts: &Facts) -> Result<Box<dyn Effect>, ConfigError> {

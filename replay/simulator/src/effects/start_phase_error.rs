@@ -35,7 +35,7 @@ impl EffectKind for StartPhaseErrorKind {
     }
 
     fn summary(&self) -> &'static str {
-        "heads begin off their planned phase"
+        "heads start with a phase error"
     }
 
     fn read(&self, tables: Vec<Section<'_>>, facts: &Facts) -> Result<Box<dyn Effect>, ConfigError> {

@@ -40,7 +40,7 @@ impl EffectKind for StuckRangeKind {
     }
 
     fn summary(&self) -> &'static str {
-        "a sonar answers one range for ever"
+        "a sonar always reports the same range"
     }
 
     fn read(&self, tables: Vec<Section<'_>>, facts: &Facts) -> Result<Box<dyn Effect>, ConfigError> {

@@ -42,7 +42,7 @@ impl EffectKind for TetherLagKind {
     }
 
     fn summary(&self) -> &'static str {
-        "the tender lets out and takes in cable late, in bursts"
+        "the tender pays out and hauls in the cable late, in bursts"
     }
 
     fn read(&self, tables: Vec<Section<'_>>, facts: &Facts) -> Result<Box<dyn Effect>, ConfigError> {

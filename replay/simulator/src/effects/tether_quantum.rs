@@ -35,7 +35,7 @@ impl EffectKind for TetherQuantumKind {
     }
 
     fn summary(&self) -> &'static str {
-        "the cable counter counts in steps"
+        "cable counter readings are quantised"
     }
 
     fn read(&self, tables: Vec<Section<'_>>, facts: &Facts) -> Result<Box<dyn Effect>, ConfigError> {

@@ -42,7 +42,7 @@ impl EffectKind for TetherScaleKind {
     }
 
     fn summary(&self) -> &'static str {
-        "the counter's scale is off, and the cable stretches"
+        "the cable counter has a scale error, and the cable stretches"
     }
 
     fn read(&self, tables: Vec<Section<'_>>, facts: &Facts) -> Result<Box<dyn Effect>, ConfigError> {

@@ -57,7 +57,7 @@ impl EffectKind for TetherSlackKind {
     }
 
     fn summary(&self) -> &'static str {
-        "the cable's slack wanders"
+        "the cable's slack varies"
     }
 
     fn read(&self, tables: Vec<Section<'_>>, facts: &Facts) -> Result<Box<dyn Effect>, ConfigError> {

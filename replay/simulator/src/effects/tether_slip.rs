@@ -18,7 +18,7 @@ use crate::stages::Stage;
 /// Length of the travel stretches in each of which the cable may slip once, m.
 const STRETCH_M: f64 = 1.0;
 
-/// From time to time the cable slips over the counter's wheel, which changes the count permanently.
+/// From time to time the the cable slips on the counter's wheel, which changes the count permanently.
 ///
 /// It slips `per_100m` times per hundred metres of travel, forwards or back, by `size_m = [least, most]` (drawn evenly,
 /// 0.05 to 0.3 by default), with either sign. Travel is the vehicle's, summed from count to count.
@@ -48,7 +48,7 @@ impl EffectKind for TetherSlipKind {
     }
 
     fn summary(&self) -> &'static str {
-        "cable slips over the counter's wheel"
+        "the cable slips on the counter's wheel"
     }
 
     fn read(&self, tables: Vec<Section<'_>>, facts: &Facts) -> Result<Box<dyn Effect>, ConfigError> {

@@ -100,7 +100,7 @@ fn of_vehicle(vehicle: &VehicleConfig, facts: &Facts) -> Vec<Call> {
     let ids = |sensors: &[&SensorFacts]| sensors.iter().map(|sensor| sensor.id.clone()).collect::<Vec<_>>();
     let mut calls = Vec::new();
     if !heads.is_empty() {
-        calls.push(Call::new("motion_within_turn", "heads that turn on a vehicle that moves", &[]));
+        calls.push(Call::new("motion_within_turn", "heads that turn while the vehicle moves", &[]));
     }
     let sonars: Vec<&SensorFacts> = facts
         .sensors

@@ -191,7 +191,7 @@ impl Described {
     fn of_water(&self, site: &Site, heads: &[String], sonars: &[String]) -> Vec<Call> {
         let mut calls = Vec::new();
         if let Some(degc) = self.temperature_degc {
-            let by = format!("water of {degc} degrees");
+            let by = format!("water at {degc} degrees C");
             if !heads.is_empty() {
                 let keys = [("temperature_degc", number(degc))];
                 calls.push(Call::new("echo_strength", by.clone(), &keys).on(heads));
@@ -321,7 +321,7 @@ impl CableKeys {
             calls.push(Call::new("tether_scale", format!("a cable of type {}", cable.name), &keys));
         }
         if let Some(share) = self.wheel_share.filter(|share| *share != 0.0) {
-            let by = format!("a counter's wheel that is off by {share}");
+            let by = format!("a counter wheel with a scale error of {share}");
             calls.push(Call::new("tether_scale", by, &[("share", number(share))]));
         }
         if let Some(slack_m) = self.slack_m {

@@ -34,7 +34,7 @@ pub(super) fn parse(text: &str) -> Result<Vec<Timed>, String> {
             }
             let wanted = "t_s,chainage_m,y_m,z_m and, if known, roll_deg,pitch_deg,yaw_deg";
             let start: String = line.chars().take(60).collect();
-            return Err(format!("line {} of it is {start:?}; wanted is {wanted}", number + 1));
+            return Err(format!("line {} of it is {start:?}; expected {wanted}", number + 1));
         };
         if timed.last().is_some_and(|(before_s, _)| at_s <= *before_s) {
             return Err(format!("line {} of it has the time {at_s} s, not after the one before", number + 1));

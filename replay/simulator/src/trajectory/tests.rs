@@ -151,7 +151,7 @@ fn errors_of_a_recorded_trajectory_are_named() {
         ("0,1,2,3\n0,1,2,3\n", "line 2 of it has the time 0 s, not after the one before"),
         ("t,x,y,z\nt,x,y,z\n", "line 2 of it is \"t,x,y,z\""),
         ("0,1,2,3\n1,2,nan,3\n", "line 2"),
-        ("0,1,2,3\n1,2,3\n", "wanted is t_s,chainage_m,y_m,z_m"),
+        ("0,1,2,3\n1,2,3\n", "expected t_s,chainage_m,y_m,z_m"),
         ("5,1,0,4\n", "takes 0 s"),
         ("0,1,0,4\n200000,2,0,4\n", "takes 200000 s"),
         ("0,1,0,4\n9,500,0,4\n", "leads to chainage 500 m; the tunnel is 200 m long"),

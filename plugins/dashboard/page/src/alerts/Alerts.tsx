@@ -39,7 +39,7 @@ export function Alerts() {
         <button type="button" disabled={!may} onClick={silence} title="Silence for 30 s (S)">Silence</button>
         <SoundButtons />
       </div>
-      <ol class={`alert-list${list.length > ROOMY ? " dense" : ""}`} ref={ol} onScroll={count} tabIndex={0} aria-label="Alerts, first what has to be looked at first">
+      <ol class={`alert-list${list.length > ROOMY ? " dense" : ""}`} ref={ol} onScroll={count} tabIndex={0} aria-label="Alerts, most urgent first">
         {list.slice(0, SHOWN).map((alert) => <Item key={alert.number} alert={alert} may={may} />)}
         {list.length === 0 ? <li class="none">nothing to report</li> : null}
       </ol>
@@ -55,7 +55,7 @@ function Item({ alert, may }: { alert: Alert; may: boolean }) {
     <li class={`alert ${alert.priority}${open ? " open" : ""}${rectified ? " rectified" : ""}`} data-number={alert.number} data-state={alert.state} data-kind={alert.kind}>
       <Mark alert={alert} />
       <div class="what">
-        <div class="line"><b class="priority">{PRIORITY_WORDS[alert.priority]}</b> <span class="number">#{alert.number}</span> <Since alert={alert} />{rectified ? " · over" : ""}{alert.acknowledged ? ` · ack ${alert.acknowledged.by}` : ""}</div>
+        <div class="line"><b class="priority">{PRIORITY_WORDS[alert.priority]}</b> <span class="number">#{alert.number}</span> <Since alert={alert} />{rectified ? " · rectified" : ""}{alert.acknowledged ? ` · ack ${alert.acknowledged.by}` : ""}</div>
         <div class="text" title={alert.text}>{alert.text}{alert.count > 1 ? ` (${alert.count} times)` : ""}</div>
         {alert.advice ? <div class="do">→ {alert.advice}</div> : null}
       </div>

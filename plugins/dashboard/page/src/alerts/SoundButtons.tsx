@@ -12,7 +12,7 @@ export function toggleSound(): void {
 export function SoundButtons() {
   useTopics(prefsTopic, soundTopic);
   const word = !prefs.sound ? "Sound off" : isAudible() ? "Sound on" : "Tap to enable sound";
-  const title = prefs.sound && !isAudible() ? "The browser plays no sound before the page is touched" : "Sound (M)";
+  const title = prefs.sound && !isAudible() ? "The browser plays no sound until you tap the page" : "Sound (M)";
   return (
     <>
       <button type="button" class={prefs.sound && !isAudible() ? "wants" : ""} aria-pressed={prefs.sound} onClick={toggleSound} title={title}>{word}</button>

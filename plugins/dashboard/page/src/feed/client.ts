@@ -40,11 +40,11 @@ export function start(): void {
 /** Sends a command; returns whether it was sent. */
 export function send(command: Command): boolean {
   if (!dive) return feed?.send(command) ?? false;
-  store.answered("this is a file: nothing can be changed in it", true);
+  store.answered("this page is a file: it accepts no commands", true);
   return false;
 }
 
-export const login = (token: string): Promise<string> => feed?.login(token) ?? Promise.resolve("There is no program to ask.");
+export const login = (token: string): Promise<string> => feed?.login(token) ?? Promise.resolve("There is no program to log in to.");
 export const reconnect = (): void => feed?.again();
 export const acknowledge = (alert: number): boolean => send({ do: "acknowledge", alert, by: prefs.by });
 export const silence = (): boolean => send({ do: "silence", by: prefs.by });
@@ -56,7 +56,7 @@ export async function sendVoice(id: number, seconds: number, sound: Blob): Promi
   const url = new URL(`/voice/${id}`, location.href);
   url.searchParams.set("seconds", String(seconds));
   const sent = fetch(url, { method: "POST", body: sound, headers: { "content-type": sound.type }, credentials: "same-origin" });
-  const response = await sent.catch(() => { throw new Error("the voice isn't sent: no connection to the program"); });
+  const response = await sent.catch(() => { throw new Error("the voice note is not sent: not connected to the program"); });
   if (response.ok) return;
   const answer = (await response.json().catch(() => null)) as { why?: string } | null;
   throw new Error(answer?.why ?? `the program answered ${response.status}`);

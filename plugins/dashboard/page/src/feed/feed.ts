@@ -31,7 +31,7 @@ export class Feed {
 
   send(command: Command): boolean {
     if (this.socket?.readyState !== WebSocket.OPEN) {
-      this.store.answered("not sent: no connection to the program", true);
+      this.store.answered("not sent: not connected to the program", true);
       return false;
     }
     this.socket.send(JSON.stringify(command));
@@ -44,7 +44,7 @@ export class Feed {
     url.searchParams.set("token", token);
     const response = await fetch(url, { redirect: "manual", credentials: "same-origin" });
     if (response.status === 429) return "Too many wrong tokens from here: wait some seconds and try again.";
-    if (response.status >= 400) return "That token isn't right.";
+    if (response.status >= 400) return "This token is wrong.";
     this.store.link.phase = "connecting";
     this.again();
     return "";
@@ -128,7 +128,7 @@ export class Feed {
     const { link } = this.store;
     if (link.phase !== "open" || performance.now() - link.heard_ms < SILENT_MS) return;
     this.drop();
-    this.lost(`nothing for ${SILENT_MS / 1000} s`);
+    this.lost(`no data for ${SILENT_MS / 1000} s`);
   }
 
   private phase(phase: Store["link"]["phase"], why: string): void {

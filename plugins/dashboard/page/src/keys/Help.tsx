@@ -15,7 +15,7 @@ export function Help() {
   return (
     <dialog ref={dialog} class="help" aria-label="Keys" onClose={() => setHelp(false)}>
       <div class="help-head"><h2>Keys</h2><button type="button" onClick={() => setHelp(false)}>Close (Esc)</button></div>
-      <label>Your initials, kept with what you acknowledge and note <input type="text" value={prefs.by} onChange={(event) => setPrefs({ by: initials(event.currentTarget.value) || "page" })} /></label>
+      <label>Your initials, stored with your acknowledgements and notes <input type="text" value={prefs.by} onChange={(event) => setPrefs({ by: initials(event.currentTarget.value) || "page" })} /></label>
       <div class="help-groups">
         {[...new Set(KEYS.map((key) => key.group))].map((group) => (
           <div key={group}>

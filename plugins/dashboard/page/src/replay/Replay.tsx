@@ -53,7 +53,7 @@ export function Replay() {
   const off = !may(), file = isFile(), { at_s, from_s, to_s, paused, speed } = playback;
   return (
     <section class="panel replay" aria-label="Replay">
-      {file ? null : <button type="button" disabled={off} onClick={play.toggle} title="Space">{paused ? "▶ Go on" : "❚❚ Pause"}</button>}
+      {file ? null : <button type="button" disabled={off} onClick={play.toggle} title="Space">{paused ? "▶ Continue" : "❚❚ Pause"}</button>}
       <button type="button" disabled={off} onClick={play.step} title="Step (.)">{file ? "+1 s" : "Step"}</button>
       <button type="button" disabled={off} onClick={play.section} title="Step by a section (,)">{file ? "+10 s" : "Section"}</button>
       <input type="range" min={from_s} max={Math.max(to_s, from_s + 0.1)} step="any" value={at_s} disabled={off} aria-label="Time of the dive"

@@ -14,7 +14,7 @@ export function Metres() {
   let at = 0;
   return (
     <section class="panel metres" aria-label="Metres by verdict">
-      <div class="panel-head"><h2>Metres</h2><span class="count">{all ? `${metres(all.way_m)} of way` : ""}</span></div>
+      <div class="panel-head"><h2>Metres</h2><span class="count">{all ? `${metres(all.way_m)} in total` : ""}</span></div>
       <svg class="bar" viewBox="0 0 1000 20" preserveAspectRatio="none" aria-hidden="true">
         <defs>
           <pattern id="unsure" width="10" height="10" patternUnits="userSpaceOnUse" patternTransform="rotate(45)"><rect width="10" height="10" class="v-cannot-say" /><rect width="4" height="10" class="v-stripe" /></pattern>
@@ -54,7 +54,7 @@ function Left() {
   const left = store.state?.left;
   if (!left || (left.cable_m === null && left.time_s === null && left.battery_pct === null)) return null;
   return (
-    <dl class="left" aria-label="What is left">
+    <dl class="left" aria-label="Remaining cable, time and battery">
       {left.cable_m === null ? null : <div class={left.cable_m < 50 ? "bad" : ""}><dt>cable left</dt><dd>{metres(left.cable_m)}</dd></div>}
       {left.time_s === null ? null : <div class={left.time_s < 600 ? "bad" : ""}><dt>time left</dt><dd>{span(left.time_s)}</dd></div>}
       {left.battery_pct === null ? null : <div class={left.battery_pct < 25 ? "bad" : ""}><dt>battery</dt><dd>{figure(left.battery_pct, 0)} %</dd></div>}
@@ -69,7 +69,7 @@ export function Back() {
     <section class="panel back" aria-label="The way back">
       <div class="panel-head"><h2>Way back</h2><span class="count">{legs.length === 0 ? "" : `${metres(way_m)}, ${span(time_s)}`}</span></div>
       {legs.length === 0 ? <p class="none">nothing to go back for</p> : (
-        <ol tabIndex={0} aria-label="Legs, cheapest order">
+        <ol tabIndex={0} aria-label="Stretches to pass again, in order">
           {legs.map((leg) => (
             <li key={`${leg.from_m}-${leg.to_m}`}>
               <button type="button" class="leg" onClick={() => actions.goTo((leg.from_m + leg.to_m) / 2, 30)}>

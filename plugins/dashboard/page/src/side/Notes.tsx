@@ -80,7 +80,7 @@ export function NoteDialog() {
         <label>Note at {at === null || at === undefined ? "this time" : station(at, 1)}
           <input ref={field} type="text" maxLength={MOST_BYTES} autocomplete="off" />
         </label>
-        <span class="buttons"><button type="submit">Keep (Enter)</button><VoiceButton /><button type="button" onClick={close}>Cancel (Esc)</button></span>
+        <span class="buttons"><button type="submit">Save (Enter)</button><VoiceButton /><button type="button" onClick={close}>Cancel (Esc)</button></span>
         <VoiceWords />
       </form>
     </dialog>

@@ -33,8 +33,8 @@ export function Announcer() {
 /** Text if nothing limits the speed. */
 const UNBOUNDED: Partial<Record<Condition, string>> = {
   passed: "the wall here has passed",
-  going_back: "the way back is judged, too: keep to the limit",
-  outside: "no wall here is judged",
+  going_back: "the way back counts, too: keep within the limit",
+  outside: "no verdicts here",
 };
 
 export function Speed() {
@@ -63,7 +63,7 @@ export function Speed() {
 function Gauge({ speed, most }: { speed: number | null; most: number | null }) {
   const end = scaleEnd(speed, most), x = (v: number): number => Math.min(1000, (Math.abs(v) / end) * 1000);
   const at = speed === null ? null : x(speed);
-  const told = speed === null ? "no speed" : `${figure(Math.abs(speed), 2)} of at most ${figure(most, 2)} metres a second`;
+  const told = speed === null ? "no speed" : `${figure(Math.abs(speed), 2)} metres per second, limit ${figure(most, 2)}`;
   return (
     <div class="gauge-box">
     <svg class="gauge" viewBox="-14 0 1028 66" role="img" aria-label={`Speed: ${told}`} preserveAspectRatio="none">

@@ -52,11 +52,11 @@ export function shown(store: Store): Shown {
   }
   const gone = sinceState_s(store);
   if (hasEnded(store)) {
-    const advice = link.phase === "lost" ? "the program has closed" : "all is judged";
+    const advice = link.phase === "lost" ? "the program has closed" : "all verdicts are final";
     return { word: "DIVE ENDED", advice, lamp: "amber", old: false };
   }
   if (lost !== null && (lost > OLD_AFTER_S || gone > OLD_AFTER_S)) {
-    return { word: "NO CONNECTION", advice: `for ${span(Math.max(lost, gone))}: nothing here is current`, lamp: "red", old: true };
+    return { word: "NO CONNECTION", advice: `for ${span(Math.max(lost, gone))}: all data here is old`, lamp: "red", old: true };
   }
   if (isOld(store)) {
     const age = age_s(store) ?? gone;

@@ -13,7 +13,7 @@ export const REASONS: Record<string, string> = {
 };
 
 export const POSITION_WHY: Record<string, string> = {
-  cable: "cable counter doubted",
+  cable: "cable counter doubtful",
   spread: "position drifts between passes",
   no_heading: "no heading",
   no_chainage: "no chainage",
@@ -25,7 +25,7 @@ export const VERDICTS = {
 } as const;
 
 export const SENSOR_STATES: Record<string, string> = {
-  ok: "ok", silent: "silent", never: "never heard", stalled: "doesn't turn", deaf: "detects no wall", hung: "hangs", distrusted: "not believed",
+  ok: "ok", silent: "silent", never: "no data yet", stalled: "doesn't turn", deaf: "detects no wall", hung: "stuck", distrusted: "not trusted",
 };
 
 /** Text of a cause or reason: too_fast is "too fast". */
@@ -48,8 +48,8 @@ export function conditionWords(state: State): { word: string; advice: string } {
     no_data: ["WAITING", "for the first data"],
     old: [`OLD ${span(state.age_s ?? 0)}`, "nothing from any sensor: stop"],
     no_position: ["NO POSITION", `${POSITION_WHY[state.position.why ?? ""] ?? "no position"}: hold still`],
-    outside: ["OUTSIDE", "no head is over the tunnel"],
-    no_sonar: ["NO SONAR", "nothing is seen: stop"],
+    outside: ["OUTSIDE", "no head is within the tunnel"],
+    no_sonar: ["NO SONAR", "no returns: stop"],
     passed: ["PASSED HERE", "any speed will do"],
     going_back: ["GOING BACK", "to a missed section: any speed will do"],
     no_speed: ["SLOWER WON'T HELP", state.remedy ?? "no speed meets the target here"],

@@ -14,7 +14,7 @@ export function Status() {
   const lost = lost_s(store);
   const fresh = answer && performance.now() - answer.at_ms < ANSWER_MS ? answer : null;
   const told = store.told.at(-1);
-  const words = { open: "connected", file: "a dive in a file", connecting: "connecting", refused: "no access", lost: `no connection for ${span(lost ?? 0)}, tried ${link.tries} times` }[link.phase];
+  const words = { open: "connected", file: "recorded dive in a file", connecting: "connecting", refused: "no access", lost: `no connection for ${span(lost ?? 0)}, tried ${link.tries} times` }[link.phase];
   return (
     <footer class="status">
       <span class={`link ${link.phase}`}>{words}</span>

@@ -6,12 +6,12 @@ const here: Here = { connected: true, operates: true, recorded: true, secure: tr
 describe("a voice note", () => {
   it("can be recorded if nothing is missing", () => expect(lack(here)).toBeNull());
   it("gives the reason if it can't be recorded", () => {
-    expect(lack({ ...here, connected: false })).toMatch(/no connection/);
-    expect(lack({ ...here, operates: false })).toMatch(/viewer's/);
+    expect(lack({ ...here, connected: false })).toMatch(/not connected/);
+    expect(lack({ ...here, operates: false })).toMatch(/viewing only/);
     expect(lack({ ...here, recorded: false })).toMatch(/isn't recorded/);
     // By plain HTTP from another machine a browser can't ask for a microphone either.
     expect(lack({ ...here, secure: false, asks: false, type: null })).toMatch(/https/);
-    expect(lack({ ...here, type: null })).toMatch(/records no sound/);
+    expect(lack({ ...here, type: null })).toMatch(/can't record sound/);
   });
   it("has a type that the log accepts", () => {
     expect(recordable((type) => type.startsWith("audio/mp4"))).toBe("audio/mp4");

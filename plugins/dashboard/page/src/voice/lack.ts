@@ -18,11 +18,11 @@ export interface Here {
 
 /** The reason why not; null if a note can be recorded. */
 export function lack(here: Here): string | null {
-  if (!here.connected) return "no voice now: no connection to the program";
-  if (!here.operates) return "no voice here: this dive takes none, or the token is a viewer's";
-  if (!here.recorded) return "no voice here: this dive isn't recorded";
-  if (!here.secure) return "no voice here: browsers give the microphone to pages by https, or of this machine (127.0.0.1), alone";
-  if (!here.asks || here.type === null) return "no voice here: this browser records no sound";
+  if (!here.connected) return "no voice note now: not connected to the program";
+  if (!here.operates) return "no voice notes: the dive doesn't accept them, or the token is for viewing only";
+  if (!here.recorded) return "no voice notes: this dive isn't recorded";
+  if (!here.secure) return "no voice notes: browsers allow the microphone only for https pages and for pages of this machine (127.0.0.1)";
+  if (!here.asks || here.type === null) return "no voice notes: this browser can't record sound";
   return null;
 }
 
@@ -35,8 +35,8 @@ export function recordable(supports: (type: string) => boolean): string | null {
 export function refusal(name: string): string {
   if (name === "NotAllowedError" || name === "SecurityError") return "the microphone was refused: allow it for this page in the browser";
   if (name === "NotFoundError" || name === "OverconstrainedError") return "there is no microphone";
-  if (name === "NotReadableError") return "the microphone is taken by another program";
-  return `the microphone can't be had: ${name}`;
+  if (name === "NotReadableError") return "another program is using the microphone";
+  return `the microphone can't be opened: ${name}`;
 }
 
 /** Whole seconds of a recording, as displayed in the note. */

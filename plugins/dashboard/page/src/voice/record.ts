@@ -77,7 +77,7 @@ async function begin(): Promise<void> {
     recorder.onstop = () => stream.getTracks().forEach((track) => track.stop());
     recorder.stop();
     recorder = null;
-    return become("idle", "no voice now: no connection to the program");
+    return become("idle", "no voice note now: not connected to the program");
   }
   voice.since_ms = performance.now();
   become("recording");
@@ -92,7 +92,7 @@ async function send(): Promise<void> {
   if (!taken) return become("idle");
   if (taken.sound.size > MOST_BYTES) {
     unsent = null;
-    return become("idle", `the voice has ${Math.ceil(taken.sound.size / 1024)} kB; at most 512 are kept. The note stays as a mark`);
+    return become("idle", `the recording has ${Math.ceil(taken.sound.size / 1024)} kB; at most 512 kB are accepted. The note remains as a mark`);
   }
   become("sending");
   try {
@@ -103,7 +103,7 @@ async function send(): Promise<void> {
   }
   unsent = null;
   become("idle");
-  store.answered(`voice note of ${taken.seconds} s kept`, false);
+  store.answered(`voice note of ${taken.seconds} s saved`, false);
 }
 
 /** Drops a recording that couldn't be sent; the note remains as a mark. */

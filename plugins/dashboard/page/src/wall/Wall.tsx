@@ -227,9 +227,9 @@ export function Wall() {
         </span>
       </div>
       <div class="wall-box" ref={box}>
-        {why ? <p class="missing" role="alert">The wall can't be drawn: {why}. All else is shown.</p> : null}
+        {why ? <p class="missing" role="alert">The wall can't be drawn: {why}. Everything else works.</p> : null}
         <canvas ref={wall} aria-hidden="true" />
-        <canvas ref={over} class="over" role="img" aria-label="Unrolled wall, chainage across and clock positions down; the metres by verdict and the alerts say the same in words" />
+        <canvas ref={over} class="over" role="img" aria-label="Unrolled wall, chainage across and clock positions down; the metres by verdict and the alerts state the same as text" />
       </div>
     </section>
   );

@@ -327,8 +327,8 @@ fn other_files_are_refused_with_their_first_bytes() {
     };
     assert_eq!(
         error(b"\x89PNG\r\n\x1a\n1234567890"),
-        "dive.mcap is not an MCAP file: it begins with [89 50 4e 47 0d 0a 1a 0a], and \
-         [89 4d 43 41 50 30 0d 0a] is wanted"
+        "dive.mcap is not an MCAP file: it begins with [89 50 4e 47 0d 0a 1a 0a]; expected \
+         [89 4d 43 41 50 30 0d 0a]"
     );
     assert!(error(b"").contains("begins with []"));
     assert!(error(b"#ROSBAG V2.0\n").contains("23 52 4f 53"));

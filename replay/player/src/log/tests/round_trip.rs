@@ -127,7 +127,7 @@ fn file_is_opened_by_path_and_digested() {
     let abc = "ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad";
     assert_eq!(file_digest(&path).unwrap(), abc);
     let error = LogReader::open(&path).err().unwrap().to_string();
-    assert!(error.contains("[61 62 63], and [89 4d 43 41 50 30 0d 0a] is wanted"), "{error}");
+    assert!(error.contains("[61 62 63]; expected [89 4d 43 41 50 30 0d 0a]"), "{error}");
     std::fs::remove_file(&path).unwrap();
     assert!(matches!(LogReader::open(&path), Err(LogError::Open { .. })));
 }

@@ -115,7 +115,7 @@ fn impossible_walls_are_refused() {
     refused(
         "[tunnel.as_built]\nprofile = \"circle\"\nradius_m = 3\nlength_m = 9",
         "as_built.length_m = 9",
-        "isn't wanted",
+        "isn't allowed here",
     );
     feature("kind = \"debris\"\nchainage_m = 9\nlength_m = 8\nheight_m = 4", "height_m = 4", "too near");
 }
