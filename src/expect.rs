@@ -107,7 +107,7 @@ impl Allowed {
     fn covers(&self, path: &str, expected: &Value, got: &Value) -> bool {
         let names: Vec<&str> = path.split('/').collect();
         let fits = |wanted: &[String]| {
-            // "any" covers everything below its path.
+            // The tolerance "any" covers everything below its path.
             wanted.len() <= names.len()
                 && wanted.iter().zip(&names).all(|(wanted, name)| {
                     wanted == "*" || wanted == name || name.split('[').next() == Some(wanted)
@@ -164,7 +164,7 @@ fn rank(difference: &str) -> u8 {
     }
 }
 
-/// Name of an entry in a list: its index; for a section, its bounds.
+/// Name of an entry in a list. It is the entry's index, or the bounds of a section.
 fn entry_name(index: usize, entry: &Value) -> String {
     let metres = |key: &str| entry.get(key).and_then(Value::as_f64);
     match (metres("start_m"), metres("end_m")) {

@@ -12,7 +12,7 @@ use crate::output::{append, deliver, show};
 use crate::phase::Phase;
 use crate::progress::Progress;
 
-/// Width of a column with a figure and its interval.
+/// Width of a column that has a figure and the figure's interval.
 const COLUMN: usize = 20;
 
 /// Measures the worth of a scene's effects. `scenes` is the scene, read with several seeds.

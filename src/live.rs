@@ -106,7 +106,7 @@ pub(crate) fn run(args: &Run, text: &str, vehicle: &VehicleConfig, claims: Claim
     }
 }
 
-/// Page of a dive on ports.
+/// Serves the page of a dive on ports.
 fn live_page(
     args: &Run,
     vehicle: &VehicleConfig,

@@ -77,7 +77,8 @@ struct Background {
 
 enum Line {
     Text(Vec<u8>),
-    /// Dropped when all earlier lines have been written, which disconnects its channel.
+    /// Mark in the queue. It is dropped when all earlier lines have been written, which disconnects its
+    /// channel.
     Mark(Sender<()>),
 }
 

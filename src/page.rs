@@ -253,7 +253,7 @@ fn kind_text(kind: Sense) -> &'static str {
     }
 }
 
-/// UTC of the zero of a log's clock, seconds, if the log states it.
+/// UTC of the zero of a log's clock, seconds; `None` if the log doesn't state it.
 pub(crate) fn utc_of_zero_s(metadata: &BTreeMap<String, String>) -> Option<f64> {
     let number = |key: &str| metadata.get(key)?.parse::<i64>().ok();
     let [monotonic, utc] = CLOCK_ANCHOR.map(number);
@@ -400,7 +400,7 @@ pub(crate) fn following(collector: Collector) -> Box<dyn Follower> {
 
 struct PageFollower {
     collector: Collector,
-    /// First and last time of a replay's log.
+    /// First and last time of a replay's log; `None` in a live dive.
     span: Option<(MonoNs, MonoNs)>,
     now: MonoNs,
 }

@@ -96,7 +96,7 @@ pub(crate) fn has_keys() -> bool {
     std::io::stdin().is_terminal()
 }
 
-/// Reads keys of the terminal until it is dropped.
+/// Reads keys of the terminal until the returned value is dropped.
 fn keyboard(to: Sender<PlaybackCommand>, pace: Pace) -> Result<Keyboard, Failure> {
     let failed = |source| Failure::System { what: "reading keys from the terminal", source };
     Keyboard::listen(to, pace.speed, interrupt::flag()?).map_err(failed)

@@ -7,7 +7,7 @@ use headrace_monitor::live_state::Lamp;
 
 use crate::terminal::{self, Terminal};
 
-/// Width assumed for a terminal that doesn't report its own.
+/// Width assumed for a terminal that doesn't report its width.
 const COLUMNS: usize = 80;
 /// Minimum width assumed, even if the terminal is narrower.
 const LEAST_COLUMNS: usize = 40;

@@ -26,7 +26,7 @@ pub(crate) struct Window {
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub(crate) enum CollectError {
-    /// The window ends before it begins.
+    /// The end of the window is before its beginning.
     #[error("calibrating: --to {to_s} must be after --from {from_s}")]
     Backwards {
         /// Beginning of the window, s.

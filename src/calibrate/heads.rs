@@ -21,7 +21,7 @@ const TOLD: f64 = 0.3;
 /// once in 10,000 times.
 const CLEAR: f64 = 15.0;
 /// Search for a head's angle: number of starting angles, rounds per start, and stride of the returns. The
-/// last value is the number of rounds of the final fit.
+/// last value is the number of rounds of every other fit.
 const STARTS: usize = 24;
 const START_ROUNDS: usize = 2;
 const START_STRIDE: usize = 5;

@@ -235,7 +235,7 @@ impl<'a, 'b> Runs<'a, 'b> {
         surprise
     }
 
-    /// The parabola through the best point of a coarse grid and its neighbours.
+    /// Parabola through the best point of a coarse grid and the two points beside it.
     fn coarse(&mut self, source: usize, base: f64) -> Option<Curve> {
         let mut points = vec![(0.0, base)];
         for by_s in [-COARSE_S, COARSE_S, -REACH_S, REACH_S] {

@@ -141,7 +141,7 @@ fn is_file(name: &str) -> bool {
     Path::new(name).extension().is_some_and(|extension| extension == "csv")
 }
 
-/// File that describes the tunnel, if there is one.
+/// Files that describe the tunnel; empty if it isn't read from a file.
 fn tunnel_file(args: &Plan) -> Vec<PathBuf> {
     let name = args.tunnel.as_deref().and_then(|tunnel| tunnel.split(',').next()).map(str::trim);
     name.filter(|name| is_file(name)).map(PathBuf::from).into_iter().collect()

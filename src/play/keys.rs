@@ -37,7 +37,7 @@ pub(crate) enum Key {
     Help,
 }
 
-/// Standard input without line buffering and echo, until it is dropped.
+/// Standard input without line buffering and echo. The settings are restored when the value is dropped.
 pub(super) struct Keyboard {
     before: Termios,
     ended: Arc<AtomicBool>,

@@ -61,7 +61,7 @@ fn needs_vehicle(args: &Trim) -> bool {
     args.chainage.is_some() || args.drop_echoes || args.anonymise
 }
 
-/// The vehicle, if the options need it.
+/// The vehicle; `None` if the options don't need it.
 fn vehicle(
     args: &Trim,
     given: Given,

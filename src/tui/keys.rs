@@ -75,7 +75,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn bytes_of_a_terminal_are_decoded_to_playback_keys() {
+    fn bytes_of_a_terminal_are_decoded_to_screen_keys() {
         assert_eq!(
             keys("a\x1b[D\x1bOA\u{e4}\r\x7f\x1b[3~ \x03".as_bytes()),
             [

@@ -1,4 +1,4 @@
-//! Kind of dive shown, and its state.
+//! Kind and state of the dive that is shown.
 
 use crossbeam::channel::Sender;
 use headrace_replay::playback::PlaybackCommand;

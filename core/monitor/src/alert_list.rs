@@ -89,7 +89,7 @@ impl AlertChange {
 pub struct Acknowledgement {
     /// Person or device.
     pub by: Who,
-    /// Time.
+    /// Time of the acknowledgement.
     pub at: MonoNs,
 }
 
@@ -163,12 +163,13 @@ impl ListedAlert {
         self.state != AlertState::Cleared
     }
 
-    /// Whether somebody must still acknowledge it.
+    /// Whether somebody must still acknowledge the alert.
     pub fn needs_acknowledgement(&self) -> bool {
         self.is_live() && self.priority != Priority::Caution && self.acknowledged.is_none()
     }
 
-    /// Whether the alert sounds at `now`: its condition holds, and nobody has acknowledged or silenced it.
+    /// Whether the alert sounds at `now`. Its condition holds then, and nobody has acknowledged or silenced
+    /// the alert.
     pub fn sounds(&self, now: MonoNs) -> bool {
         let is_silenced = self.silenced_until.is_some_and(|until| now < until);
         self.state == AlertState::Active && self.needs_acknowledgement() && !is_silenced

@@ -74,16 +74,16 @@ impl AlertKind {
 pub struct Alert {
     /// Kind.
     pub kind: AlertKind,
-    /// Time of its first occurrence.
+    /// Time of the alert's first occurrence.
     pub since: MonoNs,
-    /// Time at which its latest occurrence began.
+    /// Time at which the alert's latest occurrence began.
     pub latest: MonoNs,
     /// Number of occurrences.
     ///
     /// An occurrence is a sample outside the tunnel, a judgement of a contradicting section, or the beginning
     /// of distrust in a head or the cable counter.
     pub count: u64,
-    /// Chainage of its first occurrence, m.
+    /// Chainage of the alert's first occurrence, m.
     pub x_m: f64,
     /// Largest deviation, m.
     ///

@@ -61,7 +61,7 @@ pub struct VehicleState {
     pub fix: Result<Fix, NoFix>,
     /// Standard deviations of the pose, from its covariance; `None` if the navigation method provides none.
     pub sd: Option<PoseSd>,
-    /// Doubt about the cable counter while it isn't trusted.
+    /// Doubt about the cable counter; `None` while the counter is trusted.
     pub cable_doubt: Option<CableDoubt>,
 }
 
@@ -141,7 +141,7 @@ pub struct Head(pub usize);
 pub struct HeadSpecification {
     /// Mount and scan parameters.
     pub spec: HeadSpec,
-    /// Modes to which it can be set.
+    /// Modes to which the head can be set.
     pub modes: Vec<HeadMode>,
     /// Shortest range setting that reaches all wall from the centre, m, and the head's modes at that setting.
     ///

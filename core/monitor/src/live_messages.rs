@@ -38,7 +38,7 @@ pub enum LiveMessage {
         cause: Cause,
         /// All causes.
         causes: Causes,
-        /// Figures for its text.
+        /// Figures for the text of the message.
         #[serde(skip)]
         missed: Missed,
     },

@@ -102,9 +102,9 @@ pub struct ActiveAlert {
     pub kind: AlertKind,
     /// The distrusted head.
     pub source: Option<SourceId>,
-    /// Time at which its present occurrence began.
+    /// Time at which the alert's present occurrence began.
     pub since: MonoNs,
-    /// Chainage of its first occurrence, m.
+    /// Chainage of the alert's first occurrence, m.
     pub x_m: f64,
     /// Largest deviation, m.
     pub worst_m: f64,

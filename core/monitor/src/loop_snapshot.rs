@@ -70,7 +70,7 @@ impl StateParts {
         self.add::<T>(name);
     }
 
-    /// Adds a resource, unless it was added already.
+    /// Adds a resource. A resource that was added already is left out.
     fn add<T: Resource<Mutability = Mutable> + Stateful>(&mut self, name: &'static str) {
         self.add_part(Part {
             kind: TypeId::of::<T>(),

@@ -93,7 +93,7 @@ impl Inbox {
         self.packets.clear();
         self.bytes.clear();
         self.heads.clear();
-        // A ring is read again only once its first packet has been taken.
+        // A ring is looked at again only when its first packet has been taken.
         self.heads.extend(readers.iter().map(PortReader::peek));
         let limit = self.allowance_bytes.min(MAX_TICK_BYTES);
         while self.packets.len() < MAX_TICK_PACKETS {

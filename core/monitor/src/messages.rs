@@ -27,7 +27,7 @@ use headrace_sensor::reading::{Reading, SourceId};
 pub struct Event {
     /// Source of the reading.
     pub source: SourceId,
-    /// Receive time of its packet.
+    /// Receive time of the reading's packet.
     pub received: MonoNs,
     /// Time for which the reading is valid.
     pub valid_at: MonoNs,

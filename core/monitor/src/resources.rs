@@ -70,7 +70,7 @@ impl VehicleEntities {
     }
 }
 
-/// Coverage of the wall: samples, verdicts and what they need.
+/// Coverage of the wall: the samples, the verdicts, and the data from which the verdicts are formed.
 #[derive(Debug, Resource)]
 pub struct Coverage {
     /// Samples.
@@ -137,7 +137,7 @@ impl Digests {
         ]
     }
 
-    /// Keeps the words of each tick from now on. Allocates: the memory for them.
+    /// Keeps the words of each tick from now on. Allocates: once, all memory for the words.
     pub fn keep(&mut self) {
         self.poses.keep();
         self.pings.keep();
@@ -191,6 +191,6 @@ pub struct Tally {
 pub struct TickTime {
     /// Number from zero.
     pub index: u64,
-    /// End of its time.
+    /// End of the tick's time.
     pub now: MonoNs,
 }

@@ -260,7 +260,7 @@ pub struct ResultStream {
 stateful!(ResultStream { state: digest, records, lost; fixed: words, room, head; });
 
 impl ResultStream {
-    /// Keeps the words of each tick from now on. Allocates: the memory for them.
+    /// Keeps the words of each tick from now on. Allocates: once, all memory for the words.
     pub fn keep(&mut self) {
         self.room = MAX_TICK_WORDS;
         self.words.reserve_exact(self.room);

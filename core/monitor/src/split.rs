@@ -268,7 +268,7 @@ impl Loop {
         is_taken
     }
 
-    /// Puts the parts back, after the last tick that they have processed.
+    /// Puts the parts back into the loop, after the last tick that they have processed.
     pub fn join(&mut self, placer: Placer, advising: Advising) {
         let Placer { world: mut placing, readers, .. } = placer;
         let (world, own) = self.split_world();

@@ -32,7 +32,7 @@ pub(super) struct Pass {
     pub(super) points: Vec<[f64; 2]>,
 }
 
-/// Computes enough turns for the chart and its detail.
+/// Computes the pattern, with enough turns for the chart and its detail.
 pub(super) fn lay(shown: &Shown<'_>) -> Result<Laid, SamplingError> {
     let planner = shown.planner;
     let specs = planner.specs(shown.mode);

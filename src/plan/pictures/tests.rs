@@ -149,7 +149,7 @@ fn no_empty_circle_exceeds_diameter_t() {
     }
 }
 
-/// Names of the modes that meet a target, each with `words` on its speed.
+/// Names of the modes that meet a target. `words` makes the text on each mode's speed.
 fn met(inspection: Inspection, target_m: f64, words: impl Fn(f64) -> String) -> Vec<String> {
     let planner = Planner::new(inspection).unwrap();
     let speed = |mode| Some((modes::name(&planner, mode), planner.v_max_mps(mode, target_m).ok()?));

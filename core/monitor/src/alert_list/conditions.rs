@@ -89,7 +89,7 @@ impl AlertList {
         self.take_recording(at, to);
     }
 
-    /// Records whether a recording fails.
+    /// Records whether a log recording fails.
     pub(crate) fn set_recording(&mut self, fails: bool, at: MonoNs, to: &mut Telling<'_>) {
         self.recording_fails = fails;
         self.take_recording(at, to);

@@ -46,7 +46,7 @@ pub struct ListedAlertJson {
     pub silenced_until_s: Option<f64>,
     /// Whether the alert sounds now.
     pub sounds: bool,
-    /// Whether somebody must still acknowledge it.
+    /// Whether somebody must still acknowledge the alert.
     pub needs_acknowledgement: bool,
     /// Beginning of the alert's stretch, or place of the vehicle when the alert was raised, m.
     pub from_m: Option<f64>,
@@ -65,12 +65,12 @@ pub struct ListedAlertJson {
     pub merged_into: Option<u32>,
 }
 
-/// Acknowledgement of an alert.
+/// Acknowledgement of an alert, with person and time.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct AcknowledgedJson {
     /// Person or device.
     pub by: String,
-    /// Time, seconds on the log's clock.
+    /// Time of the acknowledgement, seconds on the log's clock.
     pub at_s: f64,
 }
 
@@ -91,7 +91,7 @@ pub struct AlertCountsJson {
     pub caution: u32,
 }
 
-/// Remaining cable, time and charge, as far as they are known.
+/// Remaining cable, time and charge. An unknown amount is `None`.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
 pub struct LeftJson {
     /// Length of cable left beyond the vehicle's place, m.

@@ -11,9 +11,9 @@ pub use headrace_vehicle::AlertClass;
 pub enum Priority {
     /// For information; needs no acknowledgement.
     Caution,
-    /// Needs attention before it becomes worse.
+    /// The situation needs attention before it becomes worse.
     Warning,
-    /// Needs action.
+    /// The situation needs action now.
     Alarm,
     /// The vehicle may be lost.
     EmergencyAlarm,
@@ -70,7 +70,7 @@ pub enum ListKind {
     OutsideTunnel,
     /// Most samples contradict the profile; see [`AlertKind::ProfileContradicted`].
     ProfileContradicted,
-    /// A recording fails.
+    /// A log recording fails.
     NotRecorded,
     /// Little cable is left.
     CableLeft,

@@ -113,7 +113,7 @@ impl Oracle {
             "active unacknowledged" | "active acknowledged" | "active caution"
                 if off.is_some_and(|off| off >= off_ms) =>
             {
-                // After its end, a situation starts afresh.
+                // A situation starts afresh after its alert has ended.
                 self.history.clear();
                 self.all.last_mut().unwrap().1 =
                     if state == "active unacknowledged" { "rectified unacknowledged" } else { "cleared" };

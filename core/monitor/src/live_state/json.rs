@@ -35,7 +35,7 @@ pub struct LiveStateJson {
     pub v_max_mps: Option<f64>,
     /// Reason that limits the speed; `None` before the first advice.
     pub reason: Option<&'static str>,
-    /// Distances to the limits, and margins.
+    /// Margins of speed and turn, part of the target that position errors take, and share of lost returns.
     pub margins: MarginsJson,
     /// Forecast of the present turn.
     pub turn: Option<TurnJson>,
@@ -51,7 +51,7 @@ pub struct LiveStateJson {
     pub alert_counts: AlertCountsJson,
     /// Text of the setting that would allow a higher speed; `None` if there is none.
     pub remedy: Option<String>,
-    /// Remaining cable, time and charge, as far as they are known.
+    /// Remaining cable, time and charge. An unknown amount is `None`.
     pub left: LeftJson,
     /// Alerts, most urgent first, at most 64. A few ended alerts come last.
     pub alert_list: Vec<ListedAlertJson>,
@@ -85,7 +85,7 @@ pub struct PositionJson {
     pub stand_s: u32,
 }
 
-/// Distances to the limits, and margins.
+/// Margins of speed and turn, part of the target that position errors take, and share of lost returns.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct MarginsJson {
     /// v_max minus the present speed, m/s; negative if the speed is too fast.
@@ -124,9 +124,9 @@ pub struct SensorJson {
     pub id: String,
     /// State.
     pub state: SensorState,
-    /// Age of its last reading, seconds; `None` if there is none.
+    /// Age of the sensor's last reading, seconds; `None` if there is none.
     pub age_s: Option<f64>,
-    /// Whether it is a profiling head.
+    /// Whether the sensor is a profiling head.
     pub is_head: bool,
 }
 
@@ -136,7 +136,7 @@ pub struct MetresJson {
     /// Metres by verdict.
     #[serde(flatten)]
     pub by_state: LiveMetres,
-    /// Sum of the metres.
+    /// Sum of the metres by verdict.
     pub way_m: f64,
 }
 

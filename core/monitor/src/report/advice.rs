@@ -29,7 +29,7 @@ pub struct AdviceReport {
     pub predicted_t_m: Option<f64>,
     /// Whether the present turn will exceed the target at the present speed.
     pub will_exceed: bool,
-    /// Largest phase error of a head, degrees of its turn.
+    /// Largest phase error of a head, as an angle of its turn, degrees.
     pub phase_error_deg: Option<f64>,
     /// Hours at `v_max_mps` for the rest of the tunnel.
     pub needed_h: Option<f64>,

@@ -111,7 +111,7 @@ pub struct LogReport {
     pub sha256: String,
     /// Number of messages from sources.
     pub messages: u64,
-    /// Losses in plain text, each with its time span.
+    /// Losses in plain text. Each text has the time span of the loss.
     pub losses: Vec<String>,
     /// Irregularities and how they were handled, in plain text. They lost no data.
     pub notes: Vec<String>,
@@ -143,7 +143,7 @@ pub struct DiveReport {
     pub to_m: Option<f64>,
     /// Distance between the two chainages, m.
     pub distance_m: f64,
-    /// Whether any profiling head pinged. Otherwise there is no coverage.
+    /// Whether any profiling head pinged. If none did, there is no coverage.
     pub sonar: bool,
     /// Minimum speed of sound used for ranges, m/s.
     pub sound_speed_least_mps: f64,

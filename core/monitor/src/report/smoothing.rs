@@ -52,7 +52,7 @@ pub struct ChangeReport {
 pub struct JudgedReport {
     /// `pass`, `fail`, `cannot_say` or `open`.
     pub verdict: &'static str,
-    /// Diameter of the largest hole, m; `None` if it wasn't measured.
+    /// Diameter of the largest hole, m; `None` if the hole wasn't measured.
     pub hole_m: Option<f64>,
     /// Standard deviation of the diameter, m.
     pub hole_sd_m: f64,

@@ -51,7 +51,7 @@ pub struct HolidayReport {
     pub clock: String,
 }
 
-/// Maximum number of empty nodes listed; `empty` counts them all.
+/// Maximum number of empty nodes listed. The field `empty` counts all of them.
 const LISTED: usize = 1000;
 
 pub(super) fn survey(coverage: &Coverage, profile: &Profile) -> SurveyReport {

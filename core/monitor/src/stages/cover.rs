@@ -186,7 +186,7 @@ fn count(tally: &mut Tally, ping: &PlacedPing) {
     }
 }
 
-/// Adds a ping to the passage of the section in which its head is.
+/// Adds a ping to the passage of the section that the ping's head is in.
 fn note_passage(
     coverage: &mut Coverage,
     frontier: &HeadFrontier,
@@ -261,7 +261,7 @@ mod tests {
     use headrace_sensor::device::{SensorInfo, SensorKind};
     use headrace_sensor::reading::SourceId;
 
-    /// Sections in which those with these indices have failed.
+    /// Sections for a test. The ones with these indices have failed.
     fn missed(failed: &[i64]) -> Sections {
         let (Coverage { store, mut sections, .. }, profile) = (coverage(), pipe());
         let mut judging = Judging {

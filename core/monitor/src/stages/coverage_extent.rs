@@ -89,7 +89,7 @@ mod tests {
         MonoNs(seconds * 1_000_000_000)
     }
 
-    /// A vehicle with heads half a metre ahead and half a metre astern, at 4.5 m and 3.5 m. `heard` has the
+    /// A vehicle with heads half a metre ahead and half a metre astern, at 4.5 m and 3.5 m. `heard_s` has the
     /// times of their last pings.
     struct Bench {
         world: World,

@@ -142,7 +142,7 @@ fn outcome(
         return sample(range_m);
     }
     let loss = match wall_m {
-        // Wall out of range is out of range, occluded or not.
+        // Wall beyond the longest range counts as out of range, even if the vehicle occludes it.
         Some(wall_m) if wall_m > longest_m(sonar, tunnel) => Loss::OutOfRange,
         _ if hidden => Loss::Occluded,
         Some(_) => Loss::Missing,

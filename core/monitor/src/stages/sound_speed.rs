@@ -29,7 +29,7 @@ pub(crate) struct SoundSpeed {
 stateful!(SoundSpeed { state: now_mps, heard, span_mps; fixed: source, site_mps; });
 
 impl SoundSpeed {
-    /// Creates it with the site's speed, which applies until `source` supplies another.
+    /// Creates the state with the site's speed, which applies until `source` supplies another.
     pub(crate) fn new(site_mps: f64, source: Option<SourceId>) -> Self {
         Self { source, site_mps, now_mps: site_mps, heard: None, span_mps: [site_mps; 2] }
     }
